@@ -1,0 +1,31 @@
+//! Plugins: values that add themselves to an [`App`].
+
+use super::App;
+
+/// Something that can be added to the loop: a device, an outlet, a stage.
+pub trait Plugin {
+    /// Registers sources, components, systems in a named stage, outlets.
+    ///
+    /// Errors: what the plugin needs isn't there, or is there twice.
+    fn build(&self, app: &mut App) -> Result<(), PluginError>;
+}
+
+/// Why a plugin could not be added.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum PluginError {
+    /// Two sources have one id.
+    #[error("adding source {id:?}: a source of that id is registered already; ids must differ")]
+    DuplicateSource {
+        /// The id.
+        id: String,
+    },
+    /// More sources than the loop's tables hold.
+    #[error("adding source {id:?}: there are {max} sources already, which is the most")]
+    TooManySources {
+        /// The id.
+        id: String,
+        /// The limit.
+        max: usize,
+    },
+}

@@ -1,0 +1,102 @@
+//! What sensors say, freed of their protocols: the values that decoders hand to the loop.
+
+use crate::frames::{Rot, Sensor, Vec3};
+use crate::time::MonoNs;
+
+/// An IMU's own level reference: z up, x where its yaw is zero (magnetic or arbitrary north).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Level {}
+
+/// A registered source of bytes; also the second key of the total order of messages.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct SourceId(pub u16);
+
+impl SourceId {
+    /// Index into per-source tables.
+    pub fn index(self) -> usize {
+        usize::from(self.0)
+    }
+}
+
+/// Bytes as they came from a device, or from a log of it.
+#[derive(Debug, Clone, Copy)]
+pub struct Packet<'a> {
+    /// When the first byte came.
+    pub received: MonoNs,
+    /// The bytes.
+    pub bytes: &'a [u8],
+}
+
+/// One value of a sensor, in SI units and the sensor's own frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Reading {
+    /// A ping of a profiling head.
+    Sonar(SonarReturn),
+    /// A ping of a fixed echosounder, which looks along its own x.
+    Echo(EchoRange),
+    /// Absolute pressure of the water.
+    Pressure(WaterPressure),
+    /// Orientation that the device has computed: its own frame to level.
+    Attitude(Rot<Level, Sensor>),
+    /// Turn rate, rad/s.
+    AngularRate(Vec3<Sensor>),
+    /// Acceleration less gravity (specific force), m/s^2: at rest and level it is +9.8 along z.
+    SpecificForce(Vec3<Sensor>),
+    /// Cable paid out, or another measure of distance gone.
+    TetherLength(TetherLength),
+}
+
+/// A ping of a profiling head.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SonarReturn {
+    /// Head angle in the sensor's frame, radians: 0 down, growing clockwise seen along +x; any turn.
+    pub angle_rad: f64,
+    /// Slant range in metres as the device computed it, or `None` where nothing was above its threshold.
+    pub range_m: Option<f64>,
+    /// Quantum of that range.
+    pub resolution_m: f64,
+    /// The range that the head was set to.
+    pub max_range_m: f64,
+    /// Speed of sound with which the device computed the range.
+    pub sound_speed_mps: f64,
+}
+
+/// A ping of a fixed echosounder.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EchoRange {
+    /// Distance in metres as the device computed it; `None` where it found no echo.
+    pub range_m: Option<f64>,
+    /// The device's own confidence, 0 to 1.
+    pub confidence: f64,
+    /// Speed of sound with which the device computed the range.
+    pub sound_speed_mps: f64,
+}
+
+/// Absolute pressure of the water.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WaterPressure {
+    /// Absolute pressure, Pa.
+    pub pressure_pa: f64,
+    /// Quantum of the pressure, Pa.
+    pub resolution_pa: f64,
+    /// Water temperature, degrees Celsius.
+    pub temperature_degc: f64,
+}
+
+/// Cable paid out.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TetherLength {
+    /// Metres since the counter's zero, growing as the vehicle goes in.
+    pub length_m: f64,
+    /// Quantum of the length.
+    pub resolution_m: f64,
+}
+
+/// A reading and the moment for which it is valid.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Decoded {
+    /// Time of validity: the receive time less what the decoder knows of the delays.
+    pub valid_at: MonoNs,
+    /// The value.
+    pub reading: Reading,
+}

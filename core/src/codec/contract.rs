@@ -1,0 +1,134 @@
+//! The contract that every codec passes, as a macro that makes tests of it.
+//!
+//! Enable the feature `contract` in a plugin's dev-dependencies and call [`codec_contract!`](crate::codec_contract)
+//! once per codec.
+
+use super::Codec;
+
+/// Decodes `bytes` pushed in pieces of the given lengths (the last takes the rest), without a flush.
+pub fn decode_pieces<C: Codec>(codec: &mut C, bytes: &[u8], pieces: &[usize]) -> Vec<C::Value> {
+    let mut values = Vec::new();
+    let mut rest = bytes;
+    for piece in pieces {
+        let (now, later) = rest.split_at((*piece).min(rest.len()));
+        codec.push(now, &mut |value| values.push(value));
+        assert!(codec.held_bytes() <= C::MAX_FRAME_BYTES, "holds {} bytes", codec.held_bytes());
+        rest = later;
+    }
+    codec.push(rest, &mut |value| values.push(value));
+    assert!(codec.held_bytes() <= C::MAX_FRAME_BYTES, "holds {} bytes", codec.held_bytes());
+    values
+}
+
+/// Decodes `bytes` in one piece and flushes.
+pub fn decode_all<C: Codec>(codec: &mut C, bytes: &[u8]) -> Vec<C::Value> {
+    let mut values = decode_pieces(codec, bytes, &[]);
+    codec.flush(&mut |value| values.push(value));
+    values
+}
+
+/// Garbage, then a good frame: the frame must be the last value.
+pub fn decode_after_garbage<C: Codec>(codec: &mut C, garbage: &[u8], frame: &[u8]) -> Vec<C::Value> {
+    let mut values = Vec::new();
+    codec.push(garbage, &mut |value| values.push(value));
+    if C::WHOLE_MESSAGES {
+        codec.flush(&mut |value| values.push(value));
+    }
+    codec.push(frame, &mut |value| values.push(value));
+    codec.flush(&mut |value| values.push(value));
+    values
+}
+
+/// Makes a module of tests that hold a codec to its contract.
+///
+/// `codec` is an expression that makes a fresh one, `values` a proptest strategy of all values that can be encoded,
+/// `encode` a function from `&Value` to its bytes, and `frames` one or more good frames as the device sends them.
+/// On a byte stream a frame can only be told from garbage by what the protocol offers. Where the last bytes of the
+/// garbage and the first of the frame together make a valid frame, no decoder can know better; the macro's garbage is
+/// random, so that the chance of it is the protocol's own.
+#[macro_export]
+macro_rules! codec_contract {
+    ($module:ident, codec: $codec:expr, values: $values:expr, encode: $encode:expr, frames: $frames:expr $(,)?) => {
+        mod $module {
+            #[allow(unused_imports)]
+            use super::*;
+            use proptest::prelude::*;
+            use $crate::codec::Codec as _;
+            use $crate::codec::contract::{decode_after_garbage, decode_all, decode_pieces};
+
+            proptest! {
+                #[test]
+                fn any_bytes_never_panic_and_every_byte_is_accounted_for(
+                    bytes in proptest::collection::vec(any::<u8>(), 0..2000),
+                    pieces in proptest::collection::vec(0usize..40, 0..60),
+                ) {
+                    let mut codec = $codec;
+                    let _ = decode_pieces(&mut codec, &bytes, &pieces);
+                    codec.flush(&mut |_| ());
+                    prop_assert_eq!(codec.held_bytes(), 0);
+                    prop_assert!(codec.counts().skipped_bytes <= bytes.len() as u64);
+                }
+
+                #[test]
+                fn input_split_anywhere_gives_the_same_values(
+                    values in proptest::collection::vec($values, 1..6),
+                    noise in proptest::collection::vec(any::<u8>(), 0..30),
+                    pieces in proptest::collection::vec(0usize..25, 0..200),
+                ) {
+                    let mut bytes = Vec::new();
+                    for (i, value) in values.iter().enumerate() {
+                        if i == values.len() / 2 {
+                            bytes.extend_from_slice(&noise);
+                        }
+                        bytes.extend_from_slice(&($encode)(value));
+                    }
+                    let (mut whole, mut split) = ($codec, $codec);
+                    let expected = decode_all(&mut whole, &bytes);
+                    let mut got = decode_pieces(&mut split, &bytes, &pieces);
+                    split.flush(&mut |value| got.push(value));
+                    prop_assert_eq!(got, expected);
+                    prop_assert_eq!(split.counts(), whole.counts());
+                }
+
+                #[test]
+                fn garbage_before_a_good_frame_does_not_lose_it(
+                    garbage in proptest::collection::vec(any::<u8>(), 0..100),
+                    value in $values,
+                ) {
+                    let frame = ($encode)(&value);
+                    let got = decode_after_garbage(&mut $codec, &garbage, &frame);
+                    prop_assert_eq!(got.last(), Some(&value), "after garbage {:02X?}", garbage);
+                }
+
+                #[test]
+                fn a_frame_cut_short_before_a_good_one_does_not_lose_it(
+                    cut in $values,
+                    keep in 0.0f64..1.0,
+                    value in $values,
+                ) {
+                    let whole = ($encode)(&cut);
+                    let part = &whole[..((whole.len() as f64) * keep) as usize];
+                    let got = decode_after_garbage(&mut $codec, part, &($encode)(&value));
+                    prop_assert_eq!(got.last(), Some(&value), "after {:02X?}", part);
+                }
+
+                #[test]
+                fn encode_then_decode_is_the_identity(value in $values) {
+                    prop_assert_eq!(decode_all(&mut $codec, &($encode)(&value)), vec![value]);
+                }
+            }
+
+            #[test]
+            fn the_given_frames_are_good_split_at_every_byte() {
+                for frame in $frames {
+                    let frame: &[u8] = frame.as_ref();
+                    let expected = decode_all(&mut $codec, frame);
+                    assert_eq!(expected.len(), 1, "{frame:02X?}");
+                    for at in 0..=frame.len() {
+                        assert_eq!(decode_pieces(&mut $codec, frame, &[at]), expected, "split at {at}");
+                    }
+                }
+            }
+        }
+    };
+}

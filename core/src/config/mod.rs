@@ -1,0 +1,7 @@
+//! Files that people write, from text to checked values. Reading the file itself is the caller's.
+
+mod reader;
+pub mod vehicle;
+
+pub use reader::{ConfigError, Document, Section};
+pub use vehicle::{SensorConfig, TunnelConfig, VehicleConfig, WaterConfig};

@@ -1,0 +1,349 @@
+//! Typed access to a TOML text, whose errors name file, line, key, value and what is allowed.
+
+use core::cell::RefCell;
+use core::ops::RangeInclusive;
+
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+/// What is wrong with a file that a person wrote.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{file}:{line}: {key}{}: {problem}", .value.as_ref().map(|v| format!(" = {v}")).unwrap_or_default())]
+pub struct ConfigError {
+    /// The file, as the caller named it.
+    pub file: String,
+    /// Line, counted from one.
+    pub line: usize,
+    /// Dotted path of the key.
+    pub key: String,
+    /// The value that stands there, where there is one.
+    pub value: Option<String>,
+    /// What is wrong and what would be allowed.
+    pub problem: String,
+}
+
+/// A text and its name.
+#[derive(Debug, Clone, Copy)]
+pub struct Document<'a> {
+    file: &'a str,
+    text: &'a str,
+}
+
+/// One table of a document. Keys that nobody asked for are an error at [`Section::finish`].
+#[derive(Debug)]
+pub struct Section<'a> {
+    document: Document<'a>,
+    path: String,
+    table: DeTable<'a>,
+    at: usize,
+    asked: RefCell<Vec<&'static str>>,
+}
+
+impl<'a> Document<'a> {
+    /// `file` names the text in errors.
+    pub fn new(file: &'a str, text: &'a str) -> Self {
+        Self { file, text }
+    }
+
+    /// Parses the text to its root table.
+    ///
+    /// Errors: the text isn't TOML.
+    pub fn root(self) -> Result<Section<'a>, ConfigError> {
+        match DeTable::parse(self.text) {
+            Ok(root) => Ok(Section {
+                document: self,
+                path: String::new(),
+                at: 0,
+                table: root.into_inner(),
+                asked: RefCell::default(),
+            }),
+            Err(error) => {
+                let at = error.span().map_or(0, |span| span.start);
+                Err(ConfigError {
+                    file: self.file.to_owned(),
+                    line: self.line(at),
+                    key: "TOML".to_owned(),
+                    value: None,
+                    problem: error.message().to_owned(),
+                })
+            }
+        }
+    }
+
+    fn line(&self, at: usize) -> usize {
+        self.text.bytes().take(at).filter(|byte| *byte == b'\n').count() + 1
+    }
+}
+
+impl<'a> Section<'a> {
+    /// A number within `allowed`, in the unit that the key's name ends in.
+    ///
+    /// Errors: not a finite number, or outside `allowed`.
+    pub fn number(
+        &self,
+        key: &'static str,
+        allowed: RangeInclusive<f64>,
+    ) -> Result<Option<f64>, ConfigError> {
+        let Some(value) = self.ask(key) else { return Ok(None) };
+        let wanted = || format!("must be a number from {} to {}", allowed.start(), allowed.end());
+        let number = as_number(value.get_ref()).ok_or_else(|| self.error(key, Some(value), wanted()))?;
+        if !allowed.contains(&number) {
+            return Err(self.error(key, Some(value), wanted()));
+        }
+        Ok(Some(number))
+    }
+
+    /// A whole number within `allowed`; also written 0x...
+    ///
+    /// Errors: not a whole number, or outside `allowed`.
+    pub fn integer(
+        &self,
+        key: &'static str,
+        allowed: RangeInclusive<i64>,
+    ) -> Result<Option<i64>, ConfigError> {
+        let Some(value) = self.ask(key) else { return Ok(None) };
+        let wanted = || format!("must be a whole number from {} to {}", allowed.start(), allowed.end());
+        match as_integer(value.get_ref()) {
+            Some(number) if allowed.contains(&number) => Ok(Some(number)),
+            _ => Err(self.error(key, Some(value), wanted())),
+        }
+    }
+
+    /// A text.
+    ///
+    /// Errors: not a string.
+    pub fn text(&self, key: &'static str) -> Result<Option<String>, ConfigError> {
+        let Some(value) = self.ask(key) else { return Ok(None) };
+        match value.get_ref().as_str() {
+            Some(text) => Ok(Some(text.to_owned())),
+            None => Err(self.error(key, Some(value), "must be a text in quotes".to_owned())),
+        }
+    }
+
+    /// True or false.
+    ///
+    /// Errors: anything else.
+    pub fn boolean(&self, key: &'static str) -> Result<Option<bool>, ConfigError> {
+        let Some(value) = self.ask(key) else { return Ok(None) };
+        match value.get_ref().as_bool() {
+            Some(boolean) => Ok(Some(boolean)),
+            None => Err(self.error(key, Some(value), "must be true or false".to_owned())),
+        }
+    }
+
+    /// One of the given words, with what it stands for.
+    ///
+    /// Errors: another word; the message lists those allowed.
+    pub fn choice<T: Copy>(&self, key: &'static str, among: &[(&str, T)]) -> Result<Option<T>, ConfigError> {
+        let Some(value) = self.ask(key) else { return Ok(None) };
+        let found = value.get_ref().as_str().and_then(|text| among.iter().find(|(word, _)| *word == text));
+        match found {
+            Some((_, meaning)) => Ok(Some(*meaning)),
+            None => {
+                let words: Vec<&str> = among.iter().map(|(word, _)| *word).collect();
+                Err(self.error(key, Some(value), format!("must be one of {}", words.join(", "))))
+            }
+        }
+    }
+
+    /// Three numbers, each within `allowed`.
+    ///
+    /// Errors: not an array of three, or one of them outside.
+    pub fn triple(
+        &self,
+        key: &'static str,
+        allowed: RangeInclusive<f64>,
+    ) -> Result<Option<[f64; 3]>, ConfigError> {
+        let Some(value) = self.ask(key) else { return Ok(None) };
+        let wanted =
+            || format!("must be three numbers [a, b, c], each from {} to {}", allowed.start(), allowed.end());
+        let numbers = self.array_of_numbers(key, value, &allowed, &wanted)?;
+        match numbers.as_slice() {
+            [a, b, c] => Ok(Some([*a, *b, *c])),
+            _ => Err(self.error(key, Some(value), wanted())),
+        }
+    }
+
+    /// Any count of numbers, each within `allowed`.
+    ///
+    /// Errors: not an array of numbers, or one of them outside.
+    pub fn numbers(
+        &self,
+        key: &'static str,
+        allowed: RangeInclusive<f64>,
+    ) -> Result<Option<Vec<f64>>, ConfigError> {
+        let Some(value) = self.ask(key) else { return Ok(None) };
+        let wanted =
+            || format!("must be numbers [a, b, ...], each from {} to {}", allowed.start(), allowed.end());
+        self.array_of_numbers(key, value, &allowed, &wanted).map(Some)
+    }
+
+    /// A table within this one.
+    ///
+    /// Errors: the key holds something else.
+    pub fn section(&self, key: &'static str) -> Result<Option<Section<'a>>, ConfigError> {
+        let Some(value) = self.ask(key) else { return Ok(None) };
+        match value.get_ref() {
+            DeValue::Table(table) => Ok(Some(self.child(key, table.clone(), value.span().start))),
+            _ => Err(self.error(key, Some(value), "must be a table".to_owned())),
+        }
+    }
+
+    /// The tables of an array of tables; none when the key is absent.
+    ///
+    /// Errors: the key holds something else.
+    pub fn sections(&self, key: &'static str) -> Result<Vec<Section<'a>>, ConfigError> {
+        let Some(value) = self.ask(key) else { return Ok(Vec::new()) };
+        let wrong = || self.error(key, Some(value), format!("must be tables, each headed [[{key}]]"));
+        let array = value.get_ref().as_array().ok_or_else(wrong)?;
+        array
+            .iter()
+            .enumerate()
+            .map(|(i, item)| match item.get_ref() {
+                DeValue::Table(table) => {
+                    Ok(self.child(&format!("{key}[{i}]"), table.clone(), item.span().start))
+                }
+                _ => Err(wrong()),
+            })
+            .collect()
+    }
+
+    /// `value`, or an error that the key is missing.
+    ///
+    /// Errors: `value` is `None`.
+    pub fn required<T>(&self, key: &'static str, value: Option<T>) -> Result<T, ConfigError> {
+        value.ok_or_else(|| self.error(key, None, "is missing".to_owned()))
+    }
+
+    /// Checks that every key in this table was asked for.
+    ///
+    /// Errors: the first key that wasn't; the message lists the ones that are known here.
+    pub fn finish(self) -> Result<(), ConfigError> {
+        let asked = self.asked.borrow();
+        let unknown = self.table.keys().filter(|key| !asked.contains(&key.get_ref().as_ref()));
+        match unknown.min_by_key(|key| key.span().start) {
+            None => Ok(()),
+            Some(key) => Err(ConfigError {
+                file: self.document.file.to_owned(),
+                line: self.document.line(key.span().start),
+                key: self.full(key.get_ref()),
+                value: None,
+                problem: format!("is not a key here; known are {}", asked.join(", ")),
+            }),
+        }
+    }
+
+    /// An error about `key` in this table, for checks that only the caller can make.
+    pub fn invalid(&self, key: &str, problem: &str) -> ConfigError {
+        let value = self.table.get(key);
+        self.error(key, value, problem.to_owned())
+    }
+
+    /// The file that this table is from, as the caller named it.
+    pub fn file(&self) -> &str {
+        self.document.file
+    }
+
+    /// Keys present in this table, in the order of the file.
+    pub fn keys(&self) -> Vec<&str> {
+        let mut keys: Vec<_> = self.table.keys().collect();
+        keys.sort_by_key(|key| key.span().start);
+        keys.into_iter().map(|key| key.get_ref().as_ref()).collect()
+    }
+
+    fn ask(&self, key: &'static str) -> Option<&Spanned<DeValue<'a>>> {
+        if !self.asked.borrow().contains(&key) {
+            self.asked.borrow_mut().push(key);
+        }
+        self.table.get(key)
+    }
+
+    fn array_of_numbers(
+        &self,
+        key: &str,
+        value: &Spanned<DeValue<'a>>,
+        allowed: &RangeInclusive<f64>,
+        wanted: &impl Fn() -> String,
+    ) -> Result<Vec<f64>, ConfigError> {
+        let wrong = || self.error(key, Some(value), wanted());
+        let array = value.get_ref().as_array().ok_or_else(wrong)?;
+        array
+            .iter()
+            .map(|item| as_number(item.get_ref()).filter(|n| allowed.contains(n)).ok_or_else(wrong))
+            .collect()
+    }
+
+    fn child(&self, key: &str, table: DeTable<'a>, at: usize) -> Section<'a> {
+        Section { document: self.document, path: self.full(key), table, at, asked: RefCell::default() }
+    }
+
+    fn full(&self, key: &str) -> String {
+        if self.path.is_empty() { key.to_owned() } else { format!("{}.{key}", self.path) }
+    }
+
+    fn error(&self, key: &str, value: Option<&Spanned<DeValue<'a>>>, problem: String) -> ConfigError {
+        let at = value.map_or(self.at, |value| value.span().start);
+        let text = value.and_then(|value| self.document.text.get(value.span()));
+        ConfigError {
+            file: self.document.file.to_owned(),
+            line: self.document.line(at),
+            key: self.full(key),
+            value: text.map(|text| text.lines().next().unwrap_or_default().chars().take(60).collect()),
+            problem,
+        }
+    }
+}
+
+fn as_integer(value: &DeValue<'_>) -> Option<i64> {
+    let integer = value.as_integer()?;
+    i64::from_str_radix(integer.as_str(), integer.radix()).ok()
+}
+
+fn as_number(value: &DeValue<'_>) -> Option<f64> {
+    let number = match value {
+        DeValue::Integer(_) => as_integer(value)? as f64,
+        DeValue::Float(float) => float.as_str().parse().ok()?,
+        _ => return None,
+    };
+    number.is_finite().then_some(number)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TEXT: &str = "target_m = 0.5\n[water]\nsound_speed_mps = 14470\nsalt = 1\n";
+
+    #[test]
+    fn an_error_names_file_line_key_value_and_what_is_allowed() {
+        let root = Document::new("v.toml", TEXT).root().unwrap();
+        assert_eq!(root.number("target_m", 0.0..=1.0).unwrap(), Some(0.5));
+        let water = root.section("water").unwrap().unwrap();
+        let error = water.number("sound_speed_mps", 1300.0..=1600.0).unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "v.toml:3: water.sound_speed_mps = 14470: must be a number from 1300 to 1600"
+        );
+        let error = water.finish().unwrap_err();
+        assert_eq!(error.to_string(), "v.toml:4: water.salt: is not a key here; known are sound_speed_mps");
+    }
+
+    #[test]
+    fn a_missing_key_and_a_broken_text_have_their_line() {
+        let root = Document::new("v.toml", "\n[water]\n").root().unwrap();
+        let water = root.section("water").unwrap().unwrap();
+        let error =
+            water.required("density_kgpm3", water.number("density_kgpm3", 0.0..=1.0).unwrap()).unwrap_err();
+        assert_eq!(error.to_string(), "v.toml:2: water.density_kgpm3: is missing");
+        assert_eq!(Document::new("v.toml", "a = 1\nb = \n").root().unwrap_err().line, 2);
+    }
+
+    #[test]
+    fn not_a_number_is_refused() {
+        let root = Document::new("v.toml", "a = nan\nb = inf\nc = \"1\"\nd = [1, 2]\n").root().unwrap();
+        for key in ["a", "b", "c"] {
+            assert!(root.number(key, f64::MIN..=f64::MAX).is_err(), "{key}");
+        }
+        assert!(root.triple("d", -1.0..=9.0).is_err());
+    }
+}

@@ -1,0 +1,199 @@
+//! `VEHICLE.toml`: the vehicle, its sensors, the tunnel and the target.
+
+use super::reader::{ConfigError, Document, Section};
+use crate::app::device::{Device, DeviceKind};
+use crate::frames::{Mount, Rot, Vec3};
+use crate::sampling::layout::HeadLayout;
+use crate::site::Site;
+use crate::time::DurNs;
+use crate::tunnel::Profile;
+use crate::tunnel::named;
+
+/// A whole vehicle file, checked.
+pub struct VehicleConfig {
+    /// What people call the vehicle.
+    pub name: String,
+    /// Target T: the largest hole that passes, m.
+    pub target_m: f64,
+    /// Length of a section along the tunnel, m.
+    pub section_m: f64,
+    /// Water, gravity, levels.
+    pub site: Site,
+    /// The tunnel.
+    pub tunnel: TunnelConfig,
+    /// How the heads share the work.
+    pub layout: HeadLayout,
+    /// The speed for which the heads' phases are set, m/s.
+    pub planned_speed_mps: f64,
+    /// The sensors, in the order of the file, which is the order of their sources.
+    pub sensors: Vec<Box<dyn Device>>,
+    /// The common part of each sensor's table, in the same order.
+    pub sensor_configs: Vec<SensorConfig>,
+}
+
+/// The `[tunnel]` table.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TunnelConfig {
+    /// What the profile is called in the file.
+    pub name: String,
+    /// Design profile of the cross-section.
+    pub profile: Profile,
+    /// Length along the axis, m: chainage 0 at the portal to this.
+    pub length_m: f64,
+}
+
+/// The `[water]` table and levels; see [`Site`].
+pub type WaterConfig = Site;
+
+/// What every `[[sensors]]` table has.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SensorConfig {
+    /// Name of the sensor and of its channel in the log.
+    pub id: String,
+    /// Kind of device.
+    pub plugin: String,
+    /// Where it is connected, as written.
+    pub connect: String,
+    /// How it sits on the vehicle.
+    pub mount: Mount,
+    /// Time from validity of a value to the receive time of its first byte.
+    pub latency: DurNs,
+}
+
+/// Reads a file that a vehicle file names (a polyline profile), by the name given there.
+pub type Loader<'a> = &'a dyn Fn(&str) -> Result<String, String>;
+
+const SENSOR_DISTANCE_M: core::ops::RangeInclusive<f64> = -20.0..=20.0;
+const DEGREES: core::ops::RangeInclusive<f64> = -360.0..=360.0;
+
+impl VehicleConfig {
+    /// Parses and checks a vehicle file against the device kinds that this build has.
+    ///
+    /// Errors: the first key that is missing, unknown or out of range, with its line.
+    pub fn parse(
+        document: Document<'_>,
+        kinds: &[&dyn DeviceKind],
+        load: Loader<'_>,
+    ) -> Result<Self, ConfigError> {
+        let root = document.root()?;
+        let vehicle = Self::from_section(&root, kinds, load)?;
+        root.finish()?;
+        Ok(vehicle)
+    }
+
+    /// Like [`VehicleConfig::parse`], from a table that may hold other keys besides.
+    ///
+    /// Errors: as for [`VehicleConfig::parse`].
+    pub fn from_section(
+        root: &Section<'_>,
+        kinds: &[&dyn DeviceKind],
+        load: Loader<'_>,
+    ) -> Result<Self, ConfigError> {
+        let name = root.text("name")?.unwrap_or_else(|| "unnamed vehicle".to_owned());
+        let target_m = root.required("target_m", root.number("target_m", 0.01..=100.0)?)?;
+        let section_m = root.number("section_m", 0.05..=10.0)?.unwrap_or(0.25);
+        let tunnel_section = root.required("tunnel", root.section("tunnel")?)?;
+        let axis_yaw_rad = tunnel_section.number("axis_yaw_deg", DEGREES)?.unwrap_or(0.0).to_radians();
+        let tunnel = parse_tunnel(tunnel_section, load)?;
+        let site = match root.section("water")? {
+            Some(water) => parse_water(water, axis_yaw_rad)?,
+            None => Site { axis_yaw_rad, ..Site::default() },
+        };
+        let (layout, planned_speed_mps) = match root.section("heads")? {
+            Some(heads) => parse_heads(heads)?,
+            None => (HeadLayout::PhaseShift, 0.0),
+        };
+        let mut sensors = Vec::new();
+        let mut sensor_configs: Vec<SensorConfig> = Vec::new();
+        for section in root.sections("sensors")? {
+            let (config, device) = parse_sensor(section, &sensor_configs, kinds)?;
+            sensors.push(device);
+            sensor_configs.push(config);
+        }
+        if sensors.is_empty() {
+            return Err(
+                root.invalid("sensors", "has no sensor; at least one table headed [[sensors]] is needed")
+            );
+        }
+        Ok(Self {
+            name,
+            target_m,
+            section_m,
+            site,
+            tunnel,
+            layout,
+            planned_speed_mps,
+            sensors,
+            sensor_configs,
+        })
+    }
+}
+
+fn parse_tunnel(section: Section<'_>, load: Loader<'_>) -> Result<TunnelConfig, ConfigError> {
+    let (name, profile) = named::parse(&section, load)?;
+    let length_m = section.number("length_m", 0.1..=1.0e6)?.unwrap_or(10_000.0);
+    section.finish()?;
+    Ok(TunnelConfig { name, profile, length_m })
+}
+
+fn parse_water(section: Section<'_>, axis_yaw_rad: f64) -> Result<Site, ConfigError> {
+    let usual = Site::default();
+    let or = |value: Option<f64>, default| value.unwrap_or(default);
+    let site = Site {
+        sound_speed_mps: or(section.number("sound_speed_mps", 1300.0..=1700.0)?, usual.sound_speed_mps),
+        density_kgpm3: or(section.number("density_kgpm3", 900.0..=1100.0)?, usual.density_kgpm3),
+        gravity_mps2: or(section.number("gravity_mps2", 9.7..=9.9)?, usual.gravity_mps2),
+        surface_pressure_pa: or(
+            section.number("surface_pressure_pa", 40_000.0..=110_000.0)?,
+            usual.surface_pressure_pa,
+        ),
+        surface_above_floor_m: or(
+            section.number("surface_above_floor_m", 0.0..=1000.0)?,
+            usual.surface_above_floor_m,
+        ),
+        axis_yaw_rad,
+    };
+    section.finish()?;
+    Ok(site)
+}
+
+fn parse_heads(section: Section<'_>) -> Result<(HeadLayout, f64), ConfigError> {
+    let layouts = [("phase_shift", HeadLayout::PhaseShift), ("sector_offset", HeadLayout::SectorOffset)];
+    let layout = section.choice("layout", &layouts)?.unwrap_or(HeadLayout::PhaseShift);
+    let speed = section.number("planned_speed_mps", 0.0..=5.0)?.unwrap_or(0.0);
+    section.finish()?;
+    Ok((layout, speed))
+}
+
+fn parse_sensor(
+    section: Section<'_>,
+    before: &[SensorConfig],
+    kinds: &[&dyn DeviceKind],
+) -> Result<(SensorConfig, Box<dyn Device>), ConfigError> {
+    let id = section.required("id", section.text("id")?)?;
+    let simple = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+    if id.is_empty() || id.len() > 32 || !id.chars().all(simple) {
+        return Err(section.invalid("id", "must be 1 to 32 letters, digits, _ or -"));
+    }
+    if before.iter().any(|other| other.id == id) {
+        return Err(section.invalid("id", "is the id of an earlier sensor; ids must differ"));
+    }
+    let choices: Vec<(&str, usize)> = kinds.iter().enumerate().map(|(i, kind)| (kind.name(), i)).collect();
+    let index = section.required("plugin", section.choice("plugin", &choices)?)?;
+    let position = section.triple("position_m", SENSOR_DISTANCE_M)?.unwrap_or_default();
+    let angles = section.triple("angles_deg", DEGREES)?.unwrap_or_default().map(f64::to_radians);
+    let config = SensorConfig {
+        id,
+        plugin: kinds.get(index).map(|kind| kind.name().to_owned()).unwrap_or_default(),
+        connect: section.text("connect")?.unwrap_or_default(),
+        mount: Mount {
+            position: Vec3::new(position[0], position[1], position[2]),
+            rotation: Rot::from_roll_pitch_yaw(angles[0], angles[1], angles[2]),
+        },
+        latency: DurNs::from_secs_f64(section.number("latency_ms", 0.0..=1000.0)?.unwrap_or(0.0) / 1000.0),
+    };
+    let kind = kinds.get(index).ok_or_else(|| section.invalid("plugin", "is not in this build"))?;
+    let device = kind.configure(&config, &section)?;
+    section.finish()?;
+    Ok((config, device))
+}

@@ -1,0 +1,285 @@
+//! Frames as types, so that a vector can't be used in the wrong one.
+//!
+//! ```text
+//!            z up                       head angle alpha, seen looking along +x:
+//!            |                                   180 deg
+//!            |   x along the axis                   |
+//!            |  /  (chainage)            left  90 --+-- 270  right
+//!            | /                          (+y)      |
+//!   y left --+/                                   0 deg (-z)
+//! ```
+//! Tunnel frame: right-handed, metres; x = chainage along the axis, y = left, z = up from the floor's centre.
+//! Body frame: x forward, y left, z up. Sensor frame: a profiling head turns about its own x; an echosounder looks
+//! along its own x. Rotations are named target-from-source: `Rot<Tunnel, Body>` takes body vectors to the tunnel's.
+
+use core::fmt;
+use core::marker::PhantomData;
+use core::ops::{Add, Mul, Neg, Sub};
+
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+
+use crate::math;
+
+/// The tunnel's frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Tunnel {}
+
+/// The vehicle's frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Body {}
+
+/// The frame of one sensor, as mounted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Sensor {}
+
+/// A displacement or direction in frame `F`, metres (or without unit where it is a direction).
+#[derive(Clone, Copy, PartialEq)]
+pub struct Vec3<F>(pub Vector3<f64>, PhantomData<F>);
+
+/// A place in frame `F`, metres.
+#[derive(Clone, Copy, PartialEq)]
+pub struct Point3<F>(pub Vector3<f64>, PhantomData<F>);
+
+/// A rotation that takes vectors of frame `From` to frame `To`.
+#[derive(Clone, Copy, PartialEq)]
+pub struct Rot<To, From>(pub UnitQuaternion<f64>, PhantomData<(To, From)>);
+
+macro_rules! components {
+    ($type:ident) => {
+        impl<F> $type<F> {
+            /// From components in metres.
+            pub fn new(x: f64, y: f64, z: f64) -> Self {
+                Self(Vector3::new(x, y, z), PhantomData)
+            }
+
+            /// The zero of the frame.
+            pub fn zero() -> Self {
+                Self::new(0.0, 0.0, 0.0)
+            }
+
+            /// Component along x.
+            pub fn x(&self) -> f64 {
+                self.0.x
+            }
+
+            /// Component along y.
+            pub fn y(&self) -> f64 {
+                self.0.y
+            }
+
+            /// Component along z.
+            pub fn z(&self) -> f64 {
+                self.0.z
+            }
+
+            /// Whether every component is a finite number.
+            pub fn is_finite(&self) -> bool {
+                self.0.iter().all(|c| c.is_finite())
+            }
+        }
+
+        impl<F> fmt::Debug for $type<F> {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                write!(f, "[{}, {}, {}]", self.0.x, self.0.y, self.0.z)
+            }
+        }
+    };
+}
+
+components!(Vec3);
+components!(Point3);
+
+impl<F> Vec3<F> {
+    /// Length.
+    pub fn norm(&self) -> f64 {
+        math::sqrt(self.0.x * self.0.x + self.0.y * self.0.y + self.0.z * self.0.z)
+    }
+
+    /// The same direction with another length.
+    pub fn scaled(&self, factor: f64) -> Self {
+        Self(self.0 * factor, PhantomData)
+    }
+}
+
+impl<F> Add for Vec3<F> {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self(self.0 + other.0, PhantomData)
+    }
+}
+
+impl<F> Neg for Vec3<F> {
+    type Output = Self;
+
+    fn neg(self) -> Self {
+        Self(-self.0, PhantomData)
+    }
+}
+
+impl<F> Add<Vec3<F>> for Point3<F> {
+    type Output = Self;
+
+    fn add(self, displacement: Vec3<F>) -> Self {
+        Self(self.0 + displacement.0, PhantomData)
+    }
+}
+
+impl<F> Sub for Point3<F> {
+    type Output = Vec3<F>;
+
+    fn sub(self, other: Self) -> Vec3<F> {
+        Vec3(self.0 - other.0, PhantomData)
+    }
+}
+
+impl<To, From> Rot<To, From> {
+    /// The frames coincide.
+    pub fn identity() -> Self {
+        Self(UnitQuaternion::identity(), PhantomData)
+    }
+
+    /// From a quaternion w, x, y, z of any length but zero.
+    ///
+    /// Errors: `None` for a length that isn't finite or is below 1e-6.
+    pub fn from_wxyz(w: f64, x: f64, y: f64, z: f64) -> Option<Self> {
+        let norm = math::sqrt(w * w + x * x + y * y + z * z);
+        if !(norm.is_finite() && norm > 1e-6) {
+            return None;
+        }
+        let q = Quaternion::new(w / norm, x / norm, y / norm, z / norm);
+        Some(Self(UnitQuaternion::new_unchecked(q), PhantomData))
+    }
+
+    /// From roll about x, then pitch about y, then yaw about z (fixed axes), radians.
+    pub fn from_roll_pitch_yaw(roll_rad: f64, pitch_rad: f64, yaw_rad: f64) -> Self {
+        let (sr, cr) = math::sin_cos(roll_rad / 2.0);
+        let (sp, cp) = math::sin_cos(pitch_rad / 2.0);
+        let (sy, cy) = math::sin_cos(yaw_rad / 2.0);
+        let q = Quaternion::new(
+            cr * cp * cy + sr * sp * sy,
+            sr * cp * cy - cr * sp * sy,
+            cr * sp * cy + sr * cp * sy,
+            cr * cp * sy - sr * sp * cy,
+        );
+        Self(UnitQuaternion::new_unchecked(q), PhantomData)
+    }
+
+    /// Roll, pitch and yaw in radians, the inverse of [`Rot::from_roll_pitch_yaw`]; pitch in [-pi/2, pi/2].
+    pub fn roll_pitch_yaw(&self) -> (f64, f64, f64) {
+        let q = self.0.quaternion();
+        let (w, x, y, z) = (q.w, q.i, q.j, q.k);
+        (
+            math::atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)),
+            math::asin(2.0 * (w * y - z * x)),
+            math::atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)),
+        )
+    }
+
+    /// Components w, x, y, z of the unit quaternion.
+    pub fn wxyz(&self) -> [f64; 4] {
+        let q = self.0.quaternion();
+        [q.w, q.i, q.j, q.k]
+    }
+
+    /// The rotation back.
+    pub fn inverse(&self) -> Rot<From, To> {
+        Rot(self.0.inverse(), PhantomData)
+    }
+}
+
+impl<To, Mid, From> Mul<Rot<Mid, From>> for Rot<To, Mid> {
+    type Output = Rot<To, From>;
+
+    fn mul(self, inner: Rot<Mid, From>) -> Rot<To, From> {
+        Rot(self.0 * inner.0, PhantomData)
+    }
+}
+
+impl<To, From> Mul<Vec3<From>> for Rot<To, From> {
+    type Output = Vec3<To>;
+
+    fn mul(self, v: Vec3<From>) -> Vec3<To> {
+        Vec3(self.0 * v.0, PhantomData)
+    }
+}
+
+impl<To, From> fmt::Debug for Rot<To, From> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:?}", self.wxyz())
+    }
+}
+
+/// Where the vehicle is and how it is turned, in the tunnel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pose {
+    /// The body frame's origin.
+    pub position: Point3<Tunnel>,
+    /// Body to tunnel.
+    pub attitude: Rot<Tunnel, Body>,
+}
+
+impl Pose {
+    /// A body-frame place in the tunnel.
+    pub fn place(&self, offset: Vec3<Body>) -> Point3<Tunnel> {
+        self.position + self.attitude * offset
+    }
+}
+
+/// How a sensor sits on the vehicle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Mount {
+    /// The sensor's origin in the body frame.
+    pub position: Vec3<Body>,
+    /// Sensor to body.
+    pub rotation: Rot<Body, Sensor>,
+}
+
+/// The direction in which a head looks at `angle_rad`, in its own frame: 0 is down, growing clockwise seen along +x.
+///
+/// Source: metrics.md, "Frames".
+pub fn head_direction(angle_rad: f64) -> Vec3<Sensor> {
+    let (sin, cos) = math::sin_cos(angle_rad);
+    Vec3::new(0.0, sin, -cos)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn near(a: Vec3<Body>, b: [f64; 3]) {
+        for (x, y) in a.0.iter().zip(b) {
+            assert!((x - y).abs() < 1e-15, "{a:?} is not {b:?}");
+        }
+    }
+
+    #[test]
+    fn a_head_that_faces_aft_turns_the_other_way() {
+        let aft = Rot::<Body, Sensor>::from_roll_pitch_yaw(0.0, 0.0, math::PI);
+        near(aft * head_direction(0.0), [0.0, 0.0, -1.0]);
+        near(aft * head_direction(math::FRAC_PI_2), [0.0, -1.0, 0.0]);
+    }
+
+    #[test]
+    fn an_echosounder_looks_where_its_yaw_and_pitch_say() {
+        let ahead = Vec3::<Sensor>::new(1.0, 0.0, 0.0);
+        let left = Rot::<Body, Sensor>::from_roll_pitch_yaw(0.0, 0.0, math::FRAC_PI_2);
+        near(left * ahead, [0.0, 1.0, 0.0]);
+        let up = Rot::<Body, Sensor>::from_roll_pitch_yaw(0.0, -math::FRAC_PI_2, 0.0);
+        near(up * ahead, [0.0, 0.0, 1.0]);
+    }
+
+    #[test]
+    fn roll_pitch_yaw_comes_back() {
+        for (roll, pitch, yaw) in [(0.1, -0.2, 3.0), (-3.0, 1.5, -1.0), (0.0, 0.0, 0.0)] {
+            let (r, p, y) = Rot::<Tunnel, Body>::from_roll_pitch_yaw(roll, pitch, yaw).roll_pitch_yaw();
+            assert!((r - roll).abs() < 1e-12 && (p - pitch).abs() < 1e-12 && (y - yaw).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn a_quaternion_without_length_is_refused() {
+        assert!(Rot::<Tunnel, Body>::from_wxyz(0.0, 0.0, 0.0, 0.0).is_none());
+        assert!(Rot::<Tunnel, Body>::from_wxyz(f64::NAN, 0.0, 0.0, 1.0).is_none());
+    }
+}

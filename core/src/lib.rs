@@ -1,0 +1,15 @@
+//! headrace's pure core: geometry, sampling theory, fusion, coverage and the loop.
+//!
+//! No I/O, no threads, no clock, no randomness: time and bytes come in, results go out, the same on every machine.
+
+#![warn(clippy::cast_possible_truncation)]
+
+pub mod app;
+pub mod codec;
+pub mod config;
+pub mod frames;
+pub mod math;
+pub mod sampling;
+pub mod site;
+pub mod time;
+pub mod tunnel;

@@ -1,0 +1,6 @@
+//! The tunnel: design profiles with exact ray casting, and the unrolled wall.
+
+pub mod named;
+mod profile;
+
+pub use profile::{Profile, ProfileError, WallHit};

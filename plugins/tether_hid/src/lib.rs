@@ -1,0 +1,1 @@
+//! tether_hid
