@@ -7,6 +7,7 @@
 pub mod app;
 pub mod codec;
 pub mod config;
+pub mod coverage;
 pub mod frames;
 pub mod math;
 pub mod sampling;

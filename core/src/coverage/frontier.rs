@@ -1,0 +1,116 @@
+//! Where samples may still land: what decides when a section is open and when it is judged.
+
+use core::ops::Range;
+
+use crate::time::{DurNs, MonoNs};
+
+/// A head that has given no return for so long isn't waited for.
+const SILENT: DurNs = DurNs(2_000_000_000);
+/// The most heads.
+const MAX_HEADS: usize = crate::sampling::advice::MAX_HEADS;
+
+/// The stretch of tunnel on which a head lands samples now.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reach {
+    /// Least chainage, m.
+    pub from_m: f64,
+    /// Greatest chainage, m.
+    pub to_m: f64,
+}
+
+/// Follows the reach of all heads along the tunnel.
+#[derive(Debug, Clone, Default)]
+pub struct Frontier {
+    heads: [Option<(MonoNs, Reach)>; MAX_HEADS],
+    /// Every chainage that any head's reach has covered.
+    swept: Option<Reach>,
+    /// Sections, by index, that samples may still change.
+    zone: Option<Range<i64>>,
+}
+
+/// What a head's return has changed.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Moved {
+    /// Sections that lie behind now and did not before.
+    pub left_behind: Range<i64>,
+    /// Sections that lie ahead now and did not before: the vehicle goes back.
+    pub left_ahead: Range<i64>,
+    /// Where samples may land now.
+    pub reach: Option<Reach>,
+}
+
+impl Frontier {
+    /// Every chainage that has been within reach of a head.
+    pub fn swept(&self) -> Option<Reach> {
+        self.swept
+    }
+
+    /// A head has pinged, with or without a return. A section is out of the way when it is farther than `margin_m` from
+    /// the reach of every head that is alive.
+    pub fn advance(
+        &mut self,
+        head: usize,
+        now: MonoNs,
+        reach: Reach,
+        section_m: f64,
+        margin_m: f64,
+    ) -> Moved {
+        if let Some(slot) = self.heads.get_mut(head) {
+            *slot = Some((now, reach));
+        }
+        self.swept = Some(self.swept.map_or(reach, |swept| swept.with(reach)));
+        let alive = |(last, _): &&(MonoNs, Reach)| now.since(*last).0 <= SILENT.0;
+        let all = self.heads.iter().flatten().filter(alive).map(|(_, reach)| *reach).reduce(Reach::with);
+        let Some(all) = all else { return Moved::default() };
+        // Section k = [kL, (k+1)L) is behind when (k+1)L + margin <= from, ahead when kL - margin >= to.
+        let first = crate::math::floor_to_i64((all.from_m - margin_m) / section_m);
+        let end = -crate::math::floor_to_i64(-(all.to_m + margin_m) / section_m);
+        let zone = first..end;
+        let before = self.zone.replace(zone.clone()).unwrap_or(zone.clone());
+        Moved { left_behind: before.start..zone.start, left_ahead: zone.end..before.end, reach: Some(all) }
+    }
+}
+
+impl Reach {
+    fn with(self, other: Self) -> Self {
+        Self { from_m: self.from_m.min(other.from_m), to_m: self.to_m.max(other.to_m) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(x_m: f64) -> Reach {
+        Reach { from_m: x_m, to_m: x_m }
+    }
+
+    #[test]
+    fn a_section_is_left_when_the_last_head_is_a_margin_past_it() {
+        let mut frontier = Frontier::default();
+        frontier.advance(0, MonoNs(0), at(1.0), 0.25, 0.25);
+        frontier.advance(1, MonoNs(0), at(0.5), 0.25, 0.25);
+        let moved = frontier.advance(1, MonoNs(1), at(0.749), 0.25, 0.25);
+        assert_eq!(moved.left_behind, 1..1);
+        let moved = frontier.advance(1, MonoNs(2), at(0.75), 0.25, 0.25);
+        assert_eq!(moved.left_behind, 1..2, "section [0.25, 0.5) is left once 0.75 is reached");
+    }
+
+    #[test]
+    fn going_back_leaves_sections_ahead() {
+        let mut frontier = Frontier::default();
+        frontier.advance(0, MonoNs(0), at(2.0), 0.25, 0.25);
+        let moved = frontier.advance(0, MonoNs(1), at(1.7), 0.25, 0.25);
+        assert_eq!(moved.left_ahead, 8..9);
+        assert!(moved.left_behind.is_empty());
+    }
+
+    #[test]
+    fn a_silent_head_is_not_waited_for() {
+        let mut frontier = Frontier::default();
+        frontier.advance(1, MonoNs(0), at(0.0), 0.25, 0.0);
+        frontier.advance(0, MonoNs(0), at(1.0), 0.25, 0.0);
+        let moved = frontier.advance(0, MonoNs(2_000_000_001), at(1.0), 0.25, 0.0);
+        assert_eq!(moved.left_behind, 0..4);
+    }
+}
