@@ -9,6 +9,7 @@ pub mod codec;
 pub mod config;
 pub mod coverage;
 pub mod frames;
+pub mod fusion;
 pub mod math;
 pub mod sampling;
 pub mod site;

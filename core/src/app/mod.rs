@@ -2,17 +2,34 @@
 
 pub mod components;
 pub mod device;
+pub mod digest;
+pub mod flow;
+pub mod head;
+pub mod merge;
+pub mod outlet;
 pub mod plugin;
 pub mod reading;
+pub mod report;
 pub mod ring;
+pub mod run;
+pub mod stage;
+mod stages;
 
 use bevy_ecs::bundle::Bundle;
+use bevy_ecs::prelude::Resource;
+use bevy_ecs::schedule::{IntoScheduleConfigs, Schedule};
+use bevy_ecs::system::ScheduleSystem;
 use bevy_ecs::world::World;
 
+use crate::fusion::Navigation;
+use crate::site::Site;
+use crate::tunnel::Profile;
 use device::Decoder;
-use plugin::PluginError;
+use plugin::{Plugin, PluginError};
 use reading::SourceId;
 use ring::{Port, PortReader};
+use run::Loop;
+use stage::Stage;
 
 /// The most sources that one loop takes.
 pub const MAX_SOURCES: usize = 64;
@@ -31,16 +48,67 @@ pub struct SourceSpec {
     pub ring_bytes: usize,
 }
 
-/// The loop while it is put together. `arm` turns it into one that runs.
-#[derive(Default)]
+/// A source without its decoder: what reports and logs say of it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SourceInfo {
+    /// Name.
+    pub id: String,
+    /// Kind of device.
+    pub plugin: &'static str,
+    /// Where it is connected.
+    pub connect: String,
+}
+
+/// The tunnel and the target that a loop works for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Mission {
+    /// Design profile.
+    pub profile: Profile,
+    /// Water, gravity, levels.
+    pub site: Site,
+    /// Target T, m.
+    pub target_m: f64,
+    /// Length of a section, m.
+    pub section_m: f64,
+    /// Length of the tunnel, m; samples beyond are counted, not kept.
+    pub length_m: f64,
+}
+
+/// The loop while it is put together. [`App::arm`] turns it into one that runs.
 pub struct App {
+    mission: Mission,
     world: World,
-    sources: Vec<SourceSpec>,
+    schedule: Schedule,
+    sources: Vec<SourceInfo>,
+    decoders: Vec<Box<dyn Decoder>>,
     ports: Vec<Port>,
     readers: Vec<PortReader>,
 }
 
 impl App {
+    /// A loop without sources.
+    pub fn new(mission: Mission) -> Self {
+        let mut schedule = stage::schedule();
+        stages::add(&mut schedule);
+        Self {
+            mission,
+            world: World::new(),
+            schedule,
+            sources: Vec::new(),
+            decoders: Vec::new(),
+            ports: Vec::new(),
+            readers: Vec::new(),
+        }
+    }
+
+    /// Adds a plugin.
+    ///
+    /// Errors: what the plugin needs isn't there, or is there twice.
+    pub fn add_plugin(&mut self, plugin: &(impl Plugin + ?Sized)) -> Result<&mut Self, PluginError> {
+        plugin.build(self)?;
+        Ok(self)
+    }
+
     /// Registers a source; its port fills the ring that the loop reads.
     ///
     /// Errors: an id that is there already, or more than [`MAX_SOURCES`].
@@ -51,7 +119,8 @@ impl App {
         let id = u16::try_from(self.sources.len()).ok().filter(|id| usize::from(*id) < MAX_SOURCES);
         let id = id.ok_or_else(|| PluginError::TooManySources { id: spec.id.clone(), max: MAX_SOURCES })?;
         let (port, reader) = ring::ring(spec.ring_bytes);
-        self.sources.push(spec);
+        self.sources.push(SourceInfo { id: spec.id, plugin: spec.plugin, connect: spec.connect });
+        self.decoders.push(spec.decoder);
         self.ports.push(port);
         self.readers.push(reader);
         Ok(SourceId(id))
@@ -60,5 +129,27 @@ impl App {
     /// Adds an entity: a sensor with its components.
     pub fn spawn(&mut self, bundle: impl Bundle) {
         self.world.spawn(bundle);
+    }
+
+    /// Adds a resource for a plugin's own systems.
+    pub fn insert_resource(&mut self, resource: impl Resource) {
+        self.world.insert_resource(resource);
+    }
+
+    /// Adds systems to a stage. Two of one stage that touch the same data must be ordered by whoever adds them.
+    pub fn add_systems<M>(&mut self, stage: Stage, systems: impl IntoScheduleConfigs<ScheduleSystem, M>) {
+        self.schedule.add_systems(systems.in_set(stage));
+    }
+
+    /// The sources so far, in the order of their ids.
+    pub fn sources(&self) -> &[SourceInfo] {
+        &self.sources
+    }
+
+    /// Allocates all that the loop will ever need and makes it ready to run. From here on no tick allocates or locks.
+    ///
+    /// Errors: more heads than the loop's tables hold, or systems whose order matters but isn't stated.
+    pub fn arm(self, navigation: Box<dyn Navigation>) -> Result<Loop, PluginError> {
+        Loop::new(self, navigation)
     }
 }

@@ -28,4 +28,18 @@ pub enum PluginError {
         /// The limit.
         max: usize,
     },
+    /// More heads than the loop's tables hold.
+    #[error("arming the loop: {count} heads; the most is {max}")]
+    TooManyHeads {
+        /// Heads registered.
+        count: usize,
+        /// The limit.
+        max: usize,
+    },
+    /// The schedule of systems can't be built.
+    #[error("arming the loop: {why}")]
+    Schedule {
+        /// What the scheduler says.
+        why: String,
+    },
 }

@@ -189,6 +189,16 @@ impl Sections {
         Self { section_m, target_m, first, sections: vec![Section::default(); count] }
     }
 
+    /// How many sections there are.
+    pub fn len(&self) -> usize {
+        self.sections.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.sections.is_empty()
+    }
+
     /// Length of a section, m.
     pub fn section_m(&self) -> f64 {
         self.section_m

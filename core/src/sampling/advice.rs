@@ -147,7 +147,7 @@ pub fn advise(situation: &Situation, profile: &Profile, target_m: f64) -> Advice
 /// between neighbours times T is the answer. Heads in sectors: a place near a sector's end waits for a sweep there and
 /// back, twice the time of one.
 /// Source: Jorge et al. 2021, §5.1 and §5.2.
-fn pass_gaps_s(heads: &[Option<HeadMotion>; MAX_HEADS], speed_mps: f64) -> (f64, f64) {
+pub fn pass_gaps_s(heads: &[Option<HeadMotion>; MAX_HEADS], speed_mps: f64) -> (f64, f64) {
     let turning = || heads.iter().flatten();
     let sweep_s = |head: &HeadMotion| head.sector_rad.map(|sector| 2.0 * sector / head.rate_radps.abs());
     if let Some(longest) = turning().filter_map(sweep_s).max_by(f64::total_cmp) {

@@ -3,4 +3,4 @@
 pub mod named;
 mod profile;
 
-pub use profile::{Profile, ProfileError, WallHit};
+pub use profile::{Piece, Profile, ProfileError, WallHit, Yz};

@@ -1,0 +1,294 @@
+//! What flows from stage to stage within a tick, and the loop's state.
+//!
+//! Each stage reads the lists that earlier stages have filled for this tick and works through them in order, looking
+//! at nothing that lies later in them. A result therefore depends on the packets before it alone, and not on where
+//! the stream was cut into ticks.
+
+use bevy_ecs::entity::Entity;
+use bevy_ecs::prelude::Resource;
+
+use super::digest::Digest;
+use super::reading::{Reading, SourceId};
+use crate::coverage::{Frontier, HoleFinder, Judgement, Request, SampleStore, Sections};
+use crate::frames::{Point3, Tunnel};
+use crate::fusion::{Fix, Navigation, NoFix, SensorInfo};
+use crate::sampling::advice::{Advice, Situation};
+use crate::site::Site;
+use crate::time::{DurNs, MonoNs};
+use crate::tunnel::Profile;
+
+/// Room for the readings of one tick: the shortest frame of any device has over ten bytes.
+pub(super) const MAX_TICK_READINGS: usize = super::merge::MAX_TICK_BYTES / 8;
+
+/// Advice is given at every multiple of this in data time.
+pub const ADVICE_PERIOD: DurNs = DurNs(200_000_000);
+
+/// A reading with its source and times.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Event {
+    /// Where it came from.
+    pub source: SourceId,
+    /// When its packet was received.
+    pub received: MonoNs,
+    /// When it was valid.
+    pub valid_at: MonoNs,
+    /// The value.
+    pub reading: Reading,
+}
+
+/// Readings of this tick, in order.
+#[derive(Debug, Resource)]
+pub struct Events(pub Vec<Event>);
+
+/// A moment at which the way on is looked at: a multiple of [`ADVICE_PERIOD`], or a sonar ping.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Positioned {
+    /// The event of this index is a sonar ping; the fix is for its time of validity.
+    Ping {
+        /// Index into [`Events`].
+        event: usize,
+        /// Where the vehicle was.
+        fix: Result<Fix, NoFix>,
+    },
+    /// A multiple of the advice period has passed.
+    Beat {
+        /// The multiple.
+        at: MonoNs,
+        /// Where the vehicle is.
+        fix: Result<Fix, NoFix>,
+    },
+}
+
+/// Pings and beats of this tick with their fixes, in order.
+#[derive(Debug, Resource)]
+pub struct PositionedList(pub Vec<Positioned>);
+
+/// What became of a ping.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Outcome {
+    /// A sample on the wall.
+    Sample {
+        /// Where the beam ended.
+        point: Point3<Tunnel>,
+        /// Its arc length, m.
+        sigma_m: f64,
+    },
+    /// No return, where the wall was within range.
+    Missing,
+    /// No return, where the wall was beyond the range setting.
+    OutOfRange,
+    /// A return that could not be placed.
+    Unplaced(NoFix),
+}
+
+/// A ping with its place.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PlacedPing {
+    /// Number of the head, from zero.
+    pub head: usize,
+    /// When the packet was received.
+    pub received: MonoNs,
+    /// When the ping was valid.
+    pub valid_at: MonoNs,
+    /// The vehicle then; `None` without a fix.
+    pub fix: Option<Fix>,
+    /// Chainages on which the head lands samples at this attitude; `None` without a fix.
+    pub reach: Option<crate::coverage::Reach>,
+    /// The head has come here from its last ping in one step.
+    pub single_step: bool,
+    /// A new sweep has begun.
+    pub new_sweep: bool,
+    /// What became of it.
+    pub outcome: Outcome,
+}
+
+/// An item of the list that [`super::stage::Stage::Place`] hands on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[expect(clippy::large_enum_variant, reason = "a list that is filled once and read once a tick")]
+pub enum Placed {
+    /// A ping.
+    Ping(PlacedPing),
+    /// The situation at a beat.
+    Situation(MonoNs, Situation),
+}
+
+/// Pings and situations of this tick, in order.
+#[derive(Debug, Resource)]
+pub struct PlacedList(pub Vec<Placed>);
+
+/// Sections to be judged, in order.
+#[derive(Debug, Resource)]
+pub struct Requests(pub Vec<Request>);
+
+/// A result for the outlets.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Notice {
+    /// A section's verdict, hole or flag has changed.
+    Section {
+        /// Index of the section.
+        section: i64,
+        /// The moment, in data time.
+        at: MonoNs,
+        /// What has changed.
+        change: Judgement,
+    },
+    /// How fast one may go.
+    Advice(AdviceEntry),
+}
+
+/// Results of this tick, in order.
+#[derive(Debug, Resource)]
+pub struct Notices(pub Vec<Notice>);
+
+/// The tunnel, the site and the target.
+#[derive(Debug, Clone, Resource)]
+pub struct Place {
+    /// Design profile.
+    pub profile: Profile,
+    /// Water, gravity, levels.
+    pub site: Site,
+    /// Target T, m.
+    pub target_m: f64,
+}
+
+/// What navigation knows of each source, by source.
+#[derive(Debug, Resource)]
+pub struct SensorTable(pub Vec<SensorInfo>);
+
+/// For each source the number and entity of its head, where it is one.
+#[derive(Debug, Resource)]
+pub struct HeadTable(pub Vec<Option<(usize, Entity)>>);
+
+/// Navigation, and the next beat.
+#[derive(Resource)]
+pub struct Navigator {
+    /// The way of navigating.
+    pub navigation: Box<dyn Navigation>,
+    /// The next multiple of the advice period; `None` before the first packet.
+    pub next_beat: Option<MonoNs>,
+    /// The last fix that a beat or ping was given.
+    pub last: Option<Fix>,
+}
+
+/// What is known of the wall.
+#[derive(Debug, Resource)]
+pub struct Coverage {
+    /// Samples.
+    pub store: SampleStore,
+    /// Verdicts.
+    pub sections: Sections,
+    /// Where samples may still land.
+    pub frontier: Frontier,
+}
+
+/// The hole search with its working memory.
+#[derive(Debug, Default, Resource)]
+pub struct Finder(pub HoleFinder);
+
+/// Digest of each stream of results; together, the dive's.
+#[derive(Debug, Default, Resource)]
+pub struct Digests {
+    /// Placed pings.
+    pub pings: Digest,
+    /// Judgements.
+    pub judgements: Digest,
+    /// Advice.
+    pub advice: Digest,
+}
+
+/// Counts over the whole dive.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Resource)]
+pub struct Tally {
+    /// Packets consumed.
+    pub packets: u64,
+    /// First and last receive time.
+    pub span: Option<(MonoNs, MonoNs)>,
+    /// Samples on the wall.
+    pub samples: u64,
+    /// Pings without a return within range.
+    pub missing: u64,
+    /// Pings without a return where the wall was out of range.
+    pub out_of_range: u64,
+    /// Returns without a fix.
+    pub unplaced: u64,
+    /// Samples outside the stretch that is kept.
+    pub outside: u64,
+    /// Samples for which there was no room.
+    pub not_stored: u64,
+}
+
+/// What came from one source.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct SourceTally {
+    /// Packets.
+    pub packets: u64,
+    /// Their bytes.
+    pub bytes: u64,
+    /// Readings that they gave.
+    pub readings: u64,
+    /// First and last receive time.
+    pub span: Option<(MonoNs, MonoNs)>,
+    /// Longest time between two packets.
+    pub longest_gap: DurNs,
+}
+
+/// What came from each source.
+#[derive(Debug, Clone, PartialEq, Resource)]
+pub struct SourceTallies(pub Vec<SourceTally>);
+
+impl SourceTallies {
+    pub(super) fn new(sources: usize) -> Self {
+        Self(vec![SourceTally::default(); sources])
+    }
+}
+
+/// One entry of the advice's history.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AdviceEntry {
+    /// The moment, in data time.
+    pub at: MonoNs,
+    /// Chainage then, m; `None` without a fix.
+    pub chainage_m: Option<f64>,
+    /// Speed then, m/s.
+    pub speed_mps: f64,
+    /// The advice.
+    pub advice: Advice,
+}
+
+/// The advice over time, kept whenever it has changed enough to matter, or ten seconds have gone.
+#[derive(Debug, Clone, Resource)]
+pub struct AdviceLog {
+    /// The entries, in order.
+    pub entries: Vec<AdviceEntry>,
+    /// Entries for which there was no room.
+    pub dropped: u64,
+}
+
+impl Default for AdviceLog {
+    fn default() -> Self {
+        Self { entries: Vec::with_capacity(Self::CAPACITY), dropped: 0 }
+    }
+}
+
+impl AdviceLog {
+    const CAPACITY: usize = 1 << 16;
+    const EVERY: DurNs = DurNs(10_000_000_000);
+    const CHANGE_MPS: f64 = 0.01;
+
+    pub(super) fn take(&mut self, entry: AdviceEntry) {
+        let unchanged = |last: &AdviceEntry| {
+            last.advice.reason == entry.advice.reason
+                && (last.advice.v_max_mps - entry.advice.v_max_mps).abs() < Self::CHANGE_MPS
+                && (last.speed_mps - entry.speed_mps).abs() < Self::CHANGE_MPS
+                && entry.at.since(last.at).0 < Self::EVERY.0
+        };
+        if self.entries.last().is_some_and(unchanged) {
+            return;
+        }
+        if self.entries.len() < Self::CAPACITY {
+            self.entries.push(entry);
+        } else {
+            self.dropped += 1;
+        }
+    }
+}

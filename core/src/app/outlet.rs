@@ -1,0 +1,68 @@
+//! A way out of the loop for results: a bounded queue that another thread empties.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use bevy_ecs::prelude::{Res, Resource};
+use crossbeam::queue::ArrayQueue;
+
+use super::App;
+use super::flow::{Notice, Notices};
+use super::plugin::{Plugin, PluginError};
+use super::stage::Stage;
+
+/// Copies every notice into a queue. When nobody empties it the oldest notices are dropped, and counted.
+pub struct NoticeOutlet {
+    queue: Arc<Shared>,
+}
+
+/// The end at which notices come out.
+#[derive(Clone)]
+pub struct NoticeReceiver {
+    queue: Arc<Shared>,
+}
+
+struct Shared {
+    notices: ArrayQueue<Notice>,
+    dropped: AtomicU64,
+}
+
+#[derive(Resource)]
+struct Outlet(Arc<Shared>);
+
+impl NoticeOutlet {
+    /// A queue for `capacity` notices, and the end at which they come out.
+    pub fn new(capacity: usize) -> (Self, NoticeReceiver) {
+        let queue =
+            Arc::new(Shared { notices: ArrayQueue::new(capacity.max(1)), dropped: AtomicU64::new(0) });
+        (Self { queue: Arc::clone(&queue) }, NoticeReceiver { queue })
+    }
+}
+
+impl Plugin for NoticeOutlet {
+    fn build(&self, app: &mut App) -> Result<(), PluginError> {
+        app.insert_resource(Outlet(Arc::clone(&self.queue)));
+        app.add_systems(Stage::Publish, publish);
+        Ok(())
+    }
+}
+
+fn publish(notices: Res<'_, Notices>, outlet: Res<'_, Outlet>) {
+    for notice in &notices.0 {
+        if outlet.0.notices.force_push(*notice).is_some() {
+            outlet.0.dropped.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+}
+
+impl NoticeReceiver {
+    /// The oldest notice that is waiting.
+    pub fn next(&self) -> Option<Notice> {
+        self.queue.notices.pop()
+    }
+
+    /// How many were dropped because nobody took them.
+    pub fn dropped(&self) -> u64 {
+        self.queue.dropped.load(Ordering::Relaxed)
+    }
+}

@@ -1,0 +1,211 @@
+//! The armed loop.
+
+use bevy_ecs::schedule::Schedule;
+use bevy_ecs::world::World;
+
+use super::components::{DepthSensor, Echosounder, Imu, Mounted, SonarHead, Tether};
+use super::digest::Digest;
+use super::flow::{
+    AdviceLog, Coverage, Digests, Events, Finder, HeadTable, MAX_TICK_READINGS, Navigator, Notices, Place,
+    PlacedList, PositionedList, Requests, SensorTable, SourceTallies, Tally,
+};
+use super::head::HeadTrack;
+use super::merge::{Inbox, MAX_TICK_PACKETS};
+use super::plugin::PluginError;
+use super::ring::{Port, PortReader};
+use super::stages::{Advisor, Decoders, HeadSweeps, judge_one};
+use super::{App, MAX_SOURCES, Mission, SourceInfo};
+use crate::coverage::{Frontier, SampleStore, Sections, StoreLayout};
+use crate::fusion::{Navigation, SensorInfo, SensorKind};
+use crate::sampling::advice::MAX_HEADS;
+use crate::time::MonoNs;
+
+/// Room beyond both ends of the tunnel for heads that sit ahead of or behind the vehicle's origin, m.
+const ROOM_BEYOND_M: f64 = 25.0;
+/// Samples for which there is room, for a metre of tunnel and at most. Four heads at 0.2 m/s lay 1,000 a metre.
+const SAMPLES_PER_M: f64 = 4_000.0;
+const MAX_SAMPLES: f64 = 16_000_000.0;
+
+/// A loop that runs. All memory is allocated; a tick takes no lock, makes no system call and formats nothing.
+pub struct Loop {
+    world: World,
+    schedule: Schedule,
+    readers: Vec<PortReader>,
+    ports: Vec<Option<Port>>,
+    sources: Vec<SourceInfo>,
+    mission: Mission,
+    ticks: u64,
+}
+
+impl Loop {
+    pub(super) fn new(app: App, navigation: Box<dyn Navigation>) -> Result<Self, PluginError> {
+        let App { mission, mut world, mut schedule, sources, decoders, ports, readers } = app;
+        let (sensors, heads) = tables(&mut world, sources.len())?;
+        world.insert_resource(sensors);
+        world.insert_resource(heads);
+        world.insert_resource(Decoders(decoders));
+        world.insert_resource(Inbox::default());
+        world.insert_resource(Events(Vec::with_capacity(MAX_TICK_READINGS)));
+        world.insert_resource(PositionedList(Vec::with_capacity(2 * MAX_TICK_READINGS)));
+        world.insert_resource(PlacedList(Vec::with_capacity(2 * MAX_TICK_READINGS)));
+        world.insert_resource(Navigator { navigation, next_beat: None, last: None });
+        world.insert_resource(HeadSweeps::default());
+        world.insert_resource(Finder::default());
+        world.insert_resource(Advisor::default());
+        world.insert_resource(AdviceLog::default());
+        world.insert_resource(Digests::default());
+        world.insert_resource(Tally::default());
+        world.insert_resource(SourceTallies::new(sources.len()));
+        let coverage = coverage(&mission);
+        // A jump along the tunnel may ask for every section at once.
+        let most = coverage.sections.len() + MAX_TICK_PACKETS;
+        world.insert_resource(Requests(Vec::with_capacity(most)));
+        world.insert_resource(Notices(Vec::with_capacity(most + MAX_TICK_PACKETS)));
+        world.insert_resource(coverage);
+        world.insert_resource(Place {
+            profile: mission.profile.clone(),
+            site: mission.site,
+            target_m: mission.target_m,
+        });
+        schedule.initialize(&mut world).map_err(|error| PluginError::Schedule { why: format!("{error:?}") })?;
+        let mut armed =
+            Self { world, schedule, readers, ports: ports.into_iter().map(Some).collect(), sources, mission, ticks: 0 };
+        // The first run of a schedule allocates; with nothing to do it has no other effect.
+        armed.tick();
+        armed.ticks = 0;
+        Ok(armed)
+    }
+
+    /// Takes what has come and works it off. Gives the number of packets consumed.
+    ///
+    /// Allocates: never.
+    pub fn tick(&mut self) -> usize {
+        if let Some(mut inbox) = self.world.get_resource_mut::<Inbox>() {
+            inbox.fill(&mut self.readers);
+        }
+        self.schedule.run(&mut self.world);
+        self.ticks += 1;
+        self.world.get_resource::<Inbox>().map_or(0, Inbox::len)
+    }
+
+    /// The writing end of a source's ring, once: for a port's thread, a player or a simulator.
+    pub fn take_port(&mut self, source: usize) -> Option<Port> {
+        self.ports.get_mut(source)?.take()
+    }
+
+    /// The sources, in the order of their ids.
+    pub fn sources(&self) -> &[SourceInfo] {
+        &self.sources
+    }
+
+    /// The tunnel and the target.
+    pub fn mission(&self) -> &Mission {
+        &self.mission
+    }
+
+    /// Ticks run so far.
+    pub fn ticks(&self) -> u64 {
+        self.ticks
+    }
+
+    /// What happens in the world, for plugins, tests and reports.
+    pub fn world(&self) -> &World {
+        &self.world
+    }
+
+    /// Judges what is still open: the dive has ended, and no sample will come. Gives the notices of it.
+    pub fn finish(&mut self) -> Vec<super::flow::Notice> {
+        let at = self.world.resource::<Tally>().span.map_or(MonoNs(0), |(_, last)| last);
+        let mut requests = Vec::new();
+        self.world.resource_scope(|world, mut coverage: bevy_ecs::world::Mut<'_, Coverage>| {
+            let (swept, now) = (coverage.frontier.swept(), coverage.store.len());
+            coverage.sections.unsettled(swept, now, at, &mut |request| requests.push(request));
+            world.resource_scope(|world, mut finder: bevy_ecs::world::Mut<'_, Finder>| {
+                world.resource_scope(|world, mut notices: bevy_ecs::world::Mut<'_, Notices>| {
+                    notices.0.clear();
+                    let mut digests = world.resource_mut::<Digests>();
+                    for request in &requests {
+                        judge_one(request, &mut coverage, &mut finder, &mut notices, &mut digests);
+                    }
+                });
+            });
+        });
+        self.world.resource::<Notices>().0.clone()
+    }
+
+    /// Digest of all results so far: places, judgements and advice.
+    pub fn digest(&self) -> u64 {
+        let digests = self.world.resource::<Digests>();
+        let mut all = Digest::default();
+        all.integer(digests.pings.value()).integer(digests.judgements.value()).integer(digests.advice.value());
+        all.value()
+    }
+}
+
+fn coverage(mission: &Mission) -> Coverage {
+    let (from_m, to_m) = (-ROOM_BEYOND_M, mission.length_m + ROOM_BEYOND_M);
+    let samples = crate::math::round_to_i64(((to_m - from_m) * SAMPLES_PER_M).min(MAX_SAMPLES));
+    let store = SampleStore::new(StoreLayout {
+        perimeter_m: mission.profile.perimeter_m(),
+        from_m,
+        to_m,
+        cell_m: (mission.target_m / 2.0).clamp(0.05, 0.5),
+        capacity: u32::try_from(samples).unwrap_or(u32::MAX),
+    });
+    let sections = Sections::new(mission.section_m, mission.target_m, from_m, to_m);
+    Coverage { store, sections, frontier: Frontier::default() }
+}
+
+/// What stages look up by source: navigation's view of each sensor, and the number and entity of each head.
+fn tables(world: &mut World, sources: usize) -> Result<(SensorTable, HeadTable), PluginError> {
+    let nothing = SensorInfo {
+        mount: crate::frames::Mount {
+            position: crate::frames::Vec3::zero(),
+            rotation: crate::frames::Rot::identity(),
+        },
+        kind: SensorKind::Other,
+    };
+    let mut sensors = vec![nothing; sources.min(MAX_SOURCES)];
+    let mut heads = vec![None; sources.min(MAX_SOURCES)];
+    let mut found = Vec::new();
+    let mut query = world.query::<(
+        bevy_ecs::entity::Entity,
+        &Mounted,
+        Option<&SonarHead>,
+        Option<&Echosounder>,
+        Option<&DepthSensor>,
+        Option<&Imu>,
+        Option<&Tether>,
+    )>();
+    for (entity, mounted, head, echosounder, depth, imu, tether) in query.iter(world) {
+        let kind = match (head, echosounder, depth, imu, tether) {
+            (Some(_), ..) => SensorKind::Head,
+            (_, Some(echosounder), ..) => {
+                SensorKind::Echosounder { min_confidence: echosounder.min_confidence }
+            }
+            (_, _, Some(_), ..) => SensorKind::Depth,
+            (_, _, _, Some(_), _) => SensorKind::Imu,
+            (_, _, _, _, Some(tether)) => {
+                SensorKind::Tether { zero_at_m: tether.zero_at_m, scale: tether.scale }
+            }
+            _ => SensorKind::Other,
+        };
+        if let Some(slot) = sensors.get_mut(mounted.source.index()) {
+            *slot = SensorInfo { mount: mounted.mount, kind };
+        }
+        if kind == SensorKind::Head {
+            found.push((mounted.source, entity));
+        }
+    }
+    found.sort_unstable_by_key(|(source, _)| *source);
+    if found.len() > MAX_HEADS {
+        return Err(PluginError::TooManyHeads { count: found.len(), max: MAX_HEADS });
+    }
+    for (number, (source, entity)) in found.into_iter().enumerate() {
+        world.entity_mut(entity).insert(HeadTrack::default());
+        if let Some(slot) = heads.get_mut(source.index()) {
+            *slot = Some((number, entity));
+        }
+    }
+    Ok((SensorTable(sensors), HeadTable(heads)))
+}

@@ -1,0 +1,48 @@
+//! The stages of a tick, in order, and the schedule that chains them.
+
+use bevy_ecs::schedule::{
+    IntoScheduleConfigs, LogLevel, Schedule, ScheduleBuildSettings, SingleThreadedExecutor, SystemSet,
+};
+
+/// A stage of the tick. Systems of one stage see what all earlier stages have done with the tick's packets.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, SystemSet)]
+pub enum Stage {
+    /// Bytes to readings.
+    Decode,
+    /// Readings to fixes.
+    Navigate,
+    /// Returns to places on the wall.
+    Place,
+    /// Places to samples, passes and sections.
+    Cover,
+    /// Sections to verdicts and flags.
+    Judge,
+    /// How fast one may go.
+    Advise,
+    /// Results to the outlets.
+    Publish,
+}
+
+/// An empty schedule of the chained stages: one thread, and two systems whose order matters but isn't stated are an
+/// error.
+pub(super) fn schedule() -> Schedule {
+    let mut schedule = Schedule::default();
+    schedule.set_executor(SingleThreadedExecutor::new());
+    schedule.set_build_settings(ScheduleBuildSettings {
+        ambiguity_detection: LogLevel::Error,
+        ..ScheduleBuildSettings::default()
+    });
+    schedule.configure_sets(
+        (
+            Stage::Decode,
+            Stage::Navigate,
+            Stage::Place,
+            Stage::Cover,
+            Stage::Judge,
+            Stage::Advise,
+            Stage::Publish,
+        )
+            .chain(),
+    );
+    schedule
+}

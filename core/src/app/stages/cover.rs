@@ -1,0 +1,146 @@
+//! Places to samples, passes and sections.
+
+use bevy_ecs::prelude::{Res, ResMut, Resource};
+
+use crate::app::flow::{Coverage, Outcome, Placed, PlacedList, PlacedPing, Requests, Tally};
+use crate::coverage::hole::FARTHEST_M;
+use crate::coverage::{SampleIndex, StoreError, WallSample};
+use crate::frames::{Point3, Tunnel};
+use crate::math;
+use crate::sampling::advice::{self, MAX_HEADS, Situation};
+use crate::sampling::spacing;
+
+/// What is remembered of each head's sweep, and how the heads' passes were spread at the last beat.
+#[derive(Debug, Clone, Copy, Default, Resource)]
+pub(in crate::app) struct HeadSweeps {
+    last: [Option<LastSample>; MAX_HEADS],
+    pass_gap_s: f64,
+    even_gap_s: f64,
+    ping_period_s: f64,
+}
+
+/// The last valid sample of a head in its present sweep.
+#[derive(Debug, Clone, Copy)]
+struct LastSample {
+    index: SampleIndex,
+    point: Point3<Tunnel>,
+    sigma_m: f64,
+    /// Every ping since has been a single step with a return.
+    unbroken: bool,
+}
+
+pub(super) fn cover(
+    placed: Res<'_, PlacedList>,
+    mut coverage: ResMut<'_, Coverage>,
+    mut sweeps: ResMut<'_, HeadSweeps>,
+    mut requests: ResMut<'_, Requests>,
+    mut tally: ResMut<'_, Tally>,
+) {
+    requests.0.clear();
+    for item in &placed.0 {
+        match item {
+            Placed::Situation(_, situation) => sweeps.note_gaps(situation),
+            Placed::Ping(ping) => {
+                count(&mut tally, &ping.outcome);
+                note_passage(&mut coverage, &sweeps, ping);
+                if let Err(error) = note_sample(&mut coverage, &mut sweeps, ping) {
+                    match error {
+                        StoreError::Outside => tally.outside += 1,
+                        StoreError::Full => tally.not_stored += 1,
+                    }
+                }
+                note_frontier(&mut coverage, ping, &mut requests);
+            }
+        }
+    }
+}
+
+impl HeadSweeps {
+    fn note_gaps(&mut self, situation: &Situation) {
+        (self.pass_gap_s, self.even_gap_s) = advice::pass_gaps_s(&situation.heads, situation.speed_mps);
+        let periods = situation.heads.iter().flatten().map(advice::HeadMotion::ping_period_s);
+        self.ping_period_s = periods.fold(0.0, f64::max);
+    }
+}
+
+fn count(tally: &mut Tally, outcome: &Outcome) {
+    match outcome {
+        Outcome::Sample { .. } => tally.samples += 1,
+        Outcome::Missing => tally.missing += 1,
+        Outcome::OutOfRange => tally.out_of_range += 1,
+        Outcome::Unplaced(_) => tally.unplaced += 1,
+    }
+}
+
+/// Adds a ping to the passage of the section that its head is in.
+fn note_passage(coverage: &mut Coverage, sweeps: &HeadSweeps, ping: &PlacedPing) {
+    let (Some(fix), Some(reach)) = (ping.fix, ping.reach) else { return };
+    let index = coverage.sections.index_of((reach.from_m + reach.to_m) / 2.0);
+    let Some(section) = coverage.sections.get_mut(index) else { return };
+    let passage = &mut section.passage;
+    passage.pings += 1;
+    match ping.outcome {
+        Outcome::Sample { .. } => {}
+        Outcome::Missing => passage.missing += 1,
+        Outcome::OutOfRange => passage.out_of_range += 1,
+        Outcome::Unplaced(_) => passage.unplaced += 1,
+    }
+    passage.speed_sum_mps += fix.speed_mps.abs();
+    passage.pass_gap_sum_s += sweeps.pass_gap_s;
+    passage.even_gap_sum_s += sweeps.even_gap_s;
+    passage.ping_period_sum_s += sweeps.ping_period_s;
+    passage.relative_sigma_m = passage.relative_sigma_m.max(fix.relative_sigma_m);
+}
+
+/// Keeps a sample and adds its spacings to its section.
+fn note_sample(coverage: &mut Coverage, sweeps: &mut HeadSweeps, ping: &PlacedPing) -> Result<(), StoreError> {
+    let Some(slot) = sweeps.last.get_mut(ping.head) else { return Ok(()) };
+    if ping.new_sweep {
+        *slot = None;
+    }
+    let Outcome::Sample { point, sigma_m } = ping.outcome else {
+        if let Some(last) = slot {
+            last.unbroken = false;
+        }
+        return Ok(());
+    };
+    let before = *slot;
+    let step_from = before.filter(|last| last.unbroken && ping.single_step);
+    let now = coverage.store.len();
+    let t_x_m = coverage.store.nearest_pass_m(point.x(), sigma_m, FARTHEST_M, now);
+    let sample = WallSample { x_m: point.x(), sigma_m, step_from: step_from.map(|last| last.index) };
+    let kept = coverage.store.insert(sample);
+    *slot = kept.ok().map(|index| LastSample { index, point, sigma_m, unbroken: true });
+    kept?;
+    coverage.sections.touch(point.x());
+    let perimeter_m = coverage.store.perimeter_m();
+    let index = coverage.sections.index_of(point.x());
+    let Some(section) = coverage.sections.get_mut(index) else { return Ok(()) };
+    section.samples += 1;
+    if let Some(t_x_m) = t_x_m {
+        section.t_x_m.add(t_x_m);
+    }
+    if let Some(last) = before {
+        let t_y_m = (point - last.point).norm();
+        section.t_y_m.add(t_y_m);
+        let advance_m = (point.x() - last.point.x()).abs();
+        if let Some(t_x_m) = t_x_m {
+            section.t_m.add(spacing::t_max_m(t_x_m, advance_m, t_y_m));
+        }
+    }
+    if let Some(last) = step_from {
+        let around_m = math::wrap_signed(sigma_m - last.sigma_m, perimeter_m);
+        section.passage.t_y_m = section.passage.t_y_m.max(around_m.abs());
+    }
+    Ok(())
+}
+
+/// Moves the frontier on, and asks for the sections that are out of the way now.
+fn note_frontier(coverage: &mut Coverage, ping: &PlacedPing, requests: &mut Requests) {
+    let (Some(fix), Some(reach)) = (ping.fix, ping.reach) else { return };
+    let Coverage { store, sections, frontier } = coverage;
+    let margin_m = sections.margin_m(fix.relative_sigma_m);
+    let moved = frontier.advance(ping.head, ping.received, reach, sections.section_m(), margin_m);
+    let now = store.len();
+    sections.due(&moved, frontier.swept(), now, ping.received, &mut |request| requests.0.push(request));
+}

@@ -1,0 +1,54 @@
+//! Bytes to readings.
+
+use bevy_ecs::prelude::{Res, ResMut, Resource};
+
+use crate::app::device::Decoder;
+use crate::app::flow::{Event, Events, SourceTallies, SourceTally, Tally};
+use crate::app::reading::Packet;
+use crate::time::MonoNs;
+use crate::app::merge::Inbox;
+
+/// The decoder of each source.
+#[derive(Resource)]
+pub(in crate::app) struct Decoders(pub(in crate::app) Vec<Box<dyn Decoder>>);
+
+pub(super) fn decode(
+    inbox: Res<'_, Inbox>,
+    mut decoders: ResMut<'_, Decoders>,
+    mut events: ResMut<'_, Events>,
+    mut tally: ResMut<'_, Tally>,
+    mut sources: ResMut<'_, SourceTallies>,
+) {
+    events.0.clear();
+    for (source, packet) in inbox.iter() {
+        tally.packets += 1;
+        tally.span = Some(widened(tally.span, packet.received));
+        let before = events.0.len();
+        let Some(decoder) = decoders.0.get_mut(source.index()) else { continue };
+        decoder.decode(packet, &mut |decoded| {
+            events.0.push(Event {
+                source,
+                received: packet.received,
+                valid_at: decoded.valid_at,
+                reading: decoded.reading,
+            });
+        });
+        if let Some(of_source) = sources.0.get_mut(source.index()) {
+            count(of_source, packet, events.0.len() - before);
+        }
+    }
+}
+
+fn count(tally: &mut SourceTally, packet: Packet<'_>, readings: usize) {
+    tally.packets += 1;
+    tally.bytes += packet.bytes.len() as u64;
+    tally.readings += readings as u64;
+    if let Some((_, last)) = tally.span {
+        tally.longest_gap = tally.longest_gap.max(packet.received.since(last));
+    }
+    tally.span = Some(widened(tally.span, packet.received));
+}
+
+fn widened(span: Option<(MonoNs, MonoNs)>, at: MonoNs) -> (MonoNs, MonoNs) {
+    span.map_or((at, at), |(first, last)| (first.min(at), last.max(at)))
+}

@@ -1,0 +1,29 @@
+//! The core's own systems, one file a stage.
+
+mod advise;
+mod cover;
+mod decode;
+mod judge;
+mod navigate;
+mod place;
+
+use bevy_ecs::schedule::{IntoScheduleConfigs, Schedule};
+
+use super::stage::Stage;
+
+pub(super) use advise::Advisor;
+pub(super) use cover::HeadSweeps;
+pub(super) use decode::Decoders;
+pub(super) use judge::judge_one;
+
+/// Adds the core's systems to their stages.
+pub(super) fn add(schedule: &mut Schedule) {
+    schedule.add_systems((
+        decode::decode.in_set(Stage::Decode),
+        navigate::navigate.in_set(Stage::Navigate),
+        place::place.in_set(Stage::Place),
+        cover::cover.in_set(Stage::Cover),
+        judge::judge.in_set(Stage::Judge),
+        advise::advise.in_set(Stage::Advise),
+    ));
+}

@@ -1,0 +1,48 @@
+//! Readings to fixes.
+
+use bevy_ecs::prelude::{Res, ResMut};
+
+use crate::app::flow::{ADVICE_PERIOD, Events, Navigator, Positioned, PositionedList, SensorTable};
+use crate::app::reading::Reading;
+use crate::time::MonoNs;
+
+pub(super) fn navigate(
+    events: Res<'_, Events>,
+    sensors: Res<'_, SensorTable>,
+    mut navigator: ResMut<'_, Navigator>,
+    mut list: ResMut<'_, PositionedList>,
+) {
+    list.0.clear();
+    let navigator = &mut *navigator;
+    for (index, event) in events.0.iter().enumerate() {
+        // Time may stand still or go back; a beat is passed once. After a gap only the last beat counts.
+        if let Some(at) = beat_before(&mut navigator.next_beat, event.received) {
+            let fix = navigator.navigation.fix(at);
+            list.0.push(Positioned::Beat { at, fix });
+        }
+        if matches!(event.reading, Reading::Sonar(_)) {
+            let fix = navigator.navigation.fix(event.valid_at);
+            navigator.last = fix.ok().or(navigator.last);
+            list.0.push(Positioned::Ping { event: index, fix });
+        } else if let Some(sensor) = sensors.0.get(event.source.index()) {
+            navigator.navigation.update(event.source.index(), sensor, event.valid_at, &event.reading);
+        }
+    }
+}
+
+/// The last beat at or before `now` that hasn't been given yet.
+fn beat_before(next: &mut Option<MonoNs>, now: MonoNs) -> Option<MonoNs> {
+    let period = ADVICE_PERIOD.0.unsigned_abs();
+    let last = MonoNs(now.0 - now.0 % period);
+    match *next {
+        Some(due) if now < due => None,
+        Some(_) => {
+            *next = Some(last + ADVICE_PERIOD);
+            Some(last)
+        }
+        None => {
+            *next = Some(last + ADVICE_PERIOD);
+            None
+        }
+    }
+}
