@@ -1,1 +1,36 @@
-fn main() {}
+//! The `headrace` binary: command line, configuration, list of plugins; the work is done in the libraries.
+
+mod cli;
+mod commands;
+mod devices;
+mod dive;
+mod expect;
+mod failure;
+mod files;
+mod station;
+mod summary;
+mod watch;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use cli::{Cli, Command};
+
+fn main() -> ExitCode {
+    tracing_subscriber::fmt().with_writer(std::io::stderr).with_max_level(tracing::Level::WARN).init();
+    let result = match Cli::parse().command {
+        Command::Demo(demo) => commands::demo(&demo),
+        Command::Run(run) => commands::run(&run),
+        Command::Replay(replay) => commands::replay(&replay),
+        Command::Simulate(simulate) => commands::simulate(&simulate),
+        Command::Check(check) => commands::check(&check),
+    };
+    match result {
+        Ok(code) => ExitCode::from(code),
+        Err(failure) => {
+            eprintln!("headrace: {failure}");
+            ExitCode::from(failure.exit_code())
+        }
+    }
+}

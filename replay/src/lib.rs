@@ -1,1 +1,7 @@
-//! replay
+//! headrace's dive logs, the drive that feeds a loop from a log or a scene, and the simulator.
+
+pub mod drive;
+pub mod log;
+pub mod player;
+pub mod record;
+pub mod simulate;

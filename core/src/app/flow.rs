@@ -217,6 +217,15 @@ pub struct Tally {
     pub not_stored: u64,
 }
 
+/// The tick that runs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Resource)]
+pub struct TickTime {
+    /// Its number, from zero.
+    pub index: u64,
+    /// Its end.
+    pub now: MonoNs,
+}
+
 /// What came from one source.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SourceTally {

@@ -72,7 +72,9 @@ impl Inbox {
                 return;
             }
             self.bytes.resize(to, 0);
-            if let (Some(reader), Some(into)) = (readers.get_mut(usize::from(source)), self.bytes.get_mut(from..to)) {
+            if let (Some(reader), Some(into)) =
+                (readers.get_mut(usize::from(source)), self.bytes.get_mut(from..to))
+            {
                 reader.take(into);
             }
             self.packets.push(Received { source: SourceId(source), received: header.received, from, to });

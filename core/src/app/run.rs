@@ -7,7 +7,7 @@ use super::components::{DepthSensor, Echosounder, Imu, Mounted, SonarHead, Tethe
 use super::digest::Digest;
 use super::flow::{
     AdviceLog, Coverage, Digests, Events, Finder, HeadTable, MAX_TICK_READINGS, Navigator, Notices, Place,
-    PlacedList, PositionedList, Requests, SensorTable, SourceTallies, Tally,
+    PlacedList, PositionedList, Requests, SensorTable, SourceTallies, Tally, TickTime,
 };
 use super::head::HeadTrack;
 use super::merge::{Inbox, MAX_TICK_PACKETS};
@@ -55,6 +55,7 @@ impl Loop {
         world.insert_resource(AdviceLog::default());
         world.insert_resource(Digests::default());
         world.insert_resource(Tally::default());
+        world.insert_resource(TickTime::default());
         world.insert_resource(SourceTallies::new(sources.len()));
         let coverage = coverage(&mission);
         // A jump along the tunnel may ask for every section at once.
@@ -67,19 +68,32 @@ impl Loop {
             site: mission.site,
             target_m: mission.target_m,
         });
-        schedule.initialize(&mut world).map_err(|error| PluginError::Schedule { why: format!("{error:?}") })?;
-        let mut armed =
-            Self { world, schedule, readers, ports: ports.into_iter().map(Some).collect(), sources, mission, ticks: 0 };
+        schedule
+            .initialize(&mut world)
+            .map_err(|error| PluginError::Schedule { why: format!("{error:?}") })?;
+        let mut armed = Self {
+            world,
+            schedule,
+            readers,
+            ports: ports.into_iter().map(Some).collect(),
+            sources,
+            mission,
+            ticks: 0,
+        };
         // The first run of a schedule allocates; with nothing to do it has no other effect.
-        armed.tick();
+        armed.tick(MonoNs(0));
         armed.ticks = 0;
         Ok(armed)
     }
 
     /// Takes what has come and works it off. Gives the number of packets consumed.
     ///
+    /// `now` is the end of the tick's time, for the record; no result depends on it.
     /// Allocates: never.
-    pub fn tick(&mut self) -> usize {
+    pub fn tick(&mut self, now: MonoNs) -> usize {
+        if let Some(mut time) = self.world.get_resource_mut::<TickTime>() {
+            *time = TickTime { index: self.ticks, now };
+        }
         if let Some(mut inbox) = self.world.get_resource_mut::<Inbox>() {
             inbox.fill(&mut self.readers);
         }
@@ -133,11 +147,23 @@ impl Loop {
         self.world.resource::<Notices>().0.clone()
     }
 
+    /// Whether packets wait in the rings.
+    pub fn has_waiting(&self) -> bool {
+        self.readers.iter().any(|reader| reader.peek().is_some())
+    }
+
+    /// What each source's codec has seen, in the order of the sources.
+    pub fn decoder_counts(&self) -> Vec<crate::codec::CodecCounts> {
+        self.world.resource::<Decoders>().0.iter().map(|decoder| decoder.counts()).collect()
+    }
+
     /// Digest of all results so far: places, judgements and advice.
     pub fn digest(&self) -> u64 {
         let digests = self.world.resource::<Digests>();
         let mut all = Digest::default();
-        all.integer(digests.pings.value()).integer(digests.judgements.value()).integer(digests.advice.value());
+        all.integer(digests.pings.value())
+            .integer(digests.judgements.value())
+            .integer(digests.advice.value());
         all.value()
     }
 }

@@ -1,5 +1,7 @@
 //! `VEHICLE.toml`: the vehicle, its sensors, the tunnel and the target.
 
+use core::cell::RefCell;
+
 use super::reader::{ConfigError, Document, Section};
 use crate::app::device::{Device, DeviceKind};
 use crate::frames::{Mount, Rot, Vec3};
@@ -29,6 +31,8 @@ pub struct VehicleConfig {
     pub sensors: Vec<Box<dyn Device>>,
     /// The common part of each sensor's table, in the same order.
     pub sensor_configs: Vec<SensorConfig>,
+    /// Files that this one names, with their text: what a log needs to be replayed without them.
+    pub attachments: Vec<(String, String)>,
 }
 
 /// The `[tunnel]` table.
@@ -94,7 +98,13 @@ impl VehicleConfig {
         let section_m = root.number("section_m", 0.05..=10.0)?.unwrap_or(0.25);
         let tunnel_section = root.required("tunnel", root.section("tunnel")?)?;
         let axis_yaw_rad = tunnel_section.number("axis_yaw_deg", DEGREES)?.unwrap_or(0.0).to_radians();
-        let tunnel = parse_tunnel(tunnel_section, load)?;
+        let attachments = RefCell::new(Vec::new());
+        let load = |name: &str| {
+            let text = load(name)?;
+            attachments.borrow_mut().push((name.to_owned(), text.clone()));
+            Ok(text)
+        };
+        let tunnel = parse_tunnel(tunnel_section, &load)?;
         let site = match root.section("water")? {
             Some(water) => parse_water(water, axis_yaw_rad)?,
             None => Site { axis_yaw_rad, ..Site::default() },
@@ -125,6 +135,7 @@ impl VehicleConfig {
             planned_speed_mps,
             sensors,
             sensor_configs,
+            attachments: attachments.into_inner(),
         })
     }
 }

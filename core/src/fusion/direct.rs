@@ -169,9 +169,7 @@ impl TetherTrack {
             .filter_map(|k| self.readings.get(k % SPEED_READINGS))
             .find(|(at, _)| now.since(*at).0 <= SPEED_WINDOW.0);
         match recent {
-            Some((then, before_m)) if now > *then => {
-                (chainage_m - before_m) / now.since(*then).as_secs_f64()
-            }
+            Some((then, before_m)) if now > *then => (chainage_m - before_m) / now.since(*then).as_secs_f64(),
             _ => 0.0,
         }
     }
@@ -180,7 +178,9 @@ impl TetherTrack {
 impl Navigation for DirectNavigation {
     fn update(&mut self, source: usize, sensor: &SensorInfo, at: MonoNs, reading: &Reading) {
         match (sensor.kind, reading) {
-            (SensorKind::Imu, Reading::Attitude(rotation)) => self.take_attitude(at, &sensor.mount, *rotation),
+            (SensorKind::Imu, Reading::Attitude(rotation)) => {
+                self.take_attitude(at, &sensor.mount, *rotation)
+            }
             (SensorKind::Tether { zero_at_m, scale }, Reading::TetherLength(length)) => {
                 self.tether.take(at, zero_at_m, scale, length);
             }
@@ -199,7 +199,8 @@ impl Navigation for DirectNavigation {
     fn fix(&self, at: MonoNs) -> Result<Fix, NoFix> {
         let fresh = |since: MonoNs| at.since(since).0 <= STALE.0;
         let (_, attitude) = self.attitude.filter(|(since, _)| fresh(*since)).ok_or(NoFix::Heading)?;
-        let (since, chainage_m) = self.tether.latest().filter(|(since, _)| fresh(*since)).ok_or(NoFix::Chainage)?;
+        let (since, chainage_m) =
+            self.tether.latest().filter(|(since, _)| fresh(*since)).ok_or(NoFix::Chainage)?;
         let (_, [y_m, z_m]) = self.place.filter(|(since, _)| fresh(*since)).ok_or(NoFix::Section)?;
         let speed_mps = self.tether.speed_mps();
         let x_m = chainage_m + speed_mps * at.since(since).as_secs_f64();
@@ -253,7 +254,9 @@ mod tests {
         assert_eq!(nav.fix(MonoNs(0)), Err(NoFix::Section));
         let echosounder = SensorKind::Echosounder { min_confidence: 0.5 };
         let now = MonoNs(500_000_000);
-        for (source, (yaw, pitch)) in [(90.0, 0.0), (-90.0, 0.0), (0.0, -90.0), (0.0, 90.0)].iter().enumerate() {
+        for (source, (yaw, pitch)) in
+            [(90.0, 0.0), (-90.0, 0.0), (0.0, -90.0), (0.0, 90.0)].iter().enumerate()
+        {
             let info = sensor(echosounder, *yaw, *pitch);
             let origin = truth.place(info.mount.position);
             let beam = truth.attitude * (info.mount.rotation * Vec3::new(1.0, 0.0, 0.0));
@@ -288,7 +291,10 @@ mod tests {
         // The sensor is 0.4 m off; the echoes say 3.0 m.
         nav.update(1, &depth, MonoNs(0), &pressure(3.4));
         let down = SensorInfo {
-            mount: Mount { position: Vec3::zero(), rotation: Rot::from_roll_pitch_yaw(0.0, math::FRAC_PI_2, 0.0) },
+            mount: Mount {
+                position: Vec3::zero(),
+                rotation: Rot::from_roll_pitch_yaw(0.0, math::FRAC_PI_2, 0.0),
+            },
             kind: SensorKind::Echosounder { min_confidence: 0.5 },
         };
         nav.update(2, &down, MonoNs(0), &echo(3.0 * 1500.0 / site.sound_speed_mps));

@@ -205,6 +205,18 @@ impl Profile {
         self.elements.get(index).map_or(self.reference, |element| element.point_at(sigma - element.sigma_m))
     }
 
+    /// Place of an arc length on a clock seen looking along the tunnel from the reference point, to the nearest half hour:
+    /// 6 is the floor's centre, 9 the left wall, 12 the crown.
+    pub fn clock(&self, sigma_m: f64) -> String {
+        let place = sub(self.point_at(sigma_m), self.reference);
+        // Head angle: 0 down, growing to the left.
+        let angle = math::wrap(math::atan2(place[0], -place[1]), TAU);
+        let half_hours = math::round_to_i64(angle / TAU * 24.0) + 12;
+        let half_hours = half_hours.rem_euclid(24);
+        let hour = if half_hours / 2 == 0 { 12 } else { half_hours / 2 };
+        format!("{hour}:{}", if half_hours % 2 == 0 { "00" } else { "30" })
+    }
+
     /// The largest distance from `origin` to a vertex or arc end of the wall, at least as far as any wall is, m.
     pub fn farthest_m(&self, origin: Yz) -> f64 {
         let reach = |element: &Element| match element.shape {

@@ -1,1 +1,17 @@
-//! bar100
+//! Blue Robotics Bar100 depth sensor (Keller 7LD) on I2C: transactions to absolute pressure, and back.
+//!
+//! [`codec`] turns bytes into transactions, [`calibration`] turns counts into pressure, [`decoder`] joins the two for
+//! the loop, [`emulator`] is the device's side for simulations and [`plugin`] reads the vehicle file.
+
+#![cfg_attr(not(test), warn(clippy::indexing_slicing))]
+
+pub mod calibration;
+pub mod codec;
+pub mod decoder;
+pub mod emulator;
+pub mod plugin;
+
+pub use plugin::Kind;
+
+#[cfg(test)]
+mod tests;

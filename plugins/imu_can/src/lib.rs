@@ -1,1 +1,19 @@
-//! imu_can
+//! Inertial units on CAN: frames of several makers to attitude, turn rate and specific force, and back.
+//!
+//! [`frame`] is the CAN frame itself, [`sets`] the makers' messages, [`codec`] joins the two, [`decoder`] makes readings
+//! for the loop, [`emulator`] is the device's side for simulations and [`plugin`] reads the vehicle file.
+
+#![cfg_attr(not(test), warn(clippy::indexing_slicing))]
+
+pub mod codec;
+pub mod decoder;
+pub mod emulator;
+pub mod frame;
+mod motion;
+pub mod plugin;
+pub mod sets;
+
+pub use plugin::Kind;
+
+#[cfg(test)]
+mod tests;

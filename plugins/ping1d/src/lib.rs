@@ -1,1 +1,12 @@
-//! ping1d
+//! Blue Robotics Ping echosounders (`Ping1D`, Ping2): the Ping protocol, a decoder for the loop and an emulated device.
+//!
+//! Bytes to values and back without I/O; the port (serial, or the vehicle's UDP bridge) is another layer.
+
+#![cfg_attr(not(test), warn(clippy::indexing_slicing))]
+
+pub mod codec;
+pub mod emulator;
+pub mod plugin;
+pub mod settings;
+
+pub use plugin::Kind;

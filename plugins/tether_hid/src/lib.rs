@@ -1,1 +1,19 @@
-//! tether_hid
+//! Counters of cable paid out: configurable USB HID reports, and the text lines of MTNW LCI-90 monitors.
+//!
+//! [`report`] and [`mod@line`] turn bytes into values and back, [`tracker`] follows a counter that wraps, jumps or starts
+//! anew, [`decoder`] joins them for the loop, [`emulator`] is the device's side for simulations and [`plugin`] reads
+//! the vehicle file.
+
+#![cfg_attr(not(test), warn(clippy::indexing_slicing))]
+
+pub mod decoder;
+pub mod emulator;
+pub mod line;
+pub mod plugin;
+pub mod report;
+pub mod tracker;
+
+pub use plugin::Kind;
+
+#[cfg(test)]
+mod tests;

@@ -93,7 +93,11 @@ fn note_passage(coverage: &mut Coverage, sweeps: &HeadSweeps, ping: &PlacedPing)
 }
 
 /// Keeps a sample and adds its spacings to its section.
-fn note_sample(coverage: &mut Coverage, sweeps: &mut HeadSweeps, ping: &PlacedPing) -> Result<(), StoreError> {
+fn note_sample(
+    coverage: &mut Coverage,
+    sweeps: &mut HeadSweeps,
+    ping: &PlacedPing,
+) -> Result<(), StoreError> {
     let Some(slot) = sweeps.last.get_mut(ping.head) else { return Ok(()) };
     if ping.new_sweep {
         *slot = None;

@@ -4,9 +4,9 @@ use bevy_ecs::prelude::{Res, ResMut, Resource};
 
 use crate::app::device::Decoder;
 use crate::app::flow::{Event, Events, SourceTallies, SourceTally, Tally};
+use crate::app::merge::Inbox;
 use crate::app::reading::Packet;
 use crate::time::MonoNs;
-use crate::app::merge::Inbox;
 
 /// The decoder of each source.
 #[derive(Resource)]

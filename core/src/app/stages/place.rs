@@ -3,8 +3,8 @@
 use bevy_ecs::prelude::{Query, Res, ResMut};
 
 use crate::app::flow::{
-    Digests, Event, Events, HeadTable, Outcome, Place, Placed, PlacedList, PlacedPing, Positioned, PositionedList,
-    SensorTable,
+    Digests, Event, Events, HeadTable, Outcome, Place, Placed, PlacedList, PlacedPing, Positioned,
+    PositionedList, SensorTable,
 };
 use crate::app::head::HeadTrack;
 use crate::app::reading::{Reading, SonarReturn};
@@ -39,7 +39,9 @@ pub(super) fn place(
             Positioned::Ping { event, fix } => {
                 let Some(event) = events.0.get(event) else { continue };
                 let Reading::Sonar(sonar) = event.reading else { continue };
-                let Some((head, entity)) = heads.0.get(event.source.index()).copied().flatten() else { continue };
+                let Some((head, entity)) = heads.0.get(event.source.index()).copied().flatten() else {
+                    continue;
+                };
                 let (Some(sensor), Ok(mut track)) =
                     (sensors.0.get(event.source.index()), tracks.get_mut(entity))
                 else {
@@ -117,7 +119,11 @@ fn situation(
             *slot = Some(HeadMotion { mount: sensor.mount, angle_rad, rate_radps, step_rad, sector_rad });
         }
     }
-    Situation { pose: fix.ok().map(|fix| fix.pose), speed_mps: fix.map_or(0.0, |fix| fix.speed_mps), heads: motions }
+    Situation {
+        pose: fix.ok().map(|fix| fix.pose),
+        speed_mps: fix.map_or(0.0, |fix| fix.speed_mps),
+        heads: motions,
+    }
 }
 
 fn digest(digests: &mut Digests, event: &Event, ping: &PlacedPing) {

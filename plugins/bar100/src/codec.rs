@@ -1,0 +1,358 @@
+//! I2C transactions with the sensor: the bytes written and then the bytes read, as one message.
+//!
+//! ```text
+//!   measure      AC | status  pressure (2)  temperature (2)      6 bytes
+//!   memory read  cell | status  word (2)                         4 bytes, cells 0x00 to 0x7F
+//! ```
+//! Words are most significant byte first. The status byte is `0 1 busy mode(2) memory-error x x`.
+//! Source: Keller, Communication Protocol 4LD...9LD, v2.6.
+
+use headrace_core::codec::{Codec, CodecCounts};
+
+/// The command that starts a conversion.
+pub const MEASURE: u8 = 0xAC;
+
+/// Memory cells lie below the commands, so that the first byte alone tells how long a transaction is.
+const FIRST_COMMAND: u8 = 0x80;
+
+const MEASURE_BYTES: usize = 6;
+const MEMORY_BYTES: usize = 4;
+
+/// A status byte that says the result is good.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Status(u8);
+
+/// The result of a conversion, in counts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Measurement {
+    /// What the sensor says of itself.
+    pub status: Status,
+    /// Pressure in counts: 16384 at the lower limit, 49152 at the upper. Never 0, which a sensor answers that was
+    /// asked too soon.
+    pub pressure_counts: u16,
+    /// Temperature in counts of 0.05 degrees / 16. Never 0, for the same reason.
+    pub temperature_counts: u16,
+}
+
+/// One word of the sensor's memory.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct MemoryWord {
+    /// Which cell, 0x00 to 0x7F.
+    pub cell: u8,
+    /// What the sensor says of itself.
+    pub status: Status,
+    /// Its content.
+    pub word: u16,
+}
+
+/// A transaction that went well.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Transaction {
+    /// A conversion's result.
+    Measurement(Measurement),
+    /// A word of memory.
+    Memory(MemoryWord),
+}
+
+/// Why a transaction tells nothing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum TransactionError {
+    /// The answer was not there yet.
+    #[error("reading the status: 0x00, the sensor isn't ready; a good one is 0x40")]
+    NotReady,
+    /// Nobody answered.
+    #[error("reading the status: 0xFF, the bus is held high or nobody answers; a good one is 0x40")]
+    BusHigh,
+    /// Bits 7 and 6 are constant.
+    #[error("reading the status: {0:#04X}, bits 7 and 6 must be 01")]
+    FixedBits(u8),
+    /// The sensor doesn't measure.
+    #[error("reading the status: {0:#04X}, mode (bits 4 and 3) must be 00, normal")]
+    Mode(u8),
+    /// The sensor's memory, and so its calibration, is damaged.
+    #[error("reading the status: {0:#04X}, bit 2 says that the memory's checksum is wrong; it must be 0")]
+    Memory(u8),
+    /// Pressure or temperature of zero counts.
+    #[error(
+        "reading a measurement: pressure {pressure} and temperature {temperature} counts; 0 means no result"
+    )]
+    Empty {
+        /// Pressure counts.
+        pressure: u16,
+        /// Temperature counts.
+        temperature: u16,
+    },
+    /// The first byte is neither the measure command nor a memory cell, or the length doesn't fit it.
+    #[error(
+        "reading a transaction of {len} bytes that begins with {first:#04X}: known are AC with 6 bytes and 00 to 7F with 4"
+    )]
+    Unknown {
+        /// The first byte; 0 for no byte at all.
+        first: u8,
+        /// Its length.
+        len: usize,
+    },
+}
+
+impl Status {
+    /// Ready, normal mode, memory sound.
+    pub const IDLE: Self = Self(0x40);
+
+    /// Checks a status byte. A sensor that says it is busy passes: this one nearly always says so.
+    ///
+    /// Errors: not ready, bus high, or constant bits, mode or memory bit not as they must be.
+    /// Source: status checks of Blue Robotics' `KellerLD` library.
+    pub fn new(byte: u8) -> Result<Self, TransactionError> {
+        match byte {
+            0x00 => Err(TransactionError::NotReady),
+            0xFF => Err(TransactionError::BusHigh),
+            _ if byte & 0xC0 != 0x40 => Err(TransactionError::FixedBits(byte)),
+            _ if byte & 0x18 != 0 => Err(TransactionError::Mode(byte)),
+            _ if byte & 0x04 != 0 => Err(TransactionError::Memory(byte)),
+            _ => Ok(Self(byte)),
+        }
+    }
+
+    /// Whether the sensor says that a conversion is going on.
+    pub fn is_busy(self) -> bool {
+        self.0 & 0x20 != 0
+    }
+
+    /// As on the wire.
+    pub fn byte(self) -> u8 {
+        self.0
+    }
+}
+
+impl Measurement {
+    /// Temperature in degrees Celsius; the low four bits say nothing.
+    pub fn temperature_degc(&self) -> f64 {
+        (f64::from(self.temperature_counts >> 4) - 24.0) * 0.05 - 50.0
+    }
+
+    /// The whole transaction.
+    pub fn encode(&self) -> [u8; MEASURE_BYTES] {
+        let [p1, p0] = self.pressure_counts.to_be_bytes();
+        let [t1, t0] = self.temperature_counts.to_be_bytes();
+        [MEASURE, self.status.0, p1, p0, t1, t0]
+    }
+}
+
+impl MemoryWord {
+    /// The whole transaction.
+    pub fn encode(&self) -> [u8; MEMORY_BYTES] {
+        let [high, low] = self.word.to_be_bytes();
+        [self.cell, self.status.0, high, low]
+    }
+}
+
+impl Transaction {
+    /// Length in bytes of the transaction that begins with `first`, or `None` where no such is known.
+    pub fn length(first: u8) -> Option<usize> {
+        match first {
+            MEASURE => Some(MEASURE_BYTES),
+            _ if first < FIRST_COMMAND => Some(MEMORY_BYTES),
+            _ => None,
+        }
+    }
+
+    /// Reads one whole transaction.
+    ///
+    /// Errors: an unknown one, a status that isn't good, or a measurement of zeros.
+    pub fn decode(bytes: &[u8]) -> Result<Self, TransactionError> {
+        match *bytes {
+            [MEASURE, status, p1, p0, t1, t0] => {
+                let status = Status::new(status)?;
+                let pressure_counts = u16::from_be_bytes([p1, p0]);
+                let temperature_counts = u16::from_be_bytes([t1, t0]);
+                if pressure_counts == 0 || temperature_counts == 0 {
+                    let (pressure, temperature) = (pressure_counts, temperature_counts);
+                    return Err(TransactionError::Empty { pressure, temperature });
+                }
+                Ok(Self::Measurement(Measurement { status, pressure_counts, temperature_counts }))
+            }
+            [cell, status, high, low] if cell < FIRST_COMMAND => {
+                let status = Status::new(status)?;
+                Ok(Self::Memory(MemoryWord { cell, status, word: u16::from_be_bytes([high, low]) }))
+            }
+            _ => {
+                let first = bytes.first().copied().unwrap_or_default();
+                Err(TransactionError::Unknown { first, len: bytes.len() })
+            }
+        }
+    }
+}
+
+/// Bytes to transactions.
+///
+/// A transaction with a bad status is left out and counted as a bad frame. A message that begins with an unknown byte is
+/// left out to its end: what looks like a transaction within it is none.
+#[derive(Debug, Clone, Default)]
+pub struct Bar100Codec {
+    held: [u8; MEASURE_BYTES],
+    len: usize,
+    /// Whether the message that is coming in has turned out to be none of ours.
+    astray: bool,
+    counts: CodecCounts,
+}
+
+impl Bar100Codec {
+    fn take(&mut self, sink: &mut dyn FnMut(Transaction)) {
+        match Transaction::decode(self.held.get(..self.len).unwrap_or_default()) {
+            Ok(transaction) => {
+                self.counts.good_frames += 1;
+                self.len = 0;
+                sink(transaction);
+            }
+            Err(_) => self.drop_held(),
+        }
+    }
+
+    fn drop_held(&mut self) {
+        self.counts.bad_frames += 1;
+        self.counts.skipped_bytes += self.len as u64;
+        self.len = 0;
+    }
+}
+
+impl Codec for Bar100Codec {
+    type Value = Transaction;
+
+    const MAX_FRAME_BYTES: usize = MEASURE_BYTES;
+    const WHOLE_MESSAGES: bool = true;
+
+    fn push(&mut self, bytes: &[u8], sink: &mut dyn FnMut(Transaction)) {
+        for byte in bytes {
+            if self.astray {
+                self.counts.skipped_bytes += 1;
+                continue;
+            }
+            if let Some(place) = self.held.get_mut(self.len) {
+                *place = *byte;
+                self.len += 1;
+            }
+            match self.held.first().copied().and_then(Transaction::length) {
+                None => {
+                    self.drop_held();
+                    self.astray = true;
+                }
+                Some(length) if length == self.len => self.take(sink),
+                Some(_) => (),
+            }
+        }
+    }
+
+    fn flush(&mut self, _sink: &mut dyn FnMut(Transaction)) {
+        if self.len > 0 {
+            self.drop_held();
+        }
+        self.astray = false;
+    }
+
+    fn counts(&self) -> CodecCounts {
+        self.counts
+    }
+
+    fn held_bytes(&self) -> usize {
+        self.len
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn measured(bytes: [u8; 5]) -> Measurement {
+        let [status, p1, p0, t1, t0] = bytes;
+        match Transaction::decode(&[MEASURE, status, p1, p0, t1, t0]) {
+            Ok(Transaction::Measurement(measurement)) => measurement,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn worked_examples_2_to_4_give_counts_and_temperature() {
+        let examples = [
+            ([0x40, 0x40, 0x04, 0x59, 0x00], 16_388, 22_784, 20.0),
+            ([0x40, 0x46, 0x46, 0x4F, 0xA0], 17_990, 20_384, 12.5),
+            ([0x40, 0x65, 0x90, 0x45, 0x00], 26_000, 17_664, 4.0),
+        ];
+        for (bytes, pressure, temperature, degc) in examples {
+            let measurement = measured(bytes);
+            assert_eq!(measurement.pressure_counts, pressure);
+            assert_eq!(measurement.temperature_counts, temperature);
+            assert!((measurement.temperature_degc() - degc).abs() < 1e-9, "{bytes:02X?}");
+            assert_eq!(measurement.encode()[1..], bytes);
+        }
+    }
+
+    #[test]
+    fn worked_example_5_is_refused_each_for_its_reason() {
+        let measure = |status| Transaction::decode(&[MEASURE, status, 0x46, 0x46, 0x4F, 0xA0]);
+        assert_eq!(Transaction::decode(&[MEASURE, 0, 0, 0, 0, 0]), Err(TransactionError::NotReady));
+        let high = [MEASURE, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF];
+        assert_eq!(Transaction::decode(&high), Err(TransactionError::BusHigh));
+        assert_eq!(measure(0x44), Err(TransactionError::Memory(0x44)));
+        assert_eq!(measure(0x48), Err(TransactionError::Mode(0x48)));
+        assert_eq!(measure(0xC0), Err(TransactionError::FixedBits(0xC0)));
+    }
+
+    #[test]
+    fn busy_passes_and_zeros_do_not() {
+        assert!(measured([0x60, 0x46, 0x46, 0x4F, 0xA0]).status.is_busy());
+        assert!(matches!(
+            Transaction::decode(&[MEASURE, 0x40, 0, 0, 0x4F, 0xA0]),
+            Err(TransactionError::Empty { pressure: 0, .. })
+        ));
+    }
+
+    #[test]
+    fn a_memory_read_inside_a_refused_message_is_not_taken() {
+        let mut codec = Bar100Codec::default();
+        let mut none = |transaction| panic!("{transaction:?}");
+        codec.push(&[MEASURE, 0x44, 0x12, 0x40, 0x5B, 0x3D], &mut none);
+        codec.flush(&mut none);
+        codec.push(&[0x90, 0x12, 0x40, 0x5B, 0x3D, 0x00], &mut none);
+        codec.flush(&mut none);
+        assert_eq!(codec.counts(), CodecCounts { good_frames: 0, bad_frames: 2, skipped_bytes: 12 });
+    }
+
+    fn any_status() -> impl proptest::strategy::Strategy<Value = Status> {
+        use proptest::prelude::*;
+        any::<u8>().prop_map(|byte| Status(0x40 | (byte & 0x23)))
+    }
+
+    fn any_transaction() -> impl proptest::strategy::Strategy<Value = Transaction> {
+        use proptest::prelude::*;
+        prop_oneof![
+            (any_status(), 1..=u16::MAX, 1..=u16::MAX).prop_map(
+                |(status, pressure_counts, temperature_counts)| {
+                    Transaction::Measurement(Measurement { status, pressure_counts, temperature_counts })
+                }
+            ),
+            (0u8..0x80, any_status(), any::<u16>())
+                .prop_map(|(cell, status, word)| Transaction::Memory(MemoryWord { cell, status, word })),
+        ]
+    }
+
+    fn encode(transaction: Transaction) -> Vec<u8> {
+        match transaction {
+            Transaction::Measurement(measurement) => measurement.encode().to_vec(),
+            Transaction::Memory(word) => word.encode().to_vec(),
+        }
+    }
+
+    headrace_core::codec_contract!(
+        contract,
+        codec: Bar100Codec::default(),
+        values: any_transaction(),
+        encode: |transaction: &Transaction| encode(*transaction),
+        frames: [
+            &[0xAC, 0x40, 0x46, 0x46, 0x4F, 0xA0][..],
+            &[0xAC, 0x60, 0x40, 0x04, 0x59, 0x00],
+            &[0x12, 0x40, 0x5B, 0x3D],
+            &[0x15, 0x40, 0x42, 0xC8],
+        ],
+    );
+}

@@ -1,0 +1,83 @@
+//! The vehicle file's part of a Bar100, and its place in the loop.
+
+use headrace_core::app::components::{DepthSensor, Mounted};
+use headrace_core::app::device::{Device, DeviceKind, Emulator, EmulatorSetup};
+use headrace_core::app::plugin::{Plugin, PluginError};
+use headrace_core::app::{App, SourceSpec};
+use headrace_core::config::{ConfigError, Section, SensorConfig};
+
+use crate::calibration::{Calibration, Overrides, PressureMode, STANDARD_ATMOSPHERE_BAR};
+use crate::decoder::{Bar100Decoder, Meaning};
+use crate::emulator::{Bar100Emulator, Emulated};
+
+/// Name in vehicle files.
+pub const NAME: &str = "bar100";
+
+/// Two minutes of measurements at the usual rate.
+const RING_BYTES: usize = 1 << 16;
+
+/// The range of the part as sold, bar.
+const PART_LIMITS_BAR: (f64, f64) = (0.0, 100.0);
+
+/// The Bar100 as a kind of device.
+#[derive(Debug, Clone, Copy)]
+pub struct Kind;
+
+/// A configured Bar100.
+#[derive(Debug, Clone)]
+pub struct Bar100 {
+    sensor: SensorConfig,
+    meaning: Meaning,
+    emulated: Emulated,
+}
+
+impl DeviceKind for Kind {
+    fn name(&self) -> &'static str {
+        NAME
+    }
+
+    fn configure(&self, sensor: &SensorConfig, own: &Section<'_>) -> Result<Box<dyn Device>, ConfigError> {
+        let modes =
+            [("pr", PressureMode::Vented), ("pa", PressureMode::Sealed), ("paa", PressureMode::Absolute)];
+        let overrides = Overrides {
+            p_min_bar: own.number("p_min_bar", -1.0..=1000.0)?,
+            p_max_bar: own.number("p_max_bar", -1.0..=1000.0)?,
+            mode: own.choice("p_mode", &modes)?,
+        };
+        let ambient_bar = own.number("ambient_bar", 0.4..=1.1)?.unwrap_or(STANDARD_ATMOSPHERE_BAR);
+        let reject_busy = own.boolean("reject_busy")?.unwrap_or(false);
+        let rate_hz = own.number("rate_hz", 0.1..=100.0)?.unwrap_or(20.0);
+        let calibration = Calibration::new(
+            overrides.mode.unwrap_or(PressureMode::Sealed),
+            overrides.p_min_bar.unwrap_or(PART_LIMITS_BAR.0),
+            overrides.p_max_bar.unwrap_or(PART_LIMITS_BAR.1),
+        )
+        .map_err(|error| own.invalid("p_max_bar", &error.to_string()))?;
+        let latency = sensor.latency;
+        Ok(Box::new(Bar100 {
+            sensor: sensor.clone(),
+            meaning: Meaning { overrides, ambient_bar, reject_busy, latency },
+            emulated: Emulated { calibration, ambient_bar, mount: sensor.mount, rate_hz, latency },
+        }))
+    }
+}
+
+impl Plugin for Bar100 {
+    fn build(&self, app: &mut App) -> Result<(), PluginError> {
+        let source = app.add_source(SourceSpec {
+            id: self.sensor.id.clone(),
+            plugin: NAME,
+            connect: self.sensor.connect.clone(),
+            decoder: Box::new(Bar100Decoder::new(self.meaning)),
+            ring_bytes: RING_BYTES,
+        })?;
+        app.spawn((Mounted { source, mount: self.sensor.mount }, DepthSensor));
+        Ok(())
+    }
+}
+
+impl Device for Bar100 {
+    fn emulator(&self, setup: &EmulatorSetup) -> Box<dyn Emulator> {
+        Box::new(Bar100Emulator::new(self.emulated, setup.start))
+    }
+}

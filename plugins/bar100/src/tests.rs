@@ -1,0 +1,157 @@
+//! From a vehicle file's table to readings, by way of the emulated sensor.
+
+use headrace_core::app::device::{Decoder as _, Device, DeviceKind as _, Direction, EmulatorSetup, Truth};
+use headrace_core::app::reading::{Decoded, Packet, Reading, WaterPressure};
+use headrace_core::app::{App, Mission};
+use headrace_core::config::{Document, SensorConfig};
+use headrace_core::frames::{Mount, Point3, Pose, Rot, Tunnel, Vec3};
+use headrace_core::site::Site;
+use headrace_core::time::{DurNs, MonoNs};
+use headrace_core::tunnel::named;
+
+use crate::Kind;
+use crate::calibration::{Overrides, STANDARD_ATMOSPHERE_BAR};
+use crate::decoder::{Bar100Decoder, Meaning};
+
+/// A vehicle that climbs at 0.1 m/s from 2 m above the floor.
+struct Climb {
+    site: Site,
+}
+
+impl Truth for Climb {
+    fn pose(&self, at: MonoNs) -> Pose {
+        let height_m = 2.0 + 0.1 * at.as_secs_f64();
+        Pose { position: Point3::new(0.0, 0.0, height_m), attitude: Rot::identity() }
+    }
+
+    fn range_m(&self, _origin: Point3<Tunnel>, _direction: Vec3<Tunnel>) -> Option<f64> {
+        None
+    }
+
+    fn site(&self) -> &Site {
+        &self.site
+    }
+}
+
+fn sensor() -> SensorConfig {
+    SensorConfig {
+        id: "depth".to_owned(),
+        plugin: "bar100".to_owned(),
+        connect: "i2c:/dev/i2c-1:0x40".to_owned(),
+        mount: Mount { position: Vec3::new(0.0, 0.0, -0.3), rotation: Rot::identity() },
+        latency: DurNs::from_millis(9),
+    }
+}
+
+fn app() -> App {
+    App::new(Mission {
+        profile: named::circle(2.5).unwrap(),
+        site: Site::default(),
+        target_m: 0.5,
+        section_m: 0.25,
+        length_m: 100.0,
+    })
+}
+
+fn configured(own: &str) -> Result<Box<dyn Device>, String> {
+    let root = Document::new("v.toml", own).root().unwrap();
+    let device = Kind.configure(&sensor(), &root).map_err(|error| error.to_string())?;
+    root.finish().map_err(|error| error.to_string())?;
+    Ok(device)
+}
+
+fn meaning(overrides: Overrides) -> Meaning {
+    Meaning {
+        overrides,
+        ambient_bar: STANDARD_ATMOSPHERE_BAR,
+        reject_busy: false,
+        latency: DurNs::from_millis(9),
+    }
+}
+
+fn decode(decoder: &mut Bar100Decoder, received: MonoNs, bytes: &[u8]) -> Vec<Decoded> {
+    let mut readings = Vec::new();
+    decoder.decode(Packet { received, bytes }, &mut |decoded| readings.push(decoded));
+    readings
+}
+
+fn pressure(decoded: &Decoded) -> WaterPressure {
+    match decoded.reading {
+        Reading::Pressure(pressure) => pressure,
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn readings_are_withheld_until_the_calibration_is_known() {
+    let mut decoder = Bar100Decoder::new(meaning(Overrides::default()));
+    let measure = [0xAC, 0x40, 0x46, 0x46, 0x4F, 0xA0];
+    let at = MonoNs(1_000_000_000);
+    assert!(decode(&mut decoder, at, &measure).is_empty());
+    assert_eq!(decoder.withheld(), 1);
+    for read in [[0x12, 0x40, 0x5B, 0x3D], [0x13, 0x40, 0, 0], [0x14, 0x40, 0, 0], [0x15, 0x40, 0x42, 0xC8]] {
+        assert!(decode(&mut decoder, at, &read).is_empty());
+    }
+    assert!(decode(&mut decoder, at, &measure).is_empty(), "half of the upper limit is still unknown");
+    decode(&mut decoder, at, &[0x16, 0x40, 0, 0]);
+    let readings = decode(&mut decoder, at, &measure);
+    assert_eq!(readings[0].valid_at, MonoNs(991_000_000));
+    assert!((pressure(&readings[0]).pressure_pa - 590_112.0).abs() < 1.0);
+    assert_eq!(decoder.withheld(), 2);
+    assert_eq!(decoder.counts().good_frames, 8);
+}
+
+#[test]
+fn a_log_that_begins_in_the_middle_is_read_with_the_files_calibration() {
+    let device = configured("p_min_bar = 0\np_max_bar = 100\np_mode = \"paa\"\n").unwrap();
+    device.build(&mut app()).unwrap();
+    let overrides = Overrides {
+        p_min_bar: Some(0.0),
+        p_max_bar: Some(100.0),
+        mode: Some(crate::calibration::PressureMode::Absolute),
+    };
+    let mut decoder = Bar100Decoder::new(meaning(overrides));
+    let readings = decode(&mut decoder, MonoNs(0), &[0xAC, 0x60, 0x46, 0x46, 0x4F, 0xA0]);
+    assert!((pressure(&readings[0]).pressure_pa - 490_112.0).abs() < 1.0);
+    let mut strict = Bar100Decoder::new(Meaning { reject_busy: true, ..meaning(overrides) });
+    assert!(decode(&mut strict, MonoNs(0), &[0xAC, 0x60, 0x46, 0x46, 0x4F, 0xA0]).is_empty());
+    assert_eq!(strict.withheld(), 1);
+}
+
+#[test]
+fn what_the_emulated_sensor_says_decodes_to_the_true_depth() {
+    let truth = Climb { site: Site::default() };
+    let device = configured("rate_hz = 30\n").unwrap();
+    let mut emulator = device.emulator(&EmulatorSetup { start: MonoNs(5_000_000_000), head: None });
+    let mut decoder = Bar100Decoder::new(meaning(Overrides::default()));
+    let mut readings = Vec::new();
+    let mut last = MonoNs(0);
+    for _ in 0..300 {
+        assert!(emulator.due() >= last);
+        last = emulator.due();
+        emulator.act(&truth, &mut |direction, received, bytes| {
+            assert_eq!(direction, Direction::Received);
+            readings.extend(decode(&mut decoder, received, bytes));
+        });
+    }
+    assert_eq!((readings.len(), decoder.withheld()), (300, 0));
+    assert_eq!(decoder.counts().good_frames, 305);
+    assert_eq!(readings[0].valid_at, MonoNs(5_000_000_000));
+    assert_eq!(readings[30].valid_at, MonoNs(6_000_000_000));
+    for decoded in &readings {
+        let got = pressure(decoded);
+        let depth_m = 50.0 - (truth.pose(decoded.valid_at).position.z() - 0.3);
+        let error_pa = got.pressure_pa - truth.site.pressure_pa(depth_m);
+        assert!(error_pa.abs() <= got.resolution_pa / 2.0 + 1e-6, "{error_pa} Pa");
+        assert!((got.temperature_degc - 10.0).abs() < 1e-9);
+    }
+}
+
+#[test]
+fn wrong_keys_are_named() {
+    let error = configured("p_mode = \"pax\"\n").err().unwrap();
+    assert_eq!(error, "v.toml:1: p_mode = \"pax\": must be one of pr, pa, paa");
+    let error = configured("p_min_bar = 50\np_max_bar = 10\n").err().unwrap();
+    assert!(error.starts_with("v.toml:2: p_max_bar = 10: ") && error.contains("50 to 10 bar"), "{error}");
+    assert!(configured("rate = 20\n").err().unwrap().contains("is not a key here"));
+}

@@ -1,0 +1,57 @@
+//! A byte string of bounded length without the heap.
+
+/// Up to `N` bytes. Those beyond the length are zero, so that equality of values is equality of contents.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub struct Bytes<const N: usize> {
+    bytes: [u8; N],
+    len: usize,
+}
+
+/// Bytes that did not fit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("storing {len} bytes; the most allowed is {max}")]
+pub struct TooLong {
+    /// Their length.
+    pub len: usize,
+    /// The most that fits.
+    pub max: usize,
+}
+
+impl<const N: usize> Default for Bytes<N> {
+    fn default() -> Self {
+        Self { bytes: [0; N], len: 0 }
+    }
+}
+
+impl<const N: usize> Bytes<N> {
+    /// Holds a copy of `bytes`.
+    ///
+    /// Errors: more than `N`.
+    pub fn new(bytes: &[u8]) -> Result<Self, TooLong> {
+        let mut new = Self::default();
+        new.extend(bytes)?;
+        Ok(new)
+    }
+
+    /// Appends `bytes`.
+    ///
+    /// Errors: they don't fit; nothing is appended.
+    pub fn extend(&mut self, bytes: &[u8]) -> Result<(), TooLong> {
+        let len = self.len + bytes.len();
+        let free = self.bytes.get_mut(self.len..len).ok_or(TooLong { len, max: N })?;
+        free.copy_from_slice(bytes);
+        self.len = len;
+        Ok(())
+    }
+
+    /// What is held.
+    pub fn as_slice(&self) -> &[u8] {
+        self.bytes.get(..self.len).unwrap_or_default()
+    }
+}
+
+impl<const N: usize> core::fmt::Debug for Bytes<N> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "{:02X?}", self.as_slice())
+    }
+}

@@ -1,0 +1,19 @@
+//! The 881 family's wire: 27-byte switch commands to the head, returns of 13 to 513 bytes from it.
+
+mod bytes;
+mod command;
+mod returns;
+
+pub use bytes::{Bytes, TooLong};
+pub use command::{COMMAND_BYTES, Command, CommandCodec, CommandError, Points, RANGES_M};
+pub(crate) use command::{step_at_most, step_deg};
+pub use returns::{
+    Header, MAX_ECHO_BYTES, MAX_POSITION, MAX_RETURN_BYTES, Model, Return, ReturnCodec, ReturnError, Status,
+    Tag,
+};
+
+/// Counts of 0.3 degrees in a whole turn of a head.
+pub const COUNTS_PER_TURN: i32 = 1200;
+
+/// The count that a head reports at 0 degrees. Source: Imagenex 881A serial interface, head position.
+pub const ZERO_COUNT: i32 = 600;

@@ -1,0 +1,356 @@
+//! Returns: 12 bytes of header, the echo, and 0xFC. The family's heads and its 852 sounder share them.
+//!
+//! Source: Imagenex 881A serial interface, return data; Imagenex 852 serial interface specification 1.04.
+
+use headrace_core::codec::{Codec, CodecCounts, FrameBuffer, Verdict};
+
+use super::Bytes;
+
+/// The longest echo.
+pub const MAX_ECHO_BYTES: usize = MAX_ECHO as usize;
+
+/// The longest return.
+pub const MAX_RETURN_BYTES: usize = HEADER_BYTES + MAX_ECHO_BYTES + 1;
+
+/// The greatest head position of an 881: +180 degrees.
+pub const MAX_POSITION: u16 = 1200;
+
+const MAX_ECHO: u16 = 500;
+const HEADER_BYTES: usize = 12;
+const TERMINATOR: u8 = 0xFC;
+const CLOCKWISE: u8 = 0x40;
+/// Range settings from this one up count in centimetres.
+const COARSE_FROM_M: u8 = 5;
+
+/// What a return says it is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Tag {
+    /// Echo at the 25-point setting.
+    Imx,
+    /// Echo at the 50-point setting.
+    Igx,
+    /// Profile point alone.
+    Ipx,
+    /// A model with attitude sensors (GS).
+    Ina,
+    /// A model with attitude sensors (GS).
+    Inb,
+    /// A model with attitude sensors (GS).
+    Inc,
+}
+
+impl Tag {
+    const ALL: [Self; 6] = [Self::Imx, Self::Igx, Self::Ipx, Self::Ina, Self::Inb, Self::Inc];
+
+    /// Its letters on the wire.
+    pub const fn letters(self) -> [u8; 3] {
+        match self {
+            Self::Imx => *b"IMX",
+            Self::Igx => *b"IGX",
+            Self::Ipx => *b"IPX",
+            Self::Ina => *b"INA",
+            Self::Inb => *b"INB",
+            Self::Inc => *b"INC",
+        }
+    }
+
+    /// Whether a GS model sent it. Those put more fields behind the common header, known from one source only.
+    pub const fn is_gs(self) -> bool {
+        matches!(self, Self::Ina | Self::Inb | Self::Inc)
+    }
+
+    fn from_letters(letters: [u8; 3]) -> Option<Self> {
+        Self::ALL.into_iter().find(|tag| tag.letters() == letters)
+    }
+}
+
+/// Which of the family's devices a return is from; position and profile range differ.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Model {
+    /// A turning head: positions 0 to 1200; 2 or 10 mm a count.
+    Head881,
+    /// The 852 echosounder: positions to 13 bits without a meaning; always 10 mm a count.
+    Sounder852,
+}
+
+impl Model {
+    /// The model that head ids as delivered tell: 0x11 to 0x15 are the sounder's.
+    pub const fn of_head_id(head_id: u8) -> Self {
+        if matches!(head_id, 0x11..=0x15) { Self::Sounder852 } else { Self::Head881 }
+    }
+}
+
+/// The serial status byte.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Status(pub u8);
+
+impl Status {
+    /// Whether the head took the settings of the command that it answers.
+    pub const fn accepted(self) -> bool {
+        self.0 & 0x40 != 0
+    }
+
+    /// Whether the head lost characters of the command.
+    pub const fn overrun(self) -> bool {
+        self.0 & 0x80 != 0
+    }
+}
+
+/// The header of a return, in the wire's own units.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Header {
+    /// What kind of return.
+    pub tag: Tag,
+    /// The head that sent it.
+    pub head_id: u8,
+    /// Its state.
+    pub status: Status,
+    /// Head position in counts of 0.3 degrees, 600 at 0 degrees; at most 1200 on an 881, 13 bits elsewhere.
+    pub position: u16,
+    /// Direction of stepping.
+    pub clockwise: bool,
+    /// Range setting, m.
+    pub range_m: u8,
+    /// Profile range in counts of [`Header::count_mm`], 14 bits; 0 where nothing was above the threshold.
+    pub profile_counts: u16,
+}
+
+/// A whole return.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Return {
+    /// The header.
+    pub header: Header,
+    /// Echo strengths, packed by the number of data bits that the command asked for. None in [`Tag::Ipx`].
+    pub echo: Bytes<MAX_ECHO_BYTES>,
+}
+
+/// Why bytes are no return, or a value can't be one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ReturnError {
+    /// Another tag.
+    #[error("return: tag {got:02X?}; allowed are IMX, IGX, IPX, INA, INB, INC")]
+    Tag {
+        /// The three bytes.
+        got: [u8; 3],
+    },
+    /// Fewer bytes than a return has.
+    #[error("return: {got} bytes; needed are {needed}")]
+    Short {
+        /// Bytes there.
+        got: usize,
+        /// Bytes needed.
+        needed: usize,
+    },
+    /// Bit 7 of a packed field is set.
+    #[error("return: a packed field has bit 7 set in bytes {got:02X?}; allowed is 0x00 to 0x7F")]
+    HighBit {
+        /// Bytes 5, 6 and 8 to 11.
+        got: [u8; 6],
+    },
+    /// A field beyond its bits or its meaning.
+    #[error("return: {field} {got}; the most allowed is {max}")]
+    TooGreat {
+        /// Which.
+        field: &'static str,
+        /// The value.
+        got: u16,
+        /// Its limit.
+        max: u16,
+    },
+    /// Something else where 0xFC must be.
+    #[error("return: ends in {got:#04X}; allowed is 0xFC")]
+    Terminator {
+        /// The byte.
+        got: u8,
+    },
+}
+
+impl Header {
+    /// The header at the front of `bytes`, and the length of the echo that follows it.
+    ///
+    /// `model` overrides what the head id tells.
+    /// Errors: too short, another tag, bit 7 set in a packed field, or a position or length beyond its limit.
+    pub fn decode(bytes: &[u8], model: Option<Model>) -> Result<(Self, usize), ReturnError> {
+        let short = ReturnError::Short { got: bytes.len(), needed: HEADER_BYTES };
+        let &[t0, t1, t2, head_id, status, p0, p1, range_m, r0, r1, n0, n1] =
+            bytes.first_chunk::<HEADER_BYTES>().ok_or(short)?;
+        let tag = Tag::from_letters([t0, t1, t2]).ok_or(ReturnError::Tag { got: [t0, t1, t2] })?;
+        let packed = [p0, p1, r0, r1, n0, n1];
+        if packed.iter().any(|byte| byte & 0x80 != 0) {
+            return Err(ReturnError::HighBit { got: packed });
+        }
+        let header = Self {
+            tag,
+            head_id,
+            status: Status(status),
+            position: unpack(p0, p1 & !CLOCKWISE),
+            clockwise: p1 & CLOCKWISE != 0,
+            range_m,
+            profile_counts: unpack(r0, r1),
+        };
+        header.check(model)?;
+        let echo = unpack(n0, n1);
+        at_most("number of echo bytes", echo, header.max_echo_bytes())?;
+        Ok((header, usize::from(echo)))
+    }
+
+    /// Size of a count of the profile range, mm.
+    ///
+    /// Source: Imagenex 881A serial interface, profile range; for the 852 its own specification.
+    pub const fn count_mm(&self, model: Model) -> u32 {
+        match model {
+            Model::Head881 if self.range_m < COARSE_FROM_M => 2,
+            Model::Head881 | Model::Sounder852 => 10,
+        }
+    }
+
+    /// Profile range in mm at 1500 m/s; `None` where nothing was above the threshold.
+    pub fn profile_mm(&self, model: Model) -> Option<u32> {
+        (self.profile_counts != 0).then(|| u32::from(self.profile_counts) * self.count_mm(model))
+    }
+
+    fn encode(&self, echo_len: u16) -> [u8; HEADER_BYTES] {
+        let [t0, t1, t2] = self.tag.letters();
+        let ([p0, p1], [r0, r1], [n0, n1]) = (pack(self.position), pack(self.profile_counts), pack(echo_len));
+        let p1 = if self.clockwise { p1 | CLOCKWISE } else { p1 };
+        [t0, t1, t2, self.head_id, self.status.0, p0, p1, self.range_m, r0, r1, n0, n1]
+    }
+
+    fn check(&self, model: Option<Model>) -> Result<(), ReturnError> {
+        let max_position = match model.unwrap_or(Model::of_head_id(self.head_id)) {
+            Model::Head881 => MAX_POSITION,
+            Model::Sounder852 => 0x1FFF,
+        };
+        at_most("head position", self.position, max_position)?;
+        at_most("profile range in counts", self.profile_counts, 0x3FFF)
+    }
+
+    fn max_echo_bytes(&self) -> u16 {
+        if self.tag == Tag::Ipx { 0 } else { MAX_ECHO }
+    }
+}
+
+impl Return {
+    /// The return as bytes.
+    ///
+    /// Errors: a position, profile range or echo length beyond its limit.
+    pub fn encode(&self) -> Result<Bytes<MAX_RETURN_BYTES>, ReturnError> {
+        self.header.check(None)?;
+        let echo = self.echo.as_slice();
+        let echo_len = u16::try_from(echo.len()).unwrap_or(u16::MAX);
+        at_most("number of echo bytes", echo_len, self.header.max_echo_bytes())?;
+        let mut bytes = Bytes::default();
+        for part in [&self.header.encode(echo_len)[..], echo, &[TERMINATOR]] {
+            let needed = HEADER_BYTES + echo.len() + 1;
+            bytes.extend(part).map_err(|_| ReturnError::Short { got: MAX_RETURN_BYTES, needed })?;
+        }
+        Ok(bytes)
+    }
+
+    /// The return at the front of `bytes`.
+    ///
+    /// Errors: as for [`Header::decode`], bytes missing, or another end than 0xFC.
+    pub fn decode(bytes: &[u8], model: Option<Model>) -> Result<Self, ReturnError> {
+        let (header, echo_len) = Header::decode(bytes, model)?;
+        let needed = HEADER_BYTES + echo_len + 1;
+        let short = ReturnError::Short { got: bytes.len(), needed };
+        match *bytes.get(needed - 1).ok_or(short)? {
+            TERMINATOR => {
+                let echo = bytes.get(HEADER_BYTES..needed - 1).and_then(|echo| Bytes::new(echo).ok());
+                Ok(Self { header, echo: echo.ok_or(short)? })
+            }
+            got => Err(ReturnError::Terminator { got }),
+        }
+    }
+}
+
+fn unpack(low: u8, high: u8) -> u16 {
+    (u16::from(high & 0x7F) << 7) | u16::from(low & 0x7F)
+}
+
+/// Seven bits a byte, so that no byte of it has bit 7 set.
+fn pack(value: u16) -> [u8; 2] {
+    [(value & 0x7F) as u8, ((value >> 7) & 0x7F) as u8]
+}
+
+fn at_most(field: &'static str, got: u16, max: u16) -> Result<(), ReturnError> {
+    if got > max { Err(ReturnError::TooGreat { field, got, max }) } else { Ok(()) }
+}
+
+/// Returns out of the stream from head to host.
+#[derive(Debug, Clone, Default)]
+pub struct ReturnCodec {
+    buffer: FrameBuffer<MAX_RETURN_BYTES>,
+    model: Option<Model>,
+}
+
+impl ReturnCodec {
+    /// For a line whose device is known, whatever its head id. The default goes by head id.
+    pub fn for_model(model: Model) -> Self {
+        Self { model: Some(model), ..Self::default() }
+    }
+
+    /// Like [`Codec::push`], but hands out the bytes of each valid return and so copies no echo.
+    pub fn push_frames(&mut self, bytes: &[u8], sink: impl FnMut(&[u8])) {
+        let model = self.model;
+        self.buffer.push(bytes, |front| judge(front, model), sink);
+    }
+
+    /// Like [`Codec::flush`], but hands out the bytes of each valid return.
+    pub fn flush_frames(&mut self, sink: impl FnMut(&[u8])) {
+        let model = self.model;
+        self.buffer.flush(|front| judge(front, model), sink);
+    }
+}
+
+fn judge(front: &[u8], model: Option<Model>) -> Verdict {
+    let start = front.get(..front.len().min(3)).unwrap_or_default();
+    if !Tag::ALL.iter().any(|tag| tag.letters().starts_with(start)) {
+        return Verdict::NotAStart;
+    }
+    match Header::decode(front, model) {
+        Err(ReturnError::Short { needed, .. }) => Verdict::Need(needed),
+        Err(_) => Verdict::Bad,
+        Ok((_, echo_len)) => match front.get(HEADER_BYTES + echo_len) {
+            None => Verdict::Need(HEADER_BYTES + echo_len + 1),
+            Some(&TERMINATOR) => Verdict::Frame(HEADER_BYTES + echo_len + 1),
+            Some(_) => Verdict::Bad,
+        },
+    }
+}
+
+impl Codec for ReturnCodec {
+    type Value = Return;
+    const MAX_FRAME_BYTES: usize = MAX_RETURN_BYTES;
+    const WHOLE_MESSAGES: bool = false;
+
+    fn push(&mut self, bytes: &[u8], sink: &mut dyn FnMut(Return)) {
+        let model = self.model;
+        self.push_frames(bytes, |frame| {
+            if let Ok(value) = Return::decode(frame, model) {
+                sink(value);
+            }
+        });
+    }
+
+    fn flush(&mut self, sink: &mut dyn FnMut(Return)) {
+        let model = self.model;
+        self.flush_frames(|frame| {
+            if let Ok(value) = Return::decode(frame, model) {
+                sink(value);
+            }
+        });
+    }
+
+    fn counts(&self) -> CodecCounts {
+        self.buffer.counts()
+    }
+
+    fn held_bytes(&self) -> usize {
+        self.buffer.held_bytes()
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,199 @@
+use headrace_core::app::device::Decoder as _;
+use headrace_core::app::reading::{Packet, Reading, SonarReturn};
+use headrace_core::frames::{Body, Point3, Pose, Rot, Tunnel, Vec3};
+use headrace_core::math::{PI, TAU};
+use headrace_core::site::Site;
+
+use super::*;
+use crate::plugin::HeadDecoder;
+use crate::settings::tests::settings;
+
+const RADIUS_M: f64 = 4.0;
+
+/// A tube of 4 m radius; the vehicle glides along its axis, 1 m left of it.
+struct Tube {
+    site: Site,
+}
+
+impl Truth for Tube {
+    fn pose(&self, at: MonoNs) -> Pose {
+        Pose {
+            position: Point3::new(0.2 * at.as_secs_f64(), 1.0, RADIUS_M),
+            attitude: Rot::<Tunnel, Body>::identity(),
+        }
+    }
+
+    fn range_m(&self, origin: Point3<Tunnel>, direction: Vec3<Tunnel>) -> Option<f64> {
+        let (y, z) = (origin.y(), origin.z() - RADIUS_M);
+        let along = y * direction.y() + z * direction.z();
+        Some(math::sqrt(along * along + RADIUS_M * RADIUS_M - y * y - z * z) - along)
+    }
+
+    fn site(&self) -> &Site {
+        &self.site
+    }
+}
+
+fn tube() -> Tube {
+    Tube { site: Site::default() }
+}
+
+fn mount() -> Mount {
+    Mount { position: Vec3::new(0.5, -1.0, 0.0), rotation: Rot::identity() }
+}
+
+/// What a rehearsal gives: sent and received times in ns, and the readings.
+struct Run {
+    sent: Vec<u64>,
+    received: Vec<u64>,
+    readings: Vec<(u64, SonarReturn)>,
+}
+
+fn run(text: &str, latency: DurNs, program: HeadProgram, pings: usize) -> Run {
+    let settings = settings(text).unwrap();
+    let setup = EmulatorSetup { start: MonoNs(7_000_000_000), head: Some(program) };
+    let mut emulator = HeadEmulator::new(settings, mount(), latency, &setup);
+    let mut decoder = HeadDecoder::new(settings, latency);
+    let mut run = Run { sent: Vec::new(), received: Vec::new(), readings: Vec::new() };
+    while run.received.len() < pings {
+        let due = emulator.due();
+        emulator.act(&tube(), &mut |direction, at, bytes| {
+            assert_eq!(at, due);
+            if direction == Direction::Sent {
+                run.sent.push(at.0);
+                return;
+            }
+            run.received.push(at.0);
+            decoder.decode(Packet { received: at, bytes }, &mut |decoded| match decoded.reading {
+                Reading::Sonar(sonar) => run.readings.push((decoded.valid_at.0, sonar)),
+                other => panic!("{other:?}"),
+            });
+        });
+    }
+    assert_eq!(decoder.counts().bad_frames, 0);
+    run
+}
+
+fn turning(start_rad: f64, growing: bool) -> HeadProgram {
+    HeadProgram { start_rad, growing, sector: None }
+}
+
+/// Sensor angles of the readings in whole counts.
+fn counts(run: &Run) -> Vec<i32> {
+    run.readings.iter().map(|(_, sonar)| counts_of_rad(sonar.angle_rad)).collect()
+}
+
+#[test]
+fn a_ping_is_at_start_and_then_each_period() {
+    let run = run("mode = \"fastest\"", DurNs::from_millis(5), turning(0.0, true), 400);
+    for (i, k) in (0..400_u64).enumerate() {
+        let ping = 7_000_000_000 + k * 32_000_000;
+        assert_eq!((run.sent[i], run.received[i]), (ping, ping + 5_000_000));
+        assert_eq!(run.readings[i].0, ping);
+    }
+}
+
+#[test]
+fn readings_are_the_tube_in_the_devices_metres() {
+    for returns in ["profile", "imx", "igx"] {
+        let text = format!("mode = \"slow\"\nreturns = \"{returns}\"");
+        let run = run(&text, DurNs::ZERO, turning(1.0, true), 1200);
+        for (_, sonar) in &run.readings {
+            // The mount puts the head on the axis.
+            let expected = RADIUS_M * 1500.0 / 1447.0;
+            assert!((sonar.range_m.unwrap() - expected).abs() <= 0.005, "{sonar:?}");
+        }
+    }
+}
+
+#[test]
+fn a_wall_beyond_the_range_setting_is_not_heard() {
+    let near = run("mode = \"slow\"\nrange_m = 4", DurNs::ZERO, turning(0.0, true), 3);
+    assert!(near.readings.iter().all(|(_, sonar)| sonar.range_m.is_none()));
+    let fine = run("mode = \"slow\"\nrange_m = 5", DurNs::ZERO, turning(0.0, true), 3);
+    assert!(fine.readings.iter().all(|(_, sonar)| sonar.range_m.is_some()));
+}
+
+#[test]
+fn a_turn_closes_and_goes_on_either_way() {
+    for (mode, step) in [("slow", 1), ("medium", 2), ("fast", 3), ("faster", 4), ("fastest", 8)] {
+        for growing in [true, false] {
+            let pings = 1200 / step as usize;
+            let text = format!("mode = \"{mode}\"");
+            let run = run(&text, DurNs::ZERO, turning(2.0, growing), 2 * pings);
+            let got = counts(&run);
+            let signed = if growing { step } else { -step };
+            for (k, got) in (0..).zip(&got) {
+                assert_eq!((got - 382 - k * signed).rem_euclid(1200), 0, "{mode} ping {k}");
+            }
+            assert_eq!(got[..pings], got[pings..]);
+        }
+    }
+}
+
+#[test]
+fn sign_and_offset_leave_the_program_in_the_sensors_frame() {
+    let text = "mode = \"fast\"\nangle_sign = \"inverted\"\nangle_offset_deg = 33";
+    let run = run(text, DurNs::ZERO, turning(PI / 2.0, true), 50);
+    for (k, got) in (0..).zip(counts(&run)) {
+        assert_eq!((got - 300 - 3 * k).rem_euclid(1200), 0);
+    }
+}
+
+fn check_sweep(text: &str, step: i32, least: i32, size: i32, start: i32, growing: bool) {
+    let rad = |counts: i32| f64::from(counts) * TAU / 1200.0;
+    let program = HeadProgram { start_rad: rad(start), growing, sector: Some((rad(least), rad(size))) };
+    let one_way = (size + step - 1) / step;
+    let period = 2 * one_way as usize;
+    let run = run(text, DurNs::ZERO, program, 3 * period + 1);
+    let got: Vec<i32> = counts(&run).iter().map(|count| (count - least).rem_euclid(1200)).collect();
+    assert_eq!(got[0], (start - least).rem_euclid(1200));
+    assert_eq!(got[..period], got[period..2 * period], "{text}");
+    // Each end is met once a sweep, at the turning point.
+    let ends = |end: i32| got[..period].iter().filter(|count| **count == end.rem_euclid(1200)).count();
+    assert_eq!((ends(0), ends(size)), if size == 1200 { (2, 2) } else { (1, 1) });
+    assert!(got.iter().all(|count| *count <= size), "{text}: {got:?}");
+    let changes = got.windows(2).map(|pair| (pair[1] - pair[0] + 600).rem_euclid(1200) - 600);
+    assert!(changes.into_iter().all(|change| change != 0 && change.abs() <= step));
+}
+
+#[test]
+fn a_sector_is_swept_to_both_ends_which_are_not_repeated() {
+    for text in ["mode = \"fast\"", "mode = \"fast\"\nangle_sign = \"inverted\"\nangle_offset_deg = 10"] {
+        for (least, size) in [(0, 600), (600, 600), (0, 300), (300, 300), (900, 300), (0, 1200)] {
+            check_sweep(text, 3, least, size, least, true);
+            check_sweep(text, 3, least, size, least + size, false);
+        }
+    }
+}
+
+#[test]
+fn a_step_that_does_not_divide_the_sector_is_cut_at_its_end() {
+    check_sweep("mode = \"fastest\"", 8, 0, 300, 0, true);
+    check_sweep("mode = \"fast\"", 3, 400, 400, 800, false);
+}
+
+#[test]
+fn the_head_keeps_a_sector_that_it_is_commanded() {
+    let settings = settings("mode = \"fastest\"").unwrap();
+    // 90 degrees about 180: positions 1050 to 150 through the seam.
+    let command = Command { sector_deg: 90.0, train_deg: 180.0, ..settings.command };
+    let mut head = Head::new(1046, true);
+    let positions: Vec<u16> = (0..79).map(|_| head.answer(&command, |_| None).header.position).collect();
+    assert_eq!(positions[..3], [1046, 1054, 1062]);
+    assert_eq!(positions[20], 6);
+    assert_eq!(positions[38..41], [150, 142, 134]);
+    assert_eq!(positions[75..79], [1054, 1050, 1058, 1066]);
+}
+
+#[test]
+fn the_head_reverses_once_when_told() {
+    let settings = settings("mode = \"fast\"").unwrap();
+    let mut head = Head::new(600, true);
+    let mut ping = |reverse| {
+        let header = head.answer(&Command { reverse, ..settings.command }, |_| None).header;
+        (header.position, header.clockwise)
+    };
+    assert_eq!([ping(false), ping(true), ping(false)], [(600, true), (603, false), (600, false)]);
+    assert_eq!([ping(true), ping(false)], [(597, true), (600, true)]);
+}

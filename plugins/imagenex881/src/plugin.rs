@@ -1,0 +1,214 @@
+//! Registration of a head with the loop, and its returns as readings.
+
+use headrace_core::app::components::{Mounted, SonarHead};
+use headrace_core::app::device::{Decoder, Device, DeviceKind, Emulator, EmulatorSetup, HeadSpec};
+use headrace_core::app::plugin::{Plugin, PluginError};
+use headrace_core::app::reading::{Decoded, Packet, Reading, SonarReturn};
+use headrace_core::app::{App, SourceSpec};
+use headrace_core::codec::{Codec as _, CodecCounts};
+use headrace_core::config::{ConfigError, Section, SensorConfig};
+use headrace_core::time::{DurNs, MonoNs};
+
+use crate::codec::{Header, Model, ReturnCodec};
+use crate::emulator::HeadEmulator;
+use crate::settings::Settings;
+
+/// Speed of sound by which the family computes every range. Source: Imagenex 881A serial interface, profile range.
+pub const SOUND_SPEED_MPS: f64 = 1500.0;
+
+/// The kind's name in vehicle files and logs.
+const NAME: &str = "imagenex881";
+
+/// Room for some seconds of the longest returns.
+const RING_BYTES: usize = 1 << 17;
+
+/// A return's bytes follow one another on the line; after such a pause no more belong to the one begun.
+const SILENCE: DurNs = DurNs::from_millis(100);
+
+/// The kind of device that vehicle files call `imagenex881`.
+#[derive(Debug, Clone, Copy)]
+pub struct Kind;
+
+impl DeviceKind for Kind {
+    fn name(&self) -> &'static str {
+        NAME
+    }
+
+    fn configure(&self, sensor: &SensorConfig, own: &Section<'_>) -> Result<Box<dyn Device>, ConfigError> {
+        let settings = Settings::read(sensor, own)?;
+        Ok(Box::new(Imagenex881 { sensor: sensor.clone(), settings }))
+    }
+}
+
+/// A configured head.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Imagenex881 {
+    sensor: SensorConfig,
+    settings: Settings,
+}
+
+impl Plugin for Imagenex881 {
+    fn build(&self, app: &mut App) -> Result<(), PluginError> {
+        let source = app.add_source(SourceSpec {
+            id: self.sensor.id.clone(),
+            plugin: NAME,
+            connect: self.sensor.connect.clone(),
+            decoder: Box::new(HeadDecoder::new(self.settings, self.sensor.latency)),
+            ring_bytes: RING_BYTES,
+        })?;
+        let head = SonarHead {
+            step_rad: self.settings.step_rad(),
+            ping_period_s: self.settings.ping_period.as_secs_f64(),
+        };
+        app.spawn((Mounted { source, mount: self.sensor.mount }, head));
+        Ok(())
+    }
+}
+
+impl Device for Imagenex881 {
+    fn head(&self) -> Option<HeadSpec> {
+        Some(HeadSpec {
+            mount: self.sensor.mount,
+            step_rad: self.settings.step_rad(),
+            ping_period_s: self.settings.ping_period.as_secs_f64(),
+            angle_sign: self.settings.angle_sign,
+            angle_offset_rad: self.settings.angle_offset_rad,
+        })
+    }
+
+    fn emulator(&self, setup: &EmulatorSetup) -> Box<dyn Emulator> {
+        Box::new(HeadEmulator::new(self.settings, self.sensor.mount, self.sensor.latency, setup))
+    }
+}
+
+/// Whole returns that gave no reading, by reason.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Rejected {
+    /// The head did not take the command, or lost characters of it.
+    pub status: u64,
+    /// Another head's.
+    pub head_id: u64,
+    /// A GS model's, whose further fields aren't known well enough.
+    pub tag: u64,
+    /// At another range setting than the configured one.
+    pub range_setting: u64,
+    /// A profile range beyond the range setting.
+    pub beyond_range: u64,
+}
+
+impl Rejected {
+    fn total(&self) -> u64 {
+        self.status + self.head_id + self.tag + self.range_setting + self.beyond_range
+    }
+}
+
+/// Returns to readings.
+#[derive(Debug, Clone)]
+pub struct HeadDecoder {
+    codec: ReturnCodec,
+    reader: Reader,
+    begun: MonoNs,
+    last: MonoNs,
+}
+
+/// What makes a reading of a whole return; apart from the codec, so that both can be borrowed.
+#[derive(Debug, Clone)]
+struct Reader {
+    settings: Settings,
+    latency: DurNs,
+    rejected: Rejected,
+    rejected_bytes: u64,
+}
+
+impl HeadDecoder {
+    /// For a head with these settings. A position past +180 degrees makes a frame bad, whatever the head id.
+    pub fn new(settings: Settings, latency: DurNs) -> Self {
+        let reader = Reader { settings, latency, rejected: Rejected::default(), rejected_bytes: 0 };
+        let codec = ReturnCodec::for_model(Model::Head881);
+        Self { codec, reader, begun: MonoNs(0), last: MonoNs(0) }
+    }
+
+    /// Whole returns that gave no reading so far.
+    pub fn rejected(&self) -> Rejected {
+        self.reader.rejected
+    }
+}
+
+impl Decoder for HeadDecoder {
+    fn decode(&mut self, packet: Packet<'_>, sink: &mut dyn FnMut(Decoded)) {
+        let Self { codec, reader, begun, last } = self;
+        if codec.held_bytes() > 0 && packet.received.since(*last) > SILENCE {
+            codec.flush_frames(|frame| reader.read(*begun, frame, sink));
+        }
+        // A return that earlier packets began came when they did; those after it begin in this one.
+        let mut at = if codec.held_bytes() > 0 { *begun } else { packet.received };
+        codec.push_frames(packet.bytes, |frame| {
+            reader.read(at, frame, sink);
+            at = packet.received;
+        });
+        if codec.held_bytes() <= packet.bytes.len() {
+            *begun = packet.received;
+        }
+        *last = packet.received;
+    }
+
+    /// A rejected return counts as bad, and its bytes as skipped.
+    fn counts(&self) -> CodecCounts {
+        let counts = self.codec.counts();
+        let rejected = self.reader.rejected.total();
+        CodecCounts {
+            good_frames: counts.good_frames - rejected,
+            bad_frames: counts.bad_frames + rejected,
+            skipped_bytes: counts.skipped_bytes + self.reader.rejected_bytes,
+        }
+    }
+}
+
+impl Reader {
+    fn read(&mut self, received: MonoNs, frame: &[u8], sink: &mut dyn FnMut(Decoded)) {
+        let header = Header::decode(frame, Some(Model::Head881)).ok().map(|(header, _)| header);
+        match header.and_then(|header| self.accept(&header)) {
+            Some(reading) => {
+                sink(Decoded { valid_at: received - self.latency, reading: Reading::Sonar(reading) });
+            }
+            None => self.rejected_bytes += frame.len() as u64,
+        }
+    }
+
+    fn accept(&mut self, header: &Header) -> Option<SonarReturn> {
+        let command = &self.settings.command;
+        let profile_mm = header.profile_mm(Model::Head881);
+        let Rejected { status, head_id, tag, range_setting, beyond_range } = &mut self.rejected;
+        let reason = if header.head_id != command.head_id {
+            Some(head_id)
+        } else if header.tag.is_gs() {
+            Some(tag)
+        } else if !header.status.accepted() || header.status.overrun() {
+            Some(status)
+        } else if header.range_m != command.range_m {
+            Some(range_setting)
+        } else if profile_mm.is_some_and(|mm| mm > u32::from(header.range_m) * 1000) {
+            Some(beyond_range)
+        } else {
+            None
+        };
+        if let Some(count) = reason {
+            *count += 1;
+            return None;
+        }
+        Some(SonarReturn {
+            angle_rad: self.settings.sensor_rad(header.position),
+            range_m: profile_mm.map(metres),
+            resolution_m: metres(header.count_mm(Model::Head881)),
+            max_range_m: f64::from(header.range_m),
+            sound_speed_mps: SOUND_SPEED_MPS,
+        })
+    }
+}
+
+fn metres(mm: u32) -> f64 {
+    f64::from(mm) / 1000.0
+}
+
+#[cfg(test)]
+mod tests;

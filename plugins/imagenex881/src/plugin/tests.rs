@@ -1,0 +1,133 @@
+use headrace_core::app::Mission;
+use headrace_core::math::PI;
+use headrace_core::site::Site;
+use headrace_core::tunnel::named;
+
+use super::*;
+use crate::codec::{Bytes, Return, Status, Tag};
+use crate::settings::tests::{sensor, settings};
+
+const LATENCY: DurNs = DurNs(2_000_000);
+
+fn decoder(text: &str) -> HeadDecoder {
+    HeadDecoder::new(settings(text).unwrap(), LATENCY)
+}
+
+fn good() -> Return {
+    let header = Header {
+        tag: Tag::Ipx,
+        head_id: 0x10,
+        status: Status(0x41),
+        position: 750,
+        clockwise: true,
+        range_m: 10,
+        profile_counts: 537,
+    };
+    Return { header, echo: Bytes::default() }
+}
+
+fn bytes(value: &Return) -> Vec<u8> {
+    value.encode().unwrap().as_slice().to_vec()
+}
+
+fn decode(decoder: &mut HeadDecoder, received_ms: i64, bytes: &[u8]) -> Vec<(i64, SonarReturn)> {
+    let mut got = Vec::new();
+    let packet = Packet { received: MonoNs(0) + DurNs::from_millis(received_ms), bytes };
+    decoder.decode(packet, &mut |decoded| match decoded.reading {
+        Reading::Sonar(sonar) => got.push((decoded.valid_at.since(MonoNs(0)).0 / 1_000_000, sonar)),
+        other => panic!("{other:?}"),
+    });
+    got
+}
+
+#[test]
+fn a_return_becomes_a_reading_valid_a_latency_earlier() {
+    let got = decode(&mut decoder("mode = \"fast\""), 100, &bytes(&good()));
+    let expected = SonarReturn {
+        angle_rad: PI / 4.0,
+        range_m: Some(5.37),
+        resolution_m: 0.01,
+        max_range_m: 10.0,
+        sound_speed_mps: 1500.0,
+    };
+    assert_eq!(got, [(98, expected)]);
+}
+
+#[test]
+fn near_ranges_count_in_2_mm_and_nothing_heard_is_no_range() {
+    let mut decoder = decoder("mode = \"fast\"\nrange_m = 3");
+    let near = Return { header: Header { range_m: 3, profile_counts: 1234, ..good().header }, ..good() };
+    let [(_, sonar)] = decode(&mut decoder, 0, &bytes(&near))[..] else { panic!() };
+    assert_eq!((sonar.range_m, sonar.resolution_m), (Some(2.468), 0.002));
+    let silent = Return { header: Header { profile_counts: 0, ..near.header }, ..near };
+    let [(_, sonar)] = decode(&mut decoder, 20, &bytes(&silent))[..] else { panic!() };
+    assert_eq!(sonar.range_m, None);
+}
+
+#[test]
+fn an_angle_goes_through_sign_and_offset() {
+    let mut decoder = decoder("mode = \"fast\"\nangle_sign = \"inverted\"\nangle_offset_deg = 180");
+    let [(_, sonar)] = decode(&mut decoder, 0, &bytes(&good()))[..] else { panic!() };
+    assert!((sonar.angle_rad - 0.75 * PI).abs() < 1e-12);
+}
+
+#[test]
+fn what_cannot_be_trusted_is_rejected_and_counted() {
+    let mut decoder = decoder("mode = \"fast\"");
+    let header = good().header;
+    let bad = [
+        Header { status: Status(0x01), ..header },
+        Header { status: Status(0xC0), ..header },
+        Header { head_id: 0x12, ..header },
+        Header { tag: Tag::Ina, ..header },
+        Header { range_m: 20, ..header },
+        Header { profile_counts: 1001, ..header },
+    ];
+    for (i, header) in (0..).zip(bad) {
+        assert_eq!(decode(&mut decoder, i * 20, &bytes(&Return { header, ..good() })), [], "{header:?}");
+    }
+    let mut too_far = bytes(&good());
+    [too_far[5], too_far[6]] = [0x31, 0x49]; // position 1201
+    assert_eq!(decode(&mut decoder, 200, &too_far), []);
+    assert_eq!(decode(&mut decoder, 220, &bytes(&good())).len(), 1);
+    let rejected = Rejected { status: 2, head_id: 1, tag: 1, range_setting: 1, beyond_range: 1 };
+    assert_eq!(decoder.rejected(), rejected);
+    let counts = CodecCounts { good_frames: 1, bad_frames: 7, skipped_bytes: 7 * 13 };
+    assert_eq!(decoder.counts(), counts);
+}
+
+#[test]
+fn a_return_in_pieces_is_valid_from_its_first_byte() {
+    let mut decoder = decoder("mode = \"fast\"");
+    let two = [bytes(&good()), bytes(&good())].concat();
+    assert_eq!(decode(&mut decoder, 100, &two[..5]), []);
+    assert_eq!(decode(&mut decoder, 101, &two[5..9]), []);
+    let times: Vec<i64> = decode(&mut decoder, 102, &two[9..]).iter().map(|(ms, _)| *ms).collect();
+    assert_eq!(times, [98, 100]);
+}
+
+#[test]
+fn after_a_silence_a_new_return_is_not_given_an_old_time() {
+    let mut decoder = decoder("mode = \"fast\"");
+    assert_eq!(decode(&mut decoder, 100, &bytes(&good())[..5]), []);
+    let [(ms, _)] = decode(&mut decoder, 5000, &bytes(&good()))[..] else { panic!() };
+    assert_eq!(ms, 4998);
+}
+
+#[test]
+fn a_head_registers_once_and_says_what_it_is() {
+    let settings = settings("mode = \"slow\"\nangle_offset_deg = 90").unwrap();
+    let head = Imagenex881 { sensor: sensor(), settings };
+    let mut app = App::new(Mission {
+        profile: named::ceran().unwrap(),
+        site: Site::default(),
+        target_m: 0.5,
+        section_m: 0.25,
+        length_m: 100.0,
+    });
+    assert_eq!(head.build(&mut app), Ok(()));
+    assert_eq!(head.build(&mut app), Err(PluginError::DuplicateSource { id: "front".to_owned() }));
+    let spec = head.head().unwrap();
+    assert_eq!((spec.ping_period_s, spec.angle_sign, spec.angle_offset_rad), (0.018, 1.0, PI / 2.0));
+    assert!((spec.step_rad - 0.3_f64.to_radians()).abs() < 1e-15);
+}

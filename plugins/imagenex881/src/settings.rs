@@ -1,0 +1,254 @@
+//! A head's settings: the keys of its table in the vehicle file, the modes, and its angles.
+
+use headrace_core::config::{ConfigError, Section, SensorConfig};
+use headrace_core::math::{self, TAU};
+use headrace_core::time::DurNs;
+
+use crate::codec::{COUNTS_PER_TURN, Command, Points, RANGES_M, ZERO_COUNT};
+
+/// A scanning speed by the maker's name: the step, and how long a turn takes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Mode {
+    /// Step in counts of 0.3 degrees.
+    pub step_counts: u8,
+    /// Time of a whole turn at the 10 m range setting, ms. How it changes with range isn't known.
+    pub turn_ms: i64,
+}
+
+/// The modes. Source: Jorge et al. 2021, Table 2.
+const MODES: [(&str, Mode); 5] = [
+    ("slow", Mode { step_counts: 1, turn_ms: 21_600 }),
+    ("medium", Mode { step_counts: 2, turn_ms: 10_800 }),
+    ("fast", Mode { step_counts: 3, turn_ms: 8_000 }),
+    ("faster", Mode { step_counts: 4, turn_ms: 6_600 }),
+    ("fastest", Mode { step_counts: 8, turn_ms: 4_800 }),
+];
+
+/// A head's settings, checked: each command that they make can be encoded.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// The command that asks for a ping in the middle of a turn.
+    pub command: Command,
+    /// Step in counts of 0.3 degrees: one of those that a command can carry.
+    pub step_counts: u8,
+    /// Time between two pings.
+    pub ping_period: DurNs,
+    /// 1 where the device's angles grow as the sensor frame's, else -1.
+    pub angle_sign: f64,
+    /// Sensor angle where the device reports 0, radians.
+    pub angle_offset_rad: f64,
+}
+
+impl Settings {
+    /// Reads a head's own keys.
+    ///
+    /// Errors: a key that is missing or not allowed, or a latency that isn't below the ping period.
+    pub fn read(sensor: &SensorConfig, own: &Section<'_>) -> Result<Self, ConfigError> {
+        let mode = own.required("mode", own.choice("mode", &MODES)?)?;
+        let settings = Self {
+            command: command(mode, own)?,
+            step_counts: mode.step_counts,
+            ping_period: ping_period(mode, own)?,
+            angle_sign: own.choice("angle_sign", &[("normal", 1.0), ("inverted", -1.0)])?.unwrap_or(1.0),
+            angle_offset_rad: own.number("angle_offset_deg", -360.0..=360.0)?.unwrap_or(0.0).to_radians(),
+        };
+        if sensor.latency >= settings.ping_period {
+            let most = settings.ping_period.as_secs_f64() * 1000.0;
+            let problem =
+                format!("must be below the ping period of {most} ms: a head answers before the next command");
+            return Err(own.invalid("latency_ms", &problem));
+        }
+        Ok(settings)
+    }
+
+    /// The step, radians.
+    pub fn step_rad(&self) -> f64 {
+        rad_of_counts(i32::from(self.step_counts))
+    }
+
+    /// Angle in the sensor's frame at a head position, radians.
+    pub fn sensor_rad(&self, position: u16) -> f64 {
+        self.angle_sign * rad_of_counts(i32::from(position) - ZERO_COUNT) + self.angle_offset_rad
+    }
+
+    /// The head position nearest to an angle in the sensor's frame: 0 to 1199.
+    pub fn position(&self, sensor_rad: f64) -> i32 {
+        let device_rad = self.angle_sign * (sensor_rad - self.angle_offset_rad);
+        (counts_of_rad(device_rad) + ZERO_COUNT).rem_euclid(COUNTS_PER_TURN)
+    }
+}
+
+/// The nearest number of counts to an angle in radians; held to a thousand turns either way.
+pub(crate) fn counts_of_rad(angle_rad: f64) -> i32 {
+    let most = i64::from(COUNTS_PER_TURN) * 1000;
+    let counts = math::round_to_i64(angle_rad * f64::from(COUNTS_PER_TURN) / TAU).clamp(-most, most);
+    i32::try_from(counts).unwrap_or(0)
+}
+
+/// Radians of a number of counts.
+fn rad_of_counts(counts: i32) -> f64 {
+    f64::from(counts) * TAU / f64::from(COUNTS_PER_TURN)
+}
+
+fn ping_period(mode: Mode, own: &Section<'_>) -> Result<DurNs, ConfigError> {
+    let pings = COUNTS_PER_TURN / i32::from(mode.step_counts);
+    Ok(match own.number("turn_period_s", 0.1..=1000.0)? {
+        Some(turn_s) => DurNs::from_secs_f64(turn_s / f64::from(pings)),
+        None => DurNs(mode.turn_ms * 1_000_000 / i64::from(pings)),
+    })
+}
+
+fn command(mode: Mode, own: &Section<'_>) -> Result<Command, ConfigError> {
+    let byte = |key, allowed, usual: u8| -> Result<u8, ConfigError> {
+        Ok(own.integer(key, allowed)?.and_then(|value| u8::try_from(value).ok()).unwrap_or(usual))
+    };
+    let range_m = byte("range_m", 1..=100, 10)?;
+    let frequency_khz = own.integer("frequency_khz", 600..=1000)?.unwrap_or(1000);
+    if frequency_khz % 5 != 0 {
+        return Err(own.invalid("frequency_khz", "must be a multiple of 5"));
+    }
+    // High frequencies are absorbed more. Source: the settings usual for profiling heads of the family.
+    let usual_absorption = if frequency_khz >= 800 { 0.6 } else { 0.2 };
+    let logfs = [10, 20, 30, 40];
+    let logf_db = byte("logf_db", 10..=40, 20)?;
+    if !logfs.contains(&logf_db) {
+        return Err(own.invalid("logf_db", "must be 10, 20, 30 or 40"));
+    }
+    let returns =
+        [("profile", (true, Points::P250)), ("imx", (false, Points::P250)), ("igx", (false, Points::P500))];
+    let (profile, points) = own.choice("returns", &returns)?.unwrap_or((true, Points::P250));
+    let command = Command {
+        // Up to 252: 253 is the byte that ends a command.
+        head_id: byte("head_id", 0..=252, 0x10)?,
+        range_m,
+        reverse: false,
+        start_gain_db: f64::from(byte("gain_db", 0..=40, 20)?),
+        logf_db: f64::from(logf_db),
+        absorption_dbpm: own.number("absorption_dbpm", 0.0..=2.52)?.unwrap_or(usual_absorption),
+        train_deg: 0.0,
+        sector_deg: 360.0,
+        step_deg: crate::codec::step_deg(mode.step_counts),
+        pulse_us: own.number("pulse_us", 10.0..=2520.0)?.unwrap_or(usual_pulse_us(range_m)),
+        min_range_m: own.number("min_range_m", 0.0..=25.0)?.unwrap_or(0.2),
+        points,
+        data_bits: 8,
+        profile,
+        calibrate: false,
+        switch_delay_ms: 0.0,
+        frequency_khz: frequency_khz as f64,
+    };
+    // All but the range is within what its key allows.
+    command.encode().map_err(|error| own.invalid("range_m", &error.to_string()))?;
+    Ok(command)
+}
+
+/// Pulse length for a range. Source: the settings usual for profiling heads of the family.
+fn usual_pulse_us(range_m: u8) -> f64 {
+    const PULSES_US: [u16; RANGES_M.len()] = [20, 20, 20, 20, 60, 60, 100, 160, 220, 260, 320, 420, 540];
+    let pulse = RANGES_M.into_iter().zip(PULSES_US).find(|(range, _)| *range == range_m);
+    pulse.map_or(60.0, |(_, pulse_us)| f64::from(pulse_us))
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use headrace_core::config::Document;
+    use headrace_core::frames::{Mount, Rot, Vec3};
+
+    use super::*;
+
+    /// A forward head without latency.
+    pub(crate) fn sensor() -> SensorConfig {
+        SensorConfig {
+            id: "front".to_owned(),
+            plugin: "imagenex881".to_owned(),
+            connect: String::new(),
+            mount: Mount { position: Vec3::zero(), rotation: Rot::identity() },
+            latency: DurNs::ZERO,
+        }
+    }
+
+    /// Settings from the text of a table.
+    pub(crate) fn settings(text: &str) -> Result<Settings, ConfigError> {
+        let root = Document::new("v.toml", text).root()?;
+        let settings = Settings::read(&sensor(), &root)?;
+        root.finish()?;
+        Ok(settings)
+    }
+
+    #[test]
+    fn ping_periods_are_whole_nanoseconds() {
+        let periods = [("slow", 18), ("medium", 18), ("fast", 20), ("faster", 22), ("fastest", 32)];
+        for (mode, millis) in periods {
+            let settings = settings(&format!("mode = \"{mode}\"")).unwrap();
+            assert_eq!(settings.ping_period, DurNs::from_millis(millis), "{mode}");
+        }
+        let slower = settings("mode = \"fast\"\nturn_period_s = 8.4").unwrap();
+        assert_eq!(slower.ping_period, DurNs::from_millis(21));
+    }
+
+    #[test]
+    fn angles_go_through_sign_and_offset() {
+        let settings = settings("mode = \"slow\"\nangle_sign = \"inverted\"\nangle_offset_deg = 90").unwrap();
+        assert!((settings.sensor_rad(750) - math::PI / 4.0).abs() < 1e-12);
+        for position in 0..1200u16 {
+            assert_eq!(settings.position(settings.sensor_rad(position)), i32::from(position));
+        }
+        assert_eq!(settings.position(settings.sensor_rad(1200)), 0);
+    }
+
+    #[test]
+    fn every_key_is_read() {
+        let text = "mode = \"fastest\"\nrange_m = 20\nfrequency_khz = 600\nturn_period_s = 6\ngain_db = 12\n\
+                    logf_db = 30\nabsorption_dbpm = 0.3\npulse_us = 80\nmin_range_m = 0.5\nreturns = \"igx\"\n\
+                    head_id = 0x12\nangle_sign = \"normal\"\nangle_offset_deg = 3";
+        let command = settings(text).unwrap().command;
+        let expected = Command {
+            head_id: 0x12,
+            range_m: 20,
+            reverse: false,
+            start_gain_db: 12.0,
+            logf_db: 30.0,
+            absorption_dbpm: 0.3,
+            train_deg: 0.0,
+            sector_deg: 360.0,
+            step_deg: 2.4,
+            pulse_us: 80.0,
+            min_range_m: 0.5,
+            points: Points::P500,
+            data_bits: 8,
+            profile: false,
+            calibrate: false,
+            switch_delay_ms: 0.0,
+            frequency_khz: 600.0,
+        };
+        assert_eq!(command, expected);
+    }
+
+    #[test]
+    fn what_is_not_allowed_is_named_with_its_line() {
+        let error = |text: &str| settings(text).unwrap_err().to_string();
+        assert_eq!(error("range_m = 10"), "v.toml:1: mode: is missing");
+        assert_eq!(
+            error("mode = \"FAST\""),
+            "v.toml:1: mode = \"FAST\": must be one of slow, medium, fast, faster, fastest"
+        );
+        assert!(
+            error("mode = \"fast\"\nrange_m = 7")
+                .starts_with("v.toml:2: range_m = 7: switch command: range of 7")
+        );
+        assert!(error("mode = \"fast\"\nfrequency_khz = 601").contains("must be a multiple of 5"));
+        assert!(error("mode = \"fast\"\nlogf_db = 25").contains("must be 10, 20, 30 or 40"));
+        assert!(error("mode = \"fast\"\nspeed = 1").contains("speed: is not a key here"));
+    }
+
+    #[test]
+    fn a_latency_of_a_ping_period_is_refused() {
+        let root = Document::new("v.toml", "mode = \"slow\"\nlatency_ms = 18").root().unwrap();
+        let late = SensorConfig { latency: DurNs::from_millis(18), ..sensor() };
+        let error = Settings::read(&late, &root).unwrap_err().to_string();
+        assert!(
+            error.starts_with("v.toml:2: latency_ms = 18: must be below the ping period of 18 ms"),
+            "{error}"
+        );
+    }
+}

@@ -1,0 +1,229 @@
+//! Messages to readings, each as it arrives: the frames of one sample come one behind the other.
+
+use headrace_core::app::device::Decoder;
+use headrace_core::app::reading::{Decoded, Level, Packet, Reading};
+use headrace_core::codec::{Codec as _, CodecCounts};
+use headrace_core::frames::{Rot, Sensor, Vec3};
+use headrace_core::time::{DurNs, MonoNs};
+
+use crate::codec::{ImuCodec, Message, MessageSet};
+use crate::sets::{bosch, j1939, sbg, scaled, xsens};
+
+/// In which order a J1939 unit sends the axes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AxisOrder {
+    /// As the standard: pitch, roll, yaw; lateral, longitudinal, vertical. The figures of merit and the latency are
+    /// heeded.
+    Yxz,
+    /// As the `OpenIMU`: x, y, z. Its maker says to ignore the figures of merit and the latency.
+    Xyz,
+}
+
+/// How a unit's messages are to be understood.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Meaning {
+    /// The maker's set.
+    pub set: MessageSet,
+    /// Order of axes; heeded in the J1939 set.
+    pub axis_order: AxisOrder,
+    /// Length of a tick of the sample time; heeded in the Xsens set.
+    pub sample_time_tick: DurNs,
+    /// From validity to receive time.
+    pub latency: DurNs,
+}
+
+/// Bytes to readings.
+#[derive(Debug, Clone)]
+pub struct ImuDecoder {
+    codec: ImuCodec,
+    state: State,
+}
+
+/// What a message changes beside giving a reading.
+#[derive(Debug, Clone)]
+struct State {
+    meaning: Meaning,
+    /// The last status word said that the orientation can't be relied on.
+    orientation_invalid: bool,
+    /// A unit that sends both would be heard twice.
+    sends_quaternions: bool,
+    sample_time_ticks: Option<u32>,
+    group: Option<u16>,
+    /// Components that have come since the last complete vector.
+    acceleration_mps2: [Option<f64>; 3],
+    withheld: u64,
+}
+
+/// A reading, and the device's own delay where it tells one.
+type Told = Option<(Reading, DurNs)>;
+
+impl AxisOrder {
+    /// Sensor axes x, y, z of three values in the order of the wire, or the other way.
+    pub fn swapped(self, [a, b, c]: [f64; 3]) -> [f64; 3] {
+        match self {
+            Self::Yxz => [b, a, c],
+            Self::Xyz => [a, b, c],
+        }
+    }
+}
+
+impl ImuDecoder {
+    /// A decoder that has seen nothing yet.
+    pub fn new(meaning: Meaning) -> Self {
+        let state = State {
+            meaning,
+            orientation_invalid: false,
+            sends_quaternions: false,
+            sample_time_ticks: None,
+            group: None,
+            acceleration_mps2: [None; 3],
+            withheld: 0,
+        };
+        Self { codec: ImuCodec::new(meaning.set), state }
+    }
+
+    /// Values left out because the unit itself says that they are no good.
+    pub fn withheld(&self) -> u64 {
+        self.state.withheld
+    }
+
+    /// Good frames that are not of the unit.
+    pub fn passed_over(&self) -> u64 {
+        self.codec.passed_over()
+    }
+
+    /// The unit's own time of its last sample, where it tells one; wraps.
+    pub fn sample_time(&self) -> Option<DurNs> {
+        let ticks = self.state.sample_time_ticks?;
+        Some(DurNs(self.state.meaning.sample_time_tick.0.saturating_mul(i64::from(ticks))))
+    }
+
+    /// Number of the unit's last sample, where it tells one; wraps.
+    pub fn group(&self) -> Option<u16> {
+        self.state.group
+    }
+}
+
+impl Decoder for ImuDecoder {
+    fn decode(&mut self, packet: Packet<'_>, sink: &mut dyn FnMut(Decoded)) {
+        let Self { codec, state } = self;
+        let mut take = |message: Message| {
+            if let Some((reading, delay)) = state.take(&message) {
+                let valid_at: MonoNs = packet.received - (state.meaning.latency + delay);
+                sink(Decoded { valid_at, reading });
+            }
+        };
+        codec.push(packet.bytes, &mut take);
+        codec.flush(&mut take);
+    }
+
+    fn counts(&self) -> CodecCounts {
+        self.codec.counts()
+    }
+}
+
+impl State {
+    fn take(&mut self, message: &Message) -> Told {
+        match message {
+            Message::Xsens(message) => self.take_xsens(message),
+            Message::Sbg(message) => self.take_sbg(message),
+            Message::J1939(message) => self.take_j1939(message),
+            Message::Bosch(message) => self.take_bosch(*message),
+        }
+    }
+
+    fn take_xsens(&mut self, message: &xsens::Message) -> Told {
+        use xsens::Message as M;
+        match *message {
+            M::StatusWord(word) => self.orientation_invalid = !word.orientation_valid(),
+            M::SampleTime(ticks) => self.sample_time_ticks = Some(ticks),
+            M::GroupCounter(group) => self.group = Some(group),
+            M::Quaternion(raw) => return self.quaternion(scaled(raw, xsens::QUATERNION_QUANTUM)),
+            M::EulerAngles(raw) => {
+                return self.euler(scaled(raw, xsens::EULER_QUANTUM_DEG).map(f64::to_radians));
+            }
+            M::RateOfTurn(raw) => return rate(scaled(raw, xsens::RATE_QUANTUM_RADPS)),
+            M::Acceleration(raw) => return force(scaled(raw, xsens::ACCELERATION_QUANTUM_MPS2)),
+            // The high-rate messages are left out: which of the two codes is which isn't sure.
+            _ => (),
+        }
+        None
+    }
+
+    fn take_sbg(&mut self, message: &sbg::Message) -> Told {
+        use sbg::Message as M;
+        match *message {
+            M::Quaternion(raw) => {
+                self.quaternion(sbg::rotation_to_ours(scaled(raw, sbg::QUATERNION_QUANTUM)))
+            }
+            M::Euler(raw) => self.euler(sbg::to_ours(scaled(raw, sbg::EULER_QUANTUM_RAD))),
+            M::Rate(raw) => rate(sbg::to_ours(scaled(raw, sbg::RATE_QUANTUM_RADPS))),
+            M::Acceleration(raw) => force(sbg::to_ours(scaled(raw, sbg::ACCELERATION_QUANTUM_MPS2))),
+            M::ImuInfo { .. } | M::EkfTime(_) | M::Accuracy(_) => None,
+        }
+    }
+
+    fn take_j1939(&mut self, message: &j1939::Message) -> Told {
+        let order = self.meaning.axis_order;
+        let (triple, told) = match message {
+            // Pitch and roll without a yaw are no attitude; the filter has them from gravity.
+            j1939::Message::Slope(_) => return None,
+            j1939::Message::AngularRate(triple) => {
+                let rates = triple.rates_degps().map(|degps| degps.map(f64::to_radians));
+                (triple, rates.and_then(|rates| rate(order.swapped(rates))))
+            }
+            j1939::Message::Acceleration(triple) => {
+                (triple, triple.accelerations_mps2().and_then(|mps2| force(order.swapped(mps2))))
+            }
+        };
+        let heeded = order == AxisOrder::Yxz;
+        let Some((reading, _)) = told.filter(|_| !(heeded && triple.has_error())) else {
+            self.withheld += 1;
+            return None;
+        };
+        let delay_ms = triple.latency_ms().filter(|_| heeded).unwrap_or(0.0);
+        Some((reading, DurNs::from_secs_f64(delay_ms / 1000.0)))
+    }
+
+    /// The unit has no turn rate about its pitch axis, so that there is no turn rate to tell; the acceleration is told
+    /// when all three components have come.
+    fn take_bosch(&mut self, message: bosch::Message) -> Told {
+        let [x, y, z] = &mut self.acceleration_mps2;
+        match message {
+            bosch::Message::Roll(_, acceleration) => *x = Some(acceleration.mps2()),
+            bosch::Message::Yaw(_, acceleration) => *y = Some(acceleration.mps2()),
+            bosch::Message::Vertical(acceleration) => *z = Some(acceleration.mps2()),
+        }
+        let complete = [(*x)?, (*y)?, (*z)?];
+        self.acceleration_mps2 = [None; 3];
+        force(complete)
+    }
+
+    fn quaternion(&mut self, [w, x, y, z]: [f64; 4]) -> Told {
+        self.sends_quaternions = true;
+        self.attitude(Rot::from_wxyz(w, x, y, z))
+    }
+
+    fn euler(&mut self, [roll, pitch, yaw]: [f64; 3]) -> Told {
+        if self.sends_quaternions {
+            return None;
+        }
+        self.attitude(Some(Rot::from_roll_pitch_yaw(roll, pitch, yaw)))
+    }
+
+    fn attitude(&mut self, attitude: Option<Rot<Level, Sensor>>) -> Told {
+        let attitude = attitude.filter(|_| !self.orientation_invalid);
+        self.withheld += u64::from(attitude.is_none());
+        Some((Reading::Attitude(attitude?), DurNs::ZERO))
+    }
+}
+
+#[expect(clippy::unnecessary_wraps, reason = "the callers hand it on")]
+fn rate([x, y, z]: [f64; 3]) -> Told {
+    Some((Reading::AngularRate(Vec3::new(x, y, z)), DurNs::ZERO))
+}
+
+#[expect(clippy::unnecessary_wraps, reason = "the callers hand it on")]
+fn force([x, y, z]: [f64; 3]) -> Told {
+    Some((Reading::SpecificForce(Vec3::new(x, y, z)), DurNs::ZERO))
+}

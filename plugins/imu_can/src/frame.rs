@@ -1,0 +1,298 @@
+//! Classic CAN frames as `SocketCAN` hands them over: `struct can_frame`, 16 bytes.
+//!
+//! ```text
+//!   0 .. 3   identifier, u32 little-endian; bit 31 extended, bit 30 remote, bit 29 error
+//!   4        length, 0 to 8
+//!   5 .. 7   padding
+//!   8 .. 15  data
+//! ```
+//! Source: linux/can.h.
+
+use headrace_core::codec::{Codec, CodecCounts};
+
+/// Length of a frame in the log.
+pub const FRAME_BYTES: usize = 16;
+
+const MAX_DATA_BYTES: u8 = 8;
+const EXTENDED: u32 = 1 << 31;
+const REMOTE: u32 = 1 << 30;
+const ERROR: u32 = 1 << 29;
+const STANDARD_IDS: u16 = 0x7FF;
+const EXTENDED_IDS: u32 = 0x1FFF_FFFF;
+
+/// An arbitration identifier.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CanId {
+    /// 11 bits.
+    Standard(u16),
+    /// 29 bits.
+    Extended(u32),
+}
+
+/// What a frame is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FrameKind {
+    /// Data from a device.
+    Data(CanId),
+    /// A request for data.
+    Remote(CanId),
+    /// The controller tells of an error; the number says which classes.
+    Error(u32),
+}
+
+/// A classic CAN frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct CanFrame {
+    kind: FrameKind,
+    len: u8,
+    data: [u8; 8],
+}
+
+/// Why bytes are no frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum FrameError {
+    /// More data than a classic frame holds.
+    #[error("reading a CAN frame: {0} data bytes; a classic frame has 0 to 8")]
+    Length(usize),
+    /// An identifier with too many bits.
+    #[error(
+        "reading a CAN frame: identifier {0:#X}; standard ones reach to 0x7FF, extended ones to 0x1FFFFFFF"
+    )]
+    Id(u32),
+}
+
+/// Up to eight data bytes, put together piece by piece.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Payload {
+    len: u8,
+    data: [u8; 8],
+}
+
+impl CanId {
+    fn checked(self) -> Result<Self, FrameError> {
+        match self {
+            Self::Standard(id) if id > STANDARD_IDS => Err(FrameError::Id(u32::from(id))),
+            Self::Extended(id) if id > EXTENDED_IDS => Err(FrameError::Id(id)),
+            id => Ok(id),
+        }
+    }
+
+    fn bits(self) -> u32 {
+        match self {
+            Self::Standard(id) => u32::from(id),
+            Self::Extended(id) => id | EXTENDED,
+        }
+    }
+}
+
+impl Payload {
+    /// These bytes behind those that are there; what goes beyond eight is cut.
+    #[must_use]
+    pub fn with(mut self, bytes: &[u8]) -> Self {
+        for byte in bytes {
+            if let Some(place) = self.data.get_mut(usize::from(self.len)) {
+                *place = *byte;
+                self.len += 1;
+            }
+        }
+        self
+    }
+}
+
+impl CanFrame {
+    /// A data frame. An identifier with too many bits loses the upper ones.
+    pub fn new(id: CanId, payload: Payload) -> Self {
+        let id = match id {
+            CanId::Standard(id) => CanId::Standard(id & STANDARD_IDS),
+            CanId::Extended(id) => CanId::Extended(id & EXTENDED_IDS),
+        };
+        Self { kind: FrameKind::Data(id), len: payload.len, data: payload.data }
+    }
+
+    /// A frame of any kind. A remote frame has a length but no data.
+    ///
+    /// Errors: more than eight bytes, or an identifier with too many bits.
+    pub fn of_kind(kind: FrameKind, data: &[u8]) -> Result<Self, FrameError> {
+        let len = u8::try_from(data.len()).ok().filter(|len| *len <= MAX_DATA_BYTES);
+        let len = len.ok_or(FrameError::Length(data.len()))?;
+        let kind = match kind {
+            FrameKind::Data(id) => FrameKind::Data(id.checked()?),
+            FrameKind::Remote(id) => FrameKind::Remote(id.checked()?),
+            FrameKind::Error(classes) if classes > EXTENDED_IDS => return Err(FrameError::Id(classes)),
+            FrameKind::Error(classes) => FrameKind::Error(classes),
+        };
+        let data = match kind {
+            FrameKind::Remote(_) => [0; 8],
+            _ => Payload::default().with(data).data,
+        };
+        Ok(Self { kind, len, data })
+    }
+
+    /// What it is.
+    pub fn kind(&self) -> FrameKind {
+        self.kind
+    }
+
+    /// Its data; none in a remote frame.
+    pub fn data(&self) -> &[u8] {
+        match self.kind {
+            FrameKind::Remote(_) => &[],
+            _ => self.data.get(..usize::from(self.len)).unwrap_or_default(),
+        }
+    }
+
+    /// Reads a `can_frame`.
+    ///
+    /// Errors: more than eight bytes, or an identifier with too many bits.
+    pub fn decode(bytes: &[u8; FRAME_BYTES]) -> Result<Self, FrameError> {
+        let [b0, b1, b2, b3, len, _, _, _, data @ ..] = bytes;
+        let bits = u32::from_le_bytes([*b0, *b1, *b2, *b3]);
+        let id = bits & EXTENDED_IDS;
+        let can_id = if bits & EXTENDED != 0 {
+            CanId::Extended(id)
+        } else {
+            CanId::Standard(u16::try_from(id).unwrap_or(u16::MAX))
+        };
+        let kind = if bits & ERROR != 0 {
+            FrameKind::Error(id)
+        } else if bits & REMOTE != 0 {
+            FrameKind::Remote(can_id)
+        } else {
+            FrameKind::Data(can_id)
+        };
+        Self::of_kind(kind, data.get(..usize::from(*len)).ok_or(FrameError::Length(usize::from(*len)))?)
+    }
+
+    /// Writes a `can_frame`.
+    pub fn encode(&self) -> [u8; FRAME_BYTES] {
+        let bits = match self.kind {
+            FrameKind::Data(id) => id.bits(),
+            FrameKind::Remote(id) => id.bits() | REMOTE,
+            FrameKind::Error(classes) => classes | ERROR,
+        };
+        let [b0, b1, b2, b3] = bits.to_le_bytes();
+        let [d0, d1, d2, d3, d4, d5, d6, d7] = self.data;
+        [b0, b1, b2, b3, self.len, 0, 0, 0, d0, d1, d2, d3, d4, d5, d6, d7]
+    }
+}
+
+/// Bytes to frames. A message that holds something else is left out to its end.
+#[derive(Debug, Clone, Default)]
+pub struct CanFrameCodec {
+    held: [u8; FRAME_BYTES],
+    len: usize,
+    /// Whether the message that is coming in has turned out to be no classic frame.
+    astray: bool,
+    counts: CodecCounts,
+}
+
+impl CanFrameCodec {
+    fn drop_held(&mut self) {
+        self.counts.bad_frames += 1;
+        self.counts.skipped_bytes += self.len as u64;
+        self.len = 0;
+    }
+}
+
+impl Codec for CanFrameCodec {
+    type Value = CanFrame;
+
+    const MAX_FRAME_BYTES: usize = FRAME_BYTES;
+    const WHOLE_MESSAGES: bool = true;
+
+    fn push(&mut self, bytes: &[u8], sink: &mut dyn FnMut(CanFrame)) {
+        for byte in bytes {
+            if self.astray {
+                self.counts.skipped_bytes += 1;
+                continue;
+            }
+            if let Some(place) = self.held.get_mut(self.len) {
+                *place = *byte;
+                self.len += 1;
+            }
+            if self.len < FRAME_BYTES {
+                continue;
+            }
+            if let Ok(frame) = CanFrame::decode(&self.held) {
+                self.counts.good_frames += 1;
+                self.len = 0;
+                sink(frame);
+            } else {
+                self.drop_held();
+                self.astray = true;
+            }
+        }
+    }
+
+    fn flush(&mut self, _sink: &mut dyn FnMut(CanFrame)) {
+        if self.len > 0 {
+            self.drop_held();
+        }
+        self.astray = false;
+    }
+
+    fn counts(&self) -> CodecCounts {
+        self.counts
+    }
+
+    fn held_bytes(&self) -> usize {
+        self.len
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn flags_tell_what_a_frame_is() {
+        let kind = |id: [u8; 4]| {
+            let mut bytes = [0; FRAME_BYTES];
+            bytes[..4].copy_from_slice(&id);
+            CanFrame::decode(&bytes).map(|frame| frame.kind())
+        };
+        assert_eq!(kind([0x34, 0, 0, 0]), Ok(FrameKind::Data(CanId::Standard(0x34))));
+        assert_eq!(kind([0x21, 0, 0xFF, 0x99]), Ok(FrameKind::Data(CanId::Extended(0x19FF_0021))));
+        assert_eq!(kind([0x34, 0, 0, 0x40]), Ok(FrameKind::Remote(CanId::Standard(0x34))));
+        assert_eq!(kind([0x04, 0, 0, 0x20]), Ok(FrameKind::Error(4)));
+        assert_eq!(kind([0, 8, 0, 0]), Err(FrameError::Id(0x800)));
+    }
+
+    #[test]
+    fn a_frame_with_more_than_eight_bytes_is_left_out_to_its_end() {
+        // A CAN FD frame of 72 bytes, whose data would read as more frames.
+        let mut bytes = [0; 72];
+        bytes[0] = 0x34;
+        bytes[4] = 12;
+        let mut codec = CanFrameCodec::default();
+        codec.push(&bytes, &mut |frame| panic!("{frame:?}"));
+        codec.flush(&mut |frame| panic!("{frame:?}"));
+        assert_eq!(codec.counts(), CodecCounts { good_frames: 0, bad_frames: 1, skipped_bytes: 72 });
+    }
+
+    fn any_frame() -> impl proptest::strategy::Strategy<Value = CanFrame> {
+        use proptest::prelude::*;
+        let id = || {
+            prop_oneof![
+                (0u16..0x800).prop_map(CanId::Standard),
+                (0u32..0x2000_0000).prop_map(CanId::Extended),
+            ]
+        };
+        let kind = prop_oneof![
+            id().prop_map(FrameKind::Data),
+            id().prop_map(FrameKind::Remote),
+            (0u32..0x2000_0000).prop_map(FrameKind::Error),
+        ];
+        (kind, proptest::collection::vec(any::<u8>(), 0..=8))
+            .prop_filter_map("valid", |(kind, data)| CanFrame::of_kind(kind, &data).ok())
+    }
+
+    headrace_core::codec_contract!(
+        contract,
+        codec: CanFrameCodec::default(),
+        values: any_frame(),
+        encode: CanFrame::encode,
+        frames: [CanFrame::new(CanId::Standard(0x34), Payload::default().with(&[0, 0, 0, 0, 9, 0xCF])).encode()],
+    );
+}

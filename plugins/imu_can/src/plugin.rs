@@ -1,0 +1,110 @@
+//! The vehicle file's part of an inertial unit, and its place in the loop.
+
+use headrace_core::app::components::{Imu, Mounted};
+use headrace_core::app::device::{Device, DeviceKind, Emulator, EmulatorSetup};
+use headrace_core::app::plugin::{Plugin, PluginError};
+use headrace_core::app::{App, SourceSpec};
+use headrace_core::config::{ConfigError, Section, SensorConfig};
+use headrace_core::time::DurNs;
+
+use crate::codec::MessageSet;
+use crate::decoder::{AxisOrder, ImuDecoder, Meaning};
+use crate::emulator::ImuEmulator;
+use crate::sets::{j1939, xsens};
+
+/// Name in vehicle files.
+pub const NAME: &str = "imu_can";
+
+/// Several seconds of four frames a sample at the usual rate.
+const RING_BYTES: usize = 1 << 17;
+
+const USUAL_TICK_US: i64 = 100;
+
+/// Inertial units on CAN as a kind of device.
+#[derive(Debug, Clone, Copy)]
+pub struct Kind;
+
+/// A configured inertial unit.
+#[derive(Debug, Clone)]
+pub struct CanImu {
+    sensor: SensorConfig,
+    meaning: Meaning,
+    rate_hz: f64,
+}
+
+#[derive(Clone, Copy)]
+enum Preset {
+    Xsens,
+    Sbg,
+    J1939,
+    Bosch,
+}
+
+impl DeviceKind for Kind {
+    fn name(&self) -> &'static str {
+        NAME
+    }
+
+    fn configure(&self, sensor: &SensorConfig, own: &Section<'_>) -> Result<Box<dyn Device>, ConfigError> {
+        let presets = [
+            ("xsens_mti600", Preset::Xsens),
+            ("sbg_ellipse", Preset::Sbg),
+            ("j1939", Preset::J1939),
+            ("bosch_mm5", Preset::Bosch),
+        ];
+        let preset = own.required("preset", own.choice("preset", &presets)?)?;
+        let rate_hz = own.number("rate_hz", 1.0..=1000.0)?.unwrap_or(100.0);
+        let mut axis_order = AxisOrder::Yxz;
+        let mut tick_us = USUAL_TICK_US;
+        let set = match preset {
+            Preset::Xsens => {
+                tick_us = own.integer("sample_time_tick_us", 1..=1_000_000)?.unwrap_or(USUAL_TICK_US);
+                MessageSet::Xsens(xsens::Ids { base: id_base(own)? })
+            }
+            Preset::Sbg => MessageSet::Sbg,
+            Preset::J1939 => {
+                let orders = [("yxz", AxisOrder::Yxz), ("xyz", AxisOrder::Xyz)];
+                axis_order = own.choice("axis_order", &orders)?.unwrap_or(axis_order);
+                let address = own.integer("source_address", 0..=253)?;
+                let source_address = address.and_then(|address| u8::try_from(address).ok());
+                MessageSet::J1939(j1939::Network { source_address })
+            }
+            Preset::Bosch => MessageSet::Bosch,
+        };
+        let meaning = Meaning {
+            set,
+            axis_order,
+            sample_time_tick: DurNs(tick_us.saturating_mul(1000)),
+            latency: sensor.latency,
+        };
+        Ok(Box::new(CanImu { sensor: sensor.clone(), meaning, rate_hz }))
+    }
+}
+
+fn id_base(own: &Section<'_>) -> Result<Option<u32>, ConfigError> {
+    let base = own.integer("id_base", 0..=0x1FFF_FF00)?.and_then(|base| u32::try_from(base).ok());
+    if base.is_some_and(|base| base & 0xFF != 0) {
+        return Err(own.invalid("id_base", "must end in 00: the lowest byte is the message's code"));
+    }
+    Ok(base)
+}
+
+impl Plugin for CanImu {
+    fn build(&self, app: &mut App) -> Result<(), PluginError> {
+        let source = app.add_source(SourceSpec {
+            id: self.sensor.id.clone(),
+            plugin: NAME,
+            connect: self.sensor.connect.clone(),
+            decoder: Box::new(ImuDecoder::new(self.meaning)),
+            ring_bytes: RING_BYTES,
+        })?;
+        app.spawn((Mounted { source, mount: self.sensor.mount }, Imu));
+        Ok(())
+    }
+}
+
+impl Device for CanImu {
+    fn emulator(&self, setup: &EmulatorSetup) -> Box<dyn Emulator> {
+        Box::new(ImuEmulator::new(self.meaning, self.sensor.mount, self.rate_hz, setup.start))
+    }
+}

@@ -1,0 +1,106 @@
+//! Bosch MM5.10 as on the bus of the ABS M5 kit: little-endian, unsigned, a turn rate and an acceleration a frame.
+//!
+//! The unit has no turn rate about its pitch axis.
+//! Source: Bosch Motorsport, ABS M5 Kit manual, p. 40 to 42.
+
+use super::{MessageError, data_id};
+use crate::frame::{CanFrame, CanId, Payload};
+
+const YAW: u16 = 0x70;
+const ROLL: u16 = 0x80;
+const VERTICAL: u16 = 0x576;
+
+/// Shortest frame that holds both values.
+const NEEDED_BYTES: usize = 6;
+
+/// Step of the turn rates, degrees a second; they are counted from -163.84.
+pub const RATE_QUANTUM_DEGPS: f64 = 0.005;
+/// Step of the accelerations, standard gravities; they are counted from -4.1768.
+pub const ACCELERATION_QUANTUM_G: f64 = 0.000_127_465;
+const RATE_OFFSET_DEGPS: f64 = -163.84;
+const ACCELERATION_OFFSET_G: f64 = -4.1768;
+
+/// One standard gravity, m/s^2.
+const STANDARD_GRAVITY_MPS2: f64 = 9.806_65;
+
+/// A turn rate on the wire.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RawRate(pub u16);
+
+/// An acceleration on the wire.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RawAcceleration(pub u16);
+
+/// One message.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Message {
+    /// Turn rate about z, acceleration along y.
+    Yaw(RawRate, RawAcceleration),
+    /// Turn rate about x, acceleration along x.
+    Roll(RawRate, RawAcceleration),
+    /// Acceleration along z.
+    Vertical(RawAcceleration),
+}
+
+impl RawRate {
+    /// Degrees a second.
+    pub fn degps(self) -> f64 {
+        f64::from(self.0) * RATE_QUANTUM_DEGPS + RATE_OFFSET_DEGPS
+    }
+
+    /// The nearest to a turn rate in degrees a second.
+    pub fn nearest(degps: f64) -> Self {
+        Self(raw(degps, RATE_QUANTUM_DEGPS, RATE_OFFSET_DEGPS))
+    }
+}
+
+impl RawAcceleration {
+    /// Standard gravities.
+    pub fn g(self) -> f64 {
+        f64::from(self.0) * ACCELERATION_QUANTUM_G + ACCELERATION_OFFSET_G
+    }
+
+    /// Metres per second squared.
+    pub fn mps2(self) -> f64 {
+        self.g() * STANDARD_GRAVITY_MPS2
+    }
+
+    /// The nearest to an acceleration in m/s^2.
+    pub fn nearest(mps2: f64) -> Self {
+        Self(raw(mps2 / STANDARD_GRAVITY_MPS2, ACCELERATION_QUANTUM_G, ACCELERATION_OFFSET_G))
+    }
+}
+
+fn raw(value: f64, quantum: f64, offset: f64) -> u16 {
+    let raw = headrace_core::math::round_to_i64((value - offset) / quantum);
+    u16::try_from(raw.clamp(0, i64::from(u16::MAX))).unwrap_or_default()
+}
+
+/// Reads a frame; `None` where it is not of this set.
+///
+/// Errors: less than six bytes.
+pub fn decode(frame: &CanFrame) -> Result<Option<Message>, MessageError> {
+    let Some(id @ CanId::Standard(code @ (YAW | ROLL | VERTICAL))) = data_id(frame) else { return Ok(None) };
+    let data = frame.data();
+    let &[r0, r1, _, _, a0, a1, ..] = data else {
+        return Err(MessageError { id, len: data.len(), needed: NEEDED_BYTES });
+    };
+    let rate = RawRate(u16::from_le_bytes([r0, r1]));
+    let acceleration = RawAcceleration(u16::from_le_bytes([a0, a1]));
+    Ok(Some(match code {
+        YAW => Message::Yaw(rate, acceleration),
+        ROLL => Message::Roll(rate, acceleration),
+        _ => Message::Vertical(acceleration),
+    }))
+}
+
+/// Writes a message; bytes of no known meaning are zero.
+pub fn encode(message: &Message) -> CanFrame {
+    let (id, rate, acceleration) = match *message {
+        Message::Yaw(rate, acceleration) => (YAW, rate.0, acceleration),
+        Message::Roll(rate, acceleration) => (ROLL, rate.0, acceleration),
+        Message::Vertical(acceleration) => (VERTICAL, 0, acceleration),
+    };
+    let payload = Payload::default().with(&rate.to_le_bytes()).with(&[0, 0]);
+    CanFrame::new(CanId::Standard(id), payload.with(&acceleration.0.to_le_bytes()).with(&[0, 0]))
+}

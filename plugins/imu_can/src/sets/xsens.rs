@@ -1,0 +1,208 @@
+//! Xsens (Movella) MTi-600, Sirius and Avior: big-endian, one quantity a frame.
+//!
+//! Each output's identifier can be set in the device; the defaults are 11-bit codes, and a 29-bit base with the same
+//! code in its lowest byte is in use, too.
+//! Source: Xsens MT CAN protocol (MT1604P), with byte order as all known readers have it.
+
+use super::{MessageError, data_id, exactly, words};
+use crate::frame::{CanFrame, CanId, Payload};
+
+/// One step of a quaternion's component.
+pub const QUATERNION_QUANTUM: f64 = 1.0 / 32_767.0;
+/// Euler angles, degrees.
+pub const EULER_QUANTUM_DEG: f64 = 1.0 / 128.0;
+/// Turn rate, rad/s.
+pub const RATE_QUANTUM_RADPS: f64 = 1.0 / 512.0;
+/// Acceleration, m/s^2.
+pub const ACCELERATION_QUANTUM_MPS2: f64 = 1.0 / 256.0;
+/// Magnetic field, in units of the earth's.
+pub const MAGNETIC_QUANTUM: f64 = 1.0 / 1024.0;
+/// Temperature, degrees Celsius.
+pub const TEMPERATURE_QUANTUM_DEGC: f64 = 1.0 / 256.0;
+/// Air pressure, Pa.
+pub const PRESSURE_QUANTUM_PA: f64 = 1.0 / 32_768.0;
+
+/// Which identifiers the device uses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Ids {
+    /// Base of 29-bit identifiers whose lowest byte is the code; `None` for the default 11-bit codes.
+    pub base: Option<u32>,
+}
+
+/// A change of velocity over one sample.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct DeltaV {
+    /// x, y, z in 2^-`exponent` m/s.
+    pub mantissas: [i16; 3],
+    /// See `mantissas`.
+    pub exponent: u8,
+}
+
+/// UTC as the device has it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Utc {
+    /// Year less 2000, month, day, hour, minute, second.
+    pub year_to_second: [u8; 6],
+    /// Tenths of milliseconds.
+    pub tenths_ms: u16,
+}
+
+/// The device's state as bits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct StatusWord(pub u32);
+
+/// One message.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Message {
+    /// 1 = messages were dropped in the device.
+    Error(u8),
+    /// Time of the sample, in ticks whose length is configuration (100 us by most sources).
+    SampleTime(u32),
+    /// Number of the sample, wrapping.
+    GroupCounter(u16),
+    /// UTC of the sample.
+    Utc(Utc),
+    /// State.
+    StatusWord(StatusWord),
+    /// Sensor to local earth frame (z up), w x y z.
+    Quaternion([i16; 4]),
+    /// Roll, pitch, yaw.
+    EulerAngles([i16; 3]),
+    /// Change of velocity over one sample.
+    DeltaV(DeltaV),
+    /// Turn rate.
+    RateOfTurn([i16; 3]),
+    /// Change of orientation over one sample, w x y z.
+    DeltaQ([i16; 4]),
+    /// Specific force.
+    Acceleration([i16; 3]),
+    /// Acceleration in the local earth frame, gravity taken off.
+    FreeAcceleration([i16; 3]),
+    /// Magnetic field.
+    MagneticField([i16; 3]),
+    /// Temperature.
+    Temperature(i16),
+    /// Air pressure within the housing.
+    BaroPressure(u32),
+    /// Specific force at high rate. Sources swap this code with the next.
+    AccelerationHr([i16; 3]),
+    /// Turn rate at high rate. See [`Message::AccelerationHr`].
+    RateOfTurnHr([i16; 3]),
+    /// Latitude in 2^-24 and longitude in 2^-23 degrees.
+    LatLon([i32; 2]),
+    /// Height in 2^-15 m.
+    Altitude(i32),
+    /// Velocity in 2^-6 m/s.
+    Velocity([i16; 3]),
+}
+
+impl StatusWord {
+    /// Whether the orientation can be relied on.
+    pub fn orientation_valid(self) -> bool {
+        self.0 & 0b10 != 0
+    }
+}
+
+impl DeltaV {
+    /// x, y, z in m/s.
+    pub fn mps(&self) -> [f64; 3] {
+        let halvings = 1_u64 << self.exponent.min(63);
+        self.mantissas.map(|mantissa| f64::from(mantissa) / halvings as f64)
+    }
+}
+
+impl Ids {
+    fn code(self, id: CanId) -> Option<u8> {
+        match (self.base, id) {
+            (None, CanId::Standard(id)) => u8::try_from(id).ok(),
+            (Some(base), CanId::Extended(id)) if id & !0xFF == base & !0xFF => Some((id & 0xFF) as u8),
+            _ => None,
+        }
+    }
+
+    fn id(self, code: u8) -> CanId {
+        match self.base {
+            None => CanId::Standard(u16::from(code)),
+            Some(base) => CanId::Extended(base & !0xFF | u32::from(code)),
+        }
+    }
+
+    /// Reads a frame; `None` where it is not of this set.
+    ///
+    /// Errors: a length that the message can't have.
+    pub fn decode(self, frame: &CanFrame) -> Result<Option<Message>, MessageError> {
+        let Some(id) = data_id(frame) else { return Ok(None) };
+        let data = frame.data();
+        let four = || exactly::<4>(id, data);
+        let three_words = || exactly::<6>(id, data).map(|data| words(&data, i16::from_be_bytes));
+        let four_words = || exactly::<8>(id, data).map(|data| words(&data, i16::from_be_bytes));
+        Ok(Some(match self.code(id) {
+            Some(0x01) => Message::Error(u8::from_be_bytes(exactly(id, data)?)),
+            Some(0x05) => Message::SampleTime(u32::from_be_bytes(four()?)),
+            Some(0x06) => Message::GroupCounter(u16::from_be_bytes(exactly(id, data)?)),
+            Some(0x07) => {
+                let [year, month, day, hour, minute, second, high, low] = exactly(id, data)?;
+                Message::Utc(Utc {
+                    year_to_second: [year, month, day, hour, minute, second],
+                    tenths_ms: u16::from_be_bytes([high, low]),
+                })
+            }
+            Some(0x11) => Message::StatusWord(StatusWord(u32::from_be_bytes(four()?))),
+            Some(0x21) => Message::Quaternion(four_words()?),
+            Some(0x22) => Message::EulerAngles(three_words()?),
+            Some(0x31) => {
+                let data = exactly::<7>(id, data)?;
+                let [.., exponent] = data;
+                Message::DeltaV(DeltaV { mantissas: words(&data, i16::from_be_bytes), exponent })
+            }
+            Some(0x32) => Message::RateOfTurn(three_words()?),
+            Some(0x33) => Message::DeltaQ(four_words()?),
+            Some(0x34) => Message::Acceleration(three_words()?),
+            Some(0x35) => Message::FreeAcceleration(three_words()?),
+            Some(0x41) => Message::MagneticField(three_words()?),
+            Some(0x51) => Message::Temperature(i16::from_be_bytes(exactly(id, data)?)),
+            Some(0x52) => Message::BaroPressure(u32::from_be_bytes(four()?)),
+            Some(0x61) => Message::AccelerationHr(three_words()?),
+            Some(0x62) => Message::RateOfTurnHr(three_words()?),
+            Some(0x71) => {
+                let [a0, a1, a2, a3, o0, o1, o2, o3] = exactly(id, data)?;
+                Message::LatLon([i32::from_be_bytes([a0, a1, a2, a3]), i32::from_be_bytes([o0, o1, o2, o3])])
+            }
+            Some(0x72) => Message::Altitude(i32::from_be_bytes(four()?)),
+            Some(0x76) => Message::Velocity(three_words()?),
+            _ => return Ok(None),
+        }))
+    }
+
+    /// Writes a message.
+    pub fn encode(self, message: &Message) -> CanFrame {
+        let bytes = |bytes: &[u8]| Payload::default().with(bytes);
+        let (code, payload) = match *message {
+            Message::Error(code) => (0x01, bytes(&[code])),
+            Message::SampleTime(ticks) => (0x05, bytes(&ticks.to_be_bytes())),
+            Message::GroupCounter(count) => (0x06, bytes(&count.to_be_bytes())),
+            Message::Utc(utc) => (0x07, bytes(&utc.year_to_second).with(&utc.tenths_ms.to_be_bytes())),
+            Message::StatusWord(word) => (0x11, bytes(&word.0.to_be_bytes())),
+            Message::Quaternion(raw) => (0x21, big_endian(&raw)),
+            Message::EulerAngles(raw) => (0x22, big_endian(&raw)),
+            Message::DeltaV(delta) => (0x31, big_endian(&delta.mantissas).with(&[delta.exponent])),
+            Message::RateOfTurn(raw) => (0x32, big_endian(&raw)),
+            Message::DeltaQ(raw) => (0x33, big_endian(&raw)),
+            Message::Acceleration(raw) => (0x34, big_endian(&raw)),
+            Message::FreeAcceleration(raw) => (0x35, big_endian(&raw)),
+            Message::MagneticField(raw) => (0x41, big_endian(&raw)),
+            Message::Temperature(raw) => (0x51, bytes(&raw.to_be_bytes())),
+            Message::BaroPressure(raw) => (0x52, bytes(&raw.to_be_bytes())),
+            Message::AccelerationHr(raw) => (0x61, big_endian(&raw)),
+            Message::RateOfTurnHr(raw) => (0x62, big_endian(&raw)),
+            Message::LatLon([lat, lon]) => (0x71, bytes(&lat.to_be_bytes()).with(&lon.to_be_bytes())),
+            Message::Altitude(raw) => (0x72, bytes(&raw.to_be_bytes())),
+            Message::Velocity(raw) => (0x76, big_endian(&raw)),
+        };
+        CanFrame::new(self.id(code), payload)
+    }
+}
+
+fn big_endian(raw: &[i16]) -> Payload {
+    raw.iter().fold(Payload::default(), |payload, word| payload.with(&word.to_be_bytes()))
+}

@@ -1,0 +1,310 @@
+//! From a vehicle file's table to readings, by way of the emulated unit.
+
+use headrace_core::app::device::{Decoder as _, Device, DeviceKind as _, Direction, EmulatorSetup, Truth};
+use headrace_core::app::reading::{Decoded, Packet, Reading};
+use headrace_core::app::{App, Mission};
+use headrace_core::config::{Document, SensorConfig};
+use headrace_core::frames::{Mount, Point3, Pose, Rot, Tunnel, Vec3};
+use headrace_core::math;
+use headrace_core::site::Site;
+use headrace_core::time::{DurNs, MonoNs};
+use headrace_core::tunnel::named;
+
+use crate::Kind;
+use crate::codec::{Message, MessageSet};
+use crate::decoder::{AxisOrder, ImuDecoder, Meaning};
+use crate::sets::{bosch, j1939, sbg, xsens};
+
+/// A vehicle that goes ahead at a constant speed, and turns at constant rates about its own axes.
+struct Going {
+    site: Site,
+    roll_radps: f64,
+    yaw_radps: f64,
+}
+
+impl Going {
+    fn new(roll_radps: f64, yaw_radps: f64) -> Self {
+        let site = Site { axis_yaw_rad: 0.4, gravity_mps2: 9.81, ..Site::default() };
+        Self { site, roll_radps, yaw_radps }
+    }
+}
+
+impl Truth for Going {
+    fn pose(&self, at: MonoNs) -> Pose {
+        let t = at.as_secs_f64();
+        Pose {
+            position: Point3::new(0.2 * t, 0.0, 1.0),
+            attitude: Rot::from_roll_pitch_yaw(self.roll_radps * t, 0.1, self.yaw_radps * t),
+        }
+    }
+
+    fn range_m(&self, _origin: Point3<Tunnel>, _direction: Vec3<Tunnel>) -> Option<f64> {
+        None
+    }
+
+    fn site(&self) -> &Site {
+        &self.site
+    }
+}
+
+fn sensor() -> SensorConfig {
+    SensorConfig {
+        id: "imu".to_owned(),
+        plugin: "imu_can".to_owned(),
+        connect: "can:can0".to_owned(),
+        mount: Mount {
+            position: Vec3::new(0.5, 0.1, 0.0),
+            rotation: Rot::from_roll_pitch_yaw(0.02, -0.03, 1.5),
+        },
+        latency: DurNs::from_millis(3),
+    }
+}
+
+fn app() -> App {
+    App::new(Mission {
+        profile: named::circle(2.5).unwrap(),
+        site: Site::default(),
+        target_m: 0.5,
+        section_m: 0.25,
+        length_m: 100.0,
+    })
+}
+
+fn configured(own: &str) -> Result<Box<dyn Device>, String> {
+    let root = Document::new("v.toml", own).root().unwrap();
+    let device = Kind.configure(&sensor(), &root).map_err(|error| error.to_string())?;
+    root.finish().map_err(|error| error.to_string())?;
+    device.build(&mut app()).unwrap();
+    Ok(device)
+}
+
+fn meaning(set: MessageSet) -> Meaning {
+    Meaning {
+        set,
+        axis_order: AxisOrder::Yxz,
+        sample_time_tick: DurNs(100_000),
+        latency: DurNs::from_millis(3),
+    }
+}
+
+const XSENS: MessageSet = MessageSet::Xsens(xsens::Ids { base: None });
+const J1939: MessageSet = MessageSet::J1939(j1939::Network { source_address: None });
+
+/// Hands messages to a decoder as the frames that carry them.
+fn readings(decoder: &mut ImuDecoder, set: MessageSet, messages: &[Message]) -> Vec<Decoded> {
+    let mut readings = Vec::new();
+    for message in messages {
+        let bytes = set.encode(message).unwrap().encode();
+        let packet = Packet { received: MonoNs(1_000_000_000), bytes: &bytes };
+        decoder.decode(packet, &mut |decoded| readings.push(decoded));
+    }
+    readings
+}
+
+/// What the emulated unit says about `truth` in `samples` samples.
+fn emulated(own: &str, decoder: &mut ImuDecoder, truth: &Going, samples: usize) -> Vec<Decoded> {
+    let setup = EmulatorSetup { start: MonoNs(2_000_000_000), head: None };
+    let mut emulator = configured(own).unwrap().emulator(&setup);
+    let mut readings = Vec::new();
+    for _ in 0..samples {
+        emulator.act(truth, &mut |direction, received, bytes| {
+            assert_eq!(direction, Direction::Received);
+            decoder.decode(Packet { received, bytes }, &mut |decoded| readings.push(decoded));
+        });
+    }
+    assert_eq!(decoder.counts().bad_frames, 0);
+    assert_eq!((decoder.passed_over(), decoder.withheld()), (0, 0));
+    readings
+}
+
+fn true_attitude(
+    truth: &Going,
+    at: MonoNs,
+) -> Rot<headrace_core::app::reading::Level, headrace_core::frames::Sensor> {
+    let level = Rot::from_roll_pitch_yaw(0.0, 0.0, truth.site.axis_yaw_rad);
+    level * truth.pose(at).attitude * sensor().mount.rotation
+}
+
+/// Compares every reading with the truth; the tolerances are one quantum of rate and force.
+fn check(readings: &[Decoded], truth: &Going, rate_quantum: f64, force_quantum: f64) {
+    for decoded in readings {
+        let attitude = true_attitude(truth, decoded.valid_at);
+        match decoded.reading {
+            Reading::Attitude(got) => {
+                let [w, x, y, z] = (got.inverse() * attitude).wxyz();
+                let error = 2.0 * math::atan2(math::sqrt(x * x + y * y + z * z), w.abs());
+                assert!(error < 1e-4, "{error} rad");
+            }
+            Reading::AngularRate(got) => {
+                let earth = Vec3::<Tunnel>::new(0.0, 0.0, truth.yaw_radps);
+                let yaw = truth.pose(decoded.valid_at).attitude.inverse() * earth;
+                let body = yaw + Vec3::new(truth.roll_radps, 0.0, 0.0);
+                let error = (got + -(sensor().mount.rotation.inverse() * body)).norm();
+                assert!(error < rate_quantum, "{error} rad/s");
+            }
+            Reading::SpecificForce(got) if truth.yaw_radps == 0.0 && truth.roll_radps == 0.0 => {
+                let gravity = attitude.inverse() * Vec3::new(0.0, 0.0, truth.site.gravity_mps2);
+                let error = (got + -gravity).norm();
+                assert!(error < force_quantum, "{error} m/s^2");
+            }
+            Reading::SpecificForce(got) => assert!((got.norm() - 9.81).abs() < 0.1),
+            other => panic!("{other:?}"),
+        }
+    }
+}
+
+#[test]
+fn an_emulated_xsens_comes_back() {
+    for (roll, yaw) in [(0.0, 0.0), (0.0, 0.2), (0.3, 0.0)] {
+        let truth = Going::new(roll, yaw);
+        let mut decoder = ImuDecoder::new(meaning(XSENS));
+        let readings = emulated("preset = \"xsens_mti600\"\n", &mut decoder, &truth, 500);
+        assert_eq!(readings.len(), 1500);
+        assert_eq!(readings[0].valid_at, MonoNs(2_000_000_000));
+        check(&readings, &truth, 1.0 / 512.0, 1.0 / 256.0);
+        assert_eq!(decoder.sample_time(), Some(DurNs::from_millis(4990)));
+    }
+}
+
+#[test]
+fn at_constant_attitude_and_velocity_rate_is_zero_and_force_is_gravity() {
+    let truth = Going::new(0.0, 0.0);
+    let mut decoder = ImuDecoder::new(meaning(XSENS));
+    let readings = emulated("preset = \"xsens_mti600\"\n", &mut decoder, &truth, 500);
+    for decoded in &readings[3..] {
+        match decoded.reading {
+            Reading::AngularRate(rate) => assert_eq!(rate, Vec3::zero()),
+            _ => assert!(readings[..3].iter().any(|first| first.reading == decoded.reading)),
+        }
+    }
+}
+
+#[test]
+fn an_emulated_sbg_comes_back_in_our_axes() {
+    let truth = Going::new(0.1, 0.0);
+    let mut decoder = ImuDecoder::new(meaning(MessageSet::Sbg));
+    let readings = emulated("preset = \"sbg_ellipse\"\nrate_hz = 50\n", &mut decoder, &truth, 200);
+    assert_eq!(readings.len(), 600);
+    check(&readings, &truth, 1e-3, 1e-2);
+}
+
+#[test]
+fn an_emulated_j1939_unit_comes_back_in_either_order() {
+    for (key, axis_order) in [("yxz", AxisOrder::Yxz), ("xyz", AxisOrder::Xyz)] {
+        let truth = Going::new(0.0, 0.0);
+        let mut decoder = ImuDecoder::new(Meaning { axis_order, ..meaning(J1939) });
+        let own = format!("preset = \"j1939\"\naxis_order = \"{key}\"\n");
+        let readings = emulated(&own, &mut decoder, &truth, 100);
+        assert_eq!(readings.len(), 200);
+        check(&readings, &truth, 1.0_f64.to_radians() / 128.0, 0.01);
+    }
+}
+
+#[test]
+fn an_emulated_bosch_unit_comes_back_with_its_force_alone() {
+    let truth = Going::new(0.0, 0.0);
+    let mut decoder = ImuDecoder::new(meaning(MessageSet::Bosch));
+    let readings = emulated("preset = \"bosch_mm5\"\n", &mut decoder, &truth, 100);
+    assert_eq!(readings.len(), 100);
+    check(&readings, &truth, 0.0, 0.002);
+}
+
+#[test]
+fn an_attitude_that_the_unit_calls_invalid_is_withheld() {
+    let mut decoder = ImuDecoder::new(meaning(XSENS));
+    let quaternion = xsens::Message::Quaternion([32_767, 0, 0, 0]);
+    let rate = xsens::Message::RateOfTurn([512, 0, 0]);
+    let status = |bits| xsens::Message::StatusWord(xsens::StatusWord(bits));
+    let messages = [
+        quaternion,
+        status(0b01),
+        quaternion,
+        rate,
+        status(0b10),
+        quaternion,
+        xsens::Message::Quaternion([0; 4]),
+        xsens::Message::GroupCounter(7),
+    ]
+    .map(Message::Xsens);
+    let got = readings(&mut decoder, XSENS, &messages);
+    let attitude = Reading::Attitude(Rot::identity());
+    let expected = [attitude, Reading::AngularRate(Vec3::new(1.0, 0.0, 0.0)), attitude];
+    assert_eq!(got.iter().map(|decoded| decoded.reading).collect::<Vec<_>>(), expected);
+    assert_eq!(decoder.withheld(), 2);
+    assert_eq!(got[0].valid_at, MonoNs(997_000_000));
+    assert_eq!(decoder.group(), Some(7));
+}
+
+#[test]
+fn euler_angles_are_heard_unless_there_are_quaternions() {
+    let mut decoder = ImuDecoder::new(meaning(XSENS));
+    let euler = Message::Xsens(xsens::Message::EulerAngles([1600, -416, -11_520]));
+    let quaternion = Message::Xsens(xsens::Message::Quaternion([32_767, 0, 0, 0]));
+    let got = readings(&mut decoder, XSENS, &[euler, quaternion, euler]);
+    assert_eq!(got.len(), 2);
+    let Reading::Attitude(attitude) = got[0].reading else { panic!() };
+    let (roll, pitch, yaw) = attitude.roll_pitch_yaw();
+    let deg = [roll, pitch, yaw].map(f64::to_degrees);
+    for (got, expected) in deg.iter().zip([12.5, -3.25, -90.0]) {
+        assert!((got - expected).abs() < 1e-9, "{deg:?}");
+    }
+}
+
+#[test]
+fn an_sbg_at_rest_feels_gravity_upwards_and_its_yaw_grows_to_the_left() {
+    let mut decoder = ImuDecoder::new(meaning(MessageSet::Sbg));
+    // At rest the device's own z, which points down, reads -9.81; a heading of -1.5 is nearly west, to the left of north.
+    let messages = [sbg::Message::Acceleration([0, 0, -981]), sbg::Message::Euler([0, 1000, -15_000])];
+    let got = readings(&mut decoder, MessageSet::Sbg, &messages.map(Message::Sbg));
+    let Reading::SpecificForce(force) = got[0].reading else { panic!() };
+    assert!((force.z() - 9.81).abs() < 1e-9);
+    let Reading::Attitude(attitude) = got[1].reading else { panic!() };
+    let (roll, pitch, yaw) = attitude.roll_pitch_yaw();
+    assert!(roll.abs() < 1e-9 && (pitch + 0.1).abs() < 1e-9 && (yaw - 1.5).abs() < 1e-9);
+}
+
+#[test]
+fn values_that_a_j1939_unit_calls_wrong_are_withheld_and_its_latency_counts() {
+    let mut decoder = ImuDecoder::new(meaning(J1939));
+    let triple = |raw, figures, latency| j1939::Triple { raw, figures, latency };
+    let level = [32_000, 32_000, 32_981];
+    let messages = [
+        j1939::Message::Acceleration(triple(level, 0, 5)),
+        j1939::Message::Acceleration(triple([32_000, 0xFE00, 32_000], 0, 5)),
+        j1939::Message::Acceleration(triple(level, 0b10_00_00, 5)),
+        j1939::Message::AngularRate(triple([32_128, 32_000, 32_000], 0b11_11_11, 0xFF)),
+    ];
+    let got = readings(&mut decoder, J1939, &messages.map(Message::J1939));
+    assert_eq!((got.len(), decoder.withheld()), (2, 2));
+    assert_eq!(got[0].valid_at, MonoNs(1_000_000_000 - 3_000_000 - 2_500_000));
+    assert_eq!(got[1].valid_at, MonoNs(1_000_000_000 - 3_000_000));
+    // The first rate is pitch: about y.
+    let Reading::AngularRate(rate) = got[1].reading else { panic!() };
+    assert_eq!(rate, Vec3::new(0.0, 1.0_f64.to_radians(), 0.0));
+}
+
+#[test]
+fn a_bosch_unit_tells_its_force_when_all_of_it_has_come() {
+    let mut decoder = ImuDecoder::new(meaning(MessageSet::Bosch));
+    let (rate, force) = (bosch::RawRate::nearest(0.0), bosch::RawAcceleration::nearest(1.0));
+    let messages = [
+        bosch::Message::Yaw(rate, force),
+        bosch::Message::Roll(rate, force),
+        bosch::Message::Yaw(rate, force),
+        bosch::Message::Vertical(force),
+        bosch::Message::Vertical(force),
+    ];
+    let got = readings(&mut decoder, MessageSet::Bosch, &messages.map(Message::Bosch));
+    assert_eq!(got.len(), 1);
+}
+
+#[test]
+fn wrong_keys_are_named() {
+    let error = |own| configured(own).err().unwrap();
+    assert_eq!(error("rate_hz = 100\n"), "v.toml:1: preset: is missing");
+    assert!(error("preset = \"vectornav\"\n").contains("xsens_mti600, sbg_ellipse, j1939, bosch_mm5"));
+    assert!(error("preset = \"xsens_mti600\"\nid_base = 0x19FF0021\n").contains("must end in 00"));
+    assert!(error("preset = \"sbg_ellipse\"\nid_base = 0\n").contains("is not a key here"));
+    assert!(configured("preset = \"xsens_mti600\"\nid_base = 0x19FF0000\n").is_ok());
+    assert!(configured("preset = \"j1939\"\nsource_address = 0xE2\n").is_ok());
+}

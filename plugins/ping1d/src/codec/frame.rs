@@ -1,0 +1,88 @@
+//! Frames: `BR`, payload length, message id, source, destination, payload, sum of all that as 16 bits.
+//!
+//! Source: Ping protocol, packet format. All numbers are little-endian.
+
+use headrace_core::codec::Verdict;
+
+use super::{Bytes, TooLong};
+
+/// The longest frame that is taken. The protocol itself allows 65 545 bytes, but no echosounder comes near this.
+pub const MAX_FRAME_BYTES: usize = 4096;
+
+/// The longest payload that is taken.
+pub const MAX_PAYLOAD_BYTES: usize = MAX_FRAME_BYTES - HEADER_BYTES - CHECKSUM_BYTES;
+
+const HEADER_BYTES: usize = 8;
+const CHECKSUM_BYTES: usize = 2;
+const START: [u8; 2] = *b"BR";
+
+/// A frame whose payload stands elsewhere.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Frame<'a> {
+    /// Message id.
+    pub id: u16,
+    /// Device id of the sender.
+    pub source: u8,
+    /// Device id of the receiver.
+    pub destination: u8,
+    /// Payload.
+    pub payload: &'a [u8],
+}
+
+impl<'a> Frame<'a> {
+    /// The frame that `bytes` begin with, if they do and its checksum is right.
+    pub fn parse(bytes: &'a [u8]) -> Option<Self> {
+        let (header, rest) = bytes.split_first_chunk::<HEADER_BYTES>()?;
+        let [b, r, n0, n1, i0, i1, source, destination] = *header;
+        let (payload, rest) = rest.split_at_checked(usize::from(u16::from_le_bytes([n0, n1])))?;
+        let sum = sum(header).wrapping_add(sum(payload));
+        let good = [b, r] == START && rest.first_chunk() == Some(&sum.to_le_bytes());
+        good.then_some(Self { id: u16::from_le_bytes([i0, i1]), source, destination, payload })
+    }
+
+    /// The frame as bytes.
+    ///
+    /// Errors: a payload longer than [`MAX_PAYLOAD_BYTES`].
+    pub fn encode(&self) -> Result<Bytes<MAX_FRAME_BYTES>, TooLong> {
+        let len = self.payload.len();
+        let length = u16::try_from(len).map_err(|_| TooLong { len, max: MAX_PAYLOAD_BYTES })?;
+        let mut bytes = Bytes::new(&START)?;
+        bytes.extend(&length.to_le_bytes())?;
+        bytes.extend(&self.id.to_le_bytes())?;
+        bytes.extend(&[self.source, self.destination])?;
+        bytes.extend(self.payload)?;
+        let sum = sum(bytes.as_slice());
+        bytes.extend(&sum.to_le_bytes())?;
+        Ok(bytes)
+    }
+}
+
+/// Whether `front` is, or may become, a frame; its checksum is checked, its payload isn't.
+pub(super) fn judge(front: &[u8]) -> Verdict {
+    let start = front.len().min(START.len());
+    if !START.starts_with(front.get(..start).unwrap_or_default()) {
+        return Verdict::NotAStart;
+    }
+    let Some((_, payload, _)) = announced(front) else { return Verdict::Need(HEADER_BYTES) };
+    let whole = HEADER_BYTES + payload + CHECKSUM_BYTES;
+    if whole > MAX_FRAME_BYTES {
+        Verdict::Bad
+    } else if front.len() < whole {
+        Verdict::Need(whole)
+    } else if Frame::parse(front).is_some() {
+        Verdict::Frame(whole)
+    } else {
+        Verdict::Bad
+    }
+}
+
+/// Message id and payload length that a header announces, and what is there of the payload.
+pub(super) fn announced(front: &[u8]) -> Option<(u16, usize, &[u8])> {
+    let (&[_, _, n0, n1, i0, i1, _, _], rest) = front.split_first_chunk::<HEADER_BYTES>()?;
+    let len = usize::from(u16::from_le_bytes([n0, n1]));
+    Some((u16::from_le_bytes([i0, i1]), len, rest.get(..len).unwrap_or(rest)))
+}
+
+fn sum(bytes: &[u8]) -> u16 {
+    bytes.iter().fold(0, |sum: u16, byte| sum.wrapping_add(u16::from(*byte)))
+}

@@ -1,0 +1,135 @@
+//! Registration of an echosounder with the loop, and its messages as readings.
+
+use headrace_core::app::components::{Echosounder, Mounted};
+use headrace_core::app::device::{Decoder, Device, DeviceKind, Emulator, EmulatorSetup};
+use headrace_core::app::plugin::{Plugin, PluginError};
+use headrace_core::app::reading::{Decoded, EchoRange, Packet, Reading};
+use headrace_core::app::{App, SourceSpec};
+use headrace_core::codec::{Codec as _, CodecCounts};
+use headrace_core::config::{ConfigError, Section, SensorConfig};
+use headrace_core::time::{DurNs, MonoNs};
+
+use crate::codec::{Distance, DistanceSimple, Frame, PingCodec};
+use crate::emulator::PingEmulator;
+use crate::settings::Settings;
+
+/// The kind's name in vehicle files and logs.
+const NAME: &str = "ping1d";
+
+/// Room for several of the longest frames.
+const RING_BYTES: usize = 1 << 16;
+
+/// A frame's bytes follow one another on the line; after such a pause no more belong to the one begun. Below the usual
+/// interval, so that a false start can hold back one reading at most.
+const SILENCE: DurNs = DurNs::from_millis(50);
+
+/// The kind of device that vehicle files call `ping1d`.
+#[derive(Debug, Clone, Copy)]
+pub struct Kind;
+
+impl DeviceKind for Kind {
+    fn name(&self) -> &'static str {
+        NAME
+    }
+
+    fn configure(&self, sensor: &SensorConfig, own: &Section<'_>) -> Result<Box<dyn Device>, ConfigError> {
+        let settings = Settings::read(sensor, own)?;
+        Ok(Box::new(Ping1d { sensor: sensor.clone(), settings }))
+    }
+}
+
+/// A configured echosounder.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Ping1d {
+    sensor: SensorConfig,
+    settings: Settings,
+}
+
+impl Plugin for Ping1d {
+    fn build(&self, app: &mut App) -> Result<(), PluginError> {
+        let source = app.add_source(SourceSpec {
+            id: self.sensor.id.clone(),
+            plugin: NAME,
+            connect: self.sensor.connect.clone(),
+            decoder: Box::new(PingDecoder::new(self.settings, self.sensor.latency)),
+            ring_bytes: RING_BYTES,
+        })?;
+        let echosounder = Echosounder { min_confidence: self.settings.min_confidence };
+        app.spawn((Mounted { source, mount: self.sensor.mount }, echosounder));
+        Ok(())
+    }
+}
+
+impl Device for Ping1d {
+    fn emulator(&self, setup: &EmulatorSetup) -> Box<dyn Emulator> {
+        Box::new(PingEmulator::new(self.settings, self.sensor.mount, self.sensor.latency, setup))
+    }
+}
+
+/// Messages to readings. Distances that another client has asked for are taken as well.
+#[derive(Debug, Clone)]
+pub struct PingDecoder {
+    codec: PingCodec,
+    settings: Settings,
+    latency: DurNs,
+    begun: MonoNs,
+    last: MonoNs,
+}
+
+impl PingDecoder {
+    /// For a device with these settings.
+    pub fn new(settings: Settings, latency: DurNs) -> Self {
+        Self { codec: PingCodec::default(), settings, latency, begun: MonoNs(0), last: MonoNs(0) }
+    }
+}
+
+impl Decoder for PingDecoder {
+    fn decode(&mut self, packet: Packet<'_>, sink: &mut dyn FnMut(Decoded)) {
+        let Self { codec, settings, latency, begun, last } = self;
+        let mut emit = |received: MonoNs, frame: &Frame<'_>| {
+            if let Some(echo) = echo(settings, frame) {
+                sink(Decoded { valid_at: received - *latency, reading: Reading::Echo(echo) });
+            }
+        };
+        if codec.held_bytes() > 0 && packet.received.since(*last) > SILENCE {
+            codec.flush_frames(|frame| emit(*begun, &frame));
+        }
+        // A frame that earlier packets began came when they did; those after it begin in this one.
+        let mut at = if codec.held_bytes() > 0 { *begun } else { packet.received };
+        codec.push_frames(packet.bytes, |frame| {
+            emit(at, &frame);
+            at = packet.received;
+        });
+        if codec.held_bytes() <= packet.bytes.len() {
+            *begun = packet.received;
+        }
+        *last = packet.received;
+    }
+
+    fn counts(&self) -> CodecCounts {
+        self.codec.counts()
+    }
+}
+
+/// The range that a frame tells of, if it does and comes from the device that is meant.
+fn echo(settings: &Settings, frame: &Frame<'_>) -> Option<EchoRange> {
+    if frame.source != settings.device_id {
+        return None;
+    }
+    let simple = DistanceSimple::of(frame).map(|it| (it.distance_mm, u16::from(it.confidence_percent)));
+    let whole = || Distance::of(frame).map(|it| (it.distance_mm, it.confidence_percent));
+    let (distance_mm, confidence_percent) = simple.or_else(whole)?;
+    // Nothing above 100 per cent is defined.
+    if confidence_percent > 100 {
+        return None;
+    }
+    let heard = confidence_percent > 0 && distance_mm > 0;
+    Some(EchoRange {
+        range_m: heard.then(|| f64::from(distance_mm) / 1000.0),
+        confidence: f64::from(confidence_percent) / 100.0,
+        sound_speed_mps: settings.sound_speed_mps,
+    })
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,102 @@
+use headrace_core::app::Mission;
+use headrace_core::site::Site;
+use headrace_core::tunnel::named;
+
+use super::*;
+use crate::codec::{Addressed, Bytes, Message, Profile, ScanRange};
+use crate::settings::tests::{sensor, settings};
+
+const PING: Distance = Distance {
+    distance_mm: 4538,
+    confidence_percent: 97,
+    pulse_us: 60,
+    ping_number: 1,
+    scan: ScanRange { start_mm: 0, length_mm: 10_000 },
+    gain: 3,
+};
+
+fn decoder() -> PingDecoder {
+    PingDecoder::new(settings("sound_speed_mps = 1480").unwrap(), DurNs::from_millis(2))
+}
+
+fn frame(message: &Message) -> Vec<u8> {
+    let value = Addressed { source: 1, destination: 0, message: *message };
+    value.encode().unwrap().as_slice().to_vec()
+}
+
+fn decode(decoder: &mut PingDecoder, received_ms: i64, bytes: &[u8]) -> Vec<(i64, EchoRange)> {
+    let mut got = Vec::new();
+    let packet = Packet { received: MonoNs(0) + DurNs::from_millis(received_ms), bytes };
+    decoder.decode(packet, &mut |decoded| match decoded.reading {
+        Reading::Echo(echo) => got.push((decoded.valid_at.since(MonoNs(0)).0 / 1_000_000, echo)),
+        other => panic!("{other:?}"),
+    });
+    got
+}
+
+fn one(message: &Message) -> EchoRange {
+    let [(98, echo)] = decode(&mut decoder(), 100, &frame(message))[..] else { panic!() };
+    echo
+}
+
+#[test]
+fn every_message_with_a_distance_becomes_a_reading() {
+    let expected = EchoRange { range_m: Some(4.538), confidence: 0.97, sound_speed_mps: 1480.0 };
+    let strengths = Bytes::new(&[1, 2, 3]).unwrap();
+    assert_eq!(one(&Message::Distance(PING)), expected);
+    assert_eq!(one(&Message::Profile(Profile { distance: PING, strengths })), expected);
+    let simple = DistanceSimple { distance_mm: 4538, confidence_percent: 97 };
+    assert_eq!(one(&Message::DistanceSimple(simple)), expected);
+}
+
+#[test]
+fn no_confidence_or_no_distance_is_no_range() {
+    assert_eq!(one(&Message::Distance(Distance { confidence_percent: 0, ..PING })).range_m, None);
+    assert_eq!(one(&Message::Distance(Distance { distance_mm: 0, ..PING })).range_m, None);
+}
+
+#[test]
+fn other_messages_other_devices_and_nonsense_give_no_reading() {
+    let mut decoder = decoder();
+    let nonsense = Distance { confidence_percent: 101, ..PING };
+    for message in [Message::Ack(1004), Message::PingInterval(66), Message::Distance(nonsense)] {
+        assert_eq!(decode(&mut decoder, 100, &frame(&message)), []);
+    }
+    let elsewhere = Addressed { source: 2, destination: 0, message: Message::Distance(PING) };
+    assert_eq!(decode(&mut decoder, 100, elsewhere.encode().unwrap().as_slice()), []);
+}
+
+#[test]
+fn a_datagram_may_hold_part_of_a_frame_or_several() {
+    let mut decoder = decoder();
+    let two = [frame(&Message::Distance(PING)), frame(&Message::Distance(PING))].concat();
+    assert_eq!(decode(&mut decoder, 100, &two[..20]), []);
+    let times: Vec<i64> = decode(&mut decoder, 103, &two[20..]).iter().map(|(ms, _)| *ms).collect();
+    assert_eq!(times, [98, 101]);
+}
+
+#[test]
+fn a_frame_cut_short_delays_nothing_after_a_silence() {
+    let mut decoder = decoder();
+    let longer = Message::Profile(Profile { distance: PING, strengths: Bytes::new(&[9; 200]).unwrap() });
+    assert_eq!(decode(&mut decoder, 100, &frame(&longer)[..30]), []);
+    let [(ms, _)] = decode(&mut decoder, 166, &frame(&Message::Distance(PING)))[..] else { panic!() };
+    assert_eq!(ms, 164);
+    let counts = CodecCounts { good_frames: 1, bad_frames: 1, skipped_bytes: 30 };
+    assert_eq!(decoder.counts(), counts);
+}
+
+#[test]
+fn an_echosounder_registers_once() {
+    let ping = Ping1d { sensor: sensor(), settings: settings("").unwrap() };
+    let mut app = App::new(Mission {
+        profile: named::ceran().unwrap(),
+        site: Site::default(),
+        target_m: 0.5,
+        section_m: 0.25,
+        length_m: 100.0,
+    });
+    assert_eq!(ping.build(&mut app), Ok(()));
+    assert_eq!(ping.build(&mut app), Err(PluginError::DuplicateSource { id: "left".to_owned() }));
+    assert!(ping.head().is_none());
+}

@@ -1,0 +1,95 @@
+//! An echosounder's settings: the keys of its table in the vehicle file.
+
+use headrace_core::config::{ConfigError, Section, SensorConfig};
+use headrace_core::time::DurNs;
+
+/// An echosounder's settings, checked.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// Readings of less confidence (0 to 1) are not used.
+    pub min_confidence: f64,
+    /// Time between two pings.
+    pub interval: DurNs,
+    /// Speed of sound that the device is set to, m/s.
+    pub sound_speed_mps: f64,
+    /// The device's id on its line.
+    pub device_id: u8,
+}
+
+impl Settings {
+    /// Reads an echosounder's own keys.
+    ///
+    /// Errors: a key that isn't allowed, or a latency that isn't below the interval.
+    pub fn read(sensor: &SensorConfig, own: &Section<'_>) -> Result<Self, ConfigError> {
+        let device_id = own.integer("device_id", 1..=254)?.and_then(|id| u8::try_from(id).ok());
+        let settings = Self {
+            min_confidence: own.number("min_confidence", 0.0..=1.0)?.unwrap_or(0.5),
+            // The protocol's interval is 16 bits of whole milliseconds.
+            interval: DurNs::from_millis(own.integer("interval_ms", 10..=65_535)?.unwrap_or(66)),
+            sound_speed_mps: own.number("sound_speed_mps", 1000.0..=2000.0)?.unwrap_or(1500.0),
+            device_id: device_id.unwrap_or(1),
+        };
+        if sensor.latency >= settings.interval {
+            let problem = "must be below interval_ms: a device answers before it is asked again";
+            return Err(own.invalid("latency_ms", problem));
+        }
+        Ok(settings)
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use headrace_core::config::Document;
+    use headrace_core::frames::{Mount, Rot, Vec3};
+
+    use super::*;
+
+    /// An echosounder that looks ahead, without latency.
+    pub(crate) fn sensor() -> SensorConfig {
+        SensorConfig {
+            id: "left".to_owned(),
+            plugin: "ping1d".to_owned(),
+            connect: String::new(),
+            mount: Mount { position: Vec3::zero(), rotation: Rot::identity() },
+            latency: DurNs::ZERO,
+        }
+    }
+
+    /// Settings from the text of a table.
+    pub(crate) fn settings(text: &str) -> Result<Settings, ConfigError> {
+        let root = Document::new("v.toml", text).root()?;
+        let settings = Settings::read(&sensor(), &root)?;
+        root.finish()?;
+        Ok(settings)
+    }
+
+    #[test]
+    fn an_empty_table_gives_the_usual_settings_and_every_key_is_read() {
+        let usual = Settings {
+            min_confidence: 0.5,
+            interval: DurNs::from_millis(66),
+            sound_speed_mps: 1500.0,
+            device_id: 1,
+        };
+        assert_eq!(settings(""), Ok(usual));
+        let text = "min_confidence = 0.8\ninterval_ms = 50\nsound_speed_mps = 1447\ndevice_id = 3";
+        let other = Settings {
+            min_confidence: 0.8,
+            interval: DurNs::from_millis(50),
+            sound_speed_mps: 1447.0,
+            device_id: 3,
+        };
+        assert_eq!(settings(text), Ok(other));
+    }
+
+    #[test]
+    fn what_is_not_allowed_is_named_with_its_line() {
+        let error = |text: &str| settings(text).unwrap_err().to_string();
+        assert_eq!(error("device_id = 0"), "v.toml:1: device_id = 0: must be a whole number from 1 to 254");
+        assert!(error("\nmin_confidence = 50").starts_with("v.toml:2: min_confidence = 50: must be"));
+        let late = SensorConfig { latency: DurNs::from_millis(66), ..sensor() };
+        let root = Document::new("v.toml", "latency_ms = 66").root().unwrap();
+        let error = Settings::read(&late, &root).unwrap_err().to_string();
+        assert!(error.starts_with("v.toml:1: latency_ms = 66: must be below interval_ms"), "{error}");
+    }
+}

@@ -1,0 +1,175 @@
+//! The vehicle file's part of a cable counter, and its place in the loop.
+
+use headrace_core::app::components::{Mounted, Tether};
+use headrace_core::app::device::{Decoder, Device, DeviceKind, Emulator, EmulatorSetup};
+use headrace_core::app::plugin::{Plugin, PluginError};
+use headrace_core::app::{App, SourceSpec};
+use headrace_core::config::{ConfigError, Section, SensorConfig};
+
+use crate::decoder::{Counter, HidDecoder, LineDecoder};
+use crate::emulator::{HidEmulator, LineEmulator, Reeling};
+use crate::report::{Endian, MAX_REPORT_BYTES, ReportLayout, Width};
+use crate::tracker::Counting;
+
+/// Name in vehicle files.
+pub const NAME: &str = "tether_hid";
+
+/// A minute of reports at the usual rate.
+const RING_BYTES: usize = 1 << 17;
+
+const METRES_PER_FOOT: f64 = 0.3048;
+
+/// Cable counters as a kind of device.
+#[derive(Debug, Clone, Copy)]
+pub struct Kind;
+
+/// A configured cable counter.
+#[derive(Debug, Clone)]
+pub struct CableCounter {
+    sensor: SensorConfig,
+    reeling: Reeling,
+    wire: Wire,
+}
+
+/// What the counter speaks.
+#[derive(Debug, Clone)]
+enum Wire {
+    Hid { decoder: Box<HidDecoder>, counter: Counter },
+    Line { metres_per_unit: f64 },
+}
+
+#[derive(Clone, Copy)]
+enum WireKind {
+    Hid,
+    Line,
+}
+
+impl DeviceKind for Kind {
+    fn name(&self) -> &'static str {
+        NAME
+    }
+
+    fn configure(&self, sensor: &SensorConfig, own: &Section<'_>) -> Result<Box<dyn Device>, ConfigError> {
+        let kinds = [("hid", WireKind::Hid), ("lci90", WireKind::Line)];
+        let kind = own.choice("kind", &kinds)?.unwrap_or(WireKind::Hid);
+        let usual_rate_hz = match kind {
+            WireKind::Hid => 50.0,
+            WireKind::Line => 10.0,
+        };
+        let scale = own.number("scale", -10.0..=10.0)?.unwrap_or(1.0);
+        if scale.abs() < 0.01 {
+            return Err(own.invalid("scale", "must be at least 0.01 away from zero"));
+        }
+        let zero_at_m = own.number("zero_at_m", -1.0e6..=1.0e6)?.unwrap_or(0.0);
+        let reeling = Reeling {
+            tether: Tether { zero_at_m, scale },
+            rate_hz: own.number("rate_hz", 0.1..=1000.0)?.unwrap_or(usual_rate_hz),
+            latency: sensor.latency,
+        };
+        let wire = match kind {
+            WireKind::Hid => hid(&reeling, own)?,
+            WireKind::Line => {
+                let units = [("m", 1.0), ("ft", METRES_PER_FOOT)];
+                Wire::Line { metres_per_unit: own.choice("unit", &units)?.unwrap_or(1.0) }
+            }
+        };
+        Ok(Box::new(CableCounter { sensor: sensor.clone(), reeling, wire }))
+    }
+}
+
+fn hid(reeling: &Reeling, own: &Section<'_>) -> Result<Wire, ConfigError> {
+    let layout = report_layout(own)?;
+    let countings = [("absolute", Counting::Absolute), ("delta", Counting::Delta)];
+    let counting = own.choice("mode", &countings)?.unwrap_or(Counting::Absolute);
+    let counts_per_metre =
+        own.required("counts_per_metre", own.number("counts_per_metre", -1.0e6..=1.0e6)?)?;
+    if counts_per_metre.abs() < 0.1 {
+        return Err(own.invalid("counts_per_metre", "must be at least 0.1 away from zero"));
+    }
+    let max_speed_mps = own.number("max_speed_mps", 0.1..=20.0)?.unwrap_or(3.0);
+    let between_reports = max_speed_mps * counts_per_metre.abs() / reeling.rate_hz;
+    let half = (1_u64 << (layout.width.bits() - 1)) as f64;
+    if between_reports >= half {
+        let problem = format!(
+            "is too fast: {between_reports} counts between two reports, and the counter's width must tell them \
+             from going round, so that below {half} are allowed"
+        );
+        return Err(own.invalid("max_speed_mps", &problem));
+    }
+    let counter = Counter { layout, counting, counts_per_metre, max_speed_mps, latency: reeling.latency };
+    let decoder =
+        HidDecoder::new(counter).map_err(|error| own.invalid("report_bytes", &error.to_string()))?;
+    Ok(Wire::Hid { decoder: Box::new(decoder), counter })
+}
+
+/// The reference layout, as far as the keys don't say otherwise. Only a device that has all of it has its sequence,
+/// status and auxiliary value, too.
+fn report_layout(own: &Section<'_>) -> Result<ReportLayout, ConfigError> {
+    let reference = ReportLayout::REFERENCE;
+    let byte = |key, least, usual: usize| -> Result<usize, ConfigError> {
+        let value = own.integer(key, least..=MAX_REPORT_BYTES as i64)?;
+        Ok(value.and_then(|value| usize::try_from(value).ok()).unwrap_or(usual))
+    };
+    let id = own.integer("report_id", 0..=255)?.and_then(|id| u8::try_from(id).ok());
+    let widths = [(8, Width::Bits8), (16, Width::Bits16), (32, Width::Bits32)];
+    let width = match own.integer("width_bits", 8..=32)? {
+        None => reference.width,
+        Some(bits) => match widths.iter().find(|(allowed, _)| *allowed == bits) {
+            Some((_, width)) => *width,
+            None => return Err(own.invalid("width_bits", "must be 8, 16 or 32")),
+        },
+    };
+    let endians = [("little", Endian::Little), ("big", Endian::Big)];
+    let mut layout = ReportLayout {
+        // HID reserves id 0 for devices that use none.
+        report_id: if id == Some(0) { None } else { id.or(reference.report_id) },
+        report_bytes: byte("report_bytes", 1, reference.report_bytes)?,
+        offset: byte("offset", 0, reference.offset)?,
+        width,
+        signed: own.boolean("signed")?.unwrap_or(reference.signed),
+        endian: own.choice("endian", &endians)?.unwrap_or(reference.endian),
+        ..reference
+    };
+    let as_reference = layout == reference;
+    if !as_reference {
+        layout.auxiliary_offset = None;
+    }
+    let other = |key, usual: Option<usize>| -> Result<Option<usize>, ConfigError> {
+        let offset = own.integer(key, 0..=MAX_REPORT_BYTES as i64)?;
+        Ok(offset.and_then(|offset| usize::try_from(offset).ok()).or(usual.filter(|_| as_reference)))
+    };
+    layout.sequence_offset = other("sequence_offset", reference.sequence_offset)?;
+    layout.status_offset = other("status_offset", reference.status_offset)?;
+    Ok(layout)
+}
+
+impl Plugin for CableCounter {
+    fn build(&self, app: &mut App) -> Result<(), PluginError> {
+        let decoder: Box<dyn Decoder> = match &self.wire {
+            Wire::Hid { decoder, .. } => decoder.clone(),
+            Wire::Line { metres_per_unit } => {
+                Box::new(LineDecoder::new(*metres_per_unit, self.reeling.latency))
+            }
+        };
+        let source = app.add_source(SourceSpec {
+            id: self.sensor.id.clone(),
+            plugin: NAME,
+            connect: self.sensor.connect.clone(),
+            decoder,
+            ring_bytes: RING_BYTES,
+        })?;
+        app.spawn((Mounted { source, mount: self.sensor.mount }, self.reeling.tether));
+        Ok(())
+    }
+}
+
+impl Device for CableCounter {
+    fn emulator(&self, setup: &EmulatorSetup) -> Box<dyn Emulator> {
+        match &self.wire {
+            Wire::Hid { counter, .. } => Box::new(HidEmulator::new(self.reeling, *counter, setup.start)),
+            Wire::Line { metres_per_unit } => {
+                Box::new(LineEmulator::new(self.reeling, *metres_per_unit, setup.start))
+            }
+        }
+    }
+}

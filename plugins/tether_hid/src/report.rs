@@ -1,0 +1,451 @@
+//! HID reports whose layout the vehicle file gives: no cable counter with a published report is known.
+//!
+//! The reference layout is this project's own, for emulated counters:
+//! ```text
+//!   byte   0    1         2       3 .. 6             7 .. 10
+//!          id   sequence  status  count, i32 little  auxiliary, i32 little
+//! ```
+
+use headrace_core::codec::{Codec, CodecCounts};
+
+/// The longest report: an id and what a full-speed interrupt transfer carries.
+pub const MAX_REPORT_BYTES: usize = 65;
+
+/// Report descriptor of the reference layout: vendor page 0xFF00, usage 1, report id 1, 80 bits of input.
+pub const REFERENCE_DESCRIPTOR: [u8; 59] = [
+    0x06, 0x00, 0xFF, // usage page: vendor
+    0x09, 0x01, // usage 1
+    0xA1, 0x01, // collection: application
+    0x85, 0x01, // report id 1
+    0x09, 0x02, 0x15, 0x00, 0x26, 0xFF, 0x00, 0x75, 0x08, 0x95, 0x02, 0x81, 0x02, // 2 x u8
+    0x09, 0x03, 0x17, 0x00, 0x00, 0x00, 0x80, 0x27, 0xFF, 0xFF, 0xFF, 0x7F, 0x75, 0x20, 0x95, 0x01, 0x81,
+    0x02, 0x09, 0x04, 0x17, 0x00, 0x00, 0x00, 0x80, 0x27, 0xFF, 0xFF, 0xFF, 0x7F, 0x75, 0x20, 0x95, 0x01,
+    0x81, 0x02, 0xC0, // end of collection
+];
+
+/// How many bits a counter has before it wraps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Width {
+    /// One byte.
+    Bits8,
+    /// Two bytes.
+    Bits16,
+    /// Four bytes.
+    Bits32,
+}
+
+/// Order of a counter's bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Endian {
+    /// Least significant first.
+    Little,
+    /// Most significant first.
+    Big,
+}
+
+/// Where things stand in a report. Offsets count from the report's first byte, which is the id where there is one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ReportLayout {
+    /// The report's id, or `None` for a device that uses none.
+    pub report_id: Option<u8>,
+    /// Length of the whole report, id included; 1 to 65.
+    pub report_bytes: usize,
+    /// Where the count begins.
+    pub offset: usize,
+    /// Its width.
+    pub width: Width,
+    /// Whether it is two's complement.
+    pub signed: bool,
+    /// Order of its bytes.
+    pub endian: Endian,
+    /// Where a byte stands that grows by one with each report.
+    pub sequence_offset: Option<usize>,
+    /// Where a status byte stands. Its meaning is the device's own.
+    pub status_offset: Option<usize>,
+    /// Where an i32, little-endian, of the device's own meaning stands.
+    pub auxiliary_offset: Option<usize>,
+}
+
+/// One report.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Report {
+    /// Sequence number, where the layout has one.
+    pub sequence: Option<u8>,
+    /// Status, where the layout has one.
+    pub status: Option<u8>,
+    /// The count as the device gives it, within what the layout's width and sign can say.
+    pub count: i64,
+    /// Auxiliary value, where the layout has one.
+    pub auxiliary: Option<i32>,
+}
+
+/// Why a layout can't be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum LayoutError {
+    /// No report has that length.
+    #[error("laying out a report of {0} bytes; allowed are 1 to {MAX_REPORT_BYTES}")]
+    Length(usize),
+    /// A field reaches over the end.
+    #[error("laying out {what} at offset {offset}, {bytes} bytes: the report has {report_bytes}")]
+    Outside {
+        /// Which field.
+        what: &'static str,
+        /// Where it begins.
+        offset: usize,
+        /// How long it is.
+        bytes: usize,
+        /// How long the report is.
+        report_bytes: usize,
+    },
+    /// Two fields share a byte.
+    #[error("laying out {what} at offset {offset}, {bytes} bytes: it overlaps {other}")]
+    Overlap {
+        /// Which field.
+        what: &'static str,
+        /// Where it begins.
+        offset: usize,
+        /// How long it is.
+        bytes: usize,
+        /// The field it runs into.
+        other: &'static str,
+    },
+}
+
+impl Width {
+    /// 8, 16 or 32.
+    pub fn bits(self) -> u32 {
+        match self {
+            Self::Bits8 => 8,
+            Self::Bits16 => 16,
+            Self::Bits32 => 32,
+        }
+    }
+
+    fn bytes(self) -> usize {
+        self.bits() as usize / 8
+    }
+
+    /// `count` brought into what the width can say, as a counter that wraps does.
+    pub fn wrapped(self, count: i64, signed: bool) -> i64 {
+        let modulus = 1_i64 << self.bits();
+        let least = if signed { -modulus / 2 } else { 0 };
+        (count - least).rem_euclid(modulus) + least
+    }
+
+    /// From `before` to `after` the short way round.
+    pub fn difference(self, before: i64, after: i64) -> i64 {
+        self.wrapped(after - before, true)
+    }
+}
+
+impl ReportLayout {
+    /// The layout of [`REFERENCE_DESCRIPTOR`].
+    pub const REFERENCE: Self = Self {
+        report_id: Some(1),
+        report_bytes: 11,
+        offset: 3,
+        width: Width::Bits32,
+        signed: true,
+        endian: Endian::Little,
+        sequence_offset: Some(1),
+        status_offset: Some(2),
+        auxiliary_offset: Some(7),
+    };
+
+    /// Checks that every field lies within the report and none on another.
+    ///
+    /// Errors: a length that no report has, a field outside, an overlap.
+    pub fn check(&self) -> Result<(), LayoutError> {
+        let report_bytes = self.report_bytes;
+        if !(1..=MAX_REPORT_BYTES).contains(&report_bytes) {
+            return Err(LayoutError::Length(report_bytes));
+        }
+        let fields = [
+            ("the report id", self.report_id.map(|_| 0), 1),
+            ("the count", Some(self.offset), self.width.bytes()),
+            ("the sequence", self.sequence_offset, 1),
+            ("the status", self.status_offset, 1),
+            ("the auxiliary value", self.auxiliary_offset, 4),
+        ];
+        let mut owner = [None; MAX_REPORT_BYTES];
+        for (what, offset, bytes) in fields {
+            let Some(offset) = offset else { continue };
+            let end = offset.saturating_add(bytes);
+            let place = owner.get_mut(offset..end).filter(|_| end <= report_bytes);
+            let place = place.ok_or(LayoutError::Outside { what, offset, bytes, report_bytes })?;
+            if let Some(other) = place.iter().find_map(|owner| *owner) {
+                return Err(LayoutError::Overlap { what, offset, bytes, other });
+            }
+            place.fill(Some(what));
+        }
+        Ok(())
+    }
+
+    /// Reads a whole report; `None` where the length or the id is another.
+    pub fn decode(&self, bytes: &[u8]) -> Option<Report> {
+        if bytes.len() != self.report_bytes || self.report_id.is_some_and(|id| bytes.first() != Some(&id)) {
+            return None;
+        }
+        let byte = |offset: Option<usize>| offset.and_then(|offset| bytes.get(offset)).copied();
+        let auxiliary = self.auxiliary_offset.and_then(|offset| bytes.get(offset..)?.first_chunk());
+        Some(Report {
+            sequence: byte(self.sequence_offset),
+            status: byte(self.status_offset),
+            count: self.count(bytes)?,
+            auxiliary: auxiliary.map(|bytes| i32::from_le_bytes(*bytes)),
+        })
+    }
+
+    /// Writes a whole report; what the layout has no place for is left out, what `report` hasn't is zero.
+    pub fn encode(&self, report: &Report) -> Vec<u8> {
+        let mut bytes = vec![0; self.report_bytes];
+        let mut put = |offset: usize, value: &[u8]| {
+            for (place, byte) in bytes.iter_mut().skip(offset).zip(value) {
+                *place = *byte;
+            }
+        };
+        if let Some(id) = self.report_id {
+            put(0, &[id]);
+        }
+        if let Some(offset) = self.sequence_offset {
+            put(offset, &[report.sequence.unwrap_or(0)]);
+        }
+        if let Some(offset) = self.status_offset {
+            put(offset, &[report.status.unwrap_or(0)]);
+        }
+        if let Some(offset) = self.auxiliary_offset {
+            put(offset, &report.auxiliary.unwrap_or(0).to_le_bytes());
+        }
+        let mut count = report.count.to_le_bytes();
+        let count = count.get_mut(..self.width.bytes()).unwrap_or_default();
+        if self.endian == Endian::Big {
+            count.reverse();
+        }
+        put(self.offset, count);
+        bytes
+    }
+
+    fn count(&self, bytes: &[u8]) -> Option<i64> {
+        let field = bytes.get(self.offset..self.offset + self.width.bytes())?;
+        let join = |count: i64, byte: &u8| count << 8 | i64::from(*byte);
+        let count = match self.endian {
+            Endian::Big => field.iter().fold(0, join),
+            Endian::Little => field.iter().rev().fold(0, join),
+        };
+        Some(self.width.wrapped(count, self.signed))
+    }
+}
+
+/// What stands before a report in a `uhid_event` that hands it to the kernel: `UHID_INPUT2` and the report's length.
+///
+/// Source: linux/uhid.h, `struct uhid_input2_req`, native byte order.
+pub fn uhid_input2_header(report_bytes: u16) -> [u8; 6] {
+    const UHID_INPUT2: u32 = 12;
+    let [t0, t1, t2, t3] = UHID_INPUT2.to_ne_bytes();
+    let [n0, n1] = report_bytes.to_ne_bytes();
+    [t0, t1, t2, t3, n0, n1]
+}
+
+/// Bytes to reports. A report with another id is left out to its end, whatever it holds.
+#[derive(Debug, Clone)]
+pub struct ReportCodec {
+    layout: ReportLayout,
+    held: [u8; MAX_REPORT_BYTES],
+    len: usize,
+    /// Whether the report that is coming in has turned out to be another.
+    astray: bool,
+    counts: CodecCounts,
+}
+
+impl ReportCodec {
+    /// A codec for one layout.
+    ///
+    /// Errors: as for [`ReportLayout::check`].
+    pub fn new(layout: ReportLayout) -> Result<Self, LayoutError> {
+        layout.check()?;
+        let counts = CodecCounts::default();
+        Ok(Self { layout, held: [0; MAX_REPORT_BYTES], len: 0, astray: false, counts })
+    }
+
+    fn drop_held(&mut self) {
+        self.counts.bad_frames += 1;
+        self.counts.skipped_bytes += self.len as u64;
+        self.len = 0;
+    }
+}
+
+impl Codec for ReportCodec {
+    type Value = Report;
+
+    const MAX_FRAME_BYTES: usize = MAX_REPORT_BYTES;
+    const WHOLE_MESSAGES: bool = true;
+
+    fn push(&mut self, bytes: &[u8], sink: &mut dyn FnMut(Report)) {
+        for byte in bytes {
+            if self.astray {
+                self.counts.skipped_bytes += 1;
+                continue;
+            }
+            if let Some(place) = self.held.get_mut(self.len) {
+                *place = *byte;
+                self.len += 1;
+            }
+            if self.len == 1 && self.layout.report_id.is_some_and(|id| *byte != id) {
+                self.drop_held();
+                self.astray = true;
+            } else if self.len == self.layout.report_bytes {
+                match self.held.get(..self.len).and_then(|bytes| self.layout.decode(bytes)) {
+                    Some(report) => {
+                        self.counts.good_frames += 1;
+                        self.len = 0;
+                        sink(report);
+                    }
+                    None => self.drop_held(),
+                }
+            }
+        }
+    }
+
+    fn flush(&mut self, _sink: &mut dyn FnMut(Report)) {
+        if self.len > 0 {
+            self.drop_held();
+        }
+        self.astray = false;
+    }
+
+    fn counts(&self) -> CodecCounts {
+        self.counts
+    }
+
+    fn held_bytes(&self) -> usize {
+        self.len
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const EXAMPLE: [u8; 11] = [0x01, 0x2A, 0x01, 0xC0, 0x1D, 0xFE, 0xFF, 0xDC, 0x05, 0x00, 0x00];
+
+    #[test]
+    fn worked_example_1_is_read_and_written() {
+        let report = ReportLayout::REFERENCE.decode(&EXAMPLE).unwrap();
+        assert_eq!(
+            report,
+            Report { sequence: Some(42), status: Some(1), count: -123_456, auxiliary: Some(1500) }
+        );
+        assert_eq!(ReportLayout::REFERENCE.encode(&report), EXAMPLE);
+    }
+
+    #[test]
+    fn worked_example_2_precedes_a_report_for_the_kernel() {
+        let event = [&uhid_input2_header(11)[..], &EXAMPLE].concat();
+        if cfg!(target_endian = "little") {
+            assert_eq!(event[..8], [0x0C, 0x00, 0x00, 0x00, 0x0B, 0x00, 0x01, 0x2A]);
+            assert_eq!(event.len(), 17);
+        }
+    }
+
+    #[test]
+    fn worked_example_3_wraps_the_short_way() {
+        assert_eq!(Width::Bits16.difference(65_530, 4), 10);
+        assert_eq!(Width::Bits16.difference(3, 65_533), -6);
+        assert_eq!(Width::Bits8.difference(250, 6), 12);
+        assert_eq!(Width::Bits32.difference(i64::from(i32::MAX), i64::from(i32::MIN)), 1);
+    }
+
+    #[test]
+    fn the_reference_descriptor_announces_the_reference_report() {
+        let (mut size, mut count, mut bits, mut at) = (0, 0, 0, 0);
+        while at < REFERENCE_DESCRIPTOR.len() {
+            let prefix = REFERENCE_DESCRIPTOR[at];
+            let bytes = [0, 1, 2, 4][usize::from(prefix & 3)];
+            let data = REFERENCE_DESCRIPTOR[at + 1..=at + bytes].iter().rev();
+            let value = data.fold(0_usize, |value, byte| value << 8 | usize::from(*byte));
+            match prefix & 0xFC {
+                0x74 => size = value,
+                0x94 => count = value,
+                0x80 => bits += size * count,
+                _ => (),
+            }
+            at += 1 + bytes;
+        }
+        assert_eq!(bits, 80);
+        assert_eq!(1 + bits / 8, ReportLayout::REFERENCE.report_bytes);
+    }
+
+    #[test]
+    fn impossible_layouts_are_refused() {
+        let base = ReportLayout::REFERENCE;
+        assert_eq!(base.check(), Ok(()));
+        let long = ReportLayout { report_bytes: 66, ..base };
+        assert_eq!(long.check(), Err(LayoutError::Length(66)));
+        let outside = ReportLayout { offset: 8, auxiliary_offset: None, ..base };
+        assert!(matches!(outside.check(), Err(LayoutError::Outside { what: "the count", .. })));
+        let on_id = ReportLayout { offset: 0, ..base };
+        assert!(matches!(on_id.check(), Err(LayoutError::Overlap { other: "the report id", .. })));
+        let on_count = ReportLayout { status_offset: Some(4), ..base };
+        assert!(matches!(on_count.check(), Err(LayoutError::Overlap { other: "the count", .. })));
+    }
+
+    #[test]
+    fn a_report_with_another_id_is_left_out_whole() {
+        let mut codec = ReportCodec::new(ReportLayout::REFERENCE).unwrap();
+        let mut message = vec![0x02];
+        message.extend_from_slice(&EXAMPLE);
+        codec.push(&message, &mut |report| panic!("{report:?}"));
+        codec.flush(&mut |report| panic!("{report:?}"));
+        assert_eq!(codec.counts(), CodecCounts { good_frames: 0, bad_frames: 1, skipped_bytes: 12 });
+    }
+
+    /// Two bytes, big-endian, unsigned, no id: as unlike the reference as the keys allow.
+    const PLAIN: ReportLayout = ReportLayout {
+        report_id: None,
+        report_bytes: 5,
+        offset: 2,
+        width: Width::Bits16,
+        signed: false,
+        endian: Endian::Big,
+        sequence_offset: None,
+        status_offset: Some(0),
+        auxiliary_offset: None,
+    };
+
+    #[test]
+    fn byte_order_and_sign_are_the_layouts() {
+        let report = PLAIN.decode(&[7, 0, 0xFF, 0xFA, 0]).unwrap();
+        assert_eq!((report.count, report.status), (65_530, Some(7)));
+        let signed = ReportLayout { signed: true, endian: Endian::Little, ..PLAIN };
+        assert_eq!(signed.decode(&[7, 0, 0xFA, 0xFF, 0]).unwrap().count, -6);
+    }
+
+    headrace_core::codec_contract!(
+        reference_contract,
+        codec: ReportCodec::new(ReportLayout::REFERENCE).unwrap(),
+        values: (any::<u8>(), any::<u8>(), any::<i32>(), any::<i32>()).prop_map(
+            |(sequence, status, count, auxiliary)| Report {
+                sequence: Some(sequence),
+                status: Some(status),
+                count: i64::from(count),
+                auxiliary: Some(auxiliary),
+            }
+        ),
+        encode: |report: &Report| ReportLayout::REFERENCE.encode(report),
+        frames: [EXAMPLE],
+    );
+
+    headrace_core::codec_contract!(
+        plain_contract,
+        codec: ReportCodec::new(PLAIN).unwrap(),
+        values: (any::<u8>(), any::<u16>()).prop_map(|(status, count)| Report {
+            sequence: None,
+            status: Some(status),
+            count: i64::from(count),
+            auxiliary: None,
+        }),
+        encode: |report: &Report| PLAIN.encode(report),
+        frames: [[7, 0, 0xFF, 0xFA, 0]],
+    );
+}

@@ -1,0 +1,180 @@
+//! From a vehicle file's table to readings, by way of the emulated counter.
+
+use headrace_core::app::device::{Decoder, Device, DeviceKind as _, EmulatorSetup, Truth};
+use headrace_core::app::reading::{Decoded, Packet, Reading, TetherLength};
+use headrace_core::app::{App, Mission};
+use headrace_core::config::{Document, SensorConfig};
+use headrace_core::frames::{Mount, Point3, Pose, Rot, Tunnel, Vec3};
+use headrace_core::site::Site;
+use headrace_core::time::{DurNs, MonoNs};
+use headrace_core::tunnel::named;
+
+use crate::Kind;
+use crate::decoder::{Counter, HidDecoder, LineDecoder};
+use crate::report::{Endian, ReportLayout, Width};
+use crate::tracker::Counting;
+
+/// A vehicle that goes in at 0.5 m/s from chainage 20 m.
+struct Straight {
+    site: Site,
+}
+
+impl Truth for Straight {
+    fn pose(&self, at: MonoNs) -> Pose {
+        let chainage_m = 20.0 + 0.5 * at.as_secs_f64();
+        Pose { position: Point3::new(chainage_m, 0.0, 1.0), attitude: Rot::identity() }
+    }
+
+    fn range_m(&self, _origin: Point3<Tunnel>, _direction: Vec3<Tunnel>) -> Option<f64> {
+        None
+    }
+
+    fn site(&self) -> &Site {
+        &self.site
+    }
+}
+
+fn app() -> App {
+    App::new(Mission {
+        profile: named::circle(2.5).unwrap(),
+        site: Site::default(),
+        target_m: 0.5,
+        section_m: 0.25,
+        length_m: 100.0,
+    })
+}
+
+fn configured(own: &str) -> Result<Box<dyn Device>, String> {
+    let sensor = SensorConfig {
+        id: "tether".to_owned(),
+        plugin: "tether_hid".to_owned(),
+        connect: "hid:1209:0001".to_owned(),
+        mount: Mount { position: Vec3::zero(), rotation: Rot::identity() },
+        latency: DurNs::from_millis(4),
+    };
+    let root = Document::new("v.toml", own).root().unwrap();
+    let device = Kind.configure(&sensor, &root).map_err(|error| error.to_string())?;
+    root.finish().map_err(|error| error.to_string())?;
+    device.build(&mut app()).unwrap();
+    Ok(device)
+}
+
+fn reference_counter() -> Counter {
+    Counter {
+        layout: ReportLayout::REFERENCE,
+        counting: Counting::Absolute,
+        counts_per_metre: 2000.0,
+        max_speed_mps: 3.0,
+        latency: DurNs::from_millis(4),
+    }
+}
+
+fn decode(decoder: &mut dyn Decoder, received: MonoNs, bytes: &[u8]) -> Vec<Decoded> {
+    let mut readings = Vec::new();
+    decoder.decode(Packet { received, bytes }, &mut |decoded| readings.push(decoded));
+    readings
+}
+
+fn length(decoded: &Decoded) -> TetherLength {
+    match decoded.reading {
+        Reading::TetherLength(length) => length,
+        other => panic!("{other:?}"),
+    }
+}
+
+/// Runs the emulated device into `decoder` and compares each reading with the truth.
+fn round_trip(own: &str, decoder: &mut dyn Decoder, zero_at_m: f64, scale: f64, reports: usize) {
+    let truth = Straight { site: Site::default() };
+    let mut emulator = configured(own).unwrap().emulator(&EmulatorSetup { start: MonoNs(7), head: None });
+    let mut readings = Vec::new();
+    for _ in 0..reports {
+        emulator.act(&truth, &mut |_, received, bytes| readings.extend(decode(decoder, received, bytes)));
+    }
+    assert_eq!(readings.len(), reports);
+    assert_eq!(readings[0].valid_at, MonoNs(7));
+    for decoded in &readings {
+        let expected_m = (truth.pose(decoded.valid_at).position.x() - zero_at_m) / scale;
+        let got = length(decoded);
+        let error_m = got.length_m - expected_m;
+        assert!(error_m.abs() <= got.resolution_m / 2.0 + 1e-9, "{error_m} m at {expected_m} m");
+    }
+}
+
+#[test]
+fn worked_example_1_is_61_728_m_below_zero() {
+    let mut decoder = HidDecoder::new(reference_counter()).unwrap();
+    let report = [0x01, 0x2A, 0x01, 0xC0, 0x1D, 0xFE, 0xFF, 0xDC, 0x05, 0x00, 0x00];
+    let readings = decode(&mut decoder, MonoNs(5_000_000), &report);
+    assert_eq!(readings[0].valid_at, MonoNs(1_000_000));
+    assert!((length(&readings[0]).length_m + 61.728).abs() < 1e-12);
+    assert!((length(&readings[0]).resolution_m - 0.0005).abs() < 1e-15);
+    assert_eq!(decoder.status(), Some(1));
+}
+
+#[test]
+fn the_reference_counter_comes_back() {
+    let mut decoder = HidDecoder::new(reference_counter()).unwrap();
+    round_trip("counts_per_metre = 2000\nzero_at_m = 12.5\nscale = 0.98\n", &mut decoder, 12.5, 0.98, 2000);
+    assert_eq!(decoder.health(), crate::tracker::TrackerHealth::default());
+}
+
+#[test]
+fn a_narrow_falling_big_endian_counter_comes_back() {
+    let layout = ReportLayout {
+        report_id: None,
+        report_bytes: 4,
+        offset: 1,
+        width: Width::Bits16,
+        signed: true,
+        endian: Endian::Big,
+        sequence_offset: None,
+        status_offset: None,
+        auxiliary_offset: None,
+    };
+    let counter = Counter { layout, counts_per_metre: -1500.0, ..reference_counter() };
+    let own = "report_id = 0\nreport_bytes = 4\noffset = 1\nwidth_bits = 16\nendian = \"big\"\n\
+               counts_per_metre = -1500\nzero_at_m = 10.0\n";
+    // 16 bits wrap after 22 m on either side; this goes from 10 m to 60 m.
+    round_trip(own, &mut HidDecoder::new(counter).unwrap(), 10.0, 1.0, 5000);
+}
+
+#[test]
+fn a_counter_of_changes_comes_back() {
+    let layout = ReportLayout { width: Width::Bits8, ..ReportLayout::REFERENCE };
+    let layout =
+        ReportLayout { sequence_offset: None, status_offset: None, auxiliary_offset: None, ..layout };
+    let counter = Counter { layout, counting: Counting::Delta, ..reference_counter() };
+    let own = "mode = \"delta\"\nwidth_bits = 8\ncounts_per_metre = 2000\nzero_at_m = 20.0\n";
+    round_trip(own, &mut HidDecoder::new(counter).unwrap(), 20.0, 1.0, 2000);
+}
+
+#[test]
+fn an_emulated_line_monitor_comes_back() {
+    let mut decoder = LineDecoder::new(1.0, DurNs::from_millis(4));
+    round_trip("kind = \"lci90\"\nzero_at_m = 30.0\n", &mut decoder, 30.0, 1.0, 500);
+    let mut decoder = LineDecoder::new(0.3048, DurNs::from_millis(4));
+    round_trip("kind = \"lci90\"\nunit = \"ft\"\nrate_hz = 20\n", &mut decoder, 0.0, 1.0, 500);
+}
+
+#[test]
+fn a_line_is_valid_when_its_first_byte_came() {
+    let mut decoder = LineDecoder::new(1.0, DurNs::ZERO);
+    let line = b"RD,00000125,000012.4,0152.304,1504\r\n";
+    assert!(decode(&mut decoder, MonoNs(100), &line[..10]).is_empty());
+    assert!(decode(&mut decoder, MonoNs(200), &line[10..20]).is_empty());
+    let rest = [&line[20..], &line[..], &line[..5]].concat();
+    let readings = decode(&mut decoder, MonoNs(300), &rest);
+    assert_eq!(readings.iter().map(|decoded| decoded.valid_at.0).collect::<Vec<_>>(), [100, 300]);
+    assert_eq!(decode(&mut decoder, MonoNs(400), &line[5..])[0].valid_at, MonoNs(300));
+}
+
+#[test]
+fn wrong_keys_are_named() {
+    let error = |own| configured(own).err().unwrap();
+    assert_eq!(error("kind = \"hid\"\n"), "v.toml:1: counts_per_metre: is missing");
+    assert!(error("counts_per_metre = 2000\nwidth_bits = 24\n").contains("must be 8, 16 or 32"));
+    assert!(error("counts_per_metre = 2000\noffset = 9\n").contains("the report has 11"));
+    assert!(error("counts_per_metre = 9000\nwidth_bits = 8\n").contains("max_speed_mps"));
+    assert!(error("kind = \"lci90\"\ncounts_per_metre = 2000\n").contains("is not a key here"));
+    assert!(error("counts_per_metre = 2000\nscale = 0\n").contains("away from zero"));
+}

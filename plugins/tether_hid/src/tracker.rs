@@ -1,0 +1,299 @@
+//! From a counter that wraps, jumps and starts anew to metres of cable.
+//!
+//! - A counter wraps: the change is taken the short way round.
+//! - A change faster than the winch can be is rejected and counted. Rejected reports are held against each other: when
+//!   [`PERSIST`] in a row agree, it is the counter that has moved and not the report that was garbled.
+//!   - If the first of them was near zero, the device has been plugged in again and counts from zero: the length goes on
+//!     from where it was. After a silence, too, a way back to zero must not be longer than the winch goes in a second.
+//!   - Otherwise the counter's new word is taken as it is.
+//! - Either way, and whenever counts may have been lost, the length is no longer sure: re-zero needed, from then on.
+
+use headrace_core::time::MonoNs;
+
+use crate::report::{Report, Width};
+
+/// Reports in a row that must agree with each other before a jump is believed.
+pub const PERSIST: u32 = 5;
+
+/// Reports that waited in the kernel's ring arrive together, so that the time between two may be nearly nothing: the
+/// winch is given this much more.
+const SLACK_S: f64 = 0.1;
+
+/// A device that is plugged in again has counted from zero for no longer than this when its first report comes.
+const FRESH_S: f64 = 1.0;
+
+/// What a report's count means.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Counting {
+    /// The count since the device's zero, wrapping.
+    Absolute,
+    /// The change since the report before.
+    Delta,
+}
+
+/// How the tracker stands. Counts only grow, and the mark stays once it is set.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct TrackerHealth {
+    /// Reports rejected as faster than the winch.
+    pub rejected: u64,
+    /// Reports missing from the sequence.
+    pub lost: u64,
+    /// Whether counts may be missing, so that the length's zero is no longer sure.
+    pub re_zero_needed: bool,
+}
+
+/// A counter's follower.
+#[derive(Debug, Clone)]
+pub struct CountTracker {
+    counting: Counting,
+    width: Width,
+    max_counts_per_s: f64,
+    accepted: Option<Seen>,
+    jumped: Option<Jump>,
+    sequence: Option<u8>,
+    total: i64,
+    health: TrackerHealth,
+}
+
+/// A count and when it came.
+#[derive(Debug, Clone, Copy)]
+struct Seen {
+    count: i64,
+    at: MonoNs,
+}
+
+/// Rejected reports that agree with each other.
+#[derive(Debug, Clone, Copy)]
+struct Jump {
+    from_zero: bool,
+    last: Seen,
+    agreeing: u32,
+}
+
+impl CountTracker {
+    /// `max_counts_per_s` is the fastest that the winch, or the vehicle, can be.
+    pub fn new(counting: Counting, width: Width, max_counts_per_s: f64) -> Self {
+        Self {
+            counting,
+            width,
+            max_counts_per_s,
+            accepted: None,
+            jumped: None,
+            sequence: None,
+            total: 0,
+            health: TrackerHealth::default(),
+        }
+    }
+
+    /// How it stands.
+    pub fn health(&self) -> TrackerHealth {
+        self.health
+    }
+
+    /// Takes a report received at `at`; gives the counts since zero, or `None` where the report isn't believed.
+    pub fn take(&mut self, at: MonoNs, report: &Report) -> Option<i64> {
+        let repeated = self.note_sequence(report.sequence);
+        let now = Seen { count: report.count, at };
+        match self.counting {
+            // To add a change twice would be wrong; to see a count twice is harmless.
+            Counting::Delta if repeated => None,
+            Counting::Delta => self.take_delta(now),
+            Counting::Absolute => self.take_absolute(now),
+        }
+    }
+
+    fn note_sequence(&mut self, sequence: Option<u8>) -> bool {
+        let before = core::mem::replace(&mut self.sequence, sequence);
+        let (Some(before), Some(sequence)) = (before, sequence) else { return false };
+        if before == sequence {
+            return true;
+        }
+        let lost = sequence.wrapping_sub(before).wrapping_sub(1);
+        self.health.lost += u64::from(lost);
+        self.health.re_zero_needed |= lost > 0 && self.counting == Counting::Delta;
+        false
+    }
+
+    fn take_delta(&mut self, now: Seen) -> Option<i64> {
+        let before = self.accepted.replace(now);
+        if before.is_some_and(|before| !self.reaches(before.at, now.at, now.count)) {
+            self.health.rejected += 1;
+            self.health.re_zero_needed = true;
+            return None;
+        }
+        self.total = self.total.saturating_add(now.count);
+        Some(self.total)
+    }
+
+    fn take_absolute(&mut self, now: Seen) -> Option<i64> {
+        let Some(before) = self.accepted else {
+            self.accepted = Some(now);
+            self.total = now.count;
+            return Some(self.total);
+        };
+        if let Some(jump) = self.jumped
+            && self.reaches(jump.last.at, now.at, self.width.difference(jump.last.count, now.count))
+        {
+            return self.agree(before, jump, now);
+        }
+        let change = self.width.difference(before.count, now.count);
+        let from_zero = self.within(FRESH_S, self.width.difference(0, now.count));
+        let back_at_once = from_zero && !self.within(FRESH_S, change);
+        if back_at_once || !self.reaches(before.at, now.at, change) {
+            self.health.rejected += 1;
+            self.jumped = Some(Jump { from_zero, last: now, agreeing: 1 });
+            return None;
+        }
+        // In so long a silence the counter may have gone round, and nobody can say how often.
+        let half = (1_u64 << self.width.bits()) as f64 / 2.0;
+        self.health.re_zero_needed |= self.max_counts_per_s * now.at.since(before.at).as_secs_f64() >= half;
+        self.accept(now, change)
+    }
+
+    /// One more report agrees with those rejected.
+    fn agree(&mut self, before: Seen, jump: Jump, now: Seen) -> Option<i64> {
+        let agreeing = jump.agreeing + 1;
+        if agreeing < PERSIST {
+            self.health.rejected += 1;
+            self.jumped = Some(Jump { last: now, agreeing, ..jump });
+            return None;
+        }
+        self.health.re_zero_needed = true;
+        let reference = if jump.from_zero { 0 } else { before.count };
+        self.accept(now, self.width.difference(reference, now.count))
+    }
+
+    #[expect(clippy::unnecessary_wraps, reason = "the callers hand it on")]
+    fn accept(&mut self, now: Seen, change: i64) -> Option<i64> {
+        self.jumped = None;
+        self.accepted = Some(now);
+        self.total = self.total.saturating_add(change);
+        Some(self.total)
+    }
+
+    /// Whether the winch can have moved by `change` counts between two moments.
+    fn reaches(&self, from: MonoNs, to: MonoNs, change: i64) -> bool {
+        self.within(to.since(from).as_secs_f64().max(0.0), change)
+    }
+
+    /// Whether the winch can have moved by `change` counts in `elapsed_s`. One count is rounding.
+    fn within(&self, elapsed_s: f64, change: i64) -> bool {
+        (change as f64).abs() <= self.max_counts_per_s * (elapsed_s + SLACK_S) + 1.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Three metres a second at 2000 counts a metre.
+    const FASTEST: f64 = 6000.0;
+
+    fn at_ms(ms: u64) -> MonoNs {
+        MonoNs(ms * 1_000_000)
+    }
+
+    fn counted(count: i64) -> Report {
+        Report { sequence: None, status: None, count, auxiliary: None }
+    }
+
+    fn take_all(tracker: &mut CountTracker, counts: &[i64]) -> Vec<Option<i64>> {
+        let reports = counts.iter().zip(0..);
+        reports.map(|(count, i)| tracker.take(at_ms(20 * i), &counted(*count))).collect()
+    }
+
+    #[test]
+    fn a_narrow_counter_wraps_without_a_trace() {
+        let mut tracker = CountTracker::new(Counting::Absolute, Width::Bits8, FASTEST);
+        let totals = take_all(&mut tracker, &[250, 6, 20, 250, 6]);
+        assert_eq!(totals, [250, 262, 276, 250, 262].map(Some));
+        let mut tracker = CountTracker::new(Counting::Absolute, Width::Bits16, FASTEST);
+        assert_eq!(take_all(&mut tracker, &[65_530, 4, 65_530]), [65_530, 65_540, 65_530].map(Some));
+        assert_eq!(tracker.health(), TrackerHealth::default());
+    }
+
+    #[test]
+    fn a_garbled_report_is_rejected_and_leaves_no_trace_in_the_length() {
+        let mut tracker = CountTracker::new(Counting::Absolute, Width::Bits32, FASTEST);
+        let totals = take_all(&mut tracker, &[120_000, 0, 120_010, -9_000_000, 120_020]);
+        assert_eq!(totals, [Some(120_000), None, Some(120_010), None, Some(120_020)]);
+        assert_eq!(tracker.health(), TrackerHealth { rejected: 2, ..TrackerHealth::default() });
+    }
+
+    #[test]
+    fn a_device_plugged_in_again_goes_on_from_the_length_held() {
+        let mut tracker = CountTracker::new(Counting::Absolute, Width::Bits32, FASTEST);
+        let totals = take_all(&mut tracker, &[120_000, 0, 2, 4, 6, 8, 10]);
+        assert_eq!(totals, [Some(120_000), None, None, None, None, Some(120_008), Some(120_010)]);
+        let health = TrackerHealth { rejected: 4, lost: 0, re_zero_needed: true };
+        assert_eq!(tracker.health(), health);
+    }
+
+    #[test]
+    fn a_device_away_for_long_is_not_taken_for_a_journey_back() {
+        let mut tracker = CountTracker::new(Counting::Absolute, Width::Bits32, FASTEST);
+        tracker.take(at_ms(0), &counted(120_000));
+        let totals = (0..5).map(|i| tracker.take(at_ms(60_000 + 20 * i), &counted(300 + i as i64)));
+        assert_eq!(totals.last(), Some(Some(120_304)));
+        assert!(tracker.health().re_zero_needed);
+    }
+
+    #[test]
+    fn a_slow_device_plugged_in_again_is_not_taken_for_a_journey_back() {
+        let mut tracker = CountTracker::new(Counting::Absolute, Width::Bits32, FASTEST);
+        let counts = [20_000, 0, 100, 200, 300, 400];
+        let totals = counts.iter().zip(0..).map(|(count, s)| tracker.take(at_ms(1000 * s), &counted(*count)));
+        assert_eq!(totals.last(), Some(Some(20_400)));
+    }
+
+    #[test]
+    fn a_jump_that_stays_is_believed() {
+        let mut tracker = CountTracker::new(Counting::Absolute, Width::Bits32, FASTEST);
+        let totals = take_all(&mut tracker, &[120_000, 90_000, 90_001, 90_002, 90_003, 90_004]);
+        assert_eq!(totals, [Some(120_000), None, None, None, None, Some(90_004)]);
+        assert!(tracker.health().re_zero_needed);
+    }
+
+    #[test]
+    fn reports_that_arrive_together_are_not_too_fast() {
+        let mut tracker = CountTracker::new(Counting::Absolute, Width::Bits32, FASTEST);
+        for report in 0..50 {
+            let total = tracker.take(at_ms(1000), &counted(report * 120));
+            assert_eq!(total, Some(report * 120));
+        }
+    }
+
+    #[test]
+    fn a_silence_in_which_the_counter_may_have_gone_round_marks_the_length() {
+        let mut tracker = CountTracker::new(Counting::Absolute, Width::Bits16, FASTEST);
+        tracker.take(at_ms(0), &counted(0));
+        assert_eq!(tracker.take(at_ms(5000), &counted(100)), Some(100));
+        assert!(!tracker.health().re_zero_needed);
+        assert_eq!(tracker.take(at_ms(11_000), &counted(200)), Some(200));
+        assert!(tracker.health().re_zero_needed);
+    }
+
+    #[test]
+    fn changes_are_added_up_once_each_and_lost_ones_are_told() {
+        let mut tracker = CountTracker::new(Counting::Delta, Width::Bits8, FASTEST);
+        let mut take = |ms, sequence, count| {
+            let report = Report { sequence: Some(sequence), ..counted(count) };
+            (tracker.take(at_ms(ms), &report), tracker.health())
+        };
+        let good = TrackerHealth::default();
+        assert_eq!(take(0, 254, 5), (Some(5), good));
+        assert_eq!(take(20, 255, -7), (Some(-2), good));
+        assert_eq!(take(20, 255, -7), (None, good));
+        assert_eq!(take(40, 0, 2), (Some(0), good));
+        let marked = TrackerHealth { rejected: 0, lost: 2, re_zero_needed: true };
+        assert_eq!(take(100, 3, 1), (Some(1), marked));
+    }
+
+    #[test]
+    fn a_change_faster_than_the_winch_is_left_out_and_told() {
+        let mut tracker = CountTracker::new(Counting::Delta, Width::Bits32, FASTEST);
+        let totals = take_all(&mut tracker, &[5, 5, 800_000, 5]);
+        assert_eq!(totals, [Some(5), Some(10), None, Some(15)]);
+        assert_eq!(tracker.health(), TrackerHealth { rejected: 1, lost: 0, re_zero_needed: true });
+    }
+}

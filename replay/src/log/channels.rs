@@ -1,0 +1,180 @@
+//! The channels of a log and the sources behind them.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::SourceInfo;
+use super::format::{
+    CONNECT_KEY, PLUGIN_KEY, RAW_PREFIX, RESULT_PREFIX, SENT_PREFIX, SOURCE_KEY, TICK_TOPIC,
+};
+use super::framing::Definition;
+
+/// Rank of the first channel that isn't raw; sources are counted by a u16.
+const OTHER_RANK: u32 = 1 << 16;
+
+/// What a channel carries.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kind {
+    Raw(u16),
+    Sent(u16),
+    Tick,
+    Result,
+    Other,
+}
+
+/// A known channel.
+#[derive(Debug, Clone)]
+pub(super) struct Channel {
+    pub(super) definition: Definition,
+    pub(super) kind: Kind,
+    /// Place among messages of the same time: raw by source, then the others by topic.
+    pub(super) rank: u32,
+}
+
+/// All channels that are known.
+#[derive(Debug, Default)]
+pub(super) struct Channels {
+    by_id: BTreeMap<u16, Channel>,
+    sources: Vec<SourceInfo>,
+    others: u32,
+}
+
+impl Channels {
+    /// Numbers the sources: by their channels' metadata where these number all of them from 0 on, and by name where
+    /// not.
+    pub(super) fn new(definitions: BTreeMap<u16, Definition>) -> Self {
+        let mut definitions: Vec<Definition> = definitions.into_values().collect();
+        let numbers: BTreeMap<&str, Option<u16>> =
+            definitions.iter().filter_map(|d| source_id(&d.topic).map(|id| (id, stated_number(d)))).collect();
+        let distinct: BTreeSet<u16> = numbers.values().filter_map(|number| *number).collect();
+        let stated = distinct.iter().copied().map(usize::from).eq(0..numbers.len());
+        definitions.sort_by_cached_key(|d| (stated.then(|| stated_number(d)), d.topic.clone(), d.id));
+        let mut channels = Self::default();
+        // Raw first: a source that only something was sent to comes after those that spoke.
+        let (raw, others): (Vec<_>, Vec<_>) =
+            definitions.into_iter().partition(|d| stated || d.topic.starts_with(RAW_PREFIX));
+        for definition in raw.into_iter().chain(others) {
+            channels.admit(definition);
+        }
+        channels
+    }
+
+    /// Adds a channel. A source that isn't known yet gets the next number. `false` when it contradicts a known one.
+    pub(super) fn admit(&mut self, definition: Definition) -> bool {
+        if let Some(known) = self.by_id.get(&definition.id) {
+            return known.definition == definition;
+        }
+        let kind = match definition.topic.as_str() {
+            TICK_TOPIC => Kind::Tick,
+            topic if topic.starts_with(RESULT_PREFIX) => Kind::Result,
+            topic => match source_id(topic).map(str::to_owned) {
+                Some(id) if topic.starts_with(RAW_PREFIX) => Kind::Raw(self.source(id, &definition.metadata)),
+                Some(id) => Kind::Sent(self.source(id, &definition.metadata)),
+                None => Kind::Other,
+            },
+        };
+        let rank = if let Kind::Raw(source) = kind {
+            source.into()
+        } else {
+            self.others += 1;
+            OTHER_RANK + self.others
+        };
+        self.by_id.insert(definition.id, Channel { definition, kind, rank });
+        true
+    }
+
+    pub(super) fn get(&self, id: u16) -> Option<&Channel> {
+        self.by_id.get(&id)
+    }
+
+    pub(super) fn sources(&self) -> &[SourceInfo] {
+        &self.sources
+    }
+
+    pub(super) fn has_ticks(&self) -> bool {
+        self.by_id.values().any(|channel| channel.kind == Kind::Tick)
+    }
+
+    fn source(&mut self, id: String, metadata: &BTreeMap<String, String>) -> u16 {
+        let known = self.sources.iter().position(|source| source.id == id);
+        let number = known.unwrap_or_else(|| {
+            let text = |key| metadata.get(key).cloned().unwrap_or_default();
+            self.sources.push(SourceInfo { id, plugin: text(PLUGIN_KEY), connect: text(CONNECT_KEY) });
+            self.sources.len() - 1
+        });
+        // A file has at most 65536 channels, since a u16 counts them.
+        u16::try_from(number).unwrap_or(u16::MAX)
+    }
+}
+
+fn source_id(topic: &str) -> Option<&str> {
+    topic.strip_prefix(RAW_PREFIX).or_else(|| topic.strip_prefix(SENT_PREFIX))
+}
+
+fn stated_number(definition: &Definition) -> Option<u16> {
+    definition.metadata.get(SOURCE_KEY)?.parse().ok()
+}
+
+/// The channels in the metadata record that repeats them.
+pub(super) fn listed(entries: &BTreeMap<String, String>) -> Vec<Definition> {
+    let mut definitions: BTreeMap<u16, Definition> = BTreeMap::new();
+    for (key, value) in entries {
+        let Some((id, key)) = key.split_once('/') else { continue };
+        let Ok(id) = id.parse() else { continue };
+        let definition = definitions.entry(id).or_insert_with(|| Definition {
+            id,
+            topic: String::new(),
+            metadata: BTreeMap::new(),
+        });
+        if key == "topic" {
+            definition.topic.clone_from(value);
+        } else {
+            definition.metadata.insert(key.to_owned(), value.clone());
+        }
+    }
+    definitions.into_values().filter(|definition| !definition.topic.is_empty()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn channels(topics: &[(&str, Option<&str>)]) -> Channels {
+        let definition = |(id, (topic, source)): (u16, &(&str, Option<&str>))| {
+            let metadata =
+                source.map(|source| (SOURCE_KEY.to_owned(), source.to_owned())).into_iter().collect();
+            (id, Definition { id, topic: (*topic).to_owned(), metadata })
+        };
+        Channels::new((0..).zip(topics).map(definition).collect())
+    }
+
+    fn ids(channels: &Channels) -> Vec<&str> {
+        channels.sources().iter().map(|source| source.id.as_str()).collect()
+    }
+
+    #[test]
+    fn sources_are_numbered_by_name() {
+        let channels = channels(&[("/sent/a", None), ("/raw/z", None), ("/raw/b", None), ("/imu", None)]);
+        assert_eq!(ids(&channels), ["b", "z", "a"]);
+        assert_eq!(channels.get(1).unwrap().kind, Kind::Raw(1));
+        assert_eq!(channels.get(0).unwrap().kind, Kind::Sent(2));
+        assert!(channels.get(0).unwrap().rank > channels.get(1).unwrap().rank);
+        assert_eq!(channels.get(3).unwrap().kind, Kind::Other);
+    }
+
+    #[test]
+    fn sources_are_numbered_by_metadata_that_numbers_all() {
+        let stated =
+            [("/raw/a", Some("1")), ("/raw/b", Some("0")), ("/sent/a", Some("1")), ("/loop/tick", None)];
+        assert_eq!(ids(&channels(&stated)), ["b", "a"]);
+        assert_eq!(ids(&channels(&[("/raw/a", Some("1")), ("/raw/b", Some("2"))])), ["a", "b"]);
+        assert_eq!(ids(&channels(&[("/raw/a", Some("b")), ("/raw/b", Some("0"))])), ["a", "b"]);
+    }
+
+    #[test]
+    fn a_second_definition_must_agree() {
+        let mut channels = channels(&[("/raw/a", None)]);
+        let same = channels.get(0).unwrap().definition.clone();
+        assert!(channels.admit(same.clone()));
+        assert!(!channels.admit(Definition { topic: "/raw/b".to_owned(), ..same }));
+    }
+}

@@ -1,0 +1,121 @@
+//! Unpacking chunks, and the checksums over larger parts of a file, by the `mcap` crate's own reader.
+
+use std::io::{Read, Seek};
+
+use mcap::records::op;
+use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
+use mcap::{McapError, McapResult};
+
+use super::framing::{ChunkPlace, LogFile, MAX_RECORD_BYTES};
+use super::{LogError, LossKind};
+
+/// The most that a chunk may hold when unpacked.
+pub(super) const MAX_CHUNK_BYTES: u64 = MAX_RECORD_BYTES;
+/// The most that is read at once.
+const READ_BYTES: usize = 1 << 20;
+
+/// How unpacking a chunk went.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) enum Unpacked {
+    /// All of it is good.
+    Whole,
+    /// The file ends within it; what came until then has no checksum, but nothing speaks against it.
+    Cut,
+    /// It is damaged; nothing that came can be trusted.
+    Bad(LossKind),
+}
+
+/// Calls `sink` with opcode and body of each record in a chunk.
+///
+/// Errors: only those of the medium.
+pub(super) fn unpack<R: Read + Seek>(
+    file: &mut LogFile<R>,
+    place: &ChunkPlace,
+    mut sink: impl FnMut(u8, &[u8]),
+) -> Result<Unpacked, LogError> {
+    let mut reader = reader(|options| options.with_skip_start_magic(true).with_validate_chunk_crcs(true));
+    // The head is made anew: in a chunk that the file's end cuts its lengths and checksum are for what isn't there.
+    let head = chunk_head(place);
+    reader.insert(head.len()).copy_from_slice(&head);
+    reader.notify_read(head.len());
+    let (mut total, mut too_large) = (0_u64, false);
+    let mut counted = |opcode, body: &[u8]| {
+        total = total.saturating_add(body.len() as u64);
+        too_large = total > MAX_CHUNK_BYTES;
+        if !too_large {
+            sink(opcode, body);
+        }
+        !too_large
+    };
+    let result = drive(file, place.data..place.data.saturating_add(place.data_len), reader, &mut counted)?;
+    Ok(match result {
+        _ if too_large => Unpacked::Bad(LossKind::TooLarge { limit: MAX_CHUNK_BYTES }),
+        Err(McapError::UnsupportedCompression(name)) => Unpacked::Bad(LossKind::Compression(name)),
+        _ if place.cut => Unpacked::Cut,
+        Ok(()) => Unpacked::Whole,
+        Err(McapError::BadChunkCrc { .. }) => Unpacked::Bad(LossKind::Checksum),
+        Err(_) => Unpacked::Bad(LossKind::Contents),
+    })
+}
+
+/// Whether the checksum over everything before the data end record fits; also when there is none, or something is too
+/// large to look at.
+pub(super) fn data_section_holds<R: Read + Seek>(file: &mut LogFile<R>) -> Result<bool, LogError> {
+    let reader = reader(|options| options.with_emit_chunks(true).with_validate_data_section_crc(true));
+    let result = drive(file, 0..u64::MAX, reader, &mut |opcode, _| opcode != op::DATA_END)?;
+    Ok(!matches!(result, Err(McapError::BadDataCrc { .. })))
+}
+
+/// Whether the summary, which begins with the data end record at `data_end`, reads and its checksum, if any, fits.
+pub(super) fn summary_holds<R: Read + Seek>(file: &mut LogFile<R>, data_end: u64) -> Result<bool, LogError> {
+    let reader =
+        reader(|options| options.with_skip_start_magic(true).with_validate_summary_section_crc(true));
+    Ok(drive(file, data_end..u64::MAX, reader, &mut |opcode, _| opcode != op::FOOTER)?.is_ok())
+}
+
+/// A reader that allocates no more than a record's largest length, whatever a file says.
+fn reader(set: impl FnOnce(LinearReaderOptions) -> LinearReaderOptions) -> LinearReader {
+    let limit = usize::try_from(MAX_RECORD_BYTES).unwrap_or(usize::MAX);
+    let options = LinearReaderOptions::default().with_skip_end_magic(true).with_record_length_limit(limit);
+    LinearReader::new_with_options(set(options))
+}
+
+/// Feeds a part of the file to a reader until that ends, the reader fails, or `sink` says that it is enough.
+fn drive<R: Read + Seek>(
+    file: &mut LogFile<R>,
+    part: core::ops::Range<u64>,
+    mut reader: LinearReader,
+    sink: &mut dyn FnMut(u8, &[u8]) -> bool,
+) -> Result<McapResult<()>, LogError> {
+    let mut at = part.start;
+    while let Some(event) = reader.next_event() {
+        match event {
+            Ok(LinearReadEvent::ReadRequest(wanted)) => {
+                let left = usize::try_from(part.end.saturating_sub(at)).unwrap_or(usize::MAX);
+                let got = file.read_at(at, reader.insert(wanted.min(left).min(READ_BYTES)))?;
+                reader.notify_read(got);
+                at += got as u64;
+            }
+            Ok(LinearReadEvent::Record { opcode, data }) if sink(opcode, data) => {}
+            Ok(LinearReadEvent::Record { .. }) => return Ok(Ok(())),
+            Err(error) => return Ok(Err(error)),
+        }
+    }
+    Ok(Ok(()))
+}
+
+/// A chunk's record up to its data.
+///
+/// Source: MCAP format specification, "Chunk (op=0x06)".
+fn chunk_head(place: &ChunkPlace) -> Vec<u8> {
+    let mut fields = Vec::new();
+    fields.extend(place.times.0.to_le_bytes());
+    fields.extend(place.times.1.to_le_bytes());
+    fields.extend(place.unpacked_len.to_le_bytes());
+    fields.extend(if place.cut { 0 } else { place.crc }.to_le_bytes());
+    fields.extend(u32::try_from(place.compression.len()).unwrap_or(u32::MAX).to_le_bytes());
+    fields.extend(place.compression.as_bytes());
+    fields.extend(place.data_len.to_le_bytes());
+    let len = place.data_len.saturating_add(fields.len() as u64);
+    [&[op::CHUNK], len.to_le_bytes().as_slice(), &fields].concat()
+}

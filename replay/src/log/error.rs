@@ -1,0 +1,117 @@
+//! What can go wrong with a log as a whole. Damage within one is a [`super::Loss`].
+
+use std::io;
+use std::path::PathBuf;
+
+/// A log that could not be written, or not be read at all.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum LogError {
+    /// The file could not be made.
+    #[error("could not create {}: {source}", path.display())]
+    Create {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// The file could not be opened.
+    #[error("could not open {}: {source}", path.display())]
+    Open {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// The medium failed while it was read.
+    #[error("could not read {name} at byte {offset}: {source}")]
+    Read {
+        /// The log, as the caller named it.
+        name: String,
+        /// Where.
+        offset: u64,
+        /// Why.
+        source: io::Error,
+    },
+    /// The medium failed while it was written to: full, gone, read-only.
+    #[error("could not write {what} to the log: {source}")]
+    Write {
+        /// What was being written.
+        what: &'static str,
+        /// Why.
+        source: io::Error,
+    },
+    /// Something that MCAP has no room for.
+    #[error("could not write {what} to the log: {source}")]
+    Encode {
+        /// What was being written.
+        what: &'static str,
+        /// Why.
+        source: mcap::McapError,
+    },
+    /// Not an MCAP file.
+    #[error("{name} is not an MCAP file: it begins with [{found}], and [{wanted}] is wanted")]
+    NotMcap {
+        /// The log, as the caller named it.
+        name: String,
+        /// Its first bytes, in hex.
+        found: String,
+        /// MCAP's first bytes, in hex.
+        wanted: String,
+    },
+    /// A log of a later version of this program.
+    #[error("{name} is a log of format {found}; this program reads formats up to {known}")]
+    TooNew {
+        /// The log, as the caller named it.
+        name: String,
+        /// The format that it says it has.
+        found: String,
+        /// The latest that is known here.
+        known: u32,
+    },
+    /// A topic of a result outside the place for results.
+    #[error("topic {topic:?} of a result must begin with {:?}", super::format::RESULT_PREFIX)]
+    Topic {
+        /// The topic.
+        topic: String,
+    },
+    /// A message for a channel that the header did not announce.
+    #[error("a message for {channel}, which the log's header does not announce")]
+    NoChannel {
+        /// The channel, by kind and index.
+        channel: String,
+    },
+    /// More packets in one tick than a message can count.
+    #[error("a tick of {packets} packets; a message holds up to {}", u32::MAX)]
+    TickTooLong {
+        /// Packets in the tick.
+        packets: usize,
+    },
+    /// The recorder's thread could not be started.
+    #[error("could not start the recorder's thread: {source}")]
+    Thread {
+        /// Why.
+        source: io::Error,
+    },
+    /// The recorder stopped writing before its end; what was written until then reads.
+    #[error("{source}; {discarded} messages after that were not recorded")]
+    Stopped {
+        /// Messages that were taken from the queue and discarded.
+        discarded: u64,
+        /// What stopped it.
+        source: Box<LogError>,
+    },
+    /// A bug in the recorder.
+    #[error("the recorder's thread panicked")]
+    Panicked,
+}
+
+impl LogError {
+    /// An error of the MCAP writer, with the system's own error in the message where there is one.
+    pub(super) fn writing(what: &'static str) -> impl Fn(mcap::McapError) -> Self {
+        move |error| match error {
+            mcap::McapError::Io(source) => Self::Write { what, source },
+            source => Self::Encode { what, source },
+        }
+    }
+}

@@ -1,0 +1,202 @@
+//! Names and layouts of the dive log: what a reader has to know.
+//!
+//! | channel | message | log time | publish time |
+//! |---|---|---|---|
+//! | `/raw/<source id>` | bytes as received: one device frame, datagram, CAN frame, HID report or I2C transaction | receive time | time of validity, where the device gives one, else the receive time |
+//! | `/sent/<source id>` | bytes sent to the device | when | when |
+//! | `/loop/tick` | one tick of the loop, see [`Tick`] | the tick's moment | the same |
+//! | `/result/...` | what the loop made of it, for people's viewers | as the result says | the same |
+//!
+//! Times are nanoseconds of the host's monotonic clock. Every channel counts its messages from 0 (`sequence`).
+//! Channels of bytes have the message encoding `application/octet-stream` and no schema; their metadata has `plugin`,
+//! `connect` and `source`, the source's number in `/loop/tick`.
+
+use std::collections::BTreeMap;
+
+use headrace_core::time::MonoNs;
+use sha2::{Digest, Sha256};
+
+/// Version of what this module describes.
+pub const FORMAT_VERSION: u32 = 1;
+/// Before a source's id: bytes received.
+pub const RAW_PREFIX: &str = "/raw/";
+/// Before a source's id: bytes sent.
+pub const SENT_PREFIX: &str = "/sent/";
+/// Before the topics of results.
+pub const RESULT_PREFIX: &str = "/result/";
+/// The channel of ticks.
+pub const TICK_TOPIC: &str = "/loop/tick";
+/// Message encoding of raw, sent and tick.
+pub const BYTES_ENCODING: &str = "application/octet-stream";
+/// Name of the metadata record with what the recorder knew: versions, digests, clock anchors.
+pub const METADATA: &str = "headrace";
+/// Name of the metadata record that repeats the channels: `<number>/topic`, `<number>/<key of its metadata>`.
+pub const CHANNEL_LIST: &str = "headrace.channels";
+/// Key in [`METADATA`] with [`FORMAT_VERSION`].
+pub const FORMAT_KEY: &str = "format";
+/// Key, in the metadata records that we write, with the digest of name and other entries (MCAP has none there).
+pub const DIGEST_KEY: &str = "sha256";
+/// Name of the attachment with the vehicle file.
+pub const VEHICLE_FILE: &str = "vehicle.toml";
+/// Key of a channel's metadata: kind of device.
+pub const PLUGIN_KEY: &str = "plugin";
+/// Key of a channel's metadata: where the device was connected.
+pub const CONNECT_KEY: &str = "connect";
+/// Key of a channel's metadata: the source's number, as `/loop/tick` has it.
+pub const SOURCE_KEY: &str = "source";
+
+/// Bytes of a tick's message before the order.
+pub const TICK_HEAD_BYTES: usize = 20;
+
+/// One tick of the loop, as the message of `/loop/tick` has it.
+///
+/// Layout, little-endian: u64 index of the tick, u64 its moment in ns, u32 count, then count u16: the numbers of the
+/// sources whose packets the tick consumed, one entry per packet, in the order of consumption. A source's packets are
+/// consumed in the order of their sequence numbers, so that this names each packet.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Tick<'a> {
+    /// Number of the tick, from 0.
+    pub index: u64,
+    /// The tick's moment.
+    pub now: MonoNs,
+    order: &'a [u8],
+}
+
+/// A message of `/loop/tick` that isn't one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "a tick of {packets} packets takes {TICK_HEAD_BYTES} + 2 * {packets} bytes, and the message has {len}"
+)]
+pub struct TickError {
+    /// Packets that the message announces; 0 where it is too short to say.
+    pub packets: u32,
+    /// Its length in bytes.
+    pub len: usize,
+}
+
+impl<'a> Tick<'a> {
+    /// Reads a message.
+    ///
+    /// Errors: the length isn't what the count asks for. Allocates: never.
+    pub fn decode(message: &'a [u8]) -> Result<Self, TickError> {
+        let fields = || {
+            let mut fields = super::fields::Fields::new(message);
+            Some((fields.u64()?, fields.u64()?, fields.u32()?, fields.rest()))
+        };
+        let (index, now, packets, order) = fields().ok_or(TickError { packets: 0, len: message.len() })?;
+        if order.len() as u64 != 2 * u64::from(packets) {
+            return Err(TickError { packets, len: message.len() });
+        }
+        Ok(Self { index, now: MonoNs(now), order })
+    }
+
+    /// Numbers of the sources in the order in which their packets were consumed.
+    pub fn order(&self) -> impl ExactSizeIterator<Item = u16> + 'a {
+        self.order.as_chunks::<2>().0.iter().map(|pair| u16::from_le_bytes(*pair))
+    }
+}
+
+/// The part of a tick's message before the order. Allocates: never.
+pub(super) fn tick_head(index: u64, now: MonoNs, packets: u32) -> [u8; TICK_HEAD_BYTES] {
+    let mut head = [0; TICK_HEAD_BYTES];
+    let values = index.to_le_bytes().into_iter().chain(now.0.to_le_bytes()).chain(packets.to_le_bytes());
+    head.iter_mut().zip(values).for_each(|(byte, value)| *byte = value);
+    head
+}
+
+/// Bytes of `order` as the message has them.
+pub(super) fn order_bytes(order: &[u16]) -> impl Iterator<Item = u8> {
+    order.iter().flat_map(|source| source.to_le_bytes())
+}
+
+/// Adds the digest of name and other entries to a metadata record.
+pub(super) fn seal(name: &str, mut metadata: BTreeMap<String, String>) -> BTreeMap<String, String> {
+    metadata.remove(DIGEST_KEY);
+    metadata.insert(DIGEST_KEY.to_owned(), digest_of(name, &metadata));
+    metadata
+}
+
+/// Takes the digest out of a metadata record; `false` when it doesn't fit. Records of other writers need none.
+pub(super) fn unseal(name: &str, metadata: &mut BTreeMap<String, String>) -> bool {
+    match metadata.remove(DIGEST_KEY) {
+        Some(digest) => digest == digest_of(name, metadata),
+        None => name != METADATA && name != CHANNEL_LIST,
+    }
+}
+
+fn digest_of(name: &str, metadata: &BTreeMap<String, String>) -> String {
+    let mut hasher = Sha256::new();
+    let entries = metadata.iter().flat_map(|(key, value)| [key.as_str(), value]);
+    for text in [name].into_iter().chain(entries) {
+        hasher.update((text.len() as u64).to_le_bytes());
+        hasher.update(text);
+    }
+    hex(&hasher.finalize())
+}
+
+/// Bytes as lower-case hex without spaces.
+pub(super) fn hex(bytes: &[u8]) -> String {
+    let digits = |byte: &u8| [byte >> 4, byte & 0xF].map(|digit| char::from_digit(digit.into(), 16));
+    bytes.iter().flat_map(digits).flatten().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn encode(index: u64, now: u64, order: &[u16]) -> Vec<u8> {
+        let mut bytes = tick_head(index, MonoNs(now), u32::try_from(order.len()).unwrap()).to_vec();
+        bytes.extend(order_bytes(order));
+        bytes
+    }
+
+    #[test]
+    fn a_tick_has_the_documented_layout() {
+        let bytes = [1, 0, 0, 0, 0, 0, 0, 0, 2, 1, 0, 0, 0, 0, 0, 0, 3, 0, 0, 0, 5, 0, 0, 1, 5, 0];
+        assert_eq!(encode(1, 258, &[5, 256, 5]), bytes);
+        let tick = Tick::decode(&bytes).unwrap();
+        assert_eq!((tick.index, tick.now), (1, MonoNs(258)));
+        assert_eq!(tick.order().collect::<Vec<_>>(), [5, 256, 5]);
+    }
+
+    #[test]
+    fn a_count_that_lies_is_an_error() {
+        let mut bytes = encode(0, 0, &[1, 2]);
+        bytes[16..20].copy_from_slice(&u32::MAX.to_le_bytes());
+        assert_eq!(Tick::decode(&bytes), Err(TickError { packets: u32::MAX, len: 24 }));
+        assert_eq!(Tick::decode(&bytes[..19]), Err(TickError { packets: 0, len: 19 }));
+        assert!(Tick::decode(&encode(0, 0, &[7])[..21]).is_err());
+    }
+
+    #[test]
+    fn a_changed_metadata_record_is_noticed() {
+        let plain = BTreeMap::from([("a".to_owned(), "b".to_owned()), ("c".to_owned(), String::new())]);
+        let mut sealed = seal("m", plain.clone());
+        assert!(!unseal("n", &mut sealed.clone()));
+        assert!(unseal("m", &mut sealed));
+        assert_eq!(sealed, plain);
+        let mut changed = seal("m", plain.clone());
+        changed.insert("a".to_owned(), "B".to_owned());
+        assert!(!unseal("m", &mut changed));
+        assert!(unseal("m", &mut plain.clone()), "other writers' records have no digest");
+        assert!(!unseal(METADATA, &mut plain.clone()));
+    }
+
+    proptest! {
+        #[test]
+        fn what_was_encoded_is_decoded(index: u64, now: u64, order: Vec<u16>) {
+            let bytes = encode(index, now, &order);
+            let tick = Tick::decode(&bytes).unwrap();
+            prop_assert_eq!((tick.index, tick.now), (index, MonoNs(now)));
+            prop_assert_eq!(tick.order().collect::<Vec<_>>(), order);
+        }
+
+        #[test]
+        fn any_bytes_decode_or_fail(bytes: Vec<u8>) {
+            if let Ok(tick) = Tick::decode(&bytes) {
+                prop_assert_eq!(TICK_HEAD_BYTES + 2 * tick.order().len(), bytes.len());
+            }
+        }
+    }
+}

@@ -1,0 +1,414 @@
+//! Where records begin and end in a file that may be damaged.
+//!
+//! A record is an opcode, a u64 length and that many bytes; nothing marks its beginning, so a length that lies takes
+//! everything after it along. Three things find it out: most kinds of records say their length twice (theirs and that
+//! of the fields within), a length must leave room for the next record, and what follows must be a record too. After
+//! damage the next place is looked for, byte by byte, where records follow each other again.
+//!
+//! Source: MCAP format specification, "Records".
+
+use std::collections::BTreeMap;
+use std::io::{BufReader, Read, Seek};
+
+use mcap::records::op;
+
+use super::LogError;
+use super::fields::{Fields, MessageHead};
+
+/// The longest record that is read as a whole. A length above it is a lie; chunks and attachments aside.
+pub(super) const MAX_RECORD_BYTES: u64 = 256 << 20;
+/// Opcode and length.
+const RECORD_HEAD_BYTES: usize = 9;
+/// How much of a record is looked at to find out whether it is one: fields of fixed length, and names.
+const GLANCE_BYTES: usize = 1024;
+/// Bytes of a chunk's record before its data, without the name of the compression.
+const CHUNK_HEAD_BYTES: u64 = 40;
+/// Records that must follow each other for a place to count as found again.
+const CHAIN: usize = 3;
+/// Bytes that the search for that place reads at once.
+const SEARCH_BYTES: usize = 64 * 1024;
+
+/// A log's bytes, by their place.
+pub(super) struct LogFile<R> {
+    input: BufReader<R>,
+    at: u64,
+    len: u64,
+    name: String,
+}
+
+impl<R: Read + Seek> LogFile<R> {
+    pub(super) fn new(mut input: R, name: String) -> Result<Self, LogError> {
+        let len = input.seek(std::io::SeekFrom::End(0)).and_then(|len| input.rewind().map(|()| len));
+        let len = len.map_err(|source| LogError::Read { name: name.clone(), offset: 0, source })?;
+        Ok(Self { input: BufReader::new(input), at: 0, len, name })
+    }
+
+    pub(super) fn len(&self) -> u64 {
+        self.len
+    }
+
+    pub(super) fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Reads from `at` until `into` is full or the file ends; gives the number of bytes.
+    pub(super) fn read_at(&mut self, at: u64, into: &mut [u8]) -> Result<usize, LogError> {
+        let mut done = 0;
+        let mut read = || {
+            let distance = i128::from(at) - i128::from(self.at);
+            self.input.seek_relative(i64::try_from(distance).map_err(std::io::Error::other)?)?;
+            self.at = at;
+            while let Some(rest) = into.get_mut(done..).filter(|rest| !rest.is_empty()) {
+                match self.input.read(rest) {
+                    Ok(0) => break,
+                    Ok(more) => (done, self.at) = (done + more, self.at + more as u64),
+                    Err(error) if error.kind() == std::io::ErrorKind::Interrupted => {}
+                    Err(error) => return Err(error),
+                }
+            }
+            Ok(())
+        };
+        read().map_err(|source| LogError::Read { name: self.name.clone(), offset: at, source })?;
+        Ok(done)
+    }
+
+    /// The `len` bytes at `at`, or those that there are. `len` must have been bounded.
+    pub(super) fn bytes_at(&mut self, at: u64, len: u64) -> Result<Vec<u8>, LogError> {
+        let len = len.min(self.len.saturating_sub(at));
+        let mut bytes = vec![0; usize::try_from(len).unwrap_or(0)];
+        let done = self.read_at(at, &mut bytes)?;
+        bytes.truncate(done);
+        Ok(bytes)
+    }
+}
+
+/// A channel's definition.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Definition {
+    pub(super) id: u16,
+    pub(super) topic: String,
+    pub(super) metadata: BTreeMap<String, String>,
+}
+
+impl Definition {
+    pub(super) fn read(fields: &mut Fields<'_>) -> Option<Self> {
+        let (id, _schema) = (fields.u16()?, fields.u16()?);
+        let (topic, _encoding) = (fields.text()?, fields.text()?);
+        Some(Self { id, topic: topic.to_owned(), metadata: fields.map()? })
+    }
+}
+
+/// A chunk: where its data is and what its head says.
+#[derive(Debug, Clone)]
+pub(super) struct ChunkPlace {
+    pub(super) data: u64,
+    pub(super) data_len: u64,
+    pub(super) unpacked_len: u64,
+    pub(super) crc: u32,
+    pub(super) compression: String,
+    /// Log times of its messages, from and to; both 0 where there are none.
+    pub(super) times: (u64, u64),
+    /// Whether the file ends within it.
+    pub(super) cut: bool,
+}
+
+/// An attachment: where its data is and what its head says.
+#[derive(Debug, Clone)]
+pub(super) struct AttachmentPlace {
+    pub(super) name: String,
+    /// Bytes of the record before the data.
+    pub(super) head_len: u64,
+    pub(super) data_len: u64,
+}
+
+/// What a record is, as far as the framing and the index need to know.
+#[derive(Debug, Clone)]
+pub(super) enum Item {
+    Header,
+    Channel,
+    Message { log_time: u64 },
+    Chunk(ChunkPlace),
+    Attachment(AttachmentPlace),
+    Metadata,
+    Statistics { channels: u32 },
+    DataEnd,
+    Footer,
+    Other,
+}
+
+/// A record and its place.
+#[derive(Debug, Clone)]
+pub(super) struct Frame {
+    pub(super) at: u64,
+    pub(super) body: u64,
+    pub(super) end: u64,
+    pub(super) item: Item,
+    /// Whether the lengths of its fields confirm its own.
+    pub(super) confirmed: bool,
+}
+
+/// What is found at a place.
+#[derive(Debug)]
+pub(super) enum Found {
+    /// A record that lies within the file.
+    Record(Frame),
+    /// A record that the file's end cuts, or whose length lies.
+    Cut(Frame),
+    /// The closing magic bytes.
+    Closing,
+    /// The end of the file.
+    End,
+    /// No record.
+    Nothing,
+}
+
+/// What is at `at`.
+pub(super) fn look<R: Read + Seek>(file: &mut LogFile<R>, at: u64) -> Result<Found, LogError> {
+    let mut head = [0; RECORD_HEAD_BYTES];
+    let got = file.read_at(at, &mut head)?;
+    let body = at.saturating_add(RECORD_HEAD_BYTES as u64);
+    let frame = |end, item, confirmed| Frame { at, body, end, item, confirmed };
+    if got == 0 {
+        return Ok(Found::End);
+    }
+    if head.starts_with(mcap::MAGIC) {
+        return Ok(Found::Closing);
+    }
+    if got < head.len() {
+        return Ok(Found::Cut(frame(file.len(), Item::Other, false)));
+    }
+    let (opcode, len) = record_head(head);
+    if !is_possible(opcode, len) {
+        return Ok(Found::Nothing);
+    }
+    let mut glance = [0; GLANCE_BYTES];
+    // A chunk is looked at whatever length it claims, since it has a second one.
+    let wanted = if opcode == op::CHUNK { u64::MAX } else { len };
+    let wanted = usize::try_from(wanted).unwrap_or(usize::MAX).min(GLANCE_BYTES);
+    let got = file.read_at(body, glance.get_mut(..wanted).unwrap_or_default())?;
+    let end = body.saturating_add(len);
+    let glance = glance.get(..got).unwrap_or_default();
+    let parsed = parse(opcode, body, glance);
+    let item = match parsed {
+        Some((Item::Chunk(place), _)) => {
+            return look_at_chunk(file, frame(end, Item::Other, false), place);
+        }
+        // A message's content has no length of its own.
+        Some((item, inner_len)) if inner_len == len && opcode != op::MESSAGE => {
+            return Ok(whole_or_cut(file, frame(end, item, true)));
+        }
+        _ if let Some(item) = disguised(opcode, body, glance, len) => {
+            return Ok(whole_or_cut(file, frame(end, item, true)));
+        }
+        Some((item, inner_len)) if inner_len <= len && !is_reserved(opcode) => item,
+        None if got < wanted => return Ok(Found::Cut(frame(file.len(), Item::Other, false))),
+        None if wanted == GLANCE_BYTES && opcode != op::CHUNK => unread(opcode),
+        _ => return Ok(Found::Nothing),
+    };
+    Ok(whole_or_cut(file, frame(end, item, false)))
+}
+
+/// A record whose opcode is damaged, where its content says what it is.
+fn disguised(opcode: u8, body: u64, glance: &[u8], len: u64) -> Option<Item> {
+    // A message may hold anything; that it looks like a chunk with the right length in both places is no accident.
+    let kinds: &[u8] =
+        if opcode == op::MESSAGE { &[op::CHUNK] } else { &[op::CHUNK, op::ATTACHMENT, op::METADATA] };
+    kinds
+        .iter()
+        .find_map(|kind| parse(*kind, body, glance).filter(|(_, inner_len)| *inner_len == len))
+        .map(|it| it.0)
+}
+
+/// Opcodes that MCAP keeps for its future; it has not used any in years, and damage makes them easily.
+fn is_reserved(opcode: u8) -> bool {
+    (op::DATA_END + 1..0x80).contains(&opcode)
+}
+
+/// What a record is whose names are longer than a glance.
+fn unread(opcode: u8) -> Item {
+    match opcode {
+        op::CHANNEL => Item::Channel,
+        op::METADATA => Item::Metadata,
+        _ => Item::Other,
+    }
+}
+
+fn record_head(head: [u8; RECORD_HEAD_BYTES]) -> (u8, u64) {
+    let [opcode, len @ ..] = head;
+    (opcode, u64::from_le_bytes(len))
+}
+
+/// Whether there may be a record of that kind and length.
+fn is_possible(opcode: u8, len: u64) -> bool {
+    opcode != 0 && (len <= MAX_RECORD_BYTES || matches!(opcode, op::CHUNK | op::ATTACHMENT))
+}
+
+fn whole_or_cut<R: Read + Seek>(file: &LogFile<R>, frame: Frame) -> Found {
+    if frame.end <= file.len() { Found::Record(frame) } else { Found::Cut(frame) }
+}
+
+/// A chunk says its length twice. Where the two differ, that one is right after which there is a record. Where both
+/// are the largest number there is, its writer had not closed it.
+fn look_at_chunk<R: Read + Seek>(
+    file: &mut LogFile<R>,
+    mut frame: Frame,
+    mut place: ChunkPlace,
+) -> Result<Found, LogError> {
+    let end = place.data.saturating_add(place.data_len);
+    let unclosed = place.data_len == u64::MAX;
+    frame.confirmed = end == frame.end && (unclosed || end < u64::MAX);
+    if !frame.confirmed {
+        if record_follows(file, end)? {
+            (frame.end, frame.confirmed) = (end, true);
+        } else if end > frame.end || !record_follows(file, frame.end)? {
+            return Ok(Found::Nothing);
+        }
+    }
+    if frame.end > file.len() {
+        place.cut = true;
+        place.data_len = file.len().saturating_sub(place.data);
+    }
+    frame.item = Item::Chunk(place);
+    Ok(whole_or_cut(file, frame))
+}
+
+/// Whether the head at `at` could be a record's; or the file ends there.
+fn record_follows<R: Read + Seek>(file: &mut LogFile<R>, at: u64) -> Result<bool, LogError> {
+    if at >= file.len() {
+        return Ok(at == file.len());
+    }
+    let mut head = [0; RECORD_HEAD_BYTES];
+    let whole = file.read_at(at, &mut head)? == head.len();
+    let (opcode, len) = record_head(head);
+    Ok(whole && opcode <= op::DATA_END && is_possible(opcode, len) && len <= file.len() - at)
+}
+
+/// Reads what is needed of a record, and the length that its fields say it has at least.
+fn parse(opcode: u8, body: u64, bytes: &[u8]) -> Option<(Item, u64)> {
+    let mut fields = Fields::new(bytes);
+    let item = match opcode {
+        op::HEADER => {
+            let _profile_and_library = (fields.text()?, fields.text()?);
+            Item::Header
+        }
+        op::FOOTER => {
+            fields.take(20)?;
+            Item::Footer
+        }
+        op::SCHEMA => {
+            let _id_name_encoding = (fields.u16()?, fields.text()?, fields.text()?);
+            return with_list(fields, Item::Other);
+        }
+        op::CHANNEL => {
+            let _ids_topic_encoding = (fields.u32()?, fields.text()?, fields.text()?);
+            return with_list(fields, Item::Channel);
+        }
+        op::MESSAGE => Item::Message { log_time: MessageHead::read(&mut fields)?.log_time },
+        op::CHUNK => {
+            let place = chunk_place(&mut fields, body)?;
+            let len = fields.taken().saturating_add(place.data_len);
+            return Some((Item::Chunk(place), len));
+        }
+        op::MESSAGE_INDEX => {
+            let _channel = fields.u16()?;
+            return with_list(fields, Item::Other);
+        }
+        op::ATTACHMENT => {
+            let place = attachment_place(&mut fields)?;
+            let len = place.head_len.checked_add(place.data_len)?.checked_add(4)?;
+            return Some((Item::Attachment(place), len));
+        }
+        op::STATISTICS => {
+            let (_messages, _schemas, channels) = (fields.u64()?, fields.u16()?, fields.u32()?);
+            Item::Statistics { channels }
+        }
+        op::METADATA => {
+            let _name = fields.text()?;
+            return with_list(fields, Item::Metadata);
+        }
+        op::DATA_END => {
+            fields.u32()?;
+            Item::DataEnd
+        }
+        _ => Item::Other,
+    };
+    Some((item, fields.taken()))
+}
+
+/// A record that ends in something with a length before it.
+fn with_list(mut fields: Fields<'_>, item: Item) -> Option<(Item, u64)> {
+    let len = fields.u32()?;
+    Some((item, fields.taken() + u64::from(len)))
+}
+
+fn chunk_place(fields: &mut Fields<'_>, body: u64) -> Option<ChunkPlace> {
+    let times = (fields.u64()?, fields.u64()?);
+    let (unpacked_len, crc, compression) = (fields.u64()?, fields.u32()?, fields.text()?);
+    Some(ChunkPlace {
+        compression: compression.to_owned(),
+        data_len: fields.u64()?,
+        data: body + CHUNK_HEAD_BYTES + compression.len() as u64,
+        unpacked_len,
+        crc,
+        times: (times.0.min(times.1), times.0.max(times.1)),
+        cut: false,
+    })
+}
+
+fn attachment_place(fields: &mut Fields<'_>) -> Option<AttachmentPlace> {
+    let _log_and_create_time = (fields.u64()?, fields.u64()?);
+    let (name, _media_type) = (fields.text()?, fields.text()?);
+    let data_len = fields.u64()?;
+    Some(AttachmentPlace { name: name.to_owned(), head_len: fields.taken(), data_len })
+}
+
+/// The first place within `from..until` from which records follow each other.
+pub(super) fn find_records<R: Read + Seek>(
+    file: &mut LogFile<R>,
+    from: u64,
+    until: u64,
+) -> Result<Option<u64>, LogError> {
+    let mut block = vec![0; SEARCH_BYTES];
+    let mut start = from;
+    while start < until.min(file.len()) {
+        let got = file.read_at(start, &mut block)?;
+        let bytes = block.get(..got).unwrap_or_default();
+        for (at, head) in (start..until).zip(bytes.windows(mcap::MAGIC.len())) {
+            if may_begin(head) && records_follow(file, at)? {
+                return Ok(Some(at));
+            }
+        }
+        // Windows that would cross the block's end are looked at in the next one.
+        let whole_windows = got.saturating_sub(mcap::MAGIC.len() - 1);
+        if whole_windows == 0 {
+            break;
+        }
+        start += whole_windows as u64;
+    }
+    Ok(None)
+}
+
+/// A quick look that sorts out nearly every place: a known opcode and a length below 2^32, or the closing bytes.
+fn may_begin(head: &[u8]) -> bool {
+    match head {
+        [1..=op::DATA_END, _, _, _, _, 0, 0, 0] => true,
+        _ => head == mcap::MAGIC,
+    }
+}
+
+fn records_follow<R: Read + Seek>(file: &mut LogFile<R>, from: u64) -> Result<bool, LogError> {
+    let mut at = from;
+    for _ in 0..CHAIN {
+        match look(file, at)? {
+            Found::Record(Frame { item: Item::Chunk(_), confirmed: true, .. }) => return Ok(true),
+            Found::Record(frame) => at = frame.end,
+            Found::Cut(Frame { item, confirmed, .. }) => {
+                return Ok(matches!(item, Item::Chunk(_)) && confirmed);
+            }
+            Found::Closing => return Ok(at.saturating_add(mcap::MAGIC.len() as u64) == file.len()),
+            Found::End => return Ok(at != from),
+            Found::Nothing => return Ok(false),
+        }
+    }
+    Ok(true)
+}

@@ -1,0 +1,126 @@
+//! What a damaged log has lost, and where.
+
+use core::fmt;
+
+use headrace_core::time::MonoNs;
+
+/// The most losses that are listed one by one; what comes after is added to the last.
+const MAX_LOSSES: usize = 1000;
+
+/// What a piece of a log has in the way of damage.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum LossKind {
+    /// The file ends before its closing records: the recorder was cut off, or the copy.
+    Truncated,
+    /// Bytes that are no records: lengths that lie, or overwritten.
+    Framing,
+    /// A chunk whose content isn't what its checksum says. None of it is delivered.
+    Checksum,
+    /// A chunk that doesn't unpack, or holds something else than records. None of it is delivered.
+    Contents,
+    /// A chunk compressed in a way that isn't known here.
+    Compression(String),
+    /// A chunk or an attachment larger than what is read into memory.
+    TooLarge {
+        /// The largest allowed, bytes.
+        limit: u64,
+    },
+    /// An attachment that fails its checksum.
+    Attachment(String),
+    /// A metadata record that fails its checksum.
+    Metadata(String),
+    /// Messages of a channel whose definition isn't in the log.
+    UnknownChannel {
+        /// The channel's number.
+        channel: u16,
+        /// Messages that could not be delivered.
+        messages: u64,
+    },
+    /// A second definition of a channel that contradicts the first, which was kept.
+    Conflict {
+        /// The channel's number.
+        channel: u16,
+    },
+    /// Every record reads, but the checksum over all of them does not fit: a byte has changed, and nothing says which.
+    DataSection,
+}
+
+/// One piece of a log that is damaged.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Loss {
+    /// What is the matter.
+    pub kind: LossKind,
+    /// Where it begins in the file.
+    pub offset: u64,
+    /// How many bytes of the file it concerns.
+    pub bytes: u64,
+    /// Last receive time before it that is good, where there is one.
+    pub from: Option<MonoNs>,
+    /// First receive time after it, where there is one.
+    pub to: Option<MonoNs>,
+}
+
+impl fmt::Display for LossKind {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Truncated => out.write_str("the file ends before its closing records"),
+            Self::Framing => out.write_str("bytes that are no records"),
+            Self::Checksum => out.write_str("a chunk that fails its checksum"),
+            Self::Contents => out.write_str("a chunk that does not unpack"),
+            Self::Compression(name) => write!(out, "a chunk compressed as {name:?}; zstd and lz4 are known"),
+            Self::TooLarge { limit } => {
+                write!(out, "larger than the {limit} bytes that are read into memory")
+            }
+            Self::Attachment(name) => write!(out, "attachment {name:?} fails its checksum"),
+            Self::Metadata(name) => write!(out, "metadata {name:?} fails its checksum"),
+            Self::UnknownChannel { channel, messages } => {
+                write!(out, "{messages} messages of channel {channel}, which is defined nowhere")
+            }
+            Self::Conflict { channel } => write!(out, "channel {channel} is defined twice, differently"),
+            Self::DataSection => {
+                out.write_str("some byte has changed: the checksum over the whole log does not fit")
+            }
+        }
+    }
+}
+
+impl fmt::Display for Loss {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(out, "byte {}: {} ({} bytes", self.offset, self.kind, self.bytes)?;
+        if let Some(from) = self.from {
+            write!(out, ", after {:.3} s", from.as_secs_f64())?;
+        }
+        if let Some(to) = self.to {
+            write!(out, ", before {:.3} s", to.as_secs_f64())?;
+        }
+        out.write_str(")")
+    }
+}
+
+/// The list of losses, bounded.
+#[derive(Debug, Default)]
+pub(super) struct Losses(Vec<Loss>);
+
+impl Losses {
+    pub(super) fn list(&self) -> &[Loss] {
+        &self.0
+    }
+
+    pub(super) fn list_mut(&mut self) -> &mut [Loss] {
+        &mut self.0
+    }
+
+    pub(super) fn is_full(&self) -> bool {
+        self.0.len() >= MAX_LOSSES
+    }
+
+    pub(super) fn push(&mut self, loss: Loss) {
+        if !self.is_full() {
+            self.0.push(loss);
+        } else if let Some(last) = self.0.last_mut() {
+            last.bytes = last.bytes.saturating_add(loss.bytes);
+            last.to = loss.to;
+        }
+    }
+}

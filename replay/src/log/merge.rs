@@ -1,0 +1,133 @@
+//! Messages of the pieces that are in memory, in order.
+
+use core::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+use super::fields::{Fields, MessageHead};
+
+/// A message in a batch.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Entry {
+    pub(super) head: MessageHead,
+    /// See [`super::channels::Channel::rank`].
+    pub(super) rank: u32,
+    start: usize,
+    end: usize,
+}
+
+/// The messages of one piece.
+#[derive(Debug, Default)]
+pub(super) struct Batch {
+    bytes: Vec<u8>,
+    pub(super) entries: Vec<Entry>,
+    next: usize,
+}
+
+impl Batch {
+    pub(super) fn clear(&mut self) {
+        self.bytes.clear();
+        self.entries.clear();
+        self.next = 0;
+    }
+
+    /// Adds a message's record; `false` when it is none.
+    pub(super) fn push(&mut self, record: &[u8]) -> bool {
+        let mut fields = Fields::new(record);
+        let Some(head) = MessageHead::read(&mut fields) else { return false };
+        let start = self.bytes.len();
+        self.bytes.extend_from_slice(fields.rest());
+        self.entries.push(Entry { head, rank: 0, start, end: self.bytes.len() });
+        true
+    }
+
+    fn memory(&self) -> usize {
+        self.bytes.capacity() + self.entries.capacity() * size_of::<Entry>()
+    }
+}
+
+/// Order of messages: by time, rank and sequence where that is asked for, then as they stand in the file.
+type Key = (u64, u32, u32, usize, usize);
+
+/// The pieces in memory.
+#[derive(Debug)]
+pub(super) struct Merge {
+    by_time: bool,
+    heads: BinaryHeap<Reverse<(Key, usize)>>,
+    batches: Vec<Batch>,
+    /// Batches that are used up and may be filled again.
+    spare: Vec<usize>,
+    memory: usize,
+}
+
+impl Merge {
+    pub(super) fn new(by_time: bool) -> Self {
+        Self { by_time, heads: BinaryHeap::new(), batches: Vec::new(), spare: Vec::new(), memory: 0 }
+    }
+
+    /// Bytes that the pieces take.
+    pub(super) fn memory(&self) -> usize {
+        self.memory
+    }
+
+    /// Log time of the next message.
+    pub(super) fn next_time(&self) -> Option<u64> {
+        self.heads.peek().map(|Reverse(((time, ..), _))| *time)
+    }
+
+    /// An empty batch to fill, with the memory of one that is used up.
+    pub(super) fn empty_batch(&mut self) -> Batch {
+        let spare = self.spare.last().and_then(|slot| self.batches.get_mut(*slot));
+        let mut batch = spare.map(core::mem::take).unwrap_or_default();
+        batch.clear();
+        batch
+    }
+
+    /// Adds the messages of the piece with number `span`.
+    pub(super) fn add(&mut self, span: usize, mut batch: Batch) {
+        if self.by_time {
+            batch.entries.sort_by_key(|entry| (entry.head.log_time, entry.rank, entry.head.sequence));
+        }
+        let slot = self.spare.pop().unwrap_or(self.batches.len());
+        let key = self.key(span, &batch);
+        self.memory += batch.memory();
+        if slot == self.batches.len() {
+            self.batches.push(batch);
+        } else if let Some(place) = self.batches.get_mut(slot) {
+            *place = batch;
+        }
+        match key {
+            Some(key) => self.heads.push(Reverse((key, slot))),
+            None => self.release(slot),
+        }
+    }
+
+    /// Takes the next message. Its bytes stay until the next call of [`Merge::empty_batch`].
+    pub(super) fn pop(&mut self) -> Option<(Entry, usize)> {
+        let Reverse(((_, _, _, span, _), slot)) = self.heads.pop()?;
+        let batch = self.batches.get_mut(slot)?;
+        let entry = *batch.entries.get(batch.next)?;
+        batch.next += 1;
+        match self.batches.get(slot).and_then(|batch| self.key(span, batch)) {
+            Some(key) => self.heads.push(Reverse((key, slot))),
+            None => self.release(slot),
+        }
+        Some((entry, slot))
+    }
+
+    /// Bytes of a message that [`Merge::pop`] has given.
+    pub(super) fn bytes(&self, entry: &Entry, slot: usize) -> &[u8] {
+        self.batches.get(slot).and_then(|batch| batch.bytes.get(entry.start..entry.end)).unwrap_or_default()
+    }
+
+    fn key(&self, span: usize, batch: &Batch) -> Option<Key> {
+        let Entry { head, rank, .. } = batch.entries.get(batch.next)?;
+        let (time, rank, sequence) =
+            if self.by_time { (head.log_time, *rank, head.sequence) } else { (0, 0, 0) };
+        Some((time, rank, sequence, span, batch.next))
+    }
+
+    fn release(&mut self, slot: usize) {
+        self.memory -= self.batches.get(slot).map_or(0, Batch::memory);
+        self.spare.push(slot);
+    }
+}

@@ -1,0 +1,42 @@
+//! The dive log: an MCAP file with the bytes of every device as they came, the order in which the loop took them, and
+//! what the loop made of them.
+//!
+//! [`format`] names channels and metadata and lays out `/loop/tick`. [`LogWriter`] writes a log, [`Recorder`] does so
+//! on a thread of its own behind a lock-free queue, and [`LogReader`] reads logs, ours and others', whole or damaged.
+//!
+//! A log that we write, in the order of the file:
+//!
+//! | record | content |
+//! |---|---|
+//! | metadata `headrace` | [`format::FORMAT_KEY`] and what the caller gave: version, digest of the configuration, clock anchors |
+//! | attachments | `vehicle.toml` and the files that it names |
+//! | a chunk | definitions of all channels, nothing else |
+//! | metadata `headrace.channels` | the same definitions once more, so that a log survives the loss of that chunk |
+//! | chunks | messages, each chunk at most half a second of a dive |
+//! | summary | what viewers need to find their way |
+//!
+//! The file is only ever appended to: nothing that has been written is touched again, whatever the power does.
+
+#![cfg_attr(not(test), warn(clippy::indexing_slicing))]
+
+mod channels;
+mod chunk;
+mod error;
+mod fields;
+pub mod format;
+mod framing;
+mod loss;
+mod merge;
+mod reader;
+mod recorder;
+mod scan;
+mod writer;
+
+pub use error::LogError;
+pub use loss::{Loss, LossKind};
+pub use reader::{LogInfo, LogMessage, LogReader, MessageKind, file_digest};
+pub use recorder::{Full, Recorder, RecorderHandle, RecorderPort};
+pub use writer::{LogHeader, LogWriter, ResultChannel, SourceInfo, Summary};
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,378 @@
+//! Reading logs: ours and others', whole or damaged, a piece at a time.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{Read, Seek};
+use std::path::Path;
+
+use headrace_core::time::MonoNs;
+use mcap::records::op;
+use sha2::{Digest, Sha256};
+
+use super::channels::{Channels, Kind};
+use super::chunk::{Unpacked, data_section_holds, unpack};
+use super::fields::Fields;
+use super::format::{VEHICLE_FILE, hex};
+use super::framing::{ChunkPlace, Definition, LogFile};
+use super::loss::Losses;
+use super::merge::{Batch, Merge};
+use super::scan::{Piece, Span, scan};
+use super::{LogError, Loss, LossKind, SourceInfo};
+
+/// The most bytes of overlapping pieces that are held to bring their messages into order.
+const MAX_HELD_BYTES: usize = 256 << 20;
+
+/// What a log says about itself.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct LogInfo {
+    /// Text of the vehicle file, where the log has one that is text.
+    pub vehicle_toml: Option<String>,
+    /// The other attachments: name and content.
+    pub attachments: Vec<(String, Vec<u8>)>,
+    /// Metadata: of our own record by key, of others as `<name of the record>/<key>`.
+    pub metadata: BTreeMap<String, String>,
+    /// The sources; a source's place is its number in [`MessageKind`]. Numbered by the channels' metadata where these
+    /// number all of them (as in our logs), else by the names of `/raw/...` in their order, then `/sent/...`.
+    pub sources: Vec<SourceInfo>,
+}
+
+/// What a message is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MessageKind<'a> {
+    /// Bytes from a source.
+    Raw {
+        /// The source's number.
+        source: u16,
+    },
+    /// Bytes sent to a source.
+    Sent {
+        /// The source's number.
+        source: u16,
+    },
+    /// A tick of the loop, see [`super::format::Tick`].
+    Tick,
+    /// What a loop made of it.
+    Result {
+        /// Its topic.
+        topic: &'a str,
+    },
+    /// A channel that isn't ours.
+    Other,
+}
+
+/// A message of a log.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LogMessage<'a> {
+    /// What it is.
+    pub kind: MessageKind<'a>,
+    /// When it was received, or made.
+    pub log_time: MonoNs,
+    /// For when it is valid.
+    pub publish_time: MonoNs,
+    /// Its number in its channel.
+    pub sequence: u32,
+    /// Its content.
+    pub data: &'a [u8],
+}
+
+/// Reads a log.
+///
+/// Opening walks over the file once, without unpacking it: so the order of messages doesn't depend on a summary being
+/// there. A log with a `/loop/tick` channel is then read as it stands in the file. Others' logs are brought into the
+/// order of (log time, source, sequence): a piece (a chunk, or about a megabyte of messages outside chunks) is held
+/// from the moment when its earliest message may be next, and pieces that overlap are merged. That is exact as long as
+/// what overlaps fits into 256 MiB and chunks don't lie about their times; messages for which it wasn't are counted in
+/// [`LogReader::late`].
+///
+/// Damage is no error: what reads is delivered, and [`LogReader::losses`] says what is missing.
+pub struct LogReader<R = File> {
+    file: LogFile<R>,
+    info: LogInfo,
+    channels: Channels,
+    losses: Losses,
+    /// Pieces in the order of the file.
+    spans: Vec<Span>,
+    /// Numbers of the pieces in the order in which they are read.
+    plan: Vec<usize>,
+    /// How many of the plan have been read.
+    read: usize,
+    merge: Merge,
+    by_time: bool,
+    latest: u64,
+    late: u64,
+    finished: bool,
+}
+
+impl LogReader<File> {
+    /// Opens a log.
+    ///
+    /// Errors: the file can't be read, isn't MCAP, or is of a later format.
+    pub fn open(path: &Path) -> Result<Self, LogError> {
+        let file = File::open(path).map_err(|source| LogError::Open { path: path.to_owned(), source })?;
+        Self::new(file, path.display().to_string())
+    }
+}
+
+impl<R: Read + Seek> LogReader<R> {
+    /// Reads a log from anything; `name` is for messages to people.
+    ///
+    /// Errors: as for [`LogReader::open`].
+    pub fn new(input: R, name: String) -> Result<Self, LogError> {
+        let mut file = LogFile::new(input, name)?;
+        let (scan, channels) = scan(&mut file)?;
+        let mut info = LogInfo {
+            vehicle_toml: None,
+            attachments: scan.attachments,
+            metadata: scan.metadata,
+            sources: channels.sources().to_vec(),
+        };
+        take_vehicle_file(&mut info);
+        let by_time = !channels.has_ticks();
+        let mut plan: Vec<usize> = (0..scan.spans.len()).collect();
+        if by_time {
+            plan.sort_by_key(|number| scan.spans.get(*number).map(|span| span.from));
+        }
+        Ok(Self {
+            file,
+            info,
+            channels,
+            losses: scan.losses,
+            spans: scan.spans,
+            plan,
+            read: 0,
+            merge: Merge::new(by_time),
+            by_time,
+            latest: 0,
+            late: 0,
+            finished: false,
+        })
+    }
+
+    /// What the log says about itself.
+    pub fn header(&self) -> &LogInfo {
+        &self.info
+    }
+
+    /// Whether the log has the ticks of the loop that wrote it.
+    pub fn has_ticks(&self) -> bool {
+        self.channels.has_ticks()
+    }
+
+    /// What has been found damaged. Damage to the framing is known from the start, that within chunks when they have
+    /// been read; the list is complete when [`LogReader::next`] has given `None`.
+    pub fn losses(&self) -> &[Loss] {
+        self.losses.list()
+    }
+
+    /// Messages that were delivered after one with a later log time, in a log without ticks.
+    pub fn late(&self) -> u64 {
+        self.late
+    }
+
+    /// The next message, or `None` at the end.
+    ///
+    /// Errors: the medium fails; damage is no error.
+    #[expect(
+        clippy::should_implement_trait,
+        reason = "messages borrow from the reader, which no Iterator allows"
+    )]
+    pub fn next(&mut self) -> Result<Option<LogMessage<'_>>, LogError> {
+        while self.must_read() {
+            self.read_piece()?;
+        }
+        let Some((entry, slot)) = self.merge.pop() else {
+            self.finish()?;
+            return Ok(None);
+        };
+        if self.by_time {
+            self.late += u64::from(entry.head.log_time < self.latest);
+            self.latest = self.latest.max(entry.head.log_time);
+        }
+        let kind = match self.channels.get(entry.head.channel) {
+            None => MessageKind::Other,
+            Some(channel) => match channel.kind {
+                Kind::Raw(source) => MessageKind::Raw { source },
+                Kind::Sent(source) => MessageKind::Sent { source },
+                Kind::Tick => MessageKind::Tick,
+                Kind::Result => MessageKind::Result { topic: &channel.definition.topic },
+                Kind::Other => MessageKind::Other,
+            },
+        };
+        Ok(Some(LogMessage {
+            kind,
+            log_time: MonoNs(entry.head.log_time),
+            publish_time: MonoNs(entry.head.publish_time),
+            sequence: entry.head.sequence,
+            data: self.merge.bytes(&entry, slot),
+        }))
+    }
+
+    fn must_read(&self) -> bool {
+        let next = self.plan.get(self.read).and_then(|number| self.spans.get(*number));
+        match (next, self.merge.next_time()) {
+            (None, _) => false,
+            (Some(_), None) => true,
+            (Some(span), Some(time)) => {
+                self.by_time && span.from <= time && self.merge.memory() < MAX_HELD_BYTES
+            }
+        }
+    }
+
+    fn read_piece(&mut self) -> Result<(), LogError> {
+        let Some(&number) = self.plan.get(self.read) else { return Ok(()) };
+        self.read += 1;
+        let mut batch = self.merge.empty_batch();
+        let mut found = Vec::new();
+        match self.spans.get(number) {
+            Some(Span { piece: Piece::Chunk(place), .. }) => {
+                read_chunk(&mut self.file, place, &mut batch, &mut self.channels, &mut found)?;
+            }
+            Some(span) => read_run(&mut self.file, span, &mut batch)?,
+            None => {}
+        }
+        place_entries(&mut batch, &self.channels, &mut found);
+        for kind in found {
+            self.lose(number, kind);
+        }
+        self.date_cut(number, &batch);
+        self.merge.add(number, batch);
+        Ok(())
+    }
+
+    fn lose(&mut self, number: usize, kind: LossKind) {
+        let Some(span) = self.spans.get(number) else { return };
+        let before = self.spans.iter().take(number).rev().find(|span| span.is_dated());
+        let after = self.spans.iter().skip(number + 1).find(|span| span.is_dated());
+        self.losses.push(Loss {
+            kind,
+            offset: span.at,
+            bytes: span.end.saturating_sub(span.at),
+            from: before.map(|span| MonoNs(span.to)),
+            to: after.map(|span| MonoNs(span.from)),
+        });
+    }
+
+    /// A chunk that the file's end cuts may have given messages nevertheless: the loss begins after them.
+    fn date_cut(&mut self, number: usize, batch: &Batch) {
+        let Some(Span { at, piece: Piece::Chunk(ChunkPlace { cut: true, .. }), .. }) = self.spans.get(number)
+        else {
+            return;
+        };
+        let last = batch.entries.iter().map(|entry| MonoNs(entry.head.log_time)).max();
+        let loss = self.losses.list_mut().iter_mut().find(|loss| loss.offset == *at);
+        if let (Some(loss), Some(_)) = (loss, last) {
+            loss.from = last;
+        }
+    }
+
+    /// Messages outside chunks have no checksum but that over the whole log: at the end of one that seems whole it is
+    /// the last question. It is of no use where there are chunks: the `mcap` crate's own writer gets it wrong when it
+    /// is told to leave out the chunks' checksums.
+    fn finish(&mut self) -> Result<(), LogError> {
+        if self.finished {
+            return Ok(());
+        }
+        self.finished = true;
+        let unchunked = self.spans.iter().all(|span| matches!(span.piece, Piece::Run));
+        if unchunked && self.losses.list().is_empty() && !data_section_holds(&mut self.file)? {
+            self.losses.push(Loss {
+                kind: LossKind::DataSection,
+                offset: 0,
+                bytes: self.file.len(),
+                from: None,
+                to: None,
+            });
+        }
+        Ok(())
+    }
+}
+
+fn take_vehicle_file(info: &mut LogInfo) {
+    let Some(place) = info.attachments.iter().position(|(name, _)| name == VEHICLE_FILE) else { return };
+    let (name, data) = info.attachments.remove(place);
+    match String::from_utf8(data) {
+        Ok(text) => info.vehicle_toml = Some(text),
+        Err(error) => info.attachments.insert(place, (name, error.into_bytes())),
+    }
+}
+
+fn read_chunk<R: Read + Seek>(
+    file: &mut LogFile<R>,
+    place: &ChunkPlace,
+    batch: &mut Batch,
+    channels: &mut Channels,
+    found: &mut Vec<LossKind>,
+) -> Result<(), LogError> {
+    // Definitions count only when the chunk's checksum has been found right.
+    let (mut definitions, mut sound) = (Vec::new(), true);
+    let unpacked = unpack(file, place, |opcode, body| match opcode {
+        op::MESSAGE => sound &= batch.push(body),
+        op::CHANNEL => definitions.extend(Definition::read(&mut Fields::new(body))),
+        _ => {}
+    })?;
+    if let Unpacked::Bad(kind) = unpacked {
+        batch.clear();
+        found.push(kind);
+        return Ok(());
+    }
+    if !sound {
+        found.push(LossKind::Contents);
+    }
+    for definition in definitions {
+        let channel = definition.id;
+        if !channels.admit(definition) {
+            found.push(LossKind::Conflict { channel });
+        }
+    }
+    Ok(())
+}
+
+fn read_run<R: Read + Seek>(file: &mut LogFile<R>, span: &Span, batch: &mut Batch) -> Result<(), LogError> {
+    let bytes = file.bytes_at(span.at, span.end - span.at)?;
+    let mut fields = Fields::new(&bytes);
+    let mut record = || {
+        let (opcode, len) = (fields.u8()?, fields.u64()?);
+        Some((opcode, fields.take(len)?))
+    };
+    while let Some((opcode, body)) = record() {
+        if opcode == op::MESSAGE {
+            batch.push(body);
+        }
+    }
+    Ok(())
+}
+
+/// Gives the messages their ranks, and takes out those of channels that nobody knows.
+fn place_entries(batch: &mut Batch, channels: &Channels, found: &mut Vec<LossKind>) {
+    let mut unknown: BTreeMap<u16, u64> = BTreeMap::new();
+    batch.entries.retain_mut(|entry| {
+        let channel = channels.get(entry.head.channel);
+        if let Some(channel) = channel {
+            entry.rank = channel.rank;
+        } else {
+            *unknown.entry(entry.head.channel).or_default() += 1;
+        }
+        channel.is_some()
+    });
+    found.extend(
+        unknown.into_iter().map(|(channel, messages)| LossKind::UnknownChannel { channel, messages }),
+    );
+}
+
+/// SHA-256 of a file, in hex.
+///
+/// Errors: the file can't be read.
+pub fn file_digest(path: &Path) -> Result<String, LogError> {
+    let failed = |source| LogError::Open { path: path.to_owned(), source };
+    let mut file = File::open(path).map_err(failed)?;
+    let mut hasher = Sha256::new();
+    let mut block = vec![0; 1 << 16];
+    loop {
+        match file.read(&mut block) {
+            Ok(0) => return Ok(hex(&hasher.finalize())),
+            Ok(len) => hasher.update(block.get(..len).unwrap_or_default()),
+            Err(error) if error.kind() == std::io::ErrorKind::Interrupted => {}
+            Err(source) => return Err(failed(source)),
+        }
+    }
+}

@@ -1,0 +1,315 @@
+//! A walk over a whole log before it is read: where its chunks are and when, its channels, attachments and metadata,
+//! and what of it is damaged. Data of chunks is skipped, so that the walk is short.
+
+use std::collections::BTreeMap;
+use std::io::{Read, Seek};
+
+use headrace_core::time::MonoNs;
+
+use super::channels::{Channels, listed};
+use super::chunk::{Unpacked, summary_holds, unpack};
+use super::fields::Fields;
+use super::format::{CHANNEL_LIST, FORMAT_KEY, FORMAT_VERSION, METADATA, unseal};
+use super::framing::{
+    AttachmentPlace, ChunkPlace, Definition, Found, Frame, Item, LogFile, find_records, look,
+};
+use super::loss::Losses;
+use super::{LogError, Loss, LossKind};
+
+/// Messages outside chunks are read in pieces of about this size.
+const RUN_BYTES: u64 = 1 << 20;
+/// Definitions and metadata longer than that aren't read.
+const MAX_WHOLE_BYTES: u64 = 16 << 20;
+/// All attachments together.
+const MAX_ATTACHMENT_BYTES: u64 = 64 << 20;
+
+/// A piece of the log that is read at once.
+#[derive(Debug)]
+pub(super) enum Piece {
+    Chunk(ChunkPlace),
+    /// Messages, and records of other kinds between them, that stand in the file as they are.
+    Run,
+}
+
+/// A piece and its place, in the file and in time.
+#[derive(Debug)]
+pub(super) struct Span {
+    pub(super) at: u64,
+    pub(super) end: u64,
+    pub(super) from: u64,
+    pub(super) to: u64,
+    pub(super) piece: Piece,
+}
+
+/// What the walk has found.
+#[derive(Default)]
+pub(super) struct Scan {
+    pub(super) spans: Vec<Span>,
+    pub(super) losses: Losses,
+    pub(super) attachments: Vec<(String, Vec<u8>)>,
+    pub(super) metadata: BTreeMap<String, String>,
+    definitions: BTreeMap<u16, Definition>,
+    /// Definitions in the summary, which count only if its checksum fits.
+    summary: BTreeMap<u16, Definition>,
+    summary_channels: Option<u32>,
+    data_end: Option<u64>,
+    /// Whether the channels are known without a look into the chunks.
+    complete: bool,
+    /// Whether it is a log of ours, which has no messages outside chunks.
+    ours: bool,
+    /// Whether the next message may join the last run.
+    run_open: bool,
+    attachment_bytes: u64,
+}
+
+/// Walks over a log.
+///
+/// Errors: not MCAP, of a later format, or the medium fails.
+pub(super) fn scan<R: Read + Seek>(file: &mut LogFile<R>) -> Result<(Scan, Channels), LogError> {
+    let mut scan = Scan::default();
+    let magic_len = mcap::MAGIC.len() as u64;
+    let first = file.bytes_at(0, magic_len)?;
+    if first != mcap::MAGIC {
+        // A log whose very first bytes are damaged still has its header behind them.
+        if !matches!(look(file, magic_len)?, Found::Record(Frame { item: Item::Header, .. })) {
+            return Err(not_mcap(file, &first));
+        }
+        scan.lose(LossKind::Framing, 0..magic_len);
+    }
+    scan.walk(file, magic_len)?;
+    scan.check_format(file)?;
+    scan.take_summary(file)?;
+    if !scan.complete {
+        scan.look_into_chunks(file)?;
+    }
+    scan.date_losses();
+    let channels = Channels::new(core::mem::take(&mut scan.definitions));
+    Ok((scan, channels))
+}
+
+fn not_mcap<R: Read + Seek>(file: &LogFile<R>, first: &[u8]) -> LogError {
+    let spaced = |bytes: &[u8]| bytes.iter().map(|b| format!("{b:02x}")).collect::<Vec<_>>().join(" ");
+    LogError::NotMcap { name: file.name().to_owned(), found: spaced(first), wanted: spaced(mcap::MAGIC) }
+}
+
+impl Scan {
+    fn walk<R: Read + Seek>(&mut self, file: &mut LogFile<R>, start: u64) -> Result<(), LogError> {
+        let (mut at, mut found) = (start, look(file, start)?);
+        loop {
+            // Where to go on after damage.
+            let resumed = match found {
+                Found::Closing => {
+                    let end = at + mcap::MAGIC.len() as u64;
+                    if end < file.len() {
+                        self.lose(LossKind::Framing, end..file.len());
+                    }
+                    return Ok(());
+                }
+                Found::End => {
+                    self.lose(LossKind::Truncated, at..at);
+                    return Ok(());
+                }
+                Found::Record(frame) => {
+                    let next = look(file, frame.end)?;
+                    if is_believed(file, &frame, &next)? {
+                        (at, found) = (frame.end, next);
+                        self.accept(file, frame)?;
+                        continue;
+                    }
+                    find_records(file, frame.body, u64::MAX)?
+                }
+                Found::Cut(Frame { item: Item::Chunk(place), end, .. }) => {
+                    self.lose(LossKind::Truncated, at..file.len());
+                    self.add_chunk(at, end, place);
+                    return Ok(());
+                }
+                Found::Cut(_) => {
+                    let resumed = find_records(file, at + 1, u64::MAX)?;
+                    if resumed.is_none() {
+                        self.lose(LossKind::Truncated, at..file.len());
+                        return Ok(());
+                    }
+                    resumed
+                }
+                Found::Nothing => find_records(file, at + 1, u64::MAX)?,
+            };
+            let resumed = resumed.filter(|_| !self.losses.is_full());
+            self.lose(LossKind::Framing, at..resumed.unwrap_or(file.len()));
+            let Some(resumed) = resumed else { return Ok(()) };
+            (at, found) = (resumed, look(file, resumed)?);
+        }
+    }
+
+    fn accept<R: Read + Seek>(&mut self, file: &mut LogFile<R>, frame: Frame) -> Result<(), LogError> {
+        match frame.item {
+            Item::Message { .. } if self.ours => self.lose(LossKind::Framing, frame.at..frame.end),
+            Item::Message { log_time } => self.add_message(&frame, log_time),
+            Item::Chunk(place) => self.add_chunk(frame.at, frame.end, place),
+            Item::Channel => self.add_channel(file, &frame)?,
+            Item::Metadata => self.add_metadata(file, &frame)?,
+            Item::Attachment(ref place) => self.add_attachment(file, &frame, place)?,
+            Item::Statistics { channels } => self.summary_channels = Some(channels),
+            Item::DataEnd => self.data_end = Some(frame.at),
+            Item::Header | Item::Footer | Item::Other => {}
+        }
+        Ok(())
+    }
+
+    fn add_message(&mut self, frame: &Frame, log_time: u64) {
+        let last = self.spans.last_mut().filter(|last| self.run_open && last.end - last.at < RUN_BYTES);
+        if let Some(run) = last {
+            (run.end, run.from, run.to) = (frame.end, run.from.min(log_time), run.to.max(log_time));
+        } else {
+            let (at, end) = (frame.at, frame.end);
+            self.spans.push(Span { at, end, from: log_time, to: log_time, piece: Piece::Run });
+            self.run_open = true;
+        }
+    }
+
+    fn add_chunk(&mut self, at: u64, end: u64, place: ChunkPlace) {
+        let (from, to) = place.times;
+        self.spans.push(Span { at, end, from, to, piece: Piece::Chunk(place) });
+        self.run_open = false;
+    }
+
+    fn add_channel<R: Read + Seek>(&mut self, file: &mut LogFile<R>, frame: &Frame) -> Result<(), LogError> {
+        let body = whole_body(file, frame)?;
+        let Some(definition) = body.and_then(|body| Definition::read(&mut Fields::new(&body))) else {
+            self.lose(LossKind::Framing, frame.at..frame.end);
+            return Ok(());
+        };
+        let id = definition.id;
+        let into = if self.data_end.is_some() { &mut self.summary } else { &mut self.definitions };
+        if *into.entry(id).or_insert_with(|| definition.clone()) != definition {
+            self.lose(LossKind::Conflict { channel: id }, frame.at..frame.end);
+        }
+        Ok(())
+    }
+
+    fn add_metadata<R: Read + Seek>(&mut self, file: &mut LogFile<R>, frame: &Frame) -> Result<(), LogError> {
+        let body = whole_body(file, frame)?.unwrap_or_default();
+        let mut fields = Fields::new(&body);
+        let (Some(name), Some(mut entries)) = (fields.text(), fields.map()) else {
+            self.lose(LossKind::Framing, frame.at..frame.end);
+            return Ok(());
+        };
+        if !unseal(name, &mut entries) {
+            self.lose(LossKind::Metadata(name.to_owned()), frame.at..frame.end);
+        } else if name == CHANNEL_LIST {
+            (self.complete, self.ours) = (true, true);
+            for definition in listed(&entries) {
+                self.definitions.entry(definition.id).or_insert(definition);
+            }
+        } else if name == METADATA {
+            self.metadata.extend(entries);
+        } else {
+            self.metadata.extend(entries.into_iter().map(|(key, value)| (format!("{name}/{key}"), value)));
+        }
+        Ok(())
+    }
+
+    fn add_attachment<R: Read + Seek>(
+        &mut self,
+        file: &mut LogFile<R>,
+        frame: &Frame,
+        place: &AttachmentPlace,
+    ) -> Result<(), LogError> {
+        self.run_open = false;
+        self.attachment_bytes = self.attachment_bytes.saturating_add(place.data_len);
+        if self.attachment_bytes > MAX_ATTACHMENT_BYTES {
+            self.attachment_bytes -= place.data_len;
+            self.lose(LossKind::TooLarge { limit: MAX_ATTACHMENT_BYTES }, frame.at..frame.end);
+            return Ok(());
+        }
+        let body = file.bytes_at(frame.body, place.head_len + place.data_len + 4)?;
+        // The crate's parser checks the checksum. It wants a record whose lengths fit, which the framing has seen to.
+        match mcap::parse_record(mcap::records::op::ATTACHMENT, &body) {
+            Ok(mcap::records::Record::Attachment { data, .. }) => {
+                self.attachments.push((place.name.clone(), data.into_owned()));
+            }
+            _ => self.lose(LossKind::Attachment(place.name.clone()), frame.at..frame.end),
+        }
+        Ok(())
+    }
+
+    fn check_format<R: Read + Seek>(&self, file: &LogFile<R>) -> Result<(), LogError> {
+        let Some(found) = self.metadata.get(FORMAT_KEY) else { return Ok(()) };
+        if found.parse().is_ok_and(|format: u32| format <= FORMAT_VERSION) {
+            return Ok(());
+        }
+        Err(LogError::TooNew { name: file.name().to_owned(), found: found.clone(), known: FORMAT_VERSION })
+    }
+
+    fn take_summary<R: Read + Seek>(&mut self, file: &mut LogFile<R>) -> Result<(), LogError> {
+        let Some(data_end) = self.data_end else { return Ok(()) };
+        if self.summary.is_empty() || !summary_holds(file, data_end)? {
+            return Ok(());
+        }
+        let all = self.summary_channels.is_some_and(|count| self.summary.len() as u64 >= u64::from(count));
+        self.complete |= all;
+        for (id, definition) in core::mem::take(&mut self.summary) {
+            self.definitions.entry(id).or_insert(definition);
+        }
+        Ok(())
+    }
+
+    /// The long way to the channels, for logs of other writers that were cut off.
+    fn look_into_chunks<R: Read + Seek>(&mut self, file: &mut LogFile<R>) -> Result<(), LogError> {
+        for span in &self.spans {
+            let Piece::Chunk(place) = &span.piece else { continue };
+            let mut defined = Vec::new();
+            let unpacked = unpack(file, place, |opcode, body| {
+                if opcode == mcap::records::op::CHANNEL {
+                    defined.extend(Definition::read(&mut Fields::new(body)));
+                }
+            })?;
+            if matches!(unpacked, Unpacked::Whole | Unpacked::Cut) {
+                for definition in defined {
+                    self.definitions.entry(definition.id).or_insert(definition);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn lose(&mut self, kind: LossKind, part: core::ops::Range<u64>) {
+        self.run_open = false;
+        let bytes = part.end.saturating_sub(part.start);
+        self.losses.push(Loss { kind, offset: part.start, bytes, from: None, to: None });
+    }
+
+    fn date_losses(&mut self) {
+        for loss in self.losses.list_mut() {
+            let next = self.spans.partition_point(|span| span.at < loss.offset);
+            let after = self.spans.iter().skip(next).find(|span| span.at > loss.offset && span.is_dated());
+            let before = self.spans.iter().take(next).rev().find(|span| span.is_dated());
+            (loss.from, loss.to) = (before.map(|span| MonoNs(span.to)), after.map(|span| MonoNs(span.from)));
+        }
+    }
+}
+
+/// A record whose own length nothing confirms is believed when what follows is a record too. Where the file's end cuts
+/// what follows, the length is a lie if there are records within it.
+fn is_believed<R: Read + Seek>(file: &mut LogFile<R>, frame: &Frame, next: &Found) -> Result<bool, LogError> {
+    let followed = !matches!(next, Found::Nothing);
+    Ok(match next {
+        _ if frame.confirmed => true,
+        Found::Cut(next) if !matches!(next.item, Item::Chunk(_)) => {
+            find_records(file, frame.body, frame.end)?.is_none()
+        }
+        _ => followed,
+    })
+}
+
+impl Span {
+    /// Whether its times mean anything: a chunk without messages has none.
+    pub(super) fn is_dated(&self) -> bool {
+        (self.from, self.to) != (0, 0)
+    }
+}
+
+/// The whole of a record, unless it is too long to be read.
+fn whole_body<R: Read + Seek>(file: &mut LogFile<R>, frame: &Frame) -> Result<Option<Vec<u8>>, LogError> {
+    let len = frame.end - frame.body;
+    if len > MAX_WHOLE_BYTES { Ok(None) } else { file.bytes_at(frame.body, len).map(Some) }
+}

@@ -1,0 +1,231 @@
+//! Damaged logs: nothing panics, all that is whole is delivered, and what is missing is said.
+
+use mcap::records::op;
+use proptest::prelude::*;
+
+use super::super::{LogError, LogInfo, LogWriter, LossKind};
+use super::*;
+
+/// Messages per chunk and chunks of [`log`].
+const PER_CHUNK: usize = 6;
+const CHUNKS: usize = 6;
+
+/// A log whose chunk `n` (from 0) has the log times `100 n + 1` to `100 n + 6`; with the places of the chunks.
+fn log() -> (Vec<u8>, Vec<Seen>, Vec<usize>) {
+    let mut log = LogWriter::new(Vec::new(), &header(true)).unwrap();
+    for chunk in 0..CHUNKS as u64 {
+        for message in 1..=PER_CHUNK as u64 {
+            let at = MonoNs(100 * chunk + message);
+            match u16::try_from(message % 3).unwrap() {
+                0 => log.tick(chunk, at, &[0, 1, 0]).unwrap(),
+                source => log.raw(source, at, at, &noise(at.0, 40)).unwrap(),
+            }
+        }
+        log.flush().unwrap();
+    }
+    let bytes = log.finish().unwrap().0;
+    let seen = read(&bytes).0;
+    assert_eq!(seen.len(), CHUNKS * PER_CHUNK);
+    let places = places(&bytes, op::CHUNK);
+    assert_eq!(places.len(), CHUNKS + 1, "the first has the channels");
+    (bytes, seen, places[1..].to_vec())
+}
+
+/// The messages without those of one chunk.
+fn without_chunk(seen: &[Seen], chunk: usize) -> Vec<Seen> {
+    [&seen[..chunk * PER_CHUNK], &seen[(chunk + 1) * PER_CHUNK..]].concat()
+}
+
+fn is_subsequence(part: &[Seen], whole: &[Seen]) -> bool {
+    let mut rest = whole.iter();
+    part.iter().all(|message| rest.any(|other| other == message))
+}
+
+#[test]
+fn a_log_cut_anywhere_gives_what_was_before_the_cut() {
+    let (bytes, seen, places) = log();
+    for cut in places[CHUNKS - 2]..bytes.len() {
+        let (got, losses) = read(&bytes[..cut]);
+        let whole_chunks = places.iter().filter(|place| **place < cut).count().saturating_sub(1);
+        assert!(got.len() >= whole_chunks * PER_CHUNK, "cut at {cut}: {} messages", got.len());
+        assert_eq!(got, seen[..got.len()], "cut at {cut}");
+        assert_eq!(losses.len(), 1, "cut at {cut}: {losses:?}");
+        assert_eq!(losses[0].kind, LossKind::Truncated, "cut at {cut}");
+        assert_eq!(losses[0].to, None);
+    }
+}
+
+#[test]
+fn a_log_cut_in_its_beginning_is_a_log_or_no_log() {
+    let (bytes, _, places) = log();
+    for cut in 0..places[0] {
+        match LogReader::new(Cursor::new(bytes[..cut].to_vec()), "cut".to_owned()) {
+            Ok(mut reader) => {
+                assert_eq!(read_all(&mut reader), []);
+                assert!(!reader.losses().is_empty(), "cut at {cut}");
+            }
+            Err(LogError::NotMcap { .. }) => assert!(cut < 8),
+            Err(error) => panic!("cut at {cut}: {error}"),
+        }
+    }
+}
+
+#[test]
+fn a_chunk_that_fails_its_checksum_is_lost_alone() {
+    let (mut bytes, seen, places) = log();
+    bytes[places[3] + 9 + 44 + 30] ^= 4;
+    let (got, losses) = read(&bytes);
+    assert_eq!(got, without_chunk(&seen, 3));
+    assert_eq!(losses.len(), 1, "{losses:?}");
+    assert_eq!(losses[0].offset, places[3] as u64);
+    assert_eq!((losses[0].from, losses[0].to), (Some(MonoNs(206)), Some(MonoNs(401))));
+    let text = losses[0].to_string();
+    assert!(text.contains("after 0.000 s, before 0.000 s"), "{text}");
+}
+
+#[test]
+fn a_record_length_that_lies_costs_at_most_its_chunk() {
+    let (bytes, seen, places) = log();
+    for lie in [0, 1, 40, 60, 1000, 1 << 20, 1 << 40, u64::MAX - 8, u64::MAX] {
+        let mut bytes = bytes.clone();
+        bytes[places[2] + 1..places[2] + 9].copy_from_slice(&lie.to_le_bytes());
+        let (got, _) = read(&bytes);
+        // The chunk says its length a second time, after which a record follows: nothing is lost.
+        assert!(got == seen, "length {lie}: {} messages", got.len());
+        bytes[places[2] + 9 + 36..places[2] + 9 + 44].copy_from_slice(&(lie ^ 3).to_le_bytes());
+        let (got, losses) = read(&bytes);
+        assert_eq!(got, without_chunk(&seen, 2), "both lengths about {lie}");
+        assert_eq!((losses.len(), &losses[0].kind), (1, &LossKind::Framing), "{losses:?}");
+        assert_eq!((losses[0].from, losses[0].to), (Some(MonoNs(106)), Some(MonoNs(301))));
+    }
+}
+
+#[test]
+fn an_overwritten_block_costs_what_it_covers() {
+    let (bytes, seen, places) = log();
+    for value in [0, 0xFF, 0x05] {
+        let mut bytes = bytes.clone();
+        // From the middle of chunk 1 into chunk 3, as a medium loses a block.
+        bytes[places[1] + 100..places[3] + 20].fill(value);
+        let (got, losses) = read(&bytes);
+        let kept = [&seen[..PER_CHUNK], &seen[4 * PER_CHUNK..]].concat();
+        assert_eq!(got, kept, "{value}");
+        assert!(losses.iter().any(|loss| loss.kind == LossKind::Framing), "{losses:?}");
+        assert!(losses.iter().all(|loss| loss.to == Some(MonoNs(401)) || loss.from == Some(MonoNs(6))));
+    }
+}
+
+#[test]
+fn bytes_between_records_are_skipped() {
+    let (mut bytes, seen, places) = log();
+    bytes.splice(places[4]..places[4], noise(7, 5000));
+    let (got, losses) = read(&bytes);
+    assert_eq!(got, seen);
+    assert_eq!((losses.len(), &losses[0].kind, losses[0].bytes), (1, &LossKind::Framing, 5000));
+}
+
+#[test]
+fn the_channels_survive_the_loss_of_their_chunk_and_of_the_summary() {
+    let (bytes, seen, places) = log();
+    let mut bytes = bytes[..places[CHUNKS - 1]].to_vec();
+    let definitions = super::places(&bytes, op::CHUNK)[0];
+    bytes[definitions + 60..definitions + 90].fill(0);
+    let mut reader = open(&bytes);
+    assert_eq!(read_all(&mut reader), seen[..(CHUNKS - 1) * PER_CHUNK]);
+    assert_eq!(reader.header().sources, header(true).sources);
+    assert_eq!(reader.losses().len(), 2, "the chunk and the end: {:?}", reader.losses());
+}
+
+#[test]
+fn damaged_first_bytes_do_not_hide_a_log() {
+    let (mut bytes, seen, _) = log();
+    bytes[..8].fill(0);
+    let (got, losses) = read(&bytes);
+    assert_eq!((got, losses.len()), (seen, 1));
+}
+
+#[test]
+fn a_damaged_attachment_is_named() {
+    let (mut bytes, seen, _) = log();
+    let at = bytes.windows(6).position(|window| window == b"target").unwrap();
+    bytes[at] = b'T';
+    let mut reader = open(&bytes);
+    assert_eq!(reader.header().vehicle_toml, None);
+    assert_eq!(reader.losses()[0].kind, LossKind::Attachment("vehicle.toml".to_owned()));
+    assert_eq!(read_all(&mut reader), seen);
+}
+
+#[test]
+fn other_files_are_refused_with_what_they_begin_with() {
+    let error = |bytes: &[u8]| {
+        LogReader::new(Cursor::new(bytes.to_vec()), "dive.mcap".to_owned()).err().unwrap().to_string()
+    };
+    assert_eq!(
+        error(b"\x89PNG\r\n\x1a\n1234567890"),
+        "dive.mcap is not an MCAP file: it begins with [89 50 4e 47 0d 0a 1a 0a], and \
+         [89 4d 43 41 50 30 0d 0a] is wanted"
+    );
+    assert!(error(b"").contains("begins with []"));
+    assert!(error(b"#ROSBAG V2.0\n").contains("23 52 4f 53"));
+}
+
+/// Damage is either without effect or reported, and never makes up a message.
+fn check_changed(bytes: Vec<u8>, seen: &[Seen], info: &LogInfo) {
+    match LogReader::new(Cursor::new(bytes), "changed".to_owned()) {
+        Ok(mut reader) => {
+            let got = read_all(&mut reader);
+            assert!(is_subsequence(&got, seen), "{} messages, {:?}", got.len(), reader.losses());
+            if reader.losses().is_empty() {
+                assert_eq!(got.len(), seen.len());
+                assert_eq!(reader.header(), info);
+            }
+        }
+        Err(error) => assert!(matches!(error, LogError::NotMcap { .. }), "{error}"),
+    }
+}
+
+#[test]
+fn a_changed_bit_is_noticed_wherever_it_is() {
+    let (bytes, seen, places) = log();
+    let info = open(&bytes).header().clone();
+    for place in 0..bytes.len() {
+        let bits = if places.contains(&place) { 0..8 } else { place % 8..place % 8 + 1 };
+        for bit in bits {
+            let mut changed = bytes.clone();
+            changed[place] ^= 1 << bit;
+            check_changed(changed, &seen, &info);
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(40000))]
+
+    #[test]
+    fn changed_bytes_are_noticed(
+        changes in prop::collection::vec((any::<prop::sample::Index>(), 1_u8..), 2..6),
+    ) {
+        let (mut bytes, seen, _) = log();
+        let info = open(&bytes).header().clone();
+        for (place, change) in changes {
+            let place = place.index(bytes.len());
+            bytes[place] ^= change;
+        }
+        check_changed(bytes, &seen, &info);
+    }
+
+    #[test]
+    fn any_bytes_are_read_to_an_end(
+        start in prop::sample::select(vec![&b""[..], &b"\x01\x08\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0"[..]]),
+        bytes: Vec<u8>,
+        records in prop::collection::vec((0_u8..17, 0_u64..80, prop::collection::vec(any::<u8>(), 0..80)), 0..20),
+    ) {
+        let mut file = [mcap::MAGIC, start, &bytes].concat();
+        for (opcode, len, body) in records {
+            file.push(opcode);
+            file.extend(len.to_le_bytes());
+            file.extend(body);
+        }
+        read(&file);
+    }
+}

@@ -1,0 +1,172 @@
+//! The recorder's thread, its queue, and what becomes of errors.
+
+use std::io::Write;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, mpsc};
+use std::time::Duration;
+
+use super::super::{LogError, Recorder, RecorderPort};
+use super::*;
+
+/// A medium that takes its time, and says when something has been flushed to it.
+struct SlowMedium {
+    bytes: Vec<u8>,
+    nap: Duration,
+    done: mpsc::SyncSender<Vec<u8>>,
+}
+
+impl Write for SlowMedium {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        std::thread::sleep(self.nap);
+        let len = bytes.len().min(20_000);
+        self.bytes.extend_from_slice(&bytes[..len]);
+        Ok(len)
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        // Nobody may be listening any more.
+        self.done.try_send(self.bytes.clone()).ok();
+        Ok(())
+    }
+}
+
+fn slow(millis: u64) -> (SlowMedium, mpsc::Receiver<Vec<u8>>) {
+    let (done, flushed) = mpsc::sync_channel(1000);
+    (SlowMedium { bytes: Vec::new(), nap: Duration::from_millis(millis), done }, flushed)
+}
+
+#[test]
+fn a_loop_that_respects_the_queue_loses_nothing_to_a_slow_medium() {
+    let (medium, flushed) = slow(1);
+    let (mut port, handle) = Recorder::start(medium, &header(true), 0).unwrap();
+    let mut held_back = 0;
+    for round in 0..20_000_u32 {
+        let bytes = noise(round.into(), usize::try_from(round % 300).unwrap());
+        let needed = RecorderPort::entry_bytes(bytes.len()) + RecorderPort::tick_entry_bytes(1);
+        while port.vacant_bytes() < needed {
+            held_back += 1;
+            std::thread::yield_now();
+        }
+        let now = MonoNs(round.into());
+        port.raw(1, now, now, &bytes).unwrap();
+        port.tick(round.into(), now, &[1]).unwrap();
+    }
+    let summary = handle.finish().unwrap();
+    assert!(held_back > 0, "the medium was fast enough");
+    assert_eq!(summary.messages, 40_000);
+    let bytes = flushed.iter().last().unwrap();
+    assert_eq!(bytes.len() as u64, summary.bytes);
+    let (seen, losses) = read(&bytes);
+    assert_eq!((seen.len(), losses), (40_000, vec![]));
+    for (round, pair) in (0_u32..).zip(seen.chunks(2)) {
+        assert_eq!((pair[0].0.as_str(), pair[0].1, pair[0].3), ("raw 1", round.into(), round));
+        assert_eq!((pair[1].0.as_str(), pair[1].4.len()), ("tick", 22));
+    }
+}
+
+#[test]
+fn what_is_older_than_a_second_reads_without_an_end() {
+    let (medium, flushed) = slow(0);
+    let (mut port, handle) = Recorder::start(medium, &header(true), 0).unwrap();
+    let header_only = flushed.recv_timeout(Duration::from_secs(1)).unwrap();
+    assert_eq!(open(&header_only).header().sources.len(), 3, "the header is there before the first message");
+    port.raw(0, MonoNs(5), MonoNs(4), b"ping").unwrap();
+    port.sent(0, MonoNs(6), b"poll").unwrap();
+    port.result(0, MonoNs(7), b"{}").unwrap();
+    let after_a_second = flushed.recv_timeout(Duration::from_secs(1)).unwrap();
+    let (seen, losses) = read(&after_a_second);
+    let kinds: Vec<_> = seen.iter().map(|message| message.0.as_str()).collect();
+    assert_eq!(kinds, ["raw 0", "sent 0", "/result/advice"]);
+    assert_eq!(losses.len(), 1, "{losses:?}");
+    assert!(!port.failed() && !handle.failed());
+    handle.finish().unwrap();
+}
+
+#[test]
+fn a_full_queue_takes_nothing_of_an_entry() {
+    let (medium, _flushed) = slow(0);
+    let (mut port, handle) = Recorder::start(medium, &header(true), 0).unwrap();
+    let capacity = port.capacity_bytes();
+    let too_long = vec![0; capacity];
+    let full = port.raw(0, MonoNs(0), MonoNs(0), &too_long).unwrap_err();
+    assert_eq!((full.free, full.needed), (capacity, RecorderPort::entry_bytes(capacity)));
+    assert!(port.tick(0, MonoNs(0), &vec![0; capacity]).is_err());
+    assert_eq!(port.vacant_bytes(), capacity);
+    assert_eq!(handle.finish().unwrap().messages, 0);
+}
+
+#[test]
+fn a_dropped_handle_completes_the_file() {
+    let (medium, flushed) = slow(0);
+    let (mut port, handle) = Recorder::start(medium, &header(true), 0).unwrap();
+    port.raw(0, MonoNs(5), MonoNs(5), b"ping").unwrap();
+    drop(handle);
+    let (seen, losses) = read(&flushed.iter().last().unwrap());
+    assert_eq!((seen.len(), losses), (1, vec![]));
+}
+
+/// A medium with room for so many bytes.
+struct SmallMedium(Arc<AtomicUsize>);
+
+impl Write for SmallMedium {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        let room = self.0.load(Ordering::Relaxed);
+        if room == 0 {
+            return Err(std::io::ErrorKind::StorageFull.into());
+        }
+        let len = bytes.len().min(room);
+        self.0.store(room - len, Ordering::Relaxed);
+        Ok(len)
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
+}
+
+#[test]
+fn a_full_medium_is_reported_and_does_not_stop_the_loop() {
+    let room = Arc::new(AtomicUsize::new(1 << 20));
+    let (mut port, handle) = Recorder::start(SmallMedium(Arc::clone(&room)), &header(true), 0).unwrap();
+    room.store(0, Ordering::Relaxed);
+    let mut rounds = 0;
+    while !port.failed() {
+        if port.vacant_bytes() > 10_000 {
+            port.raw(0, MonoNs(0), MonoNs(0), &[9; 5000]).unwrap();
+        }
+        rounds += 1;
+        assert!(rounds < 100_000_000, "the failure never showed");
+    }
+    for _ in 0..1000 {
+        while port.raw(0, MonoNs(0), MonoNs(0), &[9; 5000]).is_err() {
+            std::thread::yield_now();
+        }
+    }
+    let error = handle.finish().unwrap_err();
+    let LogError::Stopped { discarded, source } = &error else { panic!("{error}") };
+    assert!(*discarded >= 1000);
+    assert!(matches!(**source, LogError::Write { .. }), "{source}");
+    assert!(error.to_string().contains("no storage space"), "{error}");
+}
+
+#[test]
+fn an_unknown_source_is_an_error_of_the_thread() {
+    let (medium, _flushed) = slow(0);
+    let (mut port, handle) = Recorder::start(medium, &header(false), 0).unwrap();
+    port.raw(77, MonoNs(0), MonoNs(0), &[]).unwrap();
+    let error = handle.finish().unwrap_err();
+    assert!(error.to_string().contains("Raw(77)"), "{error}");
+}
+
+#[test]
+fn a_recording_is_never_overwritten() {
+    let path = std::env::temp_dir().join(format!("headrace-recorder-{}.mcap", std::process::id()));
+    std::fs::remove_file(&path).ok();
+    let (mut port, handle) = Recorder::create(&path, &header(true), 1 << 20).unwrap();
+    port.raw(0, MonoNs(1), MonoNs(1), b"ping").unwrap();
+    let summary = handle.finish().unwrap();
+    assert_eq!(std::fs::metadata(&path).unwrap().len(), summary.bytes);
+    assert!(matches!(Recorder::create(&path, &header(true), 0), Err(LogError::Create { .. })));
+    assert_eq!(read(&std::fs::read(&path).unwrap()).0.len(), 1);
+    std::fs::remove_file(&path).unwrap();
+}

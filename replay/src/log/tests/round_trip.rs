@@ -1,0 +1,146 @@
+//! What was written is read.
+
+use std::io::Write;
+
+use super::super::format::{Tick, seal};
+use super::super::{LogError, LogReader, LogWriter, file_digest};
+use super::*;
+
+/// Ticks that consume packets out of the order of their times, with results and sent bytes between.
+fn write<W: Write>(log: &mut LogWriter<W>, rounds: u32) -> Vec<Seen> {
+    let mut written = Vec::new();
+    for number in 0..rounds {
+        let (round, now) = (u64::from(number), 1_000_000 * (u64::from(number) + 1));
+        let bytes = number.to_le_bytes().repeat(4);
+        let early = MonoNs(now - 900_000);
+        log.raw(2, MonoNs(now - 1000), early, &bytes).unwrap();
+        written.push(("raw 2".to_owned(), now - 1000, early.0, number, bytes));
+        log.raw(0, MonoNs(now - 2000), MonoNs(now - 2000), b"head").unwrap();
+        written.push(("raw 0".to_owned(), now - 2000, now - 2000, number, b"head".to_vec()));
+        log.sent(1, MonoNs(now), &[]).unwrap();
+        written.push(("sent 1".to_owned(), now, now, number, vec![]));
+        log.tick(round, MonoNs(now), &[2, 0]).unwrap();
+        let mut tick = [round.to_le_bytes(), now.to_le_bytes()].concat();
+        tick.extend([2, 0, 0, 0, 2, 0, 0, 0]);
+        written.push(("tick".to_owned(), now, now, number, tick));
+        log.result(0, MonoNs(now), b"{}").unwrap();
+        written.push(("/result/advice".to_owned(), now, now, number, b"{}".to_vec()));
+    }
+    written
+}
+
+#[test]
+fn a_log_with_ticks_is_read_as_it_was_written() {
+    let mut log = LogWriter::new(Vec::new(), &header(true)).unwrap();
+    let mut written = write(&mut log, 50);
+    log.flush().unwrap();
+    written.extend(
+        write(&mut log, 50)
+            .into_iter()
+            .map(|(kind, at, valid, sequence, data)| (kind, at, valid, sequence + 50, data)),
+    );
+    let (bytes, summary) = log.finish().unwrap();
+    assert_eq!((summary.messages, summary.chunks, summary.bytes), (500, 3, bytes.len() as u64));
+    let mut reader = open(&bytes);
+    assert!(reader.has_ticks());
+    assert_eq!(read_all(&mut reader), written);
+    assert_eq!((reader.losses(), reader.late()), (&[][..], 0));
+    let tick = written.iter().find(|message| message.0 == "tick").unwrap();
+    assert_eq!(Tick::decode(&tick.4).unwrap().order().collect::<Vec<_>>(), [2, 0]);
+}
+
+#[test]
+fn the_header_comes_back() {
+    let written = header(true);
+    let (bytes, _) = LogWriter::new(Vec::new(), &written).unwrap().finish().unwrap();
+    let reader = open(&bytes);
+    let info = reader.header();
+    assert_eq!(info.vehicle_toml.as_ref(), Some(&written.vehicle_toml));
+    assert_eq!(info.attachments, written.attachments);
+    assert_eq!(info.sources, written.sources);
+    assert_eq!(info.metadata.get("config").map(String::as_str), Some("abc"));
+    assert_eq!(info.metadata.get("format").map(String::as_str), Some("1"));
+}
+
+#[test]
+fn a_log_without_ticks_is_read_by_time_then_source_then_sequence() {
+    let mut log = LogWriter::new(Vec::new(), &header(false)).unwrap();
+    for (source, at) in [(1, 30), (0, 30), (2, 10), (2, 10), (0, 20)] {
+        log.raw(source, MonoNs(at), MonoNs(at), &[]).unwrap();
+        log.flush().unwrap();
+    }
+    assert!(matches!(log.tick(0, MonoNs(0), &[]), Err(LogError::NoChannel { .. })));
+    let (bytes, _) = log.finish().unwrap();
+    let mut reader = open(&bytes);
+    assert!(!reader.has_ticks());
+    let order: Vec<_> = read_all(&mut reader).into_iter().map(|m| (m.0, m.1, m.3)).collect();
+    let wanted = [("raw 2", 10, 0), ("raw 2", 10, 1), ("raw 0", 20, 1), ("raw 0", 30, 0), ("raw 1", 30, 0)];
+    assert_eq!(order, wanted.map(|(kind, at, sequence)| (kind.to_owned(), at, sequence)));
+    assert_eq!((reader.losses(), reader.late()), (&[][..], 0));
+}
+
+#[test]
+fn the_same_messages_give_the_same_bytes() {
+    let log = || {
+        let mut log = LogWriter::new(Vec::new(), &header(true)).unwrap();
+        write(&mut log, 3000);
+        log.finish().unwrap().0
+    };
+    assert_eq!(log(), log());
+}
+
+#[test]
+fn chunks_close_by_size() {
+    let mut log = LogWriter::new(Vec::new(), &header(true)).unwrap();
+    for at in 0..40 {
+        log.raw(0, MonoNs(at), MonoNs(at), &vec![7; 100_000]).unwrap();
+    }
+    let (bytes, summary) = log.finish().unwrap();
+    assert!(summary.chunks >= 4, "{summary:?}");
+    assert_eq!(read(&bytes).0.len(), 40);
+}
+
+#[test]
+fn what_the_header_does_not_have_is_refused() {
+    let mut log = LogWriter::new(Vec::new(), &header(true)).unwrap();
+    assert!(matches!(log.raw(3, MonoNs(0), MonoNs(0), &[]), Err(LogError::NoChannel { .. })));
+    assert!(matches!(log.result(1, MonoNs(0), &[]), Err(LogError::NoChannel { .. })));
+    let mut outside = header(true);
+    outside.results[0].topic = "/raw/head0".to_owned();
+    assert!(matches!(LogWriter::new(Vec::new(), &outside), Err(LogError::Topic { .. })));
+}
+
+#[test]
+fn a_file_is_opened_by_its_path_and_digested() {
+    let path = std::env::temp_dir().join(format!("headrace-round-trip-{}.mcap", std::process::id()));
+    let mut log = LogWriter::create(&path, &header(true)).unwrap();
+    write(&mut log, 10);
+    log.finish().unwrap();
+    let mut reader = LogReader::open(&path).unwrap();
+    let mut count = 0;
+    while reader.next().unwrap().is_some() {
+        count += 1;
+    }
+    assert_eq!(count, 50);
+    std::fs::write(&path, b"abc").unwrap();
+    // Source: FIPS 180-4, the one-block example.
+    let abc = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
+    assert_eq!(file_digest(&path).unwrap(), abc);
+    let error = LogReader::open(&path).err().unwrap().to_string();
+    assert!(error.contains("[61 62 63], and [89 4d 43 41 50 30 0d 0a] is wanted"), "{error}");
+    std::fs::remove_file(&path).unwrap();
+    assert!(matches!(LogReader::open(&path), Err(LogError::Open { .. })));
+}
+
+#[test]
+fn a_later_format_is_refused() {
+    let (bytes, _) = LogWriter::new(Vec::new(), &header(true)).unwrap().finish().unwrap();
+    assert!(LogReader::new(Cursor::new(bytes), "old".to_owned()).is_ok());
+    let mut writer = mcap::Writer::new(Cursor::new(Vec::new())).unwrap();
+    let metadata = seal("headrace", [("format".to_owned(), "2".to_owned())].into());
+    writer.write_metadata(&mcap::records::Metadata { name: "headrace".to_owned(), metadata }).unwrap();
+    writer.finish().unwrap();
+    let bytes = writer.into_inner().into_inner();
+    let error = LogReader::new(Cursor::new(bytes), "new".to_owned()).err().unwrap();
+    assert_eq!(error.to_string(), "new is a log of format 2; this program reads formats up to 1");
+}

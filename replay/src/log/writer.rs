@@ -1,0 +1,325 @@
+//! Writing a log, on whatever thread calls: the one place where messages become records.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::Path;
+
+use headrace_core::time::MonoNs;
+use mcap::records::{MessageHeader, Metadata};
+use mcap::write::NoSeek;
+
+use super::LogError;
+use super::format::{
+    BYTES_ENCODING, CHANNEL_LIST, CONNECT_KEY, FORMAT_KEY, FORMAT_VERSION, METADATA, PLUGIN_KEY, RAW_PREFIX,
+    RESULT_PREFIX, SENT_PREFIX, SOURCE_KEY, TICK_TOPIC, VEHICLE_FILE, order_bytes, seal, tick_head,
+};
+
+/// A chunk is closed when it holds more than this, whatever the clock says.
+const CHUNK_BYTES: u64 = 1 << 20;
+
+/// What a log begins with.
+#[derive(Debug, Clone, Default)]
+pub struct LogHeader {
+    /// Text of the vehicle file.
+    pub vehicle_toml: String,
+    /// Files that the vehicle file names: name and content.
+    pub attachments: Vec<(String, Vec<u8>)>,
+    /// Version, digest of the configuration, clock anchors and the like.
+    pub metadata: BTreeMap<String, String>,
+    /// The sources; a source's place is its number in the messages.
+    pub sources: Vec<SourceInfo>,
+    /// Whether a loop will say when it ticked. A simulation has none, and its log no channel of ticks.
+    pub ticks: bool,
+    /// The results; a result's place is its number in the messages.
+    pub results: Vec<ResultChannel>,
+}
+
+/// A source of bytes, as its channels describe it.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct SourceInfo {
+    /// Name, also of its channels.
+    pub id: String,
+    /// Kind of device; empty where a log doesn't say.
+    pub plugin: String,
+    /// Where it was connected; empty where a log doesn't say.
+    pub connect: String,
+}
+
+/// A channel of results.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ResultChannel {
+    /// Its topic, which begins with `/result/`.
+    pub topic: String,
+    /// Name of its schema, for instance `foxglove.PoseInFrame`.
+    pub schema_name: String,
+    /// How the schema is written, for instance `jsonschema`.
+    pub schema_encoding: String,
+    /// The schema.
+    pub schema: String,
+    /// How its messages are written, for instance `json`.
+    pub message_encoding: String,
+}
+
+/// What has been written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Summary {
+    /// Messages of all channels.
+    pub messages: u64,
+    /// Bytes of these messages, before compression and without any framing.
+    pub message_bytes: u64,
+    /// Chunks, the one with the channels' definitions included.
+    pub chunks: u32,
+    /// Bytes of the file.
+    pub bytes: u64,
+}
+
+/// A channel by what it carries.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Lane {
+    Raw(u16),
+    Sent(u16),
+    Tick,
+    Result(u16),
+}
+
+/// A channel in the file and the number of its next message.
+#[derive(Debug, Clone, Copy)]
+struct Channel {
+    id: u16,
+    sequence: u32,
+}
+
+/// Writes a log. The writer under it is appended to and never sought, so that what is written stays as it is.
+///
+/// Chunks are compressed with zstd at its lowest level: a dive is written where nobody waits for it, at some hundred
+/// kB/s, of which even a small computer packs a thousandfold; so the smaller file wins over lz4's speed.
+pub struct LogWriter<W: Write> {
+    writer: mcap::Writer<NoSeek<W>>,
+    raw: Vec<Channel>,
+    sent: Vec<Channel>,
+    tick: Option<Channel>,
+    results: Vec<Channel>,
+    tick_message: Vec<u8>,
+    messages: u64,
+    message_bytes: u64,
+}
+
+impl LogWriter<BufWriter<File>> {
+    /// Starts a log in a file, and overwrites what was there.
+    ///
+    /// Errors: the file can't be made or written to, or the header isn't allowed (see [`LogWriter::new`]).
+    pub fn create(path: &Path, header: &LogHeader) -> Result<Self, LogError> {
+        let file = File::create(path).map_err(|source| LogError::Create { path: path.to_owned(), source })?;
+        Self::new(BufWriter::new(file), header)
+    }
+}
+
+impl<W: Write> LogWriter<W> {
+    /// Starts a log and writes all that comes before the first message.
+    ///
+    /// Errors: the writer's, a result's topic outside `/result/`, or more channels than MCAP counts.
+    pub fn new(writer: W, header: &LogHeader) -> Result<Self, LogError> {
+        if let Some(result) = header.results.iter().find(|result| !result.topic.starts_with(RESULT_PREFIX)) {
+            return Err(LogError::Topic { topic: result.topic.clone() });
+        }
+        // Threads would compress in pieces that depend on the machine, and the log of a simulation is a function of
+        // its scene. Without seeking a chunk is written at once when it is closed.
+        let options = mcap::WriteOptions::new()
+            .profile("headrace")
+            .library(concat!("headrace ", env!("CARGO_PKG_VERSION")))
+            .compression(Some(mcap::Compression::Zstd))
+            .compression_level(1)
+            .compression_threads(0)
+            .chunk_size(Some(CHUNK_BYTES))
+            .disable_seeking(true);
+        let mut writer = options.create(NoSeek::new(writer)).map_err(LogError::writing("the first bytes"))?;
+        write_metadata(&mut writer, header)?;
+        attach(&mut writer, VEHICLE_FILE, "application/toml", header.vehicle_toml.as_bytes())?;
+        for (name, data) in &header.attachments {
+            attach(&mut writer, name, "application/octet-stream", data)?;
+        }
+        let mut channels = ChannelList { writer: &mut writer, list: BTreeMap::new() };
+        let raw = channels.add_sources(RAW_PREFIX, &header.sources)?;
+        let sent = channels.add_sources(SENT_PREFIX, &header.sources)?;
+        let tick = header.ticks.then(|| channels.add(0, TICK_TOPIC, BYTES_ENCODING, BTreeMap::new()));
+        let tick = tick.transpose()?;
+        let results = channels.add_results(&header.results)?;
+        channels.write()?;
+        Ok(Self { writer, raw, sent, tick, results, tick_message: Vec::new(), messages: 0, message_bytes: 0 })
+    }
+
+    /// Bytes that `source` sent, received at `received` and valid for `valid`.
+    ///
+    /// Errors: the writer's, or a source that the header doesn't have.
+    pub fn raw(
+        &mut self,
+        source: u16,
+        received: MonoNs,
+        valid: MonoNs,
+        bytes: &[u8],
+    ) -> Result<(), LogError> {
+        self.message(Lane::Raw(source), received, valid, bytes)
+    }
+
+    /// Bytes sent to `source`.
+    ///
+    /// Errors: the writer's, or a source that the header doesn't have.
+    pub fn sent(&mut self, source: u16, at: MonoNs, bytes: &[u8]) -> Result<(), LogError> {
+        self.message(Lane::Sent(source), at, at, bytes)
+    }
+
+    /// A tick of the loop, and the numbers of the sources in the order in which it consumed their packets.
+    ///
+    /// Errors: the writer's, or the header said that there are no ticks.
+    pub fn tick(&mut self, index: u64, now: MonoNs, order: &[u16]) -> Result<(), LogError> {
+        let packets =
+            u32::try_from(order.len()).map_err(|_| LogError::TickTooLong { packets: order.len() })?;
+        let mut message = core::mem::take(&mut self.tick_message);
+        message.clear();
+        message.extend(tick_head(index, now, packets));
+        message.extend(order_bytes(order));
+        let written = self.message(Lane::Tick, now, now, &message);
+        self.tick_message = message;
+        written
+    }
+
+    /// A message of the result with that number.
+    ///
+    /// Errors: the writer's, or a result that the header doesn't have.
+    pub fn result(&mut self, channel: u16, time: MonoNs, bytes: &[u8]) -> Result<(), LogError> {
+        self.message(Lane::Result(channel), time, time, bytes)
+    }
+
+    /// Writes one message.
+    pub(super) fn message(
+        &mut self,
+        lane: Lane,
+        log_time: MonoNs,
+        publish_time: MonoNs,
+        bytes: &[u8],
+    ) -> Result<(), LogError> {
+        let channel = match lane {
+            Lane::Raw(source) => self.raw.get_mut(usize::from(source)),
+            Lane::Sent(source) => self.sent.get_mut(usize::from(source)),
+            Lane::Tick => self.tick.as_mut(),
+            Lane::Result(channel) => self.results.get_mut(usize::from(channel)),
+        };
+        let channel = channel.ok_or_else(|| LogError::NoChannel { channel: format!("{lane:?}") })?;
+        let header = MessageHeader {
+            channel_id: channel.id,
+            sequence: channel.sequence,
+            log_time: log_time.0,
+            publish_time: publish_time.0,
+        };
+        channel.sequence = channel.sequence.wrapping_add(1);
+        self.writer.write_to_known_channel(&header, bytes).map_err(LogError::writing("a message"))?;
+        self.messages += 1;
+        self.message_bytes += bytes.len() as u64;
+        Ok(())
+    }
+
+    /// Closes the chunk and flushes the writer: everything until now survives whatever comes.
+    ///
+    /// Errors: the writer's.
+    pub fn flush(&mut self) -> Result<(), LogError> {
+        self.writer.flush().map_err(LogError::writing("a chunk"))
+    }
+
+    /// Writes the summary, flushes, and gives the writer back.
+    ///
+    /// Errors: the writer's.
+    pub fn finish(mut self) -> Result<(W, Summary), LogError> {
+        let chunks = self.writer.finish().map_err(LogError::writing("the summary"))?.chunk_indexes.len();
+        let mut writer = self.writer.into_inner();
+        let flushed = writer.flush().and_then(|()| std::io::Seek::stream_position(&mut writer));
+        let bytes = flushed.map_err(|source| LogError::Write { what: "the summary", source })?;
+        let summary = Summary {
+            messages: self.messages,
+            message_bytes: self.message_bytes,
+            chunks: u32::try_from(chunks).unwrap_or(u32::MAX),
+            bytes,
+        };
+        Ok((writer.into_inner(), summary))
+    }
+}
+
+fn write_metadata<W: Write>(
+    writer: &mut mcap::Writer<NoSeek<W>>,
+    header: &LogHeader,
+) -> Result<(), LogError> {
+    let mut metadata = header.metadata.clone();
+    metadata.insert(FORMAT_KEY.to_owned(), FORMAT_VERSION.to_string());
+    let record = Metadata { name: METADATA.to_owned(), metadata: seal(METADATA, metadata) };
+    writer.write_metadata(&record).map_err(LogError::writing("metadata"))
+}
+
+fn attach<W: Write>(
+    writer: &mut mcap::Writer<NoSeek<W>>,
+    name: &str,
+    media_type: &str,
+    data: &[u8],
+) -> Result<(), LogError> {
+    let attachment = mcap::Attachment {
+        log_time: 0,
+        create_time: 0,
+        name: name.to_owned(),
+        media_type: media_type.to_owned(),
+        data: data.into(),
+    };
+    writer.attach(&attachment).map_err(LogError::writing("an attachment"))
+}
+
+/// Adds channels and notes them for the record that repeats them.
+struct ChannelList<'a, W: Write> {
+    writer: &'a mut mcap::Writer<NoSeek<W>>,
+    list: BTreeMap<String, String>,
+}
+
+impl<W: Write> ChannelList<'_, W> {
+    fn add(
+        &mut self,
+        schema: u16,
+        topic: &str,
+        encoding: &str,
+        metadata: BTreeMap<String, String>,
+    ) -> Result<Channel, LogError> {
+        let id = self.writer.add_channel(schema, topic, encoding, &metadata);
+        let id = id.map_err(LogError::writing("a channel"))?;
+        self.list.insert(format!("{id}/topic"), topic.to_owned());
+        self.list.extend(metadata.into_iter().map(|(key, value)| (format!("{id}/{key}"), value)));
+        Ok(Channel { id, sequence: 0 })
+    }
+
+    fn add_sources(&mut self, prefix: &str, sources: &[SourceInfo]) -> Result<Vec<Channel>, LogError> {
+        let mut channels = Vec::with_capacity(sources.len());
+        for (number, source) in sources.iter().enumerate() {
+            let metadata = BTreeMap::from([
+                (PLUGIN_KEY.to_owned(), source.plugin.clone()),
+                (CONNECT_KEY.to_owned(), source.connect.clone()),
+                (SOURCE_KEY.to_owned(), number.to_string()),
+            ]);
+            channels.push(self.add(0, &format!("{prefix}{}", source.id), BYTES_ENCODING, metadata)?);
+        }
+        Ok(channels)
+    }
+
+    fn add_results(&mut self, results: &[ResultChannel]) -> Result<Vec<Channel>, LogError> {
+        let mut channels = Vec::with_capacity(results.len());
+        for result in results {
+            let schema = self.writer.add_schema(
+                &result.schema_name,
+                &result.schema_encoding,
+                result.schema.as_bytes(),
+            );
+            let schema = schema.map_err(LogError::writing("a schema"))?;
+            channels.push(self.add(schema, &result.topic, &result.message_encoding, BTreeMap::new())?);
+        }
+        Ok(channels)
+    }
+
+    fn write(self) -> Result<(), LogError> {
+        let record = Metadata { name: CHANNEL_LIST.to_owned(), metadata: seal(CHANNEL_LIST, self.list) };
+        self.writer.write_metadata(&record).map_err(LogError::writing("the list of channels"))
+    }
+}

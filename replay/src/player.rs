@@ -1,0 +1,166 @@
+//! A recorded dive as a feed.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use headrace_core::app::SourceInfo;
+use headrace_core::app::reading::SourceId;
+use headrace_core::app::ring::{MAX_PACKET_BYTES, NO_ORDER, Port, RingError};
+use headrace_core::time::MonoNs;
+
+use crate::drive::{Coming, Feed};
+use crate::log::{LogError, LogInfo, LogReader, Loss, MessageKind};
+
+/// Plays the sources' messages of a log.
+pub struct Player {
+    reader: LogReader,
+    /// For each source of the log, the loop's source of that name.
+    sources: Vec<Option<SourceId>>,
+    ids: Vec<String>,
+    next: Option<Coming>,
+    bytes: Vec<u8>,
+    order: u64,
+    played: u64,
+    /// Messages that no sensor of the vehicle file takes, by the source's name.
+    unmatched: BTreeMap<String, u64>,
+    too_long: u64,
+}
+
+impl Player {
+    /// Opens a log.
+    ///
+    /// Errors: the file can't be read, isn't MCAP, or is of a later format.
+    pub fn open(path: &Path) -> Result<Self, LogError> {
+        let reader = LogReader::open(path)?;
+        let ids: Vec<String> = reader.header().sources.iter().map(|source| source.id.clone()).collect();
+        Ok(Self {
+            reader,
+            sources: vec![None; ids.len()],
+            ids,
+            next: None,
+            bytes: Vec::new(),
+            order: 0,
+            played: 0,
+            unmatched: BTreeMap::new(),
+            too_long: 0,
+        })
+    }
+
+    /// What the log says about itself.
+    pub fn info(&self) -> &LogInfo {
+        self.reader.header()
+    }
+
+    /// Matches the log's sources with the loop's, by name. Until then every message counts as unmatched.
+    pub fn connect(&mut self, sources: &[SourceInfo]) {
+        let find = |id: &String| {
+            let index = sources.iter().position(|source| source.id == *id)?;
+            u16::try_from(index).ok().map(SourceId)
+        };
+        self.sources = self.ids.iter().map(find).collect();
+    }
+
+    /// Messages handed over so far.
+    pub fn played(&self) -> u64 {
+        self.played
+    }
+
+    /// What was lost or left out so far, in words.
+    pub fn losses(&self) -> Vec<String> {
+        let mut all: Vec<String> = self.reader.losses().iter().map(Loss::to_string).collect();
+        for (id, count) in &self.unmatched {
+            all.push(format!("{count} messages of source {id:?}, which the vehicle file doesn't have"));
+        }
+        if self.too_long > 0 {
+            all.push(format!("{} messages of over {MAX_PACKET_BYTES} bytes", self.too_long));
+        }
+        if self.reader.late() > 0 {
+            all.push(format!("{} messages out of order by more than can be held", self.reader.late()));
+        }
+        all
+    }
+
+    /// Reads on to the next message of a source that the loop has.
+    fn read(&mut self) -> Result<Option<Coming>, LogError> {
+        while let Some(message) = self.reader.next()? {
+            let MessageKind::Raw { source } = message.kind else { continue };
+            let index = usize::from(source);
+            let Some(id) = self.sources.get(index).copied().flatten() else {
+                let name = self.ids.get(index).cloned().unwrap_or_else(|| source.to_string());
+                *self.unmatched.entry(name).or_default() += 1;
+                continue;
+            };
+            if message.data.len() > MAX_PACKET_BYTES {
+                self.too_long += 1;
+                continue;
+            }
+            self.bytes.clear();
+            self.bytes.extend_from_slice(message.data);
+            return Ok(Some(Coming { at: message.log_time, source: id, len: self.bytes.len() }));
+        }
+        Ok(None)
+    }
+}
+
+impl Feed for Player {
+    fn coming(&mut self) -> Result<Option<Coming>, LogError> {
+        if self.next.is_none() {
+            self.next = self.read()?;
+        }
+        Ok(self.next)
+    }
+
+    fn send(&mut self, port: &mut Port) -> Result<(), RingError> {
+        let Some(coming) = self.next else { return Ok(()) };
+        // Our own logs stand in the order in which the loop consumed them, others' in that of their times.
+        let order = if self.reader.has_ticks() { self.order } else { NO_ORDER };
+        port.send_in_order(coming.at, order, &self.bytes)?;
+        self.order += 1;
+        self.played += 1;
+        self.next = None;
+        Ok(())
+    }
+}
+
+/// A simulated dive as a feed; what is sent to the devices is left out.
+pub struct SimulationFeed {
+    simulation: crate::simulate::Simulation,
+    next: Option<crate::simulate::Message>,
+}
+
+impl SimulationFeed {
+    /// From the dive's first message on.
+    pub fn new(simulation: crate::simulate::Simulation) -> Self {
+        Self { simulation, next: None }
+    }
+}
+
+impl Feed for SimulationFeed {
+    fn coming(&mut self) -> Result<Option<Coming>, LogError> {
+        while self.next.is_none() {
+            match self.simulation.next_message() {
+                None => return Ok(None),
+                Some(message) if message.direction == headrace_core::app::device::Direction::Sent => {}
+                Some(message) => self.next = Some(message),
+            }
+        }
+        Ok(self.next.as_ref().map(|message| Coming {
+            at: message.at,
+            source: SourceId(message.source),
+            len: message.bytes.len(),
+        }))
+    }
+
+    fn send(&mut self, port: &mut Port) -> Result<(), RingError> {
+        if let Some(message) = &self.next {
+            port.send(message.at, &message.bytes)?;
+            self.next = None;
+        }
+        Ok(())
+    }
+}
+
+/// A moment as people read it in messages: seconds on the log's clock.
+pub fn seconds(at: MonoNs) -> String {
+    format!("{:.3} s", at.as_secs_f64())
+}

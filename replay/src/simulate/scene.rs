@@ -1,0 +1,85 @@
+//! `SCENE.toml`: a vehicle file, a trajectory, and the effects to simulate.
+
+use headrace_core::app::device::DeviceKind;
+use headrace_core::config::vehicle::Loader;
+use headrace_core::config::{ConfigError, Document, Section, VehicleConfig};
+
+use super::trajectory::{Leg, Trajectory};
+
+/// A scene, checked.
+pub struct Scene {
+    /// What people call it.
+    pub name: String,
+    /// Text of its vehicle file, which goes into the log.
+    pub vehicle_text: String,
+    /// The vehicle.
+    pub vehicle: VehicleConfig,
+    /// Its way.
+    pub trajectory: Trajectory,
+}
+
+/// What is wrong with a scene.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SceneError {
+    /// A key of the scene or of its vehicle file.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+}
+
+const CHAINAGE_M: std::ops::RangeInclusive<f64> = -20.0..=1.0e6;
+
+impl Scene {
+    /// Parses and checks a scene. `load` gives the text of a file that the scene or its vehicle file names.
+    ///
+    /// Errors: the first key that is missing, unknown or out of range; a trajectory that leaves the tunnel.
+    pub fn parse(
+        document: Document<'_>,
+        kinds: &[&dyn DeviceKind],
+        load: Loader<'_>,
+    ) -> Result<Self, SceneError> {
+        let root = document.root()?;
+        let name = root.text("name")?.unwrap_or_else(|| "unnamed scene".to_owned());
+        let file = root.required("vehicle", root.text("vehicle")?)?;
+        let vehicle_text = load(&file).map_err(|why| root.invalid("vehicle", &why))?;
+        let vehicle = VehicleConfig::parse(Document::new(&file, &vehicle_text), kinds, load)?;
+        let section = root.required("trajectory", root.section("trajectory")?)?;
+        let trajectory = parse_trajectory(section, &vehicle)?;
+        if let Some(effects) = root.section("effects")? {
+            // None is simulated yet: whatever is named is unknown.
+            effects.finish()?;
+        }
+        root.finish()?;
+        Ok(Self { name, vehicle_text, vehicle, trajectory })
+    }
+}
+
+fn parse_trajectory(section: Section<'_>, vehicle: &VehicleConfig) -> Result<Trajectory, ConfigError> {
+    let start_m = section.number("start_m", CHAINAGE_M)?.unwrap_or(0.0);
+    let reference = vehicle.tunnel.profile.reference();
+    let place_m = match section.numbers("place_m", -200.0..=200.0)?.as_deref() {
+        None => reference,
+        Some([y, z]) => [*y, *z],
+        Some(_) => return Err(section.invalid("place_m", "must be two numbers [y, z]")),
+    };
+    if !vehicle.tunnel.profile.contains(place_m) {
+        return Err(section.invalid("place_m", "must be inside the tunnel's profile"));
+    }
+    let mut legs = Vec::new();
+    for leg in section.sections("legs")? {
+        let distance_m = leg.required("distance_m", leg.number("distance_m", 0.01..=1.0e6)?)?;
+        let speed_mps = leg.required("speed_mps", leg.number("speed_mps", -5.0..=5.0)?)?;
+        if speed_mps.abs() < 1e-3 {
+            return Err(leg.invalid("speed_mps", "must be at least 0.001 either way, or the leg has no end"));
+        }
+        leg.finish()?;
+        legs.push(Leg { distance_m, speed_mps });
+    }
+    if legs.is_empty() {
+        return Err(
+            section.invalid("legs", "has no leg; at least one table headed [[trajectory.legs]] is needed")
+        );
+    }
+    section.finish()?;
+    Ok(Trajectory { start_m, place_m, legs })
+}

@@ -1,0 +1,191 @@
+//! The commands.
+
+use std::path::Path;
+
+use headrace_core::app::device::Direction;
+use headrace_core::app::report::{LogReport, Report};
+use headrace_core::config::vehicle::Loader;
+use headrace_core::config::{Document, VehicleConfig};
+use headrace_core::time::DurNs;
+use headrace_replay::drive::Pace;
+use headrace_replay::log::{LogWriter, file_digest};
+use headrace_replay::player::{Player, SimulationFeed};
+use headrace_replay::simulate::{Scene, Simulation};
+use serde_json::json;
+
+use crate::cli::{Check, Demo, Output, Replay, Run, Simulate};
+use crate::devices::KINDS;
+use crate::dive::{self, assemble, log_header};
+use crate::expect;
+use crate::failure::{self, Failure};
+use crate::files;
+use crate::summary::summary;
+use crate::watch::Watch;
+
+/// Shows a simulated dive.
+pub(crate) fn demo(args: &Demo) -> Result<u8, Failure> {
+    let (name, text) = files::DEMO_SCENE;
+    let scene = Scene::parse(Document::new(name, text), &KINDS, &files::built_in)?;
+    std::fs::create_dir_all(&args.out).map_err(|source| Failure::Write { path: args.out.clone(), source })?;
+    let (log, report_file) = (args.out.join("dive.mcap"), args.out.join("report.json"));
+    let dive = assemble(&scene.vehicle, &scene.vehicle_text, Some(&log))?;
+    println!("{}, target {} m: a simulated dive", scene.vehicle.name, scene.vehicle.target_m);
+    let mut feed = SimulationFeed::new(Simulation::new(&scene));
+    let pace = Pace { speed: args.speed.0, ..Pace::default() };
+    let report = dive.run(&mut feed, pace, &mut Watch::loud())?;
+    files::write(&report_file, &serde_json::to_vec_pretty(&report)?)?;
+    print!("\n{}", summary(&report));
+    println!("report {}\nlog    {}  (headrace replay it)", report_file.display(), log.display());
+    Ok(dive::exit_code(&report))
+}
+
+/// The dive itself.
+pub(crate) fn run(args: &Run) -> Result<u8, Failure> {
+    let (text, vehicle) = vehicle_file(&args.vehicle)?;
+    let Some(log) = &args.source else {
+        return Err(Failure::Usage(
+            "run: this version has no port drivers; --source LOG.mcap feeds the loop from a recorded dive"
+                .to_owned(),
+        ));
+    };
+    let mut player = Player::open(log)?;
+    let dive = assemble(&vehicle, &text, args.record.as_deref())?;
+    player.connect(dive.armed.sources());
+    let pace = Pace { speed: args.speed.0, ..Pace::default() };
+    let mut report = dive.run(&mut player, pace, &mut watch(&args.output))?;
+    note_losses(&mut report, log, &player)?;
+    finish(&report, &args.output)
+}
+
+/// Runs a recorded dive through the loop.
+pub(crate) fn replay(args: &Replay) -> Result<u8, Failure> {
+    let mut player = Player::open(&args.log)?;
+    let (text, mut vehicle) = match &args.vehicle {
+        Some(path) => vehicle_file(path)?,
+        None => {
+            let info = player.info();
+            let text = info.vehicle_toml.clone().ok_or_else(|| {
+                Failure::Usage(format!(
+                    "replaying {}: no vehicle file is attached to this log; give one with --vehicle",
+                    args.log.display()
+                ))
+            })?;
+            let vehicle = parse_vehicle("vehicle.toml", &text, &files::attached(&info.attachments))?;
+            (text, vehicle)
+        }
+    };
+    vehicle.target_m = args.target.unwrap_or(vehicle.target_m);
+    let dive = assemble(&vehicle, &text, None)?;
+    player.connect(dive.armed.sources());
+    let pace = Pace { tick: DurNs::from_millis(i64::from(args.tick_ms)), speed: args.speed.0 };
+    let mut report = dive.run(&mut player, pace, &mut watch(&args.output))?;
+    note_losses(&mut report, &args.log, &player)?;
+    let code = finish(&report, &args.output)?;
+    match &args.expect {
+        Some(golden) if expect::differs(&report, golden)? => Ok(failure::FAILED),
+        _ => Ok(code),
+    }
+}
+
+/// Turns a scene into a log.
+pub(crate) fn simulate(args: &Simulate) -> Result<u8, Failure> {
+    let text = files::read(&args.scene)?;
+    let name = args.scene.display().to_string();
+    let scene = Scene::parse(Document::new(&name, &text), &KINDS, &files::beside(&args.scene))?;
+    let mut writer =
+        LogWriter::create(&args.output, &log_header(&scene.vehicle, &scene.vehicle_text, false))?;
+    let mut simulation = Simulation::new(&scene);
+    while let Some(message) = simulation.next_message() {
+        match message.direction {
+            Direction::Received => writer.raw(message.source, message.at, message.at, &message.bytes)?,
+            Direction::Sent => writer.sent(message.source, message.at, &message.bytes)?,
+        }
+    }
+    let (_, written) = writer.finish()?;
+    let duration_s = scene.trajectory.duration_s();
+    if args.json {
+        let shown = json!({
+            "scene": scene.name, "duration_s": duration_s, "messages": written.messages, "bytes": written.bytes,
+        });
+        println!("{shown}");
+    } else {
+        println!(
+            "{}: {duration_s:.1} s of {}, {} messages, {} bytes in {}",
+            scene.name,
+            scene.vehicle.name,
+            written.messages,
+            written.bytes,
+            args.output.display()
+        );
+    }
+    Ok(failure::OK)
+}
+
+/// Says what a vehicle file describes.
+pub(crate) fn check(args: &Check) -> Result<u8, Failure> {
+    let (_, vehicle) = vehicle_file(&args.vehicle)?;
+    let sensors = vehicle.sensor_configs.iter();
+    if args.json {
+        let list: Vec<_> =
+            sensors.map(|s| json!({"id": s.id, "plugin": s.plugin, "connect": s.connect})).collect();
+        let shown = json!({
+            "vehicle": vehicle.name, "target_m": vehicle.target_m, "section_m": vehicle.section_m,
+            "tunnel": vehicle.tunnel.name, "perimeter_m": vehicle.tunnel.profile.perimeter_m(),
+            "length_m": vehicle.tunnel.length_m, "sensors": list,
+        });
+        println!("{shown}");
+    } else {
+        println!("{}: target {} m, sections of {} m", vehicle.name, vehicle.target_m, vehicle.section_m);
+        println!(
+            "tunnel {}: perimeter {:.2} m, length {} m",
+            vehicle.tunnel.name,
+            vehicle.tunnel.profile.perimeter_m(),
+            vehicle.tunnel.length_m
+        );
+        for sensor in sensors {
+            println!("  {:<12} {:<12} {}", sensor.id, sensor.plugin, sensor.connect);
+        }
+        println!("nothing is wrong with it");
+    }
+    Ok(failure::OK)
+}
+
+fn vehicle_file(path: &Path) -> Result<(String, VehicleConfig), Failure> {
+    let text = files::read(path)?;
+    let vehicle = parse_vehicle(&path.display().to_string(), &text, &files::beside(path))?;
+    Ok((text, vehicle))
+}
+
+fn parse_vehicle(name: &str, text: &str, load: Loader<'_>) -> Result<VehicleConfig, Failure> {
+    Ok(VehicleConfig::parse(Document::new(name, text), &KINDS, load)?)
+}
+
+fn watch(output: &Output) -> Watch {
+    if output.json { Watch::quiet() } else { Watch::loud() }
+}
+
+/// Adds to the report what the log read from is, and what of it was lost.
+fn note_losses(report: &mut Report, path: &Path, player: &Player) -> Result<(), Failure> {
+    let recorded = report.log.take();
+    let mut losses = player.losses();
+    losses.extend(recorded.into_iter().flat_map(|log| log.losses));
+    report.log = Some(LogReport {
+        path: path.display().to_string(),
+        sha256: file_digest(path)?,
+        messages: player.played(),
+        losses,
+    });
+    Ok(())
+}
+
+fn finish(report: &Report, output: &Output) -> Result<u8, Failure> {
+    if let Some(path) = &output.report {
+        files::write(path, &serde_json::to_vec_pretty(report)?)?;
+    }
+    if output.json {
+        println!("{}", serde_json::to_string_pretty(report)?);
+    } else {
+        print!("{}", summary(report));
+    }
+    Ok(dive::exit_code(report))
+}

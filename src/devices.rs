@@ -1,0 +1,12 @@
+//! The device kinds of this build. Adding a device adds a line here.
+
+use headrace_core::app::device::DeviceKind;
+
+/// Every kind of device that a vehicle file may name.
+pub(crate) const KINDS: [&dyn DeviceKind; 5] = [
+    &headrace_imagenex881::Kind,
+    &headrace_ping1d::Kind,
+    &headrace_bar100::Kind,
+    &headrace_imu_can::Kind,
+    &headrace_tether_hid::Kind,
+];

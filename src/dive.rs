@@ -1,0 +1,128 @@
+//! A dive from assembled loop to report: shared by `demo`, `run` and `replay`.
+
+use std::path::{Path, PathBuf};
+
+use headrace_core::app::flow::Notice;
+use headrace_core::app::outlet::{NoticeOutlet, NoticeReceiver};
+use headrace_core::app::plugin::Plugin;
+use headrace_core::app::report::{LogReport, Report};
+use headrace_core::app::run::Loop;
+use headrace_core::app::{App, Mission};
+use headrace_core::config::VehicleConfig;
+use headrace_core::fusion::direct::DirectNavigation;
+use headrace_replay::drive::{Feed, Pace, drive};
+use headrace_replay::log::{LogHeader, Recorder, RecorderHandle, SourceInfo, file_digest};
+use headrace_replay::record::{QUEUE_BYTES, RecorderOutlet};
+
+use crate::failure::{self, Failure};
+use crate::watch::Watch;
+
+/// Notices that may wait for the terminal; a tick of 20 ms has a handful.
+const NOTICES: usize = 1 << 16;
+
+/// A loop with the vehicle's sensors and ways out for its results.
+pub(crate) struct Dive {
+    pub(crate) armed: Loop,
+    notices: NoticeReceiver,
+    recorder: Option<(PathBuf, RecorderHandle)>,
+}
+
+/// Assembles the loop for a vehicle; `record_to` names a log to write.
+pub(crate) fn assemble(
+    vehicle: &VehicleConfig,
+    vehicle_text: &str,
+    record_to: Option<&Path>,
+) -> Result<Dive, Failure> {
+    let mut app = App::new(Mission {
+        profile: vehicle.tunnel.profile.clone(),
+        site: vehicle.site,
+        target_m: vehicle.target_m,
+        section_m: vehicle.section_m,
+        length_m: vehicle.tunnel.length_m,
+    });
+    for sensor in &vehicle.sensors {
+        let plugin: &dyn Plugin = sensor.as_ref();
+        app.add_plugin(plugin)?;
+    }
+    let (outlet, notices) = NoticeOutlet::new(NOTICES);
+    app.add_plugin(&outlet)?;
+    let recorder = match record_to {
+        None => None,
+        Some(path) => {
+            let (port, handle) =
+                Recorder::create(path, &log_header(vehicle, vehicle_text, true), QUEUE_BYTES)?;
+            app.add_plugin(&RecorderOutlet::new(port))?;
+            Some((path.to_owned(), handle))
+        }
+    };
+    let navigation = DirectNavigation::new(vehicle.tunnel.profile.clone(), vehicle.site);
+    Ok(Dive { armed: app.arm(Box::new(navigation))?, notices, recorder })
+}
+
+/// What a log of this vehicle begins with.
+pub(crate) fn log_header(vehicle: &VehicleConfig, vehicle_text: &str, ticks: bool) -> LogHeader {
+    let sources = vehicle.sensor_configs.iter().map(|sensor| SourceInfo {
+        id: sensor.id.clone(),
+        plugin: sensor.plugin.clone(),
+        connect: sensor.connect.clone(),
+    });
+    LogHeader {
+        vehicle_toml: vehicle_text.to_owned(),
+        attachments: vehicle
+            .attachments
+            .iter()
+            .map(|(name, text)| (name.clone(), text.clone().into_bytes()))
+            .collect(),
+        metadata: [("version".to_owned(), env!("CARGO_PKG_VERSION").to_owned())].into(),
+        sources: sources.collect(),
+        ticks,
+        results: Vec::new(),
+    }
+}
+
+impl Dive {
+    /// Runs the loop until the feed ends, shows what happens, and gives the report.
+    pub(crate) fn run(
+        mut self,
+        feed: &mut dyn Feed,
+        pace: Pace,
+        watch: &mut Watch,
+    ) -> Result<Report, Failure> {
+        let notices = self.notices.clone();
+        let driven = drive(&mut self.armed, feed, pace, &mut |dive| {
+            while let Some(notice) = notices.next() {
+                watch.notice(&notice, dive);
+            }
+        });
+        let last: Vec<Notice> = self.armed.finish();
+        for notice in &last {
+            watch.notice(notice, &self.armed);
+        }
+        watch.end();
+        let mut report = Report::of(&self.armed);
+        if let Some((path, handle)) = self.recorder.take() {
+            drop(self.armed);
+            let written = handle.finish();
+            let losses = written.as_ref().err().map(|error| format!("recording failed: {error}"));
+            report.log = Some(LogReport {
+                path: path.display().to_string(),
+                sha256: file_digest(&path)?,
+                messages: report.sources.iter().map(|source| source.packets).sum(),
+                losses: losses.into_iter().collect(),
+            });
+        }
+        driven?;
+        Ok(report)
+    }
+}
+
+/// The exit code that a finished dive deserves.
+pub(crate) fn exit_code(report: &Report) -> u8 {
+    if report.lost_data() {
+        failure::DATA_LOST
+    } else if report.dive.sonar {
+        failure::OK
+    } else {
+        failure::FAILED
+    }
+}

@@ -1,0 +1,45 @@
+//! Reading and writing files, and the ones that are built in.
+
+use std::path::{Path, PathBuf};
+
+use crate::failure::Failure;
+
+/// The demonstration's scene and its vehicle, so that the binary needs no file beside it.
+pub(crate) const DEMO_SCENE: (&str, &str) =
+    ("deploy/scenes/demo.toml", include_str!("../deploy/scenes/demo.toml"));
+const DEMO_VEHICLE: (&str, &str) =
+    ("../vehicles/vita2-4.toml", include_str!("../deploy/vehicles/vita2-4.toml"));
+
+/// Reads a text file.
+pub(crate) fn read(path: &Path) -> Result<String, Failure> {
+    std::fs::read_to_string(path).map_err(|source| Failure::Read { path: path.to_owned(), source })
+}
+
+/// Writes a file.
+pub(crate) fn write(path: &Path, content: &[u8]) -> Result<(), Failure> {
+    std::fs::write(path, content).map_err(|source| Failure::Write { path: path.to_owned(), source })
+}
+
+/// Loads the files that `file` names, relative to its folder.
+pub(crate) fn beside(file: &Path) -> impl Fn(&str) -> Result<String, String> {
+    let folder: PathBuf = file.parent().map(Path::to_owned).unwrap_or_default();
+    move |name| {
+        let path = folder.join(name);
+        std::fs::read_to_string(&path)
+            .map_err(|error| format!("can't be read at {}: {error}", path.display()))
+    }
+}
+
+/// Loads the built-in files that the demonstration names.
+pub(crate) fn built_in(name: &str) -> Result<String, String> {
+    if name == DEMO_VEHICLE.0 { Ok(DEMO_VEHICLE.1.to_owned()) } else { Err("is not built in".to_owned()) }
+}
+
+/// Loads a file that was attached to a log.
+pub(crate) fn attached(attachments: &[(String, Vec<u8>)]) -> impl Fn(&str) -> Result<String, String> {
+    move |name| {
+        let content = attachments.iter().find(|(attached, _)| attached == name).map(|(_, content)| content);
+        let content = content.ok_or_else(|| "is not attached to the log".to_owned())?;
+        String::from_utf8(content.clone()).map_err(|_| "is attached to the log, but is no text".to_owned())
+    }
+}
