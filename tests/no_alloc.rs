@@ -1,0 +1,146 @@
+//! The armed loop allocates nothing: a million packets of a four-head dive, with recorder and notice outlet, under an
+//! allocator that counts on the loop's thread.
+//!
+//! That it takes no lock is kept by clippy.toml, which bars the lock types from the whole workspace.
+
+#![expect(unsafe_code, reason = "a global allocator is an unsafe trait; this one counts and hands on to the system's")]
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+use std::path::Path;
+
+use headrace_core::app::device::{Direction, DeviceKind};
+use headrace_core::app::outlet::NoticeOutlet;
+use headrace_core::app::{App, Mission};
+use headrace_core::config::Document;
+use headrace_core::fusion::direct::DirectNavigation;
+use headrace_core::time::DurNs;
+use headrace_replay::log::{LogHeader, Recorder, SourceInfo};
+use headrace_replay::record::{QUEUE_BYTES, RecorderOutlet};
+use headrace_replay::simulate::{START, Scene, Simulation};
+
+struct Counting;
+
+thread_local! {
+    static COUNTED: Cell<Option<u64>> = const { Cell::new(None) };
+}
+
+fn count() {
+    // Const-initialised and without a destructor: looking at it allocates nothing.
+    COUNTED.with(|counted| counted.set(counted.get().map(|n| n + 1)));
+}
+
+// SAFETY: every call is handed on to the system's allocator unchanged.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        count();
+        // SAFETY: the caller's promises are passed on.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        count();
+        // SAFETY: as above.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+
+    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        count();
+        // SAFETY: as above.
+        unsafe { System.realloc(pointer, layout, size) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+/// Allocator calls made on this thread while `work` runs.
+fn allocations(work: impl FnOnce()) -> u64 {
+    COUNTED.with(|counted| counted.set(Some(0)));
+    work();
+    COUNTED.with(|counted| counted.replace(None)).unwrap()
+}
+
+const KINDS: [&dyn DeviceKind; 5] = [
+    &headrace_imagenex881::Kind,
+    &headrace_ping1d::Kind,
+    &headrace_bar100::Kind,
+    &headrace_imu_can::Kind,
+    &headrace_tether_hid::Kind,
+];
+
+/// Forth, too fast for a stretch, back over it, and forth again, so that flags are raised and cleared.
+const SCENE: &str = "vehicle = \"vita2-4.toml\"\n[trajectory]\n
+[[trajectory.legs]]\ndistance_m = 120\nspeed_mps = 0.197\n
+[[trajectory.legs]]\ndistance_m = 40\nspeed_mps = 0.4\n
+[[trajectory.legs]]\ndistance_m = 60\nspeed_mps = -0.2\n
+[[trajectory.legs]]\ndistance_m = 200\nspeed_mps = 0.35\n";
+
+#[test]
+fn a_million_packets_without_one_allocation() {
+    assert!(allocations(|| drop(vec![1])) > 0, "the counter counts");
+
+    let vehicles = Path::new(env!("CARGO_MANIFEST_DIR")).join("deploy/vehicles");
+    let load = |name: &str| std::fs::read_to_string(vehicles.join(name)).map_err(|error| error.to_string());
+    let scene = Scene::parse(Document::new("scene.toml", SCENE), &KINDS, &load).unwrap();
+    let vehicle = &scene.vehicle;
+    let mut app = App::new(Mission {
+        profile: vehicle.tunnel.profile.clone(),
+        site: vehicle.site,
+        target_m: vehicle.target_m,
+        section_m: vehicle.section_m,
+        length_m: 1000.0,
+    });
+    for sensor in &vehicle.sensors {
+        app.add_plugin(sensor.as_ref()).unwrap();
+    }
+    // Nobody empties this one: dropping the oldest must not allocate either.
+    let (outlet, notices) = NoticeOutlet::new(1000);
+    app.add_plugin(&outlet).unwrap();
+    let header = LogHeader {
+        vehicle_toml: scene.vehicle_text.clone(),
+        sources: vehicle
+            .sensor_configs
+            .iter()
+            .map(|s| SourceInfo { id: s.id.clone(), plugin: s.plugin.clone(), connect: s.connect.clone() })
+            .collect(),
+        ticks: true,
+        ..LogHeader::default()
+    };
+    let (port, recorder) = Recorder::start(std::io::sink(), &header, QUEUE_BYTES).unwrap();
+    app.add_plugin(&RecorderOutlet::new(port)).unwrap();
+    let navigation = DirectNavigation::new(vehicle.tunnel.profile.clone(), vehicle.site);
+    let mut dive = app.arm(Box::new(navigation)).unwrap();
+    let mut ports: Vec<_> = (0..vehicle.sensors.len()).map(|source| dive.take_port(source).unwrap()).collect();
+
+    let mut simulation = Simulation::new(&scene);
+    let mut until = START;
+    let (mut packets, mut allocated, mut waited) = (0_usize, 0, 0_u64);
+    let mut next = simulation.next_message();
+    while packets < 1_000_000 {
+        until = until + DurNs(20_000_000);
+        while let Some(message) = next.take_if(|message| message.at < until) {
+            if message.direction == Direction::Received {
+                ports[usize::from(message.source)].send(message.at, &message.bytes).unwrap();
+            }
+            next = simulation.next_message();
+        }
+        while dive.has_waiting() {
+            let mut consumed = 0;
+            allocated += allocations(|| consumed = dive.tick(until));
+            packets += consumed;
+            if consumed == 0 {
+                // The recorder is behind and holds packets back; it loses none.
+                waited += 1;
+                std::thread::sleep(std::time::Duration::from_millis(1));
+            }
+        }
+        assert!(next.is_some(), "the scene is too short: {packets} packets");
+    }
+    assert_eq!(allocated, 0, "allocator calls in {packets} packets");
+    assert!(notices.dropped() > 0, "the notice queue has overflowed");
+    drop(dive);
+    let written = recorder.finish().unwrap();
+    println!("{packets} packets, {} messages recorded, waited {waited} times", written.messages);
+    assert!(written.messages >= packets as u64, "recorded input is never dropped");
+}
