@@ -10,7 +10,7 @@ use headrace_core::time::DurNs;
 use headrace_replay::drive::Pace;
 use headrace_replay::log::{LogWriter, file_digest};
 use headrace_replay::player::{Player, SimulationFeed};
-use headrace_replay::simulate::{Scene, Simulation};
+use headrace_replay::simulate::{START, Scene, Simulation};
 use serde_json::json;
 
 use crate::cli::{Check, Demo, Output, Replay, Run, Simulate};
@@ -19,6 +19,7 @@ use crate::dive::{self, assemble, log_header};
 use crate::expect;
 use crate::failure::{self, Failure};
 use crate::files;
+use crate::progress::Progress;
 use crate::summary::summary;
 use crate::watch::Watch;
 
@@ -95,7 +96,15 @@ pub(crate) fn simulate(args: &Simulate) -> Result<u8, Failure> {
     let mut writer =
         LogWriter::create(&args.output, &log_header(&scene.vehicle, &scene.vehicle_text, false))?;
     let mut simulation = Simulation::new(&scene);
+    let mut progress = Progress::start();
     while let Some(message) = simulation.next_message() {
+        progress.at(|| {
+            format!(
+                "{:.0} s of {:.0} s",
+                message.at.since(START).as_secs_f64(),
+                scene.trajectory.duration_s()
+            )
+        });
         match message.direction {
             Direction::Received => writer.raw(message.source, message.at, message.at, &message.bytes)?,
             Direction::Sent => writer.sent(message.source, message.at, &message.bytes)?,

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use headrace_core::app::flow::Notice;
+use headrace_core::app::flow::{Notice, Tally};
 use headrace_core::app::outlet::{NoticeOutlet, NoticeReceiver};
 use headrace_core::app::plugin::Plugin;
 use headrace_core::app::report::{LogReport, Report};
@@ -15,6 +15,7 @@ use headrace_replay::log::{LogHeader, Recorder, RecorderHandle, SourceInfo, file
 use headrace_replay::record::{QUEUE_BYTES, RecorderOutlet};
 
 use crate::failure::{self, Failure};
+use crate::progress::Progress;
 use crate::watch::Watch;
 
 /// Notices that may wait for the terminal; a tick of 20 ms has a handful.
@@ -89,11 +90,17 @@ impl Dive {
         watch: &mut Watch,
     ) -> Result<Report, Failure> {
         let notices = self.notices.clone();
+        let mut progress = Progress::start();
         let driven = drive(&mut self.armed, feed, pace, &mut |dive| {
+            if watch.is_quiet() {
+                let tally = dive.world().resource::<Tally>();
+                progress.at(|| format!("{} packets, {} samples", tally.packets, tally.samples));
+            }
             while let Some(notice) = notices.next() {
                 watch.notice(&notice, dive);
             }
         });
+        drop(progress);
         let last: Vec<Notice> = self.armed.finish();
         for notice in &last {
             watch.notice(notice, &self.armed);

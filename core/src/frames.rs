@@ -96,6 +96,7 @@ impl<F> Vec3<F> {
     }
 
     /// The same direction with another length.
+    #[must_use]
     pub fn scaled(&self, factor: f64) -> Self {
         Self(self.0 * factor, PhantomData)
     }

@@ -7,7 +7,6 @@ use headrace_core::app::plugin::{Plugin, PluginError};
 use headrace_core::app::stage::Stage;
 
 use bevy_ecs::prelude::{Res, ResMut, Resource};
-use bevy_platform::cell::SyncCell;
 use std::cell::Cell;
 
 use crate::log::RecorderPort;
@@ -35,26 +34,23 @@ impl RecorderOutlet {
 
 #[derive(Resource)]
 struct Recording {
-    port: SyncCell<RecorderPort>,
+    port: RecorderPort,
     order: Vec<u16>,
 }
 
 impl Plugin for RecorderOutlet {
     fn build(&self, app: &mut App) -> Result<(), PluginError> {
         if let Some(port) = self.port.take() {
-            app.insert_resource(Recording {
-                port: SyncCell::new(port),
-                order: Vec::with_capacity(MAX_TICK_PACKETS),
-            });
+            app.insert_resource(Recording { port, order: Vec::with_capacity(MAX_TICK_PACKETS) });
             app.add_systems(Stage::Publish, record);
         }
         Ok(())
     }
 }
 
+#[expect(clippy::needless_pass_by_value, reason = "bevy hands systems their arguments by value")]
 fn record(mut inbox: ResMut<'_, Inbox>, time: Res<'_, TickTime>, mut recording: ResMut<'_, Recording>) {
     let Recording { port, order } = &mut *recording;
-    let port = port.get();
     if port.failed() {
         inbox.allowance_bytes = MAX_TICK_BYTES;
         return;

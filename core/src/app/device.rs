@@ -43,6 +43,12 @@ pub trait Decoder: Send + Sync {
 
     /// What the codec has seen so far.
     fn counts(&self) -> CodecCounts;
+
+    /// Readings that were understood but not handed on: a bad status, another range setting than the configured one, a
+    /// calibration that isn't known, a jump, an orientation that the device itself calls invalid.
+    fn withheld(&self) -> u64 {
+        0
+    }
 }
 
 /// What a schedule of heads needs to know of one head.

@@ -47,6 +47,7 @@ impl Plugin for NoticeOutlet {
     }
 }
 
+#[expect(clippy::needless_pass_by_value, reason = "bevy hands systems their arguments by value")]
 fn publish(notices: Res<'_, Notices>, outlet: Res<'_, Outlet>) {
     for notice in &notices.0 {
         if outlet.0.notices.force_push(*notice).is_some() {

@@ -173,8 +173,8 @@ pub struct EvidenceReport {
     pub cause: &'static str,
     /// Mean speed in the section, m/s.
     pub speed_mps: f64,
-    /// Speed that would have met the target, m/s.
-    pub v_max_mps: f64,
+    /// Speed that would have met the target with the heads evenly spread, m/s.
+    pub even_v_max_mps: f64,
     /// Time between passes, seconds.
     pub pass_gap_s: f64,
     /// The same had the heads been spread evenly.
@@ -219,6 +219,8 @@ pub struct SourceReport {
     pub skipped_bytes: u64,
     /// Readings taken from them.
     pub readings: u64,
+    /// Readings understood but not used: a bad status, another range setting, no calibration, a jump.
+    pub withheld: u64,
     /// Longest silence between two packets, seconds.
     pub longest_gap_s: f64,
     /// Packets a second.
@@ -344,7 +346,7 @@ fn evidence_report(evidence: Evidence) -> EvidenceReport {
     EvidenceReport {
         cause: evidence.cause.as_str(),
         speed_mps: evidence.speed_mps,
-        v_max_mps: evidence.v_max_mps,
+        even_v_max_mps: evidence.even_v_max_mps,
         pass_gap_s: evidence.pass_gap_s,
         even_pass_gap_s: evidence.even_pass_gap_s,
         missing_share: evidence.missing_share,
@@ -364,12 +366,12 @@ fn advice_report(entry: &AdviceEntry) -> AdviceReport {
 }
 
 fn source_reports(dive: &Loop, tallies: &SourceTallies) -> Vec<SourceReport> {
-    let counts = dive.decoder_counts();
+    let decoders = dive.decoder_counts().into_iter().zip(dive.decoder_withheld());
     dive.sources()
         .iter()
         .zip(&tallies.0)
-        .zip(counts)
-        .map(|((source, tally), counts)| {
+        .zip(decoders)
+        .map(|((source, tally), (counts, withheld))| {
             let span_s = tally.span.map_or(0.0, |(first, last)| last.since(first).as_secs_f64());
             let intervals = tally.packets.saturating_sub(1) as f64;
             SourceReport {
@@ -380,6 +382,7 @@ fn source_reports(dive: &Loop, tallies: &SourceTallies) -> Vec<SourceReport> {
                 bad_frames: counts.bad_frames,
                 skipped_bytes: counts.skipped_bytes,
                 readings: tally.readings,
+                withheld,
                 longest_gap_s: tally.longest_gap.as_secs_f64(),
                 rate_hz: if span_s > 0.0 { intervals / span_s } else { 0.0 },
             }

@@ -132,8 +132,8 @@ impl Loop {
         let at = self.world.resource::<Tally>().span.map_or(MonoNs(0), |(_, last)| last);
         let mut requests = Vec::new();
         self.world.resource_scope(|world, mut coverage: bevy_ecs::world::Mut<'_, Coverage>| {
-            let (swept, now) = (coverage.frontier.swept(), coverage.store.len());
-            coverage.sections.unsettled(swept, now, at, &mut |request| requests.push(request));
+            let Coverage { store, sections, frontier } = &mut *coverage;
+            sections.unsettled(frontier, store.len(), at, &mut |request| requests.push(request));
             world.resource_scope(|world, mut finder: bevy_ecs::world::Mut<'_, Finder>| {
                 world.resource_scope(|world, mut notices: bevy_ecs::world::Mut<'_, Notices>| {
                     notices.0.clear();
@@ -155,6 +155,11 @@ impl Loop {
     /// What each source's codec has seen, in the order of the sources.
     pub fn decoder_counts(&self) -> Vec<crate::codec::CodecCounts> {
         self.world.resource::<Decoders>().0.iter().map(|decoder| decoder.counts()).collect()
+    }
+
+    /// Readings that each source's decoder understood but did not hand on, in the order of the sources.
+    pub fn decoder_withheld(&self) -> Vec<u64> {
+        self.world.resource::<Decoders>().0.iter().map(|decoder| decoder.withheld()).collect()
     }
 
     /// Digest of all results so far: places, judgements and advice.

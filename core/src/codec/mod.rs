@@ -3,11 +3,15 @@
 //! A codec is a pure state machine. It is fed bytes in whatever pieces a port delivers and hands out values; it reads
 //! no clock, opens nothing, and holds no more than one frame's worth of bytes. Ports are another layer.
 
+mod bytes;
 #[cfg(feature = "contract")]
 pub mod contract;
-mod frame_buffer;
+mod framed;
+mod line_clock;
 
-pub use frame_buffer::{FrameBuffer, Verdict};
+pub use bytes::{Bytes, TooLong};
+pub use framed::{Framed, Framing, Verdict};
+pub use line_clock::LineClock;
 
 /// What a codec has seen so far. Every byte pushed is in exactly one of: a good frame, `skipped_bytes`, or still held.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

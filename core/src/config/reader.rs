@@ -137,13 +137,11 @@ impl<'a> Section<'a> {
     pub fn choice<T: Copy>(&self, key: &'static str, among: &[(&str, T)]) -> Result<Option<T>, ConfigError> {
         let Some(value) = self.ask(key) else { return Ok(None) };
         let found = value.get_ref().as_str().and_then(|text| among.iter().find(|(word, _)| *word == text));
-        match found {
-            Some((_, meaning)) => Ok(Some(*meaning)),
-            None => {
-                let words: Vec<&str> = among.iter().map(|(word, _)| *word).collect();
-                Err(self.error(key, Some(value), format!("must be one of {}", words.join(", "))))
-            }
+        if let Some((_, meaning)) = found {
+            return Ok(Some(*meaning));
         }
+        let words: Vec<&str> = among.iter().map(|(word, _)| *word).collect();
+        Err(self.error(key, Some(value), format!("must be one of {}", words.join(", "))))
     }
 
     /// Three numbers, each within `allowed`.

@@ -1,7 +1,7 @@
 //! Why a section failed, from what was measured while it was passed.
 
 use super::hole::Hole;
-use super::sections::Section;
+use super::sections::Passage;
 use crate::coverage::Reach;
 use crate::sampling::spacing;
 
@@ -46,8 +46,8 @@ pub struct Evidence {
     pub cause: Cause,
     /// Speed along the tunnel, m/s.
     pub speed_mps: f64,
-    /// Largest speed that would have met the target with the pass gap measured, m/s; zero where none.
-    pub v_max_mps: f64,
+    /// Largest speed that would have met the target with the heads evenly spread, m/s; zero where none.
+    pub even_v_max_mps: f64,
     /// Time between passes, seconds.
     pub pass_gap_s: f64,
     /// Time between passes had they been spread evenly, seconds.
@@ -58,39 +58,86 @@ pub struct Evidence {
     pub t_y_m: f64,
 }
 
-/// Names the cause of a fail.
+/// Names the cause of a hole from the passages of the sections that it touches.
 ///
 /// The order is that of certainty: what was never passed needs no other explanation; what could not be placed or did
 /// not return is explained by that when the rest would have met the target; then what slower driving can't mend, then
-/// phase, and last speed.
-pub fn explain(section: &Section, hole: &Hole, swept: Option<Reach>, target_m: f64) -> Evidence {
-    let passage = &section.passage;
-    let mean = |sum: f64| if passage.pings == 0 { 0.0 } else { sum / f64::from(passage.pings) };
-    let share = |count: u32| mean(f64::from(count));
-    let (speed_mps, pass_gap_s) = (mean(passage.speed_sum_mps), mean(passage.pass_gap_sum_s));
-    let (even_pass_gap_s, ping_s) = (mean(passage.even_gap_sum_s), mean(passage.ping_period_sum_s));
-    let t_y_m = passage.t_y_m;
-    let t_at = |gap_s: f64| spacing::t_max_m(speed_mps * gap_s, speed_mps * ping_s, t_y_m);
-    let radius_m = hole.diameter_m / 2.0;
-    let beyond = |swept: Reach| hole.x_m - radius_m < swept.from_m || hole.x_m + radius_m > swept.to_m;
-    let missing_share = share(passage.missing + passage.out_of_range);
-    let as_driven_meets = t_at(pass_gap_s) <= target_m;
+/// phase, and last speed. The figures are those of the passage that was driven worst.
+pub fn explain<'a>(
+    passages: &(impl Iterator<Item = &'a Passage> + Clone),
+    hole: &Hole,
+    swept_by_all: Option<Reach>,
+    target_m: f64,
+) -> Evidence {
+    let worst = passages
+        .clone()
+        .filter(|passage| passage.pings > 0)
+        .map(Driven::of)
+        .max_by(|a, b| a.t_m(a.pass_gap_s).total_cmp(&b.t_m(b.pass_gap_s)))
+        .unwrap_or_default();
+    let count = |of: fn(&Passage) -> u32| passages.clone().map(of).fold(0, u32::saturating_add);
+    let pings = count(|passage| passage.pings).max(1);
+    let (missing, beyond) = (count(|passage| passage.missing), count(|passage| passage.out_of_range));
+    let unplaced = count(|passage| passage.unplaced);
+    let missing_share = f64::from(missing + beyond) / f64::from(pings);
+    // What makes it a fail is an empty circle of the target's size; the hole may still shrink from ahead.
+    let radius_m = hole.diameter_m.min(target_m) / 2.0;
+    let passed = swept_by_all
+        .is_some_and(|swept| hole.x_m - radius_m >= swept.from_m && hole.x_m + radius_m <= swept.to_m);
+    let as_driven_meets = worst.t_m(worst.pass_gap_s) <= target_m;
 
-    let cause = if passage.pings == 0 || swept.is_none_or(beyond) {
+    let cause = if !passed || !hole.bounded {
         Cause::NotPassed
-    } else if share(passage.unplaced) > 0.02 && as_driven_meets {
+    } else if as_driven_meets && unplaced > missing + beyond {
         Cause::PositionLost
-    } else if passage.out_of_range > passage.missing && as_driven_meets {
+    } else if as_driven_meets && beyond > missing {
         Cause::OutOfRange
-    } else if missing_share > 0.0 && as_driven_meets {
+    } else if as_driven_meets && missing > 0 {
         Cause::MissingReturns
-    } else if t_y_m >= target_m {
+    } else if worst.t_y_m >= target_m {
         Cause::AngularStep
-    } else if !as_driven_meets && t_at(even_pass_gap_s) <= target_m {
+    } else if !as_driven_meets && worst.t_m(worst.even_pass_gap_s) <= target_m {
         Cause::Phase
     } else {
         Cause::TooFast
     };
-    let v_max_mps = spacing::speed_for_target_mps(target_m, t_y_m, pass_gap_s, ping_s).unwrap_or(0.0);
-    Evidence { cause, speed_mps, v_max_mps, pass_gap_s, even_pass_gap_s, missing_share, t_y_m }
+    let even_v_max =
+        spacing::speed_for_target_mps(target_m, worst.t_y_m, worst.even_pass_gap_s, worst.ping_period_s);
+    Evidence {
+        cause,
+        speed_mps: worst.speed_mps,
+        even_v_max_mps: even_v_max.unwrap_or(0.0),
+        pass_gap_s: worst.pass_gap_s,
+        even_pass_gap_s: worst.even_pass_gap_s,
+        missing_share,
+        t_y_m: worst.t_y_m,
+    }
+}
+
+/// How a section was driven: means over its pings.
+#[derive(Debug, Clone, Copy, Default)]
+struct Driven {
+    speed_mps: f64,
+    pass_gap_s: f64,
+    even_pass_gap_s: f64,
+    ping_period_s: f64,
+    t_y_m: f64,
+}
+
+impl Driven {
+    fn of(passage: &Passage) -> Self {
+        let mean = |sum: f64| sum / f64::from(passage.pings.max(1));
+        Self {
+            speed_mps: mean(passage.speed_sum_mps),
+            pass_gap_s: mean(passage.pass_gap_sum_s),
+            even_pass_gap_s: mean(passage.even_gap_sum_s),
+            ping_period_s: mean(passage.ping_period_sum_s),
+            t_y_m: passage.t_y_m,
+        }
+    }
+
+    /// T_max at this speed with that time between passes.
+    fn t_m(&self, pass_gap_s: f64) -> f64 {
+        spacing::t_max_m(self.speed_mps * pass_gap_s, self.speed_mps * self.ping_period_s, self.t_y_m)
+    }
 }

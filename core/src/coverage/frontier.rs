@@ -21,11 +21,20 @@ pub struct Reach {
 /// Follows the reach of all heads along the tunnel.
 #[derive(Debug, Clone, Default)]
 pub struct Frontier {
-    heads: [Option<(MonoNs, Reach)>; MAX_HEADS],
+    heads: [Option<Head>; MAX_HEADS],
     /// Every chainage that any head's reach has covered.
     swept: Option<Reach>,
     /// Sections, by index, that samples may still change.
     zone: Option<Range<i64>>,
+}
+
+/// One head.
+#[derive(Debug, Clone, Copy)]
+struct Head {
+    last: MonoNs,
+    reach: Reach,
+    /// Every chainage that this head's reach has covered.
+    swept: Reach,
 }
 
 /// What a head's return has changed.
@@ -45,6 +54,16 @@ impl Frontier {
         self.swept
     }
 
+    /// The stretch that every head that is alive has covered, or `None` where there is none.
+    pub fn swept_by_all(&self, now: MonoNs) -> Option<Reach> {
+        let common = |a: Reach, b: Reach| Reach { from_m: a.from_m.max(b.from_m), to_m: a.to_m.min(b.to_m) };
+        self.alive(now).map(|head| head.swept).reduce(common).filter(|all| all.from_m <= all.to_m)
+    }
+
+    fn alive(&self, now: MonoNs) -> impl Iterator<Item = &Head> {
+        self.heads.iter().flatten().filter(move |head| now.since(head.last).0 <= SILENT.0)
+    }
+
     /// A head has pinged, with or without a return. A section is out of the way when it is farther than `margin_m` from
     /// the reach of every head that is alive.
     pub fn advance(
@@ -56,11 +75,11 @@ impl Frontier {
         margin_m: f64,
     ) -> Moved {
         if let Some(slot) = self.heads.get_mut(head) {
-            *slot = Some((now, reach));
+            let swept = slot.map_or(reach, |head| head.swept.with(reach));
+            *slot = Some(Head { last: now, reach, swept });
         }
         self.swept = Some(self.swept.map_or(reach, |swept| swept.with(reach)));
-        let alive = |(last, _): &&(MonoNs, Reach)| now.since(*last).0 <= SILENT.0;
-        let all = self.heads.iter().flatten().filter(alive).map(|(_, reach)| *reach).reduce(Reach::with);
+        let all = self.alive(now).map(|head| head.reach).reduce(Reach::with);
         let Some(all) = all else { return Moved::default() };
         // Section k = [kL, (k+1)L) is behind when (k+1)L + margin <= from, ahead when kL - margin >= to.
         let first = crate::math::floor_to_i64((all.from_m - margin_m) / section_m);
@@ -72,6 +91,11 @@ impl Frontier {
 }
 
 impl Reach {
+    /// The middle of the stretch, m.
+    pub fn middle_m(&self) -> f64 {
+        f64::midpoint(self.from_m, self.to_m)
+    }
+
     fn with(self, other: Self) -> Self {
         Self { from_m: self.from_m.min(other.from_m), to_m: self.to_m.max(other.to_m) }
     }

@@ -47,6 +47,60 @@ struct Best {
     sigma_m: f64,
 }
 
+impl Tile {
+    /// Distance from the centre to a corner.
+    fn half_m(&self) -> f64 {
+        math::sqrt(self.half_x_m * self.half_x_m + self.half_sigma_m * self.half_sigma_m)
+    }
+
+    /// The tile cut across its longer side.
+    fn halves(&self) -> [Self; 2] {
+        let along_x = self.half_x_m > self.half_sigma_m;
+        [-0.5, 0.5].map(|side| {
+            if along_x {
+                Self { x_m: self.x_m + side * self.half_x_m, half_x_m: self.half_x_m / 2.0, ..*self }
+            } else {
+                let sigma_m = self.sigma_m + side * self.half_sigma_m;
+                Self { sigma_m, half_sigma_m: self.half_sigma_m / 2.0, ..*self }
+            }
+        })
+    }
+}
+
+/// Covers a section with about square tiles.
+fn first_tiles(perimeter_m: f64, from_m: f64, to_m: f64) -> impl Iterator<Item = Tile> {
+    let half_x_m = (to_m - from_m) / 2.0;
+    let count = math::floor_to_i64(perimeter_m / (2.0 * half_x_m)).clamp(1, 8192) + 1;
+    let half_sigma_m = perimeter_m / (2 * count) as f64;
+    (0..count).map(move |k| Tile {
+        x_m: from_m + half_x_m,
+        sigma_m: (2 * k + 1) as f64 * half_sigma_m,
+        half_x_m,
+        half_sigma_m,
+        bound_m: f64::INFINITY,
+    })
+}
+
+/// The tile with its bound by the distance of its middle, which may be the best place so far; `None` where no sample is
+/// in reach.
+fn looked_at(store: &SampleStore, tile: Tile, as_of: SampleIndex, best: &mut Best) -> Option<Tile> {
+    let nearest = store.nearest(tile.x_m, tile.sigma_m, tile.bound_m.min(FARTHEST_M), as_of)?;
+    let distance_m = math::sqrt(nearest.distance2());
+    if distance_m > best.distance_m {
+        *best = Best { distance_m, x_m: tile.x_m, sigma_m: tile.sigma_m };
+    }
+    Some(Tile { bound_m: tile.bound_m.min(distance_m + tile.half_m()), ..tile })
+}
+
+fn unbounded(tile: &Tile, perimeter_m: f64) -> Hole {
+    Hole {
+        diameter_m: 2.0 * FARTHEST_M,
+        x_m: tile.x_m,
+        sigma_m: math::wrap(tile.sigma_m, perimeter_m),
+        bounded: false,
+    }
+}
+
 /// Finds the largest hole of a stretch of wall; keeps its working memory from one search to the next.
 #[derive(Debug)]
 pub struct HoleFinder {
@@ -70,37 +124,35 @@ impl HoleFinder {
     ///
     /// Allocates: never, unless a section is over 4,000 cells large.
     pub fn largest(&mut self, store: &SampleStore, from_m: f64, to_m: f64, as_of: SampleIndex) -> Hole {
-        self.lay_tiles(store, from_m, to_m);
         let mut best = Best { distance_m: 0.0, x_m: from_m, sigma_m: 0.0 };
+        self.tiles.clear();
+        // A good first guess spares most of the work: every tile's middle is looked at before any is divided, and the
+        // most promising is divided first.
+        for tile in first_tiles(store.perimeter_m(), from_m, to_m) {
+            match looked_at(store, tile, as_of, &mut best) {
+                Some(tile) => self.tiles.push(tile),
+                None => return unbounded(&tile, store.perimeter_m()),
+            }
+        }
+        self.tiles.sort_unstable_by(|a, b| a.bound_m.total_cmp(&b.bound_m));
         while let Some(tile) = self.tiles.pop() {
-            if tile.bound_m <= best.distance_m {
-                continue;
-            }
-            let half_m = math::hypot(tile.half_x_m, tile.half_sigma_m);
-            let Some(nearest) = store.nearest(tile.x_m, tile.sigma_m, tile.bound_m.min(FARTHEST_M), as_of)
-            else {
-                return Hole {
-                    diameter_m: 2.0 * FARTHEST_M,
-                    x_m: tile.x_m,
-                    sigma_m: math::wrap(tile.sigma_m, store.perimeter_m()),
-                    bounded: false,
-                };
-            };
-            let distance_m = math::sqrt(nearest.distance2());
-            if distance_m > best.distance_m {
-                best = Best { distance_m, x_m: tile.x_m, sigma_m: tile.sigma_m };
-            }
-            let bound_m = distance_m + half_m;
-            if bound_m <= best.distance_m || half_m < NO_FINER_M {
+            let half_m = tile.half_m();
+            if tile.bound_m <= best.distance_m || half_m < NO_FINER_M {
                 continue;
             }
             // Worth dividing exactly only when the tile is small beside its distance from the samples.
-            let owners_known =
-                half_m < 0.5 * distance_m && self.find_owners(store, &tile, bound_m + half_m, as_of);
-            if owners_known {
-                self.divide(&tile, &mut best);
-            } else {
-                self.halve(&tile, bound_m, store);
+            let small = half_m < 0.5 * (tile.bound_m - half_m);
+            if small && self.find_owners(store, &tile, tile.bound_m + half_m, as_of) {
+                if self.reach_m(&tile) > best.distance_m {
+                    self.divide(&tile, &mut best);
+                }
+                continue;
+            }
+            for part in tile.halves() {
+                match looked_at(store, part, as_of, &mut best) {
+                    Some(part) => self.tiles.push(part),
+                    None => return unbounded(&part, store.perimeter_m()),
+                }
             }
         }
         Hole {
@@ -108,42 +160,6 @@ impl HoleFinder {
             x_m: best.x_m,
             sigma_m: math::wrap(best.sigma_m, store.perimeter_m()),
             bounded: true,
-        }
-    }
-
-    /// Covers the section with about square tiles.
-    fn lay_tiles(&mut self, store: &SampleStore, from_m: f64, to_m: f64) {
-        self.tiles.clear();
-        let half_x_m = (to_m - from_m) / 2.0;
-        let perimeter_m = store.perimeter_m();
-        let count = math::floor_to_i64(perimeter_m / (2.0 * half_x_m)).clamp(1, 8192) + 1;
-        let half_sigma_m = perimeter_m / (2 * count) as f64;
-        for k in 0..count {
-            self.tiles.push(Tile {
-                x_m: from_m + half_x_m,
-                sigma_m: (2 * k + 1) as f64 * half_sigma_m,
-                half_x_m,
-                half_sigma_m,
-                bound_m: f64::INFINITY,
-            });
-        }
-    }
-
-    fn halve(&mut self, tile: &Tile, bound_m: f64, store: &SampleStore) {
-        let along_x = tile.half_x_m > tile.half_sigma_m;
-        let (half_x_m, half_sigma_m) = if along_x {
-            (tile.half_x_m / 2.0, tile.half_sigma_m)
-        } else {
-            (tile.half_x_m, tile.half_sigma_m / 2.0)
-        };
-        for side in [-1.0, 1.0] {
-            let (x_m, sigma_m) = if along_x {
-                (tile.x_m + side * half_x_m, tile.sigma_m)
-            } else {
-                (tile.x_m, tile.sigma_m + side * half_sigma_m)
-            };
-            let sigma_m = if sigma_m < 0.0 { sigma_m + store.perimeter_m() } else { sigma_m };
-            self.tiles.push(Tile { x_m, sigma_m, half_x_m, half_sigma_m, bound_m });
         }
     }
 
@@ -164,7 +180,9 @@ impl HoleFinder {
                     continue;
                 }
                 // A vehicle that stands still lays samples on samples; one of them owns for all.
-                let repeated = |other: &Found| other.dx_m == image.dx_m && other.dsigma_m == image.dsigma_m;
+                let repeated = |other: &Found| {
+                    (other.dx_m - image.dx_m).abs() + (other.dsigma_m - image.dsigma_m).abs() <= 0.0
+                };
                 if owners.iter().any(repeated) {
                     continue;
                 }
@@ -178,15 +196,29 @@ impl HoleFinder {
         fits
     }
 
+    /// A closer bound, from the owners: no place of the tile is farther from its nearest sample than its farthest corner
+    /// is from any one owner.
+    fn reach_m(&self, tile: &Tile) -> f64 {
+        let corner2 = |owner: &Found| {
+            let (dx, dsigma) = (owner.dx_m.abs() + tile.half_x_m, owner.dsigma_m.abs() + tile.half_sigma_m);
+            dx * dx + dsigma * dsigma
+        };
+        math::sqrt(self.owners.iter().map(corner2).fold(f64::INFINITY, f64::min))
+    }
+
     /// Divides the tile among its owners, and takes the farthest corner of any share.
     fn divide(&mut self, tile: &Tile, best: &mut Best) {
+        let half_m = tile.half_m();
         for (k, owner) in self.owners.iter().enumerate() {
+            if math::sqrt(owner.distance2()) + half_m <= best.distance_m {
+                continue;
+            }
             // In coordinates about the owner, differences of near places are exact.
             let (left, right) = (-owner.dx_m - tile.half_x_m, -owner.dx_m + tile.half_x_m);
             let (low, high) = (-owner.dsigma_m - tile.half_sigma_m, -owner.dsigma_m + tile.half_sigma_m);
             self.share.set_rectangle(left, right, low, high);
             for (other, rival) in self.owners.iter().enumerate() {
-                if other != k {
+                if other != k && !self.share.corners.is_empty() {
                     self.share.clip(rival.dx_m - owner.dx_m, rival.dsigma_m - owner.dsigma_m);
                 }
             }
@@ -223,8 +255,11 @@ impl Polygon {
 
     /// Keeps the part that is at least as near to the origin as to a rival at (`nx`, `ny`).
     fn clip(&mut self, nx: f64, ny: f64) {
-        let half = (nx * nx + ny * ny) / 2.0;
+        let half = 0.5 * (nx * nx + ny * ny);
         let excess = |corner: (f64, f64)| nx * corner.0 + ny * corner.1 - half;
+        if self.corners.iter().all(|corner| excess(*corner) <= 0.0) {
+            return;
+        }
         self.clipped.clear();
         let mut before = self.corners.last().copied().unwrap_or_default();
         let mut excess_before = excess(before);

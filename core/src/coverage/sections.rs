@@ -3,7 +3,7 @@
 use core::ops::Range;
 
 use super::cause::{Evidence, explain};
-use super::frontier::{Moved, Reach};
+use super::frontier::{Frontier, Moved, Reach};
 use super::hole::{FARTHEST_M, Hole, HoleFinder};
 use super::store::{SampleIndex, SampleStore};
 use crate::math;
@@ -152,8 +152,8 @@ pub struct Request {
     pub as_of: SampleIndex,
     /// The moment.
     pub at: MonoNs,
-    /// The stretch that had been swept by then.
-    pub swept: Option<Reach>,
+    /// The stretch that every head had swept by then.
+    pub swept_by_all: Option<Reach>,
     /// Whether the section's surroundings are complete.
     pub settles: bool,
 }
@@ -251,26 +251,27 @@ impl Sections {
     pub fn due(
         &mut self,
         moved: &Moved,
-        swept: Option<Reach>,
+        frontier: &Frontier,
         as_of: SampleIndex,
         at: MonoNs,
         ask: &mut impl FnMut(Request),
     ) {
-        let (Some(reach), Some(swept)) = (moved.reach, swept) else { return };
-        let passed = self.index_of(swept.from_m)..self.index_of(swept.to_m) + 1;
-        for range in [&moved.left_behind, &moved.left_ahead] {
-            if range.is_empty() {
-                continue;
-            }
-            self.ask_for_left(
-                range,
-                &passed,
-                Request { section: 0, as_of, at, swept: Some(swept), settles: false },
-                ask,
-            );
-        }
         if moved.left_behind.is_empty() && moved.left_ahead.is_empty() {
             return;
+        }
+        let Some(reach) = moved.reach else { return };
+        let passed = self.passed(frontier.swept());
+        let swept_by_all = frontier.swept_by_all(at);
+        let ask_for = |section, settles| Request { section, as_of, at, swept_by_all, settles };
+        for range in [&moved.left_behind, &moved.left_ahead] {
+            for index in clamp(range.clone(), &passed) {
+                let Some(section) = self.get_mut(index) else { continue };
+                if section.stale || section.hole.is_none() {
+                    section.stale = false;
+                    section.settled = false;
+                    ask(ask_for(index, false));
+                }
+            }
         }
         let far = math::floor_to_i64(FARTHEST_M / self.section_m) + 1;
         let behind = moved.left_behind.end - far..moved.left_behind.end;
@@ -283,25 +284,8 @@ impl Sections {
                 let radius_m = hole.diameter_m / 2.0;
                 if to_m + radius_m <= reach.from_m || from_m - radius_m >= reach.to_m {
                     section.settled = true;
-                    ask(Request { section: index, as_of, at, swept: Some(swept), settles: true });
+                    ask(ask_for(index, true));
                 }
-            }
-        }
-    }
-
-    fn ask_for_left(
-        &mut self,
-        left: &Range<i64>,
-        passed: &Range<i64>,
-        template: Request,
-        ask: &mut impl FnMut(Request),
-    ) {
-        for index in clamp(left.clone(), passed) {
-            let Some(section) = self.get_mut(index) else { continue };
-            if section.stale || section.hole.is_none() {
-                section.stale = false;
-                section.settled = false;
-                ask(Request { section: index, ..template });
             }
         }
     }
@@ -327,7 +311,9 @@ impl Sections {
         section.settled = request.settles || section.verdict == Verdict::Pass;
         let flagged = section.flagged.is_some() && section.cleared.is_none();
         if section.verdict == Verdict::Fail {
-            section.evidence = Some(explain(section, &hole, request.swept, target_m));
+            let evidence = self.explain(&hole, request.swept_by_all);
+            let section = self.get_mut(request.section)?;
+            section.evidence = Some(evidence);
             if !flagged {
                 section.flagged = Some(request.at);
                 section.cleared = None;
@@ -340,21 +326,29 @@ impl Sections {
         Some(Judgement::Updated)
     }
 
+    /// The cause of a hole: that of the worst passage among the sections that it touches.
+    fn explain(&self, hole: &Hole, swept_by_all: Option<Reach>) -> Evidence {
+        let radius_m = hole.diameter_m / 2.0;
+        let touched = self.index_of(hole.x_m - radius_m)..self.index_of(hole.x_m + radius_m) + 1;
+        let passages = touched.filter_map(|index| self.get(index)).map(|section| &section.passage);
+        explain(&passages, hole, swept_by_all, self.target_m)
+    }
+
     /// Calls `ask` for every section that was passed and isn't settled, at the end of a dive.
     pub fn unsettled(
         &mut self,
-        swept: Option<Reach>,
+        frontier: &Frontier,
         as_of: SampleIndex,
         at: MonoNs,
         ask: &mut impl FnMut(Request),
     ) {
-        let Some(reach) = swept else { return };
-        for index in self.passed(Some(reach)) {
+        let swept_by_all = frontier.swept_by_all(at);
+        for index in self.passed(frontier.swept()) {
             let Some(section) = self.get_mut(index) else { continue };
             if section.stale || !section.settled {
                 section.stale = false;
                 section.settled = true;
-                ask(Request { section: index, as_of, at, swept, settles: true });
+                ask(Request { section: index, as_of, at, swept_by_all, settles: true });
             }
         }
     }

@@ -116,6 +116,11 @@ impl SampleStore {
         (self.layout.from_m, self.layout.to_m)
     }
 
+    /// Whether a place is within the stretch of which samples are kept, and its coordinates are numbers.
+    pub fn covers(&self, x_m: f64, sigma_m: f64) -> bool {
+        self.row(x_m).is_some() && sigma_m.is_finite()
+    }
+
     /// Samples kept so far; as an index, the moment now.
     pub fn len(&self) -> SampleIndex {
         SampleIndex(u32::try_from(self.samples.len()).unwrap_or(u32::MAX))

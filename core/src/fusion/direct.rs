@@ -179,15 +179,15 @@ impl Navigation for DirectNavigation {
     fn update(&mut self, source: usize, sensor: &SensorInfo, at: MonoNs, reading: &Reading) {
         match (sensor.kind, reading) {
             (SensorKind::Imu, Reading::Attitude(rotation)) => {
-                self.take_attitude(at, &sensor.mount, *rotation)
+                self.take_attitude(at, &sensor.mount, *rotation);
             }
             (SensorKind::Tether { zero_at_m, scale }, Reading::TetherLength(length)) => {
                 self.tether.take(at, zero_at_m, scale, length);
             }
-            (SensorKind::Echosounder { min_confidence }, Reading::Echo(echo)) => {
-                if echo.confidence >= min_confidence {
-                    self.take_echo(source, at, &sensor.mount, echo);
-                }
+            (SensorKind::Echosounder { min_confidence }, Reading::Echo(echo))
+                if echo.confidence >= min_confidence =>
+            {
+                self.take_echo(source, at, &sensor.mount, echo);
             }
             (SensorKind::Depth, Reading::Pressure(water)) => {
                 self.take_pressure(at, &sensor.mount, water.pressure_pa);

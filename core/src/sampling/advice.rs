@@ -106,37 +106,110 @@ impl Advice {
     }
 }
 
+/// How far the vehicle may move across the tunnel, m, or turn, as a quaternion's component (half an angle, rad), before
+/// its largest steps along the wall are worked out anew. Both change them by well under the speed margin.
+const STILL_M: f64 = 0.01;
+const STILL_TURN: f64 = 0.002;
+
+/// The largest step of each head, remembered while the vehicle keeps its place in the section.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct StepMemory {
+    heads: [Option<Remembered>; MAX_HEADS],
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Remembered {
+    place_m: [f64; 2],
+    attitude: [f64; 4],
+    step_rad: f64,
+    largest_m: f64,
+}
+
+impl StepMemory {
+    fn largest_step_m(
+        &mut self,
+        number: usize,
+        head: &HeadMotion,
+        pose: &Pose,
+        profile: &Profile,
+    ) -> Option<f64> {
+        let place_m = [pose.position.y(), pose.position.z()];
+        let attitude = pose.attitude.wxyz();
+        let near = |a: &[f64], b: &[f64], by: f64| a.iter().zip(b).all(|(a, b)| (a - b).abs() <= by);
+        let slot = self.heads.get_mut(number)?;
+        let holds = |known: &&mut Remembered| {
+            near(&known.place_m, &place_m, STILL_M)
+                && near(&known.attitude, &attitude, STILL_TURN)
+                && near(&[known.step_rad], &[head.step_rad], 1e-9)
+        };
+        if let Some(known) = slot.as_mut().filter(holds) {
+            return Some(known.largest_m);
+        }
+        // Of a sector the ends aren't known, only the size: the whole turn is looked at, which is the safer answer.
+        let sweep = Sweep { at_rad: head.angle_rad, step_rad: head.step_rad, span_rad: TAU };
+        let largest_m = spacing::largest_step_m(profile, pose, &head.mount, &sweep)?;
+        *slot = Some(Remembered { place_m, attitude, step_rad: head.step_rad, largest_m });
+        Some(largest_m)
+    }
+}
+
 /// The largest speed at which the predicted T_max stays within `target_m`, by inverting Eq. 16 with what is measured:
-/// turn period, step, number and phases of the heads, and the vehicle's place and attitude.
+/// turn period, step, number and phases of the heads as they would meet the wall at that speed, and the vehicle's place
+/// and attitude.
 ///
 /// Source: metrics.md, "Speed advice".
-pub fn advise(situation: &Situation, profile: &Profile, target_m: f64) -> Advice {
+pub fn advise(situation: &Situation, profile: &Profile, target_m: f64, memory: &mut StepMemory) -> Advice {
     let Some(pose) = situation.pose else { return Advice::nothing(Reason::NoHeadingOrFix) };
     if !situation.heads.iter().flatten().any(|_| true) {
         return Advice::nothing(Reason::NoReturns);
     }
     let mut t_y_m = 0.0_f64;
-    for head in situation.heads.iter().flatten() {
-        let span_rad = head.sector_rad.unwrap_or(TAU);
-        let sweep = Sweep { at_rad: head.angle_rad, step_rad: head.step_rad, span_rad };
-        match spacing::largest_step_m(profile, &pose, &head.mount, &sweep) {
+    for (number, head) in situation.heads.iter().enumerate() {
+        let Some(head) = head else { continue };
+        match memory.largest_step_m(number, head, &pose, profile) {
             Some(step_m) => t_y_m = t_y_m.max(step_m),
             None => return Advice::nothing(Reason::NoHeadingOrFix),
         }
     }
     let (pass_gap_s, even_pass_gap_s) = pass_gaps_s(&situation.heads, situation.speed_mps);
     let ping_period_s = situation.heads.iter().flatten().map(HeadMotion::ping_period_s).fold(0.0, f64::max);
-    let v_max = spacing::speed_for_target_mps(target_m, t_y_m, pass_gap_s, ping_period_s);
+    let even_v_max = spacing::speed_for_target_mps(target_m, t_y_m, even_pass_gap_s, ping_period_s);
+    let meets = |speed_mps: f64| {
+        let (gap_s, _) = pass_gaps_s(&situation.heads, speed_mps);
+        spacing::t_max_m(speed_mps * gap_s, speed_mps * ping_period_s, t_y_m) <= target_m
+    };
     let speed = situation.speed_mps.abs();
     Advice {
-        v_max_mps: v_max.map_or(0.0, |v| v * (1.0 - SPEED_MARGIN)),
-        reason: if v_max.is_some() { Reason::HelixPitch } else { Reason::AngularStep },
+        v_max_mps: even_v_max.map_or(0.0, |fastest| largest_speed_mps(fastest, meets) * (1.0 - SPEED_MARGIN)),
+        reason: if even_v_max.is_some() { Reason::HelixPitch } else { Reason::AngularStep },
         predicted_t_m: Some(spacing::t_max_m(speed * pass_gap_s, speed * ping_period_s, t_y_m)),
         pass_gap_s,
         even_pass_gap_s,
         t_y_m,
         ping_period_s,
     }
+}
+
+/// The largest speed up to `fastest_mps` that `meets` the target.
+///
+/// Heads apart along the hull keep their phases at one speed only, so that what meets the target isn't an interval:
+/// speeds are tried from above, and the edge of the first that meets it is then closed in on.
+fn largest_speed_mps(fastest_mps: f64, meets: impl Fn(f64) -> bool) -> f64 {
+    const TRIED: u32 = 64;
+    // The bound itself is met but for rounding when the heads are evenly phased.
+    let at = |k: u32| fastest_mps * (1.0 - f64::from(k) / f64::from(TRIED)) * (1.0 - 1e-12);
+    let Some(first) = (0..TRIED).find(|k| meets(at(*k))) else { return 0.0 };
+    let Some(too_fast) = first.checked_sub(1) else { return at(0) };
+    let (mut good, mut bad) = (at(first), at(too_fast));
+    for _ in 0..20 {
+        let middle = f64::midpoint(good, bad);
+        if meets(middle) {
+            good = middle;
+        } else {
+            bad = middle;
+        }
+    }
+    good
 }
 
 /// The longest time between two passes over a place of the wall, as the heads are phased at this speed, and what it
@@ -183,9 +256,16 @@ pub fn pass_gaps_s(heads: &[Option<HeadMotion>; MAX_HEADS], speed_mps: f64) -> (
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{Advice, HeadMotion, MAX_HEADS, Reason, SPEED_MARGIN, Situation, StepMemory, spacing};
+    use crate::frames::{Mount, Pose};
     use crate::frames::{Point3, Rot, Vec3};
+    use crate::math::TAU;
+    use crate::tunnel::Profile;
     use crate::tunnel::named;
+
+    fn advise(situation: &Situation, profile: &Profile, target_m: f64) -> Advice {
+        super::advise(situation, profile, target_m, &mut StepMemory::default())
+    }
 
     fn situation(angles_deg: &[f64], x_m: &[f64], speed_mps: f64, profile: &Profile) -> Situation {
         let mut heads = [None; MAX_HEADS];
@@ -226,6 +306,27 @@ mod tests {
         // Half a pitch apart along the hull, the same angles interleave: 0.2 m/s, 8 s a turn, 0.8 m.
         let apart = advise(&situation(&[0.0, 0.0], &[0.8, 0.0], 0.2, &profile), &profile, 2.0);
         assert!((apart.pass_gap_s - 4.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_largest_speed_is_one_at_which_the_phases_of_heads_apart_hold() {
+        let profile = named::ceran().unwrap();
+        let target_m = 1.0;
+        let now = situation(&[0.0, 0.0], &[0.8, 0.0], 0.2, &profile);
+        let advice = advise(&now, &profile, target_m);
+        let t_at = |speed_mps: f64| {
+            let gap_s = super::pass_gaps_s(&now.heads, speed_mps).0;
+            spacing::t_max_m(speed_mps * gap_s, speed_mps * advice.ping_period_s, advice.t_y_m)
+        };
+        let v_max = advice.v_max_mps / (1.0 - SPEED_MARGIN);
+        assert!((t_at(v_max) - target_m).abs() < 1e-6, "{v_max}: {}", t_at(v_max));
+        assert!(t_at(1.02 * v_max) > target_m);
+        // Evenly spread at every speed, they could go faster.
+        let even = spacing::speed_for_target_mps(target_m, advice.t_y_m, 4.0, advice.ping_period_s).unwrap();
+        assert!(v_max < 0.99 * even, "{v_max} and {even}");
+        // The advice doesn't depend on how fast one goes while it is given.
+        let faster = advise(&Situation { speed_mps: 0.5, ..now }, &profile, target_m);
+        assert!((faster.v_max_mps - advice.v_max_mps).abs() < 1e-12);
     }
 
     #[test]

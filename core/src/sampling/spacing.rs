@@ -44,11 +44,15 @@ pub struct Sweep {
 /// Source: Eq. 6 where the paper's assumptions hold.
 pub fn largest_step_m(profile: &Profile, pose: &Pose, mount: &Mount, sweep: &Sweep) -> Option<f64> {
     let origin = pose.place(mount.position);
+    let from = [origin.y(), origin.z()];
+    if !profile.contains(from) {
+        return None;
+    }
     let turn = pose.attitude * mount.rotation;
     let pings = math::floor_to_i64(sweep.span_rad.min(TAU) / sweep.step_rad).clamp(1, 20_000);
     let at = |ping: i64| {
         let direction: Vec3<_> = turn * head_direction(sweep.at_rad + ping as f64 * sweep.step_rad);
-        let hit = profile.cast([origin.y(), origin.z()], [direction.y(), direction.z()])?;
+        let hit = profile.cast_from_inside(from, [direction.y(), direction.z()])?;
         Some((direction.x() * hit.range_m, hit.sigma_m))
     };
     let mut before = at(0)?;

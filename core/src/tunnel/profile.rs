@@ -191,6 +191,11 @@ impl Profile {
         self.hit(origin, direction)
     }
 
+    /// [`Profile::cast`] for many rays from one point, which the caller knows to be inside.
+    pub fn cast_from_inside(&self, origin: Yz, direction: Yz) -> Option<WallHit> {
+        self.hit(origin, direction)
+    }
+
     /// Arc length of the wall as seen from the reference point through `point`: the chart in which spacing is measured
     /// when the wall isn't where the design says. Zero for the reference point itself.
     pub fn sigma_of(&self, point: Yz) -> f64 {

@@ -7,7 +7,7 @@
 //! Words are most significant byte first. The status byte is `0 1 busy mode(2) memory-error x x`.
 //! Source: Keller, Communication Protocol 4LD...9LD, v2.6.
 
-use headrace_core::codec::{Codec, CodecCounts};
+use headrace_core::codec::{Framed, Framing, Verdict};
 
 /// The command that starts a conversion.
 pub const MEASURE: u8 = 0xAC;
@@ -184,83 +184,33 @@ impl Transaction {
     }
 }
 
+/// How transactions stand in messages: each is one. One with a bad status is left out and counted as a bad frame.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Transactions;
+
 /// Bytes to transactions.
-///
-/// A transaction with a bad status is left out and counted as a bad frame. A message that begins with an unknown byte is
-/// left out to its end: what looks like a transaction within it is none.
-#[derive(Debug, Clone, Default)]
-pub struct Bar100Codec {
-    held: [u8; MEASURE_BYTES],
-    len: usize,
-    /// Whether the message that is coming in has turned out to be none of ours.
-    astray: bool,
-    counts: CodecCounts,
-}
+pub type Bar100Codec = Framed<Transactions, MEASURE_BYTES>;
 
-impl Bar100Codec {
-    fn take(&mut self, sink: &mut dyn FnMut(Transaction)) {
-        match Transaction::decode(self.held.get(..self.len).unwrap_or_default()) {
-            Ok(transaction) => {
-                self.counts.good_frames += 1;
-                self.len = 0;
-                sink(transaction);
-            }
-            Err(_) => self.drop_held(),
-        }
-    }
-
-    fn drop_held(&mut self) {
-        self.counts.bad_frames += 1;
-        self.counts.skipped_bytes += self.len as u64;
-        self.len = 0;
-    }
-}
-
-impl Codec for Bar100Codec {
+impl Framing for Transactions {
     type Value = Transaction;
 
-    const MAX_FRAME_BYTES: usize = MEASURE_BYTES;
     const WHOLE_MESSAGES: bool = true;
 
-    fn push(&mut self, bytes: &[u8], sink: &mut dyn FnMut(Transaction)) {
-        for byte in bytes {
-            if self.astray {
-                self.counts.skipped_bytes += 1;
-                continue;
-            }
-            if let Some(place) = self.held.get_mut(self.len) {
-                *place = *byte;
-                self.len += 1;
-            }
-            match self.held.first().copied().and_then(Transaction::length) {
-                None => {
-                    self.drop_held();
-                    self.astray = true;
-                }
-                Some(length) if length == self.len => self.take(sink),
-                Some(_) => (),
-            }
-        }
+    fn judge(&self, front: &[u8]) -> Verdict {
+        let length = front.first().copied().and_then(Transaction::length);
+        let is_good = |frame: &[u8]| Transaction::decode(frame).is_ok();
+        length.map_or(Verdict::NotAStart, |length| Verdict::on(front, length, is_good))
     }
 
-    fn flush(&mut self, _sink: &mut dyn FnMut(Transaction)) {
-        if self.len > 0 {
-            self.drop_held();
-        }
-        self.astray = false;
-    }
-
-    fn counts(&self) -> CodecCounts {
-        self.counts
-    }
-
-    fn held_bytes(&self) -> usize {
-        self.len
+    fn read(&self, frame: &[u8]) -> Option<Transaction> {
+        Transaction::decode(frame).ok()
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use headrace_core::codec::{Codec as _, CodecCounts};
+
     use super::*;
 
     fn measured(bytes: [u8; 5]) -> Measurement {

@@ -39,11 +39,6 @@ impl Bar100Decoder {
         Self { codec: Bar100Codec::default(), meaning, cells, calibration, withheld: 0 }
     }
 
-    /// Measurements left out because the calibration wasn't known or was refused, or the status said busy.
-    pub fn withheld(&self) -> u64 {
-        self.withheld
-    }
-
     /// The calibration in use, once it is known.
     ///
     /// Errors: the sensor's memory says something impossible.
@@ -84,5 +79,10 @@ impl Decoder for Bar100Decoder {
 
     fn counts(&self) -> CodecCounts {
         self.codec.counts()
+    }
+
+    /// Measurements left out because the calibration wasn't known or was refused, or the status said busy.
+    fn withheld(&self) -> u64 {
+        self.withheld
     }
 }

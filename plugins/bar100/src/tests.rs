@@ -2,9 +2,11 @@
 
 use headrace_core::app::device::{Decoder as _, Device, DeviceKind as _, Direction, EmulatorSetup, Truth};
 use headrace_core::app::reading::{Decoded, Packet, Reading, WaterPressure};
+use headrace_core::app::report::Report;
 use headrace_core::app::{App, Mission};
 use headrace_core::config::{Document, SensorConfig};
 use headrace_core::frames::{Mount, Point3, Pose, Rot, Tunnel, Vec3};
+use headrace_core::fusion::direct::DirectNavigation;
 use headrace_core::site::Site;
 use headrace_core::time::{DurNs, MonoNs};
 use headrace_core::tunnel::named;
@@ -99,6 +101,19 @@ fn readings_are_withheld_until_the_calibration_is_known() {
     assert!((pressure(&readings[0]).pressure_pa - 590_112.0).abs() < 1.0);
     assert_eq!(decoder.withheld(), 2);
     assert_eq!(decoder.counts().good_frames, 8);
+}
+
+#[test]
+fn the_report_tells_what_was_withheld() {
+    let mut app = app();
+    configured("").unwrap().build(&mut app).unwrap();
+    let navigation = DirectNavigation::new(named::circle(2.5).unwrap(), Site::default());
+    let mut armed = app.arm(Box::new(navigation)).unwrap();
+    let mut port = armed.take_port(0).unwrap();
+    port.send(MonoNs(1), &[0xAC, 0x40, 0x46, 0x46, 0x4F, 0xA0]).unwrap();
+    armed.tick(MonoNs(2));
+    let source = &Report::of(&armed).sources[0];
+    assert_eq!((source.frames, source.readings, source.withheld), (1, 0, 1));
 }
 
 #[test]

@@ -1,14 +1,14 @@
 //! An emulated head, and the host that polls it: one command and one return each ping period.
 
 use headrace_core::app::device::{Direction, Emulator, EmulatorSetup, HeadProgram, Truth};
-use headrace_core::codec::Codec as _;
+use headrace_core::codec::{Bytes, Codec as _};
 use headrace_core::frames::{Mount, head_direction};
 use headrace_core::math;
 use headrace_core::time::{DurNs, MonoNs};
 
 use crate::codec::{
-    Bytes, COUNTS_PER_TURN, Command, CommandCodec, Header, MAX_ECHO_BYTES, MAX_RETURN_BYTES, Model, Points,
-    Return, Status, Tag, ZERO_COUNT, step_at_most, step_deg,
+    COUNTS_PER_TURN, Command, CommandCodec, Header, MAX_ECHO_BYTES, MAX_RETURN_BYTES, Model, Points, Return,
+    Status, Tag, ZERO_COUNT, step_at_most, step_deg,
 };
 use crate::plugin::SOUND_SPEED_MPS;
 use crate::settings::{Settings, counts_of_rad};

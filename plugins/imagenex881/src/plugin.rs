@@ -5,11 +5,11 @@ use headrace_core::app::device::{Decoder, Device, DeviceKind, Emulator, Emulator
 use headrace_core::app::plugin::{Plugin, PluginError};
 use headrace_core::app::reading::{Decoded, Packet, Reading, SonarReturn};
 use headrace_core::app::{App, SourceSpec};
-use headrace_core::codec::{Codec as _, CodecCounts};
+use headrace_core::codec::{Codec as _, CodecCounts, LineClock};
 use headrace_core::config::{ConfigError, Section, SensorConfig};
-use headrace_core::time::{DurNs, MonoNs};
+use headrace_core::time::DurNs;
 
-use crate::codec::{Header, Model, ReturnCodec};
+use crate::codec::{Header, Model, ReturnCodec, Returns};
 use crate::emulator::HeadEmulator;
 use crate::settings::Settings;
 
@@ -106,9 +106,8 @@ impl Rejected {
 #[derive(Debug, Clone)]
 pub struct HeadDecoder {
     codec: ReturnCodec,
+    clock: LineClock,
     reader: Reader,
-    begun: MonoNs,
-    last: MonoNs,
 }
 
 /// What makes a reading of a whole return; apart from the codec, so that both can be borrowed.
@@ -117,15 +116,14 @@ struct Reader {
     settings: Settings,
     latency: DurNs,
     rejected: Rejected,
-    rejected_bytes: u64,
 }
 
 impl HeadDecoder {
     /// For a head with these settings. A position past +180 degrees makes a frame bad, whatever the head id.
     pub fn new(settings: Settings, latency: DurNs) -> Self {
-        let reader = Reader { settings, latency, rejected: Rejected::default(), rejected_bytes: 0 };
-        let codec = ReturnCodec::for_model(Model::Head881);
-        Self { codec, reader, begun: MonoNs(0), last: MonoNs(0) }
+        let reader = Reader { settings, latency, rejected: Rejected::default() };
+        let codec = ReturnCodec::new(Returns { model: Some(Model::Head881) });
+        Self { codec, clock: LineClock::new(SILENCE), reader }
     }
 
     /// Whole returns that gave no reading so far.
@@ -136,46 +134,27 @@ impl HeadDecoder {
 
 impl Decoder for HeadDecoder {
     fn decode(&mut self, packet: Packet<'_>, sink: &mut dyn FnMut(Decoded)) {
-        let Self { codec, reader, begun, last } = self;
-        if codec.held_bytes() > 0 && packet.received.since(*last) > SILENCE {
-            codec.flush_frames(|frame| reader.read(*begun, frame, sink));
-        }
-        // A return that earlier packets began came when they did; those after it begin in this one.
-        let mut at = if codec.held_bytes() > 0 { *begun } else { packet.received };
-        codec.push_frames(packet.bytes, |frame| {
-            reader.read(at, frame, sink);
-            at = packet.received;
+        let Self { codec, clock, reader } = self;
+        clock.push(codec, packet.received, packet.bytes, |received, frame| {
+            if let Some(reading) = reader.read(frame) {
+                let valid_at = received - reader.latency;
+                sink(Decoded { valid_at, reading: Reading::Sonar(reading) });
+            }
         });
-        if codec.held_bytes() <= packet.bytes.len() {
-            *begun = packet.received;
-        }
-        *last = packet.received;
     }
 
-    /// A rejected return counts as bad, and its bytes as skipped.
     fn counts(&self) -> CodecCounts {
-        let counts = self.codec.counts();
-        let rejected = self.reader.rejected.total();
-        CodecCounts {
-            good_frames: counts.good_frames - rejected,
-            bad_frames: counts.bad_frames + rejected,
-            skipped_bytes: counts.skipped_bytes + self.reader.rejected_bytes,
-        }
+        self.codec.counts()
+    }
+
+    fn withheld(&self) -> u64 {
+        self.rejected().total()
     }
 }
 
 impl Reader {
-    fn read(&mut self, received: MonoNs, frame: &[u8], sink: &mut dyn FnMut(Decoded)) {
-        let header = Header::decode(frame, Some(Model::Head881)).ok().map(|(header, _)| header);
-        match header.and_then(|header| self.accept(&header)) {
-            Some(reading) => {
-                sink(Decoded { valid_at: received - self.latency, reading: Reading::Sonar(reading) });
-            }
-            None => self.rejected_bytes += frame.len() as u64,
-        }
-    }
-
-    fn accept(&mut self, header: &Header) -> Option<SonarReturn> {
+    fn read(&mut self, frame: &[u8]) -> Option<SonarReturn> {
+        let (header, _) = Header::decode(frame, Some(Model::Head881)).ok()?;
         let command = &self.settings.command;
         let profile_mm = header.profile_mm(Model::Head881);
         let Rejected { status, head_id, tag, range_setting, beyond_range } = &mut self.rejected;

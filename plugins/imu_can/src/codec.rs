@@ -1,8 +1,8 @@
 //! Frames to the messages of one maker's set.
 
-use headrace_core::codec::{Codec, CodecCounts};
+use headrace_core::codec::{Framed, Framing, Verdict};
 
-use crate::frame::{CanFrame, CanFrameCodec, FRAME_BYTES};
+use crate::frame::{CanFrame, FRAME_BYTES};
 use crate::sets::{MessageError, bosch, j1939, sbg, xsens};
 
 /// A maker's set of messages with what of it can be configured.
@@ -58,60 +58,27 @@ impl MessageSet {
 
 /// Bytes to messages of one set.
 ///
-/// Other devices' frames on the bus, remote frames and error frames are passed over and counted apart; a frame of the
-/// set with a wrong length is a bad frame.
-#[derive(Debug, Clone)]
-pub struct ImuCodec {
-    set: MessageSet,
-    frames: CanFrameCodec,
-    passed_over: u64,
-    malformed: u64,
-}
+/// Other devices' frames on the bus, remote frames and error frames are good frames of which nothing is read; a frame of
+/// the set with a wrong length is a bad one, as is a message that holds no classic frame.
+pub type ImuCodec = Framed<MessageSet, FRAME_BYTES>;
 
-impl ImuCodec {
-    /// A codec for one set.
-    pub fn new(set: MessageSet) -> Self {
-        Self { set, frames: CanFrameCodec::default(), passed_over: 0, malformed: 0 }
-    }
-
-    /// Good frames that are not of the set.
-    pub fn passed_over(&self) -> u64 {
-        self.passed_over
-    }
-}
-
-impl Codec for ImuCodec {
+impl Framing for MessageSet {
     type Value = Message;
 
-    const MAX_FRAME_BYTES: usize = FRAME_BYTES;
     const WHOLE_MESSAGES: bool = true;
 
-    fn push(&mut self, bytes: &[u8], sink: &mut dyn FnMut(Message)) {
-        let Self { set, frames, passed_over, malformed } = self;
-        frames.push(bytes, &mut |frame| match set.decode(&frame) {
-            Ok(Some(message)) => sink(message),
-            Ok(None) => *passed_over += 1,
-            Err(_) => *malformed += 1,
-        });
+    fn judge(&self, front: &[u8]) -> Verdict {
+        let fits = |frame| self.decode(&frame).is_ok();
+        Verdict::on(front, FRAME_BYTES, |frame| can_frame(frame).is_some_and(fits))
     }
 
-    fn flush(&mut self, _sink: &mut dyn FnMut(Message)) {
-        // A frame has one length: what is incomplete holds no other.
-        self.frames.flush(&mut |_| ());
+    fn read(&self, frame: &[u8]) -> Option<Message> {
+        self.decode(&can_frame(frame)?).ok()?
     }
+}
 
-    fn counts(&self) -> CodecCounts {
-        let frames = self.frames.counts();
-        CodecCounts {
-            good_frames: frames.good_frames - self.malformed,
-            bad_frames: frames.bad_frames + self.malformed,
-            skipped_bytes: frames.skipped_bytes + self.malformed * FRAME_BYTES as u64,
-        }
-    }
-
-    fn held_bytes(&self) -> usize {
-        self.frames.held_bytes()
-    }
+fn can_frame(bytes: &[u8]) -> Option<CanFrame> {
+    CanFrame::decode(bytes.first_chunk()?).ok()
 }
 
 #[cfg(test)]

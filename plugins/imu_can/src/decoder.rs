@@ -2,9 +2,9 @@
 
 use headrace_core::app::device::Decoder;
 use headrace_core::app::reading::{Decoded, Level, Packet, Reading};
-use headrace_core::codec::{Codec as _, CodecCounts};
+use headrace_core::codec::{Codec as _, CodecCounts, Framing as _};
 use headrace_core::frames::{Rot, Sensor, Vec3};
-use headrace_core::time::{DurNs, MonoNs};
+use headrace_core::time::DurNs;
 
 use crate::codec::{ImuCodec, Message, MessageSet};
 use crate::sets::{bosch, j1939, sbg, scaled, xsens};
@@ -37,6 +37,7 @@ pub struct Meaning {
 pub struct ImuDecoder {
     codec: ImuCodec,
     state: State,
+    passed_over: u64,
 }
 
 /// What a message changes beside giving a reading.
@@ -79,17 +80,12 @@ impl ImuDecoder {
             acceleration_mps2: [None; 3],
             withheld: 0,
         };
-        Self { codec: ImuCodec::new(meaning.set), state }
-    }
-
-    /// Values left out because the unit itself says that they are no good.
-    pub fn withheld(&self) -> u64 {
-        self.state.withheld
+        Self { codec: ImuCodec::new(meaning.set), state, passed_over: 0 }
     }
 
     /// Good frames that are not of the unit.
     pub fn passed_over(&self) -> u64 {
-        self.codec.passed_over()
+        self.passed_over
     }
 
     /// The unit's own time of its last sample, where it tells one; wraps.
@@ -106,19 +102,27 @@ impl ImuDecoder {
 
 impl Decoder for ImuDecoder {
     fn decode(&mut self, packet: Packet<'_>, sink: &mut dyn FnMut(Decoded)) {
-        let Self { codec, state } = self;
-        let mut take = |message: Message| {
+        let Self { codec, state, passed_over } = self;
+        codec.push_frames(packet.bytes, |frame, _| {
+            let Some(message) = state.meaning.set.read(frame) else {
+                *passed_over += 1;
+                return;
+            };
             if let Some((reading, delay)) = state.take(&message) {
-                let valid_at: MonoNs = packet.received - (state.meaning.latency + delay);
+                let valid_at = packet.received - (state.meaning.latency + delay);
                 sink(Decoded { valid_at, reading });
             }
-        };
-        codec.push(packet.bytes, &mut take);
-        codec.flush(&mut take);
+        });
+        codec.flush(&mut |_| ());
     }
 
     fn counts(&self) -> CodecCounts {
         self.codec.counts()
+    }
+
+    /// Values left out because the unit itself says that they are no good.
+    fn withheld(&self) -> u64 {
+        self.state.withheld
     }
 }
 

@@ -8,8 +8,6 @@
 //! ```
 //! Source: linux/can.h.
 
-use headrace_core::codec::{Codec, CodecCounts};
-
 /// Length of a frame in the log.
 pub const FRAME_BYTES: usize = 16;
 
@@ -177,70 +175,6 @@ impl CanFrame {
     }
 }
 
-/// Bytes to frames. A message that holds something else is left out to its end.
-#[derive(Debug, Clone, Default)]
-pub struct CanFrameCodec {
-    held: [u8; FRAME_BYTES],
-    len: usize,
-    /// Whether the message that is coming in has turned out to be no classic frame.
-    astray: bool,
-    counts: CodecCounts,
-}
-
-impl CanFrameCodec {
-    fn drop_held(&mut self) {
-        self.counts.bad_frames += 1;
-        self.counts.skipped_bytes += self.len as u64;
-        self.len = 0;
-    }
-}
-
-impl Codec for CanFrameCodec {
-    type Value = CanFrame;
-
-    const MAX_FRAME_BYTES: usize = FRAME_BYTES;
-    const WHOLE_MESSAGES: bool = true;
-
-    fn push(&mut self, bytes: &[u8], sink: &mut dyn FnMut(CanFrame)) {
-        for byte in bytes {
-            if self.astray {
-                self.counts.skipped_bytes += 1;
-                continue;
-            }
-            if let Some(place) = self.held.get_mut(self.len) {
-                *place = *byte;
-                self.len += 1;
-            }
-            if self.len < FRAME_BYTES {
-                continue;
-            }
-            if let Ok(frame) = CanFrame::decode(&self.held) {
-                self.counts.good_frames += 1;
-                self.len = 0;
-                sink(frame);
-            } else {
-                self.drop_held();
-                self.astray = true;
-            }
-        }
-    }
-
-    fn flush(&mut self, _sink: &mut dyn FnMut(CanFrame)) {
-        if self.len > 0 {
-            self.drop_held();
-        }
-        self.astray = false;
-    }
-
-    fn counts(&self) -> CodecCounts {
-        self.counts
-    }
-
-    fn held_bytes(&self) -> usize {
-        self.len
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -257,18 +191,6 @@ mod tests {
         assert_eq!(kind([0x34, 0, 0, 0x40]), Ok(FrameKind::Remote(CanId::Standard(0x34))));
         assert_eq!(kind([0x04, 0, 0, 0x20]), Ok(FrameKind::Error(4)));
         assert_eq!(kind([0, 8, 0, 0]), Err(FrameError::Id(0x800)));
-    }
-
-    #[test]
-    fn a_frame_with_more_than_eight_bytes_is_left_out_to_its_end() {
-        // A CAN FD frame of 72 bytes, whose data would read as more frames.
-        let mut bytes = [0; 72];
-        bytes[0] = 0x34;
-        bytes[4] = 12;
-        let mut codec = CanFrameCodec::default();
-        codec.push(&bytes, &mut |frame| panic!("{frame:?}"));
-        codec.flush(&mut |frame| panic!("{frame:?}"));
-        assert_eq!(codec.counts(), CodecCounts { good_frames: 0, bad_frames: 1, skipped_bytes: 72 });
     }
 
     fn any_frame() -> impl proptest::strategy::Strategy<Value = CanFrame> {
@@ -288,11 +210,10 @@ mod tests {
             .prop_filter_map("valid", |(kind, data)| CanFrame::of_kind(kind, &data).ok())
     }
 
-    headrace_core::codec_contract!(
-        contract,
-        codec: CanFrameCodec::default(),
-        values: any_frame(),
-        encode: CanFrame::encode,
-        frames: [CanFrame::new(CanId::Standard(0x34), Payload::default().with(&[0, 0, 0, 0, 9, 0xCF])).encode()],
-    );
+    proptest::proptest! {
+        #[test]
+        fn every_frame_comes_back(frame in any_frame()) {
+            proptest::prop_assert_eq!(CanFrame::decode(&frame.encode()), Ok(frame));
+        }
+    }
 }

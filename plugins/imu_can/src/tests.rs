@@ -236,6 +236,14 @@ fn an_attitude_that_the_unit_calls_invalid_is_withheld() {
 }
 
 #[test]
+fn frames_of_other_devices_are_passed_over() {
+    let mut decoder = ImuDecoder::new(meaning(XSENS));
+    let other = Message::Sbg(sbg::Message::Rate([0; 3]));
+    assert_eq!(readings(&mut decoder, MessageSet::Sbg, &[other, other]), []);
+    assert_eq!((decoder.passed_over(), decoder.withheld(), decoder.counts().good_frames), (2, 0, 2));
+}
+
+#[test]
 fn euler_angles_are_heard_unless_there_are_quaternions() {
     let mut decoder = ImuDecoder::new(meaning(XSENS));
     let euler = Message::Xsens(xsens::Message::EulerAngles([1600, -416, -11_520]));

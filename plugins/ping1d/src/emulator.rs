@@ -1,12 +1,12 @@
 //! An emulated echosounder, and the host that asks it for a distance each interval.
 
 use headrace_core::app::device::{Direction, Emulator, EmulatorSetup, Truth};
-use headrace_core::codec::Codec as _;
+use headrace_core::codec::{Bytes, Codec as _};
 use headrace_core::frames::{Mount, Vec3};
 use headrace_core::math;
 use headrace_core::time::{DurNs, MonoNs};
 
-use crate::codec::{Addressed, Bytes, Distance, MAX_FRAME_BYTES, Message, PingCodec, ScanRange, Text, id};
+use crate::codec::{Addressed, Distance, MAX_FRAME_BYTES, Message, PingCodec, ScanRange, Text, id};
 use crate::settings::Settings;
 
 /// Where an emulated device listens: up to the practical limit of a `Ping1D`.

@@ -5,9 +5,9 @@ use headrace_core::app::device::{Decoder, Device, DeviceKind, Emulator, Emulator
 use headrace_core::app::plugin::{Plugin, PluginError};
 use headrace_core::app::reading::{Decoded, EchoRange, Packet, Reading};
 use headrace_core::app::{App, SourceSpec};
-use headrace_core::codec::{Codec as _, CodecCounts};
+use headrace_core::codec::{Codec as _, CodecCounts, LineClock};
 use headrace_core::config::{ConfigError, Section, SensorConfig};
-use headrace_core::time::{DurNs, MonoNs};
+use headrace_core::time::DurNs;
 
 use crate::codec::{Distance, DistanceSimple, Frame, PingCodec};
 use crate::emulator::PingEmulator;
@@ -70,65 +70,55 @@ impl Device for Ping1d {
 #[derive(Debug, Clone)]
 pub struct PingDecoder {
     codec: PingCodec,
+    clock: LineClock,
     settings: Settings,
     latency: DurNs,
-    begun: MonoNs,
-    last: MonoNs,
+    withheld: u64,
 }
 
 impl PingDecoder {
     /// For a device with these settings.
     pub fn new(settings: Settings, latency: DurNs) -> Self {
-        Self { codec: PingCodec::default(), settings, latency, begun: MonoNs(0), last: MonoNs(0) }
+        let (codec, clock) = (PingCodec::default(), LineClock::new(SILENCE));
+        Self { codec, clock, settings, latency, withheld: 0 }
     }
 }
 
 impl Decoder for PingDecoder {
     fn decode(&mut self, packet: Packet<'_>, sink: &mut dyn FnMut(Decoded)) {
-        let Self { codec, settings, latency, begun, last } = self;
-        let mut emit = |received: MonoNs, frame: &Frame<'_>| {
-            if let Some(echo) = echo(settings, frame) {
-                sink(Decoded { valid_at: received - *latency, reading: Reading::Echo(echo) });
+        let Self { codec, clock, settings, latency, withheld } = self;
+        clock.push(codec, packet.received, packet.bytes, |received, frame| {
+            let Some(frame) = Frame::parse(frame) else { return };
+            let Some((distance_mm, confidence_percent)) = distance(&frame) else { return };
+            // Nothing above 100 per cent is defined.
+            if frame.source != settings.device_id || confidence_percent > 100 {
+                *withheld += 1;
+                return;
             }
-        };
-        if codec.held_bytes() > 0 && packet.received.since(*last) > SILENCE {
-            codec.flush_frames(|frame| emit(*begun, &frame));
-        }
-        // A frame that earlier packets began came when they did; those after it begin in this one.
-        let mut at = if codec.held_bytes() > 0 { *begun } else { packet.received };
-        codec.push_frames(packet.bytes, |frame| {
-            emit(at, &frame);
-            at = packet.received;
+            let heard = confidence_percent > 0 && distance_mm > 0;
+            let echo = EchoRange {
+                range_m: heard.then(|| f64::from(distance_mm) / 1000.0),
+                confidence: f64::from(confidence_percent) / 100.0,
+                sound_speed_mps: settings.sound_speed_mps,
+            };
+            sink(Decoded { valid_at: received - *latency, reading: Reading::Echo(echo) });
         });
-        if codec.held_bytes() <= packet.bytes.len() {
-            *begun = packet.received;
-        }
-        *last = packet.received;
     }
 
     fn counts(&self) -> CodecCounts {
         self.codec.counts()
     }
+
+    /// Distances of other devices, or with a confidence that isn't defined.
+    fn withheld(&self) -> u64 {
+        self.withheld
+    }
 }
 
-/// The range that a frame tells of, if it does and comes from the device that is meant.
-fn echo(settings: &Settings, frame: &Frame<'_>) -> Option<EchoRange> {
-    if frame.source != settings.device_id {
-        return None;
-    }
+/// Distance in mm and confidence in per cent, where a frame tells them.
+fn distance(frame: &Frame<'_>) -> Option<(u32, u16)> {
     let simple = DistanceSimple::of(frame).map(|it| (it.distance_mm, u16::from(it.confidence_percent)));
-    let whole = || Distance::of(frame).map(|it| (it.distance_mm, it.confidence_percent));
-    let (distance_mm, confidence_percent) = simple.or_else(whole)?;
-    // Nothing above 100 per cent is defined.
-    if confidence_percent > 100 {
-        return None;
-    }
-    let heard = confidence_percent > 0 && distance_mm > 0;
-    Some(EchoRange {
-        range_m: heard.then(|| f64::from(distance_mm) / 1000.0),
-        confidence: f64::from(confidence_percent) / 100.0,
-        sound_speed_mps: settings.sound_speed_mps,
-    })
+    simple.or_else(|| Distance::of(frame).map(|it| (it.distance_mm, it.confidence_percent)))
 }
 
 #[cfg(test)]

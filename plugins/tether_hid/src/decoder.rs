@@ -2,12 +2,15 @@
 
 use headrace_core::app::device::Decoder;
 use headrace_core::app::reading::{Decoded, Packet, Reading, TetherLength};
-use headrace_core::codec::{Codec as _, CodecCounts};
-use headrace_core::time::{DurNs, MonoNs};
+use headrace_core::codec::{Codec as _, CodecCounts, Framing as _, LineClock};
+use headrace_core::time::DurNs;
 
-use crate::line::LineCodec;
-use crate::report::{LayoutError, ReportCodec, ReportLayout};
+use crate::line::{LineCodec, Lines};
+use crate::report::{LayoutError, Report, ReportCodec, ReportLayout};
 use crate::tracker::{CountTracker, Counting, TrackerHealth};
+
+/// A line's characters follow one another; after such a pause no more belong to the one begun.
+const SILENCE: DurNs = DurNs::from_millis(100);
 
 /// How a HID counter is to be understood.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,10 +40,9 @@ pub struct HidDecoder {
 #[derive(Debug, Clone)]
 pub struct LineDecoder {
     codec: LineCodec,
+    clock: LineClock,
     metres_per_unit: f64,
     latency: DurNs,
-    /// When the bytes came that the codec holds for an unfinished line.
-    held_since: MonoNs,
 }
 
 impl HidDecoder {
@@ -48,9 +50,10 @@ impl HidDecoder {
     ///
     /// Errors: the layout can't be.
     pub fn new(counter: Counter) -> Result<Self, LayoutError> {
+        counter.layout.check()?;
         let max_counts_per_s = counter.max_speed_mps * counter.counts_per_metre.abs();
         Ok(Self {
-            codec: ReportCodec::new(counter.layout)?,
+            codec: ReportCodec::new(counter.layout),
             tracker: CountTracker::new(counter.counting, counter.layout.width, max_counts_per_s),
             counter,
             status: None,
@@ -71,7 +74,7 @@ impl HidDecoder {
 impl Decoder for HidDecoder {
     fn decode(&mut self, packet: Packet<'_>, sink: &mut dyn FnMut(Decoded)) {
         let Self { codec, tracker, counter, status } = self;
-        let mut take = |report: crate::report::Report| {
+        let mut take = |report: Report| {
             *status = report.status;
             let Some(counts) = tracker.take(packet.received, &report) else { return };
             let length = TetherLength {
@@ -90,31 +93,31 @@ impl Decoder for HidDecoder {
     fn counts(&self) -> CodecCounts {
         self.codec.counts()
     }
+
+    /// Reports rejected as faster than the winch.
+    fn withheld(&self) -> u64 {
+        self.health().rejected
+    }
 }
 
 impl LineDecoder {
     /// A decoder of lines whose payout is in units of `metres_per_unit`.
     pub fn new(metres_per_unit: f64, latency: DurNs) -> Self {
-        Self { codec: LineCodec::default(), metres_per_unit, latency, held_since: MonoNs::default() }
+        Self { codec: LineCodec::default(), clock: LineClock::new(SILENCE), metres_per_unit, latency }
     }
 }
 
 impl Decoder for LineDecoder {
     fn decode(&mut self, packet: Packet<'_>, sink: &mut dyn FnMut(Decoded)) {
-        let Self { codec, metres_per_unit, latency, held_since } = self;
-        // Only the first line that is completed can have begun in an earlier packet.
-        let mut begun = if codec.held_bytes() > 0 { *held_since } else { packet.received };
-        codec.push(packet.bytes, &mut |line| {
+        let Self { codec, clock, metres_per_unit, latency } = self;
+        clock.push(codec, packet.received, packet.bytes, |received, line| {
+            let Some(line) = Lines.read(line) else { return };
             let length = TetherLength {
                 length_m: line.payout.value() * *metres_per_unit,
                 resolution_m: line.payout.quantum() * *metres_per_unit,
             };
-            sink(Decoded { valid_at: begun - *latency, reading: Reading::TetherLength(length) });
-            begun = packet.received;
+            sink(Decoded { valid_at: received - *latency, reading: Reading::TetherLength(length) });
         });
-        if codec.held_bytes() <= packet.bytes.len() {
-            *held_since = packet.received;
-        }
     }
 
     fn counts(&self) -> CodecCounts {

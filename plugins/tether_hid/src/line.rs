@@ -8,7 +8,7 @@
 //! in decimal, of the codes of all characters before it. Anything may stand before a line.
 //! Source: LCI-90 Operator Manual, p. 48; a recorded LCI-90i line whose sum confirms the order of the fields.
 
-use headrace_core::codec::{Codec, CodecCounts, FrameBuffer, Verdict};
+use headrace_core::codec::{Framed, Framing, Verdict};
 use headrace_core::math;
 
 /// Shapes of the two lines: 9 stands for a digit, # for a character of a number, all else for itself.
@@ -191,61 +191,45 @@ fn sum(chars: &[u8]) -> u32 {
     chars.iter().map(|char| u32::from(*char)).sum()
 }
 
-fn judge(bytes: &[u8]) -> Verdict {
-    let (shape, marker) = match bytes.first() {
-        Some(b'R') => (PLAIN, PLAIN_MARKER),
-        Some(b'0'..=b'9') => (STAMPED, STAMPED_MARKER),
-        _ => return Verdict::NotAStart,
-    };
-    let fits = |(char, wanted): (&u8, &u8)| match wanted {
-        b'9' => char.is_ascii_digit(),
-        b'#' => char.is_ascii_digit() || matches!(char, b'-' | b'.'),
-        _ => char == wanted,
-    };
-    match bytes.iter().zip(shape).position(|pair| !fits(pair)) {
-        Some(at) if at < marker => Verdict::NotAStart,
-        Some(_) => Verdict::Bad,
-        None => match bytes.get(..shape.len()) {
-            None => Verdict::Need(shape.len()),
-            Some(line) if LineReading::decode(line).is_some() => Verdict::Frame(shape.len()),
-            Some(_) => Verdict::Bad,
-        },
-    }
-}
+/// How lines stand in a stream of characters.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Lines;
 
 /// Bytes of a serial line to readings.
-#[derive(Debug, Clone, Default)]
-pub struct LineCodec {
-    buffer: FrameBuffer<MAX_LINE_BYTES>,
-}
+pub type LineCodec = Framed<Lines, MAX_LINE_BYTES>;
 
-impl Codec for LineCodec {
+impl Framing for Lines {
     type Value = LineReading;
 
-    const MAX_FRAME_BYTES: usize = MAX_LINE_BYTES;
-    const WHOLE_MESSAGES: bool = false;
-
-    fn push(&mut self, bytes: &[u8], sink: &mut dyn FnMut(LineReading)) {
-        self.buffer.push(bytes, judge, |line| LineReading::decode(line).into_iter().for_each(&mut *sink));
+    fn judge(&self, front: &[u8]) -> Verdict {
+        let (shape, marker) = match front.first() {
+            Some(b'R') => (PLAIN, PLAIN_MARKER),
+            Some(b'0'..=b'9') => (STAMPED, STAMPED_MARKER),
+            _ => return Verdict::NotAStart,
+        };
+        let fits = |(char, wanted): (&u8, &u8)| match wanted {
+            b'9' => char.is_ascii_digit(),
+            b'#' => char.is_ascii_digit() || matches!(char, b'-' | b'.'),
+            _ => char == wanted,
+        };
+        match front.iter().zip(shape).position(|pair| !fits(pair)) {
+            Some(at) if at < marker => Verdict::NotAStart,
+            Some(_) => Verdict::Bad,
+            None => Verdict::on(front, shape.len(), |line| LineReading::decode(line).is_some()),
+        }
     }
 
-    fn flush(&mut self, sink: &mut dyn FnMut(LineReading)) {
-        self.buffer.flush(judge, |line| LineReading::decode(line).into_iter().for_each(&mut *sink));
-    }
-
-    fn counts(&self) -> CodecCounts {
-        self.buffer.counts()
-    }
-
-    fn held_bytes(&self) -> usize {
-        self.buffer.held_bytes()
+    fn read(&self, frame: &[u8]) -> Option<LineReading> {
+        LineReading::decode(frame)
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use headrace_core::codec::Codec as _;
     use headrace_core::codec::contract::decode_all;
+
+    use super::*;
 
     const PROTOCOL_1: &[u8] = b"RD,00000125,000012.4,0152.304,1504\r\n";
     const RECORDED: &[u8] = b"03RD,2022-05-14T16:17:36.502,-0000168,00000000,-00004.8,2839\r\n";

@@ -6,7 +6,7 @@
 //!          id   sequence  status  count, i32 little  auxiliary, i32 little
 //! ```
 
-use headrace_core::codec::{Codec, CodecCounts};
+use headrace_core::codec::{Framed, Framing, Verdict};
 
 /// The longest report: an id and what a full-speed interrupt transfer carries.
 pub const MAX_REPORT_BYTES: usize = 65;
@@ -248,83 +248,26 @@ pub fn uhid_input2_header(report_bytes: u16) -> [u8; 6] {
 }
 
 /// Bytes to reports. A report with another id is left out to its end, whatever it holds.
-#[derive(Debug, Clone)]
-pub struct ReportCodec {
-    layout: ReportLayout,
-    held: [u8; MAX_REPORT_BYTES],
-    len: usize,
-    /// Whether the report that is coming in has turned out to be another.
-    astray: bool,
-    counts: CodecCounts,
-}
+pub type ReportCodec = Framed<ReportLayout, MAX_REPORT_BYTES>;
 
-impl ReportCodec {
-    /// A codec for one layout.
-    ///
-    /// Errors: as for [`ReportLayout::check`].
-    pub fn new(layout: ReportLayout) -> Result<Self, LayoutError> {
-        layout.check()?;
-        let counts = CodecCounts::default();
-        Ok(Self { layout, held: [0; MAX_REPORT_BYTES], len: 0, astray: false, counts })
-    }
-
-    fn drop_held(&mut self) {
-        self.counts.bad_frames += 1;
-        self.counts.skipped_bytes += self.len as u64;
-        self.len = 0;
-    }
-}
-
-impl Codec for ReportCodec {
+impl Framing for ReportLayout {
     type Value = Report;
 
-    const MAX_FRAME_BYTES: usize = MAX_REPORT_BYTES;
     const WHOLE_MESSAGES: bool = true;
 
-    fn push(&mut self, bytes: &[u8], sink: &mut dyn FnMut(Report)) {
-        for byte in bytes {
-            if self.astray {
-                self.counts.skipped_bytes += 1;
-                continue;
-            }
-            if let Some(place) = self.held.get_mut(self.len) {
-                *place = *byte;
-                self.len += 1;
-            }
-            if self.len == 1 && self.layout.report_id.is_some_and(|id| *byte != id) {
-                self.drop_held();
-                self.astray = true;
-            } else if self.len == self.layout.report_bytes {
-                match self.held.get(..self.len).and_then(|bytes| self.layout.decode(bytes)) {
-                    Some(report) => {
-                        self.counts.good_frames += 1;
-                        self.len = 0;
-                        sink(report);
-                    }
-                    None => self.drop_held(),
-                }
-            }
-        }
+    fn judge(&self, front: &[u8]) -> Verdict {
+        Verdict::on(front, self.report_bytes, |report| self.decode(report).is_some())
     }
 
-    fn flush(&mut self, _sink: &mut dyn FnMut(Report)) {
-        if self.len > 0 {
-            self.drop_held();
-        }
-        self.astray = false;
-    }
-
-    fn counts(&self) -> CodecCounts {
-        self.counts
-    }
-
-    fn held_bytes(&self) -> usize {
-        self.len
+    fn read(&self, frame: &[u8]) -> Option<Report> {
+        self.decode(frame)
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use headrace_core::codec::{Codec as _, CodecCounts};
+
     use super::*;
 
     const EXAMPLE: [u8; 11] = [0x01, 0x2A, 0x01, 0xC0, 0x1D, 0xFE, 0xFF, 0xDC, 0x05, 0x00, 0x00];
@@ -392,7 +335,7 @@ mod tests {
 
     #[test]
     fn a_report_with_another_id_is_left_out_whole() {
-        let mut codec = ReportCodec::new(ReportLayout::REFERENCE).unwrap();
+        let mut codec = ReportCodec::new(ReportLayout::REFERENCE);
         let mut message = vec![0x02];
         message.extend_from_slice(&EXAMPLE);
         codec.push(&message, &mut |report| panic!("{report:?}"));
@@ -423,7 +366,7 @@ mod tests {
 
     headrace_core::codec_contract!(
         reference_contract,
-        codec: ReportCodec::new(ReportLayout::REFERENCE).unwrap(),
+        codec: ReportCodec::new(ReportLayout::REFERENCE),
         values: (any::<u8>(), any::<u8>(), any::<i32>(), any::<i32>()).prop_map(
             |(sequence, status, count, auxiliary)| Report {
                 sequence: Some(sequence),
@@ -438,7 +381,7 @@ mod tests {
 
     headrace_core::codec_contract!(
         plain_contract,
-        codec: ReportCodec::new(PLAIN).unwrap(),
+        codec: ReportCodec::new(PLAIN),
         values: (any::<u8>(), any::<u16>()).prop_map(|(status, count)| Report {
             sequence: None,
             status: Some(status),

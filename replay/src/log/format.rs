@@ -18,6 +18,8 @@ use sha2::{Digest, Sha256};
 
 /// Version of what this module describes.
 pub const FORMAT_VERSION: u32 = 1;
+/// What the `library` of our logs begins with, before this program's version.
+pub const LIBRARY: &str = "headrace ";
 /// Before a source's id: bytes received.
 pub const RAW_PREFIX: &str = "/raw/";
 /// Before a source's id: bytes sent.
@@ -30,8 +32,11 @@ pub const TICK_TOPIC: &str = "/loop/tick";
 pub const BYTES_ENCODING: &str = "application/octet-stream";
 /// Name of the metadata record with what the recorder knew: versions, digests, clock anchors.
 pub const METADATA: &str = "headrace";
-/// Name of the metadata record that repeats the channels: `<number>/topic`, `<number>/<key of its metadata>`.
+/// Name of the metadata record that repeats the channels: `<number>/topic`, `<number>/<key of its metadata>`; and the
+/// attachments: [`ATTACHMENT_PREFIX`] and name, with the length in bytes as the value.
 pub const CHANNEL_LIST: &str = "headrace.channels";
+/// Before the names of attachments in [`CHANNEL_LIST`].
+pub const ATTACHMENT_PREFIX: &str = "attachment/";
 /// Key in [`METADATA`] with [`FORMAT_VERSION`].
 pub const FORMAT_KEY: &str = "format";
 /// Key, in the metadata records that we write, with the digest of name and other entries (MCAP has none there).

@@ -2,8 +2,7 @@
 //!
 //! A record is an opcode, a u64 length and that many bytes; nothing marks its beginning, so a length that lies takes
 //! everything after it along. Three things find it out: most kinds of records say their length twice (theirs and that
-//! of the fields within), a length must leave room for the next record, and what follows must be a record too. After
-//! damage the next place is looked for, byte by byte, where records follow each other again.
+//! of the fields within), a length must leave room for the next record, and what follows must be a record too.
 //!
 //! Source: MCAP format specification, "Records".
 
@@ -14,6 +13,7 @@ use mcap::records::op;
 
 use super::LogError;
 use super::fields::{Fields, MessageHead};
+use super::format::LIBRARY;
 
 /// The longest record that is read as a whole. A length above it is a lie; chunks and attachments aside.
 pub(super) const MAX_RECORD_BYTES: u64 = 256 << 20;
@@ -23,10 +23,6 @@ const RECORD_HEAD_BYTES: usize = 9;
 const GLANCE_BYTES: usize = 1024;
 /// Bytes of a chunk's record before its data, without the name of the compression.
 const CHUNK_HEAD_BYTES: u64 = 40;
-/// Records that must follow each other for a place to count as found again.
-const CHAIN: usize = 3;
-/// Bytes that the search for that place reads at once.
-const SEARCH_BYTES: usize = 64 * 1024;
 
 /// A log's bytes, by their place.
 pub(super) struct LogFile<R> {
@@ -124,7 +120,7 @@ pub(super) struct AttachmentPlace {
 /// What a record is, as far as the framing and the index need to know.
 #[derive(Debug, Clone)]
 pub(super) enum Item {
-    Header,
+    Header { ours: bool },
     Channel,
     Message { log_time: u64 },
     Chunk(ChunkPlace),
@@ -288,8 +284,8 @@ fn parse(opcode: u8, body: u64, bytes: &[u8]) -> Option<(Item, u64)> {
     let mut fields = Fields::new(bytes);
     let item = match opcode {
         op::HEADER => {
-            let _profile_and_library = (fields.text()?, fields.text()?);
-            Item::Header
+            let (_profile, library) = (fields.text()?, fields.text()?);
+            Item::Header { ours: library.starts_with(LIBRARY) }
         }
         op::FOOTER => {
             fields.take(20)?;
@@ -320,7 +316,27 @@ fn parse(opcode: u8, body: u64, bytes: &[u8]) -> Option<(Item, u64)> {
         }
         op::STATISTICS => {
             let (_messages, _schemas, channels) = (fields.u64()?, fields.u16()?, fields.u32()?);
-            Item::Statistics { channels }
+            let _other_counts_and_times = fields.take(28)?;
+            return with_list(fields, Item::Statistics { channels });
+        }
+        op::CHUNK_INDEX => {
+            let _times_and_place = fields.take(32)?;
+            let indexes_len = fields.u32()?;
+            fields.take(u64::from(indexes_len) + 8)?;
+            let (_compression, _lengths) = (fields.text()?, fields.take(16)?);
+            Item::Other
+        }
+        op::ATTACHMENT_INDEX => {
+            let _numbers_name_type = (fields.take(40)?, fields.text()?, fields.text()?);
+            Item::Other
+        }
+        op::METADATA_INDEX => {
+            let _place_name = (fields.take(16)?, fields.text()?);
+            Item::Other
+        }
+        op::SUMMARY_OFFSET => {
+            fields.take(17)?;
+            Item::Other
         }
         op::METADATA => {
             let _name = fields.text()?;
@@ -360,55 +376,4 @@ fn attachment_place(fields: &mut Fields<'_>) -> Option<AttachmentPlace> {
     let (name, _media_type) = (fields.text()?, fields.text()?);
     let data_len = fields.u64()?;
     Some(AttachmentPlace { name: name.to_owned(), head_len: fields.taken(), data_len })
-}
-
-/// The first place within `from..until` from which records follow each other.
-pub(super) fn find_records<R: Read + Seek>(
-    file: &mut LogFile<R>,
-    from: u64,
-    until: u64,
-) -> Result<Option<u64>, LogError> {
-    let mut block = vec![0; SEARCH_BYTES];
-    let mut start = from;
-    while start < until.min(file.len()) {
-        let got = file.read_at(start, &mut block)?;
-        let bytes = block.get(..got).unwrap_or_default();
-        for (at, head) in (start..until).zip(bytes.windows(mcap::MAGIC.len())) {
-            if may_begin(head) && records_follow(file, at)? {
-                return Ok(Some(at));
-            }
-        }
-        // Windows that would cross the block's end are looked at in the next one.
-        let whole_windows = got.saturating_sub(mcap::MAGIC.len() - 1);
-        if whole_windows == 0 {
-            break;
-        }
-        start += whole_windows as u64;
-    }
-    Ok(None)
-}
-
-/// A quick look that sorts out nearly every place: a known opcode and a length below 2^32, or the closing bytes.
-fn may_begin(head: &[u8]) -> bool {
-    match head {
-        [1..=op::DATA_END, _, _, _, _, 0, 0, 0] => true,
-        _ => head == mcap::MAGIC,
-    }
-}
-
-fn records_follow<R: Read + Seek>(file: &mut LogFile<R>, from: u64) -> Result<bool, LogError> {
-    let mut at = from;
-    for _ in 0..CHAIN {
-        match look(file, at)? {
-            Found::Record(Frame { item: Item::Chunk(_), confirmed: true, .. }) => return Ok(true),
-            Found::Record(frame) => at = frame.end,
-            Found::Cut(Frame { item, confirmed, .. }) => {
-                return Ok(matches!(item, Item::Chunk(_)) && confirmed);
-            }
-            Found::Closing => return Ok(at.saturating_add(mcap::MAGIC.len() as u64) == file.len()),
-            Found::End => return Ok(at != from),
-            Found::Nothing => return Ok(false),
-        }
-    }
-    Ok(true)
 }

@@ -4,7 +4,7 @@ use core::fmt;
 
 use headrace_core::time::MonoNs;
 
-/// The most losses that are listed one by one; what comes after is added to the last.
+/// The most losses that are listed; what comes after makes the last reach further.
 const MAX_LOSSES: usize = 1000;
 
 /// What a piece of a log has in the way of damage.
@@ -26,9 +26,9 @@ pub enum LossKind {
         /// The largest allowed, bytes.
         limit: u64,
     },
-    /// An attachment that fails its checksum.
+    /// An attachment that fails its checksum, or isn't there though the log says so.
     Attachment(String),
-    /// A metadata record that fails its checksum.
+    /// A metadata record that fails its checksum, or isn't there in a log of ours.
     Metadata(String),
     /// Messages of a channel whose definition isn't in the log.
     UnknownChannel {
@@ -72,8 +72,8 @@ impl fmt::Display for LossKind {
             Self::TooLarge { limit } => {
                 write!(out, "larger than the {limit} bytes that are read into memory")
             }
-            Self::Attachment(name) => write!(out, "attachment {name:?} fails its checksum"),
-            Self::Metadata(name) => write!(out, "metadata {name:?} fails its checksum"),
+            Self::Attachment(name) => write!(out, "attachment {name:?} is damaged"),
+            Self::Metadata(name) => write!(out, "metadata {name:?} is damaged"),
             Self::UnknownChannel { channel, messages } => {
                 write!(out, "{messages} messages of channel {channel}, which is defined nowhere")
             }
@@ -111,15 +111,12 @@ impl Losses {
         &mut self.0
     }
 
-    pub(super) fn is_full(&self) -> bool {
-        self.0.len() >= MAX_LOSSES
-    }
-
     pub(super) fn push(&mut self, loss: Loss) {
-        if !self.is_full() {
+        if self.0.len() < MAX_LOSSES {
             self.0.push(loss);
         } else if let Some(last) = self.0.last_mut() {
-            last.bytes = last.bytes.saturating_add(loss.bytes);
+            let end = loss.offset.saturating_add(loss.bytes);
+            last.bytes = last.bytes.max(end.saturating_sub(last.offset));
             last.to = loss.to;
         }
     }

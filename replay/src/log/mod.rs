@@ -1,7 +1,7 @@
 //! The dive log: an MCAP file with the bytes of every device as they came, the order in which the loop took them, and
 //! what the loop made of them.
 //!
-//! [`format`] names channels and metadata and lays out `/loop/tick`. [`LogWriter`] writes a log, [`Recorder`] does so
+//! [`mod@format`] names channels and metadata and lays out `/loop/tick`. [`LogWriter`] writes a log, [`Recorder`] does so
 //! on a thread of its own behind a lock-free queue, and [`LogReader`] reads logs, ours and others', whole or damaged.
 //!
 //! A log that we write, in the order of the file:
@@ -30,6 +30,7 @@ mod merge;
 mod reader;
 mod recorder;
 mod scan;
+mod search;
 mod writer;
 
 pub use error::LogError;

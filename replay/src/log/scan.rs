@@ -9,11 +9,10 @@ use headrace_core::time::MonoNs;
 use super::channels::{Channels, listed};
 use super::chunk::{Unpacked, summary_holds, unpack};
 use super::fields::Fields;
-use super::format::{CHANNEL_LIST, FORMAT_KEY, FORMAT_VERSION, METADATA, unseal};
-use super::framing::{
-    AttachmentPlace, ChunkPlace, Definition, Found, Frame, Item, LogFile, find_records, look,
-};
+use super::format::{ATTACHMENT_PREFIX, CHANNEL_LIST, FORMAT_KEY, FORMAT_VERSION, METADATA, unseal};
+use super::framing::{AttachmentPlace, ChunkPlace, Definition, Found, Frame, Item, LogFile, look};
 use super::loss::Losses;
+use super::search::find_records;
 use super::{LogError, Loss, LossKind};
 
 /// Messages outside chunks are read in pieces of about this size.
@@ -53,10 +52,12 @@ pub(super) struct Scan {
     summary: BTreeMap<u16, Definition>,
     summary_channels: Option<u32>,
     data_end: Option<u64>,
-    /// Whether the channels are known without a look into the chunks.
-    complete: bool,
     /// Whether it is a log of ours, which has no messages outside chunks.
     ours: bool,
+    /// Whether it repeats its channels.
+    has_list: bool,
+    /// Attachments that a log of ours says it has.
+    announced: Vec<String>,
     /// Whether the next message may join the last run.
     run_open: bool,
     attachment_bytes: u64,
@@ -71,17 +72,18 @@ pub(super) fn scan<R: Read + Seek>(file: &mut LogFile<R>) -> Result<(Scan, Chann
     let first = file.bytes_at(0, magic_len)?;
     if first != mcap::MAGIC {
         // A log whose very first bytes are damaged still has its header behind them.
-        if !matches!(look(file, magic_len)?, Found::Record(Frame { item: Item::Header, .. })) {
+        if !matches!(look(file, magic_len)?, Found::Record(Frame { item: Item::Header { .. }, .. })) {
             return Err(not_mcap(file, &first));
         }
         scan.lose(LossKind::Framing, 0..magic_len);
     }
     scan.walk(file, magic_len)?;
     scan.check_format(file)?;
-    scan.take_summary(file)?;
-    if !scan.complete {
+    let summarised = scan.take_summary(file)?;
+    if !summarised && !scan.has_list {
         scan.look_into_chunks(file)?;
     }
+    scan.miss_parts();
     scan.date_losses();
     let channels = Channels::new(core::mem::take(&mut scan.definitions));
     Ok((scan, channels))
@@ -133,7 +135,6 @@ impl Scan {
                 }
                 Found::Nothing => find_records(file, at + 1, u64::MAX)?,
             };
-            let resumed = resumed.filter(|_| !self.losses.is_full());
             self.lose(LossKind::Framing, at..resumed.unwrap_or(file.len()));
             let Some(resumed) = resumed else { return Ok(()) };
             (at, found) = (resumed, look(file, resumed)?);
@@ -150,7 +151,8 @@ impl Scan {
             Item::Attachment(ref place) => self.add_attachment(file, &frame, place)?,
             Item::Statistics { channels } => self.summary_channels = Some(channels),
             Item::DataEnd => self.data_end = Some(frame.at),
-            Item::Header | Item::Footer | Item::Other => {}
+            Item::Header { ours } => self.ours = ours,
+            Item::Footer | Item::Other => {}
         }
         Ok(())
     }
@@ -196,10 +198,12 @@ impl Scan {
         if !unseal(name, &mut entries) {
             self.lose(LossKind::Metadata(name.to_owned()), frame.at..frame.end);
         } else if name == CHANNEL_LIST {
-            (self.complete, self.ours) = (true, true);
+            self.has_list = true;
             for definition in listed(&entries) {
                 self.definitions.entry(definition.id).or_insert(definition);
             }
+            let names = entries.keys().filter_map(|key| key.strip_prefix(ATTACHMENT_PREFIX));
+            self.announced.extend(names.map(str::to_owned));
         } else if name == METADATA {
             self.metadata.extend(entries);
         } else {
@@ -240,20 +244,20 @@ impl Scan {
         Err(LogError::TooNew { name: file.name().to_owned(), found: found.clone(), known: FORMAT_VERSION })
     }
 
-    fn take_summary<R: Read + Seek>(&mut self, file: &mut LogFile<R>) -> Result<(), LogError> {
-        let Some(data_end) = self.data_end else { return Ok(()) };
+    /// Takes the channels of the summary, if it is sound, before all others: a tool that has copied a log of ours may
+    /// have numbered them anew. Gives whether these are all.
+    fn take_summary<R: Read + Seek>(&mut self, file: &mut LogFile<R>) -> Result<bool, LogError> {
+        let Some(data_end) = self.data_end else { return Ok(false) };
         if self.summary.is_empty() || !summary_holds(file, data_end)? {
-            return Ok(());
+            return Ok(false);
         }
         let all = self.summary_channels.is_some_and(|count| self.summary.len() as u64 >= u64::from(count));
-        self.complete |= all;
-        for (id, definition) in core::mem::take(&mut self.summary) {
-            self.definitions.entry(id).or_insert(definition);
-        }
-        Ok(())
+        self.definitions.append(&mut self.summary);
+        Ok(all)
     }
 
-    /// The long way to the channels, for logs of other writers that were cut off.
+    /// The long way to the channels, for logs of other writers that were cut off. What stands in a sound chunk is
+    /// believed before what stands outside.
     fn look_into_chunks<R: Read + Seek>(&mut self, file: &mut LogFile<R>) -> Result<(), LogError> {
         for span in &self.spans {
             let Piece::Chunk(place) = &span.piece else { continue };
@@ -263,13 +267,34 @@ impl Scan {
                     defined.extend(Definition::read(&mut Fields::new(body)));
                 }
             })?;
-            if matches!(unpacked, Unpacked::Whole | Unpacked::Cut) {
-                for definition in defined {
-                    self.definitions.entry(definition.id).or_insert(definition);
+            for definition in defined {
+                match unpacked {
+                    Unpacked::Whole => drop(self.definitions.insert(definition.id, definition)),
+                    Unpacked::Cut => drop(self.definitions.entry(definition.id).or_insert(definition)),
+                    Unpacked::Bad(_) => {}
                 }
             }
         }
         Ok(())
+    }
+
+    /// Says which parts of a log of ours are missing, where nothing else has been found to be.
+    fn miss_parts(&mut self) {
+        if !self.ours || !self.losses.list().is_empty() {
+            return;
+        }
+        for name in core::mem::take(&mut self.announced) {
+            if self.attachments.iter().all(|(other, _)| *other != name) {
+                self.lose(LossKind::Attachment(name), 0..0);
+            }
+        }
+        for (name, there) in
+            [(METADATA, self.metadata.contains_key(FORMAT_KEY)), (CHANNEL_LIST, self.has_list)]
+        {
+            if !there {
+                self.lose(LossKind::Metadata(name.to_owned()), 0..0);
+            }
+        }
     }
 
     fn lose(&mut self, kind: LossKind, part: core::ops::Range<u64>) {
@@ -281,7 +306,8 @@ impl Scan {
     fn date_losses(&mut self) {
         for loss in self.losses.list_mut() {
             let next = self.spans.partition_point(|span| span.at < loss.offset);
-            let after = self.spans.iter().skip(next).find(|span| span.at > loss.offset && span.is_dated());
+            let end = loss.offset.saturating_add(loss.bytes.max(1));
+            let after = self.spans.iter().skip(next).find(|span| span.at >= end && span.is_dated());
             let before = self.spans.iter().take(next).rev().find(|span| span.is_dated());
             (loss.from, loss.to) = (before.map(|span| MonoNs(span.to)), after.map(|span| MonoNs(span.from)));
         }

@@ -11,8 +11,9 @@ use mcap::write::NoSeek;
 
 use super::LogError;
 use super::format::{
-    BYTES_ENCODING, CHANNEL_LIST, CONNECT_KEY, FORMAT_KEY, FORMAT_VERSION, METADATA, PLUGIN_KEY, RAW_PREFIX,
-    RESULT_PREFIX, SENT_PREFIX, SOURCE_KEY, TICK_TOPIC, VEHICLE_FILE, order_bytes, seal, tick_head,
+    ATTACHMENT_PREFIX, BYTES_ENCODING, CHANNEL_LIST, CONNECT_KEY, FORMAT_KEY, FORMAT_VERSION, LIBRARY,
+    METADATA, PLUGIN_KEY, RAW_PREFIX, RESULT_PREFIX, SENT_PREFIX, SOURCE_KEY, TICK_TOPIC, VEHICLE_FILE,
+    order_bytes, seal, tick_head,
 };
 
 /// A chunk is closed when it holds more than this, whatever the clock says.
@@ -127,7 +128,7 @@ impl<W: Write> LogWriter<W> {
         // its scene. Without seeking a chunk is written at once when it is closed.
         let options = mcap::WriteOptions::new()
             .profile("headrace")
-            .library(concat!("headrace ", env!("CARGO_PKG_VERSION")))
+            .library(format!("{LIBRARY}{}", env!("CARGO_PKG_VERSION")))
             .compression(Some(mcap::Compression::Zstd))
             .compression_level(1)
             .compression_threads(0)
@@ -135,11 +136,15 @@ impl<W: Write> LogWriter<W> {
             .disable_seeking(true);
         let mut writer = options.create(NoSeek::new(writer)).map_err(LogError::writing("the first bytes"))?;
         write_metadata(&mut writer, header)?;
-        attach(&mut writer, VEHICLE_FILE, "application/toml", header.vehicle_toml.as_bytes())?;
-        for (name, data) in &header.attachments {
-            attach(&mut writer, name, "application/octet-stream", data)?;
+        let mut list = BTreeMap::new();
+        let vehicle = (VEHICLE_FILE, "application/toml", header.vehicle_toml.as_bytes());
+        let others = header.attachments.iter();
+        let others = others.map(|(name, data)| (name.as_str(), BYTES_ENCODING, data.as_slice()));
+        for (name, media_type, data) in [vehicle].into_iter().chain(others) {
+            attach(&mut writer, name, media_type, data)?;
+            list.insert(format!("{ATTACHMENT_PREFIX}{name}"), data.len().to_string());
         }
-        let mut channels = ChannelList { writer: &mut writer, list: BTreeMap::new() };
+        let mut channels = ChannelList { writer: &mut writer, list };
         let raw = channels.add_sources(RAW_PREFIX, &header.sources)?;
         let sent = channels.add_sources(SENT_PREFIX, &header.sources)?;
         let tick = header.ticks.then(|| channels.add(0, TICK_TOPIC, BYTES_ENCODING, BTreeMap::new()));

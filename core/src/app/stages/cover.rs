@@ -75,7 +75,7 @@ fn count(tally: &mut Tally, outcome: &Outcome) {
 /// Adds a ping to the passage of the section that its head is in.
 fn note_passage(coverage: &mut Coverage, sweeps: &HeadSweeps, ping: &PlacedPing) {
     let (Some(fix), Some(reach)) = (ping.fix, ping.reach) else { return };
-    let index = coverage.sections.index_of((reach.from_m + reach.to_m) / 2.0);
+    let index = coverage.sections.index_of(reach.middle_m());
     let Some(section) = coverage.sections.get_mut(index) else { return };
     let passage = &mut section.passage;
     passage.pings += 1;
@@ -108,6 +108,10 @@ fn note_sample(
         }
         return Ok(());
     };
+    if !coverage.store.covers(point.x(), sigma_m) {
+        *slot = None;
+        return Err(StoreError::Outside);
+    }
     let before = *slot;
     let step_from = before.filter(|last| last.unbroken && ping.single_step);
     let now = coverage.store.len();
@@ -146,5 +150,5 @@ fn note_frontier(coverage: &mut Coverage, ping: &PlacedPing, requests: &mut Requ
     let margin_m = sections.margin_m(fix.relative_sigma_m);
     let moved = frontier.advance(ping.head, ping.received, reach, sections.section_m(), margin_m);
     let now = store.len();
-    sections.due(&moved, frontier.swept(), now, ping.received, &mut |request| requests.0.push(request));
+    sections.due(&moved, frontier, now, ping.received, &mut |request| requests.0.push(request));
 }

@@ -1,5 +1,7 @@
 //! The core's own systems, one file a stage.
 
+#![allow(clippy::needless_pass_by_value, reason = "bevy hands systems their arguments by value")]
+
 mod advise;
 mod cover;
 mod decode;

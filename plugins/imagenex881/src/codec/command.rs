@@ -2,7 +2,7 @@
 //!
 //! Source: Imagenex 881A serial interface, switch data command.
 
-use headrace_core::codec::{Codec, CodecCounts, FrameBuffer, Verdict};
+use headrace_core::codec::{Framed, Framing, Verdict};
 use headrace_core::math;
 
 /// Length of a command.
@@ -326,49 +326,25 @@ fn decode_switch(field: &'static str, code: u8) -> Result<bool, CommandError> {
     }
 }
 
+/// How commands stand in the stream from host to head.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Commands;
+
 /// Commands out of the stream from host to head.
-#[derive(Debug, Clone, Default)]
-pub struct CommandCodec {
-    buffer: FrameBuffer<COMMAND_BYTES>,
-}
+pub type CommandCodec = Framed<Commands, COMMAND_BYTES>;
 
-fn judge(front: &[u8]) -> Verdict {
-    let start = front.len().min(HEADER.len());
-    if !HEADER.starts_with(front.get(..start).unwrap_or_default()) {
-        return Verdict::NotAStart;
-    }
-    match front.first_chunk().map(Command::decode) {
-        None => Verdict::Need(COMMAND_BYTES),
-        Some(Ok(_)) => Verdict::Frame(COMMAND_BYTES),
-        Some(Err(_)) => Verdict::Bad,
-    }
-}
-
-fn take(frame: &[u8], sink: &mut dyn FnMut(Command)) {
-    if let Some(Ok(command)) = frame.first_chunk().map(Command::decode) {
-        sink(command);
-    }
-}
-
-impl Codec for CommandCodec {
+impl Framing for Commands {
     type Value = Command;
-    const MAX_FRAME_BYTES: usize = COMMAND_BYTES;
-    const WHOLE_MESSAGES: bool = false;
 
-    fn push(&mut self, bytes: &[u8], sink: &mut dyn FnMut(Command)) {
-        self.buffer.push(bytes, judge, |frame| take(frame, sink));
+    fn judge(&self, front: &[u8]) -> Verdict {
+        if front.iter().zip(HEADER).any(|(byte, wanted)| *byte != wanted) {
+            return Verdict::NotAStart;
+        }
+        Verdict::on(front, COMMAND_BYTES, |frame| self.read(frame).is_some())
     }
 
-    fn flush(&mut self, sink: &mut dyn FnMut(Command)) {
-        self.buffer.flush(judge, |frame| take(frame, sink));
-    }
-
-    fn counts(&self) -> CodecCounts {
-        self.buffer.counts()
-    }
-
-    fn held_bytes(&self) -> usize {
-        self.buffer.held_bytes()
+    fn read(&self, frame: &[u8]) -> Option<Command> {
+        Command::decode(frame.first_chunk()?).ok()
     }
 }
 

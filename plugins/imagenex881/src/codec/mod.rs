@@ -1,15 +1,13 @@
 //! The 881 family's wire: 27-byte switch commands to the head, returns of 13 to 513 bytes from it.
 
-mod bytes;
 mod command;
 mod returns;
 
-pub use bytes::{Bytes, TooLong};
-pub use command::{COMMAND_BYTES, Command, CommandCodec, CommandError, Points, RANGES_M};
+pub use command::{COMMAND_BYTES, Command, CommandCodec, CommandError, Commands, Points, RANGES_M};
 pub(crate) use command::{step_at_most, step_deg};
 pub use returns::{
-    Header, MAX_ECHO_BYTES, MAX_POSITION, MAX_RETURN_BYTES, Model, Return, ReturnCodec, ReturnError, Status,
-    Tag,
+    Header, MAX_ECHO_BYTES, MAX_POSITION, MAX_RETURN_BYTES, Model, Return, ReturnCodec, ReturnError, Returns,
+    Status, Tag,
 };
 
 /// Counts of 0.3 degrees in a whole turn of a head.

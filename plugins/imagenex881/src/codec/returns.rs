@@ -2,9 +2,7 @@
 //!
 //! Source: Imagenex 881A serial interface, return data; Imagenex 852 serial interface specification 1.04.
 
-use headrace_core::codec::{Codec, CodecCounts, FrameBuffer, Verdict};
-
-use super::Bytes;
+use headrace_core::codec::{Bytes, Framed, Framing, Verdict};
 
 /// The longest echo.
 pub const MAX_ECHO_BYTES: usize = MAX_ECHO as usize;
@@ -278,77 +276,35 @@ fn at_most(field: &'static str, got: u16, max: u16) -> Result<(), ReturnError> {
     if got > max { Err(ReturnError::TooGreat { field, got, max }) } else { Ok(()) }
 }
 
+/// How returns stand in the stream from head to host.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Returns {
+    /// For a line whose device is known, whatever its head id; `None` goes by head id.
+    pub model: Option<Model>,
+}
+
 /// Returns out of the stream from head to host.
-#[derive(Debug, Clone, Default)]
-pub struct ReturnCodec {
-    buffer: FrameBuffer<MAX_RETURN_BYTES>,
-    model: Option<Model>,
-}
+pub type ReturnCodec = Framed<Returns, MAX_RETURN_BYTES>;
 
-impl ReturnCodec {
-    /// For a line whose device is known, whatever its head id. The default goes by head id.
-    pub fn for_model(model: Model) -> Self {
-        Self { model: Some(model), ..Self::default() }
-    }
-
-    /// Like [`Codec::push`], but hands out the bytes of each valid return and so copies no echo.
-    pub fn push_frames(&mut self, bytes: &[u8], sink: impl FnMut(&[u8])) {
-        let model = self.model;
-        self.buffer.push(bytes, |front| judge(front, model), sink);
-    }
-
-    /// Like [`Codec::flush`], but hands out the bytes of each valid return.
-    pub fn flush_frames(&mut self, sink: impl FnMut(&[u8])) {
-        let model = self.model;
-        self.buffer.flush(|front| judge(front, model), sink);
-    }
-}
-
-fn judge(front: &[u8], model: Option<Model>) -> Verdict {
-    let start = front.get(..front.len().min(3)).unwrap_or_default();
-    if !Tag::ALL.iter().any(|tag| tag.letters().starts_with(start)) {
-        return Verdict::NotAStart;
-    }
-    match Header::decode(front, model) {
-        Err(ReturnError::Short { needed, .. }) => Verdict::Need(needed),
-        Err(_) => Verdict::Bad,
-        Ok((_, echo_len)) => match front.get(HEADER_BYTES + echo_len) {
-            None => Verdict::Need(HEADER_BYTES + echo_len + 1),
-            Some(&TERMINATOR) => Verdict::Frame(HEADER_BYTES + echo_len + 1),
-            Some(_) => Verdict::Bad,
-        },
-    }
-}
-
-impl Codec for ReturnCodec {
+impl Framing for Returns {
     type Value = Return;
-    const MAX_FRAME_BYTES: usize = MAX_RETURN_BYTES;
-    const WHOLE_MESSAGES: bool = false;
 
-    fn push(&mut self, bytes: &[u8], sink: &mut dyn FnMut(Return)) {
-        let model = self.model;
-        self.push_frames(bytes, |frame| {
-            if let Ok(value) = Return::decode(frame, model) {
-                sink(value);
+    fn judge(&self, front: &[u8]) -> Verdict {
+        let start = front.get(..front.len().min(3)).unwrap_or_default();
+        if !Tag::ALL.iter().any(|tag| tag.letters().starts_with(start)) {
+            return Verdict::NotAStart;
+        }
+        match Header::decode(front, self.model) {
+            Err(ReturnError::Short { needed, .. }) => Verdict::Need(needed),
+            Err(_) => Verdict::Bad,
+            Ok((_, echo_len)) => {
+                Verdict::on(front, HEADER_BYTES + echo_len + 1, |frame| frame.last() == Some(&TERMINATOR))
             }
-        });
+        }
     }
 
-    fn flush(&mut self, sink: &mut dyn FnMut(Return)) {
-        let model = self.model;
-        self.flush_frames(|frame| {
-            if let Ok(value) = Return::decode(frame, model) {
-                sink(value);
-            }
-        });
-    }
-
-    fn counts(&self) -> CodecCounts {
-        self.buffer.counts()
-    }
-
-    fn held_bytes(&self) -> usize {
-        self.buffer.held_bytes()
+    fn read(&self, frame: &[u8]) -> Option<Return> {
+        Return::decode(frame, self.model).ok()
     }
 }
 

@@ -1,10 +1,12 @@
 use headrace_core::app::Mission;
+use headrace_core::codec::Bytes;
 use headrace_core::math::PI;
 use headrace_core::site::Site;
+use headrace_core::time::MonoNs;
 use headrace_core::tunnel::named;
 
 use super::*;
-use crate::codec::{Bytes, Return, Status, Tag};
+use crate::codec::{Return, Status, Tag};
 use crate::settings::tests::{sensor, settings};
 
 const LATENCY: DurNs = DurNs(2_000_000);
@@ -92,8 +94,8 @@ fn what_cannot_be_trusted_is_rejected_and_counted() {
     assert_eq!(decode(&mut decoder, 220, &bytes(&good())).len(), 1);
     let rejected = Rejected { status: 2, head_id: 1, tag: 1, range_setting: 1, beyond_range: 1 };
     assert_eq!(decoder.rejected(), rejected);
-    let counts = CodecCounts { good_frames: 1, bad_frames: 7, skipped_bytes: 7 * 13 };
-    assert_eq!(decoder.counts(), counts);
+    let counts = CodecCounts { good_frames: 7, bad_frames: 1, skipped_bytes: 13 };
+    assert_eq!((decoder.counts(), decoder.withheld()), (counts, 6));
 }
 
 #[test]
@@ -104,6 +106,16 @@ fn a_return_in_pieces_is_valid_from_its_first_byte() {
     assert_eq!(decode(&mut decoder, 101, &two[5..9]), []);
     let times: Vec<i64> = decode(&mut decoder, 102, &two[9..]).iter().map(|(ms, _)| *ms).collect();
     assert_eq!(times, [98, 100]);
+}
+
+#[test]
+fn a_return_behind_one_cut_short_is_not_given_its_time() {
+    let mut decoder = decoder("mode = \"fast\"");
+    let whole = bytes(&good());
+    assert_eq!(decode(&mut decoder, 100, &whole[..9]), []);
+    assert_eq!(decode(&mut decoder, 118, &whole[..6]), []);
+    let [(ms, _)] = decode(&mut decoder, 119, &whole[6..])[..] else { panic!() };
+    assert_eq!(ms, 116);
 }
 
 #[test]

@@ -1,6 +1,8 @@
 //! Little-endian fields of a payload: read with a check, written with a bound.
 
-use super::{Bytes, MAX_PAYLOAD_BYTES, TooLong};
+use headrace_core::codec::{Bytes, TooLong};
+
+use super::MAX_PAYLOAD_BYTES;
 
 /// A payload as it is put together.
 pub(super) type Payload = Bytes<MAX_PAYLOAD_BYTES>;

@@ -2,9 +2,7 @@
 //!
 //! Source: Ping protocol, packet format. All numbers are little-endian.
 
-use headrace_core::codec::Verdict;
-
-use super::{Bytes, TooLong};
+use headrace_core::codec::{Bytes, TooLong, Verdict};
 
 /// The longest frame that is taken. The protocol itself allows 65 545 bytes, but no echosounder comes near this.
 pub const MAX_FRAME_BYTES: usize = 4096;
@@ -59,21 +57,13 @@ impl<'a> Frame<'a> {
 
 /// Whether `front` is, or may become, a frame; its checksum is checked, its payload isn't.
 pub(super) fn judge(front: &[u8]) -> Verdict {
-    let start = front.len().min(START.len());
-    if !START.starts_with(front.get(..start).unwrap_or_default()) {
+    if front.iter().zip(START).any(|(byte, wanted)| *byte != wanted) {
         return Verdict::NotAStart;
     }
     let Some((_, payload, _)) = announced(front) else { return Verdict::Need(HEADER_BYTES) };
     let whole = HEADER_BYTES + payload + CHECKSUM_BYTES;
-    if whole > MAX_FRAME_BYTES {
-        Verdict::Bad
-    } else if front.len() < whole {
-        Verdict::Need(whole)
-    } else if Frame::parse(front).is_some() {
-        Verdict::Frame(whole)
-    } else {
-        Verdict::Bad
-    }
+    // The codec takes one for bad that is longer than it has room for.
+    Verdict::on(front, whole, |frame| Frame::parse(frame).is_some())
 }
 
 /// Message id and payload length that a header announces, and what is there of the payload.

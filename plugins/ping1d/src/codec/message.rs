@@ -2,8 +2,10 @@
 //!
 //! Source: Ping protocol, common and ping1d messages.
 
+use headrace_core::codec::{Bytes, TooLong};
+
 use super::fields::{Field, Payload, record};
-use super::{Bytes, Frame, MAX_PAYLOAD_BYTES, TooLong};
+use super::{Frame, MAX_PAYLOAD_BYTES};
 
 record! {
     /// What a device is.

@@ -1,9 +1,11 @@
 use headrace_core::app::Mission;
+use headrace_core::codec::Bytes;
 use headrace_core::site::Site;
+use headrace_core::time::MonoNs;
 use headrace_core::tunnel::named;
 
 use super::*;
-use crate::codec::{Addressed, Bytes, Message, Profile, ScanRange};
+use crate::codec::{Addressed, Message, Profile, ScanRange};
 use crate::settings::tests::{sensor, settings};
 
 const PING: Distance = Distance {
@@ -64,6 +66,7 @@ fn other_messages_other_devices_and_nonsense_give_no_reading() {
     }
     let elsewhere = Addressed { source: 2, destination: 0, message: Message::Distance(PING) };
     assert_eq!(decode(&mut decoder, 100, elsewhere.encode().unwrap().as_slice()), []);
+    assert_eq!((decoder.counts().good_frames, decoder.withheld()), (4, 2));
 }
 
 #[test]

@@ -38,7 +38,12 @@ fn without_chunk(seen: &[Seen], chunk: usize) -> Vec<Seen> {
 
 fn is_subsequence(part: &[Seen], whole: &[Seen]) -> bool {
     let mut rest = whole.iter();
-    part.iter().all(|message| rest.any(|other| other == message))
+    // Which channel a message is of may be lost too, when all copies of the definitions are damaged.
+    part.iter().all(|message| {
+        rest.any(|other| {
+            (other.1, other.2, other.3, &other.4) == (message.1, message.2, message.3, &message.4)
+        })
+    })
 }
 
 #[test]
@@ -125,6 +130,26 @@ fn bytes_between_records_are_skipped() {
 }
 
 #[test]
+fn however_much_is_damaged_the_rest_is_read() {
+    let mut log = LogWriter::new(Vec::new(), &header(true)).unwrap();
+    for at in 0..3000 {
+        log.raw(0, MonoNs(at), MonoNs(at), &noise(at, 30)).unwrap();
+        log.flush().unwrap();
+    }
+    let mut bytes = log.finish().unwrap().0;
+    for place in places(&bytes, op::CHUNK).into_iter().skip(1).step_by(2) {
+        bytes[place..place + 30].fill(0);
+    }
+    let (got, losses) = read(&bytes);
+    let odd: Vec<u64> = (0..3000).filter(|at| at % 2 == 1).collect();
+    let times: Vec<u64> = got.iter().map(|message| message.1).collect();
+    assert!(times == odd, "{} of {} messages", times.len(), odd.len());
+    assert_eq!(losses.len(), 1000);
+    let last = losses.last().unwrap();
+    assert_eq!((last.from, last.to), (Some(MonoNs(1997)), Some(MonoNs(2999))), "{last}");
+}
+
+#[test]
 fn the_channels_survive_the_loss_of_their_chunk_and_of_the_summary() {
     let (bytes, seen, places) = log();
     let mut bytes = bytes[..places[CHUNKS - 1]].to_vec();
@@ -176,7 +201,7 @@ fn check_changed(bytes: Vec<u8>, seen: &[Seen], info: &LogInfo) {
             let got = read_all(&mut reader);
             assert!(is_subsequence(&got, seen), "{} messages, {:?}", got.len(), reader.losses());
             if reader.losses().is_empty() {
-                assert_eq!(got.len(), seen.len());
+                assert!(got == seen, "{} messages", got.len());
                 assert_eq!(reader.header(), info);
             }
         }
@@ -199,7 +224,7 @@ fn a_changed_bit_is_noticed_wherever_it_is() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(40000))]
+    #![proptest_config(ProptestConfig::with_cases(400))]
 
     #[test]
     fn changed_bytes_are_noticed(

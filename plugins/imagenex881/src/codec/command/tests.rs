@@ -1,3 +1,4 @@
+use headrace_core::codec::Codec as _;
 use proptest::prelude::*;
 
 use super::*;

@@ -55,3 +55,19 @@ impl<const N: usize> core::fmt::Debug for Bytes<N> {
         write!(f, "{:02X?}", self.as_slice())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_does_not_fit_is_refused_whole() {
+        let mut bytes = Bytes::<4>::new(&[1, 2, 3]).unwrap();
+        assert_eq!(bytes.extend(&[4, 5]), Err(TooLong { len: 5, max: 4 }));
+        assert_eq!(bytes, Bytes::new(&[1, 2, 3]).unwrap());
+        bytes.extend(&[0]).unwrap();
+        assert_eq!(bytes.as_slice(), [1, 2, 3, 0]);
+        assert_ne!(bytes, Bytes::new(&[1, 2, 3]).unwrap());
+        assert_eq!(format!("{bytes:?}"), "[01, 02, 03, 00]");
+    }
+}

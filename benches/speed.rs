@@ -1,0 +1,332 @@
+//! How fast the loop is, each figure beside a yardstick measured in the same run. Prints Markdown.
+//!
+//! `cargo bench` runs it on one core for about a minute. Absolute times drift on shared machines; the ratios hold.
+
+#![expect(clippy::disallowed_methods, reason = "a benchmark reads the clock")]
+#![expect(clippy::disallowed_types, reason = "std's hash map is a yardstick here")]
+#![expect(clippy::unwrap_used, reason = "a benchmark stops at what it can't do")]
+
+use std::collections::HashMap;
+use std::hint::black_box;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use bevy_ecs::schedule::{IntoScheduleConfigs, Schedule, SingleThreadedExecutor};
+use bevy_ecs::world::World;
+use headrace_core::app::device::{Decoder, DeviceKind, Direction};
+use headrace_core::app::flow::{Coverage, Tally};
+use headrace_core::app::reading::{Decoded, Packet};
+use headrace_core::app::run::Loop;
+use headrace_core::app::{App, Mission, SourceSpec};
+use headrace_core::codec::CodecCounts;
+use headrace_core::config::Document;
+use headrace_core::coverage::hole::FARTHEST_M;
+use headrace_core::coverage::{HoleFinder, SampleIndex, SampleStore, Sections, StoreLayout, WallSample};
+use headrace_core::fusion::direct::DirectNavigation;
+use headrace_core::math;
+use headrace_core::time::{DurNs, MonoNs};
+use headrace_core::tunnel::named;
+use headrace_replay::simulate::{Message, START, Scene, Simulation};
+
+const KINDS: [&dyn DeviceKind; 5] = [
+    &headrace_imagenex881::Kind,
+    &headrace_ping1d::Kind,
+    &headrace_bar100::Kind,
+    &headrace_imu_can::Kind,
+    &headrace_tether_hid::Kind,
+];
+const SCENE: &str =
+    "vehicle = \"vita2-4.toml\"\n[trajectory]\n[[trajectory.legs]]\ndistance_m = 120\nspeed_mps = 0.197\n";
+const TICK: DurNs = DurNs(20_000_000);
+const ROUNDS: usize = 5;
+
+fn main() {
+    println!(
+        "{}, {} {}, {} rounds, best of each\n",
+        cpu(),
+        std::env::consts::ARCH,
+        std::env::consts::OS,
+        ROUNDS
+    );
+    println!("| what | figure | yardstick in the same run | ratio |\n|---|---|---|---|");
+    // `cargo bench -- holes` runs one alone.
+    let wanted = std::env::args().nth(1).filter(|word| !word.starts_with('-'));
+    let benches: [(&str, fn()); 4] =
+        [("loop", whole_loop), ("idle", idle_tick), ("covering", covering), ("holes", holes)];
+    for (name, bench) in benches {
+        if wanted.as_deref().is_none_or(|word| word == name) {
+            bench();
+        }
+    }
+}
+
+fn row(what: &str, figure: &str, yardstick: &str, ratio: f64) {
+    println!("| {what} | {figure} | {yardstick} | {ratio:.2} |");
+}
+
+fn cpu() -> String {
+    let info = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let model =
+        info.lines().find_map(|line| line.strip_prefix("model name")).unwrap_or(": unknown processor");
+    model.trim_start_matches(['\t', ' ', ':']).to_owned()
+}
+
+fn best(mut work: impl FnMut() -> Duration) -> Duration {
+    (0..ROUNDS).map(|_| work()).min().unwrap()
+}
+
+struct Nothing;
+
+impl Decoder for Nothing {
+    fn decode(&mut self, _: Packet<'_>, _: &mut dyn FnMut(Decoded)) {}
+
+    fn counts(&self) -> CodecCounts {
+        CodecCounts::default()
+    }
+}
+
+fn scene() -> Scene {
+    let vehicles = Path::new(env!("CARGO_MANIFEST_DIR")).join("deploy/vehicles");
+    let load = |name: &str| std::fs::read_to_string(vehicles.join(name)).map_err(|error| error.to_string());
+    Scene::parse(Document::new("scene", SCENE), &KINDS, &load).unwrap()
+}
+
+fn armed(scene: &Scene, decoding: bool) -> Loop {
+    let vehicle = &scene.vehicle;
+    let mut app = App::new(Mission {
+        profile: vehicle.tunnel.profile.clone(),
+        site: vehicle.site,
+        target_m: vehicle.target_m,
+        section_m: vehicle.section_m,
+        length_m: 200.0,
+    });
+    for (sensor, config) in vehicle.sensors.iter().zip(&vehicle.sensor_configs) {
+        if decoding {
+            app.add_plugin(sensor.as_ref()).unwrap();
+        } else {
+            let id = config.id.clone();
+            let decoder = Box::new(Nothing);
+            app.add_source(SourceSpec {
+                id,
+                plugin: "none",
+                connect: String::new(),
+                decoder,
+                ring_bytes: 1 << 17,
+            })
+            .unwrap();
+        }
+    }
+    app.arm(Box::new(DirectNavigation::new(vehicle.tunnel.profile.clone(), vehicle.site))).unwrap()
+}
+
+/// Feeds all messages tick by tick; gives the time of each tick with the filling of its rings.
+fn run(dive: &mut Loop, messages: &[Message]) -> Vec<Duration> {
+    let mut ports: Vec<_> = (0..dive.sources().len()).map(|source| dive.take_port(source).unwrap()).collect();
+    let mut ticks = Vec::new();
+    let mut rest = messages;
+    let mut until = START;
+    while !rest.is_empty() {
+        until = until + TICK;
+        let (now, later) = rest.split_at(rest.partition_point(|message| message.at < until));
+        rest = later;
+        let started = Instant::now();
+        for message in now {
+            ports[usize::from(message.source)].send(message.at, &message.bytes).unwrap();
+        }
+        dive.tick(until);
+        ticks.push(started.elapsed());
+    }
+    ticks
+}
+
+fn whole_loop() {
+    let scene = scene();
+    let mut simulation = Simulation::new(&scene);
+    let messages: Vec<Message> = std::iter::from_fn(|| simulation.next_message())
+        .filter(|message| message.direction == Direction::Received)
+        .collect();
+    let data_s = scene.trajectory.duration_s();
+    let mut ticks = Vec::new();
+    let mut samples = 0;
+    let full = best(|| {
+        let mut dive = armed(&scene, true);
+        ticks = run(&mut dive, &messages);
+        samples = dive.world().resource::<Tally>().samples;
+        ticks.iter().sum()
+    });
+    let bare = best(|| run(&mut armed(&scene, false), &messages).iter().sum());
+    let per_packet = |time: Duration| time.as_secs_f64() * 1e9 / messages.len() as f64;
+    row(
+        &format!("whole loop, four heads, {} packets, {samples} samples", messages.len()),
+        &format!(
+            "{:.2} M packets/s, {:.0} ns a packet, {:.0} x real time",
+            1e3 / per_packet(full),
+            per_packet(full),
+            data_s / full.as_secs_f64()
+        ),
+        &format!("rings, merge and empty decoders: {:.0} ns a packet", per_packet(bare)),
+        full.as_secs_f64() / bare.as_secs_f64(),
+    );
+    ticks.sort_unstable();
+    let at = |share: f64| ticks[((ticks.len() - 1) as f64 * share) as usize].as_secs_f64() * 1e6;
+    row(
+        "a tick of 20 ms of that dive",
+        &format!(
+            "p50 {:.1} us, p99 {:.1} us, p99.9 {:.1} us, max {:.1} us",
+            at(0.5),
+            at(0.99),
+            at(0.999),
+            at(1.0)
+        ),
+        "its 20 ms",
+        at(0.5) / 20_000.0,
+    );
+}
+
+fn nothing() {}
+
+fn idle_tick() {
+    const RUNS: u32 = 200_000;
+    let mut dive = armed(&scene(), true);
+    let idle = best(|| {
+        let started = Instant::now();
+        for _ in 0..RUNS {
+            black_box(dive.tick(MonoNs(0)));
+        }
+        started.elapsed() / RUNS
+    });
+    let mut world = World::new();
+    let mut schedule = Schedule::default();
+    schedule.set_executor(SingleThreadedExecutor::new());
+    // As many as the loop has, chained.
+    schedule.add_systems(
+        (|| nothing(), || nothing(), || nothing(), || nothing(), || nothing(), || nothing()).chain(),
+    );
+    let bare = best(|| {
+        let started = Instant::now();
+        for _ in 0..RUNS {
+            schedule.run(&mut world);
+        }
+        started.elapsed() / RUNS
+    });
+    row(
+        "a tick with nothing to do",
+        &format!("{} ns", idle.as_nanos()),
+        &format!("a bare schedule of six empty systems: {} ns", bare.as_nanos()),
+        idle.as_secs_f64() / bare.as_secs_f64(),
+    );
+}
+
+/// Samples of ideal heads together at the circle's centre, in the order in which they fall.
+fn helix(steps: u32, turn_s: f64, heads: u32, length_m: f64) -> Vec<(f64, f64, usize)> {
+    let profile = named::ceran().unwrap();
+    let per_ping_m = 0.197 * turn_s / f64::from(steps);
+    let pings = math::floor_to_i64(length_m / per_ping_m);
+    let mut samples = Vec::new();
+    for ping in 0..pings {
+        for head in 0..heads {
+            let angle = math::TAU * (ping as f64 / f64::from(steps) + f64::from(head) / f64::from(heads));
+            let hit = profile.cast(profile.reference(), [math::sin(angle), -math::cos(angle)]).unwrap();
+            samples.push((ping as f64 * per_ping_m, hit.sigma_m, head as usize));
+        }
+    }
+    samples
+}
+
+fn store(length_m: f64, capacity: usize) -> SampleStore {
+    SampleStore::new(StoreLayout {
+        perimeter_m: named::ceran().unwrap().perimeter_m(),
+        from_m: -1.0,
+        to_m: length_m + 1.0,
+        cell_m: 0.25,
+        capacity: u32::try_from(capacity).unwrap(),
+    })
+}
+
+/// Keeps all samples as the cover stage does: the nearest pass, the sample, the sections it touches.
+fn cover(samples: &[(f64, f64, usize)], length_m: f64) -> Coverage {
+    let mut coverage = Coverage {
+        store: store(length_m, samples.len()),
+        sections: Sections::new(0.25, 0.5, -1.0, length_m + 1.0),
+        frontier: headrace_core::coverage::Frontier::default(),
+    };
+    let mut last = [None; 8];
+    for (x_m, sigma_m, head) in samples {
+        let now = coverage.store.len();
+        black_box(coverage.store.nearest_pass_m(*x_m, *sigma_m, FARTHEST_M, now));
+        let sample = WallSample { x_m: *x_m, sigma_m: *sigma_m, step_from: last[*head] };
+        last[*head] = Some(coverage.store.insert(sample).unwrap());
+        coverage.sections.touch(*x_m);
+    }
+    coverage
+}
+
+fn covering() {
+    let length_m = 100.0;
+    let samples = helix(400, 8.0, 4, length_m);
+    let per_sample = |time: Duration| time.as_secs_f64() * 1e9 / samples.len() as f64;
+    let ours = best(|| {
+        let started = Instant::now();
+        black_box(cover(&samples, length_m));
+        started.elapsed()
+    });
+    let hashed = best(|| {
+        let mut grid: HashMap<(i64, i64), (u32, f64)> = HashMap::new();
+        let started = Instant::now();
+        for (x_m, sigma_m, _) in &samples {
+            let cell = (math::floor_to_i64(x_m / 0.05), math::floor_to_i64(sigma_m / 0.05));
+            let entry = grid.entry(cell).or_default();
+            *entry = (entry.0 + 1, *x_m);
+        }
+        black_box(&grid);
+        started.elapsed()
+    });
+    row(
+        "covering a sample (nearest pass, keeping, sections)",
+        &format!("{:.0} ns", per_sample(ours)),
+        &format!("counting it in a hash map of 5 cm cells: {:.0} ns", per_sample(hashed)),
+        ours.as_secs_f64() / hashed.as_secs_f64(),
+    );
+}
+
+fn holes() {
+    for (mode, steps, turn_s, heads) in [("FAST", 400, 8.0, 4), ("SLOW", 1200, 21.6, 1)] {
+        let length_m = 60.0;
+        let samples = helix(steps, turn_s, heads, length_m);
+        let coverage = cover(&samples, length_m);
+        let mut finder = HoleFinder::default();
+        let sections = 160;
+        let ours = best(|| {
+            let started = Instant::now();
+            for k in 0..sections {
+                let from_m = 10.0 + 0.25 * f64::from(k);
+                black_box(finder.largest(&coverage.store, from_m, from_m + 0.25, SampleIndex(u32::MAX)));
+            }
+            started.elapsed()
+        });
+        let nearest = best(|| {
+            let started = Instant::now();
+            for (x_m, sigma_m, _) in &samples {
+                black_box(coverage.store.nearest(
+                    x_m + 0.1,
+                    sigma_m + 0.1,
+                    FARTHEST_M,
+                    SampleIndex(u32::MAX),
+                ));
+            }
+            started.elapsed()
+        });
+        let in_sections = samples.len() as f64 * (0.25 * f64::from(sections)) / length_m;
+        let per_sample = ours.as_secs_f64() * 1e9 / in_sections;
+        let per_query = nearest.as_secs_f64() * 1e9 / samples.len() as f64;
+        row(
+            &format!("exact hole, {mode} x {heads}, a sample"),
+            &format!(
+                "{per_sample:.0} ns ({:.0} us a section)",
+                ours.as_secs_f64() * 1e6 / f64::from(sections)
+            ),
+            &format!("one nearest-sample query: {per_query:.0} ns"),
+            per_sample / per_query,
+        );
+    }
+}

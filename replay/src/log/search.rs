@@ -1,0 +1,97 @@
+//! The search for records after damage: byte by byte, until there is a place from which records follow each other.
+
+use std::io::{Read, Seek};
+
+use mcap::records::op;
+
+use super::LogError;
+use super::framing::{Found, Item, LogFile, look};
+
+/// Records that must follow each other for a place to count as found again.
+const CHAIN: usize = 3;
+/// Bytes that are read at once.
+const SEARCH_BYTES: usize = 64 * 1024;
+
+/// The first place within `from..until` from which records follow each other.
+///
+/// A byte before a record may make another of it, with a length that by chance ends where a record begins; so one that
+/// nothing confirms is taken only if there are no records within it.
+pub(super) fn find_records<R: Read + Seek>(
+    file: &mut LogFile<R>,
+    from: u64,
+    until: u64,
+) -> Result<Option<u64>, LogError> {
+    let mut first = find_chain(file, from, until)?;
+    while let Some(Chain { at, end, confirmed: false }) = first {
+        let Some(inner) = find_chain(file, at + 1, end.min(until))? else { break };
+        first = Some(inner);
+    }
+    Ok(first.map(|chain| chain.at))
+}
+
+/// The first of some records that follow each other.
+struct Chain {
+    at: u64,
+    end: u64,
+    confirmed: bool,
+}
+
+fn find_chain<R: Read + Seek>(
+    file: &mut LogFile<R>,
+    from: u64,
+    until: u64,
+) -> Result<Option<Chain>, LogError> {
+    let mut block = vec![0; SEARCH_BYTES];
+    let mut start = from;
+    while start < until.min(file.len()) {
+        let got = file.read_at(start, &mut block)?;
+        let bytes = block.get(..got).unwrap_or_default();
+        for (at, head) in (start..until).zip(bytes.windows(mcap::MAGIC.len())) {
+            if may_begin(head)
+                && let Some(chain) = chain_at(file, at)?
+            {
+                return Ok(Some(chain));
+            }
+        }
+        // Windows that would cross the block's end are looked at in the next one.
+        let whole_windows = got.saturating_sub(mcap::MAGIC.len() - 1);
+        if whole_windows == 0 {
+            break;
+        }
+        start += whole_windows as u64;
+    }
+    Ok(None)
+}
+
+/// A quick look that sorts out nearly every place: a known opcode and a length below 2^32, or the closing bytes.
+fn may_begin(head: &[u8]) -> bool {
+    match head {
+        [1..=op::DATA_END, _, _, _, _, 0, 0, 0] => true,
+        _ => head == mcap::MAGIC,
+    }
+}
+
+fn chain_at<R: Read + Seek>(file: &mut LogFile<R>, from: u64) -> Result<Option<Chain>, LogError> {
+    let mut chain = Chain { at: from, end: from, confirmed: true };
+    let mut at = from;
+    for link in 0..CHAIN {
+        let follows = match look(file, at)? {
+            Found::Record(frame) => {
+                if link == 0 {
+                    (chain.end, chain.confirmed) = (frame.end, frame.confirmed);
+                }
+                if frame.confirmed && matches!(frame.item, Item::Chunk(_)) {
+                    return Ok(Some(chain));
+                }
+                at = frame.end;
+                continue;
+            }
+            Found::Cut(frame) => frame.confirmed && matches!(frame.item, Item::Chunk(_)),
+            Found::Closing => at.saturating_add(mcap::MAGIC.len() as u64) == file.len(),
+            Found::End => at != from,
+            Found::Nothing => false,
+        };
+        return Ok(follows.then_some(chain));
+    }
+    Ok(Some(chain))
+}
