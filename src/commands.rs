@@ -29,6 +29,10 @@ pub(crate) fn demo(args: &Demo) -> Result<u8, Failure> {
     let scene = Scene::parse(Document::new(name, text), &KINDS, &files::built_in)?;
     std::fs::create_dir_all(&args.out).map_err(|source| Failure::Write { path: args.out.clone(), source })?;
     let (log, report_file) = (args.out.join("dive.mcap"), args.out.join("report.json"));
+    // A dive is never recorded over another; the demonstration's own last one is no loss.
+    if log.exists() {
+        std::fs::remove_file(&log).map_err(|source| Failure::Write { path: log.clone(), source })?;
+    }
     let dive = assemble(&scene.vehicle, &scene.vehicle_text, Some(&log))?;
     println!("{}, target {} m: a simulated dive", scene.vehicle.name, scene.vehicle.target_m);
     let mut feed = SimulationFeed::new(Simulation::new(&scene));

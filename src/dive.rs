@@ -105,7 +105,7 @@ impl Dive {
         for notice in &last {
             watch.notice(notice, &self.armed);
         }
-        watch.end();
+        watch.end(&self.armed);
         let mut report = Report::of(&self.armed);
         if let Some((path, handle)) = self.recorder.take() {
             drop(self.armed);

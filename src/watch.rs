@@ -5,7 +5,7 @@ use std::io::{IsTerminal, Write};
 
 use headrace_core::app::flow::{AdviceEntry, Coverage, Notice};
 use headrace_core::app::run::Loop;
-use headrace_core::coverage::{Cause, Evidence, Judgement};
+use headrace_core::coverage::{Cause, Evidence, Judgement, Sections, Verdict};
 use headrace_core::sampling::advice::Reason;
 use headrace_core::time::{DurNs, MonoNs};
 
@@ -27,11 +27,28 @@ pub(crate) struct Watch {
     v_max_mps: f64,
 }
 
-/// Neighbouring flagged sections with one cause.
+/// Neighbouring sections of which one thing is said.
 struct Run {
-    to: i64,
-    end_m: f64,
-    evidence: Evidence,
+    /// The cause of their flags, or `None` where flags were cleared.
+    cause: Option<Cause>,
+    low: i64,
+    high: i64,
+}
+
+impl Run {
+    /// Takes in a section next to the run's ends of which the same is said.
+    fn extend(&mut self, section: i64, cause: Option<Cause>) -> bool {
+        let next = self.touches(section) && self.cause == cause;
+        if next {
+            self.low = self.low.min(section);
+            self.high = self.high.max(section);
+        }
+        next
+    }
+
+    fn touches(&self, section: i64) -> bool {
+        section == self.low - 1 || section == self.high + 1
+    }
 }
 
 impl Watch {
@@ -64,13 +81,13 @@ impl Watch {
         }
         match notice {
             Notice::Advice(entry) => self.status(entry, dive.mission().target_m),
-            Notice::Section { section, at, change } => self.section(*section, *at, *change, dive),
+            Notice::Section { section, change, .. } => self.section(*section, *change, dive),
         }
     }
 
     /// The dive has ended.
-    pub(crate) fn end(&mut self) {
-        self.close_run();
+    pub(crate) fn end(&mut self, dive: &Loop) {
+        self.close_run(&dive.world().resource::<Coverage>().sections);
         self.close_status();
     }
 
@@ -98,47 +115,38 @@ impl Watch {
         self.flush();
     }
 
-    fn section(&mut self, section: i64, at: MonoNs, change: Judgement, dive: &Loop) {
+    fn section(&mut self, section: i64, change: Judgement, dive: &Loop) {
         let sections = &dive.world().resource::<Coverage>().sections;
-        let start_m = sections.bounds_m(section).0;
-        match change {
+        let evidence = sections.get(section).and_then(|section| section.evidence);
+        let cause = match change {
             Judgement::Updated => {
-                if self.run.as_ref().is_some_and(|run| section == run.to + 1) {
-                    self.close_run();
+                let failed = sections.get(section).is_some_and(|section| section.verdict == Verdict::Fail);
+                if !failed && self.run.as_ref().is_some_and(|run| run.touches(section)) {
+                    self.close_run(sections);
                 }
+                return;
             }
-            Judgement::Cleared => {
-                self.close_run();
-                self.line(&format!("cleared  ch {}", station(start_m)));
-            }
-            Judgement::Raised => {
-                let Some(evidence) = sections.get(section).and_then(|section| section.evidence) else {
-                    return;
-                };
-                if let Some(run) = &mut self.run
-                    && run.evidence.cause == evidence.cause
-                    && section == run.to + 1
-                {
-                    run.to = section;
-                    run.end_m = sections.bounds_m(section).1;
-                    return;
-                }
-                self.close_run();
-                let clock = sections
-                    .get(section)
-                    .and_then(|section| section.hole)
-                    .map_or_else(String::new, |hole| dive.mission().profile.clock(hole.sigma_m));
-                self.line(&format!(
-                    "FLAG     ch {}  {}: holes over {} m at {clock} o'clock; {}",
-                    station(start_m),
-                    cause_words(&evidence),
-                    sections.target_m(),
-                    self.what_to_do(&evidence, start_m),
-                ));
-                tracing::debug!(flagged_s = at.as_secs_f64(), section, "flag");
-                self.run = Some(Run { to: section, end_m: sections.bounds_m(section).1, evidence });
-            }
+            Judgement::Raised => evidence.map(|evidence| evidence.cause),
+            Judgement::Cleared => None,
+        };
+        if self.run.as_mut().is_some_and(|run| run.extend(section, cause)) {
+            return;
         }
+        self.close_run(sections);
+        self.run = Some(Run { cause, low: section, high: section });
+        let Some(evidence) = evidence.filter(|_| cause.is_some()) else { return };
+        let start_m = sections.bounds_m(section).0;
+        let clock = sections
+            .get(section)
+            .and_then(|section| section.hole)
+            .map_or_else(String::new, |hole| dive.mission().profile.clock(hole.sigma_m));
+        self.line(&format!(
+            "FLAG     ch {}  {}: holes over {} m at {clock} o'clock; {}",
+            station(start_m),
+            cause_words(&evidence),
+            sections.target_m(),
+            self.what_to_do(&evidence, start_m),
+        ));
     }
 
     /// What a pilot does about a missed stretch, with the speed that is advised now.
@@ -154,10 +162,12 @@ impl Watch {
         }
     }
 
-    fn close_run(&mut self) {
-        if let Some(run) = self.run.take() {
-            self.line(&format!("         ... to ch {}", station(run.end_m)));
-        }
+    /// Says how far the run went, once that is known.
+    fn close_run(&mut self, sections: &Sections) {
+        let Some(run) = self.run.take() else { return };
+        let what = if run.cause.is_some() { "   ...  " } else { "cleared " };
+        let (from_m, to_m) = (sections.bounds_m(run.low).0, sections.bounds_m(run.high).1);
+        self.line(&format!("{what} ch {} to {}", station(from_m), station(to_m)));
     }
 
     fn line(&mut self, text: &str) {
