@@ -108,7 +108,7 @@ fn armed(scene: &Scene, decoding: bool) -> Loop {
             let decoder = Box::new(Nothing);
             app.add_source(SourceSpec {
                 id,
-                plugin: "none",
+                plugin: String::new(),
                 connect: String::new(),
                 decoder,
                 ring_bytes: 1 << 17,
@@ -168,7 +168,7 @@ fn whole_loop() {
         full.as_secs_f64() / bare.as_secs_f64(),
     );
     ticks.sort_unstable();
-    let at = |share: f64| ticks[((ticks.len() - 1) as f64 * share) as usize].as_secs_f64() * 1e6;
+    let at = |share: usize| ticks[(ticks.len() - 1) * share / 1000].as_secs_f64() * 1e6;
     row(
         "a tick of 20 ms of that dive",
         &format!(
@@ -179,7 +179,7 @@ fn whole_loop() {
             at(1.0)
         ),
         "its 20 ms",
-        at(0.5) / 20_000.0,
+        at(500) / 20_000.0,
     );
 }
 

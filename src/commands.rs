@@ -8,7 +8,7 @@ use headrace_core::config::vehicle::Loader;
 use headrace_core::config::{Document, VehicleConfig};
 use headrace_core::time::DurNs;
 use headrace_replay::drive::Pace;
-use headrace_replay::log::{LogWriter, file_digest};
+use headrace_replay::log::{LogInfo, LogWriter, file_digest};
 use headrace_replay::player::{Player, SimulationFeed};
 use headrace_replay::simulate::{START, Scene, Simulation};
 use serde_json::json;
@@ -66,19 +66,9 @@ pub(crate) fn run(args: &Run) -> Result<u8, Failure> {
 pub(crate) fn replay(args: &Replay) -> Result<u8, Failure> {
     let mut player = Player::open(&args.log)?;
     let (text, mut vehicle) = match &args.vehicle {
-        Some(path) => vehicle_file(path)?,
-        None => {
-            let info = player.info();
-            let text = info.vehicle_toml.clone().ok_or_else(|| {
-                Failure::Usage(format!(
-                    "replaying {}: no vehicle file is attached to this log; give one with --vehicle",
-                    args.log.display()
-                ))
-            })?;
-            let vehicle = parse_vehicle("vehicle.toml", &text, &files::attached(&info.attachments))?;
-            (text, vehicle)
-        }
-    };
+        Some(path) => vehicle_file(path),
+        None => attached_vehicle(player.info(), &args.log),
+    }?;
     vehicle.target_m = args.target.unwrap_or(vehicle.target_m);
     let dive = assemble(&vehicle, &text, None)?;
     player.connect(dive.armed.sources());
@@ -166,6 +156,17 @@ pub(crate) fn check(args: &Check) -> Result<u8, Failure> {
 fn vehicle_file(path: &Path) -> Result<(String, VehicleConfig), Failure> {
     let text = files::read(path)?;
     let vehicle = parse_vehicle(&path.display().to_string(), &text, &files::beside(path))?;
+    Ok((text, vehicle))
+}
+
+fn attached_vehicle(info: &LogInfo, log: &Path) -> Result<(String, VehicleConfig), Failure> {
+    let text = info.vehicle_toml.clone().ok_or_else(|| {
+        Failure::Usage(format!(
+            "replaying {}: no vehicle file is attached to this log; give one with --vehicle",
+            log.display()
+        ))
+    })?;
+    let vehicle = parse_vehicle("vehicle.toml", &text, &files::attached(&info.attachments))?;
     Ok((text, vehicle))
 }
 

@@ -25,7 +25,7 @@ impl Progress {
     /// `words` is called only when the line is due.
     pub(crate) fn at(&mut self, words: impl FnOnce() -> String) {
         self.calls += 1;
-        if !self.terminal || self.calls % CALLS != 0 || self.started.elapsed() < AFTER {
+        if !self.terminal || !self.calls.is_multiple_of(CALLS) || self.started.elapsed() < AFTER {
             return;
         }
         if self.shown.is_some_and(|shown| shown.elapsed() < EVERY) {

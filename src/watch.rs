@@ -112,7 +112,7 @@ impl Watch {
         } else {
             println!("{line}");
         }
-        self.flush();
+        flush();
     }
 
     fn section(&mut self, section: i64, change: Judgement, dive: &Loop) {
@@ -183,11 +183,11 @@ impl Watch {
             self.status_open = false;
         }
     }
+}
 
-    fn flush(&self) {
-        if let Err(error) = std::io::stdout().flush() {
-            tracing::debug!(%error, "the terminal takes no more");
-        }
+fn flush() {
+    if let Err(error) = std::io::stdout().flush() {
+        tracing::debug!(%error, "the terminal takes no more");
     }
 }
 

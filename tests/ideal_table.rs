@@ -4,6 +4,8 @@
 //! The mean distance between passes must be v T / s within 0.5 %, and the largest hole over nine metres within 1 % of
 //! the table, whose values were computed elsewhere from Delaunay circumcircles.
 
+#![expect(clippy::unwrap_used, reason = "a test stops at what it can't do")]
+
 use std::fmt::Write as _;
 use std::path::Path;
 use std::process::Command;
@@ -42,7 +44,8 @@ fn vehicle(mode: &str, heads: usize) -> String {
     text
 }
 
-const SCENE: &str = "vehicle = \"vehicle.toml\"\n[trajectory]\n[[trajectory.legs]]\ndistance_m = 21\nspeed_mps = 0.197\n";
+const SCENE: &str =
+    "vehicle = \"vehicle.toml\"\n[trajectory]\n[[trajectory.legs]]\ndistance_m = 21\nspeed_mps = 0.197\n";
 
 fn headrace(arguments: &[&Path]) {
     let output = Command::new(env!("CARGO_BIN_EXE_headrace")).args(arguments).output().unwrap();

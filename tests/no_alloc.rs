@@ -3,13 +3,17 @@
 //!
 //! That it takes no lock is kept by clippy.toml, which bars the lock types from the whole workspace.
 
-#![expect(unsafe_code, reason = "a global allocator is an unsafe trait; this one counts and hands on to the system's")]
+#![expect(clippy::unwrap_used, reason = "a test stops at what it can't do")]
+#![expect(
+    unsafe_code,
+    reason = "a global allocator is an unsafe trait; this one counts and hands on to the system's"
+)]
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use std::path::Path;
 
-use headrace_core::app::device::{Direction, DeviceKind};
+use headrace_core::app::device::{DeviceKind, Direction};
 use headrace_core::app::outlet::NoticeOutlet;
 use headrace_core::app::{App, Mission};
 use headrace_core::config::Document;
@@ -111,7 +115,8 @@ fn a_million_packets_without_one_allocation() {
     app.add_plugin(&RecorderOutlet::new(port)).unwrap();
     let navigation = DirectNavigation::new(vehicle.tunnel.profile.clone(), vehicle.site);
     let mut dive = app.arm(Box::new(navigation)).unwrap();
-    let mut ports: Vec<_> = (0..vehicle.sensors.len()).map(|source| dive.take_port(source).unwrap()).collect();
+    let mut ports: Vec<_> =
+        (0..vehicle.sensors.len()).map(|source| dive.take_port(source).unwrap()).collect();
 
     let mut simulation = Simulation::new(&scene);
     let mut until = START;

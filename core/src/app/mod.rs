@@ -15,15 +15,16 @@ pub mod run;
 pub mod stage;
 mod stages;
 
-use bevy_ecs::bundle::Bundle;
-use bevy_ecs::prelude::Resource;
+use bevy_ecs::prelude::{Component, Resource};
 use bevy_ecs::schedule::{IntoScheduleConfigs, Schedule};
 use bevy_ecs::system::ScheduleSystem;
 use bevy_ecs::world::World;
 
+use crate::config::SensorConfig;
 use crate::fusion::Navigation;
 use crate::site::Site;
 use crate::tunnel::Profile;
+use components::Mounted;
 use device::Decoder;
 use plugin::{Plugin, PluginError};
 use reading::SourceId;
@@ -39,7 +40,7 @@ pub struct SourceSpec {
     /// Name, also of its channel in the log.
     pub id: String,
     /// Kind of device.
-    pub plugin: &'static str,
+    pub plugin: String,
     /// Where it is connected, as written in the vehicle file.
     pub connect: String,
     /// Bytes to readings.
@@ -54,7 +55,7 @@ pub struct SourceInfo {
     /// Name.
     pub id: String,
     /// Kind of device.
-    pub plugin: &'static str,
+    pub plugin: String,
     /// Where it is connected.
     pub connect: String,
 }
@@ -126,9 +127,25 @@ impl App {
         Ok(SourceId(id))
     }
 
-    /// Adds an entity: a sensor with its components.
-    pub fn spawn(&mut self, bundle: impl Bundle) {
-        self.world.spawn(bundle);
+    /// Registers a sensor: its source, and an entity with the component that says what it is.
+    ///
+    /// Errors: as for [`App::add_source`].
+    pub fn add_sensor(
+        &mut self,
+        sensor: &SensorConfig,
+        decoder: Box<dyn Decoder>,
+        ring_bytes: usize,
+        kind: impl Component,
+    ) -> Result<SourceId, PluginError> {
+        let source = self.add_source(SourceSpec {
+            id: sensor.id.clone(),
+            plugin: sensor.plugin.clone(),
+            connect: sensor.connect.clone(),
+            decoder,
+            ring_bytes,
+        })?;
+        self.world.spawn((Mounted { source, mount: sensor.mount }, kind));
+        Ok(source)
     }
 
     /// Adds a resource for a plugin's own systems.

@@ -376,7 +376,7 @@ fn source_reports(dive: &Loop, tallies: &SourceTallies) -> Vec<SourceReport> {
             let intervals = tally.packets.saturating_sub(1) as f64;
             SourceReport {
                 id: source.id.clone(),
-                plugin: source.plugin.to_owned(),
+                plugin: source.plugin.clone(),
                 packets: tally.packets,
                 frames: counts.good_frames,
                 bad_frames: counts.bad_frames,

@@ -141,7 +141,7 @@ impl HoleFinder {
                 continue;
             }
             // Worth dividing exactly only when the tile is small beside its distance from the samples.
-            let small = half_m < 0.5 * (tile.bound_m - half_m);
+            let small = half_m < 0.6 * (tile.bound_m - half_m);
             if small && self.find_owners(store, &tile, tile.bound_m + half_m, as_of) {
                 if self.reach_m(&tile) > best.distance_m {
                     self.divide(&tile, &mut best);
@@ -217,20 +217,24 @@ impl HoleFinder {
             let (left, right) = (-owner.dx_m - tile.half_x_m, -owner.dx_m + tile.half_x_m);
             let (low, high) = (-owner.dsigma_m - tile.half_sigma_m, -owner.dsigma_m + tile.half_sigma_m);
             self.share.set_rectangle(left, right, low, high);
+            let best2 = best.distance_m * best.distance_m;
             for (other, rival) in self.owners.iter().enumerate() {
-                if other != k && !self.share.corners.is_empty() {
+                // Once no corner beats the best place, the rest of the share can't either.
+                if self.share.farthest2 <= best2 {
+                    break;
+                }
+                if other != k {
                     self.share.clip(rival.dx_m - owner.dx_m, rival.dsigma_m - owner.dsigma_m);
                 }
             }
-            if let Some((dx, dsigma)) = self.share.farthest() {
-                let distance_m = math::sqrt(dx * dx + dsigma * dsigma);
-                if distance_m > best.distance_m {
-                    *best = Best {
-                        distance_m,
-                        x_m: tile.x_m + owner.dx_m + dx,
-                        sigma_m: tile.sigma_m + owner.dsigma_m + dsigma,
-                    };
-                }
+            if self.share.farthest2 > best2
+                && let Some((dx, dsigma)) = self.share.farthest()
+            {
+                *best = Best {
+                    distance_m: math::sqrt(self.share.farthest2),
+                    x_m: tile.x_m + owner.dx_m + dx,
+                    sigma_m: tile.sigma_m + owner.dsigma_m + dsigma,
+                };
             }
         }
     }
@@ -241,21 +245,32 @@ impl HoleFinder {
 struct Polygon {
     corners: Vec<(f64, f64)>,
     clipped: Vec<(f64, f64)>,
+    /// Squared distance of the farthest corner; zero when none is left.
+    farthest2: f64,
 }
 
 impl Polygon {
     fn with_capacity(corners: usize) -> Self {
-        Self { corners: Vec::with_capacity(corners), clipped: Vec::with_capacity(corners) }
+        Self { corners: Vec::with_capacity(corners), clipped: Vec::with_capacity(corners), farthest2: 0.0 }
     }
 
     fn set_rectangle(&mut self, left: f64, right: f64, low: f64, high: f64) {
         self.corners.clear();
         self.corners.extend([(left, low), (right, low), (right, high), (left, high)]);
+        self.measure();
+    }
+
+    fn measure(&mut self) {
+        self.farthest2 = self.corners.iter().map(square).fold(0.0, f64::max);
     }
 
     /// Keeps the part that is at least as near to the origin as to a rival at (`nx`, `ny`).
     fn clip(&mut self, nx: f64, ny: f64) {
         let half = 0.5 * (nx * nx + ny * ny);
+        // A rival more than twice as far as the farthest corner cuts nothing: half > 2 farthest^2.
+        if half > 2.0 * self.farthest2 {
+            return;
+        }
         let excess = |corner: (f64, f64)| nx * corner.0 + ny * corner.1 - half;
         if self.corners.iter().all(|corner| excess(*corner) <= 0.0) {
             return;
@@ -278,12 +293,16 @@ impl Polygon {
             excess_before = excess_here;
         }
         core::mem::swap(&mut self.corners, &mut self.clipped);
+        self.measure();
     }
 
     fn farthest(&self) -> Option<(f64, f64)> {
-        let square = |corner: &(f64, f64)| corner.0 * corner.0 + corner.1 * corner.1;
         self.corners.iter().max_by(|a, b| square(a).total_cmp(&square(b))).copied()
     }
+}
+
+fn square(corner: &(f64, f64)) -> f64 {
+    corner.0 * corner.0 + corner.1 * corner.1
 }
 
 #[cfg(test)]

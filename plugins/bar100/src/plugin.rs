@@ -1,9 +1,9 @@
 //! The vehicle file's part of a Bar100, and its place in the loop.
 
-use headrace_core::app::components::{DepthSensor, Mounted};
+use headrace_core::app::App;
+use headrace_core::app::components::DepthSensor;
 use headrace_core::app::device::{Device, DeviceKind, Emulator, EmulatorSetup};
 use headrace_core::app::plugin::{Plugin, PluginError};
-use headrace_core::app::{App, SourceSpec};
 use headrace_core::config::{ConfigError, Section, SensorConfig};
 
 use crate::calibration::{Calibration, Overrides, PressureMode, STANDARD_ATMOSPHERE_BAR};
@@ -64,14 +64,7 @@ impl DeviceKind for Kind {
 
 impl Plugin for Bar100 {
     fn build(&self, app: &mut App) -> Result<(), PluginError> {
-        let source = app.add_source(SourceSpec {
-            id: self.sensor.id.clone(),
-            plugin: NAME,
-            connect: self.sensor.connect.clone(),
-            decoder: Box::new(Bar100Decoder::new(self.meaning)),
-            ring_bytes: RING_BYTES,
-        })?;
-        app.spawn((Mounted { source, mount: self.sensor.mount }, DepthSensor));
+        app.add_sensor(&self.sensor, Box::new(Bar100Decoder::new(self.meaning)), RING_BYTES, DepthSensor)?;
         Ok(())
     }
 }

@@ -1,10 +1,10 @@
 //! Registration of a head with the loop, and its returns as readings.
 
-use headrace_core::app::components::{Mounted, SonarHead};
+use headrace_core::app::App;
+use headrace_core::app::components::SonarHead;
 use headrace_core::app::device::{Decoder, Device, DeviceKind, Emulator, EmulatorSetup, HeadSpec};
 use headrace_core::app::plugin::{Plugin, PluginError};
 use headrace_core::app::reading::{Decoded, Packet, Reading, SonarReturn};
-use headrace_core::app::{App, SourceSpec};
 use headrace_core::codec::{Codec as _, CodecCounts, LineClock};
 use headrace_core::config::{ConfigError, Section, SensorConfig};
 use headrace_core::time::DurNs;
@@ -49,18 +49,16 @@ pub struct Imagenex881 {
 
 impl Plugin for Imagenex881 {
     fn build(&self, app: &mut App) -> Result<(), PluginError> {
-        let source = app.add_source(SourceSpec {
-            id: self.sensor.id.clone(),
-            plugin: NAME,
-            connect: self.sensor.connect.clone(),
-            decoder: Box::new(HeadDecoder::new(self.settings, self.sensor.latency)),
-            ring_bytes: RING_BYTES,
-        })?;
         let head = SonarHead {
             step_rad: self.settings.step_rad(),
             ping_period_s: self.settings.ping_period.as_secs_f64(),
         };
-        app.spawn((Mounted { source, mount: self.sensor.mount }, head));
+        app.add_sensor(
+            &self.sensor,
+            Box::new(HeadDecoder::new(self.settings, self.sensor.latency)),
+            RING_BYTES,
+            head,
+        )?;
         Ok(())
     }
 }

@@ -1,9 +1,9 @@
 //! The vehicle file's part of an inertial unit, and its place in the loop.
 
-use headrace_core::app::components::{Imu, Mounted};
+use headrace_core::app::App;
+use headrace_core::app::components::Imu;
 use headrace_core::app::device::{Device, DeviceKind, Emulator, EmulatorSetup};
 use headrace_core::app::plugin::{Plugin, PluginError};
-use headrace_core::app::{App, SourceSpec};
 use headrace_core::config::{ConfigError, Section, SensorConfig};
 use headrace_core::time::DurNs;
 
@@ -91,14 +91,7 @@ fn id_base(own: &Section<'_>) -> Result<Option<u32>, ConfigError> {
 
 impl Plugin for CanImu {
     fn build(&self, app: &mut App) -> Result<(), PluginError> {
-        let source = app.add_source(SourceSpec {
-            id: self.sensor.id.clone(),
-            plugin: NAME,
-            connect: self.sensor.connect.clone(),
-            decoder: Box::new(ImuDecoder::new(self.meaning)),
-            ring_bytes: RING_BYTES,
-        })?;
-        app.spawn((Mounted { source, mount: self.sensor.mount }, Imu));
+        app.add_sensor(&self.sensor, Box::new(ImuDecoder::new(self.meaning)), RING_BYTES, Imu)?;
         Ok(())
     }
 }

@@ -1,10 +1,10 @@
 //! Registration of an echosounder with the loop, and its messages as readings.
 
-use headrace_core::app::components::{Echosounder, Mounted};
+use headrace_core::app::App;
+use headrace_core::app::components::Echosounder;
 use headrace_core::app::device::{Decoder, Device, DeviceKind, Emulator, EmulatorSetup};
 use headrace_core::app::plugin::{Plugin, PluginError};
 use headrace_core::app::reading::{Decoded, EchoRange, Packet, Reading};
-use headrace_core::app::{App, SourceSpec};
 use headrace_core::codec::{Codec as _, CodecCounts, LineClock};
 use headrace_core::config::{ConfigError, Section, SensorConfig};
 use headrace_core::time::DurNs;
@@ -47,15 +47,13 @@ pub struct Ping1d {
 
 impl Plugin for Ping1d {
     fn build(&self, app: &mut App) -> Result<(), PluginError> {
-        let source = app.add_source(SourceSpec {
-            id: self.sensor.id.clone(),
-            plugin: NAME,
-            connect: self.sensor.connect.clone(),
-            decoder: Box::new(PingDecoder::new(self.settings, self.sensor.latency)),
-            ring_bytes: RING_BYTES,
-        })?;
         let echosounder = Echosounder { min_confidence: self.settings.min_confidence };
-        app.spawn((Mounted { source, mount: self.sensor.mount }, echosounder));
+        app.add_sensor(
+            &self.sensor,
+            Box::new(PingDecoder::new(self.settings, self.sensor.latency)),
+            RING_BYTES,
+            echosounder,
+        )?;
         Ok(())
     }
 }

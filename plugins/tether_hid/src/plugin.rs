@@ -1,9 +1,9 @@
 //! The vehicle file's part of a cable counter, and its place in the loop.
 
-use headrace_core::app::components::{Mounted, Tether};
+use headrace_core::app::App;
+use headrace_core::app::components::Tether;
 use headrace_core::app::device::{Decoder, Device, DeviceKind, Emulator, EmulatorSetup};
 use headrace_core::app::plugin::{Plugin, PluginError};
-use headrace_core::app::{App, SourceSpec};
 use headrace_core::config::{ConfigError, Section, SensorConfig};
 
 use crate::decoder::{Counter, HidDecoder, LineDecoder};
@@ -151,14 +151,7 @@ impl Plugin for CableCounter {
                 Box::new(LineDecoder::new(*metres_per_unit, self.reeling.latency))
             }
         };
-        let source = app.add_source(SourceSpec {
-            id: self.sensor.id.clone(),
-            plugin: NAME,
-            connect: self.sensor.connect.clone(),
-            decoder,
-            ring_bytes: RING_BYTES,
-        })?;
-        app.spawn((Mounted { source, mount: self.sensor.mount }, self.reeling.tether));
+        app.add_sensor(&self.sensor, decoder, RING_BYTES, self.reeling.tether)?;
         Ok(())
     }
 }

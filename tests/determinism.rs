@@ -1,0 +1,139 @@
+//! The same bytes in the same order give the same digest: live and replayed, in ticks of any length, at any speed, with
+//! idle and with busy cores. (.ci/run compares debug and release builds.)
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "clippy.toml's leave for tests doesn't reach their helpers"
+)]
+
+mod common;
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use common::Folder;
+
+const TICKS_MS: [&str; 6] = ["1", "5", "20", "100", "777", "60000"];
+
+/// Runs `work` while `threads` threads do nothing as fast as they can.
+fn while_busy<T>(threads: usize, work: impl FnOnce() -> T) -> T {
+    /// Ends the threads when `work` panics, too.
+    struct Stop<'a>(&'a AtomicBool);
+    impl Drop for Stop<'_> {
+        fn drop(&mut self) {
+            self.0.store(true, Ordering::Relaxed);
+        }
+    }
+
+    let done = AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        let _stop = Stop(&done);
+        for _ in 0..threads {
+            scope.spawn(|| {
+                while !done.load(Ordering::Relaxed) {
+                    std::hint::spin_loop();
+                }
+            });
+        }
+        work()
+    })
+}
+
+#[test]
+fn a_live_dive_and_the_replay_of_its_log_agree() {
+    let folder = Folder::new();
+    let answer = folder.headrace(&["demo", "--speed", "max", "--out", "demo"]);
+    assert_eq!(answer.code, Some(0), "{}", answer.stderr);
+    let live: serde_json::Value = serde_json::from_slice(&folder.read("demo/report.json")).unwrap();
+    let (code, replayed) = folder.replay("demo/dive.mcap", &["--expect", "demo/report.json"]);
+    assert_eq!(code, Some(0), "the replay differs from the live report");
+    assert_eq!(live["digest"], replayed["digest"]);
+    assert_eq!(live["log"]["sha256"], replayed["log"]["sha256"]);
+    assert_eq!(live["log"]["messages"], replayed["log"]["messages"]);
+    assert!(live["summary"]["fail_m"].as_f64().unwrap() > 5.0, "the demonstration misses a stretch");
+}
+
+#[test]
+fn a_report_expected_is_met_or_each_difference_named() {
+    let folder = Folder::with_dive();
+    let (_, mut report) = folder.replay("dive.mcap", &["--report", "golden.json"]);
+    assert_eq!(folder.replay("dive.mcap", &["--expect", "golden.json"]).0, Some(0));
+
+    // Another log's name is no difference; another hole is, however small.
+    report["log"]["path"] = "elsewhere.mcap".into();
+    folder.write("golden.json", report.to_string());
+    assert_eq!(folder.replay("dive.mcap", &["--expect", "golden.json"]).0, Some(0));
+    let hole_m = report["sections"][3]["hole_m"].as_f64().unwrap();
+    report["sections"][3]["hole_m"] = hole_m.next_up().into();
+    report["digest"] = "0123456789abcdef".into();
+    folder.write("golden.json", report.to_string());
+    let answer = folder.headrace(&["replay", "dive.mcap", "--expect", "golden.json"]);
+    assert_eq!(answer.code, Some(1));
+    let places: Vec<_> = answer.stderr.lines().map(|line| line.split_whitespace().nth(1).unwrap()).collect();
+    assert_eq!(places, ["/digest:", "/sections/3/hole_m:"]);
+}
+
+#[test]
+fn a_dive_recorded_again_is_the_same_dive() {
+    let folder = Folder::with_dive();
+    let expected = folder.digest("dive.mcap", &[]);
+    for (speed, again) in [("max", "max.mcap"), ("40x", "40x.mcap")] {
+        let arguments = ["--source", "dive.mcap", "--record", again, "--speed", speed, "--json"];
+        let answer = folder.headrace(&[&["run", "vehicle.toml"], &arguments[..]].concat());
+        assert_eq!(answer.code, Some(0), "{}", answer.stderr);
+        let live: serde_json::Value = serde_json::from_str(&answer.stdout).unwrap();
+        assert_eq!(live["digest"], expected, "live, {speed}");
+        assert_eq!(folder.digest(again, &[]), expected, "recorded, {speed}");
+    }
+}
+
+#[test]
+fn a_scene_gives_the_same_log_each_time() {
+    let folder = Folder::with_dive();
+    folder.simulate("scene.toml", "again.mcap");
+    assert!(folder.read("dive.mcap") == folder.read("again.mcap"), "two logs of one scene differ");
+}
+
+#[test]
+fn ticks_of_any_length_give_the_same_report() {
+    let folder = Folder::with_dive();
+    let (_, expected) = folder.replay("dive.mcap", &[]);
+    for tick in TICKS_MS {
+        let (code, report) = folder.replay("dive.mcap", &["--tick-ms", tick]);
+        assert_eq!(code, Some(0));
+        assert_eq!(report, expected, "ticks of {tick} ms");
+    }
+}
+
+#[test]
+fn speed_has_no_part_in_the_result() {
+    let folder = Folder::with_dive();
+    assert_eq!(folder.digest("dive.mcap", &["--speed", "20x"]), folder.digest("dive.mcap", &[]));
+}
+
+#[test]
+fn repetitions_give_the_same_digest() {
+    let folder = Folder::with_dive();
+    let expected = folder.digest("dive.mcap", &[]);
+    for repetition in 0..20 {
+        let tick = TICKS_MS[repetition % 4];
+        assert_eq!(folder.digest("dive.mcap", &["--tick-ms", tick]), expected, "{repetition}");
+    }
+}
+
+#[test]
+fn busy_cores_change_nothing() {
+    let folder = Folder::with_dive();
+    let expected = folder.digest("dive.mcap", &[]);
+    let cores = std::thread::available_parallelism().map_or(2, usize::from);
+    while_busy(cores.clamp(2, 8), || {
+        for tick in TICKS_MS {
+            assert_eq!(folder.digest("dive.mcap", &["--tick-ms", tick]), expected, "ticks of {tick} ms");
+        }
+        let arguments =
+            ["run", "vehicle.toml", "--source", "dive.mcap", "--record", "busy.mcap", "--speed", "20x"];
+        let answer = folder.headrace(&arguments);
+        assert_eq!(answer.code, Some(0), "{}", answer.stderr);
+        assert_eq!(folder.digest("busy.mcap", &[]), expected, "recorded");
+    });
+}
