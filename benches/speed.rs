@@ -173,10 +173,10 @@ fn whole_loop() {
         "a tick of 20 ms of that dive",
         &format!(
             "p50 {:.1} us, p99 {:.1} us, p99.9 {:.1} us, max {:.1} us",
-            at(0.5),
-            at(0.99),
-            at(0.999),
-            at(1.0)
+            at(500),
+            at(990),
+            at(999),
+            at(1000)
         ),
         "its 20 ms",
         at(500) / 20_000.0,
