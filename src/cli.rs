@@ -131,6 +131,6 @@ fn speed(text: &str) -> Result<Speed, String> {
 }
 
 fn target(text: &str) -> Result<f64, String> {
-    let number = text.parse::<f64>().ok().filter(|metres| (0.01..=100.0).contains(metres));
-    number.ok_or_else(|| "wanted is a number of metres from 0.01 to 100".to_owned())
+    let number = text.parse::<f64>().ok().filter(|metres| (0.01..=20.0).contains(metres));
+    number.ok_or_else(|| "wanted is a number of metres from 0.01 to 20".to_owned())
 }

@@ -439,3 +439,21 @@ fn wrong_arguments_are_usage_errors() {
     }
     assert!(!Path::new(&folder.path("other.mcap")).exists());
 }
+
+#[test]
+fn every_command_has_help_with_an_example() {
+    let folder = Folder::new();
+    let help = folder.headrace(&["--help"]).stdout;
+    let (_, list) = help.split_once("Commands:\n").unwrap();
+    let commands: Vec<&str> = list
+        .lines()
+        .take_while(|line| !line.is_empty())
+        .filter_map(|line| line.split_whitespace().next())
+        .collect();
+    assert!(commands.contains(&"replay") && commands.contains(&"demo"), "{commands:?}");
+    for command in commands.into_iter().filter(|command| *command != "help") {
+        let answer = folder.headrace(&[command, "--help"]);
+        assert_eq!((answer.code, answer.stderr.as_str()), (Some(0), ""), "{command}");
+        assert!(answer.stdout.contains(&format!("Example:\n  headrace {command}")), "{}", answer.stdout);
+    }
+}

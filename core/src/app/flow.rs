@@ -116,7 +116,7 @@ pub enum Placed {
 #[derive(Debug, Resource)]
 pub struct PlacedList(pub Vec<Placed>);
 
-/// Sections to be judged, in order.
+/// Sections to be judged after a ping, in order; room that is used again and again.
 #[derive(Debug, Resource)]
 pub struct Requests(pub Vec<Request>);
 
@@ -166,8 +166,6 @@ pub struct Navigator {
     pub navigation: Box<dyn Navigation>,
     /// The next multiple of the advice period; `None` before the first packet.
     pub next_beat: Option<MonoNs>,
-    /// The last fix that a beat or ping was given.
-    pub last: Option<Fix>,
 }
 
 /// What is known of the wall.
@@ -205,7 +203,7 @@ pub struct Tally {
     pub span: Option<(MonoNs, MonoNs)>,
     /// Samples on the wall.
     pub samples: u64,
-    /// Pings without a return within range.
+    /// Pings without a return, the wall within range or its distance not known.
     pub missing: u64,
     /// Pings without a return where the wall was out of range.
     pub out_of_range: u64,

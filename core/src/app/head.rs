@@ -3,7 +3,7 @@
 use bevy_ecs::prelude::Component;
 
 use crate::math::{self, TAU};
-use crate::time::MonoNs;
+use crate::time::{DurNs, MonoNs};
 
 /// Angles closer together than this are equal, radians: well under the finest head's step (0.3 degrees).
 const SAME_ANGLE_RAD: f64 = 1e-6;
@@ -11,6 +11,9 @@ const SAME_ANGLE_RAD: f64 = 1e-6;
 const RATE_SPAN_RAD: f64 = TAU / 2.0;
 /// A step this many times as long as the usual one passed over something.
 const LONG_STEP: f64 = 1.5;
+
+/// After standing still or being silent for so long, the turn rate is measured anew.
+const STANDING: DurNs = DurNs(1_000_000_000);
 
 /// What a ping says of its place in the head's motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -67,14 +70,20 @@ impl HeadTrack {
 
     /// Takes a ping at `angle_rad` into account.
     pub fn ping(&mut self, at: MonoNs, angle_rad: f64) -> Turned {
-        let Some((_, before)) = self.last.replace((at, angle_rad)) else {
+        let Some((last, before)) = self.last else {
+            self.last = Some((at, angle_rad));
             self.anchors = [Some((at, 0.0)), None];
             return Turned { single_step: false, new_sweep: true };
         };
         let step = math::wrap_signed(angle_rad - before, TAU);
         let size = step.abs();
         if size < SAME_ANGLE_RAD {
+            // A head that stands still has not turned: `last` grows old, and the rate stays what it was.
             return Turned { single_step: false, new_sweep: false };
+        }
+        self.last = Some((at, angle_rad));
+        if at.since(last).0.abs() > STANDING.0 {
+            self.anchors = [Some((at, self.turned_rad + size)), None];
         }
         let reversed = step * self.last_step_rad < 0.0;
         if reversed {
@@ -87,7 +96,7 @@ impl HeadTrack {
         }
         self.last_step_rad = step;
         self.since_turning_rad += size;
-        if self.since_turning_rad > TAU {
+        if self.since_turning_rad > TAU + size / 2.0 {
             self.sector_rad = None;
             self.from_turning_point = false;
         }
@@ -142,6 +151,23 @@ mod tests {
         assert!((track.sector_rad().unwrap() - f64::to_radians(90.0)).abs() < 1e-9);
         let rounds: Vec<_> = (0..500).filter(|k| turned[*k].new_sweep).collect();
         assert_eq!(rounds, [0, 101, 201, 301, 401]);
+    }
+
+    #[test]
+    fn a_stalled_head_grows_old_and_starts_with_a_fresh_rate() {
+        let mut track = HeadTrack::default();
+        for k in 0..100 {
+            track.ping(MonoNs(k * 20_000_000), f64::to_radians(0.9 * k as f64));
+        }
+        for k in 100..500 {
+            track.ping(MonoNs(k * 20_000_000), f64::to_radians(0.9 * 99.0));
+        }
+        assert_eq!(track.last().unwrap().0, MonoNs(99 * 20_000_000));
+        assert!((track.rate_radps().unwrap() - f64::to_radians(45.0)).abs() < 1e-9);
+        for k in 500..510 {
+            track.ping(MonoNs(k * 20_000_000), f64::to_radians(0.9 * (k - 400) as f64));
+        }
+        assert!((track.rate_radps().unwrap() - f64::to_radians(45.0)).abs() < 1e-9);
     }
 
     #[test]

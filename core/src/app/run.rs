@@ -24,6 +24,7 @@ use crate::time::MonoNs;
 const ROOM_BEYOND_M: f64 = 25.0;
 /// Samples for which there is room, for a metre of tunnel and at most. Four heads at 0.2 m/s lay 1,000 a metre.
 const SAMPLES_PER_M: f64 = 4_000.0;
+const MIN_SAMPLES: f64 = 4_000_000.0;
 const MAX_SAMPLES: f64 = 16_000_000.0;
 
 /// A loop that runs. All memory is allocated; a tick takes no lock, makes no system call and formats nothing.
@@ -48,7 +49,7 @@ impl Loop {
         world.insert_resource(Events(Vec::with_capacity(MAX_TICK_READINGS)));
         world.insert_resource(PositionedList(Vec::with_capacity(2 * MAX_TICK_READINGS)));
         world.insert_resource(PlacedList(Vec::with_capacity(2 * MAX_TICK_READINGS)));
-        world.insert_resource(Navigator { navigation, next_beat: None, last: None });
+        world.insert_resource(Navigator { navigation, next_beat: None });
         world.insert_resource(HeadSweeps::default());
         world.insert_resource(Finder::default());
         world.insert_resource(Advisor::default());
@@ -175,15 +176,16 @@ impl Loop {
 
 fn coverage(mission: &Mission) -> Coverage {
     let (from_m, to_m) = (-ROOM_BEYOND_M, mission.length_m + ROOM_BEYOND_M);
-    let samples = crate::math::round_to_i64(((to_m - from_m) * SAMPLES_PER_M).min(MAX_SAMPLES));
+    let samples =
+        crate::math::round_to_i64(((to_m - from_m) * SAMPLES_PER_M).clamp(MIN_SAMPLES, MAX_SAMPLES));
     let store = SampleStore::new(StoreLayout {
         perimeter_m: mission.profile.perimeter_m(),
         from_m,
         to_m,
-        cell_m: (mission.target_m / 2.0).clamp(0.05, 0.5),
+        cell_m: StoreLayout::cell_for_target_m(mission.target_m),
         capacity: u32::try_from(samples).unwrap_or(u32::MAX),
     });
-    let sections = Sections::new(mission.section_m, mission.target_m, from_m, to_m);
+    let sections = Sections::new(mission.section_m, mission.target_m, 0.0, mission.length_m);
     Coverage { store, sections, frontier: Frontier::default() }
 }
 

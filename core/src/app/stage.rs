@@ -13,9 +13,9 @@ pub enum Stage {
     Navigate,
     /// Returns to places on the wall.
     Place,
-    /// Places to samples, passes and sections.
+    /// Places to samples, passes and sections; each section that is out of reach to its verdict, there and then.
     Cover,
-    /// Sections to verdicts and flags.
+    /// For plugins that look at verdicts before there is advice.
     Judge,
     /// How fast one may go.
     Advise,

@@ -26,7 +26,7 @@ pub struct CodecCounts {
 
 /// Bytes to values and back, sans-I/O.
 ///
-/// Contract, checked by [`contract`] for each implementation: any bytes whatever never panic; the same bytes split
+/// Contract, checked by the module `contract` for each implementation: any bytes whatever never panic; the same bytes split
 /// anywhere give the same values; garbage before a good frame doesn't lose it; encode then decode is the identity;
 /// what is held between pushes is bounded by [`Codec::MAX_FRAME_BYTES`].
 pub trait Codec {

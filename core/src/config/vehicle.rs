@@ -4,6 +4,7 @@ use core::cell::RefCell;
 
 use super::reader::{ConfigError, Document, Section};
 use crate::app::device::{Device, DeviceKind};
+use crate::coverage::StoreLayout;
 use crate::frames::{Mount, Rot, Vec3};
 use crate::sampling::layout::HeadLayout;
 use crate::site::Site;
@@ -70,6 +71,16 @@ pub type Loader<'a> = &'a dyn Fn(&str) -> Result<String, String>;
 const SENSOR_DISTANCE_M: core::ops::RangeInclusive<f64> = -20.0..=20.0;
 const DEGREES: core::ops::RangeInclusive<f64> = -360.0..=360.0;
 
+/// Bounds on what is allocated before a dive: some hundred megabytes of sections, and of cells of the wall.
+const MAX_SECTIONS: f64 = 400_000.0;
+const MAX_CELLS: f64 = 2e8;
+
+/// Cells of the wall that the sample store will have.
+fn wall_cells(tunnel: &TunnelConfig, target_m: f64) -> f64 {
+    let cell_m = StoreLayout::cell_for_target_m(target_m);
+    tunnel.length_m * tunnel.profile.perimeter_m() / (cell_m * cell_m)
+}
+
 impl VehicleConfig {
     /// Parses and checks a vehicle file against the device kinds that this build has.
     ///
@@ -94,7 +105,7 @@ impl VehicleConfig {
         load: Loader<'_>,
     ) -> Result<Self, ConfigError> {
         let name = root.text("name")?.unwrap_or_else(|| "unnamed vehicle".to_owned());
-        let target_m = root.required("target_m", root.number("target_m", 0.01..=100.0)?)?;
+        let target_m = root.required("target_m", root.number("target_m", 0.01..=20.0)?)?;
         let section_m = root.number("section_m", 0.05..=10.0)?.unwrap_or(0.25);
         let tunnel_section = root.required("tunnel", root.section("tunnel")?)?;
         let axis_yaw_rad = tunnel_section.number("axis_yaw_deg", DEGREES)?.unwrap_or(0.0).to_radians();
@@ -105,6 +116,10 @@ impl VehicleConfig {
             Ok(text)
         };
         let tunnel = parse_tunnel(tunnel_section, &load)?;
+        if tunnel.length_m / section_m > MAX_SECTIONS || wall_cells(&tunnel, target_m) > MAX_CELLS {
+            let problem = "is too fine for so long a tunnel; make tunnel.length_m smaller, or this and section_m larger";
+            return Err(root.invalid("target_m", problem));
+        }
         let site = match root.section("water")? {
             Some(water) => parse_water(water, axis_yaw_rad)?,
             None => Site { axis_yaw_rad, ..Site::default() },
@@ -142,7 +157,7 @@ impl VehicleConfig {
 
 fn parse_tunnel(section: Section<'_>, load: Loader<'_>) -> Result<TunnelConfig, ConfigError> {
     let (name, profile) = named::parse(&section, load)?;
-    let length_m = section.number("length_m", 0.1..=1.0e6)?.unwrap_or(10_000.0);
+    let length_m = section.number("length_m", 0.1..=1.0e5)?.unwrap_or(10_000.0);
     section.finish()?;
     Ok(TunnelConfig { name, profile, length_m })
 }

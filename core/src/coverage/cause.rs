@@ -60,8 +60,8 @@ pub struct Evidence {
 
 /// Names the cause of a hole from the passages of the sections that it touches.
 ///
-/// The order is that of certainty: what was never passed needs no other explanation; what could not be placed or did
-/// not return is explained by that when the rest would have met the target; then what slower driving can't mend, then
+/// The order is that of certainty: returns that could not be placed explain a hole when the rest would have met the
+/// target, and what was never passed needs no other explanation; then returns that did not come, likewise; then what slower driving can't mend, then
 /// phase, and last speed. The figures are those of the passage that was driven worst.
 pub fn explain<'a>(
     passages: &(impl Iterator<Item = &'a Passage> + Clone),
@@ -71,25 +71,25 @@ pub fn explain<'a>(
 ) -> Evidence {
     let worst = passages
         .clone()
-        .filter(|passage| passage.pings > 0)
+        .filter(|passage| passage.placed > 0)
         .map(Driven::of)
         .max_by(|a, b| a.t_m(a.pass_gap_s).total_cmp(&b.t_m(b.pass_gap_s)))
         .unwrap_or_default();
     let count = |of: fn(&Passage) -> u32| passages.clone().map(of).fold(0, u32::saturating_add);
-    let pings = count(|passage| passage.pings).max(1);
+    let pings = count(|passage| passage.pings);
     let (missing, beyond) = (count(|passage| passage.missing), count(|passage| passage.out_of_range));
     let unplaced = count(|passage| passage.unplaced);
-    let missing_share = f64::from(missing + beyond) / f64::from(pings);
+    let missing_share = f64::from(missing + beyond) / f64::from(pings.max(1));
     // What makes it a fail is an empty circle of the target's size; the hole may still shrink from ahead.
     let radius_m = hole.diameter_m.min(target_m) / 2.0;
     let passed = swept_by_all
         .is_some_and(|swept| hole.x_m - radius_m >= swept.from_m && hole.x_m + radius_m <= swept.to_m);
     let as_driven_meets = worst.t_m(worst.pass_gap_s) <= target_m;
 
-    let cause = if !passed || !hole.bounded {
-        Cause::NotPassed
-    } else if as_driven_meets && unplaced > missing + beyond {
+    let cause = if as_driven_meets && unplaced > missing + beyond {
         Cause::PositionLost
+    } else if pings == 0 || (beyond == 0 && (!passed || !hole.bounded)) {
+        Cause::NotPassed
     } else if as_driven_meets && beyond > missing {
         Cause::OutOfRange
     } else if as_driven_meets && missing > 0 {
@@ -126,7 +126,7 @@ struct Driven {
 
 impl Driven {
     fn of(passage: &Passage) -> Self {
-        let mean = |sum: f64| sum / f64::from(passage.pings.max(1));
+        let mean = |sum: f64| sum / f64::from(passage.placed.max(1));
         Self {
             speed_mps: mean(passage.speed_sum_mps),
             pass_gap_s: mean(passage.pass_gap_sum_s),

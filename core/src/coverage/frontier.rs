@@ -54,6 +54,18 @@ impl Frontier {
         self.swept
     }
 
+    /// A head has pinged where nobody knows: it is alive, and waited for where it was last.
+    pub fn heard(&mut self, head: usize, now: MonoNs) {
+        if let Some(head) = self.heads.get_mut(head).and_then(Option::as_mut) {
+            head.last = now;
+        }
+    }
+
+    /// Where a head landed samples when its place was last known.
+    pub fn last_reach(&self, head: usize) -> Option<Reach> {
+        self.heads.get(head).copied().flatten().map(|head| head.reach)
+    }
+
     /// The stretch that every head that is alive has covered, or `None` where there is none.
     pub fn swept_by_all(&self, now: MonoNs) -> Option<Reach> {
         let common = |a: Reach, b: Reach| Reach { from_m: a.from_m.max(b.from_m), to_m: a.to_m.min(b.to_m) };
@@ -61,7 +73,7 @@ impl Frontier {
     }
 
     fn alive(&self, now: MonoNs) -> impl Iterator<Item = &Head> {
-        self.heads.iter().flatten().filter(move |head| now.since(head.last).0 <= SILENT.0)
+        self.heads.iter().flatten().filter(move |head| now.since(head.last).0.abs() <= SILENT.0)
     }
 
     /// A head has pinged, with or without a return. A section is out of the way when it is farther than `margin_m` from

@@ -92,7 +92,9 @@ impl Spread {
 pub struct Passage {
     /// All pings, whatever came of them.
     pub pings: u32,
-    /// Pings without a return where the wall was within range.
+    /// Pings made where the vehicle's place was known.
+    pub placed: u32,
+    /// Pings without a return where the wall was within range, or its place not known.
     pub missing: u32,
     /// Pings without a return where the wall was farther than the range setting.
     pub out_of_range: u32,
@@ -121,7 +123,7 @@ pub struct Section {
     pub hole: Option<Hole>,
     /// Standard deviation of the hole's diameter, m.
     pub hole_sigma_m: f64,
-    /// Whether no later sample on the way forward can change the hole.
+    /// Whether no later sample on the way forward can change the verdict, nor the hole of a fail.
     pub settled: bool,
     /// When the fail was flagged.
     pub flagged: Option<MonoNs>,
@@ -184,7 +186,7 @@ impl Sections {
     /// Allocates: startup only; all that it will ever use.
     pub fn new(section_m: f64, target_m: f64, from_m: f64, to_m: f64) -> Self {
         let first = math::floor_to_i64(from_m / section_m);
-        let end = math::floor_to_i64(to_m / section_m) + 1;
+        let end = -math::floor_to_i64(-to_m / section_m);
         let count = usize::try_from(end - first).unwrap_or(0);
         Self { section_m, target_m, first, sections: vec![Section::default(); count] }
     }
@@ -306,7 +308,7 @@ impl Sections {
         let sigma_m = section.passage.relative_sigma_m;
         section.hole = Some(hole);
         section.hole_sigma_m = sigma_m;
-        section.verdict = verdict(hole.diameter_m, sigma_m, target_m);
+        section.verdict = verdict(&hole, sigma_m, target_m);
         // Of a hole no larger than the target, nothing can come nearer than its own edge.
         section.settled = request.settles || section.verdict == Verdict::Pass;
         let flagged = section.flagged.is_some() && section.cleared.is_none();
@@ -319,7 +321,7 @@ impl Sections {
                 section.cleared = None;
                 return Some(Judgement::Raised);
             }
-        } else if flagged {
+        } else if flagged && section.verdict == Verdict::Pass {
             section.cleared = Some(request.at);
             return Some(Judgement::Cleared);
         }
@@ -345,7 +347,8 @@ impl Sections {
         let swept_by_all = frontier.swept_by_all(at);
         for index in self.passed(frontier.swept()) {
             let Some(section) = self.get_mut(index) else { continue };
-            if section.stale || !section.settled {
+            // The hole of a fail may have been narrowed from farther away than a pass depends on.
+            if section.stale || !section.settled || section.verdict != Verdict::Pass {
                 section.stale = false;
                 section.settled = true;
                 ask(Request { section: index, as_of, at, swept_by_all, settles: true });
@@ -361,11 +364,11 @@ impl Sections {
     }
 }
 
-/// `pass` when D + 2 sigma <= T, `fail` when D - 2 sigma > T, else `cannot_say`.
-fn verdict(diameter_m: f64, sigma_m: f64, target_m: f64) -> Verdict {
-    if diameter_m - 2.0 * sigma_m > target_m {
+/// `pass` when D + 2 sigma <= T, `fail` when D - 2 sigma > T, else `cannot_say`. Wall without samples around it fails.
+fn verdict(hole: &Hole, sigma_m: f64, target_m: f64) -> Verdict {
+    if !hole.bounded || hole.diameter_m - 2.0 * sigma_m > target_m {
         Verdict::Fail
-    } else if diameter_m + 2.0 * sigma_m <= target_m {
+    } else if hole.diameter_m + 2.0 * sigma_m <= target_m {
         Verdict::Pass
     } else {
         Verdict::CannotSay

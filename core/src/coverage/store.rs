@@ -36,6 +36,13 @@ pub struct StoreLayout {
     pub capacity: u32,
 }
 
+impl StoreLayout {
+    /// The edge of a cell that suits searches for holes about as large as the target, m.
+    pub fn cell_for_target_m(target_m: f64) -> f64 {
+        (target_m / 2.0).clamp(0.05, 0.5)
+    }
+}
+
 /// Why a sample was not kept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
@@ -58,6 +65,8 @@ pub struct SampleStore {
     /// For each cell, one more than the index of its latest sample, or zero.
     latest: Vec<u32>,
     samples: Vec<Stored>,
+    /// The longest single step so far, along the perimeter and along the tunnel, m.
+    longest_step_m: (f64, f64),
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -103,6 +112,7 @@ impl SampleStore {
             column_m: layout.perimeter_m / columns as f64,
             latest: vec![0; cells],
             samples: Vec::with_capacity(layout.capacity as usize),
+            longest_step_m: (0.0, 0.0),
         }
     }
 
@@ -152,6 +162,11 @@ impl SampleStore {
         let sigma_m = math::wrap(sample.sigma_m, self.layout.perimeter_m);
         let cell = self.cell(row, self.column(sigma_m));
         let index = self.len();
+        if let Some(from) = sample.step_from.and_then(|from| self.get(from)) {
+            let around_m = math::wrap_signed(sigma_m - from.sigma_m, self.layout.perimeter_m).abs();
+            let (longest, farthest) = self.longest_step_m;
+            self.longest_step_m = (longest.max(around_m), farthest.max((sample.x_m - from.x_m).abs()));
+        }
         let slot = self.latest.get_mut(cell).ok_or(StoreError::Outside)?;
         self.samples.push(Stored {
             x_m: sample.x_m,
@@ -320,15 +335,15 @@ impl SampleStore {
         let centre_column = self.column(sigma);
         let into_row = (x_m - self.layout.from_m) - centre_row as f64 * self.layout.cell_m;
         let inner = into_row.min(self.layout.cell_m - into_row).max(0.0);
-        // A step ends at most this many columns from where it crosses sigma. A step is also at most a sixth of the
-        // perimeter, or else it is no step over neighbouring wall.
-        let reach = (self.columns / 6).clamp(1, 4);
+        // A step ends at most its own length from where it crosses sigma.
+        let (longest_m, along_m) = self.longest_step_m;
+        let reach = (math::floor_to_i64(longest_m / self.column_m) + 1).min((self.columns - 1) / 2);
         let mut best: Option<f64> = None;
         let mut ring = 0_i64;
         loop {
             let nearest = inner + (ring - 1) as f64 * self.layout.cell_m;
             let limit = best.unwrap_or(within_m);
-            if ring > 0 && nearest > limit {
+            if ring > 0 && nearest > limit + along_m {
                 return best;
             }
             if ring > self.rows {

@@ -94,7 +94,7 @@ impl DirectNavigation {
             let (wy, wz) = (weight(PRIOR_Y_SIGMA_M), weight(PRIOR_Z_SIGMA_M));
             let (mut hyy, mut hyz, mut hzz) = (wy, 0.0, wz);
             let (mut gy, mut gz) = (wy * (prior[0] - place[0]), wz * (prior[1] - place[1]));
-            for echo in self.echoes.iter().flatten().filter(|echo| now.since(echo.at).0 <= ECHO_AGE.0) {
+            for echo in self.echoes.iter().flatten().filter(|echo| now.since(echo.at).0.abs() <= ECHO_AGE.0) {
                 let offset = attitude * echo.mount.position;
                 let beam = attitude * (echo.mount.rotation * Vec3::<Sensor>::new(1.0, 0.0, 0.0));
                 let origin = [place[0] + offset.y(), place[1] + offset.z()];
@@ -135,7 +135,7 @@ impl DirectNavigation {
         let height_m = self.site.surface_above_floor_m - self.site.depth_m(pressure_pa) - up;
         self.height_m = Some(height_m);
         // Where the echoes say nothing of height, depth alone moves the place.
-        let silent = self.echoes.iter().flatten().all(|echo| at.since(echo.at).0 > ECHO_AGE.0);
+        let silent = self.echoes.iter().flatten().all(|echo| at.since(echo.at).0.abs() > ECHO_AGE.0);
         if let (true, Some((_, place))) = (silent, &mut self.place) {
             place[1] = height_m + self.height_offset_m;
         }
@@ -167,7 +167,7 @@ impl TetherTrack {
         let kept = self.count.min(SPEED_READINGS);
         let recent = (self.count - kept..self.count)
             .filter_map(|k| self.readings.get(k % SPEED_READINGS))
-            .find(|(at, _)| now.since(*at).0 <= SPEED_WINDOW.0);
+            .find(|(at, _)| now.since(*at).0.abs() <= SPEED_WINDOW.0);
         match recent {
             Some((then, before_m)) if now > *then => (chainage_m - before_m) / now.since(*then).as_secs_f64(),
             _ => 0.0,
@@ -197,7 +197,7 @@ impl Navigation for DirectNavigation {
     }
 
     fn fix(&self, at: MonoNs) -> Result<Fix, NoFix> {
-        let fresh = |since: MonoNs| at.since(since).0 <= STALE.0;
+        let fresh = |since: MonoNs| at.since(since).0.abs() <= STALE.0;
         let (_, attitude) = self.attitude.filter(|(since, _)| fresh(*since)).ok_or(NoFix::Heading)?;
         let (since, chainage_m) =
             self.tether.latest().filter(|(since, _)| fresh(*since)).ok_or(NoFix::Chainage)?;

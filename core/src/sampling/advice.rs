@@ -174,8 +174,9 @@ pub fn advise(situation: &Situation, profile: &Profile, target_m: f64, memory: &
     let (pass_gap_s, even_pass_gap_s) = pass_gaps_s(&situation.heads, situation.speed_mps);
     let ping_period_s = situation.heads.iter().flatten().map(HeadMotion::ping_period_s).fold(0.0, f64::max);
     let even_v_max = spacing::speed_for_target_mps(target_m, t_y_m, even_pass_gap_s, ping_period_s);
+    let heading = if situation.speed_mps < 0.0 { -1.0 } else { 1.0 };
     let meets = |speed_mps: f64| {
-        let (gap_s, _) = pass_gaps_s(&situation.heads, speed_mps);
+        let (gap_s, _) = pass_gaps_s(&situation.heads, heading * speed_mps);
         spacing::t_max_m(speed_mps * gap_s, speed_mps * ping_period_s, t_y_m) <= target_m
     };
     let speed = situation.speed_mps.abs();
@@ -229,12 +230,17 @@ pub fn pass_gaps_s(heads: &[Option<HeadMotion>; MAX_HEADS], speed_mps: f64) -> (
     let count = turning().count();
     let turn_s = turning().map(HeadMotion::turn_period_s).fold(0.0, f64::max);
     let even_s = turn_s / count.max(1) as f64;
+    // Seen in a mirror, heads that all turn the other way turn this way.
+    let body_rate = |head: &HeadMotion| {
+        if super::layout::faces_aft(head.mount.rotation) { -head.rate_radps } else { head.rate_radps }
+    };
+    let mirror = if turning().all(|head| body_rate(head) < 0.0) { -1.0 } else { 1.0 };
     let mut phases = [0.0; MAX_HEADS];
     let mut known = 0;
     for (head, slot) in turning().zip(&mut phases) {
         let aft = super::layout::faces_aft(head.mount.rotation);
-        let angle = if aft { -head.angle_rad } else { head.angle_rad };
-        let rate = if aft { -head.rate_radps } else { head.rate_radps };
+        let angle = mirror * if aft { -head.angle_rad } else { head.angle_rad };
+        let rate = mirror * body_rate(head);
         if rate <= 0.0 || turn_s <= 0.0 {
             // Heads that turn against each other meet every place at uneven times: count on one of them only.
             return (turn_s, even_s);
@@ -327,6 +333,27 @@ mod tests {
         // The advice doesn't depend on how fast one goes while it is given.
         let faster = advise(&Situation { speed_mps: 0.5, ..now }, &profile, target_m);
         assert!((faster.v_max_mps - advice.v_max_mps).abs() < 1e-12);
+    }
+
+    #[test]
+    fn heads_that_all_turn_the_other_way_are_phased_alike() {
+        let profile = named::ceran().unwrap();
+        let mut mirrored = situation(&[0.0, 180.0], &[0.0, 0.0], 0.2, &profile);
+        for head in mirrored.heads.iter_mut().flatten() {
+            head.rate_radps = -head.rate_radps;
+        }
+        let (gap_s, even_s) = super::pass_gaps_s(&mirrored.heads, 0.2);
+        assert!((gap_s - 4.0).abs() < 1e-9 && (even_s - 4.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn on_the_way_back_the_phases_of_the_way_back_count() {
+        let profile = named::ceran().unwrap();
+        let back = situation(&[30.0, 250.0], &[0.9, -0.3], -0.2, &profile);
+        let advice = advise(&back, &profile, 1.0);
+        let v = advice.v_max_mps / (1.0 - SPEED_MARGIN);
+        let gap_s = super::pass_gaps_s(&back.heads, -v).0;
+        assert!(spacing::t_max_m(v * gap_s, v * advice.ping_period_s, advice.t_y_m) <= 1.0 + 1e-6);
     }
 
     #[test]

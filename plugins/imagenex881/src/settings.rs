@@ -92,7 +92,7 @@ fn rad_of_counts(counts: i32) -> f64 {
 
 fn ping_period(mode: Mode, own: &Section<'_>) -> Result<DurNs, ConfigError> {
     let pings = COUNTS_PER_TURN / i32::from(mode.step_counts);
-    Ok(match own.number("turn_period_s", 0.1..=1000.0)? {
+    Ok(match own.number("turn_period_s", 0.1..=100.0)? {
         Some(turn_s) => DurNs::from_secs_f64(turn_s / f64::from(pings)),
         None => DurNs(mode.turn_ms * 1_000_000 / i64::from(pings)),
     })

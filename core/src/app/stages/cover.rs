@@ -1,8 +1,13 @@
-//! Places to samples, passes and sections.
+//! Places to samples, passes and sections, and sections to verdicts.
+//!
+//! Both in one pass over the pings: which sections are judged, and on what evidence, depends on the verdicts before.
 
 use bevy_ecs::prelude::{Res, ResMut, Resource};
 
-use crate::app::flow::{Coverage, Outcome, Placed, PlacedList, PlacedPing, Requests, Tally};
+use super::judge::judge_one;
+use crate::app::flow::{
+    Coverage, Digests, Finder, Notices, Outcome, Placed, PlacedList, PlacedPing, Requests, Tally,
+};
 use crate::coverage::hole::FARTHEST_M;
 use crate::coverage::{SampleIndex, StoreError, WallSample};
 use crate::frames::{Point3, Tunnel};
@@ -29,14 +34,18 @@ struct LastSample {
     unbroken: bool,
 }
 
+#[expect(clippy::too_many_arguments, reason = "a system's arguments are what it reads and writes")]
 pub(super) fn cover(
     placed: Res<'_, PlacedList>,
     mut coverage: ResMut<'_, Coverage>,
     mut sweeps: ResMut<'_, HeadSweeps>,
     mut requests: ResMut<'_, Requests>,
     mut tally: ResMut<'_, Tally>,
+    mut finder: ResMut<'_, Finder>,
+    mut notices: ResMut<'_, Notices>,
+    mut digests: ResMut<'_, Digests>,
 ) {
-    requests.0.clear();
+    notices.0.clear();
     for item in &placed.0 {
         match item {
             Placed::Situation(_, situation) => sweeps.note_gaps(situation),
@@ -50,6 +59,9 @@ pub(super) fn cover(
                     }
                 }
                 note_frontier(&mut coverage, ping, &mut requests);
+                for request in requests.0.drain(..) {
+                    judge_one(&request, &mut coverage, &mut finder, &mut notices, &mut digests);
+                }
             }
         }
     }
@@ -74,7 +86,8 @@ fn count(tally: &mut Tally, outcome: &Outcome) {
 
 /// Adds a ping to the passage of the section that its head is in.
 fn note_passage(coverage: &mut Coverage, sweeps: &HeadSweeps, ping: &PlacedPing) {
-    let (Some(fix), Some(reach)) = (ping.fix, ping.reach) else { return };
+    // Without a fix, a ping counts where its head was last known to be.
+    let Some(reach) = ping.reach.or_else(|| coverage.frontier.last_reach(ping.head)) else { return };
     let index = coverage.sections.index_of(reach.middle_m());
     let Some(section) = coverage.sections.get_mut(index) else { return };
     let passage = &mut section.passage;
@@ -85,6 +98,8 @@ fn note_passage(coverage: &mut Coverage, sweeps: &HeadSweeps, ping: &PlacedPing)
         Outcome::OutOfRange => passage.out_of_range += 1,
         Outcome::Unplaced(_) => passage.unplaced += 1,
     }
+    let Some(fix) = ping.fix else { return };
+    passage.placed += 1;
     passage.speed_sum_mps += fix.speed_mps.abs();
     passage.pass_gap_sum_s += sweeps.pass_gap_s;
     passage.even_gap_sum_s += sweeps.even_gap_s;
@@ -145,8 +160,11 @@ fn note_sample(
 
 /// Moves the frontier on, and asks for the sections that are out of the way now.
 fn note_frontier(coverage: &mut Coverage, ping: &PlacedPing, requests: &mut Requests) {
-    let (Some(fix), Some(reach)) = (ping.fix, ping.reach) else { return };
     let Coverage { store, sections, frontier } = coverage;
+    let (Some(fix), Some(reach)) = (ping.fix, ping.reach) else {
+        frontier.heard(ping.head, ping.received);
+        return;
+    };
     let margin_m = sections.margin_m(fix.relative_sigma_m);
     let moved = frontier.advance(ping.head, ping.received, reach, sections.section_m(), margin_m);
     let now = store.len();

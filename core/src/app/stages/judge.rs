@@ -1,22 +1,7 @@
-//! Sections to verdicts and flags.
+//! A section to its verdict and flag.
 
-use bevy_ecs::prelude::{Res, ResMut};
-
-use crate::app::flow::{Coverage, Digests, Finder, Notice, Notices, Requests};
+use crate::app::flow::{Coverage, Digests, Finder, Notice, Notices};
 use crate::coverage::Request;
-
-pub(super) fn judge(
-    requests: Res<'_, Requests>,
-    mut coverage: ResMut<'_, Coverage>,
-    mut finder: ResMut<'_, Finder>,
-    mut notices: ResMut<'_, Notices>,
-    mut digests: ResMut<'_, Digests>,
-) {
-    notices.0.clear();
-    for request in &requests.0 {
-        judge_one(request, &mut coverage, &mut finder, &mut notices, &mut digests);
-    }
-}
 
 /// Judges one section and says what has changed.
 pub(in crate::app) fn judge_one(

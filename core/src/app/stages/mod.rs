@@ -25,7 +25,6 @@ pub(super) fn add(schedule: &mut Schedule) {
         navigate::navigate.in_set(Stage::Navigate),
         place::place.in_set(Stage::Place),
         cover::cover.in_set(Stage::Cover),
-        judge::judge.in_set(Stage::Judge),
         advise::advise.in_set(Stage::Advise),
     ));
 }

@@ -22,7 +22,6 @@ pub(super) fn navigate(
         }
         if matches!(event.reading, Reading::Sonar(_)) {
             let fix = navigator.navigation.fix(event.valid_at);
-            navigator.last = fix.ok().or(navigator.last);
             list.0.push(Positioned::Ping { event: index, fix });
         } else if let Some(sensor) = sensors.0.get(event.source.index()) {
             navigator.navigation.update(event.source.index(), sensor, event.valid_at, &event.reading);

@@ -112,7 +112,7 @@ fn situation(
         else {
             continue;
         };
-        if at.since(last).0 <= SILENT.0 {
+        if at.since(last).0.abs() <= SILENT.0 {
             // Heads ping at their own moments; their angles are compared at one.
             let angle_rad = angle_rad + rate_radps * at.since(last).as_secs_f64();
             let sector_rad = track.sector_rad();
