@@ -19,6 +19,7 @@ use crate::dive::{self, assemble, log_header};
 use crate::expect;
 use crate::failure::{self, Failure};
 use crate::files;
+use crate::output::{deliver, put, say};
 use crate::progress::Progress;
 use crate::summary::summary;
 use crate::watch::Watch;
@@ -34,13 +35,13 @@ pub(crate) fn demo(args: &Demo) -> Result<u8, Failure> {
         std::fs::remove_file(&log).map_err(|source| Failure::Write { path: log.clone(), source })?;
     }
     let dive = assemble(&scene.vehicle, &scene.vehicle_text, Some(&log))?;
-    println!("{}, target {} m: a simulated dive", scene.vehicle.name, scene.vehicle.target_m);
+    say(&format!("{}, target {} m: a simulated dive", scene.vehicle.name, scene.vehicle.target_m));
     let mut feed = SimulationFeed::new(Simulation::new(&scene));
     let pace = Pace { speed: args.speed.0, ..Pace::default() };
     let report = dive.run(&mut feed, pace, &mut Watch::loud())?;
     files::write(&report_file, &serde_json::to_vec_pretty(&report)?)?;
-    print!("\n{}", summary(&report));
-    println!("report {}\nlog    {}  (headrace replay it)", report_file.display(), log.display());
+    put(&format!("\n{}", summary(&report)));
+    say(&format!("report {}\nlog    {}  (headrace replay it)", report_file.display(), log.display()));
     Ok(dive::exit_code(&report))
 }
 
@@ -110,16 +111,16 @@ pub(crate) fn simulate(args: &Simulate) -> Result<u8, Failure> {
         let shown = json!({
             "scene": scene.name, "duration_s": duration_s, "messages": written.messages, "bytes": written.bytes,
         });
-        println!("{shown}");
+        deliver(&shown.to_string())?;
     } else {
-        println!(
+        say(&format!(
             "{}: {duration_s:.1} s of {}, {} messages, {} bytes in {}",
             scene.name,
             scene.vehicle.name,
             written.messages,
             written.bytes,
             args.output.display()
-        );
+        ));
     }
     Ok(failure::OK)
 }
@@ -136,19 +137,19 @@ pub(crate) fn check(args: &Check) -> Result<u8, Failure> {
             "tunnel": vehicle.tunnel.name, "perimeter_m": vehicle.tunnel.profile.perimeter_m(),
             "length_m": vehicle.tunnel.length_m, "sensors": list,
         });
-        println!("{shown}");
+        deliver(&shown.to_string())?;
     } else {
-        println!("{}: target {} m, sections of {} m", vehicle.name, vehicle.target_m, vehicle.section_m);
-        println!(
+        say(&format!("{}: target {} m, sections of {} m", vehicle.name, vehicle.target_m, vehicle.section_m));
+        say(&format!(
             "tunnel {}: perimeter {:.2} m, length {} m",
             vehicle.tunnel.name,
             vehicle.tunnel.profile.perimeter_m(),
             vehicle.tunnel.length_m
-        );
+        ));
         for sensor in sensors {
-            println!("  {:<12} {:<12} {}", sensor.id, sensor.plugin, sensor.connect);
+            say(&format!("  {:<12} {:<12} {}", sensor.id, sensor.plugin, sensor.connect));
         }
-        println!("nothing is wrong with it");
+        say("nothing is wrong with it");
     }
     Ok(failure::OK)
 }
@@ -197,9 +198,9 @@ fn finish(report: &Report, output: &Output) -> Result<u8, Failure> {
         files::write(path, &serde_json::to_vec_pretty(report)?)?;
     }
     if output.json {
-        println!("{}", serde_json::to_string_pretty(report)?);
+        deliver(&serde_json::to_string_pretty(report)?)?;
     } else {
-        print!("{}", summary(report));
+        put(&summary(report));
     }
     Ok(dive::exit_code(report))
 }

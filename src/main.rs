@@ -7,6 +7,7 @@ mod dive;
 mod expect;
 mod failure;
 mod files;
+mod output;
 mod progress;
 mod station;
 mod summary;

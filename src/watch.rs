@@ -1,7 +1,7 @@
 //! What a person sees on the terminal while a dive runs: where the vehicle is, how fast it may go, and each missed
 //! stretch, once.
 
-use std::io::{IsTerminal, Write};
+use std::io::IsTerminal;
 
 use headrace_core::app::flow::{AdviceEntry, Coverage, Notice};
 use headrace_core::app::run::Loop;
@@ -9,6 +9,7 @@ use headrace_core::coverage::{Cause, Evidence, Judgement, Sections, Verdict};
 use headrace_core::sampling::advice::Reason;
 use headrace_core::time::{DurNs, MonoNs};
 
+use crate::output::{put, say};
 use crate::station::station;
 
 /// How often the state is shown where lines can't be overwritten, in the dive's own time.
@@ -107,12 +108,11 @@ impl Watch {
             } else {
                 "\x1b[32m"
             };
-            print!("\r\x1b[K{colour}{line}\x1b[0m");
+            put(&format!("\r\x1b[K{colour}{line}\x1b[0m"));
             self.status_open = true;
         } else {
-            println!("{line}");
+            say(&line);
         }
-        flush();
     }
 
     fn section(&mut self, section: i64, change: Judgement, dive: &Loop) {
@@ -174,20 +174,14 @@ impl Watch {
         self.close_status();
         let colour =
             if self.terminal && text.starts_with("FLAG") { ("\x1b[1;31m", "\x1b[0m") } else { ("", "") };
-        println!("{}{text}{}", colour.0, colour.1);
+        say(&format!("{}{text}{}", colour.0, colour.1));
     }
 
     fn close_status(&mut self) {
         if self.status_open {
-            println!();
+            say("");
             self.status_open = false;
         }
-    }
-}
-
-fn flush() {
-    if let Err(error) = std::io::stdout().flush() {
-        tracing::debug!(%error, "the terminal takes no more");
     }
 }
 

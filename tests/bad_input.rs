@@ -88,7 +88,7 @@ fn a_wrong_vehicle_file_is_refused_with_file_line_key_value_and_what_is_allowed(
     unknown table
         headrace: vehicle.toml:12: head: is not a key here; known are name, target_m, section_m, tunnel, water, heads, sensors
     text in place of a number
-        headrace: vehicle.toml:2: target_m = "1.2": must be a number from 0.01 to 100
+        headrace: vehicle.toml:2: target_m = "1.2": must be a number from 0.01 to 20
     number in place of a text
         headrace: vehicle.toml:1: name = 7: must be a text in quotes
     number in place of a table
@@ -158,7 +158,7 @@ fn a_wrong_scene_is_refused_with_file_line_key_value_and_what_is_allowed() {
     unknown table
         headrace: scene.toml:4: weather: is not a key here; known are name, vehicle, trajectory, effects
     unknown effect
-        headrace: scene.toml:5: effects.fish: is not a key here; known are 
+        headrace: scene.toml:5: effects.fish = 12: is no effect that can be simulated; this version has none
     text in place of a number
         headrace: scene.toml:5: trajectory.start_m = "portal": must be a number from -20 to 1000000
     no distance

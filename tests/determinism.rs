@@ -53,6 +53,27 @@ fn a_live_dive_and_the_replay_of_its_log_agree() {
     assert!(live["summary"]["fail_m"].as_f64().unwrap() > 5.0, "the demonstration misses a stretch");
 }
 
+/// Dives in which failed sections settle, flags are cleared on a later pass, and judging depends on judging.
+#[test]
+fn ticks_of_any_length_agree_where_sections_fail_settle_and_are_cleared() {
+    let folder = Folder::new();
+    folder.write("vehicle.toml", include_str!("../deploy/vehicles/vita2-4.toml"));
+    let leg = |distance_m: f64, speed_mps: f64| {
+        format!("[[trajectory.legs]]\ndistance_m = {distance_m}\nspeed_mps = {speed_mps}\n")
+    };
+    let legs = leg(10.0, 0.197) + &leg(6.0, 0.35) + &leg(9.0, -0.3) + &leg(12.0, 0.197);
+    folder.write("scene.toml", format!("vehicle = \"vehicle.toml\"\n[trajectory]\n{legs}"));
+    assert_eq!(folder.headrace(&["simulate", "scene.toml", "-o", "dive.mcap"]).code, Some(0));
+    let report = |ticks: &str| folder.replay("dive.mcap", &["--tick-ms", ticks]).1;
+    let expected = report(TICKS_MS[0]);
+    assert!(expected["summary"]["flags_cleared"].as_u64().unwrap() > 10, "{}", expected["summary"]);
+    for ticks in &TICKS_MS[1..] {
+        let got = report(ticks);
+        assert_eq!(got["digest"], expected["digest"], "ticks of {ticks} ms");
+        assert_eq!(got["sections"], expected["sections"], "ticks of {ticks} ms");
+    }
+}
+
 #[test]
 fn a_report_expected_is_met_or_each_difference_named() {
     let folder = Folder::with_dive();

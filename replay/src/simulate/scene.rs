@@ -27,6 +27,7 @@ pub enum SceneError {
     Config(#[from] ConfigError),
 }
 
+/// A dive may begin and end as much as 20 m outside the tunnel.
 const CHAINAGE_M: std::ops::RangeInclusive<f64> = -20.0..=1.0e6;
 
 impl Scene {
@@ -46,8 +47,11 @@ impl Scene {
         let section = root.required("trajectory", root.section("trajectory")?)?;
         let trajectory = parse_trajectory(section, &vehicle)?;
         if let Some(effects) = root.section("effects")? {
-            // None is simulated yet: whatever is named is unknown.
-            effects.finish()?;
+            if let Some(effect) = effects.keys().first() {
+                return Err(effects
+                    .invalid(effect, "is no effect that can be simulated; this version has none")
+                    .into());
+            }
         }
         root.finish()?;
         Ok(Self { name, vehicle_text, vehicle, trajectory })
@@ -66,11 +70,18 @@ fn parse_trajectory(section: Section<'_>, vehicle: &VehicleConfig) -> Result<Tra
         return Err(section.invalid("place_m", "must be inside the tunnel's profile"));
     }
     let mut legs = Vec::new();
+    let mut chainage_m = start_m;
     for leg in section.sections("legs")? {
         let distance_m = leg.required("distance_m", leg.number("distance_m", 0.01..=1.0e6)?)?;
         let speed_mps = leg.required("speed_mps", leg.number("speed_mps", -5.0..=5.0)?)?;
         if speed_mps.abs() < 1e-3 {
             return Err(leg.invalid("speed_mps", "must be at least 0.001 either way, or the leg has no end"));
+        }
+        chainage_m += distance_m * speed_mps.signum();
+        if !(CHAINAGE_M.start()..=&(vehicle.tunnel.length_m - CHAINAGE_M.start())).contains(&&chainage_m) {
+            let problem =
+                format!("ends at chainage {chainage_m} m; the tunnel is {} m long", vehicle.tunnel.length_m);
+            return Err(leg.invalid("distance_m", &problem));
         }
         leg.finish()?;
         legs.push(Leg { distance_m, speed_mps });

@@ -1,0 +1,30 @@
+//! Words for people, on stdout. A terminal that has gone away ends neither a dive nor its recording.
+
+use std::io::Write;
+
+use crate::failure::Failure;
+
+/// Writes `text` as it is. What can't be written is let go: a closed pipe or a lost session is no reason to stop.
+pub(crate) fn put(text: &str) {
+    let mut stdout = std::io::stdout().lock();
+    if let Err(error) = stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
+        tracing::debug!(%error, "stdout takes no more");
+    }
+}
+
+/// Writes a line.
+pub(crate) fn say(text: &str) {
+    put(&format!("{text}\n"));
+}
+
+/// Writes what a program asked for.
+///
+/// Errors: stdout takes it not, or not all.
+pub(crate) fn deliver(text: &str) -> Result<(), Failure> {
+    let mut stdout = std::io::stdout().lock();
+    stdout
+        .write_all(text.as_bytes())
+        .and_then(|()| stdout.write_all(b"\n"))
+        .and_then(|()| stdout.flush())
+        .map_err(|source| Failure::Write { path: "standard output".into(), source })
+}
