@@ -68,7 +68,7 @@ pub(crate) fn replay(args: &Replay) -> Result<u8, Failure> {
     let mut player = Player::open(&args.log)?;
     let (text, mut vehicle) = match &args.vehicle {
         Some(path) => vehicle_file(path),
-        None => attached_vehicle(player.info(), &args.log),
+        None => attached_vehicle(player.info(), &player.losses(), &args.log),
     }?;
     vehicle.target_m = args.target.unwrap_or(vehicle.target_m);
     let dive = assemble(&vehicle, &text, None)?;
@@ -160,10 +160,17 @@ fn vehicle_file(path: &Path) -> Result<(String, VehicleConfig), Failure> {
     Ok((text, vehicle))
 }
 
-fn attached_vehicle(info: &LogInfo, log: &Path) -> Result<(String, VehicleConfig), Failure> {
+fn attached_vehicle(
+    info: &LogInfo,
+    losses: &[String],
+    log: &Path,
+) -> Result<(String, VehicleConfig), Failure> {
     let text = info.vehicle_toml.clone().ok_or_else(|| {
+        let damage =
+            losses.first().map(|loss| format!(" can be read from this log, which is damaged ({loss})"));
+        let which = damage.unwrap_or_else(|| " is attached to this log".to_owned());
         Failure::Usage(format!(
-            "replaying {}: no vehicle file is attached to this log; give one with --vehicle",
+            "replaying {}: no vehicle file{which}; give one with --vehicle",
             log.display()
         ))
     })?;

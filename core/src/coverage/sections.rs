@@ -378,3 +378,27 @@ fn verdict(hole: &Hole, sigma_m: f64, target_m: f64) -> Verdict {
 fn clamp(range: Range<i64>, within: &Range<i64>) -> Range<i64> {
     range.start.max(within.start)..range.end.min(within.end)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_wall_without_samples_never_passes() {
+        let hole = Hole { diameter_m: 2.0 * FARTHEST_M, x_m: 0.0, sigma_m: 0.0, bounded: false };
+        assert_eq!(verdict(&hole, 0.0, 100.0), Verdict::Fail);
+    }
+
+    #[test]
+    fn the_verdict_needs_two_standard_deviations() {
+        let hole = |diameter_m| Hole { diameter_m, x_m: 0.0, sigma_m: 0.0, bounded: true };
+        for (diameter_m, expected) in [
+            (0.47, Verdict::Pass),
+            (0.49, Verdict::CannotSay),
+            (0.52, Verdict::CannotSay),
+            (0.53, Verdict::Fail),
+        ] {
+            assert_eq!(verdict(&hole(diameter_m), 0.0125, 0.5), expected, "{diameter_m}");
+        }
+    }
+}

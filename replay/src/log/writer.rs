@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
-use headrace_core::time::MonoNs;
+use headrace_core::time::{DurNs, MonoNs};
 use mcap::records::{MessageHeader, Metadata};
 use mcap::write::NoSeek;
 
@@ -18,6 +18,8 @@ use super::format::{
 
 /// A chunk is closed when it holds more than this, whatever the clock says.
 const CHUNK_BYTES: u64 = 1 << 20;
+/// A chunk is closed once its messages span so much of the dive's own time.
+const CHUNK_SPAN: DurNs = DurNs(500_000_000);
 
 /// What a log begins with.
 #[derive(Debug, Clone, Default)]
@@ -104,6 +106,8 @@ pub struct LogWriter<W: Write> {
     tick_message: Vec<u8>,
     messages: u64,
     message_bytes: u64,
+    /// Time of the first message of the chunk that is open.
+    chunk_began: Option<MonoNs>,
 }
 
 impl LogWriter<BufWriter<File>> {
@@ -151,7 +155,17 @@ impl<W: Write> LogWriter<W> {
         let tick = tick.transpose()?;
         let results = channels.add_results(&header.results)?;
         channels.write()?;
-        Ok(Self { writer, raw, sent, tick, results, tick_message: Vec::new(), messages: 0, message_bytes: 0 })
+        Ok(Self {
+            writer,
+            raw,
+            sent,
+            tick,
+            results,
+            tick_message: Vec::new(),
+            messages: 0,
+            message_bytes: 0,
+            chunk_began: None,
+        })
     }
 
     /// Bytes that `source` sent, received at `received` and valid for `valid`.
@@ -218,6 +232,12 @@ impl<W: Write> LogWriter<W> {
             publish_time: publish_time.0,
         };
         channel.sequence = channel.sequence.wrapping_add(1);
+        // However fast a dive is written, damage to one chunk costs no more of it than this.
+        let began = *self.chunk_began.get_or_insert(log_time);
+        if log_time.since(began).0 >= CHUNK_SPAN.0 {
+            self.writer.flush().map_err(LogError::writing("a chunk"))?;
+            self.chunk_began = Some(log_time);
+        }
         self.writer.write_to_known_channel(&header, bytes).map_err(LogError::writing("a message"))?;
         self.messages += 1;
         self.message_bytes += bytes.len() as u64;
@@ -228,6 +248,7 @@ impl<W: Write> LogWriter<W> {
     ///
     /// Errors: the writer's.
     pub fn flush(&mut self) -> Result<(), LogError> {
+        self.chunk_began = None;
         self.writer.flush().map_err(LogError::writing("a chunk"))
     }
 
