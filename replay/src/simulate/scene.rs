@@ -46,12 +46,11 @@ impl Scene {
         let vehicle = VehicleConfig::parse(Document::new(&file, &vehicle_text), kinds, load)?;
         let section = root.required("trajectory", root.section("trajectory")?)?;
         let trajectory = parse_trajectory(section, &vehicle)?;
-        if let Some(effects) = root.section("effects")? {
-            if let Some(effect) = effects.keys().first() {
-                return Err(effects
-                    .invalid(effect, "is no effect that can be simulated; this version has none")
-                    .into());
-            }
+        if let Some(effects) = root.section("effects")?
+            && let Some(effect) = effects.keys().first()
+        {
+            let problem = "is no effect that can be simulated; this version has none";
+            return Err(effects.invalid(effect, problem).into());
         }
         root.finish()?;
         Ok(Self { name, vehicle_text, vehicle, trajectory })
