@@ -1,8 +1,11 @@
 //! Sensors that fall silent in the middle of a dive: what can't be placed is said so, nothing is flagged that going on
 //! forward fills, and the dive goes on once they are back.
 
-#![allow(clippy::unwrap_used, reason = "clippy.toml's leave for tests doesn't reach their helpers")]
-#![allow(dead_code, reason = "not every test file uses all of the helpers")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "clippy.toml's leave for tests doesn't reach their helpers"
+)]
 
 mod common;
 
