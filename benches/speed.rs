@@ -93,13 +93,7 @@ fn scene() -> Scene {
 
 fn armed(scene: &Scene, decoding: bool) -> Loop {
     let vehicle = &scene.vehicle;
-    let mut app = App::new(Mission {
-        profile: vehicle.tunnel.profile.clone(),
-        site: vehicle.site,
-        target_m: vehicle.target_m,
-        section_m: vehicle.section_m,
-        length_m: 200.0,
-    });
+    let mut app = App::new(Mission { length_m: 200.0, ..vehicle.mission() });
     for (sensor, config) in vehicle.sensors.iter().zip(&vehicle.sensor_configs) {
         if decoding {
             app.add_plugin(sensor.as_ref()).unwrap();

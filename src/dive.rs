@@ -2,12 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
+use headrace_core::app::App;
 use headrace_core::app::flow::{Notice, Tally};
 use headrace_core::app::outlet::{NoticeOutlet, NoticeReceiver};
 use headrace_core::app::plugin::Plugin;
 use headrace_core::app::report::{LogReport, Report};
 use headrace_core::app::run::Loop;
-use headrace_core::app::{App, Mission};
 use headrace_core::config::VehicleConfig;
 use headrace_core::fusion::direct::DirectNavigation;
 use headrace_replay::drive::{Feed, Pace, drive};
@@ -34,13 +34,7 @@ pub(crate) fn assemble(
     vehicle_text: &str,
     record_to: Option<&Path>,
 ) -> Result<Dive, Failure> {
-    let mut app = App::new(Mission {
-        profile: vehicle.tunnel.profile.clone(),
-        site: vehicle.site,
-        target_m: vehicle.target_m,
-        section_m: vehicle.section_m,
-        length_m: vehicle.tunnel.length_m,
-    });
+    let mut app = App::new(vehicle.mission());
     for sensor in &vehicle.sensors {
         let plugin: &dyn Plugin = sensor.as_ref();
         app.add_plugin(plugin)?;

@@ -6,7 +6,7 @@ use std::io::IsTerminal;
 use headrace_core::app::flow::{AdviceEntry, Coverage, Notice};
 use headrace_core::app::run::Loop;
 use headrace_core::coverage::{Cause, Evidence, Judgement, Sections, Verdict};
-use headrace_core::sampling::advice::Reason;
+use headrace_core::sampling::advice::{Reason, Remedy};
 use headrace_core::time::{DurNs, MonoNs};
 
 use crate::output::{put, say};
@@ -194,11 +194,17 @@ fn advice_words(entry: &AdviceEntry, target_m: f64) -> String {
     match advice.reason {
         Reason::HelixPitch if too_fast(entry) => format!("TOO FAST: at most {:.2} m/s", advice.v_max_mps),
         Reason::HelixPitch if advice.predicted_t_m.is_some_and(|t_m| t_m > target_m) => {
-            format!("OUT OF PHASE at this speed: go {:.2} m/s", advice.v_max_mps)
+            let error_deg = advice.phase_error_rad.map_or(0.0, f64::to_degrees).abs();
+            format!("OUT OF PHASE by {error_deg:.0} degrees: go {:.2} m/s", advice.v_max_mps)
         }
         Reason::HelixPitch => format!("may go {:.2} m/s (distance between turns)", advice.v_max_mps),
         Reason::AngularStep => {
-            format!("slower won't help: steps of {:.2} m along the wall; finer mode needed", advice.t_y_m)
+            let remedy = match advice.remedy {
+                Some(Remedy::Centre) => "go to the middle of the tunnel".to_owned(),
+                Some(Remedy::Mode(mode)) => format!("set the heads to {}", mode.to_uppercase()),
+                None => "no mode meets the target here".to_owned(),
+            };
+            format!("slower won't help: steps of {:.2} m along the wall; {remedy}", advice.t_y_m)
         }
         Reason::NoHeadingOrFix => "no speed can be given: no position or heading".to_owned(),
         Reason::NoReturns => "no speed can be given: no sonar returns".to_owned(),

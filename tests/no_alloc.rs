@@ -88,13 +88,7 @@ fn a_million_packets_without_one_allocation() {
     let load = |name: &str| std::fs::read_to_string(vehicles.join(name)).map_err(|error| error.to_string());
     let scene = Scene::parse(Document::new("scene.toml", SCENE), &KINDS, &load).unwrap();
     let vehicle = &scene.vehicle;
-    let mut app = App::new(Mission {
-        profile: vehicle.tunnel.profile.clone(),
-        site: vehicle.site,
-        target_m: vehicle.target_m,
-        section_m: vehicle.section_m,
-        length_m: 1000.0,
-    });
+    let mut app = App::new(Mission { length_m: 1000.0, ..vehicle.mission() });
     for sensor in &vehicle.sensors {
         app.add_plugin(sensor.as_ref()).unwrap();
     }

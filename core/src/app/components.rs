@@ -4,6 +4,7 @@ use bevy_ecs::prelude::Component;
 
 use super::reading::SourceId;
 use crate::frames::Mount;
+use crate::sampling::head::{HeadMode, HeadSpec};
 
 /// Which source a sensor's readings come from, and how it sits on the vehicle.
 #[derive(Debug, Clone, Copy, PartialEq, Component)]
@@ -15,12 +16,12 @@ pub struct Mounted {
 }
 
 /// A mechanical profiling head, as configured.
-#[derive(Debug, Clone, Copy, PartialEq, Component)]
+#[derive(Debug, Clone, PartialEq, Component)]
 pub struct SonarHead {
-    /// Angle between two pings that the mode promises, radians.
-    pub step_rad: f64,
-    /// Time between two pings that the mode promises, seconds.
-    pub ping_period_s: f64,
+    /// How it sits and turns.
+    pub spec: HeadSpec,
+    /// The modes that it could be set to instead.
+    pub modes: Vec<HeadMode>,
 }
 
 /// A fixed echosounder.

@@ -8,7 +8,8 @@ use super::plugin::Plugin;
 use super::reading::{Decoded, Packet};
 use crate::codec::CodecCounts;
 use crate::config::{ConfigError, Section, SensorConfig};
-use crate::frames::{Mount, Point3, Pose, Tunnel, Vec3};
+use crate::frames::{Point3, Pose, Tunnel, Vec3};
+use crate::sampling::head::{HeadMode, HeadProgram, HeadSpec};
 use crate::site::Site;
 use crate::time::MonoNs;
 
@@ -30,6 +31,21 @@ pub trait Device: Plugin + Send + Sync {
         None
     }
 
+    /// For a profiling head, the modes that it could be set to at `range_m`, or at its own range setting.
+    ///
+    /// Errors: in words, a range that isn't a setting of it.
+    fn modes(&self, range_m: Option<f64>) -> Result<Vec<HeadMode>, String> {
+        let _ = range_m;
+        Ok(Vec::new())
+    }
+
+    /// For a profiling head that is at `angle_rad` and would step towards `growing` angles, both in the sensor's frame:
+    /// the messages, in order, after which it is at its program's start and steps as that begins.
+    fn start_commands(&self, angle_rad: f64, growing: bool, program: &HeadProgram) -> Vec<Vec<u8>> {
+        let _ = (angle_rad, growing, program);
+        Vec::new()
+    }
+
     /// The device's side of the wire, for simulations.
     fn emulator(&self, setup: &EmulatorSetup) -> Box<dyn Emulator>;
 }
@@ -49,33 +65,6 @@ pub trait Decoder: Send + Sync {
     fn withheld(&self) -> u64 {
         0
     }
-}
-
-/// What a schedule of heads needs to know of one head.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct HeadSpec {
-    /// How it sits on the vehicle.
-    pub mount: Mount,
-    /// Angle between two pings, radians.
-    pub step_rad: f64,
-    /// Time between two pings, seconds.
-    pub ping_period_s: f64,
-    /// Whether the head's own angles grow the other way round or from elsewhere than the sensor frame's:
-    /// sensor angle = sign * device angle + offset.
-    pub angle_sign: f64,
-    /// See `angle_sign`; radians.
-    pub angle_offset_rad: f64,
-}
-
-/// What a head does during a dive: where it begins and between which angles it turns. Angles in the sensor's frame.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct HeadProgram {
-    /// Angle of the first ping, radians.
-    pub start_rad: f64,
-    /// Whether the first step goes towards growing angles.
-    pub growing: bool,
-    /// The sector to go back and forth in as (least angle, size), radians; `None` turns on for ever.
-    pub sector: Option<(f64, f64)>,
 }
 
 /// How an emulated device begins.

@@ -122,6 +122,7 @@ pub struct Requests(pub Vec<Request>);
 
 /// A result for the outlets.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[expect(clippy::large_enum_variant, reason = "copied into room that is there already; a box would allocate")]
 pub enum Notice {
     /// A section's verdict, hole or flag has changed.
     Section {
@@ -282,7 +283,7 @@ impl AdviceLog {
     const EVERY: DurNs = DurNs(10_000_000_000);
     const CHANGE_MPS: f64 = 0.01;
 
-    pub(super) fn take(&mut self, entry: AdviceEntry) {
+    pub(super) fn take(&mut self, entry: &AdviceEntry) {
         let unchanged = |last: &AdviceEntry| {
             last.advice.reason == entry.advice.reason
                 && (last.advice.v_max_mps - entry.advice.v_max_mps).abs() < Self::CHANGE_MPS
@@ -293,7 +294,7 @@ impl AdviceLog {
             return;
         }
         if self.entries.len() < Self::CAPACITY {
-            self.entries.push(entry);
+            self.entries.push(*entry);
         } else {
             self.dropped += 1;
         }

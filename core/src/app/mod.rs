@@ -22,7 +22,9 @@ use bevy_ecs::world::World;
 
 use crate::config::SensorConfig;
 use crate::fusion::Navigation;
+use crate::sampling::occlusion::Obstacle;
 use crate::site::Site;
+use crate::time::DurNs;
 use crate::tunnel::Profile;
 use components::Mounted;
 use device::Decoder;
@@ -73,6 +75,25 @@ pub struct Mission {
     pub section_m: f64,
     /// Length of the tunnel, m; samples beyond are counted, not kept.
     pub length_m: f64,
+    /// Parts of the vehicle that may stand in a head's way, besides the other heads.
+    pub hull: Vec<Obstacle>,
+    /// How long the dive may take from its first packet; `None` when nobody has said.
+    pub dive_time: Option<DurNs>,
+}
+
+impl Mission {
+    /// A tunnel 100 m long with sections of 0.25 m, at a usual site; no hull, no end of the dive.
+    pub fn new(profile: Profile, target_m: f64) -> Self {
+        Self {
+            profile,
+            site: Site::default(),
+            target_m,
+            section_m: 0.25,
+            length_m: 100.0,
+            hull: Vec::new(),
+            dive_time: None,
+        }
+    }
 }
 
 /// The loop while it is put together. [`App::arm`] turns it into one that runs.

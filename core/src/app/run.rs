@@ -17,7 +17,8 @@ use super::stages::{Advisor, Decoders, HeadSweeps, judge_one};
 use super::{App, MAX_SOURCES, Mission, SourceInfo};
 use crate::coverage::{Frontier, SampleStore, Sections, StoreLayout};
 use crate::fusion::{Navigation, SensorInfo, SensorKind};
-use crate::sampling::advice::MAX_HEADS;
+use crate::sampling::advice::{self, Task};
+use crate::sampling::head::{HeadMode, HeadSpec, MAX_HEADS};
 use crate::time::MonoNs;
 
 /// Room beyond both ends of the tunnel for heads that sit ahead of or behind the vehicle's origin, m.
@@ -41,7 +42,7 @@ pub struct Loop {
 impl Loop {
     pub(super) fn new(app: App, navigation: Box<dyn Navigation>) -> Result<Self, PluginError> {
         let App { mission, mut world, mut schedule, sources, decoders, ports, readers } = app;
-        let (sensors, heads) = tables(&mut world, sources.len())?;
+        let (sensors, heads, specs) = tables(&mut world, sources.len())?;
         world.insert_resource(sensors);
         world.insert_resource(heads);
         world.insert_resource(Decoders(decoders));
@@ -52,7 +53,11 @@ impl Loop {
         world.insert_resource(Navigator { navigation, next_beat: None });
         world.insert_resource(HeadSweeps::default());
         world.insert_resource(Finder::default());
-        world.insert_resource(Advisor::default());
+        let task = Task { target_m: mission.target_m, length_m: mission.length_m };
+        world.insert_resource(Advisor {
+            advisor: advice::Advisor::new(&mission.profile, task, &specs, &mission.hull),
+            dive_time: mission.dive_time,
+        });
         world.insert_resource(AdviceLog::default());
         world.insert_resource(Digests::default());
         world.insert_resource(Tally::default());
@@ -189,8 +194,13 @@ fn coverage(mission: &Mission) -> Coverage {
     Coverage { store, sections, frontier: Frontier::default() }
 }
 
-/// What stages look up by source: navigation's view of each sensor, and the number and entity of each head.
-fn tables(world: &mut World, sources: usize) -> Result<(SensorTable, HeadTable), PluginError> {
+/// What stages look up by source: navigation's view of each sensor, and the number and entity of each head; and the
+/// heads themselves, by number.
+#[expect(clippy::type_complexity, reason = "three tables, taken apart at once")]
+fn tables(
+    world: &mut World,
+    sources: usize,
+) -> Result<(SensorTable, HeadTable, Vec<(HeadSpec, Vec<HeadMode>)>), PluginError> {
     let nothing = SensorInfo {
         mount: crate::frames::Mount {
             position: crate::frames::Vec3::zero(),
@@ -227,18 +237,20 @@ fn tables(world: &mut World, sources: usize) -> Result<(SensorTable, HeadTable),
             *slot = SensorInfo { mount: mounted.mount, kind };
         }
         if kind == SensorKind::Head {
-            found.push((mounted.source, entity));
+            found.push((mounted.source, entity, head.cloned()));
         }
     }
-    found.sort_unstable_by_key(|(source, _)| *source);
+    found.sort_unstable_by_key(|(source, ..)| *source);
     if found.len() > MAX_HEADS {
         return Err(PluginError::TooManyHeads { count: found.len(), max: MAX_HEADS });
     }
-    for (number, (source, entity)) in found.into_iter().enumerate() {
+    let mut specs = Vec::new();
+    for (number, (source, entity, head)) in found.into_iter().enumerate() {
+        specs.extend(head.map(|head| (head.spec, head.modes)));
         world.entity_mut(entity).insert(HeadTrack::default());
         if let Some(slot) = heads.get_mut(source.index()) {
             *slot = Some((number, entity));
         }
     }
-    Ok((SensorTable(sensors), HeadTable(heads)))
+    Ok((SensorTable(sensors), HeadTable(heads), specs))
 }

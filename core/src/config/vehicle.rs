@@ -3,10 +3,13 @@
 use core::cell::RefCell;
 
 use super::reader::{ConfigError, Document, Section};
+use crate::app::Mission;
 use crate::app::device::{Device, DeviceKind};
 use crate::coverage::StoreLayout;
 use crate::frames::{Mount, Rot, Vec3};
+use crate::sampling::head::HeadSpec;
 use crate::sampling::layout::HeadLayout;
+use crate::sampling::occlusion::Obstacle;
 use crate::site::Site;
 use crate::time::DurNs;
 use crate::tunnel::Profile;
@@ -26,8 +29,12 @@ pub struct VehicleConfig {
     pub tunnel: TunnelConfig,
     /// How the heads share the work.
     pub layout: HeadLayout,
-    /// The speed for which the heads' phases are set, m/s.
+    /// The speed for which the heads' phases are set, m/s; zero sets them without regard to their places along the hull.
     pub planned_speed_mps: f64,
+    /// Parts of the vehicle that may stand in a head's way.
+    pub hull: Vec<Obstacle>,
+    /// How long the dive may take.
+    pub dive_time: Option<DurNs>,
     /// The sensors, in the order of the file, which is the order of their sources.
     pub sensors: Vec<Box<dyn Device>>,
     /// The common part of each sensor's table, in the same order.
@@ -124,10 +131,8 @@ impl VehicleConfig {
             Some(water) => parse_water(water, axis_yaw_rad)?,
             None => Site { axis_yaw_rad, ..Site::default() },
         };
-        let (layout, planned_speed_mps) = match root.section("heads")? {
-            Some(heads) => parse_heads(heads)?,
-            None => (HeadLayout::PhaseShift, 0.0),
-        };
+        let dive_time = root.number("dive_hours", 0.01..=1000.0)?;
+        let hull = root.sections("hull")?.into_iter().map(parse_hull).collect::<Result<Vec<_>, _>>()?;
         let mut sensors = Vec::new();
         let mut sensor_configs: Vec<SensorConfig> = Vec::new();
         for section in root.sections("sensors")? {
@@ -140,6 +145,10 @@ impl VehicleConfig {
                 root.invalid("sensors", "has no sensor; at least one table headed [[sensors]] is needed")
             );
         }
+        let (layout, planned_speed_mps) = match root.section("heads")? {
+            Some(section) => parse_heads(section, &sensors)?,
+            None => (HeadLayout::PhaseShift, 0.0),
+        };
         Ok(Self {
             name,
             target_m,
@@ -148,10 +157,32 @@ impl VehicleConfig {
             tunnel,
             layout,
             planned_speed_mps,
+            hull,
+            dive_time: dive_time.map(|hours| DurNs::from_secs_f64(hours * 3600.0)),
             sensors,
             sensor_configs,
             attachments: attachments.into_inner(),
         })
+    }
+}
+
+impl VehicleConfig {
+    /// What a loop works for with this vehicle.
+    pub fn mission(&self) -> Mission {
+        Mission {
+            profile: self.tunnel.profile.clone(),
+            site: self.site,
+            target_m: self.target_m,
+            section_m: self.section_m,
+            length_m: self.tunnel.length_m,
+            hull: self.hull.clone(),
+            dive_time: self.dive_time,
+        }
+    }
+
+    /// The profiling heads, in the order of the file.
+    pub fn heads(&self) -> Vec<HeadSpec> {
+        self.sensors.iter().filter_map(|sensor| sensor.head()).collect()
     }
 }
 
@@ -183,9 +214,23 @@ fn parse_water(section: Section<'_>, axis_yaw_rad: f64) -> Result<Site, ConfigEr
     Ok(site)
 }
 
-fn parse_heads(section: Section<'_>) -> Result<(HeadLayout, f64), ConfigError> {
-    let layouts = [("phase_shift", HeadLayout::PhaseShift), ("sector_offset", HeadLayout::SectorOffset)];
-    let layout = section.choice("layout", &layouts)?.unwrap_or(HeadLayout::PhaseShift);
+fn parse_hull(section: Section<'_>) -> Result<Obstacle, ConfigError> {
+    let corner = |key: &'static str| section.required(key, section.triple(key, SENSOR_DISTANCE_M)?);
+    let (least, most) = (corner("least_m")?, corner("most_m")?);
+    if least.iter().zip(&most).any(|(least, most)| least >= most) {
+        return Err(section.invalid("most_m", "must be larger than least_m in each of x, y, z"));
+    }
+    section.finish()?;
+    let point = |[x, y, z]: [f64; 3]| Vec3::new(x, y, z);
+    Ok(Obstacle::Box { least: point(least), most: point(most) })
+}
+
+fn parse_heads(section: Section<'_>, sensors: &[Box<dyn Device>]) -> Result<(HeadLayout, f64), ConfigError> {
+    let layout = section.choice("layout", &HeadLayout::NAMES)?.unwrap_or(HeadLayout::PhaseShift);
+    if layout == HeadLayout::SectorOffset {
+        let heads = sensors.iter().filter(|sensor| sensor.head().is_some()).count();
+        layout.check(heads).map_err(|why| section.invalid("layout", &why.to_string()))?;
+    }
     let speed = section.number("planned_speed_mps", 0.0..=5.0)?.unwrap_or(0.0);
     section.finish()?;
     Ok((layout, speed))

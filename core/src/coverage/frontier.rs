@@ -7,7 +7,7 @@ use crate::time::{DurNs, MonoNs};
 /// A head that has given no return for so long isn't waited for.
 const SILENT: DurNs = DurNs(2_000_000_000);
 /// The most heads.
-const MAX_HEADS: usize = crate::sampling::advice::MAX_HEADS;
+const MAX_HEADS: usize = crate::sampling::head::MAX_HEADS;
 
 /// The stretch of tunnel on which a head lands samples now.
 #[derive(Debug, Clone, Copy, PartialEq)]

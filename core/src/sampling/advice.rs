@@ -1,48 +1,34 @@
-//! How fast one may go, from what is measured now.
+//! How fast one may go, from what is measured now, and what else one could do.
 
-use super::spacing::{self, Sweep};
-use crate::frames::{Mount, Pose};
+use super::error::SamplingError;
+use super::head::{HeadMode, HeadMotion, HeadSet, HeadSpec, MAX_HEADS};
+use super::occlusion::{self, AngleRange, Obstacle};
+use super::passes::Passes;
+use super::ring::{Ring, Standing};
+use super::spacing;
+use super::strips::{Arc, Strips, View};
+use crate::frames::{Point3, Pose, Rot};
 use crate::math::{self, TAU};
 use crate::tunnel::Profile;
 
-/// The most heads of one vehicle.
-pub const MAX_HEADS: usize = 8;
 /// Share of the speed kept back for the error of its measurement.
 pub const SPEED_MARGIN: f64 = 0.01;
+/// The most modes of a head that alternatives are given for.
+pub const MAX_MODES: usize = 8;
 
-/// What has been measured of one head that is turning.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct HeadMotion {
-    /// How it sits on the vehicle.
-    pub mount: Mount,
-    /// Its angle now, in the sensor's frame, radians.
-    pub angle_rad: f64,
-    /// Angle turned per second, positive where the angle grows.
-    pub rate_radps: f64,
-    /// Angle between two pings, radians, positive.
-    pub step_rad: f64,
-    /// Size of the sector between its last turning points; `None` while it turns on.
-    pub sector_rad: Option<f64>,
-}
-
-impl HeadMotion {
-    /// Time of a whole turn at this rate, seconds.
-    pub fn turn_period_s(&self) -> f64 {
-        TAU / self.rate_radps.abs()
-    }
-
-    /// Time between two pings, seconds.
-    pub fn ping_period_s(&self) -> f64 {
-        self.step_rad / self.rate_radps.abs()
-    }
-}
+/// How far the vehicle may move across the tunnel, m, or turn, as a quaternion's component (half an angle, rad), before
+/// the beams of its heads are cast anew. Both change the largest step by well under the speed margin.
+const STILL_M: f64 = 0.01;
+const STILL_TURN: f64 = 0.002;
+/// Soundings of a head's ring: the finest steps of the heads that there are (0.3 degrees).
+const RING: u32 = 1200;
 
 /// Everything that the advice depends on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Situation {
     /// Where the vehicle is; `None` without a fix.
     pub pose: Option<Pose>,
-    /// Speed along the tunnel, m/s.
+    /// Speed along the tunnel, m/s; below zero on the way back.
     pub speed_mps: f64,
     /// The heads that are turning and give returns.
     pub heads: [Option<HeadMotion>; MAX_HEADS],
@@ -53,7 +39,8 @@ pub struct Situation {
 pub enum Reason {
     /// The distance between passes decides: slower helps.
     HelixPitch,
-    /// The angle between pings alone gives gaps as large as the target: slower won't help, another mode or place would.
+    /// The distance between neighbours of one turn, or a strip that no head sees, is as large as the target: slower
+    /// won't help, another mode or place would.
     AngularStep,
     /// Without a position and heading nothing can be said.
     NoHeadingOrFix,
@@ -73,6 +60,56 @@ impl Reason {
     }
 }
 
+/// What would help where slower doesn't.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Remedy {
+    /// Another mode.
+    Mode(&'static str),
+    /// The middle of the tunnel, level and straight.
+    Centre,
+}
+
+impl Remedy {
+    /// The word used in reports: `centre`, or the mode's name.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Mode(name) => name,
+            Self::Centre => "centre",
+        }
+    }
+}
+
+/// What all heads could do in one of their modes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Alternative {
+    /// The mode.
+    pub mode: &'static str,
+    /// The largest speed at which it meets the target with the heads started in phase for it, m/s; zero where none is.
+    pub v_max_mps: f64,
+}
+
+/// What is left of a dive.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Left {
+    /// Length of tunnel in the direction of travel, m.
+    pub length_m: f64,
+    /// Time, seconds, where it is known.
+    pub time_s: Option<f64>,
+}
+
+impl Left {
+    /// Hours that the length takes at a speed; `None` at zero speed.
+    pub fn hours_at(&self, speed_mps: f64) -> Option<f64> {
+        (speed_mps > 0.0).then(|| self.length_m / speed_mps / 3600.0)
+    }
+
+    /// Whether the time is enough at a speed; `None` where it isn't known.
+    pub fn suffices_at(&self, speed_mps: f64) -> Option<bool> {
+        let time_s = self.time_s?;
+        Some(self.hours_at(speed_mps).is_some_and(|hours| hours * 3600.0 <= time_s))
+    }
+}
+
 /// The advice.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Advice {
@@ -80,9 +117,9 @@ pub struct Advice {
     pub v_max_mps: f64,
     /// What decides.
     pub reason: Reason,
-    /// T_max predicted at the present speed, m; `None` where nothing can be said.
+    /// T_max predicted at the present speed, m; `None` where nothing can be said or nothing bounds it.
     pub predicted_t_m: Option<f64>,
-    /// The longest time between two passes over a place, seconds.
+    /// The longest time between two passes over a place that all heads see, seconds.
     pub pass_gap_s: f64,
     /// What that time would be if the heads' passes were spread evenly, seconds.
     pub even_pass_gap_s: f64,
@@ -90,6 +127,14 @@ pub struct Advice {
     pub t_y_m: f64,
     /// Time between two pings, seconds; the longest of any head.
     pub ping_period_s: f64,
+    /// By how much the head farthest out of its phase is, radians of its turn; `None` in sectors, or with one head.
+    pub phase_error_rad: Option<f64>,
+    /// What is left of the tunnel and of the time.
+    pub left: Left,
+    /// What would help where slower doesn't.
+    pub remedy: Option<Remedy>,
+    /// The modes that all heads have.
+    pub alternatives: [Option<Alternative>; MAX_MODES],
 }
 
 impl Advice {
@@ -102,93 +147,289 @@ impl Advice {
             even_pass_gap_s: 0.0,
             t_y_m: 0.0,
             ping_period_s: 0.0,
+            phase_error_rad: None,
+            left: Left::default(),
+            remedy: None,
+            alternatives: [None; MAX_MODES],
         }
     }
 }
 
-/// How far the vehicle may move across the tunnel, m, or turn, as a quaternion's component (half an angle, rad), before
-/// its largest steps along the wall are worked out anew. Both change them by well under the speed margin.
-const STILL_M: f64 = 0.01;
-const STILL_TURN: f64 = 0.002;
-
-/// The largest step of each head, remembered while the vehicle keeps its place in the section.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct StepMemory {
-    heads: [Option<Remembered>; MAX_HEADS],
+/// What the advice is given for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Task {
+    /// Target T, m.
+    pub target_m: f64,
+    /// Length of the tunnel, m.
+    pub length_m: f64,
 }
 
-#[derive(Debug, Clone, Copy)]
-struct Remembered {
-    place_m: [f64; 2],
-    attitude: [f64; 4],
-    step_rad: f64,
-    largest_m: f64,
+/// A head, and its ring as last cast.
+#[derive(Debug, Clone)]
+struct AdvisedHead {
+    spec: HeadSpec,
+    modes: Vec<HeadMode>,
+    hidden: Vec<AngleRange>,
+    ring: Ring,
+    cast_at: Option<Pose>,
+    /// The largest steps by stride: of the modes, and of the step that was measured.
+    steps_m: Vec<(usize, f64)>,
+    /// The same in the middle of the tunnel.
+    centred_steps_m: Vec<(usize, f64)>,
 }
 
-impl StepMemory {
-    fn largest_step_m(
-        &mut self,
-        number: usize,
-        head: &HeadMotion,
-        pose: &Pose,
+/// Gives advice; remembers the beams of heads that keep their place in the section.
+#[derive(Debug, Clone)]
+pub struct Advisor {
+    profile: Profile,
+    task: Task,
+    heads: Vec<AdvisedHead>,
+    views: Vec<View>,
+    strips: Strips,
+    /// The head whose ring is looked at first.
+    turn: usize,
+}
+
+impl Advisor {
+    /// For heads with the modes that each has, and the parts of the hull that may stand in their way.
+    ///
+    /// Allocates: startup only.
+    pub fn new(
         profile: &Profile,
-    ) -> Option<f64> {
-        let place_m = [pose.position.y(), pose.position.z()];
-        let attitude = pose.attitude.wxyz();
-        let near = |a: &[f64], b: &[f64], by: f64| a.iter().zip(b).all(|(a, b)| (a - b).abs() <= by);
-        let slot = self.heads.get_mut(number)?;
-        let holds = |known: &&mut Remembered| {
-            near(&known.place_m, &place_m, STILL_M)
-                && near(&known.attitude, &attitude, STILL_TURN)
-                && near(&[known.step_rad], &[head.step_rad], 1e-9)
-        };
-        if let Some(known) = slot.as_mut().filter(holds) {
-            return Some(known.largest_m);
+        task: Task,
+        heads: &[(HeadSpec, Vec<HeadMode>)],
+        hull: &[Obstacle],
+    ) -> Self {
+        let specs: Vec<HeadSpec> = heads.iter().map(|(spec, _)| *spec).collect();
+        let hidden = occlusion::hidden_by_vehicle(&specs, hull);
+        let [y, z] = profile.reference();
+        let centre = Pose { position: Point3::new(0.0, y, z), attitude: Rot::identity() };
+        let mut views: Vec<View> = Vec::new();
+        let advised = heads.iter().zip(hidden).map(|((spec, modes), hidden)| {
+            let mut head = AdvisedHead {
+                spec: *spec,
+                modes: modes.iter().copied().take(MAX_MODES).collect(),
+                hidden,
+                ring: Ring::default(),
+                cast_at: None,
+                steps_m: Vec::with_capacity(MAX_MODES + 1),
+                centred_steps_m: Vec::new(),
+            };
+            views.push(View { sector: None, hidden: Vec::with_capacity(head.hidden.len()) });
+            // Casting once makes the room that later casts use; a head that is outside there has nothing to remember.
+            if let (Ok(()), Some(view)) = (head.cast(profile, &centre), views.last_mut()) {
+                head.centred_steps_m.clone_from(&head.steps_m);
+                head.look(profile, &centre, view);
+            }
+            head.cast_at = None;
+            head
+        });
+        let heads: Vec<AdvisedHead> = advised.collect();
+        let mut strips = Strips::with_room(heads.iter().map(|head| head.hidden.len()).sum());
+        strips.rebuild(profile.perimeter_m(), &views);
+        Self { profile: profile.clone(), task, heads, views, strips, turn: 0 }
+    }
+
+    /// The largest speed at which the predicted T_max stays within the target, by inverting Eq. 16 with what is
+    /// measured: turn period, step, number and phases of the heads as they would meet the wall at that speed, what
+    /// the vehicle hides from them, and its place and attitude. `left_s` is the time that is left, where it is known.
+    ///
+    /// Source: metrics.md, "Speed advice".
+    /// Allocates: never.
+    pub fn advise(&mut self, situation: &Situation, left_s: Option<f64>) -> Advice {
+        let Some(pose) = situation.pose else { return Advice::nothing(Reason::NoHeadingOrFix) };
+        if situation.heads.iter().all(Option::is_none) {
+            return Advice::nothing(Reason::NoReturns);
         }
-        // Of a sector the ends aren't known, only the size: the whole turn is looked at, which is the safer answer.
-        let sweep = Sweep { at_rad: head.angle_rad, step_rad: head.step_rad, span_rad: TAU };
-        let largest_m = spacing::largest_step_m(profile, pose, &head.mount, &sweep)?;
-        *slot = Some(Remembered { place_m, attitude, step_rad: head.step_rad, largest_m });
-        Some(largest_m)
+        let Ok(t_y_m) = self.largest_step_m(situation, &pose) else {
+            return Advice::nothing(Reason::NoHeadingOrFix);
+        };
+        let speed = situation.speed_mps.abs();
+        let passes = Passes::measured(&situation.heads, situation.speed_mps);
+        let ping_period_s =
+            situation.heads.iter().flatten().map(HeadMotion::ping_period_s).fold(0.0, f64::max);
+        let fastest = self.fastest_mps(situation, &passes, ping_period_s, t_y_m);
+        let predicted_t_m = self.strips.t_max_m(&passes, speed, ping_period_s, t_y_m);
+        let left_m = if situation.speed_mps < 0.0 {
+            pose.position.x()
+        } else {
+            self.task.length_m - pose.position.x()
+        };
+        let left = Left { length_m: left_m.clamp(0.0, self.task.length_m), time_s: left_s };
+        let in_sectors = situation.heads.iter().flatten().any(|motion| motion.sector_rad.is_some());
+        let alternatives = self.alternatives(in_sectors);
+        let errors = passes.phase_errors_rad(self.heads.len()).into_iter().flatten();
+        Advice {
+            v_max_mps: fastest.unwrap_or(0.0) * (1.0 - SPEED_MARGIN),
+            reason: if fastest.is_some() { Reason::HelixPitch } else { Reason::AngularStep },
+            predicted_t_m: predicted_t_m.is_finite().then_some(predicted_t_m),
+            pass_gap_s: passes.gap_s(passes.heads()).unwrap_or(0.0),
+            even_pass_gap_s: passes.even_gap_s(),
+            t_y_m,
+            ping_period_s,
+            phase_error_rad: errors
+                .max_by(|a, b| a.abs().total_cmp(&b.abs()))
+                .filter(|_| passes.heads().len() > 1),
+            left,
+            remedy: if fastest.is_none() { self.remedy(situation, &alternatives) } else { None },
+            alternatives,
+        }
+    }
+
+    /// The largest step of any head that turns, m.
+    ///
+    /// A head's beams are cast anew when the vehicle has moved; of several whose beams are old, one a call, since a
+    /// vehicle doesn't move far between two.
+    fn largest_step_m(&mut self, situation: &Situation, pose: &Pose) -> Result<f64, SamplingError> {
+        let count = self.heads.len().max(1);
+        let mut may_cast = true;
+        let mut seen_anew = false;
+        for offset in 0..count {
+            let number = (self.turn + offset) % count;
+            let present = situation.heads.get(number).is_some_and(Option::is_some);
+            let (Some(head), Some(view)) = (self.heads.get_mut(number), self.views.get_mut(number)) else {
+                continue;
+            };
+            if present && (head.cast_at.is_none() || may_cast && !head.is_near(pose)) {
+                may_cast &= head.cast_at.is_none();
+                head.cast(&self.profile, pose)?;
+                head.look(&self.profile, pose, view);
+                seen_anew |= !head.hidden.is_empty();
+                self.turn = (number + 1) % count;
+            }
+        }
+        if seen_anew {
+            self.strips.rebuild(self.profile.perimeter_m(), &self.views);
+        }
+        let steps = self.heads.iter_mut().zip(&situation.heads);
+        Ok(steps
+            .filter_map(|(head, motion)| Some(head.step_m(motion.as_ref()?.step_rad)))
+            .fold(0.0, f64::max))
+    }
+
+    /// The largest speed at which the phases measured now meet the target; `None` where no speed would, however the
+    /// heads were phased.
+    fn fastest_mps(
+        &self,
+        situation: &Situation,
+        passes: &Passes,
+        ping_period_s: f64,
+        t_y_m: f64,
+    ) -> Option<f64> {
+        let target_m = self.task.target_m;
+        let even_gap_s = passes.even_gap_s();
+        let bound = spacing::speed_for_target_mps(target_m, t_y_m, even_gap_s, ping_period_s)?;
+        self.strips.speed_for_target_mps(passes, target_m, ping_period_s, t_y_m).ok()?;
+        let heading = if situation.speed_mps < 0.0 { -1.0 } else { 1.0 };
+        let meets = |speed_mps: f64| {
+            let then = Passes::measured(&situation.heads, heading * speed_mps);
+            self.strips.t_max_m(&then, speed_mps, ping_period_s, t_y_m) <= target_m
+        };
+        Some(largest_speed_mps(bound, meets))
+    }
+
+    /// What each mode that all heads have would allow, started in phase.
+    fn alternatives(&self, in_sectors: bool) -> [Option<Alternative>; MAX_MODES] {
+        let mut alternatives = [None; MAX_MODES];
+        let modes = self.heads.first().map_or(&[][..], |head| &head.modes);
+        for (slot, mode) in alternatives.iter_mut().zip(modes) {
+            let Some(v_mps) = self.mode_speed_mps(mode.name, in_sectors) else { continue };
+            *slot = Some(Alternative { mode: mode.name, v_max_mps: v_mps * (1.0 - SPEED_MARGIN) });
+        }
+        alternatives
+    }
+
+    /// The largest speed in a mode, zero where none is; `None` when a head doesn't have it.
+    fn mode_speed_mps(&self, name: &str, in_sectors: bool) -> Option<f64> {
+        let (mut period_s, mut ping_period_s, mut t_y_m) = (0.0_f64, 0.0_f64, 0.0_f64);
+        for head in &self.heads {
+            let mode = head.modes.iter().find(|mode| mode.name == name)?;
+            period_s = period_s.max(mode.turn.period_s());
+            ping_period_s = ping_period_s.max(mode.turn.ping_period_s());
+            t_y_m = t_y_m.max(head.known_step_m(stride(mode.turn.step_rad()))?);
+        }
+        let count = self.heads.len();
+        let passes = if in_sectors {
+            Passes::in_sectors(count, period_s, 2.0 * period_s / count.max(1) as f64)
+        } else {
+            Passes::evenly_phased(count, period_s)
+        };
+        let speed = self.strips.speed_for_target_mps(&passes.ok()?, self.task.target_m, ping_period_s, t_y_m);
+        Some(speed.unwrap_or(0.0))
+    }
+
+    fn remedy(&self, situation: &Situation, alternatives: &[Option<Alternative>]) -> Option<Remedy> {
+        let centred = |(head, motion): (&AdvisedHead, &Option<HeadMotion>)| {
+            let stride = stride(motion.as_ref()?.step_rad);
+            head.centred_steps_m.iter().find(|(known, _)| *known == stride).map(|(_, step_m)| *step_m)
+        };
+        let in_the_middle = self.heads.iter().zip(&situation.heads).filter_map(centred).reduce(f64::max);
+        if in_the_middle.is_some_and(|t_y_m| t_y_m < self.task.target_m)
+            && self.strips.as_slice().iter().all(|strip| !strip.seen_by.is_empty())
+        {
+            return Some(Remedy::Centre);
+        }
+        let best = alternatives.iter().flatten().max_by(|a, b| a.v_max_mps.total_cmp(&b.v_max_mps));
+        best.filter(|best| best.v_max_mps > 0.0).map(|best| Remedy::Mode(best.mode))
+    }
+
+    /// The heads on which some strip depends that not all of them see.
+    pub fn hidden_from(&self) -> HeadSet {
+        let hidden = self.heads.iter().enumerate().filter(|(_, head)| !head.hidden.is_empty());
+        hidden.fold(HeadSet::default(), |set, (number, _)| set.with(number))
     }
 }
 
-/// The largest speed at which the predicted T_max stays within `target_m`, by inverting Eq. 16 with what is measured:
-/// turn period, step, number and phases of the heads as they would meet the wall at that speed, and the vehicle's place
-/// and attitude.
-///
-/// Source: metrics.md, "Speed advice".
-pub fn advise(situation: &Situation, profile: &Profile, target_m: f64, memory: &mut StepMemory) -> Advice {
-    let Some(pose) = situation.pose else { return Advice::nothing(Reason::NoHeadingOrFix) };
-    if !situation.heads.iter().flatten().any(|_| true) {
-        return Advice::nothing(Reason::NoReturns);
+impl AdvisedHead {
+    fn is_near(&self, pose: &Pose) -> bool {
+        let Some(cast_at) = &self.cast_at else { return false };
+        let near = |a: &[f64], b: &[f64], by: f64| a.iter().zip(b).all(|(a, b)| (a - b).abs() <= by);
+        let place = |pose: &Pose| [pose.position.y(), pose.position.z()];
+        near(&place(cast_at), &place(pose), STILL_M)
+            && near(&cast_at.attitude.wxyz(), &pose.attitude.wxyz(), STILL_TURN)
     }
-    let mut t_y_m = 0.0_f64;
-    for (number, head) in situation.heads.iter().enumerate() {
-        let Some(head) = head else { continue };
-        match memory.largest_step_m(number, head, &pose, profile) {
-            Some(step_m) => t_y_m = t_y_m.max(step_m),
-            None => return Advice::nothing(Reason::NoHeadingOrFix),
+
+    /// Casts the head's ring anew and takes the largest steps from it.
+    fn cast(&mut self, profile: &Profile, pose: &Pose) -> Result<(), SamplingError> {
+        self.cast_at = None;
+        let standing = Standing::new(profile, pose, &self.spec.mount)?;
+        self.ring.recast(&standing, 0.0, RING)?;
+        self.steps_m.clear();
+        for mode in &self.modes {
+            let stride = stride(mode.turn.step_rad());
+            self.steps_m.push((stride, self.ring.largest_step_m(stride)));
         }
+        self.cast_at = Some(*pose);
+        Ok(())
     }
-    let (pass_gap_s, even_pass_gap_s) = pass_gaps_s(&situation.heads, situation.speed_mps);
-    let ping_period_s = situation.heads.iter().flatten().map(HeadMotion::ping_period_s).fold(0.0, f64::max);
-    let even_v_max = spacing::speed_for_target_mps(target_m, t_y_m, even_pass_gap_s, ping_period_s);
-    let heading = if situation.speed_mps < 0.0 { -1.0 } else { 1.0 };
-    let meets = |speed_mps: f64| {
-        let (gap_s, _) = pass_gaps_s(&situation.heads, heading * speed_mps);
-        spacing::t_max_m(speed_mps * gap_s, speed_mps * ping_period_s, t_y_m) <= target_m
-    };
-    let speed = situation.speed_mps.abs();
-    Advice {
-        v_max_mps: even_v_max.map_or(0.0, |fastest| largest_speed_mps(fastest, meets) * (1.0 - SPEED_MARGIN)),
-        reason: if even_v_max.is_some() { Reason::HelixPitch } else { Reason::AngularStep },
-        predicted_t_m: Some(spacing::t_max_m(speed * pass_gap_s, speed * ping_period_s, t_y_m)),
-        pass_gap_s,
-        even_pass_gap_s,
-        t_y_m,
-        ping_period_s,
+
+    /// Where on the wall its hidden angles fall.
+    fn look(&self, profile: &Profile, pose: &Pose, view: &mut View) {
+        view.hidden.clear();
+        let Ok(standing) = Standing::new(profile, pose, &self.spec.mount) else { return };
+        view.hidden.extend(self.hidden.iter().filter_map(|angles| Arc::of(&standing, angles).ok()));
     }
+
+    fn known_step_m(&self, stride: usize) -> Option<f64> {
+        self.steps_m.iter().find(|(known, _)| *known == stride).map(|(_, step_m)| *step_m)
+    }
+
+    /// The largest step at this angle between pings, m.
+    fn step_m(&mut self, step_rad: f64) -> f64 {
+        let stride = stride(step_rad);
+        self.known_step_m(stride).unwrap_or_else(|| {
+            let step_m = self.ring.largest_step_m(stride);
+            self.steps_m.truncate(self.modes.len());
+            self.steps_m.push((stride, step_m));
+            step_m
+        })
+    }
+}
+
+/// How many soundings of a ring a step passes over, rounded up.
+fn stride(step_rad: f64) -> usize {
+    let soundings = -math::floor_to_i64(-(step_rad * f64::from(RING) / TAU - 1e-6));
+    usize::try_from(soundings.clamp(1, i64::from(RING))).unwrap_or(1)
 }
 
 /// The largest speed up to `fastest_mps` that `meets` the target.
@@ -213,158 +454,5 @@ fn largest_speed_mps(fastest_mps: f64, meets: impl Fn(f64) -> bool) -> f64 {
     good
 }
 
-/// The longest time between two passes over a place of the wall, as the heads are phased at this speed, and what it
-/// would be if they were phased evenly; seconds.
-///
-/// Heads that turn on: head k passes body angle zero at the times t_k + i T, and as it sits x_k ahead of the vehicle's
-/// origin, on the wall at chainages x_k + v (t_k + i T). Divided by v T these are phases on a circle; the largest gap
-/// between neighbours times T is the answer. Heads in sectors: a place near a sector's end waits for a sweep there and
-/// back, twice the time of one.
-/// Source: Jorge et al. 2021, §5.1 and §5.2.
-pub fn pass_gaps_s(heads: &[Option<HeadMotion>; MAX_HEADS], speed_mps: f64) -> (f64, f64) {
-    let turning = || heads.iter().flatten();
-    let sweep_s = |head: &HeadMotion| head.sector_rad.map(|sector| 2.0 * sector / head.rate_radps.abs());
-    if let Some(longest) = turning().filter_map(sweep_s).max_by(f64::total_cmp) {
-        return (longest, longest);
-    }
-    let count = turning().count();
-    let turn_s = turning().map(HeadMotion::turn_period_s).fold(0.0, f64::max);
-    let even_s = turn_s / count.max(1) as f64;
-    // Seen in a mirror, heads that all turn the other way turn this way.
-    let body_rate = |head: &HeadMotion| {
-        if super::layout::faces_aft(head.mount.rotation) { -head.rate_radps } else { head.rate_radps }
-    };
-    let mirror = if turning().all(|head| body_rate(head) < 0.0) { -1.0 } else { 1.0 };
-    let mut phases = [0.0; MAX_HEADS];
-    let mut known = 0;
-    for (head, slot) in turning().zip(&mut phases) {
-        let aft = super::layout::faces_aft(head.mount.rotation);
-        let angle = mirror * if aft { -head.angle_rad } else { head.angle_rad };
-        let rate = mirror * body_rate(head);
-        if rate <= 0.0 || turn_s <= 0.0 {
-            // Heads that turn against each other meet every place at uneven times: count on one of them only.
-            return (turn_s, even_s);
-        }
-        let until_zero_s = math::wrap(-angle, TAU) / rate;
-        let ahead_s = if speed_mps.abs() > 1e-3 { head.mount.position.x() / speed_mps } else { 0.0 };
-        *slot = math::wrap((until_zero_s + ahead_s) / turn_s, 1.0);
-        known += 1;
-    }
-    let phases = phases.get_mut(..known).unwrap_or_default();
-    phases.sort_unstable_by(f64::total_cmp);
-    let wrapped = phases.first().zip(phases.last()).map_or(1.0, |(first, last)| first + 1.0 - last);
-    let between = phases.windows(2).map(|pair| match pair {
-        [a, b] => b - a,
-        _ => 0.0,
-    });
-    (turn_s * between.fold(wrapped, f64::max), even_s)
-}
-
 #[cfg(test)]
-mod tests {
-    use super::{Advice, HeadMotion, MAX_HEADS, Reason, SPEED_MARGIN, Situation, StepMemory, spacing};
-    use crate::frames::{Mount, Pose};
-    use crate::frames::{Point3, Rot, Vec3};
-    use crate::math::TAU;
-    use crate::tunnel::Profile;
-    use crate::tunnel::named;
-
-    fn advise(situation: &Situation, profile: &Profile, target_m: f64) -> Advice {
-        super::advise(situation, profile, target_m, &mut StepMemory::default())
-    }
-
-    fn situation(angles_deg: &[f64], x_m: &[f64], speed_mps: f64, profile: &Profile) -> Situation {
-        let mut heads = [None; MAX_HEADS];
-        for ((slot, angle), x) in heads.iter_mut().zip(angles_deg).zip(x_m) {
-            *slot = Some(HeadMotion {
-                mount: Mount { position: Vec3::new(*x, 0.0, 0.0), rotation: Rot::identity() },
-                angle_rad: angle.to_radians(),
-                rate_radps: TAU / 8.0,
-                step_rad: f64::to_radians(0.9),
-                sector_rad: None,
-            });
-        }
-        let [y, z] = profile.reference();
-        let pose = Pose { position: Point3::new(0.0, y, z), attitude: Rot::identity() };
-        Situation { pose: Some(pose), speed_mps, heads }
-    }
-
-    #[test]
-    fn evenly_phased_heads_share_the_turn() {
-        let profile = named::ceran().unwrap();
-        let advice =
-            advise(&situation(&[10.0, 100.0, 190.0, 280.0], &[0.0; 4], 0.2, &profile), &profile, 0.5);
-        assert!((advice.pass_gap_s - 2.0).abs() < 1e-9 && (advice.even_pass_gap_s - 2.0).abs() < 1e-12);
-        assert_eq!(advice.reason, Reason::HelixPitch);
-        let at_v_max = spacing::t_max_m(
-            advice.v_max_mps / (1.0 - SPEED_MARGIN) * advice.pass_gap_s,
-            advice.v_max_mps / (1.0 - SPEED_MARGIN) * advice.ping_period_s,
-            advice.t_y_m,
-        );
-        assert!((at_v_max - 0.5).abs() < 1e-9);
-    }
-
-    #[test]
-    fn a_broken_phase_shows_as_a_longer_gap() {
-        let profile = named::ceran().unwrap();
-        let together = advise(&situation(&[0.0, 0.0], &[0.0, 0.0], 0.2, &profile), &profile, 2.0);
-        assert!((together.pass_gap_s - 8.0).abs() < 1e-9 && (together.even_pass_gap_s - 4.0).abs() < 1e-12);
-        // Half a pitch apart along the hull, the same angles interleave: 0.2 m/s, 8 s a turn, 0.8 m.
-        let apart = advise(&situation(&[0.0, 0.0], &[0.8, 0.0], 0.2, &profile), &profile, 2.0);
-        assert!((apart.pass_gap_s - 4.0).abs() < 1e-9);
-    }
-
-    #[test]
-    fn the_largest_speed_is_one_at_which_the_phases_of_heads_apart_hold() {
-        let profile = named::ceran().unwrap();
-        let target_m = 1.0;
-        let now = situation(&[0.0, 0.0], &[0.8, 0.0], 0.2, &profile);
-        let advice = advise(&now, &profile, target_m);
-        let t_at = |speed_mps: f64| {
-            let gap_s = super::pass_gaps_s(&now.heads, speed_mps).0;
-            spacing::t_max_m(speed_mps * gap_s, speed_mps * advice.ping_period_s, advice.t_y_m)
-        };
-        let v_max = advice.v_max_mps / (1.0 - SPEED_MARGIN);
-        assert!((t_at(v_max) - target_m).abs() < 1e-6, "{v_max}: {}", t_at(v_max));
-        assert!(t_at(1.02 * v_max) > target_m);
-        // Evenly spread at every speed, they could go faster.
-        let even = spacing::speed_for_target_mps(target_m, advice.t_y_m, 4.0, advice.ping_period_s).unwrap();
-        assert!(v_max < 0.99 * even, "{v_max} and {even}");
-        // The advice doesn't depend on how fast one goes while it is given.
-        let faster = advise(&Situation { speed_mps: 0.5, ..now }, &profile, target_m);
-        assert!((faster.v_max_mps - advice.v_max_mps).abs() < 1e-12);
-    }
-
-    #[test]
-    fn heads_that_all_turn_the_other_way_are_phased_alike() {
-        let profile = named::ceran().unwrap();
-        let mut mirrored = situation(&[0.0, 180.0], &[0.0, 0.0], 0.2, &profile);
-        for head in mirrored.heads.iter_mut().flatten() {
-            head.rate_radps = -head.rate_radps;
-        }
-        let (gap_s, even_s) = super::pass_gaps_s(&mirrored.heads, 0.2);
-        assert!((gap_s - 4.0).abs() < 1e-9 && (even_s - 4.0).abs() < 1e-12);
-    }
-
-    #[test]
-    fn on_the_way_back_the_phases_of_the_way_back_count() {
-        let profile = named::ceran().unwrap();
-        let back = situation(&[30.0, 250.0], &[0.9, -0.3], -0.2, &profile);
-        let advice = advise(&back, &profile, 1.0);
-        let v = advice.v_max_mps / (1.0 - SPEED_MARGIN);
-        let gap_s = super::pass_gaps_s(&back.heads, -v).0;
-        assert!(spacing::t_max_m(v * gap_s, v * advice.ping_period_s, advice.t_y_m) <= 1.0 + 1e-6);
-    }
-
-    #[test]
-    fn where_slower_does_not_help_it_says_so() {
-        let profile = named::ceran().unwrap();
-        let advice = advise(&situation(&[0.0], &[0.0], 0.2, &profile), &profile, 0.1);
-        assert_eq!((advice.v_max_mps, advice.reason), (0.0, Reason::AngularStep));
-        let mut lost = situation(&[0.0], &[0.0], 0.2, &profile);
-        lost.pose = None;
-        assert_eq!(advise(&lost, &profile, 0.5).reason, Reason::NoHeadingOrFix);
-        let blind = situation(&[], &[], 0.2, &profile);
-        assert_eq!(advise(&blind, &profile, 0.5).reason, Reason::NoReturns);
-    }
-}
+mod tests;

@@ -1,5 +1,19 @@
 //! Sampling theory: the spacing of samples on the wall, layouts of several heads, and how fast one may go.
+//!
+//! `section` and `spacing` have the paper's closed forms; `ring` is the general case beside them. `layout` and `schedule`
+//! say what several heads do, `passes` what comes of it. `advice` puts them together for the pilot, `plan` for the engineer.
 
 pub mod advice;
+pub mod error;
+pub mod head;
+pub mod interference;
 pub mod layout;
+pub mod occlusion;
+pub mod passes;
+pub mod ring;
+pub mod schedule;
+pub mod section;
 pub mod spacing;
+pub mod strips;
+
+pub use error::SamplingError;

@@ -1,13 +1,13 @@
-//! The spacing of samples that the paper's equations predict.
+//! The paper's equations for a head that turns while it is carried along: the spacing of its samples.
 
-use crate::frames::{Mount, Pose, Vec3, head_direction};
-use crate::math::{self, TAU};
-use crate::tunnel::Profile;
+use super::error::{SamplingError, not_negative, positive};
+use super::head::Turn;
+use crate::math;
 
 /// T_max, m: the longer diagonal of the parallelogram that four neighbouring samples make.
 ///
 /// `t_x_m` is the distance between passes, `advance_m` (d) the way gone between two pings, `t_y_m` the largest distance
-/// between neighbours within a turn.
+/// between neighbours within a turn; all finite.
 /// Source: Jorge et al. 2021, Eq. 16.
 pub fn t_max_m(t_x_m: f64, advance_m: f64, t_y_m: f64) -> f64 {
     math::hypot(t_x_m + advance_m, t_y_m)
@@ -26,94 +26,110 @@ pub fn speed_for_target_mps(target_m: f64, t_y_m: f64, pass_gap_s: f64, ping_per
     (t_y_m < target_m && time_s > 0.0).then(|| math::sqrt(square) / time_s)
 }
 
-/// The range of angles through which a head turns.
+/// The spiral that heads leave on the wall at a constant speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sweep {
-    /// An angle at which it pings, radians in the sensor's frame.
-    pub at_rad: f64,
-    /// Angle between pings, radians, positive.
-    pub step_rad: f64,
-    /// Angle turned through before the same place is met again: a whole turn, or a sector.
-    pub span_rad: f64,
+pub struct Spiral {
+    speed_mps: f64,
+    turn: Turn,
+    passes_per_turn: f64,
 }
 
-/// T_y2 in general, m: the largest distance on the unrolled wall between neighbouring pings of one sweep of a head that
-/// stands still, by ray casting; any profile, place and attitude.
-///
-/// `None` when the head is outside the profile, or a beam runs along the tunnel.
-/// Source: Eq. 6 where the paper's assumptions hold.
-pub fn largest_step_m(profile: &Profile, pose: &Pose, mount: &Mount, sweep: &Sweep) -> Option<f64> {
-    let origin = pose.place(mount.position);
-    let from = [origin.y(), origin.z()];
-    if !profile.contains(from) {
-        return None;
+impl Spiral {
+    /// `passes_per_turn` is how often a place is passed in the time of one turn: 1 for a single head, s for s heads in
+    /// phase shift, s / 2 for s heads in sectors.
+    ///
+    /// Errors: a speed below zero, passes that aren't above zero, or what isn't finite. A speed of zero is a limit that
+    /// exists: all distances along the tunnel are zero.
+    pub fn new(speed_mps: f64, turn: Turn, passes_per_turn: f64) -> Result<Self, SamplingError> {
+        not_negative("the speed in m/s", speed_mps)?;
+        positive("the number of passes in a turn", passes_per_turn)?;
+        Ok(Self { speed_mps, turn, passes_per_turn })
     }
-    let turn = pose.attitude * mount.rotation;
-    let pings = math::floor_to_i64(sweep.span_rad.min(TAU) / sweep.step_rad).clamp(1, 20_000);
-    let at = |ping: i64| {
-        let direction: Vec3<_> = turn * head_direction(sweep.at_rad + ping as f64 * sweep.step_rad);
-        let hit = profile.cast_from_inside(from, [direction.y(), direction.z()])?;
-        Some((direction.x() * hit.range_m, hit.sigma_m))
-    };
-    let mut before = at(0)?;
-    let mut largest_m = 0.0_f64;
-    for ping in 1..=pings {
-        let here = at(ping)?;
-        let around = math::wrap_signed(here.1 - before.1, profile.perimeter_m());
-        largest_m = largest_m.max(math::hypot(here.0 - before.0, around));
-        before = here;
+
+    /// d, m: the way gone between two pings. Source: Jorge et al. 2021, Eq. 11.
+    pub fn advance_m(&self) -> f64 {
+        self.speed_mps * self.turn.ping_period_s()
     }
-    Some(largest_m)
+
+    /// T_x of one head, m: the way gone in a turn. Source: Eq. 12.
+    pub fn pitch_m(&self) -> f64 {
+        self.speed_mps * self.turn.period_s()
+    }
+
+    /// Distance along the tunnel between passes over a place, m: T_x / s, or 2 T_x / s at its largest in sectors.
+    /// Source: §5.1 and §5.2.
+    pub fn t_x_m(&self) -> f64 {
+        self.pitch_m() / self.passes_per_turn
+    }
+
+    /// T_ymax, m, of the largest step `t_y2_m` of a head that stands still. Source: Eq. 13.
+    pub fn t_y_max_m(&self, t_y2_m: f64) -> f64 {
+        math::hypot(self.advance_m(), t_y2_m)
+    }
+
+    /// T_ymin, m, of the smallest step of a head that stands still: T_y1 or T_c. Source: Eq. 14.
+    pub fn t_y_min_m(&self, smallest_step_m: f64) -> f64 {
+        math::hypot(self.advance_m(), smallest_step_m)
+    }
+
+    /// Mean step, m, of the mean step `t_yp_m` of a head that stands still, as Eq. 15 is printed.
+    ///
+    /// (n d)^2 under its root is a whole turn's way added to a single step's length: with [`Spiral::t_y_mean_m`] beside
+    /// it, both can be shown.
+    /// Source: Eq. 15.
+    pub fn t_y_mean_printed_m(&self, t_yp_m: f64) -> f64 {
+        math::hypot(f64::from(self.turn.steps()) * self.advance_m(), t_yp_m)
+    }
+
+    /// Mean step, m: that of a head that stands still, with the way gone during one step.
+    pub fn t_y_mean_m(&self, t_yp_m: f64) -> f64 {
+        math::hypot(self.advance_m(), t_yp_m)
+    }
+
+    /// T_max, m, of the largest step `t_y2_m` of a head that stands still. Source: Eq. 16.
+    pub fn t_max_m(&self, t_y2_m: f64) -> f64 {
+        t_max_m(self.t_x_m(), self.advance_m(), t_y2_m)
+    }
+
+    /// T_mean, m, of the mean step, the way gone included. Source: Eq. 17.
+    pub fn t_mean_m(&self, t_y_mean_m: f64) -> f64 {
+        t_max_m(self.t_x_m(), self.advance_m(), t_y_mean_m)
+    }
+
+    /// T_min, m, of the smallest step, the way gone included. Source: Eq. 18.
+    pub fn t_min_m(&self, t_y_min_m: f64) -> f64 {
+        t_max_m(self.t_x_m(), self.advance_m(), t_y_min_m)
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::frames::{Point3, Rot};
-    use crate::tunnel::named;
 
-    fn centred(profile: &Profile) -> Pose {
-        let [y, z] = profile.reference();
-        Pose { position: Point3::new(3.0, y, z), attitude: Rot::identity() }
+    #[test]
+    fn verif_hand_computed_values() {
+        let fast = Turn::new(f64::to_radians(0.9), 8.0).unwrap();
+        let one = Spiral::new(0.197, fast, 1.0).unwrap();
+        assert!((one.advance_m() - 0.003_94).abs() < 1e-15);
+        assert!((one.pitch_m() - 1.576).abs() < 1e-12 && (one.t_x_m() - 1.576).abs() < 1e-12);
+        let four = Spiral::new(0.197, fast, 4.0).unwrap();
+        assert!((four.t_x_m() - 0.394).abs() < 1e-12);
+        // sqrt(0.39794^2 + 0.18^2)
+        assert!((four.t_max_m(0.18) - 0.436_756_6).abs() < 1e-6);
+        assert!((one.t_y_mean_printed_m(0.085) - math::hypot(1.576, 0.085)).abs() < 1e-12);
+        assert!((one.t_y_mean_m(0.085) - 0.085_091_3).abs() < 1e-6);
     }
 
-    const AT_ORIGIN: fn() -> Mount =
-        || Mount { position: Vec3::new(0.0, 0.0, 0.0), rotation: Rot::identity() };
-
-    /// metrics.md's table: T_max of Eq. 16 for `ceran` at 0.197 m/s.
     #[test]
-    fn val_t_max_of_the_reference_table() {
-        let profile = named::ceran().unwrap();
-        let modes = [
-            (0.3, 21.6, 0.018, [4.259, 2.132, 1.069]),
-            (0.6, 10.8, 0.018, [2.134, 1.074, 0.548]),
-            (0.9, 8.0, 0.020, [1.589, 0.811, 0.434]),
-            (1.2, 6.6, 0.022, [1.325, 0.695, 0.404]),
-            (2.4, 4.8, 0.032, [1.042, 0.639, 0.513]),
-        ];
-        for (step_deg, turn_s, ping_s, expected) in modes {
-            for (heads, expected) in [1.0, 2.0, 4.0].into_iter().zip(expected) {
-                // A quarter turn is 37.5 steps of 2.4 degrees: every other head meets the corner half a step off.
-                let t_y = (0..4)
-                    .map(|head| TAU * (f64::from(head) / heads))
-                    .map(|at_rad| Sweep { at_rad, step_rad: f64::to_radians(step_deg), span_rad: TAU })
-                    .map(|sweep| largest_step_m(&profile, &centred(&profile), &AT_ORIGIN(), &sweep).unwrap())
-                    .fold(0.0, f64::max);
-                let t = t_max_m(0.197 * turn_s / heads, 0.197 * ping_s, t_y);
-                assert!((t / expected - 1.0).abs() < 2e-3, "{step_deg} deg x {heads}: {t} and {expected}");
-            }
+    fn at_rest_all_distances_along_the_tunnel_are_zero() {
+        let turn = Turn::new(f64::to_radians(0.9), 8.0).unwrap();
+        let rest = Spiral::new(0.0, turn, 2.0).unwrap();
+        assert_eq!((rest.advance_m(), rest.t_x_m(), rest.t_max_m(0.2)), (0.0, 0.0, 0.2));
+        for speed in [-0.1, f64::NAN, f64::INFINITY] {
+            let why = Spiral::new(speed, turn, 2.0).unwrap_err().to_string();
+            assert!(why.starts_with("the speed in m/s is"), "{why}");
         }
-    }
-
-    /// Eq. 6 on a flat floor, from a place where its corner falls on a ping.
-    #[test]
-    fn verif_the_closed_form_on_a_square() {
-        let profile = named::rectangle(4.0, 4.0).unwrap();
-        let step = f64::to_radians(0.9);
-        let sweep = Sweep { at_rad: 0.0, step_rad: step, span_rad: TAU };
-        let t_y = largest_step_m(&profile, &centred(&profile), &AT_ORIGIN(), &sweep).unwrap();
-        let closed = 4.0 * (math::tan(50.0 * step) - math::tan(49.0 * step)) / 2.0;
-        assert!((t_y / closed - 1.0).abs() < 1e-12, "{t_y} and {closed}");
+        assert!(Spiral::new(0.2, turn, 0.0).is_err());
     }
 
     #[test]

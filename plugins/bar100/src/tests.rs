@@ -46,13 +46,7 @@ fn sensor() -> SensorConfig {
 }
 
 fn app() -> App {
-    App::new(Mission {
-        profile: named::circle(2.5).unwrap(),
-        site: Site::default(),
-        target_m: 0.5,
-        section_m: 0.25,
-        length_m: 100.0,
-    })
+    App::new(Mission::new(named::circle(2.5).unwrap(), 0.5))
 }
 
 fn configured(own: &str) -> Result<Box<dyn Device>, String> {

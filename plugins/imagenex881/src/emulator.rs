@@ -1,9 +1,10 @@
 //! An emulated head, and the host that polls it: one command and one return each ping period.
 
-use headrace_core::app::device::{Direction, Emulator, EmulatorSetup, HeadProgram, Truth};
+use headrace_core::app::device::{Direction, Emulator, EmulatorSetup, Truth};
 use headrace_core::codec::{Bytes, Codec as _};
 use headrace_core::frames::{Mount, head_direction};
 use headrace_core::math;
+use headrace_core::sampling::head::HeadProgram;
 use headrace_core::time::{DurNs, MonoNs};
 
 use crate::codec::{

@@ -6,6 +6,7 @@
 
 pub mod codec;
 pub mod emulator;
+pub mod homing;
 pub mod logfile;
 pub mod plugin;
 pub mod settings;

@@ -2,16 +2,18 @@
 
 use headrace_core::app::App;
 use headrace_core::app::components::SonarHead;
-use headrace_core::app::device::{Decoder, Device, DeviceKind, Emulator, EmulatorSetup, HeadSpec};
+use headrace_core::app::device::{Decoder, Device, DeviceKind, Emulator, EmulatorSetup};
 use headrace_core::app::plugin::{Plugin, PluginError};
 use headrace_core::app::reading::{Decoded, Packet, Reading, SonarReturn};
 use headrace_core::codec::{Codec as _, CodecCounts, LineClock};
 use headrace_core::config::{ConfigError, Section, SensorConfig};
+use headrace_core::sampling::head::{HeadMode, HeadProgram, HeadSpec};
 use headrace_core::time::DurNs;
 
 use crate::codec::{Header, Model, ReturnCodec, Returns};
 use crate::emulator::HeadEmulator;
-use crate::settings::Settings;
+use crate::homing::{self, Standing};
+use crate::settings::{Settings, range_setting};
 
 /// Speed of sound by which the family computes every range. Source: Imagenex 881A serial interface, profile range.
 pub const SOUND_SPEED_MPS: f64 = 1500.0;
@@ -49,33 +51,44 @@ pub struct Imagenex881 {
 
 impl Plugin for Imagenex881 {
     fn build(&self, app: &mut App) -> Result<(), PluginError> {
-        let head = SonarHead {
+        let head = SonarHead { spec: self.spec(), modes: self.settings.modes(self.settings.command.range_m) };
+        let decoder = HeadDecoder::new(self.settings.clone(), self.sensor.latency);
+        app.add_sensor(&self.sensor, Box::new(decoder), RING_BYTES, head)?;
+        Ok(())
+    }
+}
+
+impl Imagenex881 {
+    fn spec(&self) -> HeadSpec {
+        HeadSpec {
+            mount: self.sensor.mount,
             step_rad: self.settings.step_rad(),
             ping_period_s: self.settings.ping_period.as_secs_f64(),
-        };
-        app.add_sensor(
-            &self.sensor,
-            Box::new(HeadDecoder::new(self.settings, self.sensor.latency)),
-            RING_BYTES,
-            head,
-        )?;
-        Ok(())
+            max_range_m: f64::from(self.settings.command.range_m),
+            beam_rad: self.settings.beam_rad(),
+            body: self.settings.body,
+        }
     }
 }
 
 impl Device for Imagenex881 {
     fn head(&self) -> Option<HeadSpec> {
-        Some(HeadSpec {
-            mount: self.sensor.mount,
-            step_rad: self.settings.step_rad(),
-            ping_period_s: self.settings.ping_period.as_secs_f64(),
-            angle_sign: self.settings.angle_sign,
-            angle_offset_rad: self.settings.angle_offset_rad,
-        })
+        Some(self.spec())
+    }
+
+    fn modes(&self, range_m: Option<f64>) -> Result<Vec<HeadMode>, String> {
+        let range_m = range_m.map_or(Ok(self.settings.command.range_m), range_setting)?;
+        Ok(self.settings.modes(range_m))
+    }
+
+    fn start_commands(&self, angle_rad: f64, growing: bool, program: &HeadProgram) -> Vec<Vec<u8>> {
+        let commands = homing::commands(&self.settings, Standing { angle_rad, growing }, program);
+        // Settings are checked when they are read, so that each command has its bytes.
+        commands.iter().filter_map(|command| command.encode().ok()).map(|bytes| bytes.to_vec()).collect()
     }
 
     fn emulator(&self, setup: &EmulatorSetup) -> Box<dyn Emulator> {
-        Box::new(HeadEmulator::new(self.settings, self.sensor.mount, self.sensor.latency, setup))
+        Box::new(HeadEmulator::new(self.settings.clone(), self.sensor.mount, self.sensor.latency, setup))
     }
 }
 

@@ -2,6 +2,7 @@
 
 use headrace_core::config::{ConfigError, Section, SensorConfig};
 use headrace_core::math::{self, TAU};
+use headrace_core::sampling::head::{Basis, HeadBody, HeadMode, Turn};
 use headrace_core::time::DurNs;
 
 use crate::codec::{COUNTS_PER_TURN, Command, Points, RANGES_M, ZERO_COUNT};
@@ -9,23 +10,40 @@ use crate::codec::{COUNTS_PER_TURN, Command, Points, RANGES_M, ZERO_COUNT};
 /// A scanning speed by the maker's name: the step, and how long a turn takes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Mode {
+    /// Its name in vehicle files.
+    pub name: &'static str,
     /// Step in counts of 0.3 degrees.
     pub step_counts: u8,
-    /// Time of a whole turn at the 10 m range setting, ms. How it changes with range isn't known.
+    /// Time of a whole turn at the range setting of the table, ms.
     pub turn_ms: i64,
 }
 
 /// The modes. Source: Jorge et al. 2021, Table 2.
-const MODES: [(&str, Mode); 5] = [
-    ("slow", Mode { step_counts: 1, turn_ms: 21_600 }),
-    ("medium", Mode { step_counts: 2, turn_ms: 10_800 }),
-    ("fast", Mode { step_counts: 3, turn_ms: 8_000 }),
-    ("faster", Mode { step_counts: 4, turn_ms: 6_600 }),
-    ("fastest", Mode { step_counts: 8, turn_ms: 4_800 }),
+pub const MODES: [Mode; 5] = [
+    Mode { name: "slow", step_counts: 1, turn_ms: 21_600 },
+    Mode { name: "medium", step_counts: 2, turn_ms: 10_800 },
+    Mode { name: "fast", step_counts: 3, turn_ms: 8_000 },
+    Mode { name: "faster", step_counts: 4, turn_ms: 6_600 },
+    Mode { name: "fastest", step_counts: 8, turn_ms: 4_800 },
 ];
 
-/// A head's settings, checked: each command that they make can be encoded.
+/// Range setting for which the table of modes is, m.
+const TABLE_RANGE_M: u8 = 10;
+
+/// A turn's period that was measured.
 #[derive(Debug, Clone, Copy, PartialEq)]
+struct MeasuredTurn {
+    step_counts: u8,
+    range_m: u8,
+    period: DurNs,
+}
+
+/// The body of a head of the family about its beam. Source: radius from Jorge et al. 2021, §8.3; the lengths are
+/// estimates.
+const USUAL_BODY: HeadBody = HeadBody { radius_m: 0.04, ahead_m: 0.03, behind_m: 0.2 };
+
+/// A head's settings, checked: each command that they make can be encoded.
+#[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
     /// The command that asks for a ping in the middle of a turn.
     pub command: Command,
@@ -37,6 +55,9 @@ pub struct Settings {
     pub angle_sign: f64,
     /// Sensor angle where the device reports 0, radians.
     pub angle_offset_rad: f64,
+    /// Its body.
+    pub body: HeadBody,
+    measured: Vec<MeasuredTurn>,
 }
 
 impl Settings {
@@ -44,13 +65,25 @@ impl Settings {
     ///
     /// Errors: a key that is missing or not allowed, or a latency that isn't below the ping period.
     pub fn read(sensor: &SensorConfig, own: &Section<'_>) -> Result<Self, ConfigError> {
-        let mode = own.required("mode", own.choice("mode", &MODES)?)?;
+        let choices = MODES.map(|mode| (mode.name, mode));
+        let mode = own.required("mode", own.choice("mode", &choices)?)?;
+        let command = command(mode, own)?;
+        let measured = measured_turns(mode, command.range_m, own)?;
+        let (turn, _) = turn_period(mode, command.range_m, &measured);
+        let usual = USUAL_BODY;
+        let length = |key, usual: f64| Ok(own.number(key, 0.0..=1.0)?.unwrap_or(usual));
         let settings = Self {
-            command: command(mode, own)?,
+            command,
             step_counts: mode.step_counts,
-            ping_period: ping_period(mode, own)?,
+            ping_period: DurNs(turn.0 / i64::from(pings_a_turn(mode))),
             angle_sign: own.choice("angle_sign", &[("normal", 1.0), ("inverted", -1.0)])?.unwrap_or(1.0),
             angle_offset_rad: own.number("angle_offset_deg", -360.0..=360.0)?.unwrap_or(0.0).to_radians(),
+            body: HeadBody {
+                radius_m: length("body_radius_m", usual.radius_m)?,
+                ahead_m: length("body_ahead_m", usual.ahead_m)?,
+                behind_m: length("body_behind_m", usual.behind_m)?,
+            },
+            measured,
         };
         if sensor.latency >= settings.ping_period {
             let most = settings.ping_period.as_secs_f64() * 1000.0;
@@ -59,6 +92,16 @@ impl Settings {
             return Err(own.invalid("latency_ms", &problem));
         }
         Ok(settings)
+    }
+
+    /// All modes at a range setting, with the periods that are known for it best.
+    pub fn modes(&self, range_m: u8) -> Vec<HeadMode> {
+        modes(range_m, &self.measured)
+    }
+
+    /// Full width of the beam at the frequency set, radians.
+    pub fn beam_rad(&self) -> f64 {
+        beam_rad(self.command.frequency_khz)
     }
 
     /// The step, radians.
@@ -90,13 +133,106 @@ fn rad_of_counts(counts: i32) -> f64 {
     f64::from(counts) * TAU / f64::from(COUNTS_PER_TURN)
 }
 
-fn ping_period(mode: Mode, own: &Section<'_>) -> Result<DurNs, ConfigError> {
-    let pings = COUNTS_PER_TURN / i32::from(mode.step_counts);
-    Ok(match own.number("turn_period_s", 0.1..=100.0)? {
-        Some(turn_s) => DurNs::from_secs_f64(turn_s / f64::from(pings)),
-        None => DurNs(mode.turn_ms * 1_000_000 / i64::from(pings)),
-    })
+/// A range as the head's setting.
+///
+/// Errors: in words, a range that is none of its settings.
+pub fn range_setting(range_m: f64) -> Result<u8, String> {
+    RANGES_M
+        .into_iter()
+        .find(|setting| (f64::from(*setting) - range_m).abs() < 1e-9)
+        .ok_or_else(|| format!("{range_m} m is no range setting of the head; it has {RANGES_M:?}"))
 }
+
+/// The modes of a head of which nothing has been measured, at a range setting.
+pub fn usual_modes(range_m: u8) -> Vec<HeadMode> {
+    modes(range_m, &[])
+}
+
+/// Full width of the profiling beam: 2.4 degrees at 600 kHz and less, in equal parts to 1.4 degrees at 1 MHz, radians.
+///
+/// Source: Jorge et al. 2021, §6; the profiling head's model in LSTS DUNE.
+pub fn beam_rad(frequency_khz: f64) -> f64 {
+    let share = ((frequency_khz - 600.0) / 400.0).clamp(0.0, 1.0);
+    f64::to_radians(2.4 - share)
+}
+
+fn modes(range_m: u8, measured: &[MeasuredTurn]) -> Vec<HeadMode> {
+    let mode = |mode: &Mode| {
+        let (period, basis) = turn_period(*mode, range_m, measured);
+        let step_rad = rad_of_counts(i32::from(mode.step_counts));
+        let turn = Turn::new(step_rad, period.as_secs_f64()).ok()?;
+        Some(HeadMode { name: mode.name, turn, basis })
+    };
+    MODES.iter().filter_map(mode).collect()
+}
+
+fn pings_a_turn(mode: Mode) -> i32 {
+    COUNTS_PER_TURN / i32::from(mode.step_counts)
+}
+
+/// How long a turn takes at a range setting.
+///
+/// From the periods measured in this mode, or else the maker's table: what was found at this very range; between two
+/// ranges, in proportion; and beyond them with the time that sound takes for the difference, to the range and back once
+/// a ping. The rest of a ping's period, stepping and the line, doesn't depend on the range.
+fn turn_period(mode: Mode, range_m: u8, measured: &[MeasuredTurn]) -> (DurNs, Basis) {
+    let table = MeasuredTurn {
+        step_counts: mode.step_counts,
+        range_m: TABLE_RANGE_M,
+        period: DurNs(mode.turn_ms * 1_000_000),
+    };
+    let of_mode = || measured.iter().filter(|turn| turn.step_counts == mode.step_counts);
+    let (known, basis) =
+        if of_mode().next().is_some() { (measured, Basis::Measured) } else { (&[table][..], Basis::Table) };
+    let known = || known.iter().filter(|turn| turn.step_counts == mode.step_counts);
+    let below = known().filter(|turn| turn.range_m <= range_m).max_by_key(|turn| turn.range_m);
+    let above = known().filter(|turn| turn.range_m >= range_m).min_by_key(|turn| turn.range_m);
+    let there_and_back = |from_m: u8| {
+        let metres = i64::from(range_m) - i64::from(from_m);
+        2_000_000_000 * metres / SOUND_SPEED * i64::from(pings_a_turn(mode))
+    };
+    match (below, above) {
+        (Some(known), _) | (_, Some(known)) if known.range_m == range_m => (known.period, basis),
+        (Some(below), Some(above)) => {
+            let share = f64::from(range_m - below.range_m) / f64::from(above.range_m - below.range_m);
+            let (near_s, far_s) = (below.period.as_secs_f64(), above.period.as_secs_f64());
+            (DurNs::from_secs_f64(near_s + share * (far_s - near_s)), Basis::Estimated)
+        }
+        (Some(known), None) | (None, Some(known)) => {
+            (DurNs(known.period.0 + there_and_back(known.range_m)), Basis::Estimated)
+        }
+        (None, None) => (table.period, Basis::Table),
+    }
+}
+
+/// The periods that the vehicle file says were measured: `turn_period_s` in the mode and at the range set, and any
+/// others in tables of their own.
+fn measured_turns(mode: Mode, range_m: u8, own: &Section<'_>) -> Result<Vec<MeasuredTurn>, ConfigError> {
+    let mut measured = Vec::new();
+    if let Some(turn_s) = own.number("turn_period_s", TURN_S)? {
+        let period = DurNs::from_secs_f64(turn_s);
+        measured.push(MeasuredTurn { step_counts: mode.step_counts, range_m, period });
+    }
+    for table in own.sections("measured_turns")? {
+        let choices = MODES.map(|mode| (mode.name, mode.step_counts));
+        let step_counts = table.required("mode", table.choice("mode", &choices)?)?;
+        let range_m = table.required("range_m", table.integer("range_m", 1..=100)?)?;
+        let range_m = u8::try_from(range_m).ok().filter(|range| RANGES_M.contains(range));
+        let range_m = range_m.ok_or_else(|| table.invalid("range_m", "is no range setting of the head"))?;
+        let turn_s = table.required("turn_period_s", table.number("turn_period_s", TURN_S)?)?;
+        if measured.iter().any(|known| known.step_counts == step_counts && known.range_m == range_m) {
+            return Err(table.invalid("range_m", "has its period in this mode already"));
+        }
+        measured.push(MeasuredTurn { step_counts, range_m, period: DurNs::from_secs_f64(turn_s) });
+        table.finish()?;
+    }
+    Ok(measured)
+}
+
+/// Times of a turn that can be, seconds.
+const TURN_S: core::ops::RangeInclusive<f64> = 0.1..=100.0;
+/// By which the family computes ranges, m/s.
+const SOUND_SPEED: i64 = 1500;
 
 fn command(mode: Mode, own: &Section<'_>) -> Result<Command, ConfigError> {
     let byte = |key, allowed, usual: u8| -> Result<u8, ConfigError> {
@@ -143,7 +279,7 @@ fn command(mode: Mode, own: &Section<'_>) -> Result<Command, ConfigError> {
 }
 
 /// Pulse length for a range. Source: the settings usual for profiling heads of the family.
-fn usual_pulse_us(range_m: u8) -> f64 {
+pub(crate) fn usual_pulse_us(range_m: u8) -> f64 {
     const PULSES_US: [u16; RANGES_M.len()] = [20, 20, 20, 20, 60, 60, 100, 160, 220, 260, 320, 420, 540];
     let pulse = RANGES_M.into_iter().zip(PULSES_US).find(|(range, _)| *range == range_m);
     pulse.map_or(60.0, |(_, pulse_us)| f64::from(pulse_us))

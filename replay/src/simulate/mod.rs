@@ -9,7 +9,6 @@ use std::collections::BTreeMap;
 
 use headrace_core::app::device::{Direction, Emulator, EmulatorSetup, Truth};
 use headrace_core::frames::{Point3, Pose, Tunnel, Vec3};
-use headrace_core::sampling::layout;
 use headrace_core::site::Site;
 use headrace_core::time::MonoNs;
 use headrace_core::tunnel::Profile;
@@ -65,11 +64,10 @@ pub struct Simulation {
 }
 
 impl Simulation {
-    /// Puts the scene's devices into its tunnel. Heads are given programs for the scene's layout and planned speed.
+    /// Puts the scene's devices into its tunnel. Heads follow the scene's programs.
     pub fn new(scene: &Scene) -> Self {
         let vehicle = &scene.vehicle;
-        let heads: Vec<_> = vehicle.sensors.iter().filter_map(|sensor| sensor.head()).collect();
-        let mut programs = layout::programs(&heads, vehicle.layout, vehicle.planned_speed_mps).into_iter();
+        let mut programs = scene.programs.iter().copied();
         let emulators = vehicle
             .sensors
             .iter()

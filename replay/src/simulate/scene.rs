@@ -3,6 +3,8 @@
 use headrace_core::app::device::DeviceKind;
 use headrace_core::config::vehicle::Loader;
 use headrace_core::config::{ConfigError, Document, Section, VehicleConfig};
+use headrace_core::sampling::head::HeadProgram;
+use headrace_core::sampling::layout;
 
 use super::trajectory::{Leg, Trajectory};
 
@@ -14,6 +16,8 @@ pub struct Scene {
     pub vehicle_text: String,
     /// The vehicle.
     pub vehicle: VehicleConfig,
+    /// What its heads do, in the order of the vehicle file.
+    pub programs: Vec<HeadProgram>,
     /// Its way.
     pub trajectory: Trajectory,
 }
@@ -44,6 +48,14 @@ impl Scene {
         let file = root.required("vehicle", root.text("vehicle")?)?;
         let vehicle_text = load(&file).map_err(|why| root.invalid("vehicle", &why))?;
         let vehicle = VehicleConfig::parse(Document::new(&file, &vehicle_text), kinds, load)?;
+        let heads = vehicle.heads();
+        let programs = if heads.is_empty() {
+            Vec::new()
+        } else {
+            layout::programs(&heads, vehicle.layout, vehicle.planned_speed_mps).map_err(|why| {
+                root.invalid("vehicle", &format!("describes heads that no program fits: {why}"))
+            })?
+        };
         let section = root.required("trajectory", root.section("trajectory")?)?;
         let trajectory = parse_trajectory(section, &vehicle)?;
         if let Some(effects) = root.section("effects")?
@@ -53,7 +65,7 @@ impl Scene {
             return Err(effects.invalid(effect, problem).into());
         }
         root.finish()?;
-        Ok(Self { name, vehicle_text, vehicle, trajectory })
+        Ok(Self { name, vehicle_text, vehicle, programs, trajectory })
     }
 }
 

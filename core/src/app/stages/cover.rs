@@ -12,7 +12,9 @@ use crate::coverage::hole::FARTHEST_M;
 use crate::coverage::{SampleIndex, StoreError, WallSample};
 use crate::frames::{Point3, Tunnel};
 use crate::math;
-use crate::sampling::advice::{self, MAX_HEADS, Situation};
+use crate::sampling::advice::Situation;
+use crate::sampling::head::{HeadMotion, MAX_HEADS};
+use crate::sampling::passes::Passes;
 use crate::sampling::spacing;
 
 /// What is remembered of each head's sweep, and how the heads' passes were spread at the last beat.
@@ -69,8 +71,10 @@ pub(super) fn cover(
 
 impl HeadSweeps {
     fn note_gaps(&mut self, situation: &Situation) {
-        (self.pass_gap_s, self.even_gap_s) = advice::pass_gaps_s(&situation.heads, situation.speed_mps);
-        let periods = situation.heads.iter().flatten().map(advice::HeadMotion::ping_period_s);
+        let passes = Passes::measured(&situation.heads, situation.speed_mps);
+        (self.pass_gap_s, self.even_gap_s) =
+            (passes.gap_s(passes.heads()).unwrap_or(0.0), passes.even_gap_s());
+        let periods = situation.heads.iter().flatten().map(HeadMotion::ping_period_s);
         self.ping_period_s = periods.fold(0.0, f64::max);
     }
 }

@@ -12,7 +12,8 @@ use crate::coverage::Reach;
 use crate::frames::{Mount, Pose, head_direction};
 use crate::fusion::{Fix, NoFix};
 use crate::math;
-use crate::sampling::advice::{HeadMotion, MAX_HEADS, Situation};
+use crate::sampling::advice::Situation;
+use crate::sampling::head::{HeadMotion, MAX_HEADS};
 use crate::time::{DurNs, MonoNs};
 
 /// A head whose last return is older than this isn't turning.

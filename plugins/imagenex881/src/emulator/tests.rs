@@ -52,8 +52,8 @@ struct Run {
 fn run(text: &str, latency: DurNs, program: HeadProgram, pings: usize) -> Run {
     let settings = settings(text).unwrap();
     let setup = EmulatorSetup { start: MonoNs(7_000_000_000), head: Some(program) };
-    let mut emulator = HeadEmulator::new(settings, mount(), latency, &setup);
-    let mut decoder = HeadDecoder::new(settings, latency);
+    let mut emulator = HeadEmulator::new(settings.clone(), mount(), latency, &setup);
+    let mut decoder = HeadDecoder::new(settings.clone(), latency);
     let mut run = Run { sent: Vec::new(), received: Vec::new(), readings: Vec::new() };
     while run.received.len() < pings {
         let due = emulator.due();

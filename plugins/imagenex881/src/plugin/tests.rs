@@ -1,7 +1,6 @@
 use headrace_core::app::Mission;
 use headrace_core::codec::Bytes;
 use headrace_core::math::PI;
-use headrace_core::site::Site;
 use headrace_core::time::MonoNs;
 use headrace_core::tunnel::named;
 
@@ -130,16 +129,10 @@ fn after_a_silence_a_new_return_is_not_given_an_old_time() {
 fn a_head_registers_once_and_says_what_it_is() {
     let settings = settings("mode = \"slow\"\nangle_offset_deg = 90").unwrap();
     let head = Imagenex881 { sensor: sensor(), settings };
-    let mut app = App::new(Mission {
-        profile: named::ceran().unwrap(),
-        site: Site::default(),
-        target_m: 0.5,
-        section_m: 0.25,
-        length_m: 100.0,
-    });
+    let mut app = App::new(Mission::new(named::ceran().unwrap(), 0.5));
     assert_eq!(head.build(&mut app), Ok(()));
     assert_eq!(head.build(&mut app), Err(PluginError::DuplicateSource { id: "front".to_owned() }));
     let spec = head.head().unwrap();
-    assert_eq!((spec.ping_period_s, spec.angle_sign, spec.angle_offset_rad), (0.018, 1.0, PI / 2.0));
+    assert_eq!((spec.ping_period_s, spec.max_range_m), (0.018, 10.0));
     assert!((spec.step_rad - 0.3_f64.to_radians()).abs() < 1e-15);
 }

@@ -1,6 +1,5 @@
 use headrace_core::app::Mission;
 use headrace_core::codec::Bytes;
-use headrace_core::site::Site;
 use headrace_core::time::MonoNs;
 use headrace_core::tunnel::named;
 
@@ -92,13 +91,7 @@ fn a_frame_cut_short_delays_nothing_after_a_silence() {
 #[test]
 fn an_echosounder_registers_once() {
     let ping = Ping1d { sensor: sensor(), settings: settings("").unwrap() };
-    let mut app = App::new(Mission {
-        profile: named::ceran().unwrap(),
-        site: Site::default(),
-        target_m: 0.5,
-        section_m: 0.25,
-        length_m: 100.0,
-    });
+    let mut app = App::new(Mission::new(named::ceran().unwrap(), 0.5));
     assert_eq!(ping.build(&mut app), Ok(()));
     assert_eq!(ping.build(&mut app), Err(PluginError::DuplicateSource { id: "left".to_owned() }));
     assert!(ping.head().is_none());

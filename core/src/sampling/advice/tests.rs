@@ -1,0 +1,193 @@
+use super::*;
+use crate::frames::{Mount, Vec3};
+use crate::sampling::head::{Basis, HeadBody, Turn};
+use crate::tunnel::named;
+
+const LENGTH_M: f64 = 1000.0;
+
+fn spec(position: [f64; 3], radius_m: f64) -> HeadSpec {
+    HeadSpec {
+        mount: Mount {
+            position: Vec3::new(position[0], position[1], position[2]),
+            rotation: Rot::identity(),
+        },
+        step_rad: f64::to_radians(0.9),
+        ping_period_s: 0.02,
+        max_range_m: 10.0,
+        beam_rad: f64::to_radians(1.4),
+        body: HeadBody { radius_m, ahead_m: 0.03, behind_m: 0.2 },
+    }
+}
+
+fn modes() -> Vec<HeadMode> {
+    let mode = |name, step_deg: f64, period_s| HeadMode {
+        name,
+        turn: Turn::new(step_deg.to_radians(), period_s).unwrap(),
+        basis: Basis::Table,
+    };
+    vec![mode("slow", 0.3, 21.6), mode("fast", 0.9, 8.0), mode("fastest", 2.4, 4.8)]
+}
+
+struct Case {
+    profile: Profile,
+    specs: Vec<HeadSpec>,
+    situation: Situation,
+    target_m: f64,
+    left_s: Option<f64>,
+}
+
+impl Case {
+    /// Heads at x along the hull with these angles, all in FAST, in the middle of `ceran`.
+    fn new(angles_deg: &[f64], x_m: &[f64], speed_mps: f64, target_m: f64) -> Self {
+        let profile = named::ceran().unwrap();
+        let specs: Vec<HeadSpec> = x_m.iter().map(|x| spec([*x, 0.0, 0.0], 0.0)).collect();
+        let mut heads = [None; MAX_HEADS];
+        for ((slot, angle), spec) in heads.iter_mut().zip(angles_deg).zip(&specs) {
+            *slot = Some(HeadMotion {
+                mount: spec.mount,
+                angle_rad: angle.to_radians(),
+                rate_radps: TAU / 8.0,
+                step_rad: spec.step_rad,
+                sector_rad: None,
+            });
+        }
+        let [y, z] = profile.reference();
+        let pose = Pose { position: Point3::new(100.0, y, z), attitude: Rot::identity() };
+        let situation = Situation { pose: Some(pose), speed_mps, heads };
+        Self { profile, specs, situation, target_m, left_s: None }
+    }
+
+    fn advisor(&self) -> Advisor {
+        let heads: Vec<_> = self.specs.iter().map(|spec| (*spec, modes())).collect();
+        Advisor::new(&self.profile, Task { target_m: self.target_m, length_m: LENGTH_M }, &heads, &[])
+    }
+
+    fn advice(&self) -> Advice {
+        self.advisor().advise(&self.situation, self.left_s)
+    }
+}
+
+#[test]
+fn at_the_largest_speed_the_target_is_just_met() {
+    let advice = Case::new(&[10.0, 100.0, 190.0, 280.0], &[0.0; 4], 0.2, 0.5).advice();
+    assert!((advice.pass_gap_s - 2.0).abs() < 1e-9 && (advice.even_pass_gap_s - 2.0).abs() < 1e-12);
+    assert_eq!((advice.reason, advice.remedy), (Reason::HelixPitch, None));
+    let v = advice.v_max_mps / (1.0 - SPEED_MARGIN);
+    let t_m = spacing::t_max_m(v * advice.pass_gap_s, v * advice.ping_period_s, advice.t_y_m);
+    assert!((t_m - 0.5).abs() < 1e-9);
+    assert!(advice.phase_error_rad.unwrap().abs() < 1e-9);
+}
+
+#[test]
+fn the_largest_speed_is_one_at_which_the_phases_of_heads_apart_hold() {
+    let case = Case::new(&[0.0, 0.0], &[0.8, 0.0], 0.2, 1.0);
+    let advice = case.advice();
+    let t_at = |speed_mps: f64| {
+        let passes = Passes::measured(&case.situation.heads, speed_mps);
+        let gap_s = passes.gap_s(passes.heads()).unwrap();
+        spacing::t_max_m(speed_mps * gap_s, speed_mps * advice.ping_period_s, advice.t_y_m)
+    };
+    let v_max = advice.v_max_mps / (1.0 - SPEED_MARGIN);
+    assert!((t_at(v_max) - 1.0).abs() < 1e-6, "{v_max}: {}", t_at(v_max));
+    assert!(t_at(1.02 * v_max) > 1.0);
+    // Evenly spread at every speed, they could go faster.
+    let even = spacing::speed_for_target_mps(1.0, advice.t_y_m, 4.0, advice.ping_period_s).unwrap();
+    assert!(v_max < 0.99 * even, "{v_max} and {even}");
+    // The advice doesn't depend on how fast one goes while it is given; the phase error does.
+    let faster = Case::new(&[0.0, 0.0], &[0.8, 0.0], 0.5, 1.0).advice();
+    assert!((faster.v_max_mps - advice.v_max_mps).abs() < 1e-12);
+    assert!(advice.phase_error_rad.unwrap().abs() < 1e-9 && faster.phase_error_rad.unwrap().abs() > 0.5);
+}
+
+#[test]
+fn on_the_way_back_the_phases_and_the_length_of_the_way_back_count() {
+    let case = Case::new(&[30.0, 250.0], &[0.9, -0.3], -0.2, 1.0);
+    let advice = case.advice();
+    let v = advice.v_max_mps / (1.0 - SPEED_MARGIN);
+    let passes = Passes::measured(&case.situation.heads, -v);
+    let gap_s = passes.gap_s(passes.heads()).unwrap();
+    assert!(spacing::t_max_m(v * gap_s, v * advice.ping_period_s, advice.t_y_m) <= 1.0 + 1e-6);
+    assert!(
+        (advice.left.hours_at(advice.v_max_mps).unwrap() - 100.0 / advice.v_max_mps / 3600.0).abs() < 1e-12
+    );
+}
+
+#[test]
+fn alternatives_give_speed_hours_and_whether_they_suffice() {
+    let mut case = Case::new(&[0.0, 180.0], &[0.0, 0.0], 0.2, 1.0);
+    assert_eq!(case.advice().left.suffices_at(1.0), None);
+    case.left_s = Some(3000.0);
+    let advice = case.advice();
+    let names: Vec<_> = advice.alternatives.iter().flatten().map(|other| other.mode).collect();
+    assert_eq!(names, ["slow", "fast", "fastest"]);
+    let [slow, fast, _] = [0, 1, 2].map(|k| advice.alternatives[k].unwrap());
+    // The present mode, in phase: what is advised anyway.
+    assert!((fast.v_max_mps - advice.v_max_mps).abs() < 1e-9);
+    assert!((slow.v_max_mps - 1.0 / 10.818 * 0.99).abs() < 1e-3);
+    assert!((advice.left.hours_at(fast.v_max_mps).unwrap() - 900.0 / fast.v_max_mps / 3600.0).abs() < 1e-12);
+    // 900 m in 3,000 s take 0.3 m/s.
+    let suffices = |v_mps| advice.left.suffices_at(v_mps).unwrap();
+    assert!(!suffices(0.299) && suffices(0.301) && !suffices(slow.v_max_mps));
+}
+
+#[test]
+fn where_slower_does_not_help_it_says_what_would() {
+    let mut case = Case::new(&[0.0], &[0.0], 0.2, 0.1);
+    let advice = case.advice();
+    assert_eq!((advice.v_max_mps, advice.reason), (0.0, Reason::AngularStep));
+    assert_eq!(advice.remedy, Some(Remedy::Mode("slow")));
+    assert_eq!(advice.left.hours_at(advice.v_max_mps), None);
+    assert!(advice.alternatives[0].unwrap().v_max_mps > 0.0);
+
+    // Near the floor's corner the same mode's steps are too long; in the middle they aren't.
+    case = Case::new(&[0.0], &[0.0], 0.2, 0.25);
+    assert_eq!(case.advice().reason, Reason::HelixPitch);
+    case.situation.pose =
+        case.situation.pose.map(|pose| Pose { position: Point3::new(100.0, 4.0, 1.0), ..pose });
+    let aside = case.advice();
+    assert_eq!((aside.reason, aside.remedy), (Reason::AngularStep, Some(Remedy::Centre)));
+
+    case.situation.pose = None;
+    assert_eq!(case.advice().reason, Reason::NoHeadingOrFix);
+    let blind = Case::new(&[], &[0.0], 0.2, 0.5);
+    assert_eq!(blind.advice().reason, Reason::NoReturns);
+    let mut outside = Case::new(&[0.0], &[0.0], 0.2, 0.5);
+    outside.situation.pose = Some(Pose { position: Point3::new(0.0, 9.0, 0.0), attitude: Rot::identity() });
+    assert_eq!(outside.advice().reason, Reason::NoHeadingOrFix);
+}
+
+#[test]
+fn heads_that_hide_the_wall_from_each_other_slow_the_vehicle_down() {
+    let mut case = Case::new(&[0.0, 90.0, 180.0, 270.0], &[0.0; 4], 0.1, 0.5);
+    let free = case.advice();
+    let places = [[0.5, 0.15, 0.0], [0.5, -0.15, 0.0], [-0.5, 0.15, 0.0], [-0.5, -0.15, 0.0]];
+    for ((spec, motion), place) in case.specs.iter_mut().zip(&mut case.situation.heads).zip(places) {
+        *spec = self::spec(place, 0.04);
+        // Phased for 0.125 m/s, at which 1 m is a whole turn's advance.
+        if let Some(motion) = motion {
+            motion.mount = spec.mount;
+        }
+    }
+    case.situation.speed_mps = 0.125;
+    let hidden = case.advice();
+    assert!((hidden.pass_gap_s - 2.0).abs() < 1e-9, "{hidden:?}");
+    // Both heads on one side look at the other wall past a neighbour: half of the passes are missing there.
+    let t_m = spacing::t_max_m(0.125 * 4.0, 0.125 * 0.02, hidden.t_y_m);
+    assert!((hidden.predicted_t_m.unwrap() - t_m).abs() < 1e-9, "{hidden:?}");
+    assert!(hidden.v_max_mps < 0.6 * free.v_max_mps, "{} and {}", hidden.v_max_mps, free.v_max_mps);
+    assert_eq!(case.advisor().hidden_from().len(), 4);
+}
+
+#[test]
+fn old_rings_are_cast_one_a_call_and_the_same_in_the_end() {
+    let case = Case::new(&[0.0, 120.0, 240.0], &[0.0; 3], 0.1, 0.5);
+    let mut advisor = case.advisor();
+    advisor.advise(&case.situation, None);
+    let pose = case.situation.pose.unwrap();
+    let moved = Pose { position: Point3::new(100.0, 1.0, pose.position.z()), ..pose };
+    let then = Situation { pose: Some(moved), ..case.situation };
+    let steps: Vec<f64> = (0..4).map(|_| advisor.advise(&then, None).t_y_m).collect();
+    let fresh = case.advisor().advise(&then, None).t_y_m;
+    assert!((steps[0] - fresh).abs() < 1e-12 && steps.iter().all(|step| (step - fresh).abs() < 1e-12));
+    assert!(advisor.heads.iter().all(|head| head.is_near(&moved)));
+}

@@ -1,0 +1,101 @@
+//! What sampling theory refuses, each with its reason.
+
+use super::head::MAX_HEADS;
+
+/// Why no number can be given.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SamplingError {
+    /// A quantity that must be above zero isn't.
+    #[error("{what} is {value}; it must be a finite number above zero")]
+    NotPositive {
+        /// The quantity, with its unit.
+        what: &'static str,
+        /// Its value.
+        value: f64,
+    },
+    /// A quantity that must not be below zero is, or is no number.
+    #[error("{what} is {value}; it must be a finite number, zero or above")]
+    Negative {
+        /// The quantity, with its unit.
+        what: &'static str,
+        /// Its value.
+        value: f64,
+    },
+    /// A step that leaves a rest of the turn.
+    #[error("a step of {step_deg} degrees doesn't divide a turn: 360 degrees are {steps} of them")]
+    StepDoesNotDivide {
+        /// The step, degrees.
+        step_deg: f64,
+        /// Steps to a turn.
+        steps: f64,
+    },
+    /// A beam at or beyond 90 degrees from the perpendicular to a flat wall.
+    #[error(
+        "a beam {angle_deg} degrees off the perpendicular never meets the flat wall; it must be below 90"
+    )]
+    BeamMissesWall {
+        /// Angle from the perpendicular, degrees.
+        angle_deg: f64,
+    },
+    /// A beam that runs along the tunnel meets no wall within a kilometre.
+    #[error("the beam at a head angle of {angle_deg} degrees runs along the tunnel and meets no wall")]
+    BeamAlongTunnel {
+        /// Head angle, degrees.
+        angle_deg: f64,
+    },
+    /// A head that would be in the rock.
+    #[error("a head at y = {y_m:.3} m, z = {z_m:.3} m is outside the tunnel's profile")]
+    HeadOutside {
+        /// Left of the axis, m.
+        y_m: f64,
+        /// Above the floor's centre, m.
+        z_m: f64,
+    },
+    /// Sectors for fewer than two heads.
+    #[error("sector offset divides a turn among heads: it needs at least 2, not {heads}")]
+    SectorNeedsHeads {
+        /// Heads there are.
+        heads: usize,
+    },
+    /// No head, or more than the tables hold.
+    #[error("{heads} heads; from 1 to {MAX_HEADS} are possible")]
+    HeadCount {
+        /// Heads there are.
+        heads: usize,
+    },
+    /// Heads apart along the hull can't be phased for a vehicle that stands still.
+    #[error(
+        "heads {apart_m} m apart along the hull have no phase at {speed_mps} m/s; it takes a speed above zero"
+    )]
+    NoPhaseAtRest {
+        /// Distance along the hull, m.
+        apart_m: f64,
+        /// Speed, m/s.
+        speed_mps: f64,
+    },
+    /// The distance between neighbours of one turn is as large as the target.
+    #[error(
+        "a target of {target_m} m is met at no speed: neighbours of one turn are {t_y_m:.3} m apart, whatever the speed"
+    )]
+    AngularStep {
+        /// The target, m.
+        target_m: f64,
+        /// The largest distance between neighbours of one turn, m.
+        t_y_m: f64,
+    },
+}
+
+/// `value` if it is finite and above zero.
+///
+/// Errors: [`SamplingError::NotPositive`].
+pub(crate) fn positive(what: &'static str, value: f64) -> Result<f64, SamplingError> {
+    if value.is_finite() && value > 0.0 { Ok(value) } else { Err(SamplingError::NotPositive { what, value }) }
+}
+
+/// `value` if it is finite and not below zero.
+///
+/// Errors: [`SamplingError::Negative`].
+pub(crate) fn not_negative(what: &'static str, value: f64) -> Result<f64, SamplingError> {
+    if value.is_finite() && value >= 0.0 { Ok(value) } else { Err(SamplingError::Negative { what, value }) }
+}

@@ -1,0 +1,202 @@
+//! The general case: where the beams of a head that stands still meet the wall of any profile, from any place and in
+//! any attitude, by ray casting.
+
+use super::error::{SamplingError, positive};
+use crate::frames::{Mount, Point3, Pose, Rot, Sensor, Tunnel, Vec3, head_direction};
+use crate::math::{self, TAU};
+use crate::tunnel::{Profile, WallHit};
+
+/// A beam that needs more than this to the wall runs along the tunnel, m.
+const ALONG_M: f64 = 1000.0;
+
+/// A head that stands still in a straight tunnel.
+#[derive(Debug, Clone, Copy)]
+pub struct Standing<'a> {
+    profile: &'a Profile,
+    head: Point3<Tunnel>,
+    turn: Rot<Tunnel, Sensor>,
+}
+
+/// Where a beam meets the wall.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sounding {
+    /// Head angle, radians in the sensor's frame.
+    pub angle_rad: f64,
+    /// Way from the head to the wall: chainage gained, left, up, m. Its length is the range.
+    pub beam: Vec3<Tunnel>,
+    /// Arc length of the place on the wall, m.
+    pub sigma_m: f64,
+    /// Cosine of the angle between beam and wall's normal: 1 where the beam meets the wall squarely.
+    pub squareness: f64,
+}
+
+/// The patch of wall that a beam of some width covers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Footprint {
+    /// Its extent in the plane in which the head turns, measured on the unrolled wall, m.
+    pub in_plane_m: f64,
+    /// Its extent across that plane, m.
+    pub across_m: f64,
+}
+
+impl<'a> Standing<'a> {
+    /// A head on a vehicle.
+    ///
+    /// Errors: a head outside the profile.
+    pub fn new(profile: &'a Profile, pose: &Pose, mount: &Mount) -> Result<Self, SamplingError> {
+        let head = pose.place(mount.position);
+        let inside = head.is_finite() && profile.contains([head.y(), head.z()]);
+        inside
+            .then(|| Self { profile, head, turn: pose.attitude * mount.rotation })
+            .ok_or(SamplingError::HeadOutside { y_m: head.y(), z_m: head.z() })
+    }
+
+    /// The profile's perimeter, m.
+    pub fn perimeter_m(&self) -> f64 {
+        self.profile.perimeter_m()
+    }
+
+    /// Where the beam at `angle_rad` (the sensor's frame) meets the wall.
+    ///
+    /// Errors: a beam that meets no wall within a kilometre.
+    pub fn sounding(&self, angle_rad: f64) -> Result<Sounding, SamplingError> {
+        let direction = self.turn * head_direction(angle_rad);
+        let hit = self.hit(direction);
+        let hit = hit.ok_or(SamplingError::BeamAlongTunnel { angle_deg: angle_rad.to_degrees() })?;
+        let squareness = -(direction.y() * hit.normal[0] + direction.z() * hit.normal[1]);
+        Ok(Sounding { angle_rad, beam: direction.scaled(hit.range_m), sigma_m: hit.sigma_m, squareness })
+    }
+
+    /// The patch that a beam of full width `beam_rad` covers about `angle_rad`.
+    ///
+    /// In the plane of turning, from the beam's one edge to the other along the unrolled wall; across it, between the
+    /// edges tilted forwards and back.
+    /// Errors: as for [`Standing::sounding`], of each edge; a width that isn't above zero.
+    /// Source: Jorge et al. 2021, §9.2 and Fig. 15, for any wall.
+    pub fn footprint(&self, angle_rad: f64, beam_rad: f64) -> Result<Footprint, SamplingError> {
+        positive("the beam's width in radians", beam_rad)?;
+        let half = beam_rad / 2.0;
+        let (early, late) = (self.sounding(angle_rad - half)?, self.sounding(angle_rad + half)?);
+        let (sine, cosine) = math::sin_cos(half);
+        let tilted = |sign: f64| {
+            let lean = Vec3::new(sign * sine, 0.0, 0.0) + head_direction(angle_rad).scaled(cosine);
+            let direction = self.turn * lean;
+            let hit = self.hit(direction);
+            let hit = hit.ok_or(SamplingError::BeamAlongTunnel { angle_deg: angle_rad.to_degrees() })?;
+            Ok(direction.scaled(hit.range_m))
+        };
+        let (ahead, behind) = (tilted(1.0)?, tilted(-1.0)?);
+        Ok(Footprint {
+            in_plane_m: early.step_m(&late, self.perimeter_m()),
+            across_m: (ahead + -behind).norm(),
+        })
+    }
+
+    fn hit(&self, direction: Vec3<Tunnel>) -> Option<WallHit> {
+        let hit =
+            self.profile.cast_from_inside([self.head.y(), self.head.z()], [direction.y(), direction.z()])?;
+        (hit.range_m <= ALONG_M).then_some(hit)
+    }
+}
+
+impl Sounding {
+    /// The range, m.
+    pub fn range_m(&self) -> f64 {
+        self.beam.norm()
+    }
+
+    /// Distance to another sounding of the same head on the unrolled wall, m: what holes are measured by.
+    pub fn step_m(&self, other: &Self, perimeter_m: f64) -> f64 {
+        let around_m = math::wrap_signed(other.sigma_m - self.sigma_m, perimeter_m);
+        math::hypot(other.beam.x() - self.beam.x(), around_m)
+    }
+
+    /// Distance to another sounding of the same head straight through the water, m: the paper's T_y.
+    pub fn chord_m(&self, other: &Self) -> f64 {
+        (other.beam + -self.beam).norm()
+    }
+}
+
+/// The soundings of a whole turn at equal angles; room that can be used again.
+#[derive(Debug, Clone, Default)]
+pub struct Ring {
+    soundings: Vec<Sounding>,
+    perimeter_m: f64,
+}
+
+impl Ring {
+    /// A ring of `count` soundings, the first at `start_rad`.
+    ///
+    /// Errors: as for [`Standing::sounding`]; a count of zero.
+    pub fn cast(standing: &Standing<'_>, start_rad: f64, count: u32) -> Result<Self, SamplingError> {
+        let mut ring = Self::default();
+        ring.recast(standing, start_rad, count)?;
+        Ok(ring)
+    }
+
+    /// Casts anew in place; without soundings after an error.
+    ///
+    /// Errors: as for [`Ring::cast`].
+    /// Allocates: not when the ring has had as many soundings before.
+    pub fn recast(
+        &mut self,
+        standing: &Standing<'_>,
+        start_rad: f64,
+        count: u32,
+    ) -> Result<(), SamplingError> {
+        positive("the number of soundings", f64::from(count))?;
+        self.perimeter_m = standing.perimeter_m();
+        self.soundings.clear();
+        for k in 0..count {
+            match standing.sounding(start_rad + TAU * (f64::from(k) / f64::from(count))) {
+                Ok(sounding) => self.soundings.push(sounding),
+                Err(why) => {
+                    self.soundings.clear();
+                    return Err(why);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The soundings, in order of angle.
+    pub fn soundings(&self) -> &[Sounding] {
+        &self.soundings
+    }
+
+    /// Pairs of soundings `stride` apart, the turn closed: what a head lays that pings at every `stride`-th.
+    pub fn pairs(&self, stride: usize) -> impl Iterator<Item = (&Sounding, &Sounding)> {
+        let count = self.soundings.len().max(1);
+        self.soundings.iter().zip(self.soundings.iter().cycle().skip(stride % count))
+    }
+
+    /// T_y2 in general, m: the largest distance on the unrolled wall between soundings `stride` apart, wherever in the
+    /// turn the first ping falls; zero without soundings.
+    ///
+    /// Source: Eq. 6 where the paper's assumptions hold.
+    pub fn largest_step_m(&self, stride: usize) -> f64 {
+        self.pairs(stride).map(|(a, b)| a.step_m(b, self.perimeter_m)).fold(0.0, f64::max)
+    }
+
+    /// Smallest, mean and largest chord between soundings `stride` apart, m; zeros without soundings.
+    pub fn chords_m(&self, stride: usize) -> [f64; 3] {
+        let chords = || self.pairs(stride).map(|(a, b)| a.chord_m(b));
+        let count = self.soundings.len();
+        if count == 0 {
+            return [0.0; 3];
+        }
+        [
+            chords().fold(f64::INFINITY, f64::min),
+            chords().sum::<f64>() / count as f64,
+            chords().fold(0.0, f64::max),
+        ]
+    }
+
+    /// The longest range of the turn, m; zero without soundings.
+    pub fn longest_range_m(&self) -> f64 {
+        self.soundings.iter().map(Sounding::range_m).fold(0.0, f64::max)
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,92 @@
+//! From where a head is to where its program starts.
+
+use headrace_core::sampling::head::HeadProgram;
+
+use crate::codec::{COUNTS_PER_TURN, Command, step_at_most, step_deg};
+use crate::settings::{Settings, usual_pulse_us};
+
+/// Range setting on the way, m: pings at it are the shortest, and no returns of the one configured.
+const RANGE_M: u8 = 1;
+
+/// Where a head is, and which way it would step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Standing {
+    /// Its angle in the sensor's frame, radians.
+    pub angle_rad: f64,
+    /// Whether its next step goes towards growing angles of the sensor's frame.
+    pub growing: bool,
+}
+
+/// The commands that take a head the short way to its program's start and leave it stepping as the program begins.
+///
+/// A head pings with every command; on the way it does so at another range setting than the configured one, so that
+/// nobody takes these returns for samples. A last command that only turns the direction round moves it no further.
+pub fn commands(settings: &Settings, now: Standing, program: &HeadProgram) -> Vec<Command> {
+    let normal = settings.angle_sign > 0.0;
+    let half = COUNTS_PER_TURN / 2;
+    let from = settings.position(now.angle_rad);
+    let way = (settings.position(program.start_rad) - from + half).rem_euclid(COUNTS_PER_TURN) - half;
+    let (mut growing, wanted) = (now.growing == normal, program.growing == normal);
+    let mut commands = Vec::new();
+    let mut command = |step_counts: u8, towards: bool| {
+        let reverse = growing != towards;
+        growing = towards;
+        commands.push(Command {
+            range_m: RANGE_M,
+            pulse_us: usual_pulse_us(RANGE_M),
+            reverse,
+            step_deg: step_deg(step_counts),
+            ..settings.command
+        });
+    };
+    let mut left = way.abs();
+    while left > 0 {
+        let step = step_at_most(left);
+        command(step, way > 0);
+        left -= i32::from(step);
+    }
+    let last = if way == 0 { now.growing == normal } else { way > 0 };
+    if last != wanted {
+        command(0, wanted);
+    }
+    commands
+}
+
+#[cfg(test)]
+mod tests {
+    use headrace_core::math::{self, TAU};
+
+    use super::*;
+    use crate::emulator::Head;
+    use crate::settings::tests::settings;
+
+    /// An emulated head obeys the commands, and then its program's first one.
+    #[test]
+    fn a_head_arrives_and_steps_as_its_program_begins() {
+        for text in ["mode = \"fast\"", "mode = \"slow\"\nangle_sign = \"inverted\"\nangle_offset_deg = 40"] {
+            let settings = settings(text).unwrap();
+            for (from, start) in [(0.3, 5.0), (5.0, 0.3), (1.0, 1.0), (1.0, 1.0052), (0.0, 3.1), (6.2, 0.01)]
+            {
+                for (growing, wanted) in [(true, true), (true, false), (false, true), (false, false)] {
+                    let program = HeadProgram { start_rad: start, growing: wanted, sector: None };
+                    let normal = settings.angle_sign > 0.0;
+                    let mut head = Head::new(settings.position(from), growing == normal);
+                    let commands = commands(&settings, Standing { angle_rad: from, growing }, &program);
+                    assert!(commands.len() <= 80, "{}", commands.len());
+                    for command in &commands {
+                        command.encode().unwrap();
+                        assert_ne!(command.range_m, settings.command.range_m);
+                        head.answer(command, |_| None);
+                    }
+                    let first = head.answer(&settings.command, |_| None).header;
+                    let second = head.answer(&settings.command, |_| None).header;
+                    let (at, then) =
+                        (settings.sensor_rad(first.position), settings.sensor_rad(second.position));
+                    let miss = math::wrap_signed(at - start, TAU);
+                    assert!(miss.abs() <= f64::to_radians(0.151), "{text}: {from} to {start}: {miss}");
+                    assert_eq!(math::wrap_signed(then - at, TAU) > 0.0, wanted, "{text}: {from} to {start}");
+                }
+            }
+        }
+    }
+}
