@@ -329,10 +329,11 @@ impl Element {
     fn along(&self, point: Yz) -> f64 {
         match self.shape {
             Shape::Line => norm(sub(point, self.start)),
-            Shape::Arc { centre, radius_m, from_rad, .. } => {
+            Shape::Arc { centre, radius_m, from_rad, sweep_rad } => {
                 let from_centre = sub(point, centre);
                 let turned = math::wrap(math::atan2(from_centre[1], from_centre[0]) - from_rad, TAU);
-                let turned = if turned >= TAU - 2.0 * ARC_SLACK_RAD { 0.0 } else { turned };
+                // Beyond the end is a hair before the start.
+                let turned = if turned > sweep_rad + ARC_SLACK_RAD { 0.0 } else { turned };
                 radius_m * turned
             }
         }
