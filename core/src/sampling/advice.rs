@@ -8,7 +8,6 @@ use super::ring::{Ring, Standing};
 use super::spacing;
 use super::strips::{Arc, Strips, View};
 use crate::frames::{Point3, Pose, Rot};
-use crate::math::{self, TAU};
 use crate::tunnel::Profile;
 
 /// Share of the speed kept back for the error of its measurement.
@@ -426,10 +425,8 @@ impl AdvisedHead {
     }
 }
 
-/// How many soundings of a ring a step passes over, rounded up.
 fn stride(step_rad: f64) -> usize {
-    let soundings = -math::floor_to_i64(-(step_rad * f64::from(RING) / TAU - 1e-6));
-    usize::try_from(soundings.clamp(1, i64::from(RING))).unwrap_or(1)
+    Ring::stride(step_rad, RING)
 }
 
 /// The largest speed up to `fastest_mps` that `meets` the target.

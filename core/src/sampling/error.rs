@@ -64,6 +64,12 @@ pub enum SamplingError {
         /// Heads there are.
         heads: usize,
     },
+    /// Heads that can't all be set to one mode.
+    #[error("the heads have no mode in common, or none at all")]
+    NoCommonMode,
+    /// A plan without a question.
+    #[error("nothing is asked: give a target, a speed or a time")]
+    NothingAsked,
     /// Heads apart along the hull can't be phased for a vehicle that stands still.
     #[error(
         "heads {apart_m} m apart along the hull have no phase at {speed_mps} m/s; it takes a speed above zero"

@@ -10,6 +10,7 @@ pub mod interference;
 pub mod layout;
 pub mod occlusion;
 pub mod passes;
+pub mod plan;
 pub mod ring;
 pub mod schedule;
 pub mod section;

@@ -159,6 +159,12 @@ impl Ring {
         Ok(())
     }
 
+    /// How many of `count` soundings a step passes over, rounded up; at least one.
+    pub fn stride(step_rad: f64, count: u32) -> usize {
+        let soundings = -math::floor_to_i64(-(step_rad * f64::from(count) / TAU - 1e-6));
+        usize::try_from(soundings.clamp(1, i64::from(count.max(1)))).unwrap_or(1)
+    }
+
     /// The soundings, in order of angle.
     pub fn soundings(&self) -> &[Sounding] {
         &self.soundings

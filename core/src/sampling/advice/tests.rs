@@ -1,5 +1,6 @@
 use super::*;
 use crate::frames::{Mount, Vec3};
+use crate::math::TAU;
 use crate::sampling::head::{Basis, HeadBody, Turn};
 use crate::tunnel::named;
 
