@@ -122,7 +122,7 @@ impl VehicleConfig {
             attachments.borrow_mut().push((name.to_owned(), text.clone()));
             Ok(text)
         };
-        let tunnel = parse_tunnel(tunnel_section, &load)?;
+        let tunnel = TunnelConfig::from_section(tunnel_section, &load)?;
         if tunnel.length_m / section_m > MAX_SECTIONS || wall_cells(&tunnel, target_m) > MAX_CELLS {
             let problem = "is too fine for so long a tunnel; make tunnel.length_m smaller, or this and section_m larger";
             return Err(root.invalid("target_m", problem));
@@ -186,11 +186,16 @@ impl VehicleConfig {
     }
 }
 
-fn parse_tunnel(section: Section<'_>, load: Loader<'_>) -> Result<TunnelConfig, ConfigError> {
-    let (name, profile) = named::parse(&section, load)?;
-    let length_m = section.number("length_m", 0.1..=1.0e5)?.unwrap_or(10_000.0);
-    section.finish()?;
-    Ok(TunnelConfig { name, profile, length_m })
+impl TunnelConfig {
+    /// Reads a tunnel's table, without the keys that concern the site.
+    ///
+    /// Errors: the first key that is missing, unknown or out of range.
+    pub fn from_section(section: Section<'_>, load: Loader<'_>) -> Result<Self, ConfigError> {
+        let (name, profile) = named::parse(&section, load)?;
+        let length_m = section.number("length_m", 0.1..=1.0e5)?.unwrap_or(10_000.0);
+        section.finish()?;
+        Ok(Self { name, profile, length_m })
+    }
 }
 
 fn parse_water(section: Section<'_>, axis_yaw_rad: f64) -> Result<Site, ConfigError> {

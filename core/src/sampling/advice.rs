@@ -186,7 +186,7 @@ pub struct Advisor {
     views: Vec<View>,
     strips: Strips,
     /// The head whose ring is looked at first.
-    turn: usize,
+    next: usize,
 }
 
 impl Advisor {
@@ -226,7 +226,7 @@ impl Advisor {
         let heads: Vec<AdvisedHead> = advised.collect();
         let mut strips = Strips::with_room(heads.iter().map(|head| head.hidden.len()).sum());
         strips.rebuild(profile.perimeter_m(), &views);
-        Self { profile: profile.clone(), task, heads, views, strips, turn: 0 }
+        Self { profile: profile.clone(), task, heads, views, strips, next: 0 }
     }
 
     /// The largest speed at which the predicted T_max stays within the target, by inverting Eq. 16 with what is
@@ -256,7 +256,7 @@ impl Advisor {
         };
         let left = Left { length_m: left_m.clamp(0.0, self.task.length_m), time_s: left_s };
         let in_sectors = situation.heads.iter().flatten().any(|motion| motion.sector_rad.is_some());
-        let alternatives = self.alternatives(in_sectors);
+        let alternatives = self.alternatives(passes.heads(), in_sectors);
         let errors = passes.phase_errors_rad(self.heads.len()).into_iter().flatten();
         Advice {
             v_max_mps: fastest.unwrap_or(0.0) * (1.0 - SPEED_MARGIN),
@@ -284,7 +284,7 @@ impl Advisor {
         let mut may_cast = true;
         let mut seen_anew = false;
         for offset in 0..count {
-            let number = (self.turn + offset) % count;
+            let number = (self.next + offset) % count;
             let present = situation.heads.get(number).is_some_and(Option::is_some);
             let (Some(head), Some(view)) = (self.heads.get_mut(number), self.views.get_mut(number)) else {
                 continue;
@@ -294,7 +294,7 @@ impl Advisor {
                 head.cast(&self.profile, pose)?;
                 head.look(&self.profile, pose, view);
                 seen_anew |= !head.hidden.is_empty();
-                self.turn = (number + 1) % count;
+                self.next = (number + 1) % count;
             }
         }
         if seen_anew {
@@ -327,31 +327,31 @@ impl Advisor {
         Some(largest_speed_mps(bound, meets))
     }
 
-    /// What each mode that all heads have would allow, started in phase.
-    fn alternatives(&self, in_sectors: bool) -> [Option<Alternative>; MAX_MODES] {
+    /// What each mode that all heads have would allow, those that turn now started in phase.
+    fn alternatives(&self, heads: HeadSet, in_sectors: bool) -> [Option<Alternative>; MAX_MODES] {
         let mut alternatives = [None; MAX_MODES];
         let modes = self.heads.first().map_or(&[][..], |head| &head.modes);
         for (slot, mode) in alternatives.iter_mut().zip(modes) {
-            let Some(v_mps) = self.mode_speed_mps(mode.name, in_sectors) else { continue };
+            let Some(v_mps) = self.mode_speed_mps(mode.name, heads, in_sectors) else { continue };
             *slot = Some(Alternative { mode: mode.name, v_max_mps: v_mps * (1.0 - SPEED_MARGIN) });
         }
         alternatives
     }
 
     /// The largest speed in a mode, zero where none is; `None` when a head doesn't have it.
-    fn mode_speed_mps(&self, name: &str, in_sectors: bool) -> Option<f64> {
+    fn mode_speed_mps(&self, name: &str, heads: HeadSet, in_sectors: bool) -> Option<f64> {
         let (mut period_s, mut ping_period_s, mut t_y_m) = (0.0_f64, 0.0_f64, 0.0_f64);
-        for head in &self.heads {
+        for head in heads.iter().filter_map(|number| self.heads.get(number)) {
             let mode = head.modes.iter().find(|mode| mode.name == name)?;
             period_s = period_s.max(mode.turn.period_s());
             ping_period_s = ping_period_s.max(mode.turn.ping_period_s());
             t_y_m = t_y_m.max(head.known_step_m(stride(mode.turn.step_rad()))?);
         }
-        let count = self.heads.len();
         let passes = if in_sectors {
-            Passes::in_sectors(count, period_s, 2.0 * period_s / count.max(1) as f64)
+            // Sectors stay as large as they are, however many heads are left.
+            Passes::in_sectors(heads, period_s, 2.0 * period_s / self.heads.len().max(1) as f64)
         } else {
-            Passes::evenly_phased(count, period_s)
+            Passes::evenly_phased(heads, period_s)
         };
         let speed = self.strips.speed_for_target_mps(&passes.ok()?, self.task.target_m, ping_period_s, t_y_m);
         Some(speed.unwrap_or(0.0))

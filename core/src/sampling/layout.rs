@@ -75,6 +75,14 @@ pub fn start_reversed_rad(
     Ok(math::wrap(TAU - start_rad(phase_rad, rate_radps, x_m, speed_mps)?, TAU))
 }
 
+/// Angles closer together than this are one, radians.
+const ROUNDING_RAD: f64 = 1e-9;
+
+/// Steps that it takes to go so far, the last one being shorter where they don't divide it.
+pub(super) fn steps_over(far_rad: f64, step_rad: f64) -> i64 {
+    -math::floor_to_i64(-(far_rad / step_rad - 1e-6))
+}
+
 /// Where a head is in its back and forth, and which way it goes. Angles in its own frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InSector {
@@ -122,6 +130,10 @@ pub fn in_step(
     let size_rad = TAU / sector.of as f64;
     let sweep_s = turn_s / sector.of as f64;
     let delay_s = if speed_mps > 0.0 { sector.behind_m / speed_mps } else { 0.0 };
+    not_negative(
+        "what is left of the first head's sector in radians",
+        size_rad - lead.angle_rad + ROUNDING_RAD,
+    )?;
     // Back and forth unfolded: 0 to 1 on the way out, 1 to 2 on the way back.
     let share = (lead.angle_rad / size_rad).min(1.0);
     let lead_legs = if lead.growing { share } else { 2.0 - share };
@@ -211,7 +223,8 @@ fn phase_shift(
     behind_m: f64,
     speed_mps: f64,
 ) -> Result<HeadProgram, SamplingError> {
-    let rate_radps = head.step_rad / positive("the ping period in seconds", head.ping_period_s)?;
+    let step_rad = positive("the step in radians", head.step_rad)?;
+    let rate_radps = step_rad / positive("the ping period in seconds", head.ping_period_s)?;
     let behind_m = if speed_mps > 0.0 { behind_m } else { 0.0 };
     let aft = faces_aft(head.mount.rotation);
     let start = if aft { start_reversed_rad } else { start_rad };
@@ -220,14 +233,16 @@ fn phase_shift(
 }
 
 fn sector_offset(head: &HeadSpec, sector: &Sector, speed_mps: f64) -> Result<HeadProgram, SamplingError> {
-    let turn_s = head.ping_period_s * TAU / positive("the step in radians", head.step_rad)?;
     let size_rad = TAU / sector.of as f64;
+    let step_rad = positive("the step in radians", head.step_rad)?;
+    // A sweep takes whole pings: where steps don't divide the sector, as long as for a turn that they do divide.
+    let turn_s = head.ping_period_s * steps_over(size_rad, step_rad) as f64 * sector.of as f64;
     let least_rad = size_rad * sector.number as f64;
     let least_rad = if sector.reversed { math::wrap(TAU - least_rad - size_rad, TAU) } else { least_rad };
     let begin = InSector { angle_rad: 0.0, growing: true };
     let start = in_step(begin, sector, turn_s, speed_mps)?;
     // Either end may have been taken for the other side of a whole turn.
-    let along_rad = math::wrap(start.angle_rad - least_rad + 1e-9, TAU) - 1e-9;
+    let along_rad = math::wrap(start.angle_rad - least_rad + ROUNDING_RAD, TAU) - ROUNDING_RAD;
     Ok(HeadProgram {
         start_rad: least_rad + along_rad,
         growing: start.growing,
@@ -235,8 +250,8 @@ fn sector_offset(head: &HeadSpec, sector: &Sector, speed_mps: f64) -> Result<Hea
     })
 }
 
-/// How distance along the hull, speed and turn must fit for heads at equal angles between them to interleave: then
-/// none of them needs another start than its phase.
+/// How distance along the hull, speed and turn must fit for heads at whole s-ths of a turn from each other to
+/// interleave: the angles at which they disturb each other least.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HullRule {
     /// q: how many s-ths of a turn the vehicle takes to go the distance, nearest to what it is.

@@ -13,6 +13,8 @@ pub struct Passes {
     heads: HeadSet,
     turn_s: f64,
     pattern: Pattern,
+    /// At no speed to speak of, phases along the tunnel mean nothing.
+    at_rest: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,11 +38,12 @@ impl Passes {
         let turning = || motions.iter().flatten();
         let present = motions.iter().enumerate().filter(|(_, motion)| motion.is_some());
         let heads = present.fold(HeadSet::default(), |set, (head, _)| set.with(head));
+        let at_rest = speed_mps.abs() <= AT_REST_MPS;
         let turn_s = turning().map(HeadMotion::turn_period_s).fold(0.0, f64::max);
         let sweep_s =
             |motion: &HeadMotion| motion.sector_rad.map(|size| 2.0 * size / motion.rate_radps.abs());
         if let Some(longest) = turning().filter_map(sweep_s).max_by(f64::total_cmp) {
-            return Self { heads, turn_s, pattern: Pattern::Sectors(longest) };
+            return Self { heads, turn_s, pattern: Pattern::Sectors(longest), at_rest };
         }
         // Seen in a mirror, heads that all turn the other way turn this way.
         let mirror = if turning().all(|motion| body_rate(motion) < 0.0) { -1.0 } else { 1.0 };
@@ -49,42 +52,41 @@ impl Passes {
             let Some(motion) = motion else { continue };
             let rate = mirror * body_rate(motion);
             if rate <= 0.0 || turn_s <= 0.0 {
-                return Self { heads, turn_s, pattern: Pattern::Opposed };
+                return Self { heads, turn_s, pattern: Pattern::Opposed, at_rest };
             }
             let angle = mirror * body_sign(motion) * motion.angle_rad;
             let until_zero_s = math::wrap(-angle, TAU) / rate;
             let ahead_m = motion.mount.position.x();
-            let ahead_s = if speed_mps.abs() > AT_REST_MPS { ahead_m / speed_mps } else { 0.0 };
+            let ahead_s = if at_rest { 0.0 } else { ahead_m / speed_mps };
             *phase = math::wrap((until_zero_s + ahead_s) / turn_s, 1.0);
         }
-        Self { heads, turn_s, pattern: Pattern::Turning(phases) }
+        Self { heads, turn_s, pattern: Pattern::Turning(phases), at_rest }
     }
 
-    /// Heads that turn on, evenly spread in the order of their numbers: what a schedule for this speed gives.
+    /// These heads turning on, evenly spread in the order of their numbers: what a schedule for this speed gives.
     ///
     /// `turn_s` is the time of a turn.
-    /// Errors: no head or more than [`MAX_HEADS`].
-    pub fn evenly_phased(heads: usize, turn_s: f64) -> Result<Self, SamplingError> {
-        if !(1..=MAX_HEADS).contains(&heads) {
-            return Err(SamplingError::HeadCount { heads });
+    /// Errors: no head.
+    pub fn evenly_phased(heads: HeadSet, turn_s: f64) -> Result<Self, SamplingError> {
+        if heads.is_empty() {
+            return Err(SamplingError::HeadCount { heads: 0 });
         }
         let mut phases = [0.0; MAX_HEADS];
-        for (head, phase) in phases.iter_mut().enumerate() {
-            *phase = math::wrap(scheduled_phase(head, heads), 1.0);
+        for (rank, head) in heads.iter().enumerate() {
+            if let Some(phase) = phases.get_mut(head) {
+                *phase = math::wrap(scheduled_phase(rank, heads.len()), 1.0);
+            }
         }
-        Ok(Self { heads: HeadSet::first(heads), turn_s, pattern: Pattern::Turning(phases) })
+        Ok(Self { heads, turn_s, pattern: Pattern::Turning(phases), at_rest: false })
     }
 
     /// Heads in sectors whose sweep there and back takes `sweep_s`.
     ///
-    /// Errors: fewer heads than two, or more than [`MAX_HEADS`].
-    pub fn in_sectors(heads: usize, turn_s: f64, sweep_s: f64) -> Result<Self, SamplingError> {
-        match heads {
-            0 | 1 => Err(SamplingError::SectorNeedsHeads { heads }),
-            2..=MAX_HEADS => {
-                Ok(Self { heads: HeadSet::first(heads), turn_s, pattern: Pattern::Sectors(sweep_s) })
-            }
-            _ => Err(SamplingError::HeadCount { heads }),
+    /// Errors: fewer heads than two.
+    pub fn in_sectors(heads: HeadSet, turn_s: f64, sweep_s: f64) -> Result<Self, SamplingError> {
+        match heads.len() {
+            count @ (0 | 1) => Err(SamplingError::SectorNeedsHeads { heads: count }),
+            _ => Ok(Self { heads, turn_s, pattern: Pattern::Sectors(sweep_s), at_rest: false }),
         }
     }
 
@@ -123,11 +125,14 @@ impl Passes {
     /// By how much each head is out of its phase against the first that turns, radians of its turn, in [-pi, pi).
     ///
     /// Positive: it passes a place later, farther ahead, than the schedule for `scheduled` heads has it. `None` for a
-    /// head that isn't there, and for heads that don't all turn on.
+    /// head that isn't there, for heads that don't all turn on, and at rest.
     /// Source: Jorge et al. 2021, §5.1 (phi(k) = 2 pi k / s).
     pub fn phase_errors_rad(&self, scheduled: usize) -> [Option<f64>; MAX_HEADS] {
         let mut errors = [None; MAX_HEADS];
         let Pattern::Turning(phases) = &self.pattern else { return errors };
+        if self.at_rest {
+            return errors;
+        }
         let late = |head: usize| phases.get(head).map(|phase| phase - scheduled_phase(head, scheduled));
         let Some(first) = self.heads.iter().next().and_then(late) else { return errors };
         for (head, error) in errors.iter_mut().enumerate().filter(|(head, _)| self.heads.has(*head)) {
@@ -192,13 +197,13 @@ mod tests {
         assert!((all(&passes) - 2.0).abs() < 1e-9 && (passes.even_gap_s() - 2.0).abs() < 1e-12);
         let errors = passes.phase_errors_rad(4);
         assert!(errors[..4].iter().all(|error| error.unwrap().abs() < 1e-9) && errors[4].is_none());
-        let planned = Passes::evenly_phased(4, 8.0).unwrap();
+        let planned = Passes::evenly_phased(HeadSet::first(4), 8.0).unwrap();
         assert!((all(&planned) - 2.0).abs() < 1e-12);
     }
 
     #[test]
     fn where_heads_do_not_see_a_place_the_others_leave_longer_gaps() {
-        let passes = Passes::evenly_phased(4, 8.0).unwrap();
+        let passes = Passes::evenly_phased(HeadSet::first(4), 8.0).unwrap();
         let gap_s =
             |hidden: [usize; 2]| passes.gap_s(passes.heads().without(hidden[0]).without(hidden[1])).unwrap();
         // Half a turn apart: doubled. A quarter apart: two passes in a row are missing.
@@ -243,10 +248,13 @@ mod tests {
     }
 
     #[test]
-    fn how_many_heads_there_may_be() {
-        assert_eq!(Passes::evenly_phased(0, 8.0), Err(SamplingError::HeadCount { heads: 0 }));
-        assert_eq!(Passes::evenly_phased(9, 8.0), Err(SamplingError::HeadCount { heads: 9 }));
-        assert_eq!(Passes::in_sectors(1, 8.0, 16.0), Err(SamplingError::SectorNeedsHeads { heads: 1 }));
-        assert!((all(&Passes::in_sectors(2, 8.0, 8.0).unwrap()) - 8.0).abs() < 1e-12);
+    fn heads_that_are_left_share_the_turn_evenly() {
+        let three = Passes::evenly_phased(HeadSet::first(4).without(1), 9.0).unwrap();
+        assert!((all(&three) - 3.0).abs() < 1e-12);
+        let none = HeadSet::default();
+        assert_eq!(Passes::evenly_phased(none, 8.0), Err(SamplingError::HeadCount { heads: 0 }));
+        let one = HeadSet::first(1);
+        assert_eq!(Passes::in_sectors(one, 8.0, 16.0), Err(SamplingError::SectorNeedsHeads { heads: 1 }));
+        assert!((all(&Passes::in_sectors(HeadSet::first(2), 8.0, 8.0).unwrap()) - 8.0).abs() < 1e-12);
     }
 }

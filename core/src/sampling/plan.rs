@@ -1,10 +1,11 @@
 //! The day before: what heads, modes, layout and speed give in a tunnel, before there is anything to measure.
 
 mod answer;
+mod briefing;
 mod wall;
 
 use super::error::{SamplingError, not_negative, positive};
-use super::head::{HeadMode, HeadSpec};
+use super::head::{HeadMode, HeadSet, HeadSpec};
 use super::layout::{self, HeadLayout};
 use super::occlusion::{self, AngleRange, Obstacle};
 use super::passes::Passes;
@@ -15,6 +16,7 @@ use crate::frames::{Point3, Pose, Rot};
 use crate::tunnel::{Profile, Yz};
 
 pub use answer::{Answer, Question, Spacing};
+pub use briefing::{Briefing, Heard, Hidden, HullAdvice, Start, ThinStrip};
 pub use wall::{PatternSample, WallPlace};
 
 /// Soundings of a ring: 0.1 degrees apart, so that a step is looked at from many starts.
@@ -321,7 +323,7 @@ fn planned_mode(
     let longest = |of: fn(&HeadMode) -> f64| of_heads.iter().map(of).fold(0.0, f64::max);
     let (turn_s, ping_period_s) =
         (longest(|mode| mode.turn.period_s()), longest(|mode| mode.turn.ping_period_s()));
-    let heads = of_heads.len();
+    let heads = HeadSet::first(of_heads.len());
     let passes = match inspection.layout {
         HeadLayout::PhaseShift => Passes::evenly_phased(heads, turn_s)?,
         HeadLayout::SectorOffset => {
@@ -336,7 +338,7 @@ fn planned_mode(
                 })
                 .collect();
             let sweep_s = Schedule::new(&specs, inspection.layout, 0.0)?.sweep_s();
-            Passes::in_sectors(heads, turn_s, sweep_s.unwrap_or(2.0 * turn_s / heads as f64))?
+            Passes::in_sectors(heads, turn_s, sweep_s.unwrap_or(2.0 * turn_s / of_heads.len() as f64))?
         }
     };
     Ok(PlannedMode { mode, chords_m, t_y2_m, passes, ping_period_s })

@@ -105,7 +105,8 @@ impl Sounding {
         self.beam.norm()
     }
 
-    /// Distance to another sounding of the same head on the unrolled wall, m: what holes are measured by.
+    /// Distance to another sounding of the same head on the unrolled wall, the short way round, m: what holes are
+    /// measured by.
     pub fn step_m(&self, other: &Self, perimeter_m: f64) -> f64 {
         let around_m = math::wrap_signed(other.sigma_m - self.sigma_m, perimeter_m);
         math::hypot(other.beam.x() - self.beam.x(), around_m)
@@ -121,6 +122,9 @@ impl Sounding {
 #[derive(Debug, Clone, Default)]
 pub struct Ring {
     soundings: Vec<Sounding>,
+    /// Way along the perimeter from the first sounding to each, m, and at last all the way round; negative where the
+    /// head turns against arc length.
+    way_m: Vec<f64>,
     perimeter_m: f64,
 }
 
@@ -147,6 +151,7 @@ impl Ring {
         positive("the number of soundings", f64::from(count))?;
         self.perimeter_m = standing.perimeter_m();
         self.soundings.clear();
+        self.way_m.clear();
         for k in 0..count {
             match standing.sounding(start_rad + TAU * (f64::from(k) / f64::from(count))) {
                 Ok(sounding) => self.soundings.push(sounding),
@@ -156,6 +161,12 @@ impl Ring {
                 }
             }
         }
+        let mut way_m = 0.0;
+        for (a, b) in self.soundings.iter().zip(self.soundings.iter().cycle().skip(1)) {
+            self.way_m.push(way_m);
+            way_m += math::wrap_signed(b.sigma_m - a.sigma_m, self.perimeter_m);
+        }
+        self.way_m.push(way_m);
         Ok(())
     }
 
@@ -181,7 +192,22 @@ impl Ring {
     ///
     /// Source: Eq. 6 where the paper's assumptions hold.
     pub fn largest_step_m(&self, stride: usize) -> f64 {
-        self.pairs(stride).map(|(a, b)| a.step_m(b, self.perimeter_m)).fold(0.0, f64::max)
+        self.steps_m(stride).fold(0.0, f64::max)
+    }
+
+    /// Distances on the unrolled wall from each sounding to the one `stride` further, m, the way that the head turns:
+    /// a head that pings once a turn has the whole perimeter between its pings.
+    pub fn steps_m(&self, stride: usize) -> impl Iterator<Item = f64> {
+        let count = self.soundings.len().max(1);
+        let whole_m = self.way_m.last().copied().unwrap_or(0.0);
+        let way_m =
+            move |k: usize| self.way_m.get(k % count).copied().unwrap_or(0.0) + whole_m * (k / count) as f64;
+        self.pairs(stride).enumerate().map(move |(k, (a, b))| {
+            // The soundings' own difference keeps its digits; the way says how often it goes round.
+            let short_m = math::wrap_signed(b.sigma_m - a.sigma_m, self.perimeter_m);
+            let rounds = math::round_to_i64((way_m(k + stride) - way_m(k) - short_m) / self.perimeter_m);
+            math::hypot(b.beam.x() - a.beam.x(), short_m + rounds as f64 * self.perimeter_m)
+        })
     }
 
     /// Smallest, mean and largest chord between soundings `stride` apart, m; zeros without soundings.

@@ -2,7 +2,7 @@
 
 use super::error::SamplingError;
 use super::head::{HeadProgram, HeadSpec};
-use super::layout::{self, HeadLayout};
+use super::layout::{self, HeadLayout, steps_over};
 use crate::math;
 use crate::time::DurNs;
 
@@ -50,11 +50,6 @@ impl Schedule {
         };
         self.heads.iter().filter_map(sweep).max_by(f64::total_cmp)
     }
-}
-
-/// Steps that it takes to go so far, the last one being shorter where they don't divide it.
-fn steps_over(far_rad: f64, step_rad: f64) -> i64 {
-    -math::floor_to_i64(-(far_rad / step_rad - 1e-6))
 }
 
 fn back_and_forth(

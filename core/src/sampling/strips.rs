@@ -220,7 +220,7 @@ mod tests {
     fn where_all_see_all_there_is_one_strip() {
         let one = strips(&[all_around(&[]), all_around(&[])]);
         assert_eq!(one.as_slice(), [Strip { arc: arc(0.0, 30.0), seen_by: HeadSet::first(2) }]);
-        let passes = Passes::evenly_phased(2, 8.0).unwrap();
+        let passes = Passes::evenly_phased(HeadSet::first(2), 8.0).unwrap();
         let v = one.speed_for_target_mps(&passes, 0.5, 0.02, 0.2).unwrap();
         assert!((v - spacing::speed_for_target_mps(0.5, 0.2, 4.0, 0.02).unwrap()).abs() < 1e-15);
         assert!((one.t_max_m(&passes, v, 0.02, 0.2) - 0.5).abs() < 1e-12);
@@ -238,7 +238,7 @@ mod tests {
     fn fewer_passes_on_a_hidden_strip_slow_the_vehicle_down() {
         let views =
             [all_around(&[arc(7.0, 1.7)]), all_around(&[]), all_around(&[arc(7.0, 1.7)]), all_around(&[])];
-        let passes = Passes::evenly_phased(4, 8.0).unwrap();
+        let passes = Passes::evenly_phased(HeadSet::first(4), 8.0).unwrap();
         let hidden = strips(&views);
         let v = hidden.speed_for_target_mps(&passes, 0.5, 0.02, 0.16).unwrap();
         assert!((v - spacing::speed_for_target_mps(0.5, 0.16, 4.0, 0.02).unwrap()).abs() < 1e-15);
@@ -248,7 +248,7 @@ mod tests {
     #[test]
     fn a_narrow_hidden_strip_counts_as_a_long_step_if_that_is_better() {
         let views = [all_around(&[arc(7.0, 0.1)]), all_around(&[])];
-        let passes = Passes::evenly_phased(2, 8.0).unwrap();
+        let passes = Passes::evenly_phased(HeadSet::first(2), 8.0).unwrap();
         let v = strips(&views).speed_for_target_mps(&passes, 0.5, 0.02, 0.16).unwrap();
         assert!((v - spacing::speed_for_target_mps(0.5, 0.26, 4.0, 0.02).unwrap()).abs() < 1e-15);
     }
@@ -256,7 +256,7 @@ mod tests {
     #[test]
     fn a_strip_that_no_head_sees_can_make_every_speed_too_high() {
         let views = [all_around(&[arc(7.0, 0.7)]), all_around(&[arc(7.0, 0.7)])];
-        let passes = Passes::evenly_phased(2, 8.0).unwrap();
+        let passes = Passes::evenly_phased(HeadSet::first(2), 8.0).unwrap();
         let why = strips(&views).speed_for_target_mps(&passes, 0.5, 0.02, 0.16).unwrap_err();
         assert!(
             matches!(why, SamplingError::AngularStep { t_y_m, .. } if (t_y_m - 0.86).abs() < 1e-9),
@@ -264,7 +264,7 @@ mod tests {
         );
         assert!(strips(&views).speed_for_target_mps(&passes, 1.0, 0.02, 0.16).is_ok());
         let blind = [all_around(&[arc(0.0, 30.0)])];
-        let one = Passes::evenly_phased(1, 8.0).unwrap();
+        let one = Passes::evenly_phased(HeadSet::first(1), 8.0).unwrap();
         assert!(strips(&blind).speed_for_target_mps(&one, 0.5, 0.02, 0.16).is_err());
         assert!(strips(&blind).t_max_m(&one, 0.1, 0.02, 0.16).is_infinite());
     }
@@ -275,7 +275,7 @@ mod tests {
             View { sector: Some(arc(0.2, 14.8)), hidden: Vec::new() },
             View { sector: Some(arc(15.0, 14.9)), hidden: Vec::new() },
         ];
-        let passes = Passes::in_sectors(2, 8.0, 8.0).unwrap();
+        let passes = Passes::in_sectors(HeadSet::first(2), 8.0, 8.0).unwrap();
         let some = strips(&views);
         let unseen: Vec<&Strip> = some.as_slice().iter().filter(|strip| strip.seen_by.is_empty()).collect();
         assert!(unseen.len() == 1 && (unseen[0].arc.length_m - 0.3).abs() < 1e-9);

@@ -149,7 +149,8 @@ impl Around {
         let ring = Ring::cast(&standing, 0.0, super::RING)?;
         let hidden = planner.hidden().get(number).map_or(&[][..], Vec::as_slice);
         let places = self.t_y_m.len();
-        for (sounding, next) in ring.pairs(super::stride_of(spec.step_rad)) {
+        let stride = super::stride_of(spec.step_rad);
+        for ((sounding, next), step_m) in ring.pairs(stride).zip(ring.steps_m(stride)) {
             if hidden.iter().any(|range| range.has(sounding.angle_rad)) {
                 continue;
             }
@@ -159,7 +160,6 @@ impl Around {
             if share.is_some_and(|share| share > 1.0) {
                 continue;
             }
-            let step_m = sounding.step_m(next, self.perimeter_m);
             let way_m = math::wrap_signed(next.sigma_m - sounding.sigma_m, self.perimeter_m);
             let from_m = if way_m < 0.0 { next.sigma_m } else { sounding.sigma_m };
             let place_m = self.perimeter_m / places as f64;

@@ -127,6 +127,25 @@ fn a_ring_read_at_a_stride_is_that_of_a_coarser_head_from_every_start() {
     );
 }
 
+#[test]
+fn few_pings_a_turn_leave_most_of_the_wall_between_them() {
+    let profile = named::rectangle(20.0, 2.0).unwrap();
+    let ring = Ring::cast(&standing(&profile), 0.0, 1200).unwrap();
+    let perimeter_m = profile.perimeter_m();
+    assert!((ring.largest_step_m(1200) - perimeter_m).abs() < 1e-9);
+    // Two a turn: whichever way one looks, one side is at least half of it.
+    assert!(ring.largest_step_m(600) >= perimeter_m / 2.0 - 1e-9);
+    // Seen from close to the left wall, a third of a turn spans more than half of the perimeter.
+    let near = Standing::new(&profile, &pose(&profile, 9.9, 0.0, 0.0), &mount()).unwrap();
+    let ring = Ring::cast(&near, 0.0, 1200).unwrap();
+    assert!(ring.largest_step_m(400) > 0.8 * perimeter_m, "{}", ring.largest_step_m(400));
+    // All steps of a turn together go once round.
+    for stride in [1, 8, 400] {
+        let around: f64 = ring.steps_m(stride).step_by(stride).sum();
+        assert!((around - perimeter_m).abs() < 1e-9);
+    }
+}
+
 proptest! {
     /// Eq. 10: wherever the head is and whatever the profile, the mean chord of a turn is at most perimeter by pings.
     #[test]
