@@ -37,6 +37,7 @@ const KINDS: [&dyn DeviceKind; 5] = [
 ];
 const SCENE: &str =
     "vehicle = \"vita2-4.toml\"\n[trajectory]\n[[trajectory.legs]]\ndistance_m = 120\nspeed_mps = 0.197\n";
+const SPEED_MPS: f64 = 0.197;
 const TICK: DurNs = DurNs(20_000_000);
 const ROUNDS: usize = 5;
 
@@ -87,7 +88,12 @@ impl Decoder for Nothing {
 
 fn scene() -> Scene {
     let vehicles = Path::new(env!("CARGO_MANIFEST_DIR")).join("deploy/vehicles");
-    let load = |name: &str| std::fs::read_to_string(vehicles.join(name)).map_err(|error| error.to_string());
+    // Heads in phase for the speed of the dive, as they would be.
+    let phased =
+        |text: String| text.replace("planned_speed_mps = 0.11", &format!("planned_speed_mps = {SPEED_MPS}"));
+    let load = |name: &str| {
+        std::fs::read_to_string(vehicles.join(name)).map(phased).map_err(|error| error.to_string())
+    };
     Scene::parse(Document::new("scene", SCENE), &KINDS, &load).unwrap()
 }
 
@@ -212,7 +218,7 @@ fn idle_tick() {
 /// Samples of ideal heads together at the circle's centre, in the order in which they fall.
 fn helix(steps: u32, turn_s: f64, heads: u32, length_m: f64) -> Vec<(f64, f64, usize)> {
     let profile = named::ceran().unwrap();
-    let per_ping_m = 0.197 * turn_s / f64::from(steps);
+    let per_ping_m = SPEED_MPS * turn_s / f64::from(steps);
     let pings = math::floor_to_i64(length_m / per_ping_m);
     let mut samples = Vec::new();
     for ping in 0..pings {

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
+use headrace_core::sampling::layout::HeadLayout;
 
 /// On-board coverage monitor for sonar inspection of flooded hydroelectric tunnels.
 #[derive(Debug, Parser)]
@@ -30,9 +31,18 @@ pub(crate) enum Command {
     /// Turn a scene into a log of the bytes that its devices would send.
     #[command(after_help = "Example:\n  headrace simulate deploy/scenes/demo.toml -o dive.mcap")]
     Simulate(Simulate),
+    /// Plan an inspection: spacing, speed and hours for a tunnel, modes, heads, layout and target.
+    ///
+    /// A target asks how fast one may go; a speed or the hours ask which target they allow. Exit code 1 when no mode
+    /// gives what is asked.
+    #[command(after_help = PLAN_EXAMPLES)]
+    Plan(Plan),
     /// Say what is wrong with a vehicle file, or what it describes.
     #[command(after_help = "Example:\n  headrace check deploy/vehicles/vita2-4.toml")]
     Check(Check),
+    /// The numbers of the paper that the theory is from, ours beside them, and where the fault is the paper's.
+    #[command(after_help = "Example:\n  headrace paper --tables")]
+    Paper(Paper),
 }
 
 #[derive(Debug, Args)]
@@ -94,11 +104,81 @@ pub(crate) struct Simulate {
     pub(crate) json: bool,
 }
 
+const PLAN_EXAMPLES: &str = "Example:
+  headrace plan --vehicle deploy/vehicles/vita2-4.toml --target 0.5
+  headrace plan --tunnel ceran --heads 2 --target 0.6 --drift 1.5 --yaw 15 --svg pictures
+  headrace plan --tunnel trimmed_circle,radius_m=4,base_m=5 --length 3200 --mode fast --hours 8";
+
+#[derive(Debug, Args)]
+pub(crate) struct Plan {
+    /// Vehicle file: its heads, layout, tunnel and target; options outweigh it.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) vehicle: Option<PathBuf>,
+    /// Tunnel by name, with its dimensions as in a vehicle file (circle,radius_m=3), or the file of a polyline (.csv).
+    #[arg(long, value_name = "TUNNEL")]
+    pub(crate) tunnel: Option<String>,
+    /// Length to inspect, metres.
+    #[arg(long, value_name = "METRES", value_parser = length)]
+    pub(crate) length: Option<f64>,
+    /// Where the vehicle goes in the cross-section: left of the axis and above the floor, metres.
+    #[arg(long, value_name = "Y,Z", value_parser = place, allow_hyphen_values = true)]
+    pub(crate) at: Option<[f64; 2]>,
+    /// Mode of the heads, or all.
+    #[arg(long, value_name = "MODE", default_value = "all")]
+    pub(crate) mode: String,
+    /// How many ideal heads, all in one place, where no vehicle file is given.
+    #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u32).range(1..=8), conflicts_with = "vehicle")]
+    pub(crate) heads: u32,
+    /// How the heads share the work: phase_shift or sector_offset.
+    #[arg(long, value_name = "LAYOUT", value_parser = layout)]
+    pub(crate) layout: Option<HeadLayout>,
+    /// Range setting of the heads, metres; 10 where no vehicle file is given.
+    #[arg(long, value_name = "METRES", value_parser = length)]
+    pub(crate) range: Option<f64>,
+    /// Target T, metres.
+    #[arg(long, value_name = "METRES", value_parser = target)]
+    pub(crate) target: Option<f64>,
+    /// Speed along the tunnel, m/s.
+    #[arg(long, value_name = "MPS", value_parser = metres_a_second, conflicts_with = "hours")]
+    pub(crate) speed: Option<f64>,
+    /// Hours for the whole length, one way.
+    #[arg(long, value_name = "HOURS", value_parser = hours)]
+    pub(crate) hours: Option<f64>,
+    /// How far the pilot may drift up, down and sideways, metres.
+    #[arg(long, value_name = "METRES", default_value = "0", value_parser = drift)]
+    pub(crate) drift: f64,
+    /// How far from the tunnel's axis the vehicle may head, steadily, degrees.
+    #[arg(long, value_name = "DEGREES", default_value = "0", value_parser = yaw)]
+    pub(crate) yaw: f64,
+    /// How fast the vehicle may turn about, degrees a second: beams swing along the wall.
+    #[arg(long, value_name = "DEGREES", default_value = "0", value_parser = yaw)]
+    pub(crate) yaw_rate: f64,
+    /// Print JSON.
+    #[arg(long, conflicts_with = "csv")]
+    pub(crate) json: bool,
+    /// Print the modes as CSV.
+    #[arg(long)]
+    pub(crate) csv: bool,
+    /// Folder to draw pictures into: perimeter, pattern, speeds and hours (docs/plan says how to read them).
+    #[arg(long, value_name = "DIR")]
+    pub(crate) svg: Option<PathBuf>,
+}
+
 #[derive(Debug, Args)]
 pub(crate) struct Check {
     /// Vehicle file.
     pub(crate) vehicle: PathBuf,
     /// Print it as JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Paper {
+    /// Tables 1 to 5, computed anew.
+    #[arg(long)]
+    pub(crate) tables: bool,
+    /// Print them as JSON.
     #[arg(long)]
     pub(crate) json: bool,
 }
@@ -131,6 +211,43 @@ fn speed(text: &str) -> Result<Speed, String> {
 }
 
 fn target(text: &str) -> Result<f64, String> {
-    let number = text.parse::<f64>().ok().filter(|metres| (0.01..=20.0).contains(metres));
-    number.ok_or_else(|| "wanted is a number of metres from 0.01 to 20".to_owned())
+    within(text, "metres", 0.01, 20.0)
+}
+
+fn length(text: &str) -> Result<f64, String> {
+    within(text, "metres", 0.1, 1.0e5)
+}
+
+fn metres_a_second(text: &str) -> Result<f64, String> {
+    within(text, "metres a second", 0.001, 5.0)
+}
+
+fn hours(text: &str) -> Result<f64, String> {
+    within(text, "hours", 0.01, 10_000.0)
+}
+
+fn drift(text: &str) -> Result<f64, String> {
+    within(text, "metres", 0.0, 100.0)
+}
+
+fn yaw(text: &str) -> Result<f64, String> {
+    within(text, "degrees", 0.0, 80.0)
+}
+
+fn within(text: &str, unit: &str, least: f64, most: f64) -> Result<f64, String> {
+    let number = text.parse::<f64>().ok().filter(|number| (least..=most).contains(number));
+    number.ok_or_else(|| format!("wanted is a number of {unit} from {least} to {most}"))
+}
+
+fn place(text: &str) -> Result<[f64; 2], String> {
+    let number = |text: &str| within(text.trim(), "metres", -200.0, 200.0);
+    match text.split_once(',') {
+        Some((y, z)) => Ok([number(y)?, number(z)?]),
+        None => Err("wanted are two numbers of metres, y,z".to_owned()),
+    }
+}
+
+fn layout(text: &str) -> Result<HeadLayout, String> {
+    let known = HeadLayout::NAMES.iter().find(|(name, _)| *name == text);
+    known.map(|(_, layout)| *layout).ok_or_else(|| "wanted is phase_shift or sector_offset".to_owned())
 }

@@ -154,7 +154,8 @@ pub(crate) fn check(args: &Check) -> Result<u8, Failure> {
     Ok(failure::OK)
 }
 
-fn vehicle_file(path: &Path) -> Result<(String, VehicleConfig), Failure> {
+/// Reads and checks a vehicle file; gives its text too.
+pub(crate) fn vehicle_file(path: &Path) -> Result<(String, VehicleConfig), Failure> {
     let text = files::read(path)?;
     let vehicle = parse_vehicle(&path.display().to_string(), &text, &files::beside(path))?;
     Ok((text, vehicle))

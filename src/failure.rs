@@ -4,9 +4,12 @@ use std::path::PathBuf;
 
 use headrace_core::app::plugin::PluginError;
 use headrace_core::config::ConfigError;
+use headrace_core::sampling::SamplingError;
 use headrace_replay::drive::DriveError;
 use headrace_replay::log::LogError;
 use headrace_replay::simulate::SceneError;
+
+use crate::plan::PictureError;
 
 /// Exit code of a command that did all it was asked, on all the data.
 pub(crate) const OK: u8 = 0;
@@ -36,6 +39,10 @@ pub(crate) enum Failure {
     Drive(#[from] DriveError),
     #[error("making JSON of the report: {0}")]
     Json(#[from] serde_json::Error),
+    #[error("planning: {0}")]
+    Plan(#[from] SamplingError),
+    #[error(transparent)]
+    Picture(#[from] PictureError),
     #[error("{0}")]
     Usage(String),
 }
@@ -44,7 +51,7 @@ impl Failure {
     /// The exit code that goes with it.
     pub(crate) fn exit_code(&self) -> u8 {
         match self {
-            Self::Config(_) | Self::Scene(_) | Self::Usage(_) | Self::Read { .. } => USAGE,
+            Self::Config(_) | Self::Scene(_) | Self::Usage(_) | Self::Plan(_) | Self::Read { .. } => USAGE,
             _ => FAILED,
         }
     }

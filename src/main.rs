@@ -8,6 +8,8 @@ mod expect;
 mod failure;
 mod files;
 mod output;
+mod paper;
+mod plan;
 mod progress;
 mod station;
 mod summary;
@@ -26,7 +28,9 @@ fn main() -> ExitCode {
         Command::Run(run) => commands::run(&run),
         Command::Replay(replay) => commands::replay(&replay),
         Command::Simulate(simulate) => commands::simulate(&simulate),
+        Command::Plan(args) => plan::plan(&args),
         Command::Check(check) => commands::check(&check),
+        Command::Paper(args) => paper::paper(&args),
     };
     match result {
         Ok(code) => ExitCode::from(code),

@@ -3,11 +3,13 @@
 
 use std::io::IsTerminal;
 
+use headrace_core::app::Mission;
 use headrace_core::app::flow::{AdviceEntry, Coverage, Notice};
 use headrace_core::app::run::Loop;
 use headrace_core::coverage::{Cause, Evidence, Judgement, Sections, Verdict};
 use headrace_core::sampling::advice::{Reason, Remedy};
 use headrace_core::time::{DurNs, MonoNs};
+use headrace_core::tunnel::Profile;
 
 use crate::output::{put, say};
 use crate::station::station;
@@ -81,7 +83,7 @@ impl Watch {
             return;
         }
         match notice {
-            Notice::Advice(entry) => self.status(entry, dive.mission().target_m),
+            Notice::Advice(entry) => self.status(entry, dive.mission()),
             Notice::Section { section, change, .. } => self.section(*section, *change, dive),
         }
     }
@@ -92,7 +94,7 @@ impl Watch {
         self.close_status();
     }
 
-    fn status(&mut self, entry: &AdviceEntry, target_m: f64) {
+    fn status(&mut self, entry: &AdviceEntry, mission: &Mission) {
         self.v_max_mps = entry.advice.v_max_mps;
         let every = if self.terminal { REFRESH_EVERY } else { LINE_EVERY };
         if self.shown.is_some_and(|shown| entry.at.since(shown).0 < every.0) {
@@ -101,13 +103,18 @@ impl Watch {
         self.shown = Some(entry.at);
         let place =
             entry.chainage_m.map_or_else(|| "no position".to_owned(), |x| format!("ch {}", station(x)));
-        let line = format!("{place:<14} {:5.2} m/s   {}", entry.speed_mps, advice_words(entry, target_m));
+        let line = format!(
+            "{place:<14} {:5.2} m/s   {}",
+            entry.speed_mps,
+            advice_words(entry, mission.target_m, &mission.profile)
+        );
         if self.terminal {
-            let colour = if too_fast(entry) || entry.advice.predicted_t_m.is_none_or(|t_m| t_m > target_m) {
-                "\x1b[33m"
-            } else {
-                "\x1b[32m"
-            };
+            let colour =
+                if too_fast(entry) || entry.advice.predicted_t_m.is_none_or(|t_m| t_m > mission.target_m) {
+                    "\x1b[33m"
+                } else {
+                    "\x1b[32m"
+                };
             put(&format!("\r\x1b[K{colour}{line}\x1b[0m"));
             self.status_open = true;
         } else {
@@ -189,7 +196,7 @@ fn too_fast(entry: &AdviceEntry) -> bool {
     entry.speed_mps.abs() > entry.advice.v_max_mps
 }
 
-fn advice_words(entry: &AdviceEntry, target_m: f64) -> String {
+fn advice_words(entry: &AdviceEntry, target_m: f64, profile: &Profile) -> String {
     let advice = &entry.advice;
     match advice.reason {
         Reason::HelixPitch if too_fast(entry) => format!("TOO FAST: at most {:.2} m/s", advice.v_max_mps),
@@ -204,7 +211,13 @@ fn advice_words(entry: &AdviceEntry, target_m: f64) -> String {
                 Some(Remedy::Mode(mode)) => format!("set the heads to {}", mode.to_uppercase()),
                 None => "no mode meets the target here".to_owned(),
             };
-            format!("slower won't help: steps of {:.2} m along the wall; {remedy}", advice.t_y_m)
+            match advice.unseen_m {
+                Some([width_m, sigma_m]) => {
+                    let clock = profile.clock(sigma_m);
+                    format!("slower won't help: no head sees {width_m:.2} m of the wall at {clock}; {remedy}")
+                }
+                None => format!("slower won't help: steps of {:.2} m along the wall; {remedy}", advice.t_y_m),
+            }
         }
         Reason::NoHeadingOrFix => "no speed can be given: no position or heading".to_owned(),
         Reason::NoReturns => "no speed can be given: no sonar returns".to_owned(),

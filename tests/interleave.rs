@@ -61,7 +61,8 @@ impl Rig {
             },
             step_rad: self.step_rad(),
             ping_period_s: self.ping_s(),
-            max_range_m: 10.0,
+            range_m: [0.2, 10.0],
+            sound_speed_mps: 1500.0,
             beam_rad: 0.02,
             body: HeadBody { radius_m: 0.04, ahead_m: 0.03, behind_m: 0.2 },
         };

@@ -12,7 +12,9 @@ use super::reading::{Reading, SourceId};
 use crate::coverage::{Frontier, HoleFinder, Judgement, Request, SampleStore, Sections};
 use crate::frames::{Point3, Tunnel};
 use crate::fusion::{Fix, Navigation, NoFix, SensorInfo};
-use crate::sampling::advice::{Advice, Situation};
+use crate::sampling::advice::Advice;
+use crate::sampling::layout::HeadLayout;
+use crate::sampling::passes::Situation;
 use crate::site::Site;
 use crate::time::{DurNs, MonoNs};
 use crate::tunnel::Profile;
@@ -150,6 +152,8 @@ pub struct Place {
     pub site: Site,
     /// Target T, m.
     pub target_m: f64,
+    /// How the heads share the work.
+    pub layout: HeadLayout,
 }
 
 /// What navigation knows of each source, by source.

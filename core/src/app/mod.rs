@@ -22,6 +22,7 @@ use bevy_ecs::world::World;
 
 use crate::config::SensorConfig;
 use crate::fusion::Navigation;
+use crate::sampling::layout::HeadLayout;
 use crate::sampling::occlusion::Obstacle;
 use crate::site::Site;
 use crate::time::DurNs;
@@ -75,6 +76,8 @@ pub struct Mission {
     pub section_m: f64,
     /// Length of the tunnel, m; samples beyond are counted, not kept.
     pub length_m: f64,
+    /// How the heads share the work.
+    pub layout: HeadLayout,
     /// Parts of the vehicle that may stand in a head's way, besides the other heads.
     pub hull: Vec<Obstacle>,
     /// How long the dive may take from its first packet; `None` when nobody has said.
@@ -82,7 +85,7 @@ pub struct Mission {
 }
 
 impl Mission {
-    /// A tunnel 100 m long with sections of 0.25 m, at a usual site; no hull, no end of the dive.
+    /// A tunnel 100 m long with sections of 0.25 m, at a usual site; phase shift, no hull, no end of the dive.
     pub fn new(profile: Profile, target_m: f64) -> Self {
         Self {
             profile,
@@ -90,6 +93,7 @@ impl Mission {
             target_m,
             section_m: 0.25,
             length_m: 100.0,
+            layout: HeadLayout::PhaseShift,
             hull: Vec::new(),
             dive_time: None,
         }

@@ -53,7 +53,12 @@ impl Loop {
         world.insert_resource(Navigator { navigation, next_beat: None });
         world.insert_resource(HeadSweeps::default());
         world.insert_resource(Finder::default());
-        let task = Task { target_m: mission.target_m, length_m: mission.length_m };
+        let task = Task {
+            target_m: mission.target_m,
+            length_m: mission.length_m,
+            layout: mission.layout,
+            sound_speed_mps: mission.site.sound_speed_mps,
+        };
         world.insert_resource(Advisor {
             advisor: advice::Advisor::new(&mission.profile, task, &specs, &mission.hull),
             dive_time: mission.dive_time,
@@ -73,6 +78,7 @@ impl Loop {
             profile: mission.profile.clone(),
             site: mission.site,
             target_m: mission.target_m,
+            layout: mission.layout,
         });
         schedule
             .initialize(&mut world)

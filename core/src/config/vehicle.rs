@@ -149,6 +149,7 @@ impl VehicleConfig {
             Some(section) => parse_heads(section, &sensors)?,
             None => (HeadLayout::PhaseShift, 0.0),
         };
+        check_heads(root, &sensors, &hull)?;
         Ok(Self {
             name,
             target_m,
@@ -175,6 +176,7 @@ impl VehicleConfig {
             target_m: self.target_m,
             section_m: self.section_m,
             length_m: self.tunnel.length_m,
+            layout: self.layout,
             hull: self.hull.clone(),
             dive_time: self.dive_time,
         }
@@ -228,6 +230,27 @@ fn parse_hull(section: Section<'_>) -> Result<Obstacle, ConfigError> {
     section.finish()?;
     let point = |[x, y, z]: [f64; 3]| Vec3::new(x, y, z);
     Ok(Obstacle::Box { least: point(least), most: point(most) })
+}
+
+/// That there are no more heads than tables hold, and that none is inside a box of the hull, which it would see through.
+fn check_heads(
+    root: &Section<'_>,
+    sensors: &[Box<dyn Device>],
+    hull: &[Obstacle],
+) -> Result<(), ConfigError> {
+    let heads: Vec<HeadSpec> = sensors.iter().filter_map(|sensor| sensor.head()).collect();
+    if !heads.is_empty() {
+        HeadLayout::PhaseShift.check(heads.len()).map_err(|why| root.invalid("sensors", &why.to_string()))?;
+    }
+    for (number, part) in hull.iter().enumerate() {
+        if heads.iter().any(|head| part.holds(head.mount.position)) {
+            let problem = format!(
+                "box {number} (from 0) has a profiling head inside; a head must be clear of the hull"
+            );
+            return Err(root.invalid("hull", &problem));
+        }
+    }
+    Ok(())
 }
 
 fn parse_heads(section: Section<'_>, sensors: &[Box<dyn Device>]) -> Result<(HeadLayout, f64), ConfigError> {

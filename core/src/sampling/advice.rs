@@ -2,11 +2,11 @@
 
 use super::error::SamplingError;
 use super::head::{HeadMode, HeadMotion, HeadSet, HeadSpec, MAX_HEADS};
+use super::layout::{self, HeadLayout};
 use super::occlusion::{self, AngleRange, Obstacle};
-use super::passes::Passes;
+use super::passes::{self, Passes, Phasing, Situation};
 use super::ring::{Ring, Standing};
-use super::spacing;
-use super::strips::{Arc, Strips, View};
+use super::strips::{Arc, Going, Strips, View};
 use crate::frames::{Point3, Pose, Rot};
 use crate::tunnel::Profile;
 
@@ -22,16 +22,12 @@ const STILL_TURN: f64 = 0.002;
 /// Soundings of a head's ring: the finest steps of the heads that there are (0.3 degrees).
 const RING: u32 = 1200;
 
-/// Everything that the advice depends on.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Situation {
-    /// Where the vehicle is; `None` without a fix.
-    pub pose: Option<Pose>,
-    /// Speed along the tunnel, m/s; below zero on the way back.
-    pub speed_mps: f64,
-    /// The heads that are turning and give returns.
-    pub heads: [Option<HeadMotion>; MAX_HEADS],
-}
+/// Alternatives are thought over anew every so many pieces of advice.
+const ALTERNATIVES_EVERY: u32 = 25;
+/// Slower than this, m/s, a vehicle goes the way it went before.
+const UNDER_WAY_MPS: f64 = 0.02;
+/// Stretches of wall out of a head's reach that there is room for.
+const OUT_OF_REACH: usize = 16;
 
 /// Why the advice is what it is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -130,6 +126,9 @@ pub struct Advice {
     pub phase_error_rad: Option<f64>,
     /// What is left of the tunnel and of the time.
     pub left: Left,
+    /// Where slower doesn't help because no head sees a strip of the wall: its width and the arc length of its middle,
+    /// m.
+    pub unseen_m: Option<[f64; 2]>,
     /// What would help where slower doesn't.
     pub remedy: Option<Remedy>,
     /// The modes that all heads have.
@@ -148,6 +147,7 @@ impl Advice {
             ping_period_s: 0.0,
             phase_error_rad: None,
             left: Left::default(),
+            unseen_m: None,
             remedy: None,
             alternatives: [None; MAX_MODES],
         }
@@ -161,6 +161,10 @@ pub struct Task {
     pub target_m: f64,
     /// Length of the tunnel, m.
     pub length_m: f64,
+    /// How the heads share the work.
+    pub layout: HeadLayout,
+    /// Speed of sound in the tunnel's water, m/s.
+    pub sound_speed_mps: f64,
 }
 
 /// A head, and its ring as last cast.
@@ -168,13 +172,11 @@ pub struct Task {
 struct AdvisedHead {
     spec: HeadSpec,
     modes: Vec<HeadMode>,
+    /// Angles that the vehicle hides, and the sector, in the sensor's frame.
     hidden: Vec<AngleRange>,
+    sector: Option<AngleRange>,
     ring: Ring,
     cast_at: Option<Pose>,
-    /// The largest steps by stride: of the modes, and of the step that was measured.
-    steps_m: Vec<(usize, f64)>,
-    /// The same in the middle of the tunnel.
-    centred_steps_m: Vec<(usize, f64)>,
 }
 
 /// Gives advice; remembers the beams of heads that keep their place in the section.
@@ -184,9 +186,20 @@ pub struct Advisor {
     task: Task,
     heads: Vec<AdvisedHead>,
     views: Vec<View>,
-    strips: Strips,
+    /// The wall as the heads are set now, and in each of their modes.
+    now: Strips,
+    modes: Strips,
+    /// The largest steps in each mode in the middle of the tunnel, m.
+    centred_m: Vec<f64>,
+    parallax_rad: f64,
+    /// How many soundings of its ring the step of each head that turns passes over.
+    strides: [Option<usize>; MAX_HEADS],
     /// The head whose ring is looked at first.
     next: usize,
+    /// Pieces of advice until alternatives are thought over, and what they were.
+    until_alternatives: u32,
+    alternatives: [Option<Alternative>; MAX_MODES],
+    astern: bool,
 }
 
 impl Advisor {
@@ -201,38 +214,67 @@ impl Advisor {
     ) -> Self {
         let specs: Vec<HeadSpec> = heads.iter().map(|(spec, _)| *spec).collect();
         let hidden = occlusion::hidden_by_vehicle(&specs, hull);
-        let [y, z] = profile.reference();
-        let centre = Pose { position: Point3::new(0.0, y, z), attitude: Rot::identity() };
-        let mut views: Vec<View> = Vec::new();
-        let advised = heads.iter().zip(hidden).map(|((spec, modes), hidden)| {
-            let mut head = AdvisedHead {
+        let programs = layout::programs(&specs, task.layout, 0.0).unwrap_or_default();
+        let sector = |head: usize| {
+            let (from_rad, size_rad) = programs.get(head)?.sector?;
+            Some(AngleRange { from_rad, size_rad })
+        };
+        let advised =
+            heads.iter().zip(hidden).enumerate().map(|(number, ((spec, modes), hidden))| AdvisedHead {
                 spec: *spec,
                 modes: modes.iter().copied().take(MAX_MODES).collect(),
                 hidden,
+                sector: sector(number),
                 ring: Ring::default(),
                 cast_at: None,
-                steps_m: Vec::with_capacity(MAX_MODES + 1),
-                centred_steps_m: Vec::new(),
-            };
-            views.push(View { sector: None, hidden: Vec::with_capacity(head.hidden.len()) });
-            // Casting once makes the room that later casts use; a head that is outside there has nothing to remember.
-            if let (Ok(()), Some(view)) = (head.cast(profile, &centre), views.last_mut()) {
-                head.centred_steps_m.clone_from(&head.steps_m);
-                head.look(profile, &centre, view);
-            }
-            head.cast_at = None;
-            head
-        });
+            });
         let heads: Vec<AdvisedHead> = advised.collect();
-        let mut strips = Strips::with_room(heads.iter().map(|head| head.hidden.len()).sum());
-        strips.rebuild(profile.perimeter_m(), &views);
-        Self { profile: profile.clone(), task, heads, views, strips, next: 0 }
+        let room = |head: &AdvisedHead| head.hidden.len() + OUT_OF_REACH;
+        let view = |head: &AdvisedHead| View { sector: None, hidden: Vec::with_capacity(room(head)) };
+        let arcs = heads.iter().map(|head| room(head) + 1).sum();
+        let mut advisor = Self {
+            profile: profile.clone(),
+            task,
+            views: heads.iter().map(view).collect(),
+            heads,
+            now: Strips::with_room(arcs, 1, RING),
+            modes: Strips::with_room(arcs, MAX_MODES, RING),
+            centred_m: Vec::new(),
+            parallax_rad: 0.0,
+            strides: [None; MAX_HEADS],
+            next: 0,
+            until_alternatives: 0,
+            alternatives: [None; MAX_MODES],
+            astern: false,
+        };
+        advisor.look_from_the_middle();
+        advisor
+    }
+
+    /// Casting once makes the room that later casts use; a head that is outside there has nothing to remember.
+    fn look_from_the_middle(&mut self) {
+        let [y, z] = self.profile.reference();
+        let centre = Pose { position: Point3::new(0.0, y, z), attitude: Rot::identity() };
+        for (head, view) in self.heads.iter_mut().zip(&mut self.views) {
+            if head.cast(&self.profile, &centre).is_ok() {
+                head.look(&self.profile, &centre, self.task.sound_speed_mps, view);
+            }
+        }
+        self.now.rebuild(self.profile.perimeter_m(), &self.views);
+        self.measure_modes();
+        self.centred_m = (0..MAX_MODES).map(|mode| self.modes.largest_step_m(mode)).collect();
+        for head in &mut self.heads {
+            head.cast_at = None;
+        }
     }
 
     /// The largest speed at which the predicted T_max stays within the target, by inverting Eq. 16 with what is
     /// measured: turn period, step, number and phases of the heads as they would meet the wall at that speed, what
-    /// the vehicle hides from them, and its place and attitude. `left_s` is the time that is left, where it is known.
+    /// the vehicle hides from them or is out of their reach, and its place and attitude. `left_s` is the time that is
+    /// left, where it is known.
     ///
+    /// Heads apart along the hull keep their phases at some speeds only: the largest is the end of the stretch of speeds
+    /// in which the vehicle goes now, if that meets the target, else of any.
     /// Source: metrics.md, "Speed advice".
     /// Allocates: never.
     pub fn advise(&mut self, situation: &Situation, left_s: Option<f64>) -> Advice {
@@ -240,142 +282,186 @@ impl Advisor {
         if situation.heads.iter().all(Option::is_none) {
             return Advice::nothing(Reason::NoReturns);
         }
-        let Ok(t_y_m) = self.largest_step_m(situation, &pose) else {
+        if !self.look(situation, &pose) {
             return Advice::nothing(Reason::NoHeadingOrFix);
-        };
-        let speed = situation.speed_mps.abs();
-        let passes = Passes::measured(&situation.heads, situation.speed_mps);
+        }
+        if situation.speed_mps.abs() > UNDER_WAY_MPS {
+            self.astern = situation.speed_mps < 0.0;
+        }
+        let passes = Phasing::of(situation).at(situation.speed_mps).beside(self.parallax_rad);
         let ping_period_s =
             situation.heads.iter().flatten().map(HeadMotion::ping_period_s).fold(0.0, f64::max);
-        let fastest = self.fastest_mps(situation, &passes, ping_period_s, t_y_m);
-        let predicted_t_m = self.strips.t_max_m(&passes, speed, ping_period_s, t_y_m);
-        let left_m = if situation.speed_mps < 0.0 {
-            pose.position.x()
-        } else {
-            self.task.length_m - pose.position.x()
+        let going = Going { ping_period_s, ..Going::default() };
+        let fastest = self.fastest_mps(situation, &passes, &going);
+        let predicted_t_m = self.now.t_max_m(0, &passes, situation.speed_mps.abs(), &going);
+        let x_m = pose.position.x();
+        let left_m = if self.astern { x_m } else { self.task.length_m - x_m };
+        self.think_over(&passes);
+        let unseen_m = match fastest {
+            Err(SamplingError::UnseenStrip { width_m, sigma_m, .. }) => Some([width_m, sigma_m]),
+            _ => None,
         };
-        let left = Left { length_m: left_m.clamp(0.0, self.task.length_m), time_s: left_s };
-        let in_sectors = situation.heads.iter().flatten().any(|motion| motion.sector_rad.is_some());
-        let alternatives = self.alternatives(passes.heads(), in_sectors);
         let errors = passes.phase_errors_rad(self.heads.len()).into_iter().flatten();
         Advice {
             v_max_mps: fastest.unwrap_or(0.0) * (1.0 - SPEED_MARGIN),
-            reason: if fastest.is_some() { Reason::HelixPitch } else { Reason::AngularStep },
+            reason: if fastest.is_ok() { Reason::HelixPitch } else { Reason::AngularStep },
             predicted_t_m: predicted_t_m.is_finite().then_some(predicted_t_m),
             pass_gap_s: passes.gap_s(passes.heads()).unwrap_or(0.0),
             even_pass_gap_s: passes.even_gap_s(),
-            t_y_m,
+            t_y_m: self.now.largest_step_m(0),
             ping_period_s,
             phase_error_rad: errors
                 .max_by(|a, b| a.abs().total_cmp(&b.abs()))
                 .filter(|_| passes.heads().len() > 1),
-            left,
-            remedy: if fastest.is_none() { self.remedy(situation, &alternatives) } else { None },
-            alternatives,
+            left: Left { length_m: left_m.clamp(0.0, self.task.length_m), time_s: left_s },
+            unseen_m,
+            remedy: if fastest.is_err() { self.remedy(situation, unseen_m.is_some()) } else { None },
+            alternatives: self.alternatives,
         }
     }
 
-    /// The largest step of any head that turns, m.
+    /// Looks at the wall from where the vehicle is; `false` when no head that turns can.
     ///
     /// A head's beams are cast anew when the vehicle has moved; of several whose beams are old, one a call, since a
     /// vehicle doesn't move far between two.
-    fn largest_step_m(&mut self, situation: &Situation, pose: &Pose) -> Result<f64, SamplingError> {
+    fn look(&mut self, situation: &Situation, pose: &Pose) -> bool {
         let count = self.heads.len().max(1);
+        let present = |number: usize| situation.heads.get(number).is_some_and(Option::is_some);
+        let first = self.next;
         let mut may_cast = true;
-        let mut seen_anew = false;
-        for offset in 0..count {
-            let number = (self.next + offset) % count;
-            let present = situation.heads.get(number).is_some_and(Option::is_some);
+        let mut cast = false;
+        for number in (first..first + count).map(|number| number % count).filter(|number| present(*number)) {
             let (Some(head), Some(view)) = (self.heads.get_mut(number), self.views.get_mut(number)) else {
                 continue;
             };
-            if present && (head.cast_at.is_none() || may_cast && !head.is_near(pose)) {
+            if head.cast_at.is_none() || may_cast && !head.is_near(pose) {
                 may_cast &= head.cast_at.is_none();
-                head.cast(&self.profile, pose)?;
-                head.look(&self.profile, pose, view);
-                seen_anew |= !head.hidden.is_empty();
+                if head.cast(&self.profile, pose).is_ok() {
+                    head.look(&self.profile, pose, self.task.sound_speed_mps, view);
+                }
                 self.next = (number + 1) % count;
+                cast = true;
             }
         }
-        if seen_anew {
-            self.strips.rebuild(self.profile.perimeter_m(), &self.views);
+        let stride = |motion: Option<HeadMotion>| Some(Ring::stride(motion?.step_rad, RING));
+        let strides = situation.heads.map(stride);
+        if cast || strides != self.strides {
+            self.strides = strides;
+            self.measure_now(pose);
         }
-        let steps = self.heads.iter_mut().zip(&situation.heads);
-        Ok(steps
-            .filter_map(|(head, motion)| Some(head.step_m(motion.as_ref()?.step_rad)))
-            .fold(0.0, f64::max))
+        self.heads.iter().enumerate().any(|(number, head)| present(number) && head.cast_at.is_some())
     }
 
-    /// The largest speed at which the phases measured now meet the target; `None` where no speed would, however the
-    /// heads were phased.
+    fn measure_now(&mut self, pose: &Pose) {
+        let mut places = [[0.0; 2]; MAX_HEADS];
+        let mut known = 0;
+        for (head, slot) in self.heads.iter().filter(|head| head.cast_at.is_some()).zip(&mut places) {
+            let place = pose.place(head.spec.mount.position);
+            *slot = [place.y(), place.z()];
+            known += 1;
+        }
+        self.parallax_rad = passes::parallax_rad(&self.profile, places.get(..known).unwrap_or_default());
+        self.now.rebuild(self.profile.perimeter_m(), &self.views);
+        let rings = self.heads.iter().map(|head| &head.ring);
+        self.now.measure(1, rings, |_, head| self.strides.get(head).copied().flatten());
+    }
+
+    /// The largest speed at which the phases measured now meet the target.
+    ///
+    /// Errors: no speed would.
     fn fastest_mps(
         &self,
         situation: &Situation,
         passes: &Passes,
-        ping_period_s: f64,
-        t_y_m: f64,
-    ) -> Option<f64> {
+        going: &Going,
+    ) -> Result<f64, SamplingError> {
         let target_m = self.task.target_m;
-        let even_gap_s = passes.even_gap_s();
-        let bound = spacing::speed_for_target_mps(target_m, t_y_m, even_gap_s, ping_period_s)?;
-        self.strips.speed_for_target_mps(passes, target_m, ping_period_s, t_y_m).ok()?;
-        let heading = if situation.speed_mps < 0.0 { -1.0 } else { 1.0 };
+        // However the heads were phased, no speed beyond this one would do.
+        let bound_mps = target_m / (passes.even_gap_s() + going.ping_period_s);
+        self.now.speed_for_target_mps(0, passes, target_m, going)?;
+        let heading = if self.astern { -1.0 } else { 1.0 };
+        let phasing = Phasing::of(situation);
         let meets = |speed_mps: f64| {
-            let then = Passes::measured(&situation.heads, heading * speed_mps);
-            self.strips.t_max_m(&then, speed_mps, ping_period_s, t_y_m) <= target_m
+            let then = phasing.at(heading * speed_mps).beside(self.parallax_rad);
+            // No strip has more passes than all heads make: most speeds are ruled out by these alone.
+            let gap_s = then.gap_s(then.heads()).unwrap_or(f64::INFINITY);
+            speed_mps * gap_s <= target_m && self.now.t_max_m(0, &then, speed_mps, going) <= target_m
         };
-        Some(largest_speed_mps(bound, meets))
+        let now_mps = situation.speed_mps.abs();
+        Ok(if now_mps > UNDER_WAY_MPS && now_mps < bound_mps && meets(now_mps) {
+            upwards_mps(now_mps, bound_mps, meets)
+        } else {
+            downwards_mps(bound_mps, meets)
+        })
     }
 
-    /// What each mode that all heads have would allow, those that turn now started in phase.
-    fn alternatives(&self, heads: HeadSet, in_sectors: bool) -> [Option<Alternative>; MAX_MODES] {
+    /// Thinks over what each mode that all heads have would allow, those that turn now started in phase.
+    fn think_over(&mut self, passes: &Passes) {
+        if let Some(left) = self.until_alternatives.checked_sub(1) {
+            self.until_alternatives = left;
+            return;
+        }
+        self.until_alternatives = ALTERNATIVES_EVERY - 1;
+        self.measure_modes();
+        let names = self.heads.first().map(|head| head.modes.as_slice()).unwrap_or_default();
         let mut alternatives = [None; MAX_MODES];
-        let modes = self.heads.first().map_or(&[][..], |head| &head.modes);
-        for (slot, mode) in alternatives.iter_mut().zip(modes) {
-            let Some(v_mps) = self.mode_speed_mps(mode.name, heads, in_sectors) else { continue };
+        for (number, (slot, mode)) in alternatives.iter_mut().zip(names).enumerate() {
+            let Some(v_mps) = self.mode_speed_mps(number, passes.heads()) else { continue };
             *slot = Some(Alternative { mode: mode.name, v_max_mps: v_mps * (1.0 - SPEED_MARGIN) });
         }
-        alternatives
+        self.alternatives = alternatives;
+    }
+
+    fn measure_modes(&mut self) {
+        let Self { heads, modes, views, profile, .. } = self;
+        modes.rebuild(profile.perimeter_m(), views);
+        let name = |mode: usize| heads.first()?.modes.get(mode).map(|mode| mode.name);
+        let rings = heads.iter().map(|head| &head.ring);
+        modes.measure(MAX_MODES, rings, |mode, head| {
+            let turn = heads.get(head)?.mode(name(mode)?)?.turn;
+            Some(Ring::stride(turn.step_rad(), RING))
+        });
     }
 
     /// The largest speed in a mode, zero where none is; `None` when a head doesn't have it.
-    fn mode_speed_mps(&self, name: &str, heads: HeadSet, in_sectors: bool) -> Option<f64> {
-        let (mut period_s, mut ping_period_s, mut t_y_m) = (0.0_f64, 0.0_f64, 0.0_f64);
-        for head in heads.iter().filter_map(|number| self.heads.get(number)) {
-            let mode = head.modes.iter().find(|mode| mode.name == name)?;
-            period_s = period_s.max(mode.turn.period_s());
-            ping_period_s = ping_period_s.max(mode.turn.ping_period_s());
-            t_y_m = t_y_m.max(head.known_step_m(stride(mode.turn.step_rad()))?);
+    fn mode_speed_mps(&self, number: usize, heads: HeadSet) -> Option<f64> {
+        let name = self.heads.first()?.modes.get(number)?.name;
+        let turn = |head: usize| self.heads.get(head)?.mode(name).map(|mode| mode.turn);
+        let (mut longest_s, mut ping_period_s) = (0.0_f64, 0.0_f64);
+        for head in heads.iter() {
+            longest_s = longest_s.max(turn(head)?.period_s());
+            ping_period_s = ping_period_s.max(turn(head)?.ping_period_s());
         }
-        let passes = if in_sectors {
+        let passes = match self.task.layout {
             // Sectors stay as large as they are, however many heads are left.
-            Passes::in_sectors(heads, period_s, 2.0 * period_s / self.heads.len().max(1) as f64)
-        } else {
-            Passes::evenly_phased(heads, period_s)
+            HeadLayout::SectorOffset => {
+                Passes::in_sectors(heads, 2.0 * longest_s / self.heads.len().max(1) as f64)
+            }
+            HeadLayout::PhaseShift => {
+                Passes::evenly_phased(heads, |head| turn(head).map_or(0.0, |turn| turn.period_s()))
+            }
         };
-        let speed = self.strips.speed_for_target_mps(&passes.ok()?, self.task.target_m, ping_period_s, t_y_m);
+        let passes = passes.ok()?.beside(self.parallax_rad);
+        let going = Going { ping_period_s, ..Going::default() };
+        let speed = self.modes.speed_for_target_mps(number, &passes, self.task.target_m, &going);
         Some(speed.unwrap_or(0.0))
     }
 
-    fn remedy(&self, situation: &Situation, alternatives: &[Option<Alternative>]) -> Option<Remedy> {
-        let centred = |(head, motion): (&AdvisedHead, &Option<HeadMotion>)| {
-            let stride = stride(motion.as_ref()?.step_rad);
-            head.centred_steps_m.iter().find(|(known, _)| *known == stride).map(|(_, step_m)| *step_m)
-        };
-        let in_the_middle = self.heads.iter().zip(&situation.heads).filter_map(centred).reduce(f64::max);
-        if in_the_middle.is_some_and(|t_y_m| t_y_m < self.task.target_m)
-            && self.strips.as_slice().iter().all(|strip| !strip.seen_by.is_empty())
+    /// What would help: the middle, where the same steps are short enough there, or the mode that is fastest.
+    fn remedy(&self, situation: &Situation, unseen: bool) -> Option<Remedy> {
+        let stride = situation.heads.iter().flatten().map(|motion| Ring::stride(motion.step_rad, RING)).max();
+        let same = |mode: &HeadMode| Some(Ring::stride(mode.turn.step_rad(), RING)) == stride;
+        let modes = self.heads.first().map(|head| head.modes.as_slice()).unwrap_or_default();
+        let centred_m = modes.iter().position(same).and_then(|mode| self.centred_m.get(mode));
+        let target_m = self.task.target_m;
+        if !unseen
+            && self.now.largest_step_m(0) >= target_m
+            && centred_m.is_some_and(|centred_m| *centred_m < target_m)
         {
             return Some(Remedy::Centre);
         }
-        let best = alternatives.iter().flatten().max_by(|a, b| a.v_max_mps.total_cmp(&b.v_max_mps));
+        let best = self.alternatives.iter().flatten().max_by(|a, b| a.v_max_mps.total_cmp(&b.v_max_mps));
         best.filter(|best| best.v_max_mps > 0.0).map(|best| Remedy::Mode(best.mode))
-    }
-
-    /// The heads on which some strip depends that not all of them see.
-    pub fn hidden_from(&self) -> HeadSet {
-        let hidden = self.heads.iter().enumerate().filter(|(_, head)| !head.hidden.is_empty());
-        hidden.fold(HeadSet::default(), |set, (number, _)| set.with(number))
     }
 }
 
@@ -388,59 +474,57 @@ impl AdvisedHead {
             && near(&cast_at.attitude.wxyz(), &pose.attitude.wxyz(), STILL_TURN)
     }
 
-    /// Casts the head's ring anew and takes the largest steps from it.
+    /// Casts the head's ring anew; a head that can't look from there keeps what it saw last.
     fn cast(&mut self, profile: &Profile, pose: &Pose) -> Result<(), SamplingError> {
         self.cast_at = None;
         let standing = Standing::new(profile, pose, &self.spec.mount)?;
         self.ring.recast(&standing, 0.0, RING)?;
-        self.steps_m.clear();
-        for mode in &self.modes {
-            let stride = stride(mode.turn.step_rad());
-            self.steps_m.push((stride, self.ring.largest_step_m(stride)));
-        }
         self.cast_at = Some(*pose);
         Ok(())
     }
 
-    /// Where on the wall its hidden angles fall.
-    fn look(&self, profile: &Profile, pose: &Pose, view: &mut View) {
+    /// Where on the wall its sector is, and what it doesn't see.
+    fn look(&self, profile: &Profile, pose: &Pose, sound_speed_mps: f64, view: &mut View) {
         view.hidden.clear();
         let Ok(standing) = Standing::new(profile, pose, &self.spec.mount) else { return };
+        view.sector = self.sector.and_then(|angles| Arc::of(&standing, &angles).ok());
         view.hidden.extend(self.hidden.iter().filter_map(|angles| Arc::of(&standing, angles).ok()));
+        view.hide_out_of_reach(&self.ring, self.spec.reach_m(sound_speed_mps));
     }
 
-    fn known_step_m(&self, stride: usize) -> Option<f64> {
-        self.steps_m.iter().find(|(known, _)| *known == stride).map(|(_, step_m)| *step_m)
-    }
-
-    /// The largest step at this angle between pings, m.
-    fn step_m(&mut self, step_rad: f64) -> f64 {
-        let stride = stride(step_rad);
-        self.known_step_m(stride).unwrap_or_else(|| {
-            let step_m = self.ring.largest_step_m(stride);
-            self.steps_m.truncate(self.modes.len());
-            self.steps_m.push((stride, step_m));
-            step_m
-        })
+    fn mode(&self, name: &str) -> Option<&HeadMode> {
+        self.modes.iter().find(|mode| mode.name == name)
     }
 }
 
-fn stride(step_rad: f64) -> usize {
-    Ring::stride(step_rad, RING)
+/// The end of the stretch of speeds about `from_mps`, which meets the target, upwards to `bound_mps`.
+fn upwards_mps(from_mps: f64, bound_mps: f64, meets: impl Fn(f64) -> bool) -> f64 {
+    const STEP: f64 = 1.02;
+    let mut good = from_mps;
+    while good < bound_mps {
+        let next = (good * STEP).min(bound_mps);
+        if !meets(next) {
+            return edge_mps(good, next, meets);
+        }
+        good = next;
+    }
+    good
 }
 
-/// The largest speed up to `fastest_mps` that `meets` the target.
-///
-/// Heads apart along the hull keep their phases at one speed only, so that what meets the target isn't an interval:
-/// speeds are tried from above, and the edge of the first that meets it is then closed in on.
-fn largest_speed_mps(fastest_mps: f64, meets: impl Fn(f64) -> bool) -> f64 {
-    const TRIED: u32 = 64;
-    // The bound itself is met but for rounding when the heads are evenly phased.
-    let at = |k: u32| fastest_mps * (1.0 - f64::from(k) / f64::from(TRIED)) * (1.0 - 1e-12);
-    let Some(first) = (0..TRIED).find(|k| meets(at(*k))) else { return 0.0 };
-    let Some(too_fast) = first.checked_sub(1) else { return at(0) };
-    let (mut good, mut bad) = (at(first), at(too_fast));
-    for _ in 0..20 {
+/// The largest speed up to `bound_mps` that meets the target, as far as trying from above finds it; else zero.
+fn downwards_mps(bound_mps: f64, meets: impl Fn(f64) -> bool) -> f64 {
+    const TRIED: u32 = 256;
+    let at = |k: u32| bound_mps * (1.0 - f64::from(k) / f64::from(TRIED));
+    match (0..TRIED).find(|k| meets(at(*k))) {
+        None => 0.0,
+        Some(0) => bound_mps,
+        Some(first) => edge_mps(at(first), at(first - 1), meets),
+    }
+}
+
+/// Where speeds cease to meet the target, between one that does and one that doesn't.
+fn edge_mps(mut good: f64, mut bad: f64, meets: impl Fn(f64) -> bool) -> f64 {
+    for _ in 0..30 {
         let middle = f64::midpoint(good, bad);
         if meets(middle) {
             good = middle;

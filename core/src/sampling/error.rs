@@ -44,6 +44,9 @@ pub enum SamplingError {
         /// Head angle, degrees.
         angle_deg: f64,
     },
+    /// A head whose plane lies along the tunnel.
+    #[error("a head's axis stands across the tunnel: its beams run along it")]
+    HeadAskew,
     /// A head that would be in the rock.
     #[error("a head at y = {y_m:.3} m, z = {z_m:.3} m is outside the tunnel's profile")]
     HeadOutside {
@@ -79,6 +82,26 @@ pub enum SamplingError {
         apart_m: f64,
         /// Speed, m/s.
         speed_mps: f64,
+    },
+    /// A strip of the wall that no head sees is as wide as the target.
+    #[error(
+        "a target of {target_m} m is met at no speed: no head sees {width_m:.2} m of the wall, {sigma_m:.2} m from the floor's centre"
+    )]
+    UnseenStrip {
+        /// The target, m.
+        target_m: f64,
+        /// Width of the strip, m.
+        width_m: f64,
+        /// Its middle, arc length in m.
+        sigma_m: f64,
+    },
+    /// The vehicle heads too far askew, or swings about too fast.
+    #[error(
+        "a target of {target_m} m is met at no speed: so askew, or swinging so fast, passes are farther apart"
+    )]
+    OffAxis {
+        /// The target, m.
+        target_m: f64,
     },
     /// The distance between neighbours of one turn is as large as the target.
     #[error(

@@ -117,12 +117,21 @@ pub struct HeadSpec {
     pub step_rad: f64,
     /// Time between two pings, seconds.
     pub ping_period_s: f64,
-    /// The longest range it hears at its setting, m, at the site's speed of sound or more.
-    pub max_range_m: f64,
+    /// The nearest and the farthest that it hears at its setting, m, as it reckons ranges.
+    pub range_m: [f64; 2],
+    /// The speed of sound by which it reckons them, m/s.
+    pub sound_speed_mps: f64,
     /// zeta: full width of its beam, radians.
     pub beam_rad: f64,
     /// Its body.
     pub body: HeadBody,
+}
+
+impl HeadSpec {
+    /// The nearest and the farthest wall that it hears in water with this speed of sound, m.
+    pub fn reach_m(&self, sound_speed_mps: f64) -> [f64; 2] {
+        self.range_m.map(|range_m| range_m * sound_speed_mps / self.sound_speed_mps)
+    }
 }
 
 /// What a head does during a dive: where it begins and between which angles it turns. Angles in the sensor's frame.

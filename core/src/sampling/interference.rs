@@ -119,7 +119,8 @@ mod tests {
             mount: Mount { position: Vec3::new(place[0], place[1], place[2]), rotation: Rot::identity() },
             step_rad: f64::to_radians(0.9),
             ping_period_s: 0.02,
-            max_range_m: 10.0,
+            range_m: [0.2, 10.0],
+            sound_speed_mps: 1500.0,
             beam_rad: f64::to_radians(1.4),
             body: HeadBody { radius_m: 0.04, ahead_m: 0.03, behind_m: 0.2 },
         };

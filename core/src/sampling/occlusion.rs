@@ -60,6 +60,17 @@ impl Obstacle {
         }
     }
 
+    /// Whether a place is within a box; cylinders are heads, which may share a place.
+    pub fn holds(&self, place: Vec3<Body>) -> bool {
+        match self {
+            Self::Box { least, most } => {
+                let within = |((low, at), high): ((&f64, &f64), &f64)| low < at && at < high;
+                least.0.iter().zip(place.0.iter()).zip(most.0.iter()).all(within)
+            }
+            Self::Cylinder { .. } => false,
+        }
+    }
+
     /// Whether a ray from outside meets it; one from inside never does, so that a head isn't hidden by what holds it.
     pub fn stops(&self, from: Vec3<Body>, direction: Vec3<Body>) -> bool {
         match self {
@@ -210,7 +221,8 @@ mod tests {
             },
             step_rad: f64::to_radians(0.9),
             ping_period_s: 0.02,
-            max_range_m: 10.0,
+            range_m: [0.2, 10.0],
+            sound_speed_mps: 1500.0,
             beam_rad: f64::to_radians(1.4),
             body: HeadBody { radius_m: 0.04, ahead_m: 0.03, behind_m: 0.2 },
         }

@@ -8,11 +8,12 @@ use super::error::{SamplingError, not_negative, positive};
 use super::head::{HeadMode, HeadSet, HeadSpec};
 use super::layout::{self, HeadLayout};
 use super::occlusion::{self, AngleRange, Obstacle};
-use super::passes::Passes;
+use super::passes::{self, Passes};
 use super::ring::{Ring, Standing};
 use super::schedule::Schedule;
-use super::strips::{Arc, Strips, View};
+use super::strips::{Arc, Going, Strips, View};
 use crate::frames::{Point3, Pose, Rot};
+use crate::math::TAU;
 use crate::tunnel::{Profile, Yz};
 
 pub use answer::{Answer, Question, Spacing};
@@ -39,17 +40,24 @@ pub struct Inspection {
     pub layout: HeadLayout,
     /// How far the pilot may drift, up, down and sideways, m.
     pub drift_m: f64,
-    /// How far the vehicle may turn from the tunnel's axis, radians.
+    /// How far from the tunnel's axis it may head, steadily, radians.
     pub yaw_rad: f64,
+    /// How fast it may turn about, rad/s: between two passes, beams swing along the wall.
+    pub yaw_rate_radps: f64,
+    /// Speed of sound in the tunnel's water, m/s.
+    pub sound_speed_mps: f64,
 }
 
 /// A vehicle at one of the places and headings that are allowed for.
 #[derive(Debug, Clone)]
 struct Stance {
     strips: Strips,
-    /// The largest step of any head by mode, m.
-    t_y_m: Vec<f64>,
     farthest_m: f64,
+    parallax_rad: f64,
+    /// By how much heads apart are out of the places along the tunnel that their schedule is for, m.
+    shift_m: f64,
+    /// How far apart they are along the tunnel, m.
+    apart_m: f64,
 }
 
 /// One way in which all heads can be set.
@@ -91,22 +99,22 @@ impl Planner {
         if common.is_empty() {
             return Err(SamplingError::NoCommonMode);
         }
-        let poses = poses(&inspection);
-        let mut stances = Vec::with_capacity(poses.len());
-        let mut chords = vec![[0.0; 3]; common.len()];
-        for (number, pose) in poses.iter().enumerate() {
-            let rings = rings(&inspection, pose)?;
-            if number == 0 {
+        not_negative("the rate of yaw in rad/s", inspection.yaw_rate_radps)?;
+        positive("the speed of sound in m/s", inspection.sound_speed_mps)?;
+        let mut stances = Vec::new();
+        let mut chords = Vec::new();
+        for pose in poses(&inspection) {
+            let rings = rings(&inspection, &pose)?;
+            if stances.is_empty() {
                 chords = common.iter().map(|modes| chords_m(&rings, modes)).collect();
             }
-            let t_y_m = common.iter().map(|modes| largest_step_m(&rings, modes)).collect();
-            let farthest_m = rings.iter().map(Ring::longest_range_m).fold(0.0, f64::max);
-            stances.push(Stance { strips: strips(&inspection, &hidden, pose)?, t_y_m, farthest_m });
+            stances.push(stance(&inspection, &hidden, &common, &pose, &rings)?);
         }
         let mut modes = Vec::with_capacity(common.len());
         for (number, (of_heads, chords_m)) in common.iter().zip(chords).enumerate() {
-            let t_y2_m = stances.iter().filter_map(|stance| stance.t_y_m.get(number)).copied();
-            modes.push(planned_mode(&inspection, of_heads, chords_m, t_y2_m.fold(0.0, f64::max))?);
+            let t_y2_m =
+                stances.iter().map(|stance| stance.strips.largest_step_m(number)).fold(0.0, f64::max);
+            modes.push(planned_mode(&inspection, of_heads, chords_m, t_y2_m)?);
         }
         Ok(Self { inspection, hidden, stances, modes })
     }
@@ -128,8 +136,8 @@ impl Planner {
     /// Source: Jorge et al. 2021, Eq. 16.
     pub fn t_max_m(&self, mode: usize, speed_mps: f64) -> Result<f64, SamplingError> {
         positive("the speed in m/s", speed_mps)?;
-        let t_m = |planned: &PlannedMode, stance: &Stance, t_y_m: f64| {
-            stance.strips.t_max_m(&planned.passes, speed_mps, planned.ping_period_s, t_y_m)
+        let t_m = |stance: &Stance, passes: &Passes, going: &Going| {
+            stance.strips.t_max_m(mode, passes, speed_mps, going)
         };
         Ok(self.over_stances(mode, t_m).fold(0.0, f64::max))
     }
@@ -140,8 +148,8 @@ impl Planner {
     /// Errors: a target that isn't above zero, or that no speed meets.
     pub fn v_max_mps(&self, mode: usize, target_m: f64) -> Result<f64, SamplingError> {
         positive("the target in metres", target_m)?;
-        let speed = |planned: &PlannedMode, stance: &Stance, t_y_m: f64| {
-            stance.strips.speed_for_target_mps(&planned.passes, target_m, planned.ping_period_s, t_y_m)
+        let speed = |stance: &Stance, passes: &Passes, going: &Going| {
+            stance.strips.speed_for_target_mps(mode, passes, target_m, going)
         };
         let mut slowest = f64::INFINITY;
         let mut refused = None;
@@ -160,10 +168,19 @@ impl Planner {
     fn over_stances<T>(
         &self,
         mode: usize,
-        of: impl Fn(&PlannedMode, &Stance, f64) -> T,
+        of: impl Fn(&Stance, &Passes, &Going) -> T,
     ) -> impl Iterator<Item = T> {
         let planned = self.modes.get(mode);
-        self.stances.iter().filter_map(move |stance| Some(of(planned?, stance, *stance.t_y_m.get(mode)?)))
+        self.stances.iter().filter_map(move |stance| {
+            let planned = planned?;
+            let going = Going {
+                ping_period_s: planned.ping_period_s,
+                swing_mps: self.inspection.yaw_rate_radps * stance.farthest_m,
+                shift_m: stance.shift_m,
+                apart_m: stance.apart_m,
+            };
+            Some(of(stance, &planned.passes.beside(stance.parallax_rad), &going))
+        })
     }
 
     /// Time between passes over a place that all heads see, and the longest over any that some head sees, seconds, the
@@ -185,6 +202,24 @@ impl Planner {
     pub fn farthest_m(&self) -> (f64, f64) {
         let far = || self.stances.iter().map(|stance| stance.farthest_m);
         (far().next().unwrap_or(0.0), far().fold(0.0, f64::max))
+    }
+
+    /// Length of the first head's footprint on the wall in the plane in which it turns, the shortest and the longest of
+    /// a turn, m, the vehicle where it should be.
+    ///
+    /// Errors: as for [`Standing::footprint`].
+    /// Source: Jorge et al. 2021, Fig. 15.
+    pub fn footprints_m(&self) -> Result<[f64; 2], SamplingError> {
+        const LOOKED_AT: u32 = 720;
+        let (spec, _) = self.inspection.heads.first().ok_or(SamplingError::HeadCount { heads: 0 })?;
+        let standing = Standing::new(&self.inspection.profile, &self.nominal_pose(), &spec.mount)?;
+        let mut found = [f64::INFINITY, 0.0];
+        for k in 0..LOOKED_AT {
+            let angle_rad = TAU * f64::from(k) / f64::from(LOOKED_AT);
+            let length_m = standing.footprint(angle_rad, spec.beam_rad)?.in_plane_m;
+            found = [found[0].min(length_m), found[1].max(length_m)];
+        }
+        Ok(found)
     }
 
     /// For each head the angles hidden from it, in its own frame.
@@ -227,15 +262,14 @@ impl PlannedMode {
     }
 }
 
-/// Of two reasons, the one with the larger step.
+/// Of two reasons, a strip that no head sees before a step, and the larger.
 fn worse(known: Option<SamplingError>, other: SamplingError) -> Option<SamplingError> {
-    match (known, other) {
-        (
-            Some(SamplingError::AngularStep { t_y_m: known_m, .. }),
-            SamplingError::AngularStep { t_y_m, .. },
-        ) if known_m >= t_y_m => known,
-        _ => Some(other),
-    }
+    let weight = |why: &SamplingError| match why {
+        SamplingError::UnseenStrip { width_m, .. } => (1, *width_m),
+        SamplingError::AngularStep { t_y_m, .. } => (0, *t_y_m),
+        _ => (2, 0.0),
+    };
+    known.filter(|known| weight(known) >= weight(&other)).or(Some(other))
 }
 
 /// For each mode that all heads have, the mode of each.
@@ -282,10 +316,6 @@ fn stride_of(step_rad: f64) -> usize {
     Ring::stride(step_rad, RING)
 }
 
-fn largest_step_m(rings: &[Ring], modes: &[HeadMode]) -> f64 {
-    rings.iter().zip(modes).map(|(ring, mode)| ring.largest_step_m(stride(mode))).fold(0.0, f64::max)
-}
-
 fn chords_m(rings: &[Ring], modes: &[HeadMode]) -> [f64; 3] {
     let mut all = [f64::INFINITY, 0.0, 0.0];
     for (ring, mode) in rings.iter().zip(modes) {
@@ -295,22 +325,64 @@ fn chords_m(rings: &[Ring], modes: &[HeadMode]) -> [f64; 3] {
     all
 }
 
-fn strips(inspection: &Inspection, hidden: &[Vec<AngleRange>], pose: &Pose) -> Result<Strips, SamplingError> {
+fn stance(
+    inspection: &Inspection,
+    hidden: &[Vec<AngleRange>],
+    common: &[Vec<HeadMode>],
+    pose: &Pose,
+    rings: &[Ring],
+) -> Result<Stance, SamplingError> {
     let specs: Vec<HeadSpec> = inspection.heads.iter().map(|(spec, _)| *spec).collect();
-    let programs = layout::programs(&specs, inspection.layout, 0.0)?;
+    let perimeter_m = inspection.profile.perimeter_m();
+    let mut strips = Strips::default();
+    strips.rebuild(perimeter_m, &views(inspection, &specs, hidden, pose, rings)?);
+    strips.measure(common.len(), rings.iter(), |setting, head| Some(stride(common.get(setting)?.get(head)?)));
+    let place = |spec: &HeadSpec| {
+        let place = pose.place(spec.mount.position);
+        [place.y(), place.z()]
+    };
+    let places: Vec<Yz> = specs.iter().map(place).collect();
+    let ahead_m =
+        |spec: &HeadSpec| passes::ahead_m(&pose.attitude, &spec.mount).ok_or(SamplingError::HeadAskew);
+    let ahead_m = specs.iter().map(ahead_m).collect::<Result<Vec<f64>, _>>()?;
+    let off_m = ahead_m.iter().zip(&specs).map(|(ahead_m, spec)| ahead_m - spec.mount.position.x());
+    Ok(Stance {
+        strips,
+        farthest_m: rings.iter().map(Ring::longest_range_m).fold(0.0, f64::max),
+        parallax_rad: passes::parallax_rad(&inspection.profile, &places),
+        shift_m: spread(off_m),
+        apart_m: spread(ahead_m.iter().copied()),
+    })
+}
+
+/// The largest less the least.
+fn spread(values: impl Iterator<Item = f64> + Clone) -> f64 {
+    (values.clone().fold(f64::MIN, f64::max) - values.fold(f64::MAX, f64::min)).max(0.0)
+}
+
+/// What each head sees of the wall.
+fn views(
+    inspection: &Inspection,
+    specs: &[HeadSpec],
+    hidden: &[Vec<AngleRange>],
+    pose: &Pose,
+    rings: &[Ring],
+) -> Result<Vec<View>, SamplingError> {
+    /// Stretches of wall out of reach, at most.
+    const OUT_OF_REACH: usize = 64;
+    let programs = layout::programs(specs, inspection.layout, 0.0)?;
     let mut views = Vec::with_capacity(specs.len());
-    for ((spec, program), hidden) in specs.iter().zip(&programs).zip(hidden) {
+    for (((spec, program), hidden), ring) in specs.iter().zip(&programs).zip(hidden).zip(rings) {
         let standing = Standing::new(&inspection.profile, pose, &spec.mount)?;
         let arc = |angles: &AngleRange| Arc::of(&standing, angles);
         let sector = program.sector.map(|(from_rad, size_rad)| AngleRange { from_rad, size_rad });
-        views.push(View {
-            sector: sector.as_ref().map(arc).transpose()?,
-            hidden: hidden.iter().map(arc).collect::<Result<_, _>>()?,
-        });
+        let mut view = View { sector: sector.as_ref().map(arc).transpose()?, hidden: Vec::new() };
+        view.hidden = hidden.iter().map(arc).collect::<Result<_, _>>()?;
+        view.hidden.reserve(OUT_OF_REACH);
+        view.hide_out_of_reach(ring, spec.reach_m(inspection.sound_speed_mps));
+        views.push(view);
     }
-    let mut strips = Strips::default();
-    strips.rebuild(inspection.profile.perimeter_m(), &views);
-    Ok(strips)
+    Ok(views)
 }
 
 fn planned_mode(
@@ -320,25 +392,20 @@ fn planned_mode(
     t_y2_m: f64,
 ) -> Result<PlannedMode, SamplingError> {
     let mode = of_heads.first().copied().ok_or(SamplingError::NoCommonMode)?;
-    let longest = |of: fn(&HeadMode) -> f64| of_heads.iter().map(of).fold(0.0, f64::max);
-    let (turn_s, ping_period_s) =
-        (longest(|mode| mode.turn.period_s()), longest(|mode| mode.turn.ping_period_s()));
+    let ping_period_s = of_heads.iter().map(|mode| mode.turn.ping_period_s()).fold(0.0, f64::max);
     let heads = HeadSet::first(of_heads.len());
+    let turn_s = |head: usize| of_heads.get(head).map_or(0.0, |mode| mode.turn.period_s());
     let passes = match inspection.layout {
         HeadLayout::PhaseShift => Passes::evenly_phased(heads, turn_s)?,
         HeadLayout::SectorOffset => {
-            let specs: Vec<HeadSpec> = inspection
-                .heads
-                .iter()
-                .zip(of_heads)
-                .map(|((spec, _), mode)| HeadSpec {
-                    step_rad: mode.turn.step_rad(),
-                    ping_period_s: mode.turn.ping_period_s(),
-                    ..*spec
-                })
-                .collect();
+            let set = |((spec, _), mode): (&(HeadSpec, Vec<HeadMode>), &HeadMode)| HeadSpec {
+                step_rad: mode.turn.step_rad(),
+                ping_period_s: mode.turn.ping_period_s(),
+                ..*spec
+            };
+            let specs: Vec<HeadSpec> = inspection.heads.iter().zip(of_heads).map(set).collect();
             let sweep_s = Schedule::new(&specs, inspection.layout, 0.0)?.sweep_s();
-            Passes::in_sectors(heads, turn_s, sweep_s.unwrap_or(2.0 * turn_s / of_heads.len() as f64))?
+            Passes::in_sectors(heads, sweep_s.ok_or(SamplingError::NoCommonMode)?)?
         }
     };
     Ok(PlannedMode { mode, chords_m, t_y2_m, passes, ping_period_s })

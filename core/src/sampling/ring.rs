@@ -176,6 +176,16 @@ impl Ring {
         usize::try_from(soundings.clamp(1, i64::from(count.max(1)))).unwrap_or(1)
     }
 
+    /// The profile's perimeter, m.
+    pub fn perimeter_m(&self) -> f64 {
+        self.perimeter_m
+    }
+
+    /// The way all round the perimeter as the head turns, m: below zero where that is against arc length.
+    pub fn way_round_m(&self) -> f64 {
+        self.way_m.last().copied().unwrap_or(0.0)
+    }
+
     /// The soundings, in order of angle.
     pub fn soundings(&self) -> &[Sounding] {
         &self.soundings
@@ -199,7 +209,7 @@ impl Ring {
     /// a head that pings once a turn has the whole perimeter between its pings.
     pub fn steps_m(&self, stride: usize) -> impl Iterator<Item = f64> {
         let count = self.soundings.len().max(1);
-        let whole_m = self.way_m.last().copied().unwrap_or(0.0);
+        let whole_m = self.way_round_m();
         let way_m =
             move |k: usize| self.way_m.get(k % count).copied().unwrap_or(0.0) + whole_m * (k / count) as f64;
         self.pairs(stride).enumerate().map(move |(k, (a, b))| {

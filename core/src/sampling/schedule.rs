@@ -83,7 +83,8 @@ mod tests {
             mount: Mount { position: Vec3::zero(), rotation: Rot::identity() },
             step_rad: step_deg.to_radians(),
             ping_period_s: 0.02,
-            max_range_m: 10.0,
+            range_m: [0.2, 10.0],
+            sound_speed_mps: 1500.0,
             beam_rad: 0.02,
             body: HeadBody { radius_m: 0.0, ahead_m: 0.0, behind_m: 0.0 },
         }

@@ -4,7 +4,7 @@ use super::error::SamplingError;
 use super::head::{HeadSet, MAX_HEADS};
 use super::occlusion::AngleRange;
 use super::passes::Passes;
-use super::ring::Standing;
+use super::ring::{Ring, Standing};
 use super::spacing;
 use crate::math;
 
@@ -53,8 +53,40 @@ impl Arc {
 pub struct View {
     /// Its sector; `None` for all around.
     pub sector: Option<Arc>,
-    /// What is hidden from it.
+    /// What is hidden from it, by the vehicle or by distance.
     pub hidden: Vec<Arc>,
+}
+
+impl View {
+    /// Hides what a ring meets nearer or farther than the head hears, as far as there is room.
+    pub fn hide_out_of_reach(&mut self, ring: &Ring, reach_m: [f64; 2]) {
+        let [least_m, most_m] = reach_m;
+        let heard = |range_m: f64| (least_m..=most_m).contains(&range_m);
+        let soundings = ring.soundings();
+        let Some(first) = soundings.iter().position(|sounding| heard(sounding.range_m())) else {
+            self.hidden.push(Arc { from_m: 0.0, length_m: ring.perimeter_m() });
+            return;
+        };
+        let mut began: Option<f64> = None;
+        let mut before_m = 0.0;
+        for sounding in soundings.iter().cycle().skip(first).take(soundings.len() + 1) {
+            match (heard(sounding.range_m()), began) {
+                (false, None) => began = Some(before_m),
+                (true, Some(from_m)) => {
+                    let way_m = math::wrap_signed(sounding.sigma_m - from_m, ring.perimeter_m());
+                    let forward = ring.way_round_m() >= 0.0;
+                    let (from_m, way_m) = if forward { (from_m, way_m) } else { (sounding.sigma_m, -way_m) };
+                    let length_m = math::wrap(way_m, ring.perimeter_m());
+                    if self.hidden.len() < self.hidden.capacity() {
+                        self.hidden.push(Arc { from_m, length_m });
+                    }
+                    began = None;
+                }
+                _ => {}
+            }
+            before_m = sounding.sigma_m;
+        }
+    }
 }
 
 /// A strip of the wall along the tunnel.
@@ -64,31 +96,56 @@ pub struct Strip {
     pub arc: Arc,
     /// The heads that see it.
     pub seen_by: HeadSet,
+    /// Something hides it, or part of it, from a head: pings stop up to a step before its edge. Where it is only beyond
+    /// a sector, they stop at it.
+    pub hidden: bool,
 }
 
-/// The strips of a wall, in order of arc length, neighbours seen by different heads; one strip where all see all.
+/// How the vehicle goes.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Going {
+    /// Time between two pings, the longest of any head, seconds.
+    pub ping_period_s: f64,
+    /// By how much the beams' swing may carry them along the wall, besides the vehicle's speed, m/s.
+    pub swing_mps: f64,
+    /// By how much passes are out of their places at any speed, m.
+    pub shift_m: f64,
+    /// How far apart heads are along the hull, m: while the vehicle goes so far, the swing goes on.
+    pub apart_m: f64,
+}
+
+/// The strips of a wall, in order of arc length, neighbours seen by different heads; one strip where all see all. With
+/// the largest steps on each, for each of some settings of the heads.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Strips {
     strips: Vec<Strip>,
     edges_m: Vec<f64>,
     perimeter_m: f64,
+    /// By setting and strip: the largest step of the heads that see it, m, and of all of them.
+    steps_m: Vec<[f64; 2]>,
+    /// The strip of each sounding of the ring looked at.
+    strip_of: Vec<usize>,
 }
 
 impl Strips {
-    /// Without strips, but with room for those that so many arcs make.
-    pub fn with_room(arcs: usize) -> Self {
+    /// Without strips, but with room for those that so many arcs make, in so many settings.
+    pub fn with_room(arcs: usize, settings: usize, soundings: u32) -> Self {
+        let strips = 2 * arcs + 1;
         Self {
-            strips: Vec::with_capacity(2 * arcs + 1),
+            strips: Vec::with_capacity(strips),
             edges_m: Vec::with_capacity(2 * arcs),
             perimeter_m: 0.0,
+            steps_m: Vec::with_capacity(strips * settings),
+            strip_of: Vec::with_capacity(soundings as usize),
         }
     }
 
-    /// The strips that these views make.
+    /// The strips that these views make, without steps.
     ///
     /// Allocates: not when there is room for their sectors and hidden arcs.
     pub fn rebuild(&mut self, perimeter_m: f64, views: &[View]) {
         self.perimeter_m = perimeter_m;
+        self.steps_m.clear();
         self.edges_m.clear();
         for arc in views.iter().flat_map(|view| view.sector.iter().chain(&view.hidden)) {
             self.edges_m.push(math::wrap(arc.from_m, perimeter_m));
@@ -102,15 +159,48 @@ impl Strips {
             let to_m =
                 edges.get(k + 1).copied().unwrap_or(perimeter_m + edges.first().copied().unwrap_or(0.0));
             let arc = Arc { from_m: *from_m, length_m: to_m - from_m };
-            let seen_by = seen_by(views, from_m + arc.length_m / 2.0, perimeter_m);
-            match self.strips.last_mut() {
-                Some(last) if last.seen_by == seen_by => last.arc.length_m += arc.length_m,
-                _ => self.strips.push(Strip { arc, seen_by }),
-            }
+            self.strips.push(strip(views, arc, perimeter_m));
         }
         if self.strips.is_empty() {
-            let arc = Arc { from_m: 0.0, length_m: perimeter_m };
-            self.strips.push(Strip { arc, seen_by: seen_by(views, 0.0, perimeter_m) });
+            self.strips.push(strip(views, Arc { from_m: 0.0, length_m: perimeter_m }, perimeter_m));
+        }
+        self.strips.dedup_by(|b, a| {
+            let alike = a.seen_by == b.seen_by && a.hidden == b.hidden;
+            if alike {
+                a.arc.length_m += b.arc.length_m;
+            }
+            alike
+        });
+    }
+
+    /// Measures the largest steps on each strip in `settings` settings of the heads: `stride` says how many soundings of
+    /// its ring a head's step passes over in a setting, `None` for a head that isn't there.
+    ///
+    /// Allocates: not when there is room for the settings.
+    pub fn measure<'a>(
+        &mut self,
+        settings: usize,
+        rings: impl Iterator<Item = &'a Ring>,
+        stride: impl Fn(usize, usize) -> Option<usize>,
+    ) {
+        let count = self.strips.len();
+        self.steps_m.clear();
+        self.steps_m.resize(count * settings, [0.0; 2]);
+        for (head, ring) in rings.enumerate() {
+            self.strip_of.clear();
+            for sounding in ring.soundings() {
+                self.strip_of.push(number_at(&self.strips, sounding.sigma_m, self.perimeter_m));
+            }
+            let forward = ring.way_round_m() >= 0.0;
+            for setting in 0..settings {
+                let Some(stride) = stride(setting, head) else { continue };
+                for ((sounding, from), step_m) in
+                    ring.soundings().iter().zip(&self.strip_of).zip(ring.steps_m(stride))
+                {
+                    let to = Reached { head, sigma_m: sounding.sigma_m, strip: *from, forward };
+                    note_step(&self.strips, &mut self.steps_m, setting, &to, step_m, self.perimeter_m);
+                }
+            }
         }
     }
 
@@ -119,15 +209,29 @@ impl Strips {
         &self.strips
     }
 
-    /// T_max predicted at a speed, m: the largest of any strip. `t_y_m` is the largest step of a head within a turn.
+    /// The strip at an arc length.
+    pub fn at(&self, sigma_m: f64) -> Option<&Strip> {
+        self.strips.get(number_at(&self.strips, sigma_m, self.perimeter_m))
+    }
+
+    /// The largest step of heads on what they see, in a setting, m.
+    pub fn largest_step_m(&self, setting: usize) -> f64 {
+        let count = self.strips.len();
+        let of_setting = self.steps_m.iter().skip(setting * count).take(count);
+        of_setting.map(|steps| steps[0]).fold(0.0, f64::max)
+    }
+
+    /// T_max predicted at a speed, m: the largest of any strip; infinite where a wide strip is seen by no head.
     ///
-    /// On a strip that some heads don't see, passes are farther apart; but the strip is no wider than it is, so that
-    /// its width and a step bound the distance between samples on its sides, too.
-    pub fn t_max_m(&self, passes: &Passes, speed_mps: f64, ping_period_s: f64, t_y_m: f64) -> f64 {
-        let t_m =
-            |limit: Limit| spacing::t_max_m(speed_mps * limit.gap_s, speed_mps * ping_period_s, limit.t_y_m);
-        self.limits(passes, t_y_m)
-            .map(|(within, across)| within.map_or(f64::INFINITY, t_m).min(across.map_or(f64::INFINITY, t_m)))
+    /// On a strip that some heads don't see, passes are farther apart; but the strip is no wider than it is, so that its
+    /// width bounds the distance between samples on its sides, too.
+    /// Source: Jorge et al. 2021, Eq. 16.
+    pub fn t_max_m(&self, setting: usize, passes: &Passes, speed_mps: f64, going: &Going) -> f64 {
+        let t_m = |limit: Limit| limit.t_m(speed_mps, going);
+        self.limits(setting, passes)
+            .map(|(_, within, across)| {
+                within.map_or(f64::INFINITY, t_m).min(across.map_or(f64::INFINITY, t_m))
+            })
             .fold(0.0, f64::max)
     }
 
@@ -136,150 +240,162 @@ impl Strips {
     /// Errors: a strip on which neighbouring samples are as far apart as the target at any speed.
     pub fn speed_for_target_mps(
         &self,
+        setting: usize,
         passes: &Passes,
         target_m: f64,
-        ping_period_s: f64,
-        t_y_m: f64,
+        going: &Going,
     ) -> Result<f64, SamplingError> {
         let mut slowest = f64::INFINITY;
-        for (within, across) in self.limits(passes, t_y_m) {
-            let speed = |limit: Limit| {
-                spacing::speed_for_target_mps(target_m, limit.t_y_m, limit.gap_s, ping_period_s)
+        for (strip, within, across) in self.limits(setting, passes) {
+            let limits = || [within, across].into_iter().flatten();
+            let fastest =
+                limits().filter_map(|limit| limit.speed_mps(target_m, going)).max_by(f64::total_cmp);
+            let t_y_m = limits().map(|limit| limit.t_y_m).fold(f64::INFINITY, f64::min);
+            let arc = strip.arc;
+            let refused = if within.is_some() && t_y_m >= target_m {
+                SamplingError::AngularStep { target_m, t_y_m }
+            } else if within.is_some() {
+                SamplingError::OffAxis { target_m }
+            } else {
+                let sigma_m = math::wrap(arc.from_m + arc.length_m / 2.0, self.perimeter_m);
+                SamplingError::UnseenStrip { target_m, width_m: arc.length_m, sigma_m }
             };
-            let fastest = [within, across].into_iter().flatten().filter_map(speed).max_by(f64::total_cmp);
-            let least_t_y_m =
-                [within, across].into_iter().flatten().map(|limit| limit.t_y_m).fold(f64::INFINITY, f64::min);
-            let fastest = fastest.ok_or(SamplingError::AngularStep { target_m, t_y_m: least_t_y_m })?;
-            slowest = slowest.min(fastest);
+            slowest = slowest.min(fastest.ok_or(refused)?);
         }
         Ok(slowest)
     }
 
     /// For each strip what bounds T within it, where any head sees it, and across it, where not all do.
-    fn limits(&self, passes: &Passes, t_y_m: f64) -> impl Iterator<Item = (Option<Limit>, Option<Limit>)> {
-        let all = passes.heads();
+    fn limits(
+        &self,
+        setting: usize,
+        passes: &Passes,
+    ) -> impl Iterator<Item = (&Strip, Option<Limit>, Option<Limit>)> {
+        let count = self.strips.len();
         let best_s =
             self.strips.iter().filter_map(|strip| passes.gap_s(strip.seen_by)).fold(f64::INFINITY, f64::min);
         let full = move |strip: &Strip| passes.gap_s(strip.seen_by).is_some_and(|gap_s| gap_s <= best_s);
         self.strips.iter().enumerate().map(move |(k, strip)| {
-            let within = passes.gap_s(strip.seen_by).map(|gap_s| Limit { gap_s, t_y_m });
-            let across = (!full(strip) && !all.is_empty())
-                .then(|| Limit { gap_s: best_s, t_y_m: self.run_m(k, &full) + t_y_m })
-                .filter(|limit| limit.gap_s.is_finite() && limit.t_y_m < self.perimeter_m);
-            (within, across)
+            let seen_m = self.steps_m.get(setting * count + k).map_or(0.0, |steps| steps[0]);
+            let within = passes.gap_s(strip.seen_by).map(|gap_s| Limit { gap_s, t_y_m: seen_m });
+            let across = (!full(strip) && best_s.is_finite())
+                .then(|| Limit { gap_s: best_s, t_y_m: self.across_m(setting, k, &full) })
+                .filter(|limit| limit.t_y_m < self.perimeter_m);
+            (strip, within, across)
         })
     }
 
-    /// Width of the strips about strip `k` that aren't `full`, m.
-    fn run_m(&self, k: usize, full: &impl Fn(&Strip) -> bool) -> f64 {
+    /// Distance between samples on both sides of the strips about strip `k` that aren't `full`, m.
+    fn across_m(&self, setting: usize, k: usize, full: &impl Fn(&Strip) -> bool) -> f64 {
         let count = self.strips.len();
-        let width = |number: usize| self.strips.get(number % count).map_or(0.0, |strip| strip.arc.length_m);
-        let stays = |number: usize| self.strips.get(number % count).is_some_and(|strip| !full(strip));
-        let forward: f64 = (k..k + count).take_while(|number| stays(*number)).map(width).sum();
-        let back: f64 =
-            (1..count).map(|step| k + count - step).take_while(|number| stays(*number)).map(width).sum();
-        (forward + back).min(self.perimeter_m)
+        let thin = |number: usize| {
+            self.strips.get(number % count).filter(|strip| !full(strip)).map(|_| number % count)
+        };
+        let forward = (k..k + count).map_while(&thin);
+        let back = (1..count).map(|step| k + count - step).map_while(&thin);
+        let (mut width_m, mut step_m, mut hidden) = (0.0, 0.0_f64, false);
+        for number in forward.chain(back) {
+            let Some(strip) = self.strips.get(number) else { continue };
+            width_m += strip.arc.length_m;
+            hidden |= strip.hidden;
+            step_m = step_m.max(self.steps_m.get(setting * count + number).map_or(0.0, |steps| steps[1]));
+        }
+        // Pings end at a sector's edge, but up to a step before what is hidden.
+        width_m.min(self.perimeter_m) + if hidden { 2.0 * step_m } else { 0.0 }
     }
 }
 
-/// Passes this far apart in time, and neighbours within a turn this far apart on the wall.
+/// Where a step begins, and which way it goes.
+struct Reached {
+    head: usize,
+    sigma_m: f64,
+    strip: usize,
+    forward: bool,
+}
+
+/// Notes a step on every strip that it touches or passes over, however narrow.
+fn note_step(
+    strips: &[Strip],
+    steps_m: &mut [[f64; 2]],
+    setting: usize,
+    from: &Reached,
+    step_m: f64,
+    perimeter_m: f64,
+) {
+    let count = strips.len();
+    let mut number = from.strip;
+    let into_m =
+        strips.get(number).map_or(0.0, |strip| math::wrap(from.sigma_m - strip.arc.from_m, perimeter_m));
+    let mut left_behind_m = if from.forward {
+        -into_m
+    } else {
+        into_m - strips.get(number).map_or(0.0, |strip| strip.arc.length_m)
+    };
+    for _ in 0..count {
+        let (Some(strip), Some(steps)) = (strips.get(number), steps_m.get_mut(setting * count + number))
+        else {
+            return;
+        };
+        if strip.seen_by.has(from.head) {
+            steps[0] = steps[0].max(step_m);
+        }
+        steps[1] = steps[1].max(step_m);
+        left_behind_m += strip.arc.length_m;
+        if left_behind_m >= step_m {
+            return;
+        }
+        number = if from.forward { number + 1 } else { number + count - 1 } % count;
+    }
+}
+
+/// Passes this far apart in time, and neighbours this far apart around the wall.
 #[derive(Debug, Clone, Copy)]
 struct Limit {
     gap_s: f64,
     t_y_m: f64,
 }
 
-fn seen_by(views: &[View], sigma_m: f64, perimeter_m: f64) -> HeadSet {
-    let sees = |view: &View| {
-        view.sector.is_none_or(|sector| sector.has(sigma_m, perimeter_m))
-            && !view.hidden.iter().any(|hidden| hidden.has(sigma_m, perimeter_m))
-    };
+impl Limit {
+    fn t_m(&self, speed_mps: f64, going: &Going) -> f64 {
+        let over_ground_mps = speed_mps + going.swing_mps;
+        let lag_m2ps = going.swing_mps * going.apart_m;
+        let lag_m = if lag_m2ps > 0.0 { lag_m2ps / speed_mps } else { 0.0 };
+        let t_x_m = over_ground_mps * self.gap_s + going.shift_m + lag_m;
+        spacing::t_max_m(t_x_m, over_ground_mps * going.ping_period_s, self.t_y_m)
+    }
+
+    /// The largest speed that solves T = hypot((v + w) t + shift + w a / v, T_y), t being gap and ping period, w the
+    /// swing, a how far heads are apart.
+    fn speed_mps(&self, target_m: f64, going: &Going) -> Option<f64> {
+        // (T - t)(T + t) keeps its digits as the two meet.
+        let along_m = math::sqrt(((target_m - self.t_y_m) * (target_m + self.t_y_m)).max(0.0));
+        let time_s = self.gap_s + going.ping_period_s;
+        let for_speed_m = along_m - going.shift_m - going.swing_mps * time_s;
+        let rest = for_speed_m * for_speed_m - 4.0 * time_s * going.swing_mps * going.apart_m;
+        let possible = time_s > 0.0 && for_speed_m > 0.0 && rest >= 0.0;
+        possible.then(|| (for_speed_m + math::sqrt(rest)) / (2.0 * time_s))
+    }
+}
+
+fn strip(views: &[View], arc: Arc, perimeter_m: f64) -> Strip {
+    let middle_m = arc.from_m + arc.length_m / 2.0;
+    let hides = |view: &View| view.hidden.iter().any(|hidden| hidden.has(middle_m, perimeter_m));
+    let sees =
+        |view: &View| view.sector.is_none_or(|sector| sector.has(middle_m, perimeter_m)) && !hides(view);
     let heads = views.iter().take(MAX_HEADS).enumerate().filter(|(_, view)| sees(view));
-    heads.fold(HeadSet::default(), |set, (head, _)| set.with(head))
+    Strip {
+        arc,
+        seen_by: heads.fold(HeadSet::default(), |set, (head, _)| set.with(head)),
+        hidden: views.iter().any(hides),
+    }
+}
+
+/// The number of the strip at an arc length: the last that begins at or before it.
+fn number_at(strips: &[Strip], sigma_m: f64, perimeter_m: f64) -> usize {
+    let first_m = strips.first().map_or(0.0, |strip| strip.arc.from_m);
+    let from_first_m = math::wrap(sigma_m - first_m, perimeter_m);
+    strips.iter().rposition(|strip| strip.arc.from_m - first_m <= from_first_m).unwrap_or(0)
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn arc(from_m: f64, length_m: f64) -> Arc {
-        Arc { from_m, length_m }
-    }
-
-    fn strips(views: &[View]) -> Strips {
-        let mut strips = Strips::default();
-        strips.rebuild(30.0, views);
-        strips
-    }
-
-    fn all_around(hidden: &[Arc]) -> View {
-        View { sector: None, hidden: hidden.to_vec() }
-    }
-
-    #[test]
-    fn where_all_see_all_there_is_one_strip() {
-        let one = strips(&[all_around(&[]), all_around(&[])]);
-        assert_eq!(one.as_slice(), [Strip { arc: arc(0.0, 30.0), seen_by: HeadSet::first(2) }]);
-        let passes = Passes::evenly_phased(HeadSet::first(2), 8.0).unwrap();
-        let v = one.speed_for_target_mps(&passes, 0.5, 0.02, 0.2).unwrap();
-        assert!((v - spacing::speed_for_target_mps(0.5, 0.2, 4.0, 0.02).unwrap()).abs() < 1e-15);
-        assert!((one.t_max_m(&passes, v, 0.02, 0.2) - 0.5).abs() < 1e-12);
-    }
-
-    #[test]
-    fn a_hidden_strip_crosses_the_seam() {
-        let some = strips(&[all_around(&[arc(29.0, 2.0)]), all_around(&[])]);
-        let widths: Vec<f64> = some.as_slice().iter().map(|strip| strip.arc.length_m).collect();
-        assert_eq!(widths, [28.0, 2.0]);
-        assert_eq!(some.as_slice()[1].seen_by, HeadSet::first(2).without(0));
-    }
-
-    #[test]
-    fn fewer_passes_on_a_hidden_strip_slow_the_vehicle_down() {
-        let views =
-            [all_around(&[arc(7.0, 1.7)]), all_around(&[]), all_around(&[arc(7.0, 1.7)]), all_around(&[])];
-        let passes = Passes::evenly_phased(HeadSet::first(4), 8.0).unwrap();
-        let hidden = strips(&views);
-        let v = hidden.speed_for_target_mps(&passes, 0.5, 0.02, 0.16).unwrap();
-        assert!((v - spacing::speed_for_target_mps(0.5, 0.16, 4.0, 0.02).unwrap()).abs() < 1e-15);
-        assert!((hidden.t_max_m(&passes, v, 0.02, 0.16) - 0.5).abs() < 1e-12);
-    }
-
-    #[test]
-    fn a_narrow_hidden_strip_counts_as_a_long_step_if_that_is_better() {
-        let views = [all_around(&[arc(7.0, 0.1)]), all_around(&[])];
-        let passes = Passes::evenly_phased(HeadSet::first(2), 8.0).unwrap();
-        let v = strips(&views).speed_for_target_mps(&passes, 0.5, 0.02, 0.16).unwrap();
-        assert!((v - spacing::speed_for_target_mps(0.5, 0.26, 4.0, 0.02).unwrap()).abs() < 1e-15);
-    }
-
-    #[test]
-    fn a_strip_that_no_head_sees_can_make_every_speed_too_high() {
-        let views = [all_around(&[arc(7.0, 0.7)]), all_around(&[arc(7.0, 0.7)])];
-        let passes = Passes::evenly_phased(HeadSet::first(2), 8.0).unwrap();
-        let why = strips(&views).speed_for_target_mps(&passes, 0.5, 0.02, 0.16).unwrap_err();
-        assert!(
-            matches!(why, SamplingError::AngularStep { t_y_m, .. } if (t_y_m - 0.86).abs() < 1e-9),
-            "{why}"
-        );
-        assert!(strips(&views).speed_for_target_mps(&passes, 1.0, 0.02, 0.16).is_ok());
-        let blind = [all_around(&[arc(0.0, 30.0)])];
-        let one = Passes::evenly_phased(HeadSet::first(1), 8.0).unwrap();
-        assert!(strips(&blind).speed_for_target_mps(&one, 0.5, 0.02, 0.16).is_err());
-        assert!(strips(&blind).t_max_m(&one, 0.1, 0.02, 0.16).is_infinite());
-    }
-
-    #[test]
-    fn sectors_that_leave_a_place_out_are_noticed() {
-        let views = [
-            View { sector: Some(arc(0.2, 14.8)), hidden: Vec::new() },
-            View { sector: Some(arc(15.0, 14.9)), hidden: Vec::new() },
-        ];
-        let passes = Passes::in_sectors(HeadSet::first(2), 8.0, 8.0).unwrap();
-        let some = strips(&views);
-        let unseen: Vec<&Strip> = some.as_slice().iter().filter(|strip| strip.seen_by.is_empty()).collect();
-        assert!(unseen.len() == 1 && (unseen[0].arc.length_m - 0.3).abs() < 1e-9);
-        let v = some.speed_for_target_mps(&passes, 1.0, 0.02, 0.16).unwrap();
-        assert!((v - spacing::speed_for_target_mps(1.0, 0.46, 8.0, 0.02).unwrap()).abs() < 1e-12);
-    }
-}
+mod tests;

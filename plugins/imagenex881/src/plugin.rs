@@ -64,7 +64,8 @@ impl Imagenex881 {
             mount: self.sensor.mount,
             step_rad: self.settings.step_rad(),
             ping_period_s: self.settings.ping_period.as_secs_f64(),
-            max_range_m: f64::from(self.settings.command.range_m),
+            range_m: [self.settings.command.min_range_m, f64::from(self.settings.command.range_m)],
+            sound_speed_mps: SOUND_SPEED_MPS,
             beam_rad: self.settings.beam_rad(),
             body: self.settings.body,
         }

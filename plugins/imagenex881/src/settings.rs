@@ -172,8 +172,8 @@ fn pings_a_turn(mode: Mode) -> i32 {
 
 /// How long a turn takes at a range setting.
 ///
-/// From the periods measured in this mode, or else the maker's table: what was found at this very range; between two
-/// ranges, in proportion; and beyond them with the time that sound takes for the difference, to the range and back once
+/// From the periods measured in this mode and the maker's table at its range: what is known at this very range; between
+/// two ranges, in proportion; and beyond them with the time that sound takes for the difference, to the range and back once
 /// a ping. The rest of a ping's period, stepping and the line, doesn't depend on the range.
 fn turn_period(mode: Mode, range_m: u8, measured: &[MeasuredTurn]) -> (DurNs, Basis) {
     let table = MeasuredTurn {
@@ -182,9 +182,11 @@ fn turn_period(mode: Mode, range_m: u8, measured: &[MeasuredTurn]) -> (DurNs, Ba
         period: DurNs(mode.turn_ms * 1_000_000),
     };
     let of_mode = || measured.iter().filter(|turn| turn.step_counts == mode.step_counts);
-    let (known, basis) =
-        if of_mode().next().is_some() { (measured, Basis::Measured) } else { (&[table][..], Basis::Table) };
-    let known = || known.iter().filter(|turn| turn.step_counts == mode.step_counts);
+    let at_table = of_mode().any(|turn| turn.range_m == TABLE_RANGE_M);
+    let known = || of_mode().chain((!at_table).then_some(&table));
+    let basis = |turn: &MeasuredTurn| {
+        if *turn == table && !at_table { Basis::Table } else { Basis::Measured }
+    };
     let below = known().filter(|turn| turn.range_m <= range_m).max_by_key(|turn| turn.range_m);
     let above = known().filter(|turn| turn.range_m >= range_m).min_by_key(|turn| turn.range_m);
     let there_and_back = |from_m: u8| {
@@ -192,7 +194,7 @@ fn turn_period(mode: Mode, range_m: u8, measured: &[MeasuredTurn]) -> (DurNs, Ba
         2_000_000_000 * metres / SOUND_SPEED * i64::from(pings_a_turn(mode))
     };
     match (below, above) {
-        (Some(known), _) | (_, Some(known)) if known.range_m == range_m => (known.period, basis),
+        (Some(known), _) | (_, Some(known)) if known.range_m == range_m => (known.period, basis(known)),
         (Some(below), Some(above)) => {
             let share = f64::from(range_m - below.range_m) / f64::from(above.range_m - below.range_m);
             let (near_s, far_s) = (below.period.as_secs_f64(), above.period.as_secs_f64());
@@ -209,7 +211,17 @@ fn turn_period(mode: Mode, range_m: u8, measured: &[MeasuredTurn]) -> (DurNs, Ba
 /// others in tables of their own.
 fn measured_turns(mode: Mode, range_m: u8, own: &Section<'_>) -> Result<Vec<MeasuredTurn>, ConfigError> {
     let mut measured = Vec::new();
+    let possible = |step_counts: u8, range_m: u8, turn_s: f64| {
+        // Each ping waits for its sound, there and back.
+        let pings = f64::from(COUNTS_PER_TURN / i32::from(step_counts));
+        let least_s = pings * 2.0 * f64::from(range_m) / SOUND_SPEED as f64;
+        if turn_s >= least_s {
+            return Ok(());
+        }
+        Err(format!("is less than the {least_s:.2} s that sound alone takes at a range of {range_m} m"))
+    };
     if let Some(turn_s) = own.number("turn_period_s", TURN_S)? {
+        possible(mode.step_counts, range_m, turn_s).map_err(|why| own.invalid("turn_period_s", &why))?;
         let period = DurNs::from_secs_f64(turn_s);
         measured.push(MeasuredTurn { step_counts: mode.step_counts, range_m, period });
     }
@@ -220,7 +232,11 @@ fn measured_turns(mode: Mode, range_m: u8, own: &Section<'_>) -> Result<Vec<Meas
         let range_m = u8::try_from(range_m).ok().filter(|range| RANGES_M.contains(range));
         let range_m = range_m.ok_or_else(|| table.invalid("range_m", "is no range setting of the head"))?;
         let turn_s = table.required("turn_period_s", table.number("turn_period_s", TURN_S)?)?;
-        if measured.iter().any(|known| known.step_counts == step_counts && known.range_m == range_m) {
+        possible(step_counts, range_m, turn_s).map_err(|why| table.invalid("turn_period_s", &why))?;
+        if measured
+            .iter()
+            .any(|known: &MeasuredTurn| known.step_counts == step_counts && known.range_m == range_m)
+        {
             return Err(table.invalid("range_m", "has its period in this mode already"));
         }
         measured.push(MeasuredTurn { step_counts, range_m, period: DurNs::from_secs_f64(turn_s) });

@@ -12,9 +12,8 @@ use crate::coverage::hole::FARTHEST_M;
 use crate::coverage::{SampleIndex, StoreError, WallSample};
 use crate::frames::{Point3, Tunnel};
 use crate::math;
-use crate::sampling::advice::Situation;
 use crate::sampling::head::{HeadMotion, MAX_HEADS};
-use crate::sampling::passes::Passes;
+use crate::sampling::passes::{Phasing, Situation};
 use crate::sampling::spacing;
 
 /// What is remembered of each head's sweep, and how the heads' passes were spread at the last beat.
@@ -71,7 +70,7 @@ pub(super) fn cover(
 
 impl HeadSweeps {
     fn note_gaps(&mut self, situation: &Situation) {
-        let passes = Passes::measured(&situation.heads, situation.speed_mps);
+        let passes = Phasing::of(situation).at(situation.speed_mps);
         (self.pass_gap_s, self.even_gap_s) =
             (passes.gap_s(passes.heads()).unwrap_or(0.0), passes.even_gap_s());
         let periods = situation.heads.iter().flatten().map(HeadMotion::ping_period_s);

@@ -12,8 +12,9 @@ use crate::coverage::Reach;
 use crate::frames::{Mount, Pose, head_direction};
 use crate::fusion::{Fix, NoFix};
 use crate::math;
-use crate::sampling::advice::Situation;
 use crate::sampling::head::{HeadMotion, MAX_HEADS};
+use crate::sampling::layout::HeadLayout;
+use crate::sampling::passes::Situation;
 use crate::time::{DurNs, MonoNs};
 
 /// A head whose last return is older than this isn't turning.
@@ -34,7 +35,7 @@ pub(super) fn place(
     for item in &positioned.0 {
         match *item {
             Positioned::Beat { at, fix } => {
-                let situation = situation(at, fix, &heads, &sensors, &tracks);
+                let situation = situation(at, fix, context.layout, &heads, &sensors, &tracks);
                 placed.0.push(Placed::Situation(at, situation));
             }
             Positioned::Ping { event, fix } => {
@@ -100,6 +101,7 @@ fn reach(pose: &Pose, mount: &Mount, context: &Place) -> Reach {
 fn situation(
     at: MonoNs,
     fix: Result<Fix, NoFix>,
+    layout: HeadLayout,
     heads: &HeadTable,
     sensors: &SensorTable,
     tracks: &Query<'_, '_, &mut HeadTrack>,
@@ -123,6 +125,8 @@ fn situation(
     Situation {
         pose: fix.ok().map(|fix| fix.pose),
         speed_mps: fix.map_or(0.0, |fix| fix.speed_mps),
+        layout,
+        configured: heads.0.iter().flatten().count(),
         heads: motions,
     }
 }

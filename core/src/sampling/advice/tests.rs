@@ -2,6 +2,7 @@ use super::*;
 use crate::frames::{Mount, Vec3};
 use crate::math::TAU;
 use crate::sampling::head::{Basis, HeadBody, Turn};
+use crate::sampling::spacing;
 use crate::tunnel::named;
 
 const LENGTH_M: f64 = 1000.0;
@@ -14,7 +15,8 @@ fn spec(position: [f64; 3], radius_m: f64) -> HeadSpec {
         },
         step_rad: f64::to_radians(0.9),
         ping_period_s: 0.02,
-        max_range_m: 10.0,
+        range_m: [0.2, 10.0],
+        sound_speed_mps: 1500.0,
         beam_rad: f64::to_radians(1.4),
         body: HeadBody { radius_m, ahead_m: 0.03, behind_m: 0.2 },
     }
@@ -54,13 +56,25 @@ impl Case {
         }
         let [y, z] = profile.reference();
         let pose = Pose { position: Point3::new(100.0, y, z), attitude: Rot::identity() };
-        let situation = Situation { pose: Some(pose), speed_mps, heads };
+        let situation = Situation {
+            pose: Some(pose),
+            speed_mps,
+            layout: HeadLayout::PhaseShift,
+            configured: specs.len(),
+            heads,
+        };
         Self { profile, specs, situation, target_m, left_s: None }
     }
 
     fn advisor(&self) -> Advisor {
         let heads: Vec<_> = self.specs.iter().map(|spec| (*spec, modes())).collect();
-        Advisor::new(&self.profile, Task { target_m: self.target_m, length_m: LENGTH_M }, &heads, &[])
+        let task = Task {
+            target_m: self.target_m,
+            length_m: LENGTH_M,
+            layout: self.situation.layout,
+            sound_speed_mps: 1500.0,
+        };
+        Advisor::new(&self.profile, task, &heads, &[])
     }
 
     fn advice(&self) -> Advice {
@@ -84,7 +98,7 @@ fn the_largest_speed_is_one_at_which_the_phases_of_heads_apart_hold() {
     let case = Case::new(&[0.0, 0.0], &[0.8, 0.0], 0.2, 1.0);
     let advice = case.advice();
     let t_at = |speed_mps: f64| {
-        let passes = Passes::measured(&case.situation.heads, speed_mps);
+        let passes = Phasing::of(&case.situation).at(speed_mps);
         let gap_s = passes.gap_s(passes.heads()).unwrap();
         spacing::t_max_m(speed_mps * gap_s, speed_mps * advice.ping_period_s, advice.t_y_m)
     };
@@ -94,10 +108,60 @@ fn the_largest_speed_is_one_at_which_the_phases_of_heads_apart_hold() {
     // Evenly spread at every speed, they could go faster.
     let even = spacing::speed_for_target_mps(1.0, advice.t_y_m, 4.0, advice.ping_period_s).unwrap();
     assert!(v_max < 0.99 * even, "{v_max} and {even}");
-    // The advice doesn't depend on how fast one goes while it is given; the phase error does.
     let faster = Case::new(&[0.0, 0.0], &[0.8, 0.0], 0.5, 1.0).advice();
-    assert!((faster.v_max_mps - advice.v_max_mps).abs() < 1e-12);
     assert!(advice.phase_error_rad.unwrap().abs() < 1e-9 && faster.phase_error_rad.unwrap().abs() > 0.5);
+    // Too fast, it is told of a speed that will do.
+    let passes = Phasing::of(&case.situation).at(faster.v_max_mps);
+    let t_m = |v: f64| spacing::t_max_m(v * passes.gap_s(passes.heads()).unwrap(), v * 0.02, faster.t_y_m);
+    assert!(faster.v_max_mps > 0.1 && t_m(faster.v_max_mps) <= 1.0);
+}
+
+#[test]
+fn a_speed_that_meets_the_target_is_not_called_too_fast() {
+    // Heads 1.1 m apart meet 0.5 m in narrow stretches of speed only; the vehicle goes in one of them.
+    let phase_deg = |v: f64| 180.0 - 360.0 * 1.1 / (v * 8.0);
+    for v in [0.06, 0.085, 0.1, 0.105] {
+        let case = Case::new(&[0.0, phase_deg(v)], &[0.0, -1.1], v, 0.5);
+        let advice = case.advice();
+        assert!(advice.predicted_t_m.unwrap() <= 0.5, "{v}: {advice:?}");
+        assert!(advice.v_max_mps >= v * (1.0 - SPEED_MARGIN), "{v}: {}", advice.v_max_mps);
+    }
+}
+
+#[test]
+fn in_sectors_a_head_that_is_gone_leaves_its_sector_unseen() {
+    let mut case = Case::new(&[10.0, 190.0], &[0.0; 2], 0.05, 0.8);
+    case.situation.layout = HeadLayout::SectorOffset;
+    let whole = case.advice();
+    assert!(whole.v_max_mps > 0.08 && whole.phase_error_rad.is_none(), "{whole:?}");
+    assert!((whole.pass_gap_s - 8.0).abs() < 1e-9);
+    case.situation.heads[1] = None;
+    let half = case.advice();
+    assert_eq!((half.v_max_mps, half.reason), (0.0, Reason::AngularStep));
+    let [width_m, sigma_m] = half.unseen_m.unwrap();
+    assert!((width_m - 17.95).abs() < 0.1 && (sigma_m - 26.9).abs() < 0.2, "{width_m} {sigma_m}");
+    assert!(half.remedy.is_none() && half.predicted_t_m.unwrap() > 17.0);
+}
+
+#[test]
+fn a_wall_out_of_reach_is_not_seen() {
+    let mut case = Case::new(&[0.0], &[0.0], 0.2, 0.5);
+    case.specs[0].range_m[1] = 2.0;
+    let advice = case.advice();
+    assert!(advice.v_max_mps <= 0.0 && advice.predicted_t_m.is_none(), "{advice:?}");
+}
+
+#[test]
+fn at_rest_the_way_out_stays_the_way_out() {
+    let case = Case::new(&[0.0, 180.0], &[0.0; 2], 0.2, 1.0);
+    let mut advisor = case.advisor();
+    let mut then = case.situation;
+    for (speed_mps, expected_m) in [(0.2, 900.0), (-1e-3, 900.0), (-0.1, 100.0), (1e-3, 100.0), (0.1, 900.0)]
+    {
+        then.speed_mps = speed_mps;
+        let left_m = advisor.advise(&then, None).left.length_m;
+        assert!((left_m - expected_m).abs() < 1e-9, "{speed_mps}");
+    }
 }
 
 #[test]
@@ -105,7 +169,7 @@ fn on_the_way_back_the_phases_and_the_length_of_the_way_back_count() {
     let case = Case::new(&[30.0, 250.0], &[0.9, -0.3], -0.2, 1.0);
     let advice = case.advice();
     let v = advice.v_max_mps / (1.0 - SPEED_MARGIN);
-    let passes = Passes::measured(&case.situation.heads, -v);
+    let passes = Phasing::of(&case.situation).at(-v);
     let gap_s = passes.gap_s(passes.heads()).unwrap();
     assert!(spacing::t_max_m(v * gap_s, v * advice.ping_period_s, advice.t_y_m) <= 1.0 + 1e-6);
     assert!(
@@ -144,9 +208,9 @@ fn where_slower_does_not_help_it_says_what_would() {
     case = Case::new(&[0.0], &[0.0], 0.2, 0.25);
     assert_eq!(case.advice().reason, Reason::HelixPitch);
     case.situation.pose =
-        case.situation.pose.map(|pose| Pose { position: Point3::new(100.0, 4.0, 1.0), ..pose });
+        case.situation.pose.map(|pose| Pose { position: Point3::new(100.0, 3.0, 1.5), ..pose });
     let aside = case.advice();
-    assert_eq!((aside.reason, aside.remedy), (Reason::AngularStep, Some(Remedy::Centre)));
+    assert_eq!((aside.reason, aside.remedy), (Reason::AngularStep, Some(Remedy::Centre)), "{aside:?}");
 
     case.situation.pose = None;
     assert_eq!(case.advice().reason, Reason::NoHeadingOrFix);
@@ -170,25 +234,34 @@ fn heads_that_hide_the_wall_from_each_other_slow_the_vehicle_down() {
         }
     }
     case.situation.speed_mps = 0.125;
-    let hidden = case.advice();
-    assert!((hidden.pass_gap_s - 2.0).abs() < 1e-9, "{hidden:?}");
+    let mut advisor = case.advisor();
+    let hidden = advisor.advise(&case.situation, None);
+    assert!((hidden.pass_gap_s - 2.0).abs() < 0.15, "{hidden:?}");
     // Both heads on one side look at the other wall past a neighbour: half of the passes are missing there.
-    let t_m = spacing::t_max_m(0.125 * 4.0, 0.125 * 0.02, hidden.t_y_m);
-    assert!((hidden.predicted_t_m.unwrap() - t_m).abs() < 1e-9, "{hidden:?}");
+    let parallax_s = advisor.parallax_rad / TAU * 8.0;
+    assert!((0.1..0.15).contains(&parallax_s), "{parallax_s}");
+    // The hidden strips lie where steps are short.
+    let t_m = spacing::t_max_m(0.125 * (4.0 + parallax_s), 0.125 * 0.02, 0.1);
+    assert!((hidden.predicted_t_m.unwrap() - t_m).abs() < 0.01, "{hidden:?}");
     assert!(hidden.v_max_mps < 0.6 * free.v_max_mps, "{} and {}", hidden.v_max_mps, free.v_max_mps);
-    assert_eq!(case.advisor().hidden_from().len(), 4);
 }
 
 #[test]
 fn old_rings_are_cast_one_a_call_and_the_same_in_the_end() {
-    let case = Case::new(&[0.0, 120.0, 240.0], &[0.0; 3], 0.1, 0.5);
+    let mut case = Case::new(&[0.0, 120.0, 240.0], &[0.0; 3], 0.1, 0.5);
+    for (spec, y_m) in case.specs.iter_mut().zip([-0.5, 0.0, 0.5]) {
+        spec.mount.position = Vec3::new(0.0, y_m, 0.0);
+    }
     let mut advisor = case.advisor();
     advisor.advise(&case.situation, None);
     let pose = case.situation.pose.unwrap();
+    assert!(advisor.heads.iter().all(|head| head.is_near(&pose)), "at first all are cast");
     let moved = Pose { position: Point3::new(100.0, 1.0, pose.position.z()), ..pose };
     let then = Situation { pose: Some(moved), ..case.situation };
-    let steps: Vec<f64> = (0..4).map(|_| advisor.advise(&then, None).t_y_m).collect();
+    for cast in 1..=3 {
+        advisor.advise(&then, None);
+        assert_eq!(advisor.heads.iter().filter(|head| head.is_near(&moved)).count(), cast);
+    }
     let fresh = case.advisor().advise(&then, None).t_y_m;
-    assert!((steps[0] - fresh).abs() < 1e-12 && steps.iter().all(|step| (step - fresh).abs() < 1e-12));
-    assert!(advisor.heads.iter().all(|head| head.is_near(&moved)));
+    assert!((advisor.advise(&then, None).t_y_m - fresh).abs() < 1e-12);
 }

@@ -35,11 +35,11 @@ pub struct Answer {
     /// epsilon: overlap of neighbouring beams; below 1, none. Eq. 22.
     pub overlap: f64,
     /// T_y at rest and where the vehicle should be, straight from sample to sample: smallest, m. Eq. 5 or 7.
-    pub t_y_min_m: f64,
+    pub t_y_min_rest_m: f64,
     /// The same: mean, m. Eq. 10.
-    pub t_y_mean_m: f64,
+    pub t_y_mean_rest_m: f64,
     /// The same: largest, m. Eq. 6.
-    pub t_y_max_m: f64,
+    pub t_y_max_rest_m: f64,
     /// T_yp: what the mean is at most, m. Eq. 10.
     pub t_yp_m: f64,
     /// T_y2: the largest distance between neighbours of one turn on the wall, anywhere the vehicle may be, m.
@@ -48,7 +48,7 @@ pub struct Answer {
     pub v_max_mps: Option<f64>,
     /// Hours at that speed for the whole length.
     pub needed_h: Option<f64>,
-    /// Why no speed does: `angular_step`.
+    /// Why no speed does: `angular_step`, `unseen_strip` or `off_axis`.
     pub reason: Option<&'static str>,
     /// The same in words.
     pub refused: Option<String>,
@@ -124,7 +124,11 @@ impl Planner {
         let (v_max_mps, refused) = match v_max {
             None => (None, None),
             Some(Ok(v_mps)) => (Some(v_mps), None),
-            Some(Err(why @ SamplingError::AngularStep { .. })) => (None, Some(why.to_string())),
+            Some(Err(
+                why @ (SamplingError::AngularStep { .. }
+                | SamplingError::UnseenStrip { .. }
+                | SamplingError::OffAxis { .. }),
+            )) => (None, Some(why)),
             Some(Err(why)) => return Err(why),
         };
         let speed_mps = asked.asked_mps.or(v_max_mps);
@@ -138,15 +142,19 @@ impl Planner {
             turn_s: turn.period_s(),
             turn_basis: planned.mode.basis.as_str(),
             overlap: section::overlap(beam_rad, turn.step_rad())?,
-            t_y_min_m: planned.chords_m[0],
-            t_y_mean_m: planned.chords_m[1],
-            t_y_max_m: planned.chords_m[2],
+            t_y_min_rest_m: planned.chords_m[0],
+            t_y_mean_rest_m: planned.chords_m[1],
+            t_y_max_rest_m: planned.chords_m[2],
             t_yp_m: section::t_yp_m(self.inspection().profile.perimeter_m(), turn.steps())?,
             t_y2_m: planned.t_y2_m,
             v_max_mps,
             needed_h: v_max_mps.map(|v_mps| self.inspection().length_m / v_mps / 3600.0),
-            reason: refused.is_some().then_some("angular_step"),
-            refused,
+            reason: refused.map(|why| match why {
+                SamplingError::UnseenStrip { .. } => "unseen_strip",
+                SamplingError::OffAxis { .. } => "off_axis",
+                _ => "angular_step",
+            }),
+            refused: refused.map(|why| why.to_string()),
             speed_mps,
             spacing,
             meets_target: asked.asked_mps.and(asked.target_m).map(meets),

@@ -57,13 +57,8 @@ impl Planner {
         }
         let passes = planned.passes();
         let ping_s = planned.ping_period_s();
-        let strips = self.nominal_strips().map(super::Strips::as_slice).unwrap_or_default();
-        let seen_by = |sigma_m: f64| {
-            let here = |strip: &&crate::sampling::strips::Strip| {
-                math::wrap(sigma_m - strip.arc.from_m, around.perimeter_m) <= strip.arc.length_m
-            };
-            strips.iter().find(here).map(|strip| strip.seen_by)
-        };
+        let strips = self.nominal_strips().ok_or(SamplingError::NoCommonMode)?;
+        let seen_by = |sigma_m: f64| strips.at(sigma_m).map(|strip| strip.seen_by);
         let place = |k: usize| {
             let sigma_m = around.sigma_m(k);
             let gap_s = seen_by(sigma_m).and_then(|heads| passes.gap_s(heads));

@@ -133,6 +133,6 @@ fn a_head_registers_once_and_says_what_it_is() {
     assert_eq!(head.build(&mut app), Ok(()));
     assert_eq!(head.build(&mut app), Err(PluginError::DuplicateSource { id: "front".to_owned() }));
     let spec = head.head().unwrap();
-    assert_eq!((spec.ping_period_s, spec.max_range_m), (0.018, 10.0));
+    assert_eq!((spec.ping_period_s, spec.range_m[1]), (0.018, 10.0));
     assert!((spec.step_rad - 0.3_f64.to_radians()).abs() < 1e-15);
 }

@@ -1,0 +1,176 @@
+//! What is to be planned, from a vehicle file, or from arguments alone.
+
+use std::path::Path;
+
+use headrace_core::app::device::Device;
+use headrace_core::config::vehicle::{Loader, TunnelConfig};
+use headrace_core::config::{Document, SensorConfig};
+use headrace_core::frames::{Mount, Rot, Vec3};
+use headrace_core::sampling::head::{HeadMode, HeadSpec};
+use headrace_core::sampling::layout::HeadLayout;
+use headrace_core::sampling::occlusion::Obstacle;
+use headrace_core::sampling::plan::{Inspection, Question};
+use headrace_core::site::Site;
+use headrace_core::time::DurNs;
+
+use crate::cli::Plan;
+use crate::commands::vehicle_file;
+use crate::devices::KINDS;
+use crate::failure::Failure;
+use crate::files;
+
+/// The heads that are planned with when no vehicle file names any.
+const USUAL_HEAD: &str = "imagenex881";
+/// Their range setting, m: that for which the times of their modes are known.
+const USUAL_RANGE_M: f64 = 10.0;
+
+/// An inspection with the names that people know it by.
+pub(super) struct Case {
+    pub(super) inspection: Inspection,
+    pub(super) heads: Vec<String>,
+    pub(super) tunnel: String,
+    pub(super) range_m: f64,
+    pub(super) question: Question,
+}
+
+type Head = (HeadSpec, Vec<HeadMode>);
+
+impl Case {
+    /// From arguments; those given outweigh the vehicle file's values.
+    pub(super) fn of(args: &Plan) -> Result<Self, Failure> {
+        let question = Question {
+            target_m: args.target,
+            speed_mps: args.speed,
+            time_s: args.hours.map(|hours| hours * 3600.0),
+        };
+        let tunnel = args.tunnel.as_deref().map(tunnel).transpose()?;
+        match (&args.vehicle, tunnel) {
+            (Some(path), tunnel) => Self::of_vehicle(path, tunnel, question, args),
+            (None, Some(tunnel)) => {
+                let layout = args.layout.unwrap_or(HeadLayout::PhaseShift);
+                Ok(Self::new(
+                    tunnel,
+                    ideal_heads(args)?,
+                    Vec::new(),
+                    layout,
+                    Site::default().sound_speed_mps,
+                    question,
+                    args,
+                ))
+            }
+            (None, None) => {
+                Err(Failure::Usage("plan: give --tunnel, or --vehicle with a vehicle file".to_owned()))
+            }
+        }
+    }
+
+    fn of_vehicle(
+        path: &Path,
+        tunnel: Option<TunnelConfig>,
+        question: Question,
+        args: &Plan,
+    ) -> Result<Self, Failure> {
+        let (_, vehicle) = vehicle_file(path)?;
+        let question = Question { target_m: question.target_m.or(Some(vehicle.target_m)), ..question };
+        let configs = vehicle.sensors.iter().zip(&vehicle.sensor_configs);
+        let ids = configs.filter(|(sensor, _)| sensor.head().is_some()).map(|(_, config)| config.id.clone());
+        let heads = ids.zip(heads_of(path, &vehicle.sensors, args.range)?).collect();
+        let layout = args.layout.unwrap_or(vehicle.layout);
+        let sound_speed_mps = vehicle.site.sound_speed_mps;
+        Ok(Self::new(
+            tunnel.unwrap_or(vehicle.tunnel),
+            heads,
+            vehicle.hull,
+            layout,
+            sound_speed_mps,
+            question,
+            args,
+        ))
+    }
+
+    fn new(
+        tunnel: TunnelConfig,
+        heads: Vec<(String, Head)>,
+        hull: Vec<Obstacle>,
+        layout: HeadLayout,
+        sound_speed_mps: f64,
+        question: Question,
+        args: &Plan,
+    ) -> Self {
+        let (ids, heads): (Vec<String>, Vec<Head>) = heads.into_iter().unzip();
+        let range_m = heads.iter().map(|(spec, _)| spec.range_m[1]).fold(0.0, f64::max);
+        let inspection = Inspection {
+            length_m: args.length.unwrap_or(tunnel.length_m),
+            place: args.at.unwrap_or(tunnel.profile.reference()),
+            profile: tunnel.profile,
+            heads,
+            hull,
+            layout,
+            drift_m: args.drift,
+            yaw_rad: args.yaw.to_radians(),
+            yaw_rate_radps: args.yaw_rate.to_radians(),
+            sound_speed_mps,
+        };
+        Self { inspection, heads: ids, tunnel: tunnel.name, range_m, question }
+    }
+}
+
+/// A tunnel from `NAME`, `NAME,KEY=VALUE,...` with a vehicle file's keys, or the file of a polyline.
+fn tunnel(text: &str) -> Result<TunnelConfig, Failure> {
+    let mut parts = text.split(',');
+    let name = parts.next().unwrap_or_default().trim();
+    let begin = if Path::new(name).extension().is_some_and(|extension| extension == "csv") {
+        format!("profile = \"polyline\"\nfile = {name:?}\n")
+    } else {
+        format!("profile = {name:?}\n")
+    };
+    let line = |part: &str| {
+        let (key, value) = part.split_once('=').unwrap_or((part, "?"));
+        let value = value.trim();
+        let is_number = value.parse::<f64>().is_ok();
+        let value = if is_number { value.to_owned() } else { format!("{value:?}") };
+        format!("{} = {value}\n", key.trim())
+    };
+    let table: String = std::iter::once(begin).chain(parts.map(line)).collect();
+    let load: Loader<'_> = &files::beside(Path::new(""));
+    let root = Document::new("--tunnel", &table).root()?;
+    Ok(TunnelConfig::from_section(root, load)?)
+}
+
+/// The heads of a vehicle, at another range setting where one is given.
+fn heads_of(path: &Path, sensors: &[Box<dyn Device>], range_m: Option<f64>) -> Result<Vec<Head>, Failure> {
+    let mut heads = Vec::new();
+    for sensor in sensors {
+        let Some(mut spec) = sensor.head() else { continue };
+        let modes = sensor.modes(range_m).map_err(|why| Failure::Usage(format!("--range: {why}")))?;
+        spec.range_m[1] = range_m.unwrap_or(spec.range_m[1]);
+        heads.push((spec, modes));
+    }
+    if heads.is_empty() {
+        return Err(Failure::Usage(format!("plan: {} has no profiling head", path.display())));
+    }
+    Ok(heads)
+}
+
+/// Heads that all sit at the vehicle's origin: what the closed forms are for.
+fn ideal_heads(args: &Plan) -> Result<Vec<(String, Head)>, Failure> {
+    let kind = KINDS.iter().find(|kind| kind.name() == USUAL_HEAD);
+    let kind = kind.ok_or_else(|| Failure::Usage(format!("plan: this build has no {USUAL_HEAD}")))?;
+    let range_m = args.range.unwrap_or(USUAL_RANGE_M);
+    let head = |number: u32| {
+        let id = format!("head_{number}");
+        let config = SensorConfig {
+            id: id.clone(),
+            plugin: USUAL_HEAD.to_owned(),
+            connect: String::new(),
+            mount: Mount { position: Vec3::zero(), rotation: Rot::identity() },
+            latency: DurNs::ZERO,
+        };
+        // Any mode will do: all of them are planned.
+        let own = Document::new("plan", "mode = \"slow\"").root()?;
+        let device = kind.configure(&config, &own)?;
+        let mut heads = heads_of(Path::new("plan"), &[device], Some(range_m))?;
+        heads.pop().map(|head| (id, head)).ok_or_else(|| Failure::Usage("plan: no head".to_owned()))
+    };
+    (0..args.heads).map(head).collect()
+}

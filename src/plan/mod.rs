@@ -1,0 +1,139 @@
+//! `headrace plan`: the day before a dive.
+
+mod case;
+mod csv;
+mod pictures;
+mod table;
+
+use std::path::Path;
+
+use headrace_core::sampling::plan::{Answer, Briefing, Planner, Question};
+use serde_json::json;
+
+use crate::cli::Plan;
+use crate::failure::{self, Failure};
+use crate::files;
+use crate::output::{deliver, put, say};
+use case::Case;
+use pictures::Shown;
+
+pub(crate) use pictures::PictureError;
+
+/// Everything that one run of the command has found.
+struct Findings {
+    planner: Planner,
+    /// Ids of the heads.
+    heads: Vec<String>,
+    tunnel: String,
+    /// The range setting, m.
+    range_m: f64,
+    /// The shortest and the longest stretch of perimeter that a beam covers, m.
+    footprints_m: [f64; 2],
+    question: Question,
+    answers: Vec<Answer>,
+    /// The mode that briefing and pictures are for, with its speed; `None` where no mode gives one.
+    shown: Option<(usize, f64)>,
+    briefing: Option<Briefing>,
+}
+
+/// Plans an inspection.
+pub(crate) fn plan(args: &Plan) -> Result<u8, Failure> {
+    let findings = find(Case::of(args)?, args)?;
+    if let Some(folder) = &args.svg {
+        draw(&findings, folder)?;
+    }
+    if args.json {
+        deliver(&serde_json::to_string_pretty(&json(&findings))?)?;
+    } else if args.csv {
+        deliver(&csv::csv(&findings.answers))?;
+    } else {
+        put(&table::table(&findings));
+        for picture in args.svg.iter().flat_map(|folder| PICTURES.map(|(name, _)| folder.join(name))) {
+            say(&format!("picture {}", picture.display()));
+        }
+    }
+    Ok(if findings.answers.iter().any(is_met) { failure::OK } else { failure::FAILED })
+}
+
+fn find(case: Case, args: &Plan) -> Result<Findings, Failure> {
+    let Case { inspection, heads, tunnel, range_m, question } = case;
+    let planner = Planner::new(inspection)?;
+    let only = (args.mode != "all").then_some(args.mode.as_str());
+    let answers = planner.answers(&question, only)?;
+    if answers.is_empty() {
+        let names: Vec<_> = planner.modes().iter().map(|planned| planned.mode.name).collect();
+        let names = names.join(", ");
+        return Err(Failure::Usage(format!("--mode {}: wanted is all, or one of {names}", args.mode)));
+    }
+    let best = answers.iter().find(|answer| answer.best);
+    let shown = best.and_then(|best| {
+        let number = planner.modes().iter().position(|planned| planned.mode.name == best.mode)?;
+        let asked = question.speed_mps.is_some() || question.time_s.is_some();
+        let speed_mps = best.speed_mps?;
+        Some((number, if asked { speed_mps } else { printed_mps(speed_mps) }))
+    });
+    let briefing = shown.map(|(mode, speed_mps)| planner.briefing(mode, speed_mps)).transpose()?;
+    let footprints_m = planner.footprints_m()?;
+    Ok(Findings { planner, heads, tunnel, range_m, footprints_m, question, answers, shown, briefing })
+}
+
+/// A speed as it is printed: whole millimetres a second, rounded down, so that what is printed meets the target, too.
+fn printed_mps(speed_mps: f64) -> f64 {
+    let down = (speed_mps * 1000.0 + 1e-6).floor() / 1000.0;
+    if down > 0.0 { down } else { speed_mps }
+}
+
+/// Whether what was asked for can be had in a mode.
+fn is_met(answer: &Answer) -> bool {
+    answer.meets_target.unwrap_or(answer.refused.is_none())
+        && answer.spacing.is_some_and(|spacing| spacing.t_max_m.is_some())
+}
+
+type Picture = fn(&Shown<'_>) -> Result<String, PictureError>;
+
+const PICTURES: [(&str, Picture); 4] = [
+    ("perimeter.svg", pictures::perimeter),
+    ("pattern.svg", pictures::pattern),
+    ("speeds.svg", pictures::speeds),
+    ("hours.svg", pictures::hours),
+];
+
+fn draw(findings: &Findings, folder: &Path) -> Result<(), Failure> {
+    let Some((mode, speed_mps)) = findings.shown else {
+        return Err(Failure::Usage(
+            "--svg: no mode meets the target at any speed; nothing to draw".to_owned(),
+        ));
+    };
+    std::fs::create_dir_all(folder).map_err(|source| Failure::Write { path: folder.to_owned(), source })?;
+    let title = format!("{}, {}", findings.tunnel, table::heads(findings));
+    let shown = Shown { planner: &findings.planner, mode, speed_mps, question: findings.question, title };
+    for (name, picture) in PICTURES {
+        files::write(&folder.join(name), picture(&shown)?.as_bytes())?;
+    }
+    Ok(())
+}
+
+fn json(findings: &Findings) -> serde_json::Value {
+    let inspection = findings.planner.inspection();
+    let (farthest_m, farthest_allowed_m) = findings.planner.farthest_m();
+    json!({
+        "plan_version": 1,
+        "tunnel": findings.tunnel,
+        "perimeter_m": inspection.profile.perimeter_m(),
+        "length_m": inspection.length_m,
+        "place_m": inspection.place,
+        "drift_m": inspection.drift_m,
+        "yaw_deg": inspection.yaw_rad.to_degrees(),
+        "heads": findings.heads,
+        "layout": inspection.layout.as_str(),
+        "range_m": findings.range_m,
+        "footprints_m": findings.footprints_m,
+        "farthest_wall_m": farthest_m,
+        "farthest_wall_allowed_m": farthest_allowed_m,
+        "target_m": findings.question.target_m,
+        "asked_speed_mps": findings.question.speed_mps,
+        "asked_time_h": findings.question.time_s.map(|time_s| time_s / 3600.0),
+        "modes": findings.answers,
+        "briefing": findings.briefing,
+    })
+}

@@ -1,0 +1,88 @@
+//! A piece of the pattern to scale, about the emptiest place.
+
+use super::canvas::{Canvas, Drawn, NORMAL, Px, SMALL, Side};
+use super::chart::{Axis, Chart, short};
+use super::laid::Laid;
+use super::look::{self, Look};
+use super::pattern::CIRCLE;
+use super::polyline::Frame;
+
+const FRAME: Frame = Frame { left: 676.0, top: 92.0, right: 886.0, bottom: 302.0 };
+/// Where the words below it begin, pixels.
+const WORDS: Px = [634.0, 348.0];
+/// Samples closer together than this are shown by one marker, pixels.
+const APART_PX: f64 = 4.0;
+/// More samples than this are too many to tell apart.
+const MOST: usize = 450;
+/// Half of its width as a share of T.
+const HALF: f64 = 1.5;
+
+struct Detail<'c, 'a> {
+    chart: Chart<'c, 'a>,
+    laid: &'c Laid,
+    centre: [f64; 2],
+    /// Where x is counted from, m.
+    from_m: f64,
+    half_m: f64,
+}
+
+/// Draws it.
+pub(super) fn draw(canvas: &Canvas<'_>, laid: &Laid, centre: [f64; 2], from_m: f64, t_m: f64) -> Drawn {
+    let half_m = HALF * t_m;
+    let [x_m, sigma_m] = [centre[0] - from_m, centre[1]];
+    let x = Axis::new("m", x_m - half_m, x_m + half_m, 5).with_name_at(30.0);
+    let y = Axis::new("", sigma_m - half_m, sigma_m + half_m, 6);
+    let chart = Chart::new(canvas, FRAME, &x, &y)?;
+    let radius_px = (FRAME.right - FRAME.left) / (4.0 * HALF);
+    let outline = Look { width_px: 1.8, ..look::T };
+    chart.ellipse(chart.px([x_m, sigma_m]), [radius_px; 2], CIRCLE, &outline)?;
+    let detail = Detail { chart, laid, centre, from_m, half_m };
+    let samples = detail.samples();
+    // Too many to tell apart: the lines of what is sampled say it all.
+    let dense = samples.len() > MOST;
+    detail.lines(dense)?;
+    for (head, place) in samples.iter().filter(|_| !dense) {
+        canvas.marker(*place, &look::of_several(*head), 2.6, true)?;
+    }
+    words(canvas, t_m)
+}
+
+fn words(canvas: &Canvas<'_>, t_m: f64) -> Drawn {
+    canvas.text([FRAME.left, FRAME.top - 12.0], "detail, true to scale", Side::Right, SMALL)?;
+    let circle = format!("Circle: {} m (T). Any feature as", short(t_m));
+    let lines = [circle.as_str(), "large is hit, even here, where the", "gaps are widest."];
+    for (k, line) in lines.into_iter().enumerate() {
+        canvas.text([WORDS[0], WORDS[1] + 17.0 * k as f64], line, Side::Right, NORMAL)?;
+    }
+    Ok(())
+}
+
+impl Detail<'_, '_> {
+    /// The heads' ways: as they are, and as they come from either side of the seam.
+    fn lines(&self, dense: bool) -> Drawn {
+        for pass in self.laid.passes().into_iter().filter(|pass| !(dense && pass.hidden)) {
+            let thin = Look { width_px: 0.8, dash: &[], ..look::of_several(pass.head) };
+            let look = if pass.hidden { look::HIDDEN } else { thin };
+            for turns in [-1.0, 0.0, 1.0] {
+                let place = |[x, sigma]: &[f64; 2]| [x - self.from_m, sigma + turns * self.laid.perimeter_m];
+                self.chart.line(&pass.points.iter().map(place).collect::<Vec<_>>(), &look)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Samples that aren't hidden, by head, on the sheet.
+    fn samples(&self) -> Vec<(usize, Px)> {
+        let mut places: Vec<(usize, Px)> = Vec::new();
+        for (sample, at) in self.laid.near(self.centre, [self.half_m; 2]) {
+            let place = self.chart.px([at[0] - self.from_m, at[1]]);
+            let near = |(head, before): &(usize, Px)| {
+                *head == sample.head && (before[0] - place[0]).abs() + (before[1] - place[1]).abs() < APART_PX
+            };
+            if !sample.hidden && self.chart.frame.has(place) && !places.last().is_some_and(near) {
+                places.push((sample.head, place));
+            }
+        }
+        places
+    }
+}

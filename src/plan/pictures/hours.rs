@@ -1,0 +1,193 @@
+//! Hours against T.
+
+use super::canvas::{self, BOLD, Drawn, NORMAL, Side, width_px};
+use super::chart::{Axis, Chart, short};
+use super::labels::{self, Label};
+use super::look::{self, Look};
+use super::modes::{self, Mode};
+use super::polyline::Frame;
+use super::{PictureError, Shown};
+
+use plotters::style::RGBColor;
+
+const FRAME: Frame = Frame { left: 66.0, top: 92.0, right: 752.0, bottom: 482.0 };
+/// By how much a speed exceeds the one before it on a curve.
+const FASTER: f64 = 1.02;
+/// Places at which the mode that takes least time is looked up.
+const LEAST: u32 = 300;
+/// What lies under the mode that takes least time.
+const BAND: Look = Look { colour: RGBColor(222, 222, 222), width_px: 9.0, ..look::T };
+
+/// What is looked for: a T, with the hours that every mode takes for it.
+struct Sought {
+    t_m: f64,
+    /// By mode.
+    hours: Vec<Option<f64>>,
+}
+
+/// Hours for the whole length, one way, against T for every mode.
+pub(crate) fn hours(shown: &Shown<'_>) -> Result<String, PictureError> {
+    let modes = modes::all(shown)?;
+    let sought = sought(shown, &modes)?;
+    let most = ends(shown, &modes, &sought)?;
+    let title = format!("Hours for {} m, one way, against T", shown.planner.inspection().length_m);
+    canvas::sheet(&title, &shown.subtitle(), |canvas| {
+        let x = Axis::new("T: a feature this large is hit, m", 0.0, most[0], 12);
+        let chart = Chart::new(canvas, FRAME, &x, &Axis::new("hours, one way", 0.0, most[1], 9))?;
+        let words = modes::blind_words(&modes);
+        if modes.iter().any(|mode| !mode.blind) {
+            curves(&chart, shown, &modes, &sought, most)?;
+        }
+        if words.is_empty() { Ok(()) } else { chart.instead(&words) }
+    })
+}
+
+/// All that is drawn where some mode gives a T.
+fn curves(
+    chart: &Chart<'_, '_>,
+    shown: &Shown<'_>,
+    modes: &[Mode],
+    sought: &Sought,
+    most: [f64; 2],
+) -> Drawn {
+    chart.line(&least(shown, modes, most[0]), &BAND)?;
+    legend(chart)?;
+    let mut right: Vec<Label> = asked(chart, shown, sought)?.into_iter().collect();
+    for mode in modes.iter().filter(|mode| !mode.blind) {
+        let pieces = chart.line(&curve(shown, mode, most)?, &mode.look)?;
+        let end = pieces.last().and_then(|piece| piece.last()).copied();
+        right.push(label(chart, mode, end, sought.hours.get(mode.number).copied().flatten()));
+    }
+    labels::at_right(chart.canvas, &FRAME, &right)?;
+    marks(chart, shown, modes, sought)
+}
+
+/// The target, or else the T that the speed asked about gives.
+fn sought(shown: &Shown<'_>, modes: &[Mode]) -> Result<Sought, PictureError> {
+    let length_m = shown.planner.inspection().length_m;
+    let t_m = match shown.question.target_m {
+        Some(target_m) => target_m,
+        None => shown.planner.t_max_m(shown.mode, shown.asked_mps().unwrap_or(shown.speed_mps))?,
+    };
+    // An axis of no meaning, for words in place of curves.
+    let t_m = if t_m.is_finite() { t_m } else { 1.0 };
+    let hours = |mode: &Mode| Some(length_m / shown.planner.v_max_mps(mode.number, t_m).ok()? / 3600.0);
+    Ok(Sought { t_m, hours: modes.iter().map(hours).collect() })
+}
+
+/// The right and the upper end.
+fn ends(shown: &Shown<'_>, modes: &[Mode], sought: &Sought) -> Result<[f64; 2], PictureError> {
+    let length_m = shown.planner.inspection().length_m;
+    let all = || sought.hours.iter().flatten().copied();
+    let (least_h, most_h) = (all().fold(f64::INFINITY, f64::min), all().fold(0.0, f64::max));
+    let asked_h = shown.asked_mps().map_or(0.0, |asked_mps| length_m / asked_mps / 3600.0);
+    let shown_h = length_m / shown.speed_mps / 3600.0;
+    if most_h > 0.0 {
+        return Ok([2.2 * sought.t_m, (1.15 * most_h).min(4.0 * least_h).max(1.3 * asked_h)]);
+    }
+    // No mode meets it: as far as the modes reach at the speed that is shown.
+    let mut reached_m = 0.0_f64;
+    for mode in modes.iter().filter(|mode| !mode.blind) {
+        reached_m = reached_m.max(shown.planner.t_max_m(mode.number, shown.speed_mps)?);
+    }
+    Ok([(1.3 * reached_m).max(2.2 * sought.t_m), (3.0 * shown_h).max(1.3 * asked_h)])
+}
+
+/// What the band is.
+fn legend(chart: &Chart<'_, '_>) -> Drawn {
+    let [x, y] = [FRAME.right - 10.0, FRAME.top + 12.0];
+    chart.canvas.line(&[[x - 40.0, y], [x, y]], &BAND)?;
+    chart.canvas.text_on_white([x - 46.0, y], "takes least time", Side::Left, NORMAL)
+}
+
+fn curve(shown: &Shown<'_>, mode: &Mode, [most_m, most_h]: [f64; 2]) -> Result<Vec<[f64; 2]>, PictureError> {
+    /// Enough for a speed to grow a thousandfold.
+    const POINTS: u32 = 400;
+    let length_m = shown.planner.inspection().length_m;
+    let mut v_mps = length_m / (1.02 * most_h * 3600.0);
+    let mut points = Vec::new();
+    for _ in 0..POINTS {
+        let t_m = shown.planner.t_max_m(mode.number, v_mps)?;
+        points.push([t_m, length_m / v_mps / 3600.0]);
+        if t_m > most_m {
+            break;
+        }
+        v_mps *= FASTER;
+    }
+    Ok(points)
+}
+
+/// The least hours of any mode at every T.
+fn least(shown: &Shown<'_>, modes: &[Mode], most_m: f64) -> Vec<[f64; 2]> {
+    let length_m = shown.planner.inspection().length_m;
+    let point = |k: u32| {
+        let t_m = most_m * f64::from(k) / f64::from(LEAST);
+        let speeds = modes.iter().filter_map(|mode| shown.planner.v_max_mps(mode.number, t_m).ok());
+        let fastest_mps = speeds.max_by(f64::total_cmp)?;
+        Some([t_m, length_m / fastest_mps / 3600.0])
+    };
+    (1..=LEAST).filter_map(point).collect()
+}
+
+/// Target, or the T that is found, upright; the time asked about across, with its label.
+fn asked(chart: &Chart<'_, '_>, shown: &Shown<'_>, sought: &Sought) -> Result<Option<Label>, PictureError> {
+    chart.upright(sought.t_m, &look::TARGET)?;
+    if let Some(asked_mps) = shown.asked_mps() {
+        let asked_h = shown.planner.inspection().length_m / asked_mps / 3600.0;
+        chart.across(asked_h, &look::ASKED)?;
+        let lines = match shown.question.time_s {
+            Some(_) if shown.question.speed_mps.is_none() => {
+                vec![format!("asked: {} h", modes::hours(asked_h))]
+            }
+            _ => vec![
+                format!("{} h at the", modes::hours(asked_h)),
+                format!("{} m/s asked", modes::speed(asked_mps)),
+            ],
+        };
+        let place = [FRAME.right, chart.px([0.0, asked_h])[1]];
+        return Ok(Some(Label { place, lines, look: look::ASKED, bold: false }));
+    }
+    Ok(None)
+}
+
+fn label(chart: &Chart<'_, '_>, mode: &Mode, end: Option<[f64; 2]>, hours: Option<f64>) -> Label {
+    let words = match hours {
+        Some(hours) => format!("{}: {} h", mode.name, modes::hours(hours)),
+        None => format!("{}: never", mode.name),
+    };
+    let place = end.unwrap_or([chart.frame.right, chart.frame.top]);
+    Label { place, lines: vec![words], look: mode.look, bold: true }
+}
+
+/// Markers where curves meet the target; the one that takes least time filled, with its hours and speed.
+fn marks(chart: &Chart<'_, '_>, shown: &Shown<'_>, modes: &[Mode], sought: &Sought) -> Drawn {
+    let Sought { t_m, hours } = sought;
+    let found = modes.iter().filter_map(|mode| Some((mode, (*hours.get(mode.number)?)?)));
+    let found: Vec<_> = found.collect();
+    let best = found.iter().min_by(|a, b| a.1.total_cmp(&b.1)).map(|(mode, _)| mode.number);
+    for (mode, hours) in &found {
+        let is_best = best == Some(mode.number);
+        let place = chart.px([*t_m, *hours]);
+        if !chart.frame.has(place) {
+            continue;
+        }
+        chart.canvas.marker(place, &mode.look, if is_best { 6.5 } else { 4.5 }, is_best)?;
+        if is_best {
+            let v_mps = shown.planner.inspection().length_m / hours / 3600.0;
+            let words = format!("{}: {} h at {} m/s", mode.name, modes::hours(*hours), modes::speed(v_mps));
+            chart.canvas.text_on_white([place[0] - 12.0, place[1] + 20.0], &words, Side::Left, BOLD)?;
+        }
+    }
+    let words = match shown.question.target_m {
+        Some(target_m) if found.is_empty() => format!("target {target_m} m: no mode meets it"),
+        Some(target_m) => format!("target {target_m} m"),
+        None => format!("{} m, by the speed asked", short(*t_m)),
+    };
+    let place = chart.px([*t_m, 0.0])[0].max(FRAME.left + width_px(&words, NORMAL) / 2.0);
+    chart.canvas.text([place, FRAME.top - 10.0], &words, Side::Middle, NORMAL)?;
+    for (k, line) in ["hours at the", "upright line:"].iter().enumerate() {
+        let place = [FRAME.right + 12.0, FRAME.top - 26.0 + 15.0 * k as f64];
+        chart.canvas.text(place, line, Side::Right, NORMAL)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,163 @@
+//! The pattern that heads lay on the wall, and the part of it in which all of them have passed.
+
+use headrace_core::math;
+use headrace_core::sampling::plan::PatternSample;
+
+use super::{PictureError, Shown};
+
+/// The most samples that are computed for a picture.
+const MOST_SAMPLES: f64 = 400_000.0;
+
+/// A pattern.
+pub(super) struct Laid {
+    pub(super) samples: Vec<PatternSample>,
+    pub(super) heads: usize,
+    pub(super) perimeter_m: f64,
+    /// Way gone in a turn, m.
+    pub(super) pitch_m: f64,
+    /// T at this speed, m; `None` where a strip is seen by no head.
+    pub(super) t_m: Option<f64>,
+    /// Where all heads have passed, m.
+    pub(super) from_m: f64,
+    pub(super) to_m: f64,
+}
+
+/// A piece of a head's way over the wall; drawn as one line.
+pub(super) struct Pass {
+    pub(super) head: usize,
+    pub(super) hidden: bool,
+    /// Chainage and arc length, m.
+    pub(super) points: Vec<[f64; 2]>,
+}
+
+/// Lays enough turns for the picture and its detail.
+pub(super) fn lay(shown: &Shown<'_>) -> Result<Laid, PictureError> {
+    let planner = shown.planner;
+    let specs = planner.specs(shown.mode);
+    let turn = planner.modes().get(shown.mode).map(|planned| planned.mode.turn);
+    let pitch_m = shown.speed_mps * turn.map_or(1.0, |turn| turn.period_s());
+    let t_m = Some(planner.t_max_m(shown.mode, shown.speed_mps)?).filter(|t_m| t_m.is_finite());
+    let places = || specs.iter().map(|spec| spec.mount.position.x());
+    let apart_m = places().fold(f64::NEG_INFINITY, f64::max) - places().fold(f64::INFINITY, f64::min);
+    // A turn in which to look for the emptiest place, and the detail about it.
+    let wanted_m = (turns_shown(specs.len()) * pitch_m).max(pitch_m + 3.2 * t_m.unwrap_or(0.0));
+    let steps = turn.map_or(1.0, |turn| f64::from(turn.steps())) * specs.len().max(1) as f64;
+    let turns = ((wanted_m + apart_m.max(0.0)) / pitch_m + 1.0).min(MOST_SAMPLES / steps).max(2.0);
+    let samples = planner.pattern(shown.mode, shown.speed_mps, turns)?;
+    let [from_m, to_m] = all_passed_m(&samples, specs.len(), pitch_m);
+    let perimeter_m = planner.inspection().profile.perimeter_m();
+    Ok(Laid { samples, heads: specs.len(), perimeter_m, pitch_m, t_m, from_m, to_m })
+}
+
+/// How many turns are shown: fewer of more heads.
+pub(super) fn turns_shown(heads: usize) -> f64 {
+    match heads {
+        0 | 1 => 3.0,
+        2 => 2.5,
+        3 | 4 => 2.0,
+        _ => 1.5,
+    }
+}
+
+/// From where the last head has begun to where the first head ends; all of it if that is hardly anything.
+fn all_passed_m(samples: &[PatternSample], heads: usize, pitch_m: f64) -> [f64; 2] {
+    let of = |head: usize| samples.iter().filter(move |sample| sample.head == head).map(|sample| sample.x_m);
+    let firsts = (0..heads).map(|head| of(head).fold(f64::INFINITY, f64::min));
+    let lasts = (0..heads).map(|head| of(head).fold(f64::NEG_INFINITY, f64::max));
+    let (from_m, to_m) =
+        (firsts.clone().fold(f64::NEG_INFINITY, f64::max), lasts.clone().fold(f64::INFINITY, f64::min));
+    if to_m - from_m >= pitch_m {
+        return [from_m, to_m];
+    }
+    [firsts.fold(f64::INFINITY, f64::min), lasts.fold(f64::NEG_INFINITY, f64::max)]
+}
+
+impl Laid {
+    /// The heads' ways, broken where they turn round, cross the seam, or begin or cease to be hidden.
+    pub(super) fn passes(&self) -> Vec<Pass> {
+        let mut passes: Vec<Pass> = Vec::new();
+        for pair in self.samples.windows(2) {
+            let [before, here] = pair else { continue };
+            if here.new_sweep || here.head != before.head {
+                continue;
+            }
+            // A step to or from a hidden sample is one over wall that isn't sampled.
+            let hidden = here.hidden || before.hidden;
+            for [begin, end] in self.over_seam([before.x_m, before.sigma_m], [here.x_m, here.sigma_m]) {
+                match passes.last_mut() {
+                    Some(pass)
+                        if pass.head == here.head
+                            && pass.hidden == hidden
+                            && pass.points.last() == Some(&begin) =>
+                    {
+                        pass.points.push(end);
+                    }
+                    _ => passes.push(Pass { head: here.head, hidden, points: vec![begin, end] }),
+                }
+            }
+        }
+        passes
+    }
+
+    /// A step as one segment, or as two that end and begin at the seam.
+    fn over_seam(&self, from: [f64; 2], to: [f64; 2]) -> Vec<[[f64; 2]; 2]> {
+        let way_m = math::wrap_signed(to[1] - from[1], self.perimeter_m);
+        if (to[1] - from[1] - way_m).abs() < 1e-9 {
+            return vec![[from, to]];
+        }
+        let (leaving_m, entering_m) =
+            if way_m > 0.0 { (self.perimeter_m, 0.0) } else { (0.0, self.perimeter_m) };
+        let share = (leaving_m - from[1]) / way_m;
+        let x_m = from[0] + share * (to[0] - from[0]);
+        vec![[from, [x_m, leaving_m]], [[x_m, entering_m], to]]
+    }
+
+    /// Samples not hidden near a place, their arc length on this side of the seam; within `half_m` either way.
+    pub(super) fn near(&self, centre: [f64; 2], half_m: [f64; 2]) -> Vec<(&PatternSample, [f64; 2])> {
+        let place = |sample: &PatternSample| {
+            let across_m = math::wrap_signed(sample.sigma_m - centre[1], self.perimeter_m);
+            [sample.x_m, centre[1] + across_m]
+        };
+        let placed = self.samples.iter().map(|sample| (sample, place(sample)));
+        let near =
+            |at: &[f64; 2]| (at[0] - centre[0]).abs() <= half_m[0] && (at[1] - centre[1]).abs() <= half_m[1];
+        placed.filter(|(_, at)| near(at)).collect()
+    }
+
+    /// The middle of the largest circle without samples about an arc length, within a turn's way: where spacing is at
+    /// its worst; and its diameter, m. `None` where T is none.
+    pub(super) fn emptiest(&self, sigma_m: f64) -> Option<([f64; 2], f64)> {
+        /// Places tried along and around.
+        const TRIED: [u32; 2] = [120, 40];
+        let t_m = self.t_m?;
+        // Away from the ends, where samples are missing that would come.
+        let room_m = (self.to_m - self.from_m - self.pitch_m).max(0.0) / 2.0;
+        let begin_m = self.from_m + room_m;
+        let middle = [begin_m + self.pitch_m / 2.0, sigma_m];
+        let half = [self.pitch_m / 2.0 + t_m, 1.5 * t_m];
+        let near: Vec<[f64; 2]> = self
+            .near(middle, half)
+            .into_iter()
+            .filter(|(sample, _)| !sample.hidden)
+            .map(|(_, at)| at)
+            .collect();
+        let nearest_m2 = |place: [f64; 2]| {
+            let m2 = near.iter().map(|at| {
+                let (x, y) = (at[0] - place[0], at[1] - place[1]);
+                x * x + y * y
+            });
+            m2.fold(f64::INFINITY, f64::min)
+        };
+        let mut best = (f64::NEG_INFINITY, middle);
+        for (i, j) in (0..TRIED[0]).flat_map(|i| (0..TRIED[1]).map(move |j| (i, j))) {
+            let share = |k: u32, of: u32| f64::from(k) / f64::from(of);
+            let place =
+                [begin_m + self.pitch_m * share(i, TRIED[0]), sigma_m + t_m * (share(j, TRIED[1]) - 0.5)];
+            let m2 = nearest_m2(place);
+            if m2 > best.0 {
+                best = (m2, place);
+            }
+        }
+        Some((best.1, 2.0 * math::sqrt(best.0)))
+    }
+}

@@ -1,0 +1,68 @@
+//! The four pictures of a plan, as SVG text: spacing around the wall, the pattern on it, and what speed gives.
+//!
+//! Drawn for white paper: every line has a dash pattern and a label of its own besides its colour.
+
+mod canvas;
+mod chart;
+mod detail;
+mod hours;
+mod labels;
+mod laid;
+mod look;
+mod modes;
+mod pattern;
+mod perimeter;
+mod polyline;
+mod speeds;
+mod wall;
+
+use headrace_core::sampling::SamplingError;
+use headrace_core::sampling::plan::{Planner, Question};
+
+pub(crate) use hours::hours;
+pub(crate) use pattern::pattern;
+pub(crate) use perimeter::perimeter;
+pub(crate) use speeds::speeds;
+
+/// Why there is no picture.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum PictureError {
+    #[error("computing a picture: {0}")]
+    Sampling(#[from] SamplingError),
+    #[error("drawing a picture: {0}")]
+    Drawing(String),
+}
+
+/// What is shown.
+pub(crate) struct Shown<'a> {
+    pub(crate) planner: &'a Planner,
+    /// The mode that perimeter and pattern show.
+    pub(crate) mode: usize,
+    /// The speed at which they show it, m/s.
+    pub(crate) speed_mps: f64,
+    pub(crate) question: Question,
+    /// Tunnel, heads and layout in words.
+    pub(crate) title: String,
+}
+
+impl Shown<'_> {
+    /// The speed asked about: as such, or by the time there is.
+    fn asked_mps(&self) -> Option<f64> {
+        let needed = |time_s: f64| self.planner.inspection().length_m / time_s;
+        self.question.speed_mps.or(self.question.time_s.map(needed))
+    }
+
+    /// Tunnel, heads, layout, and what is asked.
+    fn subtitle(&self) -> String {
+        let Question { target_m, speed_mps, time_s } = self.question;
+        let words = [
+            target_m.map(|target_m| format!("target {target_m} m")),
+            speed_mps.map(|speed_mps| format!("{speed_mps} m/s asked")),
+            time_s.map(|time_s| format!("{} h asked", time_s / 3600.0)),
+        ];
+        [Some(self.title.clone())].into_iter().chain(words).flatten().collect::<Vec<_>>().join(", ")
+    }
+}
+
+#[cfg(test)]
+mod tests;

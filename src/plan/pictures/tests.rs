@@ -1,0 +1,303 @@
+//! Every picture of every kind of plan: well-formed, the same each time, and says what it shows.
+
+use clap::Parser;
+use headrace_core::frames::Vec3;
+use headrace_core::sampling::occlusion::Obstacle;
+use headrace_core::sampling::plan::{Inspection, Planner, Question};
+
+use super::*;
+use crate::cli::{Cli, Command};
+use crate::plan::case::Case;
+
+const FAST: usize = 2;
+const TARGET: Question = Question { target_m: Some(0.5), speed_mps: None, time_s: None };
+const SPEED: Question = Question { target_m: None, speed_mps: Some(0.1), time_s: None };
+/// VITA 2 with four heads in phase shift: two side by side in front, two aft.
+const VITA_2: &str = "--vehicle deploy/vehicles/vita2-4.toml";
+/// The same heads in sectors: where they are apart, a strip is seen by none.
+const SECTORS: &str = "--vehicle deploy/vehicles/vita2-4.toml --layout sector_offset";
+const ONE: &str = "--tunnel ceran --length 7000";
+
+type Picture = fn(&Shown<'_>) -> Result<String, PictureError>;
+
+const PICTURES: [(&str, Picture); 4] =
+    [("perimeter", perimeter), ("pattern", pattern), ("speeds", speeds), ("hours", hours)];
+
+/// What these arguments of `headrace plan` describe.
+fn inspection(arguments: &str) -> Inspection {
+    let cli = Cli::try_parse_from(["headrace", "plan"].into_iter().chain(arguments.split(' '))).unwrap();
+    let Command::Plan(plan) = cli.command else { panic!("{arguments}") };
+    Case::of(&plan).unwrap().inspection
+}
+
+/// A vehicle whose own parts stand before its head: to the left, or all around.
+fn walled_in(all_around: bool) -> Inspection {
+    let plate = |[x, y, z]: [f64; 3], most: [f64; 3]| Obstacle::Box {
+        least: Vec3::new(x, y, z),
+        most: Vec3::new(most[0], most[1], most[2]),
+    };
+    let left = plate([-2.0, 0.3, -2.0], [2.0, 0.5, 2.0]);
+    let others = [
+        plate([-2.0, -0.5, -2.0], [2.0, -0.3, 2.0]),
+        plate([-2.0, -2.0, 0.3], [2.0, 2.0, 0.5]),
+        plate([-2.0, -2.0, -0.5], [2.0, 2.0, -0.3]),
+    ];
+    let hull = [left].into_iter().chain(others.into_iter().filter(|_| all_around)).collect();
+    Inspection { hull, ..inspection(ONE) }
+}
+
+/// A picture of a plan, checked for what holds of every picture.
+fn draw(inspection: Inspection, mode: usize, speed_mps: f64, question: Question, name: &str) -> String {
+    let planner = Planner::new(inspection).unwrap();
+    let title = "ceran, <4> heads & phase shift".to_owned();
+    let shown = Shown { planner: &planner, mode, speed_mps, question, title };
+    let picture = PICTURES.iter().find(|(known, _)| *known == name).unwrap().1;
+    let svg = picture(&shown).unwrap();
+    assert_eq!(svg, picture(&shown).unwrap(), "{name} differs when drawn again");
+    check(name, &svg);
+    svg
+}
+
+fn check(name: &str, svg: &str) {
+    well_formed(svg).unwrap_or_else(|why| panic!("{name}: {why}"));
+    assert!(svg.len() < 150_000, "{name}: {} bytes", svg.len());
+    assert!(!svg.contains("NaN") && !svg.contains("inf\"") && !svg.contains("inf "), "{name}");
+    assert!(svg.starts_with("<svg width=\"900\" height=\"560\" viewBox=\"0 0 9000 5600\""), "{name}");
+    assert!(svg.contains("ceran, &lt;4&gt; heads &amp; phase shift"), "{name}");
+    for size in svg.split("font-size=\"").skip(1) {
+        let tenths: f64 = size.split('"').next().unwrap().parse().unwrap();
+        assert!(tenths > 119.9, "{name}: letters of {tenths} tenths of a pixel");
+    }
+    let texts = svg.matches("<text").count();
+    assert!(texts > 15 && svg.matches("font-family=\"sans-serif\"").count() == texts, "{name}: {texts}");
+}
+
+/// Whether tags are closed in order, attributes quoted, and all else escaped.
+fn well_formed(svg: &str) -> Result<(), String> {
+    let mut open: Vec<&str> = Vec::new();
+    let mut rest = svg;
+    while let Some(start) = rest.find('<') {
+        escaped(&rest[..start])?;
+        let end = rest[start..].find('>').ok_or("a tag without an end")? + start;
+        let tag = &rest[start + 1..end];
+        rest = &rest[end + 1..];
+        if let Some(name) = tag.strip_prefix('/') {
+            if open.pop() != Some(name) {
+                return Err(format!("</{name}> closes nothing"));
+            }
+            continue;
+        }
+        let (tag, empty) = tag.strip_suffix('/').map_or((tag, false), |tag| (tag, true));
+        let (name, attributes) = tag.split_once(' ').unwrap_or((tag, ""));
+        for (k, part) in attributes.split('"').enumerate() {
+            let fits = if k % 2 == 0 { part.is_empty() || part.trim_start().ends_with('=') } else { true };
+            escaped(part)?;
+            if !fits || part.contains('<') {
+                return Err(format!("{part:?} in <{tag}>"));
+            }
+        }
+        if attributes.matches('"').count() % 2 == 1 {
+            return Err(format!("an open quote in <{tag}>"));
+        }
+        if !empty {
+            open.push(name);
+        }
+    }
+    if open.is_empty() && rest.trim().is_empty() { Ok(()) } else { Err(format!("left open: {open:?}")) }
+}
+
+fn escaped(text: &str) -> Result<(), String> {
+    for entity in text.split('&').skip(1) {
+        if !["amp;", "lt;", "gt;", "quot;", "apos;"].iter().any(|known| entity.starts_with(known)) {
+            return Err(format!("a bare & before {entity:?}"));
+        }
+    }
+    Ok(())
+}
+
+fn says(svg: &str, all: &[&str]) {
+    for words in all {
+        assert!(svg.contains(words), "{words:?} isn't said");
+    }
+}
+
+fn silent(svg: &str, none: &[&str]) {
+    for words in none {
+        assert!(!svg.contains(words), "{words:?} is said");
+    }
+}
+
+#[test]
+fn the_check_of_xml_finds_what_is_wrong() {
+    well_formed("<a b=\"c\"><d/>x &amp; y</a>\n").unwrap();
+    for wrong in ["<a>", "<a></b>", "<a b=c/>", "<a b=\"c/>", "<a>&</a>", "<a>&nbsp;</a>", "</a>", "text"] {
+        assert!(well_formed(wrong).is_err(), "{wrong}");
+    }
+}
+
+#[test]
+fn perimeter_names_its_curves_and_who_sees_what() {
+    let svg = draw(inspection(VITA_2), FAST, 0.115, TARGET, "perimeter");
+    says(&svg, &["Spacing around the wall: FAST at 0.115 m/s", "target 0.5 m", "T, both together:"]);
+    says(&svg, &["T_x, between passes", "T_y, neighbours", "2 of 4", "9:00 left", "12:00 crown", "m, 9:00"]);
+    silent(&svg, &["no head", "that alternate", "over the target", " across"]);
+    says(&draw(inspection(VITA_2), FAST, 0.2, TARGET, "perimeter"), &["over the target"]);
+}
+
+#[test]
+fn perimeter_of_sectors_shows_two_distances_and_strips_that_no_head_sees() {
+    let svg = draw(inspection(SECTORS), 1, 0.048, TARGET, "perimeter");
+    says(
+        &svg,
+        &["two distances", "that alternate", "no head", "sees it", " m across", "counts as one long step"],
+    );
+}
+
+#[test]
+fn pattern_shows_every_head_the_circle_and_what_is_hidden() {
+    let svg = draw(inspection(VITA_2), FAST, 0.115, TARGET, "pattern");
+    says(
+        &svg,
+        &["Pattern on the unrolled wall: FAST at 0.115 m/s", "head 0", "head 3", "hidden by the vehicle"],
+    );
+    says(&svg, &[" m (T). Any feature as", "true to scale", "9:00 left", "way along the tunnel, m"]);
+    silent(&draw(inspection(ONE), FAST, 0.058, TARGET, "pattern"), &["head 1", "hidden by"]);
+}
+
+/// What the circle says, against the samples of the pattern: none as large is empty, and none is emptier than where
+/// it is drawn.
+#[test]
+fn verif_no_circle_of_diameter_t_is_empty() {
+    let plans = [
+        (ONE, 0.058),
+        ("--tunnel ceran --heads 4", 0.2),
+        (VITA_2, 0.118),
+        (SECTORS, 0.099),
+        ("--tunnel ceran --heads 2 --layout sector_offset", 0.1),
+        ("--tunnel circle,radius_m=0.5 --heads 8", 0.3),
+    ];
+    for (arguments, speed_mps) in plans {
+        let planner = Planner::new(inspection(arguments)).unwrap();
+        let shown =
+            Shown { planner: &planner, mode: FAST, speed_mps, question: TARGET, title: String::new() };
+        let laid = laid::lay(&shown).unwrap();
+        let t_m = laid.t_m.unwrap();
+        let places = planner.perimeter(FAST, speed_mps, 180).unwrap();
+        let empty_m = |sigma_m: f64| laid.emptiest(sigma_m).unwrap().1;
+        let around_m = places.iter().step_by(9).map(|place| empty_m(place.sigma_m)).fold(0.0, f64::max);
+        let worst_m = wall::unseen_m(&planner).or(wall::worst(&planner, &places).map(|place| place.sigma_m));
+        let shown_m = empty_m(worst_m.unwrap());
+        assert!(around_m.max(shown_m) <= 1.001 * t_m, "{arguments}: {around_m} {shown_m} of {t_m}");
+        // Steep helices leave less than the diagonal of T_x and T_y.
+        assert!(shown_m > 0.75 * t_m, "{arguments}: {shown_m} of {t_m}");
+        assert!(shown_m > 0.97 * around_m, "{arguments}: {shown_m} of {around_m} elsewhere");
+    }
+}
+
+/// The names of the modes that meet a target, each with `words` of its speed.
+fn met(inspection: Inspection, target_m: f64, words: impl Fn(f64) -> String) -> Vec<String> {
+    let planner = Planner::new(inspection).unwrap();
+    let speed = |mode| Some((modes::name(&planner, mode), planner.v_max_mps(mode, target_m).ok()?));
+    let met = (0..planner.modes().len()).filter_map(speed);
+    met.map(|(name, v_mps)| format!("{name}: {}", words(v_mps))).collect()
+}
+
+#[test]
+fn speeds_name_every_mode_with_what_it_may_go() {
+    let svg = draw(inspection(VITA_2), FAST, 0.115, TARGET, "speeds");
+    let modes = met(inspection(VITA_2), 0.5, |v_mps| format!("{} m/s", modes::speed(v_mps)));
+    assert_eq!(modes.len(), 5);
+    for mode in &modes {
+        says(&svg, &[mode]);
+    }
+    says(&svg, &["target 0.5 m", "at most, to meet"]);
+    silent(&svg, &["asked", "never"]);
+    let svg = draw(inspection(VITA_2), FAST, 0.1, SPEED, "speeds");
+    says(&svg, &["asked: 0.100 m/s", "MEDIUM"]);
+    silent(&svg, &["target"]);
+}
+
+#[test]
+fn hours_mark_the_best_mode_and_the_time_there_is() {
+    let svg = draw(inspection(VITA_2), FAST, 0.115, TARGET, "hours");
+    let modes = met(inspection(VITA_2), 0.5, |v_mps| format!("{} h", modes::hours(7000.0 / v_mps / 3600.0)));
+    for mode in &modes {
+        says(&svg, &[mode]);
+    }
+    let planner = Planner::new(inspection(VITA_2)).unwrap();
+    let best = planner.answers(&TARGET, None).unwrap().into_iter().find(|answer| answer.best).unwrap();
+    let (hours, speed) = (modes::hours(best.needed_h.unwrap()), modes::speed(best.v_max_mps.unwrap()));
+    says(
+        &svg,
+        &[&format!("{}: {hours} h at {speed} m/s", best.mode.to_uppercase()), "Hours for 7000 m, one way"],
+    );
+    let day = Question { time_s: Some(20.0 * 3600.0), ..TARGET };
+    says(&draw(inspection(VITA_2), FAST, 0.097, day, "hours"), &["asked: 20.0 h", "20 h asked"]);
+}
+
+#[test]
+fn without_a_target_hours_are_for_the_t_that_the_speed_gives() {
+    let planner = Planner::new(inspection(VITA_2)).unwrap();
+    let finest = planner.answers(&SPEED, None).unwrap().iter().position(|answer| answer.best).unwrap();
+    let svg = draw(inspection(VITA_2), finest, 0.1, SPEED, "hours");
+    let name = modes::name(&planner, finest);
+    says(&svg, &["m, by the speed asked", "19.4 h at the", &format!("{name}: 19.4 h at 0.100 m/s")]);
+}
+
+#[test]
+fn modes_that_never_meet_the_target_are_drawn_and_said_so() {
+    // Its step alone takes FASTEST beyond this at the corners.
+    let coarse = Question { target_m: Some(0.4), ..TARGET };
+    for name in ["speeds", "hours"] {
+        let svg = draw(inspection(VITA_2), FAST, 0.08, coarse, name);
+        says(&svg, &["FASTEST: never"]);
+        silent(&svg, &["FASTER: never"]);
+    }
+    let tiny = Question { target_m: Some(0.02), ..TARGET };
+    for name in ["speeds", "hours"] {
+        says(&draw(inspection(ONE), FAST, 0.1, tiny, name), &["target 0.02 m: no mode meets it"]);
+    }
+}
+
+#[test]
+fn where_no_head_sees_there_are_words_in_place_of_curves() {
+    let words = [
+        "No head sees the wall anywhere",
+        "No head sees part of the wall",
+        "seen by no head",
+        "seen by no head",
+    ];
+    for ((name, _), words) in PICTURES.iter().zip(words) {
+        for question in [TARGET, SPEED] {
+            says(&draw(walled_in(true), FAST, 0.1, question, name), &[words]);
+        }
+        draw(walled_in(false), FAST, 0.1, TARGET, name);
+    }
+}
+
+#[test]
+fn small_pipes_large_tunnels_and_many_heads_have_pictures() {
+    let asked = Question { speed_mps: Some(0.3), ..TARGET };
+    for (name, _) in PICTURES {
+        for heads in [1, 8] {
+            draw(inspection(&format!("--tunnel circle,radius_m=0.5 --heads {heads}")), 4, 0.3, asked, name);
+            let large = format!("--tunnel circle,radius_m=20 --range 50 --heads {heads}");
+            draw(inspection(&large), 0, 0.05, TARGET, name);
+            let drifting = inspection(&format!("{large} --drift 2 --yaw 11"));
+            let svg = draw(drifting, FAST, 0.25, TARGET, name);
+            assert!(name != "perimeter" || svg.contains("2 m of drift and 11° of yaw allowed for"));
+        }
+        draw(inspection("--tunnel ceran --heads 8 --layout sector_offset"), FAST, 0.1, TARGET, name);
+        draw(inspection("--tunnel rectangle,width_m=12,height_m=0.8 --heads 3"), FAST, 0.1, TARGET, name);
+    }
+}
+
+#[test]
+fn speeds_near_rest_and_far_beyond_sense_have_pictures() {
+    for speed_mps in [0.002, 5.0] {
+        for (name, _) in PICTURES {
+            let asked = Question { speed_mps: Some(speed_mps), ..Question::default() };
+            draw(inspection(VITA_2), FAST, speed_mps, asked, name);
+        }
+    }
+}

@@ -1,0 +1,244 @@
+//! A plan on the terminal.
+
+use headrace_core::sampling::head::Basis;
+use headrace_core::sampling::layout::HeadLayout;
+use headrace_core::sampling::plan::{Answer, Briefing, Heard, Spacing, ThinStrip};
+
+use super::{Findings, printed_mps};
+
+/// The plan in words and a table.
+pub(super) fn table(findings: &Findings) -> String {
+    let mut lines = vec![tunnel_line(findings), heads_line(findings), question_line(findings), String::new()];
+    lines.extend(range_warning(findings));
+    lines.push(HEADINGS[0].to_owned());
+    lines.push(HEADINGS[1].to_owned());
+    lines.extend(findings.answers.iter().map(row));
+    lines.push(String::new());
+    lines.extend(notes(findings));
+    if let Some(briefing) = &findings.briefing {
+        lines.extend(briefing_lines(findings, briefing));
+    }
+    lines.push(String::new());
+    lines.iter().map(|line| line.trim_end()).collect::<Vec<_>>().join("\n")
+}
+
+/// How many heads, and how they share the work.
+pub(super) fn heads(findings: &Findings) -> String {
+    let layout = match findings.planner.inspection().layout {
+        HeadLayout::PhaseShift => "phase shift",
+        HeadLayout::SectorOffset => "sector offset",
+    };
+    match findings.heads.len() {
+        1 => "1 head".to_owned(),
+        count => format!("{count} heads in {layout}"),
+    }
+}
+
+fn tunnel_line(findings: &Findings) -> String {
+    let inspection = findings.planner.inspection();
+    let [y, z] = inspection.place;
+    let allowed = match (inspection.drift_m > 0.0, inspection.yaw_rad > 0.0) {
+        (false, false) => String::new(),
+        _ => format!(
+            "; drift of {} m and yaw of {:.1} degrees allowed for",
+            inspection.drift_m,
+            inspection.yaw_rad.to_degrees()
+        ),
+    };
+    format!(
+        "{}: perimeter {:.2} m, {} m long; vehicle at y {y:.2} m, z {z:.2} m{allowed}",
+        findings.tunnel,
+        inspection.profile.perimeter_m(),
+        inspection.length_m
+    )
+}
+
+fn heads_line(findings: &Findings) -> String {
+    let [least_m, most_m] = findings.footprints_m;
+    let (heads, range_m) = (heads(findings), findings.range_m);
+    format!("{heads}, range setting {range_m} m; a beam covers {least_m:.2} to {most_m:.2} m of wall")
+}
+
+fn question_line(findings: &Findings) -> String {
+    let question = &findings.question;
+    let mut asked = Vec::new();
+    asked.extend(question.target_m.map(|target_m| format!("target {target_m} m")));
+    asked.extend(question.speed_mps.map(|speed_mps| format!("speed {speed_mps} m/s")));
+    asked.extend(question.time_s.map(|time_s| {
+        let speed_mps = findings.planner.inspection().length_m / time_s;
+        format!("{} h for the whole length, one way: {speed_mps:.3} m/s", time_s / 3600.0)
+    }));
+    asked.join(", ")
+}
+
+/// Said where a head can't hear the wall.
+fn range_warning(findings: &Findings) -> Option<String> {
+    let (here_m, allowed_m) = findings.planner.farthest_m();
+    (allowed_m > findings.range_m).then(|| {
+        let where_it_is = if here_m > findings.range_m { "" } else { " when drifting" };
+        let range_m = findings.range_m;
+        format!(
+            "OUT OF RANGE: the wall is up to {allowed_m:.1} m away{where_it_is}, the setting {range_m} m\n"
+        )
+    })
+}
+
+const HEADINGS: [&str; 2] = [
+    "                                   T_y at rest, m         at  T_x, m, seen by   T_max  sure to hit, m   v_max   hours",
+    "  mode     step   turn  overlap    min   mean  worst     m/s    all    fewest       m   once    twice     m/s  needed",
+];
+
+fn row(answer: &Answer) -> String {
+    let mark = if answer.best { '*' } else { ' ' };
+    let estimated = if answer.turn_basis == Basis::Estimated.as_str() { '~' } else { ' ' };
+    let known = format!(
+        "{mark} {:<8} {:>4.1} {estimated}{:>6.2} {:>8.2}  {:>5.3}  {:>5.3}  {:>5.3}",
+        answer.mode,
+        answer.step_deg,
+        answer.turn_s,
+        answer.overlap,
+        answer.t_y_min_rest_m,
+        answer.t_y_mean_rest_m,
+        answer.t_y2_m
+    );
+    let at_speed = match (&answer.spacing, answer.speed_mps) {
+        (Some(spacing), Some(speed_mps)) if answer.v_max_mps == answer.speed_mps => {
+            spacing_columns(spacing, printed_mps(speed_mps))
+        }
+        (Some(spacing), Some(speed_mps)) => spacing_columns(spacing, speed_mps),
+        _ => format!("{:>50}", "-"),
+    };
+    let v_max = match (answer.v_max_mps, answer.needed_h) {
+        (Some(v_mps), Some(hours)) => format!("{:>8.3} {hours:>7.1}", printed_mps(v_mps)),
+        _ if answer.refused.is_some() => "    none".to_owned(),
+        _ => String::new(),
+    };
+    format!("{known}{at_speed}{v_max}")
+}
+
+fn spacing_columns(spacing: &Spacing, speed_mps: f64) -> String {
+    let metres = |value: Option<f64>, digits: usize| {
+        value.map_or_else(|| "-".to_owned(), |value| format!("{value:.digits$}"))
+    };
+    format!(
+        "  {speed_mps:>6.3} {:>6.3} {:>9.3} {:>7} {:>6} {:>8}",
+        spacing.t_x_m,
+        spacing.t_x_hidden_m,
+        metres(spacing.t_max_m, 3),
+        metres(spacing.hit_once_m, 2),
+        metres(spacing.hit_twice_m, 2)
+    )
+}
+
+fn notes(findings: &Findings) -> Vec<String> {
+    let mut notes = Vec::new();
+    for answer in &findings.answers {
+        if let Some(why) = &answer.refused {
+            notes.push(format!("{}: {why}", answer.mode));
+        }
+    }
+    if let Some(best) = findings.answers.iter().find(|answer| answer.best) {
+        notes.push(format!("* {}", best_words(best)));
+    }
+    if findings.answers.iter().any(|answer| answer.turn_basis == Basis::Estimated.as_str()) {
+        notes.push(
+            "~ carried over from another range setting; measure the turn and put it into the vehicle file"
+                .to_owned(),
+        );
+    }
+    notes
+}
+
+fn best_words(best: &Answer) -> String {
+    let met = match (best.meets_target, best.suffices) {
+        (Some(true), _) => "; it meets the target",
+        (Some(false), _) => "; it misses the target",
+        _ => "",
+    };
+    match (best.v_max_mps, best.needed_h, best.meets_target) {
+        (Some(v_mps), Some(hours), None) => {
+            let mode = best.mode;
+            format!(
+                "fastest for the target: {mode}, at most {:.3} m/s, {hours:.1} h one way",
+                printed_mps(v_mps)
+            )
+        }
+        _ => format!("finest at this speed: {}{met}", best.mode),
+    }
+}
+
+fn briefing_lines(findings: &Findings, briefing: &Briefing) -> Vec<String> {
+    let name = |head: &usize| findings.heads.get(*head).map_or("?", String::as_str);
+    let names = |heads: &[usize]| heads.iter().map(name).collect::<Vec<_>>().join(", ");
+    let mut lines = Vec::new();
+    for hidden in &briefing.hidden {
+        lines.push(format!(
+            "{}: {:.1} degrees about {:.0} are hidden by the vehicle, {:.2} m of wall at {}",
+            name(&hidden.head),
+            hidden.size_deg,
+            hidden.middle_deg,
+            hidden.wall_m,
+            hidden.clock
+        ));
+    }
+    lines.extend(briefing.strips.iter().map(|strip| strip_words(strip, &names)));
+    lines.extend(briefing.exposures.iter().map(|heard| heard_words(heard, &names)));
+    if findings.heads.len() > 1 {
+        let degrees = |start: &headrace_core::sampling::plan::Start| {
+            let way = if start.growing { '+' } else { '-' };
+            let sector = start.sector_deg.map_or_else(String::new, |[least, size]| {
+                format!(" within {:.0} to {:.0}", least, least + size)
+            });
+            format!("{} {:.1}{way}{sector}", name(&start.head), start.angle_deg)
+        };
+        let starts: Vec<String> = briefing.starts.iter().map(degrees).collect();
+        lines.push(format!(
+            "start angles in {} at {:.3} m/s, degrees, + growing: {}",
+            briefing.mode,
+            briefing.speed_mps,
+            starts.join("; ")
+        ));
+    }
+    // Heads as far apart as others say nothing new.
+    let mut said = Vec::new();
+    for rule in &briefing.hull_rules {
+        let text = format!(
+            "{:.3} m apart along the hull, heads are at equal angles at {:.3} m/s, or {:.3} m apart at this speed (q = {})",
+            rule.behind_m, rule.speed_mps, rule.apart_m, rule.q
+        );
+        if !said.contains(&text) {
+            said.push(text);
+        }
+    }
+    lines.extend(said);
+    lines
+}
+
+fn strip_words(strip: &ThinStrip, names: &impl Fn(&[usize]) -> String) -> String {
+    let (width_m, clock) = (strip.width_m, &strip.clock);
+    match strip.t_x_factor {
+        Some(factor) => {
+            let heads = names(&strip.seen_by);
+            format!(
+                "{width_m:.2} m of wall at {clock} are seen by {heads} only: passes there are {factor:.3} times as far apart"
+            )
+        }
+        None => format!("{width_m:.2} m of wall at {clock} are seen by NO head"),
+    }
+}
+
+fn heard_words(heard: &Heard, names: &impl Fn(&[usize]) -> String) -> String {
+    let mut ways = Vec::new();
+    if heard.facing_s > 0.0 {
+        ways.push(format!("face each other for {:.2} s", heard.facing_s));
+    }
+    if heard.same_patch_s > 0.0 {
+        ways.push(format!("look at one patch for {:.2} s", heard.same_patch_s));
+    }
+    format!(
+        "{} {} of every {:.1} s: they may hear each other",
+        names(&heard.heads),
+        ways.join(" and "),
+        heard.of_s
+    )
+}
