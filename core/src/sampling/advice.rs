@@ -200,6 +200,8 @@ pub struct Advisor {
     until_alternatives: u32,
     alternatives: [Option<Alternative>; MAX_MODES],
     astern: bool,
+    /// The largest speed found last: where it still does, no other is looked for.
+    last_mps: Option<f64>,
 }
 
 impl Advisor {
@@ -246,6 +248,7 @@ impl Advisor {
             until_alternatives: 0,
             alternatives: [None; MAX_MODES],
             astern: false,
+            last_mps: None,
         };
         advisor.look_from_the_middle();
         advisor
@@ -274,7 +277,7 @@ impl Advisor {
     /// left, where it is known.
     ///
     /// Heads apart along the hull keep their phases at some speeds only: the largest is the end of the stretch of speeds
-    /// in which the vehicle goes now, if that meets the target, else of any.
+    /// in which the vehicle goes now, if that meets the target; else of the stretch advised last, else of any.
     /// Source: metrics.md, "Speed advice".
     /// Allocates: never.
     pub fn advise(&mut self, situation: &Situation, left_s: Option<f64>) -> Advice {
@@ -293,6 +296,7 @@ impl Advisor {
             situation.heads.iter().flatten().map(HeadMotion::ping_period_s).fold(0.0, f64::max);
         let going = Going { ping_period_s, ..Going::default() };
         let fastest = self.fastest_mps(situation, &passes, &going);
+        self.last_mps = fastest.ok().filter(|fastest_mps| *fastest_mps > 0.0);
         let predicted_t_m = self.now.t_max_m(0, &passes, situation.speed_mps.abs(), &going);
         let x_m = pose.position.x();
         let left_m = if self.astern { x_m } else { self.task.length_m - x_m };
@@ -387,11 +391,12 @@ impl Advisor {
             let gap_s = then.gap_s(then.heads()).unwrap_or(f64::INFINITY);
             speed_mps * gap_s <= target_m && self.now.t_max_m(0, &then, speed_mps, going) <= target_m
         };
-        let now_mps = situation.speed_mps.abs();
-        Ok(if now_mps > UNDER_WAY_MPS && now_mps < bound_mps && meets(now_mps) {
-            upwards_mps(now_mps, bound_mps, meets)
-        } else {
-            downwards_mps(bound_mps, meets)
+        let now_mps = Some(situation.speed_mps.abs()).filter(|now_mps| *now_mps > UNDER_WAY_MPS);
+        let known = now_mps.into_iter().chain(self.last_mps);
+        let from_mps = known.into_iter().find(|speed_mps| *speed_mps < bound_mps && meets(*speed_mps));
+        Ok(match from_mps {
+            Some(from_mps) => upwards_mps(from_mps, bound_mps, meets),
+            None => downwards_mps(bound_mps, meets),
         })
     }
 

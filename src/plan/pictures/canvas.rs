@@ -1,9 +1,10 @@
 //! The sheet that a picture is drawn on, in pixels from its upper left corner.
 
+use std::cell::RefCell;
+
 use headrace_core::math;
-use plotters::coord::Shift;
-use plotters::prelude::*;
-use plotters::style::text_anchor::{HPos, Pos, VPos};
+use svg::node::element;
+use svg::{Document, Node};
 
 use super::PictureError;
 use super::look::{Look, Marker};
@@ -14,17 +15,17 @@ pub(super) type Px = [f64; 2];
 
 /// Width and height of a picture, pixels.
 pub(super) const SIZE_PX: [u32; 2] = [900, 560];
-/// plotters knows whole units only: a pixel is ten of them, lest slanting lines become stairs.
-const UNITS: u32 = 10;
-/// What plotters divides the size of letters by on its way to SVG.
-const PLOTTERS_POINTS: f64 = 1.24;
 /// Mean width of a letter of the usual fonts, plain and bold, as a share of their size; rather too wide.
 const LETTER: [f64; 2] = [0.56, 0.65];
 
-pub(super) const BLACK: RGBColor = RGBColor(0, 0, 0);
-pub(super) const DIM: RGBColor = RGBColor(85, 85, 85);
-pub(super) const PALE: RGBColor = RGBColor(150, 150, 150);
-pub(super) const WHITE: RGBColor = RGBColor(255, 255, 255);
+/// A colour as red, green and blue.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Colour(pub(super) u8, pub(super) u8, pub(super) u8);
+
+pub(super) const BLACK: Colour = Colour(0, 0, 0);
+pub(super) const DIM: Colour = Colour(85, 85, 85);
+pub(super) const PALE: Colour = Colour(150, 150, 150);
+pub(super) const WHITE: Colour = Colour(255, 255, 255);
 
 /// Where a text stands with respect to its place.
 #[derive(Debug, Clone, Copy)]
@@ -38,7 +39,7 @@ pub(super) enum Side {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Letters {
     pub(super) size_px: f64,
-    pub(super) colour: RGBColor,
+    pub(super) colour: Colour,
     pub(super) bold: bool,
     /// Upwards instead of to the right.
     pub(super) upright: bool,
@@ -49,9 +50,7 @@ pub(super) const SMALL: Letters = Letters { size_px: 12.0, colour: DIM, bold: fa
 pub(super) const BOLD: Letters = Letters { bold: true, ..NORMAL };
 const TITLE: Letters = Letters { size_px: 18.0, bold: true, ..NORMAL };
 
-pub(super) struct Canvas<'a> {
-    root: DrawingArea<SVGBackend<'a>, Shift>,
-}
+pub(super) struct Canvas(RefCell<Document>);
 
 pub(super) type Drawn = Result<(), PictureError>;
 
@@ -59,27 +58,21 @@ pub(super) type Drawn = Result<(), PictureError>;
 pub(super) fn sheet(
     title: &str,
     subtitle: &str,
-    draw: impl FnOnce(&Canvas<'_>) -> Drawn,
+    draw: impl FnOnce(&Canvas) -> Drawn,
 ) -> Result<String, PictureError> {
-    let mut svg = String::new();
-    {
-        let size = (SIZE_PX[0] * UNITS, SIZE_PX[1] * UNITS);
-        let canvas = Canvas { root: SVGBackend::with_string(&mut svg, size).into_drawing_area() };
-        canvas.root.fill(&WHITE).map_err(failed)?;
-        canvas.text([14.0, 22.0], title, Side::Right, TITLE)?;
-        let room = f64::from(SIZE_PX[0]) - 28.0;
-        canvas.text([14.0, 44.0], &fitting(subtitle, room, NORMAL), Side::Right, NORMAL)?;
-        draw(&canvas)?;
-        canvas.root.present().map_err(failed)?;
-    }
-    // Units are seen by the drawing alone: whoever embeds the picture gets its size in pixels.
     let [width, height] = SIZE_PX;
-    let inside = format!("<svg width=\"{}\" height=\"{}\"", width * UNITS, height * UNITS);
-    Ok(svg.replacen(&inside, &format!("<svg width=\"{width}\" height=\"{height}\""), 1))
-}
-
-fn failed(why: impl std::fmt::Display) -> PictureError {
-    PictureError::Drawing(why.to_string())
+    let document = Document::new()
+        .set("width", width)
+        .set("height", height)
+        .set("viewBox", (0, 0, width, height))
+        .set("font-family", "sans-serif");
+    let canvas = Canvas(RefCell::new(document));
+    canvas.area([0.0, 0.0], SIZE_PX.map(f64::from), WHITE)?;
+    canvas.text([14.0, 22.0], title, Side::Right, TITLE)?;
+    let room = f64::from(width) - 28.0;
+    canvas.text([14.0, 44.0], &fitting(subtitle, room, NORMAL), Side::Right, NORMAL)?;
+    draw(&canvas)?;
+    Ok(format!("{}\n", canvas.0.into_inner()))
 }
 
 /// About how wide a text will be, pixels.
@@ -99,37 +92,49 @@ fn fitting(text: &str, room_px: f64, letters: Letters) -> String {
     text.chars().take(usize::try_from(most).unwrap_or(0)).chain(['…']).collect()
 }
 
-/// Pixels in plotters' units.
-fn units(px: f64) -> i32 {
-    i32::try_from(math::round_to_i64(px * f64::from(UNITS))).unwrap_or(0)
+/// A tenth of a pixel is as fine as anybody sees.
+fn number(px: f64) -> String {
+    let text = format!("{:.1}", px + 0.0);
+    let text = text.strip_suffix(".0").unwrap_or(&text);
+    if text == "-0" { "0".to_owned() } else { text.to_owned() }
 }
 
-fn at(place: Px) -> (i32, i32) {
-    (units(place[0]), units(place[1]))
+fn points(places: &[Px]) -> String {
+    let pairs: Vec<String> = places.iter().map(|[x, y]| format!("{},{}", number(*x), number(*y))).collect();
+    pairs.join(" ")
 }
 
-fn stroke(look: &Look) -> ShapeStyle {
-    look.colour.stroke_width(units(look.width_px).unsigned_abs())
+fn hex(Colour(red, green, blue): Colour) -> String {
+    format!("#{red:02x}{green:02x}{blue:02x}")
 }
 
-/// A style of plotters' for text.
-fn style(letters: Letters, side: Side) -> TextStyle<'static> {
-    let weight = if letters.bold { FontStyle::Bold } else { FontStyle::Normal };
-    let size = letters.size_px * f64::from(UNITS) * PLOTTERS_POINTS;
-    let font = FontDesc::new(FontFamily::SansSerif, size, weight);
-    let font = if letters.upright { font.transform(FontTransform::Rotate270) } else { font };
-    let side = match side {
-        Side::Right => HPos::Left,
-        Side::Left => HPos::Right,
-        Side::Middle => HPos::Center,
-    };
-    TextStyle { font, color: letters.colour.to_backend_color(), pos: Pos::new(side, VPos::Center) }
-}
+impl Canvas {
+    fn put(&self, node: impl Node) -> Drawn {
+        self.0.borrow_mut().append(node);
+        Ok(())
+    }
 
-impl Canvas<'_> {
     /// A line of text, centred on its place from top to bottom.
-    pub(super) fn text(&self, place: Px, text: &str, side: Side, letters: Letters) -> Drawn {
-        self.root.draw_text(text, &style(letters, side), at(place)).map_err(failed)
+    pub(super) fn text(&self, [x, y]: Px, text: &str, side: Side, letters: Letters) -> Drawn {
+        let anchor = match side {
+            Side::Right => "start",
+            Side::Left => "end",
+            Side::Middle => "middle",
+        };
+        // Not every viewer centres letters by itself: their middle is about a third of their size above the line.
+        let mut node = element::Text::new(text)
+            .set("x", number(x))
+            .set("y", number(y + 0.35 * letters.size_px))
+            .set("text-anchor", anchor)
+            .set("font-size", number(letters.size_px))
+            .set("fill", hex(letters.colour));
+        if letters.bold {
+            node = node.set("font-weight", "bold");
+        }
+        if letters.upright {
+            node = node.set("transform", format!("rotate(-90 {} {})", number(x), number(y)));
+        }
+        self.put(node)
     }
 
     /// The same on a white ground, for places that lines cross.
@@ -146,23 +151,33 @@ impl Canvas<'_> {
     }
 
     /// A rectangle without an outline.
-    pub(super) fn area(&self, upper_left: Px, lower_right: Px, colour: RGBColor) -> Drawn {
-        self.root.draw(&Rectangle::new([at(upper_left), at(lower_right)], colour.filled())).map_err(failed)
+    pub(super) fn area(&self, [left, top]: Px, [right, bottom]: Px, colour: Colour) -> Drawn {
+        let node = element::Rectangle::new()
+            .set("x", number(left))
+            .set("y", number(top))
+            .set("width", number(right - left))
+            .set("height", number(bottom - top))
+            .set("fill", hex(colour));
+        self.put(node)
     }
 
     /// A filled polygon without an outline.
-    pub(super) fn polygon(&self, corners: &[Px], colour: RGBColor) -> Drawn {
-        let corners: Vec<_> = corners.iter().map(|corner| at(*corner)).collect();
-        self.root.draw(&Polygon::new(corners, colour.filled())).map_err(failed)
+    pub(super) fn polygon(&self, corners: &[Px], colour: Colour) -> Drawn {
+        self.put(element::Polygon::new().set("points", points(corners)).set("fill", hex(colour)))
     }
 
     /// A line through these places as a look has it.
     pub(super) fn line(&self, places: &[Px], look: &Look) -> Drawn {
-        for piece in polyline::dashes(&polyline::thinned(places), look.dash) {
-            let piece: Vec<_> = piece.into_iter().map(at).collect();
-            self.root.draw(&PathElement::new(piece, stroke(look))).map_err(failed)?;
+        let mut node = element::Polyline::new()
+            .set("points", points(&polyline::thinned(places)))
+            .set("fill", "none")
+            .set("stroke", hex(look.colour))
+            .set("stroke-width", number(look.width_px));
+        if !look.dash.is_empty() {
+            let dash: Vec<String> = look.dash.iter().map(|length_px| number(*length_px)).collect();
+            node = node.set("stroke-dasharray", dash.join(" "));
         }
-        Ok(())
+        self.put(node)
     }
 
     /// A marker, filled or with a white inside.
@@ -170,9 +185,14 @@ impl Canvas<'_> {
         let inside = if filled { look.colour } else { WHITE };
         let outline = Look { width_px: 1.4, dash: &[], ..*look };
         if look.marker == Marker::Circle {
-            let circle = |style: ShapeStyle| Circle::new(at(place), units(size_px), style);
-            self.root.draw(&circle(inside.filled())).map_err(failed)?;
-            return if filled { Ok(()) } else { self.root.draw(&circle(stroke(&outline))).map_err(failed) };
+            let node = element::Circle::new()
+                .set("cx", number(place[0]))
+                .set("cy", number(place[1]))
+                .set("r", number(size_px))
+                .set("fill", hex(inside))
+                .set("stroke", hex(look.colour))
+                .set("stroke-width", number(if filled { 0.0 } else { outline.width_px }));
+            return self.put(node);
         }
         let corner = |[x, y]: &[f64; 2]| [place[0] + size_px * x, place[1] + size_px * y];
         let mut corners: Vec<Px> = look.marker.corners().iter().map(corner).collect();

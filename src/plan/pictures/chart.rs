@@ -1,12 +1,10 @@
 //! A chart: a frame with two axes, and the way from metres to pixels.
 
-use headrace_core::math;
-use plotters::style::RGBColor;
-
 use super::PictureError;
-use super::canvas::{BLACK, BOLD, Canvas, Drawn, Letters, NORMAL, Px, SMALL, Side};
+use super::canvas::{BLACK, BOLD, Canvas, Colour, Drawn, Letters, NORMAL, Px, SMALL, Side};
 use super::look::{AXIS, GRID, Look};
 use super::polyline::Frame;
+use headrace_core::math;
 
 /// Length of the mark at a number, pixels.
 const TICK_PX: f64 = 4.0;
@@ -72,17 +70,17 @@ pub(super) fn short(value: f64) -> String {
 }
 
 /// A chart on a canvas.
-pub(super) struct Chart<'c, 'a> {
-    pub(super) canvas: &'c Canvas<'a>,
+pub(super) struct Chart<'c> {
+    pub(super) canvas: &'c Canvas,
     pub(super) frame: Frame,
     x: [f64; 2],
     y: [f64; 2],
 }
 
-impl<'c, 'a> Chart<'c, 'a> {
+impl<'c> Chart<'c> {
     /// Draws the grid and both axes.
     pub(super) fn new(
-        canvas: &'c Canvas<'a>,
+        canvas: &'c Canvas,
         frame: Frame,
         x: &Axis,
         y: &Axis,
@@ -143,7 +141,7 @@ impl<'c, 'a> Chart<'c, 'a> {
     }
 
     /// An ellipse about a place on the sheet, as far as it is within the frame.
-    pub(super) fn ellipse(&self, centre: Px, radii: Px, ground: RGBColor, look: &Look) -> Drawn {
+    pub(super) fn ellipse(&self, centre: Px, radii: Px, ground: Colour, look: &Look) -> Drawn {
         /// Corners of the polygon that stands for it.
         const CORNERS: u32 = 72;
         let Frame { left, top, right, bottom } = self.frame;

@@ -17,8 +17,8 @@ const MOST: usize = 450;
 /// Half of its width as a share of T.
 const HALF: f64 = 1.5;
 
-struct Detail<'c, 'a> {
-    chart: Chart<'c, 'a>,
+struct Detail<'c> {
+    chart: Chart<'c>,
     laid: &'c Laid,
     centre: [f64; 2],
     /// Where x is counted from, m.
@@ -27,7 +27,7 @@ struct Detail<'c, 'a> {
 }
 
 /// Draws it.
-pub(super) fn draw(canvas: &Canvas<'_>, laid: &Laid, centre: [f64; 2], from_m: f64, t_m: f64) -> Drawn {
+pub(super) fn draw(canvas: &Canvas, laid: &Laid, centre: [f64; 2], from_m: f64, t_m: f64) -> Drawn {
     let half_m = HALF * t_m;
     let [x_m, sigma_m] = [centre[0] - from_m, centre[1]];
     let x = Axis::new("m", x_m - half_m, x_m + half_m, 5).with_name_at(30.0);
@@ -47,7 +47,7 @@ pub(super) fn draw(canvas: &Canvas<'_>, laid: &Laid, centre: [f64; 2], from_m: f
     words(canvas, t_m)
 }
 
-fn words(canvas: &Canvas<'_>, t_m: f64) -> Drawn {
+fn words(canvas: &Canvas, t_m: f64) -> Drawn {
     canvas.text([FRAME.left, FRAME.top - 12.0], "detail, true to scale", Side::Right, SMALL)?;
     let circle = format!("Circle: {} m (T). Any feature as", short(t_m));
     let lines = [circle.as_str(), "large is hit, even here, where the", "gaps are widest."];
@@ -57,7 +57,7 @@ fn words(canvas: &Canvas<'_>, t_m: f64) -> Drawn {
     Ok(())
 }
 
-impl Detail<'_, '_> {
+impl Detail<'_> {
     /// The heads' ways: as they are, and as they come from either side of the seam.
     fn lines(&self, dense: bool) -> Drawn {
         for pass in self.laid.passes().into_iter().filter(|pass| !(dense && pass.hidden)) {

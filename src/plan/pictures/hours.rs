@@ -1,6 +1,6 @@
 //! Hours against T.
 
-use super::canvas::{self, BOLD, Drawn, NORMAL, Side, width_px};
+use super::canvas::{self, BOLD, Colour, Drawn, NORMAL, Side, width_px};
 use super::chart::{Axis, Chart, short};
 use super::labels::{self, Label};
 use super::look::{self, Look};
@@ -8,15 +8,13 @@ use super::modes::{self, Mode};
 use super::polyline::Frame;
 use super::{PictureError, Shown};
 
-use plotters::style::RGBColor;
-
 const FRAME: Frame = Frame { left: 66.0, top: 92.0, right: 752.0, bottom: 482.0 };
 /// By how much a speed exceeds the one before it on a curve.
 const FASTER: f64 = 1.02;
 /// Places at which the mode that takes least time is looked up.
 const LEAST: u32 = 300;
 /// What lies under the mode that takes least time.
-const BAND: Look = Look { colour: RGBColor(222, 222, 222), width_px: 9.0, ..look::T };
+const BAND: Look = Look { colour: Colour(222, 222, 222), width_px: 9.0, ..look::T };
 
 /// What is looked for: a T, with the hours that every mode takes for it.
 struct Sought {
@@ -44,7 +42,7 @@ pub(crate) fn hours(shown: &Shown<'_>) -> Result<String, PictureError> {
 
 /// All that is drawn where some mode gives a T.
 fn curves(
-    chart: &Chart<'_, '_>,
+    chart: &Chart<'_>,
     shown: &Shown<'_>,
     modes: &[Mode],
     sought: &Sought,
@@ -94,7 +92,7 @@ fn ends(shown: &Shown<'_>, modes: &[Mode], sought: &Sought) -> Result<[f64; 2], 
 }
 
 /// What the band is.
-fn legend(chart: &Chart<'_, '_>) -> Drawn {
+fn legend(chart: &Chart<'_>) -> Drawn {
     let [x, y] = [FRAME.right - 10.0, FRAME.top + 12.0];
     chart.canvas.line(&[[x - 40.0, y], [x, y]], &BAND)?;
     chart.canvas.text_on_white([x - 46.0, y], "takes least time", Side::Left, NORMAL)
@@ -130,7 +128,7 @@ fn least(shown: &Shown<'_>, modes: &[Mode], most_m: f64) -> Vec<[f64; 2]> {
 }
 
 /// Target, or the T that is found, upright; the time asked about across, with its label.
-fn asked(chart: &Chart<'_, '_>, shown: &Shown<'_>, sought: &Sought) -> Result<Option<Label>, PictureError> {
+fn asked(chart: &Chart<'_>, shown: &Shown<'_>, sought: &Sought) -> Result<Option<Label>, PictureError> {
     chart.upright(sought.t_m, &look::TARGET)?;
     if let Some(asked_mps) = shown.asked_mps() {
         let asked_h = shown.planner.inspection().length_m / asked_mps / 3600.0;
@@ -150,7 +148,7 @@ fn asked(chart: &Chart<'_, '_>, shown: &Shown<'_>, sought: &Sought) -> Result<Op
     Ok(None)
 }
 
-fn label(chart: &Chart<'_, '_>, mode: &Mode, end: Option<[f64; 2]>, hours: Option<f64>) -> Label {
+fn label(chart: &Chart<'_>, mode: &Mode, end: Option<[f64; 2]>, hours: Option<f64>) -> Label {
     let words = match hours {
         Some(hours) => format!("{}: {} h", mode.name, modes::hours(hours)),
         None => format!("{}: never", mode.name),
@@ -160,7 +158,7 @@ fn label(chart: &Chart<'_, '_>, mode: &Mode, end: Option<[f64; 2]>, hours: Optio
 }
 
 /// Markers where curves meet the target; the one that takes least time filled, with its hours and speed.
-fn marks(chart: &Chart<'_, '_>, shown: &Shown<'_>, modes: &[Mode], sought: &Sought) -> Drawn {
+fn marks(chart: &Chart<'_>, shown: &Shown<'_>, modes: &[Mode], sought: &Sought) -> Drawn {
     let Sought { t_m, hours } = sought;
     let found = modes.iter().filter_map(|mode| Some((mode, (*hours.get(mode.number)?)?)));
     let found: Vec<_> = found.collect();

@@ -31,7 +31,7 @@ impl Label {
 }
 
 /// Draws labels to the right of a frame, each as near to its place as its neighbours let it.
-pub(super) fn at_right(canvas: &Canvas<'_>, frame: &Frame, labels: &[Label]) -> Drawn {
+pub(super) fn at_right(canvas: &Canvas, frame: &Frame, labels: &[Label]) -> Drawn {
     let mut labels: Vec<&Label> = labels.iter().collect();
     labels.sort_by(|a, b| a.place[1].total_cmp(&b.place[1]));
     let wanted: Vec<_> = labels.iter().map(|label| (label.place[1], label.size_px()[1])).collect();
@@ -47,7 +47,7 @@ pub(super) fn at_right(canvas: &Canvas<'_>, frame: &Frame, labels: &[Label]) -> 
 }
 
 /// Draws labels of one line above a frame.
-pub(super) fn above(canvas: &Canvas<'_>, frame: &Frame, labels: &[Label]) -> Drawn {
+pub(super) fn above(canvas: &Canvas, frame: &Frame, labels: &[Label]) -> Drawn {
     let mut labels: Vec<&Label> = labels.iter().collect();
     labels.sort_by(|a, b| a.place[0].total_cmp(&b.place[0]));
     let wanted: Vec<_> = labels.iter().map(|label| (label.place[0], label.size_px()[0] + 8.0)).collect();

@@ -1,14 +1,12 @@
 //! How lines and markers look: never by colour alone.
 
-use plotters::style::RGBColor;
-
-use super::canvas::{BLACK, DIM, PALE};
+use super::canvas::{BLACK, Colour, DIM, PALE};
 
 /// The colours of Okabe and Ito, which most colour-blind people tell apart, without those too pale for lines.
-const BLUE: RGBColor = RGBColor(0, 114, 178);
-const VERMILION: RGBColor = RGBColor(213, 94, 0);
-const GREEN: RGBColor = RGBColor(0, 158, 115);
-const PURPLE: RGBColor = RGBColor(170, 51, 119);
+const BLUE: Colour = Colour(0, 114, 178);
+const VERMILION: Colour = Colour(213, 94, 0);
+const GREEN: Colour = Colour(0, 158, 115);
+const PURPLE: Colour = Colour(170, 51, 119);
 
 /// What marks a point.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,14 +34,14 @@ impl Marker {
 /// How a line and the markers on it look.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Look {
-    pub(super) colour: RGBColor,
+    pub(super) colour: Colour,
     pub(super) width_px: f64,
     /// Lengths of dash, gap, dash, ..., pixels; empty for a solid line.
     pub(super) dash: &'static [f64],
     pub(super) marker: Marker,
 }
 
-const fn look(colour: RGBColor, dash: &'static [f64], marker: Marker) -> Look {
+const fn look(colour: Colour, dash: &'static [f64], marker: Marker) -> Look {
     Look { colour, width_px: 2.0, dash, marker }
 }
 
@@ -77,7 +75,7 @@ pub(super) const ASKED: Look = Look { width_px: 1.4, ..look(DIM, &[2.0, 4.0], Ma
 /// What the vehicle hides.
 pub(super) const HIDDEN: Look = Look { width_px: 1.2, ..look(PALE, &[1.5, 3.5], Marker::Circle) };
 /// Lines across a chart at its numbers.
-pub(super) const GRID: Look = Look { width_px: 0.8, ..look(RGBColor(228, 228, 228), &[], Marker::Circle) };
+pub(super) const GRID: Look = Look { width_px: 0.8, ..look(Colour(228, 228, 228), &[], Marker::Circle) };
 /// The axes.
 pub(super) const AXIS: Look = Look { width_px: 1.0, ..look(DIM, &[], Marker::Circle) };
 /// From a label to what it is of.

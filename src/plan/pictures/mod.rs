@@ -29,8 +29,6 @@ pub(crate) use speeds::speeds;
 pub(crate) enum PictureError {
     #[error("computing a picture: {0}")]
     Sampling(#[from] SamplingError),
-    #[error("drawing a picture: {0}")]
-    Drawing(String),
 }
 
 /// What is shown.

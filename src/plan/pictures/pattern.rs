@@ -1,8 +1,6 @@
 //! The pattern on the unrolled wall.
 
-use plotters::style::RGBColor;
-
-use super::canvas::{self, BOLD, Canvas, Drawn, Letters, NORMAL, Px, SMALL, Side};
+use super::canvas::{self, BOLD, Canvas, Colour, Drawn, Letters, NORMAL, Px, SMALL, Side};
 use super::chart::{Axis, Chart};
 use super::detail;
 use super::laid::{self, Laid};
@@ -14,7 +12,7 @@ use super::{PictureError, Shown};
 
 const FRAME: Frame = Frame { left: 66.0, top: 92.0, right: 548.0, bottom: 482.0 };
 /// The inside of the circle.
-pub(super) const CIRCLE: RGBColor = RGBColor(255, 240, 190);
+pub(super) const CIRCLE: Colour = Colour(255, 240, 190);
 /// Where the legend begins, pixels.
 const LEGEND: Px = [634.0, 412.0];
 /// Places around the wall at which spacing is compared.
@@ -47,14 +45,14 @@ pub(crate) fn pattern(shown: &Shown<'_>) -> Result<String, PictureError> {
     })
 }
 
-fn chart<'c, 'a>(canvas: &'c Canvas<'a>, laid: &Laid, length_m: f64) -> Result<Chart<'c, 'a>, PictureError> {
+fn chart<'c>(canvas: &'c Canvas, laid: &Laid, length_m: f64) -> Result<Chart<'c>, PictureError> {
     let x = Axis::new("way along the tunnel, m", 0.0, length_m, 10);
     let y = Axis::new("arc length from the floor's centre, via the left wall, m", 0.0, laid.perimeter_m, 10);
     Chart::new(canvas, FRAME, &x, &y)
 }
 
 /// The circle of diameter T: flat, as the axes have different scales; cut off where it is larger than the picture.
-fn circle(chart: &Chart<'_, '_>, centre: [f64; 2], t_m: f64) -> Drawn {
+fn circle(chart: &Chart<'_>, centre: [f64; 2], t_m: f64) -> Drawn {
     let (middle, corner) = (chart.px(centre), chart.px([centre[0] + t_m / 2.0, centre[1] + t_m / 2.0]));
     chart.ellipse(middle, [corner[0] - middle[0], middle[1] - corner[1]], CIRCLE, &look::T)?;
     let note = "Left: along the tunnel and around it the scales differ, so that the circle is no circle.";
@@ -65,7 +63,7 @@ fn circle(chart: &Chart<'_, '_>, centre: [f64; 2], t_m: f64) -> Drawn {
 type Ways = Vec<(usize, Vec<Px>)>;
 
 /// Draws the heads' ways; gives those that aren't hidden.
-fn passes(chart: &Chart<'_, '_>, laid: &Laid, from_m: f64) -> Result<Ways, PictureError> {
+fn passes(chart: &Chart<'_>, laid: &Laid, from_m: f64) -> Result<Ways, PictureError> {
     let mut ways = Vec::new();
     for pass in laid.passes() {
         let look = if pass.hidden { look::HIDDEN } else { way(pass.head) };
@@ -77,7 +75,7 @@ fn passes(chart: &Chart<'_, '_>, laid: &Laid, from_m: f64) -> Result<Ways, Pictu
 }
 
 /// The heads' numbers: where their ways reach the top, or else on the longest piece.
-fn numbers(chart: &Chart<'_, '_>, heads: usize, ways: &Ways) -> Drawn {
+fn numbers(chart: &Chart<'_>, heads: usize, ways: &Ways) -> Drawn {
     /// Numbers closer together than this cover each other, pixels.
     const APART_PX: f64 = 9.0;
     let mut taken: Vec<(usize, f64)> = Vec::new();
@@ -104,13 +102,13 @@ fn way(head: usize) -> Look {
     Look { width_px: 1.5, ..look::of_several(head) }
 }
 
-fn number(chart: &Chart<'_, '_>, head: usize, place: Px) -> Drawn {
+fn number(chart: &Chart<'_>, head: usize, place: Px) -> Drawn {
     let letters = Letters { colour: way(head).colour, ..BOLD };
     chart.canvas.text_on_white(place, &head.to_string(), Side::Middle, letters)
 }
 
 /// Hours of a clock, to the right.
-fn clocks(chart: &Chart<'_, '_>, shown: &Shown<'_>) -> Drawn {
+fn clocks(chart: &Chart<'_>, shown: &Shown<'_>) -> Drawn {
     for hour in wall::hours(&shown.planner.inspection().profile) {
         let y = chart.px([0.0, hour.sigma_m])[1];
         let x = chart.frame.right;
@@ -121,7 +119,7 @@ fn clocks(chart: &Chart<'_, '_>, shown: &Shown<'_>) -> Drawn {
 }
 
 /// Heads with their lines and markers, two to a row.
-fn legend(canvas: &Canvas<'_>, laid: &Laid) -> Drawn {
+fn legend(canvas: &Canvas, laid: &Laid) -> Drawn {
     const ROW_PX: f64 = 19.0;
     for head in 0..laid.heads {
         let place = [LEGEND[0] + 126.0 * (head % 2) as f64, LEGEND[1] + ROW_PX * (head / 2) as f64];
@@ -135,12 +133,12 @@ fn legend(canvas: &Canvas<'_>, laid: &Laid) -> Drawn {
     entry(canvas, [LEGEND[0], y], "hidden by the vehicle", &look::HIDDEN)
 }
 
-fn entry(canvas: &Canvas<'_>, place: Px, words: &str, look: &Look) -> Drawn {
+fn entry(canvas: &Canvas, place: Px, words: &str, look: &Look) -> Drawn {
     canvas.line(&[place, [place[0] + 40.0, place[1]]], look)?;
     canvas.text([place[0] + 48.0, place[1]], words, Side::Right, NORMAL)
 }
 
-fn unseen(canvas: &Canvas<'_>) -> Drawn {
+fn unseen(canvas: &Canvas) -> Drawn {
     let lines =
         ["No head sees part of the wall:", "no feature there is hit, however", "large, and there is no T."];
     for (k, line) in lines.iter().enumerate() {

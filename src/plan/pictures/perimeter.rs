@@ -1,9 +1,6 @@
 //! Spacing around the wall.
 
-use headrace_core::sampling::plan::WallPlace;
-use plotters::style::RGBColor;
-
-use super::canvas::{self, Canvas, Drawn, NORMAL, PALE, SMALL, Side, width_px};
+use super::canvas::{self, Canvas, Colour, Drawn, NORMAL, PALE, SMALL, Side, width_px};
 use super::chart::{Axis, Chart, short};
 use super::labels::{self, Label};
 use super::look::{self, Look};
@@ -11,13 +8,14 @@ use super::modes;
 use super::polyline::Frame;
 use super::wall::{self, Hour, Thin};
 use super::{PictureError, Shown};
+use headrace_core::sampling::plan::WallPlace;
 
 const FRAME: Frame = Frame { left: 66.0, top: 72.0, right: 724.0, bottom: 444.0 };
 /// Places around the wall at which spacing is computed.
 const PLACES: usize = 720;
-const FEWER: RGBColor = RGBColor(236, 241, 246);
-const UNSEEN: RGBColor = RGBColor(214, 214, 214);
-const BAND: RGBColor = RGBColor(205, 226, 240);
+const FEWER: Colour = Colour(236, 241, 246);
+const UNSEEN: Colour = Colour(214, 214, 214);
+const BAND: Colour = Colour(205, 226, 240);
 
 /// What is known of the wall.
 struct Around {
@@ -74,7 +72,7 @@ impl Around {
 }
 
 /// The T across the widest strip that no head sees.
-fn across(chart: &Chart<'_, '_>, around: &Around) -> Drawn {
+fn across(chart: &Chart<'_>, around: &Around) -> Drawn {
     let Some(point) = around.across_m() else { return Ok(()) };
     let place = chart.px(point);
     chart.canvas.marker(place, &look::T, 4.5, false)?;
@@ -114,11 +112,11 @@ fn allowed(shown: &Shown<'_>) -> String {
     if all.is_empty() { String::new() } else { format!(", {} allowed for", all.join(" and ")) }
 }
 
-fn chart<'c, 'a>(
-    canvas: &'c Canvas<'a>,
+fn chart<'c>(
+    canvas: &'c Canvas,
     shown: &Shown<'_>,
     around: &Around,
-) -> Result<Chart<'c, 'a>, PictureError> {
+) -> Result<Chart<'c>, PictureError> {
     let most_m = [Some(around.most_m()), around.across_m().map(|[_, t_m]| t_m), shown.question.target_m];
     let most_m = most_m.into_iter().flatten().fold(0.0, f64::max);
     // Words about who sees what stand above the curves.
@@ -134,7 +132,7 @@ fn chart<'c, 'a>(
     Chart::new(canvas, FRAME, &x, &Axis::new("distance between samples, m", 0.0, top_m, 9))
 }
 
-fn shade(chart: &Chart<'_, '_>, stretch: &Thin) -> Drawn {
+fn shade(chart: &Chart<'_>, stretch: &Thin) -> Drawn {
     let [left, right] = [stretch.from_m, stretch.to_m].map(|sigma_m| chart.px([sigma_m, 0.0])[0]);
     let Frame { top, bottom, .. } = chart.frame;
     if stretch.heads > 0 {
@@ -148,7 +146,7 @@ fn shade(chart: &Chart<'_, '_>, stretch: &Thin) -> Drawn {
 }
 
 /// A second row of labels: hours of a clock.
-fn clocks(chart: &Chart<'_, '_>, hours: &[Hour]) -> Drawn {
+fn clocks(chart: &Chart<'_>, hours: &[Hour]) -> Drawn {
     let y = chart.frame.bottom + 34.0;
     let mut taken: Vec<[f64; 2]> = Vec::new();
     // Floor, walls and crown first; what is between them where there is room.
@@ -169,7 +167,7 @@ fn clocks(chart: &Chart<'_, '_>, hours: &[Hour]) -> Drawn {
 }
 
 /// Who sees the thin stretches, above them.
-fn captions(chart: &Chart<'_, '_>, stretches: &[Thin]) -> Drawn {
+fn captions(chart: &Chart<'_>, stretches: &[Thin]) -> Drawn {
     let mut last: Option<(f64, [String; 2])> = None;
     for stretch in stretches {
         let words = stretch.words();
@@ -188,7 +186,7 @@ fn captions(chart: &Chart<'_, '_>, stretches: &[Thin]) -> Drawn {
     Ok(())
 }
 
-fn curves(chart: &Chart<'_, '_>, shown: &Shown<'_>, places: &[WallPlace], largest: &WallPlace) -> Drawn {
+fn curves(chart: &Chart<'_>, shown: &Shown<'_>, places: &[WallPlace], largest: &WallPlace) -> Drawn {
     let t_x = |place: &WallPlace, which: usize| place.t_x_m.and_then(|both| both.get(which).copied());
     let alternate =
         places.iter().filter_map(|place| place.t_x_m).any(|[smaller, larger]| larger - smaller > 1e-9);
@@ -209,7 +207,7 @@ fn curves(chart: &Chart<'_, '_>, shown: &Shown<'_>, places: &[WallPlace], larges
 }
 
 fn name_curves(
-    chart: &Chart<'_, '_>,
+    chart: &Chart<'_>,
     shown: &Shown<'_>,
     places: &[WallPlace],
     largest: &WallPlace,
@@ -247,7 +245,7 @@ fn name_curves(
 }
 
 fn line(
-    chart: &Chart<'_, '_>,
+    chart: &Chart<'_>,
     places: &[WallPlace],
     of: impl Fn(&WallPlace) -> Option<f64>,
     look: &Look,

@@ -1,4 +1,4 @@
-//! Lines through points: cut off at a frame, thinned, and cut into dashes.
+//! Lines through points: cut off at a frame, and thinned.
 
 use headrace_core::math;
 
@@ -102,50 +102,11 @@ fn off_chord_px(point: Px, from: Px, to: Px) -> f64 {
     math::hypot(here[0] - share * along[0], here[1] - share * along[1])
 }
 
-/// The dashes of a line; lengths of dash, gap, dash, ... in pixels. The line itself where there are none.
-///
-/// Lines are cut here because plotters' SVG has no dash patterns, and its own dashes have one length only.
-pub(super) fn dashes(line: &[Px], lengths_px: &[f64]) -> Vec<Vec<Px>> {
-    let (Some(start), false) = (line.first(), lengths_px.is_empty()) else { return vec![line.to_vec()] };
-    let mut lengths = lengths_px.iter().copied().cycle();
-    let mut left_px = lengths.next().unwrap_or(1.0);
-    let (mut pieces, mut piece, mut drawing) = (Vec::new(), vec![*start], true);
-    for pair in line.windows(2) {
-        let [from, to] = pair else { continue };
-        let segment_px = math::hypot(to[0] - from[0], to[1] - from[1]);
-        let mut gone_px = 0.0;
-        while segment_px - gone_px > left_px {
-            gone_px += left_px;
-            let share = gone_px / segment_px;
-            let here = [from[0] + share * (to[0] - from[0]), from[1] + share * (to[1] - from[1])];
-            piece.push(here);
-            if drawing {
-                pieces.push(piece);
-            }
-            (piece, drawing) = (vec![here], !drawing);
-            left_px = lengths.next().unwrap_or(1.0);
-        }
-        left_px -= segment_px - gone_px;
-        piece.push(*to);
-    }
-    if drawing && piece.len() > 1 {
-        pieces.push(piece);
-    }
-    pieces
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     const UNIT: Frame = Frame { left: 0.0, top: 0.0, right: 1.0, bottom: 1.0 };
-
-    fn length_px(pieces: &[Vec<Px>]) -> f64 {
-        let of = |piece: &Vec<Px>| -> f64 {
-            piece.windows(2).map(|pair| math::hypot(pair[1][0] - pair[0][0], pair[1][1] - pair[0][1])).sum()
-        };
-        pieces.iter().map(of).sum()
-    }
 
     #[test]
     fn a_line_is_cut_off_at_the_frame() {
@@ -162,15 +123,5 @@ mod tests {
         assert_eq!(thinned(&line), [[0.0, 50.0], [50.0, 0.0], [100.0, 50.0]]);
         assert!(thinned(&[]).is_empty());
         assert_eq!(thinned(&[[1.0, 1.0]]), [[1.0, 1.0]]);
-    }
-
-    #[test]
-    fn dashes_go_round_corners_and_take_their_share() {
-        let line = [[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [10.0, 10.0]];
-        let pieces = dashes(&line, &[4.0, 1.0]);
-        assert_eq!(pieces.len(), 4);
-        assert!((length_px(&pieces) - 16.0).abs() < 1e-9);
-        assert_eq!(dashes(&line, &[]), [line.to_vec()]);
-        assert_eq!(dashes(&line, &[12.0, 1.0])[0], [[0.0, 0.0], [10.0, 0.0], [10.0, 2.0]]);
     }
 }

@@ -83,7 +83,7 @@ fn curve(shown: &Shown<'_>, mode: &Mode, most_mps: f64) -> Result<Vec<[f64; 2]>,
 }
 
 /// The speed asked about as a line; gives where and what it is.
-fn asked(chart: &Chart<'_, '_>, shown: &Shown<'_>) -> Result<Option<(f64, String)>, PictureError> {
+fn asked(chart: &Chart<'_>, shown: &Shown<'_>) -> Result<Option<(f64, String)>, PictureError> {
     let Some(asked_mps) = shown.asked_mps() else { return Ok(None) };
     chart.upright(asked_mps, &look::ASKED)?;
     let why = match shown.question.time_s {
@@ -103,7 +103,7 @@ struct Ends {
 }
 
 impl Ends {
-    fn add(&mut self, chart: &Chart<'_, '_>, shown: &Shown<'_>, mode: &Mode, points: &[[f64; 2]]) -> Drawn {
+    fn add(&mut self, chart: &Chart<'_>, shown: &Shown<'_>, mode: &Mode, points: &[[f64; 2]]) -> Drawn {
         let pieces = chart.line(points, &mode.look)?;
         let end = pieces.last().and_then(|piece| piece.last()).copied();
         let reached = match (shown.question.target_m, mode.v_max_mps) {
@@ -123,7 +123,7 @@ impl Ends {
         Ok(())
     }
 
-    fn draw(&self, canvas: &Canvas<'_>, heading: bool) -> Drawn {
+    fn draw(&self, canvas: &Canvas, heading: bool) -> Drawn {
         for (k, line) in ["at most, to meet", "the target:"].iter().enumerate().filter(|_| heading) {
             let place = [FRAME.right + 12.0, FRAME.top - 26.0 + 15.0 * k as f64];
             canvas.text(place, line, Side::Right, NORMAL)?;
@@ -138,7 +138,7 @@ fn label(place: [f64; 2], mode: &Mode, words: String) -> Label {
 }
 
 /// Markers where curves meet the target; the fastest filled, with its speed.
-fn marks(chart: &Chart<'_, '_>, shown: &Shown<'_>, modes: &[Mode]) -> Drawn {
+fn marks(chart: &Chart<'_>, shown: &Shown<'_>, modes: &[Mode]) -> Drawn {
     let Some(target_m) = shown.question.target_m else { return Ok(()) };
     let fastest = modes::fastest(modes).map(|mode| mode.number);
     for mode in modes {
@@ -162,7 +162,7 @@ fn marks(chart: &Chart<'_, '_>, shown: &Shown<'_>, modes: &[Mode]) -> Drawn {
     )
 }
 
-fn blind(chart: &Chart<'_, '_>, modes: &[Mode]) -> Drawn {
+fn blind(chart: &Chart<'_>, modes: &[Mode]) -> Drawn {
     let words = modes::blind_words(modes);
     if words.is_empty() { Ok(()) } else { chart.instead(&words) }
 }

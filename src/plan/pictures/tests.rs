@@ -60,16 +60,19 @@ fn draw(inspection: Inspection, mode: usize, speed_mps: f64, question: Question,
 
 fn check(name: &str, svg: &str) {
     well_formed(svg).unwrap_or_else(|why| panic!("{name}: {why}"));
-    assert!(svg.len() < 150_000, "{name}: {} bytes", svg.len());
+    assert!(svg.len() < 60_000, "{name}: {} bytes", svg.len());
     assert!(!svg.contains("NaN") && !svg.contains("inf\"") && !svg.contains("inf "), "{name}");
-    assert!(svg.starts_with("<svg width=\"900\" height=\"560\" viewBox=\"0 0 9000 5600\""), "{name}");
+    let opening = svg.lines().next().unwrap();
+    for attribute in ["<svg ", "width=\"900\"", "height=\"560\"", "viewBox=\"0 0 900 560\"", "\"sans-serif\""] {
+        assert!(opening.contains(attribute), "{name}: {opening}");
+    }
     assert!(svg.contains("ceran, &lt;4&gt; heads &amp; phase shift"), "{name}");
     for size in svg.split("font-size=\"").skip(1) {
-        let tenths: f64 = size.split('"').next().unwrap().parse().unwrap();
-        assert!(tenths > 119.9, "{name}: letters of {tenths} tenths of a pixel");
+        let size_px: f64 = size.split('"').next().unwrap().parse().unwrap();
+        assert!(size_px > 11.9, "{name}: letters of {size_px} pixels");
     }
     let texts = svg.matches("<text").count();
-    assert!(texts > 15 && svg.matches("font-family=\"sans-serif\"").count() == texts, "{name}: {texts}");
+    assert!(texts > 15, "{name}: {texts}");
 }
 
 /// Whether tags are closed in order, attributes quoted, and all else escaped.
