@@ -79,12 +79,7 @@ pub(super) struct Chart<'c> {
 
 impl<'c> Chart<'c> {
     /// Draws the grid and both axes.
-    pub(super) fn new(
-        canvas: &'c Canvas,
-        frame: Frame,
-        x: &Axis,
-        y: &Axis,
-    ) -> Result<Self, PictureError> {
+    pub(super) fn new(canvas: &'c Canvas, frame: Frame, x: &Axis, y: &Axis) -> Result<Self, PictureError> {
         let chart = Self { canvas, frame, x: [x.from, x.to], y: [y.from, y.to] };
         let Frame { left, top, right, bottom } = frame;
         for tick in &x.ticks {

@@ -41,13 +41,7 @@ pub(crate) fn hours(shown: &Shown<'_>) -> Result<String, PictureError> {
 }
 
 /// All that is drawn where some mode gives a T.
-fn curves(
-    chart: &Chart<'_>,
-    shown: &Shown<'_>,
-    modes: &[Mode],
-    sought: &Sought,
-    most: [f64; 2],
-) -> Drawn {
+fn curves(chart: &Chart<'_>, shown: &Shown<'_>, modes: &[Mode], sought: &Sought, most: [f64; 2]) -> Drawn {
     chart.line(&least(shown, modes, most[0]), &BAND)?;
     legend(chart)?;
     let mut right: Vec<Label> = asked(chart, shown, sought)?.into_iter().collect();

@@ -112,11 +112,7 @@ fn allowed(shown: &Shown<'_>) -> String {
     if all.is_empty() { String::new() } else { format!(", {} allowed for", all.join(" and ")) }
 }
 
-fn chart<'c>(
-    canvas: &'c Canvas,
-    shown: &Shown<'_>,
-    around: &Around,
-) -> Result<Chart<'c>, PictureError> {
+fn chart<'c>(canvas: &'c Canvas, shown: &Shown<'_>, around: &Around) -> Result<Chart<'c>, PictureError> {
     let most_m = [Some(around.most_m()), around.across_m().map(|[_, t_m]| t_m), shown.question.target_m];
     let most_m = most_m.into_iter().flatten().fold(0.0, f64::max);
     // Words about who sees what stand above the curves.

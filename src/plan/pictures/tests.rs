@@ -63,7 +63,8 @@ fn check(name: &str, svg: &str) {
     assert!(svg.len() < 60_000, "{name}: {} bytes", svg.len());
     assert!(!svg.contains("NaN") && !svg.contains("inf\"") && !svg.contains("inf "), "{name}");
     let opening = svg.lines().next().unwrap();
-    for attribute in ["<svg ", "width=\"900\"", "height=\"560\"", "viewBox=\"0 0 900 560\"", "\"sans-serif\""] {
+    for attribute in ["<svg ", "width=\"900\"", "height=\"560\"", "viewBox=\"0 0 900 560\"", "\"sans-serif\""]
+    {
         assert!(opening.contains(attribute), "{name}: {opening}");
     }
     assert!(svg.contains("ceran, &lt;4&gt; heads &amp; phase shift"), "{name}");
