@@ -67,10 +67,10 @@ pub(super) fn sheet(
         .set("viewBox", (0, 0, width, height))
         .set("font-family", "sans-serif");
     let canvas = Canvas(RefCell::new(document));
-    canvas.area([0.0, 0.0], SIZE_PX.map(f64::from), WHITE)?;
-    canvas.text([14.0, 22.0], title, Side::Right, TITLE)?;
+    canvas.area([0.0, 0.0], SIZE_PX.map(f64::from), WHITE);
+    canvas.text([14.0, 22.0], title, Side::Right, TITLE);
     let room = f64::from(width) - 28.0;
-    canvas.text([14.0, 44.0], &fitting(subtitle, room, NORMAL), Side::Right, NORMAL)?;
+    canvas.text([14.0, 44.0], &fitting(subtitle, room, NORMAL), Side::Right, NORMAL);
     draw(&canvas)?;
     Ok(format!("{}\n", canvas.0.into_inner()))
 }
@@ -109,13 +109,12 @@ fn hex(Colour(red, green, blue): Colour) -> String {
 }
 
 impl Canvas {
-    fn put(&self, node: impl Node) -> Drawn {
+    fn put(&self, node: impl Node) {
         self.0.borrow_mut().append(node);
-        Ok(())
     }
 
     /// A line of text, centred on its place from top to bottom.
-    pub(super) fn text(&self, [x, y]: Px, text: &str, side: Side, letters: Letters) -> Drawn {
+    pub(super) fn text(&self, [x, y]: Px, text: &str, side: Side, letters: Letters) {
         let anchor = match side {
             Side::Right => "start",
             Side::Left => "end",
@@ -134,11 +133,11 @@ impl Canvas {
         if letters.upright {
             node = node.set("transform", format!("rotate(-90 {} {})", number(x), number(y)));
         }
-        self.put(node)
+        self.put(node);
     }
 
     /// The same on a white ground, for places that lines cross.
-    pub(super) fn text_on_white(&self, place: Px, text: &str, side: Side, letters: Letters) -> Drawn {
+    pub(super) fn text_on_white(&self, place: Px, text: &str, side: Side, letters: Letters) {
         let width = width_px(text, letters);
         let left = match side {
             Side::Right => place[0] - 2.0,
@@ -146,28 +145,28 @@ impl Canvas {
             Side::Middle => place[0] - width / 2.0,
         };
         let half = letters.size_px * 0.6;
-        self.area([left, place[1] - half], [left + width, place[1] + half], WHITE)?;
-        self.text(place, text, side, letters)
+        self.area([left, place[1] - half], [left + width, place[1] + half], WHITE);
+        self.text(place, text, side, letters);
     }
 
     /// A rectangle without an outline.
-    pub(super) fn area(&self, [left, top]: Px, [right, bottom]: Px, colour: Colour) -> Drawn {
+    pub(super) fn area(&self, [left, top]: Px, [right, bottom]: Px, colour: Colour) {
         let node = element::Rectangle::new()
             .set("x", number(left))
             .set("y", number(top))
             .set("width", number(right - left))
             .set("height", number(bottom - top))
             .set("fill", hex(colour));
-        self.put(node)
+        self.put(node);
     }
 
     /// A filled polygon without an outline.
-    pub(super) fn polygon(&self, corners: &[Px], colour: Colour) -> Drawn {
-        self.put(element::Polygon::new().set("points", points(corners)).set("fill", hex(colour)))
+    pub(super) fn polygon(&self, corners: &[Px], colour: Colour) {
+        self.put(element::Polygon::new().set("points", points(corners)).set("fill", hex(colour)));
     }
 
     /// A line through these places as a look has it.
-    pub(super) fn line(&self, places: &[Px], look: &Look) -> Drawn {
+    pub(super) fn line(&self, places: &[Px], look: &Look) {
         let mut node = element::Polyline::new()
             .set("points", points(&polyline::thinned(places)))
             .set("fill", "none")
@@ -177,11 +176,11 @@ impl Canvas {
             let dash: Vec<String> = look.dash.iter().map(|length_px| number(*length_px)).collect();
             node = node.set("stroke-dasharray", dash.join(" "));
         }
-        self.put(node)
+        self.put(node);
     }
 
     /// A marker, filled or with a white inside.
-    pub(super) fn marker(&self, place: Px, look: &Look, size_px: f64, filled: bool) -> Drawn {
+    pub(super) fn marker(&self, place: Px, look: &Look, size_px: f64, filled: bool) {
         let inside = if filled { look.colour } else { WHITE };
         let outline = Look { width_px: 1.4, dash: &[], ..*look };
         if look.marker == Marker::Circle {
@@ -192,12 +191,15 @@ impl Canvas {
                 .set("fill", hex(inside))
                 .set("stroke", hex(look.colour))
                 .set("stroke-width", number(if filled { 0.0 } else { outline.width_px }));
-            return self.put(node);
+            self.put(node);
+            return;
         }
         let corner = |[x, y]: &[f64; 2]| [place[0] + size_px * x, place[1] + size_px * y];
         let mut corners: Vec<Px> = look.marker.corners().iter().map(corner).collect();
-        self.polygon(&corners, inside)?;
+        self.polygon(&corners, inside);
         corners.extend(corners.first().copied());
-        if filled { Ok(()) } else { self.line(&corners, &outline) }
+        if !filled {
+            self.line(&corners, &outline);
+        }
     }
 }

@@ -1,7 +1,6 @@
 //! A chart: a frame with two axes, and the way from metres to pixels.
 
-use super::PictureError;
-use super::canvas::{BLACK, BOLD, Canvas, Colour, Drawn, Letters, NORMAL, Px, SMALL, Side};
+use super::canvas::{BLACK, BOLD, Canvas, Colour, Letters, NORMAL, Px, SMALL, Side};
 use super::look::{AXIS, GRID, Look};
 use super::polyline::Frame;
 use headrace_core::math;
@@ -79,33 +78,33 @@ pub(super) struct Chart<'c> {
 
 impl<'c> Chart<'c> {
     /// Draws the grid and both axes.
-    pub(super) fn new(canvas: &'c Canvas, frame: Frame, x: &Axis, y: &Axis) -> Result<Self, PictureError> {
+    pub(super) fn new(canvas: &'c Canvas, frame: Frame, x: &Axis, y: &Axis) -> Self {
         let chart = Self { canvas, frame, x: [x.from, x.to], y: [y.from, y.to] };
         let Frame { left, top, right, bottom } = frame;
         for tick in &x.ticks {
             let [at, _] = chart.px([*tick, y.from]);
-            canvas.line(&[[at, top], [at, bottom]], &GRID)?;
-            canvas.line(&[[at, bottom], [at, bottom + TICK_PX]], &AXIS)?;
+            canvas.line(&[[at, top], [at, bottom]], &GRID);
+            canvas.line(&[[at, bottom], [at, bottom + TICK_PX]], &AXIS);
             let words = format!("{tick:.*}", x.digits);
-            canvas.text([at, bottom + 14.0], &words, Side::Middle, NUMBER)?;
+            canvas.text([at, bottom + 14.0], &words, Side::Middle, NUMBER);
         }
         for tick in &y.ticks {
             let [_, at] = chart.px([x.from, *tick]);
-            canvas.line(&[[left, at], [right, at]], &GRID)?;
-            canvas.line(&[[left - TICK_PX, at], [left, at]], &AXIS)?;
+            canvas.line(&[[left, at], [right, at]], &GRID);
+            canvas.line(&[[left - TICK_PX, at], [left, at]], &AXIS);
             let words = format!("{tick:.*}", y.digits);
-            canvas.text([left - 8.0, at], &words, Side::Left, NUMBER)?;
+            canvas.text([left - 8.0, at], &words, Side::Left, NUMBER);
         }
-        canvas.line(&[[left, top], [left, bottom], [right, bottom]], &AXIS)?;
+        canvas.line(&[[left, top], [left, bottom], [right, bottom]], &AXIS);
         let middle = [f64::midpoint(left, right), f64::midpoint(top, bottom)];
-        canvas.text([middle[0], bottom + x.name_px], &x.name, Side::Middle, NORMAL)?;
+        canvas.text([middle[0], bottom + x.name_px], &x.name, Side::Middle, NORMAL);
         canvas.text(
             [left - y.name_px - 8.0, middle[1]],
             &y.name,
             Side::Middle,
             Letters { upright: true, ..NORMAL },
-        )?;
-        Ok(chart)
+        );
+        chart
     }
 
     /// Where a point is on the sheet.
@@ -116,27 +115,27 @@ impl<'c> Chart<'c> {
     }
 
     /// The line through these points, as far as it is within the frame; gives its pieces on the sheet.
-    pub(super) fn line(&self, points: &[[f64; 2]], look: &Look) -> Result<Vec<Vec<Px>>, PictureError> {
+    pub(super) fn line(&self, points: &[[f64; 2]], look: &Look) -> Vec<Vec<Px>> {
         let places: Vec<Px> = points.iter().map(|point| self.px(*point)).collect();
         let pieces = self.frame.cut(&places);
         for piece in &pieces {
-            self.canvas.line(piece, look)?;
+            self.canvas.line(piece, look);
         }
-        Ok(pieces)
+        pieces
     }
 
     /// A line from the left to the right.
-    pub(super) fn across(&self, y: f64, look: &Look) -> Drawn {
-        self.line(&[[self.x[0], y], [self.x[1], y]], look).map(drop)
+    pub(super) fn across(&self, y: f64, look: &Look) {
+        self.line(&[[self.x[0], y], [self.x[1], y]], look);
     }
 
     /// A line from the bottom to the top.
-    pub(super) fn upright(&self, x: f64, look: &Look) -> Drawn {
-        self.line(&[[x, self.y[0]], [x, self.y[1]]], look).map(drop)
+    pub(super) fn upright(&self, x: f64, look: &Look) {
+        self.line(&[[x, self.y[0]], [x, self.y[1]]], look);
     }
 
     /// An ellipse about a place on the sheet, as far as it is within the frame.
-    pub(super) fn ellipse(&self, centre: Px, radii: Px, ground: Colour, look: &Look) -> Drawn {
+    pub(super) fn ellipse(&self, centre: Px, radii: Px, ground: Colour, look: &Look) {
         /// Corners of the polygon that stands for it.
         const CORNERS: u32 = 72;
         let Frame { left, top, right, bottom } = self.frame;
@@ -147,19 +146,20 @@ impl<'c> Chart<'c> {
         let corners: Vec<Px> = (0..=CORNERS).map(corner).collect();
         let within: Vec<Px> =
             corners.iter().map(|[x, y]| [x.clamp(left, right), y.clamp(top, bottom)]).collect();
-        self.canvas.polygon(&within, ground)?;
-        self.frame.cut(&corners).iter().try_for_each(|piece| self.canvas.line(piece, look))
+        self.canvas.polygon(&within, ground);
+        for piece in self.frame.cut(&corners) {
+            self.canvas.line(&piece, look);
+        }
     }
 
     /// Words in place of what can't be drawn, in the middle of the frame.
-    pub(super) fn instead(&self, lines: &[String]) -> Drawn {
+    pub(super) fn instead(&self, lines: &[String]) {
         let Frame { left, top, right, bottom } = self.frame;
         let first = f64::midpoint(top, bottom) - 10.0 * (lines.len() as f64 - 1.0);
         for (k, line) in lines.iter().enumerate() {
             let place = [f64::midpoint(left, right), first + 20.0 * k as f64];
-            self.canvas.text_on_white(place, line, Side::Middle, BOLD)?;
+            self.canvas.text_on_white(place, line, Side::Middle, BOLD);
         }
-        Ok(())
     }
 }
 

@@ -1,6 +1,6 @@
 //! A piece of the pattern to scale, about the emptiest place.
 
-use super::canvas::{Canvas, Drawn, NORMAL, Px, SMALL, Side};
+use super::canvas::{Canvas, NORMAL, Px, SMALL, Side};
 use super::chart::{Axis, Chart, short};
 use super::laid::Laid;
 use super::look::{self, Look};
@@ -27,48 +27,46 @@ struct Detail<'c> {
 }
 
 /// Draws it.
-pub(super) fn draw(canvas: &Canvas, laid: &Laid, centre: [f64; 2], from_m: f64, t_m: f64) -> Drawn {
+pub(super) fn draw(canvas: &Canvas, laid: &Laid, centre: [f64; 2], from_m: f64, t_m: f64) {
     let half_m = HALF * t_m;
     let [x_m, sigma_m] = [centre[0] - from_m, centre[1]];
     let x = Axis::new("m", x_m - half_m, x_m + half_m, 5).with_name_at(30.0);
     let y = Axis::new("", sigma_m - half_m, sigma_m + half_m, 6);
-    let chart = Chart::new(canvas, FRAME, &x, &y)?;
+    let chart = Chart::new(canvas, FRAME, &x, &y);
     let radius_px = (FRAME.right - FRAME.left) / (4.0 * HALF);
     let outline = Look { width_px: 1.8, ..look::T };
-    chart.ellipse(chart.px([x_m, sigma_m]), [radius_px; 2], CIRCLE, &outline)?;
+    chart.ellipse(chart.px([x_m, sigma_m]), [radius_px; 2], CIRCLE, &outline);
     let detail = Detail { chart, laid, centre, from_m, half_m };
     let samples = detail.samples();
     // Too many to tell apart: the lines of what is sampled say it all.
     let dense = samples.len() > MOST;
-    detail.lines(dense)?;
+    detail.lines(dense);
     for (head, place) in samples.iter().filter(|_| !dense) {
-        canvas.marker(*place, &look::of_several(*head), 2.6, true)?;
+        canvas.marker(*place, &look::of_several(*head), 2.6, true);
     }
-    words(canvas, t_m)
+    words(canvas, t_m);
 }
 
-fn words(canvas: &Canvas, t_m: f64) -> Drawn {
-    canvas.text([FRAME.left, FRAME.top - 12.0], "detail, true to scale", Side::Right, SMALL)?;
+fn words(canvas: &Canvas, t_m: f64) {
+    canvas.text([FRAME.left, FRAME.top - 12.0], "detail, true to scale", Side::Right, SMALL);
     let circle = format!("Circle: {} m (T). Any feature as", short(t_m));
     let lines = [circle.as_str(), "large is hit, even here, where the", "gaps are widest."];
     for (k, line) in lines.into_iter().enumerate() {
-        canvas.text([WORDS[0], WORDS[1] + 17.0 * k as f64], line, Side::Right, NORMAL)?;
+        canvas.text([WORDS[0], WORDS[1] + 17.0 * k as f64], line, Side::Right, NORMAL);
     }
-    Ok(())
 }
 
 impl Detail<'_> {
     /// The heads' ways: as they are, and as they come from either side of the seam.
-    fn lines(&self, dense: bool) -> Drawn {
+    fn lines(&self, dense: bool) {
         for pass in self.laid.passes().into_iter().filter(|pass| !(dense && pass.hidden)) {
             let thin = Look { width_px: 0.8, dash: &[], ..look::of_several(pass.head) };
             let look = if pass.hidden { look::HIDDEN } else { thin };
             for turns in [-1.0, 0.0, 1.0] {
                 let place = |[x, sigma]: &[f64; 2]| [x - self.from_m, sigma + turns * self.laid.perimeter_m];
-                self.chart.line(&pass.points.iter().map(place).collect::<Vec<_>>(), &look)?;
+                self.chart.line(&pass.points.iter().map(place).collect::<Vec<_>>(), &look);
             }
         }
-        Ok(())
     }
 
     /// Samples that aren't hidden, by head, on the sheet.

@@ -31,27 +31,31 @@ pub(crate) fn hours(shown: &Shown<'_>) -> Result<String, PictureError> {
     let title = format!("Hours for {} m, one way, against T", shown.planner.inspection().length_m);
     canvas::sheet(&title, &shown.subtitle(), |canvas| {
         let x = Axis::new("T: a feature this large is hit, m", 0.0, most[0], 12);
-        let chart = Chart::new(canvas, FRAME, &x, &Axis::new("hours, one way", 0.0, most[1], 9))?;
+        let chart = Chart::new(canvas, FRAME, &x, &Axis::new("hours, one way", 0.0, most[1], 9));
         let words = modes::blind_words(&modes);
         if modes.iter().any(|mode| !mode.blind) {
             curves(&chart, shown, &modes, &sought, most)?;
         }
-        if words.is_empty() { Ok(()) } else { chart.instead(&words) }
+        if !words.is_empty() {
+            chart.instead(&words);
+        }
+        Ok(())
     })
 }
 
 /// All that is drawn where some mode gives a T.
 fn curves(chart: &Chart<'_>, shown: &Shown<'_>, modes: &[Mode], sought: &Sought, most: [f64; 2]) -> Drawn {
-    chart.line(&least(shown, modes, most[0]), &BAND)?;
-    legend(chart)?;
-    let mut right: Vec<Label> = asked(chart, shown, sought)?.into_iter().collect();
+    chart.line(&least(shown, modes, most[0]), &BAND);
+    legend(chart);
+    let mut right: Vec<Label> = asked(chart, shown, sought).into_iter().collect();
     for mode in modes.iter().filter(|mode| !mode.blind) {
-        let pieces = chart.line(&curve(shown, mode, most)?, &mode.look)?;
+        let pieces = chart.line(&curve(shown, mode, most)?, &mode.look);
         let end = pieces.last().and_then(|piece| piece.last()).copied();
         right.push(label(chart, mode, end, sought.hours.get(mode.number).copied().flatten()));
     }
-    labels::at_right(chart.canvas, &FRAME, &right)?;
-    marks(chart, shown, modes, sought)
+    labels::at_right(chart.canvas, &FRAME, &right);
+    marks(chart, shown, modes, sought);
+    Ok(())
 }
 
 /// The target, or else the T that the speed asked about gives.
@@ -86,10 +90,10 @@ fn ends(shown: &Shown<'_>, modes: &[Mode], sought: &Sought) -> Result<[f64; 2], 
 }
 
 /// What the band is.
-fn legend(chart: &Chart<'_>) -> Drawn {
+fn legend(chart: &Chart<'_>) {
     let [x, y] = [FRAME.right - 10.0, FRAME.top + 12.0];
-    chart.canvas.line(&[[x - 40.0, y], [x, y]], &BAND)?;
-    chart.canvas.text_on_white([x - 46.0, y], "takes least time", Side::Left, NORMAL)
+    chart.canvas.line(&[[x - 40.0, y], [x, y]], &BAND);
+    chart.canvas.text_on_white([x - 46.0, y], "takes least time", Side::Left, NORMAL);
 }
 
 fn curve(shown: &Shown<'_>, mode: &Mode, [most_m, most_h]: [f64; 2]) -> Result<Vec<[f64; 2]>, PictureError> {
@@ -122,11 +126,11 @@ fn least(shown: &Shown<'_>, modes: &[Mode], most_m: f64) -> Vec<[f64; 2]> {
 }
 
 /// Target, or the T that is found, upright; the time asked about across, with its label.
-fn asked(chart: &Chart<'_>, shown: &Shown<'_>, sought: &Sought) -> Result<Option<Label>, PictureError> {
-    chart.upright(sought.t_m, &look::TARGET)?;
+fn asked(chart: &Chart<'_>, shown: &Shown<'_>, sought: &Sought) -> Option<Label> {
+    chart.upright(sought.t_m, &look::TARGET);
     if let Some(asked_mps) = shown.asked_mps() {
         let asked_h = shown.planner.inspection().length_m / asked_mps / 3600.0;
-        chart.across(asked_h, &look::ASKED)?;
+        chart.across(asked_h, &look::ASKED);
         let lines = match shown.question.time_s {
             Some(_) if shown.question.speed_mps.is_none() => {
                 vec![format!("asked: {} h", modes::hours(asked_h))]
@@ -137,9 +141,9 @@ fn asked(chart: &Chart<'_>, shown: &Shown<'_>, sought: &Sought) -> Result<Option
             ],
         };
         let place = [FRAME.right, chart.px([0.0, asked_h])[1]];
-        return Ok(Some(Label { place, lines, look: look::ASKED, bold: false }));
+        return Some(Label { place, lines, look: look::ASKED, bold: false });
     }
-    Ok(None)
+    None
 }
 
 fn label(chart: &Chart<'_>, mode: &Mode, end: Option<[f64; 2]>, hours: Option<f64>) -> Label {
@@ -152,7 +156,7 @@ fn label(chart: &Chart<'_>, mode: &Mode, end: Option<[f64; 2]>, hours: Option<f6
 }
 
 /// Markers where curves meet the target; the one that takes least time filled, with its hours and speed.
-fn marks(chart: &Chart<'_>, shown: &Shown<'_>, modes: &[Mode], sought: &Sought) -> Drawn {
+fn marks(chart: &Chart<'_>, shown: &Shown<'_>, modes: &[Mode], sought: &Sought) {
     let Sought { t_m, hours } = sought;
     let found = modes.iter().filter_map(|mode| Some((mode, (*hours.get(mode.number)?)?)));
     let found: Vec<_> = found.collect();
@@ -163,11 +167,11 @@ fn marks(chart: &Chart<'_>, shown: &Shown<'_>, modes: &[Mode], sought: &Sought) 
         if !chart.frame.has(place) {
             continue;
         }
-        chart.canvas.marker(place, &mode.look, if is_best { 6.5 } else { 4.5 }, is_best)?;
+        chart.canvas.marker(place, &mode.look, if is_best { 6.5 } else { 4.5 }, is_best);
         if is_best {
             let v_mps = shown.planner.inspection().length_m / hours / 3600.0;
             let words = format!("{}: {} h at {} m/s", mode.name, modes::hours(*hours), modes::speed(v_mps));
-            chart.canvas.text_on_white([place[0] - 12.0, place[1] + 20.0], &words, Side::Left, BOLD)?;
+            chart.canvas.text_on_white([place[0] - 12.0, place[1] + 20.0], &words, Side::Left, BOLD);
         }
     }
     let words = match shown.question.target_m {
@@ -176,10 +180,9 @@ fn marks(chart: &Chart<'_>, shown: &Shown<'_>, modes: &[Mode], sought: &Sought) 
         None => format!("{} m, by the speed asked", short(*t_m)),
     };
     let place = chart.px([*t_m, 0.0])[0].max(FRAME.left + width_px(&words, NORMAL) / 2.0);
-    chart.canvas.text([place, FRAME.top - 10.0], &words, Side::Middle, NORMAL)?;
+    chart.canvas.text([place, FRAME.top - 10.0], &words, Side::Middle, NORMAL);
     for (k, line) in ["hours at the", "upright line:"].iter().enumerate() {
         let place = [FRAME.right + 12.0, FRAME.top - 26.0 + 15.0 * k as f64];
-        chart.canvas.text(place, line, Side::Right, NORMAL)?;
+        chart.canvas.text(place, line, Side::Right, NORMAL);
     }
-    Ok(())
 }

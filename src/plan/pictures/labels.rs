@@ -1,6 +1,6 @@
 //! Labels at the ends of curves, moved apart where they would cover each other.
 
-use super::canvas::{Canvas, Drawn, Letters, NORMAL, Px, Side, width_px};
+use super::canvas::{Canvas, Letters, NORMAL, Px, Side, width_px};
 use super::look::{LEADER, Look};
 use super::polyline::Frame;
 
@@ -31,34 +31,32 @@ impl Label {
 }
 
 /// Draws labels to the right of a frame, each as near to its place as its neighbours let it.
-pub(super) fn at_right(canvas: &Canvas, frame: &Frame, labels: &[Label]) -> Drawn {
+pub(super) fn at_right(canvas: &Canvas, frame: &Frame, labels: &[Label]) {
     let mut labels: Vec<&Label> = labels.iter().collect();
     labels.sort_by(|a, b| a.place[1].total_cmp(&b.place[1]));
     let wanted: Vec<_> = labels.iter().map(|label| (label.place[1], label.size_px()[1])).collect();
     let x = frame.right + APART_PX;
     for (label, y) in labels.iter().zip(moved_apart(&wanted, frame.top, frame.bottom + LINE_PX)) {
-        canvas.line(&[label.place, [x - 3.0, y]], &LEADER)?;
+        canvas.line(&[label.place, [x - 3.0, y]], &LEADER);
         let first = y - LINE_PX * (label.lines.len() as f64 - 1.0) / 2.0;
         for (k, line) in label.lines.iter().enumerate() {
-            canvas.text([x, first + LINE_PX * k as f64], line, Side::Right, label.letters())?;
+            canvas.text([x, first + LINE_PX * k as f64], line, Side::Right, label.letters());
         }
     }
-    Ok(())
 }
 
 /// Draws labels of one line above a frame.
-pub(super) fn above(canvas: &Canvas, frame: &Frame, labels: &[Label]) -> Drawn {
+pub(super) fn above(canvas: &Canvas, frame: &Frame, labels: &[Label]) {
     let mut labels: Vec<&Label> = labels.iter().collect();
     labels.sort_by(|a, b| a.place[0].total_cmp(&b.place[0]));
     let wanted: Vec<_> = labels.iter().map(|label| (label.place[0], label.size_px()[0] + 8.0)).collect();
     for (label, x) in labels.iter().zip(moved_apart(&wanted, frame.left, frame.right)) {
         let y = frame.top - APART_PX;
-        canvas.line(&[label.place, [x, y + 6.0]], &LEADER)?;
+        canvas.line(&[label.place, [x, y + 6.0]], &LEADER);
         for line in &label.lines {
-            canvas.text([x, y], line, Side::Middle, label.letters())?;
+            canvas.text([x, y], line, Side::Middle, label.letters());
         }
     }
-    Ok(())
 }
 
 /// Middles of intervals as near to the places wanted, in order, as their lengths allow, within bounds if they fit.

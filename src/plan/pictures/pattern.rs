@@ -1,6 +1,6 @@
 //! The pattern on the unrolled wall.
 
-use super::canvas::{self, BOLD, Canvas, Colour, Drawn, Letters, NORMAL, Px, SMALL, Side};
+use super::canvas::{self, BOLD, Canvas, Colour, Letters, NORMAL, Px, SMALL, Side};
 use super::chart::{Axis, Chart};
 use super::detail;
 use super::laid::{self, Laid};
@@ -30,52 +30,53 @@ pub(crate) fn pattern(shown: &Shown<'_>) -> Result<String, PictureError> {
     let from_m = from_m.max(laid.from_m).min(laid.to_m - length_m);
     let title = format!("Pattern on the unrolled wall: {}", modes::at_speed(shown));
     canvas::sheet(&title, &shown.subtitle(), |canvas| {
-        let chart = chart(canvas, &laid, length_m)?;
+        let chart = chart(canvas, &laid, length_m);
         if let (Some(centre), Some(t_m)) = (centre, laid.t_m) {
-            circle(&chart, [centre[0] - from_m, centre[1]], t_m)?;
+            circle(&chart, [centre[0] - from_m, centre[1]], t_m);
         }
-        let ways = passes(&chart, &laid, from_m)?;
-        numbers(&chart, laid.heads, &ways)?;
-        clocks(&chart, shown)?;
-        legend(canvas, &laid)?;
+        let ways = passes(&chart, &laid, from_m);
+        numbers(&chart, laid.heads, &ways);
+        clocks(&chart, shown);
+        legend(canvas, &laid);
         match (centre, laid.t_m) {
             (Some(centre), Some(t_m)) => detail::draw(canvas, &laid, centre, from_m, t_m),
             _ => unseen(canvas),
         }
+        Ok(())
     })
 }
 
-fn chart<'c>(canvas: &'c Canvas, laid: &Laid, length_m: f64) -> Result<Chart<'c>, PictureError> {
+fn chart<'c>(canvas: &'c Canvas, laid: &Laid, length_m: f64) -> Chart<'c> {
     let x = Axis::new("way along the tunnel, m", 0.0, length_m, 10);
     let y = Axis::new("arc length from the floor's centre, via the left wall, m", 0.0, laid.perimeter_m, 10);
     Chart::new(canvas, FRAME, &x, &y)
 }
 
 /// The circle of diameter T: flat, as the axes have different scales; cut off where it is larger than the picture.
-fn circle(chart: &Chart<'_>, centre: [f64; 2], t_m: f64) -> Drawn {
+fn circle(chart: &Chart<'_>, centre: [f64; 2], t_m: f64) {
     let (middle, corner) = (chart.px(centre), chart.px([centre[0] + t_m / 2.0, centre[1] + t_m / 2.0]));
-    chart.ellipse(middle, [corner[0] - middle[0], middle[1] - corner[1]], CIRCLE, &look::T)?;
+    chart.ellipse(middle, [corner[0] - middle[0], middle[1] - corner[1]], CIRCLE, &look::T);
     let note = "Left: along the tunnel and around it the scales differ, so that the circle is no circle.";
-    chart.canvas.text([14.0, 546.0], note, Side::Right, SMALL)
+    chart.canvas.text([14.0, 546.0], note, Side::Right, SMALL);
 }
 
 /// A head's pieces of line, on the sheet.
 type Ways = Vec<(usize, Vec<Px>)>;
 
 /// Draws the heads' ways; gives those that aren't hidden.
-fn passes(chart: &Chart<'_>, laid: &Laid, from_m: f64) -> Result<Ways, PictureError> {
+fn passes(chart: &Chart<'_>, laid: &Laid, from_m: f64) -> Ways {
     let mut ways = Vec::new();
     for pass in laid.passes() {
         let look = if pass.hidden { look::HIDDEN } else { way(pass.head) };
         let points: Vec<_> = pass.points.iter().map(|[x, sigma]| [x - from_m, *sigma]).collect();
-        let pieces = chart.line(&points, &look)?;
+        let pieces = chart.line(&points, &look);
         ways.extend(pieces.into_iter().filter(|_| !pass.hidden).map(|piece| (pass.head, piece)));
     }
-    Ok(ways)
+    ways
 }
 
 /// The heads' numbers: where their ways reach the top, or else on the longest piece.
-fn numbers(chart: &Chart<'_>, heads: usize, ways: &Ways) -> Drawn {
+fn numbers(chart: &Chart<'_>, heads: usize, ways: &Ways) {
     /// Numbers closer together than this cover each other, pixels.
     const APART_PX: f64 = 9.0;
     let mut taken: Vec<(usize, f64)> = Vec::new();
@@ -83,7 +84,7 @@ fn numbers(chart: &Chart<'_>, heads: usize, ways: &Ways) -> Drawn {
         let ends = [piece.first(), piece.last()].into_iter().flatten();
         for top in ends.filter(|end| end[1] <= chart.frame.top + 1.0) {
             if taken.iter().all(|(_, x)| (x - top[0]).abs() > APART_PX) {
-                number(chart, *head, [top[0], top[1] - 10.0])?;
+                number(chart, *head, [top[0], top[1] - 10.0]);
                 taken.push((*head, top[0]));
             }
         }
@@ -91,10 +92,9 @@ fn numbers(chart: &Chart<'_>, heads: usize, ways: &Ways) -> Drawn {
     for head in (0..heads).filter(|head| taken.iter().all(|(numbered, _)| numbered != head)) {
         let longest = ways.iter().filter(|(of, _)| *of == head).max_by_key(|(_, piece)| piece.len());
         if let Some(middle) = longest.and_then(|(_, piece)| piece.get(piece.len() / 2)) {
-            number(chart, head, *middle)?;
+            number(chart, head, *middle);
         }
     }
-    Ok(())
 }
 
 /// How a head's way looks here: thinner than a curve.
@@ -102,47 +102,45 @@ fn way(head: usize) -> Look {
     Look { width_px: 1.5, ..look::of_several(head) }
 }
 
-fn number(chart: &Chart<'_>, head: usize, place: Px) -> Drawn {
+fn number(chart: &Chart<'_>, head: usize, place: Px) {
     let letters = Letters { colour: way(head).colour, ..BOLD };
-    chart.canvas.text_on_white(place, &head.to_string(), Side::Middle, letters)
+    chart.canvas.text_on_white(place, &head.to_string(), Side::Middle, letters);
 }
 
 /// Hours of a clock, to the right.
-fn clocks(chart: &Chart<'_>, shown: &Shown<'_>) -> Drawn {
+fn clocks(chart: &Chart<'_>, shown: &Shown<'_>) {
     for hour in wall::hours(&shown.planner.inspection().profile) {
         let y = chart.px([0.0, hour.sigma_m])[1];
         let x = chart.frame.right;
-        chart.canvas.line(&[[x, y], [x + 4.0, y]], &look::AXIS)?;
-        chart.canvas.text([x + 7.0, y], &hour.words(), Side::Right, NORMAL)?;
+        chart.canvas.line(&[[x, y], [x + 4.0, y]], &look::AXIS);
+        chart.canvas.text([x + 7.0, y], &hour.words(), Side::Right, NORMAL);
     }
-    Ok(())
 }
 
 /// Heads with their lines and markers, two to a row.
-fn legend(canvas: &Canvas, laid: &Laid) -> Drawn {
+fn legend(canvas: &Canvas, laid: &Laid) {
     const ROW_PX: f64 = 19.0;
     for head in 0..laid.heads {
         let place = [LEGEND[0] + 126.0 * (head % 2) as f64, LEGEND[1] + ROW_PX * (head / 2) as f64];
-        canvas.marker([place[0] + 20.0, place[1]], &look::of_several(head), 3.2, true)?;
-        entry(canvas, place, &format!("head {head}"), &way(head))?;
+        canvas.marker([place[0] + 20.0, place[1]], &look::of_several(head), 3.2, true);
+        entry(canvas, place, &format!("head {head}"), &way(head));
     }
     if laid.samples.iter().all(|sample| !sample.hidden) {
-        return Ok(());
+        return;
     }
     let y = LEGEND[1] + ROW_PX * laid.heads.div_ceil(2) as f64;
-    entry(canvas, [LEGEND[0], y], "hidden by the vehicle", &look::HIDDEN)
+    entry(canvas, [LEGEND[0], y], "hidden by the vehicle", &look::HIDDEN);
 }
 
-fn entry(canvas: &Canvas, place: Px, words: &str, look: &Look) -> Drawn {
-    canvas.line(&[place, [place[0] + 40.0, place[1]]], look)?;
-    canvas.text([place[0] + 48.0, place[1]], words, Side::Right, NORMAL)
+fn entry(canvas: &Canvas, place: Px, words: &str, look: &Look) {
+    canvas.line(&[place, [place[0] + 40.0, place[1]]], look);
+    canvas.text([place[0] + 48.0, place[1]], words, Side::Right, NORMAL);
 }
 
-fn unseen(canvas: &Canvas) -> Drawn {
+fn unseen(canvas: &Canvas) {
     let lines =
         ["No head sees part of the wall:", "no feature there is hit, however", "large, and there is no T."];
     for (k, line) in lines.iter().enumerate() {
-        canvas.text([LEGEND[0], 150.0 + 19.0 * k as f64], line, Side::Right, BOLD)?;
+        canvas.text([LEGEND[0], 150.0 + 19.0 * k as f64], line, Side::Right, BOLD);
     }
-    Ok(())
 }

@@ -1,6 +1,6 @@
 //! Spacing around the wall.
 
-use super::canvas::{self, Canvas, Colour, Drawn, NORMAL, PALE, SMALL, Side, width_px};
+use super::canvas::{self, Canvas, Colour, NORMAL, PALE, SMALL, Side, width_px};
 use super::chart::{Axis, Chart, short};
 use super::labels::{self, Label};
 use super::look::{self, Look};
@@ -39,23 +39,26 @@ pub(crate) fn perimeter(shown: &Shown<'_>) -> Result<String, PictureError> {
     };
     let title = format!("Spacing around the wall: {}", modes::at_speed(shown));
     canvas::sheet(&title, &shown.subtitle(), |canvas| {
-        let chart = chart(canvas, shown, &around)?;
+        let chart = chart(canvas, shown, &around);
         let stretches = wall::thin(shown.planner);
-        stretches.iter().try_for_each(|stretch| shade(&chart, stretch))?;
-        clocks(&chart, &wall::hours(&shown.planner.inspection().profile))?;
+        for stretch in &stretches {
+            shade(&chart, stretch);
+        }
+        clocks(&chart, &wall::hours(&shown.planner.inspection().profile));
         if let Some(target_m) = shown.question.target_m {
-            chart.across(target_m, &look::TARGET)?;
+            chart.across(target_m, &look::TARGET);
         }
         match around.worst {
-            Some(worst) => curves(&chart, shown, &around.places, &worst)?,
+            Some(worst) => curves(&chart, shown, &around.places, &worst),
             None => chart.instead(&[
                 "No head sees the wall anywhere:".to_owned(),
                 "there is no spacing to show.".to_owned(),
-            ])?,
+            ]),
         }
-        captions(&chart, &stretches)?;
-        across(&chart, &around)?;
-        canvas.text([14.0, 546.0], &note(shown, &around), Side::Right, SMALL)
+        captions(&chart, &stretches);
+        across(&chart, &around);
+        canvas.text([14.0, 546.0], &note(shown, &around), Side::Right, SMALL);
+        Ok(())
     })
 }
 
@@ -72,14 +75,14 @@ impl Around {
 }
 
 /// The T across the widest strip that no head sees.
-fn across(chart: &Chart<'_>, around: &Around) -> Drawn {
-    let Some(point) = around.across_m() else { return Ok(()) };
+fn across(chart: &Chart<'_>, around: &Around) {
+    let Some(point) = around.across_m() else { return };
     let place = chart.px(point);
-    chart.canvas.marker(place, &look::T, 4.5, false)?;
+    chart.canvas.marker(place, &look::T, 4.5, false);
     let side =
         if place[0] > f64::midpoint(chart.frame.left, chart.frame.right) { Side::Left } else { Side::Right };
     let x = if matches!(side, Side::Left) { place[0] - 10.0 } else { place[0] + 10.0 };
-    chart.canvas.text_on_white([x, place[1] + 16.0], &format!("{} m across", short(point[1])), side, NORMAL)
+    chart.canvas.text_on_white([x, place[1] + 16.0], &format!("{} m across", short(point[1])), side, NORMAL);
 }
 
 /// What the plan counts with where that isn't what is seen here; else empty.
@@ -112,7 +115,7 @@ fn allowed(shown: &Shown<'_>) -> String {
     if all.is_empty() { String::new() } else { format!(", {} allowed for", all.join(" and ")) }
 }
 
-fn chart<'c>(canvas: &'c Canvas, shown: &Shown<'_>, around: &Around) -> Result<Chart<'c>, PictureError> {
+fn chart<'c>(canvas: &'c Canvas, shown: &Shown<'_>, around: &Around) -> Chart<'c> {
     let most_m = [Some(around.most_m()), around.across_m().map(|[_, t_m]| t_m), shown.question.target_m];
     let most_m = most_m.into_iter().flatten().fold(0.0, f64::max);
     // Words about who sees what stand above the curves.
@@ -128,21 +131,21 @@ fn chart<'c>(canvas: &'c Canvas, shown: &Shown<'_>, around: &Around) -> Result<C
     Chart::new(canvas, FRAME, &x, &Axis::new("distance between samples, m", 0.0, top_m, 9))
 }
 
-fn shade(chart: &Chart<'_>, stretch: &Thin) -> Drawn {
+fn shade(chart: &Chart<'_>, stretch: &Thin) {
     let [left, right] = [stretch.from_m, stretch.to_m].map(|sigma_m| chart.px([sigma_m, 0.0])[0]);
     let Frame { top, bottom, .. } = chart.frame;
     if stretch.heads > 0 {
-        return chart.canvas.area([left, top], [right, bottom], FEWER);
+        chart.canvas.area([left, top], [right, bottom], FEWER);
+        return;
     }
-    chart.canvas.area([left, top], [right, bottom], UNSEEN)?;
+    chart.canvas.area([left, top], [right, bottom], UNSEEN);
     for x in [left, right] {
-        chart.canvas.line(&[[x, top], [x, bottom]], &Look { colour: PALE, width_px: 1.0, ..look::T })?;
+        chart.canvas.line(&[[x, top], [x, bottom]], &Look { colour: PALE, width_px: 1.0, ..look::T });
     }
-    Ok(())
 }
 
 /// A second row of labels: hours of a clock.
-fn clocks(chart: &Chart<'_>, hours: &[Hour]) -> Drawn {
+fn clocks(chart: &Chart<'_>, hours: &[Hour]) {
     let y = chart.frame.bottom + 34.0;
     let mut taken: Vec<[f64; 2]> = Vec::new();
     // Floor, walls and crown first; what is between them where there is room.
@@ -154,16 +157,13 @@ fn clocks(chart: &Chart<'_>, hours: &[Hour]) -> Drawn {
             continue;
         }
         taken.push([x - half, x + half]);
-        chart.canvas.text([x, y], &hour.words(), Side::Middle, NORMAL)?;
-        chart
-            .canvas
-            .line(&[[x, y - 14.0], [x, y - 9.0]], &Look { colour: PALE, width_px: 1.0, ..look::T })?;
+        chart.canvas.text([x, y], &hour.words(), Side::Middle, NORMAL);
+        chart.canvas.line(&[[x, y - 14.0], [x, y - 9.0]], &Look { colour: PALE, width_px: 1.0, ..look::T });
     }
-    Ok(())
 }
 
 /// Who sees the thin stretches, above them.
-fn captions(chart: &Chart<'_>, stretches: &[Thin]) -> Drawn {
+fn captions(chart: &Chart<'_>, stretches: &[Thin]) {
     let mut last: Option<(f64, [String; 2])> = None;
     for stretch in stretches {
         let words = stretch.words();
@@ -175,14 +175,13 @@ fn captions(chart: &Chart<'_>, stretches: &[Thin]) -> Drawn {
         }
         for (k, word) in words.iter().enumerate() {
             let letters = canvas::Letters { colour: canvas::BLACK, ..SMALL };
-            chart.canvas.text([x, chart.frame.top + 11.0 + 14.0 * k as f64], word, Side::Middle, letters)?;
+            chart.canvas.text([x, chart.frame.top + 11.0 + 14.0 * k as f64], word, Side::Middle, letters);
         }
         last = Some((x, words));
     }
-    Ok(())
 }
 
-fn curves(chart: &Chart<'_>, shown: &Shown<'_>, places: &[WallPlace], largest: &WallPlace) -> Drawn {
+fn curves(chart: &Chart<'_>, shown: &Shown<'_>, places: &[WallPlace], largest: &WallPlace) {
     let t_x = |place: &WallPlace, which: usize| place.t_x_m.and_then(|both| both.get(which).copied());
     let alternate =
         places.iter().filter_map(|place| place.t_x_m).any(|[smaller, larger]| larger - smaller > 1e-9);
@@ -190,16 +189,16 @@ fn curves(chart: &Chart<'_>, shown: &Shown<'_>, places: &[WallPlace], largest: &
         for band in runs(places, |place| place.t_x_m) {
             let upper = band.iter().map(|(sigma_m, [_, larger])| chart.px([*sigma_m, *larger]));
             let lower = band.iter().rev().map(|(sigma_m, [smaller, _])| chart.px([*sigma_m, *smaller]));
-            chart.canvas.polygon(&upper.chain(lower).collect::<Vec<_>>(), BAND)?;
+            chart.canvas.polygon(&upper.chain(lower).collect::<Vec<_>>(), BAND);
         }
-        line(chart, places, |place| t_x(place, 0), &Look { width_px: 1.2, ..look::T_X })?;
+        line(chart, places, |place| t_x(place, 0), &Look { width_px: 1.2, ..look::T_X });
     }
-    line(chart, places, |place| t_x(place, 1), &look::T_X)?;
-    line(chart, places, |place| (place.t_y_m > 0.0).then_some(place.t_y_m), &look::T_Y)?;
-    line(chart, places, |place| place.t_m, &look::T)?;
+    line(chart, places, |place| t_x(place, 1), &look::T_X);
+    line(chart, places, |place| (place.t_y_m > 0.0).then_some(place.t_y_m), &look::T_Y);
+    line(chart, places, |place| place.t_m, &look::T);
     let t_m = largest.t_m.unwrap_or(0.0);
-    chart.canvas.marker(chart.px([largest.sigma_m, t_m]), &look::T, 4.5, true)?;
-    name_curves(chart, shown, places, largest, alternate)
+    chart.canvas.marker(chart.px([largest.sigma_m, t_m]), &look::T, 4.5, true);
+    name_curves(chart, shown, places, largest, alternate);
 }
 
 fn name_curves(
@@ -208,7 +207,7 @@ fn name_curves(
     places: &[WallPlace],
     largest: &WallPlace,
     alternate: bool,
-) -> Drawn {
+) {
     let last = places.iter().rev().find(|place| place.t_m.is_some());
     let end = |y_m: f64| [chart.frame.right, chart.px([0.0, y_m])[1]];
     let label = |y_m: f64, look: Look, bold: bool, lines: &[&str]| Label {
@@ -237,20 +236,14 @@ fn name_curves(
     if let Some(target_m) = shown.question.target_m {
         labels.push(label(target_m, look::TARGET, false, &[&format!("target {target_m} m")]));
     }
-    labels::at_right(chart.canvas, &chart.frame, &labels)
+    labels::at_right(chart.canvas, &chart.frame, &labels);
 }
 
-fn line(
-    chart: &Chart<'_>,
-    places: &[WallPlace],
-    of: impl Fn(&WallPlace) -> Option<f64>,
-    look: &Look,
-) -> Drawn {
+fn line(chart: &Chart<'_>, places: &[WallPlace], of: impl Fn(&WallPlace) -> Option<f64>, look: &Look) {
     for run in runs(places, of) {
         let points: Vec<_> = run.into_iter().map(|(sigma_m, value_m)| [sigma_m, value_m]).collect();
-        chart.line(&points, look)?;
+        chart.line(&points, look);
     }
-    Ok(())
 }
 
 /// Neighbouring places that have a value.

@@ -1,6 +1,6 @@
 //! T against speed.
 
-use super::canvas::{self, BOLD, Canvas, Drawn, NORMAL, Side};
+use super::canvas::{self, BOLD, Canvas, NORMAL, Side};
 use super::chart::{Axis, Chart};
 use super::labels::{self, Label};
 use super::look;
@@ -23,21 +23,22 @@ pub(crate) fn speeds(shown: &Shown<'_>) -> Result<String, PictureError> {
     canvas::sheet("T against speed: how fast each mode may go", &shown.subtitle(), |canvas| {
         let x = Axis::new("speed along the tunnel, m/s", 0.0, most_mps, 10);
         let y = Axis::new("T: a feature this large is hit, m", 0.0, most_m, 9);
-        let chart = Chart::new(canvas, FRAME, &x, &y)?;
+        let chart = Chart::new(canvas, FRAME, &x, &y);
         if let Some(target_m) = shown.question.target_m {
-            chart.across(target_m, &look::TARGET)?;
+            chart.across(target_m, &look::TARGET);
         }
-        let asked = asked(&chart, shown)?;
+        let asked = asked(&chart, shown);
         let mut ends = Ends::default();
         for (mode, points) in &curves {
-            ends.add(&chart, shown, mode, points)?;
+            ends.add(&chart, shown, mode, points);
         }
-        marks(&chart, shown, &modes)?;
-        ends.draw(canvas, shown.question.target_m.is_some())?;
-        asked.map_or(Ok(()), |(x, words)| {
-            canvas.text_on_white([x, FRAME.bottom - 14.0], &words, Side::Middle, NORMAL)
-        })?;
-        blind(&chart, &modes)
+        marks(&chart, shown, &modes);
+        ends.draw(canvas, shown.question.target_m.is_some());
+        if let Some((x, words)) = asked {
+            canvas.text_on_white([x, FRAME.bottom - 14.0], &words, Side::Middle, NORMAL);
+        }
+        blind(&chart, &modes);
+        Ok(())
     })
 }
 
@@ -83,16 +84,16 @@ fn curve(shown: &Shown<'_>, mode: &Mode, most_mps: f64) -> Result<Vec<[f64; 2]>,
 }
 
 /// The speed asked about as a line; gives where and what it is.
-fn asked(chart: &Chart<'_>, shown: &Shown<'_>) -> Result<Option<(f64, String)>, PictureError> {
-    let Some(asked_mps) = shown.asked_mps() else { return Ok(None) };
-    chart.upright(asked_mps, &look::ASKED)?;
+fn asked(chart: &Chart<'_>, shown: &Shown<'_>) -> Option<(f64, String)> {
+    let asked_mps = shown.asked_mps()?;
+    chart.upright(asked_mps, &look::ASKED);
     let why = match shown.question.time_s {
         Some(time_s) if shown.question.speed_mps.is_none() => {
             format!("{} h: ", modes::hours(time_s / 3600.0))
         }
         _ => "asked: ".to_owned(),
     };
-    Ok(Some((chart.px([asked_mps, 0.0])[0], format!("{why}{} m/s", modes::speed(asked_mps)))))
+    Some((chart.px([asked_mps, 0.0])[0], format!("{why}{} m/s", modes::speed(asked_mps))))
 }
 
 /// Where curves leave the frame, and what is said there.
@@ -103,8 +104,8 @@ struct Ends {
 }
 
 impl Ends {
-    fn add(&mut self, chart: &Chart<'_>, shown: &Shown<'_>, mode: &Mode, points: &[[f64; 2]]) -> Drawn {
-        let pieces = chart.line(points, &mode.look)?;
+    fn add(&mut self, chart: &Chart<'_>, shown: &Shown<'_>, mode: &Mode, points: &[[f64; 2]]) {
+        let pieces = chart.line(points, &mode.look);
         let end = pieces.last().and_then(|piece| piece.last()).copied();
         let reached = match (shown.question.target_m, mode.v_max_mps) {
             (None, _) => None,
@@ -115,21 +116,20 @@ impl Ends {
             // All of it is above the frame.
             let corner = [chart.frame.left, chart.frame.top];
             self.above.push(label(corner, mode, format!("{}: above", mode.name)));
-            return Ok(());
+            return;
         };
         let words = [Some(mode.name.clone()), reached].into_iter().flatten().collect::<Vec<_>>().join(": ");
         let ends = if end[0] >= chart.frame.right - 1.0 { &mut self.right } else { &mut self.above };
         ends.push(label(end, mode, words));
-        Ok(())
     }
 
-    fn draw(&self, canvas: &Canvas, heading: bool) -> Drawn {
+    fn draw(&self, canvas: &Canvas, heading: bool) {
         for (k, line) in ["at most, to meet", "the target:"].iter().enumerate().filter(|_| heading) {
             let place = [FRAME.right + 12.0, FRAME.top - 26.0 + 15.0 * k as f64];
-            canvas.text(place, line, Side::Right, NORMAL)?;
+            canvas.text(place, line, Side::Right, NORMAL);
         }
-        labels::above(canvas, &FRAME, &self.above)?;
-        labels::at_right(canvas, &FRAME, &self.right)
+        labels::above(canvas, &FRAME, &self.above);
+        labels::at_right(canvas, &FRAME, &self.right);
     }
 }
 
@@ -138,18 +138,18 @@ fn label(place: [f64; 2], mode: &Mode, words: String) -> Label {
 }
 
 /// Markers where curves meet the target; the fastest filled, with its speed.
-fn marks(chart: &Chart<'_>, shown: &Shown<'_>, modes: &[Mode]) -> Drawn {
-    let Some(target_m) = shown.question.target_m else { return Ok(()) };
+fn marks(chart: &Chart<'_>, shown: &Shown<'_>, modes: &[Mode]) {
+    let Some(target_m) = shown.question.target_m else { return };
     let fastest = modes::fastest(modes).map(|mode| mode.number);
     for mode in modes {
         let Some(v_mps) = mode.v_max_mps else { continue };
         let best = fastest == Some(mode.number);
         let place = chart.px([v_mps, target_m]);
-        chart.canvas.marker(place, &mode.look, if best { 6.0 } else { 4.5 }, best)?;
+        chart.canvas.marker(place, &mode.look, if best { 6.0 } else { 4.5 }, best);
         if best {
-            chart.line(&[[v_mps, 0.0], [v_mps, target_m]], &look::LEADER)?;
+            chart.line(&[[v_mps, 0.0], [v_mps, target_m]], &look::LEADER);
             let words = format!("{} {} m/s", mode.name, modes::speed(v_mps));
-            chart.canvas.text_on_white([place[0] + 8.0, place[1] + 18.0], &words, Side::Right, BOLD)?;
+            chart.canvas.text_on_white([place[0] + 8.0, place[1] + 18.0], &words, Side::Right, BOLD);
         }
     }
     let none = fastest.is_none() && modes.iter().any(|mode| !mode.blind);
@@ -159,10 +159,12 @@ fn marks(chart: &Chart<'_>, shown: &Shown<'_>, modes: &[Mode]) -> Drawn {
         &words,
         Side::Right,
         NORMAL,
-    )
+    );
 }
 
-fn blind(chart: &Chart<'_>, modes: &[Mode]) -> Drawn {
+fn blind(chart: &Chart<'_>, modes: &[Mode]) {
     let words = modes::blind_words(modes);
-    if words.is_empty() { Ok(()) } else { chart.instead(&words) }
+    if !words.is_empty() {
+        chart.instead(&words);
+    }
 }
