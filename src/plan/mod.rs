@@ -33,7 +33,7 @@ struct Findings {
     answers: Vec<Answer>,
     /// The mode that briefing and pictures are for, with its speed; `None` where no mode gives one.
     shown: Option<(usize, f64)>,
-    briefing: Option<Briefing>,
+    briefing: Briefing,
 }
 
 /// Plans an inspection.
@@ -72,7 +72,9 @@ fn find(case: Case, args: &Plan) -> Result<Findings, Failure> {
         let speed_mps = best.speed_mps?;
         Some((number, if asked { speed_mps } else { printed_mps(speed_mps) }))
     });
-    let briefing = shown.map(|(mode, speed_mps)| planner.briefing(mode, speed_mps)).transpose()?;
+    // What the vehicle hides is to be known all the more where no mode will do.
+    let (mode, speed_mps) = shown.unwrap_or((0, ANY_SPEED_MPS));
+    let briefing = planner.briefing(mode, speed_mps)?;
     let footprints_m = planner.footprints_m()?;
     Ok(Findings { planner, heads, tunnel, range_m, footprints_m, question, answers, shown, briefing })
 }
@@ -88,6 +90,9 @@ fn is_met(answer: &Answer) -> bool {
     answer.meets_target.unwrap_or(answer.refused.is_none())
         && answer.spacing.is_some_and(|spacing| spacing.t_max_m.is_some())
 }
+
+/// For what doesn't depend on the speed.
+const ANY_SPEED_MPS: f64 = 0.1;
 
 type Picture = fn(&Shown<'_>) -> Result<String, PictureError>;
 
@@ -128,12 +133,13 @@ fn json(findings: &Findings) -> serde_json::Value {
         "layout": inspection.layout.as_str(),
         "range_m": findings.range_m,
         "footprints_m": findings.footprints_m,
+        "reach_m": findings.planner.reach_m(),
         "farthest_wall_m": farthest_m,
         "farthest_wall_allowed_m": farthest_allowed_m,
         "target_m": findings.question.target_m,
         "asked_speed_mps": findings.question.speed_mps,
         "asked_time_h": findings.question.time_s.map(|time_s| time_s / 3600.0),
         "modes": findings.answers,
-        "briefing": findings.briefing,
+        "briefing": findings.shown.map(|_| &findings.briefing),
     })
 }

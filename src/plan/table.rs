@@ -15,8 +15,9 @@ pub(super) fn table(findings: &Findings) -> String {
     lines.extend(findings.answers.iter().map(row));
     lines.push(String::new());
     lines.extend(notes(findings));
-    if let Some(briefing) = &findings.briefing {
-        lines.extend(briefing_lines(findings, briefing));
+    lines.extend(hidden_lines(findings, &findings.briefing));
+    if findings.shown.is_some() {
+        lines.extend(start_lines(findings, &findings.briefing));
     }
     lines.push(String::new());
     lines.iter().map(|line| line.trim_end()).collect::<Vec<_>>().join("\n")
@@ -73,13 +74,10 @@ fn question_line(findings: &Findings) -> String {
 
 /// Said where a head can't hear the wall.
 fn range_warning(findings: &Findings) -> Option<String> {
-    let (here_m, allowed_m) = findings.planner.farthest_m();
-    (allowed_m > findings.range_m).then(|| {
-        let where_it_is = if here_m > findings.range_m { "" } else { " when drifting" };
-        let range_m = findings.range_m;
-        format!(
-            "OUT OF RANGE: the wall is up to {allowed_m:.1} m away{where_it_is}, the setting {range_m} m\n"
-        )
+    let ((here_m, allowed_m), reach_m) = (findings.planner.farthest_m(), findings.planner.reach_m());
+    (allowed_m > reach_m).then(|| {
+        let where_it_is = if here_m > reach_m { "" } else { ", for the drift and yaw allowed for" };
+        format!("OUT OF RANGE: the wall is up to {allowed_m:.1} m away{where_it_is}; heads hear to {reach_m:.1} m\n")
     })
 }
 
@@ -91,15 +89,16 @@ const HEADINGS: [&str; 2] = [
 fn row(answer: &Answer) -> String {
     let mark = if answer.best { '*' } else { ' ' };
     let estimated = if answer.turn_basis == Basis::Estimated.as_str() { '~' } else { ' ' };
+    // Nothing is measured where nothing is seen.
+    let worst = if answer.t_y2_m > 0.0 { format!("{:.3}", answer.t_y2_m) } else { "-".to_owned() };
     let known = format!(
-        "{mark} {:<8} {:>4.1} {estimated}{:>6.2} {:>8.2}  {:>5.3}  {:>5.3}  {:>5.3}",
+        "{mark} {:<8} {:>4.1} {estimated}{:>6.2} {:>8.2}  {:>5.3}  {:>5.3}  {worst:>5}",
         answer.mode,
         answer.step_deg,
         answer.turn_s,
         answer.overlap,
         answer.t_y_min_rest_m,
-        answer.t_y_mean_rest_m,
-        answer.t_y2_m
+        answer.t_y_mean_rest_m
     );
     let at_speed = match (&answer.spacing, answer.speed_mps) {
         (Some(spacing), Some(speed_mps)) if answer.v_max_mps == answer.speed_mps => {
@@ -132,11 +131,16 @@ fn spacing_columns(spacing: &Spacing, speed_mps: f64) -> String {
 
 fn notes(findings: &Findings) -> Vec<String> {
     let mut notes = Vec::new();
+    // One reason often holds for several modes.
+    let mut reasons: Vec<(&String, Vec<&str>)> = Vec::new();
     for answer in &findings.answers {
-        if let Some(why) = &answer.refused {
-            notes.push(format!("{}: {why}", answer.mode));
+        let Some(why) = &answer.refused else { continue };
+        match reasons.iter_mut().find(|(known, _)| *known == why) {
+            Some((_, modes)) => modes.push(answer.mode),
+            None => reasons.push((why, vec![answer.mode])),
         }
     }
+    notes.extend(reasons.into_iter().map(|(why, modes)| format!("{}: {why}", modes.join(", "))));
     if let Some(best) = findings.answers.iter().find(|answer| answer.best) {
         notes.push(format!("* {}", best_words(best)));
     }
@@ -167,21 +171,31 @@ fn best_words(best: &Answer) -> String {
     }
 }
 
-fn briefing_lines(findings: &Findings, briefing: &Briefing) -> Vec<String> {
-    let name = |head: &usize| findings.heads.get(*head).map_or("?", String::as_str);
-    let names = |heads: &[usize]| heads.iter().map(name).collect::<Vec<_>>().join(", ");
-    let mut lines = Vec::new();
-    for hidden in &briefing.hidden {
-        lines.push(format!(
+/// What the vehicle hides, and where that leaves fewer passes.
+fn hidden_lines(findings: &Findings, briefing: &Briefing) -> Vec<String> {
+    let names = |heads: &[usize]| names(findings, heads);
+    let hidden = briefing.hidden.iter().map(|hidden| {
+        format!(
             "{}: {:.1} degrees about {:.0} are hidden by the vehicle, {:.2} m of wall at {}",
-            name(&hidden.head),
+            names(&[hidden.head]),
             hidden.size_deg,
             hidden.middle_deg,
             hidden.wall_m,
             hidden.clock
-        ));
-    }
-    lines.extend(briefing.strips.iter().map(|strip| strip_words(strip, &names)));
+        )
+    });
+    hidden.chain(briefing.strips.iter().map(|strip| strip_words(strip, &names))).collect()
+}
+
+fn names(findings: &Findings, heads: &[usize]) -> String {
+    let name = |head: &usize| findings.heads.get(*head).map_or("?", String::as_str);
+    heads.iter().map(name).collect::<Vec<_>>().join(", ")
+}
+
+/// How heads start, who disturbs whom, and what would make starts simpler.
+fn start_lines(findings: &Findings, briefing: &Briefing) -> Vec<String> {
+    let names = |heads: &[usize]| names(findings, heads);
+    let mut lines = Vec::new();
     lines.extend(briefing.exposures.iter().map(|heard| heard_words(heard, &names)));
     if findings.heads.len() > 1 {
         let degrees = |start: &headrace_core::sampling::plan::Start| {
@@ -189,7 +203,7 @@ fn briefing_lines(findings: &Findings, briefing: &Briefing) -> Vec<String> {
             let sector = start.sector_deg.map_or_else(String::new, |[least, size]| {
                 format!(" within {:.0} to {:.0}", least, least + size)
             });
-            format!("{} {:.1}{way}{sector}", name(&start.head), start.angle_deg)
+            format!("{} {:.1}{way}{sector}", names(&[start.head]), start.angle_deg)
         };
         let starts: Vec<String> = briefing.starts.iter().map(degrees).collect();
         lines.push(format!(

@@ -109,22 +109,13 @@ impl<'a> Pair<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::frames::{Mount, Point3, Rot};
-    use crate::sampling::head::HeadBody;
+    use crate::frames::{Point3, Rot};
+    use crate::sampling::fixtures;
     use crate::sampling::layout::HeadLayout;
     use crate::tunnel::named;
 
     fn heads(places: &[[f64; 3]]) -> Vec<HeadSpec> {
-        let head = |place: &[f64; 3]| HeadSpec {
-            mount: Mount { position: Vec3::new(place[0], place[1], place[2]), rotation: Rot::identity() },
-            step_rad: f64::to_radians(0.9),
-            ping_period_s: 0.02,
-            range_m: [0.2, 10.0],
-            sound_speed_mps: 1500.0,
-            beam_rad: f64::to_radians(1.4),
-            body: HeadBody { radius_m: 0.04, ahead_m: 0.03, behind_m: 0.2 },
-        };
-        places.iter().map(head).collect()
+        places.iter().map(|place| fixtures::head(*place, false, 0.04)).collect()
     }
 
     fn found(places: &[[f64; 3]], layout: HeadLayout) -> Vec<Exposure> {

@@ -5,6 +5,8 @@
 
 pub mod advice;
 pub mod error;
+#[cfg(test)]
+mod fixtures;
 pub mod head;
 pub mod interference;
 pub mod layout;

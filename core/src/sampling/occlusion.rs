@@ -209,23 +209,10 @@ pub fn hidden_by_vehicle(heads: &[HeadSpec], hull: &[Obstacle]) -> Vec<Vec<Angle
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::frames::Rot;
-    use crate::sampling::head::HeadBody;
+    use crate::sampling::fixtures;
 
     fn head(position: [f64; 3], aft: bool) -> HeadSpec {
-        let yaw = if aft { math::PI } else { 0.0 };
-        HeadSpec {
-            mount: Mount {
-                position: Vec3::new(position[0], position[1], position[2]),
-                rotation: Rot::from_roll_pitch_yaw(0.0, 0.0, yaw),
-            },
-            step_rad: f64::to_radians(0.9),
-            ping_period_s: 0.02,
-            range_m: [0.2, 10.0],
-            sound_speed_mps: 1500.0,
-            beam_rad: f64::to_radians(1.4),
-            body: HeadBody { radius_m: 0.04, ahead_m: 0.03, behind_m: 0.2 },
-        }
+        fixtures::head(position, aft, 0.04)
     }
 
     #[test]

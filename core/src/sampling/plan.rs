@@ -222,6 +222,12 @@ impl Planner {
         Ok(found)
     }
 
+    /// The farthest wall that every head hears, m.
+    pub fn reach_m(&self) -> f64 {
+        let reach = |(spec, _): &(HeadSpec, Vec<HeadMode>)| spec.reach_m(self.inspection.sound_speed_mps)[1];
+        self.inspection.heads.iter().map(reach).fold(f64::INFINITY, f64::min)
+    }
+
     /// For each head the angles hidden from it, in its own frame.
     pub fn hidden(&self) -> &[Vec<AngleRange>] {
         &self.hidden

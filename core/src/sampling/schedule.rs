@@ -75,19 +75,10 @@ fn back_and_forth(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::frames::{Mount, Rot, Vec3};
-    use crate::sampling::head::HeadBody;
+    use crate::sampling::fixtures;
 
     fn head(step_deg: f64) -> HeadSpec {
-        HeadSpec {
-            mount: Mount { position: Vec3::zero(), rotation: Rot::identity() },
-            step_rad: step_deg.to_radians(),
-            ping_period_s: 0.02,
-            range_m: [0.2, 10.0],
-            sound_speed_mps: 1500.0,
-            beam_rad: 0.02,
-            body: HeadBody { radius_m: 0.0, ahead_m: 0.0, behind_m: 0.0 },
-        }
+        HeadSpec { step_rad: step_deg.to_radians(), ..fixtures::head([0.0; 3], false, 0.0) }
     }
 
     fn angles_deg(schedule: &Schedule, head: usize, pings: i64) -> Vec<f64> {

@@ -1,25 +1,15 @@
 use super::*;
-use crate::frames::{Mount, Vec3};
+use crate::frames::Vec3;
 use crate::math::TAU;
-use crate::sampling::head::{Basis, HeadBody, Turn};
+use crate::sampling::fixtures;
+use crate::sampling::head::{Basis, Turn};
 use crate::sampling::spacing;
 use crate::tunnel::named;
 
 const LENGTH_M: f64 = 1000.0;
 
 fn spec(position: [f64; 3], radius_m: f64) -> HeadSpec {
-    HeadSpec {
-        mount: Mount {
-            position: Vec3::new(position[0], position[1], position[2]),
-            rotation: Rot::identity(),
-        },
-        step_rad: f64::to_radians(0.9),
-        ping_period_s: 0.02,
-        range_m: [0.2, 10.0],
-        sound_speed_mps: 1500.0,
-        beam_rad: f64::to_radians(1.4),
-        body: HeadBody { radius_m, ahead_m: 0.03, behind_m: 0.2 },
-    }
+    fixtures::head(position, false, radius_m)
 }
 
 fn modes() -> Vec<HeadMode> {

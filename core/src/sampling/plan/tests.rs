@@ -1,7 +1,7 @@
 use super::*;
-use crate::frames::{Mount, Vec3};
 use crate::math;
-use crate::sampling::head::{Basis, HeadBody, Turn};
+use crate::sampling::fixtures;
+use crate::sampling::head::{Basis, Turn};
 use crate::tunnel::named;
 
 const MODES: [(&str, f64, f64); 5] = [
@@ -22,20 +22,7 @@ fn modes() -> Vec<HeadMode> {
 }
 
 fn head(position: [f64; 3], aft: bool, radius_m: f64) -> (HeadSpec, Vec<HeadMode>) {
-    let yaw = if aft { math::PI } else { 0.0 };
-    let spec = HeadSpec {
-        mount: Mount {
-            position: Vec3::new(position[0], position[1], position[2]),
-            rotation: Rot::from_roll_pitch_yaw(0.0, 0.0, yaw),
-        },
-        step_rad: f64::to_radians(0.9),
-        ping_period_s: 0.02,
-        range_m: [0.2, 10.0],
-        sound_speed_mps: 1500.0,
-        beam_rad: f64::to_radians(1.4),
-        body: HeadBody { radius_m, ahead_m: 0.03, behind_m: 0.2 },
-    };
-    (spec, modes())
+    (fixtures::head(position, aft, radius_m), modes())
 }
 
 fn inspection(heads: Vec<(HeadSpec, Vec<HeadMode>)>, layout: HeadLayout) -> Inspection {
