@@ -144,7 +144,7 @@ pub(crate) struct Plan {
     /// Hours for the whole length, one way.
     #[arg(long, value_name = "HOURS", value_parser = hours)]
     pub(crate) hours: Option<f64>,
-    /// How far the pilot may drift up, down and sideways, metres.
+    /// How far up, down and sideways the vehicle may be, steadily or drifting slowly, metres.
     #[arg(long, value_name = "METRES", default_value = "0", value_parser = drift)]
     pub(crate) drift: f64,
     /// How far from the tunnel's axis the vehicle may head, steadily, degrees.

@@ -60,7 +60,7 @@ fn a_plan_with_drift_yaw_and_a_deadline_in_words() {
     let answer = plan(&Folder::new(), &[&args[..], &allowed].concat());
     assert_eq!(answer.code, Some(1), "{}", answer.stderr);
     insta::assert_snapshot!(answer.stdout, @r"
-    ceran: perimeter 35.90 m, 7000 m long; vehicle at y 0.00 m, z 3.09 m; drift of 1 m and yaw of 10.0 degrees allowed for
+    ceran: perimeter 35.90 m, 7000 m long; vehicle at y 0.00 m, z 3.09 m; drift of 1 m and yaw of 10.0 degrees, held steadily, allowed for
     2 heads in sector offset, range setting 20 m; a beam covers 0.08 to 0.28 m of wall
     target 0.6 m, 30 h for the whole length, one way: 0.065 m/s
 

@@ -41,7 +41,7 @@ fn tunnel_line(findings: &Findings) -> String {
     let allowed = match (inspection.drift_m > 0.0, inspection.yaw_rad > 0.0) {
         (false, false) => String::new(),
         _ => format!(
-            "; drift of {} m and yaw of {:.1} degrees allowed for",
+            "; drift of {} m and yaw of {:.1} degrees, held steadily, allowed for",
             inspection.drift_m,
             inspection.yaw_rad.to_degrees()
         ),

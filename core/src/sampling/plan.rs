@@ -374,8 +374,8 @@ fn views(
     pose: &Pose,
     rings: &[Ring],
 ) -> Result<Vec<View>, SamplingError> {
-    /// Stretches of wall out of reach, at most.
-    const OUT_OF_REACH: usize = 64;
+    /// Room for stretches of wall out of reach: every other sounding.
+    const OUT_OF_REACH: usize = RING as usize / 2;
     let programs = layout::programs(specs, inspection.layout, 0.0)?;
     let mut views = Vec::with_capacity(specs.len());
     for (((spec, program), hidden), ring) in specs.iter().zip(&programs).zip(hidden).zip(rings) {

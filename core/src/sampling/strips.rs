@@ -43,6 +43,13 @@ impl Arc {
         })
     }
 
+    /// From this one on to the end of the next, the way that a head turns.
+    fn on_to(&self, next: &Self, forward: bool, perimeter_m: f64) -> Self {
+        let (first, last) = if forward { (self, next) } else { (next, self) };
+        let length_m = math::wrap(last.from_m + last.length_m - first.from_m, perimeter_m);
+        Self { from_m: first.from_m, length_m }
+    }
+
     fn has(&self, sigma_m: f64, perimeter_m: f64) -> bool {
         math::wrap(sigma_m - self.from_m, perimeter_m) <= self.length_m
     }
@@ -58,12 +65,16 @@ pub struct View {
 }
 
 impl View {
-    /// Hides what a ring meets nearer or farther than the head hears, as far as there is room.
+    /// Hides what a ring meets nearer or farther than the head hears. Where there is no room for more stretches, the last
+    /// is made longer, over what is heard between: rather too much is hidden than too little.
+    ///
+    /// Allocates: not when there is room for one.
     pub fn hide_out_of_reach(&mut self, ring: &Ring, reach_m: [f64; 2]) {
         let [least_m, most_m] = reach_m;
         let heard = |range_m: f64| (least_m..=most_m).contains(&range_m);
         let soundings = ring.soundings();
         let Some(first) = soundings.iter().position(|sounding| heard(sounding.range_m())) else {
+            self.hidden.clear();
             self.hidden.push(Arc { from_m: 0.0, length_m: ring.perimeter_m() });
             return;
         };
@@ -76,9 +87,11 @@ impl View {
                     let way_m = math::wrap_signed(sounding.sigma_m - from_m, ring.perimeter_m());
                     let forward = ring.way_round_m() >= 0.0;
                     let (from_m, way_m) = if forward { (from_m, way_m) } else { (sounding.sigma_m, -way_m) };
-                    let length_m = math::wrap(way_m, ring.perimeter_m());
-                    if self.hidden.len() < self.hidden.capacity() {
-                        self.hidden.push(Arc { from_m, length_m });
+                    let arc = Arc { from_m, length_m: math::wrap(way_m, ring.perimeter_m()) };
+                    let full = self.hidden.len() == self.hidden.capacity();
+                    match self.hidden.last_mut().filter(|_| full) {
+                        Some(last) => *last = last.on_to(&arc, forward, ring.perimeter_m()),
+                        None => self.hidden.push(arc),
                     }
                     began = None;
                 }
@@ -171,6 +184,20 @@ impl Strips {
             }
             alike
         });
+        self.join_at_the_seam();
+    }
+
+    /// The last strip goes on over the seam where the first is like it.
+    fn join_at_the_seam(&mut self) {
+        let alike = |a: &Strip, b: &Strip| a.seen_by == b.seen_by && a.hidden == b.hidden;
+        let first = self.strips.first().copied();
+        if self.strips.len() > 1
+            && let (Some(first), Some(last)) = (first, self.strips.last_mut())
+            && alike(&first, last)
+        {
+            last.arc.length_m += first.arc.length_m;
+            self.strips.remove(0);
+        }
     }
 
     /// Measures the largest steps on each strip in `settings` settings of the heads: `stride` says how many soundings of

@@ -165,3 +165,43 @@ fn what_is_out_of_reach_is_hidden() {
     assert_eq!(hidden([0.1, 1.0]), [arc(0.0, 24.0)]);
     assert_eq!(hidden([3.0, 10.0]).len(), 2);
 }
+
+#[test]
+fn a_strip_over_the_seam_is_one() {
+    let mut some = Strips::default();
+    some.rebuild(10.0, &[all_around(&[arc(8.0, 4.0), arc(1.0, 2.0)])]);
+    let unseen: Vec<&Strip> = some.as_slice().iter().filter(|strip| strip.seen_by.is_empty()).collect();
+    assert!(unseen.len() == 1 && (unseen[0].arc.length_m - 5.0).abs() < 1e-9, "{some:?}");
+    assert!((unseen[0].arc.from_m - 8.0).abs() < 1e-9);
+    for (sigma_m, seen) in [(0.5, false), (2.9, false), (3.1, true), (7.9, true), (8.1, false)] {
+        assert_eq!(some.at(sigma_m).unwrap().seen_by.is_empty(), !seen, "{sigma_m}");
+    }
+}
+
+#[test]
+fn without_room_more_is_hidden_and_not_less() {
+    // Slots all around, out of reach, and two views with too little room for them.
+    let points: Vec<[f64; 2]> = (0..240)
+        .map(|k| {
+            let (sine, cosine) = math::sin_cos(math::TAU * (f64::from(k) + 0.3) / 240.0);
+            let r = if k % 6 == 0 { 3.4 } else { 3.0 };
+            [r * sine, r * cosine]
+        })
+        .collect();
+    let profile = Profile::polygon(&points, Some([0.0, 0.0])).unwrap();
+    let ring = ring(&profile);
+    let hidden = |room: usize| {
+        let mut view = View { sector: None, hidden: Vec::with_capacity(room) };
+        view.hide_out_of_reach(&ring, [0.1, 3.2]);
+        assert!(view.hidden.capacity() == room && view.hidden.len() <= room);
+        view
+    };
+    let (all, few) = (hidden(100), hidden(5));
+    assert_eq!((all.hidden.len(), few.hidden.len()), (40, 5));
+    let perimeter_m = profile.perimeter_m();
+    let is_hidden = |view: &View, sigma_m: f64| view.hidden.iter().any(|arc| arc.has(sigma_m, perimeter_m));
+    for k in 0..2000 {
+        let sigma_m = perimeter_m * f64::from(k) / 2000.0;
+        assert!(is_hidden(&few, sigma_m) || !is_hidden(&all, sigma_m), "{sigma_m}");
+    }
+}
