@@ -294,7 +294,11 @@ pub fn alternating_m(pitch_m: f64, heads: usize, share: f64) -> Result<[f64; 2],
     not_negative("the pitch in metres", pitch_m)?;
     not_negative("the share of the sector", share)?;
     not_negative("the rest of the sector", 1.0 - share)?;
-    let both = 2.0 * pitch_m / heads as f64;
+    Ok(divided_m(2.0 * pitch_m / heads as f64, share))
+}
+
+/// The way that a sweep there and back takes, `both_m`, divided by a place in the sector: the smaller part first.
+pub(super) fn divided_m(both_m: f64, share: f64) -> [f64; 2] {
     let nearer = share.min(1.0 - share);
-    Ok([both * nearer, both * (1.0 - nearer)])
+    [both_m * nearer, both_m * (1.0 - nearer)]
 }

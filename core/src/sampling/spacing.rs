@@ -21,9 +21,14 @@ pub fn t_max_m(t_x_m: f64, advance_m: f64, t_y_m: f64) -> f64 {
 /// Source: Eq. 16 solved for v (metrics.md, "Speed advice").
 pub fn speed_for_target_mps(target_m: f64, t_y_m: f64, pass_gap_s: f64, ping_period_s: f64) -> Option<f64> {
     let time_s = pass_gap_s + ping_period_s;
+    along_m(target_m, t_y_m).filter(|_| time_s > 0.0).map(|along_m| along_m / time_s)
+}
+
+/// What T_max leaves for the distance between passes and pings, m: sqrt(T^2 - T_y^2); `None` where `t_y_m` alone is as
+/// large as the target.
+pub(super) fn along_m(target_m: f64, t_y_m: f64) -> Option<f64> {
     // (T - t)(T + t) keeps its digits as the two meet.
-    let square = (target_m - t_y_m) * (target_m + t_y_m);
-    (t_y_m < target_m && time_s > 0.0).then(|| math::sqrt(square) / time_s)
+    (t_y_m < target_m).then(|| math::sqrt((target_m - t_y_m) * (target_m + t_y_m)))
 }
 
 /// The spiral that heads leave on the wall at a constant speed.

@@ -394,8 +394,7 @@ impl Limit {
     /// The largest speed that solves T = hypot((v + w) t + shift + w a / v, T_y), t being gap and ping period, w the
     /// swing, a how far heads are apart.
     fn speed_mps(&self, target_m: f64, going: &Going) -> Option<f64> {
-        // (T - t)(T + t) keeps its digits as the two meet.
-        let along_m = math::sqrt(((target_m - self.t_y_m) * (target_m + self.t_y_m)).max(0.0));
+        let along_m = spacing::along_m(target_m, self.t_y_m)?;
         let time_s = self.gap_s + going.ping_period_s;
         let for_speed_m = along_m - going.shift_m - going.swing_mps * time_s;
         let rest = for_speed_m * for_speed_m - 4.0 * time_s * going.swing_mps * going.apart_m;

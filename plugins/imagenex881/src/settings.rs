@@ -6,6 +6,7 @@ use headrace_core::sampling::head::{Basis, HeadBody, HeadMode, Turn};
 use headrace_core::time::DurNs;
 
 use crate::codec::{COUNTS_PER_TURN, Command, Points, RANGES_M, ZERO_COUNT};
+use crate::plugin::SOUND_SPEED_MPS;
 
 /// A scanning speed by the maker's name: the step, and how long a turn takes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -190,8 +191,8 @@ fn turn_period(mode: Mode, range_m: u8, measured: &[MeasuredTurn]) -> (DurNs, Ba
     let below = known().filter(|turn| turn.range_m <= range_m).max_by_key(|turn| turn.range_m);
     let above = known().filter(|turn| turn.range_m >= range_m).min_by_key(|turn| turn.range_m);
     let there_and_back = |from_m: u8| {
-        let metres = i64::from(range_m) - i64::from(from_m);
-        2_000_000_000 * metres / SOUND_SPEED * i64::from(pings_a_turn(mode))
+        let metres = f64::from(range_m) - f64::from(from_m);
+        DurNs::from_secs_f64(2.0 * metres / SOUND_SPEED_MPS * f64::from(pings_a_turn(mode))).0
     };
     match (below, above) {
         (Some(known), _) | (_, Some(known)) if known.range_m == range_m => (known.period, basis(known)),
@@ -214,7 +215,7 @@ fn measured_turns(mode: Mode, range_m: u8, own: &Section<'_>) -> Result<Vec<Meas
     let possible = |step_counts: u8, range_m: u8, turn_s: f64| {
         // Each ping waits for its sound, there and back.
         let pings = f64::from(COUNTS_PER_TURN / i32::from(step_counts));
-        let least_s = pings * 2.0 * f64::from(range_m) / SOUND_SPEED as f64;
+        let least_s = pings * 2.0 * f64::from(range_m) / SOUND_SPEED_MPS;
         if turn_s >= least_s {
             return Ok(());
         }
@@ -247,8 +248,6 @@ fn measured_turns(mode: Mode, range_m: u8, own: &Section<'_>) -> Result<Vec<Meas
 
 /// Times of a turn that can be, seconds.
 const TURN_S: core::ops::RangeInclusive<f64> = 0.1..=100.0;
-/// By which the family computes ranges, m/s.
-const SOUND_SPEED: i64 = 1500;
 
 fn command(mode: Mode, own: &Section<'_>) -> Result<Command, ConfigError> {
     let byte = |key, allowed, usual: u8| -> Result<u8, ConfigError> {

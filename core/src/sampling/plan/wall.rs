@@ -66,9 +66,7 @@ impl Planner {
             let t_x_m = gap_s.map(|gap_s| {
                 let longest_m = speed_mps * gap_s;
                 // In a sector two distances alternate, of which this is the sum.
-                share.map_or([longest_m; 2], |share| {
-                    [longest_m * share.min(1.0 - share), longest_m * share.max(1.0 - share)]
-                })
+                share.map_or([longest_m; 2], |share| layout::divided_m(longest_m, share))
             });
             let t_y_m = around.t_y_m.get(k).copied().unwrap_or(0.0);
             let t_m = t_x_m.map(|[_, larger]| spacing::t_max_m(larger, speed_mps * ping_s, t_y_m));
