@@ -26,7 +26,7 @@ use headrace_core::fusion::direct::DirectNavigation;
 use headrace_core::math;
 use headrace_core::time::{DurNs, MonoNs};
 use headrace_core::tunnel::named;
-use headrace_replay::simulate::{Message, START, Scene, Simulation};
+use headrace_replay::simulate::{START, Scene, Simulation};
 
 const KINDS: [&dyn DeviceKind; 5] = [
     &headrace_imagenex881::Kind,
@@ -92,9 +92,10 @@ fn scene() -> Scene {
     let phased =
         |text: String| text.replace("planned_speed_mps = 0.11", &format!("planned_speed_mps = {SPEED_MPS}"));
     let load = |name: &str| {
-        std::fs::read_to_string(vehicles.join(name)).map(phased).map_err(|error| error.to_string())
+        let text = std::fs::read_to_string(vehicles.join(name)).map_err(|error| error.to_string())?;
+        Ok(phased(text).into_bytes())
     };
-    Scene::parse(Document::new("scene", SCENE), &KINDS, &load).unwrap()
+    Scene::parse(Document::new("scene", SCENE), &KINDS, &load, None).unwrap()
 }
 
 fn armed(scene: &Scene, decoding: bool) -> Loop {
@@ -119,8 +120,15 @@ fn armed(scene: &Scene, decoding: bool) -> Loop {
     app.arm(Box::new(DirectNavigation::new(vehicle.tunnel.profile.clone(), vehicle.site))).unwrap()
 }
 
+/// A message of a simulation, to be fed.
+struct Kept {
+    at: MonoNs,
+    source: u16,
+    bytes: Vec<u8>,
+}
+
 /// Feeds all messages tick by tick; gives the time of each tick with the filling of its rings.
-fn run(dive: &mut Loop, messages: &[Message]) -> Vec<Duration> {
+fn run(dive: &mut Loop, messages: &[Kept]) -> Vec<Duration> {
     let mut ports: Vec<_> = (0..dive.sources().len()).map(|source| dive.take_port(source).unwrap()).collect();
     let mut ticks = Vec::new();
     let mut rest = messages;
@@ -141,11 +149,14 @@ fn run(dive: &mut Loop, messages: &[Message]) -> Vec<Duration> {
 
 fn whole_loop() {
     let scene = scene();
-    let mut simulation = Simulation::new(&scene);
-    let messages: Vec<Message> = std::iter::from_fn(|| simulation.next_message())
-        .filter(|message| message.direction == Direction::Received)
-        .collect();
-    let data_s = scene.trajectory.duration_s();
+    let mut simulation = Simulation::new(&scene).unwrap();
+    let data_s = simulation.duration_s();
+    let mut messages: Vec<Kept> = Vec::new();
+    while let Some(message) = simulation.next_message() {
+        if message.direction == Direction::Received {
+            messages.push(Kept { at: message.at, source: message.source, bytes: message.bytes.to_vec() });
+        }
+    }
     let mut ticks = Vec::new();
     let mut samples = 0;
     let full = best(|| {

@@ -29,7 +29,9 @@ pub(crate) enum Command {
     #[command(after_help = "Example:\n  headrace replay dive.mcap --target 0.6 --report report.json")]
     Replay(Replay),
     /// Turn a scene into a log of the bytes that its devices would send.
-    #[command(after_help = "Example:\n  headrace simulate deploy/scenes/demo.toml -o dive.mcap")]
+    ///
+    /// Only the effects that the scene names are simulated; --explain lists what that comes to.
+    #[command(after_help = SIMULATE_EXAMPLES)]
     Simulate(Simulate),
     /// Plan an inspection: spacing, speed and hours for a tunnel, modes, heads, layout and target.
     ///
@@ -41,7 +43,9 @@ pub(crate) enum Command {
     #[command(after_help = "Example:\n  headrace check deploy/vehicles/vita2-4.toml")]
     Check(Check),
     /// The numbers of the paper that the theory is from, ours beside them, and where the fault is the paper's.
-    #[command(after_help = "Example:\n  headrace paper --tables")]
+    #[command(
+        after_help = "Example:\n  headrace paper --tables\n  headrace paper --experiments --svg pictures"
+    )]
     Paper(Paper),
 }
 
@@ -98,11 +102,26 @@ pub(crate) struct Simulate {
     pub(crate) scene: PathBuf,
     /// Log to write.
     #[arg(short, long, value_name = "LOG.mcap")]
-    pub(crate) output: PathBuf,
+    pub(crate) output: Option<PathBuf>,
+    /// Where the random numbers begin, in place of the scene's own seed.
+    #[arg(long, value_name = "N")]
+    pub(crate) seed: Option<u64>,
+    /// File for the truth: CSV, a line for each measurement with the vehicle's pose, the place on the wall, and what each
+    /// effect did to it.
+    #[arg(long, value_name = "TRUTH.csv")]
+    pub(crate) truth: Option<PathBuf>,
+    /// Say what would be simulated and why, and simulate nothing.
+    #[arg(long)]
+    pub(crate) explain: bool,
     /// Print a summary as JSON.
     #[arg(long)]
     pub(crate) json: bool,
 }
+
+const SIMULATE_EXAMPLES: &str = "Example:
+  headrace simulate deploy/scenes/demo.toml -o dive.mcap
+  headrace simulate deploy/scenes/vita1-field.toml --explain
+  headrace simulate deploy/scenes/vita1-field.toml --seed 7 --truth truth.csv -o dive.mcap";
 
 const PLAN_EXAMPLES: &str = "Example:
   headrace plan --vehicle deploy/vehicles/vita2-4.toml --target 0.5
@@ -176,9 +195,15 @@ pub(crate) struct Check {
 #[derive(Debug, Args)]
 pub(crate) struct Paper {
     /// Tables 1 to 5, computed anew.
-    #[arg(long)]
+    #[arg(long, conflicts_with = "experiments")]
     pub(crate) tables: bool,
-    /// Print them as JSON.
+    /// Its simulated and real experiments (§8 and §9), run anew; takes a minute or two.
+    #[arg(long)]
+    pub(crate) experiments: bool,
+    /// Folder to draw pictures like its Figures 6, 8, 12, 13 and 15 into, with --experiments.
+    #[arg(long, value_name = "DIR", requires = "experiments")]
+    pub(crate) svg: Option<PathBuf>,
+    /// Print JSON.
     #[arg(long)]
     pub(crate) json: bool,
 }

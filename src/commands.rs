@@ -2,32 +2,30 @@
 
 use std::path::Path;
 
-use headrace_core::app::device::Direction;
 use headrace_core::app::report::{LogReport, Report};
 use headrace_core::config::vehicle::Loader;
 use headrace_core::config::{Document, VehicleConfig};
 use headrace_core::time::DurNs;
 use headrace_replay::drive::Pace;
-use headrace_replay::log::{LogInfo, LogWriter, file_digest};
+use headrace_replay::log::{LogInfo, file_digest};
 use headrace_replay::player::{Player, SimulationFeed};
-use headrace_replay::simulate::{START, Scene, Simulation};
+use headrace_replay::simulate::{Scene, Simulation};
 use serde_json::json;
 
-use crate::cli::{Check, Demo, Output, Replay, Run, Simulate};
+use crate::cli::{Check, Demo, Output, Replay, Run};
 use crate::devices::KINDS;
-use crate::dive::{self, assemble, log_header};
+use crate::dive::{self, assemble};
 use crate::expect;
 use crate::failure::{self, Failure};
 use crate::files;
 use crate::output::{deliver, put, say};
-use crate::progress::Progress;
 use crate::summary::summary;
 use crate::watch::Watch;
 
 /// Shows a simulated dive.
 pub(crate) fn demo(args: &Demo) -> Result<u8, Failure> {
     let (name, text) = files::DEMO_SCENE;
-    let scene = Scene::parse(Document::new(name, text), &KINDS, &files::built_in)?;
+    let scene = Scene::parse(Document::new(name, text), &KINDS, &files::built_in, None)?;
     std::fs::create_dir_all(&args.out).map_err(|source| Failure::Write { path: args.out.clone(), source })?;
     let (log, report_file) = (args.out.join("dive.mcap"), args.out.join("report.json"));
     // A dive is never recorded over another; the demonstration's own last one is no loss.
@@ -36,7 +34,7 @@ pub(crate) fn demo(args: &Demo) -> Result<u8, Failure> {
     }
     let dive = assemble(&scene.vehicle, &scene.vehicle_text, Some(&log))?;
     say(&format!("{}, target {} m: a simulated dive", scene.vehicle.name, scene.vehicle.target_m));
-    let mut feed = SimulationFeed::new(Simulation::new(&scene));
+    let mut feed = SimulationFeed::new(Simulation::new(&scene)?);
     let pace = Pace { speed: args.speed.0, ..Pace::default() };
     let report = dive.run(&mut feed, pace, &mut Watch::loud())?;
     files::write(&report_file, &serde_json::to_vec_pretty(&report)?)?;
@@ -81,48 +79,6 @@ pub(crate) fn replay(args: &Replay) -> Result<u8, Failure> {
         Some(golden) if expect::differs(&report, golden)? => Ok(failure::FAILED),
         _ => Ok(code),
     }
-}
-
-/// Turns a scene into a log.
-pub(crate) fn simulate(args: &Simulate) -> Result<u8, Failure> {
-    let text = files::read(&args.scene)?;
-    let name = args.scene.display().to_string();
-    let scene = Scene::parse(Document::new(&name, &text), &KINDS, &files::beside(&args.scene))?;
-    let mut writer =
-        LogWriter::create(&args.output, &log_header(&scene.vehicle, &scene.vehicle_text, false))?;
-    let mut simulation = Simulation::new(&scene);
-    let mut progress = Progress::start();
-    while let Some(message) = simulation.next_message() {
-        progress.at(|| {
-            format!(
-                "{:.0} s of {:.0} s",
-                message.at.since(START).as_secs_f64(),
-                scene.trajectory.duration_s()
-            )
-        });
-        match message.direction {
-            Direction::Received => writer.raw(message.source, message.at, message.at, &message.bytes)?,
-            Direction::Sent => writer.sent(message.source, message.at, &message.bytes)?,
-        }
-    }
-    let (_, written) = writer.finish()?;
-    let duration_s = scene.trajectory.duration_s();
-    if args.json {
-        let shown = json!({
-            "scene": scene.name, "duration_s": duration_s, "messages": written.messages, "bytes": written.bytes,
-        });
-        deliver(&shown.to_string())?;
-    } else {
-        say(&format!(
-            "{}: {duration_s:.1} s of {}, {} messages, {} bytes in {}",
-            scene.name,
-            scene.vehicle.name,
-            written.messages,
-            written.bytes,
-            args.output.display()
-        ));
-    }
-    Ok(failure::OK)
 }
 
 /// Says what a vehicle file describes.

@@ -5,11 +5,12 @@ use std::path::PathBuf;
 use headrace_core::app::plugin::PluginError;
 use headrace_core::config::ConfigError;
 use headrace_core::sampling::SamplingError;
+use headrace_experiments::ExperimentError;
 use headrace_replay::drive::DriveError;
 use headrace_replay::log::LogError;
 use headrace_replay::simulate::SceneError;
 
-use crate::plan::PictureError;
+use crate::pictures::PictureError;
 
 /// Exit code of a command that did all it was asked, on all the data.
 pub(crate) const OK: u8 = 0;
@@ -41,6 +42,8 @@ pub(crate) enum Failure {
     Json(#[from] serde_json::Error),
     #[error("planning: {0}")]
     Plan(#[from] SamplingError),
+    #[error("the paper's experiments: {0}")]
+    Experiment(#[from] ExperimentError),
     #[error(transparent)]
     Picture(#[from] PictureError),
     #[error("{0}")]

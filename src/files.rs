@@ -30,9 +30,30 @@ pub(crate) fn beside(file: &Path) -> impl Fn(&str) -> Result<String, String> {
     }
 }
 
+/// Loads the files of any content that `file` names, relative to its folder.
+pub(crate) fn bytes_beside(file: &Path) -> impl Fn(&str) -> Result<Vec<u8>, String> {
+    let folder: PathBuf = file.parent().map(Path::to_owned).unwrap_or_default();
+    move |name| {
+        let path = folder.join(name);
+        std::fs::read(&path).map_err(|error| format!("can't be read at {}: {error}", path.display()))
+    }
+}
+
 /// Loads the built-in files that the demonstration names.
-pub(crate) fn built_in(name: &str) -> Result<String, String> {
-    if name == DEMO_VEHICLE.0 { Ok(DEMO_VEHICLE.1.to_owned()) } else { Err("is not built in".to_owned()) }
+pub(crate) fn built_in(name: &str) -> Result<Vec<u8>, String> {
+    if name == DEMO_VEHICLE.0 { Ok(DEMO_VEHICLE.1.into()) } else { Err("is not built in".to_owned()) }
+}
+
+/// Loads the shipped vehicle files by their names alone.
+pub(crate) fn built_in_vehicle(name: &str) -> Result<Vec<u8>, String> {
+    let text = match name {
+        "vita1.toml" => include_str!("../deploy/vehicles/vita1.toml"),
+        "vita2-2.toml" => include_str!("../deploy/vehicles/vita2-2.toml"),
+        "vita2-3.toml" => include_str!("../deploy/vehicles/vita2-3.toml"),
+        "vita2-4.toml" => DEMO_VEHICLE.1,
+        _ => return Err("is not built in".to_owned()),
+    };
+    Ok(text.into())
 }
 
 /// Loads a file that was attached to a log.

@@ -9,8 +9,10 @@ mod failure;
 mod files;
 mod output;
 mod paper;
+mod pictures;
 mod plan;
 mod progress;
+mod simulate;
 mod station;
 mod summary;
 mod watch;
@@ -27,7 +29,7 @@ fn main() -> ExitCode {
         Command::Demo(demo) => commands::demo(&demo),
         Command::Run(run) => commands::run(&run),
         Command::Replay(replay) => commands::replay(&replay),
-        Command::Simulate(simulate) => commands::simulate(&simulate),
+        Command::Simulate(simulate) => simulate::simulate(&simulate),
         Command::Plan(args) => plan::plan(&args),
         Command::Check(check) => commands::check(&check),
         Command::Paper(args) => paper::paper(&args),

@@ -1,5 +1,6 @@
 //! Words for people, on stdout. A terminal that has gone away ends neither a dive nor its recording.
 
+use std::fmt::{self, Write as _};
 use std::io::Write;
 
 use crate::failure::Failure;
@@ -27,4 +28,10 @@ pub(crate) fn deliver(text: &str) -> Result<(), Failure> {
         .and_then(|()| stdout.write_all(b"\n"))
         .and_then(|()| stdout.flush())
         .map_err(|source| Failure::Write { path: "standard output".into(), source })
+}
+
+/// Adds words to a text.
+pub(crate) fn append(text: &mut String, words: fmt::Arguments<'_>) {
+    // Writing to a String can't fail.
+    let _written = text.write_fmt(words);
 }

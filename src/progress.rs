@@ -31,7 +31,18 @@ impl Progress {
         if self.shown.is_some_and(|shown| shown.elapsed() < EVERY) {
             return;
         }
-        eprint!("\r\x1b[K{}", words());
+        self.show(&words());
+    }
+
+    /// Shows the next of a few long steps.
+    pub(crate) fn step(&mut self, words: &str) {
+        if self.terminal {
+            self.show(words);
+        }
+    }
+
+    fn show(&mut self, words: &str) {
+        eprint!("\r\x1b[K{words}");
         if std::io::stderr().flush().is_err() {
             self.terminal = false;
         }

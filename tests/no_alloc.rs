@@ -85,8 +85,8 @@ fn a_million_packets_without_one_allocation() {
     assert!(allocations(|| drop(vec![1])) > 0, "the counter counts");
 
     let vehicles = Path::new(env!("CARGO_MANIFEST_DIR")).join("deploy/vehicles");
-    let load = |name: &str| std::fs::read_to_string(vehicles.join(name)).map_err(|error| error.to_string());
-    let scene = Scene::parse(Document::new("scene.toml", SCENE), &KINDS, &load).unwrap();
+    let load = |name: &str| std::fs::read(vehicles.join(name)).map_err(|error| error.to_string());
+    let scene = Scene::parse(Document::new("scene.toml", SCENE), &KINDS, &load, None).unwrap();
     let vehicle = &scene.vehicle;
     let mut app = App::new(Mission { length_m: 1000.0, ..vehicle.mission() });
     for sensor in &vehicle.sensors {
@@ -112,17 +112,16 @@ fn a_million_packets_without_one_allocation() {
     let mut ports: Vec<_> =
         (0..vehicle.sensors.len()).map(|source| dive.take_port(source).unwrap()).collect();
 
-    let mut simulation = Simulation::new(&scene);
+    let mut simulation = Simulation::new(&scene).unwrap();
     let mut until = START;
     let (mut packets, mut allocated, mut waited) = (0_usize, 0, 0_u64);
-    let mut next = simulation.next_message();
     while packets < 1_000_000 {
         until = until + DurNs(20_000_000);
-        while let Some(message) = next.take_if(|message| message.at < until) {
+        while simulation.peek_message().is_some_and(|message| message.at < until) {
+            let message = simulation.next_message().unwrap();
             if message.direction == Direction::Received {
-                ports[usize::from(message.source)].send(message.at, &message.bytes).unwrap();
+                ports[usize::from(message.source)].send(message.at, message.bytes).unwrap();
             }
-            next = simulation.next_message();
         }
         while dive.has_waiting() {
             let mut consumed = 0;
@@ -134,7 +133,7 @@ fn a_million_packets_without_one_allocation() {
                 std::thread::sleep(std::time::Duration::from_millis(1));
             }
         }
-        assert!(next.is_some(), "the scene is too short: {packets} packets");
+        assert!(simulation.peek_message().is_some(), "the scene is too short: {packets} packets");
     }
     assert_eq!(allocated, 0, "allocator calls in {packets} packets");
     assert!(notices.dropped() > 0, "the notice queue has overflowed");

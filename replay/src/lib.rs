@@ -2,6 +2,8 @@
 
 pub mod drive;
 pub mod log;
+#[cfg(feature = "mesh")]
+pub mod mesh;
 pub mod player;
 pub mod record;
 pub mod simulate;

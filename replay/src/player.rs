@@ -125,36 +125,31 @@ impl Feed for Player {
 /// A simulated dive as a feed; what is sent to the devices is left out.
 pub struct SimulationFeed {
     simulation: crate::simulate::Simulation,
-    next: Option<crate::simulate::Message>,
 }
 
 impl SimulationFeed {
     /// From the dive's first message on.
     pub fn new(simulation: crate::simulate::Simulation) -> Self {
-        Self { simulation, next: None }
+        Self { simulation }
     }
 }
 
 impl Feed for SimulationFeed {
     fn coming(&mut self) -> Result<Option<Coming>, LogError> {
-        while self.next.is_none() {
-            match self.simulation.next_message() {
-                None => return Ok(None),
-                Some(message) if message.direction == headrace_core::app::device::Direction::Sent => {}
-                Some(message) => self.next = Some(message),
+        while let Some(message) = self.simulation.peek_message() {
+            if message.direction == headrace_core::app::device::Direction::Received {
+                let (at, source, len) = (message.at, SourceId(message.source), message.bytes.len());
+                return Ok(Some(Coming { at, source, len }));
             }
+            self.simulation.next_message();
         }
-        Ok(self.next.as_ref().map(|message| Coming {
-            at: message.at,
-            source: SourceId(message.source),
-            len: message.bytes.len(),
-        }))
+        Ok(None)
     }
 
     fn send(&mut self, port: &mut Port) -> Result<(), RingError> {
-        if let Some(message) = &self.next {
-            port.send(message.at, &message.bytes)?;
-            self.next = None;
+        if let Some(message) = self.simulation.peek_message() {
+            port.send(message.at, message.bytes)?;
+            self.simulation.next_message();
         }
         Ok(())
     }

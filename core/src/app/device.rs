@@ -4,11 +4,11 @@
 //! Discovering and opening the port, decoding (pure) and applying (in the loop) are three separate things; this file
 //! has the second, and the device's side of the wire for simulations.
 
+use super::measurement::{Inertia, Payout, Pressure, Sounding};
 use super::plugin::Plugin;
 use super::reading::{Decoded, Packet};
 use crate::codec::CodecCounts;
 use crate::config::{ConfigError, Section, SensorConfig};
-use crate::frames::{Point3, Pose, Tunnel, Vec3};
 use crate::sampling::head::{HeadMode, HeadProgram, HeadSpec};
 use crate::site::Site;
 use crate::time::MonoNs;
@@ -46,8 +46,11 @@ pub trait Device: Plugin + Send + Sync {
         Vec::new()
     }
 
+    /// What it senses: what a simulation has to tell its emulator.
+    fn sense(&self) -> Sense;
+
     /// The device's side of the wire, for simulations.
-    fn emulator(&self, setup: &EmulatorSetup) -> Box<dyn Emulator>;
+    fn emulator(&self, setup: &EmulatorSetup) -> Emulated;
 }
 
 /// Bytes to readings: a codec with the device's configuration around it. Pure, in the loop.
@@ -74,18 +77,8 @@ pub struct EmulatorSetup {
     pub start: MonoNs,
     /// For a head, its program.
     pub head: Option<HeadProgram>,
-}
-
-/// What an emulated device can sense. Implemented by the simulator.
-pub trait Truth {
-    /// The vehicle's true pose.
-    fn pose(&self, at: MonoNs) -> Pose;
-
-    /// Distance from `origin` along the unit vector `direction` to the wall, or `None` when there is none.
-    fn range_m(&self, origin: Point3<Tunnel>, direction: Vec3<Tunnel>) -> Option<f64>;
-
-    /// Water, gravity and where the tunnel lies.
-    fn site(&self) -> &Site;
+    /// The water and the tunnel's place, as those who set it up know them.
+    pub site: Site,
 }
 
 /// Which way bytes went on a line.
@@ -97,11 +90,58 @@ pub enum Direction {
     Sent,
 }
 
-/// The device's side of the wire, together with the host's polling of it: one event at a time, in order.
-pub trait Emulator: Send {
-    /// When the next event is due; never earlier than the last.
-    fn due(&self) -> MonoNs;
+/// Takes what crosses a line: which way, when its first byte did, the bytes.
+pub type LineSink<'a> = &'a mut dyn FnMut(Direction, MonoNs, &[u8]);
 
-    /// Does what is due then, and calls `line` for each message that crosses the wire, in order of its time.
-    fn act(&mut self, truth: &dyn Truth, line: &mut dyn FnMut(Direction, MonoNs, &[u8]));
+/// The device's side of the wire, together with the host's polling of it; `M` is what the device measures.
+pub trait Emulator<M>: Send + Sync {
+    /// Adds the measurements that the device makes before `until` and hasn't been asked for yet, in order of time, on
+    /// the device's own clock.
+    fn begin(&mut self, until: MonoNs, due: &mut Vec<M>);
+
+    /// Puts what was measured on the line, each message with its time: once for each measurement that has begun, in the
+    /// same order.
+    fn tell(&mut self, measured: &M, line: LineSink<'_>);
+}
+
+/// An emulated device by what it senses.
+pub enum Emulated {
+    /// A profiling head.
+    Head(Box<dyn Emulator<Sounding>>),
+    /// A fixed echosounder: it looks along its own x.
+    Echosounder(Box<dyn Emulator<Sounding>>),
+    /// A depth sensor.
+    Depth(Box<dyn Emulator<Pressure>>),
+    /// An inertial unit.
+    Inertial(Box<dyn Emulator<Inertia>>),
+    /// A cable counter.
+    Tether(Box<dyn Emulator<Payout>>),
+}
+
+/// What a device senses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Sense {
+    /// The wall, round about.
+    Head,
+    /// The wall, in one direction.
+    Echosounder,
+    /// Depth.
+    Depth,
+    /// Attitude and motion.
+    Inertial,
+    /// The way gone.
+    Tether,
+}
+
+impl Sense {
+    /// What such a device is called.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Head => "profiling head",
+            Self::Echosounder => "echosounder",
+            Self::Depth => "depth sensor",
+            Self::Inertial => "inertial unit",
+            Self::Tether => "cable counter",
+        }
+    }
 }

@@ -5,6 +5,7 @@ pub mod device;
 pub mod digest;
 pub mod flow;
 pub mod head;
+pub mod measurement;
 pub mod merge;
 pub mod outlet;
 pub mod plugin;

@@ -1,7 +1,9 @@
 //! Files that people write, from text to checked values. Reading the file itself is the caller's.
 
+mod changes;
 mod reader;
 pub mod vehicle;
 
+pub use changes::changed;
 pub use reader::{ConfigError, Document, Section};
 pub use vehicle::{SensorConfig, TunnelConfig, VehicleConfig, WaterConfig};

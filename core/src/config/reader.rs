@@ -29,6 +29,9 @@ pub struct Document<'a> {
     text: &'a str,
 }
 
+/// A value with its path, its text, and what makes an error about it.
+pub(super) type Leaf<'s> = (Vec<String>, &'s str, Box<dyn Fn(&str) -> ConfigError + 's>);
+
 /// One table of a document. Keys that nobody asked for are an error at [`Section::finish`].
 #[derive(Debug)]
 pub struct Section<'a> {
@@ -49,14 +52,14 @@ impl<'a> Document<'a> {
     ///
     /// Errors: the text isn't TOML.
     pub fn root(self) -> Result<Section<'a>, ConfigError> {
+        let table = self.table()?;
+        Ok(Section { document: self, path: String::new(), at: 0, table, asked: RefCell::default() })
+    }
+
+    /// The root table as the parser has it.
+    pub(super) fn table(self) -> Result<DeTable<'a>, ConfigError> {
         match DeTable::parse(self.text) {
-            Ok(root) => Ok(Section {
-                document: self,
-                path: String::new(),
-                at: 0,
-                table: root.into_inner(),
-                asked: RefCell::default(),
-            }),
+            Ok(root) => Ok(root.into_inner()),
             Err(error) => {
                 let at = error.span().map_or(0, |span| span.start);
                 Err(ConfigError {
@@ -206,6 +209,25 @@ impl<'a> Section<'a> {
             .collect()
     }
 
+    /// One table, or the tables of an array of tables; none when the key is absent.
+    ///
+    /// Errors: the key holds something else.
+    pub fn tables(&self, key: &'static str) -> Result<Vec<Section<'a>>, ConfigError> {
+        let one = self.ask(key).is_some_and(|value| matches!(value.get_ref(), DeValue::Table(_)));
+        if one { Ok(self.section(key)?.into_iter().collect()) } else { self.sections(key) }
+    }
+
+    /// An array of texts.
+    ///
+    /// Errors: the key holds something else.
+    pub fn texts(&self, key: &'static str) -> Result<Option<Vec<String>>, ConfigError> {
+        let Some(value) = self.ask(key) else { return Ok(None) };
+        let wrong = || self.error(key, Some(value), "must be texts [\"a\", \"b\", ...]".to_owned());
+        let array = value.get_ref().as_array().ok_or_else(wrong)?;
+        let text = |item: &Spanned<DeValue<'a>>| item.get_ref().as_str().map(str::to_owned);
+        array.iter().map(|item| text(item).ok_or_else(wrong)).collect::<Result<Vec<_>, _>>().map(Some)
+    }
+
     /// `value`, or an error that the key is missing.
     ///
     /// Errors: `value` is `None`.
@@ -237,6 +259,17 @@ impl<'a> Section<'a> {
         self.error(key, value, problem.to_owned())
     }
 
+    /// An error about this table as a whole.
+    pub fn invalid_itself(&self, problem: &str) -> ConfigError {
+        ConfigError {
+            file: self.document.file.to_owned(),
+            line: self.document.line(self.at),
+            key: self.path.clone(),
+            value: None,
+            problem: problem.to_owned(),
+        }
+    }
+
     /// The file that this table is from, as the caller named it.
     pub fn file(&self) -> &str {
         self.document.file
@@ -247,6 +280,26 @@ impl<'a> Section<'a> {
         let mut keys: Vec<_> = self.table.keys().collect();
         keys.sort_by_key(|key| key.span().start);
         keys.into_iter().map(|key| key.get_ref().as_ref()).collect()
+    }
+
+    /// Every value below this table that is no table itself: its path from here, its text, and an error about it.
+    pub(super) fn leaves(&self) -> Vec<Leaf<'_>> {
+        let mut leaves = Vec::new();
+        self.collect_leaves(&self.table, &[], &mut leaves);
+        leaves
+    }
+
+    fn collect_leaves<'s>(&'s self, table: &'s DeTable<'a>, above: &[String], leaves: &mut Vec<Leaf<'s>>) {
+        for (key, value) in table {
+            let path: Vec<String> = above.iter().cloned().chain([key.get_ref().to_string()]).collect();
+            if let DeValue::Table(inner) = value.get_ref() {
+                self.collect_leaves(inner, &path, leaves);
+                continue;
+            }
+            let text = self.document.text.get(value.span()).unwrap_or_default();
+            let name = path.join(".");
+            leaves.push((path, text, Box::new(move |why| self.error(&name, Some(value), why.to_owned()))));
+        }
     }
 
     fn ask(&self, key: &'static str) -> Option<&Spanned<DeValue<'a>>> {

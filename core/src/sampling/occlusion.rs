@@ -73,22 +73,28 @@ impl Obstacle {
 
     /// Whether a ray from outside meets it; one from inside never does, so that a head isn't hidden by what holds it.
     pub fn stops(&self, from: Vec3<Body>, direction: Vec3<Body>) -> bool {
+        self.enters_m(from, direction).is_some()
+    }
+
+    /// Where a ray from outside meets it, in lengths of `direction`: metres along a unit vector. `None` for a ray that
+    /// misses it, or that begins inside.
+    pub fn enters_m(&self, from: Vec3<Body>, direction: Vec3<Body>) -> Option<f64> {
         match self {
-            Self::Box { least, most } => box_stops(*least, *most, from, direction),
+            Self::Box { least, most } => box_entered(*least, *most, from, direction),
             Self::Cylinder { from: base, along, radius_m } => {
-                cylinder_stops(*base, *along, *radius_m, from, direction)
+                cylinder_entered(*base, *along, *radius_m, from, direction)
             }
         }
     }
 }
 
-fn box_stops(least: Vec3<Body>, most: Vec3<Body>, from: Vec3<Body>, direction: Vec3<Body>) -> bool {
+fn box_entered(least: Vec3<Body>, most: Vec3<Body>, from: Vec3<Body>, direction: Vec3<Body>) -> Option<f64> {
     let (mut enter, mut leave) = (f64::NEG_INFINITY, f64::INFINITY);
     let axes = least.0.iter().zip(most.0.iter()).zip(from.0.iter().zip(direction.0.iter()));
     for ((low, high), (at, towards)) in axes {
         if *towards == 0.0 {
             if at <= low || at >= high {
-                return false;
+                return None;
             }
             continue;
         }
@@ -96,19 +102,19 @@ fn box_stops(least: Vec3<Body>, most: Vec3<Body>, from: Vec3<Body>, direction: V
         enter = enter.max(a.min(b));
         leave = leave.min(a.max(b));
     }
-    enter > 0.0 && enter < leave
+    (enter > 0.0 && enter < leave).then_some(enter)
 }
 
-fn cylinder_stops(
+fn cylinder_entered(
     base: Vec3<Body>,
     along: Vec3<Body>,
     radius_m: f64,
     from: Vec3<Body>,
     direction: Vec3<Body>,
-) -> bool {
+) -> Option<f64> {
     let length_m = along.norm();
     if radius_m <= 0.0 || length_m <= 0.0 {
-        return false;
+        return None;
     }
     let axis = along.scaled(1.0 / length_m).0;
     let (offset, direction) = ((from + -base).0, direction.0);
@@ -121,23 +127,23 @@ fn cylinder_stops(
     if a > 0.0 {
         let discriminant = b * b - a * c;
         if discriminant <= 0.0 {
-            return false;
+            return None;
         }
         let root = math::sqrt(discriminant);
         (enter, leave) = ((-b - root) / a, (-b + root) / a);
     } else if c >= 0.0 {
-        return false;
+        return None;
     }
     if climb == 0.0 {
         if height <= 0.0 || height >= length_m {
-            return false;
+            return None;
         }
     } else {
         let (first, second) = (-height / climb, (length_m - height) / climb);
         enter = enter.max(first.min(second));
         leave = leave.min(first.max(second));
     }
-    enter > 0.0 && enter < leave
+    (enter > 0.0 && enter < leave).then_some(enter)
 }
 
 /// The angles at which obstacles hide the wall from a head, in order of angle; edges are good to 1e-12 rad.
@@ -251,6 +257,23 @@ mod tests {
     }
 
     #[test]
+    fn a_ray_enters_where_it_first_touches() {
+        let x = Vec3::new(1.0, 0.0, 0.0);
+        let hull = Obstacle::Box { least: Vec3::new(2.0, -1.0, -1.0), most: Vec3::new(3.0, 1.0, 1.0) };
+        assert_eq!(hull.enters_m(Vec3::zero(), x), Some(2.0));
+        assert_eq!(hull.enters_m(Vec3::zero(), x.scaled(-1.0)), None);
+        assert_eq!(hull.enters_m(Vec3::new(2.5, 0.0, 0.0), x), None);
+        let post = Obstacle::Cylinder {
+            from: Vec3::new(2.0, 0.0, -1.0),
+            along: Vec3::new(0.0, 0.0, 2.0),
+            radius_m: 0.5,
+        };
+        assert_eq!(post.enters_m(Vec3::zero(), x), Some(1.5));
+        assert_eq!(post.enters_m(Vec3::new(2.0, 0.0, 4.0), Vec3::new(0.0, 0.0, -1.0)), Some(3.0));
+        assert_eq!(post.enters_m(Vec3::new(2.0, 0.0, 0.0), x), None);
+    }
+
+    #[test]
     fn a_head_inside_the_hull_s_box_sees_all_and_one_in_a_tube_nothing() {
         let around = Obstacle::Box { least: Vec3::new(-1.0, -1.0, -1.0), most: Vec3::new(1.0, 1.0, 1.0) };
         assert!(hidden_angles(&head([0.0; 3], false).mount, &[around]).is_empty());
@@ -290,6 +313,10 @@ mod tests {
             let direction = Vec3::new(ca * cb, sa * cb, sb);
             let marched = (0..4000).any(|i| inside(direction.scaled(f64::from(i) * 5e-4)));
             let stops = cylinder.stops(Vec3::zero(), direction);
+            if let Some(enters_m) = cylinder.enters_m(Vec3::zero(), direction) {
+                assert!(!inside(direction.scaled(enters_m - 1e-9)), "direction {direction:?}");
+                assert!(inside(direction.scaled(enters_m + 1e-9)) || !marched, "direction {direction:?}");
+            }
             // Marching may step over a ray that only grazes.
             assert!(stops || !marched, "direction {direction:?}");
             met += i32::from(stops && marched) - i32::from(stops && !marched);

@@ -7,6 +7,7 @@ mod baseline;
 mod cell;
 mod combined;
 mod drift;
+mod experiments;
 mod findings;
 mod modes;
 mod printed;
@@ -19,6 +20,7 @@ use crate::tunnel::{ProfileError, named};
 pub use baseline::{AtBothSpeeds, OneHeadRow, SeveralHeadsRow};
 pub use cell::{Cell, Note, NoteKind, Table};
 pub use combined::{Combined, CombinedCell, CombinedRow};
+pub use experiments::{Measured, Spacings, measured};
 pub use modes::{ModeRow, OverlapRow};
 pub use printed::{Digits, Interval, Printed};
 

@@ -3,4 +3,4 @@
 pub mod named;
 mod profile;
 
-pub use profile::{Piece, Profile, ProfileError, WallHit, Yz};
+pub use profile::{Nearest, Piece, Profile, ProfileError, WallHit, Yz};

@@ -2,6 +2,10 @@
 
 use crate::math::{self, TAU};
 
+mod nearest;
+
+pub use nearest::Nearest;
+
 /// A place in the cross-section: y left, z up, metres.
 pub type Yz = [f64; 2];
 

@@ -1,7 +1,7 @@
 //! The sensor's side of the bus: it is asked for its calibration, then for measurements at a fixed rate.
 
-use headrace_core::app::device::{Direction, Emulator, Truth};
-use headrace_core::frames::Mount;
+use headrace_core::app::device::{Direction, Emulator, LineSink};
+use headrace_core::app::measurement::Pressure;
 use headrace_core::time::{DurNs, MonoNs};
 
 use crate::calibration::{Calibration, Scaling0};
@@ -15,13 +15,11 @@ const TEMPERATURE_COUNTS: u16 = 0x4C80;
 
 /// What an emulated sensor is like.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Emulated {
+pub struct Simulated {
     /// Its range and kind.
     pub calibration: Calibration,
     /// Pressure of the air outside, bar.
     pub ambient_bar: f64,
-    /// How it sits on the vehicle.
-    pub mount: Mount,
     /// Measurements a second.
     pub rate_hz: f64,
     /// From validity to receive time.
@@ -31,44 +29,52 @@ pub struct Emulated {
 /// An ideal sensor: no noise and no delay of its own, but whole counts.
 #[derive(Debug, Clone)]
 pub struct Bar100Emulator {
-    sensor: Emulated,
+    sensor: Simulated,
     start: MonoNs,
-    measured: u64,
+    begun: u64,
+    calibration_told: bool,
 }
 
 impl Bar100Emulator {
     /// A sensor that is switched on, and first measures, at `start`.
-    pub fn new(sensor: Emulated, start: MonoNs) -> Self {
-        Self { sensor, start, measured: 0 }
+    pub fn new(sensor: Simulated, start: MonoNs) -> Self {
+        Self { sensor, start, begun: 0, calibration_told: false }
     }
 
-    fn measure(&self, truth: &dyn Truth, at: MonoNs) -> Measurement {
-        let site = truth.site();
-        let height_m = truth.pose(at).place(self.sensor.mount.position).z();
-        let pressure_pa = site.pressure_pa(site.surface_above_floor_m - height_m);
+    fn due(&self) -> MonoNs {
+        self.start + DurNs::from_secs_f64(self.begun as f64 / self.sensor.rate_hz)
+    }
+
+    fn measurement(&self, pressure_pa: f64) -> Measurement {
         Measurement {
             status: Status::IDLE,
             pressure_counts: self.sensor.calibration.counts(pressure_pa, self.sensor.ambient_bar),
             temperature_counts: TEMPERATURE_COUNTS,
         }
     }
+
+    fn tell_calibration(&mut self, received: MonoNs, line: LineSink<'_>) {
+        for (cell, word) in self.sensor.calibration.to_words(CALIBRATED) {
+            let read = MemoryWord { cell, status: Status::IDLE, word };
+            line(Direction::Received, received, &read.encode());
+        }
+        self.calibration_told = true;
+    }
 }
 
-impl Emulator for Bar100Emulator {
-    fn due(&self) -> MonoNs {
-        self.start + DurNs::from_secs_f64(self.measured as f64 / self.sensor.rate_hz)
+impl Emulator<Pressure> for Bar100Emulator {
+    fn begin(&mut self, until: MonoNs, due: &mut Vec<Pressure>) {
+        while self.due() < until {
+            due.push(Pressure::due(self.due()));
+            self.begun += 1;
+        }
     }
 
-    fn act(&mut self, truth: &dyn Truth, line: &mut dyn FnMut(Direction, MonoNs, &[u8])) {
-        let at = self.due();
-        let received = at + self.sensor.latency;
-        if self.measured == 0 {
-            for (cell, word) in self.sensor.calibration.to_words(CALIBRATED) {
-                let read = MemoryWord { cell, status: Status::IDLE, word };
-                line(Direction::Received, received, &read.encode());
-            }
+    fn tell(&mut self, pressure: &Pressure, line: LineSink<'_>) {
+        let received = pressure.at + self.sensor.latency;
+        if !self.calibration_told {
+            self.tell_calibration(received, line);
         }
-        line(Direction::Received, received, &self.measure(truth, at).encode());
-        self.measured += 1;
+        line(Direction::Received, received, &self.measurement(pressure.pressure_pa).encode());
     }
 }

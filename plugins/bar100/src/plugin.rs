@@ -2,13 +2,13 @@
 
 use headrace_core::app::App;
 use headrace_core::app::components::DepthSensor;
-use headrace_core::app::device::{Device, DeviceKind, Emulator, EmulatorSetup};
+use headrace_core::app::device::{Device, DeviceKind, Emulated, EmulatorSetup, Sense};
 use headrace_core::app::plugin::{Plugin, PluginError};
 use headrace_core::config::{ConfigError, Section, SensorConfig};
 
 use crate::calibration::{Calibration, Overrides, PressureMode, STANDARD_ATMOSPHERE_BAR};
 use crate::decoder::{Bar100Decoder, Meaning};
-use crate::emulator::{Bar100Emulator, Emulated};
+use crate::emulator::{Bar100Emulator, Simulated};
 
 /// Name in vehicle files.
 pub const NAME: &str = "bar100";
@@ -28,7 +28,7 @@ pub struct Kind;
 pub struct Bar100 {
     sensor: SensorConfig,
     meaning: Meaning,
-    emulated: Emulated,
+    emulated: Simulated,
 }
 
 impl DeviceKind for Kind {
@@ -57,7 +57,7 @@ impl DeviceKind for Kind {
         Ok(Box::new(Bar100 {
             sensor: sensor.clone(),
             meaning: Meaning { overrides, ambient_bar, reject_busy, latency },
-            emulated: Emulated { calibration, ambient_bar, mount: sensor.mount, rate_hz, latency },
+            emulated: Simulated { calibration, ambient_bar, rate_hz, latency },
         }))
     }
 }
@@ -70,7 +70,11 @@ impl Plugin for Bar100 {
 }
 
 impl Device for Bar100 {
-    fn emulator(&self, setup: &EmulatorSetup) -> Box<dyn Emulator> {
-        Box::new(Bar100Emulator::new(self.emulated, setup.start))
+    fn sense(&self) -> Sense {
+        Sense::Depth
+    }
+
+    fn emulator(&self, setup: &EmulatorSetup) -> Emulated {
+        Emulated::Depth(Box::new(Bar100Emulator::new(self.emulated, setup.start)))
     }
 }

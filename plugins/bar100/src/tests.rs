@@ -1,11 +1,12 @@
 //! From a vehicle file's table to readings, by way of the emulated sensor.
 
-use headrace_core::app::device::{Decoder as _, Device, DeviceKind as _, Direction, EmulatorSetup, Truth};
+use headrace_core::app::device::{Decoder as _, Device, DeviceKind as _, Direction, Emulated, EmulatorSetup};
+use headrace_core::app::measurement::Pressure;
 use headrace_core::app::reading::{Decoded, Packet, Reading, WaterPressure};
 use headrace_core::app::report::Report;
 use headrace_core::app::{App, Mission};
 use headrace_core::config::{Document, SensorConfig};
-use headrace_core::frames::{Mount, Point3, Pose, Rot, Tunnel, Vec3};
+use headrace_core::frames::{Mount, Rot, Vec3};
 use headrace_core::fusion::direct::DirectNavigation;
 use headrace_core::site::Site;
 use headrace_core::time::{DurNs, MonoNs};
@@ -14,26 +15,6 @@ use headrace_core::tunnel::named;
 use crate::Kind;
 use crate::calibration::{Overrides, STANDARD_ATMOSPHERE_BAR};
 use crate::decoder::{Bar100Decoder, Meaning};
-
-/// A vehicle that climbs at 0.1 m/s from 2 m above the floor.
-struct Climb {
-    site: Site,
-}
-
-impl Truth for Climb {
-    fn pose(&self, at: MonoNs) -> Pose {
-        let height_m = 2.0 + 0.1 * at.as_secs_f64();
-        Pose { position: Point3::new(0.0, 0.0, height_m), attitude: Rot::identity() }
-    }
-
-    fn range_m(&self, _origin: Point3<Tunnel>, _direction: Vec3<Tunnel>) -> Option<f64> {
-        None
-    }
-
-    fn site(&self) -> &Site {
-        &self.site
-    }
-}
 
 fn sensor() -> SensorConfig {
     SensorConfig {
@@ -128,29 +109,31 @@ fn a_log_that_begins_in_the_middle_is_read_with_the_files_calibration() {
 }
 
 #[test]
-fn what_the_emulated_sensor_says_decodes_to_the_true_depth() {
-    let truth = Climb { site: Site::default() };
+fn what_the_emulated_sensor_says_decodes_to_the_true_pressure() {
+    let start = MonoNs(5_000_000_000);
     let device = configured("rate_hz = 30\n").unwrap();
-    let mut emulator = device.emulator(&EmulatorSetup { start: MonoNs(5_000_000_000), head: None });
+    let setup = EmulatorSetup { start, head: None, site: Site::default() };
+    let Emulated::Depth(mut emulator) = device.emulator(&setup) else { panic!("no depth sensor") };
     let mut decoder = Bar100Decoder::new(meaning(Overrides::default()));
-    let mut readings = Vec::new();
-    let mut last = MonoNs(0);
-    for _ in 0..300 {
-        assert!(emulator.due() >= last);
-        last = emulator.due();
-        emulator.act(&truth, &mut |direction, received, bytes| {
+    // Climbing.
+    let pressure_pa = |at: MonoNs| 590_000.0 - 981.0 * at.as_secs_f64();
+    let (mut readings, mut due) = (Vec::new(), Vec::new());
+    emulator.begin(start + DurNs::from_millis(4), &mut due);
+    emulator.begin(start + DurNs::from_millis(9_990), &mut due);
+    for pressure in due {
+        let felt = Pressure { pressure_pa: pressure_pa(pressure.at), ..pressure };
+        emulator.tell(&felt, &mut |direction, received, bytes| {
             assert_eq!(direction, Direction::Received);
             readings.extend(decode(&mut decoder, received, bytes));
         });
     }
     assert_eq!((readings.len(), decoder.withheld()), (300, 0));
     assert_eq!(decoder.counts().good_frames, 305);
-    assert_eq!(readings[0].valid_at, MonoNs(5_000_000_000));
-    assert_eq!(readings[30].valid_at, MonoNs(6_000_000_000));
+    assert_eq!(readings[0].valid_at, start);
+    assert_eq!(readings[30].valid_at, start + DurNs::from_millis(1000));
     for decoded in &readings {
         let got = pressure(decoded);
-        let depth_m = 50.0 - (truth.pose(decoded.valid_at).position.z() - 0.3);
-        let error_pa = got.pressure_pa - truth.site.pressure_pa(depth_m);
+        let error_pa = got.pressure_pa - pressure_pa(decoded.valid_at);
         assert!(error_pa.abs() <= got.resolution_pa / 2.0 + 1e-6, "{error_pa} Pa");
         assert!((got.temperature_degc - 10.0).abs() < 1e-9);
     }

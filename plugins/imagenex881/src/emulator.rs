@@ -1,14 +1,16 @@
 //! An emulated head, and the host that polls it: one command and one return each ping period.
 
-use headrace_core::app::device::{Direction, Emulator, EmulatorSetup, Truth};
+use std::collections::VecDeque;
+
+use headrace_core::app::device::{Direction, Emulator, EmulatorSetup, LineSink};
+use headrace_core::app::measurement::Sounding;
 use headrace_core::codec::{Bytes, Codec as _};
-use headrace_core::frames::{Mount, head_direction};
 use headrace_core::math;
 use headrace_core::sampling::head::HeadProgram;
 use headrace_core::time::{DurNs, MonoNs};
 
 use crate::codec::{
-    COUNTS_PER_TURN, Command, CommandCodec, Header, MAX_ECHO_BYTES, MAX_RETURN_BYTES, Model, Points, Return,
+    COMMAND_BYTES, COUNTS_PER_TURN, Command, CommandCodec, Header, MAX_ECHO_BYTES, Model, Points, Return,
     Status, Tag, ZERO_COUNT, step_at_most, step_deg,
 };
 use crate::plugin::SOUND_SPEED_MPS;
@@ -74,7 +76,43 @@ impl Sector {
     }
 }
 
-/// The device: pings where it is, answers, and steps.
+/// Where a head pinged, and which way it went on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Ping {
+    /// Its position, 0 to 1199.
+    pub position: u16,
+    /// Whether positions grow.
+    pub clockwise: bool,
+}
+
+impl Ping {
+    /// The answer of a head that hears the wall at `range_m`, in metres at 1500 m/s.
+    pub fn answer(self, command: &Command, range_m: Option<f64>) -> Return {
+        let heard = range_m
+            .filter(|range| *range > 0.0 && *range >= command.min_range_m)
+            .filter(|range| *range <= f64::from(command.range_m));
+        let tag = match command.points {
+            _ if command.profile => Tag::Ipx,
+            Points::P250 => Tag::Imx,
+            Points::P500 => Tag::Igx,
+        };
+        let silent = Header {
+            tag,
+            head_id: command.head_id,
+            status: Status(0x40),
+            position: self.position,
+            clockwise: self.clockwise,
+            range_m: command.range_m,
+            profile_counts: 0,
+        };
+        let count_m = f64::from(silent.count_mm(Model::Head881)) / 1000.0;
+        let counts = heard.map_or(0, |range| math::round_to_i64(range / count_m));
+        let header = Header { profile_counts: u16::try_from(counts).unwrap_or(0), ..silent };
+        Return { header, echo: echo(tag, heard.map(|range| range / f64::from(command.range_m))) }
+    }
+}
+
+/// The device: pings where it is, and steps.
 #[derive(Debug, Clone)]
 pub struct Head {
     position: i32,
@@ -87,33 +125,13 @@ impl Head {
         Self { position: position.rem_euclid(COUNTS_PER_TURN), growing }
     }
 
-    /// Obeys one command. `range_m` gives the range at a position, in metres at 1500 m/s.
-    pub fn answer(&mut self, command: &Command, range_m: impl FnOnce(u16) -> Option<f64>) -> Return {
+    /// Obeys one command: pings where it is, and steps.
+    pub fn obey(&mut self, command: &Command) -> Ping {
         self.growing ^= command.reverse;
         let next = self.next_position(command);
         let position = u16::try_from(self.position).unwrap_or(0);
         self.position = next;
-        let heard = range_m(position)
-            .filter(|range| *range > 0.0 && *range >= command.min_range_m)
-            .filter(|range| *range <= f64::from(command.range_m));
-        let tag = match command.points {
-            _ if command.profile => Tag::Ipx,
-            Points::P250 => Tag::Imx,
-            Points::P500 => Tag::Igx,
-        };
-        let silent = Header {
-            tag,
-            head_id: command.head_id,
-            status: Status(0x40),
-            position,
-            clockwise: self.growing,
-            range_m: command.range_m,
-            profile_counts: 0,
-        };
-        let count_m = f64::from(silent.count_mm(Model::Head881)) / 1000.0;
-        let counts = heard.map_or(0, |range| math::round_to_i64(range / count_m));
-        let header = Header { profile_counts: u16::try_from(counts).unwrap_or(0), ..silent };
-        Return { header, echo: echo(tag, heard.map(|range| range / f64::from(command.range_m))) }
+        Ping { position, clockwise: self.growing }
     }
 
     /// Where the command's step leads; turns round at the ends of a sector narrower than the whole turn.
@@ -157,62 +175,66 @@ fn echo(tag: Tag, part: Option<f64>) -> Bytes<MAX_ECHO_BYTES> {
 #[derive(Debug, Clone)]
 pub struct HeadEmulator {
     settings: Settings,
-    mount: Mount,
     latency: DurNs,
+    /// Metres as the head reckons them for a metre of the site's.
+    device_per_site: f64,
     host: Host,
     codec: CommandCodec,
     head: Head,
     ping_at: MonoNs,
-    answer: Option<Bytes<MAX_RETURN_BYTES>>,
+    asked: VecDeque<Asked>,
+}
+
+/// A command that has been obeyed but not yet answered.
+#[derive(Debug, Clone)]
+struct Asked {
+    bytes: [u8; COMMAND_BYTES],
+    command: Command,
+    ping: Ping,
 }
 
 impl HeadEmulator {
     /// A head that is at its program's start when switched on, and pings at once. Without a program it turns on for
     /// ever from the sensor frame's 0.
-    pub fn new(settings: Settings, mount: Mount, latency: DurNs, setup: &EmulatorSetup) -> Self {
+    pub fn new(settings: Settings, latency: DurNs, setup: &EmulatorSetup) -> Self {
         let idle = HeadProgram { start_rad: 0.0, growing: true, sector: None };
         let program = setup.head.unwrap_or(idle);
         let host = Host::new(&settings, &program);
         let head = Head::new(settings.position(program.start_rad), host.growing);
-        let (codec, ping_at) = (CommandCodec::default(), setup.start);
-        Self { settings, mount, latency, host, codec, head, ping_at, answer: None }
+        let device_per_site = SOUND_SPEED_MPS / setup.site.sound_speed_mps;
+        let (codec, ping_at, asked) = (CommandCodec::default(), setup.start, VecDeque::new());
+        Self { settings, latency, device_per_site, host, codec, head, ping_at, asked }
     }
 
-    fn ask(&mut self, truth: &dyn Truth, line: &mut dyn FnMut(Direction, MonoNs, &[u8])) {
-        let Self { settings, mount, host, codec, head, ping_at, answer, .. } = self;
+    /// Sends the next command to the head, which obeys what the bytes say.
+    fn ask(&mut self, due: &mut Vec<Sounding>) {
+        let Self { settings, host, codec, head, ping_at, asked, .. } = self;
         // Settings are checked when they are read, so that each command has its bytes.
         let Ok(bytes) = host.next_command().encode() else { return };
-        line(Direction::Sent, *ping_at, &bytes);
         codec.push(&bytes, &mut |command| {
-            let value = head.answer(&command, |position| {
-                device_range_m(truth, mount, *ping_at, settings.sensor_rad(position))
-            });
-            *answer = value.encode().ok();
+            let ping = head.obey(&command);
+            due.push(Sounding::due(*ping_at, settings.sensor_rad(ping.position)));
+            asked.push_back(Asked { bytes, command, ping });
         });
     }
 }
 
-/// Range in metres that a head computes at an angle in its frame: along the beam's centre, with its own sound speed.
-fn device_range_m(truth: &dyn Truth, mount: &Mount, at: MonoNs, sensor_rad: f64) -> Option<f64> {
-    let pose = truth.pose(at);
-    let direction = pose.attitude * (mount.rotation * head_direction(sensor_rad));
-    let range_m = truth.range_m(pose.place(mount.position), direction)?;
-    Some(range_m * (SOUND_SPEED_MPS / truth.site().sound_speed_mps))
-}
-
-impl Emulator for HeadEmulator {
-    fn due(&self) -> MonoNs {
-        if self.answer.is_some() { self.ping_at + self.latency } else { self.ping_at }
+impl Emulator<Sounding> for HeadEmulator {
+    fn begin(&mut self, until: MonoNs, due: &mut Vec<Sounding>) {
+        while self.ping_at < until {
+            self.ask(due);
+            self.ping_at = self.ping_at + self.settings.ping_period;
+        }
     }
 
-    /// Sends a command, or receives its answer.
-    fn act(&mut self, truth: &dyn Truth, line: &mut dyn FnMut(Direction, MonoNs, &[u8])) {
-        match self.answer.take() {
-            Some(answer) => line(Direction::Received, self.ping_at + self.latency, answer.as_slice()),
-            None => self.ask(truth, line),
-        }
-        if self.answer.is_none() {
-            self.ping_at = self.ping_at + self.settings.ping_period;
+    fn tell(&mut self, sounding: &Sounding, line: LineSink<'_>) {
+        let Some(Asked { bytes, command, ping }) = self.asked.pop_front() else { return };
+        line(Direction::Sent, sounding.at, &bytes);
+        let reported = self.settings.position(sounding.reported_rad);
+        let ping = Ping { position: u16::try_from(reported).unwrap_or(ping.position), ..ping };
+        let range_m = sounding.range_m.map(|range_m| range_m * self.device_per_site);
+        if let Ok(answer) = ping.answer(&command, range_m).encode() {
+            line(Direction::Received, sounding.at + self.latency, answer.as_slice());
         }
     }
 }

@@ -76,10 +76,10 @@ mod tests {
                     for command in &commands {
                         command.encode().unwrap();
                         assert_ne!(command.range_m, settings.command.range_m);
-                        head.answer(command, |_| None);
+                        head.obey(command);
                     }
-                    let first = head.answer(&settings.command, |_| None).header;
-                    let second = head.answer(&settings.command, |_| None).header;
+                    let first = head.obey(&settings.command);
+                    let second = head.obey(&settings.command);
                     let (at, then) =
                         (settings.sensor_rad(first.position), settings.sensor_rad(second.position));
                     let miss = math::wrap_signed(at - start, TAU);

@@ -2,7 +2,7 @@
 
 use headrace_core::app::App;
 use headrace_core::app::components::SonarHead;
-use headrace_core::app::device::{Decoder, Device, DeviceKind, Emulator, EmulatorSetup};
+use headrace_core::app::device::{Decoder, Device, DeviceKind, Emulated, EmulatorSetup, Sense};
 use headrace_core::app::plugin::{Plugin, PluginError};
 use headrace_core::app::reading::{Decoded, Packet, Reading, SonarReturn};
 use headrace_core::codec::{Codec as _, CodecCounts, LineClock};
@@ -88,8 +88,12 @@ impl Device for Imagenex881 {
         commands.iter().filter_map(|command| command.encode().ok()).map(|bytes| bytes.to_vec()).collect()
     }
 
-    fn emulator(&self, setup: &EmulatorSetup) -> Box<dyn Emulator> {
-        Box::new(HeadEmulator::new(self.settings.clone(), self.sensor.mount, self.sensor.latency, setup))
+    fn sense(&self) -> Sense {
+        Sense::Head
+    }
+
+    fn emulator(&self, setup: &EmulatorSetup) -> Emulated {
+        Emulated::Head(Box::new(HeadEmulator::new(self.settings.clone(), self.sensor.latency, setup)))
     }
 }
 

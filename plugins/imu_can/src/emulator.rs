@@ -1,13 +1,12 @@
 //! The unit's side of the bus: at a fixed rate, the frames of one sample.
 
-use headrace_core::app::device::{Direction, Emulator, Truth};
-use headrace_core::frames::Mount;
+use headrace_core::app::device::{Direction, Emulator, LineSink};
+use headrace_core::app::measurement::Inertia;
 use headrace_core::math;
 use headrace_core::time::{DurNs, MonoNs};
 
 use crate::codec::{Message, MessageSet};
 use crate::decoder::Meaning;
-use crate::motion::{Motion, motion};
 use crate::sets::{bosch, j1939, sbg, xsens};
 
 /// Temperature that an emulated unit gives: 10 degrees Celsius.
@@ -17,19 +16,24 @@ const SBG_TEMPERATURE: i16 = 1000;
 #[derive(Debug, Clone)]
 pub struct ImuEmulator {
     meaning: Meaning,
-    mount: Mount,
     rate_hz: f64,
     start: MonoNs,
-    sampled: u64,
+    begun: u64,
+    told: u64,
 }
 
 impl ImuEmulator {
     /// A unit that is switched on, and first samples, at `start`.
-    pub fn new(meaning: Meaning, mount: Mount, rate_hz: f64, start: MonoNs) -> Self {
-        Self { meaning, mount, rate_hz, start, sampled: 0 }
+    pub fn new(meaning: Meaning, rate_hz: f64, start: MonoNs) -> Self {
+        Self { meaning, rate_hz, start, begun: 0, told: 0 }
     }
 
-    fn xsens(&self, motion: &Motion, elapsed: DurNs) -> [Message; 4] {
+    /// From the start to a sample on the unit's own clock.
+    fn elapsed(&self, sample: u64) -> DurNs {
+        DurNs::from_secs_f64(sample as f64 / self.rate_hz)
+    }
+
+    fn xsens(&self, motion: &Inertia, elapsed: DurNs) -> [Message; 4] {
         let ticks = elapsed.0 / self.meaning.sample_time_tick.0.max(1);
         [
             xsens::Message::SampleTime(wrapped(ticks)),
@@ -43,7 +47,7 @@ impl ImuEmulator {
         .map(Message::Xsens)
     }
 
-    fn j1939(&self, motion: &Motion) -> [Message; 3] {
+    fn j1939(&self, motion: &Inertia) -> [Message; 3] {
         let (roll, pitch, _) = motion.attitude.roll_pitch_yaw();
         let slope = j1939::Slope {
             pitch: j1939::slope_raw(pitch.to_degrees()),
@@ -64,31 +68,33 @@ impl ImuEmulator {
     }
 }
 
-impl Emulator for ImuEmulator {
-    fn due(&self) -> MonoNs {
-        self.start + DurNs::from_secs_f64(self.sampled as f64 / self.rate_hz)
+impl Emulator<Inertia> for ImuEmulator {
+    fn begin(&mut self, until: MonoNs, due: &mut Vec<Inertia>) {
+        let period = DurNs::from_secs_f64(1.0 / self.rate_hz);
+        while self.start + self.elapsed(self.begun) < until {
+            due.push(Inertia::due(self.start + self.elapsed(self.begun), period));
+            self.begun += 1;
+        }
     }
 
-    fn act(&mut self, truth: &dyn Truth, line: &mut dyn FnMut(Direction, MonoNs, &[u8])) {
-        let at = self.due();
-        let motion = motion(truth, &self.mount, at, DurNs::from_secs_f64(1.0 / self.rate_hz));
-        let elapsed = at.since(self.start);
+    fn tell(&mut self, motion: &Inertia, line: LineSink<'_>) {
+        let elapsed = self.elapsed(self.told);
+        self.told += 1;
         let mut send = |messages: &[Message]| {
             for frame in messages.iter().filter_map(|message| self.meaning.set.encode(message)) {
-                line(Direction::Received, at + self.meaning.latency, &frame.encode());
+                line(Direction::Received, motion.at + self.meaning.latency, &frame.encode());
             }
         };
         match self.meaning.set {
-            MessageSet::Xsens(_) => send(&self.xsens(&motion, elapsed)),
-            MessageSet::Sbg => send(&sbg(&motion, elapsed)),
-            MessageSet::J1939(_) => send(&self.j1939(&motion)),
-            MessageSet::Bosch => send(&bosch(&motion)),
+            MessageSet::Xsens(_) => send(&self.xsens(motion, elapsed)),
+            MessageSet::Sbg => send(&sbg(motion, elapsed)),
+            MessageSet::J1939(_) => send(&self.j1939(motion)),
+            MessageSet::Bosch => send(&bosch(motion)),
         }
-        self.sampled += 1;
     }
 }
 
-fn sbg(motion: &Motion, elapsed: DurNs) -> [Message; 4] {
+fn sbg(motion: &Inertia, elapsed: DurNs) -> [Message; 4] {
     let force = sbg::to_ours(motion.force_mps2.0.into());
     let rate = sbg::to_ours(motion.rate_radps.0.into());
     let quaternion = sbg::rotation_to_ours(motion.attitude.wxyz());
@@ -101,7 +107,7 @@ fn sbg(motion: &Motion, elapsed: DurNs) -> [Message; 4] {
     .map(Message::Sbg)
 }
 
-fn bosch(motion: &Motion) -> [Message; 3] {
+fn bosch(motion: &Inertia) -> [Message; 3] {
     let rate = |radps: f64| bosch::RawRate::nearest(radps.to_degrees());
     let force = bosch::RawAcceleration::nearest;
     [

@@ -9,7 +9,6 @@ pub mod codec;
 pub mod decoder;
 pub mod emulator;
 pub mod frame;
-mod motion;
 pub mod plugin;
 pub mod sets;
 

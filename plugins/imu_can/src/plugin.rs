@@ -2,7 +2,7 @@
 
 use headrace_core::app::App;
 use headrace_core::app::components::Imu;
-use headrace_core::app::device::{Device, DeviceKind, Emulator, EmulatorSetup};
+use headrace_core::app::device::{Device, DeviceKind, Emulated, EmulatorSetup, Sense};
 use headrace_core::app::plugin::{Plugin, PluginError};
 use headrace_core::config::{ConfigError, Section, SensorConfig};
 use headrace_core::time::DurNs;
@@ -97,7 +97,11 @@ impl Plugin for CanImu {
 }
 
 impl Device for CanImu {
-    fn emulator(&self, setup: &EmulatorSetup) -> Box<dyn Emulator> {
-        Box::new(ImuEmulator::new(self.meaning, self.sensor.mount, self.rate_hz, setup.start))
+    fn sense(&self) -> Sense {
+        Sense::Inertial
+    }
+
+    fn emulator(&self, setup: &EmulatorSetup) -> Emulated {
+        Emulated::Inertial(Box::new(ImuEmulator::new(self.meaning, self.rate_hz, setup.start)))
     }
 }

@@ -2,7 +2,7 @@
 
 use headrace_core::app::App;
 use headrace_core::app::components::Echosounder;
-use headrace_core::app::device::{Decoder, Device, DeviceKind, Emulator, EmulatorSetup};
+use headrace_core::app::device::{Decoder, Device, DeviceKind, Emulated, EmulatorSetup, Sense};
 use headrace_core::app::plugin::{Plugin, PluginError};
 use headrace_core::app::reading::{Decoded, EchoRange, Packet, Reading};
 use headrace_core::codec::{Codec as _, CodecCounts, LineClock};
@@ -59,8 +59,12 @@ impl Plugin for Ping1d {
 }
 
 impl Device for Ping1d {
-    fn emulator(&self, setup: &EmulatorSetup) -> Box<dyn Emulator> {
-        Box::new(PingEmulator::new(self.settings, self.sensor.mount, self.sensor.latency, setup))
+    fn sense(&self) -> Sense {
+        Sense::Echosounder
+    }
+
+    fn emulator(&self, setup: &EmulatorSetup) -> Emulated {
+        Emulated::Echosounder(Box::new(PingEmulator::new(self.settings, self.sensor.latency, setup)))
     }
 }
 

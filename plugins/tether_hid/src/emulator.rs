@@ -1,7 +1,8 @@
 //! The counter's side of the line: a report, or a text line, at a fixed rate.
 
 use headrace_core::app::components::Tether;
-use headrace_core::app::device::{Direction, Emulator, Truth};
+use headrace_core::app::device::{Direction, Emulator, LineSink};
+use headrace_core::app::measurement::Payout;
 use headrace_core::math;
 use headrace_core::time::{DurNs, MonoNs};
 
@@ -33,7 +34,8 @@ pub struct HidEmulator {
     reeling: Reeling,
     counter: Counter,
     start: MonoNs,
-    sent: u64,
+    begun: u64,
+    told: u64,
     told_counts: i64,
 }
 
@@ -43,24 +45,34 @@ pub struct LineEmulator {
     reeling: Reeling,
     metres_per_unit: f64,
     start: MonoNs,
-    sent: u64,
+    begun: u64,
+    before: Option<(MonoNs, f64)>,
 }
 
 impl Reeling {
-    fn due(&self, start: MonoNs, sent: u64) -> MonoNs {
-        start + DurNs::from_secs_f64(sent as f64 / self.rate_hz)
+    /// From the start to a report on the counter's own clock.
+    fn elapsed(&self, report: u64) -> DurNs {
+        DurNs::from_secs_f64(report as f64 / self.rate_hz)
+    }
+
+    /// Adds the reports before `until`, from `begun` on.
+    fn begin(&self, start: MonoNs, begun: &mut u64, until: MonoNs, due: &mut Vec<Payout>) {
+        while start + self.elapsed(*begun) < until {
+            due.push(Payout::due(start + self.elapsed(*begun)));
+            *begun += 1;
+        }
     }
 
     /// Cable paid out, m.
-    fn length_m(&self, truth: &dyn Truth, at: MonoNs) -> f64 {
-        (truth.pose(at).position.x() - self.tether.zero_at_m) / self.tether.scale
+    fn length_m(&self, payout: &Payout) -> f64 {
+        (payout.chainage_m - self.tether.zero_at_m) / self.tether.scale
     }
 }
 
 impl HidEmulator {
     /// A counter that is switched on, and first reports, at `start`.
     pub fn new(reeling: Reeling, counter: Counter, start: MonoNs) -> Self {
-        Self { reeling, counter, start, sent: 0, told_counts: 0 }
+        Self { reeling, counter, start, begun: 0, told: 0, told_counts: 0 }
     }
 
     /// What the next report says of `counts`; a change too large for the report is told over several.
@@ -78,50 +90,50 @@ impl HidEmulator {
     }
 }
 
-impl Emulator for HidEmulator {
-    fn due(&self) -> MonoNs {
-        self.reeling.due(self.start, self.sent)
+impl Emulator<Payout> for HidEmulator {
+    fn begin(&mut self, until: MonoNs, due: &mut Vec<Payout>) {
+        self.reeling.begin(self.start, &mut self.begun, until, due);
     }
 
-    fn act(&mut self, truth: &dyn Truth, line: &mut dyn FnMut(Direction, MonoNs, &[u8])) {
-        let at = self.due();
-        let length_m = self.reeling.length_m(truth, at);
+    fn tell(&mut self, payout: &Payout, line: LineSink<'_>) {
+        let length_m = self.reeling.length_m(payout);
         let report = Report {
-            sequence: Some((self.sent & 0xFF) as u8),
+            sequence: Some((self.told & 0xFF) as u8),
             status: Some(STATUS_WELL),
             count: self.count(math::round_to_i64(length_m * self.counter.counts_per_metre)),
-            auxiliary: i32::try_from(at.since(self.start).0 / 1_000_000).ok(),
+            auxiliary: i32::try_from(self.reeling.elapsed(self.told).0 / 1_000_000).ok(),
         };
-        line(Direction::Received, at + self.reeling.latency, &self.counter.layout.encode(&report));
-        self.sent += 1;
+        self.told += 1;
+        let bytes = self.counter.layout.encode(&report);
+        line(Direction::Received, payout.at + self.reeling.latency, &bytes);
     }
 }
 
 impl LineEmulator {
     /// A monitor that is switched on, and first sends a line, at `start`.
     pub fn new(reeling: Reeling, metres_per_unit: f64, start: MonoNs) -> Self {
-        Self { reeling, metres_per_unit, start, sent: 0 }
+        Self { reeling, metres_per_unit, start, begun: 0, before: None }
     }
 }
 
-impl Emulator for LineEmulator {
-    fn due(&self) -> MonoNs {
-        self.reeling.due(self.start, self.sent)
+impl Emulator<Payout> for LineEmulator {
+    fn begin(&mut self, until: MonoNs, due: &mut Vec<Payout>) {
+        self.reeling.begin(self.start, &mut self.begun, until, due);
     }
 
-    fn act(&mut self, truth: &dyn Truth, line: &mut dyn FnMut(Direction, MonoNs, &[u8])) {
-        let at = self.due();
-        let before = at - DurNs::from_millis(100);
-        let units = |at| self.reeling.length_m(truth, at) / self.metres_per_unit;
-        let elapsed_s = at.since(before).as_secs_f64();
-        let speed = if elapsed_s > 0.0 { (units(at) - units(before)) / elapsed_s } else { 0.0 };
+    fn tell(&mut self, payout: &Payout, line: LineSink<'_>) {
+        let units = self.reeling.length_m(payout) / self.metres_per_unit;
+        let speed = self.before.map_or(0.0, |(at, before)| {
+            let elapsed_s = payout.at.since(at).as_secs_f64();
+            if elapsed_s > 0.0 { (units - before) / elapsed_s } else { 0.0 }
+        });
+        self.before = Some((payout.at, units));
         let reading = LineReading {
             stamp: None,
             tension: Decimal::ZERO,
             speed: Decimal::nearest(speed, LINE_PLACES),
-            payout: Decimal::nearest(units(at), LINE_PLACES),
+            payout: Decimal::nearest(units, LINE_PLACES),
         };
-        line(Direction::Received, at + self.reeling.latency, &reading.encode());
-        self.sent += 1;
+        line(Direction::Received, payout.at + self.reeling.latency, &reading.encode());
     }
 }

@@ -2,7 +2,7 @@
 
 use headrace_core::app::App;
 use headrace_core::app::components::Tether;
-use headrace_core::app::device::{Decoder, Device, DeviceKind, Emulator, EmulatorSetup};
+use headrace_core::app::device::{Decoder, Device, DeviceKind, Emulated, EmulatorSetup, Sense};
 use headrace_core::app::plugin::{Plugin, PluginError};
 use headrace_core::config::{ConfigError, Section, SensorConfig};
 
@@ -157,11 +157,17 @@ impl Plugin for CableCounter {
 }
 
 impl Device for CableCounter {
-    fn emulator(&self, setup: &EmulatorSetup) -> Box<dyn Emulator> {
+    fn sense(&self) -> Sense {
+        Sense::Tether
+    }
+
+    fn emulator(&self, setup: &EmulatorSetup) -> Emulated {
         match &self.wire {
-            Wire::Hid { counter, .. } => Box::new(HidEmulator::new(self.reeling, *counter, setup.start)),
+            Wire::Hid { counter, .. } => {
+                Emulated::Tether(Box::new(HidEmulator::new(self.reeling, *counter, setup.start)))
+            }
             Wire::Line { metres_per_unit } => {
-                Box::new(LineEmulator::new(self.reeling, *metres_per_unit, setup.start))
+                Emulated::Tether(Box::new(LineEmulator::new(self.reeling, *metres_per_unit, setup.start)))
             }
         }
     }

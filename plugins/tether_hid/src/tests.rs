@@ -1,10 +1,11 @@
 //! From a vehicle file's table to readings, by way of the emulated counter.
 
-use headrace_core::app::device::{Decoder, Device, DeviceKind as _, EmulatorSetup, Truth};
+use headrace_core::app::device::{Decoder, Device, DeviceKind as _, Emulated, EmulatorSetup};
+use headrace_core::app::measurement::Payout;
 use headrace_core::app::reading::{Decoded, Packet, Reading, TetherLength};
 use headrace_core::app::{App, Mission};
 use headrace_core::config::{Document, SensorConfig};
-use headrace_core::frames::{Mount, Point3, Pose, Rot, Tunnel, Vec3};
+use headrace_core::frames::{Mount, Rot, Vec3};
 use headrace_core::site::Site;
 use headrace_core::time::{DurNs, MonoNs};
 use headrace_core::tunnel::named;
@@ -14,24 +15,9 @@ use crate::decoder::{Counter, HidDecoder, LineDecoder};
 use crate::report::{Endian, ReportLayout, Width};
 use crate::tracker::Counting;
 
-/// A vehicle that goes in at 0.5 m/s from chainage 20 m.
-struct Straight {
-    site: Site,
-}
-
-impl Truth for Straight {
-    fn pose(&self, at: MonoNs) -> Pose {
-        let chainage_m = 20.0 + 0.5 * at.as_secs_f64();
-        Pose { position: Point3::new(chainage_m, 0.0, 1.0), attitude: Rot::identity() }
-    }
-
-    fn range_m(&self, _origin: Point3<Tunnel>, _direction: Vec3<Tunnel>) -> Option<f64> {
-        None
-    }
-
-    fn site(&self) -> &Site {
-        &self.site
-    }
+/// Chainage of a vehicle that goes in at 0.5 m/s from chainage 20 m.
+fn chainage_m(at: MonoNs) -> f64 {
+    20.0 + 0.5 * at.as_secs_f64()
 }
 
 fn app() -> App {
@@ -78,16 +64,25 @@ fn length(decoded: &Decoded) -> TetherLength {
 
 /// Runs the emulated device into `decoder` and compares each reading with the truth.
 fn round_trip(own: &str, decoder: &mut dyn Decoder, zero_at_m: f64, scale: f64, reports: usize) {
-    let truth = Straight { site: Site::default() };
-    let mut emulator = configured(own).unwrap().emulator(&EmulatorSetup { start: MonoNs(7), head: None });
-    let mut readings = Vec::new();
-    for _ in 0..reports {
-        emulator.act(&truth, &mut |_, received, bytes| readings.extend(decode(decoder, received, bytes)));
+    let setup = EmulatorSetup { start: MonoNs(7), head: None, site: Site::default() };
+    let Emulated::Tether(mut emulator) = configured(own).unwrap().emulator(&setup) else {
+        panic!("no cable counter")
+    };
+    let (mut readings, mut due) = (Vec::new(), Vec::new());
+    let mut until = setup.start;
+    while due.len() < reports {
+        until = until + DurNs::from_millis(10);
+        emulator.begin(until, &mut due);
+    }
+    due.truncate(reports);
+    for payout in due {
+        let reeled = Payout { chainage_m: chainage_m(payout.at), ..payout };
+        emulator.tell(&reeled, &mut |_, received, bytes| readings.extend(decode(decoder, received, bytes)));
     }
     assert_eq!(readings.len(), reports);
     assert_eq!(readings[0].valid_at, MonoNs(7));
     for decoded in &readings {
-        let expected_m = (truth.pose(decoded.valid_at).position.x() - zero_at_m) / scale;
+        let expected_m = (chainage_m(decoded.valid_at) - zero_at_m) / scale;
         let got = length(decoded);
         let error_m = got.length_m - expected_m;
         assert!(error_m.abs() <= got.resolution_m / 2.0 + 1e-9, "{error_m} m at {expected_m} m");

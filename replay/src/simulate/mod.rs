@@ -1,93 +1,127 @@
 //! The simulator: a scene becomes the bytes that its devices would send.
 //!
 //! Only what a scene names is simulated. Without effects a device is ideal but for the quanta of its own wire format.
+//! A simulation is an ECS world: an entity for each sensor, base systems that ask, aim, look, feel and tell, and between
+//! them the systems of the effects that the scene names. Its schedule runs once for each slice of the dive.
 
+mod builder;
+mod clock;
+pub mod effects;
+mod motion;
+mod notes;
+mod outbox;
+mod random;
 mod scene;
-mod trajectory;
+mod sensing;
+mod stages;
+pub mod surroundings;
+mod truth;
+pub mod way;
 
-use std::collections::BTreeMap;
+use bevy_ecs::entity::Entity;
+use bevy_ecs::prelude::World;
+use bevy_ecs::schedule::Schedule;
+use headrace_core::app::device::{Emulated, EmulatorSetup, Sense};
+use headrace_core::app::measurement::{Inertia, Measurement, Payout, Pressure, Sounding};
+use headrace_core::frames::Pose;
+use headrace_core::time::{DurNs, MonoNs};
 
-use headrace_core::app::device::{Direction, Emulator, EmulatorSetup, Truth};
-use headrace_core::frames::{Point3, Pose, Tunnel, Vec3};
-use headrace_core::site::Site;
-use headrace_core::time::MonoNs;
-use headrace_core::tunnel::Profile;
+use builder::{Builder, Programs};
+use notes::{Before, LineBefore, Notes};
+use sensing::{Device, Echosounder, Head, Line, Mounted, Rays, Reach, Samples, Slice, Source};
+use stages::{AIM_HELD, Held};
 
-pub use scene::{Scene, SceneError};
-pub use trajectory::{Leg, Trajectory};
+pub use builder::Added;
+pub use outbox::Message;
+pub use scene::{Facts, FileLoader, Scene, SceneError, SensorFacts};
+pub use sensing::Scenery;
+pub use stages::Stage;
+pub use truth::{Cause, SoundingTruth, TruthRow};
+pub use way::{Leg, Way};
 
 /// Simulated dives begin at this moment of their clock.
 pub const START: MonoNs = MonoNs(1_000_000_000);
 
-/// A straight tunnel and the vehicle's way through it.
-struct World {
-    profile: Profile,
-    site: Site,
-    trajectory: Trajectory,
-}
-
-impl Truth for World {
-    fn pose(&self, at: MonoNs) -> Pose {
-        self.trajectory.pose(at.since(START).as_secs_f64())
-    }
-
-    fn range_m(&self, origin: Point3<Tunnel>, direction: Vec3<Tunnel>) -> Option<f64> {
-        self.profile.cast([origin.y(), origin.z()], [direction.y(), direction.z()]).map(|hit| hit.range_m)
-    }
-
-    fn site(&self) -> &Site {
-        &self.site
-    }
-}
-
-/// Bytes on the line of one source.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Message {
-    /// When they crossed the line.
-    pub at: MonoNs,
-    /// The source, in the order of the vehicle file.
-    pub source: u16,
-    /// Which way they went.
-    pub direction: Direction,
-    /// The bytes.
-    pub bytes: Vec<u8>,
-}
+/// Length of a slice: long enough that a schedule's cost is nothing beside its measurements.
+const SLICE: DurNs = DurNs(1_000_000_000);
+/// A sonar is asked for walls this much beyond its reach, for effects that bring them nearer.
+const REACH_SHARE: f64 = 1.25;
+/// Reach of an echosounder, m.
+const ECHOSOUNDER_REACH_M: f64 = 100.0;
 
 /// A dive that is being simulated: messages in the order of (time, source, sequence).
 pub struct Simulation {
     world: World,
-    emulators: Vec<Box<dyn Emulator>>,
+    schedule: Schedule,
+    entities: Vec<Entity>,
     end: MonoNs,
-    /// Messages that an emulator has sent ahead of the others' next ones.
-    waiting: BTreeMap<(MonoNs, u16, u64), (Direction, Vec<u8>)>,
-    sequence: u64,
+    slice: DurNs,
+    outbox: outbox::Outbox,
+    added: Vec<Added>,
+    base: Vec<(Stage, String)>,
+    truth: Option<Vec<TruthRow>>,
 }
 
 impl Simulation {
     /// Puts the scene's devices into its tunnel. Heads follow the scene's programs.
-    pub fn new(scene: &Scene) -> Self {
-        let vehicle = &scene.vehicle;
-        let mut programs = scene.programs.iter().copied();
-        let emulators = vehicle
-            .sensors
-            .iter()
-            .map(|sensor| {
-                let head = sensor.head().and_then(|_| programs.next());
-                sensor.emulator(&EmulatorSetup { start: START, head })
-            })
-            .collect();
-        let end = START + headrace_core::time::DurNs::from_secs_f64(scene.trajectory.duration_s());
-        Self {
-            world: World {
-                profile: vehicle.tunnel.profile.clone(),
-                site: vehicle.site,
-                trajectory: scene.trajectory.clone(),
-            },
-            emulators,
-            end,
-            waiting: BTreeMap::new(),
-            sequence: 0,
+    ///
+    /// Errors: effects that contradict each other or the scene; a way through a wall.
+    pub fn new(scene: &Scene) -> Result<Self, SceneError> {
+        Self::assemble(scene, false, SLICE)
+    }
+
+    /// A simulation that keeps its truth for [`Simulation::take_truth`].
+    ///
+    /// Errors: as for [`Simulation::new`].
+    pub fn with_truth(scene: &Scene) -> Result<Self, SceneError> {
+        Self::assemble(scene, true, SLICE)
+    }
+
+    /// A simulation that keeps its truth, in slices of another length.
+    #[cfg(test)]
+    fn with_slice(scene: &Scene, slice: DurNs) -> Result<Self, SceneError> {
+        Self::assemble(scene, true, slice)
+    }
+
+    /// The same in slices of another length, of which nothing may depend.
+    #[cfg(test)]
+    pub(crate) fn in_slices(self, slice: DurNs) -> Self {
+        Self { slice, ..self }
+    }
+
+    fn assemble(scene: &Scene, noting: bool, slice: DurNs) -> Result<Self, SceneError> {
+        let mut world = World::new();
+        world.insert_resource(Slice { from: START, until: START });
+        world.insert_resource(Scenery {
+            surroundings: scene.surroundings.clone(),
+            way: scene.way.clone(),
+            site: scene.vehicle.site,
+        });
+        let (facts, drawn) = programmed(scene);
+        let entities = spawn_sensors(&mut world, scene, &facts, noting);
+        if noting {
+            world.insert_resource(Notes::default());
         }
+        let mut sim = Builder::new(&mut world, &facts, scene.seed, &entities);
+        for (kind, effect) in &scene.effects.0 {
+            sim.effect(kind.name());
+            sim.has_drawn(drawn.iter().filter(|(name, _)| *name == kind.name()).map(|(_, id)| id.clone()));
+            effect.build(&mut sim)?;
+        }
+        sim.base();
+        add_base_systems(&mut sim);
+        let (schedule, added, base) = sim.schedule(noting);
+        let duration_s = match world.get_resource::<Scenery>() {
+            Some(scenery) => {
+                scenery.check()?;
+                scenery.way.duration_s()
+            }
+            None => 0.0,
+        };
+        let end = START + DurNs::from_secs_f64(duration_s);
+        let truth = noting.then(Vec::new);
+        let outbox = outbox::Outbox::default();
+        Ok(Self { world, schedule, entities, end, slice, outbox, added, base, truth })
     }
 
     /// When the dive ends.
@@ -95,34 +129,177 @@ impl Simulation {
         self.end
     }
 
-    /// The next message, or `None` at the end of the dive.
-    pub fn next_message(&mut self) -> Option<Message> {
-        loop {
-            let next = self
-                .emulators
-                .iter()
-                .map(|emulator| emulator.due())
-                .enumerate()
-                .min_by_key(|(_, due)| *due)
-                .filter(|(_, due)| *due <= self.end);
-            // What waits may go once nobody can send anything earlier.
-            if let Some(entry) = self.waiting.first_entry()
-                && next.is_none_or(|(_, due)| entry.key().0 < due)
-            {
-                let ((at, source, _), (direction, bytes)) = entry.remove_entry();
-                return Some(Message { at, source, direction, bytes });
-            }
-            let (index, _) = next?;
-            self.act(index);
-        }
+    /// How long it takes, s.
+    pub fn duration_s(&self) -> f64 {
+        self.end.since(START).as_secs_f64()
     }
 
-    fn act(&mut self, index: usize) {
-        let Self { world, emulators, waiting, sequence, .. } = self;
-        let (Some(emulator), Ok(source)) = (emulators.get_mut(index), u16::try_from(index)) else { return };
-        emulator.act(world, &mut |direction, at, bytes| {
-            *sequence += 1;
-            waiting.insert((at, source, *sequence), (direction, bytes.to_vec()));
-        });
+    /// Where the vehicle truly is.
+    pub fn pose(&self, at: MonoNs) -> Option<Pose> {
+        self.world.get_resource::<Scenery>().map(|scenery| scenery.pose(at))
+    }
+
+    /// What is round the vehicle, and its way.
+    pub fn scenery(&self) -> Option<&Scenery> {
+        self.world.get_resource::<Scenery>()
+    }
+
+    /// What each effect of the scene has added.
+    pub fn added(&self) -> &[Added] {
+        &self.added
+    }
+
+    /// The systems that this simulation would have without effects, less those that effects replace.
+    pub fn base_systems(&self) -> &[(Stage, String)] {
+        &self.base
+    }
+
+    /// The next message, or `None` at the end of the dive.
+    pub fn next_message(&mut self) -> Option<Message<'_>> {
+        self.come().then(|| self.outbox.next()).flatten()
+    }
+
+    /// The next message, which stays the next one.
+    pub fn peek_message(&mut self) -> Option<Message<'_>> {
+        self.come().then(|| self.outbox.peek()).flatten()
+    }
+
+    /// Simulates on until a message can be given; false at the end of the dive.
+    fn come(&mut self) -> bool {
+        while !self.outbox.has_next() {
+            if !self.next_slice() {
+                return false;
+            }
+        }
+        true
+    }
+
+    /// The truth of all measurements since the last call; none without [`Simulation::with_truth`].
+    pub fn take_truth(&mut self) -> Vec<TruthRow> {
+        self.truth.as_mut().map(std::mem::take).unwrap_or_default()
+    }
+
+    /// Simulates on for a second of the dive and forgets the messages, for those who want the truth alone; false at the end.
+    pub fn advance(&mut self) -> bool {
+        let more = self.next_slice();
+        self.outbox.skip();
+        more
+    }
+
+    /// Simulates the next slice; false when there is none.
+    fn next_slice(&mut self) -> bool {
+        let Some(mut slice) = self.world.get_resource_mut::<Slice>() else { return false };
+        // A measurement at the very end is still made.
+        let last = self.end + DurNs(1);
+        if slice.until >= last {
+            return self.outbox.finish();
+        }
+        slice.from = slice.until;
+        slice.until = (slice.until + self.slice).min(last);
+        let until = slice.until;
+        self.schedule.run(&mut self.world);
+        for (source, entity) in self.entities.iter().enumerate() {
+            if let (Ok(source), Some(mut line)) = (u16::try_from(source), self.world.get_mut::<Line>(*entity))
+            {
+                self.outbox.take(source, &line);
+                line.clear();
+            }
+        }
+        if let Some(rows) = &mut self.truth {
+            truth::collect(&mut self.world, &self.entities, rows);
+        }
+        self.outbox.release(until);
+        true
     }
 }
+
+/// The scene's facts with what effects make of the heads' programs, and what they have drawn for it.
+fn programmed(scene: &Scene) -> (Facts, Vec<(&'static str, String)>) {
+    let (mut facts, mut drawn) = (scene.facts.clone(), Vec::new());
+    for (kind, effect) in &scene.effects.0 {
+        let (effect_name, seed) = (kind.name(), scene.seed);
+        effect.begin(&mut Programs { facts: &mut facts, seed, effect: effect_name, drawn: &mut drawn });
+    }
+    (facts, drawn)
+}
+
+fn spawn_sensors(world: &mut World, scene: &Scene, facts: &Facts, noting: bool) -> Vec<Entity> {
+    let sensors = scene.vehicle.sensors.iter().zip(&scene.vehicle.sensor_configs).zip(&facts.sensors);
+    let site = scene.vehicle.site;
+    let mut entities = Vec::new();
+    for (number, ((sensor, config), facts)) in (0..).zip(sensors) {
+        let setup = EmulatorSetup { start: START, head: facts.program, site };
+        let entity = world.spawn((Source(number), Mounted(config.mount), Line::default())).id();
+        if noting {
+            world.entity_mut(entity).insert(LineBefore::default());
+        }
+        match sensor.emulator(&setup) {
+            Emulated::Head(device) => {
+                spawn_device(world, entity, Device(device), noting);
+                let mut head = world.entity_mut(entity);
+                head.insert((Rays::default(), Held::default()));
+                if let Some(spec) = facts.head {
+                    let [_, reach_m] = spec.reach_m(site.sound_speed_mps);
+                    head.insert((Head(spec), Reach(reach_m * REACH_SHARE)));
+                }
+            }
+            Emulated::Echosounder(device) => {
+                spawn_device(world, entity, Device(device), noting);
+                let parts = (Echosounder, Rays::default(), Reach(ECHOSOUNDER_REACH_M));
+                world.entity_mut(entity).insert(parts);
+            }
+            Emulated::Depth(device) => spawn_device(world, entity, Device(device), noting),
+            Emulated::Inertial(device) => spawn_device(world, entity, Device(device), noting),
+            Emulated::Tether(device) => spawn_device(world, entity, Device(device), noting),
+        }
+        entities.push(entity);
+    }
+    entities
+}
+
+fn spawn_device<M: Measurement>(world: &mut World, entity: Entity, device: Device<M>, noting: bool) {
+    world.entity_mut(entity).insert((device, Samples::<M>::default()));
+    if noting {
+        world.entity_mut(entity).insert(Before::<M>::default());
+    }
+}
+
+/// Systems for the senses that the vehicle has, but for those whose work an effect does.
+fn add_base_systems(sim: &mut Builder<'_>) {
+    let has = |sense: Sense| sim.facts().sensors.iter().any(|sensor| sensor.sense == sense);
+    let [head, echosounder, depth, inertial, tether] =
+        [Sense::Head, Sense::Echosounder, Sense::Depth, Sense::Inertial, Sense::Tether].map(has);
+    if head && !sim.replaced(AIM_HELD) {
+        sim.system(Stage::Aim, stages::aim_held);
+    }
+    if echosounder {
+        sim.system(Stage::Aim, stages::aim_echosounders);
+    }
+    if head || echosounder {
+        sim.system(Stage::Begin, stages::begin::<Sounding>);
+        sim.system(Stage::Look, stages::look);
+        sim.system(Stage::Tell, stages::tell::<Sounding>);
+    }
+    if depth {
+        sim.system(Stage::Begin, stages::begin::<Pressure>);
+        sim.system(Stage::Feel, stages::feel_pressure);
+        sim.system(Stage::Tell, stages::tell::<Pressure>);
+    }
+    if inertial {
+        sim.system(Stage::Begin, stages::begin::<Inertia>);
+        sim.system(Stage::Feel, stages::feel_motion);
+        sim.system(Stage::Tell, stages::tell::<Inertia>);
+    }
+    if tether {
+        sim.system(Stage::Begin, stages::begin::<Payout>);
+        sim.system(Stage::Feel, stages::feel_cable);
+        sim.system(Stage::Tell, stages::tell::<Payout>);
+    }
+}
+
+#[cfg(test)]
+mod testing;
+#[cfg(test)]
+mod testing_motion;
+#[cfg(test)]
+mod tests;

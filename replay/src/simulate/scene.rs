@@ -1,12 +1,18 @@
-//! `SCENE.toml`: a vehicle file, a trajectory, and the effects to simulate.
+//! `SCENE.toml`: a vehicle file, a tunnel as it truly is, a trajectory, and the effects to simulate.
 
-use headrace_core::app::device::DeviceKind;
+use headrace_core::app::device::{DeviceKind, Sense};
 use headrace_core::config::vehicle::Loader;
-use headrace_core::config::{ConfigError, Document, Section, VehicleConfig};
-use headrace_core::sampling::head::HeadProgram;
+use headrace_core::config::{self, ConfigError, Document, VehicleConfig};
+use headrace_core::sampling::head::{HeadProgram, HeadSpec};
 use headrace_core::sampling::layout;
+use headrace_core::sampling::occlusion::Obstacle;
 
-use super::trajectory::{Leg, Trajectory};
+use super::effects::{self, Named};
+use super::surroundings::Surroundings;
+use super::way::{self, Ground, Way};
+
+/// Gives the content of a file that a scene names.
+pub type FileLoader<'a> = &'a dyn Fn(&str) -> Result<Vec<u8>, String>;
 
 /// A scene, checked.
 pub struct Scene {
@@ -18,36 +24,102 @@ pub struct Scene {
     pub vehicle: VehicleConfig,
     /// What its heads do, in the order of the vehicle file.
     pub programs: Vec<HeadProgram>,
-    /// Its way.
-    pub trajectory: Trajectory,
+    /// Where the random numbers begin.
+    pub seed: u64,
+    pub(super) surroundings: Surroundings,
+    pub(super) way: Way,
+    pub(super) facts: Facts,
+    pub(super) effects: Named,
+}
+
+/// What effects are checked against.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Facts {
+    /// The sensors, in the order of the vehicle file.
+    pub sensors: Vec<SensorFacts>,
+    /// Parts of the vehicle that may stand in a head's way.
+    pub hull: Vec<Obstacle>,
+    /// Whether a current would carry the vehicle.
+    pub ground: Ground,
+    /// Length of the tunnel, m.
+    pub length_m: f64,
+    /// The speed of sound that the vehicle file gives, m/s.
+    pub sound_speed_mps: f64,
+    /// Time from the start to the end of the way as the trajectory has it, s.
+    pub duration_s: f64,
+}
+
+/// A sensor of the vehicle.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SensorFacts {
+    /// Its id.
+    pub id: String,
+    /// What it senses.
+    pub sense: Sense,
+    /// A head's particulars.
+    pub head: Option<HeadSpec>,
+    /// What a head does.
+    pub program: Option<HeadProgram>,
 }
 
 /// What is wrong with a scene.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SceneError {
     /// A key of the scene or of its vehicle file.
     #[error(transparent)]
     Config(#[from] ConfigError),
+    /// The vehicle's way leads through something.
+    #[error(
+        "simulating the way: after {after_s:.1} s, at chainage {chainage_m:.2} m, y {y_m:.2} m, z {z_m:.2} m, it leads \
+         through {what}"
+    )]
+    Blocked {
+        /// Seconds after the start.
+        after_s: f64,
+        /// Where: chainage, left, up, m.
+        chainage_m: f64,
+        /// Left of the axis.
+        y_m: f64,
+        /// Above the floor.
+        z_m: f64,
+        /// What is there.
+        what: String,
+    },
+    /// An effect that contradicts the rest.
+    #[error("simulating {effect}: it {problem}")]
+    Effect {
+        /// Its name.
+        effect: &'static str,
+        /// What is wrong.
+        problem: String,
+    },
 }
 
-/// A dive may begin and end as much as 20 m outside the tunnel.
-const CHAINAGE_M: std::ops::RangeInclusive<f64> = -20.0..=1.0e6;
-
 impl Scene {
-    /// Parses and checks a scene. `load` gives the text of a file that the scene or its vehicle file names.
+    /// Parses and checks a scene. `load` gives the content of a file that the scene or its vehicle file names; `seed`
+    /// outweighs the scene's own.
     ///
-    /// Errors: the first key that is missing, unknown or out of range; a trajectory that leaves the tunnel.
+    /// Errors: the first key that is missing, unknown or out of range; a trajectory that leaves the tunnel; an effect
+    /// without anything to act on.
     pub fn parse(
         document: Document<'_>,
         kinds: &[&dyn DeviceKind],
-        load: Loader<'_>,
+        load: FileLoader<'_>,
+        seed: Option<u64>,
     ) -> Result<Self, SceneError> {
+        let text = |name: &str| String::from_utf8(load(name)?).map_err(|_| "is no text".to_owned());
+        let text: Loader<'_> = &text;
         let root = document.root()?;
         let name = root.text("name")?.unwrap_or_else(|| "unnamed scene".to_owned());
+        let own_seed = root.integer("seed", 0..=i64::MAX)?.and_then(|seed| u64::try_from(seed).ok());
+        let seed = seed.or(own_seed).unwrap_or(1);
         let file = root.required("vehicle", root.text("vehicle")?)?;
-        let vehicle_text = load(&file).map_err(|why| root.invalid("vehicle", &why))?;
-        let vehicle = VehicleConfig::parse(Document::new(&file, &vehicle_text), kinds, load)?;
+        let mut vehicle_text = text(&file).map_err(|why| root.invalid("vehicle", &why))?;
+        if let Some(changes) = root.section("vehicle_changes")? {
+            vehicle_text = config::changed(&vehicle_text, &changes)?;
+        }
+        let vehicle = VehicleConfig::parse(Document::new(&file, &vehicle_text), kinds, text)?;
         let heads = vehicle.heads();
         let programs = if heads.is_empty() {
             Vec::new()
@@ -56,52 +128,40 @@ impl Scene {
                 root.invalid("vehicle", &format!("describes heads that no program fits: {why}"))
             })?
         };
+        let tunnel = &vehicle.tunnel;
+        let surroundings =
+            Surroundings::parse(root.section("tunnel")?, &tunnel.profile, tunnel.length_m, text, load)?;
         let section = root.required("trajectory", root.section("trajectory")?)?;
-        let trajectory = parse_trajectory(section, &vehicle)?;
-        if let Some(effects) = root.section("effects")?
-            && let Some(effect) = effects.keys().first()
-        {
-            let problem = "is no effect that can be simulated; this version has none";
-            return Err(effects.invalid(effect, problem).into());
-        }
+        let (way, ground) = way::parse(section, (&tunnel.profile, tunnel.length_m), seed, text)?;
+        let facts = Facts::new(&vehicle, &programs, ground, way.duration_s());
+        let effects = effects::parse(root.section("effects")?, &facts)?;
         root.finish()?;
-        Ok(Self { name, vehicle_text, vehicle, programs, trajectory })
+        Ok(Self { name, vehicle_text, vehicle, programs, seed, surroundings, way, facts, effects })
     }
 }
 
-fn parse_trajectory(section: Section<'_>, vehicle: &VehicleConfig) -> Result<Trajectory, ConfigError> {
-    let start_m = section.number("start_m", CHAINAGE_M)?.unwrap_or(0.0);
-    let reference = vehicle.tunnel.profile.reference();
-    let place_m = match section.numbers("place_m", -200.0..=200.0)?.as_deref() {
-        None => reference,
-        Some([y, z]) => [*y, *z],
-        Some(_) => return Err(section.invalid("place_m", "must be two numbers [y, z]")),
-    };
-    if !vehicle.tunnel.profile.contains(place_m) {
-        return Err(section.invalid("place_m", "must be inside the tunnel's profile"));
+impl Scene {
+    /// What its effects are checked against.
+    pub fn facts(&self) -> &Facts {
+        &self.facts
     }
-    let mut legs = Vec::new();
-    let mut chainage_m = start_m;
-    for leg in section.sections("legs")? {
-        let distance_m = leg.required("distance_m", leg.number("distance_m", 0.01..=1.0e6)?)?;
-        let speed_mps = leg.required("speed_mps", leg.number("speed_mps", -5.0..=5.0)?)?;
-        if speed_mps.abs() < 1e-3 {
-            return Err(leg.invalid("speed_mps", "must be at least 0.001 either way, or the leg has no end"));
+}
+
+impl Facts {
+    fn new(vehicle: &VehicleConfig, programs: &[HeadProgram], ground: Ground, duration_s: f64) -> Self {
+        let mut programs = programs.iter().copied();
+        let sensors = vehicle.sensors.iter().zip(&vehicle.sensor_configs).map(|(sensor, config)| {
+            let head = sensor.head();
+            let program = head.and_then(|_| programs.next());
+            SensorFacts { id: config.id.clone(), sense: sensor.sense(), head, program }
+        });
+        Self {
+            sensors: sensors.collect(),
+            hull: vehicle.hull.clone(),
+            ground,
+            length_m: vehicle.tunnel.length_m,
+            sound_speed_mps: vehicle.site.sound_speed_mps,
+            duration_s,
         }
-        chainage_m += distance_m * speed_mps.signum();
-        if !(CHAINAGE_M.start()..=&(vehicle.tunnel.length_m - CHAINAGE_M.start())).contains(&&chainage_m) {
-            let problem =
-                format!("ends at chainage {chainage_m} m; the tunnel is {} m long", vehicle.tunnel.length_m);
-            return Err(leg.invalid("distance_m", &problem));
-        }
-        leg.finish()?;
-        legs.push(Leg { distance_m, speed_mps });
     }
-    if legs.is_empty() {
-        return Err(
-            section.invalid("legs", "has no leg; at least one table headed [[trajectory.legs]] is needed")
-        );
-    }
-    section.finish()?;
-    Ok(Trajectory { start_m, place_m, legs })
 }

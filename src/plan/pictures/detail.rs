@@ -1,11 +1,11 @@
 //! A piece of the pattern to scale, about the emptiest place.
 
-use super::canvas::{Canvas, NORMAL, Px, SMALL, Side};
-use super::chart::{Axis, Chart, short};
 use super::laid::Laid;
-use super::look::{self, Look};
 use super::pattern::CIRCLE;
-use super::polyline::Frame;
+use crate::pictures::canvas::{Canvas, NORMAL, Px, SMALL, Side};
+use crate::pictures::chart::{Axis, Chart, short};
+use crate::pictures::look::{self, Look};
+use crate::pictures::polyline::Frame;
 
 const FRAME: Frame = Frame { left: 676.0, top: 92.0, right: 886.0, bottom: 302.0 };
 /// Where the words below it begin, pixels.

@@ -1,12 +1,12 @@
 //! Hours against T.
 
-use super::canvas::{self, BOLD, Colour, Drawn, NORMAL, Side, width_px};
-use super::chart::{Axis, Chart, short};
-use super::labels::{self, Label};
-use super::look::{self, Look};
 use super::modes::{self, Mode};
-use super::polyline::Frame;
 use super::{PictureError, Shown};
+use crate::pictures::canvas::{self, BOLD, Colour, Drawn, NORMAL, Side, width_px};
+use crate::pictures::chart::{Axis, Chart, short};
+use crate::pictures::labels::{self, Label};
+use crate::pictures::look::{self, Look};
+use crate::pictures::polyline::Frame;
 
 const FRAME: Frame = Frame { left: 66.0, top: 92.0, right: 752.0, bottom: 482.0 };
 /// By how much a speed exceeds the one before it on a curve.

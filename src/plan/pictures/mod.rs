@@ -1,35 +1,21 @@
 //! The four pictures of a plan, as SVG text: spacing around the wall, the pattern on it, and what speed gives.
-//!
-//! Drawn for white paper: every line has a dash pattern and a label of its own besides its colour.
 
-mod canvas;
-mod chart;
 mod detail;
 mod hours;
-mod labels;
 mod laid;
-mod look;
 mod modes;
 mod pattern;
 mod perimeter;
-mod polyline;
 mod speeds;
 mod wall;
 
-use headrace_core::sampling::SamplingError;
 use headrace_core::sampling::plan::{Planner, Question};
 
+pub(crate) use crate::pictures::PictureError;
 pub(crate) use hours::hours;
 pub(crate) use pattern::pattern;
 pub(crate) use perimeter::perimeter;
 pub(crate) use speeds::speeds;
-
-/// Why there is no picture.
-#[derive(Debug, thiserror::Error)]
-pub(crate) enum PictureError {
-    #[error("computing a picture: {0}")]
-    Sampling(#[from] SamplingError),
-}
 
 /// What is shown.
 pub(crate) struct Shown<'a> {

@@ -2,8 +2,8 @@
 
 use headrace_core::sampling::plan::Planner;
 
-use super::look::{self, Look};
 use super::{PictureError, Shown};
+use crate::pictures::look::{self, Look};
 
 /// A mode as the pictures show it.
 #[derive(Debug, Clone)]

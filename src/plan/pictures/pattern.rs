@@ -1,14 +1,15 @@
 //! The pattern on the unrolled wall.
 
-use super::canvas::{self, BOLD, Canvas, Colour, Letters, NORMAL, Px, SMALL, Side};
-use super::chart::{Axis, Chart};
 use super::detail;
 use super::laid::{self, Laid};
-use super::look::{self, Look};
 use super::modes;
-use super::polyline::Frame;
 use super::wall;
 use super::{PictureError, Shown};
+use crate::pictures::canvas::{self, BOLD, Canvas, Colour, Letters, NORMAL, Px, SMALL, Side};
+use crate::pictures::chart::{Axis, Chart};
+use crate::pictures::clock;
+use crate::pictures::look::{self, Look};
+use crate::pictures::polyline::Frame;
 
 const FRAME: Frame = Frame { left: 66.0, top: 92.0, right: 548.0, bottom: 482.0 };
 /// The inside of the circle.
@@ -36,7 +37,7 @@ pub(crate) fn pattern(shown: &Shown<'_>) -> Result<String, PictureError> {
         }
         let ways = passes(&chart, &laid, from_m);
         numbers(&chart, laid.heads, &ways);
-        clocks(&chart, shown);
+        clock::at_right(&chart, &shown.planner.inspection().profile);
         legend(canvas, &laid);
         match (centre, laid.t_m) {
             (Some(centre), Some(t_m)) => detail::draw(canvas, &laid, centre, from_m, t_m),
@@ -105,16 +106,6 @@ fn way(head: usize) -> Look {
 fn number(chart: &Chart<'_>, head: usize, place: Px) {
     let letters = Letters { colour: way(head).colour, ..BOLD };
     chart.canvas.text_on_white(place, &head.to_string(), Side::Middle, letters);
-}
-
-/// Hours of a clock, to the right.
-fn clocks(chart: &Chart<'_>, shown: &Shown<'_>) {
-    for hour in wall::hours(&shown.planner.inspection().profile) {
-        let y = chart.px([0.0, hour.sigma_m])[1];
-        let x = chart.frame.right;
-        chart.canvas.line(&[[x, y], [x + 4.0, y]], &look::AXIS);
-        chart.canvas.text([x + 7.0, y], &hour.words(), Side::Right, NORMAL);
-    }
 }
 
 /// Heads with their lines and markers, two to a row.

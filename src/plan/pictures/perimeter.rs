@@ -1,13 +1,14 @@
 //! Spacing around the wall.
 
-use super::canvas::{self, Canvas, Colour, NORMAL, PALE, SMALL, Side, width_px};
-use super::chart::{Axis, Chart, short};
-use super::labels::{self, Label};
-use super::look::{self, Look};
 use super::modes;
-use super::polyline::Frame;
-use super::wall::{self, Hour, Thin};
+use super::wall::{self, Thin};
 use super::{PictureError, Shown};
+use crate::pictures::canvas::{self, Canvas, Colour, NORMAL, PALE, SMALL, Side, width_px};
+use crate::pictures::chart::{Axis, Chart, short};
+use crate::pictures::clock::{self, Hour};
+use crate::pictures::labels::{self, Label};
+use crate::pictures::look::{self, Look};
+use crate::pictures::polyline::Frame;
 use headrace_core::sampling::plan::WallPlace;
 
 const FRAME: Frame = Frame { left: 66.0, top: 72.0, right: 724.0, bottom: 444.0 };
@@ -44,7 +45,7 @@ pub(crate) fn perimeter(shown: &Shown<'_>) -> Result<String, PictureError> {
         for stretch in &stretches {
             shade(&chart, stretch);
         }
-        clocks(&chart, &wall::hours(&shown.planner.inspection().profile));
+        clocks(&chart, &clock::hours(&shown.planner.inspection().profile));
         if let Some(target_m) = shown.question.target_m {
             chart.across(target_m, &look::TARGET);
         }

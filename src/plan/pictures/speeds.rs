@@ -1,12 +1,12 @@
 //! T against speed.
 
-use super::canvas::{self, BOLD, Canvas, NORMAL, Side};
-use super::chart::{Axis, Chart};
-use super::labels::{self, Label};
-use super::look;
 use super::modes::{self, Mode};
-use super::polyline::Frame;
 use super::{PictureError, Shown};
+use crate::pictures::canvas::{self, BOLD, Canvas, NORMAL, Side};
+use crate::pictures::chart::{Axis, Chart};
+use crate::pictures::labels::{self, Label};
+use crate::pictures::look;
+use crate::pictures::polyline::Frame;
 
 const FRAME: Frame = Frame { left: 66.0, top: 92.0, right: 708.0, bottom: 482.0 };
 /// Speeds at which T is computed.

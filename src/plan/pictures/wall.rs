@@ -1,53 +1,8 @@
-//! Places of the wall as people call them, and the strips that not all heads see.
+//! Where spacing is at its worst, and the strips that not all heads see.
 
 use headrace_core::math;
 use headrace_core::sampling::plan::{Planner, WallPlace};
 use headrace_core::sampling::strips::Strips;
-use headrace_core::tunnel::Profile;
-
-/// A place of the perimeter with the hour it has on a clock.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Hour {
-    pub(super) sigma_m: f64,
-    /// The hour alone.
-    pub(super) clock: String,
-    /// What is there; empty between floor, walls and crown.
-    pub(super) place: &'static str,
-}
-
-impl Hour {
-    /// The hour, and what is there.
-    pub(super) fn words(&self) -> String {
-        format!("{} {}", self.clock, self.place).trim_end().to_owned()
-    }
-}
-
-/// Every hour and a half from floor to floor, seen looking along the tunnel from the profile's reference point.
-pub(super) fn hours(profile: &Profile) -> Vec<Hour> {
-    const NAMES: [(&str, &str); 9] = [
-        ("6:00", "floor"),
-        ("7:30", ""),
-        ("9:00", "left"),
-        ("10:30", ""),
-        ("12:00", "crown"),
-        ("1:30", ""),
-        ("3:00", "right"),
-        ("4:30", ""),
-        ("6:00", "floor"),
-    ];
-    let [y_m, z_m] = profile.reference();
-    let hour = |(k, (clock, place)): (u32, (&str, &'static str))| {
-        let (sine, cosine) = math::sin_cos(math::TAU * f64::from(k) / 8.0);
-        let sigma_m = match k {
-            // The seam itself may come out on either side of it.
-            0 => 0.0,
-            8 => profile.perimeter_m(),
-            _ => profile.sigma_of([y_m + sine, z_m - cosine]),
-        };
-        Hour { sigma_m, clock: clock.to_owned(), place }
-    };
-    (0..).zip(NAMES).map(hour).collect()
-}
 
 /// The place where T is largest; of those as good as equal the one nearest to the left wall.
 pub(super) fn worst(planner: &Planner, places: &[WallPlace]) -> Option<WallPlace> {
@@ -108,21 +63,4 @@ pub(super) fn unseen_m(planner: &Planner) -> Option<f64> {
     let unseen = strips.filter(|strip| strip.seen_by.is_empty()).map(|strip| strip.arc);
     let widest = unseen.max_by(|a, b| a.length_m.total_cmp(&b.length_m))?;
     Some(math::wrap(widest.from_m + widest.length_m / 2.0, profile.perimeter_m()))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use headrace_core::tunnel::named;
-
-    #[test]
-    fn hours_are_where_the_profile_says() {
-        for profile in
-            [named::ceran().unwrap(), named::rectangle(3.0, 4.0).unwrap(), named::circle(0.5).unwrap()]
-        {
-            let hours = hours(&profile);
-            assert!(hours.windows(2).all(|pair| pair[0].sigma_m < pair[1].sigma_m), "{hours:?}");
-            assert!(hours.iter().all(|hour| profile.clock(hour.sigma_m) == hour.clock), "{hours:?}");
-        }
-    }
 }

@@ -1,6 +1,5 @@
 use headrace_core::app::device::Decoder as _;
 use headrace_core::app::reading::{Packet, Reading, SonarReturn};
-use headrace_core::frames::{Body, Point3, Pose, Rot, Tunnel, Vec3};
 use headrace_core::math::{PI, TAU};
 use headrace_core::site::Site;
 
@@ -8,39 +7,8 @@ use super::*;
 use crate::plugin::HeadDecoder;
 use crate::settings::tests::settings;
 
+/// The wall is as far as this all round.
 const RADIUS_M: f64 = 4.0;
-
-/// A tube of 4 m radius; the vehicle glides along its axis, 1 m left of it.
-struct Tube {
-    site: Site,
-}
-
-impl Truth for Tube {
-    fn pose(&self, at: MonoNs) -> Pose {
-        Pose {
-            position: Point3::new(0.2 * at.as_secs_f64(), 1.0, RADIUS_M),
-            attitude: Rot::<Tunnel, Body>::identity(),
-        }
-    }
-
-    fn range_m(&self, origin: Point3<Tunnel>, direction: Vec3<Tunnel>) -> Option<f64> {
-        let (y, z) = (origin.y(), origin.z() - RADIUS_M);
-        let along = y * direction.y() + z * direction.z();
-        Some(math::sqrt(along * along + RADIUS_M * RADIUS_M - y * y - z * z) - along)
-    }
-
-    fn site(&self) -> &Site {
-        &self.site
-    }
-}
-
-fn tube() -> Tube {
-    Tube { site: Site::default() }
-}
-
-fn mount() -> Mount {
-    Mount { position: Vec3::new(0.5, -1.0, 0.0), rotation: Rot::identity() }
-}
 
 /// What a rehearsal gives: sent and received times in ns, and the readings.
 struct Run {
@@ -51,14 +19,19 @@ struct Run {
 
 fn run(text: &str, latency: DurNs, program: HeadProgram, pings: usize) -> Run {
     let settings = settings(text).unwrap();
-    let setup = EmulatorSetup { start: MonoNs(7_000_000_000), head: Some(program) };
-    let mut emulator = HeadEmulator::new(settings.clone(), mount(), latency, &setup);
+    let start = MonoNs(7_000_000_000);
+    let setup = EmulatorSetup { start, head: Some(program), site: Site::default() };
+    let mut emulator = HeadEmulator::new(settings.clone(), latency, &setup);
     let mut decoder = HeadDecoder::new(settings.clone(), latency);
     let mut run = Run { sent: Vec::new(), received: Vec::new(), readings: Vec::new() };
-    while run.received.len() < pings {
-        let due = emulator.due();
-        emulator.act(&tube(), &mut |direction, at, bytes| {
-            assert_eq!(at, due);
+    let mut due = Vec::new();
+    let last = start + DurNs(settings.ping_period.0 * (pings as i64 - 1));
+    // Asking in two goes gives each ping once.
+    emulator.begin(start + DurNs(settings.ping_period.0 / 2), &mut due);
+    emulator.begin(last + DurNs(1), &mut due);
+    for sounding in due {
+        let heard = Sounding { range_m: Some(RADIUS_M), ..sounding };
+        emulator.tell(&heard, &mut |direction, at, bytes| {
             if direction == Direction::Sent {
                 run.sent.push(at.0);
                 return;
@@ -70,6 +43,7 @@ fn run(text: &str, latency: DurNs, program: HeadProgram, pings: usize) -> Run {
             });
         });
     }
+    assert_eq!(run.received.len(), pings);
     assert_eq!(decoder.counts().bad_frames, 0);
     run
 }
@@ -99,7 +73,6 @@ fn readings_are_the_tube_in_the_devices_metres() {
         let text = format!("mode = \"slow\"\nreturns = \"{returns}\"");
         let run = run(&text, DurNs::ZERO, turning(1.0, true), 1200);
         for (_, sonar) in &run.readings {
-            // The mount puts the head on the axis.
             let expected = RADIUS_M * 1500.0 / 1447.0;
             assert!((sonar.range_m.unwrap() - expected).abs() <= 0.005, "{sonar:?}");
         }
@@ -179,7 +152,7 @@ fn the_head_keeps_a_sector_that_it_is_commanded() {
     // 90 degrees about 180: positions 1050 to 150 through the seam.
     let command = Command { sector_deg: 90.0, train_deg: 180.0, ..settings.command };
     let mut head = Head::new(1046, true);
-    let positions: Vec<u16> = (0..79).map(|_| head.answer(&command, |_| None).header.position).collect();
+    let positions: Vec<u16> = (0..79).map(|_| head.obey(&command).position).collect();
     assert_eq!(positions[..3], [1046, 1054, 1062]);
     assert_eq!(positions[20], 6);
     assert_eq!(positions[38..41], [150, 142, 134]);
@@ -191,9 +164,27 @@ fn the_head_reverses_once_when_told() {
     let settings = settings("mode = \"fast\"").unwrap();
     let mut head = Head::new(600, true);
     let mut ping = |reverse| {
-        let header = head.answer(&Command { reverse, ..settings.command }, |_| None).header;
-        (header.position, header.clockwise)
+        let ping = head.obey(&Command { reverse, ..settings.command });
+        (ping.position, ping.clockwise)
     };
     assert_eq!([ping(false), ping(true), ping(false)], [(600, true), (603, false), (600, false)]);
     assert_eq!([ping(true), ping(false)], [(597, true), (600, true)]);
+}
+
+#[test]
+fn the_answer_has_the_position_that_the_head_reports() {
+    let settings = settings("mode = \"fast\"").unwrap();
+    let setup = EmulatorSetup { start: MonoNs(0), head: Some(turning(0.0, true)), site: Site::default() };
+    let mut emulator = HeadEmulator::new(settings.clone(), DurNs::ZERO, &setup);
+    let mut due = Vec::new();
+    emulator.begin(MonoNs(1), &mut due);
+    let elsewhere = Sounding { reported_rad: f64::to_radians(30.0), ..due[0] };
+    let mut decoder = HeadDecoder::new(settings, DurNs::ZERO);
+    let mut angles = Vec::new();
+    emulator.tell(&elsewhere, &mut |direction, received, bytes| {
+        if direction == Direction::Received {
+            decoder.decode(Packet { received, bytes }, &mut |decoded| angles.push(decoded.reading));
+        }
+    });
+    assert!(matches!(angles[..], [Reading::Sonar(sonar)] if counts_of_rad(sonar.angle_rad) == 100));
 }

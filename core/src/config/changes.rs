@@ -1,0 +1,103 @@
+//! A file with some of its values changed: what a scene says of the vehicle that it borrows.
+
+use core::ops::Range;
+
+use toml::de::{DeTable, DeValue};
+
+use super::reader::{ConfigError, Document, Section};
+
+/// Stands for every table of an array that has the key.
+const ALL: &str = "all";
+/// Key by which a table of an array is named.
+const ID: &str = "id";
+
+/// `text` with the values that `changes` gives in their place. `heads.layout = "x"` changes a key of a table,
+/// `sensors.ID.key` one of the array's table with that id, `sensors.all.key` all that have the key.
+///
+/// Errors: a change whose key isn't in the text; a text that isn't TOML.
+pub fn changed(text: &str, changes: &Section<'_>) -> Result<String, ConfigError> {
+    let table = Document::new(changes.file(), text).table()?;
+    let mut edits: Vec<(Range<usize>, &str)> = Vec::new();
+    for (path, value, invalid) in changes.leaves() {
+        let path: Vec<&str> = path.iter().map(String::as_str).collect();
+        let mut found = Vec::new();
+        find(&table, &path, &mut found);
+        if found.is_empty() {
+            return Err(invalid("is not in the vehicle file, so that it can't be changed"));
+        }
+        edits.extend(found.into_iter().map(|span| (span, value)));
+    }
+    edits.sort_by_key(|(span, _)| span.start);
+    let mut changed = String::new();
+    let mut at = 0;
+    for (span, value) in edits {
+        changed.push_str(text.get(at..span.start).unwrap_or_default());
+        changed.push_str(value);
+        at = span.end;
+    }
+    changed.push_str(text.get(at..).unwrap_or_default());
+    Ok(changed)
+}
+
+/// The places of the values at `path`.
+fn find(table: &DeTable<'_>, path: &[&str], found: &mut Vec<Range<usize>>) {
+    let Some((key, rest)) = path.split_first() else { return };
+    let Some(value) = table.get(*key) else { return };
+    match (value.get_ref(), rest) {
+        (_, []) => found.push(value.span()),
+        (DeValue::Table(inner), _) => find(inner, rest, found),
+        (DeValue::Array(items), [name, rest @ ..]) => {
+            for item in items {
+                let DeValue::Table(inner) = item.get_ref() else { continue };
+                let id = inner.get(ID).and_then(|id| id.get_ref().as_str());
+                if *name == ALL || id == Some(*name) {
+                    find(inner, rest, found);
+                }
+            }
+        }
+        _ => {}
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TEXT: &str = "a = 1 # one\n[heads]\nlayout = \"phase_shift\"\n\n[[sensors]]\nid = \"x\"\nmode = \"slow\"\n\
+                        [[sensors]]\nid = \"y\"\n[[sensors]]\nid = \"z\"\nmode = \"slow\"\n";
+
+    fn change(changes: &str) -> Result<String, String> {
+        let root = Document::new("s.toml", changes).root().unwrap();
+        changed(TEXT, &root).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn values_are_changed_and_the_rest_stays_to_the_byte() {
+        let expected = TEXT
+            .replace("a = 1", "a = [2, 3]")
+            .replace("\"phase_shift\"", "\"sector_offset\"")
+            .replace("\"slow\"", "\"fast\"");
+        let changes = "sensors.all.mode = \"fast\"\na = [2, 3]\nheads.layout = \"sector_offset\"\n";
+        assert_eq!(change(changes).unwrap(), expected);
+        let one = change("[sensors.z]\nmode = 'medium'\n").unwrap();
+        assert_eq!(
+            one,
+            TEXT.replacen(
+                "[[sensors]]\nid = \"z\"\nmode = \"slow\"",
+                "[[sensors]]\nid = \"z\"\nmode = 'medium'",
+                1
+            )
+        );
+        assert_eq!(change("").unwrap(), TEXT);
+    }
+
+    #[test]
+    fn what_is_not_there_is_refused() {
+        let missing = "is not in the vehicle file, so that it can't be changed";
+        for (changes, key) in
+            [("\nheads.speed = 1", "heads.speed"), ("\nsensors.y.mode = 1", "sensors.y.mode")]
+        {
+            assert_eq!(change(changes).unwrap_err(), format!("s.toml:2: {key} = 1: {missing}"));
+        }
+    }
+}

@@ -1,0 +1,104 @@
+//! Figure 15: how much of a flat wall a beam covers.
+
+use headrace_core::math;
+use headrace_core::sampling::section::{beam_width_m, footprint_m};
+use headrace_core::tunnel::{Profile, named};
+use headrace_replay::simulate::effects::Cone;
+
+use crate::ExperimentError;
+
+/// Widths of the 881L's beam: at 1 MHz and at 600 kHz, degrees (the paper's §6).
+const BEAMS_DEG: [f64; 2] = [1.4, 2.4];
+/// Largest range setting of the paper's experiments, m.
+const RANGE_M: f64 = 10.0;
+/// Points of a curve.
+const POINTS: u32 = 60;
+/// Rays of a simulated beam: as many as a scene may have.
+const RAYS: usize = 64;
+/// Every so manieth point of a curve is simulated, too.
+const SIMULATED: u32 = 6;
+
+/// Figure 15.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Footprints {
+    /// Square to a wall, by the range to it, m.
+    pub by_range: Vec<Footprint>,
+    /// On the floor, by the angle from straight down, degrees.
+    pub by_angle: Vec<Footprint>,
+    /// How high the head is above that floor, m.
+    pub height_m: f64,
+    /// Where that floor's corner is, degrees from straight down.
+    pub corner_deg: f64,
+    /// The largest range, m.
+    pub range_m: f64,
+}
+
+/// A beam's footprints.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Footprint {
+    /// The beam's full width, degrees.
+    pub beam_deg: f64,
+    /// Range or angle, and the footprint by the formula, m.
+    pub points: Vec<[f64; 2]>,
+    /// Range or angle, and how far apart the simulated beam's rays meet the wall, m.
+    pub simulated: Vec<[f64; 2]>,
+}
+
+/// Computes them for the blueprint's tunnel.
+///
+/// Errors: none that can occur.
+pub fn footprints() -> Result<Footprints, ExperimentError> {
+    let profile = named::ceran_blueprint()?;
+    let [_, height_m] = profile.reference();
+    let half_m = floor_half_m(&profile);
+    let corner_deg = math::atan2(half_m, height_m).to_degrees();
+    let curve =
+        |beam_deg: f64, most: f64, first: u32, of: &dyn Fn(f64) -> Result<[f64; 2], ExperimentError>| {
+            let (mut points, mut simulated) = (Vec::new(), Vec::new());
+            for number in first..=POINTS {
+                let at = most * f64::from(number) / f64::from(POINTS);
+                let [formula_m, rays_m] = of(at)?;
+                points.push([at, formula_m]);
+                if number % SIMULATED == 0 {
+                    simulated.push([at, rays_m]);
+                }
+            }
+            Ok::<_, ExperimentError>(Footprint { beam_deg, points, simulated })
+        };
+    let (mut by_range, mut by_angle) = (Vec::new(), Vec::new());
+    for beam_deg in BEAMS_DEG {
+        let beam_rad = f64::to_radians(beam_deg);
+        by_range.push(curve(beam_deg, RANGE_M, 1, &|range_m| {
+            Ok([beam_width_m(range_m, beam_rad)?, met_m(range_m, 0.0, beam_rad)])
+        })?);
+        by_angle.push(curve(beam_deg, corner_deg, 0, &|angle_deg| {
+            let angle_rad = angle_deg.to_radians();
+            Ok([footprint_m(height_m, angle_rad, beam_rad)?, met_m(height_m, angle_rad, beam_rad)])
+        })?);
+    }
+    Ok(Footprints { by_range, by_angle, height_m, corner_deg, range_m: RANGE_M })
+}
+
+/// Half the width of a flat floor, by halving.
+fn floor_half_m(profile: &Profile) -> f64 {
+    let (mut floor_m, mut wall_m) = (0.0, profile.perimeter_m() / 2.0);
+    for _ in 0..60 {
+        let middle_m = f64::midpoint(floor_m, wall_m);
+        let flat = profile.point_at(middle_m)[1] < 1e-9;
+        *(if flat { &mut floor_m } else { &mut wall_m }) = middle_m;
+    }
+    profile.point_at(floor_m)[0].abs()
+}
+
+/// From the nearest to the farthest place at which a simulated beam's rays meet a flat wall, in the plane of turning, m.
+fn met_m(distance_m: f64, angle_rad: f64, beam_rad: f64) -> f64 {
+    let (sine, cosine) = math::sin_cos(angle_rad);
+    let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
+    for [middle, _, across] in Cone::new(beam_rad, RAYS).parts() {
+        // Down and aside of the beam's middle turned by the angle.
+        let (down, aside) = (middle * cosine - across * sine, middle * sine + across * cosine);
+        let at = distance_m * aside / down;
+        (least, most) = (least.min(at), most.max(at));
+    }
+    most - least
+}

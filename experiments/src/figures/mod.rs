@@ -1,0 +1,91 @@
+//! What pictures like the paper's Figures 6, 8, 12, 13 and 15 show, without their drawing.
+
+mod beam;
+mod patterns;
+mod walls;
+
+use headrace_core::math;
+
+use crate::runs::{Dive, Sample};
+
+pub use beam::{Footprint, Footprints, footprints};
+pub use patterns::{PhaseShift, Sectors, phase_shift, sectors};
+pub use walls::{AT_GAPS, Gap, PHASES, Panel, Walls, walls};
+
+/// A sample on the unrolled wall.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Place {
+    /// Which head's.
+    pub head: u16,
+    /// Way along the tunnel from where the picture begins, m.
+    pub x_m: f64,
+    /// Arc length from the floor's centre, m.
+    pub sigma_m: f64,
+}
+
+/// A piece of a head's way over the unrolled wall that doesn't cross its seam.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Way {
+    /// Which head's.
+    pub head: u16,
+    /// Way along the tunnel from where the picture begins, and arc length, m.
+    pub points: Vec<[f64; 2]>,
+}
+
+/// A stretch of the tunnel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Window {
+    from_m: f64,
+    length_m: f64,
+}
+
+impl Window {
+    fn has(&self, x_m: f64) -> bool {
+        (0.0..=self.length_m).contains(&(x_m - self.from_m))
+    }
+
+    /// The wall's samples within, in each head's order.
+    fn places(&self, dive: &Dive) -> Vec<Place> {
+        let within = dive.heads.iter().flatten().filter(|s| s.of_wall && self.has(s.at.x()));
+        within.map(|s| Place { head: s.head, x_m: s.at.x() - self.from_m, sigma_m: s.sigma_m }).collect()
+    }
+
+    /// The heads' ways within and a step beyond.
+    fn ways(&self, dive: &Dive) -> Vec<Way> {
+        let mut ways = Vec::new();
+        for samples in &dive.heads {
+            let point = |s: &Sample| [s.at.x() - self.from_m, s.sigma_m];
+            let near = samples.windows(2).filter(|pair| pair.iter().any(|s| self.has(s.at.x())));
+            let steps = near.filter_map(|pair| match pair {
+                [a, b] if a.of_wall && b.of_wall => Some((a.head, point(a), point(b))),
+                _ => None,
+            });
+            for (head, from, to) in steps {
+                add_step(&mut ways, head, dive.profile.perimeter_m(), from, to);
+            }
+        }
+        ways
+    }
+}
+
+/// Adds a step to the way that it continues, if it does; one over the seam as two that end and begin there.
+fn add_step(ways: &mut Vec<Way>, head: u16, perimeter_m: f64, from: [f64; 2], to: [f64; 2]) {
+    let around_m = math::wrap_signed(to[1] - from[1], perimeter_m);
+    let mut add = |begin: [f64; 2], end: [f64; 2]| match ways.last_mut() {
+        // A step that ends on the seam goes no way beyond it.
+        _ if (begin[0] - end[0]).abs() + (begin[1] - end[1]).abs() <= 0.0 => (),
+        Some(way) if way.head == head && way.points.last() == Some(&begin) => way.points.push(end),
+        _ => ways.push(Way { head, points: vec![begin, end] }),
+    };
+    if (to[1] - from[1] - around_m).abs() < 1e-9 {
+        add(from, to);
+        return;
+    }
+    let (leaving_m, entering_m) = if around_m > 0.0 { (perimeter_m, 0.0) } else { (0.0, perimeter_m) };
+    let x_m = from[0] + (leaving_m - from[1]) / around_m * (to[0] - from[0]);
+    add(from, [x_m, leaving_m]);
+    add([x_m, entering_m], to);
+}
+
+#[cfg(test)]
+mod tests;

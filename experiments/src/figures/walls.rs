@@ -1,0 +1,226 @@
+//! Figures 12 and 13: samples on a stretch of wall, and how far the Poisson surface is from it.
+
+use headrace_core::math::{self, TAU};
+use headrace_core::tunnel::Profile;
+
+use super::{Place, Window};
+use crate::meshes::{LENGTH_M, cloud, poisson, setting};
+use crate::runs::{Dive, Dives, SPEED_MPS};
+use crate::spacing::passes_of;
+use crate::surface::{MeshIndex, Spread, wall};
+use crate::{ExperimentError, Progress};
+
+/// Length of the stretch shown, m.
+const SHOWN_M: f64 = 12.0;
+/// Where dives begin, m.
+const START_M: f64 = 5.0;
+/// Cells along the stretch and round the wall.
+const CELLS: [u32; 2] = [40, 100];
+/// Lines along the wall at which passes are looked for.
+const LINES: u32 = 360;
+/// A line with gaps so many times those of most lines is in a shadow.
+const IN_SHADOW: f64 = 1.5;
+/// Cells that the scale of distances takes in: those at a floor's corners, which any such surface rounds off, have more.
+const SCALE_SHARE: f64 = 0.93;
+
+/// Heads, mode, sectors, aligned.
+type Configuration = (u8, &'static str, bool, bool);
+
+/// Figure 12: two heads with and without their phases aligned.
+pub const PHASES: [Configuration; 4] =
+    [(2, "slow", false, false), (2, "slow", false, true), (2, "slow", true, false), (2, "slow", true, true)];
+/// Figure 13: heads that hide the wall from each other.
+pub const AT_GAPS: [Configuration; 4] = [
+    (3, "medium", false, true),
+    (4, "medium", false, true),
+    (3, "medium", true, true),
+    (4, "medium", true, true),
+];
+
+/// Panels side by side, of one stretch.
+#[derive(Debug, Clone)]
+pub struct Walls {
+    /// The tunnel's profile.
+    pub profile: Profile,
+    /// Speed, m/s.
+    pub speed_mps: f64,
+    /// Length of the dives, m.
+    pub dive_m: f64,
+    /// Length of the stretch, m.
+    pub length_m: f64,
+    /// The panels.
+    pub panels: Vec<Panel>,
+    /// The distance that the scale of colours ends at, m: all but a few cells are below.
+    pub most_m: f64,
+}
+
+/// A configuration's stretch of wall.
+#[derive(Debug, Clone)]
+pub struct Panel {
+    /// How many heads.
+    pub heads: u8,
+    /// Their mode.
+    pub mode: &'static str,
+    /// Sector offset in place of phase shift.
+    pub sectors: bool,
+    /// In phase.
+    pub aligned: bool,
+    /// T_x of a single head, over the number of heads, m.
+    pub t_x_m: f64,
+    /// The samples, in each head's order.
+    pub samples: Vec<Place>,
+    /// Cells along the stretch and round the wall.
+    pub cells: [u32; 2],
+    /// Unsigned distance of each cell's middle from the surface, m; those along the stretch outermost.
+    pub distances_m: Vec<f64>,
+    /// Their mean, m.
+    pub mean_m: f64,
+    /// The largest distance along the tunnel between passes, where heads pass at all.
+    pub widest: Option<Gap>,
+    /// Strips of wall on which passes are more than 1.5 T_x / s apart somewhere, from and to, m.
+    pub wide_m: Vec<[f64; 2]>,
+    /// Strips of wall that no head passes, from and to, m.
+    pub unseen_m: Vec<[f64; 2]>,
+}
+
+/// Wall between two passes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Gap {
+    /// The line's arc length, m.
+    pub sigma_m: f64,
+    /// Where it begins and ends, from where the picture begins, m.
+    pub x_m: [f64; 2],
+}
+
+impl Gap {
+    /// How long it is, m.
+    pub fn length_m(&self) -> f64 {
+        self.x_m[1] - self.x_m[0]
+    }
+}
+
+/// Simulates dives as the meshes' and looks at a stretch in their middle.
+///
+/// Errors: a surface that can't be made; none with the vehicles that are built in.
+pub fn walls(
+    dives: &Dives<'_>,
+    configurations: &[Configuration],
+    progress: Progress<'_>,
+) -> Result<Walls, ExperimentError> {
+    let window = Window { from_m: START_M + (LENGTH_M - SHOWN_M) / 2.0, length_m: SHOWN_M };
+    let mut panels = Vec::new();
+    for configuration in configurations {
+        progress(&format!("a picture of {} heads' samples", configuration.0));
+        let dive = dives.dive(&setting(*configuration, LENGTH_M, 1))?;
+        panels.push(panel(&dive, window, *configuration)?);
+    }
+    let mut all: Vec<f64> = panels.iter().flat_map(|panel| panel.distances_m.iter().copied()).collect();
+    all.sort_by(f64::total_cmp);
+    let last = math::floor_to_i64(SCALE_SHARE * all.len() as f64);
+    let most_m = all.get(crate::index(last)).copied().unwrap_or_default();
+    let profile = headrace_core::tunnel::named::ceran_blueprint()?;
+    // A round number of centimetres.
+    let most_m = (most_m * 100.0).ceil().max(1.0) / 100.0;
+    Ok(Walls { profile, speed_mps: SPEED_MPS, dive_m: LENGTH_M, length_m: SHOWN_M, panels, most_m })
+}
+
+fn panel(
+    dive: &Dive,
+    window: Window,
+    (heads, mode, sectors, aligned): Configuration,
+) -> Result<Panel, ExperimentError> {
+    let t_x_m = SPEED_MPS * dive.ping_period_s * TAU / dive.step_rad / f64::from(heads);
+    let distances_m = distances(dive, window)?;
+    let mean_m = Spread::of(distances_m.iter().copied()).mean_m;
+    let lines = lines(dive, window);
+    let perimeter_m = dive.profile.perimeter_m();
+    let unseen_m = strips(&lines, perimeter_m, |line| line.passes_m.is_empty());
+    let wide = |line: &Line| line.widest().is_some_and(|gap| gap.length_m() > IN_SHADOW * t_x_m);
+    let (widest, wide_m) = (widest(&lines), strips(&lines, perimeter_m, wide));
+    let samples = window.places(dive);
+    Ok(Panel {
+        heads,
+        mode,
+        sectors,
+        aligned,
+        t_x_m,
+        samples,
+        cells: CELLS,
+        distances_m,
+        mean_m,
+        widest,
+        wide_m,
+        unseen_m,
+    })
+}
+
+fn distances(dive: &Dive, window: Window) -> Result<Vec<f64>, ExperimentError> {
+    let (mesh, bin_m) = poisson(dive, &cloud(dive))?;
+    let index = MeshIndex::new(&mesh, bin_m).ok_or(ExperimentError::NoSurface)?;
+    let middle = |number: u32, of: u32| (f64::from(number) + 0.5) / f64::from(of);
+    let distance_m = |(i, k)| {
+        let x_m = window.from_m + window.length_m * middle(i, CELLS[0]);
+        let sigma_m = dive.profile.perimeter_m() * middle(k, CELLS[1]);
+        index.distance_m(wall::place(&dive.profile, x_m, sigma_m, 0.0))
+    };
+    let cells = (0..CELLS[0]).flat_map(|i| (0..CELLS[1]).map(move |k| (i, k)));
+    Ok(cells.map(distance_m).collect())
+}
+
+/// A line along the wall with the passes over it within the stretch.
+struct Line {
+    sigma_m: f64,
+    passes_m: Vec<f64>,
+}
+
+impl Line {
+    fn widest(&self) -> Option<Gap> {
+        let gaps = self.passes_m.windows(2).filter_map(|pair| match pair {
+            [from, to] => Some(Gap { sigma_m: self.sigma_m, x_m: [*from, *to] }),
+            _ => None,
+        });
+        gaps.max_by(|a, b| a.length_m().total_cmp(&b.length_m()))
+    }
+}
+
+fn lines(dive: &Dive, window: Window) -> Vec<Line> {
+    let perimeter_m = dive.profile.perimeter_m();
+    let line = |number: u32| {
+        let sigma_m = perimeter_m * (f64::from(number) + 0.5) / f64::from(LINES);
+        let all = dive.heads.iter().flat_map(|samples| passes_of(dive, samples, sigma_m));
+        let mut passes_m: Vec<f64> =
+            all.filter(|x_m| window.has(*x_m)).map(|x_m| x_m - window.from_m).collect();
+        passes_m.sort_by(f64::total_cmp);
+        Line { sigma_m, passes_m }
+    };
+    (0..LINES).map(line).collect()
+}
+
+/// The largest gap; of the lines beside it that are in the same shadow, that of the middle one.
+fn widest(lines: &[Line]) -> Option<Gap> {
+    let mut lengths: Vec<f64> = lines.iter().filter_map(Line::widest).map(|gap| gap.length_m()).collect();
+    lengths.sort_by(f64::total_cmp);
+    let usual_m = lengths.get(lengths.len() / 4).copied()?;
+    let shadowed = |line: &&Line| line.widest().is_some_and(|gap| gap.length_m() > IN_SHADOW * usual_m);
+    let length_m = |line: &Line| line.widest().map_or(0.0, |gap| gap.length_m());
+    let (number, worst) = lines.iter().enumerate().max_by(|a, b| length_m(a.1).total_cmp(&length_m(b.1)))?;
+    let before = lines.iter().take(number).rev().take_while(shadowed).count();
+    let after = lines.iter().skip(number + 1).take_while(shadowed).count();
+    // As much of the shadow to either side.
+    let middle = (2 * number + after).saturating_sub(before) / 2;
+    lines.get(middle).unwrap_or(worst).widest()
+}
+
+/// Runs of lines of a kind, from and to, m.
+fn strips(lines: &[Line], perimeter_m: f64, kind: impl Fn(&Line) -> bool) -> Vec<[f64; 2]> {
+    let apart_m = perimeter_m / f64::from(LINES);
+    let mut strips: Vec<[f64; 2]> = Vec::new();
+    for line in lines.iter().filter(|line| kind(line)) {
+        let [from_m, to_m] = [line.sigma_m - apart_m / 2.0, line.sigma_m + apart_m / 2.0];
+        match strips.last_mut() {
+            Some(strip) if (strip[1] - from_m).abs() < apart_m / 4.0 => strip[1] = to_m,
+            _ => strips.push([from_m, to_m]),
+        }
+    }
+    strips
+}

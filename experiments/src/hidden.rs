@@ -1,0 +1,118 @@
+//! §8.3: what heads side by side hide from each other.
+
+use headrace_core::math::{self, TAU};
+use headrace_core::sampling::layout::HeadLayout;
+use serde::Serialize;
+
+use crate::runs::{Dive, Dives, Sample, Setting};
+use crate::spacing::{gaps_m, passes};
+use crate::{ExperimentError, Progress};
+
+/// Length of a run, m.
+const LENGTH_M: f64 = 130.0;
+/// Places of the wall looked at round the perimeter.
+const LINES: usize = 720;
+
+/// What a layout of heads that hide each other comes to.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct HiddenRow {
+    /// How many heads.
+    pub heads: u8,
+    /// Phase between heads side by side, degrees.
+    pub side_by_side_deg: f64,
+    /// Angle that a head loses to its neighbour, degrees.
+    pub angle_deg: f64,
+    /// Wall that it doesn't see, m.
+    pub gap_m: f64,
+    /// T_x / s where nothing is hidden, m.
+    pub t_x_m: f64,
+    /// The largest distance between passes anywhere, as a multiple of it.
+    pub times: f64,
+    /// The same for the places in the middle of what is hidden, mean of each place's largest.
+    pub times_in_shadow: f64,
+}
+
+/// Three heads; four with neighbours a quarter turn apart (on either wall the forward and the aft head that are hidden
+/// follow each other at half a turn, or at a quarter); four with neighbours half a turn apart.
+const ARRANGEMENTS: [(u8, &str); 4] = [(3, ""), (4, ""), (4, "[0, 0, -90, 90]"), (4, "[0, 90, 90, 0]")];
+
+/// All arrangements, MEDIUM as in Figure 13.
+///
+/// Errors: none with the vehicles that are built in.
+pub(crate) fn rows(dives: &Dives<'_>, progress: Progress<'_>) -> Result<Vec<HiddenRow>, ExperimentError> {
+    let mut rows = Vec::new();
+    for (heads, offsets) in ARRANGEMENTS {
+        let effects = match offsets {
+            "" => String::new(),
+            offsets => format!("start_phase_error = {{ offsets_deg = {offsets} }}\n"),
+        };
+        progress(&format!("occlusion with {heads} heads"));
+        let setting = Setting {
+            heads,
+            mode: "medium",
+            layout: HeadLayout::PhaseShift,
+            aligned: true,
+            occlusion: true,
+            length_m: LENGTH_M,
+            effects,
+            seed: 1,
+        };
+        let dive = dives.dive(&setting)?;
+        rows.push(row(heads, &dive));
+    }
+    Ok(rows)
+}
+
+fn row(heads: u8, dive: &Dive) -> HiddenRow {
+    let aft = dive.heads.last().map(Vec::as_slice).unwrap_or_default();
+    let (angle_rad, gap_m) = shadow(aft, dive);
+    let lines = passes(dive, LINES);
+    let largest: Vec<f64> = lines.iter().map(|line| gaps_m(line).fold(0.0, f64::max)).collect();
+    let mut sorted = largest.clone();
+    sorted.sort_by(f64::total_cmp);
+    let t_x_m = sorted.get(sorted.len() / 4).copied().unwrap_or(0.0);
+    let hidden: Vec<f64> = largest.iter().copied().filter(|gap| *gap > 1.5 * t_x_m).collect();
+    let mean = hidden.iter().sum::<f64>() / (hidden.len().max(1)) as f64;
+    HiddenRow {
+        heads,
+        side_by_side_deg: side_by_side_rad(dive).to_degrees(),
+        angle_deg: angle_rad.to_degrees(),
+        gap_m,
+        t_x_m,
+        times: sorted.last().copied().unwrap_or(0.0) / t_x_m,
+        times_in_shadow: mean / t_x_m,
+    }
+}
+
+/// The largest run of angles of a head at which it meets its neighbour, and of wall behind it.
+fn shadow(samples: &[Sample], dive: &Dive) -> (f64, f64) {
+    let (mut angle_rad, mut gap_m) = (0.0_f64, 0.0_f64);
+    let mut began: Option<&Sample> = None;
+    let mut last: Option<&Sample> = None;
+    for sample in samples {
+        if sample.of_wall {
+            if let (Some(from), Some(before)) = (began, last) {
+                // Edges fall between two pings; the step beyond each is half hidden.
+                let turned = math::wrap_signed(before.angle_rad - from.angle_rad, TAU).abs() + dive.step_rad;
+                angle_rad = angle_rad.max(turned);
+                let around = math::wrap_signed(before.sigma_m - from.sigma_m, dive.profile.perimeter_m());
+                gap_m = gap_m.max(around.abs() * (turned / (turned - dive.step_rad)));
+            }
+            began = None;
+        } else if began.is_none() {
+            began = Some(sample);
+        }
+        last = Some(sample);
+    }
+    (angle_rad, gap_m)
+}
+
+/// Phase between the last two heads, which are side by side, in (0, pi].
+fn side_by_side_rad(dive: &Dive) -> f64 {
+    let firsts: Vec<f64> =
+        dive.heads.iter().rev().take(2).filter_map(|samples| samples.first()).map(|s| s.angle_rad).collect();
+    match firsts.as_slice() {
+        [a, b] => math::wrap_signed(a - b, TAU).abs(),
+        _ => 0.0,
+    }
+}

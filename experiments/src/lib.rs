@@ -1,0 +1,68 @@
+//! The paper's §8 and §9 repeated: simulated dives, their spacings (Tables 3 to 5), what heads hide from each other, and
+//! what that needs beyond a dive: surfaces through samples and their distance from the wall (§8.2,
+//! 8.3), the perimeter as a wide beam sees it (§9.2), and the Wilcoxon signed-rank test (§8.1).
+//!
+//! Deterministic: one thread, no clock, no randomness, no hash containers; mathematics through `headrace_core::math`.
+
+pub mod figures;
+mod hidden;
+mod meshes;
+pub mod perimeter;
+mod report;
+mod runs;
+mod spacing;
+mod stationary;
+pub mod surface;
+mod tables;
+pub mod wilcoxon;
+
+use headrace_core::sampling::SamplingError;
+use headrace_core::sampling::paper::PaperError;
+use headrace_core::tunnel::ProfileError;
+use headrace_replay::simulate::SceneError;
+
+pub use hidden::HiddenRow;
+pub use meshes::MeshRow;
+pub use report::{Experiments, Finding, run};
+pub use runs::{Dive, Dives, SPEED_MPS, Sample, Setting};
+pub use spacing::{Spacing, SpacingSpread};
+pub use stationary::Perimeter;
+pub use tables::{Pair, RunRow, SignedRankRow};
+
+/// Is told what is being done.
+pub type Progress<'a> = &'a dyn Fn(&str);
+
+/// Why an experiment can't be run.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ExperimentError {
+    /// A scene that is none.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// The paper's numbers.
+    #[error(transparent)]
+    Paper(#[from] PaperError),
+    /// A profile that is none.
+    #[error(transparent)]
+    Profile(#[from] ProfileError),
+    /// Samples without a Poisson surface.
+    #[error("a surface through the samples: {0}")]
+    Surface(#[from] surface::poisson::PoissonError),
+    /// Samples without a Delaunay triangulation.
+    #[error("interpolating between the samples: {0}")]
+    Chart(#[from] surface::chart::ChartError),
+    /// An argument of a formula.
+    #[error(transparent)]
+    Sampling(#[from] SamplingError),
+    /// A Poisson surface without a triangle.
+    #[error("the surface through the samples has no triangle")]
+    NoSurface,
+    /// A stationary turn without a closed line.
+    #[error("the perimeter from echoes: {0}")]
+    Perimeter(#[from] perimeter::PerimeterError),
+}
+
+/// A whole number as an index; one below zero is zero.
+fn index(k: i64) -> usize {
+    usize::try_from(k).unwrap_or(0)
+}

@@ -1,0 +1,130 @@
+//! §8.2 and §8.3: surfaces through the samples, and their distance from the wall.
+
+use headrace_core::sampling::layout::HeadLayout;
+use serde::Serialize;
+
+use crate::runs::{Dive, Dives, Setting};
+use crate::surface::chart::{Chart, Deviation};
+use crate::surface::poisson::{Settings, Surface};
+use crate::surface::wall::{self, Stretch};
+use crate::surface::{Mesh, MeshIndex, Spread, Xyz, normals};
+use crate::{ExperimentError, Progress};
+
+/// Length of a run, m: as in the paper.
+pub(crate) const LENGTH_M: f64 = 130.0;
+/// The surface is compared away from its ends.
+const INNER: Stretch = Stretch { from_m: 20.0, to_m: 120.0, step_m: 0.1 };
+/// The paper's simulator's noise.
+const EFFECTS: &str = "range_noise = { sd_m = 0.01, sensors = [SONARS] }\n";
+/// How often an unaligned dive is repeated, with other phases each time.
+const SEEDS: u64 = 5;
+
+/// A configuration of §8.2 or §8.3.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct MeshRow {
+    /// How many heads.
+    pub heads: u8,
+    /// Their mode.
+    pub mode: &'static str,
+    /// Sector offset in place of phase shift.
+    pub sectors: bool,
+    /// In phase.
+    pub aligned: bool,
+    /// The paper's mean distance and standard deviation, m; none where it gives none.
+    pub paper_m: Option<[f64; 2]>,
+    /// From the wall to the screened Poisson surface of depth 8: mean, standard deviation, m; mean over the seeds.
+    pub poisson_m: [f64; 2],
+    /// From the wall to the plain interpolation in (x, sigma), m.
+    pub plain_m: [f64; 2],
+    /// The mean distance of each seed, m.
+    pub seeds_m: Vec<f64>,
+}
+
+/// Heads, mode, sectors, aligned, and the paper's mean and standard deviation.
+type Configuration = (u8, &'static str, bool, bool, Option<[f64; 2]>);
+
+/// The configurations that the paper has, and its distances: heads, mode, sectors, aligned, mean and sd.
+///
+/// Source: errata, row "§8.2": the paper's text names one of the unaligned pairs twice.
+const PAPER: [Configuration; 10] = [
+    (2, "slow", false, true, Some([0.040, 0.060])),
+    (2, "slow", false, false, Some([0.059, 0.083])),
+    (2, "slow", true, true, Some([0.057, 0.077])),
+    (2, "slow", true, false, Some([0.050, 0.083])),
+    (3, "medium", false, true, Some([0.018, 0.031])),
+    (3, "medium", false, false, None),
+    (3, "medium", true, true, Some([0.037, 0.106])),
+    (4, "medium", false, true, Some([0.016, 0.025])),
+    (4, "medium", false, false, None),
+    (4, "medium", true, true, Some([0.020, 0.036])),
+];
+
+/// All of them.
+///
+/// Errors: a surface that can't be made; none with the vehicles that are built in.
+pub(crate) fn rows(dives: &Dives<'_>, progress: Progress<'_>) -> Result<Vec<MeshRow>, ExperimentError> {
+    let mut rows = Vec::new();
+    for (heads, mode, sectors, aligned, paper_m) in PAPER {
+        let mut found = Vec::new();
+        for seed in 1..=if aligned { 1 } else { SEEDS } {
+            progress(&format!("a surface through {heads} heads' samples, seed {seed}"));
+            let setting = setting((heads, mode, sectors, aligned), LENGTH_M, seed);
+            found.push(distances(&dives.dive(&setting)?)?);
+        }
+        let mean = |which: usize| {
+            let of = |spread: fn(&Spread) -> f64| {
+                found.iter().filter_map(|pair| pair.get(which)).map(spread).sum::<f64>() / found.len() as f64
+            };
+            [of(|s| s.mean_m), of(|s| s.sd_m)]
+        };
+        let seeds_m = found.iter().map(|[poisson, _]| poisson.mean_m).collect();
+        rows.push(MeshRow {
+            heads,
+            mode,
+            sectors,
+            aligned,
+            paper_m,
+            poisson_m: mean(0),
+            plain_m: mean(1),
+            seeds_m,
+        });
+    }
+    Ok(rows)
+}
+
+/// The dive of a configuration: heads, mode, sectors, aligned.
+///
+/// Unaligned heads begin anywhere in their turn, or on the way there and back in their sector.
+pub(crate) fn setting(
+    (heads, mode, sectors, aligned): (u8, &'static str, bool, bool),
+    length_m: f64,
+    seed: u64,
+) -> Setting {
+    let layout = if sectors { HeadLayout::SectorOffset } else { HeadLayout::PhaseShift };
+    let unaligned = if aligned { "" } else { "start_phase_error = { max_deg = 180 }\n" };
+    let effects = format!("{EFFECTS}{unaligned}");
+    Setting { heads, mode, layout, aligned, occlusion: heads > 2, length_m, effects, seed }
+}
+
+/// Places where the wall was measured to be.
+pub(crate) fn cloud(dive: &Dive) -> Vec<Xyz> {
+    let samples = dive.heads.iter().flatten().filter(|sample| sample.of_wall);
+    samples.map(|sample| [sample.at.x(), sample.at.y(), sample.at.z()]).collect()
+}
+
+/// The surface as the paper made it, and the side of a bin for an index of its triangles, m.
+pub(crate) fn poisson(dive: &Dive, cloud: &[Xyz]) -> Result<(Mesh, f64), ExperimentError> {
+    let surface = Surface::through(&normals::towards_axis(&dive.profile, cloud), &Settings::of_paper())?;
+    Ok((surface.mesh(), surface.cell_m() / 2.0))
+}
+
+/// From the wall to the Poisson surface and to the plain interpolation.
+fn distances(dive: &Dive) -> Result<[Spread; 2], ExperimentError> {
+    let cloud = cloud(dive);
+    let (mesh, bin_m) = poisson(dive, &cloud)?;
+    let index = MeshIndex::new(&mesh, bin_m).ok_or(ExperimentError::NoSurface)?;
+    let poisson = wall::from_wall(&dive.profile, &index, &INNER, |_, _| 0.0);
+    let deviations: Vec<Deviation> = cloud.iter().map(|place| Deviation::of(&dive.profile, *place)).collect();
+    let plain = Chart::new(dive.profile.perimeter_m(), &deviations)?.compare(&INNER, |_, _| 0.0).spread;
+    Ok([poisson, plain])
+}

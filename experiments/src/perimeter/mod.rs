@@ -1,0 +1,153 @@
+//! Perimeter of a cross-section from one turn of a head that stands still (§9.2): through the ranges, and the paper's
+//! way by an image of the echoes and its skeleton.
+
+mod chain;
+mod echo;
+mod image;
+mod thin;
+
+use headrace_core::math::{self, TAU};
+
+pub use chain::Chain;
+
+use chain::trace;
+use echo::Echoes;
+use image::Image;
+
+/// One ping: the head's angle, and where its beam's rays met the wall.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Ping {
+    /// Angle of the head in [`headrace_core::frames`]'s sense, radians: 0 down, 90 degrees to the left.
+    pub angle_rad: f64,
+    /// Range of every ray in the beam, m; rays that are no number or beyond range give no echo.
+    pub ranges_m: Vec<f64>,
+}
+
+/// How echoes become a skeleton.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct Settings {
+    /// Range of the last bin's end, m.
+    pub range_max_m: f64,
+    /// Bins of an echo; 8 to 10,000.
+    pub bins: usize,
+    /// Length of a ray's echo along the range, m, centred on the wall.
+    pub pulse_m: f64,
+    /// Side of a pixel, m; at least a 4000th of twice the range.
+    pub pixel_m: f64,
+    /// Echo from which a pixel is set, as a share of its ping's strongest bin; above 0, at most 1.
+    pub threshold: f64,
+    /// Pixels by which set ones grow before thinning, so that neighbouring echoes touch: the paper cleaned by hand.
+    pub grow_px: usize,
+}
+
+impl Settings {
+    /// The paper's where it states them: 10 m, 500 points (§9.2). Pulse, pixel and threshold are ours.
+    pub fn of_paper() -> Self {
+        Self { range_max_m: 10.0, bins: 500, pulse_m: 0.05, pixel_m: 0.02, threshold: 0.5, grow_px: 2 }
+    }
+}
+
+/// Why there is no perimeter.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum PerimeterError {
+    /// A perimeter needs pings all round.
+    #[error("a perimeter needs echoes at 3 angles at least; there are {count}")]
+    TooFewPings {
+        /// Angles with an echo.
+        count: usize,
+    },
+    /// A setting is out of range.
+    #[error("{setting} is {value}; wanted is {wanted}")]
+    Setting {
+        /// The setting's name.
+        setting: &'static str,
+        /// What it is.
+        value: f64,
+        /// What it may be.
+        wanted: &'static str,
+    },
+    /// The skeleton doesn't close round the head; a longer pulse or more growing would.
+    #[error("the wall's skeleton does not close round the head")]
+    NotClosed,
+    /// The skeleton has a fork that pruning and thinning left.
+    #[error("the wall's skeleton forks at {forks} pixels")]
+    Forked {
+        /// Pixels with other than two neighbours.
+        forks: usize,
+    },
+}
+
+/// Length of the closed polygon through places given by (angle in radians, range in metres), in the order of their
+/// angles. Of places at one angle, the order given counts.
+///
+/// Errors: fewer than three places that are numbers.
+pub fn polygon_m(places: &[(f64, f64)]) -> Result<f64, PerimeterError> {
+    let good = |(angle, range): &&(f64, f64)| angle.is_finite() && range.is_finite();
+    let mut sorted: Vec<(f64, f64)> =
+        places.iter().filter(good).map(|(angle, range)| (math::wrap(*angle, TAU), *range)).collect();
+    sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
+    if sorted.len() < 3 {
+        return Err(PerimeterError::TooFewPings { count: sorted.len() });
+    }
+    let place = |(angle, range): &(f64, f64)| {
+        let (sin, cos) = math::sin_cos(*angle);
+        [range * sin, -range * cos]
+    };
+    let next = sorted.iter().cycle().skip(1);
+    let sides = sorted.iter().map(place).zip(next.map(place));
+    Ok(sides.map(|(a, b)| math::hypot(b[0] - a[0], b[1] - a[1])).sum())
+}
+
+/// Each ping's angle and least range: what a head reports that takes the first echo. Pings without echo are left out.
+pub fn least_ranges(pings: &[Ping]) -> Vec<(f64, f64)> {
+    let least = |p: &Ping| p.ranges_m.iter().copied().filter(|r| r.is_finite()).fold(f64::INFINITY, f64::min);
+    pings.iter().map(|p| (p.angle_rad, least(p))).filter(|(_, range)| range.is_finite()).collect()
+}
+
+/// Each ping's angle and mean range. Pings without echo are left out.
+pub fn mean_ranges(pings: &[Ping]) -> Vec<(f64, f64)> {
+    let mean = |p: &Ping| {
+        let known = p.ranges_m.iter().filter(|r| r.is_finite());
+        known.clone().sum::<f64>() / known.count() as f64
+    };
+    pings.iter().map(|p| (p.angle_rad, mean(p))).filter(|(_, range)| range.is_finite()).collect()
+}
+
+/// Length of the skeleton of the wall's image: echoes interpolated bilinearly over angle and range, cut at a threshold,
+/// thinned, pruned.
+///
+/// Errors: see [`PerimeterError`].
+/// Source: the paper's §9.2.
+pub fn skeleton(pings: &[Ping], settings: &Settings) -> Result<Chain, PerimeterError> {
+    check(settings)?;
+    let echoes = Echoes::of(pings, settings)?;
+    let mut image = Image::of(&echoes, settings);
+    image.grow(settings.grow_px);
+    thin::zhang_suen(&mut image);
+    thin::clean(&mut image);
+    let mut ring = image.round_the_middle().ok_or(PerimeterError::NotClosed)?;
+    thin::clean(&mut ring);
+    trace(&ring, settings.pixel_m)
+}
+
+fn check(settings: &Settings) -> Result<(), PerimeterError> {
+    let Settings { range_max_m, bins, pulse_m, pixel_m, threshold, grow_px } = *settings;
+    let pixels = 2.0 * range_max_m / pixel_m;
+    let settings = [
+        ("range_max_m", range_max_m, range_max_m > 0.0 && range_max_m.is_finite(), "above 0"),
+        ("bins", bins as f64, (8..=10_000).contains(&bins), "8 to 10,000"),
+        ("pulse_m", pulse_m, (0.0..=range_max_m).contains(&pulse_m), "0 to the range"),
+        ("pixel_m", pixel_m, (8.0..=4000.0).contains(&pixels), "a 4,000th to an 8th of twice the range"),
+        ("threshold", threshold, threshold > 0.0 && threshold <= 1.0, "above 0, at most 1"),
+        ("grow_px", grow_px as f64, grow_px <= 100, "at most 100"),
+    ];
+    match settings.into_iter().find(|(_, _, good, _)| !good) {
+        Some((setting, value, _, wanted)) => Err(PerimeterError::Setting { setting, value, wanted }),
+        None => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests;

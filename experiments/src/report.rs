@@ -1,0 +1,114 @@
+//! The paper's experiments as a whole, and whether its findings hold.
+
+use serde::Serialize;
+
+use crate::hidden::{self, HiddenRow};
+use crate::meshes::{self, MeshRow};
+use crate::runs::{Dives, SPEED_MPS};
+use crate::stationary::{self, Perimeter};
+use crate::tables::{self, RunRow, SignedRankRow};
+use crate::{ExperimentError, Progress};
+
+/// Ours beside the paper's.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Experiments {
+    /// Speed of the runs, m/s.
+    pub speed_mps: f64,
+    /// Tables 3 to 5.
+    pub runs: Vec<RunRow>,
+    /// §8.1.
+    pub signed_ranks: Vec<SignedRankRow>,
+    /// §8.2 and §8.3.
+    pub meshes: Vec<MeshRow>,
+    /// §8.3.
+    pub hidden: Vec<HiddenRow>,
+    /// §9.2.
+    pub perimeter: Perimeter,
+    /// What the paper found, and whether it holds.
+    pub findings: Vec<Finding>,
+}
+
+/// A finding of the paper.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Finding {
+    /// What the paper says.
+    pub says: &'static str,
+    /// Whether our runs say so, too.
+    pub holds: bool,
+    /// Ours.
+    pub evidence: String,
+}
+
+/// Runs all of them. `progress` is told what is being done.
+///
+/// Errors: none with the vehicles that are built in.
+pub fn run(dives: &Dives<'_>, progress: Progress<'_>) -> Result<Experiments, ExperimentError> {
+    let runs = tables::runs(dives, progress)?;
+    let signed_ranks = tables::signed_ranks(&runs)?;
+    let meshes = meshes::rows(dives, progress)?;
+    let hidden = hidden::rows(dives, progress)?;
+    progress("the perimeter from a stationary turn");
+    let perimeter = stationary::perimeter()?;
+    let findings = findings(&meshes, &hidden);
+    Ok(Experiments { speed_mps: SPEED_MPS, runs, signed_ranks, meshes, hidden, perimeter, findings })
+}
+
+fn findings(meshes: &[MeshRow], hidden: &[HiddenRow]) -> Vec<Finding> {
+    let mean = |heads: u8, sectors: bool, aligned: bool| {
+        let mut rows = meshes.iter();
+        rows.find(|row| (row.heads, row.sectors, row.aligned) == (heads, sectors, aligned))
+            .map_or(f64::NAN, |row| row.poisson_m[0])
+    };
+    let mm = |m: f64| format!("{:.1} mm", 1e3 * m);
+    let change = |sectors| mean(2, sectors, false) / mean(2, sectors, true);
+    let mut findings = vec![
+        Finding {
+            says: "alignment matters to phase shift",
+            holds: change(false) > 1.1,
+            evidence: format!(
+                "two heads, SLOW: {} aligned, {} unaligned ({:+.0} %)",
+                mm(mean(2, false, true)),
+                mm(mean(2, false, false)),
+                100.0 * (change(false) - 1.0)
+            ),
+        },
+        Finding {
+            says: "alignment doesn't matter to sector offset",
+            holds: (change(true) - 1.0).abs() < (change(false) - 1.0).abs() / 2.0,
+            evidence: format!(
+                "two heads, SLOW: {} aligned, {} unaligned ({:+.0} %)",
+                mm(mean(2, true, true)),
+                mm(mean(2, true, false)),
+                100.0 * (change(true) - 1.0)
+            ),
+        },
+    ];
+    for (heads, says) in [
+        (2, "two heads: aligned phase shift beats sectors"),
+        (3, "three heads: aligned phase shift beats sectors"),
+        (4, "four heads: aligned phase shift beats sectors"),
+    ] {
+        let (phase, sector) = (mean(heads, false, true), mean(heads, true, true));
+        let evidence = format!("{} against {}", mm(phase), mm(sector));
+        findings.push(Finding { says, holds: phase < sector, evidence });
+    }
+    findings.extend(hidden.iter().map(of_hidden));
+    findings
+}
+
+/// §8.3: how far apart passes are where neighbours hide the wall.
+fn of_hidden(row: &HiddenRow) -> Finding {
+    let twice = (1.9..2.15).contains(&row.times_in_shadow);
+    let (says, holds) = match (row.heads, row.side_by_side_deg > 135.0) {
+        (3, _) => ("three heads: hidden places have twice T_x / s", twice),
+        (_, true) => ("four heads, neighbours half a turn apart: hidden places have twice T_x / s", twice),
+        (_, false) => {
+            ("four heads, neighbours a quarter turn apart: up to four times T_x / s", row.times > 3.5)
+        }
+    };
+    let evidence = format!(
+        "neighbours {:.0} deg apart: {:.2} times in the shadow, {:.2} at most; {:.2} deg, {:.2} m of wall hidden",
+        row.side_by_side_deg, row.times_in_shadow, row.times, row.angle_deg, row.gap_m
+    );
+    Finding { says, holds, evidence }
+}

@@ -1,0 +1,134 @@
+//! Simulated dives for the experiments: a vehicle as the paper has it, a straight stretch, and the effects that the
+//! paper's own simulation had.
+
+use headrace_core::app::device::{DeviceKind, Sense};
+use headrace_core::config::Document;
+use headrace_core::frames::{Point3, Tunnel};
+use headrace_core::sampling::layout::HeadLayout;
+use headrace_core::tunnel::Profile;
+use headrace_replay::simulate::{FileLoader, Scene, SceneError, Simulation};
+
+/// The speed that the paper states, m/s (§7.2).
+pub const SPEED_MPS: f64 = 0.197;
+
+/// What a dive is simulated with.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Setting {
+    /// How many heads: one is VITA 1, more are VITA 2.
+    pub heads: u8,
+    /// Their mode.
+    pub mode: &'static str,
+    /// How they share the work.
+    pub layout: HeadLayout,
+    /// Whether heads apart along the hull are put in phase for the dive's speed.
+    pub aligned: bool,
+    /// Whether neighbours hide the wall from each other.
+    pub occlusion: bool,
+    /// Metres that the vehicle goes.
+    pub length_m: f64,
+    /// Further lines of the scene's effects; SONARS stands for the ids of the heads.
+    pub effects: String,
+    /// Where random numbers begin.
+    pub seed: u64,
+}
+
+/// A ping of a head.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sample {
+    /// Which head.
+    pub head: u16,
+    /// Its angle in the sensor's frame, radians.
+    pub angle_rad: f64,
+    /// Where the head was.
+    pub from: Point3<Tunnel>,
+    /// Where the wall was measured to be.
+    pub at: Point3<Tunnel>,
+    /// Arc length of the place that was truly met, m.
+    pub sigma_m: f64,
+    /// What was measured is the wall, and no part of the vehicle.
+    pub of_wall: bool,
+}
+
+/// A simulated dive.
+pub struct Dive {
+    /// The tunnel's profile.
+    pub profile: Profile,
+    /// All pings of all heads in order of time that heard something, by head.
+    pub heads: Vec<Vec<Sample>>,
+    /// Angle between pings, radians.
+    pub step_rad: f64,
+    /// Time between pings, s.
+    pub ping_period_s: f64,
+}
+
+/// What dives are simulated with: the devices that vehicle files may name, and the vehicle files by name.
+#[derive(Clone, Copy)]
+pub struct Dives<'a> {
+    /// The kinds of devices.
+    pub kinds: &'a [&'a dyn DeviceKind],
+    /// Gives a vehicle file.
+    pub load: FileLoader<'a>,
+}
+
+impl Dives<'_> {
+    /// Simulates a dive.
+    ///
+    /// Errors: a scene that isn't one; none with the vehicles that are built in.
+    pub fn dive(&self, setting: &Setting) -> Result<Dive, SceneError> {
+        let text = scene_text(setting);
+        let scene =
+            Scene::parse(Document::new("experiment", &text), self.kinds, self.load, Some(setting.seed))?;
+        run(&scene)
+    }
+}
+
+fn run(scene: &Scene) -> Result<Dive, SceneError> {
+    let mut simulation = Simulation::with_truth(scene)?;
+    let mut heads: Vec<Vec<Sample>> = Vec::new();
+    let numbers: Vec<u16> =
+        (0..).zip(&scene.facts().sensors).filter(|(_, s)| s.sense == Sense::Head).map(|(n, _)| n).collect();
+    heads.resize(numbers.len(), Vec::new());
+    while simulation.advance() {
+        for row in simulation.take_truth() {
+            let Some(head) = numbers.iter().position(|number| *number == row.source) else { continue };
+            let Some(sounding) = row.sounding else { continue };
+            let (Some(at), Some((hit, sigma_m))) = (sounding.measured_point(), sounding.wall) else {
+                continue;
+            };
+            let of_wall = (at - sounding.origin).norm() > 0.5 * hit.range_m;
+            let (angle_rad, from) = (sounding.measured.angle_rad, sounding.origin);
+            if let (Some(samples), Ok(number)) = (heads.get_mut(head), u16::try_from(head)) {
+                samples.push(Sample { head: number, angle_rad, from, at, sigma_m, of_wall });
+            }
+        }
+    }
+    let spec = scene.vehicle.heads().first().copied();
+    Ok(Dive {
+        profile: scene.vehicle.tunnel.profile.clone(),
+        heads,
+        step_rad: spec.map_or(0.0, |spec| spec.step_rad),
+        ping_period_s: spec.map_or(0.0, |spec| spec.ping_period_s),
+    })
+}
+
+fn scene_text(setting: &Setting) -> String {
+    let vehicle = match setting.heads {
+        1 => "vita1.toml".to_owned(),
+        heads => format!("vita2-{heads}.toml"),
+    };
+    let layout =
+        HeadLayout::NAMES.iter().find(|(_, layout)| *layout == setting.layout).map_or("", |(name, _)| name);
+    // A planned speed of zero leaves the heads' places along the hull out of their phases.
+    let planned_mps = if setting.aligned { SPEED_MPS } else { 0.0 };
+    let layout = if setting.heads == 1 { String::new() } else { format!("heads.layout = \"{layout}\"\n") };
+    let occlusion = if setting.occlusion { "occlusion = {}\n" } else { "" };
+    let sonars: Vec<String> = (0..setting.heads).map(|head| format!("\"sonar_{head}\"")).collect();
+    format!(
+        "name = \"experiment\"\nvehicle = \"{vehicle}\"\n[vehicle_changes]\ntunnel.profile = \"ceran-blueprint\"\n\
+         {layout}heads.planned_speed_mps = {planned_mps}\nsensors.all.mode = \"{}\"\n[trajectory]\nstart_m = 5\n\
+         [[trajectory.legs]]\ndistance_m = {}\nspeed_mps = {SPEED_MPS}\n[effects]\nmotion_within_turn = {{}}\n{occlusion}{}\n",
+        setting.mode.to_lowercase(),
+        setting.length_m,
+        setting.effects.replace("SONARS", &sonars.join(", "))
+    )
+}

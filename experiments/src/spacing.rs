@@ -1,0 +1,146 @@
+//! The paper's spacings, measured on simulated samples: T_y from ping to ping, T_x from pass to pass, T of both.
+
+use headrace_core::math::{self, TAU};
+use headrace_core::sampling::layout::HeadLayout;
+use serde::Serialize;
+
+use crate::runs::{Dive, Sample};
+
+/// Lines along the wall at which passes are counted.
+const LINES: usize = 72;
+/// Angles by which a step may miss the usual one, as a share of it.
+const STEP_SHARE: f64 = 0.25;
+
+/// Mean, standard deviation, least and largest of a spacing, m.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct SpacingSpread {
+    /// How many.
+    pub count: usize,
+    /// Their mean.
+    pub mean: f64,
+    /// Their standard deviation.
+    pub sd: f64,
+    /// The least.
+    pub min: f64,
+    /// The largest.
+    pub max: f64,
+}
+
+impl SpacingSpread {
+    /// Of some values; all zero of none.
+    pub fn of(values: &[f64]) -> Self {
+        if values.is_empty() {
+            return Self::default();
+        }
+        let n = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / n;
+        let squares: f64 = values.iter().map(|value| (value - mean) * (value - mean)).sum();
+        Self {
+            count: values.len(),
+            mean,
+            sd: math::sqrt(squares / n),
+            min: values.iter().copied().fold(f64::INFINITY, f64::min),
+            max: values.iter().copied().fold(0.0, f64::max),
+        }
+    }
+}
+
+/// What the paper's Tables 3 to 5 say of a run.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Spacing {
+    /// Along the tunnel, from pass to pass: what each line of the wall has in the mean; for sectors, what lines at their
+    /// ends have, which is twice the mean.
+    pub t_x_m: f64,
+    /// Across it, from ping to ping in the cross-section.
+    pub t_y: SpacingSpread,
+    /// T = sqrt(T_x^2 + T_y^2) for the mean, least and largest T_y.
+    pub t_m: [f64; 3],
+}
+
+/// Measures a dive.
+pub(crate) fn spacing(dive: &Dive, layout: HeadLayout) -> Spacing {
+    let t_y = SpacingSpread::of(
+        &dive.heads.iter().flat_map(|samples| steps_m(samples, dive.step_rad)).collect::<Vec<_>>(),
+    );
+    let t_x_m = match layout {
+        HeadLayout::PhaseShift => {
+            mean(&passes(dive, LINES).iter().flat_map(|line| gaps_m(line)).collect::<Vec<_>>())
+        }
+        HeadLayout::SectorOffset => {
+            mean(&dive.heads.iter().flat_map(|samples| turning_gaps_m(samples)).collect::<Vec<_>>())
+        }
+    };
+    let t = |t_y: f64| math::hypot(t_x_m, t_y);
+    Spacing { t_x_m, t_y, t_m: [t(t_y.mean), t(t_y.min), t(t_y.max)] }
+}
+
+fn mean(values: &[f64]) -> f64 {
+    SpacingSpread::of(values).mean
+}
+
+fn turned_rad(a: &Sample, b: &Sample) -> f64 {
+    math::wrap_signed(b.angle_rad - a.angle_rad, TAU)
+}
+
+/// Distances in the cross-section between pings that follow each other in a sweep.
+fn steps_m(samples: &[Sample], step_rad: f64) -> impl Iterator<Item = f64> {
+    samples.windows(2).filter_map(move |pair| {
+        let [a, b] = pair else { return None };
+        let whole = (turned_rad(a, b).abs() - step_rad).abs() < STEP_SHARE * step_rad;
+        let between = b.at - a.at;
+        (whole && a.of_wall && b.of_wall).then(|| math::hypot(between.y(), between.z()))
+    })
+}
+
+/// For each line along the wall, the chainages at which a head has passed it, growing.
+pub(crate) fn passes(dive: &Dive, count: usize) -> Vec<Vec<f64>> {
+    let perimeter_m = dive.profile.perimeter_m();
+    // Where only some of the heads have come, or still come, passes are farther apart.
+    let ends = |pick: fn(&[Sample]) -> Option<&Sample>| {
+        dive.heads.iter().filter_map(move |samples| pick(samples)).map(|s| s.at.x())
+    };
+    let from_m = ends(<[Sample]>::first).fold(f64::NEG_INFINITY, f64::max);
+    let to_m = ends(<[Sample]>::last).fold(f64::INFINITY, f64::min);
+    let line = |number: usize| {
+        let sigma_m = perimeter_m * (number as f64 + 0.37) / count as f64;
+        let passed = dive.heads.iter().flat_map(|samples| passes_of(dive, samples, sigma_m));
+        let mut line: Vec<f64> = passed.filter(|x_m| (from_m..to_m).contains(x_m)).collect();
+        line.sort_by(f64::total_cmp);
+        line
+    };
+    (0..count).map(line).collect()
+}
+
+/// The chainages at which a head has passed a line along the wall, in order of time.
+pub(crate) fn passes_of(dive: &Dive, samples: &[Sample], sigma_m: f64) -> impl Iterator<Item = f64> {
+    let (perimeter_m, step_rad) = (dive.profile.perimeter_m(), dive.step_rad);
+    samples.windows(2).filter_map(move |pair| {
+        let [a, b] = pair else { return None };
+        if !(a.of_wall && b.of_wall) || turned_rad(a, b).abs() > 2.0 * step_rad {
+            return None;
+        }
+        let around_m = math::wrap_signed(b.sigma_m - a.sigma_m, perimeter_m);
+        let share = math::wrap_signed(sigma_m - a.sigma_m, perimeter_m) / around_m;
+        (0.0..1.0).contains(&share).then(|| a.at.x() + share * (b.at.x() - a.at.x()))
+    })
+}
+
+pub(crate) fn gaps_m(passes: &[f64]) -> impl Iterator<Item = f64> {
+    passes.windows(2).filter_map(|pair| match pair {
+        [a, b] => Some(b - a),
+        _ => None,
+    })
+}
+
+/// Chainage gained between a head's turnings at the same end of its sector.
+fn turning_gaps_m(samples: &[Sample]) -> Vec<f64> {
+    let mut ends: [Vec<f64>; 2] = [Vec::new(), Vec::new()];
+    for triple in samples.windows(3) {
+        let [a, b, c] = triple else { continue };
+        let (before, after) = (turned_rad(a, b), turned_rad(b, c));
+        if before * after < 0.0 {
+            ends[usize::from(before > 0.0)].push(b.at.x());
+        }
+    }
+    ends.iter().flat_map(|end| gaps_m(end)).collect()
+}

@@ -1,0 +1,77 @@
+//! §9.2: the perimeter of the cross-section from a turn of a vehicle that stands still, seen with a beam of some width.
+
+use headrace_core::math::{self, PI, TAU};
+use headrace_core::tunnel::named;
+use serde::Serialize;
+
+use crate::ExperimentError;
+use crate::perimeter::{self, Ping, Settings};
+
+/// Width of the beam at 1 MHz, degrees.
+const BEAM_DEG: f64 = 1.4;
+/// Rays of a beam.
+const RAYS: i32 = 61;
+/// Pings of a turn in SLOW.
+const PINGS: i32 = 1200;
+/// What the paper measured, m.
+const PAPER_M: f64 = 33.09;
+
+/// The perimeter by several ways, m.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Perimeter {
+    /// The blueprint's.
+    pub nominal_m: f64,
+    /// The paper's measurement.
+    pub paper_m: f64,
+    /// The paper's way: skeleton of the echo image, each step of it counted as 1 or sqrt 2 pixels.
+    pub skeleton_m: f64,
+    /// The same skeleton, measured without the staircase's excess.
+    pub skeleton_smooth_m: f64,
+    /// A polygon through the first returns.
+    pub first_returns_m: f64,
+    /// A polygon through the mean ranges of each beam.
+    pub mean_ranges_m: f64,
+    /// A polygon through ideal rays.
+    pub rays_m: f64,
+}
+
+/// Measures it on the blueprint's profile.
+///
+/// Errors: none that can occur.
+pub(crate) fn perimeter() -> Result<Perimeter, ExperimentError> {
+    let profile = named::ceran_blueprint()?;
+    let centre = profile.reference();
+    let range_m = |angle_rad: f64| {
+        let (sin, cos) = math::sin_cos(angle_rad);
+        profile.cast_from_inside(centre, [sin, -cos]).map_or(0.0, |hit| hit.range_m)
+    };
+    // Rays evenly over the beam's disc; those ahead and astern go farther to the same wall.
+    let golden_rad = PI * (3.0 - math::sqrt(5.0));
+    let cone = |angle_rad: f64| -> Vec<f64> {
+        let ray = |number: i32| {
+            let radius =
+                math::sqrt((f64::from(number) + 0.5) / f64::from(RAYS)) * f64::to_radians(BEAM_DEG) / 2.0;
+            let (sin, cos) = math::sin_cos(golden_rad * f64::from(number));
+            let (ahead, aside) = (radius * cos, radius * sin);
+            range_m(angle_rad + aside) / math::cos(ahead)
+        };
+        (0..RAYS).map(ray).collect()
+    };
+    let pings: Vec<Ping> = (0..PINGS)
+        .map(|number| {
+            let angle_rad = TAU * f64::from(number) / f64::from(PINGS);
+            Ping { angle_rad, ranges_m: cone(angle_rad) }
+        })
+        .collect();
+    let rays: Vec<(f64, f64)> = pings.iter().map(|ping| (ping.angle_rad, range_m(ping.angle_rad))).collect();
+    let chain = perimeter::skeleton(&pings, &Settings::of_paper())?;
+    Ok(Perimeter {
+        nominal_m: profile.perimeter_m(),
+        paper_m: PAPER_M,
+        skeleton_m: chain.steps_m,
+        skeleton_smooth_m: chain.corrected_m,
+        first_returns_m: perimeter::polygon_m(&perimeter::least_ranges(&pings))?,
+        mean_ranges_m: perimeter::polygon_m(&perimeter::mean_ranges(&pings))?,
+        rays_m: perimeter::polygon_m(&rays)?,
+    })
+}

@@ -1,0 +1,132 @@
+//! Quadratic B-splines on a line of cells: their values, and the banded matrices of their integrals.
+//!
+//! n cells carry n + 2 functions; the function i lives on the cells i - 2 to i. Lengths are in cells. Matrices are summed
+//! over the cells there are, so that the boundary condition is the natural one (no flux).
+
+/// Integral of N_a N_b over a cell.
+const MASS: [[f64; 3]; 3] = [
+    [6.0 / 120.0, 13.0 / 120.0, 1.0 / 120.0],
+    [13.0 / 120.0, 54.0 / 120.0, 13.0 / 120.0],
+    [1.0 / 120.0, 13.0 / 120.0, 6.0 / 120.0],
+];
+/// Integral of N_a' N_b' over a cell.
+const STIFFNESS: [[f64; 3]; 3] = [
+    [1.0 / 3.0, -1.0 / 6.0, -1.0 / 6.0],
+    [-1.0 / 6.0, 1.0 / 3.0, -1.0 / 6.0],
+    [-1.0 / 6.0, -1.0 / 6.0, 1.0 / 3.0],
+];
+/// Integral of N_a' N_b over a cell.
+const SLOPE: [[f64; 3]; 3] = [
+    [-1.0 / 8.0, -1.0 / 3.0, -1.0 / 24.0],
+    [1.0 / 12.0, 0.0, -1.0 / 12.0],
+    [1.0 / 24.0, 1.0 / 3.0, 1.0 / 8.0],
+];
+
+/// Values at `t` in [0, 1] of a cell of its three functions.
+pub(super) fn values(t: f64) -> [f64; 3] {
+    [(1.0 - t) * (1.0 - t) / 2.0, 0.5 + t - t * t, t * t / 2.0]
+}
+
+/// A matrix with two diagonals on either side; row i holds the columns i - 2 to i + 2.
+pub(super) struct Band {
+    rows: Vec<[f64; 5]>,
+}
+
+impl Band {
+    fn assemble(cells: usize, element: &[[f64; 3]; 3]) -> Self {
+        let mut rows = vec![[0.0; 5]; cells + 2];
+        for cell in 0..cells {
+            for (a, line) in element.iter().enumerate() {
+                for (b, value) in line.iter().enumerate() {
+                    rows[cell + a][2 + b - a] += value;
+                }
+            }
+        }
+        Self { rows }
+    }
+
+    /// Integrals of the products of functions.
+    pub(super) fn mass(cells: usize) -> Self {
+        Self::assemble(cells, &MASS)
+    }
+
+    /// Integrals of the products of their slopes.
+    pub(super) fn stiffness(cells: usize) -> Self {
+        Self::assemble(cells, &STIFFNESS)
+    }
+
+    /// Integrals of the row's slope times the column's function.
+    pub(super) fn slope(cells: usize) -> Self {
+        Self::assemble(cells, &SLOPE)
+    }
+
+    /// Entry on the diagonal.
+    pub(super) fn diagonal(&self, row: usize) -> f64 {
+        self.rows.get(row).map_or(0.0, |r| r[2])
+    }
+
+    /// `target` += this times `source` along one axis of an array `outer x n x inner`.
+    pub(super) fn add_product(&self, inner: usize, source: &[f64], target: &mut [f64]) {
+        let n = self.rows.len();
+        let slabs = source.chunks_exact(n * inner).zip(target.chunks_exact_mut(n * inner));
+        for (source, target) in slabs {
+            for (i, (row, line)) in self.rows.iter().zip(target.chunks_exact_mut(inner)).enumerate() {
+                for (k, coefficient) in row.iter().enumerate() {
+                    let Some(j) = (i + k).checked_sub(2).filter(|j| *j < n) else { continue };
+                    for (t, s) in line.iter_mut().zip(&source[j * inner..(j + 1) * inner]) {
+                        *t += coefficient * s;
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn slopes(t: f64) -> [f64; 3] {
+        [t - 1.0, 1.0 - 2.0 * t, t]
+    }
+
+    #[test]
+    fn verif_integrals_over_a_cell_by_gauss_points() {
+        let root = (0.6_f64).sqrt() / 2.0;
+        let gauss = [(0.5 - root, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.5 + root, 5.0 / 18.0)];
+        let integral = |f: &dyn Fn(f64) -> f64| gauss.iter().map(|(t, w)| w * f(*t)).sum::<f64>();
+        for a in 0..3 {
+            for b in 0..3 {
+                let close = |x: f64, y: f64| assert!((x - y).abs() < 1e-15, "{a} {b}: {x} {y}");
+                close(MASS[a][b], integral(&|t| values(t)[a] * values(t)[b]));
+                close(STIFFNESS[a][b], integral(&|t| slopes(t)[a] * slopes(t)[b]));
+                close(SLOPE[a][b], integral(&|t| slopes(t)[a] * values(t)[b]));
+            }
+        }
+    }
+
+    #[test]
+    fn a_constant_has_no_stiffness_anywhere() {
+        let mut product = vec![0.0; 8];
+        Band::stiffness(6).add_product(1, &[1.0; 8], &mut product);
+        assert!(product.iter().all(|p| p.abs() < 1e-15), "{product:?}");
+    }
+
+    #[test]
+    fn a_product_along_the_middle_axis_is_that_of_each_line() {
+        let band = Band::mass(3);
+        let source: Vec<f64> = (0..2 * 5 * 3).map(f64::from).collect();
+        let mut target = vec![0.0; 30];
+        band.add_product(3, &source, &mut target);
+        for outer in 0..2 {
+            for inner in 0..3 {
+                let line: Vec<f64> = (0..5).map(|i| source[(outer * 5 + i) * 3 + inner]).collect();
+                let mut alone = vec![0.0; 5];
+                band.add_product(1, &line, &mut alone);
+                for i in 0..5 {
+                    assert_eq!(target[(outer * 5 + i) * 3 + inner].to_bits(), alone[i].to_bits());
+                }
+            }
+        }
+    }
+}

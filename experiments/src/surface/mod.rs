@@ -1,0 +1,46 @@
+//! Surfaces through scattered samples of a tunnel's wall, and how far they are from the wall.
+//!
+//! `poisson` closes a surface round the samples as the paper did; `chart` interpolates deviations on the unrolled wall;
+//! `wall` measures both ways between a surface and the design.
+
+mod band;
+pub mod chart;
+mod extract;
+mod grid;
+mod mesh;
+pub mod normals;
+pub mod poisson;
+mod solver;
+mod stats;
+pub mod wall;
+
+pub use mesh::{Mesh, MeshIndex};
+pub use stats::Spread;
+
+/// A place in the tunnel's frame: x chainage, y left, z up, metres.
+pub type Xyz = [f64; 3];
+
+/// A sample of the wall.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sample {
+    /// Where the wall was hit.
+    pub place: Xyz,
+    /// Unit normal there, towards the water.
+    pub normal: Xyz,
+}
+
+pub(crate) fn sub(a: Xyz, b: Xyz) -> Xyz {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+pub(crate) fn along(a: Xyz, direction: Xyz, length: f64) -> Xyz {
+    [a[0] + length * direction[0], a[1] + length * direction[1], a[2] + length * direction[2]]
+}
+
+pub(crate) fn dot(a: Xyz, b: Xyz) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+pub(crate) fn norm(a: Xyz) -> f64 {
+    headrace_core::math::sqrt(dot(a, a))
+}

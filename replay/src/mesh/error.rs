@@ -1,0 +1,113 @@
+//! What can be wrong with a mesh or with its file, and where.
+
+use core::fmt;
+
+use super::MeshFormat;
+
+/// A place in a file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Place {
+    /// Of a text: the line, from 1.
+    Line(usize),
+    /// Of binary data: the offset of the byte, from 0.
+    Byte(usize),
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Line(line) => write!(f, "line {line}"),
+            Self::Byte(byte) => write!(f, "byte {byte}"),
+        }
+    }
+}
+
+/// Why a mesh can't be used. Positions are in the file's own axes.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum MeshError {
+    /// The file isn't as its format says.
+    #[error("reading {format}: {place}: expected {expected}, found {found}")]
+    File {
+        /// The format it was read as.
+        format: MeshFormat,
+        /// Where.
+        place: Place,
+        /// What should be there.
+        expected: String,
+        /// What is there.
+        found: String,
+    },
+    /// No triangle is left.
+    #[error("the mesh has no face ({given} given; those with two corners in one place don't count)")]
+    NoFaces {
+        /// Triangles given, each with two corners in one place.
+        given: usize,
+    },
+    /// More than 32 bits can number.
+    #[error("the mesh has {given} {what}; at most {} can be numbered", u32::MAX)]
+    TooMany {
+        /// Of what.
+        what: &'static str,
+        /// How many.
+        given: usize,
+    },
+    /// A triangle has a corner that isn't there.
+    #[error("face {face} has vertex {vertex} as a corner, of {vertices} vertices (both counted from 0)")]
+    NoSuchVertex {
+        /// Number of the face.
+        face: usize,
+        /// The corner.
+        vertex: u32,
+        /// How many there are.
+        vertices: usize,
+    },
+    /// A vertex isn't anywhere near.
+    #[error("vertex {vertex} (counted from 0) is at {}; coordinates must be finite and within 100 km of 0", At(*at))]
+    FarVertex {
+        /// Number of the vertex.
+        vertex: usize,
+        /// Its coordinates, metres.
+        at: [f64; 3],
+    },
+    /// More than two triangles meet at an edge, so that no side is inside.
+    #[error("{faces} faces share the edge from {} to {}; at most 2 may", At(*from), At(*to))]
+    NonManifold {
+        /// One end of the edge, metres.
+        from: [f64; 3],
+        /// The other end, metres.
+        to: [f64; 3],
+        /// Faces that have this edge.
+        faces: usize,
+    },
+    /// A body isn't closed, or a wall is open elsewhere than at its ends.
+    #[error("the mesh has {holes} hole(s) where it must be closed; the largest has {edges} edges, one of them at {}", At(*at))]
+    Hole {
+        /// How many there are, open ends of a wall not counted.
+        holes: usize,
+        /// Edges around the largest.
+        edges: usize,
+        /// A vertex on its rim, metres.
+        at: [f64; 3],
+    },
+    /// A wall must be open at both ends.
+    #[error(
+        "the wall is closed at its end at x = {x_m:.3} m; it must have an opening within {within_m:.3} m of it"
+    )]
+    ClosedEnd {
+        /// Where the mesh ends, metres.
+        x_m: f64,
+        /// How far from there all vertices of an opening may lie, metres.
+        within_m: f64,
+    },
+}
+
+/// A position as text.
+struct At([f64; 3]);
+
+impl fmt::Display for At {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [x, y, z] = self.0;
+        write!(f, "({x:.3}, {y:.3}, {z:.3})")
+    }
+}

@@ -1,0 +1,207 @@
+//! A ray against a box and a triangle, without gaps between triangles; the distance from a point to a triangle.
+//!
+//! Source: S. Woop, C. Benthin, I. Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013. The side of the ray on
+//! which an edge passes is a difference of two products. Rounding keeps their order and swapping the ends changes the
+//! sign alone, so that the two triangles of an edge agree, or both find zero, which counts as inside: nothing passes
+//! between them.
+
+use headrace_core::math;
+
+/// Where the order of two rounded products leaves the place in a triangle open: seen edge-on, or a needle. A few
+/// thousand units in the last place.
+const THIN: f64 = 1e-12;
+/// Widens the interval of a box by more than its own rounding.
+const WIDER: f64 = 1.0 + 1e-15;
+
+/// What a triangle does to a ray that must not be in doubt.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Crossing {
+    Beside,
+    Through,
+    /// Through an edge or a corner, or along the face.
+    Unclear,
+}
+
+/// A ray, prepared.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Ray {
+    origin: [f64; 3],
+    inverse: [f64; 3],
+    /// The axes in an order that puts the one last to which the ray is nearest.
+    axes: [usize; 3],
+    /// What to take from the first two coordinates for each unit of the last to turn the ray into that axis; and the
+    /// scale of the last.
+    shear: [f64; 3],
+    far: f64,
+}
+
+/// Doubled areas of the parts into which the ray's place divides a triangle, seen along the ray.
+struct Parts {
+    corners: [[f64; 3]; 3],
+    areas: [f64; 3],
+}
+
+impl Ray {
+    /// From an origin and a direction of any length, up to `far` times that length. A direction that isn't finite, or is
+    /// zero, meets nothing.
+    pub(super) fn new(origin: [f64; 3], direction: [f64; 3], far: f64) -> Self {
+        let [x, y, z] = direction.map(f64::abs);
+        let axes = if z >= x && z >= y {
+            [0, 1, 2]
+        } else if y >= x {
+            [2, 0, 1]
+        } else {
+            [1, 2, 0]
+        };
+        let [u, v, w] = axes.map(|k| direction[k]);
+        let shear = [u / w, v / w, 1.0 / w];
+        Self { origin, inverse: direction.map(|d| 1.0 / d), axes, shear, far }
+    }
+
+    /// A lower bound of the range at which the ray may be in a box; infinite if it misses it.
+    ///
+    /// Comparisons are written so that what isn't a number, from zero times infinity, bounds nothing.
+    pub(super) fn enters(&self, low: [f64; 3], high: [f64; 3]) -> f64 {
+        let mut near = 0.0;
+        let mut far = self.far;
+        for k in 0..3 {
+            let a = (low[k] - self.origin[k]) * self.inverse[k];
+            let b = (high[k] - self.origin[k]) * self.inverse[k];
+            let (first, last) = if a > b { (b, a) } else { (a, b) };
+            if first > near {
+                near = first;
+            }
+            if last < far {
+                far = last;
+            }
+        }
+        // The bound is below any hit in the box, even at 0, so that a second hit at the same range is looked at.
+        if near <= far * WIDER { near / WIDER / WIDER - f64::MIN_POSITIVE } else { f64::INFINITY }
+    }
+
+    fn parts(&self, triangle: [[f64; 3]; 3]) -> Parts {
+        let [kx, ky, kz] = self.axes;
+        let corners = triangle.map(|p| {
+            let z = p[kz] - self.origin[kz];
+            [p[kx] - self.origin[kx] - self.shear[0] * z, p[ky] - self.origin[ky] - self.shear[1] * z, z]
+        });
+        let [a, b, c] = corners;
+        let area = |p: [f64; 3], q: [f64; 3]| p[0] * q[1] - p[1] * q[0];
+        Parts { corners, areas: [area(b, c), area(c, a), area(a, b)] }
+    }
+
+    /// The range at which the ray meets a triangle, from either side, its edges included.
+    pub(super) fn hits(&self, triangle: [[f64; 3]; 3]) -> Option<f64> {
+        let parts = self.parts(triangle);
+        let [u, v, w] = parts.areas;
+        if !((u >= 0.0 && v >= 0.0 && w >= 0.0) || (u <= 0.0 && v <= 0.0 && w <= 0.0)) {
+            return None;
+        }
+        let range = parts.depth()? * self.shear[2];
+        (range >= 0.0 && range <= self.far).then_some(range)
+    }
+
+    /// Whether the ray goes through a triangle's inside.
+    pub(super) fn crosses(&self, triangle: [[f64; 3]; 3]) -> Crossing {
+        let parts = self.parts(triangle);
+        let [u, v, w] = parts.areas;
+        let is_outside = (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0);
+        if is_outside || parts.corners.iter().all(|p| p[2] * self.shear[2] < 0.0) {
+            return Crossing::Beside;
+        }
+        if u == 0.0 || v == 0.0 || w == 0.0 {
+            return Crossing::Unclear;
+        }
+        match parts.depth().map(|depth| depth * self.shear[2]) {
+            Some(range) if range > 0.0 => Crossing::Through,
+            Some(range) if range < 0.0 => Crossing::Beside,
+            _ => Crossing::Unclear,
+        }
+    }
+}
+
+impl Parts {
+    /// How far along the last axis the ray's place in the triangle lies.
+    fn depth(&self) -> Option<f64> {
+        let [u, v, w] = self.areas;
+        let [a, b, c] = self.corners;
+        let whole = u + v + w;
+        if whole == 0.0 {
+            return None;
+        }
+        let largest = |p: &[f64; 3]| p[0].abs().max(p[1].abs());
+        let wide = largest(&a).max(largest(&b)).max(largest(&c));
+        let deep = wide.max(a[2].abs()).max(b[2].abs()).max(c[2].abs());
+        if whole.abs() > THIN * wide * deep {
+            return Some((u * a[2] + v * b[2] + w * c[2]) / whole);
+        }
+        // The parts are rounding errors. The triangle is nearly a line, so that its longest side tells the place.
+        let side = |p: [f64; 3], q: [f64; 3]| {
+            let (x, y) = (q[0] - p[0], q[1] - p[1]);
+            let square = x * x + y * y;
+            let share = (-(p[0] * x + p[1] * y) / square).clamp(0.0, 1.0);
+            (square, p[2] + share * (q[2] - p[2]))
+        };
+        let mut longest = side(a, b);
+        for (p, q) in [(b, c), (c, a)] {
+            let next = side(p, q);
+            if next.0 > longest.0 {
+                longest = next;
+            }
+        }
+        Some(if longest.0 > 0.0 { longest.1 } else { a[2] })
+    }
+}
+
+/// The unit normal of a triangle on the side from which a ray of this direction comes; that of a triangle without area
+/// faces the ray.
+pub(super) fn normal_against(triangle: [[f64; 3]; 3], direction: [f64; 3]) -> [f64; 3] {
+    let [a, b, c] = triangle;
+    let normal = cross(minus(b, a), minus(c, a));
+    let length = math::sqrt(dot(normal, normal));
+    if length > 0.0 {
+        let length = if dot(normal, direction) > 0.0 { -length } else { length };
+        normal.map(|n| n / length)
+    } else {
+        direction.map(|d| -d)
+    }
+}
+
+/// The square of the distance from a point to a box; zero inside.
+pub(super) fn square_to_box(point: [f64; 3], low: [f64; 3], high: [f64; 3]) -> f64 {
+    let out = [0, 1, 2].map(|k| (low[k] - point[k]).max(point[k] - high[k]).max(0.0));
+    dot(out, out)
+}
+
+/// The square of the distance from a point to a triangle, which may be without area.
+pub(super) fn square_to_triangle(point: [f64; 3], triangle: [[f64; 3]; 3]) -> f64 {
+    let [a, b, c] = triangle;
+    let normal = cross(minus(b, a), minus(c, a));
+    let is_left = |p: [f64; 3], q: [f64; 3]| dot(cross(minus(q, p), minus(point, p)), normal) >= 0.0;
+    let square = dot(normal, normal);
+    if square > 0.0 && is_left(a, b) && is_left(b, c) && is_left(c, a) {
+        let off = dot(minus(point, a), normal);
+        return off * off / square;
+    }
+    square_to_side(point, a, b).min(square_to_side(point, b, c)).min(square_to_side(point, c, a))
+}
+
+fn square_to_side(point: [f64; 3], p: [f64; 3], q: [f64; 3]) -> f64 {
+    let (side, to) = (minus(q, p), minus(point, p));
+    let square = dot(side, side);
+    let share = if square > 0.0 { (dot(to, side) / square).clamp(0.0, 1.0) } else { 0.0 };
+    let off = minus(to, side.map(|s| s * share));
+    dot(off, off)
+}
+
+fn minus(p: [f64; 3], q: [f64; 3]) -> [f64; 3] {
+    [p[0] - q[0], p[1] - q[1], p[2] - q[2]]
+}
+
+fn dot(p: [f64; 3], q: [f64; 3]) -> f64 {
+    p[0] * q[0] + p[1] * q[1] + p[2] * q[2]
+}
+
+fn cross(p: [f64; 3], q: [f64; 3]) -> [f64; 3] {
+    [p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]]
+}

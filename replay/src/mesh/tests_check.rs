@@ -1,0 +1,181 @@
+//! What is refused, what is mended, and what it is told as; how fast large meshes are.
+
+use super::tests::{cuboid, icosphere, tube};
+use super::*;
+
+fn refused(triangles: &Triangles, role: Role) -> String {
+    Mesh::new(triangles.clone(), role).unwrap_err().to_string()
+}
+
+#[test]
+fn numbers_out_of_range_are_refused() {
+    let cube = cuboid([1.0; 3]);
+    let mut t = cube.clone();
+    t.faces[5][1] = 8;
+    assert_eq!(
+        refused(&t, Role::Body),
+        "face 5 has vertex 8 as a corner, of 8 vertices (both counted from 0)"
+    );
+    for (value, shown) in [(f64::NAN, "NaN"), (f64::INFINITY, "inf"), (1e6, "1000000.000")] {
+        let mut t = cube.clone();
+        t.vertices[3][2] = value;
+        let expected = format!(
+            "vertex 3 (counted from 0) is at (1.000, 1.000, {shown}); coordinates must be finite and within 100 km of 0"
+        );
+        assert_eq!(refused(&t, Role::Body), expected);
+    }
+}
+
+#[test]
+fn triangles_with_two_corners_in_one_place_are_left_out() {
+    let none = "the mesh has no face (0 given; those with two corners in one place don't count)";
+    assert_eq!(refused(&Triangles::default(), Role::Wall), none);
+    let mut t = cuboid([1.0; 3]);
+    let point = Triangles { vertices: vec![[7.0; 3]; 3], faces: vec![[0, 1, 2]] };
+    assert!(refused(&point, Role::Body).starts_with("the mesh has no face (1 given;"));
+    t.faces.insert(0, [4, 4, 5]);
+    t.vertices.push(t.vertices[7].map(|c| c + 1e-10));
+    t.faces.insert(3, [7, 2, 8]);
+    let mesh = Mesh::new(t, Role::Body).unwrap();
+    assert_eq!((mesh.faces(), mesh.left_out()), (12, 2));
+    let hit = mesh.cast([0.0; 3], [0.0, 0.0, 1.0], 9.0).unwrap();
+    assert_eq!(hit.face, 12, "numbers are those of the triangles given");
+}
+
+#[test]
+fn vertices_that_exporters_doubled_are_welded() {
+    let whole = icosphere(3, || 2.0);
+    let mut t = Triangles::default();
+    for (i, corner) in (0_u32..).zip(whole.faces.as_flattened()) {
+        // Off by less than a billionth of the diagonal, to either side.
+        let off = f64::from(i % 3) * 1e-9;
+        t.vertices.push(whole.vertices[*corner as usize].map(|c| c + off));
+    }
+    t.faces = (0..u32::try_from(whole.faces.len()).unwrap()).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+    assert_eq!(Mesh::new(t.clone(), Role::Body).unwrap().faces(), whole.faces.len());
+    t.vertices[0][0] += 1e-6;
+    assert!(refused(&t, Role::Body).starts_with("the mesh has 1 hole(s)"));
+}
+
+#[test]
+fn edges_of_three_faces_are_refused() {
+    let mut t = cuboid([1.0; 3]);
+    t.vertices.push([5.0, 0.0, 0.0]);
+    t.faces.push([0, 1, 8]);
+    assert_eq!(
+        refused(&t, Role::Body),
+        "3 faces share the edge from (-1.000, -1.000, -1.000) to (1.000, -1.000, -1.000); at most 2 may"
+    );
+}
+
+#[test]
+fn a_body_with_holes_is_refused() {
+    let mut t = icosphere(3, || 2.0);
+    let mut middle = t.faces.len() / 2;
+    t.faces.remove(0);
+    while t.faces[middle].iter().any(|corner| t.faces[0].contains(corner)) {
+        middle += 1;
+    }
+    // All the faces of one vertex that isn't a corner of the icosahedron.
+    t.faces.retain(|face| !face.contains(&100));
+    let expected =
+        "the mesh has 2 hole(s) where it must be closed; the largest has 6 edges, one of them at (";
+    let said = refused(&t, Role::Body);
+    assert!(said.starts_with(expected), "{said}");
+    let tube = tube(10, 8, 10.0, || 2.0);
+    let said = refused(&tube, Role::Body);
+    assert_eq!(
+        said,
+        "the mesh has 2 hole(s) where it must be closed; the largest has 8 edges, one of them at (0.000, 0.000, 2.000)"
+    );
+}
+
+#[test]
+fn a_wall_is_open_at_its_ends_and_there_alone() {
+    let whole = tube(100, 8, 100.0, || 2.0);
+    assert!(Mesh::new(whole.clone(), Role::Wall).is_ok());
+
+    // 16 faces between two rings: a missing one within 2 % of the end is part of the end's unevenness.
+    let mut t = whole.clone();
+    t.faces.remove(16);
+    assert!(Mesh::new(t, Role::Wall).is_ok());
+    let mut t = whole.clone();
+    t.faces.remove(16 * 50);
+    assert_eq!(
+        refused(&t, Role::Wall),
+        "the mesh has 1 hole(s) where it must be closed; the largest has 3 edges, one of them at (50.000, 0.000, 2.000)"
+    );
+
+    // A half pipe has one rim, all the way round.
+    let mut t = whole.clone();
+    t.faces.retain(|face| face.iter().all(|corner| corner % 8 <= 4));
+    assert!(
+        refused(&t, Role::Wall)
+            .starts_with("the mesh has 1 hole(s) where it must be closed; the largest has 208")
+    );
+
+    let mut t = whole.clone();
+    t.vertices.push([100.0, 0.0, 0.0]);
+    t.faces.extend((0..8).map(|j| [800 + j, 800 + (j + 1) % 8, 808]));
+    assert_eq!(
+        refused(&t, Role::Wall),
+        "the wall is closed at its end at x = 100.000 m; it must have an opening within 2.000 m of it"
+    );
+    assert_eq!(
+        refused(&cuboid([1.0; 3]), Role::Wall),
+        "the wall is closed at its end at x = -1.000 m; it must have an opening within 0.500 m of it"
+    );
+}
+
+/// Prints what a million triangles cost: `cargo test --release ... -- --ignored --nocapture a_million`.
+#[test]
+#[ignore = "measures"]
+#[expect(clippy::disallowed_methods, reason = "it measures time")]
+fn a_million_triangles() {
+    use std::hint::black_box;
+    use std::time::Instant;
+    let mut tick = 0_u32;
+    let mut radius = || {
+        tick = tick.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        6.0 + 0.02 * f64::from(tick >> 16) / 65_536.0
+    };
+    let triangles = tube(1_000, 500, 100.0, &mut radius);
+    let faces = triangles.faces.len();
+    let start = Instant::now();
+    let mesh = Mesh::new(triangles, Role::Wall).unwrap();
+    println!("{faces} faces: checked and built in {:.0} ms", start.elapsed().as_secs_f64() * 1e3);
+    for (what, tilt) in [("across", 0.0), ("aslant, 45 deg", 1.0), ("aslant, 84 deg", 10.0)] {
+        let rays: Vec<([f64; 3], [f64; 3])> = (0..200_000)
+            .map(|i| {
+                let (sin, cos) = math::sin_cos(f64::from(i) * 0.0157);
+                let length = math::sqrt(1.0 + tilt * tilt);
+                ([10.0 + f64::from(i) * 1e-4, 0.3, -0.2], [tilt / length, sin / length, cos / length])
+            })
+            .collect();
+        let start = Instant::now();
+        let ranges = rays.iter().filter_map(|(origin, direction)| mesh.cast(*origin, *direction, 500.0));
+        let (met, total) = ranges.fold((0, 0.0), |(met, total), hit| (met + 1, total + hit.range_m));
+        let ns = start.elapsed().as_secs_f64() * 1e9 / rays.len() as f64;
+        // The total is the same to the last digit in every build and on every machine.
+        println!("{what}: {ns:.0} ns a ray, {met} of {} met the wall, total range {total:?} m", rays.len());
+    }
+    let places: Vec<[f64; 3]> =
+        (0..20_000).map(|i| [5.0 + f64::from(i) * 4e-3, 0.2, f64::from(i % 500) * 0.01]).collect();
+    let start = Instant::now();
+    let inside = places.iter().filter(|place| mesh.contains(**place)).count();
+    println!(
+        "contains: {:.0} ns, {inside} inside",
+        start.elapsed().as_secs_f64() * 1e9 / places.len() as f64
+    );
+    let start = Instant::now();
+    black_box(places.iter().map(|place| mesh.distance_m(*place)).sum::<f64>());
+    println!("distance: {:.0} ns", start.elapsed().as_secs_f64() * 1e9 / places.len() as f64);
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    println!(
+        "{}",
+        status
+            .lines()
+            .filter(|line| line.starts_with("VmHWM") || line.starts_with("VmRSS"))
+            .collect::<String>()
+    );
+}

@@ -1,0 +1,86 @@
+//! Strength of a ping's echo over bins of range.
+
+use headrace_core::math;
+
+/// Strengths over bins of equal width, centred on its multiples.
+///
+/// This is how we read "we use bilinear interpolation of range values of the 881L sensor to determine where the tunnel
+/// surface is": the head's picture is a grid of angle and range; an echo between grid points belongs to those next to it
+/// in proportion to its distance from them, in angle (the beam's strength, which falls off linearly from its middle) as
+/// in range; and the surface is on the ridge of the picture. Where the beam is oblique to the wall its echo is long,
+/// and the ridge wide and low, as the paper found next to the corners.
+/// Source: Jorge et al. 2021, §9.2.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Bins {
+    width_m: f64,
+    strengths: Vec<f64>,
+    /// The first bin with an echo in it, and the one after the last.
+    filled: (usize, usize),
+}
+
+impl Bins {
+    /// Empty bins, `width_m` > 0 wide.
+    pub(super) fn new(width_m: f64) -> Self {
+        Self { width_m, strengths: Vec::new(), filled: (usize::MAX, 0) }
+    }
+
+    /// Adds an echo: shared linearly between the two bins next to `range_m`.
+    pub(super) fn add(&mut self, range_m: f64, strength: f64) {
+        let at = range_m / self.width_m;
+        let Ok(below) = usize::try_from(math::floor_to_i64(at)) else { return };
+        let above = at - below as f64;
+        if self.strengths.len() < below + 2 {
+            self.strengths.resize(below + 2, 0.0);
+        }
+        for (bin, share) in self.strengths.iter_mut().skip(below).zip([1.0 - above, above]) {
+            *bin += share * strength;
+        }
+        self.filled = (self.filled.0.min(below), self.filled.1.max(below + 2));
+    }
+
+    /// Where the echo is strongest, m: the centroid of the strongest bin and its two neighbours, the nearest where some
+    /// are equal. Empties the bins; `None` where they are.
+    pub(super) fn take_surface_m(&mut self) -> Option<f64> {
+        let (from, to) = std::mem::replace(&mut self.filled, (usize::MAX, 0));
+        let filled = self.strengths.get_mut(from..to)?;
+        let mut strongest = (0, 0.0);
+        for (bin, strength) in filled.iter().enumerate() {
+            if *strength > strongest.1 {
+                strongest = (bin, *strength);
+            }
+        }
+        let first = strongest.0.saturating_sub(1);
+        let (mut sum, mut moment) = (0.0, 0.0);
+        for (bin, strength) in filled.iter().enumerate().skip(first).take(strongest.0 - first + 2) {
+            (sum, moment) = (sum + strength, moment + strength * (from + bin) as f64);
+        }
+        filled.fill(0.0);
+        (sum > 0.0).then(|| moment / sum * self.width_m)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_echo_is_found_where_it_is_and_leaves_the_bins_empty() {
+        let mut bins = Bins::new(0.02);
+        for range_m in [3.0, 3.001, 3.009, 3.010, 3.0199, 0.0, 12.5] {
+            bins.add(range_m, 0.7);
+            assert!((bins.take_surface_m().unwrap() - range_m).abs() < 1e-12, "{range_m}");
+        }
+        assert_eq!(bins.take_surface_m(), None);
+    }
+
+    #[test]
+    fn the_stronger_of_two_echoes_is_taken_and_near_ones_are_taken_together() {
+        let mut bins = Bins::new(0.02);
+        bins.add(3.0, 1.0);
+        bins.add(4.0, 1.5);
+        assert!((bins.take_surface_m().unwrap() - 4.0).abs() < 1e-12);
+        bins.add(3.00, 1.0);
+        bins.add(3.02, 3.0);
+        assert!((bins.take_surface_m().unwrap() - 3.015).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,73 @@
+//! Directions about a beam, and what happens to sound at a wall.
+
+use headrace_core::frames::{Tunnel, Vec3};
+use headrace_core::math;
+
+/// A beam counts as along the tunnel where its direction's share along it is more than this.
+const ALONG: f64 = 0.9;
+
+/// Scalar product.
+pub(super) fn dot(a: Vec3<Tunnel>, b: Vec3<Tunnel>) -> f64 {
+    a.0.dot(&b.0)
+}
+
+/// Two unit vectors square to a beam's unit vector and to each other: the first as far along the tunnel as may be, the
+/// second across it, in the plane in which a head turns whose axis is along the tunnel. For a beam along the tunnel the
+/// first is as far up as may be.
+pub(super) fn square_to(direction: Vec3<Tunnel>) -> [Vec3<Tunnel>; 2] {
+    let along = direction.x().abs() > ALONG;
+    let towards = if along { Vec3::new(0.0, 0.0, 1.0) } else { Vec3::new(1.0, 0.0, 0.0) };
+    let rest = towards + direction.scaled(-dot(towards, direction));
+    let first = rest.scaled(1.0 / rest.norm());
+    let second = direction.0.cross(&first.0);
+    [first, Vec3::new(second.x, second.y, second.z)]
+}
+
+/// How squarely a beam meets a wall: the cosine of its incidence, from 0 along the wall to 1 square to it.
+///
+/// `normal` is a unit vector towards the water.
+pub(super) fn squareness(direction: Vec3<Tunnel>, normal: Vec3<Tunnel>) -> f64 {
+    (-dot(direction, normal)).clamp(0.0, 1.0)
+}
+
+/// Where a smooth wall sends a beam on.
+pub(super) fn mirrored(direction: Vec3<Tunnel>, normal: Vec3<Tunnel>) -> Vec3<Tunnel> {
+    direction + normal.scaled(-2.0 * dot(direction, normal))
+}
+
+/// Angle between two vectors, radians, in [0, pi]; they may have any length but zero.
+pub(super) fn between_rad(a: Vec3<Tunnel>, b: Vec3<Tunnel>) -> f64 {
+    math::atan2(a.0.cross(&b.0).norm(), dot(a, b))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn vectors_square_to_a_beam_are_square_and_one_is_in_the_plane_of_turning() {
+        for k in 0..50 {
+            let (a, b) = (f64::from(k) * 0.7, f64::from(k) * 0.31);
+            let ((sa, ca), (sb, cb)) = (math::sin_cos(a), math::sin_cos(b));
+            let direction = Vec3::new(sb, ca * cb, sa * cb);
+            let [u, v] = square_to(direction);
+            for (p, q, product) in
+                [(u, u, 1.0), (v, v, 1.0), (u, v, 0.0), (u, direction, 0.0), (v, direction, 0.0)]
+            {
+                assert!((dot(p, q) - product).abs() < 1e-14, "{direction:?}");
+            }
+        }
+        let [u, v] = square_to(Vec3::new(0.0, 1.0, 0.0));
+        assert_eq!((u, v), (Vec3::new(1.0, 0.0, 0.0), Vec3::new(0.0, 0.0, -1.0)));
+    }
+
+    #[test]
+    fn a_mirrored_beam_keeps_its_length_and_its_incidence() {
+        let (direction, normal) = (Vec3::new(0.0, 0.6, -0.8), Vec3::new(0.0, 0.0, 1.0));
+        assert_eq!(mirrored(direction, normal), Vec3::new(0.0, 0.6, 0.8));
+        assert!((squareness(direction, normal) - 0.8).abs() < 1e-15);
+        assert!(
+            (between_rad(direction, mirrored(direction, normal)) - 2.0 * math::atan2(0.8, 0.6)).abs() < 1e-15
+        );
+    }
+}

@@ -1,0 +1,59 @@
+//! Keys that several effects have.
+
+use std::ops::RangeInclusive;
+
+use headrace_core::config::{ConfigError, Section};
+
+/// The table of an effect that is for the vehicle or the tunnel, not for sensors one by one.
+///
+/// Errors: more than one.
+pub(super) fn only_one(tables: Vec<Section<'_>>) -> Result<Vec<Section<'_>>, ConfigError> {
+    match tables.get(1) {
+        Some(second) => Err(second.invalid_itself("is a second table; this effect has one")),
+        None => Ok(tables),
+    }
+}
+
+/// Two numbers `[least, most]`.
+///
+/// Errors: other than two, one outside `allowed`, or in the wrong order.
+pub(super) fn span(
+    table: &Section<'_>,
+    key: &'static str,
+    allowed: RangeInclusive<f64>,
+    usual: [f64; 2],
+) -> Result<[f64; 2], ConfigError> {
+    match table.numbers(key, allowed)?.as_deref() {
+        None => Ok(usual),
+        Some([least, most]) if least <= most => Ok([*least, *most]),
+        Some(_) => Err(table.invalid(key, "must be two numbers [least, most]")),
+    }
+}
+
+/// A number, zero where it is absent.
+///
+/// Errors: outside `allowed`.
+pub(super) fn or_zero(
+    table: &Section<'_>,
+    key: &'static str,
+    allowed: RangeInclusive<f64>,
+) -> Result<f64, ConfigError> {
+    Ok(table.number(key, allowed)?.unwrap_or(0.0))
+}
+
+/// That an effect does something.
+///
+/// Errors: all of these keys are zero or absent.
+pub(super) fn some_not_zero(table: &Section<'_>, values: &[(&'static str, f64)]) -> Result<(), ConfigError> {
+    if values.iter().any(|(_, value)| *value != 0.0) {
+        return Ok(());
+    }
+    let keys: Vec<&str> = values.iter().map(|(key, _)| *key).collect();
+    match keys.as_slice() {
+        [] => Ok(()),
+        [only] => Err(table.invalid(only, "must not be zero, or the effect has none")),
+        [first, others @ ..] => {
+            Err(table.invalid(first, &format!("or {} must not be zero", others.join(" or "))))
+        }
+    }
+}

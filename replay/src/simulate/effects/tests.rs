@@ -1,0 +1,4 @@
+//! Effects together, and what they cost.
+
+mod motion;
+mod sonar;

@@ -1,0 +1,184 @@
+//! What a simulation keeps: an entity for each sensor, and what all of them share.
+//!
+//! A simulation goes slice by slice; within one, each system works through all measurements of its kind at once.
+
+use bevy_ecs::prelude::{Component, Resource};
+use headrace_core::app::device::{Direction, Emulator};
+use headrace_core::app::measurement::Measurement;
+use headrace_core::frames::{Mount, Point3, Pose, Rot, Tunnel, Vec3};
+use headrace_core::math;
+use headrace_core::sampling::head::HeadSpec;
+use headrace_core::site::Site;
+use headrace_core::time::{DurNs, MonoNs};
+
+use super::START;
+use super::SceneError;
+use super::surroundings::{Hit, Surroundings, What};
+use super::way::Way;
+
+/// The stretch of time that is being simulated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Resource)]
+pub(super) struct Slice {
+    /// Its beginning.
+    pub from: MonoNs,
+    /// Its end, excluded.
+    pub until: MonoNs,
+}
+
+/// The tunnel, the vehicle's way through it, the water.
+#[derive(Debug, Resource)]
+pub struct Scenery {
+    /// What is round the vehicle.
+    pub surroundings: Surroundings,
+    /// Its way.
+    pub way: Way,
+    /// Water and levels, as they truly are.
+    pub site: Site,
+}
+
+/// A sensor by its place in the vehicle file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Component)]
+pub(super) struct Source(pub u16);
+
+/// How it sits on the vehicle.
+#[derive(Debug, Clone, Copy, PartialEq, Component)]
+pub(super) struct Mounted(pub Mount);
+
+/// The device's side of its wire.
+#[derive(Component)]
+pub(super) struct Device<M: Measurement>(pub Box<dyn Emulator<M>>);
+
+/// A profiling head.
+#[derive(Debug, Clone, Copy, PartialEq, Component)]
+pub(super) struct Head(pub HeadSpec);
+
+/// A fixed echosounder.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Component)]
+pub(super) struct Echosounder;
+
+/// The slice's measurements, in order of time.
+#[derive(Debug, Clone, Component)]
+pub(super) struct Samples<M: Measurement> {
+    /// Number of the first, counted through the dive: the step by which effects draw.
+    pub first: u64,
+    /// The measurements.
+    pub list: Vec<M>,
+}
+
+/// Where the slice's soundings go, one for one with the samples.
+#[derive(Debug, Clone, Default, Component)]
+pub(super) struct Rays(pub Vec<Ray>);
+
+/// A beam's middle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Ray {
+    /// Where the sonar is.
+    pub origin: Point3<Tunnel>,
+    /// Where it looks, a unit vector.
+    pub direction: Vec3<Tunnel>,
+    /// What its ray meets; `None` where that is nothing within reach.
+    pub hit: Option<Hit>,
+}
+
+/// The farthest that a sonar hears at its setting, m of water, and a little beyond.
+#[derive(Debug, Clone, Copy, PartialEq, Component)]
+pub(super) struct Reach(pub f64);
+
+/// What the slice puts on a line.
+#[derive(Debug, Clone, Default, Component)]
+pub(super) struct Line {
+    /// The messages, in the order in which the device sent them.
+    pub messages: Vec<LineMessage>,
+    /// Their bytes.
+    pub bytes: Vec<u8>,
+}
+
+/// A message on a line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct LineMessage {
+    /// When its first byte crosses the line.
+    pub at: MonoNs,
+    /// Which way.
+    pub direction: Direction,
+    /// Where its bytes begin and end in the line's.
+    pub bytes: (usize, usize),
+    /// The sample that it tells, counted within the slice.
+    pub sample: usize,
+}
+
+impl<M: Measurement> Default for Samples<M> {
+    fn default() -> Self {
+        Self { first: 0, list: Vec::new() }
+    }
+}
+
+impl<M: Measurement> Samples<M> {
+    /// The measurements with their steps.
+    pub(super) fn steps(&mut self) -> impl Iterator<Item = (u64, &mut M)> {
+        (self.first..).zip(&mut self.list)
+    }
+}
+
+impl Scenery {
+    /// The vehicle's true pose.
+    pub fn pose(&self, at: MonoNs) -> Pose {
+        let place = self.way.place(at.since(START).as_secs_f64());
+        let axis = self.surroundings.axis();
+        let [roll, pitch, yaw] = place.turned_rad;
+        let yaw = if axis.is_straight() { yaw } else { yaw + axis.heading_rad(place.chainage_m) };
+        let attitude = if roll == 0.0 && pitch == 0.0 && yaw == 0.0 {
+            Rot::identity()
+        } else {
+            Rot::from_roll_pitch_yaw(roll, pitch, yaw)
+        };
+        Pose { position: axis.place(place.chainage_m, place.across_m), attitude }
+    }
+
+    /// The chainage that the vehicle has truly come to, m.
+    pub fn chainage_m(&self, at: MonoNs) -> f64 {
+        self.way.place(at.since(START).as_secs_f64()).chainage_m
+    }
+}
+
+impl Line {
+    /// Adds a message.
+    pub(super) fn send(&mut self, at: MonoNs, direction: Direction, bytes: &[u8], sample: usize) {
+        let from = self.bytes.len();
+        self.bytes.extend_from_slice(bytes);
+        self.messages.push(LineMessage { at, direction, bytes: (from, self.bytes.len()), sample });
+    }
+
+    /// Forgets the slice's messages.
+    pub(super) fn clear(&mut self) {
+        self.messages.clear();
+        self.bytes.clear();
+    }
+}
+
+/// Time between two places at which the way is looked at, s.
+const CHECK_S: f64 = 0.5;
+
+impl Scenery {
+    /// That the way leads through water alone.
+    ///
+    /// Errors: the first place where it doesn't.
+    pub(super) fn check(&self) -> Result<(), SceneError> {
+        let steps = math::floor_to_i64(self.way.duration_s() / CHECK_S) + 1;
+        let at = |step: i64| (step as f64 * CHECK_S).min(self.way.duration_s());
+        let mut from = self.pose(START).position;
+        for step in 1..=steps {
+            let after_s = at(step);
+            let to = self.pose(START + DurNs::from_secs_f64(after_s)).position;
+            if let Some(hit) = self.surroundings.first_obstruction(from, to) {
+                let [chainage_m, y_m, z_m] = self.surroundings.axis().chart(hit.point);
+                let what = match hit.what {
+                    What::Wall => "the wall".to_owned(),
+                    What::Feature(feature) => self.surroundings.feature_name(feature).to_owned(),
+                };
+                return Err(SceneError::Blocked { after_s, chainage_m, y_m, z_m, what });
+            }
+            from = to;
+        }
+        Ok(())
+    }
+}

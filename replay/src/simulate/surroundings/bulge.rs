@@ -1,0 +1,79 @@
+//! Where the wall isn't on the profile: displaced towards the reference point, or away from it.
+
+use headrace_core::math::{self, PI};
+
+/// A displaced patch of wall, a raised cosine along the tunnel and along the wall.
+///
+/// The wall moves along the ray from the profile's reference point, so that any displacement short of that point leaves
+/// the section star-shaped.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Bulge {
+    /// The feature that it belongs to.
+    pub(super) feature: u16,
+    /// Chainage of its middle, m.
+    pub(super) chainage_m: f64,
+    /// Half its extent along the tunnel, m.
+    pub(super) half_length_m: f64,
+    /// Arc length of its middle on the unscaled profile, m.
+    pub(super) sigma_m: f64,
+    /// Half its extent along the wall of the unscaled profile, m.
+    pub(super) half_width_m: f64,
+    /// Displacement of its middle, inwards positive, m.
+    pub(super) depth_m: f64,
+}
+
+impl Bulge {
+    /// Chainage at which it begins, m.
+    pub(super) fn begin_m(&self) -> f64 {
+        self.chainage_m - self.half_length_m
+    }
+
+    /// Chainage at which it ends, m.
+    pub(super) fn end_m(&self) -> f64 {
+        self.chainage_m + self.half_length_m
+    }
+
+    /// Displacement of the wall at a place of the unrolled profile of this perimeter, inwards positive, m.
+    pub(super) fn displacement_m(&self, chainage_m: f64, sigma_m: f64, perimeter_m: f64) -> f64 {
+        let along = (chainage_m - self.chainage_m) / self.half_length_m;
+        if along.abs() >= 1.0 {
+            return 0.0;
+        }
+        let across = self.off_middle_m(sigma_m, perimeter_m) / self.half_width_m;
+        if across >= 1.0 {
+            return 0.0;
+        }
+        self.depth_m * raised_cosine(along) * raised_cosine(across)
+    }
+
+    /// Its steepest slope along the tunnel.
+    pub(super) fn steepest_along(&self) -> f64 {
+        self.depth_m.abs() * PI / 2.0 / self.half_length_m
+    }
+
+    /// Its steepest slope along the wall.
+    pub(super) fn steepest_across(&self) -> f64 {
+        self.depth_m.abs() * PI / 2.0 / self.half_width_m
+    }
+
+    /// Whether it comes within `margin_m` of this arc length.
+    pub(super) fn covers(&self, sigma_m: f64, perimeter_m: f64, margin_m: f64) -> bool {
+        self.off_middle_m(sigma_m, perimeter_m) < self.half_width_m + margin_m
+    }
+
+    /// Whether the two share a place.
+    pub(super) fn overlaps(&self, other: &Self, perimeter_m: f64) -> bool {
+        self.begin_m() < other.end_m()
+            && other.begin_m() < self.end_m()
+            && self.covers(other.sigma_m, perimeter_m, other.half_width_m)
+    }
+
+    fn off_middle_m(&self, sigma_m: f64, perimeter_m: f64) -> f64 {
+        math::wrap_signed(sigma_m - self.sigma_m, perimeter_m).abs()
+    }
+}
+
+/// 1 in the middle, 0 with slope 0 at -1 and 1.
+fn raised_cosine(x: f64) -> f64 {
+    0.5 + 0.5 * math::cos(PI * x)
+}

@@ -1,0 +1,65 @@
+//! What is near a stretch of chainage, found without looking at the rest.
+
+use headrace_core::math;
+
+/// Things by the metres of chainage that they reach into.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Index {
+    first_m: f64,
+    bucket_m: f64,
+    /// Where the list of each bucket begins; one more than there are buckets, or empty.
+    starts: Vec<usize>,
+    /// Numbers of things, bucket by bucket. A thing that reaches into several is in each.
+    numbers: Vec<u32>,
+}
+
+/// Length of a bucket, m: about the span of a boulder, and several times that of a profiler's ray.
+const BUCKET_M: f64 = 1.0;
+/// Buckets at most; a longer tunnel has longer ones.
+const MOST_BUCKETS: f64 = 65_536.0;
+
+impl Index {
+    /// Thing k reaches from `spans[k].0` to `spans[k].1` of chainage, m.
+    ///
+    /// Allocates: startup only.
+    pub(super) fn new(spans: &[(f64, f64)]) -> Self {
+        if spans.is_empty() {
+            return Self::default();
+        }
+        let first_m = spans.iter().map(|span| span.0).fold(f64::INFINITY, f64::min);
+        let last_m = spans.iter().map(|span| span.1).fold(f64::NEG_INFINITY, f64::max);
+        let bucket_m = BUCKET_M.max((last_m - first_m) / MOST_BUCKETS);
+        let mut index = Self { first_m, bucket_m, starts: Vec::new(), numbers: Vec::new() };
+        let count = index.bucket(last_m) + 1;
+        let mut lists = vec![Vec::new(); count];
+        for (number, (from_m, to_m)) in (0_u32..).zip(spans) {
+            for list in lists.iter_mut().take(index.bucket(*to_m) + 1).skip(index.bucket(*from_m)) {
+                list.push(number);
+            }
+        }
+        index.starts.push(0);
+        for list in lists {
+            index.numbers.extend(list);
+            index.starts.push(index.numbers.len());
+        }
+        index
+    }
+
+    /// Numbers of all things that reach into `[from_m, to_m]`, some of them more than once, and perhaps of a few beside it.
+    pub(super) fn near(&self, from_m: f64, to_m: f64) -> &[u32] {
+        let Some(count) = self.starts.len().checked_sub(1) else { return &[] };
+        if to_m < self.first_m {
+            return &[];
+        }
+        let first = self.bucket(from_m);
+        if first >= count {
+            return &[];
+        }
+        let past = (self.bucket(to_m) + 1).min(count);
+        &self.numbers[self.starts[first]..self.starts[past]]
+    }
+
+    fn bucket(&self, chainage_m: f64) -> usize {
+        usize::try_from(math::floor_to_i64((chainage_m - self.first_m) / self.bucket_m)).unwrap_or(0)
+    }
+}

@@ -1,0 +1,90 @@
+//! How the profile's size changes along the tunnel.
+
+use headrace_core::config::{ConfigError, Section};
+
+/// The wall may move by as much as this along the ray from the floor's centre, for each metre of chainage.
+const STEEPEST: f64 = 1.0;
+
+/// Scale of the profile by chainage: linear between stations, constant outside; 1 without stations.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Scales {
+    /// Chainage, m, and scale, by growing chainage.
+    stations: Vec<(f64, f64)>,
+}
+
+impl Scales {
+    /// Reads the `[[tunnel.stations]]` tables. `farthest_m` is the wall's largest distance from the floor's centre.
+    ///
+    /// Errors: a key missing, unknown or out of range; stations out of order, or too steep a change between two.
+    pub(super) fn parse(
+        sections: Vec<Section<'_>>,
+        farthest_m: f64,
+        length_m: f64,
+    ) -> Result<Self, ConfigError> {
+        let mut stations: Vec<(f64, f64)> = Vec::new();
+        for section in sections {
+            let chainage_m = section.required("chainage_m", section.number("chainage_m", 0.0..=length_m)?)?;
+            let scale = section.required("scale", section.number("scale", 0.2..=5.0)?)?;
+            if let Some((before_m, before)) = stations.last() {
+                if chainage_m <= *before_m {
+                    let problem = format!("must be more than the station's before, {before_m} m");
+                    return Err(section.invalid("chainage_m", &problem));
+                }
+                let least_m = (scale - before).abs() * farthest_m / STEEPEST;
+                if chainage_m - before_m < least_m {
+                    let problem = format!(
+                        "moves the wall by {least_m:.3} m within {:.3} m of tunnel; at most {STEEPEST} m a metre",
+                        chainage_m - before_m
+                    );
+                    return Err(section.invalid("scale", &problem));
+                }
+            }
+            section.finish()?;
+            stations.push((chainage_m, scale));
+        }
+        Ok(Self { stations })
+    }
+
+    /// Chainages at which the slope changes, m.
+    pub(super) fn breaks(&self) -> impl Iterator<Item = f64> + '_ {
+        self.stations.iter().map(|station| station.0)
+    }
+
+    /// Scale at `chainage_m`.
+    pub(super) fn at(&self, chainage_m: f64) -> f64 {
+        let after = self.stations.partition_point(|station| station.0 <= chainage_m);
+        match (after.checked_sub(1).and_then(|before| self.stations.get(before)), self.stations.get(after)) {
+            (Some((from_m, from)), Some((to_m, to))) => {
+                from + (to - from) * ((chainage_m - from_m) / (to_m - from_m))
+            }
+            (Some((_, only)), None) | (None, Some((_, only))) => *only,
+            (None, None) => 1.0,
+        }
+    }
+
+    /// Change of scale for each metre between two chainages with no station between them, 1/m.
+    pub(super) fn slope_pm(&self, from_m: f64, to_m: f64) -> f64 {
+        if from_m.is_finite() && to_m.is_finite() {
+            (self.at(to_m) - self.at(from_m)) / (to_m - from_m)
+        } else {
+            0.0
+        }
+    }
+
+    /// Whether it is 1 everywhere.
+    #[expect(clippy::float_cmp, reason = "any other scale, however near, is one")]
+    pub(super) fn is_one(&self) -> bool {
+        self.stations.iter().all(|station| station.1 == 1.0)
+    }
+
+    /// The largest scale.
+    pub(super) fn largest(&self) -> f64 {
+        self.stations.iter().map(|station| station.1).reduce(f64::max).unwrap_or(1.0)
+    }
+
+    /// The smallest scale between two chainages.
+    pub(super) fn smallest(&self, from_m: f64, to_m: f64) -> f64 {
+        let within = self.stations.iter().filter(|station| (from_m..=to_m).contains(&station.0));
+        within.map(|station| station.1).fold(self.at(from_m).min(self.at(to_m)), f64::min)
+    }
+}

@@ -1,0 +1,223 @@
+//! A bench for effects: a vehicle with one device or two of each kind, dived along short ways.
+
+use bevy_ecs::entity::Entity;
+use headrace_core::app::device::{DeviceKind, Direction};
+use headrace_core::app::measurement::{Inertia, Measurement, Payout, Pressure, Sounding};
+use headrace_core::config::Document;
+use headrace_core::time::{DurNs, MonoNs};
+
+use super::sensing::Samples;
+use super::{Scene, SceneError, Simulation};
+
+const KINDS: [&dyn DeviceKind; 5] = [
+    &headrace_imagenex881::Kind,
+    &headrace_ping1d::Kind,
+    &headrace_bar100::Kind,
+    &headrace_imu_can::Kind,
+    &headrace_tether_hid::Kind,
+];
+
+const VEHICLE: &str = r#"
+target_m = 0.7
+
+[tunnel]
+profile = "ceran"
+length_m = 200
+
+[heads]
+layout = "LAYOUT"
+planned_speed_mps = 0.12
+
+[[sensors]]
+id = "head_a"
+plugin = "imagenex881"
+connect = "tcp:192.168.0.4:4040"
+position_m = [0.551, 0, 0]
+mode = "fast"
+range_m = 10
+
+[[sensors]]
+id = "head_b"
+plugin = "imagenex881"
+connect = "tcp:192.168.0.5:4040"
+position_m = [-0.551, 0.15, 0]
+angles_deg = [0, 0, 180]
+mode = "fast"
+range_m = 10
+
+[[sensors]]
+id = "ping"
+plugin = "ping1d"
+connect = "udp:192.168.2.2:9090"
+
+[[sensors]]
+id = "depth"
+plugin = "bar100"
+connect = "i2c:/dev/i2c-1:0x40"
+
+[[sensors]]
+id = "imu"
+plugin = "imu_can"
+connect = "can:can0"
+preset = "xsens_mti600"
+
+[[sensors]]
+id = "tether"
+plugin = "tether_hid"
+connect = "hid:1209:0001"
+counts_per_metre = 2000
+"#;
+
+/// There, and a little way back: 35 s.
+pub(super) const LEGS: &str = "start_m = 2.0\n[[trajectory.legs]]\ndistance_m = 6\nspeed_mps = 0.2\n\
+                               [[trajectory.legs]]\ndistance_m = 1\nspeed_mps = -0.2\n";
+/// On and on: 640 s.
+pub(super) const LONG: &str = "start_m = 2.0\n[[trajectory.legs]]\ndistance_m = 64\nspeed_mps = 0.1\n";
+/// A pilot to 40 m.
+pub(super) const PILOT: &str = "kind = \"pilot\"\nto_m = 40\nspeed_mps = 0.4\nstops_per_hour = 60\n\
+                                backs_per_hour = 60\nback_m = [0.5, 2]\nstop_s = [5, 10]\n";
+/// A way that is given over ground.
+pub(super) const WAYPOINTS: &str = "kind = \"waypoints\"\n[[trajectory.waypoints]]\nchainage_m = 2\n\
+                                    [[trajectory.waypoints]]\nchainage_m = 6\nspeed_mps = 0.2\n";
+
+/// What crossed a line: when, which way, what.
+pub(super) type OnLine = (MonoNs, Direction, Vec<u8>);
+
+/// A scene to be dived with any effects.
+pub(super) struct Bench {
+    layout: &'static str,
+    scene: String,
+}
+
+impl Bench {
+    /// Heads that turn on, for 35 s.
+    pub(super) fn turning(effects: &str) -> Self {
+        Self::on(LEGS, effects)
+    }
+
+    /// Heads in sectors, for 35 s.
+    pub(super) fn sectors(effects: &str) -> Self {
+        Self { layout: "sector_offset", ..Self::on(LEGS, effects) }
+    }
+
+    /// Heads that turn on, for 640 s.
+    pub(super) fn long(effects: &str) -> Self {
+        Self::on(LONG, effects)
+    }
+
+    /// Heads in sectors, for 640 s.
+    pub(super) fn long_sectors(effects: &str) -> Self {
+        Self { layout: "sector_offset", ..Self::long(effects) }
+    }
+
+    /// Heads that turn on, on this way.
+    pub(super) fn on(trajectory: &str, effects: &str) -> Self {
+        let scene = format!("vehicle = \"vehicle.toml\"\nseed = 11\n[trajectory]\n{trajectory}\n{effects}\n");
+        Self { layout: "phase_shift", scene }
+    }
+
+    fn parse(&self) -> Result<Scene, SceneError> {
+        let vehicle = VEHICLE.replace("LAYOUT", self.layout);
+        Scene::parse(Document::new("scene", &self.scene), &KINDS, &|_| Ok(vehicle.clone().into_bytes()), None)
+    }
+
+    pub(super) fn simulation(&self) -> Simulation {
+        self.parse().and_then(|scene| Simulation::new(&scene)).unwrap()
+    }
+
+    /// Why it can't be dived; empty where it can.
+    pub(super) fn refusal(&self) -> String {
+        let simulated = self.parse().and_then(|scene| Simulation::new(&scene));
+        simulated.err().map(|why| why.to_string()).unwrap_or_default()
+    }
+
+    /// The number of a sensor.
+    pub(super) fn source(&self, sensor: &str) -> usize {
+        self.parse().unwrap().facts.sensors.iter().position(|s| s.id == sensor).unwrap()
+    }
+
+    pub(super) fn sensors(&self) -> u16 {
+        u16::try_from(self.parse().unwrap().facts.sensors.len()).unwrap()
+    }
+
+    /// All that a sensor measured, without the others.
+    pub(super) fn run<M: Measurement>(&self, sensor: &str) -> Vec<M> {
+        let scene = self.parse().unwrap();
+        let mut sim = Simulation::new(&scene).unwrap();
+        let source = self.source(sensor);
+        sim.keep_only(source);
+        let mut all: Vec<M> = Vec::new();
+        while sim.next_slice() {
+            let samples = sim.world.get::<Samples<M>>(sim.entities[source]).unwrap();
+            if samples.first == all.len() as u64 {
+                all.extend_from_slice(&samples.list);
+            }
+        }
+        all
+    }
+
+    /// All that crossed the lines.
+    pub(super) fn messages(&self) -> Vec<(MonoNs, u16, Direction, Vec<u8>)> {
+        self.messages_in(DurNs(1_000_000_000))
+    }
+
+    fn messages_in(&self, slice: DurNs) -> Vec<(MonoNs, u16, Direction, Vec<u8>)> {
+        let mut sim = self.simulation().in_slices(slice);
+        let mut all = Vec::new();
+        while let Some(message) = sim.next_message() {
+            all.push((message.at, message.source, message.direction, message.bytes.to_vec()));
+        }
+        all
+    }
+
+    /// What crossed one line.
+    pub(super) fn line(&self, source: u16) -> Vec<OnLine> {
+        let all = self.messages().into_iter().filter(|message| message.1 == source);
+        all.map(|(at, _, direction, bytes)| (at, direction, bytes)).collect()
+    }
+}
+
+impl Simulation {
+    /// Takes the other sensors from the vehicle.
+    pub(super) fn keep_only(&mut self, source: usize) {
+        for (other, entity) in self.entities.iter().enumerate() {
+            if other != source {
+                self.world.despawn(*entity);
+            }
+        }
+    }
+
+    /// Forgets the messages that are due.
+    pub(super) fn forget_messages(&mut self) {
+        while self.outbox.has_next() {
+            self.outbox.next();
+        }
+    }
+
+    /// How many measurements the last slice has.
+    pub(super) fn measured(&self) -> usize {
+        let count = |entity: &Entity| {
+            self.world.get::<Samples<Sounding>>(*entity).map_or(0, |s| s.list.len())
+                + self.world.get::<Samples<Pressure>>(*entity).map_or(0, |s| s.list.len())
+                + self.world.get::<Samples<Inertia>>(*entity).map_or(0, |s| s.list.len())
+                + self.world.get::<Samples<Payout>>(*entity).map_or(0, |s| s.list.len())
+        };
+        self.entities.iter().map(count).sum()
+    }
+}
+
+/// Why the short dive can't be made with these effects.
+pub(super) fn refusal(effects: &str) -> String {
+    Bench::turning(effects).refusal()
+}
+
+/// That the lines carry the same, bit for bit, however long slices are.
+pub(super) fn same_in_any_slices(bench: &Bench) {
+    let usual = bench.messages();
+    assert!(usual.len() > 1000 && usual.windows(2).all(|w| w[0].0 <= w[1].0));
+    for nanos in [13_000_007, 333_333_333, 20_000_000_000] {
+        let other = bench.messages_in(DurNs(nanos));
+        let differs = usual.iter().zip(&other).position(|(a, b)| a != b);
+        assert!(usual.len() == other.len() && differs.is_none(), "{nanos} ns: message {differs:?}");
+    }
+}

@@ -1,0 +1,263 @@
+//! `simulate`: a scene becomes a log, with its truth beside it; or what would be simulated is explained.
+
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use headrace_core::app::device::Direction;
+use headrace_core::config::Document;
+use headrace_core::time::MonoNs;
+use headrace_replay::log::LogWriter;
+use headrace_replay::simulate::effects::KINDS as EFFECTS;
+use headrace_replay::simulate::surroundings::What;
+use headrace_replay::simulate::{Added, START, Scene, Simulation, SoundingTruth, TruthRow};
+use serde_json::json;
+
+use crate::cli::Simulate;
+use crate::devices::KINDS;
+use crate::dive::log_header;
+use crate::failure::{self, Failure};
+use crate::files;
+use crate::output::{append, deliver, put, say};
+use crate::progress::Progress;
+
+/// Turns a scene into a log, or explains what it would simulate.
+pub(crate) fn simulate(args: &Simulate) -> Result<u8, Failure> {
+    let text = files::read(&args.scene)?;
+    let name = args.scene.display().to_string();
+    let load = files::bytes_beside(&args.scene);
+    let scene = Scene::parse(Document::new(&name, &text), &KINDS, &load, args.seed)?;
+    if args.explain {
+        return explain(&scene, args.json);
+    }
+    let Some(output) = &args.output else {
+        let what = "simulate: where to? -o LOG.mcap names the log, or --explain says what would be simulated";
+        return Err(Failure::Usage(what.to_owned()));
+    };
+    let mut simulation =
+        if args.truth.is_some() { Simulation::with_truth(&scene)? } else { Simulation::new(&scene)? };
+    let mut truth = args.truth.as_deref().map(|path| Truth::create(path, &scene, &simulation)).transpose()?;
+    let mut writer = LogWriter::create(output, &log_header(&scene.vehicle, &scene.vehicle_text, false))?;
+    let mut progress = Progress::start();
+    let duration_s = simulation.duration_s();
+    while let Some(message) = simulation.next_message() {
+        let after_s = message.at.since(START).as_secs_f64();
+        progress.at(|| format!("{after_s:.0} s of {duration_s:.0} s"));
+        match message.direction {
+            Direction::Received => writer.raw(message.source, message.at, message.at, message.bytes)?,
+            Direction::Sent => writer.sent(message.source, message.at, message.bytes)?,
+        }
+        if let Some(truth) = &mut truth {
+            truth.write(&scene, &simulation.take_truth())?;
+        }
+    }
+    let (_, written) = writer.finish()?;
+    if let Some(truth) = &mut truth {
+        truth.finish()?;
+    }
+    drop(progress);
+    if args.json {
+        let shown = json!({
+            "scene": scene.name, "seed": scene.seed, "duration_s": duration_s, "messages": written.messages,
+            "bytes": written.bytes, "truth_rows": truth.map(|truth| truth.rows),
+        });
+        deliver(&shown.to_string())?;
+    } else {
+        say(&format!(
+            "{}: {duration_s:.1} s of {}, seed {}, {} messages, {} bytes in {}",
+            scene.name,
+            scene.vehicle.name,
+            scene.seed,
+            written.messages,
+            written.bytes,
+            output.display()
+        ));
+        if let Some(truth) = truth {
+            say(&format!("truth of {} measurements in {}", truth.rows, truth.path.display()));
+        }
+    }
+    Ok(failure::OK)
+}
+
+/// Says which systems, components and random streams a scene calls for, and what it leaves out.
+fn explain(scene: &Scene, as_json: bool) -> Result<u8, Failure> {
+    let simulation = Simulation::new(scene)?;
+    let added = simulation.added();
+    let left_out: Vec<_> =
+        EFFECTS.iter().filter(|kind| added.iter().all(|effect| effect.effect != kind.name())).collect();
+    if as_json {
+        let system = |(stage, name): &(_, String)| json!({"stage": stage_name(*stage), "system": name});
+        let effect = |effect: &Added| {
+            json!({
+                "effect": effect.effect,
+                "systems": effect.systems.iter().map(system).collect::<Vec<_>>(),
+                "replaces": effect.replaces,
+                "components": effect.components.iter().map(|(name, on)| json!({"component": name, "sensors": on})).collect::<Vec<_>>(),
+                "streams": effect.streams, "way": effect.way,
+            })
+        };
+        let shown = json!({
+            "scene": scene.name, "seed": scene.seed, "duration_s": simulation.duration_s(),
+            "base": simulation.base_systems().iter().map(system).collect::<Vec<_>>(),
+            "effects": added.iter().map(effect).collect::<Vec<_>>(),
+            "left_out": left_out.iter().map(|kind| kind.name()).collect::<Vec<_>>(),
+        });
+        deliver(&serde_json::to_string_pretty(&shown)?)?;
+        return Ok(failure::OK);
+    }
+    let mut text = format!(
+        "{}: {:.0} s of {}, seed {}\n\nevery simulation of this vehicle:\n",
+        scene.name,
+        simulation.duration_s(),
+        scene.vehicle.name,
+        scene.seed
+    );
+    for (stage, name) in simulation.base_systems() {
+        append(&mut text, format_args!("  {:<6} {name}\n", stage_name(*stage)));
+    }
+    text.push_str(if added.is_empty() { "\nno effects\n" } else { "\neffects that the scene names:\n" });
+    for effect in added {
+        text.push_str(&in_words(effect));
+    }
+    text.push_str("\nleft out, at no cost:\n");
+    for kind in left_out {
+        append(&mut text, format_args!("  {:<22} {}\n", kind.name(), kind.summary()));
+    }
+    put(&text);
+    Ok(failure::OK)
+}
+
+fn in_words(added: &Added) -> String {
+    let summary = EFFECTS.iter().find(|kind| kind.name() == added.effect).map_or("", |kind| kind.summary());
+    let mut text = format!("  {}: {summary}\n", added.effect);
+    let mut line = |what: &str, words: String| append(&mut text, format_args!("    {what:<10} {words}\n"));
+    for (stage, name) in &added.systems {
+        line("system", format!("{name} in {}", stage_name(*stage)));
+    }
+    for base in &added.replaces {
+        line("instead of", (*base).to_owned());
+    }
+    for (component, sensors) in &added.components {
+        line("component", format!("{component} on {}", sensors.join(", ")));
+    }
+    if !added.streams.is_empty() {
+        line("random", format!("a stream each for {}", added.streams.join(", ")));
+    }
+    if let Some(way) = &added.way {
+        line("way", way.clone());
+    }
+    text
+}
+
+/// The truth file: CSV, a line for each measurement.
+struct Truth {
+    path: PathBuf,
+    file: BufWriter<File>,
+    effects: Vec<&'static str>,
+    features: Vec<String>,
+    rows: u64,
+}
+
+const COLUMNS: &str = "time_s,source,sense,number,chainage_m,x_m,y_m,z_m,roll_deg,pitch_deg,yaw_deg,angle_deg,\
+                       wall_x_m,wall_y_m,wall_z_m,sigma_m,wall,true_range_m,measured_range_m,effects";
+
+impl Truth {
+    fn create(path: &Path, scene: &Scene, simulation: &Simulation) -> Result<Self, Failure> {
+        let failed = |source| Failure::Write { path: path.to_owned(), source };
+        let file = BufWriter::new(File::create(path).map_err(failed)?);
+        let effects = simulation.added().iter().map(|added| added.effect).collect();
+        let features =
+            simulation.scenery().map(|scenery| scenery.surroundings.features().to_vec()).unwrap_or_default();
+        let mut truth = Self { path: path.to_owned(), file, effects, features, rows: 0 };
+        truth.line(&format!("# {}, seed {}", scene.name.replace('\n', " "), scene.seed))?;
+        truth.line(COLUMNS)?;
+        Ok(truth)
+    }
+
+    fn write(&mut self, scene: &Scene, rows: &[TruthRow]) -> Result<(), Failure> {
+        for row in rows {
+            let line = self.row(scene, row);
+            self.line(&line)?;
+            self.rows += 1;
+        }
+        Ok(())
+    }
+
+    fn finish(&mut self) -> Result<(), Failure> {
+        self.file.flush().map_err(|source| Failure::Write { path: self.path.clone(), source })
+    }
+
+    fn line(&mut self, text: &str) -> Result<(), Failure> {
+        writeln!(self.file, "{text}").map_err(|source| Failure::Write { path: self.path.clone(), source })
+    }
+
+    fn row(&self, scene: &Scene, row: &TruthRow) -> String {
+        let id =
+            scene.vehicle.sensor_configs.get(usize::from(row.source)).map_or("", |sensor| sensor.id.as_str());
+        let (position, (roll, pitch, yaw)) = (row.pose.position, row.pose.attitude.roll_pitch_yaw());
+        let mut text = format!(
+            "{},{id},{},{},{},{},{},{},{},{},{}",
+            seconds(row.at),
+            row.sense.as_str().replace(' ', "_"),
+            row.number,
+            row.chainage_m,
+            position.x(),
+            position.y(),
+            position.z(),
+            roll.to_degrees(),
+            pitch.to_degrees(),
+            yaw.to_degrees()
+        );
+        match &row.sounding {
+            Some(sounding) => text.push_str(&self.sounding(sounding)),
+            None => text.push_str(",,,,,,,,,"),
+        }
+        let causes = row.causes.iter().map(|cause| {
+            let effect = self.effects.get(usize::from(cause.effect)).copied().unwrap_or("");
+            let value = |value: f64| if value.is_nan() { "none".to_owned() } else { value.to_string() };
+            format!("{effect} {} {} -> {}", cause.what, value(cause.from), value(cause.to))
+        });
+        text.push_str(&causes.collect::<Vec<_>>().join("; "));
+        text
+    }
+
+    /// The columns of a sounding.
+    fn sounding(&self, sounding: &SoundingTruth) -> String {
+        let mut text = format!(",{}", sounding.measured.angle_rad.to_degrees());
+        match &sounding.wall {
+            Some((hit, sigma_m)) => append(
+                &mut text,
+                format_args!(
+                    ",{},{},{},{sigma_m},{},{}",
+                    hit.point.x(),
+                    hit.point.y(),
+                    hit.point.z(),
+                    self.wall(hit.what),
+                    hit.range_m
+                ),
+            ),
+            None => text.push_str(",,,,,,"),
+        }
+        match sounding.measured.range_m {
+            Some(range_m) => append(&mut text, format_args!(",{range_m},")),
+            None => text.push_str(",,"),
+        }
+        text
+    }
+
+    fn wall(&self, what: What) -> &str {
+        match what {
+            What::Wall => "wall",
+            What::Feature(number) => self.features.get(usize::from(number)).map_or("feature", String::as_str),
+        }
+    }
+}
+
+/// A moment of the dive's clock with all its digits.
+fn seconds(at: MonoNs) -> String {
+    format!("{}.{:09}", at.0 / 1_000_000_000, at.0 % 1_000_000_000)
+}
+
+fn stage_name(stage: headrace_replay::simulate::Stage) -> &'static str {
+    stage.as_str()
+}
