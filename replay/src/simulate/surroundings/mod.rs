@@ -4,7 +4,7 @@
 //! Where the axis bends, chainage and x differ; see [`Axis`].
 //!
 //! Water is (tube or hollows) without solids. A ray from the water goes to the tube's wall, on through the hollows that
-//! open there, and stops at the first solid before. Nothing here draws random numbers but [`boulders`], from a seed.
+//! open there, and stops at the first solid before. Nothing here draws random numbers but boulders, from a seed.
 
 mod axis;
 mod boulders;
