@@ -10,7 +10,7 @@ use headrace_core::time::MonoNs;
 use headrace_replay::log::LogWriter;
 use headrace_replay::simulate::effects::KINDS as EFFECTS;
 use headrace_replay::simulate::surroundings::What;
-use headrace_replay::simulate::{Added, START, Scene, Simulation, SoundingTruth, TruthRow};
+use headrace_replay::simulate::{Added, START, Scene, Simulation, SoundingTruth, Stage, TruthRow};
 use serde_json::json;
 
 use crate::cli::Simulate;
@@ -86,7 +86,7 @@ fn explain(scene: &Scene, as_json: bool) -> Result<u8, Failure> {
     let left_out: Vec<_> =
         EFFECTS.iter().filter(|kind| added.iter().all(|effect| effect.effect != kind.name())).collect();
     if as_json {
-        let system = |(stage, name): &(_, String)| json!({"stage": stage_name(*stage), "system": name});
+        let system = |(stage, name): &(Stage, String)| json!({"stage": stage.as_str(), "system": name});
         let effect = |effect: &Added| {
             json!({
                 "effect": effect.effect,
@@ -113,7 +113,7 @@ fn explain(scene: &Scene, as_json: bool) -> Result<u8, Failure> {
         scene.seed
     );
     for (stage, name) in simulation.base_systems() {
-        append(&mut text, format_args!("  {:<6} {name}\n", stage_name(*stage)));
+        append(&mut text, format_args!("  {:<6} {name}\n", stage.as_str()));
     }
     text.push_str(if added.is_empty() { "\nno effects\n" } else { "\neffects that the scene names:\n" });
     for effect in added {
@@ -132,7 +132,7 @@ fn in_words(added: &Added) -> String {
     let mut text = format!("  {}: {summary}\n", added.effect);
     let mut line = |what: &str, words: String| append(&mut text, format_args!("    {what:<10} {words}\n"));
     for (stage, name) in &added.systems {
-        line("system", format!("{name} in {}", stage_name(*stage)));
+        line("system", format!("{name} in {}", stage.as_str()));
     }
     for base in &added.replaces {
         line("instead of", (*base).to_owned());
@@ -256,8 +256,4 @@ impl Truth {
 /// A moment of the dive's clock with all its digits.
 fn seconds(at: MonoNs) -> String {
     format!("{}.{:09}", at.0 / 1_000_000_000, at.0 % 1_000_000_000)
-}
-
-fn stage_name(stage: headrace_replay::simulate::Stage) -> &'static str {
-    stage.as_str()
 }

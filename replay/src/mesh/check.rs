@@ -23,8 +23,16 @@ pub(super) struct Surface {
     pub(super) faces: Vec<[u32; 3]>,
     /// The number that each face had when given.
     pub(super) given: Vec<u32>,
-    /// Triangles that close a wall's ends.
-    pub(super) caps: Vec<[[f64; 3]; 3]>,
+    /// What closes each opening of a wall.
+    pub(super) caps: Vec<Cap>,
+    pub(super) low: [f64; 3],
+    pub(super) high: [f64; 3],
+}
+
+/// Triangles that close an opening, and the box around them.
+#[derive(Debug, Clone)]
+pub(super) struct Cap {
+    pub(super) triangles: Vec<[[f64; 3]; 3]>,
     pub(super) low: [f64; 3],
     pub(super) high: [f64; 3],
 }
@@ -63,7 +71,7 @@ impl Surface {
             }
             Role::Wall => {
                 ends(&vertices, &holes, low[0], high[0])?;
-                holes.iter().flat_map(|hole| cap(&vertices, hole)).collect()
+                holes.iter().map(|hole| cap(&vertices, hole)).collect()
             }
         };
         vertices.shrink_to_fit();
@@ -232,7 +240,7 @@ fn ends(vertices: &[[f64; 3]], holes: &[Hole], low_x: f64, high_x: f64) -> Resul
 
 /// Closes a hole by triangles from the mean of its edges' ends to each edge. Whatever its shape, each of its edges then
 /// has two faces, and what is inside is defined.
-fn cap(vertices: &[[f64; 3]], hole: &Hole) -> Vec<[[f64; 3]; 3]> {
+fn cap(vertices: &[[f64; 3]], hole: &Hole) -> Cap {
     let mut middle = [0.0; 3];
     for &corner in hole.edges.as_flattened() {
         for (sum, c) in middle.iter_mut().zip(vertices[corner as usize]) {
@@ -240,5 +248,14 @@ fn cap(vertices: &[[f64; 3]], hole: &Hole) -> Vec<[[f64; 3]; 3]> {
         }
     }
     let middle = middle.map(|sum| sum / (2 * hole.edges.len()) as f64);
-    hole.edges.iter().map(|&[a, b]| [vertices[a as usize], vertices[b as usize], middle]).collect()
+    let triangle = |&[a, b]: &[u32; 2]| [vertices[a as usize], vertices[b as usize], middle];
+    let triangles: Vec<_> = hole.edges.iter().map(triangle).collect();
+    // The middle is within what the edges reach.
+    let (mut low, mut high) = (middle, middle);
+    for corner in triangles.as_flattened() {
+        for k in 0..3 {
+            (low[k], high[k]) = (low[k].min(corner[k]), high[k].max(corner[k]));
+        }
+    }
+    Cap { triangles, low, high }
 }

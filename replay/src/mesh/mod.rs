@@ -86,9 +86,12 @@ impl Mesh {
     /// Allocates: about 190 bytes a face, and twice that while building; the same tree on any machine.
     pub fn new(triangles: Triangles, role: Role) -> Result<Self, MeshError> {
         let given = triangles.faces.len();
-        let surface = Surface::new(triangles, role)?;
+        let mut surface = Surface::new(triangles, role)?;
         let largest = surface.low.iter().chain(&surface.high).fold(0.0_f64, |most, c| most.max(c.abs()));
         let slack = SLACK * (largest + check::diagonal(surface.low, surface.high));
+        for cap in &mut surface.caps {
+            (cap.low, cap.high) = (cap.low.map(|c| c - slack), cap.high.map(|c| c + slack));
+        }
         let boxes = surface.faces.iter().map(|&face| {
             let [a, b, c] = surface.corners(face);
             let low = [0, 1, 2].map(|k| a[k].min(b[k]).min(c[k]) - slack);
@@ -113,7 +116,6 @@ impl Mesh {
             |node, _| enters(&ray, node),
             |leaf, _| {
                 let range = ray.hits(self.surface.triangle(leaf))?;
-
                 if best.get().is_none_or(|(least, first)| range < least || (range <= least && leaf < first)) {
                     best.set(Some((range, leaf)));
                 }
@@ -146,8 +148,10 @@ impl Mesh {
     fn is_crossed_oddly(&self, ray: &Ray) -> Option<bool> {
         let leaves = self.tree.leaves(|node| enters(ray, node) < f64::MAX);
         let met = leaves.map(|leaf| self.surface.triangle(leaf));
+        let caps = self.surface.caps.iter().filter(|cap| ray.enters(cap.low, cap.high) < f64::MAX);
+        let closing = caps.flat_map(|cap| cap.triangles.iter().copied());
         let mut is_odd = false;
-        for triangle in met.chain(self.surface.caps.iter().copied()) {
+        for triangle in met.chain(closing) {
             match ray.crosses(triangle) {
                 Crossing::Beside => {}
                 Crossing::Through => is_odd = !is_odd,
@@ -177,7 +181,8 @@ impl Mesh {
     pub fn closed_m(&self) -> (f64, f64) {
         let (low, high) = (self.surface.low[0], self.surface.high[0]);
         let middle = f64::midpoint(low, high);
-        let rims = self.surface.caps.as_flattened().iter().map(|corner| corner[0]);
+        let triangles = self.surface.caps.iter().flat_map(|cap| cap.triangles.as_flattened());
+        let rims = triangles.map(|corner| corner[0]);
         rims.fold((low, high), |(from, to), x| if x < middle { (from.max(x), to) } else { (from, to.min(x)) })
     }
 

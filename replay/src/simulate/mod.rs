@@ -67,20 +67,14 @@ impl Simulation {
     ///
     /// Errors: effects that contradict each other or the scene; a way through a wall.
     pub fn new(scene: &Scene) -> Result<Self, SceneError> {
-        Self::assemble(scene, false, SLICE)
+        Self::assemble(scene, false)
     }
 
     /// A simulation that keeps its truth for [`Simulation::take_truth`].
     ///
     /// Errors: as for [`Simulation::new`].
     pub fn with_truth(scene: &Scene) -> Result<Self, SceneError> {
-        Self::assemble(scene, true, SLICE)
-    }
-
-    /// A simulation that keeps its truth, in slices of another length.
-    #[cfg(test)]
-    fn with_slice(scene: &Scene, slice: DurNs) -> Result<Self, SceneError> {
-        Self::assemble(scene, true, slice)
+        Self::assemble(scene, true)
     }
 
     /// The same in slices of another length, of which nothing may depend.
@@ -89,7 +83,7 @@ impl Simulation {
         Self { slice, ..self }
     }
 
-    fn assemble(scene: &Scene, noting: bool, slice: DurNs) -> Result<Self, SceneError> {
+    fn assemble(scene: &Scene, noting: bool) -> Result<Self, SceneError> {
         let mut world = World::new();
         world.insert_resource(Slice { from: START, until: START });
         world.insert_resource(Scenery {
@@ -120,8 +114,8 @@ impl Simulation {
         };
         let end = START + DurNs::from_secs_f64(duration_s);
         let truth = noting.then(Vec::new);
-        let outbox = outbox::Outbox::default();
-        Ok(Self { world, schedule, entities, end, slice, outbox, added, base, truth })
+        let outbox = outbox::Outbox::new(entities.len());
+        Ok(Self { world, schedule, entities, end, slice: SLICE, outbox, added, base, truth })
     }
 
     /// When the dive ends.
@@ -198,15 +192,13 @@ impl Simulation {
         slice.until = (slice.until + self.slice).min(last);
         let until = slice.until;
         self.schedule.run(&mut self.world);
-        for (source, entity) in self.entities.iter().enumerate() {
-            if let (Ok(source), Some(mut line)) = (u16::try_from(source), self.world.get_mut::<Line>(*entity))
-            {
-                self.outbox.take(source, &line);
-                line.clear();
-            }
-        }
         if let Some(rows) = &mut self.truth {
             truth::collect(&mut self.world, &self.entities, rows);
+        }
+        for (source, entity) in self.entities.iter().enumerate() {
+            if let Some(mut line) = self.world.get_mut::<Line>(*entity) {
+                self.outbox.take(source, &mut line);
+            }
         }
         self.outbox.release(until);
         true
@@ -301,5 +293,3 @@ fn add_base_systems(sim: &mut Builder<'_>) {
 mod testing;
 #[cfg(test)]
 mod testing_motion;
-#[cfg(test)]
-mod tests;

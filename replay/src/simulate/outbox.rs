@@ -1,9 +1,9 @@
-//! Messages of all lines in one order: (time, source, sequence).
+//! Messages of all lines in one order: (time, source, place on the line).
 
 use headrace_core::app::device::Direction;
 use headrace_core::time::MonoNs;
 
-use super::sensing::Line;
+use super::sensing::{Line, LineMessage};
 
 /// Bytes on the line of one source.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -18,104 +18,198 @@ pub struct Message<'a> {
     pub bytes: &'a [u8],
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Waiting {
-    at: MonoNs,
-    source: u16,
-    sequence: u64,
-    direction: Direction,
-    bytes: (usize, usize),
-}
-
-/// Messages that wait for those of other lines before them.
+/// Messages that wait for those of other lines before them: merged as they are asked for, their bytes where the devices
+/// put them.
 #[derive(Debug, Default)]
 pub(super) struct Outbox {
-    /// In order up to `released`.
-    waiting: Vec<Waiting>,
-    bytes: Vec<u8>,
-    /// Bytes that messages of later slices keep.
-    kept: Vec<u8>,
-    next: usize,
-    released: usize,
-    sequence: u64,
+    /// One for each source, in its order.
+    lanes: Vec<Lane>,
+    /// What crosses its line before this may go.
+    until: MonoNs,
     finished: bool,
+    /// The lane with the next message that may go.
+    front: Option<usize>,
+}
+
+/// What waits on one line.
+#[derive(Debug, Default)]
+struct Lane {
+    /// In order of time.
+    line: Line,
+    next: usize,
+}
+
+impl Lane {
+    fn waiting(&self) -> Option<&LineMessage> {
+        self.line.messages.get(self.next)
+    }
+
+    /// Takes a slice's messages in exchange for room.
+    fn take(&mut self, line: &mut Line) {
+        self.forget_sent();
+        if self.line.messages.is_empty() {
+            std::mem::swap(&mut self.line, line);
+        } else {
+            self.line.append(line);
+        }
+        line.clear();
+        // A message without bytes is none.
+        self.line.messages.retain(|message| message.bytes.0 < message.bytes.1);
+        // An answer may come after the next question.
+        if !self.line.messages.is_sorted_by_key(|message| message.at) {
+            self.line.messages.sort_by_key(|message| message.at);
+        }
+    }
+
+    fn forget_sent(&mut self) {
+        if self.next == 0 {
+            return;
+        }
+        let mut kept = Line::default();
+        for message in self.line.messages.iter().skip(self.next) {
+            let bytes = self.line.bytes_of(message);
+            kept.send(message.at, message.direction, bytes, message.sample);
+        }
+        self.next = 0;
+        if kept.messages.is_empty() {
+            self.line.clear();
+        } else {
+            self.line = kept;
+        }
+    }
 }
 
 impl Outbox {
+    /// An outbox for so many sources.
+    pub(super) fn new(sources: usize) -> Self {
+        Self { lanes: (0..sources).map(|_| Lane::default()).collect(), ..Self::default() }
+    }
+
     /// Whether [`Outbox::next`] gives a message.
     pub(super) fn has_next(&self) -> bool {
-        self.next < self.released
+        self.front.is_some()
     }
 
     /// The next message that nothing can come before any more.
     pub(super) fn next(&mut self) -> Option<Message<'_>> {
-        self.next += usize::from(self.has_next());
-        self.message(self.next.checked_sub(1)?)
+        let front = self.front?;
+        let lane = self.lanes.get_mut(front)?;
+        lane.next += 1;
+        let sent = lane.next - 1;
+        self.find_front();
+        self.message(front, sent)
     }
 
     /// What [`Outbox::next`] would give.
     pub(super) fn peek(&self) -> Option<Message<'_>> {
-        self.message(self.next)
+        let front = self.front?;
+        self.message(front, self.lanes.get(front)?.next)
     }
 
-    fn message(&self, number: usize) -> Option<Message<'_>> {
-        let waiting = self.waiting.get(..self.released)?.get(number)?;
-        let (from, to) = waiting.bytes;
-        let bytes = self.bytes.get(from..to).unwrap_or_default();
-        Some(Message { at: waiting.at, source: waiting.source, direction: waiting.direction, bytes })
+    fn message(&self, lane: usize, number: usize) -> Option<Message<'_>> {
+        let line = &self.lanes.get(lane)?.line;
+        let message = line.messages.get(number)?;
+        let source = u16::try_from(lane).ok()?;
+        Some(Message { at: message.at, source, direction: message.direction, bytes: line.bytes_of(message) })
     }
 
-    /// Takes what a slice has put on a line.
-    pub(super) fn take(&mut self, source: u16, line: &Line) {
-        if self.next > 0 && self.next == self.released {
-            self.forget_sent();
-        }
-        let offset = self.bytes.len();
-        self.bytes.extend_from_slice(&line.bytes);
-        // A message without bytes is none.
-        for message in line.messages.iter().filter(|message| message.bytes.0 < message.bytes.1) {
-            self.sequence += 1;
-            let (from, to) = message.bytes;
-            self.waiting.push(Waiting {
-                at: message.at,
-                source,
-                sequence: self.sequence,
-                direction: message.direction,
-                bytes: (offset + from, offset + to),
-            });
+    /// Takes what a slice has put on a source's line, and leaves the line empty.
+    pub(super) fn take(&mut self, source: usize, line: &mut Line) {
+        if let Some(lane) = self.lanes.get_mut(source) {
+            lane.take(line);
         }
     }
 
     /// Releases what crossed its line before `until`.
     pub(super) fn release(&mut self, until: MonoNs) {
-        // Each line's messages are in order, or nearly: a sort that finds runs merges them.
-        self.waiting.sort_by_key(|waiting| (waiting.at, waiting.source, waiting.sequence));
-        self.released = self.waiting.partition_point(|waiting| waiting.at < until);
+        self.until = until;
+        self.find_front();
     }
 
     /// Releases everything; false when it had done so before, and there is nothing more to come.
     pub(super) fn finish(&mut self) -> bool {
         let more = !self.finished;
         self.finished = true;
-        self.released = self.waiting.len();
+        self.find_front();
         more
     }
 
     /// Passes over what is released.
     pub(super) fn skip(&mut self) {
-        self.next = self.released;
+        let (until, finished) = (self.until, self.finished);
+        for lane in &mut self.lanes {
+            lane.next = lane.line.messages.partition_point(|message| finished || message.at < until);
+        }
+        self.front = None;
     }
 
-    fn forget_sent(&mut self) {
-        self.waiting.drain(..self.released);
-        self.kept.clear();
-        for waiting in &mut self.waiting {
-            let (from, to) = waiting.bytes;
-            let at = self.kept.len();
-            self.kept.extend_from_slice(self.bytes.get(from..to).unwrap_or_default());
-            waiting.bytes = (at, self.kept.len());
+    fn find_front(&mut self) {
+        let mut first: Option<(MonoNs, usize)> = None;
+        for (number, lane) in self.lanes.iter().enumerate() {
+            if let Some(message) = lane.waiting()
+                && first.is_none_or(|(at, _)| message.at < at)
+            {
+                first = Some((message.at, number));
+            }
         }
-        std::mem::swap(&mut self.bytes, &mut self.kept);
-        (self.next, self.released) = (0, 0);
+        let may_go = |(at, _): &(MonoNs, usize)| self.finished || *at < self.until;
+        self.front = first.filter(may_go).map(|(_, number)| number);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SENT: Direction = Direction::Sent;
+
+    fn line(times: &[u64]) -> Line {
+        let mut line = Line::default();
+        for (sample, at) in times.iter().enumerate() {
+            line.send(MonoNs(*at), SENT, &[u8::try_from(sample).unwrap()], sample);
+        }
+        line
+    }
+
+    /// Time, source and byte of what may go.
+    fn going(outbox: &mut Outbox) -> Vec<(u64, u16, u8)> {
+        let mut gone = Vec::new();
+        while outbox.has_next() {
+            let peeked = outbox.peek().unwrap();
+            let expected = (peeked.at.0, peeked.source, peeked.bytes[0]);
+            let next = outbox.next().unwrap();
+            assert_eq!((next.at.0, next.source, next.bytes[0]), expected);
+            gone.push(expected);
+        }
+        gone
+    }
+
+    #[test]
+    fn messages_go_by_time_then_source_then_place_and_late_ones_wait() {
+        let mut outbox = Outbox::new(2);
+        outbox.take(0, &mut line(&[1, 5, 5, 12]));
+        outbox.take(1, &mut line(&[0, 11, 5, 1]));
+        outbox.release(MonoNs(10));
+        assert_eq!(going(&mut outbox), [(0, 1, 0), (1, 0, 0), (1, 1, 3), (5, 0, 1), (5, 0, 2), (5, 1, 2)]);
+        outbox.take(0, &mut line(&[10, 13]));
+        outbox.release(MonoNs(13));
+        assert_eq!(going(&mut outbox), [(10, 0, 0), (11, 1, 1), (12, 0, 3)]);
+        assert!(outbox.finish());
+        assert_eq!(going(&mut outbox), [(13, 0, 1)]);
+        assert!(!outbox.finish());
+    }
+
+    #[test]
+    fn a_message_without_bytes_is_none_and_what_is_skipped_is_gone() {
+        let mut outbox = Outbox::new(1);
+        let mut with_empty = line(&[1, 3]);
+        with_empty.send(MonoNs(2), SENT, &[], 2);
+        outbox.take(0, &mut with_empty);
+        outbox.release(MonoNs(3));
+        outbox.skip();
+        assert!(!outbox.has_next());
+        outbox.take(0, &mut line(&[4]));
+        outbox.release(MonoNs(10));
+        assert_eq!(going(&mut outbox), [(3, 0, 1), (4, 0, 0)]);
     }
 }

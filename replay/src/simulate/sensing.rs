@@ -16,6 +16,9 @@ use super::SceneError;
 use super::surroundings::{Hit, Surroundings, What};
 use super::way::Way;
 
+/// Time between two places at which the way is looked at, s.
+const CHECK_S: f64 = 0.5;
+
 /// The stretch of time that is being simulated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Resource)]
 pub(super) struct Slice {
@@ -138,27 +141,7 @@ impl Scenery {
     pub fn chainage_m(&self, at: MonoNs) -> f64 {
         self.way.place(at.since(START).as_secs_f64()).chainage_m
     }
-}
 
-impl Line {
-    /// Adds a message.
-    pub(super) fn send(&mut self, at: MonoNs, direction: Direction, bytes: &[u8], sample: usize) {
-        let from = self.bytes.len();
-        self.bytes.extend_from_slice(bytes);
-        self.messages.push(LineMessage { at, direction, bytes: (from, self.bytes.len()), sample });
-    }
-
-    /// Forgets the slice's messages.
-    pub(super) fn clear(&mut self) {
-        self.messages.clear();
-        self.bytes.clear();
-    }
-}
-
-/// Time between two places at which the way is looked at, s.
-const CHECK_S: f64 = 0.5;
-
-impl Scenery {
     /// That the way leads through water alone.
     ///
     /// Errors: the first place where it doesn't.
@@ -180,5 +163,33 @@ impl Scenery {
             from = to;
         }
         Ok(())
+    }
+}
+
+impl Line {
+    /// Adds a message.
+    pub(super) fn send(&mut self, at: MonoNs, direction: Direction, bytes: &[u8], sample: usize) {
+        let from = self.bytes.len();
+        self.bytes.extend_from_slice(bytes);
+        self.messages.push(LineMessage { at, direction, bytes: (from, self.bytes.len()), sample });
+    }
+
+    /// The bytes of a message of this line.
+    pub(super) fn bytes_of(&self, message: &LineMessage) -> &[u8] {
+        let (from, to) = message.bytes;
+        self.bytes.get(from..to).unwrap_or_default()
+    }
+
+    /// Adds another line's messages.
+    pub(super) fn append(&mut self, other: &Self) {
+        for message in &other.messages {
+            self.send(message.at, message.direction, other.bytes_of(message), message.sample);
+        }
+    }
+
+    /// Forgets the slice's messages.
+    pub(super) fn clear(&mut self) {
+        self.messages.clear();
+        self.bytes.clear();
     }
 }

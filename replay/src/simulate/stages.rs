@@ -202,7 +202,6 @@ pub(super) fn feel_cable(scenery: Res<'_, Scenery>, mut counters: Query<'_, '_, 
 /// Devices put what they measured on their lines.
 pub(super) fn tell<M: Measurement>(mut devices: Query<'_, '_, (&mut Device<M>, &Samples<M>, &mut Line)>) {
     for (mut device, samples, mut line) in &mut devices {
-        line.clear();
         for (number, measured) in samples.list.iter().enumerate() {
             device.0.tell(measured, &mut |direction, at, bytes| line.send(at, direction, bytes, number));
         }

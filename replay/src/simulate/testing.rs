@@ -102,10 +102,11 @@ impl Dive {
     /// The simulation with these effects.
     pub(super) fn simulation(&self, effects: &str) -> Result<Simulation, SceneError> {
         let scene = self.scene(effects)?;
-        match self.slice {
-            Some(slice) => Simulation::with_slice(&scene, slice),
-            None => Simulation::with_truth(&scene),
-        }
+        let simulation = Simulation::with_truth(&scene)?;
+        Ok(match self.slice {
+            Some(slice) => simulation.in_slices(slice),
+            None => simulation,
+        })
     }
 
     /// Dives with these effects.
