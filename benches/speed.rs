@@ -6,20 +6,21 @@
 #![expect(clippy::disallowed_types, reason = "std's hash map is a yardstick here")]
 #![expect(clippy::unwrap_used, reason = "a benchmark stops at what it can't do")]
 
+#[path = "../tests/common/shipped.rs"]
+mod shipped;
+
 use std::collections::HashMap;
 use std::hint::black_box;
-use std::path::Path;
 use std::time::{Duration, Instant};
 
 use bevy_ecs::schedule::{IntoScheduleConfigs, Schedule, SingleThreadedExecutor};
 use bevy_ecs::world::World;
-use headrace_core::app::device::{Decoder, DeviceKind, Direction};
+use headrace_core::app::device::{Decoder, Direction};
 use headrace_core::app::flow::{Coverage, Tally};
 use headrace_core::app::reading::{Decoded, Packet};
 use headrace_core::app::run::Loop;
 use headrace_core::app::{App, Mission, SourceSpec};
 use headrace_core::codec::CodecCounts;
-use headrace_core::config::Document;
 use headrace_core::coverage::hole::FARTHEST_M;
 use headrace_core::coverage::{HoleFinder, SampleIndex, SampleStore, Sections, StoreLayout, WallSample};
 use headrace_core::fusion::direct::DirectNavigation;
@@ -28,15 +29,8 @@ use headrace_core::time::{DurNs, MonoNs};
 use headrace_core::tunnel::named;
 use headrace_replay::simulate::{START, Scene, Simulation};
 
-const KINDS: [&dyn DeviceKind; 5] = [
-    &headrace_imagenex881::Kind,
-    &headrace_ping1d::Kind,
-    &headrace_bar100::Kind,
-    &headrace_imu_can::Kind,
-    &headrace_tether_hid::Kind,
-];
-const SCENE: &str =
-    "vehicle = \"vita2-4.toml\"\n[trajectory]\n[[trajectory.legs]]\ndistance_m = 120\nspeed_mps = 0.197\n";
+const SCENE: &str = "vehicle = \"vita2-4.toml\"\n[vehicle_changes]\nheads.planned_speed_mps = 0.197\n[trajectory]\n\
+    [[trajectory.legs]]\ndistance_m = 120\nspeed_mps = 0.197\n";
 const SPEED_MPS: f64 = 0.197;
 const TICK: DurNs = DurNs(20_000_000);
 const ROUNDS: usize = 5;
@@ -84,18 +78,6 @@ impl Decoder for Nothing {
     fn counts(&self) -> CodecCounts {
         CodecCounts::default()
     }
-}
-
-fn scene() -> Scene {
-    let vehicles = Path::new(env!("CARGO_MANIFEST_DIR")).join("deploy/vehicles");
-    // Heads in phase for the speed of the dive, as they would be.
-    let phased =
-        |text: String| text.replace("planned_speed_mps = 0.11", &format!("planned_speed_mps = {SPEED_MPS}"));
-    let load = |name: &str| {
-        let text = std::fs::read_to_string(vehicles.join(name)).map_err(|error| error.to_string())?;
-        Ok(phased(text).into_bytes())
-    };
-    Scene::parse(Document::new("scene", SCENE), &KINDS, &load, None).unwrap()
 }
 
 fn armed(scene: &Scene, decoding: bool) -> Loop {
@@ -148,7 +130,7 @@ fn run(dive: &mut Loop, messages: &[Kept]) -> Vec<Duration> {
 }
 
 fn whole_loop() {
-    let scene = scene();
+    let scene = shipped::scene(SCENE);
     let mut simulation = Simulation::new(&scene).unwrap();
     let data_s = simulation.duration_s();
     let mut messages: Vec<Kept> = Vec::new();
@@ -198,7 +180,7 @@ fn nothing() {}
 
 fn idle_tick() {
     const RUNS: u32 = 200_000;
-    let mut dive = armed(&scene(), true);
+    let mut dive = armed(&shipped::scene(SCENE), true);
     let idle = best(|| {
         let started = Instant::now();
         for _ in 0..RUNS {

@@ -7,26 +7,13 @@
     reason = "clippy.toml's leave for tests doesn't reach their helpers"
 )]
 
-use std::fmt::Write as _;
-use std::path::Path;
+#[path = "common/shipped.rs"]
+mod shipped;
 
-use headrace_core::app::App;
-use headrace_core::app::device::DeviceKind;
-use headrace_core::app::report::Report;
-use headrace_core::config::Document;
-use headrace_core::fusion::direct::DirectNavigation;
-use headrace_replay::drive::{Pace, drive};
-use headrace_replay::player::SimulationFeed;
+use std::fmt::Write as _;
+
 use headrace_replay::simulate::surroundings::What;
 use headrace_replay::simulate::{Scene, Simulation};
-
-const KINDS: [&dyn DeviceKind; 5] = [
-    &headrace_imagenex881::Kind,
-    &headrace_ping1d::Kind,
-    &headrace_bar100::Kind,
-    &headrace_imu_can::Kind,
-    &headrace_tether_hid::Kind,
-];
 
 /// Between neighbouring boulders, m: no beam across the tunnel meets two of them.
 const SPACING_M: f64 = 2.5;
@@ -37,25 +24,12 @@ const SCENE: &str = "vehicle = \"vita2-4.toml\"\n[vehicle_changes]\nsensors.all.
     distance_m = 2520\nspeed_mps = 0.5\n[effects]\nmotion_within_turn = {}\n";
 
 fn scene(rest: &str) -> Scene {
-    let vehicles = Path::new(env!("CARGO_MANIFEST_DIR")).join("deploy/vehicles");
-    let load = |name: &str| std::fs::read(vehicles.join(name)).map_err(|error| error.to_string());
-    Scene::parse(Document::new("scene", &format!("{SCENE}{rest}")), &KINDS, &load, None).unwrap()
+    shipped::scene(&format!("{SCENE}{rest}"))
 }
 
 /// The hole of each section of the bare tunnel, m: chainage where it begins, and D.
 fn holes() -> Vec<(f64, f64)> {
-    let scene = scene("");
-    let vehicle = &scene.vehicle;
-    let mut app = App::new(vehicle.mission());
-    for sensor in &vehicle.sensors {
-        app.add_plugin(sensor.as_ref()).unwrap();
-    }
-    let navigation = DirectNavigation::new(vehicle.tunnel.profile.clone(), vehicle.site);
-    let mut dive = app.arm(Box::new(navigation)).unwrap();
-    let mut feed = SimulationFeed::new(Simulation::new(&scene).unwrap());
-    drive(&mut dive, &mut feed, Pace::default(), &mut |_| {}).unwrap();
-    dive.finish();
-    let report = Report::of(&dive);
+    let report = shipped::report(&scene(""));
     report.sections.iter().filter_map(|section| Some((section.start_m, section.hole_m?))).collect()
 }
 

@@ -9,19 +9,20 @@
     reason = "a global allocator is an unsafe trait; this one counts and hands on to the system's"
 )]
 
+#[path = "common/shipped.rs"]
+mod shipped;
+
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
-use std::path::Path;
 
-use headrace_core::app::device::{DeviceKind, Direction};
+use headrace_core::app::device::Direction;
 use headrace_core::app::outlet::NoticeOutlet;
 use headrace_core::app::{App, Mission};
-use headrace_core::config::Document;
 use headrace_core::fusion::direct::DirectNavigation;
 use headrace_core::time::DurNs;
 use headrace_replay::log::{LogHeader, Recorder, SourceInfo};
 use headrace_replay::record::{QUEUE_BYTES, RecorderOutlet};
-use headrace_replay::simulate::{START, Scene, Simulation};
+use headrace_replay::simulate::{START, Simulation};
 
 struct Counting;
 
@@ -65,14 +66,6 @@ fn allocations(work: impl FnOnce()) -> u64 {
     COUNTED.with(|counted| counted.replace(None)).unwrap()
 }
 
-const KINDS: [&dyn DeviceKind; 5] = [
-    &headrace_imagenex881::Kind,
-    &headrace_ping1d::Kind,
-    &headrace_bar100::Kind,
-    &headrace_imu_can::Kind,
-    &headrace_tether_hid::Kind,
-];
-
 /// Forth, too fast for a stretch, back over it, and forth again, so that flags are raised and cleared.
 const SCENE: &str = "vehicle = \"vita2-4.toml\"\n[trajectory]\n
 [[trajectory.legs]]\ndistance_m = 120\nspeed_mps = 0.197\n
@@ -84,9 +77,7 @@ const SCENE: &str = "vehicle = \"vita2-4.toml\"\n[trajectory]\n
 fn a_million_packets_without_one_allocation() {
     assert!(allocations(|| drop(vec![1])) > 0, "the counter counts");
 
-    let vehicles = Path::new(env!("CARGO_MANIFEST_DIR")).join("deploy/vehicles");
-    let load = |name: &str| std::fs::read(vehicles.join(name)).map_err(|error| error.to_string());
-    let scene = Scene::parse(Document::new("scene.toml", SCENE), &KINDS, &load, None).unwrap();
+    let scene = shipped::scene(SCENE);
     let vehicle = &scene.vehicle;
     let mut app = App::new(Mission { length_m: 1000.0, ..vehicle.mission() });
     for sensor in &vehicle.sensors {

@@ -6,24 +6,17 @@
     reason = "clippy.toml's leave for tests doesn't reach their helpers"
 )]
 
+#[path = "common/shipped.rs"]
+mod shipped;
+
 use std::path::{Path, PathBuf};
 
-use headrace_core::app::device::DeviceKind;
-use headrace_core::config::Document;
-use headrace_replay::simulate::{Scene, Simulation};
+use headrace_replay::simulate::Simulation;
 
-const KINDS: [&dyn DeviceKind; 5] = [
-    &headrace_imagenex881::Kind,
-    &headrace_ping1d::Kind,
-    &headrace_bar100::Kind,
-    &headrace_imu_can::Kind,
-    &headrace_tether_hid::Kind,
-];
-
-fn shipped() -> Vec<PathBuf> {
+fn files() -> Vec<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("deploy/scenes");
-    let files = |folder: &Path| std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
-    let mut scenes: Vec<_> = files(&folder).chain(files(&folder.join("paper"))).collect();
+    let all = |folder: &Path| std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    let mut scenes: Vec<_> = all(&folder).chain(all(&folder.join("paper"))).collect();
     scenes.retain(|path| path.extension().is_some_and(|extension| extension == "toml"));
     scenes.sort();
     scenes
@@ -31,15 +24,14 @@ fn shipped() -> Vec<PathBuf> {
 
 #[test]
 fn every_shipped_scene_can_be_simulated() {
-    let scenes = shipped();
+    let scenes = files();
     assert_eq!(scenes.len(), 26, "{scenes:?}");
     for path in scenes {
         let folder = path.parent().unwrap();
-        let load = |name: &str| std::fs::read(folder.join(name)).map_err(|error| error.to_string());
         let text = std::fs::read_to_string(&path).unwrap();
         let name = path.display().to_string();
-        let scene = Scene::parse(Document::new(&name, &text), &KINDS, &load, None);
-        let scene = scene.unwrap_or_else(|why| panic!("{why}"));
+        let load = |name: &str| std::fs::read(folder.join(name)).map_err(|error| error.to_string());
+        let scene = shipped::scene_from(&text, &load);
         let mut simulation = Simulation::with_truth(&scene).unwrap_or_else(|why| panic!("{name}: {why}"));
         let (mut heard, mut pings) = (0, 0);
         for _ in 0..20 {

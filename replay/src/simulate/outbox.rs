@@ -3,7 +3,7 @@
 use headrace_core::app::device::Direction;
 use headrace_core::time::MonoNs;
 
-use super::sensing::{Line, LineMessage};
+use super::sensing::Line;
 
 /// Bytes on the line of one source.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -18,15 +18,18 @@ pub struct Message<'a> {
     pub bytes: &'a [u8],
 }
 
+const NEVER: MonoNs = MonoNs(u64::MAX);
+
 /// Messages that wait for those of other lines before them: merged as they are asked for, their bytes where the devices
 /// put them.
 #[derive(Debug, Default)]
 pub(super) struct Outbox {
     /// One for each source, in its order.
     lanes: Vec<Lane>,
+    /// When the next message of each lane is due; `NEVER` where none waits.
+    due: Vec<MonoNs>,
     /// What crosses its line before this may go.
     until: MonoNs,
-    finished: bool,
     /// The lane with the next message that may go.
     front: Option<usize>,
 }
@@ -40,18 +43,16 @@ struct Lane {
 }
 
 impl Lane {
-    fn waiting(&self) -> Option<&LineMessage> {
-        self.line.messages.get(self.next)
+    /// When its next message is due.
+    fn due(&self) -> MonoNs {
+        self.line.messages.get(self.next).map_or(NEVER, |message| message.at)
     }
 
-    /// Takes a slice's messages in exchange for room.
+    /// Takes a slice's messages in exchange for room. What still waits, which is little, moves in before them.
     fn take(&mut self, line: &mut Line) {
-        self.forget_sent();
-        if self.line.messages.is_empty() {
-            std::mem::swap(&mut self.line, line);
-        } else {
-            self.line.append(line);
-        }
+        std::mem::swap(&mut self.line, line);
+        self.line.put_first(line, self.next);
+        self.next = 0;
         line.clear();
         // A message without bytes is none.
         self.line.messages.retain(|message| message.bytes.0 < message.bytes.1);
@@ -60,29 +61,13 @@ impl Lane {
             self.line.messages.sort_by_key(|message| message.at);
         }
     }
-
-    fn forget_sent(&mut self) {
-        if self.next == 0 {
-            return;
-        }
-        let mut kept = Line::default();
-        for message in self.line.messages.iter().skip(self.next) {
-            let bytes = self.line.bytes_of(message);
-            kept.send(message.at, message.direction, bytes, message.sample);
-        }
-        self.next = 0;
-        if kept.messages.is_empty() {
-            self.line.clear();
-        } else {
-            self.line = kept;
-        }
-    }
 }
 
 impl Outbox {
     /// An outbox for so many sources.
     pub(super) fn new(sources: usize) -> Self {
-        Self { lanes: (0..sources).map(|_| Lane::default()).collect(), ..Self::default() }
+        let lanes = (0..sources).map(|_| Lane::default()).collect();
+        Self { lanes, due: vec![NEVER; sources], ..Self::default() }
     }
 
     /// Whether [`Outbox::next`] gives a message.
@@ -94,8 +79,9 @@ impl Outbox {
     pub(super) fn next(&mut self) -> Option<Message<'_>> {
         let front = self.front?;
         let lane = self.lanes.get_mut(front)?;
+        let sent = lane.next;
         lane.next += 1;
-        let sent = lane.next - 1;
+        *self.due.get_mut(front)? = lane.due();
         self.find_front();
         self.message(front, sent)
     }
@@ -123,37 +109,36 @@ impl Outbox {
     /// Releases what crossed its line before `until`.
     pub(super) fn release(&mut self, until: MonoNs) {
         self.until = until;
-        self.find_front();
+        self.look();
     }
 
     /// Releases everything; false when it had done so before, and there is nothing more to come.
     pub(super) fn finish(&mut self) -> bool {
-        let more = !self.finished;
-        self.finished = true;
-        self.find_front();
+        let more = self.until < NEVER;
+        self.release(NEVER);
         more
     }
 
     /// Passes over what is released.
     pub(super) fn skip(&mut self) {
-        let (until, finished) = (self.until, self.finished);
+        let until = self.until;
         for lane in &mut self.lanes {
-            lane.next = lane.line.messages.partition_point(|message| finished || message.at < until);
+            lane.next = lane.line.messages.partition_point(|message| message.at < until);
         }
-        self.front = None;
+        self.look();
+    }
+
+    /// Looks when each lane is due.
+    fn look(&mut self) {
+        for (due, lane) in self.due.iter_mut().zip(&self.lanes) {
+            *due = lane.due();
+        }
+        self.find_front();
     }
 
     fn find_front(&mut self) {
-        let mut first: Option<(MonoNs, usize)> = None;
-        for (number, lane) in self.lanes.iter().enumerate() {
-            if let Some(message) = lane.waiting()
-                && first.is_none_or(|(at, _)| message.at < at)
-            {
-                first = Some((message.at, number));
-            }
-        }
-        let may_go = |(at, _): &(MonoNs, usize)| self.finished || *at < self.until;
-        self.front = first.filter(may_go).map(|(_, number)| number);
+        let first = self.due.iter().enumerate().min_by_key(|(_, at)| **at);
+        self.front = first.filter(|(_, at)| **at < self.until).map(|(number, _)| number);
     }
 }
 

@@ -180,11 +180,15 @@ impl Line {
         self.bytes.get(from..to).unwrap_or_default()
     }
 
-    /// Adds another line's messages.
-    pub(super) fn append(&mut self, other: &Self) {
-        for message in &other.messages {
-            self.send(message.at, message.direction, other.bytes_of(message), message.sample);
-        }
+    /// Puts another line's messages, from its `first` on, before its own.
+    pub(super) fn put_first(&mut self, other: &Self, first: usize) {
+        let bytes = &mut self.bytes;
+        let moved = other.messages.iter().skip(first).map(|message| {
+            let from = bytes.len();
+            bytes.extend_from_slice(other.bytes_of(message));
+            LineMessage { bytes: (from, bytes.len()), ..*message }
+        });
+        drop(self.messages.splice(0..0, moved));
     }
 
     /// Forgets the slice's messages.

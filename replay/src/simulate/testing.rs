@@ -8,7 +8,7 @@ use headrace_core::time::{DurNs, MonoNs};
 
 use super::{Scene, SceneError, Simulation, TruthRow};
 
-const KINDS: [&dyn DeviceKind; 5] = [
+pub(super) const KINDS: [&dyn DeviceKind; 5] = [
     &headrace_imagenex881::Kind,
     &headrace_ping1d::Kind,
     &headrace_bar100::Kind,

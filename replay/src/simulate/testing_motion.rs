@@ -1,21 +1,14 @@
 //! A bench for effects: a vehicle with one device or two of each kind, dived along short ways.
 
 use bevy_ecs::entity::Entity;
-use headrace_core::app::device::{DeviceKind, Direction};
+use headrace_core::app::device::Direction;
 use headrace_core::app::measurement::{Inertia, Measurement, Payout, Pressure, Sounding};
 use headrace_core::config::Document;
 use headrace_core::time::{DurNs, MonoNs};
 
 use super::sensing::Samples;
+use super::testing::KINDS;
 use super::{Scene, SceneError, Simulation};
-
-const KINDS: [&dyn DeviceKind; 5] = [
-    &headrace_imagenex881::Kind,
-    &headrace_ping1d::Kind,
-    &headrace_bar100::Kind,
-    &headrace_imu_can::Kind,
-    &headrace_tether_hid::Kind,
-];
 
 const VEHICLE: &str = r#"
 target_m = 0.7

@@ -161,17 +161,27 @@ impl Surroundings {
     ///
     /// A ray that grazes what is displaced or bent may cross up to 0.1 mm of it unnoticed; elsewhere it is exact.
     /// Allocates: no.
+    #[inline]
     pub fn cast(&self, origin: Point3<Tunnel>, direction: Vec3<Tunnel>, far_m: f64) -> Option<Hit> {
-        if self.plain {
-            let hit = self.tube.profile().cast([origin.y(), origin.z()], [direction.y(), direction.z()])?;
-            let (range_m, [y, z]) = (hit.range_m, hit.normal);
-            return (range_m <= far_m).then(|| Hit {
-                range_m,
-                point: origin + direction.scaled(range_m),
-                normal: Vec3::new(0.0, y, z),
-                what: What::Wall,
-            });
+        if !self.plain {
+            return self.cast_among_features(origin, direction, far_m);
         }
+        let hit = self.tube.profile().cast([origin.y(), origin.z()], [direction.y(), direction.z()])?;
+        let (range_m, [y, z]) = (hit.range_m, hit.normal);
+        (range_m <= far_m).then(|| Hit {
+            range_m,
+            point: origin + direction.scaled(range_m),
+            normal: Vec3::new(0.0, y, z),
+            what: What::Wall,
+        })
+    }
+
+    fn cast_among_features(
+        &self,
+        origin: Point3<Tunnel>,
+        direction: Vec3<Tunnel>,
+        far_m: f64,
+    ) -> Option<Hit> {
         let ray = ray(origin, direction);
         let reach = self.reach(&ray, far_m)?;
         let point = ray.at(reach.t_m);

@@ -1,34 +1,24 @@
 //! What each effect of the simulator costs, and what leaving it out would cost in truth. Prints Markdown.
 //!
-//! `cargo bench --bench effects` runs all; `-- bare`, `-- cost`, `-- fidelity`, `-- seven` one part alone.
+//! `cargo bench --bench effects` runs all; `-- bare`, `-- cost`, `-- fidelity`, `-- seven` one part alone, and in a build
+//! with `--features mesh` `-- mesh`.
 //! Times are the least of several rounds, taken in turns; the machine should have nothing else to do.
 
 #![expect(clippy::disallowed_methods, reason = "a benchmark reads the clock")]
 #![expect(clippy::unwrap_used, clippy::panic, reason = "a benchmark stops at what it can't do")]
 
-use std::hint::black_box;
-use std::path::Path;
+mod bare;
+#[cfg(feature = "mesh")]
+mod mesh;
+#[path = "../../tests/common/shipped.rs"]
+mod shipped;
+
 use std::time::Instant;
 
-use headrace_core::app::App;
-use headrace_core::app::device::{DeviceKind, Emulated, EmulatorSetup};
-use headrace_core::app::report::Report;
-use headrace_core::config::Document;
-use headrace_core::frames::{Body, Point3, Rot, Tunnel, head_direction};
-use headrace_core::fusion::direct::DirectNavigation;
-use headrace_core::time::{DurNs, MonoNs};
-use headrace_replay::drive::{Pace, drive};
-use headrace_replay::player::SimulationFeed;
-use headrace_replay::simulate::{START, Scene, Simulation};
+use headrace_replay::simulate::{Scene, Simulation};
 
-const KINDS: [&dyn DeviceKind; 5] = [
-    &headrace_imagenex881::Kind,
-    &headrace_ping1d::Kind,
-    &headrace_bar100::Kind,
-    &headrace_imu_can::Kind,
-    &headrace_tether_hid::Kind,
-];
-const ROUNDS: usize = 5;
+const ROUNDS: usize = 15;
+
 const SPEED_MPS: f64 = 0.11;
 
 /// Every effect with some parameters; heads turn in sectors, so that their ends can be slowed.
@@ -65,10 +55,16 @@ const EFFECTS: [(&str, &str); 28] = [
 
 fn main() {
     let wanted = std::env::args().nth(1).filter(|word| !word.starts_with('-'));
-    let parts: [(&str, fn()); 4] =
-        [("bare", bare), ("cost", cost), ("fidelity", fidelity), ("seven", seven_kilometres)];
+    let parts: &[(&str, fn())] = &[
+        ("bare", bare::bare),
+        ("cost", cost),
+        ("fidelity", fidelity),
+        ("seven", seven_kilometres),
+        #[cfg(feature = "mesh")]
+        ("mesh", mesh::mesh),
+    ];
     for (name, part) in parts {
-        if wanted.as_deref().is_none_or(|word| word == name) {
+        if wanted.as_deref().is_none_or(|word| word == *name) {
             part();
         }
     }
@@ -76,21 +72,14 @@ fn main() {
 
 /// VITA 2 with four heads over `length_m` metres.
 fn scene(length_m: f64, layout: &str, rest: &str) -> Scene {
-    let vehicles = Path::new(env!("CARGO_MANIFEST_DIR")).join("deploy/vehicles");
-    scene_of(&vehicles, length_m, layout, rest, |text| text)
+    shipped::scene(&text(length_m, layout, rest))
 }
 
-/// The same with a vehicle file that is changed beforehand.
-fn scene_of(vehicles: &Path, length_m: f64, layout: &str, rest: &str, change: fn(String) -> String) -> Scene {
-    let load = |name: &str| {
-        let text = std::fs::read_to_string(vehicles.join(name)).map_err(|error| error.to_string())?;
-        Ok(change(text).into_bytes())
-    };
-    let text = format!(
+fn text(length_m: f64, layout: &str, rest: &str) -> String {
+    format!(
         "vehicle = \"vita2-4.toml\"\n[vehicle_changes]\nheads.layout = \"{layout}\"\n[trajectory]\nstart_m = 5\n\
          [[trajectory.legs]]\ndistance_m = {length_m}\nspeed_mps = {SPEED_MPS}\n{rest}"
-    );
-    Scene::parse(Document::new("scene", &text), &KINDS, &load, None).unwrap_or_else(|why| panic!("{why}"))
+    )
 }
 
 fn named(effects: &[(&str, &str)]) -> String {
@@ -99,102 +88,28 @@ fn named(effects: &[(&str, &str)]) -> String {
     tables.concat()
 }
 
-/// Simulates a scene; seconds it took, and how many soundings of sonars there were.
+/// What some work gives, and the seconds that it takes.
+fn timed<T>(work: impl FnOnce() -> T) -> (T, f64) {
+    let began = Instant::now();
+    let given = work();
+    (given, began.elapsed().as_secs_f64())
+}
+
+/// Seconds to simulate a scene.
 fn simulate(scene: &Scene) -> f64 {
     let mut simulation = Simulation::new(scene).unwrap_or_else(|why| panic!("{why}"));
-    let began = Instant::now();
-    while simulation.advance() {}
-    began.elapsed().as_secs_f64()
+    timed(|| while simulation.advance() {}).1
 }
 
 /// Least times of several works, each round doing all of them.
-fn best<const N: usize>(mut works: [&mut dyn FnMut() -> f64; N]) -> [f64; N] {
+fn best<const N: usize>(rounds: usize, mut works: [&mut dyn FnMut() -> f64; N]) -> [f64; N] {
     let mut least = [f64::INFINITY; N];
-    for _ in 0..ROUNDS {
+    for _ in 0..rounds {
         for (least, work) in least.iter_mut().zip(&mut works) {
             *least = least.min(work());
         }
     }
     least
-}
-
-/// A vehicle file's heads alone.
-#[expect(clippy::needless_pass_by_value, reason = "a change takes the text that it is given")]
-fn heads_alone(text: String) -> String {
-    text.split_once("[[sensors]]\nid = \"ping_left\"").map_or(text.clone(), |(heads, _)| heads.to_owned())
-}
-
-/// A scene without effects beside its rays and its devices' bytes alone; heads and nothing else.
-fn bare() {
-    let vehicles = Path::new(env!("CARGO_MANIFEST_DIR")).join("deploy/vehicles");
-    let scene = scene_of(&vehicles, 80.0, "phase_shift", "", heads_alone);
-    let vehicle = &scene.vehicle;
-    let end = START + DurNs::from_secs_f64(80.0 / SPEED_MPS) + DurNs(1);
-    let place = vehicle.tunnel.profile.reference();
-    let level = Rot::<Tunnel, Body>::identity();
-    let mut soundings = 0;
-    let mut rays = || {
-        let began = Instant::now();
-        soundings = 0;
-        for (sensor, config) in vehicle.sensors.iter().zip(&vehicle.sensor_configs) {
-            let Some(head) = sensor.head() else { continue };
-            let mut at = START;
-            let mut angle_rad = 0.0;
-            while at < end {
-                let x_m = 5.0 + at.since(START).as_secs_f64() * SPEED_MPS;
-                let origin = Point3::new(x_m, place[0], place[1]) + level * config.mount.position;
-                let direction = level * (config.mount.rotation * head_direction(angle_rad));
-                let hit =
-                    vehicle.tunnel.profile.cast([origin.y(), origin.z()], [direction.y(), direction.z()]);
-                black_box(hit.map(|hit| (hit.range_m, origin + direction.scaled(hit.range_m))));
-                angle_rad += head.step_rad;
-                at = at + DurNs::from_secs_f64(head.ping_period_s);
-                soundings += 1;
-            }
-        }
-        began.elapsed().as_secs_f64()
-    };
-    let mut bytes = || {
-        let began = Instant::now();
-        let setup = EmulatorSetup { start: START, head: scene.programs.first().copied(), site: vehicle.site };
-        for sensor in &vehicle.sensors {
-            device_alone(sensor.emulator(&setup), end);
-        }
-        began.elapsed().as_secs_f64()
-    };
-    let [rays_s, bytes_s, whole_s] = best([&mut rays, &mut bytes, &mut || simulate(&scene)]);
-    let ns = |seconds: f64| seconds * 1e9 / f64::from(soundings);
-    println!("\n| a scene without effects | ns a head's return |\n|---|---|");
-    println!("| rays alone, a loop by hand | {:.0} |", ns(rays_s));
-    println!("| bytes of all its devices alone | {:.0} |", ns(bytes_s));
-    println!("| the simulation: both, in order of time | {:.0} |", ns(whole_s));
-    println!("| over both, percent | {:+.1} |", 100.0 * (whole_s / (rays_s + bytes_s) - 1.0));
-}
-
-/// Lets a device measure nothing until `end`, for what its bytes cost.
-fn device_alone(device: Emulated, end: MonoNs) {
-    macro_rules! told {
-        ($emulator:expr) => {{
-            let mut emulator = $emulator;
-            let (mut due, mut until) = (Vec::new(), START);
-            while until < end {
-                until = (until + DurNs(1_000_000_000)).min(end);
-                due.clear();
-                emulator.begin(until, &mut due);
-                for measured in &due {
-                    emulator.tell(measured, &mut |_, at, bytes| {
-                        black_box((at, bytes.len()));
-                    });
-                }
-            }
-        }};
-    }
-    match device {
-        Emulated::Head(emulator) | Emulated::Echosounder(emulator) => told!(emulator),
-        Emulated::Depth(emulator) => told!(emulator),
-        Emulated::Inertial(emulator) => told!(emulator),
-        Emulated::Tether(emulator) => told!(emulator),
-    }
 }
 
 /// What each effect costs, alone and among all the others.
@@ -210,12 +125,12 @@ fn cost() {
         let others: Vec<_> =
             EFFECTS.iter().enumerate().filter(|(k, _)| *k != index).map(|(_, e)| *e).collect();
         let without = scene(LENGTH_M, "sector_offset", &named(&others));
-        let [none_s, alone_s, without_s, all_s] = best([
-            &mut || simulate(&none),
-            &mut || simulate(&alone),
-            &mut || simulate(&without),
-            &mut || simulate(&all),
-        ]);
+        let [none_s, alone_s, without_s, all_s] = best(
+            ROUNDS,
+            [&mut || simulate(&none), &mut || simulate(&alone), &mut || simulate(&without), &mut || {
+                simulate(&all)
+            }],
+        );
         // A current changes how long the dive takes.
         let scale = |scene: &Scene| {
             Simulation::new(scene).map_or(1.0, |simulation| LENGTH_M / SPEED_MPS / simulation.duration_s())
@@ -240,17 +155,7 @@ struct Figures {
 
 /// What the loop makes of a scene.
 fn dive(scene: &Scene) -> Figures {
-    let vehicle = &scene.vehicle;
-    let mut app = App::new(vehicle.mission());
-    for sensor in &vehicle.sensors {
-        app.add_plugin(sensor.as_ref()).unwrap();
-    }
-    let navigation = DirectNavigation::new(vehicle.tunnel.profile.clone(), vehicle.site);
-    let mut dive = app.arm(Box::new(navigation)).unwrap();
-    let mut feed = SimulationFeed::new(Simulation::new(scene).unwrap_or_else(|why| panic!("{why}")));
-    drive(&mut dive, &mut feed, Pace::default(), &mut |_| {}).unwrap();
-    dive.finish();
-    let report = serde_json::to_value(Report::of(&dive)).unwrap();
+    let report = serde_json::to_value(shipped::report(scene)).unwrap();
     let summary =
         |pointer: &str| report.pointer(pointer).and_then(serde_json::Value::as_f64).unwrap_or(f64::NAN);
     Figures {

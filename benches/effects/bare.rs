@@ -1,0 +1,168 @@
+//! A scene without effects beside the shortest program by hand that says the same.
+
+use std::hint::black_box;
+
+use headrace_core::app::device::{Emulated, Emulator, EmulatorSetup};
+use headrace_core::app::measurement::Sounding;
+
+use headrace_core::frames::{Body, Mount, Point3, Rot, Tunnel, head_direction};
+use headrace_core::time::{DurNs, MonoNs};
+use headrace_core::tunnel::Profile;
+use headrace_replay::simulate::{START, Scene, Simulation};
+
+use crate::{SPEED_MPS, best, shipped, text, timed};
+
+/// Many, for a figure that is the difference of two that are nearly the same.
+const ROUNDS: usize = 40;
+const LENGTH_M: f64 = 80.0;
+const SECOND: DurNs = DurNs(1_000_000_000);
+
+/// What a dive says: how many messages, and a sum in which the order, times and bytes of all matter.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+struct Said {
+    messages: u32,
+    sum: u64,
+}
+
+impl Said {
+    fn hear(&mut self, at: MonoNs, source: usize, bytes: &[u8]) {
+        self.messages += 1;
+        let last = bytes.last().copied().unwrap_or_default();
+        let heard = at.0 ^ u64::from(last) << 8 ^ bytes.len() as u64 ^ source as u64;
+        self.sum = self.sum.rotate_left(5) ^ heard;
+        black_box(bytes);
+    }
+}
+
+/// Prints what the schedule adds; heads and nothing else.
+pub(crate) fn bare() {
+    let text = text(LENGTH_M, "phase_shift", "");
+    let scene = shipped::scene_from(&text, &|name| shipped::vehicle_file(name).map(heads_alone));
+    let [mut by_hand, mut simulated] = [Said::default(); 2];
+    let [hand_s, whole_s] = best(
+        ROUNDS,
+        [
+            &mut || {
+                let mut hand = ByHand::new(&scene);
+                let (said, seconds) = timed(|| hand.dive());
+                by_hand = said;
+                seconds
+            },
+            &mut || {
+                let simulation = Simulation::new(&scene).unwrap_or_else(|why| panic!("{why}"));
+                let (said, seconds) = timed(|| dive(simulation));
+                simulated = said;
+                seconds
+            },
+        ],
+    );
+    assert_eq!(by_hand, simulated, "both say the same");
+    let ns = |seconds: f64| seconds * 1e9 / f64::from(by_hand.messages / 2);
+    println!("\n| a scene without effects | ns a head's return |\n|---|---|");
+    println!("| by hand: all heads' rays and bytes, in order of time | {:.0} |", ns(hand_s));
+    println!("| the simulation: the same | {:.0} |", ns(whole_s));
+    println!("| over what is by hand, percent | {:+.1} |", 100.0 * (whole_s / hand_s - 1.0));
+}
+
+/// A vehicle file's heads alone, which come first in it.
+fn heads_alone(mut vehicle: Vec<u8>) -> Vec<u8> {
+    let next = b"[[sensors]]\nid = \"ping_left\"";
+    let heads = vehicle.windows(next.len()).position(|window| window == next);
+    vehicle.truncate(heads.unwrap());
+    vehicle
+}
+
+/// Simulates and takes the messages.
+fn dive(mut simulation: Simulation) -> Said {
+    let mut said = Said::default();
+    while let Some(message) = simulation.next_message() {
+        said.hear(message.at, usize::from(message.source), message.bytes);
+    }
+    said
+}
+
+type Head = Box<dyn Emulator<Sounding>>;
+
+/// Heads in a straight tunnel, second by second, without systems, components or anything that an effect could take hold of.
+struct ByHand<'a> {
+    profile: &'a Profile,
+    heads: Vec<(Head, Mount)>,
+    end: MonoNs,
+    due: Vec<Sounding>,
+    /// Time, source, and place of the bytes.
+    waiting: Vec<(MonoNs, usize, usize, usize)>,
+    bytes: Vec<u8>,
+}
+
+impl<'a> ByHand<'a> {
+    fn new(scene: &'a Scene) -> Self {
+        let sensors = scene.vehicle.sensors.iter().zip(&scene.vehicle.sensor_configs).zip(&scene.programs);
+        let heads = sensors.map(|((sensor, config), program)| {
+            let setup = EmulatorSetup { start: START, head: Some(*program), site: scene.vehicle.site };
+            let Emulated::Head(head) = sensor.emulator(&setup) else { panic!("heads come first") };
+            (head, config.mount)
+        });
+        Self {
+            profile: &scene.vehicle.tunnel.profile,
+            heads: heads.collect(),
+            end: START + DurNs::from_secs_f64(LENGTH_M / SPEED_MPS) + DurNs(1),
+            due: Vec::new(),
+            waiting: Vec::new(),
+            bytes: Vec::new(),
+        }
+    }
+
+    /// Casts every ray and says it.
+    fn dive(&mut self) -> Said {
+        let mut said = Said::default();
+        let mut until = START;
+        while until < self.end {
+            until = (until + SECOND).min(self.end);
+            for (source, (head, mount)) in self.heads.iter_mut().enumerate() {
+                measure(head, mount, self.profile, until, &mut self.due);
+                for sounding in &self.due {
+                    head.tell(sounding, &mut |_, at, told| {
+                        let from = self.bytes.len();
+                        self.bytes.extend_from_slice(told);
+                        self.waiting.push((at, source, from, self.bytes.len()));
+                    });
+                }
+            }
+            self.send(until, &mut said);
+        }
+        self.send(MonoNs(u64::MAX), &mut said);
+        said
+    }
+
+    /// Sends what is before `until`, in order.
+    fn send(&mut self, until: MonoNs, said: &mut Said) {
+        self.waiting.sort();
+        let sent = self.waiting.partition_point(|(at, ..)| *at < until);
+        for (at, source, from, to) in self.waiting.drain(..sent) {
+            said.hear(at, source, &self.bytes[from..to]);
+        }
+        let mut kept = Vec::new();
+        for (_, _, from, to) in &mut self.waiting {
+            let at = kept.len();
+            kept.extend_from_slice(&self.bytes[*from..*to]);
+            (*from, *to) = (at, kept.len());
+        }
+        self.bytes.clear();
+        self.bytes.append(&mut kept);
+    }
+}
+
+/// What a head measures until then.
+fn measure(head: &mut Head, mount: &Mount, profile: &Profile, until: MonoNs, due: &mut Vec<Sounding>) {
+    let [y_m, z_m] = profile.reference();
+    let level = Rot::<Tunnel, Body>::identity();
+    due.clear();
+    head.begin(until, due);
+    for sounding in due {
+        let x_m = 5.0 + sounding.at.since(START).as_secs_f64() * SPEED_MPS;
+        let origin = Point3::new(x_m, y_m, z_m) + level * mount.position;
+        let direction = level * (mount.rotation * head_direction(sounding.angle_rad));
+        let hit = profile.cast([origin.y(), origin.z()], [direction.y(), direction.z()]);
+        sounding.range_m = hit.map(|hit| hit.range_m);
+    }
+}

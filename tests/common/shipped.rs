@@ -1,0 +1,49 @@
+//! Scenes of the vehicles that are shipped, for tests and benches within one process.
+
+#![allow(dead_code, reason = "each takes what it needs")]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
+
+#[path = "../../src/devices.rs"]
+mod devices;
+
+use std::path::Path;
+
+use headrace_core::app::App;
+use headrace_core::app::report::Report;
+use headrace_core::config::Document;
+use headrace_core::fusion::direct::DirectNavigation;
+use headrace_replay::drive::{Pace, drive};
+use headrace_replay::player::SimulationFeed;
+use headrace_replay::simulate::{FileLoader, Scene, Simulation};
+
+/// A file of `deploy/vehicles`.
+pub(crate) fn vehicle_file(name: &str) -> Result<Vec<u8>, String> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("deploy/vehicles");
+    std::fs::read(folder.join(name)).map_err(|error| error.to_string())
+}
+
+/// A scene of a vehicle that is shipped.
+pub(crate) fn scene(text: &str) -> Scene {
+    scene_from(text, &vehicle_file)
+}
+
+/// A scene whose files are had from `load`.
+pub(crate) fn scene_from(text: &str, load: FileLoader<'_>) -> Scene {
+    let scene = Scene::parse(Document::new("scene.toml", text), &devices::KINDS, load, None);
+    scene.unwrap_or_else(|why| panic!("{why}"))
+}
+
+/// What the loop reports of a scene's dive.
+pub(crate) fn report(scene: &Scene) -> Report {
+    let vehicle = &scene.vehicle;
+    let mut app = App::new(vehicle.mission());
+    for sensor in &vehicle.sensors {
+        app.add_plugin(sensor.as_ref()).unwrap();
+    }
+    let navigation = DirectNavigation::new(vehicle.tunnel.profile.clone(), vehicle.site);
+    let mut dive = app.arm(Box::new(navigation)).unwrap();
+    let simulation = Simulation::new(scene).unwrap_or_else(|why| panic!("{why}"));
+    drive(&mut dive, &mut SimulationFeed::new(simulation), Pace::default(), &mut |_| {}).unwrap();
+    dive.finish();
+    Report::of(&dive)
+}
