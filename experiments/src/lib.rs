@@ -11,6 +11,7 @@ pub mod perimeter;
 mod report;
 mod runs;
 mod spacing;
+mod spread;
 mod stationary;
 pub mod surface;
 mod tables;
@@ -25,7 +26,8 @@ pub use hidden::HiddenRow;
 pub use meshes::MeshRow;
 pub use report::{Experiments, Finding, run};
 pub use runs::{Dive, Dives, SPEED_MPS, Sample, Setting};
-pub use spacing::{Spacing, SpacingSpread};
+pub use spacing::Spacing;
+pub use spread::Spread;
 pub use stationary::Perimeter;
 pub use tables::{Pair, RunRow, SignedRankRow};
 

@@ -3,11 +3,12 @@
 use headrace_core::sampling::layout::HeadLayout;
 use serde::Serialize;
 
+use crate::Spread;
 use crate::runs::{Dive, Dives, Setting};
 use crate::surface::chart::{Chart, Deviation};
 use crate::surface::poisson::{Settings, Surface};
 use crate::surface::wall::{self, Stretch};
-use crate::surface::{Mesh, MeshIndex, Spread, Xyz, normals};
+use crate::surface::{Mesh, MeshIndex, Xyz, normals};
 use crate::{ExperimentError, Progress};
 
 /// Length of a run, m: as in the paper.

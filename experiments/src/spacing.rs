@@ -4,46 +4,13 @@ use headrace_core::math::{self, TAU};
 use headrace_core::sampling::layout::HeadLayout;
 use serde::Serialize;
 
+use crate::Spread;
 use crate::runs::{Dive, Sample};
 
 /// Lines along the wall at which passes are counted.
 const LINES: usize = 72;
 /// Angles by which a step may miss the usual one, as a share of it.
 const STEP_SHARE: f64 = 0.25;
-
-/// Mean, standard deviation, least and largest of a spacing, m.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
-pub struct SpacingSpread {
-    /// How many.
-    pub count: usize,
-    /// Their mean.
-    pub mean: f64,
-    /// Their standard deviation.
-    pub sd: f64,
-    /// The least.
-    pub min: f64,
-    /// The largest.
-    pub max: f64,
-}
-
-impl SpacingSpread {
-    /// Of some values; all zero of none.
-    pub fn of(values: &[f64]) -> Self {
-        if values.is_empty() {
-            return Self::default();
-        }
-        let n = values.len() as f64;
-        let mean = values.iter().sum::<f64>() / n;
-        let squares: f64 = values.iter().map(|value| (value - mean) * (value - mean)).sum();
-        Self {
-            count: values.len(),
-            mean,
-            sd: math::sqrt(squares / n),
-            min: values.iter().copied().fold(f64::INFINITY, f64::min),
-            max: values.iter().copied().fold(0.0, f64::max),
-        }
-    }
-}
 
 /// What the paper's Tables 3 to 5 say of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -52,30 +19,22 @@ pub struct Spacing {
     /// ends have, which is twice the mean.
     pub t_x_m: f64,
     /// Across it, from ping to ping in the cross-section.
-    pub t_y: SpacingSpread,
+    pub t_y: Spread,
     /// T = sqrt(T_x^2 + T_y^2) for the mean, least and largest T_y.
     pub t_m: [f64; 3],
 }
 
 /// Measures a dive.
 pub(crate) fn spacing(dive: &Dive, layout: HeadLayout) -> Spacing {
-    let t_y = SpacingSpread::of(
-        &dive.heads.iter().flat_map(|samples| steps_m(samples, dive.step_rad)).collect::<Vec<_>>(),
-    );
+    let t_y = Spread::of(dive.heads.iter().flat_map(|samples| steps_m(samples, dive.step_rad)));
     let t_x_m = match layout {
-        HeadLayout::PhaseShift => {
-            mean(&passes(dive, LINES).iter().flat_map(|line| gaps_m(line)).collect::<Vec<_>>())
-        }
+        HeadLayout::PhaseShift => Spread::of(passes(dive, LINES).iter().flat_map(|line| gaps_m(line))).mean_m,
         HeadLayout::SectorOffset => {
-            mean(&dive.heads.iter().flat_map(|samples| turning_gaps_m(samples)).collect::<Vec<_>>())
+            Spread::of(dive.heads.iter().flat_map(|samples| turning_gaps_m(samples))).mean_m
         }
     };
     let t = |t_y: f64| math::hypot(t_x_m, t_y);
-    Spacing { t_x_m, t_y, t_m: [t(t_y.mean), t(t_y.min), t(t_y.max)] }
-}
-
-fn mean(values: &[f64]) -> f64 {
-    SpacingSpread::of(values).mean
+    Spacing { t_x_m, t_y, t_m: [t(t_y.mean_m), t(t_y.min_m), t(t_y.max_m)] }
 }
 
 fn turned_rad(a: &Sample, b: &Sample) -> f64 {

@@ -115,10 +115,10 @@ fn row(run: &Measured, layout: HeadLayout, paper: &Spacings, ours: &Spacing, tur
     let [mean, sd, min, max] = paper.t_y_m;
     let t_x = Pair::new(paper.t_x_m, ours.t_x_m);
     let t_y = [
-        Pair::new(mean, ours.t_y.mean),
-        Pair::new(sd, ours.t_y.sd),
-        Pair::new(min, ours.t_y.min),
-        Pair::new(max, ours.t_y.max),
+        Pair::new(mean, ours.t_y.mean_m),
+        Pair::new(sd, ours.t_y.sd_m),
+        Pair::new(min, ours.t_y.min_m),
+        Pair::new(max, ours.t_y.max_m),
     ];
     let t = paper.t_m.map(|[mean, min, max]| {
         let [a, b, c] = ours.t_m;

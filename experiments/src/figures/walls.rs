@@ -4,10 +4,11 @@ use headrace_core::math::{self, TAU};
 use headrace_core::tunnel::Profile;
 
 use super::{Place, Window};
+use crate::Spread;
 use crate::meshes::{LENGTH_M, cloud, poisson, setting};
 use crate::runs::{Dive, Dives, SPEED_MPS};
 use crate::spacing::passes_of;
-use crate::surface::{MeshIndex, Spread, wall};
+use crate::surface::{MeshIndex, wall};
 use crate::{ExperimentError, Progress};
 
 /// Length of the stretch shown, m.

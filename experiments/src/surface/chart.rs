@@ -4,8 +4,9 @@ use headrace_core::math;
 use headrace_core::tunnel::Profile;
 use spade::{DelaunayTriangulation, FloatTriangulation, HasPosition, Point2, Triangulation};
 
+use super::Xyz;
 use super::wall::Stretch;
-use super::{Spread, Xyz};
+use crate::Spread;
 
 /// Smaller coordinates are zero: the triangulation's exact predicates take none below 1e-142.
 const TINY_M: f64 = 1e-100;

@@ -11,11 +11,9 @@ mod mesh;
 pub mod normals;
 pub mod poisson;
 mod solver;
-mod stats;
 pub mod wall;
 
 pub use mesh::{Mesh, MeshIndex};
-pub use stats::Spread;
 
 /// A place in the tunnel's frame: x chainage, y left, z up, metres.
 pub type Xyz = [f64; 3];

@@ -3,7 +3,8 @@
 use headrace_core::math;
 use headrace_core::tunnel::Profile;
 
-use super::{Mesh, MeshIndex, Spread, Xyz};
+use super::{Mesh, MeshIndex, Xyz};
+use crate::Spread;
 
 /// A stretch of wall, looked at on a lattice of places.
 #[derive(Debug, Clone, Copy, PartialEq)]

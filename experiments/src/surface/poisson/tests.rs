@@ -1,5 +1,6 @@
-use super::super::{MeshIndex, Spread, norm};
+use super::super::{MeshIndex, norm};
 use super::*;
+use crate::Spread;
 
 fn sphere(count: u32, radius_m: f64) -> Vec<Sample> {
     let sample = |k: u32| {
