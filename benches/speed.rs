@@ -23,7 +23,6 @@ use headrace_core::app::{App, Mission, SourceSpec};
 use headrace_core::codec::CodecCounts;
 use headrace_core::coverage::hole::FARTHEST_M;
 use headrace_core::coverage::{HoleFinder, SampleIndex, SampleStore, Sections, StoreLayout, WallSample};
-use headrace_core::fusion::direct::DirectNavigation;
 use headrace_core::math;
 use headrace_core::time::{DurNs, MonoNs};
 use headrace_core::tunnel::named;
@@ -99,7 +98,7 @@ fn armed(scene: &Scene, decoding: bool) -> Loop {
             .unwrap();
         }
     }
-    app.arm(Box::new(DirectNavigation::new(vehicle.tunnel.profile.clone(), vehicle.site))).unwrap()
+    app.arm(vehicle.navigation()).unwrap()
 }
 
 /// A message of a simulation, to be fed.

@@ -9,7 +9,6 @@ use headrace_core::app::plugin::Plugin;
 use headrace_core::app::report::{LogReport, Report};
 use headrace_core::app::run::Loop;
 use headrace_core::config::VehicleConfig;
-use headrace_core::fusion::direct::DirectNavigation;
 use headrace_replay::drive::{Feed, Pace, drive};
 use headrace_replay::log::{LogHeader, Recorder, RecorderHandle, SourceInfo, file_digest};
 use headrace_replay::record::{QUEUE_BYTES, RecorderOutlet};
@@ -50,8 +49,7 @@ pub(crate) fn assemble(
             Some((path.to_owned(), handle))
         }
     };
-    let navigation = DirectNavigation::new(vehicle.tunnel.profile.clone(), vehicle.site);
-    Ok(Dive { armed: app.arm(Box::new(navigation))?, notices, recorder })
+    Ok(Dive { armed: app.arm(vehicle.navigation())?, notices, recorder })
 }
 
 /// What a log of this vehicle begins with.

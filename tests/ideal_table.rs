@@ -25,7 +25,7 @@ const TABLE: [(&str, f64, [f64; 3]); 5] = [
 
 fn vehicle(mode: &str, heads: usize) -> String {
     let mut text = "name = \"ideal\"\ntarget_m = 0.5\n[tunnel]\nprofile = \"ceran\"\nlength_m = 60\n\
-                    [heads]\nlayout = \"phase_shift\"\nplanned_speed_mps = 0.197\n"
+                    [navigation]\nway = \"direct\"\n[heads]\nlayout = \"phase_shift\"\nplanned_speed_mps = 0.197\n"
         .to_owned();
     let mut sensor = |id: &str, plugin: &str, keys: &str| {
         writeln!(text, "[[sensors]]\nid = \"{id}\"\nplugin = \"{plugin}\"\n{keys}").unwrap();

@@ -18,7 +18,6 @@ use std::cell::Cell;
 use headrace_core::app::device::Direction;
 use headrace_core::app::outlet::NoticeOutlet;
 use headrace_core::app::{App, Mission};
-use headrace_core::fusion::direct::DirectNavigation;
 use headrace_core::time::DurNs;
 use headrace_replay::log::{LogHeader, Recorder, SourceInfo};
 use headrace_replay::record::{QUEUE_BYTES, RecorderOutlet};
@@ -98,8 +97,7 @@ fn a_million_packets_without_one_allocation() {
     };
     let (port, recorder) = Recorder::start(std::io::sink(), &header, QUEUE_BYTES).unwrap();
     app.add_plugin(&RecorderOutlet::new(port)).unwrap();
-    let navigation = DirectNavigation::new(vehicle.tunnel.profile.clone(), vehicle.site);
-    let mut dive = app.arm(Box::new(navigation)).unwrap();
+    let mut dive = app.arm(vehicle.navigation()).unwrap();
     let mut ports: Vec<_> =
         (0..vehicle.sensors.len()).map(|source| dive.take_port(source).unwrap()).collect();
 

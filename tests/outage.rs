@@ -16,11 +16,12 @@ use serde_json::Value;
 const LEG: &str = "vehicle = \"vehicle.toml\"\n[trajectory]\nstart_m = 2\n[[trajectory.legs]]\ndistance_m = 12\nspeed_mps = 0.197\n";
 
 /// Replays a four-head dive of 12 m without what `source` sent between two moments, in seconds of its clock.
-fn without(source: &str, from_s: f64, to_s: f64) -> Value {
+fn without(way: &str, source: &str, from_s: f64, to_s: f64) -> Value {
     let folder = Folder::new();
     // The heads' bodies aren't simulated: nothing is hidden, and the paper's speed meets the target.
     let vehicle = include_str!("../deploy/vehicles/vita2-4.toml")
-        .replace("planned_speed_mps = 0.11", "planned_speed_mps = 0.197");
+        .replace("planned_speed_mps = 0.11", "planned_speed_mps = 0.197")
+        .replace("[water]", &format!("[navigation]\nway = \"{way}\"\n\n[water]"));
     folder.write("vehicle.toml", &vehicle);
     folder.write("scene.toml", LEG);
     folder.simulate("scene.toml", "whole.mcap");
@@ -44,8 +45,8 @@ fn failed(report: &Value) -> Vec<&Value> {
 }
 
 #[test]
-fn a_lost_tether_is_named_as_lost_position_and_its_return_raises_no_false_flag() {
-    let report = without("tether", 25.0, 31.0);
+fn without_a_filter_a_lost_tether_is_named_as_lost_position_and_its_return_raises_no_false_flag() {
+    let report = without("direct", "tether", 25.0, 31.0);
     assert!(report["dive"]["samples_rejected"]["no_fix"].as_u64().unwrap() > 500);
     let failed = failed(&report);
     assert!(!failed.is_empty(), "0.8 m of wall without a sample");
@@ -57,12 +58,16 @@ fn a_lost_tether_is_named_as_lost_position_and_its_return_raises_no_false_flag()
 
 #[test]
 fn a_short_silence_of_the_tether_is_bridged() {
-    let report = without("tether", 25.0, 26.5);
-    assert_eq!(failed(&report).len(), 0);
+    for (way, until_s) in [("direct", 26.5), ("filter", 31.0)] {
+        let report = without(way, "tether", 25.0, until_s);
+        assert_eq!(failed(&report).len(), 0, "{way}");
+    }
 }
 
 #[test]
 fn three_of_four_echosounders_are_enough() {
-    let report = without("ping_left", 25.0, 60.0);
-    assert_eq!(failed(&report).len(), 0);
+    for way in ["direct", "filter"] {
+        let report = without(way, "ping_left", 25.0, 60.0);
+        assert_eq!(failed(&report).len(), 0, "{way}");
+    }
 }

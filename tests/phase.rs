@@ -17,10 +17,11 @@ const APART_M: f64 = 1.102;
 const TURN_S: f64 = 8.0;
 const PLANNED_MPS: f64 = 0.197;
 
-/// Advice of a dive at a constant speed, without its first seconds.
+/// Advice of a dive at a constant speed, without its first seconds. Nothing disturbs its sensors, so that the speed is known
+/// without a filter, which would allow for slack of the cable.
 fn advice(speed_mps: f64, vehicle: &str) -> Vec<Value> {
     let folder = Folder::new();
-    folder.write("vehicle.toml", vehicle);
+    folder.write("vehicle.toml", vehicle.replace("[water]", "[navigation]\nway = \"direct\"\n\n[water]"));
     folder.write(
         "scene.toml",
         format!("vehicle = \"vehicle.toml\"\n[trajectory]\nstart_m = 5\n[[trajectory.legs]]\ndistance_m = 12\nspeed_mps = {speed_mps}\n"),

@@ -52,6 +52,11 @@ macro_rules! components {
                 Self(Vector3::new(x, y, z), PhantomData)
             }
 
+            /// From a vector in metres, in this frame.
+            pub fn of(vector: Vector3<f64>) -> Self {
+                Self(vector, PhantomData)
+            }
+
             /// The zero of the frame.
             pub fn zero() -> Self {
                 Self::new(0.0, 0.0, 0.0)
@@ -93,6 +98,17 @@ impl<F> Vec3<F> {
     /// Length.
     pub fn norm(&self) -> f64 {
         math::sqrt(self.0.x * self.0.x + self.0.y * self.0.y + self.0.z * self.0.z)
+    }
+
+    /// The scalar product.
+    pub fn dot(&self, other: &Self) -> f64 {
+        self.0.x * other.0.x + self.0.y * other.0.y + self.0.z * other.0.z
+    }
+
+    /// The vector product.
+    #[must_use]
+    pub fn cross(&self, other: &Self) -> Self {
+        Self(self.0.cross(&other.0), PhantomData)
     }
 
     /// The same direction with another length.

@@ -11,7 +11,6 @@ use std::path::Path;
 use headrace_core::app::App;
 use headrace_core::app::report::Report;
 use headrace_core::config::Document;
-use headrace_core::fusion::direct::DirectNavigation;
 use headrace_replay::drive::{Pace, drive};
 use headrace_replay::player::SimulationFeed;
 use headrace_replay::simulate::{FileLoader, Scene, Simulation};
@@ -27,6 +26,14 @@ pub(crate) fn scene(text: &str) -> Scene {
     scene_from(text, &vehicle_file)
 }
 
+/// A scene with a seed.
+pub(crate) fn seeded(text: &str, seed: u64) -> Scene {
+    let text = text.replace("../vehicles/", "");
+    let load = |name: &str| vehicle_file(name);
+    let scene = Scene::parse(Document::new("scene.toml", &text), &devices::KINDS, &load, Some(seed));
+    scene.unwrap_or_else(|why| panic!("{why}"))
+}
+
 /// A scene whose files are had from `load`.
 pub(crate) fn scene_from(text: &str, load: FileLoader<'_>) -> Scene {
     let scene = Scene::parse(Document::new("scene.toml", text), &devices::KINDS, load, None);
@@ -40,8 +47,7 @@ pub(crate) fn report(scene: &Scene) -> Report {
     for sensor in &vehicle.sensors {
         app.add_plugin(sensor.as_ref()).unwrap();
     }
-    let navigation = DirectNavigation::new(vehicle.tunnel.profile.clone(), vehicle.site);
-    let mut dive = app.arm(Box::new(navigation)).unwrap();
+    let mut dive = app.arm(vehicle.navigation()).unwrap();
     let simulation = Simulation::new(scene).unwrap_or_else(|why| panic!("{why}"));
     drive(&mut dive, &mut SimulationFeed::new(simulation), Pace::default(), &mut |_| {}).unwrap();
     dive.finish();

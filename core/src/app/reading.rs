@@ -42,8 +42,33 @@ pub enum Reading {
     AngularRate(Vec3<Sensor>),
     /// Acceleration less gravity (specific force), m/s^2: at rest and level it is +9.8 along z.
     SpecificForce(Vec3<Sensor>),
+    /// Velocity over ground, m/s.
+    VelocityOverGround(Vec3<Sensor>),
     /// Cable paid out, or another measure of distance gone.
     TetherLength(TetherLength),
+}
+
+impl Reading {
+    /// Whether every number of it is finite.
+    pub fn is_finite(&self) -> bool {
+        let all = |numbers: &[f64]| numbers.iter().all(|number| number.is_finite());
+        match self {
+            Self::Sonar(sonar) => all(&[
+                sonar.angle_rad,
+                sonar.range_m.unwrap_or(0.0),
+                sonar.resolution_m,
+                sonar.max_range_m,
+                sonar.sound_speed_mps,
+            ]),
+            Self::Echo(echo) => all(&[echo.range_m.unwrap_or(0.0), echo.confidence, echo.sound_speed_mps]),
+            Self::Pressure(water) => all(&[water.pressure_pa, water.resolution_pa]),
+            Self::Attitude(rotation) => all(&rotation.wxyz()),
+            Self::AngularRate(vector) | Self::SpecificForce(vector) | Self::VelocityOverGround(vector) => {
+                vector.is_finite()
+            }
+            Self::TetherLength(length) => all(&[length.length_m, length.resolution_m]),
+        }
+    }
 }
 
 /// A ping of a profiling head.

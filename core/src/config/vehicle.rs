@@ -7,6 +7,7 @@ use crate::app::Mission;
 use crate::app::device::{Device, DeviceKind};
 use crate::coverage::StoreLayout;
 use crate::frames::{Mount, Rot, Vec3};
+use crate::fusion::{Navigation, NavigationConfig};
 use crate::sampling::head::HeadSpec;
 use crate::sampling::layout::HeadLayout;
 use crate::sampling::occlusion::Obstacle;
@@ -33,6 +34,8 @@ pub struct VehicleConfig {
     pub planned_speed_mps: f64,
     /// Parts of the vehicle that may stand in a head's way.
     pub hull: Vec<Obstacle>,
+    /// How it navigates.
+    pub navigation: NavigationConfig,
     /// How long the dive may take.
     pub dive_time: Option<DurNs>,
     /// The sensors, in the order of the file, which is the order of their sources.
@@ -131,6 +134,7 @@ impl VehicleConfig {
             Some(water) => parse_water(water, axis_yaw_rad)?,
             None => Site { axis_yaw_rad, ..Site::default() },
         };
+        let navigation = NavigationConfig::parse(root.section("navigation")?)?;
         let dive_time = root.number("dive_hours", 0.01..=1000.0)?;
         let hull = root.sections("hull")?.into_iter().map(parse_hull).collect::<Result<Vec<_>, _>>()?;
         let mut sensors = Vec::new();
@@ -159,6 +163,7 @@ impl VehicleConfig {
             layout,
             planned_speed_mps,
             hull,
+            navigation,
             dive_time: dive_time.map(|hours| DurNs::from_secs_f64(hours * 3600.0)),
             sensors,
             sensor_configs,
@@ -180,6 +185,11 @@ impl VehicleConfig {
             hull: self.hull.clone(),
             dive_time: self.dive_time,
         }
+    }
+
+    /// Navigation at the start of a dive.
+    pub fn navigation(&self) -> Box<dyn Navigation> {
+        self.navigation.begin(&self.tunnel.profile, self.site)
     }
 
     /// The profiling heads, in the order of the file.

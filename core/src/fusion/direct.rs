@@ -3,10 +3,12 @@
 //!
 //! Good for data without much noise, and the yardstick for a filter.
 
-use super::{Fix, Navigation, NoFix, SensorInfo, SensorKind};
+use super::relative::Relative;
+use super::section::{Echo, settle};
+use super::{Fix, Navigation, NoFix, SensorInfo, SensorKind, Times};
 use crate::app::MAX_SOURCES;
 use crate::app::reading::{EchoRange, Level, Reading, TetherLength};
-use crate::frames::{Body, Mount, Point3, Pose, Rot, Sensor, Tunnel, Vec3};
+use crate::frames::{Body, Mount, Point3, Pose, Rot, Sensor, Tunnel};
 use crate::math;
 use crate::site::Site;
 use crate::time::{DurNs, MonoNs};
@@ -21,8 +23,8 @@ const SPEED_WINDOW: DurNs = DurNs(1_000_000_000);
 const SPEED_READINGS: usize = 64;
 /// Weight of an echo against the prior place, as standard deviations, m.
 const ECHO_SIGMA_M: f64 = 0.01;
-const PRIOR_Y_SIGMA_M: f64 = 10.0;
-const PRIOR_Z_SIGMA_M: f64 = 1.0;
+/// Across and up.
+const PRIOR_SD_M: [f64; 2] = [10.0, 1.0];
 
 /// See the module's description.
 pub struct DirectNavigation {
@@ -30,18 +32,11 @@ pub struct DirectNavigation {
     site: Site,
     attitude: Option<(MonoNs, Rot<Tunnel, Body>)>,
     tether: TetherTrack,
-    echoes: [Option<Echo>; MAX_SOURCES],
+    echoes: [Option<(MonoNs, Echo)>; MAX_SOURCES],
     place: Option<(MonoNs, [f64; 2])>,
     /// Height by pressure, and by how much the echoes have shown it to be off, m.
     height_m: Option<f64>,
     height_offset_m: f64,
-}
-
-#[derive(Debug, Clone, Copy)]
-struct Echo {
-    at: MonoNs,
-    mount: Mount,
-    range_m: f64,
 }
 
 /// The last readings of the cable counter, as chainages.
@@ -76,57 +71,24 @@ impl DirectNavigation {
         let Some(range_m) = echo.range_m else { return };
         let range_m = self.site.rescaled_range_m(range_m, echo.sound_speed_mps);
         if let Some(slot) = self.echoes.get_mut(source) {
-            *slot = Some(Echo { at, mount: *mount, range_m });
+            *slot = Some((at, Echo { mount: *mount, range_m }));
         }
         self.find_place(at);
     }
 
-    /// Moves the place in the section to where the recent ranges agree best with the profile: Gauss-Newton on
-    /// sum((measured - predicted)^2 / sigma^2) with a weak prior, d range / d place = -n / (n . direction).
+    /// Moves the place in the section to where the recent ranges agree best with the profile.
     fn find_place(&mut self, now: MonoNs) {
         let Some((_, attitude)) = self.attitude else { return };
         let [reference_y, reference_z] = self.profile.reference();
         let prior_z = self.height_m.map_or(reference_z, |height| height + self.height_offset_m);
         let prior = [self.place.map_or(reference_y, |(_, place)| place[0]), prior_z];
-        let mut place = self.place.map_or([reference_y, reference_z], |(_, place)| place);
-        let mut vertical = false;
-        for _ in 0..3 {
-            let (wy, wz) = (weight(PRIOR_Y_SIGMA_M), weight(PRIOR_Z_SIGMA_M));
-            let (mut hyy, mut hyz, mut hzz) = (wy, 0.0, wz);
-            let (mut gy, mut gz) = (wy * (prior[0] - place[0]), wz * (prior[1] - place[1]));
-            for echo in self.echoes.iter().flatten().filter(|echo| now.since(echo.at).0.abs() <= ECHO_AGE.0) {
-                let offset = attitude * echo.mount.position;
-                let beam = attitude * (echo.mount.rotation * Vec3::<Sensor>::new(1.0, 0.0, 0.0));
-                let origin = [place[0] + offset.y(), place[1] + offset.z()];
-                let Some(hit) = self.profile.cast(origin, [beam.y(), beam.z()]) else { continue };
-                let cosine = hit.normal[0] * beam.y() + hit.normal[1] * beam.z();
-                if cosine.abs() < 0.1 {
-                    continue;
-                }
-                let slope = [-hit.normal[0] / cosine, -hit.normal[1] / cosine];
-                vertical |= slope[1].abs() > 0.7;
-                let weight = weight(ECHO_SIGMA_M);
-                let residual = echo.range_m - hit.range_m;
-                hyy += weight * slope[0] * slope[0];
-                hyz += weight * slope[0] * slope[1];
-                hzz += weight * slope[1] * slope[1];
-                gy += weight * slope[0] * residual;
-                gz += weight * slope[1] * residual;
-            }
-            // The prior keeps the determinant at 1e-2 or more.
-            let determinant = hyy * hzz - hyz * hyz;
-            let moved = [
-                place[0] + (hzz * gy - hyz * gz) / determinant,
-                place[1] + (hyy * gz - hyz * gy) / determinant,
-            ];
-            if !self.profile.contains(moved) {
-                break;
-            }
-            place = moved;
-        }
-        self.place = Some((now, place));
-        if let (true, Some(height_m)) = (vertical, self.height_m) {
-            self.height_offset_m = place[1] - height_m;
+        let start = self.place.map_or([reference_y, reference_z], |(_, place)| place);
+        let recent = self.echoes.iter().flatten().filter(|(at, _)| now.since(*at).0.abs() <= ECHO_AGE.0);
+        let echoes = recent.map(|(_, echo)| *echo);
+        let place = settle(&self.profile, attitude, start, (prior, PRIOR_SD_M), ECHO_SIGMA_M, &echoes);
+        self.place = Some((now, place.at_m));
+        if let (true, Some(height_m)) = (place.is_height_seen, self.height_m) {
+            self.height_offset_m = place.at_m[1] - height_m;
         }
     }
 
@@ -135,16 +97,11 @@ impl DirectNavigation {
         let height_m = self.site.surface_above_floor_m - self.site.depth_m(pressure_pa) - up;
         self.height_m = Some(height_m);
         // Where the echoes say nothing of height, depth alone moves the place.
-        let silent = self.echoes.iter().flatten().all(|echo| at.since(echo.at).0.abs() > ECHO_AGE.0);
+        let silent = self.echoes.iter().flatten().all(|(echoed, _)| at.since(*echoed).0.abs() > ECHO_AGE.0);
         if let (true, Some((_, place))) = (silent, &mut self.place) {
             place[1] = height_m + self.height_offset_m;
         }
     }
-}
-
-/// Weight of an observation of this standard deviation.
-const fn weight(sigma_m: f64) -> f64 {
-    1.0 / (sigma_m * sigma_m)
 }
 
 impl TetherTrack {
@@ -176,7 +133,8 @@ impl TetherTrack {
 }
 
 impl Navigation for DirectNavigation {
-    fn update(&mut self, source: usize, sensor: &SensorInfo, at: MonoNs, reading: &Reading) {
+    fn update(&mut self, source: usize, sensor: &SensorInfo, times: Times, reading: &Reading) {
+        let at = times.valid;
         match (sensor.kind, reading) {
             (SensorKind::Imu, Reading::Attitude(rotation)) => {
                 self.take_attitude(at, &sensor.mount, *rotation);
@@ -208,7 +166,7 @@ impl Navigation for DirectNavigation {
             pose: Pose { position: Point3::new(x_m, y_m, z_m), attitude },
             speed_mps,
             // Two independent roundings to the counter's quantum.
-            relative_sigma_m: self.tether.resolution_m * math::sqrt(2.0 / 12.0),
+            relative: Relative::along(self.tether.resolution_m * math::sqrt(2.0 / 12.0)),
         })
     }
 }
@@ -217,11 +175,16 @@ impl Navigation for DirectNavigation {
 mod tests {
     use super::*;
     use crate::app::reading::WaterPressure;
+    use crate::frames::Vec3;
     use crate::tunnel::named;
 
     fn sensor(kind: SensorKind, yaw_deg: f64, pitch_deg: f64) -> SensorInfo {
         let rotation = Rot::from_roll_pitch_yaw(0.0, pitch_deg.to_radians(), yaw_deg.to_radians());
         SensorInfo { mount: Mount { position: Vec3::new(0.1, 0.0, 0.05), rotation }, kind }
+    }
+
+    fn at_once(at: MonoNs) -> Times {
+        Times { received: at, valid: at }
     }
 
     fn echo(range_m: f64) -> Reading {
@@ -244,12 +207,12 @@ mod tests {
             kind: SensorKind::Imu,
         };
         let [w, x, y, z] = level.wxyz();
-        nav.update(0, &imu, MonoNs(0), &Reading::Attitude(Rot::from_wxyz(w, x, y, z).unwrap()));
+        nav.update(0, &imu, at_once(MonoNs(0)), &Reading::Attitude(Rot::from_wxyz(w, x, y, z).unwrap()));
         assert_eq!(nav.fix(MonoNs(0)), Err(NoFix::Chainage));
         let tether = SensorInfo { kind: SensorKind::Tether { zero_at_m: 2.0, scale: 1.0 }, ..imu };
         for (at, length_m) in [(0, 9.9), (500_000_000, 10.0)] {
             let reading = Reading::TetherLength(TetherLength { length_m, resolution_m: 0.001 });
-            nav.update(1, &tether, MonoNs(at), &reading);
+            nav.update(1, &tether, at_once(MonoNs(at)), &reading);
         }
         assert_eq!(nav.fix(MonoNs(0)), Err(NoFix::Section));
         let echosounder = SensorKind::Echosounder { min_confidence: 0.5 };
@@ -261,7 +224,7 @@ mod tests {
             let origin = truth.place(info.mount.position);
             let beam = truth.attitude * (info.mount.rotation * Vec3::new(1.0, 0.0, 0.0));
             let hit = profile.cast([origin.y(), origin.z()], [beam.y(), beam.z()]).unwrap();
-            nav.update(2 + source, &info, now, &echo(hit.range_m * 1500.0 / site.sound_speed_mps));
+            nav.update(2 + source, &info, at_once(now), &echo(hit.range_m * 1500.0 / site.sound_speed_mps));
         }
         let fix = nav.fix(now).unwrap();
         let off = fix.pose.position - truth.position;
@@ -279,7 +242,7 @@ mod tests {
             mount: Mount { position: Vec3::zero(), rotation: Rot::identity() },
             kind: SensorKind::Imu,
         };
-        nav.update(0, &imu, MonoNs(0), &Reading::Attitude(Rot::identity()));
+        nav.update(0, &imu, at_once(MonoNs(0)), &Reading::Attitude(Rot::identity()));
         let pressure = |height_m: f64| {
             Reading::Pressure(WaterPressure {
                 pressure_pa: site.pressure_pa(site.surface_above_floor_m - height_m),
@@ -289,7 +252,7 @@ mod tests {
         };
         let depth = SensorInfo { kind: SensorKind::Depth, ..imu };
         // The sensor is 0.4 m off; the echoes say 3.0 m.
-        nav.update(1, &depth, MonoNs(0), &pressure(3.4));
+        nav.update(1, &depth, at_once(MonoNs(0)), &pressure(3.4));
         let down = SensorInfo {
             mount: Mount {
                 position: Vec3::zero(),
@@ -297,8 +260,8 @@ mod tests {
             },
             kind: SensorKind::Echosounder { min_confidence: 0.5 },
         };
-        nav.update(2, &down, MonoNs(0), &echo(3.0 * 1500.0 / site.sound_speed_mps));
-        nav.update(1, &depth, MonoNs(1_000_000_000), &pressure(3.6));
+        nav.update(2, &down, at_once(MonoNs(0)), &echo(3.0 * 1500.0 / site.sound_speed_mps));
+        nav.update(1, &depth, at_once(MonoNs(1_000_000_000)), &pressure(3.6));
         let height = nav.place.unwrap().1[1];
         assert!((height - 3.2).abs() < 2e-3, "{height}");
     }

@@ -1,10 +1,20 @@
 //! Where the vehicle is: the seam behind which navigation stands, and the ways of navigating.
 
 pub mod direct;
+pub mod filter;
+pub mod relative;
+pub mod section;
 
+use self::direct::DirectNavigation;
+use self::filter::FilterNavigation;
+use self::filter::settings::Settings;
+use self::relative::Relative;
 use crate::app::reading::Reading;
+use crate::config::{ConfigError, Section};
 use crate::frames::{Mount, Pose};
+use crate::site::Site;
 use crate::time::MonoNs;
+use crate::tunnel::Profile;
 
 /// A sensor as navigation knows it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,6 +39,8 @@ pub enum SensorKind {
     Depth,
     /// An inertial unit.
     Imu,
+    /// A sonar that measures velocity over ground.
+    VelocityLog,
     /// A cable counter.
     Tether {
         /// Chainage where it reads zero, m.
@@ -47,8 +59,8 @@ pub struct Fix {
     pub pose: Pose,
     /// Speed along the tunnel, m/s, positive inwards.
     pub speed_mps: f64,
-    /// Standard deviation of the displacement between two passes of a head a turn apart, m.
-    pub relative_sigma_m: f64,
+    /// Its errors against those when the heads last passed here.
+    pub relative: Relative,
 }
 
 /// What a fix lacks.
@@ -73,15 +85,57 @@ impl NoFix {
     }
 }
 
+/// When a reading came, and when it was valid.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Times {
+    /// When its first byte came.
+    pub received: MonoNs,
+    /// The moment that it speaks of.
+    pub valid: MonoNs,
+}
+
 /// A way of navigating. Readings come in the order in which they were received; a fix is as of the readings so far.
 pub trait Navigation: Send + Sync {
     /// Takes a reading. `source` is the same for all readings of one sensor.
     ///
     /// Allocates: never.
-    fn update(&mut self, source: usize, sensor: &SensorInfo, at: MonoNs, reading: &Reading);
+    fn update(&mut self, source: usize, sensor: &SensorInfo, times: Times, reading: &Reading);
 
     /// Where the vehicle is at `at`, which may be a little before or after the last reading.
     ///
     /// Errors: what is missing.
     fn fix(&self, at: MonoNs) -> Result<Fix, NoFix>;
+}
+
+/// Which way a vehicle navigates: the `[navigation]` table of its file.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[expect(clippy::large_enum_variant, reason = "there is one of it")]
+pub enum NavigationConfig {
+    /// By the filter.
+    Filter(Settings),
+    /// Without one.
+    Direct,
+}
+
+impl NavigationConfig {
+    /// Reads the table; without one, a filter with the usual settings.
+    ///
+    /// Errors: the first key that is unknown or out of range.
+    pub fn parse(section: Option<Section<'_>>) -> Result<Self, ConfigError> {
+        let Some(section) = section else { return Ok(Self::Filter(Settings::default())) };
+        let config = match section.choice("way", &[("filter", true), ("direct", false)])? {
+            Some(false) => Self::Direct,
+            _ => Self::Filter(Settings::parse(&section)?),
+        };
+        section.finish()?;
+        Ok(config)
+    }
+
+    /// Navigation that knows nothing yet.
+    pub fn begin(&self, profile: &Profile, site: Site) -> Box<dyn Navigation> {
+        match self {
+            Self::Filter(settings) => Box::new(FilterNavigation::new(profile.clone(), site, *settings)),
+            Self::Direct => Box::new(DirectNavigation::new(profile.clone(), site)),
+        }
+    }
 }

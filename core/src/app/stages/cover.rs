@@ -107,7 +107,7 @@ fn note_passage(coverage: &mut Coverage, sweeps: &HeadSweeps, ping: &PlacedPing)
     passage.pass_gap_sum_s += sweeps.pass_gap_s;
     passage.even_gap_sum_s += sweeps.even_gap_s;
     passage.ping_period_sum_s += sweeps.ping_period_s;
-    passage.relative_sigma_m = passage.relative_sigma_m.max(fix.relative_sigma_m);
+    passage.relative_sigma_m = passage.relative_sigma_m.max(ping.relative_sigma_m);
 }
 
 /// Keeps a sample and adds its spacings to its section.
@@ -164,11 +164,11 @@ fn note_sample(
 /// Moves the frontier on, and asks for the sections that are out of the way now.
 fn note_frontier(coverage: &mut Coverage, ping: &PlacedPing, requests: &mut Requests) {
     let Coverage { store, sections, frontier } = coverage;
-    let (Some(fix), Some(reach)) = (ping.fix, ping.reach) else {
+    let (Some(_), Some(reach)) = (ping.fix, ping.reach) else {
         frontier.heard(ping.head, ping.received);
         return;
     };
-    let margin_m = sections.margin_m(fix.relative_sigma_m);
+    let margin_m = sections.margin_m(ping.relative_sigma_m);
     let moved = frontier.advance(ping.head, ping.received, reach, sections.section_m(), margin_m);
     let now = store.len();
     sections.due(&moved, frontier, now, ping.received, &mut |request| requests.0.push(request));

@@ -4,6 +4,7 @@ use bevy_ecs::prelude::{Res, ResMut};
 
 use crate::app::flow::{ADVICE_PERIOD, Events, Navigator, Positioned, PositionedList, SensorTable};
 use crate::app::reading::Reading;
+use crate::fusion::Times;
 use crate::time::MonoNs;
 
 pub(super) fn navigate(
@@ -23,8 +24,10 @@ pub(super) fn navigate(
         if matches!(event.reading, Reading::Sonar(_)) {
             let fix = navigator.navigation.fix(event.valid_at);
             list.0.push(Positioned::Ping { event: index, fix });
-        } else if let Some(sensor) = sensors.0.get(event.source.index()) {
-            navigator.navigation.update(event.source.index(), sensor, event.valid_at, &event.reading);
+        }
+        if let Some(sensor) = sensors.0.get(event.source.index()) {
+            let times = Times { received: event.received, valid: event.valid_at };
+            navigator.navigation.update(event.source.index(), sensor, times, &event.reading);
         }
     }
 }

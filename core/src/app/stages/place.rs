@@ -9,7 +9,7 @@ use crate::app::flow::{
 use crate::app::head::HeadTrack;
 use crate::app::reading::{Reading, SonarReturn};
 use crate::coverage::Reach;
-use crate::frames::{Mount, Pose, head_direction};
+use crate::frames::{Mount, Pose, Vec3, head_direction};
 use crate::fusion::{Fix, NoFix};
 use crate::math;
 use crate::sampling::head::{HeadMotion, MAX_HEADS};
@@ -51,6 +51,7 @@ pub(super) fn place(
                 };
                 let turned = track.ping(event.valid_at, sonar.angle_rad);
                 let outcome = outcome(&sonar, fix, &sensor.mount, &context);
+                let relative_sigma_m = fix.map_or(0.0, |fix| relative_sigma_m(&fix, &outcome));
                 let ping = PlacedPing {
                     head,
                     received: event.received,
@@ -59,6 +60,7 @@ pub(super) fn place(
                     reach: fix.ok().map(|fix| reach(&fix.pose, &sensor.mount, &context)),
                     single_step: turned.single_step,
                     new_sweep: turned.new_sweep,
+                    relative_sigma_m,
                     outcome,
                 };
                 digest(&mut digests, event, &ping);
@@ -88,10 +90,18 @@ fn outcome(sonar: &SonarReturn, fix: Result<Fix, NoFix>, mount: &Mount, context:
     Outcome::Sample { point, sigma_m: context.profile.sigma_of([point.y(), point.z()]) }
 }
 
+/// How far a sample may be off along the tunnel against those of the last pass; of the vehicle, where there is none.
+fn relative_sigma_m(fix: &Fix, outcome: &Outcome) -> f64 {
+    match outcome {
+        Outcome::Sample { point, .. } => fix.relative.sigma_m(*point - fix.pose.position),
+        _ => fix.relative.sigma_m(Vec3::zero()),
+    }
+}
+
 /// A head lands its samples in the plane across its axis; tilted against the tunnel, the plane spans some chainage.
 fn reach(pose: &Pose, mount: &Mount, context: &Place) -> Reach {
     let origin = pose.place(mount.position);
-    let axis = pose.attitude * (mount.rotation * crate::frames::Vec3::new(1.0, 0.0, 0.0));
+    let axis = pose.attitude * (mount.rotation * Vec3::new(1.0, 0.0, 0.0));
     let across = math::hypot(axis.y(), axis.z()).min(0.99);
     let slope = across / math::sqrt(1.0 - across * across);
     let spread_m = slope * context.profile.farthest_m([origin.y(), origin.z()]);

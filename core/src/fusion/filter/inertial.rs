@@ -1,0 +1,263 @@
+//! From moment to moment: what gyros and accelerometers make of the estimate and of its errors.
+//!
+//! Derivation: `docs/fusion.md`, "Propagation".
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::factors::Factors;
+use super::settings::Settings;
+use super::state::{
+    ATTITUDE, DEPTH, ERRORS, Errors, FORCE_BIAS, HEADING, POSITION, RATE_BIAS, SCALE, SLACK, SLACK_RATE,
+    State, VELOCITY, cross, matrix, rotation,
+};
+use crate::frames::{Body, Vec3};
+use crate::math;
+
+/// What an inertial unit felt in the mean over some time, turned into the body's frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Felt {
+    /// Turn rate, rad/s; `None` where no gyro speaks: the attitude then stays, and its error grows fast.
+    pub rate_radps: Option<Vec3<Body>>,
+    /// Specific force, m/s^2; `None` where no accelerometer speaks: the velocity then stays, and its error grows fast.
+    pub force_mps2: Option<Vec3<Body>>,
+}
+
+/// What has been propagated since the errors were last moved on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Leg {
+    dt_s: f64,
+    /// Integral of the rotation, and of that.
+    turned: Matrix3<f64>,
+    turned_twice: Matrix3<f64>,
+    /// Velocity and way by specific force, without gravity.
+    velocity: Vector3<f64>,
+    way: Vector3<f64>,
+    /// What a gyro's bias does to velocity and way by tilting the force.
+    tilting: Matrix3<f64>,
+    tilting_twice: Matrix3<f64>,
+    /// Time without gyros, and without accelerometers.
+    blind_s: [f64; 2],
+}
+
+impl Default for Leg {
+    fn default() -> Self {
+        Self {
+            dt_s: 0.0,
+            turned: Matrix3::zeros(),
+            turned_twice: Matrix3::zeros(),
+            velocity: Vector3::zeros(),
+            way: Vector3::zeros(),
+            tilting: Matrix3::zeros(),
+            tilting_twice: Matrix3::zeros(),
+            blind_s: [0.0; 2],
+        }
+    }
+}
+
+impl State {
+    /// Moves the estimate on by what was felt over `dt_s`, and notes in `leg` what that does to its errors.
+    pub fn go_on(&mut self, felt: &Felt, dt_s: f64, gravity_mps2: f64, leg: &mut Leg) {
+        let half = felt.rate_radps.map(|rate| rotation((rate + -self.rate_bias_radps).scaled(dt_s / 2.0)));
+        let middle = half.map_or(self.attitude, |half| self.attitude * half);
+        let turn = matrix(middle);
+        let force = felt.force_mps2.map(|force| turn * (force + -self.force_bias_mps2).0);
+        leg.add(dt_s, turn, force, felt.rate_radps.is_some());
+        let lift = Vector3::new(0.0, 0.0, -gravity_mps2);
+        let gain = Vec3::of(force.map_or_else(Vector3::zeros, |force| (force + lift) * dt_s));
+        self.position = self.position + (self.velocity_mps + gain.scaled(0.5)).scaled(dt_s);
+        self.velocity_mps = self.velocity_mps + gain;
+        self.attitude = half.map_or(self.attitude, |half| middle * half);
+    }
+}
+
+impl Leg {
+    fn add(&mut self, dt_s: f64, turn: Matrix3<f64>, force: Option<Vector3<f64>>, turns: bool) {
+        let half = dt_s * dt_s / 2.0;
+        if let Some(force) = force {
+            let force_matrix = cross(force);
+            self.tilting_twice += self.tilting * dt_s;
+            self.tilting += force_matrix * (self.turned + turn * (dt_s / 2.0)) * dt_s;
+            self.way += self.velocity * dt_s + force * half;
+            self.velocity += force * dt_s;
+        } else {
+            self.tilting_twice += self.tilting * dt_s;
+            self.way += self.velocity * dt_s;
+        }
+        self.turned_twice += self.turned * dt_s + turn * half;
+        self.turned += turn * dt_s;
+        self.dt_s += dt_s;
+        let [without_rate, without_force] = &mut self.blind_s;
+        *without_rate += if turns { 0.0 } else { dt_s };
+        *without_force += if force.is_some() { 0.0 } else { dt_s };
+    }
+
+    /// Two equal lags in a row, driven by white noise.
+    fn disturb_slack(&self, settings: &Settings, factors: &mut Factors<ERRORS>) {
+        let slack = settings.slack;
+        let lags = self.dt_s / slack.time_s;
+        let left = math::exp(-2.0 * lags);
+        let drive = slack.drive();
+        let of_rate = drive * drive * (1.0 - left);
+        let of_both = drive * drive * slack.time_s / 2.0 * (1.0 - left * (1.0 + 2.0 * lags));
+        let of_slack = slack.reach * slack.reach * (1.0 - left * (1.0 + 2.0 * lags * (1.0 + lags)));
+        if of_rate <= 0.0 {
+            return;
+        }
+        let mut a = [0.0; ERRORS];
+        for (i, share) in [(SLACK, of_both / of_rate), (SLACK_RATE, 1.0)] {
+            if let Some(slot) = a.get_mut(i) {
+                *slot = share;
+            }
+        }
+        factors.add(of_rate, a, SLACK_RATE + 1);
+        factors.add_to(SLACK, (of_slack - of_both * of_both / of_rate).max(0.0));
+    }
+
+    /// Its length, s.
+    pub fn dt_s(&self) -> f64 {
+        self.dt_s
+    }
+
+    /// How errors at its beginning show at its end.
+    pub fn transition(&self, settings: &Settings) -> Transition {
+        let fading = |time_s: f64| math::exp(-self.dt_s / time_s).max(LEAST_FADING);
+        let seeing = |blind_s: f64| if blind_s > 0.5 * self.dt_s { 0.0 } else { 1.0 };
+        let [without_rate, without_force] = self.blind_s.map(seeing);
+        Transition {
+            dt_s: self.dt_s,
+            velocity_tilted: -cross(self.velocity),
+            way_tilted: -cross(self.way),
+            turned: -self.turned * without_rate,
+            velocity_pushed: -self.turned * without_force,
+            way_pushed: -self.turned_twice * without_force,
+            velocity_turned: self.tilting * without_rate,
+            way_turned: self.tilting_twice * without_rate,
+            fading: [
+                (FORCE_BIAS, fading(settings.force_bias.time_s)),
+                (FORCE_BIAS + 1, fading(settings.force_bias.time_s)),
+                (FORCE_BIAS + 2, fading(settings.force_bias.time_s)),
+                (RATE_BIAS, fading(settings.rate_bias.time_s)),
+                (RATE_BIAS + 1, fading(settings.rate_bias.time_s)),
+                (RATE_BIAS + 2, fading(settings.rate_bias.time_s)),
+                (SLACK, fading(settings.slack.time_s)),
+                (SLACK_RATE, fading(settings.slack.time_s)),
+                (HEADING, fading(settings.heading.time_s)),
+            ],
+        }
+    }
+
+    /// Adds what can't be known of the way: noise of the sensors, and wandering of what is wrong with them.
+    pub fn disturb(&self, settings: &Settings, transition: &Transition, factors: &mut Factors<ERRORS>) {
+        let [blind_rate_s, blind_force_s] = self.blind_s;
+        let variance = |density: f64, blind_density: f64, blind_s: f64| {
+            density * density * (self.dt_s - blind_s).max(0.0) + blind_density * blind_density * blind_s
+        };
+        let force = variance(settings.force_noise, settings.blind_force_noise, blind_force_s);
+        let rate = variance(settings.rate_noise, settings.blind_rate_noise, blind_rate_s);
+        for k in 0..3 {
+            // White force over the leg: velocity and way vary together, and the way by a twelfth on its own.
+            let mut a = [0.0; ERRORS];
+            if let Some(slot) = a.get_mut(POSITION + k) {
+                *slot = self.dt_s / 2.0;
+            }
+            if let Some(slot) = a.get_mut(VELOCITY + k) {
+                *slot = 1.0;
+            }
+            factors.add(force, a, VELOCITY + k + 1);
+            factors.add_to(POSITION + k, force * self.dt_s * self.dt_s / 12.0);
+            factors.add_to(ATTITUDE + k, rate);
+        }
+        self.disturb_slack(settings, factors);
+        for (i, fading) in transition.fading {
+            let reach = match i {
+                SLACK | SLACK_RATE => continue,
+                HEADING => settings.heading.reach,
+                _ if i >= RATE_BIAS => settings.rate_bias.reach,
+                _ => settings.force_bias.reach,
+            };
+            factors.add_to(i, reach * reach * (1.0 - fading * fading));
+        }
+        factors.add_to(SCALE, settings.scale_noise * settings.scale_noise * self.dt_s);
+        factors.add_to(DEPTH, settings.depth_noise * settings.depth_noise * self.dt_s);
+    }
+}
+
+/// Beyond this little of an error is left to matter; to have none left would divide by zero.
+const LEAST_FADING: f64 = 1e-3;
+
+/// How errors at a moment show at a later one: e' = F e.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Transition {
+    dt_s: f64,
+    velocity_tilted: Matrix3<f64>,
+    way_tilted: Matrix3<f64>,
+    turned: Matrix3<f64>,
+    velocity_pushed: Matrix3<f64>,
+    way_pushed: Matrix3<f64>,
+    velocity_turned: Matrix3<f64>,
+    way_turned: Matrix3<f64>,
+    /// Errors that fade by themselves, and what is left of them.
+    fading: [(usize, f64); 9],
+}
+
+impl Transition {
+    /// Moves the factors on.
+    pub fn carry(&self, factors: &mut Factors<ERRORS>) {
+        factors.shear(|column, len| self.shear(column, len));
+        for (i, fading) in self.fading {
+            factors.scale(i, fading);
+        }
+    }
+
+    /// Moves on what is wrong with the sensors: left to itself, it fades towards nothing.
+    pub fn fade(&self, state: &mut State) {
+        let left = |of: usize| self.fading.iter().find(|(i, _)| *i == of).map_or(1.0, |(_, left)| *left);
+        state.force_bias_mps2 = state.force_bias_mps2.scaled(left(FORCE_BIAS));
+        state.rate_bias_radps = state.rate_bias_radps.scaled(left(RATE_BIAS));
+        state.slack_m = (state.slack_m + state.slack_rate_mps * self.dt_s) * left(SLACK);
+        state.slack_rate_mps *= left(SLACK_RATE);
+        state.heading_offset_rad *= left(HEADING);
+    }
+
+    /// Moves errors on.
+    pub fn apply(&self, errors: &mut Errors) {
+        self.shear(errors, ERRORS);
+        for (i, fading) in self.fading {
+            if let Some(error) = errors.get_mut(i) {
+                *error *= fading;
+            }
+        }
+    }
+
+    /// What doesn't fade; errors from `len` on are zero.
+    fn shear(&self, e: &mut Errors, len: usize) {
+        if len <= VELOCITY {
+            return;
+        }
+        let part = |from: usize| Vector3::from_fn(|k, _| e.get(from + k).copied().unwrap_or(0.0));
+        let mut way = part(VELOCITY) * self.dt_s;
+        let mut velocity = Vector3::zeros();
+        let mut turn = Vector3::zeros();
+        if len > ATTITUDE {
+            let tilt = part(ATTITUDE);
+            way += self.way_tilted * tilt;
+            velocity += self.velocity_tilted * tilt;
+        }
+        if len > FORCE_BIAS {
+            let (force, rate) = (part(FORCE_BIAS), part(RATE_BIAS));
+            way += self.way_pushed * force + self.way_turned * rate;
+            velocity += self.velocity_pushed * force + self.velocity_turned * rate;
+            turn += self.turned * rate;
+        }
+        if let Some([slack, rate]) =
+            e.get_mut(SLACK..=SLACK_RATE).and_then(|pair| <&mut [f64; 2]>::try_from(pair).ok())
+        {
+            *slack += *rate * self.dt_s;
+        }
+        for (from, change) in [(POSITION, way), (VELOCITY, velocity), (ATTITUDE, turn)] {
+            for (e, change) in e.iter_mut().skip(from).zip(change.iter()) {
+                *e += change;
+            }
+        }
+    }
+}

@@ -1,0 +1,270 @@
+//! Navigation by an error-state Kalman filter: inertial propagation, corrected by everything that the other sensors say.
+//!
+//! Readings wait in a window until all of their time have come, and are fused at their own time, epoch by epoch; a fix is
+//! the estimate of the last epoch, carried on by what the inertial unit has felt since. `docs/fusion.md` derives it.
+
+pub mod align;
+pub mod factors;
+pub mod inertial;
+pub mod measure;
+pub mod running;
+pub mod settings;
+pub mod sources;
+pub mod state;
+pub mod trail;
+pub mod window;
+
+use self::align::Listening;
+use self::inertial::Leg;
+use self::running::{Context, Running};
+use self::settings::Settings;
+use self::sources::{Consistency, Source};
+use self::state::State;
+use self::window::{Waiting, Window};
+use super::relative::Relative;
+use super::{Fix, Navigation, NoFix, SensorInfo, SensorKind, Times};
+use crate::app::MAX_SOURCES;
+use crate::app::reading::Reading;
+use crate::frames::{Pose, Vec3};
+use crate::site::Site;
+use crate::time::{DurNs, MonoNs};
+use crate::tunnel::Profile;
+
+/// Length of an epoch; epochs begin at its multiples.
+const EPOCH: DurNs = DurNs(100_000_000);
+/// A fix is given so long after the last epoch at most, beyond the window.
+const CARRIES: DurNs = DurNs(2_000_000_000);
+/// Attitudes, cables and depths are used so often: their errors last longer.
+const ATTITUDE_PERIOD: DurNs = DurNs(100_000_000);
+const TETHER_PERIOD: DurNs = DurNs(100_000_000);
+const DEPTH_PERIOD: DurNs = DurNs(500_000_000);
+/// Samples are placed while the place in the section and the yaw are known so well, m and radians.
+const PLACE_LIMIT_M: f64 = 0.5;
+const YAW_LIMIT_RAD: f64 = 0.25;
+/// Chainage against that when the heads last passed, m.
+const RELATIVE_LIMIT_M: f64 = 1.0;
+/// Room for the estimates after the last epoch.
+const AHEAD: usize = 512;
+/// The time between two passes of heads when none is known to turn.
+const USUAL_GAP: DurNs = DurNs(20_000_000_000);
+
+/// See the module's description.
+pub struct FilterNavigation {
+    context: Context,
+    window: Window,
+    sources: [Option<Source>; MAX_SOURCES],
+    /// The inertial unit whose rates and forces are followed: the first that was heard. Its place is that of the estimate.
+    unit: Option<usize>,
+    listening: Listening,
+    running: Running,
+    is_running: bool,
+    /// Epochs begin at this time, and at multiples of their length after it.
+    epoch_zero: MonoNs,
+    /// The latest time at which anything came.
+    received: MonoNs,
+    /// The estimate of the last epoch, carried on.
+    ahead: Vec<(MonoNs, State)>,
+    standing: Result<Relative, NoFix>,
+    /// How often the estimate had to be begun anew because it was no number any more.
+    restarts: u64,
+}
+
+impl FilterNavigation {
+    /// Nothing is known yet.
+    pub fn new(profile: Profile, site: Site, settings: Settings) -> Self {
+        Self {
+            context: Context { profile, site, settings, unit_at: Vec3::zero() },
+            unit: None,
+            window: Window::default(),
+            sources: [None; MAX_SOURCES],
+            listening: Listening::default(),
+            running: Running::default(),
+            is_running: false,
+            epoch_zero: MonoNs(0),
+            received: MonoNs(0),
+            ahead: Vec::with_capacity(AHEAD),
+            standing: Err(NoFix::Heading),
+            restarts: 0,
+        }
+    }
+
+    /// The estimate and its covariance; `None` before the first.
+    pub fn running(&self) -> Option<&Running> {
+        self.is_running.then_some(&self.running)
+    }
+
+    /// How well each source agrees with the others.
+    pub fn consistency(&self, source: usize) -> Option<Consistency> {
+        self.sources.get(source).copied().flatten().map(|source| source.consistency)
+    }
+
+    /// How often the estimate had to be begun anew.
+    pub fn restarts(&self) -> u64 {
+        self.restarts
+    }
+
+    /// Fuses every epoch whose readings must have come by now.
+    fn close_epochs(&mut self) {
+        if !self.is_running {
+            return;
+        }
+        let last = self.epoch_before(self.received - self.context.settings.window);
+        if self.running.at >= last {
+            return;
+        }
+        while self.running.at < last {
+            let due = self.epoch_before(self.running.at + EPOCH);
+            // Over a time in which nothing was heard, one leg will do.
+            let heard =
+                self.window.next_heard(self.running.at).map_or(last, |heard| self.epoch_before(heard));
+            let to = due.max(heard).min(last);
+            self.running.advance(to, &self.context, &mut self.window, &mut self.sources);
+            self.window.forget(to);
+        }
+        self.after_epochs();
+    }
+
+    /// The last beginning of an epoch at or before a time.
+    fn epoch_before(&self, at: MonoNs) -> MonoNs {
+        MonoNs(at.0 - at.0.saturating_sub(self.epoch_zero.0) % EPOCH.0.unsigned_abs())
+    }
+
+    fn after_epochs(&mut self) {
+        let running = &self.running;
+        if !running.is_sound() {
+            self.is_running = false;
+            self.listening = Listening::default();
+            self.restarts += 1;
+            self.standing = Err(NoFix::Heading);
+            return;
+        }
+        let [y_m, z_m, yaw_rad] = running.sigmas();
+        let relative = running.trail.relative(self.pass_gap());
+        let relative = relative.unwrap_or_else(|| Relative::along(0.0));
+        self.standing = if yaw_rad > YAW_LIMIT_RAD {
+            Err(NoFix::Heading)
+        } else if y_m > PLACE_LIMIT_M || z_m > PLACE_LIMIT_M {
+            Err(NoFix::Section)
+        } else if relative.sigma_m(Vec3::zero()) > RELATIVE_LIMIT_M {
+            Err(NoFix::Chainage)
+        } else {
+            Ok(relative)
+        };
+        let (mut now, mut state) = (running.at, running.state);
+        let mut leg = Leg::default();
+        self.ahead.clear();
+        self.ahead.push((now, state));
+        while let Some(heard) = self.window.next_felt(now).filter(|_| self.ahead.len() < AHEAD) {
+            let (felt, until) = self.window.felt(now, heard);
+            state.go_on(&felt, until.since(now).as_secs_f64(), self.context.site.gravity_mps2, &mut leg);
+            now = until;
+            self.ahead.push((now, state));
+        }
+    }
+
+    /// Time between two passes of heads over a place, evenly spread.
+    fn pass_gap(&self) -> DurNs {
+        let turning =
+            self.sources.iter().flatten().filter_map(|source| source.turning.turns_per_s(self.received));
+        let passes_per_s: f64 = turning.sum();
+        if passes_per_s > 0.0 { DurNs::from_secs_f64(1.0 / passes_per_s) } else { USUAL_GAP }
+    }
+
+    /// Puts a reading where it will be fused, unless the ones before it say as much.
+    fn take(&mut self, number: usize, at: MonoNs, reading: &Reading) {
+        let step_rad = self.context.settings.return_step_rad;
+        let Some(Some(source)) = self.sources.get_mut(number) else { return };
+        let mount = source.sensor.mount;
+        let wanted = match (source.sensor.kind, reading) {
+            (SensorKind::Head, Reading::Sonar(sonar)) => source.turning.ping(at, sonar, step_rad),
+            (SensorKind::Echosounder { min_confidence }, Reading::Echo(echo)) => {
+                echo.range_m.is_some() && echo.confidence >= min_confidence
+            }
+            (SensorKind::Imu, Reading::Attitude(_)) => source.is_due(at, ATTITUDE_PERIOD),
+            (SensorKind::Tether { .. }, Reading::TetherLength(_)) => source.is_due(at, TETHER_PERIOD),
+            (SensorKind::Depth, Reading::Pressure(_)) => source.is_due(at, DEPTH_PERIOD),
+            (SensorKind::VelocityLog, Reading::VelocityOverGround(_)) => true,
+            (SensorKind::Imu, Reading::AngularRate(_) | Reading::SpecificForce(_))
+                if self.unit != Some(number) =>
+            {
+                false
+            }
+            (SensorKind::Imu, Reading::AngularRate(rate)) => {
+                source.consistency.dropped += u64::from(!self.window.take_rate(at, mount.rotation * *rate));
+                false
+            }
+            (SensorKind::Imu, Reading::SpecificForce(force)) => {
+                source.consistency.dropped += u64::from(!self.window.take_force(at, mount.rotation * *force));
+                false
+            }
+            _ => false,
+        };
+        if !wanted {
+            return;
+        }
+        if self.is_running && at <= self.running.at {
+            source.consistency.late += 1;
+            return;
+        }
+        let waiting = Waiting { at, source: number, reading: *reading };
+        source.consistency.dropped += u64::from(!self.window.take(waiting));
+    }
+}
+
+impl Navigation for FilterNavigation {
+    fn update(&mut self, number: usize, sensor: &SensorInfo, times: Times, reading: &Reading) {
+        self.received = self.received.max(times.received);
+        self.close_epochs();
+        let Some(slot) = self.sources.get_mut(number) else { return };
+        let source = slot.get_or_insert_with(|| Source::new(*sensor));
+        if !reading.is_finite() {
+            source.consistency.dropped += 1;
+            return;
+        }
+        if !self.is_running {
+            if sensor.kind == SensorKind::Imu && self.unit.is_none() {
+                self.unit = Some(number);
+                self.context.unit_at = sensor.mount.position;
+            }
+            self.listening.hear(&self.context, number, sensor, times.valid, reading);
+            self.standing = Err(self.listening.lacks());
+            self.epoch_zero = self.listening.since().unwrap_or(times.valid);
+            let at = self.epoch_before(times.valid);
+            if let Some((state, factors)) = self.listening.settle(at, &self.context) {
+                self.running.begin(at, state, factors);
+                self.is_running = true;
+                self.window.drop_until(at);
+                self.after_epochs();
+            }
+        }
+        self.take(number, times.valid, reading);
+    }
+
+    fn fix(&self, at: MonoNs) -> Result<Fix, NoFix> {
+        let relative = self.standing?;
+        let before = self.ahead.partition_point(|(knot, _)| *knot <= at);
+        let (from, state) = self.ahead.get(before.saturating_sub(1)).ok_or(NoFix::Heading)?;
+        let mut state = *state;
+        if at > *from {
+            if at.since(*from).0 > CARRIES.0 {
+                return Err(NoFix::Heading);
+            }
+            let mut leg = Leg::default();
+            let mut now = *from;
+            while now < at {
+                let (felt, until) = self.window.felt(now, at);
+                state.go_on(&felt, until.since(now).as_secs_f64(), self.context.site.gravity_mps2, &mut leg);
+                now = until;
+            }
+        } else {
+            let back_s = from.since(at).as_secs_f64();
+            if back_s > 1.0 {
+                return Err(NoFix::Heading);
+            }
+            state.position = state.position + state.velocity_mps.scaled(-back_s);
+        }
+        let arm = state.attitude * -self.context.unit_at;
+        let pose = Pose { position: state.position + arm, attitude: state.attitude };
+        Ok(Fix { pose, speed_mps: state.velocity_mps.x(), relative })
+    }
+}

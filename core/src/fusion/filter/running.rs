@@ -1,0 +1,271 @@
+//! The filter at work: an epoch is a leg of propagation, and the measurements of its time.
+
+use super::factors::Factors;
+use super::inertial::Leg;
+use super::measure::{self, Beam, Row};
+use super::settings::Settings;
+use super::sources::Source;
+use super::state::{ATTITUDE, ERRORS, Errors, POSITION, State};
+use super::trail::Trail;
+use super::window::{Waiting, Window};
+use crate::app::MAX_SOURCES;
+use crate::app::reading::{Level, Reading};
+use crate::frames::{Body, Point3, Rot, Sensor, Tunnel, Vec3, head_direction};
+use crate::fusion::SensorKind;
+use crate::math;
+use crate::site::Site;
+use crate::time::{DurNs, MonoNs};
+use crate::tunnel::Profile;
+
+/// Room for the moments of an epoch at which an inertial unit spoke.
+const KNOTS: usize = 256;
+/// Measurements of ranges over which it is seen whether they agree with the wall at all.
+const WALL_MEMORY: u32 = 40;
+/// When fewer than this share of them do, the place in the section is lost, and sought anew.
+const LEAST_AGREEING: f64 = 0.35;
+/// How far off it may be then, m.
+const LOST_M: f64 = 1.5;
+
+/// What doesn't change during a dive.
+#[derive(Debug, Clone)]
+pub struct Context {
+    /// The design.
+    pub profile: Profile,
+    /// The water and the place.
+    pub site: Site,
+    /// How far sensors are trusted.
+    pub settings: Settings,
+    /// Where the inertial unit is on the vehicle.
+    pub unit_at: Vec3<Body>,
+}
+
+/// The estimate at a moment, and how far it may be off.
+#[derive(Debug, Clone)]
+pub struct Running {
+    /// The moment: all that was valid before has been fused.
+    pub at: MonoNs,
+    /// The estimate then.
+    pub state: State,
+    /// The covariance of its errors.
+    pub factors: Factors<ERRORS>,
+    /// Errors against those before.
+    pub trail: Trail,
+    /// The estimate through the last epoch, before its measurements.
+    knots: Vec<(MonoNs, State)>,
+    wall: WallMemory,
+}
+
+/// Whether ranges have agreed with the wall of late.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct WallMemory {
+    seen: u32,
+    agreeing: f64,
+}
+
+impl Default for Running {
+    /// Room for what an estimate needs, before there is one.
+    fn default() -> Self {
+        Self {
+            at: MonoNs(0),
+            state: State::at_rest(Point3::zero(), Rot::identity()),
+            factors: Factors::independent([0.0; ERRORS]),
+            trail: Trail::default(),
+            knots: Vec::with_capacity(KNOTS),
+            wall: WallMemory::default(),
+        }
+    }
+}
+
+impl Running {
+    /// Begins with an estimate and its covariance.
+    pub fn begin(&mut self, at: MonoNs, state: State, factors: Factors<ERRORS>) {
+        (self.at, self.state, self.factors) = (at, state, factors);
+        self.trail.clear();
+        self.wall = WallMemory::default();
+    }
+
+    /// Goes on to a later moment, and fuses what the window has up to it.
+    pub fn advance(
+        &mut self,
+        to: MonoNs,
+        context: &Context,
+        window: &mut Window,
+        sources: &mut [Option<Source>; MAX_SOURCES],
+    ) {
+        let (mut nominal, leg) = self.propagate(to, context, window);
+        let transition = leg.transition(&context.settings);
+        transition.fade(&mut nominal);
+        transition.carry(&mut self.factors);
+        leg.disturb(&context.settings, &transition, &mut self.factors);
+        self.trail.carry(&transition);
+        let mut errors = [0.0; ERRORS];
+        while let Some(waiting) = window.pop(to) {
+            let Some(Some(source)) = sources.get_mut(waiting.source) else { continue };
+            let then = self.state_at(waiting.at);
+            let later_s = to.since(waiting.at).as_secs_f64();
+            let rows = rows(&then, context, source, &waiting, window);
+            for row in rows.into_iter().flatten() {
+                self.fuse(&row.seen_later(later_s), context, source, &mut errors);
+            }
+        }
+        self.at = to;
+        self.state = nominal;
+        self.state.correct(&errors);
+        self.trail.note(to, &self.factors);
+        self.seek_wall();
+    }
+
+    /// Whether the estimate is made of numbers.
+    pub fn is_sound(&self) -> bool {
+        self.state.is_sound() && self.factors.is_sound()
+    }
+
+    fn propagate(&mut self, to: MonoNs, context: &Context, window: &Window) -> (State, Leg) {
+        let mut leg = Leg::default();
+        let (mut now, mut state) = (self.at, self.state);
+        self.knots.clear();
+        self.knots.push((now, state));
+        while now < to {
+            let (felt, until) = window.felt(now, to);
+            state.go_on(&felt, until.since(now).as_secs_f64(), context.site.gravity_mps2, &mut leg);
+            now = until;
+            if self.knots.len() < KNOTS {
+                self.knots.push((now, state));
+            }
+        }
+        (state, leg)
+    }
+
+    /// The estimate at a moment of the last epoch, before its measurements.
+    fn state_at(&self, at: MonoNs) -> State {
+        let next = self.knots.partition_point(|(knot, _)| *knot < at);
+        let (before, after) = (self.knots.get(next.saturating_sub(1)), self.knots.get(next));
+        let (Some((from, before)), Some((to, after))) = (before, after) else {
+            return before.or(after).map_or(self.state, |(_, state)| *state);
+        };
+        if to <= from {
+            return *after;
+        }
+        let share = at.since(*from).as_secs_f64() / to.since(*from).as_secs_f64();
+        before.between(after, share)
+    }
+
+    fn fuse(&mut self, row: &Row, context: &Context, source: &mut Source, errors: &mut Errors) {
+        let expected: f64 = row.h.iter().zip(errors.iter()).map(|(h, e)| h * e).sum();
+        let innovation = row.residual - expected;
+        let variance = self.factors.variance_along(&row.h) + row.noise;
+        let nis = innovation * innovation / variance;
+        let is_range = matches!(source.sensor.kind, SensorKind::Head | SensorKind::Echosounder { .. });
+        let agrees = nis <= context.settings.gate;
+        if is_range {
+            self.wall.note(agrees);
+        }
+        if !agrees {
+            source.consistency.gated += 1;
+            return;
+        }
+        let gain = self.factors.measure(&row.h, row.noise);
+        self.trail.measure(&row.h, &gain);
+        for (error, k) in errors.iter_mut().zip(&gain.k) {
+            *error += k * innovation;
+        }
+        source.consistency.used += 1;
+        source.consistency.nis_sum += nis;
+    }
+
+    /// When ranges no longer agree with the wall, the place in the section is anywhere near.
+    fn seek_wall(&mut self) {
+        if self.wall.seen < WALL_MEMORY || self.wall.agreeing >= LEAST_AGREEING {
+            return;
+        }
+        for axis in 1..3 {
+            self.factors.add_to(POSITION + axis, LOST_M * LOST_M);
+        }
+        self.wall = WallMemory::default();
+    }
+
+    /// Standard deviations of the place in the section, m, and of yaw, radians.
+    pub fn sigmas(&self) -> [f64; 3] {
+        [POSITION + 1, POSITION + 2, ATTITUDE + 2].map(|i| math::sqrt(self.factors.variance(i)))
+    }
+}
+
+impl Default for WallMemory {
+    fn default() -> Self {
+        Self { seen: 0, agreeing: 1.0 }
+    }
+}
+
+impl WallMemory {
+    fn note(&mut self, agrees: bool) {
+        self.seen = (self.seen + 1).min(WALL_MEMORY);
+        let share = 1.0 / f64::from(self.seen.max(1));
+        self.agreeing += share * (f64::from(u8::from(agrees)) - self.agreeing);
+    }
+}
+
+/// What a reading measures; nothing where it can't be said.
+fn rows(
+    state: &State,
+    context: &Context,
+    source: &Source,
+    waiting: &Waiting,
+    window: &Window,
+) -> [Option<Row>; 3] {
+    let Context { profile, site, settings, unit_at } = context;
+    let mount = source.sensor.mount;
+    let offset = mount.position + -*unit_at;
+    let beam = |along: Vec3<Sensor>, first_rad: f64, unsure_rad: f64| {
+        let along = mount.rotation * along;
+        Beam { offset, along, first_rad, unsure_rad }
+    };
+    let one = |row: Option<Row>| [row, None, None];
+    match (source.sensor.kind, waiting.reading) {
+        (SensorKind::Echosounder { .. }, Reading::Echo(echo)) => one(echo.range_m.and_then(|range_m| {
+            let range_m = site.rescaled_range_m(range_m, echo.sound_speed_mps);
+            let beam = beam(Vec3::new(1.0, 0.0, 0.0), 0.0, settings.echo_beam_rad / 2.0);
+            measure::range(state, profile, &beam, range_m, settings.echo_sd_m)
+        })),
+        (SensorKind::Head, Reading::Sonar(sonar)) => one(sonar.range_m.and_then(|range_m| {
+            let range_m = site.rescaled_range_m(range_m, sonar.sound_speed_mps);
+            let beam = beam(head_direction(sonar.angle_rad), settings.return_beam_rad / 2.0, 0.0);
+            let sd_m = with_quantum(settings.return_sd_m, sonar.resolution_m);
+            measure::range(state, profile, &beam, range_m, sd_m)
+        })),
+        (SensorKind::Depth, Reading::Pressure(water)) => {
+            let height_m = site.surface_above_floor_m - site.depth_m(water.pressure_pa);
+            let quantum_m = site.depth_m(site.surface_pressure_pa + water.resolution_pa);
+            let sd_m = with_quantum(settings.depth_sd_m, quantum_m);
+            one(Some(measure::height(state, offset, height_m, sd_m)))
+        }
+        (SensorKind::Tether { zero_at_m, scale }, Reading::TetherLength(length)) => {
+            let sd_m = with_quantum(settings.tether_sd_m, length.resolution_m * scale.abs());
+            let chainage_m = zero_at_m + scale * length.length_m;
+            one(Some(measure::chainage(state, -*unit_at, zero_at_m, chainage_m, sd_m)))
+        }
+        (SensorKind::Imu, Reading::Attitude(level)) => {
+            let measured = in_tunnel(site, level) * mount.rotation.inverse();
+            let (felt, _) = window.felt(waiting.at, waiting.at + DurNs(1));
+            let seeing = felt.rate_radps.is_some() && felt.force_mps2.is_some();
+            let tilt_sd = if seeing { settings.tilt_sd_rad } else { settings.attitude_sd_rad };
+            measure::attitude(state, measured, tilt_sd, settings.heading_sd_rad).map(Some)
+        }
+        (SensorKind::VelocityLog, Reading::VelocityOverGround(moved)) => {
+            let (felt, _) = window.felt(waiting.at, waiting.at + DurNs(1));
+            let rate = felt.rate_radps.map_or_else(Vec3::zero, |rate| rate + -state.rate_bias_radps);
+            let sensor = (offset, mount.rotation);
+            measure::velocity(state, sensor, rate, moved, settings.velocity_sd_mps).map(Some)
+        }
+        _ => [None; 3],
+    }
+}
+
+/// An attitude of a unit against its own level, in the tunnel.
+pub fn in_tunnel(site: &Site, level: Rot<Level, Sensor>) -> Rot<Tunnel, Sensor> {
+    Rot::<Tunnel, Level>::from_roll_pitch_yaw(0.0, 0.0, -site.axis_yaw_rad) * level
+}
+
+/// A noise with that of rounding to a quantum.
+fn with_quantum(sd: f64, quantum: f64) -> f64 {
+    math::hypot(sd, quantum / math::sqrt(12.0))
+}

@@ -1,0 +1,171 @@
+//! How far each sensor is trusted. Defaults suit a small vehicle with a MEMS unit; a vehicle file's `[navigation]` table
+//! changes them.
+
+use core::ops::RangeInclusive;
+
+use crate::config::{ConfigError, Section};
+use crate::time::DurNs;
+
+/// In radians.
+const DEGREE: f64 = core::f64::consts::PI / 180.0;
+/// What a noise may be: zero would make the filter believe one sensor against all others.
+const DEGREES: RangeInclusive<f64> = 1e-4..=90.0;
+const METRES: RangeInclusive<f64> = 1e-4..=100.0;
+const SMALL: RangeInclusive<f64> = 1e-9..=10.0;
+const SECONDS: RangeInclusive<f64> = 0.1..=1e6;
+
+/// Something that wanders about zero: a Gauss-Markov process.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Wander {
+    /// Standard deviation, in the units of what wanders.
+    pub reach: f64,
+    /// Time over which it forgets itself, s.
+    pub time_s: f64,
+}
+
+impl Wander {
+    /// Standard deviation of what drives a process of two equal lags in a row, whose own is `reach`: it wanders smoothly.
+    pub fn drive(&self) -> f64 {
+        core::f64::consts::SQRT_2 * self.reach / self.time_s
+    }
+}
+
+/// See the module's description. Every number is positive.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// White noise of the gyros, rad/s/sqrt(Hz).
+    pub rate_noise: f64,
+    /// White noise of the accelerometers, m/s^2/sqrt(Hz).
+    pub force_noise: f64,
+    /// The same where no gyro, or no accelerometer, speaks: how a vehicle turns and speeds up by itself.
+    pub blind_rate_noise: f64,
+    /// See `blind_rate_noise`.
+    pub blind_force_noise: f64,
+    /// Bias of the gyros, rad/s.
+    pub rate_bias: Wander,
+    /// Bias of the accelerometers, m/s^2.
+    pub force_bias: Wander,
+    /// A tether counter's noise beside its quantum, m.
+    pub tether_sd_m: f64,
+    /// Slack of the cable, m, which wanders smoothly: two lags in a row.
+    pub slack: Wander,
+    /// Scale of the cable at the start, a share, and how it wanders, a share per root of a second.
+    pub scale_sd: f64,
+    /// See `scale_sd`.
+    pub scale_noise: f64,
+    /// A depth sensor's noise beside its quantum, m.
+    pub depth_sd_m: f64,
+    /// Its offset at the start, m, and how that wanders, m per root of a second: water level, density, surface pressure.
+    pub depth_offset_sd_m: f64,
+    /// See `depth_offset_sd_m`.
+    pub depth_noise: f64,
+    /// Noise of an attitude about the vertical, radians.
+    pub heading_sd_rad: f64,
+    /// A compass's deviation, radians.
+    pub heading: Wander,
+    /// Noise of an attitude about level axes, radians, where gyros and accelerometers speak for themselves.
+    pub tilt_sd_rad: f64,
+    /// Noise of an attitude where they don't.
+    pub attitude_sd_rad: f64,
+    /// Noise of an echosounder, m, the wall's own roughness included.
+    pub echo_sd_m: f64,
+    /// Full width of its beam, radians: within it nobody knows which part of the wall answers.
+    pub echo_beam_rad: f64,
+    /// Noise of a head's return, m, the wall's own roughness included.
+    pub return_sd_m: f64,
+    /// Full width of its beam, radians: the nearest part of the wall answers.
+    pub return_beam_rad: f64,
+    /// Angle between two returns of a head that are used, radians: nearer ones see the same roughness.
+    pub return_step_rad: f64,
+    /// Noise of a velocity over ground, m/s.
+    pub velocity_sd_mps: f64,
+    /// A measurement is left out when its innovation squared is more than this many times its variance.
+    pub gate: f64,
+    /// Readings older than this when they come are too late.
+    pub window: DurNs,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            rate_noise: 0.01 * DEGREE,
+            force_noise: 0.003,
+            blind_rate_noise: 2.0 * DEGREE,
+            blind_force_noise: 0.03,
+            rate_bias: Wander { reach: 0.2 * DEGREE, time_s: 300.0 },
+            force_bias: Wander { reach: 0.03, time_s: 300.0 },
+            tether_sd_m: 0.005,
+            slack: Wander { reach: 0.06, time_s: 10.0 },
+            scale_sd: 0.002,
+            scale_noise: 1e-5,
+            depth_sd_m: 0.02,
+            depth_offset_sd_m: 0.5,
+            depth_noise: 0.001,
+            heading_sd_rad: 1.0 * DEGREE,
+            heading: Wander { reach: 4.0 * DEGREE, time_s: 30.0 },
+            tilt_sd_rad: 2.0 * DEGREE,
+            attitude_sd_rad: 1.0 * DEGREE,
+            echo_sd_m: 0.03,
+            echo_beam_rad: 25.0 * DEGREE,
+            return_sd_m: 0.03,
+            return_beam_rad: 1.4 * DEGREE,
+            return_step_rad: 3.0 * DEGREE,
+            velocity_sd_mps: 0.02,
+            gate: GATE_999,
+            window: DurNs::from_millis(200),
+        }
+    }
+}
+
+/// Chi-square with one degree of freedom is above this once in a thousand times.
+const GATE_999: f64 = 10.828;
+
+impl Settings {
+    /// Reads a vehicle file's `[navigation]` table; what it leaves out is as usual.
+    ///
+    /// Errors: the first key whose value is out of range.
+    pub fn parse(section: &Section<'_>) -> Result<Self, ConfigError> {
+        let mut settings = Self::default();
+        let keys: [(&'static str, RangeInclusive<f64>, f64, &mut f64); 10] = [
+            ("gyro_bias_degps", DEGREES, DEGREE, &mut settings.rate_bias.reach),
+            ("gyro_bias_time_s", SECONDS, 1.0, &mut settings.rate_bias.time_s),
+            ("accel_bias_mps2", SMALL, 1.0, &mut settings.force_bias.reach),
+            ("accel_bias_time_s", SECONDS, 1.0, &mut settings.force_bias.time_s),
+            ("slack_sd_m", METRES, 1.0, &mut settings.slack.reach),
+            ("slack_time_s", SECONDS, 1.0, &mut settings.slack.time_s),
+            ("deviation_deg", DEGREES, DEGREE, &mut settings.heading.reach),
+            ("deviation_time_s", SECONDS, 1.0, &mut settings.heading.time_s),
+            ("gyro_noise_degps_rthz", SMALL, DEGREE, &mut settings.rate_noise),
+            ("accel_noise_mps2_rthz", SMALL, 1.0, &mut settings.force_noise),
+        ];
+        read(section, keys)?;
+        let keys: [(&'static str, RangeInclusive<f64>, f64, &mut f64); 12] = [
+            ("tether_sd_m", METRES, 1.0, &mut settings.tether_sd_m),
+            ("tether_scale_sd", SMALL, 1.0, &mut settings.scale_sd),
+            ("depth_sd_m", METRES, 1.0, &mut settings.depth_sd_m),
+            ("depth_offset_sd_m", METRES, 1.0, &mut settings.depth_offset_sd_m),
+            ("heading_sd_deg", DEGREES, DEGREE, &mut settings.heading_sd_rad),
+            ("tilt_sd_deg", DEGREES, DEGREE, &mut settings.tilt_sd_rad),
+            ("attitude_sd_deg", DEGREES, DEGREE, &mut settings.attitude_sd_rad),
+            ("echo_sd_m", METRES, 1.0, &mut settings.echo_sd_m),
+            ("echo_beam_deg", DEGREES, DEGREE, &mut settings.echo_beam_rad),
+            ("return_sd_m", METRES, 1.0, &mut settings.return_sd_m),
+            ("return_beam_deg", DEGREES, DEGREE, &mut settings.return_beam_rad),
+            ("velocity_sd_mps", SMALL, 1.0, &mut settings.velocity_sd_mps),
+        ];
+        read(section, keys)?;
+        Ok(settings)
+    }
+}
+
+fn read<const N: usize>(
+    section: &Section<'_>,
+    keys: [(&'static str, RangeInclusive<f64>, f64, &mut f64); N],
+) -> Result<(), ConfigError> {
+    for (key, range, unit, slot) in keys {
+        if let Some(value) = section.number(key, range)? {
+            *slot = value * unit;
+        }
+    }
+    Ok(())
+}

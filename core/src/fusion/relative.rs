@@ -1,0 +1,41 @@
+//! How well two moments are known against each other.
+
+use crate::frames::{Tunnel, Vec3};
+use crate::math;
+
+/// Covariance of the errors that move a sample along the tunnel, of one moment against another.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Relative([[f64; 3]; 3]);
+
+impl Relative {
+    /// From the covariance of chainage, m, and of pitch and yaw, radians.
+    pub fn new(covariance: [[f64; 3]; 3]) -> Self {
+        Self(covariance)
+    }
+
+    /// Nothing but an error of chainage of this standard deviation, m.
+    pub fn along(sigma_m: f64) -> Self {
+        Self([[sigma_m * sigma_m, 0.0, 0.0], [0.0; 3], [0.0; 3]])
+    }
+
+    /// Standard deviation of the chainage of a place at `arm` from the vehicle, m.
+    pub fn sigma_m(&self, arm: Vec3<Tunnel>) -> f64 {
+        let weights = [1.0, arm.z(), -arm.y()];
+        let rows = self.0.iter().zip(weights);
+        let sum: f64 =
+            rows.map(|(row, w)| w * row.iter().zip(weights).map(|(c, w)| c * w).sum::<f64>()).sum();
+        math::sqrt(sum.max(0.0))
+    }
+
+    /// The sum of shares of two.
+    #[must_use]
+    pub fn weighted(&self, share: f64, other: &Self, other_share: f64) -> Self {
+        let mut sum = [[0.0; 3]; 3];
+        for ((sum, a), b) in
+            sum.as_flattened_mut().iter_mut().zip(self.0.as_flattened()).zip(other.0.as_flattened())
+        {
+            *sum = a * share + b * other_share;
+        }
+        Self(sum)
+    }
+}
