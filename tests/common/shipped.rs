@@ -26,17 +26,14 @@ pub(crate) fn scene(text: &str) -> Scene {
     scene_from(text, &vehicle_file)
 }
 
-/// A scene with a seed.
-pub(crate) fn seeded(text: &str, seed: u64) -> Scene {
-    let text = text.replace("../vehicles/", "");
-    let load = |name: &str| vehicle_file(name);
-    let scene = Scene::parse(Document::new("scene.toml", &text), &devices::KINDS, &load, Some(seed));
-    scene.unwrap_or_else(|why| panic!("{why}"))
-}
-
 /// A scene whose files are had from `load`.
 pub(crate) fn scene_from(text: &str, load: FileLoader<'_>) -> Scene {
-    let scene = Scene::parse(Document::new("scene.toml", text), &devices::KINDS, load, None);
+    seeded(text, load, None)
+}
+
+/// A scene with another seed than its own.
+pub(crate) fn seeded(text: &str, load: FileLoader<'_>, seed: Option<u64>) -> Scene {
+    let scene = Scene::parse(Document::new("scene.toml", text), &devices::KINDS, load, seed);
     scene.unwrap_or_else(|why| panic!("{why}"))
 }
 

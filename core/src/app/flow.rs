@@ -94,8 +94,6 @@ pub struct PlacedPing {
     pub valid_at: MonoNs,
     /// The vehicle then; `None` without a fix.
     pub fix: Option<Fix>,
-    /// How far its place may be off along the tunnel against those of the heads' last pass, standard deviation, m.
-    pub relative_sigma_m: f64,
     /// Chainages on which the head lands samples at this attitude; `None` without a fix.
     pub reach: Option<crate::coverage::Reach>,
     /// The head has come here from its last ping in one step.

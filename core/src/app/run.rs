@@ -151,7 +151,14 @@ impl Loop {
                     notices.0.clear();
                     let mut digests = world.resource_mut::<Digests>();
                     for request in &requests {
-                        judge_one(request, &mut coverage, &mut finder, &mut notices, &mut digests);
+                        judge_one(
+                            request,
+                            &self.mission.profile,
+                            &mut coverage,
+                            &mut finder,
+                            &mut notices,
+                            &mut digests,
+                        );
                     }
                 });
             });

@@ -9,5 +9,5 @@ pub mod store;
 pub use cause::{Cause, Evidence};
 pub use frontier::{Frontier, Reach};
 pub use hole::{Hole, HoleFinder};
-pub use sections::{Judgement, Passage, Request, Section, Sections, Spread, Verdict};
+pub use sections::{Doubt, Judgement, Passage, Request, Section, Sections, Spread, Verdict};
 pub use store::{SampleIndex, SampleStore, StoreError, StoreLayout, WallSample};

@@ -6,8 +6,11 @@ use super::cause::{Evidence, explain};
 use super::frontier::{Frontier, Moved, Reach};
 use super::hole::{FARTHEST_M, Hole, HoleFinder};
 use super::store::{SampleIndex, SampleStore};
+use crate::frames::Vec3;
+use crate::fusion::relative::Relative;
 use crate::math;
 use crate::time::MonoNs;
+use crate::tunnel::Profile;
 
 /// What is said of a section. Source: metrics.md, "Sections and verdicts".
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -110,8 +113,36 @@ pub struct Passage {
     pub ping_period_sum_s: f64,
     /// The largest T_y that geometry predicted, m.
     pub t_y_m: f64,
-    /// The largest standard deviation of one pass relative to another, m.
-    pub relative_sigma_m: f64,
+    /// How far one pass may be off against another.
+    pub doubt: Doubt,
+}
+
+/// The largest hole of a section is looked for where errors have made it large: so much more is it off than the distance of
+/// two passes at one place. Measured over the field dives of `tests/fusion.rs`.
+const LARGEST_OF_MANY: f64 = 1.2;
+
+/// How far the samples of a pass may be off along the tunnel against those of the pass before.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Doubt {
+    /// The errors that move them.
+    pub relative: Relative,
+    /// Where the vehicle was in the cross-section, m.
+    pub from_m: [f64; 2],
+}
+
+impl Doubt {
+    /// Keeps the larger of the two.
+    pub fn add(&mut self, other: &Self) {
+        if other.relative.sigma_m(Vec3::zero()) >= self.relative.sigma_m(Vec3::zero()) {
+            *self = *other;
+        }
+    }
+
+    /// Standard deviation of the diameter of a hole there on the wall, m: one edge of it is a pass, the other edge the next.
+    pub fn sigma_m(&self, wall_m: [f64; 2]) -> f64 {
+        LARGEST_OF_MANY
+            * self.relative.sigma_m(Vec3::new(0.0, wall_m[0] - self.from_m[0], wall_m[1] - self.from_m[1]))
+    }
 }
 
 /// One section.
@@ -300,12 +331,13 @@ impl Sections {
         request: &Request,
         store: &SampleStore,
         finder: &mut HoleFinder,
+        profile: &Profile,
     ) -> Option<Judgement> {
         let (from_m, to_m) = self.bounds_m(request.section);
         let target_m = self.target_m;
         let section = self.get_mut(request.section)?;
         let hole = finder.largest(store, from_m, to_m, request.as_of);
-        let sigma_m = section.passage.relative_sigma_m;
+        let sigma_m = section.passage.doubt.sigma_m(profile.point_at(hole.sigma_m));
         section.hole = Some(hole);
         section.hole_sigma_m = sigma_m;
         section.verdict = verdict(&hole, sigma_m, target_m);

@@ -3,7 +3,7 @@
 use crate::frames::{Tunnel, Vec3};
 use crate::math;
 
-/// Covariance of the errors that move a sample along the tunnel, of one moment against another.
+/// Covariance of the errors that move a sample along the tunnel, of one moment against another: chainage, pitch, yaw.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Relative([[f64; 3]; 3]);
 

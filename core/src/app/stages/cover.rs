@@ -6,11 +6,11 @@ use bevy_ecs::prelude::{Res, ResMut, Resource};
 
 use super::judge::judge_one;
 use crate::app::flow::{
-    Coverage, Digests, Finder, Notices, Outcome, Placed, PlacedList, PlacedPing, Requests, Tally,
+    Coverage, Digests, Finder, Notices, Outcome, Place, Placed, PlacedList, PlacedPing, Requests, Tally,
 };
 use crate::coverage::hole::FARTHEST_M;
-use crate::coverage::{SampleIndex, StoreError, WallSample};
-use crate::frames::{Point3, Tunnel};
+use crate::coverage::{Doubt, SampleIndex, StoreError, WallSample};
+use crate::frames::{Point3, Tunnel, Vec3};
 use crate::math;
 use crate::sampling::head::{HeadMotion, MAX_HEADS};
 use crate::sampling::passes::{Phasing, Situation};
@@ -38,6 +38,7 @@ struct LastSample {
 #[expect(clippy::too_many_arguments, reason = "a system's arguments are what it reads and writes")]
 pub(super) fn cover(
     placed: Res<'_, PlacedList>,
+    context: Res<'_, Place>,
     mut coverage: ResMut<'_, Coverage>,
     mut sweeps: ResMut<'_, HeadSweeps>,
     mut requests: ResMut<'_, Requests>,
@@ -61,7 +62,14 @@ pub(super) fn cover(
                 }
                 note_frontier(&mut coverage, ping, &mut requests);
                 for request in requests.0.drain(..) {
-                    judge_one(&request, &mut coverage, &mut finder, &mut notices, &mut digests);
+                    judge_one(
+                        &request,
+                        &context.profile,
+                        &mut coverage,
+                        &mut finder,
+                        &mut notices,
+                        &mut digests,
+                    );
                 }
             }
         }
@@ -107,7 +115,8 @@ fn note_passage(coverage: &mut Coverage, sweeps: &HeadSweeps, ping: &PlacedPing)
     passage.pass_gap_sum_s += sweeps.pass_gap_s;
     passage.even_gap_sum_s += sweeps.even_gap_s;
     passage.ping_period_sum_s += sweeps.ping_period_s;
-    passage.relative_sigma_m = passage.relative_sigma_m.max(ping.relative_sigma_m);
+    let from_m = [fix.pose.position.y(), fix.pose.position.z()];
+    passage.doubt.add(&Doubt { relative: fix.relative, from_m });
 }
 
 /// Keeps a sample and adds its spacings to its section.
@@ -164,11 +173,11 @@ fn note_sample(
 /// Moves the frontier on, and asks for the sections that are out of the way now.
 fn note_frontier(coverage: &mut Coverage, ping: &PlacedPing, requests: &mut Requests) {
     let Coverage { store, sections, frontier } = coverage;
-    let (Some(_), Some(reach)) = (ping.fix, ping.reach) else {
+    let (Some(fix), Some(reach)) = (ping.fix, ping.reach) else {
         frontier.heard(ping.head, ping.received);
         return;
     };
-    let margin_m = sections.margin_m(ping.relative_sigma_m);
+    let margin_m = sections.margin_m(fix.relative.sigma_m(Vec3::zero()));
     let moved = frontier.advance(ping.head, ping.received, reach, sections.section_m(), margin_m);
     let now = store.len();
     sections.due(&moved, frontier, now, ping.received, &mut |request| requests.0.push(request));

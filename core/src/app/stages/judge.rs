@@ -2,17 +2,19 @@
 
 use crate::app::flow::{Coverage, Digests, Finder, Notice, Notices};
 use crate::coverage::Request;
+use crate::tunnel::Profile;
 
 /// Judges one section and says what has changed.
 pub(in crate::app) fn judge_one(
     request: &Request,
+    profile: &Profile,
     coverage: &mut Coverage,
     finder: &mut Finder,
     notices: &mut Notices,
     digests: &mut Digests,
 ) {
     let Coverage { store, sections, .. } = coverage;
-    let Some(change) = sections.judge(request, store, &mut finder.0) else { return };
+    let Some(change) = sections.judge(request, store, &mut finder.0, profile) else { return };
     notices.0.push(Notice::Section { section: request.section, at: request.at, change });
     let Some(section) = sections.get(request.section) else { return };
     digests

@@ -51,7 +51,6 @@ pub(super) fn place(
                 };
                 let turned = track.ping(event.valid_at, sonar.angle_rad);
                 let outcome = outcome(&sonar, fix, &sensor.mount, &context);
-                let relative_sigma_m = fix.map_or(0.0, |fix| relative_sigma_m(&fix, &outcome));
                 let ping = PlacedPing {
                     head,
                     received: event.received,
@@ -60,7 +59,6 @@ pub(super) fn place(
                     reach: fix.ok().map(|fix| reach(&fix.pose, &sensor.mount, &context)),
                     single_step: turned.single_step,
                     new_sweep: turned.new_sweep,
-                    relative_sigma_m,
                     outcome,
                 };
                 digest(&mut digests, event, &ping);
@@ -88,14 +86,6 @@ fn outcome(sonar: &SonarReturn, fix: Result<Fix, NoFix>, mount: &Mount, context:
     };
     let point = origin + beam.scaled(context.site.rescaled_range_m(range_m, sonar.sound_speed_mps));
     Outcome::Sample { point, sigma_m: context.profile.sigma_of([point.y(), point.z()]) }
-}
-
-/// How far a sample may be off along the tunnel against those of the last pass; of the vehicle, where there is none.
-fn relative_sigma_m(fix: &Fix, outcome: &Outcome) -> f64 {
-    match outcome {
-        Outcome::Sample { point, .. } => fix.relative.sigma_m(*point - fix.pose.position),
-        _ => fix.relative.sigma_m(Vec3::zero()),
-    }
 }
 
 /// A head lands its samples in the plane across its axis; tilted against the tunnel, the plane spans some chainage.

@@ -18,11 +18,25 @@ pub struct Row {
     pub residual: f64,
     /// Variance of the measurement itself.
     pub noise: f64,
+    /// For a range, how the beam leans along the tunnel.
+    pub lean: Option<Lean>,
+}
+
+/// How a beam leans along the tunnel. It makes the range longer whichever way it leans: a filter that isn't sure which way
+/// would take its first guess for proven.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Lean {
+    /// Component of the beam along the tunnel.
+    pub along: f64,
+    /// Its change for a unit of each error.
+    pub by: Errors,
+    /// Change of the range for a unit of `along`, for each unit of it, m.
+    pub slope_m: f64,
 }
 
 impl Row {
     fn new(residual: f64, noise: f64) -> Self {
-        Self { h: [0.0; ERRORS], residual, noise }
+        Self { h: [0.0; ERRORS], residual, noise, lean: None }
     }
 
     fn with<F: Copy>(mut self, from: usize, part: Vec3<F>) -> Self {
@@ -33,6 +47,22 @@ impl Row {
     fn with_one(mut self, i: usize, part: f64) -> Self {
         if let Some(slot) = self.h.get_mut(i) {
             *slot = part;
+        }
+        self
+    }
+
+    /// The same row, without what it says of the beam's lean where that isn't known: `sd_of` gives the standard deviation of
+    /// a sum of errors.
+    #[must_use]
+    pub fn unless_sure(mut self, sd_of: impl Fn(&Errors) -> f64) -> Self {
+        let Some(lean) = self.lean else { return self };
+        let sd = sd_of(&lean.by);
+        if lean.along.abs() < SURE * sd {
+            for (h, by) in self.h.iter_mut().zip(&lean.by) {
+                *h -= lean.slope_m * lean.along * by;
+            }
+            let unknown_m = lean.slope_m * sd * (lean.along.abs() + sd / 2.0);
+            self.noise += unknown_m * unknown_m;
         }
         self
     }
@@ -52,6 +82,8 @@ impl Row {
 
 /// Beams that graze the wall more than this say little of where they start, and much of the wall's roughness.
 const LEAST_COSINE: f64 = 0.5;
+/// A lean is known when it is so many standard deviations from none.
+const SURE: f64 = 3.0;
 
 /// A sonar's beam.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -88,7 +120,11 @@ pub fn range(state: &State, profile: &Profile, beam: &Beam, range_m: f64, sd_m: 
     let turning = arm.cross(&normal).scaled(1.0 / cos) + along.cross(&normal).scaled(slope);
     let unsure = math::cos((incidence.min(beam.unsure_rad) - beam.first_rad).max(0.0));
     let unsure_m = expected_m * (1.0 - unsure) / math::sqrt(3.0);
-    let row = Row::new(range_m - expected_m, sd_m * sd_m + unsure_m * unsure_m);
+    let mut row = Row::new(range_m - expected_m, sd_m * sd_m + unsure_m * unsure_m);
+    let mut by = [0.0; ERRORS];
+    put(&mut by, ATTITUDE, Vec3::<Tunnel>::new(0.0, along.z(), -along.y()));
+    let across = 1.0 - along.x() * along.x();
+    row.lean = Some(Lean { along: along.x(), by, slope_m: expected_m / across });
     Some(row.with(POSITION, normal.scaled(1.0 / cos)).with(ATTITUDE, turning))
 }
 

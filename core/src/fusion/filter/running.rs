@@ -151,6 +151,7 @@ impl Running {
     }
 
     fn fuse(&mut self, row: &Row, context: &Context, source: &mut Source, errors: &mut Errors) {
+        let row = row.unless_sure(|by| math::sqrt(self.factors.variance_along(by)));
         let expected: f64 = row.h.iter().zip(errors.iter()).map(|(h, e)| h * e).sum();
         let innovation = row.residual - expected;
         let variance = self.factors.variance_along(&row.h) + row.noise;

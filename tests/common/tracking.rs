@@ -1,0 +1,190 @@
+//! Dives whose navigation is looked over its shoulder: where it says the vehicle is, and where that truly is.
+
+#![allow(dead_code, reason = "each takes what it needs")]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
+
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+
+use headrace_core::app::App;
+use headrace_core::app::reading::Reading;
+use headrace_core::app::report::Report;
+use headrace_core::frames::Pose;
+use headrace_core::fusion::filter::FilterNavigation;
+use headrace_core::fusion::filter::factors::Factors;
+use headrace_core::fusion::filter::settings::Settings;
+use headrace_core::fusion::filter::sources::Consistency;
+use headrace_core::fusion::filter::state::{ERRORS, Errors, State};
+use headrace_core::fusion::relative::Relative;
+use headrace_core::fusion::{Fix, Navigation, NavigationConfig, NoFix, SensorInfo, Times};
+use headrace_core::time::MonoNs;
+use headrace_replay::drive::{Pace, drive};
+use headrace_replay::player::SimulationFeed;
+use headrace_replay::simulate::{START, Scene, Simulation};
+
+/// More than a dive of an hour says.
+const MOST_SAID: usize = 1 << 20;
+
+/// A fix that was asked for, and the truth.
+pub(crate) struct Tracked {
+    pub(crate) at: MonoNs,
+    pub(crate) fix: Result<Fix, NoFix>,
+    pub(crate) truth: Pose,
+}
+
+/// The filter at the end of an epoch.
+pub(crate) struct Epoch {
+    pub(crate) at: MonoNs,
+    pub(crate) factors: Box<Factors<ERRORS>>,
+    /// What takes the estimate to the truth; of pose alone, other errors aren't known.
+    pub(crate) errors: Errors,
+}
+
+/// What a dive's navigation said.
+pub(crate) struct Track {
+    pub(crate) fixes: Vec<Tracked>,
+    pub(crate) epochs: Vec<Epoch>,
+    /// How well sources agree, whenever one has been fused: time of the last epoch, source, and all so far.
+    pub(crate) consistency: Vec<(MonoNs, usize, Consistency)>,
+    pub(crate) report: Report,
+}
+
+/// Sources that fall silent, by their numbers, from and to seconds of the dive.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Silence {
+    pub(crate) sources: Vec<usize>,
+    pub(crate) from_s: f64,
+    pub(crate) to_s: f64,
+}
+
+enum Said {
+    Fix(MonoNs, Result<Fix, NoFix>),
+    Epoch(MonoNs, Box<(State, Factors<ERRORS>)>),
+    Consistency(usize, Consistency),
+}
+
+/// What there is to see in a way of navigating.
+pub(crate) trait Transparent: Navigation + 'static {
+    fn estimate(&self) -> Option<(MonoNs, State, Factors<ERRORS>)> {
+        None
+    }
+
+    fn consistency_of(&self, _source: usize) -> Option<Consistency> {
+        None
+    }
+}
+
+impl Transparent for headrace_core::fusion::direct::DirectNavigation {}
+
+impl Transparent for FilterNavigation {
+    fn estimate(&self) -> Option<(MonoNs, State, Factors<ERRORS>)> {
+        self.running().map(|running| (running.at, running.state, running.factors))
+    }
+
+    fn consistency_of(&self, source: usize) -> Option<Consistency> {
+        self.consistency(source)
+    }
+}
+
+/// Navigation that knows the truth.
+struct Truth(Simulation);
+
+impl Navigation for Truth {
+    fn update(&mut self, _: usize, _: &SensorInfo, _: Times, _: &Reading) {}
+
+    fn fix(&self, at: MonoNs) -> Result<Fix, NoFix> {
+        let pose = self.0.pose(at).ok_or(NoFix::Chainage)?;
+        Ok(Fix { pose, speed_mps: 0.0, relative: Relative::default() })
+    }
+}
+
+impl Transparent for Truth {}
+
+/// Dives a scene, the samples placed where they truly are.
+pub(crate) fn true_dive(scene: &Scene) -> Track {
+    dive(scene, Truth(Simulation::new(scene).unwrap()), Silence::default())
+}
+
+struct Overheard<N> {
+    inner: N,
+    silence: Silence,
+    last: Option<MonoNs>,
+    told: Vec<Consistency>,
+    said: SyncSender<Said>,
+}
+
+impl<N: Transparent> Navigation for Overheard<N> {
+    fn update(&mut self, source: usize, sensor: &SensorInfo, times: Times, reading: &Reading) {
+        let at_s = times.received.since(START).as_secs_f64();
+        let silent = self.silence.from_s..self.silence.to_s;
+        if self.silence.sources.contains(&source) && silent.contains(&at_s) {
+            return;
+        }
+        self.inner.update(source, sensor, times, reading);
+        if let Some((at, state, factors)) = self.inner.estimate().filter(|(at, ..)| self.last != Some(*at)) {
+            self.last = Some(at);
+            self.said.try_send(Said::Epoch(at, Box::new((state, factors)))).unwrap();
+        }
+        if let (Some(consistency), Some(told)) =
+            (self.inner.consistency_of(source), self.told.get_mut(source))
+            && *told != consistency
+        {
+            *told = consistency;
+            self.said.try_send(Said::Consistency(source, consistency)).unwrap();
+        }
+    }
+
+    fn fix(&self, at: MonoNs) -> Result<Fix, NoFix> {
+        let fix = self.inner.fix(at);
+        self.said.try_send(Said::Fix(at, fix)).unwrap();
+        fix
+    }
+}
+
+/// The filter with a scene's settings.
+pub(crate) fn filter(scene: &Scene) -> FilterNavigation {
+    let vehicle = &scene.vehicle;
+    let settings = match vehicle.navigation {
+        NavigationConfig::Filter(settings) => settings,
+        NavigationConfig::Direct => Settings::default(),
+    };
+    FilterNavigation::new(vehicle.tunnel.profile.clone(), vehicle.site, settings)
+}
+
+/// Dives a scene with a way of navigating.
+pub(crate) fn dive(scene: &Scene, inner: impl Transparent, silence: Silence) -> Track {
+    let vehicle = &scene.vehicle;
+    let mut app = App::new(vehicle.mission());
+    for sensor in &vehicle.sensors {
+        app.add_plugin(sensor.as_ref()).unwrap();
+    }
+    let (said, heard) = sync_channel(MOST_SAID);
+    let told = vec![Consistency::default(); vehicle.sensors.len()];
+    let mut dive = app.arm(Box::new(Overheard { inner, silence, last: None, told, said })).unwrap();
+    let simulation = Simulation::new(scene).unwrap();
+    drive(&mut dive, &mut SimulationFeed::new(simulation), Pace::default(), &mut |_| {}).unwrap();
+    dive.finish();
+    sort(scene, &heard, Report::of(&dive))
+}
+
+fn sort(scene: &Scene, heard: &Receiver<Said>, report: Report) -> Track {
+    let simulation = Simulation::new(scene).unwrap();
+    let truth = |at: MonoNs| simulation.pose(at).unwrap();
+    let (mut fixes, mut epochs, mut consistency) = (Vec::new(), Vec::<Epoch>::new(), Vec::new());
+    while let Ok(said) = heard.try_recv() {
+        match said {
+            Said::Fix(at, fix) => fixes.push(Tracked { at, fix, truth: truth(at) }),
+            Said::Epoch(at, estimate) => {
+                let (state, factors) = *estimate;
+                let truth = truth(at);
+                let errors =
+                    state.errors_to(&State { position: truth.position, attitude: truth.attitude, ..state });
+                epochs.push(Epoch { at, factors: Box::new(factors), errors });
+            }
+            Said::Consistency(source, counted) => {
+                let at = epochs.last().map_or(START, |epoch| epoch.at);
+                consistency.push((at, source, counted));
+            }
+        }
+    }
+    Track { fixes, epochs, consistency, report }
+}
