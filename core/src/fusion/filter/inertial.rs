@@ -26,9 +26,11 @@ pub struct Felt {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Leg {
     dt_s: f64,
-    /// Integral of the rotation, and of that.
+    /// Integral of the rotation while gyros speak.
     turned: Matrix3<f64>,
-    turned_twice: Matrix3<f64>,
+    /// The same while accelerometers speak, and the integral of that.
+    pushed: Matrix3<f64>,
+    pushed_twice: Matrix3<f64>,
     /// Velocity and way by specific force, without gravity.
     velocity: Vector3<f64>,
     way: Vector3<f64>,
@@ -44,7 +46,8 @@ impl Default for Leg {
         Self {
             dt_s: 0.0,
             turned: Matrix3::zeros(),
-            turned_twice: Matrix3::zeros(),
+            pushed: Matrix3::zeros(),
+            pushed_twice: Matrix3::zeros(),
             velocity: Vector3::zeros(),
             way: Vector3::zeros(),
             tilting: Matrix3::zeros(),
@@ -73,18 +76,20 @@ impl State {
 impl Leg {
     fn add(&mut self, dt_s: f64, turn: Matrix3<f64>, force: Option<Vector3<f64>>, turns: bool) {
         let half = dt_s * dt_s / 2.0;
+        let turning = if turns { turn } else { Matrix3::zeros() };
+        self.way += self.velocity * dt_s;
+        self.pushed_twice += self.pushed * dt_s;
+        self.tilting_twice += self.tilting * dt_s;
         if let Some(force) = force {
-            let force_matrix = cross(force);
-            self.tilting_twice += self.tilting * dt_s;
-            self.tilting += force_matrix * (self.turned + turn * (dt_s / 2.0)) * dt_s;
-            self.way += self.velocity * dt_s + force * half;
+            let tilting = cross(force) * (self.turned + turning * (dt_s / 2.0));
+            self.tilting_twice += tilting * half;
+            self.tilting += tilting * dt_s;
+            self.way += force * half;
             self.velocity += force * dt_s;
-        } else {
-            self.tilting_twice += self.tilting * dt_s;
-            self.way += self.velocity * dt_s;
+            self.pushed_twice += turn * half;
+            self.pushed += turn * dt_s;
         }
-        self.turned_twice += self.turned * dt_s + turn * half;
-        self.turned += turn * dt_s;
+        self.turned += turning * dt_s;
         self.dt_s += dt_s;
         let [without_rate, without_force] = &mut self.blind_s;
         *without_rate += if turns { 0.0 } else { dt_s };
@@ -121,17 +126,15 @@ impl Leg {
     /// How errors at its beginning show at its end.
     pub fn transition(&self, settings: &Settings) -> Transition {
         let fading = |time_s: f64| math::exp(-self.dt_s / time_s).max(LEAST_FADING);
-        let seeing = |blind_s: f64| if blind_s > 0.5 * self.dt_s { 0.0 } else { 1.0 };
-        let [without_rate, without_force] = self.blind_s.map(seeing);
         Transition {
             dt_s: self.dt_s,
             velocity_tilted: -cross(self.velocity),
             way_tilted: -cross(self.way),
-            turned: -self.turned * without_rate,
-            velocity_pushed: -self.turned * without_force,
-            way_pushed: -self.turned_twice * without_force,
-            velocity_turned: self.tilting * without_rate,
-            way_turned: self.tilting_twice * without_rate,
+            turned: -self.turned,
+            velocity_pushed: -self.pushed,
+            way_pushed: -self.pushed_twice,
+            velocity_turned: self.tilting,
+            way_turned: self.tilting_twice,
             fading: [
                 (FORCE_BIAS, fading(settings.force_bias.time_s)),
                 (FORCE_BIAS + 1, fading(settings.force_bias.time_s)),
