@@ -118,8 +118,9 @@ pub fn range(state: &State, profile: &Profile, beam: &Beam, range_m: f64, sd_m: 
     // d expected / d incidence, and d incidence = turn . (along x normal) / sin(incidence).
     let slope = if nearest > 0.0 { expected_m * sin / cos / math::sin(incidence) } else { 0.0 };
     let turning = arm.cross(&normal).scaled(1.0 / cos) + along.cross(&normal).scaled(slope);
-    let unsure = math::cos((incidence.min(beam.unsure_rad) - beam.first_rad).max(0.0));
-    let unsure_m = expected_m * (1.0 - unsure) / math::sqrt(3.0);
+    // It may be anything down to the nearest of the wider cone: of what is spread evenly over that, the mean square.
+    let soonest_m = height_m / math::cos((incidence - beam.unsure_rad).max(0.0));
+    let unsure_m = (expected_m - soonest_m).max(0.0) / math::sqrt(3.0);
     let mut row = Row::new(range_m - expected_m, sd_m * sd_m + unsure_m * unsure_m);
     let mut by = [0.0; ERRORS];
     put(&mut by, ATTITUDE, Vec3::<Tunnel>::new(0.0, along.z(), -along.y()));
