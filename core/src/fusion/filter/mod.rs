@@ -11,6 +11,8 @@ pub mod running;
 pub mod settings;
 pub mod sources;
 pub mod state;
+#[cfg(test)]
+mod tests;
 pub mod trail;
 pub mod window;
 

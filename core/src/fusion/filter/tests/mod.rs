@@ -1,0 +1,2 @@
+mod jacobians;
+mod noise;
