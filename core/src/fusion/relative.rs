@@ -27,6 +27,16 @@ impl Relative {
         math::sqrt(sum.max(0.0))
     }
 
+    /// The same, told of another place of the vehicle that is `arm` from this one.
+    #[must_use]
+    pub fn moved(&self, arm: Vec3<Tunnel>) -> Self {
+        let sheared = |[x, pitch, yaw]: [f64; 3]| [x + arm.z() * pitch - arm.y() * yaw, pitch, yaw];
+        // Symmetric: rows, then columns.
+        let once = self.0.map(sheared);
+        let columns = [0, 1, 2].map(|c| sheared(once.map(|row| row.get(c).copied().unwrap_or(0.0))));
+        Self(columns)
+    }
+
     /// The sum of shares of two.
     #[must_use]
     pub fn weighted(&self, share: f64, other: &Self, other_share: f64) -> Self {
@@ -37,5 +47,18 @@ impl Relative {
             *sum = a * share + b * other_share;
         }
         Self(sum)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_place_is_as_uncertain_from_wherever_its_arm_begins() {
+        let relative = Relative::new([[0.04, 0.003, -0.002], [0.003, 0.01, 0.001], [-0.002, 0.001, 0.02]]);
+        let (whole, part) = (Vec3::new(0.3, 2.0, -1.5), Vec3::new(-0.1, 0.4, 0.7));
+        let moved = relative.moved(part).sigma_m(whole + -part);
+        assert!((moved - relative.sigma_m(whole)).abs() < 1e-12, "{moved}");
     }
 }

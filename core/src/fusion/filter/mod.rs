@@ -267,6 +267,6 @@ impl Navigation for FilterNavigation {
         }
         let arm = state.attitude * -self.context.unit_at;
         let pose = Pose { position: state.position + arm, attitude: state.attitude };
-        Ok(Fix { pose, speed_mps: state.velocity_mps.x(), relative })
+        Ok(Fix { pose, speed_mps: state.velocity_mps.x(), relative: relative.moved(arm) })
     }
 }
