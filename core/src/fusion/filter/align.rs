@@ -1,7 +1,7 @@
 //! The first estimate: what the sensors say within the first second, taken together.
 
 use super::factors::Factors;
-use super::running::{Context, in_tunnel};
+use super::running::{Context, in_tunnel, with_quantum};
 use super::settings::Settings;
 use super::state::{
     ATTITUDE, DEPTH, ERRORS, FORCE_BIAS, HEADING, POSITION, RATE_BIAS, SCALE, SLACK, SLACK_RATE, State,
@@ -34,9 +34,19 @@ pub struct Listening {
     since: Option<MonoNs>,
     attitude: Option<Rot<Tunnel, Body>>,
     force: Option<Vec3<Body>>,
-    chainage_m: Option<f64>,
+    told: Option<Told>,
     height_m: Option<f64>,
     echoes: [Heard; MAX_SOURCES],
+}
+
+/// What a cable said.
+#[derive(Debug, Clone, Copy)]
+struct Told {
+    at: MonoNs,
+    chainage_m: f64,
+    /// From where the cable's scale counts, m.
+    way_m: f64,
+    sd_m: f64,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -52,7 +62,7 @@ impl Default for Listening {
             since: None,
             attitude: None,
             force: None,
-            chainage_m: None,
+            told: None,
             height_m: None,
             echoes: [Heard { sensor: None, ranges_m: [0.0; ECHOES], count: 0 }; MAX_SOURCES],
         }
@@ -80,7 +90,9 @@ impl Listening {
                 self.force = Some(self.force.map_or(force, |mean| mean + (force + -mean).scaled(0.05)));
             }
             (SensorKind::Tether { zero_at_m, scale }, Reading::TetherLength(length)) => {
-                self.chainage_m = Some(zero_at_m + scale * length.length_m);
+                let way_m = scale * length.length_m;
+                let sd_m = with_quantum(context.settings.tether_sd_m, length.resolution_m * scale.abs());
+                self.told = Some(Told { at, chainage_m: zero_at_m + way_m, way_m, sd_m });
             }
             (SensorKind::Depth, Reading::Pressure(water)) => {
                 let up_m = self.attitude.map_or(0.0, |attitude| (attitude * sensor.mount.position).z());
@@ -99,7 +111,7 @@ impl Listening {
     pub fn lacks(&self) -> NoFix {
         if self.attitude.is_none() && self.force.is_none() {
             NoFix::Heading
-        } else if self.chainage_m.is_none() {
+        } else if self.told.is_none() {
             NoFix::Chainage
         } else {
             NoFix::Section
@@ -124,23 +136,23 @@ impl Listening {
         let weak = [PLACE_UNSEEN_SD_M; 2];
         let echo_sd_m = context.settings.echo_sd_m;
         let place = settle(&context.profile, attitude, start, (start, weak), echo_sd_m, &echoes);
-        let body = Point3::new(self.chainage_m.unwrap_or(0.0), place.at_m[0], place.at_m[1]);
+        let body = Point3::new(self.told.map_or(0.0, |told| told.chainage_m), place.at_m[0], place.at_m[1]);
         let mut state = State::at_rest(body + attitude * context.unit_at, attitude);
         if let (true, Some(height_m)) = (has_echoes, self.height_m) {
             state.depth_offset_m = height_m - place.at_m[1];
         }
         let place_sd_m = if has_echoes { PLACE_SD_M } else { PLACE_UNSEEN_SD_M };
-        Some((state, self.factors(&context.settings, place_sd_m)))
+        Some((state, self.factors(at, &context.settings, place_sd_m)))
     }
 
-    fn factors(&self, settings: &Settings, place_sd_m: f64) -> Factors<ERRORS> {
+    /// A chainage and a yaw that were read are off by what is wrong with the cable and the compass, so that reading these
+    /// again says nothing new; and the slack goes with its rate.
+    fn factors(&self, at: MonoNs, settings: &Settings, place_sd_m: f64) -> Factors<ERRORS> {
         let mut sds = [0.0; ERRORS];
-        let chainage_sd_m =
-            if self.chainage_m.is_some() { settings.slack.reach } else { CHAINAGE_UNTOLD_SD_M };
-        let yaw_sd = match self.attitude {
-            Some(_) => math::hypot(settings.heading.reach, settings.heading_sd_rad),
-            None => YAW_UNTOLD_SD_RAD,
-        };
+        let chainage_sd_m = self.told.map_or(CHAINAGE_UNTOLD_SD_M, |told| {
+            math::hypot(told.sd_m, VELOCITY_SD_MPS * at.since(told.at).as_secs_f64())
+        });
+        let yaw_sd = self.attitude.map_or(YAW_UNTOLD_SD_RAD, |_| settings.heading_sd_rad);
         let threes = [
             (POSITION, [chainage_sd_m, place_sd_m, place_sd_m]),
             (VELOCITY, [VELOCITY_SD_MPS; 3]),
@@ -154,7 +166,8 @@ impl Listening {
             }
         }
         let ones = [
-            (SLACK, settings.slack.reach),
+            // What doesn't go with the rate.
+            (SLACK, settings.slack.reach / core::f64::consts::SQRT_2),
             (SLACK_RATE, settings.slack.drive()),
             (SCALE, settings.scale_sd),
             (DEPTH, settings.depth_offset_sd_m),
@@ -165,7 +178,23 @@ impl Listening {
                 *slot = sd;
             }
         }
-        Factors::independent(sds.map(|sd| sd * sd))
+        let mut factors = Factors::independent(sds.map(|sd| sd * sd));
+        factors.shear(|e, _| {
+            let [slack, rate, scale, heading] =
+                [SLACK, SLACK_RATE, SCALE, HEADING].map(|i| e.get(i).copied().unwrap_or(0.0));
+            let slack = slack + rate * settings.slack.time_s / 2.0;
+            let shown = self.told.map_or(0.0, |told| slack + scale * told.way_m);
+            let deviates = if self.attitude.is_some() { heading } else { 0.0 };
+            for (i, change) in [(POSITION, -shown), (ATTITUDE + 2, -deviates)] {
+                if let Some(slot) = e.get_mut(i) {
+                    *slot += change;
+                }
+            }
+            if let Some(slot) = e.get_mut(SLACK) {
+                *slot = slack;
+            }
+        });
+        factors
     }
 }
 
@@ -192,4 +221,54 @@ fn level(force: Vec3<Body>) -> Rot<Tunnel, Body> {
     let roll = math::atan2(force.y(), force.z());
     let pitch = math::atan2(-force.x(), math::hypot(force.y(), force.z()));
     Rot::from_roll_pitch_yaw(roll, pitch, 0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::measure;
+    use super::*;
+    use crate::app::reading::{Level, TetherLength};
+    use crate::frames::{Mount, Sensor};
+    use crate::site::Site;
+    use crate::tunnel::named;
+
+    /// What a cable and a compass have said is not said anew by their next readings: the chainage and the yaw stay as
+    /// uncertain as the slack, the scale and the deviation are.
+    #[test]
+    fn readings_that_made_the_first_estimate_do_not_count_twice() {
+        let context = Context {
+            profile: named::ceran().unwrap(),
+            site: Site::default(),
+            settings: Settings::default(),
+            unit_at: Vec3::zero(),
+        };
+        let mount = Mount { position: Vec3::zero(), rotation: Rot::<Body, Sensor>::identity() };
+        let tether = SensorInfo { mount, kind: SensorKind::Tether { zero_at_m: 20.0, scale: 1.0 } };
+        let imu = SensorInfo { mount, kind: SensorKind::Imu };
+        let mut listening = Listening::default();
+        let at = MonoNs(1_000_000_000);
+        let level = Reading::Attitude(Rot::<Level, Sensor>::identity());
+        let length = Reading::TetherLength(TetherLength { length_m: 100.0, resolution_m: 0.001 });
+        listening.hear(&context, 0, &imu, MonoNs(0), &level);
+        listening.hear(&context, 1, &tether, at, &length);
+        let (state, mut factors) = listening.settle(at, &context).unwrap();
+        assert!((state.position.x() - 120.0).abs() < 1e-12);
+        let Settings { slack, scale_sd, heading, tether_sd_m, .. } = context.settings;
+        let chainage = slack.reach * slack.reach + 1e4 * scale_sd * scale_sd;
+        let yaw = heading.reach * heading.reach;
+        let both = factors.covariance(SLACK, SLACK_RATE);
+        assert!((factors.variance(SLACK) / (slack.reach * slack.reach) - 1.0).abs() < 1e-12);
+        assert!((both * slack.time_s / (slack.reach * slack.reach) - 1.0).abs() < 1e-12);
+        for _ in 0..50 {
+            let row = measure::chainage(&state, Vec3::zero(), 20.0, 120.0, tether_sd_m);
+            factors.measure(&row.h, row.noise);
+            for row in measure::attitude(&state, state.attitude, 0.03, 0.01) {
+                factors.measure(&row.h, row.noise);
+            }
+            for (is, least) in [(POSITION, chainage), (ATTITUDE + 2, yaw)] {
+                let is = factors.variance(is);
+                assert!(is >= 0.999 * least && is < 1.1 * least, "{is}, not {least}");
+            }
+        }
+    }
 }

@@ -267,6 +267,6 @@ pub fn in_tunnel(site: &Site, level: Rot<Level, Sensor>) -> Rot<Tunnel, Sensor> 
 }
 
 /// A noise with that of rounding to a quantum.
-fn with_quantum(sd: f64, quantum: f64) -> f64 {
+pub(super) fn with_quantum(sd: f64, quantum: f64) -> f64 {
     math::hypot(sd, quantum / math::sqrt(12.0))
 }
