@@ -115,16 +115,17 @@ return_sd_m = 0.011
 
 [heads]";
 
-/// The field scene, half as long.
-fn field(seed: u64) -> Scene {
+/// The field scene over so many metres.
+fn field(seed: u64, length_m: f64) -> Scene {
     let scene = include_str!("../deploy/scenes/vita1-field.toml");
-    let half = scene.replace("distance_m = 130", "distance_m = 65").replace("../vehicles/", "");
-    assert_ne!(half, scene);
+    let length = format!("distance_m = {length_m}");
+    let shorter = scene.replace("distance_m = 130", &length).replace("../vehicles/", "");
+    assert!(shorter.contains(&length));
     let load = |name: &str| {
         let text = String::from_utf8(shipped::vehicle_file(name)?).map_err(|error| error.to_string())?;
         Ok(text.replace("[heads]", SETTINGS).into_bytes())
     };
-    shipped::seeded(&half, &load, Some(seed))
+    shipped::seeded(&shorter, &load, Some(seed))
 }
 
 /// Degrees of freedom of a pose.
@@ -146,7 +147,7 @@ struct Dives {
 }
 
 fn dives(seed: u64) -> Dives {
-    let scene = field(seed);
+    let scene = field(seed, 65.0);
     let vehicle = &scene.vehicle;
     let direct = DirectNavigation::new(vehicle.tunnel.profile.clone(), vehicle.site);
     let without = figures(&dive(&scene, direct, Silence::default()));
@@ -289,4 +290,38 @@ fn share(of: impl Iterator<Item = bool>) -> f64 {
         yes += f64::from(u8::from(is));
     }
     yes / f64::max(n, 1.0)
+}
+
+/// Each sensor lost for a while, and for good: the error stays within what is told of it, and grows no faster.
+#[test]
+fn whatever_falls_silent_the_error_stays_within_its_bounds() {
+    let scene = field(3, 40.0);
+    for (name, sources) in [
+        ("the head", vec![0]),
+        ("the left echosounder", vec![1]),
+        ("all echosounders", vec![1, 2, 3, 4]),
+        ("depth", vec![5]),
+        ("the inertial unit", vec![6]),
+        ("the tether", vec![7]),
+        ("all but the inertial unit", vec![0, 1, 2, 3, 4, 5, 7]),
+        ("everything", vec![0, 1, 2, 3, 4, 5, 6, 7]),
+    ] {
+        for to_s in [70.0, 120.0, f64::INFINITY] {
+            let silence = Silence { sources: sources.clone(), from_s: 60.0, to_s };
+            let track = dive(&scene, filter(&scene), silence);
+            let off = |epoch: &tracking::Epoch| {
+                POSE.map(|i| epoch.errors[i].abs() / math::sqrt(epoch.factors.variance(i)))
+            };
+            let settled = &track.epochs[SETTLED..];
+            let within = share(settled.iter().flat_map(off).map(|off| off <= 3.0));
+            let worst = settled.iter().flat_map(off).fold(0.0, f64::max);
+            let lost = share(track.fixes.iter().map(|tracked| tracked.fix.is_err()));
+            let end = track.epochs.last().unwrap();
+            println!(
+                "{name} to {to_s}: within {within:.4} worst {worst:.2} lost {lost:.2} end {:.2?} {:.2?}",
+                POSE.map(|i| end.errors[i]),
+                POSE.map(|i| math::sqrt(end.factors.variance(i)))
+            );
+        }
+    }
 }

@@ -11,6 +11,7 @@ pub mod running;
 pub mod settings;
 pub mod sources;
 pub mod state;
+pub mod stillness;
 #[cfg(test)]
 mod tests;
 pub mod trail;
@@ -22,6 +23,7 @@ use self::running::{Context, Running};
 use self::settings::Settings;
 use self::sources::{Consistency, Source};
 use self::state::State;
+use self::stillness::Stillness;
 use self::window::{Waiting, Window};
 use super::relative::Relative;
 use super::{Fix, Navigation, NoFix, SensorInfo, SensorKind, Times};
@@ -58,6 +60,7 @@ pub struct FilterNavigation {
     /// The inertial unit whose rates and forces are followed: the first that was heard. Its place is that of the estimate.
     unit: Option<usize>,
     listening: Listening,
+    stillness: Stillness,
     running: Running,
     is_running: bool,
     /// Epochs begin at this time, and at multiples of their length after it.
@@ -80,6 +83,7 @@ impl FilterNavigation {
             window: Window::default(),
             sources: [None; MAX_SOURCES],
             listening: Listening::default(),
+            stillness: Stillness::default(),
             running: Running::default(),
             is_running: false,
             epoch_zero: MonoNs(0),
@@ -121,6 +125,9 @@ impl FilterNavigation {
                 self.window.next_heard(self.running.at).map_or(last, |heard| self.epoch_before(heard));
             let to = due.max(heard).min(last);
             self.running.advance(to, &self.context, &mut self.window, &mut self.sources);
+            if self.stillness.is_still() {
+                self.running.rest();
+            }
             self.window.forget(to);
         }
         self.after_epochs();
@@ -238,6 +245,9 @@ impl Navigation for FilterNavigation {
                 self.window.drop_until(at);
                 self.after_epochs();
             }
+        }
+        if sensor.kind != SensorKind::Imu || self.unit == Some(number) {
+            self.stillness.take(times.valid, sensor.kind, reading);
         }
         self.take(number, times.valid, reading);
     }

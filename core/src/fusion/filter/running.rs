@@ -23,6 +23,10 @@ const KNOTS: usize = 256;
 const WALL_MEMORY: u32 = 40;
 /// When fewer than this share of them do, the place in the section is lost, and sought anew.
 const LEAST_AGREEING: f64 = 0.35;
+/// A vehicle that rests moves by so much, m/s: the sea's, or the deck's.
+const REST_SD_MPS: f64 = 0.02;
+/// It doesn't rest when that is more unlikely than once in ten thousand times.
+const REST_GATE: f64 = 15.1;
 /// How far off it may be then, m.
 const LOST_M: f64 = 1.5;
 
@@ -113,6 +117,27 @@ impl Running {
         self.state.correct(&errors);
         self.trail.note(to, &self.factors);
         self.seek_wall();
+    }
+
+    /// Fuses that the vehicle doesn't move, unless that is too unlikely.
+    pub fn rest(&mut self) {
+        let rows = measure::rest(&self.state, REST_SD_MPS);
+        let unlikely = |row: &Row| {
+            row.residual * row.residual > REST_GATE * (self.factors.variance_along(&row.h) + row.noise)
+        };
+        if rows.iter().any(unlikely) {
+            return;
+        }
+        let mut errors = [0.0; ERRORS];
+        for row in rows {
+            let expected: f64 = row.h.iter().zip(errors.iter()).map(|(h, e)| h * e).sum();
+            let gain = self.factors.measure(&row.h, row.noise);
+            self.trail.measure(&row.h, &gain);
+            for (error, k) in errors.iter_mut().zip(&gain.k) {
+                *error += k * (row.residual - expected);
+            }
+        }
+        self.state.correct(&errors);
     }
 
     /// Whether the estimate is made of numbers.
