@@ -32,6 +32,8 @@ const TILT_SD_RAD: f64 = 0.05;
 #[derive(Debug, Clone)]
 pub struct Listening {
     since: Option<MonoNs>,
+    /// Chainage of an estimate before, and its standard deviation, m.
+    before: Option<(f64, f64)>,
     attitude: Option<Rot<Tunnel, Body>>,
     force: Option<Vec3<Body>>,
     told: Option<Told>,
@@ -60,6 +62,7 @@ impl Default for Listening {
     fn default() -> Self {
         Self {
             since: None,
+            before: None,
             attitude: None,
             force: None,
             told: None,
@@ -107,6 +110,11 @@ impl Listening {
         }
     }
 
+    /// After an estimate that was lost: its chainage, m, and how far off that may be.
+    pub fn after(before: Option<(f64, f64)>) -> Self {
+        Self { before, ..Self::default() }
+    }
+
     /// What is missing yet.
     pub fn lacks(&self) -> NoFix {
         if self.attitude.is_none() && self.force.is_none() {
@@ -136,7 +144,9 @@ impl Listening {
         let weak = [PLACE_UNSEEN_SD_M; 2];
         let echo_sd_m = context.settings.echo_sd_m;
         let place = settle(&context.profile, attitude, start, (start, weak), echo_sd_m, &echoes);
-        let body = Point3::new(self.told.map_or(0.0, |told| told.chainage_m), place.at_m[0], place.at_m[1]);
+        let before_m = self.before.map_or(0.0, |(chainage_m, _)| chainage_m);
+        let chainage_m = self.told.map_or(before_m, |told| told.chainage_m);
+        let body = Point3::new(chainage_m, place.at_m[0], place.at_m[1]);
         let mut state = State::at_rest(body + attitude * context.unit_at, attitude);
         if let (true, Some(height_m)) = (has_echoes, self.height_m) {
             state.depth_offset_m = height_m - place.at_m[1];
@@ -149,7 +159,8 @@ impl Listening {
     /// again says nothing new; and the slack goes with its rate.
     fn factors(&self, at: MonoNs, settings: &Settings, place_sd_m: f64) -> Factors<ERRORS> {
         let mut sds = [0.0; ERRORS];
-        let chainage_sd_m = self.told.map_or(CHAINAGE_UNTOLD_SD_M, |told| {
+        let untold_sd_m = self.before.map_or(0.0, |(_, sd_m)| sd_m).max(CHAINAGE_UNTOLD_SD_M);
+        let chainage_sd_m = self.told.map_or(untold_sd_m, |told| {
             math::hypot(told.sd_m, VELOCITY_SD_MPS * at.since(told.at).as_secs_f64())
         });
         let yaw_sd = self.attitude.map_or(YAW_UNTOLD_SD_RAD, |_| settings.heading_sd_rad);

@@ -62,6 +62,18 @@ impl<const N: usize> Factors<N> {
         terms.sum()
     }
 
+    /// Covariances of all errors with their sum, weighted by `h`: P h.
+    pub fn along(&self, h: &[f64; N]) -> [f64; N] {
+        let mut along = [0.0; N];
+        for (j, (column, d)) in self.u.iter().zip(&self.d).enumerate() {
+            let f = d * dot(column, h, j + 1);
+            for (along, u) in along.iter_mut().zip(column).take(j + 1) {
+                *along += f * u;
+            }
+        }
+        along
+    }
+
     /// e^T P^-1 e: how unlikely these errors are, chi-square with `N` degrees of freedom. Infinite where P says that an
     /// error is known exactly, and it isn't zero.
     pub fn distance(&self, errors: &[f64; N]) -> f64 {

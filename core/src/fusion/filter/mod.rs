@@ -45,8 +45,11 @@ const DEPTH_PERIOD: DurNs = DurNs(500_000_000);
 /// Samples are placed while the place in the section and the yaw are known so well, m and radians.
 const PLACE_LIMIT_M: f64 = 0.5;
 const YAW_LIMIT_RAD: f64 = 0.25;
-/// Chainage against that when the heads last passed, m.
-const RELATIVE_LIMIT_M: f64 = 1.0;
+/// The same of chainage, against that when the heads last passed, and against the cable's length.
+const ALONG_LIMIT_M: f64 = 1.0;
+/// An estimate that is farther off is begun anew: rays and attitudes aren't straight enough to lead it back.
+const LOST_PLACE_M: f64 = 3.0;
+const LOST_TILT_RAD: f64 = 0.2;
 /// Room for the estimates after the last epoch.
 const AHEAD: usize = 512;
 /// The time between two passes of heads when none is known to turn.
@@ -70,7 +73,7 @@ pub struct FilterNavigation {
     /// The estimate of the last epoch, carried on.
     ahead: Vec<(MonoNs, State)>,
     standing: Result<Relative, NoFix>,
-    /// How often the estimate had to be begun anew because it was no number any more.
+    /// How often the estimate had to be begun anew because it was lost.
     restarts: u64,
 }
 
@@ -139,27 +142,40 @@ impl FilterNavigation {
     }
 
     fn after_epochs(&mut self) {
-        let running = &self.running;
-        if !running.is_sound() {
-            self.is_running = false;
-            self.listening = Listening::default();
-            self.restarts += 1;
-            self.standing = Err(NoFix::Heading);
+        let sigmas = self.running.sigmas();
+        if !self.running.is_sound() || sigmas.place_m > LOST_PLACE_M || sigmas.tilt_rad > LOST_TILT_RAD {
+            self.begin_anew(sigmas.along_m);
             return;
         }
-        let [y_m, z_m, yaw_rad] = running.sigmas();
-        let relative = running.trail.relative(self.pass_gap());
+        let relative = self.running.trail.relative(self.pass_gap());
         let relative = relative.unwrap_or_else(|| Relative::along(0.0));
-        self.standing = if yaw_rad > YAW_LIMIT_RAD {
+        let between_m = relative.sigma_m(Vec3::zero());
+        self.standing = if sigmas.yaw_rad > YAW_LIMIT_RAD {
             Err(NoFix::Heading)
-        } else if y_m > PLACE_LIMIT_M || z_m > PLACE_LIMIT_M {
+        } else if sigmas.place_m > PLACE_LIMIT_M {
             Err(NoFix::Section)
-        } else if relative.sigma_m(Vec3::zero()) > RELATIVE_LIMIT_M {
+        } else if between_m > ALONG_LIMIT_M || sigmas.along_m > ALONG_LIMIT_M {
             Err(NoFix::Chainage)
         } else {
             Ok(relative)
         };
-        let (mut now, mut state) = (running.at, running.state);
+        self.carry_ahead();
+    }
+
+    /// Listens for a new first estimate: the last one is too far off to be corrected step by step. What has been placed
+    /// stays; the chainage is kept until the cable is heard.
+    fn begin_anew(&mut self, along_m: f64) {
+        let x_m = self.running.state.position.x();
+        let before = (x_m.is_finite() && along_m.is_finite()).then_some((x_m, along_m));
+        self.listening = Listening::after(before);
+        self.standing = Err(self.listening.lacks());
+        self.is_running = false;
+        self.restarts += 1;
+    }
+
+    /// The estimate at each moment since the last epoch at which the inertial unit has spoken.
+    fn carry_ahead(&mut self) {
+        let (mut now, mut state) = (self.running.at, self.running.state);
         let mut leg = Leg::default();
         self.ahead.clear();
         self.ahead.push((now, state));

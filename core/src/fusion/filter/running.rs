@@ -5,7 +5,7 @@ use super::inertial::Leg;
 use super::measure::{self, Beam, Row};
 use super::settings::Settings;
 use super::sources::Source;
-use super::state::{ATTITUDE, ERRORS, Errors, POSITION, State};
+use super::state::{ATTITUDE, ERRORS, Errors, POSITION, SCALE, State, VELOCITY};
 use super::trail::Trail;
 use super::window::{Waiting, Window};
 use crate::app::MAX_SOURCES;
@@ -27,6 +27,10 @@ const LEAST_AGREEING: f64 = 0.35;
 const REST_SD_MPS: f64 = 0.02;
 /// It doesn't rest when that is more unlikely than once in ten thousand times.
 const REST_GATE: f64 = 15.1;
+/// A wall is as good as flat over so little, m.
+const NEAR_M: f64 = 0.03;
+/// How fast a vehicle is, m/s, when nobody knows.
+const SPEED_SD_MPS: f64 = 0.5;
 /// How far off it may be then, m.
 const LOST_M: f64 = 1.5;
 
@@ -107,13 +111,17 @@ impl Running {
             let Some(Some(source)) = sources.get_mut(waiting.source) else { continue };
             let then = self.state_at(waiting.at);
             let later_s = to.since(waiting.at).as_secs_f64();
-            let rows = rows(&then, context, source, &waiting, window);
-            for row in rows.into_iter().flatten() {
-                self.fuse(&row.seen_later(later_s), context, source, &mut errors);
+            for (number, row) in rows(&then, context, source, &waiting, window).into_iter().enumerate() {
+                let again = |state: &State| {
+                    rows(state, context, source, &waiting, window).get(number).copied().flatten()
+                };
+                if let Some(row) = row.and_then(|row| self.straight(row, &then, again)) {
+                    self.fuse(&row.seen_later(later_s), context, source, &mut errors);
+                }
             }
         }
-        self.at = to;
-        self.state = nominal;
+        (self.at, self.state) = (to, nominal);
+        self.bound_speed(&mut errors);
         self.state.correct(&errors);
         self.trail.note(to, &self.factors);
         self.seek_wall();
@@ -129,13 +137,8 @@ impl Running {
             return;
         }
         let mut errors = [0.0; ERRORS];
-        for row in rows {
-            let expected: f64 = row.h.iter().zip(errors.iter()).map(|(h, e)| h * e).sum();
-            let gain = self.factors.measure(&row.h, row.noise);
-            self.trail.measure(&row.h, &gain);
-            for (error, k) in errors.iter_mut().zip(&gain.k) {
-                *error += k * (row.residual - expected);
-            }
+        for row in &rows {
+            self.correct(row, &mut errors);
         }
         self.state.correct(&errors);
     }
@@ -190,13 +193,29 @@ impl Running {
             source.consistency.gated += 1;
             return;
         }
-        let gain = self.factors.measure(&row.h, row.noise);
-        self.trail.measure(&row.h, &gain);
-        for (error, k) in errors.iter_mut().zip(&gain.k) {
-            *error += k * innovation;
-        }
+        self.correct(&row, errors);
         source.consistency.used += 1;
         source.consistency.nis_sum += nis;
+    }
+
+    /// A row as noisy as what it measures is bent: looked at from a standard deviation to either side. `None` where there is
+    /// nothing to be seen from there.
+    fn straight(&self, mut row: Row, then: &State, again: impl Fn(&State) -> Option<Row>) -> Option<Row> {
+        let variance = self.factors.variance_along(&row.h);
+        if row.lean.is_none() || variance < NEAR_M * NEAR_M {
+            return Some(row);
+        }
+        let sd_m = math::sqrt(variance);
+        let step = self.factors.along(&row.h).map(|covariance| covariance / sd_m);
+        let mut bent_m = 0.0_f64;
+        for side in [1.0, -1.0] {
+            let mut moved = *then;
+            moved.correct(&step.map(|step| side * step));
+            let straight_m = row.residual - side * sd_m;
+            bent_m = bent_m.max((again(&moved)?.residual - straight_m).abs());
+        }
+        row.noise += bent_m * bent_m;
+        Some(row)
     }
 
     /// When ranges no longer agree with the wall, the place in the section is anywhere near.
@@ -210,10 +229,53 @@ impl Running {
         self.wall = WallMemory::default();
     }
 
-    /// Standard deviations of the place in the section, m, and of yaw, radians.
-    pub fn sigmas(&self) -> [f64; 3] {
-        [POSITION + 1, POSITION + 2, ATTITUDE + 2].map(|i| math::sqrt(self.factors.variance(i)))
+    /// How far off the estimate may be.
+    pub fn sigmas(&self) -> Sigmas {
+        let of = |i: usize| math::sqrt(self.factors.variance(i));
+        let mut along = [0.0; ERRORS];
+        for (i, share) in [(POSITION, 1.0), (SCALE, self.state.position.x())] {
+            if let Some(slot) = along.get_mut(i) {
+                *slot = share;
+            }
+        }
+        Sigmas {
+            along_m: math::sqrt(self.factors.variance_along(&along)),
+            place_m: of(POSITION + 1).max(of(POSITION + 2)),
+            tilt_rad: of(ATTITUDE).max(of(ATTITUDE + 1)),
+            yaw_rad: of(ATTITUDE + 2),
+        }
     }
+
+    /// Vehicles are no faster than a little, whatever an accelerometer without anything beside it makes of gravity.
+    fn bound_speed(&mut self, errors: &mut Errors) {
+        for (axis, row) in measure::rest(&self.state, SPEED_SD_MPS).iter().enumerate() {
+            if self.factors.variance(VELOCITY + axis) > SPEED_SD_MPS * SPEED_SD_MPS {
+                self.correct(row, errors);
+            }
+        }
+    }
+
+    fn correct(&mut self, row: &Row, errors: &mut Errors) {
+        let expected: f64 = row.h.iter().zip(errors.iter()).map(|(h, e)| h * e).sum();
+        let gain = self.factors.measure(&row.h, row.noise);
+        self.trail.measure(&row.h, &gain);
+        for (error, k) in errors.iter_mut().zip(&gain.k) {
+            *error += k * (row.residual - expected);
+        }
+    }
+}
+
+/// Standard deviations of an estimate.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sigmas {
+    /// Of the chainage, its cable's scale left out, m.
+    pub along_m: f64,
+    /// Of the place in the section, in the worse direction, m.
+    pub place_m: f64,
+    /// Of roll or pitch, radians.
+    pub tilt_rad: f64,
+    /// Of yaw, radians.
+    pub yaw_rad: f64,
 }
 
 impl Default for WallMemory {
