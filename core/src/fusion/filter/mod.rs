@@ -17,6 +17,9 @@ mod tests;
 pub mod trail;
 pub mod window;
 
+#[cfg(test)]
+mod tests;
+
 use self::align::Listening;
 use self::inertial::Leg;
 use self::running::{Context, Running};
