@@ -53,6 +53,9 @@ const ALONG_LIMIT_M: f64 = 1.0;
 /// An estimate that is farther off is begun anew: rays and attitudes aren't straight enough to lead it back.
 const LOST_PLACE_M: f64 = 3.0;
 const LOST_TILT_RAD: f64 = 0.2;
+/// No vehicle turns so fast, or feels so much: a saturated unit, or one that has lost its senses.
+const MOST_RATE_RADPS: f64 = 10.0;
+const MOST_FORCE_MPS2: f64 = 50.0;
 /// Room for the estimates after the last epoch.
 const AHEAD: usize = 512;
 /// The time between two passes of heads when none is known to turn.
@@ -215,6 +218,14 @@ impl FilterNavigation {
             (SensorKind::Imu, Reading::AngularRate(_) | Reading::SpecificForce(_))
                 if self.unit != Some(number) =>
             {
+                false
+            }
+            (SensorKind::Imu, Reading::AngularRate(turn)) if turn.norm() > MOST_RATE_RADPS => {
+                source.consistency.dropped += 1;
+                false
+            }
+            (SensorKind::Imu, Reading::SpecificForce(force)) if force.norm() > MOST_FORCE_MPS2 => {
+                source.consistency.dropped += 1;
                 false
             }
             (SensorKind::Imu, Reading::AngularRate(rate)) => {
