@@ -148,16 +148,17 @@ impl Listening {
         let chainage_m = self.told.map_or(before_m, |told| told.chainage_m);
         let body = Point3::new(chainage_m, place.at_m[0], place.at_m[1]);
         let mut state = State::at_rest(body + attitude * context.unit_at, attitude);
-        if let (true, Some(height_m)) = (has_echoes, self.height_m) {
+        if let (true, Some(height_m)) = (place.is_height_seen, self.height_m) {
             state.depth_offset_m = height_m - place.at_m[1];
         }
-        let place_sd_m = if has_echoes { PLACE_SD_M } else { PLACE_UNSEEN_SD_M };
+        let sd_m = |is_seen: bool| if is_seen { PLACE_SD_M } else { PLACE_UNSEEN_SD_M };
+        let place_sd_m = [sd_m(has_echoes), sd_m(place.is_height_seen)];
         Some((state, self.factors(at, &context.settings, place_sd_m)))
     }
 
     /// A chainage and a yaw that were read are off by what is wrong with the cable and the compass, so that reading these
     /// again says nothing new; and the slack goes with its rate.
-    fn factors(&self, at: MonoNs, settings: &Settings, place_sd_m: f64) -> Factors<ERRORS> {
+    fn factors(&self, at: MonoNs, settings: &Settings, [y_sd_m, z_sd_m]: [f64; 2]) -> Factors<ERRORS> {
         let mut sds = [0.0; ERRORS];
         let untold_sd_m = self.before.map_or(0.0, |(_, sd_m)| sd_m).max(CHAINAGE_UNTOLD_SD_M);
         let chainage_sd_m = self.told.map_or(untold_sd_m, |told| {
@@ -165,7 +166,7 @@ impl Listening {
         });
         let yaw_sd = self.attitude.map_or(YAW_UNTOLD_SD_RAD, |_| settings.heading_sd_rad);
         let threes = [
-            (POSITION, [chainage_sd_m, place_sd_m, place_sd_m]),
+            (POSITION, [chainage_sd_m, y_sd_m, z_sd_m]),
             (VELOCITY, [VELOCITY_SD_MPS; 3]),
             (ATTITUDE, [TILT_SD_RAD, TILT_SD_RAD, yaw_sd]),
             (FORCE_BIAS, [settings.force_bias.reach; 3]),
