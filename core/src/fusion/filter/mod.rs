@@ -25,7 +25,7 @@ use self::inertial::Leg;
 use self::running::{Context, Running};
 use self::settings::Settings;
 use self::sources::{Consistency, Source};
-use self::state::State;
+use self::state::{State, rotation};
 use self::stillness::Stillness;
 use self::window::{Waiting, Window};
 use super::relative::Relative;
@@ -304,6 +304,9 @@ impl Navigation for FilterNavigation {
                 return Err(NoFix::Heading);
             }
             state.position = state.position + state.velocity_mps.scaled(-back_s);
+            let (felt, _) = self.window.felt(*from, *from + DurNs(1));
+            let rate = felt.rate_radps.map_or_else(Vec3::zero, |rate| rate + -state.rate_bias_radps);
+            state.attitude = state.attitude * rotation(rate.scaled(-back_s));
         }
         let arm = state.attitude * -self.context.unit_at;
         let pose = Pose { position: state.position + arm, attitude: state.attitude };
