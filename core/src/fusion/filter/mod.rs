@@ -41,6 +41,8 @@ use crate::tunnel::Profile;
 const EPOCH: DurNs = DurNs(100_000_000);
 /// A fix is given so long after the last epoch at most, beyond the window.
 const CARRIES: DurNs = DurNs(2_000_000_000);
+/// A clock that goes back by more than this has been set, and a reading doesn't speak of a time so far ahead.
+const CLOCK_JUMP: DurNs = DurNs(10_000_000_000);
 /// Attitudes, cables and depths are used so often: their errors last longer.
 const ATTITUDE_PERIOD: DurNs = DurNs(100_000_000);
 const TETHER_PERIOD: DurNs = DurNs(100_000_000);
@@ -79,7 +81,7 @@ pub struct FilterNavigation {
     /// The estimate of the last epoch, carried on.
     ahead: Vec<(MonoNs, State)>,
     standing: Result<Relative, NoFix>,
-    /// How often the estimate had to be begun anew because it was lost.
+    /// How often the estimate had to be begun anew: it was lost, no number any more, or the clock went back.
     restarts: u64,
 }
 
@@ -252,11 +254,18 @@ impl FilterNavigation {
 
 impl Navigation for FilterNavigation {
     fn update(&mut self, number: usize, sensor: &SensorInfo, times: Times, reading: &Reading) {
+        if self.received.since(times.received) > CLOCK_JUMP {
+            // Or the one before was stamped wrongly. Waiting until the time comes again would be no better.
+            let along_m = self.running.sigmas().along_m;
+            self.begin_anew(along_m);
+            self.window.clear();
+            self.received = times.received;
+        }
         self.received = self.received.max(times.received);
         self.close_epochs();
         let Some(slot) = self.sources.get_mut(number) else { return };
         let source = slot.get_or_insert_with(|| Source::new(*sensor));
-        if !reading.is_finite() {
+        if !reading.is_finite() || times.valid.since(times.received) > CLOCK_JUMP {
             source.consistency.dropped += 1;
             return;
         }

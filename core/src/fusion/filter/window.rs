@@ -116,6 +116,12 @@ impl Window {
         self.felt.get(self.felt.partition_point(|(felt, _)| *felt <= at)).map(|(at, _)| *at)
     }
 
+    /// Forgets everything.
+    pub fn clear(&mut self) {
+        self.waiting.clear();
+        self.felt.clear();
+    }
+
     /// Forgets readings valid at or before a moment.
     pub fn drop_until(&mut self, at: MonoNs) {
         let old = self.waiting.partition_point(|waiting| waiting.at <= at);
