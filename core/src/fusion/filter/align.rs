@@ -34,6 +34,7 @@ pub struct Listening {
     since: Option<MonoNs>,
     /// Chainage of an estimate before, and its standard deviation, m.
     before: Option<(f64, f64)>,
+    hears_wall: bool,
     attitude: Option<Rot<Tunnel, Body>>,
     force: Option<Vec3<Body>>,
     told: Option<Told>,
@@ -63,6 +64,7 @@ impl Default for Listening {
         Self {
             since: None,
             before: None,
+            hears_wall: false,
             attitude: None,
             force: None,
             told: None,
@@ -83,6 +85,7 @@ impl Listening {
         reading: &Reading,
     ) {
         self.since.get_or_insert(at);
+        let heard_wall = self.hears_wall;
         let site = &context.site;
         match (sensor.kind, reading) {
             (SensorKind::Imu, Reading::Attitude(level)) => {
@@ -101,12 +104,18 @@ impl Listening {
                 let up_m = self.attitude.map_or(0.0, |attitude| (attitude * sensor.mount.position).z());
                 self.height_m = Some(site.surface_above_floor_m - site.depth_m(water.pressure_pa) - up_m);
             }
+            (SensorKind::Head, Reading::Sonar(sonar)) => self.hears_wall |= sonar.range_m.is_some(),
             (SensorKind::Echosounder { .. }, Reading::Echo(echo)) => {
+                self.hears_wall |= echo.range_m.is_some();
                 if let (Some(range_m), Some(heard)) = (echo.range_m, self.echoes.get_mut(source)) {
                     heard.hear(sensor, site.rescaled_range_m(range_m, echo.sound_speed_mps));
                 }
             }
             _ => {}
+        }
+        if self.before.is_some() && self.hears_wall && !heard_wall {
+            // The others may speak again only now, too.
+            self.since = Some(at);
         }
     }
 
@@ -133,7 +142,8 @@ impl Listening {
 
     /// The first estimate as of `at`, once sensors have been listened to for long enough.
     pub fn settle(&self, at: MonoNs, context: &Context) -> Option<(State, Factors<ERRORS>)> {
-        if at.since(self.since?).0 < LISTENS.0 {
+        // An estimate that was lost is not begun anew before it could be any better.
+        if at.since(self.since?).0 < LISTENS.0 || (self.before.is_some() && !self.hears_wall) {
             return None;
         }
         let attitude = self.attitude.or_else(|| self.force.map(level))?;

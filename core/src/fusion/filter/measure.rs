@@ -20,6 +20,8 @@ pub struct Row {
     pub noise: f64,
     /// For a range, how the beam leans along the tunnel.
     pub lean: Option<Lean>,
+    /// Second derivatives of what should be measured: by the place, 1/m; by a turn, m; by both. The row leaves them out.
+    pub bends: [f64; 3],
 }
 
 /// How a beam leans along the tunnel. It makes the range longer whichever way it leans: a filter that isn't sure which way
@@ -36,7 +38,12 @@ pub struct Lean {
 
 impl Row {
     fn new(residual: f64, noise: f64) -> Self {
-        Self { h: [0.0; ERRORS], residual, noise, lean: None }
+        Self { h: [0.0; ERRORS], residual, noise, lean: None, bends: [0.0; 3] }
+    }
+
+    /// One error itself.
+    pub fn of(error: usize, residual: f64, noise: f64) -> Self {
+        Self::new(residual, noise).with_one(error, 1.0)
     }
 
     fn with<F: Copy>(mut self, from: usize, part: Vec3<F>) -> Self {
@@ -82,6 +89,8 @@ impl Row {
 
 /// Beams that graze the wall more than this say little of where they start, and much of the wall's roughness.
 const LEAST_COSINE: f64 = 0.5;
+/// A wall nearer than this is not taken to bend more, m.
+const LEAST_HEIGHT_M: f64 = 0.5;
 /// A lean is known when it is so many standard deviations from none.
 const SURE: f64 = 3.0;
 
@@ -125,6 +134,11 @@ pub fn range(state: &State, profile: &Profile, beam: &Beam, range_m: f64, sd_m: 
     let mut by = [0.0; ERRORS];
     put(&mut by, ATTITUDE, Vec3::<Tunnel>::new(0.0, along.z(), -along.y()));
     let across = 1.0 - along.x() * along.x();
+    // The wall as if it bent like a circle about the sonar; and of height / cos(incidence).
+    let secant = 1.0 / cosine;
+    let by_turn = expected_m * (2.0 * secant * secant - 1.0);
+    let tangent = math::sqrt((secant * secant - 1.0).max(0.0));
+    row.bends = [secant / height_m.max(LEAST_HEIGHT_M), by_turn, secant * tangent];
     row.lean = Some(Lean { along: along.x(), by, slope_m: expected_m / across });
     Some(row.with(POSITION, normal.scaled(1.0 / cos)).with(ATTITUDE, turning))
 }

@@ -3,6 +3,7 @@
 //! Readings wait in a window until all of their time have come, and are fused at their own time, epoch by epoch; a fix is
 //! the estimate of the last epoch, carried on by what the inertial unit has felt since. `docs/fusion.md` derives it.
 
+pub mod agreement;
 pub mod align;
 pub mod factors;
 pub mod inertial;
@@ -12,8 +13,6 @@ pub mod settings;
 pub mod sources;
 pub mod state;
 pub mod stillness;
-#[cfg(test)]
-mod tests;
 pub mod trail;
 pub mod window;
 
@@ -55,6 +54,8 @@ const ALONG_LIMIT_M: f64 = 1.0;
 /// An estimate that is farther off is begun anew: rays and attitudes aren't straight enough to lead it back.
 const LOST_PLACE_M: f64 = 3.0;
 const LOST_TILT_RAD: f64 = 0.2;
+/// So is one after nothing at all was heard for so long.
+const SILENCE: DurNs = DurNs(5_000_000_000);
 /// No vehicle turns so fast, or feels so much: a saturated unit, or one that has lost its senses.
 const MOST_RATE_RADPS: f64 = 10.0;
 const MOST_FORCE_MPS2: f64 = 50.0;
@@ -135,11 +136,16 @@ impl FilterNavigation {
             let heard =
                 self.window.next_heard(self.running.at).map_or(last, |heard| self.epoch_before(heard));
             let to = due.max(heard).min(last);
+            let is_silent = to.since(self.running.at).0 > SILENCE.0;
             self.running.advance(to, &self.context, &mut self.window, &mut self.sources);
             if self.stillness.is_still() {
                 self.running.rest();
             }
             self.window.forget(to);
+            if is_silent {
+                self.begin_anew(self.running.sigmas().along_m);
+                return;
+            }
         }
         self.after_epochs();
     }

@@ -1,11 +1,14 @@
 //! The filter at work: an epoch is a leg of propagation, and the measurements of its time.
 
+use core::ops::Range;
+
+use super::agreement::Agreement;
 use super::factors::Factors;
 use super::inertial::Leg;
 use super::measure::{self, Beam, Row};
 use super::settings::Settings;
 use super::sources::Source;
-use super::state::{ATTITUDE, ERRORS, Errors, POSITION, SCALE, State, VELOCITY};
+use super::state::{ATTITUDE, ERRORS, Errors, POSITION, SCALE, State, VELOCITY, put, vec};
 use super::trail::Trail;
 use super::window::{Waiting, Window};
 use crate::app::MAX_SOURCES;
@@ -19,20 +22,16 @@ use crate::tunnel::Profile;
 
 /// Room for the moments of an epoch at which an inertial unit spoke.
 const KNOTS: usize = 256;
-/// Measurements of ranges over which it is seen whether they agree with the wall at all.
-const WALL_MEMORY: u32 = 40;
-/// When fewer than this share of them do, the place in the section is lost, and sought anew.
-const LEAST_AGREEING: f64 = 0.35;
 /// A vehicle that rests moves by so much, m/s: the sea's, or the deck's.
 const REST_SD_MPS: f64 = 0.02;
 /// It doesn't rest when that is more unlikely than once in ten thousand times.
 const REST_GATE: f64 = 15.1;
-/// A wall is as good as flat over so little, m.
+/// A wall is as good as flat over so little, m, unless ranges are better still.
 const NEAR_M: f64 = 0.03;
 /// How fast a vehicle is, m/s, when nobody knows.
 const SPEED_SD_MPS: f64 = 0.5;
-/// How far off it may be then, m.
-const LOST_M: f64 = 1.5;
+/// How far off an estimate beyond the wall may be, m.
+const BEYOND_M: f64 = 1.5;
 
 /// What doesn't change during a dive.
 #[derive(Debug, Clone)]
@@ -60,14 +59,7 @@ pub struct Running {
     pub trail: Trail,
     /// The estimate through the last epoch, before its measurements.
     knots: Vec<(MonoNs, State)>,
-    wall: WallMemory,
-}
-
-/// Whether ranges have agreed with the wall of late.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct WallMemory {
-    seen: u32,
-    agreeing: f64,
+    agreement: Agreement,
 }
 
 impl Default for Running {
@@ -79,7 +71,7 @@ impl Default for Running {
             factors: Factors::independent([0.0; ERRORS]),
             trail: Trail::default(),
             knots: Vec::with_capacity(KNOTS),
-            wall: WallMemory::default(),
+            agreement: Agreement::default(),
         }
     }
 }
@@ -89,7 +81,7 @@ impl Running {
     pub fn begin(&mut self, at: MonoNs, state: State, factors: Factors<ERRORS>) {
         (self.at, self.state, self.factors) = (at, state, factors);
         self.trail.clear();
-        self.wall = WallMemory::default();
+        self.agreement = Agreement::default();
     }
 
     /// Goes on to a later moment, and fuses what the window has up to it.
@@ -109,22 +101,26 @@ impl Running {
         let mut errors = [0.0; ERRORS];
         while let Some(waiting) = window.pop(to) {
             let Some(Some(source)) = sources.get_mut(waiting.source) else { continue };
-            let then = self.state_at(waiting.at);
+            // Each reading is compared with the best estimate so far: after a silence the first ones move it far.
+            let known = errors;
             let later_s = to.since(waiting.at).as_secs_f64();
+            let mut then = self.state_at(waiting.at);
+            then.correct(&earlier(&known, later_s));
             for (number, row) in rows(&then, context, source, &waiting, window).into_iter().enumerate() {
                 let again = |state: &State| {
                     rows(state, context, source, &waiting, window).get(number).copied().flatten()
                 };
                 if let Some(row) = row.and_then(|row| self.straight(row, &then, again)) {
-                    self.fuse(&row.seen_later(later_s), context, source, &mut errors);
+                    self.fuse(&row.seen_later(later_s), context.settings.gate, source, (&known, &mut errors));
                 }
             }
         }
         (self.at, self.state) = (to, nominal);
-        self.bound_speed(&mut errors);
         self.state.correct(&errors);
+        self.bound_speed();
+        self.stay_inside(&context.profile);
         self.trail.note(to, &self.factors);
-        self.seek_wall();
+        self.agreement.seek(&mut self.factors);
     }
 
     /// Fuses that the vehicle doesn't move, unless that is too unlikely.
@@ -138,7 +134,7 @@ impl Running {
         }
         let mut errors = [0.0; ERRORS];
         for row in &rows {
-            self.correct(row, &mut errors);
+            self.correct(row, &[0.0; ERRORS], &mut errors);
         }
         self.state.correct(&errors);
     }
@@ -178,31 +174,40 @@ impl Running {
         before.between(after, share)
     }
 
-    fn fuse(&mut self, row: &Row, context: &Context, source: &mut Source, errors: &mut Errors) {
-        let row = row.unless_sure(|by| math::sqrt(self.factors.variance_along(by)));
-        let expected: f64 = row.h.iter().zip(errors.iter()).map(|(h, e)| h * e).sum();
-        let innovation = row.residual - expected;
+    /// Takes a row whose residual is against the estimate corrected by the errors that were known.
+    fn fuse(&mut self, row: &Row, gate: f64, source: &mut Source, (known, errors): (&Errors, &mut Errors)) {
+        let mut row = row.unless_sure(|by| math::sqrt(self.factors.variance_along(by)));
+        row.noise += self.left_out(row.bends);
+        let innovation = row.residual - since(&row, known, errors);
         let variance = self.factors.variance_along(&row.h) + row.noise;
         let nis = innovation * innovation / variance;
-        let is_range = matches!(source.sensor.kind, SensorKind::Head | SensorKind::Echosounder { .. });
-        let agrees = nis <= context.settings.gate;
-        if is_range {
-            self.wall.note(agrees);
-        }
+        let agrees = nis <= gate;
+        self.agreement.note(source.sensor.kind, &row, agrees);
         if !agrees {
             source.consistency.gated += 1;
             return;
         }
-        self.correct(&row, errors);
+        self.correct(&row, known, errors);
         source.consistency.used += 1;
         source.consistency.nis_sum += nis;
+    }
+
+    /// Variance of what a row leaves out, by its second derivatives. It matters only while the place or the attitude is
+    /// hardly known.
+    ///
+    /// Of a normal error e, f'' e^2 / 2 has a square of mean 3/4 (f'' sigma^2)^2.
+    fn left_out(&self, [by_place, by_turn, by_both]: [f64; 3]) -> f64 {
+        let sum = |axes: Range<usize>| axes.map(|i| self.factors.variance(i)).sum::<f64>();
+        let (place, turn) = (sum(POSITION + 1..POSITION + 3), sum(ATTITUDE..ATTITUDE + 3));
+        let bent = by_place * place + by_turn * turn + 2.0 * by_both * math::sqrt(place * turn);
+        0.75 * bent * bent
     }
 
     /// A row as noisy as what it measures is bent: looked at from a standard deviation to either side. `None` where there is
     /// nothing to be seen from there.
     fn straight(&self, mut row: Row, then: &State, again: impl Fn(&State) -> Option<Row>) -> Option<Row> {
         let variance = self.factors.variance_along(&row.h);
-        if row.lean.is_none() || variance < NEAR_M * NEAR_M {
+        if row.lean.is_none() || variance < row.noise.min(NEAR_M * NEAR_M) {
             return Some(row);
         }
         let sd_m = math::sqrt(variance);
@@ -218,15 +223,24 @@ impl Running {
         Some(row)
     }
 
-    /// When ranges no longer agree with the wall, the place in the section is anywhere near.
-    fn seek_wall(&mut self) {
-        if self.wall.seen < WALL_MEMORY || self.wall.agreeing >= LEAST_AGREEING {
+    /// The vehicle is in the tunnel: an estimate beyond the wall, from where no beam could be told, is drawn back.
+    fn stay_inside(&mut self, profile: &Profile) {
+        let place = [self.state.position.y(), self.state.position.z()];
+        if profile.contains(place) {
             return;
         }
-        for axis in 1..3 {
-            self.factors.add_to(POSITION + axis, LOST_M * LOST_M);
+        let reference = profile.reference();
+        let reach_m = profile.farthest_m(reference);
+        let mut errors = [0.0; ERRORS];
+        for (axis, (is, middle)) in (1..3).zip(place.into_iter().zip(reference)) {
+            self.factors.add_to(POSITION + axis, BEYOND_M * BEYOND_M);
+            self.correct(
+                &Row::of(POSITION + axis, middle - is, reach_m * reach_m),
+                &[0.0; ERRORS],
+                &mut errors,
+            );
         }
-        self.wall = WallMemory::default();
+        self.state.correct(&errors);
     }
 
     /// How far off the estimate may be.
@@ -247,22 +261,29 @@ impl Running {
     }
 
     /// Vehicles are no faster than a little, whatever an accelerometer without anything beside it makes of gravity.
-    fn bound_speed(&mut self, errors: &mut Errors) {
+    fn bound_speed(&mut self) {
+        let mut errors = [0.0; ERRORS];
         for (axis, row) in measure::rest(&self.state, SPEED_SD_MPS).iter().enumerate() {
             if self.factors.variance(VELOCITY + axis) > SPEED_SD_MPS * SPEED_SD_MPS {
-                self.correct(row, errors);
+                self.correct(row, &[0.0; ERRORS], &mut errors);
             }
         }
+        self.state.correct(&errors);
     }
 
-    fn correct(&mut self, row: &Row, errors: &mut Errors) {
-        let expected: f64 = row.h.iter().zip(errors.iter()).map(|(h, e)| h * e).sum();
+    fn correct(&mut self, row: &Row, known: &Errors, errors: &mut Errors) {
+        let innovation = row.residual - since(row, known, errors);
         let gain = self.factors.measure(&row.h, row.noise);
         self.trail.measure(&row.h, &gain);
         for (error, k) in errors.iter_mut().zip(&gain.k) {
-            *error += k * (row.residual - expected);
+            *error += k * innovation;
         }
     }
+}
+
+/// What a row would have measured of the errors that have been found since those that were known.
+fn since(row: &Row, known: &Errors, errors: &Errors) -> f64 {
+    row.h.iter().zip(errors.iter().zip(known)).map(|(h, (error, known))| h * (error - known)).sum()
 }
 
 /// Standard deviations of an estimate.
@@ -278,18 +299,11 @@ pub struct Sigmas {
     pub yaw_rad: f64,
 }
 
-impl Default for WallMemory {
-    fn default() -> Self {
-        Self { seen: 0, agreeing: 1.0 }
-    }
-}
-
-impl WallMemory {
-    fn note(&mut self, agrees: bool) {
-        self.seen = (self.seen + 1).min(WALL_MEMORY);
-        let share = 1.0 / f64::from(self.seen.max(1));
-        self.agreeing += share * (f64::from(u8::from(agrees)) - self.agreeing);
-    }
+/// Errors as they were `by_s` before.
+fn earlier(errors: &Errors, by_s: f64) -> Errors {
+    let mut then = *errors;
+    put(&mut then, POSITION, vec::<Tunnel>(errors, POSITION) + vec::<Tunnel>(errors, VELOCITY).scaled(-by_s));
+    then
 }
 
 /// What a reading measures; nothing where it can't be said.
