@@ -1,0 +1,112 @@
+//! The yardsticks: filters that keep the covariance itself, a dense matrix.
+
+use std::hint::black_box;
+
+use headrace_core::fusion::filter::factors::Factors;
+use headrace_core::fusion::filter::settings::Settings;
+use headrace_core::fusion::filter::state::ERRORS;
+use kfilter::kalman::{Kalman, KalmanLinearNoInput, KalmanPredict as _, KalmanUpdate as _};
+use kfilter::measurement::LinearMeasurement;
+use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+use nalgebra_of_peers as peers;
+
+use crate::dive::Dive;
+
+/// Which errors are measured: those of the attitude.
+const MEASURED: [usize; 3] = [6, 7, 8];
+const NOISE: f64 = 1e-3;
+const INNOVATION: f64 = 1e-3;
+
+/// Factors of a covariance without zeros.
+pub(crate) fn factors<const N: usize>() -> Factors<N> {
+    let mut factors = Factors::independent([0.01; N]);
+    for k in 0..N {
+        // Any direction that isn't along another.
+        let a = core::array::from_fn(|i| ((3 * i + 5 * k + i * k) % 11) as f64 / 11.0 - 0.4);
+        factors.add(0.001, a, N);
+    }
+    factors
+}
+
+/// Element (i, j) of an epoch's transition matrix, of which fewer states have a corner.
+fn transition() -> [[f64; ERRORS]; ERRORS] {
+    let transition = Dive::under_way().leg().transition(&Settings::default());
+    let columns: [[f64; ERRORS]; ERRORS] = core::array::from_fn(|j| {
+        let mut errors = core::array::from_fn(|i| if i == j { 1.0 } else { 0.0 });
+        transition.apply(&mut errors);
+        errors
+    });
+    core::array::from_fn(|i| core::array::from_fn(|j| columns[j][i]))
+}
+
+/// Written out with nalgebra's matrices of fixed size, the update in Joseph's form.
+#[derive(Clone)]
+pub(crate) struct Dense<const N: usize> {
+    x: SVector<f64, N>,
+    p: SMatrix<f64, N, N>,
+    f: SMatrix<f64, N, N>,
+    q: SMatrix<f64, N, N>,
+    h: SMatrix<f64, 3, N>,
+    r: Matrix3<f64>,
+}
+
+impl<const N: usize> Dense<N> {
+    pub(crate) fn new() -> Self {
+        let (transition, factors) = (transition(), factors::<N>());
+        Self {
+            x: SVector::zeros(),
+            p: SMatrix::from_fn(|i, j| factors.covariance(i, j)),
+            f: SMatrix::from_fn(|i, j| transition[i][j]),
+            q: SMatrix::from_diagonal_element(1e-6),
+            h: SMatrix::from_fn(|k, j| f64::from(u8::from(MEASURED[k] == j))),
+            r: Matrix3::from_diagonal_element(NOISE),
+        }
+    }
+
+    pub(crate) fn predict(&mut self) {
+        self.p = self.f * self.p * self.f.transpose() + self.q;
+    }
+
+    pub(crate) fn update(&mut self) {
+        let ph = self.p * self.h.transpose();
+        let s = self.h * ph + self.r;
+        let k = ph * s.try_inverse().unwrap();
+        let y = black_box(Vector3::from_element(INNOVATION)) - self.h * self.x;
+        self.x += k * y;
+        let left = SMatrix::identity() - k * self.h;
+        self.p = left * self.p * left.transpose() + k * self.r * k.transpose();
+    }
+}
+
+/// The crate `kfilter`.
+#[derive(Clone)]
+pub(crate) struct Published<const N: usize> {
+    filter: KalmanLinearNoInput<f64, N>,
+    measurement: LinearMeasurement<f64, N, 3>,
+}
+
+impl<const N: usize> Published<N> {
+    pub(crate) fn new() -> Self {
+        let (transition, factors) = (transition(), factors::<N>());
+        let filter = Kalman::new(
+            peers::SMatrix::from_fn(|i, j| transition[i][j]),
+            peers::SMatrix::from_diagonal_element(1e-6),
+            peers::SVector::zeros(),
+            peers::SMatrix::from_fn(|i, j| factors.covariance(i, j)),
+        );
+        let measurement = LinearMeasurement::new(
+            peers::SMatrix::from_fn(|k, j| f64::from(u8::from(MEASURED[k] == j))),
+            peers::Matrix3::from_diagonal_element(NOISE),
+            peers::Vector3::from_element(INNOVATION),
+        );
+        Self { filter, measurement }
+    }
+
+    pub(crate) fn predict(&mut self) {
+        self.filter.predict().unwrap();
+    }
+
+    pub(crate) fn update(&mut self) {
+        self.filter.update(black_box(&self.measurement)).unwrap();
+    }
+}
