@@ -24,6 +24,14 @@ pub struct Gain<const N: usize> {
     pub variance: f64,
 }
 
+/// Noise that is to be added to one error or two.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Noise {
+    variance: f64,
+    /// Which errors, and their weights; the first is the later one.
+    weights: [(usize, f64); 2],
+}
+
 impl<const N: usize> Factors<N> {
     /// Independent errors of these variances, none negative.
     pub fn independent(variances: [f64; N]) -> Self {
@@ -117,32 +125,36 @@ impl<const N: usize> Factors<N> {
     }
 
     /// Adds noise of a variance to the errors, weighted by `a`, of which those from `len` on are zero.
-    ///
-    /// Source: Agee and Turner 1972, in Bierman 1977, III.4.
-    pub fn add(&mut self, variance: f64, mut a: [f64; N], len: usize) {
-        let mut c = variance;
+    pub fn add(&mut self, mut variance: f64, mut a: [f64; N], len: usize) {
         for (j, (column, d)) in self.u.iter_mut().zip(&mut self.d).enumerate().take(len).rev() {
-            let s = at(&a, j);
-            let sum = *d + c * s * s;
-            if sum > 0.0 {
-                let b = c / sum;
-                c = b * *d;
-                for (a, u) in a.iter_mut().zip(column).take(j) {
-                    *a -= s * *u;
-                    *u += s * b * *a;
-                }
-            }
-            *d = sum;
+            enter(j, column, d, &mut variance, &mut a);
         }
     }
 
     /// Adds noise of a variance to one error.
     pub fn add_to(&mut self, i: usize, variance: f64) {
-        let mut a = [0.0; N];
-        if let Some(slot) = a.get_mut(i) {
-            *slot = 1.0;
+        self.add_all([Noise::of_one(i, variance)]);
+    }
+
+    /// Adds noises, the first first.
+    ///
+    /// They take turns column by column. That gives the same bits as one after the other, as none needs more of those
+    /// before it than the column it is at; and while one waits for its quotient, on which its next column depends, the
+    /// processor is at the others.
+    pub fn add_all<const M: usize>(&mut self, noises: [Noise; M]) {
+        let mut variances = noises.map(|noise| noise.variance);
+        let lens = noises.map(|noise| noise.weights[0].0 + 1);
+        let mut a = [[0.0; N]; M];
+        for (a, noise) in a.iter_mut().zip(&noises) {
+            noise.put(a);
         }
-        self.add(variance, a, i + 1);
+        for (j, (column, d)) in self.u.iter_mut().zip(&mut self.d).enumerate().rev() {
+            for ((a, variance), len) in a.iter_mut().zip(&mut variances).zip(&lens) {
+                if *len > j {
+                    enter(j, column, d, variance, a);
+                }
+            }
+        }
     }
 
     /// Replaces the errors e by F e, where F is unit upper triangular: `transform` works on one vector of errors, of which
@@ -177,6 +189,44 @@ impl<const N: usize> Factors<N> {
     }
 }
 
+impl Noise {
+    /// Noise of a variance in one error.
+    pub fn of_one(i: usize, variance: f64) -> Self {
+        Self { variance, weights: [(i, 1.0); 2] }
+    }
+
+    /// Noise of a variance in an error, and by a share in one before it.
+    pub fn of_two(i: usize, (before, share): (usize, f64), variance: f64) -> Self {
+        Self { variance, weights: [(i, 1.0), (before, share)] }
+    }
+
+    fn put<const N: usize>(&self, a: &mut [f64; N]) {
+        for (i, weight) in self.weights {
+            if let Some(slot) = a.get_mut(i) {
+                *slot = weight;
+            }
+        }
+    }
+}
+
+/// Enters noise into column `j` of the factors, once it has entered those after it; what is left of its variance and its
+/// weights is for those before.
+///
+/// Source: Agee and Turner 1972, in Bierman 1977, III.4.
+fn enter<const N: usize>(j: usize, column: &mut [f64; N], d: &mut f64, variance: &mut f64, a: &mut [f64; N]) {
+    let s = at(a, j);
+    let sum = *d + *variance * s * s;
+    if sum > 0.0 {
+        let b = *variance / sum;
+        *variance = b * *d;
+        for (a, u) in a.iter_mut().zip(column).take(j) {
+            *a -= s * *u;
+            *u += s * b * *a;
+        }
+    }
+    *d = sum;
+}
+
 fn at<const N: usize>(column: &[f64; N], i: usize) -> f64 {
     column.get(i).copied().unwrap_or(0.0)
 }
@@ -194,4 +244,48 @@ fn dot<const N: usize>(a: &[f64; N], b: &[f64; N], len: usize) -> f64 {
     }
     let rest: f64 = a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum();
     (sums[0] + sums[2]) + (sums[1] + sums[3]) + rest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The same as it stands in the book, one noise at a time.
+    fn add_alone(factors: &mut Factors<7>, noise: &Noise) {
+        let (mut c, mut a) = (noise.variance, [0.0; 7]);
+        noise.put(&mut a);
+        for j in (0..=noise.weights[0].0).rev() {
+            let (s, d) = (a[j], factors.d[j]);
+            factors.d[j] = d + c * s * s;
+            if factors.d[j] > 0.0 {
+                let b = c / factors.d[j];
+                c = b * d;
+                for (a, u) in a[..j].iter_mut().zip(&mut factors.u[j]) {
+                    *a -= s * *u;
+                    *u += s * b * *a;
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn noises_that_take_turns_give_the_bits_of_one_after_the_other() {
+        let noises: [Noise; 9] = core::array::from_fn(|i| match i {
+            7 => Noise::of_two(5, (2, -1.3), 0.11),
+            8 => Noise::of_two(6, (5, 0.7), 0.2),
+            _ => Noise::of_one((3 * i) % 7, 0.3 / (i + 1) as f64),
+        });
+        for start in [[0.0; 7], [1.0, 0.1, 0.0, 3.0, 1e-9, 0.0, 7.0]] {
+            let (mut alone, mut together) = (Factors::independent(start), Factors::independent(start));
+            for _ in 0..3 {
+                for noise in &noises {
+                    add_alone(&mut alone, noise);
+                }
+                together.add_all(noises);
+            }
+            assert_eq!(alone.d.map(f64::to_bits), together.d.map(f64::to_bits));
+            assert_eq!(alone.u.map(|c| c.map(f64::to_bits)), together.u.map(|c| c.map(f64::to_bits)));
+            assert!(together.is_sound());
+        }
+    }
 }

@@ -4,8 +4,8 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::factors::Factors;
-use super::settings::Settings;
+use super::factors::{Factors, Noise};
+use super::settings::{Settings, Wander};
 use super::state::{
     ATTITUDE, DEPTH, ERRORS, Errors, FORCE_BIAS, HEADING, POSITION, RATE_BIAS, SCALE, SLACK, SLACK_RATE,
     State, VELOCITY, cross, matrix, rotation,
@@ -97,7 +97,7 @@ impl Leg {
     }
 
     /// Two equal lags in a row, driven by white noise.
-    fn disturb_slack(&self, settings: &Settings, factors: &mut Factors<ERRORS>) {
+    fn slack_noises(&self, settings: &Settings) -> [Noise; 2] {
         let slack = settings.slack;
         let lags = self.dt_s / slack.time_s;
         let left = math::exp(-2.0 * lags);
@@ -106,16 +106,12 @@ impl Leg {
         let of_both = drive * drive * slack.time_s / 2.0 * (1.0 - left * (1.0 + 2.0 * lags));
         let of_slack = slack.reach * slack.reach * (1.0 - left * (1.0 + 2.0 * lags * (1.0 + lags)));
         if of_rate <= 0.0 {
-            return;
+            return [Noise::of_one(SLACK, 0.0); 2];
         }
-        let mut a = [0.0; ERRORS];
-        for (i, share) in [(SLACK, of_both / of_rate), (SLACK_RATE, 1.0)] {
-            if let Some(slot) = a.get_mut(i) {
-                *slot = share;
-            }
-        }
-        factors.add(of_rate, a, SLACK_RATE + 1);
-        factors.add_to(SLACK, (of_slack - of_both * of_both / of_rate).max(0.0));
+        [
+            Noise::of_two(SLACK_RATE, (SLACK, of_both / of_rate), of_rate),
+            Noise::of_one(SLACK, (of_slack - of_both * of_both / of_rate).max(0.0)),
+        ]
     }
 
     /// Its length, s.
@@ -158,30 +154,39 @@ impl Leg {
         let force = variance(settings.force_noise, settings.blind_force_noise, blind_force_s);
         let rate = variance(settings.rate_noise, settings.blind_rate_noise, blind_rate_s);
         for k in 0..3 {
-            // White force over the leg: velocity and way vary together, and the way by a twelfth on its own.
-            let mut a = [0.0; ERRORS];
-            if let Some(slot) = a.get_mut(POSITION + k) {
-                *slot = self.dt_s / 2.0;
-            }
-            if let Some(slot) = a.get_mut(VELOCITY + k) {
-                *slot = 1.0;
-            }
-            factors.add(force, a, VELOCITY + k + 1);
-            factors.add_to(POSITION + k, force * self.dt_s * self.dt_s / 12.0);
-            factors.add_to(ATTITUDE + k, rate);
+            factors.add_all([
+                // White force over the leg: velocity and way vary together, and the way by a twelfth on its own.
+                Noise::of_two(VELOCITY + k, (POSITION + k, self.dt_s / 2.0), force),
+                Noise::of_one(POSITION + k, force * self.dt_s * self.dt_s / 12.0),
+                Noise::of_one(ATTITUDE + k, rate),
+            ]);
         }
-        self.disturb_slack(settings, factors);
-        for (i, fading) in transition.fading {
-            let reach = match i {
-                SLACK | SLACK_RATE => continue,
-                HEADING => settings.heading.reach,
-                _ if i >= RATE_BIAS => settings.rate_bias.reach,
-                _ => settings.force_bias.reach,
-            };
-            factors.add_to(i, reach * reach * (1.0 - fading * fading));
-        }
-        factors.add_to(SCALE, settings.scale_noise * settings.scale_noise * self.dt_s);
-        factors.add_to(DEPTH, settings.depth_noise * settings.depth_noise * self.dt_s);
+        factors.add_all(self.wandering(settings, transition));
+    }
+
+    /// How what is wrong with the sensors wanders.
+    fn wandering(&self, settings: &Settings, transition: &Transition) -> [Noise; 11] {
+        let fading = |i: usize, wander: Wander| {
+            let left = transition.left_of(i);
+            Noise::of_one(i, wander.reach * wander.reach * (1.0 - left * left))
+        };
+        let force = |k: usize| fading(FORCE_BIAS + k, settings.force_bias);
+        let rate = |k: usize| fading(RATE_BIAS + k, settings.rate_bias);
+        let white = |i: usize, noise: f64| Noise::of_one(i, noise * noise * self.dt_s);
+        let [slack, slack_alone] = self.slack_noises(settings);
+        [
+            slack,
+            slack_alone,
+            force(0),
+            force(1),
+            force(2),
+            rate(0),
+            rate(1),
+            rate(2),
+            fading(HEADING, settings.heading),
+            white(SCALE, settings.scale_noise),
+            white(DEPTH, settings.depth_noise),
+        ]
     }
 }
 
@@ -214,12 +219,16 @@ impl Transition {
 
     /// Moves on what is wrong with the sensors: left to itself, it fades towards nothing.
     pub fn fade(&self, state: &mut State) {
-        let left = |of: usize| self.fading.iter().find(|(i, _)| *i == of).map_or(1.0, |(_, left)| *left);
-        state.force_bias_mps2 = state.force_bias_mps2.scaled(left(FORCE_BIAS));
-        state.rate_bias_radps = state.rate_bias_radps.scaled(left(RATE_BIAS));
-        state.slack_m = (state.slack_m + state.slack_rate_mps * self.dt_s) * left(SLACK);
-        state.slack_rate_mps *= left(SLACK_RATE);
-        state.heading_offset_rad *= left(HEADING);
+        state.force_bias_mps2 = state.force_bias_mps2.scaled(self.left_of(FORCE_BIAS));
+        state.rate_bias_radps = state.rate_bias_radps.scaled(self.left_of(RATE_BIAS));
+        state.slack_m = (state.slack_m + state.slack_rate_mps * self.dt_s) * self.left_of(SLACK);
+        state.slack_rate_mps *= self.left_of(SLACK_RATE);
+        state.heading_offset_rad *= self.left_of(HEADING);
+    }
+
+    /// What is left of an error by itself.
+    fn left_of(&self, error: usize) -> f64 {
+        self.fading.iter().find(|(i, _)| *i == error).map_or(1.0, |(_, left)| *left)
     }
 
     /// Moves errors on.
