@@ -188,7 +188,7 @@ impl Alone {
         let rates = self.second.iter().map(|sample| sample.rate_radps);
         let forces = self.second.iter().map(|sample| sample.force_mps2);
         if spread(rates.clone()) < STILL_RADPS && spread(forces) < STILL_MPS2 {
-            let rows = still(&self.state, mean(rates), self.settings.rate_noise);
+            let rows = measure::no_turn(&self.state, mean(rates), self.settings.rate_noise);
             self.fuse(&rows);
             self.fuse(&measure::rest(&self.state, STILL_SD_MPS));
         } else {
@@ -208,16 +208,6 @@ impl Alone {
         }
         self.state.correct(&errors);
     }
-}
-
-/// Of a unit that doesn't turn, the mean rate of a second is its bias.
-fn still(state: &State, rate_radps: Vec3<Body>, rate_noise: f64) -> [Row; 3] {
-    let off = (rate_radps + -state.rate_bias_radps).0;
-    core::array::from_fn(|k| {
-        let mut h = [0.0; ERRORS];
-        h[RATE_BIAS + k] = 1.0;
-        Row { h, residual: off[k], noise: rate_noise * rate_noise }
-    })
 }
 
 fn ours(samples: &[Sample]) -> Off {

@@ -3,7 +3,8 @@
 //! Derivation: `docs/fusion.md`, "Measurements".
 
 use super::state::{
-    ATTITUDE, DEPTH, ERRORS, Errors, HEADING, POSITION, SCALE, SLACK, State, VELOCITY, put, rotation_vector,
+    ATTITUDE, DEPTH, ERRORS, Errors, HEADING, POSITION, RATE_BIAS, SCALE, SLACK, State, VELOCITY, put,
+    rotation_vector,
 };
 use crate::frames::{Body, Rot, Sensor, Tunnel, Vec3};
 use crate::math;
@@ -199,6 +200,13 @@ pub fn velocity(
         let residual = residuals.get(k).copied().unwrap_or(0.0);
         Row::new(residual, sd_mps * sd_mps).with(VELOCITY, axis).with(ATTITUDE, axis.cross(&moved))
     })
+}
+
+/// Of a unit that doesn't turn, the mean rate is its bias, rad/s.
+pub fn no_turn(state: &State, mean_radps: Vec3<Body>, sd_radps: f64) -> [Row; 3] {
+    let off = mean_radps + -state.rate_bias_radps;
+    let off = [off.x(), off.y(), off.z()];
+    core::array::from_fn(|k| Row::of(RATE_BIAS + k, off.get(k).copied().unwrap_or(0.0), sd_radps * sd_radps))
 }
 
 /// Rest: no velocity.

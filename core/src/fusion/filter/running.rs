@@ -24,6 +24,8 @@ use crate::tunnel::Profile;
 const KNOTS: usize = 256;
 /// A vehicle that rests moves by so much, m/s: the sea's, or the deck's.
 const REST_SD_MPS: f64 = 0.02;
+/// And turns by so much in the mean of a second, rad/s.
+const REST_SD_RADPS: f64 = 1e-3;
 /// It doesn't rest when that is more unlikely than once in ten thousand times.
 const REST_GATE: f64 = 15.1;
 /// A wall is as good as flat over so little, m, unless ranges are better still.
@@ -123,8 +125,8 @@ impl Running {
         self.agreement.seek(&mut self.factors);
     }
 
-    /// Fuses that the vehicle doesn't move, unless that is too unlikely.
-    pub fn rest(&mut self) {
+    /// Fuses that the vehicle doesn't move, unless that is too unlikely; and that a mean turn rate is its bias.
+    pub fn rest(&mut self, mean_radps: Option<Vec3<Body>>) {
         let rows = measure::rest(&self.state, REST_SD_MPS);
         let unlikely = |row: &Row| {
             row.residual * row.residual > REST_GATE * (self.factors.variance_along(&row.h) + row.noise)
@@ -133,7 +135,8 @@ impl Running {
             return;
         }
         let mut errors = [0.0; ERRORS];
-        for row in &rows {
+        let turns = mean_radps.map(|mean| measure::no_turn(&self.state, mean, REST_SD_RADPS));
+        for row in rows.iter().chain(turns.iter().flatten()) {
             self.correct(row, &[0.0; ERRORS], &mut errors);
         }
         self.state.correct(&errors);

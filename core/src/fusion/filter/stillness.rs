@@ -1,6 +1,7 @@
 //! Whether the vehicle rests: on deck, or on the ground. It is then known not to move, and the gyros' bias shows.
 
 use crate::app::reading::Reading;
+use crate::frames::{Sensor, Vec3};
 use crate::fusion::SensorKind;
 use crate::time::{DurNs, MonoNs};
 
@@ -28,6 +29,8 @@ struct Means {
     count: f64,
     first: Option<[f64; 3]>,
     alike: u32,
+    /// The latest, until it is taken.
+    latest: Option<[f64; 3]>,
 }
 
 impl Means {
@@ -39,6 +42,7 @@ impl Means {
                 self.first.is_some_and(|first| first.iter().zip(mean).all(|(a, b)| (a - b).abs() <= same));
             self.alike = if is_alike { self.alike.saturating_add(1) } else { 0 };
             self.first = if is_alike { self.first } else { Some(mean) };
+            self.latest = Some(mean);
             (self.since, self.sum, self.count) = (Some(at), [0.0; 3], 0.0);
         }
         for (sum, value) in self.sum.iter_mut().zip(value) {
@@ -74,13 +78,17 @@ impl Stillness {
     pub fn is_still(&self) -> bool {
         self.rate.alike >= MEANS && self.force.alike >= MEANS && self.cable_still
     }
+
+    /// The mean turn rate of the last second, rad/s, once.
+    pub fn take_mean_rate(&mut self) -> Option<Vec3<Sensor>> {
+        self.rate.latest.take().map(|[x, y, z]| Vec3::new(x, y, z))
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::app::reading::TetherLength;
-    use crate::frames::Vec3;
     use crate::math;
 
     /// Whether it is still at the end of twenty seconds with this turn rate and way.
