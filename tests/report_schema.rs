@@ -170,7 +170,8 @@ fn a_report_that_is_wrong_is_found_out() {
 }
 
 /// What a key's ending says of its unit, and the words for it.
-const UNITS: [(&str, &str); 8] = [
+const UNITS: [(&str, &str); 9] = [
+    ("nis", "without unit"),
     ("_deg", "degrees"),
     ("_h", "Hours"),
     ("_m", "metres"),

@@ -67,10 +67,6 @@ pub(crate) trait Transparent: Navigation + 'static {
     fn estimate(&self) -> Option<(MonoNs, State, Factors<ERRORS>)> {
         None
     }
-
-    fn consistency_of(&self, _source: usize) -> Option<Consistency> {
-        None
-    }
 }
 
 impl Transparent for headrace_core::fusion::direct::DirectNavigation {}
@@ -78,10 +74,6 @@ impl Transparent for headrace_core::fusion::direct::DirectNavigation {}
 impl Transparent for FilterNavigation {
     fn estimate(&self) -> Option<(MonoNs, State, Factors<ERRORS>)> {
         self.running().map(|running| (running.at, running.state, running.factors))
-    }
-
-    fn consistency_of(&self, source: usize) -> Option<Consistency> {
-        self.consistency(source)
     }
 }
 
@@ -124,8 +116,7 @@ impl<N: Transparent> Navigation for Overheard<N> {
             self.last = Some(at);
             self.said.try_send(Said::Epoch(at, Box::new((state, factors)))).unwrap();
         }
-        if let (Some(consistency), Some(told)) =
-            (self.inner.consistency_of(source), self.told.get_mut(source))
+        if let (Some(consistency), Some(told)) = (self.inner.consistency(source), self.told.get_mut(source))
             && *told != consistency
         {
             *told = consistency;

@@ -3,7 +3,7 @@
 
 use serde::Serialize;
 
-use super::flow::{AdviceEntry, AdviceLog, Coverage, SourceTallies, Tally};
+use super::flow::{AdviceEntry, AdviceLog, Coverage, Navigator, SourceTallies, Tally};
 use super::run::Loop;
 use crate::coverage::{Evidence, Section, Sections, Spread, Verdict};
 use crate::sampling::advice::{Alternative, Left, Remedy};
@@ -249,6 +249,23 @@ pub struct SourceReport {
     pub longest_gap_s: f64,
     /// Packets a second.
     pub rate_hz: f64,
+    /// How well it agreed with the others in navigation; `None` without a filter, and for what it doesn't use.
+    pub navigation: Option<NavigationReport>,
+}
+
+/// How a source's measurements fared in navigation.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct NavigationReport {
+    /// Measured numbers that were used.
+    pub used: u64,
+    /// Measured numbers that were too unlikely to be used.
+    pub gated: u64,
+    /// Readings that came after their time.
+    pub late: u64,
+    /// Readings that weren't possible numbers, or for which there was no room.
+    pub dropped: u64,
+    /// Mean of their innovations squared, over the variances expected: about 1 where all is trusted as it deserves.
+    pub nis: Option<f64>,
 }
 
 impl Report {
@@ -403,11 +420,13 @@ fn alternative_report(other: &Alternative, left: &Left) -> AlternativeReport {
 
 fn source_reports(dive: &Loop, tallies: &SourceTallies) -> Vec<SourceReport> {
     let decoders = dive.decoder_counts().into_iter().zip(dive.decoder_withheld());
+    let navigation = &dive.world().resource::<Navigator>().navigation;
     dive.sources()
         .iter()
         .zip(&tallies.0)
         .zip(decoders)
-        .map(|((source, tally), (counts, withheld))| {
+        .enumerate()
+        .map(|(number, ((source, tally), (counts, withheld)))| {
             let span_s = tally.span.map_or(0.0, |(first, last)| last.since(first).as_secs_f64());
             let intervals = tally.packets.saturating_sub(1) as f64;
             SourceReport {
@@ -421,6 +440,13 @@ fn source_reports(dive: &Loop, tallies: &SourceTallies) -> Vec<SourceReport> {
                 withheld,
                 longest_gap_s: tally.longest_gap.as_secs_f64(),
                 rate_hz: if span_s > 0.0 { intervals / span_s } else { 0.0 },
+                navigation: navigation.consistency(number).map(|consistency| NavigationReport {
+                    used: consistency.used,
+                    gated: consistency.gated,
+                    late: consistency.late,
+                    dropped: consistency.dropped,
+                    nis: consistency.nis(),
+                }),
             }
         })
         .collect()

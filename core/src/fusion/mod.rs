@@ -8,6 +8,7 @@ pub mod section;
 use self::direct::DirectNavigation;
 use self::filter::FilterNavigation;
 use self::filter::settings::Settings;
+use self::filter::sources::Consistency;
 use self::relative::Relative;
 use crate::app::reading::Reading;
 use crate::config::{ConfigError, Section};
@@ -100,6 +101,11 @@ pub trait Navigation: Send + Sync {
     ///
     /// Allocates: never.
     fn update(&mut self, source: usize, sensor: &SensorInfo, times: Times, reading: &Reading);
+
+    /// How well a source agrees with the others; `None` where that isn't known.
+    fn consistency(&self, _source: usize) -> Option<Consistency> {
+        None
+    }
 
     /// Where the vehicle is at `at`, which may be a little before or after the last reading.
     ///

@@ -111,11 +111,6 @@ impl FilterNavigation {
         self.is_running.then_some(&self.running)
     }
 
-    /// How well each source agrees with the others.
-    pub fn consistency(&self, source: usize) -> Option<Consistency> {
-        self.sources.get(source).copied().flatten().map(|source| source.consistency)
-    }
-
     /// How often the estimate had to be begun anew.
     pub fn restarts(&self) -> u64 {
         self.restarts
@@ -297,6 +292,10 @@ impl Navigation for FilterNavigation {
             self.stillness.take(times.valid, sensor.kind, reading);
         }
         self.take(number, times.valid, reading);
+    }
+
+    fn consistency(&self, source: usize) -> Option<Consistency> {
+        self.sources.get(source).copied().flatten().map(|source| source.consistency)
     }
 
     fn fix(&self, at: MonoNs) -> Result<Fix, NoFix> {
