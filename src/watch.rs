@@ -192,8 +192,11 @@ impl Watch {
     }
 }
 
+/// A speed isn't known better, m/s: words must not change to and fro with it.
+const SPEED_KNOWN_MPS: f64 = 0.005;
+
 fn too_fast(entry: &AdviceEntry) -> bool {
-    entry.speed_mps.abs() > entry.advice.v_max_mps
+    entry.speed_mps.abs() > entry.advice.v_max_mps + SPEED_KNOWN_MPS
 }
 
 fn advice_words(entry: &AdviceEntry, target_m: f64, profile: &Profile) -> String {

@@ -101,6 +101,7 @@ const SETTINGS: &str = "[navigation]
 gyro_noise_degps_rthz = 0.007
 accel_noise_mps2_rthz = 0.001
 accel_bias_mps2 = 0.02
+gyro_bias_time_s = 300
 tether_sd_m = 0.003
 tether_scale_sd = 1e-4
 slack_sd_m = 0.085

@@ -21,7 +21,8 @@ fn without(way: &str, source: &str, from_s: f64, to_s: f64) -> Value {
     // The heads' bodies aren't simulated: nothing is hidden, and the paper's speed meets the target.
     let vehicle = include_str!("../deploy/vehicles/vita2-4.toml")
         .replace("planned_speed_mps = 0.11", "planned_speed_mps = 0.197")
-        .replace("[water]", &format!("[navigation]\nway = \"{way}\"\n\n[water]"));
+        .replace("[navigation]", &format!("[navigation]\nway = \"{way}\""));
+    assert!(vehicle.contains(&format!("way = \"{way}\"")));
     folder.write("vehicle.toml", &vehicle);
     folder.write("scene.toml", LEG);
     folder.simulate("scene.toml", "whole.mcap");

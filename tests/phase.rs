@@ -21,7 +21,13 @@ const PLANNED_MPS: f64 = 0.197;
 /// without a filter, which would allow for slack of the cable.
 fn advice(speed_mps: f64, vehicle: &str) -> Vec<Value> {
     let folder = Folder::new();
-    folder.write("vehicle.toml", vehicle.replace("[water]", "[navigation]\nway = \"direct\"\n\n[water]"));
+    let direct = "[navigation]\nway = \"direct\"\n";
+    let vehicle = if vehicle.contains("[navigation]") {
+        vehicle.replace("[navigation]\n", direct)
+    } else {
+        vehicle.replace("[water]", &format!("{direct}\n[water]"))
+    };
+    folder.write("vehicle.toml", vehicle);
     folder.write(
         "scene.toml",
         format!("vehicle = \"vehicle.toml\"\n[trajectory]\nstart_m = 5\n[[trajectory.legs]]\ndistance_m = 12\nspeed_mps = {speed_mps}\n"),

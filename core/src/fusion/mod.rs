@@ -129,12 +129,10 @@ impl NavigationConfig {
     /// Errors: the first key that is unknown or out of range.
     pub fn parse(section: Option<Section<'_>>) -> Result<Self, ConfigError> {
         let Some(section) = section else { return Ok(Self::Filter(Settings::default())) };
-        let config = match section.choice("way", &[("filter", true), ("direct", false)])? {
-            Some(false) => Self::Direct,
-            _ => Self::Filter(Settings::parse(&section)?),
-        };
+        let by_filter = section.choice("way", &[("filter", true), ("direct", false)])?.unwrap_or(true);
+        let settings = Settings::parse(&section)?;
         section.finish()?;
-        Ok(config)
+        Ok(if by_filter { Self::Filter(settings) } else { Self::Direct })
     }
 
     /// Navigation that knows nothing yet.

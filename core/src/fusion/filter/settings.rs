@@ -92,7 +92,7 @@ impl Default for Settings {
             force_noise: 0.003,
             blind_rate_noise: 2.0 * DEGREE,
             blind_force_noise: 0.03,
-            rate_bias: Wander { reach: 0.2 * DEGREE, time_s: 300.0 },
+            rate_bias: Wander { reach: 0.2 * DEGREE, time_s: 1000.0 },
             force_bias: Wander { reach: 0.03, time_s: 300.0 },
             tether_sd_m: 0.005,
             slack: Wander { reach: 0.06, time_s: 10.0 },
