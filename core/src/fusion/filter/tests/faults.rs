@@ -260,7 +260,7 @@ fn a_jump_that_a_vehicle_could_make_is_got_over() {
 fn a_frozen_sensor_is_got_over() {
     // The depth and one head are outvoted at once. An echosounder drags the place off by centimetres before its range is
     // too unlikely.
-    for (source, wrong_s) in [(DEPTH, 0.0), (HEADS, 0.0), (ECHOES, 35.0), (ECHOES + 2, 35.0), (IMU, 60.0)] {
+    for (source, wrong_s) in [(DEPTH, 0.0), (HEADS, 0.0), (ECHOES, 35.0), (ECHOES + 2, 35.0), (IMU, 75.0)] {
         let rig = Rig::new(cruise, 1);
         let mut events = rig.events(0.0, 110.0);
         freeze(&mut events, source, 30.0);

@@ -145,7 +145,7 @@ fn verif_wandering() {
     ];
     let mut factors = Factors::independent([0.0; ERRORS]);
     let (transition, noise) = leg(&settings, 5.0, still());
-    for _ in 0..1000 {
+    for _ in 0..5000 {
         transition.carry(&mut factors);
         for i in FORCE_BIAS..ERRORS {
             factors.add_to(i, noise.variance(i));
@@ -154,8 +154,8 @@ fn verif_wandering() {
     for (i, reach) in reaches {
         near("reach", factors.variance(i), reach * reach, 1e-9);
     }
-    near("scale", factors.variance(SCALE), settings.scale_noise * settings.scale_noise * 5e3, 1e-9);
-    near("depth", factors.variance(DEPTH), settings.depth_noise * settings.depth_noise * 5e3, 1e-9);
+    near("scale", factors.variance(SCALE), settings.scale_noise * settings.scale_noise * 25e3, 1e-9);
+    near("depth", factors.variance(DEPTH), settings.depth_noise * settings.depth_noise * 25e3, 1e-9);
     // After one of its times, an e-th is left.
     let (transition, _) = leg(&settings, settings.heading.time_s, still());
     let mut column = [1.0; ERRORS];
