@@ -65,27 +65,17 @@ fn a_body_on_the_floor_is_what_sounders_measure() {
     assert!(truth.contains("car"), "the truth names what was met");
 }
 
-#[track_caller]
-fn refused(folder: &Folder, words: &[&str]) {
-    let answer = folder.headrace(&["simulate", "scene.toml", "-o", "dive.mcap"]);
-    assert_eq!(answer.code, Some(2), "{}", answer.stderr);
-    for word in words {
-        assert!(answer.stderr.contains(word), "{word:?} is not in {}", answer.stderr);
-    }
-    assert!(!folder.path("dive.mcap").exists(), "no log of a scene that is none");
-}
-
 #[test]
 fn a_mesh_that_is_none_is_refused_with_the_place() {
     let folder = folder("file = \"box.obj\"\nchainage_m = 5");
     let place = "scene.toml:13: tunnel.features[0].file = \"box.obj\"";
-    refused(&folder, &[place, "can't be read"]);
+    folder.refuses_scene(&[place, "can't be read"]);
     folder.write("box.obj", cuboid().replace("f 5 6 8 7\n", ""));
-    refused(&folder, &[place, "1 hole(s)", "4 edges"]);
+    folder.refuses_scene(&[place, "1 hole(s)", "4 edges"]);
     folder.write("box.obj", cuboid().replace("v 0.5 0.5 0", "v 0.5"));
-    refused(&folder, &[place, "reading OBJ: line 5"]);
+    folder.refuses_scene(&[place, "reading OBJ: line 5"]);
     folder.write("box.obj", &cuboid()[..100]);
-    refused(&folder, &[place]);
+    folder.refuses_scene(&[place]);
     folder.write("box.obj", cuboid().replace(" 1\n", " 9\n"));
-    refused(&folder, &["leads through mesh_0"]);
+    folder.refuses_scene(&["leads through mesh_0"]);
 }

@@ -144,12 +144,7 @@ fn only_what_is_named_has_systems_components_and_streams() {
 fn refused(scene: &str, words: &[&str]) {
     let folder = folder();
     folder.write("scene.toml", scene);
-    let answer = folder.headrace(&["simulate", "scene.toml", "-o", "dive.mcap"]);
-    assert_eq!(answer.code, Some(2), "{}", answer.stderr);
-    for word in words {
-        assert!(answer.stderr.contains(word), "{word:?} is not in {}", answer.stderr);
-    }
-    assert!(!folder.path("dive.mcap").exists(), "no log of a scene that is none");
+    folder.refuses_scene(words);
 }
 
 #[test]

@@ -144,6 +144,17 @@ impl Folder {
         assert_eq!(answer.code, Some(0), "{}", answer.stderr);
     }
 
+    /// `scene.toml` is refused: exit code 2, these words, and no log.
+    #[track_caller]
+    pub(crate) fn refuses_scene(&self, words: &[&str]) {
+        let answer = self.headrace(&["simulate", "scene.toml", "-o", "dive.mcap"]);
+        assert_eq!(answer.code, Some(2), "{}", answer.stderr);
+        for word in words {
+            assert!(answer.stderr.contains(word), "{word:?} is not in {}", answer.stderr);
+        }
+        assert!(!self.path("dive.mcap").exists(), "no log of a scene that is none");
+    }
+
     /// Exit code and report of `replay LOG --json` with further arguments.
     pub(crate) fn replay(&self, log: &str, further: &[&str]) -> (Option<i32>, Value) {
         let answer = self.headrace(&[&["replay", log, "--json"], further].concat());

@@ -1,8 +1,7 @@
 //! A bench for effects: a vehicle with one device or two of each kind, dived along short ways.
 
-use bevy_ecs::entity::Entity;
 use headrace_core::app::device::Direction;
-use headrace_core::app::measurement::{Inertia, Measurement, Payout, Pressure, Sounding};
+use headrace_core::app::measurement::Measurement;
 use headrace_core::config::Document;
 use headrace_core::time::{DurNs, MonoNs};
 
@@ -98,11 +97,6 @@ impl Bench {
         Self::on(LONG, effects)
     }
 
-    /// Heads in sectors, for 640 s.
-    pub(super) fn long_sectors(effects: &str) -> Self {
-        Self { layout: "sector_offset", ..Self::long(effects) }
-    }
-
     /// Heads that turn on, on this way.
     pub(super) fn on(trajectory: &str, effects: &str) -> Self {
         let scene = format!("vehicle = \"vehicle.toml\"\nseed = 11\n[trajectory]\n{trajectory}\n{effects}\n");
@@ -178,24 +172,6 @@ impl Simulation {
                 self.world.despawn(*entity);
             }
         }
-    }
-
-    /// Forgets the messages that are due.
-    pub(super) fn forget_messages(&mut self) {
-        while self.outbox.has_next() {
-            self.outbox.next();
-        }
-    }
-
-    /// How many measurements the last slice has.
-    pub(super) fn measured(&self) -> usize {
-        let count = |entity: &Entity| {
-            self.world.get::<Samples<Sounding>>(*entity).map_or(0, |s| s.list.len())
-                + self.world.get::<Samples<Pressure>>(*entity).map_or(0, |s| s.list.len())
-                + self.world.get::<Samples<Inertia>>(*entity).map_or(0, |s| s.list.len())
-                + self.world.get::<Samples<Payout>>(*entity).map_or(0, |s| s.list.len())
-        };
-        self.entities.iter().map(count).sum()
     }
 }
 

@@ -132,14 +132,3 @@ fn figure_13_has_gaps_on_the_side_walls_in_phase_shift_and_strips_without_sample
         &["4 heads, MEDIUM", "sector offset, aligned", "no sample along the whole stretch", "T_x up to"],
     );
 }
-
-/// Draws all of them as the command does, into a folder for looking at.
-#[test]
-#[ignore = "takes minutes without optimisation; HEADRACE_PICTURES=DIR cargo test -- --ignored draw_pictures"]
-fn draw_pictures() {
-    let folder = std::path::PathBuf::from(std::env::var("HEADRACE_PICTURES").unwrap());
-    for (name, svg) in all(&dives()).unwrap() {
-        check(&svg, &[]);
-        std::fs::write(folder.join(name), svg).unwrap();
-    }
-}

@@ -13,7 +13,6 @@ mod bodies;
 mod meshes;
 mod oracle;
 mod refusals;
-mod speed;
 mod walls;
 
 /// Length of the tunnels under test, m.

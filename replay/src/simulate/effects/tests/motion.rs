@@ -1,5 +1,3 @@
-use std::time::Instant;
-
 use headrace_core::app::measurement::{Inertia, Payout, Pressure, Sounding};
 
 use crate::simulate::testing_motion::{Bench, same_in_any_slices};
@@ -77,36 +75,4 @@ fn effects_are_run_in_the_order_of_kinds_whatever_the_scene() {
     let (ahead, back): (String, String) =
         (ALONE.iter().map(|(_, e)| *e).collect(), ALONE.iter().rev().map(|(_, e)| *e).collect());
     assert_eq!(Bench::sectors(&ahead).messages(), Bench::sectors(&back).messages());
-}
-
-/// Prints what each effect costs: `cargo test --release -p headrace_replay costs -- --ignored --nocapture`.
-#[test]
-#[ignore = "prints figures"]
-#[expect(clippy::disallowed_methods, reason = "it measures time")]
-fn costs() {
-    let ns = |sensor: &str, effect: &str| {
-        let bench = Bench::long_sectors(effect);
-        let mut sim = bench.simulation();
-        if !sensor.is_empty() {
-            sim.keep_only(bench.source(sensor));
-        }
-        let begun = Instant::now();
-        let mut measured = 0;
-        while sim.next_slice() {
-            measured += sim.measured();
-            sim.forget_messages();
-        }
-        begun.elapsed().as_secs_f64() * 1e9 / measured as f64
-    };
-    for (sensor, effect) in ALONE {
-        // In turns, since the machine may be busy with other things.
-        let rounds: Vec<[f64; 2]> = (0..9).map(|_| [ns(sensor, ""), ns(sensor, effect)]).collect();
-        let [base_ns, with_ns] =
-            [0, 1].map(|which| rounds.iter().map(|round| round[which]).fold(f64::MAX, f64::min));
-        let name = effect.lines().next().unwrap_or_default();
-        println!(
-            "{name:36} {sensor:7} base {base_ns:7.0} ns, with it {with_ns:7.0} ns, more {:6.0} ns",
-            with_ns - base_ns
-        );
-    }
 }

@@ -1,7 +1,7 @@
 //! Effects together, and what they cost.
 
+use crate::simulate::TruthRow;
 use crate::simulate::testing::{Dive, Dived};
-use crate::simulate::{Simulation, TruthRow};
 
 /// Each effect of the sonars with some keys.
 const EFFECTS: [&str; 10] = [
@@ -83,36 +83,4 @@ fn tables_treat_sensors_differently() {
     assert!((first / 0.01 - 1.0).abs() < allowed && (second / 0.1 - 1.0).abs() < allowed);
     let twice = "[[effects.range_noise]]\nsd_m = 0.01\n[[effects.range_noise]]\nsd_m = 0.02\n";
     assert!(dive.refusal(twice).contains("an earlier table of this effect is for"));
-}
-
-/// Time of a dive's return, over that without the effect, ns. Run it with `--release -- --ignored --nocapture`.
-#[test]
-#[ignore = "a measurement"]
-#[expect(clippy::disallowed_methods, clippy::print_stdout, reason = "a stopwatch")]
-fn what_effects_cost() {
-    let dive = Dive {
-        seconds: 600.0,
-        tunnel: "profile = \"ceran\"",
-        ..Dive::with_heads(&[[0.5, 0.15, 0.0], [0.5, -0.15, 0.0], [-0.5, 0.15, 0.0], [-0.5, -0.15, 0.0]])
-    };
-    let time_ns = |effects: &str| {
-        let once = |_| {
-            let scene = dive.scene(effects).unwrap();
-            let mut simulation = Simulation::new(&scene).unwrap();
-            let start = std::time::Instant::now();
-            let mut messages = 0_u64;
-            while simulation.next_message().is_some() {
-                messages += 1;
-            }
-            start.elapsed().as_secs_f64() * 1e9 / (messages as f64 / 2.0)
-        };
-        (0..9).map(once).fold(f64::INFINITY, f64::min)
-    };
-    let base_ns = time_ns("");
-    println!("base {base_ns:.0}");
-    let more = ["[effects.beam_cone]\nform = \"bilinear\"\n", "[effects.interference]\n"];
-    for effects in EFFECTS.into_iter().chain(more) {
-        println!("{:+.0} {}", time_ns(effects) - base_ns, effects.replace('\n', " "));
-    }
-    println!("{:+.0} all", time_ns(&EFFECTS.concat()) - base_ns);
 }
