@@ -16,7 +16,7 @@ use crate::math;
 use crate::time::{DurNs, MonoNs};
 
 /// How long sensors are listened to.
-const LISTENS: DurNs = DurNs(1_000_000_000);
+pub const LISTENS: DurNs = DurNs(1_000_000_000);
 /// Echoes of one sounder of which the middle one is taken.
 const ECHOES: usize = 9;
 /// Standard deviations at the start: of the place in the section by echoes, and without them; of a chainage that nobody
@@ -105,7 +105,9 @@ impl Listening {
                 self.height_m = Some(site.surface_above_floor_m - site.depth_m(water.pressure_pa) - up_m);
             }
             (SensorKind::Head, Reading::Sonar(sonar)) => self.hears_wall |= sonar.range_m.is_some(),
-            (SensorKind::Echosounder { .. }, Reading::Echo(echo)) => {
+            (SensorKind::Echosounder { min_confidence }, Reading::Echo(echo))
+                if echo.confidence >= min_confidence =>
+            {
                 self.hears_wall |= echo.range_m.is_some();
                 if let (Some(range_m), Some(heard)) = (echo.range_m, self.echoes.get_mut(source)) {
                     heard.hear(sensor, site.rescaled_range_m(range_m, echo.sound_speed_mps));
@@ -122,6 +124,11 @@ impl Listening {
     /// After an estimate that was lost: its chainage, m, and how far off that may be.
     pub fn after(before: Option<(f64, f64)>) -> Self {
         Self { before, ..Self::default() }
+    }
+
+    /// The chainage of an estimate that was lost, m, and how far off that may be.
+    pub fn before(&self) -> Option<(f64, f64)> {
+        self.before
     }
 
     /// What is missing yet.

@@ -19,7 +19,7 @@ pub mod window;
 #[cfg(test)]
 mod tests;
 
-use self::align::Listening;
+use self::align::{LISTENS, Listening};
 use self::inertial::Leg;
 use self::running::{Context, Running};
 use self::settings::Settings;
@@ -177,8 +177,11 @@ impl FilterNavigation {
     /// stays; the chainage is kept until the cable is heard.
     fn begin_anew(&mut self, along_m: f64) {
         let x_m = self.running.state.position.x();
-        let before = (x_m.is_finite() && along_m.is_finite()).then_some((x_m, along_m));
-        self.listening = Listening::after(before);
+        if self.is_running && x_m.is_finite() && along_m.is_finite() {
+            self.listening = Listening::after(Some((x_m, along_m)));
+        } else {
+            self.listening = Listening::after(self.listening.before());
+        }
         self.standing = Err(self.listening.lacks());
         self.is_running = false;
         self.restarts += 1;
@@ -277,6 +280,10 @@ impl Navigation for FilterNavigation {
                 self.unit = Some(number);
                 self.context.unit_at = sensor.mount.position;
             }
+            // Nothing from before what is listened to will ever be fused.
+            let old = self.received - LISTENS;
+            self.window.drop_until(old);
+            self.window.forget(old);
             self.listening.hear(&self.context, number, sensor, times.valid, reading);
             self.standing = Err(self.listening.lacks());
             self.epoch_zero = self.listening.since().unwrap_or(times.valid);

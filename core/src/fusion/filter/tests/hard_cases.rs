@@ -68,6 +68,7 @@ fn ten_hours_of_dead_reckoning_end_with_one_precise_fix() {
         rig.check(&nav, events.last().unwrap().received, &mut tally);
     }
     assert!(nav.running().is_none() && nav.fix(at(f64::from(end_s))).is_err(), "nothing is invented");
+    assert_eq!(nav.consistency(IMU).unwrap().dropped, 0, "what nobody waits for takes no room");
     rig.run(&mut nav, &rig.events(f64::from(end_s), f64::from(end_s + 60)));
     let fix = nav.fix(at(f64::from(end_s + 60)));
     assert!(fix.is_ok(), "{fix:?} {:?}", nav.running().map(super::super::running::Running::sigmas));
