@@ -49,6 +49,7 @@ pub(crate) fn summary(report: &Report) -> String {
     let lost = [
         (rejected.missing, "pings without a return"),
         (rejected.out_of_range, "pings beyond the range setting"),
+        (rejected.occluded, "pings stopped by the vehicle itself"),
         (rejected.no_fix, "returns without a position"),
         (rejected.outside, "returns beyond the ends of the tunnel"),
         (rejected.not_stored, "returns for which there was no room"),

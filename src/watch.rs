@@ -4,9 +4,10 @@
 use std::io::IsTerminal;
 
 use headrace_core::app::Mission;
+use headrace_core::app::alerts::{Alert, AlertKind, Alerts};
 use headrace_core::app::flow::{AdviceEntry, Coverage, Notice};
 use headrace_core::app::run::Loop;
-use headrace_core::coverage::{Cause, Evidence, Judgement, Sections, Verdict};
+use headrace_core::coverage::{Action, Cause, Evidence, Run, RunChange, RunId, Section, Sections};
 use headrace_core::sampling::advice::{Reason, Remedy};
 use headrace_core::time::{DurNs, MonoNs};
 use headrace_core::tunnel::Profile;
@@ -25,33 +26,10 @@ pub(crate) struct Watch {
     terminal: bool,
     shown: Option<MonoNs>,
     status_open: bool,
-    run: Option<Run>,
+    /// The run whose flag was said last, until it is known how far it goes.
+    run: Option<RunId>,
     /// The speed advised last, m/s.
     v_max_mps: f64,
-}
-
-/// Neighbouring sections of which one thing is said.
-struct Run {
-    /// The cause of their flags, or `None` where flags were cleared.
-    cause: Option<Cause>,
-    low: i64,
-    high: i64,
-}
-
-impl Run {
-    /// Takes in a section next to the run's ends of which the same is said.
-    fn extend(&mut self, section: i64, cause: Option<Cause>) -> bool {
-        let next = self.touches(section) && self.cause == cause;
-        if next {
-            self.low = self.low.min(section);
-            self.high = self.high.max(section);
-        }
-        next
-    }
-
-    fn touches(&self, section: i64) -> bool {
-        section == self.low - 1 || section == self.high + 1
-    }
 }
 
 impl Watch {
@@ -84,13 +62,19 @@ impl Watch {
         }
         match notice {
             Notice::Advice(entry) => self.status(entry, dive.mission()),
-            Notice::Section { section, change, .. } => self.section(*section, *change, dive),
+            Notice::Section { section, .. } => self.section(*section, sections(dive)),
+            Notice::Run { id, change, .. } => self.run(*id, *change, dive),
+            Notice::Alert(kind) => {
+                if let Some(alert) = dive.world().resource::<Alerts>().get(*kind) {
+                    self.line(&alert_words(alert));
+                }
+            }
         }
     }
 
     /// The dive has ended.
     pub(crate) fn end(&mut self, dive: &Loop) {
-        self.close_run(&dive.world().resource::<Coverage>().sections);
+        self.close_run(sections(dive));
         self.close_status();
     }
 
@@ -122,46 +106,57 @@ impl Watch {
         }
     }
 
-    fn section(&mut self, section: i64, change: Judgement, dive: &Loop) {
-        let sections = &dive.world().resource::<Coverage>().sections;
-        let evidence = sections.get(section).and_then(|section| section.evidence);
-        let cause = match change {
-            Judgement::Updated => {
-                let failed = sections.get(section).is_some_and(|section| section.verdict == Verdict::Fail);
-                if !failed && self.run.as_ref().is_some_and(|run| run.touches(section)) {
-                    self.close_run(sections);
-                }
-                return;
-            }
-            Judgement::Raised => evidence.map(|evidence| evidence.cause),
-            Judgement::Cleared => None,
-        };
-        if self.run.as_mut().is_some_and(|run| run.extend(section, cause)) {
-            return;
+    /// A section that doesn't fail, next to the run said last, is its end.
+    fn section(&mut self, section: i64, sections: &Sections) {
+        let fails = sections.get(section).is_some_and(Section::is_flagged);
+        let run = self.run.and_then(|id| sections.runs().get(id));
+        if !fails && run.is_some_and(|run| section == run.to || section == run.from - 1) {
+            self.close_run(sections);
         }
-        self.close_run(sections);
-        self.run = Some(Run { cause, low: section, high: section });
-        let Some(evidence) = evidence.filter(|_| cause.is_some()) else { return };
-        let start_m = sections.bounds_m(section).0;
-        let clock = sections
-            .get(section)
-            .and_then(|section| section.hole)
-            .map_or_else(String::new, |hole| dive.mission().profile.clock(hole.sigma_m));
+    }
+
+    fn run(&mut self, id: RunId, change: RunChange, dive: &Loop) {
+        let sections = sections(dive);
+        let Some(run) = sections.runs().get(id) else { return };
+        match change {
+            RunChange::Raised => {
+                self.close_run(sections);
+                self.run = Some(id);
+                self.flag(run, dive);
+            }
+            RunChange::Cleared => {
+                // What has only turned out to have another cause is told as that.
+                if !(run.from..run.to).filter_map(|index| sections.get(index)).any(Section::is_flagged) {
+                    let (from_m, to_m) = (sections.bounds_m(run.from).0, sections.bounds_m(run.to - 1).1);
+                    self.line(&format!("cleared  ch {} to {}", station(from_m), station(to_m)));
+                }
+            }
+            RunChange::Changed | RunChange::Merged => {}
+        }
+    }
+
+    fn flag(&mut self, run: &Run, dive: &Loop) {
+        let sections = sections(dive);
+        let Some(evidence) = sections.get(run.worst.0).and_then(|section| section.evidence) else { return };
+        let start_m = sections.bounds_m(run.from).0;
         self.line(&format!(
-            "FLAG     ch {}  {}: holes over {} m at {clock} o'clock; {}",
+            "FLAG     ch {}  {}: holes over {} m at {} o'clock; {}",
             station(start_m),
             cause_words(&evidence),
             sections.target_m(),
+            dive.mission().profile.clock(run.worst.1.sigma_m),
             self.what_to_do(&evidence, start_m),
         ));
     }
 
     /// What a pilot does about a missed stretch, with the speed that is advised now.
     fn what_to_do(&self, evidence: &Evidence, start_m: f64) -> String {
-        match evidence.cause {
-            Cause::AngularStep => "slower won't help, a finer mode will".to_owned(),
-            Cause::NotPassed => "pass it again from end to end".to_owned(),
-            Cause::OutOfRange => "set a longer range".to_owned(),
+        match Action::of(evidence.cause) {
+            Action::FinerMode => "slower won't help, a finer mode will".to_owned(),
+            Action::LongerRange => "set a longer range".to_owned(),
+            Action::Again if evidence.cause == Cause::NotPassed => "pass it again from end to end".to_owned(),
+            Action::OtherSide => format!("pass {} again turned or rolled", station(start_m)),
+            Action::Position => format!("pass {} again once the position is back", station(start_m)),
             _ if self.v_max_mps > 0.0 => {
                 format!("go back to {}, then at most {:.2} m/s", station(start_m), self.v_max_mps)
             }
@@ -171,16 +166,15 @@ impl Watch {
 
     /// Says how far the run went, once that is known.
     fn close_run(&mut self, sections: &Sections) {
-        let Some(run) = self.run.take() else { return };
-        let what = if run.cause.is_some() { "   ...  " } else { "cleared " };
-        let (from_m, to_m) = (sections.bounds_m(run.low).0, sections.bounds_m(run.high).1);
-        self.line(&format!("{what} ch {} to {}", station(from_m), station(to_m)));
+        let Some(run) = self.run.take().and_then(|id| sections.runs().get(id)) else { return };
+        let (from_m, to_m) = (sections.bounds_m(run.from).0, sections.bounds_m(run.to - 1).1);
+        self.line(&format!("   ...   ch {} to {}", station(from_m), station(to_m)));
     }
 
     fn line(&mut self, text: &str) {
         self.close_status();
         let colour =
-            if self.terminal && text.starts_with("FLAG") { ("\x1b[1;31m", "\x1b[0m") } else { ("", "") };
+            if self.terminal && (text.starts_with("FLAG") || text.starts_with("ALERT")) { ("\x1b[1;31m", "\x1b[0m") } else { ("", "") };
         say(&format!("{}{text}{}", colour.0, colour.1));
     }
 
@@ -189,6 +183,22 @@ impl Watch {
             say("");
             self.status_open = false;
         }
+    }
+}
+
+fn sections(dive: &Loop) -> &Sections {
+    &dive.world().resource::<Coverage>().sections
+}
+
+fn alert_words(alert: &Alert) -> String {
+    let (x, off_m) = (station(alert.x_m), alert.worst_m);
+    match alert.kind {
+        AlertKind::OutsideTunnel => {
+            format!("ALERT    ch {x}  samples {off_m:.2} m outside the tunnel: is the tether's zero right?")
+        }
+        AlertKind::ProfileContradicted => format!(
+            "ALERT    ch {x}  the wall is {off_m:+.2} m off the design profile: wrong profile or position; nothing passes"
+        ),
     }
 }
 
@@ -234,6 +244,12 @@ pub(crate) fn cause_words(evidence: &Evidence) -> String {
         Cause::AngularStep => format!("steps of {:.2} m along the wall", evidence.t_y_m),
         Cause::MissingReturns => format!("{:.0} % of returns missing", evidence.missing_share * 100.0),
         Cause::OutOfRange => "wall out of range".to_owned(),
+        Cause::Occluded => "the vehicle in the beams' way".to_owned(),
+        Cause::OffAxis if evidence.swing_m > evidence.t_y_m - evidence.middle_t_y_m => {
+            format!("beams swung {:.1} m between turns (yaw or pitch)", evidence.swing_m)
+        }
+        Cause::OffAxis => format!("off the middle (steps of {:.2} m along the wall)", evidence.t_y_m),
+        Cause::HeadStalled => "a head stood still".to_owned(),
         Cause::Phase => format!("heads out of phase ({:.2} m/s)", evidence.speed_mps),
         Cause::PositionLost => "position lost".to_owned(),
         Cause::NotPassed => "not passed on both sides".to_owned(),

@@ -7,13 +7,15 @@
 use bevy_ecs::entity::Entity;
 use bevy_ecs::prelude::Resource;
 
+use super::alerts::AlertKind;
 use super::digest::Digest;
 use super::reading::{Reading, SourceId};
-use crate::coverage::{Frontier, HoleFinder, Judgement, Request, SampleStore, Sections};
+use crate::coverage::{Frontier, HoleFinder, Judgement, Loss, RunChange, RunId, Request, SampleStore, Sections};
 use crate::frames::{Point3, Tunnel};
 use crate::fusion::{Fix, Navigation, NoFix, SensorInfo};
 use crate::sampling::advice::Advice;
 use crate::sampling::layout::HeadLayout;
+use crate::sampling::occlusion::AngleRange;
 use crate::sampling::passes::Situation;
 use crate::site::Site;
 use crate::time::{DurNs, MonoNs};
@@ -75,12 +77,19 @@ pub enum Outcome {
         /// Its arc length, m.
         sigma_m: f64,
     },
-    /// No return, where the wall was within range.
-    Missing,
-    /// No return, where the wall was beyond the range setting.
-    OutOfRange,
+    /// No return from where one should have come, for a reason; nobody knows where that was without a fix.
+    Lost(Loss, Option<Aim>),
     /// A return that could not be placed.
     Unplaced(NoFix),
+}
+
+/// Where a beam meets the wall by design.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Aim {
+    /// Chainage, m.
+    pub x_m: f64,
+    /// Arc length, m.
+    pub sigma_m: f64,
 }
 
 /// A ping with its place.
@@ -100,6 +109,8 @@ pub struct PlacedPing {
     pub single_step: bool,
     /// A new sweep has begun.
     pub new_sweep: bool,
+    /// The head stands still.
+    pub standing: bool,
     /// What became of it.
     pub outcome: Outcome,
 }
@@ -135,6 +146,17 @@ pub enum Notice {
         /// What has changed.
         change: Judgement,
     },
+    /// A run of flagged sections has changed.
+    Run {
+        /// Its number.
+        id: RunId,
+        /// The moment, in data time.
+        at: MonoNs,
+        /// What has changed.
+        change: RunChange,
+    },
+    /// Something is wrong that wasn't before.
+    Alert(AlertKind),
     /// How fast one may go.
     Advice(AdviceEntry),
 }
@@ -154,6 +176,10 @@ pub struct Place {
     pub target_m: f64,
     /// How the heads share the work.
     pub layout: HeadLayout,
+    /// Length of the tunnel, m.
+    pub length_m: f64,
+    /// Samples farther than this from the design profile contradict it, m.
+    pub contradiction_m: f64,
 }
 
 /// What navigation knows of each source, by source.
@@ -163,6 +189,10 @@ pub struct SensorTable(pub Vec<SensorInfo>);
 /// For each source the number and entity of its head, where it is one.
 #[derive(Debug, Resource)]
 pub struct HeadTable(pub Vec<Option<(usize, Entity)>>);
+
+/// By number of the head, the angles that the vehicle hides from it, in its own frame.
+#[derive(Debug, Resource)]
+pub struct HiddenAngles(pub Vec<Vec<AngleRange>>);
 
 /// Navigation, and the next beat.
 #[derive(Resource)]
@@ -212,6 +242,8 @@ pub struct Tally {
     pub missing: u64,
     /// Pings without a return where the wall was out of range.
     pub out_of_range: u64,
+    /// Pings that the vehicle itself stopped.
+    pub occluded: u64,
     /// Returns without a fix.
     pub unplaced: u64,
     /// Samples outside the stretch that is kept.

@@ -22,6 +22,8 @@ pub struct Turned {
     pub single_step: bool,
     /// The head has turned round, or its motion isn't known: a new sweep begins.
     pub new_sweep: bool,
+    /// The head has stood still for longer than it ever does between two pings.
+    pub standing: bool,
 }
 
 /// The motion of one head as measured: state of the loop.
@@ -73,13 +75,14 @@ impl HeadTrack {
         let Some((last, before)) = self.last else {
             self.last = Some((at, angle_rad));
             self.anchors = [Some((at, 0.0)), None];
-            return Turned { single_step: false, new_sweep: true };
+            return Turned { single_step: false, new_sweep: true, standing: false };
         };
         let step = math::wrap_signed(angle_rad - before, TAU);
         let size = step.abs();
         if size < SAME_ANGLE_RAD {
             // A head that stands still has not turned: `last` grows old, and the rate stays what it was.
-            return Turned { single_step: false, new_sweep: false };
+            let standing = at.since(last).as_secs_f64() > self.stands_after_s();
+            return Turned { single_step: false, new_sweep: false, standing };
         }
         self.last = Some((at, angle_rad));
         if at.since(last).0.abs() > STANDING.0 {
@@ -103,7 +106,14 @@ impl HeadTrack {
         self.turned_rad += size;
         self.move_anchors(at);
         let usual = self.step_rad.unwrap_or(size);
-        Turned { single_step: !reversed && size < LONG_STEP * usual, new_sweep: reversed }
+        let single_step = !reversed && size < LONG_STEP * usual;
+        Turned { single_step, new_sweep: reversed, standing: false }
+    }
+
+    /// How long the same angle is no standing still yet, seconds: four pings.
+    fn stands_after_s(&self) -> f64 {
+        let ping_period_s = self.step_rad.zip(self.rate_radps()).map(|(step, rate)| step / rate.abs());
+        ping_period_s.map_or(STANDING.as_secs_f64(), |period_s| 4.0 * period_s)
     }
 
     /// Keeps two anchors half a turn apart, so that the older is always between a half and a whole turn back.

@@ -1,5 +1,6 @@
 //! The loop: sources, merge, stages, and what plugins add to them.
 
+pub mod alerts;
 pub mod components;
 pub mod device;
 pub mod digest;
@@ -21,7 +22,7 @@ use bevy_ecs::schedule::{IntoScheduleConfigs, Schedule};
 use bevy_ecs::system::ScheduleSystem;
 use bevy_ecs::world::World;
 
-use crate::config::SensorConfig;
+use crate::config::{CoverageConfig, SensorConfig};
 use crate::fusion::Navigation;
 use crate::sampling::layout::HeadLayout;
 use crate::sampling::occlusion::Obstacle;
@@ -81,6 +82,8 @@ pub struct Mission {
     pub layout: HeadLayout,
     /// Parts of the vehicle that may stand in a head's way, besides the other heads.
     pub hull: Vec<Obstacle>,
+    /// How the wall is judged, and where there is none.
+    pub coverage: CoverageConfig,
     /// How long the dive may take from its first packet; `None` when nobody has said.
     pub dive_time: Option<DurNs>,
 }
@@ -96,6 +99,7 @@ impl Mission {
             length_m: 100.0,
             layout: HeadLayout::PhaseShift,
             hull: Vec::new(),
+            coverage: CoverageConfig::default(),
             dive_time: None,
         }
     }

@@ -36,6 +36,14 @@ pub enum PluginError {
         /// The limit.
         max: usize,
     },
+    /// A declared opening can't be laid out.
+    #[error("arming the loop: opening {name:?}: {why}")]
+    Opening {
+        /// The opening.
+        name: String,
+        /// What is wrong with it.
+        why: String,
+    },
     /// The schedule of systems can't be built.
     #[error("arming the loop: {why}")]
     Schedule {

@@ -1,19 +1,20 @@
 //! The armed loop.
 
 use bevy_ecs::schedule::Schedule;
-use bevy_ecs::world::World;
+use bevy_ecs::world::{Mut, World};
 
+use super::alerts::Alerts;
 use super::components::{DepthSensor, Echosounder, Imu, Mounted, SonarHead, Tether};
 use super::digest::Digest;
 use super::flow::{
-    AdviceLog, Coverage, Digests, Events, Finder, HeadTable, MAX_TICK_READINGS, Navigator, Notices, Place,
+    AdviceLog, Coverage, Digests, Events, Finder, HeadTable, HiddenAngles, MAX_TICK_READINGS, Navigator, Notices, Place,
     PlacedList, PositionedList, Requests, SensorTable, SourceTallies, Tally, TickTime,
 };
 use super::head::HeadTrack;
 use super::merge::{Inbox, MAX_TICK_PACKETS};
 use super::plugin::PluginError;
 use super::ring::{Port, PortReader};
-use super::stages::{Advisor, Decoders, HeadSweeps, judge_one};
+use super::stages::{Advisor, Decoders, Driving, HeadSweeps, Results, judge_one};
 use super::{App, MAX_SOURCES, Mission, SourceInfo};
 use crate::coverage::{Frontier, SampleStore, Sections, StoreLayout};
 use crate::fusion::{Navigation, SensorInfo, SensorKind};
@@ -27,6 +28,9 @@ const ROOM_BEYOND_M: f64 = 25.0;
 const SAMPLES_PER_M: f64 = 4_000.0;
 const MIN_SAMPLES: f64 = 4_000_000.0;
 const MAX_SAMPLES: f64 = 16_000_000.0;
+
+/// A section that is judged may change its run and two others, and raise an alert.
+const NOTICES_EACH: usize = 5;
 
 /// A loop that runs. All memory is allocated; a tick takes no lock, makes no system call and formats nothing.
 pub struct Loop {
@@ -52,33 +56,36 @@ impl Loop {
         world.insert_resource(PlacedList(Vec::with_capacity(2 * MAX_TICK_READINGS)));
         world.insert_resource(Navigator { navigation, next_beat: None });
         world.insert_resource(HeadSweeps::default());
+        world.insert_resource(Driving::default());
         world.insert_resource(Finder::default());
+        world.insert_resource(Alerts::default());
         let task = Task {
             target_m: mission.target_m,
             length_m: mission.length_m,
             layout: mission.layout,
             sound_speed_mps: mission.site.sound_speed_mps,
         };
-        world.insert_resource(Advisor {
-            advisor: advice::Advisor::new(&mission.profile, task, &specs, &mission.hull),
-            dive_time: mission.dive_time,
-        });
+        let advisor = advice::Advisor::new(&mission.profile, task, &specs, &mission.hull);
+        world.insert_resource(HiddenAngles(advisor.hidden_angles().map(<[_]>::to_vec).collect()));
+        world.insert_resource(Advisor { advisor, dive_time: mission.dive_time });
         world.insert_resource(AdviceLog::default());
         world.insert_resource(Digests::default());
         world.insert_resource(Tally::default());
         world.insert_resource(TickTime::default());
         world.insert_resource(SourceTallies::new(sources.len()));
-        let coverage = coverage(&mission);
+        let coverage = coverage(&mission)?;
         // A jump along the tunnel may ask for every section at once.
         let most = coverage.sections.len() + MAX_TICK_PACKETS;
         world.insert_resource(Requests(Vec::with_capacity(most)));
-        world.insert_resource(Notices(Vec::with_capacity(most + MAX_TICK_PACKETS)));
+        world.insert_resource(Notices(Vec::with_capacity(NOTICES_EACH * most + MAX_TICK_PACKETS)));
         world.insert_resource(coverage);
         world.insert_resource(Place {
             profile: mission.profile.clone(),
             site: mission.site,
             target_m: mission.target_m,
             layout: mission.layout,
+            length_m: mission.length_m,
+            contradiction_m: mission.coverage.contradiction_m,
         });
         schedule
             .initialize(&mut world)
@@ -142,24 +149,27 @@ impl Loop {
     /// Judges what is still open: the dive has ended, and no sample will come. Gives the notices of it.
     pub fn finish(&mut self) -> Vec<super::flow::Notice> {
         let at = self.world.resource::<Tally>().span.map_or(MonoNs(0), |(_, last)| last);
-        let mut requests = Vec::new();
-        self.world.resource_scope(|world, mut coverage: bevy_ecs::world::Mut<'_, Coverage>| {
-            let Coverage { store, sections, frontier } = &mut *coverage;
-            sections.unsettled(frontier, store.len(), at, &mut |request| requests.push(request));
-            world.resource_scope(|world, mut finder: bevy_ecs::world::Mut<'_, Finder>| {
-                world.resource_scope(|world, mut notices: bevy_ecs::world::Mut<'_, Notices>| {
-                    notices.0.clear();
-                    let mut digests = world.resource_mut::<Digests>();
-                    for request in &requests {
-                        judge_one(
-                            request,
-                            &self.mission.profile,
-                            &mut coverage,
-                            &mut finder,
-                            &mut notices,
-                            &mut digests,
-                        );
-                    }
+        let profile = &self.mission.profile;
+        let world = &mut self.world;
+        world.resource_scope(|world, mut coverage: Mut<'_, Coverage>| {
+            world.resource_scope(|world, mut finder: Mut<'_, Finder>| {
+                world.resource_scope(|world, mut notices: Mut<'_, Notices>| {
+                    world.resource_scope(|world, mut alerts: Mut<'_, Alerts>| {
+                        notices.0.clear();
+                        let mut requests = Vec::new();
+                        let Coverage { store, sections, frontier } = &mut *coverage;
+                        sections.unsettled(frontier, store.len(), at, &mut |request| requests.push(request));
+                        let mut digests = world.resource_mut::<Digests>();
+                        let mut results = Results {
+                            finder: &mut finder,
+                            notices: &mut notices,
+                            digests: &mut digests,
+                            alerts: &mut alerts,
+                        };
+                        for request in &requests {
+                            judge_one(request, profile, &mut coverage, &mut results);
+                        }
+                    });
                 });
             });
         });
@@ -192,19 +202,26 @@ impl Loop {
     }
 }
 
-fn coverage(mission: &Mission) -> Coverage {
+fn coverage(mission: &Mission) -> Result<Coverage, PluginError> {
     let (from_m, to_m) = (-ROOM_BEYOND_M, mission.length_m + ROOM_BEYOND_M);
     let samples =
         crate::math::round_to_i64(((to_m - from_m) * SAMPLES_PER_M).clamp(MIN_SAMPLES, MAX_SAMPLES));
-    let store = SampleStore::new(StoreLayout {
+    let mut store = SampleStore::new(StoreLayout {
         perimeter_m: mission.profile.perimeter_m(),
         from_m,
         to_m,
         cell_m: StoreLayout::cell_for_target_m(mission.target_m),
         capacity: u32::try_from(samples).unwrap_or(u32::MAX),
     });
-    let sections = Sections::new(mission.section_m, mission.target_m, 0.0, mission.length_m);
-    Coverage { store, sections, frontier: Frontier::default() }
+    let mut sections = Sections::new(mission.section_m, mission.target_m, 0.0, mission.length_m);
+    for opening in &mission.coverage.openings {
+        let name = || opening.name.clone();
+        opening
+            .fill(&mut store, mission.target_m)
+            .map_err(|why| PluginError::Opening { name: name(), why: why.to_string() })?;
+        sections.mask(opening, &mission.profile);
+    }
+    Ok(Coverage { store, sections, frontier: Frontier::default() })
 }
 
 /// What stages look up by source: navigation's view of each sensor, and the number and entity of each head; and the

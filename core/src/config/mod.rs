@@ -1,9 +1,11 @@
 //! Files that people write, from text to checked values. Reading the file itself is the caller's.
 
 mod changes;
+mod coverage;
 mod reader;
 pub mod vehicle;
 
 pub use changes::changed;
+pub use coverage::CoverageConfig;
 pub use reader::{ConfigError, Document, Section};
 pub use vehicle::{SensorConfig, TunnelConfig, VehicleConfig, WaterConfig};

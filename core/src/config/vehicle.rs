@@ -2,6 +2,7 @@
 
 use core::cell::RefCell;
 
+use super::coverage::CoverageConfig;
 use super::reader::{ConfigError, Document, Section};
 use crate::app::Mission;
 use crate::app::device::{Device, DeviceKind};
@@ -34,6 +35,8 @@ pub struct VehicleConfig {
     pub planned_speed_mps: f64,
     /// Parts of the vehicle that may stand in a head's way.
     pub hull: Vec<Obstacle>,
+    /// How the wall is judged.
+    pub coverage: CoverageConfig,
     /// How it navigates.
     pub navigation: NavigationConfig,
     /// How long the dive may take.
@@ -135,6 +138,7 @@ impl VehicleConfig {
             None => Site { axis_yaw_rad, ..Site::default() },
         };
         let navigation = NavigationConfig::parse(root.section("navigation")?)?;
+        let coverage = CoverageConfig::from_root(root, &tunnel.profile, target_m)?;
         let dive_time = root.number("dive_hours", 0.01..=1000.0)?;
         let hull = root.sections("hull")?.into_iter().map(parse_hull).collect::<Result<Vec<_>, _>>()?;
         let mut sensors = Vec::new();
@@ -163,6 +167,7 @@ impl VehicleConfig {
             layout,
             planned_speed_mps,
             hull,
+            coverage,
             navigation,
             dive_time: dive_time.map(|hours| DurNs::from_secs_f64(hours * 3600.0)),
             sensors,
@@ -183,6 +188,7 @@ impl VehicleConfig {
             length_m: self.tunnel.length_m,
             layout: self.layout,
             hull: self.hull.clone(),
+            coverage: self.coverage.clone(),
             dive_time: self.dive_time,
         }
     }

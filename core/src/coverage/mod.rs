@@ -1,13 +1,23 @@
 //! Coverage: samples on the unrolled wall, the holes between them, and the verdict on each section.
 
+pub mod action;
 pub mod cause;
+pub mod deviation;
 pub mod frontier;
 pub mod hole;
+pub mod openings;
+pub mod passage;
+pub mod runs;
+pub mod section;
 pub mod sections;
 pub mod store;
 
+pub use action::Action;
 pub use cause::{Cause, Evidence};
 pub use frontier::{Frontier, Reach};
 pub use hole::{Hole, HoleFinder};
-pub use sections::{Doubt, Judgement, Passage, Request, Section, Sections, Spread, Verdict};
+pub use passage::{Doubt, Loss, Passage};
+pub use runs::{Run, RunChange, RunId, Runs};
+pub use section::{Judgement, Section, Spread, Verdict};
+pub use sections::{Judging, Request, Sections};
 pub use store::{SampleIndex, SampleStore, StoreError, StoreLayout, WallSample};

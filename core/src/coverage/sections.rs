@@ -2,179 +2,16 @@
 
 use core::ops::Range;
 
-use super::cause::{Evidence, explain};
+use super::cause::{Case, Evidence, explain};
 use super::frontier::{Frontier, Moved, Reach};
+use super::openings::Opening;
 use super::hole::{FARTHEST_M, Hole, HoleFinder};
+use super::runs::{RunChange, RunId, Runs, Telling};
+use super::section::{Judgement, Section, Verdict};
 use super::store::{SampleIndex, SampleStore};
-use crate::frames::Vec3;
-use crate::fusion::relative::Relative;
 use crate::math;
 use crate::time::MonoNs;
 use crate::tunnel::Profile;
-
-/// What is said of a section. Source: metrics.md, "Sections and verdicts".
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Verdict {
-    /// Samples may still come without turning back.
-    #[default]
-    Open,
-    /// D + 2 sigma_D <= T.
-    Pass,
-    /// D - 2 sigma_D > T.
-    Fail,
-    /// Neither can be said for sure.
-    CannotSay,
-}
-
-impl Verdict {
-    /// The word used in reports and logs.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Self::Open => "open",
-            Self::Pass => "pass",
-            Self::Fail => "fail",
-            Self::CannotSay => "cannot_say",
-        }
-    }
-}
-
-/// Count, mean and extremes of a quantity.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Spread {
-    /// Values.
-    pub count: u32,
-    /// Their sum.
-    pub sum: f64,
-    /// The sum of their squares.
-    pub sum_of_squares: f64,
-    /// The smallest.
-    pub min: f64,
-    /// The largest.
-    pub max: f64,
-}
-
-impl Default for Spread {
-    fn default() -> Self {
-        Self { count: 0, sum: 0.0, sum_of_squares: 0.0, min: f64::INFINITY, max: f64::NEG_INFINITY }
-    }
-}
-
-impl Spread {
-    /// Takes a value in.
-    pub fn add(&mut self, value: f64) {
-        self.count += 1;
-        self.sum += value;
-        self.sum_of_squares += value * value;
-        self.min = self.min.min(value);
-        self.max = self.max.max(value);
-    }
-
-    /// Takes in all that another has seen.
-    pub fn merge(&mut self, other: &Self) {
-        self.count += other.count;
-        self.sum += other.sum;
-        self.sum_of_squares += other.sum_of_squares;
-        self.min = self.min.min(other.min);
-        self.max = self.max.max(other.max);
-    }
-
-    /// Mean; `None` without values.
-    pub fn mean(&self) -> Option<f64> {
-        (self.count > 0).then(|| self.sum / f64::from(self.count))
-    }
-
-    /// Standard deviation of the values themselves; `None` without values.
-    pub fn sd(&self) -> Option<f64> {
-        let mean = self.mean()?;
-        Some(math::sqrt((self.sum_of_squares / f64::from(self.count) - mean * mean).max(0.0)))
-    }
-}
-
-/// What the pings made within a section say of how it was passed.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Passage {
-    /// All pings, whatever came of them.
-    pub pings: u32,
-    /// Pings made where the vehicle's place was known.
-    pub placed: u32,
-    /// Pings without a return where the wall was within range, or its place not known.
-    pub missing: u32,
-    /// Pings without a return where the wall was farther than the range setting.
-    pub out_of_range: u32,
-    /// Returns that could not be placed.
-    pub unplaced: u32,
-    /// Sum of the speeds at the pings, m/s.
-    pub speed_sum_mps: f64,
-    /// Sum of the times between passes, seconds.
-    pub pass_gap_sum_s: f64,
-    /// Sum of what those times would have been, spread evenly, seconds.
-    pub even_gap_sum_s: f64,
-    /// Sum of the times between pings, seconds.
-    pub ping_period_sum_s: f64,
-    /// The largest T_y that geometry predicted, m.
-    pub t_y_m: f64,
-    /// How far one pass may be off against another.
-    pub doubt: Doubt,
-}
-
-/// The largest hole of a section is looked for where errors have made it large: so much more is it off than the distance of
-/// two passes at one place. Measured over the field dives of `tests/fusion.rs`.
-const LARGEST_OF_MANY: f64 = 1.2;
-
-/// How far the samples of a pass may be off along the tunnel against those of the pass before.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Doubt {
-    /// The errors that move them.
-    pub relative: Relative,
-    /// Where the vehicle was in the cross-section, m.
-    pub from_m: [f64; 2],
-}
-
-impl Doubt {
-    /// Keeps the larger of the two.
-    pub fn add(&mut self, other: &Self) {
-        if other.relative.sigma_m(Vec3::zero()) >= self.relative.sigma_m(Vec3::zero()) {
-            *self = *other;
-        }
-    }
-
-    /// Standard deviation of the diameter of a hole there on the wall, m: one edge of it is a pass, the other edge the next.
-    pub fn sigma_m(&self, wall_m: [f64; 2]) -> f64 {
-        LARGEST_OF_MANY
-            * self.relative.sigma_m(Vec3::new(0.0, wall_m[0] - self.from_m[0], wall_m[1] - self.from_m[1]))
-    }
-}
-
-/// One section.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Section {
-    /// The verdict so far.
-    pub verdict: Verdict,
-    /// The hole as last measured.
-    pub hole: Option<Hole>,
-    /// Standard deviation of the hole's diameter, m.
-    pub hole_sigma_m: f64,
-    /// Whether no later sample on the way forward can change the verdict, nor the hole of a fail.
-    pub settled: bool,
-    /// When the fail was flagged.
-    pub flagged: Option<MonoNs>,
-    /// When a later pass filled the hole.
-    pub cleared: Option<MonoNs>,
-    /// Why it failed.
-    pub evidence: Option<Evidence>,
-    /// How it was passed.
-    pub passage: Passage,
-    /// T_x of its samples, m.
-    pub t_x_m: Spread,
-    /// T_y of its samples, m.
-    pub t_y_m: Spread,
-    /// T of its samples, m.
-    pub t_m: Spread,
-    /// Samples on its wall.
-    pub samples: u32,
-    /// Samples have come within the target of it since it was last judged.
-    stale: bool,
-}
 
 /// Asks for a section to be judged as of a moment.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -191,24 +28,26 @@ pub struct Request {
     pub settles: bool,
 }
 
-/// What judging a section has changed.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Judgement {
-    /// The verdict or the hole has a new value.
-    Updated,
-    /// A flag was raised.
-    Raised,
-    /// A flag was cleared.
-    Cleared,
+/// What judging looks at, and who hears of the runs that it changes.
+pub struct Judging<'a> {
+    /// The samples.
+    pub store: &'a SampleStore,
+    /// The search, with its memory.
+    pub finder: &'a mut HoleFinder,
+    /// The design profile.
+    pub profile: &'a Profile,
+    /// Hears of every run that changes.
+    pub tell: &'a mut dyn FnMut(RunId, RunChange),
 }
 
-/// All sections of the stretch of tunnel that the store covers.
+/// All sections of the stretch of tunnel that the store covers, and the runs of those that are flagged.
 #[derive(Debug, Clone)]
 pub struct Sections {
     section_m: f64,
     target_m: f64,
     first: i64,
     sections: Vec<Section>,
+    runs: Runs,
 }
 
 impl Sections {
@@ -219,7 +58,24 @@ impl Sections {
         let first = math::floor_to_i64(from_m / section_m);
         let end = -math::floor_to_i64(-to_m / section_m);
         let count = usize::try_from(end - first).unwrap_or(0);
-        Self { section_m, target_m, first, sections: vec![Section::default(); count] }
+        let runs = Runs::new(first, count, section_m);
+        Self { section_m, target_m, first, sections: vec![Section::default(); count], runs }
+    }
+
+    /// The runs of flagged sections.
+    pub fn runs(&self) -> &Runs {
+        &self.runs
+    }
+
+    /// Leaves a declared opening out of the sections that it lies in.
+    pub fn mask(&mut self, opening: &Opening, profile: &Profile) {
+        for index in self.index_of(opening.from_m)..=self.index_of(opening.to_m) {
+            let (from_m, to_m) = self.bounds_m(index);
+            let share = opening.share_of(from_m, to_m, profile);
+            if let Some(section) = self.get_mut(index) {
+                section.masked_share = (section.masked_share + share).min(1.0);
+            }
+        }
     }
 
     /// How many sections there are.
@@ -326,46 +182,49 @@ impl Sections {
     /// Measures a section's hole and says what it means.
     ///
     /// Allocates: never.
-    pub fn judge(
-        &mut self,
-        request: &Request,
-        store: &SampleStore,
-        finder: &mut HoleFinder,
-        profile: &Profile,
-    ) -> Option<Judgement> {
+    pub fn judge(&mut self, request: &Request, judging: &mut Judging<'_>) -> Option<Judgement> {
         let (from_m, to_m) = self.bounds_m(request.section);
         let target_m = self.target_m;
         let section = self.get_mut(request.section)?;
-        let hole = finder.largest(store, from_m, to_m, request.as_of);
-        let sigma_m = section.passage.doubt.sigma_m(profile.point_at(hole.sigma_m));
+        let hole = judging.finder.largest(judging.store, from_m, to_m, request.as_of);
+        let sigma_m = section.passage.doubt.sigma_m(judging.profile.point_at(hole.sigma_m));
         section.hole = Some(hole);
         section.hole_sigma_m = sigma_m;
-        section.verdict = verdict(&hole, sigma_m, target_m);
+        section.verdict = match verdict(&hole, sigma_m, target_m) {
+            Verdict::Pass if section.is_doubtful() => Verdict::CannotSay,
+            verdict => verdict,
+        };
         // Of a hole no larger than the target, nothing can come nearer than its own edge.
         section.settled = request.settles || section.verdict == Verdict::Pass;
-        let flagged = section.flagged.is_some() && section.cleared.is_none();
         if section.verdict == Verdict::Fail {
-            let evidence = self.explain(&hole, request.swept_by_all);
-            let section = self.get_mut(request.section)?;
-            section.evidence = Some(evidence);
-            if !flagged {
-                section.flagged = Some(request.at);
-                section.cleared = None;
-                return Some(Judgement::Raised);
-            }
-        } else if flagged && section.verdict == Verdict::Pass {
-            section.cleared = Some(request.at);
-            return Some(Judgement::Cleared);
+            let evidence = self.explain(&hole, request.swept_by_all, judging.profile.perimeter_m());
+            self.get_mut(request.section)?.evidence = Some(evidence);
         }
-        Some(Judgement::Updated)
+        let judgement = self.get_mut(request.section)?.flag(request.at);
+        self.tell_runs(request, judging);
+        Some(judgement)
     }
 
-    /// The cause of a hole: that of the worst passage among the sections that it touches.
-    fn explain(&self, hole: &Hole, swept_by_all: Option<Reach>) -> Evidence {
+    /// Puts a flagged section into its run, and one whose flag was cleared out of it.
+    fn tell_runs(&mut self, request: &Request, judging: &mut Judging<'_>) {
+        let Self { sections, runs, first, .. } = self;
+        let get = |index: i64| sections.get(usize::try_from(index - *first).ok()?);
+        let flagged = get(request.section).filter(|section| section.is_flagged());
+        let cause = flagged.and_then(|section| section.evidence).map(|evidence| evidence.cause);
+        if cause.is_none() && runs.of(request.section).is_none() {
+            return;
+        }
+        let hole = |index: i64| get(index)?.hole;
+        runs.set(request.section, cause, &mut Telling { at: request.at, hole: &hole, tell: judging.tell });
+    }
+
+    /// The cause of a hole, from the passages of the sections that it touches.
+    fn explain(&self, hole: &Hole, swept_by_all: Option<Reach>, perimeter_m: f64) -> Evidence {
         let radius_m = hole.diameter_m / 2.0;
         let touched = self.index_of(hole.x_m - radius_m)..self.index_of(hole.x_m + radius_m) + 1;
-        let passages = touched.filter_map(|index| self.get(index)).map(|section| &section.passage);
-        explain(&passages, hole, swept_by_all, self.target_m)
+        let passages =
+            touched.filter_map(|index| Some((self.bounds_m(index), &self.get(index)?.passage)));
+        explain(&Case { hole, swept_by_all, target_m: self.target_m, perimeter_m }, &passages)
     }
 
     /// Calls `ask` for every section that was passed and isn't settled, at the end of a dive.

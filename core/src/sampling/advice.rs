@@ -8,6 +8,7 @@ use super::passes::{self, Passes, Phasing, Situation};
 use super::ring::{Ring, Standing};
 use super::strips::{Arc, Going, Strips, View};
 use crate::frames::{Point3, Pose, Rot};
+use crate::math;
 use crate::tunnel::Profile;
 
 /// Share of the speed kept back for the error of its measurement.
@@ -191,6 +192,8 @@ pub struct Advisor {
     modes: Strips,
     /// The largest steps in each mode in the middle of the tunnel, m.
     centred_m: Vec<f64>,
+    /// What the first head sees from there.
+    middle: Ring,
     parallax_rad: f64,
     /// How many soundings of its ring the step of each head that turns passes over.
     strides: [Option<usize>; MAX_HEADS],
@@ -242,6 +245,7 @@ impl Advisor {
             now: Strips::with_room(arcs, 1, RING),
             modes: Strips::with_room(arcs, MAX_MODES, RING),
             centred_m: Vec::new(),
+            middle: Ring::default(),
             parallax_rad: 0.0,
             strides: [None; MAX_HEADS],
             next: 0,
@@ -266,9 +270,24 @@ impl Advisor {
         self.now.rebuild(self.profile.perimeter_m(), &self.views);
         self.measure_modes();
         self.centred_m = (0..MAX_MODES).map(|mode| self.modes.largest_step_m(mode)).collect();
+        self.middle = self.heads.first().map(|head| head.ring.clone()).unwrap_or_default();
         for head in &mut self.heads {
             head.cast_at = None;
         }
+    }
+
+    /// The angles that the vehicle hides from each head, in the heads' own frames.
+    pub fn hidden_angles(&self) -> impl Iterator<Item = &[AngleRange]> {
+        self.heads.iter().map(|head| head.hidden.as_slice())
+    }
+
+    /// The largest distance along the wall of two pings `step_rad` apart, from the middle of the tunnel, level, m.
+    ///
+    /// Allocates: never.
+    pub fn middle_step_m(&self, step_rad: f64) -> f64 {
+        let pairs = self.middle.pairs(Ring::stride(step_rad, RING));
+        let perimeter_m = self.middle.perimeter_m();
+        pairs.map(|(a, b)| math::wrap_signed(b.sigma_m - a.sigma_m, perimeter_m).abs()).fold(0.0, f64::max)
     }
 
     /// The largest speed at which the predicted T_max stays within the target, by inverting Eq. 16 with what is

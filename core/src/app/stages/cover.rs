@@ -4,25 +4,26 @@
 
 use bevy_ecs::prelude::{Res, ResMut, Resource};
 
-use super::judge::judge_one;
+use super::advise::Advisor;
+use super::driving::{Driven, Driving};
+use super::judge::{Results, judge_one};
+use crate::app::alerts::{AlertKind, Alerts};
 use crate::app::flow::{
-    Coverage, Digests, Finder, Notices, Outcome, Place, Placed, PlacedList, PlacedPing, Requests, Tally,
+    Coverage, Digests, Finder, Notice, Notices, Outcome, Place, Placed, PlacedList, PlacedPing, Requests, Tally,
 };
 use crate::coverage::hole::FARTHEST_M;
-use crate::coverage::{Doubt, SampleIndex, StoreError, WallSample};
+use crate::coverage::{Doubt, Loss, SampleIndex, StoreError, WallSample};
 use crate::frames::{Point3, Tunnel, Vec3};
 use crate::math;
-use crate::sampling::head::{HeadMotion, MAX_HEADS};
-use crate::sampling::passes::{Phasing, Situation};
+use crate::sampling::head::MAX_HEADS;
 use crate::sampling::spacing;
 
-/// What is remembered of each head's sweep, and how the heads' passes were spread at the last beat.
+/// What is remembered of each head's sweep.
 #[derive(Debug, Clone, Copy, Default, Resource)]
 pub(in crate::app) struct HeadSweeps {
     last: [Option<LastSample>; MAX_HEADS],
-    pass_gap_s: f64,
-    even_gap_s: f64,
-    ping_period_s: f64,
+    /// The head has pinged where nobody knew, and hasn't since where somebody does.
+    unseen: [bool; MAX_HEADS],
 }
 
 /// The last valid sample of a head in its present sweep.
@@ -40,21 +41,31 @@ pub(super) fn cover(
     placed: Res<'_, PlacedList>,
     context: Res<'_, Place>,
     mut coverage: ResMut<'_, Coverage>,
+    advisor: Res<'_, Advisor>,
     mut sweeps: ResMut<'_, HeadSweeps>,
+    mut driving: ResMut<'_, Driving>,
     mut requests: ResMut<'_, Requests>,
     mut tally: ResMut<'_, Tally>,
     mut finder: ResMut<'_, Finder>,
     mut notices: ResMut<'_, Notices>,
     mut digests: ResMut<'_, Digests>,
+    mut alerts: ResMut<'_, Alerts>,
 ) {
     notices.0.clear();
     for item in &placed.0 {
         match item {
-            Placed::Situation(_, situation) => sweeps.note_gaps(situation),
+            Placed::Situation(at, situation) => {
+                driving.note(*at, situation, &context.profile, &advisor.advisor);
+            }
             Placed::Ping(ping) => {
                 count(&mut tally, &ping.outcome);
-                note_passage(&mut coverage, &sweeps, ping);
-                if let Err(error) = note_sample(&mut coverage, &mut sweeps, ping) {
+                note_passage(&mut coverage, &mut sweeps, &driving.now, ping);
+                if let Some(beyond_m) = beyond_end_m(ping, context.length_m)
+                    && alerts.note(AlertKind::OutsideTunnel, ping.received, beyond_m.0, beyond_m.1)
+                {
+                    notices.0.push(Notice::Alert(AlertKind::OutsideTunnel));
+                }
+                if let Err(error) = note_sample(&mut coverage, &mut sweeps, &context, ping) {
                     match error {
                         StoreError::Outside => tally.outside += 1,
                         StoreError::Full => tally.not_stored += 1,
@@ -62,67 +73,99 @@ pub(super) fn cover(
                 }
                 note_frontier(&mut coverage, ping, &mut requests);
                 for request in requests.0.drain(..) {
-                    judge_one(
-                        &request,
-                        &context.profile,
-                        &mut coverage,
-                        &mut finder,
-                        &mut notices,
-                        &mut digests,
-                    );
+                    let mut results = Results {
+                        finder: &mut finder,
+                        notices: &mut notices,
+                        digests: &mut digests,
+                        alerts: &mut alerts,
+                    };
+                    judge_one(&request, &context.profile, &mut coverage, &mut results);
                 }
             }
         }
     }
 }
 
-impl HeadSweeps {
-    fn note_gaps(&mut self, situation: &Situation) {
-        let passes = Phasing::of(situation).at(situation.speed_mps);
-        (self.pass_gap_s, self.even_gap_s) =
-            (passes.gap_s(passes.heads()).unwrap_or(0.0), passes.even_gap_s());
-        let periods = situation.heads.iter().flatten().map(HeadMotion::ping_period_s);
-        self.ping_period_s = periods.fold(0.0, f64::max);
-    }
-}
-
 fn count(tally: &mut Tally, outcome: &Outcome) {
     match outcome {
         Outcome::Sample { .. } => tally.samples += 1,
-        Outcome::Missing => tally.missing += 1,
-        Outcome::OutOfRange => tally.out_of_range += 1,
+        Outcome::Lost(Loss::Missing, _) => tally.missing += 1,
+        Outcome::Lost(Loss::OutOfRange, _) => tally.out_of_range += 1,
+        Outcome::Lost(Loss::Occluded, _) => tally.occluded += 1,
         Outcome::Unplaced(_) => tally.unplaced += 1,
     }
 }
 
-/// Adds a ping to the passage of the section that its head is in.
-fn note_passage(coverage: &mut Coverage, sweeps: &HeadSweeps, ping: &PlacedPing) {
+/// Adds a ping to the passage of the section that its head is in, and what it lost to that of the section it was aimed at.
+fn note_passage(coverage: &mut Coverage, sweeps: &mut HeadSweeps, driven: &Driven, ping: &PlacedPing) {
+    note_unseen(coverage, sweeps, ping);
+    let perimeter_m = coverage.store.perimeter_m();
+    if let Outcome::Lost(loss, Some(aim)) = ping.outcome {
+        let index = coverage.sections.index_of(aim.x_m);
+        if let Some(section) = coverage.sections.get_mut(index) {
+            section.passage.lost.note(loss, aim.sigma_m, perimeter_m);
+        }
+    }
     // Without a fix, a ping counts where its head was last known to be.
     let Some(reach) = ping.reach.or_else(|| coverage.frontier.last_reach(ping.head)) else { return };
     let index = coverage.sections.index_of(reach.middle_m());
     let Some(section) = coverage.sections.get_mut(index) else { return };
     let passage = &mut section.passage;
     passage.pings += 1;
+    passage.standing += u32::from(ping.standing);
     match ping.outcome {
         Outcome::Sample { .. } => {}
-        Outcome::Missing => passage.missing += 1,
-        Outcome::OutOfRange => passage.out_of_range += 1,
+        Outcome::Lost(Loss::Missing, _) => passage.missing += 1,
+        Outcome::Lost(Loss::OutOfRange, _) => passage.out_of_range += 1,
+        Outcome::Lost(Loss::Occluded, _) => passage.occluded += 1,
         Outcome::Unplaced(_) => passage.unplaced += 1,
     }
     let Some(fix) = ping.fix else { return };
     passage.placed += 1;
     passage.speed_sum_mps += fix.speed_mps.abs();
-    passage.pass_gap_sum_s += sweeps.pass_gap_s;
-    passage.even_gap_sum_s += sweeps.even_gap_s;
-    passage.ping_period_sum_s += sweeps.ping_period_s;
+    passage.pass_gap_sum_s += driven.gap_s;
+    passage.even_gap_sum_s += driven.even_gap_s;
+    passage.all_gap_sum_s += driven.all_gap_s;
+    passage.ping_period_sum_s += driven.ping_period_s;
+    passage.swing_sum_m += driven.swing_m;
+    passage.middle_t_y_m = passage.middle_t_y_m.max(driven.middle_t_y_m);
     let from_m = [fix.pose.position.y(), fix.pose.position.z()];
     passage.doubt.add(&Doubt { relative: fix.relative, from_m });
+}
+
+/// Sections that a head went through while nobody knew where.
+fn note_unseen(coverage: &mut Coverage, sweeps: &mut HeadSweeps, ping: &PlacedPing) {
+    let Some(unseen) = sweeps.unseen.get_mut(ping.head) else { return };
+    let Some(reach) = ping.reach else {
+        *unseen = true;
+        return;
+    };
+    if !core::mem::take(unseen) {
+        return;
+    }
+    let Some(before) = coverage.frontier.last_reach(ping.head) else { return };
+    let (from_m, to_m) = (before.middle_m().min(reach.middle_m()), before.middle_m().max(reach.middle_m()));
+    let passed = coverage.sections.index_of(from_m)..=coverage.sections.index_of(to_m);
+    for index in passed {
+        if let Some(section) = coverage.sections.get_mut(index) {
+            section.passage.unseen = true;
+        }
+    }
+}
+
+/// Chainage of a sample before the portal or behind the tunnel's end, and by how much, m.
+fn beyond_end_m(ping: &PlacedPing, length_m: f64) -> Option<(f64, f64)> {
+    let Outcome::Sample { point, .. } = ping.outcome else { return None };
+    let x_m = point.x();
+    let beyond_m = (-x_m).max(x_m - length_m);
+    (beyond_m > 0.0).then_some((x_m, beyond_m))
 }
 
 /// Keeps a sample and adds its spacings to its section.
 fn note_sample(
     coverage: &mut Coverage,
     sweeps: &mut HeadSweeps,
+    context: &Place,
     ping: &PlacedPing,
 ) -> Result<(), StoreError> {
     let Some(slot) = sweeps.last.get_mut(ping.head) else { return Ok(()) };
@@ -152,6 +195,9 @@ fn note_sample(
     let index = coverage.sections.index_of(point.x());
     let Some(section) = coverage.sections.get_mut(index) else { return Ok(()) };
     section.samples += 1;
+    let yz = |point: &Point3<Tunnel>| [point.y(), point.z()];
+    let from = step_from.map(|last| (yz(&last.point), last.sigma_m));
+    section.deviation.add(&context.profile, (yz(&point), sigma_m), from, context.contradiction_m);
     if let Some(t_x_m) = t_x_m {
         section.t_x_m.add(t_x_m);
     }

@@ -1,20 +1,33 @@
-//! A section to its verdict and flag.
+//! A section to its verdict, its flag and its run.
 
+use crate::app::alerts::{AlertKind, Alerts};
 use crate::app::flow::{Coverage, Digests, Finder, Notice, Notices};
-use crate::coverage::Request;
+use crate::coverage::{Judging, Request, RunChange, RunId};
 use crate::tunnel::Profile;
+
+/// What judging changes besides the sections.
+pub(in crate::app) struct Results<'a> {
+    pub(in crate::app) finder: &'a mut Finder,
+    pub(in crate::app) notices: &'a mut Notices,
+    pub(in crate::app) digests: &'a mut Digests,
+    pub(in crate::app) alerts: &'a mut Alerts,
+}
 
 /// Judges one section and says what has changed.
 pub(in crate::app) fn judge_one(
     request: &Request,
     profile: &Profile,
     coverage: &mut Coverage,
-    finder: &mut Finder,
-    notices: &mut Notices,
-    digests: &mut Digests,
+    results: &mut Results<'_>,
 ) {
     let Coverage { store, sections, .. } = coverage;
-    let Some(change) = sections.judge(request, store, &mut finder.0, profile) else { return };
+    let Results { finder, notices, digests, alerts } = results;
+    let mut tell = |id: RunId, change: RunChange| {
+        notices.0.push(Notice::Run { id, at: request.at, change });
+        digests.judgements.integer(u64::from(id.0)).integer(change as u64);
+    };
+    let mut judging = Judging { store, finder: &mut finder.0, profile, tell: &mut tell };
+    let Some(change) = sections.judge(request, &mut judging) else { return };
     notices.0.push(Notice::Section { section: request.section, at: request.at, change });
     let Some(section) = sections.get(request.section) else { return };
     digests
@@ -26,4 +39,11 @@ pub(in crate::app) fn judge_one(
         .number(section.hole.map_or(0.0, |hole| hole.diameter_m))
         .number(section.hole_sigma_m)
         .integer(section.evidence.map_or(u64::MAX, |evidence| evidence.cause as u64));
+    if section.contradicts() {
+        let off_m = section.deviation.mean_m().unwrap_or(0.0);
+        let x_m = sections.bounds_m(request.section).0;
+        if alerts.note(AlertKind::ProfileContradicted, request.at, x_m, off_m) {
+            notices.0.push(Notice::Alert(AlertKind::ProfileContradicted));
+        }
+    }
 }

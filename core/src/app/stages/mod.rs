@@ -5,6 +5,7 @@
 mod advise;
 mod cover;
 mod decode;
+mod driving;
 mod judge;
 mod navigate;
 mod place;
@@ -16,7 +17,8 @@ use super::stage::Stage;
 pub(super) use advise::Advisor;
 pub(super) use cover::HeadSweeps;
 pub(super) use decode::Decoders;
-pub(super) use judge::judge_one;
+pub(super) use driving::Driving;
+pub(super) use judge::{Results, judge_one};
 
 /// Adds the core's systems to their stages.
 pub(super) fn add(schedule: &mut Schedule) {

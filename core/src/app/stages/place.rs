@@ -3,12 +3,12 @@
 use bevy_ecs::prelude::{Query, Res, ResMut};
 
 use crate::app::flow::{
-    Digests, Event, Events, HeadTable, Outcome, Place, Placed, PlacedList, PlacedPing, Positioned,
+    Aim, Digests, Event, Events, HeadTable, HiddenAngles, Outcome, Place, Placed, PlacedList, PlacedPing, Positioned,
     PositionedList, SensorTable,
 };
 use crate::app::head::HeadTrack;
 use crate::app::reading::{Reading, SonarReturn};
-use crate::coverage::Reach;
+use crate::coverage::{Loss, Reach};
 use crate::frames::{Mount, Pose, Vec3, head_direction};
 use crate::fusion::{Fix, NoFix};
 use crate::math;
@@ -27,6 +27,7 @@ pub(super) fn place(
     context: Res<'_, Place>,
     heads: Res<'_, HeadTable>,
     sensors: Res<'_, SensorTable>,
+    hidden: Res<'_, HiddenAngles>,
     mut tracks: Query<'_, '_, &mut HeadTrack>,
     mut placed: ResMut<'_, PlacedList>,
     mut digests: ResMut<'_, Digests>,
@@ -50,7 +51,10 @@ pub(super) fn place(
                     continue;
                 };
                 let turned = track.ping(event.valid_at, sonar.angle_rad);
-                let outcome = outcome(&sonar, fix, &sensor.mount, &context);
+                let hidden = hidden.0.get(head).is_some_and(|angles| {
+                    angles.iter().any(|range| range.has(sonar.angle_rad))
+                });
+                let outcome = outcome(&sonar, fix, &sensor.mount, hidden, &context);
                 let ping = PlacedPing {
                     head,
                     received: event.received,
@@ -59,6 +63,7 @@ pub(super) fn place(
                     reach: fix.ok().map(|fix| reach(&fix.pose, &sensor.mount, &context)),
                     single_step: turned.single_step,
                     new_sweep: turned.new_sweep,
+                    standing: turned.standing,
                     outcome,
                 };
                 digest(&mut digests, event, &ping);
@@ -68,24 +73,46 @@ pub(super) fn place(
     }
 }
 
-fn outcome(sonar: &SonarReturn, fix: Result<Fix, NoFix>, mount: &Mount, context: &Place) -> Outcome {
+/// What comes back from nearer than this share of the way to the wall, where the vehicle itself stands in the way, is the
+/// vehicle.
+const VEHICLE_SHARE: f64 = 0.5;
+
+fn outcome(
+    sonar: &SonarReturn,
+    fix: Result<Fix, NoFix>,
+    mount: &Mount,
+    hidden: bool,
+    context: &Place,
+) -> Outcome {
     let fix = match fix {
         Ok(fix) => fix,
         Err(lacking) if sonar.range_m.is_some() => return Outcome::Unplaced(lacking),
-        Err(_) => return Outcome::Missing,
+        Err(_) => return Outcome::Lost(Loss::Missing, None),
     };
     let origin = fix.pose.place(mount.position);
     let beam = fix.pose.attitude * (mount.rotation * head_direction(sonar.angle_rad));
-    let Some(range_m) = sonar.range_m else {
-        let wall = context.profile.cast([origin.y(), origin.z()], [beam.y(), beam.z()]);
-        let longest = context.site.rescaled_range_m(sonar.max_range_m, sonar.sound_speed_mps);
-        return match wall {
-            Some(wall) if wall.range_m <= longest => Outcome::Missing,
-            _ => Outcome::OutOfRange,
-        };
+    let range_m =
+        sonar.range_m.map(|range_m| context.site.rescaled_range_m(range_m, sonar.sound_speed_mps));
+    let sample = |range_m: f64| {
+        let point = origin + beam.scaled(range_m);
+        Outcome::Sample { point, sigma_m: context.profile.sigma_of([point.y(), point.z()]) }
     };
-    let point = origin + beam.scaled(context.site.rescaled_range_m(range_m, sonar.sound_speed_mps));
-    Outcome::Sample { point, sigma_m: context.profile.sigma_of([point.y(), point.z()]) }
+    if let Some(range_m) = range_m.filter(|_| !hidden) {
+        return sample(range_m);
+    }
+    let wall = context.profile.cast([origin.y(), origin.z()], [beam.y(), beam.z()]);
+    let aim = wall.map(|wall| Aim { x_m: origin.x() + wall.range_m * beam.x(), sigma_m: wall.sigma_m });
+    let wall_m = wall.map(|wall| wall.range_m);
+    if let Some(range_m) = range_m.filter(|range_m| wall_m.is_none_or(|wall| *range_m > VEHICLE_SHARE * wall)) {
+        return sample(range_m);
+    }
+    let longest_m = context.site.rescaled_range_m(sonar.max_range_m, sonar.sound_speed_mps);
+    let loss = match wall_m {
+        _ if hidden => Loss::Occluded,
+        Some(wall_m) if wall_m <= longest_m => Loss::Missing,
+        _ => Loss::OutOfRange,
+    };
+    Outcome::Lost(loss, aim)
 }
 
 /// A head lands its samples in the plane across its axis; tilted against the tunnel, the plane spans some chainage.
@@ -137,14 +164,11 @@ fn digest(digests: &mut Digests, event: &Event, ping: &PlacedPing) {
         Outcome::Sample { point, sigma_m } => {
             digest.integer(0).number(point.x()).number(point.y()).number(point.z()).number(sigma_m);
         }
-        Outcome::Missing => {
-            digest.integer(1);
-        }
-        Outcome::OutOfRange => {
-            digest.integer(2);
+        Outcome::Lost(loss, _) => {
+            digest.integer(1).integer(loss as u64);
         }
         Outcome::Unplaced(lacking) => {
-            digest.integer(3).integer(lacking as u64);
+            digest.integer(2).integer(lacking as u64);
         }
     }
 }

@@ -68,7 +68,8 @@ impl Agreement {
     }
 
     /// When a kind of measurement no longer agrees, what it measures is anywhere near, and so is what has moved it there.
-    pub fn seek(&mut self, factors: &mut Factors<ERRORS>) {
+    /// Gives whether the way along the tunnel is sought: what is found has no bearing on what was believed before.
+    pub fn seek(&mut self, factors: &mut Factors<ERRORS>) -> bool {
         let [wall, way, tilt] = [&mut self.wall, &mut self.way, &mut self.tilt].map(Memory::is_lost);
         let lost = [
             (wall, POSITION + 1..POSITION + 3, LOST_M),
@@ -85,5 +86,6 @@ impl Agreement {
                 factors.add_to(error, reach * reach);
             }
         }
+        way
     }
 }

@@ -61,7 +61,9 @@ const MOST_RATE_RADPS: f64 = 10.0;
 const MOST_FORCE_MPS2: f64 = 50.0;
 /// Room for the estimates after the last epoch.
 const AHEAD: usize = 512;
-/// The time between two passes of heads when none is known to turn.
+/// Slower than this, m/s, a vehicle stands still.
+const SLOW_MPS: f64 = 0.01;
+/// The time between two passes of heads when none is known to turn, and the longest between heads apart along the hull.
 const USUAL_GAP: DurNs = DurNs(20_000_000_000);
 
 /// See the module's description.
@@ -158,19 +160,26 @@ impl FilterNavigation {
             self.begin_anew(sigmas.along_m);
             return;
         }
-        let relative = self.running.trail.relative(self.pass_gap());
+        let pass_gap = self.pass_gap();
+        let relative = self.running.trail.relative(pass_gap);
         let relative = relative.unwrap_or_else(|| Relative::along(0.0));
         let between_m = relative.sigma_m(Vec3::zero());
         self.standing = if sigmas.yaw_rad > YAW_LIMIT_RAD {
             Err(NoFix::Heading)
         } else if sigmas.place_m > PLACE_LIMIT_M {
             Err(NoFix::Section)
-        } else if between_m > ALONG_LIMIT_M || sigmas.along_m > ALONG_LIMIT_M {
+        } else if between_m > ALONG_LIMIT_M || sigmas.along_m > ALONG_LIMIT_M || self.has_jumped(pass_gap) {
             Err(NoFix::Chainage)
         } else {
             Ok(relative)
         };
         self.carry_ahead();
+    }
+
+    /// Whether the cable was given up and believed anew since the heads last passed here: it has slipped, and nobody knows
+    /// where what was placed before lies against what is placed now.
+    fn has_jumped(&self, pass_gap: DurNs) -> bool {
+        self.running.way_sought.is_some_and(|then| self.running.at.since(then).0 <= pass_gap.0)
     }
 
     /// Listens for a new first estimate: the last one is too far off to be corrected step by step. What has been placed
@@ -201,12 +210,22 @@ impl FilterNavigation {
         }
     }
 
-    /// Time between two passes of heads over a place, evenly spread.
+    /// Time between neighbouring passes over a place: that between two passes of heads evenly spread, and that in which the
+    /// rearmost head comes to where the foremost was.
     fn pass_gap(&self) -> DurNs {
-        let turning =
-            self.sources.iter().flatten().filter_map(|source| source.turning.turns_per_s(self.received));
-        let passes_per_s: f64 = turning.sum();
-        if passes_per_s > 0.0 { DurNs::from_secs_f64(1.0 / passes_per_s) } else { USUAL_GAP }
+        let (mut passes_per_s, mut ahead_m, mut astern_m) = (0.0, f64::NEG_INFINITY, f64::INFINITY);
+        for source in self.sources.iter().flatten() {
+            let Some(turns_per_s) = source.turning.turns_per_s(self.received) else { continue };
+            let x_m = source.sensor.mount.position.x();
+            passes_per_s += turns_per_s;
+            (ahead_m, astern_m) = (f64::max(ahead_m, x_m), f64::min(astern_m, x_m));
+        }
+        if passes_per_s <= 0.0 {
+            return USUAL_GAP;
+        }
+        let speed_mps = self.running.state.velocity_mps.x().abs();
+        let apart_s = ((ahead_m - astern_m) / speed_mps.max(SLOW_MPS)).min(USUAL_GAP.as_secs_f64());
+        DurNs::from_secs_f64(1.0 / passes_per_s + apart_s)
     }
 
     /// Puts a reading where it will be fused, unless the ones before it say as much.

@@ -59,6 +59,8 @@ pub struct Running {
     pub factors: Factors<ERRORS>,
     /// Errors against those before.
     pub trail: Trail,
+    /// When the way along the tunnel was last sought anew.
+    pub way_sought: Option<MonoNs>,
     /// The estimate through the last epoch, before its measurements.
     knots: Vec<(MonoNs, State)>,
     agreement: Agreement,
@@ -72,6 +74,7 @@ impl Default for Running {
             state: State::at_rest(Point3::zero(), Rot::identity()),
             factors: Factors::independent([0.0; ERRORS]),
             trail: Trail::default(),
+            way_sought: None,
             knots: Vec::with_capacity(KNOTS),
             agreement: Agreement::default(),
         }
@@ -84,6 +87,7 @@ impl Running {
         (self.at, self.state, self.factors) = (at, state, factors);
         self.trail.clear();
         self.agreement = Agreement::default();
+        self.way_sought = None;
     }
 
     /// Goes on to a later moment, and fuses what the window has up to it.
@@ -122,7 +126,9 @@ impl Running {
         self.bound_speed();
         self.stay_inside(&context.profile);
         self.trail.note(to, &self.factors);
-        self.agreement.seek(&mut self.factors);
+        if self.agreement.seek(&mut self.factors) {
+            self.way_sought = Some(to);
+        }
     }
 
     /// Fuses that the vehicle doesn't move, unless that is too unlikely; and that a mean turn rate is its bias.

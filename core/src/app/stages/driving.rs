@@ -1,0 +1,125 @@
+//! How the vehicle is driven and its heads turn, beat by beat: what a section's passage remembers of its pings.
+
+use bevy_ecs::prelude::Resource;
+
+use crate::frames::{Tunnel, Vec3};
+use crate::sampling::advice::Advisor;
+use crate::sampling::head::HeadMotion;
+use crate::sampling::passes::{Phasing, Situation};
+use crate::time::{DurNs, MonoNs};
+use crate::tunnel::Profile;
+
+/// Beats that are remembered: over a turn of a head in its slowest mode (28 s) at five a second.
+const BEATS: usize = 256;
+
+/// How the vehicle was driven at the last beat.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Driven {
+    /// The longest time between two passes, seconds.
+    pub(super) gap_s: f64,
+    /// The same, the heads evenly spread.
+    pub(super) even_gap_s: f64,
+    /// The same, all heads that the vehicle has turning.
+    pub(super) all_gap_s: f64,
+    /// Time between two pings, seconds.
+    pub(super) ping_period_s: f64,
+    /// How far the beams have swung along the tunnel since the pass before, where they reach farthest, m.
+    pub(super) swing_m: f64,
+    /// The largest step along the wall from the middle of the tunnel, m.
+    pub(super) middle_t_y_m: f64,
+}
+
+/// The last beat, and which way the vehicle looked at those before.
+#[derive(Debug, Clone, Resource)]
+pub(in crate::app) struct Driving {
+    pub(super) now: Driven,
+    /// The step for which `middle_t_y_m` was looked up, radians.
+    step_rad: f64,
+    /// The last beat at which a head turned.
+    turned: Option<MonoNs>,
+    looks: Vec<(MonoNs, Vec3<Tunnel>)>,
+    count: usize,
+}
+
+impl Default for Driving {
+    /// Allocates: all that it will ever use.
+    fn default() -> Self {
+        Self {
+            now: Driven::default(),
+            step_rad: 0.0,
+            turned: None,
+            looks: Vec::with_capacity(BEATS),
+            count: 0,
+        }
+    }
+}
+
+impl Driving {
+    /// Takes in a beat.
+    ///
+    /// Allocates: never.
+    pub(super) fn note(
+        &mut self,
+        at: MonoNs,
+        situation: &Situation,
+        profile: &Profile,
+        advisor: &Advisor,
+    ) {
+        self.note_gaps(at, situation);
+        let step_rad = situation.heads.iter().flatten().map(|motion| motion.step_rad).fold(0.0, f64::max);
+        if step_rad > 0.0 && (step_rad - self.step_rad).abs() > 0.0 {
+            self.step_rad = step_rad;
+            self.now.middle_t_y_m = advisor.middle_step_m(step_rad);
+        }
+        let Some(pose) = situation.pose else {
+            self.now.swing_m = 0.0;
+            return;
+        };
+        let look = pose.attitude * Vec3::new(1.0, 0.0, 0.0);
+        let then = self.look_at(at - DurNs::from_secs_f64(self.now.gap_s.min(1e3)));
+        let turned = then.map_or(0.0, |then| (look + -then).norm());
+        self.now.swing_m = turned * profile.farthest_m([pose.position.y(), pose.position.z()]);
+        self.keep(at, look);
+    }
+
+    fn note_gaps(&mut self, at: MonoNs, situation: &Situation) {
+        let turning = situation.heads.iter().flatten().count();
+        if turning == 0 {
+            // Until a head turns again the time between two passes grows.
+            if let Some(turned) = self.turned.replace(at) {
+                self.now.gap_s += at.since(turned).as_secs_f64().max(0.0);
+                self.now.even_gap_s = self.now.gap_s;
+            }
+            return;
+        }
+        self.turned = Some(at);
+        let passes = Phasing::of(situation).at(situation.speed_mps);
+        let even_gap_s = passes.even_gap_s();
+        let share = turning as f64 / situation.configured.max(1) as f64;
+        let periods = situation.heads.iter().flatten().map(HeadMotion::ping_period_s);
+        self.now = Driven {
+            gap_s: passes.gap_s(passes.heads()).unwrap_or(0.0),
+            even_gap_s,
+            all_gap_s: even_gap_s * share,
+            ping_period_s: periods.fold(0.0, f64::max),
+            ..self.now
+        };
+    }
+
+    fn keep(&mut self, at: MonoNs, look: Vec3<Tunnel>) {
+        if self.looks.len() < BEATS {
+            self.looks.push((at, look));
+        } else if let Some(slot) = self.looks.get_mut(self.count % BEATS) {
+            *slot = (at, look);
+        }
+        self.count += 1;
+    }
+
+    /// Which way the vehicle looked at the last beat at or before a time; the oldest that is known where none is so old.
+    fn look_at(&self, at: MonoNs) -> Option<Vec3<Tunnel>> {
+        let kept = self.looks.len();
+        let back = |k: usize| self.looks.get((self.count - 1 - k) % BEATS);
+        let found = (0..kept).filter_map(back).find(|(then, _)| *then <= at);
+        found.or_else(|| back(kept.checked_sub(1)?)).map(|(_, look)| *look)
+    }
+}

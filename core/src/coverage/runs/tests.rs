@@ -1,0 +1,118 @@
+use proptest::prelude::*;
+
+use super::*;
+
+const COUNT: i64 = 60;
+
+/// Runs, and what is said of each section, by which they are checked.
+struct Rig {
+    runs: Runs,
+    causes: Vec<Option<Cause>>,
+    holes: Vec<f64>,
+    told: Vec<(RunId, RunChange)>,
+}
+
+impl Rig {
+    fn new() -> Self {
+        let count = usize::try_from(COUNT).unwrap();
+        Self {
+            runs: Runs::new(-5, count, 0.25),
+            causes: vec![None; count],
+            holes: vec![0.0; count],
+            told: Vec::new(),
+        }
+    }
+
+    fn say(&mut self, section: i64, cause: Option<Cause>, diameter_m: f64) {
+        let slot = usize::try_from(section + 5).unwrap();
+        (self.causes[slot], self.holes[slot]) = (cause, diameter_m);
+        let Self { runs, holes, told, .. } = self;
+        let hole = |index: i64| {
+            let diameter_m = *holes.get(usize::try_from(index + 5).ok()?)?;
+            Some(Hole { diameter_m, x_m: 0.0, sigma_m: 0.0, bounded: true })
+        };
+        let mut tell = |id, change| told.push((id, change));
+        runs.set(section, cause, &mut Telling { at: MonoNs(1), hole: &hole, tell: &mut tell });
+    }
+
+    /// Every open run against the sections themselves.
+    fn check(&self) {
+        let cause = |index: i64| self.causes[usize::try_from(index + 5).unwrap()];
+        let indexes = || -5..COUNT - 5;
+        for index in indexes() {
+            let run = self.runs.of(index).map(|id| self.runs.get(id).unwrap());
+            assert_eq!(run.map(|run| run.cause), cause(index), "section {index}");
+            assert!(run.is_none_or(|run| (run.from..run.to).contains(&index)));
+        }
+        for (number, run) in (0..).zip(self.runs.all()) {
+            let members: Vec<_> =
+                indexes().filter(|index| self.runs.of(*index) == Some(RunId(number))).collect();
+            assert_eq!(members.len(), run.failed as usize);
+            assert_eq!(run.cleared.is_some(), members.is_empty());
+            let (Some(first), Some(last)) = (members.first(), members.last()) else { continue };
+            assert_eq!((run.from, run.to), (*first, *last + 1));
+            assert!(members.windows(2).all(|pair| pair[1] - pair[0] <= 3), "run {number} has fallen apart");
+            let largest =
+                members.iter().map(|index| self.holes[usize::try_from(index + 5).unwrap()]).fold(0.0, f64::max);
+            assert!((run.worst.1.diameter_m - largest).abs() < 1e-12);
+            // No other run of the cause is near enough to be one with it.
+            for other in last + 1..=(last + 3).min(COUNT - 6) {
+                let near = self.runs.of(other).map(|id| self.runs.get(id).unwrap());
+                assert!(near.is_none_or(|near| near.cause != run.cause), "run {number} and its neighbour");
+            }
+        }
+    }
+}
+
+#[test]
+fn neighbours_are_one_run_that_grows_merges_and_is_cleared() {
+    let mut rig = Rig::new();
+    rig.say(10, Some(Cause::TooFast), 1.0);
+    rig.say(11, Some(Cause::TooFast), 1.5);
+    rig.say(16, Some(Cause::TooFast), 1.2);
+    rig.say(13, Some(Cause::Phase), 1.2);
+    // Within half a metre of both.
+    rig.say(14, Some(Cause::TooFast), 1.1);
+    let first = *rig.runs.get(RunId(0)).unwrap();
+    assert_eq!((first.from, first.to, first.failed, first.worst.0), (10, 17, 4, 11));
+    assert_eq!(rig.runs.get(RunId(1)).unwrap().merged_into, Some(RunId(0)));
+    for section in [10, 11, 14, 16] {
+        rig.say(section, None, 0.2);
+    }
+    assert!(rig.told.contains(&(RunId(0), RunChange::Cleared)));
+    assert!(rig.runs.get(RunId(2)).unwrap().is_open(), "the other cause is another run");
+    rig.check();
+}
+
+#[test]
+fn a_run_filled_in_its_middle_falls_in_two_and_the_first_part_keeps_the_number() {
+    let mut rig = Rig::new();
+    for section in 0..9 {
+        rig.say(section, Some(Cause::MissingReturns), 0.6 + 0.1 * section as f64);
+    }
+    for section in 3..6 {
+        rig.say(section, None, 0.1);
+    }
+    let (first, second) = (*rig.runs.get(RunId(0)).unwrap(), *rig.runs.get(RunId(1)).unwrap());
+    assert_eq!((first.from, first.to, second.from, second.to), (0, 3, 6, 9));
+    assert!((first.worst.1.diameter_m - 0.8).abs() < 1e-12 && second.raised == MonoNs(1));
+    rig.check();
+}
+
+proptest! {
+    /// Whatever is said in whatever order, runs are what the sections say.
+    #[test]
+    fn runs_are_what_the_sections_say(
+        said in proptest::collection::vec((-5..COUNT - 5, 0_u8..4, 0.1_f64..3.0), 1..300),
+    ) {
+        let mut rig = Rig::new();
+        for (section, cause, diameter_m) in said {
+            let causes = [None, Some(Cause::TooFast), Some(Cause::TooFast), Some(Cause::Phase)];
+            rig.say(section, causes[usize::from(cause)], diameter_m);
+        }
+        // Numbers may be used up by so many changes; then sections are in no run.
+        if rig.runs.all().len() < usize::try_from(COUNT).unwrap() {
+            rig.check();
+        }
+    }
+}
