@@ -10,7 +10,7 @@ use bevy_ecs::prelude::Resource;
 use super::alerts::AlertKind;
 use super::digest::Digest;
 use super::reading::{Reading, SourceId};
-use crate::coverage::{Frontier, HoleFinder, Judgement, Loss, RunChange, RunId, Request, SampleStore, Sections};
+use crate::coverage::{CertainFinder, Frontier, HoleFinder, Judgement, Loss, RunChange, RunId, Request, SampleStore, Sections};
 use crate::frames::{Point3, Tunnel};
 use crate::fusion::{Fix, Navigation, NoFix, SensorInfo};
 use crate::sampling::advice::Advice;
@@ -214,9 +214,14 @@ pub struct Coverage {
     pub frontier: Frontier,
 }
 
-/// The hole search with its working memory.
+/// The searches for holes with their working memory.
 #[derive(Debug, Default, Resource)]
-pub struct Finder(pub HoleFinder);
+pub struct Finder {
+    /// For the largest hole of a section.
+    pub holes: HoleFinder,
+    /// For fails that are certain before that.
+    pub certain: CertainFinder,
+}
 
 /// Digest of each stream of results; together, the dive's.
 #[derive(Debug, Default, Resource)]

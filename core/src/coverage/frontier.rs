@@ -72,6 +72,16 @@ impl Frontier {
         self.alive(now).map(|head| head.swept).reduce(common).filter(|all| all.from_m <= all.to_m)
     }
 
+    /// The sections, by index, that samples may still change.
+    pub fn zone(&self) -> Option<Range<i64>> {
+        self.zone.clone()
+    }
+
+    /// Where the heads that are alive land samples now.
+    pub fn reach(&self, now: MonoNs) -> Option<Reach> {
+        self.alive(now).map(|head| head.reach).reduce(Reach::with)
+    }
+
     fn alive(&self, now: MonoNs) -> impl Iterator<Item = &Head> {
         self.heads.iter().flatten().filter(move |head| now.since(head.last).0.abs() <= SILENT.0)
     }
@@ -91,8 +101,7 @@ impl Frontier {
             *slot = Some(Head { last: now, reach, swept });
         }
         self.swept = Some(self.swept.map_or(reach, |swept| swept.with(reach)));
-        let all = self.alive(now).map(|head| head.reach).reduce(Reach::with);
-        let Some(all) = all else { return Moved::default() };
+        let Some(all) = self.reach(now) else { return Moved::default() };
         // Section k = [kL, (k+1)L) is behind when (k+1)L + margin <= from, ahead when kL - margin >= to.
         let first = crate::math::floor_to_i64((all.from_m - margin_m) / section_m);
         let end = -crate::math::floor_to_i64(-(all.to_m + margin_m) / section_m);

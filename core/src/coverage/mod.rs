@@ -2,6 +2,7 @@
 
 pub mod action;
 pub mod cause;
+pub mod certain;
 pub mod deviation;
 pub mod frontier;
 pub mod hole;
@@ -13,6 +14,7 @@ pub mod sections;
 pub mod store;
 
 pub use action::Action;
+pub use certain::CertainFinder;
 pub use cause::{Cause, Evidence};
 pub use frontier::{Frontier, Reach};
 pub use hole::{Hole, HoleFinder};

@@ -4,6 +4,7 @@ use super::hole::Hole;
 use crate::frames::Vec3;
 use crate::fusion::relative::Relative;
 use crate::math;
+use crate::tunnel::Profile;
 
 /// What the pings made within a section say of how it was passed.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -133,6 +134,13 @@ impl Doubt {
         if other.relative.sigma_m(Vec3::zero()) >= self.relative.sigma_m(Vec3::zero()) {
             *self = *other;
         }
+    }
+
+    /// The largest standard deviation of a hole's diameter round the profile, m.
+    pub fn worst_m(&self, profile: &Profile) -> f64 {
+        const PLACES: u32 = 16;
+        let place = |k: u32| profile.point_at(profile.perimeter_m() * f64::from(k) / f64::from(PLACES));
+        (0..PLACES).map(|k| self.sigma_m(place(k))).fold(0.0, f64::max)
     }
 
     /// Standard deviation of the diameter of a hole there on the wall, m: one edge of it is a pass, the other edge the next.

@@ -33,55 +33,56 @@ impl Verdict {
     }
 }
 
-/// Count, mean and extremes of a quantity.
+/// Count, mean, deviation and extremes of a quantity.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Spread {
     /// Values.
     pub count: u32,
-    /// Their sum.
-    pub sum: f64,
-    /// The sum of their squares.
-    pub sum_of_squares: f64,
     /// The smallest.
     pub min: f64,
     /// The largest.
     pub max: f64,
+    mean: f64,
+    /// Sum of the squares of their distances from the mean.
+    scatter: f64,
 }
 
 impl Default for Spread {
     fn default() -> Self {
-        Self { count: 0, sum: 0.0, sum_of_squares: 0.0, min: f64::INFINITY, max: f64::NEG_INFINITY }
+        Self { count: 0, min: f64::INFINITY, max: f64::NEG_INFINITY, mean: 0.0, scatter: 0.0 }
     }
 }
 
 impl Spread {
     /// Takes a value in.
     pub fn add(&mut self, value: f64) {
-        self.count += 1;
-        self.sum += value;
-        self.sum_of_squares += value * value;
-        self.min = self.min.min(value);
-        self.max = self.max.max(value);
+        self.merge(&Self { count: 1, min: value, max: value, mean: value, scatter: 0.0 });
     }
 
     /// Takes in all that another has seen.
+    ///
+    /// Source: Chan, Golub, LeVeque 1983: sums of squares about the mean keep the digits that plain ones lose.
     pub fn merge(&mut self, other: &Self) {
+        if other.count == 0 {
+            return;
+        }
+        let (a, b) = (f64::from(self.count), f64::from(other.count));
+        let (off, share) = (other.mean - self.mean, b / (a + b));
+        self.mean += off * share;
+        self.scatter += other.scatter + off * off * a * share;
         self.count += other.count;
-        self.sum += other.sum;
-        self.sum_of_squares += other.sum_of_squares;
         self.min = self.min.min(other.min);
         self.max = self.max.max(other.max);
     }
 
     /// Mean; `None` without values.
     pub fn mean(&self) -> Option<f64> {
-        (self.count > 0).then(|| self.sum / f64::from(self.count))
+        (self.count > 0).then_some(self.mean)
     }
 
     /// Standard deviation of the values themselves; `None` without values.
     pub fn sd(&self) -> Option<f64> {
-        let mean = self.mean()?;
-        Some(math::sqrt((self.sum_of_squares / f64::from(self.count) - mean * mean).max(0.0)))
+        (self.count > 0).then(|| math::sqrt(self.scatter / f64::from(self.count)))
     }
 }
 
@@ -166,5 +167,26 @@ impl Section {
             }
             _ => Judgement::Updated,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_spread_keeps_its_digits_far_from_zero_and_whatever_is_merged() {
+        let values = [1e8 + 1.0, 1e8 + 2.0, 1e8 + 4.0, 1e8 + 9.0];
+        let (mut whole, mut first, mut second) = (Spread::default(), Spread::default(), Spread::default());
+        for (k, value) in values.into_iter().enumerate() {
+            whole.add(value);
+            if k < 3 { first.add(value) } else { second.add(value) }
+        }
+        first.merge(&second);
+        for spread in [whole, first] {
+            assert!((spread.mean().unwrap() - 1e8 - 4.0).abs() < 1e-7);
+            assert!((spread.sd().unwrap() - 9.5_f64.sqrt()).abs() < 1e-7, "{:?}", spread.sd());
+        }
+        assert_eq!((Spread::default().mean(), Spread::default().sd()), (None, None));
     }
 }

@@ -3,6 +3,7 @@
 use core::ops::Range;
 
 use super::cause::{Case, Evidence, explain};
+use super::certain::{CertainFinder, clear_of};
 use super::frontier::{Frontier, Moved, Reach};
 use super::openings::Opening;
 use super::hole::{FARTHEST_M, Hole, HoleFinder};
@@ -24,8 +25,18 @@ pub struct Request {
     pub at: MonoNs,
     /// The stretch that every head had swept by then.
     pub swept_by_all: Option<Reach>,
-    /// Whether the section's surroundings are complete.
-    pub settles: bool,
+    /// Where samples may land without the vehicle turning back.
+    pub reach: Option<Reach>,
+    /// It is known to fail already: an empty circle, not its largest, is out of the way.
+    pub fails: bool,
+}
+
+impl Request {
+    /// Asks for sections as of one moment.
+    fn at(at: MonoNs, as_of: SampleIndex, frontier: &Frontier) -> impl Fn(i64) -> Self {
+        let (swept_by_all, reach) = (frontier.swept_by_all(at), frontier.reach(at));
+        move |section| Self { section, as_of, at, swept_by_all, reach, fails: false }
+    }
 }
 
 /// What judging looks at, and who hears of the runs that it changes.
@@ -133,8 +144,8 @@ impl Sections {
         }
     }
 
-    /// Calls `ask` for every section that is to be judged after the heads have moved: those that were left, and failed
-    /// ones whose hole is now wholly behind or ahead.
+    /// Calls `ask` for every section that is to be judged after the heads have moved: those that were left, and those whose
+    /// hole may be out of the way now.
     ///
     /// Allocates: never.
     pub fn due(
@@ -148,17 +159,18 @@ impl Sections {
         if moved.left_behind.is_empty() && moved.left_ahead.is_empty() {
             return;
         }
-        let Some(reach) = moved.reach else { return };
+        if moved.reach.is_none() {
+            return;
+        }
         let passed = self.passed(frontier.swept());
-        let swept_by_all = frontier.swept_by_all(at);
-        let ask_for = |section, settles| Request { section, as_of, at, swept_by_all, settles };
+        let ask_for = Request::at(at, as_of, frontier);
         for range in [&moved.left_behind, &moved.left_ahead] {
             for index in clamp(range.clone(), &passed) {
                 let Some(section) = self.get_mut(index) else { continue };
                 if section.stale || section.hole.is_none() {
                     section.stale = false;
                     section.settled = false;
-                    ask(ask_for(index, false));
+                    ask(ask_for(index));
                 }
             }
         }
@@ -167,14 +179,49 @@ impl Sections {
         let ahead = moved.left_ahead.start..moved.left_ahead.start + far;
         for range in [behind, ahead] {
             for index in clamp(range, &passed) {
-                let (from_m, to_m) = self.bounds_m(index);
-                let Some(section) = self.get_mut(index) else { continue };
-                let Some(hole) = section.hole.filter(|_| !section.settled) else { continue };
-                let radius_m = hole.diameter_m / 2.0;
-                if to_m + radius_m <= reach.from_m || from_m - radius_m >= reach.to_m {
-                    section.settled = true;
-                    ask(ask_for(index, true));
+                let target_m = self.target_m;
+                let Some(section) = self.get_mut(index).filter(|section| !section.settled) else { continue };
+                let Some(hole) = section.hole else { continue };
+                let clear_m = clear_of(moved.reach, hole.x_m);
+                let left_m = hole.diameter_m.min(2.0 * clear_m);
+                let fails = section.verdict == Verdict::Open && left_m - 2.0 * section.hole_sigma_m > target_m;
+                if fails || clear_m >= hole.diameter_m / 2.0 {
+                    ask(ask_for(index));
                 }
+            }
+        }
+    }
+
+    /// Calls `ask` for sections between those that are left and those that aren't reached yet: that fail for certain, though
+    /// their hole isn't out of the way, and flagged ones that have got samples since they were judged. Once a second is
+    /// often enough; without it, nothing would be said of them while the vehicle stands.
+    ///
+    /// Allocates: never.
+    pub fn look_around(
+        &mut self,
+        (frontier, as_of, at): (&Frontier, SampleIndex, MonoNs),
+        store: &SampleStore,
+        finder: &mut CertainFinder,
+        profile: &Profile,
+        ask: &mut impl FnMut(Request),
+    ) {
+        let Some(zone) = frontier.zone() else { return };
+        let reach = frontier.reach(at);
+        let ask_for = Request::at(at, as_of, frontier);
+        for index in clamp(zone, &self.passed(frontier.swept())) {
+            let bounds_m = self.bounds_m(index);
+            let target_m = self.target_m;
+            let Some(section) = self.get_mut(index) else { continue };
+            if section.is_flagged() {
+                if core::mem::take(&mut section.stale) {
+                    ask(ask_for(index));
+                }
+                continue;
+            }
+            let radius_m = target_m / 2.0 + section.passage.doubt.worst_m(profile);
+            let clear_m = clear_of(reach, bounds_m.0).max(clear_of(reach, bounds_m.1));
+            if clear_m > radius_m && finder.has_circle(store, bounds_m, reach, radius_m) {
+                ask(Request { fails: true, ..ask_for(index) });
             }
         }
     }
@@ -188,14 +235,16 @@ impl Sections {
         let section = self.get_mut(request.section)?;
         let hole = judging.finder.largest(judging.store, from_m, to_m, request.as_of);
         let sigma_m = section.passage.doubt.sigma_m(judging.profile.point_at(hole.sigma_m));
+        let clear_m = clear_of(request.reach, hole.x_m);
         section.hole = Some(hole);
         section.hole_sigma_m = sigma_m;
-        section.verdict = match verdict(&hole, sigma_m, target_m) {
+        section.verdict = match verdict(&hole, sigma_m, target_m, clear_m) {
             Verdict::Pass if section.is_doubtful() => Verdict::CannotSay,
+            Verdict::Open | Verdict::CannotSay if request.fails => Verdict::Fail,
             verdict => verdict,
         };
         // Of a hole no larger than the target, nothing can come nearer than its own edge.
-        section.settled = request.settles || section.verdict == Verdict::Pass;
+        section.settled = section.verdict == Verdict::Pass || clear_m >= hole.diameter_m / 2.0;
         if section.verdict == Verdict::Fail {
             let evidence = self.explain(&hole, request.swept_by_all, judging.profile.perimeter_m());
             self.get_mut(request.section)?.evidence = Some(evidence);
@@ -235,14 +284,13 @@ impl Sections {
         at: MonoNs,
         ask: &mut impl FnMut(Request),
     ) {
-        let swept_by_all = frontier.swept_by_all(at);
+        let ask_for = Request::at(at, as_of, frontier);
         for index in self.passed(frontier.swept()) {
             let Some(section) = self.get_mut(index) else { continue };
             // The hole of a fail may have been narrowed from farther away than a pass depends on.
             if section.stale || !section.settled || section.verdict != Verdict::Pass {
                 section.stale = false;
-                section.settled = true;
-                ask(Request { section: index, as_of, at, swept_by_all, settles: true });
+                ask(ask_for(index));
             }
         }
     }
@@ -255,14 +303,19 @@ impl Sections {
     }
 }
 
-/// `pass` when D + 2 sigma <= T, `fail` when D - 2 sigma > T, else `cannot_say`. Wall without samples around it fails.
-fn verdict(hole: &Hole, sigma_m: f64, target_m: f64) -> Verdict {
-    if !hole.bounded || hole.diameter_m - 2.0 * sigma_m > target_m {
-        Verdict::Fail
-    } else if hole.diameter_m + 2.0 * sigma_m <= target_m {
+/// What is said of a hole whose centre is `clear_m` from where samples may still land. `pass` when D + 2 sigma <= T: more
+/// samples won't make it larger. `fail` when D - 2 sigma > T for whatever D will be: samples come no nearer than `clear_m`.
+/// In between `open` while D may change, then `cannot_say`. Wall without samples around it fails.
+fn verdict(hole: &Hole, sigma_m: f64, target_m: f64, clear_m: f64) -> Verdict {
+    let left_m = hole.diameter_m.min(2.0 * clear_m);
+    if hole.bounded && hole.diameter_m + 2.0 * sigma_m <= target_m {
         Verdict::Pass
-    } else {
+    } else if left_m - 2.0 * sigma_m > target_m || !hole.bounded && left_m >= hole.diameter_m {
+        Verdict::Fail
+    } else if left_m >= hole.diameter_m {
         Verdict::CannotSay
+    } else {
+        Verdict::Open
     }
 }
 
@@ -274,22 +327,37 @@ fn clamp(range: Range<i64>, within: &Range<i64>) -> Range<i64> {
 mod tests {
     use super::*;
 
+    const BEHIND: f64 = f64::INFINITY;
+
+    fn hole(diameter_m: f64) -> Hole {
+        Hole { diameter_m, x_m: 0.0, sigma_m: 0.0, bounded: true }
+    }
+
     #[test]
     fn a_wall_without_samples_never_passes() {
-        let hole = Hole { diameter_m: 2.0 * FARTHEST_M, x_m: 0.0, sigma_m: 0.0, bounded: false };
-        assert_eq!(verdict(&hole, 0.0, 100.0), Verdict::Fail);
+        let hole = Hole { bounded: false, ..hole(2.0 * FARTHEST_M) };
+        assert_eq!(verdict(&hole, 0.0, 100.0, BEHIND), Verdict::Fail);
+        assert_eq!(verdict(&hole, 0.0, 100.0, 1.0), Verdict::Open);
     }
 
     #[test]
     fn the_verdict_needs_two_standard_deviations() {
-        let hole = |diameter_m| Hole { diameter_m, x_m: 0.0, sigma_m: 0.0, bounded: true };
         for (diameter_m, expected) in [
-            (0.47, Verdict::Pass),
-            (0.49, Verdict::CannotSay),
-            (0.52, Verdict::CannotSay),
-            (0.53, Verdict::Fail),
+            (0.79, Verdict::Pass),
+            (0.81, Verdict::CannotSay),
+            (1.19, Verdict::CannotSay),
+            (1.21, Verdict::Fail),
         ] {
-            assert_eq!(verdict(&hole(diameter_m), 0.0125, 0.5), expected, "{diameter_m}");
+            assert_eq!(verdict(&hole(diameter_m), 0.1, 1.0, BEHIND), expected, "{diameter_m}");
         }
+        assert_eq!(verdict(&hole(1.0), 0.0, 1.0, BEHIND), Verdict::Pass, "as large as the target passes");
+    }
+
+    #[test]
+    fn what_samples_may_still_fill_is_open_until_enough_of_it_is_out_of_their_reach() {
+        let at = |clear_m: f64| verdict(&hole(2.0), 0.1, 1.0, clear_m);
+        assert_eq!([0.0, 0.59, 0.61, 1.0].map(at), [Verdict::Open, Verdict::Open, Verdict::Fail, Verdict::Fail]);
+        let unsure = |clear_m: f64| verdict(&hole(1.1), 0.1, 1.0, clear_m);
+        assert_eq!([0.5, 0.56].map(unsure), [Verdict::Open, Verdict::CannotSay]);
     }
 }

@@ -17,6 +17,10 @@ use crate::frames::{Point3, Tunnel, Vec3};
 use crate::math;
 use crate::sampling::head::MAX_HEADS;
 use crate::sampling::spacing;
+use crate::time::{DurNs, MonoNs};
+
+/// How often sections are looked at that are neither left nor ahead.
+const LOOK_AROUND: DurNs = DurNs(1_000_000_000);
 
 /// What is remembered of each head's sweep.
 #[derive(Debug, Clone, Copy, Default, Resource)]
@@ -56,6 +60,9 @@ pub(super) fn cover(
         match item {
             Placed::Situation(at, situation) => {
                 driving.note(*at, situation, &context.profile, &advisor.advisor);
+                if at.0 % LOOK_AROUND.0.unsigned_abs() == 0 {
+                    look_around(&mut coverage, &mut finder, &context, *at, &mut requests);
+                }
             }
             Placed::Ping(ping) => {
                 count(&mut tally, &ping.outcome);
@@ -72,16 +79,16 @@ pub(super) fn cover(
                     }
                 }
                 note_frontier(&mut coverage, ping, &mut requests);
-                for request in requests.0.drain(..) {
-                    let mut results = Results {
-                        finder: &mut finder,
-                        notices: &mut notices,
-                        digests: &mut digests,
-                        alerts: &mut alerts,
-                    };
-                    judge_one(&request, &context.profile, &mut coverage, &mut results);
-                }
             }
+        }
+        for request in requests.0.drain(..) {
+            let mut results = Results {
+                finder: &mut finder,
+                notices: &mut notices,
+                digests: &mut digests,
+                alerts: &mut alerts,
+            };
+            judge_one(&request, &context.profile, &mut coverage, &mut results);
         }
     }
 }
@@ -151,6 +158,20 @@ fn note_unseen(coverage: &mut Coverage, sweeps: &mut HeadSweeps, ping: &PlacedPi
             section.passage.unseen = true;
         }
     }
+}
+
+/// Asks for the sections that are neither left nor ahead, of which something is certain already.
+fn look_around(
+    coverage: &mut Coverage,
+    finder: &mut Finder,
+    context: &Place,
+    at: MonoNs,
+    requests: &mut Requests,
+) {
+    let Coverage { store, sections, frontier } = coverage;
+    let now = (&*frontier, store.len(), at);
+    let mut ask = |request| requests.0.push(request);
+    sections.look_around(now, store, &mut finder.certain, &context.profile, &mut ask);
 }
 
 /// Chainage of a sample before the portal or behind the tunnel's end, and by how much, m.
