@@ -1,0 +1,131 @@
+//! Dives whose placed pings are copied out of the loop: all that an oracle of coverage may know.
+
+#![allow(dead_code, reason = "each takes what it needs")]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
+
+use bevy_ecs::prelude::{Res, ResMut, Resource};
+use headrace_core::app::App;
+use headrace_core::app::flow::{Outcome, Placed, PlacedList};
+use headrace_core::app::plugin::{Plugin, PluginError};
+use headrace_core::app::report::Report;
+use headrace_core::app::stage::Stage;
+use headrace_core::frames::{Mount, Pose};
+use headrace_core::math::TAU;
+use headrace_core::time::{DurNs, MonoNs};
+use headrace_core::tunnel::Profile;
+use headrace_replay::drive::{Pace, drive};
+use headrace_replay::player::SimulationFeed;
+use headrace_replay::simulate::{Scene, Simulation};
+
+use crate::shipped;
+
+/// A return on the wall.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Sample {
+    /// Chainage and arc length, m.
+    pub(crate) place: [f64; 2],
+    /// The same in space: the tunnel's frame, m.
+    pub(crate) point: [f64; 3],
+}
+
+/// A ping of a profiling head.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Ping {
+    pub(crate) head: usize,
+    pub(crate) received: MonoNs,
+    /// The head has turned round since its last ping.
+    pub(crate) new_sweep: bool,
+    /// The head has come here from its last ping in one step.
+    pub(crate) single_step: bool,
+    /// The vehicle then, where it was known.
+    pub(crate) pose: Option<Pose>,
+    pub(crate) sample: Option<Sample>,
+}
+
+/// What a dive has shown, and what it was made from.
+pub(crate) struct Dive {
+    /// In the order in which the loop placed them.
+    pub(crate) pings: Vec<Ping>,
+    pub(crate) report: Report,
+    pub(crate) profile: Profile,
+    /// How each head sits, by number.
+    pub(crate) mounts: Vec<Mount>,
+    /// How far each head hears in the site's water, m.
+    pub(crate) ranges_m: Vec<f64>,
+    /// Longest time of a turn of any head, seconds.
+    pub(crate) turn_s: f64,
+}
+
+impl Dive {
+    pub(crate) fn samples(&self) -> impl Iterator<Item = &Sample> {
+        self.pings.iter().filter_map(|ping| ping.sample.as_ref())
+    }
+}
+
+#[derive(Resource, Default)]
+struct Seen(Vec<Ping>);
+
+/// Copies what has been placed, and touches nothing.
+struct Watch;
+
+impl Plugin for Watch {
+    fn build(&self, app: &mut App) -> Result<(), PluginError> {
+        app.insert_resource(Seen::default());
+        app.add_systems(Stage::Judge, watch);
+        Ok(())
+    }
+}
+
+#[expect(clippy::needless_pass_by_value, reason = "systems take their parameters by value")]
+fn watch(placed: Res<'_, PlacedList>, mut seen: ResMut<'_, Seen>) {
+    for item in &placed.0 {
+        let Placed::Ping(ping) = item else { continue };
+        let sample = match ping.outcome {
+            Outcome::Sample { point, sigma_m } => {
+                Some(Sample { place: [point.x(), sigma_m], point: [point.x(), point.y(), point.z()] })
+            }
+            Outcome::Missing | Outcome::OutOfRange | Outcome::Unplaced(_) => None,
+        };
+        seen.0.push(Ping {
+            head: ping.head,
+            received: ping.received,
+            new_sweep: ping.new_sweep,
+            single_step: ping.single_step,
+            pose: ping.fix.map(|fix| fix.pose),
+            sample,
+        });
+    }
+}
+
+/// Dives a scene of these two files, in ticks of 20 ms.
+pub(crate) fn dive(vehicle: &str, scene: &str) -> Dive {
+    dive_in_ticks(vehicle, scene, Pace::default().tick)
+}
+
+/// Dives a scene in ticks of another length.
+pub(crate) fn dive_in_ticks(vehicle: &str, scene: &str, tick: DurNs) -> Dive {
+    let scene = shipped::scene_from(scene, &|_| Ok(vehicle.as_bytes().to_vec()));
+    watched(&scene, Pace { tick, ..Pace::default() })
+}
+
+fn watched(scene: &Scene, pace: Pace) -> Dive {
+    let vehicle = &scene.vehicle;
+    let mut app = App::new(vehicle.mission());
+    for sensor in &vehicle.sensors {
+        app.add_plugin(sensor.as_ref()).unwrap();
+    }
+    app.add_plugin(&Watch).unwrap();
+    let mut dive = app.arm(vehicle.navigation()).unwrap();
+    let simulation = Simulation::new(scene).unwrap_or_else(|why| panic!("{why}"));
+    drive(&mut dive, &mut SimulationFeed::new(simulation), pace, &mut |_| {}).unwrap();
+    dive.finish();
+    let heads = vehicle.heads();
+    Dive {
+        pings: dive.world().resource::<Seen>().0.clone(),
+        report: Report::of(&dive),
+        profile: vehicle.tunnel.profile.clone(),
+        ranges_m: heads.iter().map(|head| head.reach_m(vehicle.site.sound_speed_mps)[1]).collect(),
+        mounts: heads.iter().map(|head| head.mount).collect(),
+        turn_s: heads.iter().map(|head| TAU / head.step_rad * head.ping_period_s).fold(0.0, f64::max),
+    }
+}
