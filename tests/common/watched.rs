@@ -4,11 +4,12 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
 
 use bevy_ecs::prelude::{Res, ResMut, Resource};
-use headrace_core::app::App;
 use headrace_core::app::flow::{Outcome, Placed, PlacedList};
 use headrace_core::app::plugin::{Plugin, PluginError};
 use headrace_core::app::report::Report;
 use headrace_core::app::stage::Stage;
+use headrace_core::app::{App, Mission};
+use headrace_core::config::VehicleConfig;
 use headrace_core::frames::{Mount, Pose};
 use headrace_core::math::TAU;
 use headrace_core::time::{DurNs, MonoNs};
@@ -104,13 +105,29 @@ pub(crate) fn dive(vehicle: &str, scene: &str) -> Dive {
 
 /// Dives a scene in ticks of another length.
 pub(crate) fn dive_in_ticks(vehicle: &str, scene: &str, tick: DurNs) -> Dive {
-    let scene = shipped::scene_from(scene, &|_| Ok(vehicle.as_bytes().to_vec()));
-    watched(&scene, Pace { tick, ..Pace::default() })
+    let scene = parse(vehicle, "", scene);
+    watched(&scene, &scene.vehicle, scene.vehicle.mission(), Pace { tick, ..Pace::default() })
 }
 
-fn watched(scene: &Scene, pace: Pace) -> Dive {
-    let vehicle = &scene.vehicle;
-    let mut app = App::new(vehicle.mission());
+/// Dives a scene, the loop being told that the wall's arc length begins elsewhere.
+pub(crate) fn dive_with_profile(vehicle: &str, scene: &str, profile: Profile) -> Dive {
+    let scene = parse(vehicle, "", scene);
+    watched(&scene, &scene.vehicle, Mission { profile, ..scene.vehicle.mission() }, Pace::default())
+}
+
+/// Dives a scene in a polygon, whose corners are `y_m,z_m` a line, while the loop believes in another vehicle and polygon.
+pub(crate) fn dive_believing(vehicle: [&str; 2], polygon: [&str; 2], scene: &str) -> Dive {
+    let [true_scene, believed] = [0, 1].map(|k| parse(vehicle[k], polygon[k], scene));
+    watched(&true_scene, &believed.vehicle, believed.vehicle.mission(), Pace::default())
+}
+
+fn parse(vehicle: &str, polygon: &str, scene: &str) -> Scene {
+    let file = |name: &str| if name.contains("vehicle") { vehicle } else { polygon };
+    shipped::scene_from(scene, &|name| Ok(file(name).as_bytes().to_vec()))
+}
+
+fn watched(scene: &Scene, vehicle: &VehicleConfig, mission: Mission, pace: Pace) -> Dive {
+    let mut app = App::new(mission);
     for sensor in &vehicle.sensors {
         app.add_plugin(sensor.as_ref()).unwrap();
     }
@@ -123,7 +140,7 @@ fn watched(scene: &Scene, pace: Pace) -> Dive {
     Dive {
         pings: dive.world().resource::<Seen>().0.clone(),
         report: Report::of(&dive),
-        profile: vehicle.tunnel.profile.clone(),
+        profile: dive.mission().profile.clone(),
         ranges_m: heads.iter().map(|head| head.reach_m(vehicle.site.sound_speed_mps)[1]).collect(),
         mounts: heads.iter().map(|head| head.mount).collect(),
         turn_s: heads.iter().map(|head| TAU / head.step_rad * head.ping_period_s).fold(0.0, f64::max),
