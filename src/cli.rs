@@ -39,6 +39,13 @@ pub(crate) enum Command {
     /// gives what is asked.
     #[command(after_help = PLAN_EXAMPLES)]
     Plan(Plan),
+    /// Find from a log how sensors sit, where they count from and how late they are: values for the vehicle file.
+    ///
+    /// Heads by a turn or more while the vehicle stands still beside the tunnel's middle; the surface by --at-surface; cable
+    /// counters by --chainage; time offsets by a dive that turns and rolls. What the log can't tell is said, and why. Exit
+    /// code 1 when nothing can be told.
+    #[command(after_help = CALIBRATE_EXAMPLES)]
+    Calibrate(Calibrate),
     /// Say what is wrong with a vehicle file, or what it describes.
     #[command(after_help = "Example:\n  headrace check deploy/vehicles/vita2-4.toml")]
     Check(Check),
@@ -123,6 +130,11 @@ const SIMULATE_EXAMPLES: &str = "Example:
   headrace simulate deploy/scenes/vita1-field.toml --explain
   headrace simulate deploy/scenes/vita1-field.toml --seed 7 --truth truth.csv -o dive.mcap";
 
+const CALIBRATE_EXAMPLES: &str = "Example:
+  headrace calibrate dive.mcap
+  headrace calibrate dive.mcap --from 60 --to 180 --chainage 0 --at-surface 5..30
+  headrace calibrate dive.mcap --vehicle vehicle.toml --json";
+
 const PLAN_EXAMPLES: &str = "Example:
   headrace plan --vehicle deploy/vehicles/vita2-4.toml --target 0.5
   headrace plan --tunnel ceran --heads 2 --target 0.6 --drift 1.5 --yaw 15 --svg pictures
@@ -181,6 +193,30 @@ pub(crate) struct Plan {
     /// Folder to draw pictures into: perimeter, pattern, speeds and hours (docs/plan says how to read them).
     #[arg(long, value_name = "DIR")]
     pub(crate) svg: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Calibrate {
+    /// Log to calibrate by.
+    pub(crate) log: PathBuf,
+    /// Vehicle file, in place of the one attached to the log.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) vehicle: Option<PathBuf>,
+    /// From here on, in seconds from the log's first message.
+    #[arg(long, value_name = "SECONDS", value_parser = moment, default_value = "0")]
+    pub(crate) from: f64,
+    /// Up to here, in seconds from the log's first message; 1200 s at most, and as many without this.
+    #[arg(long, value_name = "SECONDS", value_parser = moment)]
+    pub(crate) to: Option<f64>,
+    /// When the depth sensor was at the water's surface or above it, in seconds from the log's first message.
+    #[arg(long, value_name = "FROM..TO", value_parser = span)]
+    pub(crate) at_surface: Option<[f64; 2]>,
+    /// Where the vehicle truly stood still, metres from the portal.
+    #[arg(long, value_name = "METRES", value_parser = chainage, allow_hyphen_values = true)]
+    pub(crate) chainage: Option<f64>,
+    /// Print JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 #[derive(Debug, Args)]
@@ -262,6 +298,20 @@ fn yaw(text: &str) -> Result<f64, String> {
 fn within(text: &str, unit: &str, least: f64, most: f64) -> Result<f64, String> {
     let number = text.parse::<f64>().ok().filter(|number| (least..=most).contains(number));
     number.ok_or_else(|| format!("wanted is a number of {unit} from {least} to {most}"))
+}
+
+fn moment(text: &str) -> Result<f64, String> {
+    within(text, "seconds", 0.0, 1.0e7)
+}
+
+fn span(text: &str) -> Result<[f64; 2], String> {
+    let both = text.split_once("..").and_then(|(from, to)| Some([moment(from).ok()?, moment(to).ok()?]));
+    both.filter(|[from, to]| from < to)
+        .ok_or_else(|| "wanted are two numbers of seconds, FROM..TO, the first one less".to_owned())
+}
+
+fn chainage(text: &str) -> Result<f64, String> {
+    within(text, "metres", -1000.0, 1.0e5)
 }
 
 fn place(text: &str) -> Result<[f64; 2], String> {

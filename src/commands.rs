@@ -117,7 +117,7 @@ pub(crate) fn vehicle_file(path: &Path) -> Result<(String, VehicleConfig), Failu
     Ok((text, vehicle))
 }
 
-fn attached_vehicle(
+pub(crate) fn attached_vehicle(
     info: &LogInfo,
     losses: &[String],
     log: &Path,
@@ -126,10 +126,7 @@ fn attached_vehicle(
         let damage =
             losses.first().map(|loss| format!(" can be read from this log, which is damaged ({loss})"));
         let which = damage.unwrap_or_else(|| " is attached to this log".to_owned());
-        Failure::Usage(format!(
-            "replaying {}: no vehicle file{which}; give one with --vehicle",
-            log.display()
-        ))
+        Failure::Usage(format!("reading {}: no vehicle file{which}; give one with --vehicle", log.display()))
     })?;
     let vehicle = parse_vehicle("vehicle.toml", &text, &files::attached(&info.attachments))?;
     Ok((text, vehicle))

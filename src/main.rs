@@ -1,5 +1,6 @@
 //! The `headrace` binary: command line, configuration, list of plugins; the work is done in the libraries.
 
+mod calibrate;
 mod cli;
 mod commands;
 mod devices;
@@ -31,6 +32,7 @@ fn main() -> ExitCode {
         Command::Replay(replay) => commands::replay(&replay),
         Command::Simulate(simulate) => simulate::simulate(&simulate),
         Command::Plan(args) => plan::plan(&args),
+        Command::Calibrate(args) => calibrate::calibrate(&args),
         Command::Check(check) => commands::check(&check),
         Command::Paper(args) => paper::paper(&args),
     };

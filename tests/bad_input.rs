@@ -385,7 +385,7 @@ fn a_log_without_a_vehicle_file_needs_one_given() {
     write_log(&folder.path("bare.mcap"), WriteOptions::new(), None, &raw_messages(&dive));
     let answer = folder.headrace(&["replay", "bare.mcap"]);
     assert_eq!((answer.code, answer.stdout.as_str()), (Some(2), ""));
-    insta::assert_snapshot!(answer.stderr, @"headrace: replaying bare.mcap: no vehicle file is attached to this log; give one with --vehicle");
+    insta::assert_snapshot!(answer.stderr, @"headrace: reading bare.mcap: no vehicle file is attached to this log; give one with --vehicle");
     assert_eq!(folder.digest("bare.mcap", &["--vehicle", "vehicle.toml"]), folder.digest("dive.mcap", &[]));
 }
 

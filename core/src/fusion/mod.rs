@@ -1,5 +1,6 @@
 //! Where the vehicle is: the seam behind which navigation stands, and the ways of navigating.
 
+pub mod calibration;
 pub mod direct;
 pub mod filter;
 pub mod relative;

@@ -117,7 +117,7 @@ impl Running {
                     rows(state, context, source, &waiting, window).get(number).copied().flatten()
                 };
                 if let Some(row) = row.and_then(|row| self.straight(row, &then, again)) {
-                    self.fuse(&row.seen_later(later_s), context.settings.gate, source, (&known, &mut errors));
+                    self.fuse(&row.seen_later(later_s), &context.settings, source, (&known, &mut errors));
                 }
             }
         }
@@ -184,21 +184,25 @@ impl Running {
     }
 
     /// Takes a row whose residual is against the estimate corrected by the errors that were known.
-    fn fuse(&mut self, row: &Row, gate: f64, source: &mut Source, (known, errors): (&Errors, &mut Errors)) {
+    fn fuse(
+        &mut self,
+        row: &Row,
+        settings: &Settings,
+        source: &mut Source,
+        (known, errors): (&Errors, &mut Errors),
+    ) {
         let mut row = row.unless_sure(|by| math::sqrt(self.factors.variance_along(by)));
         row.noise += self.left_out(row.bends);
         let innovation = row.residual - since(&row, known, errors);
         let variance = self.factors.variance_along(&row.h) + row.noise;
         let nis = innovation * innovation / variance;
-        let agrees = nis <= gate;
-        self.agreement.note(source.sensor.kind, &row, agrees);
-        if !agrees {
-            source.consistency.gated += 1;
-            return;
+        let agrees = nis <= settings.gate;
+        let kind = source.sensor.kind;
+        self.agreement.note(kind, &row, agrees);
+        source.consistency.count(nis, settings.gate, variance, settings.usual_variance(kind));
+        if agrees {
+            self.correct(&row, known, errors);
         }
-        self.correct(&row, known, errors);
-        source.consistency.used += 1;
-        source.consistency.nis_sum += nis;
     }
 
     /// Variance of what a row leaves out, by its second derivatives. It matters only while the place or the attitude is
@@ -377,6 +381,6 @@ pub fn in_tunnel(site: &Site, level: Rot<Level, Sensor>) -> Rot<Tunnel, Sensor> 
 }
 
 /// A noise with that of rounding to a quantum.
-pub(super) fn with_quantum(sd: f64, quantum: f64) -> f64 {
+pub(in crate::fusion) fn with_quantum(sd: f64, quantum: f64) -> f64 {
     math::hypot(sd, quantum / math::sqrt(12.0))
 }

@@ -4,6 +4,7 @@
 use core::ops::RangeInclusive;
 
 use crate::config::{ConfigError, Section};
+use crate::fusion::SensorKind;
 use crate::time::DurNs;
 
 /// In radians.
@@ -121,6 +122,20 @@ impl Default for Settings {
 const GATE_999: f64 = 10.828;
 
 impl Settings {
+    /// Variance of a measurement of a kind of sensor by itself, in its unit: the measure of what innovations have.
+    pub fn usual_variance(&self, kind: SensorKind) -> f64 {
+        let sd = match kind {
+            SensorKind::Head => self.return_sd_m,
+            SensorKind::Echosounder { .. } => self.echo_sd_m,
+            SensorKind::Depth => self.depth_sd_m,
+            SensorKind::Imu => self.tilt_sd_rad,
+            SensorKind::VelocityLog => self.velocity_sd_mps,
+            SensorKind::Tether { .. } => self.tether_sd_m,
+            SensorKind::Other => 1.0,
+        };
+        sd * sd
+    }
+
     /// Reads a vehicle file's `[navigation]` table; what it leaves out is as usual.
     ///
     /// Errors: the first key whose value is out of range.

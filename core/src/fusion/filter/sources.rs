@@ -23,9 +23,24 @@ pub struct Consistency {
     pub dropped: u64,
     /// Sum of the normalised innovations squared (NIS) of those that were used.
     pub nis_sum: f64,
+    /// Minus twice the logarithm of the likelihood of all innovations, up to a constant for each measurement: a sum of NIS,
+    /// at the gate where they are beyond it, less 1, and of the logarithm of their variance against the usual one. Between two
+    /// ways of reading the same log, the one with less of it is likelier.
+    pub surprise: f64,
 }
 
 impl Consistency {
+    /// Counts an innovation of this variance, and whether it was used.
+    pub fn count(&mut self, nis: f64, gate: f64, variance: f64, usual: f64) {
+        self.surprise += nis.min(gate) - 1.0 + math::ln(variance / usual);
+        if nis <= gate {
+            self.used += 1;
+            self.nis_sum += nis;
+        } else {
+            self.gated += 1;
+        }
+    }
+
     /// Mean NIS of the measurements that were used; `None` without any.
     pub fn nis(&self) -> Option<f64> {
         (self.used > 0).then(|| self.nis_sum / self.used as f64)

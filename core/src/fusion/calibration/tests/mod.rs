@@ -1,0 +1,5 @@
+//! Vehicles that stand in tunnels, heads that sit otherwise than their file says, and what is found.
+
+mod found;
+mod refused;
+mod stand;
