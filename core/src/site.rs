@@ -32,6 +32,9 @@ impl Default for Site {
 }
 
 impl Site {
+    /// What the air's pressure may be at a place where water stands, Pa: from high in the mountains to below the sea's level.
+    pub const SURFACE_PRESSURE_PA: core::ops::RangeInclusive<f64> = 40_000.0..=110_000.0;
+
     /// Depth below the surface in metres of a place at absolute pressure `pressure_pa`, in water at rest.
     pub fn depth_m(&self, pressure_pa: f64) -> f64 {
         (pressure_pa - self.surface_pressure_pa) / (self.density_kgpm3 * self.gravity_mps2)

@@ -156,8 +156,10 @@ impl Table {
         let left = self.number(&id, ("left", "m", 3), at.y(), head.left_m.map(from(at.y())));
         let up = self.number(&id, ("up", "m", 3), at.z(), head.up_m.map(from(at.z())));
         if left || up {
-            let at = head.found.position;
-            self.line(&sensor(&id), format!("position_m = {}", triple([at.x(), at.y(), at.z()], 3)));
+            // What doesn't differ stays as it is written.
+            let y_m = if left { head.found.position.y() } else { at.y() };
+            let z_m = if up { head.found.position.z() } else { at.z() };
+            self.line(&sensor(&id), format!("position_m = {}", triple([at.x(), y_m, z_m], 3)));
         }
     }
 
@@ -185,9 +187,11 @@ impl Table {
             let latency = vehicle.sensor_configs.get(lag.source).map(|sensor| sensor.latency);
             let file_ms = latency.map_or(0.0, |latency| latency.as_secs_f64() * 1e3);
             let found = lag.offset_s.map(|of| Estimate { value: file_ms + of.value * 1e3, sd: of.sd * 1e3 });
-            let differs = self.number(&id, ("latency", "ms", 1), file_ms, found);
-            if let (true, Ok(found)) = (differs, found)
+            self.number(&id, ("latency", "ms", 1), file_ms, found);
+            // Of many sources one is soon two standard deviations off by chance, and none is early.
+            if let Ok(found) = found
                 && found.value > 0.0
+                && (found.value - file_ms).abs() > 3.0 * found.sd
             {
                 self.line(&sensor(&id), format!("latency_ms = {}", number(found.value, 1)));
             }

@@ -224,7 +224,7 @@ fn parse_water(section: Section<'_>, axis_yaw_rad: f64) -> Result<Site, ConfigEr
         density_kgpm3: or(section.number("density_kgpm3", 900.0..=1100.0)?, usual.density_kgpm3),
         gravity_mps2: or(section.number("gravity_mps2", 9.7..=9.9)?, usual.gravity_mps2),
         surface_pressure_pa: or(
-            section.number("surface_pressure_pa", 40_000.0..=110_000.0)?,
+            section.number("surface_pressure_pa", Site::SURFACE_PRESSURE_PA)?,
             usual.surface_pressure_pa,
         ),
         surface_above_floor_m: or(

@@ -146,6 +146,18 @@ pub enum Untold {
         /// What is allowed, Pa.
         most_pa: f64,
     },
+    /// Pressure was that of depth.
+    #[error(
+        "the depth sensor was under water: the pressure was {mean_pa:.0} Pa, and air has {least_pa} to {most_pa}"
+    )]
+    UnderWater {
+        /// The pressure, Pa.
+        mean_pa: f64,
+        /// What air has at least, Pa.
+        least_pa: f64,
+        /// What it has at most, Pa.
+        most_pa: f64,
+    },
     /// Nobody has said where the vehicle was.
     #[error("nobody has said where the vehicle stood: --chainage METRES does, the portal is 0")]
     NoChainage,
@@ -163,6 +175,17 @@ pub enum Untold {
     NoBest {
         /// How far was looked, ms.
         reach_ms: f64,
+    },
+    /// The filter isn't where the vehicle is.
+    #[error(
+        "the filter leaves out {gated:.0} % of all measurements, and {most:.0} % are allowed: mounts, beams or the profile \
+         of the vehicle file are off, or the vehicle turned too wildly"
+    )]
+    Disagrees {
+        /// Share that it leaves out, %.
+        gated: f64,
+        /// What is allowed, %.
+        most: f64,
     },
     /// The filter never ran.
     #[error(

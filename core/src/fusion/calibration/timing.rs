@@ -19,6 +19,8 @@ const CLEAR: f64 = 25.0;
 const TOLD_S: f64 = 0.03;
 /// A latency isn't negative; by so much it may seem so, s.
 const EARLY_S: f64 = 0.01;
+/// A filter that has to leave out more than this share of measurements isn't where the vehicle is.
+const MOST_GATED: f64 = 0.2;
 /// Fewer readings of a source aren't looked at, and a longer log says it well enough by its beginning.
 const LEAST_READINGS: usize = 50;
 const MOST: DurNs = DurNs(600_000_000_000);
@@ -47,6 +49,9 @@ pub fn lags(
     let mut runs = Runs::new(material, progress);
     let sources = runs.sources();
     let mut base = runs.surprise().ok_or(Untold::NoFilter)?;
+    if runs.gated > MOST_GATED {
+        return Err(Untold::Disagrees { gated: runs.gated * 100.0, most: MOST_GATED * 100.0 });
+    }
     let mut coarse: Vec<Option<Curve>> = Vec::new();
     for _ in 0..sources.len() {
         coarse = sources.iter().map(|source| runs.coarse(*source, base)).collect();
@@ -73,7 +78,7 @@ pub fn lags(
         }
     }
     let lag = |(source, curve): (&usize, &Option<Curve>)| {
-        let offset_s = runs.lag(*source, base, curve.as_ref());
+        let offset_s = runs.lag(*source, curve.as_ref());
         Lag { source: *source, offset_s }
     };
     Ok(sources.iter().zip(&coarse).map(lag).collect())
@@ -95,6 +100,8 @@ struct Runs<'a, 'b> {
     material: &'a Material<'a>,
     events: &'a [Event],
     shifts_s: Vec<f64>,
+    /// Share of measurements that the last run left out.
+    gated: f64,
     progress: &'b mut dyn FnMut(),
 }
 
@@ -103,7 +110,7 @@ impl<'a, 'b> Runs<'a, 'b> {
         let first = material.events.first().map_or(MonoNs(0), |event| event.received);
         let end = material.events.partition_point(|event| event.received.since(first).0 < MOST.0);
         let events = material.events.get(..end).unwrap_or(material.events);
-        Self { material, events, shifts_s: vec![0.0; material.sensors.len()], progress }
+        Self { material, events, shifts_s: vec![0.0; material.sensors.len()], gated: 0.0, progress }
     }
 
     /// The sources that navigation uses, and that speak.
@@ -147,7 +154,13 @@ impl<'a, 'b> Runs<'a, 'b> {
         }
         filter.running()?;
         let all = (0..sensors.len()).filter_map(|source| filter.consistency(source));
-        let sum: f64 = all.map(|consistency| consistency.surprise).sum();
+        let (mut sum, mut used, mut gated) = (0.0, 0, 0);
+        for consistency in all {
+            sum += consistency.surprise;
+            used += consistency.used;
+            gated += consistency.gated;
+        }
+        self.gated = gated as f64 / (used + gated).max(1) as f64;
         sum.is_finite().then_some(sum)
     }
 
@@ -183,7 +196,7 @@ impl<'a, 'b> Runs<'a, 'b> {
         parabola(&points, base)
     }
 
-    fn lag(&mut self, source: usize, base: f64, coarse: Option<&Curve>) -> Result<Estimate, Untold> {
+    fn lag(&mut self, source: usize, coarse: Option<&Curve>) -> Result<Estimate, Untold> {
         let none = Untold::NoBest { reach_ms: REACH_S * 1e3 };
         let coarse = coarse.ok_or(none)?;
         if coarse.sd_s > 2.0 * TOLD_S {
@@ -194,7 +207,6 @@ impl<'a, 'b> Runs<'a, 'b> {
         self.shift(source, was_s + near);
         let fine = self.surprise().and_then(|now| self.fine(source, now, coarse.sd_s));
         self.shift(source, was_s);
-        let _ = base;
         let fine = fine.ok_or(none)?;
         if fine.sd_s > TOLD_S {
             return Err(Untold::Flat { sd_ms: fine.sd_s * 1e3 });

@@ -8,6 +8,7 @@ use crate::frames::Rot;
 use crate::fusion::SensorKind;
 use crate::fusion::filter::running::{in_tunnel, with_quantum};
 use crate::math;
+use crate::site::Site;
 use crate::time::MonoNs;
 
 /// At the surface pressure goes by no more: 5 cm of water.
@@ -27,7 +28,7 @@ pub struct Zero {
 /// Pressure at the surface, Pa, by the first depth sensor: its mean from `from` to before `to`. Its standard deviation is that
 /// of one reading, since waves and drift don't average out.
 ///
-/// Errors: no pressure, or not that of one level.
+/// Errors: no pressure, not that of one level, or not that of air.
 pub fn surface(material: &Material<'_>, from: MonoNs, to: MonoNs) -> Result<Zero, Untold> {
     let mut source = None;
     let mut quantum_pa = 0.0;
@@ -49,6 +50,10 @@ pub fn surface(material: &Material<'_>, from: MonoNs, to: MonoNs) -> Result<Zero
     }
     let count = pressures.len().max(1) as f64;
     let mean = pressures.iter().sum::<f64>() / count;
+    if !Site::SURFACE_PRESSURE_PA.contains(&mean) {
+        let (least_pa, most_pa) = (*Site::SURFACE_PRESSURE_PA.start(), *Site::SURFACE_PRESSURE_PA.end());
+        return Err(Untold::UnderWater { mean_pa: mean, least_pa, most_pa });
+    }
     let variance = pressures.iter().map(|pa| (pa - mean) * (pa - mean)).sum::<f64>() / count;
     let sd = with_quantum(math::sqrt(variance), quantum_pa);
     Ok(Zero { source, found: Estimate { value: mean, sd }, readings: pressures.len() })
