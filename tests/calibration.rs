@@ -8,6 +8,8 @@
 
 mod common;
 
+use std::fmt::Write as _;
+
 use common::Folder;
 use serde_json::Value;
 
@@ -69,10 +71,12 @@ fn scene(stand: bool, effects: &str) -> String {
         "name = \"calibration\"\nvehicle = \"true.toml\"\n[trajectory]\nkind = \"waypoints\"\n".to_owned();
     let mut go = |chainage: f64, place: [f64; 2], angles: [f64; 3], stay: f64| {
         let [roll, pitch, yaw] = angles;
-        scene += &format!(
+        write!(
+            scene,
             "[[trajectory.waypoints]]\nchainage_m = {chainage}\nplace_m = {place:?}\nroll_deg = {roll}\n\
              pitch_deg = {pitch}\nyaw_deg = {yaw}\nspeed_mps = 0.35\nstay_s = {stay}\n"
-        );
+        )
+        .unwrap();
     };
     go(10.0, [0.6, 2.3], [1.0, 0.0, 2.0], if stand { 12.0 } else { 0.0 });
     for k in 1..=9 {

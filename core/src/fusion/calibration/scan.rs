@@ -1,12 +1,16 @@
 //! What was heard of the wall while the vehicle stood still.
 
+use std::collections::BTreeMap;
+
 use super::still::Still;
 use super::{Material, Untold, median};
+use crate::app::flow::Event;
 use crate::app::reading::Reading;
 use crate::frames::{Body, Mount, Rot, Tunnel};
-use crate::fusion::SensorKind;
 use crate::fusion::filter::running::in_tunnel;
+use crate::fusion::{SensorInfo, SensorKind};
 use crate::math::{self, TAU};
+use crate::time::MonoNs;
 
 /// Returns nearer together than this see the same roughness of the wall: together they count as one.
 pub(super) const SAME_WALL_RAD: f64 = TAU / SECTORS as f64;
@@ -108,60 +112,68 @@ fn sector(angle_rad: f64) -> usize {
 ///
 /// Errors: no attitude, or no head that heard the wall.
 pub fn gather(material: &Material<'_>, still: &Still) -> Result<Scan, Untold> {
-    let attitudes: Vec<_> = material
-        .during(still.from, still.to)
-        .filter_map(|(event, sensor)| match (sensor.kind, event.reading) {
-            (SensorKind::Imu, Reading::Attitude(level)) => {
-                let attitude = in_tunnel(&material.site, level) * sensor.mount.rotation.inverse();
-                Some((event.valid_at, attitude))
-            }
-            _ => None,
-        })
-        .collect();
-    let (_, attitude) =
-        *attitudes.get(attitudes.len() / 2).ok_or(Untold::Missing { what: "an inertial unit's attitude" })?;
-    let mut heads: Vec<HeadScan> = Vec::new();
-    let mut echoes: Vec<(usize, Mount, Vec<f64>)> = Vec::new();
-    for (event, sensor) in material.during(still.from, still.to) {
-        let source = event.source.index();
-        match (sensor.kind, event.reading) {
-            (SensorKind::Head, Reading::Sonar(sonar)) => {
-                let Some(range_m) = sonar.range_m else { continue };
-                let range_m = material.site.rescaled_range_m(range_m, sonar.sound_speed_mps);
-                let before = attitudes.partition_point(|(at, _)| *at <= event.valid_at);
-                let attitude =
-                    attitudes.get(before.saturating_sub(1)).map_or(attitude, |(_, attitude)| *attitude);
-                let one = Return { angle_rad: sonar.angle_rad, range_m, attitude, share: 1.0 };
-                if !(one.angle_rad.is_finite() && range_m.is_finite()) {
-                    continue;
-                }
-                match heads.iter_mut().find(|head| head.source == source) {
-                    Some(head) => head.returns.push(one),
-                    None => {
-                        heads.push(HeadScan { source, mount: sensor.mount, returns: vec![one] });
-                    }
-                }
-            }
-            (SensorKind::Echosounder { min_confidence }, Reading::Echo(echo))
-                if echo.confidence >= min_confidence =>
-            {
-                let Some(range_m) = echo.range_m.filter(|range_m| range_m.is_finite()) else { continue };
-                let range_m = material.site.rescaled_range_m(range_m, echo.sound_speed_mps);
-                match echoes.iter_mut().find(|(other, ..)| *other == source) {
-                    Some((.., ranges_m)) => ranges_m.push(range_m),
-                    None => echoes.push((source, sensor.mount, vec![range_m])),
-                }
-            }
-            _ => {}
-        }
-    }
+    let attitudes = attitudes(material, still);
+    let middle = attitudes.get(attitudes.len() / 2);
+    let (_, attitude) = *middle.ok_or(Untold::Missing { what: "an inertial unit's attitude" })?;
+    let heads = heads(material, still, &attitudes);
     if heads.is_empty() {
         return Err(Untold::Missing { what: "any profiling head" });
     }
-    heads.sort_unstable_by_key(|head| head.source);
-    heads.iter_mut().for_each(HeadScan::thin);
-    let echoes = echoes.into_iter().filter_map(|(_, mount, mut ranges_m)| {
+    Ok(Scan { attitude, heads, echoes: echoes(material, still) })
+}
+
+/// How the vehicle hung, by time.
+fn attitudes(material: &Material<'_>, still: &Still) -> Vec<(MonoNs, Rot<Tunnel, Body>)> {
+    let attitude = |(event, sensor): (&Event, &SensorInfo)| match (sensor.kind, event.reading) {
+        (SensorKind::Imu, Reading::Attitude(level)) => {
+            let attitude = in_tunnel(&material.site, level) * sensor.mount.rotation.inverse();
+            Some((event.valid_at, attitude))
+        }
+        _ => None,
+    };
+    material.during(still.from, still.to).filter_map(attitude).collect()
+}
+
+/// The heads that heard the wall, by source.
+fn heads(material: &Material<'_>, still: &Still, attitudes: &[(MonoNs, Rot<Tunnel, Body>)]) -> Vec<HeadScan> {
+    let mut heads: BTreeMap<usize, HeadScan> = BTreeMap::new();
+    for (event, sensor) in material.during(still.from, still.to) {
+        let (SensorKind::Head, Reading::Sonar(sonar)) = (sensor.kind, event.reading) else { continue };
+        let before = attitudes.partition_point(|(at, _)| *at <= event.valid_at).saturating_sub(1);
+        let (Some(range_m), Some((_, attitude)), true) =
+            (sonar.range_m, attitudes.get(before), event.reading.is_finite())
+        else {
+            continue;
+        };
+        let range_m = material.site.rescaled_range_m(range_m, sonar.sound_speed_mps);
+        let source = event.source.index();
+        let head = heads.entry(source).or_insert_with(|| HeadScan {
+            source,
+            mount: sensor.mount,
+            returns: Vec::new(),
+        });
+        head.returns.push(Return { angle_rad: sonar.angle_rad, range_m, attitude: *attitude, share: 1.0 });
+    }
+    heads.values_mut().for_each(HeadScan::thin);
+    heads.into_values().collect()
+}
+
+/// The echosounders that heard the wall, by source.
+fn echoes(material: &Material<'_>, still: &Still) -> Vec<EchoScan> {
+    let mut heard: BTreeMap<usize, (Mount, Vec<f64>)> = BTreeMap::new();
+    for (event, sensor) in material.during(still.from, still.to) {
+        let (SensorKind::Echosounder { min_confidence }, Reading::Echo(echo)) = (sensor.kind, event.reading)
+        else {
+            continue;
+        };
+        let is_sure = echo.confidence >= min_confidence && event.reading.is_finite();
+        if let (Some(range_m), true) = (echo.range_m, is_sure) {
+            let range_m = material.site.rescaled_range_m(range_m, echo.sound_speed_mps);
+            heard.entry(event.source.index()).or_insert((sensor.mount, Vec::new())).1.push(range_m);
+        }
+    }
+    let middle = |(mount, mut ranges_m): (Mount, Vec<f64>)| {
         median(&mut ranges_m).map(|range_m| EchoScan { mount, range_m })
-    });
-    Ok(Scan { attitude, heads, echoes: echoes.collect() })
+    };
+    heard.into_values().filter_map(middle).collect()
 }

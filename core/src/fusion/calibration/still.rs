@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::{Material, Untold, median};
 use crate::app::flow::Event;
-use crate::app::reading::Reading;
+use crate::app::reading::{Level, Reading};
 use crate::frames::{Rot, Sensor};
 use crate::fusion::filter::state::rotation_vector;
 use crate::fusion::{SensorInfo, SensorKind};
@@ -16,7 +16,7 @@ const BIN: DurNs = DurNs(1_000_000_000);
 const LEAST: usize = 3;
 const MOST: usize = 120;
 
-/// What shows that a vehicle moves, the name of that, how far it may go, and the unit.
+/// What shows that a vehicle moves.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Sign {
     Cable,
@@ -35,6 +35,7 @@ impl Sign {
         }
     }
 
+    /// How far it may go, and in which unit.
     fn limit(self) -> (f64, &'static str) {
         match self {
             Self::Cable => (0.05, "m"),
@@ -53,7 +54,10 @@ pub struct Still {
     pub to: MonoNs,
 }
 
-/// Medians of what one source shows, by bin.
+/// What one source shows, by bin.
+type Raw = (Sign, Vec<Vec<f64>>);
+
+/// Medians of that.
 struct Channel {
     sign: Sign,
     by_bin: Vec<Option<f64>>,
@@ -151,8 +155,8 @@ fn heard(material: &Material<'_>, first: MonoNs, bins: usize) -> Vec<bool> {
 }
 
 fn channels(material: &Material<'_>, first: MonoNs, bins: usize) -> Vec<Channel> {
-    let mut raw: BTreeMap<(usize, usize), (Sign, Vec<Vec<f64>>)> = BTreeMap::new();
-    let mut upright: BTreeMap<usize, Rot<crate::app::reading::Level, Sensor>> = BTreeMap::new();
+    let mut raw: BTreeMap<(usize, usize), Raw> = BTreeMap::new();
+    let mut upright: BTreeMap<usize, Rot<Level, Sensor>> = BTreeMap::new();
     for event in material.events {
         let Some(sensor) = material.sensors.get(event.source.index()) else { continue };
         let source = event.source.index();
@@ -167,7 +171,7 @@ fn channels(material: &Material<'_>, first: MonoNs, bins: usize) -> Vec<Channel>
             }
         }
     }
-    let channel = |(sign, mut lists): (Sign, Vec<Vec<f64>>)| Channel {
+    let channel = |(sign, mut lists): Raw| Channel {
         sign,
         by_bin: lists.iter_mut().map(|list| median(list)).collect(),
     };
@@ -179,7 +183,7 @@ fn shows(
     material: &Material<'_>,
     sensor: &SensorInfo,
     event: &Event,
-    upright: Option<&Rot<crate::app::reading::Level, Sensor>>,
+    upright: Option<&Rot<Level, Sensor>>,
 ) -> Option<(Sign, [f64; 3])> {
     let one = |value: f64| [value, f64::NAN, f64::NAN];
     match (sensor.kind, event.reading) {

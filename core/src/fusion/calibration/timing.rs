@@ -69,13 +69,11 @@ pub fn lags(
         let refined = runs.surprise().and_then(|now| runs.fine(source, now, curve.sd_s));
         let by_s = refined.map_or(curve.best_s, |fine| curve.best_s + fine.best_s);
         runs.shift(source, before_s + by_s);
-        match runs.surprise().filter(|now| *now < base) {
-            Some(now) => base = now,
-            None => {
-                runs.shift(source, before_s);
-                break;
-            }
-        }
+        let Some(now) = runs.surprise().filter(|now| *now < base) else {
+            runs.shift(source, before_s);
+            break;
+        };
+        base = now;
     }
     let lag = |(source, curve): (&usize, &Option<Curve>)| {
         let offset_s = runs.lag(*source, curve.as_ref());
@@ -231,7 +229,7 @@ fn parabola(points: &[(f64, f64)], base: f64) -> Option<Curve> {
         v += row * (y - base);
     }
     let [c, b, a] = (m.try_inverse()? * v).into();
-    if !(a > 0.0) {
+    if a.is_nan() || a <= 0.0 {
         return None;
     }
     let best = -b / (2.0 * a);

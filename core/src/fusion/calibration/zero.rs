@@ -98,7 +98,7 @@ pub fn water_level(material: &Material<'_>, heads: &Heads, surface_pa: Option<f6
 ///
 /// Errors: no cable counter.
 pub fn tethers(material: &Material<'_>, still: &Still, chainage_m: f64) -> Result<Vec<Zero>, Untold> {
-    let mut found: Vec<(usize, f64, f64, Vec<f64>)> = Vec::new();
+    let mut found: Vec<(usize, f64, Vec<f64>)> = Vec::new();
     for (event, sensor) in material.during(still.from, still.to) {
         let (SensorKind::Tether { scale, .. }, Reading::TetherLength(length)) = (sensor.kind, event.reading)
         else {
@@ -107,7 +107,7 @@ pub fn tethers(material: &Material<'_>, still: &Still, chainage_m: f64) -> Resul
         let (source, quantum_m) = (event.source.index(), length.resolution_m * scale.abs());
         match found.iter_mut().find(|(other, ..)| *other == source) {
             Some((.., lengths)) => lengths.push(scale * length.length_m),
-            None => found.push((source, scale, quantum_m, vec![scale * length.length_m])),
+            None => found.push((source, quantum_m, vec![scale * length.length_m])),
         }
     }
     if found.is_empty() {
@@ -116,7 +116,7 @@ pub fn tethers(material: &Material<'_>, still: &Still, chainage_m: f64) -> Resul
     let settings = &material.settings;
     // Slack during the stand is one number, and doesn't average out.
     let sd_m = math::hypot(settings.tether_sd_m, settings.slack.reach);
-    let zero = |(source, _, quantum_m, mut lengths): (usize, f64, f64, Vec<f64>)| Zero {
+    let zero = |(source, quantum_m, mut lengths): (usize, f64, Vec<f64>)| Zero {
         source,
         readings: lengths.len(),
         found: Estimate {

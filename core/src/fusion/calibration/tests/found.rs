@@ -38,7 +38,7 @@ fn verif_offsets_that_were_put_in_are_found() {
             let stand = Stand { outliers: 0.08, ..Stand::new(profile.clone(), &wrong, seed) };
             let found = found(&stand);
             assert!(found.median_m < 0.02);
-            let mean = |of: fn(&Wrong) -> f64| (of(&wrong[0]) + of(&wrong[1])) / 2.0;
+            let mean = |of: fn(&Wrong) -> f64| f64::midpoint(of(&wrong[0]), of(&wrong[1]));
             for (head, wrong) in found.heads.iter().zip(&wrong) {
                 let told = format!("{name}, seed {seed}, {head:?}");
                 assert_eq!(head.is_mirrored, Ok(wrong.is_mirrored), "{told}");

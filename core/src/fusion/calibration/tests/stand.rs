@@ -75,7 +75,7 @@ impl Stand {
         }
     }
 
-    fn filed(&self, source: usize) -> SensorInfo {
+    fn filed(source: usize) -> SensorInfo {
         let at = |x: f64, y: f64, z: f64, pitch: f64, yaw: f64| Mount {
             position: Vec3::new(x, y, z),
             rotation: Rot::from_roll_pitch_yaw(0.0, pitch, yaw),
@@ -96,7 +96,7 @@ impl Stand {
     }
 
     pub(super) fn sensors(&self) -> Vec<SensorInfo> {
-        (0..HEADS + self.wrong.len()).map(|source| self.filed(source)).collect()
+        (0..HEADS + self.wrong.len()).map(Self::filed).collect()
     }
 
     /// Hands its readings to `estimate`.
@@ -137,7 +137,7 @@ impl Stand {
     }
 
     fn echo(&self, source: usize, t: f64, k: u64) -> Reading {
-        let mount = self.filed(source).mount;
+        let mount = Self::filed(source).mount;
         let range_m = self.range_m(t, mount.position, mount.rotation * Vec3::new(1.0, 0.0, 0.0));
         let range_m = range_m
             .map(|m| (m + 0.01 * self.noise(k, source as u64)) * DEVICE_MPS / self.site.sound_speed_mps);
@@ -148,7 +148,7 @@ impl Stand {
         let share = k as f64 / (f64::from(self.seconds) * 20.0);
         let angle_rad = (self.sector_deg.to_radians() * share + 0.3).min(TAU + 0.3);
         let wrong = self.wrong[head];
-        let mount = self.filed(HEADS + head).mount;
+        let mount = Self::filed(HEADS + head).mount;
         let shown = if wrong.is_mirrored { -angle_rad } else { angle_rad };
         let looks: Vec3<Sensor> = head_direction(shown + wrong.angle_deg.to_radians());
         let from = mount.position + Vec3::new(0.0, wrong.left_m, wrong.up_m);
@@ -177,10 +177,10 @@ impl Stand {
                 events.push(Event { source, received: at, valid_at: at, reading });
             };
             let axis = Rot::<Level, Tunnel>::from_roll_pitch_yaw(0.0, 0.0, self.site.axis_yaw_rad);
-            say(IMU, Reading::Attitude(axis * self.pose(t).attitude * self.filed(IMU).mount.rotation));
+            say(IMU, Reading::Attitude(axis * self.pose(t).attitude * Self::filed(IMU).mount.rotation));
             let length_m = 38.0 + self.speed_mps * t;
             say(TETHER, Reading::TetherLength(TetherLength { length_m, resolution_m: 0.001 }));
-            let height_m = self.pose(t).place(self.filed(DEPTH).mount.position).z();
+            let height_m = self.pose(t).place(Self::filed(DEPTH).mount.position).z();
             let pressure_pa = self.site.pressure_pa(self.site.surface_above_floor_m - height_m);
             let (resolution_pa, temperature_degc) = (1.0, 10.0);
             say(DEPTH, Reading::Pressure(WaterPressure { pressure_pa, resolution_pa, temperature_degc }));
