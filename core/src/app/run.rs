@@ -148,6 +148,7 @@ impl Loop {
 
     /// Judges what is still open: the dive has ended, and no sample will come. Gives the notices of it.
     pub fn finish(&mut self) -> Vec<super::flow::Notice> {
+        self.world.resource_mut::<Navigator>().navigation.end();
         let at = self.world.resource::<Tally>().span.map_or(MonoNs(0), |(_, last)| last);
         let profile = &self.mission.profile;
         let world = &mut self.world;

@@ -5,6 +5,7 @@ pub mod direct;
 pub mod filter;
 pub mod relative;
 pub mod section;
+pub mod smooth;
 
 use self::direct::DirectNavigation;
 use self::filter::FilterNavigation;
@@ -102,6 +103,9 @@ pub trait Navigation: Send + Sync {
     ///
     /// Allocates: never.
     fn update(&mut self, source: usize, sensor: &SensorInfo, times: Times, reading: &Reading);
+
+    /// No reading will come any more.
+    fn end(&mut self) {}
 
     /// How well a source agrees with the others; `None` where that isn't known.
     fn consistency(&self, _source: usize) -> Option<Consistency> {

@@ -1,8 +1,7 @@
 //! Whether sensors agree with the estimate at all: an estimate that is surely wrong gates everything that would mend it.
 
-use super::factors::Factors;
 use super::measure::Row;
-use super::state::{ATTITUDE, ERRORS, HEADING, POSITION, VELOCITY};
+use super::state::{ATTITUDE, ERRORS, Errors, HEADING, POSITION, VELOCITY};
 use crate::fusion::SensorKind;
 
 /// Measurements of a kind over which it is seen whether they agree at all.
@@ -67,9 +66,9 @@ impl Agreement {
         }
     }
 
-    /// When a kind of measurement no longer agrees, what it measures is anywhere near, and so is what has moved it there.
-    /// Gives whether the way along the tunnel is sought: what is found has no bearing on what was believed before.
-    pub fn seek(&mut self, factors: &mut Factors<ERRORS>) -> bool {
+    /// When a kind of measurement no longer agrees, what it measures is anywhere near, and so is what has moved it there: the
+    /// variances by which errors are larger than was believed. `None` while all agree.
+    pub fn seek(&mut self) -> Option<Errors> {
         let [wall, way, tilt] = [&mut self.wall, &mut self.way, &mut self.tilt].map(Memory::is_lost);
         let lost = [
             (wall, POSITION + 1..POSITION + 3, LOST_M),
@@ -81,11 +80,12 @@ impl Agreement {
             (wall || way, ATTITUDE..ATTITUDE + 2, LOST_TILT_RAD),
             (tilt, ATTITUDE..ATTITUDE + 3, LOST_RAD),
         ];
+        let mut variances = [0.0; ERRORS];
         for (_, errors, reach) in lost.into_iter().filter(|(is_lost, ..)| *is_lost) {
-            for error in errors {
-                factors.add_to(error, reach * reach);
+            for slot in variances.iter_mut().take(errors.end).skip(errors.start) {
+                *slot += reach * reach;
             }
         }
-        way
+        (wall || way || tilt).then_some(variances)
     }
 }

@@ -99,6 +99,80 @@ impl<const N: usize> Factors<N> {
         sum
     }
 
+    /// P^-1 e, by back substitution. What P says is known exactly counts as nothing.
+    pub fn solve(&self, errors: &[f64; N]) -> [f64; N] {
+        let mut rest = *errors;
+        for (j, column) in self.u.iter().enumerate().rev() {
+            let y = at(&rest, j);
+            for (rest, u) in rest.iter_mut().zip(column).take(j) {
+                *rest -= u * y;
+            }
+        }
+        for (rest, d) in rest.iter_mut().zip(&self.d) {
+            *rest = if *d > 0.0 { *rest / d } else { 0.0 };
+        }
+        for (j, column) in self.u.iter().enumerate() {
+            let before = dot(column, &rest, j);
+            if let Some(rest) = rest.get_mut(j) {
+                *rest -= before;
+            }
+        }
+        rest
+    }
+
+    /// Factors of the covariance of a sum of independent errors, each transformed by the rows of a matrix.
+    ///
+    /// Source: Thornton's modified weighted Gram-Schmidt, in Bierman 1977, VI.4.
+    pub fn of_sum<const M: usize>(parts: [(&Self, &[[f64; N]; N]); M]) -> Self {
+        let mut w: [[[f64; N]; M]; N] = core::array::from_fn(|i| {
+            parts.map(|(factors, rows)| rows.get(i).map_or([0.0; N], |row| factors.through(row)))
+        });
+        let mut sum = Self::independent([0.0; N]);
+        for (j, (column, d)) in sum.u.iter_mut().zip(&mut sum.d).enumerate().rev() {
+            let (above, from) = w.split_at_mut(j);
+            let Some(own) = from.first() else { continue };
+            let weighted: [[f64; N]; M] = core::array::from_fn(|m| {
+                let weights = parts.get(m).map_or([0.0; N], |(factors, _)| factors.d);
+                let own = own.get(m).copied().unwrap_or([0.0; N]);
+                core::array::from_fn(|k| at(&own, k) * at(&weights, k))
+            });
+            let with =
+                |row: &[[f64; N]; M]| row.iter().zip(&weighted).map(|(a, b)| dot(a, b, N)).sum::<f64>();
+            *d = with(own);
+            if *d > 0.0 {
+                for (row, u) in above.iter_mut().zip(column) {
+                    *u = with(row) / *d;
+                    for (w, own) in row.as_flattened_mut().iter_mut().zip(own.as_flattened()) {
+                        *w -= *u * own;
+                    }
+                }
+            }
+        }
+        sum
+    }
+
+    /// A row times U.
+    fn through(&self, row: &[f64; N]) -> [f64; N] {
+        core::array::from_fn(|j| self.u.get(j).map_or(0.0, |column| dot(column, row, j + 1)))
+    }
+
+    /// The elements above the diagonal of U and those of D, column by column.
+    pub fn numbers(&self) -> impl Iterator<Item = f64> + '_ {
+        let columns = self.u.iter().zip(&self.d).enumerate();
+        columns.flat_map(|(j, (column, d))| column.iter().take(j).copied().chain([*d]))
+    }
+
+    /// Factors of such numbers; `None` when there are too few.
+    pub fn of_numbers(numbers: &mut impl Iterator<Item = f64>) -> Option<Self> {
+        let mut factors = Self::independent([0.0; N]);
+        for (j, (column, d)) in factors.u.iter_mut().zip(&mut factors.d).enumerate() {
+            for slot in column.iter_mut().take(j).chain([d]) {
+                *slot = numbers.next()?;
+            }
+        }
+        Some(factors)
+    }
+
     /// Takes a measurement of the errors weighted by `h`, with noise of a variance that is positive.
     ///
     /// Source: Bierman 1977, V.3.

@@ -22,6 +22,9 @@ pub struct Felt {
     pub force_mps2: Option<Vec3<Body>>,
 }
 
+/// How many numbers a leg is made of.
+pub const LEG_NUMBERS: usize = 1 + 5 * 9 + 2 * 3 + 2;
+
 /// What has been propagated since the errors were last moved on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Leg {
@@ -112,6 +115,32 @@ impl Leg {
             Noise::of_two(SLACK_RATE, (SLACK, of_both / of_rate), of_rate),
             Noise::of_one(SLACK, (of_slack - of_both * of_both / of_rate).max(0.0)),
         ]
+    }
+
+    /// Its numbers, for a record.
+    pub fn numbers(&self) -> impl Iterator<Item = f64> + '_ {
+        let squares = [&self.turned, &self.pushed, &self.pushed_twice, &self.tilting, &self.tilting_twice];
+        let squares = squares.into_iter().flat_map(|matrix| matrix.iter().copied());
+        let ways = [&self.velocity, &self.way].into_iter().flat_map(|way| way.iter().copied());
+        [self.dt_s].into_iter().chain(squares).chain(ways).chain(self.blind_s)
+    }
+
+    /// The leg of such numbers; `None` when there are too few.
+    pub fn of_numbers(numbers: &mut impl Iterator<Item = f64>) -> Option<Self> {
+        let mut leg = Self { dt_s: numbers.next()?, ..Self::default() };
+        let squares = [
+            &mut leg.turned,
+            &mut leg.pushed,
+            &mut leg.pushed_twice,
+            &mut leg.tilting,
+            &mut leg.tilting_twice,
+        ];
+        let squares = squares.into_iter().flat_map(|matrix| matrix.iter_mut());
+        let ways = [&mut leg.velocity, &mut leg.way].into_iter().flat_map(|way| way.iter_mut());
+        for slot in squares.chain(ways).chain(&mut leg.blind_s) {
+            *slot = numbers.next()?;
+        }
+        Some(leg)
     }
 
     /// Its length, s.

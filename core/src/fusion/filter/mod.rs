@@ -28,6 +28,7 @@ use self::state::{State, rotation};
 use self::stillness::Stillness;
 use self::window::{Waiting, Window};
 use super::relative::Relative;
+use super::smooth::journal::Journal;
 use super::{Fix, Navigation, NoFix, SensorInfo, SensorKind, Times};
 use crate::app::MAX_SOURCES;
 use crate::app::reading::Reading;
@@ -37,20 +38,15 @@ use crate::time::{DurNs, MonoNs};
 use crate::tunnel::Profile;
 
 /// Length of an epoch; epochs begin at its multiples.
-const EPOCH: DurNs = DurNs(100_000_000);
+pub(super) const EPOCH: DurNs = DurNs(100_000_000);
 /// A fix is given so long after the last epoch at most, beyond the window.
-const CARRIES: DurNs = DurNs(2_000_000_000);
+pub(super) const CARRIES: DurNs = DurNs(2_000_000_000);
 /// A clock that goes back by more than this has been set, and a reading doesn't speak of a time so far ahead.
-const CLOCK_JUMP: DurNs = DurNs(10_000_000_000);
+pub(super) const CLOCK_JUMP: DurNs = DurNs(10_000_000_000);
 /// Attitudes, cables and depths are used so often: their errors last longer.
 const ATTITUDE_PERIOD: DurNs = DurNs(100_000_000);
 const TETHER_PERIOD: DurNs = DurNs(100_000_000);
 const DEPTH_PERIOD: DurNs = DurNs(500_000_000);
-/// Samples are placed while the place in the section and the yaw are known so well, m and radians.
-const PLACE_LIMIT_M: f64 = 0.5;
-const YAW_LIMIT_RAD: f64 = 0.25;
-/// The same of chainage, against that when the heads last passed, and against the cable's length.
-const ALONG_LIMIT_M: f64 = 1.0;
 /// An estimate that is farther off is begun anew: rays and attitudes aren't straight enough to lead it back.
 const LOST_PLACE_M: f64 = 3.0;
 const LOST_TILT_RAD: f64 = 0.2;
@@ -86,6 +82,7 @@ pub struct FilterNavigation {
     standing: Result<Relative, NoFix>,
     /// How often the estimate had to be begun anew: it was lost, no number any more, or the clock went back.
     restarts: u64,
+    journal: Option<Journal>,
 }
 
 impl FilterNavigation {
@@ -105,6 +102,7 @@ impl FilterNavigation {
             ahead: Vec::with_capacity(AHEAD),
             standing: Err(NoFix::Heading),
             restarts: 0,
+            journal: None,
         }
     }
 
@@ -118,13 +116,18 @@ impl FilterNavigation {
         self.restarts
     }
 
-    /// Fuses every epoch whose readings must have come by now.
-    fn close_epochs(&mut self) {
-        if !self.is_running {
-            return;
-        }
-        let last = self.epoch_before(self.received - self.context.settings.window);
-        if self.running.at >= last {
+    /// Leaves from now on a record of what each epoch did, for smoothing.
+    #[must_use]
+    pub fn with_journal(mut self, journal: Journal) -> Self {
+        self.running.keep_steps();
+        self.journal = Some(journal);
+        self
+    }
+
+    /// Fuses every epoch that ended at or before a moment.
+    fn close_epochs(&mut self, until: MonoNs) {
+        let last = self.epoch_before(until);
+        if !self.is_running || self.running.at >= last {
             return;
         }
         while self.running.at < last {
@@ -141,12 +144,31 @@ impl FilterNavigation {
                 self.running.rest(mean.map(|(rate, unit)| unit.sensor.mount.rotation * rate));
             }
             self.window.forget(to);
+            self.write_steps();
             if is_silent {
                 self.begin_anew(self.running.sigmas().along_m);
                 return;
             }
         }
         self.after_epochs();
+    }
+
+    fn write_steps(&mut self) {
+        let gap = self.pass_gap();
+        let unit_at = self.context.unit_at;
+        if let Some(journal) = &mut self.journal {
+            for step in self.running.steps.drain(..) {
+                journal.write(&step, unit_at, gap);
+            }
+        }
+    }
+
+    /// Writes that the estimate has come to its end.
+    fn write_end(&mut self) {
+        if self.is_running && self.journal.is_some() {
+            self.running.keep_end();
+            self.write_steps();
+        }
     }
 
     /// The last beginning of an epoch at or before a time.
@@ -163,15 +185,9 @@ impl FilterNavigation {
         let pass_gap = self.pass_gap();
         let relative = self.running.trail.relative(pass_gap);
         let relative = relative.unwrap_or_else(|| Relative::along(0.0));
-        let between_m = relative.sigma_m(Vec3::zero());
-        self.standing = if sigmas.yaw_rad > YAW_LIMIT_RAD {
-            Err(NoFix::Heading)
-        } else if sigmas.place_m > PLACE_LIMIT_M {
-            Err(NoFix::Section)
-        } else if between_m > ALONG_LIMIT_M || sigmas.along_m > ALONG_LIMIT_M || self.has_jumped(pass_gap) {
-            Err(NoFix::Chainage)
-        } else {
-            Ok(relative)
+        self.standing = match sigmas.standing(relative) {
+            Ok(_) if self.has_jumped(pass_gap) => Err(NoFix::Chainage),
+            standing => standing,
         };
         self.carry_ahead();
     }
@@ -185,6 +201,7 @@ impl FilterNavigation {
     /// Listens for a new first estimate: the last one is too far off to be corrected step by step. What has been placed
     /// stays; the chainage is kept until the cable is heard.
     fn begin_anew(&mut self, along_m: f64) {
+        self.write_end();
         let x_m = self.running.state.position.x();
         if self.is_running && x_m.is_finite() && along_m.is_finite() {
             self.listening = Listening::after(Some((x_m, along_m)));
@@ -285,9 +302,12 @@ impl Navigation for FilterNavigation {
             self.begin_anew(along_m);
             self.window.clear();
             self.received = times.received;
+            if let Some(journal) = &mut self.journal {
+                journal.clock_set();
+            }
         }
         self.received = self.received.max(times.received);
-        self.close_epochs();
+        self.close_epochs(self.received - self.context.settings.window);
         let Some(slot) = self.sources.get_mut(number) else { return };
         let source = slot.get_or_insert_with(|| Source::new(*sensor));
         if !reading.is_finite() || times.valid.since(times.received) > CLOCK_JUMP {
@@ -310,6 +330,9 @@ impl Navigation for FilterNavigation {
             if let Some((state, factors)) = self.listening.settle(at, &self.context) {
                 self.running.begin(at, state, factors);
                 self.is_running = true;
+                if let Some(journal) = &mut self.journal {
+                    journal.begin();
+                }
                 self.window.drop_until(at);
                 self.after_epochs();
             }
@@ -318,6 +341,13 @@ impl Navigation for FilterNavigation {
             self.stillness.take(times.valid, sensor.kind, reading);
         }
         self.take(number, times.valid, reading);
+    }
+
+    fn end(&mut self) {
+        if self.journal.is_some() {
+            self.close_epochs(self.received);
+            self.write_end();
+        }
     }
 
     fn consistency(&self, source: usize) -> Option<Consistency> {

@@ -14,7 +14,9 @@ use super::window::{Waiting, Window};
 use crate::app::MAX_SOURCES;
 use crate::app::reading::{Level, Reading};
 use crate::frames::{Body, Point3, Rot, Sensor, Tunnel, Vec3, head_direction};
-use crate::fusion::SensorKind;
+use crate::fusion::relative::Relative;
+use crate::fusion::smooth::step::{Move, Step};
+use crate::fusion::{NoFix, SensorKind};
 use crate::math;
 use crate::site::Site;
 use crate::time::{DurNs, MonoNs};
@@ -34,6 +36,14 @@ const NEAR_M: f64 = 0.03;
 const SPEED_SD_MPS: f64 = 0.5;
 /// How far off an estimate beyond the wall may be, m.
 const BEYOND_M: f64 = 1.5;
+
+/// Most steps of an epoch: its leg, and two at which errors may turn out larger than was believed; and an end.
+const STEPS: usize = 4;
+/// Samples are placed while the place in the section and the yaw are known so well, m and radians.
+const PLACE_LIMIT_M: f64 = 0.5;
+const YAW_LIMIT_RAD: f64 = 0.25;
+/// The same of chainage, against that when the heads last passed, and against the cable's length.
+const ALONG_LIMIT_M: f64 = 1.0;
 
 /// What doesn't change during a dive.
 #[derive(Debug, Clone)]
@@ -64,6 +74,9 @@ pub struct Running {
     /// The estimate through the last epoch, before its measurements.
     knots: Vec<(MonoNs, State)>,
     agreement: Agreement,
+    /// What led from estimate to estimate in the last epoch, for smoothing; nothing unless it is kept.
+    pub steps: Vec<Step>,
+    keeps_steps: bool,
 }
 
 impl Default for Running {
@@ -77,11 +90,21 @@ impl Default for Running {
             way_sought: None,
             knots: Vec::with_capacity(KNOTS),
             agreement: Agreement::default(),
+            steps: Vec::new(),
+            keeps_steps: false,
         }
     }
 }
 
 impl Running {
+    /// Keeps from now on in `steps` what smoothing needs of an epoch. Whoever wants them takes them out after each.
+    ///
+    /// Allocates: their room.
+    pub fn keep_steps(&mut self) {
+        self.steps.reserve_exact(STEPS);
+        self.keeps_steps = true;
+    }
+
     /// Begins with an estimate and its covariance.
     pub fn begin(&mut self, at: MonoNs, state: State, factors: Factors<ERRORS>) {
         (self.at, self.state, self.factors) = (at, state, factors);
@@ -101,6 +124,7 @@ impl Running {
         let (mut nominal, leg) = self.propagate(to, context, window);
         let transition = leg.transition(&context.settings);
         transition.fade(&mut nominal);
+        self.keep(to, &Move::Leg(leg), nominal);
         transition.carry(&mut self.factors);
         leg.disturb(&context.settings, &transition, &mut self.factors);
         self.trail.carry(&transition);
@@ -126,9 +150,31 @@ impl Running {
         self.bound_speed();
         self.stay_inside(&context.profile);
         self.trail.note(to, &self.factors);
-        if self.agreement.seek(&mut self.factors) {
-            self.way_sought = Some(to);
+        if let Some(variances) = self.agreement.seek() {
+            if variances.get(POSITION).is_some_and(|along| *along > 0.0) {
+                self.way_sought = Some(to);
+            }
+            self.widen(&variances);
         }
+    }
+
+    /// Adds to the errors' variances: the estimate stays, and is less sure.
+    fn widen(&mut self, variances: &Errors) {
+        self.keep(self.at, &Move::Widened(*variances), self.state);
+        widen(&mut self.factors, variances);
+    }
+
+    /// Keeps a step that begins with the present estimate.
+    fn keep(&mut self, to: MonoNs, by: &Move, predicted: State) {
+        if self.keeps_steps && self.steps.len() < STEPS {
+            let (at, state, factors) = (self.at, self.state, self.factors);
+            self.steps.push(Step { at, to, state, factors, by: *by, predicted });
+        }
+    }
+
+    /// Keeps that the estimate goes no further than this.
+    pub fn keep_end(&mut self) {
+        self.keep(self.at, &Move::End, self.state);
     }
 
     /// Fuses that the vehicle doesn't move, unless that is too unlikely; and that a mean turn rate is its bias.
@@ -244,9 +290,11 @@ impl Running {
         }
         let reference = profile.reference();
         let reach_m = profile.farthest_m(reference);
+        let mut variances = [0.0; ERRORS];
+        put(&mut variances, POSITION, Vec3::<Tunnel>::new(0.0, BEYOND_M * BEYOND_M, BEYOND_M * BEYOND_M));
+        self.widen(&variances);
         let mut errors = [0.0; ERRORS];
         for (axis, (is, middle)) in (1..3).zip(place.into_iter().zip(reference)) {
-            self.factors.add_to(POSITION + axis, BEYOND_M * BEYOND_M);
             self.correct(
                 &Row::of(POSITION + axis, middle - is, reach_m * reach_m),
                 &[0.0; ERRORS],
@@ -258,19 +306,7 @@ impl Running {
 
     /// How far off the estimate may be.
     pub fn sigmas(&self) -> Sigmas {
-        let of = |i: usize| math::sqrt(self.factors.variance(i));
-        let mut along = [0.0; ERRORS];
-        for (i, share) in [(POSITION, 1.0), (SCALE, self.state.position.x())] {
-            if let Some(slot) = along.get_mut(i) {
-                *slot = share;
-            }
-        }
-        Sigmas {
-            along_m: math::sqrt(self.factors.variance_along(&along)),
-            place_m: of(POSITION + 1).max(of(POSITION + 2)),
-            tilt_rad: of(ATTITUDE).max(of(ATTITUDE + 1)),
-            yaw_rad: of(ATTITUDE + 2),
-        }
+        Sigmas::of(&self.state, &self.factors)
     }
 
     /// Vehicles are no faster than a little, whatever an accelerometer without anything beside it makes of gravity.
@@ -310,6 +346,47 @@ pub struct Sigmas {
     pub tilt_rad: f64,
     /// Of yaw, radians.
     pub yaw_rad: f64,
+}
+
+impl Sigmas {
+    /// Those of an estimate and the covariance of its errors.
+    pub fn of(state: &State, factors: &Factors<ERRORS>) -> Self {
+        let of = |i: usize| math::sqrt(factors.variance(i));
+        let mut along = [0.0; ERRORS];
+        for (i, share) in [(POSITION, 1.0), (SCALE, state.position.x())] {
+            if let Some(slot) = along.get_mut(i) {
+                *slot = share;
+            }
+        }
+        Self {
+            along_m: math::sqrt(factors.variance_along(&along)),
+            place_m: of(POSITION + 1).max(of(POSITION + 2)),
+            tilt_rad: of(ATTITUDE).max(of(ATTITUDE + 1)),
+            yaw_rad: of(ATTITUDE + 2),
+        }
+    }
+
+    /// Whether samples may be placed by such an estimate, with errors against those a pass before.
+    ///
+    /// Errors: what is too uncertain.
+    pub fn standing(&self, relative: Relative) -> Result<Relative, NoFix> {
+        if self.yaw_rad > YAW_LIMIT_RAD {
+            Err(NoFix::Heading)
+        } else if self.place_m > PLACE_LIMIT_M {
+            Err(NoFix::Section)
+        } else if relative.sigma_m(Vec3::zero()) > ALONG_LIMIT_M || self.along_m > ALONG_LIMIT_M {
+            Err(NoFix::Chainage)
+        } else {
+            Ok(relative)
+        }
+    }
+}
+
+/// Adds to the variances of errors.
+pub fn widen(factors: &mut Factors<ERRORS>, variances: &Errors) {
+    for (i, variance) in variances.iter().enumerate().filter(|(_, variance)| **variance > 0.0) {
+        factors.add_to(i, *variance);
+    }
 }
 
 /// Errors as they were `by_s` before.

@@ -28,6 +28,9 @@ pub const DEPTH: usize = 18;
 /// Of the compass's deviation, radians.
 pub const HEADING: usize = 19;
 
+/// How many numbers a state is made of.
+pub const STATE_NUMBERS: usize = ERRORS + 1;
+
 /// One number for each error. Errors that drive others come after them: see `docs/fusion.md`.
 pub type Errors = [f64; ERRORS];
 
@@ -122,6 +125,37 @@ impl State {
             attitude: rotation(turn.scaled(share)) * self.attitude,
             ..*other
         }
+    }
+
+    /// Its numbers, in the order of the errors; the attitude as a quaternion.
+    pub fn numbers(&self) -> [f64; STATE_NUMBERS] {
+        let [px, py, pz] = self.position.0.into();
+        let [vx, vy, vz] = self.velocity_mps.0.into();
+        let [w, x, y, z] = self.attitude.wxyz();
+        let [fx, fy, fz] = self.force_bias_mps2.0.into();
+        let [rx, ry, rz] = self.rate_bias_radps.0.into();
+        let (slack, heading) = ([self.slack_m, self.slack_rate_mps], self.heading_offset_rad);
+        let (scale, depth) = (self.scale, self.depth_offset_m);
+        let [s, r] = slack;
+        [px, py, pz, vx, vy, vz, w, x, y, z, fx, fy, fz, rx, ry, rz, s, r, scale, depth, heading]
+    }
+
+    /// The estimate of such numbers; `None` when the attitude is none.
+    pub fn of_numbers(numbers: [f64; STATE_NUMBERS]) -> Option<Self> {
+        let [px, py, pz, vx, vy, vz, w, x, y, z, fx, fy, fz, rx, ry, rz, s, r, scale, depth, heading] =
+            numbers;
+        Some(Self {
+            position: Point3::new(px, py, pz),
+            velocity_mps: Vec3::new(vx, vy, vz),
+            attitude: Rot::from_wxyz(w, x, y, z)?,
+            force_bias_mps2: Vec3::new(fx, fy, fz),
+            rate_bias_radps: Vec3::new(rx, ry, rz),
+            slack_m: s,
+            slack_rate_mps: r,
+            scale,
+            depth_offset_m: depth,
+            heading_offset_rad: heading,
+        })
     }
 
     /// Whether every number is finite.

@@ -12,11 +12,11 @@ use crate::fusion::relative::Relative;
 use crate::time::{DurNs, MonoNs};
 
 /// Time between two clones.
-const STEP: DurNs = DurNs(2_000_000_000);
+pub const STEP: DurNs = DurNs(2_000_000_000);
 /// Clones that are kept: over four turns of a head in its slowest mode (4 x 28 s).
-const CLONES: usize = 60;
+pub const CLONES: usize = 60;
 /// Errors that move a sample along the tunnel: of chainage, pitch and yaw.
-const MOVING: [usize; 3] = [POSITION, ATTITUDE + 1, ATTITUDE + 2];
+pub const MOVING: [usize; 3] = [POSITION, ATTITUDE + 1, ATTITUDE + 2];
 
 type Square = [Errors; ERRORS];
 
