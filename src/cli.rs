@@ -26,7 +26,11 @@ pub(crate) enum Command {
     )]
     Run(Run),
     /// Run a recorded dive through the very same loop.
-    #[command(after_help = "Example:\n  headrace replay dive.mcap --target 0.6 --report report.json")]
+    ///
+    /// With --smooth twice: once as it was, and once along the track that all sensors agree on over the whole dive.
+    #[command(
+        after_help = "Example:\n  headrace replay dive.mcap --target 0.6 --report report.json\n  headrace replay dive.mcap --smooth --report certificate.json"
+    )]
     Replay(Replay),
     /// Turn a scene into a log of the bytes that its devices would send.
     ///
@@ -96,6 +100,9 @@ pub(crate) struct Replay {
     /// Length of a tick in milliseconds; no result depends on it.
     #[arg(long, value_name = "MS", default_value = "20", value_parser = clap::value_parser!(u32).range(1..=60_000))]
     pub(crate) tick_ms: u32,
+    /// Judge by the smoothed track: what was learnt later corrects where the vehicle was before. Says what that changed.
+    #[arg(long, conflicts_with = "speed")]
+    pub(crate) smooth: bool,
     /// Report to compare with; exit code 1 when verdicts, holes or the digest differ.
     #[arg(long, value_name = "GOLDEN.json")]
     pub(crate) expect: Option<PathBuf>,

@@ -19,6 +19,7 @@ use crate::expect;
 use crate::failure::{self, Failure};
 use crate::files;
 use crate::output::{deliver, put, say};
+use crate::smooth;
 use crate::summary::summary;
 use crate::watch::Watch;
 
@@ -69,10 +70,14 @@ pub(crate) fn replay(args: &Replay) -> Result<u8, Failure> {
         None => attached_vehicle(player.info(), &player.losses(), &args.log),
     }?;
     vehicle.target_m = args.target.unwrap_or(vehicle.target_m);
-    let dive = assemble(&vehicle, &text, None)?;
-    player.connect(dive.armed.sources());
     let pace = Pace { tick: DurNs::from_millis(i64::from(args.tick_ms)), speed: args.speed.0 };
-    let mut report = dive.run(&mut player, pace, &mut watch(&args.output))?;
+    let mut report = if args.smooth {
+        smooth::smoothed(&args.log, &mut player, (&vehicle, &text), pace)?
+    } else {
+        let dive = assemble(&vehicle, &text, None)?;
+        player.connect(dive.armed.sources());
+        dive.run(&mut player, pace, &mut watch(&args.output))?
+    };
     note_losses(&mut report, &args.log, &player)?;
     let code = finish(&report, &args.output)?;
     match &args.expect {

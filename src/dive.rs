@@ -9,6 +9,7 @@ use headrace_core::app::plugin::Plugin;
 use headrace_core::app::report::{LogReport, Report};
 use headrace_core::app::run::Loop;
 use headrace_core::config::VehicleConfig;
+use headrace_core::fusion::Navigation;
 use headrace_replay::drive::{Feed, Pace, drive};
 use headrace_replay::log::{LogHeader, Recorder, RecorderHandle, SourceInfo, file_digest};
 use headrace_replay::record::{QUEUE_BYTES, RecorderOutlet};
@@ -33,6 +34,16 @@ pub(crate) fn assemble(
     vehicle_text: &str,
     record_to: Option<&Path>,
 ) -> Result<Dive, Failure> {
+    assemble_with(vehicle, vehicle.navigation(), vehicle_text, record_to)
+}
+
+/// The same with another way of navigating than the vehicle file's.
+pub(crate) fn assemble_with(
+    vehicle: &VehicleConfig,
+    navigation: Box<dyn Navigation>,
+    vehicle_text: &str,
+    record_to: Option<&Path>,
+) -> Result<Dive, Failure> {
     let mut app = App::new(vehicle.mission());
     for sensor in &vehicle.sensors {
         let plugin: &dyn Plugin = sensor.as_ref();
@@ -49,7 +60,7 @@ pub(crate) fn assemble(
             Some((path.to_owned(), handle))
         }
     };
-    Ok(Dive { armed: app.arm(vehicle.navigation())?, notices, recorder })
+    Ok(Dive { armed: app.arm(navigation)?, notices, recorder })
 }
 
 /// What a log of this vehicle begins with.
@@ -75,11 +86,17 @@ pub(crate) fn log_header(vehicle: &VehicleConfig, vehicle_text: &str, ticks: boo
 
 impl Dive {
     /// Runs the loop until the feed ends, shows what happens, and gives the report.
-    pub(crate) fn run(
+    pub(crate) fn run(self, feed: &mut dyn Feed, pace: Pace, watch: &mut Watch) -> Result<Report, Failure> {
+        self.run_beside(feed, pace, watch, &mut |_| {})
+    }
+
+    /// The same; `beside` sees the loop after every tick, and at the end.
+    pub(crate) fn run_beside(
         mut self,
         feed: &mut dyn Feed,
         pace: Pace,
         watch: &mut Watch,
+        beside: &mut dyn FnMut(&Loop),
     ) -> Result<Report, Failure> {
         let notices = self.notices.clone();
         let mut progress = Progress::start();
@@ -91,6 +108,7 @@ impl Dive {
             while let Some(notice) = notices.next() {
                 watch.notice(&notice, dive);
             }
+            beside(dive);
         });
         drop(progress);
         let last: Vec<Notice> = self.armed.finish();
@@ -98,6 +116,7 @@ impl Dive {
             watch.notice(notice, &self.armed);
         }
         watch.end(&self.armed);
+        beside(&self.armed);
         let mut report = Report::of(&self.armed);
         if let Some((path, handle)) = self.recorder.take() {
             drop(self.armed);

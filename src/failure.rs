@@ -9,6 +9,7 @@ use headrace_experiments::ExperimentError;
 use headrace_replay::drive::DriveError;
 use headrace_replay::log::LogError;
 use headrace_replay::simulate::SceneError;
+use headrace_replay::smooth::SmoothError;
 
 use crate::pictures::PictureError;
 
@@ -36,6 +37,8 @@ pub(crate) enum Failure {
     Plugin(#[from] PluginError),
     #[error(transparent)]
     Log(#[from] LogError),
+    #[error("smoothing: {0}")]
+    Smooth(#[from] SmoothError),
     #[error(transparent)]
     Drive(#[from] DriveError),
     #[error("making JSON of the report: {0}")]

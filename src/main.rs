@@ -14,6 +14,7 @@ mod pictures;
 mod plan;
 mod progress;
 mod simulate;
+mod smooth;
 mod station;
 mod summary;
 mod watch;

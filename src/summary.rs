@@ -1,6 +1,7 @@
 //! The end of a dive in words.
 
 use headrace_core::app::report::{Report, SectionReport};
+use headrace_core::app::smoothing::{ChangeReport, JudgedReport, SmoothingReport};
 
 use crate::station::station;
 
@@ -45,6 +46,9 @@ pub(crate) fn summary(report: &Report) -> String {
                 .to_owned(),
         );
     }
+    for change in report.smoothing.iter().flat_map(smoothing) {
+        line(change);
+    }
     let rejected = &dive.samples_rejected;
     let lost = [
         (rejected.missing, "pings without a return"),
@@ -83,6 +87,60 @@ fn runs(sections: &[SectionReport]) -> Vec<String> {
         ));
     }
     lines
+}
+
+/// What smoothing changed: metres by verdict, and a line for each run of neighbouring sections with the same change.
+fn smoothing(report: &SmoothingReport) -> Vec<String> {
+    let was = &report.before;
+    let mut lines = vec![format!(
+        "  smoothed {} estimates; by the filter alone: passed {:.2} m   failed {:.2} m   can't say {:.2} m   open {:.2} m",
+        report.estimates, was.pass_m, was.fail_m, was.cannot_say_m, was.open_m
+    )];
+    if report.changed.is_empty() {
+        lines.push("  no verdict has changed".to_owned());
+    }
+    let mut rest = report.changed.as_slice();
+    while let Some(first) = rest.first() {
+        let mut end_m = first.start_m;
+        let len = rest.iter().take_while(|next| follows(first, next, &mut end_m)).count();
+        let (run, after) = rest.split_at(len);
+        rest = after;
+        lines.push(format!(
+            "  changed ch {} to {}: {} to {}, holes {} to {} m",
+            station(first.start_m),
+            station(end_m),
+            words(first.before),
+            words(first.after),
+            holes(run.iter().filter_map(|change| change.before)),
+            holes(run.iter().filter_map(|change| change.after)),
+        ));
+    }
+    lines
+}
+
+/// Whether a change goes on from `end_m` as the first of its run does; then the run ends with it.
+fn follows(first: &ChangeReport, next: &ChangeReport, end_m: &mut f64) -> bool {
+    let verdicts = |change: &ChangeReport| [change.before, change.after].map(words);
+    let goes_on = (next.start_m - *end_m).abs() < 1e-6 && verdicts(first) == verdicts(next);
+    if goes_on {
+        *end_m = next.end_m;
+    }
+    goes_on
+}
+
+fn words(judged: Option<JudgedReport>) -> &'static str {
+    match judged.map(|judged| judged.verdict) {
+        None => "not passed",
+        Some("cannot_say") => "can't say",
+        Some(verdict) => verdict,
+    }
+}
+
+/// The largest hole of a run, and how sure it is.
+fn holes(run: impl Iterator<Item = JudgedReport>) -> String {
+    let measured = run.filter_map(|judged| Some((judged.hole_m?, judged.hole_sigma_m)));
+    let largest = measured.max_by(|a, b| a.0.total_cmp(&b.0));
+    largest.map_or_else(|| "-".to_owned(), |(hole_m, sigma_m)| format!("{hole_m:.3}±{sigma_m:.3}"))
 }
 
 fn cause(section: &SectionReport) -> Option<&'static str> {

@@ -120,6 +120,10 @@ fn reports_of_all_kinds_are_as_the_schema_says() {
     assert!(strict["sections"].as_array().unwrap().iter().any(|section| section["verdict"] == "fail"));
     check("a dive that fails", &strict);
 
+    let (_, smoothed) = folder.replay("dive.mcap", &["--smooth"]);
+    assert!(smoothed["smoothing"].is_object());
+    check("a smoothed dive", &smoothed);
+
     let answer =
         folder.headrace(&["run", "vehicle.toml", "--source", "dive.mcap", "--speed", "max", "--json"]);
     check("a live dive", &serde_json::from_str(&answer.stdout).unwrap());

@@ -7,3 +7,4 @@ pub mod mesh;
 pub mod player;
 pub mod record;
 pub mod simulate;
+pub mod smooth;

@@ -14,6 +14,7 @@ pub mod reading;
 pub mod report;
 pub mod ring;
 pub mod run;
+pub mod smoothing;
 pub mod stage;
 mod stages;
 

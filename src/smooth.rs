@@ -1,0 +1,67 @@
+//! `replay --smooth`: a dive by the filter, its track smoothed, and the dive once more along that.
+
+use std::path::Path;
+
+use headrace_core::app::MAX_SOURCES;
+use headrace_core::app::flow::Navigator;
+use headrace_core::app::report::Report;
+use headrace_core::app::run::Loop;
+use headrace_core::app::smoothing::SmoothingReport;
+use headrace_core::config::VehicleConfig;
+use headrace_core::fusion::NavigationConfig;
+use headrace_core::fusion::filter::FilterNavigation;
+use headrace_core::fusion::filter::sources::Consistency;
+use headrace_core::fusion::smooth::journal::Journal;
+use headrace_core::fusion::smooth::track::TrackNavigation;
+use headrace_replay::drive::Pace;
+use headrace_replay::player::Player;
+use headrace_replay::smooth::Steps;
+
+use crate::dive::assemble_with;
+use crate::failure::Failure;
+use crate::watch::Watch;
+
+/// Records that may wait: a tick has a minute at most, ten epochs a second, and up to three records of each.
+const RECORDS: usize = 4096;
+
+/// The report of a dive judged along its smoothed track. `player` plays the log from its beginning, for its losses.
+pub(crate) fn smoothed(
+    log: &Path,
+    player: &mut Player,
+    (vehicle, text): (&VehicleConfig, &str),
+    pace: Pace,
+) -> Result<Report, Failure> {
+    let NavigationConfig::Filter(settings) = vehicle.navigation else {
+        return Err(Failure::Usage(format!(
+            "replaying {}: --smooth needs the filter, and the vehicle file says [navigation] way = \"direct\"; wanted is \
+             way = \"filter\"",
+            log.display()
+        )));
+    };
+    let (journal, reader) = Journal::new(RECORDS);
+    let mut steps = Steps::new(reader.clone())?;
+    let filter = FilterNavigation::new(vehicle.tunnel.profile.clone(), vehicle.site, settings);
+    let filter = Box::new(filter.with_journal(journal));
+    let dive = assemble_with(vehicle, filter, text, None)?;
+    let mut first = Player::open(log)?;
+    first.connect(dive.armed.sources());
+    let mut consistency = [None; MAX_SOURCES];
+    let before = dive.run_beside(&mut first, pace, &mut Watch::quiet(), &mut |dive| {
+        steps.take();
+        consistency = consistencies(dive);
+    })?;
+    let records = steps.records();
+    let track = steps.smooth(settings)?;
+    tracing::debug!(records, pieces = track.pieces(), dropped = reader.dropped(), "smoothed");
+    let (estimates, pieces) = (track.len() as u64, track.pieces() as u64);
+    let dive = assemble_with(vehicle, Box::new(TrackNavigation::new(track, consistency)), text, None)?;
+    player.connect(dive.armed.sources());
+    let mut report = dive.run(player, pace, &mut Watch::quiet())?;
+    report.smoothing = Some(SmoothingReport::of(&before, &report, estimates, pieces));
+    Ok(report)
+}
+
+fn consistencies(dive: &Loop) -> [Option<Consistency>; MAX_SOURCES] {
+    let navigation = &dive.world().resource::<Navigator>().navigation;
+    core::array::from_fn(|source| navigation.consistency(source))
+}
