@@ -7,136 +7,31 @@
     reason = "clippy.toml's leave for tests doesn't reach their helpers; figures are for people, too"
 )]
 
+#[path = "common/field.rs"]
+mod field;
 #[path = "common/shipped.rs"]
 mod shipped;
 #[path = "common/tracking.rs"]
 mod tracking;
 
-use headrace_core::frames::{Tunnel, Vec3};
-use headrace_core::fusion::Fix;
+use field::{Figures, POSE, TURN_S, field, figures, nees, rms, share};
 use headrace_core::fusion::direct::DirectNavigation;
 use headrace_core::fusion::filter::sources::Consistency;
 use headrace_core::math;
-use headrace_core::time::MonoNs;
-use headrace_replay::simulate::{START, Scene};
-use nalgebra::{SMatrix, SVector};
+use headrace_replay::simulate::START;
 use tracking::{Silence, Track, dive, filter};
 
 /// Seeds; the bounds below are those of so many dives.
 const SEEDS: u64 = 20;
-/// A turn of a head in mode SLOW, and how far the vehicle comes in it.
-const TURN_S: f64 = 21.6;
+/// How far the vehicle comes in a turn of its head.
 const T_X_M: f64 = TURN_S * 0.197;
 /// Epochs until the first estimate has settled.
 const SETTLED: usize = 50;
-
-/// Root mean squares of a dive's errors.
-#[derive(Debug, Default, Clone, Copy)]
-struct Figures {
-    across_m: f64,
-    up_m: f64,
-    along_m: f64,
-    turn_m: f64,
-    turn_sigma_m: f64,
-    yaw_deg: f64,
-    tilt_deg: f64,
-    fixed: f64,
-}
-
-fn rms(values: impl IntoIterator<Item = f64>) -> f64 {
-    let (mut n, mut sum) = (0.0, 0.0);
-    for value in values {
-        n += 1.0;
-        sum += value * value;
-    }
-    math::sqrt(sum / f64::max(n, 1.0))
-}
-
-fn figures(track: &Track) -> Figures {
-    let known: Vec<_> = track.fixes.iter().filter_map(|t| Some((t.at, t.fix.ok()?, t.truth))).collect();
-    let off: Vec<Vec3<Tunnel>> =
-        known.iter().map(|(_, fix, truth)| fix.pose.position - truth.position).collect();
-    let turned = known.iter().map(|(_, fix, truth)| fix.pose.attitude * truth.attitude.inverse());
-    let turned: Vec<_> = turned.map(|off| off.roll_pitch_yaw()).collect();
-    let turns =
-        turns(&known.iter().map(|(at, fix, truth)| (*at, *fix, truth.position.x())).collect::<Vec<_>>());
-    Figures {
-        across_m: rms(off.iter().map(Vec3::y)),
-        up_m: rms(off.iter().map(Vec3::z)),
-        along_m: rms(off.iter().map(Vec3::x)),
-        turn_m: rms(turns.iter().map(|(error, _)| *error)),
-        turn_sigma_m: rms(turns.iter().map(|(_, sigma)| *sigma)),
-        yaw_deg: rms(turned.iter().map(|(_, _, yaw)| yaw.to_degrees())),
-        tilt_deg: rms(turned.iter().map(|(roll, pitch, _)| math::hypot(*roll, *pitch).to_degrees())),
-        fixed: known.len() as f64 / track.fixes.len() as f64,
-    }
-}
-
-/// Error of the displacement over a turn, and the standard deviation that was given.
-fn turns(known: &[(MonoNs, Fix, f64)]) -> Vec<(f64, f64)> {
-    let mut before = 0;
-    let mut turns = Vec::new();
-    for (at, fix, x_m) in known {
-        while at.since(known[before].0).as_secs_f64() > TURN_S {
-            before += 1;
-        }
-        if before > 0 {
-            let (_, then, x_then_m) = &known[before];
-            let moved_m = fix.pose.position.x() - then.pose.position.x();
-            turns.push((moved_m - (x_m - x_then_m), fix.relative.sigma_m(Vec3::zero())));
-        }
-    }
-    turns
-}
 
 type Pick = fn(&Figures) -> f64;
 
 fn mean_of(all: &[Figures], pick: Pick) -> f64 {
     rms(all.iter().map(pick))
-}
-
-/// What the field scene does to the sensors: rays instead of cones for the echosounders, rounding of cable and depth as
-/// noise.
-const SETTINGS: &str = "[navigation]
-gyro_noise_degps_rthz = 0.007
-accel_noise_mps2_rthz = 0.001
-accel_bias_mps2 = 0.02
-gyro_bias_time_s = 300
-tether_sd_m = 0.003
-tether_scale_sd = 1e-4
-slack_sd_m = 0.085
-slack_time_s = 15
-deviation_deg = 5
-depth_sd_m = 0.009
-heading_sd_deg = 0.3
-tilt_sd_deg = 0.3
-echo_sd_m = 0.02
-echo_beam_deg = 0.1
-return_sd_m = 0.011
-
-[heads]";
-
-/// The field scene over so many metres.
-fn field(seed: u64, length_m: f64) -> Scene {
-    let scene = include_str!("../deploy/scenes/vita1-field.toml");
-    let length = format!("distance_m = {length_m}");
-    let shorter = scene.replace("distance_m = 130", &length).replace("../vehicles/", "");
-    assert!(shorter.contains(&length));
-    let load = |name: &str| {
-        let text = String::from_utf8(shipped::vehicle_file(name)?).map_err(|error| error.to_string())?;
-        Ok(text.replace("[heads]", SETTINGS).into_bytes())
-    };
-    shipped::seeded(&shorter, &load, Some(seed))
-}
-
-/// Degrees of freedom of a pose.
-const POSE: [usize; 6] = [0, 1, 2, 6, 7, 8];
-
-/// Normalised estimation error squared (NEES) of the pose.
-fn nees(epoch: &tracking::Epoch) -> f64 {
-    let covariance = SMatrix::<f64, 6, 6>::from_fn(|i, j| epoch.factors.covariance(POSE[i], POSE[j]));
-    let error = SVector::<f64, 6>::from_fn(|i, _| epoch.errors[POSE[i]]);
-    error.dot(&covariance.cholesky().unwrap().solve(&error))
 }
 
 /// One dive with the filter, and what the same returns give without it and with the truth.
@@ -282,15 +177,6 @@ fn holes_within_their_bounds(all: &[Dives]) {
         holes.len()
     );
     assert!((0.9..=0.99).contains(&within), "{within}");
-}
-
-fn share(of: impl Iterator<Item = bool>) -> f64 {
-    let (mut n, mut yes) = (0.0, 0.0);
-    for is in of {
-        n += 1.0;
-        yes += f64::from(u8::from(is));
-    }
-    yes / f64::max(n, 1.0)
 }
 
 /// Each sensor lost for a while, and for good: the error stays within what is told of it, and grows no faster.

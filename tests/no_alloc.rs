@@ -18,6 +18,9 @@ use std::cell::Cell;
 use headrace_core::app::device::Direction;
 use headrace_core::app::outlet::NoticeOutlet;
 use headrace_core::app::{App, Mission};
+use headrace_core::fusion::NavigationConfig;
+use headrace_core::fusion::filter::FilterNavigation;
+use headrace_core::fusion::smooth::journal::Journal;
 use headrace_core::time::DurNs;
 use headrace_replay::log::{LogHeader, Recorder, SourceInfo};
 use headrace_replay::record::{QUEUE_BYTES, RecorderOutlet};
@@ -97,7 +100,11 @@ fn a_million_packets_without_one_allocation() {
     };
     let (port, recorder) = Recorder::start(std::io::sink(), &header, QUEUE_BYTES).unwrap();
     app.add_plugin(&RecorderOutlet::new(port)).unwrap();
-    let mut dive = app.arm(vehicle.navigation()).unwrap();
+    // Nor does anybody empty the journal of the filter's steps.
+    let (journal, steps) = Journal::new(1000);
+    let NavigationConfig::Filter(settings) = vehicle.navigation else { panic!("no filter") };
+    let filter = FilterNavigation::new(vehicle.tunnel.profile.clone(), vehicle.site, settings);
+    let mut dive = app.arm(Box::new(filter.with_journal(journal))).unwrap();
     let mut ports: Vec<_> =
         (0..vehicle.sensors.len()).map(|source| dive.take_port(source).unwrap()).collect();
 
@@ -126,6 +133,7 @@ fn a_million_packets_without_one_allocation() {
     }
     assert_eq!(allocated, 0, "allocator calls in {packets} packets");
     assert!(notices.dropped() > 0, "the notice queue has overflowed");
+    assert!(steps.dropped() > 0, "the journal has overflowed");
     drop(dive);
     let written = recorder.finish().unwrap();
     println!("{packets} packets, {} messages recorded, waited {waited} times", written.messages);

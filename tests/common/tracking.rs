@@ -71,6 +71,8 @@ pub(crate) trait Transparent: Navigation + 'static {
 
 impl Transparent for headrace_core::fusion::direct::DirectNavigation {}
 
+impl Transparent for headrace_core::fusion::smooth::track::TrackNavigation {}
+
 impl Transparent for FilterNavigation {
     fn estimate(&self) -> Option<(MonoNs, State, Factors<ERRORS>)> {
         self.running().map(|running| (running.at, running.state, running.factors))
@@ -122,6 +124,10 @@ impl<N: Transparent> Navigation for Overheard<N> {
             *told = consistency;
             self.said.try_send(Said::Consistency(source, consistency)).unwrap();
         }
+    }
+
+    fn end(&mut self) {
+        self.inner.end();
     }
 
     fn fix(&self, at: MonoNs) -> Result<Fix, NoFix> {
