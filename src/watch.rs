@@ -173,8 +173,11 @@ impl Watch {
 
     fn line(&mut self, text: &str) {
         self.close_status();
-        let colour =
-            if self.terminal && (text.starts_with("FLAG") || text.starts_with("ALERT")) { ("\x1b[1;31m", "\x1b[0m") } else { ("", "") };
+        let colour = if self.terminal && (text.starts_with("FLAG") || text.starts_with("ALERT")) {
+            ("\x1b[1;31m", "\x1b[0m")
+        } else {
+            ("", "")
+        };
         say(&format!("{}{text}{}", colour.0, colour.1));
     }
 

@@ -85,7 +85,7 @@ fn watch(placed: Res<'_, PlacedList>, mut seen: ResMut<'_, Seen>) {
             Outcome::Sample { point, sigma_m } => {
                 Some(Sample { place: [point.x(), sigma_m], point: [point.x(), point.y(), point.z()] })
             }
-            Outcome::Missing | Outcome::OutOfRange | Outcome::Unplaced(_) => None,
+            Outcome::Lost(..) | Outcome::Unplaced(_) => None,
         };
         seen.0.push(Ping {
             head: ping.head,

@@ -10,7 +10,9 @@ use bevy_ecs::prelude::Resource;
 use super::alerts::AlertKind;
 use super::digest::Digest;
 use super::reading::{Reading, SourceId};
-use crate::coverage::{CertainFinder, Frontier, HoleFinder, Judgement, Loss, RunChange, RunId, Request, SampleStore, Sections};
+use crate::coverage::{
+    CertainFinder, Frontier, HoleFinder, Judgement, Loss, Request, RunChange, RunId, SampleStore, Sections,
+};
 use crate::frames::{Point3, Tunnel};
 use crate::fusion::{Fix, Navigation, NoFix, SensorInfo};
 use crate::sampling::advice::Advice;

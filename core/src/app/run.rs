@@ -7,8 +7,8 @@ use super::alerts::Alerts;
 use super::components::{DepthSensor, Echosounder, Imu, Mounted, SonarHead, Tether};
 use super::digest::Digest;
 use super::flow::{
-    AdviceLog, Coverage, Digests, Events, Finder, HeadTable, HiddenAngles, MAX_TICK_READINGS, Navigator, Notices, Place,
-    PlacedList, PositionedList, Requests, SensorTable, SourceTallies, Tally, TickTime,
+    AdviceLog, Coverage, Digests, Events, Finder, HeadTable, HiddenAngles, MAX_TICK_READINGS, Navigator,
+    Notices, Place, PlacedList, PositionedList, Requests, SensorTable, SourceTallies, Tally, TickTime,
 };
 use super::head::HeadTrack;
 use super::merge::{Inbox, MAX_TICK_PACKETS};

@@ -39,7 +39,10 @@ impl CoverageConfig {
         }
         let places = |opening: &Opening| opening.places(profile.perimeter_m(), target_m);
         if config.openings.iter().map(places).sum::<i64>() > MAX_PLACES {
-            return Err(root.invalid("openings", "take more than 2500 square metres together; leave them out of the tunnel"));
+            return Err(root.invalid(
+                "openings",
+                "take more than 2500 square metres together; leave them out of the tunnel",
+            ));
         }
         Ok(config)
     }

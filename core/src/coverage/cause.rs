@@ -161,7 +161,8 @@ pub fn explain<'a>(
 
 /// The reason for which most pings into the hole were lost.
 fn most_lost(lost: [u32; Loss::ALL.len()]) -> Option<Loss> {
-    let most = Loss::ALL.into_iter().zip(lost).filter(|(_, count)| *count > 0).max_by_key(|(_, count)| *count);
+    let most =
+        Loss::ALL.into_iter().zip(lost).filter(|(_, count)| *count > 0).max_by_key(|(_, count)| *count);
     most.map(|(loss, _)| loss)
 }
 
@@ -207,7 +208,6 @@ impl Seen {
     fn is_unseen(&self, lost_in_hole: u32) -> bool {
         self.unseen || self.unplaced > self.missing.max(lost_in_hole)
     }
-
 }
 
 /// How a section was driven: means over its pings.
@@ -275,7 +275,8 @@ impl Driven {
         let alone =
             without.into_iter().filter(|(_, then)| helps(then) && then.t_m() <= target_m).min_by(least);
         let best = Self { gap_s: self.all_gap_s.min(self.gap_s), ..self.on_axis() };
-        let together = || without.into_iter().min_by(least).filter(|(_, then)| helps(then) && best.t_m() <= target_m);
+        let together =
+            || without.into_iter().min_by(least).filter(|(_, then)| helps(then) && best.t_m() <= target_m);
         alone.or_else(together).map_or(Cause::TooFast, |(cause, _)| cause)
     }
 }

@@ -14,8 +14,8 @@ pub mod sections;
 pub mod store;
 
 pub use action::Action;
-pub use certain::CertainFinder;
 pub use cause::{Cause, Evidence};
+pub use certain::CertainFinder;
 pub use frontier::{Frontier, Reach};
 pub use hole::{Hole, HoleFinder};
 pub use passage::{Doubt, Loss, Passage};

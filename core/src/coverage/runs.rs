@@ -121,9 +121,7 @@ impl Runs {
     fn join(&mut self, section: i64, cause: Cause, telling: &mut Telling<'_>) {
         let near = |side: i64| {
             let run = |step: i64| self.of(section + side * step);
-            (1..=self.join)
-                .filter_map(run)
-                .find(|id| self.get(*id).is_some_and(|run| run.cause == cause))
+            (1..=self.join).filter_map(run).find(|id| self.get(*id).is_some_and(|run| run.cause == cause))
         };
         let (kept, other) = match (near(-1), near(1)) {
             (Some(a), Some(b)) if a != b => (a.min(b), Some(a.max(b))),
@@ -219,7 +217,9 @@ impl Runs {
 
     /// Looks at a section of the run whose hole has changed.
     fn measure_again(&mut self, id: RunId, section: i64, telling: &Telling<'_>) {
-        let (Some(run), Some(hole)) = (self.runs.get_mut(id.0 as usize), (telling.hole)(section)) else { return };
+        let (Some(run), Some(hole)) = (self.runs.get_mut(id.0 as usize), (telling.hole)(section)) else {
+            return;
+        };
         if run.worst.0 == section && hole.diameter_m < run.worst.1.diameter_m {
             self.measure(id, telling);
         } else {

@@ -132,7 +132,6 @@ pub struct Section {
     pub(super) stale: bool,
 }
 
-
 /// Fewer samples than this don't contradict a profile.
 const FEW: u32 = 20;
 /// More of a section than this is an opening: there is no wall to speak of.

@@ -5,8 +5,8 @@ use core::ops::Range;
 use super::cause::{Case, Evidence, explain};
 use super::certain::{CertainFinder, clear_of};
 use super::frontier::{Frontier, Moved, Reach};
-use super::openings::Opening;
 use super::hole::{FARTHEST_M, Hole, HoleFinder};
+use super::openings::Opening;
 use super::runs::{RunChange, RunId, Runs, Telling};
 use super::section::{Judgement, Section, Verdict};
 use super::store::{SampleIndex, SampleStore};
@@ -184,7 +184,8 @@ impl Sections {
                 let Some(hole) = section.hole else { continue };
                 let clear_m = clear_of(moved.reach, hole.x_m);
                 let left_m = hole.diameter_m.min(2.0 * clear_m);
-                let fails = section.verdict == Verdict::Open && left_m - 2.0 * section.hole_sigma_m > target_m;
+                let fails =
+                    section.verdict == Verdict::Open && left_m - 2.0 * section.hole_sigma_m > target_m;
                 if fails || clear_m >= hole.diameter_m / 2.0 {
                     ask(ask_for(index));
                 }
@@ -271,8 +272,7 @@ impl Sections {
     fn explain(&self, hole: &Hole, swept_by_all: Option<Reach>, perimeter_m: f64) -> Evidence {
         let radius_m = hole.diameter_m / 2.0;
         let touched = self.index_of(hole.x_m - radius_m)..self.index_of(hole.x_m + radius_m) + 1;
-        let passages =
-            touched.filter_map(|index| Some((self.bounds_m(index), &self.get(index)?.passage)));
+        let passages = touched.filter_map(|index| Some((self.bounds_m(index), &self.get(index)?.passage)));
         explain(&Case { hole, swept_by_all, target_m: self.target_m, perimeter_m }, &passages)
     }
 
@@ -356,7 +356,10 @@ mod tests {
     #[test]
     fn what_samples_may_still_fill_is_open_until_enough_of_it_is_out_of_their_reach() {
         let at = |clear_m: f64| verdict(&hole(2.0), 0.1, 1.0, clear_m);
-        assert_eq!([0.0, 0.59, 0.61, 1.0].map(at), [Verdict::Open, Verdict::Open, Verdict::Fail, Verdict::Fail]);
+        assert_eq!(
+            [0.0, 0.59, 0.61, 1.0].map(at),
+            [Verdict::Open, Verdict::Open, Verdict::Fail, Verdict::Fail]
+        );
         let unsure = |clear_m: f64| verdict(&hole(1.1), 0.1, 1.0, clear_m);
         assert_eq!([0.5, 0.56].map(unsure), [Verdict::Open, Verdict::CannotSay]);
     }

@@ -67,4 +67,3 @@ fn alternative_report(other: &Alternative, left: &Left) -> AlternativeReport {
     let (needed_h, suffices) = (left.hours_at(v_max_mps), left.suffices_at(v_max_mps));
     AlternativeReport { mode, v_max_mps, needed_h, suffices }
 }
-

@@ -6,6 +6,7 @@ use serde::Serialize;
 use super::alerts::{Alert, Alerts};
 use super::flow::{AdviceLog, Coverage, SourceTallies, Tally};
 use super::run::Loop;
+use super::smoothing::SmoothingReport;
 use crate::coverage::openings::Opening;
 use crate::coverage::{Section, Spread, Verdict};
 use crate::time::MonoNs;
@@ -56,6 +57,8 @@ pub struct Report {
     pub advice_dropped: u64,
     /// What each source has sent.
     pub sources: Vec<SourceReport>,
+    /// What smoothing has changed; `None` where nothing was smoothed.
+    pub smoothing: Option<SmoothingReport>,
 }
 
 /// The log that a dive was read from or written to.
@@ -196,7 +199,9 @@ impl Report {
             section_m: sections.section_m(),
             dive: dive_report(coverage, &tally),
             summary: summarise(sections.section_m(), passed().map(|(_, section)| section)),
-            sections: passed().map(|(k, section)| sections::section_report(sections, k, section, dive)).collect(),
+            sections: passed()
+                .map(|(k, section)| sections::section_report(sections, k, section, dive))
+                .collect(),
             runs: runs::run_reports(sections, &dive.mission().profile),
             way_home: runs::way_home(sections),
             openings: dive.mission().coverage.openings.iter().map(opening_report).collect(),
@@ -204,6 +209,7 @@ impl Report {
             advice: log.entries.iter().map(advice::advice_report).collect(),
             advice_dropped: log.dropped,
             sources: sources::source_reports(dive, world.resource::<SourceTallies>()),
+            smoothing: None,
         }
     }
 

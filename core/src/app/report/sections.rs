@@ -96,7 +96,12 @@ pub struct EvidenceReport {
     pub swing_m: f64,
 }
 
-pub(super) fn section_report(sections: &Sections, index: i64, section: &Section, dive: &Loop) -> SectionReport {
+pub(super) fn section_report(
+    sections: &Sections,
+    index: i64,
+    section: &Section,
+    dive: &Loop,
+) -> SectionReport {
     let (start_m, end_m) = sections.bounds_m(index);
     let profile = &dive.mission().profile;
     let area_m2 = profile.perimeter_m() * sections.section_m();
@@ -151,4 +156,3 @@ fn evidence_report(evidence: Evidence) -> EvidenceReport {
         swing_m: evidence.swing_m,
     }
 }
-

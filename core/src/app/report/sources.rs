@@ -80,4 +80,3 @@ pub(super) fn source_reports(dive: &Loop, tallies: &SourceTallies) -> Vec<Source
         })
         .collect()
 }
-

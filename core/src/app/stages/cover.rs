@@ -9,7 +9,8 @@ use super::driving::{Driven, Driving};
 use super::judge::{Results, judge_one};
 use crate::app::alerts::{AlertKind, Alerts};
 use crate::app::flow::{
-    Coverage, Digests, Finder, Notice, Notices, Outcome, Place, Placed, PlacedList, PlacedPing, Requests, Tally,
+    Coverage, Digests, Finder, Notice, Notices, Outcome, Place, Placed, PlacedList, PlacedPing, Requests,
+    Tally,
 };
 use crate::coverage::hole::FARTHEST_M;
 use crate::coverage::{Doubt, Loss, SampleIndex, StoreError, WallSample};

@@ -58,13 +58,7 @@ impl Driving {
     /// Takes in a beat.
     ///
     /// Allocates: never.
-    pub(super) fn note(
-        &mut self,
-        at: MonoNs,
-        situation: &Situation,
-        profile: &Profile,
-        advisor: &Advisor,
-    ) {
+    pub(super) fn note(&mut self, at: MonoNs, situation: &Situation, profile: &Profile, advisor: &Advisor) {
         self.note_gaps(at, situation);
         let step_rad = situation.heads.iter().flatten().map(|motion| motion.step_rad).fold(0.0, f64::max);
         if step_rad > 0.0 && (step_rad - self.step_rad).abs() > 0.0 {

@@ -3,8 +3,8 @@
 use bevy_ecs::prelude::{Query, Res, ResMut};
 
 use crate::app::flow::{
-    Aim, Digests, Event, Events, HeadTable, HiddenAngles, Outcome, Place, Placed, PlacedList, PlacedPing, Positioned,
-    PositionedList, SensorTable,
+    Aim, Digests, Event, Events, HeadTable, HiddenAngles, Outcome, Place, Placed, PlacedList, PlacedPing,
+    Positioned, PositionedList, SensorTable,
 };
 use crate::app::head::HeadTrack;
 use crate::app::reading::{Reading, SonarReturn};
@@ -51,9 +51,10 @@ pub(super) fn place(
                     continue;
                 };
                 let turned = track.ping(event.valid_at, sonar.angle_rad);
-                let hidden = hidden.0.get(head).is_some_and(|angles| {
-                    angles.iter().any(|range| range.has(sonar.angle_rad))
-                });
+                let hidden = hidden
+                    .0
+                    .get(head)
+                    .is_some_and(|angles| angles.iter().any(|range| range.has(sonar.angle_rad)));
                 let outcome = outcome(&sonar, fix, &sensor.mount, hidden, &context);
                 let ping = PlacedPing {
                     head,
@@ -91,8 +92,7 @@ fn outcome(
     };
     let origin = fix.pose.place(mount.position);
     let beam = fix.pose.attitude * (mount.rotation * head_direction(sonar.angle_rad));
-    let range_m =
-        sonar.range_m.map(|range_m| context.site.rescaled_range_m(range_m, sonar.sound_speed_mps));
+    let range_m = sonar.range_m.map(|range_m| context.site.rescaled_range_m(range_m, sonar.sound_speed_mps));
     let sample = |range_m: f64| {
         let point = origin + beam.scaled(range_m);
         Outcome::Sample { point, sigma_m: context.profile.sigma_of([point.y(), point.z()]) }
@@ -103,7 +103,8 @@ fn outcome(
     let wall = context.profile.cast([origin.y(), origin.z()], [beam.y(), beam.z()]);
     let aim = wall.map(|wall| Aim { x_m: origin.x() + wall.range_m * beam.x(), sigma_m: wall.sigma_m });
     let wall_m = wall.map(|wall| wall.range_m);
-    if let Some(range_m) = range_m.filter(|range_m| wall_m.is_none_or(|wall| *range_m > VEHICLE_SHARE * wall)) {
+    if let Some(range_m) = range_m.filter(|range_m| wall_m.is_none_or(|wall| *range_m > VEHICLE_SHARE * wall))
+    {
         return sample(range_m);
     }
     let longest_m = context.site.rescaled_range_m(sonar.max_range_m, sonar.sound_speed_mps);

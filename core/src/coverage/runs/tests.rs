@@ -52,8 +52,10 @@ impl Rig {
             let (Some(first), Some(last)) = (members.first(), members.last()) else { continue };
             assert_eq!((run.from, run.to), (*first, *last + 1));
             assert!(members.windows(2).all(|pair| pair[1] - pair[0] <= 3), "run {number} has fallen apart");
-            let largest =
-                members.iter().map(|index| self.holes[usize::try_from(index + 5).unwrap()]).fold(0.0, f64::max);
+            let largest = members
+                .iter()
+                .map(|index| self.holes[usize::try_from(index + 5).unwrap()])
+                .fold(0.0, f64::max);
             assert!((run.worst.1.diameter_m - largest).abs() < 1e-12);
             // No other run of the cause is near enough to be one with it.
             for other in last + 1..=(last + 3).min(COUNT - 6) {

@@ -29,6 +29,7 @@ use self::stillness::Stillness;
 use self::window::{Waiting, Window};
 use super::relative::Relative;
 use super::smooth::journal::Journal;
+use super::smooth::later::UNTIED;
 use super::{Fix, Navigation, NoFix, SensorInfo, SensorKind, Times};
 use crate::app::MAX_SOURCES;
 use crate::app::reading::Reading;
@@ -154,7 +155,10 @@ impl FilterNavigation {
     }
 
     fn write_steps(&mut self) {
-        let gap = self.pass_gap();
+        let gap = match self.pass_gap() {
+            gap if self.has_jumped(gap) => UNTIED,
+            gap => gap,
+        };
         let unit_at = self.context.unit_at;
         if let Some(journal) = &mut self.journal {
             for step in self.running.steps.drain(..) {

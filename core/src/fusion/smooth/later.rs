@@ -8,6 +8,11 @@ use crate::fusion::filter::trail::{CLONES, MOVING, STEP};
 use crate::fusion::relative::Relative;
 use crate::time::{DurNs, MonoNs};
 
+/// Nothing ties a moment to passes before it, however long before: the cable has slipped in between.
+pub const UNTIED: DurNs = DurNs(i64::MAX);
+/// How far off it may be then, m.
+const UNTIED_M: f64 = 1e3;
+
 /// A moment that waits.
 #[derive(Debug, Clone, Copy)]
 struct Moment {
@@ -90,6 +95,9 @@ impl Later {
 impl Moment {
     /// As if what is known went on growing as evenly.
     fn answer(&self) -> Answer {
+        if self.gap.0 >= UNTIED.0 {
+            return (self.number, Relative::along(UNTIED_M));
+        }
         let share = if self.age_s > 0.0 { self.gap.as_secs_f64() / self.age_s } else { 0.0 };
         (self.number, self.relative.weighted(share, &Relative::default(), 0.0))
     }
