@@ -27,7 +27,7 @@ const ROOM_BEYOND_M: f64 = 25.0;
 /// Samples for which there is room, for a metre of tunnel and at most. Four heads at 0.2 m/s lay 1,000 a metre.
 const SAMPLES_PER_M: f64 = 4_000.0;
 const MIN_SAMPLES: f64 = 4_000_000.0;
-const MAX_SAMPLES: f64 = 16_000_000.0;
+const MAX_SAMPLES: f64 = 40_000_000.0;
 
 /// A section that is judged may change its run and two others, and raise an alert.
 const NOTICES_EACH: usize = 5;
@@ -158,8 +158,8 @@ impl Loop {
                     world.resource_scope(|world, mut alerts: Mut<'_, Alerts>| {
                         notices.0.clear();
                         let mut requests = Vec::new();
-                        let Coverage { store, sections, frontier } = &mut *coverage;
-                        sections.unsettled(frontier, store.len(), at, &mut |request| requests.push(request));
+                        let Coverage { sections, frontier, .. } = &mut *coverage;
+                        sections.unsettled(frontier, at, &mut |request| requests.push(request));
                         let mut digests = world.resource_mut::<Digests>();
                         let mut results = Results {
                             finder: &mut finder,

@@ -1,7 +1,7 @@
 //! Whether a fail is certain before its hole is: whether an empty circle lies wholly where no sample can come any more.
 
 use super::frontier::Reach;
-use super::store::{SampleIndex, SampleStore};
+use super::store::SampleStore;
 use crate::math;
 
 /// Places are told apart to this, m; a circle that is only so much larger isn't certain yet.
@@ -58,7 +58,7 @@ impl CertainFinder {
             if clear_m + tile.half_x_m < radius_m {
                 continue;
             }
-            let nearest = store.nearest(tile.x_m, tile.sigma_m, radius_m + half_m, SampleIndex(u32::MAX));
+            let nearest = store.nearest(tile.x_m, tile.sigma_m, radius_m + half_m);
             let nearest_m = nearest.map_or(f64::INFINITY, |found| math::sqrt(found.distance2()));
             if nearest_m.min(clear_m) > radius_m {
                 return true;

@@ -22,4 +22,4 @@ pub use passage::{Doubt, Loss, Passage};
 pub use runs::{Run, RunChange, RunId, Runs};
 pub use section::{Judgement, Section, Spread, Verdict};
 pub use sections::{Judging, Request, Sections};
-pub use store::{SampleIndex, SampleStore, StoreError, StoreLayout, WallSample};
+pub use store::{Fidelity, Kept, SampleStore, StoreError, StoreLayout, StoreUse, WallSample};

@@ -72,7 +72,7 @@ fn spacing_m(target_m: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::coverage::hole::HoleFinder;
-    use crate::coverage::store::{SampleIndex, StoreLayout};
+    use crate::coverage::store::StoreLayout;
     use crate::tunnel::named;
 
     fn gate() -> Opening {
@@ -110,7 +110,7 @@ mod tests {
         let profile = named::circle(3.0).unwrap();
         let hole = |with: bool, from_m: f64| {
             let store = store(&profile, with);
-            let found = HoleFinder::default().largest(&store, from_m, from_m + 0.25, SampleIndex(u32::MAX));
+            let found = HoleFinder::default().largest(&store, from_m, from_m + 0.25);
             found.diameter_m
         };
         assert!(hole(false, 5.0) > 2.0);

@@ -169,7 +169,7 @@ mod tests {
     fn a_circle_is_narrower_towards_its_ends() {
         let mut passage = Passage::default();
         passage.lost.note(Loss::OutOfRange, 1.75, 6.4);
-        let hole = Hole { diameter_m: 2.0, x_m: 5.0, sigma_m: 1.0, bounded: true };
+        let hole = Hole { diameter_m: 2.0, least_m: 2.0, most_m: 2.0, x_m: 5.0, sigma_m: 1.0, bounded: true };
         let within =
             |from_m: f64| lost_within(&hole, 1.0, 6.4, core::iter::once(((from_m, from_m + 0.25), &passage)));
         assert_eq!((within(5.0), within(5.75), within(6.0)), ([0, 1, 0], [0; 3], [0; 3]));

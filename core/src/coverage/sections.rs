@@ -9,7 +9,7 @@ use super::hole::{FARTHEST_M, Hole, HoleFinder};
 use super::openings::Opening;
 use super::runs::{RunChange, RunId, Runs, Telling};
 use super::section::{Judgement, Section, Verdict};
-use super::store::{SampleIndex, SampleStore};
+use super::store::SampleStore;
 use crate::math;
 use crate::time::MonoNs;
 use crate::tunnel::Profile;
@@ -19,8 +19,6 @@ use crate::tunnel::Profile;
 pub struct Request {
     /// Index of the section, from chainage zero.
     pub section: i64,
-    /// The samples that count.
-    pub as_of: SampleIndex,
     /// The moment.
     pub at: MonoNs,
     /// The stretch that every head had swept by then.
@@ -33,9 +31,9 @@ pub struct Request {
 
 impl Request {
     /// Asks for sections as of one moment.
-    fn at(at: MonoNs, as_of: SampleIndex, frontier: &Frontier) -> impl Fn(i64) -> Self {
+    fn at(at: MonoNs, frontier: &Frontier) -> impl Fn(i64) -> Self {
         let (swept_by_all, reach) = (frontier.swept_by_all(at), frontier.reach(at));
-        move |section| Self { section, as_of, at, swept_by_all, reach, fails: false }
+        move |section| Self { section, at, swept_by_all, reach, fails: false }
     }
 }
 
@@ -148,14 +146,7 @@ impl Sections {
     /// hole may be out of the way now.
     ///
     /// Allocates: never.
-    pub fn due(
-        &mut self,
-        moved: &Moved,
-        frontier: &Frontier,
-        as_of: SampleIndex,
-        at: MonoNs,
-        ask: &mut impl FnMut(Request),
-    ) {
+    pub fn due(&mut self, moved: &Moved, frontier: &Frontier, at: MonoNs, ask: &mut impl FnMut(Request)) {
         if moved.left_behind.is_empty() && moved.left_ahead.is_empty() {
             return;
         }
@@ -163,7 +154,7 @@ impl Sections {
             return;
         }
         let passed = self.passed(frontier.swept());
-        let ask_for = Request::at(at, as_of, frontier);
+        let ask_for = Request::at(at, frontier);
         for range in [&moved.left_behind, &moved.left_ahead] {
             for index in clamp(range.clone(), &passed) {
                 let Some(section) = self.get_mut(index) else { continue };
@@ -183,7 +174,7 @@ impl Sections {
                 let Some(section) = self.get_mut(index).filter(|section| !section.settled) else { continue };
                 let Some(hole) = section.hole else { continue };
                 let clear_m = clear_of(moved.reach, hole.x_m);
-                let left_m = hole.diameter_m.min(2.0 * clear_m);
+                let left_m = hole.least_m.min(2.0 * clear_m);
                 let fails =
                     section.verdict == Verdict::Open && left_m - 2.0 * section.hole_sigma_m > target_m;
                 if fails || clear_m >= hole.diameter_m / 2.0 {
@@ -200,7 +191,7 @@ impl Sections {
     /// Allocates: never.
     pub fn look_around(
         &mut self,
-        (frontier, as_of, at): (&Frontier, SampleIndex, MonoNs),
+        (frontier, at): (&Frontier, MonoNs),
         store: &SampleStore,
         finder: &mut CertainFinder,
         profile: &Profile,
@@ -208,7 +199,7 @@ impl Sections {
     ) {
         let Some(zone) = frontier.zone() else { return };
         let reach = frontier.reach(at);
-        let ask_for = Request::at(at, as_of, frontier);
+        let ask_for = Request::at(at, frontier);
         for index in clamp(zone, &self.passed(frontier.swept())) {
             let bounds_m = self.bounds_m(index);
             let target_m = self.target_m;
@@ -234,7 +225,7 @@ impl Sections {
         let (from_m, to_m) = self.bounds_m(request.section);
         let target_m = self.target_m;
         let section = self.get_mut(request.section)?;
-        let hole = judging.finder.largest(judging.store, from_m, to_m, request.as_of);
+        let hole = judging.finder.largest(judging.store, from_m, to_m);
         let sigma_m = section.passage.doubt.sigma_m(judging.profile.point_at(hole.sigma_m));
         let clear_m = clear_of(request.reach, hole.x_m);
         section.hole = Some(hole);
@@ -277,14 +268,8 @@ impl Sections {
     }
 
     /// Calls `ask` for every section that was passed and isn't settled, at the end of a dive.
-    pub fn unsettled(
-        &mut self,
-        frontier: &Frontier,
-        as_of: SampleIndex,
-        at: MonoNs,
-        ask: &mut impl FnMut(Request),
-    ) {
-        let ask_for = Request::at(at, as_of, frontier);
+    pub fn unsettled(&mut self, frontier: &Frontier, at: MonoNs, ask: &mut impl FnMut(Request)) {
+        let ask_for = Request::at(at, frontier);
         for index in self.passed(frontier.swept()) {
             let Some(section) = self.get_mut(index) else { continue };
             // The hole of a fail may have been narrowed from farther away than a pass depends on.
@@ -305,14 +290,15 @@ impl Sections {
 
 /// What is said of a hole whose centre is `clear_m` from where samples may still land. `pass` when D + 2 sigma <= T: more
 /// samples won't make it larger. `fail` when D - 2 sigma > T for whatever D will be: samples come no nearer than `clear_m`.
-/// In between `open` while D may change, then `cannot_say`. Wall without samples around it fails.
+/// In between `open` while D may change, then `cannot_say`. A verdict holds for both bounds of D. Wall without samples
+/// around it fails.
 fn verdict(hole: &Hole, sigma_m: f64, target_m: f64, clear_m: f64) -> Verdict {
-    let left_m = hole.diameter_m.min(2.0 * clear_m);
-    if hole.bounded && hole.diameter_m + 2.0 * sigma_m <= target_m {
+    let is_left = 2.0 * clear_m >= hole.diameter_m;
+    if hole.bounded && hole.most_m + 2.0 * sigma_m <= target_m {
         Verdict::Pass
-    } else if left_m - 2.0 * sigma_m > target_m || !hole.bounded && left_m >= hole.diameter_m {
+    } else if hole.least_m.min(2.0 * clear_m) - 2.0 * sigma_m > target_m || !hole.bounded && is_left {
         Verdict::Fail
-    } else if left_m >= hole.diameter_m {
+    } else if is_left {
         Verdict::CannotSay
     } else {
         Verdict::Open
@@ -330,7 +316,7 @@ mod tests {
     const BEHIND: f64 = f64::INFINITY;
 
     fn hole(diameter_m: f64) -> Hole {
-        Hole { diameter_m, x_m: 0.0, sigma_m: 0.0, bounded: true }
+        Hole { diameter_m, least_m: diameter_m, most_m: diameter_m, x_m: 0.0, sigma_m: 0.0, bounded: true }
     }
 
     #[test]
@@ -362,5 +348,13 @@ mod tests {
         );
         let unsure = |clear_m: f64| verdict(&hole(1.1), 0.1, 1.0, clear_m);
         assert_eq!([0.5, 0.56].map(unsure), [Verdict::Open, Verdict::CannotSay]);
+    }
+
+    #[test]
+    fn bounds_on_either_side_of_the_target_say_nothing() {
+        assert_eq!(verdict(&hole(0.51, 0.49, 0.51), 0.0, 0.5), Verdict::CannotSay);
+        assert_eq!(verdict(&hole(0.51, 0.501, 0.51), 0.0, 0.5), Verdict::Fail);
+        assert_eq!(verdict(&hole(0.49, 0.49, 0.505), 0.0, 0.5), Verdict::CannotSay);
+        assert_eq!(verdict(&hole(0.49, 0.45, 0.5), 0.0, 0.5), Verdict::Pass);
     }
 }

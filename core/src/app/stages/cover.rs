@@ -13,7 +13,7 @@ use crate::app::flow::{
     Tally,
 };
 use crate::coverage::hole::FARTHEST_M;
-use crate::coverage::{Doubt, Loss, SampleIndex, StoreError, WallSample};
+use crate::coverage::{Doubt, Loss, StoreError, WallSample};
 use crate::frames::{Point3, Tunnel, Vec3};
 use crate::math;
 use crate::sampling::head::MAX_HEADS;
@@ -34,7 +34,6 @@ pub(in crate::app) struct HeadSweeps {
 /// The last valid sample of a head in its present sweep.
 #[derive(Debug, Clone, Copy)]
 struct LastSample {
-    index: SampleIndex,
     point: Point3<Tunnel>,
     sigma_m: f64,
     /// Every ping since has been a single step with a return.
@@ -170,7 +169,7 @@ fn look_around(
     requests: &mut Requests,
 ) {
     let Coverage { store, sections, frontier } = coverage;
-    let now = (&*frontier, store.len(), at);
+    let now = (&*frontier, at);
     let mut ask = |request| requests.0.push(request);
     sections.look_around(now, store, &mut finder.certain, &context.profile, &mut ask);
 }
@@ -206,14 +205,14 @@ fn note_sample(
     }
     let before = *slot;
     let step_from = before.filter(|last| last.unbroken && ping.single_step);
-    let now = coverage.store.len();
-    let t_x_m = coverage.store.nearest_pass_m(point.x(), sigma_m, FARTHEST_M, now);
-    let sample = WallSample { x_m: point.x(), sigma_m, step_from: step_from.map(|last| last.index) };
-    let kept = coverage.store.insert(sample);
-    *slot = kept.ok().map(|index| LastSample { index, point, sigma_m, unbroken: true });
+    let t_x_m = coverage.store.nearest_pass_m(point.x(), sigma_m, FARTHEST_M);
+    let perimeter_m = coverage.store.perimeter_m();
+    let step_m = step_from
+        .map(|last| [point.x() - last.point.x(), math::wrap_signed(sigma_m - last.sigma_m, perimeter_m)]);
+    let kept = coverage.store.insert(WallSample { x_m: point.x(), sigma_m, head: ping.head, step_m });
+    *slot = kept.ok().map(|_| LastSample { point, sigma_m, unbroken: true });
     kept?;
     coverage.sections.touch(point.x());
-    let perimeter_m = coverage.store.perimeter_m();
     let index = coverage.sections.index_of(point.x());
     let Some(section) = coverage.sections.get_mut(index) else { return Ok(()) };
     section.samples += 1;
@@ -231,8 +230,7 @@ fn note_sample(
             section.t_m.add(spacing::t_max_m(t_x_m, advance_m, t_y_m));
         }
     }
-    if let Some(last) = step_from {
-        let around_m = math::wrap_signed(sigma_m - last.sigma_m, perimeter_m);
+    if let Some([_, around_m]) = step_m {
         section.passage.t_y_m = section.passage.t_y_m.max(around_m.abs());
     }
     Ok(())
@@ -240,13 +238,12 @@ fn note_sample(
 
 /// Moves the frontier on, and asks for the sections that are out of the way now.
 fn note_frontier(coverage: &mut Coverage, ping: &PlacedPing, requests: &mut Requests) {
-    let Coverage { store, sections, frontier } = coverage;
+    let Coverage { sections, frontier, .. } = coverage;
     let (Some(fix), Some(reach)) = (ping.fix, ping.reach) else {
         frontier.heard(ping.head, ping.received);
         return;
     };
     let margin_m = sections.margin_m(fix.relative.sigma_m(Vec3::zero()));
     let moved = frontier.advance(ping.head, ping.received, reach, sections.section_m(), margin_m);
-    let now = store.len();
-    sections.due(&moved, frontier, now, ping.received, &mut |request| requests.0.push(request));
+    sections.due(&moved, frontier, ping.received, &mut |request| requests.0.push(request));
 }

@@ -1,21 +1,29 @@
-use super::super::store::{StoreLayout, WallSample};
+use super::super::store::{Kept, StoreLayout, WallSample};
 use super::*;
 use proptest::prelude::*;
 
 const PERIMETER_M: f64 = 9.0;
-const NOW: SampleIndex = SampleIndex(u32::MAX);
 
 fn store(perimeter_m: f64, samples: &[(f64, f64)]) -> SampleStore {
     let layout = StoreLayout { perimeter_m, from_m: -20.0, to_m: 40.0, cell_m: 0.4, capacity: 100_000 };
     let mut store = SampleStore::new(layout);
     for (x_m, sigma_m) in samples {
-        store.insert(WallSample { x_m: *x_m, sigma_m: *sigma_m, step_from: None }).unwrap();
+        store.insert(WallSample { x_m: *x_m, sigma_m: *sigma_m, head: 0, step_m: None }).unwrap();
     }
     store
 }
 
 fn largest(perimeter_m: f64, samples: &[(f64, f64)], from_m: f64, to_m: f64) -> Hole {
-    HoleFinder::default().largest(&store(perimeter_m, samples), from_m, to_m, NOW)
+    HoleFinder::default().largest(&store(perimeter_m, samples), from_m, to_m)
+}
+
+/// Distance from a place to the nearest sample, looking at all.
+fn nearest_m(perimeter_m: f64, samples: &[(f64, f64)], place: (f64, f64)) -> f64 {
+    let distance = |s: &(f64, f64)| {
+        let around = (s.1 - place.1).abs() % perimeter_m;
+        math::hypot(s.0 - place.0, around.min(perimeter_m - around))
+    };
+    samples.iter().map(distance).fold(f64::INFINITY, f64::min)
 }
 
 /// Every place where f can be largest, by solving for it: circumcentres of three samples (or their images), and the
@@ -59,8 +67,96 @@ proptest! {
         let hole = largest(PERIMETER_M, &samples, 0.0, 0.5);
         let expected = brute_force(PERIMETER_M, &samples, 0.0, 0.5);
         prop_assert!((hole.diameter_m - expected).abs() < 1e-9, "{} and {}", hole.diameter_m, expected);
-        let near = store(PERIMETER_M, &samples).nearest(hole.x_m, hole.sigma_m, 20.0, NOW).unwrap();
-        prop_assert!((2.0 * near.distance2().sqrt() - hole.diameter_m).abs() < 1e-9, "its centre is where it says");
+        let at_centre = 2.0 * nearest_m(PERIMETER_M, &samples, (hole.x_m, hole.sigma_m));
+        prop_assert!((at_centre - hole.diameter_m).abs() < 1e-9, "its centre is where it says");
+        prop_assert!(hole.least_m <= hole.diameter_m && hole.most_m - hole.least_m < 1e-9, "{:?}", hole);
+    }
+
+    /// The window's search against looking at all.
+    #[test]
+    fn the_nearest_is_the_nearest(
+        samples in proptest::collection::vec((-3.0f64..4.0, 0.0f64..PERIMETER_M), 0..60),
+        place in (0.0f64..1.0, -8.0f64..16.0),
+        within_m in 0.05f64..3.0,
+        cell_m in 0.05f64..1.0,
+    ) {
+        let mut window = Window::default();
+        window.fill(&store(PERIMETER_M, &samples), 0.0, (-3.0, 4.0), cell_m);
+        let expected = Some(nearest_m(PERIMETER_M, &samples, place)).filter(|d| *d <= within_m);
+        let found = window.nearest(place.0, place.1, within_m);
+        match (found, expected) {
+            (Some(found), Some(expected)) => {
+                prop_assert!((math::sqrt(found.distance2) - expected).abs() < 1e-12);
+                let image_m = found.sigma_m + found.turns * PERIMETER_M - place.1;
+                let by_image_m = math::hypot(found.x_m - place.0, image_m);
+                prop_assert!((by_image_m - expected).abs() < 1e-12, "its image is the near one");
+            }
+            (found, expected) => prop_assert_eq!(found.is_some(), expected.is_some()),
+        }
+    }
+
+    /// D lies within the bounds that a tolerant search states, and no farther apart than it was told. A verdict from them
+    /// is the exact one, or none where T lies between them.
+    #[test]
+    fn verif_bounds_of_a_tolerant_search_hold(
+        samples in proptest::collection::vec((-2.0f64..3.0, 0.0f64..PERIMETER_M), 1..14),
+        tolerance_m in 0.0f64..0.5,
+        target_m in 0.1f64..6.0,
+    ) {
+        let expected = brute_force(PERIMETER_M, &samples, 0.0, 0.5);
+        let hole = HoleFinder::new(tolerance_m).largest(&store(PERIMETER_M, &samples), 0.0, 0.5);
+        prop_assert!(hole.least_m <= expected + 1e-9 && expected <= hole.most_m + 1e-9, "{:?}, {}", hole, expected);
+        prop_assert!(hole.most_m - hole.least_m <= tolerance_m + 1e-9);
+        let said = (hole.most_m <= target_m, hole.least_m > target_m);
+        if (expected - target_m).abs() > tolerance_m + 1e-9 {
+            prop_assert_eq!(said, (expected <= target_m, expected > target_m));
+        } else {
+            prop_assert!(said == (false, false) || said == (expected <= target_m, expected > target_m));
+        }
+    }
+
+    /// The same of samples that were packed before: moved, and the bounds say by how much.
+    #[test]
+    fn verif_bounds_after_packing_hold(
+        samples in proptest::collection::vec((-2.0f64..3.0, 0.0f64..PERIMETER_M), 1..14),
+    ) {
+        let layout = StoreLayout { perimeter_m: PERIMETER_M, from_m: -20.0, to_m: 340.0, cell_m: 0.4, capacity: 1000 };
+        let mut store = SampleStore::new(layout);
+        let far = (0..120).map(|k| (339.0 - 1.7 * f64::from(k), 0.0));
+        for (x_m, sigma_m) in samples.iter().copied().chain(far) {
+            store.insert(WallSample { x_m, sigma_m, head: 0, step_m: None }).unwrap();
+        }
+        let expected = brute_force(PERIMETER_M, &samples, 0.0, 0.5);
+        let hole = HoleFinder::default().largest(&store, 0.0, 0.5);
+        prop_assert!(hole.least_m <= expected && expected <= hole.most_m, "{:?} and {}", hole, expected);
+        let width_m = hole.most_m - hole.least_m;
+        prop_assert!(width_m > 0.0 && width_m < 1e-4, "{:?}", hole);
+    }
+
+    /// And of a cell so full that samples were left out.
+    #[test]
+    fn verif_bounds_after_thinning_hold(
+        crowd in proptest::collection::vec((0.0f64..0.4, 4.0f64..4.4), 200..500),
+    ) {
+        let mut samples: Vec<_> = crowd.into_iter().filter(|s| s.1 < 4.15 || s.1 > 4.25).collect();
+        // Elsewhere nothing is as far apart as the gap in the crowd.
+        let fence = (-6..=14).flat_map(|i| (0..180).map(move |k| (f64::from(i) * 0.05, f64::from(k) * 0.05)));
+        samples.extend(fence.filter(|s| !(4.0..4.4).contains(&s.1)));
+        let thinned = store(PERIMETER_M, &samples);
+        prop_assume!(thinned.usage().thinned > 0);
+        let hole = HoleFinder::default().largest(&thinned, 0.1, 0.3);
+        let fine = StoreLayout { perimeter_m: PERIMETER_M, from_m: -1.0, to_m: 1.0, cell_m: 0.05, capacity: 100_000 };
+        let mut all = SampleStore::new(fine);
+        for (x_m, sigma_m) in &samples {
+            let kept = all.insert(WallSample { x_m: *x_m, sigma_m: *sigma_m, head: 0, step_m: None });
+            prop_assume!(kept == Ok(Kept::Stored));
+        }
+        let exact = HoleFinder::default().largest(&all, 0.1, 0.3);
+        prop_assert!(hole.least_m < hole.diameter_m && hole.most_m - hole.diameter_m < 1e-9);
+        prop_assert!(
+            hole.least_m <= exact.diameter_m && exact.diameter_m <= hole.most_m + 1e-12,
+            "{:?} {:?}", hole, exact
+        );
     }
 
     /// A small pipe: holes wider than the wall goes round.
@@ -162,9 +258,11 @@ fn chainage_of_seven_and_of_a_thousand_kilometres() {
         };
         let mut store = SampleStore::new(layout);
         for (x_m, sigma_m) in &samples {
-            store.insert(WallSample { x_m: x_m + chainage, sigma_m: *sigma_m, step_from: None }).unwrap();
+            store
+                .insert(WallSample { x_m: x_m + chainage, sigma_m: *sigma_m, head: 0, step_m: None })
+                .unwrap();
         }
-        let hole = HoleFinder::default().largest(&store, chainage, chainage + 0.25, NOW);
+        let hole = HoleFinder::default().largest(&store, chainage, chainage + 0.25);
         assert!((hole.diameter_m - near).abs() < error, "{chainage}: {hole:?} and {near}");
     }
 }
@@ -193,14 +291,13 @@ fn val_reference_holes_of_ideal_helices() {
                         math::TAU * (ping as f64 / f64::from(steps) + f64::from(head) / f64::from(heads));
                     let hit =
                         profile.cast(profile.reference(), [math::sin(angle), -math::cos(angle)]).unwrap();
-                    let sample =
-                        WallSample { x_m: ping as f64 * per_ping_m, sigma_m: hit.sigma_m, step_from: None };
-                    store.insert(sample).unwrap();
+                    let (x_m, sigma_m, head) = (ping as f64 * per_ping_m, hit.sigma_m, head as usize);
+                    store.insert(WallSample { x_m, sigma_m, head, step_m: None }).unwrap();
                 }
             }
             let mut finder = HoleFinder::default();
             let holes = (0..36).map(|k| 7.0 + 0.25 * f64::from(k));
-            let d = holes.map(|x| finder.largest(&store, x, x + 0.25, NOW).diameter_m).fold(0.0, f64::max);
+            let d = holes.map(|x| finder.largest(&store, x, x + 0.25).diameter_m).fold(0.0, f64::max);
             assert!((d / expected - 1.0).abs() < 2e-3, "{mode} x {heads}: {d} and {expected}");
         }
     }

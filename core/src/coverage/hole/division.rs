@@ -1,0 +1,127 @@
+//! A tile divided among samples: each one's share is what lies nearer to it than to the others, a convex polygon on which
+//! the distance to it is largest at a corner.
+
+/// The most samples among which a tile is divided; with more it is halved instead.
+pub(super) const MAX_OWNERS: usize = 32;
+/// The most corners of a share; with more the tile is halved, too.
+const MAX_CORNERS: usize = 12;
+
+/// A share of a tile.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Share {
+    /// Where its sample is, from the tile's middle, m.
+    pub owner: (f64, f64),
+    /// Corners from the owner: there, differences of near places are exact.
+    corners: [(f64, f64); MAX_CORNERS],
+    len: usize,
+    /// Squared distance of the farthest corner from the owner; zero when nothing is left.
+    pub farthest2: f64,
+    /// That corner.
+    pub farthest: (f64, f64),
+}
+
+impl Share {
+    /// The whole of a tile with these half edges, for one owner.
+    fn whole(owner: (f64, f64), (half_x, half_sigma): (f64, f64)) -> Self {
+        let (left, right) = (-owner.0 - half_x, -owner.0 + half_x);
+        let (low, high) = (-owner.1 - half_sigma, -owner.1 + half_sigma);
+        let mut share =
+            Self { owner, corners: [(0.0, 0.0); MAX_CORNERS], len: 4, farthest2: 0.0, farthest: (0.0, 0.0) };
+        for (corner, place) in
+            share.corners.iter_mut().zip([(left, low), (right, low), (right, high), (left, high)])
+        {
+            *corner = place;
+        }
+        share.measure();
+        share
+    }
+
+    fn measure(&mut self) {
+        self.farthest2 = 0.0;
+        for corner in self.corners.iter().take(self.len) {
+            let distance2 = corner.0 * corner.0 + corner.1 * corner.1;
+            if distance2 > self.farthest2 {
+                (self.farthest2, self.farthest) = (distance2, *corner);
+            }
+        }
+    }
+
+    /// Keeps what is at least as near to the owner as to a rival; gives false when there are too many corners.
+    fn clip(&mut self, rival: (f64, f64)) -> bool {
+        let (nx, ny) = (rival.0 - self.owner.0, rival.1 - self.owner.1);
+        let half = 0.5 * (nx * nx + ny * ny);
+        // A rival more than twice as far as the farthest corner cuts nothing: half > 2 farthest^2.
+        if half > 2.0 * self.farthest2 {
+            return true;
+        }
+        let excess = |corner: (f64, f64)| nx * corner.0 + ny * corner.1 - half;
+        let Some(corners) = self.corners.get(..self.len) else { return false };
+        if corners.iter().all(|corner| excess(*corner) <= 0.0) {
+            return true;
+        }
+        let mut kept = [(0.0, 0.0); MAX_CORNERS];
+        let mut room = kept.iter_mut();
+        let mut before = corners.last().copied().unwrap_or_default();
+        let mut excess_before = excess(before);
+        let mut len = 0;
+        for corner in corners {
+            let excess_here = excess(*corner);
+            if (excess_before > 0.0) != (excess_here > 0.0) {
+                let share = excess_before / (excess_before - excess_here);
+                let cut =
+                    (before.0 + share * (corner.0 - before.0), before.1 + share * (corner.1 - before.1));
+                let Some(place) = room.next() else { return false };
+                (*place, len) = (cut, len + 1);
+            }
+            if excess_here <= 0.0 {
+                let Some(place) = room.next() else { return false };
+                (*place, len) = (*corner, len + 1);
+            }
+            (before, excess_before) = (*corner, excess_here);
+        }
+        (self.corners, self.len) = (kept, len);
+        self.measure();
+        true
+    }
+}
+
+/// A tile, divided among the samples that are known to matter so far.
+///
+/// More samples only make it lower: the farthest corner of any share is a bound for the whole tile.
+#[derive(Debug)]
+pub(super) struct Division {
+    half_edges: (f64, f64),
+    shares: Vec<Share>,
+}
+
+impl Default for Division {
+    fn default() -> Self {
+        Self { half_edges: (0.0, 0.0), shares: Vec::with_capacity(MAX_OWNERS) }
+    }
+}
+
+impl Division {
+    /// Begins with a tile and its first owner.
+    pub(super) fn begin(&mut self, half_edges: (f64, f64), owner: (f64, f64)) {
+        self.half_edges = half_edges;
+        self.shares.clear();
+        self.shares.push(Share::whole(owner, half_edges));
+    }
+
+    /// The share with the farthest corner.
+    pub(super) fn worst(&self) -> Option<&Share> {
+        self.shares.iter().max_by(|a, b| a.farthest2.total_cmp(&b.farthest2))
+    }
+
+    /// Gives a sample its share. False when it has one already or there is no room for it: the tile is too large.
+    pub(super) fn add(&mut self, owner: (f64, f64)) -> bool {
+        let same = |share: &Share| (share.owner.0 - owner.0).abs() + (share.owner.1 - owner.1).abs() <= 0.0;
+        if self.shares.len() == MAX_OWNERS || self.shares.iter().any(same) {
+            return false;
+        }
+        let mut added = Share::whole(owner, self.half_edges);
+        let fits = self.shares.iter_mut().all(|share| added.clip(share.owner) && share.clip(owner));
+        self.shares.push(added);
+        fits
+    }
+}

@@ -1,0 +1,238 @@
+//! The samples about a section, sorted into fine cells: what the search looks at.
+
+use crate::coverage::store::SampleStore;
+use crate::math;
+
+/// Samples for which there is room.
+const ROOM: usize = 1 << 18;
+/// Cells for which there is room.
+const CELLS: usize = 1 << 20;
+
+/// A sample's place: chainage from the window's origin, and arc length, m.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+struct Spot {
+    x_m: f64,
+    sigma_m: f64,
+}
+
+/// The nearest sample to a place.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Nearest {
+    /// Its chainage from the window's origin, m.
+    pub x_m: f64,
+    /// Its arc length, in [0, perimeter), m.
+    pub sigma_m: f64,
+    /// Turns to add to the arc length for the image that is nearest.
+    pub turns: f64,
+    /// Distance on the unrolled wall, squared.
+    pub distance2: f64,
+}
+
+/// A stretch of wall with all its samples.
+#[derive(Debug)]
+pub(super) struct Window {
+    perimeter_m: f64,
+    /// Chainage of the origin, m.
+    origin_m: f64,
+    /// Chainage of the first row from the origin, m.
+    from_m: f64,
+    cell_m: f64,
+    column_m: f64,
+    rows: usize,
+    columns: usize,
+    /// Where each cell's samples begin; row by row, with one more at the end.
+    begins: Vec<u32>,
+    spots: Vec<Spot>,
+    unsorted: Vec<(u32, Spot)>,
+    /// Whether there were more samples than fit.
+    pub overfull: bool,
+}
+
+impl Default for Window {
+    fn default() -> Self {
+        Self {
+            perimeter_m: 1.0,
+            origin_m: 0.0,
+            from_m: 0.0,
+            cell_m: 1.0,
+            column_m: 1.0,
+            rows: 0,
+            columns: 1,
+            begins: Vec::with_capacity(CELLS + 2),
+            spots: Vec::with_capacity(ROOM),
+            unsorted: Vec::with_capacity(ROOM),
+            overfull: false,
+        }
+    }
+}
+
+impl Window {
+    /// Takes in all samples between two chainages, in cells of about a wanted size. Chainages are from `origin_m` on.
+    ///
+    /// Allocates: never.
+    pub(super) fn fill(
+        &mut self,
+        store: &SampleStore,
+        origin_m: f64,
+        (from_m, to_m): (f64, f64),
+        cell_m: f64,
+    ) {
+        self.lay_out(store.perimeter_m(), origin_m, (from_m, to_m), cell_m);
+        self.unsorted.clear();
+        self.overfull = false;
+        let (rows, columns) = (self.rows as f64, self.columns - 1);
+        store.visit_between(origin_m + from_m, origin_m + to_m, |x_m, sigma_m| {
+            let spot = Spot { x_m: x_m - origin_m, sigma_m };
+            let row = (spot.x_m - self.from_m) / self.cell_m;
+            if !(0.0..rows).contains(&row) {
+                return;
+            }
+            if self.unsorted.len() == ROOM {
+                self.overfull = true;
+                return;
+            }
+            let cell = whole(row) * self.columns + whole(sigma_m / self.column_m).min(columns);
+            if let Some(count) = self.begins.get_mut(cell + 2) {
+                *count += 1;
+            }
+            self.unsorted.push((u32::try_from(cell).unwrap_or(u32::MAX), spot));
+        });
+        self.sort();
+    }
+
+    fn lay_out(&mut self, perimeter_m: f64, origin_m: f64, (from_m, to_m): (f64, f64), cell_m: f64) {
+        let cells = (to_m - from_m) * perimeter_m;
+        // Coarser cells where there would be more than there is room for.
+        let cell_m = cell_m.max(1.5 * math::sqrt(cells / CELLS as f64));
+        (self.perimeter_m, self.origin_m, self.from_m, self.cell_m) = (perimeter_m, origin_m, from_m, cell_m);
+        self.rows = whole((to_m - from_m) / cell_m) + 1;
+        self.columns = whole(perimeter_m / cell_m).clamp(1, CELLS / self.rows);
+        self.column_m = perimeter_m / self.columns as f64;
+        self.begins.clear();
+        self.begins.resize(self.rows * self.columns + 2, 0);
+    }
+
+    /// Sorts samples by cell. Counts stand two places on; sums over them are where each cell begins, and while samples
+    /// are put in place each becomes where the next one does.
+    fn sort(&mut self) {
+        let mut sum = 0;
+        for begin in &mut self.begins {
+            sum += *begin;
+            *begin = sum;
+        }
+        self.spots.clear();
+        self.spots.resize(self.unsorted.len(), Spot::default());
+        for (cell, spot) in &self.unsorted {
+            let Some(next) = self.begins.get_mut(*cell as usize + 1) else { continue };
+            if let Some(place) = self.spots.get_mut(*next as usize) {
+                *place = *spot;
+            }
+            *next += 1;
+        }
+    }
+
+    /// Chainage from the window's origin to chainage along the tunnel, m.
+    pub(super) fn chainage_m(&self, x_m: f64) -> f64 {
+        self.origin_m + x_m
+    }
+
+    /// Perimeter, m.
+    pub(super) fn perimeter_m(&self) -> f64 {
+        self.perimeter_m
+    }
+
+    /// The nearest sample to a place, no farther than a distance; of equally near ones the first that is come by.
+    pub(super) fn nearest(&self, x_m: f64, sigma_m: f64, within_m: f64) -> Option<Nearest> {
+        let turn = libm::floor(sigma_m / self.perimeter_m);
+        let sigma_m = sigma_m - turn * self.perimeter_m;
+        let mut best = Search { x_m, sigma_m, limit2: within_m * within_m, found: None };
+        let into = (x_m - self.from_m) / self.cell_m;
+        let centre = into.clamp(0.0, (self.rows - 1) as f64);
+        let centre = whole(centre);
+        // Outwards from the place's own row: first both neighbours, then theirs.
+        self.look_in_row(centre, &mut best);
+        for ring in 1..self.rows {
+            let below = (centre >= ring).then(|| centre - ring);
+            let above = Some(centre + ring).filter(|row| *row < self.rows);
+            let mut in_reach = false;
+            for row in [below, above].into_iter().flatten() {
+                in_reach |= self.look_in_row(row, &mut best);
+            }
+            if !in_reach {
+                break;
+            }
+        }
+        let (spot, turns) = best.found?;
+        let turns = turns + turn;
+        Some(Nearest { x_m: spot.x_m, sigma_m: spot.sigma_m, turns, distance2: best.limit2 })
+    }
+
+    /// Looks at what a row has near a place; gives false when the whole row is too far away.
+    fn look_in_row(&self, row: usize, best: &mut Search) -> bool {
+        let low = self.from_m + row as f64 * self.cell_m - best.x_m;
+        let away = low.max(-(low + self.cell_m)).max(0.0);
+        let width2 = best.limit2 - away * away;
+        // A hair more, since sums of rounded edges are rounded.
+        if width2 < -1e-9 {
+            return false;
+        }
+        let width_m = math::sqrt(width2.max(0.0)) + 1e-9;
+        let first = row * self.columns;
+        if 2.0 * width_m + self.column_m >= self.perimeter_m {
+            self.look_at(first, first + self.columns, best);
+            return true;
+        }
+        let left = libm::floor((best.sigma_m - width_m) / self.column_m);
+        let right = libm::floor((best.sigma_m + width_m) / self.column_m);
+        let count = self.columns as f64;
+        if left < 0.0 {
+            self.look_at(first + whole(left + count), first + self.columns, best);
+        }
+        if right >= count {
+            self.look_at(first, first + whole(right - count) + 1, best);
+        }
+        self.look_at(first + whole(left.max(0.0)), first + whole(right.min(count - 1.0)) + 1, best);
+        true
+    }
+
+    /// Looks at the samples of some cells in a row.
+    fn look_at(&self, from: usize, to: usize, best: &mut Search) {
+        let (Some(begin), Some(end)) = (self.begins.get(from), self.begins.get(to)) else { return };
+        let Some(spots) = self.spots.get(*begin as usize..*end as usize) else { return };
+        let half_m = self.perimeter_m / 2.0;
+        for spot in spots {
+            let dx = spot.x_m - best.x_m;
+            let straight = spot.sigma_m - best.sigma_m;
+            let turns = if straight >= half_m {
+                -1.0
+            } else if straight < -half_m {
+                1.0
+            } else {
+                0.0
+            };
+            let dsigma = straight + turns * self.perimeter_m;
+            let distance2 = dx * dx + dsigma * dsigma;
+            if distance2 < best.limit2 || (best.found.is_none() && distance2 <= best.limit2) {
+                best.limit2 = distance2;
+                best.found = Some((*spot, turns));
+            }
+        }
+    }
+}
+
+/// A search for the nearest.
+struct Search {
+    x_m: f64,
+    sigma_m: f64,
+    limit2: f64,
+    found: Option<(Spot, f64)>,
+}
+
+/// The whole part of what isn't negative.
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "float to integer casts saturate, which is what is wanted"
+)]
+fn whole(x: f64) -> usize {
+    x as usize
+}

@@ -1,0 +1,278 @@
+use super::*;
+use proptest::prelude::*;
+
+const PERIMETER_M: f64 = 7.3;
+const LAYOUT: StoreLayout =
+    StoreLayout { perimeter_m: PERIMETER_M, from_m: -1.0, to_m: 212.0, cell_m: 0.3, capacity: 200_000 };
+
+fn sample(x_m: f64, sigma_m: f64) -> WallSample {
+    WallSample { x_m, sigma_m, head: 0, step_m: None }
+}
+
+/// Single steps of several heads from place to place, the first of each head without one.
+fn steps(places: &[(f64, f64)], heads: usize) -> Vec<WallSample> {
+    let mut last = vec![None; heads];
+    let mut all = Vec::new();
+    for (k, (x_m, sigma_m)) in places.iter().enumerate() {
+        let head = k % heads;
+        let step_m = last[head].replace((*x_m, *sigma_m)).map(|(from_x_m, from_sigma_m): (f64, f64)| {
+            [x_m - from_x_m, math::wrap_signed(sigma_m - from_sigma_m, PERIMETER_M)]
+        });
+        all.push(WallSample { x_m: *x_m, sigma_m: *sigma_m, head, step_m });
+    }
+    all
+}
+
+fn store(samples: &[WallSample]) -> SampleStore {
+    let mut store = SampleStore::new(LAYOUT);
+    for sample in samples {
+        assert_eq!(store.insert(*sample), Ok(Kept::Stored));
+    }
+    store
+}
+
+/// Opens so many other bricks that none of the first 40 m stays open.
+fn pack_the_first_40_m(store: &mut SampleStore) {
+    for k in 0..100 {
+        store.insert(sample(210.0 - 1.2 * f64::from(k), 0.0)).unwrap();
+    }
+    assert!(store.bricks.iter().take(30).all(|brick| brick.slot == 0), "all of them are packed");
+}
+
+/// What is kept of the first 40 m, in order.
+fn kept(store: &SampleStore) -> Vec<(f64, f64)> {
+    let mut kept = Vec::new();
+    store.visit_between(-1.0, 40.0, |x_m, sigma_m| kept.push((x_m, sigma_m)));
+    kept.retain(|place| place.0 < 40.0);
+    kept.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    kept
+}
+
+/// Distances in chainage from a place to every crossing of its arc length, by walking along each step.
+fn crossings(samples: &[WallSample], (x_m, sigma_m): (f64, f64)) -> Vec<f64> {
+    let mut found = Vec::new();
+    for end in samples {
+        let Some([along_m, around_m]) = end.step_m else { continue };
+        for turn in [-1.0, 0.0, 1.0] {
+            let start = end.sigma_m - around_m + turn * PERIMETER_M;
+            let share = (sigma_m - start) / around_m;
+            if share > 0.0 && share <= 1.0 {
+                found.push((end.x_m - (1.0 - share) * along_m - x_m).abs());
+            }
+        }
+    }
+    found
+}
+
+fn apart(a: (f64, f64), b: (f64, f64)) -> f64 {
+    let around = (a.1 - b.1).abs() % PERIMETER_M;
+    math::hypot(a.0 - b.0, around.min(PERIMETER_M - around))
+}
+
+fn places(most: usize) -> impl Strategy<Value = Vec<(f64, f64)>> {
+    proptest::collection::vec((-1.0f64..12.0, 0.0f64..PERIMETER_M), 0..most)
+}
+
+proptest! {
+    /// Against looking at every step.
+    #[test]
+    fn the_nearest_pass_is_the_nearest(
+        places in places(60),
+        heads in 1_usize..4,
+        place in (-3.0f64..14.0, 0.0f64..PERIMETER_M),
+        within_m in 0.05f64..9.0,
+    ) {
+        let samples = steps(&places, heads);
+        let expected = crossings(&samples, place).into_iter().filter(|d| *d <= within_m).min_by(f64::total_cmp);
+        let found = store(&samples).nearest_pass_m(place.0, place.1, within_m);
+        match (found, expected) {
+            (Some(found), Some(expected)) => prop_assert!((found - expected).abs() < 1e-9),
+            (found, expected) => prop_assert_eq!(found, expected),
+        }
+    }
+
+    /// On the way home: from packed bricks, to what packing moves. Steps are as short as heads make them, so that how
+    /// far along a step the crossing is can't blow the error up.
+    #[test]
+    fn passes_outlive_packing(
+        starts in proptest::collection::vec((0.0f64..12.0, 0.0f64..PERIMETER_M, -0.06f64..0.06), 1..8),
+        place in (-1.0f64..13.0, 0.0f64..PERIMETER_M),
+    ) {
+        let mut samples = Vec::new();
+        for (head, (x_m, sigma_m, around_m)) in starts.iter().enumerate() {
+            for k in 0..80 {
+                let sigma_m = math::wrap(sigma_m + around_m * f64::from(k), PERIMETER_M);
+                let step_m = (k > 0).then_some([0.002, *around_m]);
+                samples.push(WallSample { x_m: x_m + 0.002 * f64::from(k), sigma_m, head, step_m });
+            }
+        }
+        // Where another step's end decides, micrometres may choose the other pass.
+        prop_assume!(samples.iter().all(|s| (s.sigma_m - place.1).abs() > 1e-4));
+        prop_assume!(starts.iter().all(|(_, _, around_m)| around_m.abs() > 0.01));
+        let expected = crossings(&samples, place).into_iter().filter(|d| *d <= 9.0).min_by(f64::total_cmp);
+        prop_assume!(expected.is_none_or(|d| d < 8.99));
+        let mut store = SampleStore::new(LAYOUT);
+        for sample in &samples {
+            store.insert(*sample).unwrap();
+        }
+        prop_assume!(store.usage().thinned == 0);
+        pack_the_first_40_m(&mut store);
+        let found = store.nearest_pass_m(place.0, place.1, 9.0);
+        match (found, expected) {
+            (Some(found), Some(expected)) => prop_assert!((found - expected).abs() < 3e-5, "{found} {expected}"),
+            (found, expected) => prop_assert_eq!(found, expected),
+        }
+    }
+
+    /// Whatever is packed, opened and packed again: each sample stays where it was, but for what is said.
+    #[test]
+    fn samples_outlive_packing(places in places(200), heads in 1_usize..8, reversed: bool) {
+        let mut samples = steps(&places, heads);
+        if reversed {
+            samples.reverse();
+        }
+        let mut store = store(&samples);
+        let mut expected = places.clone();
+        expected.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+        prop_assert_eq!(kept(&store), expected, "open, nothing is moved");
+        prop_assert_eq!(store.fidelity(-1.0, 12.0), Fidelity::default());
+        pack_the_first_40_m(&mut store);
+        let once = kept(&store);
+        prop_assert_eq!(once.len(), places.len());
+        prop_assert_eq!(store.fidelity(-1.0, 12.0).moved_m > 0.0, !places.is_empty());
+        for place in &places {
+            let nearest = once.iter().map(|other| apart(*place, *other)).fold(f64::INFINITY, f64::min);
+            prop_assert!(nearest <= packed::MOVED_M, "{place:?} was moved by {nearest}");
+        }
+        for _ in 0..3 {
+            for k in 0..40 {
+                store.opened(store.brick_of(store.row_near(f64::from(k))), false);
+            }
+            pack_the_first_40_m(&mut store);
+        }
+        prop_assert_eq!(kept(&store), once, "a second time nothing is moved");
+    }
+
+    /// A sample that isn't kept has one within the distance that is said.
+    #[test]
+    fn a_kept_one_stands_for_each_that_is_not(
+        places in proptest::collection::vec((0.0f64..0.31, 1.0f64..1.31), 400..900),
+        packing: bool,
+    ) {
+        let mut store = SampleStore::new(LAYOUT);
+        for (k, place) in places.iter().enumerate() {
+            store.insert(sample(place.0, place.1)).unwrap();
+            if packing && k == 300 {
+                pack_the_first_40_m(&mut store);
+            }
+        }
+        let (kept, fidelity) = (kept(&store), store.fidelity(0.0, 0.3));
+        prop_assert!(kept.len() < places.len(), "something is left out");
+        prop_assert_eq!(kept.len() + store.usage().thinned as usize, places.len());
+        for place in &places {
+            let nearest = kept.iter().map(|other| apart(*place, *other)).fold(f64::INFINITY, f64::min);
+            prop_assert!(nearest <= fidelity.thinned_m + fidelity.moved_m, "{place:?}: {nearest}");
+        }
+        let farthest = places.iter().map(|place| {
+            kept.iter().map(|other| apart(*place, *other)).fold(f64::INFINITY, f64::min)
+        }).fold(0.0, f64::max);
+        prop_assert!(farthest > 0.1 * fidelity.thinned_m, "the distance said is not out of all proportion");
+    }
+}
+
+#[test]
+fn a_pass_is_found_where_its_step_crosses() {
+    let mut store = store(&[sample(1.0, 7.2), sample(1.1, 0.2), sample(3.0, 7.2)]);
+    // From (1.0, 7.2) to (1.3, 0.1), crossing the seam at its middle.
+    let step = WallSample { step_m: Some([0.3, 0.2]), ..sample(1.3, 0.1) };
+    store.insert(step).unwrap();
+    let distance = store.nearest_pass_m(2.0, 0.0, 5.0).unwrap();
+    assert!((distance - 0.85).abs() < 1e-9, "{distance}");
+    assert_eq!(store.nearest_pass_m(2.0, 0.0, 0.5), None);
+    assert_eq!(store.nearest_pass_m(2.0, 1.0, 5.0), None);
+}
+
+#[test]
+fn what_is_outside_or_too_much_is_refused() {
+    let layout = StoreLayout { perimeter_m: 3.0, from_m: 0.0, to_m: 1.0, cell_m: 0.25, capacity: 1 };
+    let mut store = SampleStore::new(layout);
+    let sample = sample(0.5, 1.0);
+    for x_m in [-0.1, 1.1, f64::NAN] {
+        assert_eq!(store.insert(WallSample { x_m, ..sample }), Err(StoreError::Outside));
+    }
+    assert_eq!(store.insert(WallSample { sigma_m: f64::INFINITY, ..sample }), Err(StoreError::Outside));
+    assert_eq!(store.insert(sample), Ok(Kept::Stored));
+    assert_eq!(store.insert(sample), Err(StoreError::Full));
+}
+
+/// What is refused is said so; what was kept stays.
+#[test]
+fn a_full_store_loses_nothing_that_it_kept() {
+    let mut store = SampleStore::new(StoreLayout { capacity: 3_000, ..LAYOUT });
+    let mut stored = 0;
+    for k in 0..20_000_u32 {
+        let x_m = f64::from(k) * 0.01;
+        match store.insert(sample(x_m, (f64::from(k) * 2.37) % PERIMETER_M)) {
+            Ok(_) => stored += 1,
+            Err(error) => assert_eq!(error, StoreError::Full),
+        }
+    }
+    assert!((3_000..20_000).contains(&stored), "{stored}");
+    let mut seen = 0;
+    store.visit_between(-1.0, 212.0, |_, _| seen += 1);
+    assert_eq!(seen, stored);
+}
+
+/// Four heads at fifty pings a second, an hour on one spot, trembling by centimetres.
+#[test]
+fn a_parked_vehicle_fills_cells_and_no_more() {
+    let mut store = SampleStore::new(LAYOUT);
+    let (mut hashed, mut after_half) = (1_u64, None);
+    let mut noise_m = || {
+        hashed = hashed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        ((hashed >> 33) as f64 / (1_u64 << 31) as f64 - 0.5) * 0.04
+    };
+    let pings = 50 * 3600;
+    for k in 0..pings {
+        for head in 0..4 {
+            let sigma_m = (k as f64 / 400.0 + f64::from(head) / 4.0) * PERIMETER_M + noise_m();
+            let head = head as usize;
+            store.insert(WallSample { head, ..sample(100.0 + noise_m(), sigma_m) }).unwrap();
+        }
+        if k == pings / 2 {
+            after_half = Some(store.usage());
+        }
+    }
+    let (usage, after_half) = (store.usage(), after_half.unwrap());
+    assert_eq!(usage.kept + usage.thinned, 4 * pings as u64);
+    assert!(usage.kept < 10_000, "{usage:?}");
+    assert!(usage.bytes < 2_000_000, "{usage:?}");
+    assert!(usage.kept - after_half.kept < 300, "it hardly grows any more: {after_half:?} {usage:?}");
+    assert!(store.fidelity(100.0, 100.0).thinned_m <= 0.02);
+}
+
+/// Back and forth over one section: neither memory nor error grows.
+#[test]
+fn back_and_forth_a_hundred_times() {
+    let mut store = SampleStore::new(LAYOUT);
+    let mut after_seventy = None;
+    for round in 0..100 {
+        for k in 0..500 {
+            let k = if round % 2 == 0 { k } else { 499 - k };
+            // 150 m forth and back, so that the beginning is packed and opened each time.
+            let x_m = 0.3 * f64::from(k);
+            store.nearest_pass_m(x_m, 1.0, 12.0);
+            let sigma_m = (f64::from(k) * 0.045 + f64::from(round % 7) * 1e-3) % PERIMETER_M;
+            store.insert(sample(x_m + f64::from(round % 5) * 1e-3, sigma_m)).unwrap();
+        }
+        if round == 69 {
+            after_seventy = Some((kept(&store), store.usage()));
+        }
+    }
+    let (usage, (then, used)) = (store.usage(), after_seventy.unwrap());
+    assert!(usage.kept < used.kept + used.kept / 50, "full cells take no more: {used:?} {usage:?}");
+    assert!(usage.bytes < used.bytes + used.bytes / 50, "{used:?} {usage:?}");
+    let now = kept(&store);
+    let lost = then.iter().filter(|place| !now.iter().any(|other| apart(**place, *other) <= packed::MOVED_M));
+    assert_eq!(lost.count(), 0, "samples stay where they were");
+}
