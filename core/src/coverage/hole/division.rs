@@ -26,24 +26,23 @@ impl Share {
         let (left, right) = (-owner.0 - half_x, -owner.0 + half_x);
         let (low, high) = (-owner.1 - half_sigma, -owner.1 + half_sigma);
         let mut share =
-            Self { owner, corners: [(0.0, 0.0); MAX_CORNERS], len: 4, farthest2: 0.0, farthest: (0.0, 0.0) };
-        for (corner, place) in
-            share.corners.iter_mut().zip([(left, low), (right, low), (right, high), (left, high)])
-        {
-            *corner = place;
+            Self { owner, corners: [(0.0, 0.0); MAX_CORNERS], len: 0, farthest2: 0.0, farthest: (0.0, 0.0) };
+        for corner in [(left, low), (right, low), (right, high), (left, high)] {
+            share.push(corner);
         }
-        share.measure();
         share
     }
 
-    fn measure(&mut self) {
-        self.farthest2 = 0.0;
-        for corner in self.corners.iter().take(self.len) {
-            let distance2 = corner.0 * corner.0 + corner.1 * corner.1;
-            if distance2 > self.farthest2 {
-                (self.farthest2, self.farthest) = (distance2, *corner);
-            }
+    /// Adds a corner; gives false when there are too many.
+    fn push(&mut self, corner: (f64, f64)) -> bool {
+        let Some(place) = self.corners.get_mut(self.len) else { return false };
+        *place = corner;
+        self.len += 1;
+        let distance2 = corner.0 * corner.0 + corner.1 * corner.1;
+        if distance2 > self.farthest2 {
+            (self.farthest2, self.farthest) = (distance2, corner);
         }
+        true
     }
 
     /// Keeps what is at least as near to the owner as to a rival; gives false when there are too many corners.
@@ -59,29 +58,25 @@ impl Share {
         if corners.iter().all(|corner| excess(*corner) <= 0.0) {
             return true;
         }
-        let mut kept = [(0.0, 0.0); MAX_CORNERS];
-        let mut room = kept.iter_mut();
-        let mut before = corners.last().copied().unwrap_or_default();
-        let mut excess_before = excess(before);
-        let mut len = 0;
+        let corners = self.corners;
+        let corners = corners.iter().take(core::mem::take(&mut self.len));
+        (self.farthest2, self.farthest) = (0.0, (0.0, 0.0));
+        let Some(mut before) = corners.clone().next_back() else { return true };
+        let mut excess_before = excess(*before);
+        let mut fits = true;
         for corner in corners {
             let excess_here = excess(*corner);
             if (excess_before > 0.0) != (excess_here > 0.0) {
                 let share = excess_before / (excess_before - excess_here);
-                let cut =
-                    (before.0 + share * (corner.0 - before.0), before.1 + share * (corner.1 - before.1));
-                let Some(place) = room.next() else { return false };
-                (*place, len) = (cut, len + 1);
+                let (dx, dy) = (corner.0 - before.0, corner.1 - before.1);
+                fits &= self.push((before.0 + share * dx, before.1 + share * dy));
             }
             if excess_here <= 0.0 {
-                let Some(place) = room.next() else { return false };
-                (*place, len) = (*corner, len + 1);
+                fits &= self.push(*corner);
             }
-            (before, excess_before) = (*corner, excess_here);
+            (before, excess_before) = (corner, excess_here);
         }
-        (self.corners, self.len) = (kept, len);
-        self.measure();
-        true
+        fits
     }
 }
 

@@ -38,6 +38,8 @@ pub(super) struct Window {
     from_m: f64,
     cell_m: f64,
     column_m: f64,
+    /// One over the perimeter, a cell's length and its width: the same for sorting samples in and for finding them.
+    per_m: [f64; 3],
     rows: usize,
     columns: usize,
     /// Where each cell's samples begin; row by row, with one more at the end.
@@ -56,6 +58,7 @@ impl Default for Window {
             from_m: 0.0,
             cell_m: 1.0,
             column_m: 1.0,
+            per_m: [1.0; 3],
             rows: 0,
             columns: 1,
             begins: Vec::with_capacity(CELLS + 2),
@@ -81,9 +84,10 @@ impl Window {
         self.unsorted.clear();
         self.overfull = false;
         let (rows, columns) = (self.rows as f64, self.columns - 1);
+        let [_, per_row, per_column] = self.per_m;
         store.visit_between(origin_m + from_m, origin_m + to_m, |x_m, sigma_m| {
             let spot = Spot { x_m: x_m - origin_m, sigma_m };
-            let row = (spot.x_m - self.from_m) / self.cell_m;
+            let row = (spot.x_m - self.from_m) * per_row;
             if !(0.0..rows).contains(&row) {
                 return;
             }
@@ -91,7 +95,7 @@ impl Window {
                 self.overfull = true;
                 return;
             }
-            let cell = whole(row) * self.columns + whole(sigma_m / self.column_m).min(columns);
+            let cell = whole(row) * self.columns + whole(sigma_m * per_column).min(columns);
             if let Some(count) = self.begins.get_mut(cell + 2) {
                 *count += 1;
             }
@@ -108,6 +112,7 @@ impl Window {
         self.rows = whole((to_m - from_m) / cell_m) + 1;
         self.columns = whole(perimeter_m / cell_m).clamp(1, CELLS / self.rows);
         self.column_m = perimeter_m / self.columns as f64;
+        self.per_m = [1.0 / perimeter_m, 1.0 / cell_m, 1.0 / self.column_m];
         self.begins.clear();
         self.begins.resize(self.rows * self.columns + 2, 0);
     }
@@ -143,12 +148,11 @@ impl Window {
 
     /// The nearest sample to a place, no farther than a distance; of equally near ones the first that is come by.
     pub(super) fn nearest(&self, x_m: f64, sigma_m: f64, within_m: f64) -> Option<Nearest> {
-        let turn = libm::floor(sigma_m / self.perimeter_m);
+        let [per_turn, per_row, _] = self.per_m;
+        let turn = libm::floor(sigma_m * per_turn);
         let sigma_m = sigma_m - turn * self.perimeter_m;
         let mut best = Search { x_m, sigma_m, limit2: within_m * within_m, found: None };
-        let into = (x_m - self.from_m) / self.cell_m;
-        let centre = into.clamp(0.0, (self.rows - 1) as f64);
-        let centre = whole(centre);
+        let centre = whole((x_m - self.from_m) * per_row).min(self.rows - 1);
         // Outwards from the place's own row: first both neighbours, then theirs.
         self.look_in_row(centre, &mut best);
         for ring in 1..self.rows {
@@ -182,16 +186,19 @@ impl Window {
             self.look_at(first, first + self.columns, best);
             return true;
         }
-        let left = libm::floor((best.sigma_m - width_m) / self.column_m);
-        let right = libm::floor((best.sigma_m + width_m) / self.column_m);
-        let count = self.columns as f64;
-        if left < 0.0 {
-            self.look_at(first + whole(left + count), first + self.columns, best);
+        // A turn on, so that nothing is negative.
+        let on_m = best.sigma_m + self.perimeter_m;
+        let [_, _, per_column] = self.per_m;
+        let (left, right) = (whole((on_m - width_m) * per_column), whole((on_m + width_m) * per_column));
+        let columns = self.columns;
+        if left < columns {
+            self.look_at(first + left, first + columns, best);
         }
-        if right >= count {
-            self.look_at(first, first + whole(right - count) + 1, best);
+        if right >= 2 * columns {
+            self.look_at(first, first + right - 2 * columns + 1, best);
         }
-        self.look_at(first + whole(left.max(0.0)), first + whole(right.min(count - 1.0)) + 1, best);
+        let (left, right) = (left.max(columns) - columns, right.min(2 * columns - 1) - columns);
+        self.look_at(first + left, first + right + 1, best);
         true
     }
 

@@ -38,7 +38,7 @@ struct Cell {
 
 /// A head's samples of a brick, in the order in which they came.
 #[derive(Debug, Clone, Copy, Default)]
-struct Strand {
+struct Chain {
     first: Link,
     last: Link,
 }
@@ -51,7 +51,7 @@ pub(super) struct OpenBricks {
     cells: Vec<Cell>,
     /// For each column of a slot, a bit for each row that has samples there.
     rows_seen: Vec<u32>,
-    strands: Vec<[Strand; MAX_HEADS]>,
+    chains: Vec<[Chain; MAX_HEADS]>,
     /// The brick in each slot.
     bricks: Vec<Option<u32>>,
     nodes: Vec<Node>,
@@ -69,7 +69,7 @@ impl OpenBricks {
             columns,
             cells: vec![Cell::default(); slots * rows * columns],
             rows_seen: vec![0; slots * columns],
-            strands: vec![[Strand::default(); MAX_HEADS]; slots],
+            chains: vec![[Chain::default(); MAX_HEADS]; slots],
             bricks: vec![None; slots],
             nodes: Vec::with_capacity(most_nodes),
             most_nodes,
@@ -139,14 +139,13 @@ impl OpenBricks {
         if let Some(rows) = self.rows_seen.get_mut(at.slot * self.columns + at.column) {
             *rows |= 1 << at.row;
         }
-        let strand =
-            self.strands.get_mut(at.slot).and_then(|strands| strands.get_mut(head.min(MAX_HEADS - 1)));
-        if let Some(strand) = strand {
-            match strand.last.checked_sub(1).and_then(|index| self.nodes.get_mut(index as usize)) {
+        let chain = self.chains.get_mut(at.slot).and_then(|chains| chains.get_mut(head.min(MAX_HEADS - 1)));
+        if let Some(chain) = chain {
+            match chain.last.checked_sub(1).and_then(|index| self.nodes.get_mut(index as usize)) {
                 Some(last) => last.next_of_head = link,
-                None => strand.first = link,
+                None => chain.first = link,
             }
-            strand.last = link;
+            chain.last = link;
         }
         true
     }
@@ -173,8 +172,8 @@ impl OpenBricks {
 
     /// The samples of a head in a slot, the earliest first.
     pub(super) fn of_head(&self, slot: usize, head: usize) -> impl Iterator<Item = &Node> {
-        let strand = self.strands.get(slot).and_then(|strands| strands.get(head));
-        self.list(strand.map_or(0, |strand| strand.first), |node| node.next_of_head)
+        let chain = self.chains.get(slot).and_then(|chains| chains.get(head));
+        self.list(chain.map_or(0, |chain| chain.first), |node| node.next_of_head)
     }
 
     fn list(&self, first: Link, next: impl Fn(&Node) -> Link) -> impl Iterator<Item = &Node> {
@@ -198,8 +197,8 @@ impl OpenBricks {
             *list = Cell::default();
         }
         self.rows_seen.iter_mut().skip(slot * self.columns).take(self.columns).for_each(|rows| *rows = 0);
-        if let Some(strands) = self.strands.get_mut(slot) {
-            *strands = [Strand::default(); MAX_HEADS];
+        if let Some(chains) = self.chains.get_mut(slot) {
+            *chains = [Chain::default(); MAX_HEADS];
         }
         if let Some(held) = self.bricks.get_mut(slot) {
             *held = None;
