@@ -11,7 +11,7 @@ use super::alerts::AlertKind;
 use super::digest::Digest;
 use super::reading::{Reading, SourceId};
 use crate::coverage::{
-    CertainFinder, Frontier, HoleFinder, Judgement, Loss, Request, RunChange, RunId, SampleStore, Sections,
+    Frontier, HoleFinder, Judgement, Loss, Request, RunChange, RunId, SampleStore, Sections,
 };
 use crate::frames::{Point3, Tunnel};
 use crate::fusion::{Fix, Navigation, NoFix, SensorInfo};
@@ -216,14 +216,9 @@ pub struct Coverage {
     pub frontier: Frontier,
 }
 
-/// The searches for holes with their working memory.
+/// The search for holes with its working memory.
 #[derive(Debug, Default, Resource)]
-pub struct Finder {
-    /// For the largest hole of a section.
-    pub holes: HoleFinder,
-    /// For fails that are certain before that.
-    pub certain: CertainFinder,
-}
+pub struct Finder(pub HoleFinder);
 
 /// Digest of each stream of results; together, the dive's.
 #[derive(Debug, Default, Resource)]

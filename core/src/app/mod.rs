@@ -90,7 +90,8 @@ pub struct Mission {
 }
 
 impl Mission {
-    /// A tunnel 100 m long with sections of 0.25 m, at a usual site; phase shift, no hull, no end of the dive.
+    /// A tunnel 100 m long with sections of 0.25 m, at a usual site; phase shift, no hull, exact holes, no end of the
+    /// dive.
     pub fn new(profile: Profile, target_m: f64) -> Self {
         Self {
             profile,

@@ -16,7 +16,7 @@ use super::plugin::PluginError;
 use super::ring::{Port, PortReader};
 use super::stages::{Advisor, Decoders, Driving, HeadSweeps, Results, judge_one};
 use super::{App, MAX_SOURCES, Mission, SourceInfo};
-use crate::coverage::{Frontier, SampleStore, Sections, StoreLayout};
+use crate::coverage::{Frontier, HoleFinder, SampleStore, Sections, StoreLayout};
 use crate::fusion::{Navigation, SensorInfo, SensorKind};
 use crate::sampling::advice::{self, Task};
 use crate::sampling::head::{HeadMode, HeadSpec, MAX_HEADS};
@@ -57,7 +57,7 @@ impl Loop {
         world.insert_resource(Navigator { navigation, next_beat: None });
         world.insert_resource(HeadSweeps::default());
         world.insert_resource(Driving::default());
-        world.insert_resource(Finder::default());
+        world.insert_resource(Finder(HoleFinder::new(mission.coverage.hole_tolerance_m)));
         world.insert_resource(Alerts::default());
         let task = Task {
             target_m: mission.target_m,

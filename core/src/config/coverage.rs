@@ -8,6 +8,8 @@ use crate::tunnel::Profile;
 /// How the wall is judged.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CoverageConfig {
+    /// How far the bounds of a hole may be apart, m; zero where it is measured exactly.
+    pub hole_tolerance_m: f64,
     /// Samples farther than this from the design profile contradict it, m; where most do, nothing passes.
     pub contradiction_m: f64,
     /// Where there is no wall to cover.
@@ -16,7 +18,7 @@ pub struct CoverageConfig {
 
 impl Default for CoverageConfig {
     fn default() -> Self {
-        Self { contradiction_m: 0.5, openings: Vec::new() }
+        Self { hole_tolerance_m: 0.0, contradiction_m: 0.5, openings: Vec::new() }
     }
 }
 
@@ -32,6 +34,7 @@ impl CoverageConfig {
         if let Some(section) = root.section("coverage")? {
             config.contradiction_m =
                 section.number("contradiction_m", 0.05..=100.0)?.unwrap_or(config.contradiction_m);
+            config.hole_tolerance_m = parse_tolerance_m(&section, target_m)?;
             section.finish()?;
         }
         for section in root.sections("openings")? {
@@ -46,6 +49,15 @@ impl CoverageConfig {
         }
         Ok(config)
     }
+}
+
+fn parse_tolerance_m(section: &Section<'_>, target_m: f64) -> Result<f64, ConfigError> {
+    let exact = section.choice("hole", &[("exact", true), ("grid", false)])?.unwrap_or(true);
+    let tolerance_m = section.number("tolerance_m", 1e-6..=1.0)?;
+    if exact && tolerance_m.is_some() {
+        return Err(section.invalid("tolerance_m", "is for hole = \"grid\" alone"));
+    }
+    Ok(if exact { 0.0 } else { tolerance_m.unwrap_or(target_m / 50.0) })
 }
 
 fn parse_opening(section: Section<'_>, profile: &Profile) -> Result<Opening, ConfigError> {

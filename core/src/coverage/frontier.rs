@@ -122,6 +122,11 @@ impl Reach {
     }
 }
 
+/// How far a chainage is from where samples may still land, m.
+pub fn clear_of(reach: Option<Reach>, x_m: f64) -> f64 {
+    reach.map_or(f64::INFINITY, |reach| (reach.from_m - x_m).max(x_m - reach.to_m).max(0.0))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -13,6 +13,7 @@ use self::window::{Nearest, Window};
 use super::store::SampleStore;
 use crate::math;
 
+mod certain;
 mod division;
 mod window;
 

@@ -2,7 +2,6 @@
 
 pub mod action;
 pub mod cause;
-pub mod certain;
 pub mod deviation;
 pub mod frontier;
 pub mod hole;
@@ -15,7 +14,6 @@ pub mod store;
 
 pub use action::Action;
 pub use cause::{Cause, Evidence};
-pub use certain::CertainFinder;
 pub use frontier::{Frontier, Reach};
 pub use hole::{Hole, HoleFinder};
 pub use passage::{Doubt, Loss, Passage};

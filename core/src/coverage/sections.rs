@@ -3,8 +3,7 @@
 use core::ops::Range;
 
 use super::cause::{Case, Evidence, explain};
-use super::certain::{CertainFinder, clear_of};
-use super::frontier::{Frontier, Moved, Reach};
+use super::frontier::{Frontier, Moved, Reach, clear_of};
 use super::hole::{FARTHEST_M, Hole, HoleFinder};
 use super::openings::Opening;
 use super::runs::{RunChange, RunId, Runs, Telling};
@@ -193,7 +192,7 @@ impl Sections {
         &mut self,
         (frontier, at): (&Frontier, MonoNs),
         store: &SampleStore,
-        finder: &mut CertainFinder,
+        finder: &mut HoleFinder,
         profile: &Profile,
         ask: &mut impl FnMut(Request),
     ) {
@@ -352,9 +351,12 @@ mod tests {
 
     #[test]
     fn bounds_on_either_side_of_the_target_say_nothing() {
-        assert_eq!(verdict(&hole(0.51, 0.49, 0.51), 0.0, 0.5), Verdict::CannotSay);
-        assert_eq!(verdict(&hole(0.51, 0.501, 0.51), 0.0, 0.5), Verdict::Fail);
-        assert_eq!(verdict(&hole(0.49, 0.49, 0.505), 0.0, 0.5), Verdict::CannotSay);
-        assert_eq!(verdict(&hole(0.49, 0.45, 0.5), 0.0, 0.5), Verdict::Pass);
+        let within = |diameter_m: f64, least_m: f64, most_m: f64| {
+            verdict(&Hole { least_m, most_m, ..hole(diameter_m) }, 0.0, 0.5, BEHIND)
+        };
+        assert_eq!(within(0.51, 0.49, 0.51), Verdict::CannotSay);
+        assert_eq!(within(0.51, 0.501, 0.51), Verdict::Fail);
+        assert_eq!(within(0.49, 0.49, 0.505), Verdict::CannotSay);
+        assert_eq!(within(0.49, 0.45, 0.5), Verdict::Pass);
     }
 }

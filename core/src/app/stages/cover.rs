@@ -171,7 +171,7 @@ fn look_around(
     let Coverage { store, sections, frontier } = coverage;
     let now = (&*frontier, at);
     let mut ask = |request| requests.0.push(request);
-    sections.look_around(now, store, &mut finder.certain, &context.profile, &mut ask);
+    sections.look_around(now, store, &mut finder.0, &context.profile, &mut ask);
 }
 
 /// Chainage of a sample before the portal or behind the tunnel's end, and by how much, m.

@@ -26,7 +26,7 @@ pub(in crate::app) fn judge_one(
         notices.0.push(Notice::Run { id, at: request.at, change });
         digests.judgements.integer(u64::from(id.0)).integer(change as u64);
     };
-    let mut judging = Judging { store, finder: &mut finder.holes, profile, tell: &mut tell };
+    let mut judging = Judging { store, finder: &mut finder.0, profile, tell: &mut tell };
     let Some(change) = sections.judge(request, &mut judging) else { return };
     notices.0.push(Notice::Section { section: request.section, at: request.at, change });
     let Some(section) = sections.get(request.section) else { return };
