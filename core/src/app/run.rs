@@ -158,8 +158,9 @@ impl Loop {
                     world.resource_scope(|world, mut alerts: Mut<'_, Alerts>| {
                         notices.0.clear();
                         let mut requests = Vec::new();
-                        let Coverage { sections, frontier, .. } = &mut *coverage;
-                        sections.unsettled(frontier, at, &mut |request| requests.push(request));
+                        let Coverage { store, sections, frontier } = &mut *coverage;
+                        let mut ask = |request| requests.push(request);
+                        sections.unsettled((frontier, at), store, &mut finder.0, profile, &mut ask);
                         let mut digests = world.resource_mut::<Digests>();
                         let mut results = Results {
                             finder: &mut finder,

@@ -26,6 +26,30 @@ pub struct Frontier {
     swept: Option<Reach>,
     /// Sections, by index, that samples may still change.
     zone: Option<Range<i64>>,
+    course: Option<Course>,
+}
+
+/// Which way the vehicle goes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Course {
+    /// The farthest that it has come on this course, m: the middle of what its heads reach.
+    farthest_m: f64,
+    astern: bool,
+}
+
+/// A vehicle that has gone back by less than this still goes the way it went, m: yaw and slack look the same.
+const TURNED_M: f64 = 0.25;
+
+impl Course {
+    /// On to where the middle of the reach is now.
+    fn to(self, middle_m: f64) -> Self {
+        let ahead_m = if self.astern { self.farthest_m - middle_m } else { middle_m - self.farthest_m };
+        match ahead_m {
+            ahead_m if ahead_m > 0.0 => Self { farthest_m: middle_m, ..self },
+            ahead_m if ahead_m < -TURNED_M => Self { farthest_m: middle_m, astern: !self.astern },
+            _ => self,
+        }
+    }
 }
 
 /// One head.
@@ -44,8 +68,8 @@ pub struct Moved {
     pub left_behind: Range<i64>,
     /// Sections that lie ahead now and did not before: the vehicle goes back.
     pub left_ahead: Range<i64>,
-    /// Where samples may land now.
-    pub reach: Option<Reach>,
+    /// Where samples may land without turning back.
+    pub to_come: Option<Reach>,
 }
 
 impl Frontier {
@@ -78,8 +102,17 @@ impl Frontier {
     }
 
     /// Where the heads that are alive land samples now.
-    pub fn reach(&self, now: MonoNs) -> Option<Reach> {
+    fn reach(&self, now: MonoNs) -> Option<Reach> {
         self.alive(now).map(|head| head.reach).reduce(Reach::with)
+    }
+
+    /// Where they may land samples without turning back: from here on, all that lies ahead.
+    pub fn to_come(&self, now: MonoNs) -> Option<Reach> {
+        let reach = self.reach(now)?;
+        Some(match self.course {
+            Some(Course { astern: true, .. }) => Reach { from_m: f64::NEG_INFINITY, ..reach },
+            _ => Reach { to_m: f64::INFINITY, ..reach },
+        })
     }
 
     fn alive(&self, now: MonoNs) -> impl Iterator<Item = &Head> {
@@ -102,12 +135,15 @@ impl Frontier {
         }
         self.swept = Some(self.swept.map_or(reach, |swept| swept.with(reach)));
         let Some(all) = self.reach(now) else { return Moved::default() };
+        let middle_m = all.middle_m();
+        let course = self.course.unwrap_or(Course { farthest_m: middle_m, astern: false });
+        self.course = Some(course.to(middle_m));
         // Section k = [kL, (k+1)L) is behind when (k+1)L + margin <= from, ahead when kL - margin >= to.
         let first = crate::math::floor_to_i64((all.from_m - margin_m) / section_m);
         let end = -crate::math::floor_to_i64(-(all.to_m + margin_m) / section_m);
         let zone = first..end;
         let before = self.zone.replace(zone.clone()).unwrap_or(zone.clone());
-        Moved { left_behind: before.start..zone.start, left_ahead: zone.end..before.end, reach: Some(all) }
+        Moved { left_behind: before.start..zone.start, left_ahead: zone.end..before.end, to_come: self.to_come(now) }
     }
 }
 
@@ -122,9 +158,9 @@ impl Reach {
     }
 }
 
-/// How far a chainage is from where samples may still land, m.
-pub fn clear_of(reach: Option<Reach>, x_m: f64) -> f64 {
-    reach.map_or(f64::INFINITY, |reach| (reach.from_m - x_m).max(x_m - reach.to_m).max(0.0))
+/// How far a chainage is from where samples may still land, m; infinite where none may.
+pub fn clear_of(to_come: Option<Reach>, x_m: f64) -> f64 {
+    to_come.map_or(f64::INFINITY, |reach| (reach.from_m - x_m).max(x_m - reach.to_m).max(0.0))
 }
 
 #[cfg(test)]
@@ -153,6 +189,19 @@ mod tests {
         let moved = frontier.advance(0, MonoNs(1), at(1.7), 0.25, 0.25);
         assert_eq!(moved.left_ahead, 8..9);
         assert!(moved.left_behind.is_empty());
+    }
+
+    #[test]
+    fn what_lies_ahead_may_still_come_until_the_vehicle_has_turned_back() {
+        let mut frontier = Frontier::default();
+        for x_m in [1.0, 2.0, 1.8] {
+            frontier.advance(0, MonoNs(0), at(x_m), 0.25, 0.25);
+        }
+        let clear = |frontier: &Frontier, x_m: f64| clear_of(frontier.to_come(MonoNs(0)), x_m);
+        assert_eq!([1.0, 1.8, 2.5].map(|x_m| clear(&frontier, x_m) > 0.5), [true, false, false]);
+        frontier.advance(0, MonoNs(0), at(1.7), 0.25, 0.25);
+        assert_eq!([1.0, 1.7, 2.5].map(|x_m| clear(&frontier, x_m) > 0.5), [false, false, true]);
+        assert!(clear_of(frontier.to_come(MonoNs(3_000_000_000)), 1.7) > 1e9, "nobody is alive");
     }
 
     #[test]

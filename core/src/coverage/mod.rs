@@ -10,6 +10,7 @@ pub mod passage;
 pub mod runs;
 pub mod section;
 pub mod sections;
+pub mod soundings;
 pub mod store;
 
 pub use action::Action;
@@ -20,4 +21,5 @@ pub use passage::{Doubt, Loss, Passage};
 pub use runs::{Run, RunChange, RunId, Runs};
 pub use section::{Judgement, Section, Spread, Verdict};
 pub use sections::{Judging, Request, Sections};
+pub use soundings::{GridLayout, GridNode, GridSummary, Soundings};
 pub use store::{Fidelity, Kept, SampleStore, StoreError, StoreLayout, StoreUse, WallSample};

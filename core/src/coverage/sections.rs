@@ -23,7 +23,7 @@ pub struct Request {
     /// The stretch that every head had swept by then.
     pub swept_by_all: Option<Reach>,
     /// Where samples may land without the vehicle turning back.
-    pub reach: Option<Reach>,
+    pub to_come: Option<Reach>,
     /// It is known to fail already: an empty circle, not its largest, is out of the way.
     pub fails: bool,
 }
@@ -31,8 +31,8 @@ pub struct Request {
 impl Request {
     /// Asks for sections as of one moment.
     fn at(at: MonoNs, frontier: &Frontier) -> impl Fn(i64) -> Self {
-        let (swept_by_all, reach) = (frontier.swept_by_all(at), frontier.reach(at));
-        move |section| Self { section, at, swept_by_all, reach, fails: false }
+        let (swept_by_all, to_come) = (frontier.swept_by_all(at), frontier.to_come(at));
+        move |section| Self { section, at, swept_by_all, to_come, fails: false }
     }
 }
 
@@ -149,7 +149,7 @@ impl Sections {
         if moved.left_behind.is_empty() && moved.left_ahead.is_empty() {
             return;
         }
-        if moved.reach.is_none() {
+        if moved.to_come.is_none() {
             return;
         }
         let passed = self.passed(frontier.swept());
@@ -172,7 +172,7 @@ impl Sections {
                 let target_m = self.target_m;
                 let Some(section) = self.get_mut(index).filter(|section| !section.settled) else { continue };
                 let Some(hole) = section.hole else { continue };
-                let clear_m = clear_of(moved.reach, hole.x_m);
+                let clear_m = clear_of(moved.to_come, hole.x_m);
                 let left_m = hole.least_m.min(2.0 * clear_m);
                 let fails =
                     section.verdict == Verdict::Open && left_m - 2.0 * section.hole_sigma_m > target_m;
@@ -197,11 +197,9 @@ impl Sections {
         ask: &mut impl FnMut(Request),
     ) {
         let Some(zone) = frontier.zone() else { return };
-        let reach = frontier.reach(at);
+        let to_come = frontier.to_come(at);
         let ask_for = Request::at(at, frontier);
         for index in clamp(zone, &self.passed(frontier.swept())) {
-            let bounds_m = self.bounds_m(index);
-            let target_m = self.target_m;
             let Some(section) = self.get_mut(index) else { continue };
             if section.is_flagged() {
                 if core::mem::take(&mut section.stale) {
@@ -209,12 +207,26 @@ impl Sections {
                 }
                 continue;
             }
-            let radius_m = target_m / 2.0 + section.passage.doubt.worst_m(profile);
-            let clear_m = clear_of(reach, bounds_m.0).max(clear_of(reach, bounds_m.1));
-            if clear_m > radius_m && finder.has_circle(store, bounds_m, reach, radius_m) {
+            if self.fails_already(index, to_come, store, finder, profile) {
                 ask(Request { fails: true, ..ask_for(index) });
             }
         }
+    }
+
+    /// Whether an empty circle of a section, too large for the target, lies where no sample will come any more.
+    fn fails_already(
+        &self,
+        index: i64,
+        to_come: Option<Reach>,
+        store: &SampleStore,
+        finder: &mut HoleFinder,
+        profile: &Profile,
+    ) -> bool {
+        let Some(section) = self.get(index) else { return false };
+        let bounds_m = self.bounds_m(index);
+        let radius_m = self.target_m / 2.0 + section.passage.doubt.worst_m(profile);
+        let clear_m = clear_of(to_come, bounds_m.0).max(clear_of(to_come, bounds_m.1));
+        clear_m > radius_m && finder.has_circle(store, bounds_m, to_come, radius_m)
     }
 
     /// Measures a section's hole and says what it means.
@@ -226,7 +238,7 @@ impl Sections {
         let section = self.get_mut(request.section)?;
         let hole = judging.finder.largest(judging.store, from_m, to_m);
         let sigma_m = section.passage.doubt.sigma_m(judging.profile.point_at(hole.sigma_m));
-        let clear_m = clear_of(request.reach, hole.x_m);
+        let clear_m = clear_of(request.to_come, hole.x_m);
         section.hole = Some(hole);
         section.hole_sigma_m = sigma_m;
         section.verdict = match verdict(&hole, sigma_m, target_m, clear_m) {
@@ -267,14 +279,23 @@ impl Sections {
     }
 
     /// Calls `ask` for every section that was passed and isn't settled, at the end of a dive.
-    pub fn unsettled(&mut self, frontier: &Frontier, at: MonoNs, ask: &mut impl FnMut(Request)) {
+    pub fn unsettled(
+        &mut self,
+        (frontier, at): (&Frontier, MonoNs),
+        store: &SampleStore,
+        finder: &mut HoleFinder,
+        profile: &Profile,
+        ask: &mut impl FnMut(Request),
+    ) {
         let ask_for = Request::at(at, frontier);
+        let to_come = frontier.to_come(at);
         for index in self.passed(frontier.swept()) {
             let Some(section) = self.get_mut(index) else { continue };
             // The hole of a fail may have been narrowed from farther away than a pass depends on.
             if section.stale || !section.settled || section.verdict != Verdict::Pass {
                 section.stale = false;
-                ask(ask_for(index));
+                let fails = self.fails_already(index, to_come, store, finder, profile);
+                ask(Request { fails, ..ask_for(index) });
             }
         }
     }

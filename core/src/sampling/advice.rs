@@ -192,8 +192,8 @@ pub struct Advisor {
     modes: Strips,
     /// The largest steps in each mode in the middle of the tunnel, m.
     centred_m: Vec<f64>,
-    /// What the first head sees from there.
-    middle: Ring,
+    /// What each head sees from there.
+    middle: Vec<Ring>,
     parallax_rad: f64,
     /// How many soundings of its ring the step of each head that turns passes over.
     strides: [Option<usize>; MAX_HEADS],
@@ -245,7 +245,7 @@ impl Advisor {
             now: Strips::with_room(arcs, 1, RING),
             modes: Strips::with_room(arcs, MAX_MODES, RING),
             centred_m: Vec::new(),
-            middle: Ring::default(),
+            middle: Vec::new(),
             parallax_rad: 0.0,
             strides: [None; MAX_HEADS],
             next: 0,
@@ -270,7 +270,7 @@ impl Advisor {
         self.now.rebuild(self.profile.perimeter_m(), &self.views);
         self.measure_modes();
         self.centred_m = (0..MAX_MODES).map(|mode| self.modes.largest_step_m(mode)).collect();
-        self.middle = self.heads.first().map(|head| head.ring.clone()).unwrap_or_default();
+        self.middle = self.heads.iter().map(|head| head.ring.clone()).collect();
         for head in &mut self.heads {
             head.cast_at = None;
         }
@@ -285,9 +285,12 @@ impl Advisor {
     ///
     /// Allocates: never.
     pub fn middle_step_m(&self, step_rad: f64) -> f64 {
-        let pairs = self.middle.pairs(Ring::stride(step_rad, RING));
-        let perimeter_m = self.middle.perimeter_m();
-        pairs.map(|(a, b)| math::wrap_signed(b.sigma_m - a.sigma_m, perimeter_m).abs()).fold(0.0, f64::max)
+        let largest_m = |ring: &Ring| {
+            let pairs = ring.pairs(Ring::stride(step_rad, RING));
+            let steps = pairs.map(|(a, b)| math::wrap_signed(b.sigma_m - a.sigma_m, ring.perimeter_m()).abs());
+            steps.fold(0.0, f64::max)
+        };
+        self.middle.iter().map(largest_m).fold(0.0, f64::max)
     }
 
     /// The largest speed at which the predicted T_max stays within the target, by inverting Eq. 16 with what is
