@@ -2,7 +2,7 @@
 //! the distance to it is largest at a corner.
 
 /// The most samples among which a tile is divided; with more it is halved instead.
-pub(super) const MAX_OWNERS: usize = 32;
+pub(super) const MAX_OWNERS: usize = 24;
 /// The most corners of a share; with more the tile is halved, too.
 const MAX_CORNERS: usize = 12;
 

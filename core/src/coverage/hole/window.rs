@@ -183,7 +183,7 @@ impl Window {
         let width_m = math::sqrt(width2.max(0.0)) + 1e-9;
         let first = row * self.columns;
         if 2.0 * width_m + self.column_m >= self.perimeter_m {
-            self.look_at(first, first + self.columns, best);
+            self.look_all_round(first, best);
             return true;
         }
         // A turn on, so that nothing is negative.
@@ -192,24 +192,36 @@ impl Window {
         let (left, right) = (whole((on_m - width_m) * per_column), whole((on_m + width_m) * per_column));
         let columns = self.columns;
         if left < columns {
-            self.look_at(first + left, first + columns, best);
+            self.look_at(first + left, first + columns, -1.0, best);
         }
         if right >= 2 * columns {
-            self.look_at(first, first + right - 2 * columns + 1, best);
+            self.look_at(first, first + right - 2 * columns + 1, 1.0, best);
         }
         let (left, right) = (left.max(columns) - columns, right.min(2 * columns - 1) - columns);
-        self.look_at(first + left, first + right + 1, best);
+        self.look_at(first + left, first + right + 1, 0.0, best);
         true
     }
 
-    /// Looks at the samples of some cells in a row.
-    fn look_at(&self, from: usize, to: usize, best: &mut Search) {
-        let (Some(begin), Some(end)) = (self.begins.get(from), self.begins.get(to)) else { return };
-        let Some(spots) = self.spots.get(*begin as usize..*end as usize) else { return };
+    /// The samples of some cells in a row.
+    fn spots(&self, from: usize, to: usize) -> &[Spot] {
+        let (Some(begin), Some(end)) = (self.begins.get(from), self.begins.get(to)) else { return &[] };
+        self.spots.get(*begin as usize..*end as usize).unwrap_or_default()
+    }
+
+    /// Looks at the samples of some cells in a row, so many turns on.
+    fn look_at(&self, from: usize, to: usize, turns: f64, best: &mut Search) {
+        let sigma_m = best.sigma_m - turns * self.perimeter_m;
+        for spot in self.spots(from, to) {
+            let (dx, dsigma) = (spot.x_m - best.x_m, spot.sigma_m - sigma_m);
+            best.take(spot, turns, dx * dx + dsigma * dsigma);
+        }
+    }
+
+    /// Looks at all samples of a row, each the short way round.
+    fn look_all_round(&self, first: usize, best: &mut Search) {
         let half_m = self.perimeter_m / 2.0;
-        for spot in spots {
-            let dx = spot.x_m - best.x_m;
-            let straight = spot.sigma_m - best.sigma_m;
+        for spot in self.spots(first, first + self.columns) {
+            let (dx, straight) = (spot.x_m - best.x_m, spot.sigma_m - best.sigma_m);
             let turns = if straight >= half_m {
                 -1.0
             } else if straight < -half_m {
@@ -218,11 +230,7 @@ impl Window {
                 0.0
             };
             let dsigma = straight + turns * self.perimeter_m;
-            let distance2 = dx * dx + dsigma * dsigma;
-            if distance2 < best.limit2 || (best.found.is_none() && distance2 <= best.limit2) {
-                best.limit2 = distance2;
-                best.found = Some((*spot, turns));
-            }
+            best.take(spot, turns, dx * dx + dsigma * dsigma);
         }
     }
 }
@@ -233,6 +241,14 @@ struct Search {
     sigma_m: f64,
     limit2: f64,
     found: Option<(Spot, f64)>,
+}
+
+impl Search {
+    fn take(&mut self, spot: &Spot, turns: f64, distance2: f64) {
+        if distance2 < self.limit2 || (distance2 <= self.limit2 && self.found.is_none()) {
+            (self.limit2, self.found) = (distance2, Some((*spot, turns)));
+        }
+    }
 }
 
 /// The whole part of what isn't negative.
