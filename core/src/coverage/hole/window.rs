@@ -4,7 +4,7 @@ use crate::coverage::store::SampleStore;
 use crate::math;
 
 /// Samples for which there is room.
-const ROOM: usize = 1 << 18;
+const ROOM: usize = 1 << 20;
 /// Cells for which there is room.
 const CELLS: usize = 1 << 20;
 
