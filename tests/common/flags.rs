@@ -37,8 +37,10 @@ pub(crate) struct Reached {
 /// What was within reach during a dive.
 pub(crate) fn reached(dive: &Dive) -> Vec<Reached> {
     let mut all: Vec<Reached> = Vec::new();
-    for ping in &dive.pings {
+    for (index, ping) in dive.pings.iter().enumerate() {
         let due = all.last().is_none_or(|last| ping.received.since(last.at).0 >= EVERY.0);
+        // The last one too: it is where the dive ends.
+        let due = due || index + 1 == dive.pings.len();
         if let Some(pose) = ping.pose.filter(|_| due) {
             all.push(Reached { at: ping.received, rear_m: rear_m(dive, &pose) });
         }
@@ -87,6 +89,8 @@ pub(crate) struct Flag {
     pub(crate) start_m: f64,
     /// The first moment from which going on forward couldn't undo the fail, seconds.
     pub(crate) due_s: Option<f64>,
+    /// The same, were it as early as the lines across the section leave open.
+    pub(crate) may_s: Option<f64>,
     /// When the dive ended.
     pub(crate) end_s: f64,
     pub(crate) raised_s: Option<f64>,
@@ -98,7 +102,7 @@ pub(crate) struct Flag {
 impl Flag {
     /// Raised by the end of the dive alone.
     pub(crate) fn raised_at_the_end(&self) -> bool {
-        self.due_s.is_none() && self.raised_s.is_some_and(|at_s| at_s >= self.end_s - 1e-6)
+        self.may_s.is_none() && self.raised_s.is_some_and(|at_s| at_s >= self.end_s - 1e-6)
     }
 
     /// How long after its moment, seconds.
@@ -155,15 +159,20 @@ impl Journey {
     fn flag(&self, target_m: f64, section: &SectionReport, sigmas: f64) -> Flag {
         let ends = [section.start_m, section.end_m];
         let radius_m = 0.5 * (target_m + sigmas * section.hole_sigma_m);
-        let due = |wall: &Wall, reached: &[Reached]| {
-            left_behind(reached, first_failing_m(wall, ends, radius_m)? + radius_m)
+        let due = |wall: &Wall, reached: &[Reached], early_m: f64| {
+            left_behind(reached, first_failing_m(wall, ends, radius_m)? + radius_m - early_m)
         };
         let on = if self.turned.is_some() { self.back.end } else { 0 };
-        let out = self.turned.as_ref().and_then(|wall| due(wall, &self.reached[..self.back.start]));
-        let due = out.or_else(|| due(&self.whole, &self.reached[on..]));
+        let first = |early_m: f64| {
+            let out =
+                self.turned.as_ref().and_then(|wall| due(wall, &self.reached[..self.back.start], early_m));
+            out.or_else(|| due(&self.whole, &self.reached[on..], early_m)).map(MonoNs::as_secs_f64)
+        };
+        let line_m = (section.end_m - section.start_m) / f64::from(LINES);
         Flag {
             start_m: section.start_m,
-            due_s: due.map(MonoNs::as_secs_f64),
+            due_s: first(0.0),
+            may_s: first(line_m),
             end_s: self.end_s,
             raised_s: section.flagged_s,
             cleared_s: section.cleared_s,

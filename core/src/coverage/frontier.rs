@@ -26,6 +26,10 @@ pub struct Frontier {
     swept: Option<Reach>,
     /// Sections, by index, that samples may still change.
     zone: Option<Range<i64>>,
+    /// When sections last came into it or left it.
+    zone_moved: Option<MonoNs>,
+    /// When a head first pinged where somebody knew.
+    begun: Option<MonoNs>,
     course: Option<Course>,
 }
 
@@ -96,9 +100,11 @@ impl Frontier {
         self.alive(now).map(|head| head.swept).reduce(common).filter(|all| all.from_m <= all.to_m)
     }
 
-    /// The sections, by index, that samples may still change.
-    pub fn zone(&self) -> Option<Range<i64>> {
-        self.zone.clone()
+    /// The sections, by index, that samples may still change, when for some time none has come or gone: the vehicle stands,
+    /// or nearly. Not before it is known which heads are alive.
+    pub fn still_zone(&self, now: MonoNs) -> Option<Range<i64>> {
+        let over = |since: Option<MonoNs>| since.is_some_and(|since| now.since(since).0 > SILENT.0);
+        self.zone.clone().filter(|_| over(self.begun) && over(self.zone_moved))
     }
 
     /// Where the heads that are alive land samples now.
@@ -142,8 +148,16 @@ impl Frontier {
         let first = crate::math::floor_to_i64((all.from_m - margin_m) / section_m);
         let end = -crate::math::floor_to_i64(-(all.to_m + margin_m) / section_m);
         let zone = first..end;
+        self.begun = self.begun.or(Some(now));
+        if self.zone.as_ref() != Some(&zone) {
+            self.zone_moved = Some(now);
+        }
         let before = self.zone.replace(zone.clone()).unwrap_or(zone.clone());
-        Moved { left_behind: before.start..zone.start, left_ahead: zone.end..before.end, to_come: self.to_come(now) }
+        Moved {
+            left_behind: before.start..zone.start,
+            left_ahead: zone.end..before.end,
+            to_come: self.to_come(now),
+        }
     }
 }
 

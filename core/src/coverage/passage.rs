@@ -138,7 +138,7 @@ impl Doubt {
 
     /// The largest standard deviation of a hole's diameter round the profile, m.
     pub fn worst_m(&self, profile: &Profile) -> f64 {
-        const PLACES: u32 = 16;
+        const PLACES: u32 = 64;
         let place = |k: u32| profile.point_at(profile.perimeter_m() * f64::from(k) / f64::from(PLACES));
         (0..PLACES).map(|k| self.sigma_m(place(k))).fold(0.0, f64::max)
     }

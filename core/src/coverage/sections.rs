@@ -184,8 +184,8 @@ impl Sections {
     }
 
     /// Calls `ask` for sections between those that are left and those that aren't reached yet: that fail for certain, though
-    /// their hole isn't out of the way, and flagged ones that have got samples since they were judged. Once a second is
-    /// often enough; without it, nothing would be said of them while the vehicle stands.
+    /// their hole isn't out of the way, and flagged ones that have got samples since they were judged. Without it, nothing
+    /// would be said of them while the vehicle stands.
     ///
     /// Allocates: never.
     pub fn look_around(
@@ -196,7 +196,7 @@ impl Sections {
         profile: &Profile,
         ask: &mut impl FnMut(Request),
     ) {
-        let Some(zone) = frontier.zone() else { return };
+        let Some(zone) = frontier.still_zone(at) else { return };
         let to_come = frontier.to_come(at);
         let ask_for = Request::at(at, frontier);
         for index in clamp(zone, &self.passed(frontier.swept())) {

@@ -287,7 +287,8 @@ impl Advisor {
     pub fn middle_step_m(&self, step_rad: f64) -> f64 {
         let largest_m = |ring: &Ring| {
             let pairs = ring.pairs(Ring::stride(step_rad, RING));
-            let steps = pairs.map(|(a, b)| math::wrap_signed(b.sigma_m - a.sigma_m, ring.perimeter_m()).abs());
+            let steps =
+                pairs.map(|(a, b)| math::wrap_signed(b.sigma_m - a.sigma_m, ring.perimeter_m()).abs());
             steps.fold(0.0, f64::max)
         };
         self.middle.iter().map(largest_m).fold(0.0, f64::max)

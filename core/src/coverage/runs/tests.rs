@@ -29,7 +29,14 @@ impl Rig {
         let Self { runs, holes, told, .. } = self;
         let hole = |index: i64| {
             let diameter_m = *holes.get(usize::try_from(index + 5).ok()?)?;
-            Some(Hole { diameter_m, least_m: diameter_m, most_m: diameter_m, x_m: 0.0, sigma_m: 0.0, bounded: true })
+            Some(Hole {
+                diameter_m,
+                least_m: diameter_m,
+                most_m: diameter_m,
+                x_m: 0.0,
+                sigma_m: 0.0,
+                bounded: true,
+            })
         };
         let mut tell = |id, change| told.push((id, change));
         runs.set(section, cause, &mut Telling { at: MonoNs(1), hole: &hole, tell: &mut tell });

@@ -211,7 +211,9 @@ impl SampleStore {
         let number = self.brick_of(row);
         let slot = self.opened(number, true).ok_or(StoreError::Full)?;
         let cell = self.cell_at(slot, row, self.column(sigma_m));
-        if let Some(tier) = thinning::stands_for(&self.open, cell, (sample.x_m, sigma_m), self.edge_m()) {
+        if let Some(tier) =
+            thinning::stands_for(&self.open, cell, (sample.x_m, sigma_m), sample.step_m, self.edge_m())
+        {
             self.thinned += 1;
             if let Some(brick) = self.bricks.get_mut(number as usize) {
                 brick.tier = brick.tier.max(tier);
