@@ -29,7 +29,7 @@ pub(crate) enum Command {
     ///
     /// With --smooth twice: once as it was, and once along the track that all sensors agree on over the whole dive.
     #[command(
-        after_help = "Example:\n  headrace replay dive.mcap --target 0.6 --report report.json\n  headrace replay dive.mcap --smooth --report certificate.json"
+        after_help = "Example:\n  headrace replay dive.mcap --target 0.6 --report report.json\n  headrace replay dive.mcap --target 0.3,0.6,1.0 --section 0.25,1\n  headrace replay dive.mcap --smooth --report certificate.json"
     )]
     Replay(Replay),
     /// Turn a scene into a log of the bytes that its devices would send.
@@ -92,9 +92,15 @@ pub(crate) struct Replay {
     /// Vehicle file, in place of the one attached to the log.
     #[arg(long, value_name = "FILE")]
     pub(crate) vehicle: Option<PathBuf>,
-    /// Target T in metres, in place of the vehicle file's.
-    #[arg(long, value_name = "METRES", value_parser = target)]
-    pub(crate) target: Option<f64>,
+    /// Target T in metres, in place of the vehicle file's; with several, what the others would have said is told too.
+    #[arg(long, value_name = "METRES,..", value_parser = target, value_delimiter = ',')]
+    pub(crate) target: Vec<f64>,
+    /// Length of a section in metres, in place of the vehicle file's; with several, as for targets.
+    #[arg(long, value_name = "METRES,..", value_parser = section, value_delimiter = ',')]
+    pub(crate) section: Vec<f64>,
+    /// Speed of sound in the tunnel's water in metres a second, in place of the vehicle file's.
+    #[arg(long, value_name = "M/S", value_parser = sound_speed)]
+    pub(crate) sound_speed: Option<f64>,
     #[arg(long, value_name = "max|Nx", default_value = "max", value_parser = speed, help = SPEED_HELP)]
     pub(crate) speed: Speed,
     /// Length of a tick in milliseconds; no result depends on it.
@@ -280,6 +286,14 @@ fn speed(text: &str) -> Result<Speed, String> {
 
 fn target(text: &str) -> Result<f64, String> {
     within(text, "metres", 0.01, 20.0)
+}
+
+fn section(text: &str) -> Result<f64, String> {
+    within(text, "metres", 0.05, 10.0)
+}
+
+fn sound_speed(text: &str) -> Result<f64, String> {
+    within(text, "metres a second", 1300.0, 1700.0)
 }
 
 fn length(text: &str) -> Result<f64, String> {

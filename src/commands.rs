@@ -14,7 +14,7 @@ use serde_json::json;
 
 use crate::cli::{Check, Demo, Output, Replay, Run};
 use crate::devices::KINDS;
-use crate::dive::{self, assemble};
+use crate::dive::{self, WhatIf, assemble};
 use crate::expect;
 use crate::failure::{self, Failure};
 use crate::files;
@@ -69,12 +69,12 @@ pub(crate) fn replay(args: &Replay) -> Result<u8, Failure> {
         Some(path) => vehicle_file(path),
         None => attached_vehicle(player.info(), &player.losses(), &args.log),
     }?;
-    vehicle.target_m = args.target.unwrap_or(vehicle.target_m);
+    let what_if = what_if(args, &mut vehicle);
     let pace = Pace { tick: DurNs::from_millis(i64::from(args.tick_ms)), speed: args.speed.0 };
     let mut report = if args.smooth {
-        smooth::smoothed(&args.log, &mut player, (&vehicle, &text), pace)?
+        smooth::smoothed(&args.log, &mut player, (&vehicle, &text), pace, what_if)?
     } else {
-        let dive = assemble(&vehicle, &text, None)?;
+        let dive = assemble(&vehicle, &text, None)?.asking(what_if);
         player.connect(dive.armed.sources());
         dive.run(&mut player, pace, &mut watch(&args.output))?
     };
@@ -84,6 +84,19 @@ pub(crate) fn replay(args: &Replay) -> Result<u8, Failure> {
         Some(golden) if expect::differs(&report, golden)? => Ok(failure::FAILED),
         _ => Ok(code),
     }
+}
+
+/// Changes the vehicle by what was asked for; the first of several targets and lengths of section is the dive's own. Gives all
+/// of them where there are several.
+fn what_if(args: &Replay, vehicle: &mut VehicleConfig) -> WhatIf {
+    vehicle.target_m = args.target.first().copied().unwrap_or(vehicle.target_m);
+    vehicle.section_m = args.section.first().copied().unwrap_or(vehicle.section_m);
+    vehicle.site.sound_speed_mps = args.sound_speed.unwrap_or(vehicle.site.sound_speed_mps);
+    if args.target.len() < 2 && args.section.len() < 2 {
+        return WhatIf::default();
+    }
+    let or = |asked: &[f64], own: f64| if asked.is_empty() { vec![own] } else { asked.to_vec() };
+    WhatIf { targets_m: or(&args.target, vehicle.target_m), sections_m: or(&args.section, vehicle.section_m) }
 }
 
 /// Says what a vehicle file describes.

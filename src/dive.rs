@@ -26,6 +26,14 @@ pub(crate) struct Dive {
     pub(crate) armed: Loop,
     notices: NoticeReceiver,
     recorder: Option<(PathBuf, RecorderHandle)>,
+    what_if: WhatIf,
+}
+
+/// Targets and lengths of section that a dive is to be judged by besides, m.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct WhatIf {
+    pub(crate) targets_m: Vec<f64>,
+    pub(crate) sections_m: Vec<f64>,
 }
 
 /// Assembles the loop for a vehicle; `record_to` names a log to write.
@@ -60,7 +68,7 @@ pub(crate) fn assemble_with(
             Some((path.to_owned(), handle))
         }
     };
-    Ok(Dive { armed: app.arm(navigation)?, notices, recorder })
+    Ok(Dive { armed: app.arm(navigation)?, notices, recorder, what_if: WhatIf::default() })
 }
 
 /// What a log of this vehicle begins with.
@@ -85,6 +93,11 @@ pub(crate) fn log_header(vehicle: &VehicleConfig, vehicle_text: &str, ticks: boo
 }
 
 impl Dive {
+    /// Judged by these besides, once it has ended.
+    pub(crate) fn asking(self, what_if: WhatIf) -> Self {
+        Self { what_if, ..self }
+    }
+
     /// Runs the loop until the feed ends, shows what happens, and gives the report.
     pub(crate) fn run(self, feed: &mut dyn Feed, pace: Pace, watch: &mut Watch) -> Result<Report, Failure> {
         self.run_beside(feed, pace, watch, &mut |_| {})
@@ -118,6 +131,7 @@ impl Dive {
         watch.end(&self.armed);
         beside(&self.armed);
         let mut report = Report::of(&self.armed);
+        report.what_if = self.armed.what_if(&self.what_if.targets_m, &self.what_if.sections_m);
         if let Some((path, handle)) = self.recorder.take() {
             drop(self.armed);
             let written = handle.finish();

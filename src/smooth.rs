@@ -17,7 +17,7 @@ use headrace_replay::drive::Pace;
 use headrace_replay::player::Player;
 use headrace_replay::smooth::Steps;
 
-use crate::dive::assemble_with;
+use crate::dive::{WhatIf, assemble_with};
 use crate::failure::Failure;
 use crate::watch::Watch;
 
@@ -30,6 +30,7 @@ pub(crate) fn smoothed(
     player: &mut Player,
     (vehicle, text): (&VehicleConfig, &str),
     pace: Pace,
+    what_if: WhatIf,
 ) -> Result<Report, Failure> {
     let NavigationConfig::Filter(settings) = vehicle.navigation else {
         return Err(Failure::Usage(format!(
@@ -54,7 +55,8 @@ pub(crate) fn smoothed(
     let track = steps.smooth(settings)?;
     tracing::debug!(records, pieces = track.pieces(), dropped = reader.dropped(), "smoothed");
     let (estimates, pieces) = (track.len() as u64, track.pieces() as u64);
-    let dive = assemble_with(vehicle, Box::new(TrackNavigation::new(track, consistency)), text, None)?;
+    let dive = assemble_with(vehicle, Box::new(TrackNavigation::new(track, consistency)), text, None)?
+        .asking(what_if);
     player.connect(dive.armed.sources());
     let mut report = dive.run(player, pace, &mut Watch::quiet())?;
     report.smoothing = Some(SmoothingReport::of(&before, &report, estimates, pieces));

@@ -33,6 +33,12 @@ pub(crate) fn summary(report: &Report) -> String {
         for run in runs(&report.sections) {
             line(run);
         }
+        for other in &report.what_if {
+            line(format!(
+                "  with target {} m in sections of {} m: passed {:.2} m   failed {:.2} m   can't say {:.2} m   open {:.2} m",
+                other.target_m, other.section_m, other.pass_m, other.fail_m, other.cannot_say_m, other.open_m
+            ));
+        }
         let metres = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |v| format!("{v:.3}"));
         line(format!(
             "  largest hole {} m   T_x mean {} m   T_y max {} m",

@@ -239,7 +239,7 @@ fn replay_says_what_smoothing_changed() {
     let about = |line: &&str| ["  smoothed", "  changed"].iter().any(|start| line.starts_with(start));
     let said: Vec<&str> = answer.stdout.lines().filter(about).collect();
     insta::assert_snapshot!(said.join("\n"), @r"
-      smoothed 591 estimates; by the filter alone: passed 9.50 m   failed 1.25 m   can't say 1.50 m   open 0.00 m
+      smoothed 591 estimates; by the filter alone: passed 9.50 m   failed 0.50 m   can't say 1.50 m   open 0.75 m
       changed ch 0+002.75 to 0+003.00: not passed to fail, holes - to 1.968±0.000 m
       changed ch 0+003.50 to 0+003.75: can't say to pass, holes 0.554±0.096 to 0.554±0.014 m
       changed ch 0+004.00 to 0+004.50: can't say to pass, holes 0.604±0.071 to 0.413±0.014 m

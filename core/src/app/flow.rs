@@ -11,7 +11,7 @@ use super::alerts::AlertKind;
 use super::digest::Digest;
 use super::reading::{Reading, SourceId};
 use crate::coverage::{
-    Frontier, HoleFinder, Judgement, Loss, Request, RunChange, RunId, SampleStore, Sections,
+    Frontier, HoleFinder, Judgement, Loss, Request, RunChange, RunId, SampleStore, Sections, Soundings,
 };
 use crate::frames::{Point3, Tunnel};
 use crate::fusion::{Fix, Navigation, NoFix, SensorInfo};
@@ -214,6 +214,8 @@ pub struct Coverage {
     pub sections: Sections,
     /// Where samples may still land.
     pub frontier: Frontier,
+    /// Samples by node of a square grid.
+    pub soundings: Soundings,
 }
 
 /// The search for holes with its working memory.

@@ -17,6 +17,7 @@ pub mod run;
 pub mod smoothing;
 pub mod stage;
 mod stages;
+pub mod what_if;
 
 use bevy_ecs::prelude::{Component, Resource};
 use bevy_ecs::schedule::{IntoScheduleConfigs, Schedule};

@@ -16,7 +16,7 @@ use super::plugin::PluginError;
 use super::ring::{Port, PortReader};
 use super::stages::{Advisor, Decoders, Driving, HeadSweeps, Results, judge_one};
 use super::{App, MAX_SOURCES, Mission, SourceInfo};
-use crate::coverage::{Frontier, HoleFinder, SampleStore, Sections, StoreLayout};
+use crate::coverage::{Frontier, GridLayout, HoleFinder, SampleStore, Sections, Soundings, StoreLayout};
 use crate::fusion::{Navigation, SensorInfo, SensorKind};
 use crate::sampling::advice::{self, Task};
 use crate::sampling::head::{HeadMode, HeadSpec, MAX_HEADS};
@@ -146,6 +146,10 @@ impl Loop {
         &self.world
     }
 
+    pub(super) fn world_mut(&mut self) -> &mut World {
+        &mut self.world
+    }
+
     /// Judges what is still open: the dive has ended, and no sample will come. Gives the notices of it.
     pub fn finish(&mut self) -> Vec<super::flow::Notice> {
         self.world.resource_mut::<Navigator>().navigation.end();
@@ -158,7 +162,7 @@ impl Loop {
                     world.resource_scope(|world, mut alerts: Mut<'_, Alerts>| {
                         notices.0.clear();
                         let mut requests = Vec::new();
-                        let Coverage { store, sections, frontier } = &mut *coverage;
+                        let Coverage { store, sections, frontier, .. } = &mut *coverage;
                         let mut ask = |request| requests.push(request);
                         sections.unsettled((frontier, at), store, &mut finder.0, profile, &mut ask);
                         let mut digests = world.resource_mut::<Digests>();
@@ -223,7 +227,13 @@ fn coverage(mission: &Mission) -> Result<Coverage, PluginError> {
             .map_err(|why| PluginError::Opening { name: name(), why: why.to_string() })?;
         sections.mask(opening, &mission.profile);
     }
-    Ok(Coverage { store, sections, frontier: Frontier::default() })
+    let soundings = Soundings::new(GridLayout {
+        perimeter_m: mission.profile.perimeter_m(),
+        from_m: 0.0,
+        to_m: mission.length_m,
+        node_m: mission.coverage.node_m,
+    });
+    Ok(Coverage { store, sections, frontier: Frontier::default(), soundings })
 }
 
 /// What stages look up by source: navigation's view of each sensor, and the number and entity of each head; and the

@@ -2,6 +2,7 @@
 
 use super::reader::{ConfigError, Section};
 use crate::coverage::openings::Opening;
+use crate::coverage::soundings::NODE_M;
 use crate::math::{self, TAU};
 use crate::tunnel::Profile;
 
@@ -12,13 +13,15 @@ pub struct CoverageConfig {
     pub hole_tolerance_m: f64,
     /// Samples farther than this from the design profile contradict it, m; where most do, nothing passes.
     pub contradiction_m: f64,
+    /// Edge of a node of the grid on which soundings are counted, m.
+    pub node_m: f64,
     /// Where there is no wall to cover.
     pub openings: Vec<Opening>,
 }
 
 impl Default for CoverageConfig {
     fn default() -> Self {
-        Self { hole_tolerance_m: 0.0, contradiction_m: 0.5, openings: Vec::new() }
+        Self { hole_tolerance_m: 0.0, contradiction_m: 0.5, node_m: NODE_M, openings: Vec::new() }
     }
 }
 
@@ -34,6 +37,7 @@ impl CoverageConfig {
         if let Some(section) = root.section("coverage")? {
             config.contradiction_m =
                 section.number("contradiction_m", 0.05..=100.0)?.unwrap_or(config.contradiction_m);
+            config.node_m = section.number("node_m", 0.05..=10.0)?.unwrap_or(config.node_m);
             config.hole_tolerance_m = parse_tolerance_m(&section, target_m)?;
             section.finish()?;
         }

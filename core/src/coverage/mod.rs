@@ -12,6 +12,7 @@ pub mod section;
 pub mod sections;
 pub mod soundings;
 pub mod store;
+pub mod what_if;
 
 pub use action::Action;
 pub use cause::{Cause, Evidence};
@@ -23,3 +24,4 @@ pub use section::{Judgement, Section, Spread, Verdict};
 pub use sections::{Judging, Request, Sections};
 pub use soundings::{GridLayout, GridNode, GridSummary, Soundings};
 pub use store::{Fidelity, Kept, SampleStore, StoreError, StoreLayout, StoreUse, WallSample};
+pub use what_if::Metres;

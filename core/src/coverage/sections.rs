@@ -312,7 +312,7 @@ impl Sections {
 /// samples won't make it larger. `fail` when D - 2 sigma > T for whatever D will be: samples come no nearer than `clear_m`.
 /// In between `open` while D may change, then `cannot_say`. A verdict holds for both bounds of D. Wall without samples
 /// around it fails.
-fn verdict(hole: &Hole, sigma_m: f64, target_m: f64, clear_m: f64) -> Verdict {
+pub(super) fn verdict(hole: &Hole, sigma_m: f64, target_m: f64, clear_m: f64) -> Verdict {
     let is_left = 2.0 * clear_m >= hole.diameter_m;
     if hole.bounded && hole.most_m + 2.0 * sigma_m <= target_m {
         Verdict::Pass

@@ -7,6 +7,7 @@ use super::alerts::{Alert, Alerts};
 use super::flow::{AdviceLog, Coverage, SourceTallies, Tally};
 use super::run::Loop;
 use super::smoothing::SmoothingReport;
+use super::what_if::WhatIfReport;
 use crate::coverage::openings::Opening;
 use crate::coverage::{Section, Spread, Verdict};
 use crate::time::MonoNs;
@@ -15,11 +16,13 @@ mod advice;
 mod runs;
 mod sections;
 mod sources;
+mod survey;
 
 pub use advice::{AdviceReport, AlternativeReport};
 pub use runs::{ReturnReport, RunReport};
 pub use sections::{DeviationReport, EvidenceReport, SectionReport};
 pub use sources::{NavigationReport, SourceReport};
+pub use survey::{HolidayReport, NodeRowReport, SurveyReport};
 
 /// Version of the report's form.
 pub const REPORT_VERSION: u32 = 2;
@@ -47,6 +50,10 @@ pub struct Report {
     pub runs: Vec<RunReport>,
     /// What to pass again on the way home, from the far end to the portal.
     pub way_home: Vec<ReturnReport>,
+    /// Samples by node of a square grid, as surveyors' specifications are written.
+    pub survey: SurveyReport,
+    /// Metres by verdict for the targets and lengths of section that were asked for besides.
+    pub what_if: Vec<WhatIfReport>,
     /// Declared openings of the wall, which no verdict speaks of.
     pub openings: Vec<OpeningReport>,
     /// What was wrong with the dive as a whole.
@@ -91,6 +98,8 @@ pub struct DiveReport {
     pub sonar: bool,
     /// Samples on the wall.
     pub samples_valid: u64,
+    /// Of these, samples that others stand for, since their surroundings are full.
+    pub samples_thinned: u64,
     /// Pings that gave none, by reason.
     pub samples_rejected: RejectedReport,
 }
@@ -204,6 +213,8 @@ impl Report {
                 .collect(),
             runs: runs::run_reports(sections, &dive.mission().profile),
             way_home: runs::way_home(sections),
+            survey: survey::survey(coverage, &dive.mission().profile),
+            what_if: Vec::new(),
             openings: dive.mission().coverage.openings.iter().map(opening_report).collect(),
             alerts: world.resource::<Alerts>().iter().map(alert_report).collect(),
             advice: log.entries.iter().map(advice::advice_report).collect(),
@@ -231,6 +242,7 @@ fn dive_report(coverage: &Coverage, tally: &Tally) -> DiveReport {
         distance_m: swept.map_or(0.0, |reach| reach.to_m - reach.from_m),
         sonar: tally.samples + tally.missing + tally.out_of_range + tally.occluded + tally.unplaced > 0,
         samples_valid: tally.samples - tally.outside - tally.not_stored,
+        samples_thinned: coverage.store.usage().thinned,
         samples_rejected: RejectedReport {
             missing: tally.missing,
             out_of_range: tally.out_of_range,

@@ -16,6 +16,10 @@ pub struct SectionReport {
     pub end_m: f64,
     /// Diameter of its largest hole, m; `None` where it wasn't measured.
     pub hole_m: Option<f64>,
+    /// The hole is no smaller than this, m: samples that aren't kept may have parted it.
+    pub hole_least_m: Option<f64>,
+    /// No larger, m; `None` where nothing bounds it.
+    pub hole_most_m: Option<f64>,
     /// False where the hole is at least that large, for want of samples around it.
     pub hole_bounded: bool,
     /// Standard deviation of the hole, m.
@@ -109,6 +113,8 @@ pub(super) fn section_report(
         start_m,
         end_m,
         hole_m: section.hole.map(|hole| hole.diameter_m),
+        hole_least_m: section.hole.map(|hole| hole.least_m),
+        hole_most_m: section.hole.map(|hole| hole.most_m).filter(|most_m| most_m.is_finite()),
         hole_bounded: section.hole.is_some_and(|hole| hole.bounded),
         hole_sigma_m: section.hole_sigma_m,
         hole_x_m: section.hole.map(|hole| hole.x_m),

@@ -168,7 +168,7 @@ fn look_around(
     at: MonoNs,
     requests: &mut Requests,
 ) {
-    let Coverage { store, sections, frontier } = coverage;
+    let Coverage { store, sections, frontier, .. } = coverage;
     let now = (&*frontier, at);
     let mut ask = |request| requests.0.push(request);
     sections.look_around(now, store, &mut finder.0, &context.profile, &mut ask);
@@ -212,6 +212,7 @@ fn note_sample(
     let kept = coverage.store.insert(WallSample { x_m: point.x(), sigma_m, head: ping.head, step_m });
     *slot = kept.ok().map(|_| LastSample { point, sigma_m, unbroken: true });
     kept?;
+    coverage.soundings.add(point.x(), sigma_m);
     coverage.sections.touch(point.x());
     let index = coverage.sections.index_of(point.x());
     let Some(section) = coverage.sections.get_mut(index) else { return Ok(()) };

@@ -12,6 +12,11 @@ use crate::tunnel::Profile;
 /// Beats that are remembered: over a turn of a head in its slowest mode (28 s) at five a second.
 const BEATS: usize = 256;
 
+/// The longest time between neighbouring passes that is looked back over, seconds.
+const LONGEST_S: f64 = 50.0;
+/// Slower than this, m/s, a vehicle stands still.
+const SLOW_MPS: f64 = 0.01;
+
 /// How the vehicle was driven at the last beat.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Driven {
@@ -23,7 +28,7 @@ pub(super) struct Driven {
     pub(super) all_gap_s: f64,
     /// Time between two pings, seconds.
     pub(super) ping_period_s: f64,
-    /// How far the beams have swung along the tunnel since the pass before, where they reach farthest, m.
+    /// How far the beams have swung along the tunnel since the neighbouring passes, where they reach farthest, m.
     pub(super) swing_m: f64,
     /// The largest step along the wall from the middle of the tunnel, m.
     pub(super) middle_t_y_m: f64,
@@ -70,10 +75,12 @@ impl Driving {
             return;
         };
         let look = pose.attitude * Vec3::new(1.0, 0.0, 0.0);
-        let then = self.look_at(at - DurNs::from_secs_f64(self.now.gap_s.min(1e3)));
-        let turned = then.map_or(0.0, |then| (look + -then).norm());
-        self.now.swing_m = turned * profile.farthest_m([pose.position.y(), pose.position.z()]);
         self.keep(at, look);
+        // Neighbouring passes may be those of heads apart along the hull.
+        let apart_s = apart_m(situation) / situation.speed_mps.abs().max(SLOW_MPS);
+        let since = at - DurNs::from_secs_f64((self.now.gap_s + apart_s).min(LONGEST_S));
+        let turned = self.looks_since(since).map(|then| (look + -then).norm()).fold(0.0, f64::max);
+        self.now.swing_m = turned * profile.farthest_m([pose.position.y(), pose.position.z()]);
     }
 
     fn note_gaps(&mut self, at: MonoNs, situation: &Situation) {
@@ -109,11 +116,14 @@ impl Driving {
         self.count += 1;
     }
 
-    /// Which way the vehicle looked at the last beat at or before a time; the oldest that is known where none is so old.
-    fn look_at(&self, at: MonoNs) -> Option<Vec3<Tunnel>> {
-        let kept = self.looks.len();
-        let back = |k: usize| self.looks.get((self.count - 1 - k) % BEATS);
-        let found = (0..kept).filter_map(back).find(|(then, _)| *then <= at);
-        found.or_else(|| back(kept.checked_sub(1)?)).map(|(_, look)| *look)
+    /// Which way the vehicle looked at each beat since a time.
+    fn looks_since(&self, since: MonoNs) -> impl Iterator<Item = Vec3<Tunnel>> {
+        self.looks.iter().filter(move |(then, _)| *then >= since).map(|(_, look)| *look)
     }
+}
+
+/// How far apart along the hull the heads that turn are, m.
+fn apart_m(situation: &Situation) -> f64 {
+    let x_m = || situation.heads.iter().flatten().map(|motion| motion.mount.position.x());
+    (x_m().fold(f64::NEG_INFINITY, f64::max) - x_m().fold(f64::INFINITY, f64::min)).max(0.0)
 }
