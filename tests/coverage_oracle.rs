@@ -127,9 +127,9 @@ fn val_verdicts_follow_from_hole_sigma_and_target() {
         let rear_m = reached(dive).last()?.rear_m;
         let radius_m = (target_m + twice_m) / 2.0;
         let first_m = first_failing_m(wall, [section.start_m, section.end_m], radius_m);
-        // Where the first such circle is, is known to a twentieth of the section; and the program goes by the largest
-        // deviation round the wall.
-        let near_m = (section.end_m - section.start_m) / 20.0 + 2.0 * section.hole_sigma_m;
+        // Where the first such circle is, is known to a twentieth of the section; the program goes by the largest deviation
+        // round the wall, and by the farthest wall for the reach of a tilted head.
+        let near_m = (section.end_m - section.start_m) / 20.0 + 2.0 * section.hole_sigma_m + 0.03;
         let clear_m = first_m.map_or(f64::NEG_INFINITY, |first_m| rear_m - first_m - radius_m);
         let behind_m = rear_m - largest.centre[0] - largest.radius_m;
         let expected = match section.verdict {
