@@ -124,8 +124,11 @@ pub fn explain<'a>(
         .is_some_and(|swept| hole.x_m - radius_m >= swept.from_m && hole.x_m + radius_m <= swept.to_m);
     let lost_in_hole = lost.iter().sum();
     let whole = passed && hole.bounded;
-    // A hole that is much larger than driving makes it has another cause.
-    let driving_explains = worst.t_m() > target_m && worst.t_m() * EXPLAINED > hole.diameter_m;
+    // A hole that is much larger than driving makes it has another cause, unless driving alone is bad enough: what was lost
+    // has then only made it larger.
+    let explained =
+        worst.t_m() * EXPLAINED > hole.diameter_m || worst.t_m() > BAD_ENOUGH * target_m && lost_in_hole > 0;
+    let driving_explains = worst.t_m() > target_m && explained;
     let cause = if seen.is_unseen(lost_in_hole) && !driving_explains {
         Cause::PositionLost
     } else if seen.pings == 0 || (!whole && lost_in_hole == 0) {
@@ -181,6 +184,8 @@ struct Seen {
 const STANDING_SHARE: f64 = 0.02;
 /// A hole may be larger than T as driven by this factor: figures are means over a section.
 const EXPLAINED: f64 = 1.5;
+/// Beyond so many times the target, driving would have failed without anything else.
+const BAD_ENOUGH: f64 = 1.1;
 /// What leaves more of T than this when it is taken away isn't the cause.
 const HELPS: f64 = 0.99;
 

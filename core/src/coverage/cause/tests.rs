@@ -74,6 +74,16 @@ fn what_was_lost_elsewhere_is_no_cause() {
 }
 
 #[test]
+fn what_was_lost_on_a_stretch_driven_too_fast_has_only_made_it_worse() {
+    let mut passage = sound();
+    passage.speed_sum_mps = 0.35 * 1000.0;
+    passage.lost.note(Loss::Occluded, 3.1, 18.0);
+    assert_eq!(cause_of(&passage, 1.8), Cause::TooFast);
+    passage.speed_sum_mps = 0.22 * 1000.0;
+    assert_eq!(cause_of(&passage, 1.8), Cause::Occluded);
+}
+
+#[test]
 fn of_several_that_are_needed_the_one_that_costs_most_is_named() {
     let mut passage = sound();
     passage.pass_gap_sum_s = 6.0 * 1000.0;
