@@ -87,18 +87,12 @@ impl Watch {
         self.shown = Some(entry.at);
         let place =
             entry.chainage_m.map_or_else(|| "no position".to_owned(), |x| format!("ch {}", station(x)));
-        let line = format!(
-            "{place:<14} {:5.2} m/s   {}",
-            entry.speed_mps,
-            advice_words(entry, mission.target_m, &mission.profile)
-        );
+        let line =
+            format!("{place:<14} {:5.2} m/s   {}", entry.speed_mps, advice_words(entry, &mission.profile));
         if self.terminal {
-            let colour =
-                if too_fast(entry) || entry.advice.predicted_t_m.is_none_or(|t_m| t_m > mission.target_m) {
-                    "\x1b[33m"
-                } else {
-                    "\x1b[32m"
-                };
+            let advice = &entry.advice;
+            let wrong = advice.will_exceed || advice.predicted_t_m.is_none();
+            let colour = if wrong { "\x1b[33m" } else { "\x1b[32m" };
             put(&format!("\r\x1b[K{colour}{line}\x1b[0m"));
             self.status_open = true;
         } else {
@@ -205,24 +199,22 @@ fn alert_words(alert: &Alert) -> String {
     }
 }
 
-/// A speed isn't known better, m/s: words must not change to and fro with it.
-const SPEED_KNOWN_MPS: f64 = 0.005;
-
-fn too_fast(entry: &AdviceEntry) -> bool {
-    entry.speed_mps.abs() > entry.advice.v_max_mps + SPEED_KNOWN_MPS
-}
-
-fn advice_words(entry: &AdviceEntry, target_m: f64, profile: &Profile) -> String {
+fn advice_words(entry: &AdviceEntry, profile: &Profile) -> String {
     let advice = &entry.advice;
     match advice.reason {
-        Reason::HelixPitch if too_fast(entry) => format!("TOO FAST: at most {:.2} m/s", advice.v_max_mps),
-        Reason::HelixPitch if advice.predicted_t_m.is_some_and(|t_m| t_m > target_m) => {
+        Reason::HelixPitch if advice.will_exceed && entry.speed_mps.abs() > advice.v_max_mps => {
+            format!("TOO FAST: at most {:.2} m/s", advice.v_max_mps)
+        }
+        Reason::HelixPitch if advice.will_exceed => {
             let error_deg = advice.phase_error_rad.map_or(0.0, f64::to_degrees).abs();
             format!("OUT OF PHASE by {error_deg:.0} degrees: go {:.2} m/s", advice.v_max_mps)
         }
         Reason::HelixPitch => format!("may go {:.2} m/s (distance between turns)", advice.v_max_mps),
         Reason::AngularStep => {
             let remedy = match advice.remedy {
+                Some(Remedy::Steady) => {
+                    return "slower won't help: hold the heading, the beams swing".to_owned();
+                }
                 Some(Remedy::Centre) => "go to the middle of the tunnel".to_owned(),
                 Some(Remedy::Mode(mode)) => format!("set the heads to {}", mode.to_uppercase()),
                 None => "no mode meets the target here".to_owned(),

@@ -326,6 +326,7 @@ impl AdviceLog {
     pub(super) fn take(&mut self, entry: &AdviceEntry) {
         let unchanged = |last: &AdviceEntry| {
             last.advice.reason == entry.advice.reason
+                && last.advice.will_exceed == entry.advice.will_exceed
                 && (last.advice.v_max_mps - entry.advice.v_max_mps).abs() < Self::CHANGE_MPS
                 && (last.speed_mps - entry.speed_mps).abs() < Self::CHANGE_MPS
                 && entry.at.since(last.at).0 < Self::EVERY.0

@@ -67,7 +67,7 @@ impl Loop {
         };
         let advisor = advice::Advisor::new(&mission.profile, task, &specs, &mission.hull);
         world.insert_resource(HiddenAngles(advisor.hidden_angles().map(<[_]>::to_vec).collect()));
-        world.insert_resource(Advisor { advisor, dive_time: mission.dive_time });
+        world.insert_resource(Advisor::new(advisor, mission.target_m, mission.dive_time));
         world.insert_resource(AdviceLog::default());
         world.insert_resource(Digests::default());
         world.insert_resource(Tally::default());

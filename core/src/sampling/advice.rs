@@ -1,25 +1,31 @@
 //! How fast one may go, from what is measured now, and what else one could do.
 
+mod answer;
+mod look;
+mod search;
+mod steady;
+
 use super::error::SamplingError;
 use super::head::{HeadMode, HeadMotion, HeadSet, HeadSpec, MAX_HEADS};
 use super::layout::{self, HeadLayout};
 use super::occlusion::{self, AngleRange, Obstacle};
 use super::passes::{self, Passes, Phasing, Situation};
-use super::ring::{Ring, Standing};
-use super::strips::{Arc, Going, Strips, View};
+use super::ring::Ring;
+use super::strips::{Going, Strips, View};
+use super::swing::Swing;
 use crate::frames::{Point3, Pose, Rot};
 use crate::math;
 use crate::tunnel::Profile;
+use look::AdvisedHead;
+
+pub use answer::{Advice, Alternative, Left, Reason, Remedy};
+pub use steady::Steady;
 
 /// Share of the speed kept back for the error of its measurement.
 pub const SPEED_MARGIN: f64 = 0.01;
 /// The most modes of a head that alternatives are given for.
 pub const MAX_MODES: usize = 8;
 
-/// How far the vehicle may move across the tunnel, m, or turn, as a quaternion's component (half an angle, rad), before
-/// the beams of its heads are cast anew. Both change the largest step by well under the speed margin.
-const STILL_M: f64 = 0.01;
-const STILL_TURN: f64 = 0.002;
 /// Soundings of a head's ring: the finest steps of the heads that there are (0.3 degrees).
 const RING: u32 = 1200;
 
@@ -29,131 +35,6 @@ const ALTERNATIVES_EVERY: u32 = 25;
 const UNDER_WAY_MPS: f64 = 0.02;
 /// Stretches of wall out of a head's reach that there is room for.
 const OUT_OF_REACH: usize = 16;
-
-/// Why the advice is what it is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Reason {
-    /// The distance between passes decides: slower helps.
-    HelixPitch,
-    /// The distance between neighbours of one turn, or a strip that no head sees, is as large as the target: slower
-    /// won't help, another mode or place would.
-    AngularStep,
-    /// Without a position and heading nothing can be said.
-    NoHeadingOrFix,
-    /// No head gives returns.
-    NoReturns,
-}
-
-impl Reason {
-    /// The word used in reports and logs.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Self::HelixPitch => "helix_pitch",
-            Self::AngularStep => "angular_step",
-            Self::NoHeadingOrFix => "no_heading_or_fix",
-            Self::NoReturns => "no_returns",
-        }
-    }
-}
-
-/// What would help where slower doesn't.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Remedy {
-    /// Another mode.
-    Mode(&'static str),
-    /// The middle of the tunnel, level and straight.
-    Centre,
-}
-
-impl Remedy {
-    /// The word used in reports: `centre`, or the mode's name.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Self::Mode(name) => name,
-            Self::Centre => "centre",
-        }
-    }
-}
-
-/// What all heads could do in one of their modes.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Alternative {
-    /// The mode.
-    pub mode: &'static str,
-    /// The largest speed at which it meets the target with the heads started in phase for it, m/s; zero where none is.
-    pub v_max_mps: f64,
-}
-
-/// What is left of a dive.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Left {
-    /// Length of tunnel in the direction of travel, m.
-    pub length_m: f64,
-    /// Time, seconds, where it is known.
-    pub time_s: Option<f64>,
-}
-
-impl Left {
-    /// Hours that the length takes at a speed; `None` at zero speed.
-    pub fn hours_at(&self, speed_mps: f64) -> Option<f64> {
-        (speed_mps > 0.0).then(|| self.length_m / speed_mps / 3600.0)
-    }
-
-    /// Whether the time is enough at a speed; `None` where it isn't known.
-    pub fn suffices_at(&self, speed_mps: f64) -> Option<bool> {
-        let time_s = self.time_s?;
-        Some(self.hours_at(speed_mps).is_some_and(|hours| hours * 3600.0 <= time_s))
-    }
-}
-
-/// The advice.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Advice {
-    /// The largest speed at which the target is met, m/s; zero where none is.
-    pub v_max_mps: f64,
-    /// What decides.
-    pub reason: Reason,
-    /// T_max predicted at the present speed, m; `None` where nothing can be said or nothing bounds it.
-    pub predicted_t_m: Option<f64>,
-    /// The longest time between two passes over a place that all heads see, seconds.
-    pub pass_gap_s: f64,
-    /// What that time would be if the heads' passes were spread evenly, seconds.
-    pub even_pass_gap_s: f64,
-    /// The largest distance between neighbours of one turn, m.
-    pub t_y_m: f64,
-    /// Time between two pings, seconds; the longest of any head.
-    pub ping_period_s: f64,
-    /// By how much the head farthest out of its phase is, radians of its turn; `None` in sectors, or with one head.
-    pub phase_error_rad: Option<f64>,
-    /// What is left of the tunnel and of the time.
-    pub left: Left,
-    /// Where slower doesn't help because no head sees a strip of the wall: its width and the arc length of its middle,
-    /// m.
-    pub unseen_m: Option<[f64; 2]>,
-    /// What would help where slower doesn't.
-    pub remedy: Option<Remedy>,
-    /// The modes that all heads have.
-    pub alternatives: [Option<Alternative>; MAX_MODES],
-}
-
-impl Advice {
-    fn nothing(reason: Reason) -> Self {
-        Self {
-            v_max_mps: 0.0,
-            reason,
-            predicted_t_m: None,
-            pass_gap_s: 0.0,
-            even_pass_gap_s: 0.0,
-            t_y_m: 0.0,
-            ping_period_s: 0.0,
-            phase_error_rad: None,
-            left: Left::default(),
-            unseen_m: None,
-            remedy: None,
-            alternatives: [None; MAX_MODES],
-        }
-    }
-}
 
 /// What the advice is given for.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -166,18 +47,6 @@ pub struct Task {
     pub layout: HeadLayout,
     /// Speed of sound in the tunnel's water, m/s.
     pub sound_speed_mps: f64,
-}
-
-/// A head, and its ring as last cast.
-#[derive(Debug, Clone)]
-struct AdvisedHead {
-    spec: HeadSpec,
-    modes: Vec<HeadMode>,
-    /// Angles that the vehicle hides, and the sector, in the sensor's frame.
-    hidden: Vec<AngleRange>,
-    sector: Option<AngleRange>,
-    ring: Ring,
-    cast_at: Option<Pose>,
 }
 
 /// Gives advice; remembers the beams of heads that keep their place in the section.
@@ -195,6 +64,8 @@ pub struct Advisor {
     /// What each head sees from there.
     middle: Vec<Ring>,
     parallax_rad: f64,
+    /// The farthest wall that a head looks at, m.
+    farthest_m: f64,
     /// How many soundings of its ring the step of each head that turns passes over.
     strides: [Option<usize>; MAX_HEADS],
     /// The head whose ring is looked at first.
@@ -247,6 +118,7 @@ impl Advisor {
             centred_m: Vec::new(),
             middle: Vec::new(),
             parallax_rad: 0.0,
+            farthest_m: 0.0,
             strides: [None; MAX_HEADS],
             next: 0,
             until_alternatives: 0,
@@ -296,14 +168,14 @@ impl Advisor {
 
     /// The largest speed at which the predicted T_max stays within the target, by inverting Eq. 16 with what is
     /// measured: turn period, step, number and phases of the heads as they would meet the wall at that speed, what
-    /// the vehicle hides from them or is out of their reach, and its place and attitude. `left_s` is the time that is
-    /// left, where it is known.
+    /// the vehicle hides from them or is out of their reach, its place and attitude, and how it swings. `left_s` is the
+    /// time that is left, where it is known.
     ///
     /// Heads apart along the hull keep their phases at some speeds only: the largest is the end of the stretch of speeds
     /// in which the vehicle goes now, if that meets the target; else of the stretch advised last, else of any.
     /// Source: metrics.md, "Speed advice".
     /// Allocates: never.
-    pub fn advise(&mut self, situation: &Situation, left_s: Option<f64>) -> Advice {
+    pub fn advise(&mut self, situation: &Situation, swing: Swing, left_s: Option<f64>) -> Advice {
         let Some(pose) = situation.pose else { return Advice::nothing(Reason::NoHeadingOrFix) };
         if situation.heads.iter().all(Option::is_none) {
             return Advice::nothing(Reason::NoReturns);
@@ -314,25 +186,35 @@ impl Advisor {
         if situation.speed_mps.abs() > UNDER_WAY_MPS {
             self.astern = situation.speed_mps < 0.0;
         }
-        let passes = Phasing::of(situation).at(situation.speed_mps).beside(self.parallax_rad);
+        let phasing = Phasing::of(situation);
+        let passes = phasing.at(situation.speed_mps).beside(self.parallax_rad);
         let ping_period_s =
             situation.heads.iter().flatten().map(HeadMotion::ping_period_s).fold(0.0, f64::max);
-        let going = Going { ping_period_s, ..Going::default() };
+        let going = Going {
+            ping_period_s,
+            swing_mps: swing.rate_radps * self.farthest_m,
+            shift_m: 0.0,
+            apart_m: phasing.apart_m(),
+            swing_most_m: Some(swing.most_rad * self.farthest_m),
+        };
         let fastest = self.fastest_mps(situation, &passes, &going);
-        self.last_mps = fastest.ok().filter(|fastest_mps| *fastest_mps > 0.0);
+        let advised_mps = fastest.ok().map(|[_, advised_mps]| advised_mps).filter(|mps| *mps > 0.0);
+        self.last_mps = fastest.ok().map(|[fastest_mps, _]| fastest_mps).filter(|mps| *mps > 0.0);
         let predicted_t_m = self.now.t_max_m(0, &passes, situation.speed_mps.abs(), &going);
         let x_m = pose.position.x();
         let left_m = if self.astern { x_m } else { self.task.length_m - x_m };
-        self.think_over(&passes);
+        self.think_over(&passes, &going);
         let unseen_m = match fastest {
             Err(SamplingError::UnseenStrip { width_m, sigma_m, .. }) => Some([width_m, sigma_m]),
             _ => None,
         };
         let errors = passes.phase_errors_rad(self.heads.len()).into_iter().flatten();
+        let helps = advised_mps.is_some();
         Advice {
-            v_max_mps: fastest.unwrap_or(0.0) * (1.0 - SPEED_MARGIN),
-            reason: if fastest.is_ok() { Reason::HelixPitch } else { Reason::AngularStep },
+            v_max_mps: advised_mps.unwrap_or(0.0),
+            reason: if helps { Reason::HelixPitch } else { Reason::AngularStep },
             predicted_t_m: predicted_t_m.is_finite().then_some(predicted_t_m),
+            will_exceed: predicted_t_m > self.task.target_m,
             pass_gap_s: passes.gap_s(passes.heads()).unwrap_or(0.0),
             even_pass_gap_s: passes.even_gap_s(),
             t_y_m: self.now.largest_step_m(0),
@@ -342,7 +224,7 @@ impl Advisor {
                 .filter(|_| passes.heads().len() > 1),
             left: Left { length_m: left_m.clamp(0.0, self.task.length_m), time_s: left_s },
             unseen_m,
-            remedy: if fastest.is_err() { self.remedy(situation, unseen_m.is_some()) } else { None },
+            remedy: if helps { None } else { self.remedy(situation, &passes, &going, unseen_m.is_some()) },
             alternatives: self.alternatives,
         }
     }
@@ -387,13 +269,15 @@ impl Advisor {
             *slot = [place.y(), place.z()];
             known += 1;
         }
+        let looking = self.heads.iter().filter(|head| head.cast_at.is_some());
+        self.farthest_m = looking.map(|head| head.ring.longest_range_m()).fold(0.0, f64::max);
         self.parallax_rad = passes::parallax_rad(&self.profile, places.get(..known).unwrap_or_default());
         self.now.rebuild(self.profile.perimeter_m(), &self.views);
         let rings = self.heads.iter().map(|head| &head.ring);
         self.now.measure(1, rings, |_, head| self.strides.get(head).copied().flatten());
     }
 
-    /// The largest speed at which the phases measured now meet the target.
+    /// The largest speed at which the phases measured now meet the target, and what to advise of it.
     ///
     /// Errors: no speed would.
     fn fastest_mps(
@@ -401,7 +285,7 @@ impl Advisor {
         situation: &Situation,
         passes: &Passes,
         going: &Going,
-    ) -> Result<f64, SamplingError> {
+    ) -> Result<[f64; 2], SamplingError> {
         let target_m = self.task.target_m;
         // However the heads were phased, no speed beyond this one would do.
         let bound_mps = target_m / (passes.even_gap_s() + going.ping_period_s);
@@ -417,14 +301,15 @@ impl Advisor {
         let now_mps = Some(situation.speed_mps.abs()).filter(|now_mps| *now_mps > UNDER_WAY_MPS);
         let known = now_mps.into_iter().chain(self.last_mps);
         let from_mps = known.into_iter().find(|speed_mps| *speed_mps < bound_mps && meets(*speed_mps));
-        Ok(match from_mps {
-            Some(from_mps) => upwards_mps(from_mps, bound_mps, meets),
-            None => downwards_mps(bound_mps, meets),
-        })
+        let fastest_mps = match from_mps {
+            Some(from_mps) => search::upwards_mps(from_mps, bound_mps, meets),
+            None => search::downwards_mps(bound_mps, meets),
+        };
+        Ok([fastest_mps, search::kept_back_mps(fastest_mps, SPEED_MARGIN, meets)])
     }
 
     /// Thinks over what each mode that all heads have would allow, those that turn now started in phase.
-    fn think_over(&mut self, passes: &Passes) {
+    fn think_over(&mut self, passes: &Passes, going: &Going) {
         if let Some(left) = self.until_alternatives.checked_sub(1) {
             self.until_alternatives = left;
             return;
@@ -434,7 +319,7 @@ impl Advisor {
         let names = self.heads.first().map(|head| head.modes.as_slice()).unwrap_or_default();
         let mut alternatives = [None; MAX_MODES];
         for (number, (slot, mode)) in alternatives.iter_mut().zip(names).enumerate() {
-            let Some(v_mps) = self.mode_speed_mps(number, passes.heads()) else { continue };
+            let Some(v_mps) = self.mode_speed_mps(number, passes.heads(), going) else { continue };
             *slot = Some(Alternative { mode: mode.name, v_max_mps: v_mps * (1.0 - SPEED_MARGIN) });
         }
         self.alternatives = alternatives;
@@ -452,7 +337,7 @@ impl Advisor {
     }
 
     /// The largest speed in a mode, zero where none is; `None` when a head doesn't have it.
-    fn mode_speed_mps(&self, number: usize, heads: HeadSet) -> Option<f64> {
+    fn mode_speed_mps(&self, number: usize, heads: HeadSet, going: &Going) -> Option<f64> {
         let name = self.heads.first()?.modes.get(number)?.name;
         let turn = |head: usize| self.heads.get(head)?.mode(name).map(|mode| mode.turn);
         let (mut longest_s, mut ping_period_s) = (0.0_f64, 0.0_f64);
@@ -470,18 +355,23 @@ impl Advisor {
             }
         };
         let passes = passes.ok()?.beside(self.parallax_rad);
-        let going = Going { ping_period_s, ..Going::default() };
+        let going = Going { ping_period_s, ..*going };
         let speed = self.modes.speed_for_target_mps(number, &passes, self.task.target_m, &going);
         Some(speed.unwrap_or(0.0))
     }
 
-    /// What would help: the middle, where the same steps are short enough there, or the mode that is fastest.
-    fn remedy(&self, situation: &Situation, unseen: bool) -> Option<Remedy> {
+    /// What would help: a steady heading, where that alone would; the middle, where the same steps are short enough
+    /// there; or the mode that is fastest.
+    fn remedy(&self, situation: &Situation, passes: &Passes, going: &Going, unseen: bool) -> Option<Remedy> {
+        let target_m = self.task.target_m;
+        let steady = Going { ping_period_s: going.ping_period_s, ..Going::default() };
+        if going.swing_mps > 0.0 && self.now.speed_for_target_mps(0, passes, target_m, &steady).is_ok() {
+            return Some(Remedy::Steady);
+        }
         let stride = situation.heads.iter().flatten().map(|motion| Ring::stride(motion.step_rad, RING)).max();
         let same = |mode: &HeadMode| Some(Ring::stride(mode.turn.step_rad(), RING)) == stride;
         let modes = self.heads.first().map(|head| head.modes.as_slice()).unwrap_or_default();
         let centred_m = modes.iter().position(same).and_then(|mode| self.centred_m.get(mode));
-        let target_m = self.task.target_m;
         if !unseen
             && self.now.largest_step_m(0) >= target_m
             && centred_m.is_some_and(|centred_m| *centred_m < target_m)
@@ -491,76 +381,6 @@ impl Advisor {
         let best = self.alternatives.iter().flatten().max_by(|a, b| a.v_max_mps.total_cmp(&b.v_max_mps));
         best.filter(|best| best.v_max_mps > 0.0).map(|best| Remedy::Mode(best.mode))
     }
-}
-
-impl AdvisedHead {
-    fn is_near(&self, pose: &Pose) -> bool {
-        let Some(cast_at) = &self.cast_at else { return false };
-        let near = |a: &[f64], b: &[f64], by: f64| a.iter().zip(b).all(|(a, b)| (a - b).abs() <= by);
-        let place = |pose: &Pose| [pose.position.y(), pose.position.z()];
-        near(&place(cast_at), &place(pose), STILL_M)
-            && near(&cast_at.attitude.wxyz(), &pose.attitude.wxyz(), STILL_TURN)
-    }
-
-    /// Casts the head's ring anew; a head that can't look from there keeps what it saw last.
-    fn cast(&mut self, profile: &Profile, pose: &Pose) -> Result<(), SamplingError> {
-        self.cast_at = None;
-        let standing = Standing::new(profile, pose, &self.spec.mount)?;
-        self.ring.recast(&standing, 0.0, RING)?;
-        self.cast_at = Some(*pose);
-        Ok(())
-    }
-
-    /// Where on the wall its sector is, and what it doesn't see.
-    fn look(&self, profile: &Profile, pose: &Pose, sound_speed_mps: f64, view: &mut View) {
-        view.hidden.clear();
-        let Ok(standing) = Standing::new(profile, pose, &self.spec.mount) else { return };
-        view.sector = self.sector.and_then(|angles| Arc::of(&standing, &angles).ok());
-        view.hidden.extend(self.hidden.iter().filter_map(|angles| Arc::of(&standing, angles).ok()));
-        view.hide_out_of_reach(&self.ring, self.spec.reach_m(sound_speed_mps));
-    }
-
-    fn mode(&self, name: &str) -> Option<&HeadMode> {
-        self.modes.iter().find(|mode| mode.name == name)
-    }
-}
-
-/// The end of the stretch of speeds about `from_mps`, which meets the target, upwards to `bound_mps`.
-fn upwards_mps(from_mps: f64, bound_mps: f64, meets: impl Fn(f64) -> bool) -> f64 {
-    const STEP: f64 = 1.02;
-    let mut good = from_mps;
-    while good < bound_mps {
-        let next = (good * STEP).min(bound_mps);
-        if !meets(next) {
-            return edge_mps(good, next, meets);
-        }
-        good = next;
-    }
-    good
-}
-
-/// The largest speed up to `bound_mps` that meets the target, as far as trying from above finds it; else zero.
-fn downwards_mps(bound_mps: f64, meets: impl Fn(f64) -> bool) -> f64 {
-    const TRIED: u32 = 256;
-    let at = |k: u32| bound_mps * (1.0 - f64::from(k) / f64::from(TRIED));
-    match (0..TRIED).find(|k| meets(at(*k))) {
-        None => 0.0,
-        Some(0) => bound_mps,
-        Some(first) => edge_mps(at(first), at(first - 1), meets),
-    }
-}
-
-/// Where speeds cease to meet the target, between one that does and one that doesn't.
-fn edge_mps(mut good: f64, mut bad: f64, meets: impl Fn(f64) -> bool) -> f64 {
-    for _ in 0..30 {
-        let middle = f64::midpoint(good, bad);
-        if meets(middle) {
-            good = middle;
-        } else {
-            bad = middle;
-        }
-    }
-    good
 }
 
 #[cfg(test)]

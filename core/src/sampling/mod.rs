@@ -1,7 +1,8 @@
 //! Sampling theory: the spacing of samples on the wall, layouts of several heads, and how fast one may go.
 //!
 //! `section` and `spacing` have the paper's closed forms; `ring` is the general case beside them. `layout` and `schedule`
-//! say what several heads do, `passes` what comes of it. `advice` puts them together for the pilot, `plan` for the engineer.
+//! say what several heads do, `passes` what comes of it, `swing` how
+//! the vehicle's own turning adds to that. `advice` puts them together for the pilot, `plan` for the engineer.
 
 pub mod advice;
 pub mod error;
@@ -19,5 +20,6 @@ pub mod schedule;
 pub mod section;
 pub mod spacing;
 pub mod strips;
+pub mod swing;
 
 pub use error::SamplingError;

@@ -91,6 +91,14 @@ impl Phasing {
         }
     }
 
+    /// How far apart the heads that follow each other over a place meet the wall, along the tunnel, m: zero for those
+    /// that have a sector, or the work, for themselves.
+    pub fn apart_m(&self) -> f64 {
+        let Pattern::Turning(_) = self.pattern else { return 0.0 };
+        let ahead_m = || self.heads.iter().filter_map(|head| self.ahead_m.get(head)).copied();
+        (ahead_m().fold(f64::MIN, f64::max) - ahead_m().fold(f64::MAX, f64::min)).max(0.0)
+    }
+
     /// The passes, were the vehicle to go at `speed_mps`.
     ///
     /// Heads that turn on: head k passes the vertical at the times t_k + i T, and as it sits x_k ahead of the vehicle's

@@ -178,6 +178,7 @@ impl Planner {
                 swing_mps: self.inspection.yaw_rate_radps * stance.farthest_m,
                 shift_m: stance.shift_m,
                 apart_m: stance.apart_m,
+                swing_most_m: None,
             };
             Some(of(stance, &planned.passes.beside(stance.parallax_rad), &going))
         })

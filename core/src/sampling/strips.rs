@@ -125,6 +125,8 @@ pub struct Going {
     pub shift_m: f64,
     /// How far apart heads are along the hull, m: while the vehicle goes so far, the swing goes on.
     pub apart_m: f64,
+    /// The most that the swing comes to however long it goes on, m; `None` where that isn't known.
+    pub swing_most_m: Option<f64>,
 }
 
 /// The strips of a wall, in order of arc length, neighbours seen by different heads; one strip where all see all. With
@@ -387,14 +389,27 @@ impl Limit {
         let over_ground_mps = speed_mps + going.swing_mps;
         let lag_m2ps = going.swing_mps * going.apart_m;
         let lag_m = if lag_m2ps > 0.0 { lag_m2ps / speed_mps } else { 0.0 };
-        let t_x_m = over_ground_mps * self.gap_s + going.shift_m + lag_m;
+        let swung_m = over_ground_mps * self.gap_s + going.shift_m + lag_m;
+        let at_most_m = going.swing_most_m.map(|most_m| speed_mps * self.gap_s + going.shift_m + most_m);
+        let t_x_m = at_most_m.map_or(swung_m, |at_most_m| swung_m.min(at_most_m));
         spacing::t_max_m(t_x_m, over_ground_mps * going.ping_period_s, self.t_y_m)
     }
 
     /// The largest speed that solves T = hypot((v + w) t + shift + w a / v, T_y), t being gap and ping period, w the
-    /// swing, a how far heads are apart.
+    /// swing, a how far heads are apart; or the same with the most that the swing comes to between passes.
     fn speed_mps(&self, target_m: f64, going: &Going) -> Option<f64> {
         let along_m = spacing::along_m(target_m, self.t_y_m)?;
+        let bounded = going.swing_most_m.and_then(|most_m| self.bounded_mps(along_m, most_m, going));
+        self.swung_mps(along_m, going).into_iter().chain(bounded).max_by(f64::total_cmp)
+    }
+
+    fn bounded_mps(&self, along_m: f64, most_m: f64, going: &Going) -> Option<f64> {
+        let time_s = self.gap_s + going.ping_period_s;
+        let for_speed_m = along_m - going.shift_m - most_m - going.swing_mps * going.ping_period_s;
+        (time_s > 0.0 && for_speed_m > 0.0).then(|| for_speed_m / time_s)
+    }
+
+    fn swung_mps(&self, along_m: f64, going: &Going) -> Option<f64> {
         let time_s = self.gap_s + going.ping_period_s;
         let for_speed_m = along_m - going.shift_m - going.swing_mps * time_s;
         let rest = for_speed_m * for_speed_m - 4.0 * time_s * going.swing_mps * going.apart_m;

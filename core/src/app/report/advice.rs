@@ -20,13 +20,15 @@ pub struct AdviceReport {
     pub reason: &'static str,
     /// T predicted at the present speed, m.
     pub predicted_t_m: Option<f64>,
+    /// At the present speed the present turn will exceed the target.
+    pub will_exceed: bool,
     /// By how much the head farthest out of its phase is, degrees of its turn.
     pub phase_error_deg: Option<f64>,
     /// Hours at `v_max_mps` for what is left of the tunnel.
     pub needed_h: Option<f64>,
     /// Whether the time that is left is enough.
     pub suffices: Option<bool>,
-    /// What would help where slower doesn't: `centre`, or a mode.
+    /// What would help where slower doesn't: `centre`, `steady`, or a mode.
     pub remedy: Option<&'static str>,
     /// What the heads could do in each of their modes.
     pub alternatives: Vec<AlternativeReport>,
@@ -54,6 +56,7 @@ pub(super) fn advice_report(entry: &AdviceEntry) -> AdviceReport {
         v_max_mps: entry.advice.v_max_mps,
         reason: entry.advice.reason.as_str(),
         predicted_t_m: entry.advice.predicted_t_m,
+        will_exceed: entry.advice.will_exceed,
         phase_error_deg: entry.advice.phase_error_rad.map(f64::to_degrees),
         needed_h: left.hours_at(entry.advice.v_max_mps),
         suffices: left.suffices_at(entry.advice.v_max_mps),

@@ -3,14 +3,42 @@
 use bevy_ecs::prelude::{Res, ResMut, Resource};
 
 use crate::app::flow::{AdviceEntry, AdviceLog, Digests, Notice, Notices, Placed, PlacedList, Tally};
-use crate::sampling::advice;
-use crate::time::DurNs;
+use crate::frames::Vec3;
+use crate::sampling::advice::{self, Advice, Steady};
+use crate::sampling::passes::{Phasing, Situation};
+use crate::sampling::swing::{Looks, Swing};
+use crate::time::{DurNs, MonoNs};
 
 /// What gives the advice, and how long the dive may take from its first packet.
 #[derive(Debug, Clone, Resource)]
 pub(in crate::app) struct Advisor {
     pub(in crate::app) advisor: advice::Advisor,
     pub(in crate::app) dive_time: Option<DurNs>,
+    looks: Looks,
+    steady: Steady,
+}
+
+impl Advisor {
+    /// Allocates: all that it will ever use.
+    pub(in crate::app) fn new(advisor: advice::Advisor, target_m: f64, dive_time: Option<DurNs>) -> Self {
+        Self { advisor, dive_time, looks: Looks::default(), steady: Steady::new(target_m) }
+    }
+
+    /// What to show at a beat, `begun` being when the first packet came.
+    fn advise(&mut self, at: MonoNs, situation: &Situation, begun: Option<MonoNs>) -> Advice {
+        let left = self.dive_time.zip(begun).map(|(time, begun)| (time - at.since(begun)).as_secs_f64());
+        let advice = self.advisor.advise(situation, swing(&mut self.looks, at, situation), left);
+        self.steady.show(at, advice)
+    }
+}
+
+/// How the vehicle swings between two passes.
+fn swing(looks: &mut Looks, at: MonoNs, situation: &Situation) -> Swing {
+    if let Some(pose) = situation.pose {
+        looks.keep(at, pose.attitude * Vec3::new(1.0, 0.0, 0.0));
+    }
+    let passes = Phasing::of(situation).at(situation.speed_mps);
+    looks.swing(at, passes.gap_s(passes.heads()).unwrap_or(0.0))
 }
 
 pub(super) fn advise(
@@ -21,13 +49,12 @@ pub(super) fn advise(
     mut notices: ResMut<'_, Notices>,
     mut digests: ResMut<'_, Digests>,
 ) {
-    let Advisor { advisor, dive_time } = &mut *advisor;
     for item in &placed.0 {
         let Placed::Situation(at, situation) = item else { continue };
         let begun = tally.span.map(|(first, _)| first);
-        let left = dive_time.zip(begun).map(|(time, begun)| (time - at.since(begun)).as_secs_f64());
-        let advice = advisor.advise(situation, left);
-        digests.advice.integer(at.0).number(advice.v_max_mps).integer(advice.reason as u64);
+        let advice = advisor.advise(*at, situation, begun);
+        let digest = digests.advice.integer(at.0).number(advice.v_max_mps);
+        digest.integer(advice.reason as u64).integer(u64::from(advice.will_exceed));
         for other in advice.alternatives.iter().flatten() {
             digests.advice.number(other.v_max_mps);
         }

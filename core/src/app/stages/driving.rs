@@ -2,15 +2,13 @@
 
 use bevy_ecs::prelude::Resource;
 
-use crate::frames::{Tunnel, Vec3};
+use crate::frames::Vec3;
 use crate::sampling::advice::Advisor;
 use crate::sampling::head::HeadMotion;
 use crate::sampling::passes::{Phasing, Situation};
+use crate::sampling::swing::Looks;
 use crate::time::{DurNs, MonoNs};
 use crate::tunnel::Profile;
-
-/// Beats that are remembered: over a turn of a head in its slowest mode (28 s) at five a second.
-const BEATS: usize = 256;
 
 /// The longest time between neighbouring passes that is looked back over, seconds.
 const LONGEST_S: f64 = 50.0;
@@ -35,28 +33,14 @@ pub(super) struct Driven {
 }
 
 /// The last beat, and which way the vehicle looked at those before.
-#[derive(Debug, Clone, Resource)]
+#[derive(Debug, Clone, Default, Resource)]
 pub(in crate::app) struct Driving {
     pub(super) now: Driven,
     /// The step for which `middle_t_y_m` was looked up, radians.
     step_rad: f64,
     /// The last beat at which a head turned.
     turned: Option<MonoNs>,
-    looks: Vec<(MonoNs, Vec3<Tunnel>)>,
-    count: usize,
-}
-
-impl Default for Driving {
-    /// Allocates: all that it will ever use.
-    fn default() -> Self {
-        Self {
-            now: Driven::default(),
-            step_rad: 0.0,
-            turned: None,
-            looks: Vec::with_capacity(BEATS),
-            count: 0,
-        }
-    }
+    looks: Looks,
 }
 
 impl Driving {
@@ -75,12 +59,12 @@ impl Driving {
             return;
         };
         let look = pose.attitude * Vec3::new(1.0, 0.0, 0.0);
-        self.keep(at, look);
         // Neighbouring passes may be those of heads apart along the hull.
         let apart_s = apart_m(situation) / situation.speed_mps.abs().max(SLOW_MPS);
         let since = at - DurNs::from_secs_f64((self.now.gap_s + apart_s).min(LONGEST_S));
-        let turned = self.looks_since(since).map(|then| (look + -then).norm()).fold(0.0, f64::max);
-        self.now.swing_m = turned * profile.farthest_m([pose.position.y(), pose.position.z()]);
+        let turned_rad = self.looks.turned_since(look, since);
+        self.now.swing_m = turned_rad * profile.farthest_m([pose.position.y(), pose.position.z()]);
+        self.looks.keep(at, look);
     }
 
     fn note_gaps(&mut self, at: MonoNs, situation: &Situation) {
@@ -105,20 +89,6 @@ impl Driving {
             ping_period_s: periods.fold(0.0, f64::max),
             ..self.now
         };
-    }
-
-    fn keep(&mut self, at: MonoNs, look: Vec3<Tunnel>) {
-        if self.looks.len() < BEATS {
-            self.looks.push((at, look));
-        } else if let Some(slot) = self.looks.get_mut(self.count % BEATS) {
-            *slot = (at, look);
-        }
-        self.count += 1;
-    }
-
-    /// Which way the vehicle looked at each beat since a time.
-    fn looks_since(&self, since: MonoNs) -> impl Iterator<Item = Vec3<Tunnel>> {
-        self.looks.iter().filter(move |(then, _)| *then >= since).map(|(_, look)| *look)
     }
 }
 

@@ -68,7 +68,7 @@ impl Case {
     }
 
     fn advice(&self) -> Advice {
-        self.advisor().advise(&self.situation, self.left_s)
+        self.advisor().advise(&self.situation, Swing::default(), self.left_s)
     }
 }
 
@@ -149,7 +149,7 @@ fn at_rest_the_way_out_stays_the_way_out() {
     for (speed_mps, expected_m) in [(0.2, 900.0), (-1e-3, 900.0), (-0.1, 100.0), (1e-3, 100.0), (0.1, 900.0)]
     {
         then.speed_mps = speed_mps;
-        let left_m = advisor.advise(&then, None).left.length_m;
+        let left_m = advisor.advise(&then, Swing::default(), None).left.length_m;
         assert!((left_m - expected_m).abs() < 1e-9, "{speed_mps}");
     }
 }
@@ -225,7 +225,7 @@ fn heads_that_hide_the_wall_from_each_other_slow_the_vehicle_down() {
     }
     case.situation.speed_mps = 0.125;
     let mut advisor = case.advisor();
-    let hidden = advisor.advise(&case.situation, None);
+    let hidden = advisor.advise(&case.situation, Swing::default(), None);
     assert!((hidden.pass_gap_s - 2.0).abs() < 0.15, "{hidden:?}");
     // Both heads on one side look at the other wall past a neighbour: half of the passes are missing there.
     let parallax_s = advisor.parallax_rad / TAU * 8.0;
@@ -243,15 +243,51 @@ fn old_rings_are_cast_one_a_call_and_the_same_in_the_end() {
         spec.mount.position = Vec3::new(0.0, y_m, 0.0);
     }
     let mut advisor = case.advisor();
-    advisor.advise(&case.situation, None);
+    advisor.advise(&case.situation, Swing::default(), None);
     let pose = case.situation.pose.unwrap();
     assert!(advisor.heads.iter().all(|head| head.is_near(&pose)), "at first all are cast");
     let moved = Pose { position: Point3::new(100.0, 1.0, pose.position.z()), ..pose };
     let then = Situation { pose: Some(moved), ..case.situation };
     for cast in 1..=3 {
-        advisor.advise(&then, None);
+        advisor.advise(&then, Swing::default(), None);
         assert_eq!(advisor.heads.iter().filter(|head| head.is_near(&moved)).count(), cast);
     }
-    let fresh = case.advisor().advise(&then, None).t_y_m;
-    assert!((advisor.advise(&then, None).t_y_m - fresh).abs() < 1e-12);
+    let fresh = case.advisor().advise(&then, Swing::default(), None).t_y_m;
+    assert!((advisor.advise(&then, Swing::default(), None).t_y_m - fresh).abs() < 1e-12);
+}
+
+#[test]
+fn the_swing_of_the_vehicle_slows_it_down_and_a_steady_heading_helps() {
+    let case = Case::new(&[0.0, 180.0], &[0.0, 0.0], 0.2, 1.0);
+    let advise = |swing: Swing| case.advisor().advise(&case.situation, swing, None);
+    let still = advise(Swing::default());
+    let swing = Swing { rate_radps: 0.01, most_rad: 1.0 };
+    let swung = advise(swing);
+    // What the beams sweep comes off the speed, as far as they reach.
+    let lost_mps = (still.v_max_mps - swung.v_max_mps) / (1.0 - SPEED_MARGIN);
+    assert!((0.05..0.07).contains(&lost_mps), "{lost_mps}");
+    assert!(swung.predicted_t_m > still.predicted_t_m && swung.reason == Reason::HelixPitch);
+    assert!(swung.alternatives[1].unwrap().v_max_mps < still.alternatives[1].unwrap().v_max_mps);
+    // To and fro by little, it costs no more than that, however fast.
+    let little = advise(Swing { rate_radps: 0.05, most_rad: 0.01 });
+    assert!(little.v_max_mps > swung.v_max_mps, "{little:?}");
+    let wild = advise(Swing { rate_radps: 0.2, most_rad: 1.0 });
+    assert_eq!((wild.v_max_mps, wild.reason), (0.0, Reason::AngularStep));
+    assert_eq!(wild.remedy, Some(Remedy::Steady));
+    assert!(wild.will_exceed && !still.will_exceed);
+}
+
+#[test]
+fn a_swing_goes_on_while_heads_apart_follow_each_other() {
+    let together = Case::new(&[0.0, 180.0], &[0.0, 0.0], 0.2, 1.5);
+    let apart = Case::new(&[0.0, 0.0], &[0.8, 0.0], 0.2, 1.5);
+    let swing = Swing { rate_radps: 0.01, most_rad: 1.0 };
+    let t_m = |case: &Case| {
+        let advice = case.advisor().advise(&case.situation, swing, None);
+        assert!((advice.pass_gap_s - 4.0).abs() < 1e-9, "{advice:?}");
+        advice.predicted_t_m.unwrap()
+    };
+    // 0.8 m at 0.2 m/s take as long as from pass to pass.
+    let swept_m = 0.01 * 4.0 * 6.05;
+    assert!((t_m(&apart) - t_m(&together) - swept_m).abs() < 0.02, "{} {}", t_m(&apart), t_m(&together));
 }

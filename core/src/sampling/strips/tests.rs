@@ -5,7 +5,8 @@ use crate::tunnel::{Profile, named};
 const SOUNDINGS: u32 = 3600;
 const STEP: usize = 24;
 const PING_S: f64 = 0.02;
-const GOING: Going = Going { ping_period_s: PING_S, swing_mps: 0.0, shift_m: 0.0, apart_m: 0.0 };
+const GOING: Going =
+    Going { ping_period_s: PING_S, swing_mps: 0.0, shift_m: 0.0, apart_m: 0.0, swing_most_m: None };
 
 /// A pipe of 30 m around, on whose axis every step is as long as the other.
 fn pipe() -> Profile {
@@ -144,6 +145,11 @@ fn what_swings_or_is_shifted_makes_passes_farther_apart() {
     assert!(v < speed(&one, &turning(1), 0.5).unwrap() - 0.01);
     let worse = Going { swing_mps: 0.1, ..rough };
     assert!(one.speed_for_target_mps(0, &turning(1), 0.5, &worse).is_err());
+    // A swing that comes to an end leaves room for speed.
+    let to_and_fro = Going { swing_most_m: Some(0.1), ..worse };
+    let v = one.speed_for_target_mps(0, &turning(1), 0.5, &to_and_fro).unwrap();
+    assert!((one.t_max_m(0, &turning(1), v, &to_and_fro) - 0.5).abs() < 1e-12);
+    assert!(v > 0.02 && one.t_max_m(0, &turning(1), 1.02 * v, &to_and_fro) > 0.5);
 }
 
 #[test]
