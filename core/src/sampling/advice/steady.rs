@@ -8,9 +8,9 @@ use crate::time::{DurNs, MonoNs};
 const HOLD: DurNs = DurNs(1_000_000_000);
 /// Pieces of advice remembered: those of that time, at five a second.
 const HELD: usize = 6;
-/// A turn that was to exceed the target no longer is when T is predicted below it by this share: half of what a speed is
-/// told with, so that following the advice to its margin clears it.
-const CLEAR_BELOW: f64 = SPEED_MARGIN / 2.0;
+/// A turn is forecast to exceed the target when T is predicted above it by this share: half of what is kept back for the
+/// error of the speed, so that a vehicle at the advised speed isn't told to and fro.
+const BEYOND: f64 = SPEED_MARGIN / 2.0;
 
 /// Shows of the advice of the last second what restricts most: the gravest reason, and of helix pitches the least speed.
 ///
@@ -47,7 +47,7 @@ impl Steady {
             let recent = self.held.iter().flatten().filter(|(then, _)| at.since(*then).0.abs() <= HOLD.0);
             recent.map(|(_, held)| held)
         };
-        let limit_m = self.target_m * if self.will_exceed { 1.0 - CLEAR_BELOW } else { 1.0 };
+        let limit_m = self.target_m * if self.will_exceed { 1.0 } else { 1.0 + BEYOND };
         let will_exceed = held().any(|held| exceeds(held, limit_m));
         let worst =
             held().fold(&advice, |worst, held| if restricts_more(held, worst) { held } else { worst });
@@ -143,14 +143,14 @@ mod tests {
     }
 
     #[test]
-    fn what_is_exceeded_is_said_at_once_and_taken_back_when_it_is_over() {
+    fn what_is_exceeded_is_said_at_once_and_taken_back_once_the_target_is_met() {
         let at = |t_m: f64| advice(Reason::HelixPitch, 0.2, t_m);
         let given = [
-            vec![at(0.4999); 3],
-            vec![at(0.5001)],
-            // Not yet well below.
-            vec![at(0.4985); 10],
-            vec![at(0.49); 8],
+            // Above the target by less than the speed is known.
+            vec![at(0.502); 3],
+            vec![at(0.503)],
+            vec![at(0.5005); 10],
+            vec![at(0.4995); 8],
             vec![at(f64::INFINITY)],
         ];
         let exceed: Vec<_> = shown(given.concat()).iter().map(|advice| advice.will_exceed).collect();

@@ -1,0 +1,87 @@
+//! Dives whose advice is read beat by beat, as a pilot sees it, and followed.
+
+#![allow(dead_code, reason = "each takes what it needs")]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
+
+use headrace_core::app::App;
+use headrace_core::app::device::Direction;
+use headrace_core::app::flow::{AdviceEntry, Notice, Notices};
+use headrace_core::app::reading::SourceId;
+use headrace_core::app::report::Report;
+use headrace_core::app::ring::{Port, RingError};
+use headrace_core::time::DurNs;
+use headrace_replay::drive::{Coming, Feed, Pace, drive};
+use headrace_replay::log::LogError;
+use headrace_replay::simulate::{Scene, Simulation};
+
+/// A simulated dive one of whose sources may be dumb.
+struct Partly {
+    simulation: Simulation,
+    dumb: Option<usize>,
+}
+
+impl Feed for Partly {
+    fn coming(&mut self) -> Result<Option<Coming>, LogError> {
+        while let Some(message) = self.simulation.peek_message() {
+            let dumb = self.dumb == Some(usize::from(message.source));
+            if message.direction == Direction::Received && !dumb {
+                let source = SourceId(message.source);
+                return Ok(Some(Coming { at: message.at, source, len: message.bytes.len() }));
+            }
+            self.simulation.next_message();
+        }
+        Ok(None)
+    }
+
+    fn send(&mut self, port: &mut Port) -> Result<(), RingError> {
+        if let Some(message) = self.simulation.peek_message() {
+            port.send(message.at, message.bytes)?;
+            self.simulation.next_message();
+        }
+        Ok(())
+    }
+}
+
+/// What was advised at each beat, and what came of the dive.
+pub(crate) struct Advised {
+    pub(crate) beats: Vec<AdviceEntry>,
+    pub(crate) report: Report,
+    pub(crate) digest: u64,
+}
+
+/// Dives a scene in ticks of a length; the source of this id says nothing.
+pub(crate) fn dive(scene: &Scene, dumb: Option<&str>, tick: DurNs) -> Advised {
+    let vehicle = &scene.vehicle;
+    let mut app = App::new(vehicle.mission());
+    for sensor in &vehicle.sensors {
+        app.add_plugin(sensor.as_ref()).unwrap();
+    }
+    let mut dive = app.arm(vehicle.navigation()).unwrap();
+    let dumb = dumb.map(|id| dive.sources().iter().position(|source| source.id == id).unwrap());
+    let mut feed = Partly { simulation: Simulation::new(scene).unwrap_or_else(|why| panic!("{why}")), dumb };
+    let mut beats = Vec::new();
+    let mut note = |dive: &headrace_core::app::run::Loop| {
+        for notice in &dive.world().resource::<Notices>().0 {
+            if let Notice::Advice(entry) = notice {
+                beats.push(*entry);
+            }
+        }
+    };
+    drive(&mut dive, &mut feed, Pace { tick, ..Pace::default() }, &mut note).unwrap();
+    dive.finish();
+    Advised { beats, report: Report::of(&dive), digest: dive.digest() }
+}
+
+impl Advised {
+    /// The beats of the second half of the dive.
+    pub(crate) fn settled(&self) -> &[AdviceEntry] {
+        &self.beats[self.beats.len() / 2..]
+    }
+
+    /// The median of a figure over the second half of the dive.
+    pub(crate) fn median(&self, of: impl Fn(&AdviceEntry) -> f64) -> f64 {
+        let mut values: Vec<f64> = self.settled().iter().map(of).collect();
+        values.sort_by(f64::total_cmp);
+        values[values.len() / 2]
+    }
+}
