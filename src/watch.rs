@@ -7,7 +7,7 @@ use headrace_core::app::Mission;
 use headrace_core::app::alerts::{Alert, AlertKind, Alerts};
 use headrace_core::app::flow::{AdviceEntry, Coverage, Notice};
 use headrace_core::app::run::Loop;
-use headrace_core::coverage::{Action, Cause, Evidence, Run, RunChange, RunId, Section, Sections};
+use headrace_core::coverage::{Action, Cause, Evidence, Run, RunChange, RunId, Section, Sections, Verdict};
 use headrace_core::sampling::advice::{Reason, Remedy};
 use headrace_core::time::{DurNs, MonoNs};
 use headrace_core::tunnel::Profile;
@@ -102,9 +102,11 @@ impl Watch {
 
     /// A section that doesn't fail, next to the run said last, is its end.
     fn section(&mut self, section: i64, sections: &Sections) {
-        let fails = sections.get(section).is_some_and(Section::is_flagged);
+        // What is open may yet become part of it.
+        let other = |section: &Section| !section.is_flagged() && section.verdict != Verdict::Open;
+        let ends = sections.get(section).is_some_and(other);
         let run = self.run.and_then(|id| sections.runs().get(id));
-        if !fails && run.is_some_and(|run| section == run.to || section == run.from - 1) {
+        if ends && run.is_some_and(|run| section == run.to || section == run.from - 1) {
             self.close_run(sections);
         }
     }

@@ -2,6 +2,7 @@
 
 use super::hole::Hole;
 use crate::frames::Vec3;
+use crate::fusion::Fix;
 use crate::fusion::relative::Relative;
 use crate::math;
 use crate::tunnel::Profile;
@@ -129,6 +130,11 @@ pub struct Doubt {
 }
 
 impl Doubt {
+    /// Of a fix.
+    pub fn of(fix: &Fix) -> Self {
+        Self { relative: fix.relative, from_m: [fix.pose.position.y(), fix.pose.position.z()] }
+    }
+
     /// Keeps the larger of the two.
     pub fn add(&mut self, other: &Self) {
         if other.relative.sigma_m(Vec3::zero()) >= self.relative.sigma_m(Vec3::zero()) {

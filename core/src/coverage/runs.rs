@@ -235,7 +235,7 @@ impl Runs {
         let failed = u32::try_from(members().count()).unwrap_or(u32::MAX);
         let holes = members().filter_map(|index| Some((index, (telling.hole)(index)?)));
         let worst = holes.reduce(larger).unwrap_or(run.worst);
-        let ends = members().next().zip(members().last());
+        let ends = members().next().zip(members().next_back());
         let (from, to) = ends.map_or((run.from, run.to), |(first, last)| (first, last + 1));
         let cleared = (failed == 0).then_some(telling.at);
         if let Some(run) = self.runs.get_mut(id.0 as usize) {

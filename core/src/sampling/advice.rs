@@ -197,7 +197,11 @@ impl Advisor {
             apart_m: phasing.apart_m(),
             swing_most_m: Some(swing.most_rad * self.farthest_m),
         };
-        let fastest = self.fastest_mps(situation, &passes, &going);
+        // What is just within the target, but not surely, can't pass; where no speed leaves such room, the target alone counts.
+        let sure_m = self.task.target_m - margin_m(situation.doubt_m, self.task.target_m);
+        let fastest = self
+            .fastest_mps(situation, &passes, &going, sure_m)
+            .or_else(|_| self.fastest_mps(situation, &passes, &going, self.task.target_m));
         let advised_mps = fastest.ok().map(|[_, advised_mps]| advised_mps).filter(|mps| *mps > 0.0);
         self.last_mps = fastest.ok().map(|[fastest_mps, _]| fastest_mps).filter(|mps| *mps > 0.0);
         let predicted_t_m = self.now.t_max_m(0, &passes, situation.speed_mps.abs(), &going);
@@ -277,7 +281,7 @@ impl Advisor {
         self.now.measure(1, rings, |_, head| self.strides.get(head).copied().flatten());
     }
 
-    /// The largest speed at which the phases measured now meet the target, and what to advise of it.
+    /// The largest speed at which the phases measured now meet a target, and what to advise of it.
     ///
     /// Errors: no speed would.
     fn fastest_mps(
@@ -285,8 +289,8 @@ impl Advisor {
         situation: &Situation,
         passes: &Passes,
         going: &Going,
+        target_m: f64,
     ) -> Result<[f64; 2], SamplingError> {
-        let target_m = self.task.target_m;
         // However the heads were phased, no speed beyond this one would do.
         let bound_mps = target_m / (passes.even_gap_s() + going.ping_period_s);
         self.now.speed_for_target_mps(0, passes, target_m, going)?;
@@ -381,6 +385,14 @@ impl Advisor {
         let best = self.alternatives.iter().flatten().max_by(|a, b| a.v_max_mps.total_cmp(&b.v_max_mps));
         best.filter(|best| best.v_max_mps > 0.0).map(|best| Remedy::Mode(best.mode))
     }
+}
+
+/// What of the target is left to errors of position, m: two standard deviations, as a verdict of pass wants, in steps that
+/// don't change from beat to beat; a fifth of the target at most, since no speed makes up for a lost position.
+fn margin_m(doubt_m: f64, target_m: f64) -> f64 {
+    const STEP_M: f64 = 0.005;
+    let doubt_m = math::round_to_i64(doubt_m / STEP_M) as f64 * STEP_M;
+    (2.0 * doubt_m).min(target_m / 5.0)
 }
 
 #[cfg(test)]

@@ -22,6 +22,8 @@ pub struct Situation {
     pub pose: Option<Pose>,
     /// Speed along the tunnel, m/s; below zero on the way back.
     pub speed_mps: f64,
+    /// Standard deviation of the distance between two passes, at most round the wall, m.
+    pub doubt_m: f64,
     /// How the heads share the work, as the vehicle file says.
     pub layout: HeadLayout,
     /// How many heads the vehicle has.
@@ -305,7 +307,14 @@ mod tests {
             });
         }
         let configured = angles_deg.len();
-        Situation { pose: None, speed_mps: 0.2, layout: HeadLayout::PhaseShift, configured, heads }
+        Situation {
+            pose: None,
+            speed_mps: 0.2,
+            doubt_m: 0.0,
+            layout: HeadLayout::PhaseShift,
+            configured,
+            heads,
+        }
     }
 
     fn passes(angles_deg: &[f64], x_m: &[f64]) -> Passes {

@@ -136,8 +136,7 @@ fn note_passage(coverage: &mut Coverage, sweeps: &mut HeadSweeps, driven: &Drive
     passage.ping_period_sum_s += driven.ping_period_s;
     passage.swing_sum_m += driven.swing_m;
     passage.middle_t_y_m = passage.middle_t_y_m.max(driven.middle_t_y_m);
-    let from_m = [fix.pose.position.y(), fix.pose.position.z()];
-    passage.doubt.add(&Doubt { relative: fix.relative, from_m });
+    passage.doubt.add(&Doubt::of(&fix));
 }
 
 /// Sections that a head went through while nobody knew where.

@@ -8,7 +8,7 @@ use crate::app::flow::{
 };
 use crate::app::head::HeadTrack;
 use crate::app::reading::{Reading, SonarReturn};
-use crate::coverage::{Loss, Reach};
+use crate::coverage::{Doubt, Loss, Reach};
 use crate::frames::{Mount, Pose, Vec3, head_direction};
 use crate::fusion::{Fix, NoFix};
 use crate::math;
@@ -16,6 +16,7 @@ use crate::sampling::head::{HeadMotion, MAX_HEADS};
 use crate::sampling::layout::HeadLayout;
 use crate::sampling::passes::Situation;
 use crate::time::{DurNs, MonoNs};
+use crate::tunnel::Profile;
 
 /// A head whose last return is older than this isn't turning.
 const SILENT: DurNs = DurNs(2_000_000_000);
@@ -36,7 +37,8 @@ pub(super) fn place(
     for item in &positioned.0 {
         match *item {
             Positioned::Beat { at, fix } => {
-                let situation = situation(at, fix, context.layout, &heads, &sensors, &tracks);
+                let situation =
+                    situation(at, fix, &context.profile, context.layout, &heads, &sensors, &tracks);
                 placed.0.push(Placed::Situation(at, situation));
             }
             Positioned::Ping { event, fix } => {
@@ -129,6 +131,7 @@ fn reach(pose: &Pose, mount: &Mount, context: &Place) -> Reach {
 fn situation(
     at: MonoNs,
     fix: Result<Fix, NoFix>,
+    profile: &Profile,
     layout: HeadLayout,
     heads: &HeadTable,
     sensors: &SensorTable,
@@ -153,6 +156,7 @@ fn situation(
     Situation {
         pose: fix.ok().map(|fix| fix.pose),
         speed_mps: fix.map_or(0.0, |fix| fix.speed_mps),
+        doubt_m: fix.map_or(0.0, |fix| Doubt::of(&fix).worst_m(profile)),
         layout,
         configured: heads.0.iter().flatten().count(),
         heads: motions,

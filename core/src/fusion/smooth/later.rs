@@ -95,7 +95,7 @@ impl Later {
 impl Moment {
     /// As if what is known went on growing as evenly.
     fn answer(&self) -> Answer {
-        if self.gap.0 >= UNTIED.0 {
+        if self.gap == UNTIED {
             return (self.number, Relative::along(UNTIED_M));
         }
         let share = if self.age_s > 0.0 { self.gap.as_secs_f64() / self.age_s } else { 0.0 };

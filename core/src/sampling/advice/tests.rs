@@ -48,6 +48,7 @@ impl Case {
         let pose = Pose { position: Point3::new(100.0, y, z), attitude: Rot::identity() };
         let situation = Situation {
             pose: Some(pose),
+            doubt_m: 0.0,
             speed_mps,
             layout: HeadLayout::PhaseShift,
             configured: specs.len(),
