@@ -125,7 +125,7 @@ fn val_verdicts_follow_from_hole_sigma_and_target() {
             (2.0 * largest.radius_m, dive.report.target_m, 2.0 * section.hole_sigma_m);
         // What going on forward could still fill is open.
         let rear_m = reached(dive).last()?.rear_m;
-        let radius_m = (target_m + twice_m) / 2.0;
+        let radius_m = f64::midpoint(target_m, twice_m);
         let first_m = first_failing_m(wall, [section.start_m, section.end_m], radius_m);
         // Where the first such circle is, is known to a twentieth of the section; the program goes by the largest deviation
         // round the wall, and by the farthest wall for the reach of a tilted head.
