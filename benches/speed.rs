@@ -22,7 +22,9 @@ use headrace_core::app::run::Loop;
 use headrace_core::app::{App, Mission, SourceSpec};
 use headrace_core::codec::CodecCounts;
 use headrace_core::coverage::hole::FARTHEST_M;
-use headrace_core::coverage::{HoleFinder, SampleStore, Sections, StoreLayout, WallSample};
+use headrace_core::coverage::{
+    GridLayout, HoleFinder, SampleStore, Sections, Soundings, StoreLayout, WallSample,
+};
 use headrace_core::math;
 use headrace_core::time::{DurNs, MonoNs};
 use headrace_core::tunnel::named;
@@ -239,6 +241,12 @@ fn cover(samples: &[(f64, f64, usize)], length_m: f64) -> Coverage {
         store: store(length_m, samples.len()),
         sections: Sections::new(0.25, 0.5, -1.0, length_m + 1.0),
         frontier: headrace_core::coverage::Frontier::default(),
+        soundings: Soundings::new(GridLayout {
+            perimeter_m: named::ceran().unwrap().perimeter_m(),
+            from_m: 0.0,
+            to_m: length_m,
+            node_m: 0.5,
+        }),
     };
     let mut last = [None; 8];
     for (x_m, sigma_m, head) in samples {
@@ -249,6 +257,7 @@ fn cover(samples: &[(f64, f64, usize)], length_m: f64) -> Coverage {
         last[*head] = Some((*x_m, *sigma_m));
         let sample = WallSample { x_m: *x_m, sigma_m: *sigma_m, head: *head, step_m };
         coverage.store.insert(sample).unwrap();
+        coverage.soundings.add(*x_m, *sigma_m);
         coverage.sections.touch(*x_m);
     }
     coverage

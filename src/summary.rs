@@ -1,6 +1,6 @@
 //! The end of a dive in words.
 
-use headrace_core::app::report::{Report, SectionReport};
+use headrace_core::app::report::{Report, ReturnReport, RunReport};
 use headrace_core::app::smoothing::{ChangeReport, JudgedReport, SmoothingReport};
 
 use crate::station::station;
@@ -30,7 +30,7 @@ pub(crate) fn summary(report: &Report) -> String {
             "  passed {:.2} m   failed {:.2} m   can't say {:.2} m   open {:.2} m",
             sum.pass_m, sum.fail_m, sum.cannot_say_m, sum.open_m
         ));
-        for run in runs(&report.sections) {
+        for run in missed(report) {
             line(run);
         }
         for other in &report.what_if {
@@ -74,25 +74,41 @@ pub(crate) fn summary(report: &Report) -> String {
     text
 }
 
-/// Neighbouring failed sections with one cause, a line each.
-fn runs(sections: &[SectionReport]) -> Vec<String> {
-    let mut lines = Vec::new();
-    let mut rest = sections;
-    while let Some(first) = rest.first() {
-        let same = |s: &&SectionReport| cause(s) == cause(first);
-        let len = rest.iter().take_while(same).count();
-        let (run, after) = rest.split_at(len);
-        rest = after;
-        let Some(cause) = cause(first) else { continue };
-        let worst = run.iter().filter_map(|s| s.hole_m).fold(0.0, f64::max);
-        let end_m = run.last().map_or(first.end_m, |last| last.end_m);
-        lines.push(format!(
-            "  missed ch {} to {}: {cause}, holes up to {worst:.2} m",
-            station(first.start_m),
-            station(end_m)
-        ));
+/// What is still missed, a line each, with what to do about it on the way home.
+fn missed(report: &Report) -> Vec<String> {
+    let open = report.runs.iter().filter(|run| run.cleared_s.is_none());
+    let mut open: Vec<_> = open.collect();
+    open.sort_by(|a, b| a.start_m.total_cmp(&b.start_m));
+    let line = |run: &&RunReport| {
+        let back = report.way_home.iter().find(|back| back.run == run.id);
+        format!(
+            "  missed ch {} to {}: {}, holes up to {:.2} m{}",
+            station(run.start_m),
+            station(run.end_m),
+            run.cause,
+            run.hole_m,
+            back.map_or_else(String::new, what_to_do)
+        )
+    };
+    open.iter().map(line).collect()
+}
+
+fn what_to_do(back: &ReturnReport) -> String {
+    let how = match back.action {
+        "slower" => "",
+        "finer_mode" => "in a finer mode, ",
+        "longer_range" => "with a longer range, ",
+        "other_side" => "turned or rolled, ",
+        "middle" => "in the middle and steady, ",
+        "in_phase" => "heads in phase, ",
+        "head" => "with that head mended or without it, ",
+        "position" => "with a position, ",
+        _ => "from end to end, ",
+    };
+    match back.at_most_mps {
+        at_most_mps if at_most_mps > 0.0 => format!("; again {how}at most {at_most_mps:.2} m/s"),
+        _ => format!("; again {how}at another speed, mode or target"),
     }
-    lines
 }
 
 /// What smoothing changed: metres by verdict, and a line for each run of neighbouring sections with the same change.
@@ -147,8 +163,4 @@ fn holes(run: impl Iterator<Item = JudgedReport>) -> String {
     let measured = run.filter_map(|judged| Some((judged.hole_m?, judged.hole_sigma_m)));
     let largest = measured.max_by(|a, b| a.0.total_cmp(&b.0));
     largest.map_or_else(|| "-".to_owned(), |(hole_m, sigma_m)| format!("{hole_m:.3}±{sigma_m:.3}"))
-}
-
-fn cause(section: &SectionReport) -> Option<&'static str> {
-    section.cause.map(|evidence| evidence.cause)
 }

@@ -289,13 +289,14 @@ fn where_slower_does_not_help_it_says_so() {
 }
 
 #[test]
-fn the_wandering_of_a_filter_with_clean_sensors_does_not_lower_it() {
+fn a_filter_lowers_it_by_what_it_leaves_unsure_and_no_more() {
     for case in [Case { mode: "slow", target_m: 5.0, ..VITA1 }, TWO, Case { target_m: 0.9, ..FOUR }] {
         let direct_mps = case.dive(0.15, 0.15).median(v_max_mps);
         let filtered = Case { filter: true, ..case }.dive(0.15, 0.15);
         let off = filtered.median(v_max_mps) / direct_mps - 1.0;
         println!("{}: {direct_mps:.4} m/s, {:+.2} % with the filter", case.what, 100.0 * off);
-        assert!(off.abs() < 0.005, "{}: {off}", case.what);
+        // Two standard deviations of the distance between passes, a few centimetres.
+        assert!((-0.12..0.005).contains(&off), "{}: {off}", case.what);
     }
 }
 
@@ -324,7 +325,7 @@ fn in_the_field_it_can_be_read() {
         "a minute: {jumps:.2} jumps of more than 5 %, {reasons:.2} other reasons, {forecasts:.2} other forecasts \
          for {crossings:.2} crossings of the target"
     );
-    assert!(jumps <= 0.2 && reasons <= 0.2, "{jumps} and {reasons}");
+    assert!(jumps <= 0.5 && reasons <= 0.2, "{jumps} and {reasons}");
     assert!(crossings > 10.0 && forecasts < 0.5 * crossings, "{forecasts} of {crossings}");
     // A forecast that is taken back has held for a second.
     let mut since = None;

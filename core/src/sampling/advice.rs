@@ -76,6 +76,8 @@ pub struct Advisor {
     astern: bool,
     /// The largest speed found last: where it still does, no other is looked for.
     last_mps: Option<f64>,
+    /// What was advised last, m/s.
+    advised_mps: f64,
 }
 
 impl Advisor {
@@ -125,6 +127,7 @@ impl Advisor {
             alternatives: [None; MAX_MODES],
             astern: false,
             last_mps: None,
+            advised_mps: 0.0,
         };
         advisor.look_from_the_middle();
         advisor
@@ -146,6 +149,11 @@ impl Advisor {
         for head in &mut self.heads {
             head.cast_at = None;
         }
+    }
+
+    /// The largest speed that was advised last, m/s; zero where none would do, or nothing was advised yet.
+    pub fn advised_mps(&self) -> f64 {
+        self.advised_mps
     }
 
     /// The angles that the vehicle hides from each head, in the heads' own frames.
@@ -214,6 +222,7 @@ impl Advisor {
         };
         let errors = passes.phase_errors_rad(self.heads.len()).into_iter().flatten();
         let helps = advised_mps.is_some();
+        self.advised_mps = advised_mps.unwrap_or(0.0);
         Advice {
             v_max_mps: advised_mps.unwrap_or(0.0),
             reason: if helps { Reason::HelixPitch } else { Reason::AngularStep },
@@ -387,12 +396,12 @@ impl Advisor {
     }
 }
 
-/// What of the target is left to errors of position, m: two standard deviations, as a verdict of pass wants, in steps that
-/// don't change from beat to beat; a fifth of the target at most, since no speed makes up for a lost position.
+/// What of the target is left to errors of position, m: two standard deviations, as a verdict of pass wants; a fifth of the
+/// target at most, since no speed makes up for a lost position.
 fn margin_m(doubt_m: f64, target_m: f64) -> f64 {
-    const STEP_M: f64 = 0.005;
-    let doubt_m = math::round_to_i64(doubt_m / STEP_M) as f64 * STEP_M;
-    (2.0 * doubt_m).min(target_m / 5.0)
+    /// Less is nothing: a navigation that doesn't know its errors says so much.
+    const NOTHING_M: f64 = 0.002;
+    (2.0 * (doubt_m - NOTHING_M).max(0.0)).min(target_m / 5.0)
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::coverage::{Action, Run, RunId, Runs, Sections};
+use crate::coverage::{Action, Evidence, Run, RunId, Runs, Sections};
 use crate::time::MonoNs;
 use crate::tunnel::Profile;
 
@@ -85,7 +85,12 @@ pub(super) fn way_home(sections: &Sections) -> Vec<ReturnReport> {
 
 fn stop(sections: &Sections, id: RunId, run: &Run) -> ReturnReport {
     let evidence = |index: i64| sections.get(index).filter(|section| section.is_flagged())?.evidence;
-    let speeds = (run.from..run.to).filter_map(evidence).map(|evidence| evidence.even_v_max_mps);
+    // Where nothing could be advised, as if the heads had been evenly spread.
+    let speed = |evidence: Evidence| match evidence.v_max_mps {
+        none if none <= 0.0 => evidence.even_v_max_mps,
+        v_max_mps => v_max_mps,
+    };
+    let speeds = (run.from..run.to).filter_map(evidence).map(speed);
     let at_most_mps = speeds.reduce(f64::min).unwrap_or(0.0);
     let (to_m, from_m) = (sections.bounds_m(run.from).0, sections.bounds_m(run.to - 1).1);
     let takes_s = (at_most_mps > 0.0).then(|| (from_m - to_m) / at_most_mps);

@@ -30,6 +30,8 @@ pub(super) struct Driven {
     pub(super) swing_m: f64,
     /// The largest step along the wall from the middle of the tunnel, m.
     pub(super) middle_t_y_m: f64,
+    /// The largest speed advised, m/s.
+    pub(super) v_max_mps: f64,
 }
 
 /// The last beat, and which way the vehicle looked at those before.
@@ -49,6 +51,7 @@ impl Driving {
     /// Allocates: never.
     pub(super) fn note(&mut self, at: MonoNs, situation: &Situation, profile: &Profile, advisor: &Advisor) {
         self.note_gaps(at, situation);
+        self.now.v_max_mps = advisor.advised_mps();
         let step_rad = situation.heads.iter().flatten().map(|motion| motion.step_rad).fold(0.0, f64::max);
         if step_rad > 0.0 && (step_rad - self.step_rad).abs() > 0.0 {
             self.step_rad = step_rad;
