@@ -79,7 +79,22 @@ pub fn lags(
         let offset_s = runs.lag(*source, curve.as_ref());
         Lag { source: *source, offset_s }
     };
-    Ok(sources.iter().zip(&coarse).map(lag).collect())
+    let mut lags: Vec<Lag> = sources.iter().zip(&coarse).map(lag).collect();
+    own_up(&mut lags, latencies);
+    Ok(lags)
+}
+
+/// No source is early. Where one seems to be by several of its standard deviations, something else than time is amiss (a beam
+/// that isn't as wide as is believed, a mount), and none of them is known so well.
+fn own_up(lags: &mut [Lag], latencies: &[DurNs]) {
+    let early = |lag: &Lag| {
+        let latency_s = latencies.get(lag.source).map_or(0.0, |latency| latency.as_secs_f64());
+        lag.offset_s.as_ref().map_or(0.0, |offset| -(latency_s + offset.value) / offset.sd)
+    };
+    let amiss = lags.iter().map(early).fold(1.0, f64::max);
+    for offset in lags.iter_mut().filter_map(|lag| lag.offset_s.as_mut().ok()) {
+        offset.sd *= amiss;
+    }
 }
 
 /// A parabola of the likelihood by a source's shift, from where that is now.
@@ -235,4 +250,23 @@ fn parabola(points: &[(f64, f64)], base: f64) -> Option<Curve> {
     let best = -b / (2.0 * a);
     let least = c + b * best + a * best * best;
     Some(Curve { best_s: best * unit, sd_s: unit / math::sqrt(a), gain: -least })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_source_that_seems_early_makes_all_less_sure() {
+        let lag = |source, value, sd| Lag { source, offset_s: Ok(Estimate { value, sd }) };
+        let latencies = [DurNs::from_secs_f64(0.01); 2];
+        let sds = |mut lags: [Lag; 2]| {
+            own_up(&mut lags, &latencies);
+            lags.map(|lag| lag.offset_s.unwrap().sd)
+        };
+        let near =
+            |got: [f64; 2], wanted: [f64; 2]| got.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 1e-12);
+        assert!(near(sds([lag(0, -0.07, 0.02), lag(1, 0.09, 0.01)]), [0.06, 0.03]));
+        assert!(near(sds([lag(0, -0.02, 0.02), lag(1, 0.09, 0.01)]), [0.02, 0.01]));
+    }
 }
