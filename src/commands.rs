@@ -18,7 +18,7 @@ use crate::dive::{self, WhatIf, assemble};
 use crate::expect;
 use crate::failure::{self, Failure};
 use crate::files;
-use crate::output::{deliver, put, say};
+use crate::output::{deliver, deliver_json, put, say};
 use crate::smooth;
 use crate::summary::summary;
 use crate::watch::Watch;
@@ -38,7 +38,7 @@ pub(crate) fn demo(args: &Demo) -> Result<u8, Failure> {
     let mut feed = SimulationFeed::new(Simulation::new(&scene)?);
     let pace = Pace { speed: args.speed.0, ..Pace::default() };
     let report = dive.run(&mut feed, pace, &mut Watch::loud())?;
-    files::write(&report_file, &serde_json::to_vec_pretty(&report)?)?;
+    files::write_json(&report_file, &report)?;
     put(&format!("\n{}", summary(&report)));
     say(&format!("report {}\nlog    {}  (headrace replay it)", report_file.display(), log.display()));
     Ok(dive::exit_code(&report))
@@ -174,10 +174,10 @@ fn note_losses(report: &mut Report, path: &Path, player: &Player) -> Result<(), 
 
 fn finish(report: &Report, output: &Output) -> Result<u8, Failure> {
     if let Some(path) = &output.report {
-        files::write(path, &serde_json::to_vec_pretty(report)?)?;
+        files::write_json(path, report)?;
     }
     if output.json {
-        deliver(&serde_json::to_string_pretty(report)?)?;
+        deliver_json(report)?;
     } else {
         put(&summary(report));
     }

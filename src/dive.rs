@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use headrace_core::app::App;
-use headrace_core::app::flow::{Notice, Tally};
+use headrace_core::app::flow::Tally;
 use headrace_core::app::outlet::{NoticeOutlet, NoticeReceiver};
 use headrace_core::app::plugin::Plugin;
 use headrace_core::app::report::{LogReport, Report};
@@ -18,8 +18,9 @@ use crate::failure::{self, Failure};
 use crate::progress::Progress;
 use crate::watch::Watch;
 
-/// Notices that may wait for the terminal; a tick of 20 ms has a handful.
-const NOTICES: usize = 1 << 16;
+/// Notices that may wait for the terminal; a tick of 20 ms has a handful. Each slot is some 400 bytes, and all are
+/// touched.
+const NOTICES: usize = 1 << 10;
 
 /// A loop with the vehicle's sensors and ways out for its results.
 pub(crate) struct Dive {
@@ -124,12 +125,11 @@ impl Dive {
             beside(dive);
         });
         drop(progress);
-        let last: Vec<Notice> = self.armed.finish();
-        for notice in &last {
-            watch.notice(notice, &self.armed);
-        }
+        self.armed.finish(&mut |notice, dive| watch.notice(notice, dive));
         watch.end(&self.armed);
         beside(&self.armed);
+        // A long dive's report takes as much room as its samples, which it needs no more.
+        self.armed.release_samples();
         let mut report = Report::of(&self.armed);
         report.what_if = self.armed.what_if(&self.what_if.targets_m, &self.what_if.sections_m);
         if let Some((path, handle)) = self.recorder.take() {

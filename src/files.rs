@@ -1,6 +1,10 @@
 //! Reading and writing files, and the ones that are built in.
 
+use std::fs::File;
+use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
+
+use headrace_core::app::report::Report;
 
 use crate::failure::Failure;
 
@@ -18,6 +22,14 @@ pub(crate) fn read(path: &Path) -> Result<String, Failure> {
 /// Writes a file.
 pub(crate) fn write(path: &Path, content: &[u8]) -> Result<(), Failure> {
     std::fs::write(path, content).map_err(|source| Failure::Write { path: path.to_owned(), source })
+}
+
+/// Writes a report as JSON, piece by piece: that of a long dive would take more memory than the dive.
+pub(crate) fn write_json(path: &Path, report: &Report) -> Result<(), Failure> {
+    let failed = |source| Failure::Write { path: path.to_owned(), source };
+    let mut file = BufWriter::new(File::create(path).map_err(failed)?);
+    serde_json::to_writer_pretty(&mut file, report).map_err(|error| failed(error.into()))?;
+    file.flush().map_err(failed)
 }
 
 /// Loads the files that `file` names, relative to its folder.

@@ -1,7 +1,9 @@
 //! Words for people, on stdout. A terminal that has gone away ends neither a dive nor its recording.
 
 use std::fmt::{self, Write as _};
-use std::io::Write;
+use std::io::{BufWriter, Write};
+
+use headrace_core::app::report::Report;
 
 use crate::failure::Failure;
 
@@ -28,6 +30,16 @@ pub(crate) fn deliver(text: &str) -> Result<(), Failure> {
         .and_then(|()| stdout.write_all(b"\n"))
         .and_then(|()| stdout.flush())
         .map_err(|source| Failure::Write { path: "standard output".into(), source })
+}
+
+/// Writes a report for a program as JSON, piece by piece.
+///
+/// Errors: stdout takes it not, or not all.
+pub(crate) fn deliver_json(report: &Report) -> Result<(), Failure> {
+    let failed = |source| Failure::Write { path: "standard output".into(), source };
+    let mut stdout = BufWriter::new(std::io::stdout().lock());
+    serde_json::to_writer_pretty(&mut stdout, report).map_err(|error| failed(error.into()))?;
+    stdout.write_all(b"\n").and_then(|()| stdout.flush()).map_err(failed)
 }
 
 /// Adds words to a text.

@@ -67,6 +67,15 @@ pub fn erfc(x: f64) -> f64 {
 
 /// `value` brought into [0, `modulus`). `modulus` must be positive and finite.
 pub fn wrap(value: f64, modulus: f64) -> f64 {
+    // Nearly all values are less than a turn off; what follows gives the same bits for them, by a quotient.
+    if (0.0..modulus).contains(&value) {
+        // Both zeros become the positive one.
+        return value + 0.0;
+    }
+    if value < 0.0 && value > -modulus {
+        let r = value + modulus;
+        return if r >= modulus { 0.0 } else { r };
+    }
     let r = value - modulus * libm::floor(value / modulus);
     // Rounding can leave r at the modulus itself, or a hair below zero.
     if r >= modulus || r < 0.0 { 0.0 } else { r }
@@ -74,6 +83,14 @@ pub fn wrap(value: f64, modulus: f64) -> f64 {
 
 /// `difference` brought into [-`modulus`/2, `modulus`/2): the short way round.
 pub fn wrap_signed(difference: f64, modulus: f64) -> f64 {
+    // As in `wrap`; near the halves, where rounding decides, the quotient does.
+    let size = difference.abs();
+    if size < 0.499 * modulus {
+        return difference;
+    }
+    if size > 0.501 * modulus && size < 1.499 * modulus {
+        return if difference > 0.0 { difference - modulus } else { difference + modulus };
+    }
     let r = difference - modulus * libm::floor(difference / modulus + 0.5);
     if r >= modulus / 2.0 { r - modulus } else { r }
 }
@@ -84,7 +101,9 @@ pub fn wrap_signed(difference: f64, modulus: f64) -> f64 {
     reason = "float to integer casts saturate, which is what is wanted"
 )]
 pub fn floor_to_i64(x: f64) -> i64 {
-    libm::floor(x) as i64
+    // Without a call: cells and sections are looked up by it several times a sample.
+    let towards_zero = x as i64;
+    if towards_zero as f64 > x { towards_zero.saturating_sub(1) } else { towards_zero }
 }
 
 /// The nearest integer to `x` (halves to even); saturates, and NaN gives zero.
@@ -93,12 +112,58 @@ pub fn floor_to_i64(x: f64) -> i64 {
     reason = "float to integer casts saturate, which is what is wanted"
 )]
 pub fn round_to_i64(x: f64) -> i64 {
-    libm::rint(x) as i64
+    /// From here on there is nothing behind the point; adding it rounds what there was, halves to even.
+    const WHOLE: f64 = 4_503_599_627_370_496.0;
+    let size = x.abs();
+    if size < WHOLE { ((size + WHOLE) - WHOLE).copysign(x) as i64 } else { x as i64 }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// What is computed without a quotient has the bits of what is computed with one.
+    #[test]
+    fn the_short_ways_give_the_same_bits() {
+        let by_quotient = |value: f64, modulus: f64| {
+            let r = value - modulus * libm::floor(value / modulus);
+            if r >= modulus || r < 0.0 { 0.0 } else { r }
+        };
+        let signed_by_quotient = |value: f64, modulus: f64| {
+            let r = value - modulus * libm::floor(value / modulus + 0.5);
+            if r >= modulus / 2.0 { r - modulus } else { r }
+        };
+        let mut state = 1_u64;
+        let mut next = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        for modulus in [TAU, 35.9, 1.0, 0.3, 34.17, 1e-3] {
+            let edges = [0.0, 0.25, 0.499, 0.5, 0.501, 1.0, 1.499, 1.5, 2.0, 1e-20, 1e-310, 1e9];
+            let near = edges.into_iter().flat_map(|edge| {
+                let x = edge * modulus;
+                [x, x.next_up(), x.next_down(), f64::midpoint(x, x.next_up().next_up())]
+            });
+            let anywhere = core::iter::repeat_with(|| 4.0 * modulus * next()).take(100_000);
+            for x in near.chain(anywhere).flat_map(|x| [x, -x]) {
+                assert_eq!(wrap(x, modulus).to_bits(), by_quotient(x, modulus).to_bits(), "{x} {modulus}");
+                let signed = signed_by_quotient(x, modulus);
+                assert_eq!(wrap_signed(x, modulus).to_bits(), signed.to_bits(), "{x} {modulus}");
+            }
+        }
+    }
+
+    #[test]
+    #[expect(clippy::cast_possible_truncation, reason = "as in the functions under test")]
+    fn whole_numbers_are_those_of_the_library() {
+        let whole = [0.0, 0.5, 1.0, 1.5, 2.5, 4.4e15, 4.6e15, 9.1e15, 9.2e18, 9.3e18, 1e300];
+        let about = whole.into_iter().flat_map(|x: f64| [x, x.next_up(), x.next_down()]);
+        let special = [f64::NAN, f64::INFINITY, 1e-310];
+        for x in about.chain(special).flat_map(|x| [x, -x]) {
+            assert_eq!(floor_to_i64(x), libm::floor(x) as i64, "{x}");
+            assert_eq!(round_to_i64(x), libm::rint(x) as i64, "{x}");
+        }
+    }
 
     #[test]
     fn wrap_stays_below_its_modulus() {

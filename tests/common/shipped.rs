@@ -47,6 +47,6 @@ pub(crate) fn report(scene: &Scene) -> Report {
     let mut dive = app.arm(vehicle.navigation()).unwrap();
     let simulation = Simulation::new(scene).unwrap_or_else(|why| panic!("{why}"));
     drive(&mut dive, &mut SimulationFeed::new(simulation), Pace::default(), &mut |_| {}).unwrap();
-    dive.finish();
+    dive.finish(&mut |_, _| {});
     Report::of(&dive)
 }

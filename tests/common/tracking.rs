@@ -159,7 +159,7 @@ pub(crate) fn dive(scene: &Scene, inner: impl Transparent, silence: Silence) -> 
     let mut dive = app.arm(Box::new(Overheard { inner, silence, last: None, told, said })).unwrap();
     let simulation = Simulation::new(scene).unwrap();
     drive(&mut dive, &mut SimulationFeed::new(simulation), Pace::default(), &mut |_| {}).unwrap();
-    dive.finish();
+    dive.finish(&mut |_, _| {});
     sort(scene, &heard, Report::of(&dive))
 }
 

@@ -135,7 +135,7 @@ fn watched(scene: &Scene, vehicle: &VehicleConfig, mission: Mission, pace: Pace)
     let mut dive = app.arm(vehicle.navigation()).unwrap();
     let simulation = Simulation::new(scene).unwrap_or_else(|why| panic!("{why}"));
     drive(&mut dive, &mut SimulationFeed::new(simulation), pace, &mut |_| {}).unwrap();
-    dive.finish();
+    dive.finish(&mut |_, _| {});
     let heads = vehicle.heads();
     Dive {
         pings: dive.world().resource::<Seen>().0.clone(),

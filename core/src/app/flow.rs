@@ -304,22 +304,28 @@ pub struct AdviceEntry {
 }
 
 /// The advice over time, kept whenever it has changed enough to matter, or ten seconds have gone.
+///
+/// When it is full every other entry is dropped, and from then on entries are at least twice as far apart in time as they
+/// had to be before: a longer dive is told more coarsely, from its beginning to its end.
 #[derive(Debug, Clone, Resource)]
 pub struct AdviceLog {
     /// The entries, in order.
     pub entries: Vec<AdviceEntry>,
     /// Entries for which there was no room.
     pub dropped: u64,
+    /// Least time between two entries.
+    apart: DurNs,
 }
 
 impl Default for AdviceLog {
     fn default() -> Self {
-        Self { entries: Vec::with_capacity(Self::CAPACITY), dropped: 0 }
+        Self { entries: Vec::with_capacity(Self::CAPACITY), dropped: 0, apart: DurNs(0) }
     }
 }
 
 impl AdviceLog {
-    const CAPACITY: usize = 1 << 16;
+    /// An entry has some 400 bytes.
+    const CAPACITY: usize = 1 << 13;
     const EVERY: DurNs = DurNs(10_000_000_000);
     const CHANGE_MPS: f64 = 0.01;
 
@@ -334,10 +340,61 @@ impl AdviceLog {
         if self.entries.last().is_some_and(unchanged) {
             return;
         }
-        if self.entries.len() < Self::CAPACITY {
-            self.entries.push(*entry);
-        } else {
+        if self.entries.last().is_some_and(|last| entry.at.since(last.at).0 < self.apart.0) {
             self.dropped += 1;
+            return;
         }
+        if self.entries.len() == Self::CAPACITY {
+            self.thin_out();
+        }
+        self.entries.push(*entry);
+    }
+
+    fn thin_out(&mut self) {
+        let before = self.entries.len();
+        let mut number = 0_usize;
+        self.entries.retain(|_| {
+            number += 1;
+            number % 2 == 1
+        });
+        self.dropped += (before - self.entries.len()) as u64;
+        self.apart = DurNs((2 * self.apart.0).max(2 * ADVICE_PERIOD.0));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sampling::advice::{Advisor, Task};
+    use crate::tunnel::named;
+
+    /// Advice that changes at every beat of ten hours is told from beginning to end in the room that there is.
+    #[test]
+    fn the_advice_s_history_does_not_grow_with_hours() {
+        let profile = named::circle(3.0).unwrap();
+        let task =
+            Task { target_m: 0.5, length_m: 100.0, layout: HeadLayout::PhaseShift, sound_speed_mps: 1447.0 };
+        let nowhere = Situation {
+            pose: None,
+            speed_mps: 0.0,
+            layout: HeadLayout::PhaseShift,
+            configured: 0,
+            heads: [None; crate::sampling::head::MAX_HEADS],
+        };
+        let advice = Advisor::new(&profile, task, &[], &[]).advise(&nowhere, None);
+        let mut log = AdviceLog::default();
+        let room = log.entries.capacity();
+        let beats = 180_000_u32;
+        for beat in 0..beats {
+            let at = MonoNs(u64::from(beat) * ADVICE_PERIOD.0.unsigned_abs());
+            let speed_mps = f64::from(beat % 2);
+            log.take(&AdviceEntry { at, chainage_m: None, speed_mps, advice });
+        }
+        assert_eq!(log.entries.capacity(), room);
+        assert!(log.entries.len() > AdviceLog::CAPACITY / 2 - 1, "{}", log.entries.len());
+        assert!(log.dropped > 0, "what is left out is counted");
+        let apart_s = log.entries.windows(2).map(|two| two[1].at.since(two[0].at).as_secs_f64());
+        assert!(apart_s.fold(0.0, f64::max) < 12.0);
+        assert_eq!(log.entries[0].at, MonoNs(0));
     }
 }

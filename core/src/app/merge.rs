@@ -2,6 +2,7 @@
 
 use bevy_ecs::prelude::Resource;
 
+use super::MAX_SOURCES;
 use super::reading::{Packet, SourceId};
 use super::ring::{PacketHeader, PortReader};
 use crate::time::MonoNs;
@@ -16,6 +17,8 @@ pub const MAX_TICK_BYTES: usize = 256 * 1024;
 pub struct Inbox {
     packets: Vec<Received>,
     bytes: Vec<u8>,
+    /// What waits first in each source's ring.
+    heads: Vec<Option<PacketHeader>>,
     /// Bytes that the next tick may take: an outlet that must not lose any lowers it while it is behind.
     pub allowance_bytes: usize,
 }
@@ -33,6 +36,7 @@ impl Default for Inbox {
         Self {
             packets: Vec::with_capacity(MAX_TICK_PACKETS),
             bytes: Vec::with_capacity(MAX_TICK_BYTES),
+            heads: Vec::with_capacity(MAX_SOURCES),
             allowance_bytes: MAX_TICK_BYTES,
         }
     }
@@ -63,19 +67,24 @@ impl Inbox {
     pub(super) fn fill(&mut self, readers: &mut [PortReader]) {
         self.packets.clear();
         self.bytes.clear();
+        self.heads.clear();
+        // A ring is looked at again only once its first packet has been taken.
+        self.heads.extend(readers.iter().map(PortReader::peek));
         let limit = self.allowance_bytes.min(MAX_TICK_BYTES);
         while self.packets.len() < MAX_TICK_PACKETS {
-            let Some((source, header)) = first(readers) else { return };
+            let Some((source, header)) = first(&self.heads) else { return };
             let from = self.bytes.len();
             let to = from + header.len;
             if to > limit {
                 return;
             }
             self.bytes.resize(to, 0);
-            if let (Some(reader), Some(into)) =
-                (readers.get_mut(usize::from(source)), self.bytes.get_mut(from..to))
+            let number = usize::from(source);
+            if let (Some(reader), Some(head), Some(into)) =
+                (readers.get_mut(number), self.heads.get_mut(number), self.bytes.get_mut(from..to))
             {
                 reader.take(into);
+                *head = reader.peek();
             }
             self.packets.push(Received { source: SourceId(source), received: header.received, from, to });
         }
@@ -83,10 +92,10 @@ impl Inbox {
 }
 
 /// The source whose next packet comes first.
-fn first(readers: &[PortReader]) -> Option<(u16, PacketHeader)> {
+fn first(heads: &[Option<PacketHeader>]) -> Option<(u16, PacketHeader)> {
     (0_u16..)
-        .zip(readers)
-        .filter_map(|(source, reader)| reader.peek().map(|header| (source, header)))
+        .zip(heads)
+        .filter_map(|(source, head)| head.map(|header| (source, header)))
         .min_by_key(|(source, header)| (header.order, header.received, *source))
 }
 

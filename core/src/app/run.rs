@@ -8,7 +8,8 @@ use super::components::{DepthSensor, Echosounder, Imu, Mounted, SonarHead, Tethe
 use super::digest::Digest;
 use super::flow::{
     AdviceLog, Coverage, Digests, Events, Finder, HeadTable, HiddenAngles, MAX_TICK_READINGS, Navigator,
-    Notices, Place, PlacedList, PositionedList, Requests, SensorTable, SourceTallies, Tally, TickTime,
+    Notice, Notices, Place, PlacedList, PositionedList, Requests, SensorTable, SourceTallies, Tally,
+    TickTime,
 };
 use super::head::HeadTrack;
 use super::merge::{Inbox, MAX_TICK_PACKETS};
@@ -16,7 +17,9 @@ use super::plugin::PluginError;
 use super::ring::{Port, PortReader};
 use super::stages::{Advisor, Decoders, Driving, HeadSweeps, Results, judge_one};
 use super::{App, MAX_SOURCES, Mission, SourceInfo};
-use crate::coverage::{Frontier, GridLayout, HoleFinder, SampleStore, Sections, Soundings, StoreLayout};
+use crate::coverage::{
+    Frontier, GridLayout, HoleFinder, Request, SampleStore, Sections, Soundings, StoreLayout,
+};
 use crate::fusion::{Navigation, SensorInfo, SensorKind};
 use crate::sampling::advice::{self, Task};
 use crate::sampling::head::{HeadMode, HeadSpec, MAX_HEADS};
@@ -31,6 +34,8 @@ const MAX_SAMPLES: f64 = 40_000_000.0;
 
 /// A section that is judged may change its run and two others, and raise an alert.
 const NOTICES_EACH: usize = 5;
+/// Sections judged at the end of a dive before their notices are heard.
+const FINISHED_AT_ONCE: usize = 256;
 
 /// A loop that runs. All memory is allocated; a tick takes no lock, makes no system call and formats nothing.
 pub struct Loop {
@@ -150,21 +155,47 @@ impl Loop {
         &mut self.world
     }
 
-    /// Judges what is still open: the dive has ended, and no sample will come. Gives the notices of it.
-    pub fn finish(&mut self) -> Vec<super::flow::Notice> {
+    /// Judges what is still open: the dive has ended, and no sample will come. `hear` is given the notices of it, some
+    /// sections' at a time, and the loop as it is then: those of a long dive at once would take more than its samples.
+    pub fn finish(&mut self, hear: &mut dyn FnMut(&Notice, &Self)) {
         self.world.resource_mut::<Navigator>().navigation.end();
+        let (open, common) = self.open_requests();
+        let request =
+            |(section, fails): &(i64, bool)| Some(Request { section: *section, fails: *fails, ..common? });
+        for some in open.chunks(FINISHED_AT_ONCE) {
+            self.judge_all(some.iter().filter_map(request));
+            let notices = core::mem::take(&mut self.world.resource_mut::<Notices>().0);
+            for notice in &notices {
+                hear(notice, self);
+            }
+            self.world.resource_mut::<Notices>().0 = notices;
+        }
+    }
+
+    /// The sections that are to be judged at the end, which of them are known to fail, and what they have in common.
+    fn open_requests(&mut self) -> (Vec<(i64, bool)>, Option<Request>) {
         let at = self.world.resource::<Tally>().span.map_or(MonoNs(0), |(_, last)| last);
         let profile = &self.mission.profile;
-        let world = &mut self.world;
+        let (mut open, mut common) = (Vec::new(), None);
+        self.world.resource_scope(|world, mut coverage: Mut<'_, Coverage>| {
+            let mut finder = world.resource_mut::<Finder>();
+            let Coverage { store, sections, frontier, .. } = &mut *coverage;
+            let mut ask = |request: Request| {
+                open.push((request.section, request.fails));
+                common = Some(request);
+            };
+            sections.unsettled((frontier, at), store, &mut finder.0, profile, &mut ask);
+        });
+        (open, common)
+    }
+
+    fn judge_all(&mut self, requests: impl Iterator<Item = Request>) {
+        let Self { world, mission, .. } = self;
         world.resource_scope(|world, mut coverage: Mut<'_, Coverage>| {
             world.resource_scope(|world, mut finder: Mut<'_, Finder>| {
                 world.resource_scope(|world, mut notices: Mut<'_, Notices>| {
                     world.resource_scope(|world, mut alerts: Mut<'_, Alerts>| {
                         notices.0.clear();
-                        let mut requests = Vec::new();
-                        let Coverage { store, sections, frontier, .. } = &mut *coverage;
-                        let mut ask = |request| requests.push(request);
-                        sections.unsettled((frontier, at), store, &mut finder.0, profile, &mut ask);
                         let mut digests = world.resource_mut::<Digests>();
                         let mut results = Results {
                             finder: &mut finder,
@@ -172,14 +203,18 @@ impl Loop {
                             digests: &mut digests,
                             alerts: &mut alerts,
                         };
-                        for request in &requests {
-                            judge_one(request, profile, &mut coverage, &mut results);
+                        for request in requests {
+                            judge_one(&request, &mission.profile, &mut coverage, &mut results);
                         }
                     });
                 });
             });
         });
-        self.world.resource::<Notices>().0.clone()
+    }
+
+    /// Gives the samples' memory back: after the end of a dive a report needs the sections alone.
+    pub fn release_samples(&mut self) {
+        self.world.resource_mut::<Coverage>().store.release();
     }
 
     /// Whether packets wait in the rings.

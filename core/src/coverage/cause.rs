@@ -67,8 +67,6 @@ pub struct Evidence {
     pub cause: Cause,
     /// Speed along the tunnel, m/s.
     pub speed_mps: f64,
-    /// Largest speed that was advised there, m/s; zero where none would do.
-    pub v_max_mps: f64,
     /// Largest speed that would have met the target with the heads evenly spread, m/s; zero where none.
     pub even_v_max_mps: f64,
     /// Time between passes, seconds.
@@ -150,7 +148,6 @@ pub fn explain<'a>(
     Evidence {
         cause,
         speed_mps: worst.speed_mps,
-        v_max_mps: worst.v_max_mps,
         even_v_max_mps: even_v_max.unwrap_or(0.0),
         pass_gap_s: worst.gap_s,
         even_pass_gap_s: worst.even_gap_s,
@@ -222,7 +219,6 @@ impl Seen {
 #[derive(Debug, Clone, Copy, Default)]
 struct Driven {
     speed_mps: f64,
-    v_max_mps: f64,
     gap_s: f64,
     even_gap_s: f64,
     all_gap_s: f64,
@@ -238,7 +234,6 @@ impl Driven {
         let t_y_m = passage.t_y_m;
         Self {
             speed_mps: mean(passage.speed_sum_mps),
-            v_max_mps: mean(passage.v_max_sum_mps),
             gap_s: mean(passage.pass_gap_sum_s),
             even_gap_s: mean(passage.even_gap_sum_s),
             all_gap_s: mean(passage.all_gap_sum_s),

@@ -38,8 +38,6 @@ pub struct Passage {
     pub all_gap_sum_s: f64,
     /// Sum of how far the beams swung along the tunnel between two passes, m.
     pub swing_sum_m: f64,
-    /// Sum of the largest speeds advised, m/s.
-    pub v_max_sum_mps: f64,
     /// Sum of the times between pings, seconds.
     pub ping_period_sum_s: f64,
     /// The largest T_y that geometry predicted, m.

@@ -76,8 +76,6 @@ pub struct Advisor {
     astern: bool,
     /// The largest speed found last: where it still does, no other is looked for.
     last_mps: Option<f64>,
-    /// What was advised last, m/s.
-    advised_mps: f64,
 }
 
 impl Advisor {
@@ -127,7 +125,6 @@ impl Advisor {
             alternatives: [None; MAX_MODES],
             astern: false,
             last_mps: None,
-            advised_mps: 0.0,
         };
         advisor.look_from_the_middle();
         advisor
@@ -151,14 +148,14 @@ impl Advisor {
         }
     }
 
-    /// The largest speed that was advised last, m/s; zero where none would do, or nothing was advised yet.
-    pub fn advised_mps(&self) -> f64 {
-        self.advised_mps
-    }
-
     /// The angles that the vehicle hides from each head, in the heads' own frames.
     pub fn hidden_angles(&self) -> impl Iterator<Item = &[AngleRange]> {
         self.heads.iter().map(|head| head.hidden.as_slice())
+    }
+
+    /// Soundings of a ring that a step passes over: steps of as many are alike to [`Advisor::middle_step_m`].
+    pub fn stride(step_rad: f64) -> usize {
+        Ring::stride(step_rad, RING)
     }
 
     /// The largest distance along the wall of two pings `step_rad` apart, from the middle of the tunnel, level, m.
@@ -222,7 +219,6 @@ impl Advisor {
         };
         let errors = passes.phase_errors_rad(self.heads.len()).into_iter().flatten();
         let helps = advised_mps.is_some();
-        self.advised_mps = advised_mps.unwrap_or(0.0);
         Advice {
             v_max_mps: advised_mps.unwrap_or(0.0),
             reason: if helps { Reason::HelixPitch } else { Reason::AngularStep },
@@ -286,6 +282,12 @@ impl Advisor {
         self.farthest_m = looking.map(|head| head.ring.longest_range_m()).fold(0.0, f64::max);
         self.parallax_rad = passes::parallax_rad(&self.profile, places.get(..known).unwrap_or_default());
         self.now.rebuild(self.profile.perimeter_m(), &self.views);
+        // Most heads' rings are those of the last piece of advice.
+        for (head, stride) in self.heads.iter_mut().zip(self.strides) {
+            if let Some(stride) = stride {
+                head.ring.keep_steps(stride);
+            }
+        }
         let rings = self.heads.iter().map(|head| &head.ring);
         self.now.measure(1, rings, |_, head| self.strides.get(head).copied().flatten());
     }

@@ -161,9 +161,10 @@ pub fn parallax_rad(profile: &Profile, heads: &[Yz]) -> f64 {
     let mut most_rad = 0.0_f64;
     for k in 0..PLACES {
         let place = profile.point_at(profile.perimeter_m() * f64::from(k) / f64::from(PLACES));
+        let from_first = angle(first, place);
         let (mut least, mut most) = (0.0_f64, 0.0_f64);
-        for head in heads {
-            let off = math::wrap_signed(angle(head, place) - angle(first, place), TAU);
+        for head in heads.iter().skip(1) {
+            let off = math::wrap_signed(angle(head, place) - from_first, TAU);
             (least, most) = (least.min(off), most.max(off));
         }
         most_rad = most_rad.max(most - least);

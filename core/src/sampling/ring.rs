@@ -60,7 +60,12 @@ impl<'a> Standing<'a> {
     ///
     /// Errors: a beam that meets no wall within a kilometre.
     pub fn sounding(&self, angle_rad: f64) -> Result<Sounding, SamplingError> {
-        let direction = self.turn * head_direction(angle_rad);
+        self.sounding_along(angle_rad, head_direction(angle_rad))
+    }
+
+    /// The same, the angle's direction being known.
+    fn sounding_along(&self, angle_rad: f64, beam: Vec3<Sensor>) -> Result<Sounding, SamplingError> {
+        let direction = self.turn * beam;
         let hit = self.hit(direction);
         let hit = hit.ok_or(SamplingError::BeamAlongTunnel { angle_deg: angle_rad.to_degrees() })?;
         let squareness = -(direction.y() * hit.normal[0] + direction.z() * hit.normal[1]);
@@ -126,6 +131,11 @@ pub struct Ring {
     /// head turns against arc length.
     way_m: Vec<f64>,
     perimeter_m: f64,
+    /// The angles of the soundings and their directions, which stay from cast to cast.
+    beams: Vec<(f64, Vec3<Sensor>)>,
+    /// Distances between soundings so many apart, of the last cast; none while it is zero.
+    stride: usize,
+    steps_m: Vec<f64>,
 }
 
 impl Ring {
@@ -152,8 +162,10 @@ impl Ring {
         self.perimeter_m = standing.perimeter_m();
         self.soundings.clear();
         self.way_m.clear();
-        for k in 0..count {
-            match standing.sounding(start_rad + TAU * (f64::from(k) / f64::from(count))) {
+        self.stride = 0;
+        self.aim(start_rad, count);
+        for (angle_rad, beam) in &self.beams {
+            match standing.sounding_along(*angle_rad, *beam) {
                 Ok(sounding) => self.soundings.push(sounding),
                 Err(why) => {
                     self.soundings.clear();
@@ -168,6 +180,34 @@ impl Ring {
         }
         self.way_m.push(way_m);
         Ok(())
+    }
+
+    /// Notes the directions of a turn's beams, unless they are those of the last.
+    fn aim(&mut self, start_rad: f64, count: u32) {
+        let from_rad = self.beams.first().map(|(angle_rad, _)| angle_rad.to_bits());
+        if self.beams.len() == count as usize && from_rad == Some((start_rad + 0.0).to_bits()) {
+            return;
+        }
+        let angle_rad = |k: u32| start_rad + TAU * (f64::from(k) / f64::from(count));
+        self.beams.clear();
+        self.beams.extend((0..count).map(angle_rad).map(|angle_rad| (angle_rad, head_direction(angle_rad))));
+    }
+
+    /// Measures the distances between soundings `stride` apart once, for as long as the ring stays as it is.
+    ///
+    /// Allocates: not when the ring has had as many soundings before.
+    pub fn keep_steps(&mut self, stride: usize) {
+        if self.stride != stride {
+            let mut steps_m = core::mem::take(&mut self.steps_m);
+            steps_m.clear();
+            steps_m.extend(self.steps_m(stride));
+            (self.stride, self.steps_m) = (stride, steps_m);
+        }
+    }
+
+    /// The distances of [`Ring::keep_steps`]; `None` where they are those of another stride.
+    pub fn kept_steps_m(&self, stride: usize) -> Option<&[f64]> {
+        (self.stride == stride).then_some(self.steps_m.as_slice())
     }
 
     /// How many of `count` soundings a step passes over, rounded up; at least one.

@@ -4,7 +4,7 @@ use super::error::SamplingError;
 use super::head::{HeadSet, MAX_HEADS};
 use super::occlusion::AngleRange;
 use super::passes::Passes;
-use super::ring::{Ring, Standing};
+use super::ring::{Ring, Sounding, Standing};
 use super::spacing;
 use crate::math;
 
@@ -138,8 +138,8 @@ pub struct Strips {
     perimeter_m: f64,
     /// By setting and strip: the largest step of the heads that see it, m, and of all of them.
     steps_m: Vec<[f64; 2]>,
-    /// The strip of each sounding of the ring looked at.
-    strip_of: Vec<usize>,
+    /// The strip of each sounding of the ring looked at, and how far it is to its end, nearly, m.
+    strip_of: Vec<(usize, f64)>,
 }
 
 impl Strips {
@@ -216,20 +216,38 @@ impl Strips {
         self.steps_m.clear();
         self.steps_m.resize(count * settings, [0.0; 2]);
         for (head, ring) in rings.enumerate() {
-            self.strip_of.clear();
-            for sounding in ring.soundings() {
-                self.strip_of.push(number_at(&self.strips, sounding.sigma_m, self.perimeter_m));
-            }
             let forward = ring.way_round_m() >= 0.0;
+            self.find_strips(ring, forward);
             for setting in 0..settings {
                 let Some(stride) = stride(setting, head) else { continue };
-                for ((sounding, from), step_m) in
-                    ring.soundings().iter().zip(&self.strip_of).zip(ring.steps_m(stride))
-                {
-                    let to = Reached { head, sigma_m: sounding.sigma_m, strip: *from, forward };
-                    note_step(&self.strips, &mut self.steps_m, setting, &to, step_m, self.perimeter_m);
+                let Self { strips, strip_of, steps_m, perimeter_m, .. } = &mut *self;
+                let from = ring.soundings().iter().zip(strip_of.iter());
+                let mut note = |((sounding, (strip, left_m)), step_m): ((&Sounding, &(usize, f64)), f64)| {
+                    let (strip, is_within) = (*strip, step_m < left_m - NO_WIDTH_M);
+                    let from = Reached { head, sigma_m: sounding.sigma_m, strip, forward, is_within };
+                    note_step(strips, steps_m, setting, &from, step_m, *perimeter_m);
+                };
+                match ring.kept_steps_m(stride) {
+                    Some(kept_m) => from.zip(kept_m.iter().copied()).for_each(&mut note),
+                    None => from.zip(ring.steps_m(stride)).for_each(&mut note),
                 }
             }
+        }
+    }
+
+    /// Finds the strip of each sounding of a ring.
+    fn find_strips(&mut self, ring: &Ring, forward: bool) {
+        let first_m = self.strips.first().map_or(0.0, |strip| strip.arc.from_m);
+        let mut number = 0;
+        self.strip_of.clear();
+        for sounding in ring.soundings() {
+            number = number_near(&self.strips, sounding.sigma_m, self.perimeter_m, number);
+            let from_first_m = math::wrap(sounding.sigma_m - first_m, self.perimeter_m);
+            let left_m = self.strips.get(number).map_or(0.0, |strip| {
+                let into_m = from_first_m - (strip.arc.from_m - first_m);
+                if forward { strip.arc.length_m - into_m } else { into_m }
+            });
+            self.strip_of.push((number, left_m));
         }
     }
 
@@ -301,12 +319,13 @@ impl Strips {
         passes: &Passes,
     ) -> impl Iterator<Item = (&Strip, Option<Limit>, Option<Limit>)> {
         let count = self.strips.len();
+        let gaps = Gaps::of(passes, &self.strips);
         let best_s =
-            self.strips.iter().filter_map(|strip| passes.gap_s(strip.seen_by)).fold(f64::INFINITY, f64::min);
-        let full = move |strip: &Strip| passes.gap_s(strip.seen_by).is_some_and(|gap_s| gap_s <= best_s);
+            self.strips.iter().filter_map(|strip| gaps.gap_s(strip.seen_by)).fold(f64::INFINITY, f64::min);
+        let full = move |strip: &Strip| gaps.gap_s(strip.seen_by).is_some_and(|gap_s| gap_s <= best_s);
         self.strips.iter().enumerate().map(move |(k, strip)| {
             let seen_m = self.steps_m.get(setting * count + k).map_or(0.0, |steps| steps[0]);
-            let within = passes.gap_s(strip.seen_by).map(|gap_s| Limit { gap_s, t_y_m: seen_m });
+            let within = gaps.gap_s(strip.seen_by).map(|gap_s| Limit { gap_s, t_y_m: seen_m });
             let across = (!full(strip) && best_s.is_finite())
                 .then(|| Limit { gap_s: best_s, t_y_m: self.across_m(setting, k, &full) })
                 .filter(|limit| limit.t_y_m < self.perimeter_m);
@@ -334,12 +353,49 @@ impl Strips {
     }
 }
 
+/// Sets of heads whose gaps are remembered; strips hidden from one or two heads make hardly more.
+const SETS: usize = 8;
+
+/// The gaps of passes by the heads that see a strip: many strips are seen by the same.
+#[derive(Clone, Copy)]
+struct Gaps<'a> {
+    passes: &'a Passes,
+    known: [Option<(HeadSet, Option<f64>)>; SETS],
+}
+
+impl<'a> Gaps<'a> {
+    fn of(passes: &'a Passes, strips: &[Strip]) -> Self {
+        let mut gaps = Self { passes, known: [None; SETS] };
+        let mut count = 0;
+        for strip in strips {
+            if gaps.find(strip.seen_by).is_none()
+                && let Some(slot) = gaps.known.get_mut(count)
+            {
+                *slot = Some((strip.seen_by, passes.gap_s(strip.seen_by)));
+                count += 1;
+            }
+        }
+        gaps
+    }
+
+    fn find(&self, seen_by: HeadSet) -> Option<(HeadSet, Option<f64>)> {
+        self.known.iter().map_while(|known| *known).find(|(set, _)| *set == seen_by)
+    }
+
+    /// See [`Passes::gap_s`].
+    fn gap_s(&self, seen_by: HeadSet) -> Option<f64> {
+        self.find(seen_by).map_or_else(|| self.passes.gap_s(seen_by), |(_, gap_s)| gap_s)
+    }
+}
+
 /// Where a step begins, and which way it goes.
 struct Reached {
     head: usize,
     sigma_m: f64,
     strip: usize,
     forward: bool,
+    /// It surely ends in the strip in which it begins.
+    is_within: bool,
 }
 
 /// Notes a step on every strip that it touches or passes over, however narrow.
@@ -353,6 +409,12 @@ fn note_step(
 ) {
     let count = strips.len();
     let mut number = from.strip;
+    if from.is_within {
+        if let (Some(strip), Some(steps)) = (strips.get(number), steps_m.get_mut(setting * count + number)) {
+            note_on(strip, steps, from.head, step_m);
+        }
+        return;
+    }
     let into_m =
         strips.get(number).map_or(0.0, |strip| math::wrap(from.sigma_m - strip.arc.from_m, perimeter_m));
     let mut left_behind_m = if from.forward {
@@ -365,16 +427,20 @@ fn note_step(
         else {
             return;
         };
-        if strip.seen_by.has(from.head) {
-            steps[0] = steps[0].max(step_m);
-        }
-        steps[1] = steps[1].max(step_m);
+        note_on(strip, steps, from.head, step_m);
         left_behind_m += strip.arc.length_m;
         if left_behind_m >= step_m {
             return;
         }
         number = if from.forward { number + 1 } else { number + count - 1 } % count;
     }
+}
+
+fn note_on(strip: &Strip, steps_m: &mut [f64; 2], head: usize, step_m: f64) {
+    if strip.seen_by.has(head) {
+        steps_m[0] = steps_m[0].max(step_m);
+    }
+    steps_m[1] = steps_m[1].max(step_m);
 }
 
 /// Passes this far apart in time, and neighbours this far apart around the wall.
@@ -431,11 +497,20 @@ fn strip(views: &[View], arc: Arc, perimeter_m: f64) -> Strip {
     }
 }
 
-/// The number of the strip at an arc length: the last that begins at or before it.
-fn number_at(strips: &[Strip], sigma_m: f64, perimeter_m: f64) -> usize {
+/// The same as [`number_at`], where a guess is mostly right: soundings follow each other round the wall.
+fn number_near(strips: &[Strip], sigma_m: f64, perimeter_m: f64, guess: usize) -> usize {
     let first_m = strips.first().map_or(0.0, |strip| strip.arc.from_m);
     let from_first_m = math::wrap(sigma_m - first_m, perimeter_m);
+    let begins = |number: usize| strips.get(number).map(|strip| strip.arc.from_m - first_m <= from_first_m);
+    if begins(guess) == Some(true) && begins(guess + 1) != Some(true) {
+        return guess;
+    }
     strips.iter().rposition(|strip| strip.arc.from_m - first_m <= from_first_m).unwrap_or(0)
+}
+
+/// The number of the strip at an arc length: the last that begins at or before it.
+fn number_at(strips: &[Strip], sigma_m: f64, perimeter_m: f64) -> usize {
+    number_near(strips, sigma_m, perimeter_m, strips.len())
 }
 
 #[cfg(test)]

@@ -13,6 +13,9 @@ pub type Yz = [f64; 2];
 const SAME_POINT_M: f64 = 1e-9;
 /// Share of a turn by which a hit may lie beyond an arc's end, so that neighbours leave no crack between them.
 const ARC_SLACK_RAD: f64 = 1e-12;
+/// A direction whose cosine against an arc's middle is off that of the ends by more than this is surely within the arc, or
+/// surely not: far more than the slack and rounding together.
+const CLEAR: f64 = 1e-9;
 
 /// One piece of a profile, as given; pieces follow each other counter-clockwise with y to the right and z up.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -98,7 +101,15 @@ struct Element {
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Shape {
     Line,
-    Arc { centre: Yz, radius_m: f64, from_rad: f64, sweep_rad: f64 },
+    /// `middle` is the unit vector to the arc's middle, `cos_half` the cosine of half its sweep.
+    Arc {
+        centre: Yz,
+        radius_m: f64,
+        from_rad: f64,
+        sweep_rad: f64,
+        middle: Yz,
+        cos_half: f64,
+    },
 }
 
 impl Profile {
@@ -307,7 +318,7 @@ impl Element {
                 let t = cross(start, sub(self.end, self.start)) / (left - right);
                 (t >= 0.0).then_some(t)
             }
-            Shape::Arc { centre, radius_m, from_rad, sweep_rad } => {
+            Shape::Arc { centre, radius_m, from_rad, sweep_rad, middle, cos_half } => {
                 let offset = sub(origin, centre);
                 let a = dot(direction, direction);
                 let b = dot(direction, offset);
@@ -322,6 +333,10 @@ impl Element {
                     return None;
                 }
                 let hit = [offset[0] + t * direction[0], offset[1] + t * direction[1]];
+                let lean = dot(hit, middle) / radius_m - cos_half;
+                if lean.abs() > CLEAR {
+                    return (lean > 0.0).then_some(t);
+                }
                 let turned = math::wrap(math::atan2(hit[1], hit[0]) - from_rad, TAU);
                 let within = turned <= sweep_rad + ARC_SLACK_RAD || turned >= TAU - ARC_SLACK_RAD;
                 within.then_some(t)
@@ -333,7 +348,7 @@ impl Element {
     fn along(&self, point: Yz) -> f64 {
         match self.shape {
             Shape::Line => norm(sub(point, self.start)),
-            Shape::Arc { centre, radius_m, from_rad, sweep_rad } => {
+            Shape::Arc { centre, radius_m, from_rad, sweep_rad, .. } => {
                 let from_centre = sub(point, centre);
                 let turned = math::wrap(math::atan2(from_centre[1], from_centre[0]) - from_rad, TAU);
                 // Beyond the end is a hair before the start.
@@ -377,7 +392,7 @@ impl Element {
                 let angle = math::atan2(cross(start, end), dot(start, end));
                 (angle > 0.0).then_some(angle)
             }
-            Shape::Arc { centre, radius_m, from_rad, sweep_rad } => {
+            Shape::Arc { centre, radius_m, from_rad, sweep_rad, .. } => {
                 // On the arc, forwards means (centre - reference) . e(theta) + radius > 0; checked finely.
                 let shift = sub(centre, reference);
                 let steps = 256;
@@ -410,7 +425,10 @@ fn build(start: Yz, piece: Piece) -> Element {
             let from_rad = math::atan2(from_centre[1], from_centre[0]);
             let (sin, cos) = math::sin_cos(from_rad + sweep_rad);
             let end = [centre[0] + radius_m * cos, centre[1] + radius_m * sin];
-            let shape = Shape::Arc { centre, radius_m, from_rad, sweep_rad };
+            let (sin_middle, cos_middle) = math::sin_cos(from_rad + sweep_rad / 2.0);
+            let middle = [cos_middle, sin_middle];
+            let cos_half = math::cos(sweep_rad / 2.0);
+            let shape = Shape::Arc { centre, radius_m, from_rad, sweep_rad, middle, cos_half };
             Element { start, end, sigma_m: 0.0, length_m: radius_m * sweep_rad, shape }
         }
     }

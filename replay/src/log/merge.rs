@@ -2,6 +2,7 @@
 
 use core::cmp::Reverse;
 use std::collections::BinaryHeap;
+use std::collections::binary_heap::PeekMut;
 
 use super::fields::{Fields, MessageHead};
 
@@ -88,7 +89,7 @@ impl Merge {
             batch.entries.sort_by_key(|entry| (entry.head.log_time, entry.rank, entry.head.sequence));
         }
         let slot = self.spare.pop().unwrap_or(self.batches.len());
-        let key = self.key(span, &batch);
+        let key = key(self.by_time, span, &batch);
         self.memory += batch.memory();
         if slot == self.batches.len() {
             self.batches.push(batch);
@@ -103,13 +104,17 @@ impl Merge {
 
     /// Takes the next message. Its bytes stay until the next call of [`Merge::empty_batch`].
     pub(super) fn pop(&mut self) -> Option<(Entry, usize)> {
-        let Reverse(((_, _, _, span, _), slot)) = self.heads.pop()?;
+        let mut head = self.heads.peek_mut()?;
+        let Reverse(((_, _, _, span, _), slot)) = *head;
         let batch = self.batches.get_mut(slot)?;
         let entry = *batch.entries.get(batch.next)?;
         batch.next += 1;
-        match self.batches.get(slot).and_then(|batch| self.key(span, batch)) {
-            Some(key) => self.heads.push(Reverse((key, slot))),
-            None => self.release(slot),
+        // The next message of a batch is mostly the next of all: it stays at the top.
+        if let Some(key) = key(self.by_time, span, batch) {
+            *head = Reverse((key, slot));
+        } else {
+            PeekMut::pop(head);
+            self.release(slot);
         }
         Some((entry, slot))
     }
@@ -119,15 +124,15 @@ impl Merge {
         self.batches.get(slot).and_then(|batch| batch.bytes.get(entry.start..entry.end)).unwrap_or_default()
     }
 
-    fn key(&self, span: usize, batch: &Batch) -> Option<Key> {
-        let Entry { head, rank, .. } = batch.entries.get(batch.next)?;
-        let (time, rank, sequence) =
-            if self.by_time { (head.log_time, *rank, head.sequence) } else { (0, 0, 0) };
-        Some((time, rank, sequence, span, batch.next))
-    }
-
     fn release(&mut self, slot: usize) {
         self.memory -= self.batches.get(slot).map_or(0, Batch::memory);
         self.spare.push(slot);
     }
+}
+
+/// Where the next message of a batch stands in the order.
+fn key(by_time: bool, span: usize, batch: &Batch) -> Option<Key> {
+    let Entry { head, rank, .. } = batch.entries.get(batch.next)?;
+    let (time, rank, sequence) = if by_time { (head.log_time, *rank, head.sequence) } else { (0, 0, 0) };
+    Some((time, rank, sequence, span, batch.next))
 }

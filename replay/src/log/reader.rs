@@ -93,7 +93,7 @@ pub struct LogReader<R = File> {
     /// Pieces in the order of the file.
     spans: Vec<Span>,
     /// Numbers of the pieces in the order in which they are read.
-    plan: Vec<usize>,
+    plan: Vec<u32>,
     /// How many of the plan have been read.
     read: usize,
     merge: Merge,
@@ -128,9 +128,9 @@ impl<R: Read + Seek> LogReader<R> {
         };
         take_vehicle_file(&mut info);
         let by_time = !channels.has_ticks();
-        let mut plan: Vec<usize> = (0..scan.spans.len()).collect();
+        let mut plan: Vec<u32> = (0..).take(scan.spans.len()).collect();
         if by_time {
-            plan.sort_by_key(|number| scan.spans.get(*number).map(|span| span.from));
+            plan.sort_by_key(|number| scan.spans.get(*number as usize).map(|span| span.from));
         }
         Ok(Self {
             file,
@@ -208,7 +208,7 @@ impl<R: Read + Seek> LogReader<R> {
     }
 
     fn must_read(&self) -> bool {
-        let next = self.plan.get(self.read).and_then(|number| self.spans.get(*number));
+        let next = self.plan.get(self.read).and_then(|number| self.spans.get(*number as usize));
         match (next, self.merge.next_time()) {
             (None, _) => false,
             (Some(_), None) => true,
@@ -219,22 +219,25 @@ impl<R: Read + Seek> LogReader<R> {
     }
 
     fn read_piece(&mut self) -> Result<(), LogError> {
-        let Some(&number) = self.plan.get(self.read) else { return Ok(()) };
+        let Some(number) = self.plan.get(self.read).map(|number| *number as usize) else { return Ok(()) };
         self.read += 1;
         let mut batch = self.merge.empty_batch();
         let mut found = Vec::new();
-        match self.spans.get(number) {
-            Some(Span { piece: Piece::Chunk(place), .. }) => {
-                read_chunk(&mut self.file, place, &mut batch, &mut self.channels, &mut found)?;
-            }
-            Some(span) => read_run(&mut self.file, span, &mut batch)?,
-            None => {}
+        let Some(span) = self.spans.get(number).copied() else { return Ok(()) };
+        let chunk = span.chunk(&mut self.file)?;
+        match &chunk {
+            Some(place) => read_chunk(&mut self.file, place, &mut batch, &mut self.channels, &mut found)?,
+            None if span.piece == Piece::Run => read_run(&mut self.file, &span, &mut batch)?,
+            // The file has changed since it was walked over.
+            None => found.push(LossKind::Contents),
         }
         place_entries(&mut batch, &self.channels, &mut found);
         for kind in found {
             self.lose(number, kind);
         }
-        self.date_cut(number, &batch);
+        if chunk.is_some_and(|place| place.cut) {
+            self.date_cut(span.at, &batch);
+        }
         self.merge.add(number, batch);
         Ok(())
     }
@@ -253,13 +256,9 @@ impl<R: Read + Seek> LogReader<R> {
     }
 
     /// A chunk that the file's end cuts may have given messages nevertheless: the loss begins after them.
-    fn date_cut(&mut self, number: usize, batch: &Batch) {
-        let Some(Span { at, piece: Piece::Chunk(ChunkPlace { cut: true, .. }), .. }) = self.spans.get(number)
-        else {
-            return;
-        };
+    fn date_cut(&mut self, at: u64, batch: &Batch) {
         let last = batch.entries.iter().map(|entry| MonoNs(entry.head.log_time)).max();
-        let loss = self.losses.list_mut().iter_mut().find(|loss| loss.offset == *at);
+        let loss = self.losses.list_mut().iter_mut().find(|loss| loss.offset == at);
         if let (Some(loss), Some(_)) = (loss, last) {
             loss.from = last;
         }

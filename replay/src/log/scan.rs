@@ -23,15 +23,16 @@ const MAX_WHOLE_BYTES: u64 = 16 << 20;
 const MAX_ATTACHMENT_BYTES: u64 = 64 << 20;
 
 /// A piece of the log that is read at once.
-#[derive(Debug)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Piece {
-    Chunk(ChunkPlace),
+    /// Its head is read again when its turn comes: a long dive has a hundred thousand, of half a second each.
+    Chunk,
     /// Messages, and records of other kinds between them, that stand in the file as they are.
     Run,
 }
 
 /// A piece and its place, in the file and in time.
-#[derive(Debug)]
+#[derive(Debug, Clone, Copy)]
 pub(super) struct Span {
     pub(super) at: u64,
     pub(super) end: u64,
@@ -115,14 +116,14 @@ impl Scan {
                     let next = look(file, frame.end)?;
                     if is_believed(file, &frame, &next)? {
                         (at, found) = (frame.end, next);
-                        self.accept(file, frame)?;
+                        self.accept(file, &frame)?;
                         continue;
                     }
                     find_records(file, frame.body, u64::MAX)?
                 }
                 Found::Cut(Frame { item: Item::Chunk(place), end, .. }) => {
                     self.lose(LossKind::Truncated, at..file.len());
-                    self.add_chunk(at, end, place);
+                    self.add_chunk(at, end, &place);
                     return Ok(());
                 }
                 Found::Cut(_) => {
@@ -141,17 +142,17 @@ impl Scan {
         }
     }
 
-    fn accept<R: Read + Seek>(&mut self, file: &mut LogFile<R>, frame: Frame) -> Result<(), LogError> {
-        match frame.item {
+    fn accept<R: Read + Seek>(&mut self, file: &mut LogFile<R>, frame: &Frame) -> Result<(), LogError> {
+        match &frame.item {
             Item::Message { .. } if self.ours => self.lose(LossKind::Framing, frame.at..frame.end),
-            Item::Message { log_time } => self.add_message(&frame, log_time),
+            Item::Message { log_time } => self.add_message(frame, *log_time),
             Item::Chunk(place) => self.add_chunk(frame.at, frame.end, place),
-            Item::Channel => self.add_channel(file, &frame)?,
-            Item::Metadata => self.add_metadata(file, &frame)?,
-            Item::Attachment(ref place) => self.add_attachment(file, &frame, place)?,
-            Item::Statistics { channels } => self.summary_channels = Some(channels),
+            Item::Channel => self.add_channel(file, frame)?,
+            Item::Metadata => self.add_metadata(file, frame)?,
+            Item::Attachment(place) => self.add_attachment(file, frame, place)?,
+            Item::Statistics { channels } => self.summary_channels = Some(*channels),
             Item::DataEnd => self.data_end = Some(frame.at),
-            Item::Header { ours } => self.ours = ours,
+            Item::Header { ours } => self.ours = *ours,
             Item::Footer | Item::Other => {}
         }
         Ok(())
@@ -168,9 +169,9 @@ impl Scan {
         }
     }
 
-    fn add_chunk(&mut self, at: u64, end: u64, place: ChunkPlace) {
+    fn add_chunk(&mut self, at: u64, end: u64, place: &ChunkPlace) {
         let (from, to) = place.times;
-        self.spans.push(Span { at, end, from, to, piece: Piece::Chunk(place) });
+        self.spans.push(Span { at, end, from, to, piece: Piece::Chunk });
         self.run_open = false;
     }
 
@@ -260,9 +261,9 @@ impl Scan {
     /// believed before what stands outside.
     fn look_into_chunks<R: Read + Seek>(&mut self, file: &mut LogFile<R>) -> Result<(), LogError> {
         for span in &self.spans {
-            let Piece::Chunk(place) = &span.piece else { continue };
+            let Some(place) = span.chunk(file)? else { continue };
             let mut defined = Vec::new();
-            let unpacked = unpack(file, place, |opcode, body| {
+            let unpacked = unpack(file, &place, |opcode, body| {
                 if opcode == mcap::records::op::CHANNEL {
                     defined.extend(Definition::read(&mut Fields::new(body)));
                 }
@@ -328,6 +329,21 @@ fn is_believed<R: Read + Seek>(file: &mut LogFile<R>, frame: &Frame, next: &Foun
 }
 
 impl Span {
+    /// The chunk that it is, as its head says; `None` for a run.
+    pub(super) fn chunk<R: Read + Seek>(
+        &self,
+        file: &mut LogFile<R>,
+    ) -> Result<Option<ChunkPlace>, LogError> {
+        if self.piece == Piece::Run {
+            return Ok(None);
+        }
+        Ok(match look(file, self.at)? {
+            Found::Record(Frame { item: Item::Chunk(place), .. })
+            | Found::Cut(Frame { item: Item::Chunk(place), .. }) => Some(place),
+            _ => None,
+        })
+    }
+
     /// Whether its times mean anything: a chunk without messages has none.
     pub(super) fn is_dated(&self) -> bool {
         (self.from, self.to) != (0, 0)

@@ -2,7 +2,8 @@
 
 use serde::Serialize;
 
-use crate::coverage::{Action, Evidence, Run, RunId, Runs, Sections};
+use crate::app::flow::{AdviceEntry, AdviceLog};
+use crate::coverage::{Action, Run, RunId, Runs, Sections};
 use crate::time::MonoNs;
 use crate::tunnel::Profile;
 
@@ -74,25 +75,29 @@ pub(super) fn run_reports(sections: &Sections, profile: &Profile) -> Vec<RunRepo
         .collect()
 }
 
+/// How near a run advice counts for it, m.
+const NEAR_M: f64 = 1.0;
+
 /// What still fails, from the far end to the portal.
-pub(super) fn way_home(sections: &Sections) -> Vec<ReturnReport> {
+pub(super) fn way_home(sections: &Sections, log: &AdviceLog) -> Vec<ReturnReport> {
     let runs: &Runs = sections.runs();
     let open = (0..).map(RunId).zip(runs.all()).filter(|(_, run)| run.is_open());
-    let mut stops: Vec<ReturnReport> = open.map(|(id, run)| stop(sections, id, run)).collect();
+    let mut stops: Vec<ReturnReport> = open.map(|(id, run)| stop(sections, log, id, run)).collect();
     stops.sort_by(|a, b| b.from_m.total_cmp(&a.from_m));
     stops
 }
 
-fn stop(sections: &Sections, id: RunId, run: &Run) -> ReturnReport {
-    let evidence = |index: i64| sections.get(index).filter(|section| section.is_flagged())?.evidence;
-    // Where nothing could be advised, as if the heads had been evenly spread.
-    let speed = |evidence: Evidence| match evidence.v_max_mps {
-        none if none <= 0.0 => evidence.even_v_max_mps,
-        v_max_mps => v_max_mps,
-    };
-    let speeds = (run.from..run.to).filter_map(evidence).map(speed);
-    let at_most_mps = speeds.reduce(f64::min).unwrap_or(0.0);
+fn stop(sections: &Sections, log: &AdviceLog, id: RunId, run: &Run) -> ReturnReport {
     let (to_m, from_m) = (sections.bounds_m(run.from).0, sections.bounds_m(run.to - 1).1);
+    let near = |entry: &&AdviceEntry| {
+        entry.chainage_m.is_some_and(|x_m| (to_m - NEAR_M..from_m + NEAR_M).contains(&x_m))
+    };
+    let advised = log.entries.iter().filter(near).map(|entry| entry.advice.v_max_mps);
+    // Where nothing could be advised, as if the heads that turned had been evenly spread.
+    let evidence = |index: i64| sections.get(index).filter(|section| section.is_flagged())?.evidence;
+    let evenly = (run.from..run.to).filter_map(evidence).map(|evidence| evidence.even_v_max_mps);
+    let at_most_mps = advised.filter(|mps| *mps > 0.0).reduce(f64::min).or_else(|| evenly.reduce(f64::min));
+    let at_most_mps = at_most_mps.unwrap_or(0.0);
     let takes_s = (at_most_mps > 0.0).then(|| (from_m - to_m) / at_most_mps);
     ReturnReport { run: id.0, from_m, to_m, action: Action::of(run.cause).as_str(), at_most_mps, takes_s }
 }

@@ -76,8 +76,6 @@ pub struct EvidenceReport {
     pub cause: &'static str,
     /// Mean speed in the section, m/s.
     pub speed_mps: f64,
-    /// Largest speed that was advised there, m/s.
-    pub v_max_mps: f64,
     /// Speed that would have met the target with the heads evenly spread, m/s.
     pub even_v_max_mps: f64,
     /// Time between passes, seconds.
@@ -151,7 +149,6 @@ fn evidence_report(evidence: Evidence) -> EvidenceReport {
     EvidenceReport {
         cause: evidence.cause.as_str(),
         speed_mps: evidence.speed_mps,
-        v_max_mps: evidence.v_max_mps,
         even_v_max_mps: evidence.even_v_max_mps,
         pass_gap_s: evidence.pass_gap_s,
         even_pass_gap_s: evidence.even_pass_gap_s,

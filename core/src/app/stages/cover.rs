@@ -135,7 +135,6 @@ fn note_passage(coverage: &mut Coverage, sweeps: &mut HeadSweeps, driven: &Drive
     passage.all_gap_sum_s += driven.all_gap_s;
     passage.ping_period_sum_s += driven.ping_period_s;
     passage.swing_sum_m += driven.swing_m;
-    passage.v_max_sum_mps += driven.v_max_mps;
     passage.middle_t_y_m = passage.middle_t_y_m.max(driven.middle_t_y_m);
     passage.doubt.add(&Doubt::of(&fix));
 }

@@ -30,16 +30,14 @@ pub(super) struct Driven {
     pub(super) swing_m: f64,
     /// The largest step along the wall from the middle of the tunnel, m.
     pub(super) middle_t_y_m: f64,
-    /// The largest speed advised, m/s.
-    pub(super) v_max_mps: f64,
 }
 
 /// The last beat, and which way the vehicle looked at those before.
 #[derive(Debug, Clone, Default, Resource)]
 pub(in crate::app) struct Driving {
     pub(super) now: Driven,
-    /// The step for which `middle_t_y_m` was looked up, radians.
-    step_rad: f64,
+    /// The step for which `middle_t_y_m` was looked up, in soundings of a ring.
+    stride: usize,
     /// The last beat at which a head turned.
     turned: Option<MonoNs>,
     looks: Looks,
@@ -51,10 +49,10 @@ impl Driving {
     /// Allocates: never.
     pub(super) fn note(&mut self, at: MonoNs, situation: &Situation, profile: &Profile, advisor: &Advisor) {
         self.note_gaps(at, situation);
-        self.now.v_max_mps = advisor.advised_mps();
         let step_rad = situation.heads.iter().flatten().map(|motion| motion.step_rad).fold(0.0, f64::max);
-        if step_rad > 0.0 && (step_rad - self.step_rad).abs() > 0.0 {
-            self.step_rad = step_rad;
+        let stride = Advisor::stride(step_rad);
+        if step_rad > 0.0 && stride != self.stride {
+            self.stride = stride;
             self.now.middle_t_y_m = advisor.middle_step_m(step_rad);
         }
         let Some(pose) = situation.pose else {

@@ -175,6 +175,12 @@ impl SampleStore {
         }
     }
 
+    /// Gives all samples and their memory back; nothing is stored any more.
+    pub fn release(&mut self) {
+        let layout = StoreLayout { to_m: self.layout.from_m, capacity: 0, ..self.layout };
+        *self = Self::new(layout);
+    }
+
     /// Perimeter of the profile, m.
     pub fn perimeter_m(&self) -> f64 {
         self.layout.perimeter_m

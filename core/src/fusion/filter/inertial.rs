@@ -63,16 +63,28 @@ impl Default for Leg {
 impl State {
     /// Moves the estimate on by what was felt over `dt_s`, and notes in `leg` what that does to its errors.
     pub fn go_on(&mut self, felt: &Felt, dt_s: f64, gravity_mps2: f64, leg: &mut Leg) {
+        let (turn, force) = self.move_on(felt, dt_s, gravity_mps2);
+        leg.add(dt_s, turn, force, felt.rate_radps.is_some());
+    }
+
+    /// Moves the estimate on by what was felt over `dt_s`; gives its attitude in the middle of that, and the specific force
+    /// in the tunnel's frame.
+    pub fn move_on(
+        &mut self,
+        felt: &Felt,
+        dt_s: f64,
+        gravity_mps2: f64,
+    ) -> (Matrix3<f64>, Option<Vector3<f64>>) {
         let half = felt.rate_radps.map(|rate| rotation((rate + -self.rate_bias_radps).scaled(dt_s / 2.0)));
         let middle = half.map_or(self.attitude, |half| self.attitude * half);
         let turn = matrix(middle);
         let force = felt.force_mps2.map(|force| turn * (force + -self.force_bias_mps2).0);
-        leg.add(dt_s, turn, force, felt.rate_radps.is_some());
         let lift = Vector3::new(0.0, 0.0, -gravity_mps2);
         let gain = Vec3::of(force.map_or_else(Vector3::zeros, |force| (force + lift) * dt_s));
         self.position = self.position + (self.velocity_mps + gain.scaled(0.5)).scaled(dt_s);
         self.velocity_mps = self.velocity_mps + gain;
         self.attitude = half.map_or(self.attitude, |half| middle * half);
+        (turn, force)
     }
 }
 

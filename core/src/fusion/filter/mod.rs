@@ -20,7 +20,6 @@ pub mod window;
 mod tests;
 
 use self::align::{LISTENS, Listening};
-use self::inertial::Leg;
 use self::running::{Context, Running};
 use self::settings::Settings;
 use self::sources::{Consistency, Source};
@@ -226,12 +225,11 @@ impl FilterNavigation {
     /// The estimate at each moment since the last epoch at which the inertial unit has spoken.
     fn carry_ahead(&mut self) {
         let (mut now, mut state) = (self.running.at, self.running.state);
-        let mut leg = Leg::default();
         self.ahead.clear();
         self.ahead.push((now, state));
         while let Some(heard) = self.window.next_felt(now).filter(|_| self.ahead.len() < AHEAD) {
             let (felt, until) = self.window.felt(now, heard);
-            state.go_on(&felt, until.since(now).as_secs_f64(), self.context.site.gravity_mps2, &mut leg);
+            state.move_on(&felt, until.since(now).as_secs_f64(), self.context.site.gravity_mps2);
             now = until;
             self.ahead.push((now, state));
         }
@@ -378,11 +376,10 @@ impl Navigation for FilterNavigation {
             if at.since(*from).0 > CARRIES.0 {
                 return Err(NoFix::Heading);
             }
-            let mut leg = Leg::default();
             let mut now = *from;
             while now < at {
                 let (felt, until) = self.window.felt(now, at);
-                state.go_on(&felt, until.since(now).as_secs_f64(), self.context.site.gravity_mps2, &mut leg);
+                state.move_on(&felt, until.since(now).as_secs_f64(), self.context.site.gravity_mps2);
                 now = until;
             }
         } else {

@@ -42,7 +42,7 @@ impl Element {
                 let share = (dot(sub(point, self.start), along) / dot(along, along)).clamp(0.0, 1.0);
                 [self.start[0] + share * along[0], self.start[1] + share * along[1]]
             }
-            Shape::Arc { centre, radius_m, from_rad, sweep_rad } => {
+            Shape::Arc { centre, radius_m, from_rad, sweep_rad, .. } => {
                 let out = sub(point, centre);
                 let length = norm(out);
                 let turned = math::wrap(math::atan2(out[1], out[0]) - from_rad, TAU);
