@@ -68,7 +68,7 @@ pub(crate) fn dive(scene: &Scene, dumb: Option<&str>, tick: DurNs) -> Advised {
         }
     };
     drive(&mut dive, &mut feed, Pace { tick, ..Pace::default() }, &mut note).unwrap();
-    dive.finish();
+    dive.finish(&mut |_, _| {});
     Advised { beats, report: Report::of(&dive), digest: dive.digest() }
 }
 

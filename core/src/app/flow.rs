@@ -366,6 +366,7 @@ impl AdviceLog {
 mod tests {
     use super::*;
     use crate::sampling::advice::{Advisor, Task};
+    use crate::sampling::swing::Swing;
     use crate::tunnel::named;
 
     /// Advice that changes at every beat of ten hours is told from beginning to end in the room that there is.
@@ -377,11 +378,12 @@ mod tests {
         let nowhere = Situation {
             pose: None,
             speed_mps: 0.0,
+            doubt_m: 0.0,
             layout: HeadLayout::PhaseShift,
             configured: 0,
             heads: [None; crate::sampling::head::MAX_HEADS],
         };
-        let advice = Advisor::new(&profile, task, &[], &[]).advise(&nowhere, None);
+        let advice = Advisor::new(&profile, task, &[], &[]).advise(&nowhere, Swing::default(), None);
         let mut log = AdviceLog::default();
         let room = log.entries.capacity();
         let beats = 180_000_u32;

@@ -179,6 +179,9 @@ impl Ring {
             way_m += math::wrap_signed(b.sigma_m - a.sigma_m, self.perimeter_m);
         }
         self.way_m.push(way_m);
+        // Room for what `keep_steps` may be asked for later, when nothing may allocate.
+        self.steps_m.clear();
+        self.steps_m.reserve(self.soundings.len());
         Ok(())
     }
 
