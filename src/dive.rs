@@ -126,12 +126,14 @@ impl Dive {
         });
         drop(progress);
         self.armed.finish(&mut |notice, dive| watch.notice(notice, dive));
+        // While there still are samples.
+        let what_if = self.armed.what_if(&self.what_if.targets_m, &self.what_if.sections_m);
         watch.end(&self.armed);
         beside(&self.armed);
         // A long dive's report takes as much room as its samples, which it needs no more.
         self.armed.release_samples();
         let mut report = Report::of(&self.armed);
-        report.what_if = self.armed.what_if(&self.what_if.targets_m, &self.what_if.sections_m);
+        report.what_if = what_if;
         if let Some((path, handle)) = self.recorder.take() {
             drop(self.armed);
             let written = handle.finish();

@@ -175,10 +175,10 @@ impl SampleStore {
         }
     }
 
-    /// Gives all samples and their memory back; nothing is stored any more.
+    /// Gives all samples and their memory back; nothing is stored any more, but how many others stood for is still known.
     pub fn release(&mut self) {
         let layout = StoreLayout { to_m: self.layout.from_m, capacity: 0, ..self.layout };
-        *self = Self::new(layout);
+        *self = Self { thinned: self.thinned, ..Self::new(layout) };
     }
 
     /// Perimeter of the profile, m.
