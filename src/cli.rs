@@ -20,9 +20,12 @@ pub(crate) enum Command {
     /// VITA 2 with four heads in the Ceran tunnel, most of the way at a speed that is right and for a stretch too fast.
     #[command(after_help = "Example:\n  headrace demo --speed max --out /tmp/demo")]
     Demo(Demo),
-    /// The dive itself. In this version it is fed by a recorded log in place of the ports.
+    /// The dive itself: every sensor on its own port, recorded, until it is interrupted.
+    ///
+    /// A sensor that isn't there is tried for ever, and the dive goes on with the others, unless --require names it. With
+    /// --source a recorded dive takes the ports' place.
     #[command(
-        after_help = "Example:\n  headrace run deploy/vehicles/vita2-4.toml --source dive.mcap --record again.mcap"
+        after_help = "Example:\n  headrace run vehicle.toml --record dive.mcap --require imu,sonar_0\n  headrace run vehicle.toml --source dive.mcap --record again.mcap"
     )]
     Run(Run),
     /// Run a recorded dive through the very same loop.
@@ -50,6 +53,14 @@ pub(crate) enum Command {
     /// code 1 when nothing can be told.
     #[command(after_help = CALIBRATE_EXAMPLES)]
     Calibrate(Calibrate),
+    /// Put a scene's devices on real ports, at real speed, for a rehearsal of the dive.
+    ///
+    /// Prints a vehicle file that `headrace run` takes. The vehicle stands until all its sensors are called, and then a while;
+    /// the command ends when the way has.
+    #[command(
+        after_help = "Example:\n  headrace emulate deploy/scenes/demo.toml --out /tmp/rehearsal\n  headrace run /tmp/rehearsal/vehicle.toml"
+    )]
+    Emulate(Emulate),
     /// Say what is wrong with a vehicle file, or what it describes.
     #[command(after_help = "Example:\n  headrace check deploy/vehicles/vita2-4.toml")]
     Check(Check),
@@ -74,15 +85,45 @@ pub(crate) struct Run {
     /// Vehicle file.
     pub(crate) vehicle: PathBuf,
     /// Log whose messages take the place of the ports'.
-    #[arg(long, value_name = "LOG.mcap")]
+    #[arg(long, value_name = "LOG.mcap", conflicts_with_all = ["require", "duration", "no_record"])]
     pub(crate) source: Option<PathBuf>,
-    /// Log to write.
+    /// Log to write; on ports it is dive-SECONDS.mcap in this folder unless said otherwise.
     #[arg(long, value_name = "LOG.mcap")]
     pub(crate) record: Option<PathBuf>,
+    /// Write no log.
+    #[arg(long, conflicts_with = "record")]
+    pub(crate) no_record: bool,
+    /// Sensors without which the dive ends, by their ids, or all; each has 30 s to run.
+    #[arg(long, value_name = "ID,..", value_delimiter = ',')]
+    pub(crate) require: Vec<String>,
+    /// End the dive after so many seconds.
+    #[arg(long = "for", value_name = "SECONDS", value_parser = moment)]
+    pub(crate) duration: Option<f64>,
     #[arg(long, value_name = "max|Nx", default_value = "1x", value_parser = speed, help = SPEED_HELP)]
     pub(crate) speed: Speed,
     #[command(flatten)]
     pub(crate) output: Output,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Emulate {
+    /// Scene file.
+    pub(crate) scene: PathBuf,
+    /// Folder for the vehicle file of the rehearsal.
+    #[arg(long, value_name = "DIR", default_value = "headrace-rehearsal")]
+    pub(crate) out: PathBuf,
+    /// Seed of the random numbers, in place of the scene's.
+    #[arg(long, value_name = "N")]
+    pub(crate) seed: Option<u64>,
+    /// Address on which the devices of the network listen.
+    #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1")]
+    pub(crate) listen: std::net::IpAddr,
+    /// Seconds for which the vehicle stands once all sensors are called: heads find their places.
+    #[arg(long, value_name = "SECONDS", default_value = "8", value_parser = moment)]
+    pub(crate) stand: f64,
+    /// Seconds for which the devices go on once the way has ended.
+    #[arg(long, value_name = "SECONDS", default_value = "5", value_parser = moment)]
+    pub(crate) linger: f64,
 }
 
 #[derive(Debug, Args)]

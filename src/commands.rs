@@ -14,10 +14,11 @@ use serde_json::json;
 
 use crate::cli::{Check, Demo, Output, Replay, Run};
 use crate::devices::KINDS;
-use crate::dive::{self, WhatIf, assemble};
+use crate::dive::{self, Clock, Recording, WhatIf, assemble};
 use crate::expect;
 use crate::failure::{self, Failure};
 use crate::files;
+use crate::live;
 use crate::output::{deliver, deliver_json, put, say};
 use crate::smooth;
 use crate::summary::summary;
@@ -33,7 +34,8 @@ pub(crate) fn demo(args: &Demo) -> Result<u8, Failure> {
     if log.exists() {
         std::fs::remove_file(&log).map_err(|source| Failure::Write { path: log.clone(), source })?;
     }
-    let dive = assemble(&scene.vehicle, &scene.vehicle_text, Some(&log))?;
+    let dive =
+        assemble(&scene.vehicle, &scene.vehicle_text, Some(Recording { path: &log, clock: Clock::Theirs }))?;
     say(&format!("{}, target {} m: a simulated dive", scene.vehicle.name, scene.vehicle.target_m));
     let mut feed = SimulationFeed::new(Simulation::new(&scene)?);
     let pace = Pace { speed: args.speed.0, ..Pace::default() };
@@ -47,14 +49,10 @@ pub(crate) fn demo(args: &Demo) -> Result<u8, Failure> {
 /// The dive itself.
 pub(crate) fn run(args: &Run) -> Result<u8, Failure> {
     let (text, vehicle) = vehicle_file(&args.vehicle)?;
-    let Some(log) = &args.source else {
-        return Err(Failure::Usage(
-            "run: this version has no port drivers; --source LOG.mcap feeds the loop from a recorded dive"
-                .to_owned(),
-        ));
-    };
+    let Some(log) = &args.source else { return live::run(args, &text, &vehicle) };
     let mut player = Player::open(log)?;
-    let dive = assemble(&vehicle, &text, args.record.as_deref())?;
+    let recording = args.record.as_deref().map(|path| Recording { path, clock: Clock::Theirs });
+    let dive = assemble(&vehicle, &text, recording)?;
     player.connect(dive.armed.sources());
     let pace = Pace { speed: args.speed.0, ..Pace::default() };
     let mut report = dive.run(&mut player, pace, &mut watch(&args.output))?;
@@ -123,6 +121,18 @@ pub(crate) fn check(args: &Check) -> Result<u8, Failure> {
         for sensor in sensors {
             say(&format!("  {:<12} {:<12} {}", sensor.id, sensor.plugin, sensor.connect));
         }
+    }
+    let wrong =
+        live::connections(&vehicle).into_iter().filter_map(|(id, connect)| Some((id, connect.err()?)));
+    // A vehicle that is only simulated or replayed needs no ports.
+    let wrong: Vec<_> = wrong.filter(|(_, error)| !error.text.is_empty()).collect();
+    for (id, error) in &wrong {
+        eprintln!("headrace: sensor {id:?}: {error}");
+    }
+    if !wrong.is_empty() {
+        return Ok(failure::USAGE);
+    }
+    if !args.json {
         say("nothing is wrong with it");
     }
     Ok(failure::OK)
@@ -154,7 +164,7 @@ fn parse_vehicle(name: &str, text: &str, load: Loader<'_>) -> Result<VehicleConf
     Ok(VehicleConfig::parse(Document::new(name, text), &KINDS, load)?)
 }
 
-fn watch(output: &Output) -> Watch {
+pub(crate) fn watch(output: &Output) -> Watch {
     if output.json { Watch::quiet() } else { Watch::loud() }
 }
 
@@ -172,7 +182,7 @@ fn note_losses(report: &mut Report, path: &Path, player: &Player) -> Result<(), 
     Ok(())
 }
 
-fn finish(report: &Report, output: &Output) -> Result<u8, Failure> {
+pub(crate) fn finish(report: &Report, output: &Output) -> Result<u8, Failure> {
     if let Some(path) = &output.report {
         files::write_json(path, report)?;
     }

@@ -6,12 +6,13 @@ use headrace_core::app::App;
 use headrace_core::app::flow::Tally;
 use headrace_core::app::outlet::{NoticeOutlet, NoticeReceiver};
 use headrace_core::app::plugin::Plugin;
-use headrace_core::app::report::{LogReport, Report};
+use headrace_core::app::report::{LineReport, LogReport, Report};
 use headrace_core::app::run::Loop;
 use headrace_core::config::VehicleConfig;
 use headrace_core::fusion::Navigation;
+use headrace_ports::Crew;
 use headrace_replay::drive::{Feed, Pace, drive};
-use headrace_replay::log::{LogHeader, Recorder, RecorderHandle, SourceInfo, file_digest};
+use headrace_replay::log::{LogHeader, Recorder, RecorderHandle, SentPort, SourceInfo, file_digest};
 use headrace_replay::record::{QUEUE_BYTES, RecorderOutlet};
 
 use crate::failure::{self, Failure};
@@ -30,6 +31,22 @@ pub(crate) struct Dive {
     what_if: WhatIf,
 }
 
+/// A log to write.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Recording<'a> {
+    pub(crate) path: &'a Path,
+    pub(crate) clock: Clock,
+}
+
+/// Whose clock the stamps are of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Clock {
+    /// This machine's.
+    Ours,
+    /// A recorded or a simulated dive's.
+    Theirs,
+}
+
 /// Targets and lengths of section that a dive is to be judged by besides, m.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct WhatIf {
@@ -37,11 +54,11 @@ pub(crate) struct WhatIf {
     pub(crate) sections_m: Vec<f64>,
 }
 
-/// Assembles the loop for a vehicle; `record_to` names a log to write.
+/// Assembles the loop for a vehicle.
 pub(crate) fn assemble(
     vehicle: &VehicleConfig,
     vehicle_text: &str,
-    record_to: Option<&Path>,
+    record_to: Option<Recording<'_>>,
 ) -> Result<Dive, Failure> {
     assemble_with(vehicle, vehicle.navigation(), vehicle_text, record_to)
 }
@@ -51,7 +68,7 @@ pub(crate) fn assemble_with(
     vehicle: &VehicleConfig,
     navigation: Box<dyn Navigation>,
     vehicle_text: &str,
-    record_to: Option<&Path>,
+    record_to: Option<Recording<'_>>,
 ) -> Result<Dive, Failure> {
     let mut app = App::new(vehicle.mission());
     for sensor in &vehicle.sensors {
@@ -62,14 +79,24 @@ pub(crate) fn assemble_with(
     app.add_plugin(&outlet)?;
     let recorder = match record_to {
         None => None,
-        Some(path) => {
-            let (port, handle) =
-                Recorder::create(path, &log_header(vehicle, vehicle_text, true), QUEUE_BYTES)?;
+        Some(Recording { path, clock }) => {
+            let mut header = log_header(vehicle, vehicle_text, true);
+            if clock == Clock::Ours {
+                anchor(&mut header);
+            }
+            let (port, handle) = Recorder::create(path, &header, QUEUE_BYTES)?;
             app.add_plugin(&RecorderOutlet::new(port))?;
             Some((path.to_owned(), handle))
         }
     };
     Ok(Dive { armed: app.arm(navigation)?, notices, recorder, what_if: WhatIf::default() })
+}
+
+/// Notes what time of day it is on the clock of the stamps.
+fn anchor(header: &mut LogHeader) {
+    let (monotonic, utc) = headrace_ports::clock_anchor();
+    header.metadata.insert("clock_anchor_monotonic_ns".to_owned(), monotonic.0.to_string());
+    header.metadata.insert("clock_anchor_utc_ns".to_owned(), utc.0.to_string());
 }
 
 /// What a log of this vehicle begins with.
@@ -125,6 +152,50 @@ impl Dive {
             beside(dive);
         });
         drop(progress);
+        let report = self.end(watch, beside)?;
+        driven?;
+        Ok(report)
+    }
+
+    /// Runs the loop on the ports that a crew serves, until `ended` says so, and gives the report. `beside` sees the crew
+    /// after every tick.
+    pub(crate) fn run_live(
+        mut self,
+        crew: Crew,
+        ended: &dyn Fn() -> bool,
+        watch: &mut Watch,
+        beside: &mut dyn FnMut(&Crew, &mut Watch),
+    ) -> Result<Report, Failure> {
+        let notices = self.notices.clone();
+        crew.run(&mut self.armed, ended, &mut |dive| {
+            while let Some(notice) = notices.next() {
+                watch.notice(&notice, dive);
+            }
+            beside(&crew, watch);
+        });
+        let histories = crew.stop(&mut self.armed, &mut |_| ());
+        while let Some(notice) = notices.next() {
+            watch.notice(&notice, &self.armed);
+        }
+        let mut report = self.end(watch, &mut |_| ())?;
+        for (source, history) in report.sources.iter_mut().zip(histories) {
+            source.line = Some(LineReport {
+                opened: history.opened,
+                lost: history.lost,
+                dropped_packets: history.dropped,
+                status: history.last,
+            });
+        }
+        Ok(report)
+    }
+
+    /// An end of the recorder for what is sent to the devices.
+    pub(crate) fn sent_port(&self) -> Option<SentPort> {
+        self.recorder.as_ref().map(|(_, handle)| handle.sent_port())
+    }
+
+    /// Ends the dive and gives the report.
+    fn end(mut self, watch: &mut Watch, beside: &mut dyn FnMut(&Loop)) -> Result<Report, Failure> {
         self.armed.finish(&mut |notice, dive| watch.notice(notice, dive));
         // While there still are samples.
         let what_if = self.armed.what_if(&self.what_if.targets_m, &self.what_if.sections_m);
@@ -145,7 +216,6 @@ impl Dive {
                 losses: losses.into_iter().collect(),
             });
         }
-        driven?;
         Ok(report)
     }
 }

@@ -49,6 +49,10 @@ pub(crate) enum Failure {
     Experiment(#[from] ExperimentError),
     #[error(transparent)]
     Picture(#[from] PictureError),
+    #[error("{what}: {source}")]
+    System { what: &'static str, source: std::io::Error },
+    #[error("{0}")]
+    Required(String),
     #[error("{0}")]
     Usage(String),
 }

@@ -5,9 +5,11 @@ mod cli;
 mod commands;
 mod devices;
 mod dive;
+mod emulate;
 mod expect;
 mod failure;
 mod files;
+mod live;
 mod output;
 mod paper;
 mod pictures;
@@ -34,6 +36,7 @@ fn main() -> ExitCode {
         Command::Simulate(simulate) => simulate::simulate(&simulate),
         Command::Plan(args) => plan::plan(&args),
         Command::Calibrate(args) => calibrate::calibrate(&args),
+        Command::Emulate(args) => emulate::emulate(&args),
         Command::Check(check) => commands::check(&check),
         Command::Paper(args) => paper::paper(&args),
     };

@@ -11,6 +11,7 @@ use headrace_core::coverage::{Action, Cause, Evidence, Run, RunChange, RunId, Se
 use headrace_core::sampling::advice::{Reason, Remedy};
 use headrace_core::time::{DurNs, MonoNs};
 use headrace_core::tunnel::Profile;
+use headrace_ports::Status;
 
 use crate::output::{put, say};
 use crate::station::station;
@@ -69,6 +70,13 @@ impl Watch {
                     self.line(&alert_words(alert));
                 }
             }
+        }
+    }
+
+    /// A sensor does better or worse than before.
+    pub(crate) fn sensor(&mut self, id: &str, status: &Status) {
+        if !self.quiet {
+            self.line(&format!("SENSOR   {id:<12} {status}"));
         }
     }
 

@@ -98,7 +98,8 @@ impl<'a> ByHand<'a> {
     fn new(scene: &'a Scene) -> Self {
         let sensors = scene.vehicle.sensors.iter().zip(&scene.vehicle.sensor_configs).zip(&scene.programs);
         let heads = sensors.map(|((sensor, config), program)| {
-            let setup = EmulatorSetup { start: START, head: Some(*program), site: scene.vehicle.site };
+            let setup =
+                EmulatorSetup { start: START, head: Some(*program), site: scene.vehicle.site, polled: true };
             let Emulated::Head(head) = sensor.emulator(&setup) else { panic!("heads come first") };
             (head, config.mount)
         });

@@ -4,6 +4,7 @@
 //! Discovering and opening the port, decoding (pure) and applying (in the loop) are three separate things; this file
 //! has the second, and the device's side of the wire for simulations.
 
+use super::driver::{Carrier, Driver, DriverSetup};
 use super::measurement::{Inertia, Payout, Pressure, Sounding};
 use super::plugin::Plugin;
 use super::reading::{Decoded, Packet};
@@ -39,18 +40,17 @@ pub trait Device: Plugin + Send + Sync {
         Ok(Vec::new())
     }
 
-    /// For a profiling head that is at `angle_rad` and would step towards `growing` angles, both in the sensor's frame:
-    /// the messages, in order, after which it is at its program's start and steps as that begins.
-    fn start_commands(&self, angle_rad: f64, growing: bool, program: &HeadProgram) -> Vec<Vec<u8>> {
-        let _ = (angle_rad, growing, program);
-        Vec::new()
-    }
-
     /// What it senses: what a simulation has to tell its emulator.
     fn sense(&self) -> Sense;
 
     /// The device's side of the wire, for simulations.
     fn emulator(&self, setup: &EmulatorSetup) -> Emulated;
+
+    /// What may carry its bytes. UDP may stand in for any of them, a message a datagram.
+    fn carriers(&self) -> &'static [Carrier];
+
+    /// The host's side of its line.
+    fn driver(&self, setup: &DriverSetup) -> Box<dyn Driver>;
 }
 
 /// Bytes to readings: a codec with the device's configuration around it. Pure, in the loop.
@@ -79,6 +79,8 @@ pub struct EmulatorSetup {
     pub head: Option<HeadProgram>,
     /// The water and the tunnel's place, as those who set it up know them.
     pub site: Site,
+    /// Whether the host that polls it is emulated, too; else it does what is asked of it through [`Emulator::hear`].
+    pub polled: bool,
 }
 
 /// Which way bytes went on a line.
@@ -98,6 +100,10 @@ pub trait Emulator<M>: Send + Sync {
     /// Adds the measurements that the device makes before `until` and hasn't been asked for yet, in order of time, on
     /// the device's own clock.
     fn begin(&mut self, until: MonoNs, due: &mut Vec<M>);
+
+    /// Bytes that a host has sent it, at `at` on the device's own clock; a device that isn't polled heeds none. What it answers
+    /// without measuring goes to `line`.
+    fn hear(&mut self, _at: MonoNs, _bytes: &[u8], _line: LineSink<'_>) {}
 
     /// Puts what was measured on the line, each message with its time: once for each measurement that has begun, in the
     /// same order.

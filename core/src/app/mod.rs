@@ -4,6 +4,7 @@ pub mod alerts;
 pub mod components;
 pub mod device;
 pub mod digest;
+pub mod driver;
 pub mod flow;
 pub mod head;
 pub mod measurement;

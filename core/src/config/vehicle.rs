@@ -9,8 +9,9 @@ use crate::app::device::{Device, DeviceKind};
 use crate::coverage::StoreLayout;
 use crate::frames::{Mount, Rot, Vec3};
 use crate::fusion::{Navigation, NavigationConfig};
-use crate::sampling::head::HeadSpec;
-use crate::sampling::layout::HeadLayout;
+use crate::sampling::SamplingError;
+use crate::sampling::head::{HeadProgram, HeadSpec};
+use crate::sampling::layout::{self, HeadLayout};
 use crate::sampling::occlusion::Obstacle;
 use crate::site::Site;
 use crate::time::DurNs;
@@ -196,6 +197,17 @@ impl VehicleConfig {
     /// Navigation at the start of a dive.
     pub fn navigation(&self) -> Box<dyn Navigation> {
         self.navigation.begin(&self.tunnel.profile, self.site)
+    }
+
+    /// What the heads do, in the order of the file; none without heads.
+    ///
+    /// Errors: heads that no program fits.
+    pub fn programs(&self) -> Result<Vec<HeadProgram>, SamplingError> {
+        let heads = self.heads();
+        if heads.is_empty() {
+            return Ok(Vec::new());
+        }
+        layout::programs(&heads, self.layout, self.planned_speed_mps)
     }
 
     /// The profiling heads, in the order of the file.

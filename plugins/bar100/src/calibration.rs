@@ -10,6 +10,8 @@ pub const CELL_SCALING0: u8 = 0x12;
 pub const CELLS_P_MIN: [u8; 2] = [0x13, 0x14];
 /// Cells of the upper limit, high and low word of a float.
 pub const CELLS_P_MAX: [u8; 2] = [0x15, 0x16];
+/// All cells that the calibration is in.
+pub const CALIBRATION_CELLS: [u8; 5] = [0x12, 0x13, 0x14, 0x15, 0x16];
 
 /// One standard atmosphere, the ambient pressure that a vented sensor is taken to have.
 pub const STANDARD_ATMOSPHERE_BAR: f64 = 1.013_25;

@@ -15,8 +15,10 @@ pub const MEASURE: u8 = 0xAC;
 /// Memory cells lie below the commands, so that the first byte alone tells how long a transaction is.
 const FIRST_COMMAND: u8 = 0x80;
 
-const MEASURE_BYTES: usize = 6;
-const MEMORY_BYTES: usize = 4;
+/// Length of a measurement's transaction.
+pub const MEASURE_BYTES: usize = 6;
+/// Length of a memory read's.
+pub const MEMORY_BYTES: usize = 4;
 
 /// A status byte that says the result is good.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

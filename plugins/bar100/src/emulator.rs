@@ -1,11 +1,12 @@
-//! The sensor's side of the bus: it is asked for its calibration, then for measurements at a fixed rate.
+//! The sensor's side of the bus: it is asked for its calibration, then for measurements, at a fixed rate by an emulated host or
+//! when a real one does.
 
-use headrace_core::app::device::{Direction, Emulator, LineSink};
+use headrace_core::app::device::{Direction, Emulator, EmulatorSetup, LineSink};
 use headrace_core::app::measurement::Pressure;
 use headrace_core::time::{DurNs, MonoNs};
 
 use crate::calibration::{Calibration, Scaling0};
-use crate::codec::{Measurement, MemoryWord, Status};
+use crate::codec::{MEASURE, Measurement, MemoryWord, Status};
 
 /// Date of calibration that the emulated memory gives.
 const CALIBRATED: Scaling0 = Scaling0 { year: 2021, month: 6, day: 15, mode: 0 };
@@ -32,13 +33,18 @@ pub struct Bar100Emulator {
     sensor: Simulated,
     start: MonoNs,
     begun: u64,
+    /// Whether the host is emulated, too.
+    polled: bool,
+    /// Measurements that a real host has asked for and that haven't begun.
+    waiting: Vec<Pressure>,
     calibration_told: bool,
 }
 
 impl Bar100Emulator {
-    /// A sensor that is switched on, and first measures, at `start`.
-    pub fn new(sensor: Simulated, start: MonoNs) -> Self {
-        Self { sensor, start, begun: 0, calibration_told: false }
+    /// A sensor that is switched on, and first measures, as the setup says.
+    pub fn new(sensor: Simulated, setup: &EmulatorSetup) -> Self {
+        let (start, polled) = (setup.start, setup.polled);
+        Self { sensor, start, begun: 0, polled, waiting: Vec::new(), calibration_told: !polled }
     }
 
     fn due(&self) -> MonoNs {
@@ -64,10 +70,26 @@ impl Bar100Emulator {
 
 impl Emulator<Pressure> for Bar100Emulator {
     fn begin(&mut self, until: MonoNs, due: &mut Vec<Pressure>) {
-        while self.due() < until {
+        while self.polled && self.due() < until {
             due.push(Pressure::due(self.due()));
             self.begun += 1;
         }
+        let begun = self.waiting.partition_point(|pressure| pressure.at < until);
+        due.extend(self.waiting.drain(..begun));
+    }
+
+    /// What was written, and last how many bytes are to be read.
+    fn hear(&mut self, at: MonoNs, bytes: &[u8], line: LineSink<'_>) {
+        let Some(asked) = bytes.first() else { return };
+        if *asked == MEASURE {
+            self.waiting.push(Pressure::due(at));
+            return;
+        }
+        let words = self.sensor.calibration.to_words(CALIBRATED);
+        // Cells that aren't the calibration's are erased.
+        let word = words.iter().find(|(cell, _)| cell == asked).map_or(0xFFFF, |(_, word)| *word);
+        let read = MemoryWord { cell: *asked, status: Status::IDLE, word };
+        line(Direction::Received, at + self.sensor.latency, &read.encode());
     }
 
     fn tell(&mut self, pressure: &Pressure, line: LineSink<'_>) {

@@ -1,13 +1,15 @@
 //! Blue Robotics Bar100 depth sensor (Keller 7LD) on I2C: transactions to absolute pressure, and back.
 //!
 //! [`codec`] turns bytes into transactions, [`calibration`] turns counts into pressure, [`decoder`] joins the two for
-//! the loop, [`emulator`] is the device's side for simulations and [`plugin`] reads the vehicle file.
+//! the loop, [`driver`] is the host's side of the bus, [`emulator`] the device's for simulations and rehearsals, and
+//! [`plugin`] reads the vehicle file.
 
 #![cfg_attr(not(test), warn(clippy::indexing_slicing))]
 
 pub mod calibration;
 pub mod codec;
 pub mod decoder;
+pub mod driver;
 pub mod emulator;
 pub mod plugin;
 

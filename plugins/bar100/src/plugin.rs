@@ -3,11 +3,13 @@
 use headrace_core::app::App;
 use headrace_core::app::components::DepthSensor;
 use headrace_core::app::device::{Device, DeviceKind, Emulated, EmulatorSetup, Sense};
+use headrace_core::app::driver::{Carrier, Driver, DriverSetup};
 use headrace_core::app::plugin::{Plugin, PluginError};
 use headrace_core::config::{ConfigError, Section, SensorConfig};
 
 use crate::calibration::{Calibration, Overrides, PressureMode, STANDARD_ATMOSPHERE_BAR};
 use crate::decoder::{Bar100Decoder, Meaning};
+use crate::driver::{Bar100Driver, CARRIERS};
 use crate::emulator::{Bar100Emulator, Simulated};
 
 /// Name in vehicle files.
@@ -75,6 +77,14 @@ impl Device for Bar100 {
     }
 
     fn emulator(&self, setup: &EmulatorSetup) -> Emulated {
-        Emulated::Depth(Box::new(Bar100Emulator::new(self.emulated, setup.start)))
+        Emulated::Depth(Box::new(Bar100Emulator::new(self.emulated, setup)))
+    }
+
+    fn carriers(&self) -> &'static [Carrier] {
+        &CARRIERS
+    }
+
+    fn driver(&self, _: &DriverSetup) -> Box<dyn Driver> {
+        Box::new(Bar100Driver::new(self.emulated.rate_hz))
     }
 }

@@ -112,7 +112,7 @@ fn a_log_that_begins_in_the_middle_is_read_with_the_files_calibration() {
 fn what_the_emulated_sensor_says_decodes_to_the_true_pressure() {
     let start = MonoNs(5_000_000_000);
     let device = configured("rate_hz = 30\n").unwrap();
-    let setup = EmulatorSetup { start, head: None, site: Site::default() };
+    let setup = EmulatorSetup { start, head: None, site: Site::default(), polled: true };
     let Emulated::Depth(mut emulator) = device.emulator(&setup) else { panic!("no depth sensor") };
     let mut decoder = Bar100Decoder::new(meaning(Overrides::default()));
     // Climbing.

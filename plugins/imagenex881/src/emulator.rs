@@ -1,4 +1,4 @@
-//! An emulated head, and the host that polls it: one command and one return each ping period.
+//! An emulated head, polled by an emulated host, one command and one return each ping period, or by a real one.
 
 use std::collections::VecDeque;
 
@@ -10,71 +10,15 @@ use headrace_core::sampling::head::HeadProgram;
 use headrace_core::time::{DurNs, MonoNs};
 
 use crate::codec::{
-    COMMAND_BYTES, COUNTS_PER_TURN, Command, CommandCodec, Header, MAX_ECHO_BYTES, Model, Points, Return,
-    Status, Tag, ZERO_COUNT, step_at_most, step_deg,
+    COUNTS_PER_TURN, Command, CommandCodec, Header, MAX_ECHO_BYTES, Model, Points, Return, Status, Tag,
+    ZERO_COUNT,
 };
 use crate::plugin::SOUND_SPEED_MPS;
+use crate::program::Host;
 use crate::settings::{Settings, counts_of_rad};
 
 /// Strength of an emulated echo where the wall is; zero elsewhere.
 const ECHO: u8 = 127;
-
-/// The host's side: which command comes next, so that the head follows its program.
-///
-/// Sectors are kept with steps and reversals, not with the head's own sector switches: those know multiples of
-/// 3 degrees only. Both ends of a sector are pinged; where the step doesn't divide it, the last one before an end is
-/// shorter, and an end's ping isn't repeated.
-#[derive(Debug, Clone)]
-pub struct Host {
-    command: Command,
-    step_counts: i32,
-    growing: bool,
-    sector: Option<Sector>,
-}
-
-/// A sector in counts, and how far above its lower end the head is.
-#[derive(Debug, Clone, Copy)]
-struct Sector {
-    size: i32,
-    along: i32,
-}
-
-impl Host {
-    /// For a head at the program's start that would step in the program's first direction.
-    pub fn new(settings: &Settings, program: &HeadProgram) -> Self {
-        let normal = settings.angle_sign > 0.0;
-        Self {
-            command: settings.command,
-            step_counts: i32::from(settings.step_counts),
-            growing: program.growing == normal,
-            sector: program.sector.map(|(least_rad, size_rad)| {
-                let above_least = program.start_rad - least_rad;
-                let above_rad = if normal { above_least } else { size_rad - above_least };
-                Sector::new(counts_of_rad(above_rad), counts_of_rad(size_rad))
-            }),
-        }
-    }
-
-    /// The next command. The head pings where it is, then steps as the command says.
-    pub fn next_command(&mut self) -> Command {
-        let Some(Sector { size, along }) = &mut self.sector else { return self.command };
-        let to_end = |growing| if growing { *size - *along } else { *along };
-        let reverse = to_end(self.growing) <= 0;
-        self.growing ^= reverse;
-        let step = step_at_most(self.step_counts.min(to_end(self.growing)));
-        *along += if self.growing { i32::from(step) } else { -i32::from(step) };
-        Command { reverse, step_deg: step_deg(step), ..self.command }
-    }
-}
-
-impl Sector {
-    fn new(above: i32, size: i32) -> Self {
-        let size = size.clamp(0, COUNTS_PER_TURN);
-        let inside = (0..=size).contains(&above);
-        let along = if inside { above } else { above.rem_euclid(COUNTS_PER_TURN).min(size) };
-        Self { size, along }
-    }
-}
 
 /// Where a head pinged, and which way it went on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -123,6 +67,16 @@ impl Head {
     /// A head at `position` (0 to 1199) that would step towards growing positions, or the other way.
     pub fn new(position: i32, growing: bool) -> Self {
         Self { position: position.rem_euclid(COUNTS_PER_TURN), growing }
+    }
+
+    /// Where it is, 0 to 1199.
+    pub fn position(&self) -> i32 {
+        self.position
+    }
+
+    /// Whether its next step goes towards growing positions.
+    pub fn growing(&self) -> bool {
+        self.growing
     }
 
     /// Obeys one command: pings where it is, and steps.
@@ -178,17 +132,19 @@ pub struct HeadEmulator {
     latency: DurNs,
     /// Metres as the head reckons them for a metre of the site's.
     device_per_site: f64,
-    host: Host,
+    /// The emulated host; without one, whoever is at the other end of the line asks.
+    host: Option<Host>,
     codec: CommandCodec,
     head: Head,
     ping_at: MonoNs,
+    /// Soundings that a real host has asked for and that haven't begun.
+    waiting: Vec<Sounding>,
     asked: VecDeque<Asked>,
 }
 
 /// A command that has been obeyed but not yet answered.
 #[derive(Debug, Clone)]
 struct Asked {
-    bytes: [u8; COMMAND_BYTES],
     command: Command,
     ping: Ping,
 }
@@ -200,36 +156,57 @@ impl HeadEmulator {
         let idle = HeadProgram { start_rad: 0.0, growing: true, sector: None };
         let program = setup.head.unwrap_or(idle);
         let host = Host::new(&settings, &program);
-        let head = Head::new(settings.position(program.start_rad), host.growing);
+        let head = Head::new(settings.position(program.start_rad), host.growing());
         let device_per_site = SOUND_SPEED_MPS / setup.site.sound_speed_mps;
-        let (codec, ping_at, asked) = (CommandCodec::default(), setup.start, VecDeque::new());
-        Self { settings, latency, device_per_site, host, codec, head, ping_at, asked }
+        Self {
+            settings,
+            latency,
+            device_per_site,
+            host: setup.polled.then_some(host),
+            codec: CommandCodec::default(),
+            head,
+            ping_at: setup.start,
+            waiting: Vec::new(),
+            asked: VecDeque::new(),
+        }
     }
 
-    /// Sends the next command to the head, which obeys what the bytes say.
-    fn ask(&mut self, due: &mut Vec<Sounding>) {
-        let Self { settings, host, codec, head, ping_at, asked, .. } = self;
-        // Settings are checked when they are read, so that each command has its bytes.
-        let Ok(bytes) = host.next_command().encode() else { return };
-        codec.push(&bytes, &mut |command| {
+    /// Obeys the commands in what a host has sent at `at`; they begin soundings.
+    fn obey(&mut self, at: MonoNs, bytes: &[u8]) {
+        let Self { settings, codec, head, asked, waiting, .. } = self;
+        codec.push(bytes, &mut |command| {
+            if command.head_id != settings.command.head_id {
+                return;
+            }
             let ping = head.obey(&command);
-            due.push(Sounding::due(*ping_at, settings.sensor_rad(ping.position)));
-            asked.push_back(Asked { bytes, command, ping });
+            waiting.push(Sounding::due(at, settings.sensor_rad(ping.position)));
+            asked.push_back(Asked { command, ping });
         });
     }
 }
 
 impl Emulator<Sounding> for HeadEmulator {
     fn begin(&mut self, until: MonoNs, due: &mut Vec<Sounding>) {
-        while self.ping_at < until {
-            self.ask(due);
+        while let Some(host) = self.host.as_mut().filter(|_| self.ping_at < until) {
+            // Settings are checked when they are read, so that each command has its bytes.
+            if let Ok(bytes) = host.next_command().encode() {
+                self.obey(self.ping_at, &bytes);
+            }
             self.ping_at = self.ping_at + self.settings.ping_period;
         }
+        let begun = self.waiting.partition_point(|sounding| sounding.at < until);
+        due.extend(self.waiting.drain(..begun));
+    }
+
+    fn hear(&mut self, at: MonoNs, bytes: &[u8], _: LineSink<'_>) {
+        self.obey(at, bytes);
     }
 
     fn tell(&mut self, sounding: &Sounding, line: LineSink<'_>) {
-        let Some(Asked { bytes, command, ping }) = self.asked.pop_front() else { return };
-        line(Direction::Sent, sounding.at, &bytes);
+        let Some(Asked { command, ping }) = self.asked.pop_front() else { return };
+        if let Some(bytes) = self.host.as_ref().and_then(|_| command.encode().ok()) {
+            line(Direction::Sent, sounding.at, &bytes);
+        }
         let reported = self.settings.position(sounding.reported_rad);
         let ping = Ping { position: u16::try_from(reported).unwrap_or(ping.position), ..ping };
         let range_m = sounding.range_m.map(|range_m| range_m * self.device_per_site);

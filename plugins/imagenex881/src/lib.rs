@@ -5,10 +5,12 @@
 #![cfg_attr(not(test), warn(clippy::indexing_slicing))]
 
 pub mod codec;
+pub mod driver;
 pub mod emulator;
 pub mod homing;
 pub mod logfile;
 pub mod plugin;
+pub mod program;
 pub mod settings;
 
 pub use plugin::Kind;

@@ -3,16 +3,17 @@
 use headrace_core::app::App;
 use headrace_core::app::components::SonarHead;
 use headrace_core::app::device::{Decoder, Device, DeviceKind, Emulated, EmulatorSetup, Sense};
+use headrace_core::app::driver::{Carrier, Driver, DriverSetup};
 use headrace_core::app::plugin::{Plugin, PluginError};
 use headrace_core::app::reading::{Decoded, Packet, Reading, SonarReturn};
 use headrace_core::codec::{Codec as _, CodecCounts, LineClock};
 use headrace_core::config::{ConfigError, Section, SensorConfig};
-use headrace_core::sampling::head::{HeadMode, HeadProgram, HeadSpec};
+use headrace_core::sampling::head::{HeadMode, HeadSpec};
 use headrace_core::time::DurNs;
 
 use crate::codec::{Header, Model, ReturnCodec, Returns};
+use crate::driver::{CARRIERS, HeadDriver};
 use crate::emulator::HeadEmulator;
-use crate::homing::{self, Standing};
 use crate::settings::{Settings, range_setting};
 
 /// Speed of sound by which the family computes every range. Source: Imagenex 881A serial interface, profile range.
@@ -82,18 +83,20 @@ impl Device for Imagenex881 {
         Ok(self.settings.modes(range_m))
     }
 
-    fn start_commands(&self, angle_rad: f64, growing: bool, program: &HeadProgram) -> Vec<Vec<u8>> {
-        let commands = homing::commands(&self.settings, Standing { angle_rad, growing }, program);
-        // Settings are checked when they are read, so that each command has its bytes.
-        commands.iter().filter_map(|command| command.encode().ok()).map(|bytes| bytes.to_vec()).collect()
-    }
-
     fn sense(&self) -> Sense {
         Sense::Head
     }
 
     fn emulator(&self, setup: &EmulatorSetup) -> Emulated {
         Emulated::Head(Box::new(HeadEmulator::new(self.settings.clone(), self.sensor.latency, setup)))
+    }
+
+    fn carriers(&self) -> &'static [Carrier] {
+        &CARRIERS
+    }
+
+    fn driver(&self, setup: &DriverSetup) -> Box<dyn Driver> {
+        Box::new(HeadDriver::new(self.settings.clone(), setup))
     }
 }
 

@@ -7,6 +7,7 @@
 
 pub mod codec;
 pub mod decoder;
+pub mod driver;
 pub mod emulator;
 pub mod frame;
 pub mod plugin;

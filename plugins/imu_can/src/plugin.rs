@@ -3,12 +3,14 @@
 use headrace_core::app::App;
 use headrace_core::app::components::Imu;
 use headrace_core::app::device::{Device, DeviceKind, Emulated, EmulatorSetup, Sense};
+use headrace_core::app::driver::{Carrier, Driver, DriverSetup};
 use headrace_core::app::plugin::{Plugin, PluginError};
 use headrace_core::config::{ConfigError, Section, SensorConfig};
 use headrace_core::time::DurNs;
 
 use crate::codec::MessageSet;
 use crate::decoder::{AxisOrder, ImuDecoder, Meaning};
+use crate::driver;
 use crate::emulator::ImuEmulator;
 use crate::sets::{j1939, xsens};
 
@@ -103,5 +105,13 @@ impl Device for CanImu {
 
     fn emulator(&self, setup: &EmulatorSetup) -> Emulated {
         Emulated::Inertial(Box::new(ImuEmulator::new(self.meaning, self.rate_hz, setup.start)))
+    }
+
+    fn carriers(&self) -> &'static [Carrier] {
+        &driver::CARRIERS
+    }
+
+    fn driver(&self, _: &DriverSetup) -> Box<dyn Driver> {
+        Box::new(driver::listener())
     }
 }

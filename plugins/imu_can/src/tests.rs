@@ -104,7 +104,7 @@ fn readings(decoder: &mut ImuDecoder, set: MessageSet, messages: &[Message]) -> 
 /// What the emulated unit says about `truth` in `samples` samples.
 fn emulated(own: &str, decoder: &mut ImuDecoder, truth: &Going, samples: usize) -> Vec<Decoded> {
     let start = MonoNs(2_000_000_000);
-    let setup = EmulatorSetup { start, head: None, site: Site::default() };
+    let setup = EmulatorSetup { start, head: None, site: Site::default(), polled: true };
     let Emulated::Inertial(mut emulator) = configured(own).unwrap().emulator(&setup) else {
         panic!("no inertial unit")
     };

@@ -1,4 +1,6 @@
-//! An emulated echosounder, and the host that asks it for a distance each interval.
+//! An emulated echosounder, and the emulated or real host that asks it for distances.
+
+use std::collections::VecDeque;
 
 use headrace_core::app::device::{Direction, Emulator, EmulatorSetup, LineSink};
 use headrace_core::app::measurement::Sounding;
@@ -6,79 +8,188 @@ use headrace_core::codec::{Bytes, Codec as _};
 use headrace_core::math;
 use headrace_core::time::{DurNs, MonoNs};
 
-use crate::codec::{Addressed, Distance, Message, PingCodec, ScanRange, Text, id};
+use crate::codec::{
+    Addressed, DeviceInformation, Distance, DistanceSimple, MAX_STRENGTHS, Message, PingCodec, Profile,
+    ProtocolVersion, ScanRange, Text, id,
+};
 use crate::settings::Settings;
 
 /// Where an emulated device listens: up to the practical limit of a `Ping1D`.
 const SCAN: ScanRange = ScanRange { start_mm: 0, length_mm: 30_000 };
 
+/// Everyone on the line is meant.
+const EVERYONE: u8 = 255;
+
+/// What an emulated device says that it is.
+const DEVICE: DeviceInformation = DeviceInformation {
+    device_type: 1,
+    revision: 1,
+    firmware_major: 3,
+    firmware_minor: 29,
+    firmware_patch: 0,
+    reserved: 0,
+};
+const PROTOCOL: ProtocolVersion = ProtocolVersion { major: 1, minor: 0, patch: 0, reserved: 0 };
+
 /// Constant in an emulated ping.
 const PULSE_US: u16 = 60;
 
-/// Host and device on one line.
+/// Strengths of an emulated echo's points, and the one where the wall is.
+const POINTS: usize = 200;
+const ECHO: u8 = 255;
+
+/// Host and device on one line, or the device alone, on a real host's.
 #[derive(Debug, Clone)]
 pub struct PingEmulator {
     settings: Settings,
     latency: DurNs,
-    /// Metres as the device reckons them for a metre of the site's.
-    device_per_site: f64,
+    /// The water's, m/s.
+    site_mps: f64,
+    /// What the device computes with, mm/s; a host can set it.
+    device_mmps: u32,
+    interval: DurNs,
     codec: PingCodec,
     pings: u32,
-    ping_at: MonoNs,
+    /// When it next pings without being asked by a real host: polled by an emulated one, or continuously.
+    ping_at: Option<MonoNs>,
+    /// Pings that a real host has asked for and that haven't begun.
+    waiting: Vec<Sounding>,
+    /// The ids of the messages that tell them.
+    asked: VecDeque<u16>,
+    polled: bool,
 }
 
 impl PingEmulator {
-    /// A device that is asked as soon as it is switched on.
+    /// A device that is asked as soon as it is switched on, or when a real host does.
     pub fn new(settings: Settings, latency: DurNs, setup: &EmulatorSetup) -> Self {
-        let device_per_site = settings.sound_speed_mps / setup.site.sound_speed_mps;
-        let (codec, ping_at) = (PingCodec::default(), setup.start);
-        Self { settings, latency, device_per_site, codec, pings: 0, ping_at }
+        Self {
+            settings,
+            latency,
+            site_mps: setup.site.sound_speed_mps,
+            device_mmps: settings.sound_speed_mmps(),
+            interval: settings.interval,
+            codec: PingCodec::default(),
+            pings: 0,
+            ping_at: setup.polled.then_some(setup.start),
+            waiting: Vec::new(),
+            asked: VecDeque::new(),
+            polled: setup.polled,
+        }
     }
 
-    fn answer_to(&mut self, message: &Message, distance_mm: Option<u32>) -> Message {
-        if *message != Message::GeneralRequest(id::DISTANCE) {
-            let text = Text(Bytes::new(b"not emulated").unwrap_or_default());
-            return Message::Nack { nacked_id: message.id(), text };
+    /// What the device says at once to what isn't a question for a distance.
+    fn answer_to(&mut self, at: MonoNs, message: &Message) -> Option<Message> {
+        match *message {
+            Message::GeneralRequest(about @ (id::DISTANCE | id::DISTANCE_SIMPLE | id::PROFILE)) => {
+                self.waiting.push(Sounding::due(at, 0.0));
+                self.asked.push_back(about);
+                return None;
+            }
+            Message::GeneralRequest(id::PROTOCOL_VERSION) => return Some(Message::ProtocolVersion(PROTOCOL)),
+            Message::GeneralRequest(id::DEVICE_INFORMATION) => {
+                return Some(Message::DeviceInformation(DEVICE));
+            }
+            Message::GeneralRequest(id::SPEED_OF_SOUND) => {
+                return Some(Message::SpeedOfSound(self.device_mmps));
+            }
+            Message::SetSpeedOfSound(mmps) => self.device_mmps = mmps,
+            Message::SetPingInterval(ms) => self.interval = DurNs::from_millis(i64::from(ms.max(1))),
+            Message::SetRange(_)
+            | Message::SetGain(_)
+            | Message::SetModeAuto(_)
+            | Message::SetPingEnable(_) => (),
+            Message::ContinuousStart(id::PROFILE) => self.ping_at = Some(at),
+            Message::ContinuousStop(id::PROFILE) => self.ping_at = None,
+            _ => {
+                let text = Text(Bytes::new(b"not emulated").unwrap_or_default());
+                return Some(Message::Nack { nacked_id: message.id(), text });
+            }
         }
+        Some(Message::Ack(message.id()))
+    }
+
+    /// The message of this id that tells a ping.
+    fn telling(&mut self, about: u16, distance_mm: Option<u32>) -> Message {
         self.pings = self.pings.wrapping_add(1);
-        Message::Distance(Distance {
+        let distance = Distance {
             distance_mm: distance_mm.unwrap_or(0),
             confidence_percent: if distance_mm.is_some() { 100 } else { 0 },
             pulse_us: PULSE_US,
             ping_number: self.pings,
             scan: SCAN,
             gain: 0,
-        })
+        };
+        match about {
+            id::DISTANCE_SIMPLE => Message::DistanceSimple(DistanceSimple {
+                distance_mm: distance.distance_mm,
+                confidence_percent: if distance_mm.is_some() { 100 } else { 0 },
+            }),
+            id::PROFILE => Message::Profile(Profile { distance, strengths: strengths(distance_mm) }),
+            _ => Message::Distance(distance),
+        }
     }
 
     /// Distance in mm that the device computes with the speed of sound it is set to.
     fn distance_mm(&self, range_m: Option<f64>) -> Option<u32> {
-        let mm = u32::try_from(math::round_to_i64(range_m? * self.device_per_site * 1000.0)).ok()?;
+        let mm = range_m? * f64::from(self.device_mmps) / self.site_mps;
+        let mm = u32::try_from(math::round_to_i64(mm)).ok()?;
         (1..=SCAN.length_mm).contains(&mm).then_some(mm)
     }
+
+    fn say(&self, at: MonoNs, message: Message, line: LineSink<'_>) {
+        if let Ok(answer) = (Addressed { source: self.settings.device_id, destination: 0, message }).encode()
+        {
+            line(Direction::Received, at + self.latency, answer.as_slice());
+        }
+    }
+}
+
+/// An echo of one point.
+fn strengths(distance_mm: Option<u32>) -> Bytes<MAX_STRENGTHS> {
+    let mut strengths = [0; POINTS];
+    let point = distance_mm.map(|mm| u64::from(mm) * POINTS as u64 / u64::from(SCAN.length_mm));
+    let point = point.and_then(|point| usize::try_from(point).ok());
+    if let Some(strength) = point.and_then(|point| strengths.get_mut(point.min(POINTS - 1))) {
+        *strength = ECHO;
+    }
+    Bytes::new(&strengths).unwrap_or_default()
 }
 
 impl Emulator<Sounding> for PingEmulator {
     fn begin(&mut self, until: MonoNs, due: &mut Vec<Sounding>) {
-        while self.ping_at < until {
-            due.push(Sounding::due(self.ping_at, 0.0));
-            self.ping_at = self.ping_at + self.settings.interval;
+        let begun = self.waiting.partition_point(|sounding| sounding.at < until);
+        due.extend(self.waiting.drain(..begun));
+        while let Some(at) = self.ping_at.filter(|at| *at < until) {
+            due.push(Sounding::due(at, 0.0));
+            self.asked.push_back(if self.polled { id::DISTANCE } else { id::PROFILE });
+            self.ping_at = Some(at + self.interval);
+        }
+    }
+
+    fn hear(&mut self, at: MonoNs, bytes: &[u8], line: LineSink<'_>) {
+        let mut heard = Vec::new();
+        self.codec.push(bytes, &mut |value| heard.push(value));
+        for Addressed { destination, message, .. } in heard {
+            let meant = [self.settings.device_id, EVERYONE].contains(&destination);
+            if let Some(answer) = meant.then(|| self.answer_to(at, &message)).flatten() {
+                self.say(at, answer, line);
+            }
         }
     }
 
     fn tell(&mut self, sounding: &Sounding, line: LineSink<'_>) {
-        let device = self.settings.device_id;
-        let message = Message::GeneralRequest(id::DISTANCE);
-        // A request is far shorter than the longest frame.
-        let Ok(bytes) = (Addressed { source: 0, destination: device, message }).encode() else { return };
-        line(Direction::Sent, sounding.at, bytes.as_slice());
-        let mut asked = None;
-        self.codec.push(bytes.as_slice(), &mut |value| asked = Some(value.message));
-        let Some(asked) = asked else { return };
-        let message = self.answer_to(&asked, self.distance_mm(sounding.range_m));
-        if let Ok(answer) = (Addressed { source: device, destination: 0, message }).encode() {
-            line(Direction::Received, sounding.at + self.latency, answer.as_slice());
+        let about = self.asked.pop_front().unwrap_or(id::DISTANCE);
+        if self.polled {
+            let message = Message::GeneralRequest(about);
+            let question = Addressed { source: 0, destination: self.settings.device_id, message };
+            // A request is far shorter than the longest frame.
+            if let Ok(bytes) = question.encode() {
+                line(Direction::Sent, sounding.at, bytes.as_slice());
+            }
         }
+        let distance_mm = self.distance_mm(sounding.range_m);
+        let message = self.telling(about, distance_mm);
+        self.say(sounding.at, message, line);
     }
 }
 

@@ -5,6 +5,7 @@
 #![cfg_attr(not(test), warn(clippy::indexing_slicing))]
 
 pub mod codec;
+pub mod driver;
 pub mod emulator;
 pub mod plugin;
 pub mod settings;

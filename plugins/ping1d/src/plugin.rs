@@ -3,6 +3,7 @@
 use headrace_core::app::App;
 use headrace_core::app::components::Echosounder;
 use headrace_core::app::device::{Decoder, Device, DeviceKind, Emulated, EmulatorSetup, Sense};
+use headrace_core::app::driver::{Carrier, Driver, DriverSetup};
 use headrace_core::app::plugin::{Plugin, PluginError};
 use headrace_core::app::reading::{Decoded, EchoRange, Packet, Reading};
 use headrace_core::codec::{Codec as _, CodecCounts, LineClock};
@@ -10,6 +11,7 @@ use headrace_core::config::{ConfigError, Section, SensorConfig};
 use headrace_core::time::DurNs;
 
 use crate::codec::{Distance, DistanceSimple, Frame, PingCodec};
+use crate::driver::{CARRIERS, PingDriver};
 use crate::emulator::PingEmulator;
 use crate::settings::Settings;
 
@@ -65,6 +67,14 @@ impl Device for Ping1d {
 
     fn emulator(&self, setup: &EmulatorSetup) -> Emulated {
         Emulated::Echosounder(Box::new(PingEmulator::new(self.settings, self.sensor.latency, setup)))
+    }
+
+    fn carriers(&self) -> &'static [Carrier] {
+        &CARRIERS
+    }
+
+    fn driver(&self, _: &DriverSetup) -> Box<dyn Driver> {
+        Box::new(PingDriver::new(self.settings))
     }
 }
 

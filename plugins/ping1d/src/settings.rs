@@ -1,7 +1,19 @@
 //! An echosounder's settings: the keys of its table in the vehicle file.
 
 use headrace_core::config::{ConfigError, Section, SensorConfig};
+use headrace_core::math;
 use headrace_core::time::DurNs;
+
+use crate::codec::ScanRange;
+
+/// Who says when to ping.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Polling {
+    /// The host asks for each distance.
+    Asked,
+    /// The device sends profiles at its interval.
+    Continuous,
+}
 
 /// An echosounder's settings, checked.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -14,6 +26,12 @@ pub struct Settings {
     pub sound_speed_mps: f64,
     /// The device's id on its line.
     pub device_id: u8,
+    /// Who says when to ping.
+    pub polling: Polling,
+    /// Where the device is to listen; `None` leaves range and gain to it.
+    pub scan: Option<ScanRange>,
+    /// Index of the gain, 0 to 6; `None` leaves it as it is.
+    pub gain: Option<u8>,
 }
 
 impl Settings {
@@ -28,12 +46,25 @@ impl Settings {
             interval: DurNs::from_millis(own.integer("interval_ms", 10..=65_535)?.unwrap_or(66)),
             sound_speed_mps: own.number("sound_speed_mps", 1000.0..=2000.0)?.unwrap_or(1500.0),
             device_id: device_id.unwrap_or(1),
+            polling: own
+                .choice("polling", &[("asked", Polling::Asked), ("continuous", Polling::Continuous)])?
+                .unwrap_or(Polling::Asked),
+            scan: own.number("scan_m", 1.0..=100.0)?.map(|metres| ScanRange {
+                start_mm: 0,
+                length_mm: u32::try_from(math::round_to_i64(metres * 1000.0)).unwrap_or(0),
+            }),
+            gain: own.integer("gain", 0..=6)?.and_then(|gain| u8::try_from(gain).ok()),
         };
         if sensor.latency >= settings.interval {
             let problem = "must be below interval_ms: a device answers before it is asked again";
             return Err(own.invalid("latency_ms", problem));
         }
         Ok(settings)
+    }
+
+    /// The speed of sound as the wire has it, mm/s.
+    pub fn sound_speed_mmps(&self) -> u32 {
+        u32::try_from(math::round_to_i64(self.sound_speed_mps * 1000.0)).unwrap_or(0)
     }
 }
 
@@ -70,14 +101,21 @@ pub(crate) mod tests {
             interval: DurNs::from_millis(66),
             sound_speed_mps: 1500.0,
             device_id: 1,
+            polling: Polling::Asked,
+            scan: None,
+            gain: None,
         };
         assert_eq!(settings(""), Ok(usual));
-        let text = "min_confidence = 0.8\ninterval_ms = 50\nsound_speed_mps = 1447\ndevice_id = 3";
+        let text = "min_confidence = 0.8\ninterval_ms = 50\nsound_speed_mps = 1447\ndevice_id = 3\n\
+                    polling = \"continuous\"\nscan_m = 8\ngain = 2";
         let other = Settings {
             min_confidence: 0.8,
             interval: DurNs::from_millis(50),
             sound_speed_mps: 1447.0,
             device_id: 3,
+            polling: Polling::Continuous,
+            scan: Some(ScanRange { start_mm: 0, length_mm: 8000 }),
+            gain: Some(2),
         };
         assert_eq!(settings(text), Ok(other));
     }

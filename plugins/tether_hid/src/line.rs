@@ -14,7 +14,8 @@ use headrace_core::math;
 /// Shapes of the two lines: 9 stands for a digit, # for a character of a number, all else for itself.
 const PLAIN: &[u8] = b"RD,########,########,########,9999\r\n";
 const STAMPED: &[u8] = b"99RD,9999-99-99T99:99:99.999,########,########,########,9999\r\n";
-const MAX_LINE_BYTES: usize = STAMPED.len();
+/// The longest line.
+pub const MAX_LINE_BYTES: usize = STAMPED.len();
 
 /// From where on a shape has told itself from chance: behind `RD,`.
 const PLAIN_MARKER: usize = 3;

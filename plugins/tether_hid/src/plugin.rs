@@ -3,10 +3,12 @@
 use headrace_core::app::App;
 use headrace_core::app::components::Tether;
 use headrace_core::app::device::{Decoder, Device, DeviceKind, Emulated, EmulatorSetup, Sense};
+use headrace_core::app::driver::{Carrier, Driver, DriverSetup};
 use headrace_core::app::plugin::{Plugin, PluginError};
 use headrace_core::config::{ConfigError, Section, SensorConfig};
 
 use crate::decoder::{Counter, HidDecoder, LineDecoder};
+use crate::driver;
 use crate::emulator::{HidEmulator, LineEmulator, Reeling};
 use crate::report::{Endian, MAX_REPORT_BYTES, ReportLayout, Width};
 use crate::tracker::Counting;
@@ -169,6 +171,20 @@ impl Device for CableCounter {
             Wire::Line { metres_per_unit } => {
                 Emulated::Tether(Box::new(LineEmulator::new(self.reeling, *metres_per_unit, setup.start)))
             }
+        }
+    }
+
+    fn carriers(&self) -> &'static [Carrier] {
+        match &self.wire {
+            Wire::Hid { .. } => &driver::REPORT_CARRIERS,
+            Wire::Line { .. } => &driver::LINE_CARRIERS,
+        }
+    }
+
+    fn driver(&self, _: &DriverSetup) -> Box<dyn Driver> {
+        match &self.wire {
+            Wire::Hid { counter, .. } => Box::new(driver::reports(counter.layout)),
+            Wire::Line { .. } => Box::new(driver::lines()),
         }
     }
 }

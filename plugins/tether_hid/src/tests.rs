@@ -64,7 +64,7 @@ fn length(decoded: &Decoded) -> TetherLength {
 
 /// Runs the emulated device into `decoder` and compares each reading with the truth.
 fn round_trip(own: &str, decoder: &mut dyn Decoder, zero_at_m: f64, scale: f64, reports: usize) {
-    let setup = EmulatorSetup { start: MonoNs(7), head: None, site: Site::default() };
+    let setup = EmulatorSetup { start: MonoNs(7), head: None, site: Site::default(), polled: true };
     let Emulated::Tether(mut emulator) = configured(own).unwrap().emulator(&setup) else {
         panic!("no cable counter")
     };

@@ -36,7 +36,7 @@ mod writer;
 pub use error::LogError;
 pub use loss::{Loss, LossKind};
 pub use reader::{LogInfo, LogMessage, LogReader, MessageKind, file_digest};
-pub use recorder::{Full, Recorder, RecorderHandle, RecorderPort};
+pub use recorder::{Full, Recorder, RecorderHandle, RecorderPort, SentPort};
 pub use writer::{LogHeader, LogWriter, ResultChannel, SourceInfo, Summary};
 
 #[cfg(test)]

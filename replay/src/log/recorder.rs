@@ -7,10 +7,11 @@ use std::fs::{File, OpenOptions};
 use std::io::{BufWriter, Write};
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
+use crossbeam::queue::ArrayQueue;
 use headrace_core::time::MonoNs;
 use ringbuf::HeapRb;
 use ringbuf::traits::{Consumer as _, Observer as _, Producer as _};
@@ -30,6 +31,8 @@ const NAP: Duration = Duration::from_millis(2);
 /// How often a chunk is closed and brought to the medium. Half of the second that a power cut may cost, since closing
 /// and syncing take their time too.
 const FLUSH_PERIOD: Duration = Duration::from_millis(500);
+/// Messages to devices that may wait: some seconds of eight heads.
+const SENT_MESSAGES: usize = 2048;
 /// Entries between two looks at the clock.
 const BATCH: usize = 256;
 
@@ -60,10 +63,40 @@ pub struct RecorderHandle {
     state: Arc<State>,
 }
 
-#[derive(Default)]
 struct State {
     stopping: AtomicBool,
     failed: AtomicBool,
+    /// What the ports' threads have sent to the devices: it doesn't pass the loop.
+    sent: ArrayQueue<SentMessage>,
+    sent_dropped: AtomicU64,
+}
+
+/// Bytes sent to a device.
+struct SentMessage {
+    source: u16,
+    at: MonoNs,
+    bytes: Vec<u8>,
+}
+
+/// Takes what is sent to devices into the log, from any thread. When the queue is full the oldest is dropped, and counted.
+#[derive(Clone)]
+pub struct SentPort {
+    state: Arc<State>,
+}
+
+impl SentPort {
+    /// Bytes sent to `source`. Never blocks.
+    pub fn sent(&self, source: u16, at: MonoNs, bytes: &[u8]) {
+        let message = SentMessage { source, at, bytes: bytes.to_vec() };
+        if self.state.sent.force_push(message).is_some() {
+            self.state.sent_dropped.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+
+    /// How many messages were dropped.
+    pub fn dropped(&self) -> u64 {
+        self.state.sent_dropped.load(Ordering::Relaxed)
+    }
 }
 
 impl Recorder {
@@ -79,7 +112,12 @@ impl Recorder {
         let mut log = LogWriter::new(writer, header)?;
         log.flush()?;
         let ring = Arc::new(HeapRb::new(queue_bytes.max(MIN_QUEUE_BYTES)));
-        let state = Arc::new(State::default());
+        let state = Arc::new(State {
+            stopping: AtomicBool::new(false),
+            failed: AtomicBool::new(false),
+            sent: ArrayQueue::new(SENT_MESSAGES),
+            sent_dropped: AtomicU64::new(0),
+        });
         let queue = Queue { ring: Cons::new(Arc::clone(&ring)), message: Vec::new() };
         let thread_state = Arc::clone(&state);
         let thread = thread::Builder::new().name("recorder".to_owned());
@@ -215,6 +253,11 @@ impl RecorderHandle {
         self.state.failed.load(Ordering::Acquire)
     }
 
+    /// An end for what is sent to the devices.
+    pub fn sent_port(&self) -> SentPort {
+        SentPort { state: Arc::clone(&self.state) }
+    }
+
     /// Writes what is in the queue and the summary, and ends the thread.
     ///
     /// Errors: whatever went wrong on the thread since its start.
@@ -306,7 +349,7 @@ impl<'a, W: Write> Worker<'a, W> {
             let stopping = self.state.stopping.load(Ordering::Acquire);
             let taken =
                 (0..BATCH).map_while(|_| queue.take().map(|entry| self.write(&entry, &queue.message)));
-            let taken = taken.count();
+            let taken = taken.count() + self.write_sent();
             self.flush_in_time();
             if taken == 0 && stopping {
                 return self.finish();
@@ -321,6 +364,19 @@ impl<'a, W: Write> Worker<'a, W> {
         self.discarded += u64::from(self.log.is_none());
         self.open = true;
         self.attempt(|log| log.message(entry.lane, entry.log_time, entry.publish_time, message));
+    }
+
+    /// Writes what has been sent to the devices; gives the number of messages.
+    fn write_sent(&mut self) -> usize {
+        let state = self.state;
+        let mut written = 0;
+        while let Some(message) = state.sent.pop() {
+            let entry =
+                Entry { lane: Lane::Sent(message.source), log_time: message.at, publish_time: message.at };
+            self.write(&entry, &message.bytes);
+            written += 1;
+        }
+        written
     }
 
     fn flush_in_time(&mut self) {

@@ -49,6 +49,20 @@ const REACH_SHARE: f64 = 1.25;
 /// Reach of an echosounder, m.
 const ECHOSOUNDER_REACH_M: f64 = 100.0;
 
+/// A moment that doesn't come.
+const NEVER: MonoNs = MonoNs(u64::MAX);
+
+/// Who asks the devices for measurements.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Asked {
+    /// Emulated hosts.
+    ByItself,
+    /// The same, and the truth is kept.
+    ByItselfNoting,
+    /// Real ones.
+    ByHosts,
+}
+
 /// A dive that is being simulated: messages in the order of (time, source, sequence).
 pub struct Simulation {
     world: World,
@@ -67,14 +81,24 @@ impl Simulation {
     ///
     /// Errors: effects that contradict each other or the scene; a way through a wall.
     pub fn new(scene: &Scene) -> Result<Self, SceneError> {
-        Self::assemble(scene, false)
+        Self::assemble(scene, Asked::ByItself)
+    }
+
+    /// A simulation whose devices do what hosts ask of them through [`Simulation::hear`], while time goes on as
+    /// [`Simulation::go_on`] is told. The vehicle stands until [`Simulation::set_out`].
+    ///
+    /// Errors: as for [`Simulation::new`].
+    pub fn for_hosts(scene: &Scene) -> Result<Self, SceneError> {
+        let mut simulation = Self::assemble(scene, Asked::ByHosts)?;
+        simulation.set_out(NEVER);
+        Ok(simulation)
     }
 
     /// A simulation that keeps its truth for [`Simulation::take_truth`].
     ///
     /// Errors: as for [`Simulation::new`].
     pub fn with_truth(scene: &Scene) -> Result<Self, SceneError> {
-        Self::assemble(scene, true)
+        Self::assemble(scene, Asked::ByItselfNoting)
     }
 
     /// The same in slices of another length, of which nothing may depend.
@@ -83,16 +107,18 @@ impl Simulation {
         Self { slice, ..self }
     }
 
-    fn assemble(scene: &Scene, noting: bool) -> Result<Self, SceneError> {
+    fn assemble(scene: &Scene, asked: Asked) -> Result<Self, SceneError> {
+        let noting = asked == Asked::ByItselfNoting;
         let mut world = World::new();
         world.insert_resource(Slice { from: START, until: START });
         world.insert_resource(Scenery {
             surroundings: scene.surroundings.clone(),
             way: scene.way.clone(),
             site: scene.vehicle.site,
+            sets_out: None,
         });
         let (facts, drawn) = programmed(scene);
-        let entities = spawn_sensors(&mut world, scene, &facts, noting);
+        let entities = spawn_sensors(&mut world, scene, &facts, asked);
         if noting {
             world.insert_resource(Notes::default());
         }
@@ -125,7 +151,7 @@ impl Simulation {
 
     /// How long it takes, s.
     pub fn duration_s(&self) -> f64 {
-        self.end.since(START).as_secs_f64()
+        self.scenery().map_or(0.0, |scenery| scenery.way.duration_s())
     }
 
     /// Where the vehicle truly is.
@@ -180,17 +206,55 @@ impl Simulation {
         more
     }
 
+    /// Bytes that a host has sent to a device, by its number in the vehicle file, at `at`, which must not be before what
+    /// has been simulated.
+    pub fn hear(&mut self, source: usize, at: MonoNs, bytes: &[u8]) {
+        let Some(entity) = self.entities.get(source).copied() else { return };
+        hear::<Sounding>(&mut self.world, entity, at, bytes);
+        hear::<Pressure>(&mut self.world, entity, at, bytes);
+        hear::<Inertia>(&mut self.world, entity, at, bytes);
+        hear::<Payout>(&mut self.world, entity, at, bytes);
+    }
+
+    /// The vehicle sets out at `at`; the dive ends when its way does.
+    pub fn set_out(&mut self, at: MonoNs) {
+        if let Some(mut scenery) = self.world.get_resource_mut::<Scenery>() {
+            scenery.sets_out = Some(at);
+            self.end = if at == NEVER { NEVER } else { at + DurNs::from_secs_f64(scenery.way.duration_s()) };
+        }
+    }
+
+    /// Simulates on to `until`, for hosts; [`Simulation::next_message`] has what crossed the lines before it.
+    pub fn go_on(&mut self, until: MonoNs) {
+        let Some(slice) = self.world.get_resource::<Slice>() else { return };
+        if until > slice.until {
+            self.simulate(until);
+        }
+    }
+
+    /// The next message that has crossed its line, without simulating on for one.
+    pub fn waiting_message(&mut self) -> Option<Message<'_>> {
+        self.outbox.has_next().then(|| self.outbox.next()).flatten()
+    }
+
     /// Simulates the next slice; false when there is none.
     fn next_slice(&mut self) -> bool {
-        let Some(mut slice) = self.world.get_resource_mut::<Slice>() else { return false };
+        let Some(slice) = self.world.get_resource::<Slice>() else { return false };
         // A measurement at the very end is still made.
         let last = self.end + DurNs(1);
         if slice.until >= last {
             return self.outbox.finish();
         }
-        slice.from = slice.until;
-        slice.until = (slice.until + self.slice).min(last);
-        let until = slice.until;
+        let until = (slice.until + self.slice).min(last);
+        self.simulate(until);
+        true
+    }
+
+    fn simulate(&mut self, until: MonoNs) {
+        if let Some(mut slice) = self.world.get_resource_mut::<Slice>() {
+            slice.from = slice.until;
+            slice.until = until;
+        }
         self.schedule.run(&mut self.world);
         if let Some(rows) = &mut self.truth {
             truth::collect(&mut self.world, &self.entities, rows);
@@ -201,8 +265,16 @@ impl Simulation {
             }
         }
         self.outbox.release(until);
-        true
     }
+}
+
+/// Lets a device that measures `M` hear a host; what it answers at once is on its line.
+fn hear<M: Measurement>(world: &mut World, entity: Entity, at: MonoNs, bytes: &[u8]) {
+    let mut entity = world.entity_mut(entity);
+    let Ok((mut device, mut line)) = entity.get_components_mut::<(&mut Device<M>, &mut Line)>() else {
+        return;
+    };
+    device.0.hear(at, bytes, &mut |direction, at, bytes| line.send(at, direction, bytes, 0));
 }
 
 /// The scene's facts with what effects make of the heads' programs, and what they have drawn for it.
@@ -215,12 +287,13 @@ fn programmed(scene: &Scene) -> (Facts, Vec<(&'static str, String)>) {
     (facts, drawn)
 }
 
-fn spawn_sensors(world: &mut World, scene: &Scene, facts: &Facts, noting: bool) -> Vec<Entity> {
+fn spawn_sensors(world: &mut World, scene: &Scene, facts: &Facts, asked: Asked) -> Vec<Entity> {
+    let (noting, polled) = (asked == Asked::ByItselfNoting, asked != Asked::ByHosts);
     let sensors = scene.vehicle.sensors.iter().zip(&scene.vehicle.sensor_configs).zip(&facts.sensors);
     let site = scene.vehicle.site;
     let mut entities = Vec::new();
     for (number, ((sensor, config), facts)) in (0..).zip(sensors) {
-        let setup = EmulatorSetup { start: START, head: facts.program, site };
+        let setup = EmulatorSetup { start: START, head: facts.program, site, polled };
         let entity = world.spawn((Source(number), Mounted(config.mount), Line::default())).id();
         if noting {
             world.entity_mut(entity).insert(LineBefore::default());

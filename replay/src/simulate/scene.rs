@@ -4,7 +4,6 @@ use headrace_core::app::device::{DeviceKind, Sense};
 use headrace_core::config::vehicle::Loader;
 use headrace_core::config::{self, ConfigError, Document, VehicleConfig};
 use headrace_core::sampling::head::{HeadProgram, HeadSpec};
-use headrace_core::sampling::layout;
 use headrace_core::sampling::occlusion::Obstacle;
 
 use super::effects::{self, Named};
@@ -120,14 +119,9 @@ impl Scene {
             vehicle_text = config::changed(&vehicle_text, &changes)?;
         }
         let vehicle = VehicleConfig::parse(Document::new(&file, &vehicle_text), kinds, text)?;
-        let heads = vehicle.heads();
-        let programs = if heads.is_empty() {
-            Vec::new()
-        } else {
-            layout::programs(&heads, vehicle.layout, vehicle.planned_speed_mps).map_err(|why| {
-                root.invalid("vehicle", &format!("describes heads that no program fits: {why}"))
-            })?
-        };
+        let programs = vehicle.programs().map_err(|why| {
+            root.invalid("vehicle", &format!("describes heads that no program fits: {why}"))
+        })?;
         let tunnel = &vehicle.tunnel;
         let surroundings =
             Surroundings::parse(root.section("tunnel")?, &tunnel.profile, tunnel.length_m, text, load)?;

@@ -37,6 +37,8 @@ pub struct Scenery {
     pub way: Way,
     /// Water and levels, as they truly are.
     pub site: Site,
+    /// When the vehicle sets out from where it stands; without it, it is under way as the dive begins.
+    pub sets_out: Option<MonoNs>,
 }
 
 /// A sensor by its place in the vehicle file.
@@ -125,7 +127,7 @@ impl<M: Measurement> Samples<M> {
 impl Scenery {
     /// The vehicle's true pose.
     pub fn pose(&self, at: MonoNs) -> Pose {
-        let place = self.way.place(at.since(START).as_secs_f64());
+        let place = self.way.place(self.under_way_s(at));
         let axis = self.surroundings.axis();
         let [roll, pitch, yaw] = place.turned_rad;
         let yaw = if axis.is_straight() { yaw } else { yaw + axis.heading_rad(place.chainage_m) };
@@ -139,7 +141,13 @@ impl Scenery {
 
     /// The chainage that the vehicle has truly come to, m.
     pub fn chainage_m(&self, at: MonoNs) -> f64 {
-        self.way.place(at.since(START).as_secs_f64()).chainage_m
+        self.way.place(self.under_way_s(at)).chainage_m
+    }
+
+    /// How long it has been under way, s.
+    fn under_way_s(&self, at: MonoNs) -> f64 {
+        self.sets_out
+            .map_or_else(|| at.since(START).as_secs_f64(), |out| at.since(out).as_secs_f64().max(0.0))
     }
 
     /// That the way leads through water alone.

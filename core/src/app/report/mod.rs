@@ -21,7 +21,7 @@ mod survey;
 pub use advice::{AdviceReport, AlternativeReport};
 pub use runs::{ReturnReport, RunReport};
 pub use sections::{DeviationReport, EvidenceReport, SectionReport};
-pub use sources::{NavigationReport, SourceReport};
+pub use sources::{LineReport, NavigationReport, SourceReport};
 pub use survey::{HolidayReport, NodeRowReport, SurveyReport};
 
 /// Version of the report's form.
@@ -227,7 +227,9 @@ impl Report {
     /// Whether anything that was received has been lost on the way to the results.
     pub fn lost_data(&self) -> bool {
         let rejected = &self.dive.samples_rejected;
-        rejected.not_stored > 0 || self.log.as_ref().is_some_and(|log| !log.losses.is_empty())
+        let dropped =
+            self.sources.iter().flat_map(|source| &source.line).any(|line| line.dropped_packets > 0);
+        rejected.not_stored > 0 || dropped || self.log.as_ref().is_some_and(|log| !log.losses.is_empty())
     }
 }
 

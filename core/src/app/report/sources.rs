@@ -30,6 +30,21 @@ pub struct SourceReport {
     pub rate_hz: f64,
     /// How well it agreed with the others in navigation; `None` without a filter, and for what it doesn't use.
     pub navigation: Option<NavigationReport>,
+    /// What its line has been through; `None` where bytes didn't come from a port.
+    pub line: Option<LineReport>,
+}
+
+/// What a sensor's line has been through.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct LineReport {
+    /// How often it was opened.
+    pub opened: u64,
+    /// How often it was lost, or given up for silence.
+    pub lost: u64,
+    /// Packets that came and for which there was no room.
+    pub dropped_packets: u64,
+    /// How it was at the end, in words.
+    pub status: String,
 }
 
 /// How a source's measurements fared in navigation.
@@ -76,6 +91,7 @@ pub(super) fn source_reports(dive: &Loop, tallies: &SourceTallies) -> Vec<Source
                     dropped: consistency.dropped,
                     nis: consistency.nis(),
                 }),
+                line: None,
             }
         })
         .collect()

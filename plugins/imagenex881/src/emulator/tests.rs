@@ -20,7 +20,7 @@ struct Run {
 fn run(text: &str, latency: DurNs, program: HeadProgram, pings: usize) -> Run {
     let settings = settings(text).unwrap();
     let start = MonoNs(7_000_000_000);
-    let setup = EmulatorSetup { start, head: Some(program), site: Site::default() };
+    let setup = EmulatorSetup { start, head: Some(program), site: Site::default(), polled: true };
     let mut emulator = HeadEmulator::new(settings.clone(), latency, &setup);
     let mut decoder = HeadDecoder::new(settings.clone(), latency);
     let mut run = Run { sent: Vec::new(), received: Vec::new(), readings: Vec::new() };
@@ -174,7 +174,12 @@ fn the_head_reverses_once_when_told() {
 #[test]
 fn the_answer_has_the_position_that_the_head_reports() {
     let settings = settings("mode = \"fast\"").unwrap();
-    let setup = EmulatorSetup { start: MonoNs(0), head: Some(turning(0.0, true)), site: Site::default() };
+    let setup = EmulatorSetup {
+        start: MonoNs(0),
+        head: Some(turning(0.0, true)),
+        site: Site::default(),
+        polled: true,
+    };
     let mut emulator = HeadEmulator::new(settings.clone(), DurNs::ZERO, &setup);
     let mut due = Vec::new();
     emulator.begin(MonoNs(1), &mut due);

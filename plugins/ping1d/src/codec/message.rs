@@ -108,7 +108,7 @@ pub struct Profile {
 const PROFILE_HEADER: usize = Distance::LEN + u16::LEN;
 
 /// The most strengths that a payload has room for.
-const MAX_STRENGTHS: usize = MAX_PAYLOAD_BYTES - PROFILE_HEADER;
+pub const MAX_STRENGTHS: usize = MAX_PAYLOAD_BYTES - PROFILE_HEADER;
 
 /// Text as a device sends it: any bytes, with or without a zero at its end.
 #[derive(Clone, Copy, PartialEq, Eq)]

@@ -8,7 +8,7 @@ use headrace_core::codec::{Bytes, Framed, Framing, Verdict};
 
 pub use frame::{Frame, MAX_FRAME_BYTES, MAX_PAYLOAD_BYTES};
 pub use message::{
-    DeviceInformation, Distance, DistanceSimple, GeneralInfo, Message, MessageError, Profile,
+    DeviceInformation, Distance, DistanceSimple, GeneralInfo, MAX_STRENGTHS, Message, MessageError, Profile,
     ProtocolVersion, ScanRange, Text, id,
 };
 

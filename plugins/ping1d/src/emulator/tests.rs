@@ -13,7 +13,7 @@ fn run(
     latency: DurNs,
 ) -> (Vec<u64>, Vec<(u64, EchoRange)>) {
     let settings = settings(text).unwrap();
-    let setup = EmulatorSetup { start: MonoNs(5_000_000), head: None, site: Site::default() };
+    let setup = EmulatorSetup { start: MonoNs(5_000_000), head: None, site: Site::default(), polled: true };
     let mut emulator = PingEmulator::new(settings, latency, &setup);
     let mut decoder = PingDecoder::new(settings, latency);
     let (mut sent, mut readings, mut due) = (Vec::new(), Vec::new(), Vec::new());

@@ -34,7 +34,12 @@ fn the_way_by_the_wall_and_the_straight_way_take_their_time() {
     let other_spec = head(&dive, 1);
     let room = Surroundings::straight(named::rectangle(6.0, 5.0).unwrap());
     let scene = dive.scene("").unwrap();
-    let scenery = Scenery { surroundings: room.clone(), way: scene.way.clone(), site: scene.vehicle.site };
+    let scenery = Scenery {
+        surroundings: room.clone(),
+        way: scene.way.clone(),
+        site: scene.vehicle.site,
+        sets_out: None,
+    };
     let ray = |y_m: f64, angle_rad: f64| {
         let local = head_direction(angle_rad);
         let (origin, direction) = (Point3::new(0.0, y_m, 2.5), Vec3::new(0.0, local.y(), local.z()));

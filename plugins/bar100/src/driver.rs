@@ -1,0 +1,102 @@
+//! The host's side of the bus: calibration first, then a measurement at a fixed rate.
+
+use headrace_core::app::driver::{Carrier, Driver, Standing, Wire};
+use headrace_core::time::{DurNs, MonoNs};
+
+use crate::calibration::CALIBRATION_CELLS;
+use crate::codec::{MEASURE, MEASURE_BYTES, MEMORY_BYTES, Transaction, TransactionError};
+
+/// What may carry a sensor's transactions.
+pub const CARRIERS: [Carrier; 2] = [Carrier::I2c, Carrier::Udp];
+
+/// From asking for a cell of the memory to reading it. Source: Keller's protocol, at least 0.6 ms.
+const MEMORY_SETTLES: DurNs = DurNs(1_000_000);
+/// From the start of a conversion to its result. Source: Keller's protocol, 8 ms at most; drivers wait 9 or 10 ms.
+const CONVERSION: DurNs = DurNs(10_000_000);
+/// Between reading the calibration and the first measurement. Source: `ArduPilot`'s driver.
+const AFTER_CALIBRATION: DurNs = DurNs::from_millis(150);
+/// Between two tries to read the calibration.
+const RETRY: DurNs = DurNs::from_millis(500);
+/// Bad answers in a row after which the calibration is read again: the sensor may have been replaced.
+const READ_AGAIN_AFTER: u32 = 20;
+
+/// A sensor's driver.
+pub struct Bar100Driver {
+    period: DurNs,
+    next_at: MonoNs,
+    /// The cell of the calibration that is asked for next.
+    cell: usize,
+    bad_in_a_row: u32,
+    good_frames: u64,
+    complaint: Option<TransactionError>,
+}
+
+impl Bar100Driver {
+    /// For `rate_hz` measurements a second.
+    pub fn new(rate_hz: f64) -> Self {
+        let period = DurNs::from_secs_f64(1.0 / rate_hz);
+        Self { period, next_at: MonoNs(0), cell: 0, bad_in_a_row: 0, good_frames: 0, complaint: None }
+    }
+
+    fn answered(&mut self, answer: Result<Transaction, TransactionError>, at: MonoNs) {
+        match answer {
+            Ok(transaction) => {
+                self.good_frames += 1;
+                self.complaint = None;
+                self.bad_in_a_row = 0;
+                if matches!(transaction, Transaction::Memory(_)) {
+                    self.cell += 1;
+                    let done = self.cell == CALIBRATION_CELLS.len();
+                    self.next_at = if done { at + AFTER_CALIBRATION } else { at };
+                }
+            }
+            Err(error) => {
+                self.complaint = Some(error);
+                self.bad_in_a_row += 1;
+                if self.cell < CALIBRATION_CELLS.len() || self.bad_in_a_row >= READ_AGAIN_AFTER {
+                    self.cell = 0;
+                    self.bad_in_a_row = 0;
+                    self.next_at = at + RETRY;
+                }
+            }
+        }
+    }
+}
+
+impl Driver for Bar100Driver {
+    fn opened(&mut self, now: MonoNs, _: &mut dyn Wire) {
+        self.cell = 0;
+        self.bad_in_a_row = 0;
+        self.next_at = now;
+    }
+
+    fn heard(&mut self, received: MonoNs, bytes: &[u8], wire: &mut dyn Wire) {
+        wire.deliver(received, bytes);
+        self.answered(Transaction::decode(bytes), received);
+    }
+
+    fn due(&self) -> Option<MonoNs> {
+        Some(self.next_at)
+    }
+
+    fn wake(&mut self, now: MonoNs, wire: &mut dyn Wire) {
+        // What doesn't answer at all is asked again, too.
+        match CALIBRATION_CELLS.get(self.cell) {
+            Some(cell) => {
+                self.next_at = now + RETRY;
+                wire.exchange(&[*cell], MEMORY_SETTLES, MEMORY_BYTES - 1);
+            }
+            None => {
+                let next = self.next_at + self.period;
+                self.next_at = if next > now { next } else { now + self.period };
+                wire.exchange(&[MEASURE], CONVERSION, MEASURE_BYTES - 1);
+            }
+        }
+    }
+
+    fn standing(&self) -> Standing {
+        let identity = (self.cell == CALIBRATION_CELLS.len()).then(|| "Keller LD pressure sensor".to_owned());
+        let complaint = self.complaint.as_ref().map(TransactionError::to_string);
+        Standing { good_frames: self.good_frames, identity, complaint }
+    }
+}

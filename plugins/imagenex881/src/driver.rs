@@ -1,0 +1,287 @@
+//! The host's side of a head's line: one command in flight, and the head kept to its program.
+//!
+//! A head is first asked where it is, taken the short way to where its program would have it, and then asked for the
+//! program's pings, each when it is due. An answer that is late or lost puts the head behind; it catches up by being asked as
+//! soon as it has answered. One that is far off, since it was switched off or turned elsewhere, is taken back.
+
+use std::collections::VecDeque;
+
+use headrace_core::app::driver::{Carrier, Cutter, Driver, DriverSetup, Standing, Wire};
+use headrace_core::sampling::head::HeadProgram;
+use headrace_core::time::{DurNs, MonoNs};
+
+use crate::codec::{COMMAND_BYTES, COUNTS_PER_TURN, Command, Header, MAX_RETURN_BYTES, Model, Returns};
+use crate::homing;
+use crate::program::{Planned, Timetable};
+use crate::settings::Settings;
+
+/// What may carry a head's bytes: Ethernet for the 881L, RS-485 or RS-232 for the 881A.
+pub const CARRIERS: [Carrier; 3] = [Carrier::Tcp, Carrier::Serial, Carrier::Udp];
+
+/// A return's bytes follow one another on the line.
+const SILENCE: DurNs = DurNs::from_millis(100);
+/// What a head may take for an answer beyond the sound's way and the line's.
+const LEISURE: DurNs = DurNs::from_millis(60);
+/// The slowest that sound and line are taken to be, for how long an answer may take, m/s and bits a second.
+const SLOWEST_SOUND_MPS: f64 = 1300.0;
+const LINE_BAUD: f64 = 115_200.0;
+/// Silence after which a head is asked less often. Source: LSTS DUNE asks again after a second.
+const ASK_SELDOM_AFTER: u32 = 10;
+const SELDOM: DurNs = DurNs::from_millis(1_000);
+/// The share of a turn that a head may be behind its program before it is taken there; ahead it may be a few pings.
+const BEHIND_SHARE: u64 = 4;
+const AHEAD_PINGS: u64 = 10;
+/// Turns behind its program after which a head that answers is said to be too slow for its settings.
+const TOO_SLOW_SHARE: u64 = 8;
+
+/// What the last command was for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Aim {
+    /// To know where the head is.
+    Locate,
+    /// To take it nearer to its program.
+    Home,
+    /// The program's ping of this number.
+    Ping(u64),
+}
+
+/// A head's driver.
+pub struct HeadDriver {
+    settings: Settings,
+    timetable: Timetable,
+    cutter: Cutter<Returns, MAX_RETURN_BYTES>,
+    timeout: DurNs,
+    /// What is in flight, and when it went.
+    asked: Option<(Aim, MonoNs)>,
+    /// When the next command goes, unless one is in flight.
+    next_at: MonoNs,
+    aim: Aim,
+    way_home: VecDeque<Command>,
+    /// The ping to go on with after the way home.
+    joins_at: u64,
+    unanswered: u32,
+    /// Whether it has once been on its program.
+    joined: bool,
+    last_position: Option<u16>,
+    foreign_id: Option<u8>,
+    refused: bool,
+    behind: u64,
+}
+
+impl HeadDriver {
+    /// For a head with these settings. Without a program it turns on for ever from the sensor frame's 0.
+    pub fn new(settings: Settings, setup: &DriverSetup) -> Self {
+        let idle = HeadProgram { start_rad: 0.0, growing: true, sector: None };
+        let program = setup.head.unwrap_or(idle);
+        let timetable = Timetable::new(&settings, &program, setup.begun);
+        let timeout = answer_time(&settings.command);
+        Self {
+            settings,
+            timetable,
+            cutter: Cutter::new(Returns { model: Some(Model::Head881) }, SILENCE),
+            timeout,
+            asked: None,
+            next_at: MonoNs(0),
+            aim: Aim::Locate,
+            way_home: VecDeque::new(),
+            joins_at: 0,
+            unanswered: 0,
+            joined: false,
+            last_position: None,
+            foreign_id: None,
+            refused: false,
+            behind: 0,
+        }
+    }
+
+    fn ask(&mut self, now: MonoNs, wire: &mut dyn Wire) {
+        let bytes = match self.aim {
+            Aim::Locate => self.standing_still(),
+            Aim::Home => self.way_home.pop_front().and_then(|command| command.encode().ok()),
+            Aim::Ping(number) => self.timetable.ping(number).map(|ping| ping.command),
+        };
+        let Some(bytes) = bytes else { return self.locate(now) };
+        wire.send(&bytes);
+        self.asked = Some((self.aim, now));
+    }
+
+    /// A ping at the settings of the dive, so that it counts, after which the head is where it was.
+    fn standing_still(&self) -> Option<[u8; COMMAND_BYTES]> {
+        Command { step_deg: 0.0, reverse: false, ..self.settings.command }.encode().ok()
+    }
+
+    fn locate(&mut self, at: MonoNs) {
+        self.aim = Aim::Locate;
+        self.next_at = at;
+    }
+
+    /// A return that came at `now`.
+    fn answered(&mut self, header: &Header, now: MonoNs) {
+        if header.head_id != self.settings.command.head_id {
+            self.foreign_id = Some(header.head_id);
+            return;
+        }
+        self.foreign_id = None;
+        self.refused = !header.status.accepted() || header.status.overrun();
+        let position = u16::try_from(i32::from(header.position) % COUNTS_PER_TURN).unwrap_or(0);
+        // The second of two answers to one question, or one that came after all: it answers nothing that is asked now.
+        let Some((aim, _)) = self.asked else { return };
+        if let Aim::Ping(number) = aim {
+            let planned = self.timetable.ping(number).map(|ping| ping.position);
+            if planned != Some(position) && self.last_position == Some(position) {
+                return;
+            }
+        }
+        self.asked = None;
+        self.unanswered = 0;
+        self.last_position = Some(position);
+        match aim {
+            Aim::Locate => self.join(position, header.clockwise, now),
+            Aim::Home if !self.way_home.is_empty() => self.next_at = now,
+            Aim::Home => self.go_on(self.joins_at, now),
+            Aim::Ping(number) if self.is_at(number, position) => self.go_on(number + 1, now),
+            Aim::Ping(_) => self.locate(now),
+        }
+    }
+
+    fn is_at(&self, number: u64, position: u16) -> bool {
+        self.timetable.ping(number).is_some_and(|ping| ping.position == position)
+    }
+
+    /// Goes on with a ping of the program when it is due, or at once if that is past.
+    fn go_on(&mut self, number: u64, now: MonoNs) {
+        self.joined = true;
+        self.aim = Aim::Ping(number);
+        self.next_at = self.timetable.due(number).max(now);
+        self.behind = self.timetable.first_at(now).saturating_sub(number);
+    }
+
+    /// From where the head is to its program.
+    fn join(&mut self, position: u16, clockwise: bool, now: MonoNs) {
+        let current = self.timetable.first_at(now);
+        let most_behind = if self.joined { self.timetable.len() / BEHIND_SHARE } else { 1 };
+        let near = |number: &u64| number + most_behind >= current && *number <= current + AHEAD_PINGS;
+        match self.timetable.nearest(current, position, clockwise).filter(near) {
+            Some(number) => self.go_on(number, now),
+            None => self.go_home(position, clockwise, now),
+        }
+    }
+
+    fn go_home(&mut self, position: u16, clockwise: bool, now: MonoNs) {
+        let growing = clockwise == (self.settings.angle_sign > 0.0);
+        let from = homing::Standing { angle_rad: self.settings.sensor_rad(position), growing };
+        let current = self.timetable.first_at(now);
+        self.joins_at = current;
+        // The way's length depends on where the program is by then, and that on the way's length.
+        for _ in 0..3 {
+            let Some(Planned { position, clockwise, .. }) = self.timetable.ping(self.joins_at).copied()
+            else {
+                return;
+            };
+            let there = HeadProgram {
+                start_rad: self.settings.sensor_rad(position),
+                growing: clockwise == (self.settings.angle_sign > 0.0),
+                sector: None,
+            };
+            self.way_home = homing::commands(&self.settings, from, &there).into();
+            let arrives_at = current + self.way_home.len() as u64 + 1;
+            if arrives_at <= self.joins_at {
+                break;
+            }
+            self.joins_at = arrives_at;
+        }
+        if self.way_home.is_empty() {
+            self.go_on(self.joins_at, now);
+        } else {
+            self.aim = Aim::Home;
+            self.next_at = now;
+        }
+    }
+
+    /// What is in flight will not be answered any more.
+    fn give_up(&mut self, now: MonoNs) {
+        self.asked = None;
+        self.unanswered = self.unanswered.saturating_add(1);
+        let seldom = self.unanswered > ASK_SELDOM_AFTER;
+        self.locate(if seldom { now + SELDOM } else { now });
+    }
+
+    fn complaint(&self) -> Option<String> {
+        let own = self.settings.command.head_id;
+        if let Some(id) = self.foreign_id {
+            return Some(format!("answers as head {id:#04x}; head_id says {own:#04x}"));
+        }
+        if self.refused {
+            return Some(
+                "doesn't accept the command, or loses characters of it; see range_m and the line".to_owned(),
+            );
+        }
+        (self.behind > self.timetable.len() / TOO_SLOW_SHARE).then(|| {
+            let period_ms = self.settings.ping_period.as_secs_f64() * 1000.0;
+            format!("can't keep up with a ping each {period_ms:.1} ms; set turn_period_s to what it manages")
+        })
+    }
+}
+
+impl Driver for HeadDriver {
+    fn opened(&mut self, now: MonoNs, wire: &mut dyn Wire) {
+        self.cutter.flush(&mut |piece| wire.deliver(piece.received, piece.bytes));
+        self.asked = None;
+        self.unanswered = 0;
+        self.last_position = None;
+        self.locate(now);
+        self.ask(now, wire);
+    }
+
+    fn heard(&mut self, received: MonoNs, bytes: &[u8], wire: &mut dyn Wire) {
+        let mut headers = Vec::new();
+        self.cutter.push(received, bytes, &mut |piece| {
+            wire.deliver(piece.received, piece.bytes);
+            if piece.is_frame {
+                headers
+                    .extend(Header::decode(piece.bytes, Some(Model::Head881)).ok().map(|(header, _)| header));
+            }
+        });
+        for header in headers {
+            self.answered(&header, received);
+        }
+    }
+
+    fn due(&self) -> Option<MonoNs> {
+        let next = self.asked.map_or(self.next_at, |(_, at)| at + self.timeout);
+        Some(self.cutter.gives_up().map_or(next, |gives_up| next.min(gives_up)))
+    }
+
+    fn wake(&mut self, now: MonoNs, wire: &mut dyn Wire) {
+        self.heard(now, &[], wire);
+        if self.asked.is_some_and(|(_, at)| now.since(at) >= self.timeout) {
+            self.give_up(now);
+        }
+        if self.asked.is_none() && now >= self.next_at {
+            self.ask(now, wire);
+        }
+    }
+
+    fn awaits(&self) -> bool {
+        self.asked.is_some()
+    }
+
+    fn standing(&self) -> Standing {
+        let good_frames = self.cutter.counts().good_frames;
+        let id = self.settings.command.head_id;
+        let identity = (good_frames > 0).then(|| format!("Imagenex 881 family, head {id:#04x}"));
+        Standing { good_frames, identity, complaint: self.complaint() }
+    }
+}
+
+/// How long an answer may take: the sound's way at the range setting, command and longest return on a serial line, and
+/// leisure; twice all that.
+fn answer_time(command: &Command) -> DurNs {
+    let sound_s = 2.0 * f64::from(command.range_m) / SLOWEST_SOUND_MPS;
+    let line_s = (COMMAND_BYTES + MAX_RETURN_BYTES) as f64 * 10.0 / LINE_BAUD;
+    let once = DurNs::from_secs_f64(sound_s + line_s) + LEISURE;
+    once + once
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,150 @@
+//! A head's program as commands, ping by ping.
+
+use headrace_core::sampling::head::HeadProgram;
+use headrace_core::time::{DurNs, MonoNs};
+
+use crate::codec::{COMMAND_BYTES, COUNTS_PER_TURN, Command, step_at_most, step_deg};
+use crate::emulator::Head;
+use crate::settings::{Settings, counts_of_rad};
+
+/// The host's side: which command comes next, so that the head follows its program.
+///
+/// Sectors are kept with steps and reversals, not with the head's own sector switches: those know multiples of
+/// 3 degrees only. Both ends of a sector are pinged; where the step doesn't divide it, the last one before an end is
+/// shorter, and an end's ping isn't repeated.
+#[derive(Debug, Clone)]
+pub struct Host {
+    command: Command,
+    step_counts: i32,
+    growing: bool,
+    sector: Option<Sector>,
+}
+
+/// A sector in counts, and how far above its lower end the head is.
+#[derive(Debug, Clone, Copy)]
+struct Sector {
+    size: i32,
+    along: i32,
+}
+
+impl Host {
+    /// For a head at the program's start that would step in the program's first direction.
+    pub fn new(settings: &Settings, program: &HeadProgram) -> Self {
+        let normal = settings.angle_sign > 0.0;
+        Self {
+            command: settings.command,
+            step_counts: i32::from(settings.step_counts),
+            growing: program.growing == normal,
+            sector: program.sector.map(|(least_rad, size_rad)| {
+                let above_least = program.start_rad - least_rad;
+                let above_rad = if normal { above_least } else { size_rad - above_least };
+                Sector::new(counts_of_rad(above_rad), counts_of_rad(size_rad))
+            }),
+        }
+    }
+
+    /// Whether the head would step towards growing positions.
+    pub fn growing(&self) -> bool {
+        self.growing
+    }
+
+    /// The next command. The head pings where it is, then steps as the command says.
+    pub fn next_command(&mut self) -> Command {
+        let Some(Sector { size, along }) = &mut self.sector else { return self.command };
+        let to_end = |growing| if growing { *size - *along } else { *along };
+        let reverse = to_end(self.growing) <= 0;
+        self.growing ^= reverse;
+        let step = step_at_most(self.step_counts.min(to_end(self.growing)));
+        *along += if self.growing { i32::from(step) } else { -i32::from(step) };
+        Command { reverse, step_deg: step_deg(step), ..self.command }
+    }
+}
+
+impl Sector {
+    fn new(above: i32, size: i32) -> Self {
+        let size = size.clamp(0, COUNTS_PER_TURN);
+        let inside = (0..=size).contains(&above);
+        let along = if inside { above } else { above.rem_euclid(COUNTS_PER_TURN).min(size) };
+        Self { size, along }
+    }
+}
+
+/// A ping of a program.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Planned {
+    /// Where the head is, 0 to 1199.
+    pub position: u16,
+    /// Whether it would step towards growing positions before it is asked.
+    pub clockwise: bool,
+    /// What asks for the ping, and says how to go on.
+    pub command: [u8; COMMAND_BYTES],
+}
+
+/// A program in time: ping number k is due k ping periods after the dive has begun. It repeats itself.
+#[derive(Debug, Clone)]
+pub struct Timetable {
+    pings: Vec<Planned>,
+    begun: MonoNs,
+    period: DurNs,
+}
+
+/// A program that hasn't come back to its beginning after so many pings never will; a slow sector has 2,400.
+const MAX_PINGS: usize = 10_000;
+
+impl Timetable {
+    /// The program of a head that is at its start when the dive begins.
+    pub fn new(settings: &Settings, program: &HeadProgram, begun: MonoNs) -> Self {
+        let mut host = Host::new(settings, program);
+        let mut head = Head::new(settings.position(program.start_rad), host.growing());
+        let beginning = (head.position(), head.growing());
+        let mut pings = Vec::new();
+        while pings.len() < MAX_PINGS {
+            let before = (head.position(), head.growing());
+            if !pings.is_empty() && before == beginning {
+                break;
+            }
+            let command = host.next_command();
+            let ping = head.obey(&command);
+            // Settings are checked when they are read, so that each command has its bytes.
+            let Ok(command) = command.encode() else { break };
+            pings.push(Planned { position: ping.position, clockwise: before.1, command });
+        }
+        Self { pings, begun, period: settings.ping_period }
+    }
+
+    /// Pings until the program repeats itself.
+    pub fn len(&self) -> u64 {
+        self.pings.len() as u64
+    }
+
+    /// Whether the program has no ping, which can't be.
+    pub fn is_empty(&self) -> bool {
+        self.pings.is_empty()
+    }
+
+    /// Ping number `number`.
+    pub fn ping(&self, number: u64) -> Option<&Planned> {
+        let place = number.checked_rem(self.len())?;
+        self.pings.get(usize::try_from(place).ok()?)
+    }
+
+    /// When it is due.
+    pub fn due(&self, number: u64) -> MonoNs {
+        self.begun + DurNs(i64::try_from(number).unwrap_or(i64::MAX).saturating_mul(self.period.0))
+    }
+
+    /// The first ping that is due at `at` or later.
+    pub fn first_at(&self, at: MonoNs) -> u64 {
+        let since = at.since(self.begun).0.max(0);
+        since.unsigned_abs().div_ceil(self.period.0.max(1).unsigned_abs())
+    }
+
+    /// The ping nearest to number `near` at which the head is at `position` and would step this way.
+    pub fn nearest(&self, near: u64, position: u16, clockwise: bool) -> Option<u64> {
+        let fits = |number: &u64| {
+            self.ping(*number).is_some_and(|ping| ping.position == position && ping.clockwise == clockwise)
+        };
+        let candidates = (0..=self.len() / 2).flat_map(|off| [near.checked_sub(off), near.checked_add(off)]);
+        candidates.flatten().find(fits)
+    }
+}

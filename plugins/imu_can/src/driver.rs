@@ -1,0 +1,23 @@
+//! The host's side of the bus: it listens.
+
+use headrace_core::app::driver::{Carrier, MessageListener};
+use headrace_core::time::DurNs;
+
+use crate::frame::{CanFrame, FRAME_BYTES};
+
+/// What may carry frames, each as a `can_frame` of 16 bytes.
+pub const CARRIERS: [Carrier; 2] = [Carrier::Can, Carrier::Udp];
+
+const PATIENCE: DurNs = DurNs::from_millis(5_000);
+
+/// A unit's driver.
+pub fn listener() -> MessageListener {
+    MessageListener::new(Box::new(judge), PATIENCE)
+}
+
+fn judge(message: &[u8]) -> Option<String> {
+    let Some(frame) = message.first_chunk::<FRAME_BYTES>().filter(|_| message.len() == FRAME_BYTES) else {
+        return Some(format!("a message of {} bytes came; a frame has {FRAME_BYTES}", message.len()));
+    };
+    CanFrame::decode(frame).err().map(|error| error.to_string())
+}

@@ -1,0 +1,231 @@
+//! The host's side of an echosounder's line: settings first, each acknowledged, then a distance each interval, asked for or
+//! sent by the device of its own accord.
+
+use std::collections::VecDeque;
+
+use headrace_core::app::driver::{Carrier, Cutter, Driver, Standing, Wire};
+use headrace_core::time::{DurNs, MonoNs};
+
+use crate::codec::{Addressed, DeviceInformation, Frame, Frames, MAX_FRAME_BYTES, Message, id};
+use crate::settings::{Polling, Settings};
+
+/// What may carry an echosounder's bytes.
+pub const CARRIERS: [Carrier; 3] = [Carrier::Serial, Carrier::Udp, Carrier::Tcp];
+
+/// A frame's bytes follow one another on the line.
+const SILENCE: DurNs = DurNs::from_millis(50);
+/// How long an answer to a setting or a question may take. Source: Ping protocol, 50 ms; a bridge adds to it.
+const ANSWER_TIME: DurNs = DurNs::from_millis(150);
+/// What a ping may take beyond the interval.
+const PING_TIME: DurNs = DurNs::from_millis(250);
+/// How often the speed of sound is asked for: other clients of a bridge can change it.
+const LOOK_PERIOD: DurNs = DurNs::from_millis(10_000);
+
+const ECHOSOUNDER: u8 = 1;
+
+/// What the last message was for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Asked {
+    /// A setting, or a question about the device, by the id of the message.
+    Setting(u16),
+    /// A distance.
+    Distance,
+}
+
+/// An echosounder's driver.
+pub struct PingDriver {
+    settings: Settings,
+    cutter: Cutter<Frames, MAX_FRAME_BYTES>,
+    /// Messages that come before the next distance.
+    to_say: VecDeque<Message>,
+    asked: Option<(Asked, MonoNs)>,
+    next_at: MonoNs,
+    look_at: MonoNs,
+    device: Option<DeviceInformation>,
+    refused: Option<String>,
+}
+
+impl PingDriver {
+    /// For a device with these settings.
+    pub fn new(settings: Settings) -> Self {
+        Self {
+            settings,
+            cutter: Cutter::new(Frames, SILENCE),
+            to_say: VecDeque::new(),
+            asked: None,
+            next_at: MonoNs(0),
+            look_at: MonoNs(0),
+            device: None,
+            refused: None,
+        }
+    }
+
+    /// What a device is told and asked when its line has been opened.
+    fn greeting(&self) -> VecDeque<Message> {
+        let continuous = self.settings.polling == Polling::Continuous;
+        let interval_ms = u16::try_from(self.settings.interval.0 / 1_000_000).unwrap_or(u16::MAX);
+        let mut messages: VecDeque<Message> = [
+            Message::GeneralRequest(id::PROTOCOL_VERSION),
+            Message::GeneralRequest(id::DEVICE_INFORMATION),
+            Message::ContinuousStop(id::PROFILE),
+            self.sound_speed(),
+            Message::SetPingInterval(interval_ms),
+        ]
+        .into();
+        if let Some(scan) = self.settings.scan {
+            messages.push_back(Message::SetModeAuto(false));
+            messages.push_back(Message::SetRange(scan));
+        }
+        messages.extend(self.settings.gain.map(Message::SetGain));
+        messages.push_back(Message::SetPingEnable(true));
+        if continuous {
+            messages.push_back(Message::ContinuousStart(id::PROFILE));
+        }
+        messages
+    }
+
+    fn sound_speed(&self) -> Message {
+        Message::SetSpeedOfSound(self.settings.sound_speed_mmps())
+    }
+
+    fn say(&mut self, message: Message, asked: Asked, now: MonoNs, wire: &mut dyn Wire) {
+        let addressed = Addressed { source: 0, destination: self.settings.device_id, message };
+        // What a host says is far shorter than the longest frame.
+        if let Ok(bytes) = addressed.encode() {
+            wire.send(bytes.as_slice());
+            self.asked = Some((asked, now));
+        }
+    }
+
+    fn next(&mut self, now: MonoNs, wire: &mut dyn Wire) {
+        if now >= self.look_at {
+            self.look_at = now + LOOK_PERIOD;
+            self.to_say.push_back(Message::GeneralRequest(id::SPEED_OF_SOUND));
+        }
+        if let Some(message) = self.to_say.pop_front() {
+            let about = if let Message::GeneralRequest(about) = message { about } else { message.id() };
+            self.say(message, Asked::Setting(about), now, wire);
+        } else if self.settings.polling == Polling::Asked && now >= self.next_at {
+            let next = self.next_at + self.settings.interval;
+            self.next_at = if next > now { next } else { now + self.settings.interval };
+            self.say(Message::GeneralRequest(id::DISTANCE), Asked::Distance, now, wire);
+        }
+    }
+
+    /// A message of the device, or of what was taken for it.
+    fn answered(&mut self, frame: &Frame<'_>) {
+        let answers = |asked: Asked| self.asked.is_some_and(|(awaited, _)| awaited == asked);
+        let done = match Message::decode(frame) {
+            Ok(Message::Ack(about)) => answers(Asked::Setting(about)),
+            Ok(Message::Nack { nacked_id, text }) => {
+                self.refused = Some(format!("refuses message {nacked_id}: {}", text.as_str()));
+                answers(Asked::Setting(nacked_id)) || (nacked_id == id::DISTANCE && answers(Asked::Distance))
+            }
+            Ok(Message::Distance(_) | Message::DistanceSimple(_) | Message::Profile(_)) => {
+                self.refused = None;
+                answers(Asked::Distance)
+            }
+            Ok(Message::DeviceInformation(device)) => {
+                self.device = Some(device);
+                answers(Asked::Setting(id::DEVICE_INFORMATION))
+            }
+            Ok(Message::SpeedOfSound(mmps)) => {
+                if mmps != self.settings.sound_speed_mmps() {
+                    self.to_say.push_back(self.sound_speed());
+                }
+                answers(Asked::Setting(id::SPEED_OF_SOUND))
+            }
+            Ok(other) => answers(Asked::Setting(other.id())),
+            Err(_) => false,
+        };
+        if done {
+            self.asked = None;
+        }
+    }
+
+    /// How long the answer to what was asked may take.
+    fn timeout(&self, asked: Asked) -> DurNs {
+        match asked {
+            Asked::Setting(_) => ANSWER_TIME,
+            Asked::Distance => self.settings.interval + PING_TIME,
+        }
+    }
+
+    fn complaint(&self) -> Option<String> {
+        let other = self.device.filter(|device| device.device_type != ECHOSOUNDER);
+        other
+            .map(|device| match device.device_type {
+                2 => "is a Ping360, no echosounder; another is on this line than connect says".to_owned(),
+                other => format!("is a device of type {other}; an echosounder is of type {ECHOSOUNDER}"),
+            })
+            .or_else(|| self.refused.clone())
+    }
+}
+
+impl Driver for PingDriver {
+    fn opened(&mut self, now: MonoNs, wire: &mut dyn Wire) {
+        self.cutter.flush(&mut |piece| wire.deliver(piece.received, piece.bytes));
+        self.to_say = self.greeting();
+        self.device = None;
+        self.refused = None;
+        self.asked = None;
+        self.next_at = now;
+        self.look_at = now + LOOK_PERIOD;
+        self.next(now, wire);
+    }
+
+    fn heard(&mut self, received: MonoNs, bytes: &[u8], wire: &mut dyn Wire) {
+        let mut frames = Vec::new();
+        self.cutter.push(received, bytes, &mut |piece| {
+            wire.deliver(piece.received, piece.bytes);
+            if piece.is_frame {
+                frames.push(piece.bytes.to_vec());
+            }
+        });
+        for frame in frames.iter().filter_map(|bytes| Frame::parse(bytes)) {
+            self.answered(&frame);
+        }
+        // The next setting needn't wait for a thread to be woken.
+        if self.asked.is_none() && !self.to_say.is_empty() {
+            self.next(received, wire);
+        }
+    }
+
+    fn due(&self) -> Option<MonoNs> {
+        let next = match self.asked {
+            Some((asked, at)) => at + self.timeout(asked),
+            None if self.settings.polling == Polling::Asked => self.next_at.min(self.look_at),
+            None => self.look_at,
+        };
+        Some(self.cutter.gives_up().map_or(next, |gives_up| next.min(gives_up)))
+    }
+
+    fn wake(&mut self, now: MonoNs, wire: &mut dyn Wire) {
+        self.heard(now, &[], wire);
+        if self.asked.is_some_and(|(asked, at)| now.since(at) >= self.timeout(asked)) {
+            self.asked = None;
+        }
+        if self.asked.is_none() {
+            self.next(now, wire);
+        }
+    }
+
+    fn awaits(&self) -> bool {
+        self.asked.is_some()
+    }
+
+    fn standing(&self) -> Standing {
+        let identity = self.device.map(|device| {
+            let DeviceInformation { firmware_major, firmware_minor, firmware_patch, revision, .. } = device;
+            let kind = if device.device_type == ECHOSOUNDER { "Ping echosounder" } else { "Ping device" };
+            format!(
+                "{kind}, revision {revision}, firmware {firmware_major}.{firmware_minor}.{firmware_patch}"
+            )
+        });
+        let good_frames = self.cutter.counts().good_frames;
+        Standing { good_frames, identity, complaint: self.complaint() }
+    }
+}
+
+#[cfg(test)]
+mod tests;

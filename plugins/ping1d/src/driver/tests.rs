@@ -1,0 +1,170 @@
+//! The driver against an emulated device, on a line that may lose messages; no port, no clock.
+
+use headrace_core::app::device::{Emulator as _, EmulatorSetup};
+use headrace_core::app::measurement::Sounding;
+use headrace_core::site::Site;
+
+use super::*;
+use crate::emulator::PingEmulator;
+use crate::settings::tests::settings;
+
+const LATENCY: DurNs = DurNs::from_millis(20);
+
+/// A driver, a device and the line between them.
+struct Rig {
+    driver: PingDriver,
+    device: PingEmulator,
+    now: MonoNs,
+    line: Vec<(MonoNs, Vec<u8>)>,
+    sent: Vec<Message>,
+    heard: Vec<(MonoNs, Message)>,
+    /// Every message of this number from the host is lost; 0 loses none.
+    loses: usize,
+}
+
+#[derive(Default)]
+struct Ends {
+    sent: Vec<Vec<u8>>,
+    heard: Vec<(MonoNs, Vec<u8>)>,
+}
+
+impl Wire for Ends {
+    fn send(&mut self, bytes: &[u8]) {
+        self.sent.push(bytes.to_vec());
+    }
+
+    fn exchange(&mut self, _: &[u8], _: DurNs, _: usize) {
+        panic!("an echosounder is on no bus");
+    }
+
+    fn deliver(&mut self, received: MonoNs, bytes: &[u8]) {
+        self.heard.push((received, bytes.to_vec()));
+    }
+}
+
+fn message(bytes: &[u8]) -> Message {
+    Message::decode(&Frame::parse(bytes).unwrap()).unwrap()
+}
+
+impl Rig {
+    fn new(text: &str, loses: usize) -> Self {
+        let settings = settings(text).unwrap();
+        let now = MonoNs(1_000_000_000);
+        let setup = EmulatorSetup { start: now, head: None, site: Site::default(), polled: false };
+        let device = PingEmulator::new(settings, LATENCY, &setup);
+        let (line, sent, heard) = (Vec::new(), Vec::new(), Vec::new());
+        Self { driver: PingDriver::new(settings), device, now, line, sent, heard, loses }
+    }
+
+    fn drive(&mut self, call: impl FnOnce(&mut PingDriver, MonoNs, &mut dyn Wire)) {
+        let mut ends = Ends::default();
+        call(&mut self.driver, self.now, &mut ends);
+        self.heard.extend(ends.heard.iter().map(|(at, bytes)| (*at, message(bytes))));
+        for bytes in ends.sent {
+            self.sent.push(message(&bytes));
+            if self.loses == 0 || self.sent.len() % self.loses != 0 {
+                let line = &mut self.line;
+                self.device.hear(self.now, &bytes, &mut |_, at, bytes| line.push((at, bytes.to_vec())));
+            }
+        }
+    }
+
+    /// Lets the device ping, with the wall at 4 m.
+    fn ping(&mut self) {
+        let mut due = Vec::new();
+        self.device.begin(self.now + DurNs(1), &mut due);
+        for sounding in due {
+            let heard = Sounding { range_m: Some(4.0), ..sounding };
+            let line = &mut self.line;
+            self.device.tell(&heard, &mut |_, at, bytes| line.push((at, bytes.to_vec())));
+        }
+        self.line.sort_by_key(|(at, _)| *at);
+    }
+
+    fn run(&mut self, seconds: f64) {
+        let until = self.now + DurNs::from_secs_f64(seconds);
+        if self.sent.is_empty() {
+            self.drive(|driver, now, wire| driver.opened(now, wire));
+        }
+        while self.now < until {
+            self.ping();
+            if self.line.first().is_some_and(|(at, _)| *at <= self.now) {
+                let (_, bytes) = self.line.remove(0);
+                self.drive(|driver, now, wire| driver.heard(now, &bytes, wire));
+            } else if self.driver.due().is_some_and(|due| due <= self.now) {
+                self.drive(|driver, now, wire| driver.wake(now, wire));
+            } else {
+                self.now = self.now + DurNs::from_millis(1);
+            }
+        }
+    }
+
+    fn distances(&self) -> usize {
+        let tells = |m: &Message| matches!(m, Message::Distance(_) | Message::Profile(_));
+        self.heard.iter().filter(|(_, message)| tells(message)).count()
+    }
+}
+
+#[test]
+fn settings_come_first_and_then_a_distance_each_interval() {
+    let mut rig = Rig::new("interval_ms = 50\nsound_speed_mps = 1447\nscan_m = 8\ngain = 2", 0);
+    rig.run(10.0);
+    assert!((190..=200).contains(&rig.distances()), "{}", rig.distances());
+    for wanted in [
+        Message::SetSpeedOfSound(1_447_000),
+        Message::SetPingInterval(50),
+        Message::SetModeAuto(false),
+        Message::SetRange(crate::codec::ScanRange { start_mm: 0, length_mm: 8000 }),
+        Message::SetGain(2),
+        Message::SetPingEnable(true),
+    ] {
+        assert_eq!(rig.sent.iter().filter(|sent| **sent == wanted).count(), 1, "{wanted:?}");
+    }
+    assert!(rig.heard.iter().all(|(_, message)| !matches!(message, Message::Nack { .. })));
+    let standing = rig.driver.standing();
+    assert_eq!(standing.identity.as_deref(), Some("Ping echosounder, revision 1, firmware 3.29.0"));
+    assert_eq!(standing.complaint, None);
+}
+
+#[test]
+fn a_continuous_device_is_started_once_and_not_asked() {
+    let mut rig = Rig::new("polling = \"continuous\"\ninterval_ms = 50", 0);
+    rig.run(10.0);
+    assert!((190..=200).contains(&rig.distances()), "{}", rig.distances());
+    assert!(!rig.sent.contains(&Message::GeneralRequest(id::DISTANCE)));
+}
+
+#[test]
+fn a_line_that_loses_messages_costs_those_and_a_wait() {
+    let mut rig = Rig::new("interval_ms = 50", 7);
+    rig.run(20.0);
+    assert!(rig.distances() > 180, "{}", rig.distances());
+}
+
+#[test]
+fn a_speed_of_sound_that_another_client_has_set_is_set_back() {
+    let mut rig = Rig::new("", 0);
+    rig.run(5.0);
+    let other = Addressed { source: 0, destination: 1, message: Message::SetSpeedOfSound(1_480_000) };
+    rig.device.hear(rig.now, other.encode().unwrap().as_slice(), &mut |_, _, _| ());
+    rig.run(12.0);
+    assert_eq!(rig.sent.iter().filter(|sent| **sent == Message::SetSpeedOfSound(1_500_000)).count(), 2);
+}
+
+#[test]
+fn another_device_on_the_line_is_complained_of() {
+    let mut rig = Rig::new("", 0);
+    rig.drive(|driver, now, wire| driver.opened(now, wire));
+    let device = DeviceInformation {
+        device_type: 2,
+        revision: 1,
+        firmware_major: 3,
+        firmware_minor: 3,
+        firmware_patch: 0,
+        reserved: 0,
+    };
+    let says = Addressed { source: 2, destination: 0, message: Message::DeviceInformation(device) };
+    let bytes = says.encode().unwrap();
+    rig.drive(|driver, now, wire| driver.heard(now, bytes.as_slice(), wire));
+    assert!(rig.driver.standing().complaint.unwrap().contains("Ping360"));
+}

@@ -1,0 +1,59 @@
+//! The one clock by which everything that comes in is stamped.
+
+use std::time::{Duration, SystemTime};
+
+use headrace_core::time::{DurNs, MonoNs, UtcNs};
+use rustix::time::{ClockId, clock_gettime};
+
+/// Now, on the host's monotonic clock: it counts from the machine's start and is never set.
+pub fn now() -> MonoNs {
+    let time = clock_gettime(ClockId::Monotonic);
+    let seconds = u64::try_from(time.tv_sec).unwrap_or(0);
+    let rest = u64::try_from(time.tv_nsec).unwrap_or(0);
+    MonoNs(seconds.saturating_mul(1_000_000_000).saturating_add(rest))
+}
+
+/// A moment that the kernel has stamped with the time of day, on the monotonic clock.
+///
+/// It is as long ago on either clock; one that would lie ahead, since the time of day was set, is taken as now.
+pub fn of_wall(stamped: SystemTime) -> MonoNs {
+    let now = now();
+    let ago = wall().duration_since(stamped).unwrap_or(Duration::ZERO);
+    now - DurNs(i64::try_from(ago.as_nanos()).unwrap_or(0))
+}
+
+#[expect(
+    clippy::disallowed_methods,
+    reason = "the kernel stamps with the time of day, and this is where it is left behind"
+)]
+fn wall() -> SystemTime {
+    SystemTime::now()
+}
+
+/// The same moment on the monotonic clock and in UTC.
+pub fn clock_anchor() -> (MonoNs, UtcNs) {
+    let (mono, wall) = (now(), wall());
+    let since = wall.duration_since(SystemTime::UNIX_EPOCH).unwrap_or(Duration::ZERO);
+    (mono, UtcNs(i64::try_from(since.as_nanos()).unwrap_or(0)))
+}
+
+/// A wait as the system takes it.
+pub(crate) fn duration(wait: DurNs) -> Duration {
+    Duration::from_nanos(u64::try_from(wait.0).unwrap_or(0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_clock_goes_on_and_stamps_of_the_day_are_carried_over() {
+        let (first, stamped) = (now(), wall());
+        let second = now();
+        assert!(second.0 >= first.0 && first.0 > 0);
+        let over = of_wall(stamped);
+        // Between the two looks at the clocks the thread may have been put aside, however shortly.
+        assert!(over.since(first).0 > -1_000_000_000 && over.since(now()).0 <= 0);
+        assert!(of_wall(wall() + Duration::from_mins(1)).since(now()).0 <= 0);
+    }
+}

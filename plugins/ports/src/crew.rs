@@ -1,0 +1,120 @@
+//! The threads of all lines, and the loop that lives on them.
+
+use std::io;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::{self, JoinHandle};
+use std::time::Duration;
+
+use crossbeam::sync::Parker;
+use headrace_core::app::driver::Driver;
+use headrace_core::app::ring::Port;
+use headrace_core::app::run::Loop;
+use headrace_core::config::{Connect, ConnectError};
+
+use crate::clock;
+use crate::service::{Berth, Common, SentSink, Service};
+use crate::status::{Board, LineHistory, Status};
+
+/// Statuses that may wait for whoever shows them.
+const BOARD: usize = 256;
+/// How long the loop sleeps when nothing comes.
+const PERIOD: Duration = Duration::from_millis(20);
+/// How long an outlet is given that is behind.
+const BEHIND: Duration = Duration::from_millis(1);
+
+/// A sensor that is to be served.
+pub struct Hand {
+    /// Its number, in the order of the vehicle file.
+    pub source: usize,
+    /// Where it is, or why that can't be told.
+    pub connect: Result<Connect, ConnectError>,
+    /// Its ring's writing end.
+    pub port: Port,
+    /// The host's side of its line.
+    pub driver: Box<dyn Driver>,
+}
+
+/// Threads that serve lines, one each. Sensors whose `connect` is the same share one.
+pub struct Crew {
+    threads: Vec<JoinHandle<Vec<(usize, LineHistory)>>>,
+    stopping: Arc<AtomicBool>,
+    board: Board,
+    parker: Parker,
+}
+
+impl Crew {
+    /// Starts them. `sent` takes what is sent to the devices.
+    ///
+    /// Errors: a thread can't be started.
+    pub fn start(hands: Vec<Hand>, sent: Option<SentSink>) -> io::Result<Self> {
+        let parker = Parker::new();
+        let stopping = Arc::new(AtomicBool::new(false));
+        let board = Board::new(BOARD);
+        let waker = parker.unparker().clone();
+        let common = Common { stopping: Arc::clone(&stopping), board: board.clone(), waker, sent };
+        let mut crew = Self { threads: Vec::new(), stopping, board, parker };
+        for (name, connect, berths) in lines(hands) {
+            let service = Service::new(connect, berths, common.clone());
+            let thread = thread::Builder::new().name(name).spawn(move || service.run())?;
+            crew.threads.push(thread);
+        }
+        Ok(crew)
+    }
+
+    /// The oldest change of a device's status that hasn't been taken.
+    pub fn next_status(&self) -> Option<Status> {
+        self.board.next()
+    }
+
+    /// Runs the loop until `ended` says so: a tick as soon as something has come, or a period has passed.
+    pub fn run(&self, dive: &mut Loop, ended: &dyn Fn() -> bool, after_tick: &mut dyn FnMut(&Loop)) {
+        while !ended() {
+            self.parker.park_timeout(PERIOD);
+            dive.tick(clock::now());
+            after_tick(dive);
+        }
+    }
+
+    /// Ends all threads and works off what they have left in the rings; gives what each sensor's line has been through, in
+    /// the order of the sensors.
+    pub fn stop(mut self, dive: &mut Loop, after_tick: &mut dyn FnMut(&Loop)) -> Vec<LineHistory> {
+        self.stopping.store(true, Ordering::Relaxed);
+        let mut all: Vec<(usize, LineHistory)> = Vec::new();
+        for thread in self.threads.drain(..) {
+            // A thread that has panicked has said so itself.
+            all.extend(thread.join().unwrap_or_default());
+        }
+        while dive.has_waiting() {
+            // An outlet that is behind holds packets back; it is given time.
+            if dive.tick(clock::now()) == 0 {
+                thread::sleep(BEHIND);
+            }
+            after_tick(dive);
+        }
+        all.sort_by_key(|(source, _)| *source);
+        all.into_iter().map(|(_, history)| history).collect()
+    }
+}
+
+impl Drop for Crew {
+    fn drop(&mut self) {
+        self.stopping.store(true, Ordering::Relaxed);
+    }
+}
+
+/// A line: its thread's name, where it is, those on it.
+type LineOf = (String, Result<Connect, ConnectError>, Vec<Berth>);
+
+fn lines(hands: Vec<Hand>) -> Vec<LineOf> {
+    let mut lines: Vec<LineOf> = Vec::new();
+    for Hand { source, connect, port, driver } in hands {
+        let berth = Berth { source, port, driver };
+        // A connect that can't be understood is no line that could be shared.
+        match lines.iter_mut().find(|line| line.1.is_ok() && line.1 == connect) {
+            Some(line) => line.2.push(berth),
+            None => lines.push((format!("line {source}"), connect, vec![berth])),
+        }
+    }
+    lines
+}

@@ -1,0 +1,19 @@
+//! What the drivers of all devices share: the clock, lines of every carrier, and the life of a line: opened, read with stamps,
+//! lost, and opened again.
+//!
+//! The drivers themselves are in the devices' crates and do no I/O; see [`headrace_core::app::driver`].
+
+mod clock;
+mod crew;
+mod lines;
+mod service;
+mod stand;
+mod status;
+mod trouble;
+
+pub use clock::{clock_anchor, now, of_wall};
+pub use crew::{Crew, Hand};
+pub use service::SentSink;
+pub use stand::{Stand, wait_for_any};
+pub use status::{Board, LineHistory, Phase, Status};
+pub use trouble::{Trouble, TroubleKind};

@@ -1,0 +1,87 @@
+//! CAN interfaces, with the kernel's own stamps.
+
+use std::io;
+use std::time::Duration;
+
+use headrace_core::time::MonoNs;
+use socketcan::{
+    CanFrame, CanSocket, EmbeddedFrame as _, ExtendedId, Frame as _, Id, Socket as _, SocketOptions as _,
+    StandardId,
+};
+
+use super::{Line, READ_BYTES, waited};
+use crate::clock;
+use crate::trouble::Trouble;
+
+/// Length of a `can_frame`, and where its data begins.
+const FRAME_BYTES: usize = 16;
+const DATA_AT: usize = 8;
+/// The bits of the identifier's word that say that it has 29 bits. Source: Linux, `CAN_EFF_FLAG`.
+const EXTENDED: u32 = 0x8000_0000;
+
+struct Can(CanSocket);
+
+pub(super) fn open(interface: &str) -> Result<Box<dyn Line>, Trouble> {
+    let opening = || {
+        let socket = CanSocket::open(interface)?;
+        socket.set_recv_timestamp(true)?;
+        // A bus that is off or breaks down says so in frames of its own.
+        socket.set_error_filter_accept_all()?;
+        Ok(socket)
+    };
+    let socket = opening().map_err(|error| Trouble::can(interface, &error))?;
+    Ok(Box::new(Can(socket)))
+}
+
+impl Line for Can {
+    fn read(&mut self, wait: Duration, into: &mut [u8; READ_BYTES]) -> io::Result<Option<(MonoNs, usize)>> {
+        self.0.set_read_timeout(wait.max(Duration::from_micros(1)))?;
+        let mut stamped = None;
+        let read = self.0.read_frame_with_timestamp().map(|(frame, stamp)| {
+            if let Some(to) = into.first_chunk_mut() {
+                *to = bytes_of(&frame);
+            }
+            stamped = Some(clock::of_wall(stamp));
+            FRAME_BYTES
+        });
+        Ok(waited(read)?.zip(stamped).map(|(count, at)| (at, count)))
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
+        write(&self.0, bytes)
+    }
+}
+
+/// Puts a frame on a bus.
+pub(crate) fn write(socket: &CanSocket, bytes: &[u8]) -> io::Result<()> {
+    let refused = || io::Error::new(io::ErrorKind::InvalidInput, "no can_frame of 16 bytes");
+    socket.write_frame(&frame(bytes).ok_or_else(refused)?)
+}
+
+/// A frame's bytes as the kernel lays them out: identifier and its flags, length, three spare bytes, data.
+fn bytes_of(frame: &CanFrame) -> [u8; FRAME_BYTES] {
+    let mut bytes = [0; FRAME_BYTES];
+    let data = frame.data();
+    let length = u8::try_from(frame.dlc()).unwrap_or(0);
+    for (to, from) in bytes.iter_mut().zip(frame.id_word().to_ne_bytes().iter().chain(&[length])) {
+        *to = *from;
+    }
+    for (to, from) in bytes.iter_mut().skip(DATA_AT).zip(data) {
+        *to = *from;
+    }
+    bytes
+}
+
+/// A frame of its bytes as the kernel lays them out.
+fn frame(bytes: &[u8]) -> Option<CanFrame> {
+    let (word, rest) = bytes.split_first_chunk::<4>().filter(|_| bytes.len() == FRAME_BYTES)?;
+    let word = u32::from_ne_bytes(*word);
+    let length = usize::from(*rest.first()?);
+    let data = bytes.get(DATA_AT..DATA_AT + length)?;
+    let id = if word & EXTENDED == 0 {
+        Id::Standard(StandardId::new(u16::try_from(word).ok()?)?)
+    } else {
+        Id::Extended(ExtendedId::new(word & !EXTENDED)?)
+    };
+    CanFrame::new(id, data)
+}

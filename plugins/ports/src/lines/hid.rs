@@ -1,0 +1,51 @@
+//! HID devices, found by vendor, product and serial number.
+
+use std::io;
+use std::time::Duration;
+
+use headrace_core::config::UsbIdentity;
+use headrace_core::time::MonoNs;
+use hidapi::{DeviceInfo, HidApi, HidDevice, HidError};
+
+use super::{Line, READ_BYTES};
+use crate::clock;
+use crate::trouble::Trouble;
+
+struct Hid(HidDevice);
+
+pub(super) fn open(identity: &UsbIdentity) -> Result<Box<dyn Line>, Trouble> {
+    let what = format!("hid:{identity}");
+    let api = HidApi::new().map_err(|error| Trouble::opening(&what, &io_error(&error)))?;
+    let mut fitting = api.device_list().filter(|device| is_it(device, identity));
+    let Some(device) = fitting.next() else { return Err(Trouble::not_plugged_in(&what)) };
+    let path = device.path().to_string_lossy().into_owned();
+    if let Some(other) = fitting.find(|other| other.path() != device.path()) {
+        return Err(Trouble::ambiguous(&what, &[path, other.path().to_string_lossy().into_owned()]));
+    }
+    let opened = api.open_path(device.path()).map_err(|error| Trouble::opening(&path, &io_error(&error)))?;
+    Ok(Box::new(Hid(opened)))
+}
+
+fn is_it(device: &DeviceInfo, identity: &UsbIdentity) -> bool {
+    (device.vendor_id(), device.product_id()) == (identity.vendor, identity.product)
+        && identity.serial.as_ref().is_none_or(|serial| device.serial_number() == Some(serial.as_str()))
+}
+
+fn io_error(error: &HidError) -> io::Error {
+    match error {
+        HidError::IoError { error } => io::Error::new(error.kind(), error.to_string()),
+        other => io::Error::other(other.to_string()),
+    }
+}
+
+impl Line for Hid {
+    fn read(&mut self, wait: Duration, into: &mut [u8; READ_BYTES]) -> io::Result<Option<(MonoNs, usize)>> {
+        let wait_ms = i32::try_from(wait.as_millis()).unwrap_or(i32::MAX).max(1);
+        let count = self.0.read_timeout(into, wait_ms).map_err(|error| io_error(&error))?;
+        Ok((count > 0).then(|| (clock::now(), count)))
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.0.write(bytes).map(|_| ()).map_err(|error| io_error(&error))
+    }
+}

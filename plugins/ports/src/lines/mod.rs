@@ -1,0 +1,79 @@
+//! Open lines to devices: one file a carrier.
+
+#[cfg(target_os = "linux")]
+pub(crate) mod can;
+#[cfg(target_os = "linux")]
+pub(crate) mod hid;
+#[cfg(target_os = "linux")]
+mod i2c;
+pub(crate) mod serial;
+mod tcp;
+mod udp;
+
+use std::io;
+use std::time::Duration;
+
+use headrace_core::config::Connect;
+use headrace_core::time::{DurNs, MonoNs};
+
+use crate::trouble::Trouble;
+
+/// The most bytes that one read gives.
+pub(crate) const READ_BYTES: usize = 2048;
+
+/// An open line.
+pub(crate) trait Line {
+    /// Waits up to `wait` for bytes; gives when the first of them came, and how many. `None` when none came.
+    fn read(&mut self, wait: Duration, into: &mut [u8; READ_BYTES]) -> io::Result<Option<(MonoNs, usize)>>;
+
+    /// Puts bytes on the line; on a carrier of messages they are one.
+    fn write(&mut self, bytes: &[u8]) -> io::Result<()>;
+
+    /// On a bus: writes, waits `settle`, reads, and gives the transaction, the bytes written and then those read, with the
+    /// moment at which the read began. `None` where the answer comes as a message.
+    fn exchange(
+        &mut self,
+        write: &[u8],
+        settle: DurNs,
+        read_bytes: usize,
+    ) -> io::Result<Option<(MonoNs, Vec<u8>)>> {
+        let _ = (write, settle, read_bytes);
+        Err(io::Error::new(io::ErrorKind::Unsupported, "only an I2C bus, or UDP in its place, exchanges"))
+    }
+
+    /// Called about once a second while nothing has come, for carriers on which those who are silent are forgotten.
+    fn knock(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+/// Opens what a `connect` names.
+///
+/// Errors: why it can't be opened, and what would mend it.
+pub(crate) fn open(connect: &Connect) -> Result<Box<dyn Line>, Trouble> {
+    match connect {
+        Connect::Serial { port, baud } => serial::open(port, *baud),
+        Connect::Tcp { address } => tcp::open(address),
+        Connect::Udp { address } => udp::open(address),
+        Connect::UdpListen { address } => udp::listen(address),
+        #[cfg(target_os = "linux")]
+        Connect::Can { interface } => can::open(interface),
+        #[cfg(target_os = "linux")]
+        Connect::Hid(identity) => hid::open(identity),
+        #[cfg(target_os = "linux")]
+        Connect::I2c { bus, address } => i2c::open(bus, *address),
+        #[cfg(not(target_os = "linux"))]
+        other => Err(Trouble::unsupported(&other.to_string())),
+    }
+}
+
+/// What a read with a timeout gave; a timeout is no error.
+fn waited(read: io::Result<usize>) -> io::Result<Option<usize>> {
+    match read {
+        Ok(count) => Ok(Some(count)),
+        Err(error) => match error.kind() {
+            io::ErrorKind::TimedOut | io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted => Ok(None),
+            _ => Err(error),
+        },
+    }
+}

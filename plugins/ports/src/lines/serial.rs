@@ -1,0 +1,78 @@
+//! Serial ports, by path or by the USB adapter's identity.
+
+use std::io::{self, Read as _, Write as _};
+use std::time::Duration;
+
+use headrace_core::config::{SerialPort, UsbIdentity};
+use headrace_core::time::{DurNs, MonoNs};
+use serialport::{SerialPort as _, SerialPortType, TTYPort};
+
+use super::{Line, READ_BYTES, waited};
+use crate::clock;
+use crate::trouble::Trouble;
+
+/// Bits on the line for a byte: start, eight, stop.
+const BITS_A_BYTE: i64 = 10;
+/// How long a write may wait for the line to take more.
+const WRITE_TIME: Duration = Duration::from_millis(500);
+
+struct Serial {
+    port: TTYPort,
+    byte_time: DurNs,
+    /// When the last read had taken all that there was.
+    emptied: MonoNs,
+}
+
+pub(super) fn open(port: &SerialPort, baud: u32) -> Result<Box<dyn Line>, Trouble> {
+    let path = match port {
+        SerialPort::Path(path) => path.clone(),
+        SerialPort::Usb(identity) => path_of(identity)?,
+    };
+    let builder = serialport::new(&path, baud).timeout(WRITE_TIME);
+    let port = TTYPort::open(&builder).map_err(|error| Trouble::opening(&path, &error.into()))?;
+    port.clear(serialport::ClearBuffer::All).map_err(|error| Trouble::opening(&path, &error.into()))?;
+    let byte_time = DurNs(BITS_A_BYTE * 1_000_000_000 / i64::from(baud.max(1)));
+    Ok(Box::new(Serial { port, byte_time, emptied: clock::now() }))
+}
+
+/// The path that a USB adapter's port has now.
+fn path_of(identity: &UsbIdentity) -> Result<String, Trouble> {
+    let what = format!("serial:usb:{identity}");
+    let ports = serialport::available_ports().map_err(|error| Trouble::opening(&what, &error.into()))?;
+    let is_it = |kind: &SerialPortType| match kind {
+        SerialPortType::UsbPort(usb) => {
+            (usb.vid, usb.pid) == (identity.vendor, identity.product)
+                && identity.serial.as_ref().is_none_or(|serial| usb.serial_number.as_ref() == Some(serial))
+        }
+        _ => false,
+    };
+    let mut fitting = ports.into_iter().filter(|port| is_it(&port.port_type)).map(|port| port.port_name);
+    let Some(path) = fitting.next() else { return Err(Trouble::not_plugged_in(&what)) };
+    match fitting.next() {
+        None => Ok(path),
+        Some(other) => Err(Trouble::ambiguous(&what, &[path, other])),
+    }
+}
+
+impl Line for Serial {
+    fn read(&mut self, wait: Duration, into: &mut [u8; READ_BYTES]) -> io::Result<Option<(MonoNs, usize)>> {
+        self.port.set_timeout(wait)?;
+        let Some(count) = waited(self.port.read(into))? else { return Ok(None) };
+        if count == 0 {
+            return Err(io::Error::new(io::ErrorKind::BrokenPipe, "the port is gone"));
+        }
+        let now = clock::now();
+        // The bytes came one after the other, the first no earlier than the port was last found empty.
+        let ago = DurNs(self.byte_time.0.saturating_mul(i64::try_from(count).unwrap_or(0)));
+        let first = (now - ago).max(self.emptied).min(now);
+        if count < into.len() {
+            self.emptied = now;
+        }
+        Ok(Some((first, count)))
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.port.set_timeout(WRITE_TIME)?;
+        self.port.write_all(bytes)
+    }
+}

@@ -1,0 +1,333 @@
+//! The thread of one line: opens it, serves its drivers, loses it, and opens it again, for ever.
+
+use std::collections::VecDeque;
+use std::io;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::Duration;
+
+use crossbeam::sync::Unparker;
+use headrace_core::app::driver::{Driver, Standing, Wire};
+use headrace_core::app::ring::{MAX_PACKET_BYTES, Port};
+use headrace_core::config::{Connect, ConnectError};
+use headrace_core::time::{DurNs, MonoNs};
+
+use crate::clock;
+use crate::lines::{self, Line, READ_BYTES};
+use crate::status::{Board, LineHistory, Phase, Status};
+
+/// The least and the longest wait before a line is tried again.
+const FIRST_PAUSE: DurNs = DurNs::from_millis(250);
+const LONGEST_PAUSE: DurNs = DurNs::from_millis(4_000);
+/// The longest that a thread waits before it looks whether to end.
+const LOOK: Duration = Duration::from_millis(50);
+/// How often the devices' standing is looked at.
+const STANDING_PERIOD: DurNs = DurNs::from_millis(500);
+/// A device that has run so long starts the pauses anew when it is lost.
+const LONG_ENOUGH: DurNs = DurNs::from_millis(2_000);
+/// How often a silent line is knocked at.
+const KNOCK_PERIOD: DurNs = DurNs::from_millis(1_000);
+
+/// Takes what is sent to a device: the sensor's number, when, the bytes.
+pub type SentSink = Arc<dyn Fn(usize, MonoNs, &[u8]) + Send + Sync>;
+
+/// A sensor on a line.
+pub(crate) struct Berth {
+    /// Its number, in the order of the vehicle file.
+    pub source: usize,
+    pub port: Port,
+    pub driver: Box<dyn Driver>,
+}
+
+/// What all threads have.
+#[derive(Clone)]
+pub(crate) struct Common {
+    pub stopping: Arc<AtomicBool>,
+    pub board: Board,
+    pub waker: Unparker,
+    pub sent: Option<SentSink>,
+}
+
+/// A line and those who use it.
+pub(crate) struct Service {
+    connect: Result<Connect, ConnectError>,
+    seats: Vec<Seat>,
+    common: Common,
+}
+
+/// A sensor with what is known of it.
+struct Seat {
+    berth: Berth,
+    history: LineHistory,
+    status: Option<(Phase, String)>,
+    /// Bytes heard, good frames by then, and when there were last more of either.
+    bytes: u64,
+    frames: u64,
+    last_bytes: MonoNs,
+    last_frame: MonoNs,
+}
+
+/// What drivers want of the line, noted while they are called.
+enum Wish {
+    Send(Vec<u8>),
+    Exchange { write: Vec<u8>, settle: DurNs, read_bytes: usize },
+}
+
+struct Ends<'a> {
+    port: &'a mut Port,
+    history: &'a mut LineHistory,
+    wishes: &'a mut VecDeque<Wish>,
+}
+
+impl Wire for Ends<'_> {
+    fn send(&mut self, bytes: &[u8]) {
+        self.wishes.push_back(Wish::Send(bytes.to_vec()));
+    }
+
+    fn exchange(&mut self, write: &[u8], settle: DurNs, read_bytes: usize) {
+        self.wishes.push_back(Wish::Exchange { write: write.to_vec(), settle, read_bytes });
+    }
+
+    fn deliver(&mut self, received: MonoNs, bytes: &[u8]) {
+        for part in bytes.chunks(MAX_PACKET_BYTES) {
+            if self.port.send(received, part).is_err() {
+                self.history.dropped += 1;
+            }
+        }
+    }
+}
+
+impl Service {
+    pub(crate) fn new(connect: Result<Connect, ConnectError>, berths: Vec<Berth>, common: Common) -> Self {
+        let now = clock::now();
+        let seat = |berth| Seat {
+            berth,
+            history: LineHistory::default(),
+            status: None,
+            bytes: 0,
+            frames: 0,
+            last_bytes: now,
+            last_frame: now,
+        };
+        Self { connect, seats: berths.into_iter().map(seat).collect(), common }
+    }
+
+    /// Runs until it is told to end; gives what each sensor's line has been through.
+    pub(crate) fn run(mut self) -> Vec<(usize, LineHistory)> {
+        let mut pause = FIRST_PAUSE;
+        while !self.stopping() {
+            match self.connect.clone() {
+                // What can't be understood won't be later.
+                Err(error) => {
+                    self.say_all(Phase::Closed, &error.to_string());
+                    self.wait(LONGEST_PAUSE);
+                    continue;
+                }
+                Ok(connect) => match lines::open(&connect) {
+                    Err(trouble) => self.say_all(Phase::Closed, &trouble.to_string()),
+                    Ok(mut line) => {
+                        let opened = clock::now();
+                        let ended = self.serve(line.as_mut(), opened);
+                        let served = clock::now().since(opened);
+                        if served >= LONG_ENOUGH && self.seats.iter().any(|seat| seat.last_frame >= opened) {
+                            pause = FIRST_PAUSE;
+                        }
+                        if let Err(error) = ended {
+                            self.lost(&connect, &error);
+                        }
+                    }
+                },
+            }
+            self.wait(pause);
+            pause = (pause + pause).min(LONGEST_PAUSE);
+        }
+        self.seats.into_iter().map(|seat| (seat.berth.source, seat.history)).collect()
+    }
+
+    fn stopping(&self) -> bool {
+        self.common.stopping.load(Ordering::Relaxed)
+    }
+
+    fn wait(&self, pause: DurNs) {
+        let until = clock::now() + pause;
+        while !self.stopping() && clock::now() < until {
+            thread::sleep(LOOK);
+        }
+    }
+
+    fn lost(&mut self, connect: &Connect, error: &io::Error) {
+        for seat in &mut self.seats {
+            seat.history.lost += 1;
+        }
+        self.say_all(Phase::Closed, &format!("lost {connect}: {error}; it is tried again"));
+    }
+
+    /// Serves an open line until it fails, all on it have been silent for too long, or the end.
+    fn serve(&mut self, line: &mut dyn Line, opened: MonoNs) -> io::Result<()> {
+        for seat in &mut self.seats {
+            seat.history.opened += 1;
+            (seat.last_bytes, seat.last_frame) = (opened, opened);
+        }
+        for number in 0..self.seats.len() {
+            self.drive(line, number, |driver, wire| driver.opened(opened, wire))?;
+        }
+        let mut buffer = [0; READ_BYTES];
+        let mut look_at = opened + STANDING_PERIOD;
+        let mut knock_at = opened + KNOCK_PERIOD;
+        while !self.stopping() {
+            let wait = self.wait_for(clock::now());
+            if let Some((received, count)) = line.read(wait, &mut buffer)? {
+                let bytes = buffer.get(..count).unwrap_or_default();
+                self.heard(line, received, bytes)?;
+                knock_at = received + KNOCK_PERIOD;
+            }
+            self.wake(line)?;
+            let now = clock::now();
+            if now >= knock_at {
+                line.knock()?;
+                knock_at = now + KNOCK_PERIOD;
+            }
+            if now >= look_at {
+                look_at = now + STANDING_PERIOD;
+                self.look(now);
+                if self.seats.iter().all(|seat| seat.is_silent(now)) {
+                    let silence = "nothing has come for too long; it is opened again";
+                    return Err(io::Error::new(io::ErrorKind::TimedOut, silence));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// How long to wait for bytes before a driver wants to be woken.
+    fn wait_for(&self, now: MonoNs) -> Duration {
+        let due = self.seats.iter().filter_map(|seat| seat.berth.driver.due()).min();
+        due.map_or(LOOK, |due| clock::duration(due.since(now)).min(LOOK))
+    }
+
+    fn heard(&mut self, line: &mut dyn Line, received: MonoNs, bytes: &[u8]) -> io::Result<()> {
+        for number in 0..self.seats.len() {
+            if let Some(seat) = self.seats.get_mut(number) {
+                seat.bytes += bytes.len() as u64;
+                seat.last_bytes = clock::now();
+            }
+            self.drive(line, number, |driver, wire| driver.heard(received, bytes, wire))?;
+        }
+        self.common.waker.unpark();
+        Ok(())
+    }
+
+    /// Wakes those who are due, unless another on the line awaits an answer.
+    fn wake(&mut self, line: &mut dyn Line) -> io::Result<()> {
+        for number in 0..self.seats.len() {
+            let now = clock::now();
+            let others = self.seats.iter().enumerate().filter(|(other, _)| *other != number);
+            let awaited = others.into_iter().any(|(_, seat)| seat.berth.driver.awaits());
+            let due = self.seats.get(number).and_then(|seat| seat.berth.driver.due());
+            if due.is_some_and(|due| due <= now) && !awaited {
+                self.drive(line, number, |driver, wire| driver.wake(now, wire))?;
+                self.common.waker.unpark();
+            }
+        }
+        Ok(())
+    }
+
+    /// Calls a driver, and does what it wishes; a transaction's answer may lead to more wishes.
+    fn drive(
+        &mut self,
+        line: &mut dyn Line,
+        number: usize,
+        call: impl FnOnce(&mut dyn Driver, &mut dyn Wire),
+    ) -> io::Result<()> {
+        let Some(seat) = self.seats.get_mut(number) else { return Ok(()) };
+        let Seat { berth: Berth { driver, port, source }, history, bytes, last_bytes, .. } = seat;
+        let mut wishes = VecDeque::new();
+        call(driver.as_mut(), &mut Ends { port, history, wishes: &mut wishes });
+        while let Some(wish) = wishes.pop_front() {
+            match wish {
+                Wish::Send(message) => {
+                    self.common.note_sent(*source, &message);
+                    line.write(&message)?;
+                }
+                Wish::Exchange { write, settle, read_bytes } => {
+                    self.common.note_sent(*source, &write);
+                    if let Some((received, answer)) = line.exchange(&write, settle, read_bytes)? {
+                        *bytes += answer.len() as u64;
+                        *last_bytes = clock::now();
+                        driver.heard(received, &answer, &mut Ends { port, history, wishes: &mut wishes });
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn say_all(&mut self, phase: Phase, words: &str) {
+        let now = clock::now();
+        for seat in &mut self.seats {
+            seat.say(&self.common.board, now, phase, words);
+        }
+    }
+
+    /// Looks at how the devices are doing.
+    fn look(&mut self, now: MonoNs) {
+        for seat in &mut self.seats {
+            let (phase, words) = seat.judge(now);
+            seat.say(&self.common.board, now, phase, &words);
+        }
+    }
+}
+
+impl Common {
+    fn note_sent(&self, source: usize, bytes: &[u8]) {
+        if let Some(sent) = &self.sent {
+            sent(source, clock::now(), bytes);
+        }
+    }
+}
+
+impl Seat {
+    fn is_silent(&self, now: MonoNs) -> bool {
+        now.since(self.last_bytes) > self.berth.driver.patience()
+    }
+
+    /// How the device is doing, and why.
+    fn judge(&mut self, now: MonoNs) -> (Phase, String) {
+        let patience = self.berth.driver.patience();
+        let Standing { good_frames, identity, complaint } = self.berth.driver.standing();
+        if good_frames != self.frames {
+            self.frames = good_frames;
+            self.last_frame = now;
+        }
+        if let Some(complaint) = complaint {
+            return (Phase::Wrong, complaint);
+        }
+        let seconds = patience.as_secs_f64();
+        if now.since(self.last_frame) <= patience {
+            // Before it has said anything it is left alone.
+            return match self.frames {
+                0 => self.status.clone().unwrap_or((Phase::Silent, "the line is open".to_owned())),
+                _ => (Phase::Running, identity.unwrap_or_default()),
+            };
+        }
+        if self.is_silent(now) {
+            (Phase::Silent, format!("nothing has come for {seconds:.0} s; is it switched on?"))
+        } else {
+            let words =
+                format!("bytes come, but no frame for {seconds:.0} s; another device, or another baud rate?");
+            (Phase::Babbling, words)
+        }
+    }
+
+    /// Puts a status on the board when it is another than the last.
+    fn say(&mut self, board: &Board, since: MonoNs, phase: Phase, words: &str) {
+        if self.status.as_ref().is_some_and(|(last, said)| *last == phase && said == words) {
+            return;
+        }
+        self.status = Some((phase, words.to_owned()));
+        let status = Status { source: self.berth.source, since, phase, words: words.to_owned() };
+        self.history.last = status.to_string();
+        board.put(status);
+    }
+}

@@ -1,0 +1,218 @@
+//! The device's end of a line, for rehearsals: pseudoterminals, TCP, UDP, the kernel's CAN and HID, as the host would open
+//! them.
+
+use std::fs::File;
+use std::io::{self, Read as _, Write as _};
+use std::net::{IpAddr, SocketAddr, TcpListener, TcpStream, UdpSocket};
+use std::os::fd::{AsFd, BorrowedFd};
+
+use headrace_core::app::driver::Carrier;
+use headrace_core::config::{Connect, SerialPort};
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
+use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
+use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
+
+use crate::lines::READ_BYTES;
+
+/// Rate that a rehearsed serial port is opened at.
+const BAUD: u32 = 115_200;
+
+/// The device's end of a line.
+pub struct Stand {
+    end: End,
+    /// How the host opens the other end.
+    connect: Connect,
+}
+
+enum End {
+    Pty {
+        master: File,
+    },
+    Tcp {
+        listener: TcpListener,
+        stream: Option<TcpStream>,
+    },
+    Udp {
+        socket: UdpSocket,
+        peers: Vec<SocketAddr>,
+    },
+    #[cfg(target_os = "linux")]
+    Can(socketcan::CanSocket),
+}
+
+/// The most hosts that a rehearsed bridge answers.
+const MAX_PEERS: usize = 8;
+
+impl Stand {
+    /// An end on a carrier; `at` is the address on which the network's ends listen.
+    ///
+    /// Errors: the system has no such port to give, or refuses it.
+    pub fn new(carrier: Carrier, at: IpAddr) -> io::Result<Self> {
+        match carrier {
+            Carrier::Serial => pty(),
+            Carrier::Tcp => tcp(at),
+            Carrier::Udp | Carrier::I2c => udp(at),
+            #[cfg(target_os = "linux")]
+            Carrier::Can => can("vcan0"),
+            other => Err(io::Error::new(
+                io::ErrorKind::Unsupported,
+                format!("rehearsing on {} isn't possible here", other.as_str()),
+            )),
+        }
+    }
+
+    /// How the host opens the other end.
+    pub fn connect(&self) -> &Connect {
+        &self.connect
+    }
+
+    /// Whether a host is at the other end, as far as that can be known.
+    pub fn is_called(&self) -> bool {
+        match &self.end {
+            End::Pty { master } => {
+                let mut polled = [PollFd::new(master, PollFlags::IN)];
+                // A terminal that nobody has open hangs up.
+                poll(&mut polled, Some(&Timespec { tv_sec: 0, tv_nsec: 0 })).is_ok()
+                    && polled.iter().all(|end| !end.revents().contains(PollFlags::HUP))
+            }
+            End::Tcp { stream, .. } => stream.is_some(),
+            End::Udp { peers, .. } => !peers.is_empty(),
+            #[cfg(target_os = "linux")]
+            End::Can(_) => true,
+        }
+    }
+
+    /// What has come from the host, if anything has; an empty message is a knock. Never waits.
+    ///
+    /// Errors: the end itself is broken; a host that has gone is none.
+    pub fn read(&mut self) -> io::Result<Option<Vec<u8>>> {
+        let mut buffer = [0; READ_BYTES];
+        let read = match &mut self.end {
+            End::Pty { master } => master.read(&mut buffer),
+            End::Tcp { listener, stream } => {
+                if let Ok((accepted, _)) = listener.accept() {
+                    accepted.set_nonblocking(true)?;
+                    accepted.set_nodelay(true)?;
+                    *stream = Some(accepted);
+                }
+                let Some(open) = stream else { return Ok(None) };
+                let read = open.read(&mut buffer);
+                if matches!(read, Ok(0)) || read.as_ref().is_err_and(is_gone) {
+                    *stream = None;
+                    return Ok(None);
+                }
+                read
+            }
+            End::Udp { socket, peers } => socket.recv_from(&mut buffer).map(|(count, peer)| {
+                if !peers.contains(&peer) {
+                    peers.truncate(MAX_PEERS - 1);
+                    peers.insert(0, peer);
+                }
+                count
+            }),
+            #[cfg(target_os = "linux")]
+            End::Can(_) => return Ok(None),
+        };
+        match read {
+            Ok(count) => Ok(buffer.get(..count).map(<[u8]>::to_vec)),
+            Err(error) if is_gone(&error) || error.kind() == io::ErrorKind::WouldBlock => Ok(None),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Puts a message of the device on the line. Where no host is, or it doesn't read, it is lost.
+    ///
+    /// Errors: the end itself is broken.
+    pub fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
+        let written = match &mut self.end {
+            End::Pty { master } => master.write_all(bytes),
+            End::Tcp { stream, .. } => stream.as_mut().map_or(Ok(()), |open| open.write_all(bytes)),
+            End::Udp { socket, peers } => {
+                peers.retain(|peer| socket.send_to(bytes, *peer).is_ok_and(|sent| sent == bytes.len()));
+                Ok(())
+            }
+            #[cfg(target_os = "linux")]
+            End::Can(socket) => crate::lines::can::write(socket, bytes),
+        };
+        match written {
+            Err(error) if is_gone(&error) || error.kind() == io::ErrorKind::WouldBlock => Ok(()),
+            other => other,
+        }
+    }
+
+    fn fds(&self) -> Vec<BorrowedFd<'_>> {
+        match &self.end {
+            End::Pty { master } => vec![master.as_fd()],
+            End::Tcp { listener, stream } => {
+                std::iter::once(listener.as_fd()).chain(stream.as_ref().map(AsFd::as_fd)).collect()
+            }
+            End::Udp { socket, .. } => vec![socket.as_fd()],
+            #[cfg(target_os = "linux")]
+            End::Can(socket) => vec![socket.as_fd()],
+        }
+    }
+}
+
+/// Waits until something has come to one of the ends, or `wait_ns` nanoseconds have passed.
+pub fn wait_for_any(stands: &[Stand], wait_ns: u32) {
+    // A terminal that nobody has open would never let it wait.
+    let open = stands.iter().filter(|stand| !matches!(stand.end, End::Pty { .. }) || stand.is_called());
+    let fds: Vec<BorrowedFd<'_>> = open.flat_map(Stand::fds).collect();
+    let mut polled: Vec<PollFd<'_>> = fds.iter().map(|fd| PollFd::new(fd, PollFlags::IN)).collect();
+    let wait = Timespec { tv_sec: 0, tv_nsec: i64::from(wait_ns.min(999_999_999)) };
+    // Interrupted, it has waited less; that does no harm.
+    poll(&mut polled, Some(&wait)).unwrap_or_default();
+}
+
+/// The other end has been closed.
+fn is_gone(error: &io::Error) -> bool {
+    /// Source: Linux, EIO: what a terminal's master gives while nobody has it open.
+    const EIO: i32 = 5;
+    use io::ErrorKind as E;
+    error.raw_os_error() == Some(EIO)
+        || matches!(
+            error.kind(),
+            E::ConnectionReset | E::BrokenPipe | E::ConnectionRefused | E::ConnectionAborted
+        )
+}
+
+fn pty() -> io::Result<Stand> {
+    let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC)?;
+    grantpt(&master)?;
+    unlockpt(&master)?;
+    let path = ptsname(&master, Vec::new())?.to_string_lossy().into_owned();
+    // Bytes as they are, and no echo, from before the host opens it.
+    let mut settings = tcgetattr(&master)?;
+    settings.make_raw();
+    tcsetattr(&master, OptionalActions::Now, &settings)?;
+    let flags = fcntl_getfl(&master)?;
+    fcntl_setfl(&master, flags | OFlags::NONBLOCK)?;
+    let connect = Connect::Serial { port: SerialPort::Path(path), baud: BAUD };
+    Ok(Stand { end: End::Pty { master: File::from(master) }, connect })
+}
+
+fn tcp(at: IpAddr) -> io::Result<Stand> {
+    let listener = TcpListener::bind((at, 0))?;
+    listener.set_nonblocking(true)?;
+    let connect = Connect::Tcp { address: listener.local_addr()?.to_string() };
+    Ok(Stand { end: End::Tcp { listener, stream: None }, connect })
+}
+
+fn udp(at: IpAddr) -> io::Result<Stand> {
+    let socket = UdpSocket::bind((at, 0))?;
+    socket.set_nonblocking(true)?;
+    let connect = Connect::Udp { address: socket.local_addr()?.to_string() };
+    Ok(Stand { end: End::Udp { socket, peers: Vec::new() }, connect })
+}
+
+#[cfg(target_os = "linux")]
+fn can(interface: &str) -> io::Result<Stand> {
+    use socketcan::{Socket as _, SocketOptions as _};
+    let socket = socketcan::CanSocket::open(interface)?;
+    socket.set_filter_drop_all()?;
+    Ok(Stand { end: End::Can(socket), connect: Connect::Can { interface: interface.to_owned() } })
+}
+
+#[cfg(test)]
+mod tests;

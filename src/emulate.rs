@@ -1,0 +1,130 @@
+//! `headrace emulate`: a scene's devices on real ports, at real speed.
+
+use std::path::Path;
+
+use headrace_core::app::device::Direction;
+use headrace_core::app::driver::Carrier;
+use headrace_core::config::{self, Connect, Document};
+use headrace_core::time::{DurNs, MonoNs};
+use headrace_ports::{Stand, wait_for_any};
+use headrace_replay::simulate::{START, Scene, Simulation};
+
+use crate::cli::Emulate;
+use crate::devices::KINDS;
+use crate::failure::{self, Failure};
+use crate::files;
+use crate::output::say;
+
+/// How long it waits for a host at most before it goes on: a measurement is told at most so late.
+const WAIT_NS: u32 = 1_000_000;
+
+/// Puts a scene's devices on ports.
+pub(crate) fn emulate(args: &Emulate) -> Result<u8, Failure> {
+    let (name, text) = (args.scene.display().to_string(), files::read(&args.scene)?);
+    let load = files::bytes_beside(&args.scene);
+    let scene = Scene::parse(Document::new(&name, &text), &KINDS, &load, args.seed)?;
+    let stands = stands(&scene, args)?;
+    let vehicle_file = args.out.join("vehicle.toml");
+    write_vehicle(&scene, &stands, &args.out, &vehicle_file)?;
+    for (config, stand) in scene.vehicle.sensor_configs.iter().zip(&stands) {
+        say(&format!("{:<12} {}", config.id, stand.connect()));
+    }
+    say(&format!("vehicle {}", vehicle_file.display()));
+    let mut rehearsal =
+        Rehearsal { simulation: Simulation::for_hosts(&scene)?, stands, origin: headrace_ports::now() };
+    rehearsal.run(args)?;
+    Ok(failure::OK)
+}
+
+/// A port for each sensor: the one that its `connect` asks for, or UDP where this machine has none of it.
+fn stands(scene: &Scene, args: &Emulate) -> Result<Vec<Stand>, Failure> {
+    let mut stands = Vec::new();
+    for (config, device) in scene.vehicle.sensor_configs.iter().zip(&scene.vehicle.sensors) {
+        let asked = Connect::parse(&config.connect).and_then(|connect| connect.among(device.carriers()));
+        let carrier = asked.map_or(Carrier::Udp, |connect| connect.carrier());
+        let stand = Stand::new(carrier, args.listen).or_else(|error| {
+            eprintln!("headrace: {}: no {} here ({error}); UDP takes its place", config.id, carrier.as_str());
+            Stand::new(Carrier::Udp, args.listen)
+        });
+        stands.push(stand.map_err(|source| Failure::System { what: "opening a port for a device", source })?);
+    }
+    Ok(stands)
+}
+
+/// Writes the vehicle file of the rehearsal and the files that it names.
+fn write_vehicle(scene: &Scene, stands: &[Stand], folder: &Path, file: &Path) -> Result<(), Failure> {
+    let failed = |path: &Path, source| Failure::Write { path: path.to_owned(), source };
+    let mut changes = String::new();
+    for (config, stand) in scene.vehicle.sensor_configs.iter().zip(stands) {
+        changes += &format!("sensors.{}.connect = \"{}\"\n", config.id, stand.connect());
+    }
+    let section = Document::new("rehearsal", &changes).root()?;
+    let text = config::changed(&scene.vehicle_text, &section)?;
+    std::fs::create_dir_all(folder).map_err(|source| failed(folder, source))?;
+    for (name, content) in &scene.vehicle.attachments {
+        let path = folder.join(name);
+        if let Some(parent) = path.parent() {
+            std::fs::create_dir_all(parent).map_err(|source| failed(parent, source))?;
+        }
+        files::write(&path, content.as_bytes())?;
+    }
+    files::write(file, text.as_bytes())
+}
+
+/// Devices in a simulated tunnel, and the ports that they are on.
+struct Rehearsal {
+    simulation: Simulation,
+    stands: Vec<Stand>,
+    /// When the simulation began, on our clock.
+    origin: MonoNs,
+}
+
+impl Rehearsal {
+    fn run(&mut self, args: &Emulate) -> Result<(), Failure> {
+        let mut called = vec![false; self.stands.len()];
+        while called.contains(&false) {
+            self.go_on()?;
+            for (called, stand) in called.iter_mut().zip(&self.stands) {
+                *called |= stand.is_called();
+            }
+        }
+        let sets_out = self.now() + DurNs::from_secs_f64(args.stand);
+        self.simulation.set_out(sets_out);
+        say(&format!("all sensors are called; sets out in {} s", args.stand));
+        let end = self.simulation.end();
+        self.go_on_until(end)?;
+        say("the way has ended");
+        self.go_on_until(end + DurNs::from_secs_f64(args.linger))
+    }
+
+    fn now(&self) -> MonoNs {
+        START + headrace_ports::now().since(self.origin)
+    }
+
+    fn go_on_until(&mut self, end: MonoNs) -> Result<(), Failure> {
+        while self.now() < end {
+            self.go_on()?;
+        }
+        Ok(())
+    }
+
+    /// What hosts have sent goes to the devices, and what the devices say by now onto the lines.
+    fn go_on(&mut self) -> Result<(), Failure> {
+        let failed = |source| Failure::System { what: "rehearsing on a device's port", source };
+        wait_for_any(&self.stands, WAIT_NS);
+        let now = self.now();
+        for (number, stand) in self.stands.iter_mut().enumerate() {
+            while let Some(bytes) = stand.read().map_err(failed)? {
+                self.simulation.hear(number, now, &bytes);
+            }
+        }
+        self.simulation.go_on(now + DurNs(1));
+        while let Some(message) = self.simulation.waiting_message() {
+            let stand = self.stands.get_mut(usize::from(message.source));
+            if let Some(stand) = stand.filter(|_| message.direction == Direction::Received) {
+                stand.write(message.bytes).map_err(failed)?;
+            }
+        }
+        Ok(())
+    }
+}
