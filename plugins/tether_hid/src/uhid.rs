@@ -1,0 +1,263 @@
+//! The device's side of the kernel's `/dev/uhid`: a HID device made by a program, for rehearsals and tests.
+//!
+//! Whoever opens `/dev/uhid` (root, as a rule) and writes these events there makes the kernel believe that a device was
+//! plugged in; it gets its own `/dev/hidrawN`. Layout: `struct uhid_event` of Linux' `<linux/uhid.h>`, packed, native byte
+//! order:
+//! ```text
+//!   CREATE2   0 type u32 = 11, 4 name[128], 132 phys[64], 196 serial ("uniq")[64], 260 descriptor's size u16, 262 bus u16,
+//!             264 vendor u32, 268 product u32, 272 version u32, 276 country u32, 280 descriptor, at most 4096
+//!   INPUT2    0 type u32 = 12, 4 size u16, 6 report
+//!   DESTROY   0 type u32 = 1
+//! ```
+//! The kernel takes an event that ends early for one with zeros behind, so no event is longer than what it says.
+
+use std::io::Write;
+
+/// Where Linux takes the events.
+pub const PATH: &str = "/dev/uhid";
+
+/// The longest report descriptor that the kernel takes.
+pub const MAX_DESCRIPTOR_BYTES: usize = 4096;
+
+/// The longest report that the kernel takes.
+pub const MAX_INPUT_BYTES: usize = 4096;
+
+const DESTROY: u32 = 1;
+const CREATE2: u32 = 11;
+const INPUT2: u32 = 12;
+const BUS_USB: u16 = 3;
+const NAME_BYTES: usize = 128;
+const PHYS_BYTES: usize = 64;
+const SERIAL_BYTES: usize = 64;
+
+/// What a device says of itself when it is plugged in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Identity<'a> {
+    /// Product's name, up to 127 bytes.
+    pub name: &'a str,
+    /// Serial number, up to 63 bytes; what tells devices of one make apart.
+    pub serial: &'a str,
+    /// USB vendor id.
+    pub vendor_id: u16,
+    /// USB product id.
+    pub product_id: u16,
+    /// HID report descriptor, 1 to 4096 bytes.
+    pub descriptor: &'a [u8],
+}
+
+/// Why a device could not be made, heard or taken away.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum UhidError {
+    /// Something doesn't fit into the kernel's event.
+    #[error("{what} has {bytes} bytes; allowed: {least} to {most}")]
+    Size {
+        /// What was to be told.
+        what: &'static str,
+        /// Its length.
+        bytes: usize,
+        /// The least that fits.
+        least: usize,
+        /// The most that fits.
+        most: usize,
+    },
+    /// The kernel refused an event.
+    #[error("uhid: {event}: {source}")]
+    Refused {
+        /// Which event.
+        event: &'static str,
+        /// Its answer.
+        source: std::io::Error,
+    },
+    /// Only part of an event was taken, which the kernel never does.
+    #[error("uhid: {event}: {taken} of {bytes} bytes were taken")]
+    Cut {
+        /// Which event.
+        event: &'static str,
+        /// Bytes taken.
+        taken: usize,
+        /// The event's bytes.
+        bytes: usize,
+    },
+}
+
+/// A plugged-in device. It is there until [`VirtualDevice::unplug`], or until `W` is closed.
+#[derive(Debug)]
+pub struct VirtualDevice<W> {
+    kernel: W,
+}
+
+impl<W: Write> VirtualDevice<W> {
+    /// Plugs a USB device in. `kernel` is `/dev/uhid`, opened for writing; one write there is one event, so it must not be
+    /// buffered. The kernel makes the `/dev/hidrawN` some time after this returns. Errors: see [`UhidError`].
+    pub fn plug(mut kernel: W, identity: &Identity<'_>) -> Result<Self, UhidError> {
+        send(&mut kernel, "create a device", &create(identity)?)?;
+        Ok(Self { kernel })
+    }
+
+    /// Sends an input report, its id first where the descriptor has ids; 1 to 4096 bytes.
+    pub fn report(&mut self, report: &[u8]) -> Result<(), UhidError> {
+        send(&mut self.kernel, "input report", &input(report)?)
+    }
+
+    /// Takes the device away and gives back what it was written to, fit for another.
+    pub fn unplug(mut self) -> Result<W, UhidError> {
+        send(&mut self.kernel, "destroy the device", &DESTROY.to_ne_bytes())?;
+        Ok(self.kernel)
+    }
+}
+
+fn create(identity: &Identity<'_>) -> Result<Vec<u8>, UhidError> {
+    let size = size("a report descriptor", identity.descriptor, 1, MAX_DESCRIPTOR_BYTES)?;
+    let mut event = Vec::with_capacity(280 + identity.descriptor.len());
+    event.extend(CREATE2.to_ne_bytes());
+    push_text(&mut event, "a device's name", identity.name, NAME_BYTES)?;
+    push_text(&mut event, "a device's place", "headrace", PHYS_BYTES)?;
+    push_text(&mut event, "a serial number", identity.serial, SERIAL_BYTES)?;
+    event.extend(size.to_ne_bytes());
+    event.extend(BUS_USB.to_ne_bytes());
+    // Version and country: none.
+    for word in [u32::from(identity.vendor_id), u32::from(identity.product_id), 0, 0] {
+        event.extend(word.to_ne_bytes());
+    }
+    event.extend(identity.descriptor);
+    Ok(event)
+}
+
+fn input(report: &[u8]) -> Result<Vec<u8>, UhidError> {
+    let size = size("a report", report, 1, MAX_INPUT_BYTES)?;
+    let mut event = Vec::with_capacity(6 + report.len());
+    event.extend(INPUT2.to_ne_bytes());
+    event.extend(size.to_ne_bytes());
+    event.extend(report);
+    Ok(event)
+}
+
+fn size(what: &'static str, bytes: &[u8], least: usize, most: usize) -> Result<u16, UhidError> {
+    let told = u16::try_from(bytes.len()).ok().filter(|_| (least..=most).contains(&bytes.len()));
+    told.ok_or(UhidError::Size { what, bytes: bytes.len(), least, most })
+}
+
+/// Adds a text in a field of `field` bytes, the last of which stays zero.
+fn push_text(event: &mut Vec<u8>, what: &'static str, text: &str, field: usize) -> Result<(), UhidError> {
+    size(what, text.as_bytes(), 0, field - 1)?;
+    event.extend(text.as_bytes());
+    event.extend(std::iter::repeat_n(0, field - text.len()));
+    Ok(())
+}
+
+fn send(kernel: &mut impl Write, name: &'static str, event: &[u8]) -> Result<(), UhidError> {
+    match kernel.write(event) {
+        Ok(taken) if taken == event.len() => Ok(()),
+        Ok(taken) => Err(UhidError::Cut { event: name, taken, bytes: event.len() }),
+        Err(source) => Err(UhidError::Refused { event: name, source }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::REFERENCE_DESCRIPTOR;
+
+    const COUNTER: Identity<'static> = Identity {
+        name: "tether counter",
+        serial: "HR-0001",
+        vendor_id: 0x1209,
+        product_id: 0x0001,
+        descriptor: &REFERENCE_DESCRIPTOR,
+    };
+
+    /// A kernel that keeps each write by itself, and takes at most so many bytes of one.
+    #[derive(Debug)]
+    struct Events {
+        taken: Vec<Vec<u8>>,
+        most: usize,
+    }
+
+    impl Write for &mut Events {
+        fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+            let taken = bytes.len().min(self.most);
+            self.taken.push(bytes[..taken].to_vec());
+            Ok(taken)
+        }
+
+        fn flush(&mut self) -> std::io::Result<()> {
+            Ok(())
+        }
+    }
+
+    fn created(identity: &Identity<'_>) -> Vec<u8> {
+        let mut event = Vec::new();
+        VirtualDevice::plug(&mut event, identity).unwrap();
+        event
+    }
+
+    #[test]
+    fn each_thing_stands_where_the_kernel_looks_for_it() {
+        let event = created(&COUNTER);
+        assert_eq!(event.len(), 280 + 59);
+        assert_eq!(event[0..4], 11_u32.to_ne_bytes());
+        assert_eq!(event[4..18], *b"tether counter");
+        assert!(event[18..132].iter().all(|byte| *byte == 0));
+        assert_eq!(event[132..140], *b"headrace");
+        assert!(event[140..196].iter().all(|byte| *byte == 0));
+        assert_eq!(event[196..203], *b"HR-0001");
+        assert!(event[203..260].iter().all(|byte| *byte == 0));
+        assert_eq!(event[260..262], 59_u16.to_ne_bytes());
+        assert_eq!(event[262..264], 3_u16.to_ne_bytes());
+        assert_eq!(event[264..268], 0x1209_u32.to_ne_bytes());
+        assert_eq!(event[268..272], 1_u32.to_ne_bytes());
+        assert_eq!(event[272..280], [0; 8]);
+        assert_eq!(event[280..], REFERENCE_DESCRIPTOR);
+    }
+
+    #[test]
+    #[cfg(target_endian = "little")]
+    fn a_report_is_as_in_the_worked_example() {
+        let report = [0x01, 0x2A, 0x01, 0xC0, 0x1D, 0xFE, 0xFF, 0xDC, 0x05, 0x00, 0x00];
+        let mut expected = vec![0x0C, 0x00, 0x00, 0x00, 0x0B, 0x00];
+        expected.extend(report);
+        assert_eq!(input(&report).unwrap(), expected);
+    }
+
+    #[test]
+    fn every_event_is_one_write_and_the_kernel_is_given_back() {
+        let mut events = Events { taken: Vec::new(), most: usize::MAX };
+        let mut device = VirtualDevice::plug(&mut events, &COUNTER).unwrap();
+        device.report(&[1; 11]).unwrap();
+        device.report(&[2; 11]).unwrap();
+        let kernel = device.unplug().unwrap();
+        VirtualDevice::plug(kernel, &COUNTER).unwrap();
+        let lengths: Vec<_> = events.taken.iter().map(Vec::len).collect();
+        assert_eq!(lengths, [339, 17, 17, 4, 339]);
+        assert_eq!(events.taken[3], 1_u32.to_ne_bytes());
+    }
+
+    #[test]
+    fn what_does_not_fit_is_refused() {
+        let said = |identity| VirtualDevice::plug(Vec::new(), &identity).unwrap_err().to_string();
+        let long = "x".repeat(128);
+        let name = Identity { name: &long, ..COUNTER };
+        assert_eq!(said(name), "a device's name has 128 bytes; allowed: 0 to 127");
+        let serial = Identity { serial: &long[..64], ..COUNTER };
+        assert_eq!(said(serial), "a serial number has 64 bytes; allowed: 0 to 63");
+        let empty = Identity { descriptor: &[], ..COUNTER };
+        assert_eq!(said(empty), "a report descriptor has 0 bytes; allowed: 1 to 4096");
+        let mut device = VirtualDevice::plug(Vec::new(), &COUNTER).unwrap();
+        assert_eq!(
+            device.report(&[0; 4097]).unwrap_err().to_string(),
+            "a report has 4097 bytes; allowed: 1 to 4096"
+        );
+
+        let fits = Identity { name: &long[..127], serial: &long[..63], ..COUNTER };
+        let event = created(&fits);
+        assert_eq!((event[131], event[259]), (0, 0));
+    }
+
+    #[test]
+    fn a_cut_event_is_said() {
+        let mut events = Events { taken: Vec::new(), most: 100 };
+        let said = VirtualDevice::plug(&mut events, &COUNTER).unwrap_err().to_string();
+        assert_eq!(said, "uhid: create a device: 100 of 339 bytes were taken");
+    }
+}
