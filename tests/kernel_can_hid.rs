@@ -88,7 +88,9 @@ fn a_frame_comes_with_the_time_at_which_the_kernel_received_it() {
     let (sender, stamped, plain) = (vcan.socket(), vcan.socket(), vcan.socket());
     stamped.set_recv_timestamp(true).unwrap();
 
-    for number in 0..20 {
+    // Whether a frame's stamp is from before it was read. The kernel begins to stamp a moment after it was asked to; what
+    // comes before gets the time at which it is read.
+    let stamped_early = |number| {
         let before = SystemTime::now();
         sender.write_frame(&frame(number)).unwrap();
         // When one socket has the frame, the kernel has received it for the other, too.
@@ -101,8 +103,10 @@ fn a_frame_comes_with_the_time_at_which_the_kernel_received_it() {
         let (since_sent, before_read) =
             (at.duration_since(before).unwrap(), read.duration_since(at).unwrap());
         println!("CAN: frame {number}: stamp {since_sent:?} after sending, {before_read:?} before reading");
-        assert!(at <= received_by, "frame {number} is stamped when it is read");
-    }
+        at <= received_by
+    };
+    assert!((0..200).any(stamped_early), "the kernel stamps nothing");
+    assert!((200..220).all(stamped_early), "a frame is stamped when it is read");
 }
 
 #[test]
