@@ -39,6 +39,10 @@ pub struct DepthSensor;
 #[derive(Debug, Clone, Copy, PartialEq, Component)]
 pub struct Imu;
 
+/// A sonar that measures velocity over ground.
+#[derive(Debug, Clone, Copy, PartialEq, Component)]
+pub struct VelocityLog;
+
 /// A cable counter.
 #[derive(Debug, Clone, Copy, PartialEq, Component)]
 pub struct Tether {

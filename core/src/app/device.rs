@@ -5,7 +5,7 @@
 //! has the second, and the device's side of the wire for simulations.
 
 use super::driver::{Carrier, Driver, DriverSetup};
-use super::measurement::{Inertia, Payout, Pressure, Sounding};
+use super::measurement::{GroundVelocity, Inertia, Payout, Pressure, Sounding};
 use super::plugin::Plugin;
 use super::reading::{Decoded, Packet};
 use crate::codec::CodecCounts;
@@ -120,6 +120,8 @@ pub enum Emulated {
     Depth(Box<dyn Emulator<Pressure>>),
     /// An inertial unit.
     Inertial(Box<dyn Emulator<Inertia>>),
+    /// A velocity log.
+    VelocityLog(Box<dyn Emulator<GroundVelocity>>),
     /// A cable counter.
     Tether(Box<dyn Emulator<Payout>>),
 }
@@ -135,6 +137,8 @@ pub enum Sense {
     Depth,
     /// Attitude and motion.
     Inertial,
+    /// Velocity over ground.
+    Velocity,
     /// The way gone.
     Tether,
 }
@@ -147,6 +151,7 @@ impl Sense {
             Self::Echosounder => "echosounder",
             Self::Depth => "depth sensor",
             Self::Inertial => "inertial unit",
+            Self::Velocity => "velocity log",
             Self::Tether => "cable counter",
         }
     }

@@ -51,6 +51,15 @@ pub struct Inertia {
     pub force_mps2: Vec3<Sensor>,
 }
 
+/// Velocity over ground at a velocity log.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GroundVelocity {
+    /// When.
+    pub at: MonoNs,
+    /// Of the sensor itself, turning included, m/s.
+    pub velocity_mps: Vec3<Sensor>,
+}
+
 /// How far into the tunnel the cable has been paid out.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Payout {
@@ -74,7 +83,7 @@ macro_rules! measurement {
     };
 }
 
-measurement!(Sounding, Pressure, Inertia, Payout);
+measurement!(Sounding, Pressure, Inertia, GroundVelocity, Payout);
 
 impl Sounding {
     /// A ping that is still to be heard.
@@ -95,6 +104,13 @@ impl Inertia {
     pub fn due(at: MonoNs, period: DurNs) -> Self {
         let (attitude, rate_radps, force_mps2) = (Rot::identity(), Vec3::zero(), Vec3::zero());
         Self { at, period, attitude, rate_radps, force_mps2 }
+    }
+}
+
+impl GroundVelocity {
+    /// A measurement that is still to be made.
+    pub fn due(at: MonoNs) -> Self {
+        Self { at, velocity_mps: Vec3::zero() }
     }
 }
 

@@ -4,7 +4,7 @@ use bevy_ecs::schedule::Schedule;
 use bevy_ecs::world::{Mut, World};
 
 use super::alerts::Alerts;
-use super::components::{DepthSensor, Echosounder, Imu, Mounted, SonarHead, Tether};
+use super::components::{DepthSensor, Echosounder, Imu, Mounted, SonarHead, Tether, VelocityLog};
 use super::digest::Digest;
 use super::flow::{
     AdviceLog, Coverage, Digests, Events, Finder, HeadTable, HiddenAngles, MAX_TICK_READINGS, Navigator,
@@ -295,19 +295,19 @@ fn tables(
         Option<&Echosounder>,
         Option<&DepthSensor>,
         Option<&Imu>,
+        Option<&VelocityLog>,
         Option<&Tether>,
     )>();
-    for (entity, mounted, head, echosounder, depth, imu, tether) in query.iter(world) {
-        let kind = match (head, echosounder, depth, imu, tether) {
+    for (entity, mounted, head, echosounder, depth, imu, velocity, tether) in query.iter(world) {
+        let kind = match (head, echosounder, depth, imu, velocity, tether) {
             (Some(_), ..) => SensorKind::Head,
             (_, Some(echosounder), ..) => {
                 SensorKind::Echosounder { min_confidence: echosounder.min_confidence }
             }
             (_, _, Some(_), ..) => SensorKind::Depth,
-            (_, _, _, Some(_), _) => SensorKind::Imu,
-            (_, _, _, _, Some(tether)) => {
-                SensorKind::Tether { zero_at_m: tether.zero_at_m, scale: tether.scale }
-            }
+            (_, _, _, Some(_), ..) => SensorKind::Imu,
+            (_, _, _, _, Some(_), _) => SensorKind::VelocityLog,
+            (.., Some(tether)) => SensorKind::Tether { zero_at_m: tether.zero_at_m, scale: tether.scale },
             _ => SensorKind::Other,
         };
         if let Some(slot) = sensors.get_mut(mounted.source.index()) {

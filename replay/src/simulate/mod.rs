@@ -22,7 +22,7 @@ use bevy_ecs::entity::Entity;
 use bevy_ecs::prelude::World;
 use bevy_ecs::schedule::Schedule;
 use headrace_core::app::device::{Emulated, EmulatorSetup, Sense};
-use headrace_core::app::measurement::{Inertia, Measurement, Payout, Pressure, Sounding};
+use headrace_core::app::measurement::{GroundVelocity, Inertia, Measurement, Payout, Pressure, Sounding};
 use headrace_core::frames::Pose;
 use headrace_core::time::{DurNs, MonoNs};
 
@@ -315,6 +315,7 @@ fn spawn_sensors(world: &mut World, scene: &Scene, facts: &Facts, asked: Asked) 
             }
             Emulated::Depth(device) => spawn_device(world, entity, Device(device), noting),
             Emulated::Inertial(device) => spawn_device(world, entity, Device(device), noting),
+            Emulated::VelocityLog(device) => spawn_device(world, entity, Device(device), noting),
             Emulated::Tether(device) => spawn_device(world, entity, Device(device), noting),
         }
         entities.push(entity);
@@ -332,8 +333,9 @@ fn spawn_device<M: Measurement>(world: &mut World, entity: Entity, device: Devic
 /// Systems for the senses that the vehicle has, but for those whose work an effect does.
 fn add_base_systems(sim: &mut Builder<'_>) {
     let has = |sense: Sense| sim.facts().sensors.iter().any(|sensor| sensor.sense == sense);
-    let [head, echosounder, depth, inertial, tether] =
-        [Sense::Head, Sense::Echosounder, Sense::Depth, Sense::Inertial, Sense::Tether].map(has);
+    let [head, echosounder, depth, inertial, velocity, tether] =
+        [Sense::Head, Sense::Echosounder, Sense::Depth, Sense::Inertial, Sense::Velocity, Sense::Tether]
+            .map(has);
     if head && !sim.replaced(AIM_HELD) {
         sim.system(Stage::Aim, stages::aim_held);
     }
@@ -354,6 +356,11 @@ fn add_base_systems(sim: &mut Builder<'_>) {
         sim.system(Stage::Begin, stages::begin::<Inertia>);
         sim.system(Stage::Feel, stages::feel_motion);
         sim.system(Stage::Tell, stages::tell::<Inertia>);
+    }
+    if velocity {
+        sim.system(Stage::Begin, stages::begin::<GroundVelocity>);
+        sim.system(Stage::Feel, stages::feel_velocity);
+        sim.system(Stage::Tell, stages::tell::<GroundVelocity>);
     }
     if tether {
         sim.system(Stage::Begin, stages::begin::<Payout>);

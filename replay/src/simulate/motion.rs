@@ -28,6 +28,18 @@ pub(super) fn motion(truth: &Scenery, mount: &Mount, at: MonoNs, period: DurNs) 
     Inertia { at, period, attitude: now, rate_radps, force_mps2 }
 }
 
+/// Half of the time over which a velocity log's velocity is a mean.
+const HALF_PING: DurNs = DurNs::from_millis(5);
+
+/// The velocity of the sensor's own place at `at`, m/s.
+pub(super) fn velocity(truth: &Scenery, mount: &Mount, at: MonoNs) -> Vec3<Sensor> {
+    let (early, late) = (at - HALF_PING, at + HALF_PING);
+    let place = |at| truth.pose(at).place(mount.position);
+    let elapsed_s = late.since(early).as_secs_f64();
+    let attitude = truth.pose(at).attitude * mount.rotation;
+    attitude.inverse() * (place(late) - place(early)).scaled(1.0 / elapsed_s)
+}
+
 /// The turn rate that takes one attitude to the other in `elapsed`.
 fn rate(before: Rot<Level, Sensor>, after: Rot<Level, Sensor>, elapsed: DurNs) -> Vec3<Sensor> {
     let [w, x, y, z] = (before.inverse() * after).wxyz();

@@ -2,7 +2,7 @@
 //! asked for its truth has it.
 
 use bevy_ecs::prelude::{Component, Query, ResMut, Resource};
-use headrace_core::app::measurement::{Inertia, Measurement, Payout, Pressure, Sounding};
+use headrace_core::app::measurement::{GroundVelocity, Inertia, Measurement, Payout, Pressure, Sounding};
 
 use super::sensing::{Line, Samples, Source};
 
@@ -48,6 +48,15 @@ impl Figures for Payout {
 
     fn figures(&self) -> [f64; FIGURES] {
         padded([self.at.as_secs_f64(), self.chainage_m])
+    }
+}
+
+impl Figures for GroundVelocity {
+    const NAMES: &'static [&'static str] = &["at_s", "velocity_x_mps", "velocity_y_mps", "velocity_z_mps"];
+
+    fn figures(&self) -> [f64; FIGURES] {
+        let [x, y, z] = self.velocity_mps.0.into();
+        padded([self.at.as_secs_f64(), x, y, z])
     }
 }
 
@@ -124,10 +133,11 @@ pub(super) fn note(
     AllNoted<'_, '_, Sounding>,
     AllNoted<'_, '_, Pressure>,
     AllNoted<'_, '_, Inertia>,
+    AllNoted<'_, '_, GroundVelocity>,
     AllNoted<'_, '_, Payout>,
     Query<'_, '_, (&Source, &Line, &mut LineBefore)>,
 ) {
-    move |mut notes, mut soundings, mut pressures, mut inertias, mut payouts, mut lines| {
+    move |mut notes, mut soundings, mut pressures, mut inertias, mut velocities, mut payouts, mut lines| {
         let after = After(effect);
         for noted in &mut soundings {
             compare(after, &mut notes.0, noted);
@@ -136,6 +146,9 @@ pub(super) fn note(
             compare(after, &mut notes.0, noted);
         }
         for noted in &mut inertias {
+            compare(after, &mut notes.0, noted);
+        }
+        for noted in &mut velocities {
             compare(after, &mut notes.0, noted);
         }
         for noted in &mut payouts {

@@ -3,12 +3,12 @@
 #![allow(clippy::needless_pass_by_value, reason = "bevy hands systems their arguments by value")]
 
 use bevy_ecs::prelude::{Component, Query, Res, With, Without};
-use headrace_core::app::measurement::{Inertia, Measurement, Payout, Pressure, Sounding};
+use headrace_core::app::measurement::{GroundVelocity, Inertia, Measurement, Payout, Pressure, Sounding};
 use headrace_core::frames::{Mount, Pose, Vec3, head_direction};
 use headrace_core::math::{self, TAU};
 
 use super::clock::Clock;
-use super::motion::motion;
+use super::motion::{motion, velocity};
 use super::sensing::{Device, Echosounder, Head, Line, Mounted, Ray, Rays, Reach, Samples, Scenery, Slice};
 
 /// Name of the system [`aim_held`], for effects that take its place.
@@ -186,6 +186,18 @@ pub(super) fn feel_motion(
     for (mut samples, mounted) in &mut units {
         for inertia in &mut samples.list {
             *inertia = motion(&scenery, &mounted.0, inertia.at, inertia.period);
+        }
+    }
+}
+
+/// Velocity logs feel their own velocity.
+pub(super) fn feel_velocity(
+    scenery: Res<'_, Scenery>,
+    mut logs: Query<'_, '_, (&mut Samples<GroundVelocity>, &Mounted)>,
+) {
+    for (mut samples, mounted) in &mut logs {
+        for moved in &mut samples.list {
+            moved.velocity_mps = velocity(&scenery, &mounted.0, moved.at);
         }
     }
 }

@@ -3,7 +3,7 @@
 use bevy_ecs::entity::Entity;
 use bevy_ecs::prelude::World;
 use headrace_core::app::device::Sense;
-use headrace_core::app::measurement::{Inertia, Measurement, Payout, Pressure, Sounding};
+use headrace_core::app::measurement::{GroundVelocity, Inertia, Measurement, Payout, Pressure, Sounding};
 use headrace_core::frames::{Point3, Pose, Tunnel, Vec3};
 use headrace_core::time::MonoNs;
 
@@ -100,6 +100,9 @@ pub(super) fn collect(world: &mut World, entities: &[Entity], rows: &mut Vec<Tru
         }
         if let Some(samples) = world.get::<Samples<Inertia>>(*entity) {
             rows.extend(base.rows(samples, Sense::Inertial));
+        }
+        if let Some(samples) = world.get::<Samples<GroundVelocity>>(*entity) {
+            rows.extend(base.rows(samples, Sense::Velocity));
         }
         if let Some(samples) = world.get::<Samples<Payout>>(*entity) {
             rows.extend(base.rows(samples, Sense::Tether));

@@ -15,8 +15,8 @@ use crate::simulate::sensing::Line;
 use crate::simulate::stages::Stage;
 
 /// Every sense.
-pub(super) const SENSES: [Sense; 5] =
-    [Sense::Head, Sense::Echosounder, Sense::Depth, Sense::Inertial, Sense::Tether];
+pub(super) const SENSES: [Sense; 6] =
+    [Sense::Head, Sense::Echosounder, Sense::Depth, Sense::Inertial, Sense::Velocity, Sense::Tether];
 
 /// Messages from a device come late, over what the vehicle file says of its latency; none overtakes another on its line.
 ///
