@@ -1,0 +1,251 @@
+//! Frames to readings of one part of the vehicle; other good frames are passed over.
+
+use headrace_core::app::device::Decoder;
+use headrace_core::app::reading::{Decoded, EchoRange, Packet, Reading, WaterPressure};
+use headrace_core::codec::{Codec as _, CodecCounts, Framing as _, LineClock};
+use headrace_core::frames::{Rot, Vec3};
+use headrace_core::math;
+use headrace_core::time::DurNs;
+
+use crate::frame::{Frame, Frames, MavlinkCodec};
+use crate::message::{
+    Attitude, Distance, HECTOPASCAL, Imu, ImuMessage, MILLI_G_MPS2, MILLIRADPS, Message, Pressure,
+    PressureMessage, to_ours,
+};
+
+/// A frame's bytes follow one another: the longest takes 50 ms at 57,600 baud.
+const SILENCE: DurNs = DurNs::from_millis(100);
+
+/// Angles may be off their range by a rounding.
+const ANGLE_TOLERANCE_RAD: f64 = 1e-3;
+
+/// The quality that says that a distance is no good.
+const QUALITY_INVALID_PERCENT: u8 = 1;
+
+/// How a part's messages are to be understood.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Meaning {
+    /// Which part.
+    pub part: Part,
+    /// Whom to listen to; `None` for anyone.
+    pub system_id: Option<u8>,
+    /// Which part of that vehicle; `None` for any.
+    pub component_id: Option<u8>,
+    /// From validity to receive time.
+    pub latency: DurNs,
+}
+
+/// A part of the vehicle that the autopilot speaks of.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Part {
+    /// Attitude, turn rate, specific force.
+    Imu {
+        /// Where rates and forces come from; `None` for the rates of ATTITUDE, and no forces.
+        message: Option<ImuMessage>,
+    },
+    /// Pressure of the water.
+    Pressure {
+        /// Which barometer.
+        message: PressureMessage,
+        /// Quantum of the sensor behind it, Pa.
+        resolution_pa: f64,
+    },
+    /// A distance.
+    Distance(DistancePart),
+}
+
+/// Which distance, and how it is to be understood.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DistancePart {
+    /// Number of MAV_SENSOR_ORIENTATION; `None` for any.
+    pub orientation: Option<u8>,
+    /// Number of the sensor; `None` for any.
+    pub sensor_id: Option<u8>,
+    /// Confidence, 0 to 1, of a distance whose quality isn't known.
+    pub unknown_confidence: f64,
+    /// Speed of sound that the sensor is set to, m/s.
+    pub sound_speed_mps: f64,
+}
+
+/// Bytes to readings.
+#[derive(Debug, Clone)]
+pub struct MavlinkDecoder {
+    codec: MavlinkCodec,
+    clock: LineClock,
+    state: State,
+}
+
+#[derive(Debug, Clone)]
+struct State {
+    meaning: Meaning,
+    boot: BootClock,
+    passed_over: u64,
+    withheld: u64,
+}
+
+/// The autopilot's clock of 32 bits of milliseconds, unwrapped.
+#[derive(Debug, Clone, Copy, Default)]
+struct BootClock {
+    last_ms: Option<u32>,
+    since_boot_ms: i64,
+}
+
+impl BootClock {
+    /// Takes a time. One that seems a little earlier is: messages may be sent out of their order.
+    fn note(&mut self, time_ms: u32) {
+        self.since_boot_ms = match self.last_ms {
+            None => i64::from(time_ms),
+            Some(last_ms) => self.since_boot_ms + i64::from(time_ms.wrapping_sub(last_ms).cast_signed()),
+        };
+        self.last_ms = Some(time_ms);
+    }
+}
+
+impl MavlinkDecoder {
+    /// A decoder that has seen nothing yet.
+    pub fn new(meaning: Meaning) -> Self {
+        let state = State { meaning, boot: BootClock::default(), passed_over: 0, withheld: 0 };
+        Self { codec: MavlinkCodec::default(), clock: LineClock::new(SILENCE), state }
+    }
+
+    /// Good frames that are not of the part.
+    pub fn passed_over(&self) -> u64 {
+        self.state.passed_over
+    }
+
+    /// The autopilot's own time of the part's last message, from when it began.
+    pub fn since_boot(&self) -> Option<DurNs> {
+        self.state.boot.last_ms.map(|_| DurNs::from_millis(self.state.boot.since_boot_ms))
+    }
+}
+
+impl Decoder for MavlinkDecoder {
+    fn decode(&mut self, packet: Packet<'_>, sink: &mut dyn FnMut(Decoded)) {
+        let Self { codec, clock, state } = self;
+        clock.push(codec, packet.received, packet.bytes, |received, frame| {
+            let Some(frame) = Frames.read(frame) else { return };
+            let valid_at = received - state.meaning.latency;
+            state.take(&frame, &mut |reading| sink(Decoded { valid_at, reading }));
+        });
+    }
+
+    fn counts(&self) -> CodecCounts {
+        self.codec.counts()
+    }
+
+    /// Values that can't be: angles beyond a turn, numbers that are none, a pressure below zero, limits that contradict.
+    fn withheld(&self) -> u64 {
+        self.state.withheld
+    }
+}
+
+impl State {
+    fn take(&mut self, frame: &Frame, sink: &mut dyn FnMut(Reading)) {
+        let Meaning { part, system_id, component_id, .. } = self.meaning;
+        let is_ours = system_id.is_none_or(|id| id == frame.system_id)
+            && component_id.is_none_or(|id| id == frame.component_id);
+        match (part, Message::of(frame).filter(|_| is_ours)) {
+            (Part::Imu { message }, Some(Message::Attitude(attitude))) => {
+                self.boot.note(attitude.time_boot_ms);
+                self.tell(self::attitude(&attitude), sink);
+                if message.is_none() {
+                    self.tell(Some(rate(attitude.rates_radps.map(f64::from))), sink);
+                }
+            }
+            (Part::Imu { message: Some(message) }, Some(Message::Imu(imu)))
+                if imu.message == message && imu.unit == 0 =>
+            {
+                let [rate, force] = rate_and_force(&imu);
+                self.tell(Some(rate), sink);
+                self.tell(Some(force), sink);
+            }
+            (Part::Pressure { message, resolution_pa }, Some(Message::Pressure(pressure)))
+                if pressure.message == message =>
+            {
+                self.boot.note(pressure.time_boot_ms);
+                self.tell(water_pressure(&pressure, resolution_pa), sink);
+            }
+            (Part::Distance(part), Some(Message::Distance(distance))) if part.is_of(&distance) => {
+                self.boot.note(distance.time_boot_ms);
+                self.tell(part.echo(&distance), sink);
+            }
+            _ => self.passed_over += 1,
+        }
+    }
+
+    fn tell(&mut self, reading: Option<Reading>, sink: &mut dyn FnMut(Reading)) {
+        match reading.filter(Reading::is_finite) {
+            Some(reading) => sink(reading),
+            None => self.withheld += 1,
+        }
+    }
+}
+
+/// Turned about z, then y, then x of the turned axes is about fixed x, then y, then z: what [`Rot`] takes.
+fn attitude(attitude: &Attitude) -> Option<Reading> {
+    let [roll, pitch, yaw] = to_ours(attitude.angles_rad.map(f64::from));
+    let within = |angle: f64, most: f64| angle.abs() <= most + ANGLE_TOLERANCE_RAD;
+    let possible = within(roll, math::PI) && within(pitch, math::FRAC_PI_2) && within(yaw, math::PI);
+    possible.then(|| Reading::Attitude(Rot::from_roll_pitch_yaw(roll, pitch, yaw)))
+}
+
+fn rate(radps: [f64; 3]) -> Reading {
+    let [x, y, z] = to_ours(radps);
+    Reading::AngularRate(Vec3::new(x, y, z))
+}
+
+fn rate_and_force(imu: &Imu) -> [Reading; 2] {
+    let [x, y, z] = to_ours(imu.force_mg.map(|milli_g| f64::from(milli_g) * MILLI_G_MPS2));
+    let force = Reading::SpecificForce(Vec3::new(x, y, z));
+    [rate(imu.rate_mradps.map(|mradps| f64::from(mradps) * MILLIRADPS)), force]
+}
+
+fn water_pressure(pressure: &Pressure, resolution_pa: f64) -> Option<Reading> {
+    let pressure_pa = f64::from(pressure.absolute_hpa) * HECTOPASCAL;
+    let temperature_degc = f64::from(pressure.temperature_cdegc) / 100.0;
+    let water = WaterPressure { pressure_pa, resolution_pa, temperature_degc };
+    (pressure_pa > 0.0).then_some(Reading::Pressure(water))
+}
+
+impl DistancePart {
+    fn is_of(&self, distance: &Distance) -> bool {
+        self.orientation.is_none_or(|orientation| orientation == distance.orientation)
+            && self.sensor_id.is_none_or(|id| id == distance.sensor_id)
+    }
+
+    /// What the sensor calls invalid, or says to be beyond what it can measure, is no echo.
+    fn echo(&self, distance: &Distance) -> Option<Reading> {
+        if distance.least_cm >= distance.most_cm || distance.quality_percent > 100 {
+            return None;
+        }
+        let invalid = distance.quality_percent == QUALITY_INVALID_PERCENT;
+        let within = (distance.least_cm.max(1)..=distance.most_cm).contains(&distance.distance_cm);
+        let heard = within && !invalid;
+        let confidence = match distance.quality_percent {
+            _ if !heard => 0.0,
+            0 => self.unknown_confidence,
+            percent => f64::from(percent) / 100.0,
+        };
+        Some(Reading::Echo(EchoRange {
+            range_m: heard.then(|| f64::from(distance.distance_cm) / 100.0),
+            confidence,
+            sound_speed_mps: self.sound_speed_mps,
+        }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_autopilots_clock_goes_on_when_it_wraps_and_may_step_back() {
+        let mut clock = BootClock::default();
+        for (time_ms, since_boot_ms) in
+            [(4_294_967_000, 4_294_967_000), (4_294_966_990, 4_294_966_990), (4, 4_294_967_300_i64)]
+        {
+            clock.note(time_ms);
+            assert_eq!(clock.since_boot_ms, since_boot_ms);
+        }
+    }
+}

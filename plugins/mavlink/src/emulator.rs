@@ -1,0 +1,154 @@
+//! The autopilot's side of the line: at a fixed rate, the messages of one part.
+
+use headrace_core::app::device::{Direction, Emulator, EmulatorSetup, LineSink};
+use headrace_core::app::measurement::{Inertia, Measurement, Pressure as Felt, Sounding};
+use headrace_core::math;
+use headrace_core::time::{DurNs, MonoNs};
+
+use crate::decoder::{DistancePart, Meaning, Part};
+use crate::message::{
+    Attitude, Distance, HECTOPASCAL, Imu, MILLI_G_MPS2, MILLIRADPS, Message, Pressure, Sender, to_ours,
+};
+
+/// Limits that an emulated distance sensor tells, cm: about those of a Ping1D.
+const LEAST_CM: u16 = 30;
+const MOST_CM: u16 = 5000;
+/// Qualities that it gives where it hears something, and where it doesn't.
+const QUALITY_HEARD_PERCENT: u8 = 100;
+const QUALITY_INVALID_PERCENT: u8 = 1;
+/// Ten degrees Celsius.
+const TEMPERATURE_CDEGC: i16 = 1000;
+
+/// An ideal autopilot: no noise and no delay of its own, but whole units of the wire.
+#[derive(Debug, Clone)]
+pub struct AutopilotEmulator {
+    meaning: Meaning,
+    rate_hz: f64,
+    start: MonoNs,
+    /// Metres as the distance sensor reckons them for a metre of the site's.
+    device_per_site: f64,
+    begun: u64,
+    sequence: u8,
+}
+
+impl AutopilotEmulator {
+    /// An autopilot that is switched on, and first speaks, when `setup` says.
+    pub fn new(meaning: Meaning, rate_hz: f64, setup: &EmulatorSetup) -> Self {
+        let device_per_site = match meaning.part {
+            Part::Distance(part) => part.sound_speed_mps / setup.site.sound_speed_mps,
+            _ => 1.0,
+        };
+        Self { meaning, rate_hz, start: setup.start, device_per_site, begun: 0, sequence: 0 }
+    }
+
+    fn begin_each<M: Measurement>(&mut self, until: MonoNs, due: &mut Vec<M>, new: impl Fn(MonoNs) -> M) {
+        loop {
+            let at = self.start + DurNs::from_secs_f64(self.begun as f64 / self.rate_hz);
+            if at >= until {
+                return;
+            }
+            due.push(new(at));
+            self.begun += 1;
+        }
+    }
+
+    fn send(&mut self, at: MonoNs, message: &Message, line: LineSink<'_>) {
+        let sender = Sender {
+            system_id: self.meaning.system_id.unwrap_or(1),
+            component_id: self.meaning.component_id.unwrap_or(1),
+            sequence: self.sequence,
+        };
+        self.sequence = self.sequence.wrapping_add(1);
+        // No message here is longer than a frame.
+        if let Ok(bytes) = message.to_frame(sender).encode() {
+            line(Direction::Received, at + self.meaning.latency, bytes.as_slice());
+        }
+    }
+
+    fn since_boot_us(&self, at: MonoNs) -> u64 {
+        u64::try_from(at.since(self.start).0 / 1000).unwrap_or_default()
+    }
+
+    fn since_boot_ms(&self, at: MonoNs) -> u32 {
+        u32::try_from((self.since_boot_us(at) / 1000) & u64::from(u32::MAX)).unwrap_or_default()
+    }
+}
+
+impl Emulator<Inertia> for AutopilotEmulator {
+    fn begin(&mut self, until: MonoNs, due: &mut Vec<Inertia>) {
+        let period = DurNs::from_secs_f64(1.0 / self.rate_hz);
+        self.begin_each(until, due, |at| Inertia::due(at, period));
+    }
+
+    fn tell(&mut self, motion: &Inertia, line: LineSink<'_>) {
+        let Part::Imu { message } = self.meaning.part else { return };
+        let (roll, pitch, yaw) = motion.attitude.roll_pitch_yaw();
+        let rates_radps = to_ours(motion.rate_radps.0.into());
+        let attitude = Attitude {
+            time_boot_ms: self.since_boot_ms(motion.at),
+            angles_rad: to_ours([roll, pitch, yaw]).map(single),
+            rates_radps: rates_radps.map(single),
+        };
+        self.send(motion.at, &Message::Attitude(attitude), line);
+        let Some(message) = message else { return };
+        let imu = Imu {
+            message,
+            time_us: self.since_boot_us(motion.at),
+            force_mg: to_ours(motion.force_mps2.0.into()).map(|mps2| counts(mps2 / MILLI_G_MPS2)),
+            rate_mradps: rates_radps.map(|radps| counts(radps / MILLIRADPS)),
+            unit: 0,
+        };
+        self.send(motion.at, &Message::Imu(imu), line);
+    }
+}
+
+impl Emulator<Felt> for AutopilotEmulator {
+    fn begin(&mut self, until: MonoNs, due: &mut Vec<Felt>) {
+        self.begin_each(until, due, Felt::due);
+    }
+
+    fn tell(&mut self, felt: &Felt, line: LineSink<'_>) {
+        let Part::Pressure { message, resolution_pa } = self.meaning.part else { return };
+        let steps = math::round_to_i64(felt.pressure_pa / resolution_pa);
+        let pressure = Pressure {
+            message,
+            time_boot_ms: self.since_boot_ms(felt.at),
+            absolute_hpa: single(steps as f64 * resolution_pa / HECTOPASCAL),
+            temperature_cdegc: TEMPERATURE_CDEGC,
+        };
+        self.send(felt.at, &Message::Pressure(pressure), line);
+    }
+}
+
+impl Emulator<Sounding> for AutopilotEmulator {
+    fn begin(&mut self, until: MonoNs, due: &mut Vec<Sounding>) {
+        self.begin_each(until, due, |at| Sounding::due(at, 0.0));
+    }
+
+    fn tell(&mut self, sounding: &Sounding, line: LineSink<'_>) {
+        let Part::Distance(DistancePart { orientation, sensor_id, .. }) = self.meaning.part else { return };
+        let cm = sounding.range_m.map(|range_m| math::round_to_i64(range_m * self.device_per_site * 100.0));
+        let heard = cm.and_then(|cm| u16::try_from(cm).ok()).filter(|cm| (LEAST_CM..=MOST_CM).contains(cm));
+        let distance = Distance {
+            time_boot_ms: self.since_boot_ms(sounding.at),
+            least_cm: LEAST_CM,
+            most_cm: MOST_CM,
+            distance_cm: heard.unwrap_or(0),
+            sensor_id: sensor_id.unwrap_or(0),
+            orientation: orientation.unwrap_or(0),
+            quality_percent: if heard.is_some() { QUALITY_HEARD_PERCENT } else { QUALITY_INVALID_PERCENT },
+        };
+        self.send(sounding.at, &Message::Distance(distance), line);
+    }
+}
+
+/// The nearest that the wire can say.
+fn counts(value: f64) -> i16 {
+    let counts = math::round_to_i64(value);
+    i16::try_from(counts).unwrap_or(if counts < 0 { i16::MIN } else { i16::MAX })
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "the wire has single precision")]
+fn single(value: f64) -> f32 {
+    value as f32
+}

@@ -1,0 +1,140 @@
+//! The vehicle file's part of an autopilot's part, and its place in the loop.
+
+use headrace_core::app::App;
+use headrace_core::app::components::{DepthSensor, Echosounder, Imu};
+use headrace_core::app::device::{Device, DeviceKind, Emulated, EmulatorSetup, Sense};
+use headrace_core::app::plugin::{Plugin, PluginError};
+use headrace_core::config::{ConfigError, Section, SensorConfig};
+
+use crate::decoder::{DistancePart, MavlinkDecoder, Meaning, Part};
+use crate::emulator::AutopilotEmulator;
+use crate::message::{ImuMessage, PressureMessage};
+
+/// Name in vehicle files.
+pub const NAME: &str = "mavlink";
+
+/// Some seconds of all that an autopilot says.
+const RING_BYTES: usize = 1 << 17;
+
+/// Step of the pressures that ArduSub gives for a Bar30.
+const USUAL_RESOLUTION_PA: f64 = 10.0;
+
+/// Parts that an autopilot speaks of, as a kind of device.
+#[derive(Debug, Clone, Copy)]
+pub struct Kind;
+
+/// A configured part.
+#[derive(Debug, Clone)]
+pub struct Autopilot {
+    sensor: SensorConfig,
+    meaning: Meaning,
+    rate_hz: f64,
+    min_confidence: f64,
+}
+
+#[derive(Clone, Copy)]
+enum PartName {
+    Imu,
+    Pressure,
+    Distance,
+}
+
+impl DeviceKind for Kind {
+    fn name(&self) -> &'static str {
+        NAME
+    }
+
+    fn configure(&self, sensor: &SensorConfig, own: &Section<'_>) -> Result<Box<dyn Device>, ConfigError> {
+        let names =
+            [("imu", PartName::Imu), ("pressure", PartName::Pressure), ("distance", PartName::Distance)];
+        let name = own.required("part", own.choice("part", &names)?)?;
+        let mut min_confidence = 0.0;
+        let part = match name {
+            PartName::Imu => imu(own)?,
+            PartName::Pressure => pressure(own)?,
+            PartName::Distance => {
+                min_confidence = own.number("min_confidence", 0.0..=1.0)?.unwrap_or(0.5);
+                distance(own)?
+            }
+        };
+        let usual_rate_hz = if matches!(name, PartName::Imu) { 50.0 } else { 10.0 };
+        let meaning = Meaning {
+            part,
+            system_id: byte(own, "system_id", 1)?,
+            component_id: byte(own, "component_id", 1)?,
+            latency: sensor.latency,
+        };
+        let rate_hz = own.number("rate_hz", 0.1..=1000.0)?.unwrap_or(usual_rate_hz);
+        Ok(Box::new(Autopilot { sensor: sensor.clone(), meaning, rate_hz, min_confidence }))
+    }
+}
+
+fn imu(own: &Section<'_>) -> Result<Part, ConfigError> {
+    let messages = [
+        ("raw_imu", Some(ImuMessage::Raw)),
+        ("scaled_imu", Some(ImuMessage::Scaled)),
+        ("scaled_imu2", Some(ImuMessage::Scaled2)),
+        ("scaled_imu3", Some(ImuMessage::Scaled3)),
+        ("attitude", None),
+    ];
+    Ok(Part::Imu { message: own.choice("message", &messages)?.unwrap_or(Some(ImuMessage::Raw)) })
+}
+
+fn pressure(own: &Section<'_>) -> Result<Part, ConfigError> {
+    let messages = [
+        ("scaled_pressure", PressureMessage::First),
+        ("scaled_pressure2", PressureMessage::Second),
+        ("scaled_pressure3", PressureMessage::Third),
+    ];
+    Ok(Part::Pressure {
+        message: own.choice("message", &messages)?.unwrap_or(PressureMessage::Second),
+        resolution_pa: own.number("resolution_pa", 0.01..=10_000.0)?.unwrap_or(USUAL_RESOLUTION_PA),
+    })
+}
+
+fn distance(own: &Section<'_>) -> Result<Part, ConfigError> {
+    Ok(Part::Distance(DistancePart {
+        orientation: byte(own, "orientation", 0)?,
+        sensor_id: byte(own, "sensor_id", 0)?,
+        unknown_confidence: own.number("unknown_confidence", 0.0..=1.0)?.unwrap_or(1.0),
+        sound_speed_mps: own.number("sound_speed_mps", 1300.0..=1700.0)?.unwrap_or(1500.0),
+    }))
+}
+
+fn byte(own: &Section<'_>, key: &'static str, least: i64) -> Result<Option<u8>, ConfigError> {
+    Ok(own.integer(key, least..=255)?.and_then(|value| u8::try_from(value).ok()))
+}
+
+impl Plugin for Autopilot {
+    fn build(&self, app: &mut App) -> Result<(), PluginError> {
+        let decoder = Box::new(MavlinkDecoder::new(self.meaning));
+        match self.meaning.part {
+            Part::Imu { .. } => app.add_sensor(&self.sensor, decoder, RING_BYTES, Imu)?,
+            Part::Pressure { .. } => app.add_sensor(&self.sensor, decoder, RING_BYTES, DepthSensor)?,
+            Part::Distance(_) => {
+                let echosounder = Echosounder { min_confidence: self.min_confidence };
+                app.add_sensor(&self.sensor, decoder, RING_BYTES, echosounder)?
+            }
+        };
+        Ok(())
+    }
+}
+
+impl Device for Autopilot {
+    fn sense(&self) -> Sense {
+        match self.meaning.part {
+            Part::Imu { .. } => Sense::Inertial,
+            Part::Pressure { .. } => Sense::Depth,
+            Part::Distance(_) => Sense::Echosounder,
+        }
+    }
+
+    fn emulator(&self, setup: &EmulatorSetup) -> Emulated {
+        let emulator = Box::new(AutopilotEmulator::new(self.meaning, self.rate_hz, setup));
+        match self.meaning.part {
+            Part::Imu { .. } => Emulated::Inertial(emulator),
+            Part::Pressure { .. } => Emulated::Depth(emulator),
+            Part::Distance(_) => Emulated::Echosounder(emulator),
+        }
+    }
+}

@@ -1,0 +1,292 @@
+//! From a vehicle file's table to readings, by way of the emulated autopilot.
+
+use headrace_core::app::device::{
+    Decoder as _, Device, DeviceKind as _, Direction, Emulated, Emulator, EmulatorSetup, Sense,
+};
+use headrace_core::app::measurement::{Inertia, Measurement, Pressure, Sounding};
+use headrace_core::app::reading::{Decoded, Level, Packet, Reading};
+use headrace_core::app::{App, Mission};
+use headrace_core::codec::CodecCounts;
+use headrace_core::config::{Document, SensorConfig};
+use headrace_core::frames::{Mount, Rot, Sensor, Vec3};
+use headrace_core::math;
+use headrace_core::site::Site;
+use headrace_core::time::{DurNs, MonoNs};
+use headrace_core::tunnel::named;
+
+use crate::Kind;
+use crate::decoder::{DistancePart, MavlinkDecoder, Meaning, Part};
+use crate::message::{Attitude, Distance, ImuMessage, Message, Pressure as Told, PressureMessage, Sender};
+
+/// ATTITUDE, RAW_IMU and SCALED_PRESSURE2 of an ArduSub, from a telemetry log.
+pub(crate) const RECORDED_ATTITUDE: &[u8] = &[
+    0xFD, 0x1C, 0x00, 0x00, 0xEC, 0x01, 0x01, 0x1E, 0x00, 0x00, 0x53, 0x84, 0x0A, 0x00, 0x9C, 0x11, 0xC7,
+    0xBC, 0x2B, 0x3E, 0xCA, 0x3C, 0xA0, 0x45, 0x16, 0xC0, 0x16, 0x73, 0xBF, 0xBC, 0x59, 0x0E, 0x30, 0x3C,
+    0x07, 0x07, 0x37, 0xBA, 0x07, 0xBA,
+];
+pub(crate) const RECORDED_RAW_IMU: &[u8] = &[
+    0xFD, 0x1D, 0x00, 0x00, 0xC9, 0x01, 0x01, 0x1B, 0x00, 0x00, 0x48, 0xFA, 0x13, 0x29, 0x00, 0x00, 0x00,
+    0x00, 0x25, 0x00, 0x18, 0x00, 0x29, 0xFC, 0xF1, 0xFF, 0x11, 0x00, 0x00, 0x00, 0x63, 0xFF, 0x47, 0x00,
+    0x5A, 0x01, 0x00, 0x9A, 0x0B, 0x4A, 0xD4,
+];
+pub(crate) const RECORDED_PRESSURE: &[u8] = &[
+    0xFD, 0x0E, 0x00, 0x00, 0xD7, 0x01, 0x01, 0x89, 0x00, 0x00, 0x17, 0x84, 0x0A, 0x00, 0x33, 0xF3, 0x7D,
+    0x44, 0x00, 0x00, 0x00, 0x00, 0xDD, 0x04, 0xF8, 0x5F,
+];
+
+const START: MonoNs = MonoNs(2_000_000_000);
+const LATENCY: DurNs = DurNs::from_millis(5);
+
+fn configured(own: &str) -> Result<Box<dyn Device>, String> {
+    let sensor = SensorConfig {
+        id: "autopilot".to_owned(),
+        plugin: "mavlink".to_owned(),
+        connect: "udp:0.0.0.0:14550".to_owned(),
+        mount: Mount { position: Vec3::zero(), rotation: Rot::identity() },
+        latency: LATENCY,
+    };
+    let root = Document::new("v.toml", own).root().unwrap();
+    let device = Kind.configure(&sensor, &root).map_err(|error| error.to_string())?;
+    root.finish().map_err(|error| error.to_string())?;
+    device.build(&mut App::new(Mission::new(named::circle(2.5).unwrap(), 0.5))).unwrap();
+    Ok(device)
+}
+
+fn decoder(part: Part) -> MavlinkDecoder {
+    MavlinkDecoder::new(Meaning { part, system_id: None, component_id: None, latency: LATENCY })
+}
+
+const RAW_IMU: Part = Part::Imu { message: Some(ImuMessage::Raw) };
+const PRESSURE: Part = Part::Pressure { message: PressureMessage::Second, resolution_pa: 10.0 };
+const DISTANCE: DistancePart =
+    DistancePart { orientation: None, sensor_id: None, unknown_confidence: 0.7, sound_speed_mps: 1450.0 };
+
+fn decode(decoder: &mut MavlinkDecoder, received: MonoNs, bytes: &[u8]) -> Vec<Decoded> {
+    let mut readings = Vec::new();
+    decoder.decode(Packet { received, bytes }, &mut |decoded| readings.push(decoded));
+    readings
+}
+
+fn decode_message(decoder: &mut MavlinkDecoder, message: &Message) -> Vec<Reading> {
+    let frame = message.to_frame(Sender { system_id: 1, component_id: 1, sequence: 0 });
+    let readings = decode(decoder, START, frame.encode().unwrap().as_slice());
+    readings.into_iter().map(|decoded| decoded.reading).collect()
+}
+
+/// What the emulated part says of measurements that `feel` fills in.
+fn emulated<M: Measurement>(
+    emulator: &mut dyn Emulator<M>,
+    decoder: &mut MavlinkDecoder,
+    count: usize,
+    feel: impl Fn(M) -> M,
+) -> Vec<Decoded> {
+    let (mut due, mut readings) = (Vec::new(), Vec::new());
+    let mut until = START;
+    while due.len() < count {
+        until = until + DurNs::from_millis(7);
+        emulator.begin(until, &mut due);
+    }
+    for measured in due.into_iter().take(count) {
+        emulator.tell(&feel(measured), &mut |direction, received, bytes| {
+            assert_eq!((direction, received), (Direction::Received, measured.at() + LATENCY));
+            readings.extend(decode(decoder, received, bytes));
+        });
+    }
+    let counts = decoder.counts();
+    assert_eq!((counts.bad_frames, counts.skipped_bytes, decoder.withheld()), (0, 0, 0));
+    readings
+}
+
+fn setup() -> EmulatorSetup {
+    EmulatorSetup { start: START, head: None, site: Site { sound_speed_mps: 1450.0, ..Site::default() } }
+}
+
+/// A vehicle that yaws to the left, nose down and heeling; it doesn't accelerate.
+fn felt(inertia: Inertia) -> Inertia {
+    let t = inertia.at.since(START).as_secs_f64();
+    let attitude: Rot<Level, Sensor> = Rot::from_roll_pitch_yaw(0.1, 0.3, 0.5 + 0.2 * t);
+    Inertia {
+        attitude,
+        rate_radps: attitude.inverse() * Vec3::new(0.0, 0.0, 0.2),
+        force_mps2: attitude.inverse() * Vec3::new(0.0, 0.0, 9.81),
+        ..inertia
+    }
+}
+
+#[test]
+fn attitude_rates_and_forces_come_back() {
+    for (own, part, each) in [
+        ("part = \"imu\"\n", RAW_IMU, 3),
+        ("part = \"imu\"\nmessage = \"scaled_imu2\"\n", Part::Imu { message: Some(ImuMessage::Scaled2) }, 3),
+        ("part = \"imu\"\nmessage = \"attitude\"\n", Part::Imu { message: None }, 2),
+    ] {
+        let device = configured(own).unwrap();
+        assert_eq!(device.sense(), Sense::Inertial);
+        let Emulated::Inertial(mut emulator) = device.emulator(&setup()) else { panic!() };
+        let mut decoder = decoder(part);
+        let readings = emulated(emulator.as_mut(), &mut decoder, 50, felt);
+        assert_eq!(readings.len(), 50 * each);
+        // Two quanta of rate and force, and single precision of angles.
+        for decoded in &readings {
+            let truth = felt(Inertia::due(decoded.valid_at, DurNs::ZERO));
+            match decoded.reading {
+                Reading::Attitude(got) => {
+                    let [w, x, y, z] = (got.inverse() * truth.attitude).wxyz();
+                    assert!(2.0 * math::atan2(math::sqrt(x * x + y * y + z * z), w.abs()) < 1e-6);
+                }
+                Reading::AngularRate(got) => assert!((got + -truth.rate_radps).norm() < 1e-3),
+                Reading::SpecificForce(got) => assert!((got + -truth.force_mps2).norm() < 0.01),
+                other => panic!("{other:?}"),
+            }
+        }
+        assert_eq!(decoder.since_boot(), Some(DurNs::from_millis(980)));
+    }
+}
+
+#[test]
+fn pressures_come_back_to_half_a_quantum() {
+    for (own, message) in
+        [("", PressureMessage::Second), ("message = \"scaled_pressure\"\n", PressureMessage::First)]
+    {
+        let device = configured(&format!("part = \"pressure\"\n{own}")).unwrap();
+        assert_eq!(device.sense(), Sense::Depth);
+        let Emulated::Depth(mut emulator) = device.emulator(&setup()) else { panic!() };
+        let truth_pa = |at: MonoNs| 150_000.0 + 1234.5 * at.since(START).as_secs_f64();
+        let mut decoder = decoder(Part::Pressure { message, resolution_pa: 10.0 });
+        let readings = emulated(emulator.as_mut(), &mut decoder, 40, |felt: Pressure| Pressure {
+            pressure_pa: truth_pa(felt.at),
+            ..felt
+        });
+        assert_eq!(readings.len(), 40);
+        for decoded in &readings {
+            let Reading::Pressure(water) = decoded.reading else { panic!() };
+            assert!((water.pressure_pa - truth_pa(decoded.valid_at)).abs() < 5.02);
+            assert!((water.resolution_pa, water.temperature_degc) == (10.0, 10.0));
+        }
+    }
+}
+
+#[test]
+fn distances_come_back_and_none_where_nothing_is_heard() {
+    let own = "part = \"distance\"\norientation = 25\nsensor_id = 3\nsound_speed_mps = 1500\n";
+    let device = configured(own).unwrap();
+    assert_eq!(device.sense(), Sense::Echosounder);
+    let Emulated::Echosounder(mut emulator) = device.emulator(&setup()) else { panic!() };
+    let part =
+        DistancePart { orientation: Some(25), sensor_id: Some(3), sound_speed_mps: 1500.0, ..DISTANCE };
+    let mut decoder = decoder(Part::Distance(part));
+    let heard = [Some(2.345), None, Some(0.1), Some(60.0)];
+    let soundings = std::cell::Cell::new(0);
+    let readings = emulated(emulator.as_mut(), &mut decoder, 4, |sounding: Sounding| {
+        soundings.set(soundings.get() + 1);
+        Sounding { range_m: heard[soundings.get() - 1], ..sounding }
+    });
+    let echo = |decoded: &Decoded| match decoded.reading {
+        Reading::Echo(echo) => (echo.range_m, echo.confidence, echo.sound_speed_mps),
+        other => panic!("{other:?}"),
+    };
+    let ranges: Vec<_> = readings.iter().map(echo).collect();
+    // 2.345 m of the site's water are 2.426 m with the speed of sound that the sensor is set to.
+    assert_eq!(
+        ranges,
+        [(Some(2.43), 1.0, 1500.0), (None, 0.0, 1500.0), (None, 0.0, 1500.0), (None, 0.0, 1500.0)]
+    );
+}
+
+#[test]
+fn axes_that_point_down_and_right_are_turned() {
+    let attitude = Attitude { time_boot_ms: 1, angles_rad: [0.1, 0.2, 0.3], rates_radps: [1.0, 2.0, 3.0] };
+    let mut decoder = decoder(Part::Imu { message: None });
+    let readings = decode_message(&mut decoder, &Message::Attitude(attitude));
+    let Reading::Attitude(attitude) = readings[0] else { panic!() };
+    let (roll, pitch, yaw) = attitude.roll_pitch_yaw();
+    assert!((roll - 0.1).abs() < 1e-7 && (pitch + 0.2).abs() < 1e-7 && (yaw + 0.3).abs() < 1e-7);
+    // Nose up there is nose up here: the body's x axis rises.
+    let nose = attitude * Vec3::new(1.0, 0.0, 0.0);
+    assert!((nose.z() - 0.198_669).abs() < 1e-6, "{nose:?}");
+    assert_eq!(readings[1], Reading::AngularRate(Vec3::new(1.0, -2.0, -3.0)));
+}
+
+#[test]
+fn each_part_takes_its_own_and_passes_over_the_rest() {
+    let line = [RECORDED_ATTITUDE, RECORDED_RAW_IMU, RECORDED_PRESSURE].concat();
+    for (part, readings, passed_over) in [
+        (RAW_IMU, 3, 1),
+        (Part::Imu { message: None }, 2, 2),
+        (PRESSURE, 1, 2),
+        (Part::Distance(DISTANCE), 0, 3),
+    ] {
+        let mut decoder = decoder(part);
+        assert_eq!(decode(&mut decoder, START, &line).len(), readings, "{part:?}");
+        assert_eq!((decoder.passed_over(), decoder.withheld()), (passed_over, 0), "{part:?}");
+        assert_eq!(decoder.counts(), CodecCounts { good_frames: 3, ..CodecCounts::default() });
+    }
+}
+
+#[test]
+fn only_the_wanted_sender_is_heard() {
+    for (system_id, component_id, readings) in
+        [(Some(1), Some(1), 1), (Some(2), None, 0), (None, Some(2), 0), (None, None, 1)]
+    {
+        let mut decoder =
+            MavlinkDecoder::new(Meaning { part: PRESSURE, system_id, component_id, latency: LATENCY });
+        assert_eq!(decode(&mut decoder, START, RECORDED_PRESSURE).len(), readings);
+    }
+}
+
+#[test]
+fn values_that_cannot_be_are_withheld() {
+    let attitude =
+        |angles_rad| Message::Attitude(Attitude { time_boot_ms: 1, angles_rad, rates_radps: [0.0; 3] });
+    let pressure = |absolute_hpa| {
+        let message = PressureMessage::Second;
+        Message::Pressure(Told { message, time_boot_ms: 1, absolute_hpa, temperature_cdegc: 0 })
+    };
+    for (part, message) in [
+        (RAW_IMU, attitude([f32::NAN, 0.0, 0.0])),
+        (RAW_IMU, attitude([0.0, 1.6, 0.0])),
+        (RAW_IMU, attitude([0.0, 0.0, 4.0])),
+        (PRESSURE, pressure(0.0)),
+        (PRESSURE, pressure(f32::INFINITY)),
+    ] {
+        let mut decoder = decoder(part);
+        assert_eq!(decode_message(&mut decoder, &message), [], "{message:?}");
+        assert_eq!(decoder.withheld(), 1, "{message:?}");
+    }
+}
+
+#[test]
+fn a_distance_is_as_sure_as_its_sensor_says() {
+    let distance = Distance {
+        time_boot_ms: 1,
+        least_cm: 20,
+        most_cm: 3000,
+        distance_cm: 250,
+        sensor_id: 0,
+        orientation: 25,
+        quality_percent: 0,
+    };
+    let mut decoder = decoder(Part::Distance(DISTANCE));
+    let mut echo = |distance| match decode_message(&mut decoder, &Message::Distance(distance))[..] {
+        [Reading::Echo(echo)] => Some((echo.range_m, echo.confidence)),
+        _ => None,
+    };
+    assert_eq!(echo(distance), Some((Some(2.5), 0.7)));
+    assert_eq!(echo(Distance { quality_percent: 80, ..distance }), Some((Some(2.5), 0.8)));
+    assert_eq!(echo(Distance { quality_percent: 1, ..distance }), Some((None, 0.0)));
+    assert_eq!(echo(Distance { distance_cm: 3001, ..distance }), Some((None, 0.0)));
+    assert_eq!(echo(Distance { distance_cm: 0, least_cm: 0, ..distance }), Some((None, 0.0)));
+    assert_eq!(echo(Distance { quality_percent: 101, ..distance }), None);
+    assert_eq!(echo(Distance { most_cm: 20, ..distance }), None);
+}
+
+#[test]
+fn wrong_keys_are_named() {
+    let error = |own| configured(own).err().unwrap();
+    assert_eq!(error("rate_hz = 10\n"), "v.toml:1: part: is missing");
+    assert!(error("part = \"gps\"\n").contains("must be one of imu, pressure, distance"));
+    assert!(error("part = \"imu\"\nmessage = \"scaled_pressure2\"\n").contains("raw_imu, scaled_imu"));
+    assert!(error("part = \"imu\"\norientation = 25\n").contains("is not a key here"));
+    assert!(error("part = \"pressure\"\nsystem_id = 0\n").contains("from 1 to 255"));
+    assert!(configured("part = \"distance\"\nmin_confidence = 0.2\nunknown_confidence = 0.5\n").is_ok());
+}
