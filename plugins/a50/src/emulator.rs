@@ -1,0 +1,74 @@
+//! The device's side of the connection: reports at a fixed rate.
+
+use headrace_core::app::device::{Direction, Emulator, LineSink};
+use headrace_core::app::measurement::GroundVelocity;
+use headrace_core::time::{DurNs, MonoNs};
+
+use crate::report::{Against, Velocity};
+
+/// From the reflection of sound to the sending of its report; the maker's example has 189 ms.
+const DELAY_US: i64 = 100_000;
+/// The device's own clock when it is switched on, microseconds since 1970.
+const BEGINS_US: i64 = 1_638_191_471_000_000;
+/// Nothing here tells what the beams meet.
+const ALTITUDE_M: f64 = 1.0;
+/// Figures of merit, in turn: no device says twice the same, and the decoder takes one that does for stuck.
+const FOMS_MPS: [f64; 2] = [0.001, 0.001_1];
+
+/// What an emulated device is like.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Simulated {
+    /// Reports a second.
+    pub rate_hz: f64,
+    /// From sending to receive time.
+    pub latency: DurNs,
+}
+
+/// An ideal device: no noise, and its numbers are the wire's own.
+#[derive(Debug, Clone)]
+pub struct A50Emulator {
+    device: Simulated,
+    start: MonoNs,
+    begun: u64,
+    told: u64,
+}
+
+impl A50Emulator {
+    /// A device that is switched on, and first pings, at `start`.
+    pub fn new(device: Simulated, start: MonoNs) -> Self {
+        Self { device, start, begun: 0, told: 0 }
+    }
+
+    fn due(&self) -> MonoNs {
+        self.start + DurNs::from_secs_f64(self.begun as f64 / self.device.rate_hz)
+    }
+}
+
+impl Emulator<GroundVelocity> for A50Emulator {
+    fn begin(&mut self, until: MonoNs, due: &mut Vec<GroundVelocity>) {
+        while self.due() < until {
+            due.push(GroundVelocity::due(self.due()));
+            self.begun += 1;
+        }
+    }
+
+    fn tell(&mut self, moved: &GroundVelocity, line: LineSink<'_>) {
+        // To the device's axes as from them: y and z change their sense.
+        let [x, y, z] = moved.velocity_mps.0.into();
+        let at_us = BEGINS_US + moved.at.since(self.start).0 / 1000;
+        let [even, odd] = FOMS_MPS;
+        let report = Velocity {
+            against: Against::Bottom,
+            velocity_mps: [x, -y, -z],
+            fom_mps: if self.told.is_multiple_of(2) { even } else { odd },
+            altitude_m: ALTITUDE_M,
+            valid_beams: 4,
+            is_valid: true,
+            status: 0,
+            times_us: Some([at_us, at_us + DELAY_US]),
+        };
+        self.told += 1;
+        let received = moved.at + DurNs(DELAY_US * 1000) + self.device.latency;
+        line(Direction::Received, received, &report.encode());
+    }
+}

@@ -1,0 +1,62 @@
+//! The vehicle file's part of an A50, and its place in the loop.
+
+use headrace_core::app::App;
+use headrace_core::app::components::VelocityLog;
+use headrace_core::app::device::{Device, DeviceKind, Emulated, EmulatorSetup, Sense};
+use headrace_core::app::plugin::{Plugin, PluginError};
+use headrace_core::config::{ConfigError, Section, SensorConfig};
+
+use crate::decoder::{A50Decoder, Meaning};
+use crate::emulator::{A50Emulator, Simulated};
+
+/// Name in vehicle files.
+pub const NAME: &str = "a50";
+
+/// Some seconds of reports at the highest rate.
+const RING_BYTES: usize = 1 << 17;
+
+/// The A50 as a kind of device.
+#[derive(Debug, Clone, Copy)]
+pub struct Kind;
+
+/// A configured A50.
+#[derive(Debug, Clone)]
+pub struct A50 {
+    sensor: SensorConfig,
+    meaning: Meaning,
+    emulated: Simulated,
+}
+
+impl DeviceKind for Kind {
+    fn name(&self) -> &'static str {
+        NAME
+    }
+
+    fn configure(&self, sensor: &SensorConfig, own: &Section<'_>) -> Result<Box<dyn Device>, ConfigError> {
+        let latency = sensor.latency;
+        let meaning = Meaning {
+            fom_max_mps: own.number("fom_max_mps", 0.001..=10.0)?.unwrap_or(0.4),
+            max_speed_mps: own.number("max_speed_mps", 0.1..=10.0)?.unwrap_or(3.0),
+            latency,
+        };
+        let rate_hz = own.number("rate_hz", 0.5..=30.0)?.unwrap_or(8.0);
+        Ok(Box::new(A50 { sensor: sensor.clone(), meaning, emulated: Simulated { rate_hz, latency } }))
+    }
+}
+
+impl Plugin for A50 {
+    fn build(&self, app: &mut App) -> Result<(), PluginError> {
+        app.add_sensor(&self.sensor, Box::new(A50Decoder::new(self.meaning)), RING_BYTES, VelocityLog)?;
+        Ok(())
+    }
+}
+
+impl Device for A50 {
+    fn sense(&self) -> Sense {
+        Sense::Velocity
+    }
+
+    fn emulator(&self, setup: &EmulatorSetup) -> Emulated {
+        Emulated::VelocityLog(Box::new(A50Emulator::new(self.emulated, setup.start)))
+    }
+}
