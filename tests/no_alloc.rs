@@ -15,13 +15,18 @@ mod shipped;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
-use headrace_core::app::device::Direction;
+use headrace_a50::decoder::{self as a50, A50Decoder};
+use headrace_a50::report::{Against, Velocity};
+use headrace_core::app::device::{Decoder, Direction};
 use headrace_core::app::outlet::NoticeOutlet;
+use headrace_core::app::reading::Packet;
 use headrace_core::app::{App, Mission};
 use headrace_core::fusion::NavigationConfig;
 use headrace_core::fusion::filter::FilterNavigation;
 use headrace_core::fusion::smooth::journal::Journal;
 use headrace_core::time::DurNs;
+use headrace_mavlink::decoder::{self as mavlink, MavlinkDecoder, Part};
+use headrace_mavlink::message::{Imu, ImuMessage, Message, Sender};
 use headrace_replay::log::{LogHeader, Recorder, SourceInfo};
 use headrace_replay::record::{QUEUE_BYTES, RecorderOutlet};
 use headrace_replay::simulate::{START, Simulation};
@@ -138,4 +143,51 @@ fn a_million_packets_without_one_allocation() {
     let written = recorder.finish().unwrap();
     println!("{packets} packets, {} messages recorded, waited {waited} times", written.messages);
     assert!(written.messages >= packets as u64, "recorded input is never dropped");
+}
+
+/// Lines as these devices send them, damaged here and there, in pieces.
+#[test]
+fn decoders_of_other_vehicles_allocate_nothing() {
+    let sender = Sender { system_id: 1, component_id: 1, sequence: 0 };
+    let imu = Imu {
+        message: ImuMessage::Raw,
+        time_us: 1,
+        force_mg: [0, 0, -1000],
+        rate_mradps: [1, 2, 3],
+        unit: 0,
+    };
+    let frames = Message::Imu(imu).to_frame(sender).encode().unwrap().as_slice().repeat(500);
+    let reports: Vec<u8> = (0..500)
+        .flat_map(|number| {
+            let velocity = Velocity {
+                against: Against::Bottom,
+                velocity_mps: [0.2, 0.001 * f64::from(number), 0.0],
+                fom_mps: 0.002,
+                altitude_m: 1.0,
+                valid_beams: 4,
+                is_valid: true,
+                status: 0,
+                times_us: Some([i64::from(number), i64::from(number) + 1000]),
+            };
+            velocity.encode()
+        })
+        .collect();
+    let part = Part::Imu { message: Some(ImuMessage::Raw) };
+    let meaning = mavlink::Meaning { part, system_id: None, component_id: None, latency: DurNs(0) };
+    let mut autopilot = MavlinkDecoder::new(meaning);
+    let mut log = A50Decoder::new(a50::Meaning { fom_max_mps: 0.4, max_speed_mps: 3.0, latency: DurNs(0) });
+    let devices: [(&mut dyn Decoder, Vec<u8>); 2] = [(&mut autopilot, frames), (&mut log, reports)];
+    for (decoder, mut bytes) in devices {
+        bytes.iter_mut().step_by(3001).for_each(|byte| *byte ^= 0x55);
+        let (mut at, mut readings) = (START, 0);
+        let allocated = allocations(|| {
+            for piece in bytes.chunks(97) {
+                at = at + DurNs(1_000_000);
+                decoder.decode(Packet { received: at, bytes: piece }, &mut |_| readings += 1);
+            }
+        });
+        let counts = decoder.counts();
+        assert_eq!(allocated, 0, "{readings} readings, {counts:?}");
+        assert!(readings > 400 && counts.bad_frames > 0, "{readings} readings, {counts:?}");
+    }
 }
