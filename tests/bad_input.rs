@@ -112,7 +112,7 @@ fn a_wrong_vehicle_file_is_refused_with_file_line_key_value_and_what_is_allowed(
     id with a space
         headrace: vehicle.toml:35: sensors[3].id = "ping right": must be 1 to 32 letters, digits, _ or -
     unknown plugin
-        headrace: vehicle.toml:51: sensors[6].plugin = "bar300": must be one of imagenex881, ping1d, bar100, imu_can, tether_hid
+        headrace: vehicle.toml:51: sensors[6].plugin = "bar300": must be one of imagenex881, ping1d, bar100, imu_can, tether_hid, mavlink, a50
     unknown profile
         headrace: vehicle.toml:5: tunnel.profile = "egg": must be one of ceran, ceran-blueprint, rectangle, circle, arch, trimmed_circle, polyline
     unknown preset
