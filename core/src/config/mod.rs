@@ -9,5 +9,5 @@ pub mod vehicle;
 pub use changes::changed;
 pub use connect::{Connect, ConnectError, SerialPort, UsbIdentity};
 pub use coverage::CoverageConfig;
-pub use reader::{ConfigError, Document, Section};
+pub use reader::{ConfigError, Document, NamedFile, Section};
 pub use vehicle::{SensorConfig, TunnelConfig, VehicleConfig, WaterConfig};

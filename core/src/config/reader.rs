@@ -29,6 +29,28 @@ pub struct Document<'a> {
     text: &'a str,
 }
 
+/// Reads a file that another one names (a polyline profile, a device's definitions), by the name given there.
+pub type Loader<'a> = &'a dyn Fn(&str) -> Result<String, String>;
+
+/// A file that a key names.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct NamedFile {
+    /// Its name, as the key gives it.
+    pub name: String,
+    /// What is in it.
+    pub text: String,
+}
+
+/// Where the files come from that keys name.
+#[derive(Clone, Copy)]
+struct Files<'a>(Option<Loader<'a>>);
+
+impl core::fmt::Debug for Files<'_> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(if self.0.is_some() { "Files" } else { "no files" })
+    }
+}
+
 /// A value with its path, its text, and what makes an error about it.
 pub(super) type Leaf<'s> = (Vec<String>, &'s str, Box<dyn Fn(&str) -> ConfigError + 's>);
 
@@ -40,6 +62,7 @@ pub struct Section<'a> {
     table: DeTable<'a>,
     at: usize,
     asked: RefCell<Vec<&'static str>>,
+    files: Files<'a>,
 }
 
 impl<'a> Document<'a> {
@@ -53,7 +76,8 @@ impl<'a> Document<'a> {
     /// Errors: the text isn't TOML.
     pub fn root(self) -> Result<Section<'a>, ConfigError> {
         let table = self.table()?;
-        Ok(Section { document: self, path: String::new(), at: 0, table, asked: RefCell::default() })
+        let (path, asked) = (String::new(), RefCell::default());
+        Ok(Section { document: self, path, at: 0, table, asked, files: Files(None) })
     }
 
     /// The root table as the parser has it.
@@ -79,6 +103,23 @@ impl<'a> Document<'a> {
 }
 
 impl<'a> Section<'a> {
+    /// This table and those within it, whose keys may name files that `load` reads.
+    #[must_use]
+    pub fn with_files(self, load: Loader<'a>) -> Self {
+        Self { files: Files(Some(load)), ..self }
+    }
+
+    /// The file that a key names. One that a vehicle file's table names is attached to logs, too.
+    ///
+    /// Errors: not a string, or a file that can't be read.
+    pub fn named_file(&self, key: &'static str) -> Result<Option<NamedFile>, ConfigError> {
+        let Some(name) = self.text(key)? else { return Ok(None) };
+        let Files(load) = self.files;
+        let load = load.ok_or_else(|| self.invalid(key, "names a file, and files can't be read here"))?;
+        let text = load(&name).map_err(|problem| self.invalid(key, &problem))?;
+        Ok(Some(NamedFile { name, text }))
+    }
+
     /// A number within `allowed`, in the unit that the key's name ends in.
     ///
     /// Errors: not a finite number, or outside `allowed`.
@@ -325,7 +366,8 @@ impl<'a> Section<'a> {
     }
 
     fn child(&self, key: &str, table: DeTable<'a>, at: usize) -> Section<'a> {
-        Section { document: self.document, path: self.full(key), table, at, asked: RefCell::default() }
+        let (path, asked) = (self.full(key), RefCell::default());
+        Section { document: self.document, path, table, at, asked, files: self.files }
     }
 
     fn full(&self, key: &str) -> String {
@@ -387,6 +429,26 @@ mod tests {
             water.required("density_kgpm3", water.number("density_kgpm3", 0.0..=1.0).unwrap()).unwrap_err();
         assert_eq!(error.to_string(), "v.toml:2: water.density_kgpm3: is missing");
         assert_eq!(Document::new("v.toml", "a = 1\nb = \n").root().unwrap_err().line, 2);
+    }
+
+    #[test]
+    fn a_key_names_a_file() {
+        let files = |name: &str| match name {
+            "a.dbc" => Ok("text".to_owned()),
+            _ => Err("isn't there".to_owned()),
+        };
+        let text = "file = \"a.dbc\"\n[inner]\nfile = \"a.dbc\"\nother = \"b.dbc\"\n";
+        let root = Document::new("v.toml", text).root().unwrap();
+        let error = root.named_file("file").unwrap_err().to_string();
+        assert_eq!(error, "v.toml:1: file = \"a.dbc\": names a file, and files can't be read here");
+        let root = root.with_files(&files);
+        let expected = NamedFile { name: "a.dbc".to_owned(), text: "text".to_owned() };
+        let inner = root.section("inner").unwrap().unwrap();
+        assert_eq!(root.named_file("file").unwrap(), Some(expected.clone()));
+        assert_eq!(inner.named_file("file").unwrap(), Some(expected));
+        assert_eq!(root.named_file("none").unwrap(), None);
+        let error = inner.named_file("other").unwrap_err().to_string();
+        assert_eq!(error, "v.toml:4: inner.other = \"b.dbc\": isn't there");
     }
 
     #[test]

@@ -3,6 +3,7 @@
 use core::cell::RefCell;
 
 use super::coverage::CoverageConfig;
+pub use super::reader::Loader;
 use super::reader::{ConfigError, Document, Section};
 use crate::app::Mission;
 use crate::app::device::{Device, DeviceKind};
@@ -79,9 +80,6 @@ pub struct SensorConfig {
     pub latency: DurNs,
 }
 
-/// Reads a file that a vehicle file names (a polyline profile), by the name given there.
-pub type Loader<'a> = &'a dyn Fn(&str) -> Result<String, String>;
-
 const SENSOR_DISTANCE_M: core::ops::RangeInclusive<f64> = -20.0..=20.0;
 const DEGREES: core::ops::RangeInclusive<f64> = -360.0..=360.0;
 
@@ -126,7 +124,10 @@ impl VehicleConfig {
         let attachments = RefCell::new(Vec::new());
         let load = |name: &str| {
             let text = load(name)?;
-            attachments.borrow_mut().push((name.to_owned(), text.clone()));
+            let mut attachments = attachments.borrow_mut();
+            if attachments.iter().all(|(attached, _)| attached != name) {
+                attachments.push((name.to_owned(), text.clone()));
+            }
             Ok(text)
         };
         let tunnel = TunnelConfig::from_section(tunnel_section, &load)?;
@@ -145,7 +146,7 @@ impl VehicleConfig {
         let mut sensors = Vec::new();
         let mut sensor_configs: Vec<SensorConfig> = Vec::new();
         for section in root.sections("sensors")? {
-            let (config, device) = parse_sensor(section, &sensor_configs, kinds)?;
+            let (config, device) = parse_sensor(section.with_files(&load), &sensor_configs, kinds)?;
             sensors.push(device);
             sensor_configs.push(config);
         }
