@@ -174,7 +174,7 @@ fn a_report_that_is_wrong_is_found_out() {
 }
 
 /// What a key's ending says of its unit, and the words for it.
-const UNITS: [(&str, &str); 10] = [
+const UNITS: [(&str, &str); 11] = [
     ("_ratio", "without unit"),
     ("nis", "without unit"),
     ("_deg", "degrees"),
@@ -185,6 +185,7 @@ const UNITS: [(&str, &str); 10] = [
     ("_hz", "a second"),
     ("_perm2", "square metre"),
     ("_share", "0 to 1"),
+    ("_ppm", "parts per million"),
 ];
 
 #[test]

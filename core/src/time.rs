@@ -3,6 +3,10 @@
 //! The loop knows only [`MonoNs`]: the host's monotonic clock, as stamped by the thread that received the bytes,
 //! or as a log or a simulation gives it. UTC appears at the edges alone.
 
+mod device_clock;
+
+pub use device_clock::{ClockReport, DeviceClock, Drift};
+
 use core::ops::{Add, Neg, Sub};
 
 const NS_PER_S: f64 = 1e9;

@@ -12,7 +12,7 @@ use crate::codec::CodecCounts;
 use crate::config::{ConfigError, Section, SensorConfig};
 use crate::sampling::head::{HeadMode, HeadProgram, HeadSpec};
 use crate::site::Site;
-use crate::time::MonoNs;
+use crate::time::{ClockReport, MonoNs};
 
 /// One kind of device, by the name that vehicle files call it: `plugin = "imagenex881"`.
 pub trait DeviceKind: Sync {
@@ -67,6 +67,12 @@ pub trait Decoder: Send + Sync {
     /// calibration that isn't known, a jump, an orientation that the device itself calls invalid.
     fn withheld(&self) -> u64 {
         0
+    }
+
+    /// How the device's own clock goes beside ours, where it sends its time. It is reported and nothing else: readings
+    /// are valid by the receive time.
+    fn clock(&self) -> Option<ClockReport> {
+        None
     }
 }
 

@@ -232,6 +232,11 @@ impl Loop {
         self.world.resource::<Decoders>().0.iter().map(|decoder| decoder.withheld()).collect()
     }
 
+    /// How each source's own clock goes, in the order of the sources.
+    pub fn decoder_clocks(&self) -> Vec<Option<crate::time::ClockReport>> {
+        self.world.resource::<Decoders>().0.iter().map(|decoder| decoder.clock()).collect()
+    }
+
     /// Digest of all results so far: places, judgements and advice.
     pub fn digest(&self) -> u64 {
         let digests = self.world.resource::<Digests>();

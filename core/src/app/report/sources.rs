@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use crate::app::flow::{Navigator, SourceTallies};
 use crate::app::run::Loop;
+use crate::time::ClockReport;
 
 /// What a source has sent.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -28,6 +29,8 @@ pub struct SourceReport {
     pub longest_gap_s: f64,
     /// Packets a second.
     pub rate_hz: f64,
+    /// How its own clock goes; `None` where it sends no time.
+    pub device_clock: Option<DeviceClockReport>,
     /// How well it agreed with the others in navigation; `None` without a filter, and for what it doesn't use.
     pub navigation: Option<NavigationReport>,
     /// What its line has been through; `None` where bytes didn't come from a port.
@@ -47,6 +50,36 @@ pub struct LineReport {
     pub status: String,
 }
 
+/// How a source's own clock goes beside ours. Readings are valid by the receive time, whatever it says.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DeviceClockReport {
+    /// Stamps that came.
+    pub stamps: u64,
+    /// How often it began anew or fell behind.
+    pub restarts: u64,
+    /// How often it ran ahead.
+    pub jumps: u64,
+    /// Time on its clock from which its drift is known, seconds.
+    pub span_s: f64,
+    /// How fast it runs, parts per million; above zero it gains on ours. `None` before there is enough to tell.
+    pub drift_ppm: Option<f64>,
+    /// Standard deviation of it, parts per million.
+    pub drift_sd_ppm: Option<f64>,
+}
+
+impl From<ClockReport> for DeviceClockReport {
+    fn from(clock: ClockReport) -> Self {
+        Self {
+            stamps: clock.stamps,
+            restarts: clock.restarts,
+            jumps: clock.jumps,
+            span_s: clock.span.as_secs_f64(),
+            drift_ppm: clock.drift.map(|drift| drift.ppm),
+            drift_sd_ppm: clock.drift.map(|drift| drift.sd_ppm),
+        }
+    }
+}
+
 /// How a source's measurements fared in navigation.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NavigationReport {
@@ -63,14 +96,14 @@ pub struct NavigationReport {
 }
 
 pub(super) fn source_reports(dive: &Loop, tallies: &SourceTallies) -> Vec<SourceReport> {
-    let decoders = dive.decoder_counts().into_iter().zip(dive.decoder_withheld());
+    let decoders = dive.decoder_counts().into_iter().zip(dive.decoder_withheld()).zip(dive.decoder_clocks());
     let navigation = &dive.world().resource::<Navigator>().navigation;
     dive.sources()
         .iter()
         .zip(&tallies.0)
         .zip(decoders)
         .enumerate()
-        .map(|(number, ((source, tally), (counts, withheld)))| {
+        .map(|(number, ((source, tally), ((counts, withheld), clock)))| {
             let span_s = tally.span.map_or(0.0, |(first, last)| last.since(first).as_secs_f64());
             let intervals = tally.packets.saturating_sub(1) as f64;
             SourceReport {
@@ -84,6 +117,7 @@ pub(super) fn source_reports(dive: &Loop, tallies: &SourceTallies) -> Vec<Source
                 withheld,
                 longest_gap_s: tally.longest_gap.as_secs_f64(),
                 rate_hz: if span_s > 0.0 { intervals / span_s } else { 0.0 },
+                device_clock: clock.map(DeviceClockReport::from),
                 navigation: navigation.consistency(number).map(|consistency| NavigationReport {
                     used: consistency.used,
                     gated: consistency.gated,
