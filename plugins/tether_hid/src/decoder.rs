@@ -3,7 +3,7 @@
 use headrace_core::app::device::Decoder;
 use headrace_core::app::reading::{Decoded, Packet, Reading, TetherLength};
 use headrace_core::codec::{Codec as _, CodecCounts, Framing as _, LineClock};
-use headrace_core::time::DurNs;
+use headrace_core::time::{ClockReport, DeviceClock, DurNs};
 
 use crate::line::{LineCodec, Lines};
 use crate::report::{LayoutError, Report, ReportCodec, ReportLayout};
@@ -12,11 +12,15 @@ use crate::tracker::{CountTracker, Counting, TrackerHealth};
 /// A line's characters follow one another; after such a pause no more belong to the one begun.
 const SILENCE: DurNs = DurNs::from_millis(100);
 
+const MILLISECOND: DurNs = DurNs::from_millis(1);
+
 /// How a HID counter is to be understood.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Counter {
     /// Where things stand in its reports.
     pub layout: ReportLayout,
+    /// Whether the auxiliary value is the device's time in milliseconds.
+    pub auxiliary_is_ms: bool,
     /// Whether it counts from its zero or from report to report.
     pub counting: Counting,
     /// Counts for a metre of cable; below zero where the count falls as cable is paid out.
@@ -33,6 +37,7 @@ pub struct HidDecoder {
     codec: ReportCodec,
     tracker: CountTracker,
     counter: Counter,
+    clock: Option<DeviceClock>,
     status: Option<u8>,
 }
 
@@ -56,6 +61,7 @@ impl HidDecoder {
             codec: ReportCodec::new(counter.layout),
             tracker: CountTracker::new(counter.counting, counter.layout.width, max_counts_per_s),
             counter,
+            clock: counter.auxiliary_is_ms.then(|| DeviceClock::new(u32::BITS, MILLISECOND)),
             status: None,
         })
     }
@@ -73,9 +79,12 @@ impl HidDecoder {
 
 impl Decoder for HidDecoder {
     fn decode(&mut self, packet: Packet<'_>, sink: &mut dyn FnMut(Decoded)) {
-        let Self { codec, tracker, counter, status } = self;
+        let Self { codec, tracker, counter, clock, status } = self;
         let mut take = |report: Report| {
             *status = report.status;
+            if let (Some(clock), Some(ms)) = (&mut *clock, report.auxiliary) {
+                clock.take(u64::from(ms.cast_unsigned()), packet.received);
+            }
             let Some(counts) = tracker.take(packet.received, &report) else { return };
             let length = TetherLength {
                 length_m: counts as f64 / counter.counts_per_metre,
@@ -97,6 +106,10 @@ impl Decoder for HidDecoder {
     /// Reports rejected as faster than the winch.
     fn withheld(&self) -> u64 {
         self.health().rejected
+    }
+
+    fn clock(&self) -> Option<ClockReport> {
+        self.clock.as_ref().map(DeviceClock::report)
     }
 }
 

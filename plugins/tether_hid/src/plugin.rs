@@ -80,7 +80,10 @@ impl DeviceKind for Kind {
 }
 
 fn hid(reeling: &Reeling, own: &Section<'_>) -> Result<Wire, ConfigError> {
-    let layout = report_layout(own)?;
+    let mut layout = report_layout(own)?;
+    let clock_offset = own.integer("clock_ms_offset", 0..=MAX_REPORT_BYTES as i64)?;
+    let clock_offset = clock_offset.and_then(|offset| usize::try_from(offset).ok());
+    layout.auxiliary_offset = clock_offset.or(layout.auxiliary_offset);
     let countings = [("absolute", Counting::Absolute), ("delta", Counting::Delta)];
     let counting = own.choice("mode", &countings)?.unwrap_or(Counting::Absolute);
     let counts_per_metre =
@@ -98,7 +101,14 @@ fn hid(reeling: &Reeling, own: &Section<'_>) -> Result<Wire, ConfigError> {
         );
         return Err(own.invalid("max_speed_mps", &problem));
     }
-    let counter = Counter { layout, counting, counts_per_metre, max_speed_mps, latency: reeling.latency };
+    let counter = Counter {
+        layout,
+        auxiliary_is_ms: clock_offset.is_some(),
+        counting,
+        counts_per_metre,
+        max_speed_mps,
+        latency: reeling.latency,
+    };
     let decoder =
         HidDecoder::new(counter).map_err(|error| own.invalid("report_bytes", &error.to_string()))?;
     Ok(Wire::Hid { decoder: Box::new(decoder), counter })

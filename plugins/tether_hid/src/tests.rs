@@ -12,7 +12,7 @@ use headrace_core::tunnel::named;
 
 use crate::Kind;
 use crate::decoder::{Counter, HidDecoder, LineDecoder};
-use crate::report::{Endian, ReportLayout, Width};
+use crate::report::{Endian, Report, ReportLayout, Width};
 use crate::tracker::Counting;
 
 /// Chainage of a vehicle that goes in at 0.5 m/s from chainage 20 m.
@@ -42,6 +42,7 @@ fn configured(own: &str) -> Result<Box<dyn Device>, String> {
 fn reference_counter() -> Counter {
     Counter {
         layout: ReportLayout::REFERENCE,
+        auxiliary_is_ms: false,
         counting: Counting::Absolute,
         counts_per_metre: 2000.0,
         max_speed_mps: 3.0,
@@ -138,6 +139,27 @@ fn a_counter_of_changes_comes_back() {
 }
 
 #[test]
+fn a_counter_s_own_clock_is_followed_where_the_file_says_where_it_is() {
+    let mut decoder = HidDecoder::new(reference_counter()).unwrap();
+    round_trip("counts_per_metre = 2000\n", &mut decoder, 0.0, 1.0, 200);
+    assert_eq!(decoder.clock(), None);
+    let mut decoder = HidDecoder::new(Counter { auxiliary_is_ms: true, ..reference_counter() }).unwrap();
+    round_trip("counts_per_metre = 2000\nclock_ms_offset = 7\n", &mut decoder, 0.0, 1.0, 2000);
+    let clock = decoder.clock().unwrap();
+    assert_eq!((clock.stamps, clock.restarts, clock.jumps), (2000, 0, 0));
+    assert_eq!(clock.span, DurNs::from_millis(39_980));
+    assert!(clock.drift.unwrap().ppm.abs() < 1e-6, "{clock:?}");
+    // A clock from 2^31 ms on is a negative number on the wire, and no restart.
+    let mut decoder = HidDecoder::new(Counter { auxiliary_is_ms: true, ..reference_counter() }).unwrap();
+    for (second, ms) in [i32::MAX - 999, i32::MIN, i32::MIN + 1000].into_iter().enumerate() {
+        let report = Report { sequence: None, status: None, count: 0, auxiliary: Some(ms) };
+        let bytes = ReportLayout::REFERENCE.encode(&report);
+        decode(&mut decoder, MonoNs(second as u64 * 1_000_000_000), &bytes);
+    }
+    assert_eq!(decoder.clock().unwrap().restarts, 0);
+}
+
+#[test]
 fn an_emulated_line_monitor_comes_back() {
     let mut decoder = LineDecoder::new(1.0, DurNs::from_millis(4));
     round_trip("kind = \"lci90\"\nzero_at_m = 30.0\n", &mut decoder, 30.0, 1.0, 500);
@@ -163,6 +185,9 @@ fn wrong_keys_are_named() {
     assert_eq!(error("kind = \"hid\"\n"), "v.toml:1: counts_per_metre: is missing");
     assert!(error("counts_per_metre = 2000\nwidth_bits = 24\n").contains("must be 8, 16 or 32"));
     assert!(error("counts_per_metre = 2000\noffset = 9\n").contains("the report has 11"));
+    assert!(
+        error("counts_per_metre = 2000\nclock_ms_offset = 8\n").contains("the auxiliary value at offset 8")
+    );
     assert!(error("counts_per_metre = 9000\nwidth_bits = 8\n").contains("max_speed_mps"));
     assert!(error("kind = \"lci90\"\ncounts_per_metre = 2000\n").contains("is not a key here"));
     assert!(error("counts_per_metre = 2000\nscale = 0\n").contains("away from zero"));
