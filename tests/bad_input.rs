@@ -230,6 +230,29 @@ fn a_profile_from_a_polyline_goes_into_the_log_and_replays_without_the_file() {
     assert_eq!(folder.digest("dive.mcap", &[]), digest);
 }
 
+#[test]
+fn a_dbc_goes_into_the_log_and_replays_without_the_file() {
+    let folder = Folder::new();
+    let dbc = include_str!("../plugins/imu_can/dbc/xsens_mti600.dbc");
+    let keys = "dbc = \"imu.dbc\"\nsignals = { rate = [\"GyroX\", \"GyroY\", \"GyroZ\"], force = [\"AccX\", \"AccY\", \"AccZ\"], \
+                quaternion = [\"QuatW\", \"QuatX\", \"QuatY\", \"QuatZ\"], sample_time = \"SampleTime\" }\n";
+    folder.write("vehicle.toml", change(VEHICLE, "preset = \"xsens_mti600\"\n", keys));
+    folder.write("scene.toml", SCENE);
+    folder.write("imu.dbc", dbc.replace("SG_ GyroY : 23|16@0-", "SG_ GyroY : 23|16@3-"));
+    let answer = folder.headrace(&["check", "vehicle.toml"]);
+    assert_eq!(answer.code, Some(2), "{}", answer.stderr);
+    assert!(answer.stderr.contains("imu.dbc:43: DBC: \"SG_ GyroY : 23|16@3-"), "{}", answer.stderr);
+
+    folder.write("imu.dbc", dbc);
+    folder.simulate("scene.toml", "dive.mcap");
+    let (_, report) = folder.replay("dive.mcap", &["--vehicle", "vehicle.toml"]);
+    let imu = report["sources"].as_array().unwrap().iter().find(|source| source["id"] == "imu").unwrap();
+    assert_eq!(imu["device_clock"]["restarts"], 0);
+    assert!(imu["device_clock"]["drift_ppm"].as_f64().unwrap().abs() < 1.0, "{imu}");
+    std::fs::remove_file(folder.path("imu.dbc")).unwrap();
+    assert_eq!(folder.digest("dive.mcap", &[]), report["digest"].as_str().unwrap());
+}
+
 /// A log of the short dive in chunks of about a second, with the vehicle file in it.
 fn chunked_log(folder: &Folder, log: &str) -> usize {
     let dive = folder.read("dive.mcap");

@@ -77,7 +77,8 @@ impl Framing for MessageSet {
     }
 }
 
-fn can_frame(bytes: &[u8]) -> Option<CanFrame> {
+/// The frame that these bytes are.
+pub(crate) fn can_frame(bytes: &[u8]) -> Option<CanFrame> {
     CanFrame::decode(bytes.first_chunk()?).ok()
 }
 

@@ -4,10 +4,12 @@ use headrace_core::app::device::Decoder;
 use headrace_core::app::reading::{Decoded, Level, Packet, Reading};
 use headrace_core::codec::{Codec as _, CodecCounts, Framing as _};
 use headrace_core::frames::{Rot, Sensor, Vec3};
-use headrace_core::time::DurNs;
+use headrace_core::time::{ClockReport, DeviceClock, DurNs, MonoNs};
 
 use crate::codec::{ImuCodec, Message, MessageSet};
 use crate::sets::{bosch, j1939, sbg, scaled, xsens};
+
+const MICROSECOND: DurNs = DurNs(1000);
 
 /// In which order a J1939 unit sends the axes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -44,15 +46,25 @@ pub struct ImuDecoder {
 #[derive(Debug, Clone)]
 struct State {
     meaning: Meaning,
-    /// The last status word said that the orientation can't be relied on.
-    orientation_invalid: bool,
+    invalid: Invalid,
     /// A unit that sends both would be heard twice.
     sends_quaternions: bool,
     sample_time_ticks: Option<u32>,
+    clock: Option<DeviceClock>,
+    stamped_by_filter: Option<bool>,
+    received: MonoNs,
     group: Option<u16>,
     /// Components that have come since the last complete vector.
     acceleration_mps2: [Option<f64>; 3],
     withheld: u64,
+}
+
+/// What can't be relied on by the unit's last status.
+#[derive(Debug, Clone, Copy, Default)]
+struct Invalid {
+    orientation: bool,
+    rate: bool,
+    force: bool,
 }
 
 /// A reading, and the device's own delay where it tells one.
@@ -73,9 +85,12 @@ impl ImuDecoder {
     pub fn new(meaning: Meaning) -> Self {
         let state = State {
             meaning,
-            orientation_invalid: false,
+            invalid: Invalid::default(),
             sends_quaternions: false,
             sample_time_ticks: None,
+            clock: None,
+            stamped_by_filter: None,
+            received: MonoNs(0),
             group: None,
             acceleration_mps2: [None; 3],
             withheld: 0,
@@ -108,6 +123,7 @@ impl Decoder for ImuDecoder {
                 *passed_over += 1;
                 return;
             };
+            state.received = packet.received;
             if let Some((reading, delay)) = state.take(&message) {
                 let valid_at = packet.received - (state.meaning.latency + delay);
                 sink(Decoded { valid_at, reading });
@@ -124,6 +140,10 @@ impl Decoder for ImuDecoder {
     fn withheld(&self) -> u64 {
         self.state.withheld
     }
+
+    fn clock(&self) -> Option<ClockReport> {
+        self.state.clock.as_ref().map(DeviceClock::report)
+    }
 }
 
 impl State {
@@ -139,15 +159,22 @@ impl State {
     fn take_xsens(&mut self, message: &xsens::Message) -> Told {
         use xsens::Message as M;
         match *message {
-            M::StatusWord(word) => self.orientation_invalid = !word.orientation_valid(),
-            M::SampleTime(ticks) => self.sample_time_ticks = Some(ticks),
+            M::StatusWord(word) => {
+                self.invalid.orientation = !word.orientation_valid();
+                self.invalid.rate = word.rate_clipped();
+                self.invalid.force = word.acceleration_clipped();
+            }
+            M::SampleTime(ticks) => {
+                self.sample_time_ticks = Some(ticks);
+                self.stamp(ticks, self.meaning.sample_time_tick);
+            }
             M::GroupCounter(group) => self.group = Some(group),
             M::Quaternion(raw) => return self.quaternion(scaled(raw, xsens::QUATERNION_QUANTUM)),
             M::EulerAngles(raw) => {
                 return self.euler(scaled(raw, xsens::EULER_QUANTUM_DEG).map(f64::to_radians));
             }
-            M::RateOfTurn(raw) => return rate(scaled(raw, xsens::RATE_QUANTUM_RADPS)),
-            M::Acceleration(raw) => return force(scaled(raw, xsens::ACCELERATION_QUANTUM_MPS2)),
+            M::RateOfTurn(raw) => return self.rate(scaled(raw, xsens::RATE_QUANTUM_RADPS)),
+            M::Acceleration(raw) => return self.force(scaled(raw, xsens::ACCELERATION_QUANTUM_MPS2)),
             // The high-rate messages are left out: which of the two codes is which isn't sure.
             _ => (),
         }
@@ -161,9 +188,19 @@ impl State {
                 self.quaternion(sbg::rotation_to_ours(scaled(raw, sbg::QUATERNION_QUANTUM)))
             }
             M::Euler(raw) => self.euler(sbg::to_ours(scaled(raw, sbg::EULER_QUANTUM_RAD))),
-            M::Rate(raw) => rate(sbg::to_ours(scaled(raw, sbg::RATE_QUANTUM_RADPS))),
-            M::Acceleration(raw) => force(sbg::to_ours(scaled(raw, sbg::ACCELERATION_QUANTUM_MPS2))),
-            M::ImuInfo { .. } | M::EkfTime(_) | M::Accuracy(_) => None,
+            M::Rate(raw) => self.rate(sbg::to_ours(scaled(raw, sbg::RATE_QUANTUM_RADPS))),
+            M::Acceleration(raw) => self.force(sbg::to_ours(scaled(raw, sbg::ACCELERATION_QUANTUM_MPS2))),
+            M::ImuInfo { time_us, status, .. } => {
+                self.sbg_stamp(time_us, false);
+                self.invalid.force = !status.force_is_well();
+                self.invalid.rate = !status.rate_is_well();
+                None
+            }
+            M::EkfTime(time_us) => {
+                self.sbg_stamp(time_us, true);
+                None
+            }
+            M::Accuracy(_) => None,
         }
     }
 
@@ -203,6 +240,30 @@ impl State {
         force(complete)
     }
 
+    /// The unit stamps its samples and its filter's solutions with one clock, which stands at different times for them: the
+    /// kind that came first is followed.
+    fn sbg_stamp(&mut self, time_us: u32, of_filter: bool) {
+        if *self.stamped_by_filter.get_or_insert(of_filter) == of_filter {
+            self.stamp(time_us, MICROSECOND);
+        }
+    }
+
+    /// Takes a stamp of the unit's clock of 32 bits.
+    fn stamp(&mut self, ticks: u32, tick: DurNs) {
+        let clock = self.clock.get_or_insert_with(|| DeviceClock::new(u32::BITS, tick));
+        clock.take(u64::from(ticks), self.received);
+    }
+
+    fn rate(&mut self, radps: [f64; 3]) -> Told {
+        self.withheld += u64::from(self.invalid.rate);
+        rate(radps).filter(|_| !self.invalid.rate)
+    }
+
+    fn force(&mut self, mps2: [f64; 3]) -> Told {
+        self.withheld += u64::from(self.invalid.force);
+        force(mps2).filter(|_| !self.invalid.force)
+    }
+
     fn quaternion(&mut self, [w, x, y, z]: [f64; 4]) -> Told {
         self.sends_quaternions = true;
         self.attitude(Rot::from_wxyz(w, x, y, z))
@@ -216,7 +277,7 @@ impl State {
     }
 
     fn attitude(&mut self, attitude: Option<Rot<Level, Sensor>>) -> Told {
-        let attitude = attitude.filter(|_| !self.orientation_invalid);
+        let attitude = attitude.filter(|_| !self.invalid.orientation);
         self.withheld += u64::from(attitude.is_none());
         Some((Reading::Attitude(attitude?), DurNs::ZERO))
     }

@@ -99,7 +99,11 @@ fn sbg(motion: &Inertia, elapsed: DurNs) -> [Message; 4] {
     let rate = sbg::to_ours(motion.rate_radps.0.into());
     let quaternion = sbg::rotation_to_ours(motion.attitude.wxyz());
     [
-        sbg::Message::ImuInfo { time_us: wrapped(elapsed.0 / 1000), status: 0, temperature: SBG_TEMPERATURE },
+        sbg::Message::ImuInfo {
+            time_us: wrapped(elapsed.0 / 1000),
+            status: sbg::ALL_WELL,
+            temperature: SBG_TEMPERATURE,
+        },
         sbg::Message::Acceleration(counts(force, sbg::ACCELERATION_QUANTUM_MPS2)),
         sbg::Message::Rate(counts(rate, sbg::RATE_QUANTUM_RADPS)),
         sbg::Message::Quaternion(counts(quaternion, sbg::QUATERNION_QUANTUM)),

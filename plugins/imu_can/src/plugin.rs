@@ -4,11 +4,16 @@ use headrace_core::app::App;
 use headrace_core::app::components::Imu;
 use headrace_core::app::device::{Device, DeviceKind, Emulated, EmulatorSetup, Sense};
 use headrace_core::app::driver::{Carrier, Driver, DriverSetup};
+use headrace_core::app::device::{Decoder, Device, DeviceKind, Emulated, EmulatorSetup, Sense};
 use headrace_core::app::plugin::{Plugin, PluginError};
 use headrace_core::config::{ConfigError, Section, SensorConfig};
 use headrace_core::time::DurNs;
 
 use crate::codec::MessageSet;
+use crate::dbc::decoder::DbcDecoder;
+use crate::dbc::emulator::DbcEmulator;
+use crate::dbc::keys;
+use crate::dbc::mapping::Mapping;
 use crate::decoder::{AxisOrder, ImuDecoder, Meaning};
 use crate::driver;
 use crate::emulator::ImuEmulator;
@@ -30,8 +35,15 @@ pub struct Kind;
 #[derive(Debug, Clone)]
 pub struct CanImu {
     sensor: SensorConfig,
-    meaning: Meaning,
+    known: Known,
     rate_hz: f64,
+}
+
+/// By what its frames are understood.
+#[derive(Debug, Clone)]
+enum Known {
+    Preset(Meaning),
+    Dbc(Box<Mapping>),
 }
 
 #[derive(Clone, Copy)]
@@ -48,39 +60,51 @@ impl DeviceKind for Kind {
     }
 
     fn configure(&self, sensor: &SensorConfig, own: &Section<'_>) -> Result<Box<dyn Device>, ConfigError> {
-        let presets = [
-            ("xsens_mti600", Preset::Xsens),
-            ("sbg_ellipse", Preset::Sbg),
-            ("j1939", Preset::J1939),
-            ("bosch_mm5", Preset::Bosch),
-        ];
-        let preset = own.required("preset", own.choice("preset", &presets)?)?;
         let rate_hz = own.number("rate_hz", 1.0..=1000.0)?.unwrap_or(100.0);
-        let mut axis_order = AxisOrder::Yxz;
-        let mut tick_us = USUAL_TICK_US;
-        let set = match preset {
-            Preset::Xsens => {
-                tick_us = own.integer("sample_time_tick_us", 1..=1_000_000)?.unwrap_or(USUAL_TICK_US);
-                MessageSet::Xsens(xsens::Ids { base: id_base(own)? })
+        let known = match own.named_file("dbc")? {
+            Some(_) if own.text("preset")?.is_some() => {
+                return Err(
+                    own.invalid("dbc", "is there beside preset; one of them says how frames are read")
+                );
             }
-            Preset::Sbg => MessageSet::Sbg,
-            Preset::J1939 => {
-                let orders = [("yxz", AxisOrder::Yxz), ("xyz", AxisOrder::Xyz)];
-                axis_order = own.choice("axis_order", &orders)?.unwrap_or(axis_order);
-                let address = own.integer("source_address", 0..=253)?;
-                let source_address = address.and_then(|address| u8::try_from(address).ok());
-                MessageSet::J1939(j1939::Network { source_address })
-            }
-            Preset::Bosch => MessageSet::Bosch,
+            Some(file) => Known::Dbc(Box::new(keys::mapping(&file, own, sensor.latency)?)),
+            None => Known::Preset(preset(sensor, own)?),
         };
-        let meaning = Meaning {
-            set,
-            axis_order,
-            sample_time_tick: DurNs(tick_us.saturating_mul(1000)),
-            latency: sensor.latency,
-        };
-        Ok(Box::new(CanImu { sensor: sensor.clone(), meaning, rate_hz }))
+        Ok(Box::new(CanImu { sensor: sensor.clone(), known, rate_hz }))
     }
+}
+
+fn preset(sensor: &SensorConfig, own: &Section<'_>) -> Result<Meaning, ConfigError> {
+    let presets = [
+        ("xsens_mti600", Preset::Xsens),
+        ("sbg_ellipse", Preset::Sbg),
+        ("j1939", Preset::J1939),
+        ("bosch_mm5", Preset::Bosch),
+    ];
+    let preset = own.required("preset", own.choice("preset", &presets)?)?;
+    let mut axis_order = AxisOrder::Yxz;
+    let mut tick_us = USUAL_TICK_US;
+    let set = match preset {
+        Preset::Xsens => {
+            tick_us = own.integer("sample_time_tick_us", 1..=1_000_000)?.unwrap_or(USUAL_TICK_US);
+            MessageSet::Xsens(xsens::Ids { base: id_base(own)? })
+        }
+        Preset::Sbg => MessageSet::Sbg,
+        Preset::J1939 => {
+            let orders = [("yxz", AxisOrder::Yxz), ("xyz", AxisOrder::Xyz)];
+            axis_order = own.choice("axis_order", &orders)?.unwrap_or(axis_order);
+            let address = own.integer("source_address", 0..=253)?;
+            let source_address = address.and_then(|address| u8::try_from(address).ok());
+            MessageSet::J1939(j1939::Network { source_address })
+        }
+        Preset::Bosch => MessageSet::Bosch,
+    };
+    Ok(Meaning {
+        set,
+        axis_order,
+        sample_time_tick: DurNs(tick_us.saturating_mul(1000)),
+        latency: sensor.latency,
+    })
 }
 
 fn id_base(own: &Section<'_>) -> Result<Option<u32>, ConfigError> {
@@ -93,7 +117,11 @@ fn id_base(own: &Section<'_>) -> Result<Option<u32>, ConfigError> {
 
 impl Plugin for CanImu {
     fn build(&self, app: &mut App) -> Result<(), PluginError> {
-        app.add_sensor(&self.sensor, Box::new(ImuDecoder::new(self.meaning)), RING_BYTES, Imu)?;
+        let decoder: Box<dyn Decoder> = match &self.known {
+            Known::Preset(meaning) => Box::new(ImuDecoder::new(*meaning)),
+            Known::Dbc(mapping) => Box::new(DbcDecoder::new(mapping)),
+        };
+        app.add_sensor(&self.sensor, decoder, RING_BYTES, Imu)?;
         Ok(())
     }
 }
@@ -104,7 +132,10 @@ impl Device for CanImu {
     }
 
     fn emulator(&self, setup: &EmulatorSetup) -> Emulated {
-        Emulated::Inertial(Box::new(ImuEmulator::new(self.meaning, self.rate_hz, setup.start)))
+        Emulated::Inertial(match &self.known {
+            Known::Preset(meaning) => Box::new(ImuEmulator::new(*meaning, self.rate_hz, setup.start)),
+            Known::Dbc(mapping) => Box::new(DbcEmulator::new(**mapping, self.rate_hz, setup.start)),
+        })
     }
 
     fn carriers(&self) -> &'static [Carrier] {

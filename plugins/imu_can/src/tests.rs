@@ -311,3 +311,28 @@ fn wrong_keys_are_named() {
     assert!(configured("preset = \"xsens_mti600\"\nid_base = 0x19FF0000\n").is_ok());
     assert!(configured("preset = \"j1939\"\nsource_address = 0xE2\n").is_ok());
 }
+
+#[test]
+fn what_an_sbg_calls_unfit_is_withheld() {
+    let mut decoder = ImuDecoder::new(meaning(MessageSet::Sbg));
+    let info = |status| sbg::Message::ImuInfo { time_us: 0, status: sbg::ImuStatus(status), temperature: 0 };
+    let samples = [sbg::Message::Acceleration([0; 3]), sbg::Message::Rate([0; 3])];
+    assert_eq!(readings(&mut decoder, MessageSet::Sbg, &samples.map(Message::Sbg)).len(), 2);
+    // Accelerometer bits, gyro bits, and that the unit answers at all; the overall test is their sum and not asked.
+    for (bit, expected) in [(0, 0), (1, 2), (2, 1), (4, 1), (5, 1), (7, 1), (8, 1), (9, 1), (10, 2)] {
+        let messages = [info(0x3FF & !(1 << bit)), samples[0], samples[1]].map(Message::Sbg);
+        assert_eq!(readings(&mut decoder, MessageSet::Sbg, &messages).len(), expected, "bit {bit}");
+    }
+    assert_eq!(decoder.withheld(), 8);
+}
+
+#[test]
+fn the_kind_of_time_that_came_first_is_followed() {
+    let mut decoder = ImuDecoder::new(meaning(MessageSet::Sbg));
+    assert_eq!(decoder.clock(), None);
+    let info = |time_us| sbg::Message::ImuInfo { time_us, status: sbg::ALL_WELL, temperature: 0 };
+    let messages = [sbg::Message::EkfTime(5000), info(1), sbg::Message::EkfTime(6000), info(900)];
+    readings(&mut decoder, MessageSet::Sbg, &messages.map(Message::Sbg));
+    let clock = decoder.clock().unwrap();
+    assert_eq!((clock.stamps, clock.restarts), (2, 0));
+}

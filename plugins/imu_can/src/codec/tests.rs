@@ -225,8 +225,10 @@ mod strategies {
         use sbg::Message as M;
         let three = || uniform3(any::<i16>());
         prop_oneof![
-            (any::<u32>(), any::<u16>(), any::<i16>())
-                .prop_map(|(time_us, status, temperature)| M::ImuInfo { time_us, status, temperature }),
+            (any::<u32>(), any::<u16>(), any::<i16>()).prop_map(|(time_us, status, temperature)| {
+                let status = sbg::ImuStatus(status);
+                M::ImuInfo { time_us, status, temperature }
+            }),
             three().prop_map(M::Acceleration),
             three().prop_map(M::Rate),
             any::<u32>().prop_map(M::EkfTime),

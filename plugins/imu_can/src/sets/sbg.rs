@@ -2,7 +2,7 @@
 //!
 //! The device's axes are x forward, y right, z down, and its earth frame is north, east, down: two of three axes point
 //! the other way than ours. [`to_ours`] turns vectors and [`rotation_to_ours`] rotations; both are their own inverse.
-//! Source: SBG Systems, sbgECom CAN protocol and sbgCan.dbc.
+//! Source: SBG Systems, sbgECom CAN protocol and sbgCan.dbc; bits of the status in its firmware reference.
 
 use super::{MessageError, data_id, exactly, words};
 use crate::frame::{CanFrame, CanId, Payload};
@@ -18,6 +18,29 @@ pub const EULER_QUANTUM_RAD: f64 = 1e-4;
 /// Temperature, degrees Celsius.
 pub const TEMPERATURE_QUANTUM_DEGC: f64 = 1e-2;
 
+/// The unit answers, its accelerometers have passed their tests and are within their range.
+const FORCE_WELL: u16 = 0x11D;
+/// The same of its gyros.
+const RATE_WELL: u16 = 0x2E1;
+/// A status of which all bits that are known say that all is well.
+pub const ALL_WELL: ImuStatus = ImuStatus(0x3FF);
+
+/// State of the inertial unit as bits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ImuStatus(pub u16);
+
+impl ImuStatus {
+    /// Whether specific force is fit for use.
+    pub fn force_is_well(self) -> bool {
+        self.0 & FORCE_WELL == FORCE_WELL
+    }
+
+    /// Whether turn rate is fit for use.
+    pub fn rate_is_well(self) -> bool {
+        self.0 & RATE_WELL == RATE_WELL
+    }
+}
+
 /// One message, in the device's own axes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Message {
@@ -25,8 +48,8 @@ pub enum Message {
     ImuInfo {
         /// Time since switched on, microseconds.
         time_us: u32,
-        /// State as bits.
-        status: u16,
+        /// State.
+        status: ImuStatus,
         /// Temperature.
         temperature: i16,
     },
@@ -66,7 +89,7 @@ pub fn decode(frame: &CanFrame) -> Result<Option<Message>, MessageError> {
             let [t0, t1, t2, t3, s0, s1, c0, c1] = exactly(id, data)?;
             Message::ImuInfo {
                 time_us: u32::from_le_bytes([t0, t1, t2, t3]),
-                status: u16::from_le_bytes([s0, s1]),
+                status: ImuStatus(u16::from_le_bytes([s0, s1])),
                 temperature: i16::from_le_bytes([c0, c1]),
             }
         }
@@ -85,7 +108,7 @@ pub fn encode(message: &Message) -> CanFrame {
     let bytes = |bytes: &[u8]| Payload::default().with(bytes);
     let (id, payload) = match *message {
         Message::ImuInfo { time_us, status, temperature } => {
-            let payload = bytes(&time_us.to_le_bytes()).with(&status.to_le_bytes());
+            let payload = bytes(&time_us.to_le_bytes()).with(&status.0.to_le_bytes());
             (0x120, payload.with(&temperature.to_le_bytes()))
         }
         Message::Acceleration(raw) => (0x121, little_endian(&raw)),

@@ -101,6 +101,16 @@ impl StatusWord {
     pub fn orientation_valid(self) -> bool {
         self.0 & 0b10 != 0
     }
+
+    /// Whether an accelerometer is beyond its range.
+    pub fn acceleration_clipped(self) -> bool {
+        self.0 & 0x700 != 0
+    }
+
+    /// Whether a gyro is beyond its range.
+    pub fn rate_clipped(self) -> bool {
+        self.0 & 0x3800 != 0
+    }
 }
 
 impl DeltaV {

@@ -1,0 +1,125 @@
+//! The unit's side of the bus: at a fixed rate, the frames of one sample as the DBC lays them out.
+
+use headrace_core::app::device::{Direction, Emulator, LineSink};
+use headrace_core::app::measurement::Inertia;
+use headrace_core::time::{DurNs, MonoNs};
+
+use super::file::Place;
+use super::layout::DATA_BYTES;
+use super::mapping::{Attitude, Condition, Mapping, Part};
+use crate::frame::{CanFrame, CanId, Payload};
+
+/// An ideal unit: no noise, no bias and no delay of its own, but what its signals can say.
+#[derive(Debug, Clone)]
+pub struct DbcEmulator {
+    mapping: Mapping,
+    frames: Vec<Frame>,
+    rate_hz: f64,
+    start: MonoNs,
+    begun: u64,
+    told: u64,
+}
+
+/// A frame of a sample: its identifier, its length, and which of its signals are there.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Frame {
+    id: CanId,
+    bytes: u8,
+    switch: Option<u64>,
+}
+
+impl DbcEmulator {
+    /// A unit that is switched on, and first samples, at `start`.
+    pub fn new(mapping: Mapping, rate_hz: f64, start: MonoNs) -> Self {
+        let mut frames: Vec<Frame> = Vec::new();
+        for place in mapping.places() {
+            let frame = Frame {
+                id: place.id,
+                bytes: place.frame_bytes,
+                switch: place.switch.map(|(_, value)| value),
+            };
+            if !frames.contains(&frame) {
+                frames.push(frame);
+            }
+        }
+        // Where some signals of a message hang on a switch, the others are in each of its frames.
+        let switched: Vec<CanId> = frames.iter().filter(|f| f.switch.is_some()).map(|f| f.id).collect();
+        frames.retain(|frame| frame.switch.is_some() || !switched.contains(&frame.id));
+        Self { mapping, frames, rate_hz, start, begun: 0, told: 0 }
+    }
+
+    /// From the start to a sample on the unit's own clock.
+    fn elapsed(&self, sample: u64) -> DurNs {
+        DurNs::from_secs_f64(sample as f64 / self.rate_hz)
+    }
+
+    /// Each signal with the value that it has.
+    fn values(&self, motion: &Inertia) -> Vec<(Place, f64)> {
+        let axes = self.mapping.axes;
+        let mut values = Vec::new();
+        let mut say = |parts: &[Part], si: &[f64]| {
+            values.extend(parts.iter().zip(si).map(|(part, si)| (part.place, part.unit.of_si(*si))));
+        };
+        if let Some(parts) = self.mapping.rate {
+            say(&parts, &axes.turned(motion.rate_radps.0.into()));
+        }
+        if let Some(parts) = self.mapping.force {
+            say(&parts, &axes.turned(motion.force_mps2.0.into()));
+        }
+        match self.mapping.attitude {
+            Some(Attitude::Quaternion(parts)) => say(&parts, &axes.rotation_turned(motion.attitude.wxyz())),
+            Some(Attitude::Euler(parts)) => {
+                say(&parts, &axes.turned(motion.attitude.roll_pitch_yaw().into()));
+            }
+            None => (),
+        }
+        values
+    }
+
+    fn frame(&self, frame: Frame, values: &[(Place, f64)], elapsed: DurNs) -> CanFrame {
+        let there = |place: &Place| {
+            place.id == frame.id && place.switch.is_none_or(|(_, on)| Some(on) == frame.switch)
+        };
+        let mut data = [0; DATA_BYTES];
+        for (place, value) in values.iter().filter(|(place, _)| there(place)) {
+            data = place.put(data, *value);
+        }
+        let conditions = self.mapping.conditions;
+        let conditions = [conditions.all, conditions.attitude, conditions.rate, conditions.force];
+        for Condition { place, mask, value } in conditions.into_iter().flatten().filter(|c| there(&c.place)) {
+            let others = place.layout.extract(data) & !mask;
+            data = place.layout.insert(data, others | value);
+        }
+        if let Some(stamp) = self.mapping.sample_time.filter(|stamp| there(&stamp.place)) {
+            let ticks = elapsed.0 / stamp.tick.0.max(1);
+            data = stamp.place.layout.insert(data, ticks as u64);
+        }
+        let switches =
+            self.mapping.places().filter(|place| place.id == frame.id).filter_map(|place| place.switch);
+        for (switch, value) in switches.filter(|(_, value)| Some(*value) == frame.switch) {
+            data = switch.insert(data, value);
+        }
+        let data = data.get(..usize::from(frame.bytes)).unwrap_or_default();
+        CanFrame::new(frame.id, Payload::default().with(data))
+    }
+}
+
+impl Emulator<Inertia> for DbcEmulator {
+    fn begin(&mut self, until: MonoNs, due: &mut Vec<Inertia>) {
+        let period = DurNs::from_secs_f64(1.0 / self.rate_hz);
+        while self.start + self.elapsed(self.begun) < until {
+            due.push(Inertia::due(self.start + self.elapsed(self.begun), period));
+            self.begun += 1;
+        }
+    }
+
+    fn tell(&mut self, motion: &Inertia, line: LineSink<'_>) {
+        let elapsed = self.elapsed(self.told);
+        self.told += 1;
+        let values = self.values(motion);
+        for frame in &self.frames {
+            let bytes = self.frame(*frame, &values, elapsed).encode();
+            line(Direction::Received, motion.at + self.mapping.latency, &bytes);
+        }
+    }
+}

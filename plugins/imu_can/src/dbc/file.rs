@@ -1,0 +1,336 @@
+//! A DBC text, and the signals that are looked up in it. This is done when a vehicle file is read; nothing of it is in the
+//! loop.
+
+use std::collections::BTreeMap;
+
+use can_dbc::{ByteOrder, Dbc, MessageId, MultiplexIndicator, SignalExtendedValueType, ValueType};
+
+use super::layout::{Bits, DATA_BYTES, Layout, Order};
+use crate::frame::CanId;
+
+/// A text is refused above this: IMUs' files have some kilobytes, whole vehicles' some hundreds.
+const MOST_BYTES: usize = 4 << 20;
+
+/// So many names are listed in an error.
+const MOST_NAMES: usize = 40;
+
+const MOST_STANDARD: u32 = 0x7FF;
+const EXTENDED: u64 = 1 << 31;
+
+/// What is wrong with a DBC text, or with what is wanted of it.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum DbcError {
+    /// It isn't DBC.
+    #[error("reading the DBC: {problem}")]
+    Parse {
+        /// Line, counted from one.
+        line: usize,
+        /// What stands there.
+        problem: String,
+    },
+    /// It is too long to be one.
+    #[error("reading the DBC: {0} bytes; at most {MOST_BYTES} are read")]
+    Long(usize),
+    /// No such signal.
+    #[error("looking for the signal {wanted:?}: the DBC has none of that name; it has {has}")]
+    NoSignal {
+        /// What was looked for.
+        wanted: String,
+        /// The names that there are.
+        has: String,
+    },
+    /// Several messages have a signal of that name.
+    #[error("looking for the signal {wanted:?}: it is in several messages; name one of {among}")]
+    Ambiguous {
+        /// What was looked for.
+        wanted: String,
+        /// Names with which it is found.
+        among: String,
+    },
+    /// It reaches over the end of its frame.
+    #[error(
+        "laying out the signal {signal:?}: bits {start}|{size}@{order} reach over the end of its frame of {frame_bytes} \
+         bytes (1 to 64 bits within a classic frame's 8 bytes are allowed)"
+    )]
+    Wide {
+        /// Which one.
+        signal: String,
+        /// Its start bit.
+        start: u64,
+        /// Its size in bits.
+        size: u64,
+        /// 1 Intel, 0 Motorola.
+        order: u8,
+        /// Length of its message.
+        frame_bytes: u64,
+    },
+    /// A float of another length than 32 or 64 bits.
+    #[error(
+        "laying out the signal {signal:?}: a float of {size} bits; allowed are 32 for SIG_VALTYPE_ 1 and 64 for 2"
+    )]
+    Float {
+        /// Which one.
+        signal: String,
+        /// Its size in bits.
+        size: u64,
+    },
+    /// A factor that leaves nothing of a value.
+    #[error(
+        "reading the signal {signal:?}: factor {factor}, offset {offset}; allowed are finite ones, the factor not zero"
+    )]
+    Scale {
+        /// Which one.
+        signal: String,
+        /// Its factor, as text.
+        factor: String,
+        /// Its offset, as text.
+        offset: String,
+    },
+    /// An identifier that no frame has.
+    #[error(
+        "reading the message {message:?}: identifier {id}; standard ones reach to 2047, extended ones have bit 31 set"
+    )]
+    Id {
+        /// Which message.
+        message: String,
+        /// Its identifier as written.
+        id: u64,
+    },
+    /// A switch that hangs on another switch, or none or several in a message.
+    #[error(
+        "reading the signal {signal:?}: it is multiplexed in a way that isn't read; one switch a message is, with single \
+         values"
+    )]
+    Multiplexed {
+        /// Which one.
+        signal: String,
+    },
+}
+
+/// A signal that was looked up.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Signal {
+    /// Its name, with its message's.
+    pub name: String,
+    /// The unit as written.
+    pub unit: String,
+    /// Where it is in which frames.
+    pub place: Place,
+}
+
+/// Which frames a signal is in, and how it becomes a number.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Place {
+    /// The frames that have it.
+    pub id: CanId,
+    /// Length of their data.
+    pub frame_bytes: u8,
+    /// Where it stands.
+    pub layout: Layout,
+    /// What its bits are.
+    pub bits: Bits,
+    /// Value = bits x factor + offset, in the signal's unit.
+    pub factor: f64,
+    /// See `factor`.
+    pub offset: f64,
+    /// It is there only where these bits have this value.
+    pub switch: Option<(Layout, u64)>,
+}
+
+impl Place {
+    /// The signal's bits in this frame's data, which is filled up to eight bytes; `None` where it is not in it.
+    pub fn raw(&self, id: CanId, data: [u8; DATA_BYTES]) -> Option<u64> {
+        let there = self.switch.is_none_or(|(switch, value)| switch.extract(data) == value);
+        (self.id == id && there).then(|| self.layout.extract(data))
+    }
+
+    /// The signal's value in its own unit.
+    pub fn value(&self, id: CanId, data: [u8; DATA_BYTES]) -> Option<f64> {
+        let raw = self.raw(id, data)?;
+        Some(self.bits.value(raw, self.layout.bits()) * self.factor + self.offset)
+    }
+
+    /// Puts the bits that come nearest to `value` into a frame's data.
+    pub fn put(&self, data: [u8; DATA_BYTES], value: f64) -> [u8; DATA_BYTES] {
+        let raw = self.bits.raw((value - self.offset) / self.factor, self.layout.bits());
+        self.layout.insert(data, raw)
+    }
+}
+
+/// A DBC text that was read.
+#[derive(Debug)]
+pub struct DbcFile {
+    dbc: Dbc,
+    /// Identifiers as written, by message: the parser keeps only 16 bits of standard ones.
+    wide_ids: BTreeMap<String, u64>,
+}
+
+impl DbcFile {
+    /// Reads a text.
+    ///
+    /// Errors: one that isn't DBC, with its line; one that is too long.
+    pub fn parse(text: &str) -> Result<Self, DbcError> {
+        if text.len() > MOST_BYTES {
+            return Err(DbcError::Long(text.len()));
+        }
+        // Without the mark that some editors set, and with an end of line at the end, which the grammar wants.
+        let text = format!("{}\n", text.trim_start_matches('\u{FEFF}'));
+        let dbc = Dbc::try_from(text.as_str()).map_err(|error| named(&text, &error))?;
+        Ok(Self { dbc, wide_ids: wide_ids(&text) })
+    }
+
+    /// The signal that is called `wanted`: its name, or its message's and its own with a dot between.
+    ///
+    /// Errors: no such signal, or several; one that can't be taken out of a classic frame.
+    pub fn signal(&self, wanted: &str) -> Result<Signal, DbcError> {
+        let all =
+            || self.dbc.messages.iter().flat_map(|message| message.signals.iter().map(move |s| (message, s)));
+        let full = |message: &can_dbc::Message, signal: &can_dbc::Signal| {
+            format!("{}.{}", message.name, signal.name)
+        };
+        let found: Vec<_> = all().filter(|(m, s)| s.name == wanted || full(m, s) == wanted).collect();
+        match found.as_slice() {
+            [] => {
+                let names: Vec<&str> = all().map(|(_, signal)| signal.name.as_str()).collect();
+                Err(DbcError::NoSignal { wanted: wanted.to_owned(), has: listed(&names) })
+            }
+            [(message, signal)] => self.read(message, signal),
+            several => {
+                let names: Vec<String> = several.iter().map(|(m, s)| full(m, s)).collect();
+                let names: Vec<&str> = names.iter().map(String::as_str).collect();
+                Err(DbcError::Ambiguous { wanted: wanted.to_owned(), among: listed(&names) })
+            }
+        }
+    }
+
+    fn read(&self, message: &can_dbc::Message, signal: &can_dbc::Signal) -> Result<Signal, DbcError> {
+        let name = format!("{}.{}", message.name, signal.name);
+        let layout = layout(message, signal)?;
+        if !(signal.factor.is_finite() && signal.offset.is_finite() && signal.factor != 0.0) {
+            let (factor, offset) = (signal.factor.to_string(), signal.offset.to_string());
+            return Err(DbcError::Scale { signal: name, factor, offset });
+        }
+        let place = Place {
+            id: self.id(message)?,
+            frame_bytes: u8::try_from(message.size).unwrap_or(u8::MAX),
+            layout,
+            bits: self.bits(message, signal)?,
+            factor: signal.factor,
+            offset: signal.offset,
+            switch: self.switch(message, signal)?,
+        };
+        Ok(Signal { name, unit: signal.unit.clone(), place })
+    }
+
+    fn id(&self, message: &can_dbc::Message) -> Result<CanId, DbcError> {
+        let wrong = |id: u64| DbcError::Id { message: message.name.clone(), id };
+        if let Some(id) = self.wide_ids.get(&message.name) {
+            return Err(wrong(*id));
+        }
+        match message.id {
+            MessageId::Standard(id) if u32::from(id) <= MOST_STANDARD => Ok(CanId::Standard(id)),
+            MessageId::Standard(id) => Err(wrong(u64::from(id))),
+            MessageId::Extended(id) => Ok(CanId::Extended(id)),
+        }
+    }
+
+    fn bits(&self, message: &can_dbc::Message, signal: &can_dbc::Signal) -> Result<Bits, DbcError> {
+        let types = self.dbc.signal_extended_value_type_list.iter();
+        let mut own = types.filter(|t| t.message_id == message.id && t.signal_name == signal.name);
+        let wrong = || DbcError::Float { signal: signal.name.clone(), size: signal.size };
+        match own.next().map(|own| own.signal_extended_value_type) {
+            Some(SignalExtendedValueType::IEEEfloat32Bit) if signal.size == 32 => Ok(Bits::Float32),
+            Some(SignalExtendedValueType::IEEEdouble64bit) if signal.size == 64 => Ok(Bits::Float64),
+            Some(SignalExtendedValueType::IEEEfloat32Bit | SignalExtendedValueType::IEEEdouble64bit) => {
+                Err(wrong())
+            }
+            _ if signal.value_type == ValueType::Signed => Ok(Bits::Signed),
+            _ => Ok(Bits::Unsigned),
+        }
+    }
+
+    fn switch(
+        &self,
+        message: &can_dbc::Message,
+        signal: &can_dbc::Signal,
+    ) -> Result<Option<(Layout, u64)>, DbcError> {
+        let wrong = || DbcError::Multiplexed { signal: signal.name.clone() };
+        let extended = &self.dbc.extended_multiplex;
+        if extended.iter().any(|e| e.message_id == message.id && e.signal_name == signal.name) {
+            return Err(wrong());
+        }
+        let value = match signal.multiplexer_indicator {
+            MultiplexIndicator::Plain | MultiplexIndicator::Multiplexor => return Ok(None),
+            MultiplexIndicator::MultiplexedSignal(value) => value,
+            MultiplexIndicator::MultiplexorAndMultiplexedSignal(_) => return Err(wrong()),
+        };
+        let is_switch = |s: &&can_dbc::Signal| s.multiplexer_indicator == MultiplexIndicator::Multiplexor;
+        let mut switches = message.signals.iter().filter(is_switch);
+        match (switches.next(), switches.next()) {
+            (Some(switch), None) => Ok(Some((layout(message, switch)?, value))),
+            _ => Err(wrong()),
+        }
+    }
+}
+
+fn layout(message: &can_dbc::Message, signal: &can_dbc::Signal) -> Result<Layout, DbcError> {
+    let (order, digit) = match signal.byte_order {
+        ByteOrder::LittleEndian => (Order::Intel, 1),
+        ByteOrder::BigEndian => (Order::Motorola, 0),
+    };
+    let bytes = usize::try_from(message.size).ok().filter(|bytes| *bytes <= DATA_BYTES);
+    let layout = bytes.and_then(|bytes| Layout::new(signal.start_bit, signal.size, order, bytes));
+    layout.ok_or_else(|| DbcError::Wide {
+        signal: signal.name.clone(),
+        start: signal.start_bit,
+        size: signal.size,
+        order: digit,
+        frame_bytes: message.size,
+    })
+}
+
+/// Messages whose identifier is no extended one and has more than 16 bits.
+fn wide_ids(text: &str) -> BTreeMap<String, u64> {
+    let message = |line: &str| {
+        let (id, rest) =
+            line.trim_start().strip_prefix("BO_ ")?.trim_start().split_once(char::is_whitespace)?;
+        let id: u64 = id.parse().ok()?;
+        let name = rest.trim_start().split([':', ' ', '\t']).next()?;
+        (id & EXTENDED == 0 && id > u64::from(u16::MAX)).then(|| (name.to_owned(), id))
+    };
+    text.lines().filter_map(message).collect()
+}
+
+/// The parser's words for people: the line, and what stands there.
+fn named(text: &str, error: &can_dbc::DbcError) -> DbcError {
+    let words = error.to_string();
+    let line = if matches!(error, can_dbc::DbcError::Pest(_)) {
+        // ` --> 3:1` is the only way to the line that doesn't need the parser's own parser by name.
+        let at = words.split_once("--> ").and_then(|(_, at)| at.split(':').next());
+        at.and_then(|line| line.trim().parse().ok()).unwrap_or(1)
+    } else {
+        // The others name the text that they are about.
+        let value = words.split('\'').nth(1).or_else(|| words.rsplit(' ').next());
+        let holds = |line: &str| value.is_some_and(|value| !value.is_empty() && line.contains(value));
+        text.lines().position(holds).map_or(1, |line| line + 1)
+    };
+    let there: String =
+        text.lines().nth(line.saturating_sub(1)).unwrap_or_default().trim().chars().take(60).collect();
+    let problem = match error {
+        can_dbc::DbcError::Pest(_) if there.is_empty() => {
+            "it ends, or is empty, where more is wanted".to_owned()
+        }
+        can_dbc::DbcError::Pest(_) => format!("{there:?} is not as DBC has it"),
+        _ => words,
+    };
+    DbcError::Parse { line, problem }
+}
+
+fn listed(names: &[&str]) -> String {
+    match names.get(..MOST_NAMES) {
+        None if names.is_empty() => "none at all".to_owned(),
+        None => names.join(", "),
+        Some(first) => format!("{} and {} more", first.join(", "), names.len() - first.len()),
+    }
+}
