@@ -189,3 +189,30 @@ fn a_build_without_meshes_says_so() {
         &["scene.toml:12: tunnel.features[0].kind = \"mesh\"", "cargo build --features mesh"],
     );
 }
+
+#[test]
+fn a_report_finds_the_drifts_that_clocks_were_given() {
+    let folder = Folder::new();
+    folder
+        .write("vehicle.toml", VEHICLE.replace("counts_per_metre", "clock_ms_offset = 7\ncounts_per_metre"));
+    let jitter = "line_delay = { jitter_ms = 2 }";
+    for (ppm, of_one) in [(250.0, 400.0), (-400.0, -250.0)] {
+        let drift = format!(
+            "[[effects.clock_drift]]\nppm = {ppm:?}\nsensors = [\"imu\"]\n\
+             [[effects.clock_drift]]\nppm = {of_one:?}\nsensors = [\"tether\"]"
+        );
+        lines(&folder, &format!("{jitter}\n{drift}"), &[]);
+        let (_, report) = folder.replay("dive.mcap", &[]);
+        for (id, ppm) in [("imu", ppm), ("tether", of_one)] {
+            let sources = report["sources"].as_array().unwrap();
+            let clock = &sources.iter().find(|source| source["id"] == id).unwrap()["device_clock"];
+            let number = |key: &str| clock[key].as_f64().unwrap();
+            assert_eq!((&clock["restarts"], &clock["jumps"]), (&0.into(), &0.into()), "{id}");
+            // An effect's seconds are longer than true ones by so much: its clock is slow.
+            let (error, sd) = (number("drift_ppm") + ppm, number("drift_sd_ppm"));
+            assert!(error.abs() < 5.0 * sd && sd < 30.0, "{id}: {clock}");
+        }
+        let depth = report["sources"].as_array().unwrap().iter().find(|source| source["id"] == "depth");
+        assert!(depth.unwrap()["device_clock"].is_null());
+    }
+}
