@@ -41,8 +41,12 @@ fn stands(scene: &Scene, args: &Emulate) -> Result<Vec<Stand>, Failure> {
     let mut stands = Vec::new();
     for (config, device) in scene.vehicle.sensor_configs.iter().zip(&scene.vehicle.sensors) {
         let asked = Connect::parse(&config.connect).and_then(|connect| connect.among(device.carriers()));
-        let carrier = asked.map_or(Carrier::Udp, |connect| connect.carrier());
-        let stand = Stand::new(carrier, args.listen).or_else(|error| {
+        let carrier = asked.as_ref().map_or(Carrier::Udp, Connect::carrier);
+        let stand = match (asked, device.report_descriptor()) {
+            (Ok(Connect::Hid(identity)), Some(descriptor)) => Stand::hid(&identity, &descriptor),
+            _ => Stand::new(carrier, args.listen),
+        };
+        let stand = stand.or_else(|error| {
             eprintln!("headrace: {}: no {} here ({error}); UDP takes its place", config.id, carrier.as_str());
             Stand::new(Carrier::Udp, args.listen)
         });
@@ -54,10 +58,10 @@ fn stands(scene: &Scene, args: &Emulate) -> Result<Vec<Stand>, Failure> {
 /// Writes the vehicle file of the rehearsal and the files that it names.
 fn write_vehicle(scene: &Scene, stands: &[Stand], folder: &Path, file: &Path) -> Result<(), Failure> {
     let failed = |path: &Path, source| Failure::Write { path: path.to_owned(), source };
-    let mut changes = String::new();
-    for (config, stand) in scene.vehicle.sensor_configs.iter().zip(stands) {
-        changes += &format!("sensors.{}.connect = \"{}\"\n", config.id, stand.connect());
-    }
+    let ids = scene.vehicle.sensor_configs.iter().map(|config| &config.id);
+    let changed =
+        ids.zip(stands).map(|(id, stand)| format!("sensors.{id}.connect = \"{}\"\n", stand.connect()));
+    let changes: String = changed.collect();
     let section = Document::new("rehearsal", &changes).root()?;
     let text = config::changed(&scene.vehicle_text, &section)?;
     std::fs::create_dir_all(folder).map_err(|source| failed(folder, source))?;

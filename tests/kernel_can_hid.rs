@@ -17,8 +17,8 @@ use std::process::Command;
 use std::thread;
 use std::time::{Duration, SystemTime};
 
+use headrace_ports::uhid::{Identity, PATH, VirtualDevice};
 use headrace_tether_hid::report::REFERENCE_DESCRIPTOR;
-use headrace_tether_hid::uhid::{Identity, PATH, VirtualDevice};
 use hidapi::{DeviceInfo, HidApi, HidDevice};
 use socketcan::{CanFrame, CanSocket, EmbeddedFrame, Socket, SocketOptions, StandardId};
 

@@ -46,6 +46,11 @@ pub trait Device: Plugin + Send + Sync {
     /// The device's side of the wire, for simulations.
     fn emulator(&self, setup: &EmulatorSetup) -> Emulated;
 
+    /// For a HID device, the report descriptor by which a rehearsal introduces it to the kernel.
+    fn report_descriptor(&self) -> Option<Vec<u8>> {
+        None
+    }
+
     /// What may carry its bytes. UDP may stand in for any of them, a message a datagram.
     fn carriers(&self) -> &'static [Carrier];
 

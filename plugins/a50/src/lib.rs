@@ -6,6 +6,7 @@
 #![cfg_attr(not(test), warn(clippy::indexing_slicing))]
 
 pub mod decoder;
+pub mod driver;
 pub mod emulator;
 pub mod json;
 pub mod plugin;

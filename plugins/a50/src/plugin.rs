@@ -3,10 +3,12 @@
 use headrace_core::app::App;
 use headrace_core::app::components::VelocityLog;
 use headrace_core::app::device::{Device, DeviceKind, Emulated, EmulatorSetup, Sense};
+use headrace_core::app::driver::{Carrier, Driver, DriverSetup};
 use headrace_core::app::plugin::{Plugin, PluginError};
 use headrace_core::config::{ConfigError, Section, SensorConfig};
 
 use crate::decoder::{A50Decoder, Meaning};
+use crate::driver;
 use crate::emulator::{A50Emulator, Simulated};
 
 /// Name in vehicle files.
@@ -58,5 +60,13 @@ impl Device for A50 {
 
     fn emulator(&self, setup: &EmulatorSetup) -> Emulated {
         Emulated::VelocityLog(Box::new(A50Emulator::new(self.emulated, setup.start)))
+    }
+
+    fn carriers(&self) -> &'static [Carrier] {
+        &driver::CARRIERS
+    }
+
+    fn driver(&self, _: &DriverSetup) -> Box<dyn Driver> {
+        Box::new(driver::listener())
     }
 }

@@ -61,7 +61,7 @@ fn good() -> Velocity {
 
 #[test]
 fn velocities_come_back_at_their_own_times() {
-    let setup = EmulatorSetup { start: START, head: None, site: Site::default() };
+    let setup = EmulatorSetup { start: START, head: None, site: Site::default(), polled: true };
     let device = configured("rate_hz = 12.5\n").unwrap();
     assert_eq!(device.sense(), Sense::Velocity);
     let Emulated::VelocityLog(mut emulator) = device.emulator(&setup) else { panic!() };
@@ -87,7 +87,7 @@ fn velocities_come_back_at_their_own_times() {
 
 #[test]
 fn a_vehicle_that_stands_is_heard_each_time() {
-    let setup = EmulatorSetup { start: START, head: None, site: Site::default() };
+    let setup = EmulatorSetup { start: START, head: None, site: Site::default(), polled: true };
     let Emulated::VelocityLog(mut emulator) = configured("").unwrap().emulator(&setup) else { panic!() };
     let (mut due, mut heard, mut decoder) = (Vec::new(), 0, decoder());
     emulator.begin(START + DurNs::from_millis(1000), &mut due);

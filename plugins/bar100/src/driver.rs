@@ -81,16 +81,13 @@ impl Driver for Bar100Driver {
 
     fn wake(&mut self, now: MonoNs, wire: &mut dyn Wire) {
         // What doesn't answer at all is asked again, too.
-        match CALIBRATION_CELLS.get(self.cell) {
-            Some(cell) => {
-                self.next_at = now + RETRY;
-                wire.exchange(&[*cell], MEMORY_SETTLES, MEMORY_BYTES - 1);
-            }
-            None => {
-                let next = self.next_at + self.period;
-                self.next_at = if next > now { next } else { now + self.period };
-                wire.exchange(&[MEASURE], CONVERSION, MEASURE_BYTES - 1);
-            }
+        if let Some(cell) = CALIBRATION_CELLS.get(self.cell) {
+            self.next_at = now + RETRY;
+            wire.exchange(&[*cell], MEMORY_SETTLES, MEMORY_BYTES - 1);
+        } else {
+            let next = self.next_at + self.period;
+            self.next_at = if next > now { next } else { now + self.period };
+            wire.exchange(&[MEASURE], CONVERSION, MEASURE_BYTES - 1);
         }
     }
 

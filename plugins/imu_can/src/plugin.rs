@@ -2,9 +2,8 @@
 
 use headrace_core::app::App;
 use headrace_core::app::components::Imu;
-use headrace_core::app::device::{Device, DeviceKind, Emulated, EmulatorSetup, Sense};
-use headrace_core::app::driver::{Carrier, Driver, DriverSetup};
 use headrace_core::app::device::{Decoder, Device, DeviceKind, Emulated, EmulatorSetup, Sense};
+use headrace_core::app::driver::{Carrier, Driver, DriverSetup};
 use headrace_core::app::plugin::{Plugin, PluginError};
 use headrace_core::config::{ConfigError, Section, SensorConfig};
 use headrace_core::time::DurNs;

@@ -9,6 +9,7 @@
 
 pub mod checksum;
 pub mod decoder;
+pub mod driver;
 pub mod emulator;
 pub mod frame;
 pub mod message;

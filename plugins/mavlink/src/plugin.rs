@@ -3,10 +3,12 @@
 use headrace_core::app::App;
 use headrace_core::app::components::{DepthSensor, Echosounder, Imu};
 use headrace_core::app::device::{Device, DeviceKind, Emulated, EmulatorSetup, Sense};
+use headrace_core::app::driver::{Carrier, Driver, DriverSetup};
 use headrace_core::app::plugin::{Plugin, PluginError};
 use headrace_core::config::{ConfigError, Section, SensorConfig};
 
 use crate::decoder::{DistancePart, MavlinkDecoder, Meaning, Part};
+use crate::driver::{self, MavlinkDriver};
 use crate::emulator::AutopilotEmulator;
 use crate::message::{ImuMessage, PressureMessage};
 
@@ -136,5 +138,13 @@ impl Device for Autopilot {
             Part::Pressure { .. } => Emulated::Depth(emulator),
             Part::Distance(_) => Emulated::Echosounder(emulator),
         }
+    }
+
+    fn carriers(&self) -> &'static [Carrier] {
+        &driver::CARRIERS
+    }
+
+    fn driver(&self, _: &DriverSetup) -> Box<dyn Driver> {
+        Box::new(MavlinkDriver::new(self.meaning))
     }
 }

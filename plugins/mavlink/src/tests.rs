@@ -98,7 +98,12 @@ fn emulated<M: Measurement>(
 }
 
 fn setup() -> EmulatorSetup {
-    EmulatorSetup { start: START, head: None, site: Site { sound_speed_mps: 1450.0, ..Site::default() } }
+    EmulatorSetup {
+        start: START,
+        head: None,
+        site: Site { sound_speed_mps: 1450.0, ..Site::default() },
+        polled: true,
+    }
 }
 
 /// A vehicle that yaws to the left, nose down and heeling; it doesn't accelerate.

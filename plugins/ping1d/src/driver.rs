@@ -37,7 +37,7 @@ pub struct PingDriver {
     settings: Settings,
     cutter: Cutter<Frames, MAX_FRAME_BYTES>,
     /// Messages that come before the next distance.
-    to_say: VecDeque<Message>,
+    to_say: VecDeque<(Asked, Vec<u8>)>,
     asked: Option<(Asked, MonoNs)>,
     next_at: MonoNs,
     look_at: MonoNs,
@@ -61,60 +61,62 @@ impl PingDriver {
     }
 
     /// What a device is told and asked when its line has been opened.
-    fn greeting(&self) -> VecDeque<Message> {
-        let continuous = self.settings.polling == Polling::Continuous;
-        let interval_ms = u16::try_from(self.settings.interval.0 / 1_000_000).unwrap_or(u16::MAX);
-        let mut messages: VecDeque<Message> = [
-            Message::GeneralRequest(id::PROTOCOL_VERSION),
-            Message::GeneralRequest(id::DEVICE_INFORMATION),
-            Message::ContinuousStop(id::PROFILE),
-            self.sound_speed(),
-            Message::SetPingInterval(interval_ms),
-        ]
-        .into();
-        if let Some(scan) = self.settings.scan {
-            messages.push_back(Message::SetModeAuto(false));
-            messages.push_back(Message::SetRange(scan));
+    fn greet(&mut self) {
+        let settings = self.settings;
+        let interval_ms = u16::try_from(settings.interval.0 / 1_000_000).unwrap_or(u16::MAX);
+        self.to_say.clear();
+        self.will_say(&Message::GeneralRequest(id::PROTOCOL_VERSION));
+        self.will_say(&Message::GeneralRequest(id::DEVICE_INFORMATION));
+        self.will_say(&Message::ContinuousStop(id::PROFILE));
+        self.will_say(&Message::SetSpeedOfSound(settings.sound_speed_mmps()));
+        self.will_say(&Message::SetPingInterval(interval_ms));
+        if let Some(scan) = settings.scan {
+            self.will_say(&Message::SetModeAuto(false));
+            self.will_say(&Message::SetRange(scan));
         }
-        messages.extend(self.settings.gain.map(Message::SetGain));
-        messages.push_back(Message::SetPingEnable(true));
-        if continuous {
-            messages.push_back(Message::ContinuousStart(id::PROFILE));
+        if let Some(gain) = settings.gain {
+            self.will_say(&Message::SetGain(gain));
         }
-        messages
-    }
-
-    fn sound_speed(&self) -> Message {
-        Message::SetSpeedOfSound(self.settings.sound_speed_mmps())
-    }
-
-    fn say(&mut self, message: Message, asked: Asked, now: MonoNs, wire: &mut dyn Wire) {
-        let addressed = Addressed { source: 0, destination: self.settings.device_id, message };
-        // What a host says is far shorter than the longest frame.
-        if let Ok(bytes) = addressed.encode() {
-            wire.send(bytes.as_slice());
-            self.asked = Some((asked, now));
+        self.will_say(&Message::SetPingEnable(true));
+        if settings.polling == Polling::Continuous {
+            self.will_say(&Message::ContinuousStart(id::PROFILE));
         }
     }
 
+    fn will_say(&mut self, message: &Message) {
+        let about = if let Message::GeneralRequest(about) = message { *about } else { message.id() };
+        self.to_say.extend(self.encoded(message).map(|bytes| (Asked::Setting(about), bytes)));
+    }
+
+    /// A message to the device; what a host says is far shorter than the longest frame.
+    fn encoded(&self, message: &Message) -> Option<Vec<u8>> {
+        let addressed = Addressed { source: 0, destination: self.settings.device_id, message: *message };
+        addressed.encode().ok().map(|bytes| bytes.as_slice().to_vec())
+    }
+
+    /// Says what is to be said, or asks for a distance that is due.
     fn next(&mut self, now: MonoNs, wire: &mut dyn Wire) {
         if now >= self.look_at {
             self.look_at = now + LOOK_PERIOD;
-            self.to_say.push_back(Message::GeneralRequest(id::SPEED_OF_SOUND));
+            self.will_say(&Message::GeneralRequest(id::SPEED_OF_SOUND));
         }
-        if let Some(message) = self.to_say.pop_front() {
-            let about = if let Message::GeneralRequest(about) = message { about } else { message.id() };
-            self.say(message, Asked::Setting(about), now, wire);
-        } else if self.settings.polling == Polling::Asked && now >= self.next_at {
+        let is_due = self.settings.polling == Polling::Asked && now >= self.next_at;
+        if self.to_say.is_empty() && is_due {
             let next = self.next_at + self.settings.interval;
             self.next_at = if next > now { next } else { now + self.settings.interval };
-            self.say(Message::GeneralRequest(id::DISTANCE), Asked::Distance, now, wire);
+            let question = self.encoded(&Message::GeneralRequest(id::DISTANCE));
+            self.to_say.extend(question.map(|bytes| (Asked::Distance, bytes)));
+        }
+        if let Some((asked, bytes)) = self.to_say.pop_front() {
+            wire.send(&bytes);
+            self.asked = Some((asked, now));
         }
     }
 
     /// A message of the device, or of what was taken for it.
     fn answered(&mut self, frame: &Frame<'_>) {
-        let answers = |asked: Asked| self.asked.is_some_and(|(awaited, _)| awaited == asked);
+        let awaited = self.asked;
+        let answers = |asked: Asked| awaited.is_some_and(|(awaited, _)| awaited == asked);
         let done = match Message::decode(frame) {
             Ok(Message::Ack(about)) => answers(Asked::Setting(about)),
             Ok(Message::Nack { nacked_id, text }) => {
@@ -131,7 +133,7 @@ impl PingDriver {
             }
             Ok(Message::SpeedOfSound(mmps)) => {
                 if mmps != self.settings.sound_speed_mmps() {
-                    self.to_say.push_back(self.sound_speed());
+                    self.will_say(&Message::SetSpeedOfSound(self.settings.sound_speed_mmps()));
                 }
                 answers(Asked::Setting(id::SPEED_OF_SOUND))
             }
@@ -165,7 +167,7 @@ impl PingDriver {
 impl Driver for PingDriver {
     fn opened(&mut self, now: MonoNs, wire: &mut dyn Wire) {
         self.cutter.flush(&mut |piece| wire.deliver(piece.received, piece.bytes));
-        self.to_say = self.greeting();
+        self.greet();
         self.device = None;
         self.refused = None;
         self.asked = None;

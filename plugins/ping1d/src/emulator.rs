@@ -136,9 +136,9 @@ impl PingEmulator {
         (1..=SCAN.length_mm).contains(&mm).then_some(mm)
     }
 
-    fn say(&self, at: MonoNs, message: Message, line: LineSink<'_>) {
-        if let Ok(answer) = (Addressed { source: self.settings.device_id, destination: 0, message }).encode()
-        {
+    fn say(&self, at: MonoNs, message: &Message, line: LineSink<'_>) {
+        let answer = Addressed { source: self.settings.device_id, destination: 0, message: *message };
+        if let Ok(answer) = answer.encode() {
             line(Direction::Received, at + self.latency, answer.as_slice());
         }
     }
@@ -172,7 +172,7 @@ impl Emulator<Sounding> for PingEmulator {
         for Addressed { destination, message, .. } in heard {
             let meant = [self.settings.device_id, EVERYONE].contains(&destination);
             if let Some(answer) = meant.then(|| self.answer_to(at, &message)).flatten() {
-                self.say(at, answer, line);
+                self.say(at, &answer, line);
             }
         }
     }
@@ -189,7 +189,7 @@ impl Emulator<Sounding> for PingEmulator {
         }
         let distance_mm = self.distance_mm(sounding.range_m);
         let message = self.telling(about, distance_mm);
-        self.say(sounding.at, message, line);
+        self.say(sounding.at, &message, line);
     }
 }
 

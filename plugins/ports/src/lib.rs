@@ -10,6 +10,7 @@ mod service;
 mod stand;
 mod status;
 mod trouble;
+pub mod uhid;
 
 pub use clock::{clock_anchor, now, of_wall};
 pub use crew::{Crew, Hand};

@@ -7,13 +7,14 @@ use std::net::{IpAddr, SocketAddr, TcpListener, TcpStream, UdpSocket};
 use std::os::fd::{AsFd, BorrowedFd};
 
 use headrace_core::app::driver::Carrier;
-use headrace_core::config::{Connect, SerialPort};
+use headrace_core::config::{Connect, SerialPort, UsbIdentity};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 
 use crate::lines::READ_BYTES;
+use crate::uhid::{self, Identity, VirtualDevice};
 
 /// Rate that a rehearsed serial port is opened at.
 const BAUD: u32 = 115_200;
@@ -39,6 +40,7 @@ enum End {
     },
     #[cfg(target_os = "linux")]
     Can(socketcan::CanSocket),
+    Hid(VirtualDevice<File>),
 }
 
 /// The most hosts that a rehearsed bridge answers.
@@ -62,6 +64,20 @@ impl Stand {
         }
     }
 
+    /// A HID device of this identity, made by the kernel.
+    ///
+    /// Errors: this kernel makes none, or not for this user.
+    pub fn hid(identity: &UsbIdentity, descriptor: &[u8]) -> io::Result<Self> {
+        let kernel = File::options().read(true).write(true).open(uhid::PATH)?;
+        let serial = identity.serial.as_deref().unwrap_or_default();
+        let (vendor_id, product_id) = (identity.vendor, identity.product);
+        let identity = Identity { name: "headrace rehearsal", serial, vendor_id, product_id, descriptor };
+        let device = VirtualDevice::plug(kernel, &identity).map_err(io::Error::other)?;
+        let serial = (!serial.is_empty()).then(|| serial.to_owned());
+        let connect = Connect::Hid(UsbIdentity { vendor: vendor_id, product: product_id, serial });
+        Ok(Self { end: End::Hid(device), connect })
+    }
+
     /// How the host opens the other end.
     pub fn connect(&self) -> &Connect {
         &self.connect
@@ -80,6 +96,7 @@ impl Stand {
             End::Udp { peers, .. } => !peers.is_empty(),
             #[cfg(target_os = "linux")]
             End::Can(_) => true,
+            End::Hid(_) => true,
         }
     }
 
@@ -113,6 +130,8 @@ impl Stand {
             }),
             #[cfg(target_os = "linux")]
             End::Can(_) => return Ok(None),
+            // The kernel says who opens the device and the like.
+            End::Hid(_) => return Ok(None),
         };
         match read {
             Ok(count) => Ok(buffer.get(..count).map(<[u8]>::to_vec)),
@@ -134,6 +153,7 @@ impl Stand {
             }
             #[cfg(target_os = "linux")]
             End::Can(socket) => crate::lines::can::write(socket, bytes),
+            End::Hid(device) => device.report(bytes).map_err(io::Error::other),
         };
         match written {
             Err(error) if is_gone(&error) || error.kind() == io::ErrorKind::WouldBlock => Ok(()),
@@ -150,6 +170,7 @@ impl Stand {
             End::Udp { socket, .. } => vec![socket.as_fd()],
             #[cfg(target_os = "linux")]
             End::Can(socket) => vec![socket.as_fd()],
+            End::Hid(_) => Vec::new(),
         }
     }
 }

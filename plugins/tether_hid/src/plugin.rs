@@ -184,6 +184,13 @@ impl Device for CableCounter {
         }
     }
 
+    fn report_descriptor(&self) -> Option<Vec<u8>> {
+        match &self.wire {
+            Wire::Hid { counter, .. } => Some(counter.layout.descriptor()),
+            Wire::Line { .. } => None,
+        }
+    }
+
     fn carriers(&self) -> &'static [Carrier] {
         match &self.wire {
             Wire::Hid { .. } => &driver::REPORT_CARRIERS,

@@ -153,6 +153,22 @@ impl ReportLayout {
         auxiliary_offset: Some(7),
     };
 
+    /// A descriptor of a vendor's device whose one report is as long as this layout's, and has its id.
+    ///
+    /// Source: USB HID 1.11, 6.2.2: usage page, usage, collection, id, usage, limits, size, count, input, end.
+    pub fn descriptor(&self) -> Vec<u8> {
+        if *self == Self::REFERENCE {
+            return REFERENCE_DESCRIPTOR.to_vec();
+        }
+        let mut descriptor = vec![0x06, 0x00, 0xFF, 0x09, 0x01, 0xA1, 0x01];
+        descriptor.extend(self.report_id.iter().flat_map(|id| [0x85, *id]));
+        let count = self.report_bytes - usize::from(self.report_id.is_some()).min(self.report_bytes);
+        descriptor.extend([0x09, 0x02, 0x15, 0x00, 0x26, 0xFF, 0x00, 0x75, 0x08, 0x95]);
+        descriptor.push(u8::try_from(count).unwrap_or(u8::MAX));
+        descriptor.extend([0x81, 0x02, 0xC0]);
+        descriptor
+    }
+
     /// Checks that every field lies within the report and none on another.
     ///
     /// Errors: a length that no report has, a field outside, an overlap.

@@ -54,13 +54,13 @@ const NEVER: MonoNs = MonoNs(u64::MAX);
 
 /// Who asks the devices for measurements.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Asked {
+enum Asker {
     /// Emulated hosts.
-    ByItself,
+    Itself,
     /// The same, and the truth is kept.
-    ByItselfNoting,
+    Noted,
     /// Real ones.
-    ByHosts,
+    Hosts,
 }
 
 /// A dive that is being simulated: messages in the order of (time, source, sequence).
@@ -81,7 +81,7 @@ impl Simulation {
     ///
     /// Errors: effects that contradict each other or the scene; a way through a wall.
     pub fn new(scene: &Scene) -> Result<Self, SceneError> {
-        Self::assemble(scene, Asked::ByItself)
+        Self::assemble(scene, Asker::Itself)
     }
 
     /// A simulation whose devices do what hosts ask of them through [`Simulation::hear`], while time goes on as
@@ -89,7 +89,7 @@ impl Simulation {
     ///
     /// Errors: as for [`Simulation::new`].
     pub fn for_hosts(scene: &Scene) -> Result<Self, SceneError> {
-        let mut simulation = Self::assemble(scene, Asked::ByHosts)?;
+        let mut simulation = Self::assemble(scene, Asker::Hosts)?;
         simulation.set_out(NEVER);
         Ok(simulation)
     }
@@ -98,7 +98,7 @@ impl Simulation {
     ///
     /// Errors: as for [`Simulation::new`].
     pub fn with_truth(scene: &Scene) -> Result<Self, SceneError> {
-        Self::assemble(scene, Asked::ByItselfNoting)
+        Self::assemble(scene, Asker::Noted)
     }
 
     /// The same in slices of another length, of which nothing may depend.
@@ -107,8 +107,8 @@ impl Simulation {
         Self { slice, ..self }
     }
 
-    fn assemble(scene: &Scene, asked: Asked) -> Result<Self, SceneError> {
-        let noting = asked == Asked::ByItselfNoting;
+    fn assemble(scene: &Scene, asker: Asker) -> Result<Self, SceneError> {
+        let noting = asker == Asker::Noted;
         let mut world = World::new();
         world.insert_resource(Slice { from: START, until: START });
         world.insert_resource(Scenery {
@@ -118,7 +118,7 @@ impl Simulation {
             sets_out: None,
         });
         let (facts, drawn) = programmed(scene);
-        let entities = spawn_sensors(&mut world, scene, &facts, asked);
+        let entities = spawn_sensors(&mut world, scene, &facts, asker);
         if noting {
             world.insert_resource(Notes::default());
         }
@@ -214,6 +214,7 @@ impl Simulation {
         hear::<Pressure>(&mut self.world, entity, at, bytes);
         hear::<Inertia>(&mut self.world, entity, at, bytes);
         hear::<Payout>(&mut self.world, entity, at, bytes);
+        hear::<GroundVelocity>(&mut self.world, entity, at, bytes);
     }
 
     /// The vehicle sets out at `at`; the dive ends when its way does.
@@ -287,8 +288,8 @@ fn programmed(scene: &Scene) -> (Facts, Vec<(&'static str, String)>) {
     (facts, drawn)
 }
 
-fn spawn_sensors(world: &mut World, scene: &Scene, facts: &Facts, asked: Asked) -> Vec<Entity> {
-    let (noting, polled) = (asked == Asked::ByItselfNoting, asked != Asked::ByHosts);
+fn spawn_sensors(world: &mut World, scene: &Scene, facts: &Facts, asker: Asker) -> Vec<Entity> {
+    let (noting, polled) = (asker == Asker::Noted, asker != Asker::Hosts);
     let sensors = scene.vehicle.sensors.iter().zip(&scene.vehicle.sensor_configs).zip(&facts.sensors);
     let site = scene.vehicle.site;
     let mut entities = Vec::new();

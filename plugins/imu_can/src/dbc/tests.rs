@@ -423,7 +423,8 @@ fn an_emulated_unit_comes_back_by_its_dbc() {
     ];
     for (name, text, own, readings) in cases {
         let device = configured(&format!("rate_hz = 50\ndbc = {name:?}\n{own}")).unwrap();
-        let setup = EmulatorSetup { start: MonoNs(7_000_000), head: None, site: Site::default() };
+        let setup =
+            EmulatorSetup { start: MonoNs(7_000_000), head: None, site: Site::default(), polled: true };
         let Emulated::Inertial(mut emulator) = device.emulator(&setup) else { panic!() };
         let mut decoder = DbcDecoder::new(&mapped(text, &own).unwrap());
         let mut due = Vec::new();

@@ -62,7 +62,7 @@ impl Rig {
         self.heard.extend(ends.heard.iter().map(|(at, bytes)| (*at, message(bytes))));
         for bytes in ends.sent {
             self.sent.push(message(&bytes));
-            if self.loses == 0 || self.sent.len() % self.loses != 0 {
+            if self.loses == 0 || !self.sent.len().is_multiple_of(self.loses) {
                 let line = &mut self.line;
                 self.device.hear(self.now, &bytes, &mut |_, at, bytes| line.push((at, bytes.to_vec())));
             }
@@ -110,16 +110,13 @@ fn settings_come_first_and_then_a_distance_each_interval() {
     let mut rig = Rig::new("interval_ms = 50\nsound_speed_mps = 1447\nscan_m = 8\ngain = 2", 0);
     rig.run(10.0);
     assert!((190..=200).contains(&rig.distances()), "{}", rig.distances());
-    for wanted in [
-        Message::SetSpeedOfSound(1_447_000),
-        Message::SetPingInterval(50),
-        Message::SetModeAuto(false),
-        Message::SetRange(crate::codec::ScanRange { start_mm: 0, length_mm: 8000 }),
-        Message::SetGain(2),
-        Message::SetPingEnable(true),
-    ] {
-        assert_eq!(rig.sent.iter().filter(|sent| **sent == wanted).count(), 1, "{wanted:?}");
-    }
+    let said = |wanted: &Message| rig.sent.iter().filter(|sent| *sent == wanted).count();
+    assert_eq!(said(&Message::SetSpeedOfSound(1_447_000)), 1);
+    assert_eq!(said(&Message::SetPingInterval(50)), 1);
+    assert_eq!(said(&Message::SetModeAuto(false)), 1);
+    assert_eq!(said(&Message::SetRange(crate::codec::ScanRange { start_mm: 0, length_mm: 8000 })), 1);
+    assert_eq!(said(&Message::SetGain(2)), 1);
+    assert_eq!(said(&Message::SetPingEnable(true)), 1);
     assert!(rig.heard.iter().all(|(_, message)| !matches!(message, Message::Nack { .. })));
     let standing = rig.driver.standing();
     assert_eq!(standing.identity.as_deref(), Some("Ping echosounder, revision 1, firmware 3.29.0"));

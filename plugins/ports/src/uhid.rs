@@ -157,14 +157,18 @@ fn send(kernel: &mut impl Write, name: &'static str, event: &[u8]) -> Result<(),
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::REFERENCE_DESCRIPTOR;
+    /// A vendor's device with reports of two bytes.
+    const DESCRIPTOR: [u8; 21] = [
+        0x06, 0x00, 0xFF, 0x09, 0x01, 0xA1, 0x01, 0x09, 0x02, 0x15, 0x00, 0x26, 0xFF, 0x00, 0x75, 0x08, 0x95,
+        0x02, 0x81, 0x02, 0xC0,
+    ];
 
     const COUNTER: Identity<'static> = Identity {
         name: "tether counter",
         serial: "HR-0001",
         vendor_id: 0x1209,
         product_id: 0x0001,
-        descriptor: &REFERENCE_DESCRIPTOR,
+        descriptor: &DESCRIPTOR,
     };
 
     /// A kernel that keeps each write by itself, and takes at most so many bytes of one.
@@ -195,7 +199,7 @@ mod tests {
     #[test]
     fn each_thing_stands_where_the_kernel_looks_for_it() {
         let event = created(&COUNTER);
-        assert_eq!(event.len(), 280 + 59);
+        assert_eq!(event.len(), 280 + DESCRIPTOR.len());
         assert_eq!(event[0..4], 11_u32.to_ne_bytes());
         assert_eq!(event[4..18], *b"tether counter");
         assert!(event[18..132].iter().all(|byte| *byte == 0));
@@ -203,12 +207,12 @@ mod tests {
         assert!(event[140..196].iter().all(|byte| *byte == 0));
         assert_eq!(event[196..203], *b"HR-0001");
         assert!(event[203..260].iter().all(|byte| *byte == 0));
-        assert_eq!(event[260..262], 59_u16.to_ne_bytes());
+        assert_eq!(event[260..262], 21_u16.to_ne_bytes());
         assert_eq!(event[262..264], 3_u16.to_ne_bytes());
         assert_eq!(event[264..268], 0x1209_u32.to_ne_bytes());
         assert_eq!(event[268..272], 1_u32.to_ne_bytes());
         assert_eq!(event[272..280], [0; 8]);
-        assert_eq!(event[280..], REFERENCE_DESCRIPTOR);
+        assert_eq!(event[280..], DESCRIPTOR);
     }
 
     #[test]

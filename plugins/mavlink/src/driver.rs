@@ -1,0 +1,103 @@
+//! The host's side of a telemetry link: it listens for its part, and says that it is there.
+
+use headrace_core::app::device::Decoder as _;
+use headrace_core::app::driver::{Carrier, Cutter, Driver, Standing, Wire};
+use headrace_core::app::reading::Packet;
+use headrace_core::codec::Bytes;
+use headrace_core::time::{DurNs, MonoNs};
+
+use crate::decoder::{MavlinkDecoder, Meaning};
+use crate::frame::{Frame, Frames, MAX_FRAME_BYTES, Version};
+
+/// What may carry telemetry.
+pub const CARRIERS: [Carrier; 3] = [Carrier::Udp, Carrier::Tcp, Carrier::Serial];
+
+/// A frame's bytes follow one another: the longest takes 50 ms at 57,600 baud.
+const SILENCE: DurNs = DurNs::from_millis(100);
+/// Routers send only to those who speak. Source: MAVLink, heartbeat protocol, once a second.
+const HEARTBEAT_PERIOD: DurNs = DurNs::from_millis(1_000);
+const HEARTBEAT: u32 = 0;
+/// Custom mode (4 bytes), MAV_TYPE_ONBOARD_CONTROLLER, MAV_AUTOPILOT_INVALID, base mode, MAV_STATE_ACTIVE, version 3.
+const HEARTBEAT_PAYLOAD: [u8; 9] = [0, 0, 0, 0, 18, 8, 0, 4, 3];
+/// We are a part of the vehicle: MAV_COMP_ID_ONBOARD_COMPUTER.
+const COMPONENT_ID: u8 = 191;
+const SYSTEM_ID: u8 = 1;
+
+/// A part's driver. Messages of other parts aren't handed on: where several share a line, each is recorded once.
+pub struct MavlinkDriver {
+    cutter: Cutter<Frames, MAX_FRAME_BYTES>,
+    /// Tells the part's messages from others.
+    decoder: MavlinkDecoder,
+    own_frames: u64,
+    next_at: MonoNs,
+    sequence: u8,
+    system_id: u8,
+}
+
+impl MavlinkDriver {
+    /// For a part of the vehicle.
+    pub fn new(meaning: Meaning) -> Self {
+        Self {
+            cutter: Cutter::new(Frames, SILENCE),
+            decoder: MavlinkDecoder::new(meaning),
+            own_frames: 0,
+            next_at: MonoNs(0),
+            sequence: 0,
+            system_id: meaning.system_id.unwrap_or(SYSTEM_ID),
+        }
+    }
+
+    fn heartbeat(&mut self) -> Option<Bytes<MAX_FRAME_BYTES>> {
+        self.sequence = self.sequence.wrapping_add(1);
+        let frame = Frame {
+            version: Version::V2(None),
+            sequence: self.sequence,
+            system_id: self.system_id,
+            component_id: COMPONENT_ID,
+            message_id: HEARTBEAT,
+            payload: Bytes::new(&HEARTBEAT_PAYLOAD).ok()?,
+        };
+        frame.encode().ok()
+    }
+}
+
+impl Driver for MavlinkDriver {
+    fn opened(&mut self, now: MonoNs, wire: &mut dyn Wire) {
+        self.cutter.flush(&mut |piece| wire.deliver(piece.received, piece.bytes));
+        self.next_at = now;
+    }
+
+    fn heard(&mut self, received: MonoNs, bytes: &[u8], wire: &mut dyn Wire) {
+        let Self { cutter, decoder, own_frames, .. } = self;
+        cutter.push(received, bytes, &mut |piece| {
+            let before = decoder.passed_over();
+            decoder.decode(Packet { received: piece.received, bytes: piece.bytes }, &mut |_| ());
+            if !piece.is_frame || decoder.passed_over() == before {
+                *own_frames += u64::from(piece.is_frame);
+                wire.deliver(piece.received, piece.bytes);
+            }
+        });
+    }
+
+    fn due(&self) -> Option<MonoNs> {
+        Some(self.cutter.gives_up().map_or(self.next_at, |gives_up| self.next_at.min(gives_up)))
+    }
+
+    fn wake(&mut self, now: MonoNs, wire: &mut dyn Wire) {
+        self.heard(now, &[], wire);
+        if now >= self.next_at {
+            self.next_at = now + HEARTBEAT_PERIOD;
+            if let Some(bytes) = self.heartbeat() {
+                wire.send(bytes.as_slice());
+            }
+        }
+    }
+
+    fn standing(&self) -> Standing {
+        let others = self.cutter.counts().good_frames > 50 && self.own_frames == 0;
+        let complaint = others.then(|| {
+            "the autopilot speaks, but not of this part; see message and its stream rates".to_owned()
+        });
+        Standing { good_frames: self.own_frames, identity: None, complaint }
+    }
+}
