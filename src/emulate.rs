@@ -63,7 +63,7 @@ fn write_vehicle(scene: &Scene, stands: &[Stand], folder: &Path, file: &Path) ->
         ids.zip(stands).map(|(id, stand)| format!("sensors.{id}.connect = \"{}\"\n", stand.connect()));
     let changes: String = changed.collect();
     let section = Document::new("rehearsal", &changes).root()?;
-    let text = config::changed(&scene.vehicle_text, &section)?;
+    let text = config::changed(&with_connects(scene), &section)?;
     std::fs::create_dir_all(folder).map_err(|source| failed(folder, source))?;
     for (name, content) in &scene.vehicle.attachments {
         let path = folder.join(name);
@@ -73,6 +73,29 @@ fn write_vehicle(scene: &Scene, stands: &[Stand], folder: &Path, file: &Path) ->
         files::write(&path, content.as_bytes())?;
     }
     files::write(file, text.as_bytes())
+}
+
+/// The scene's vehicle file with a `connect` in each sensor's table: one that is only simulated needs none.
+fn with_connects(scene: &Scene) -> String {
+    let missing: Vec<String> = scene
+        .vehicle
+        .sensor_configs
+        .iter()
+        .filter(|config| config.connect.is_empty())
+        .map(|config| format!("\"{}\"", config.id))
+        .collect();
+    let mut text = String::new();
+    for line in scene.vehicle_text.lines() {
+        text.push_str(line);
+        let key_and_value = line.split('#').next().and_then(|line| line.split_once('='));
+        let names =
+            |(key, value): (&str, &str)| key.trim() == "id" && missing.iter().any(|id| value.trim() == id);
+        if key_and_value.is_some_and(names) {
+            text.push_str("\nconnect = \"\"");
+        }
+        text.push('\n');
+    }
+    text
 }
 
 /// Devices in a simulated tunnel, and the ports that they are on.

@@ -17,6 +17,20 @@ pub struct Site {
     pub axis_yaw_rad: f64,
 }
 
+/// Speed of sound in fresh water of 0 to 95 degrees Celsius at an absolute pressure, m/s.
+///
+/// Source: Marczak 1997, J. Acoust. Soc. Am. 102, 2776 (pure water at one atmosphere, within 0.02 m/s); depth adds 0.0163 m/s a
+/// metre, Mackenzie 1981, J. Acoust. Soc. Am. 70, 807.
+pub fn fresh_water_sound_speed_mps(temperature_degc: f64, pressure_pa: f64) -> f64 {
+    const COEFFICIENTS: [f64; 6] =
+        [1.402_385e3, 5.038_813, -5.799_136e-2, 3.287_156e-4, -1.398_845e-6, 2.787_860e-9];
+    const MPS_PER_PA: f64 = 0.0163 / 9_806.65;
+    const ATMOSPHERE_PA: f64 = 101_325.0;
+    let at_surface =
+        COEFFICIENTS.iter().rev().fold(0.0, |sum, coefficient| sum * temperature_degc + coefficient);
+    at_surface + (pressure_pa - ATMOSPHERE_PA) * MPS_PER_PA
+}
+
 impl Default for Site {
     /// Fresh water at about 10 degrees Celsius, standard gravity and atmosphere, 50 m of water above the floor.
     fn default() -> Self {
@@ -48,5 +62,22 @@ impl Site {
     /// A range that a device computed with `device_mps`, rescaled to the water's own speed of sound.
     pub fn rescaled_range_m(&self, range_m: f64, device_mps: f64) -> f64 {
         range_m * (self.sound_speed_mps / device_mps)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::fresh_water_sound_speed_mps;
+
+    /// Values of other sources: Del Grosso and Mader 1972, tables of pure water.
+    #[test]
+    fn sound_goes_as_fast_as_tables_say() {
+        for (degc, mps) in [(0.0, 1402.39), (5.0, 1426.16), (10.0, 1447.27), (20.0, 1482.34), (30.0, 1509.13)]
+        {
+            let ours = fresh_water_sound_speed_mps(degc, 101_325.0);
+            assert!((ours - mps).abs() < 0.05, "{degc}: {ours}");
+        }
+        let deep = fresh_water_sound_speed_mps(10.0, 101_325.0 + 9_806.65 * 100.0);
+        assert!((deep - 1447.27 - 1.63).abs() < 0.05, "{deep}");
     }
 }

@@ -75,6 +75,8 @@ pub struct Mission {
     pub profile: Profile,
     /// Water, gravity, levels.
     pub site: Site,
+    /// The depth sensor whose temperature tells the speed of sound, in place of the site's.
+    pub sound_speed_from: Option<String>,
     /// Target T, m.
     pub target_m: f64,
     /// Length of a section, m.
@@ -98,6 +100,7 @@ impl Mission {
         Self {
             profile,
             site: Site::default(),
+            sound_speed_from: None,
             target_m,
             section_m: 0.25,
             length_m: 100.0,

@@ -20,6 +20,12 @@ pub enum PluginError {
         /// The id.
         id: String,
     },
+    /// A source that is asked for and not there.
+    #[error("arming the loop: water.sound_speed_from = {id:?}: there is no such source")]
+    MissingSource {
+        /// The id.
+        id: String,
+    },
     /// More sources than the loop's tables hold.
     #[error("adding source {id:?}: there are {max} sources already, which is the most")]
     TooManySources {

@@ -15,8 +15,8 @@ use super::head::HeadTrack;
 use super::merge::{Inbox, MAX_TICK_PACKETS};
 use super::plugin::PluginError;
 use super::ring::{Port, PortReader};
-use super::stages::{Advisor, Decoders, Driving, HeadSweeps, Results, judge_one};
-use super::{App, MAX_SOURCES, Mission, SourceInfo};
+use super::stages::{Advisor, Decoders, Driving, HeadSweeps, Results, WaterSound, judge_one};
+use super::{App, MAX_SOURCES, Mission, SourceId, SourceInfo};
 use crate::coverage::{
     Frontier, GridLayout, HoleFinder, Request, SampleStore, Sections, Soundings, StoreLayout,
 };
@@ -55,6 +55,8 @@ impl Loop {
         world.insert_resource(sensors);
         world.insert_resource(heads);
         world.insert_resource(Decoders(decoders));
+        let told_by = sound_source(&mission, &sources)?;
+        world.insert_resource(WaterSound::new(mission.site.sound_speed_mps, told_by));
         world.insert_resource(Inbox::default());
         world.insert_resource(Events(Vec::with_capacity(MAX_TICK_READINGS)));
         world.insert_resource(PositionedList(Vec::with_capacity(2 * MAX_TICK_READINGS)));
@@ -246,6 +248,14 @@ impl Loop {
             .integer(digests.advice.value());
         all.value()
     }
+}
+
+/// The source that tells the speed of sound.
+fn sound_source(mission: &Mission, sources: &[SourceInfo]) -> Result<Option<SourceId>, PluginError> {
+    let Some(id) = &mission.sound_speed_from else { return Ok(None) };
+    let place =
+        sources.iter().position(|source| source.id == *id).and_then(|place| u16::try_from(place).ok());
+    place.map(|place| Some(SourceId(place))).ok_or_else(|| PluginError::MissingSource { id: id.clone() })
 }
 
 fn coverage(mission: &Mission) -> Result<Coverage, PluginError> {

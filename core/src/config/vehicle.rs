@@ -6,7 +6,7 @@ use super::coverage::CoverageConfig;
 pub use super::reader::Loader;
 use super::reader::{ConfigError, Document, Section};
 use crate::app::Mission;
-use crate::app::device::{Device, DeviceKind};
+use crate::app::device::{Device, DeviceKind, Sense};
 use crate::coverage::StoreLayout;
 use crate::frames::{Mount, Rot, Vec3};
 use crate::fusion::{Navigation, NavigationConfig};
@@ -29,6 +29,8 @@ pub struct VehicleConfig {
     pub section_m: f64,
     /// Water, gravity, levels.
     pub site: Site,
+    /// The depth sensor whose temperature tells the speed of sound, in place of the site's.
+    pub sound_speed_from: Option<String>,
     /// The tunnel.
     pub tunnel: TunnelConfig,
     /// How the heads share the work.
@@ -135,9 +137,9 @@ impl VehicleConfig {
             let problem = "is too fine for so long a tunnel; make tunnel.length_m smaller, or this and section_m larger";
             return Err(root.invalid("target_m", problem));
         }
-        let site = match root.section("water")? {
+        let (site, sound_speed_from) = match root.section("water")? {
             Some(water) => parse_water(water, axis_yaw_rad)?,
-            None => Site { axis_yaw_rad, ..Site::default() },
+            None => (Site { axis_yaw_rad, ..Site::default() }, None),
         };
         let navigation = NavigationConfig::parse(root.section("navigation")?)?;
         let coverage = CoverageConfig::from_root(root, &tunnel.profile, target_m)?;
@@ -160,11 +162,13 @@ impl VehicleConfig {
             None => (HeadLayout::PhaseShift, 0.0),
         };
         check_heads(root, &sensors, &hull)?;
+        check_sound(root, sound_speed_from.as_deref(), &sensors, &sensor_configs)?;
         Ok(Self {
             name,
             target_m,
             section_m,
             site,
+            sound_speed_from,
             tunnel,
             layout,
             planned_speed_mps,
@@ -185,6 +189,7 @@ impl VehicleConfig {
         Mission {
             profile: self.tunnel.profile.clone(),
             site: self.site,
+            sound_speed_from: self.sound_speed_from.clone(),
             target_m: self.target_m,
             section_m: self.section_m,
             length_m: self.tunnel.length_m,
@@ -229,7 +234,7 @@ impl TunnelConfig {
     }
 }
 
-fn parse_water(section: Section<'_>, axis_yaw_rad: f64) -> Result<Site, ConfigError> {
+fn parse_water(section: Section<'_>, axis_yaw_rad: f64) -> Result<(Site, Option<String>), ConfigError> {
     let usual = Site::default();
     let or = |value: Option<f64>, default| value.unwrap_or(default);
     let site = Site {
@@ -246,8 +251,9 @@ fn parse_water(section: Section<'_>, axis_yaw_rad: f64) -> Result<Site, ConfigEr
         ),
         axis_yaw_rad,
     };
+    let sound_speed_from = section.text("sound_speed_from")?;
     section.finish()?;
-    Ok(site)
+    Ok((site, sound_speed_from))
 }
 
 fn parse_hull(section: Section<'_>) -> Result<Obstacle, ConfigError> {
@@ -259,6 +265,23 @@ fn parse_hull(section: Section<'_>) -> Result<Obstacle, ConfigError> {
     section.finish()?;
     let point = |[x, y, z]: [f64; 3]| Vec3::new(x, y, z);
     Ok(Obstacle::Box { least: point(least), most: point(most) })
+}
+
+/// That the sensor that is to tell the speed of sound is there, and feels the water.
+fn check_sound(
+    root: &Section<'_>,
+    told_by: Option<&str>,
+    sensors: &[Box<dyn Device>],
+    configs: &[SensorConfig],
+) -> Result<(), ConfigError> {
+    let Some(id) = told_by else { return Ok(()) };
+    let told_by = configs.iter().zip(sensors).find(|(config, _)| config.id == id);
+    if told_by.is_some_and(|(_, sensor)| sensor.sense() == Sense::Depth) {
+        return Ok(());
+    }
+    let problem =
+        format!("sound_speed_from = {id:?} names no depth sensor of this file; it must be the id of one");
+    Err(root.invalid("water", &problem))
 }
 
 /// That there are no more heads than tables hold, and that none is inside a box of the hull, which it would see through.

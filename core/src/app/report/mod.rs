@@ -7,6 +7,7 @@ use super::alerts::{Alert, Alerts};
 use super::flow::{AdviceLog, Coverage, SourceTallies, Tally};
 use super::run::Loop;
 use super::smoothing::SmoothingReport;
+use super::stages::WaterSound;
 use super::what_if::WhatIfReport;
 use crate::coverage::openings::Opening;
 use crate::coverage::{Section, Spread, Verdict};
@@ -96,6 +97,10 @@ pub struct DiveReport {
     pub distance_m: f64,
     /// Whether any ping of a profiling head came; without, there is no coverage to speak of.
     pub sonar: bool,
+    /// The least speed of sound by which ranges were reckoned, m/s.
+    pub sound_speed_least_mps: f64,
+    /// The greatest, m/s.
+    pub sound_speed_most_mps: f64,
     /// Samples on the wall.
     pub samples_valid: u64,
     /// Of these, samples that others stand for, since their surroundings are full.
@@ -206,7 +211,7 @@ impl Report {
             digest: format!("{:016x}", dive.digest()),
             target_m: sections.target_m(),
             section_m: sections.section_m(),
-            dive: dive_report(coverage, &tally),
+            dive: dive_report(coverage, &tally, dive.world().resource::<WaterSound>().span_mps()),
             summary: summarise(sections.section_m(), passed().map(|(_, section)| section)),
             sections: passed()
                 .map(|(k, section)| sections::section_report(sections, k, section, dive))
@@ -233,7 +238,8 @@ impl Report {
     }
 }
 
-fn dive_report(coverage: &Coverage, tally: &Tally) -> DiveReport {
+fn dive_report(coverage: &Coverage, tally: &Tally, sound_mps: [f64; 2]) -> DiveReport {
+    let [sound_speed_least_mps, sound_speed_most_mps] = sound_mps;
     let swept = coverage.frontier.swept();
     let (first, last) = tally.span.unwrap_or((MonoNs(0), MonoNs(0)));
     DiveReport {
@@ -243,6 +249,8 @@ fn dive_report(coverage: &Coverage, tally: &Tally) -> DiveReport {
         to_m: swept.map(|reach| reach.to_m),
         distance_m: swept.map_or(0.0, |reach| reach.to_m - reach.from_m),
         sonar: tally.samples + tally.missing + tally.out_of_range + tally.occluded + tally.unplaced > 0,
+        sound_speed_least_mps,
+        sound_speed_most_mps,
         samples_valid: tally.samples - tally.outside - tally.not_stored,
         samples_thinned: coverage.store.usage().thinned,
         samples_rejected: RejectedReport {

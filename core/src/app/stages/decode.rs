@@ -8,6 +8,8 @@ use crate::app::merge::Inbox;
 use crate::app::reading::Packet;
 use crate::time::MonoNs;
 
+use super::sound::WaterSound;
+
 /// The decoder of each source.
 #[derive(Resource)]
 pub(in crate::app) struct Decoders(pub(in crate::app) Vec<Box<dyn Decoder>>);
@@ -18,6 +20,7 @@ pub(super) fn decode(
     mut events: ResMut<'_, Events>,
     mut tally: ResMut<'_, Tally>,
     mut sources: ResMut<'_, SourceTallies>,
+    mut sound: ResMut<'_, WaterSound>,
 ) {
     events.0.clear();
     for (source, packet) in inbox.iter() {
@@ -25,7 +28,8 @@ pub(super) fn decode(
         tally.span = Some(widened(tally.span, packet.received));
         let before = events.0.len();
         let Some(decoder) = decoders.0.get_mut(source.index()) else { continue };
-        decoder.decode(packet, &mut |decoded| {
+        decoder.decode(packet, &mut |mut decoded| {
+            sound.pass(source, &mut decoded);
             events.0.push(Event {
                 source,
                 received: packet.received,

@@ -9,6 +9,7 @@ mod driving;
 mod judge;
 mod navigate;
 mod place;
+mod sound;
 
 use bevy_ecs::schedule::{IntoScheduleConfigs, Schedule};
 
@@ -19,6 +20,7 @@ pub(super) use cover::HeadSweeps;
 pub(super) use decode::Decoders;
 pub(super) use driving::Driving;
 pub(super) use judge::{Results, judge_one};
+pub(super) use sound::WaterSound;
 
 /// Adds the core's systems to their stages.
 pub(super) fn add(schedule: &mut Schedule) {
