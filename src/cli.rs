@@ -35,6 +35,12 @@ pub(crate) enum Command {
         after_help = "Example:\n  headrace replay dive.mcap --target 0.6 --report report.json\n  headrace replay dive.mcap --target 0.3,0.6,1.0 --section 0.25,1\n  headrace replay dive.mcap --smooth --report certificate.json"
     )]
     Replay(Replay),
+    /// Replay a dive and hold it against what it published live: the same, or where they first part.
+    ///
+    /// Names the tick, the sensor, the field and both values down to the bit. Exit code 4 when they part, 3 when they don't but
+    /// the log has lost data.
+    #[command(after_help = "Example:\n  headrace verify dive.mcap")]
+    Verify(Verify),
     /// Turn a scene into a log of the bytes that its devices would send.
     ///
     /// Only the effects that the scene names are simulated; --explain lists what that comes to.
@@ -155,6 +161,21 @@ pub(crate) struct Replay {
     pub(crate) expect: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) output: Output,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Verify {
+    /// Log to verify.
+    pub(crate) log: PathBuf,
+    /// Vehicle file, in place of the one attached to the log.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) vehicle: Option<PathBuf>,
+    /// Length of a tick in milliseconds; no result depends on it.
+    #[arg(long, value_name = "MS", default_value = "20", value_parser = clap::value_parser!(u32).range(1..=60_000))]
+    pub(crate) tick_ms: u32,
+    /// Print JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 #[derive(Debug, Args)]

@@ -13,7 +13,7 @@ use headrace_core::fusion::Navigation;
 use headrace_ports::Crew;
 use headrace_replay::drive::{Feed, Pace, drive};
 use headrace_replay::log::{LogHeader, Recorder, RecorderHandle, SentPort, SourceInfo, file_digest};
-use headrace_replay::record::{QUEUE_BYTES, RecorderOutlet};
+use headrace_replay::record::{QUEUE_BYTES, RecorderOutlet, result_channels};
 
 use crate::failure::{self, Failure};
 use crate::progress::Progress;
@@ -63,6 +63,14 @@ pub(crate) fn assemble(
     assemble_with(vehicle, vehicle.navigation(), vehicle_text, record_to)
 }
 
+/// The same, keeping the words of all results for those who compare them.
+pub(crate) fn assemble_kept(vehicle: &VehicleConfig) -> Result<Dive, Failure> {
+    let (mut app, notices) = app(vehicle)?;
+    app.keep_results();
+    let armed = app.arm(vehicle.navigation())?;
+    Ok(Dive { armed, notices, recorder: None, what_if: WhatIf::default() })
+}
+
 /// The same with another way of navigating than the vehicle file's.
 pub(crate) fn assemble_with(
     vehicle: &VehicleConfig,
@@ -70,13 +78,7 @@ pub(crate) fn assemble_with(
     vehicle_text: &str,
     record_to: Option<Recording<'_>>,
 ) -> Result<Dive, Failure> {
-    let mut app = App::new(vehicle.mission());
-    for sensor in &vehicle.sensors {
-        let plugin: &dyn Plugin = sensor.as_ref();
-        app.add_plugin(plugin)?;
-    }
-    let (outlet, notices) = NoticeOutlet::new(NOTICES);
-    app.add_plugin(&outlet)?;
+    let (mut app, notices) = app(vehicle)?;
     let recorder = match record_to {
         None => None,
         Some(Recording { path, clock }) => {
@@ -90,6 +92,18 @@ pub(crate) fn assemble_with(
         }
     };
     Ok(Dive { armed: app.arm(navigation)?, notices, recorder, what_if: WhatIf::default() })
+}
+
+/// The vehicle's sensors, and the way out to the terminal.
+fn app(vehicle: &VehicleConfig) -> Result<(App, NoticeReceiver), Failure> {
+    let mut app = App::new(vehicle.mission());
+    for sensor in &vehicle.sensors {
+        let plugin: &dyn Plugin = sensor.as_ref();
+        app.add_plugin(plugin)?;
+    }
+    let (outlet, notices) = NoticeOutlet::new(NOTICES);
+    app.add_plugin(&outlet)?;
+    Ok((app, notices))
 }
 
 /// Notes what time of day it is on the clock of the stamps.
@@ -116,7 +130,7 @@ pub(crate) fn log_header(vehicle: &VehicleConfig, vehicle_text: &str, ticks: boo
         metadata: [("version".to_owned(), env!("CARGO_PKG_VERSION").to_owned())].into(),
         sources: sources.collect(),
         ticks,
-        results: Vec::new(),
+        results: if ticks { result_channels() } else { Vec::new() },
     }
 }
 
@@ -201,6 +215,9 @@ impl Dive {
         let what_if = self.armed.what_if(&self.what_if.targets_m, &self.what_if.sections_m);
         watch.end(&self.armed);
         beside(&self.armed);
+        // What the end has judged is recorded, too.
+        let now = self.armed.now();
+        self.armed.tick(now);
         // A long dive's report takes as much room as its samples, which it needs no more.
         self.armed.release_samples();
         let mut report = Report::of(&self.armed);

@@ -22,6 +22,9 @@ pub(crate) const USAGE: u8 = 2;
 /// The command finished, but data was lost.
 pub(crate) const DATA_LOST: u8 = 3;
 
+/// The replay isn't the dive.
+pub(crate) const DIVERGED: u8 = 4;
+
 /// Why a command could not do what it was asked.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum Failure {

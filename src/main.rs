@@ -19,6 +19,7 @@ mod simulate;
 mod smooth;
 mod station;
 mod summary;
+mod verify;
 mod watch;
 
 use std::process::ExitCode;
@@ -33,6 +34,7 @@ fn main() -> ExitCode {
         Command::Demo(demo) => commands::demo(&demo),
         Command::Run(run) => commands::run(&run),
         Command::Replay(replay) => commands::replay(&replay),
+        Command::Verify(args) => verify::verify(&args),
         Command::Simulate(simulate) => simulate::simulate(&simulate),
         Command::Plan(args) => plan::plan(&args),
         Command::Calibrate(args) => calibrate::calibrate(&args),

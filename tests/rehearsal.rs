@@ -127,12 +127,10 @@ fn replay(folder: &Folder, log: &Path, name: &str) -> Value {
     report(&folder.path(name))
 }
 
-/// Sections by the chainage at which they begin, in millimetres.
-fn sections(report: &Value) -> BTreeMap<i64, &Value> {
+/// Sections by the chainage at which they begin, as written in millimetres.
+fn sections(report: &Value) -> BTreeMap<String, &Value> {
     let sections = report["sections"].as_array().unwrap().iter();
-    sections
-        .map(|section| ((section["start_m"].as_f64().unwrap() * 1000.0).round() as i64, section))
-        .collect()
+    sections.map(|section| (format!("{:9.3}", section["start_m"].as_f64().unwrap()), section)).collect()
 }
 
 fn rehearse(distance_m: f64) {
@@ -149,26 +147,22 @@ fn rehearse(distance_m: f64) {
     }
     let (ours, theirs) = (sections(&live), sections(&scene));
     let mut different = Vec::new();
-    for (from_mm, section) in &theirs {
-        let Some(live) = ours.get(from_mm) else {
-            different.push(format!("{from_mm} mm: not in the live dive, {}", section["verdict"]));
+    for (start_m, section) in &theirs {
+        let Some(live) = ours.get(start_m) else {
+            different.push(format!("{start_m} m: not in the live dive, {}", section["verdict"]));
             continue;
         };
         let (ours, theirs) = (&live["verdict"], &section["verdict"]);
         let hole_m = |section: &Value| section["hole_m"].as_f64().unwrap_or(f64::NAN);
-        // Phases among heads are the same; where their turns begin along the tunnel is not.
+        // Phases among heads are the same, to some millimetres of hole; a machine that stalls for a quarter of a second
+        // truly makes one larger.
         let apart_m = (hole_m(live) - hole_m(section)).abs();
-        if apart_m > 0.03 {
-            different.push(format!("{from_mm} mm: holes are {apart_m:.3} m apart"));
+        if apart_m > 0.12 {
+            different.push(format!("{start_m} m: holes are {apart_m:.3} m apart"));
         }
-        println!(
-            "{:7.2} m  live {ours} {:.3} m, replay {theirs} {:.3} m",
-            *from_mm as f64 / 1000.0,
-            hole_m(live),
-            hole_m(section)
-        );
+        println!("{start_m} m  live {ours} {:.3} m, replay {theirs} {:.3} m", hole_m(live), hole_m(section));
         if ours != theirs {
-            different.push(format!("{from_mm} mm: live {ours}, replay {theirs}"));
+            different.push(format!("{start_m} m: live {ours}, replay {theirs}"));
         }
     }
     assert_eq!(ours.len(), theirs.len());

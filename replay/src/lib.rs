@@ -8,3 +8,4 @@ pub mod player;
 pub mod record;
 pub mod simulate;
 pub mod smooth;
+pub mod verify;

@@ -1,7 +1,7 @@
 //! The recorder as an outlet of the loop.
 
 use headrace_core::app::App;
-use headrace_core::app::flow::TickTime;
+use headrace_core::app::flow::{Digests, TickTime};
 use headrace_core::app::merge::{Inbox, MAX_TICK_BYTES, MAX_TICK_PACKETS};
 use headrace_core::app::plugin::{Plugin, PluginError};
 use headrace_core::app::stage::Stage;
@@ -9,15 +9,53 @@ use headrace_core::app::stage::Stage;
 use bevy_ecs::prelude::{Res, ResMut, Resource};
 use std::cell::Cell;
 
-use crate::log::RecorderPort;
+use crate::log::format::RESULT_PREFIX;
+use crate::log::{RecorderPort, ResultChannel};
 
 /// What the recorder's queue must have free for the largest tick: packets, their headers, and their order.
 const LARGEST_TICK_BYTES: usize = MAX_TICK_BYTES + MAX_TICK_PACKETS * 64 + 4096;
 
+/// Room for a tick's results of one stream; more are recorded in part.
+const MAX_RESULT_BYTES: usize = 1 << 19;
+
 /// Size of the recorder's queue, bytes.
 pub const QUEUE_BYTES: usize = 4 * LARGEST_TICK_BYTES;
 
-/// Records every packet that the loop consumes, in the order of consumption, and every tick.
+/// The streams of results in a log; [`Digests::streams`] has them in the same order.
+pub(crate) const STREAMS: [&str; 3] = ["pings", "judgements", "advice"];
+/// Encoding of their messages: the tick's index and the number of the records before it, then the words of
+/// [`headrace_core::app::trail`], all u64, little-endian.
+const ENCODING: &str = "headrace-trail";
+/// Words before a message's records.
+const HEAD_WORDS: usize = 2;
+
+/// The channels of a loop's results.
+pub fn result_channels() -> Vec<ResultChannel> {
+    let channel = |name: &&str| ResultChannel {
+        topic: format!("{RESULT_PREFIX}{name}"),
+        schema_name: "headrace.trail".to_owned(),
+        schema_encoding: String::new(),
+        schema: String::new(),
+        message_encoding: ENCODING.to_owned(),
+    };
+    STREAMS.iter().map(channel).collect()
+}
+
+/// The stream of results that a topic is of.
+pub fn stream_of(topic: &str) -> Option<usize> {
+    let name = topic.strip_prefix(RESULT_PREFIX)?;
+    STREAMS.iter().position(|stream| *stream == name)
+}
+
+/// A message of a stream: the tick's index, the number of the first record, the words.
+pub fn read_results(message: &[u8]) -> Option<(u64, u64, Vec<u64>)> {
+    let (words, rest) = message.as_chunks::<8>();
+    let mut words = words.iter().map(|word| u64::from_le_bytes(*word));
+    let (tick, first) = (words.next()?, words.next()?);
+    rest.is_empty().then(|| (tick, first, words.collect()))
+}
+
+/// Records every packet that the loop consumes, in the order of consumption, every tick, and every result.
 ///
 /// When the queue can't take another largest tick the loop takes nothing in until it can: recorded input is never
 /// dropped. When the recorder's thread has failed the dive goes on without it; its handle tells.
@@ -36,12 +74,25 @@ impl RecorderOutlet {
 struct Recording {
     port: RecorderPort,
     order: Vec<u16>,
+    /// A stream's message.
+    message: Vec<u8>,
+    /// Records of each stream before the tick.
+    records: [u64; STREAMS.len()],
+    /// Ticks' results for which there was no room.
+    missing: u64,
 }
 
 impl Plugin for RecorderOutlet {
     fn build(&self, app: &mut App) -> Result<(), PluginError> {
         if let Some(port) = self.port.take() {
-            app.insert_resource(Recording { port, order: Vec::with_capacity(MAX_TICK_PACKETS) });
+            app.keep_results();
+            app.insert_resource(Recording {
+                port,
+                order: Vec::with_capacity(MAX_TICK_PACKETS),
+                message: Vec::with_capacity(MAX_RESULT_BYTES),
+                records: [0; STREAMS.len()],
+                missing: 0,
+            });
             app.add_systems(Stage::Publish, record);
         }
         Ok(())
@@ -49,8 +100,13 @@ impl Plugin for RecorderOutlet {
 }
 
 #[expect(clippy::needless_pass_by_value, reason = "bevy hands systems their arguments by value")]
-fn record(mut inbox: ResMut<'_, Inbox>, time: Res<'_, TickTime>, mut recording: ResMut<'_, Recording>) {
-    let Recording { port, order } = &mut *recording;
+fn record(
+    mut inbox: ResMut<'_, Inbox>,
+    time: Res<'_, TickTime>,
+    results: Res<'_, Digests>,
+    mut recording: ResMut<'_, Recording>,
+) {
+    let Recording { port, order, message, records, missing } = &mut *recording;
     if port.failed() {
         inbox.allowance_bytes = MAX_TICK_BYTES;
         return;
@@ -65,5 +121,22 @@ fn record(mut inbox: ResMut<'_, Inbox>, time: Res<'_, TickTime>, mut recording: 
     if !order.is_empty() && port.tick(time.index, time.now, order).is_err() {
         order.clear();
     }
+    for (channel, ((_, trail), before)) in (0..).zip(results.streams().into_iter().zip(records)) {
+        if !trail.words().is_empty() {
+            fill(message, time.index, *before, trail.words());
+            // What there is no room for is missing from the record, which numbers what it has; the input goes first.
+            *missing += u64::from(port.result(channel, time.now, message).is_err());
+        }
+        *before = trail.records();
+    }
     inbox.allowance_bytes = if port.vacant_bytes() >= LARGEST_TICK_BYTES { MAX_TICK_BYTES } else { 0 };
+}
+
+/// Puts a stream's words into a message, without allocating.
+fn fill(message: &mut Vec<u8>, tick: u64, before: u64, words: &[u64]) {
+    message.clear();
+    let room = message.capacity() / 8 - HEAD_WORDS;
+    for word in [tick, before].iter().chain(words.iter().take(room)) {
+        message.extend_from_slice(&word.to_le_bytes());
+    }
 }

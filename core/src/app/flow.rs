@@ -8,8 +8,8 @@ use bevy_ecs::entity::Entity;
 use bevy_ecs::prelude::Resource;
 
 use super::alerts::AlertKind;
-use super::digest::Digest;
 use super::reading::{Reading, SourceId};
+use super::trail::Trail;
 use crate::coverage::{
     Frontier, HoleFinder, Judgement, Loss, Request, RunChange, RunId, SampleStore, Sections, Soundings,
 };
@@ -222,15 +222,35 @@ pub struct Coverage {
 #[derive(Debug, Default, Resource)]
 pub struct Finder(pub HoleFinder);
 
-/// Digest of each stream of results; together, the dive's.
+/// The streams of results with their digests; together, the dive's.
 #[derive(Debug, Default, Resource)]
 pub struct Digests {
     /// Placed pings.
-    pub pings: Digest,
+    pub pings: Trail,
     /// Judgements.
-    pub judgements: Digest,
+    pub judgements: Trail,
     /// Advice.
-    pub advice: Digest,
+    pub advice: Trail,
+}
+
+impl Digests {
+    /// The streams by name, in the order in which a log has them.
+    pub fn streams(&self) -> [(&'static str, &Trail); 3] {
+        [("pings", &self.pings), ("judgements", &self.judgements), ("advice", &self.advice)]
+    }
+
+    /// Keeps the words of each tick from now on.
+    pub fn keep(&mut self) {
+        self.pings.keep();
+        self.judgements.keep();
+        self.advice.keep();
+    }
+
+    pub(super) fn next_tick(&mut self) {
+        self.pings.next_tick();
+        self.judgements.next_tick();
+        self.advice.next_tick();
+    }
 }
 
 /// Counts over the whole dive.

@@ -18,6 +18,7 @@ pub mod run;
 pub mod smoothing;
 pub mod stage;
 mod stages;
+pub mod trail;
 pub mod what_if;
 
 use bevy_ecs::prelude::{Component, Resource};
@@ -34,6 +35,7 @@ use crate::time::DurNs;
 use crate::tunnel::Profile;
 use components::Mounted;
 use device::Decoder;
+use flow::Digests;
 use plugin::{Plugin, PluginError};
 use reading::SourceId;
 use ring::{Port, PortReader};
@@ -188,6 +190,13 @@ impl App {
     /// Adds a resource for a plugin's own systems.
     pub fn insert_resource(&mut self, resource: impl Resource) {
         self.world.insert_resource(resource);
+    }
+
+    /// Keeps the words of all results, tick by tick, for those who record or compare them.
+    pub fn keep_results(&mut self) {
+        let mut digests = Digests::default();
+        digests.keep();
+        self.world.insert_resource(digests);
     }
 
     /// Adds systems to a stage. Two of one stage that touch the same data must be ordered by whoever adds them.

@@ -46,6 +46,7 @@ pub struct Loop {
     sources: Vec<SourceInfo>,
     mission: Mission,
     ticks: u64,
+    finished: bool,
 }
 
 impl Loop {
@@ -76,7 +77,9 @@ impl Loop {
         world.insert_resource(HiddenAngles(advisor.hidden_angles().map(<[_]>::to_vec).collect()));
         world.insert_resource(Advisor::new(advisor, mission.target_m, mission.dive_time));
         world.insert_resource(AdviceLog::default());
-        world.insert_resource(Digests::default());
+        if world.get_resource::<Digests>().is_none() {
+            world.insert_resource(Digests::default());
+        }
         world.insert_resource(Tally::default());
         world.insert_resource(TickTime::default());
         world.insert_resource(SourceTallies::new(sources.len()));
@@ -105,6 +108,7 @@ impl Loop {
             sources,
             mission,
             ticks: 0,
+            finished: false,
         };
         // The first run of a schedule allocates; with nothing to do it has no other effect.
         armed.tick(MonoNs(0));
@@ -119,6 +123,10 @@ impl Loop {
     pub fn tick(&mut self, now: MonoNs) -> usize {
         if let Some(mut time) = self.world.get_resource_mut::<TickTime>() {
             *time = TickTime { index: self.ticks, now };
+        }
+        // What the end of a dive has judged is still to be published.
+        if !self.finished {
+            self.world.resource_mut::<Digests>().next_tick();
         }
         if let Some(mut inbox) = self.world.get_resource_mut::<Inbox>() {
             inbox.fill(&mut self.readers);
@@ -148,6 +156,11 @@ impl Loop {
         self.ticks
     }
 
+    /// The end of the last tick's time.
+    pub fn now(&self) -> MonoNs {
+        self.world.resource::<TickTime>().now
+    }
+
     /// What happens in the world, for plugins, tests and reports.
     pub fn world(&self) -> &World {
         &self.world
@@ -161,6 +174,8 @@ impl Loop {
     /// sections' at a time, and the loop as it is then: those of a long dive at once would take more than its samples.
     pub fn finish(&mut self, hear: &mut dyn FnMut(&Notice, &Self)) {
         self.world.resource_mut::<Navigator>().navigation.end();
+        self.world.resource_mut::<Digests>().next_tick();
+        self.finished = true;
         let (open, common) = self.open_requests();
         let request =
             |(section, fails): &(i64, bool)| Some(Request { section: *section, fails: *fails, ..common? });

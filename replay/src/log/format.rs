@@ -5,6 +5,7 @@
 //! | `/raw/<source id>` | bytes as received: one device frame, datagram, CAN frame, HID report or I2C transaction | receive time | time of validity, where the device gives one, else the receive time |
 //! | `/sent/<source id>` | bytes sent to the device | when | when |
 //! | `/loop/tick` | one tick of the loop, see [`Tick`] | the tick's moment | the same |
+//! | `/result/pings`, `/result/judgements`, `/result/advice` | what the loop published in a tick, word by word ([`headrace_core::app::trail`]): u64 tick, u64 number of the first record, records; for `verify`, never read by a replay | the tick's moment | the same |
 //! | `/result/...` | what the loop made of it, for people's viewers | as the result says | the same |
 //!
 //! Times are nanoseconds of the host's monotonic clock. Every channel counts its messages from 0 (`sequence`).

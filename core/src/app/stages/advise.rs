@@ -3,6 +3,7 @@
 use bevy_ecs::prelude::{Res, ResMut, Resource};
 
 use crate::app::flow::{AdviceEntry, AdviceLog, Digests, Notice, Notices, Placed, PlacedList, Tally};
+use crate::app::trail::RecordKind;
 use crate::frames::Vec3;
 use crate::sampling::advice::{self, Advice, Steady};
 use crate::sampling::passes::{Phasing, Situation};
@@ -53,7 +54,7 @@ pub(super) fn advise(
         let Placed::Situation(at, situation) = item else { continue };
         let begun = tally.span.map(|(first, _)| first);
         let advice = advisor.advise(*at, situation, begun);
-        let digest = digests.advice.integer(at.0).number(advice.v_max_mps);
+        let digest = digests.advice.record(RecordKind::Advice).integer(at.0).number(advice.v_max_mps);
         digest.integer(advice.reason as u64).integer(u64::from(advice.will_exceed));
         for other in advice.alternatives.iter().flatten() {
             digests.advice.number(other.v_max_mps);

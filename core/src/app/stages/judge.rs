@@ -2,6 +2,7 @@
 
 use crate::app::alerts::{AlertKind, Alerts};
 use crate::app::flow::{Coverage, Digests, Finder, Notice, Notices};
+use crate::app::trail::RecordKind;
 use crate::coverage::{Judging, Request, RunChange, RunId};
 use crate::tunnel::Profile;
 
@@ -24,7 +25,7 @@ pub(in crate::app) fn judge_one(
     let Results { finder, notices, digests, alerts } = results;
     let mut tell = |id: RunId, change: RunChange| {
         notices.0.push(Notice::Run { id, at: request.at, change });
-        digests.judgements.integer(u64::from(id.0)).integer(change as u64);
+        digests.judgements.record(RecordKind::Run).integer(u64::from(id.0)).integer(change as u64);
     };
     let mut judging = Judging { store, finder: &mut finder.0, profile, tell: &mut tell };
     let Some(change) = sections.judge(request, &mut judging) else { return };
@@ -32,6 +33,7 @@ pub(in crate::app) fn judge_one(
     let Some(section) = sections.get(request.section) else { return };
     digests
         .judgements
+        .record(RecordKind::Section)
         .integer(request.at.0)
         .integer(request.section as u64)
         .integer(change as u64)

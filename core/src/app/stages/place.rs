@@ -8,6 +8,7 @@ use crate::app::flow::{
 };
 use crate::app::head::HeadTrack;
 use crate::app::reading::{Reading, SonarReturn};
+use crate::app::trail::RecordKind;
 use crate::coverage::{Doubt, Loss, Reach};
 use crate::frames::{Mount, Pose, Vec3, head_direction};
 use crate::fusion::{Fix, NoFix};
@@ -164,7 +165,12 @@ fn situation(
 }
 
 fn digest(digests: &mut Digests, event: &Event, ping: &PlacedPing) {
-    let digest = digests.pings.integer(event.received.0).integer(u64::from(event.source.0));
+    let kind = if matches!(ping.outcome, Outcome::Sample { .. }) {
+        RecordKind::Sample
+    } else {
+        RecordKind::NoSample
+    };
+    let digest = digests.pings.record(kind).integer(event.received.0).integer(u64::from(event.source.0));
     match ping.outcome {
         Outcome::Sample { point, sigma_m } => {
             digest.integer(0).number(point.x()).number(point.y()).number(point.z()).number(sigma_m);

@@ -1,0 +1,128 @@
+//! `headrace verify`: a replay held against what the live dive published.
+
+use headrace_core::app::SourceInfo;
+use headrace_core::app::trail::WordKind;
+use headrace_core::time::DurNs;
+use headrace_replay::drive::Pace;
+use headrace_replay::player::Player;
+use headrace_replay::verify::{Difference, Verified, Verifier, What};
+use serde_json::{Value, json};
+
+use crate::cli::Verify;
+use crate::commands::{attached_vehicle, vehicle_file};
+use crate::dive::assemble_kept;
+use crate::failure::{self, Failure};
+use crate::output::{deliver, say};
+use crate::watch::Watch;
+
+/// Replays a log and compares.
+pub(crate) fn verify(args: &Verify) -> Result<u8, Failure> {
+    let mut player = Player::open(&args.log)?;
+    let (_, vehicle) = match &args.vehicle {
+        Some(path) => vehicle_file(path),
+        None => attached_vehicle(player.info(), &player.losses(), &args.log),
+    }?;
+    let dive = assemble_kept(&vehicle)?;
+    let sources: Vec<SourceInfo> = dive.armed.sources().to_vec();
+    player.connect(&sources);
+    let mut verifier = Verifier::open(&args.log)?;
+    let mut failed = None;
+    let pace = Pace { tick: DurNs::from_millis(i64::from(args.tick_ms)), ..Pace::default() };
+    dive.run_beside(&mut player, pace, &mut Watch::quiet(), &mut |dive| {
+        if failed.is_none() {
+            failed = verifier.after_tick(dive).err();
+        }
+    })?;
+    match failed {
+        Some(error) => Err(error.into()),
+        None => tell(args, &verifier.finish()?, &player.losses(), &sources),
+    }
+}
+
+fn tell(
+    args: &Verify,
+    verified: &Verified,
+    losses: &[String],
+    sources: &[SourceInfo],
+) -> Result<u8, Failure> {
+    let code = if !verified.differences.is_empty() {
+        failure::DIVERGED
+    } else if !verified.has_results {
+        failure::FAILED
+    } else if !losses.is_empty() {
+        failure::DATA_LOST
+    } else {
+        failure::OK
+    };
+    if args.json {
+        let differences: Vec<Value> =
+            verified.differences.iter().map(|difference| as_json(difference, sources)).collect();
+        let told = json!({
+            "same_records": verified.same, "unrecorded_records": verified.unrecorded, "differences": differences,
+            "losses": losses,
+        });
+        deliver(&told.to_string())?;
+        return Ok(code);
+    }
+    for loss in losses {
+        say(&format!("lost     {loss}"));
+    }
+    if !verified.has_results {
+        say("nothing to compare: this log has no results of a live dive; headrace run and demo record them");
+        return Ok(code);
+    }
+    for difference in &verified.differences {
+        say(&words(difference, sources));
+    }
+    let unrecorded = match verified.unrecorded {
+        0 => String::new(),
+        count => format!("; {count} that the dive made aren't in the log"),
+    };
+    let verdict =
+        if verified.differences.is_empty() { "the replay is the dive" } else { "the replay is another dive" };
+    say(&format!("{verdict}: {} results are the same, bit for bit{unrecorded}", verified.same));
+    Ok(code)
+}
+
+fn words(difference: &Difference, sources: &[SourceInfo]) -> String {
+    let Difference { tick, stream, record, what } = difference;
+    let place = format!("{stream}: first parts at tick {tick}, result {record}");
+    match what {
+        What::Field { kind, source, field, word, live, replayed } => {
+            let of = source.map(|source| format!(" of {}", name(source, sources))).unwrap_or_default();
+            let (kind, live, replayed) = (kind.as_str(), value(*word, *live), value(*word, *replayed));
+            format!("{place}: {kind}{of}: {field} was {live}, replayed {replayed}")
+        }
+        What::Kind { live, replayed } => {
+            format!("{place}: was a {live}, replayed a {replayed}, or with other fields")
+        }
+        What::Missing => format!("{place}: the replay doesn't have it"),
+        What::Added => format!("{place}: the dive didn't publish it"),
+    }
+}
+
+/// A word as a person reads it, and its bits.
+fn value(word: WordKind, bits: u64) -> String {
+    match word {
+        WordKind::Integer => format!("{bits}"),
+        WordKind::Number => format!("{:?} ({bits:#018x})", f64::from_bits(bits)),
+    }
+}
+
+fn name(source: u64, sources: &[SourceInfo]) -> String {
+    let of = usize::try_from(source).ok().and_then(|source| sources.get(source));
+    of.map_or_else(|| source.to_string(), |source| source.id.clone())
+}
+
+fn as_json(difference: &Difference, sources: &[SourceInfo]) -> Value {
+    let Difference { tick, stream, record, what } = difference;
+    let mut told =
+        json!({"tick": tick, "stream": stream, "record": record, "what": words(difference, sources)});
+    if let (What::Field { source, field, live, replayed, .. }, Some(told)) = (what, told.as_object_mut()) {
+        told.insert("source".to_owned(), json!(source.map(|source| name(source, sources))));
+        told.insert("field".to_owned(), json!(field));
+        told.insert("live_bits".to_owned(), json!(format!("{live:016x}")));
+        told.insert("replayed_bits".to_owned(), json!(format!("{replayed:016x}")));
+    }
+    told
+}
