@@ -173,6 +173,8 @@ impl Verifier {
         let unrecorded = self.streams.iter().map(|stream| stream.unrecorded).sum();
         let mut differences: Vec<Difference> =
             self.streams.into_iter().filter_map(|stream| stream.difference).collect();
+        // A log that has none at all isn't one of a live dive.
+        differences.retain(|_| self.has_results);
         differences.sort_by_key(|difference| difference.tick);
         Ok(Verified { same, unrecorded, differences, has_results: self.has_results })
     }
