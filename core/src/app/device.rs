@@ -4,7 +4,7 @@
 //! Discovering and opening the port, decoding (pure) and applying (in the loop) are three separate things; this file
 //! has the second, and the device's side of the wire for simulations.
 
-use super::driver::{Carrier, Driver, DriverSetup};
+use super::driver::{Carrier, Driver, DriverSetup, Probe};
 use super::measurement::{GroundVelocity, Inertia, Payout, Pressure, Sounding};
 use super::plugin::Plugin;
 use super::reading::{Decoded, Packet};
@@ -23,6 +23,11 @@ pub trait DeviceKind: Sync {
     ///
     /// Errors: a key with a value that isn't allowed.
     fn configure(&self, sensor: &SensorConfig, own: &Section<'_>) -> Result<Box<dyn Device>, ConfigError>;
+
+    /// Asks what is on a row of bytes whether it is of this kind. `None` where such devices can't be asked.
+    fn probe(&self) -> Option<Box<dyn Probe>> {
+        None
+    }
 }
 
 /// A configured sensor. As a [`Plugin`] it registers its source and its components.

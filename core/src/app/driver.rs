@@ -91,3 +91,16 @@ pub trait Driver: Send {
     /// What is to be thought of the device.
     fn standing(&self) -> Standing;
 }
+
+/// Finds out whether a device of one kind is on a line, and which. What it sends is harmless to whatever else is there:
+/// nothing turns, and no setting stays.
+pub trait Probe: Send {
+    /// What to send, one after the other, each with time for an answer, until there is an identity.
+    fn questions(&self) -> Vec<Vec<u8>>;
+
+    /// Bytes that came, in whatever pieces.
+    fn heard(&mut self, bytes: &[u8]);
+
+    /// What the device says that it is, once it has.
+    fn identity(&self) -> Option<String>;
+}

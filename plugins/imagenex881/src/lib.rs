@@ -10,6 +10,7 @@ pub mod emulator;
 pub mod homing;
 pub mod logfile;
 pub mod plugin;
+pub mod probe;
 pub mod program;
 pub mod settings;
 

@@ -3,7 +3,7 @@
 use headrace_core::app::App;
 use headrace_core::app::components::SonarHead;
 use headrace_core::app::device::{Decoder, Device, DeviceKind, Emulated, EmulatorSetup, Sense};
-use headrace_core::app::driver::{Carrier, Driver, DriverSetup};
+use headrace_core::app::driver::{Carrier, Driver, DriverSetup, Probe};
 use headrace_core::app::plugin::{Plugin, PluginError};
 use headrace_core::app::reading::{Decoded, Packet, Reading, SonarReturn};
 use headrace_core::codec::{Codec as _, CodecCounts, LineClock};
@@ -14,6 +14,7 @@ use headrace_core::time::DurNs;
 use crate::codec::{Header, Model, ReturnCodec, Returns};
 use crate::driver::{CARRIERS, HeadDriver};
 use crate::emulator::HeadEmulator;
+use crate::probe::HeadProbe;
 use crate::settings::{Settings, range_setting};
 
 /// Speed of sound by which the family computes every range. Source: Imagenex 881A serial interface, profile range.
@@ -40,6 +41,10 @@ impl DeviceKind for Kind {
     fn configure(&self, sensor: &SensorConfig, own: &Section<'_>) -> Result<Box<dyn Device>, ConfigError> {
         let settings = Settings::read(sensor, own)?;
         Ok(Box::new(Imagenex881 { sensor: sensor.clone(), settings }))
+    }
+
+    fn probe(&self) -> Option<Box<dyn Probe>> {
+        Some(Box::new(HeadProbe::default()))
     }
 }
 

@@ -8,6 +8,7 @@ pub mod codec;
 pub mod driver;
 pub mod emulator;
 pub mod plugin;
+pub mod probe;
 pub mod settings;
 
 pub use plugin::Kind;

@@ -3,7 +3,7 @@
 use headrace_core::app::App;
 use headrace_core::app::components::Echosounder;
 use headrace_core::app::device::{Decoder, Device, DeviceKind, Emulated, EmulatorSetup, Sense};
-use headrace_core::app::driver::{Carrier, Driver, DriverSetup};
+use headrace_core::app::driver::{Carrier, Driver, DriverSetup, Probe};
 use headrace_core::app::plugin::{Plugin, PluginError};
 use headrace_core::app::reading::{Decoded, EchoRange, Packet, Reading};
 use headrace_core::codec::{Codec as _, CodecCounts, LineClock};
@@ -13,6 +13,7 @@ use headrace_core::time::DurNs;
 use crate::codec::{Distance, DistanceSimple, Frame, PingCodec};
 use crate::driver::{CARRIERS, PingDriver};
 use crate::emulator::PingEmulator;
+use crate::probe::PingProbe;
 use crate::settings::Settings;
 
 /// The kind's name in vehicle files and logs.
@@ -37,6 +38,10 @@ impl DeviceKind for Kind {
     fn configure(&self, sensor: &SensorConfig, own: &Section<'_>) -> Result<Box<dyn Device>, ConfigError> {
         let settings = Settings::read(sensor, own)?;
         Ok(Box::new(Ping1d { sensor: sensor.clone(), settings }))
+    }
+
+    fn probe(&self) -> Option<Box<dyn Probe>> {
+        Some(Box::new(PingProbe::default()))
     }
 }
 

@@ -1,0 +1,132 @@
+//! Whether a head is on a line, and which: it is asked for one short ping where it stands.
+
+use headrace_core::app::driver::Probe;
+use headrace_core::codec::Codec as _;
+
+use crate::codec::{Command, Header, Model, Points, ReturnCodec, ZERO_COUNT};
+
+/// The ids that are asked for: as delivered, and those that further heads on one RS-485 line are given first.
+const HEAD_IDS: [u8; 4] = [0x10, 0x11, 0x12, 0x13];
+
+/// Degrees of a count of the position.
+const DEGREES_A_COUNT: f64 = 0.3;
+
+/// Asks for a head by id, and takes the first whole return for the answer.
+#[derive(Debug, Clone, Default)]
+pub struct HeadProbe {
+    codec: ReturnCodec,
+    found: Option<Header>,
+}
+
+/// A ping of the least range and gain after which the head is where it was.
+fn standing_still(head_id: u8) -> Command {
+    Command {
+        head_id,
+        range_m: 1,
+        reverse: false,
+        start_gain_db: 0.0,
+        logf_db: 20.0,
+        absorption_dbpm: 0.6,
+        train_deg: 0.0,
+        sector_deg: 360.0,
+        step_deg: 0.0,
+        pulse_us: 10.0,
+        min_range_m: 0.0,
+        points: Points::P250,
+        data_bits: 8,
+        profile: true,
+        calibrate: false,
+        switch_delay_ms: 0.0,
+        frequency_khz: 1000.0,
+    }
+}
+
+impl Probe for HeadProbe {
+    fn questions(&self) -> Vec<Vec<u8>> {
+        let commands = HEAD_IDS.iter().filter_map(|id| standing_still(*id).encode().ok());
+        commands.map(|bytes| bytes.to_vec()).collect()
+    }
+
+    fn heard(&mut self, bytes: &[u8]) {
+        let found = &mut self.found;
+        self.codec.push(bytes, &mut |answer| *found = found.or(Some(answer.header)));
+    }
+
+    fn identity(&self) -> Option<String> {
+        let Header { tag, head_id, status, position, .. } = self.found?;
+        if Model::of_head_id(head_id) == Model::Sounder852 {
+            return Some(format!("Imagenex 852 sounder or a head of its id, head_id = {head_id:#04x}"));
+        }
+        let model = if tag.is_gs() { "881 with attitude sensors (GS)" } else { "881 family" };
+        let degrees = f64::from(i32::from(position) - ZERO_COUNT) * DEGREES_A_COUNT;
+        let refuses = if status.accepted() { "" } else { ", refuses the settings" };
+        Some(format!("Imagenex {model}, head_id = {head_id:#04x}, at {degrees:.1} degrees{refuses}"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use headrace_core::app::device::{Direction, Emulator as _, EmulatorSetup};
+    use headrace_core::site::Site;
+    use headrace_core::time::{DurNs, MonoNs};
+
+    use super::*;
+    use crate::codec::CommandCodec;
+    use crate::emulator::{Head, HeadEmulator};
+    use crate::settings::tests::settings;
+
+    /// What a head with these keys answers to all questions, in order.
+    fn answers(keys: &str) -> Vec<Vec<u8>> {
+        let setup = EmulatorSetup { start: MonoNs(0), head: None, site: Site::default(), polled: false };
+        let mut head = HeadEmulator::new(settings(keys).unwrap(), DurNs(0), &setup);
+        let (mut due, mut answers) = (Vec::new(), Vec::new());
+        for (number, question) in HeadProbe::default().questions().iter().enumerate() {
+            let at = MonoNs(1_000_000_000 * (number as u64 + 1));
+            head.hear(at, question, &mut |_, _, _| ());
+            head.begin(at + DurNs(1), &mut due);
+            for sounding in due.drain(..) {
+                head.tell(&sounding, &mut |direction, _, bytes| {
+                    assert_eq!(direction, Direction::Received);
+                    answers.push(bytes.to_vec());
+                });
+            }
+        }
+        answers
+    }
+
+    #[test]
+    fn a_head_says_which_it_is_and_where() {
+        let mut probe = HeadProbe::default();
+        assert_eq!(probe.identity(), None);
+        let answers = answers("mode = \"slow\"");
+        assert_eq!(answers.len(), 1, "only the question with its id is its");
+        let (first, second) = answers[0].split_at(5);
+        probe.heard(b"noise");
+        probe.heard(first);
+        assert_eq!(probe.identity(), None, "half a return is none");
+        probe.heard(second);
+        assert_eq!(probe.identity().unwrap(), "Imagenex 881 family, head_id = 0x10, at 0.0 degrees");
+    }
+
+    #[test]
+    fn heads_with_other_ids_are_found_too() {
+        let mut probe = HeadProbe::default();
+        answers("mode = \"slow\"\nhead_id = 0x13").iter().for_each(|answer| probe.heard(answer));
+        assert!(probe.identity().unwrap().contains("head_id = 0x13"));
+    }
+
+    #[test]
+    fn no_question_moves_a_head() {
+        let mut head = Head::new(700, true);
+        let mut asked = 0;
+        let mut codec = CommandCodec::default();
+        for question in HeadProbe::default().questions() {
+            codec.push(&question, &mut |command| {
+                head.obey(&command);
+                asked += 1;
+                assert!(!command.calibrate);
+            });
+        }
+        assert_eq!((asked, head.position(), head.growing()), (HEAD_IDS.len(), 700, true));
+    }
+}

@@ -1,0 +1,103 @@
+//! Whether a Ping device is on a line, and which: it is asked for its version and what it is, whatever its id.
+
+use headrace_core::app::driver::Probe;
+use headrace_core::codec::Codec as _;
+
+use crate::codec::{Addressed, DeviceInformation, Message, PingCodec, ProtocolVersion, id};
+
+/// Everyone on the line is meant. Source: Ping protocol, device ids.
+const EVERYONE: u8 = 255;
+
+/// Asks everyone what they are, and takes the first that says so.
+#[derive(Debug, Clone, Default)]
+pub struct PingProbe {
+    codec: PingCodec,
+    protocol: Option<ProtocolVersion>,
+    found: Option<(u8, DeviceInformation)>,
+}
+
+impl Probe for PingProbe {
+    /// The version first, so that it is known when the device says what it is.
+    fn questions(&self) -> Vec<Vec<u8>> {
+        let asked = [id::PROTOCOL_VERSION, id::DEVICE_INFORMATION].into_iter().filter_map(|about| {
+            let message = Message::GeneralRequest(about);
+            Addressed { source: 0, destination: EVERYONE, message }.encode().ok()
+        });
+        vec![asked.flat_map(|bytes| bytes.as_slice().to_vec()).collect()]
+    }
+
+    fn heard(&mut self, bytes: &[u8]) {
+        let Self { codec, protocol, found } = self;
+        codec.push(bytes, &mut |Addressed { source, message, .. }| match message {
+            Message::ProtocolVersion(version) => *protocol = Some(version),
+            Message::DeviceInformation(device) => *found = found.or(Some((source, device))),
+            _ => (),
+        });
+    }
+
+    fn identity(&self) -> Option<String> {
+        let (device_id, device) = self.found?;
+        let DeviceInformation {
+            device_type, revision, firmware_major, firmware_minor, firmware_patch, ..
+        } = device;
+        let kind = match device_type {
+            1 => "Ping echosounder (Ping1D, Ping2)".to_owned(),
+            2 => "Ping360, no echosounder".to_owned(),
+            other => format!("Ping device of type {other}, no echosounder"),
+        };
+        let version = self
+            .protocol
+            .map(|ProtocolVersion { major, minor, patch, .. }| format!(", protocol {major}.{minor}.{patch}"));
+        Some(format!(
+            "{kind}, device_id = {device_id}, revision {revision}, firmware {firmware_major}.{firmware_minor}.{firmware_patch}{}",
+            version.unwrap_or_default()
+        ))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use headrace_core::app::device::{Emulator as _, EmulatorSetup};
+    use headrace_core::site::Site;
+    use headrace_core::time::{DurNs, MonoNs};
+
+    use super::*;
+    use crate::emulator::PingEmulator;
+    use crate::settings::tests::settings;
+
+    #[test]
+    fn an_echosounder_says_which_it_is_whatever_its_id() {
+        let setup = EmulatorSetup { start: MonoNs(0), head: None, site: Site::default(), polled: false };
+        let mut device = PingEmulator::new(settings("device_id = 7").unwrap(), DurNs(0), &setup);
+        let mut probe = PingProbe::default();
+        let mut answers = Vec::new();
+        for question in probe.questions() {
+            device.hear(MonoNs(1), &question, &mut |_, _, bytes| answers.extend_from_slice(bytes));
+        }
+        for piece in answers.chunks(3) {
+            assert_eq!(probe.identity(), None);
+            probe.heard(piece);
+        }
+        assert_eq!(
+            probe.identity().unwrap(),
+            "Ping echosounder (Ping1D, Ping2), device_id = 7, revision 1, firmware 3.29.0, protocol 1.0.0"
+        );
+    }
+
+    #[test]
+    fn a_ping360_is_told_from_an_echosounder() {
+        let device = DeviceInformation {
+            device_type: 2,
+            revision: 1,
+            firmware_major: 3,
+            firmware_minor: 1,
+            firmware_patch: 1,
+            reserved: 0,
+        };
+        let message = Message::DeviceInformation(device);
+        let answer = Addressed { source: 2, destination: 0, message }.encode().unwrap();
+        let mut probe = PingProbe::default();
+        probe.heard(answer.as_slice());
+        assert!(probe.identity().unwrap().starts_with("Ping360, no echosounder, device_id = 2"));
+    }
+}
