@@ -111,7 +111,9 @@ mod tests {
     #[test]
     fn heads_with_other_ids_are_found_too() {
         let mut probe = HeadProbe::default();
-        answers("mode = \"slow\"\nhead_id = 0x13").iter().for_each(|answer| probe.heard(answer));
+        for answer in answers("mode = \"slow\"\nhead_id = 0x13") {
+            probe.heard(&answer);
+        }
         assert!(probe.identity().unwrap().contains("head_id = 0x13"));
     }
 

@@ -1,11 +1,14 @@
 //! What the drivers of all devices share: the clock, lines of every carrier, and the life of a line: opened, read with stamps,
-//! lost, and opened again.
+//! lost, and opened again. Also what is plugged in, what keeps us from it, and what answers there.
 //!
 //! The drivers themselves are in the devices' crates and do no I/O; see [`headrace_core::app::driver`].
 
 mod clock;
 mod crew;
+mod discover;
 mod lines;
+mod probe;
+mod remedy;
 mod service;
 mod stand;
 mod status;
@@ -14,6 +17,8 @@ pub mod uhid;
 
 pub use clock::{clock_anchor, now, of_wall};
 pub use crew::{Crew, Hand};
+pub use discover::{Found, Machine, Presence, Rights, User, discover, presence};
+pub use probe::{Answer, probe};
 pub use service::SentSink;
 pub use stand::{Stand, wait_for_any};
 pub use status::{Board, LineHistory, Phase, Status};

@@ -3,6 +3,11 @@
 use std::fmt;
 use std::io;
 
+use headrace_core::config::ConnectError;
+
+use crate::discover::remedy_for;
+use crate::remedy;
+
 /// What kind of trouble.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TroubleKind {
@@ -37,7 +42,7 @@ impl fmt::Display for Trouble {
 }
 
 impl Trouble {
-    fn new(kind: TroubleKind, why: String, remedy: Option<&str>) -> Self {
+    pub(crate) fn new(kind: TroubleKind, why: String, remedy: Option<&str>) -> Self {
         Self { kind, why, remedy: remedy.map(str::to_owned) }
     }
 
@@ -46,15 +51,8 @@ impl Trouble {
         use io::ErrorKind as E;
         let why = |words: &str| format!("opening {what}: {words}");
         match error.kind() {
-            E::NotFound => Self::new(
-                TroubleKind::Absent,
-                why("it isn't there"),
-                Some("plug it in, or see headrace devices"),
-            ),
-            E::PermissionDenied => {
-                let remedy = format!("see headrace devices, or allow it to this user: {}", group_line(what));
-                Self::new(TroubleKind::Denied, why("this user may not open it"), Some(&remedy))
-            }
+            E::NotFound => Self::not_there(what),
+            E::PermissionDenied => Self::denied(what, &remedy_for(what)),
             E::ConnectionRefused | E::TimedOut | E::HostUnreachable | E::NetworkUnreachable => {
                 Self::new(TroubleKind::Absent, why(&format!("nobody answers there ({error})")), None)
             }
@@ -71,18 +69,39 @@ impl Trouble {
         const ENODEV: i32 = 19;
         const EAFNOSUPPORT: i32 = 97;
         match error.raw_os_error() {
-            Some(ENODEV) => Self::new(
-                TroubleKind::Absent,
-                format!("opening {interface}: there is no such interface"),
-                Some("plug the adapter in; ip link shows what there is"),
-            ),
-            Some(EAFNOSUPPORT) => Self::new(
-                TroubleKind::Absent,
-                format!("opening {interface}: this kernel has no CAN"),
-                Some("sudo modprobe can-raw"),
-            ),
+            Some(ENODEV) => Self::no_interface(interface),
+            Some(EAFNOSUPPORT) => Self::no_can(interface),
             _ => Self::opening(interface, error),
         }
+    }
+
+    /// There is no such device file or host.
+    pub(crate) fn not_there(what: &str) -> Self {
+        let why = format!("opening {what}: it isn't there");
+        Self::new(TroubleKind::Absent, why, Some("plug it in, or see headrace devices"))
+    }
+
+    /// The rights to a device file don't suffice.
+    pub(crate) fn denied(path: &str, remedy: &str) -> Self {
+        Self::new(TroubleKind::Denied, format!("opening {path}: this user may not open it"), Some(remedy))
+    }
+
+    /// There is no such CAN interface.
+    pub(crate) fn no_interface(interface: &str) -> Self {
+        let why = format!("opening {interface}: there is no such CAN interface");
+        Self::new(TroubleKind::Absent, why, Some(&remedy::no_interface(interface)))
+    }
+
+    /// The kernel has no sockets for CAN.
+    pub(crate) fn no_can(interface: &str) -> Self {
+        let why = format!("opening {interface}: this kernel has no CAN sockets");
+        Self::new(TroubleKind::Absent, why, Some(remedy::CAN_RAW))
+    }
+
+    /// A `connect` that can't be used, as it stands in a vehicle file.
+    pub fn unusable(error: &ConnectError) -> Self {
+        let ConnectError { text, problem, allowed } = error;
+        Self::new(TroubleKind::Other, format!("connect = {text:?}: {problem}"), Some(allowed))
     }
 
     pub(crate) fn not_plugged_in(what: &str) -> Self {
@@ -98,16 +117,5 @@ impl Trouble {
     #[cfg(not(target_os = "linux"))]
     pub(crate) fn unsupported(what: &str) -> Self {
         Self::new(TroubleKind::Other, format!("opening {what}: this system has no such ports for us"), None)
-    }
-}
-
-/// The line that gives this user the right to a device file.
-fn group_line(path: &str) -> &'static str {
-    if path.starts_with("/dev/hidraw") {
-        "install deploy/udev/70-headrace.rules"
-    } else if path.starts_with("/dev/i2c") {
-        "sudo usermod -aG i2c $USER, and log in again"
-    } else {
-        "sudo usermod -aG dialout $USER, and log in again"
     }
 }

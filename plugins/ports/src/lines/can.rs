@@ -11,6 +11,7 @@ use socketcan::{
 
 use super::{Line, READ_BYTES, waited};
 use crate::clock;
+use crate::discover::{self, Machine};
 use crate::trouble::Trouble;
 
 /// Length of a `can_frame`, and where its data begins.
@@ -30,6 +31,10 @@ pub(super) fn open(interface: &str) -> Result<Box<dyn Line>, Trouble> {
         Ok(socket)
     };
     let socket = opening().map_err(|error| Trouble::can(interface, &error))?;
+    // An interface that is down can be opened, and then says nothing.
+    if let Some(trouble) = discover::down(&Machine::ours(), interface) {
+        return Err(trouble);
+    }
     Ok(Box::new(Can(socket)))
 }
 

@@ -1,0 +1,79 @@
+//! CAN interfaces, as `/sys/class/net` lists them.
+
+use headrace_core::app::driver::Carrier;
+use headrace_core::config::Connect;
+
+use super::{Found, Machine};
+use crate::remedy;
+use crate::trouble::{Trouble, TroubleKind};
+
+const CLASS: &str = "/sys/class/net";
+/// The kind of network that an interface is of. Source: Linux, `ARPHRD_CAN`.
+const CAN: &str = "280";
+/// The bit of an interface's flags that says that it is up. Source: Linux, `IFF_UP`.
+const UP: u32 = 1;
+
+pub(super) fn found(machine: &Machine) -> Vec<Found> {
+    let names = machine.names(CLASS).into_iter();
+    names.filter(|name| is_can(machine, name)).map(|name| describe(machine, name)).collect()
+}
+
+fn is_can(machine: &Machine, name: &str) -> bool {
+    machine.text(&format!("{CLASS}/{name}/type")).as_deref() == Some(CAN)
+}
+
+/// Whether it is up, where its flags can be read.
+fn is_up(machine: &Machine, name: &str) -> Option<bool> {
+    let flags = machine.text(&format!("{CLASS}/{name}/flags"))?;
+    let flags = u32::from_str_radix(flags.trim_start_matches("0x"), 16).ok()?;
+    Some(flags & UP != 0)
+}
+
+/// Whether there is an adapter behind it, which has a bit rate.
+fn has_hardware(machine: &Machine, name: &str) -> bool {
+    machine.exists(&format!("{CLASS}/{name}/device"))
+}
+
+/// What keeps an interface from being used: it isn't there, or it is down.
+pub(crate) fn down(machine: &Machine, name: &str) -> Option<Trouble> {
+    if is_up(machine, name)? {
+        return None;
+    }
+    let why = format!("opening {name}: the interface is down");
+    let mends = remedy::set_up(name, has_hardware(machine, name));
+    Some(Trouble::new(TroubleKind::Other, why, Some(&mends)))
+}
+
+/// What keeps an interface from being used, or would.
+pub(super) fn troubles(machine: &Machine, name: &str) -> Vec<Trouble> {
+    if !is_can(machine, name) {
+        return vec![Trouble::no_interface(name)];
+    }
+    let state = machine.text(&format!("{CLASS}/{name}/operstate"));
+    let silenced = state.as_deref() == Some("down") && is_up(machine, name) == Some(true);
+    let silenced = silenced.then(|| {
+        let why = format!("opening {name}: the interface is up, but off the bus");
+        Trouble::new(TroubleKind::Other, why, Some(&remedy::back_on_bus(name)))
+    });
+    let has_sockets = machine.has_protocol("CAN_RAW") || machine.has_module("can_raw");
+    let no_sockets = (!has_sockets).then(|| Trouble::no_can(name));
+    down(machine, name).into_iter().chain(silenced).chain(no_sockets).collect()
+}
+
+fn describe(machine: &Machine, name: String) -> Found {
+    let kind = if has_hardware(machine, &name) { "an adapter" } else { "without hardware" };
+    let state = match is_up(machine, &name) {
+        Some(true) => "up",
+        Some(false) => "down",
+        None => "unknown",
+    };
+    Found {
+        carrier: Carrier::Can,
+        says: Some(kind.to_owned()),
+        connect: Some(Connect::Can { interface: name.clone() }.to_string()),
+        details: vec![("state", state.to_owned())],
+        rights: None,
+        troubles: troubles(machine, &name),
+        name,
+    }
+}

@@ -1,0 +1,48 @@
+//! I2C buses, as `/sys/bus/i2c` lists them.
+
+use headrace_core::app::driver::Carrier;
+
+use super::{Found, Machine, Rights};
+use crate::remedy;
+use crate::trouble::{Trouble, TroubleKind};
+
+const DEVICES: &str = "/sys/bus/i2c/devices";
+
+/// Buses; the folder holds the devices on them as well, under other names.
+pub(super) fn found(machine: &Machine) -> Vec<Found> {
+    let names = machine.names(DEVICES).into_iter();
+    let buses = names.filter(|name| name.strip_prefix("i2c-").is_some_and(|n| n.parse::<u32>().is_ok()));
+    buses.map(|name| describe(machine, &name)).collect()
+}
+
+fn describe(machine: &Machine, name: &str) -> Found {
+    let path = format!("/dev/{name}");
+    let rights = Rights::of(machine, &path);
+    Found {
+        carrier: Carrier::I2c,
+        says: machine.text(&format!("{DEVICES}/{name}/name")),
+        connect: Some(format!("i2c:{path}:ADDRESS")),
+        details: Vec::new(),
+        troubles: trouble(machine, &path).into_iter().collect(),
+        rights,
+        name: path,
+    }
+}
+
+/// What keeps a bus from being used.
+pub(super) fn trouble(machine: &Machine, path: &str) -> Option<Trouble> {
+    if let Some(rights) = Rights::of(machine, path) {
+        return rights.trouble(path);
+    }
+    let bus = path.strip_prefix("/dev/").unwrap_or(path);
+    let why = |words: &str| format!("opening {path}: {words}");
+    Some(if machine.exists(&format!("{DEVICES}/{bus}")) {
+        Trouble::new(TroubleKind::Absent, why("the bus has no device file"), Some(remedy::I2C_DEV))
+    } else {
+        Trouble::new(
+            TroubleKind::Absent,
+            why("there is no such bus"),
+            Some("headrace devices shows what there is"),
+        )
+    })
+}

@@ -1,0 +1,132 @@
+//! The system's files, ours or a copy of another's.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use rustix::fs::{Access, access};
+
+/// Whose right to open things is asked for.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum User {
+    /// Whoever runs this program. The kernel itself is asked, so that access lists count.
+    Ourselves,
+    /// Another one, by the modes of the files alone.
+    Other {
+        /// Number of the user.
+        uid: u32,
+        /// Numbers of all the user's groups.
+        gids: Vec<u32>,
+    },
+}
+
+/// A system whose `/dev`, `/sys`, `/proc`, `/etc` and `/lib` are looked at.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Machine {
+    root: PathBuf,
+    user: User,
+}
+
+impl Machine {
+    /// This one, for whoever runs this program.
+    pub fn ours() -> Self {
+        Self { root: PathBuf::from("/"), user: User::Ourselves }
+    }
+
+    /// One whose folders are below `root`.
+    pub fn below(root: &Path, user: User) -> Self {
+        Self { root: root.to_owned(), user }
+    }
+
+    /// Where a file of it is that it calls `absolute`.
+    pub(super) fn path(&self, absolute: &str) -> PathBuf {
+        self.root.join(absolute.trim_start_matches('/'))
+    }
+
+    pub(super) fn exists(&self, absolute: &str) -> bool {
+        self.path(absolute).exists()
+    }
+
+    /// The text of a file, without spaces around it; `None` where it is empty or can't be read.
+    pub(super) fn text(&self, absolute: &str) -> Option<String> {
+        text(&self.path(absolute))
+    }
+
+    /// The names in a folder, `ttyUSB2` before `ttyUSB10`.
+    pub(super) fn names(&self, folder: &str) -> Vec<String> {
+        let entries = fs::read_dir(self.path(folder)).into_iter().flatten().flatten();
+        let mut names: Vec<String> =
+            entries.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
+        names.sort_by_cached_key(|name| {
+            let stem = name.trim_end_matches(|c: char| c.is_ascii_digit()).to_owned();
+            let number: u64 = name.get(stem.len()..).and_then(|digits| digits.parse().ok()).unwrap_or(0);
+            (stem, number)
+        });
+        names
+    }
+
+    /// The user's number and those of the groups.
+    pub(super) fn ids(&self) -> (u32, Vec<u32>) {
+        match &self.user {
+            User::Other { uid, gids } => (*uid, gids.clone()),
+            User::Ourselves => {
+                let groups = rustix::process::getgroups().unwrap_or_default();
+                let own = rustix::process::getegid();
+                let gids = groups.into_iter().chain([own]).map(rustix::process::Gid::as_raw);
+                (rustix::process::geteuid().as_raw(), gids.collect())
+            }
+        }
+    }
+
+    /// Whether the kernel says that the file may be read and written, where it is to be asked.
+    pub(super) fn asked_kernel(&self, absolute: &str) -> Option<bool> {
+        (self.user == User::Ourselves)
+            .then(|| access(self.path(absolute), Access::READ_OK | Access::WRITE_OK).is_ok())
+    }
+
+    /// The name that `/etc/group` or `/etc/passwd` has for a number; both have it third.
+    pub(super) fn name_of(&self, file: &str, number: u32) -> Option<String> {
+        let all = self.text(file)?;
+        let line = all.lines().find(|line| line.split(':').nth(2) == Some(number.to_string().as_str()))?;
+        line.split(':').next().map(str::to_owned)
+    }
+
+    /// Whether `/etc/group` lists the user in a group, wherever this session was begun.
+    pub(super) fn is_listed(&self, group: &str) -> bool {
+        let listed = || {
+            let user = self.name_of("/etc/passwd", self.ids().0)?;
+            let all = self.text("/etc/group")?;
+            let line = all.lines().find(|line| line.split(':').next() == Some(group))?;
+            Some(line.rsplit(':').next()?.split(',').any(|member| member == user))
+        };
+        listed().unwrap_or(false)
+    }
+
+    /// Whether the kernel has a protocol of this name registered, be it by a module or built in.
+    pub(super) fn has_protocol(&self, name: &str) -> bool {
+        let all = self.text("/proc/net/protocols").unwrap_or_default();
+        all.lines().any(|line| line.split_whitespace().next() == Some(name))
+    }
+
+    /// Whether the kernel has a module, or could load it; `name` with underscores.
+    pub(super) fn has_module(&self, name: &str) -> bool {
+        let is_it = |path: &str| {
+            let file = path.trim_end_matches(':').rsplit('/').next().unwrap_or_default();
+            file.split('.').next().is_some_and(|stem| stem.replace('-', "_") == name)
+        };
+        let loaded = self.text("/proc/modules").unwrap_or_default();
+        let release = self.text("/proc/sys/kernel/osrelease").unwrap_or_default();
+        let listed = ["modules.builtin", "modules.dep"].into_iter().any(|list| {
+            let list = self.text(&format!("/lib/modules/{release}/{list}")).unwrap_or_default();
+            list.lines().filter_map(|line| line.split_whitespace().next()).any(is_it)
+        });
+        listed
+            || self.exists(&format!("/sys/module/{name}"))
+            || loaded.lines().any(|line| line.split_whitespace().next() == Some(name))
+    }
+}
+
+/// The text of a file, without spaces around it; `None` where it is empty or can't be read.
+pub(super) fn text(path: &Path) -> Option<String> {
+    let bytes = fs::read(path).ok()?;
+    Some(String::from_utf8_lossy(&bytes).trim().to_owned()).filter(|text| !text.is_empty())
+}

@@ -1,0 +1,57 @@
+//! Whether what a `connect` names is there and may be opened.
+
+use headrace_core::config::{Connect, SerialPort, UsbIdentity};
+
+use super::{Machine, Rights, can, hid, i2c, serial};
+use crate::trouble::Trouble;
+
+/// What is known of what a `connect` names.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Presence {
+    /// It is there, and may be opened, under this name.
+    There(String),
+    /// An address on the network: only asking can tell.
+    Elsewhere,
+}
+
+/// Whether what `connect` names is there and may be opened. Nothing is opened for it.
+///
+/// Errors: it isn't there, it is there more than once, or it may not be opened; with what mends it.
+pub fn presence(machine: &Machine, connect: &Connect) -> Result<Presence, Trouble> {
+    match connect {
+        Connect::Serial { port: SerialPort::Path(path), .. } => file(machine, path),
+        Connect::Serial { port: SerialPort::Usb(identity), .. } => {
+            let what = format!("serial:usb:{identity}");
+            file(machine, &one(&what, serial::adapters(machine), identity)?)
+        }
+        Connect::Hid(identity) => {
+            let what = format!("hid:{identity}");
+            file(machine, &one(&what, hid::identities(machine), identity)?)
+        }
+        Connect::Can { interface } => match can::troubles(machine, interface).into_iter().next() {
+            Some(trouble) => Err(trouble),
+            None => Ok(Presence::There(interface.clone())),
+        },
+        Connect::I2c { bus, .. } => match i2c::trouble(machine, bus) {
+            Some(trouble) => Err(trouble),
+            None => Ok(Presence::There(bus.clone())),
+        },
+        Connect::Tcp { .. } | Connect::Udp { .. } | Connect::UdpListen { .. } => Ok(Presence::Elsewhere),
+    }
+}
+
+/// The path of the one device that fits.
+fn one(what: &str, all: Vec<(String, UsbIdentity)>, wanted: &UsbIdentity) -> Result<String, Trouble> {
+    let fitting = all.into_iter().filter(|(_, got)| serial::fits(got, wanted));
+    let mut paths: Vec<String> = fitting.map(|(path, _)| path).collect();
+    match paths.len() {
+        0 => Err(Trouble::not_plugged_in(what)),
+        1 => Ok(paths.remove(0)),
+        _ => Err(Trouble::ambiguous(what, &paths)),
+    }
+}
+
+fn file(machine: &Machine, path: &str) -> Result<Presence, Trouble> {
+    let rights = Rights::of(machine, path).ok_or_else(|| Trouble::not_there(path))?;
+    rights.trouble(path).map_or_else(|| Ok(Presence::There(path.to_owned())), Err)
+}

@@ -1,0 +1,68 @@
+//! Asking what is on a line.
+
+use std::io;
+use std::time::Duration;
+
+use headrace_core::app::driver::Probe;
+use headrace_core::config::Connect;
+use headrace_core::time::DurNs;
+
+use crate::clock;
+use crate::lines::{self, Line, READ_BYTES};
+use crate::trouble::Trouble;
+
+/// How long the answer to a question may take.
+const ANSWER_TIME: DurNs = DurNs::from_millis(400);
+
+/// What came of asking.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Answer {
+    /// What a device says that it is.
+    Is(String),
+    /// So many bytes came that none of the probes understood.
+    Unknown(u64),
+    /// Nothing came.
+    Silence,
+}
+
+/// Opens a line and asks on it, one kind of device after the other, until one has said what it is. A question without an
+/// answer takes 0.4 s.
+///
+/// Errors: the line can't be opened, or breaks; with what would mend it.
+pub fn probe(connect: &Connect, probes: &mut [Box<dyn Probe>]) -> Result<Answer, Trouble> {
+    let mut line = lines::open(connect)?;
+    let mut unknown = 0;
+    for probe in probes {
+        let asked = ask(line.as_mut(), probe.as_mut(), &mut unknown);
+        if let Some(identity) = asked.map_err(|error| Trouble::opening(&connect.to_string(), &error))? {
+            return Ok(Answer::Is(identity));
+        }
+    }
+    Ok(if unknown > 0 { Answer::Unknown(unknown) } else { Answer::Silence })
+}
+
+fn ask(line: &mut dyn Line, probe: &mut dyn Probe, bytes: &mut u64) -> io::Result<Option<String>> {
+    let mut buffer = [0; READ_BYTES];
+    for question in probe.questions() {
+        line.write(&question)?;
+        let until = clock::now() + ANSWER_TIME;
+        loop {
+            let left = until.since(clock::now());
+            if left.0 <= 0 {
+                break;
+            }
+            let Some((_, count)) = line.read(clock::duration(left).max(SHORTEST), &mut buffer)? else {
+                continue;
+            };
+            *bytes += count as u64;
+            probe.heard(buffer.get(..count).unwrap_or_default());
+            if let Some(identity) = probe.identity() {
+                return Ok(Some(identity));
+            }
+        }
+    }
+    Ok(None)
+}
+
+/// The shortest wait that isn't none.
+const SHORTEST: Duration = Duration::from_millis(1);

@@ -1,0 +1,56 @@
+//! The lines that mend what keeps a port from being used; `run` and `devices` say the same.
+
+/// Bits a second that a CAN interface is set up with where nothing else is known, as in `deploy/systemd/can@.service`.
+const CAN_BITRATE: u32 = 250_000;
+
+/// The device's group may open it, and the user isn't in it.
+pub(crate) fn join(group: &str) -> String {
+    format!("sudo usermod -aG {group} $USER, and log in again")
+}
+
+/// The user has been put into the group since this session was begun.
+pub(crate) fn log_in_again(group: &str) -> String {
+    format!("log in again: this user has been put into the group {group} since")
+}
+
+/// The device's group may not open it, or is root's.
+pub(crate) fn rule(path: &str) -> String {
+    if path.starts_with("/dev/hidraw") {
+        "install deploy/udev/70-headrace.rules, with the ids of this device in it, and sudo udevadm trigger"
+            .into()
+    } else if path.starts_with("/dev/i2c") {
+        "install deploy/udev/70-headrace.rules, and sudo udevadm trigger".into()
+    } else {
+        format!("sudo chgrp dialout {path} && sudo chmod 660 {path}; {}", join("dialout"))
+    }
+}
+
+/// A CAN interface is down; those without hardware have no bit rate.
+pub(crate) fn set_up(interface: &str, has_bitrate: bool) -> String {
+    if has_bitrate {
+        format!("sudo ip link set {interface} up type can bitrate {CAN_BITRATE}, with the rate of the bus")
+    } else {
+        format!("sudo ip link set {interface} up")
+    }
+}
+
+/// A CAN interface is up, but has left the bus.
+pub(crate) fn back_on_bus(interface: &str) -> String {
+    format!("see to bit rate, wiring and termination: ip -details link show {interface}")
+}
+
+/// There is no such CAN interface.
+pub(crate) fn no_interface(interface: &str) -> String {
+    if interface.starts_with("vcan") {
+        format!("sudo modprobe vcan; sudo ip link add {interface} type vcan; {}", set_up(interface, false))
+    } else {
+        "plug the adapter in; ip link shows what there is".into()
+    }
+}
+
+/// The kernel has no raw CAN sockets.
+pub(crate) const CAN_RAW: &str = "sudo modprobe can-raw";
+
+/// I2C buses have no device files.
+pub(crate) const I2C_DEV: &str =
+    "sudo modprobe i2c-dev; to have it at each start: echo i2c-dev | sudo tee /etc/modules-load.d/i2c.conf";
