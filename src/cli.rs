@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
+use headrace_core::config::Connect;
 use headrace_core::sampling::layout::HeadLayout;
 
 /// On-board coverage monitor for sonar inspection of flooded hydroelectric tunnels.
@@ -67,6 +68,15 @@ pub(crate) enum Command {
         after_help = "Example:\n  headrace emulate deploy/scenes/demo.toml --out /tmp/rehearsal\n  headrace run /tmp/rehearsal/vehicle.toml"
     )]
     Emulate(Emulate),
+    /// Show what is plugged in, who may open it, and what is missing, each with the line that mends it.
+    ///
+    /// Nothing is opened, unless --probe or --address asks for it: then 881 heads and Ping devices say what they are, with
+    /// one short ping and no movement. Not while a dive runs; and other devices on serial ports get bytes that aren't for
+    /// them. With --vehicle exit code 1 when a sensor's port isn't there or may not be opened.
+    #[command(
+        after_help = "Example:\n  headrace devices\n  headrace devices --probe --address tcp:192.168.0.5:4040\n  headrace devices --vehicle vehicle.toml"
+    )]
+    Devices(Devices),
     /// Say what is wrong with a vehicle file, or what it describes.
     #[command(after_help = "Example:\n  headrace check deploy/vehicles/vita2-4.toml")]
     Check(Check),
@@ -295,6 +305,22 @@ pub(crate) struct Calibrate {
 }
 
 #[derive(Debug, Args)]
+pub(crate) struct Devices {
+    /// Ask on each serial port that may be opened, at 115200 baud, and at the addresses of the vehicle file.
+    #[arg(long)]
+    pub(crate) probe: bool,
+    /// Address to ask at; may be given several times.
+    #[arg(long, value_name = "tcp:HOST:PORT|udp:HOST:PORT", value_parser = address)]
+    pub(crate) address: Vec<Connect>,
+    /// Vehicle file, of whose sensors is said whether their ports are there.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) vehicle: Option<PathBuf>,
+    /// Print JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Args)]
 pub(crate) struct Check {
     /// Vehicle file.
     pub(crate) vehicle: PathBuf,
@@ -344,6 +370,13 @@ fn speed(text: &str) -> Result<Speed, String> {
         .filter(|factor| (0.01..=10_000.0).contains(factor))
         .map(|factor| Speed(Some(factor)))
         .ok_or_else(|| "wanted is max, or a number from 0.01x to 10000x".to_owned())
+}
+
+fn address(text: &str) -> Result<Connect, String> {
+    match Connect::parse(text) {
+        Ok(connect @ (Connect::Tcp { .. } | Connect::Udp { .. })) => Ok(connect),
+        _ => Err("wanted is tcp:HOST:PORT or udp:HOST:PORT".to_owned()),
+    }
 }
 
 fn target(text: &str) -> Result<f64, String> {

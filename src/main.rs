@@ -9,6 +9,7 @@ mod emulate;
 mod expect;
 mod failure;
 mod files;
+mod inventory;
 mod live;
 mod output;
 mod paper;
@@ -39,6 +40,7 @@ fn main() -> ExitCode {
         Command::Plan(args) => plan::plan(&args),
         Command::Calibrate(args) => calibrate::calibrate(&args),
         Command::Emulate(args) => emulate::emulate(&args),
+        Command::Devices(args) => inventory::devices(&args),
         Command::Check(check) => commands::check(&check),
         Command::Paper(args) => paper::paper(&args),
     };
