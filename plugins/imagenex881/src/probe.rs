@@ -54,8 +54,9 @@ impl Probe for HeadProbe {
 
     fn identity(&self) -> Option<String> {
         let Header { tag, head_id, status, position, .. } = self.found?;
+        // An id that sounders have as well; their positions mean nothing.
         if Model::of_head_id(head_id) == Model::Sounder852 {
-            return Some(format!("Imagenex 852 sounder or a head of its id, head_id = {head_id:#04x}"));
+            return Some(format!("Imagenex 881 family or 852 sounder, head_id = {head_id:#04x}"));
         }
         let model = if tag.is_gs() { "881 with attitude sensors (GS)" } else { "881 family" };
         let degrees = f64::from(i32::from(position) - ZERO_COUNT) * DEGREES_A_COUNT;
