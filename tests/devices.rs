@@ -30,9 +30,9 @@ fn vehicle_text(sensors: &[(&str, String)]) -> String {
     let mut text =
         include_str!("../deploy/vehicles/pipe.toml").split("[[sensors]]").next().unwrap().to_owned();
     for (number, (keys, connect)) in sensors.iter().enumerate() {
-        text += &format!(
-            "[[sensors]]\nid = \"sensor_{number}\"\n{keys}\nconnect = \"{connect}\"\nposition_m = [0.1, 0.0, 0.0]\nangles_deg = [0, 0, 0]\n"
-        );
+        let table = format!("[[sensors]]\nid = \"sensor_{number}\"\n{keys}\nconnect = \"{connect}\"\n");
+        text.push_str(&table);
+        text.push_str("position_m = [0.1, 0.0, 0.0]\nangles_deg = [0, 0, 0]\n");
     }
     text
 }
