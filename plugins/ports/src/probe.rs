@@ -34,7 +34,7 @@ pub fn probe(connect: &Connect, probes: &mut [Box<dyn Probe>]) -> Result<Answer,
     let mut unknown = 0;
     for probe in probes {
         let asked = ask(line.as_mut(), probe.as_mut(), &mut unknown);
-        if let Some(identity) = asked.map_err(|error| Trouble::opening(&connect.to_string(), &error))? {
+        if let Some(identity) = asked.map_err(|error| Trouble::asking(&connect.to_string(), &error))? {
             return Ok(Answer::Is(identity));
         }
     }

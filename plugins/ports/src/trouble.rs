@@ -46,6 +46,16 @@ impl Trouble {
         Self { kind, why, remedy: remedy.map(str::to_owned) }
     }
 
+    /// An open line has failed while its device was asked.
+    pub(crate) fn asking(what: &str, error: &io::Error) -> Self {
+        let Self { kind, remedy, .. } = Self::opening(what, error);
+        let why = match kind {
+            TroubleKind::Absent => format!("asking at {what}: nobody answers there ({error})"),
+            _ => format!("asking at {what}: {error}"),
+        };
+        Self { kind, why, remedy }
+    }
+
     /// Opening `what` has failed.
     pub(crate) fn opening(what: &str, error: &io::Error) -> Self {
         use io::ErrorKind as E;
@@ -54,7 +64,8 @@ impl Trouble {
             E::NotFound => Self::not_there(what),
             E::PermissionDenied => Self::denied(what, &remedy_for(what)),
             E::ConnectionRefused | E::TimedOut | E::HostUnreachable | E::NetworkUnreachable => {
-                Self::new(TroubleKind::Absent, why(&format!("nobody answers there ({error})")), None)
+                let words = format!("nobody answers there ({error})");
+                Self::new(TroubleKind::Absent, why(&words), Some(remedy::NOBODY_ANSWERS))
             }
             E::ResourceBusy | E::AddrInUse => {
                 Self::new(TroubleKind::Busy, why("another program has it"), Some("close that one"))
