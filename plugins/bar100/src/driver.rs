@@ -44,7 +44,9 @@ impl Bar100Driver {
                 self.good_frames += 1;
                 self.complaint = None;
                 self.bad_in_a_row = 0;
-                if matches!(transaction, Transaction::Memory(_)) {
+                // Of two answers to one question the second is none to the next.
+                let asked = CALIBRATION_CELLS.get(self.cell);
+                if matches!(&transaction, Transaction::Memory(read) if Some(&read.cell) == asked) {
                     self.cell += 1;
                     let done = self.cell == CALIBRATION_CELLS.len();
                     self.next_at = if done { at + AFTER_CALIBRATION } else { at };
@@ -95,5 +97,51 @@ impl Driver for Bar100Driver {
         let identity = (self.cell == CALIBRATION_CELLS.len()).then(|| "Keller LD pressure sensor".to_owned());
         let complaint = self.complaint.as_ref().map(TransactionError::to_string);
         Standing { good_frames: self.good_frames, identity, complaint }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::codec::{MemoryWord, Status};
+
+    #[derive(Default)]
+    struct Bus(Vec<u8>);
+
+    impl Wire for Bus {
+        fn send(&mut self, _: &[u8]) {
+            panic!("all is asked by transactions");
+        }
+
+        fn exchange(&mut self, write: &[u8], _: DurNs, _: usize) {
+            self.0.extend_from_slice(write);
+        }
+
+        fn deliver(&mut self, _: MonoNs, _: &[u8]) {}
+    }
+
+    /// The first cell is asked for twice since its answer is late; its second answer is none to the question after it, which
+    /// is lost and asked again.
+    #[test]
+    fn a_late_answer_stands_for_no_other_cell() {
+        let (mut driver, mut bus) = (Bar100Driver::new(10.0), Bus::default());
+        driver.opened(MonoNs(0), &mut bus);
+        let answer = |cell| MemoryWord { cell, status: Status::IDLE, word: 7 }.encode();
+        let go_on = |driver: &mut Bar100Driver, bus: &mut Bus| {
+            let now = driver.due().unwrap();
+            driver.wake(now, bus);
+            now
+        };
+        go_on(&mut driver, &mut bus);
+        let now = go_on(&mut driver, &mut bus);
+        driver.heard(now, &answer(0x12), &mut bus);
+        let now = go_on(&mut driver, &mut bus);
+        driver.heard(now, &answer(0x12), &mut bus);
+        for cell in CALIBRATION_CELLS.into_iter().skip(1) {
+            let now = go_on(&mut driver, &mut bus);
+            driver.heard(now, &answer(cell), &mut bus);
+        }
+        go_on(&mut driver, &mut bus);
+        assert_eq!(bus.0, [0x12, 0x12, 0x13, 0x13, 0x14, 0x15, 0x16, MEASURE]);
     }
 }
