@@ -18,6 +18,8 @@ const SILENCE: DurNs = DurNs::from_millis(50);
 const ANSWER_TIME: DurNs = DurNs::from_millis(150);
 /// What a ping may take beyond the interval.
 const PING_TIME: DurNs = DurNs::from_millis(250);
+/// How often a setting is said that isn't acknowledged, before the next one's turn.
+const TRIES: u32 = 4;
 /// How often the speed of sound is asked for: other clients of a bridge can change it.
 const LOOK_PERIOD: DurNs = DurNs::from_millis(10_000);
 
@@ -39,6 +41,8 @@ pub struct PingDriver {
     /// Messages that come before the next distance.
     to_say: VecDeque<(Asked, Vec<u8>)>,
     asked: Option<(Asked, MonoNs)>,
+    /// The setting in flight, and how often it may still be said.
+    again: Option<(Vec<u8>, u32)>,
     next_at: MonoNs,
     look_at: MonoNs,
     device: Option<DeviceInformation>,
@@ -53,6 +57,7 @@ impl PingDriver {
             cutter: Cutter::new(Frames, SILENCE),
             to_say: VecDeque::new(),
             asked: None,
+            again: None,
             next_at: MonoNs(0),
             look_at: MonoNs(0),
             device: None,
@@ -110,7 +115,17 @@ impl PingDriver {
         if let Some((asked, bytes)) = self.to_say.pop_front() {
             wire.send(&bytes);
             self.asked = Some((asked, now));
+            self.again = matches!(asked, Asked::Setting(_)).then_some((bytes, TRIES - 1));
         }
+    }
+
+    /// Nothing has answered in time. A setting is said again: a device that hasn't heard it measures otherwise.
+    fn give_up(&mut self, asked: Asked, now: MonoNs, wire: &mut dyn Wire) {
+        self.asked = None;
+        let Some((bytes, tries)) = self.again.take().filter(|(_, tries)| *tries > 0) else { return };
+        wire.send(&bytes);
+        self.asked = Some((asked, now));
+        self.again = Some((bytes, tries - 1));
     }
 
     /// A message of the device, or of what was taken for it.
@@ -142,6 +157,7 @@ impl PingDriver {
         };
         if done {
             self.asked = None;
+            self.again = None;
         }
     }
 
@@ -157,7 +173,8 @@ impl PingDriver {
         let other = self.device.filter(|device| device.device_type != ECHOSOUNDER);
         other
             .map(|device| match device.device_type {
-                2 => "is a Ping360, no echosounder; another is on this line than connect says".to_owned(),
+                2 => "is a Ping360, no echosounder; connect leads to another device than this sensor"
+                    .to_owned(),
                 other => format!("is a device of type {other}; an echosounder is of type {ECHOSOUNDER}"),
             })
             .or_else(|| self.refused.clone())
@@ -171,6 +188,7 @@ impl Driver for PingDriver {
         self.device = None;
         self.refused = None;
         self.asked = None;
+        self.again = None;
         self.next_at = now;
         self.look_at = now + LOOK_PERIOD;
         self.next(now, wire);
@@ -204,8 +222,10 @@ impl Driver for PingDriver {
 
     fn wake(&mut self, now: MonoNs, wire: &mut dyn Wire) {
         self.heard(now, &[], wire);
-        if self.asked.is_some_and(|(asked, at)| now.since(at) >= self.timeout(asked)) {
-            self.asked = None;
+        if let Some((asked, at)) = self.asked
+            && now.since(at) >= self.timeout(asked)
+        {
+            self.give_up(asked, now, wire);
         }
         if self.asked.is_none() {
             self.next(now, wire);

@@ -17,6 +17,9 @@ use crate::settings::Settings;
 /// Where an emulated device listens: up to the practical limit of a `Ping1D`.
 const SCAN: ScanRange = ScanRange { start_mm: 0, length_mm: 30_000 };
 
+/// A frame's bytes follow one another on the line.
+const SILENCE: DurNs = DurNs::from_millis(50);
+
 /// Everyone on the line is meant.
 const EVERYONE: u8 = 255;
 
@@ -49,6 +52,7 @@ pub struct PingEmulator {
     device_mmps: u32,
     interval: DurNs,
     codec: PingCodec,
+    heard_at: MonoNs,
     pings: u32,
     /// When it next pings without being asked by a real host: polled by an emulated one, or continuously.
     ping_at: Option<MonoNs>,
@@ -69,6 +73,7 @@ impl PingEmulator {
             device_mmps: settings.sound_speed_mmps(),
             interval: settings.interval,
             codec: PingCodec::default(),
+            heard_at: setup.start,
             pings: 0,
             ping_at: setup.polled.then_some(setup.start),
             waiting: Vec::new(),
@@ -168,6 +173,11 @@ impl Emulator<Sounding> for PingEmulator {
 
     fn hear(&mut self, at: MonoNs, bytes: &[u8], line: LineSink<'_>) {
         let mut heard = Vec::new();
+        // A frame that lost bytes on its way must not swallow those after it.
+        if at.since(self.heard_at) > SILENCE {
+            self.codec.flush(&mut |value| heard.push(value));
+        }
+        self.heard_at = at;
         self.codec.push(bytes, &mut |value| heard.push(value));
         for Addressed { destination, message, .. } in heard {
             let meant = [self.settings.device_id, EVERYONE].contains(&destination);

@@ -20,6 +20,8 @@ struct Rig {
     heard: Vec<(MonoNs, Message)>,
     /// Every message of this number from the host is lost; 0 loses none.
     loses: usize,
+    /// The one message from the host that is lost besides, by its number.
+    loses_only: Option<usize>,
 }
 
 #[derive(Default)]
@@ -53,7 +55,7 @@ impl Rig {
         let setup = EmulatorSetup { start: now, head: None, site: Site::default(), polled: false };
         let device = PingEmulator::new(settings, LATENCY, &setup);
         let (line, sent, heard) = (Vec::new(), Vec::new(), Vec::new());
-        Self { driver: PingDriver::new(settings), device, now, line, sent, heard, loses }
+        Self { driver: PingDriver::new(settings), device, now, line, sent, heard, loses, loses_only: None }
     }
 
     fn drive(&mut self, call: impl FnOnce(&mut PingDriver, MonoNs, &mut dyn Wire)) {
@@ -62,7 +64,8 @@ impl Rig {
         self.heard.extend(ends.heard.iter().map(|(at, bytes)| (*at, message(bytes))));
         for bytes in ends.sent {
             self.sent.push(message(&bytes));
-            if self.loses == 0 || !self.sent.len().is_multiple_of(self.loses) {
+            let lost = self.loses_only == Some(self.sent.len());
+            if !lost && (self.loses == 0 || !self.sent.len().is_multiple_of(self.loses)) {
                 let line = &mut self.line;
                 self.device.hear(self.now, &bytes, &mut |_, at, bytes| line.push((at, bytes.to_vec())));
             }
@@ -136,6 +139,28 @@ fn a_line_that_loses_messages_costs_those_and_a_wait() {
     let mut rig = Rig::new("interval_ms = 50", 7);
     rig.run(20.0);
     assert!(rig.distances() > 180, "{}", rig.distances());
+}
+
+#[test]
+fn a_setting_that_is_lost_is_said_again() {
+    for lost in 2..12 {
+        let mut rig = Rig::new("interval_ms = 50\nsound_speed_mps = 1447\nscan_m = 8\ngain = 2", 0);
+        rig.loses_only = Some(lost);
+        rig.run(3.0);
+        let twice: Vec<_> = rig.sent.windows(2).filter(|two| two[0] == two[1]).collect();
+        let is_setting = |message: &Message| *message != Message::GeneralRequest(id::DISTANCE);
+        let again = twice.iter().filter(|two| is_setting(&two[0])).count();
+        assert_eq!(again, usize::from(is_setting(&rig.sent[lost - 1])), "of the message of number {lost}");
+    }
+}
+
+#[test]
+fn a_device_that_answers_nothing_is_told_each_setting_and_asked_for_distances() {
+    let mut rig = Rig::new("interval_ms = 50", 1);
+    rig.run(10.0);
+    let said = |wanted: Message| rig.sent.iter().filter(|sent| **sent == wanted).count();
+    assert_eq!(said(Message::SetPingEnable(true)), 4);
+    assert!(said(Message::GeneralRequest(id::DISTANCE)) > 3);
 }
 
 #[test]
