@@ -34,6 +34,9 @@ const AHEAD_PINGS: u64 = 10;
 /// Turns behind its program after which a head that answers is said to be too slow for its settings.
 const TOO_SLOW_SHARE: u64 = 8;
 
+/// Commands of the last 32 that went unanswered from which on it is the line that keeps a head behind.
+const LOSSY_FROM: u32 = 3;
+
 /// What the last command was for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Aim {
@@ -60,6 +63,8 @@ pub struct HeadDriver {
     /// The ping to go on with after the way home.
     joins_at: u64,
     unanswered: u32,
+    /// The last commands, a bit each, the latest the lowest: whether it went unanswered.
+    losses: u32,
     /// Whether it has once been on its program.
     joined: bool,
     last_position: Option<u16>,
@@ -86,6 +91,7 @@ impl HeadDriver {
             way_home: VecDeque::new(),
             joins_at: 0,
             unanswered: 0,
+            losses: 0,
             joined: false,
             last_position: None,
             foreign_id: None,
@@ -134,6 +140,7 @@ impl HeadDriver {
         }
         self.asked = None;
         self.unanswered = 0;
+        self.losses <<= 1;
         self.last_position = Some(position);
         match aim {
             Aim::Locate => self.join(position, header.clockwise, now),
@@ -202,6 +209,7 @@ impl HeadDriver {
     fn give_up(&mut self, now: MonoNs) {
         self.asked = None;
         self.unanswered = self.unanswered.saturating_add(1);
+        self.losses = self.losses << 1 | 1;
         let seldom = self.unanswered > ASK_SELDOM_AFTER;
         self.locate(if seldom { now + SELDOM } else { now });
     }
@@ -217,6 +225,10 @@ impl HeadDriver {
             );
         }
         (self.behind > self.timetable.len() / TOO_SLOW_SHARE).then(|| {
+            if self.losses.count_ones() >= LOSSY_FROM {
+                return "falls behind since answers get lost; see the cable, its plugs and the line's rate"
+                    .to_owned();
+            }
             let period_ms = self.settings.ping_period.as_secs_f64() * 1000.0;
             format!("can't keep up with a ping each {period_ms:.1} ms; set turn_period_s to what it manages")
         })
