@@ -151,10 +151,15 @@ impl Connect {
             return Ok(self);
         }
         let names: Vec<&str> = carriers.iter().map(|carrier| carrier.as_str()).collect();
+        let names = match names.split_last() {
+            Some((last, [])) => (*last).to_owned(),
+            Some((last, others)) => format!("{} or {last}", others.join(", ")),
+            None => String::new(),
+        };
         Err(ConnectError {
             text: self.to_string(),
-            problem: format!("the device isn't on {}", self.carrier().as_str()),
-            allowed: format!("it is on {}", names.join(" or ")),
+            problem: format!("a device of this kind isn't connected by {}", self.carrier().as_str()),
+            allowed: format!("it is by {names}"),
         })
     }
 }

@@ -57,3 +57,6 @@ pub(crate) const I2C_DEV: &str =
 
 /// Nobody answers at an address.
 pub(crate) const NOBODY_ANSWERS: &str = "see that it is switched on, that its port is right, and that this computer is in its network: ip address";
+
+/// Nobody listens at a port of an address.
+pub(crate) const NOBODY_LISTENS: &str = "is the device switched on, and the port's number right?";

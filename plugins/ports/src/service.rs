@@ -16,6 +16,7 @@ use headrace_core::time::{DurNs, MonoNs};
 use crate::clock;
 use crate::lines::{self, Line, READ_BYTES};
 use crate::status::{Board, LineHistory, Phase, Status};
+use crate::trouble;
 
 /// The least and the longest wait before a line is tried again.
 const FIRST_PAUSE: DurNs = DurNs::from_millis(250);
@@ -61,11 +62,21 @@ struct Seat {
     berth: Berth,
     history: LineHistory,
     status: Option<(Phase, String)>,
-    /// Bytes heard, good frames by then, and when there were last more of either.
+    /// Bytes heard, good frames by then, those of them that had come when the line was opened, and when there were last
+    /// more of either.
     bytes: u64,
     frames: u64,
+    frames_before: u64,
     last_bytes: MonoNs,
     last_frame: MonoNs,
+}
+
+/// How serving a line ended that hasn't failed.
+enum Served {
+    /// We are to end.
+    ToTheEnd,
+    /// All on it have been silent for too long: it is opened anew.
+    InSilence,
 }
 
 /// What drivers want of the line, noted while they are called.
@@ -107,6 +118,7 @@ impl Service {
             status: None,
             bytes: 0,
             frames: 0,
+            frames_before: 0,
             last_bytes: now,
             last_frame: now,
         };
@@ -133,8 +145,11 @@ impl Service {
                         if served >= LONG_ENOUGH && self.seats.iter().any(|seat| seat.last_frame >= opened) {
                             pause = FIRST_PAUSE;
                         }
-                        if let Err(error) = ended {
-                            self.lost(&connect, &error);
+                        match ended {
+                            Ok(Served::ToTheEnd) => (),
+                            // What is to be said of that has been said, and holds until it speaks again.
+                            Ok(Served::InSilence) => self.count_lost(),
+                            Err(error) => self.lost(&connect, &error),
                         }
                     }
                 },
@@ -157,16 +172,22 @@ impl Service {
     }
 
     fn lost(&mut self, connect: &Connect, error: &io::Error) {
+        self.count_lost();
+        let why = trouble::losing(error);
+        self.say_all(Phase::Closed, &format!("lost {connect}: {why}; it is tried again"));
+    }
+
+    fn count_lost(&mut self) {
         for seat in &mut self.seats {
             seat.history.lost += 1;
         }
-        self.say_all(Phase::Closed, &format!("lost {connect}: {error}; it is tried again"));
     }
 
     /// Serves an open line until it fails, all on it have been silent for too long, or the end.
-    fn serve(&mut self, line: &mut dyn Line, opened: MonoNs) -> io::Result<()> {
+    fn serve(&mut self, line: &mut dyn Line, opened: MonoNs) -> io::Result<Served> {
         for seat in &mut self.seats {
             seat.history.opened += 1;
+            seat.frames_before = seat.berth.driver.standing().good_frames;
             (seat.last_bytes, seat.last_frame) = (opened, opened);
         }
         for number in 0..self.seats.len() {
@@ -192,12 +213,11 @@ impl Service {
                 look_at = now + STANDING_PERIOD;
                 self.look(now);
                 if self.seats.iter().all(|seat| seat.is_silent(now)) {
-                    let silence = "nothing has come for too long; it is opened again";
-                    return Err(io::Error::new(io::ErrorKind::TimedOut, silence));
+                    return Ok(Served::InSilence);
                 }
             }
         }
-        Ok(())
+        Ok(Served::ToTheEnd)
     }
 
     /// How long to wait for bytes before a driver wants to be woken.
@@ -218,14 +238,17 @@ impl Service {
         Ok(())
     }
 
-    /// Wakes those who are due, unless another on the line awaits an answer.
+    /// Wakes those who are due, unless another on the line awaits an answer. Of several who await one, as when a line has
+    /// just been opened, the first gives up first: else each would wait for the others for ever.
     fn wake(&mut self, line: &mut dyn Line) -> io::Result<()> {
         for number in 0..self.seats.len() {
             let now = clock::now();
-            let others = self.seats.iter().enumerate().filter(|(other, _)| *other != number);
-            let awaited = others.into_iter().any(|(_, seat)| seat.berth.driver.awaits());
-            let due = self.seats.get(number).and_then(|seat| seat.berth.driver.due());
-            if due.is_some_and(|due| due <= now) && !awaited {
+            let awaits = |seat: &Seat| seat.berth.driver.awaits();
+            let Some(seat) = self.seats.get(number) else { continue };
+            let rivals = if awaits(seat) { number } else { self.seats.len() };
+            let mut others = self.seats.iter().take(rivals).enumerate();
+            let awaited = others.any(|(other, seat)| other != number && awaits(seat));
+            if seat.berth.driver.due().is_some_and(|due| due <= now) && !awaited {
                 self.drive(line, number, |driver, wire| driver.wake(now, wire))?;
                 self.common.waker.unpark();
             }
@@ -298,18 +321,21 @@ impl Seat {
         let Standing { good_frames, identity, complaint } = self.berth.driver.standing();
         if good_frames != self.frames {
             self.frames = good_frames;
-            self.last_frame = now;
+            // Not now: a device is as long silent as no frame has come.
+            self.last_frame = self.last_bytes;
         }
         if let Some(complaint) = complaint {
             return (Phase::Wrong, complaint);
         }
         let seconds = patience.as_secs_f64();
         if now.since(self.last_frame) <= patience {
-            // Before it has said anything it is left alone.
-            return match self.frames {
-                0 => self.status.clone().unwrap_or((Phase::Silent, "the line is open".to_owned())),
-                _ => (Phase::Running, identity.unwrap_or_default()),
-            };
+            if good_frames > self.frames_before {
+                return (Phase::Running, identity.unwrap_or_default());
+            }
+            // A device whose line is opened again since it is silent stays said to be.
+            let silent = self.status.clone().filter(|(phase, _)| *phase == Phase::Silent);
+            let words = "the line is open, and no frame has come yet";
+            return silent.unwrap_or_else(|| (Phase::Silent, words.to_owned()));
         }
         if self.is_silent(now) {
             (Phase::Silent, format!("nothing has come for {seconds:.0} s; is it switched on?"))

@@ -3,7 +3,7 @@
 
 use std::fs::File;
 use std::io::{self, Read as _, Write as _};
-use std::net::{IpAddr, SocketAddr, TcpListener, TcpStream, UdpSocket};
+use std::net::{IpAddr, SocketAddr, TcpListener, TcpStream, ToSocketAddrs, UdpSocket};
 use std::os::fd::{AsFd, BorrowedFd};
 
 use headrace_core::app::driver::Carrier;
@@ -53,13 +53,27 @@ impl Stand {
     pub fn new(carrier: Carrier, at: IpAddr) -> io::Result<Self> {
         match carrier {
             Carrier::Serial => pty(),
-            Carrier::Tcp => tcp(at),
-            Carrier::Udp | Carrier::I2c => udp(at),
+            Carrier::Tcp => tcp((at, 0)),
+            Carrier::Udp | Carrier::I2c => udp((at, 0)),
             #[cfg(target_os = "linux")]
             Carrier::Can => can("vcan0"),
             other => Err(io::Error::new(
                 io::ErrorKind::Unsupported,
                 format!("rehearsing on {} isn't possible here", other.as_str()),
+            )),
+        }
+    }
+
+    /// An end where hosts look for it already: a device of the network that was switched off and on again.
+    ///
+    /// Errors: the address is another's; a carrier on which the system chooses the place.
+    pub fn again(connect: &Connect) -> io::Result<Self> {
+        match connect {
+            Connect::Tcp { address } => tcp(address),
+            Connect::Udp { address } => udp(address),
+            other => Err(io::Error::new(
+                io::ErrorKind::Unsupported,
+                format!("{other} can't be had again; it is the system that chooses it"),
             )),
         }
     }
@@ -213,15 +227,15 @@ fn pty() -> io::Result<Stand> {
     Ok(Stand { end: End::Pty { master: File::from(master) }, connect })
 }
 
-fn tcp(at: IpAddr) -> io::Result<Stand> {
-    let listener = TcpListener::bind((at, 0))?;
+fn tcp(at: impl ToSocketAddrs) -> io::Result<Stand> {
+    let listener = TcpListener::bind(at)?;
     listener.set_nonblocking(true)?;
     let connect = Connect::Tcp { address: listener.local_addr()?.to_string() };
     Ok(Stand { end: End::Tcp { listener, stream: None }, connect })
 }
 
-fn udp(at: IpAddr) -> io::Result<Stand> {
-    let socket = UdpSocket::bind((at, 0))?;
+fn udp(at: impl ToSocketAddrs) -> io::Result<Stand> {
+    let socket = UdpSocket::bind(at)?;
     socket.set_nonblocking(true)?;
     let connect = Connect::Udp { address: socket.local_addr()?.to_string() };
     Ok(Stand { end: End::Udp { socket, peers: Vec::new() }, connect })

@@ -34,6 +34,25 @@ pub struct Trouble {
     pub remedy: Option<String>,
 }
 
+/// Why an open line has failed, in words.
+pub(crate) fn losing(error: &io::Error) -> String {
+    /// Input/output error; no such device or address; no such device. Source: Linux, errno.
+    const UNPLUGGED: [i32; 3] = [5, 6, 19];
+    use io::ErrorKind as E;
+    if error.raw_os_error().is_some_and(|number| UNPLUGGED.contains(&number)) {
+        return "the port is gone".to_owned();
+    }
+    match error.kind() {
+        E::ConnectionRefused => "nobody listens there".to_owned(),
+        E::ConnectionReset | E::ConnectionAborted => "the device has closed the connection".to_owned(),
+        // The serial library's own has neither a number nor words.
+        E::BrokenPipe if error.raw_os_error().is_some() => "the device has closed the connection".to_owned(),
+        E::BrokenPipe if error.get_ref().is_none() => "the port is gone".to_owned(),
+        E::TimedOut | E::WouldBlock => "it doesn't take what is sent to it".to_owned(),
+        _ => error.to_string(),
+    }
+}
+
 impl fmt::Display for Trouble {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.why)?;
@@ -63,9 +82,11 @@ impl Trouble {
         match error.kind() {
             E::NotFound => Self::not_there(what),
             E::PermissionDenied => Self::denied(what, &remedy_for(what)),
-            E::ConnectionRefused | E::TimedOut | E::HostUnreachable | E::NetworkUnreachable => {
-                let words = format!("nobody answers there ({error})");
-                Self::new(TroubleKind::Absent, why(&words), Some(remedy::NOBODY_ANSWERS))
+            E::ConnectionRefused => {
+                Self::new(TroubleKind::Absent, why("nobody listens there"), Some(remedy::NOBODY_LISTENS))
+            }
+            E::TimedOut | E::HostUnreachable | E::NetworkUnreachable => {
+                Self::new(TroubleKind::Absent, why("nobody answers there"), Some(remedy::NOBODY_ANSWERS))
             }
             E::ResourceBusy | E::AddrInUse => {
                 Self::new(TroubleKind::Busy, why("another program has it"), Some("close that one"))
