@@ -101,7 +101,7 @@ pub(crate) struct Run {
     /// Vehicle file.
     pub(crate) vehicle: PathBuf,
     /// Log whose messages take the place of the ports'.
-    #[arg(long, value_name = "LOG.mcap", conflicts_with_all = ["require", "duration", "no_record"])]
+    #[arg(long, value_name = "LOG.mcap", conflicts_with_all = ["require", "require_within", "duration", "no_record"])]
     pub(crate) source: Option<PathBuf>,
     /// Log to write; on ports it is dive-SECONDS.mcap in this folder unless said otherwise.
     #[arg(long, value_name = "LOG.mcap")]
@@ -109,9 +109,12 @@ pub(crate) struct Run {
     /// Write no log.
     #[arg(long, conflicts_with = "record")]
     pub(crate) no_record: bool,
-    /// Sensors without which the dive ends, by their ids, or all; each has 30 s to run.
+    /// Sensors without which the dive ends, by their ids, or all.
     #[arg(long, value_name = "ID,..", value_delimiter = ',')]
     pub(crate) require: Vec<String>,
+    /// Seconds that a required sensor has until it runs.
+    #[arg(long, value_name = "SECONDS", default_value = "30", value_parser = moment, requires = "require")]
+    pub(crate) require_within: f64,
     /// End the dive after so many seconds.
     #[arg(long = "for", value_name = "SECONDS", value_parser = moment)]
     pub(crate) duration: Option<f64>,

@@ -17,9 +17,6 @@ use crate::failure::Failure;
 use crate::output::say;
 use crate::watch::Watch;
 
-/// How long a required sensor may take until it runs.
-const REQUIRED_WITHIN: DurNs = DurNs::from_millis(30_000);
-
 /// The dive itself.
 pub(crate) fn run(args: &Run, text: &str, vehicle: &VehicleConfig) -> Result<u8, Failure> {
     let required = required(args, vehicle)?;
@@ -36,7 +33,8 @@ pub(crate) fn run(args: &Run, text: &str, vehicle: &VehicleConfig) -> Result<u8,
             if args.no_record { "not recorded".to_owned() } else { format!("recorded to {}", log.display()) };
         say(&format!("{}, target {} m: {where_to}; Ctrl-C ends the dive", vehicle.name, vehicle.target_m));
     }
-    let lamps = RefCell::new(Lamps::new(vehicle, required, begun));
+    let lamps =
+        RefCell::new(Lamps::new(vehicle, required, begun, begun + DurNs::from_secs_f64(args.require_within)));
     let ended = || {
         let now = headrace_ports::now();
         interrupted.load(Ordering::Relaxed)
@@ -133,14 +131,16 @@ struct Lamps {
     words: Vec<String>,
     /// Required sensors that haven't run yet.
     required: Vec<usize>,
+    /// By when they must have.
+    required_by: MonoNs,
     begun: MonoNs,
 }
 
 impl Lamps {
-    fn new(vehicle: &VehicleConfig, required: Vec<usize>, begun: MonoNs) -> Self {
+    fn new(vehicle: &VehicleConfig, required: Vec<usize>, begun: MonoNs, required_by: MonoNs) -> Self {
         let ids: Vec<String> = vehicle.sensor_configs.iter().map(|config| config.id.clone()).collect();
         let (phases, words) = (vec![None; ids.len()], vec![String::new(); ids.len()]);
-        Self { ids, phases, words, required, begun }
+        Self { ids, phases, words, required, required_by, begun }
     }
 
     fn show(&mut self, status: &Status, watch: &mut Watch) {
@@ -161,8 +161,8 @@ impl Lamps {
 
     /// A required sensor that hasn't run in the time that it has for it, with why.
     fn missing(&self, now: MonoNs) -> Option<String> {
-        let number = *self.required.first().filter(|_| now.since(self.begun) > REQUIRED_WITHIN)?;
-        let within_s = REQUIRED_WITHIN.as_secs_f64();
+        let number = *self.required.first().filter(|_| now > self.required_by)?;
+        let within_s = self.required_by.since(self.begun).as_secs_f64();
         Some(format!(
             "sensor {:?} is required and didn't run within {within_s} s: {}",
             self.ids.get(number)?,
