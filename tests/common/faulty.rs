@@ -1,0 +1,347 @@
+//! Emulated devices on real ports, and faults of their lines.
+
+#![allow(dead_code, reason = "each takes what it needs")]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
+
+use std::net::{IpAddr, Ipv4Addr};
+use std::os::unix::fs::symlink;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::thread::{self, JoinHandle};
+use std::time::Duration;
+
+use headrace_core::app::device::{Direction, Emulated, Emulator};
+use headrace_core::app::driver::Carrier;
+use headrace_core::app::measurement::Measurement;
+use headrace_core::config::{Connect, SerialPort};
+use headrace_core::time::{DurNs, MonoNs};
+use headrace_ports::{Stand, wait_for_any};
+
+const LOCAL: IpAddr = IpAddr::V4(Ipv4Addr::LOCALHOST);
+const WAIT_NS: u32 = 1_000_000;
+const BAUD: u32 = 115_200;
+
+/// What becomes of what crosses a line.
+pub(crate) trait Fault: Send {
+    /// A frame of the device, the `number`th.
+    fn to_host(&mut self, number: u64, frame: &[u8], line: &mut Wire) {
+        let _ = number;
+        line.whole(frame);
+    }
+
+    /// Bytes of the host, and what of them the device hears.
+    fn to_device(&mut self, bytes: Vec<u8>) -> Vec<u8> {
+        bytes
+    }
+
+    /// Called all the time.
+    fn meanwhile(&mut self, line: &mut Wire) {
+        let _ = line;
+    }
+}
+
+/// No fault.
+pub(crate) struct Healthy;
+
+impl Fault for Healthy {}
+
+/// A device's end that can be unplugged and plugged in again where it was.
+pub(crate) struct End {
+    connect: Connect,
+    /// Of a serial port: the stable name of whatever the system calls it.
+    link: Option<PathBuf>,
+    stand: Option<Stand>,
+    /// Whether it is on the line of the sensor before it.
+    beside: bool,
+}
+
+impl End {
+    /// A serial port with a name in `folder` that stays, as udev's links by identity do.
+    pub(crate) fn serial(folder: &std::path::Path, name: &str) -> Self {
+        let link = folder.join(name);
+        let port = SerialPort::Path(link.display().to_string());
+        let mut end = Self {
+            connect: Connect::Serial { port, baud: BAUD },
+            link: Some(link),
+            stand: None,
+            beside: false,
+        };
+        end.plug();
+        end
+    }
+
+    pub(crate) fn tcp() -> Self {
+        Self::of_network(Carrier::Tcp)
+    }
+
+    pub(crate) fn udp() -> Self {
+        Self::of_network(Carrier::Udp)
+    }
+
+    fn of_network(carrier: Carrier) -> Self {
+        let stand = Stand::new(carrier, LOCAL).unwrap();
+        Self { connect: stand.connect().clone(), link: None, stand: Some(stand), beside: false }
+    }
+
+    /// On the same line as the sensor before, whose end this is.
+    pub(crate) fn beside(other: &Self) -> Self {
+        Self { connect: other.connect.clone(), link: None, stand: None, beside: true }
+    }
+
+    pub(crate) fn is_beside(&self) -> bool {
+        self.beside
+    }
+
+    /// The same, not plugged in yet.
+    pub(crate) fn absent(mut self) -> Self {
+        self.unplug();
+        self
+    }
+
+    pub(crate) fn connect(&self) -> &Connect {
+        &self.connect
+    }
+
+    fn plug(&mut self) {
+        let Some(link) = &self.link else {
+            self.stand = Some(Stand::again(&self.connect).unwrap());
+            return;
+        };
+        let stand = Stand::new(Carrier::Serial, LOCAL).unwrap();
+        let Connect::Serial { port: SerialPort::Path(path), .. } = stand.connect() else { panic!("a port") };
+        symlink(path, link).unwrap();
+        self.stand = Some(stand);
+    }
+
+    fn unplug(&mut self) {
+        if let Some(link) = &self.link {
+            std::fs::remove_file(link).unwrap();
+        }
+        self.stand = None;
+    }
+}
+
+/// What a test says to a device, and hears of it.
+#[derive(Default)]
+pub(crate) struct Control {
+    unplugged: AtomicBool,
+    silent: AtomicBool,
+    /// It has fallen silent.
+    quiet: AtomicBool,
+    gone: AtomicBool,
+    healed: AtomicBool,
+    whole: AtomicU64,
+}
+
+impl Control {
+    /// Unplugs the device as soon as it has been asked something.
+    pub(crate) fn unplug(&self) {
+        self.unplugged.store(true, Ordering::SeqCst);
+    }
+
+    pub(crate) fn plug(&self) {
+        self.unplugged.store(false, Ordering::SeqCst);
+    }
+
+    /// From now on the device says nothing.
+    pub(crate) fn fall_silent(&self) {
+        self.silent.store(true, Ordering::SeqCst);
+        while !self.quiet.load(Ordering::SeqCst) {
+            thread::sleep(Duration::from_millis(1));
+        }
+    }
+
+    /// It speaks again.
+    pub(crate) fn speak(&self) {
+        self.quiet.store(false, Ordering::SeqCst);
+        self.silent.store(false, Ordering::SeqCst);
+    }
+
+    /// From now on its line is sound.
+    pub(crate) fn heal(&self) {
+        self.healed.store(true, Ordering::SeqCst);
+    }
+
+    /// Frames that it has sent whole.
+    pub(crate) fn whole(&self) -> u64 {
+        self.whole.load(Ordering::SeqCst)
+    }
+}
+
+/// The device's end of the line, as faults see it.
+pub(crate) struct Wire {
+    end: End,
+    control: Arc<Control>,
+}
+
+impl Wire {
+    /// Sends a frame whole.
+    pub(crate) fn whole(&mut self, frame: &[u8]) {
+        self.part(frame);
+        let called = self.end.stand.as_ref().is_some_and(Stand::is_called);
+        self.control.whole.fetch_add(u64::from(called), Ordering::SeqCst);
+    }
+
+    /// Sends what is no whole frame.
+    pub(crate) fn part(&mut self, bytes: &[u8]) {
+        if let Some(stand) = &mut self.end.stand {
+            stand.write(bytes).unwrap();
+        }
+    }
+
+    /// Counts frames that were sent whole in other ways.
+    pub(crate) fn count(&self, frames: u64) {
+        self.control.whole.fetch_add(frames, Ordering::SeqCst);
+    }
+
+    /// Lets time pass.
+    pub(crate) fn pause(&self, ms: u64) {
+        thread::sleep(Duration::from_millis(ms));
+    }
+}
+
+/// A device on a line that may fail, in a thread of its own.
+pub(crate) struct Faulty {
+    control: Arc<Control>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Faulty {
+    pub(crate) fn start(devices: Vec<Emulated>, end: End, fault: Box<dyn Fault>) -> Self {
+        let control = Arc::new(Control::default());
+        control.unplugged.store(end.stand.is_none(), Ordering::SeqCst);
+        let wire = Wire { end, control: Arc::clone(&control) };
+        let mut life = Life { devices, wire, fault, told: 0, out: Vec::new() };
+        let thread = thread::spawn(move || life.live());
+        Self { control, thread: Some(thread) }
+    }
+
+    pub(crate) fn control(&self) -> &Control {
+        &self.control
+    }
+}
+
+impl Drop for Faulty {
+    fn drop(&mut self) {
+        self.control.gone.store(true, Ordering::SeqCst);
+        let ended = self.thread.take().unwrap().join();
+        assert!(ended.is_ok() || thread::panicking(), "a device's thread has panicked");
+    }
+}
+
+struct Life {
+    devices: Vec<Emulated>,
+    wire: Wire,
+    fault: Box<dyn Fault>,
+    told: u64,
+    out: Vec<Vec<u8>>,
+}
+
+impl Life {
+    fn live(&mut self) {
+        let control = Arc::clone(&self.wire.control);
+        let is = |flag: &AtomicBool| flag.load(Ordering::SeqCst);
+        while !is(&control.gone) {
+            let plugged = self.wire.end.stand.is_some();
+            control.quiet.store(is(&control.silent), Ordering::SeqCst);
+            if plugged {
+                self.serve(is(&control.silent), is(&control.unplugged));
+            } else {
+                self.step(None);
+                self.out.clear();
+                thread::sleep(Duration::from_millis(1));
+                if !is(&control.unplugged) {
+                    self.wire.end.plug();
+                }
+            }
+        }
+    }
+
+    /// What the host says goes to the device, and what the device says by now onto the line.
+    fn serve(&mut self, silent: bool, unplugging: bool) {
+        if let Some(stand) = &self.wire.end.stand {
+            wait_for_any(std::slice::from_ref(stand), WAIT_NS);
+        }
+        let mut asked = false;
+        while let Some(bytes) = self.wire.end.stand.as_mut().and_then(|stand| stand.read().unwrap()) {
+            asked |= !bytes.is_empty();
+            let healed = self.wire.control.healed.load(Ordering::SeqCst);
+            let heard = if healed { bytes } else { self.fault.to_device(bytes) };
+            if !heard.is_empty() {
+                self.step(Some(&heard));
+            }
+        }
+        self.step(None);
+        let out = std::mem::take(&mut self.out);
+        if unplugging && asked {
+            // Since the host has asked again, it has read all earlier answers; of this one it gets half.
+            if let Some(frame) = out.first() {
+                self.wire.part(&frame[..frame.len() / 2]);
+            }
+            self.wire.end.unplug();
+            return;
+        }
+        if silent {
+            return;
+        }
+        for frame in out {
+            self.told += 1;
+            if self.wire.control.healed.load(Ordering::SeqCst) {
+                self.wire.whole(&frame);
+            } else {
+                self.fault.to_host(self.told, &frame, &mut self.wire);
+            }
+        }
+        if !self.wire.control.healed.load(Ordering::SeqCst) {
+            self.fault.meanwhile(&mut self.wire);
+        }
+    }
+
+    fn step(&mut self, heard: Option<&[u8]>) {
+        let (now, out) = (headrace_ports::now(), &mut self.out);
+        for device in &mut self.devices {
+            feel(device, heard, now, out);
+        }
+    }
+}
+
+/// Lets a device hear and measure, always the same.
+fn feel(device: &mut Emulated, heard: Option<&[u8]>, now: MonoNs, out: &mut Vec<Vec<u8>>) {
+    match device {
+        Emulated::Head(device) | Emulated::Echosounder(device) => {
+            step(device.as_mut(), heard, now, out, |sounding| sounding.range_m = Some(3.0));
+        }
+        Emulated::Depth(device) => {
+            step(device.as_mut(), heard, now, out, |pressure| pressure.pressure_pa = 150_000.0);
+        }
+        Emulated::Tether(device) => {
+            step(device.as_mut(), heard, now, out, |payout| payout.chainage_m = 5.0);
+        }
+        Emulated::Inertial(device) => step(device.as_mut(), heard, now, out, |_| ()),
+        Emulated::VelocityLog(device) => step(device.as_mut(), heard, now, out, |_| ()),
+    }
+}
+
+fn step<M: Measurement>(
+    device: &mut dyn Emulator<M>,
+    heard: Option<&[u8]>,
+    now: MonoNs,
+    out: &mut Vec<Vec<u8>>,
+    feel: impl Fn(&mut M),
+) {
+    let mut line = |direction, _, bytes: &[u8]| {
+        if direction == Direction::Received {
+            out.push(bytes.to_vec());
+        }
+    };
+    if let Some(bytes) = heard {
+        device.hear(now, bytes, &mut line);
+    }
+    let mut due = Vec::new();
+    device.begin(now + DurNs(1), &mut due);
+    for mut measured in due {
+        feel(&mut measured);
+        device.tell(&measured, &mut line);
+    }
+}
