@@ -12,6 +12,8 @@
 mod common;
 #[path = "common/faulty.rs"]
 mod faulty;
+#[path = "common/garbling.rs"]
+mod garbling;
 #[path = "common/rig.rs"]
 mod rig;
 
@@ -19,9 +21,7 @@ use std::os::unix::fs::PermissionsExt as _;
 
 use common::Folder;
 use faulty::{End, Fault, Healthy, Wire};
-use headrace_core::codec::Codec;
-use headrace_imagenex881::codec::{Model, ReturnCodec, Returns};
-use headrace_ping1d::codec::PingCodec;
+use garbling::{EachFrame, Garbled, Random, flipped, of_head, of_ping, thinned};
 use headrace_ports::Phase;
 use rig::{COUNTER, DEPTH, HEAD, PING, Rig, Sensor};
 
@@ -32,85 +32,6 @@ fn healthy() -> Sensor {
 
 fn sensor(text: &'static str, end: End, fault: impl Fault + 'static) -> Sensor {
     Sensor { text, end, fault: Box::new(fault) }
-}
-
-/// Numbers that look random and are the same each time.
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mixed = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        mixed ^ (mixed >> 27)
-    }
-
-    fn one_in(&mut self, count: u64) -> bool {
-        self.next().is_multiple_of(count)
-    }
-}
-
-/// How many good frames a codec finds in bytes that stand alone.
-type Count = fn(&[u8]) -> u64;
-
-fn of_ping(bytes: &[u8]) -> u64 {
-    counted(&mut PingCodec::default(), bytes)
-}
-
-fn of_head(bytes: &[u8]) -> u64 {
-    counted(&mut ReturnCodec::new(Returns { model: Some(Model::Head881) }), bytes)
-}
-
-fn counted(codec: &mut impl Codec, bytes: &[u8]) -> u64 {
-    codec.push(bytes, &mut |_| ());
-    codec.flush(&mut |_| ());
-    codec.counts().good_frames
-}
-
-/// Bytes are changed on their way. Not each change can be told: a head's returns have no checksum.
-struct Garbled {
-    random: Random,
-    change: fn(&mut Random, &[u8]) -> Vec<u8>,
-    count: Count,
-}
-
-impl Garbled {
-    fn new(seed: u64, count: Count, change: fn(&mut Random, &[u8]) -> Vec<u8>) -> Self {
-        Self { random: Random(seed), change, count }
-    }
-}
-
-impl Fault for Garbled {
-    fn to_host(&mut self, _: u64, frame: &[u8], line: &mut Wire) {
-        let changed = (self.change)(&mut self.random, frame);
-        if changed == frame {
-            line.whole(frame);
-        } else {
-            line.part(&changed);
-            line.count((self.count)(&changed));
-        }
-    }
-
-    fn to_device(&mut self, bytes: Vec<u8>) -> Vec<u8> {
-        (self.change)(&mut self.random, &bytes)
-    }
-}
-
-fn flipped(random: &mut Random, bytes: &[u8]) -> Vec<u8> {
-    let flip = |byte: &u8| if random.one_in(100) { byte ^ (1 << (random.next() % 8)) } else { *byte };
-    bytes.iter().map(flip).collect()
-}
-
-fn thinned(random: &mut Random, bytes: &[u8]) -> Vec<u8> {
-    bytes.iter().copied().filter(|_| !random.one_in(100)).collect()
-}
-
-/// What is done with each frame, by its number.
-struct EachFrame<F>(F);
-
-impl<F: FnMut(u64, &[u8], &mut Wire) + Send> Fault for EachFrame<F> {
-    fn to_host(&mut self, number: u64, frame: &[u8], line: &mut Wire) {
-        (self.0)(number, frame, line);
-    }
 }
 
 /// The statuses of a sensor, each one that differs once.
@@ -263,7 +184,7 @@ fn with_bursts(seed: u64, lure: &'static [u8]) -> impl Fault {
     EachFrame(move |_, frame: &[u8], line: &mut Wire| {
         if random.one_in(3) {
             let count = random.next() % 300;
-            let mut garbage: Vec<u8> = (0..count).map(|_| (random.next() >> 40) as u8).collect();
+            let mut garbage: Vec<u8> = (0..count).map(|_| random.byte()).collect();
             garbage.extend_from_slice(lure);
             line.part(&garbage);
         }
@@ -300,13 +221,13 @@ fn stalling() -> impl Fault {
         match number % 9 {
             2 => {
                 line.part(first);
-                line.pause(5);
+                Wire::pause(5);
                 line.part(second);
                 line.count(1);
             }
             5 => {
                 line.part(first);
-                line.pause(300);
+                Wire::pause(300);
                 line.part(second);
             }
             8 => line.part(first),
@@ -383,6 +304,7 @@ fn as_ping360(frame: &mut Vec<u8>) {
     }
 }
 
+#[expect(clippy::ptr_arg, reason = "other disguises change the length")]
 fn as_head_0x11(frame: &mut Vec<u8>) {
     frame[3] = 0x11;
 }
@@ -428,7 +350,7 @@ impl Fault for Babbling {
     fn to_host(&mut self, _: u64, _: &[u8], _: &mut Wire) {}
 
     fn meanwhile(&mut self, line: &mut Wire) {
-        let block: Vec<u8> = (0..8192).map(|_| (self.0.next() >> 40) as u8).collect();
+        let block: Vec<u8> = (0..8192).map(|_| self.0.byte()).collect();
         for _ in 0..16 {
             line.part(&block);
         }

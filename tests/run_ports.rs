@@ -84,7 +84,7 @@ fn ports_that_are_wrong_or_not_there_are_named_while_the_dive_goes_on() {
     let place = end.connect().to_string();
     let device = Faulty::start(vec![emulated(HEAD)], end, Box::new(Healthy));
     let sensors: Vec<_> = [("head", HEAD, place.as_str())].into_iter().chain(WRONG).chain(ABSENT).collect();
-    folder.write("vehicle.toml", vehicle(&sensors[..1 + WRONG.len()]));
+    folder.write("vehicle.toml", vehicle(&sensors[..=WRONG.len()]));
     let answer = folder.headrace(&RUN);
     let wrong = report(&folder);
     assert_eq!(answer.code, Some(0), "{}{}", answer.stdout, answer.stderr);

@@ -196,7 +196,7 @@ impl Wire {
     }
 
     /// Lets time pass.
-    pub(crate) fn pause(&self, ms: u64) {
+    pub(crate) fn pause(ms: u64) {
         thread::sleep(Duration::from_millis(ms));
     }
 }

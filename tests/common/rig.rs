@@ -5,9 +5,10 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
 
 use std::cell::{Cell, RefCell};
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::{Duration, Instant};
 
 use headrace_core::app::App;
 use headrace_core::app::device::{DeviceKind, Emulated, EmulatorSetup};
@@ -16,6 +17,7 @@ use headrace_core::app::plugin::Plugin;
 use headrace_core::app::report::Report;
 use headrace_core::app::run::Loop;
 use headrace_core::config::{Connect, Document, VehicleConfig};
+use headrace_core::time::DurNs;
 use headrace_ports::{Crew, Hand, LineHistory, Phase, SentSink};
 use headrace_replay::drive::{Pace, drive};
 use headrace_replay::log::{LogHeader, Recorder, RecorderHandle, SourceInfo};
@@ -35,7 +37,7 @@ const KINDS: [&dyn DeviceKind; 7] = [
 ];
 
 /// Nothing that is waited for takes as long.
-const LONG: Duration = Duration::from_secs(20);
+const LONG: DurNs = DurNs::from_millis(20_000);
 
 pub(crate) const HEADING: &str = r#"name = "faults"
 target_m = 1.2
@@ -104,7 +106,8 @@ impl Rig {
         let places: Vec<String> = sensors.iter().map(|sensor| sensor.end.connect().to_string()).collect();
         let mut text = HEADING.to_owned();
         for (number, (sensor, place)) in sensors.iter().zip(&places).enumerate() {
-            text += &format!("\n[[sensors]]\nid = \"s{number}\"\nconnect = \"{place}\"\n{}", sensor.text);
+            let own = sensor.text;
+            write!(text, "\n[[sensors]]\nid = \"s{number}\"\nconnect = \"{place}\"\n{own}").unwrap();
         }
         let document = Document::new("vehicle.toml", &text);
         let vehicle = VehicleConfig::parse(document, &KINDS, &|_| unreachable!("no file is named")).unwrap();
@@ -130,8 +133,9 @@ impl Rig {
         let devices: Vec<Faulty> = lines.into_iter().map(start).collect();
         let sent = handle.as_ref().map(|handle| {
             let port = handle.sent_port();
-            let sink: SentSink =
-                Arc::new(move |source, at, bytes: &[u8]| port.sent(source as u16, at, bytes));
+            let sink: SentSink = Arc::new(move |source, at, bytes: &[u8]| {
+                port.sent(u16::try_from(source).unwrap(), at, bytes);
+            });
             sink
         });
         let crew = Crew::start(hands, sent).unwrap();
@@ -159,9 +163,9 @@ impl Rig {
     #[track_caller]
     pub(crate) fn until(&mut self, what: &str, condition: impl Fn(&View) -> bool) -> View {
         let Self { dive, crew, devices, on, view, places, .. } = self;
-        let deadline = Instant::now() + LONG;
+        let deadline = headrace_ports::now() + LONG;
         let (met, view) = (Cell::new(false), RefCell::new(view));
-        crew.run(dive, &|| met.get() || Instant::now() > deadline, &mut |dive| {
+        crew.run(dive, &|| met.get() || headrace_ports::now() > deadline, &mut |dive| {
             let mut view = view.borrow_mut();
             view.look(dive, crew, (devices, on), places);
             met.set(condition(&view));
@@ -270,8 +274,8 @@ fn assemble(vehicle: &VehicleConfig, text: &str, log: Option<&Path>) -> (Loop, O
         });
         let header = LogHeader {
             vehicle_toml: text.to_owned(),
-            attachments: Default::default(),
-            metadata: Default::default(),
+            attachments: Vec::new(),
+            metadata: BTreeMap::new(),
             sources: sources.collect(),
             ticks: true,
             results: Vec::new(),

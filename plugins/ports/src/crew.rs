@@ -37,6 +37,8 @@ pub struct Hand {
 
 /// Threads that serve lines, one each. Sensors whose `connect` is the same share one.
 pub struct Crew {
+    /// How many sensors the vehicle has, as far as they are served.
+    sensors: usize,
     threads: Vec<JoinHandle<Vec<(usize, LineHistory)>>>,
     stopping: Arc<AtomicBool>,
     board: Board,
@@ -53,7 +55,8 @@ impl Crew {
         let board = Board::new(BOARD);
         let waker = parker.unparker().clone();
         let common = Common { stopping: Arc::clone(&stopping), board: board.clone(), waker, sent };
-        let mut crew = Self { threads: Vec::new(), stopping, board, parker };
+        let sensors = hands.iter().map(|hand| hand.source + 1).max().unwrap_or(0);
+        let mut crew = Self { sensors, threads: Vec::new(), stopping, board, parker };
         for (name, connect, berths) in lines(hands) {
             let service = Service::new(connect, berths, common.clone());
             let thread = thread::Builder::new().name(name).spawn(move || service.run())?;
@@ -80,10 +83,14 @@ impl Crew {
     /// the order of the sensors.
     pub fn stop(mut self, dive: &mut Loop, after_tick: &mut dyn FnMut(&Loop)) -> Vec<LineHistory> {
         self.stopping.store(true, Ordering::Relaxed);
-        let mut all: Vec<(usize, LineHistory)> = Vec::new();
-        for thread in self.threads.drain(..) {
-            // A thread that has panicked has said so itself.
-            all.extend(thread.join().unwrap_or_default());
+        // A thread that has panicked has said so itself; the others' histories stay their own.
+        let ended_early =
+            LineHistory { last: "its thread has ended early".to_owned(), ..LineHistory::default() };
+        let mut all = vec![ended_early; self.sensors];
+        for (source, history) in self.threads.drain(..).flat_map(|thread| thread.join().unwrap_or_default()) {
+            if let Some(place) = all.get_mut(source) {
+                *place = history;
+            }
         }
         while dive.has_waiting() {
             // An outlet that is behind holds packets back; it is given time.
@@ -92,8 +99,7 @@ impl Crew {
             }
             after_tick(dive);
         }
-        all.sort_by_key(|(source, _)| *source);
-        all.into_iter().map(|(_, history)| history).collect()
+        all
     }
 }
 

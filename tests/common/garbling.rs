@@ -1,0 +1,90 @@
+//! What becomes of bytes on bad lines, the same each time.
+
+use headrace_core::codec::Codec;
+use headrace_imagenex881::codec::{Model, ReturnCodec, Returns};
+use headrace_ping1d::codec::PingCodec;
+
+use super::faulty::{Fault, Wire};
+
+/// Numbers that look random and are the same each time.
+pub(crate) struct Random(pub(crate) u64);
+
+impl Random {
+    pub(crate) fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mixed = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        mixed ^ (mixed >> 27)
+    }
+
+    pub(crate) fn byte(&mut self) -> u8 {
+        self.next().to_le_bytes()[5]
+    }
+
+    pub(crate) fn one_in(&mut self, count: u64) -> bool {
+        self.next().is_multiple_of(count)
+    }
+}
+
+/// How many good frames a codec finds in bytes that stand alone.
+pub(crate) type Count = fn(&[u8]) -> u64;
+
+pub(crate) fn of_ping(bytes: &[u8]) -> u64 {
+    counted(&mut PingCodec::default(), bytes)
+}
+
+pub(crate) fn of_head(bytes: &[u8]) -> u64 {
+    counted(&mut ReturnCodec::new(Returns { model: Some(Model::Head881) }), bytes)
+}
+
+fn counted(codec: &mut impl Codec, bytes: &[u8]) -> u64 {
+    codec.push(bytes, &mut |_| ());
+    codec.flush(&mut |_| ());
+    codec.counts().good_frames
+}
+
+/// Bytes are changed on their way. Not each change can be told: a head's returns have no checksum.
+pub(crate) struct Garbled {
+    random: Random,
+    change: fn(&mut Random, &[u8]) -> Vec<u8>,
+    count: Count,
+}
+
+impl Garbled {
+    pub(crate) fn new(seed: u64, count: Count, change: fn(&mut Random, &[u8]) -> Vec<u8>) -> Self {
+        Self { random: Random(seed), change, count }
+    }
+}
+
+impl Fault for Garbled {
+    fn to_host(&mut self, _: u64, frame: &[u8], line: &mut Wire) {
+        let changed = (self.change)(&mut self.random, frame);
+        if changed == frame {
+            line.whole(frame);
+        } else {
+            line.part(&changed);
+            line.count((self.count)(&changed));
+        }
+    }
+
+    fn to_device(&mut self, bytes: Vec<u8>) -> Vec<u8> {
+        (self.change)(&mut self.random, &bytes)
+    }
+}
+
+pub(crate) fn flipped(random: &mut Random, bytes: &[u8]) -> Vec<u8> {
+    let flip = |byte: &u8| if random.one_in(100) { byte ^ (1 << (random.next() % 8)) } else { *byte };
+    bytes.iter().map(flip).collect()
+}
+
+pub(crate) fn thinned(random: &mut Random, bytes: &[u8]) -> Vec<u8> {
+    bytes.iter().copied().filter(|_| !random.one_in(100)).collect()
+}
+
+/// What is done with each frame, by its number.
+pub(crate) struct EachFrame<F>(pub(crate) F);
+
+impl<F: FnMut(u64, &[u8], &mut Wire) + Send> Fault for EachFrame<F> {
+    fn to_host(&mut self, number: u64, frame: &[u8], line: &mut Wire) {
+        (self.0)(number, frame, line);
+    }
+}
