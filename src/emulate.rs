@@ -44,6 +44,10 @@ fn stands(scene: &Scene, args: &Emulate) -> Result<Vec<Stand>, Failure> {
         let carrier = asked.as_ref().map_or(Carrier::Udp, Connect::carrier);
         let stand = match (asked, device.report_descriptor()) {
             (Ok(Connect::Hid(identity)), Some(descriptor)) => Stand::hid(&identity, &descriptor),
+            #[cfg(target_os = "linux")]
+            (Ok(Connect::Can { interface }), _) if headrace_ports::is_up(&interface) => {
+                Stand::can(&interface)
+            }
             _ => Stand::new(carrier, args.listen),
         };
         let stand = stand.or_else(|error| {

@@ -18,9 +18,10 @@ use crate::lines::{self, Line, READ_BYTES};
 use crate::status::{Board, LineHistory, Phase, Status};
 use crate::trouble;
 
-/// The least and the longest wait before a line is tried again.
+/// The least and the longest wait before a line is tried again; what is plugged into this machine costs little to try.
 const FIRST_PAUSE: DurNs = DurNs::from_millis(250);
 const LONGEST_PAUSE: DurNs = DurNs::from_millis(4_000);
+const LONGEST_LOCAL_PAUSE: DurNs = DurNs::from_millis(1_000);
 /// The longest that a thread waits before it looks whether to end.
 const LOOK: Duration = Duration::from_millis(50);
 /// How often the devices' standing is looked at.
@@ -155,9 +156,16 @@ impl Service {
                 },
             }
             self.wait(pause);
-            pause = (pause + pause).min(LONGEST_PAUSE);
+            pause = (pause + pause).min(self.longest_pause());
         }
         self.seats.into_iter().map(|seat| (seat.berth.source, seat.history)).collect()
+    }
+
+    fn longest_pause(&self) -> DurNs {
+        match self.connect {
+            Ok(Connect::Tcp { .. } | Connect::Udp { .. }) => LONGEST_PAUSE,
+            _ => LONGEST_LOCAL_PAUSE,
+        }
     }
 
     fn stopping(&self) -> bool {
@@ -211,7 +219,7 @@ impl Service {
             }
             if now >= look_at {
                 look_at = now + STANDING_PERIOD;
-                self.look(now);
+                self.look(line.complaint().as_deref(), now);
                 if self.seats.iter().all(|seat| seat.is_silent(now)) {
                     return Ok(Served::InSilence);
                 }
@@ -293,10 +301,15 @@ impl Service {
         }
     }
 
-    /// Looks at how the devices are doing.
-    fn look(&mut self, now: MonoNs) {
+    /// Looks at how the devices are doing; what the line complains of goes before what is thought of them.
+    fn look(&mut self, complaint: Option<&str>, now: MonoNs) {
         for seat in &mut self.seats {
-            let (phase, words) = seat.judge(now);
+            let judged = seat.judge(now);
+            if complaint.is_some() {
+                // The device can't help it.
+                (seat.last_bytes, seat.last_frame) = (now, now);
+            }
+            let (phase, words) = complaint.map_or(judged, |words| (Phase::Closed, words.to_owned()));
             seat.say(&self.common.board, now, phase, &words);
         }
     }

@@ -39,7 +39,11 @@ enum End {
         peers: Vec<SocketAddr>,
     },
     #[cfg(target_os = "linux")]
-    Can(socketcan::CanSocket),
+    Can {
+        interface: String,
+        /// None while there is no such interface.
+        socket: Option<socketcan::CanSocket>,
+    },
     Hid(VirtualDevice<File>),
 }
 
@@ -56,7 +60,7 @@ impl Stand {
             Carrier::Tcp => tcp((at, 0)),
             Carrier::Udp | Carrier::I2c => udp((at, 0)),
             #[cfg(target_os = "linux")]
-            Carrier::Can => can("vcan0"),
+            Carrier::Can => Self::can("vcan0"),
             other => Err(io::Error::new(
                 io::ErrorKind::Unsupported,
                 format!("rehearsing on {} isn't possible here", other.as_str()),
@@ -92,6 +96,17 @@ impl Stand {
         Ok(Self { end: End::Hid(device), connect })
     }
 
+    /// A node on a CAN bus.
+    ///
+    /// Errors: there is no such interface.
+    #[cfg(target_os = "linux")]
+    pub fn can(interface: &str) -> io::Result<Self> {
+        let socket = Some(can_socket(interface)?);
+        let interface = interface.to_owned();
+        let connect = Connect::Can { interface: interface.clone() };
+        Ok(Self { end: End::Can { interface, socket }, connect })
+    }
+
     /// How the host opens the other end.
     pub fn connect(&self) -> &Connect {
         &self.connect
@@ -109,7 +124,7 @@ impl Stand {
             End::Tcp { stream, .. } => stream.is_some(),
             End::Udp { peers, .. } => !peers.is_empty(),
             #[cfg(target_os = "linux")]
-            End::Can(_) => true,
+            End::Can { .. } => true,
             End::Hid(_) => true,
         }
     }
@@ -143,7 +158,7 @@ impl Stand {
                 count
             }),
             #[cfg(target_os = "linux")]
-            End::Can(_) => return Ok(None),
+            End::Can { .. } => return Ok(None),
             // The kernel says who opens the device and the like.
             End::Hid(_) => return Ok(None),
         };
@@ -166,7 +181,7 @@ impl Stand {
                 Ok(())
             }
             #[cfg(target_os = "linux")]
-            End::Can(socket) => crate::lines::can::write(socket, bytes),
+            End::Can { interface, socket } => write_can(interface, socket, bytes),
             End::Hid(device) => device.report(bytes).map_err(io::Error::other),
         };
         match written {
@@ -183,7 +198,7 @@ impl Stand {
             }
             End::Udp { socket, .. } => vec![socket.as_fd()],
             #[cfg(target_os = "linux")]
-            End::Can(socket) => vec![socket.as_fd()],
+            End::Can { .. } => Vec::new(),
             End::Hid(_) => Vec::new(),
         }
     }
@@ -242,11 +257,32 @@ fn udp(at: impl ToSocketAddrs) -> io::Result<Stand> {
 }
 
 #[cfg(target_os = "linux")]
-fn can(interface: &str) -> io::Result<Stand> {
+fn can_socket(interface: &str) -> io::Result<socketcan::CanSocket> {
     use socketcan::{Socket as _, SocketOptions as _};
     let socket = socketcan::CanSocket::open(interface)?;
     socket.set_filter_drop_all()?;
-    Ok(Stand { end: End::Can(socket), connect: Connect::Can { interface: interface.to_owned() } })
+    Ok(socket)
+}
+
+/// Puts a frame on a bus; while the interface is down, or not there, it is lost. One that comes back is opened anew.
+#[cfg(target_os = "linux")]
+fn write_can(interface: &str, socket: &mut Option<socketcan::CanSocket>, bytes: &[u8]) -> io::Result<()> {
+    /// No such device or address, no such device, network is down, no buffer space. Source: Linux, errno.
+    const GONE: [i32; 2] = [6, 19];
+    const LOST: [i32; 2] = [100, 105];
+    let number = |error: &io::Error| error.raw_os_error().unwrap_or_default();
+    if socket.is_none() {
+        *socket = can_socket(interface).ok();
+    }
+    let Some(open) = socket else { return Ok(()) };
+    match crate::lines::can::write(open, bytes) {
+        Err(error) if GONE.contains(&number(&error)) => {
+            *socket = None;
+            Ok(())
+        }
+        Err(error) if LOST.contains(&number(&error)) => Ok(()),
+        other => other,
+    }
 }
 
 #[cfg(test)]

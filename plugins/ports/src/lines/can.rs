@@ -20,7 +20,17 @@ const DATA_AT: usize = 8;
 /// The bits of the identifier's word that say that it has 29 bits. Source: Linux, `CAN_EFF_FLAG`.
 const EXTENDED: u32 = 0x8000_0000;
 
-struct Can(CanSocket);
+/// What a socket says once: its interface was set down, and it hears again when that is up; it is gone, and it never hears
+/// again. Source: Linux, errno.
+const ENETDOWN: i32 = 100;
+const ENODEV: i32 = 19;
+
+struct Can {
+    socket: CanSocket,
+    interface: String,
+    /// The kernel has said that the interface is down, and nothing has come since.
+    is_down: bool,
+}
 
 pub(super) fn open(interface: &str) -> Result<Box<dyn Line>, Trouble> {
     let opening = || {
@@ -31,30 +41,51 @@ pub(super) fn open(interface: &str) -> Result<Box<dyn Line>, Trouble> {
         Ok(socket)
     };
     let socket = opening().map_err(|error| Trouble::can(interface, &error))?;
-    // An interface that is down can be opened, and then says nothing.
-    if let Some(trouble) = discover::down(&Machine::ours(), interface) {
-        return Err(trouble);
-    }
-    Ok(Box::new(Can(socket)))
+    Ok(Box::new(Can { socket, interface: interface.to_owned(), is_down: false }))
 }
 
 impl Line for Can {
     fn read(&mut self, wait: Duration, into: &mut [u8; READ_BYTES]) -> io::Result<Option<(MonoNs, usize)>> {
-        self.0.set_read_timeout(wait.max(Duration::from_micros(1)))?;
+        self.socket.set_read_timeout(wait.max(Duration::from_micros(1)))?;
         let mut stamped = None;
-        let read = self.0.read_frame_with_timestamp().map(|(frame, stamp)| {
+        let read = self.socket.read_frame_with_timestamp().map(|(frame, stamp)| {
             if let Some(to) = into.first_chunk_mut() {
                 *to = bytes_of(&frame);
             }
             stamped = Some(clock::of_wall(stamp));
             FRAME_BYTES
         });
-        Ok(waited(read)?.zip(stamped).map(|(count, at)| (at, count)))
+        // The socket is kept, so that no frame is missed once the interface is up.
+        match read.as_ref().err().and_then(io::Error::raw_os_error) {
+            Some(ENETDOWN) => {
+                self.is_down = true;
+                return Ok(None);
+            }
+            Some(ENODEV) => return Err(io::Error::new(io::ErrorKind::NotFound, "its interface is gone")),
+            _ => {}
+        }
+        let came = waited(read)?.zip(stamped).map(|(count, at)| (at, count));
+        self.is_down &= came.is_none();
+        Ok(came)
     }
 
     fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
-        write(&self.0, bytes)
+        write(&self.socket, bytes)
     }
+
+    fn complaint(&self) -> Option<String> {
+        let name = &self.interface;
+        (self.is_down && !is_up(name)).then(|| format!("can:{name} is down; sudo ip link set {name} up"))
+    }
+}
+
+/// Whether there is a network interface of this name that is up, as far as Linux says.
+pub fn is_up(interface: &str) -> bool {
+    /// Source: Linux, IFF_UP, of what /sys tells in hexadecimal.
+    const UP: u32 = 1;
+    let flags = std::fs::read_to_string(format!("/sys/class/net/{interface}/flags")).unwrap_or_default();
+    let digits = flags.trim().trim_start_matches("0x");
+    u32::from_str_radix(digits, 16).is_ok_and(|flags| flags & UP != 0)
 }
 
 /// Puts a frame on a bus.

@@ -41,6 +41,11 @@ pub(crate) trait Line {
         Err(io::Error::new(io::ErrorKind::Unsupported, "only an I2C bus, or UDP in its place, exchanges"))
     }
 
+    /// Why nothing can come for now, with what would mend it, where the line itself knows.
+    fn complaint(&self) -> Option<String> {
+        None
+    }
+
     /// Called about once a second while nothing has come, for carriers on which those who are silent are forgotten.
     fn knock(&mut self) -> io::Result<()> {
         Ok(())
