@@ -205,9 +205,9 @@ impl Stand {
 }
 
 /// Waits until something has come to one of the ends, or `wait_ns` nanoseconds have passed.
-pub fn wait_for_any(stands: &[Stand], wait_ns: u32) {
+pub fn wait_for_any<'a>(stands: impl IntoIterator<Item = &'a Stand>, wait_ns: u32) {
     // A terminal that nobody has open would never let it wait.
-    let open = stands.iter().filter(|stand| !matches!(stand.end, End::Pty { .. }) || stand.is_called());
+    let open = stands.into_iter().filter(|stand| !matches!(stand.end, End::Pty { .. }) || stand.is_called());
     let fds: Vec<BorrowedFd<'_>> = open.flat_map(Stand::fds).collect();
     let mut polled: Vec<PollFd<'_>> = fds.iter().map(|fd| PollFd::new(fd, PollFlags::IN)).collect();
     let wait = Timespec { tv_sec: 0, tv_nsec: i64::from(wait_ns.min(999_999_999)) };

@@ -9,7 +9,7 @@ use socketcan::{
     StandardId,
 };
 
-use super::{Line, READ_BYTES, waited};
+use super::{Line, READ_BYTES, ReadTimeout, waited};
 use crate::clock;
 use crate::discover::{self, Machine};
 use crate::trouble::Trouble;
@@ -27,6 +27,7 @@ const ENODEV: i32 = 19;
 
 struct Can {
     socket: CanSocket,
+    timeout: ReadTimeout,
     interface: String,
     /// The kernel has said that the interface is down, and nothing has come since.
     is_down: bool,
@@ -41,12 +42,18 @@ pub(super) fn open(interface: &str) -> Result<Box<dyn Line>, Trouble> {
         Ok(socket)
     };
     let socket = opening().map_err(|error| Trouble::can(interface, &error))?;
-    Ok(Box::new(Can { socket, interface: interface.to_owned(), is_down: false }))
+    Ok(Box::new(Can {
+        socket,
+        timeout: ReadTimeout::default(),
+        interface: interface.to_owned(),
+        is_down: false,
+    }))
 }
 
 impl Line for Can {
     fn read(&mut self, wait: Duration, into: &mut [u8; READ_BYTES]) -> io::Result<Option<(MonoNs, usize)>> {
-        self.socket.set_read_timeout(wait.max(Duration::from_micros(1)))?;
+        let socket = &self.socket;
+        self.timeout.set(wait, |wait| socket.set_read_timeout(wait))?;
         let mut stamped = None;
         let read = self.socket.read_frame_with_timestamp().map(|(frame, stamp)| {
             if let Some(to) = into.first_chunk_mut() {

@@ -72,6 +72,23 @@ pub(crate) fn open(connect: &Connect) -> Result<Box<dyn Line>, Trouble> {
     }
 }
 
+/// A socket's read timeout, told to the system when it changes: most waits are as long as the last.
+#[derive(Default)]
+struct ReadTimeout(Duration);
+
+impl ReadTimeout {
+    /// Has the next read wait so long.
+    fn set(&mut self, wait: Duration, tell: impl FnOnce(Duration) -> io::Result<()>) -> io::Result<()> {
+        // One of zero would be none.
+        let wait = wait.max(Duration::from_micros(1));
+        if self.0 != wait {
+            tell(wait)?;
+            self.0 = wait;
+        }
+        Ok(())
+    }
+}
+
 /// What a read with a timeout gave; a timeout is no error.
 fn waited(read: io::Result<usize>) -> io::Result<Option<usize>> {
     match read {

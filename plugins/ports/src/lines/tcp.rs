@@ -6,14 +6,17 @@ use std::time::Duration;
 
 use headrace_core::time::MonoNs;
 
-use super::{Line, READ_BYTES, waited};
+use super::{Line, READ_BYTES, ReadTimeout, waited};
 use crate::clock;
 use crate::trouble::Trouble;
 
 const CONNECT_TIME: Duration = Duration::from_secs(2);
 const WRITE_TIME: Duration = Duration::from_millis(500);
 
-struct Tcp(TcpStream);
+struct Tcp {
+    stream: TcpStream,
+    timeout: ReadTimeout,
+}
 
 pub(super) fn open(address: &str) -> Result<Box<dyn Line>, Trouble> {
     connect(address)
@@ -29,7 +32,7 @@ fn connect(address: &str) -> io::Result<Tcp> {
                 // A command is a few bytes that the head waits for.
                 stream.set_nodelay(true)?;
                 stream.set_write_timeout(Some(WRITE_TIME))?;
-                return Ok(Tcp(stream));
+                return Ok(Tcp { stream, timeout: ReadTimeout::default() });
             }
             Err(error) => last = error,
         }
@@ -39,9 +42,9 @@ fn connect(address: &str) -> io::Result<Tcp> {
 
 impl Line for Tcp {
     fn read(&mut self, wait: Duration, into: &mut [u8; READ_BYTES]) -> io::Result<Option<(MonoNs, usize)>> {
-        // A timeout of zero would be none.
-        self.0.set_read_timeout(Some(wait.max(Duration::from_micros(1))))?;
-        match waited(self.0.read(into))? {
+        let stream = &self.stream;
+        self.timeout.set(wait, |wait| stream.set_read_timeout(Some(wait)))?;
+        match waited(self.stream.read(into))? {
             Some(0) => Err(io::Error::new(io::ErrorKind::BrokenPipe, "the device has closed the connection")),
             Some(count) => Ok(Some((clock::now(), count))),
             None => Ok(None),
@@ -49,6 +52,6 @@ impl Line for Tcp {
     }
 
     fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
-        self.0.write_all(bytes)
+        self.stream.write_all(bytes)
     }
 }

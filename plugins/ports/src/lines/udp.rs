@@ -6,12 +6,13 @@ use std::time::Duration;
 
 use headrace_core::time::{DurNs, MonoNs};
 
-use super::{Line, READ_BYTES, waited};
+use super::{Line, READ_BYTES, ReadTimeout, waited};
 use crate::clock;
 use crate::trouble::Trouble;
 
 struct Udp {
     socket: UdpSocket,
+    timeout: ReadTimeout,
     /// Where to: the bridge, or who sent last.
     peer: Option<SocketAddr>,
     /// Whether we are the one who sends first.
@@ -26,7 +27,7 @@ pub(super) fn open(address: &str) -> Result<Box<dyn Line>, Trouble> {
         let socket = UdpSocket::bind(own)?;
         // Connected, so that only the bridge is heard and its absence is noticed.
         socket.connect(peer)?;
-        let mut line = Udp { socket, peer: Some(peer), calls: true };
+        let mut line = Udp { socket, timeout: ReadTimeout::default(), peer: Some(peer), calls: true };
         line.knock()?;
         Ok(line)
     };
@@ -35,12 +36,13 @@ pub(super) fn open(address: &str) -> Result<Box<dyn Line>, Trouble> {
 
 pub(super) fn listen(address: &str) -> Result<Box<dyn Line>, Trouble> {
     let socket = UdpSocket::bind(address).map_err(|error| Trouble::opening(address, &error))?;
-    Ok(Box::new(Udp { socket, peer: None, calls: false }))
+    Ok(Box::new(Udp { socket, timeout: ReadTimeout::default(), peer: None, calls: false }))
 }
 
 impl Line for Udp {
     fn read(&mut self, wait: Duration, into: &mut [u8; READ_BYTES]) -> io::Result<Option<(MonoNs, usize)>> {
-        self.socket.set_read_timeout(Some(wait.max(Duration::from_micros(1))))?;
+        let socket = &self.socket;
+        self.timeout.set(wait, |wait| socket.set_read_timeout(Some(wait)))?;
         let mut peer = self.peer;
         let received = self.socket.recv_from(into).map(|(count, from)| {
             peer = Some(from);

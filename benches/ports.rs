@@ -1,0 +1,492 @@
+//! How long bytes take from the device's end of a port to the loop's ring, and what serving ports costs, each figure beside
+//! a bare read loop on another port of the same kind in the same run. Prints Markdown.
+//!
+//! `cargo bench --bench ports` takes about two minutes; `-- 20` measures for twenty seconds a part, `-- latency` and `-- cpu`
+//! are its parts. The devices are emulated at their own rates by a thread of this process. On CAN (vcan0, up) and HID
+//! (`/dev/uhid`) only where they are there: in `tests/vm`, for one. Absolute times drift on shared machines, tails most.
+
+#![expect(clippy::unwrap_used, reason = "a benchmark stops at what it can't do")]
+#![expect(clippy::panic, reason = "the same")]
+
+#[path = "../tests/common/shipped.rs"]
+mod shipped;
+
+use std::collections::VecDeque;
+use std::io::Read as _;
+use std::net::{IpAddr, Ipv4Addr, TcpStream, UdpSocket};
+use std::process::Command;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::Duration;
+
+use crossbeam::queue::SegQueue;
+use headrace_core::app::App;
+use headrace_core::app::device::Direction;
+use headrace_core::app::driver::{Carrier, Driver, DriverSetup, Standing, Wire};
+use headrace_core::config::{Connect, SerialPort, UsbIdentity};
+use headrace_core::time::{DurNs, MonoNs};
+use headrace_ports::{Crew, Hand, Stand, now, wait_for_any};
+use headrace_replay::simulate::{START, Scene, Simulation};
+
+const LOCAL: IpAddr = IpAddr::V4(Ipv4Addr::LOCALHOST);
+/// Until all lines are open and the heads have found their places.
+const WARMING: DurNs = DurNs::from_millis(10_000);
+/// How long each part is measured unless said otherwise, s.
+const MEASURED_S: u64 = 60;
+/// How long the devices wait for a host at most.
+const WAIT_NS: u32 = 1_000_000;
+
+const WAY: &str = "[trajectory]\n[[trajectory.legs]]\ndistance_m = 60\nspeed_mps = 0.1\n";
+
+const TUNNEL: &str = "name = \"ports\"\ntarget_m = 1\n[tunnel]\nprofile = \"circle\"\nradius_m = 3\nlength_m = 100\n\
+    [water]\nsound_speed_mps = 1447\n[heads]\nplanned_speed_mps = 0.1\n";
+
+/// What is measured: in words, on what, and its keys in a vehicle file.
+const LINES: [(&str, Carrier, &str); 10] = [
+    ("881, returns of 13 bytes", Carrier::Serial, "plugin = \"imagenex881\"\nmode = \"fast\"\nrange_m = 10"),
+    (
+        "881, returns of 265 bytes",
+        Carrier::Serial,
+        "plugin = \"imagenex881\"\nmode = \"fast\"\nrange_m = 10\nreturns = \"imx\"",
+    ),
+    ("881, returns of 13 bytes", Carrier::Tcp, "plugin = \"imagenex881\"\nmode = \"fast\"\nrange_m = 10"),
+    (
+        "881, returns of 265 bytes",
+        Carrier::Tcp,
+        "plugin = \"imagenex881\"\nmode = \"fast\"\nrange_m = 10\nreturns = \"imx\"",
+    ),
+    ("Ping frames", Carrier::Udp, "plugin = \"ping1d\"\nangles_deg = [0, 0, 90]"),
+    ("Ping frames", Carrier::Serial, "plugin = \"ping1d\"\nangles_deg = [0, 0, -90]"),
+    ("CAN frames of an Xsens", Carrier::Udp, "plugin = \"imu_can\"\npreset = \"xsens_mti600\""),
+    ("reports of a cable counter", Carrier::Udp, "plugin = \"tether_hid\"\ncounts_per_metre = 2000"),
+    ("CAN frames of an Xsens", Carrier::Can, "plugin = \"imu_can\"\npreset = \"xsens_mti600\""),
+    ("reports of a cable counter", Carrier::Hid, "plugin = \"tether_hid\"\ncounts_per_metre = 2000"),
+];
+
+fn main() {
+    let words: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with('-')).collect();
+    let seconds = words.iter().find_map(|word| word.parse().ok()).unwrap_or(MEASURED_S);
+    let names: Vec<&String> = words.iter().filter(|word| word.parse::<u64>().is_err()).collect();
+    let wanted = |name: &str| names.is_empty() || names.iter().any(|word| *word == name);
+    let (arch, os) = (std::env::consts::ARCH, std::env::consts::OS);
+    let cores = thread::available_parallelism().map_or(0, std::num::NonZero::get);
+    println!(
+        "{}, {cores} cores, {arch} {os}, {}, commit {}, {seconds} s a part\n",
+        cpu(),
+        answer("rustc", &["--version"]),
+        commit()
+    );
+    if wanted("latency") {
+        latency(Duration::from_secs(seconds));
+    }
+    if wanted("cpu") {
+        four_heads(Duration::from_secs(seconds));
+    }
+}
+
+fn cpu() -> String {
+    let info = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let model =
+        info.lines().find_map(|line| line.strip_prefix("model name")).unwrap_or(": unknown processor");
+    model.trim_start_matches(['\t', ' ', ':']).to_owned()
+}
+
+fn commit() -> String {
+    answer("git", &["-C", env!("CARGO_MANIFEST_DIR"), "describe", "--always", "--dirty"])
+}
+
+/// What a program says, where there is such a program.
+fn answer(program: &str, arguments: &[&str]) -> String {
+    let output = Command::new(program).args(arguments).output();
+    let said = output.map(|output| String::from_utf8_lossy(&output.stdout).trim().to_owned());
+    said.ok().filter(|said| !said.is_empty()).unwrap_or_else(|| format!("unknown ({program} doesn't say)"))
+}
+
+/// What was sent and when, on its way to whoever receives it, and how long it took.
+#[derive(Clone, Default)]
+struct Course {
+    sent: Arc<SegQueue<(MonoNs, Vec<u8>)>>,
+    delays: Arc<SegQueue<DurNs>>,
+}
+
+/// The receiving end of a course.
+struct Finish {
+    course: Course,
+    waiting: VecDeque<(MonoNs, Vec<u8>)>,
+}
+
+impl Finish {
+    fn new(course: &Course) -> Self {
+        Self { course: course.clone(), waiting: VecDeque::new() }
+    }
+
+    /// A message of the device has come; what was sent before it has been lost.
+    fn note(&mut self, at: MonoNs, bytes: &[u8]) {
+        self.look();
+        if let Some(position) = self.waiting.iter().position(|(_, message)| message == bytes) {
+            self.waiting.drain(..position);
+            let (sent, _) = self.waiting.pop_front().unwrap();
+            self.course.delays.push(at.since(sent));
+        }
+    }
+
+    fn look(&mut self) {
+        self.waiting.extend(std::iter::from_fn(|| self.course.sent.pop()));
+    }
+
+    /// How long the message is that comes next.
+    fn next_len(&mut self) -> Option<usize> {
+        self.look();
+        self.waiting.front().map(|(_, message)| message.len())
+    }
+}
+
+/// A driver whose deliveries are timed.
+struct Timed {
+    driver: Box<dyn Driver>,
+    finish: Finish,
+}
+
+struct TimedWire<'a> {
+    wire: &'a mut dyn Wire,
+    finish: &'a mut Finish,
+}
+
+impl Wire for TimedWire<'_> {
+    fn send(&mut self, bytes: &[u8]) {
+        self.wire.send(bytes);
+    }
+
+    fn exchange(&mut self, write: &[u8], settle: DurNs, read_bytes: usize) {
+        self.wire.exchange(write, settle, read_bytes);
+    }
+
+    fn deliver(&mut self, received: MonoNs, bytes: &[u8]) {
+        self.wire.deliver(received, bytes);
+        self.finish.note(now(), bytes);
+    }
+}
+
+impl Timed {
+    fn with(&mut self, wire: &mut dyn Wire, call: impl FnOnce(&mut dyn Driver, &mut dyn Wire)) {
+        call(self.driver.as_mut(), &mut TimedWire { wire, finish: &mut self.finish });
+    }
+}
+
+impl Driver for Timed {
+    fn opened(&mut self, now: MonoNs, wire: &mut dyn Wire) {
+        self.with(wire, |driver, wire| driver.opened(now, wire));
+    }
+
+    fn heard(&mut self, received: MonoNs, bytes: &[u8], wire: &mut dyn Wire) {
+        self.with(wire, |driver, wire| driver.heard(received, bytes, wire));
+    }
+
+    fn due(&self) -> Option<MonoNs> {
+        self.driver.due()
+    }
+
+    fn wake(&mut self, now: MonoNs, wire: &mut dyn Wire) {
+        self.with(wire, |driver, wire| driver.wake(now, wire));
+    }
+
+    fn awaits(&self) -> bool {
+        self.driver.awaits()
+    }
+
+    fn patience(&self) -> DurNs {
+        self.driver.patience()
+    }
+
+    fn standing(&self) -> Standing {
+        self.driver.standing()
+    }
+}
+
+/// The yardstick: reads as it comes, and takes the time.
+fn bare(connect: &Connect, finish: Finish) {
+    match connect {
+        Connect::Serial { port: SerialPort::Path(path), .. } => {
+            let mut file = std::fs::File::open(path).unwrap();
+            bare_reads(finish, |buffer| file.read(buffer).unwrap_or(0));
+        }
+        Connect::Tcp { address } => {
+            let mut stream = TcpStream::connect(address).unwrap();
+            bare_reads(finish, |buffer| stream.read(buffer).unwrap_or(0));
+        }
+        Connect::Udp { address } => {
+            let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+            socket.connect(address).unwrap();
+            socket.send(&[]).unwrap();
+            bare_reads(finish, |buffer| socket.recv(buffer).unwrap_or(0));
+        }
+        #[cfg(target_os = "linux")]
+        Connect::Can { interface } => {
+            let mut socket = <socketcan::CanSocket as socketcan::Socket>::open(interface).unwrap();
+            bare_reads(finish, |buffer| socket.read(buffer).unwrap_or(0));
+        }
+        #[cfg(target_os = "linux")]
+        Connect::Hid(identity) => {
+            let device = (0..1000).find_map(|_| {
+                thread::sleep(Duration::from_millis(10));
+                let api = hidapi::HidApi::new().unwrap();
+                api.open_serial(identity.vendor, identity.product, identity.serial.as_deref()?).ok()
+            });
+            let device = device.unwrap();
+            bare_reads(finish, |buffer| device.read(buffer).unwrap_or(0));
+        }
+        other => panic!("no yardstick on {other}"),
+    }
+}
+
+fn bare_reads(mut finish: Finish, mut read: impl FnMut(&mut [u8]) -> usize) {
+    let (mut buffer, mut held) = ([0; 2048], Vec::new());
+    loop {
+        let count = read(&mut buffer);
+        let at = now();
+        // The device's end is closed when all is measured.
+        if count == 0 {
+            return;
+        }
+        held.extend_from_slice(&buffer[..count]);
+        while let Some(len) = finish.next_len().filter(|len| held.len() >= *len) {
+            finish.note(at, &held[..len]);
+            held.drain(..len);
+        }
+    }
+}
+
+/// The ends of one sensor's two ports: the driver's and the yardstick's; on a bus both hear the same one.
+struct Ends {
+    ours: Stand,
+    twin: Option<Stand>,
+    courses: [Course; 2],
+}
+
+impl Ends {
+    fn new(carrier: Carrier, number: usize, descriptor: Option<&[u8]>) -> std::io::Result<Self> {
+        let hid = |name: &str| {
+            let serial = Some(format!("{name}-{number}"));
+            Stand::hid(&UsbIdentity { vendor: 0x1209, product: 1, serial }, descriptor.unwrap_or_default())
+        };
+        let (ours, twin) = match carrier {
+            Carrier::Hid => (hid("ours")?, Some(hid("twin")?)),
+            Carrier::Can => (Stand::new(carrier, LOCAL)?, None),
+            _ => (Stand::new(carrier, LOCAL)?, Some(Stand::new(carrier, LOCAL)?)),
+        };
+        Ok(Self { ours, twin, courses: Default::default() })
+    }
+
+    fn twin_connect(&self) -> Connect {
+        self.twin.as_ref().map_or_else(|| self.ours.connect().clone(), |twin| twin.connect().clone())
+    }
+
+    /// Puts a message on both, in turns ours first.
+    fn write(&mut self, bytes: &[u8], ours_first: bool) {
+        let [ours, twin] = &self.courses;
+        let write = |stand: &mut Stand, courses: &[&Course]| {
+            if stand.is_called() {
+                let copies: Vec<Vec<u8>> = courses.iter().map(|_| bytes.to_vec()).collect();
+                let at = now();
+                for (course, copy) in courses.iter().zip(copies) {
+                    course.sent.push((at, copy));
+                }
+                stand.write(bytes).unwrap();
+            }
+        };
+        match &mut self.twin {
+            None => write(&mut self.ours, &[ours, twin]),
+            Some(stand) if ours_first => {
+                write(&mut self.ours, &[ours]);
+                write(stand, &[twin]);
+            }
+            Some(stand) => {
+                write(stand, &[twin]);
+                write(&mut self.ours, &[ours]);
+            }
+        }
+    }
+}
+
+/// What a part has measured.
+struct Measured {
+    /// For each sensor ours and the yardstick's.
+    delays: Vec<[Vec<DurNs>; 2]>,
+    /// Seconds of a core, by the beginnings of threads' names.
+    ports_s: f64,
+    loop_s: f64,
+    bare_s: f64,
+    packets: u64,
+    took_s: f64,
+}
+
+/// Serves the sensors of a scene on these ends, and measures for so long.
+fn rehearse(scene: &Scene, ends: Vec<Ends>, measured: Duration) -> Measured {
+    let vehicle = &scene.vehicle;
+    let mut app = App::new(vehicle.mission());
+    for sensor in &vehicle.sensors {
+        app.add_plugin(sensor.as_ref()).unwrap();
+    }
+    let mut dive = app.arm(vehicle.navigation()).unwrap();
+    let mut programs = vehicle.programs().unwrap().into_iter();
+    let begun = now();
+    let mut hands = Vec::new();
+    for (source, ends) in ends.iter().enumerate() {
+        let device = &vehicle.sensors[source];
+        let head = device.head().and_then(|_| programs.next());
+        let driver = device.driver(&DriverSetup { begun, head });
+        let driver = Box::new(Timed { driver, finish: Finish::new(&ends.courses[0]) });
+        let port = dive.take_port(source).unwrap();
+        hands.push(Hand { source, connect: Ok(ends.ours.connect().clone()), port, driver });
+        let (connect, finish) = (ends.twin_connect(), Finish::new(&ends.courses[1]));
+        named(&format!("bare {source}"), move || bare(&connect, finish));
+    }
+    let courses: Vec<[Course; 2]> = ends.iter().map(|ends| ends.courses.clone()).collect();
+    let ending = Arc::new(AtomicBool::new(false));
+    let simulation = Simulation::for_hosts(scene).unwrap();
+    let flag = Arc::clone(&ending);
+    let devices = named("devices", move || emulate(simulation, ends, &flag));
+    let crew = Crew::start(hands, None).unwrap();
+    let flag = Arc::clone(&ending);
+    let serving = named("loop", move || {
+        crew.run(&mut dive, &|| flag.load(Ordering::Relaxed), &mut |_| {});
+        crew.stop(&mut dive, &mut |_| ());
+    });
+    thread::sleep(Duration::from_secs_f64(WARMING.as_secs_f64()));
+    for course in courses.iter().flatten() {
+        while course.delays.pop().is_some() {}
+    }
+    let (from, before) = (now(), ["line ", "loop", "bare "].map(run_s));
+    thread::sleep(measured);
+    let (took_s, after) = (now().since(from).as_secs_f64(), ["line ", "loop", "bare "].map(run_s));
+    let taken = |course: &Course| {
+        let mut delays: Vec<DurNs> = std::iter::from_fn(|| course.delays.pop()).collect();
+        delays.sort_unstable();
+        delays
+    };
+    let delays: Vec<[Vec<DurNs>; 2]> =
+        courses.iter().map(|pair| [taken(&pair[0]), taken(&pair[1])]).collect();
+    ending.store(true, Ordering::Relaxed);
+    serving.join().unwrap();
+    devices.join().unwrap();
+    let packets = delays.iter().map(|pair| pair[0].len() as u64).sum();
+    let [ports_s, loop_s, bare_s] = [0, 1, 2].map(|part| after[part] - before[part]);
+    Measured { delays, ports_s, loop_s, bare_s, packets, took_s }
+}
+
+fn named<T: Send + 'static>(name: &str, work: impl FnOnce() -> T + Send + 'static) -> thread::JoinHandle<T> {
+    thread::Builder::new().name(name.to_owned()).spawn(work).unwrap()
+}
+
+/// Seconds for which threads of this process have run whose names begin so. Source: Linux, /proc/PID/task/TID/schedstat.
+fn run_s(beginning: &str) -> f64 {
+    let Ok(tasks) = std::fs::read_dir("/proc/self/task") else { return f64::NAN };
+    let of = |task: std::fs::DirEntry| {
+        let text = |name: &str| std::fs::read_to_string(task.path().join(name)).unwrap_or_default();
+        let ns = text("schedstat").split(' ').next().and_then(|word| word.parse::<f64>().ok());
+        if text("comm").starts_with(beginning) { ns.unwrap_or(f64::NAN) / 1e9 } else { 0.0 }
+    };
+    tasks.flatten().map(of).sum()
+}
+
+/// The devices: what hosts ask of them goes to the simulation, what they say goes to both ends.
+fn emulate(mut simulation: Simulation, mut ends: Vec<Ends>, ending: &AtomicBool) {
+    let origin = now();
+    let mut is_ours_first = false;
+    simulation.set_out(START + WARMING);
+    while !ending.load(Ordering::Relaxed) {
+        wait_for_any(ends.iter().map(|ends| &ends.ours), WAIT_NS);
+        let at = START + now().since(origin);
+        for (number, ends) in ends.iter_mut().enumerate() {
+            while let Some(bytes) = ends.ours.read().unwrap() {
+                simulation.hear(number, at, &bytes);
+            }
+            if let Some(twin) = &mut ends.twin {
+                while twin.read().unwrap().is_some() {}
+            }
+        }
+        simulation.go_on(at + DurNs(1));
+        while let Some(message) = simulation.waiting_message() {
+            if message.direction == Direction::Received {
+                is_ours_first = !is_ours_first;
+                ends[usize::from(message.source)].write(message.bytes, is_ours_first);
+            }
+        }
+    }
+}
+
+fn at(delays: &[DurNs], thousandths: usize) -> f64 {
+    delays
+        .get((delays.len().max(1) - 1) * thousandths / 1000)
+        .map_or(f64::NAN, |delay| delay.as_secs_f64() * 1e6)
+}
+
+fn quantiles(delays: &[DurNs]) -> String {
+    let [half, most, nearly, all] = [500, 990, 999, 1000].map(|thousandths| at(delays, thousandths));
+    format!("{half:.0}, {most:.0}, {nearly:.0}, {all:.0}")
+}
+
+fn latency(measured: Duration) {
+    println!(
+        "First byte written at the device's end to packet in the loop's ring, us: p50, p99, p99.9, max\n"
+    );
+    println!("| what | on | messages | ours | bare read | ratio of p50, of p99 |\n|---|---|---|---|---|---|");
+    let descriptor = headrace_tether_hid::report::REFERENCE_DESCRIPTOR;
+    let (mut vehicle, mut ends, mut rows) = (TUNNEL.to_owned(), Vec::new(), Vec::new());
+    for (number, (what, carrier, keys)) in LINES.iter().enumerate() {
+        match Ends::new(*carrier, number, Some(&descriptor)) {
+            Ok(open) => {
+                ends.push(open);
+                rows.push((*what, carrier.as_str()));
+                vehicle.extend(["[[sensors]]\nid = \"", &format!("sensor_{number}"), "\"\n", keys, "\n"]);
+            }
+            Err(error) => println!("| {what} | {} | skipped: {error} | | | |", carrier.as_str()),
+        }
+    }
+    let scene = shipped::scene_from(&format!("vehicle = \"vehicle.toml\"\n{WAY}"), &|_| {
+        Ok(vehicle.clone().into_bytes())
+    });
+    let measured = rehearse(&scene, ends, measured);
+    for ((what, on), [ours, bare]) in rows.iter().zip(&measured.delays) {
+        let ratio = |thousandths| at(ours, thousandths) / at(bare, thousandths);
+        println!(
+            "| {what} | {on} | {} | {} | {} | {:.2}, {:.2} |",
+            ours.len(),
+            quantiles(ours),
+            quantiles(bare),
+            ratio(500),
+            ratio(990)
+        );
+    }
+    println!();
+}
+
+fn four_heads(measured: Duration) {
+    println!(
+        "Share of one core, the vehicle with four heads (vita2-4.toml, 11 sensors: TCP, UDP; CAN and HID where they are)\n"
+    );
+    let scene = shipped::scene(&format!("vehicle = \"vita2-4.toml\"\n{WAY}"));
+    let mut ends = Vec::new();
+    for (number, (config, device)) in
+        scene.vehicle.sensor_configs.iter().zip(&scene.vehicle.sensors).enumerate()
+    {
+        let carrier = Connect::parse(&config.connect).map_or(Carrier::Udp, |connect| connect.carrier());
+        let descriptor = device.report_descriptor();
+        let open = Ends::new(carrier, number, descriptor.as_deref());
+        ends.push(open.or_else(|_| Ends::new(Carrier::Udp, number, None)).unwrap());
+    }
+    let measured = rehearse(&scene, ends, measured);
+    let share = |seconds: f64| 100.0 * seconds / measured.took_s;
+    println!(
+        "| what | packets a second | share | bare reads of the same messages | ratio |\n|---|---|---|---|---|"
+    );
+    println!(
+        "| threads of the ports | {:.0} | {:.2} % | {:.2} % | {:.2} |",
+        measured.packets as f64 / measured.took_s,
+        share(measured.ports_s),
+        share(measured.bare_s),
+        measured.ports_s / measured.bare_s
+    );
+    println!("| thread of the loop, whole | | {:.2} % | | |", share(measured.loop_s));
+}
