@@ -20,9 +20,6 @@ use crate::status::{Board, LineHistory, Status};
 const BOARD: usize = 256;
 /// How long the loop sleeps when nothing comes.
 const PERIOD: Duration = Duration::from_millis(20);
-/// How long the loop rests after a tick, for more to come: waking it for every packet costs more than its work. What it is told
-/// is stamped already, and nobody waits for it in less.
-const REST: Duration = Duration::from_millis(5);
 /// How long an outlet is given that is behind.
 const BEHIND: Duration = Duration::from_millis(1);
 
@@ -73,13 +70,12 @@ impl Crew {
         self.board.next()
     }
 
-    /// Runs the loop until `ended` says so: a tick as soon as something has come, but for a short rest after the last, or a period has passed.
+    /// Runs the loop until `ended` says so: a tick as soon as something has come, or a period has passed.
     pub fn run(&self, dive: &mut Loop, ended: &dyn Fn() -> bool, after_tick: &mut dyn FnMut(&Loop)) {
         while !ended() {
             self.parker.park_timeout(PERIOD);
             dive.tick(clock::now());
             after_tick(dive);
-            thread::sleep(REST);
         }
     }
 
