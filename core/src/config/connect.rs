@@ -333,7 +333,7 @@ mod tests {
         let error = Connect::parse("can:can0").unwrap().among(&[Carrier::Serial, Carrier::Tcp]).unwrap_err();
         assert_eq!(
             error.to_string(),
-            "connect = \"can:can0\": the device isn't on can:; it is on serial: or tcp:"
+            "connect = \"can:can0\": a device of this kind isn't connected by can:; it is by serial: or tcp:"
         );
     }
 }
