@@ -15,7 +15,6 @@ pub use machine::{Machine, User};
 pub use presence::{Presence, presence};
 pub use rights::Rights;
 
-pub(crate) use can::down;
 pub(crate) use rights::remedy_for;
 
 use crate::trouble::Trouble;

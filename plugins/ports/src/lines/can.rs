@@ -11,7 +11,6 @@ use socketcan::{
 
 use super::{Line, READ_BYTES, ReadTimeout, waited};
 use crate::clock;
-use crate::discover::{self, Machine};
 use crate::trouble::Trouble;
 
 /// Length of a `can_frame`, and where its data begins.
