@@ -28,7 +28,7 @@ use headrace_core::time::DurNs;
 use headrace_mavlink::decoder::{self as mavlink, MavlinkDecoder, Part};
 use headrace_mavlink::message::{Imu, ImuMessage, Message, Sender};
 use headrace_replay::log::{LogHeader, Recorder, SourceInfo};
-use headrace_replay::record::{QUEUE_BYTES, RecorderOutlet};
+use headrace_replay::record::{QUEUE_BYTES, RecorderOutlet, result_channels};
 use headrace_replay::simulate::{START, Simulation};
 
 struct Counting;
@@ -101,6 +101,7 @@ fn a_million_packets_without_one_allocation() {
             .map(|s| SourceInfo { id: s.id.clone(), plugin: s.plugin.clone(), connect: s.connect.clone() })
             .collect(),
         ticks: true,
+        results: result_channels(),
         ..LogHeader::default()
     };
     let (port, recorder) = Recorder::start(std::io::sink(), &header, QUEUE_BYTES).unwrap();

@@ -124,7 +124,7 @@ fn ports_that_are_wrong_or_not_there_are_named_while_the_dive_goes_on() {
     adapter: closed: opening /dev/serial/by-id/usb-headrace-none: it isn't there; plug it in, or see headrace devices
     usb: closed: looking for serial:usb:1209:fffe:none: no such device is plugged in; headrace devices shows what is
     counter: closed: looking for hid:1209:fffe:none: no such device is plugged in; headrace devices shows what is
-    imu: closed: opening none77: there is no such interface; plug the adapter in; ip link shows what there is
+    imu: closed: opening none77: there is no such CAN interface; plug the adapter in; ip link shows what there is
     "#);
 }
 

@@ -121,7 +121,8 @@ fn record(
     if !order.is_empty() && port.tick(time.index, time.now, order).is_err() {
         order.clear();
     }
-    for (channel, ((_, trail), before)) in (0..).zip(results.streams().into_iter().zip(records)) {
+    let streams = results.streams().into_iter().zip(records).take(port.result_channels());
+    for (channel, ((_, trail), before)) in (0..).zip(streams) {
         if !trail.words().is_empty() {
             fill(message, time.index, *before, trail.words());
             // What there is no room for is missing from the record, which numbers what it has; the input goes first.

@@ -54,6 +54,7 @@ pub struct RecorderPort {
     /// Without a cached index, so that the port can be a resource of the loop's world, which wants `Sync`.
     ring: Prod<Arc<HeapRb<u8>>>,
     state: Arc<State>,
+    result_channels: usize,
 }
 
 /// The end for those who start and finish the recorder. Dropped without [`RecorderHandle::finish`] it still completes
@@ -123,7 +124,11 @@ impl Recorder {
         let thread = thread::Builder::new().name("recorder".to_owned());
         let thread = thread.spawn(move || Worker::new(log, &thread_state).run(queue));
         let thread = Some(thread.map_err(|source| LogError::Thread { source })?);
-        let port = RecorderPort { ring: Prod::new(ring), state: Arc::clone(&state) };
+        let port = RecorderPort {
+            ring: Prod::new(ring),
+            state: Arc::clone(&state),
+            result_channels: header.results.len(),
+        };
         Ok((port, RecorderHandle { thread, state }))
     }
 
@@ -194,6 +199,11 @@ impl RecorderPort {
     /// Errors: no room; nothing was written.
     pub fn result(&mut self, channel: u16, time: MonoNs, bytes: &[u8]) -> Result<(), Full> {
         self.push(Lane::Result(channel), time, time, bytes)
+    }
+
+    /// How many channels for results the log has.
+    pub fn result_channels(&self) -> usize {
+        self.result_channels
     }
 
     /// Free bytes of the queue.
