@@ -11,7 +11,7 @@ use headrace_core::coverage::{Action, Cause, Evidence, Run, RunChange, RunId, Se
 use headrace_core::sampling::advice::{Reason, Remedy};
 use headrace_core::time::{DurNs, MonoNs};
 use headrace_core::tunnel::Profile;
-use headrace_ports::Status;
+use headrace_ports::{Phase, Status};
 
 use crate::output::{put, say};
 use crate::station::station;
@@ -76,7 +76,8 @@ impl Watch {
     /// A sensor does better or worse than before.
     pub(crate) fn sensor(&mut self, id: &str, status: &Status) {
         if !self.quiet {
-            self.line(&format!("SENSOR   {id:<12} {status}"));
+            let amber = (status.phase != Phase::Running).then_some("\x1b[33m");
+            self.coloured(&format!("SENSOR   {id:<12} {status}"), amber);
         }
     }
 
@@ -176,13 +177,16 @@ impl Watch {
     }
 
     fn line(&mut self, text: &str) {
+        let red = (text.starts_with("FLAG") || text.starts_with("ALERT")).then_some("\x1b[1;31m");
+        self.coloured(text, red);
+    }
+
+    fn coloured(&mut self, text: &str, colour: Option<&str>) {
         self.close_status();
-        let colour = if self.terminal && (text.starts_with("FLAG") || text.starts_with("ALERT")) {
-            ("\x1b[1;31m", "\x1b[0m")
-        } else {
-            ("", "")
-        };
-        say(&format!("{}{text}{}", colour.0, colour.1));
+        match colour.filter(|_| self.terminal) {
+            Some(colour) => say(&format!("{colour}{text}\x1b[0m")),
+            None => say(text),
+        }
     }
 
     fn close_status(&mut self) {

@@ -69,6 +69,10 @@ pub trait Driver: Send {
     /// The line has been opened, for the first time or again: the device may have been replaced or switched off meanwhile.
     fn opened(&mut self, now: MonoNs, wire: &mut dyn Wire);
 
+    /// The line has been closed: bytes held for the rest of a frame are delivered as they are, for a whole frame may be among
+    /// them. What is sent goes nowhere.
+    fn closed(&mut self, _wire: &mut dyn Wire) {}
+
     /// Bytes that came, the first of them at `received`. What isn't delivered is lost to the loop and to the log.
     fn heard(&mut self, received: MonoNs, bytes: &[u8], wire: &mut dyn Wire);
 

@@ -237,12 +237,15 @@ impl HeadDriver {
 
 impl Driver for HeadDriver {
     fn opened(&mut self, now: MonoNs, wire: &mut dyn Wire) {
-        self.cutter.flush(&mut |piece| wire.deliver(piece.received, piece.bytes));
         self.asked = None;
         self.unanswered = 0;
         self.last_position = None;
         self.locate(now);
         self.ask(now, wire);
+    }
+
+    fn closed(&mut self, wire: &mut dyn Wire) {
+        self.cutter.flush(&mut |piece| wire.deliver(piece.received, piece.bytes));
     }
 
     fn heard(&mut self, received: MonoNs, bytes: &[u8], wire: &mut dyn Wire) {

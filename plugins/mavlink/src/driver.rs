@@ -62,9 +62,12 @@ impl MavlinkDriver {
 }
 
 impl Driver for MavlinkDriver {
-    fn opened(&mut self, now: MonoNs, wire: &mut dyn Wire) {
-        self.cutter.flush(&mut |piece| wire.deliver(piece.received, piece.bytes));
+    fn opened(&mut self, now: MonoNs, _: &mut dyn Wire) {
         self.next_at = now;
+    }
+
+    fn closed(&mut self, wire: &mut dyn Wire) {
+        self.cutter.flush(&mut |piece| wire.deliver(piece.received, piece.bytes));
     }
 
     fn heard(&mut self, received: MonoNs, bytes: &[u8], wire: &mut dyn Wire) {

@@ -183,7 +183,6 @@ impl PingDriver {
 
 impl Driver for PingDriver {
     fn opened(&mut self, now: MonoNs, wire: &mut dyn Wire) {
-        self.cutter.flush(&mut |piece| wire.deliver(piece.received, piece.bytes));
         self.greet();
         self.device = None;
         self.refused = None;
@@ -192,6 +191,10 @@ impl Driver for PingDriver {
         self.next_at = now;
         self.look_at = now + LOOK_PERIOD;
         self.next(now, wire);
+    }
+
+    fn closed(&mut self, wire: &mut dyn Wire) {
+        self.cutter.flush(&mut |piece| wire.deliver(piece.received, piece.bytes));
     }
 
     fn heard(&mut self, received: MonoNs, bytes: &[u8], wire: &mut dyn Wire) {

@@ -142,6 +142,7 @@ impl Service {
                     Ok(mut line) => {
                         let opened = clock::now();
                         let ended = self.serve(line.as_mut(), opened);
+                        self.closed();
                         let served = clock::now().since(opened);
                         if served >= LONG_ENOUGH && self.seats.iter().any(|seat| seat.last_frame >= opened) {
                             pause = FIRST_PAUSE;
@@ -183,6 +184,14 @@ impl Service {
         self.count_lost();
         let why = trouble::losing(error);
         self.say_all(Phase::Closed, &format!("lost {connect}: {why}; it is tried again"));
+    }
+
+    /// Has what the drivers hold delivered.
+    fn closed(&mut self) {
+        for Seat { berth: Berth { driver, port, .. }, history, .. } in &mut self.seats {
+            driver.closed(&mut Ends { port, history, wishes: &mut VecDeque::new() });
+        }
+        self.common.waker.unpark();
     }
 
     fn count_lost(&mut self) {

@@ -19,7 +19,9 @@ impl<F: Framing, const N: usize> Listener<F, N> {
 }
 
 impl<F: Framing + Send, const N: usize> Driver for Listener<F, N> {
-    fn opened(&mut self, _: MonoNs, wire: &mut dyn Wire) {
+    fn opened(&mut self, _: MonoNs, _: &mut dyn Wire) {}
+
+    fn closed(&mut self, wire: &mut dyn Wire) {
         self.cutter.flush(&mut |piece| wire.deliver(piece.received, piece.bytes));
     }
 
