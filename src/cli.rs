@@ -33,7 +33,7 @@ pub(crate) enum Command {
     ///
     /// With --smooth twice: once as it was, and once along the track that all sensors agree on over the whole dive.
     #[command(
-        after_help = "Example:\n  headrace replay dive.mcap --target 0.6 --report report.json\n  headrace replay dive.mcap --target 0.3,0.6,1.0 --section 0.25,1\n  headrace replay dive.mcap --smooth --report certificate.json"
+        after_help = "Example:\n  headrace replay dive.mcap --target 0.6 --report report.json\n  headrace replay dive.mcap --target 0.3,0.6,1.0 --section 0.25,1\n  headrace replay dive.mcap --smooth --report certificate.json\n  headrace replay dive.mcap --expect golden.json --bless"
     )]
     Replay(Replay),
     /// Replay a dive and hold it against what it published live: the same, or where they first part.
@@ -42,6 +42,12 @@ pub(crate) enum Command {
     /// the log has lost data.
     #[command(after_help = "Example:\n  headrace verify dive.mcap")]
     Verify(Verify),
+    /// Rewrite what reads of a damaged log into an orderly one, and say what is lost.
+    ///
+    /// The new log replays to the same digest, and says itself what is missing, so that its reports do, too. Exit code 3
+    /// when something is.
+    #[command(after_help = "Example:\n  headrace recover dive.mcap -o recovered.mcap")]
+    Recover(Recover),
     /// Turn a scene into a log of the bytes that its devices would send.
     ///
     /// Only the effects that the scene names are simulated; --explain lists what that comes to.
@@ -172,6 +178,9 @@ pub(crate) struct Replay {
     /// Report to compare with; exit code 1 when verdicts, holes or the digest differ.
     #[arg(long, value_name = "GOLDEN.json")]
     pub(crate) expect: Option<PathBuf>,
+    /// Say what has changed against the golden report, and make this one the golden one.
+    #[arg(long, requires = "expect")]
+    pub(crate) bless: bool,
     #[command(flatten)]
     pub(crate) output: Output,
 }
@@ -187,6 +196,18 @@ pub(crate) struct Verify {
     #[arg(long, value_name = "MS", default_value = "20", value_parser = clap::value_parser!(u32).range(1..=60_000))]
     pub(crate) tick_ms: u32,
     /// Print JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Recover {
+    /// Log to recover; it is only read.
+    pub(crate) log: PathBuf,
+    /// Log to write; it must not exist.
+    #[arg(short, long, value_name = "FIXED.mcap")]
+    pub(crate) output: PathBuf,
+    /// Print what was kept and what is lost as JSON.
     #[arg(long)]
     pub(crate) json: bool,
 }

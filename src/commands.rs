@@ -79,6 +79,7 @@ pub(crate) fn replay(args: &Replay) -> Result<u8, Failure> {
     note_losses(&mut report, &args.log, &player)?;
     let code = finish(&report, &args.output)?;
     match &args.expect {
+        Some(golden) if args.bless => expect::bless(&report, golden).map(|()| code),
         Some(golden) if expect::differs(&report, golden)? => Ok(failure::FAILED),
         _ => Ok(code),
     }

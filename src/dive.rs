@@ -12,7 +12,8 @@ use headrace_core::config::VehicleConfig;
 use headrace_core::fusion::Navigation;
 use headrace_ports::Crew;
 use headrace_replay::drive::{Feed, Pace, drive};
-use headrace_replay::log::{LogHeader, Recorder, RecorderHandle, SentPort, SourceInfo, file_digest};
+use headrace_replay::log::{LeftOut, LogHeader, Recorder, RecorderHandle, SentPort, SourceInfo, file_digest};
+use headrace_replay::player::seconds;
 use headrace_replay::record::{QUEUE_BYTES, RecorderOutlet, result_channels};
 
 use crate::failure::{self, Failure};
@@ -225,7 +226,10 @@ impl Dive {
         if let Some((path, handle)) = self.recorder.take() {
             drop(self.armed);
             let written = handle.finish();
-            let losses = written.as_ref().err().map(|error| format!("recording failed: {error}"));
+            let losses = match &written {
+                Err(error) => Some(format!("recording failed: {error}")),
+                Ok(written) => Some(written.left_out).filter(|left| left.messages > 0).map(left_out),
+            };
             report.log = Some(LogReport {
                 path: path.display().to_string(),
                 sha256: file_digest(&path)?,
@@ -235,6 +239,12 @@ impl Dive {
         }
         Ok(report)
     }
+}
+
+/// What the recorder left out, with when.
+fn left_out(left: LeftOut) -> String {
+    let span = left.span.map(|(from, to)| format!(", {} to {}", seconds(from), seconds(to)));
+    format!("{}{}", left.words(), span.unwrap_or_default())
 }
 
 /// The exit code that a finished dive deserves.

@@ -16,6 +16,7 @@ mod paper;
 mod pictures;
 mod plan;
 mod progress;
+mod recover;
 mod simulate;
 mod smooth;
 mod station;
@@ -36,6 +37,7 @@ fn main() -> ExitCode {
         Command::Run(run) => commands::run(&run),
         Command::Replay(replay) => commands::replay(&replay),
         Command::Verify(args) => verify::verify(&args),
+        Command::Recover(args) => recover::recover(&args),
         Command::Simulate(simulate) => simulate::simulate(&simulate),
         Command::Plan(args) => plan::plan(&args),
         Command::Calibrate(args) => calibrate::calibrate(&args),

@@ -92,7 +92,30 @@ fn a_report_expected_is_met_or_each_difference_named() {
     let answer = folder.headrace(&["replay", "dive.mcap", "--expect", "golden.json"]);
     assert_eq!(answer.code, Some(1));
     let places: Vec<_> = answer.stderr.lines().map(|line| line.split_whitespace().nth(1).unwrap()).collect();
-    assert_eq!(places, ["/digest:", "/sections/3/hole_m:"]);
+    let of = |key: &str| report["sections"][3][key].as_f64().unwrap();
+    let section = format!("/sections/3[{}..{}m]/hole_m:", of("start_m"), of("end_m"));
+    assert_eq!(places, ["/digest:", &section]);
+}
+
+#[test]
+fn a_golden_report_is_renewed_with_a_word_on_what_changes() {
+    let folder = Folder::with_dive();
+    let bless = |further: &[&str]| {
+        let arguments = ["replay", "dive.mcap", "--expect", "golden.json", "--bless"];
+        let answer = folder.headrace(&[&arguments[..], further].concat());
+        assert_eq!(answer.code, Some(0), "{}", answer.stderr);
+        answer.stderr
+    };
+    assert!(bless(&[]).contains("a new golden report"));
+    assert!(bless(&[]).contains("nothing has changed"));
+    assert_eq!(folder.replay("dive.mcap", &["--expect", "golden.json"]).0, Some(0));
+    assert_eq!(folder.replay("dive.mcap", &["--expect", "golden.json", "--target", "0.4"]).0, Some(1));
+    assert!(bless(&["--target", "0.4"]).contains("/target_m: 0.4 in place of 1.2"));
+    assert_eq!(folder.replay("dive.mcap", &["--expect", "golden.json", "--target", "0.4"]).0, Some(0));
+    let golden: serde_json::Value = serde_json::from_slice(&folder.read("golden.json")).unwrap();
+    assert!(golden["log"].is_null() && golden["target_m"] == 0.4, "it names no file of this machine");
+    let answer = folder.headrace(&["replay", "dive.mcap", "--bless"]);
+    assert_eq!(answer.code, Some(2), "{}", answer.stderr);
 }
 
 #[test]

@@ -37,6 +37,7 @@ pub fn result_channels() -> Vec<ResultChannel> {
         schema_encoding: String::new(),
         schema: String::new(),
         message_encoding: ENCODING.to_owned(),
+        follows_echoes: *name == STREAMS[0],
     };
     STREAMS.iter().map(channel).collect()
 }

@@ -94,6 +94,11 @@ impl Channels {
         self.by_id.values().any(|channel| channel.kind == Kind::Tick)
     }
 
+    pub(super) fn result_topics(&self) -> Vec<String> {
+        let results = self.by_id.values().filter(|channel| channel.kind == Kind::Result);
+        results.map(|channel| channel.definition.topic.clone()).collect()
+    }
+
     fn source(&mut self, id: String, metadata: &BTreeMap<String, String>) -> u16 {
         let known = self.sources.iter().position(|source| source.id == id);
         let number = known.unwrap_or_else(|| {

@@ -51,6 +51,8 @@ pub(super) fn unpack<R: Read + Seek>(
     Ok(match result {
         _ if too_large => Unpacked::Bad(LossKind::TooLarge { limit: MAX_CHUNK_BYTES }),
         Err(McapError::UnsupportedCompression(name)) => Unpacked::Bad(LossKind::Compression(name)),
+        // Nothing vouches for what it holds: a head of zeros makes an empty chunk of anything.
+        _ if place.doubtful && place.crc == 0 => Unpacked::Bad(LossKind::Contents),
         _ if place.cut => Unpacked::Cut,
         Ok(()) => Unpacked::Whole,
         Err(McapError::BadChunkCrc { .. }) => Unpacked::Bad(LossKind::Checksum),

@@ -36,6 +36,9 @@ pub const METADATA: &str = "headrace";
 /// Name of the metadata record that repeats the channels: `<number>/topic`, `<number>/<key of its metadata>`; and the
 /// attachments: [`ATTACHMENT_PREFIX`] and name, with the length in bytes as the value.
 pub const CHANNEL_LIST: &str = "headrace.channels";
+/// Name of the metadata records of what this log knows to be missing from it: `<number>` to `<from> <to> <words>`, log times
+/// in ns, `-` where there is none. A recorder on a full disk writes them, and `headrace recover`.
+pub const LOSSES: &str = "headrace.losses";
 /// Before the names of attachments in [`CHANNEL_LIST`].
 pub const ATTACHMENT_PREFIX: &str = "attachment/";
 /// Key in [`METADATA`] with [`FORMAT_VERSION`].
@@ -113,6 +116,20 @@ pub(super) fn tick_head(index: u64, now: MonoNs, packets: u32) -> [u8; TICK_HEAD
 /// Bytes of `order` as the message has them.
 pub(super) fn order_bytes(order: &[u16]) -> impl Iterator<Item = u8> {
     order.iter().flat_map(|source| source.to_le_bytes())
+}
+
+/// A loss as [`LOSSES`] has it.
+pub(super) fn stated_loss(from: Option<MonoNs>, to: Option<MonoNs>, words: &str) -> String {
+    let time = |time: Option<MonoNs>| time.map_or_else(|| "-".to_owned(), |time| time.0.to_string());
+    format!("{} {} {words}", time(from), time(to))
+}
+
+/// Reads what [`stated_loss`] wrote: from, to, words.
+pub(super) fn read_loss(text: &str) -> (Option<MonoNs>, Option<MonoNs>, &str) {
+    let mut parts = text.splitn(3, ' ');
+    let mut time = || parts.next().and_then(|time| time.parse().ok()).map(MonoNs);
+    let (from, to) = (time(), time());
+    (from, to, parts.next().unwrap_or(text))
 }
 
 /// Adds the digest of name and other entries to a metadata record.

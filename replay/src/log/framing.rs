@@ -106,6 +106,8 @@ pub(super) struct ChunkPlace {
     pub(super) times: (u64, u64),
     /// Whether the file ends within it.
     pub(super) cut: bool,
+    /// Whether its head is damaged: its length isn't that of its record.
+    pub(super) doubtful: bool,
 }
 
 /// An attachment: where its data is and what its head says.
@@ -258,6 +260,8 @@ fn look_at_chunk<R: Read + Seek>(
             (frame.end, frame.confirmed) = (end, true);
         } else if end > frame.end || !record_follows(file, frame.end)? {
             return Ok(Found::Nothing);
+        } else {
+            (place.data_len, place.doubtful) = (frame.end.saturating_sub(place.data), true);
         }
     }
     if frame.end > file.len() {
@@ -368,6 +372,7 @@ fn chunk_place(fields: &mut Fields<'_>, body: u64) -> Option<ChunkPlace> {
         crc,
         times: (times.0.min(times.1), times.0.max(times.1)),
         cut: false,
+        doubtful: false,
     })
 }
 

@@ -44,6 +44,8 @@ pub enum LossKind {
     },
     /// Every record reads, but the checksum over all of them does not fit: a byte has changed, and nothing says which.
     DataSection,
+    /// The log says so itself: its recorder left something out, or it was recovered from a damaged one.
+    Stated(String),
 }
 
 /// One piece of a log that is damaged.
@@ -81,20 +83,23 @@ impl fmt::Display for LossKind {
             Self::DataSection => {
                 out.write_str("some byte has changed: the checksum over the whole log does not fit")
             }
+            Self::Stated(words) => out.write_str(words),
         }
     }
 }
 
 impl fmt::Display for Loss {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(out, "byte {}: {} ({} bytes", self.offset, self.kind, self.bytes)?;
-        if let Some(from) = self.from {
-            write!(out, ", after {:.3} s", from.as_secs_f64())?;
+        let mut notes = Vec::new();
+        if matches!(self.kind, LossKind::Stated(_)) {
+            write!(out, "{}", self.kind)?;
+        } else {
+            write!(out, "byte {}: {}", self.offset, self.kind)?;
+            notes.push(format!("{} bytes", self.bytes));
         }
-        if let Some(to) = self.to {
-            write!(out, ", before {:.3} s", to.as_secs_f64())?;
-        }
-        out.write_str(")")
+        notes.extend(self.from.map(|from| format!("after {:.3} s", from.as_secs_f64())));
+        notes.extend(self.to.map(|to| format!("before {:.3} s", to.as_secs_f64())));
+        if notes.is_empty() { Ok(()) } else { write!(out, " ({})", notes.join(", ")) }
     }
 }
 

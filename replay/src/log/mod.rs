@@ -12,6 +12,7 @@
 //! | attachments | `vehicle.toml` and the files that it names |
 //! | a chunk | definitions of all channels, nothing else |
 //! | metadata `headrace.channels` | the same definitions once more, so that a log survives the loss of that chunk |
+//! | metadata `headrace.losses` | only where something is missing: what, from when to when ([`format::LOSSES`]) |
 //! | chunks | messages, each chunk at most half a second of a dive |
 //! | summary | what viewers need to find their way |
 //!
@@ -29,14 +30,18 @@ mod loss;
 mod merge;
 mod reader;
 mod recorder;
+mod recover;
 mod scan;
 mod search;
+mod space;
 mod writer;
 
 pub use error::LogError;
 pub use loss::{Loss, LossKind};
 pub use reader::{LogInfo, LogMessage, LogReader, MessageKind, file_digest};
 pub use recorder::{Full, Recorder, RecorderHandle, RecorderPort, SentPort};
+pub use recover::{RECOVERED_FROM, Recovered, recover};
+pub use space::LeftOut;
 pub use writer::{LogHeader, LogWriter, ResultChannel, SourceInfo, Summary};
 
 #[cfg(test)]

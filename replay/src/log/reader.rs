@@ -16,7 +16,7 @@ use super::format::{VEHICLE_FILE, hex};
 use super::framing::{ChunkPlace, Definition, LogFile};
 use super::loss::Losses;
 use super::merge::{Batch, Merge};
-use super::scan::{Piece, Span, scan};
+use super::scan::{Piece, Span, date_losses, scan};
 use super::{LogError, Loss, LossKind, SourceInfo};
 
 /// The most bytes of overlapping pieces that are held to bring their messages into order.
@@ -158,6 +158,11 @@ impl<R: Read + Seek> LogReader<R> {
         self.channels.has_ticks()
     }
 
+    /// Topics of the results, in the order of their channels' numbers, and the sources: all whose channels have been read.
+    pub(super) fn channels_found(&self) -> (Vec<String>, Vec<SourceInfo>) {
+        (self.channels.result_topics(), self.channels.sources().to_vec())
+    }
+
     /// What has been found damaged. Damage to the framing is known from the start, that within chunks when they have
     /// been read; the list is complete when [`LogReader::next`] has given `None`.
     pub fn losses(&self) -> &[Loss] {
@@ -235,8 +240,9 @@ impl<R: Read + Seek> LogReader<R> {
         for kind in found {
             self.lose(number, kind);
         }
-        if chunk.is_some_and(|place| place.cut) {
-            self.date_cut(span.at, &batch);
+        let times = batch.entries.iter().map(|entry| entry.head.log_time);
+        if let Some(span) = self.spans.get_mut(number) {
+            (span.from, span.to) = (times.clone().min().unwrap_or(0), times.max().unwrap_or(0));
         }
         self.merge.add(number, batch);
         Ok(())
@@ -255,15 +261,6 @@ impl<R: Read + Seek> LogReader<R> {
         });
     }
 
-    /// A chunk that the file's end cuts may have given messages nevertheless: the loss begins after them.
-    fn date_cut(&mut self, at: u64, batch: &Batch) {
-        let last = batch.entries.iter().map(|entry| MonoNs(entry.head.log_time)).max();
-        let loss = self.losses.list_mut().iter_mut().find(|loss| loss.offset == at);
-        if let (Some(loss), Some(_)) = (loss, last) {
-            loss.from = last;
-        }
-    }
-
     /// Messages outside chunks have no checksum but that over the whole log: at the end of one that seems whole it is
     /// the last question. It is of no use where there are chunks: the `mcap` crate's own writer gets it wrong when it
     /// is told to leave out the chunks' checksums.
@@ -272,6 +269,7 @@ impl<R: Read + Seek> LogReader<R> {
             return Ok(());
         }
         self.finished = true;
+        date_losses(&mut self.losses, &self.spans, true);
         let unchunked = self.spans.iter().all(|span| matches!(span.piece, Piece::Run));
         if unchunked && self.losses.list().is_empty() && !data_section_holds(&mut self.file)? {
             self.losses.push(Loss {

@@ -20,6 +20,7 @@ use ringbuf::wrap::{Cons, Prod};
 use super::LogError;
 use super::fields::Fields;
 use super::format::{TICK_HEAD_BYTES, order_bytes, tick_head};
+use super::space::{LONGEST_KEPT_BYTES, Space};
 use super::writer::{Lane, LogHeader, LogWriter, Summary};
 
 /// Bytes before each entry in the queue: kind, a spare byte, number, length, log time, publish time.
@@ -110,6 +111,16 @@ impl Recorder {
         header: &LogHeader,
         queue_bytes: usize,
     ) -> Result<(RecorderPort, RecorderHandle), LogError> {
+        Self::start_within(Space::endless(), writer, header, queue_bytes)
+    }
+
+    /// The same where room may end.
+    pub(super) fn start_within<W: Write + Send + 'static>(
+        space: Space,
+        writer: W,
+        header: &LogHeader,
+        queue_bytes: usize,
+    ) -> Result<(RecorderPort, RecorderHandle), LogError> {
         let mut log = LogWriter::new(writer, header)?;
         log.flush()?;
         let ring = Arc::new(HeapRb::new(queue_bytes.max(MIN_QUEUE_BYTES)));
@@ -122,7 +133,8 @@ impl Recorder {
         let queue = Queue { ring: Cons::new(Arc::clone(&ring)), message: Vec::new() };
         let thread_state = Arc::clone(&state);
         let thread = thread::Builder::new().name("recorder".to_owned());
-        let thread = thread.spawn(move || Worker::new(log, &thread_state).run(queue));
+        let echoes = header.results.iter().map(|result| result.follows_echoes).collect();
+        let thread = thread.spawn(move || Worker::new(log, space, echoes, &thread_state).run(queue));
         let thread = Some(thread.map_err(|source| LogError::Thread { source })?);
         let port = RecorderPort {
             ring: Prod::new(ring),
@@ -132,7 +144,8 @@ impl Recorder {
         Ok((port, RecorderHandle { thread, state }))
     }
 
-    /// Starts a recorder that writes to a new file, which is brought to the medium at each flush.
+    /// Starts a recorder that writes to a new file, which is brought to the medium at each flush. It warns when the disk fills,
+    /// and then leaves out echoes before anything else: [`Summary::left_out`].
     ///
     /// Errors: as for [`Recorder::start`]; the file exists (a dive is never overwritten) or can't be made.
     pub fn create(
@@ -143,7 +156,8 @@ impl Recorder {
         let failed = |source| LogError::Create { path: path.to_owned(), source };
         let file = OpenOptions::new().write(true).create_new(true).open(path).map_err(failed)?;
         sync_folder_of(path).map_err(failed)?;
-        Self::start(SyncedFile(BufWriter::new(file)), header, queue_bytes)
+        let space = file.try_clone().map_or_else(|_| Space::endless(), Space::of);
+        Self::start_within(space, SyncedFile(BufWriter::new(file)), header, queue_bytes)
     }
 }
 
@@ -337,6 +351,9 @@ struct Worker<'a, W: Write> {
     flushed: Instant,
     /// Whether something was written since.
     open: bool,
+    space: Space,
+    /// Which results follow echo by echo.
+    echoes: Vec<bool>,
     state: &'a State,
 }
 
@@ -349,12 +366,14 @@ fn wall_clock() -> Instant {
 }
 
 impl<'a, W: Write> Worker<'a, W> {
-    fn new(log: LogWriter<W>, state: &'a State) -> Self {
-        Self { log: Some(log), error: None, discarded: 0, flushed: wall_clock(), open: false, state }
+    fn new(log: LogWriter<W>, space: Space, echoes: Vec<bool>, state: &'a State) -> Self {
+        let flushed = wall_clock();
+        Self { log: Some(log), error: None, discarded: 0, flushed, open: false, space, echoes, state }
     }
 
     fn run(mut self, mut queue: Queue) -> Result<Summary, LogError> {
         loop {
+            self.space.look(wall_clock());
             // Read before the queue is looked at: what was pushed before the flag was set is then taken.
             let stopping = self.state.stopping.load(Ordering::Acquire);
             let taken =
@@ -373,7 +392,16 @@ impl<'a, W: Write> Worker<'a, W> {
     fn write(&mut self, entry: &Entry, message: &[u8]) {
         self.discarded += u64::from(self.log.is_none());
         self.open = true;
-        self.attempt(|log| log.message(entry.lane, entry.log_time, entry.publish_time, message));
+        let result = |number: u16| self.echoes.get(usize::from(number)).copied().unwrap_or_default();
+        let is_echo = match entry.lane {
+            Lane::Raw(_) => message.len() > LONGEST_KEPT_BYTES,
+            Lane::Result(number) => result(number),
+            Lane::Sent(_) | Lane::Tick => false,
+        };
+        if is_echo && self.space.is_scarce() {
+            return self.attempt(|log, space| space.leave_out(entry.log_time, message.len(), log));
+        }
+        self.attempt(|log, _| log.message(entry.lane, entry.log_time, entry.publish_time, message));
     }
 
     /// Writes what has been sent to the devices; gives the number of messages.
@@ -394,23 +422,28 @@ impl<'a, W: Write> Worker<'a, W> {
         if !self.open {
             self.flushed = now;
         } else if now.duration_since(self.flushed) >= FLUSH_PERIOD {
-            self.attempt(LogWriter::flush);
+            self.attempt(|log, _| log.flush());
             (self.flushed, self.open) = (now, false);
         }
     }
 
-    fn attempt(&mut self, action: impl FnOnce(&mut LogWriter<W>) -> Result<(), LogError>) {
+    fn attempt(&mut self, action: impl FnOnce(&mut LogWriter<W>, &mut Space) -> Result<(), LogError>) {
         let Some(log) = self.log.as_mut() else { return };
-        if let Err(error) = action(log) {
+        if let Err(error) = action(log, &mut self.space) {
+            tracing::error!("the dive goes on unrecorded: {error}");
             self.error = Some(error);
             self.log = None;
             self.state.failed.store(true, Ordering::Release);
         }
     }
 
-    fn finish(self) -> Result<Summary, LogError> {
+    fn finish(mut self) -> Result<Summary, LogError> {
+        let left_out = self.space.left_out();
+        if let Some((from, to)) = left_out.span {
+            self.attempt(|log, _| log.lost(Some(from), Some(to), &left_out.words()));
+        }
         let finished = match (self.log, self.error) {
-            (Some(log), _) => log.finish().map(|(_, summary)| summary),
+            (Some(log), _) => log.finish().map(|(_, summary)| Summary { left_out, ..summary }),
             (None, Some(error)) => {
                 Err(LogError::Stopped { discarded: self.discarded, source: Box::new(error) })
             }

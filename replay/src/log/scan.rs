@@ -9,7 +9,9 @@ use headrace_core::time::MonoNs;
 use super::channels::{Channels, listed};
 use super::chunk::{Unpacked, summary_holds, unpack};
 use super::fields::Fields;
-use super::format::{ATTACHMENT_PREFIX, CHANNEL_LIST, FORMAT_KEY, FORMAT_VERSION, METADATA, unseal};
+use super::format::{
+    ATTACHMENT_PREFIX, CHANNEL_LIST, FORMAT_KEY, FORMAT_VERSION, LOSSES, METADATA, read_loss, unseal,
+};
 use super::framing::{AttachmentPlace, ChunkPlace, Definition, Found, Frame, Item, LogFile, look};
 use super::loss::Losses;
 use super::search::find_records;
@@ -59,6 +61,8 @@ pub(super) struct Scan {
     has_list: bool,
     /// Attachments that a log of ours says it has.
     announced: Vec<String>,
+    /// What it says itself to be missing from it.
+    stated: Vec<Loss>,
     /// Whether the next message may join the last run.
     run_open: bool,
     attachment_bytes: u64,
@@ -85,7 +89,10 @@ pub(super) fn scan<R: Read + Seek>(file: &mut LogFile<R>) -> Result<(Scan, Chann
         scan.look_into_chunks(file)?;
     }
     scan.miss_parts();
-    scan.date_losses();
+    date_losses(&mut scan.losses, &scan.spans, false);
+    for loss in core::mem::take(&mut scan.stated) {
+        scan.losses.push(loss);
+    }
     let channels = Channels::new(core::mem::take(&mut scan.definitions));
     Ok((scan, channels))
 }
@@ -205,6 +212,11 @@ impl Scan {
             }
             let names = entries.keys().filter_map(|key| key.strip_prefix(ATTACHMENT_PREFIX));
             self.announced.extend(names.map(str::to_owned));
+        } else if name == LOSSES {
+            self.stated.extend(entries.values().map(|text| {
+                let (from, to, words) = read_loss(text);
+                Loss { kind: LossKind::Stated(words.to_owned()), offset: frame.at, bytes: 0, from, to }
+            }));
         } else if name == METADATA {
             self.metadata.extend(entries);
         } else {
@@ -303,15 +315,20 @@ impl Scan {
         let bytes = part.end.saturating_sub(part.start);
         self.losses.push(Loss { kind, offset: part.start, bytes, from: None, to: None });
     }
+}
 
-    fn date_losses(&mut self) {
-        for loss in self.losses.list_mut() {
-            let next = self.spans.partition_point(|span| span.at < loss.offset);
-            let end = loss.offset.saturating_add(loss.bytes.max(1));
-            let after = self.spans.iter().skip(next).find(|span| span.at >= end && span.is_dated());
-            let before = self.spans.iter().take(next).rev().find(|span| span.is_dated());
-            (loss.from, loss.to) = (before.map(|span| MonoNs(span.to)), after.map(|span| MonoNs(span.from)));
-        }
+/// Says between which messages losses lie, by the pieces around them. Heads of chunks may lie about their times; once all pieces
+/// are `read`, their times are those of what they gave.
+pub(super) fn date_losses(losses: &mut Losses, spans: &[Span], read: bool) {
+    for loss in losses.list_mut().iter_mut().filter(|loss| !matches!(loss.kind, LossKind::Stated(_))) {
+        let next = spans.partition_point(|span| span.at < loss.offset);
+        let end = loss.offset.saturating_add(loss.bytes.max(1));
+        let after = spans.iter().skip(next).find(|span| span.at >= end && span.is_dated());
+        // A chunk that the file's end cuts may have given messages nevertheless: the loss begins after them.
+        let cut = usize::from(read && loss.kind == LossKind::Truncated);
+        let cut = spans.get(next..).and_then(|rest| rest.get(..cut)).unwrap_or_default();
+        let before = spans.iter().take(next).chain(cut).rev().find(|span| span.is_dated());
+        (loss.from, loss.to) = (before.map(|span| MonoNs(span.to)), after.map(|span| MonoNs(span.from)));
     }
 }
 

@@ -9,12 +9,12 @@ use headrace_core::time::{DurNs, MonoNs};
 use mcap::records::{MessageHeader, Metadata};
 use mcap::write::NoSeek;
 
-use super::LogError;
 use super::format::{
     ATTACHMENT_PREFIX, BYTES_ENCODING, CHANNEL_LIST, CONNECT_KEY, FORMAT_KEY, FORMAT_VERSION, LIBRARY,
-    METADATA, PLUGIN_KEY, RAW_PREFIX, RESULT_PREFIX, SENT_PREFIX, SOURCE_KEY, TICK_TOPIC, VEHICLE_FILE,
-    order_bytes, seal, tick_head,
+    LOSSES, METADATA, PLUGIN_KEY, RAW_PREFIX, RESULT_PREFIX, SENT_PREFIX, SOURCE_KEY, TICK_TOPIC,
+    VEHICLE_FILE, order_bytes, seal, stated_loss, tick_head,
 };
+use super::{LeftOut, LogError};
 
 /// A chunk is closed when it holds more than this, whatever the clock says.
 const CHUNK_BYTES: u64 = 1 << 20;
@@ -24,7 +24,7 @@ const CHUNK_SPAN: DurNs = DurNs(500_000_000);
 /// What a log begins with.
 #[derive(Debug, Clone, Default)]
 pub struct LogHeader {
-    /// Text of the vehicle file.
+    /// Text of the vehicle file; empty where there is none.
     pub vehicle_toml: String,
     /// Files that the vehicle file names: name and content.
     pub attachments: Vec<(String, Vec<u8>)>,
@@ -50,7 +50,7 @@ pub struct SourceInfo {
 }
 
 /// A channel of results.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct ResultChannel {
     /// Its topic, which begins with `/result/`.
     pub topic: String,
@@ -62,6 +62,8 @@ pub struct ResultChannel {
     pub schema: String,
     /// How its messages are written, for instance `json`.
     pub message_encoding: String,
+    /// Whether it has something for each echo: it is left out with the echoes when the disk fills.
+    pub follows_echoes: bool,
 }
 
 /// What has been written.
@@ -75,6 +77,8 @@ pub struct Summary {
     pub chunks: u32,
     /// Bytes of the file.
     pub bytes: u64,
+    /// What a recorder has left out because its disk was nearly full.
+    pub left_out: LeftOut,
 }
 
 /// A channel by what it carries.
@@ -106,6 +110,8 @@ pub struct LogWriter<W: Write> {
     tick_message: Vec<u8>,
     messages: u64,
     message_bytes: u64,
+    /// Losses stated.
+    losses: u64,
     /// Time of the first message of the chunk that is open.
     chunk_began: Option<MonoNs>,
 }
@@ -144,7 +150,8 @@ impl<W: Write> LogWriter<W> {
         let vehicle = (VEHICLE_FILE, "application/toml", header.vehicle_toml.as_bytes());
         let others = header.attachments.iter();
         let others = others.map(|(name, data)| (name.as_str(), BYTES_ENCODING, data.as_slice()));
-        for (name, media_type, data) in [vehicle].into_iter().chain(others) {
+        let vehicle = Some(vehicle).filter(|(.., text)| !text.is_empty());
+        for (name, media_type, data) in vehicle.into_iter().chain(others) {
             attach(&mut writer, name, media_type, data)?;
             list.insert(format!("{ATTACHMENT_PREFIX}{name}"), data.len().to_string());
         }
@@ -164,6 +171,7 @@ impl<W: Write> LogWriter<W> {
             tick_message: Vec::new(),
             messages: 0,
             message_bytes: 0,
+            losses: 0,
             chunk_began: None,
         })
     }
@@ -244,6 +252,17 @@ impl<W: Write> LogWriter<W> {
         Ok(())
     }
 
+    /// Says that something is missing from the log, after `from` and before `to` where that is known. Closes the chunk.
+    ///
+    /// Errors: the writer's.
+    pub fn lost(&mut self, from: Option<MonoNs>, to: Option<MonoNs>, words: &str) -> Result<(), LogError> {
+        let entry = (format!("{:06}", self.losses), stated_loss(from, to, words));
+        let record = Metadata { name: LOSSES.to_owned(), metadata: seal(LOSSES, [entry].into()) };
+        self.losses += 1;
+        self.writer.write_metadata(&record).map_err(LogError::writing("what is missing"))?;
+        self.flush()
+    }
+
     /// Closes the chunk and flushes the writer: everything until now survives whatever comes.
     ///
     /// Errors: the writer's.
@@ -265,6 +284,7 @@ impl<W: Write> LogWriter<W> {
             message_bytes: self.message_bytes,
             chunks: u32::try_from(chunks).unwrap_or(u32::MAX),
             bytes,
+            left_out: LeftOut::default(),
         };
         Ok((writer.into_inner(), summary))
     }

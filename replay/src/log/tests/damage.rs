@@ -1,5 +1,7 @@
 //! Damaged logs: nothing panics, all that is whole is delivered, and what is missing is said.
 
+use std::collections::BTreeSet;
+
 use mcap::records::op;
 use proptest::prelude::*;
 
@@ -57,6 +59,73 @@ fn a_log_cut_anywhere_gives_what_was_before_the_cut() {
         assert_eq!(losses.len(), 1, "cut at {cut}: {losses:?}");
         assert_eq!(losses[0].kind, LossKind::Truncated, "cut at {cut}");
         assert_eq!(losses[0].to, None);
+        missing_are_covered(&got, &seen, &losses);
+    }
+}
+
+/// A log as large dives have it: long packets, results, chunks of some kilobytes.
+fn long_log() -> (Vec<u8>, Vec<Seen>) {
+    let mut log = LogWriter::new(Vec::new(), &header(true)).unwrap();
+    for tick in 0..400_u64 {
+        let at = MonoNs(20_000_000 * (tick + 1));
+        log.raw(0, at, at, &noise(tick, 265)).unwrap();
+        log.raw(2, at, at, &noise(tick, 16)).unwrap();
+        log.tick(tick, at, &[0, 2]).unwrap();
+        log.result(0, at, &noise(!tick, 56)).unwrap();
+    }
+    let bytes = log.finish().unwrap().0;
+    let seen = read(&bytes).0;
+    assert_eq!(seen.len(), 1600);
+    (bytes, seen)
+}
+
+#[test]
+fn a_long_chunk_cut_anywhere_gives_what_was_before_it() {
+    let (bytes, seen) = long_log();
+    let last = *places(&bytes, op::CHUNK).last().unwrap();
+    let before = read(&bytes[..last]).0.len();
+    let end = record_after(&bytes, last);
+    assert!(end - last > 3000, "{}", end - last);
+    for cut in last..end {
+        let (got, losses) = read(&bytes[..cut]);
+        assert!(got.len() >= before && got == seen[..got.len()], "cut at {cut}");
+        assert_eq!((losses.len(), &losses[0].kind), (1, &LossKind::Truncated), "cut at {cut}");
+        missing_are_covered(&got, &seen, &losses);
+    }
+}
+
+#[test]
+fn a_chunk_whose_head_is_zeros_is_a_loss() {
+    let (bytes, seen) = long_log();
+    for chunk in &places(&bytes, op::CHUNK)[1..] {
+        let mut bytes = bytes.clone();
+        bytes[chunk + 9..chunk + 9 + 512].fill(0);
+        let (got, losses) = read(&bytes);
+        assert!(got.len() < seen.len() && losses.len() == 1, "{losses:?}");
+        missing_are_covered(&got, &seen, &losses);
+    }
+}
+
+#[test]
+fn thousands_of_random_changes_never_lose_anything_silently() {
+    let (bytes, seen) = long_log();
+    let info = open(&bytes).header().clone();
+    let words = noise(11, 12_000);
+    let word = |bytes: &[u8]| bytes.iter().fold(0, |sum, byte| (sum << 8) | u64::from(*byte));
+    let places: Vec<u64> = words.chunks(6).map(word).collect();
+    for (number, place) in places.iter().enumerate() {
+        let mut changed = bytes.clone();
+        // One bit, a byte, or a block as a medium loses it; every fourth log is cut off besides.
+        let at = usize::try_from(place % bytes.len() as u64).unwrap();
+        match number % 3 {
+            0 => changed[at] ^= 1 << ((place >> 40) & 7),
+            1 => changed[at] = u8::try_from(place >> 40).unwrap(),
+            _ => changed[at..(at + 512).min(bytes.len())].fill(0),
+        }
+        if number % 4 == 0 {
+            changed.truncate(bytes.len() - usize::try_from(place >> 16).unwrap() % (bytes.len() / 2));
+        }
+        check_changed(changed, &seen, &info);
     }
 }
 
@@ -194,12 +263,34 @@ fn other_files_are_refused_with_what_they_begin_with() {
     assert!(error(b"#ROSBAG V2.0\n").contains("23 52 4f 53"));
 }
 
+/// Whether each message of `seen` that isn't among `got` lies within the time of a stated loss, or is one of a channel whose
+/// definition is lost.
+fn missing_are_covered(got: &[Seen], seen: &[Seen], losses: &[Loss]) {
+    fn key(message: &Seen) -> (u64, u64, u32, &[u8]) {
+        (message.1, message.2, message.3, &message.4)
+    }
+    let there: BTreeSet<_> = got.iter().map(key).collect();
+    for missing in seen.iter().filter(|message| !there.contains(&key(message))) {
+        let covers = |loss: &Loss| {
+            let from = loss.from.is_none_or(|from| from.0 <= missing.1);
+            from && loss.to.is_none_or(|to| missing.1 <= to.0)
+        };
+        assert!(
+            losses.iter().any(covers),
+            "{} at {} is missing without a word: {losses:?}",
+            missing.0,
+            missing.1
+        );
+    }
+}
+
 /// Damage is either without effect or reported, and never makes up a message.
 fn check_changed(bytes: Vec<u8>, seen: &[Seen], info: &LogInfo) {
     match LogReader::new(Cursor::new(bytes), "changed".to_owned()) {
         Ok(mut reader) => {
             let got = read_all(&mut reader);
             assert!(is_subsequence(&got, seen), "{} messages, {:?}", got.len(), reader.losses());
+            missing_are_covered(&got, seen, reader.losses());
             if reader.losses().is_empty() {
                 assert!(got == seen, "{} messages", got.len());
                 assert_eq!(reader.header(), info);

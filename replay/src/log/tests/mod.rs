@@ -3,6 +3,7 @@
 mod damage;
 mod foreign;
 mod recorder;
+mod recover;
 mod round_trip;
 
 use std::io::Cursor;
@@ -36,6 +37,7 @@ fn header(ticks: bool) -> LogHeader {
             schema_encoding: "jsonschema".to_owned(),
             schema: "{}".to_owned(),
             message_encoding: "json".to_owned(),
+            follows_echoes: false,
         }],
     }
 }

@@ -5,7 +5,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, mpsc};
 use std::time::Duration;
 
-use super::super::{LogError, Recorder, RecorderPort};
+use super::super::space::Space;
+use super::super::{LogError, LossKind, Recorder, RecorderPort};
 use super::*;
 
 /// A medium that takes its time, and says when something has been flushed to it.
@@ -169,4 +170,44 @@ fn a_recording_is_never_overwritten() {
     assert!(matches!(Recorder::create(&path, &header(true), 0), Err(LogError::Create { .. })));
     assert_eq!(read(&std::fs::read(&path).unwrap()).0.len(), 1);
     std::fs::remove_file(&path).unwrap();
+}
+
+#[test]
+fn a_disk_that_fills_keeps_what_is_small_and_says_what_it_left_out() {
+    let (medium, flushed) = slow(0);
+    let mut header = header(true);
+    header.results.push(ResultChannel {
+        topic: "/result/pings".to_owned(),
+        follows_echoes: true,
+        ..ResultChannel::default()
+    });
+    let space = Space::new(|| Some(5_000_000));
+    let (mut port, handle) = Recorder::start_within(space, medium, &header, 0).unwrap();
+    for tick in 1..=100_u64 {
+        let at = MonoNs(tick * 1_000_000_000);
+        // The queue holds all of this.
+        port.raw(0, at, at, &noise(tick, 265)).unwrap();
+        port.raw(2, at, at, &noise(tick, 16)).unwrap();
+        port.tick(tick, at, &[0, 2]).unwrap();
+        port.result(0, at, b"{}").unwrap();
+        port.result(1, at, &noise(tick, 56)).unwrap();
+    }
+    let summary = handle.finish().unwrap();
+    assert_eq!((summary.left_out.messages, summary.left_out.bytes), (200, 100 * (265 + 56)));
+    assert_eq!(summary.left_out.span, Some((MonoNs(1_000_000_000), MonoNs(100_000_000_000))));
+    let (seen, losses) = read(&flushed.iter().last().unwrap());
+    let of = |kind: &str| seen.iter().filter(|message| message.0 == kind).count();
+    assert_eq!(
+        [of("raw 0"), of("raw 2"), of("tick"), of("/result/advice"), seen.len()],
+        [0, 100, 100, 100, 300]
+    );
+    assert!(losses.iter().all(|loss| matches!(loss.kind, LossKind::Stated(_))), "{losses:?}");
+    assert_eq!(
+        losses.iter().map(ToString::to_string).collect::<Vec<_>>(),
+        [
+            "the recorder leaves echo returns out: the disk had 5000000 bytes free (after 1.000 s)",
+            "200 echo returns and their results (32100 bytes) left out by the recorder: the disk was nearly full (after \
+             1.000 s, before 100.000 s)",
+        ]
+    );
 }

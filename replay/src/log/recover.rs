@@ -1,0 +1,124 @@
+//! Rewriting what reads of a damaged log into an orderly one.
+
+use std::collections::BTreeMap;
+use std::io::{Read, Seek, Write};
+
+use headrace_core::time::MonoNs;
+
+use super::format::BYTES_ENCODING;
+use super::writer::Lane;
+use super::{
+    LogError, LogHeader, LogMessage, LogReader, LogWriter, Loss, LossKind, MessageKind, ResultChannel,
+    SourceInfo,
+};
+
+/// Key in the metadata of a recovered log: which one it was made from.
+pub const RECOVERED_FROM: &str = "recovered_from";
+
+/// What came of a recovery.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Recovered {
+    /// Messages written.
+    pub messages: u64,
+    /// Log times of the first and the last of them, in the order of the log.
+    pub span: Option<(MonoNs, MonoNs)>,
+    /// What is missing, as the recovered log says it, too.
+    pub losses: Vec<Loss>,
+}
+
+/// Writes what reads of a log to `output`, in the same order: attachments, metadata, messages of devices, ticks and results. It
+/// replays to the same digest, and states what is missing. `open` opens the log, twice: first it is read to find all damage.
+/// `known` are the result channels whose schemas this program has; `from` is what the new log says it was made from.
+///
+/// Errors: the log can't be read at all, or the output not be written.
+pub fn recover<R: Read + Seek, W: Write>(
+    open: &mut dyn FnMut() -> Result<LogReader<R>, LogError>,
+    output: W,
+    known: &[ResultChannel],
+    from: &str,
+) -> Result<Recovered, LogError> {
+    let Found { losses, topics, sources } = look_through(open()?)?;
+    let mut reader = open()?;
+    let mut log = LogWriter::new(output, &header(&reader, &topics, sources, known, from))?;
+    for loss in &losses {
+        log.lost(loss.from, loss.to, &words(loss))?;
+    }
+    let mut done = Recovered { messages: 0, span: None, losses };
+    let numbers: BTreeMap<&str, u16> = topics.iter().map(String::as_str).zip(0..).collect();
+    while let Some(message) = reader.next()? {
+        let Some(lane) = lane(&message, &numbers) else { continue };
+        log.message(lane, message.log_time, message.publish_time, message.data)?;
+        done.messages += 1;
+        done.span = Some((done.span.map_or(message.log_time, |span| span.0), message.log_time));
+    }
+    log.finish()?;
+    Ok(done)
+}
+
+/// What is known of a log when it has been read to its end.
+struct Found {
+    /// What a dive log has no channel for included.
+    losses: Vec<Loss>,
+    topics: Vec<String>,
+    sources: Vec<SourceInfo>,
+}
+
+fn look_through<R: Read + Seek>(mut reader: LogReader<R>) -> Result<Found, LogError> {
+    let mut others = 0_u64;
+    while let Some(message) = reader.next()? {
+        others += u64::from(message.kind == MessageKind::Other);
+    }
+    let mut losses = reader.losses().to_vec();
+    if others > 0 {
+        let words = format!("{others} messages of channels that a dive log doesn't have");
+        losses.push(Loss { kind: LossKind::Stated(words), offset: 0, bytes: 0, from: None, to: None });
+    }
+    let (topics, sources) = reader.channels_found();
+    Ok(Found { losses, topics, sources })
+}
+
+fn words(loss: &Loss) -> String {
+    match &loss.kind {
+        LossKind::Stated(words) => words.clone(),
+        kind => format!("{kind}: {} bytes from byte {} of the log before recovery", loss.bytes, loss.offset),
+    }
+}
+
+fn header<R: Read + Seek>(
+    reader: &LogReader<R>,
+    topics: &[String],
+    sources: Vec<SourceInfo>,
+    known: &[ResultChannel],
+    from: &str,
+) -> LogHeader {
+    let info = reader.header();
+    let mut metadata = info.metadata.clone();
+    metadata.insert(RECOVERED_FROM.to_owned(), from.to_owned());
+    let result = |topic: &String| {
+        let known = known.iter().find(|channel| channel.topic == *topic);
+        known.cloned().unwrap_or_else(|| ResultChannel {
+            topic: topic.clone(),
+            message_encoding: BYTES_ENCODING.to_owned(),
+            ..ResultChannel::default()
+        })
+    };
+    LogHeader {
+        vehicle_toml: info.vehicle_toml.clone().unwrap_or_default(),
+        attachments: info.attachments.clone(),
+        metadata,
+        sources,
+        ticks: reader.has_ticks(),
+        results: topics.iter().map(result).collect(),
+    }
+}
+
+/// The channel of the new log that a message goes to; `None` for what a dive log has none for.
+fn lane(message: &LogMessage<'_>, results: &BTreeMap<&str, u16>) -> Option<Lane> {
+    match message.kind {
+        MessageKind::Raw { source } => Some(Lane::Raw(source)),
+        MessageKind::Sent { source } => Some(Lane::Sent(source)),
+        MessageKind::Tick => Some(Lane::Tick),
+        MessageKind::Result { topic } => results.get(topic).copied().map(Lane::Result),
+        MessageKind::Other => None,
+    }
+}

@@ -1,0 +1,69 @@
+//! `headrace recover`: what reads of a damaged log, as an orderly one.
+
+use std::fs::OpenOptions;
+use std::io::{BufWriter, Write};
+use std::path::Path;
+
+use headrace_replay::log::{LogReader, Recovered, file_digest, recover as rewrite};
+use headrace_replay::record::result_channels;
+use serde_json::json;
+
+use crate::cli::Recover;
+use crate::failure::{self, Failure};
+use crate::output::{deliver, say};
+
+/// Rewrites a log and says what is lost.
+pub(crate) fn recover(args: &Recover) -> Result<u8, Failure> {
+    // Nothing is made where the log is none.
+    LogReader::open(&args.log)?;
+    let recovered = write(&args.log, &args.output)?;
+    tell(args, &recovered)?;
+    Ok(if recovered.losses.is_empty() { failure::OK } else { failure::DATA_LOST })
+}
+
+/// Writes the new log; takes it away again when that fails.
+fn write(log: &Path, output: &Path) -> Result<Recovered, Failure> {
+    let failed = |source| Failure::Write { path: output.to_owned(), source };
+    let from = format!("{} (sha256 {})", log.display(), file_digest(log)?);
+    // A log is never overwritten.
+    let file = OpenOptions::new().write(true).create_new(true).open(output).map_err(failed)?;
+    let mut writer = BufWriter::new(&file);
+    let written = rewrite(&mut || LogReader::open(log), &mut writer, &result_channels(), &from)
+        .map_err(Failure::from)
+        .and_then(|recovered| {
+            writer.flush().and_then(|()| file.sync_all()).map(|()| recovered).map_err(failed)
+        });
+    if written.is_err() {
+        std::fs::remove_file(output).map_err(failed)?;
+    }
+    written
+}
+
+fn tell(args: &Recover, recovered: &Recovered) -> Result<(), Failure> {
+    let seconds = recovered.span.map(|(from, to)| [from.as_secs_f64(), to.as_secs_f64()]);
+    if args.json {
+        let losses = recovered.losses.iter().map(|loss| {
+            json!({
+                "what": loss.to_string(), "from_ns": loss.from.map(|at| at.0), "to_ns": loss.to.map(|at| at.0),
+                "offset": loss.offset, "bytes": loss.bytes,
+            })
+        });
+        let told = json!({
+            "log": args.output.display().to_string(), "messages": recovered.messages,
+            "from_s": seconds.map(|span| span[0]), "to_s": seconds.map(|span| span[1]),
+            "losses": losses.collect::<Vec<_>>(),
+        });
+        return deliver(&told.to_string());
+    }
+    for loss in &recovered.losses {
+        say(&format!("lost     {loss}"));
+    }
+    let span = seconds.map(|[from, to]| format!(", {from:.3} s to {to:.3} s")).unwrap_or_default();
+    let nothing = if recovered.losses.is_empty() { "; nothing is missing" } else { "" };
+    say(&format!(
+        "kept     {} messages{span}{nothing}\nlog      {}",
+        recovered.messages,
+        args.output.display()
+    ));
+    Ok(())
+}
