@@ -6,6 +6,8 @@ use clap::{Args, Parser, Subcommand};
 use headrace_core::config::Connect;
 use headrace_core::sampling::layout::HeadLayout;
 
+use crate::import::Kind;
+
 /// On-board coverage monitor for sonar inspection of flooded hydroelectric tunnels.
 #[derive(Debug, Parser)]
 #[command(version, arg_required_else_help = true)]
@@ -53,6 +55,12 @@ pub(crate) enum Command {
     /// Only the effects that the scene names are simulated; --explain lists what that comes to.
     #[command(after_help = SIMULATE_EXAMPLES)]
     Simulate(Simulate),
+    /// Turn a foreign log into one of ours: telemetry of MAVLink, candump, files of Imagenex, logs of Ping Viewer.
+    ///
+    /// Each message goes to the sensors of the vehicle file that would have heard it; the vehicle file is attached to the log.
+    /// Exit code 3 when something of the file was lost, 1 when no sensor takes anything of it.
+    #[command(after_help = IMPORT_EXAMPLES)]
+    Import(Import),
     /// Plan an inspection: spacing, speed and hours for a tunnel, modes, heads, layout and target.
     ///
     /// A target asks how fast one may go; a speed or the hours ask which target they allow. Exit code 1 when no mode
@@ -234,6 +242,33 @@ pub(crate) struct Simulate {
     pub(crate) json: bool,
 }
 
+#[derive(Debug, Args)]
+pub(crate) struct Import {
+    /// Foreign log.
+    pub(crate) file: PathBuf,
+    /// Log to write.
+    #[arg(short, long, value_name = "LOG.mcap")]
+    pub(crate) output: PathBuf,
+    /// Vehicle file: whose messages these are, and what the log can't know.
+    #[arg(long, value_name = "VEHICLE.toml")]
+    pub(crate) vehicle: Option<PathBuf>,
+    /// A sensor and the line that it listens to (mavlink, imagenex, ping, or a CAN interface), in place of the vehicle file's;
+    /// once for each sensor, and then no other listens.
+    #[arg(long, value_name = "ID=LINE", value_parser = source_line)]
+    pub(crate) source: Vec<(String, String)>,
+    /// Format of the file, where its name doesn't say.
+    #[arg(long, value_enum)]
+    pub(crate) format: Option<Kind>,
+    /// Print a summary as JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+const IMPORT_EXAMPLES: &str = "Example:
+  headrace import dive.tlog --vehicle vehicle.toml -o dive.mcap
+  headrace import candump-2026-05-04.log --vehicle vehicle.toml --source imu=can1 -o dive.mcap
+  headrace import sonar.81a --vehicle vehicle.toml --source sonar_0=imagenex -o dive.mcap";
+
 const SIMULATE_EXAMPLES: &str = "Example:
   headrace simulate deploy/scenes/demo.toml -o dive.mcap
   headrace simulate deploy/scenes/vita1-field.toml --explain
@@ -401,6 +436,12 @@ fn address(text: &str) -> Result<Connect, String> {
         Ok(connect @ (Connect::Tcp { .. } | Connect::Udp { .. })) => Ok(connect),
         _ => Err("wanted is tcp:HOST:PORT or udp:HOST:PORT".to_owned()),
     }
+}
+
+fn source_line(text: &str) -> Result<(String, String), String> {
+    let both = text.split_once('=').filter(|(id, line)| !id.is_empty() && !line.is_empty());
+    let both = both.map(|(id, line)| (id.to_owned(), line.to_owned()));
+    both.ok_or_else(|| "wanted is ID=LINE, a sensor's id and what it listens to: imu=can0".to_owned())
 }
 
 fn target(text: &str) -> Result<f64, String> {

@@ -7,6 +7,7 @@ use headrace_core::config::ConfigError;
 use headrace_core::sampling::SamplingError;
 use headrace_experiments::ExperimentError;
 use headrace_replay::drive::DriveError;
+use headrace_replay::import::ImportError;
 use headrace_replay::log::LogError;
 use headrace_replay::simulate::SceneError;
 use headrace_replay::smooth::SmoothError;
@@ -40,6 +41,8 @@ pub(crate) enum Failure {
     Plugin(#[from] PluginError),
     #[error(transparent)]
     Log(#[from] LogError),
+    #[error(transparent)]
+    Import(#[from] ImportError),
     #[error("smoothing: {0}")]
     Smooth(#[from] SmoothError),
     #[error(transparent)]

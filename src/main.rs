@@ -9,6 +9,7 @@ mod emulate;
 mod expect;
 mod failure;
 mod files;
+mod import;
 mod inventory;
 mod live;
 mod output;
@@ -39,6 +40,7 @@ fn main() -> ExitCode {
         Command::Verify(args) => verify::verify(&args),
         Command::Recover(args) => recover::recover(&args),
         Command::Simulate(simulate) => simulate::simulate(&simulate),
+        Command::Import(args) => import::import(&args),
         Command::Plan(args) => plan::plan(&args),
         Command::Calibrate(args) => calibrate::calibrate(&args),
         Command::Emulate(args) => emulate::emulate(&args),

@@ -1,0 +1,39 @@
+//! What a file looks like by its first bytes.
+
+/// Bytes that are enough to tell.
+pub const ENOUGH_BYTES: usize = 64;
+
+/// What a file looks like, in words; `None` for what isn't known.
+pub fn looks_like(front: &[u8]) -> Option<&'static str> {
+    const MAGICS: [(&[u8], &str); 16] = [
+        (b"\x89MCAP", "an MCAP file; `headrace replay` reads those of raw bytes as they are"),
+        (b"#ROSBAG V", "a ROS bag"),
+        (b"\x1F\x8B", "compressed by gzip; unpack it first"),
+        (b"\x28\xB5\x2F\xFD", "compressed by zstd; unpack it first"),
+        (b"PK\x03\x04", "a zip file; unpack it first"),
+        (b"BZh", "compressed by bzip2; unpack it first"),
+        (b"SQLite format 3", "an SQLite file, perhaps a ROS 2 bag"),
+        (b"\xA3\x95", "a dataflash log of ArduPilot (.BIN); its telemetry log (.tlog) can be imported"),
+        (b"852", "an Imagenex file"),
+        (b"81A", "an Imagenex file"),
+        (b"81B", "an Imagenex file"),
+        (b"81S", "an Imagenex file"),
+        (b"31L", "an Imagenex file"),
+        (b"BR", "bare Ping frames, which have no times"),
+        (b"\0\0\0\x34\0P\0i\0n\0g", "a log of Ping Viewer"),
+        (b"(", "a log of candump"),
+    ];
+    if front.is_empty() {
+        return Some("empty");
+    }
+    let magic = MAGICS.iter().find(|(magic, _)| front.starts_with(magic));
+    if let Some((_, words)) = magic {
+        return Some(words);
+    }
+    // Eight bytes of time before 2106 in microseconds, then a frame.
+    if front.first() == Some(&0) && matches!(front.get(8), Some(0xFE | 0xFD)) {
+        return Some("a telemetry log of MAVLink");
+    }
+    let is_text = front.iter().all(|byte| matches!(byte, b' '..=b'~' | b'\t' | b'\r' | b'\n'));
+    is_text.then(|| if front.contains(&b',') { "text with commas" } else { "text" })
+}

@@ -1,0 +1,73 @@
+//! What an import lost, by kind, with counts and the first place.
+
+use std::collections::BTreeMap;
+
+use headrace_core::time::MonoNs;
+
+/// What was lost so far.
+#[derive(Debug, Clone, Default)]
+pub struct Losses {
+    kinds: BTreeMap<&'static str, Kind>,
+    /// Where the last loss ended, and of which kind it was: a byte that follows directly is passed over in the same search.
+    last: Option<(u64, &'static str)>,
+    cut_off: Option<(u64, usize)>,
+    late: u64,
+    /// Gaps, and the first of them: how long, and when.
+    gaps: Option<(u64, u64, MonoNs)>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Kind {
+    places: u64,
+    bytes: u64,
+    first: u64,
+}
+
+impl Losses {
+    /// Bytes at a place of the file.
+    pub(super) fn lost(&mut self, at: u64, bytes: usize, why: &'static str) {
+        let kind = self.kinds.entry(why).or_insert(Kind { places: 0, bytes: 0, first: at });
+        kind.places += u64::from(bytes > 1 || self.last != Some((at, why)));
+        kind.bytes += bytes as u64;
+        self.last = Some((at + bytes as u64, why));
+    }
+
+    /// The file ends within an entry.
+    pub(super) fn cut_off(&mut self, at: u64, bytes: usize) {
+        self.cut_off = Some((at, bytes));
+    }
+
+    /// Entries that came later than order can be made of.
+    pub(super) fn late(&mut self, count: u64) {
+        self.late = count;
+    }
+
+    /// The file's clock goes on by hours from one entry to the next.
+    pub(super) fn gap(&mut self, gap_ns: u64, at: MonoNs) {
+        let (count, first_ns, first_at) = self.gaps.unwrap_or((0, gap_ns, at));
+        self.gaps = Some((count + 1, first_ns, first_at));
+    }
+
+    /// All of it in words.
+    pub fn words(&self) -> Vec<String> {
+        let mut all: Vec<String> = self
+            .kinds
+            .iter()
+            .map(|(why, kind)| {
+                let Kind { places, bytes, first } = kind;
+                format!("{why}: {places} times, {bytes} bytes in all, first at byte {first}")
+            })
+            .collect();
+        if let Some((at, bytes)) = self.cut_off {
+            all.push(format!("cut off: the entry at byte {at} has only {bytes} bytes"));
+        }
+        if self.late > 0 {
+            all.push(format!("{} entries out of order by more than can be held were left out", self.late));
+        }
+        if let Some((count, gap_ns, at)) = self.gaps {
+            let (gap_s, at_s) = (gap_ns / 1_000_000_000, at.as_secs_f64());
+            all.push(format!("the file's clock goes on by over an hour {count} times, first by {gap_s} s to {at_s:.3} s of the log: set, or several recordings in one"));
+        }
+        all
+    }
+}

@@ -1,0 +1,182 @@
+//! `import`: a foreign log becomes one of ours.
+
+mod imagenex;
+mod ping;
+mod takers;
+#[cfg(test)]
+mod tests;
+mod tlog;
+
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+use headrace_replay::import::candump::Candump;
+use headrace_replay::import::{Format, Import, Imported, detect};
+use headrace_replay::log::{LogHeader, LogWriter};
+use serde_json::json;
+
+use crate::cli;
+use crate::commands::vehicle_file;
+use crate::dive::log_header;
+use crate::failure::{self, Failure};
+use crate::output::{deliver, say};
+use crate::progress::Progress;
+
+/// A kind of foreign log.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum Kind {
+    /// Telemetry log of MAVLink.
+    Tlog,
+    /// Text of `candump -l` or `-L`.
+    Candump,
+    /// File of the software of Imagenex 881 and 852.
+    Imagenex,
+    /// Log of Ping Viewer.
+    Ping,
+}
+
+/// Imports a foreign log.
+pub(crate) fn import(args: &cli::Import) -> Result<u8, Failure> {
+    let kind = match args.format {
+        Some(kind) => kind,
+        None => Kind::of(&args.file)?,
+    };
+    let vehicle = args.vehicle.as_deref().map(vehicle_file).transpose()?;
+    let mut header = match &vehicle {
+        Some((text, vehicle)) => log_header(vehicle, text, false),
+        None => LogHeader {
+            metadata: [("version".to_owned(), env!("CARGO_PKG_VERSION").to_owned())].into(),
+            ..LogHeader::default()
+        },
+    };
+    let mut takers = takers::takers(kind, vehicle.as_ref().map(|(_, vehicle)| vehicle), &args.source)?;
+    if vehicle.is_none() {
+        header.sources = takers::sources(kind, &args.source);
+    }
+    same_file(&args.file, &args.output)?;
+    let name = args.file.display().to_string();
+    let file = File::open(&args.file).map_err(|source| Failure::Read { path: args.file.clone(), source })?;
+    let import = Import::open(&name, file, kind.format(), kind.entries()).map_err(|error| match error {
+        headrace_replay::import::ImportError::Nothing { .. } => named(&args.file, &error.to_string()),
+        error => error.into(),
+    })?;
+    header.metadata.extend(import.clock_metadata());
+    header.metadata.insert("import_format".to_owned(), kind.name().to_owned());
+    let file_name = args.file.file_name().map(|name| name.to_string_lossy().into_owned());
+    header.metadata.insert("import_file".to_owned(), file_name.unwrap_or_default());
+    let ids: Vec<String> = header.sources.iter().map(|source| source.id.clone()).collect();
+    let mut log = LogWriter::create(&args.output, &header)?;
+    let mut progress = Progress::start();
+    let imported = import.write(&mut log, &mut takers, &mut |entries| {
+        progress.at(|| format!("{entries} {}s", kind.entries()));
+    })?;
+    log.finish()?;
+    drop(progress);
+    tell(args, kind, &ids, &imported)
+}
+
+/// Says what came of it.
+fn tell(args: &cli::Import, kind: Kind, ids: &[String], imported: &Imported) -> Result<u8, Failure> {
+    let counts = |id: &usize| imported.messages.get(*id).copied().unwrap_or(0);
+    let heard: u64 = imported.messages.iter().sum();
+    let seconds = imported.last.since(headrace_replay::import::BEGIN).as_secs_f64();
+    if args.json {
+        let sources: serde_json::Map<String, serde_json::Value> =
+            ids.iter().enumerate().map(|(number, id)| (id.clone(), json!(counts(&number)))).collect();
+        let shown = json!({
+            "format": kind.name(), "entries": imported.entries, "passed_over": imported.passed_over,
+            "duration_s": seconds, "messages": sources, "losses": imported.losses,
+        });
+        deliver(&shown.to_string())?;
+    } else {
+        say(&format!(
+            "{}: {} {}s in {seconds:.1} s, {heard} messages in {}",
+            args.file.display(),
+            imported.entries,
+            kind.entries(),
+            args.output.display()
+        ));
+        for (number, id) in ids.iter().enumerate() {
+            say(&format!("  {id:<12} {} messages", counts(&number)));
+        }
+        if imported.passed_over > 0 {
+            say(&format!("  {} {}s are of no sensor here", imported.passed_over, kind.entries()));
+        }
+    }
+    for loss in &imported.losses {
+        eprintln!("headrace: lost: {loss}");
+    }
+    if heard == 0 {
+        eprintln!("headrace: no sensor of the vehicle file takes anything of this file");
+        return Ok(failure::FAILED);
+    }
+    Ok(if imported.losses.is_empty() { failure::OK } else { failure::DATA_LOST })
+}
+
+impl Kind {
+    /// By the file's name.
+    fn of(path: &Path) -> Result<Self, Failure> {
+        let extension = path.extension().map(|extension| extension.to_string_lossy().to_ascii_lowercase());
+        match extension.as_deref() {
+            Some("tlog") => Ok(Self::Tlog),
+            Some("log") => Ok(Self::Candump),
+            Some("852" | "81a" | "81b" | "81s" | "31l") => Ok(Self::Imagenex),
+            Some("bin") => Ok(Self::Ping),
+            _ => {
+                let problem = "its name doesn't say which format it has; known are .tlog, .log (candump), .852, .81a, .81b, \
+                     .81s, .31l (imagenex) and .bin (ping); --format tlog|candump|imagenex|ping says it for any name";
+                Err(named(path, &format!("importing {}: {problem}", path.display())))
+            }
+        }
+    }
+
+    fn format(self) -> Box<dyn Format> {
+        match self {
+            Self::Tlog => Box::<tlog::TlogFormat>::default(),
+            Self::Candump => Box::new(Candump),
+            Self::Imagenex => Box::new(imagenex::ImagenexFormat),
+            Self::Ping => Box::<ping::PingFormat>::default(),
+        }
+    }
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Tlog => "tlog",
+            Self::Candump => "candump",
+            Self::Imagenex => "imagenex",
+            Self::Ping => "ping",
+        }
+    }
+
+    /// What one of its entries is called.
+    fn entries(self) -> &'static str {
+        match self {
+            Self::Tlog | Self::Candump => "frame",
+            Self::Imagenex => "shot",
+            Self::Ping => "message",
+        }
+    }
+}
+
+/// A file that is none of what it should be, with what it looks like.
+fn named(path: &Path, problem: &str) -> Failure {
+    let mut front = Vec::new();
+    let read =
+        File::open(path).and_then(|file| file.take(detect::ENOUGH_BYTES as u64).read_to_end(&mut front));
+    if let Err(source) = read {
+        return Failure::Read { path: path.to_owned(), source };
+    }
+    let looks = detect::looks_like(&front).map(|words| format!("; it looks like this: {words}"));
+    Failure::Usage(format!("{problem}{}", looks.unwrap_or_default()))
+}
+
+/// A log that overwrote what it is made from would be the end of both.
+fn same_file(from: &Path, to: &Path) -> Result<(), Failure> {
+    let both = from.canonicalize().ok().zip(to.canonicalize().ok());
+    if both.is_some_and(|(from, to)| from == to) {
+        let what = format!("importing {}: -o names the same file; it would be overwritten", from.display());
+        return Err(Failure::Usage(what));
+    }
+    Ok(())
+}

@@ -1,0 +1,140 @@
+//! The formats on bytes of their own making, and on any.
+
+use headrace_core::codec::Bytes;
+use headrace_mavlink::frame::{Frame, Version};
+use headrace_replay::import::{Entry, Format, Step};
+use proptest::prelude::*;
+
+use super::imagenex::ImagenexFormat;
+use super::ping::PingFormat;
+use super::tlog::TlogFormat;
+
+/// Entries, bytes lost by reason, and bytes left at the end.
+fn cut(format: &mut dyn Format, mut file: &[u8]) -> (Vec<Entry>, Vec<(usize, &'static str)>, usize) {
+    let (mut entries, mut lost) = (Vec::new(), Vec::new());
+    while !file.is_empty() {
+        let used = match format.step(file, true, &mut entries) {
+            Step::Took(used) => used,
+            Step::Lost(used, why) => {
+                lost.push((used, why));
+                used
+            }
+            Step::More => break,
+        };
+        assert!((1..=file.len()).contains(&used), "{used} of {} bytes", file.len());
+        file = &file[used..];
+    }
+    (entries, lost, file.len())
+}
+
+fn frame(sequence: u8) -> Vec<u8> {
+    let payload = Bytes::new(&[0; 28]).unwrap();
+    let frame = Frame {
+        version: Version::V2(None),
+        sequence,
+        system_id: 1,
+        component_id: 1,
+        message_id: 30,
+        payload,
+    };
+    frame.encode().unwrap().as_slice().to_vec()
+}
+
+fn tlog(numbers: core::ops::Range<u8>) -> Vec<u8> {
+    let stamp = |n: u8| (1_600_000_000_000_000 + u64::from(n)).to_be_bytes().to_vec();
+    numbers.flat_map(|n| [stamp(n), frame(n)].concat()).collect()
+}
+
+fn text(text: &str) -> Vec<u8> {
+    let units: Vec<u8> = text.encode_utf16().flat_map(u16::to_be_bytes).collect();
+    [&u32::try_from(units.len()).unwrap().to_be_bytes()[..], &units].concat()
+}
+
+fn ping_log(records: &[(&str, &[u8])]) -> Vec<u8> {
+    let mut file = text("PingViewer sensor log file");
+    file.extend(1_u32.to_be_bytes());
+    ["abc", "2024-01-01", "v2.4", "Linux", "12"].iter().for_each(|words| file.extend(text(words)));
+    file.extend([0, 0, 0, 1, 0, 0, 0, 1]);
+    for (time, message) in records {
+        file.extend(text(time));
+        file.extend(u32::try_from(message.len()).unwrap().to_be_bytes());
+        file.extend_from_slice(message);
+    }
+    file
+}
+
+fn shot(seconds: u8) -> Vec<u8> {
+    let mut shot = vec![0; 128];
+    shot[..8].copy_from_slice(b"81A\0\0\x80\0\x0D");
+    shot[8..19].copy_from_slice(b"18-Nov-2016");
+    shot[20..32].copy_from_slice(format!("19:29:{seconds:02}\0.17").as_bytes());
+    shot[100] = b'I';
+    shot
+}
+
+#[test]
+fn a_telemetry_log_gives_frames_and_finds_the_next_one_behind_damage() {
+    let (entries, lost, left) = cut(&mut TlogFormat::default(), &tlog(0..3));
+    assert_eq!((entries.len(), lost.len(), left), (3, 0, 0));
+    assert_eq!((entries[2].stamp_ns, &entries[2].bytes), (1_600_000_000_000_002_000, &frame(2)));
+    let damaged = [tlog(0..2), vec![0xAB; 37], tlog(2..4)].concat();
+    let (entries, lost, left) = cut(&mut TlogFormat::default(), &damaged);
+    assert_eq!((entries.len(), lost.len(), left), (4, 37, 0));
+    let mut flipped = tlog(0..3);
+    flipped[8 + frame(0).len() + 8 + 20] ^= 1;
+    let (entries, lost, left) = cut(&mut TlogFormat::default(), &flipped);
+    assert_eq!((entries.len(), left), (2, 0));
+    assert_eq!(lost, [(8 + frame(1).len(), "frames that fit no known message and its checksum")]);
+}
+
+#[test]
+fn a_log_of_ping_viewer_gives_messages_past_midnight_too() {
+    let file = ping_log(&[("23:59:59.999", b"one"), ("00:00:00.001\0", b"two")]);
+    let (entries, lost, left) = cut(&mut PingFormat::default(), &file);
+    let got: Vec<_> =
+        entries.iter().map(|entry| (entry.stamp_ns / 1_000_000, entry.bytes.as_slice())).collect();
+    assert_eq!(got, [(86_399_999, &b"one"[..]), (86_400_001, b"two")]);
+    assert_eq!((lost.len(), left), (0, 0));
+    let (_, lost, _) = cut(&mut PingFormat::default(), b"BR\x02\0\x01\x02\x03\x04");
+    assert_eq!(lost, [(8, "no preface of Ping Viewer")]);
+    let (_, lost, _) = cut(&mut PingFormat::default(), &text("another log"));
+    assert_eq!(lost[0].1, "no preface of Ping Viewer");
+}
+
+#[test]
+fn shots_come_at_the_times_of_their_headers() {
+    let mut file = [shot(10), shot(11), shot(12)].concat();
+    let (entries, lost, left) = cut(&mut ImagenexFormat, &file);
+    assert_eq!((entries.len(), lost.len(), left), (3, 0, 0));
+    assert_eq!(entries[0].stamp_ns, 1_479_497_350_170_000_000);
+    assert_eq!((entries[0].bytes.len(), entries[0].bytes[0]), (13, b'I'));
+    file[128 + 20] = b'x';
+    let (entries, lost, left) = cut(&mut ImagenexFormat, &file);
+    assert_eq!((entries.len(), left), (2, 0));
+    assert_eq!(lost, [(128, "shots whose header has no date and time")]);
+}
+
+proptest! {
+    #[test]
+    fn any_bytes_are_taken_or_lost(
+        bytes in proptest::collection::vec(any::<u8>(), 0..3000),
+        which in 0_usize..3,
+        at in 0_usize..400,
+    ) {
+        let whole = [tlog(0..6), [shot(1), shot(2), shot(3)].concat(), ping_log(&[("01:02:03.004", &b"BR"[..]); 5])];
+        let mut damaged = whole[which].clone();
+        for (place, byte) in damaged.iter_mut().skip(at).zip(bytes.iter().take(9)) {
+            *place = *byte;
+        }
+        for file in [&bytes, &damaged] {
+            let mut format: Box<dyn Format> = match which {
+                0 => Box::<TlogFormat>::default(),
+                1 => Box::new(ImagenexFormat),
+                _ => Box::<PingFormat>::default(),
+            };
+            let (entries, lost, left) = cut(format.as_mut(), file);
+            prop_assert!(left <= file.len() && lost.len() <= file.len());
+            prop_assert!(entries.iter().map(|entry| entry.bytes.len()).sum::<usize>() <= file.len());
+        }
+    }
+}

@@ -1,0 +1,226 @@
+//! val: foreign logs become ours, and the ordinary decoders read them. Recordings of others are in `../shared/data`; what needs
+//! them is skipped where they are absent.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "clippy.toml's leave for tests doesn't reach their helpers"
+)]
+
+mod common;
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use common::{Answer, Folder, VEHICLE, raw_messages};
+use serde_json::Value;
+
+const DATA: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data/");
+
+const TUNNEL: &str = r#"name = "BlueROV2"
+target_m = 1
+[tunnel]
+profile = "circle"
+radius_m = 3
+length_m = 100
+"#;
+
+const AUTOPILOT: &str = r#"
+[[sensors]]
+id = "attitude"
+plugin = "mavlink"
+part = "imu"
+system_id = 1
+component_id = 1
+
+[[sensors]]
+id = "depth"
+plugin = "mavlink"
+part = "pressure"
+system_id = 1
+"#;
+
+const HEAD: &str = r#"
+[[sensors]]
+id = "sonar_0"
+plugin = "imagenex881"
+mode = "fastest"
+range_m = 10
+"#;
+
+fn recording(name: &str) -> Option<String> {
+    let path = format!("{DATA}{name}");
+    let there = Path::new(&path).exists();
+    if !there {
+        eprintln!("skipped: {path} not there");
+    }
+    there.then_some(path)
+}
+
+fn json(answer: &Answer) -> Value {
+    serde_json::from_str(&answer.stdout).unwrap_or_else(|error| panic!("{error}: {}", answer.stderr))
+}
+
+#[track_caller]
+fn refused(folder: &Folder, arguments: &[&str], words: &[&str]) {
+    let answer = folder.headrace(&[&["import"], arguments].concat());
+    assert_eq!(answer.code, Some(2), "{}", answer.stderr);
+    for word in words {
+        assert!(answer.stderr.contains(word), "{word:?} is not in {}", answer.stderr);
+    }
+    assert!(!folder.path("out.mcap").exists(), "no log of a file that is none");
+}
+
+#[test]
+fn telemetry_of_a_bluerov_replays() {
+    let Some(file) = recording("bluerov2_ardusub_logs/small.tlog") else { return };
+    let folder = Folder::new();
+    folder.write("vehicle.toml", format!("{TUNNEL}{AUTOPILOT}"));
+    let answer = folder.headrace(&["import", &file, "--vehicle", "vehicle.toml", "-o", "out.mcap", "--json"]);
+    // Four frames of its camera have a checksum that fits no definition.
+    assert_eq!(answer.code, Some(3), "{}", answer.stderr);
+    let shown = json(&answer);
+    assert!(answer.stderr.contains("4 times"), "{}", answer.stderr);
+    assert_eq!(shown["messages"], serde_json::json!({"attitude": 5245 + 528, "depth": 635}));
+    assert_eq!(shown["entries"], 35_912);
+    assert_eq!(shown["passed_over"], 35_912 - 5245 - 528 - 635);
+    let (code, report) = folder.replay("out.mcap", &[]);
+    assert_eq!(code, Some(1), "a dive without sonar");
+    assert_eq!(report["log"]["losses"], serde_json::json!([]));
+    for (source, frames) in report["sources"].as_array().unwrap().iter().zip([5773, 635]) {
+        assert_eq!((&source["frames"], &source["bad_frames"]), (&frames.into(), &0.into()), "{source}");
+    }
+    let log = folder.read("out.mcap");
+    let summary = mcap::Summary::read(&log).unwrap().unwrap();
+    let first = raw_messages(&log).first().unwrap().log_time;
+    assert!((1_000_000_000..2_000_000_000).contains(&first), "{first}");
+    let metadata = summary.metadata_indexes.iter().find(|index| index.name == "headrace").unwrap();
+    let metadata = mcap::read::metadata(&log, metadata).unwrap().metadata;
+    assert_eq!((metadata["import_format"].as_str(), metadata["import_clock"].as_str()), ("tlog", "utc"));
+    assert_eq!(metadata["clock_anchor_monotonic_ns"], "1000000000");
+    let utc_ns: u64 = metadata["clock_anchor_utc_ns"].parse().unwrap();
+    let bytes = std::fs::read(&file).unwrap();
+    assert_eq!(utc_ns, u64::from_be_bytes(bytes[..8].try_into().unwrap()) * 1000);
+}
+
+#[test]
+fn a_telemetry_log_cut_off_gives_what_is_whole_and_says_so() {
+    let Some(file) = recording("bluerov2_ardusub_logs/small.tlog") else { return };
+    let folder = Folder::new();
+    folder.write("vehicle.toml", format!("{TUNNEL}{AUTOPILOT}"));
+    folder.write("cut.tlog", &std::fs::read(file).unwrap()[..100_005]);
+    let answer = folder.headrace(&["import", "cut.tlog", "--vehicle", "vehicle.toml", "-o", "out.mcap"]);
+    assert_eq!(answer.code, Some(3), "{}", answer.stderr);
+    assert!(answer.stderr.contains("cut off"), "{}", answer.stderr);
+    assert_eq!(folder.replay("out.mcap", &[]).0, Some(1));
+}
+
+#[test]
+fn candump_of_a_simulated_dive_has_the_same_bytes_at_the_same_times() {
+    let folder = Folder::with_dive();
+    let vehicle =
+        VEHICLE.replace("preset = \"xsens_mti600\"", "connect = \"can:can3\"\npreset = \"xsens_mti600\"");
+    folder.write("can.toml", vehicle);
+    let dive = folder.read("dive.mcap");
+    let messages = raw_messages(&dive);
+    let frames: Vec<_> = messages.iter().filter(|message| message.channel.topic == "/raw/imu").collect();
+    assert!(frames.len() > 1000);
+    let mut text = String::new();
+    for message in &frames {
+        let (id, len) =
+            (u32::from_le_bytes(message.data[..4].try_into().unwrap()), usize::from(message.data[4]));
+        let id = if id >> 31 == 1 { format!("{:08X}", id & 0x1FFF_FFFF) } else { format!("{id:03X}") };
+        let data =
+            message.data[8..8 + len].iter().fold(String::new(), |data, byte| format!("{data}{byte:02X}"));
+        let (seconds, rest) = (message.log_time / 1_000_000_000, message.log_time % 1_000_000_000);
+        writeln!(text, "({}.{rest:09}) can3 {id}#{data}", 1_700_000_000 + seconds).unwrap();
+        writeln!(text, "({}.{rest:09}) can4 001#00", 1_700_000_000 + seconds).unwrap();
+    }
+    folder.write("dive.log", text);
+    for further in [&[][..], &["--source", "imu=can3"]] {
+        let arguments = ["import", "dive.log", "--vehicle", "can.toml", "-o", "out.mcap"];
+        let answer = folder.headrace(&[&arguments[..], further].concat());
+        assert_eq!(answer.code, Some(0), "{}", answer.stderr);
+        assert!(
+            answer.stdout.contains(&format!("{} frames are of no sensor", frames.len())),
+            "{}",
+            answer.stdout
+        );
+        let log = folder.read("out.mcap");
+        let got = raw_messages(&log);
+        assert_eq!(got.len(), frames.len());
+        let shift = frames[0].log_time - got[0].log_time;
+        for (got, wanted) in got.iter().zip(&frames) {
+            assert_eq!(got.channel.topic, "/raw/imu");
+            assert_eq!((&got.data, got.log_time + shift), (&wanted.data, wanted.log_time));
+        }
+    }
+}
+
+#[test]
+fn an_imagenex_file_gives_its_returns_at_its_times() {
+    let Some(file) = recording("imagenex852_cidco/19_26_51-2016_11_18-sonar.852") else { return };
+    let folder = Folder::new();
+    folder.write("vehicle.toml", format!("{TUNNEL}{HEAD}"));
+    let answer = folder.headrace(&["import", &file, "--vehicle", "vehicle.toml", "-o", "out.mcap"]);
+    assert_eq!(answer.code, Some(0), "{}", answer.stderr);
+    let log = folder.read("out.mcap");
+    let got = raw_messages(&log);
+    assert_eq!(got.len(), 917);
+    let bytes = std::fs::read(&file).unwrap();
+    for (message, shot) in got.iter().zip(bytes.chunks(640)) {
+        let len = usize::from(u16::from_be_bytes([shot[6], shot[7]]));
+        assert_eq!(message.data[..], shot[100..100 + len]);
+    }
+    assert!(got.iter().zip(&got[1..]).all(|(one, next)| one.log_time <= next.log_time));
+}
+
+#[test]
+fn an_imagenex_file_without_times_is_no_dive() {
+    let Some(file) = recording("imagenex852_cidco/hydroball.852") else { return };
+    let folder = Folder::new();
+    folder.write("vehicle.toml", format!("{TUNNEL}{HEAD}"));
+    let words = ["there is no shot in its 113280 bytes", "no date and time: 177 times, 113280 bytes"];
+    refused(&folder, &[&file, "--vehicle", "vehicle.toml", "-o", "out.mcap"], &words);
+}
+
+#[test]
+fn bare_ping_frames_have_no_times_and_are_named() {
+    let name = "ping360_tank_rgu/Uniform_Pipe__50__1N__2024-03-12_11-31-02Gain_1.bin";
+    let Some(file) = recording(name) else { return };
+    let folder = Folder::new();
+    refused(
+        &folder,
+        &[&file, "--source", "ping=ping", "-o", "out.mcap"],
+        &["bare Ping frames, which have no times"],
+    );
+}
+
+#[test]
+fn what_is_no_such_file_is_named_with_what_it_looks_like() {
+    let folder = Folder::new();
+    folder.write("vehicle.toml", format!("{TUNNEL}{AUTOPILOT}{HEAD}"));
+    folder.write("empty.tlog", b"");
+    folder.write("bag.tlog", b"#ROSBAG V2.0\nmuch more");
+    folder.write("text.log", "not a log at all\n");
+    folder.write("what.dat", b"(1.0) can0 123#11\n");
+    let with = ["--vehicle", "vehicle.toml", "-o", "out.mcap"];
+    for (file, words) in [
+        ("empty.tlog", &["in its 0 bytes", "empty"][..]),
+        ("bag.tlog", &["a ROS bag"]),
+        ("what.dat", &["--format tlog|candump|imagenex|ping", "a log of candump"]),
+        ("absent.tlog", &["reading absent.tlog"]),
+    ] {
+        refused(&folder, &[&[file][..], &with].concat(), words);
+    }
+    refused(
+        &folder,
+        &["text.log", "--source", "imu=can0", "-o", "out.mcap"],
+        &["no line of candump", "text"],
+    );
+    refused(&folder, &["text.log", "--vehicle", "vehicle.toml", "-o", "out.mcap"], &["can:INTERFACE"]);
+    refused(&folder, &["bag.tlog", "-o", "out.mcap"], &["--source ID=mavlink"]);
+    let unknown = ["bag.tlog", "--vehicle", "vehicle.toml", "--source", "imu=mavlink", "-o", "out.mcap"];
+    refused(&folder, &unknown, &["allowed are attitude, depth, sonar_0"]);
+    refused(&folder, &["text.log", "--source", "imu=can0", "-o", "text.log"], &["would be overwritten"]);
+}
