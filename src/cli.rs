@@ -55,7 +55,7 @@ pub(crate) enum Command {
     /// Only the effects that the scene names are simulated; --explain lists what that comes to.
     #[command(after_help = SIMULATE_EXAMPLES)]
     Simulate(Simulate),
-    /// Turn a foreign log into one of ours: telemetry of MAVLink, candump, files of Imagenex, logs of Ping Viewer.
+    /// Turn a foreign log into one of ours: telemetry of MAVLink, candump, files of Imagenex, logs of Ping Viewer, CSV.
     ///
     /// Each message goes to the sensors of the vehicle file that would have heard it; the vehicle file is attached to the log.
     /// Exit code 3 when something of the file was lost, 1 when no sensor takes anything of it.
@@ -256,6 +256,9 @@ pub(crate) struct Import {
     /// once for each sensor, and then no other listens.
     #[arg(long, value_name = "ID=LINE", value_parser = source_line)]
     pub(crate) source: Vec<(String, String)>,
+    /// For CSV, which column is which quantity of which sensor.
+    #[arg(long, value_name = "MAPPING.toml")]
+    pub(crate) map: Option<PathBuf>,
     /// Format of the file, where its name doesn't say.
     #[arg(long, value_enum)]
     pub(crate) format: Option<Kind>,
@@ -267,7 +270,8 @@ pub(crate) struct Import {
 const IMPORT_EXAMPLES: &str = "Example:
   headrace import dive.tlog --vehicle vehicle.toml -o dive.mcap
   headrace import candump-2026-05-04.log --vehicle vehicle.toml --source imu=can1 -o dive.mcap
-  headrace import sonar.81a --vehicle vehicle.toml --source sonar_0=imagenex -o dive.mcap";
+  headrace import sonar.81a --vehicle vehicle.toml --source sonar_0=imagenex -o dive.mcap
+  headrace import depth.csv --map mapping.toml --vehicle vehicle.toml -o dive.mcap";
 
 const SIMULATE_EXAMPLES: &str = "Example:
   headrace simulate deploy/scenes/demo.toml -o dive.mcap

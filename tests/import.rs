@@ -196,6 +196,72 @@ fn bare_ping_frames_have_no_times_and_are_named() {
     );
 }
 
+const TABLE: &str = "t_s,depth (mbar),roll,pitch,yaw,p,q,r,ax,ay,az,left,along
+1700000000.00,1500.5,1,2,3,0.1,0.2,0.3,0,0,1,2.5,10
+1700000000.05,,1.5,2,3,0.1,0.2,0.3,0,0,1,,10.005
+1700000000.10,1501.25,2,oops,3,0.1,0.2,0.3,0,0,1,2.75,10.01
+1700000000.15,1502,2,2,3,0.1,0.2,0.3,0,0,1,2.75,10.015
+";
+
+fn mapping(columns: &[(&str, &str, &str, &str)]) -> String {
+    let head = "time_column = \"t_s\"\nutc = true\n".to_owned();
+    columns.iter().fold(head, |text, (column, sensor, quantity, unit)| {
+        format!(
+            "{text}[[columns]]\ncolumn = \"{column}\"\nsensor = \"{sensor}\"\nquantity = \"{quantity}\"\nunit = \"{unit}\"\n"
+        )
+    })
+}
+
+#[test]
+fn a_table_becomes_the_bytes_that_its_sensors_would_have_sent() {
+    let folder = Folder::new();
+    folder.write("vehicle.toml", VEHICLE);
+    folder.write("table.csv", TABLE);
+    let columns = [
+        ("depth (mbar)", "depth", "pressure", "mbar"),
+        ("roll", "imu", "roll", "deg"),
+        ("pitch", "imu", "pitch", "deg"),
+        ("yaw", "imu", "yaw", "deg"),
+        ("p", "imu", "rate_x", "deg/s"),
+        ("q", "imu", "rate_y", "deg/s"),
+        ("r", "imu", "rate_z", "deg/s"),
+        ("ax", "imu", "force_x", "g"),
+        ("ay", "imu", "force_y", "g"),
+        ("az", "imu", "force_z", "g"),
+        ("left", "ping_left", "range", "m"),
+        ("along", "tether", "chainage", "m"),
+    ];
+    folder.write("map.toml", mapping(&columns));
+    let arguments = ["import", "table.csv", "--vehicle", "vehicle.toml", "-o", "out.mcap", "--map"];
+    let answer = folder.headrace(&[&arguments[..], &["map.toml", "--json"]].concat());
+    assert_eq!(answer.code, Some(3), "{}", answer.stderr);
+    assert!(answer.stderr.contains("rows with a cell that is no number: 1 times"), "{}", answer.stderr);
+    let shown = json(&answer);
+    let counts = &shown["messages"];
+    assert_eq!((&counts["imu"], &counts["ping_left"], &counts["tether"]), (&12.into(), &3.into(), &4.into()));
+    assert_eq!(counts["sonar_0"], 0);
+    let (_, report) = folder.replay("out.mcap", &[]);
+    let sources = report["sources"].as_array().unwrap();
+    assert!(sources.iter().all(|source| source["bad_frames"] == 0), "{sources:?}");
+    let heard =
+        |id: &str| sources.iter().find(|source| source["id"] == id).unwrap()["frames"].as_u64().unwrap();
+    assert_eq!((heard("imu"), heard("ping_left"), heard("tether")), (12, 3, 4));
+    // Three pressures, after the calibration that the sensor's memory gives.
+    assert_eq!(counts["depth"], heard("depth"));
+    assert!(heard("depth") > 3);
+    std::fs::remove_file(folder.path("out.mcap")).unwrap();
+    for (columns, words) in [
+        (&columns[..4], "rate_x, rate_y, rate_z, force_x, force_y, force_z"),
+        (&[("deep", "depth", "pressure", "mbar")], "is no column; there are t_s, depth (mbar), roll"),
+        (&[("along", "depth", "pressure", "m")], "must be one of Pa, hPa, mbar, kPa, bar"),
+        (&[("along", "dvl", "velocity_x", "m/s")], "is no sensor of the vehicle file"),
+    ] {
+        folder.write("wrong.toml", mapping(columns));
+        refused(&folder, &[&arguments[1..], &["wrong.toml"]].concat(), &["wrong.toml:", words]);
+    }
+    refused(&folder, &arguments[1..6], &["--map MAPPING.toml"]);
+}
+
 #[test]
 fn what_is_no_such_file_is_named_with_what_it_looks_like() {
     let folder = Folder::new();
@@ -208,7 +274,7 @@ fn what_is_no_such_file_is_named_with_what_it_looks_like() {
     for (file, words) in [
         ("empty.tlog", &["in its 0 bytes", "empty"][..]),
         ("bag.tlog", &["a ROS bag"]),
-        ("what.dat", &["--format tlog|candump|imagenex|ping", "a log of candump"]),
+        ("what.dat", &["--format tlog|candump|imagenex|ping|csv", "a log of candump"]),
         ("absent.tlog", &["reading absent.tlog"]),
     ] {
         refused(&folder, &[&[file][..], &with].concat(), words);

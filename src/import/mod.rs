@@ -8,10 +8,12 @@ mod tests;
 mod tlog;
 
 use std::fs::File;
-use std::io::Read;
+use std::io::{BufRead as _, BufReader, Read};
 use std::path::Path;
 
+use headrace_core::config::{Document, VehicleConfig};
 use headrace_replay::import::candump::Candump;
+use headrace_replay::import::csv::Csv;
 use headrace_replay::import::{Format, Import, Imported, detect};
 use headrace_replay::log::{LogHeader, LogWriter};
 use serde_json::json;
@@ -20,6 +22,7 @@ use crate::cli;
 use crate::commands::vehicle_file;
 use crate::dive::log_header;
 use crate::failure::{self, Failure};
+use crate::files;
 use crate::output::{deliver, say};
 use crate::progress::Progress;
 
@@ -34,6 +37,8 @@ pub(crate) enum Kind {
     Imagenex,
     /// Log of Ping Viewer.
     Ping,
+    /// Table of values, with --map.
+    Csv,
 }
 
 /// Imports a foreign log.
@@ -57,7 +62,13 @@ pub(crate) fn import(args: &cli::Import) -> Result<u8, Failure> {
     same_file(&args.file, &args.output)?;
     let name = args.file.display().to_string();
     let file = File::open(&args.file).map_err(|source| Failure::Read { path: args.file.clone(), source })?;
-    let import = Import::open(&name, file, kind.format(), kind.entries()).map_err(|error| match error {
+    let import = Import::open(
+        &name,
+        file,
+        format(kind, args, vehicle.as_ref().map(|(_, vehicle)| vehicle))?,
+        kind.entries(),
+    )
+    .map_err(|error| match error {
         headrace_replay::import::ImportError::Nothing { .. } => named(&args.file, &error.to_string()),
         error => error.into(),
     })?;
@@ -74,6 +85,42 @@ pub(crate) fn import(args: &cli::Import) -> Result<u8, Failure> {
     log.finish()?;
     drop(progress);
     tell(args, kind, &ids, &imported)
+}
+
+fn format(
+    kind: Kind,
+    args: &cli::Import,
+    vehicle: Option<&VehicleConfig>,
+) -> Result<Box<dyn Format>, Failure> {
+    if args.map.is_some() != (kind == Kind::Csv) {
+        let what =
+            "import: --map MAPPING.toml says what the columns of CSV are; CSV wants it, and nothing else";
+        return Err(Failure::Usage(what.to_owned()));
+    }
+    Ok(match kind {
+        Kind::Tlog => Box::<tlog::TlogFormat>::default(),
+        Kind::Candump => Box::new(Candump),
+        Kind::Imagenex => Box::new(imagenex::ImagenexFormat),
+        Kind::Ping => Box::<ping::PingFormat>::default(),
+        Kind::Csv => {
+            let (Some(map), Some(vehicle)) = (&args.map, vehicle) else {
+                let what = "import: CSV wants --vehicle VEHICLE.toml, whose sensors' bytes its values become";
+                return Err(Failure::Usage(what.to_owned()));
+            };
+            let (text, name) = (files::read(map)?, map.display().to_string());
+            let mapping = Document::new(&name, &text).root()?;
+            Box::new(Csv::new(mapping, vehicle, &first_line(&args.file)?)?)
+        }
+    })
+}
+
+/// The first line, where it is not too long to be one.
+fn first_line(path: &Path) -> Result<String, Failure> {
+    let failed = |source| Failure::Read { path: path.to_owned(), source };
+    let file = BufReader::new(File::open(path).map_err(failed)?);
+    let mut line = Vec::new();
+    file.take(1 << 16).read_until(b'\n', &mut line).map_err(failed)?;
+    Ok(String::from_utf8_lossy(&line).into_owned())
 }
 
 /// Says what came of it.
@@ -123,20 +170,12 @@ impl Kind {
             Some("log") => Ok(Self::Candump),
             Some("852" | "81a" | "81b" | "81s" | "31l") => Ok(Self::Imagenex),
             Some("bin") => Ok(Self::Ping),
+            Some("csv") => Ok(Self::Csv),
             _ => {
                 let problem = "its name doesn't say which format it has; known are .tlog, .log (candump), .852, .81a, .81b, \
-                     .81s, .31l (imagenex) and .bin (ping); --format tlog|candump|imagenex|ping says it for any name";
+                     .81s, .31l (imagenex), .bin (ping) and .csv; --format tlog|candump|imagenex|ping|csv says it for any name";
                 Err(named(path, &format!("importing {}: {problem}", path.display())))
             }
-        }
-    }
-
-    fn format(self) -> Box<dyn Format> {
-        match self {
-            Self::Tlog => Box::<tlog::TlogFormat>::default(),
-            Self::Candump => Box::new(Candump),
-            Self::Imagenex => Box::new(imagenex::ImagenexFormat),
-            Self::Ping => Box::<ping::PingFormat>::default(),
         }
     }
 
@@ -146,6 +185,7 @@ impl Kind {
             Self::Candump => "candump",
             Self::Imagenex => "imagenex",
             Self::Ping => "ping",
+            Self::Csv => "csv",
         }
     }
 
@@ -154,7 +194,7 @@ impl Kind {
         match self {
             Self::Tlog | Self::Candump => "frame",
             Self::Imagenex => "shot",
-            Self::Ping => "message",
+            Self::Ping | Self::Csv => "message",
         }
     }
 }

@@ -17,6 +17,10 @@ pub(super) fn takers(
     said: &[(String, String)],
 ) -> Result<Vec<Taker>, Failure> {
     check_streams(kind, said)?;
+    if let (Kind::Csv, Some(vehicle)) = (kind, vehicle) {
+        let taker = |(source, id): (u16, &String)| Taker { source, stream: id.clone(), driver: None };
+        return Ok((0..).zip(vehicle.sensor_configs.iter().map(|config| &config.id)).map(taker).collect());
+    }
     let Some(vehicle) = vehicle else { return without_vehicle(kind, said) };
     let ids: Vec<&str> = vehicle.sensor_configs.iter().map(|sensor| sensor.id.as_str()).collect();
     if let Some((id, _)) = said.iter().find(|(id, _)| !ids.contains(&id.as_str())) {
@@ -69,6 +73,9 @@ pub(super) fn sources(kind: Kind, said: &[(String, String)]) -> Vec<SourceInfo> 
 }
 
 fn without_vehicle(kind: Kind, said: &[(String, String)]) -> Result<Vec<Taker>, Failure> {
+    if kind == Kind::Csv {
+        return Err(refused("CSV wants --vehicle VEHICLE.toml, whose sensors' bytes its values become"));
+    }
     if said.is_empty() {
         let stream = kind.stream_form();
         return Err(refused(&format!(
@@ -82,6 +89,9 @@ fn without_vehicle(kind: Kind, said: &[(String, String)]) -> Result<Vec<Taker>, 
 
 fn check_streams(kind: Kind, said: &[(String, String)]) -> Result<(), Failure> {
     let form = kind.stream_form();
+    if kind == Kind::Csv && !said.is_empty() {
+        return Err(refused("--source isn't for CSV; its mapping file names the sensors"));
+    }
     let wrong = said.iter().find(|(_, stream)| kind != Kind::Candump && stream != form);
     if let Some((id, stream)) = wrong {
         return Err(refused(&format!("--source {id}={stream}: such a file has one line, {form}")));
@@ -108,6 +118,7 @@ impl Kind {
             Self::Candump => headrace_imu_can::Kind.name(),
             Self::Imagenex => headrace_imagenex881::Kind.name(),
             Self::Ping => headrace_ping1d::Kind.name(),
+            Self::Csv => "",
         }
     }
 
@@ -129,6 +140,7 @@ impl Kind {
             Self::Candump => "INTERFACE",
             Self::Imagenex => imagenex::STREAM,
             Self::Ping => ping::STREAM,
+            Self::Csv => "ID",
         }
     }
 }

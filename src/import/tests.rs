@@ -1,13 +1,16 @@
 //! The formats on bytes of their own making, and on any.
 
 use headrace_core::codec::Bytes;
+use headrace_core::config::{Document, VehicleConfig};
 use headrace_mavlink::frame::{Frame, Version};
+use headrace_replay::import::csv::Csv;
 use headrace_replay::import::{Entry, Format, Step};
 use proptest::prelude::*;
 
 use super::imagenex::ImagenexFormat;
 use super::ping::PingFormat;
 use super::tlog::TlogFormat;
+use crate::devices::KINDS;
 
 /// Entries, bytes lost by reason, and bytes left at the end.
 fn cut(format: &mut dyn Format, mut file: &[u8]) -> (Vec<Entry>, Vec<(usize, &'static str)>, usize) {
@@ -114,6 +117,23 @@ fn shots_come_at_the_times_of_their_headers() {
     assert_eq!(lost, [(128, "shots whose header has no date and time")]);
 }
 
+#[test]
+fn a_table_s_values_are_on_the_wire_in_the_wire_s_units() {
+    let vehicle = "target_m = 1\n[tunnel]\nprofile = \"circle\"\nradius_m = 3\nlength_m = 100\n\
+        [[sensors]]\nid = \"d\"\nplugin = \"mavlink\"\npart = \"pressure\"\n";
+    let mapping = "time_column = \"t\"\ntime_unit = \"ms\"\nseparator = \";\"\n[[columns]]\ncolumn = \"p\"\n\
+        sensor = \"d\"\nquantity = \"pressure\"\nunit = \"bar\"\nfactor = -1\n";
+    let none = |_: &str| Err("is none".to_owned());
+    let vehicle = VehicleConfig::parse(Document::new("vehicle", vehicle), &KINDS, &none).unwrap();
+    let mapping = Document::new("mapping", mapping).root().unwrap();
+    let mut table = Csv::new(mapping, &vehicle, "\"t\"; p\r\n").unwrap();
+    let (entries, lost, left) = cut(&mut table, b"\"t\"; p\r\n20.5;-1.5005\r\n");
+    assert_eq!((entries.len(), lost.len(), left), (1, 0, 0));
+    assert_eq!((entries[0].stamp_ns, entries[0].stream.as_str()), (20_500_000, "d"));
+    // SCALED_PRESSURE2: time, then the absolute pressure in hPa, behind a header of ten bytes.
+    assert_eq!(entries[0].bytes[14..18], 1500.5_f32.to_le_bytes());
+}
+
 proptest! {
     #[test]
     fn any_bytes_are_taken_or_lost(
@@ -136,5 +156,25 @@ proptest! {
             prop_assert!(left <= file.len() && lost.len() <= file.len());
             prop_assert!(entries.iter().map(|entry| entry.bytes.len()).sum::<usize>() <= file.len());
         }
+    }
+
+    #[test]
+    fn any_table_is_taken_or_lost(
+        bytes in prop_oneof![
+            proptest::collection::vec(any::<u8>(), 0..2000),
+            "(-?[0-9e.]{0,22},[-0-9einaf.]{0,9},[0-9.]{0,3}\n?){0,40}".prop_map(String::into_bytes),
+        ],
+    ) {
+        const VEHICLE: &str = "target_m = 1\n[tunnel]\nprofile = \"circle\"\nradius_m = 3\nlength_m = 100\n\
+            [[sensors]]\nid = \"d\"\nplugin = \"bar100\"\n[[sensors]]\nid = \"p\"\nplugin = \"ping1d\"\n";
+        const MAPPING: &str = "time_column = \"t\"\n[[columns]]\ncolumn = \"p\"\nsensor = \"d\"\nquantity = \"pressure\"\n\
+            unit = \"bar\"\n[[columns]]\ncolumn = \"r\"\nsensor = \"p\"\nquantity = \"range\"\nunit = \"m\"\n";
+        let none = |_: &str| Err("is none".to_owned());
+        let vehicle = VehicleConfig::parse(Document::new("vehicle", VEHICLE), &KINDS, &none).unwrap();
+        let mapping = Document::new("mapping", MAPPING).root().unwrap();
+        let mut table = Csv::new(mapping, &vehicle, "t,p,r\n").unwrap();
+        let (entries, lost, left) = cut(&mut table, &[b"t,p,r\n", &bytes[..]].concat());
+        let lines = bytes.iter().filter(|byte| **byte == b'\n').count() + 1;
+        prop_assert!(left == 0 && lost.len() <= lines && entries.len() <= 20 + 2 * lines);
     }
 }

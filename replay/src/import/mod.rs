@@ -7,6 +7,7 @@
 #![cfg_attr(not(test), warn(clippy::indexing_slicing))]
 
 pub mod candump;
+pub mod csv;
 pub mod detect;
 mod losses;
 mod order;
