@@ -51,7 +51,8 @@ fn drop_log(report: &mut Value) {
         object.remove("log");
     }
     // A replay has no ports.
-    for source in report["sources"].as_array_mut().into_iter().flatten().filter_map(Value::as_object_mut) {
+    let sources = report.get_mut("sources").and_then(Value::as_array_mut);
+    for source in sources.into_iter().flatten().filter_map(Value::as_object_mut) {
         source.remove("line");
     }
 }
