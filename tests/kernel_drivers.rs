@@ -406,7 +406,7 @@ fn a_can_adapter_that_is_unplugged_and_plugged_in_again_is_taken_up_again() {
     rehearsal.exactly(IMU, &mut imu, 100);
     rehearsal.wait_for(IMU, Phase::Running, "");
     drop(vcan);
-    rehearsal.wait_for(IMU, Phase::Closed, "opening vcan6: there is no such interface");
+    rehearsal.wait_for(IMU, Phase::Closed, "opening vcan6: there is no such CAN interface");
     let lost = |status: &Status| status.source == IMU && status.words.starts_with("lost can:vcan6: ");
     assert!(rehearsal.said.iter().any(lost), "{:?}", rehearsal.said);
     rehearsal.send(IMU, &mut imu, 3);
