@@ -3,6 +3,7 @@
 use std::fs;
 use std::os::unix::fs::{MetadataExt as _, PermissionsExt as _, symlink};
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicU32, Ordering};
 
 use headrace_core::config::Connect;
 use headrace_ports::{Machine, Presence, User, discover, presence};
@@ -22,7 +23,10 @@ impl Drop for Tree {
 
 impl Tree {
     fn new(name: &str) -> Self {
-        let tree = Self(std::env::temp_dir().join(format!("headrace-devices-{name}-{}", std::process::id())));
+        // Two tests may build the same machine at once.
+        static COUNT: AtomicU32 = AtomicU32::new(0);
+        let (process, count) = (std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed));
+        let tree = Self(std::env::temp_dir().join(format!("headrace-devices-{name}-{process}-{count}")));
         let ids = tree.file("/etc/hostname", "rov").metadata().unwrap();
         tree.file("/etc/group", &format!("dialout:x:{}:\n", ids.gid()));
         tree.file("/etc/passwd", &format!("root:x:{}:0:root:/root:/bin/sh\n", ids.uid()));
