@@ -26,6 +26,7 @@ use headrace_core::coverage::{
     GridLayout, HoleFinder, SampleStore, Sections, Soundings, StoreLayout, WallSample,
 };
 use headrace_core::math;
+use headrace_core::snapshot::{Restorer, Saver, SnapshotError, Stateful};
 use headrace_core::time::{DurNs, MonoNs};
 use headrace_core::tunnel::named;
 use headrace_replay::simulate::{START, Scene, Simulation};
@@ -72,6 +73,14 @@ fn best(mut work: impl FnMut() -> Duration) -> Duration {
 }
 
 struct Nothing;
+
+impl Stateful for Nothing {
+    fn save(&self, _: &mut Saver) {}
+
+    fn restore(&mut self, _: &mut Restorer<'_>) -> Result<(), SnapshotError> {
+        Ok(())
+    }
+}
 
 impl Decoder for Nothing {
     fn decode(&mut self, _: Packet<'_>, _: &mut dyn FnMut(Decoded)) {}

@@ -230,7 +230,7 @@ fn advice_words(entry: &AdviceEntry, profile: &Profile) -> String {
                     return "slower won't help: hold the heading, the beams swing".to_owned();
                 }
                 Some(Remedy::Centre) => "go to the middle of the tunnel".to_owned(),
-                Some(Remedy::Mode(mode)) => format!("set the heads to {}", mode.to_uppercase()),
+                Some(Remedy::Mode(mode)) => format!("set the heads to {}", mode.as_str().to_uppercase()),
                 None => "no mode meets the target here".to_owned(),
             };
             match advice.unseen_m {

@@ -139,7 +139,7 @@ impl Case {
     fn planned_mps(&self) -> f64 {
         let first = dive(&self.scene(0.1, 0.1, 3.0), self.dumb, TICK);
         let alternatives = first.beats.last().unwrap().advice.alternatives;
-        alternatives.iter().flatten().find(|other| other.mode == self.mode).unwrap().v_max_mps
+        alternatives.iter().flatten().find(|other| other.mode.as_str() == self.mode).unwrap().v_max_mps
     }
 
     /// The advice under way, and the dives at it and at a tenth more.
@@ -279,8 +279,8 @@ fn where_slower_does_not_help_it_says_so() {
     }
     // In the mode that is advised instead it is met.
     let Some(Remedy::Mode(mode)) = coarse.dive(0.1, 0.1).settled()[0].advice.remedy else { panic!() };
-    let finer = Case { mode, ..coarse };
-    assert!(finer.followed().at.failing <= 0.02, "{mode}");
+    let finer = Case { mode: mode.as_str().to_owned().leak(), ..coarse };
+    assert!(finer.followed().at.failing <= 0.02, "{mode:?}");
     // Nobody sees the sector of a head that is dumb.
     let unseen = Case { layout: "sector_offset", dumb: Some("sonar_1"), ..TWO }.dive(0.1, 0.1);
     let last = unseen.settled()[0].advice;

@@ -9,68 +9,8 @@
 
 mod common;
 
-use common::{Folder, VEHICLE};
+use common::Folder;
 use serde_json::Value;
-
-/// Six tables for one line, and a velocity log.
-const SENSORS: &str = r#"
-[[sensors]]
-id = "imu"
-plugin = "mavlink"
-connect = "udp:0.0.0.0:14550"
-part = "imu"
-rate_hz = 100
-
-[[sensors]]
-id = "depth"
-plugin = "mavlink"
-connect = "udp:0.0.0.0:14550"
-part = "pressure"
-
-[[sensors]]
-id = "left"
-plugin = "mavlink"
-connect = "udp:0.0.0.0:14550"
-part = "distance"
-sensor_id = 1
-angles_deg = [0, 0, 90]
-
-[[sensors]]
-id = "right"
-plugin = "mavlink"
-connect = "udp:0.0.0.0:14550"
-part = "distance"
-sensor_id = 2
-angles_deg = [0, 0, -90]
-
-[[sensors]]
-id = "up"
-plugin = "mavlink"
-connect = "udp:0.0.0.0:14550"
-part = "distance"
-sensor_id = 3
-angles_deg = [0, -90, 0]
-
-[[sensors]]
-id = "down"
-plugin = "mavlink"
-connect = "udp:0.0.0.0:14550"
-part = "distance"
-sensor_id = 4
-angles_deg = [0, 90, 0]
-
-[[sensors]]
-id = "dvl"
-plugin = "a50"
-connect = "tcp:192.168.194.95:16171"
-position_m = [-0.2, 0.1, -0.1]
-angles_deg = [0, 0, 20]
-
-[[sensors]]
-id = "tether"
-plugin = "tether_hid"
-counts_per_metre = 2000
-"#;
 
 const SCENE: &str = r#"vehicle = "vehicle.toml"
 [trajectory]
@@ -80,11 +20,6 @@ distance_m = 8
 speed_mps = 0.2
 "#;
 
-fn vehicle() -> String {
-    let heads = VEHICLE.split("[[sensors]]\nid = \"ping_left\"").next().unwrap();
-    format!("{heads}{SENSORS}")
-}
-
 fn source<'a>(report: &'a Value, id: &str) -> &'a Value {
     report["sources"].as_array().unwrap().iter().find(|source| source["id"] == id).unwrap()
 }
@@ -92,7 +27,7 @@ fn source<'a>(report: &'a Value, id: &str) -> &'a Value {
 #[test]
 fn an_autopilots_parts_and_a_velocity_log_navigate() {
     let folder = Folder::new();
-    folder.write("vehicle.toml", vehicle());
+    folder.write("vehicle.toml", common::other_vehicle());
     folder.write("scene.toml", SCENE);
     folder.simulate("scene.toml", "dive.mcap");
     let (code, report) = folder.replay("dive.mcap", &[]);

@@ -17,6 +17,7 @@ use core::marker::PhantomData;
 use core::ops::{Add, Mul, Neg, Sub};
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use serde::{Deserialize, Serialize};
 
 use crate::math;
 
@@ -33,15 +34,18 @@ pub enum Body {}
 pub enum Sensor {}
 
 /// A displacement or direction in frame `F`, metres (or without unit where it is a direction).
-#[derive(Clone, Copy, PartialEq)]
+#[derive(Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(bound = "")]
 pub struct Vec3<F>(pub Vector3<f64>, PhantomData<F>);
 
 /// A place in frame `F`, metres.
-#[derive(Clone, Copy, PartialEq)]
+#[derive(Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(bound = "")]
 pub struct Point3<F>(pub Vector3<f64>, PhantomData<F>);
 
 /// A rotation that takes vectors of frame `From` to frame `To`.
-#[derive(Clone, Copy, PartialEq)]
+#[derive(Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(bound = "")]
 pub struct Rot<To, From>(pub UnitQuaternion<f64>, PhantomData<(To, From)>);
 
 macro_rules! components {
@@ -228,7 +232,7 @@ impl<To, From> fmt::Debug for Rot<To, From> {
 }
 
 /// Where the vehicle is and how it is turned, in the tunnel.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Pose {
     /// The body frame's origin.
     pub position: Point3<Tunnel>,
@@ -244,7 +248,7 @@ impl Pose {
 }
 
 /// How a sensor sits on the vehicle.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Mount {
     /// The sensor's origin in the body frame.
     pub position: Vec3<Body>,

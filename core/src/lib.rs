@@ -14,5 +14,6 @@ pub mod fusion;
 pub mod math;
 pub mod sampling;
 pub mod site;
+pub mod snapshot;
 pub mod time;
 pub mod tunnel;

@@ -6,21 +6,22 @@
 mod device_clock;
 
 pub use device_clock::{ClockReport, DeviceClock, Drift};
+use serde::{Deserialize, Serialize};
 
 use core::ops::{Add, Neg, Sub};
 
 const NS_PER_S: f64 = 1e9;
 
 /// A moment on the host's monotonic clock, in nanoseconds since an arbitrary origin.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize)]
 pub struct MonoNs(pub u64);
 
 /// A moment in UTC, in nanoseconds since 1970-01-01 (negative before). Used at the edges only.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize)]
 pub struct UtcNs(pub i64);
 
 /// A signed span of time in nanoseconds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize)]
 pub struct DurNs(pub i64);
 
 impl DurNs {

@@ -16,6 +16,7 @@ use headrace_core::fusion::filter::sources::Consistency;
 use headrace_core::fusion::filter::state::{ERRORS, Errors, State};
 use headrace_core::fusion::relative::Relative;
 use headrace_core::fusion::{Fix, Navigation, NavigationConfig, NoFix, SensorInfo, Times};
+use headrace_core::snapshot::{Restorer, Saver, SnapshotError, Stateful};
 use headrace_core::time::MonoNs;
 use headrace_replay::drive::{Pace, drive};
 use headrace_replay::player::SimulationFeed;
@@ -82,6 +83,14 @@ impl Transparent for FilterNavigation {
 /// Navigation that knows the truth.
 struct Truth(Simulation);
 
+impl Stateful for Truth {
+    fn save(&self, _: &mut Saver) {}
+
+    fn restore(&mut self, _: &mut Restorer<'_>) -> Result<(), SnapshotError> {
+        Ok(())
+    }
+}
+
 impl Navigation for Truth {
     fn update(&mut self, _: usize, _: &SensorInfo, _: Times, _: &Reading) {}
 
@@ -104,6 +113,17 @@ struct Overheard<N> {
     last: Option<MonoNs>,
     told: Vec<Consistency>,
     said: SyncSender<Said>,
+}
+
+/// What was overheard is no state.
+impl<N: Transparent> Stateful for Overheard<N> {
+    fn save(&self, to: &mut Saver) {
+        self.inner.save(to);
+    }
+
+    fn restore(&mut self, from: &mut Restorer<'_>) -> Result<(), SnapshotError> {
+        self.inner.restore(from)
+    }
 }
 
 impl<N: Transparent> Navigation for Overheard<N> {

@@ -1,11 +1,12 @@
 //! What is wrong with the dive as a whole: said once, then counted.
 
 use bevy_ecs::prelude::Resource;
+use serde::{Deserialize, Serialize};
 
 use crate::time::MonoNs;
 
 /// What is wrong.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum AlertKind {
     /// Samples fall before the portal or behind the end of the tunnel.
     OutsideTunnel,
@@ -26,7 +27,7 @@ impl AlertKind {
 }
 
 /// Something wrong, since when, and how often.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Alert {
     /// What.
     pub kind: AlertKind,
@@ -41,7 +42,7 @@ pub struct Alert {
 }
 
 /// All that is wrong.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Resource)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Resource, Serialize, Deserialize)]
 pub struct Alerts([Option<Alert>; AlertKind::ALL.len()]);
 
 impl Alerts {

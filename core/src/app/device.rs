@@ -12,6 +12,7 @@ use crate::codec::CodecCounts;
 use crate::config::{ConfigError, Section, SensorConfig};
 use crate::sampling::head::{HeadMode, HeadProgram, HeadSpec};
 use crate::site::Site;
+use crate::snapshot::Stateful;
 use crate::time::{ClockReport, MonoNs};
 
 /// One kind of device, by the name that vehicle files call it: `plugin = "imagenex881"`.
@@ -63,8 +64,9 @@ pub trait Device: Plugin + Send + Sync {
     fn driver(&self, setup: &DriverSetup) -> Box<dyn Driver>;
 }
 
-/// Bytes to readings: a codec with the device's configuration around it. Pure, in the loop.
-pub trait Decoder: Send + Sync {
+/// Bytes to readings: a codec with the device's configuration around it. Pure, in the loop. Its state is what it has heard;
+/// the configuration isn't.
+pub trait Decoder: Stateful + Send + Sync {
     /// Takes a packet and calls `sink` for every reading that it completes.
     ///
     /// Allocates: never.

@@ -1,18 +1,13 @@
 //! A digest of results, the same wherever they are computed.
 
-use xxhash_rust::xxh64::Xxh64;
+use serde::{Deserialize, Serialize};
+use xxhash_rust::xxh64::xxh64;
 
-/// Hashes numbers by their bits, little-endian.
+/// Hashes numbers by their bits, little-endian, each with what came before as the seed.
 ///
 /// Not a cryptographic digest: it tells a dive computed otherwise, not a forged one.
-#[derive(Clone)]
-pub struct Digest(Xxh64);
-
-impl Default for Digest {
-    fn default() -> Self {
-        Self(Xxh64::new(0))
-    }
-}
+#[derive(Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Digest(u64);
 
 impl core::fmt::Debug for Digest {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
@@ -23,7 +18,7 @@ impl core::fmt::Debug for Digest {
 impl Digest {
     /// Takes a whole number in.
     pub fn integer(&mut self, value: u64) -> &mut Self {
-        self.0.update(&value.to_le_bytes());
+        self.0 = xxh64(&value.to_le_bytes(), self.0);
         self
     }
 
@@ -34,6 +29,6 @@ impl Digest {
 
     /// The digest of all so far.
     pub fn value(&self) -> u64 {
-        self.0.digest()
+        self.0
     }
 }

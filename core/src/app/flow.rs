@@ -6,6 +6,7 @@
 
 use bevy_ecs::entity::Entity;
 use bevy_ecs::prelude::Resource;
+use serde::{Deserialize, Serialize};
 
 use super::alerts::AlertKind;
 use super::reading::{Reading, SourceId};
@@ -20,6 +21,8 @@ use crate::sampling::layout::HeadLayout;
 use crate::sampling::occlusion::AngleRange;
 use crate::sampling::passes::Situation;
 use crate::site::Site;
+use crate::snapshot::{Restorer, Saver, SnapshotError, Stateful};
+use crate::stateful;
 use crate::time::{DurNs, MonoNs};
 use crate::tunnel::Profile;
 
@@ -205,6 +208,19 @@ pub struct Navigator {
     pub next_beat: Option<MonoNs>,
 }
 
+impl Stateful for Navigator {
+    fn save(&self, to: &mut Saver) {
+        self.navigation.save(to);
+        to.value(&self.next_beat);
+    }
+
+    fn restore(&mut self, from: &mut Restorer<'_>) -> Result<(), SnapshotError> {
+        self.navigation.restore(from)?;
+        self.next_beat = from.value()?;
+        Ok(())
+    }
+}
+
 /// What is known of the wall.
 #[derive(Debug, Resource)]
 pub struct Coverage {
@@ -218,9 +234,21 @@ pub struct Coverage {
     pub soundings: Soundings,
 }
 
+stateful!(Coverage { state: store, sections, frontier, soundings; });
+
 /// The search for holes with its working memory.
 #[derive(Debug, Default, Resource)]
 pub struct Finder(pub HoleFinder);
+
+impl Stateful for Finder {
+    fn save(&self, to: &mut Saver) {
+        self.0.save(to);
+    }
+
+    fn restore(&mut self, from: &mut Restorer<'_>) -> Result<(), SnapshotError> {
+        self.0.restore(from)
+    }
+}
 
 /// The streams of results with their digests; together, the dive's.
 #[derive(Debug, Default, Resource)]
@@ -232,6 +260,8 @@ pub struct Digests {
     /// Advice.
     pub advice: Trail,
 }
+
+stateful!(Digests { state: pings, judgements, advice; });
 
 impl Digests {
     /// The streams by name, in the order in which a log has them.
@@ -254,7 +284,7 @@ impl Digests {
 }
 
 /// Counts over the whole dive.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Resource)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Resource, Serialize, Deserialize)]
 pub struct Tally {
     /// Packets consumed.
     pub packets: u64,
@@ -277,7 +307,7 @@ pub struct Tally {
 }
 
 /// The tick that runs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Resource)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Resource, Serialize, Deserialize)]
 pub struct TickTime {
     /// Its number, from zero.
     pub index: u64,
@@ -286,7 +316,7 @@ pub struct TickTime {
 }
 
 /// What came from one source.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct SourceTally {
     /// Packets.
     pub packets: u64,
@@ -304,6 +334,16 @@ pub struct SourceTally {
 #[derive(Debug, Clone, PartialEq, Resource)]
 pub struct SourceTallies(pub Vec<SourceTally>);
 
+impl Stateful for SourceTallies {
+    fn save(&self, to: &mut Saver) {
+        to.list(&self.0);
+    }
+
+    fn restore(&mut self, from: &mut Restorer<'_>) -> Result<(), SnapshotError> {
+        from.slots(&mut self.0)
+    }
+}
+
 impl SourceTallies {
     pub(super) fn new(sources: usize) -> Self {
         Self(vec![SourceTally::default(); sources])
@@ -311,7 +351,7 @@ impl SourceTallies {
 }
 
 /// One entry of the advice's history.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct AdviceEntry {
     /// The moment, in data time.
     pub at: MonoNs,
@@ -336,6 +376,8 @@ pub struct AdviceLog {
     /// Least time between two entries.
     apart: DurNs,
 }
+
+stateful!(AdviceLog { state: dropped, apart; lists: entries; });
 
 impl Default for AdviceLog {
     fn default() -> Self {

@@ -1,6 +1,7 @@
 //! How a head turns, measured from its returns.
 
 use bevy_ecs::prelude::Component;
+use serde::{Deserialize, Serialize};
 
 use crate::math::{self, TAU};
 use crate::time::{DurNs, MonoNs};
@@ -27,7 +28,7 @@ pub struct Turned {
 }
 
 /// The motion of one head as measured: state of the loop.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Component)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Component, Serialize, Deserialize)]
 pub struct HeadTrack {
     last: Option<(MonoNs, f64)>,
     /// Signed angle of the last step, radians.

@@ -15,12 +15,14 @@ pub mod reading;
 pub mod report;
 pub mod ring;
 pub mod run;
+mod saving;
 pub mod smoothing;
 pub mod stage;
 mod stages;
 pub mod trail;
 pub mod what_if;
 
+use bevy_ecs::component::Mutable;
 use bevy_ecs::prelude::{Component, Resource};
 use bevy_ecs::schedule::{IntoScheduleConfigs, Schedule};
 use bevy_ecs::system::ScheduleSystem;
@@ -31,6 +33,7 @@ use crate::fusion::Navigation;
 use crate::sampling::layout::HeadLayout;
 use crate::sampling::occlusion::Obstacle;
 use crate::site::Site;
+use crate::snapshot::Stateful;
 use crate::time::DurNs;
 use crate::tunnel::Profile;
 use components::Mounted;
@@ -40,6 +43,7 @@ use plugin::{Plugin, PluginError};
 use reading::SourceId;
 use ring::{Port, PortReader};
 use run::Loop;
+use saving::Parts;
 use stage::Stage;
 
 /// The most sources that one loop takes.
@@ -130,9 +134,11 @@ impl App {
     pub fn new(mission: Mission) -> Self {
         let mut schedule = stage::schedule();
         stages::add(&mut schedule);
+        let mut world = World::new();
+        world.insert_resource(Parts::of_the_loop());
         Self {
             mission,
-            world: World::new(),
+            world,
             schedule,
             sources: Vec::new(),
             decoders: Vec::new(),
@@ -189,6 +195,16 @@ impl App {
 
     /// Adds a resource for a plugin's own systems.
     pub fn insert_resource(&mut self, resource: impl Resource) {
+        self.world.insert_resource(resource);
+    }
+
+    /// Adds a resource of which results depend: snapshots have it as the part of this name.
+    pub fn insert_state(
+        &mut self,
+        name: &'static str,
+        resource: impl Resource<Mutability = Mutable> + Stateful,
+    ) {
+        self.world.resource_mut::<Parts>().add_of(name, &resource);
         self.world.insert_resource(resource);
     }
 

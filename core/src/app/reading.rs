@@ -1,5 +1,7 @@
 //! What sensors say, freed of their protocols: the values that decoders hand to the loop.
 
+use serde::{Deserialize, Serialize};
+
 use crate::frames::{Rot, Sensor, Vec3};
 use crate::time::MonoNs;
 
@@ -8,7 +10,7 @@ use crate::time::MonoNs;
 pub enum Level {}
 
 /// A registered source of bytes; also the second key of the total order of messages.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct SourceId(pub u16);
 
 impl SourceId {
@@ -28,7 +30,7 @@ pub struct Packet<'a> {
 }
 
 /// One value of a sensor, in SI units and the sensor's own frame.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Reading {
     /// A ping of a profiling head.
     Sonar(SonarReturn),
@@ -72,7 +74,7 @@ impl Reading {
 }
 
 /// A ping of a profiling head.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SonarReturn {
     /// Head angle in the sensor's frame, radians: 0 down, growing clockwise seen along +x; any turn.
     pub angle_rad: f64,
@@ -87,7 +89,7 @@ pub struct SonarReturn {
 }
 
 /// A ping of a fixed echosounder.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct EchoRange {
     /// Distance in metres as the device computed it; `None` where it found no echo.
     pub range_m: Option<f64>,
@@ -98,7 +100,7 @@ pub struct EchoRange {
 }
 
 /// Absolute pressure of the water.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct WaterPressure {
     /// Absolute pressure, Pa.
     pub pressure_pa: f64,
@@ -109,7 +111,7 @@ pub struct WaterPressure {
 }
 
 /// Cable paid out.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct TetherLength {
     /// Metres since the counter's zero, growing as the vehicle goes in.
     pub length_m: f64,
@@ -118,7 +120,7 @@ pub struct TetherLength {
 }
 
 /// A reading and the moment for which it is valid.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Decoded {
     /// Time of validity: the receive time less what the decoder knows of the delays.
     pub valid_at: MonoNs,

@@ -112,6 +112,11 @@ impl PortReader {
         whole.then_some(PacketHeader { received: MonoNs(word(0)), order: word(8), len })
     }
 
+    /// Drops what waits.
+    pub(super) fn clear(&mut self) {
+        self.ring.clear();
+    }
+
     /// Takes the packet that [`PortReader::peek`] has shown into `into`, whose length must be the packet's.
     pub(super) fn take(&mut self, into: &mut [u8]) {
         self.ring.skip(HEADER_BYTES);

@@ -15,6 +15,7 @@ use super::head::HeadTrack;
 use super::merge::{Inbox, MAX_TICK_PACKETS};
 use super::plugin::PluginError;
 use super::ring::{Port, PortReader};
+use super::saving;
 use super::stages::{Advisor, Decoders, Driving, HeadSweeps, Results, WaterSound, judge_one};
 use super::{App, MAX_SOURCES, Mission, SourceId, SourceInfo};
 use crate::coverage::{
@@ -23,6 +24,7 @@ use crate::coverage::{
 use crate::fusion::{Navigation, SensorInfo, SensorKind};
 use crate::sampling::advice::{self, Task};
 use crate::sampling::head::{HeadMode, HeadSpec, MAX_HEADS};
+use crate::snapshot::{Restorer, Saver, SnapshotError};
 use crate::time::MonoNs;
 
 /// Room beyond both ends of the tunnel for heads that sit ahead of or behind the vehicle's origin, m.
@@ -227,6 +229,30 @@ impl Loop {
                 });
             });
         });
+    }
+
+    /// The state after the last tick, from which a loop of the same vehicle goes on to the same results. Packets that wait
+    /// in the rings are no part of it, nor is what plugins keep for themselves.
+    ///
+    /// Errors: something can't be written.
+    pub fn save(&self) -> Result<Vec<u8>, SnapshotError> {
+        let mut to = Saver::default();
+        to.part("ticks");
+        to.value(&self.ticks);
+        saving::save(&self.world, &mut to);
+        to.finish()
+    }
+
+    /// Goes on from a state that a loop of the same vehicle and program has saved. What waits in the rings is dropped.
+    ///
+    /// Errors: the bytes are another's. The loop must not be used then.
+    pub fn restore(&mut self, snapshot: &[u8]) -> Result<(), SnapshotError> {
+        let mut from = Restorer::new(snapshot);
+        from.part("ticks")?;
+        self.ticks = from.value()?;
+        saving::restore(&mut self.world, &mut from)?;
+        self.readers.iter_mut().for_each(PortReader::clear);
+        if from.is_empty() { Ok(()) } else { Err(from.unfit("there is more of it".to_owned())) }
     }
 
     /// Gives the samples' memory back: after the end of a dive a report needs the sections alone.

@@ -4,6 +4,7 @@
 //! the record's kind in its lowest byte and the number of its words above it. What is hashed are the words.
 
 use super::digest::Digest;
+use crate::stateful;
 
 /// Words of a stream that one tick has room for; what goes beyond is counted as lost to the record, not to the digest.
 const MAX_TICK_WORDS: usize = 1 << 16;
@@ -97,6 +98,8 @@ pub struct Trail {
     records: u64,
     lost: u64,
 }
+
+stateful!(Trail { state: digest, records, lost; fixed: words, room, head; });
 
 impl Trail {
     /// Keeps the words of each tick from now on. Allocates: all that it will need.

@@ -1,6 +1,7 @@
 //! Framing with rescanning, written once for every codec.
 
 use super::{Codec, CodecCounts};
+use crate::snapshot::{Restorer, Saver, SnapshotError, Stateful};
 
 /// What a candidate at the front of what is held turned out to be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -68,6 +69,25 @@ impl<F, const N: usize> Framed<F, N> {
     /// A codec that has seen nothing yet.
     pub fn new(framing: F) -> Self {
         Self { framing, held: [0; N], len: 0, astray: false, counts: CodecCounts::default() }
+    }
+}
+
+/// What is held of a frame begun, and the counts.
+impl<F, const N: usize> Stateful for Framed<F, N> {
+    fn save(&self, to: &mut Saver) {
+        to.value(&(self.astray, self.counts));
+        to.raw(self.held.get(..self.len).unwrap_or_default());
+    }
+
+    fn restore(&mut self, from: &mut Restorer<'_>) -> Result<(), SnapshotError> {
+        (self.astray, self.counts) = from.value()?;
+        let held = from.raw()?;
+        let Some(place) = self.held.get_mut(..held.len()) else {
+            return Err(from.unfit(format!("{} bytes of a frame of at most {N}", held.len())));
+        };
+        place.copy_from_slice(held);
+        self.len = held.len();
+        Ok(())
     }
 }
 

@@ -1,6 +1,9 @@
 //! When the frames of a byte stream came.
 
+use serde::{Deserialize, Serialize};
+
 use super::{Codec as _, Framed, Framing};
+use crate::stateful;
 use crate::time::{DurNs, MonoNs};
 
 /// Packets of which a [`LineClock`] keeps account: a kilobyte from a port that hands over 32 bytes at a time.
@@ -21,11 +24,13 @@ pub struct LineClock {
     len: usize,
 }
 
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 struct Part {
     received: MonoNs,
     bytes: usize,
 }
+
+stateful!(LineClock { state: last, len; slots: parts; fixed: silence; });
 
 impl LineClock {
     /// For a line on which a frame's bytes follow one another: after a pause of more than `silence` between two packets

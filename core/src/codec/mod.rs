@@ -12,9 +12,10 @@ mod line_clock;
 pub use bytes::{Bytes, TooLong};
 pub use framed::{Framed, Framing, Verdict};
 pub use line_clock::LineClock;
+use serde::{Deserialize, Serialize};
 
 /// What a codec has seen so far. Every byte pushed is in exactly one of: a good frame, `skipped_bytes`, or still held.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct CodecCounts {
     /// Frames that were whole and valid.
     pub good_frames: u64,

@@ -3,13 +3,15 @@
 //! A cause is what, taken away, would have let the section pass: each is tried on the figures of the passage. What gave no
 //! sample counts where it was aimed into the hole itself. `docs/coverage.md` has the order and its reasons.
 
+use serde::{Deserialize, Serialize};
+
 use super::hole::Hole;
 use super::passage::{Loss, Passage, lost_within};
 use crate::coverage::Reach;
 use crate::sampling::spacing;
 
 /// The one cause that a fail is put down to. Source: metrics.md, "Sections and verdicts".
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Cause {
     /// The distance between passes was too large at the speed driven.
     TooFast,
@@ -61,7 +63,7 @@ impl Cause {
 
 /// The figures behind a cause: means over the pings made within the section that was driven worst, of those that the hole
 /// touches; shares and counts over all of these.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Evidence {
     /// The cause.
     pub cause: Cause,

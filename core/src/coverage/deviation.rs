@@ -1,9 +1,11 @@
 //! How far the wall is from where the design says, section by section.
 
+use serde::{Deserialize, Serialize};
+
 use crate::tunnel::{Profile, Yz};
 
 /// What the samples of a section say of its wall against the design profile. Beyond the design is positive.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Deviation {
     samples: u32,
     /// Samples farther from the design than the wall can be.

@@ -2,6 +2,8 @@
 
 use core::ops::Range;
 
+use serde::{Deserialize, Serialize};
+
 use crate::time::{DurNs, MonoNs};
 
 /// A head that has given no return for so long isn't waited for.
@@ -10,7 +12,7 @@ const SILENT: DurNs = DurNs(2_000_000_000);
 const MAX_HEADS: usize = crate::sampling::head::MAX_HEADS;
 
 /// The stretch of tunnel on which a head lands samples now.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Reach {
     /// Least chainage, m.
     pub from_m: f64,
@@ -19,7 +21,7 @@ pub struct Reach {
 }
 
 /// Follows the reach of all heads along the tunnel.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct Frontier {
     heads: [Option<Head>; MAX_HEADS],
     /// Every chainage that any head's reach has covered.
@@ -34,7 +36,7 @@ pub struct Frontier {
 }
 
 /// Which way the vehicle goes.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 struct Course {
     /// The farthest that it has come on this course, m: the middle of what its heads reach.
     farthest_m: f64,
@@ -57,7 +59,7 @@ impl Course {
 }
 
 /// One head.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 struct Head {
     last: MonoNs,
     reach: Reach,

@@ -8,10 +8,13 @@
 //! the clipping gives is exact but for rounding; nothing depends on a triangulation, so that lattices, lines and repeated
 //! samples need no care.
 
+use serde::{Deserialize, Serialize};
+
 use self::division::Division;
 use self::window::{Nearest, Window};
 use super::store::SampleStore;
 use crate::math;
+use crate::stateful;
 
 mod certain;
 mod division;
@@ -25,7 +28,7 @@ const NO_FINER_M: f64 = 1e-10;
 const PROVEN_M: f64 = 1e-11;
 
 /// The largest empty circle with its centre in a section.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Hole {
     /// Diameter of the largest empty circle that was found among the samples kept, m.
     pub diameter_m: f64,
@@ -126,6 +129,8 @@ impl Default for HoleFinder {
         Self::new(0.0)
     }
 }
+
+stateful!(HoleFinder { state: last_m; fixed: tolerance_m, window, tiles, division; });
 
 impl HoleFinder {
     /// A search that finds D to within a tolerance, m; zero is exact.

@@ -1,5 +1,7 @@
 //! How a section was passed: what its pings say, for the cause of a fail.
 
+use serde::{Deserialize, Serialize};
+
 use super::hole::Hole;
 use crate::frames::Vec3;
 use crate::fusion::Fix;
@@ -8,7 +10,7 @@ use crate::math;
 use crate::tunnel::Profile;
 
 /// What the pings made within a section say of how it was passed.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Passage {
     /// All pings, whatever came of them.
     pub pings: u32,
@@ -68,7 +70,7 @@ impl Loss {
 const PARTS: f64 = 64.0;
 
 /// Where round the wall of a section pings gave no sample: one bit for each of 64 parts of the perimeter, by reason.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Lost([u64; Loss::ALL.len()]);
 
 impl Lost {
@@ -121,7 +123,7 @@ pub fn lost_within<'a>(
 const LARGEST_OF_MANY: f64 = 1.2;
 
 /// How far the samples of a pass may be off along the tunnel against those of the pass before.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Doubt {
     /// The errors that move them.
     pub relative: Relative,

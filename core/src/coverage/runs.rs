@@ -1,18 +1,21 @@
 //! Runs: neighbouring failed sections with one cause, told as one event with a number that stays.
 
+use serde::{Deserialize, Serialize};
+
 use super::cause::Cause;
 use super::hole::Hole;
+use crate::stateful;
 use crate::time::MonoNs;
 
 /// Failed sections of one cause belong together when they are no farther apart than this, m.
 const JOIN_M: f64 = 0.5;
 
 /// Number of a run; it is never given again.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct RunId(pub u32);
 
 /// Neighbouring failed sections with one cause.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Run {
     /// Why they failed.
     pub cause: Cause,
@@ -63,6 +66,8 @@ pub struct Runs {
     /// By section: its run, one more than its number, or zero.
     member: Vec<u32>,
 }
+
+stateful!(Runs { lists: runs; slots: member; fixed: first, join; });
 
 /// What runs need besides to take in what is said of a section.
 pub struct Telling<'a> {

@@ -1,5 +1,7 @@
 //! One section: what was measured in it, its hole, its verdict, and its flag.
 
+use serde::{Deserialize, Serialize};
+
 use super::cause::Evidence;
 use super::deviation::Deviation;
 use super::hole::Hole;
@@ -8,7 +10,7 @@ use crate::math;
 use crate::time::MonoNs;
 
 /// What is said of a section. Source: metrics.md, "Sections and verdicts".
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum Verdict {
     /// Samples may still come without turning back.
     #[default]
@@ -34,7 +36,7 @@ impl Verdict {
 }
 
 /// Count, mean, deviation and extremes of a quantity.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Spread {
     /// Values.
     pub count: u32,
@@ -98,7 +100,7 @@ pub enum Judgement {
 }
 
 /// One section.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Section {
     /// The verdict so far.
     pub verdict: Verdict,

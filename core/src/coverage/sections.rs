@@ -10,6 +10,7 @@ use super::runs::{RunChange, RunId, Runs, Telling};
 use super::section::{Judgement, Section, Verdict};
 use super::store::SampleStore;
 use crate::math;
+use crate::stateful;
 use crate::time::MonoNs;
 use crate::tunnel::Profile;
 
@@ -57,6 +58,8 @@ pub struct Sections {
     sections: Vec<Section>,
     runs: Runs,
 }
+
+stateful!(Sections { state: runs; slots: sections; fixed: section_m, target_m, first; });
 
 impl Sections {
     /// Sections of `section_m` over [`from_m`, `to_m`].

@@ -4,6 +4,7 @@
 //! stands beside the hole, never for it. Source: metrics.md, "Sections and verdicts".
 
 use crate::math;
+use crate::stateful;
 
 /// Samples that a node should have at least.
 pub const ENOUGH: u16 = 5;
@@ -31,6 +32,8 @@ pub struct Soundings {
     columns: i64,
     counts: Vec<u16>,
 }
+
+stateful!(Soundings { slots: counts; fixed: layout, first_row, columns; });
 
 /// What the nodes of a stretch have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

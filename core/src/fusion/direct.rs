@@ -11,6 +11,7 @@ use crate::app::reading::{EchoRange, Level, Reading, TetherLength};
 use crate::frames::{Body, Mount, Point3, Pose, Rot, Sensor, Tunnel};
 use crate::math;
 use crate::site::Site;
+use crate::stateful;
 use crate::time::{DurNs, MonoNs};
 use crate::tunnel::Profile;
 
@@ -39,6 +40,8 @@ pub struct DirectNavigation {
     height_offset_m: f64,
 }
 
+stateful!(DirectNavigation { state: attitude, tether, place, height_m, height_offset_m; slots: echoes; fixed: profile, site; });
+
 /// The last readings of the cable counter, as chainages.
 #[derive(Debug, Clone)]
 struct TetherTrack {
@@ -46,6 +49,8 @@ struct TetherTrack {
     count: usize,
     resolution_m: f64,
 }
+
+stateful!(TetherTrack { state: count, resolution_m; slots: readings; });
 
 impl DirectNavigation {
     /// Nothing is known yet.

@@ -7,6 +7,8 @@ pub mod relative;
 pub mod section;
 pub mod smooth;
 
+use serde::{Deserialize, Serialize};
+
 use self::direct::DirectNavigation;
 use self::filter::FilterNavigation;
 use self::filter::settings::Settings;
@@ -16,11 +18,12 @@ use crate::app::reading::Reading;
 use crate::config::{ConfigError, Section};
 use crate::frames::{Mount, Pose};
 use crate::site::Site;
+use crate::snapshot::Stateful;
 use crate::time::MonoNs;
 use crate::tunnel::Profile;
 
 /// A sensor as navigation knows it.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SensorInfo {
     /// How it sits on the vehicle.
     pub mount: Mount,
@@ -29,7 +32,7 @@ pub struct SensorInfo {
 }
 
 /// Kinds of sensor.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum SensorKind {
     /// A profiling head.
     Head,
@@ -56,7 +59,7 @@ pub enum SensorKind {
 }
 
 /// Where the vehicle is at a moment.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Fix {
     /// Position and attitude.
     pub pose: Pose,
@@ -67,7 +70,7 @@ pub struct Fix {
 }
 
 /// What a fix lacks.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum NoFix {
     /// No recent attitude.
     Heading,
@@ -97,8 +100,9 @@ pub struct Times {
     pub valid: MonoNs,
 }
 
-/// A way of navigating. Readings come in the order in which they were received; a fix is as of the readings so far.
-pub trait Navigation: Send + Sync {
+/// A way of navigating. Readings come in the order in which they were received; a fix is as of the readings so far. Its
+/// state is all that a fix depends on, so that a snapshot can take it up again.
+pub trait Navigation: Stateful + Send + Sync {
     /// Takes a reading. `source` is the same for all readings of one sensor.
     ///
     /// Allocates: never.

@@ -1,10 +1,12 @@
 //! How well two moments are known against each other.
 
+use serde::{Deserialize, Serialize};
+
 use crate::frames::{Tunnel, Vec3};
 use crate::math;
 
 /// Covariance of the errors that move a sample along the tunnel, of one moment against another: chainage, pitch, yaw.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Relative([[f64; 3]; 3]);
 
 impl Relative {

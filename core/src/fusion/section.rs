@@ -1,5 +1,7 @@
 //! The place in the cross-section where echosounders' ranges agree best with the design profile.
 
+use serde::{Deserialize, Serialize};
+
 use crate::frames::{Body, Mount, Rot, Sensor, Tunnel, Vec3};
 use crate::tunnel::Profile;
 
@@ -10,7 +12,7 @@ const STEEP: f64 = 0.7;
 const ROUNDS: usize = 3;
 
 /// A range to the wall, along the x of its sensor.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Echo {
     /// How the sonar sits.
     pub mount: Mount,

@@ -15,10 +15,11 @@ use super::strips::{Going, Strips, View};
 use super::swing::Swing;
 use crate::frames::{Point3, Pose, Rot};
 use crate::math;
+use crate::stateful;
 use crate::tunnel::Profile;
 use look::AdvisedHead;
 
-pub use answer::{Advice, Alternative, Left, Reason, Remedy};
+pub use answer::{Advice, Alternative, Left, ModeName, Reason, Remedy};
 pub use steady::Steady;
 
 /// Share of the speed kept back for the error of its measurement.
@@ -77,6 +78,8 @@ pub struct Advisor {
     /// The largest speed found last: where it still does, no other is looked for.
     last_mps: Option<f64>,
 }
+
+stateful!(Advisor { state: now, parallax_rad, farthest_m, next, until_alternatives, alternatives, astern, last_mps; slots: strides; each: heads, views; fixed: profile, task, modes, centred_m, middle; });
 
 impl Advisor {
     /// For heads with the modes that each has, and the parts of the hull that may stand in their way.
@@ -335,7 +338,8 @@ impl Advisor {
         let mut alternatives = [None; MAX_MODES];
         for (number, (slot, mode)) in alternatives.iter_mut().zip(names).enumerate() {
             let Some(v_mps) = self.mode_speed_mps(number, passes.heads(), going) else { continue };
-            *slot = Some(Alternative { mode: mode.name, v_max_mps: v_mps * (1.0 - SPEED_MARGIN) });
+            *slot =
+                Some(Alternative { mode: ModeName::new(mode.name), v_max_mps: v_mps * (1.0 - SPEED_MARGIN) });
         }
         self.alternatives = alternatives;
     }

@@ -1,5 +1,7 @@
 //! A profiling head as sampling theory sees it: how it turns, how it sits, what it is told to do.
 
+use serde::{Deserialize, Serialize};
+
 use super::error::{SamplingError, positive};
 use crate::frames::{Body, Mount, Rot, Sensor, head_direction};
 use crate::math::{self, TAU};
@@ -178,7 +180,7 @@ pub fn faces_aft(rotation: Rot<Body, Sensor>) -> bool {
 }
 
 /// A set of heads by their numbers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct HeadSet(u8);
 
 impl HeadSet {

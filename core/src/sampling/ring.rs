@@ -1,9 +1,12 @@
 //! The general case: where the beams of a head that stands still meet the wall of any profile, from any place and in
 //! any attitude, by ray casting.
 
+use serde::{Deserialize, Serialize};
+
 use super::error::{SamplingError, positive};
 use crate::frames::{Mount, Point3, Pose, Rot, Sensor, Tunnel, Vec3, head_direction};
 use crate::math::{self, TAU};
+use crate::stateful;
 use crate::tunnel::{Profile, WallHit};
 
 /// A beam that needs more than this to the wall runs along the tunnel, m.
@@ -18,7 +21,7 @@ pub struct Standing<'a> {
 }
 
 /// Where a beam meets the wall.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Sounding {
     /// Head angle, radians in the sensor's frame.
     pub angle_rad: f64,
@@ -137,6 +140,8 @@ pub struct Ring {
     stride: usize,
     steps_m: Vec<f64>,
 }
+
+stateful!(Ring { state: perimeter_m, stride; lists: soundings, way_m, beams, steps_m; });
 
 impl Ring {
     /// A ring of `count` soundings, the first at `start_rad`.

@@ -1,5 +1,7 @@
 //! The wall around a vehicle as strips, each seen by the same heads, and the spacing that comes of it.
 
+use serde::{Deserialize, Serialize};
+
 use super::error::SamplingError;
 use super::head::{HeadSet, MAX_HEADS};
 use super::occlusion::AngleRange;
@@ -7,12 +9,13 @@ use super::passes::Passes;
 use super::ring::{Ring, Sounding, Standing};
 use super::spacing;
 use crate::math;
+use crate::stateful;
 
 /// Strips narrower than this are rounding, m.
 const NO_WIDTH_M: f64 = 1e-9;
 
 /// An interval of the perimeter.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Arc {
     /// Arc length at which it begins, m.
     pub from_m: f64,
@@ -64,6 +67,8 @@ pub struct View {
     pub hidden: Vec<Arc>,
 }
 
+stateful!(View { state: sector; lists: hidden; });
+
 impl View {
     /// Hides what a ring meets nearer or farther than the head hears. Where there is no room for more stretches, the last
     /// is made longer, over what is heard between: rather too much is hidden than too little.
@@ -103,7 +108,7 @@ impl View {
 }
 
 /// A strip of the wall along the tunnel.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Strip {
     /// Where on the perimeter.
     pub arc: Arc,
@@ -141,6 +146,8 @@ pub struct Strips {
     /// The strip of each sounding of the ring looked at, and how far it is to its end, nearly, m.
     strip_of: Vec<(usize, f64)>,
 }
+
+stateful!(Strips { state: perimeter_m; lists: strips, edges_m, steps_m, strip_of; });
 
 impl Strips {
     /// Without strips, but with room for those that so many arcs make, in so many settings.

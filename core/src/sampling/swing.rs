@@ -2,6 +2,7 @@
 
 use crate::frames::{Tunnel, Vec3};
 use crate::math;
+use crate::stateful;
 use crate::time::{DurNs, MonoNs};
 
 /// Beats that are remembered: at five a second the time looked back on, and a turn of a head in its slowest mode before.
@@ -27,6 +28,8 @@ pub struct Looks {
     looks: Vec<(MonoNs, Vec3<Tunnel>)>,
     count: usize,
 }
+
+stateful!(Looks { state: count; lists: looks; });
 
 impl Default for Looks {
     /// Allocates: all that it will ever use.

@@ -6,8 +6,11 @@
 //! all of them alike, which is the offset's affair and not the slope's. When all places are taken, stretches are joined
 //! two by two, so that ten hours need no more memory than two minutes.
 
+use serde::{Deserialize, Serialize};
+
 use super::{DurNs, MonoNs};
 use crate::math;
+use crate::snapshot::array;
 
 /// Stretches that are kept.
 const PLACES: usize = 128;
@@ -35,7 +38,7 @@ const LONGEST_TICK_NS: i64 = 900_000_000_000;
 const PPM: f64 = 1e6;
 
 /// What is known of a device's clock.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ClockReport {
     /// Stamps seen.
     pub stamps: u64,
@@ -50,7 +53,7 @@ pub struct ClockReport {
 }
 
 /// A rate against our clock, parts per million. Positive: the device's clock is fast.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Drift {
     /// The rate.
     pub ppm: f64,
@@ -59,7 +62,7 @@ pub struct Drift {
 }
 
 /// Follows a device's clock. Allocates: never.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct DeviceClock {
     /// The clock goes round after this many ticks.
     round: i128,
@@ -73,7 +76,7 @@ pub struct DeviceClock {
 }
 
 /// Time since a start of the device.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 struct Epoch {
     /// The first stamp, of which device time is counted.
     begun: MonoNs,
@@ -85,8 +88,9 @@ struct Epoch {
 }
 
 /// The least late stamps.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 struct Edge {
+    #[serde(with = "array")]
     kept: [Stamp; PLACES],
     len: usize,
     span_ns: i64,
@@ -99,7 +103,7 @@ struct Edge {
 }
 
 /// A stamp by device time since the epoch's first and by how much later it came than that one, ns.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 struct Stamp {
     device_ns: i64,
     late_ns: i64,

@@ -8,7 +8,9 @@ use headrace_core::app::device::Decoder;
 use headrace_core::app::reading::{Decoded, Packet, Reading};
 use headrace_core::codec::{Codec as _, CodecCounts, Framing as _, LineClock};
 use headrace_core::frames::{Sensor, Vec3};
+use headrace_core::stateful;
 use headrace_core::time::{DurNs, MonoNs};
+use serde::{Deserialize, Serialize};
 
 use crate::report::{Against, LineCodec, Lines, Velocity};
 
@@ -34,7 +36,7 @@ pub struct Meaning {
 }
 
 /// Why reports were left out, and how many.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Withheld {
     /// The device called them invalid.
     pub invalid: u64,
@@ -72,12 +74,16 @@ pub struct A50Decoder {
     state: State,
 }
 
+stateful!(A50Decoder { state: codec, clock, state; });
+
 #[derive(Debug, Clone)]
 struct State {
     meaning: Meaning,
     last: Option<Velocity>,
     withheld: Withheld,
 }
+
+stateful!(State { state: last, withheld; fixed: meaning; });
 
 /// A vector in the device's axes in ours, or the other way.
 pub fn to_ours([x, y, z]: [f64; 3]) -> Vec3<Sensor> {

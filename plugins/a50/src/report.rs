@@ -4,6 +4,7 @@
 
 use headrace_core::codec::{Framed, Framing, Verdict};
 use headrace_core::math;
+use serde::{Deserialize, Serialize};
 
 use crate::json::Cursor;
 
@@ -11,7 +12,7 @@ use crate::json::Cursor;
 pub const MAX_LINE_BYTES: usize = 4096;
 
 /// What the velocity is against.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Against {
     /// The ground, or a wall.
     Bottom,
@@ -20,7 +21,7 @@ pub enum Against {
 }
 
 /// A velocity report, in the device's units and axes: x forward, y right, z down (towards where it looks).
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Velocity {
     /// What it is against.
     pub against: Against,

@@ -1,6 +1,7 @@
 //! From counts to pressure: the limits and the kind of sensor, as its memory or the vehicle file gives them.
 
 use headrace_core::math;
+use serde::{Deserialize, Serialize};
 
 use crate::codec::MemoryWord;
 
@@ -185,7 +186,7 @@ pub struct Overrides {
 }
 
 /// The calibration cells as far as they have been read.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct CalibrationCells {
     scaling0: Option<u16>,
     p_min: [Option<u16>; 2],

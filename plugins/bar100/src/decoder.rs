@@ -3,6 +3,7 @@
 use headrace_core::app::device::Decoder;
 use headrace_core::app::reading::{Decoded, Packet, Reading, WaterPressure};
 use headrace_core::codec::{Codec as _, CodecCounts};
+use headrace_core::snapshot::{Restorer, Saver, SnapshotError, Stateful};
 use headrace_core::time::DurNs;
 
 use crate::calibration::{Calibration, CalibrationCells, CalibrationError, Overrides};
@@ -29,6 +30,20 @@ pub struct Bar100Decoder {
     cells: CalibrationCells,
     calibration: Result<Option<Calibration>, CalibrationError>,
     withheld: u64,
+}
+
+impl Stateful for Bar100Decoder {
+    fn save(&self, to: &mut Saver) {
+        self.codec.save(to);
+        to.value(&(self.cells, self.withheld));
+    }
+
+    fn restore(&mut self, from: &mut Restorer<'_>) -> Result<(), SnapshotError> {
+        self.codec.restore(from)?;
+        (self.cells, self.withheld) = from.value()?;
+        self.calibration = self.cells.calibration(&self.meaning.overrides);
+        Ok(())
+    }
 }
 
 impl Bar100Decoder {

@@ -9,7 +9,9 @@ use headrace_core::app::reading::{Decoded, Packet, Reading, SonarReturn};
 use headrace_core::codec::{Codec as _, CodecCounts, LineClock};
 use headrace_core::config::{ConfigError, Section, SensorConfig};
 use headrace_core::sampling::head::{HeadMode, HeadSpec};
+use headrace_core::stateful;
 use headrace_core::time::DurNs;
+use serde::{Deserialize, Serialize};
 
 use crate::codec::{Header, Model, ReturnCodec, Returns};
 use crate::driver::{CARRIERS, HeadDriver};
@@ -106,7 +108,7 @@ impl Device for Imagenex881 {
 }
 
 /// Whole returns that gave no reading, by reason.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Rejected {
     /// The head did not take the command, or lost characters of it.
     pub status: u64,
@@ -134,6 +136,8 @@ pub struct HeadDecoder {
     reader: Reader,
 }
 
+stateful!(HeadDecoder { state: codec, clock, reader; });
+
 /// What makes a reading of a whole return; apart from the codec, so that both can be borrowed.
 #[derive(Debug, Clone)]
 struct Reader {
@@ -141,6 +145,8 @@ struct Reader {
     latency: DurNs,
     rejected: Rejected,
 }
+
+stateful!(Reader { state: rejected; fixed: settings, latency; });
 
 impl HeadDecoder {
     /// For a head with these settings. A position past +180 degrees makes a frame bad, whatever the head id.

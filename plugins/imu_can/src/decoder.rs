@@ -4,7 +4,9 @@ use headrace_core::app::device::Decoder;
 use headrace_core::app::reading::{Decoded, Level, Packet, Reading};
 use headrace_core::codec::{Codec as _, CodecCounts, Framing as _};
 use headrace_core::frames::{Rot, Sensor, Vec3};
+use headrace_core::stateful;
 use headrace_core::time::{ClockReport, DeviceClock, DurNs, MonoNs};
+use serde::{Deserialize, Serialize};
 
 use crate::codec::{ImuCodec, Message, MessageSet};
 use crate::sets::{bosch, j1939, sbg, scaled, xsens};
@@ -42,6 +44,8 @@ pub struct ImuDecoder {
     passed_over: u64,
 }
 
+stateful!(ImuDecoder { state: codec, state, passed_over; });
+
 /// What a message changes beside giving a reading.
 #[derive(Debug, Clone)]
 struct State {
@@ -59,8 +63,10 @@ struct State {
     withheld: u64,
 }
 
+stateful!(State { state: invalid, sends_quaternions, sample_time_ticks, clock, stamped_by_filter, received, group, acceleration_mps2, withheld; fixed: meaning; });
+
 /// What can't be relied on by the unit's last status.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 struct Invalid {
     orientation: bool,
     rate: bool,

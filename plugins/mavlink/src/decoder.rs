@@ -5,7 +5,9 @@ use headrace_core::app::reading::{Decoded, EchoRange, Packet, Reading, WaterPres
 use headrace_core::codec::{Codec as _, CodecCounts, Framing as _, LineClock};
 use headrace_core::frames::{Rot, Vec3};
 use headrace_core::math;
+use headrace_core::stateful;
 use headrace_core::time::DurNs;
+use serde::{Deserialize, Serialize};
 
 use crate::frame::{Frame, Frames, MavlinkCodec};
 use crate::message::{
@@ -75,6 +77,8 @@ pub struct MavlinkDecoder {
     state: State,
 }
 
+stateful!(MavlinkDecoder { state: codec, clock, state; });
+
 #[derive(Debug, Clone)]
 struct State {
     meaning: Meaning,
@@ -83,8 +87,10 @@ struct State {
     withheld: u64,
 }
 
+stateful!(State { state: boot, passed_over, withheld; fixed: meaning; });
+
 /// The autopilot's clock of 32 bits of milliseconds, unwrapped.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 struct BootClock {
     last_ms: Option<u32>,
     since_boot_ms: i64,

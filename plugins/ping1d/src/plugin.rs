@@ -8,6 +8,7 @@ use headrace_core::app::plugin::{Plugin, PluginError};
 use headrace_core::app::reading::{Decoded, EchoRange, Packet, Reading};
 use headrace_core::codec::{Codec as _, CodecCounts, LineClock};
 use headrace_core::config::{ConfigError, Section, SensorConfig};
+use headrace_core::stateful;
 use headrace_core::time::DurNs;
 
 use crate::codec::{Distance, DistanceSimple, Frame, PingCodec};
@@ -92,6 +93,8 @@ pub struct PingDecoder {
     latency: DurNs,
     withheld: u64,
 }
+
+stateful!(PingDecoder { state: codec, clock, withheld; fixed: settings, latency; });
 
 impl PingDecoder {
     /// For a device with these settings.

@@ -3,6 +3,7 @@
 use headrace_core::app::device::Decoder;
 use headrace_core::app::reading::{Decoded, Packet, Reading, TetherLength};
 use headrace_core::codec::{Codec as _, CodecCounts, Framing as _, LineClock};
+use headrace_core::stateful;
 use headrace_core::time::{ClockReport, DeviceClock, DurNs};
 
 use crate::line::{LineCodec, Lines};
@@ -41,6 +42,8 @@ pub struct HidDecoder {
     status: Option<u8>,
 }
 
+stateful!(HidDecoder { state: codec, tracker, clock, status; fixed: counter; });
+
 /// Lines to readings.
 #[derive(Debug, Clone)]
 pub struct LineDecoder {
@@ -49,6 +52,8 @@ pub struct LineDecoder {
     metres_per_unit: f64,
     latency: DurNs,
 }
+
+stateful!(LineDecoder { state: codec, clock; fixed: metres_per_unit, latency; });
 
 impl HidDecoder {
     /// A decoder that has seen no report yet.

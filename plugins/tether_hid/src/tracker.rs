@@ -8,7 +8,9 @@
 //!   - Otherwise the counter's new word is taken as it is.
 //! - Either way, and whenever counts may have been lost, the length is no longer sure: re-zero needed, from then on.
 
+use headrace_core::stateful;
 use headrace_core::time::MonoNs;
+use serde::{Deserialize, Serialize};
 
 use crate::report::{Report, Width};
 
@@ -32,7 +34,7 @@ pub enum Counting {
 }
 
 /// How the tracker stands. Counts only grow, and the mark stays once it is set.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct TrackerHealth {
     /// Reports rejected as faster than the winch.
     pub rejected: u64,
@@ -55,15 +57,17 @@ pub struct CountTracker {
     health: TrackerHealth,
 }
 
+stateful!(CountTracker { state: accepted, jumped, sequence, total, health; fixed: counting, width, max_counts_per_s; });
+
 /// A count and when it came.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 struct Seen {
     count: i64,
     at: MonoNs,
 }
 
 /// Rejected reports that agree with each other.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 struct Jump {
     from_zero: bool,
     last: Seen,

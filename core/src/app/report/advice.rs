@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use crate::app::flow::AdviceEntry;
-use crate::sampling::advice::{Alternative, Left, Remedy};
+use crate::sampling::advice::{Alternative, Left};
 
 /// Advice at a moment.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -29,16 +29,16 @@ pub struct AdviceReport {
     /// Whether the time that is left is enough.
     pub suffices: Option<bool>,
     /// What would help where slower doesn't: `centre`, `steady`, or a mode.
-    pub remedy: Option<&'static str>,
+    pub remedy: Option<String>,
     /// What the heads could do in each of their modes.
     pub alternatives: Vec<AlternativeReport>,
 }
 
 /// What the heads could do in one of their modes.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AlternativeReport {
     /// The mode.
-    pub mode: &'static str,
+    pub mode: String,
     /// Largest speed that meets the target, m/s.
     pub v_max_mps: f64,
     /// Hours at that speed for what is left of the tunnel.
@@ -60,7 +60,7 @@ pub(super) fn advice_report(entry: &AdviceEntry) -> AdviceReport {
         phase_error_deg: entry.advice.phase_error_rad.map(f64::to_degrees),
         needed_h: left.hours_at(entry.advice.v_max_mps),
         suffices: left.suffices_at(entry.advice.v_max_mps),
-        remedy: entry.advice.remedy.map(Remedy::as_str),
+        remedy: entry.advice.remedy.map(|remedy| remedy.as_str().to_owned()),
         alternatives: others.map(|other| alternative_report(other, &left)).collect(),
     }
 }
@@ -68,5 +68,5 @@ pub(super) fn advice_report(entry: &AdviceEntry) -> AdviceReport {
 fn alternative_report(other: &Alternative, left: &Left) -> AlternativeReport {
     let Alternative { mode, v_max_mps } = *other;
     let (needed_h, suffices) = (left.hours_at(v_max_mps), left.suffices_at(v_max_mps));
-    AlternativeReport { mode, v_max_mps, needed_h, suffices }
+    AlternativeReport { mode: mode.as_str().to_owned(), v_max_mps, needed_h, suffices }
 }

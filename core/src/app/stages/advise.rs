@@ -8,6 +8,7 @@ use crate::frames::Vec3;
 use crate::sampling::advice::{self, Advice, Steady};
 use crate::sampling::passes::{Phasing, Situation};
 use crate::sampling::swing::{Looks, Swing};
+use crate::stateful;
 use crate::time::{DurNs, MonoNs};
 
 /// What gives the advice, and how long the dive may take from its first packet.
@@ -18,6 +19,8 @@ pub(in crate::app) struct Advisor {
     looks: Looks,
     steady: Steady,
 }
+
+stateful!(Advisor { state: advisor, looks, steady; fixed: dive_time; });
 
 impl Advisor {
     /// Allocates: all that it will ever use.

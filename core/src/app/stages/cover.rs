@@ -3,6 +3,7 @@
 //! Both in one pass over the pings: which sections are judged, and on what evidence, depends on the verdicts before.
 
 use bevy_ecs::prelude::{Res, ResMut, Resource};
+use serde::{Deserialize, Serialize};
 
 use super::advise::Advisor;
 use super::driving::{Driven, Driving};
@@ -24,7 +25,7 @@ use crate::time::{DurNs, MonoNs};
 const LOOK_AROUND: DurNs = DurNs(1_000_000_000);
 
 /// What is remembered of each head's sweep.
-#[derive(Debug, Clone, Copy, Default, Resource)]
+#[derive(Debug, Clone, Copy, Default, Resource, Serialize, Deserialize)]
 pub(in crate::app) struct HeadSweeps {
     last: [Option<LastSample>; MAX_HEADS],
     /// The head has pinged where nobody knew, and hasn't since where somebody does.
@@ -32,7 +33,7 @@ pub(in crate::app) struct HeadSweeps {
 }
 
 /// The last valid sample of a head in its present sweep.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 struct LastSample {
     point: Point3<Tunnel>,
     sigma_m: f64,

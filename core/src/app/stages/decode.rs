@@ -6,6 +6,7 @@ use crate::app::device::Decoder;
 use crate::app::flow::{Event, Events, SourceTallies, SourceTally, Tally};
 use crate::app::merge::Inbox;
 use crate::app::reading::Packet;
+use crate::snapshot::{Restorer, Saver, SnapshotError, Stateful};
 use crate::time::MonoNs;
 
 use super::sound::WaterSound;
@@ -13,6 +14,16 @@ use super::sound::WaterSound;
 /// The decoder of each source.
 #[derive(Resource)]
 pub(in crate::app) struct Decoders(pub(in crate::app) Vec<Box<dyn Decoder>>);
+
+impl Stateful for Decoders {
+    fn save(&self, to: &mut Saver) {
+        to.each(self.0.iter().map(AsRef::as_ref));
+    }
+
+    fn restore(&mut self, from: &mut Restorer<'_>) -> Result<(), SnapshotError> {
+        from.each(self.0.iter_mut().map(AsMut::as_mut))
+    }
+}
 
 pub(super) fn decode(
     inbox: Res<'_, Inbox>,

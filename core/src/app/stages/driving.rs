@@ -1,12 +1,14 @@
 //! How the vehicle is driven and its heads turn, beat by beat: what a section's passage remembers of its pings.
 
 use bevy_ecs::prelude::Resource;
+use serde::{Deserialize, Serialize};
 
 use crate::frames::Vec3;
 use crate::sampling::advice::Advisor;
 use crate::sampling::head::HeadMotion;
 use crate::sampling::passes::{Phasing, Situation};
 use crate::sampling::swing::Looks;
+use crate::stateful;
 use crate::time::{DurNs, MonoNs};
 use crate::tunnel::Profile;
 
@@ -16,7 +18,7 @@ const LONGEST_S: f64 = 50.0;
 const SLOW_MPS: f64 = 0.01;
 
 /// How the vehicle was driven at the last beat.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Driven {
     /// The longest time between two passes, seconds.
     pub(super) gap_s: f64,
@@ -42,6 +44,8 @@ pub(in crate::app) struct Driving {
     turned: Option<MonoNs>,
     looks: Looks,
 }
+
+stateful!(Driving { state: now, stride, turned, looks; });
 
 impl Driving {
     /// Takes in a beat.

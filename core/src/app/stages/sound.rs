@@ -4,6 +4,7 @@ use bevy_ecs::prelude::Resource;
 
 use crate::app::reading::{Decoded, Reading, SourceId};
 use crate::site::fresh_water_sound_speed_mps;
+use crate::stateful;
 use crate::time::MonoNs;
 
 /// Temperatures that water has, degrees Celsius; a sensor that says others is out of order, or out of the water.
@@ -22,6 +23,8 @@ pub(in crate::app) struct WaterSound {
     /// The least and the greatest so far.
     span_mps: [f64; 2],
 }
+
+stateful!(WaterSound { state: now_mps, heard, span_mps; fixed: source, site_mps; });
 
 impl WaterSound {
     /// The site's speed, until `source` tells another.

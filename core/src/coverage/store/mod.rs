@@ -10,10 +10,13 @@ mod packed;
 mod passes;
 mod thinning;
 
+use serde::{Deserialize, Serialize};
+
 use self::open::{CellAt, OpenBricks};
 use self::packed::{Arena, Lattice, MOST_WORDS, Packed, Reader, Writer};
 use crate::math;
 use crate::sampling::head::MAX_HEADS;
+use crate::stateful;
 
 /// Bricks that are open at a time. At a metre each they reach farther than any search, to either side of where it is.
 const OPEN_BRICKS: usize = 64;
@@ -104,7 +107,7 @@ pub struct StoreUse {
 }
 
 /// Some rows of cells.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 struct Brick {
     /// Its first block in the arena, or zero.
     first_block: u32,
@@ -141,6 +144,8 @@ pub struct SampleStore {
     kept: u64,
     thinned: u64,
 }
+
+stateful!(SampleStore { state: open, arena, longest_step_m, kept, thinned; slots: bricks; fixed: layout, rows, columns, column_m, rows_shift; });
 
 impl SampleStore {
     /// An empty store.

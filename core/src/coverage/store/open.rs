@@ -1,12 +1,15 @@
 //! Samples near the vehicle, as they came, in lists by cell and by head.
 
+use serde::{Deserialize, Serialize};
+
 use crate::sampling::head::MAX_HEADS;
+use crate::stateful;
 
 /// A place in one of the lists: one more than an index, or zero for none.
 type Link = u32;
 
 /// A sample in the pool.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub(super) struct Node {
     /// Chainage, m.
     pub x_m: f64,
@@ -30,14 +33,14 @@ pub(super) struct CellAt {
 }
 
 /// A cell's samples.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 struct Cell {
     latest: Link,
     count: u32,
 }
 
 /// A head's samples of a brick, in the order in which they came.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 struct Chain {
     first: Link,
     last: Link,
@@ -60,6 +63,8 @@ pub(super) struct OpenBricks {
     free: Link,
     used: usize,
 }
+
+stateful!(OpenBricks { state: free, used; lists: nodes; slots: cells, rows_seen, chains, bricks; fixed: rows, columns, most_nodes; });
 
 impl OpenBricks {
     /// Allocates: startup only.

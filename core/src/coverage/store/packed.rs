@@ -7,6 +7,7 @@
 
 use crate::math;
 use crate::sampling::head::MAX_HEADS;
+use crate::snapshot::{Restorer, Saver, SnapshotError, Stateful};
 
 /// Quanta in a metre.
 const QUANTA_PER_M: f64 = 131_072.0;
@@ -91,6 +92,32 @@ pub(super) struct Arena {
     /// One more than the index of a block that was given back, or zero.
     free: u32,
     used: usize,
+}
+
+impl Stateful for Arena {
+    fn save(&self, to: &mut Saver) {
+        to.value(&(self.free, self.used));
+        let words = self.blocks.as_flattened();
+        to.raw(&words.iter().flat_map(|word| word.to_le_bytes()).collect::<Vec<u8>>());
+    }
+
+    fn restore(&mut self, from: &mut Restorer<'_>) -> Result<(), SnapshotError> {
+        (self.free, self.used) = from.value()?;
+        let bytes = from.raw()?;
+        let (blocks, rest) = bytes.as_chunks::<{ 4 * (ROOM + 1) }>();
+        if !rest.is_empty() || blocks.len() > self.most {
+            return Err(from.unfit(format!("{} bytes of blocks, and room for {}", bytes.len(), self.most)));
+        }
+        self.blocks.clear();
+        self.blocks.extend(blocks.iter().map(|block| {
+            let mut words = [0; ROOM + 1];
+            for (word, bytes) in words.iter_mut().zip(block.as_chunks::<4>().0) {
+                *word = u32::from_le_bytes(*bytes);
+            }
+            words
+        }));
+        Ok(())
+    }
 }
 
 impl Arena {

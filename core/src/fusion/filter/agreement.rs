@@ -1,5 +1,7 @@
 //! Whether sensors agree with the estimate at all: an estimate that is surely wrong gates everything that would mend it.
 
+use serde::{Deserialize, Serialize};
+
 use super::measure::Row;
 use super::state::{ATTITUDE, ERRORS, Errors, HEADING, POSITION, VELOCITY};
 use crate::fusion::SensorKind;
@@ -17,7 +19,7 @@ const LOST_TILT_RAD: f64 = 0.1;
 const LOST_RAD: f64 = 1.0;
 
 /// Whether ranges agree with the wall, the cable with the way, and attitudes with the tilt.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Agreement {
     wall: Memory,
     way: Memory,
@@ -25,7 +27,7 @@ pub struct Agreement {
 }
 
 /// Whether measurements of a kind have agreed of late.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 struct Memory {
     seen: u32,
     agreeing: f64,

@@ -1,5 +1,7 @@
 //! The first estimate: what the sensors say within the first second, taken together.
 
+use serde::{Deserialize, Serialize};
+
 use super::factors::Factors;
 use super::running::{Context, in_tunnel, with_quantum};
 use super::settings::Settings;
@@ -13,6 +15,7 @@ use crate::frames::{Body, Point3, Rot, Tunnel, Vec3};
 use crate::fusion::section::{Echo, settle};
 use crate::fusion::{NoFix, SensorInfo, SensorKind};
 use crate::math;
+use crate::stateful;
 use crate::time::{DurNs, MonoNs};
 
 /// How long sensors are listened to.
@@ -42,8 +45,10 @@ pub struct Listening {
     echoes: [Heard; MAX_SOURCES],
 }
 
+stateful!(Listening { state: since, before, hears_wall, attitude, force, told, height_m; slots: echoes; });
+
 /// What a cable said.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 struct Told {
     at: MonoNs,
     chainage_m: f64,
@@ -52,7 +57,7 @@ struct Told {
     sd_m: f64,
 }
 
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 struct Heard {
     sensor: Option<SensorInfo>,
     ranges_m: [f64; ECHOES],

@@ -7,6 +7,8 @@
 //! Source: Bierman, Factorization Methods for Discrete Sequential Estimation, 1977: V.3 (measurement), III.4
 //! (addition of a dyad, after Agee and Turner).
 
+use crate::snapshot::{Restorer, Saver, SnapshotError, Stateful};
+
 /// Factors of the covariance of `N` errors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Factors<const N: usize> {
@@ -30,6 +32,18 @@ pub struct Noise {
     variance: f64,
     /// Which errors, and their weights; the first is the later one.
     weights: [(usize, f64); 2],
+}
+
+impl<const N: usize> Stateful for Factors<N> {
+    fn save(&self, to: &mut Saver) {
+        to.list(self.u.as_flattened());
+        to.list(&self.d);
+    }
+
+    fn restore(&mut self, from: &mut Restorer<'_>) -> Result<(), SnapshotError> {
+        from.slots(self.u.as_flattened_mut())?;
+        from.slots(&mut self.d)
+    }
 }
 
 impl<const N: usize> Factors<N> {

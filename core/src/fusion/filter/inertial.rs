@@ -3,6 +3,7 @@
 //! Derivation: `docs/fusion.md`, "Propagation".
 
 use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
 
 use super::factors::{Factors, Noise};
 use super::settings::{Settings, Wander};
@@ -14,7 +15,7 @@ use crate::frames::{Body, Vec3};
 use crate::math;
 
 /// What an inertial unit felt in the mean over some time, turned into the body's frame.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Felt {
     /// Turn rate, rad/s; `None` where no gyro speaks: the attitude then stays, and its error grows fast.
     pub rate_radps: Option<Vec3<Body>>,

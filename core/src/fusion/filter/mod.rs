@@ -34,6 +34,7 @@ use crate::app::MAX_SOURCES;
 use crate::app::reading::Reading;
 use crate::frames::{Pose, Vec3};
 use crate::site::Site;
+use crate::stateful;
 use crate::time::{DurNs, MonoNs};
 use crate::tunnel::Profile;
 
@@ -89,6 +90,8 @@ pub struct FilterNavigation {
     restarts: u64,
     journal: Option<Journal>,
 }
+
+stateful!(FilterNavigation { state: context, window, unit, listening, stillness, running, is_running, epoch_zero, received, standing, restarts; lists: ahead; slots: sources; fixed: journal; });
 
 impl FilterNavigation {
     /// Nothing is known yet.

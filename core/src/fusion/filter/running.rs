@@ -19,6 +19,7 @@ use crate::fusion::smooth::step::{Move, Step};
 use crate::fusion::{NoFix, SensorKind};
 use crate::math;
 use crate::site::Site;
+use crate::stateful;
 use crate::time::{DurNs, MonoNs};
 use crate::tunnel::Profile;
 
@@ -58,6 +59,8 @@ pub struct Context {
     pub unit_at: Vec3<Body>,
 }
 
+stateful!(Context { state: unit_at; fixed: profile, site, settings; });
+
 /// The estimate at a moment, and how far it may be off.
 #[derive(Debug, Clone)]
 pub struct Running {
@@ -78,6 +81,8 @@ pub struct Running {
     pub steps: Vec<Step>,
     keeps_steps: bool,
 }
+
+stateful!(Running { state: at, state, factors, trail, way_sought, agreement; lists: knots; fixed: steps, keeps_steps; });
 
 impl Default for Running {
     /// Room for what an estimate needs, before there is one.

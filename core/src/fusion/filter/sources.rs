@@ -1,5 +1,7 @@
 //! What the filter keeps of each source: how it sits, what it said last, and how well it agrees.
 
+use serde::{Deserialize, Serialize};
+
 use crate::app::reading::SonarReturn;
 use crate::fusion::SensorInfo;
 use crate::math;
@@ -11,7 +13,7 @@ const SILENT: DurNs = DurNs(3_000_000_000);
 const RATE_SHARE: f64 = 0.05;
 
 /// How a source's innovations are spread: a filter that is right has a mean NIS of 1.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Consistency {
     /// Measurements that were used.
     pub used: u64,
@@ -48,7 +50,7 @@ impl Consistency {
 }
 
 /// See the module's description.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Source {
     /// How it sits, and what it is.
     pub sensor: SensorInfo,
@@ -61,7 +63,7 @@ pub struct Source {
 }
 
 /// How a head turns, as far as navigation cares.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Turning {
     last: Option<(MonoNs, f64)>,
     used_rad: Option<f64>,

@@ -1,6 +1,7 @@
 //! What the filter estimates, and the errors by which it differs from the truth.
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use serde::{Deserialize, Serialize};
 
 use crate::frames::{Body, Point3, Rot, Tunnel, Vec3};
 use crate::math;
@@ -35,7 +36,7 @@ pub const STATE_NUMBERS: usize = ERRORS + 1;
 pub type Errors = [f64; ERRORS];
 
 /// The estimate.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct State {
     /// Where the inertial unit is.
     pub position: Point3<Tunnel>,

@@ -1,5 +1,7 @@
 //! Whether the vehicle rests: on deck, or on the ground. It is then known not to move, and the gyros' bias shows.
 
+use serde::{Deserialize, Serialize};
+
 use crate::app::reading::Reading;
 use crate::frames::{Sensor, Vec3};
 use crate::fusion::SensorKind;
@@ -13,7 +15,7 @@ const SAME_RATE: f64 = 1e-3;
 const SAME_FORCE: f64 = 0.02;
 
 /// See the module's description.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Stillness {
     rate: Means,
     force: Means,
@@ -22,7 +24,7 @@ pub struct Stillness {
 }
 
 /// Means over one time after another, against the first of those that are alike.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 struct Means {
     since: Option<MonoNs>,
     sum: [f64; 3],

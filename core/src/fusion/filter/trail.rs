@@ -5,10 +5,13 @@
 //! keeps the covariance of the errors at its time, and how they have become those of the next clone: through the
 //! filter's own propagation and corrections. Derivation: `docs/fusion.md`, "Relative uncertainty".
 
+use serde::{Deserialize, Serialize};
+
 use super::factors::{Factors, Gain};
 use super::inertial::Transition;
 use super::state::{ATTITUDE, ERRORS, Errors, POSITION};
 use crate::fusion::relative::Relative;
+use crate::stateful;
 use crate::time::{DurNs, MonoNs};
 
 /// Time between two clones.
@@ -20,7 +23,7 @@ pub const MOVING: [usize; 3] = [POSITION, ATTITUDE + 1, ATTITUDE + 2];
 
 type Square = [Errors; ERRORS];
 
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 struct Moment {
     at: MonoNs,
     /// Rows of the covariance then.
@@ -40,6 +43,8 @@ pub struct Trail {
     /// By columns: how errors at the newest clone have become those now.
     since: Square,
 }
+
+stateful!(Trail { state: count, since; lists: clones; });
 
 impl Default for Trail {
     fn default() -> Self {

@@ -1,8 +1,11 @@
 //! Readings that wait until all of their time have come: each is fused at its own time, in whatever order they came.
 
+use serde::{Deserialize, Serialize};
+
 use crate::app::reading::Reading;
 use crate::frames::{Body, Vec3};
 use crate::fusion::filter::inertial::Felt;
+use crate::stateful;
 use crate::time::{DurNs, MonoNs};
 
 /// Room for readings that wait; four heads, four sounders and the rest have a tenth of it in a window.
@@ -15,7 +18,7 @@ const SPEAKS_FOR: DurNs = DurNs(100_000_000);
 const SAME: DurNs = DurNs(500_000);
 
 /// A reading that waits.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub struct Waiting {
     /// When it is valid.
     pub at: MonoNs,
@@ -31,6 +34,8 @@ pub struct Window {
     waiting: Vec<Waiting>,
     felt: Vec<(MonoNs, Felt)>,
 }
+
+stateful!(Window { lists: waiting, felt; });
 
 impl Default for Window {
     fn default() -> Self {

@@ -13,6 +13,7 @@ use crate::fusion::filter::state::{rotation, rotation_vector};
 use crate::fusion::filter::{CARRIES, CLOCK_JUMP, EPOCH};
 use crate::fusion::relative::Relative;
 use crate::fusion::{Fix, Navigation, NoFix, SensorInfo, Times};
+use crate::stateful;
 use crate::time::MonoNs;
 
 /// The inertial unit at a moment.
@@ -160,6 +161,8 @@ pub struct TrackNavigation {
     clock: u32,
     received: MonoNs,
 }
+
+stateful!(TrackNavigation { state: clock, received; slots: consistency; fixed: track; });
 
 impl TrackNavigation {
     /// Along a track that a filter made, which had found its sources to agree so well.

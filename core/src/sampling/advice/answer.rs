@@ -1,9 +1,14 @@
 //! What is advised.
 
+use serde::{Deserialize, Serialize};
+
 use super::MAX_MODES;
 
+/// Bytes of the longest mode name.
+const MODE_NAME_BYTES: usize = 15;
+
 /// Why the advice is what it is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Reason {
     /// The distance between passes decides: slower helps.
     HelixPitch,
@@ -38,11 +43,39 @@ impl Reason {
     }
 }
 
+/// The name of a mode, as advice that is saved and restored has it.
+#[derive(Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ModeName {
+    len: u8,
+    bytes: [u8; MODE_NAME_BYTES],
+}
+
+impl ModeName {
+    /// Of a name; one of more than [`MODE_NAME_BYTES`] bytes is cut.
+    pub fn new(name: &str) -> Self {
+        let mut bytes = [0; MODE_NAME_BYTES];
+        let len = name.floor_char_boundary(MODE_NAME_BYTES);
+        bytes.iter_mut().zip(name.bytes().take(len)).for_each(|(to, from)| *to = from);
+        Self { len: u8::try_from(len).unwrap_or(0), bytes }
+    }
+
+    /// The name.
+    pub fn as_str(&self) -> &str {
+        self.bytes.get(..self.len.into()).and_then(|name| core::str::from_utf8(name).ok()).unwrap_or_default()
+    }
+}
+
+impl core::fmt::Debug for ModeName {
+    fn fmt(&self, out: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(out, "{:?}", self.as_str())
+    }
+}
+
 /// What would help where slower doesn't.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Remedy {
     /// Another mode.
-    Mode(&'static str),
+    Mode(ModeName),
     /// The middle of the tunnel, level and straight.
     Centre,
     /// A steady heading.
@@ -51,9 +84,9 @@ pub enum Remedy {
 
 impl Remedy {
     /// The word used in reports: `centre`, `steady`, or the mode's name.
-    pub fn as_str(self) -> &'static str {
+    pub fn as_str(&self) -> &str {
         match self {
-            Self::Mode(name) => name,
+            Self::Mode(name) => name.as_str(),
             Self::Centre => "centre",
             Self::Steady => "steady",
         }
@@ -61,16 +94,16 @@ impl Remedy {
 }
 
 /// What all heads could do in one of their modes.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Alternative {
     /// The mode.
-    pub mode: &'static str,
+    pub mode: ModeName,
     /// The largest speed at which it meets the target with the heads started in phase for it, m/s; zero where none is.
     pub v_max_mps: f64,
 }
 
 /// What is left of a dive.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Left {
     /// Length of tunnel in the direction of travel, m.
     pub length_m: f64,
@@ -92,7 +125,7 @@ impl Left {
 }
 
 /// The advice.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Advice {
     /// The largest speed at which the target is met, m/s; zero where none is.
     pub v_max_mps: f64,

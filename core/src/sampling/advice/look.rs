@@ -6,6 +6,7 @@ use crate::sampling::head::{HeadMode, HeadSpec};
 use crate::sampling::occlusion::AngleRange;
 use crate::sampling::ring::{Ring, Standing};
 use crate::sampling::strips::{Arc, View};
+use crate::stateful;
 use crate::tunnel::Profile;
 
 use super::RING;
@@ -26,6 +27,8 @@ pub(super) struct AdvisedHead {
     pub(super) ring: Ring,
     pub(super) cast_at: Option<Pose>,
 }
+
+stateful!(AdvisedHead { state: ring, cast_at; fixed: spec, modes, hidden, sector; });
 
 impl AdvisedHead {
     pub(super) fn is_near(&self, pose: &Pose) -> bool {

@@ -2,6 +2,7 @@
 
 use super::SPEED_MARGIN;
 use super::answer::{Advice, Reason};
+use crate::stateful;
 use crate::time::{DurNs, MonoNs};
 
 /// What restricts less is shown once nothing has restricted more for so long.
@@ -24,6 +25,8 @@ pub struct Steady {
     begun: bool,
     will_exceed: bool,
 }
+
+stateful!(Steady { state: held, next, begun, will_exceed; fixed: target_m; });
 
 impl Steady {
     /// For a target T, m.

@@ -174,7 +174,7 @@ fn alternatives_give_speed_hours_and_whether_they_suffice() {
     assert_eq!(case.advice().left.suffices_at(1.0), None);
     case.left_s = Some(3000.0);
     let advice = case.advice();
-    let names: Vec<_> = advice.alternatives.iter().flatten().map(|other| other.mode).collect();
+    let names: Vec<_> = advice.alternatives.iter().flatten().map(|other| other.mode.as_str()).collect();
     assert_eq!(names, ["slow", "fast", "fastest"]);
     let [slow, fast, _] = [0, 1, 2].map(|k| advice.alternatives[k].unwrap());
     // The present mode, in phase: what is advised anyway.
@@ -191,7 +191,7 @@ fn where_slower_does_not_help_it_says_what_would() {
     let mut case = Case::new(&[0.0], &[0.0], 0.2, 0.1);
     let advice = case.advice();
     assert_eq!((advice.v_max_mps, advice.reason), (0.0, Reason::AngularStep));
-    assert_eq!(advice.remedy, Some(Remedy::Mode("slow")));
+    assert_eq!(advice.remedy, Some(Remedy::Mode(ModeName::new("slow"))));
     assert_eq!(advice.left.hours_at(advice.v_max_mps), None);
     assert!(advice.alternatives[0].unwrap().v_max_mps > 0.0);
 

@@ -4,6 +4,7 @@ use headrace_core::app::device::Decoder;
 use headrace_core::app::reading::{Decoded, Packet, Reading};
 use headrace_core::codec::{Codec as _, CodecCounts, Framed, Framing, Verdict};
 use headrace_core::frames::{Rot, Vec3};
+use headrace_core::stateful;
 use headrace_core::time::{ClockReport, DeviceClock, DurNs, MonoNs};
 
 use super::layout::DATA_BYTES;
@@ -37,6 +38,8 @@ pub struct DbcDecoder {
     passed_over: u64,
 }
 
+stateful!(DbcDecoder { state: codec, state, passed_over; fixed: listened; });
+
 #[derive(Debug, Clone)]
 struct State {
     axes: Axes,
@@ -49,9 +52,12 @@ struct State {
     attitude_well: Well,
     rate_well: Well,
     force_well: Well,
-    stamp: Option<(Stamp, DeviceClock)>,
+    stamp: Option<Stamp>,
+    clock: Option<DeviceClock>,
     withheld: u64,
 }
+
+stateful!(State { state: all_well, attitude_well, rate_well, force_well, clock, withheld; each: rate, force, quaternion, euler; fixed: axes, latency, stamp; });
 
 /// A vector whose parts come in one frame or in several.
 #[derive(Debug, Clone, Copy)]
@@ -59,6 +65,9 @@ struct Vector<const N: usize> {
     parts: [Part; N],
     came: [Option<(MonoNs, f64)>; N],
 }
+
+stateful!(Vector<3> { slots: came; fixed: parts; });
+stateful!(Vector<4> { slots: came; fixed: parts; });
 
 /// Parts of several samples came together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -70,6 +79,8 @@ struct Well {
     condition: Option<Condition>,
     now: bool,
 }
+
+stateful!(Well { state: now; fixed: condition; });
 
 impl Listened {
     /// The frames of a mapping's signals.
@@ -132,10 +143,8 @@ impl DbcDecoder {
             attitude_well: Well::new(conditions.attitude),
             rate_well: Well::new(conditions.rate),
             force_well: Well::new(conditions.force),
-            stamp: mapping.sample_time.map(|stamp| {
-                let clock = DeviceClock::new(stamp.place.layout.bits(), stamp.tick);
-                (stamp, clock)
-            }),
+            stamp: mapping.sample_time,
+            clock: mapping.sample_time.map(|stamp| DeviceClock::new(stamp.place.layout.bits(), stamp.tick)),
             withheld: 0,
         };
         let listened = Listened::new(mapping);
@@ -169,7 +178,7 @@ impl Decoder for DbcDecoder {
     }
 
     fn clock(&self) -> Option<ClockReport> {
-        self.state.stamp.as_ref().map(|(_, clock)| clock.report())
+        self.state.clock.as_ref().map(DeviceClock::report)
     }
 }
 
@@ -184,7 +193,7 @@ impl State {
         for well in [&mut *all_well, attitude_well, rate_well, force_well] {
             well.note(id, data);
         }
-        if let Some((stamp, clock)) = &mut self.stamp
+        if let (Some(stamp), Some(clock)) = (self.stamp, &mut self.clock)
             && let Some(ticks) = stamp.place.raw(id, data)
         {
             clock.take(ticks, received);
