@@ -5,8 +5,10 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand};
 use headrace_core::config::Connect;
 use headrace_core::sampling::layout::HeadLayout;
+use headrace_core::time::DurNs;
 
 use crate::import::Kind;
+use crate::play;
 
 /// On-board coverage monitor for sonar inspection of flooded hydroelectric tunnels.
 #[derive(Debug, Parser)]
@@ -180,6 +182,13 @@ pub(crate) struct Replay {
     /// Length of a tick in milliseconds; no result depends on it.
     #[arg(long, value_name = "MS", default_value = "20", value_parser = clap::value_parser!(u32).range(1..=60_000))]
     pub(crate) tick_ms: u32,
+    /// Begin at this time of the dive (90s, 1h20min, 1:23:45); what came before counts all the same. States of the dive are
+    /// kept in LOG.states, so that it takes a moment the next time.
+    #[arg(long, value_name = "TIME", value_parser = play::time, conflicts_with = "smooth")]
+    pub(crate) from: Option<DurNs>,
+    /// Take lines from standard input while it plays: pause, go, step [TICKS], seek TIME, speed N|max, end.
+    #[arg(short, long, conflicts_with = "smooth")]
+    pub(crate) interactive: bool,
     /// Judge by the smoothed track: what was learnt later corrects where the vehicle was before. Says what that changed.
     #[arg(long, conflicts_with = "speed")]
     pub(crate) smooth: bool,
@@ -424,7 +433,7 @@ const SPEED_HELP: &str = "Seconds of the dive for a second of yours, or max";
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Speed(pub(crate) Option<f64>);
 
-fn speed(text: &str) -> Result<Speed, String> {
+pub(crate) fn speed(text: &str) -> Result<Speed, String> {
     if text == "max" {
         return Ok(Speed(None));
     }

@@ -20,6 +20,7 @@ use crate::failure::{self, Failure};
 use crate::files;
 use crate::live;
 use crate::output::{deliver, deliver_json, put, say};
+use crate::play::{self, Playing};
 use crate::smooth;
 use crate::summary::summary;
 use crate::watch::Watch;
@@ -74,7 +75,14 @@ pub(crate) fn replay(args: &Replay) -> Result<u8, Failure> {
     } else {
         let dive = assemble(&vehicle, &text, None)?.asking(what_if);
         player.connect(dive.armed.sources());
-        dive.run(&mut player, pace, &mut watch(&args.output))?
+        let mut watch = watch(&args.output);
+        if args.from.is_some() || args.interactive {
+            let states = play::states(&args.log, &vehicle, &text)?;
+            let playing = Playing { from: args.from, interactive: args.interactive, states, pace };
+            playing.play(dive, &mut player, &mut watch)?
+        } else {
+            dive.run(&mut player, pace, &mut watch)?
+        }
     };
     note_losses(&mut report, &args.log, &player)?;
     let code = finish(&report, &args.output)?;

@@ -172,6 +172,19 @@ impl Dive {
         Ok(report)
     }
 
+    /// Lets `direct` run the loop, and gives the report.
+    pub(crate) fn play(
+        mut self,
+        watch: &mut Watch,
+        direct: impl FnOnce(&mut Loop, &NoticeReceiver, &mut Watch) -> Result<(), Failure>,
+    ) -> Result<Report, Failure> {
+        let notices = self.notices.clone();
+        let played = direct(&mut self.armed, &notices, watch);
+        let report = self.end(watch, &mut |_| ())?;
+        played?;
+        Ok(report)
+    }
+
     /// Runs the loop on the ports that a crew serves, until `ended` says so, and gives the report. `beside` sees the crew
     /// after every tick.
     pub(crate) fn run_live(

@@ -9,8 +9,10 @@ use headrace_experiments::ExperimentError;
 use headrace_replay::drive::DriveError;
 use headrace_replay::import::ImportError;
 use headrace_replay::log::LogError;
+use headrace_replay::playback::PlaybackError;
 use headrace_replay::simulate::SceneError;
 use headrace_replay::smooth::SmoothError;
+use headrace_replay::states::StatesError;
 
 use crate::pictures::PictureError;
 
@@ -47,6 +49,10 @@ pub(crate) enum Failure {
     Smooth(#[from] SmoothError),
     #[error(transparent)]
     Drive(#[from] DriveError),
+    #[error(transparent)]
+    Playback(#[from] PlaybackError),
+    #[error(transparent)]
+    States(#[from] StatesError),
     #[error("making JSON of the report: {0}")]
     Json(#[from] serde_json::Error),
     #[error("planning: {0}")]

@@ -16,6 +16,7 @@ mod output;
 mod paper;
 mod pictures;
 mod plan;
+mod play;
 mod progress;
 mod recover;
 mod simulate;

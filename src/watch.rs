@@ -5,7 +5,7 @@ use std::io::IsTerminal;
 
 use headrace_core::app::Mission;
 use headrace_core::app::alerts::{Alert, AlertKind, Alerts};
-use headrace_core::app::flow::{AdviceEntry, Coverage, Notice};
+use headrace_core::app::flow::{AdviceEntry, Coverage, Notice, Tally};
 use headrace_core::app::run::Loop;
 use headrace_core::coverage::{Action, Cause, Evidence, Run, RunChange, RunId, Section, Sections, Verdict};
 use headrace_core::sampling::advice::{Reason, Remedy};
@@ -78,6 +78,25 @@ impl Watch {
         if !self.quiet {
             let amber = (status.phase != Phase::Running).then_some("\x1b[33m");
             self.coloured(&format!("SENSOR   {id:<12} {status}"), amber);
+        }
+    }
+
+    /// A replay stands still so long after its beginning, or has gone there.
+    pub(crate) fn stands(&mut self, dive: &Loop, time: DurNs, ended: bool) {
+        (self.shown, self.run) = (None, None);
+        if !self.quiet {
+            let seconds = time.as_secs_f64();
+            let (h, min, s) = (seconds / 3600.0, seconds / 60.0 % 60.0, seconds % 60.0);
+            let end = if ended { ", the end" } else { "" };
+            let tally = dive.world().resource::<Tally>();
+            self.line(&format!(
+                "AT       {}:{:02}:{s:06.3}{end}: tick {}, {} samples, digest {:016x}",
+                h.floor(),
+                min.floor(),
+                dive.ticks(),
+                tally.samples,
+                dive.digest()
+            ));
         }
     }
 

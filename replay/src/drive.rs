@@ -73,29 +73,62 @@ pub fn drive(
     pace: Pace,
     after_tick: &mut dyn FnMut(&Loop),
 ) -> Result<(), DriveError> {
-    let mut ports = take_ports(dive)?;
-    let Some(first) = feed.coming()? else { return Ok(()) };
-    let clock = Clock::start(first.at, pace.speed);
-    let mut until = first.at + pace.tick;
-    let mut result = Ok(());
-    loop {
-        match send_until(dive, feed, &mut ports, until, after_tick) {
-            Ok(Some(_)) => {}
-            Ok(None) => {
-                work_off(dive, until, after_tick);
-                return result;
-            }
-            Err(error) => {
-                result = Err(error);
-                work_off(dive, until, after_tick);
-                return result;
-            }
+    let mut driver = Driver::new(dive, pace.tick)?;
+    let mut clock = None;
+    while let Some(until) = driver.due(feed)? {
+        let clock = clock.get_or_insert_with(|| Clock::start(until - pace.tick, pace.speed));
+        if let Some(left) = clock.left(until) {
+            std::thread::sleep(left);
         }
-        clock.wait(until);
+        driver.tick(dive, feed, after_tick)?;
+    }
+    Ok(())
+}
+
+/// Fills the rings and runs the loop, a tick at a time.
+pub struct Driver {
+    ports: Vec<Port>,
+    tick: DurNs,
+    /// The end of the tick before; `None` at the beginning.
+    until: Option<MonoNs>,
+}
+
+impl Driver {
+    /// Takes the loop's ports, for ticks of a length.
+    ///
+    /// Errors: a port is in use elsewhere.
+    pub fn new(dive: &mut Loop, tick: DurNs) -> Result<Self, DriveError> {
+        Ok(Self { ports: take_ports(dive)?, tick, until: None })
+    }
+
+    /// When the next tick ends; `None` at the end of the feed. After a long silence it begins with what ends that.
+    ///
+    /// Errors: the feed can't be read on.
+    pub fn due(&self, feed: &mut dyn Feed) -> Result<Option<MonoNs>, DriveError> {
+        let Some(next) = feed.coming()? else { return Ok(None) };
+        let begun = self.until.map(|until| until + self.tick);
+        Ok(Some(begun.map_or(next.at + self.tick, |until| until.max(next.at + DurNs(1)))))
+    }
+
+    /// Feeds what comes until the next tick ends, and runs it.
+    ///
+    /// Errors: see [`DriveError`]. What had been fed until then has been worked off.
+    pub fn tick(
+        &mut self,
+        dive: &mut Loop,
+        feed: &mut dyn Feed,
+        after_tick: &mut dyn FnMut(&Loop),
+    ) -> Result<(), DriveError> {
+        let Some(until) = self.due(feed)? else { return Ok(()) };
+        self.until = Some(until);
+        let sent = send_until(dive, feed, &mut self.ports, until, after_tick);
         work_off(dive, until, after_tick);
-        // After a long silence the next tick begins with what ends it.
-        let next = feed.coming()?.map_or(until, |coming| coming.at);
-        until = (until + pace.tick).max(next + DurNs(1));
+        sent
+    }
+
+    /// The feed goes on from elsewhere, and the loop with it: after a tick that ended at `until`.
+    pub fn jump_to(&mut self, until: MonoNs) {
+        self.until = Some(until);
     }
 }
 
@@ -107,18 +140,15 @@ fn take_ports(dive: &mut Loop) -> Result<Vec<Port>, DriveError> {
         .collect()
 }
 
-/// Sends what comes before `until`; gives what comes next, or `None` at the end.
+/// Sends what comes before `until`.
 fn send_until(
     dive: &mut Loop,
     feed: &mut dyn Feed,
     ports: &mut [Port],
     until: MonoNs,
     after_tick: &mut dyn FnMut(&Loop),
-) -> Result<Option<Coming>, DriveError> {
-    while let Some(coming) = feed.coming()? {
-        if coming.at >= until {
-            return Ok(Some(coming));
-        }
+) -> Result<(), DriveError> {
+    while let Some(coming) = feed.coming()?.filter(|coming| coming.at < until) {
         let Some(port) = ports.get_mut(coming.source.index()) else { continue };
         if !port.has_room(coming.len) {
             // Results don't depend on where ticks end; a full ring ends one.
@@ -128,7 +158,7 @@ fn send_until(
             tracing::error!(%error, "a packet of the feed could not be handed over");
         }
     }
-    Ok(None)
+    Ok(())
 }
 
 /// Ticks until nothing waits. An outlet that is behind holds packets back; it is given time.
@@ -146,22 +176,22 @@ fn work_off(dive: &mut Loop, now: MonoNs, after_tick: &mut dyn FnMut(&Loop)) {
 }
 
 /// Relates the packets' time to ours.
-struct Clock {
+pub(crate) struct Clock {
     origin: MonoNs,
     paced: Option<(Instant, f64)>,
 }
 
 impl Clock {
+    /// That the packets' time is `origin` now, and goes so many seconds for a second of ours; `None` goes without waiting.
     #[expect(clippy::disallowed_methods, reason = "pacing is for people who watch; no result depends on it")]
-    fn start(origin: MonoNs, speed: Option<f64>) -> Self {
+    pub(crate) fn start(origin: MonoNs, speed: Option<f64>) -> Self {
         Self { origin, paced: speed.map(|speed| (Instant::now(), speed)) }
     }
 
-    fn wait(&self, until: MonoNs) {
-        let Some((started, speed)) = self.paced else { return };
-        let wanted = Duration::try_from_secs_f64(until.since(self.origin).as_secs_f64() / speed);
-        if let Some(left) = wanted.ok().and_then(|wanted| wanted.checked_sub(started.elapsed())) {
-            std::thread::sleep(left);
-        }
+    /// How long it is, of our time, until that moment of the packets'; `None` when it is over.
+    pub(crate) fn left(&self, until: MonoNs) -> Option<Duration> {
+        let (started, speed) = self.paced?;
+        let wanted = Duration::try_from_secs_f64(until.since(self.origin).as_secs_f64() / speed).ok()?;
+        wanted.checked_sub(started.elapsed()).filter(|left| !left.is_zero())
     }
 }

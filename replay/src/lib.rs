@@ -5,8 +5,10 @@ pub mod import;
 pub mod log;
 #[cfg(feature = "mesh")]
 pub mod mesh;
+pub mod playback;
 pub mod player;
 pub mod record;
 pub mod simulate;
 pub mod smooth;
+pub mod states;
 pub mod verify;

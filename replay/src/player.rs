@@ -7,9 +7,10 @@ use headrace_core::app::SourceInfo;
 use headrace_core::app::reading::SourceId;
 use headrace_core::app::ring::{MAX_PACKET_BYTES, NO_ORDER, Port, RingError};
 use headrace_core::time::MonoNs;
+use serde::{Deserialize, Serialize};
 
 use crate::drive::{Coming, Feed};
-use crate::log::{LogError, LogInfo, LogReader, Loss, MessageKind};
+use crate::log::{LogError, LogInfo, LogPlace, LogReader, Loss, MessageKind};
 
 /// Plays the sources' messages of a log.
 pub struct Player {
@@ -22,6 +23,18 @@ pub struct Player {
     order: u64,
     played: u64,
     /// Messages that no sensor of the vehicle file takes, by the source's name.
+    unmatched: BTreeMap<String, u64>,
+    too_long: u64,
+}
+
+/// Where a player stands in its log.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct PlayerPlace {
+    log: LogPlace,
+    /// The message that was looked at and not sent yet: receive time, source, bytes.
+    next: Option<(MonoNs, u16, Vec<u8>)>,
+    order: u64,
+    played: u64,
     unmatched: BTreeMap<String, u64>,
     too_long: u64,
 }
@@ -58,6 +71,32 @@ impl Player {
             u16::try_from(index).ok().map(SourceId)
         };
         self.sources = self.ids.iter().map(find).collect();
+    }
+
+    /// Where it stands, between two ticks.
+    pub fn place(&self) -> PlayerPlace {
+        PlayerPlace {
+            log: self.reader.place(),
+            next: self.next.map(|next| (next.at, next.source.0, self.bytes.clone())),
+            order: self.order,
+            played: self.played,
+            unmatched: self.unmatched.clone(),
+            too_long: self.too_long,
+        }
+    }
+
+    /// Goes on from a place where it, or another player of the same log and vehicle, has stood.
+    ///
+    /// Errors: the log can't be read there.
+    pub fn go_to(&mut self, place: &PlayerPlace) -> Result<(), LogError> {
+        self.reader.go_to(&place.log)?;
+        self.next = place.next.as_ref().map(|(at, source, bytes)| {
+            self.bytes.clone_from(bytes);
+            Coming { at: *at, source: SourceId(*source), len: bytes.len() }
+        });
+        (self.order, self.played, self.too_long) = (place.order, place.played, place.too_long);
+        self.unmatched.clone_from(&place.unmatched);
+        Ok(())
     }
 
     /// Messages handed over so far.

@@ -3,12 +3,13 @@
 use core::fmt;
 
 use headrace_core::time::MonoNs;
+use serde::{Deserialize, Serialize};
 
 /// The most losses that are listed; what comes after makes the last reach further.
 const MAX_LOSSES: usize = 1000;
 
 /// What a piece of a log has in the way of damage.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum LossKind {
     /// The file ends before its closing records: the recorder was cut off, or the copy.
@@ -49,7 +50,7 @@ pub enum LossKind {
 }
 
 /// One piece of a log that is damaged.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Loss {
     /// What is the matter.
     pub kind: LossKind,
@@ -108,6 +109,10 @@ impl fmt::Display for Loss {
 pub(super) struct Losses(Vec<Loss>);
 
 impl Losses {
+    pub(super) fn of(list: Vec<Loss>) -> Self {
+        Self(list)
+    }
+
     pub(super) fn list(&self) -> &[Loss] {
         &self.0
     }

@@ -83,11 +83,12 @@ impl Merge {
         batch
     }
 
-    /// Adds the messages of the piece with number `span`.
-    pub(super) fn add(&mut self, span: usize, mut batch: Batch) {
+    /// Adds the messages of the piece with number `span`, from the one at `next` on.
+    pub(super) fn add(&mut self, span: usize, mut batch: Batch, next: usize) {
         if self.by_time {
             batch.entries.sort_by_key(|entry| (entry.head.log_time, entry.rank, entry.head.sequence));
         }
+        batch.next = next;
         let slot = self.spare.pop().unwrap_or(self.batches.len());
         let key = key(self.by_time, span, &batch);
         self.memory += batch.memory();
@@ -99,6 +100,18 @@ impl Merge {
         match key {
             Some(key) => self.heads.push(Reverse((key, slot))),
             None => self.release(slot),
+        }
+    }
+
+    /// The pieces in memory, and how many messages of each have been taken.
+    pub(super) fn open(&self) -> impl Iterator<Item = (usize, usize)> {
+        self.heads.iter().map(|Reverse(((_, _, _, span, next), _))| (*span, *next))
+    }
+
+    /// Drops all pieces.
+    pub(super) fn clear(&mut self) {
+        while let Some(Reverse((_, slot))) = self.heads.pop() {
+            self.release(slot);
         }
     }
 

@@ -7,6 +7,7 @@ use std::path::Path;
 
 use headrace_core::time::MonoNs;
 use mcap::records::op;
+use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::channels::{Channels, Kind};
@@ -73,6 +74,18 @@ pub struct LogMessage<'a> {
     pub sequence: u32,
     /// Its content.
     pub data: &'a [u8],
+}
+
+/// Where a reader stands in a log.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct LogPlace {
+    /// Pieces that have been read.
+    read: usize,
+    /// Those of them that hold messages still: number, and messages taken.
+    open: Vec<(usize, usize)>,
+    latest: u64,
+    late: u64,
+    losses: Vec<Loss>,
 }
 
 /// Reads a log.
@@ -223,9 +236,40 @@ impl<R: Read + Seek> LogReader<R> {
         }
     }
 
+    /// Where the reader stands.
+    pub fn place(&self) -> LogPlace {
+        LogPlace {
+            read: self.read,
+            open: self.merge.open().collect(),
+            latest: self.latest,
+            late: self.late,
+            losses: self.losses.list().to_vec(),
+        }
+    }
+
+    /// Goes on from a place where it, or another reader of the same file, has stood.
+    ///
+    /// Errors: the medium fails.
+    pub fn go_to(&mut self, place: &LogPlace) -> Result<(), LogError> {
+        self.merge.clear();
+        for (number, next) in &place.open {
+            self.read_span(*number, *next)?;
+        }
+        (self.read, self.latest, self.late) = (place.read, place.latest, place.late);
+        // What was damaged before is known again, and what lies behind is told when it has been read.
+        self.losses = Losses::of(place.losses.clone());
+        self.finished = false;
+        Ok(())
+    }
+
     fn read_piece(&mut self) -> Result<(), LogError> {
         let Some(number) = self.plan.get(self.read).map(|number| *number as usize) else { return Ok(()) };
         self.read += 1;
+        self.read_span(number, 0)
+    }
+
+    /// Reads a piece, of which so many messages have been taken.
+    fn read_span(&mut self, number: usize, next: usize) -> Result<(), LogError> {
         let mut batch = self.merge.empty_batch();
         let mut found = Vec::new();
         let Some(span) = self.spans.get(number).copied() else { return Ok(()) };
@@ -244,7 +288,7 @@ impl<R: Read + Seek> LogReader<R> {
         if let Some(span) = self.spans.get_mut(number) {
             (span.from, span.to) = (times.clone().min().unwrap_or(0), times.max().unwrap_or(0));
         }
-        self.merge.add(number, batch);
+        self.merge.add(number, batch, next);
         Ok(())
     }
 
