@@ -2,15 +2,15 @@
 
 use headrace_core::app::App;
 use headrace_core::app::components::Echosounder;
-use headrace_core::app::device::{Decoder, Device, DeviceKind, Emulated, EmulatorSetup, Sense};
+use headrace_core::app::device::{Decoder, Device, DeviceKind, Emulated, EmulatorSetup, Needless, Sense};
 use headrace_core::app::driver::{Carrier, Driver, DriverSetup, Probe};
 use headrace_core::app::plugin::{Plugin, PluginError};
 use headrace_core::app::reading::{Decoded, EchoRange, Packet, Reading};
-use headrace_core::codec::{Codec as _, CodecCounts, LineClock};
+use headrace_core::codec::{Codec as _, CodecCounts, Framing as _, LineClock};
 use headrace_core::config::{ConfigError, Section, SensorConfig};
 use headrace_core::time::DurNs;
 
-use crate::codec::{Distance, DistanceSimple, Frame, PingCodec};
+use crate::codec::{Addressed, Distance, DistanceSimple, Frame, Frames, Message, PingCodec};
 use crate::driver::{CARRIERS, PingDriver};
 use crate::emulator::PingEmulator;
 use crate::probe::PingProbe;
@@ -72,6 +72,22 @@ impl Device for Ping1d {
 
     fn emulator(&self, setup: &EmulatorSetup) -> Emulated {
         Emulated::Echosounder(Box::new(PingEmulator::new(self.settings, self.sensor.latency, setup)))
+    }
+
+    /// A profile says the same as a distance, but for its strengths.
+    fn without(&self, what: Needless, packet: &[u8], shorter: &mut Vec<u8>) -> bool {
+        shorter.clear();
+        let distance = || {
+            let whole = Frames.read(packet)?;
+            let Message::Profile(profile) = whole.message else { return None };
+            if whole.encode().ok()?.as_slice() != packet {
+                return None;
+            }
+            Addressed { message: Message::Distance(profile.distance), ..whole }.encode().ok()
+        };
+        let distance = if what == Needless::Echoes { distance() } else { None };
+        shorter.extend_from_slice(distance.as_ref().map_or(&[], |bytes| bytes.as_slice()));
+        distance.is_some()
     }
 
     fn carriers(&self) -> &'static [Carrier] {
