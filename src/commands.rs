@@ -7,6 +7,7 @@ use headrace_core::config::vehicle::Loader;
 use headrace_core::config::{Document, VehicleConfig};
 use headrace_core::time::DurNs;
 use headrace_replay::drive::Pace;
+use headrace_replay::log::format::VEHICLE_FILE;
 use headrace_replay::log::{LogInfo, file_digest, files_digest, files_of};
 use headrace_replay::player::{Player, SimulationFeed};
 use headrace_replay::simulate::{Scene, Simulation};
@@ -163,7 +164,12 @@ pub(crate) fn attached_vehicle(
         let which = damage.unwrap_or_else(|| " is attached to this log".to_owned());
         Failure::Usage(format!("reading {}: no vehicle file{which}; give one with --vehicle", log.display()))
     })?;
-    let vehicle = parse_vehicle("vehicle.toml", &text, &files::attached(&info.attachments))?;
+    // As if the log were a folder.
+    let vehicle = parse_vehicle(
+        &format!("{}/{VEHICLE_FILE}", log.display()),
+        &text,
+        &files::attached(&info.attachments),
+    )?;
     Ok((text, vehicle))
 }
 

@@ -36,8 +36,9 @@ fn a_dive_in_parts_replays_and_verifies_as_the_same_dive() {
     let folder = Folder::with_dive();
     let whole = record(&folder, &["--record", "whole.mcap"]);
     std::fs::create_dir(folder.path("parts")).unwrap();
-    let report = record(&folder, &["--record", "parts/dive.mcap", "--rotate", "5s"]);
-    assert_eq!(report["digest"], whole["digest"]);
+    record(&folder, &["--record", "parts/dive.mcap", "--rotate", "5s"]);
+    let (code, report) = folder.replay("parts/dive.mcap", &[]);
+    assert_eq!((code, &report["digest"]), (Some(0), &whole["digest"]));
     let names = |report: &Value| {
         let parts = report["log"]["parts"].as_array().cloned().unwrap_or_default();
         parts.iter().map(|part| part["path"].as_str().unwrap().to_owned()).collect::<Vec<_>>()
@@ -56,6 +57,9 @@ fn a_dive_in_parts_replays_and_verifies_as_the_same_dive() {
         assert_eq!((answer.code, &replayed["digest"]), (Some(0), &whole["digest"]), "{log:?}");
         assert_eq!(replayed["log"]["parts"], report["log"]["parts"], "{log:?}");
         assert_eq!(replayed["log"]["messages"], whole["log"]["messages"]);
+        let parts = report["log"]["parts"].as_array().unwrap().iter();
+        let sum: u64 = parts.map(|part| part["messages"].as_u64().unwrap()).sum();
+        assert_eq!(replayed["log"]["messages"], sum);
         assert_eq!(replayed["log"]["sha256"], report["log"]["sha256"]);
     }
     if let Some(digest) = shell_digest(&folder, "parts/dive.part*.mcap") {
@@ -80,6 +84,23 @@ fn a_dive_in_parts_replays_and_verifies_as_the_same_dive() {
         code == Some(3) && losses.contains("part 2 of the recording is missing, and any after"),
         "{losses}"
     );
+}
+
+#[test]
+fn the_report_of_a_dive_on_ports_names_its_parts() {
+    let folder = Folder::with_dive();
+    // Nobody is at these addresses, and so there is one part.
+    let arguments =
+        ["run", "vehicle.toml", "--record", "live.mcap", "--rotate", "1GiB", "--for", "1", "--json"];
+    let answer = folder.headrace(&arguments);
+    let report: Value = serde_json::from_str(&answer.stdout).unwrap_or_else(|_| panic!("{}", answer.stderr));
+    assert_eq!(report["log"]["path"], "live.mcap");
+    let [part] = &report["log"]["parts"].as_array().unwrap()[..] else { panic!("{report}") };
+    assert_eq!((&part["path"], &part["messages"]), (&"live.part001.mcap".into(), &0.into()));
+    assert_eq!(part["sha256"], report["log"]["sha256"]);
+    if let Some(digest) = shell_digest(&folder, "live.part001.mcap") {
+        assert_eq!(part["sha256"], digest.as_str());
+    }
 }
 
 #[test]

@@ -77,17 +77,7 @@ impl Device for Ping1d {
     /// A profile says the same as a distance, but for its strengths.
     fn without(&self, what: Needless, packet: &[u8], shorter: &mut Vec<u8>) -> bool {
         shorter.clear();
-        let distance = || {
-            let whole = Frames.read(packet)?;
-            let Message::Profile(profile) = whole.message else { return None };
-            if whole.encode().ok()?.as_slice() != packet {
-                return None;
-            }
-            Addressed { message: Message::Distance(profile.distance), ..whole }.encode().ok()
-        };
-        let distance = if what == Needless::Echoes { distance() } else { None };
-        shorter.extend_from_slice(distance.as_ref().map_or(&[], |bytes| bytes.as_slice()));
-        distance.is_some()
+        what == Needless::Echoes && without_strengths(packet, shorter).is_some()
     }
 
     fn carriers(&self) -> &'static [Carrier] {
@@ -97,6 +87,17 @@ impl Device for Ping1d {
     fn driver(&self, _: &DriverSetup) -> Box<dyn Driver> {
         Box::new(PingDriver::new(self.settings))
     }
+}
+
+/// A packet that is one profile as the distance that it tells; `None` where it is something else.
+fn without_strengths(packet: &[u8], shorter: &mut Vec<u8>) -> Option<()> {
+    let whole = Frames.read(packet)?;
+    let Message::Profile(profile) = whole.message else { return None };
+    // What our encoding wouldn't give back isn't ours to change.
+    (whole.encode().ok()?.as_slice() == packet).then_some(())?;
+    let distance = Addressed { message: Message::Distance(profile.distance), ..whole };
+    shorter.extend_from_slice(distance.encode().ok()?.as_slice());
+    Some(())
 }
 
 /// Messages to readings. Distances that another client has asked for are taken as well.

@@ -82,17 +82,17 @@ impl DiveLog<File> {
     /// Errors: no file can be read, isn't MCAP, or is of a later format; several that aren't the parts of one recording.
     pub fn open(files: &[PathBuf]) -> Result<Self, LogError> {
         match files {
-            [file] => Self::single(LogReader::open(file)?, file),
+            [file] => Ok(Self::single(LogReader::open(file)?, file)),
             files => Self::parts(files),
         }
     }
 
-    fn single(reader: LogReader<File>, file: &Path) -> Result<Self, LogError> {
+    fn single(reader: LogReader<File>, file: &Path) -> Self {
         let path = file.to_owned();
         let number = reader.header().part.as_ref().map(|part| part.head.number);
         let between = between(&[Glance::of(&reader, number.unwrap_or_default())]);
         let files = vec![PartFile { path: path.clone(), messages: 0, number }];
-        Ok(Self::start(Box::new(move |_| LogReader::open(&path)), reader, files, between))
+        Self::start(Box::new(move |_| LogReader::open(&path)), reader, files, between)
     }
 
     fn parts(files: &[PathBuf]) -> Result<Self, LogError> {

@@ -71,7 +71,9 @@ pub struct Part {
 /// A name for a recording that no other has: a digest of what its caller knows of the moment.
 pub fn dive_name(moment: &[u64]) -> String {
     let mut hasher = Sha256::new();
-    moment.iter().for_each(|word| hasher.update(word.to_le_bytes()));
+    for word in moment {
+        hasher.update(word.to_le_bytes());
+    }
     let mut name = hex(&hasher.finalize());
     name.truncate(DIVE_DIGITS);
     name

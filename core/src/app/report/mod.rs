@@ -81,10 +81,8 @@ pub struct LogReport {
     /// What was lost, in words, each with its time span.
     pub losses: Vec<String>,
     /// What was odd and what was done about it, in words; nothing was lost by it.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub notes: Vec<String>,
     /// Its files in their order, where it is a recording in parts.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub parts: Vec<PartReport>,
 }
 
