@@ -35,13 +35,11 @@ pub(crate) fn verify(args: &Verify) -> Result<u8, Failure> {
             failed = verifier.after_tick(dive).err();
         }
     })?;
-    match failed {
-        Some(error) => Err(error.into()),
-        None => {
-            let trimmed = player.info().metadata.get(TRIMMED).map(String::as_str);
-            tell(args, &verifier.finish()?, (&player.losses(), trimmed), &sources)
-        }
+    if let Some(error) = failed {
+        return Err(error.into());
     }
+    let trimmed = player.info().metadata.get(TRIMMED).map(String::as_str);
+    tell(args, &verifier.finish()?, (&player.losses(), trimmed), &sources)
 }
 
 fn tell(

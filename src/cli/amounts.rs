@@ -11,6 +11,7 @@ pub(super) fn every(text: &str) -> Result<Every, String> {
     let number: f64 = number.trim().parse().map_err(|_| wanted())?;
     let bytes = |factor: f64| {
         let bytes = number * factor;
+        #[expect(clippy::cast_possible_truncation, reason = "a fraction of a byte")]
         (1e5..=1e15).contains(&bytes).then_some(Every::Bytes(bytes as u64))
     };
     let span = |factor_s: f64| {

@@ -225,6 +225,27 @@ connect = "hid:1209:0001"
     }
 
     #[test]
+    fn the_shipped_vehicles_still_read_and_are_the_same_but_for_names() {
+        for name in ["vita1.toml", "vita2-2.toml", "vita2-3.toml", "vita2-4.toml"] {
+            let text = String::from_utf8(files::built_in_vehicle(name).unwrap()).unwrap();
+            let clean = anonymised(&text, &[]);
+            assert!(!clean.contains('#') && !clean.contains("VITA") && !clean.contains("192.168"), "{clean}");
+            let read = |text: &str| {
+                let document = headrace_core::config::Document::new(name, text);
+                VehicleConfig::parse(document, &KINDS, &|_| Err("no file".to_owned())).unwrap()
+            };
+            let (before, after) = (read(&text), read(&clean));
+            let told = |vehicle: &VehicleConfig| format!("{:?} {:?}", vehicle.tunnel, vehicle.site);
+            assert_eq!((told(&after), after.target_m), (told(&before), before.target_m));
+            let sensors = |vehicle: &VehicleConfig| {
+                let sensors = vehicle.sensor_configs.iter();
+                sensors.map(|s| format!("{} {} {:?}", s.id, s.plugin, s.mount)).collect::<Vec<_>>()
+            };
+            assert_eq!(sensors(&after), sensors(&before));
+        }
+    }
+
+    #[test]
     fn strings_without_an_end_are_gone_through() {
         for text in ["name = \"", "'", "\"\"\"", "\"\\", "#", "name = 'é", "\u{e9}#"] {
             anonymised(text, &[]);
