@@ -1,14 +1,18 @@
 //! The command line.
 
+mod amounts;
+
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
 use headrace_core::config::Connect;
 use headrace_core::sampling::layout::HeadLayout;
 use headrace_core::time::DurNs;
+use headrace_replay::log::Every;
 
 use crate::import::Kind;
-use crate::play;
+pub(crate) use amounts::time;
+use amounts::{every, stretch};
 
 /// On-board coverage monitor for sonar inspection of flooded hydroelectric tunnels.
 #[derive(Debug, Parser)]
@@ -30,14 +34,14 @@ pub(crate) enum Command {
     /// A sensor that isn't there is tried for ever, and the dive goes on with the others, unless --require names it. With
     /// --source a recorded dive takes the ports' place.
     #[command(
-        after_help = "Example:\n  headrace run vehicle.toml --record dive.mcap --require imu,sonar_0\n  headrace run vehicle.toml --source dive.mcap --record again.mcap"
+        after_help = "Example:\n  headrace run vehicle.toml --record dive.mcap --require imu,sonar_0\n  headrace run vehicle.toml --record dive.mcap --rotate 1GiB\n  headrace run vehicle.toml --source dive.mcap --record again.mcap"
     )]
     Run(Run),
     /// Run a recorded dive through the very same loop.
     ///
     /// With --smooth twice: once as it was, and once along the track that all sensors agree on over the whole dive.
     #[command(
-        after_help = "Example:\n  headrace replay dive.mcap --target 0.6 --report report.json\n  headrace replay dive.mcap --target 0.3,0.6,1.0 --section 0.25,1\n  headrace replay dive.mcap --smooth --report certificate.json\n  headrace replay dive.mcap --expect golden.json --bless"
+        after_help = "Example:\n  headrace replay dive.mcap --target 0.6 --report report.json\n  headrace replay dive.mcap --target 0.3,0.6,1.0 --section 0.25,1\n  headrace replay dive.mcap --smooth --report certificate.json\n  headrace replay dive.part*.mcap\n  headrace replay dive.mcap --expect golden.json --bless"
     )]
     Replay(Replay),
     /// Replay a dive and hold it against what it published live: the same, or where they first part.
@@ -52,6 +56,14 @@ pub(crate) enum Command {
     /// when something is.
     #[command(after_help = "Example:\n  headrace recover dive.mcap -o recovered.mcap")]
     Recover(Recover),
+    /// Cut a log down to what is to be handed on: some minutes, some metres, without echoes, without what tells whose it is.
+    ///
+    /// The new log says what was cut out of it, as a loss, and holds no results of the dive then; with nothing cut it replays to
+    /// the same digest. Exit code 3 when the log itself has lost data.
+    #[command(
+        after_help = "Example:\n  headrace trim dive.mcap -o part.mcap --from 10min --to 20min\n  headrace trim dive.mcap -o bend.mcap --chainage 120..340 --drop-echoes\n  headrace trim dive.mcap -o public.mcap --anonymise"
+    )]
+    Trim(Trim),
     /// Turn a scene into a log of the bytes that its devices would send.
     ///
     /// Only the effects that the scene names are simulated; --explain lists what that comes to.
@@ -116,12 +128,16 @@ pub(crate) struct Demo {
 pub(crate) struct Run {
     /// Vehicle file.
     pub(crate) vehicle: PathBuf,
-    /// Log whose messages take the place of the ports'.
+    /// Log whose messages take the place of the ports'; or the folder of a recording in parts.
     #[arg(long, value_name = "LOG.mcap", conflicts_with_all = ["require", "require_within", "duration", "no_record"])]
     pub(crate) source: Option<PathBuf>,
     /// Log to write; on ports it is dive-SECONDS.mcap in this folder unless said otherwise.
     #[arg(long, value_name = "LOG.mcap")]
     pub(crate) record: Option<PathBuf>,
+    /// Record in parts, each a log of its own (dive.part001.mcap for dive.mcap): a new one once there are so many bytes (1GiB,
+    /// 500MB) or so much time (30min, 2h) in the last.
+    #[arg(long, value_name = "1GiB|30min", value_parser = every, conflicts_with = "no_record")]
+    pub(crate) rotate: Option<Every>,
     /// Write no log.
     #[arg(long, conflicts_with = "record")]
     pub(crate) no_record: bool,
@@ -163,8 +179,9 @@ pub(crate) struct Emulate {
 
 #[derive(Debug, Args)]
 pub(crate) struct Replay {
-    /// Log to replay.
-    pub(crate) log: PathBuf,
+    /// Log to replay, or the parts of a recording: their files, their folder, or the name that --record was given.
+    #[arg(required = true, value_name = "LOG")]
+    pub(crate) logs: Vec<PathBuf>,
     /// Vehicle file, in place of the one attached to the log.
     #[arg(long, value_name = "FILE")]
     pub(crate) vehicle: Option<PathBuf>,
@@ -184,7 +201,7 @@ pub(crate) struct Replay {
     pub(crate) tick_ms: u32,
     /// Begin at this time of the dive (90s, 1h20min, 1:23:45); what came before counts all the same. States of the dive are
     /// kept in LOG.states, so that it takes a moment the next time.
-    #[arg(long, value_name = "TIME", value_parser = play::time, conflicts_with = "smooth")]
+    #[arg(long, value_name = "TIME", value_parser = time, conflicts_with = "smooth")]
     pub(crate) from: Option<DurNs>,
     /// Take lines from standard input while it plays: pause, go, step [TICKS], seek TIME, speed N|max, end.
     #[arg(short, long, conflicts_with = "smooth")]
@@ -204,8 +221,9 @@ pub(crate) struct Replay {
 
 #[derive(Debug, Args)]
 pub(crate) struct Verify {
-    /// Log to verify.
-    pub(crate) log: PathBuf,
+    /// Log to verify, or the parts of a recording.
+    #[arg(required = true, value_name = "LOG")]
+    pub(crate) logs: Vec<PathBuf>,
     /// Vehicle file, in place of the one attached to the log.
     #[arg(long, value_name = "FILE")]
     pub(crate) vehicle: Option<PathBuf>,
@@ -219,12 +237,44 @@ pub(crate) struct Verify {
 
 #[derive(Debug, Args)]
 pub(crate) struct Recover {
-    /// Log to recover; it is only read.
-    pub(crate) log: PathBuf,
+    /// Log to recover, or the parts of a recording, which become one log; they are only read.
+    #[arg(required = true, value_name = "LOG")]
+    pub(crate) logs: Vec<PathBuf>,
     /// Log to write; it must not exist.
     #[arg(short, long, value_name = "FIXED.mcap")]
     pub(crate) output: PathBuf,
     /// Print what was kept and what is lost as JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Trim {
+    /// Log to trim, or the parts of a recording; they are only read.
+    #[arg(required = true, value_name = "LOG")]
+    pub(crate) logs: Vec<PathBuf>,
+    /// Log to write; it must not exist.
+    #[arg(short, long, value_name = "TRIMMED.mcap")]
+    pub(crate) output: PathBuf,
+    /// From here on, counted from the log's first message: 90s, 10min, 1.5h.
+    #[arg(long, value_name = "TIME", value_parser = time, conflicts_with = "chainage")]
+    pub(crate) from: Option<DurNs>,
+    /// Up to here, counted from the log's first message.
+    #[arg(long, value_name = "TIME", value_parser = time, conflicts_with = "chainage")]
+    pub(crate) to: Option<DurNs>,
+    /// While the vehicle was between these places, metres from the portal; the log is replayed to find out when.
+    #[arg(long, value_name = "FROM..TO", value_parser = stretch, allow_hyphen_values = true)]
+    pub(crate) chainage: Option<[f64; 2]>,
+    /// Without echo strengths, where a device's messages tell the range beside them; replays give the same results.
+    #[arg(long)]
+    pub(crate) drop_echoes: bool,
+    /// Without names, comments, addresses, serial numbers, time of day and places on Earth; says what it can't take out.
+    #[arg(long)]
+    pub(crate) anonymise: bool,
+    /// Vehicle file for --chainage, --drop-echoes and --anonymise, in place of the one attached to the log.
+    #[arg(long, value_name = "FILE", conflicts_with = "anonymise")]
+    pub(crate) vehicle: Option<PathBuf>,
+    /// Print what was kept and what was done as JSON.
     #[arg(long)]
     pub(crate) json: bool,
 }
@@ -354,7 +404,7 @@ pub(crate) struct Plan {
 
 #[derive(Debug, Args)]
 pub(crate) struct Calibrate {
-    /// Log to calibrate by.
+    /// Log to calibrate by, or the folder of a recording in parts.
     pub(crate) log: PathBuf,
     /// Vehicle file, in place of the one attached to the log.
     #[arg(long, value_name = "FILE")]

@@ -1,13 +1,14 @@
 //! The commands.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use headrace_core::app::report::{LogReport, Report};
+use headrace_core::app::report::{LogReport, PartReport, Report};
 use headrace_core::config::vehicle::Loader;
 use headrace_core::config::{Document, VehicleConfig};
 use headrace_core::time::DurNs;
 use headrace_replay::drive::Pace;
-use headrace_replay::log::{LogInfo, file_digest};
+use headrace_replay::log::format::VEHICLE_FILE;
+use headrace_replay::log::{LogInfo, file_digest, files_digest, files_of};
 use headrace_replay::player::{Player, SimulationFeed};
 use headrace_replay::simulate::{Scene, Simulation};
 use serde_json::json;
@@ -35,8 +36,7 @@ pub(crate) fn demo(args: &Demo) -> Result<u8, Failure> {
     if log.exists() {
         std::fs::remove_file(&log).map_err(|source| Failure::Write { path: log.clone(), source })?;
     }
-    let dive =
-        assemble(&scene.vehicle, &scene.vehicle_text, Some(Recording { path: &log, clock: Clock::Theirs }))?;
+    let dive = assemble(&scene.vehicle, &scene.vehicle_text, Some(Recording::whole(&log, Clock::Theirs)))?;
     say(&format!("{}, target {} m: a simulated dive", scene.vehicle.name, scene.vehicle.target_m));
     let mut feed = SimulationFeed::new(Simulation::new(&scene)?);
     let pace = Pace { speed: args.speed.0, ..Pace::default() };
@@ -51,8 +51,14 @@ pub(crate) fn demo(args: &Demo) -> Result<u8, Failure> {
 pub(crate) fn run(args: &Run) -> Result<u8, Failure> {
     let (text, vehicle) = vehicle_file(&args.vehicle)?;
     let Some(log) = &args.source else { return live::run(args, &text, &vehicle) };
-    let mut player = Player::open(log)?;
-    let recording = args.record.as_deref().map(|path| Recording { path, clock: Clock::Theirs });
+    let mut player = Player::open(&files_of(std::slice::from_ref(log))?)?;
+    let recording =
+        args.record.as_deref().map(|path| Recording { path, clock: Clock::Theirs, rotate: args.rotate });
+    if let (None, Some(_)) = (&recording, args.rotate) {
+        return Err(Failure::Usage(
+            "run: --rotate is for a recording; with --source it wants --record".to_owned(),
+        ));
+    }
     let dive = assemble(&vehicle, &text, recording)?;
     player.connect(dive.armed.sources());
     let pace = Pace { speed: args.speed.0, ..Pace::default() };
@@ -63,28 +69,29 @@ pub(crate) fn run(args: &Run) -> Result<u8, Failure> {
 
 /// Runs a recorded dive through the loop.
 pub(crate) fn replay(args: &Replay) -> Result<u8, Failure> {
-    let mut player = Player::open(&args.log)?;
+    let (files, log) = (files_of(&args.logs)?, named(&args.logs));
+    let mut player = Player::open(&files)?;
     let (text, mut vehicle) = match &args.vehicle {
         Some(path) => vehicle_file(path),
-        None => attached_vehicle(player.info(), &player.losses(), &args.log),
+        None => attached_vehicle(player.info(), &player.losses(), log),
     }?;
     let what_if = what_if(args, &mut vehicle);
     let pace = Pace { tick: DurNs::from_millis(i64::from(args.tick_ms)), speed: args.speed.0 };
     let mut report = if args.smooth {
-        smooth::smoothed(&args.log, &mut player, (&vehicle, &text), pace, what_if)?
+        smooth::smoothed(&files, &mut player, (&vehicle, &text), pace, what_if)?
     } else {
         let dive = assemble(&vehicle, &text, None)?.asking(what_if);
         player.connect(dive.armed.sources());
         let mut watch = watch(&args.output);
         if args.from.is_some() || args.interactive {
-            let states = play::states(&args.log, &vehicle, &text)?;
+            let states = play::states(log, &files, &vehicle, &text)?;
             let playing = Playing { from: args.from, interactive: args.interactive, states, pace };
             playing.play(dive, &mut player, &mut watch)?
         } else {
             dive.run(&mut player, pace, &mut watch)?
         }
     };
-    note_losses(&mut report, &args.log, &player)?;
+    note_losses(&mut report, log, &player)?;
     let code = finish(&report, &args.output)?;
     match &args.expect {
         Some(golden) if args.bless => expect::bless(&report, golden).map(|()| code),
@@ -165,7 +172,12 @@ pub(crate) fn attached_vehicle(
         let which = damage.unwrap_or_else(|| " is attached to this log".to_owned());
         Failure::Usage(format!("reading {}: no vehicle file{which}; give one with --vehicle", log.display()))
     })?;
-    let vehicle = parse_vehicle("vehicle.toml", &text, &files::attached(&info.attachments))?;
+    // As if the log were a folder.
+    let vehicle = parse_vehicle(
+        &format!("{}/{VEHICLE_FILE}", log.display()),
+        &text,
+        &files::attached(&info.attachments),
+    )?;
     Ok((text, vehicle))
 }
 
@@ -177,18 +189,39 @@ pub(crate) fn watch(output: &Output) -> Watch {
     if output.json { Watch::quiet() } else { Watch::loud() }
 }
 
+/// The log as a person has named it: the first of several files.
+pub(crate) fn named(logs: &[PathBuf]) -> &Path {
+    logs.first().map_or(Path::new(""), PathBuf::as_path)
+}
+
 /// Adds to the report what the log read from is, and what of it was lost.
 fn note_losses(report: &mut Report, path: &Path, player: &Player) -> Result<(), Failure> {
     let recorded = report.log.take();
     let mut losses = player.losses();
     losses.extend(recorded.into_iter().flat_map(|log| log.losses));
+    let files: Vec<_> = player.files().iter().map(|file| (file.path.as_path(), file.messages)).collect();
+    let paths: Vec<&Path> = files.iter().map(|(path, _)| *path).collect();
     report.log = Some(LogReport {
         path: path.display().to_string(),
-        sha256: file_digest(path)?,
+        sha256: files_digest(&paths)?,
         messages: player.played(),
         losses,
+        notes: player.notes(),
+        parts: parts(path, &files)?,
     });
     Ok(())
+}
+
+/// The files of a log, where it isn't just the one that was named.
+pub(crate) fn parts(named: &Path, files: &[(&Path, u64)]) -> Result<Vec<PartReport>, Failure> {
+    if matches!(files, [(only, _)] if *only == named) {
+        return Ok(Vec::new());
+    }
+    let part = |&(path, messages): &(&Path, u64)| {
+        let sha256 = file_digest(path)?;
+        Ok(PartReport { path: path.display().to_string(), sha256, messages })
+    };
+    files.iter().map(part).collect()
 }
 
 pub(crate) fn finish(report: &Report, output: &Output) -> Result<u8, Failure> {

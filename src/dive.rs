@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use headrace_core::app::App;
+use headrace_core::app::device::Sense;
 use headrace_core::app::flow::Tally;
 use headrace_core::app::outlet::{NoticeOutlet, NoticeReceiver};
 use headrace_core::app::plugin::Plugin;
@@ -12,10 +13,14 @@ use headrace_core::config::VehicleConfig;
 use headrace_core::fusion::Navigation;
 use headrace_ports::Crew;
 use headrace_replay::drive::{Feed, Pace, drive};
-use headrace_replay::log::{LeftOut, LogHeader, Recorder, RecorderHandle, SentPort, SourceInfo, file_digest};
+use headrace_replay::log::{
+    Every, LeftOut, LogHeader, Recorder, RecorderHandle, Rotation, SentPort, SourceInfo, Summary, dive_name,
+    files_digest, files_of,
+};
 use headrace_replay::player::seconds;
 use headrace_replay::record::{QUEUE_BYTES, RecorderOutlet, result_channels};
 
+use crate::commands::parts;
 use crate::failure::{self, Failure};
 use crate::progress::Progress;
 use crate::watch::Watch;
@@ -37,6 +42,15 @@ pub(crate) struct Dive {
 pub(crate) struct Recording<'a> {
     pub(crate) path: &'a Path,
     pub(crate) clock: Clock,
+    /// When a part of it ends, where it is to have parts.
+    pub(crate) rotate: Option<Every>,
+}
+
+impl<'a> Recording<'a> {
+    /// In one file.
+    pub(crate) fn whole(path: &'a Path, clock: Clock) -> Self {
+        Self { path, clock, rotate: None }
+    }
 }
 
 /// Whose clock the stamps are of.
@@ -82,12 +96,18 @@ pub(crate) fn assemble_with(
     let (mut app, notices) = app(vehicle)?;
     let recorder = match record_to {
         None => None,
-        Some(Recording { path, clock }) => {
+        Some(Recording { path, clock, rotate }) => {
             let mut header = log_header(vehicle, vehicle_text, true);
             if clock == Clock::Ours {
                 anchor(&mut header);
             }
-            let (port, handle) = Recorder::create(path, &header, QUEUE_BYTES)?;
+            let (port, handle) = match rotate {
+                None => Recorder::create(path, &header, QUEUE_BYTES),
+                Some(every) => {
+                    let rotation = Rotation { every, dive: new_dive() };
+                    Recorder::create_in_parts(path, &header, &rotation, QUEUE_BYTES)
+                }
+            }?;
             app.add_plugin(&RecorderOutlet::new(port))?;
             Some((path.to_owned(), handle))
         }
@@ -114,6 +134,12 @@ fn anchor(header: &mut LogHeader) {
     header.metadata.insert("clock_anchor_utc_ns".to_owned(), utc.0.to_string());
 }
 
+/// A name that no other recording has.
+fn new_dive() -> String {
+    let (monotonic, utc) = headrace_ports::clock_anchor();
+    dive_name(&[monotonic.0, utc.0.cast_unsigned(), std::process::id().into()])
+}
+
 /// What a log of this vehicle begins with.
 pub(crate) fn log_header(vehicle: &VehicleConfig, vehicle_text: &str, ticks: bool) -> LogHeader {
     let sources = vehicle.sensor_configs.iter().map(|sensor| SourceInfo {
@@ -132,7 +158,16 @@ pub(crate) fn log_header(vehicle: &VehicleConfig, vehicle_text: &str, ticks: boo
         sources: sources.collect(),
         ticks,
         results: if ticks { result_channels() } else { Vec::new() },
+        sonars: sonars(vehicle),
+        part: None,
     }
+}
+
+/// Numbers of the sensors that send echoes.
+fn sonars(vehicle: &VehicleConfig) -> Vec<u16> {
+    let is_sonar = |sense: Sense| matches!(sense, Sense::Head | Sense::Echosounder);
+    let numbered = (0..).zip(&vehicle.sensors);
+    numbered.filter(|(_, sensor)| is_sonar(sensor.sense())).map(|(number, _)| number).collect()
 }
 
 impl Dive {
@@ -240,18 +275,40 @@ impl Dive {
             drop(self.armed);
             let written = handle.finish();
             let losses = match &written {
-                Err(error) => Some(format!("recording failed: {error}")),
-                Ok(written) => Some(written.left_out).filter(|left| left.messages > 0).map(left_out),
+                Err(error) => vec![format!("recording failed: {error}")],
+                Ok(written) => unrecorded(written),
             };
+            let written = written.unwrap_or_default();
+            let files = files_of(std::slice::from_ref(&path))?;
+            let parts_written: Vec<_> =
+                written.parts.iter().map(|part| (part.path.as_path(), part.raw_messages)).collect();
             report.log = Some(LogReport {
                 path: path.display().to_string(),
-                sha256: file_digest(&path)?,
+                sha256: files_digest(&files)?,
                 messages: report.sources.iter().map(|source| source.packets).sum(),
-                losses: losses.into_iter().collect(),
+                losses,
+                notes: Vec::new(),
+                parts: if parts_written.is_empty() { Vec::new() } else { parts(&path, &parts_written)? },
             });
         }
         Ok(report)
     }
+}
+
+/// What a recording that has ended in good order lacks, in words.
+fn unrecorded(written: &Summary) -> Vec<String> {
+    let mut losses: Vec<String> =
+        Some(written.left_out).filter(|left| left.messages > 0).map(left_out).into_iter().collect();
+    let counts = [
+        (
+            written.sent_dropped,
+            "messages to devices not recorded: they came faster than the recorder took them",
+        ),
+        (written.results_missing, "ticks not recorded with all their results: there were too many"),
+    ];
+    losses
+        .extend(counts.iter().filter(|(count, _)| *count > 0).map(|(count, what)| format!("{count} {what}")));
+    losses
 }
 
 /// What the recorder left out, with when.

@@ -21,7 +21,8 @@ use crate::watch::Watch;
 pub(crate) fn run(args: &Run, text: &str, vehicle: &VehicleConfig) -> Result<u8, Failure> {
     let required = required(args, vehicle)?;
     let log = args.record.clone().unwrap_or_else(new_log);
-    let recording = (!args.no_record).then_some(Recording { path: &log, clock: Clock::Ours });
+    let recording =
+        (!args.no_record).then_some(Recording { path: &log, clock: Clock::Ours, rotate: args.rotate });
     let mut dive = assemble(vehicle, text, recording)?;
     let begun = headrace_ports::now();
     let crew = crew(&mut dive, vehicle, begun)?;

@@ -23,6 +23,7 @@ mod simulate;
 mod smooth;
 mod station;
 mod summary;
+mod trim;
 mod verify;
 mod watch;
 
@@ -40,6 +41,7 @@ fn main() -> ExitCode {
         Command::Replay(replay) => commands::replay(&replay),
         Command::Verify(args) => verify::verify(&args),
         Command::Recover(args) => recover::recover(&args),
+        Command::Trim(args) => trim::trim(&args),
         Command::Simulate(simulate) => simulate::simulate(&simulate),
         Command::Import(args) => import::import(&args),
         Command::Plan(args) => plan::plan(&args),

@@ -15,7 +15,7 @@ use headrace_replay::playback::{Playback, Watcher, Wish};
 use headrace_replay::player::Player;
 use headrace_replay::states::{States, identity, log_identity};
 
-use crate::cli::speed;
+use crate::cli::{speed, time};
 use crate::dive::Dive;
 use crate::failure::Failure;
 use crate::watch::Watch;
@@ -33,15 +33,23 @@ pub(crate) struct Playing {
 }
 
 /// The states of a dive, in the file beside its log; where there can be none, for this replay alone.
-pub(crate) fn states(log: &Path, vehicle: &VehicleConfig, text: &str) -> Result<States, Failure> {
+pub(crate) fn states(
+    log: &Path,
+    files: &[PathBuf],
+    vehicle: &VehicleConfig,
+    text: &str,
+) -> Result<States, Failure> {
     let program = std::env::current_exe()
         .map_err(|source| Failure::System { what: "finding this program's file", source })?;
     let attached = format!("{:?}", vehicle.attachments);
     let mission = format!("{:?}", vehicle.mission());
-    let log_identity = log_identity(log)?.to_le_bytes();
-    let settings = [&log_identity[..], text.as_bytes(), attached.as_bytes(), mission.as_bytes()];
+    let logs: Result<Vec<[u8; 8]>, _> =
+        files.iter().map(|file| log_identity(file).map(u64::to_le_bytes)).collect();
+    let logs = logs?;
+    let settings = [logs.as_flattened(), text.as_bytes(), attached.as_bytes(), mission.as_bytes()];
     let identity = identity(&[&program], &settings)?;
-    let mut path = log.as_os_str().to_owned();
+    // Beside a folder of parts, not in it.
+    let mut path = log.components().collect::<PathBuf>().into_os_string();
     path.push(".states");
     match States::open(&PathBuf::from(path), identity) {
         Ok(states) => Ok(states),
@@ -134,62 +142,9 @@ fn wish(line: &str, begun: MonoNs) -> Result<Wish, String> {
     if words.next().is_some() { Err(unknown()) } else { Ok(wish) }
 }
 
-/// A time of a dive: `90`, `90s`, `15min`, `1h20min`, `1:23:45`, `23:45.5`.
-pub(crate) fn time(text: &str) -> Result<DurNs, String> {
-    let seconds = if text.contains(':') { by_colons(text) } else { by_units(text) };
-    let seconds = seconds.filter(|seconds| (0.0..=1.0e7).contains(seconds));
-    seconds
-        .map(DurNs::from_secs_f64)
-        .ok_or_else(|| format!("{text:?} is no time; wanted is one like 90s, 1h20min or 1:23:45"))
-}
-
-fn by_colons(text: &str) -> Option<f64> {
-    text.split(':').try_fold(0.0, |total, part| {
-        let number = part.parse::<f64>().ok().filter(|number| *number >= 0.0)?;
-        Some(60.0 * total + number)
-    })
-}
-
-fn by_units(text: &str) -> Option<f64> {
-    let (mut total, mut rest) = (0.0, text);
-    while !rest.is_empty() {
-        let digits = rest.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(rest.len());
-        let (number, after) = rest.split_at(digits);
-        let letters = after.find(|c: char| !c.is_ascii_alphabetic()).unwrap_or(after.len());
-        let (unit, later) = after.split_at(letters);
-        let factor = match unit {
-            "s" | "" => 1.0,
-            "min" | "m" => 60.0,
-            "h" => 3600.0,
-            _ => return None,
-        };
-        total += factor * number.parse::<f64>().ok()?;
-        rest = later;
-    }
-    (!text.is_empty()).then_some(total)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn times_are_read_as_people_write_them() {
-        let seconds = |text: &str| time(text).map(DurNs::as_secs_f64);
-        for (text, wanted) in [
-            ("90", 90.0),
-            ("90s", 90.0),
-            ("1.5min", 90.0),
-            ("1h20min", 4800.0),
-            ("1:23:45", 5025.0),
-            ("2:03.5", 123.5),
-        ] {
-            assert_eq!(seconds(text), Ok(wanted), "{text}");
-        }
-        for text in ["", "x", "-5", "1:-2", "5 days", "h", "nan", "1e99"] {
-            assert!(time(text).is_err(), "{text}");
-        }
-    }
 
     #[test]
     fn lines_are_wishes_or_refused_with_what_there_is() {

@@ -2,9 +2,9 @@
 
 use std::fs::OpenOptions;
 use std::io::{BufWriter, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use headrace_replay::log::{LogReader, Recovered, file_digest, recover as rewrite};
+use headrace_replay::log::{DiveLog, Recovered, files_digest, files_of, recover as rewrite};
 use headrace_replay::record::result_channels;
 use serde_json::json;
 
@@ -15,20 +15,22 @@ use crate::output::{deliver, say};
 /// Rewrites a log and says what is lost.
 pub(crate) fn recover(args: &Recover) -> Result<u8, Failure> {
     // Nothing is made where the log is none.
-    LogReader::open(&args.log)?;
-    let recovered = write(&args.log, &args.output)?;
+    let files = files_of(&args.logs)?;
+    DiveLog::open(&files)?;
+    let recovered = write(&files, &args.output)?;
     tell(args, &recovered)?;
     Ok(if recovered.losses.is_empty() { failure::OK } else { failure::DATA_LOST })
 }
 
 /// Writes the new log; takes it away again when that fails.
-fn write(log: &Path, output: &Path) -> Result<Recovered, Failure> {
+fn write(files: &[PathBuf], output: &Path) -> Result<Recovered, Failure> {
     let failed = |source| Failure::Write { path: output.to_owned(), source };
-    let from = format!("{} (sha256 {})", log.display(), file_digest(log)?);
+    let names: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
+    let from = format!("{} (sha256 {})", names.join(", "), files_digest(files)?);
     // A log is never overwritten.
     let file = OpenOptions::new().write(true).create_new(true).open(output).map_err(failed)?;
     let mut writer = BufWriter::new(&file);
-    let written = rewrite(&mut || LogReader::open(log), &mut writer, &result_channels(), &from)
+    let written = rewrite(&mut || DiveLog::open(files), &mut writer, &result_channels(), &from)
         .map_err(Failure::from)
         .and_then(|recovered| {
             writer.flush().and_then(|()| file.sync_all()).map(|()| recovered).map_err(failed)

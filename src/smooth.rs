@@ -1,6 +1,6 @@
 //! `replay --smooth`: a dive by the filter, its track smoothed, and the dive once more along that.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use headrace_core::app::MAX_SOURCES;
 use headrace_core::app::flow::Navigator;
@@ -26,7 +26,7 @@ const RECORDS: usize = 4096;
 
 /// The report of a dive judged along its smoothed track. `player` plays the log from its beginning, for its losses.
 pub(crate) fn smoothed(
-    log: &Path,
+    files: &[PathBuf],
     player: &mut Player,
     (vehicle, text): (&VehicleConfig, &str),
     pace: Pace,
@@ -36,7 +36,7 @@ pub(crate) fn smoothed(
         return Err(Failure::Usage(format!(
             "replaying {}: --smooth needs the filter, and the vehicle file says [navigation] way = \"direct\"; wanted is \
              way = \"filter\"",
-            log.display()
+            files.first().map_or(Path::new(""), PathBuf::as_path).display()
         )));
     };
     let (journal, reader) = Journal::new(RECORDS);
@@ -44,7 +44,7 @@ pub(crate) fn smoothed(
     let filter = FilterNavigation::new(vehicle.tunnel.profile.clone(), vehicle.site, settings);
     let filter = Box::new(filter.with_journal(journal));
     let dive = assemble_with(vehicle, filter, text, None)?;
-    let mut first = Player::open(log)?;
+    let mut first = Player::open(files)?;
     first.connect(dive.armed.sources());
     let mut consistency = [None; MAX_SOURCES];
     let before = dive.run_beside(&mut first, pace, &mut Watch::quiet(), &mut |dive| {

@@ -70,6 +70,9 @@ pub(crate) fn summary(report: &Report) -> String {
     for loss in report.log.iter().flat_map(|log| &log.losses) {
         line(format!("  LOST: {loss}"));
     }
+    for note in report.log.iter().flat_map(|log| &log.notes) {
+        line(format!("  note: {note}"));
+    }
     line(format!("digest {}", report.digest));
     text
 }

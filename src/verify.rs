@@ -4,12 +4,13 @@ use headrace_core::app::SourceInfo;
 use headrace_core::app::trail::WordKind;
 use headrace_core::time::DurNs;
 use headrace_replay::drive::Pace;
+use headrace_replay::log::{TRIMMED, files_of};
 use headrace_replay::player::Player;
 use headrace_replay::verify::{Difference, Verified, Verifier, What};
 use serde_json::{Value, json};
 
 use crate::cli::Verify;
-use crate::commands::{attached_vehicle, vehicle_file};
+use crate::commands::{attached_vehicle, named, vehicle_file};
 use crate::dive::assemble_kept;
 use crate::failure::{self, Failure};
 use crate::output::{deliver, say};
@@ -17,15 +18,16 @@ use crate::watch::Watch;
 
 /// Replays a log and compares.
 pub(crate) fn verify(args: &Verify) -> Result<u8, Failure> {
-    let mut player = Player::open(&args.log)?;
+    let files = files_of(&args.logs)?;
+    let mut player = Player::open(&files)?;
     let (_, vehicle) = match &args.vehicle {
         Some(path) => vehicle_file(path),
-        None => attached_vehicle(player.info(), &player.losses(), &args.log),
+        None => attached_vehicle(player.info(), &player.losses(), named(&args.logs)),
     }?;
     let dive = assemble_kept(&vehicle)?;
     let sources: Vec<SourceInfo> = dive.armed.sources().to_vec();
     player.connect(&sources);
-    let mut verifier = Verifier::open(&args.log)?;
+    let mut verifier = Verifier::open(&files)?;
     let mut failed = None;
     let pace = Pace { tick: DurNs::from_millis(i64::from(args.tick_ms)), ..Pace::default() };
     dive.run_beside(&mut player, pace, &mut Watch::quiet(), &mut |dive| {
@@ -33,16 +35,17 @@ pub(crate) fn verify(args: &Verify) -> Result<u8, Failure> {
             failed = verifier.after_tick(dive).err();
         }
     })?;
-    match failed {
-        Some(error) => Err(error.into()),
-        None => tell(args, &verifier.finish()?, &player.losses(), &sources),
+    if let Some(error) = failed {
+        return Err(error.into());
     }
+    let trimmed = player.info().metadata.get(TRIMMED).map(String::as_str);
+    tell(args, &verifier.finish()?, (&player.losses(), trimmed), &sources)
 }
 
 fn tell(
     args: &Verify,
     verified: &Verified,
-    losses: &[String],
+    (losses, trimmed): (&[String], Option<&str>),
     sources: &[SourceInfo],
 ) -> Result<u8, Failure> {
     let code = if !verified.differences.is_empty() {
@@ -68,7 +71,14 @@ fn tell(
         say(&format!("lost     {loss}"));
     }
     if !verified.has_results {
-        say("nothing to compare: this log has no results of a live dive; headrace run and demo record them");
+        say(match trimmed {
+            Some(_) => {
+                "nothing to compare: this log was cut from another, without the results of the dive; verify that one"
+            }
+            None => {
+                "nothing to compare: this log has no results of a live dive; headrace run and demo record them"
+            }
+        });
         return Ok(code);
     }
     for difference in &verified.differences {

@@ -21,6 +21,7 @@ use headrace_core::app::run::Loop;
 use headrace_core::config::VehicleConfig;
 use headrace_core::time::{DurNs, MonoNs};
 use headrace_replay::drive::{Pace, drive};
+use headrace_replay::log::files_of;
 use headrace_replay::playback::{Playback, Watcher, Wish};
 use headrace_replay::player::Player;
 use headrace_replay::states::States;
@@ -59,7 +60,7 @@ fn armed(vehicle: &VehicleConfig) -> Loop {
 /// Plays a log by wishes; where it stood, and its digest at the end of what it played.
 fn play(folder: &Folder, log: &str, wishes: &[Wish], between: Duration) -> (Stood, u64) {
     let mut dive = armed(&vehicle());
-    let mut player = Player::open(&folder.path(log)).unwrap();
+    let mut player = Player::open(&files_of(&[folder.path(log)]).unwrap()).unwrap();
     player.connect(dive.sources());
     let (to_say, said) = unbounded();
     for wish in wishes {
@@ -77,7 +78,7 @@ fn play(folder: &Folder, log: &str, wishes: &[Wish], between: Duration) -> (Stoo
 /// Digest and tick at the end of each tick of a dive that is played through.
 fn through(folder: &Folder, log: &str) -> Vec<(MonoNs, u64, u64)> {
     let mut dive = armed(&vehicle());
-    let mut player = Player::open(&folder.path(log)).unwrap();
+    let mut player = Player::open(&files_of(&[folder.path(log)]).unwrap()).unwrap();
     player.connect(dive.sources());
     let mut ticks = Vec::new();
     drive(&mut dive, &mut player, Pace::default(), &mut |dive| {
@@ -87,7 +88,7 @@ fn through(folder: &Folder, log: &str) -> Vec<(MonoNs, u64, u64)> {
     ticks
 }
 
-/// The dive as a simulation gives it, by log time, and as our recorder writes it, by ticks.
+/// The dive as a simulation gives it, by log time; as our recorder writes it, by ticks; and so in parts.
 fn logs() -> Folder {
     let folder = Folder::with_dive();
     let recorded = folder.headrace(&[
@@ -101,13 +102,27 @@ fn logs() -> Folder {
         "max",
     ]);
     assert_eq!(recorded.code, Some(0), "{}", recorded.stderr);
+    std::fs::create_dir(folder.path("parts")).unwrap();
+    let parts = folder.headrace(&[
+        "run",
+        "vehicle.toml",
+        "--source",
+        "dive.mcap",
+        "--record",
+        "parts/dive.mcap",
+        "--speed",
+        "max",
+        "--rotate",
+        "5s",
+    ]);
+    assert_eq!(parts.code, Some(0), "{}", parts.stderr);
     folder
 }
 
 #[test]
 fn every_jump_lands_in_the_state_of_a_dive_played_through() {
     let folder = logs();
-    for log in ["dive.mcap", "ticks.mcap"] {
+    for log in ["dive.mcap", "ticks.mcap", "parts"] {
         let ticks = through(&folder, log);
         let (begun, end) = (ticks[0].0, ticks[ticks.len() - 1].0);
         let span = end.since(begun).0;
@@ -147,7 +162,11 @@ fn a_replay_from_the_middle_gives_the_whole_dive_s_report() {
         let (code, later) = folder.replay("ticks.mcap", &["--from", "0:15"]);
         assert_eq!(code, Some(0));
         assert_eq!(later, whole);
+        let (code, in_parts) = folder.replay("parts", &["--from", "0:15"]);
+        assert_eq!((code, &in_parts["digest"]), (Some(0), &whole["digest"]));
+        assert_eq!(in_parts["log"]["messages"], whole["log"]["messages"]);
     }
+    assert!(folder.path("parts.states").exists());
     let states = folder.read("ticks.mcap.states");
     assert!(states.starts_with(b"headrace states\n"));
     // With another target they are another dive's, and are made anew.

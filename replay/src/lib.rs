@@ -1,5 +1,6 @@
 //! headrace's dive logs, the drive that feeds a loop from a log or a scene, and the simulator.
 
+mod clocks;
 pub mod drive;
 pub mod import;
 pub mod log;

@@ -1,7 +1,7 @@
 //! A recorded dive as a feed.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::PathBuf;
 
 use headrace_core::app::SourceInfo;
 use headrace_core::app::reading::SourceId;
@@ -9,12 +9,13 @@ use headrace_core::app::ring::{MAX_PACKET_BYTES, NO_ORDER, Port, RingError};
 use headrace_core::time::MonoNs;
 use serde::{Deserialize, Serialize};
 
+use crate::clocks::{self, Clock};
 use crate::drive::{Coming, Feed};
-use crate::log::{LogError, LogInfo, LogPlace, LogReader, Loss, MessageKind};
+use crate::log::{DiveLog, DivePlace, LogError, LogInfo, Loss, MessageKind, PartFile};
 
 /// Plays the sources' messages of a log.
 pub struct Player {
-    reader: LogReader,
+    reader: DiveLog,
     /// For each source of the log, the loop's source of that name.
     sources: Vec<Option<SourceId>>,
     ids: Vec<String>,
@@ -25,29 +26,33 @@ pub struct Player {
     /// Messages that no sensor of the vehicle file takes, by the source's name.
     unmatched: BTreeMap<String, u64>,
     too_long: u64,
+    /// The clock that most messages are stamped by.
+    clock: Option<Clock>,
+    /// Messages stamped by another, by the source's name: how many, and the first one's time.
+    astray: BTreeMap<String, (u64, MonoNs)>,
 }
 
 /// Where a player stands in its log.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PlayerPlace {
-    log: LogPlace,
+    log: DivePlace,
     /// The message that was looked at and not sent yet: receive time, source, bytes.
     next: Option<(MonoNs, u16, Vec<u8>)>,
     order: u64,
     played: u64,
     unmatched: BTreeMap<String, u64>,
     too_long: u64,
+    astray: BTreeMap<String, (u64, MonoNs)>,
 }
 
 impl Player {
-    /// Opens a log.
+    /// Opens a log, or the parts of a recording.
     ///
-    /// Errors: the file can't be read, isn't MCAP, or is of a later format.
-    pub fn open(path: &Path) -> Result<Self, LogError> {
-        let reader = LogReader::open(path)?;
+    /// Errors: see [`DiveLog::open`].
+    pub fn open(files: &[PathBuf]) -> Result<Self, LogError> {
+        let reader = DiveLog::open(files)?;
         let ids: Vec<String> = reader.header().sources.iter().map(|source| source.id.clone()).collect();
         Ok(Self {
-            reader,
             sources: vec![None; ids.len()],
             ids,
             next: None,
@@ -56,6 +61,9 @@ impl Player {
             played: 0,
             unmatched: BTreeMap::new(),
             too_long: 0,
+            clock: clocks::of(files, reader.times())?,
+            astray: BTreeMap::new(),
+            reader,
         })
     }
 
@@ -82,6 +90,7 @@ impl Player {
             played: self.played,
             unmatched: self.unmatched.clone(),
             too_long: self.too_long,
+            astray: self.astray.clone(),
         }
     }
 
@@ -96,7 +105,13 @@ impl Player {
         });
         (self.order, self.played, self.too_long) = (place.order, place.played, place.too_long);
         self.unmatched.clone_from(&place.unmatched);
+        self.astray.clone_from(&place.astray);
         Ok(())
+    }
+
+    /// The files that it is read from, in their order.
+    pub fn files(&self) -> &[PartFile] {
+        self.reader.files()
     }
 
     /// Messages handed over so far.
@@ -114,9 +129,28 @@ impl Player {
             all.push(format!("{} messages of over {MAX_PACKET_BYTES} bytes", self.too_long));
         }
         if self.reader.late() > 0 {
-            all.push(format!("{} messages out of order by more than can be held", self.reader.late()));
+            all.push(format!(
+                "{} messages out of order by more than can be held, taken where they stand",
+                self.reader.late()
+            ));
+        }
+        let clock = self.clock.iter().flat_map(|clock| self.astray.iter().map(move |found| (clock, found)));
+        for (clock, (id, (count, first))) in clock {
+            all.push(format!(
+                "{count} messages of source {id:?} left out: they are stamped by another clock, {} the one of most messages",
+                clock.distance(*first)
+            ));
         }
         all
+    }
+
+    /// What was odd so far and what was done about it, in words; nothing was lost by it.
+    pub fn notes(&self) -> Vec<String> {
+        let note = |(topic, ids): (String, Vec<u16>)| {
+            let ids: Vec<String> = ids.iter().map(u16::to_string).collect();
+            format!("channels {} are all called {topic:?}: read as one", ids.join(", "))
+        };
+        self.reader.doubles().into_iter().map(note).collect()
     }
 
     /// Reads on to the next message of a source that the loop has.
@@ -129,6 +163,11 @@ impl Player {
                 *self.unmatched.entry(name).or_default() += 1;
                 continue;
             };
+            if self.clock.is_some_and(|clock| !clock.is_of(message.log_time)) {
+                let name = self.ids.get(index).cloned().unwrap_or_default();
+                self.astray.entry(name).or_insert((0, message.log_time)).0 += 1;
+                continue;
+            }
             if message.data.len() > MAX_PACKET_BYTES {
                 self.too_long += 1;
                 continue;

@@ -79,8 +79,6 @@ struct Recording {
     message: Vec<u8>,
     /// Records of each stream before the tick.
     records: [u64; STREAMS.len()],
-    /// Ticks' results for which there was no room.
-    missing: u64,
 }
 
 impl Plugin for RecorderOutlet {
@@ -92,7 +90,6 @@ impl Plugin for RecorderOutlet {
                 order: Vec::with_capacity(MAX_TICK_PACKETS),
                 message: Vec::with_capacity(MAX_RESULT_BYTES),
                 records: [0; STREAMS.len()],
-                missing: 0,
             });
             app.add_systems(Stage::Publish, record);
         }
@@ -107,7 +104,7 @@ fn record(
     results: Res<'_, Digests>,
     mut recording: ResMut<'_, Recording>,
 ) {
-    let Recording { port, order, message, records, missing } = &mut *recording;
+    let Recording { port, order, message, records } = &mut *recording;
     if port.failed() {
         inbox.allowance_bytes = MAX_TICK_BYTES;
         return;
@@ -125,20 +122,23 @@ fn record(
     let streams = results.streams().into_iter().zip(records).take(port.result_channels());
     for (channel, ((_, trail), before)) in (0..).zip(streams) {
         if !trail.words().is_empty() {
-            fill(message, time.index, *before, trail.words());
+            let whole = fill(message, time.index, *before, trail.words());
             // What there is no room for is missing from the record, which numbers what it has; the input goes first.
-            *missing += u64::from(port.result(channel, time.now, message).is_err());
+            if port.result(channel, time.now, message).is_err() || !whole {
+                port.miss_results();
+            }
         }
         *before = trail.records();
     }
     inbox.allowance_bytes = if port.vacant_bytes() >= LARGEST_TICK_BYTES { MAX_TICK_BYTES } else { 0 };
 }
 
-/// Puts a stream's words into a message, without allocating.
-fn fill(message: &mut Vec<u8>, tick: u64, before: u64, words: &[u64]) {
+/// Puts a stream's words into a message, without allocating; `false` when it hasn't room for all.
+fn fill(message: &mut Vec<u8>, tick: u64, before: u64, words: &[u64]) -> bool {
     message.clear();
     let room = message.capacity() / 8 - HEAD_WORDS;
     for word in [tick, before].iter().chain(words.iter().take(room)) {
         message.extend_from_slice(&word.to_le_bytes());
     }
+    words.len() <= room
 }

@@ -1,13 +1,13 @@
 //! What a live dive published, held against a replay of it, record by record and bit for bit.
 
 use std::collections::VecDeque;
-use std::path::Path;
+use std::path::PathBuf;
 
 use headrace_core::app::flow::Digests;
 use headrace_core::app::run::Loop;
 use headrace_core::app::trail::{Record, RecordKind, WordKind, first_record};
 
-use crate::log::{LogError, LogReader, MessageKind};
+use crate::log::{DiveLog, LogError, MessageKind};
 use crate::record::{STREAMS, read_results, stream_of};
 
 /// Where a replay first parts from the dive.
@@ -56,7 +56,7 @@ pub enum What {
 
 /// Compares while a replay goes on.
 pub struct Verifier {
-    reader: LogReader,
+    reader: DiveLog,
     streams: [Stream; STREAMS.len()],
     /// The tick of the results read last.
     last_tick: u64,
@@ -138,9 +138,9 @@ impl Verifier {
     /// For a log; reads it beside the replay, with as much of it in memory as the two are apart.
     ///
     /// Errors: the log can't be read.
-    pub fn open(log: &Path) -> Result<Self, LogError> {
+    pub fn open(log: &[PathBuf]) -> Result<Self, LogError> {
         let streams = core::array::from_fn(|_| Stream::default());
-        Ok(Self { reader: LogReader::open(log)?, streams, last_tick: 0, has_results: false, at_end: false })
+        Ok(Self { reader: DiveLog::open(log)?, streams, last_tick: 0, has_results: false, at_end: false })
     }
 
     /// Compares what the replay's last tick gave.
@@ -183,7 +183,7 @@ impl Verifier {
     fn compare(&mut self, number: usize, name: &'static str, record: Record<'_>) -> Result<(), LogError> {
         while self.streams.get(number).is_some_and(|stream| stream.waiting.is_empty()) && self.read()? {}
         // A log that was cut off ends before its dive did.
-        let cut_off = !self.reader.losses().is_empty();
+        let cut_off = self.reader.has_losses();
         let Some(stream) = self.streams.get_mut(number).filter(|stream| stream.difference.is_none()) else {
             return Ok(());
         };

@@ -13,6 +13,7 @@ use headrace_core::fusion::calibration::zero::{self, Zero};
 use headrace_core::fusion::calibration::{Material, Untold};
 use headrace_core::fusion::filter::settings::Settings;
 use headrace_core::fusion::{NavigationConfig, SensorInfo, SensorKind};
+use headrace_replay::log::files_of;
 use headrace_replay::player::Player;
 
 use crate::cli::Calibrate;
@@ -36,7 +37,7 @@ struct Findings {
 
 /// Finds what a log tells of the vehicle file.
 pub(crate) fn calibrate(args: &Calibrate) -> Result<u8, Failure> {
-    let mut player = Player::open(&args.log)?;
+    let mut player = Player::open(&files_of(std::slice::from_ref(&args.log))?)?;
     let (text, vehicle) = match &args.vehicle {
         Some(path) => vehicle_file(path),
         None => attached_vehicle(player.info(), &player.losses(), &args.log),

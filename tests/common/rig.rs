@@ -282,6 +282,7 @@ fn assemble(vehicle: &VehicleConfig, text: &str, log: Option<&Path>) -> (Loop, O
             sources: sources.collect(),
             ticks: true,
             results: result_channels(),
+            ..LogHeader::default()
         };
         let (port, recorder) = Recorder::create(log, &header, QUEUE_BYTES).unwrap();
         app.add_plugin(&RecorderOutlet::new(port)).unwrap();
@@ -305,7 +306,7 @@ fn replayed(log: &Path, text: &str) -> u64 {
     let document = Document::new("vehicle.toml", text);
     let vehicle = VehicleConfig::parse(document, &KINDS, &|_| unreachable!("no file is named")).unwrap();
     let (mut dive, _) = assemble(&vehicle, text, None);
-    let mut player = Player::open(log).unwrap();
+    let mut player = Player::open(&[log.to_owned()]).unwrap();
     player.connect(dive.sources());
     drive(&mut dive, &mut player, Pace::default(), &mut |_| ()).unwrap();
     assert_eq!(player.losses(), [""; 0]);

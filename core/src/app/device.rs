@@ -57,11 +57,26 @@ pub trait Device: Plugin + Send + Sync {
         None
     }
 
+    /// Puts into `shorter` what a packet of it is without what nobody needs for its readings, and gives `true`; `false` where
+    /// there is nothing of that in it, or where that can't be told from these bytes alone.
+    fn without(&self, _what: Needless, _packet: &[u8], _shorter: &mut Vec<u8>) -> bool {
+        false
+    }
+
     /// What may carry its bytes. UDP may stand in for any of them, a message a datagram.
     fn carriers(&self) -> &'static [Carrier];
 
     /// The host's side of its line.
     fn driver(&self, setup: &DriverSetup) -> Box<dyn Driver>;
+}
+
+/// What a log may do without: the readings are the same, bit for bit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Needless {
+    /// Strengths of echoes, where the range is told beside them.
+    Echoes,
+    /// Places on Earth, and numbers that tell one machine from all others.
+    Identity,
 }
 
 /// Bytes to readings: a codec with the device's configuration around it. Pure, in the loop. Its state is what it has heard;

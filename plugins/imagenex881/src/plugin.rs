@@ -2,18 +2,18 @@
 
 use headrace_core::app::App;
 use headrace_core::app::components::SonarHead;
-use headrace_core::app::device::{Decoder, Device, DeviceKind, Emulated, EmulatorSetup, Sense};
+use headrace_core::app::device::{Decoder, Device, DeviceKind, Emulated, EmulatorSetup, Needless, Sense};
 use headrace_core::app::driver::{Carrier, Driver, DriverSetup, Probe};
 use headrace_core::app::plugin::{Plugin, PluginError};
 use headrace_core::app::reading::{Decoded, Packet, Reading, SonarReturn};
-use headrace_core::codec::{Codec as _, CodecCounts, LineClock};
+use headrace_core::codec::{Bytes, Codec as _, CodecCounts, LineClock};
 use headrace_core::config::{ConfigError, Section, SensorConfig};
 use headrace_core::sampling::head::{HeadMode, HeadSpec};
 use headrace_core::stateful;
 use headrace_core::time::DurNs;
 use serde::{Deserialize, Serialize};
 
-use crate::codec::{Header, Model, ReturnCodec, Returns};
+use crate::codec::{Header, Model, Return, ReturnCodec, Returns, Tag};
 use crate::driver::{CARRIERS, HeadDriver};
 use crate::emulator::HeadEmulator;
 use crate::probe::HeadProbe;
@@ -98,6 +98,12 @@ impl Device for Imagenex881 {
         Emulated::Head(Box::new(HeadEmulator::new(self.settings.clone(), self.sensor.latency, setup)))
     }
 
+    /// A return with its echo says the same as one of the profile point alone.
+    fn without(&self, what: Needless, packet: &[u8], shorter: &mut Vec<u8>) -> bool {
+        shorter.clear();
+        what == Needless::Echoes && without_echoes(packet, shorter).is_some()
+    }
+
     fn carriers(&self) -> &'static [Carrier] {
         &CARRIERS
     }
@@ -105,6 +111,27 @@ impl Device for Imagenex881 {
     fn driver(&self, setup: &DriverSetup) -> Box<dyn Driver> {
         Box::new(HeadDriver::new(self.settings.clone(), setup))
     }
+}
+
+/// The returns of a packet that holds whole ones alone, each as the head would have sent it when told to give the profile point
+/// alone; `None` where the packet holds something else, or no echo.
+fn without_echoes(packet: &[u8], shorter: &mut Vec<u8>) -> Option<()> {
+    let mut rest = packet;
+    while !rest.is_empty() {
+        let whole = Return::decode(rest, Some(Model::Head881)).ok()?;
+        let (frame, after) = rest.split_at_checked(whole.encode().ok()?.as_slice().len())?;
+        let point = match whole.header.tag {
+            Tag::Imx | Tag::Igx => {
+                Return { header: Header { tag: Tag::Ipx, ..whole.header }, echo: Bytes::default() }
+            }
+            _ => whole,
+        };
+        // What our encoding wouldn't give back isn't ours to change.
+        (whole.encode().ok()?.as_slice() == frame).then_some(())?;
+        shorter.extend_from_slice(point.encode().ok()?.as_slice());
+        rest = after;
+    }
+    (shorter.len() < packet.len()).then_some(())
 }
 
 /// Whole returns that gave no reading, by reason.

@@ -194,6 +194,27 @@ impl Framing for Frames {
     }
 }
 
+/// Messages that tell a place on Earth, a machine's own number, or what people wrote; none of them is read here: GPS_RAW_INT,
+/// GPS_STATUS, GLOBAL_POSITION_INT, SET_GPS_GLOBAL_ORIGIN, GPS_GLOBAL_ORIGIN, GLOBAL_POSITION_INT_COV, MISSION_ITEM_INT,
+/// POSITION_TARGET_GLOBAL_INT, HIL_GPS, GPS2_RAW, TERRAIN_REPORT, AUTOPILOT_VERSION, GPS_INPUT, HOME_POSITION, STATUSTEXT,
+/// OPEN_DRONE_ID_BASIC_ID. Source: MAVLink common message set.
+const IDENTITY: [u32; 16] = [24, 25, 33, 48, 49, 63, 73, 87, 113, 124, 136, 148, 232, 242, 253, 12900];
+
+/// The frames of a packet that holds whole ones alone, without those of [`IDENTITY`]; `None` where it holds something else, or
+/// none of them.
+pub(crate) fn without_identity(packet: &[u8], shorter: &mut Vec<u8>) -> Option<()> {
+    let mut rest = packet;
+    while !rest.is_empty() {
+        let header = Header::of(rest)?;
+        let (frame, after) = rest.split_at_checked(header.whole_bytes())?;
+        if !IDENTITY.contains(&header.message_id) {
+            shorter.extend_from_slice(frame);
+        }
+        rest = after;
+    }
+    (shorter.len() < packet.len()).then_some(())
+}
+
 #[cfg(test)]
 mod tests {
     use headrace_core::codec::contract::decode_all;

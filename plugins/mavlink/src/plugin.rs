@@ -2,7 +2,7 @@
 
 use headrace_core::app::App;
 use headrace_core::app::components::{DepthSensor, Echosounder, Imu};
-use headrace_core::app::device::{Device, DeviceKind, Emulated, EmulatorSetup, Sense};
+use headrace_core::app::device::{Device, DeviceKind, Emulated, EmulatorSetup, Needless, Sense};
 use headrace_core::app::driver::{Carrier, Driver, DriverSetup};
 use headrace_core::app::plugin::{Plugin, PluginError};
 use headrace_core::config::{ConfigError, Section, SensorConfig};
@@ -10,6 +10,7 @@ use headrace_core::config::{ConfigError, Section, SensorConfig};
 use crate::decoder::{DistancePart, MavlinkDecoder, Meaning, Part};
 use crate::driver::{self, MavlinkDriver};
 use crate::emulator::AutopilotEmulator;
+use crate::frame::without_identity;
 use crate::message::{ImuMessage, PressureMessage};
 
 /// Name in vehicle files.
@@ -138,6 +139,11 @@ impl Device for Autopilot {
             Part::Pressure { .. } => Emulated::Depth(emulator),
             Part::Distance(_) => Emulated::Echosounder(emulator),
         }
+    }
+
+    fn without(&self, what: Needless, packet: &[u8], shorter: &mut Vec<u8>) -> bool {
+        shorter.clear();
+        what == Needless::Identity && without_identity(packet, shorter).is_some()
     }
 
     fn carriers(&self) -> &'static [Carrier] {

@@ -16,6 +16,7 @@ use headrace_core::tunnel::named;
 
 use crate::Kind;
 use crate::decoder::{DistancePart, MavlinkDecoder, Meaning, Part};
+use crate::frame::without_identity;
 use crate::message::{Attitude, Distance, ImuMessage, Message, Pressure as Told, PressureMessage, Sender};
 
 /// ATTITUDE, RAW_IMU and SCALED_PRESSURE2 of an ArduSub, from a telemetry log.
@@ -294,4 +295,20 @@ fn wrong_keys_are_named() {
     assert!(error("part = \"imu\"\norientation = 25\n").contains("is not a key here"));
     assert!(error("part = \"pressure\"\nsystem_id = 0\n").contains("from 1 to 255"));
     assert!(configured("part = \"distance\"\nmin_confidence = 0.2\nunknown_confidence = 0.5\n").is_ok());
+}
+
+#[test]
+fn places_and_machine_numbers_go_and_readings_stay() {
+    // GLOBAL_POSITION_INT of both versions, the second one signed.
+    let first = [&[0xFE, 28, 0, 1, 1, 33][..], &[7; 28], &[0, 0]].concat();
+    let second = [&[0xFD, 20, 1, 0, 0, 1, 1, 33, 0, 0][..], &[7; 20], &[0, 0], &[9; 13]].concat();
+    let packet = [&first, RECORDED_ATTITUDE, &second, RECORDED_PRESSURE].concat();
+    let mut shorter = Vec::new();
+    assert_eq!(without_identity(&packet, &mut shorter), Some(()));
+    assert_eq!(shorter, [RECORDED_ATTITUDE, RECORDED_PRESSURE].concat());
+    for kept in [RECORDED_ATTITUDE, &packet[..50], &packet[1..]] {
+        assert_eq!(without_identity(kept, &mut Vec::new()), None);
+    }
+    let mut nothing = Vec::new();
+    assert_eq!((without_identity(&first, &mut nothing), nothing), (Some(()), Vec::new()));
 }

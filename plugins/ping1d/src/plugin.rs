@@ -2,16 +2,16 @@
 
 use headrace_core::app::App;
 use headrace_core::app::components::Echosounder;
-use headrace_core::app::device::{Decoder, Device, DeviceKind, Emulated, EmulatorSetup, Sense};
+use headrace_core::app::device::{Decoder, Device, DeviceKind, Emulated, EmulatorSetup, Needless, Sense};
 use headrace_core::app::driver::{Carrier, Driver, DriverSetup, Probe};
 use headrace_core::app::plugin::{Plugin, PluginError};
 use headrace_core::app::reading::{Decoded, EchoRange, Packet, Reading};
-use headrace_core::codec::{Codec as _, CodecCounts, LineClock};
+use headrace_core::codec::{Codec as _, CodecCounts, Framing as _, LineClock};
 use headrace_core::config::{ConfigError, Section, SensorConfig};
 use headrace_core::stateful;
 use headrace_core::time::DurNs;
 
-use crate::codec::{Distance, DistanceSimple, Frame, PingCodec};
+use crate::codec::{Addressed, Distance, DistanceSimple, Frame, Frames, Message, PingCodec};
 use crate::driver::{CARRIERS, PingDriver};
 use crate::emulator::PingEmulator;
 use crate::probe::PingProbe;
@@ -75,6 +75,12 @@ impl Device for Ping1d {
         Emulated::Echosounder(Box::new(PingEmulator::new(self.settings, self.sensor.latency, setup)))
     }
 
+    /// A profile says the same as a distance, but for its strengths.
+    fn without(&self, what: Needless, packet: &[u8], shorter: &mut Vec<u8>) -> bool {
+        shorter.clear();
+        what == Needless::Echoes && without_strengths(packet, shorter).is_some()
+    }
+
     fn carriers(&self) -> &'static [Carrier] {
         &CARRIERS
     }
@@ -82,6 +88,17 @@ impl Device for Ping1d {
     fn driver(&self, _: &DriverSetup) -> Box<dyn Driver> {
         Box::new(PingDriver::new(self.settings))
     }
+}
+
+/// A packet that is one profile as the distance that it tells; `None` where it is something else.
+fn without_strengths(packet: &[u8], shorter: &mut Vec<u8>) -> Option<()> {
+    let whole = Frames.read(packet)?;
+    let Message::Profile(profile) = whole.message else { return None };
+    // What our encoding wouldn't give back isn't ours to change.
+    (whole.encode().ok()?.as_slice() == packet).then_some(())?;
+    let distance = Addressed { message: Message::Distance(profile.distance), ..whole };
+    shorter.extend_from_slice(distance.encode().ok()?.as_slice());
+    Some(())
 }
 
 /// Messages to readings. Distances that another client has asked for are taken as well.

@@ -99,6 +99,16 @@ impl Channels {
         results.map(|channel| channel.definition.topic.clone()).collect()
     }
 
+    /// Topics that several channels have, with their numbers.
+    pub(super) fn doubles(&self) -> Vec<(String, Vec<u16>)> {
+        let mut topics: BTreeMap<&str, Vec<u16>> = BTreeMap::new();
+        for (id, channel) in &self.by_id {
+            topics.entry(&channel.definition.topic).or_default().push(*id);
+        }
+        let several = topics.into_iter().filter(|(_, ids)| ids.len() > 1);
+        several.map(|(topic, ids)| (topic.to_owned(), ids)).collect()
+    }
+
     fn source(&mut self, id: String, metadata: &BTreeMap<String, String>) -> u16 {
         let known = self.sources.iter().position(|source| source.id == id);
         let number = known.unwrap_or_else(|| {

@@ -69,6 +69,46 @@ pub enum LogError {
         /// The latest that is known here.
         known: u32,
     },
+    /// A folder without a log.
+    #[error("{} holds no log: nothing in it ends in .mcap", folder.display())]
+    NoLogs {
+        /// The folder.
+        folder: PathBuf,
+    },
+    /// Several logs, one of which isn't a part of a recording.
+    #[error(
+        "{} is not a part of a recording, and only the parts of one are read as one log; name a single log, or the parts alone",
+        path.display()
+    )]
+    NotAPart {
+        /// The log.
+        path: PathBuf,
+    },
+    /// Parts of several recordings.
+    #[error(
+        "{} and {} are parts of different recordings ({one_dive} and {other_dive}); name the parts of one",
+        one.display(), other.display()
+    )]
+    OtherDive {
+        /// A part of one of them.
+        one: PathBuf,
+        /// Its recording.
+        one_dive: String,
+        /// A part of another one.
+        other: PathBuf,
+        /// Its recording.
+        other_dive: String,
+    },
+    /// A part that is there twice.
+    #[error("{} and {} are both part {number} of the recording; name one of them", one.display(), other.display())]
+    PartTwice {
+        /// Its number.
+        number: u32,
+        /// A file.
+        one: PathBuf,
+        /// The other one.
+        other: PathBuf,
+    },
     /// A topic of a result outside the place for results.
     #[error("topic {topic:?} of a result must begin with {:?}", super::format::RESULT_PREFIX)]
     Topic {

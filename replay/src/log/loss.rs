@@ -45,6 +45,41 @@ pub enum LossKind {
     },
     /// Every record reads, but the checksum over all of them does not fit: a byte has changed, and nothing says which.
     DataSection,
+    /// Damage of one part of a recording.
+    InPart {
+        /// The part's number.
+        part: u32,
+        /// What is the matter with it.
+        kind: Box<LossKind>,
+    },
+    /// Parts of a recording that aren't there, from the first to the last; the last is `None` where nobody knows.
+    PartsMissing {
+        /// The first that is missing.
+        first: u32,
+        /// The last that is missing.
+        last: Option<u32>,
+    },
+    /// A part of a recording that holds something else than those around it say.
+    PartUnlike {
+        /// The part's number.
+        part: u32,
+        /// Messages that it and those before it have, as it says itself.
+        messages: u64,
+        /// The same as the next part says.
+        wanted: u64,
+    },
+    /// A part of a recording that can't be read at all, and why.
+    PartUnreadable {
+        /// The part's number, by the name of its file.
+        part: u32,
+        /// Why.
+        why: String,
+    },
+    /// A part whose own words on which part it is don't read; it was taken for this one by the name of its file.
+    PartByName {
+        /// The part's number.
+        part: u32,
+    },
     /// The log says so itself: its recorder left something out, or it was recovered from a damaged one.
     Stated(String),
 }
@@ -85,6 +120,40 @@ impl fmt::Display for LossKind {
                 out.write_str("some byte has changed: the checksum over the whole log does not fit")
             }
             Self::Stated(words) => out.write_str(words),
+            Self::InPart { part, kind } => write!(out, "part {part}: {kind}"),
+            Self::PartsMissing { first, last: None } => {
+                write!(out, "part {first} of the recording is missing, and any after it")
+            }
+            Self::PartsMissing { first, last: Some(last) } if first == last => {
+                write!(out, "part {first} of the recording is missing")
+            }
+            Self::PartsMissing { first, last: Some(last) } => {
+                write!(out, "parts {first} to {last} of the recording are missing")
+            }
+            Self::PartUnlike { part, messages, wanted } => write!(
+                out,
+                "part {part} is not the one that was recorded: with it there are {messages} messages, and the next part \
+                 says {wanted}"
+            ),
+            Self::PartUnreadable { part, why } => write!(out, "part {part} can't be read: {why}"),
+            Self::PartByName { part } => {
+                write!(out, "part {part} doesn't say which part it is; taken for that by its name")
+            }
+        }
+    }
+}
+
+impl LossKind {
+    /// Whether it lies in bytes of a file.
+    fn has_place(&self) -> bool {
+        match self {
+            Self::InPart { kind, .. } => kind.has_place(),
+            Self::Stated(_)
+            | Self::PartsMissing { .. }
+            | Self::PartUnlike { .. }
+            | Self::PartUnreadable { .. }
+            | Self::PartByName { .. } => false,
+            _ => true,
         }
     }
 }
@@ -92,10 +161,12 @@ impl fmt::Display for LossKind {
 impl fmt::Display for Loss {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut notes = Vec::new();
-        if matches!(self.kind, LossKind::Stated(_)) {
-            write!(out, "{}", self.kind)?;
-        } else {
-            write!(out, "byte {}: {}", self.offset, self.kind)?;
+        match &self.kind {
+            kind if !kind.has_place() => write!(out, "{kind}")?,
+            LossKind::InPart { part, kind } => write!(out, "part {part}, byte {}: {kind}", self.offset)?,
+            kind => write!(out, "byte {}: {kind}", self.offset)?,
+        }
+        if self.kind.has_place() {
             notes.push(format!("{} bytes", self.bytes));
         }
         notes.extend(self.from.map(|from| format!("after {:.3} s", from.as_secs_f64())));

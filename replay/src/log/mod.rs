@@ -9,12 +9,16 @@
 //! | record | content |
 //! |---|---|
 //! | metadata `headrace` | [`format::FORMAT_KEY`] and what the caller gave: version, digest of the configuration, clock anchors |
+//! | metadata `headrace.part` | only where a recording has several parts: which this one is ([`PartHead`]) |
 //! | attachments | `vehicle.toml` and the files that it names |
 //! | a chunk | definitions of all channels, nothing else |
 //! | metadata `headrace.channels` | the same definitions once more, so that a log survives the loss of that chunk |
 //! | metadata `headrace.losses` | only where something is missing: what, from when to when ([`format::LOSSES`]) |
 //! | chunks | messages, each chunk at most half a second of a dive |
+//! | metadata `headrace.part.end` | only in a part: whether another follows ([`PartEnd`]) |
 //! | summary | what viewers need to find their way |
+//!
+//! [`DiveLog`] reads one log, or the parts of a recording as one.
 //!
 //! The file is only ever appended to: nothing that has been written is touched again, whatever the power does.
 
@@ -22,27 +26,36 @@
 
 mod channels;
 mod chunk;
+mod dive_log;
 mod error;
 mod fields;
 pub mod format;
 mod framing;
 mod loss;
 mod merge;
+mod part;
 mod reader;
 mod recorder;
 mod recover;
+mod rotate;
 mod scan;
 mod search;
 mod space;
+mod trim;
+mod worker;
 mod writer;
 
+pub use dive_log::{DiveLog, DivePlace, PartFile, files_of};
 pub use error::LogError;
 pub use loss::{Loss, LossKind};
-pub use reader::{LogInfo, LogMessage, LogPlace, LogReader, MessageKind, file_digest};
+pub use part::{Part, PartEnd, PartHead, Progress, dive_name, part_path};
+pub use reader::{LogInfo, LogMessage, LogPlace, LogReader, MessageKind, file_digest, files_digest};
 pub use recorder::{Full, Recorder, RecorderHandle, RecorderPort, SentPort};
 pub use recover::{RECOVERED_FROM, Recovered, recover};
+pub use rotate::{Every, Rotation};
 pub use space::LeftOut;
-pub use writer::{LogHeader, LogWriter, ResultChannel, SourceInfo, Summary};
+pub use trim::{Change, TRIMMED, Trim, Trimmed, trim};
+pub use writer::{LogHeader, LogWriter, PartSummary, ResultChannel, SourceInfo, Summary};
 
 #[cfg(test)]
 mod tests;

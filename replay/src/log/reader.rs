@@ -17,6 +17,7 @@ use super::format::{VEHICLE_FILE, hex};
 use super::framing::{ChunkPlace, Definition, LogFile};
 use super::loss::Losses;
 use super::merge::{Batch, Merge};
+use super::part::Part;
 use super::scan::{Piece, Span, date_losses, scan};
 use super::{LogError, Loss, LossKind, SourceInfo};
 
@@ -35,6 +36,8 @@ pub struct LogInfo {
     /// The sources; a source's place is its number in [`MessageKind`]. Numbered by the channels' metadata where these
     /// number all of them (as in our logs), else by the names of `/raw/...` in their order, then `/sent/...`.
     pub sources: Vec<SourceInfo>,
+    /// Which part of a recording it is, where that has several.
+    pub part: Option<Part>,
 }
 
 /// What a message is.
@@ -133,10 +136,13 @@ impl<R: Read + Seek> LogReader<R> {
     pub fn new(input: R, name: String) -> Result<Self, LogError> {
         let mut file = LogFile::new(input, name)?;
         let (scan, channels) = scan(&mut file)?;
+        let mut metadata = scan.metadata;
+        let part = Part::take(&mut metadata);
         let mut info = LogInfo {
             vehicle_toml: None,
             attachments: scan.attachments,
-            metadata: scan.metadata,
+            metadata,
+            part,
             sources: channels.sources().to_vec(),
         };
         take_vehicle_file(&mut info);
@@ -171,9 +177,26 @@ impl<R: Read + Seek> LogReader<R> {
         self.channels.has_ticks()
     }
 
-    /// Topics of the results, in the order of their channels' numbers, and the sources: all whose channels have been read.
-    pub(super) fn channels_found(&self) -> (Vec<String>, Vec<SourceInfo>) {
-        (self.channels.result_topics(), self.channels.sources().to_vec())
+    /// Log times between which its messages lie, as the heads of its chunks say.
+    pub(super) fn times(&self) -> Option<(MonoNs, MonoNs)> {
+        let dated = self.spans.iter().filter(|span| span.is_dated());
+        let times = dated.map(|span| (MonoNs(span.from), MonoNs(span.to)));
+        times.reduce(|all, one| (all.0.min(one.0), all.1.max(one.1)))
+    }
+
+    /// Topics of the results, in the order of their channels' numbers: all whose channels have been read.
+    pub(super) fn result_topics(&self) -> Vec<String> {
+        self.channels.result_topics()
+    }
+
+    /// Topics that several channels have, with the channels' numbers.
+    pub(super) fn doubles(&self) -> Vec<(String, Vec<u16>)> {
+        self.channels.doubles()
+    }
+
+    /// The sources: all whose channels have been read.
+    pub(super) fn sources(&self) -> &[SourceInfo] {
+        self.channels.sources()
     }
 
     /// What has been found damaged. Damage to the framing is known from the start, that within chunks when they have
@@ -187,6 +210,18 @@ impl<R: Read + Seek> LogReader<R> {
         self.late
     }
 
+    /// Reads on to the next message; `false` at the end.
+    pub(super) fn has_next(&mut self) -> Result<bool, LogError> {
+        while self.must_read() {
+            self.read_piece()?;
+        }
+        let found = self.merge.next_time().is_some();
+        if !found {
+            self.finish()?;
+        }
+        Ok(found)
+    }
+
     /// The next message, or `None` at the end.
     ///
     /// Errors: the medium fails; damage is no error.
@@ -195,13 +230,10 @@ impl<R: Read + Seek> LogReader<R> {
         reason = "messages borrow from the reader, which no Iterator allows"
     )]
     pub fn next(&mut self) -> Result<Option<LogMessage<'_>>, LogError> {
-        while self.must_read() {
-            self.read_piece()?;
-        }
-        let Some((entry, slot)) = self.merge.pop() else {
-            self.finish()?;
+        if !self.has_next()? {
             return Ok(None);
-        };
+        }
+        let Some((entry, slot)) = self.merge.pop() else { return Ok(None) };
         if self.by_time {
             self.late += u64::from(entry.head.log_time < self.latest);
             self.latest = self.latest.max(entry.head.log_time);
@@ -404,16 +436,27 @@ fn place_entries(batch: &mut Batch, channels: &Channels, found: &mut Vec<LossKin
 ///
 /// Errors: the file can't be read.
 pub fn file_digest(path: &Path) -> Result<String, LogError> {
-    let failed = |source| LogError::Open { path: path.to_owned(), source };
-    let mut file = File::open(path).map_err(failed)?;
+    files_digest(&[path])
+}
+
+/// SHA-256 of the bytes of files one after the other, in hex.
+///
+/// Errors: a file can't be read.
+pub fn files_digest(paths: &[impl AsRef<Path>]) -> Result<String, LogError> {
     let mut hasher = Sha256::new();
     let mut block = vec![0; 1 << 16];
-    loop {
-        match file.read(&mut block) {
-            Ok(0) => return Ok(hex(&hasher.finalize())),
-            Ok(len) => hasher.update(block.get(..len).unwrap_or_default()),
-            Err(error) if error.kind() == std::io::ErrorKind::Interrupted => {}
-            Err(source) => return Err(failed(source)),
+    for path in paths {
+        let path = path.as_ref();
+        let failed = |source| LogError::Open { path: path.to_owned(), source };
+        let mut file = File::open(path).map_err(failed)?;
+        loop {
+            match file.read(&mut block) {
+                Ok(0) => break,
+                Ok(len) => hasher.update(block.get(..len).unwrap_or_default()),
+                Err(error) if error.kind() == std::io::ErrorKind::Interrupted => {}
+                Err(source) => return Err(failed(source)),
+            }
         }
     }
+    Ok(hex(&hasher.finalize()))
 }

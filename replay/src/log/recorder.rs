@@ -4,39 +4,32 @@
 //! more, and leaves packets in their ports' rings while the queue is full.
 
 use std::fs::{File, OpenOptions};
-use std::io::{BufWriter, Write};
+use std::io::{BufWriter, ErrorKind, Write};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::{self, JoinHandle};
-use std::time::{Duration, Instant};
 
 use crossbeam::queue::ArrayQueue;
 use headrace_core::time::MonoNs;
 use ringbuf::HeapRb;
-use ringbuf::traits::{Consumer as _, Observer as _, Producer as _};
+use ringbuf::traits::{Observer as _, Producer as _};
 use ringbuf::wrap::{Cons, Prod};
 
 use super::LogError;
-use super::fields::Fields;
 use super::format::{TICK_HEAD_BYTES, order_bytes, tick_head};
-use super::space::{LONGEST_KEPT_BYTES, Space};
+use super::part::part_path;
+use super::rotate::{Parts, Rotation, in_the_way};
+use super::space::Space;
+use super::worker::{Echoes, Queue, Worker};
 use super::writer::{Lane, LogHeader, LogWriter, Summary};
 
 /// Bytes before each entry in the queue: kind, a spare byte, number, length, log time, publish time.
-const ENTRY_HEAD_BYTES: usize = 24;
+pub(super) const ENTRY_HEAD_BYTES: usize = 24;
 /// A queue is never smaller than that: the longest packet of a port, and a tick that names many.
 const MIN_QUEUE_BYTES: usize = 64 * 1024;
-/// How long the thread sleeps when the queue is empty. The loop can't wake it: that would be a system call.
-const NAP: Duration = Duration::from_millis(2);
-/// How often a chunk is closed and brought to the medium. Half of the second that a power cut may cost, since closing
-/// and syncing take their time too.
-const FLUSH_PERIOD: Duration = Duration::from_millis(500);
 /// Messages to devices that may wait: some seconds of eight heads.
 const SENT_MESSAGES: usize = 2048;
-/// Entries between two looks at the clock.
-const BATCH: usize = 256;
-
 /// An entry that the queue has no room for; nothing of it was written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("the recorder's queue has room for {free} bytes and an entry needs {needed}")]
@@ -65,19 +58,20 @@ pub struct RecorderHandle {
     state: Arc<State>,
 }
 
-struct State {
-    stopping: AtomicBool,
-    failed: AtomicBool,
+pub(super) struct State {
+    pub(super) stopping: AtomicBool,
+    pub(super) failed: AtomicBool,
     /// What the ports' threads have sent to the devices: it doesn't pass the loop.
-    sent: ArrayQueue<SentMessage>,
-    sent_dropped: AtomicU64,
+    pub(super) sent: ArrayQueue<SentMessage>,
+    pub(super) sent_dropped: AtomicU64,
+    pub(super) results_missing: AtomicU64,
 }
 
 /// Bytes sent to a device.
-struct SentMessage {
-    source: u16,
-    at: MonoNs,
-    bytes: Vec<u8>,
+pub(super) struct SentMessage {
+    pub(super) source: u16,
+    pub(super) at: MonoNs,
+    pub(super) bytes: Vec<u8>,
 }
 
 /// Takes what is sent to devices into the log, from any thread. When the queue is full the oldest is dropped, and counted.
@@ -121,7 +115,17 @@ impl Recorder {
         header: &LogHeader,
         queue_bytes: usize,
     ) -> Result<(RecorderPort, RecorderHandle), LogError> {
-        let mut log = LogWriter::new(writer, header)?;
+        Self::begin(space, LogWriter::new(writer, header)?, None, header, queue_bytes)
+    }
+
+    /// Starts the thread of a log that has been begun, perhaps in parts.
+    fn begin<W: Write + Send + 'static>(
+        space: Space,
+        mut log: LogWriter<W>,
+        parts: Option<Parts<W>>,
+        header: &LogHeader,
+        queue_bytes: usize,
+    ) -> Result<(RecorderPort, RecorderHandle), LogError> {
         log.flush()?;
         let ring = Arc::new(HeapRb::new(queue_bytes.max(MIN_QUEUE_BYTES)));
         let state = Arc::new(State {
@@ -129,12 +133,13 @@ impl Recorder {
             failed: AtomicBool::new(false),
             sent: ArrayQueue::new(SENT_MESSAGES),
             sent_dropped: AtomicU64::new(0),
+            results_missing: AtomicU64::new(0),
         });
         let queue = Queue { ring: Cons::new(Arc::clone(&ring)), message: Vec::new() };
         let thread_state = Arc::clone(&state);
         let thread = thread::Builder::new().name("recorder".to_owned());
-        let echoes = header.results.iter().map(|result| result.follows_echoes).collect();
-        let thread = thread.spawn(move || Worker::new(log, space, echoes, &thread_state).run(queue));
+        let echoes = Echoes::of(header);
+        let thread = thread.spawn(move || Worker::new(log, parts, space, echoes, &thread_state).run(queue));
         let thread = Some(thread.map_err(|source| LogError::Thread { source })?);
         let port = RecorderPort {
             ring: Prod::new(ring),
@@ -153,12 +158,43 @@ impl Recorder {
         header: &LogHeader,
         queue_bytes: usize,
     ) -> Result<(RecorderPort, RecorderHandle), LogError> {
-        let failed = |source| LogError::Create { path: path.to_owned(), source };
-        let file = OpenOptions::new().write(true).create_new(true).open(path).map_err(failed)?;
-        sync_folder_of(path).map_err(failed)?;
-        let space = file.try_clone().map_or_else(|_| Space::endless(), Space::of);
-        Self::start_within(space, SyncedFile(BufWriter::new(file)), header, queue_bytes)
+        let file = new_file(path)?;
+        let space = file.space();
+        Self::start_within(space, file, header, queue_bytes)
     }
+
+    /// The same in parts, each a log of its own; `path` names the recording, and [`part_path`] its parts.
+    ///
+    /// Errors: as for [`Recorder::create`]; also where a file is there that would be taken for a part of this recording.
+    pub fn create_in_parts(
+        path: &Path,
+        header: &LogHeader,
+        rotation: &Rotation,
+        queue_bytes: usize,
+    ) -> Result<(RecorderPort, RecorderHandle), LogError> {
+        let failed = |path: &Path, source| LogError::Create { path: path.to_owned(), source };
+        if let Some(other) = in_the_way(path).map_err(|source| failed(path, source))? {
+            return Err(failed(&other, ErrorKind::AlreadyExists.into()));
+        }
+        let recording = path.to_owned();
+        let open = Box::new(move |number| {
+            let path = part_path(&recording, number);
+            new_file(&path).map(|file| (path, file))
+        });
+        let (parts, log) = Parts::begin(rotation, header, open)?;
+        // All parts are on one disk.
+        let first = part_path(path, 1);
+        let space = File::open(&first).map_or_else(|_| Space::endless(), Space::of);
+        Self::begin(space, log, Some(parts), header, queue_bytes)
+    }
+}
+
+/// A new file for a log.
+fn new_file(path: &Path) -> Result<SyncedFile, LogError> {
+    let failed = |source| LogError::Create { path: path.to_owned(), source };
+    let file = OpenOptions::new().write(true).create_new(true).open(path).map_err(failed)?;
+    sync_folder_of(path).map_err(failed)?;
+    Ok(SyncedFile(BufWriter::new(file)))
 }
 
 /// Makes the entry of a new file in its folder survive a power cut. Other systems than Unix don't open folders.
@@ -169,6 +205,12 @@ fn sync_folder_of(path: &Path) -> std::io::Result<()> {
 
 /// A file whose flush reaches the medium.
 struct SyncedFile(BufWriter<File>);
+
+impl SyncedFile {
+    fn space(&self) -> Space {
+        self.0.get_ref().try_clone().map_or_else(|_| Space::endless(), Space::of)
+    }
+}
 
 impl Write for SyncedFile {
     fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
@@ -213,6 +255,11 @@ impl RecorderPort {
     /// Errors: no room; nothing was written.
     pub fn result(&mut self, channel: u16, time: MonoNs, bytes: &[u8]) -> Result<(), Full> {
         self.push(Lane::Result(channel), time, time, bytes)
+    }
+
+    /// Counts a tick of whose results there was no room for all.
+    pub fn miss_results(&mut self) {
+        self.state.results_missing.fetch_add(1, Ordering::Relaxed);
     }
 
     /// How many channels for results the log has.
@@ -300,158 +347,5 @@ impl RecorderHandle {
 impl Drop for RecorderHandle {
     fn drop(&mut self) {
         self.stop();
-    }
-}
-
-/// The thread's end of the queue.
-struct Queue {
-    ring: Cons<Arc<HeapRb<u8>>>,
-    /// The message of the entry taken last.
-    message: Vec<u8>,
-}
-
-struct Entry {
-    lane: Lane,
-    log_time: MonoNs,
-    publish_time: MonoNs,
-}
-
-impl Queue {
-    /// The next entry, if all of it is there; its message is then in `message`.
-    fn take(&mut self) -> Option<Entry> {
-        let mut head = [0; ENTRY_HEAD_BYTES];
-        if self.ring.peek_slice(&mut head) < ENTRY_HEAD_BYTES {
-            return None;
-        }
-        let mut fields = Fields::new(&head);
-        let (kind, _, number) = (fields.u8()?, fields.u8()?, fields.u16()?);
-        let len = usize::try_from(fields.u32()?).ok()?;
-        if self.ring.occupied_len() < ENTRY_HEAD_BYTES + len {
-            return None;
-        }
-        let lane = match kind {
-            0 => Lane::Raw(number),
-            1 => Lane::Sent(number),
-            2 => Lane::Tick,
-            _ => Lane::Result(number),
-        };
-        self.ring.skip(ENTRY_HEAD_BYTES);
-        self.message.resize(len, 0);
-        self.ring.pop_slice(&mut self.message);
-        Some(Entry { lane, log_time: MonoNs(fields.u64()?), publish_time: MonoNs(fields.u64()?) })
-    }
-}
-
-/// What the thread does.
-struct Worker<'a, W: Write> {
-    /// `None` once it has failed.
-    log: Option<LogWriter<W>>,
-    error: Option<LogError>,
-    discarded: u64,
-    flushed: Instant,
-    /// Whether something was written since.
-    open: bool,
-    space: Space,
-    /// Which results follow echo by echo.
-    echoes: Vec<bool>,
-    state: &'a State,
-}
-
-#[expect(
-    clippy::disallowed_methods,
-    reason = "how long a chunk stays open is wall time, and no result depends on it"
-)]
-fn wall_clock() -> Instant {
-    Instant::now()
-}
-
-impl<'a, W: Write> Worker<'a, W> {
-    fn new(log: LogWriter<W>, space: Space, echoes: Vec<bool>, state: &'a State) -> Self {
-        let flushed = wall_clock();
-        Self { log: Some(log), error: None, discarded: 0, flushed, open: false, space, echoes, state }
-    }
-
-    fn run(mut self, mut queue: Queue) -> Result<Summary, LogError> {
-        loop {
-            self.space.look(wall_clock());
-            // Read before the queue is looked at: what was pushed before the flag was set is then taken.
-            let stopping = self.state.stopping.load(Ordering::Acquire);
-            let taken =
-                (0..BATCH).map_while(|_| queue.take().map(|entry| self.write(&entry, &queue.message)));
-            let taken = taken.count() + self.write_sent();
-            self.flush_in_time();
-            if taken == 0 && stopping {
-                return self.finish();
-            }
-            if taken == 0 {
-                thread::park_timeout(NAP);
-            }
-        }
-    }
-
-    fn write(&mut self, entry: &Entry, message: &[u8]) {
-        self.discarded += u64::from(self.log.is_none());
-        self.open = true;
-        let result = |number: u16| self.echoes.get(usize::from(number)).copied().unwrap_or_default();
-        let is_echo = match entry.lane {
-            Lane::Raw(_) => message.len() > LONGEST_KEPT_BYTES,
-            Lane::Result(number) => result(number),
-            Lane::Sent(_) | Lane::Tick => false,
-        };
-        if is_echo && self.space.is_scarce() {
-            return self.attempt(|log, space| space.leave_out(entry.log_time, message.len(), log));
-        }
-        self.attempt(|log, _| log.message(entry.lane, entry.log_time, entry.publish_time, message));
-    }
-
-    /// Writes what has been sent to the devices; gives the number of messages.
-    fn write_sent(&mut self) -> usize {
-        let state = self.state;
-        let mut written = 0;
-        while let Some(message) = state.sent.pop() {
-            let entry =
-                Entry { lane: Lane::Sent(message.source), log_time: message.at, publish_time: message.at };
-            self.write(&entry, &message.bytes);
-            written += 1;
-        }
-        written
-    }
-
-    fn flush_in_time(&mut self) {
-        let now = wall_clock();
-        if !self.open {
-            self.flushed = now;
-        } else if now.duration_since(self.flushed) >= FLUSH_PERIOD {
-            self.attempt(|log, _| log.flush());
-            (self.flushed, self.open) = (now, false);
-        }
-    }
-
-    fn attempt(&mut self, action: impl FnOnce(&mut LogWriter<W>, &mut Space) -> Result<(), LogError>) {
-        let Some(log) = self.log.as_mut() else { return };
-        if let Err(error) = action(log, &mut self.space) {
-            tracing::error!("the dive goes on unrecorded: {error}");
-            self.error = Some(error);
-            self.log = None;
-            self.state.failed.store(true, Ordering::Release);
-        }
-    }
-
-    fn finish(mut self) -> Result<Summary, LogError> {
-        let left_out = self.space.left_out();
-        if let Some((from, to)) = left_out.span {
-            self.attempt(|log, _| log.lost(Some(from), Some(to), &left_out.words()));
-        }
-        let finished = match (self.log, self.error) {
-            (Some(log), _) => log.finish().map(|(_, summary)| Summary { left_out, ..summary }),
-            (None, Some(error)) => {
-                Err(LogError::Stopped { discarded: self.discarded, source: Box::new(error) })
-            }
-            (None, None) => Err(LogError::Panicked),
-        };
-        if finished.is_err() {
-            self.state.failed.store(true, Ordering::Release);
-        }
-        finished
     }
 }

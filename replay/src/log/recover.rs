@@ -8,7 +8,7 @@ use headrace_core::time::MonoNs;
 use super::format::BYTES_ENCODING;
 use super::writer::Lane;
 use super::{
-    LogError, LogHeader, LogMessage, LogReader, LogWriter, Loss, LossKind, MessageKind, ResultChannel,
+    DiveLog, LogError, LogHeader, LogMessage, LogWriter, Loss, LossKind, MessageKind, ResultChannel,
     SourceInfo,
 };
 
@@ -27,19 +27,21 @@ pub struct Recovered {
 }
 
 /// Writes what reads of a log to `output`, in the same order: attachments, metadata, messages of devices, ticks and results. It
-/// replays to the same digest, and states what is missing. `open` opens the log, twice: first it is read to find all damage.
+/// replays to the same digest, and states what is missing. Parts of a recording become one log; a part alone stays one. `open` opens the log, twice: first it is read to find all damage.
 /// `known` are the result channels whose schemas this program has; `from` is what the new log says it was made from.
 ///
 /// Errors: the log can't be read at all, or the output not be written.
 pub fn recover<R: Read + Seek, W: Write>(
-    open: &mut dyn FnMut() -> Result<LogReader<R>, LogError>,
+    open: &mut dyn FnMut() -> Result<DiveLog<R>, LogError>,
     output: W,
     known: &[ResultChannel],
     from: &str,
 ) -> Result<Recovered, LogError> {
     let Found { losses, topics, sources } = look_through(open()?)?;
     let mut reader = open()?;
-    let mut log = LogWriter::new(output, &header(&reader, &topics, sources, known, from))?;
+    let mut begin = header(&reader, &topics, sources, known);
+    begin.metadata.insert(RECOVERED_FROM.to_owned(), from.to_owned());
+    let mut log = LogWriter::new(output, &begin)?;
     for loss in &losses {
         log.lost(loss.from, loss.to, &words(loss))?;
     }
@@ -51,24 +53,27 @@ pub fn recover<R: Read + Seek, W: Write>(
         done.messages += 1;
         done.span = Some((done.span.map_or(message.log_time, |span| span.0), message.log_time));
     }
+    if let Some(end) = reader.header().part.as_ref().and_then(|part| part.end.as_ref()) {
+        log.end_part(end.follows)?;
+    }
     log.finish()?;
     Ok(done)
 }
 
 /// What is known of a log when it has been read to its end.
-struct Found {
+pub(super) struct Found {
     /// What a dive log has no channel for included.
-    losses: Vec<Loss>,
-    topics: Vec<String>,
-    sources: Vec<SourceInfo>,
+    pub(super) losses: Vec<Loss>,
+    pub(super) topics: Vec<String>,
+    pub(super) sources: Vec<SourceInfo>,
 }
 
-fn look_through<R: Read + Seek>(mut reader: LogReader<R>) -> Result<Found, LogError> {
+pub(super) fn look_through<R: Read + Seek>(mut reader: DiveLog<R>) -> Result<Found, LogError> {
     let mut others = 0_u64;
     while let Some(message) = reader.next()? {
         others += u64::from(message.kind == MessageKind::Other);
     }
-    let mut losses = reader.losses().to_vec();
+    let mut losses = reader.losses();
     if others > 0 {
         let words = format!("{others} messages of channels that a dive log doesn't have");
         losses.push(Loss { kind: LossKind::Stated(words), offset: 0, bytes: 0, from: None, to: None });
@@ -77,23 +82,20 @@ fn look_through<R: Read + Seek>(mut reader: LogReader<R>) -> Result<Found, LogEr
     Ok(Found { losses, topics, sources })
 }
 
-fn words(loss: &Loss) -> String {
+pub(super) fn words(loss: &Loss) -> String {
     match &loss.kind {
         LossKind::Stated(words) => words.clone(),
         kind => format!("{kind}: {} bytes from byte {} of the log before recovery", loss.bytes, loss.offset),
     }
 }
 
-fn header<R: Read + Seek>(
-    reader: &LogReader<R>,
+pub(super) fn header<R: Read + Seek>(
+    reader: &DiveLog<R>,
     topics: &[String],
     sources: Vec<SourceInfo>,
     known: &[ResultChannel],
-    from: &str,
 ) -> LogHeader {
     let info = reader.header();
-    let mut metadata = info.metadata.clone();
-    metadata.insert(RECOVERED_FROM.to_owned(), from.to_owned());
     let result = |topic: &String| {
         let known = known.iter().find(|channel| channel.topic == *topic);
         known.cloned().unwrap_or_else(|| ResultChannel {
@@ -105,15 +107,17 @@ fn header<R: Read + Seek>(
     LogHeader {
         vehicle_toml: info.vehicle_toml.clone().unwrap_or_default(),
         attachments: info.attachments.clone(),
-        metadata,
+        metadata: info.metadata.clone(),
         sources,
         ticks: reader.has_ticks(),
         results: topics.iter().map(result).collect(),
+        sonars: Vec::new(),
+        part: info.part.as_ref().map(|part| part.head.clone()),
     }
 }
 
 /// The channel of the new log that a message goes to; `None` for what a dive log has none for.
-fn lane(message: &LogMessage<'_>, results: &BTreeMap<&str, u16>) -> Option<Lane> {
+pub(super) fn lane(message: &LogMessage<'_>, results: &BTreeMap<&str, u16>) -> Option<Lane> {
     match message.kind {
         MessageKind::Raw { source } => Some(Lane::Raw(source)),
         MessageKind::Sent { source } => Some(Lane::Sent(source)),

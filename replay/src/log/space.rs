@@ -1,8 +1,8 @@
 //! The room that is left on the disk of a recording, and what is left out when it gets scarce.
 //!
 //! A dive outlives its disk: what is small and can't be had again (readings of position, ticks, judgements, advice) is kept to the
-//! last byte; echoes, by far the most of a log, go first. Which packets are echoes is told by their length: the recorder knows
-//! no device. Heads that send ranges alone have short packets, which are kept: such a dive still replays to its digest.
+//! last byte; echoes, by far the most of a log, go first. Which packets are echoes is told by their source and their length: the
+//! header says which sources are sonars, since the recorder knows no device. Heads that send ranges alone have short packets, which are kept: such a dive still replays to its digest.
 
 use std::fs::File;
 use std::time::{Duration, Instant};
@@ -16,7 +16,7 @@ use super::writer::LogWriter;
 const WARN_BELOW_BYTES: u64 = 1 << 30;
 /// Below so many free bytes echoes are left out: what is kept has room for days in them.
 const SPARE_BELOW_BYTES: u64 = 128 << 20;
-/// Longer packets are echoes; those of inertial units, depth sensors and counters are shorter.
+/// Longer packets of sonars are echoes; ranges alone are shorter.
 pub(super) const LONGEST_KEPT_BYTES: usize = 128;
 /// How often the system is asked.
 const ASK_EVERY: Duration = Duration::from_secs(2);

@@ -3,7 +3,9 @@
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{BufWriter, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use headrace_core::time::{DurNs, MonoNs};
 use mcap::records::{MessageHeader, Metadata};
@@ -11,15 +13,19 @@ use mcap::write::NoSeek;
 
 use super::format::{
     ATTACHMENT_PREFIX, BYTES_ENCODING, CHANNEL_LIST, CONNECT_KEY, FORMAT_KEY, FORMAT_VERSION, LIBRARY,
-    LOSSES, METADATA, PLUGIN_KEY, RAW_PREFIX, RESULT_PREFIX, SENT_PREFIX, SOURCE_KEY, TICK_TOPIC,
+    LOSSES, METADATA, PLUGIN_KEY, RAW_PREFIX, RESULT_PREFIX, SENT_PREFIX, SOURCE_KEY, TICK_TOPIC, Tick,
     VEHICLE_FILE, order_bytes, seal, stated_loss, tick_head,
 };
+use super::part::{PART, PART_END, PartEnd, PartHead, Progress};
 use super::{LeftOut, LogError};
 
 /// A chunk is closed when it holds more than this, whatever the clock says.
 const CHUNK_BYTES: u64 = 1 << 20;
 /// A chunk is closed once its messages span so much of the dive's own time.
 const CHUNK_SPAN: DurNs = DurNs(500_000_000);
+/// What the summary has of a chunk, and of each of its channels besides. Source: MCAP format specification, "Chunk Index".
+const CHUNK_INDEX_BYTES: u64 = 80;
+const CHUNK_INDEX_CHANNEL_BYTES: u64 = 10;
 
 /// What a log begins with.
 #[derive(Debug, Clone, Default)]
@@ -36,6 +42,10 @@ pub struct LogHeader {
     pub ticks: bool,
     /// The results; a result's place is its number in the messages.
     pub results: Vec<ResultChannel>,
+    /// Numbers of the sources that are sonars: their long packets are echoes, which are left out when a disk fills.
+    pub sonars: Vec<u16>,
+    /// Where it is one part of several. Its channels count on from there.
+    pub part: Option<PartHead>,
 }
 
 /// A source of bytes, as its channels describe it.
@@ -67,7 +77,7 @@ pub struct ResultChannel {
 }
 
 /// What has been written.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Summary {
     /// Messages of all channels.
     pub messages: u64,
@@ -77,8 +87,25 @@ pub struct Summary {
     pub chunks: u32,
     /// Bytes of the file.
     pub bytes: u64,
+    /// Messages from the sources.
+    pub raw_messages: u64,
     /// What a recorder has left out because its disk was nearly full.
     pub left_out: LeftOut,
+    /// Messages to devices that a recorder had no room for.
+    pub sent_dropped: u64,
+    /// Ticks of which a recorder had no room for all the results.
+    pub results_missing: u64,
+    /// The files of a recording in parts, in their order.
+    pub parts: Vec<PartSummary>,
+}
+
+/// A part of a recording that has been written.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct PartSummary {
+    /// Its file.
+    pub path: PathBuf,
+    /// Messages from the sources.
+    pub raw_messages: u64,
 }
 
 /// A channel by what it carries.
@@ -102,7 +129,9 @@ struct Channel {
 /// Chunks are compressed with zstd at its lowest level: a dive is written where nobody waits for it, at some hundred
 /// kB/s, of which even a small computer packs a thousandfold; so the smaller file wins over lz4's speed.
 pub struct LogWriter<W: Write> {
-    writer: mcap::Writer<NoSeek<W>>,
+    writer: mcap::Writer<NoSeek<Counted<W>>>,
+    /// Bytes that have left for the medium.
+    bytes: Arc<AtomicU64>,
     raw: Vec<Channel>,
     sent: Vec<Channel>,
     tick: Option<Channel>,
@@ -110,6 +139,11 @@ pub struct LogWriter<W: Write> {
     tick_message: Vec<u8>,
     messages: u64,
     message_bytes: u64,
+    raw_messages: u64,
+    chunks: u64,
+    last_tick: Option<u64>,
+    /// How far earlier parts went.
+    before: Progress,
     /// Losses stated.
     losses: u64,
     /// Time of the first message of the chunk that is open.
@@ -144,7 +178,9 @@ impl<W: Write> LogWriter<W> {
             .compression_threads(0)
             .chunk_size(Some(CHUNK_BYTES))
             .disable_seeking(true);
-        let mut writer = options.create(NoSeek::new(writer)).map_err(LogError::writing("the first bytes"))?;
+        let bytes = Arc::new(AtomicU64::new(0));
+        let counted = NoSeek::new(Counted { writer, bytes: Arc::clone(&bytes) });
+        let mut writer = options.create(counted).map_err(LogError::writing("the first bytes"))?;
         write_metadata(&mut writer, header)?;
         let mut list = BTreeMap::new();
         let vehicle = (VEHICLE_FILE, "application/toml", header.vehicle_toml.as_bytes());
@@ -162,8 +198,10 @@ impl<W: Write> LogWriter<W> {
         let tick = tick.transpose()?;
         let results = channels.add_results(&header.results)?;
         channels.write()?;
-        Ok(Self {
+        let before = header.part.as_ref().map(|part| part.before.clone()).unwrap_or_default();
+        let mut log = Self {
             writer,
+            bytes,
             raw,
             sent,
             tick,
@@ -171,9 +209,61 @@ impl<W: Write> LogWriter<W> {
             tick_message: Vec::new(),
             messages: 0,
             message_bytes: 0,
+            raw_messages: 0,
+            chunks: 0,
+            last_tick: before.tick,
+            before,
             losses: 0,
             chunk_began: None,
-        })
+        };
+        log.count_on(header);
+        Ok(log)
+    }
+
+    /// Numbers messages from where earlier parts ended.
+    fn count_on(&mut self, header: &LogHeader) {
+        let before = core::mem::take(&mut self.before);
+        for (topic, channel) in self.channels(header) {
+            channel.sequence = before.sequences.get(&topic).copied().unwrap_or_default();
+        }
+        self.before = before;
+    }
+
+    /// All channels with their topics.
+    fn channels(&mut self, header: &LogHeader) -> Vec<(String, &mut Channel)> {
+        let topics =
+            |prefix: &'static str| header.sources.iter().map(move |source| format!("{prefix}{}", source.id));
+        let mut all: Vec<(String, &mut Channel)> = topics(RAW_PREFIX).zip(&mut self.raw).collect();
+        all.extend(topics(SENT_PREFIX).zip(&mut self.sent));
+        all.extend(self.tick.as_mut().map(|channel| (TICK_TOPIC.to_owned(), channel)));
+        all.extend(header.results.iter().map(|result| result.topic.clone()).zip(&mut self.results));
+        all
+    }
+
+    /// How far the recording has come, earlier parts included. `header` is the one that it was begun with.
+    pub(super) fn progress(&mut self, header: &LogHeader) -> Progress {
+        let sequences = self.channels(header).into_iter().map(|(topic, channel)| (topic, channel.sequence));
+        let sequences = sequences.collect();
+        Progress { messages: self.before.messages + self.messages, tick: self.last_tick, sequences }
+    }
+
+    /// Bytes of the file, should it be ended now: about, since the last chunk isn't packed yet.
+    pub(super) fn bytes(&self) -> u64 {
+        let channels = self.raw.len() + self.sent.len() + self.results.len() + 1;
+        let index = CHUNK_INDEX_BYTES + CHUNK_INDEX_CHANNEL_BYTES * channels as u64;
+        self.bytes.load(Ordering::Relaxed) + index * self.chunks
+    }
+
+    /// Says how far the recording has come with this part, and whether another follows. Closes the chunk.
+    ///
+    /// Errors: the writer's.
+    pub(super) fn end_part(&mut self, follows: bool) -> Result<(), LogError> {
+        let messages = self.before.messages + self.messages;
+        let after = Progress { messages, tick: self.last_tick, ..Progress::default() };
+        let entries = PartEnd { after, follows }.entries();
+        let record = Metadata { name: PART_END.to_owned(), metadata: seal(PART_END, entries) };
+        self.flush()?;
+        self.writer.write_metadata(&record).map_err(LogError::writing("the end of a part"))
     }
 
     /// Bytes that `source` sent, received at `received` and valid for `valid`.
@@ -244,11 +334,17 @@ impl<W: Write> LogWriter<W> {
         let began = *self.chunk_began.get_or_insert(log_time);
         if log_time.since(began).0 >= CHUNK_SPAN.0 {
             self.writer.flush().map_err(LogError::writing("a chunk"))?;
+            self.chunks += 1;
             self.chunk_began = Some(log_time);
         }
         self.writer.write_to_known_channel(&header, bytes).map_err(LogError::writing("a message"))?;
         self.messages += 1;
         self.message_bytes += bytes.len() as u64;
+        match lane {
+            Lane::Raw(_) => self.raw_messages += 1,
+            Lane::Tick => self.last_tick = Tick::decode(bytes).ok().map(|tick| tick.index),
+            Lane::Sent(_) | Lane::Result(_) => {}
+        }
         Ok(())
     }
 
@@ -267,7 +363,7 @@ impl<W: Write> LogWriter<W> {
     ///
     /// Errors: the writer's.
     pub fn flush(&mut self) -> Result<(), LogError> {
-        self.chunk_began = None;
+        self.chunks += u64::from(self.chunk_began.take().is_some());
         self.writer.flush().map_err(LogError::writing("a chunk"))
     }
 
@@ -284,24 +380,47 @@ impl<W: Write> LogWriter<W> {
             message_bytes: self.message_bytes,
             chunks: u32::try_from(chunks).unwrap_or(u32::MAX),
             bytes,
-            left_out: LeftOut::default(),
+            raw_messages: self.raw_messages,
+            ..Summary::default()
         };
-        Ok((writer.into_inner(), summary))
+        Ok((writer.into_inner().writer, summary))
     }
 }
 
 fn write_metadata<W: Write>(
-    writer: &mut mcap::Writer<NoSeek<W>>,
+    writer: &mut mcap::Writer<NoSeek<Counted<W>>>,
     header: &LogHeader,
 ) -> Result<(), LogError> {
     let mut metadata = header.metadata.clone();
     metadata.insert(FORMAT_KEY.to_owned(), FORMAT_VERSION.to_string());
-    let record = Metadata { name: METADATA.to_owned(), metadata: seal(METADATA, metadata) };
-    writer.write_metadata(&record).map_err(LogError::writing("metadata"))
+    let part = header.part.as_ref().map(|part| (PART, part.entries()));
+    for (name, metadata) in [(METADATA, metadata)].into_iter().chain(part) {
+        let record = Metadata { name: name.to_owned(), metadata: seal(name, metadata) };
+        writer.write_metadata(&record).map_err(LogError::writing("metadata"))?;
+    }
+    Ok(())
+}
+
+/// A writer and how many bytes it has taken.
+struct Counted<W> {
+    writer: W,
+    bytes: Arc<AtomicU64>,
+}
+
+impl<W: Write> Write for Counted<W> {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        let taken = self.writer.write(bytes)?;
+        self.bytes.fetch_add(taken as u64, Ordering::Relaxed);
+        Ok(taken)
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        self.writer.flush()
+    }
 }
 
 fn attach<W: Write>(
-    writer: &mut mcap::Writer<NoSeek<W>>,
+    writer: &mut mcap::Writer<NoSeek<Counted<W>>>,
     name: &str,
     media_type: &str,
     data: &[u8],
@@ -318,7 +437,7 @@ fn attach<W: Write>(
 
 /// Adds channels and notes them for the record that repeats them.
 struct ChannelList<'a, W: Write> {
-    writer: &'a mut mcap::Writer<NoSeek<W>>,
+    writer: &'a mut mcap::Writer<NoSeek<Counted<W>>>,
     list: BTreeMap<String, String>,
 }
 

@@ -74,12 +74,27 @@ pub struct Report {
 pub struct LogReport {
     /// Its path as given.
     pub path: String,
-    /// Its SHA-256, hexadecimal.
+    /// Its SHA-256, hexadecimal; of parts, that of their bytes one after the other.
     pub sha256: String,
     /// Messages of sources.
     pub messages: u64,
     /// What was lost, in words, each with its time span.
     pub losses: Vec<String>,
+    /// What was odd and what was done about it, in words; nothing was lost by it.
+    pub notes: Vec<String>,
+    /// Its files in their order, where it is a recording in parts.
+    pub parts: Vec<PartReport>,
+}
+
+/// A part of a recording.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct PartReport {
+    /// Its path.
+    pub path: String,
+    /// Its SHA-256, hexadecimal.
+    pub sha256: String,
+    /// Messages of sources.
+    pub messages: u64,
 }
 
 /// The dive as a whole.

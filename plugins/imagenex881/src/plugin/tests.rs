@@ -1,11 +1,10 @@
 use headrace_core::app::Mission;
-use headrace_core::codec::Bytes;
 use headrace_core::math::PI;
 use headrace_core::time::MonoNs;
 use headrace_core::tunnel::named;
 
 use super::*;
-use crate::codec::{Return, Status, Tag};
+use crate::codec::Status;
 use crate::settings::tests::{sensor, settings};
 
 const LATENCY: DurNs = DurNs(2_000_000);
@@ -135,4 +134,21 @@ fn a_head_registers_once_and_says_what_it_is() {
     let spec = head.head().unwrap();
     assert_eq!((spec.ping_period_s, spec.range_m[1]), (0.018, 10.0));
     assert!((spec.step_rad - 0.3_f64.to_radians()).abs() < 1e-15);
+}
+
+#[test]
+fn returns_without_their_echo_are_the_same_readings() {
+    let echo = Bytes::new(&[0x5A; 252]).unwrap();
+    let long = Return { header: Header { tag: Tag::Imx, ..good().header }, echo };
+    let packet = [bytes(&long), bytes(&good()), bytes(&long)].concat();
+    let mut shorter = Vec::new();
+    assert_eq!(without_echoes(&packet, &mut shorter), Some(()));
+    assert_eq!(shorter, [bytes(&good()), bytes(&good()), bytes(&good())].concat());
+    let read = |bytes: &[u8]| decode(&mut decoder("mode = \"fast\""), 100, bytes);
+    assert_eq!(read(&shorter), read(&packet));
+    assert_eq!(read(&packet).len(), 3);
+    // Half a return, something else, nothing to take out.
+    for kept in [&packet[..400], &packet[1..], &bytes(&good())] {
+        assert_eq!(without_echoes(kept, &mut Vec::new()), None);
+    }
 }

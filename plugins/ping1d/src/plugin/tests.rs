@@ -4,7 +4,7 @@ use headrace_core::time::MonoNs;
 use headrace_core::tunnel::named;
 
 use super::*;
-use crate::codec::{Addressed, Message, Profile, ScanRange};
+use crate::codec::{Profile, ScanRange};
 use crate::settings::tests::{sensor, settings};
 
 const PING: Distance = Distance {
@@ -95,4 +95,17 @@ fn an_echosounder_registers_once() {
     assert_eq!(ping.build(&mut app), Ok(()));
     assert_eq!(ping.build(&mut app), Err(PluginError::DuplicateSource { id: "left".to_owned() }));
     assert!(ping.head().is_none());
+}
+
+#[test]
+fn a_profile_without_its_strengths_is_the_same_reading() {
+    let strengths = Bytes::new(&[1; 150]).unwrap();
+    let profile = frame(&Message::Profile(Profile { distance: PING, strengths }));
+    let mut shorter = Vec::new();
+    assert_eq!(without_strengths(&profile, &mut shorter), Some(()));
+    assert_eq!(shorter, frame(&Message::Distance(PING)));
+    assert_eq!(decode(&mut decoder(), 100, &shorter), decode(&mut decoder(), 100, &profile));
+    for kept in [&shorter[..], &profile[..100], &[&profile[..], b"B"].concat()] {
+        assert_eq!(without_strengths(kept, &mut Vec::new()), None);
+    }
 }

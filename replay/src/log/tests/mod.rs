@@ -2,6 +2,7 @@
 
 mod damage;
 mod foreign;
+mod parts;
 mod recorder;
 mod recover;
 mod round_trip;
@@ -39,6 +40,7 @@ fn header(ticks: bool) -> LogHeader {
             message_encoding: "json".to_owned(),
             follows_echoes: false,
         }],
+        ..LogHeader::default()
     }
 }
 

@@ -182,12 +182,14 @@ fn a_disk_that_fills_keeps_what_is_small_and_says_what_it_left_out() {
         ..ResultChannel::default()
     });
     let space = Space::new(|| Some(5_000_000));
+    // A velocity log's lines are as long as echoes, and are none.
+    header.sonars = vec![0];
     let (mut port, handle) = Recorder::start_within(space, medium, &header, 0).unwrap();
     for tick in 1..=100_u64 {
         let at = MonoNs(tick * 1_000_000_000);
         // The queue holds all of this.
         port.raw(0, at, at, &noise(tick, 265)).unwrap();
-        port.raw(2, at, at, &noise(tick, 16)).unwrap();
+        port.raw(2, at, at, &noise(tick, 140)).unwrap();
         port.tick(tick, at, &[0, 2]).unwrap();
         port.result(0, at, b"{}").unwrap();
         port.result(1, at, &noise(tick, 56)).unwrap();
@@ -210,4 +212,23 @@ fn a_disk_that_fills_keeps_what_is_small_and_says_what_it_left_out() {
              1.000 s, before 100.000 s)",
         ]
     );
+}
+
+#[test]
+fn what_there_was_no_room_for_is_counted() {
+    let (medium, _flushed) = slow(0);
+    let (mut port, handle) = Recorder::start(medium, &header(true), 0).unwrap();
+    let sent = handle.sent_port();
+    // Faster than any thread empties it: 2,048 of them have room.
+    for number in 0..1_000_000_u64 {
+        sent.sent(1, MonoNs(number), b"poll");
+        if sent.dropped() > 0 {
+            break;
+        }
+    }
+    port.miss_results();
+    let dropped = sent.dropped();
+    let summary = handle.finish().unwrap();
+    assert!(dropped > 0);
+    assert_eq!((summary.sent_dropped, summary.results_missing), (dropped, 1));
 }

@@ -2,12 +2,12 @@
 
 use mcap::records::op;
 
-use super::super::{LogWriter, LossKind, RECOVERED_FROM, Recovered, recover};
+use super::super::{DiveLog, LogWriter, LossKind, RECOVERED_FROM, Recovered, recover};
 use super::*;
 
 fn recovered(bytes: &[u8]) -> (Vec<u8>, Recovered) {
     let mut output = Vec::new();
-    let mut open = || LogReader::new(Cursor::new(bytes.to_vec()), "damaged".to_owned());
+    let mut open = || LogReader::new(Cursor::new(bytes.to_vec()), "damaged".to_owned()).map(DiveLog::of);
     let done = recover(&mut open, &mut output, &header(true).results, "damaged.mcap").unwrap();
     (output, done)
 }

@@ -1,0 +1,426 @@
+//! A dive's log: one file, or the parts of a recording read as one.
+//!
+//! Parts are put in the order of their own numbers, whatever their files are called. Each is looked through once when they
+//! are opened, and then read in its turn: one reader at a time. What a part says of how far those before it went tells
+//! whether one is missing, or isn't the one that was recorded.
+
+use std::fs::File;
+use std::io::{Read, Seek};
+use std::path::{Path, PathBuf};
+
+use headrace_core::time::MonoNs;
+use serde::{Deserialize, Serialize};
+
+use super::part::{Part, Progress, named_part};
+use super::rotate::parts_of;
+use super::{LogError, LogInfo, LogMessage, LogPlace, LogReader, Loss, LossKind, MessageKind, SourceInfo};
+
+/// The files of what a person has named: a log, a folder of logs, or a recording in parts by the name that it was given.
+///
+/// Errors: a folder that can't be read, or has no log in it.
+pub fn files_of(named: &[PathBuf]) -> Result<Vec<PathBuf>, LogError> {
+    let mut files = Vec::new();
+    for path in named {
+        let failed = |source| LogError::Open { path: path.to_owned(), source };
+        if path.is_dir() {
+            let entries = std::fs::read_dir(path).and_then(Iterator::collect::<Result<Vec<_>, _>>);
+            let entries = entries.map_err(failed)?;
+            let mut logs: Vec<_> = entries.into_iter().map(|entry| path.join(entry.file_name())).collect();
+            logs.retain(|log| log.extension().is_some_and(|extension| extension == "mcap"));
+            logs.sort();
+            if logs.is_empty() {
+                return Err(LogError::NoLogs { folder: path.to_owned() });
+            }
+            files.append(&mut logs);
+        } else if path.exists() {
+            files.push(path.clone());
+        } else {
+            // Where there aren't any, opening the log says that it isn't there.
+            let parts = parts_of(path).unwrap_or_default();
+            files.extend(if parts.is_empty() { vec![path.clone()] } else { parts });
+        }
+    }
+    Ok(files)
+}
+
+/// A file of a dive's log.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct PartFile {
+    /// Its path.
+    pub path: PathBuf,
+    /// Messages of sources that have been read from it so far.
+    pub messages: u64,
+    /// Its number in the recording, where that has parts.
+    number: Option<u32>,
+}
+
+/// Opens the log with that number in the list.
+type Open<R> = Box<dyn FnMut(usize) -> Result<LogReader<R>, LogError>>;
+
+/// Where a reader stands in a dive's log.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct DivePlace {
+    /// The file.
+    at: usize,
+    place: LogPlace,
+    /// Messages of sources that have been read from each file.
+    messages: Vec<u64>,
+    earlier: Vec<Loss>,
+    late: u64,
+}
+
+/// Reads a dive's log.
+pub struct DiveLog<R = File> {
+    open: Open<R>,
+    files: Vec<PartFile>,
+    /// The file that is being read.
+    at: usize,
+    reader: LogReader<R>,
+    info: LogInfo,
+    has_ticks: bool,
+    /// The dive's number of each source of the file that is being read.
+    numbers: Vec<u16>,
+    topics: Vec<String>,
+    /// What is missing between files.
+    between: Vec<Loss>,
+    /// Losses of the files that have been read.
+    earlier: Vec<Loss>,
+    late: u64,
+    times: Option<(MonoNs, MonoNs)>,
+}
+
+impl DiveLog<File> {
+    /// Opens a log, or the parts of a recording; see [`files_of`].
+    ///
+    /// Errors: no file can be read, isn't MCAP, or is of a later format; several that aren't the parts of one recording.
+    pub fn open(files: &[PathBuf]) -> Result<Self, LogError> {
+        match files {
+            [file] => Ok(Self::single(LogReader::open(file)?, file)),
+            files => Self::parts(files),
+        }
+    }
+
+    fn single(reader: LogReader<File>, file: &Path) -> Self {
+        let path = file.to_owned();
+        let number = reader.header().part.as_ref().map(|part| part.head.number);
+        let between = between(&[Glance::of(&reader, number.unwrap_or_default())]);
+        let files = vec![PartFile { path: path.clone(), messages: 0, number }];
+        Self::start(Box::new(move |_| LogReader::open(&path)), reader, files, between)
+    }
+
+    fn parts(files: &[PathBuf]) -> Result<Self, LogError> {
+        let Arranged { parts, mut losses } = arrange(files)?;
+        let glances: Vec<Glance> = parts.iter().map(|(_, glance)| glance.clone()).collect();
+        losses.extend(between(&glances));
+        let files: Vec<PartFile> = parts
+            .into_iter()
+            .map(|(path, glance)| PartFile { path, messages: 0, number: Some(glance.number) })
+            .collect();
+        let paths: Vec<PathBuf> = files.iter().map(|file| file.path.clone()).collect();
+        let open = Box::new(move |at: usize| {
+            let path = paths.get(at).map(PathBuf::as_path);
+            LogReader::open(path.unwrap_or(Path::new("")))
+        });
+        let first = open(0)?;
+        let times = glances.iter().filter_map(|glance| glance.times);
+        let times = times.reduce(|all, one| (all.0.min(one.0), all.1.max(one.1)));
+        Ok(Self { times, ..Self::start(open, first, files, losses) })
+    }
+}
+
+impl<R: Read + Seek> DiveLog<R> {
+    /// The log of one reader.
+    pub fn of(reader: LogReader<R>) -> Self {
+        let file = PartFile { path: PathBuf::new(), messages: 0, number: None };
+        // Nothing follows it.
+        let open = |_| Err(LogError::NoLogs { folder: PathBuf::new() });
+        Self::start(Box::new(open), reader, vec![file], Vec::new())
+    }
+
+    fn start(open: Open<R>, reader: LogReader<R>, files: Vec<PartFile>, between: Vec<Loss>) -> Self {
+        let mut info = reader.header().clone();
+        if files.len() > 1 {
+            info.part = None;
+        }
+        let mut log = Self {
+            open,
+            files,
+            at: 0,
+            has_ticks: reader.has_ticks(),
+            reader,
+            info,
+            numbers: Vec::new(),
+            topics: Vec::new(),
+            between,
+            earlier: Vec::new(),
+            late: 0,
+            times: None,
+        };
+        log.times = log.reader.times();
+        log.number_sources();
+        log
+    }
+
+    /// What the log says about itself; of parts, what the first one does.
+    pub fn header(&self) -> &LogInfo {
+        &self.info
+    }
+
+    /// Whether the log has the ticks of the loop that wrote it.
+    pub fn has_ticks(&self) -> bool {
+        self.has_ticks
+    }
+
+    /// The files, in the order in which they are read.
+    pub fn files(&self) -> &[PartFile] {
+        &self.files
+    }
+
+    /// What has been found damaged or missing so far; complete when [`DiveLog::next`] has given `None`.
+    pub fn losses(&self) -> Vec<Loss> {
+        let present = self.reader.losses().iter().map(|loss| self.in_part(loss));
+        self.between.iter().chain(&self.earlier).cloned().chain(present).collect()
+    }
+
+    /// Log times between which the messages lie, as the heads of chunks say.
+    pub fn times(&self) -> Option<(MonoNs, MonoNs)> {
+        self.times
+    }
+
+    /// Topics that several channels of the file that is being read have, with their numbers: one source each.
+    pub fn doubles(&self) -> Vec<(String, Vec<u16>)> {
+        self.reader.doubles()
+    }
+
+    /// Whether anything has been found damaged or missing so far.
+    pub fn has_losses(&self) -> bool {
+        !(self.between.is_empty() && self.earlier.is_empty() && self.reader.losses().is_empty())
+    }
+
+    /// Messages that were delivered after one with a later log time, in a log without ticks.
+    pub fn late(&self) -> u64 {
+        self.late + self.reader.late()
+    }
+
+    /// Topics of the results, and the sources: all whose channels have been read.
+    pub(super) fn channels_found(&self) -> (Vec<String>, Vec<SourceInfo>) {
+        let mut topics = self.topics.clone();
+        topics.extend(self.reader.result_topics().into_iter().filter(|topic| !self.topics.contains(topic)));
+        let mut all = self.info.sources.clone();
+        let known = |id: &str| self.info.sources.iter().any(|source| source.id == id);
+        all.extend(self.reader.sources().iter().filter(|source| !known(&source.id)).cloned());
+        (topics, all)
+    }
+
+    /// The next message, or `None` at the end.
+    ///
+    /// Errors: the medium fails; damage is no error.
+    #[expect(
+        clippy::should_implement_trait,
+        reason = "messages borrow from the reader, which no Iterator allows"
+    )]
+    pub fn next(&mut self) -> Result<Option<LogMessage<'_>>, LogError> {
+        while !self.reader.has_next()? {
+            if self.at + 1 >= self.files.len() {
+                return Ok(None);
+            }
+            self.go_on()?;
+        }
+        if self.numbers.len() < self.reader.sources().len() {
+            self.number_sources();
+        }
+        let Self { reader, numbers, files, at, .. } = self;
+        let Some(mut message) = reader.next()? else { return Ok(None) };
+        match &mut message.kind {
+            MessageKind::Raw { source } => {
+                *source = numbers.get(usize::from(*source)).copied().unwrap_or(*source);
+                if let Some(file) = files.get_mut(*at) {
+                    file.messages += 1;
+                }
+            }
+            MessageKind::Sent { source } => {
+                *source = numbers.get(usize::from(*source)).copied().unwrap_or(*source);
+            }
+            _ => {}
+        }
+        Ok(Some(message))
+    }
+
+    /// Where it stands.
+    pub fn place(&self) -> DivePlace {
+        DivePlace {
+            at: self.at,
+            place: self.reader.place(),
+            messages: self.files.iter().map(|file| file.messages).collect(),
+            earlier: self.earlier.clone(),
+            late: self.late,
+        }
+    }
+
+    /// Goes on from a place where it, or another reader of the same files, has stood.
+    ///
+    /// Errors: the medium fails.
+    pub fn go_to(&mut self, place: &DivePlace) -> Result<(), LogError> {
+        if place.at != self.at {
+            self.reader = (self.open)(place.at)?;
+            self.at = place.at;
+            self.number_sources();
+        }
+        for (file, messages) in self.files.iter_mut().zip(&place.messages) {
+            file.messages = *messages;
+        }
+        (self.earlier, self.late) = (place.earlier.clone(), place.late);
+        self.reader.go_to(&place.place)
+    }
+
+    /// Goes on with the next file.
+    fn go_on(&mut self) -> Result<(), LogError> {
+        let read: Vec<Loss> = self.reader.losses().iter().map(|loss| self.in_part(loss)).collect();
+        self.earlier.extend(read);
+        (self.topics, self.info.sources) = self.channels_found();
+        self.late += self.reader.late();
+        self.at += 1;
+        self.reader = (self.open)(self.at)?;
+        self.number_sources();
+        Ok(())
+    }
+
+    /// Finds the file's sources among the dive's, by name; others are added.
+    fn number_sources(&mut self) {
+        self.numbers.clear();
+        for source in self.reader.sources() {
+            let known = self.info.sources.iter().position(|known| known.id == source.id);
+            let number = known.unwrap_or_else(|| {
+                self.info.sources.push(source.clone());
+                self.info.sources.len() - 1
+            });
+            self.numbers.push(u16::try_from(number).unwrap_or(u16::MAX));
+        }
+    }
+
+    fn in_part(&self, loss: &Loss) -> Loss {
+        let file = self.files.get(self.at).filter(|_| self.files.len() > 1);
+        match file.and_then(|file| file.number) {
+            Some(part) => {
+                Loss { kind: LossKind::InPart { part, kind: Box::new(loss.kind.clone()) }, ..loss.clone() }
+            }
+            None => loss.clone(),
+        }
+    }
+}
+
+/// What a look at a part tells.
+#[derive(Debug, Clone)]
+struct Glance {
+    number: u32,
+    part: Option<Part>,
+    times: Option<(MonoNs, MonoNs)>,
+}
+
+impl Glance {
+    fn of<R: Read + Seek>(reader: &LogReader<R>, number: u32) -> Self {
+        Self { number, part: reader.header().part.clone(), times: reader.times() }
+    }
+}
+
+/// Parts in their order, with what is amiss with some.
+struct Arranged {
+    parts: Vec<(PathBuf, Glance)>,
+    losses: Vec<Loss>,
+}
+
+/// Looks at each file, and puts them in their order.
+fn arrange(files: &[PathBuf]) -> Result<Arranged, LogError> {
+    let (mut parts, mut losses): (Vec<(PathBuf, Glance)>, _) = (Vec::new(), Vec::new());
+    let mut unread = None;
+    for path in files {
+        let by_name = named_part(path).map(|(_, number)| number);
+        match (LogReader::open(path), by_name) {
+            (Ok(reader), by_name) => match (&reader.header().part, by_name) {
+                (Some(part), _) => parts.push((path.clone(), Glance::of(&reader, part.head.number))),
+                (None, Some(number)) if !reader.losses().is_empty() => {
+                    losses.push(loss(LossKind::PartByName { part: number }, None, None));
+                    parts.push((path.clone(), Glance::of(&reader, number)));
+                }
+                _ => return Err(LogError::NotAPart { path: path.clone() }),
+            },
+            // As a power cut leaves it, in the moment in which it was begun.
+            (Err(error @ LogError::NotMcap { .. }), Some(part)) => {
+                losses.push(loss(LossKind::PartUnreadable { part, why: error.to_string() }, None, None));
+                unread = Some(error);
+            }
+            (Err(error), _) => return Err(error),
+        }
+    }
+    parts.sort_by_key(|(_, glance)| glance.number);
+    agree(&parts)?;
+    match unread {
+        Some(error) if parts.is_empty() => Err(error),
+        _ => Ok(Arranged { parts, losses }),
+    }
+}
+
+/// All are of one recording, and none is there twice.
+fn agree(parts: &[(PathBuf, Glance)]) -> Result<(), LogError> {
+    let dive = |glance: &Glance| glance.part.as_ref().map(|part| part.head.dive.clone());
+    let mut named = parts.iter().filter_map(|(path, glance)| Some((path, dive(glance)?)));
+    if let Some((one, one_dive)) = named.next()
+        && let Some((other, other_dive)) = named.find(|(_, dive)| *dive != one_dive)
+    {
+        return Err(LogError::OtherDive { one: one.clone(), one_dive, other: other.clone(), other_dive });
+    }
+    for pair in parts.windows(2) {
+        if let [(one, first), (other, second)] = pair
+            && first.number == second.number
+        {
+            return Err(LogError::PartTwice { number: first.number, one: one.clone(), other: other.clone() });
+        }
+    }
+    Ok(())
+}
+
+/// What is missing before, between and after parts.
+fn between(parts: &[Glance]) -> Vec<Loss> {
+    let mut losses = Vec::new();
+    let from = |glance: &Glance| glance.times.map(|times| times.1);
+    let to = |glance: &Glance| glance.times.map(|times| times.0);
+    if let Some(first) = parts.first().filter(|first| first.number > 1) {
+        losses.push(loss(missing(1, first.number - 1), None, to(first)));
+    }
+    for pair in parts.windows(2) {
+        let [one, next] = pair else { continue };
+        if one.number + 1 < next.number {
+            losses.push(loss(missing(one.number + 1, next.number - 1), from(one), to(next)));
+        } else if let (Some(after), Some(before)) = (after(one), before(next))
+            && !after.meets(before)
+        {
+            let (part, messages, wanted) = (one.number, after.messages, before.messages);
+            losses.push(loss(LossKind::PartUnlike { part, messages, wanted }, from(one), to(next)));
+        }
+    }
+    if let Some(last) = parts.last().filter(|last| goes_on(last)) {
+        let kind = LossKind::PartsMissing { first: last.number + 1, last: None };
+        losses.push(loss(kind, from(last), None));
+    }
+    losses
+}
+
+fn goes_on(glance: &Glance) -> bool {
+    glance.part.as_ref().and_then(|part| part.end.as_ref()).is_some_and(|end| end.follows)
+}
+
+fn after(glance: &Glance) -> Option<&Progress> {
+    Some(&glance.part.as_ref()?.end.as_ref()?.after)
+}
+
+fn before(glance: &Glance) -> Option<&Progress> {
+    Some(&glance.part.as_ref()?.head.before)
+}
+
+fn missing(first: u32, last: u32) -> LossKind {
+    LossKind::PartsMissing { first, last: Some(last) }
+}
+
+fn loss(kind: LossKind, from: Option<MonoNs>, to: Option<MonoNs>) -> Loss {
+    Loss { kind, offset: 0, bytes: 0, from, to }
+}

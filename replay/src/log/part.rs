@@ -1,0 +1,216 @@
+//! A part of a dive's recording: what a log says that is one of several.
+//!
+//! Metadata `headrace.part`, before the first message: `dive`, `number` (from 1), and how far the parts before went: `messages`
+//! of all channels, `tick` (index of the last, or `-`), `sequence<topic>` (number of each channel's next message).
+//! Metadata `headrace.part.end`, after the last message: `messages` and `tick` again, with this part's, and `follows`: `yes`
+//! where the recording goes on in the next part, `no` where the dive ended.
+
+use std::collections::BTreeMap;
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
+
+use sha2::{Digest, Sha256};
+
+use super::format::hex;
+
+/// Name of the metadata record with which a part begins.
+pub(super) const PART: &str = "headrace.part";
+/// Name of the metadata record with which a part ends.
+pub(super) const PART_END: &str = "headrace.part.end";
+const DIVE_KEY: &str = "dive";
+const NUMBER_KEY: &str = "number";
+const MESSAGES_KEY: &str = "messages";
+const TICK_KEY: &str = "tick";
+const FOLLOWS_KEY: &str = "follows";
+const SEQUENCE_PREFIX: &str = "sequence";
+/// Before the number in the name of a part's file.
+const NAME_MARK: &str = ".part";
+/// Digits of a dive's name.
+const DIVE_DIGITS: usize = 16;
+
+/// How far a recording has come.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Progress {
+    /// Messages of all channels.
+    pub messages: u64,
+    /// Index of the last tick.
+    pub tick: Option<u64>,
+    /// Number of the next message of each topic; left out where a part ends.
+    pub sequences: BTreeMap<String, u32>,
+}
+
+/// What a part begins with.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct PartHead {
+    /// Which recording it belongs to, see [`dive_name`].
+    pub dive: String,
+    /// Which part it is, from 1.
+    pub number: u32,
+    /// How far the parts before it went.
+    pub before: Progress,
+}
+
+/// What a part ends with.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct PartEnd {
+    /// How far the recording has come with it.
+    pub after: Progress,
+    /// Whether the recording goes on in the next part.
+    pub follows: bool,
+}
+
+/// What a log says of the recording that it is a part of.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Part {
+    /// Its beginning.
+    pub head: PartHead,
+    /// Its end; `None` where the log was cut off before.
+    pub end: Option<PartEnd>,
+}
+
+/// A name for a recording that no other has: a digest of what its caller knows of the moment.
+pub fn dive_name(moment: &[u64]) -> String {
+    let mut hasher = Sha256::new();
+    for word in moment {
+        hasher.update(word.to_le_bytes());
+    }
+    let mut name = hex(&hasher.finalize());
+    name.truncate(DIVE_DIGITS);
+    name
+}
+
+/// The file of a part: `dive.part002.mcap` for `dive.mcap`, so that a folder lists them in their order.
+pub fn part_path(recording: &Path, number: u32) -> PathBuf {
+    let text = |part: Option<&OsStr>| part.unwrap_or_default().to_string_lossy().into_owned();
+    let (stem, extension) = (text(recording.file_stem()), text(recording.extension()));
+    let dot = if extension.is_empty() { "" } else { "." };
+    recording.with_file_name(format!("{stem}{NAME_MARK}{number:03}{dot}{extension}"))
+}
+
+/// The recording and the number that a part's file is named by.
+pub(super) fn named_part(path: &Path) -> Option<(PathBuf, u32)> {
+    let extension = path.extension().map(|e| format!(".{}", e.to_string_lossy())).unwrap_or_default();
+    let stem = path.file_stem()?.to_string_lossy().into_owned();
+    let (recording, number) = stem.rsplit_once(NAME_MARK)?;
+    let number = number.parse().ok().filter(|number| *number > 0)?;
+    Some((path.with_file_name(format!("{recording}{extension}")), number))
+}
+
+impl Progress {
+    fn entries(&self) -> BTreeMap<String, String> {
+        let tick = self.tick.map_or_else(|| "-".to_owned(), |tick| tick.to_string());
+        let mut entries = BTreeMap::from([
+            (MESSAGES_KEY.to_owned(), self.messages.to_string()),
+            (TICK_KEY.to_owned(), tick),
+        ]);
+        let sequences = self.sequences.iter();
+        entries
+            .extend(sequences.map(|(topic, next)| (format!("{SEQUENCE_PREFIX}{topic}"), next.to_string())));
+        entries
+    }
+
+    fn read(entries: &BTreeMap<String, String>) -> Option<Self> {
+        let sequence = |(key, next): (&String, &String)| {
+            Some((key.strip_prefix(SEQUENCE_PREFIX)?.to_owned(), next.parse().ok()?))
+        };
+        Some(Self {
+            messages: entries.get(MESSAGES_KEY)?.parse().ok()?,
+            tick: entries.get(TICK_KEY)?.parse().ok(),
+            sequences: entries.iter().filter_map(sequence).collect(),
+        })
+    }
+
+    /// Whether another says the same, topics aside.
+    pub(super) fn meets(&self, other: &Self) -> bool {
+        (self.messages, self.tick) == (other.messages, other.tick)
+    }
+}
+
+impl PartHead {
+    pub(super) fn entries(&self) -> BTreeMap<String, String> {
+        let mut entries = self.before.entries();
+        entries.insert(DIVE_KEY.to_owned(), self.dive.clone());
+        entries.insert(NUMBER_KEY.to_owned(), self.number.to_string());
+        entries
+    }
+
+    fn read(entries: &BTreeMap<String, String>) -> Option<Self> {
+        Some(Self {
+            dive: entries.get(DIVE_KEY)?.clone(),
+            number: entries.get(NUMBER_KEY)?.parse().ok().filter(|number| *number > 0)?,
+            before: Progress::read(entries)?,
+        })
+    }
+}
+
+impl PartEnd {
+    pub(super) fn entries(&self) -> BTreeMap<String, String> {
+        let mut entries = self.after.entries();
+        let follows = if self.follows { "yes" } else { "no" };
+        entries.insert(FOLLOWS_KEY.to_owned(), follows.to_owned());
+        entries
+    }
+
+    fn read(entries: &BTreeMap<String, String>) -> Option<Self> {
+        let follows = entries.get(FOLLOWS_KEY)? == "yes";
+        Some(Self { after: Progress::read(entries)?, follows })
+    }
+}
+
+impl Part {
+    /// Takes what a part says of itself out of a log's metadata.
+    pub(super) fn take(metadata: &mut BTreeMap<String, String>) -> Option<Self> {
+        let (end, head) = (take_record(metadata, PART_END), take_record(metadata, PART));
+        Some(Self { head: PartHead::read(&head)?, end: PartEnd::read(&end) })
+    }
+}
+
+/// Takes out the entries of a record of that name.
+fn take_record(metadata: &mut BTreeMap<String, String>, name: &str) -> BTreeMap<String, String> {
+    let prefix = format!("{name}/");
+    let (mut taken, mut kept) = (BTreeMap::new(), BTreeMap::new());
+    for (key, value) in core::mem::take(metadata) {
+        match key.strip_prefix(&prefix) {
+            Some(own) => drop(taken.insert(own.to_owned(), value)),
+            None => drop(kept.insert(key, value)),
+        }
+    }
+    *metadata = kept;
+    taken
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_have_names_that_sort_and_say_which_they_are() {
+        let recording = Path::new("logs/gate 3.mcap");
+        let names: Vec<PathBuf> = [1, 2, 10, 100].map(|number| part_path(recording, number)).into();
+        assert_eq!(names.first(), Some(&PathBuf::from("logs/gate 3.part001.mcap")));
+        assert!(names.is_sorted());
+        for (name, number) in names.iter().zip([1, 2, 10, 100]) {
+            assert_eq!(named_part(name), Some((recording.to_owned(), number)));
+        }
+        for other in ["dive.mcap", "dive.part.mcap", "dive.part000.mcap", "dive.partial.mcap", ""] {
+            assert_eq!(named_part(Path::new(other)), None, "{other}");
+        }
+        assert_eq!(part_path(Path::new("dive"), 7), Path::new("dive.part007"));
+    }
+
+    #[test]
+    fn what_a_part_says_comes_out_as_it_went_in() {
+        let before = Progress { messages: 7, tick: None, sequences: [("/raw/a".to_owned(), 3)].into() };
+        let head = PartHead { dive: dive_name(&[1, 2]), number: 2, before };
+        let after = Progress { messages: 9, tick: Some(4), sequences: BTreeMap::new() };
+        let end = PartEnd { after, follows: true };
+        let mut metadata = BTreeMap::from([("version".to_owned(), "1".to_owned())]);
+        for (name, entries) in [(PART, head.entries()), (PART_END, end.entries())] {
+            metadata.extend(entries.into_iter().map(|(key, value)| (format!("{name}/{key}"), value)));
+        }
+        assert_eq!(Part::take(&mut metadata), Some(Part { head, end: Some(end) }));
+        assert_eq!(metadata.len(), 1);
+        assert_eq!(Part::take(&mut metadata), None);
+        assert_ne!(dive_name(&[1, 2]), dive_name(&[2, 1]));
+    }
+}

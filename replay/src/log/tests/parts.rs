@@ -1,0 +1,220 @@
+//! A recording in parts reads as one log; what is missing or foreign is named.
+
+use std::path::{Path, PathBuf};
+
+use headrace_core::time::DurNs;
+
+use super::super::{DiveLog, Every, LogError, LogWriter, Recorder, Rotation, files_of, part_path, recover};
+use super::*;
+
+/// A folder that goes away with the test.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(name: &str) -> Self {
+        let path = std::env::temp_dir().join(format!("headrace-parts-{}-{name}", std::process::id()));
+        std::fs::remove_dir_all(&path).ok();
+        std::fs::create_dir_all(&path).unwrap();
+        Self(path)
+    }
+
+    fn part(&self, number: u32) -> PathBuf {
+        part_path(&self.0.join("dive.mcap"), number)
+    }
+
+    fn files(&self) -> Vec<PathBuf> {
+        files_of(std::slice::from_ref(&self.0)).unwrap()
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        std::fs::remove_dir_all(&self.0).ok();
+    }
+}
+
+/// Ticks of a tenth of a second, each of two packets.
+const TICKS: u64 = 400;
+
+fn record(path: &Path, rotation: Option<&Rotation>) -> super::super::Summary {
+    let begun = match rotation {
+        None => Recorder::create(path, &header(true), 1 << 22),
+        Some(rotation) => Recorder::create_in_parts(path, &header(true), rotation, 1 << 22),
+    };
+    let (mut port, handle) = begun.unwrap();
+    for tick in 0..TICKS {
+        let at = MonoNs((tick + 10) * 100_000_000);
+        port.raw(0, at, at, &noise(tick, 700)).unwrap();
+        port.raw(2, at, MonoNs(at.0 - 7), &noise(tick, 16)).unwrap();
+        port.tick(tick, at, &[0, 2]).unwrap();
+        port.result(0, at, b"{}").unwrap();
+    }
+    handle.finish().unwrap()
+}
+
+fn rotation(every: Every) -> Rotation {
+    Rotation { every, dive: "one".to_owned() }
+}
+
+fn all(log: &mut DiveLog) -> Vec<Seen> {
+    let mut seen = Vec::new();
+    while let Some(message) = log.next().unwrap() {
+        let kind = format!("{:?}", message.kind);
+        let (at, valid) = (message.log_time.0, message.publish_time.0);
+        seen.push((kind, at, valid, message.sequence, message.data.to_vec()));
+    }
+    seen
+}
+
+fn losses(files: &[PathBuf]) -> Vec<String> {
+    let mut log = DiveLog::open(files).unwrap();
+    all(&mut log);
+    log.losses().iter().map(ToString::to_string).collect()
+}
+
+#[test]
+fn parts_hold_what_one_file_does() {
+    let whole = Folder::new("whole");
+    let single = whole.0.join("dive.mcap");
+    let written = record(&single, None);
+    let expected = all(&mut DiveLog::open(&[single]).unwrap());
+    for (name, every, parts) in
+        [("bytes", Every::Bytes(100_000), 3), ("span", Every::Span(DurNs::from_millis(10_000)), 4)]
+    {
+        let folder = Folder::new(name);
+        let summary = record(&folder.0.join("dive.mcap"), Some(&rotation(every)));
+        assert_eq!((summary.messages, summary.raw_messages), (written.messages, 2 * TICKS));
+        assert_eq!(summary.parts.iter().map(|part| part.raw_messages).sum::<u64>(), 2 * TICKS);
+        let paths: Vec<PathBuf> = summary.parts.iter().map(|part| part.path.clone()).collect();
+        assert_eq!(paths, (1..=parts).map(|number| folder.part(number)).collect::<Vec<_>>(), "{name}");
+        assert_eq!(folder.files(), paths);
+        // By the recording's own name, and in any order.
+        assert_eq!(files_of(&[folder.0.join("dive.mcap")]).unwrap(), paths);
+        let backwards: Vec<PathBuf> = paths.iter().rev().cloned().collect();
+        for files in [&paths, &backwards] {
+            let mut log = DiveLog::open(files).unwrap();
+            assert_eq!(all(&mut log), expected, "{name}");
+            assert_eq!((log.losses(), log.has_losses()), (vec![], false));
+            let counts: Vec<u64> = log.files().iter().map(|file| file.messages).collect();
+            assert_eq!(counts, summary.parts.iter().map(|part| part.raw_messages).collect::<Vec<_>>());
+        }
+        for path in &paths {
+            // Each has everything that a log has, and no tick is divided.
+            let (seen, losses) = read(&std::fs::read(path).unwrap());
+            assert_eq!((seen[0].0.as_str(), losses), ("raw 0", vec![]));
+            let info = LogReader::open(path).unwrap();
+            assert_eq!(info.header().attachments, header(true).attachments);
+            assert!(info.header().vehicle_toml.is_some());
+        }
+    }
+}
+
+#[test]
+fn a_part_that_is_missing_or_not_the_one_recorded_is_named() {
+    let folder = Folder::new("missing");
+    record(&folder.0.join("dive.mcap"), Some(&rotation(Every::Span(DurNs::from_millis(10_000)))));
+    let files = folder.files();
+    let said = |numbers: &[usize]| {
+        let some: Vec<PathBuf> = numbers.iter().map(|number| files[number - 1].clone()).collect();
+        losses(&some)
+    };
+    let second = "part 2 of the recording is missing (after 10.900 s, before 21.000 s)";
+    assert_eq!(said(&[1, 3, 4]), [second]);
+    assert_eq!(
+        said(&[4, 1]),
+        ["parts 2 to 3 of the recording are missing (after 10.900 s, before 31.000 s)"]
+    );
+    assert_eq!(
+        said(&[2, 3]),
+        [
+            "part 1 of the recording is missing (before 11.000 s)",
+            "part 4 of the recording is missing, and any after it (after 30.900 s)"
+        ]
+    );
+    assert_eq!(said(&[4]), ["parts 1 to 3 of the recording are missing (before 31.000 s)"]);
+
+    // Another log in its place, which calls itself the same part.
+    let other = Folder::new("unlike");
+    let mut header = LogReader::open(&files[1]).unwrap().header().clone();
+    let part = header.part.take().unwrap();
+    let whole = super::header(true);
+    let mut log = LogWriter::new(Vec::new(), &LogHeader { part: Some(part.head), ..whole }).unwrap();
+    log.raw(0, MonoNs(11_000_000_000), MonoNs(0), b"other").unwrap();
+    log.end_part(true).unwrap();
+    std::fs::write(other.part(2), log.finish().unwrap().0).unwrap();
+    let mixed = [files[0].clone(), other.part(2), files[2].clone(), files[3].clone()];
+    let told = losses(&mixed);
+    assert_eq!(told.len(), 1, "{told:?}");
+    assert!(
+        told[0].starts_with("part 2 is not the one that was recorded: with it there are 401"),
+        "{told:?}"
+    );
+}
+
+#[test]
+fn parts_of_two_recordings_and_one_twice_are_refused() {
+    let (one, other) = (Folder::new("one"), Folder::new("other"));
+    let every = Every::Span(DurNs::from_millis(10_000));
+    record(&one.0.join("dive.mcap"), Some(&rotation(every)));
+    record(&other.0.join("dive.mcap"), Some(&Rotation { every, dive: "two".to_owned() }));
+    let open = |files: &[PathBuf]| DiveLog::open(files).err().unwrap();
+    assert!(matches!(open(&[one.part(1), other.part(2)]), LogError::OtherDive { .. }));
+    std::fs::copy(one.part(2), one.part(7)).unwrap();
+    assert!(matches!(open(&one.files()), LogError::PartTwice { number: 2, .. }));
+    std::fs::remove_file(one.part(7)).unwrap();
+    let single = other.0.join("single.mcap");
+    record(&single, None);
+    assert!(matches!(open(&[one.part(1), single]), LogError::NotAPart { .. }));
+    // Nor does a recording go over another's parts.
+    let again = Recorder::create_in_parts(&one.0.join("dive.mcap"), &header(true), &rotation(every), 0);
+    assert!(matches!(again.err().unwrap(), LogError::Create { path, .. } if path == one.part(1)));
+}
+
+#[test]
+fn damaged_parts_cost_what_is_damaged_and_become_one_log_again() {
+    let folder = Folder::new("damaged");
+    record(&folder.0.join("dive.mcap"), Some(&rotation(Every::Span(DurNs::from_millis(10_000)))));
+    let whole = all(&mut DiveLog::open(&folder.files()).unwrap());
+    // As a power cut leaves the last ones: one isn't ended, and the next has no byte yet.
+    let third = std::fs::read(folder.part(3)).unwrap();
+    std::fs::write(folder.part(3), &third[..third.len() * 2 / 3]).unwrap();
+    std::fs::write(folder.part(4), []).unwrap();
+    let mut log = DiveLog::open(&folder.files()).unwrap();
+    let seen = all(&mut log);
+    assert!(seen.len() > 1000 && whole.starts_with(&seen), "{}", seen.len());
+    let told: Vec<String> = log.losses().iter().map(ToString::to_string).collect();
+    assert_eq!(told.len(), 2, "{told:?}");
+    assert!(told[0].starts_with("part 4 can't be read: "), "{told:?}");
+    assert!(told[1].starts_with("part 3, byte ") && told[1].contains("the file ends before"), "{told:?}");
+
+    let mut output = Vec::new();
+    let files = folder.files();
+    let done = recover(&mut || DiveLog::open(&files), &mut output, &[], "parts").unwrap();
+    assert_eq!(done.messages, seen.len() as u64);
+    let (recovered, losses) = read(&output);
+    assert_eq!((recovered.len(), losses.len()), (seen.len(), 2));
+    assert_eq!(open(&output).header().part, None);
+}
+
+#[test]
+fn a_part_that_cannot_be_made_costs_the_rotation_alone() {
+    let folder = Folder::new("refused");
+    // Where the second part is to be there is a folder, made once the recording has begun.
+    let (mut port, handle) = Recorder::create_in_parts(
+        &folder.0.join("dive.mcap"),
+        &header(true),
+        &rotation(Every::Span(DurNs::from_millis(10_000))),
+        1 << 22,
+    )
+    .unwrap();
+    std::fs::create_dir(folder.part(2)).unwrap();
+    for tick in 0..300 {
+        let at = MonoNs((tick + 10) * 100_000_000);
+        port.raw(0, at, at, &noise(tick, 16)).unwrap();
+        port.tick(tick, at, &[0]).unwrap();
+    }
+    let summary = handle.finish().unwrap();
+    assert_eq!((summary.raw_messages, summary.parts.len()), (300, 1));
+    let mut log = DiveLog::open(&[folder.part(1)]).unwrap();
+    assert_eq!((all(&mut log).len(), log.losses()), (600, vec![]));
+}

@@ -1,0 +1,176 @@
+//! A log with less in it: cut to spans of time, without echoes, without what tells whose it is.
+
+use std::collections::BTreeMap;
+use std::io::{Read, Seek, Write};
+
+use headrace_core::time::MonoNs;
+
+use super::recover::{header, lane, look_through, words};
+use super::writer::Lane;
+use super::{DiveLog, LogError, LogHeader, LogInfo, LogMessage, LogWriter, ResultChannel};
+
+/// Key in the metadata of a trimmed log: what was done to it.
+pub const TRIMMED: &str = "trimmed";
+
+/// Changes a message of a source: puts other bytes in the place of its own, and gives whether it did. No bytes leave it out.
+pub type Change<'a> = &'a mut dyn FnMut(u16, &[u8], &mut Vec<u8>) -> bool;
+
+/// What is kept of a log, and how it is changed.
+pub struct Trim<'a> {
+    /// Log times that are kept, each from and to, neither of them overlapping, in their order; empty keeps all.
+    pub spans: Vec<(MonoNs, MonoNs)>,
+    /// What was done, in words, for the log's metadata.
+    pub words: String,
+    /// Changes what the log begins with.
+    pub header: &'a dyn Fn(&LogInfo, LogHeader) -> LogHeader,
+    /// Changes what the sources have sent.
+    pub change: Change<'a>,
+}
+
+/// What came of it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Trimmed {
+    /// Messages written.
+    pub messages: u64,
+    /// Messages outside the spans.
+    pub cut: u64,
+    /// Messages of results left out: a part of a dive isn't judged as the whole was.
+    pub results: u64,
+    /// Messages of sources that were changed.
+    pub changed: u64,
+    /// Messages of sources of which nothing was left.
+    pub emptied: u64,
+    /// Bytes of sources' messages before.
+    pub bytes_before: u64,
+    /// And after.
+    pub bytes_after: u64,
+    /// What the log had lost before.
+    pub losses: u64,
+    /// Log times of the first and the last message written, in the order of the log.
+    pub span: Option<(MonoNs, MonoNs)>,
+}
+
+/// Writes what is to be kept of a log to `output`, in the same order. The new log says itself what was cut out, as a loss with its
+/// time span. `open` opens the log, twice; `known` are the result channels whose schemas this program has.
+///
+/// Errors: the log can't be read at all, or the output not be written.
+pub fn trim<R: Read + Seek, W: Write>(
+    open: &mut dyn FnMut() -> Result<DiveLog<R>, LogError>,
+    output: W,
+    trim: &mut Trim<'_>,
+    known: &[ResultChannel],
+) -> Result<Trimmed, LogError> {
+    let found = look_through(open()?)?;
+    let mut reader = open()?;
+    let topics = if trim.spans.is_empty() { found.topics } else { Vec::new() };
+    let mut begin = header(&reader, &topics, found.sources, known);
+    begin.metadata.insert(TRIMMED.to_owned(), trim.words.clone());
+    begin.part = None;
+    let mut log = LogWriter::new(output, &(trim.header)(reader.header(), begin))?;
+    let losses = found.losses.len() as u64;
+    for loss in found.losses {
+        log.lost(loss.from, loss.to, &words(&loss))?;
+    }
+    state_cuts(&trim.spans, &mut log)?;
+    let numbers = topics.iter().map(String::as_str).zip(0..).collect();
+    let mut cutter = Cutter {
+        numbers,
+        log,
+        done: Trimmed { losses, ..Trimmed::default() },
+        order: Vec::new(),
+        whole: true,
+        shorter: Vec::new(),
+    };
+    while let Some(message) = reader.next()? {
+        cutter.take(&message, trim)?;
+    }
+    cutter.log.finish()?;
+    Ok(cutter.done)
+}
+
+/// Says what isn't there any more.
+fn state_cuts<W: Write>(spans: &[(MonoNs, MonoNs)], log: &mut LogWriter<W>) -> Result<(), LogError> {
+    let (Some(first), Some(last)) = (spans.first(), spans.last()) else { return Ok(()) };
+    log.lost(None, Some(first.0), "what came before was cut off by headrace trim")?;
+    for pair in spans.windows(2) {
+        if let [before, after] = pair {
+            log.lost(Some(before.1), Some(after.0), "cut out by headrace trim")?;
+        }
+    }
+    log.lost(Some(last.1), None, "what came after was cut off by headrace trim")
+}
+
+/// Writes message after message.
+struct Cutter<'a, W: Write> {
+    numbers: BTreeMap<&'a str, u16>,
+    log: LogWriter<W>,
+    done: Trimmed,
+    /// Sources whose packets were kept since the last tick, in their order.
+    order: Vec<u16>,
+    /// Whether all were kept.
+    whole: bool,
+    shorter: Vec<u8>,
+}
+
+impl<W: Write> Cutter<'_, W> {
+    fn take(&mut self, message: &LogMessage<'_>, trim: &mut Trim<'_>) -> Result<(), LogError> {
+        let Some(lane) = lane(message, &self.numbers) else {
+            self.done.results += 1;
+            return Ok(());
+        };
+        let within = |(from, to): &(MonoNs, MonoNs)| (*from..*to).contains(&message.log_time);
+        if lane == Lane::Tick {
+            return self.tick(message);
+        }
+        if !trim.spans.is_empty() && !trim.spans.iter().any(within) {
+            self.done.cut += 1;
+            self.whole &= !matches!(lane, Lane::Raw(_));
+            return Ok(());
+        }
+        let Lane::Raw(source) = lane else { return self.write(lane, message, message.data) };
+        self.done.bytes_before += message.data.len() as u64;
+        let mut shorter = core::mem::take(&mut self.shorter);
+        let changed = (trim.change)(source, message.data, &mut shorter);
+        let data = if changed { shorter.as_slice() } else { message.data };
+        self.done.changed += u64::from(changed);
+        self.done.bytes_after += data.len() as u64;
+        let written = if changed && data.is_empty() {
+            self.done.emptied += 1;
+            self.whole = false;
+            Ok(())
+        } else {
+            self.order.push(source);
+            self.write(lane, message, data)
+        };
+        self.shorter = shorter;
+        written
+    }
+
+    /// A tick names the packets that it consumed: those that were kept.
+    fn tick(&mut self, message: &LogMessage<'_>) -> Result<(), LogError> {
+        let order = core::mem::take(&mut self.order);
+        let whole = core::mem::replace(&mut self.whole, true);
+        match super::format::Tick::decode(message.data) {
+            Ok(tick) if !whole => {
+                if order.is_empty() {
+                    self.done.cut += 1;
+                    return Ok(());
+                }
+                self.note(message);
+                self.log.tick(tick.index, tick.now, &order)
+            }
+            _ => self.write(Lane::Tick, message, message.data),
+        }
+    }
+
+    fn write(&mut self, lane: Lane, message: &LogMessage<'_>, data: &[u8]) -> Result<(), LogError> {
+        self.note(message);
+        self.log.message(lane, message.log_time, message.publish_time, data)
+    }
+
+    fn note(&mut self, message: &LogMessage<'_>) {
+        self.done.messages += 1;
+        let first = self.done.span.map_or(message.log_time, |span| span.0);
+        self.done.span = Some((first, message.log_time));
+    }
+}

@@ -1,0 +1,254 @@
+//! A log's beginning without what tells whose it is: comments, names, addresses, serial numbers, the time of day.
+//!
+//! The vehicle file is gone through as text, string by string: what its keys mean stays, and so does every number.
+
+use headrace_core::config::{Connect, SerialPort, VehicleConfig};
+use headrace_replay::log::format::{FORMAT_KEY, VEHICLE_FILE};
+use headrace_replay::log::{LogHeader, LogInfo, SourceInfo, TRIMMED};
+
+use crate::devices::KINDS;
+use crate::failure::Failure;
+use crate::files;
+
+/// Keys of the log's metadata that tell nothing of anybody.
+const KEPT_KEYS: [&str; 4] = [FORMAT_KEY, "version", "import_format", TRIMMED];
+/// Log times from here on, the beginning of the year 2000, are of UTC and no monotonic clock's.
+const UTC_FROM_NS: u64 = 946_684_800_000_000_000;
+
+/// What takes the place of a log's beginning.
+pub(crate) struct Anonymous {
+    vehicle_toml: String,
+    /// Names of attachments, as they were and as they are.
+    names: Vec<(String, String)>,
+    /// What is left in it, in words.
+    pub(crate) left: Vec<String>,
+}
+
+impl Anonymous {
+    /// For a log and its vehicle.
+    ///
+    /// Errors: the vehicle file doesn't read any more, which would be a fault of ours.
+    pub(crate) fn of(info: &LogInfo, vehicle: &VehicleConfig) -> Result<Self, Failure> {
+        let text = info.vehicle_toml.clone().unwrap_or_default();
+        let names: Vec<(String, String)> = (1..)
+            .zip(&info.attachments)
+            .map(|(number, (name, _))| (name.clone(), format!("file{number}{}", ending(name))))
+            .collect();
+        let vehicle_toml = anonymised(&text, &names);
+        let attachments: Vec<(String, Vec<u8>)> = names
+            .iter()
+            .zip(&info.attachments)
+            .map(|((_, name), (_, content))| (name.clone(), content.clone()))
+            .collect();
+        let document = headrace_core::config::Document::new(VEHICLE_FILE, &vehicle_toml);
+        VehicleConfig::parse(document, &KINDS, &files::attached(&attachments))?;
+        Ok(Self { vehicle_toml, names, left: left(info, vehicle) })
+    }
+
+    /// The beginning of the new log.
+    pub(crate) fn header(&self, mut header: LogHeader) -> LogHeader {
+        header.vehicle_toml.clone_from(&self.vehicle_toml);
+        for (name, _) in &mut header.attachments {
+            if let Some((_, other)) = self.names.iter().find(|(known, _)| known == name) {
+                name.clone_from(other);
+            }
+        }
+        header.metadata.retain(|key, _| KEPT_KEYS.contains(&key.as_str()));
+        for (number, source) in header.sources.iter_mut().enumerate() {
+            source.connect = connect(&source.connect, number);
+        }
+        header
+    }
+}
+
+/// What can't be taken out, in words.
+fn left(info: &LogInfo, vehicle: &VehicleConfig) -> Vec<String> {
+    let ids = |sources: &[SourceInfo]| {
+        sources.iter().map(|source| source.id.as_str()).collect::<Vec<_>>().join(", ")
+    };
+    let mut left = vec![
+        format!("left: the sensors' ids ({})", ids(&info.sources)),
+        format!("left: the tunnel's shape ({}) and all numbers of the vehicle file", vehicle.tunnel.name),
+        "left: what devices have sent, but for places, texts and machine numbers of MAVLink; it may hold serial numbers, versions \
+         and the time of day (CAN units, velocity logs, depth sensors when they are opened)"
+            .to_owned(),
+    ];
+    if !info.attachments.is_empty() {
+        left.push("left: the content of the attached files".to_owned());
+    }
+    let anchor = info.metadata.keys().any(|key| key.contains("clock_anchor"));
+    if !anchor {
+        left.push(format!("left: log times; those after {UTC_FROM_NS} ns tell the day"));
+    }
+    left
+}
+
+/// What a file's name ends in, so that its kind can still be told.
+fn ending(name: &str) -> &str {
+    name.rfind('.').and_then(|dot| name.get(dot..)).unwrap_or_default()
+}
+
+/// A place where something is connected, of the same kind, without what tells which.
+fn connect(text: &str, number: usize) -> String {
+    // Addresses for documents, RFC 5737.
+    let host = |address: &str| {
+        let port = address.rsplit_once(':').map_or("", |(_, port)| port);
+        format!("192.0.2.{}:{port}", number % 250 + 1)
+    };
+    let connect = match Connect::parse(text) {
+        Ok(Connect::Tcp { address }) => Connect::Tcp { address: host(&address) },
+        Ok(Connect::Udp { address }) => Connect::Udp { address: host(&address) },
+        Ok(Connect::UdpListen { address }) => Connect::UdpListen { address: host(&address) },
+        Ok(Connect::Serial { baud, .. }) => {
+            Connect::Serial { port: SerialPort::Path(format!("/dev/ttyUSB{number}")), baud }
+        }
+        Ok(Connect::Hid(mut usb)) => {
+            usb.serial = None;
+            Connect::Hid(usb)
+        }
+        Ok(Connect::Can { .. }) => Connect::Can { interface: format!("can{number}") },
+        Ok(connect @ Connect::I2c { .. }) => connect,
+        Err(_) => return String::new(),
+    };
+    connect.to_string()
+}
+
+/// A vehicle file without comments, and with other texts for names, addresses and attached files.
+fn anonymised(text: &str, names: &[(String, String)]) -> String {
+    let (mut clean, mut rest, mut count) = (String::new(), text, 0);
+    while let Some(c) = rest.chars().next() {
+        match c {
+            '#' => rest = rest.find('\n').and_then(|end| rest.get(end..)).unwrap_or_default(),
+            '"' | '\'' => {
+                let len = string_len(rest, c);
+                let (string, after) = rest.split_at_checked(len).unwrap_or((rest, ""));
+                let key = key_before(&clean);
+                clean.push_str(&other_string(string, key, names, &mut count));
+                rest = after;
+            }
+            c => {
+                clean.push(c);
+                rest = rest.get(c.len_utf8()..).unwrap_or_default();
+            }
+        }
+    }
+    let lines = clean.lines().map(str::trim_end).filter(|line| !line.is_empty());
+    lines.fold(String::new(), |all, line| all + line + "\n")
+}
+
+/// Bytes of the TOML string that `text` begins with, its quotes included.
+fn string_len(text: &str, quote: char) -> usize {
+    let long: String = [quote; 3].iter().collect();
+    let end = if text.starts_with(&long) { long.as_str() } else { text.get(..1).unwrap_or_default() };
+    let mut at = end.len();
+    while let Some(rest) = text.get(at..).filter(|rest| !rest.is_empty()) {
+        if rest.starts_with(end) {
+            return at + end.len();
+        }
+        let first = rest.chars().next().map_or(1, char::len_utf8);
+        let escaped = quote == '"' && rest.starts_with('\\');
+        let second = rest.chars().nth(1).filter(|_| escaped).map_or(0, char::len_utf8);
+        at += first + second;
+    }
+    text.len()
+}
+
+/// The key whose value begins at the end of `text`.
+fn key_before(text: &str) -> &str {
+    let line = text.rsplit(['\n', ',', '{', '[']).next().unwrap_or_default();
+    line.split_once('=').map_or("", |(key, _)| key.trim())
+}
+
+/// A string of the file as it may be handed on.
+fn other_string(string: &str, key: &str, names: &[(String, String)], count: &mut usize) -> String {
+    let inner = string.trim_matches(['"', '\'']);
+    if let Some((_, other)) = names.iter().find(|(name, _)| name == inner) {
+        return format!("{other:?}");
+    }
+    match key {
+        "name" => {
+            *count += 1;
+            format!("\"name {count}\"")
+        }
+        "connect" => {
+            *count += 1;
+            format!("{:?}", connect(inner, *count))
+        }
+        _ => string.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn comments_names_addresses_and_files_go_and_the_rest_stays() {
+        let text = r##"# Gate 3 of the Upper Plant
+name = "VITA # 7" # Anna's
+target_m = 1.2
+[tunnel]
+profile = 'polyline' # of 1962
+file = "upper plant.csv"
+[[openings]]
+name = """gate "three"
+at the bend"""
+from_m = 1
+[[sensors]]
+id = "sonar_0"
+connect = "tcp:plant-router.example:4040"
+[[sensors]]
+connect = "serial:/dev/serial/by-id/usb-FTDI_A50285BI-if00?baud=9600"
+[[sensors]]
+signals = { rate = ["A#1", "B\"#"], sample_time = "T" }
+connect = "hid:1209:0001:SN4711"
+"##;
+        let names = [("upper plant.csv".to_owned(), "file1.csv".to_owned())];
+        let expected = r##"name = "name 1"
+target_m = 1.2
+[tunnel]
+profile = 'polyline'
+file = "file1.csv"
+[[openings]]
+name = "name 2"
+from_m = 1
+[[sensors]]
+id = "sonar_0"
+connect = "tcp:192.0.2.4:4040"
+[[sensors]]
+connect = "serial:/dev/ttyUSB4?baud=9600"
+[[sensors]]
+signals = { rate = ["A#1", "B\"#"], sample_time = "T" }
+connect = "hid:1209:0001"
+"##;
+        assert_eq!(anonymised(text, &names), expected);
+    }
+
+    #[test]
+    fn the_shipped_vehicles_still_read_and_are_the_same_but_for_names() {
+        for name in ["vita1.toml", "vita2-2.toml", "vita2-3.toml", "vita2-4.toml"] {
+            let text = String::from_utf8(files::built_in_vehicle(name).unwrap()).unwrap();
+            let clean = anonymised(&text, &[]);
+            assert!(!clean.contains('#') && !clean.contains("VITA") && !clean.contains("192.168"), "{clean}");
+            let read = |text: &str| {
+                let document = headrace_core::config::Document::new(name, text);
+                VehicleConfig::parse(document, &KINDS, &|_| Err("no file".to_owned())).unwrap()
+            };
+            let (before, after) = (read(&text), read(&clean));
+            let told = |vehicle: &VehicleConfig| format!("{:?} {:?}", vehicle.tunnel, vehicle.site);
+            assert_eq!((told(&after), after.target_m), (told(&before), before.target_m));
+            let sensors = |vehicle: &VehicleConfig| {
+                let sensors = vehicle.sensor_configs.iter();
+                sensors.map(|s| format!("{} {} {:?}", s.id, s.plugin, s.mount)).collect::<Vec<_>>()
+            };
+            assert_eq!(sensors(&after), sensors(&before));
+        }
+    }
+
+    #[test]
+    fn strings_without_an_end_are_gone_through() {
+        for text in ["name = \"", "'", "\"\"\"", "\"\\", "#", "name = 'é", "\u{e9}#"] {
+            anonymised(text, &[]);
+        }
+    }
+}

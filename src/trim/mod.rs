@@ -1,0 +1,222 @@
+//! `headrace trim`: a log with less in it.
+
+mod anonymous;
+
+use std::fs::OpenOptions;
+use std::io::{BufWriter, Write};
+use std::path::PathBuf;
+
+use headrace_core::app::device::Needless;
+use headrace_core::app::flow::Navigator;
+use headrace_core::config::VehicleConfig;
+use headrace_core::time::{DurNs, MonoNs};
+use headrace_replay::drive::Pace;
+use headrace_replay::log::{
+    DiveLog, LogHeader, LogInfo, Trim as Work, Trimmed, files_digest, files_of, trim as rewrite,
+};
+use headrace_replay::player::{Player, seconds};
+use headrace_replay::record::result_channels;
+use serde_json::json;
+
+use crate::cli::Trim;
+use crate::commands::{attached_vehicle, named, vehicle_file};
+use crate::dive::assemble_kept;
+use crate::failure::{self, Failure};
+use crate::output::{deliver, say};
+use crate::watch::Watch;
+use anonymous::Anonymous;
+
+/// A tick of the replay that finds out when the vehicle was where.
+const TICK: DurNs = DurNs::from_millis(20);
+/// The vehicle may be away for so long, or nowhere, without a cut in the log.
+const BRIDGED: DurNs = DurNs::from_millis(2000);
+
+/// Trims a log, and says what was done.
+pub(crate) fn trim(args: &Trim) -> Result<u8, Failure> {
+    let files = files_of(&args.logs)?;
+    let log = DiveLog::open(&files)?;
+    let info = log.header().clone();
+    let vehicle = vehicle(args, &files, &info)?;
+    let spans = spans(args, &files, vehicle.as_ref())?;
+    let anonymous = match &vehicle {
+        Some(vehicle) if args.anonymise => Some(Anonymous::of(&info, vehicle)?),
+        _ => None,
+    };
+    let mut said = what_is_done(args, &files, &spans)?;
+    let trimmed = write(args, &files, &spans, vehicle.as_ref(), anonymous.as_ref(), &said)?;
+    said.extend(anonymous.iter().flat_map(|anonymous| anonymous.left.clone()));
+    tell(args, &trimmed, &spans, &said)?;
+    Ok(if trimmed.losses > 0 { failure::DATA_LOST } else { failure::OK })
+}
+
+/// The vehicle, where what is asked for needs it.
+fn vehicle(args: &Trim, files: &[PathBuf], info: &LogInfo) -> Result<Option<VehicleConfig>, Failure> {
+    if args.chainage.is_none() && !args.drop_echoes && !args.anonymise {
+        return Ok(None);
+    }
+    let losses = Player::open(files)?.losses();
+    let (_, vehicle) = match &args.vehicle {
+        Some(path) => vehicle_file(path),
+        None => attached_vehicle(info, &losses, named(&args.logs)),
+    }?;
+    Ok(Some(vehicle))
+}
+
+/// The log times that are kept; none where all are.
+fn spans(
+    args: &Trim,
+    files: &[PathBuf],
+    vehicle: Option<&VehicleConfig>,
+) -> Result<Vec<(MonoNs, MonoNs)>, Failure> {
+    if let (Some([from_m, to_m]), Some(vehicle)) = (args.chainage, vehicle) {
+        let spans = when_within(files, vehicle, from_m, to_m)?;
+        if spans.is_empty() {
+            return Err(Failure::Usage(format!(
+                "trim: the vehicle wasn't between {from_m} and {to_m} m at any time of {}",
+                named(&args.logs).display()
+            )));
+        }
+        return Ok(spans);
+    }
+    if args.from.is_none() && args.to.is_none() {
+        return Ok(Vec::new());
+    }
+    let mut log = DiveLog::open(files)?;
+    let first = log.next()?.map_or(MonoNs(0), |message| message.log_time);
+    let from = args.from.map_or(MonoNs(0), |from| first + from);
+    let to = args.to.map_or(MonoNs(u64::MAX), |to| first + to);
+    if from >= to {
+        return Err(Failure::Usage("trim: --from must be before --to".to_owned()));
+    }
+    Ok(vec![(from, to)])
+}
+
+/// When the vehicle was on a stretch, by a replay.
+fn when_within(
+    files: &[PathBuf],
+    vehicle: &VehicleConfig,
+    from_m: f64,
+    to_m: f64,
+) -> Result<Vec<(MonoNs, MonoNs)>, Failure> {
+    let dive = assemble_kept(vehicle)?;
+    let mut player = Player::open(files)?;
+    player.connect(dive.armed.sources());
+    let mut spans: Vec<(MonoNs, MonoNs)> = Vec::new();
+    let pace = Pace { tick: TICK, speed: None };
+    dive.run_beside(&mut player, pace, &mut Watch::quiet(), &mut |dive| {
+        let now = dive.now();
+        let Ok(fix) = dive.world().resource::<Navigator>().navigation.fix(now) else { return };
+        if !(from_m..=to_m).contains(&fix.pose.position.x()) {
+            return;
+        }
+        let begun = MonoNs(now.0.saturating_sub(TICK.0.cast_unsigned()));
+        match spans.last_mut() {
+            Some((_, to)) if begun.since(*to) <= BRIDGED => *to = now,
+            _ => spans.push((begun, now)),
+        }
+    })?;
+    Ok(spans)
+}
+
+/// What is done, in words.
+fn what_is_done(args: &Trim, files: &[PathBuf], spans: &[(MonoNs, MonoNs)]) -> Result<Vec<String>, Failure> {
+    let mut said = Vec::new();
+    if args.anonymise {
+        said.push("anonymised".to_owned());
+    } else {
+        let names: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
+        said.push(format!("of {} (sha256 {})", names.join(", "), files_digest(files)?));
+    }
+    if let Some([from_m, to_m]) = args.chainage {
+        said.push(format!("cut to chainage {from_m} to {to_m} m: {} spans of time", spans.len()));
+    } else if !spans.is_empty() {
+        said.push("cut in time".to_owned());
+    }
+    if !spans.is_empty() {
+        said.push("without the results of the dive".to_owned());
+    }
+    if args.drop_echoes {
+        said.push("without echo strengths".to_owned());
+    }
+    Ok(said)
+}
+
+/// Writes the new log; takes it away again when that fails.
+fn write(
+    args: &Trim,
+    files: &[PathBuf],
+    spans: &[(MonoNs, MonoNs)],
+    vehicle: Option<&VehicleConfig>,
+    anonymous: Option<&Anonymous>,
+    said: &[String],
+) -> Result<Trimmed, Failure> {
+    let failed = |source| Failure::Write { path: args.output.clone(), source };
+    let sources = DiveLog::open(files)?.header().sources.clone();
+    let device = |source: u16| {
+        let id = &sources.get(usize::from(source))?.id;
+        let configs = vehicle?.sensor_configs.iter().zip(&vehicle?.sensors);
+        configs.into_iter().find(|(config, _)| config.id == *id).map(|(_, device)| device)
+    };
+    let wanted = [(args.drop_echoes, Needless::Echoes), (args.anonymise, Needless::Identity)];
+    let mut between = Vec::new();
+    let mut change = |source: u16, bytes: &[u8], shorter: &mut Vec<u8>| {
+        let Some(device) = device(source) else { return false };
+        let mut changed = false;
+        for (_, what) in wanted.iter().filter(|(wanted, _)| *wanted) {
+            let packet = if changed { between.as_slice() } else { bytes };
+            if device.without(*what, packet, shorter) {
+                changed = true;
+                between.clone_from(shorter);
+            }
+        }
+        shorter.clone_from(&between);
+        changed
+    };
+    let header = |_: &LogInfo, header: LogHeader| match anonymous {
+        Some(anonymous) => anonymous.header(header),
+        None => header,
+    };
+    let mut work =
+        Work { spans: spans.to_vec(), words: said.join("; "), header: &header, change: &mut change };
+    // A log is never overwritten.
+    let file = OpenOptions::new().write(true).create_new(true).open(&args.output).map_err(failed)?;
+    let mut writer = BufWriter::new(&file);
+    let written = rewrite(&mut || DiveLog::open(files), &mut writer, &mut work, &result_channels())
+        .map_err(Failure::from)
+        .and_then(|trimmed| writer.flush().and_then(|()| file.sync_all()).map(|()| trimmed).map_err(failed));
+    if written.is_err() {
+        std::fs::remove_file(&args.output).map_err(failed)?;
+    }
+    written
+}
+
+fn tell(args: &Trim, trimmed: &Trimmed, spans: &[(MonoNs, MonoNs)], said: &[String]) -> Result<(), Failure> {
+    let Trimmed { messages, cut, results, changed, emptied, bytes_before, bytes_after, losses, span } =
+        *trimmed;
+    if args.json {
+        let spans: Vec<_> =
+            spans.iter().map(|(from, to)| json!({"from_ns": from.0, "to_ns": to.0})).collect();
+        let told = json!({
+            "log": args.output.display().to_string(), "messages": messages, "cut": cut, "results_left_out": results,
+            "changed": changed, "emptied": emptied, "sensor_bytes_before": bytes_before, "sensor_bytes": bytes_after,
+            "losses": losses, "spans": spans, "done": said,
+        });
+        return deliver(&told.to_string());
+    }
+    for words in said {
+        say(&format!("done     {words}"));
+    }
+    if changed > 0 {
+        say(&format!(
+            "changed  {changed} messages of sensors, of which {emptied} have nothing left; {bytes_before} bytes are {bytes_after}"
+        ));
+    }
+    if losses > 0 {
+        say(&format!("lost     {losses} losses that the log had are stated in the new one"));
+    }
+    let span = span.map(|(from, to)| format!(", {} to {}", seconds(from), seconds(to))).unwrap_or_default();
+    let results = if results > 0 { format!(" and {results} of results") } else { String::new() };
+    say(&format!("kept     {messages} messages{span}; left out {cut}{results}"));
+    say(&format!("log      {}", args.output.display()));
+    Ok(())
+}
