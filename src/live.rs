@@ -9,6 +9,7 @@ use headrace_core::app::driver::DriverSetup;
 use headrace_core::config::{Connect, ConnectError, VehicleConfig};
 use headrace_core::time::{DurNs, MonoNs};
 use headrace_ports::{Crew, Hand, Phase, SentSink, Status};
+use headrace_replay::log::part_path;
 
 use crate::cli::Run;
 use crate::commands::{finish, watch};
@@ -30,8 +31,11 @@ pub(crate) fn run(args: &Run, text: &str, vehicle: &VehicleConfig) -> Result<u8,
     let until = args.duration.map(|seconds| begun + DurNs::from_secs_f64(seconds));
     let mut watch = watch(&args.output);
     if !watch.is_quiet() {
-        let where_to =
-            if args.no_record { "not recorded".to_owned() } else { format!("recorded to {}", log.display()) };
+        let where_to = match (args.no_record, args.rotate) {
+            (true, _) => "not recorded".to_owned(),
+            (false, None) => format!("recorded to {}", log.display()),
+            (false, Some(_)) => format!("recorded in parts, from {} on", part_path(&log, 1).display()),
+        };
         say(&format!("{}, target {} m: {where_to}; Ctrl-C ends the dive", vehicle.name, vehicle.target_m));
     }
     let lamps =

@@ -4,7 +4,7 @@
 
 use headrace_core::config::{Connect, SerialPort, VehicleConfig};
 use headrace_replay::log::format::{FORMAT_KEY, VEHICLE_FILE};
-use headrace_replay::log::{LogHeader, LogInfo, SourceInfo, TRIMMED};
+use headrace_replay::log::{DiveLog, LogHeader, SourceInfo, TRIMMED};
 
 use crate::devices::KINDS;
 use crate::failure::Failure;
@@ -28,7 +28,8 @@ impl Anonymous {
     /// For a log and its vehicle.
     ///
     /// Errors: the vehicle file doesn't read any more, which would be a fault of ours.
-    pub(crate) fn of(info: &LogInfo, vehicle: &VehicleConfig) -> Result<Self, Failure> {
+    pub(crate) fn of(log: &DiveLog, vehicle: &VehicleConfig) -> Result<Self, Failure> {
+        let info = log.header();
         let text = info.vehicle_toml.clone().unwrap_or_default();
         let names: Vec<(String, String)> = (1..)
             .zip(&info.attachments)
@@ -42,7 +43,7 @@ impl Anonymous {
             .collect();
         let document = headrace_core::config::Document::new(VEHICLE_FILE, &vehicle_toml);
         VehicleConfig::parse(document, &KINDS, &files::attached(&attachments))?;
-        Ok(Self { vehicle_toml, names, left: left(info, vehicle) })
+        Ok(Self { vehicle_toml, names, left: left(log, vehicle) })
     }
 
     /// The beginning of the new log.
@@ -62,7 +63,8 @@ impl Anonymous {
 }
 
 /// What can't be taken out, in words.
-fn left(info: &LogInfo, vehicle: &VehicleConfig) -> Vec<String> {
+fn left(log: &DiveLog, vehicle: &VehicleConfig) -> Vec<String> {
+    let info = log.header();
     let ids = |sources: &[SourceInfo]| {
         sources.iter().map(|source| source.id.as_str()).collect::<Vec<_>>().join(", ")
     };
@@ -76,9 +78,8 @@ fn left(info: &LogInfo, vehicle: &VehicleConfig) -> Vec<String> {
     if !info.attachments.is_empty() {
         left.push("left: the content of the attached files".to_owned());
     }
-    let anchor = info.metadata.keys().any(|key| key.contains("clock_anchor"));
-    if !anchor {
-        left.push(format!("left: log times; those after {UTC_FROM_NS} ns tell the day"));
+    if log.times().is_some_and(|(_, to)| to.0 >= UTC_FROM_NS) {
+        left.push("left: the messages' times, which count from 1970 and tell the day".to_owned());
     }
     left
 }

@@ -39,7 +39,7 @@ pub(crate) fn trim(args: &Trim) -> Result<u8, Failure> {
     let vehicle = vehicle(args, &files, &info)?;
     let spans = spans(args, &files, vehicle.as_ref())?;
     let anonymous = match &vehicle {
-        Some(vehicle) if args.anonymise => Some(Anonymous::of(&info, vehicle)?),
+        Some(vehicle) if args.anonymise => Some(Anonymous::of(&log, vehicle)?),
         _ => None,
     };
     let mut said = what_is_done(args, &files, &spans)?;

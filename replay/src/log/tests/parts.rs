@@ -98,6 +98,12 @@ fn parts_hold_what_one_file_does() {
             let counts: Vec<u64> = log.files().iter().map(|file| file.messages).collect();
             assert_eq!(counts, summary.parts.iter().map(|part| part.raw_messages).collect::<Vec<_>>());
         }
+        if let Every::Bytes(bytes) = every {
+            // Half a second of it is 4 kB.
+            let len = |path: &PathBuf| std::fs::metadata(path).unwrap().len();
+            let ended = &paths[..paths.len() - 1];
+            assert!(ended.iter().all(|path| (bytes..bytes + 10_000).contains(&len(path))));
+        }
         for path in &paths {
             // Each has everything that a log has, and no tick is divided.
             let (seen, losses) = read(&std::fs::read(path).unwrap());
