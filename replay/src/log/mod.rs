@@ -38,7 +38,7 @@ mod writer;
 
 pub use error::LogError;
 pub use loss::{Loss, LossKind};
-pub use reader::{LogInfo, LogMessage, LogReader, MessageKind, file_digest};
+pub use reader::{ChannelInfo, LogInfo, LogMessage, LogReader, MessageKind, file_digest};
 pub use recorder::{Full, Recorder, RecorderHandle, RecorderPort, SentPort};
 pub use recover::{RECOVERED_FROM, Recovered, recover};
 pub use space::LeftOut;

@@ -12,7 +12,7 @@ use super::fields::Fields;
 use super::format::{
     ATTACHMENT_PREFIX, CHANNEL_LIST, FORMAT_KEY, FORMAT_VERSION, LOSSES, METADATA, read_loss, unseal,
 };
-use super::framing::{AttachmentPlace, ChunkPlace, Definition, Found, Frame, Item, LogFile, look};
+use super::framing::{AttachmentPlace, ChunkPlace, Definition, Found, Frame, Item, LogFile, look, schema};
 use super::loss::Losses;
 use super::search::find_records;
 use super::{LogError, Loss, LossKind};
@@ -50,6 +50,8 @@ pub(super) struct Scan {
     pub(super) losses: Losses,
     pub(super) attachments: Vec<(String, Vec<u8>)>,
     pub(super) metadata: BTreeMap<String, String>,
+    /// Names of schemas by their numbers.
+    pub(super) schemas: BTreeMap<u16, String>,
     definitions: BTreeMap<u16, Definition>,
     /// Definitions in the summary, which count only if its checksum fits.
     summary: BTreeMap<u16, Definition>,
@@ -85,7 +87,7 @@ pub(super) fn scan<R: Read + Seek>(file: &mut LogFile<R>) -> Result<(Scan, Chann
     scan.walk(file, magic_len)?;
     scan.check_format(file)?;
     let summarised = scan.take_summary(file)?;
-    if !summarised && !scan.has_list {
+    if !summarised && !scan.has_list || !scan.ours && scan.lacks_schemas() {
         scan.look_into_chunks(file)?;
     }
     scan.miss_parts();
@@ -155,6 +157,10 @@ impl Scan {
             Item::Message { log_time } => self.add_message(frame, *log_time),
             Item::Chunk(place) => self.add_chunk(frame.at, frame.end, place),
             Item::Channel => self.add_channel(file, frame)?,
+            Item::Schema => {
+                let body = whole_body(file, frame)?;
+                self.schemas.extend(body.and_then(|body| schema(&mut Fields::new(&body))));
+            }
             Item::Metadata => self.add_metadata(file, frame)?,
             Item::Attachment(place) => self.add_attachment(file, frame, place)?,
             Item::Statistics { channels } => self.summary_channels = Some(*channels),
@@ -269,17 +275,26 @@ impl Scan {
         Ok(all)
     }
 
+    /// Whether a channel has a schema that hasn't been seen.
+    fn lacks_schemas(&self) -> bool {
+        let numbers = self.definitions.values().filter_map(|definition| definition.form.as_ref());
+        numbers.map(|(schema, _)| *schema).any(|schema| schema > 0 && !self.schemas.contains_key(&schema))
+    }
+
     /// The long way to the channels, for logs of other writers that were cut off. What stands in a sound chunk is
     /// believed before what stands outside.
     fn look_into_chunks<R: Read + Seek>(&mut self, file: &mut LogFile<R>) -> Result<(), LogError> {
         for span in &self.spans {
             let Some(place) = span.chunk(file)? else { continue };
-            let mut defined = Vec::new();
-            let unpacked = unpack(file, &place, |opcode, body| {
-                if opcode == mcap::records::op::CHANNEL {
-                    defined.extend(Definition::read(&mut Fields::new(body)));
-                }
+            let (mut defined, mut schemas) = (Vec::new(), Vec::new());
+            let unpacked = unpack(file, &place, |opcode, body| match opcode {
+                mcap::records::op::CHANNEL => defined.extend(Definition::read(&mut Fields::new(body))),
+                mcap::records::op::SCHEMA => schemas.extend(schema(&mut Fields::new(body))),
+                _ => (),
             })?;
+            if !matches!(unpacked, Unpacked::Bad(_)) {
+                self.schemas.extend(schemas);
+            }
             for definition in defined {
                 match unpacked {
                     Unpacked::Whole => drop(self.definitions.insert(definition.id, definition)),
