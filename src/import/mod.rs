@@ -18,7 +18,7 @@ use headrace_replay::import::csv::Csv;
 use headrace_replay::import::ros::bag::Bag;
 use headrace_replay::import::ros::mcap::Mcap;
 use headrace_replay::import::{Format, Import, ImportError, Imported, Input, Source, Taker, detect};
-use headrace_replay::log::{LogHeader, LogWriter};
+use headrace_replay::log::{LogError, LogHeader, LogWriter};
 use serde_json::json;
 
 use crate::cli;
@@ -233,7 +233,9 @@ impl Kind {
 /// Why a file can't be imported, with what it looks like where it is the wrong one.
 fn unusable(path: &Path, error: ImportError) -> Failure {
     match error {
-        ImportError::Nothing { .. } | ImportError::NoBag { .. } => named(path, &error.to_string()),
+        ImportError::Nothing { .. }
+        | ImportError::NoBag { .. }
+        | ImportError::Log(LogError::NotMcap { .. }) => named(path, &error.to_string()),
         ImportError::DiveLog { .. } => Failure::Usage(error.to_string()),
         error => error.into(),
     }

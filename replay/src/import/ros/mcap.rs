@@ -71,7 +71,7 @@ fn topic(channel: &ChannelInfo<'_>) -> (Topic, Encoding) {
     let (encoding, schema) = (channel.encoding, channel.schema.unwrap_or_default());
     let known = match (encoding, Type::named(schema)) {
         ("cdr" | "ros1", Some(known)) => Ok(known),
-        ("cdr" | "ros1", None) => Err(format!("messages of type {schema:?} aren't known")),
+        ("cdr" | "ros1", None) => Err(format!("messages of type {schema} aren't known")),
         (encoding, _) => Err(format!("messages are encoded as {encoding:?}; cdr and ros1 are known")),
     };
     let topic = Topic { name: channel.topic.to_owned(), type_name: schema.to_owned(), known };
