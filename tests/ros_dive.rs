@@ -90,9 +90,14 @@ impl Translator {
                 Some(("/depth".to_owned(), "sensor_msgs/msg/FluidPressure", cdr))
             }
             "imu" => {
-                let words: Vec<f64> =
-                    bytes[8..].as_chunks().0.iter().map(|word| f64::from(i16::from_be_bytes(*word))).collect();
-                let scaled = |unit: f64, count: usize| words[..count].iter().map(|word| word / unit).collect();
+                let words: Vec<f64> = bytes[8..]
+                    .as_chunks()
+                    .0
+                    .iter()
+                    .map(|word| f64::from(i16::from_be_bytes(*word)))
+                    .collect();
+                let scaled =
+                    |unit: f64, count: usize| words[..count].iter().map(|word| word / unit).collect();
                 match bytes[0] {
                     0x21 => self.imu[0] = scaled(32_767.0, 4),
                     0x32 => self.imu[1] = scaled(512.0, 3),
@@ -101,7 +106,11 @@ impl Translator {
                         let [w, x, y, z] = self.imu[0][..].try_into().unwrap();
                         let nine = [0.0; 9];
                         let cdr = stamped.f64s(&[x, y, z, w]).f64s(&nine).f64s(&self.imu[1]).f64s(&nine);
-                        return Some(("/imu".to_owned(), "sensor_msgs/msg/Imu", cdr.f64s(&force).f64s(&nine)));
+                        return Some((
+                            "/imu".to_owned(),
+                            "sensor_msgs/msg/Imu",
+                            cdr.f64s(&force).f64s(&nine),
+                        ));
                     }
                     _ => (),
                 }
@@ -140,7 +149,9 @@ fn recording(messages: &[Message<'_>]) -> Vec<u8> {
     let mut channels = BTreeMap::new();
     for message in messages {
         let id = message.channel.topic.strip_prefix("/raw/").unwrap();
-        let Some((topic, of, cdr)) = translator.written(id, message.log_time, &message.data) else { continue };
+        let Some((topic, of, cdr)) = translator.written(id, message.log_time, &message.data) else {
+            continue;
+        };
         let channel = *channels.entry(topic.clone()).or_insert_with(|| {
             let schema = writer.add_schema(of, "ros2msg", b"").unwrap();
             writer.add_channel(schema, &topic, "cdr", &BTreeMap::new()).unwrap()
@@ -173,7 +184,9 @@ fn a_dive_recorded_by_ros_is_the_dive() {
     let shown = |messages: &[Message<'_>]| {
         let mut all: Vec<_> = messages
             .iter()
-            .map(|message| (message.log_time, message.channel.topic.clone(), message.sequence, message.data.to_vec()))
+            .map(|message| {
+                (message.log_time, message.channel.topic.clone(), message.sequence, message.data.to_vec())
+            })
             .collect();
         all.sort();
         all

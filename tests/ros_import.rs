@@ -14,7 +14,8 @@ use std::path::Path;
 use common::{Answer, Folder, VEHICLE, raw_messages};
 use serde_json::Value;
 
-const RECORDINGS: [&str; 6] = ["none.bag", "bz2.bag", "lz4.bag", "humble.mcap", "jazzy.mcap", "boot_time.mcap"];
+const RECORDINGS: [&str; 6] =
+    ["none.bag", "bz2.bag", "lz4.bag", "humble.mcap", "jazzy.mcap", "boot_time.mcap"];
 const TOPICS: [(&str, &str); 6] = [
     ("/imu/data", "imu"),
     ("/pressure", "depth"),
@@ -111,7 +112,10 @@ fn recordings_of_all_kinds_give_the_messages_of_the_tables() {
         let got = heard(&folder);
         for id in ["imu", "depth", "tether", "sonar_0"] {
             let topic = format!("/raw/{id}");
-            assert!(!of(&got, &topic).is_empty() && of(&got, &topic) == of(&tables, &topic), "{name}: {topic}");
+            assert!(
+                !of(&got, &topic).is_empty() && of(&got, &topic) == of(&tables, &topic),
+                "{name}: {topic}"
+            );
         }
         // Angles of points are computed anew, and what heard nothing has no point.
         let wanted: Vec<_> =
@@ -168,7 +172,8 @@ fn refused(folder: &Folder, file: &str, map: Option<&str>, words: &[&str]) {
 #[test]
 fn what_has_no_choice_is_matched_aloud_and_what_has_is_asked_for() {
     let folder = folder("");
-    let words = ["which profiling head is which?", "/sonar/points", "/sonar/scan", "sonar_0, sonar_1", "--map"];
+    let words =
+        ["which profiling head is which?", "/sonar/points", "/sonar/scan", "sonar_0, sonar_1", "--map"];
     refused(&folder, "none.bag", None, &words);
     let (head, _) = VEHICLE.split_once("[[sensors]]").unwrap();
     let one = "[[sensors]]\nid = \"imu\"\nplugin = \"imu_can\"\npreset = \"xsens_mti600\"\n";
@@ -181,7 +186,12 @@ fn what_has_no_choice_is_matched_aloud_and_what_has_is_asked_for() {
     }
     let velocity = "[[sensors]]\nid = \"dvl\"\nplugin = \"a50\"\n";
     folder.write("vehicle.toml", format!("{head}{velocity}"));
-    refused(&folder, "none.bag", None, &["no topic is of a sensor", "/chatter (std_msgs/", "dvl (velocity log)"]);
+    refused(
+        &folder,
+        "none.bag",
+        None,
+        &["no topic is of a sensor", "/chatter (std_msgs/", "dvl (velocity log)"],
+    );
     refused(&folder, "humble.mcap", None, &["no topic is of a sensor"]);
 }
 
@@ -197,7 +207,10 @@ fn wrong_mappings_are_named() {
         (table("/imu", "imu", ""), "is no topic of the file; there are"),
         (table("/chatter", "imu", ""), "messages of type std_msgs/msg/String aren't known"),
         (table("/imu/data", "gyro", ""), "is no sensor of the vehicle file"),
-        (table("/imu/data", "depth", ""), "is a depth sensor, and a topic of sensor_msgs/msg/Imu is that of a inertial unit"),
+        (
+            table("/imu/data", "depth", ""),
+            "is a depth sensor, and a topic of sensor_msgs/msg/Imu is that of a inertial unit",
+        ),
         (table("/imu/data", "imu", "time = \"stamp\""), "must be one of record, header"),
         (table("/cable", "tether", "time = \"header\""), "have no header"),
         (table("/imu/data", "imu", "unit = \"Pa\""), "unit"),
@@ -213,7 +226,11 @@ fn wrong_mappings_are_named() {
     let answer = folder.headrace(&arguments);
     assert!(answer.code == Some(2) && answer.stderr.contains("--vehicle"), "{}", answer.stderr);
     let answer = folder.headrace(&[&arguments[..], &["--source", "imu=can0"]].concat());
-    assert!(answer.code == Some(2) && answer.stderr.contains("--source isn't for rosbag"), "{}", answer.stderr);
+    assert!(
+        answer.code == Some(2) && answer.stderr.contains("--source isn't for rosbag"),
+        "{}",
+        answer.stderr
+    );
 }
 
 /// Imports what `change` makes of a file: exit code and what is said.
@@ -236,7 +253,8 @@ fn what_is_wrong_with_a_recording_is_named() {
     for name in ["none.bag", "bz2.bag", "lz4.bag", "humble.mcap"] {
         let (code, said) = changed(&folder, name, |bytes| bytes.truncate(bytes.len() * 3 / 5));
         assert_eq!(code, Some(3), "{name}: {said}");
-        let words = if name.ends_with("bag") { "cut off" } else { "the file ends before its closing records" };
+        let words =
+            if name.ends_with("bag") { "cut off" } else { "the file ends before its closing records" };
         assert!(said.contains(words), "{name}: {said}");
         assert!(!heard(&folder).is_empty());
     }

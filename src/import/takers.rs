@@ -93,7 +93,10 @@ fn without_vehicle(kind: Kind, said: &[(String, String)]) -> Result<Vec<Taker>, 
 fn check_streams(kind: Kind, said: &[(String, String)]) -> Result<(), Failure> {
     let form = kind.stream_form();
     if kind.has_values() && !said.is_empty() {
-        return Err(refused(&format!("--source isn't for {}; a mapping file names the sensors", kind.name())));
+        return Err(refused(&format!(
+            "--source isn't for {}; a mapping file names the sensors",
+            kind.name()
+        )));
     }
     let wrong = said.iter().find(|(_, stream)| kind != Kind::Candump && stream != form);
     if let Some((id, stream)) = wrong {

@@ -66,7 +66,12 @@ impl Corpus {
         // Three times as often as foreign files: they are what must not be lost.
         for messages in [12, 60] {
             add(Kind::Log, ours(messages));
-            add(Kind::Log, foreign(messages, |options| options.compression(Some(Compression::Lz4)).chunk_size(Some(300))));
+            add(
+                Kind::Log,
+                foreign(messages, |options| {
+                    options.compression(Some(Compression::Lz4)).chunk_size(Some(300))
+                }),
+            );
             add(Kind::Log, foreign(messages, |options| options.compression(None).chunk_size(Some(500))));
             add(Kind::Log, foreign(messages, |options| options.use_chunks(false)));
         }
@@ -74,7 +79,8 @@ impl Corpus {
             [(1_600_000_000_000_000 + u64::from(n) * 1000).to_be_bytes().to_vec(), frame(n)].concat()
         });
         add(Kind::Tlog, telemetry.collect());
-        let line = |n: u32| format!("(1436509052.{:06}) can0 {:03X}#2A366C2B{:02X}\n", n * 1000, 0x21 + n % 4, n);
+        let line =
+            |n: u32| format!("(1436509052.{:06}) can0 {:03X}#2A366C2B{:02X}\n", n * 1000, 0x21 + n % 4, n);
         add(Kind::Candump, (0..60).map(line).collect::<String>().into_bytes());
         add(Kind::Imagenex, (10..30).flat_map(shot).collect());
         add(Kind::Ping, ping_log(20));
@@ -86,7 +92,11 @@ impl Corpus {
         for name in ["humble.mcap", "jazzy.mcap"] {
             add(Kind::Mcap, fixture(name));
         }
-        let said = files.iter().filter(|file| file.kind == Kind::Log).map(|file| said(&file.bytes).unwrap().0).collect();
+        let said = files
+            .iter()
+            .filter(|file| file.kind == Kind::Log)
+            .map(|file| said(&file.bytes).unwrap().0)
+            .collect();
         Self { files, said }
     }
 
@@ -125,7 +135,8 @@ fn ours(messages: u64) -> Vec<u8> {
 fn foreign(messages: u64, set: impl FnOnce(WriteOptions) -> WriteOptions) -> Vec<u8> {
     let mut file = Cursor::new(Vec::new());
     let mut writer = set(WriteOptions::new().profile("")).create(&mut file).unwrap();
-    let channels = ["/raw/depth", "/raw/imu"].map(|topic| writer.add_channel(0, topic, "", &BTreeMap::new()).unwrap());
+    let channels =
+        ["/raw/depth", "/raw/imu"].map(|topic| writer.add_channel(0, topic, "", &BTreeMap::new()).unwrap());
     for number in 0..messages {
         let log_time = BEGIN.0 + number * 40_000_000;
         let channel_id = channels[usize::try_from(number % 2).unwrap()];

@@ -100,7 +100,8 @@ impl Trial {
     fn found(&self, bytes: &[u8], problem: &str) -> String {
         let Self { seed, number, kind } = self;
         let path = std::env::temp_dir().join(format!("headrace-fuzz-{seed}-{number}.{}", kind.name()));
-        let kept = std::fs::write(&path, bytes).map_or_else(|error| error.to_string(), |()| path.display().to_string());
+        let kept = std::fs::write(&path, bytes)
+            .map_or_else(|error| error.to_string(), |()| path.display().to_string());
         format!("seed {seed}, file {number} ({}): {problem}; kept as {kept}", kind.name())
     }
 
@@ -113,7 +114,8 @@ impl Trial {
         match tried {
             Err(panic) => {
                 let words = panic.downcast_ref::<String>().map(String::as_str);
-                let words = words.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("without words");
+                let words =
+                    words.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("without words");
                 Err(self.found(bytes, &format!("panic: {words}")))
             }
             Ok(Err(problem)) => Err(self.found(bytes, &problem)),
@@ -189,7 +191,11 @@ fn files_as_they_are_have_nothing_amiss() {
     for (number, file) in (0..).zip(&corpus.files) {
         let trial = Trial { seed: 0, number, kind: file.kind };
         assert_eq!(trial.of(&file.bytes, &corpus, &around), Ok(()));
-        assert!(targets::gives(file.kind, &file.bytes, &around) > 0, "{:?} {number} gives nothing", file.kind);
+        assert!(
+            targets::gives(file.kind, &file.bytes, &around) > 0,
+            "{:?} {number} gives nothing",
+            file.kind
+        );
     }
 }
 

@@ -96,7 +96,10 @@ fn lengths(random: &mut Random, bytes: &mut [u8], at: usize) {
         let fold = |number: u64, byte: &u8| number << 8 | u64::from(*byte);
         if big_endian { field.iter().fold(0, fold) } else { field.iter().rev().fold(0, fold) }
     };
-    let likely = bytes[at.min(bytes.len())..].windows(width).take(256).position(|field| (1..1 << 20).contains(&number(field)));
+    let likely = bytes[at.min(bytes.len())..]
+        .windows(width)
+        .take(256)
+        .position(|field| (1..1 << 20).contains(&number(field)));
     let at = at + likely.unwrap_or(0);
     let Some(field) = bytes.get_mut(at..at + width) else { return };
     let told = lie(random, number(field));

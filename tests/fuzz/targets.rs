@@ -75,7 +75,12 @@ const TOPICS: [(&str, &str); 6] = [
 
 impl Surroundings {
     pub(crate) fn new() -> Self {
-        let vehicle = VehicleConfig::parse(Document::new("vehicle.toml", VEHICLE), &KINDS, &|name| Err(name.to_owned()));
+        let vehicle =
+            VehicleConfig::parse(
+                Document::new("vehicle.toml", VEHICLE),
+                &KINDS,
+                &|name| Err(name.to_owned()),
+            );
         Self { vehicle: vehicle.unwrap() }
     }
 
@@ -93,7 +98,8 @@ impl Surroundings {
             .map(|((source, config), device)| {
                 let own = matches!(kind, Kind::Csv | Kind::Bag | Kind::Mcap);
                 let stream = if own { config.id.clone() } else { line.to_owned() };
-                let driver = (kind == Kind::Tlog && config.plugin == "mavlink").then(|| device.driver(&setup));
+                let driver =
+                    (kind == Kind::Tlog && config.plugin == "mavlink").then(|| device.driver(&setup));
                 Taker { source, stream, driver }
             })
             .collect()
@@ -116,7 +122,12 @@ impl Surroundings {
 /// Tries a file that may be anything.
 ///
 /// Errors: what is wrong with how it was read, in words.
-pub(crate) fn try_one(kind: Kind, bytes: &[u8], corpus: &Corpus, around: &Surroundings) -> Result<(), String> {
+pub(crate) fn try_one(
+    kind: Kind,
+    bytes: &[u8],
+    corpus: &Corpus,
+    around: &Surroundings,
+) -> Result<(), String> {
     looks_like(bytes);
     if kind != Kind::Log {
         imported(kind, bytes, around);
@@ -127,13 +138,19 @@ pub(crate) fn try_one(kind: Kind, bytes: &[u8], corpus: &Corpus, around: &Surrou
         return Ok(());
     }
     // Parts of other logs may have come into it; but one it must be whole.
-    let holds = |whole: &Said| whole.iter().all(|(message, count)| said.get(message).is_some_and(|got| got >= count));
-    if corpus.said.iter().any(holds) { Ok(()) } else { Err(format!("{} messages, and no loss is said", said.len())) }
+    let holds =
+        |whole: &Said| whole.iter().all(|(message, count)| said.get(message).is_some_and(|got| got >= count));
+    if corpus.said.iter().any(holds) {
+        Ok(())
+    } else {
+        Err(format!("{} messages, and no loss is said", said.len()))
+    }
 }
 
 /// What a log says, and whether it says that nothing is missing. Errors: it is none.
 pub(crate) fn said(bytes: &[u8]) -> Result<(Said, bool), String> {
-    let mut log = LogReader::new(Cursor::new(bytes.to_vec()), "log".to_owned()).map_err(|error| error.to_string())?;
+    let mut log =
+        LogReader::new(Cursor::new(bytes.to_vec()), "log".to_owned()).map_err(|error| error.to_string())?;
     let mut said = Said::new();
     while let Some(message) = log.next().map_err(|error| error.to_string())? {
         if matches!(message.kind, MessageKind::Raw { .. }) {

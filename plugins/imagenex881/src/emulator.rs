@@ -210,7 +210,9 @@ impl Emulator<Sounding> for HeadEmulator {
 
     fn tell(&mut self, sounding: &Sounding, line: LineSink<'_>) {
         // Who tells what an import has read begins nothing: the emulated host asks for it now.
-        let Some(Asked { command, ping }) = self.asked.pop_front().or_else(|| self.asked_now()) else { return };
+        let Some(Asked { command, ping }) = self.asked.pop_front().or_else(|| self.asked_now()) else {
+            return;
+        };
         if let Some(bytes) = self.host.as_ref().and_then(|_| command.encode().ok()) {
             line(Direction::Sent, sounding.at, &bytes);
         }

@@ -108,11 +108,11 @@ impl Csv {
         let cells: Vec<&str> = line.split(self.separator).map(cell).collect();
         let time = cells.get(self.time.0).copied().unwrap_or_default();
         let stamp_ns = nanoseconds(time, self.time.1).ok_or("rows whose time is no number from 0 on")?;
-        let mut whole = true;
+        let mut whole = Ok(());
         for target in &mut self.targets {
-            whole &= target.tell(stamp_ns, &cells, out);
+            whole = whole.and(target.tell(stamp_ns, &cells, out));
         }
-        if whole { Ok(()) } else { Err("rows with a cell that is no number") }
+        whole
     }
 }
 
@@ -165,13 +165,15 @@ impl Target {
         Ok(())
     }
 
-    /// Puts a row's values into bytes. Where all cells are empty the sensor said nothing; `false` where some can't be read.
-    fn tell(&mut self, stamp_ns: u64, cells: &[&str], out: &mut Vec<Entry>) -> bool {
+    /// Puts a row's values into bytes. Where all cells are empty the sensor said nothing.
+    ///
+    /// Errors: in words, rows with cells that can't be told.
+    fn tell(&mut self, stamp_ns: u64, cells: &[&str], out: &mut Vec<Entry>) -> Result<(), &'static str> {
         let text = |place: &Option<(usize, f64)>| {
             place.map(|(column, _)| cells.get(column).copied().unwrap_or_default()).unwrap_or_default()
         };
         if self.columns.iter().all(|place| text(place).is_empty()) {
-            return true;
+            return Ok(());
         }
         let mut values = [None; SLOTS];
         for (value, place) in values.iter_mut().zip(&self.columns) {
@@ -180,11 +182,14 @@ impl Target {
             *value = number.filter(|number| number.is_finite());
         }
         let empty = |slot: usize| self.columns.get(slot).is_none_or(|place| text(place).is_empty());
-        let Some(value) = value(self.sensor.sense, values, empty(1)) else { return false };
+        let Some(value) = value(self.sensor.sense, values, empty(1)) else {
+            return Err("rows with a cell that is no number");
+        };
         let stream = self.sensor.id.clone();
-        self.sensor.tell(MonoNs(stamp_ns), &value, &mut |at, bytes| {
+        let told = self.sensor.tell(MonoNs(stamp_ns), &value, &mut |at, bytes| {
             out.push(Entry { stamp_ns: at.0, stream: stream.clone(), bytes: bytes.to_vec() });
-        })
+        });
+        if told { Ok(()) } else { Err("rows with values that the sensor can't say") }
     }
 }
 
@@ -195,9 +200,7 @@ fn value(sense: Sense, values: [Option<f64>; SLOTS], no_range: bool) -> Option<V
         Sense::Head => Value::Beam(a?, if no_range { None } else { Some(b?) }),
         Sense::Echosounder => Value::Range(Some(a?)),
         Sense::Depth => Value::Pressure(a?),
-        Sense::Inertial => {
-            Value::Inertia(Rot::from_roll_pitch_yaw(a?, b?, c?), [d?, e?, f?], [g?, h?, i?])
-        }
+        Sense::Inertial => Value::Inertia(Rot::from_roll_pitch_yaw(a?, b?, c?), [d?, e?, f?], [g?, h?, i?]),
         Sense::Velocity => Value::Velocity([a?, b?, c?]),
         Sense::Tether => Value::Payout(a?),
     })

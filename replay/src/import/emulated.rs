@@ -28,6 +28,25 @@ pub(super) enum Value {
     Payout(f64),
 }
 
+impl Value {
+    /// Whether there can be such a value, far beyond what there is in tunnels: wires wrap and clamp what is larger, and make
+    /// something plausible of it.
+    fn is_possible(&self) -> bool {
+        let within = |values: &[f64], most: f64| values.iter().all(|value| value.abs() <= most);
+        // What wasn't measured is no number.
+        let known =
+            |values: &[f64; 3], most: f64| values.iter().all(|value| value.is_nan() || value.abs() <= most);
+        match self {
+            Self::Beam(angle_rad, range_m) => within(&[*angle_rad, range_m.unwrap_or(0.0)], 1e5),
+            Self::Range(range_m) => within(&[range_m.unwrap_or(0.0)], 1e5),
+            Self::Pressure(pressure_pa) => (0.0..=1e9).contains(pressure_pa),
+            Self::Inertia(_, rate, force) => known(rate, 1e3) && known(force, 1e4),
+            Self::Velocity(velocity) => within(velocity, 1e3),
+            Self::Payout(chainage_m) => within(&[*chainage_m], 1e6),
+        }
+    }
+}
+
 /// A sensor of the vehicle file.
 pub(super) struct EmulatedSensor {
     pub(super) id: String,
@@ -41,7 +60,11 @@ impl EmulatedSensor {
     /// By the id that a mapping's table gives under `sensor`.
     ///
     /// Errors: the vehicle file has no such sensor.
-    pub(super) fn named(section: &Section<'_>, vehicle: &VehicleConfig, id: &str) -> Result<Self, ConfigError> {
+    pub(super) fn named(
+        section: &Section<'_>,
+        vehicle: &VehicleConfig,
+        id: &str,
+    ) -> Result<Self, ConfigError> {
         Self::all(vehicle).find(|(config_id, _)| *config_id == id).map_or_else(
             || {
                 let ids: Vec<&str> = Self::all(vehicle).map(|(id, _)| id).collect();
@@ -71,8 +94,12 @@ impl EmulatedSensor {
         Self { id: id.to_owned(), sense: device.sense(), reach_m, emulated: device.emulator(&setup) }
     }
 
-    /// Gives the bytes that it would have sent, each with its receive time. `false` where it has none for such a value.
+    /// Gives the bytes that it would have sent, each with its receive time. `false` where it has none for such a value, or the value
+    /// can't be.
     pub(super) fn tell(&mut self, at: MonoNs, value: &Value, sink: &mut dyn FnMut(MonoNs, &[u8])) -> bool {
+        if !value.is_possible() {
+            return false;
+        }
         let mut told = false;
         let mut line = |direction, at: MonoNs, bytes: &[u8]| {
             if direction == Direction::Received && !bytes.is_empty() {

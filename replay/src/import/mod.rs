@@ -272,7 +272,12 @@ impl<S: Source> Import<S> {
         while !order.is_full() && input.more(&mut order)? {}
         let Some(first_ns) = order.first_ns() else {
             let why = input.told().losses.into_iter().next().map_or(String::new(), |why| format!("; {why}"));
-            return Err(ImportError::Nothing { name: input.name().to_owned(), what, bytes: input.bytes(), why });
+            return Err(ImportError::Nothing {
+                name: input.name().to_owned(),
+                what,
+                bytes: input.bytes(),
+                why,
+            });
         };
         let clock = input.clock();
         Ok(Self { input, order, first_ns, clock })

@@ -269,7 +269,12 @@ impl Bag {
     }
 
     /// A record; of a chunk, how it is packed. `None` for one that lacks what its kind must have.
-    fn accept<'a>(&mut self, fields: Fields<'a>, data: &[u8], out: &mut Vec<Entry>) -> Option<Option<&'a [u8]>> {
+    fn accept<'a>(
+        &mut self,
+        fields: Fields<'a>,
+        data: &[u8],
+        out: &mut Vec<Entry>,
+    ) -> Option<Option<&'a [u8]>> {
         match fields.u8(b"op")? {
             2 => self.message(fields.u32(b"conn")?, fields.time_ns(b"time")?, data, out),
             3 => self.stated = Some(self.bag_header(fields)?),
@@ -299,7 +304,8 @@ impl Bag {
 
     fn message(&mut self, connection: u32, record_ns: u64, data: &[u8], out: &mut Vec<Entry>) {
         let Some(topic) = self.connections.get(&connection) else {
-            *self.lost.entry("messages of a connection that is defined nowhere before them").or_default() += 1;
+            *self.lost.entry("messages of a connection that is defined nowhere before them").or_default() +=
+                1;
             return;
         };
         self.first_ns = Some(self.first_ns.map_or(record_ns, |first_ns| first_ns.min(record_ns)));

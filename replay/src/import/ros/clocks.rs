@@ -76,7 +76,9 @@ impl Clocks {
         let followed = self.base == Base::Header;
         if self.unstamped > 0 && (followed || self.unstamped < self.messages) {
             let (unstamped, messages) = (self.unstamped, self.messages);
-            all.push(format!("{unstamped} of {messages} messages have no header stamp; theirs is the time of the record"));
+            all.push(format!(
+                "{unstamped} of {messages} messages have no header stamp; theirs is the time of the record"
+            ));
         }
         let Some((least, most)) = self.lag_ns else { return all };
         let done = match self.moved_ns {
@@ -85,13 +87,25 @@ impl Clocks {
             None => "the times of the record are taken".to_owned(),
         };
         let problem = if least.abs() > OTHER_BASE_NS || most.abs() > OTHER_BASE_NS {
-            Some(format!("header stamps are on another time base, {} s before the record", range(least, most)))
+            Some(format!(
+                "header stamps are on another time base, {} s before the record",
+                range(least, most)
+            ))
         } else if least < -AHEAD_NS {
-            Some(format!("header stamps are up to {} s later than the record: another clock, not set by it", seconds(-least)))
+            Some(format!(
+                "header stamps are up to {} s later than the record: another clock, not set by it",
+                seconds(-least)
+            ))
         } else if most - least > VARIES_NS {
-            Some(format!("header stamps are {} s before the record: messages came late, or the clock isn't set by it", range(least, most)))
+            Some(format!(
+                "header stamps are {} s before the record: messages came late, or the clock isn't set by it",
+                range(least, most)
+            ))
         } else if most > LATE_NS {
-            Some(format!("header stamps are {} s before the record: another clock, not set by it", range(least, most)))
+            Some(format!(
+                "header stamps are {} s before the record: another clock, not set by it",
+                range(least, most)
+            ))
         } else {
             None
         };
@@ -159,10 +173,13 @@ mod tests {
     #[test]
     fn clocks_that_are_off_are_named() {
         assert!(words(Base::Record, &[(10 * S, 11 * S)]).1.contains("up to 1.000 s later"));
-        assert!(words(Base::Record, &[(10 * S, 8 * S)]).1.contains("2.000 s before the record: another clock"));
+        assert!(
+            words(Base::Record, &[(10 * S, 8 * S)]).1.contains("2.000 s before the record: another clock")
+        );
         assert!(words(Base::Record, &[(10 * S, 10 * S), (20 * S, 19 * S)]).1.contains("came late"));
         assert!(words(Base::Record, &[(10 * S, 9 * S), (11 * S, 8 * S)]).1.contains("go back 1 times"));
-        let (times, said) = words(Base::Header, &[(100 * S, 100 * S), (101 * S, 501 * S), (102 * S, 502 * S)]);
+        let (times, said) =
+            words(Base::Header, &[(100 * S, 100 * S), (101 * S, 501 * S), (102 * S, 502 * S)]);
         assert_eq!(times, [100 * S, 101 * S, 102 * S]);
         assert!(said.contains("jump by over 10 s against the record 1 times"), "{said}");
         let mut clocks = Clocks::new(Base::Header);

@@ -182,7 +182,7 @@ impl Feed {
             let what = "ranges that the head doesn't tell at its range setting: as if nothing was heard";
             *self.lost.entry(what).or_default() += beyond;
         }
-        if unsaid > 0 { Err("with beams that the sensor has no message for") } else { Ok(()) }
+        if unsaid > 0 { Err("with beams that the sensor can't say") } else { Ok(()) }
     }
 
     /// Puts a value into bytes. Values with a stamp of their own are received after the sensor's delays; those without when they
@@ -198,7 +198,7 @@ impl Feed {
             let stamp_ns = if stamped { received.0 } else { at_ns };
             out.push(Entry { stamp_ns, stream: stream.clone(), bytes: bytes.to_vec() });
         });
-        if said { Ok(()) } else { Err("whose values the sensor has no message for") }
+        if said { Ok(()) } else { Err("with values that the sensor can't say") }
     }
 
     /// Says what became of it.
@@ -218,15 +218,22 @@ impl Feed {
         if self.other_frames > 0 {
             let (count, first) = (self.other_frames, self.frame_id.as_deref().unwrap_or_default());
             let first = String::from_utf8_lossy(first);
-            remark(format!("{count} messages are of another frame than the first, {first:?}; the vehicle file has one mount for all"));
+            remark(format!(
+                "{count} messages are of another frame than the first, {first:?}; the vehicle file has one mount for all"
+            ));
         }
         let upward_mps2 = self.upward_mps2 / self.taken.max(1) as f64;
         if upward_mps2 < -4.0 {
-            remark(format!("specific force along z is {upward_mps2:.1} m/s^2 on average, so that z is down; `angles_deg` of {} must say so", self.sensor_id()));
+            remark(format!(
+                "specific force along z is {upward_mps2:.1} m/s^2 on average, so that z is down; `angles_deg` of {} must say so",
+                self.sensor_id()
+            ));
         }
         if self.of == Type::FluidPressure && self.taken > 0 && self.highest_pa < LEAST_PA {
             let highest_pa = self.highest_pa;
-            remark(format!("no pressure is above {highest_pa:.1} Pa, less than that of the air; `unit` of a mapping says what they are in"));
+            remark(format!(
+                "no pressure is above {highest_pa:.1} Pa, less than that of the air; `unit` of a mapping says what they are in"
+            ));
         }
     }
 }

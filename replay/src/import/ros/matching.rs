@@ -40,8 +40,7 @@ pub enum MatchError {
     },
 }
 
-const SENSES: [Sense; 5] =
-    [Sense::Head, Sense::Echosounder, Sense::Depth, Sense::Inertial, Sense::Velocity];
+const SENSES: [Sense; 5] = [Sense::Head, Sense::Echosounder, Sense::Depth, Sense::Inertial, Sense::Velocity];
 
 /// What of an error is shown of topics, which may be hundreds.
 const MOST_SHOWN: usize = 20;
@@ -53,7 +52,8 @@ impl Feeds {
     pub fn matching(vehicle: &VehicleConfig, topics: &[Topic]) -> Result<Self, MatchError> {
         let mut feeds = Self::default();
         for sense in SENSES {
-            let fitting = |topic: &&Topic| topic.of().is_some_and(|of| of.is_telling() && of.sense() == sense);
+            let fitting =
+                |topic: &&Topic| topic.of().is_some_and(|of| of.is_telling() && of.sense() == sense);
             let fitting: Vec<&Topic> = topics.iter().filter(fitting).collect();
             let sensors: Vec<_> =
                 EmulatedSensor::all(vehicle).filter(|(_, device)| device.sense() == sense).collect();
@@ -68,7 +68,11 @@ impl Feeds {
                 (topics, sensors) => {
                     let ids: Vec<&str> = sensors.iter().map(|(id, _)| *id).collect();
                     let topics = shown(topics.iter().copied());
-                    return Err(MatchError::Several { sense: sense.as_str(), topics, sensors: ids.join(", ") });
+                    return Err(MatchError::Several {
+                        sense: sense.as_str(),
+                        topics,
+                        sensors: ids.join(", "),
+                    });
                 }
             }
         }
@@ -92,7 +96,9 @@ impl Feeds {
         let mut feeds = Self::default();
         let sections = mapping.sections("topics")?;
         if sections.is_empty() {
-            return Err(mapping.invalid("topics", "is missing; it says which topic is of which sensor").into());
+            return Err(mapping
+                .invalid("topics", "is missing; it says which topic is of which sensor")
+                .into());
         }
         for section in sections {
             let (topic, feed) = feed(&section, vehicle, topics)?;

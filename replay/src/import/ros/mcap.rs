@@ -115,7 +115,10 @@ impl<R: Read + Seek> Source for Mcap<R> {
         let mut told = self.feeds.told();
         told.losses.extend(self.reader.losses().iter().map(ToString::to_string));
         if self.reader.late() > 0 {
-            told.losses.push(format!("{} messages stand too late in the file to be put in order", self.reader.late()));
+            told.losses.push(format!(
+                "{} messages stand too late in the file to be put in order",
+                self.reader.late()
+            ));
         }
         told
     }

@@ -85,7 +85,11 @@ impl Type {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Values {
     /// Parts that the sender says it doesn't have are `None`.
-    Inertial { wxyz: Option<[f64; 4]>, rate_radps: Option<[f64; 3]>, force_mps2: Option<[f64; 3]> },
+    Inertial {
+        wxyz: Option<[f64; 4]>,
+        rate_radps: Option<[f64; 3]>,
+        force_mps2: Option<[f64; 3]>,
+    },
     /// `None` where nothing was heard.
     Range(Option<f64>),
     /// A pressure, or a length of cable: in what the mapping says, or else SI.
@@ -105,7 +109,8 @@ pub(super) struct Read<'a> {
 /// Errors: in words, why it is none of its type.
 pub(super) fn read(of: Type, encoding: Encoding, bytes: &[u8]) -> Result<Read<'_>, &'static str> {
     let mut wire = Wire::new(bytes, encoding).ok_or("in another encapsulation than plain CDR")?;
-    let read = fields(of, &mut wire).ok_or("shorter than their type says, or with a count that can't be")??;
+    let read =
+        fields(of, &mut wire).ok_or("shorter than their type says, or with a count that can't be")??;
     if !wire.is_done() {
         return Err("longer than their type says");
     }

@@ -54,7 +54,14 @@ impl Feeds {
     }
 
     /// Takes a message. Those of other topics, and of types that aren't the topic's, are nobody's.
-    pub(super) fn take(&mut self, topic: &Topic, encoding: Encoding, record_ns: u64, bytes: &[u8], out: &mut Vec<Entry>) {
+    pub(super) fn take(
+        &mut self,
+        topic: &Topic,
+        encoding: Encoding,
+        record_ns: u64,
+        bytes: &[u8],
+        out: &mut Vec<Entry>,
+    ) {
         let feed = self.by_topic.get_mut(&topic.name);
         match feed.filter(|feed| topic.known.as_ref().is_ok_and(|known| feed.is_of(*known))) {
             Some(feed) => feed.take(encoding, record_ns, bytes, out),
