@@ -65,6 +65,8 @@ pub(super) struct Scan {
     announced: Vec<String>,
     /// What it says itself to be missing from it.
     stated: Vec<Loss>,
+    /// Whether the last record was the footer, which every log ends with.
+    closed: bool,
     /// Whether the next message may join the last run.
     run_open: bool,
     attachment_bytes: u64,
@@ -112,6 +114,10 @@ impl Scan {
             let resumed = match found {
                 Found::Closing => {
                     let end = at + mcap::MAGIC.len() as u64;
+                    // A part that is missing from before them takes the records along that would show it.
+                    if !self.closed {
+                        self.lose(LossKind::Truncated, at..at);
+                    }
                     if end < file.len() {
                         self.lose(LossKind::Framing, end..file.len());
                     }
@@ -168,6 +174,7 @@ impl Scan {
             Item::Header { ours } => self.ours = *ours,
             Item::Footer | Item::Other => {}
         }
+        self.closed = matches!(frame.item, Item::Footer);
         Ok(())
     }
 

@@ -191,6 +191,19 @@ fn a_message_length_that_lies_costs_that_message_and_perhaps_the_one_before() {
 }
 
 #[test]
+fn regress_what_is_missing_up_to_the_closing_bytes_is_noticed() {
+    let chunked = WriteOptions::new().chunk_size(Some(200)).compression(None);
+    for (options, opcode) in [(chunked, op::CHUNK), (WriteOptions::new().use_chunks(false), op::MESSAGE)] {
+        let whole = write(options);
+        let (_, closing) = whole.split_at(whole.len() - mcap::MAGIC.len());
+        let from = places(&whole, opcode)[3];
+        let (seen, losses) = read(&[&whole[..from], closing].concat());
+        assert!(!seen.is_empty());
+        assert!(matches!(losses[..], [Loss { kind: LossKind::Truncated, .. }]), "{losses:?}");
+    }
+}
+
+#[test]
 fn messages_of_an_undefined_channel_are_counted() {
     let mut bytes = write(WriteOptions::new().use_chunks(false).emit_summary_records(false));
     let place = bytes.windows(9).position(|window| window == b"/raw/zeta").unwrap();
