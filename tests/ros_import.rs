@@ -321,3 +321,97 @@ fn other_files_are_named() {
     folder.simulate("scene.toml", "dive.mcap");
     refused(&folder, "dive.mcap", None, &["is a dive log already"]);
 }
+
+/// A recording by the test's own hand: messages in plain CDR, each with its topic, type and time in seconds.
+fn recording(messages: &[(&str, &str, u64, Vec<u8>)]) -> Vec<u8> {
+    let mut file = std::io::Cursor::new(Vec::new());
+    let mut writer = mcap::WriteOptions::new().profile("ros2").create(&mut file).unwrap();
+    for (topic, of, seconds, data) in messages {
+        let schema = writer.add_schema(of, "ros2msg", b"").unwrap();
+        let channel_id = writer.add_channel(schema, topic, "cdr", &[].into()).unwrap();
+        let log_time = (1_700_000_000 + seconds) * 1_000_000_000;
+        let head = mcap::records::MessageHeader { channel_id, sequence: 0, log_time, publish_time: log_time };
+        writer.write_to_known_channel(&head, data).unwrap();
+    }
+    writer.finish().unwrap();
+    drop(writer);
+    file.into_inner()
+}
+
+/// Encapsulation, a stamp of the record's time, a frame of three letters, and doubles behind it.
+fn stamped(seconds: u32, frame: &str, values: &[f64]) -> Vec<u8> {
+    let head = [&[0, 1, 0, 0][..], &(1_700_000_000 + seconds).to_le_bytes(), &[0; 4], &[4, 0, 0, 0]].concat();
+    let values: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
+    [&head, frame.as_bytes(), &[0], &values].concat()
+}
+
+fn imu(wxyz: [f64; 4], without: bool, force_z: f64) -> Vec<f64> {
+    let [w, x, y, z] = wxyz;
+    let covariance = |missing: bool| [if missing { -1.0 } else { 0.0 }, 0., 0., 0., 0., 0., 0., 0., 0.];
+    let rest = [covariance(false), [0.; 9]].concat();
+    [&[x, y, z, w][..], &covariance(without), &[0.1, 0.2, 0.3], &rest[..9], &[0., 0., force_z], &rest[..9]]
+        .concat()
+}
+
+#[test]
+fn values_that_are_none_or_strange_are_named() {
+    let folder = folder("");
+    let of_imu = |seconds: u32, frame, values: &[f64]| {
+        ("/imu/data", "sensor_msgs/msg/Imu", u64::from(seconds), stamped(seconds, frame, values))
+    };
+    let pressure = |seconds: u32, value: f64| {
+        (
+            "/pressure",
+            "sensor_msgs/msg/FluidPressure",
+            u64::from(seconds),
+            stamped(seconds, "abc", &[value, 0.0]),
+        )
+    };
+    let level = [1.0, 0.0, 0.0, 0.0];
+    let mut short = pressure(9, 150.0);
+    short.3.truncate(30);
+    let mut big = pressure(11, 152.0);
+    big.3[1] = 7;
+    folder.write(
+        "strange.mcap",
+        recording(&[
+            of_imu(1, "abc", &imu(level, false, -9.8)),
+            of_imu(2, "abd", &imu(level, true, -9.8)),
+            of_imu(3, "abc", &imu([0.0; 4], false, -9.8)),
+            of_imu(4, "abc", &imu([2.0, 0.0, 0.0, 0.0], false, -9.8)),
+            of_imu(5, "abc", &imu([f64::NAN; 4], false, f64::NAN)),
+            pressure(6, 150.0),
+            pressure(7, f64::NAN),
+            pressure(8, -1e300),
+            short,
+            big,
+        ]),
+    );
+    let map = mapping("")
+        .split("[[topics]]")
+        .filter(|table| table.contains("imu") || table.contains("pressure"))
+        .map(|table| format!("[[topics]]{table}"))
+        .collect::<String>();
+    folder.write("two.toml", map);
+    let answer = import(&folder, "strange.mcap", "two.toml");
+    assert_eq!(answer.code, Some(3), "{}", answer.stderr);
+    for words in [
+        "note: /imu/data: 3 messages without orientation",
+        "note: /imu/data: 1 messages without specific force",
+        "note: /imu/data: 1 messages are of another frame than the first, \"abc\"",
+        "so that z is down; `angles_deg` of imu must say so",
+        "lost: /imu/data: 1 messages whose orientation is no unit quaternion",
+        "note: /pressure: no pressure is above 150.0 Pa",
+        "lost: /pressure: 1 messages whose value is no number",
+        "lost: /pressure: 1 messages with values that the sensor can't say",
+        "lost: /pressure: 1 messages shorter than their type says",
+        "lost: /pressure: 1 messages in another encapsulation than plain CDR",
+    ] {
+        assert!(answer.stderr.contains(words), "{words:?} is not in {}", answer.stderr);
+    }
+    let shown: Value = serde_json::from_str(&answer.stdout).unwrap();
+    // Of four samples: times, orientation of the first, four rates, three forces.
+    assert_eq!(shown["messages"]["imu"], 4 + 1 + 4 + 3);
+    let (_, report) = folder.replay("out.mcap", &[]);
+    assert!(report["sources"].as_array().unwrap().iter().all(|source| source["bad_frames"] == 0));
+}

@@ -186,6 +186,9 @@ impl Format for Bag {
     fn told(&self) -> Told {
         let mut told = self.feeds.told();
         told.losses.extend(self.lost.iter().map(|(why, count)| format!("{count} {why}")));
+        if self.begun && self.stated.is_none() {
+            told.losses.push("the bag's own header is missing".to_owned());
+        }
         if let Some(Stated { index_at, chunks, .. }) = self.stated {
             if index_at == 0 {
                 told.losses.push("the bag was not closed, so that its end may be missing".to_owned());
