@@ -137,16 +137,25 @@ pub(super) struct AttachmentPlace {
 /// What a record is, as far as the framing and the index need to know.
 #[derive(Debug, Clone)]
 pub(super) enum Item {
-    Header { ours: bool },
+    Header {
+        ours: bool,
+    },
     Schema,
     Channel,
-    Message { log_time: u64 },
+    Message {
+        log_time: u64,
+    },
     Chunk(ChunkPlace),
     Attachment(AttachmentPlace),
     Metadata,
-    Statistics { channels: u32 },
+    Statistics {
+        channels: u32,
+    },
     DataEnd,
-    Footer,
+    /// Where the summary begins, as it says; 0 where there is none.
+    Footer {
+        summary: u64,
+    },
     Other,
 }
 
@@ -309,8 +318,9 @@ fn parse(opcode: u8, body: u64, bytes: &[u8]) -> Option<(Item, u64)> {
             Item::Header { ours: library.starts_with(LIBRARY) }
         }
         op::FOOTER => {
-            fields.take(20)?;
-            Item::Footer
+            let summary = fields.u64()?;
+            let _offsets_checksum = fields.take(12)?;
+            Item::Footer { summary }
         }
         op::SCHEMA => {
             let _id_name_encoding = (fields.u16()?, fields.text()?, fields.text()?);

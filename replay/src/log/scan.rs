@@ -56,7 +56,7 @@ pub(super) struct Scan {
     /// Definitions in the summary, which count only if its checksum fits.
     summary: BTreeMap<u16, Definition>,
     summary_channels: Option<u32>,
-    data_end: Option<u64>,
+    data_end: Option<core::ops::Range<u64>>,
     /// Whether it is a log of ours, which has no messages outside chunks.
     ours: bool,
     /// Whether it repeats its channels.
@@ -65,8 +65,8 @@ pub(super) struct Scan {
     announced: Vec<String>,
     /// What it says itself to be missing from it.
     stated: Vec<Loss>,
-    /// Whether the last record was the footer, which every log ends with.
-    closed: bool,
+    /// Where the summary begins, as the last record says if that was the footer.
+    footer: Option<u64>,
     /// Whether the next message may join the last run.
     run_open: bool,
     attachment_bytes: u64,
@@ -114,10 +114,7 @@ impl Scan {
             let resumed = match found {
                 Found::Closing => {
                     let end = at + mcap::MAGIC.len() as u64;
-                    // A part that is missing from before them takes the records along that would show it.
-                    if !self.closed {
-                        self.lose(LossKind::Truncated, at..at);
-                    }
+                    self.check_closing(at);
                     if end < file.len() {
                         self.lose(LossKind::Framing, end..file.len());
                     }
@@ -170,11 +167,11 @@ impl Scan {
             Item::Metadata => self.add_metadata(file, frame)?,
             Item::Attachment(place) => self.add_attachment(file, frame, place)?,
             Item::Statistics { channels } => self.summary_channels = Some(*channels),
-            Item::DataEnd => self.data_end = Some(frame.at),
+            Item::DataEnd => self.data_end = Some(frame.at..frame.end),
             Item::Header { ours } => self.ours = *ours,
-            Item::Footer | Item::Other => {}
+            Item::Footer { .. } | Item::Other => {}
         }
-        self.closed = matches!(frame.item, Item::Footer);
+        self.footer = if let Item::Footer { summary } = frame.item { Some(summary) } else { None };
         Ok(())
     }
 
@@ -262,6 +259,18 @@ impl Scan {
         Ok(())
     }
 
+    /// Whole records that are missing leave no gap. A part that reaches the end takes the closing records along, and without any
+    /// other the summary begins elsewhere than the footer says.
+    fn check_closing(&mut self, at: u64) {
+        let (Some(summary), Some(data_end)) = (self.footer, self.data_end.clone()) else {
+            self.lose(LossKind::Truncated, at..at);
+            return;
+        };
+        if summary != 0 && summary != data_end.end && self.losses.list().is_empty() {
+            self.lose(LossKind::Displaced, 0..data_end.start);
+        }
+    }
+
     fn check_format<R: Read + Seek>(&self, file: &LogFile<R>) -> Result<(), LogError> {
         let Some(found) = self.metadata.get(FORMAT_KEY) else { return Ok(()) };
         if found.parse().is_ok_and(|format: u32| format <= FORMAT_VERSION) {
@@ -273,7 +282,7 @@ impl Scan {
     /// Takes the channels of the summary, if it is sound, before all others: a tool that has copied a log of ours may
     /// have numbered them anew. Gives whether these are all.
     fn take_summary<R: Read + Seek>(&mut self, file: &mut LogFile<R>) -> Result<bool, LogError> {
-        let Some(data_end) = self.data_end else { return Ok(false) };
+        let Some(data_end) = self.data_end.as_ref().map(|record| record.start) else { return Ok(false) };
         if self.summary.is_empty() || !summary_holds(file, data_end)? {
             return Ok(false);
         }

@@ -26,6 +26,8 @@ const NO_RECORD: &str = "no record of a bag";
 pub struct Bag {
     feeds: Feeds,
     begun: bool,
+    /// Whether the place of the next record isn't known.
+    astray: bool,
     connections: BTreeMap<u32, Topic>,
     /// The chunk that is being read, and how far.
     chunk: Option<Chunk>,
@@ -130,6 +132,10 @@ fn record(front: &[u8]) -> Result<Record<'_>, Stop<'_>> {
     if !(8..=MOST_HEADER).contains(&header_len) {
         return Err(Stop::Bad);
     }
+    // Astray, lengths are made of anything; but no name begins with anything.
+    if front.get(8).is_some_and(|byte| !byte.is_ascii_lowercase()) {
+        return Err(Stop::Bad);
+    }
     let (header, behind) = sized(front).ok_or(Stop::More(None))?;
     let fields = Fields(header);
     if !fields.is_whole() || fields.u8(b"op").is_none() {
@@ -165,13 +171,20 @@ impl Format for Bag {
         if let Some(chunk) = self.chunk.take() {
             return self.read_on(chunk, out);
         }
-        match record(front) {
+        let record = record(front);
+        let was_astray = core::mem::replace(&mut self.astray, matches!(record, Err(Stop::Bad)));
+        match record {
             Ok(Record { fields, data, len }) => match self.accept(fields, data, out) {
                 None => Step::Lost(len, NO_RECORD),
                 Some(None) => Step::Took(len),
                 Some(Some(packing)) => self.open(fields, data, packing, len, false),
             },
             Err(Stop::Bad) => Step::Lost(1, NO_RECORD),
+            Err(Stop::More(None)) if was_astray => {
+                self.astray = true;
+                // What seems to be a long header astray is likely none, but only the file's end can tell.
+                if end { Step::Lost(1, NO_RECORD) } else { Step::More }
+            }
             // A chunk that the file's end cuts holds messages all the same.
             Err(Stop::More(Some((fields, data)))) if end && fields.u8(b"op") == Some(5) => {
                 match fields.get(b"compression") {

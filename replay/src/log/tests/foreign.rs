@@ -204,6 +204,24 @@ fn regress_what_is_missing_up_to_the_closing_bytes_is_noticed() {
 }
 
 #[test]
+fn regress_whole_records_that_are_missing_are_noticed() {
+    let options = || WriteOptions::new().chunk_size(Some(200)).compression(None);
+    let whole = write(options());
+    let chunks = places(&whole, op::CHUNK);
+    let without = |part: core::ops::Range<usize>| [&whole[..part.start], &whole[part.end..]].concat();
+    let (seen, losses) = read(&without(chunks[3]..chunks[4]));
+    assert!(seen.len() < 400);
+    assert!(matches!(losses[..], [Loss { kind: LossKind::Displaced, .. }]), "{losses:?}");
+    let (data_end, footer) = (places(&whole, op::DATA_END)[0], places(&whole, op::FOOTER)[0]);
+    for part in [data_end..record_after(&whole, data_end), chunks[3]..footer] {
+        let (_, losses) = read(&without(part));
+        assert!(matches!(losses[..], [Loss { kind: LossKind::Truncated, .. }]), "{losses:?}");
+    }
+    // Without a summary nothing says where it would be.
+    assert_eq!(read(&write(options().emit_summary_records(false))).1, []);
+}
+
+#[test]
 fn messages_of_an_undefined_channel_are_counted() {
     let mut bytes = write(WriteOptions::new().use_chunks(false).emit_summary_records(false));
     let place = bytes.windows(9).position(|window| window == b"/raw/zeta").unwrap();
