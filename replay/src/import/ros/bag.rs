@@ -60,6 +60,14 @@ struct Record<'a> {
     len: usize,
 }
 
+/// What a record was.
+enum Accepted<'a> {
+    /// One that is done with.
+    Read,
+    /// A chunk, packed in this way.
+    Chunk(&'a [u8]),
+}
+
 /// Why no record can be had.
 enum Stop<'a> {
     /// It isn't all there: its fields and what there is of its data, where the fields are.
@@ -176,8 +184,8 @@ impl Format for Bag {
         match record {
             Ok(Record { fields, data, len }) => match self.accept(fields, data, out) {
                 None => Step::Lost(len, NO_RECORD),
-                Some(None) => Step::Took(len),
-                Some(Some(packing)) => self.open(fields, data, packing, len, false),
+                Some(Accepted::Read) => Step::Took(len),
+                Some(Accepted::Chunk(packing)) => self.open(fields, data, packing, len, false),
             },
             Err(Stop::Bad) => Step::Lost(1, NO_RECORD),
             Err(Stop::More(None)) if was_astray => {
@@ -234,7 +242,7 @@ impl Bag {
         }
         let mut bag = Self { begun: true, ..Self::default() };
         if let Ok(Record { fields, .. }) = record(front.get(MAGIC.len()..).unwrap_or_default())
-            && let Some(stated) = bag.bag_header(fields)
+            && let Some(stated) = Self::bag_header(fields)
             && stated.index_at > 0
         {
             let mut index = Vec::new();
@@ -276,7 +284,7 @@ impl Bag {
         if front.starts_with(MAGIC) { Step::Took(MAGIC.len()) } else { Step::Lost(1, NO_RECORD) }
     }
 
-    fn bag_header(&self, fields: Fields<'_>) -> Option<Stated> {
+    fn bag_header(fields: Fields<'_>) -> Option<Stated> {
         Some(Stated {
             index_at: fields.u64(b"index_pos")?,
             connections: fields.u32(b"conn_count")?,
@@ -284,22 +292,17 @@ impl Bag {
         })
     }
 
-    /// A record; of a chunk, how it is packed. `None` for one that lacks what its kind must have.
-    fn accept<'a>(
-        &mut self,
-        fields: Fields<'a>,
-        data: &[u8],
-        out: &mut Vec<Entry>,
-    ) -> Option<Option<&'a [u8]>> {
+    /// Takes a record. `None` for one that lacks what its kind must have.
+    fn accept<'a>(&mut self, fields: Fields<'a>, data: &[u8], out: &mut Vec<Entry>) -> Option<Accepted<'a>> {
         match fields.u8(b"op")? {
             2 => self.message(fields.u32(b"conn")?, fields.time_ns(b"time")?, data, out),
-            3 => self.stated = Some(self.bag_header(fields)?),
-            5 => return Some(Some(fields.get(b"compression")?)),
+            3 => self.stated = Some(Self::bag_header(fields)?),
+            5 => return Some(Accepted::Chunk(fields.get(b"compression")?)),
             7 => self.connection(fields.u32(b"conn")?, fields, Fields(data))?,
             // Indexes say what stands elsewhere; later kinds may be passed over.
             _ => (),
         }
-        Some(None)
+        Some(Accepted::Read)
     }
 
     fn connection(&mut self, number: u32, fields: Fields<'_>, data: Fields<'_>) -> Option<()> {

@@ -89,7 +89,7 @@ fn damage_costs_its_chunk_and_is_named() {
     let (count, losses) = read(&bag(&[first.clone(), broken], &[]));
     assert_eq!(count, 2);
     assert!(losses[0].contains("packed in a way that isn't known"), "{losses:?}");
-    let garbage = [bag(&[first.clone()], &[]), vec![0xEE; 30], second].concat();
+    let garbage = [bag(std::slice::from_ref(&first), &[]), vec![0xEE; 30], second].concat();
     let (count, losses) = read(&garbage);
     assert_eq!(count, 3);
     assert!(losses[0].contains("no record of a bag: 1 times, 30 bytes"), "{losses:?}");
