@@ -65,8 +65,8 @@ pub(super) struct Scan {
     announced: Vec<String>,
     /// What it says itself to be missing from it.
     stated: Vec<Loss>,
-    /// Where the summary begins, as the last record says if that was the footer.
-    footer: Option<u64>,
+    /// The last record if that was the footer, and where the summary begins, as it says.
+    footer: Option<(core::ops::Range<u64>, u64)>,
     /// Whether the next message may join the last run.
     run_open: bool,
     attachment_bytes: u64,
@@ -155,6 +155,10 @@ impl Scan {
     }
 
     fn accept<R: Read + Seek>(&mut self, file: &mut LogFile<R>, frame: &Frame) -> Result<(), LogError> {
+        // Nothing comes behind a footer: it was a record of another kind.
+        if let Some((footer, _)) = self.footer.take() {
+            self.lose(LossKind::Framing, footer);
+        }
         match &frame.item {
             Item::Message { .. } if self.ours => self.lose(LossKind::Framing, frame.at..frame.end),
             Item::Message { log_time } => self.add_message(frame, *log_time),
@@ -169,9 +173,9 @@ impl Scan {
             Item::Statistics { channels } => self.summary_channels = Some(*channels),
             Item::DataEnd => self.data_end = Some(frame.at..frame.end),
             Item::Header { ours } => self.ours = *ours,
-            Item::Footer { .. } | Item::Other => {}
+            Item::Footer { summary } => self.footer = Some((frame.at..frame.end, *summary)),
+            Item::Other => {}
         }
-        self.footer = if let Item::Footer { summary } = frame.item { Some(summary) } else { None };
         Ok(())
     }
 
@@ -262,7 +266,7 @@ impl Scan {
     /// Whole records that are missing leave no gap. A part that reaches the end takes the closing records along, and without any
     /// other the summary begins elsewhere than the footer says.
     fn check_closing(&mut self, at: u64) {
-        let (Some(summary), Some(data_end)) = (self.footer, self.data_end.clone()) else {
+        let (Some((_, summary)), Some(data_end)) = (self.footer.take(), self.data_end.clone()) else {
             self.lose(LossKind::Truncated, at..at);
             return;
         };

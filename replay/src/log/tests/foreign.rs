@@ -204,6 +204,16 @@ fn regress_what_is_missing_up_to_the_closing_bytes_is_noticed() {
 }
 
 #[test]
+fn regress_a_message_that_passes_for_a_footer_is_noticed() {
+    let mut log = write(WriteOptions::new().use_chunks(false));
+    let message = places(&log, op::MESSAGE)[7];
+    log[message] = op::FOOTER;
+    let (seen, losses) = read(&log);
+    assert!(seen.len() < 400);
+    assert!(matches!(losses[..], [Loss { kind: LossKind::Framing, .. }]), "{losses:?}");
+}
+
+#[test]
 fn regress_whole_records_that_are_missing_are_noticed() {
     let options = || WriteOptions::new().chunk_size(Some(200)).compression(None);
     let whole = write(options());
