@@ -117,7 +117,7 @@ fn fixture(name: &str) -> Vec<u8> {
 /// Content that is told from any other, of several lengths.
 fn content(number: u64) -> Vec<u8> {
     let mut random = Random(number);
-    (0..1 + number % 40).map(|_| random.next().to_le_bytes()[3]).collect()
+    (0..=number % 40).map(|_| random.next().to_le_bytes()[3]).collect()
 }
 
 fn ours(messages: u64) -> Vec<u8> {

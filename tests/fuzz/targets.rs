@@ -108,12 +108,10 @@ impl Surroundings {
     /// As a mapping says, for the topics that there are; stamps are followed in half of them.
     fn feeds(&self, topics: &[Topic]) -> Feeds {
         let there = TOPICS.iter().filter(|(name, _)| topics.iter().any(|topic| topic.name == *name));
-        let text: String = there
-            .map(|(topic, sensor)| {
-                let time = if sensor.starts_with("sonar") { "time = \"header\"" } else { "" };
-                format!("[[topics]]\ntopic = \"{topic}\"\nsensor = \"{sensor}\"\n{time}\n")
-            })
-            .collect();
+        let text = there.fold(String::new(), |text, (topic, sensor)| {
+            let time = if sensor.starts_with("sonar") { "time = \"header\"" } else { "" };
+            format!("{text}[[topics]]\ntopic = \"{topic}\"\nsensor = \"{sensor}\"\n{time}\n")
+        });
         let mapping = Document::new("topics.toml", &text).root().unwrap();
         Feeds::mapped(mapping, &self.vehicle, topics).unwrap_or_default()
     }
