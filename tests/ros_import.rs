@@ -390,8 +390,7 @@ fn values_that_are_none_or_strange_are_named() {
     let map = mapping("")
         .split("[[topics]]")
         .filter(|table| table.contains("imu") || table.contains("pressure"))
-        .map(|table| format!("[[topics]]{table}"))
-        .collect::<String>();
+        .fold(String::new(), |text, table| format!("{text}[[topics]]{table}"));
     folder.write("two.toml", map);
     let answer = import(&folder, "strange.mcap", "two.toml");
     assert_eq!(answer.code, Some(3), "{}", answer.stderr);
