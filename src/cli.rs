@@ -315,7 +315,7 @@ pub(crate) struct Import {
     /// once for each sensor, and then no other listens.
     #[arg(long, value_name = "ID=LINE", value_parser = source_line)]
     pub(crate) source: Vec<(String, String)>,
-    /// For CSV, which column is which quantity of which sensor.
+    /// For CSV, which column is which quantity of which sensor; for ROS, which topic is of which sensor, where there is a choice.
     #[arg(long, value_name = "MAPPING.toml")]
     pub(crate) map: Option<PathBuf>,
     /// Format of the file, where its name doesn't say.
@@ -330,7 +330,8 @@ const IMPORT_EXAMPLES: &str = "Example:
   headrace import dive.tlog --vehicle vehicle.toml -o dive.mcap
   headrace import candump-2026-05-04.log --vehicle vehicle.toml --source imu=can1 -o dive.mcap
   headrace import sonar.81a --vehicle vehicle.toml --source sonar_0=imagenex -o dive.mcap
-  headrace import depth.csv --map mapping.toml --vehicle vehicle.toml -o dive.mcap";
+  headrace import depth.csv --map mapping.toml --vehicle vehicle.toml -o dive.mcap
+  headrace import dive.bag --map topics.toml --vehicle vehicle.toml -o dive.mcap";
 
 const SIMULATE_EXAMPLES: &str = "Example:
   headrace simulate deploy/scenes/demo.toml -o dive.mcap

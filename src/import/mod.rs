@@ -2,6 +2,7 @@
 
 mod imagenex;
 mod ping;
+mod ros;
 mod takers;
 #[cfg(test)]
 mod tests;
@@ -14,8 +15,10 @@ use std::path::Path;
 use headrace_core::config::{Document, VehicleConfig};
 use headrace_replay::import::candump::Candump;
 use headrace_replay::import::csv::Csv;
-use headrace_replay::import::{Format, Import, Imported, detect};
-use headrace_replay::log::{LogHeader, LogWriter};
+use headrace_replay::import::ros::bag::Bag;
+use headrace_replay::import::ros::mcap::Mcap;
+use headrace_replay::import::{Format, Import, ImportError, Imported, Input, Source, Taker, detect};
+use headrace_replay::log::{LogError, LogHeader, LogWriter};
 use serde_json::json;
 
 use crate::cli;
@@ -39,6 +42,10 @@ pub(crate) enum Kind {
     Ping,
     /// Table of values, with --map.
     Csv,
+    /// Bag of ROS 1.
+    Rosbag,
+    /// Recording of ROS 2 (or 1) in MCAP.
+    Mcap,
 }
 
 /// Imports a foreign log.
@@ -62,16 +69,25 @@ pub(crate) fn import(args: &cli::Import) -> Result<u8, Failure> {
     same_file(&args.file, &args.output)?;
     let name = args.file.display().to_string();
     let file = File::open(&args.file).map_err(|source| Failure::Read { path: args.file.clone(), source })?;
-    let import = Import::open(
-        &name,
-        file,
-        format(kind, args, vehicle.as_ref().map(|(_, vehicle)| vehicle))?,
-        kind.entries(),
-    )
-    .map_err(|error| match error {
-        headrace_replay::import::ImportError::Nothing { .. } => named(&args.file, &error.to_string()),
-        error => error.into(),
-    })?;
+    let vehicle = vehicle.as_ref().map(|(_, vehicle)| vehicle);
+    if kind == Kind::Mcap {
+        let recording = Mcap::open(&name, file).map_err(|error| unusable(&args.file, error))?;
+        let feeds = ros::feeds(args, vehicle, &recording.topics())?;
+        return write(args, kind, recording.feeding(feeds), header, &mut takers);
+    }
+    let format = format(kind, args, vehicle)?;
+    write(args, kind, Input::new(&name, file, format), header, &mut takers)
+}
+
+/// Writes the log of what the sensors take.
+fn write<S: Source>(
+    args: &cli::Import,
+    kind: Kind,
+    input: S,
+    mut header: LogHeader,
+    takers: &mut [Taker],
+) -> Result<u8, Failure> {
+    let import = Import::of(input, kind.entries()).map_err(|error| unusable(&args.file, error))?;
     header.metadata.extend(import.clock_metadata());
     header.metadata.insert("import_format".to_owned(), kind.name().to_owned());
     let file_name = args.file.file_name().map(|name| name.to_string_lossy().into_owned());
@@ -79,7 +95,7 @@ pub(crate) fn import(args: &cli::Import) -> Result<u8, Failure> {
     let ids: Vec<String> = header.sources.iter().map(|source| source.id.clone()).collect();
     let mut log = LogWriter::create(&args.output, &header)?;
     let mut progress = Progress::start();
-    let imported = import.write(&mut log, &mut takers, &mut |entries| {
+    let imported = import.write(&mut log, takers, &mut |entries| {
         progress.at(|| format!("{entries} {}s", kind.entries()));
     })?;
     log.finish()?;
@@ -92,9 +108,9 @@ fn format(
     args: &cli::Import,
     vehicle: Option<&VehicleConfig>,
 ) -> Result<Box<dyn Format>, Failure> {
-    if args.map.is_some() != (kind == Kind::Csv) {
-        let what =
-            "import: --map MAPPING.toml says what the columns of CSV are; CSV wants it, and nothing else";
+    if args.map.is_some() != (kind == Kind::Csv) && kind != Kind::Rosbag {
+        let what = "import: --map MAPPING.toml says what the columns of CSV and the topics of ROS are; CSV wants it, other \
+                    formats know it themselves";
         return Err(Failure::Usage(what.to_owned()));
     }
     Ok(match kind {
@@ -102,6 +118,13 @@ fn format(
         Kind::Candump => Box::new(Candump),
         Kind::Imagenex => Box::new(imagenex::ImagenexFormat),
         Kind::Ping => Box::<ping::PingFormat>::default(),
+        Kind::Rosbag | Kind::Mcap => {
+            let failed = |source| Failure::Read { path: args.file.clone(), source };
+            let file = File::open(&args.file).map_err(failed)?;
+            let topics = Bag::topics(&args.file.display().to_string(), file)
+                .map_err(|error| unusable(&args.file, error))?;
+            Box::new(Bag::new(ros::feeds(args, vehicle, &topics)?))
+        }
         Kind::Csv => {
             let (Some(map), Some(vehicle)) = (&args.map, vehicle) else {
                 let what = "import: CSV wants --vehicle VEHICLE.toml, whose sensors' bytes its values become";
@@ -133,7 +156,7 @@ fn tell(args: &cli::Import, kind: Kind, ids: &[String], imported: &Imported) -> 
             ids.iter().enumerate().map(|(number, id)| (id.clone(), json!(counts(&number)))).collect();
         let shown = json!({
             "format": kind.name(), "entries": imported.entries, "passed_over": imported.passed_over,
-            "duration_s": seconds, "messages": sources, "losses": imported.losses,
+            "duration_s": seconds, "messages": sources, "losses": imported.losses, "remarks": imported.remarks,
         });
         deliver(&shown.to_string())?;
     } else {
@@ -150,6 +173,9 @@ fn tell(args: &cli::Import, kind: Kind, ids: &[String], imported: &Imported) -> 
         if imported.passed_over > 0 {
             say(&format!("  {} {}s are of no sensor here", imported.passed_over, kind.entries()));
         }
+    }
+    for remark in &imported.remarks {
+        eprintln!("headrace: note: {remark}");
     }
     for loss in &imported.losses {
         eprintln!("headrace: lost: {loss}");
@@ -171,9 +197,12 @@ impl Kind {
             Some("852" | "81a" | "81b" | "81s" | "31l") => Ok(Self::Imagenex),
             Some("bin") => Ok(Self::Ping),
             Some("csv") => Ok(Self::Csv),
+            Some("bag") => Ok(Self::Rosbag),
+            Some("mcap") => Ok(Self::Mcap),
             _ => {
                 let problem = "its name doesn't say which format it has; known are .tlog, .log (candump), .852, .81a, .81b, \
-                     .81s, .31l (imagenex), .bin (ping) and .csv; --format tlog|candump|imagenex|ping|csv says it for any name";
+                     .81s, .31l (imagenex), .bin (ping), .csv, .bag (rosbag) and .mcap (of ROS); \
+                     --format tlog|candump|imagenex|ping|csv|rosbag|mcap says it for any name";
                 Err(named(path, &format!("importing {}: {problem}", path.display())))
             }
         }
@@ -186,6 +215,8 @@ impl Kind {
             Self::Imagenex => "imagenex",
             Self::Ping => "ping",
             Self::Csv => "csv",
+            Self::Rosbag => "rosbag",
+            Self::Mcap => "mcap",
         }
     }
 
@@ -194,8 +225,19 @@ impl Kind {
         match self {
             Self::Tlog | Self::Candump => "frame",
             Self::Imagenex => "shot",
-            Self::Ping | Self::Csv => "message",
+            Self::Ping | Self::Csv | Self::Rosbag | Self::Mcap => "message",
         }
+    }
+}
+
+/// Why a file can't be imported, with what it looks like where it is the wrong one.
+fn unusable(path: &Path, error: ImportError) -> Failure {
+    match error {
+        ImportError::Nothing { .. }
+        | ImportError::NoBag { .. }
+        | ImportError::Log(LogError::NotMcap { .. }) => named(path, &error.to_string()),
+        ImportError::DiveLog { .. } => Failure::Usage(error.to_string()),
+        error => error.into(),
     }
 }
 

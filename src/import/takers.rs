@@ -17,7 +17,7 @@ pub(super) fn takers(
     said: &[(String, String)],
 ) -> Result<Vec<Taker>, Failure> {
     check_streams(kind, said)?;
-    if let (Kind::Csv, Some(vehicle)) = (kind, vehicle) {
+    if let (true, Some(vehicle)) = (kind.has_values(), vehicle) {
         let taker = |(source, id): (u16, &String)| Taker { source, stream: id.clone(), driver: None };
         return Ok((0..).zip(vehicle.sensor_configs.iter().map(|config| &config.id)).map(taker).collect());
     }
@@ -73,8 +73,11 @@ pub(super) fn sources(kind: Kind, said: &[(String, String)]) -> Vec<SourceInfo> 
 }
 
 fn without_vehicle(kind: Kind, said: &[(String, String)]) -> Result<Vec<Taker>, Failure> {
-    if kind == Kind::Csv {
-        return Err(refused("CSV wants --vehicle VEHICLE.toml, whose sensors' bytes its values become"));
+    if kind.has_values() {
+        return Err(refused(&format!(
+            "{} wants --vehicle VEHICLE.toml, whose sensors' bytes its values become",
+            kind.name()
+        )));
     }
     if said.is_empty() {
         let stream = kind.stream_form();
@@ -89,8 +92,11 @@ fn without_vehicle(kind: Kind, said: &[(String, String)]) -> Result<Vec<Taker>, 
 
 fn check_streams(kind: Kind, said: &[(String, String)]) -> Result<(), Failure> {
     let form = kind.stream_form();
-    if kind == Kind::Csv && !said.is_empty() {
-        return Err(refused("--source isn't for CSV; its mapping file names the sensors"));
+    if kind.has_values() && !said.is_empty() {
+        return Err(refused(&format!(
+            "--source isn't for {}; a mapping file names the sensors",
+            kind.name()
+        )));
     }
     let wrong = said.iter().find(|(_, stream)| kind != Kind::Candump && stream != form);
     if let Some((id, stream)) = wrong {
@@ -111,6 +117,11 @@ fn refused(problem: &str) -> Failure {
 }
 
 impl Kind {
+    /// Whether such files have values, of which emulators make bytes.
+    fn has_values(self) -> bool {
+        matches!(self, Self::Csv | Self::Rosbag | Self::Mcap)
+    }
+
     /// The kind of sensor whose bytes such files have.
     fn plugin(self) -> &'static str {
         match self {
@@ -118,7 +129,7 @@ impl Kind {
             Self::Candump => headrace_imu_can::Kind.name(),
             Self::Imagenex => headrace_imagenex881::Kind.name(),
             Self::Ping => headrace_ping1d::Kind.name(),
-            Self::Csv => "",
+            Self::Csv | Self::Rosbag | Self::Mcap => "",
         }
     }
 
@@ -140,7 +151,7 @@ impl Kind {
             Self::Candump => "INTERFACE",
             Self::Imagenex => imagenex::STREAM,
             Self::Ping => ping::STREAM,
-            Self::Csv => "ID",
+            Self::Csv | Self::Rosbag | Self::Mcap => "ID",
         }
     }
 }

@@ -22,6 +22,7 @@ fn cut(format: &mut dyn Format, mut file: &[u8]) -> (Vec<Entry>, Vec<(usize, &'s
                 lost.push((used, why));
                 used
             }
+            Step::Held => continue,
             Step::More => break,
         };
         assert!((1..=file.len()).contains(&used), "{used} of {} bytes", file.len());

@@ -139,7 +139,8 @@ pub trait Emulator<M>: Send + Sync {
     fn hear(&mut self, _at: MonoNs, _bytes: &[u8], _line: LineSink<'_>) {}
 
     /// Puts what was measured on the line, each message with its time: once for each measurement that has begun, in the
-    /// same order.
+    /// same order. Of an emulator that is polled by its own host, and that begins nothing, what others have measured: an
+    /// import's. There, values that aren't numbers weren't measured, and no message tells them.
     fn tell(&mut self, measured: &M, line: LineSink<'_>);
 }
 

@@ -171,6 +171,12 @@ impl HeadEmulator {
         }
     }
 
+    /// What the emulated host asks for next.
+    fn asked_now(&mut self) -> Option<Asked> {
+        let command = self.host.as_mut()?.next_command();
+        Some(Asked { command, ping: self.head.obey(&command) })
+    }
+
     /// Obeys the commands in what a host has sent at `at`; they begin soundings.
     fn obey(&mut self, at: MonoNs, bytes: &[u8]) {
         let Self { settings, codec, head, asked, waiting, .. } = self;
@@ -203,7 +209,10 @@ impl Emulator<Sounding> for HeadEmulator {
     }
 
     fn tell(&mut self, sounding: &Sounding, line: LineSink<'_>) {
-        let Some(Asked { command, ping }) = self.asked.pop_front() else { return };
+        // Who tells what an import has read begins nothing: the emulated host asks for it now.
+        let Some(Asked { command, ping }) = self.asked.pop_front().or_else(|| self.asked_now()) else {
+            return;
+        };
         if let Some(bytes) = self.host.as_ref().and_then(|_| command.encode().ok()) {
             line(Direction::Sent, sounding.at, &bytes);
         }

@@ -33,38 +33,38 @@ impl ImuEmulator {
         DurNs::from_secs_f64(sample as f64 / self.rate_hz)
     }
 
-    fn xsens(&self, motion: &Inertia, elapsed: DurNs) -> [Message; 4] {
+    fn xsens(&self, motion: &Inertia, elapsed: DurNs) -> [Option<Message>; 4] {
         let ticks = elapsed.0 / self.meaning.sample_time_tick.0.max(1);
         [
-            xsens::Message::SampleTime(wrapped(ticks)),
-            xsens::Message::Quaternion(counts(motion.attitude.wxyz(), xsens::QUATERNION_QUANTUM)),
-            xsens::Message::RateOfTurn(counts(motion.rate_radps.0.into(), xsens::RATE_QUANTUM_RADPS)),
-            xsens::Message::Acceleration(counts(
-                motion.force_mps2.0.into(),
-                xsens::ACCELERATION_QUANTUM_MPS2,
-            )),
+            Some(xsens::Message::SampleTime(wrapped(ticks))),
+            counts(motion.attitude.wxyz(), xsens::QUATERNION_QUANTUM).map(xsens::Message::Quaternion),
+            counts(motion.rate_radps.0.into(), xsens::RATE_QUANTUM_RADPS).map(xsens::Message::RateOfTurn),
+            counts(motion.force_mps2.0.into(), xsens::ACCELERATION_QUANTUM_MPS2)
+                .map(xsens::Message::Acceleration),
         ]
-        .map(Message::Xsens)
+        .map(|message| message.map(Message::Xsens))
     }
 
-    fn j1939(&self, motion: &Inertia) -> [Message; 3] {
+    fn j1939(&self, motion: &Inertia) -> [Option<Message>; 3] {
         let (roll, pitch, _) = motion.attitude.roll_pitch_yaw();
-        let slope = j1939::Slope {
-            pitch: j1939::slope_raw(pitch.to_degrees()),
-            roll: j1939::slope_raw(roll.to_degrees()),
-            figures: 0,
-            latency: 0,
-        };
+        let slope = all_finite(motion.attitude.wxyz()).map(|_| {
+            j1939::Message::Slope(j1939::Slope {
+                pitch: j1939::slope_raw(pitch.to_degrees()),
+                roll: j1939::slope_raw(roll.to_degrees()),
+                figures: 0,
+                latency: 0,
+            })
+        });
         let order = self.meaning.axis_order;
-        let rates = order.swapped(motion.rate_radps.0.into()).map(f64::to_degrees);
-        let forces = order.swapped(motion.force_mps2.0.into());
+        let rates = all_finite(order.swapped(motion.rate_radps.0.into()).map(f64::to_degrees));
+        let forces = all_finite(order.swapped(motion.force_mps2.0.into()));
         let triple = |raw| j1939::Triple { raw, figures: 0, latency: 0 };
         [
-            j1939::Message::Slope(slope),
-            j1939::Message::AngularRate(triple(rates.map(j1939::rate_raw))),
-            j1939::Message::Acceleration(triple(forces.map(j1939::acceleration_raw))),
+            slope,
+            rates.map(|rates| j1939::Message::AngularRate(triple(rates.map(j1939::rate_raw)))),
+            forces.map(|forces| j1939::Message::Acceleration(triple(forces.map(j1939::acceleration_raw)))),
         ]
-        .map(Message::J1939)
+        .map(|message| message.map(Message::J1939))
     }
 }
 
@@ -80,8 +80,8 @@ impl Emulator<Inertia> for ImuEmulator {
     fn tell(&mut self, motion: &Inertia, line: LineSink<'_>) {
         let elapsed = self.elapsed(self.told);
         self.told += 1;
-        let mut send = |messages: &[Message]| {
-            for frame in messages.iter().filter_map(|message| self.meaning.set.encode(message)) {
+        let mut send = |messages: &[Option<Message>]| {
+            for frame in messages.iter().flatten().filter_map(|message| self.meaning.set.encode(message)) {
                 line(Direction::Received, motion.at + self.meaning.latency, &frame.encode());
             }
         };
@@ -94,32 +94,38 @@ impl Emulator<Inertia> for ImuEmulator {
     }
 }
 
-fn sbg(motion: &Inertia, elapsed: DurNs) -> [Message; 4] {
+fn sbg(motion: &Inertia, elapsed: DurNs) -> [Option<Message>; 4] {
     let force = sbg::to_ours(motion.force_mps2.0.into());
     let rate = sbg::to_ours(motion.rate_radps.0.into());
     let quaternion = sbg::rotation_to_ours(motion.attitude.wxyz());
     [
-        sbg::Message::ImuInfo {
+        Some(sbg::Message::ImuInfo {
             time_us: wrapped(elapsed.0 / 1000),
             status: sbg::ALL_WELL,
             temperature: SBG_TEMPERATURE,
-        },
-        sbg::Message::Acceleration(counts(force, sbg::ACCELERATION_QUANTUM_MPS2)),
-        sbg::Message::Rate(counts(rate, sbg::RATE_QUANTUM_RADPS)),
-        sbg::Message::Quaternion(counts(quaternion, sbg::QUATERNION_QUANTUM)),
+        }),
+        counts(force, sbg::ACCELERATION_QUANTUM_MPS2).map(sbg::Message::Acceleration),
+        counts(rate, sbg::RATE_QUANTUM_RADPS).map(sbg::Message::Rate),
+        counts(quaternion, sbg::QUATERNION_QUANTUM).map(sbg::Message::Quaternion),
     ]
-    .map(Message::Sbg)
+    .map(|message| message.map(Message::Sbg))
 }
 
-fn bosch(motion: &Inertia) -> [Message; 3] {
+fn bosch(motion: &Inertia) -> [Option<Message>; 3] {
+    let (rates, forces) = (motion.rate_radps, motion.force_mps2);
     let rate = |radps: f64| bosch::RawRate::nearest(radps.to_degrees());
     let force = bosch::RawAcceleration::nearest;
     [
-        bosch::Message::Yaw(rate(motion.rate_radps.z()), force(motion.force_mps2.y())),
-        bosch::Message::Roll(rate(motion.rate_radps.x()), force(motion.force_mps2.x())),
-        bosch::Message::Vertical(force(motion.force_mps2.z())),
+        all_finite([rates.z(), forces.y()]).map(|[z, y]| bosch::Message::Yaw(rate(z), force(y))),
+        all_finite([rates.x(), forces.x()]).map(|[r, x]| bosch::Message::Roll(rate(r), force(x))),
+        all_finite([forces.z()]).map(|[z]| bosch::Message::Vertical(force(z))),
     ]
-    .map(Message::Bosch)
+    .map(|message| message.map(Message::Bosch))
+}
+
+/// What wasn't measured is no number, and no message tells it.
+fn all_finite<const N: usize>(values: [f64; N]) -> Option<[f64; N]> {
+    values.iter().all(|value| value.is_finite()).then_some(values)
 }
 
 /// A device's clock of 32 bits.
@@ -128,9 +134,10 @@ fn wrapped(ticks: i64) -> u32 {
 }
 
 /// The nearest counts that the wire can say.
-fn counts<const N: usize>(values: [f64; N], quantum: f64) -> [i16; N] {
-    values.map(|value| {
+fn counts<const N: usize>(values: [f64; N], quantum: f64) -> Option<[i16; N]> {
+    let counts = |value| {
         let counts = math::round_to_i64(value / quantum);
         i16::try_from(counts).unwrap_or(if counts < 0 { i16::MIN } else { i16::MAX })
-    })
+    };
+    all_finite(values).map(|values| values.map(counts))
 }

@@ -336,3 +336,37 @@ fn the_kind_of_time_that_came_first_is_followed() {
     let clock = decoder.clock().unwrap();
     assert_eq!((clock.stamps, clock.restarts), (2, 0));
 }
+
+#[test]
+fn what_was_not_measured_is_told_by_no_frame() {
+    let setup = EmulatorSetup { start: MonoNs(0), head: None, site: Site::default(), polled: true };
+    for (own, set, whole, without) in [
+        ("preset = \"xsens_mti600\"", XSENS, 4, 3),
+        ("preset = \"sbg_ellipse\"", MessageSet::Sbg, 4, 3),
+        ("preset = \"j1939\"", J1939, 3, 2),
+    ] {
+        let Emulated::Inertial(mut emulator) = configured(own).unwrap().emulator(&setup) else {
+            panic!("no inertial unit")
+        };
+        let mut felt = Inertia::due(MonoNs(0), DurNs::ZERO);
+        let mut told = |felt: &Inertia| {
+            let (mut decoder, mut readings, mut frames) = (ImuDecoder::new(meaning(set)), Vec::new(), 0);
+            emulator.tell(felt, &mut |_, received, bytes| {
+                frames += 1;
+                decoder.decode(Packet { received, bytes }, &mut |decoded| readings.push(decoded.reading));
+            });
+            (frames, readings)
+        };
+        assert_eq!(told(&felt).0, whole, "{own}");
+        felt.attitude = Rot::from_roll_pitch_yaw(f64::NAN, f64::NAN, f64::NAN);
+        let (frames, readings) = told(&felt);
+        assert_eq!(frames, without, "{own}");
+        assert!(
+            matches!(readings[..], [Reading::AngularRate(_), Reading::SpecificForce(_)])
+                || matches!(readings[..], [Reading::SpecificForce(_), Reading::AngularRate(_)]),
+            "{readings:?}"
+        );
+        felt.rate_radps = Vec3::new(0.0, f64::NAN, 0.0);
+        assert!(matches!(told(&felt).1[..], [Reading::SpecificForce(_)]), "{own}");
+    }
+}

@@ -89,8 +89,15 @@ impl Emulator<Inertia> for AutopilotEmulator {
             angles_rad: to_ours([roll, pitch, yaw]).map(single),
             rates_radps: rates_radps.map(single),
         };
-        self.send(motion.at, &Message::Attitude(attitude), line);
-        let Some(message) = message else { return };
+        // What wasn't measured is no number, and no message tells it.
+        let is_known = |values: &[f64]| values.iter().all(|value| value.is_finite());
+        if !is_known(&rates_radps) {
+            return;
+        }
+        if is_known(&[roll, pitch, yaw]) {
+            self.send(motion.at, &Message::Attitude(attitude), line);
+        }
+        let Some(message) = message.filter(|_| motion.force_mps2.is_finite()) else { return };
         let imu = Imu {
             message,
             time_us: self.since_boot_us(motion.at),

@@ -82,7 +82,7 @@ impl HidEmulator {
             Counting::Absolute => layout.width.wrapped(counts, layout.signed),
             Counting::Delta => {
                 let most = (1_i64 << (layout.width.bits() - 1)) - 1;
-                let change = (counts - self.told_counts).clamp(-most, most);
+                let change = counts.saturating_sub(self.told_counts).clamp(-most, most);
                 self.told_counts += change;
                 change
             }

@@ -129,13 +129,13 @@ impl Width {
     /// `count` brought into what the width can say, as a counter that wraps does.
     pub fn wrapped(self, count: i64, signed: bool) -> i64 {
         let modulus = 1_i64 << self.bits();
-        let least = if signed { -modulus / 2 } else { 0 };
-        (count - least).rem_euclid(modulus) + least
+        let above = count.rem_euclid(modulus);
+        if signed && above >= modulus / 2 { above - modulus } else { above }
     }
 
     /// From `before` to `after` the short way round.
     pub fn difference(self, before: i64, after: i64) -> i64 {
-        self.wrapped(after - before, true)
+        self.wrapped(after.wrapping_sub(before), true)
     }
 }
 
@@ -287,6 +287,21 @@ mod tests {
     use super::*;
 
     const EXAMPLE: [u8; 11] = [0x01, 0x2A, 0x01, 0xC0, 0x1D, 0xFE, 0xFF, 0xDC, 0x05, 0x00, 0x00];
+
+    #[test]
+    fn regress_no_count_is_too_large_to_wrap() {
+        for width in [Width::Bits8, Width::Bits16, Width::Bits32] {
+            assert_eq!([i64::MAX, i64::MIN].map(|count| width.wrapped(count, true)), [-1, 0]);
+            let most = (1 << width.bits()) - 1;
+            assert_eq!([i64::MAX, i64::MIN].map(|count| width.wrapped(count, false)), [most, 0]);
+            assert_eq!(width.difference(i64::MAX, i64::MIN), 1);
+            let half = 1 << (width.bits() - 1);
+            assert_eq!(
+                [half - 1, half, -half, -half - 1].map(|count| width.wrapped(count, true)),
+                [half - 1, -half, -half, half - 1]
+            );
+        }
+    }
 
     #[test]
     fn worked_example_1_is_read_and_written() {

@@ -1,22 +1,18 @@
 //! Tables of values (CSV), a row a moment: each sensor's own emulator puts them into the bytes that it would have sent, so that
 //! its ordinary decoder reads them.
 
-use headrace_core::app::device::{Direction, Emulated, EmulatorSetup, Sense};
-use headrace_core::app::measurement::{GroundVelocity, Inertia, Payout, Pressure, Sounding};
+use headrace_core::app::device::Sense;
 use headrace_core::config::{ConfigError, Section, VehicleConfig};
-use headrace_core::frames::{Rot, Vec3};
+use headrace_core::frames::Rot;
 use headrace_core::math::PI;
-use headrace_core::sampling::head::HeadProgram;
-use headrace_core::site::Site;
-use headrace_core::time::{DurNs, MonoNs};
+use headrace_core::time::MonoNs;
 
+use super::emulated::{EmulatedSensor, Value};
 use super::{Clock, Entry, Format, Step};
 
 /// Values that a sensor takes at most.
 const SLOTS: usize = 9;
 const LONGEST_LINE: usize = 1 << 16;
-/// What an inertial sample says of its own period, which a table doesn't.
-const PERIOD: DurNs = DurNs(10_000_000);
 
 /// A quantity: its name, its place among the sensor's values, and the units it may be given in, with their size in ours.
 type Quantity = (&'static str, usize, &'static [(&'static str, f64)]);
@@ -24,9 +20,9 @@ type Quantity = (&'static str, usize, &'static [(&'static str, f64)]);
 const ANGLE: &[(&str, f64)] = &[("rad", 1.0), ("deg", PI / 180.0)];
 const RATE: &[(&str, f64)] = &[("rad/s", 1.0), ("deg/s", PI / 180.0)];
 const FORCE: &[(&str, f64)] = &[("m/s2", 1.0), ("g", 9.806_65)];
-const LENGTH: &[(&str, f64)] = &[("m", 1.0), ("cm", 0.01), ("mm", 0.001)];
+pub(super) const LENGTH: &[(&str, f64)] = &[("m", 1.0), ("cm", 0.01), ("mm", 0.001)];
 const SPEED: &[(&str, f64)] = &[("m/s", 1.0)];
-const PRESSURE: &[(&str, f64)] =
+pub(super) const PRESSURE: &[(&str, f64)] =
     &[("Pa", 1.0), ("hPa", 100.0), ("mbar", 100.0), ("kPa", 1000.0), ("bar", 1e5)];
 
 /// Which quantities a sensor takes; all are needed.
@@ -62,9 +58,7 @@ pub struct Csv {
 
 /// A sensor and the columns that are its own.
 struct Target {
-    id: String,
-    sense: Sense,
-    emulated: Emulated,
+    sensor: EmulatedSensor,
     /// For each value, the column and the size of its unit.
     columns: [Option<(usize, f64)>; SLOTS],
 }
@@ -85,10 +79,11 @@ impl Csv {
         let mut targets: Vec<Target> = Vec::new();
         for section in mapping.sections("columns")? {
             let id = section.required("sensor", section.text("sensor")?)?;
-            let known = targets.iter().position(|target| target.id == id);
+            let known = targets.iter().position(|target| target.sensor.id == id);
             let number = known.unwrap_or(targets.len());
             if known.is_none() {
-                targets.push(target(&section, vehicle, id)?);
+                let sensor = EmulatedSensor::named(&section, vehicle, &id)?;
+                targets.push(Target { sensor, columns: [None; SLOTS] });
             }
             if let Some(target) = targets.get_mut(number) {
                 target.read(&section, &names)?;
@@ -96,11 +91,11 @@ impl Csv {
             section.finish()?;
         }
         for target in &targets {
-            let all = quantities(target.sense).iter();
+            let all = quantities(target.sensor.sense).iter();
             let missing = all.filter(|(_, slot, _)| target.columns.get(*slot).is_some_and(Option::is_none));
             let missing: Vec<&str> = missing.map(|(name, ..)| *name).collect();
             if !missing.is_empty() {
-                let (id, missing) = (&target.id, missing.join(", "));
+                let (id, missing) = (&target.sensor.id, missing.join(", "));
                 let problem = format!("have none for {missing} of sensor {id:?}; its bytes need all of them");
                 return Err(mapping.invalid("columns", &problem));
             }
@@ -113,11 +108,11 @@ impl Csv {
         let cells: Vec<&str> = line.split(self.separator).map(cell).collect();
         let time = cells.get(self.time.0).copied().unwrap_or_default();
         let stamp_ns = nanoseconds(time, self.time.1).ok_or("rows whose time is no number from 0 on")?;
-        let mut whole = true;
+        let mut whole = Ok(());
         for target in &mut self.targets {
-            whole &= target.tell(stamp_ns, &cells, out);
+            whole = whole.and(target.tell(stamp_ns, &cells, out));
         }
-        if whole { Ok(()) } else { Err("rows with a cell that is no number") }
+        whole
     }
 }
 
@@ -155,22 +150,9 @@ fn column(section: &Section<'_>, key: &'static str, names: &[&str]) -> Result<us
     found.ok_or_else(|| section.invalid(key, &format!("is no column; there are {}", names.join(", "))))
 }
 
-fn target(section: &Section<'_>, vehicle: &VehicleConfig, id: String) -> Result<Target, ConfigError> {
-    let number = vehicle.sensor_configs.iter().position(|config| config.id == id);
-    let Some(device) = number.and_then(|number| vehicle.sensors.get(number)) else {
-        let ids: Vec<&str> = vehicle.sensor_configs.iter().map(|config| config.id.as_str()).collect();
-        let problem = format!("is no sensor of the vehicle file; there are {}", ids.join(", "));
-        return Err(section.invalid("sensor", &problem));
-    };
-    let site: Site = vehicle.site;
-    let head = device.head().map(|_| HeadProgram { start_rad: 0.0, growing: true, sector: None });
-    let setup = EmulatorSetup { start: MonoNs(0), head, site, polled: true };
-    Ok(Target { id, sense: device.sense(), emulated: device.emulator(&setup), columns: [None; SLOTS] })
-}
-
 impl Target {
     fn read(&mut self, section: &Section<'_>, names: &[&str]) -> Result<(), ConfigError> {
-        let all: Vec<(&str, Quantity)> = quantities(self.sense).iter().map(|it| (it.0, *it)).collect();
+        let all: Vec<(&str, Quantity)> = quantities(self.sensor.sense).iter().map(|it| (it.0, *it)).collect();
         let (_, slot, units) = section.required("quantity", section.choice("quantity", &all)?)?;
         let unit = section.required("unit", section.choice("unit", units)?)?;
         let factor = section.number("factor", -1e9..=1e9)?.unwrap_or(1.0);
@@ -183,13 +165,15 @@ impl Target {
         Ok(())
     }
 
-    /// Puts a row's values into bytes. Where all cells are empty the sensor said nothing; `false` where some can't be read.
-    fn tell(&mut self, stamp_ns: u64, cells: &[&str], out: &mut Vec<Entry>) -> bool {
+    /// Puts a row's values into bytes. Where all cells are empty the sensor said nothing.
+    ///
+    /// Errors: in words, rows with cells that can't be told.
+    fn tell(&mut self, stamp_ns: u64, cells: &[&str], out: &mut Vec<Entry>) -> Result<(), &'static str> {
         let text = |place: &Option<(usize, f64)>| {
             place.map(|(column, _)| cells.get(column).copied().unwrap_or_default()).unwrap_or_default()
         };
         if self.columns.iter().all(|place| text(place).is_empty()) {
-            return true;
+            return Ok(());
         }
         let mut values = [None; SLOTS];
         for (value, place) in values.iter_mut().zip(&self.columns) {
@@ -197,45 +181,29 @@ impl Target {
             let number = text(place).parse::<f64>().ok().map(|number| number * unit);
             *value = number.filter(|number| number.is_finite());
         }
-        let Self { id, emulated, .. } = self;
-        let mut sink = |direction, at: MonoNs, bytes: &[u8]| {
-            if direction == Direction::Received {
-                out.push(Entry { stamp_ns: at.0, stream: id.clone(), bytes: bytes.to_vec() });
-            }
+        let empty = |slot: usize| self.columns.get(slot).is_none_or(|place| text(place).is_empty());
+        let Some(value) = value(self.sensor.sense, values, empty(1)) else {
+            return Err("rows with a cell that is no number");
         };
-        tell(emulated, MonoNs(stamp_ns), values, text(&self.columns[1]).is_empty(), &mut sink).is_some()
+        let stream = self.sensor.id.clone();
+        let told = self.sensor.tell(MonoNs(stamp_ns), &value, &mut |at, bytes| {
+            out.push(Entry { stamp_ns: at.0, stream: stream.clone(), bytes: bytes.to_vec() });
+        });
+        if told { Ok(()) } else { Err("rows with values that the sensor can't say") }
     }
 }
 
 /// `None` where a value is missing. A head that has an angle and no range has heard nothing.
-fn tell(
-    emulated: &mut Emulated,
-    at: MonoNs,
-    values: [Option<f64>; SLOTS],
-    no_range: bool,
-    sink: &mut dyn FnMut(Direction, MonoNs, &[u8]),
-) -> Option<()> {
+fn value(sense: Sense, values: [Option<f64>; SLOTS], no_range: bool) -> Option<Value> {
     let [a, b, c, d, e, f, g, h, i] = values;
-    match emulated {
-        Emulated::Head(device) => {
-            let range_m = if no_range { None } else { Some(b?) };
-            device.tell(&Sounding { range_m, ..Sounding::due(at, a?) }, sink);
-        }
-        Emulated::Echosounder(device) => {
-            device.tell(&Sounding { range_m: Some(a?), ..Sounding::due(at, 0.0) }, sink);
-        }
-        Emulated::Depth(device) => device.tell(&Pressure { at, pressure_pa: a? }, sink),
-        Emulated::Inertial(device) => {
-            let attitude = Rot::from_roll_pitch_yaw(a?, b?, c?);
-            let (rate_radps, force_mps2) = (Vec3::new(d?, e?, f?), Vec3::new(g?, h?, i?));
-            device.tell(&Inertia { at, period: PERIOD, attitude, rate_radps, force_mps2 }, sink);
-        }
-        Emulated::VelocityLog(device) => {
-            device.tell(&GroundVelocity { at, velocity_mps: Vec3::new(a?, b?, c?) }, sink);
-        }
-        Emulated::Tether(device) => device.tell(&Payout { at, chainage_m: a? }, sink),
-    }
-    Some(())
+    Some(match sense {
+        Sense::Head => Value::Beam(a?, if no_range { None } else { Some(b?) }),
+        Sense::Echosounder => Value::Range(Some(a?)),
+        Sense::Depth => Value::Pressure(a?),
+        Sense::Inertial => Value::Inertia(Rot::from_roll_pitch_yaw(a?, b?, c?), [d?, e?, f?], [g?, h?, i?]),
+        Sense::Velocity => Value::Velocity([a?, b?, c?]),
+        Sense::Tether => Value::Payout(a?),
+    })
 }
 
 /// A decimal number of units, exactly, cut off at the nanosecond.

@@ -6,13 +6,19 @@ pub const ENOUGH_BYTES: usize = 64;
 /// What a file looks like, in words; `None` for what isn't known.
 pub fn looks_like(front: &[u8]) -> Option<&'static str> {
     const MAGICS: [(&[u8], &str); 16] = [
-        (b"\x89MCAP", "an MCAP file; `headrace replay` reads those of raw bytes as they are"),
-        (b"#ROSBAG V", "a ROS bag"),
+        (
+            b"\x89MCAP",
+            "an MCAP file; `headrace replay` reads those of raw bytes as they are, --format mcap imports those of ROS",
+        ),
+        (b"#ROSBAG V", "a ROS bag; as `.bag`, or with --format rosbag, it can be imported"),
         (b"\x1F\x8B", "compressed by gzip; unpack it first"),
         (b"\x28\xB5\x2F\xFD", "compressed by zstd; unpack it first"),
         (b"PK\x03\x04", "a zip file; unpack it first"),
         (b"BZh", "compressed by bzip2; unpack it first"),
-        (b"SQLite format 3", "an SQLite file, perhaps a ROS 2 bag"),
+        (
+            b"SQLite format 3",
+            "an SQLite file, perhaps a ROS 2 bag; `ros2 bag convert` makes MCAP of it, which can be imported",
+        ),
         (b"\xA3\x95", "a dataflash log of ArduPilot (.BIN); its telemetry log (.tlog) can be imported"),
         (b"852", "an Imagenex file"),
         (b"81A", "an Imagenex file"),

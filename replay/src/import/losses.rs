@@ -6,7 +6,7 @@ use headrace_core::time::MonoNs;
 
 /// What was lost so far.
 #[derive(Debug, Clone, Default)]
-pub struct Losses {
+pub(super) struct Losses {
     kinds: BTreeMap<&'static str, Kind>,
     /// Where the last loss ended, and of which kind it was: a byte that follows directly is passed over in the same search.
     last: Option<(u64, &'static str)>,
@@ -49,7 +49,7 @@ impl Losses {
     }
 
     /// All of it in words.
-    pub fn words(&self) -> Vec<String> {
+    pub(super) fn words(&self) -> Vec<String> {
         let mut all: Vec<String> = self
             .kinds
             .iter()

@@ -9,8 +9,10 @@
 pub mod candump;
 pub mod csv;
 pub mod detect;
+mod emulated;
 mod losses;
 mod order;
+pub mod ros;
 mod taker;
 
 #[cfg(test)]
@@ -22,10 +24,10 @@ use headrace_core::time::{DurNs, MonoNs};
 
 use crate::log::{LogError, LogWriter};
 
-pub use losses::Losses;
+use losses::Losses;
 pub use taker::Taker;
 
-use order::Order;
+pub use order::Order;
 
 /// Log time of a file's first entry, as that of a simulation.
 pub const BEGIN: MonoNs = crate::simulate::START;
@@ -57,6 +59,17 @@ pub enum Step {
     Lost(usize, &'static str),
     /// Not known without more bytes; at the file's end, an entry that is cut off.
     More,
+    /// What stands at the front has more entries: none of its bytes is done with.
+    Held,
+}
+
+/// What a format says at the end besides its bytes, in words.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Told {
+    /// What was lost.
+    pub losses: Vec<String>,
+    /// What is no loss, and should be known all the same.
+    pub remarks: Vec<String>,
 }
 
 /// What a format's times count from.
@@ -83,11 +96,71 @@ impl Clock {
 
 /// How a kind of file is cut into entries. Sans-I/O: it gets the front of what is left of the file.
 pub trait Format {
-    /// What its times count from.
+    /// What its times count from, as far as has been read.
     fn clock(&self) -> Clock;
+
+    /// Longest entry, bytes.
+    fn most_held(&self) -> usize {
+        MOST_HELD
+    }
+
+    /// How long before the latest entry one may be that comes later, ns.
+    fn reach_ns(&self) -> u64 {
+        order::WINDOW_NS
+    }
+
+    /// What it has to say at the end.
+    fn told(&self) -> Told {
+        Told::default()
+    }
 
     /// What stands at the front; `out` gets the entries. `end` says that nothing follows.
     fn step(&mut self, front: &[u8], end: bool, out: &mut Vec<Entry>) -> Step;
+}
+
+impl Format for Box<dyn Format> {
+    fn clock(&self) -> Clock {
+        (**self).clock()
+    }
+
+    fn most_held(&self) -> usize {
+        (**self).most_held()
+    }
+
+    fn reach_ns(&self) -> u64 {
+        (**self).reach_ns()
+    }
+
+    fn told(&self) -> Told {
+        (**self).told()
+    }
+
+    fn step(&mut self, front: &[u8], end: bool, out: &mut Vec<Entry>) -> Step {
+        (**self).step(front, end, out)
+    }
+}
+
+/// Where entries come from: a file that a [`Format`] cuts, or one that another reader reads.
+pub trait Source {
+    /// The file.
+    fn name(&self) -> &str;
+
+    /// Puts the next entries in order. `false` at the end.
+    ///
+    /// Errors: the file can't be read on.
+    fn more(&mut self, order: &mut Order) -> Result<bool, ImportError>;
+
+    /// What its times count from, as far as has been read.
+    fn clock(&self) -> Clock;
+
+    /// How long before the latest entry one may be that comes later, ns.
+    fn reach_ns(&self) -> u64;
+
+    /// Bytes that have been read.
+    fn bytes(&self) -> u64;
+
+    /// What was lost so far, and what else should be known.
+    fn told(&self) -> Told;
 }
 
 /// Why a file can't be imported.
@@ -116,14 +189,28 @@ pub enum ImportError {
         /// What was found in place, or empty.
         why: String,
     },
-    /// The log can't be written.
+    /// No bag that is known.
+    #[error("importing {name}: a ROS bag begins with \"#ROSBAG V2.0\", this file with {found:?}")]
+    NoBag {
+        /// The file.
+        name: String,
+        /// Its first bytes.
+        found: String,
+    },
+    /// A log of ours.
+    #[error("importing {name}: it is a dive log already; `headrace replay` reads it as it is")]
+    DiveLog {
+        /// The file.
+        name: String,
+    },
+    /// The log can't be written, or the recording not be read.
     #[error(transparent)]
     Log(#[from] LogError),
 }
 
 /// A file that is being imported.
-pub struct Import<R> {
-    input: Input<R>,
+pub struct Import<S> {
+    input: S,
     order: Order,
     /// The stamp that becomes [`BEGIN`].
     first_ns: u64,
@@ -143,12 +230,15 @@ pub struct Imported {
     pub last: MonoNs,
     /// What was lost, in words.
     pub losses: Vec<String>,
+    /// What is no loss, and should be known all the same.
+    pub remarks: Vec<String>,
 }
 
-struct Input<R> {
+/// A file and the format that cuts it.
+pub struct Input<R, F = Box<dyn Format>> {
     name: String,
     reader: R,
-    format: Box<dyn Format>,
+    format: F,
     held: Vec<u8>,
     /// Of what is held, how much is done with.
     done: usize,
@@ -159,7 +249,7 @@ struct Input<R> {
     losses: Losses,
 }
 
-impl<R: Read> Import<R> {
+impl<R: Read> Import<Input<R>> {
     /// Reads as far as it takes to know when the file begins. `what` is what its entries are called.
     ///
     /// Errors: the file can't be read, or has no entry.
@@ -169,29 +259,27 @@ impl<R: Read> Import<R> {
         format: Box<dyn Format>,
         what: &'static str,
     ) -> Result<Self, ImportError> {
-        let clock = format.clock();
-        let mut input = Input {
-            name: name.to_owned(),
-            reader,
-            format,
-            held: Vec::new(),
-            done: 0,
-            offset: 0,
-            end: false,
-            found: Vec::new(),
-            losses: Losses::default(),
-        };
-        let mut order = Order::default();
+        Self::of(Input::new(name, reader, format), what)
+    }
+}
+
+impl<S: Source> Import<S> {
+    /// Reads as far as it takes to know when the recording begins. `what` is what its entries are called.
+    ///
+    /// Errors: it can't be read, or has no entry.
+    pub fn of(mut input: S, what: &'static str) -> Result<Self, ImportError> {
+        let mut order = Order::reaching(input.reach_ns());
         while !order.is_full() && input.more(&mut order)? {}
         let Some(first_ns) = order.first_ns() else {
-            let why = input.losses.words().into_iter().next().map_or(String::new(), |why| format!("; {why}"));
+            let why = input.told().losses.into_iter().next().map_or(String::new(), |why| format!("; {why}"));
             return Err(ImportError::Nothing {
-                name: input.name,
+                name: input.name().to_owned(),
                 what,
-                bytes: input.offset + input.done as u64,
+                bytes: input.bytes(),
                 why,
             });
         };
+        let clock = input.clock();
         Ok(Self { input, order, first_ns, clock })
     }
 
@@ -219,12 +307,13 @@ impl<R: Read> Import<R> {
         let sources = takers.iter().map(|taker| usize::from(taker.source) + 1).max().unwrap_or(0);
         let mut imported = Imported { messages: vec![0; sources], last: BEGIN, ..Imported::default() };
         let mut before_ns = self.first_ns;
+        let mut losses = Losses::default();
         loop {
             while !self.order.is_full() && self.input.more(&mut self.order)? {}
             let Some(entry) = self.order.pop() else { break };
             let at = BEGIN + DurNs(i64::try_from(entry.stamp_ns - self.first_ns).unwrap_or(i64::MAX / 2));
             if entry.stamp_ns - before_ns > LONGEST_GAP.0.unsigned_abs() {
-                self.input.losses.gap(entry.stamp_ns - before_ns, at);
+                losses.gap(entry.stamp_ns - before_ns, at);
             }
             before_ns = entry.stamp_ns;
             imported.entries += 1;
@@ -242,14 +331,36 @@ impl<R: Read> Import<R> {
             }
             imported.passed_over += u64::from(!taken);
         }
-        self.input.losses.late(self.order.late());
-        imported.losses = self.input.losses.words();
+        losses.late(self.order.late());
+        let told = self.input.told();
+        imported.losses = [told.losses, losses.words()].concat();
+        imported.remarks = told.remarks;
         Ok(imported)
     }
 }
 
-impl<R: Read> Input<R> {
-    /// Puts the next entries in order. `false` at the end.
+impl<R: Read, F: Format> Source for Input<R, F> {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn clock(&self) -> Clock {
+        self.format.clock()
+    }
+
+    fn reach_ns(&self) -> u64 {
+        self.format.reach_ns()
+    }
+
+    fn bytes(&self) -> u64 {
+        self.offset + self.done as u64
+    }
+
+    fn told(&self) -> Told {
+        let Told { losses, remarks } = self.format.told();
+        Told { losses: [self.losses.words(), losses].concat(), remarks }
+    }
+
     fn more(&mut self, order: &mut Order) -> Result<bool, ImportError> {
         let front = self.held.get(self.done..).unwrap_or_default();
         if front.is_empty() && self.end {
@@ -270,8 +381,9 @@ impl<R: Read> Input<R> {
                 self.losses.cut_off(at, left);
                 self.done += left;
             }
-            Step::More if left >= MOST_HELD => {
-                self.losses.lost(at, left, "no end of an entry within 1 MiB");
+            Step::Held => (),
+            Step::More if left >= self.format.most_held() => {
+                self.losses.lost(at, left, "no end of an entry within what can be held");
                 self.done += left;
             }
             Step::More => self.read()?,
@@ -280,6 +392,23 @@ impl<R: Read> Input<R> {
             order.push(entry);
         }
         Ok(true)
+    }
+}
+
+impl<R: Read, F: Format> Input<R, F> {
+    /// A file that nothing has been read of.
+    pub fn new(name: &str, reader: R, format: F) -> Self {
+        Self {
+            name: name.to_owned(),
+            reader,
+            format,
+            held: Vec::new(),
+            done: 0,
+            offset: 0,
+            end: false,
+            found: Vec::new(),
+            losses: Losses::default(),
+        }
     }
 
     fn read(&mut self) -> Result<(), ImportError> {

@@ -5,14 +5,18 @@ use std::collections::BTreeMap;
 use super::Entry;
 
 /// Entries within this of the latest one are held back: what comes after them may be older.
-const WINDOW_NS: u64 = 2_000_000_000;
+pub(super) const WINDOW_NS: u64 = 2_000_000_000;
 /// However close together, no more are held than this.
 const MOST_ENTRIES: usize = 1 << 15;
 const MOST_BYTES: usize = 1 << 24;
+/// And where they have to be held for longer than usual.
+const MOST_REACHING: usize = 1 << 18;
 
 /// Gives entries in order of their stamps, those with the same one as they came.
-#[derive(Debug, Default)]
-pub(super) struct Order {
+#[derive(Debug)]
+pub struct Order {
+    window_ns: u64,
+    most_entries: usize,
     held: BTreeMap<(u64, u64), Entry>,
     bytes: usize,
     count: u64,
@@ -20,7 +24,19 @@ pub(super) struct Order {
     late: u64,
 }
 
+impl Default for Order {
+    fn default() -> Self {
+        Self::reaching(WINDOW_NS)
+    }
+}
+
 impl Order {
+    /// For entries that may come so much later than they are.
+    pub(super) fn reaching(window_ns: u64) -> Self {
+        let most_entries = if window_ns > WINDOW_NS { MOST_REACHING } else { MOST_ENTRIES };
+        Self { window_ns, most_entries, held: BTreeMap::new(), bytes: 0, count: 0, given_ns: 0, late: 0 }
+    }
+
     /// Takes an entry, unless a later one has been given already.
     pub(super) fn push(&mut self, entry: Entry) {
         if entry.stamp_ns < self.given_ns {
@@ -35,8 +51,8 @@ impl Order {
     /// Whether an entry has to be given before another is taken.
     pub(super) fn is_full(&self) -> bool {
         let ends = self.held.first_key_value().zip(self.held.last_key_value());
-        let spans = ends.is_some_and(|((first, _), (last, _))| last.0 - first.0 > WINDOW_NS);
-        spans || self.held.len() >= MOST_ENTRIES || self.bytes >= MOST_BYTES
+        let spans = ends.is_some_and(|((first, _), (last, _))| last.0 - first.0 > self.window_ns);
+        spans || self.held.len() >= self.most_entries || self.bytes >= MOST_BYTES
     }
 
     pub(super) fn pop(&mut self) -> Option<Entry> {

@@ -31,7 +31,7 @@ fn eight(ms: u32, kind: u8, stream: u8, number: u8) -> Vec<u8> {
     [&ms.to_be_bytes()[..], &[kind, stream, 0, number]].concat()
 }
 
-fn open(file: &[u8], format: Box<dyn Format>) -> Result<Import<Cursor<Vec<u8>>>, ImportError> {
+fn open(file: &[u8], format: Box<dyn Format>) -> Result<Import<Input<Cursor<Vec<u8>>>>, ImportError> {
     Import::open("test", Cursor::new(file.to_vec()), format, "entry")
 }
 

@@ -86,6 +86,10 @@ impl Channels {
         self.by_id.get(&id)
     }
 
+    pub(super) fn all(&self) -> impl Iterator<Item = &Definition> {
+        self.by_id.values().map(|channel| &channel.definition)
+    }
+
     pub(super) fn sources(&self) -> &[SourceInfo] {
         &self.sources
     }
@@ -139,6 +143,7 @@ pub(super) fn listed(entries: &BTreeMap<String, String>) -> Vec<Definition> {
             id,
             topic: String::new(),
             metadata: BTreeMap::new(),
+            form: None,
         });
         if key == "topic" {
             definition.topic.clone_from(value);
@@ -157,7 +162,7 @@ mod tests {
         let definition = |(id, (topic, source)): (u16, &(&str, Option<&str>))| {
             let metadata =
                 source.map(|source| (SOURCE_KEY.to_owned(), source.to_owned())).into_iter().collect();
-            (id, Definition { id, topic: (*topic).to_owned(), metadata })
+            (id, Definition { id, topic: (*topic).to_owned(), metadata, form: None })
         };
         Channels::new((0..).zip(topics).map(definition).collect())
     }

@@ -79,19 +79,34 @@ impl<R: Read + Seek> LogFile<R> {
 }
 
 /// A channel's definition.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone)]
 pub(super) struct Definition {
     pub(super) id: u16,
     pub(super) topic: String,
     pub(super) metadata: BTreeMap<String, String>,
+    /// Its schema, and how its messages are put into bytes: of logs of others. Ours don't need them, nor repeat them.
+    pub(super) form: Option<(u16, String)>,
+}
+
+/// By what makes a channel one of ours: its form is left out, since our list of channels has none.
+impl PartialEq for Definition {
+    fn eq(&self, other: &Self) -> bool {
+        (self.id, &self.topic, &self.metadata) == (other.id, &other.topic, &other.metadata)
+    }
 }
 
 impl Definition {
     pub(super) fn read(fields: &mut Fields<'_>) -> Option<Self> {
-        let (id, _schema) = (fields.u16()?, fields.u16()?);
-        let (topic, _encoding) = (fields.text()?, fields.text()?);
-        Some(Self { id, topic: topic.to_owned(), metadata: fields.map()? })
+        let (id, schema) = (fields.u16()?, fields.u16()?);
+        let (topic, encoding) = (fields.text()?, fields.text()?);
+        let form = Some((schema, encoding.to_owned()));
+        Some(Self { id, topic: topic.to_owned(), metadata: fields.map()?, form })
     }
+}
+
+/// Number and name of a schema.
+pub(super) fn schema(fields: &mut Fields<'_>) -> Option<(u16, String)> {
+    Some((fields.u16()?, fields.text()?.to_owned()))
 }
 
 /// A chunk: where its data is and what its head says.
@@ -122,15 +137,25 @@ pub(super) struct AttachmentPlace {
 /// What a record is, as far as the framing and the index need to know.
 #[derive(Debug, Clone)]
 pub(super) enum Item {
-    Header { ours: bool },
+    Header {
+        ours: bool,
+    },
+    Schema,
     Channel,
-    Message { log_time: u64 },
+    Message {
+        log_time: u64,
+    },
     Chunk(ChunkPlace),
     Attachment(AttachmentPlace),
     Metadata,
-    Statistics { channels: u32 },
+    Statistics {
+        channels: u32,
+    },
     DataEnd,
-    Footer,
+    /// Where the summary begins, as it says; 0 where there is none.
+    Footer {
+        summary: u64,
+    },
     Other,
 }
 
@@ -225,6 +250,7 @@ fn is_reserved(opcode: u8) -> bool {
 /// What a record is whose names are longer than a glance.
 fn unread(opcode: u8) -> Item {
     match opcode {
+        op::SCHEMA => Item::Schema,
         op::CHANNEL => Item::Channel,
         op::METADATA => Item::Metadata,
         _ => Item::Other,
@@ -292,12 +318,13 @@ fn parse(opcode: u8, body: u64, bytes: &[u8]) -> Option<(Item, u64)> {
             Item::Header { ours: library.starts_with(LIBRARY) }
         }
         op::FOOTER => {
-            fields.take(20)?;
-            Item::Footer
+            let summary = fields.u64()?;
+            let _offsets_checksum = fields.take(12)?;
+            Item::Footer { summary }
         }
         op::SCHEMA => {
             let _id_name_encoding = (fields.u16()?, fields.text()?, fields.text()?);
-            return with_list(fields, Item::Other);
+            return with_list(fields, Item::Schema);
         }
         op::CHANNEL => {
             let _ids_topic_encoding = (fields.u32()?, fields.text()?, fields.text()?);

@@ -43,6 +43,8 @@ pub enum LossKind {
         /// The channel's number.
         channel: u16,
     },
+    /// Every record reads, but the log's end stands elsewhere than it says: whole records are missing, or don't belong here.
+    Displaced,
     /// Every record reads, but the checksum over all of them does not fit: a byte has changed, and nothing says which.
     DataSection,
     /// Damage of one part of a recording.
@@ -116,6 +118,9 @@ impl fmt::Display for LossKind {
                 write!(out, "{messages} messages of channel {channel}, which is defined nowhere")
             }
             Self::Conflict { channel } => write!(out, "channel {channel} is defined twice, differently"),
+            Self::Displaced => out.write_str(
+                "whole records are missing or were put in: the summary begins elsewhere than the log says",
+            ),
             Self::DataSection => {
                 out.write_str("some byte has changed: the checksum over the whole log does not fit")
             }

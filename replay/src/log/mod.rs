@@ -49,7 +49,9 @@ pub use dive_log::{DiveLog, DivePlace, PartFile, files_of};
 pub use error::LogError;
 pub use loss::{Loss, LossKind};
 pub use part::{Part, PartEnd, PartHead, Progress, dive_name, part_path};
-pub use reader::{LogInfo, LogMessage, LogPlace, LogReader, MessageKind, file_digest, files_digest};
+pub use reader::{
+    ChannelInfo, LogInfo, LogMessage, LogPlace, LogReader, MessageKind, file_digest, files_digest,
+};
 pub use recorder::{Full, Recorder, RecorderHandle, RecorderPort, SentPort};
 pub use recover::{RECOVERED_FROM, Recovered, recover};
 pub use rotate::{Every, Rotation};

@@ -69,6 +69,8 @@ pub enum MessageKind<'a> {
 pub struct LogMessage<'a> {
     /// What it is.
     pub kind: MessageKind<'a>,
+    /// Number of its channel.
+    pub channel: u16,
     /// When it was received, or made.
     pub log_time: MonoNs,
     /// For when it is valid.
@@ -91,6 +93,19 @@ pub struct LogPlace {
     losses: Vec<Loss>,
 }
 
+/// A channel of a log, as it says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ChannelInfo<'a> {
+    /// Its number.
+    pub id: u16,
+    /// Its topic.
+    pub topic: &'a str,
+    /// How its messages are put into bytes; empty where that isn't said.
+    pub encoding: &'a str,
+    /// Name of its messages' schema, where it has one that is in the log.
+    pub schema: Option<&'a str>,
+}
+
 /// Reads a log.
 ///
 /// Opening walks over the file once, without unpacking it: so the order of messages doesn't depend on a summary being
@@ -105,6 +120,7 @@ pub struct LogReader<R = File> {
     file: LogFile<R>,
     info: LogInfo,
     channels: Channels,
+    schemas: BTreeMap<u16, String>,
     losses: Losses,
     /// Pieces in the order of the file.
     spans: Vec<Span>,
@@ -155,6 +171,7 @@ impl<R: Read + Seek> LogReader<R> {
             file,
             info,
             channels,
+            schemas: scan.schemas,
             losses: scan.losses,
             spans: scan.spans,
             plan,
@@ -175,6 +192,16 @@ impl<R: Read + Seek> LogReader<R> {
     /// Whether the log has the ticks of the loop that wrote it.
     pub fn has_ticks(&self) -> bool {
         self.channels.has_ticks()
+    }
+
+    /// The channels that are known before messages are read.
+    pub fn channels(&self) -> impl Iterator<Item = ChannelInfo<'_>> {
+        self.channels.all().map(|definition| {
+            let (schema, encoding) =
+                definition.form.as_ref().map_or((0, ""), |(schema, encoding)| (*schema, encoding));
+            let schema = self.schemas.get(&schema).map(String::as_str);
+            ChannelInfo { id: definition.id, topic: &definition.topic, encoding, schema }
+        })
     }
 
     /// Log times between which its messages lie, as the heads of its chunks say.
@@ -250,6 +277,7 @@ impl<R: Read + Seek> LogReader<R> {
         };
         Ok(Some(LogMessage {
             kind,
+            channel: entry.head.channel,
             log_time: MonoNs(entry.head.log_time),
             publish_time: MonoNs(entry.head.publish_time),
             sequence: entry.head.sequence,

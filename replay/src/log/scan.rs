@@ -12,7 +12,7 @@ use super::fields::Fields;
 use super::format::{
     ATTACHMENT_PREFIX, CHANNEL_LIST, FORMAT_KEY, FORMAT_VERSION, LOSSES, METADATA, read_loss, unseal,
 };
-use super::framing::{AttachmentPlace, ChunkPlace, Definition, Found, Frame, Item, LogFile, look};
+use super::framing::{AttachmentPlace, ChunkPlace, Definition, Found, Frame, Item, LogFile, look, schema};
 use super::loss::Losses;
 use super::search::find_records;
 use super::{LogError, Loss, LossKind};
@@ -50,11 +50,13 @@ pub(super) struct Scan {
     pub(super) losses: Losses,
     pub(super) attachments: Vec<(String, Vec<u8>)>,
     pub(super) metadata: BTreeMap<String, String>,
+    /// Names of schemas by their numbers.
+    pub(super) schemas: BTreeMap<u16, String>,
     definitions: BTreeMap<u16, Definition>,
     /// Definitions in the summary, which count only if its checksum fits.
     summary: BTreeMap<u16, Definition>,
     summary_channels: Option<u32>,
-    data_end: Option<u64>,
+    data_end: Option<core::ops::Range<u64>>,
     /// Whether it is a log of ours, which has no messages outside chunks.
     ours: bool,
     /// Whether it repeats its channels.
@@ -63,6 +65,8 @@ pub(super) struct Scan {
     announced: Vec<String>,
     /// What it says itself to be missing from it.
     stated: Vec<Loss>,
+    /// The last record if that was the footer, and where the summary begins, as it says.
+    footer: Option<(core::ops::Range<u64>, u64)>,
     /// Whether the next message may join the last run.
     run_open: bool,
     attachment_bytes: u64,
@@ -85,7 +89,7 @@ pub(super) fn scan<R: Read + Seek>(file: &mut LogFile<R>) -> Result<(Scan, Chann
     scan.walk(file, magic_len)?;
     scan.check_format(file)?;
     let summarised = scan.take_summary(file)?;
-    if !summarised && !scan.has_list {
+    if !summarised && !scan.has_list || !scan.ours && scan.lacks_schemas() {
         scan.look_into_chunks(file)?;
     }
     scan.miss_parts();
@@ -110,6 +114,7 @@ impl Scan {
             let resumed = match found {
                 Found::Closing => {
                     let end = at + mcap::MAGIC.len() as u64;
+                    self.check_closing(at);
                     if end < file.len() {
                         self.lose(LossKind::Framing, end..file.len());
                     }
@@ -150,17 +155,26 @@ impl Scan {
     }
 
     fn accept<R: Read + Seek>(&mut self, file: &mut LogFile<R>, frame: &Frame) -> Result<(), LogError> {
+        // Nothing comes behind a footer: it was a record of another kind.
+        if let Some((footer, _)) = self.footer.take() {
+            self.lose(LossKind::Framing, footer);
+        }
         match &frame.item {
             Item::Message { .. } if self.ours => self.lose(LossKind::Framing, frame.at..frame.end),
             Item::Message { log_time } => self.add_message(frame, *log_time),
             Item::Chunk(place) => self.add_chunk(frame.at, frame.end, place),
             Item::Channel => self.add_channel(file, frame)?,
+            Item::Schema => {
+                let body = whole_body(file, frame)?;
+                self.schemas.extend(body.and_then(|body| schema(&mut Fields::new(&body))));
+            }
             Item::Metadata => self.add_metadata(file, frame)?,
             Item::Attachment(place) => self.add_attachment(file, frame, place)?,
             Item::Statistics { channels } => self.summary_channels = Some(*channels),
-            Item::DataEnd => self.data_end = Some(frame.at),
+            Item::DataEnd => self.data_end = Some(frame.at..frame.end),
             Item::Header { ours } => self.ours = *ours,
-            Item::Footer | Item::Other => {}
+            Item::Footer { summary } => self.footer = Some((frame.at..frame.end, *summary)),
+            Item::Other => {}
         }
         Ok(())
     }
@@ -249,6 +263,18 @@ impl Scan {
         Ok(())
     }
 
+    /// Whole records that are missing leave no gap. A part that reaches the end takes the closing records along, and without any
+    /// other the summary begins elsewhere than the footer says.
+    fn check_closing(&mut self, at: u64) {
+        let (Some((_, summary)), Some(data_end)) = (self.footer.take(), self.data_end.clone()) else {
+            self.lose(LossKind::Truncated, at..at);
+            return;
+        };
+        if summary != 0 && summary != data_end.end && self.losses.list().is_empty() {
+            self.lose(LossKind::Displaced, 0..data_end.start);
+        }
+    }
+
     fn check_format<R: Read + Seek>(&self, file: &LogFile<R>) -> Result<(), LogError> {
         let Some(found) = self.metadata.get(FORMAT_KEY) else { return Ok(()) };
         if found.parse().is_ok_and(|format: u32| format <= FORMAT_VERSION) {
@@ -260,7 +286,7 @@ impl Scan {
     /// Takes the channels of the summary, if it is sound, before all others: a tool that has copied a log of ours may
     /// have numbered them anew. Gives whether these are all.
     fn take_summary<R: Read + Seek>(&mut self, file: &mut LogFile<R>) -> Result<bool, LogError> {
-        let Some(data_end) = self.data_end else { return Ok(false) };
+        let Some(data_end) = self.data_end.as_ref().map(|record| record.start) else { return Ok(false) };
         if self.summary.is_empty() || !summary_holds(file, data_end)? {
             return Ok(false);
         }
@@ -269,17 +295,26 @@ impl Scan {
         Ok(all)
     }
 
+    /// Whether a channel has a schema that hasn't been seen.
+    fn lacks_schemas(&self) -> bool {
+        let numbers = self.definitions.values().filter_map(|definition| definition.form.as_ref());
+        numbers.map(|(schema, _)| *schema).any(|schema| schema > 0 && !self.schemas.contains_key(&schema))
+    }
+
     /// The long way to the channels, for logs of other writers that were cut off. What stands in a sound chunk is
     /// believed before what stands outside.
     fn look_into_chunks<R: Read + Seek>(&mut self, file: &mut LogFile<R>) -> Result<(), LogError> {
         for span in &self.spans {
             let Some(place) = span.chunk(file)? else { continue };
-            let mut defined = Vec::new();
-            let unpacked = unpack(file, &place, |opcode, body| {
-                if opcode == mcap::records::op::CHANNEL {
-                    defined.extend(Definition::read(&mut Fields::new(body)));
-                }
+            let (mut defined, mut schemas) = (Vec::new(), Vec::new());
+            let unpacked = unpack(file, &place, |opcode, body| match opcode {
+                mcap::records::op::CHANNEL => defined.extend(Definition::read(&mut Fields::new(body))),
+                mcap::records::op::SCHEMA => schemas.extend(schema(&mut Fields::new(body))),
+                _ => (),
             })?;
+            if !matches!(unpacked, Unpacked::Bad(_)) {
+                self.schemas.extend(schemas);
+            }
             for definition in defined {
                 match unpacked {
                     Unpacked::Whole => drop(self.definitions.insert(definition.id, definition)),

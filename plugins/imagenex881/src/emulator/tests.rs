@@ -193,3 +193,24 @@ fn the_answer_has_the_position_that_the_head_reports() {
     });
     assert!(matches!(angles[..], [Reading::Sonar(sonar)] if counts_of_rad(sonar.angle_rad) == 100));
 }
+
+#[test]
+fn regress_what_others_measured_is_told_without_having_begun() {
+    let settings = settings("mode = \"fastest\"\nrange_m = 5").unwrap();
+    let setup = EmulatorSetup { start: MonoNs(0), head: None, site: Site::default(), polled: true };
+    let mut emulator = HeadEmulator::new(settings.clone(), DurNs(0), &setup);
+    let mut decoder = HeadDecoder::new(settings, DurNs(0));
+    let mut angles = Vec::new();
+    for angle_rad in [0.3, -2.0, 3.0] {
+        let heard = Sounding { range_m: Some(RADIUS_M), ..Sounding::due(MonoNs(5), angle_rad) };
+        emulator.tell(&heard, &mut |direction, received, bytes| {
+            if direction == Direction::Received {
+                decoder.decode(Packet { received, bytes }, &mut |decoded| match decoded.reading {
+                    Reading::Sonar(sonar) => angles.push(counts_of_rad(sonar.angle_rad)),
+                    other => panic!("{other:?}"),
+                });
+            }
+        });
+    }
+    assert_eq!(angles, [0.3, -2.0, 3.0].map(counts_of_rad));
+}

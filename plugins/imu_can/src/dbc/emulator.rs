@@ -76,10 +76,14 @@ impl DbcEmulator {
         values
     }
 
-    fn frame(&self, frame: Frame, values: &[(Place, f64)], elapsed: DurNs) -> CanFrame {
+    /// `None` where it would tell what wasn't measured: what is no number.
+    fn frame(&self, frame: Frame, values: &[(Place, f64)], elapsed: DurNs) -> Option<CanFrame> {
         let there = |place: &Place| {
             place.id == frame.id && place.switch.is_none_or(|(_, on)| Some(on) == frame.switch)
         };
+        if values.iter().any(|(place, value)| there(place) && !value.is_finite()) {
+            return None;
+        }
         let mut data = [0; DATA_BYTES];
         for (place, value) in values.iter().filter(|(place, _)| there(place)) {
             data = place.put(data, *value);
@@ -100,7 +104,7 @@ impl DbcEmulator {
             data = switch.insert(data, value);
         }
         let data = data.get(..usize::from(frame.bytes)).unwrap_or_default();
-        CanFrame::new(frame.id, Payload::default().with(data))
+        Some(CanFrame::new(frame.id, Payload::default().with(data)))
     }
 }
 
@@ -117,9 +121,8 @@ impl Emulator<Inertia> for DbcEmulator {
         let elapsed = self.elapsed(self.told);
         self.told += 1;
         let values = self.values(motion);
-        for frame in &self.frames {
-            let bytes = self.frame(*frame, &values, elapsed).encode();
-            line(Direction::Received, motion.at + self.mapping.latency, &bytes);
+        for frame in self.frames.iter().filter_map(|frame| self.frame(*frame, &values, elapsed)) {
+            line(Direction::Received, motion.at + self.mapping.latency, &frame.encode());
         }
     }
 }

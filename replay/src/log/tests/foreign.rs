@@ -191,6 +191,47 @@ fn a_message_length_that_lies_costs_that_message_and_perhaps_the_one_before() {
 }
 
 #[test]
+fn regress_what_is_missing_up_to_the_closing_bytes_is_noticed() {
+    let chunked = WriteOptions::new().chunk_size(Some(200)).compression(None);
+    for (options, opcode) in [(chunked, op::CHUNK), (WriteOptions::new().use_chunks(false), op::MESSAGE)] {
+        let whole = write(options);
+        let (_, closing) = whole.split_at(whole.len() - mcap::MAGIC.len());
+        let from = places(&whole, opcode)[3];
+        let (seen, losses) = read(&[&whole[..from], closing].concat());
+        assert!(!seen.is_empty());
+        assert!(matches!(losses[..], [Loss { kind: LossKind::Truncated, .. }]), "{losses:?}");
+    }
+}
+
+#[test]
+fn regress_a_message_that_passes_for_a_footer_is_noticed() {
+    let mut log = write(WriteOptions::new().use_chunks(false));
+    let message = places(&log, op::MESSAGE)[7];
+    log[message] = op::FOOTER;
+    let (seen, losses) = read(&log);
+    assert!(seen.len() < 400);
+    assert!(matches!(losses[..], [Loss { kind: LossKind::Framing, .. }]), "{losses:?}");
+}
+
+#[test]
+fn regress_whole_records_that_are_missing_are_noticed() {
+    let options = || WriteOptions::new().chunk_size(Some(200)).compression(None);
+    let whole = write(options());
+    let chunks = places(&whole, op::CHUNK);
+    let without = |part: core::ops::Range<usize>| [&whole[..part.start], &whole[part.end..]].concat();
+    let (seen, losses) = read(&without(chunks[3]..chunks[4]));
+    assert!(seen.len() < 400);
+    assert!(matches!(losses[..], [Loss { kind: LossKind::Displaced, .. }]), "{losses:?}");
+    let (data_end, footer) = (places(&whole, op::DATA_END)[0], places(&whole, op::FOOTER)[0]);
+    for part in [data_end..record_after(&whole, data_end), chunks[3]..footer] {
+        let (_, losses) = read(&without(part));
+        assert!(matches!(losses[..], [Loss { kind: LossKind::Truncated, .. }]), "{losses:?}");
+    }
+    // Without a summary nothing says where it would be.
+    assert_eq!(read(&write(options().emit_summary_records(false))).1, []);
+}
+
+#[test]
 fn messages_of_an_undefined_channel_are_counted() {
     let mut bytes = write(WriteOptions::new().use_chunks(false).emit_summary_records(false));
     let place = bytes.windows(9).position(|window| window == b"/raw/zeta").unwrap();

@@ -1,0 +1,136 @@
+//! A sensor of a vehicle file as its emulator, which makes the bytes that the sensor would have sent of foreign values.
+
+use headrace_core::app::device::{Device, Direction, Emulated, EmulatorSetup, Sense};
+use headrace_core::app::measurement::{GroundVelocity, Inertia, Payout, Pressure, Sounding};
+use headrace_core::app::reading::Level;
+use headrace_core::config::{ConfigError, Section, VehicleConfig};
+use headrace_core::frames::{Rot, Sensor, Vec3};
+use headrace_core::sampling::head::HeadProgram;
+use headrace_core::time::{DurNs, MonoNs};
+
+/// What an inertial sample says of its own period, which foreign values don't.
+const PERIOD: DurNs = DurNs(10_000_000);
+
+/// What a sensor is told.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Value {
+    /// A beam of a head: its angle, and its range where something was heard.
+    Beam(f64, Option<f64>),
+    /// A range of an echosounder, where something was heard.
+    Range(Option<f64>),
+    /// Absolute pressure, Pa.
+    Pressure(f64),
+    /// Attitude, turn rate, rad/s, specific force, m/s^2. NaN where they weren't measured.
+    Inertia(Rot<Level, Sensor>, [f64; 3], [f64; 3]),
+    /// Velocity over ground, m/s.
+    Velocity([f64; 3]),
+    /// Chainage that the cable reaches, m.
+    Payout(f64),
+}
+
+impl Value {
+    /// Whether there can be such a value, far beyond what there is in tunnels: wires wrap and clamp what is larger, and make
+    /// something plausible of it.
+    fn is_possible(&self) -> bool {
+        let within = |values: &[f64], most: f64| values.iter().all(|value| value.abs() <= most);
+        // What wasn't measured is no number.
+        let known =
+            |values: &[f64; 3], most: f64| values.iter().all(|value| value.is_nan() || value.abs() <= most);
+        match self {
+            Self::Beam(angle_rad, range_m) => within(&[*angle_rad, range_m.unwrap_or(0.0)], 1e5),
+            Self::Range(range_m) => within(&[range_m.unwrap_or(0.0)], 1e5),
+            Self::Pressure(pressure_pa) => (0.0..=1e9).contains(pressure_pa),
+            Self::Inertia(_, rate, force) => known(rate, 1e3) && known(force, 1e4),
+            Self::Velocity(velocity) => within(velocity, 1e3),
+            Self::Payout(chainage_m) => within(&[*chainage_m], 1e6),
+        }
+    }
+}
+
+/// A sensor of the vehicle file.
+pub(super) struct EmulatedSensor {
+    pub(super) id: String,
+    pub(super) sense: Sense,
+    /// For a head, the ranges that it can tell, metres at the site's speed of sound.
+    pub(super) reach_m: Option<[f64; 2]>,
+    emulated: Emulated,
+}
+
+impl EmulatedSensor {
+    /// By the id that a mapping's table gives under `sensor`.
+    ///
+    /// Errors: the vehicle file has no such sensor.
+    pub(super) fn named(
+        section: &Section<'_>,
+        vehicle: &VehicleConfig,
+        id: &str,
+    ) -> Result<Self, ConfigError> {
+        Self::all(vehicle).find(|(config_id, _)| *config_id == id).map_or_else(
+            || {
+                let ids: Vec<&str> = Self::all(vehicle).map(|(id, _)| id).collect();
+                let problem = format!("is no sensor of the vehicle file; there are {}", ids.join(", "));
+                Err(section.invalid("sensor", &problem))
+            },
+            |(id, device)| Ok(Self::new(id, device, vehicle)),
+        )
+    }
+
+    /// The sensors of a vehicle file, with their ids.
+    pub(super) fn all(vehicle: &VehicleConfig) -> impl Iterator<Item = (&str, &dyn Device)> {
+        let ids = vehicle.sensor_configs.iter().map(|config| config.id.as_str());
+        ids.zip(vehicle.sensors.iter().map(|device| &**device))
+    }
+
+    pub(super) fn new(id: &str, device: &dyn Device, vehicle: &VehicleConfig) -> Self {
+        let program = HeadProgram { start_rad: 0.0, growing: true, sector: None };
+        let head = device.head();
+        let setup = EmulatorSetup {
+            start: MonoNs(0),
+            head: head.as_ref().map(|_| program),
+            site: vehicle.site,
+            polled: true,
+        };
+        let reach_m = head.map(|head| head.reach_m(vehicle.site.sound_speed_mps));
+        Self { id: id.to_owned(), sense: device.sense(), reach_m, emulated: device.emulator(&setup) }
+    }
+
+    /// Gives the bytes that it would have sent, each with its receive time. `false` where it has none for such a value, or the value
+    /// can't be.
+    pub(super) fn tell(&mut self, at: MonoNs, value: &Value, sink: &mut dyn FnMut(MonoNs, &[u8])) -> bool {
+        if !value.is_possible() {
+            return false;
+        }
+        let mut told = false;
+        let mut line = |direction, at: MonoNs, bytes: &[u8]| {
+            if direction == Direction::Received && !bytes.is_empty() {
+                told = true;
+                sink(at, bytes);
+            }
+        };
+        let vector = |[x, y, z]: [f64; 3]| Vec3::new(x, y, z);
+        match (&mut self.emulated, *value) {
+            (Emulated::Head(device), Value::Beam(angle_rad, range_m)) => {
+                device.tell(&Sounding { range_m, ..Sounding::due(at, angle_rad) }, &mut line);
+            }
+            (Emulated::Echosounder(device), Value::Range(range_m)) => {
+                device.tell(&Sounding { range_m, ..Sounding::due(at, 0.0) }, &mut line);
+            }
+            (Emulated::Depth(device), Value::Pressure(pressure_pa)) => {
+                device.tell(&Pressure { at, pressure_pa }, &mut line);
+            }
+            (Emulated::Inertial(device), Value::Inertia(attitude, rate, force)) => {
+                let (rate_radps, force_mps2) = (vector(rate), vector(force));
+                let motion = Inertia { at, period: PERIOD, attitude, rate_radps, force_mps2 };
+                device.tell(&motion, &mut line);
+            }
+            (Emulated::VelocityLog(device), Value::Velocity(velocity)) => {
+                device.tell(&GroundVelocity { at, velocity_mps: vector(velocity) }, &mut line);
+            }
+            (Emulated::Tether(device), Value::Payout(chainage_m)) => {
+                device.tell(&Payout { at, chainage_m }, &mut line);
+            }
+            _ => return false,
+        }
+        told
+    }
+}

@@ -1,0 +1,190 @@
+//! The stamps in messages beside the times at which they were recorded.
+
+/// Stamps later than the record by more than this are of another clock.
+const AHEAD_NS: i64 = 5_000_000;
+/// How late messages of a computer that is set by ours may come to be recorded.
+const LATE_NS: i64 = 1_000_000_000;
+/// How much that may vary.
+const VARIES_NS: i64 = 500_000_000;
+/// From here on it isn't a clock that is wrong, but one that counts from somewhere else.
+const OTHER_BASE_NS: i64 = 3_600_000_000_000;
+/// A stamp that is off by more, where stamps are followed, makes a new beginning.
+const ASTRAY_NS: i64 = 10_000_000_000;
+
+/// Which time a message's values are given.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) enum Base {
+    /// When it was recorded.
+    #[default]
+    Record,
+    /// The stamp in its header.
+    Header,
+}
+
+/// The stamps of one topic.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Clocks {
+    base: Base,
+    messages: u64,
+    /// Messages whose stamp is zero.
+    unstamped: u64,
+    /// Least and largest record time less the stamp.
+    lag_ns: Option<(i64, i64)>,
+    before_ns: u64,
+    backwards: u64,
+    /// What is added to stamps that are followed, since they are of another base.
+    moved_ns: Option<i64>,
+    anew: u64,
+}
+
+impl Clocks {
+    pub(super) fn new(base: Base) -> Self {
+        Self { base, ..Self::default() }
+    }
+
+    /// The time of a message's values, and whether the stamp gave it.
+    pub(super) fn time(&mut self, record_ns: u64, stamp_ns: Option<u64>) -> (u64, bool) {
+        self.messages += 1;
+        let Some(stamp_ns) = stamp_ns.filter(|stamp_ns| *stamp_ns > 0) else {
+            self.unstamped += 1;
+            return (record_ns, false);
+        };
+        let lag_ns = difference(record_ns, stamp_ns);
+        let (least, most) = self.lag_ns.unwrap_or((lag_ns, lag_ns));
+        self.lag_ns = Some((least.min(lag_ns), most.max(lag_ns)));
+        self.backwards += u64::from(stamp_ns < self.before_ns);
+        self.before_ns = stamp_ns;
+        if self.base == Base::Record {
+            return (record_ns, false);
+        }
+        let near = if lag_ns.abs() > LATE_NS { lag_ns } else { 0 };
+        let moved_ns = *self.moved_ns.get_or_insert(near);
+        if lag_ns.abs_diff(moved_ns) <= ASTRAY_NS.unsigned_abs() {
+            return (stamp_ns.saturating_add_signed(moved_ns), true);
+        }
+        self.anew += 1;
+        self.moved_ns = Some(near);
+        (stamp_ns.saturating_add_signed(near), true)
+    }
+
+    /// What people should know of it.
+    pub(super) fn words(&self) -> Vec<String> {
+        let mut all = Vec::new();
+        if self.messages == 0 {
+            return all;
+        }
+        let followed = self.base == Base::Header;
+        if self.unstamped > 0 && (followed || self.unstamped < self.messages) {
+            let (unstamped, messages) = (self.unstamped, self.messages);
+            all.push(format!(
+                "{unstamped} of {messages} messages have no header stamp; theirs is the time of the record"
+            ));
+        }
+        let Some((least, most)) = self.lag_ns else { return all };
+        let done = match self.moved_ns {
+            Some(0) => "they are followed as they are".to_owned(),
+            Some(moved) => format!("they are followed, moved by {} s", seconds(moved)),
+            None => "the times of the record are taken".to_owned(),
+        };
+        let problem = if least.abs() > OTHER_BASE_NS || most.abs() > OTHER_BASE_NS {
+            Some(format!(
+                "header stamps are on another time base, {} s before the record",
+                range(least, most)
+            ))
+        } else if least < -AHEAD_NS {
+            Some(format!(
+                "header stamps are up to {} s later than the record: another clock, not set by it",
+                seconds(-least)
+            ))
+        } else if most - least > VARIES_NS {
+            Some(format!(
+                "header stamps are {} s before the record: messages came late, or the clock isn't set by it",
+                range(least, most)
+            ))
+        } else if most > LATE_NS {
+            Some(format!(
+                "header stamps are {} s before the record: another clock, not set by it",
+                range(least, most)
+            ))
+        } else {
+            None
+        };
+        all.extend(problem.map(|problem| format!("{problem}; {done}")));
+        if self.backwards > 0 {
+            all.push(format!("header stamps go back {} times", self.backwards));
+        }
+        if self.anew > 0 {
+            all.push(format!(
+                "header stamps jump by over 10 s against the record {} times, and are moved anew",
+                self.anew
+            ));
+        }
+        all
+    }
+}
+
+fn difference(one_ns: u64, other_ns: u64) -> i64 {
+    let difference = i128::from(one_ns) - i128::from(other_ns);
+    // Half of what there is, so that two can be subtracted.
+    let most = i128::from(i64::MAX / 2);
+    i64::try_from(difference.clamp(-most, most)).unwrap_or_default()
+}
+
+fn seconds(ns: i64) -> String {
+    format!("{:.3}", ns as f64 / 1e9)
+}
+
+fn range(least: i64, most: i64) -> String {
+    let (least, most) = (seconds(least), seconds(most));
+    if least == most { least } else { format!("{least} to {most}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const S: u64 = 1_000_000_000;
+
+    fn words(base: Base, pairs: &[(u64, u64)]) -> (Vec<u64>, String) {
+        let mut clocks = Clocks::new(base);
+        let times = pairs.iter().map(|(record, stamp)| clocks.time(*record, Some(*stamp)).0).collect();
+        (times, clocks.words().join("; "))
+    }
+
+    #[test]
+    fn stamps_that_agree_need_no_words() {
+        let (times, said) = words(Base::Record, &[(1000 * S, 1000 * S - 3), (1001 * S, 1001 * S - 900)]);
+        assert_eq!((times, said.as_str()), (vec![1000 * S, 1001 * S], ""));
+        assert_eq!(words(Base::Header, &[(1000 * S, 1000 * S - 3)]).0, [1000 * S - 3]);
+    }
+
+    #[test]
+    fn another_time_base_is_named_and_moved() {
+        let pairs = [(50_000 * S, 10 * S), (50_001 * S, 10 * S + 900_000_000)];
+        let (times, said) = words(Base::Record, &pairs);
+        assert_eq!(times, [50_000 * S, 50_001 * S]);
+        assert!(said.contains("another time base, 49990.000 to 49990.100 s before"), "{said}");
+        assert!(said.contains("the times of the record are taken"), "{said}");
+        let (times, said) = words(Base::Header, &pairs);
+        assert_eq!(times, [50_000 * S, 50_000 * S + 900_000_000]);
+        assert!(said.contains("moved by 49990.000 s"), "{said}");
+    }
+
+    #[test]
+    fn clocks_that_are_off_are_named() {
+        assert!(words(Base::Record, &[(10 * S, 11 * S)]).1.contains("up to 1.000 s later"));
+        assert!(
+            words(Base::Record, &[(10 * S, 8 * S)]).1.contains("2.000 s before the record: another clock")
+        );
+        assert!(words(Base::Record, &[(10 * S, 10 * S), (20 * S, 19 * S)]).1.contains("came late"));
+        assert!(words(Base::Record, &[(10 * S, 9 * S), (11 * S, 8 * S)]).1.contains("go back 1 times"));
+        let (times, said) =
+            words(Base::Header, &[(100 * S, 100 * S), (101 * S, 501 * S), (102 * S, 502 * S)]);
+        assert_eq!(times, [100 * S, 101 * S, 102 * S]);
+        assert!(said.contains("jump by over 10 s against the record 1 times"), "{said}");
+        let mut clocks = Clocks::new(Base::Header);
+        assert_eq!(clocks.time(5, Some(0)), (5, false));
+        assert!(clocks.words()[0].contains("no header stamp"));
+        assert_eq!(difference(0, u64::MAX), -(i64::MAX / 2));
+    }
+}

@@ -1,0 +1,67 @@
+//! Chunks of bags, unpacked within bounds.
+
+use std::io::Read;
+
+/// What a chunk may hold when unpacked; a recorder makes one of less than a megabyte and one message.
+pub(super) const MOST_UNPACKED: usize = 64 << 20;
+
+/// An unpacked chunk.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) enum Unpacked {
+    /// All of it.
+    Whole(Vec<u8>),
+    /// What there is of one that the file's end cuts.
+    Cut(Vec<u8>),
+    /// Nothing, and why.
+    Bad(&'static str),
+}
+
+/// Unpacks a chunk that says how it is packed and how long it is. `cut` says that the file ends within it.
+///
+/// Source: ROS wiki, "Bags/Format/2.0": none, bz2, and lz4 as roslz4 writes it, in frames of LZ4.
+pub(super) fn unpack(packing: &[u8], packed: &[u8], size: u32, cut: bool) -> Unpacked {
+    let Some(size) = usize::try_from(size).ok().filter(|size| *size <= MOST_UNPACKED) else {
+        return Unpacked::Bad("chunks that would take more than 64 MiB");
+    };
+    match packing {
+        b"none" => judged(Ok(packed.to_vec()), size, cut),
+        b"bz2" => read(bzip2::read::BzDecoder::new(packed), size, cut),
+        b"lz4" => match lz4::Decoder::new(packed) {
+            Ok(decoder) => read(decoder, size, cut),
+            Err(_) => Unpacked::Bad("chunks that don't unpack"),
+        },
+        _ => Unpacked::Bad("chunks packed in a way that isn't known; none, bz2 and lz4 are"),
+    }
+}
+
+fn read(reader: impl Read, size: usize, cut: bool) -> Unpacked {
+    let mut unpacked = Vec::new();
+    // One byte more shows that it is longer.
+    let result = reader.take(size as u64 + 1).read_to_end(&mut unpacked);
+    judged(if result.is_ok() { Ok(unpacked) } else { Err(unpacked) }, size, cut)
+}
+
+fn judged(unpacked: Result<Vec<u8>, Vec<u8>>, size: usize, cut: bool) -> Unpacked {
+    match unpacked {
+        Ok(bytes) | Err(bytes) if cut && bytes.len() <= size => Unpacked::Cut(bytes),
+        Ok(bytes) if bytes.len() == size => Unpacked::Whole(bytes),
+        Ok(_) => Unpacked::Bad("chunks of another length than they say"),
+        Err(_) => Unpacked::Bad("chunks that don't unpack"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lengths_are_held_to() {
+        assert_eq!(unpack(b"none", b"abc", 3, false), Unpacked::Whole(b"abc".to_vec()));
+        assert!(matches!(unpack(b"none", b"abc", 4, false), Unpacked::Bad(_)));
+        assert_eq!(unpack(b"none", b"abc", 4, true), Unpacked::Cut(b"abc".to_vec()));
+        assert!(matches!(unpack(b"none", b"abc", u32::MAX, true), Unpacked::Bad(_)));
+        for packing in [b"bz2", b"lz4", b"zst"] {
+            assert!(matches!(unpack(packing, b"nothing of the kind", 3, false), Unpacked::Bad(_)));
+        }
+    }
+}

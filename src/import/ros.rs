@@ -1,0 +1,38 @@
+//! Recordings of ROS: whose topics are which sensor's.
+
+use headrace_core::config::{Document, VehicleConfig};
+use headrace_replay::import::ros::{Feeds, MatchError, Topic};
+
+use crate::cli;
+use crate::failure::Failure;
+use crate::files;
+
+/// By the mapping file, or else where there is no choice, which is said.
+pub(super) fn feeds(
+    args: &cli::Import,
+    vehicle: Option<&VehicleConfig>,
+    topics: &[Topic],
+) -> Result<Feeds, Failure> {
+    let Some(vehicle) = vehicle else {
+        let what =
+            "import: recordings of ROS want --vehicle VEHICLE.toml, whose sensors' bytes their values become";
+        return Err(Failure::Usage(what.to_owned()));
+    };
+    let Some(map) = &args.map else {
+        let feeds = Feeds::matching(vehicle, topics).map_err(|error| unmatched(args, error))?;
+        for matched in feeds.matched() {
+            eprintln!("headrace: {matched}");
+        }
+        return Ok(feeds);
+    };
+    let (text, name) = (files::read(map)?, map.display().to_string());
+    let mapping = Document::new(&name, &text).root()?;
+    Feeds::mapped(mapping, vehicle, topics).map_err(|error| unmatched(args, error))
+}
+
+fn unmatched(args: &cli::Import, error: MatchError) -> Failure {
+    match error {
+        MatchError::Mapping(error) => error.into(),
+        error => Failure::Usage(format!("importing {}: {error}", args.file.display())),
+    }
+}
