@@ -15,6 +15,7 @@ use headrace_replay::drive::{Feed, Pace, drive};
 use headrace_replay::log::{LeftOut, LogHeader, Recorder, RecorderHandle, SentPort, SourceInfo, file_digest};
 use headrace_replay::player::seconds;
 use headrace_replay::record::{QUEUE_BYTES, RecorderOutlet, result_channels};
+use headrace_replay::view::{Site, View};
 
 use crate::failure::{self, Failure};
 use crate::progress::Progress;
@@ -87,7 +88,8 @@ pub(crate) fn assemble_with(
             if clock == Clock::Ours {
                 anchor(&mut header);
             }
-            let (port, handle) = Recorder::create(path, &header, QUEUE_BYTES)?;
+            let view = Box::new(View::new(view_site(vehicle)));
+            let (port, handle) = Recorder::create_with(path, &header, QUEUE_BYTES, view)?;
             app.add_plugin(&RecorderOutlet::new(port))?;
             Some((path.to_owned(), handle))
         }
@@ -105,6 +107,18 @@ fn app(vehicle: &VehicleConfig) -> Result<(App, NoticeReceiver), Failure> {
     let (outlet, notices) = NoticeOutlet::new(NOTICES);
     app.add_plugin(&outlet)?;
     Ok((app, notices))
+}
+
+/// What people's viewers are shown the dive against.
+fn view_site(vehicle: &VehicleConfig) -> Site {
+    let heads = (0..).zip(&vehicle.sensors).filter(|(_, sensor)| sensor.head().is_some());
+    Site {
+        profile: vehicle.tunnel.profile.clone(),
+        target_m: vehicle.target_m,
+        section_m: vehicle.section_m,
+        length_m: vehicle.tunnel.length_m,
+        heads: heads.map(|(source, _)| source).collect(),
+    }
 }
 
 /// Notes what time of day it is on the clock of the stamps.

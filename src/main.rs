@@ -20,7 +20,6 @@ mod progress;
 mod recover;
 mod simulate;
 mod smooth;
-mod station;
 mod summary;
 mod verify;
 mod watch;

@@ -10,3 +10,4 @@ pub mod record;
 pub mod simulate;
 pub mod smooth;
 pub mod verify;
+pub mod view;

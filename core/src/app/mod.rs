@@ -20,6 +20,7 @@ pub mod stage;
 mod stages;
 pub mod trail;
 pub mod what_if;
+pub mod words;
 
 use bevy_ecs::prelude::{Component, Resource};
 use bevy_ecs::schedule::{IntoScheduleConfigs, Schedule};

@@ -22,6 +22,7 @@
 
 mod channels;
 mod chunk;
+mod companion;
 mod error;
 mod fields;
 pub mod format;
@@ -36,6 +37,7 @@ mod search;
 mod space;
 mod writer;
 
+pub use companion::{Companion, Made};
 pub use error::LogError;
 pub use loss::{Loss, LossKind};
 pub use reader::{LogInfo, LogMessage, LogReader, MessageKind, file_digest};

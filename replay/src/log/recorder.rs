@@ -18,6 +18,7 @@ use ringbuf::traits::{Consumer as _, Observer as _, Producer as _};
 use ringbuf::wrap::{Cons, Prod};
 
 use super::LogError;
+use super::companion::{Companion, Made};
 use super::fields::Fields;
 use super::format::{TICK_HEAD_BYTES, order_bytes, tick_head};
 use super::space::{LONGEST_KEPT_BYTES, Space};
@@ -111,7 +112,19 @@ impl Recorder {
         header: &LogHeader,
         queue_bytes: usize,
     ) -> Result<(RecorderPort, RecorderHandle), LogError> {
-        Self::start_within(Space::endless(), writer, header, queue_bytes)
+        Self::start_within(Space::endless(), writer, header, queue_bytes, None)
+    }
+
+    /// The same with a companion, which makes more messages of the results that are written.
+    ///
+    /// Errors: as for [`Recorder::start`].
+    pub fn start_with<W: Write + Send + 'static>(
+        writer: W,
+        header: &LogHeader,
+        queue_bytes: usize,
+        companion: Box<dyn Companion>,
+    ) -> Result<(RecorderPort, RecorderHandle), LogError> {
+        Self::start_within(Space::endless(), writer, header, queue_bytes, Some(companion))
     }
 
     /// The same where room may end.
@@ -120,6 +133,7 @@ impl Recorder {
         writer: W,
         header: &LogHeader,
         queue_bytes: usize,
+        companion: Option<Box<dyn Companion>>,
     ) -> Result<(RecorderPort, RecorderHandle), LogError> {
         let mut log = LogWriter::new(writer, header)?;
         log.flush()?;
@@ -134,7 +148,8 @@ impl Recorder {
         let thread_state = Arc::clone(&state);
         let thread = thread::Builder::new().name("recorder".to_owned());
         let echoes = header.results.iter().map(|result| result.follows_echoes).collect();
-        let thread = thread.spawn(move || Worker::new(log, space, echoes, &thread_state).run(queue));
+        let beside = Beside { companion, made: Vec::new() };
+        let thread = thread.spawn(move || Worker::new(log, space, echoes, beside, &thread_state).run(queue));
         let thread = Some(thread.map_err(|source| LogError::Thread { source })?);
         let port = RecorderPort {
             ring: Prod::new(ring),
@@ -153,12 +168,30 @@ impl Recorder {
         header: &LogHeader,
         queue_bytes: usize,
     ) -> Result<(RecorderPort, RecorderHandle), LogError> {
-        let failed = |source| LogError::Create { path: path.to_owned(), source };
-        let file = OpenOptions::new().write(true).create_new(true).open(path).map_err(failed)?;
-        sync_folder_of(path).map_err(failed)?;
-        let space = file.try_clone().map_or_else(|_| Space::endless(), Space::of);
-        Self::start_within(space, SyncedFile(BufWriter::new(file)), header, queue_bytes)
+        let (space, file) = new_file(path)?;
+        Self::start_within(space, file, header, queue_bytes, None)
     }
+
+    /// The same with a companion.
+    ///
+    /// Errors: as for [`Recorder::create`].
+    pub fn create_with(
+        path: &Path,
+        header: &LogHeader,
+        queue_bytes: usize,
+        companion: Box<dyn Companion>,
+    ) -> Result<(RecorderPort, RecorderHandle), LogError> {
+        let (space, file) = new_file(path)?;
+        Self::start_within(space, file, header, queue_bytes, Some(companion))
+    }
+}
+
+fn new_file(path: &Path) -> Result<(Space, SyncedFile), LogError> {
+    let failed = |source| LogError::Create { path: path.to_owned(), source };
+    let file = OpenOptions::new().write(true).create_new(true).open(path).map_err(failed)?;
+    sync_folder_of(path).map_err(failed)?;
+    let space = file.try_clone().map_or_else(|_| Space::endless(), Space::of);
+    Ok((space, SyncedFile(BufWriter::new(file))))
 }
 
 /// Makes the entry of a new file in its folder survive a power cut. Other systems than Unix don't open folders.
@@ -354,7 +387,14 @@ struct Worker<'a, W: Write> {
     space: Space,
     /// Which results follow echo by echo.
     echoes: Vec<bool>,
+    beside: Beside,
     state: &'a State,
+}
+
+/// A companion, and room for what it makes.
+struct Beside {
+    companion: Option<Box<dyn Companion>>,
+    made: Vec<Made>,
 }
 
 #[expect(
@@ -366,9 +406,9 @@ fn wall_clock() -> Instant {
 }
 
 impl<'a, W: Write> Worker<'a, W> {
-    fn new(log: LogWriter<W>, space: Space, echoes: Vec<bool>, state: &'a State) -> Self {
+    fn new(log: LogWriter<W>, space: Space, echoes: Vec<bool>, beside: Beside, state: &'a State) -> Self {
         let flushed = wall_clock();
-        Self { log: Some(log), error: None, discarded: 0, flushed, open: false, space, echoes, state }
+        Self { log: Some(log), error: None, discarded: 0, flushed, open: false, space, echoes, beside, state }
     }
 
     fn run(mut self, mut queue: Queue) -> Result<Summary, LogError> {
@@ -377,7 +417,7 @@ impl<'a, W: Write> Worker<'a, W> {
             // Read before the queue is looked at: what was pushed before the flag was set is then taken.
             let stopping = self.state.stopping.load(Ordering::Acquire);
             let taken =
-                (0..BATCH).map_while(|_| queue.take().map(|entry| self.write(&entry, &queue.message)));
+                (0..BATCH).map_while(|_| queue.take().map(|entry| self.write_all(&entry, &queue.message)));
             let taken = taken.count() + self.write_sent();
             self.flush_in_time();
             if taken == 0 && stopping {
@@ -387,6 +427,27 @@ impl<'a, W: Write> Worker<'a, W> {
                 thread::park_timeout(NAP);
             }
         }
+    }
+
+    /// Writes an entry and what the companion makes of it.
+    fn write_all(&mut self, entry: &Entry, message: &[u8]) {
+        self.write(entry, message);
+        if let Lane::Result(number) = entry.lane {
+            self.write_made(|companion, made| companion.take(number, entry.log_time, message, made));
+        }
+    }
+
+    fn write_made(&mut self, make: impl FnOnce(&mut dyn Companion, &mut Vec<Made>)) {
+        // Of a dive that goes on unrecorded nothing is to be made.
+        let Some(companion) = self.beside.companion.as_mut().filter(|_| self.log.is_some()) else { return };
+        let mut made = core::mem::take(&mut self.beside.made);
+        make(companion.as_mut(), &mut made);
+        for Made { channel, at, bytes } in made.drain(..) {
+            if usize::from(channel) < self.echoes.len() {
+                self.write(&Entry { lane: Lane::Result(channel), log_time: at, publish_time: at }, &bytes);
+            }
+        }
+        self.beside.made = made;
     }
 
     fn write(&mut self, entry: &Entry, message: &[u8]) {
@@ -438,6 +499,7 @@ impl<'a, W: Write> Worker<'a, W> {
     }
 
     fn finish(mut self) -> Result<Summary, LogError> {
+        self.write_made(|companion, made| companion.end(made));
         let left_out = self.space.left_out();
         if let Some((from, to)) = left_out.span {
             self.attempt(|log, _| log.lost(Some(from), Some(to), &left_out.words()));

@@ -182,7 +182,7 @@ fn a_disk_that_fills_keeps_what_is_small_and_says_what_it_left_out() {
         ..ResultChannel::default()
     });
     let space = Space::new(|| Some(5_000_000));
-    let (mut port, handle) = Recorder::start_within(space, medium, &header, 0).unwrap();
+    let (mut port, handle) = Recorder::start_within(space, medium, &header, 0, None).unwrap();
     for tick in 1..=100_u64 {
         let at = MonoNs(tick * 1_000_000_000);
         // The queue holds all of this.
