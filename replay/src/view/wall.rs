@@ -25,8 +25,8 @@ const FIELDS: [Field; 6] = [
     Field::byte("samples", 4),
     Field::byte("verdict", 5),
 ];
-/// More samples of a cell than this are shown as this.
-const MOST_SAMPLES: u8 = 9;
+/// More samples of a cell than this are shown as this: a picture of the counts would take most of the room.
+const MOST_SAMPLES: u8 = 3;
 
 /// Samples and verdicts by place; as long as the tunnel, and no longer than it was passed.
 #[derive(Debug)]
