@@ -47,14 +47,14 @@ fn main() {
     let share = |took: Duration| took.as_secs_f64() / dive_s * 100.0;
     println!("| what | figure | yardstick in the same run | ratio |\n|---|---|---|---|");
     println!(
-        "| making {messages} messages for viewers of a dive of {dive_s:.0} s | {:.2} % of a core at real speed | writing \
-         and compressing that dive without them: {:.2} % | {:.2} |",
+        "| making {messages} messages for viewers of a dive of {dive_s:.0} s | {:.3} % of a core at real speed | writing \
+         and compressing that dive without them: {:.3} % | {:.2} |",
         share(made),
         share(plain),
         made.as_secs_f64() / plain.as_secs_f64()
     );
     println!(
-        "| the recorder's thread with them | {:.2} % of a core | the same | {:.2} |",
+        "| the recorder's thread with them | {:.3} % of a core | the same | {:.2} |",
         share(whole),
         whole.as_secs_f64() / plain.as_secs_f64()
     );
