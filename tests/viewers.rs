@@ -144,6 +144,30 @@ fn every_message_is_as_its_schema_says_and_tells_the_dive() {
     assert!(said.iter().any(|line| line.starts_with("TOO FAST: at most")), "{said:#?}");
 }
 
+#[test]
+fn a_message_that_is_not_as_its_schema_says_is_found_out() {
+    let (folder, _) = recorded();
+    let log = folder.read("live.mcap");
+    let mut channels = MessageStream::new(&log).unwrap().map(Result::unwrap);
+    let cloud = channels.find(|message| message.channel.topic == "/result/view/points").unwrap();
+    let schema: Value = serde_json::from_slice(&cloud.channel.schema.as_ref().unwrap().data).unwrap();
+    let cloud: Value = serde_json::from_slice(&cloud.data).unwrap();
+    let wrong = |place: &str, value: Value| {
+        let mut cloud = cloud.clone();
+        *cloud.pointer_mut(place).unwrap() = value;
+        faults(&schema, &cloud).len()
+    };
+    assert_eq!(wrong("/point_stride", 16.into()), 0);
+    assert_eq!(wrong("/point_stride", "16".into()), 1);
+    assert_eq!(wrong("/point_stride", (-1).into()), 1);
+    assert_eq!(wrong("/fields/0/type", 9.into()), 1);
+    assert_eq!(wrong("/timestamp/nsec", 1_000_000_000.into()), 1);
+    assert_eq!(wrong("/data", "!".into()), 1);
+    let mut less = cloud.clone();
+    less.as_object_mut().unwrap().remove("frame_id");
+    assert_eq!(faults(&schema, &less).len(), 1);
+}
+
 /// Head and place of each point of a cloud.
 fn points_of(cloud: &Value) -> Vec<(u8, [f64; 3])> {
     let origin = numbers(&cloud["pose"]["position"], ["x", "y", "z"]);
