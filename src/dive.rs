@@ -14,11 +14,12 @@ use headrace_core::fusion::Navigation;
 use headrace_ports::Crew;
 use headrace_replay::drive::{Feed, Pace, drive};
 use headrace_replay::log::{
-    Every, LeftOut, LogHeader, Recorder, RecorderHandle, Rotation, SentPort, SourceInfo, Summary, dive_name,
-    files_digest, files_of,
+    Companion, Every, LeftOut, LogHeader, Recorder, RecorderHandle, Rotation, SentPort, SourceInfo, Summary,
+    dive_name, files_digest, files_of,
 };
 use headrace_replay::player::seconds;
 use headrace_replay::record::{QUEUE_BYTES, RecorderOutlet, result_channels};
+use headrace_replay::view::{Site, View};
 
 use crate::commands::parts;
 use crate::failure::{self, Failure};
@@ -101,11 +102,12 @@ pub(crate) fn assemble_with(
             if clock == Clock::Ours {
                 anchor(&mut header);
             }
+            let view: Option<Box<dyn Companion>> = Some(Box::new(View::new(view_site(vehicle))));
             let (port, handle) = match rotate {
-                None => Recorder::create(path, &header, QUEUE_BYTES),
+                None => Recorder::create(path, &header, QUEUE_BYTES, view),
                 Some(every) => {
                     let rotation = Rotation { every, dive: new_dive() };
-                    Recorder::create_in_parts(path, &header, &rotation, QUEUE_BYTES)
+                    Recorder::create_in_parts(path, &header, &rotation, QUEUE_BYTES, view)
                 }
             }?;
             app.add_plugin(&RecorderOutlet::new(port))?;
@@ -125,6 +127,18 @@ fn app(vehicle: &VehicleConfig) -> Result<(App, NoticeReceiver), Failure> {
     let (outlet, notices) = NoticeOutlet::new(NOTICES);
     app.add_plugin(&outlet)?;
     Ok((app, notices))
+}
+
+/// What people's viewers are shown the dive against.
+fn view_site(vehicle: &VehicleConfig) -> Site {
+    let heads = (0..).zip(&vehicle.sensors).filter(|(_, sensor)| sensor.head().is_some());
+    Site {
+        profile: vehicle.tunnel.profile.clone(),
+        target_m: vehicle.target_m,
+        section_m: vehicle.section_m,
+        length_m: vehicle.tunnel.length_m,
+        heads: heads.map(|(source, _)| source).collect(),
+    }
 }
 
 /// Notes what time of day it is on the clock of the stamps.

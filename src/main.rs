@@ -21,7 +21,6 @@ mod progress;
 mod recover;
 mod simulate;
 mod smooth;
-mod station;
 mod summary;
 mod trim;
 mod verify;

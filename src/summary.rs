@@ -3,7 +3,7 @@
 use headrace_core::app::report::{Report, ReturnReport, RunReport};
 use headrace_core::app::smoothing::{ChangeReport, JudgedReport, SmoothingReport};
 
-use crate::station::station;
+use headrace_core::app::words::station;
 
 /// The report in a few lines.
 pub(crate) fn summary(report: &Report) -> String {

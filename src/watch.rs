@@ -4,17 +4,15 @@
 use std::io::IsTerminal;
 
 use headrace_core::app::Mission;
-use headrace_core::app::alerts::{Alert, AlertKind, Alerts};
+use headrace_core::app::alerts::Alerts;
 use headrace_core::app::flow::{AdviceEntry, Coverage, Notice, Tally};
 use headrace_core::app::run::Loop;
-use headrace_core::coverage::{Action, Cause, Evidence, Run, RunChange, RunId, Section, Sections, Verdict};
-use headrace_core::sampling::advice::{Reason, Remedy};
+use headrace_core::app::words::{Missed, advice_words, alert_words, cleared_words, flag_words, station};
+use headrace_core::coverage::{Run, RunChange, RunId, Section, Sections, Verdict};
 use headrace_core::time::{DurNs, MonoNs};
-use headrace_core::tunnel::Profile;
 use headrace_ports::{Phase, Status};
 
 use crate::output::{put, say};
-use crate::station::station;
 
 /// How often the state is shown where lines can't be overwritten, in the dive's own time.
 const LINE_EVERY: DurNs = DurNs(10_000_000_000);
@@ -67,7 +65,7 @@ impl Watch {
             Notice::Run { id, change, .. } => self.run(*id, *change, dive),
             Notice::Alert(kind) => {
                 if let Some(alert) = dive.world().resource::<Alerts>().get(*kind) {
-                    self.line(&alert_words(alert));
+                    self.line(&format!("ALERT    {}", alert_words(alert.kind, alert.x_m, alert.worst_m)));
                 }
             }
         }
@@ -115,8 +113,11 @@ impl Watch {
         self.shown = Some(entry.at);
         let place =
             entry.chainage_m.map_or_else(|| "no position".to_owned(), |x| format!("ch {}", station(x)));
-        let line =
-            format!("{place:<14} {:5.2} m/s   {}", entry.speed_mps, advice_words(entry, &mission.profile));
+        let line = format!(
+            "{place:<14} {:5.2} m/s   {}",
+            entry.speed_mps,
+            advice_words(&entry.into(), &mission.profile)
+        );
         if self.terminal {
             let advice = &entry.advice;
             let wrong = advice.will_exceed || advice.predicted_t_m.is_none();
@@ -152,7 +153,7 @@ impl Watch {
                 // What has only turned out to have another cause is told as that.
                 if !(run.from..run.to).filter_map(|index| sections.get(index)).any(Section::is_flagged) {
                     let (from_m, to_m) = (sections.bounds_m(run.from).0, sections.bounds_m(run.to - 1).1);
-                    self.line(&format!("cleared  ch {} to {}", station(from_m), station(to_m)));
+                    self.line(&cleared_words(from_m, to_m));
                 }
             }
             RunChange::Changed | RunChange::Merged => {}
@@ -162,30 +163,14 @@ impl Watch {
     fn flag(&mut self, run: &Run, dive: &Loop) {
         let sections = sections(dive);
         let Some(evidence) = sections.get(run.worst.0).and_then(|section| section.evidence) else { return };
-        let start_m = sections.bounds_m(run.from).0;
-        self.line(&format!(
-            "FLAG     ch {}  {}: holes over {} m at {} o'clock; {}",
-            station(start_m),
-            cause_words(&evidence),
-            sections.target_m(),
-            dive.mission().profile.clock(run.worst.1.sigma_m),
-            self.what_to_do(&evidence, start_m),
-        ));
-    }
-
-    /// What a pilot does about a missed stretch, with the speed that is advised now.
-    fn what_to_do(&self, evidence: &Evidence, start_m: f64) -> String {
-        match Action::of(evidence.cause) {
-            Action::FinerMode => "slower won't help, a finer mode will".to_owned(),
-            Action::LongerRange => "set a longer range".to_owned(),
-            Action::Again if evidence.cause == Cause::NotPassed => "pass it again from end to end".to_owned(),
-            Action::OtherSide => format!("pass {} again turned or rolled", station(start_m)),
-            Action::Position => format!("pass {} again once the position is back", station(start_m)),
-            _ if self.v_max_mps > 0.0 => {
-                format!("go back to {}, then at most {:.2} m/s", station(start_m), self.v_max_mps)
-            }
-            _ => format!("go back to {}", station(start_m)),
-        }
+        let missed = Missed {
+            start_m: sections.bounds_m(run.from).0,
+            figures: (&evidence).into(),
+            hole_arc_m: run.worst.1.sigma_m,
+            target_m: sections.target_m(),
+            v_max_mps: self.v_max_mps,
+        };
+        self.line(&format!("FLAG     {}", flag_words(&missed, &dive.mission().profile)));
     }
 
     /// Says how far the run went, once that is known.
@@ -218,68 +203,4 @@ impl Watch {
 
 fn sections(dive: &Loop) -> &Sections {
     &dive.world().resource::<Coverage>().sections
-}
-
-fn alert_words(alert: &Alert) -> String {
-    let (x, off_m) = (station(alert.x_m), alert.worst_m);
-    match alert.kind {
-        AlertKind::OutsideTunnel => {
-            format!("ALERT    ch {x}  samples {off_m:.2} m outside the tunnel: is the tether's zero right?")
-        }
-        AlertKind::ProfileContradicted => format!(
-            "ALERT    ch {x}  the wall is {off_m:+.2} m off the design profile: wrong profile or position; nothing passes"
-        ),
-    }
-}
-
-fn advice_words(entry: &AdviceEntry, profile: &Profile) -> String {
-    let advice = &entry.advice;
-    match advice.reason {
-        Reason::HelixPitch if advice.will_exceed && entry.speed_mps.abs() > advice.v_max_mps => {
-            format!("TOO FAST: at most {:.2} m/s", advice.v_max_mps)
-        }
-        Reason::HelixPitch if advice.will_exceed => {
-            let error_deg = advice.phase_error_rad.map_or(0.0, f64::to_degrees).abs();
-            format!("OUT OF PHASE by {error_deg:.0} degrees: go {:.2} m/s", advice.v_max_mps)
-        }
-        Reason::HelixPitch => format!("may go {:.2} m/s (distance between turns)", advice.v_max_mps),
-        Reason::AngularStep => {
-            let remedy = match advice.remedy {
-                Some(Remedy::Steady) => {
-                    return "slower won't help: hold the heading, the beams swing".to_owned();
-                }
-                Some(Remedy::Centre) => "go to the middle of the tunnel".to_owned(),
-                Some(Remedy::Mode(mode)) => format!("set the heads to {}", mode.as_str().to_uppercase()),
-                None => "no mode meets the target here".to_owned(),
-            };
-            match advice.unseen_m {
-                Some([width_m, sigma_m]) => {
-                    let clock = profile.clock(sigma_m);
-                    format!("slower won't help: no head sees {width_m:.2} m of the wall at {clock}; {remedy}")
-                }
-                None => format!("slower won't help: steps of {:.2} m along the wall; {remedy}", advice.t_y_m),
-            }
-        }
-        Reason::NoHeadingOrFix => "no speed can be given: no position or heading".to_owned(),
-        Reason::NoReturns => "no speed can be given: no sonar returns".to_owned(),
-    }
-}
-
-/// A cause in a pilot's words.
-pub(crate) fn cause_words(evidence: &Evidence) -> String {
-    match evidence.cause {
-        Cause::TooFast => format!("too fast ({:.2} m/s)", evidence.speed_mps),
-        Cause::AngularStep => format!("steps of {:.2} m along the wall", evidence.t_y_m),
-        Cause::MissingReturns => format!("{:.0} % of returns missing", evidence.missing_share * 100.0),
-        Cause::OutOfRange => "wall out of range".to_owned(),
-        Cause::Occluded => "the vehicle in the beams' way".to_owned(),
-        Cause::OffAxis if evidence.swing_m > evidence.t_y_m - evidence.middle_t_y_m => {
-            format!("beams swung {:.1} m between turns (yaw or pitch)", evidence.swing_m)
-        }
-        Cause::OffAxis => format!("off the middle (steps of {:.2} m along the wall)", evidence.t_y_m),
-        Cause::HeadStalled => "a head stood still".to_owned(),
-        Cause::Phase => format!("heads out of phase ({:.2} m/s)", evidence.speed_mps),
-        Cause::PositionLost => "position lost".to_owned(),
-        Cause::NotPassed => "not passed on both sides".to_owned(),
-    }
 }

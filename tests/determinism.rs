@@ -97,6 +97,50 @@ fn a_report_expected_is_met_or_each_difference_named() {
     assert_eq!(places, ["/digest:", &section]);
 }
 
+/// Only where the golden report says so may anything differ, and only by so much.
+#[test]
+fn a_golden_report_may_state_tolerances() {
+    let folder = Folder::with_dive();
+    let (_, report) = folder.replay("dive.mcap", &[]);
+    let meets = |tolerances: serde_json::Value, change: &dyn Fn(&mut serde_json::Value)| {
+        let mut golden = report.clone();
+        change(&mut golden);
+        golden["tolerances"] = tolerances;
+        folder.write("golden.json", golden.to_string());
+        folder.replay("dive.mcap", &["--expect", "golden.json"]).0.unwrap()
+    };
+    let hole_m = report["sections"][3]["hole_m"].as_f64().unwrap();
+    let other = |golden: &mut serde_json::Value| {
+        golden["sections"][3]["hole_m"] = (hole_m + 0.004).into();
+        golden["digest"] = "0123456789abcdef".into();
+    };
+    let same = |_: &mut serde_json::Value| {};
+    assert_eq!(meets(serde_json::json!({}), &same), 0);
+    assert_eq!(meets(serde_json::json!({}), &other), 1);
+    assert_eq!(meets(serde_json::json!({"/sections/*/hole_m": 0.005}), &other), 1, "the digest isn't stated");
+    assert_eq!(meets(serde_json::json!({"/sections/*/hole_m": 0.005, "/digest": "any"}), &other), 0);
+    assert_eq!(
+        meets(serde_json::json!({"/sections/*/hole_m": 0.003, "/digest": "any"}), &other),
+        1,
+        "too far apart"
+    );
+    assert_eq!(meets(serde_json::json!({"/sections/3/hole_m": 0.005, "/digest": "any"}), &other), 0);
+    assert_eq!(
+        meets(serde_json::json!({"/sections/4/hole_m": 0.005, "/digest": "any"}), &other),
+        1,
+        "another section"
+    );
+    assert_eq!(meets(serde_json::json!({"/sections": "any", "/digest": "any"}), &other), 0);
+    assert_eq!(meets(serde_json::json!({"/sections": -1}), &same), 2);
+    let answer = folder.headrace(&["replay", "dive.mcap", "--expect", "golden.json"]);
+    assert!(answer.stderr.contains("tolerances of \"/sections\" is -1"), "{}", answer.stderr);
+    // They stay when it is made anew.
+    meets(serde_json::json!({"/digest": "any"}), &other);
+    folder.replay("dive.mcap", &["--expect", "golden.json", "--bless"]);
+    let golden: serde_json::Value = serde_json::from_slice(&folder.read("golden.json")).unwrap();
+    assert_eq!((&golden["digest"], &golden["tolerances"]["/digest"]), (&report["digest"], &"any".into()));
+}
+
 #[test]
 fn a_golden_report_is_renewed_with_a_word_on_what_changes() {
     let folder = Folder::with_dive();

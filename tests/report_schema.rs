@@ -1,8 +1,7 @@
 //! Reports are as docs/report.schema.json says: real ones of several kinds are held to it, and it describes each key
 //! with its unit.
 //!
-//! The schema uses a small part of JSON Schema (2020-12), so that the checker here is short; a keyword that it doesn't
-//! know is an error. A crate for it would add a third to the packages that the workspace builds.
+//! The schema uses a small part of JSON Schema (2020-12), which `common/schema.rs` checks.
 
 #![allow(
     clippy::unwrap_used,
@@ -11,97 +10,16 @@
 )]
 
 mod common;
+#[path = "common/schema.rs"]
+mod json_schema;
 
 use common::Folder;
-use serde_json::{Map, Value};
+use json_schema::faults;
+use serde_json::Value;
 
 fn schema() -> Value {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/report.schema.json");
     serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
-}
-
-/// Where `value` differs from what the root schema says.
-fn faults(schema: &Value, value: &Value) -> Vec<String> {
-    let mut faults = Vec::new();
-    Checker { root: schema, faults: &mut faults }.check("", schema, value);
-    faults
-}
-
-struct Checker<'a> {
-    root: &'a Value,
-    faults: &'a mut Vec<String>,
-}
-
-impl Checker<'_> {
-    fn check(&mut self, place: &str, schema: &Value, value: &Value) {
-        for (keyword, wanted) in schema.as_object().unwrap() {
-            let right = match keyword.as_str() {
-                "$schema" | "$defs" | "title" | "description" | "additionalProperties" => true,
-                "$ref" => {
-                    let target = wanted.as_str().unwrap().strip_prefix('#').unwrap();
-                    self.check(place, self.root.pointer(target).unwrap(), value);
-                    true
-                }
-                "anyOf" => wanted.as_array().unwrap().iter().any(|one| {
-                    let mut faults = Vec::new();
-                    Checker { root: self.root, faults: &mut faults }.check(place, one, value);
-                    faults.is_empty()
-                }),
-                "type" => match wanted {
-                    Value::Array(types) => types.iter().any(|one| is_a(one.as_str().unwrap(), value)),
-                    one => is_a(one.as_str().unwrap(), value),
-                },
-                "const" => value == wanted,
-                "enum" => wanted.as_array().unwrap().contains(value),
-                "minimum" => value.as_f64().is_none_or(|number| number >= wanted.as_f64().unwrap()),
-                "maximum" => value.as_f64().is_none_or(|number| number <= wanted.as_f64().unwrap()),
-                "required" => {
-                    let there = |key: &Value| value.get(key.as_str().unwrap()).is_some();
-                    !value.is_object() || wanted.as_array().unwrap().iter().all(there)
-                }
-                "properties" => {
-                    self.properties(place, schema, wanted.as_object().unwrap(), value);
-                    true
-                }
-                "items" => {
-                    for (index, item) in value.as_array().into_iter().flatten().enumerate() {
-                        self.check(&format!("{place}/{index}"), wanted, item);
-                    }
-                    true
-                }
-                unknown => panic!("{place}: the checker doesn't know {unknown:?}"),
-            };
-            if !right {
-                self.faults.push(format!("{place}: {value} is not as {keyword} {wanted} says"));
-            }
-        }
-    }
-
-    fn properties(&mut self, place: &str, schema: &Value, properties: &Map<String, Value>, value: &Value) {
-        for (key, value) in value.as_object().into_iter().flatten() {
-            let place = format!("{place}/{key}");
-            match properties.get(key) {
-                Some(schema) => self.check(&place, schema, value),
-                None if schema["additionalProperties"] == false => {
-                    self.faults.push(format!("{place}: unknown"));
-                }
-                None => {}
-            }
-        }
-    }
-}
-
-fn is_a(kind: &str, value: &Value) -> bool {
-    match kind {
-        "null" => value.is_null(),
-        "boolean" => value.is_boolean(),
-        "integer" => value.is_u64() || value.is_i64(),
-        "number" => value.is_number(),
-        "string" => value.is_string(),
-        "array" => value.is_array(),
-        "object" => value.is_object(),
-        other => panic!("the checker doesn't know the type {other:?}"),
-    }
 }
 
 #[test]

@@ -84,7 +84,7 @@ mod tests {
         let [first, ..] = clocks[..] else { panic!() };
         assert!(first.is_of(MonoNs(YEAR_NS)) && !first.is_of(MonoNs(YEAR_NS * 2)));
         assert_eq!(first.distance(MonoNs(YEAR_NS * 11 / 2)), "5.0 years after");
-        for at in 0..1000 {
+        for at in 0..190 {
             count(&mut clocks, MonoNs(at * 3 * YEAR_NS));
         }
         assert_eq!(clocks.len(), MAX_CLOCKS);

@@ -13,3 +13,4 @@ pub mod simulate;
 pub mod smooth;
 pub mod states;
 pub mod verify;
+pub mod view;

@@ -11,6 +11,7 @@ use std::cell::Cell;
 
 use crate::log::format::RESULT_PREFIX;
 use crate::log::{RecorderPort, ResultChannel};
+use crate::view;
 
 /// What the recorder's queue must have free for the largest tick: packets, their headers, and their order.
 const LARGEST_TICK_BYTES: usize = MAX_TICK_BYTES + MAX_TICK_PACKETS * 64 + 4096;
@@ -22,14 +23,16 @@ const MAX_RESULT_BYTES: usize = 1 << 19;
 pub const QUEUE_BYTES: usize = 4 * LARGEST_TICK_BYTES;
 
 /// The streams of results in a log; [`Digests::streams`] has them in the same order.
-pub(crate) const STREAMS: [&str; 3] = ["pings", "judgements", "advice"];
+pub(crate) const STREAMS: [&str; 4] = ["poses", "pings", "judgements", "advice"];
+/// The stream that has something for each echo.
+const ECHOES: &str = "pings";
 /// Encoding of their messages: the tick's index and the number of the records before it, then the words of
 /// [`headrace_core::app::trail`], all u64, little-endian.
 const ENCODING: &str = "headrace-trail";
 /// Words before a message's records.
 const HEAD_WORDS: usize = 2;
 
-/// The channels of a loop's results.
+/// The channels of a loop's results: the streams, then those of a view.
 pub fn result_channels() -> Vec<ResultChannel> {
     let channel = |name: &&str| ResultChannel {
         topic: format!("{RESULT_PREFIX}{name}"),
@@ -37,9 +40,9 @@ pub fn result_channels() -> Vec<ResultChannel> {
         schema_encoding: String::new(),
         schema: String::new(),
         message_encoding: ENCODING.to_owned(),
-        follows_echoes: *name == STREAMS[0],
+        follows_echoes: *name == ECHOES,
     };
-    STREAMS.iter().map(channel).collect()
+    STREAMS.iter().map(channel).chain(view::channels()).collect()
 }
 
 /// The stream of results that a topic is of.

@@ -15,7 +15,7 @@ use crate::record::{STREAMS, read_results, stream_of};
 pub struct Difference {
     /// The live dive's tick that published it.
     pub tick: u64,
-    /// The stream: pings, judgements or advice.
+    /// The stream: poses, pings, judgements or advice.
     pub stream: &'static str,
     /// Number of the record in its stream, from zero.
     pub record: u64,

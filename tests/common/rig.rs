@@ -284,7 +284,7 @@ fn assemble(vehicle: &VehicleConfig, text: &str, log: Option<&Path>) -> (Loop, O
             results: result_channels(),
             ..LogHeader::default()
         };
-        let (port, recorder) = Recorder::create(log, &header, QUEUE_BYTES).unwrap();
+        let (port, recorder) = Recorder::create(log, &header, QUEUE_BYTES, None).unwrap();
         app.add_plugin(&RecorderOutlet::new(port)).unwrap();
         handle = Some(recorder);
     }

@@ -15,7 +15,8 @@ pub enum AlertKind {
 }
 
 impl AlertKind {
-    const ALL: [Self; 2] = [Self::OutsideTunnel, Self::ProfileContradicted];
+    /// All of them.
+    pub const ALL: [Self; 2] = [Self::OutsideTunnel, Self::ProfileContradicted];
 
     /// The word used in reports and logs.
     pub fn as_str(self) -> &'static str {

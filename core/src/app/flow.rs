@@ -253,6 +253,8 @@ impl Stateful for Finder {
 /// The streams of results with their digests; together, the dive's.
 #[derive(Debug, Default, Resource)]
 pub struct Digests {
+    /// Poses at the beats.
+    pub poses: Trail,
     /// Placed pings.
     pub pings: Trail,
     /// Judgements.
@@ -261,22 +263,29 @@ pub struct Digests {
     pub advice: Trail,
 }
 
-stateful!(Digests { state: pings, judgements, advice; });
+stateful!(Digests { state: poses, pings, judgements, advice; });
 
 impl Digests {
     /// The streams by name, in the order in which a log has them.
-    pub fn streams(&self) -> [(&'static str, &Trail); 3] {
-        [("pings", &self.pings), ("judgements", &self.judgements), ("advice", &self.advice)]
+    pub fn streams(&self) -> [(&'static str, &Trail); 4] {
+        [
+            ("poses", &self.poses),
+            ("pings", &self.pings),
+            ("judgements", &self.judgements),
+            ("advice", &self.advice),
+        ]
     }
 
     /// Keeps the words of each tick from now on.
     pub fn keep(&mut self) {
+        self.poses.keep();
         self.pings.keep();
         self.judgements.keep();
         self.advice.keep();
     }
 
     pub(super) fn next_tick(&mut self) {
+        self.poses.next_tick();
         self.pings.next_tick();
         self.judgements.next_tick();
         self.advice.next_tick();

@@ -21,6 +21,7 @@ pub mod stage;
 mod stages;
 pub mod trail;
 pub mod what_if;
+pub mod words;
 
 use bevy_ecs::component::Mutable;
 use bevy_ecs::prelude::{Component, Resource};

@@ -280,13 +280,13 @@ impl Loop {
         self.world.resource::<Decoders>().0.iter().map(|decoder| decoder.clock()).collect()
     }
 
-    /// Digest of all results so far: places, judgements and advice.
+    /// Digest of all results so far: poses, places, judgements and advice.
     pub fn digest(&self) -> u64 {
         let digests = self.world.resource::<Digests>();
         let mut all = Digest::default();
-        all.integer(digests.pings.value())
-            .integer(digests.judgements.value())
-            .integer(digests.advice.value());
+        for (_, stream) in digests.streams() {
+            all.integer(stream.value());
+        }
         all.value()
     }
 }

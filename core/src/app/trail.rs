@@ -22,6 +22,12 @@ pub enum RecordKind {
     Run = 4,
     /// Advice.
     Advice = 5,
+    /// Where the vehicle is.
+    Pose = 6,
+    /// Nobody knows where the vehicle is.
+    NoPose = 7,
+    /// Something is wrong with the dive as a whole.
+    Alert = 8,
 }
 
 /// What a word of a record is.
@@ -34,7 +40,16 @@ pub enum WordKind {
 }
 
 impl RecordKind {
-    const ALL: [Self; 5] = [Self::Sample, Self::NoSample, Self::Section, Self::Run, Self::Advice];
+    const ALL: [Self; 8] = [
+        Self::Sample,
+        Self::NoSample,
+        Self::Section,
+        Self::Run,
+        Self::Advice,
+        Self::Pose,
+        Self::NoPose,
+        Self::Alert,
+    ];
 
     /// The kind with this number.
     pub fn of(number: u8) -> Option<Self> {
@@ -49,6 +64,9 @@ impl RecordKind {
             Self::Section => "section",
             Self::Run => "run",
             Self::Advice => "advice",
+            Self::Pose => "pose",
+            Self::NoPose => "lack of a pose",
+            Self::Alert => "alert",
         }
     }
 
@@ -76,14 +94,51 @@ impl RecordKind {
                 ("hole_m", Number),
                 ("hole_sigma_m", Number),
                 ("cause", Integer),
+                ("hole_x_m", Number),
+                ("hole_arc_m", Number),
+                // Where there is a cause.
+                ("speed_mps", Number),
+                ("t_y_m", Number),
+                ("middle_t_y_m", Number),
+                ("missing_share", Number),
+                ("swing_m", Number),
             ],
             Self::Run => &[("id", Integer), ("change", Integer)],
-            Self::Advice => {
-                &[("at_ns", Integer), ("v_max_mps", Number), ("reason", Integer), ("will_exceed", Integer)]
-            }
+            Self::Advice => &[
+                ("at_ns", Integer),
+                ("v_max_mps", Number),
+                ("reason", Integer),
+                ("will_exceed", Integer),
+                ("phase_error_rad", Number),
+                ("t_y_m", Number),
+                ("unseen_width_m", Number),
+                ("unseen_arc_m", Number),
+                ("remedy", Integer),
+                ("remedy_mode", Integer),
+                ("remedy_mode_rest", Integer),
+            ],
+            Self::Pose => &[
+                ("at_ns", Integer),
+                ("x_m", Number),
+                ("y_m", Number),
+                ("z_m", Number),
+                ("w", Number),
+                ("i", Number),
+                ("j", Number),
+                ("k", Number),
+                ("speed_mps", Number),
+                // Where navigation knows them.
+                ("along_sd_m", Number),
+                ("place_sd_m", Number),
+                ("tilt_sd_rad", Number),
+                ("yaw_sd_rad", Number),
+            ],
+            Self::NoPose => &[("at_ns", Integer), ("reason", Integer)],
+            Self::Alert => &[("at_ns", Integer), ("kind", Integer), ("x_m", Number), ("off_m", Number)],
         };
         // Advice goes on with the speeds that other modes would allow.
-        fields.get(place).copied().unwrap_or(("alternative_v_max_mps", Number))
+        let beyond = if self == Self::Advice { "alternative_v_max_mps" } else { "beyond the last field" };
+        fields.get(place).copied().unwrap_or((beyond, Number))
     }
 }
 
@@ -150,6 +205,17 @@ impl Trail {
         self.lost
     }
 
+    /// Takes a short text in: its first 16 bytes, as two whole numbers.
+    pub(super) fn text(&mut self, text: &str) -> &mut Self {
+        let mut bytes = [0; 16];
+        bytes.iter_mut().zip(text.bytes()).for_each(|(byte, of)| *byte = of);
+        let (halves, _) = bytes.as_chunks::<8>();
+        for half in halves {
+            self.integer(u64::from_le_bytes(*half));
+        }
+        self
+    }
+
     /// Forgets the words of the last tick.
     pub(super) fn next_tick(&mut self) {
         self.words.clear();
@@ -183,6 +249,13 @@ pub struct Record<'a> {
     pub words: &'a [u64],
 }
 
+/// The text that two words of a record hold.
+pub fn text_of(words: [u64; 2]) -> String {
+    let bytes = words.map(u64::to_le_bytes);
+    let text = bytes.as_flattened().iter().copied().take_while(|byte| *byte != 0).collect::<Vec<_>>();
+    String::from_utf8_lossy(&text).into_owned()
+}
+
 /// The first of a row of records, and the row after it. `None` at the end, or where a record isn't whole.
 pub fn first_record(words: &[u64]) -> Option<(Record<'_>, &[u64])> {
     let (head, rest) = words.split_first()?;
@@ -211,10 +284,21 @@ mod tests {
         let (second, rest) = first_record(rest).unwrap();
         assert_eq!(second.words, [5, 0.25_f64.to_bits(), 0, 1, 0]);
         assert_eq!(second.kind.map(|kind| kind.field(1)), Some(("v_max_mps", WordKind::Number)));
-        assert_eq!(second.kind.map(|kind| kind.field(4).0), Some("alternative_v_max_mps"));
+        assert_eq!(second.kind.map(|kind| kind.field(11).0), Some("alternative_v_max_mps"));
         assert_eq!(first_record(rest), None);
         assert_eq!((trail.records(), trail.lost()), (2, 0));
         assert_eq!(first_record(&[5 << 8 | 1, 2]), None);
+    }
+
+    #[test]
+    fn a_short_text_comes_back_and_a_long_one_is_cut() {
+        for (text, back) in [("", ""), ("0.3 deg", "0.3 deg"), ("a mode's long name", "a mode's long na")] {
+            let mut trail = Trail::default();
+            trail.keep();
+            trail.record(RecordKind::Advice).text(text);
+            let (record, _) = first_record(trail.words()).unwrap();
+            assert_eq!(text_of([record.words[0], record.words[1]]), back);
+        }
     }
 
     /// Keeping changes no digest, nor does the lack of room.

@@ -36,6 +36,20 @@ pub enum Cause {
 }
 
 impl Cause {
+    /// All of them.
+    pub const ALL: [Self; 10] = [
+        Self::TooFast,
+        Self::AngularStep,
+        Self::MissingReturns,
+        Self::OutOfRange,
+        Self::Occluded,
+        Self::OffAxis,
+        Self::Phase,
+        Self::HeadStalled,
+        Self::PositionLost,
+        Self::NotPassed,
+    ];
+
     /// The word used in reports and logs.
     pub fn as_str(self) -> &'static str {
         match self {

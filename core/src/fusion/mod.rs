@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use self::direct::DirectNavigation;
 use self::filter::FilterNavigation;
+use self::filter::running::Sigmas;
 use self::filter::settings::Settings;
 use self::filter::sources::Consistency;
 use self::relative::Relative;
@@ -81,6 +82,9 @@ pub enum NoFix {
 }
 
 impl NoFix {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Heading, Self::Chainage, Self::Section];
+
     /// The word used in reports and logs.
     pub fn as_str(self) -> &'static str {
         match self {
@@ -113,6 +117,11 @@ pub trait Navigation: Stateful + Send + Sync {
 
     /// How well a source agrees with the others; `None` where that isn't known.
     fn consistency(&self, _source: usize) -> Option<Consistency> {
+        None
+    }
+
+    /// How far off the estimate may be; `None` where that isn't known.
+    fn sigmas(&self) -> Option<Sigmas> {
         None
     }
 

@@ -5,8 +5,8 @@
 //! | `/raw/<source id>` | bytes as received: one device frame, datagram, CAN frame, HID report or I2C transaction | receive time | time of validity, where the device gives one, else the receive time |
 //! | `/sent/<source id>` | bytes sent to the device | when | when |
 //! | `/loop/tick` | one tick of the loop, see [`Tick`] | the tick's moment | the same |
-//! | `/result/pings`, `/result/judgements`, `/result/advice` | what the loop published in a tick, word by word ([`headrace_core::app::trail`]): u64 tick, u64 number of the first record, records; for `verify`, never read by a replay | the tick's moment | the same |
-//! | `/result/...` | what the loop made of it, for people's viewers | as the result says | the same |
+//! | `/result/poses`, `/result/pings`, `/result/judgements`, `/result/advice` | what the loop published in a tick, word by word ([`headrace_core::app::trail`]): u64 tick, u64 number of the first record, records; for `verify`, never read by a replay | the tick's moment | the same |
+//! | `/result/view/...` | the same for people's viewers, in JSON: [`crate::view`] | the tick's moment | the same |
 //!
 //! Times are nanoseconds of the host's monotonic clock. Every channel counts its messages from 0 (`sequence`).
 //! Channels of bytes have the message encoding `application/octet-stream` and no schema; their metadata has `plugin`,
@@ -27,6 +27,8 @@ pub const RAW_PREFIX: &str = "/raw/";
 pub const SENT_PREFIX: &str = "/sent/";
 /// Before the topics of results.
 pub const RESULT_PREFIX: &str = "/result/";
+/// Before the topics of results that are for people's viewers.
+pub const VIEW_PREFIX: &str = "/result/view/";
 /// The channel of ticks.
 pub const TICK_TOPIC: &str = "/loop/tick";
 /// Message encoding of raw, sent and tick.

@@ -26,6 +26,7 @@
 
 mod channels;
 mod chunk;
+mod companion;
 mod dive_log;
 mod error;
 mod fields;
@@ -45,6 +46,7 @@ mod trim;
 mod worker;
 mod writer;
 
+pub use companion::{Companion, Made};
 pub use dive_log::{DiveLog, DivePlace, PartFile, files_of};
 pub use error::LogError;
 pub use loss::{Loss, LossKind};

@@ -17,11 +17,12 @@ use ringbuf::traits::{Observer as _, Producer as _};
 use ringbuf::wrap::{Cons, Prod};
 
 use super::LogError;
+use super::companion::Companion;
 use super::format::{TICK_HEAD_BYTES, order_bytes, tick_head};
 use super::part::part_path;
 use super::rotate::{Parts, Rotation, in_the_way};
 use super::space::Space;
-use super::worker::{Echoes, Queue, Worker};
+use super::worker::{Beside, Echoes, Queue, Worker};
 use super::writer::{Lane, LogHeader, LogWriter, Summary};
 
 /// Bytes before each entry in the queue: kind, a spare byte, number, length, log time, publish time.
@@ -105,7 +106,7 @@ impl Recorder {
         header: &LogHeader,
         queue_bytes: usize,
     ) -> Result<(RecorderPort, RecorderHandle), LogError> {
-        Self::start_within(Space::endless(), writer, header, queue_bytes)
+        Self::start_within(Space::endless(), writer, header, queue_bytes, None)
     }
 
     /// The same where room may end.
@@ -114,17 +115,18 @@ impl Recorder {
         writer: W,
         header: &LogHeader,
         queue_bytes: usize,
+        companion: Option<Box<dyn Companion>>,
     ) -> Result<(RecorderPort, RecorderHandle), LogError> {
-        Self::begin(space, LogWriter::new(writer, header)?, None, header, queue_bytes)
+        Self::begin(space, (LogWriter::new(writer, header)?, None), header, queue_bytes, companion)
     }
 
     /// Starts the thread of a log that has been begun, perhaps in parts.
     fn begin<W: Write + Send + 'static>(
         space: Space,
-        mut log: LogWriter<W>,
-        parts: Option<Parts<W>>,
+        (mut log, parts): (LogWriter<W>, Option<Parts<W>>),
         header: &LogHeader,
         queue_bytes: usize,
+        companion: Option<Box<dyn Companion>>,
     ) -> Result<(RecorderPort, RecorderHandle), LogError> {
         log.flush()?;
         let ring = Arc::new(HeapRb::new(queue_bytes.max(MIN_QUEUE_BYTES)));
@@ -139,7 +141,9 @@ impl Recorder {
         let thread_state = Arc::clone(&state);
         let thread = thread::Builder::new().name("recorder".to_owned());
         let echoes = Echoes::of(header);
-        let thread = thread.spawn(move || Worker::new(log, parts, space, echoes, &thread_state).run(queue));
+        let beside = Beside::new(companion);
+        let thread =
+            thread.spawn(move || Worker::new(log, parts, space, echoes, beside, &thread_state).run(queue));
         let thread = Some(thread.map_err(|source| LogError::Thread { source })?);
         let port = RecorderPort {
             ring: Prod::new(ring),
@@ -157,10 +161,11 @@ impl Recorder {
         path: &Path,
         header: &LogHeader,
         queue_bytes: usize,
+        companion: Option<Box<dyn Companion>>,
     ) -> Result<(RecorderPort, RecorderHandle), LogError> {
         let file = new_file(path)?;
         let space = file.space();
-        Self::start_within(space, file, header, queue_bytes)
+        Self::start_within(space, file, header, queue_bytes, companion)
     }
 
     /// The same in parts, each a log of its own; `path` names the recording, and [`part_path`] its parts.
@@ -171,6 +176,7 @@ impl Recorder {
         header: &LogHeader,
         rotation: &Rotation,
         queue_bytes: usize,
+        companion: Option<Box<dyn Companion>>,
     ) -> Result<(RecorderPort, RecorderHandle), LogError> {
         let failed = |path: &Path, source| LogError::Create { path: path.to_owned(), source };
         if let Some(other) = in_the_way(path).map_err(|source| failed(path, source))? {
@@ -185,7 +191,7 @@ impl Recorder {
         // All parts are on one disk.
         let first = part_path(path, 1);
         let space = File::open(&first).map_or_else(|_| Space::endless(), Space::of);
-        Self::begin(space, log, Some(parts), header, queue_bytes)
+        Self::begin(space, (log, Some(parts)), header, queue_bytes, companion)
     }
 }
 

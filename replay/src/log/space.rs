@@ -24,7 +24,7 @@ const ASK_EVERY: Duration = Duration::from_secs(2);
 /// What a recorder has left out since its disk was nearly full.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct LeftOut {
-    /// Echoes, and results that follow them one by one.
+    /// Echoes, results that follow them one by one, and what viewers are shown.
     pub messages: u64,
     /// Their bytes.
     pub bytes: u64,

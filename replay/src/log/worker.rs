@@ -12,6 +12,7 @@ use ringbuf::traits::{Consumer as _, Observer as _};
 use ringbuf::wrap::Cons;
 
 use super::LogError;
+use super::companion::{Companion, Made};
 use super::fields::Fields;
 use super::recorder::{ENTRY_HEAD_BYTES, State};
 use super::rotate::Parts;
@@ -78,7 +79,20 @@ pub(super) struct Worker<'a, W: Write> {
     parts: Option<Parts<W>>,
     space: Space,
     echoes: Echoes,
+    beside: Beside,
     state: &'a State,
+}
+
+/// A companion, and room for what it makes.
+pub(super) struct Beside {
+    companion: Option<Box<dyn Companion>>,
+    made: Vec<Made>,
+}
+
+impl Beside {
+    pub(super) fn new(companion: Option<Box<dyn Companion>>) -> Self {
+        Self { companion, made: Vec::new() }
+    }
 }
 
 /// Which messages are left out when the disk fills.
@@ -117,10 +131,11 @@ impl<'a, W: Write> Worker<'a, W> {
         parts: Option<Parts<W>>,
         space: Space,
         echoes: Echoes,
+        beside: Beside,
         state: &'a State,
     ) -> Self {
         let (log, flushed) = (Some(log), wall_clock());
-        Self { log, error: None, discarded: 0, flushed, open: false, parts, space, echoes, state }
+        Self { log, error: None, discarded: 0, flushed, open: false, parts, space, echoes, beside, state }
     }
 
     pub(super) fn run(mut self, mut queue: Queue) -> Result<Summary, LogError> {
@@ -129,7 +144,7 @@ impl<'a, W: Write> Worker<'a, W> {
             // Read before the queue is looked at: what was pushed before the flag was set is then taken.
             let stopping = self.state.stopping.load(Ordering::Acquire);
             let taken =
-                (0..BATCH).map_while(|_| queue.take().map(|entry| self.write(&entry, &queue.message)));
+                (0..BATCH).map_while(|_| queue.take().map(|entry| self.write_all(&entry, &queue.message)));
             let taken = taken.count() + self.write_sent();
             self.flush_in_time();
             if taken == 0 && stopping {
@@ -139,6 +154,27 @@ impl<'a, W: Write> Worker<'a, W> {
                 thread::park_timeout(NAP);
             }
         }
+    }
+
+    /// Writes an entry and what the companion makes of it.
+    fn write_all(&mut self, entry: &Entry, message: &[u8]) {
+        self.write(entry, message);
+        if let Lane::Result(number) = entry.lane {
+            self.write_made(|companion, made| companion.take(number, entry.log_time, message, made));
+        }
+    }
+
+    fn write_made(&mut self, make: impl FnOnce(&mut dyn Companion, &mut Vec<Made>)) {
+        // Of a dive that goes on unrecorded nothing is to be made.
+        let Some(companion) = self.beside.companion.as_mut().filter(|_| self.log.is_some()) else { return };
+        let mut made = core::mem::take(&mut self.beside.made);
+        make(companion.as_mut(), &mut made);
+        for Made { channel, at, bytes } in made.drain(..) {
+            if usize::from(channel) < self.echoes.results.len() {
+                self.write(&Entry { lane: Lane::Result(channel), log_time: at, publish_time: at }, &bytes);
+            }
+        }
+        self.beside.made = made;
     }
 
     fn write(&mut self, entry: &Entry, message: &[u8]) {
@@ -193,6 +229,7 @@ impl<'a, W: Write> Worker<'a, W> {
     }
 
     fn finish(mut self) -> Result<Summary, LogError> {
+        self.write_made(|companion, made| companion.end(made));
         let left_out = self.space.left_out();
         if let Some((from, to)) = left_out.span {
             self.attempt(|log, _| log.lost(Some(from), Some(to), &left_out.words()));

@@ -72,7 +72,7 @@ pub struct ResultChannel {
     pub schema: String,
     /// How its messages are written, for instance `json`.
     pub message_encoding: String,
-    /// Whether it has something for each echo: it is left out with the echoes when the disk fills.
+    /// Whether it is left out with the echoes when the disk fills: it has something for each of them, or isn't needed for a replay.
     pub follows_echoes: bool,
 }
 

@@ -3,9 +3,9 @@
 use bevy_ecs::prelude::{Res, ResMut, Resource};
 
 use crate::app::flow::{AdviceEntry, AdviceLog, Digests, Notice, Notices, Placed, PlacedList, Tally};
-use crate::app::trail::RecordKind;
+use crate::app::trail::{RecordKind, Trail};
 use crate::frames::Vec3;
-use crate::sampling::advice::{self, Advice, Steady};
+use crate::sampling::advice::{self, Advice, Remedy, Steady};
 use crate::sampling::passes::{Phasing, Situation};
 use crate::sampling::swing::{Looks, Swing};
 use crate::stateful;
@@ -45,6 +45,25 @@ fn swing(looks: &mut Looks, at: MonoNs, situation: &Situation) -> Swing {
     looks.swing(at, passes.gap_s(passes.heads()).unwrap_or(0.0))
 }
 
+fn digest(trail: &mut Trail, at: MonoNs, advice: &Advice) {
+    let [width_m, arc_m] = advice.unseen_m.unwrap_or_default();
+    trail
+        .record(RecordKind::Advice)
+        .integer(at.0)
+        .number(advice.v_max_mps)
+        .integer(advice.reason as u64)
+        .integer(u64::from(advice.will_exceed))
+        .number(advice.phase_error_rad.unwrap_or(0.0))
+        .number(advice.t_y_m)
+        .number(width_m)
+        .number(arc_m)
+        .integer(advice.remedy.map_or(0, Remedy::number))
+        .text(if let Some(Remedy::Mode(name)) = &advice.remedy { name.as_str() } else { "" });
+    for other in advice.alternatives.iter().flatten() {
+        trail.number(other.v_max_mps);
+    }
+}
+
 pub(super) fn advise(
     placed: Res<'_, PlacedList>,
     tally: Res<'_, Tally>,
@@ -57,11 +76,7 @@ pub(super) fn advise(
         let Placed::Situation(at, situation) = item else { continue };
         let begun = tally.span.map(|(first, _)| first);
         let advice = advisor.advise(*at, situation, begun);
-        let digest = digests.advice.record(RecordKind::Advice).integer(at.0).number(advice.v_max_mps);
-        digest.integer(advice.reason as u64).integer(u64::from(advice.will_exceed));
-        for other in advice.alternatives.iter().flatten() {
-            digests.advice.number(other.v_max_mps);
-        }
+        digest(&mut digests.advice, *at, &advice);
         let chainage_m = situation.pose.map(|pose| pose.position.x());
         let entry = AdviceEntry { at: *at, chainage_m, speed_mps: situation.speed_mps, advice };
         log.take(&entry);

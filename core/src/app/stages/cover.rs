@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::advise::Advisor;
 use super::driving::{Driven, Driving};
-use super::judge::{Results, judge_one};
+use super::judge::{Results, digest_alert, judge_one};
 use crate::app::alerts::{AlertKind, Alerts};
 use crate::app::flow::{
     Coverage, Digests, Finder, Notice, Notices, Outcome, Place, Placed, PlacedList, PlacedPing, Requests,
@@ -72,6 +72,7 @@ pub(super) fn cover(
                     && alerts.note(AlertKind::OutsideTunnel, ping.received, beyond_m.0, beyond_m.1)
                 {
                     notices.0.push(Notice::Alert(AlertKind::OutsideTunnel));
+                    digest_alert(&mut digests, AlertKind::OutsideTunnel, ping.received, beyond_m);
                 }
                 if let Err(error) = note_sample(&mut coverage, &mut sweeps, &context, ping) {
                     match error {

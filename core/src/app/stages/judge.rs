@@ -4,6 +4,7 @@ use crate::app::alerts::{AlertKind, Alerts};
 use crate::app::flow::{Coverage, Digests, Finder, Notice, Notices};
 use crate::app::trail::RecordKind;
 use crate::coverage::{Judging, Request, RunChange, RunId};
+use crate::time::MonoNs;
 use crate::tunnel::Profile;
 
 /// What judging changes besides the sections.
@@ -40,12 +41,30 @@ pub(in crate::app) fn judge_one(
         .integer(section.verdict as u64)
         .number(section.hole.map_or(0.0, |hole| hole.diameter_m))
         .number(section.hole_sigma_m)
-        .integer(section.evidence.map_or(u64::MAX, |evidence| evidence.cause as u64));
+        .integer(section.evidence.map_or(u64::MAX, |evidence| evidence.cause as u64))
+        .number(section.hole.map_or(0.0, |hole| hole.x_m))
+        .number(section.hole.map_or(0.0, |hole| hole.sigma_m));
+    if let Some(evidence) = section.evidence {
+        digests
+            .judgements
+            .number(evidence.speed_mps)
+            .number(evidence.t_y_m)
+            .number(evidence.middle_t_y_m)
+            .number(evidence.missing_share)
+            .number(evidence.swing_m);
+    }
     if section.contradicts() {
         let off_m = section.deviation.mean_m().unwrap_or(0.0);
         let x_m = sections.bounds_m(request.section).0;
         if alerts.note(AlertKind::ProfileContradicted, request.at, x_m, off_m) {
             notices.0.push(Notice::Alert(AlertKind::ProfileContradicted));
+            digest_alert(digests, AlertKind::ProfileContradicted, request.at, (x_m, off_m));
         }
     }
+}
+
+/// Publishes that something is wrong at a chainage, by so much.
+pub(in crate::app) fn digest_alert(digests: &mut Digests, kind: AlertKind, at: MonoNs, at_off_m: (f64, f64)) {
+    let alert = digests.judgements.record(RecordKind::Alert).integer(at.0).integer(kind as u64);
+    alert.number(at_off_m.0).number(at_off_m.1);
 }

@@ -2,9 +2,11 @@
 
 use bevy_ecs::prelude::{Res, ResMut};
 
-use crate::app::flow::{ADVICE_PERIOD, Events, Navigator, Positioned, PositionedList, SensorTable};
+use crate::app::flow::{ADVICE_PERIOD, Digests, Events, Navigator, Positioned, PositionedList, SensorTable};
 use crate::app::reading::Reading;
-use crate::fusion::Times;
+use crate::app::trail::{RecordKind, Trail};
+use crate::fusion::filter::running::Sigmas;
+use crate::fusion::{Fix, NoFix, Times};
 use crate::time::MonoNs;
 
 pub(super) fn navigate(
@@ -12,6 +14,7 @@ pub(super) fn navigate(
     sensors: Res<'_, SensorTable>,
     mut navigator: ResMut<'_, Navigator>,
     mut list: ResMut<'_, PositionedList>,
+    mut digests: ResMut<'_, Digests>,
 ) {
     list.0.clear();
     let navigator = &mut *navigator;
@@ -19,6 +22,7 @@ pub(super) fn navigate(
         // Time may stand still or go back; a beat is passed once. After a gap only the last beat counts.
         if let Some(at) = beat_before(&mut navigator.next_beat, event.received) {
             let fix = navigator.navigation.fix(at);
+            digest(&mut digests.poses, at, &fix, navigator.navigation.sigmas());
             list.0.push(Positioned::Beat { at, fix });
         }
         if matches!(event.reading, Reading::Sonar(_)) {
@@ -46,5 +50,24 @@ fn beat_before(next: &mut Option<MonoNs>, now: MonoNs) -> Option<MonoNs> {
             *next = Some(last + ADVICE_PERIOD);
             None
         }
+    }
+}
+
+fn digest(poses: &mut Trail, at: MonoNs, fix: &Result<Fix, NoFix>, sigmas: Option<Sigmas>) {
+    let fix = match fix {
+        Ok(fix) => fix,
+        Err(lacking) => {
+            poses.record(RecordKind::NoPose).integer(at.0).integer(*lacking as u64);
+            return;
+        }
+    };
+    let place = fix.pose.position;
+    poses.record(RecordKind::Pose).integer(at.0).number(place.x()).number(place.y()).number(place.z());
+    for part in fix.pose.attitude.wxyz() {
+        poses.number(part);
+    }
+    poses.number(fix.speed_mps);
+    if let Some(Sigmas { along_m, place_m, tilt_rad, yaw_rad }) = sigmas {
+        poses.number(along_m).number(place_m).number(tilt_rad).number(yaw_rad);
     }
 }

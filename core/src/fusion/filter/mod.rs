@@ -20,7 +20,7 @@ pub mod window;
 mod tests;
 
 use self::align::{LISTENS, Listening};
-use self::running::{Context, Running};
+use self::running::{Context, Running, Sigmas};
 use self::settings::Settings;
 use self::sources::{Consistency, Source};
 use self::state::{State, rotation};
@@ -368,6 +368,10 @@ impl Navigation for FilterNavigation {
 
     fn consistency(&self, source: usize) -> Option<Consistency> {
         self.sources.get(source).copied().flatten().map(|source| source.consistency)
+    }
+
+    fn sigmas(&self) -> Option<Sigmas> {
+        self.running().map(Running::sigmas)
     }
 
     fn fix(&self, at: MonoNs) -> Result<Fix, NoFix> {

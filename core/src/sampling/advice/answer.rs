@@ -22,6 +22,9 @@ pub enum Reason {
 }
 
 impl Reason {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::HelixPitch, Self::AngularStep, Self::NoHeadingOrFix, Self::NoReturns];
+
     /// The word used in reports and logs.
     pub fn as_str(self) -> &'static str {
         match self {
@@ -83,6 +86,15 @@ pub enum Remedy {
 }
 
 impl Remedy {
+    /// Its number in what is published; 0 is none.
+    pub(crate) fn number(self) -> u64 {
+        match self {
+            Self::Steady => 1,
+            Self::Centre => 2,
+            Self::Mode(_) => 3,
+        }
+    }
+
     /// The word used in reports: `centre`, `steady`, or the mode's name.
     pub fn as_str(&self) -> &str {
         match self {

@@ -38,8 +38,8 @@ const TICKS: u64 = 400;
 
 fn record(path: &Path, rotation: Option<&Rotation>) -> super::super::Summary {
     let begun = match rotation {
-        None => Recorder::create(path, &header(true), 1 << 22),
-        Some(rotation) => Recorder::create_in_parts(path, &header(true), rotation, 1 << 22),
+        None => Recorder::create(path, &header(true), 1 << 22, None),
+        Some(rotation) => Recorder::create_in_parts(path, &header(true), rotation, 1 << 22, None),
     };
     let (mut port, handle) = begun.unwrap();
     for tick in 0..TICKS {
@@ -172,7 +172,7 @@ fn parts_of_two_recordings_and_one_twice_are_refused() {
     record(&single, None);
     assert!(matches!(open(&[one.part(1), single]), LogError::NotAPart { .. }));
     // Nor does a recording go over another's parts.
-    let again = Recorder::create_in_parts(&one.0.join("dive.mcap"), &header(true), &rotation(every), 0);
+    let again = Recorder::create_in_parts(&one.0.join("dive.mcap"), &header(true), &rotation(every), 0, None);
     assert!(matches!(again.err().unwrap(), LogError::Create { path, .. } if path == one.part(1)));
 }
 
@@ -211,6 +211,7 @@ fn a_part_that_cannot_be_made_costs_the_rotation_alone() {
         &header(true),
         &rotation(Every::Span(DurNs::from_millis(10_000))),
         1 << 22,
+        None,
     )
     .unwrap();
     std::fs::create_dir(folder.part(2)).unwrap();

@@ -6,7 +6,7 @@ use std::sync::{Arc, mpsc};
 use std::time::Duration;
 
 use super::super::space::Space;
-use super::super::{LogError, LossKind, Recorder, RecorderPort};
+use super::super::{Companion, LogError, LossKind, Made, Recorder, RecorderPort};
 use super::*;
 
 /// A medium that takes its time, and says when something has been flushed to it.
@@ -163,11 +163,11 @@ fn an_unknown_source_is_an_error_of_the_thread() {
 fn a_recording_is_never_overwritten() {
     let path = std::env::temp_dir().join(format!("headrace-recorder-{}.mcap", std::process::id()));
     std::fs::remove_file(&path).ok();
-    let (mut port, handle) = Recorder::create(&path, &header(true), 1 << 20).unwrap();
+    let (mut port, handle) = Recorder::create(&path, &header(true), 1 << 20, None).unwrap();
     port.raw(0, MonoNs(1), MonoNs(1), b"ping").unwrap();
     let summary = handle.finish().unwrap();
     assert_eq!(std::fs::metadata(&path).unwrap().len(), summary.bytes);
-    assert!(matches!(Recorder::create(&path, &header(true), 0), Err(LogError::Create { .. })));
+    assert!(matches!(Recorder::create(&path, &header(true), 0, None), Err(LogError::Create { .. })));
     assert_eq!(read(&std::fs::read(&path).unwrap()).0.len(), 1);
     std::fs::remove_file(&path).unwrap();
 }
@@ -184,7 +184,7 @@ fn a_disk_that_fills_keeps_what_is_small_and_says_what_it_left_out() {
     let space = Space::new(|| Some(5_000_000));
     // A velocity log's lines are as long as echoes, and are none.
     header.sonars = vec![0];
-    let (mut port, handle) = Recorder::start_within(space, medium, &header, 0).unwrap();
+    let (mut port, handle) = Recorder::start_within(space, medium, &header, 0, None).unwrap();
     for tick in 1..=100_u64 {
         let at = MonoNs(tick * 1_000_000_000);
         // The queue holds all of this.
@@ -231,4 +231,44 @@ fn what_there_was_no_room_for_is_counted() {
     let summary = handle.finish().unwrap();
     assert!(dropped > 0);
     assert_eq!((summary.sent_dropped, summary.results_missing), (dropped, 1));
+}
+
+/// Makes a message of each result but those of the last channel, for channels that are there and one that isn't.
+struct Echoing;
+
+impl Companion for Echoing {
+    fn take(&mut self, channel: u16, at: MonoNs, message: &[u8], made: &mut Vec<Made>) {
+        assert_eq!(channel, 0, "what it made doesn't come back");
+        for channel in [1, 9] {
+            made.push(Made { channel, at, bytes: [b"made of ", message].concat() });
+        }
+    }
+
+    fn end(&mut self, made: &mut Vec<Made>) {
+        made.push(Made { channel: 1, at: MonoNs(99), bytes: b"the end".to_vec() });
+    }
+}
+
+#[test]
+fn what_a_companion_makes_follows_its_result_and_goes_first_when_the_disk_fills() {
+    for (free, kept) in [(None, 3), (Some(5_000_000), 0)] {
+        let (medium, flushed) = slow(0);
+        let mut header = header(true);
+        let topic = "/result/view/echo".to_owned();
+        header.results.push(ResultChannel { topic, follows_echoes: true, ..ResultChannel::default() });
+        let companion = Some(Box::new(Echoing) as Box<dyn Companion>);
+        let space = Space::new(move || free);
+        let (mut port, handle) = Recorder::start_within(space, medium, &header, 0, companion).unwrap();
+        port.result(0, MonoNs(1), b"one").unwrap();
+        port.tick(0, MonoNs(2), &[]).unwrap();
+        port.result(0, MonoNs(3), b"two").unwrap();
+        let summary = handle.finish().unwrap();
+        assert_eq!((summary.messages, summary.left_out.messages), (3 + kept, 3 - kept));
+        let (seen, _) = read(&flushed.iter().last().unwrap());
+        let kinds: Vec<&str> = seen.iter().map(|message| message.0.as_str()).collect();
+        let echo = "/result/view/echo";
+        let whole = ["/result/advice", echo, "tick", "/result/advice", echo, echo];
+        let expected: Vec<&str> = whole.into_iter().filter(|kind| kept > 0 || *kind != echo).collect();
+        assert_eq!(kinds, expected);
+    }
 }

@@ -1,0 +1,158 @@
+//! What people's viewers cost: the view of a recorded demonstration beside everything else that the recorder's thread does for
+//! that dive, and the bytes that it adds to the log. Prints Markdown.
+
+#![expect(clippy::disallowed_methods, reason = "a benchmark reads the clock")]
+#![expect(clippy::unwrap_used, reason = "a benchmark stops at what it can't do")]
+
+use std::path::Path;
+use std::process::Command;
+use std::time::{Duration, Instant};
+
+use headrace_core::time::MonoNs;
+use headrace_core::tunnel::named;
+use headrace_replay::log::{Companion, LogHeader, LogReader, LogWriter, Made, MessageKind};
+use headrace_replay::record::result_channels;
+use headrace_replay::view::{Site, View};
+
+const HEADRACE: &str = env!("CARGO_BIN_EXE_headrace");
+/// Of several passes the fastest counts.
+const PASSES: u32 = 5;
+
+/// A message as it comes out of the recorder's queue.
+struct Entry {
+    lane: Lane,
+    at: MonoNs,
+    data: Vec<u8>,
+}
+
+#[derive(Clone, Copy)]
+enum Lane {
+    Raw(u16),
+    Tick,
+    Result(u16),
+}
+
+fn main() {
+    let folder = std::env::temp_dir().join(format!("headrace-view-{}", std::process::id()));
+    let demo =
+        Command::new(HEADRACE).args(["demo", "--speed", "max", "--out"]).arg(&folder).output().unwrap();
+    assert!(demo.status.code() != Some(2), "{}", String::from_utf8_lossy(&demo.stderr));
+    let (header, entries) = read(&folder.join("dive.mcap"));
+    std::fs::remove_dir_all(&folder).unwrap();
+    let dive_s = entries.last().unwrap().at.since(entries.first().unwrap().at).as_secs_f64();
+
+    let (plain, plain_bytes) = fastest(|| written(&header, &entries, false));
+    let (whole, whole_bytes) = fastest(|| written(&header, &entries, true));
+    let (made, messages) = fastest(|| viewed(&entries).len() as u64);
+    let share = |took: Duration| took.as_secs_f64() / dive_s * 100.0;
+    println!("| what | figure | yardstick in the same run | ratio |\n|---|---|---|---|");
+    println!(
+        "| making {messages} messages for viewers of a dive of {dive_s:.0} s | {:.3} % of a core at real speed | writing \
+         and compressing that dive without them: {:.3} % | {:.2} |",
+        share(made),
+        share(plain),
+        made.as_secs_f64() / plain.as_secs_f64()
+    );
+    println!(
+        "| the recorder's thread with them | {:.3} % of a core | the same | {:.2} |",
+        share(whole),
+        whole.as_secs_f64() / plain.as_secs_f64()
+    );
+    println!(
+        "| the log with them | {:.2} MB | the log without: {:.2} MB | {:.3} |",
+        whole_bytes as f64 / 1e6,
+        plain_bytes as f64 / 1e6,
+        whole_bytes as f64 / plain_bytes as f64
+    );
+}
+
+fn fastest(mut work: impl FnMut() -> u64) -> (Duration, u64) {
+    let mut least = (Duration::MAX, 0);
+    for _ in 0..PASSES {
+        let started = Instant::now();
+        let result = work();
+        least = (least.0.min(started.elapsed()), result);
+    }
+    least
+}
+
+/// The log's messages but those for viewers.
+fn read(log: &Path) -> (LogHeader, Vec<Entry>) {
+    let mut reader = LogReader::open(log).unwrap();
+    let info = reader.header();
+    let header = LogHeader {
+        vehicle_toml: info.vehicle_toml.clone().unwrap(),
+        sources: info.sources.clone(),
+        ticks: true,
+        results: result_channels(),
+        ..LogHeader::default()
+    };
+    let mut entries = Vec::new();
+    while let Some(message) = reader.next().unwrap() {
+        let result = |topic: &str| header.results.iter().position(|result| result.topic == topic).unwrap();
+        let lane = match message.kind {
+            MessageKind::Raw { source } => Lane::Raw(source),
+            MessageKind::Tick => Lane::Tick,
+            MessageKind::Result { topic } if !topic.contains("/view/") => {
+                Lane::Result(u16::try_from(result(topic)).unwrap())
+            }
+            _ => continue,
+        };
+        entries.push(Entry { lane, at: message.log_time, data: message.data.to_vec() });
+    }
+    (header, entries)
+}
+
+fn view() -> View {
+    // The demonstration's tunnel and heads.
+    View::new(Site {
+        profile: named::ceran().unwrap(),
+        target_m: 0.5,
+        section_m: 0.25,
+        length_m: 1000.0,
+        heads: (0..4).collect(),
+    })
+}
+
+fn viewed(entries: &[Entry]) -> Vec<Made> {
+    let (mut view, mut made) = (view(), Vec::new());
+    for entry in entries {
+        if let Lane::Result(channel) = entry.lane {
+            view.take(channel, entry.at, &entry.data, &mut made);
+        }
+    }
+    view.end(&mut made);
+    made
+}
+
+/// Bytes of the dive's log.
+fn written(header: &LogHeader, entries: &[Entry], with_view: bool) -> u64 {
+    let mut log = LogWriter::new(std::io::sink(), header).unwrap();
+    let (mut view, mut made) = (view(), Vec::new());
+    for entry in entries {
+        match entry.lane {
+            Lane::Raw(source) => log.raw(source, entry.at, entry.at, &entry.data).unwrap(),
+            // The order of a tick is as the message has it.
+            Lane::Tick => {
+                let tick = headrace_replay::log::format::Tick::decode(&entry.data).unwrap();
+                log.tick(tick.index, tick.now, &tick.order().collect::<Vec<_>>()).unwrap();
+            }
+            Lane::Result(channel) => {
+                log.result(channel, entry.at, &entry.data).unwrap();
+                if with_view {
+                    view.take(channel, entry.at, &entry.data, &mut made);
+                }
+            }
+        }
+        for Made { channel, at, bytes } in made.drain(..) {
+            log.result(channel, at, &bytes).unwrap();
+        }
+    }
+    if with_view {
+        view.end(&mut made);
+    }
+    for Made { channel, at, bytes } in made.drain(..) {
+        log.result(channel, at, &bytes).unwrap();
+    }
+    log.finish().unwrap().1.bytes
+}
