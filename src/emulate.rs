@@ -13,6 +13,7 @@ use crate::cli::Emulate;
 use crate::devices::KINDS;
 use crate::failure::{self, Failure};
 use crate::files;
+use crate::live::connections;
 use crate::output::say;
 
 /// How long it waits for a host at most before it goes on: a measurement is told at most so late.
@@ -39,19 +40,18 @@ pub(crate) fn emulate(args: &Emulate) -> Result<u8, Failure> {
 /// A port for each sensor: the one that its `connect` asks for, or UDP where this machine has none of it.
 fn stands(scene: &Scene, args: &Emulate) -> Result<Vec<Stand>, Failure> {
     let mut stands = Vec::new();
-    for (config, device) in scene.vehicle.sensor_configs.iter().zip(&scene.vehicle.sensors) {
-        let asked = Connect::parse(&config.connect).and_then(|connect| connect.among(device.carriers()));
+    for ((id, asked), device) in connections(&scene.vehicle).into_iter().zip(&scene.vehicle.sensors) {
         let carrier = asked.as_ref().map_or(Carrier::Udp, Connect::carrier);
         let stand = match (asked, device.report_descriptor()) {
             (Ok(Connect::Hid(identity)), Some(descriptor)) => Stand::hid(&identity, &descriptor),
             #[cfg(target_os = "linux")]
-            (Ok(Connect::Can { interface }), _) if headrace_ports::is_up(&interface) => {
+            (Ok(Connect::Can { interface }), _) if headrace_ports::is_interface_up(&interface) => {
                 Stand::can(&interface)
             }
             _ => Stand::new(carrier, args.listen),
         };
         let stand = stand.or_else(|error| {
-            eprintln!("headrace: {}: no {} here ({error}); UDP takes its place", config.id, carrier.as_str());
+            eprintln!("headrace: {id}: no {} here ({error}); UDP takes its place", carrier.as_str());
             Stand::new(Carrier::Udp, args.listen)
         });
         stands.push(stand.map_err(|source| Failure::System { what: "opening a port for a device", source })?);

@@ -132,7 +132,6 @@ fn new_log() -> PathBuf {
 /// How each sensor is doing.
 struct Lamps {
     ids: Vec<String>,
-    phases: Vec<Option<Phase>>,
     words: Vec<String>,
     /// Required sensors that haven't run yet.
     required: Vec<usize>,
@@ -144,17 +143,11 @@ struct Lamps {
 impl Lamps {
     fn new(vehicle: &VehicleConfig, required: Vec<usize>, begun: MonoNs, required_by: MonoNs) -> Self {
         let ids: Vec<String> = vehicle.sensor_configs.iter().map(|config| config.id.clone()).collect();
-        let (phases, words) = (vec![None; ids.len()], vec![String::new(); ids.len()]);
-        Self { ids, phases, words, required, required_by, begun }
+        Self { words: vec![String::new(); ids.len()], ids, required, required_by, begun }
     }
 
     fn show(&mut self, status: &Status, watch: &mut Watch) {
-        let (Some(phase), Some(words)) =
-            (self.phases.get_mut(status.source), self.words.get_mut(status.source))
-        else {
-            return;
-        };
-        *phase = Some(status.phase);
+        let Some(words) = self.words.get_mut(status.source) else { return };
         words.clone_from(&status.words);
         if status.phase == Phase::Running {
             self.required.retain(|number| *number != status.source);

@@ -360,7 +360,11 @@ fn a_can_interface_that_goes_down_and_up_is_heard_again_from_its_first_frame() {
         rehearsal.exactly(IMU, &mut imu, 100);
         rehearsal.wait_for(IMU, Phase::Running, "");
         ip_link("set vcan3 down");
-        rehearsal.wait_for(IMU, Phase::Closed, "can:vcan3 is down; sudo ip link set vcan3 up");
+        rehearsal.wait_for(
+            IMU,
+            Phase::Closed,
+            "opening vcan3: the interface is down; sudo ip link set vcan3 up",
+        );
         // What the unit says meanwhile goes nowhere. The second time it takes longer than silence is borne.
         rehearsal.send(IMU, &mut imu, 3);
         rehearsal.exactly(TETHER, &mut tether, 60);
@@ -386,7 +390,7 @@ fn a_unit_on_an_interface_that_is_down_is_heard_once_it_is_up() {
     let vcan = Interface::up("vcan4");
     ip_link("set vcan4 down");
     let mut rehearsal = Rehearsal::new(["can:vcan4", COUNTER], &unchanged);
-    rehearsal.wait_for(IMU, Phase::Closed, "can:vcan4 is down; sudo ip link set vcan4 up");
+    rehearsal.wait_for(IMU, Phase::Closed, "opening vcan4: the interface is down; sudo ip link set vcan4 up");
     rehearsal.wait_for(TETHER, Phase::Closed, "hid:1209:0001:HR-0001: no such device is plugged in");
     ip_link("set vcan4 up");
     let mut imu = Stand::can(vcan.0).unwrap();

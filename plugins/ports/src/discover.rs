@@ -1,7 +1,7 @@
 //! What is plugged in: serial ports, HID devices, CAN interfaces and I2C buses, as the system's files tell, without opening
 //! any of them.
 
-mod can;
+pub(crate) mod can;
 mod hid;
 mod i2c;
 mod machine;

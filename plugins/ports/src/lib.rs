@@ -17,9 +17,9 @@ pub mod uhid;
 
 pub use clock::{clock_anchor, now, of_wall};
 pub use crew::{Crew, Hand};
+pub use discover::can::is_interface_up;
 pub use discover::{Found, Machine, Presence, Rights, User, discover, presence};
 #[cfg(target_os = "linux")]
-pub use lines::can::is_up;
 pub use probe::{Answer, probe};
 pub use service::SentSink;
 pub use stand::{Stand, wait_for_any};

@@ -63,9 +63,7 @@ struct Seat {
     berth: Berth,
     history: LineHistory,
     status: Option<(Phase, String)>,
-    /// Bytes heard, good frames by then, those of them that had come when the line was opened, and when there were last
-    /// more of either.
-    bytes: u64,
+    /// Good frames so far, those of them that had come when the line was opened, and when there were last more bytes.
     frames: u64,
     frames_before: u64,
     last_bytes: MonoNs,
@@ -117,7 +115,6 @@ impl Service {
             berth,
             history: LineHistory::default(),
             status: None,
-            bytes: 0,
             frames: 0,
             frames_before: 0,
             last_bytes: now,
@@ -246,7 +243,6 @@ impl Service {
     fn heard(&mut self, line: &mut dyn Line, received: MonoNs, bytes: &[u8]) -> io::Result<()> {
         for number in 0..self.seats.len() {
             if let Some(seat) = self.seats.get_mut(number) {
-                seat.bytes += bytes.len() as u64;
                 seat.last_bytes = clock::now();
             }
             self.drive(line, number, |driver, wire| driver.heard(received, bytes, wire))?;
@@ -281,7 +277,7 @@ impl Service {
         call: impl FnOnce(&mut dyn Driver, &mut dyn Wire),
     ) -> io::Result<()> {
         let Some(seat) = self.seats.get_mut(number) else { return Ok(()) };
-        let Seat { berth: Berth { driver, port, source }, history, bytes, last_bytes, .. } = seat;
+        let Seat { berth: Berth { driver, port, source }, history, last_bytes, .. } = seat;
         let mut wishes = VecDeque::new();
         call(driver.as_mut(), &mut Ends { port, history, wishes: &mut wishes });
         while let Some(wish) = wishes.pop_front() {
@@ -293,7 +289,6 @@ impl Service {
                 Wish::Exchange { write, settle, read_bytes } => {
                     self.common.note_sent(*source, &write);
                     if let Some((received, answer)) = line.exchange(&write, settle, read_bytes)? {
-                        *bytes += answer.len() as u64;
                         *last_bytes = clock::now();
                         driver.heard(received, &answer, &mut Ends { port, history, wishes: &mut wishes });
                     }

@@ -22,6 +22,11 @@ fn is_can(machine: &Machine, name: &str) -> bool {
     machine.text(&format!("{CLASS}/{name}/type")).as_deref() == Some(CAN)
 }
 
+/// Whether this machine has a network interface of that name that is up.
+pub fn is_interface_up(name: &str) -> bool {
+    is_up(&Machine::ours(), name) == Some(true)
+}
+
 /// Whether it is up, where its flags can be read.
 fn is_up(machine: &Machine, name: &str) -> Option<bool> {
     let flags = machine.text(&format!("{CLASS}/{name}/flags"))?;

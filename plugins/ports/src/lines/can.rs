@@ -11,6 +11,7 @@ use socketcan::{
 
 use super::{Line, READ_BYTES, ReadTimeout, waited};
 use crate::clock;
+use crate::discover::{self, Machine};
 use crate::trouble::Trouble;
 
 /// Length of a `can_frame`, and where its data begins.
@@ -80,18 +81,9 @@ impl Line for Can {
     }
 
     fn complaint(&self) -> Option<String> {
-        let name = &self.interface;
-        (self.is_down && !is_up(name)).then(|| format!("can:{name} is down; sudo ip link set {name} up"))
+        let down = discover::can::down(&Machine::ours(), &self.interface).filter(|_| self.is_down);
+        down.map(|trouble| trouble.to_string())
     }
-}
-
-/// Whether there is a network interface of this name that is up, as far as Linux says.
-pub fn is_up(interface: &str) -> bool {
-    /// Source: Linux, IFF_UP, of what /sys tells in hexadecimal.
-    const UP: u32 = 1;
-    let flags = std::fs::read_to_string(format!("/sys/class/net/{interface}/flags")).unwrap_or_default();
-    let digits = flags.trim().trim_start_matches("0x");
-    u32::from_str_radix(digits, 16).is_ok_and(|flags| flags & UP != 0)
 }
 
 /// Puts a frame on a bus.
