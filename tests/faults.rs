@@ -14,6 +14,8 @@ mod common;
 mod faulty;
 #[path = "common/garbling.rs"]
 mod garbling;
+#[path = "common/random.rs"]
+mod random;
 #[path = "common/rig.rs"]
 mod rig;
 
@@ -21,8 +23,9 @@ use std::os::unix::fs::PermissionsExt as _;
 
 use common::Folder;
 use faulty::{End, Fault, Healthy, Wire};
-use garbling::{EachFrame, Garbled, Random, flipped, of_head, of_ping, thinned};
+use garbling::{EachFrame, Garbled, flipped, of_head, of_ping, thinned};
 use headrace_ports::Phase;
+use random::Random;
 use rig::{COUNTER, DEPTH, HEAD, PING, Rig, Sensor};
 
 /// A sensor whose line is sound.

@@ -91,31 +91,9 @@ fn through(folder: &Folder, log: &str) -> Vec<(MonoNs, u64, u64)> {
 /// The dive as a simulation gives it, by log time; as our recorder writes it, by ticks; and so in parts.
 fn logs() -> Folder {
     let folder = Folder::with_dive();
-    let recorded = folder.headrace(&[
-        "run",
-        "vehicle.toml",
-        "--source",
-        "dive.mcap",
-        "--record",
-        "ticks.mcap",
-        "--speed",
-        "max",
-    ]);
-    assert_eq!(recorded.code, Some(0), "{}", recorded.stderr);
+    folder.record("dive.mcap", "ticks.mcap", &[]);
     std::fs::create_dir(folder.path("parts")).unwrap();
-    let parts = folder.headrace(&[
-        "run",
-        "vehicle.toml",
-        "--source",
-        "dive.mcap",
-        "--record",
-        "parts/dive.mcap",
-        "--speed",
-        "max",
-        "--rotate",
-        "5s",
-    ]);
-    assert_eq!(parts.code, Some(0), "{}", parts.stderr);
+    folder.record("dive.mcap", "parts/dive.mcap", &["--rotate", "5s"]);
     folder
 }
 

@@ -14,17 +14,7 @@ use serde_json::Value;
 /// A dive that was recorded live.
 fn recorded() -> Folder {
     let folder = Folder::with_dive();
-    let answer = folder.headrace(&[
-        "run",
-        "vehicle.toml",
-        "--source",
-        "dive.mcap",
-        "--record",
-        "live.mcap",
-        "--speed",
-        "max",
-    ]);
-    assert_eq!(answer.code, Some(0), "{}", answer.stderr);
+    folder.record("dive.mcap", "live.mcap", &[]);
     folder
 }
 

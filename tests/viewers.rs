@@ -41,18 +41,7 @@ fn recorded() -> (Folder, Value) {
     folder.write("vehicle.toml", VEHICLE);
     folder.write("scene.toml", SCENE);
     folder.simulate("scene.toml", "dive.mcap");
-    let answer = folder.headrace(&[
-        "run",
-        "vehicle.toml",
-        "--source",
-        "dive.mcap",
-        "--record",
-        "live.mcap",
-        "--speed",
-        "max",
-        "--json",
-    ]);
-    assert_eq!(answer.code, Some(0), "{}", answer.stderr);
+    let answer = folder.record("dive.mcap", "live.mcap", &["--json"]);
     let report = serde_json::from_str(&answer.stdout).unwrap();
     (folder, report)
 }

@@ -5,25 +5,7 @@ use headrace_imagenex881::codec::{Model, ReturnCodec, Returns};
 use headrace_ping1d::codec::PingCodec;
 
 use super::faulty::{Fault, Wire};
-
-/// Numbers that look random and are the same each time.
-pub(crate) struct Random(pub(crate) u64);
-
-impl Random {
-    pub(crate) fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mixed = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        mixed ^ (mixed >> 27)
-    }
-
-    pub(crate) fn byte(&mut self) -> u8 {
-        self.next().to_le_bytes()[5]
-    }
-
-    pub(crate) fn one_in(&mut self, count: u64) -> bool {
-        self.next().is_multiple_of(count)
-    }
-}
+use super::random::Random;
 
 /// How many good frames a codec finds in bytes that stand alone.
 pub(crate) type Count = fn(&[u8]) -> u64;

@@ -210,6 +210,15 @@ impl Folder {
         assert_eq!(answer.code, Some(0), "{}", answer.stderr);
     }
 
+    /// Dives a log of `vehicle.toml` as if it came from ports, as fast as it can, and records it; what the program answered.
+    #[track_caller]
+    pub(crate) fn record(&self, from: &str, to: &str, further: &[&str]) -> Answer {
+        let arguments = ["run", "vehicle.toml", "--source", from, "--record", to, "--speed", "max"];
+        let answer = self.headrace(&[&arguments[..], further].concat());
+        assert_eq!(answer.code, Some(0), "{}", answer.stderr);
+        answer
+    }
+
     /// `scene.toml` is refused: exit code 2, these words, and no log.
     #[track_caller]
     pub(crate) fn refuses_scene(&self, words: &[&str]) {

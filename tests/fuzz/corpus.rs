@@ -11,7 +11,8 @@ use headrace_replay::log::{LogHeader, LogWriter, SourceInfo};
 use mcap::{Compression, WriteOptions};
 
 use crate::BEGIN;
-use crate::mutate::{Random, broken};
+use crate::mutate::broken;
+use crate::random::Random;
 use crate::targets::{Said, said};
 
 /// What reads a file.

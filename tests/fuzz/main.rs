@@ -21,6 +21,8 @@
 
 mod corpus;
 mod mutate;
+#[path = "../common/random.rs"]
+mod random;
 mod targets;
 
 #[path = "../../src/devices.rs"]
@@ -42,7 +44,7 @@ use headrace_core::time::{DurNs, MonoNs};
 use headrace_ports::now;
 
 use corpus::{Corpus, Kind};
-use mutate::Random;
+use random::Random;
 use targets::{Surroundings, try_one};
 
 /// The most that one file of some ten kilobytes may take: a chunk of a log or a bag unpacked, twice while it moves, and what it is made of.

@@ -1,34 +1,16 @@
 //! What befalls files: bits turn, ends are missing, parts are lost, doubled or come from elsewhere, and lengths lie.
 
-/// Numbers that look random and are the same each time (Weyl sequence, mixed).
-pub(crate) struct Random(pub(crate) u64);
+use super::random::Random;
 
-impl Random {
-    pub(crate) fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mixed = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        mixed ^ (mixed >> 27)
-    }
-
-    /// Below `limit`; 0 where that is 0.
-    pub(crate) fn below(&mut self, limit: usize) -> usize {
-        usize::try_from((self.next() >> 16) % (limit.max(1) as u64)).unwrap()
-    }
-
-    fn byte(&mut self) -> u8 {
-        self.next().to_le_bytes()[5]
-    }
-
-    /// A part of so many bytes: begins anywhere, and is more often short than long.
-    fn part(&mut self, len: usize) -> core::ops::Range<usize> {
-        let start = self.below(len);
-        let most = match self.below(3) {
-            0 => 16,
-            1 => 1024,
-            _ => len,
-        };
-        start..(start + self.below(most)).min(len)
-    }
+/// A part of so many bytes: begins anywhere, and is more often short than long.
+fn part(random: &mut Random, len: usize) -> core::ops::Range<usize> {
+    let start = random.below(len);
+    let most = match random.below(3) {
+        0 => 16,
+        1 => 1024,
+        _ => len,
+    };
+    start..(start + random.below(most)).min(len)
 }
 
 /// Lengths and counts that make trouble.
@@ -69,20 +51,20 @@ fn once(random: &mut Random, bytes: &mut Vec<u8>, other: &[u8]) {
             bytes.iter_mut().skip(at).take(1).for_each(|byte| *byte = value);
         }
         3 => bytes.truncate(at),
-        4 => drop(bytes.drain(random.part(len))),
+        4 => drop(bytes.drain(part(random, len))),
         5 => {
-            let part = bytes[random.part(len)].to_vec();
-            drop(bytes.splice(at..at, part));
+            let piece = bytes[part(random, len)].to_vec();
+            drop(bytes.splice(at..at, piece));
         }
         6 => {
-            let part = other[random.part(other.len())].to_vec();
-            let to = if random.below(2) == 0 { at } else { (at + part.len()).min(len) };
-            drop(bytes.splice(at..to, part));
+            let piece = other[part(random, other.len())].to_vec();
+            let to = if random.below(2) == 0 { at } else { (at + piece.len()).min(len) };
+            drop(bytes.splice(at..to, piece));
         }
         7 => {
-            let part = random.part(len);
+            let place = part(random, len);
             let value = if random.below(2) == 0 { 0 } else { random.byte() };
-            bytes[part].fill(value);
+            bytes[place].fill(value);
         }
         _ => lengths(random, bytes, at),
     }
