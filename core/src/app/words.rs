@@ -119,19 +119,8 @@ pub fn alert_words(kind: AlertKind, x_m: f64, off_m: f64) -> String {
     }
 }
 
-/// What would help where slower doesn't.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Help {
-    /// A steady heading.
-    Steady,
-    /// The middle of the tunnel.
-    Centre,
-    /// A mode of this name.
-    Mode(String),
-}
-
 /// What the words for advice need of it.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AdviceFigures {
     /// Speed now, m/s.
     pub speed_mps: f64,
@@ -148,7 +137,7 @@ pub struct AdviceFigures {
     /// A strip that no head sees: its width and the arc length of its middle, m.
     pub unseen_m: Option<[f64; 2]>,
     /// What would help where slower doesn't.
-    pub help: Option<Help>,
+    pub remedy: Option<Remedy>,
 }
 
 impl From<&AdviceEntry> for AdviceFigures {
@@ -162,11 +151,7 @@ impl From<&AdviceEntry> for AdviceFigures {
             phase_error_rad: advice.phase_error_rad.unwrap_or(0.0),
             t_y_m: advice.t_y_m,
             unseen_m: advice.unseen_m,
-            help: advice.remedy.map(|remedy| match remedy {
-                Remedy::Steady => Help::Steady,
-                Remedy::Centre => Help::Centre,
-                Remedy::Mode(name) => Help::Mode(name.as_str().to_owned()),
-            }),
+            remedy: advice.remedy,
         }
     }
 }
@@ -183,12 +168,12 @@ pub fn advice_words(advice: &AdviceFigures, profile: &Profile) -> String {
         }
         Reason::HelixPitch => format!("may go {:.2} m/s (distance between turns)", advice.v_max_mps),
         Reason::AngularStep => {
-            let remedy = match &advice.help {
-                Some(Help::Steady) => {
+            let remedy = match advice.remedy {
+                Some(Remedy::Steady) => {
                     return "slower won't help: hold the heading, the beams swing".to_owned();
                 }
-                Some(Help::Centre) => "go to the middle of the tunnel".to_owned(),
-                Some(Help::Mode(mode)) => format!("set the heads to {}", mode.to_uppercase()),
+                Some(Remedy::Centre) => "go to the middle of the tunnel".to_owned(),
+                Some(Remedy::Mode(mode)) => format!("set the heads to {}", mode.as_str().to_uppercase()),
                 None => "no mode meets the target here".to_owned(),
             };
             match advice.unseen_m {

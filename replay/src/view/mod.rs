@@ -28,11 +28,11 @@ mod tests;
 
 use headrace_core::app::alerts::AlertKind;
 use headrace_core::app::trail::{Record, RecordKind, first_record, text_of};
-use headrace_core::app::words::{AdviceFigures, CauseFigures, Help, advice_words, alert_words};
+use headrace_core::app::words::{AdviceFigures, CauseFigures, advice_words, alert_words};
 use headrace_core::coverage::{Cause, Verdict};
 use headrace_core::frames::{Body, Rot, Tunnel};
 use headrace_core::fusion::NoFix;
-use headrace_core::sampling::advice::Reason;
+use headrace_core::sampling::advice::{Reason, Remedy};
 use headrace_core::time::{DurNs, MonoNs};
 use headrace_core::tunnel::Profile;
 use serde::Serialize;
@@ -253,12 +253,7 @@ impl View {
         let will_exceed = words.integer()? != 0;
         let [phase_error_rad, t_y_m, width_m, arc_m] = words.numbers()?;
         let (remedy, mode) = (words.integer()?, [words.integer()?, words.integer()?]);
-        let help = match remedy {
-            1 => Some(Help::Steady),
-            2 => Some(Help::Centre),
-            3 => Some(Help::Mode(text_of(mode))),
-            _ => None,
-        };
+        let remedy = Remedy::of(remedy, &text_of(mode));
         self.v_max_mps = v_max_mps;
         let speed_mps = self.last.map(|(_, speed_mps)| speed_mps);
         let told = self.told.as_ref();
@@ -278,7 +273,7 @@ impl View {
             phase_error_rad,
             t_y_m,
             unseen_m: (width_m > 0.0).then_some([width_m, arc_m]),
-            help,
+            remedy,
         };
         let said = advice_words(&figures, &self.site.profile);
         if turned {

@@ -54,7 +54,7 @@ pub struct ModeName {
 }
 
 impl ModeName {
-    /// Of a name; one of more than [`MODE_NAME_BYTES`] bytes is cut.
+    /// Of a name; what goes beyond 15 bytes is cut.
     pub fn new(name: &str) -> Self {
         let mut bytes = [0; MODE_NAME_BYTES];
         let len = name.floor_char_boundary(MODE_NAME_BYTES);
@@ -93,6 +93,12 @@ impl Remedy {
             Self::Centre => 2,
             Self::Mode(_) => 3,
         }
+    }
+
+    /// The one with that number, and the name of a mode where it is one; `None` for none.
+    pub fn of(number: u64, mode: &str) -> Option<Self> {
+        let all = [Self::Steady, Self::Centre, Self::Mode(ModeName::new(mode))];
+        all.into_iter().find(|remedy| remedy.number() == number)
     }
 
     /// The word used in reports: `centre`, `steady`, or the mode's name.
