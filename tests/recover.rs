@@ -16,9 +16,7 @@ use serde_json::Value;
 /// A dive that was recorded live, and the log of it.
 fn recorded() -> (Folder, Vec<u8>) {
     let folder = Folder::with_dive();
-    let arguments = ["--source", "dive.mcap", "--record", "live.mcap", "--speed", "max"];
-    let answer = folder.headrace(&[&["run", "vehicle.toml"], &arguments[..]].concat());
-    assert_eq!(answer.code, Some(0), "{}", answer.stderr);
+    folder.record("dive.mcap", "live.mcap", &[]);
     let log = folder.read("live.mcap");
     (folder, log)
 }

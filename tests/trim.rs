@@ -30,9 +30,7 @@ fn recorded(scene: &str, vehicle: &str) -> Folder {
     folder.write("vehicle.toml", vehicle);
     folder.write("scene.toml", scene);
     folder.simulate("scene.toml", "dive.mcap");
-    let arguments = ["--source", "dive.mcap", "--record", "live.mcap", "--speed", "max"];
-    let answer = folder.headrace(&[&["run", "vehicle.toml"], &arguments[..]].concat());
-    assert_eq!(answer.code, Some(0), "{}", answer.stderr);
+    folder.record("dive.mcap", "live.mcap", &[]);
     folder
 }
 
@@ -93,6 +91,15 @@ fn a_cut_says_that_it_is_one_and_judges_its_inside_as_the_whole() {
         assert_eq!(answer.code, Some(1), "{}", answer.stdout);
         assert!(answer.stdout.contains("this log was cut from another"), "{}", answer.stdout);
     }
+    // Only what there was is said to be missing.
+    for (name, further, said, unsaid) in [
+        ("later.mcap", ["--from", "20s"], "before was cut off", "after was cut off"),
+        ("earlier.mcap", ["--to", "20s"], "after was cut off", "before was cut off"),
+    ] {
+        trim(&folder, name, &further);
+        let losses = folder.replay(name, &[]).1["log"]["losses"].to_string();
+        assert!(losses.contains(said) && !losses.contains(unsaid), "{losses}");
+    }
     let answer = folder.headrace(&["trim", "live.mcap", "-o", "none.mcap", "--chainage", "60..70"]);
     assert_eq!(answer.code, Some(2), "{}", answer.stdout);
     assert!(answer.stderr.contains("wasn't between 60 and 70 m"), "{}", answer.stderr);
@@ -135,8 +142,7 @@ fn an_anonymous_log_has_no_name_address_comment_or_time_of_day() {
     folder.write("vehicle.toml", &vehicle);
     folder.write("scene.toml", common::SCENE);
     folder.simulate("scene.toml", "plain.mcap");
-    let arguments = ["--source", "plain.mcap", "--record", "live.mcap", "--speed", "max"];
-    assert_eq!(folder.headrace(&[&["run", "vehicle.toml"], &arguments[..]].concat()).code, Some(0));
+    folder.record("plain.mcap", "live.mcap", &[]);
     let told = trim(&folder, "public.mcap", &["--anonymise"]);
     // Attachments and metadata aren't compressed; so is nothing after this.
     let answer = folder.headrace(&["recover", "public.mcap", "-o", "again.mcap"]);

@@ -154,10 +154,11 @@ fn string_len(text: &str, quote: char) -> usize {
     text.len()
 }
 
-/// The key whose value begins at the end of `text`.
+/// The key whose value begins at the end of `text`, without the tables before it.
 fn key_before(text: &str) -> &str {
     let line = text.rsplit(['\n', ',', '{', '[']).next().unwrap_or_default();
-    line.split_once('=').map_or("", |(key, _)| key.trim())
+    let key = line.split_once('=').map_or("", |(key, _)| key);
+    key.rsplit('.').next().unwrap_or_default().trim().trim_matches(['"', '\''])
 }
 
 /// A string of the file as it may be handed on.
@@ -203,6 +204,9 @@ connect = "serial:/dev/serial/by-id/usb-FTDI_A50285BI-if00?baud=9600"
 [[sensors]]
 signals = { rate = ["A#1", "B\"#"], sample_time = "T" }
 connect = "hid:1209:0001:SN4711"
+[more]
+inner."name" = "Anna"
+'connect' = "can:plant"
 "##;
         let names = [("upper plant.csv".to_owned(), "file1.csv".to_owned())];
         let expected = r##"name = "name 1"
@@ -221,6 +225,9 @@ connect = "serial:/dev/ttyUSB4?baud=9600"
 [[sensors]]
 signals = { rate = ["A#1", "B\"#"], sample_time = "T" }
 connect = "hid:1209:0001"
+[more]
+inner."name" = "name 6"
+'connect' = "can:can7"
 "##;
         assert_eq!(anonymised(text, &names), expected);
     }

@@ -71,7 +71,7 @@ pub fn trim<R: Read + Seek, W: Write>(
     for loss in found.losses {
         log.lost(loss.from, loss.to, &words(&loss))?;
     }
-    state_cuts(&trim.spans, &mut log)?;
+    state_cuts(&trim.spans, reader.times(), &mut log)?;
     let numbers = topics.iter().map(String::as_str).zip(0..).collect();
     let mut cutter = Cutter {
         numbers,
@@ -88,16 +88,25 @@ pub fn trim<R: Read + Seek, W: Write>(
     Ok(cutter.done)
 }
 
-/// Says what isn't there any more.
-fn state_cuts<W: Write>(spans: &[(MonoNs, MonoNs)], log: &mut LogWriter<W>) -> Result<(), LogError> {
-    let (Some(first), Some(last)) = (spans.first(), spans.last()) else { return Ok(()) };
-    log.lost(None, Some(first.0), "what came before was cut off by headrace trim")?;
+/// Says what isn't there any more of a log whose messages lie between two times.
+fn state_cuts<W: Write>(
+    spans: &[(MonoNs, MonoNs)],
+    times: Option<(MonoNs, MonoNs)>,
+    log: &mut LogWriter<W>,
+) -> Result<(), LogError> {
+    let (Some(first), Some(last), Some(times)) = (spans.first(), spans.last(), times) else { return Ok(()) };
+    if times.0 < first.0 {
+        log.lost(None, Some(first.0), "what came before was cut off by headrace trim")?;
+    }
     for pair in spans.windows(2) {
         if let [before, after] = pair {
             log.lost(Some(before.1), Some(after.0), "cut out by headrace trim")?;
         }
     }
-    log.lost(Some(last.1), None, "what came after was cut off by headrace trim")
+    if times.1 >= last.1 {
+        log.lost(Some(last.1), None, "what came after was cut off by headrace trim")?;
+    }
+    Ok(())
 }
 
 /// Writes message after message.
