@@ -14,6 +14,10 @@ use crate::import::Kind;
 pub(crate) use amounts::time;
 use amounts::{every, stretch};
 
+/// What `replay --interactive` understands.
+pub(crate) const COMMANDS: &str =
+    "pause, go, step [TICKS], seek TIME, ahead TIME, back TIME, speed N|max, end";
+
 /// On-board coverage monitor for sonar inspection of flooded hydroelectric tunnels.
 #[derive(Debug, Parser)]
 #[command(version, arg_required_else_help = true)]
@@ -203,8 +207,7 @@ pub(crate) struct Replay {
     /// kept in LOG.states, so that it takes a moment the next time.
     #[arg(long, value_name = "TIME", value_parser = time, conflicts_with = "smooth")]
     pub(crate) from: Option<DurNs>,
-    /// Take lines from standard input while it plays: pause, go, step [TICKS], seek TIME, speed N|max, end.
-    #[arg(short, long, conflicts_with = "smooth")]
+    #[arg(short, long, conflicts_with = "smooth", help = format!("Take lines from standard input while it plays: {COMMANDS}"))]
     pub(crate) interactive: bool,
     /// Judge by the smoothed track: what was learnt later corrects where the vehicle was before. Says what that changed.
     #[arg(long, conflicts_with = "speed")]

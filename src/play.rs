@@ -15,14 +15,13 @@ use headrace_replay::playback::{Playback, Watcher, Wish};
 use headrace_replay::player::Player;
 use headrace_replay::states::{States, identity, log_identity};
 
-use crate::cli::{speed, time};
+use crate::cli::{COMMANDS, speed, time};
 use crate::dive::Dive;
 use crate::failure::Failure;
 use crate::watch::Watch;
 
 /// From one state to the next it takes so long to replay: with what a jump takes besides, well under a second.
 const BETWEEN_STATES: Duration = Duration::from_millis(300);
-const COMMANDS: &str = "pause, go, step [TICKS], seek TIME, ahead TIME, back TIME, speed N|max, end";
 
 /// How a replay is watched.
 pub(crate) struct Playing {
