@@ -345,9 +345,9 @@ fn arrange(files: &[PathBuf]) -> Result<Arranged, LogError> {
                 _ => return Err(LogError::NotAPart { path: path.clone() }),
             },
             // As a power cut leaves it, in the moment in which it was begun.
-            (Err(error @ LogError::NotMcap { .. }), Some(part)) => {
-                losses.push(loss(LossKind::PartUnreadable { part, why: error.to_string() }, None, None));
-                unread = Some(error);
+            (Err(LogError::NotMcap { name, found, wanted }), Some(part)) => {
+                losses.push(loss(LossKind::PartUnreadable { part, found: found.clone() }, None, None));
+                unread = Some(LogError::NotMcap { name, found, wanted });
             }
             (Err(error), _) => return Err(error),
         }

@@ -70,12 +70,12 @@ pub enum LossKind {
         /// The same as the next part says.
         wanted: u64,
     },
-    /// A part of a recording that can't be read at all, and why.
+    /// A part of a recording that isn't an MCAP file.
     PartUnreadable {
         /// The part's number, by the name of its file.
         part: u32,
-        /// Why.
-        why: String,
+        /// Its first bytes, in hex.
+        found: String,
     },
     /// A part whose own words on which part it is don't read; it was taken for this one by the name of its file.
     PartByName {
@@ -140,7 +140,9 @@ impl fmt::Display for LossKind {
                 "part {part} is not the one that was recorded: with it there are {messages} messages, and the next part \
                  says {wanted}"
             ),
-            Self::PartUnreadable { part, why } => write!(out, "part {part} can't be read: {why}"),
+            Self::PartUnreadable { part, found } => {
+                write!(out, "part {part} can't be read: it begins with [{found}], which no MCAP file does")
+            }
             Self::PartByName { part } => {
                 write!(out, "part {part} doesn't say which part it is; taken for that by its name")
             }
