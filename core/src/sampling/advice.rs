@@ -37,6 +37,16 @@ const UNDER_WAY_MPS: f64 = 0.02;
 /// Stretches of wall out of a head's reach that there is room for.
 const OUT_OF_REACH: usize = 16;
 
+/// The largest speed for a target that was found.
+struct Fastest {
+    /// The speed, m/s.
+    speed_mps: f64,
+    /// What is advised of it, m/s.
+    advised_mps: f64,
+    /// T_y where it is the largest, m.
+    t_y_m: f64,
+}
+
 /// What the advice is given for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Task {
@@ -65,8 +75,6 @@ pub struct Advisor {
     /// What each head sees from there.
     middle: Vec<Ring>,
     parallax_rad: f64,
-    /// The farthest wall that a head looks at, m.
-    farthest_m: f64,
     /// How many soundings of its ring the step of each head that turns passes over.
     strides: [Option<usize>; MAX_HEADS],
     /// The head whose ring is looked at first.
@@ -77,9 +85,11 @@ pub struct Advisor {
     astern: bool,
     /// The largest speed found last: where it still does, no other is looked for.
     last_mps: Option<f64>,
+    /// How far the vehicle may move before beams are cast anew, m.
+    still_m: f64,
 }
 
-stateful!(Advisor { state: now, parallax_rad, farthest_m, next, until_alternatives, alternatives, astern, last_mps; slots: strides; each: heads, views; fixed: profile, task, modes, centred_m, middle; });
+stateful!(Advisor { state: now, parallax_rad, next, until_alternatives, alternatives, astern, last_mps, still_m; slots: strides; each: heads, views; fixed: profile, task, modes, centred_m, middle; });
 
 impl Advisor {
     /// For heads with the modes that each has, and the parts of the hull that may stand in their way.
@@ -121,13 +131,13 @@ impl Advisor {
             centred_m: Vec::new(),
             middle: Vec::new(),
             parallax_rad: 0.0,
-            farthest_m: 0.0,
             strides: [None; MAX_HEADS],
             next: 0,
             until_alternatives: 0,
             alternatives: [None; MAX_MODES],
             astern: false,
             last_mps: None,
+            still_m: 0.0,
         };
         advisor.look_from_the_middle();
         advisor
@@ -198,20 +208,23 @@ impl Advisor {
         let passes = phasing.at(situation.speed_mps).beside(self.parallax_rad);
         let ping_period_s =
             situation.heads.iter().flatten().map(HeadMotion::ping_period_s).fold(0.0, f64::max);
+        let farthest_m = self.profile.farthest_m([pose.position.y(), pose.position.z()]);
         let going = Going {
             ping_period_s,
-            swing_mps: swing.rate_radps * self.farthest_m,
+            swing_mps: swing.rate_radps * farthest_m,
             shift_m: 0.0,
             apart_m: phasing.apart_m(),
-            swing_most_m: Some(swing.most_rad * self.farthest_m),
+            swing_most_m: Some(swing.most_rad * farthest_m),
         };
         // What is just within the target, but not surely, can't pass; where no speed leaves such room, the target alone counts.
         let sure_m = self.task.target_m - margin_m(situation.doubt_m, self.task.target_m);
         let fastest = self
             .fastest_mps(situation, &passes, &going, sure_m)
             .or_else(|_| self.fastest_mps(situation, &passes, &going, self.task.target_m));
-        let advised_mps = fastest.ok().map(|[_, advised_mps]| advised_mps).filter(|mps| *mps > 0.0);
-        self.last_mps = fastest.ok().map(|[fastest_mps, _]| fastest_mps).filter(|mps| *mps > 0.0);
+        let possible = fastest.as_ref().ok().filter(|fastest| fastest.speed_mps > 0.0);
+        let advised_mps = possible.map(|fastest| fastest.advised_mps);
+        self.last_mps = possible.map(|fastest| fastest.speed_mps);
+        self.still_m = self.still_m_for(&fastest, &going);
         let predicted_t_m = self.now.t_max_m(0, &passes, situation.speed_mps.abs(), &going);
         let x_m = pose.position.x();
         let left_m = if self.astern { x_m } else { self.task.length_m - x_m };
@@ -255,7 +268,7 @@ impl Advisor {
             let (Some(head), Some(view)) = (self.heads.get_mut(number), self.views.get_mut(number)) else {
                 continue;
             };
-            if head.cast_at.is_none() || may_cast && !head.is_near(pose) {
+            if head.cast_at.is_none() || may_cast && !head.is_near(pose, self.still_m) {
                 may_cast &= head.cast_at.is_none();
                 if head.cast(&self.profile, pose).is_ok() {
                     head.look(&self.profile, pose, self.task.sound_speed_mps, view);
@@ -281,8 +294,6 @@ impl Advisor {
             *slot = [place.y(), place.z()];
             known += 1;
         }
-        let looking = self.heads.iter().filter(|head| head.cast_at.is_some());
-        self.farthest_m = looking.map(|head| head.ring.longest_range_m()).fold(0.0, f64::max);
         self.parallax_rad = passes::parallax_rad(&self.profile, places.get(..known).unwrap_or_default());
         self.now.rebuild(self.profile.perimeter_m(), &self.views);
         // Most heads' rings are those of the last piece of advice.
@@ -304,26 +315,39 @@ impl Advisor {
         passes: &Passes,
         going: &Going,
         target_m: f64,
-    ) -> Result<[f64; 2], SamplingError> {
+    ) -> Result<Fastest, SamplingError> {
         // However the heads were phased, no speed beyond this one would do.
         let bound_mps = target_m / (passes.even_gap_s() + going.ping_period_s);
-        self.now.speed_for_target_mps(0, passes, target_m, going)?;
+        let t_y_m = self.now.bound_for_target(0, passes, target_m, going)?.t_y_m;
         let heading = if self.astern { -1.0 } else { 1.0 };
         let phasing = Phasing::of(situation);
         let meets = |speed_mps: f64| {
             let then = phasing.at(heading * speed_mps).beside(self.parallax_rad);
             // No strip has more passes than all heads make: most speeds are ruled out by these alone.
             let gap_s = then.gap_s(then.heads()).unwrap_or(f64::INFINITY);
-            speed_mps * gap_s <= target_m && self.now.t_max_m(0, &then, speed_mps, going) <= target_m
+            speed_mps * gap_s <= target_m && self.now.meets(0, &then, speed_mps, target_m, going)
         };
         let now_mps = Some(situation.speed_mps.abs()).filter(|now_mps| *now_mps > UNDER_WAY_MPS);
         let known = now_mps.into_iter().chain(self.last_mps);
         let from_mps = known.into_iter().find(|speed_mps| *speed_mps < bound_mps && meets(*speed_mps));
-        let fastest_mps = match from_mps {
+        let speed_mps = match from_mps {
             Some(from_mps) => search::upwards_mps(from_mps, bound_mps, meets),
             None => search::downwards_mps(bound_mps, meets),
         };
-        Ok([fastest_mps, search::kept_back_mps(fastest_mps, SPEED_MARGIN, meets)])
+        let advised_mps = search::kept_back_mps(speed_mps, SPEED_MARGIN, meets);
+        Ok(Fastest { speed_mps, advised_mps, t_y_m })
+    }
+
+    /// How far the vehicle may move before beams are cast anew, m.
+    fn still_m_for(&self, fastest: &Result<Fastest, SamplingError>, going: &Going) -> f64 {
+        let (t_y_m, swing_share) = match fastest {
+            Ok(fastest) => (fastest.t_y_m, going.swing_mps / fastest.speed_mps.max(UNDER_WAY_MPS)),
+            // A swing too wide for any speed is so from a bit aside, too.
+            Err(SamplingError::OffAxis { .. }) => (self.now.largest_step_m(0), 0.0),
+            // Any step may be what stands in the way.
+            Err(_) => (self.task.target_m, 0.0),
+        };
+        look::still_m(self.task.target_m, t_y_m, self.profile.perimeter_m() / math::TAU, swing_share)
     }
 
     /// Thinks over what each mode that all heads have would allow, those that turn now started in phase.
@@ -375,8 +399,8 @@ impl Advisor {
         };
         let passes = passes.ok()?.beside(self.parallax_rad);
         let going = Going { ping_period_s, ..*going };
-        let speed = self.modes.speed_for_target_mps(number, &passes, self.task.target_m, &going);
-        Some(speed.unwrap_or(0.0))
+        let bound = self.modes.bound_for_target(number, &passes, self.task.target_m, &going);
+        Some(bound.map_or(0.0, |bound| bound.speed_mps))
     }
 
     /// What would help: a steady heading, where that alone would; the middle, where the same steps are short enough
@@ -384,7 +408,7 @@ impl Advisor {
     fn remedy(&self, situation: &Situation, passes: &Passes, going: &Going, unseen: bool) -> Option<Remedy> {
         let target_m = self.task.target_m;
         let steady = Going { ping_period_s: going.ping_period_s, ..Going::default() };
-        if going.swing_mps > 0.0 && self.now.speed_for_target_mps(0, passes, target_m, &steady).is_ok() {
+        if going.swing_mps > 0.0 && self.now.bound_for_target(0, passes, target_m, &steady).is_ok() {
             return Some(Remedy::Steady);
         }
         let stride = situation.heads.iter().flatten().map(|motion| Ring::stride(motion.step_rad, RING)).max();

@@ -149,7 +149,7 @@ impl Planner {
     pub fn v_max_mps(&self, mode: usize, target_m: f64) -> Result<f64, SamplingError> {
         positive("the target in metres", target_m)?;
         let speed = |stance: &Stance, passes: &Passes, going: &Going| {
-            stance.strips.speed_for_target_mps(mode, passes, target_m, going)
+            stance.strips.bound_for_target(mode, passes, target_m, going).map(|bound| bound.speed_mps)
         };
         let mut slowest = f64::INFINITY;
         let mut refused = None;

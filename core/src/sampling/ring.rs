@@ -258,12 +258,19 @@ impl Ring {
     pub fn steps_m(&self, stride: usize) -> impl Iterator<Item = f64> {
         let count = self.soundings.len().max(1);
         let whole_m = self.way_round_m();
-        let way_m =
-            move |k: usize| self.way_m.get(k % count).copied().unwrap_or(0.0) + whole_m * (k / count) as f64;
+        let way_m = |k: usize| self.way_m.get(k).copied().unwrap_or(0.0);
+        let (turns, rest) = (stride / count, stride % count);
         self.pairs(stride).enumerate().map(move |(k, (a, b))| {
-            // The soundings' own difference keeps its digits; the way says how often it goes round.
+            let (to, turns) =
+                if k + rest < count { (k + rest, turns) } else { (k + rest - count, turns + 1) };
+            // The soundings' own difference keeps its digits; the way says how often it goes round, mostly not at all.
             let short_m = math::wrap_signed(b.sigma_m - a.sigma_m, self.perimeter_m);
-            let rounds = math::round_to_i64((way_m(k + stride) - way_m(k) - short_m) / self.perimeter_m);
+            let round_m = way_m(to) + whole_m * turns as f64 - way_m(k) - short_m;
+            let rounds = if round_m.abs() < 0.4 * self.perimeter_m {
+                0
+            } else {
+                math::round_to_i64(round_m / self.perimeter_m)
+            };
             math::hypot(b.beam.x() - a.beam.x(), short_m + rounds as f64 * self.perimeter_m)
         })
     }

@@ -134,6 +134,15 @@ pub struct Going {
     pub swing_most_m: Option<f64>,
 }
 
+/// The largest speed for a target, m/s, and how far apart neighbours are around the wall where it is the largest, m.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bound {
+    /// The speed, m/s; infinite where nothing bounds it.
+    pub speed_mps: f64,
+    /// T_y there, m.
+    pub t_y_m: f64,
+}
+
 /// The strips of a wall, in order of arc length, neighbours seen by different heads; one strip where all see all. With
 /// the largest steps on each, for each of some settings of the heads.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -281,29 +290,54 @@ impl Strips {
     /// width bounds the distance between samples on its sides, too.
     /// Source: Jorge et al. 2021, Eq. 16.
     pub fn t_max_m(&self, setting: usize, passes: &Passes, speed_mps: f64, going: &Going) -> f64 {
-        let t_m = |limit: Limit| limit.t_m(speed_mps, going);
-        self.limits(setting, passes)
-            .map(|(_, within, across)| {
-                within.map_or(f64::INFINITY, t_m).min(across.map_or(f64::INFINITY, t_m))
-            })
-            .fold(0.0, f64::max)
+        self.ts_m(setting, passes, speed_mps, going).fold(0.0, f64::max)
     }
 
-    /// The largest speed at which [`Strips::t_max_m`] meets a target, m/s, the passes being what they are at any speed.
+    /// Whether [`Strips::t_max_m`] is within a target: of most speeds that aren't the first strips tell.
+    pub fn meets(
+        &self,
+        setting: usize,
+        passes: &Passes,
+        speed_mps: f64,
+        target_m: f64,
+        going: &Going,
+    ) -> bool {
+        self.ts_m(setting, passes, speed_mps, going).all(|t_m| t_m <= target_m)
+    }
+
+    /// T predicted on each strip at a speed, m.
+    fn ts_m(
+        &self,
+        setting: usize,
+        passes: &Passes,
+        speed_mps: f64,
+        going: &Going,
+    ) -> impl Iterator<Item = f64> {
+        let t_m = move |limit: Limit| limit.t_m(speed_mps, going);
+        self.limits(setting, passes).map(move |(_, within, across)| {
+            within.map_or(f64::INFINITY, t_m).min(across.map_or(f64::INFINITY, t_m))
+        })
+    }
+
+    /// The largest speed at which [`Strips::t_max_m`] meets a target, the passes being what they are at any speed, and what
+    /// makes it so.
     ///
     /// Errors: a strip on which neighbouring samples are as far apart as the target at any speed.
-    pub fn speed_for_target_mps(
+    pub fn bound_for_target(
         &self,
         setting: usize,
         passes: &Passes,
         target_m: f64,
         going: &Going,
-    ) -> Result<f64, SamplingError> {
-        let mut slowest = f64::INFINITY;
+    ) -> Result<Bound, SamplingError> {
+        let mut slowest = Bound { speed_mps: f64::INFINITY, t_y_m: 0.0 };
         for (strip, within, across) in self.limits(setting, passes) {
             let limits = || [within, across].into_iter().flatten();
-            let fastest =
-                limits().filter_map(|limit| limit.speed_mps(target_m, going)).max_by(f64::total_cmp);
+            let bounds = limits().filter_map(|limit| {
+                let speed_mps = limit.speed_mps(target_m, going)?;
+                Some(Bound { speed_mps, t_y_m: limit.t_y_m })
+            });
+            let fastest = bounds.max_by(|a, b| a.speed_mps.total_cmp(&b.speed_mps));
             let t_y_m = limits().map(|limit| limit.t_y_m).fold(f64::INFINITY, f64::min);
             let arc = strip.arc;
             let refused = if within.is_some() && t_y_m >= target_m {
@@ -314,7 +348,10 @@ impl Strips {
                 let sigma_m = math::wrap(arc.from_m + arc.length_m / 2.0, self.perimeter_m);
                 SamplingError::UnseenStrip { target_m, width_m: arc.length_m, sigma_m }
             };
-            slowest = slowest.min(fastest.ok_or(refused)?);
+            let fastest = fastest.ok_or(refused)?;
+            if fastest.speed_mps < slowest.speed_mps {
+                slowest = fastest;
+            }
         }
         Ok(slowest)
     }

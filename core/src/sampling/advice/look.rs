@@ -11,10 +11,24 @@ use crate::tunnel::Profile;
 
 use super::RING;
 
-/// How far the vehicle may move across the tunnel, m, or turn, as a quaternion's component (half an angle, rad), before
-/// the beams of its heads are cast anew. Both change the largest step by well under the speed margin.
-const STILL_M: f64 = 0.01;
-const STILL_TURN: f64 = 0.002;
+/// Share of the speed that a vehicle may make by moving before the beams of its heads are cast anew.
+const SHARE: f64 = 0.002;
+/// The least and the most that it may move across the tunnel meanwhile, m: what the target leaves may be next to nothing;
+/// and what is hidden moves along with the vehicle.
+const STILL_M: [f64; 2] = [0.004, 0.1];
+/// And turn for each metre of that, as a quaternion's component (half an angle, rad).
+const TURN_PER_M: f64 = 0.2;
+
+/// How far the vehicle may move across the tunnel, m, before the beams of its heads are cast anew, where steps of `t_y_m` on
+/// a wall `range_m` away bound the speed v for a target T, and the beams' swing w takes `swing_share` = w / v of it.
+///
+/// Of v + w ~ T_x = sqrt(T^2 - T_y^2) a change dT_y takes (T_y / T_x)^2 dT_y / T_y, and a step changes with its range, twice
+/// as much where the wall falls away.
+pub(super) fn still_m(target_m: f64, t_y_m: f64, range_m: f64, swing_share: f64) -> f64 {
+    let around2 = t_y_m * t_y_m;
+    let along2 = (target_m * target_m - around2).max(0.0);
+    (SHARE * range_m / (2.0 * around2 / along2 * (1.0 + swing_share))).clamp(STILL_M[0], STILL_M[1])
+}
 
 /// A head, and its ring as last cast.
 #[derive(Debug, Clone)]
@@ -31,12 +45,13 @@ pub(super) struct AdvisedHead {
 stateful!(AdvisedHead { state: ring, cast_at; fixed: spec, modes, hidden, sector; });
 
 impl AdvisedHead {
-    pub(super) fn is_near(&self, pose: &Pose) -> bool {
+    /// Whether the vehicle is where its ring was cast, within `still_m` and [`TURN_PER_M`] of that.
+    pub(super) fn is_near(&self, pose: &Pose, still_m: f64) -> bool {
         let Some(cast_at) = &self.cast_at else { return false };
         let near = |a: &[f64], b: &[f64], by: f64| a.iter().zip(b).all(|(a, b)| (a - b).abs() <= by);
         let place = |pose: &Pose| [pose.position.y(), pose.position.z()];
-        near(&place(cast_at), &place(pose), STILL_M)
-            && near(&cast_at.attitude.wxyz(), &pose.attitude.wxyz(), STILL_TURN)
+        near(&place(cast_at), &place(pose), still_m)
+            && near(&cast_at.attitude.wxyz(), &pose.attitude.wxyz(), still_m * TURN_PER_M)
     }
 
     /// Casts the head's ring anew; a head that can't look from there keeps what it saw last.

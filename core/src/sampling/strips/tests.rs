@@ -42,7 +42,7 @@ fn turning(heads: usize) -> Passes {
 }
 
 fn speed(strips: &Strips, passes: &Passes, target_m: f64) -> Result<f64, SamplingError> {
-    strips.speed_for_target_mps(0, passes, target_m, &GOING)
+    strips.bound_for_target(0, passes, target_m, &GOING).map(|bound| bound.speed_mps)
 }
 
 fn closed(target_m: f64, t_y_m: f64, gap_s: f64) -> f64 {
@@ -140,14 +140,14 @@ fn steps_count_where_they_are() {
 fn what_swings_or_is_shifted_makes_passes_farther_apart() {
     let one = strips(&[all_around(&[])]);
     let rough = Going { swing_mps: 0.01, shift_m: 0.05, apart_m: 0.2, ..GOING };
-    let v = one.speed_for_target_mps(0, &turning(1), 0.5, &rough).unwrap();
+    let v = one.bound_for_target(0, &turning(1), 0.5, &rough).unwrap().speed_mps;
     assert!((one.t_max_m(0, &turning(1), v, &rough) - 0.5).abs() < 1e-12);
     assert!(v < speed(&one, &turning(1), 0.5).unwrap() - 0.01);
     let worse = Going { swing_mps: 0.1, ..rough };
-    assert!(one.speed_for_target_mps(0, &turning(1), 0.5, &worse).is_err());
+    assert!(one.bound_for_target(0, &turning(1), 0.5, &worse).is_err());
     // A swing that comes to an end leaves room for speed.
     let to_and_fro = Going { swing_most_m: Some(0.1), ..worse };
-    let v = one.speed_for_target_mps(0, &turning(1), 0.5, &to_and_fro).unwrap();
+    let v = one.bound_for_target(0, &turning(1), 0.5, &to_and_fro).unwrap().speed_mps;
     assert!((one.t_max_m(0, &turning(1), v, &to_and_fro) - 0.5).abs() < 1e-12);
     assert!(v > 0.02 && one.t_max_m(0, &turning(1), 1.02 * v, &to_and_fro) > 0.5);
 }
