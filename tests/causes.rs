@@ -136,7 +136,7 @@ fn named(case: &Case, seed: u64) -> BTreeMap<&'static str, u32> {
     for section in &dive.report.sections {
         let inner = case.cause == "not_passed" || INNER_M.contains(&section.start_m);
         if let Some(cause) = section.cause.filter(|_| inner) {
-            *named.entry(cause.cause).or_insert(0) += 1;
+            *named.entry(cause.cause.as_str()).or_insert(0) += 1;
         }
     }
     named

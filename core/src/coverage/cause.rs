@@ -12,6 +12,7 @@ use crate::sampling::spacing;
 
 /// The one cause that a fail is put down to. Source: metrics.md, "Sections and verdicts".
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Cause {
     /// The distance between passes was too large at the speed driven.
     TooFast,
@@ -97,7 +98,7 @@ pub struct Evidence {
     pub occluded_share: f64,
     /// Share of pings of a head that stood still.
     pub standing_share: f64,
-    /// Parts of the hole's wall at which pings were aimed that gave no sample.
+    /// Parts of the hole's wall, a 64th of the perimeter in a section each, at which pings were aimed in vain.
     pub lost_in_hole: u32,
     /// Largest distance between neighbours of one turn that geometry gives, m.
     pub t_y_m: f64,

@@ -21,7 +21,7 @@ mod survey;
 
 pub use advice::{AdviceReport, AlternativeReport};
 pub use runs::{ReturnReport, RunReport};
-pub use sections::{DeviationReport, EvidenceReport, SectionReport};
+pub use sections::{DeviationReport, SectionReport};
 pub use sources::{DeviceClockReport, LineReport, NavigationReport, SourceReport};
 pub use survey::{HolidayReport, NodeRowReport, SurveyReport};
 

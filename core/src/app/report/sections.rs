@@ -47,7 +47,7 @@ pub struct SectionReport {
     /// `pass`, `fail`, `cannot_say` or `open`.
     pub verdict: &'static str,
     /// Why it failed, as long as it does.
-    pub cause: Option<EvidenceReport>,
+    pub cause: Option<Evidence>,
     /// When it was flagged, seconds on the log's clock.
     pub flagged_s: Option<f64>,
     /// When a later pass cleared the flag.
@@ -67,37 +67,6 @@ pub struct DeviationReport {
     pub area_ratio: Option<f64>,
     /// Whether most samples are farther off than the wall can be.
     pub contradicts: bool,
-}
-
-/// A cause and the figures behind it.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct EvidenceReport {
-    /// One of the causes of metrics.md.
-    pub cause: &'static str,
-    /// Mean speed in the section, m/s.
-    pub speed_mps: f64,
-    /// Speed that would have met the target with the heads evenly spread, m/s.
-    pub even_v_max_mps: f64,
-    /// Time between passes, seconds.
-    pub pass_gap_s: f64,
-    /// The same had the heads been spread evenly.
-    pub even_pass_gap_s: f64,
-    /// The same had all heads turned.
-    pub all_pass_gap_s: f64,
-    /// Share of pings without a return.
-    pub missing_share: f64,
-    /// Share of pings that the vehicle itself stopped.
-    pub occluded_share: f64,
-    /// Share of pings of a head that stood still.
-    pub standing_share: f64,
-    /// Parts of the hole's wall, a 64th of the perimeter in a section each, at which pings were aimed in vain.
-    pub lost_in_hole: u32,
-    /// Largest step along the perimeter, m.
-    pub t_y_m: f64,
-    /// The same from the middle of the tunnel, m.
-    pub middle_t_y_m: f64,
-    /// How far the beams swung along the tunnel between two passes, m.
-    pub swing_m: f64,
 }
 
 pub(super) fn section_report(
@@ -128,7 +97,7 @@ pub(super) fn section_report(
         deviation: deviation_report(section),
         masked_share: section.masked_share,
         verdict: section.verdict.as_str(),
-        cause: section.evidence.filter(|_| section.verdict == Verdict::Fail).map(evidence_report),
+        cause: section.evidence.filter(|_| section.verdict == Verdict::Fail),
         flagged_s: section.flagged.map(MonoNs::as_secs_f64),
         cleared_s: section.cleared.map(MonoNs::as_secs_f64),
     }
@@ -143,22 +112,4 @@ fn deviation_report(section: &Section) -> Option<DeviationReport> {
         area_ratio: section.deviation.area_ratio(),
         contradicts: section.contradicts(),
     })
-}
-
-fn evidence_report(evidence: Evidence) -> EvidenceReport {
-    EvidenceReport {
-        cause: evidence.cause.as_str(),
-        speed_mps: evidence.speed_mps,
-        even_v_max_mps: evidence.even_v_max_mps,
-        pass_gap_s: evidence.pass_gap_s,
-        even_pass_gap_s: evidence.even_pass_gap_s,
-        all_pass_gap_s: evidence.all_pass_gap_s,
-        missing_share: evidence.missing_share,
-        occluded_share: evidence.occluded_share,
-        standing_share: evidence.standing_share,
-        lost_in_hole: evidence.lost_in_hole,
-        t_y_m: evidence.t_y_m,
-        middle_t_y_m: evidence.middle_t_y_m,
-        swing_m: evidence.swing_m,
-    }
 }

@@ -27,6 +27,13 @@ fn cause_of(passage: &Passage, diameter_m: f64) -> Cause {
 }
 
 #[test]
+fn a_report_has_the_same_word_for_a_cause_wherever_it_stands() {
+    for cause in Cause::ALL {
+        assert_eq!(serde_json::to_value(cause).unwrap(), cause.as_str());
+    }
+}
+
+#[test]
 fn each_cause_alone_is_named() {
     let pings = 1000.0;
     let with = |change: &dyn Fn(&mut Passage)| {
