@@ -11,7 +11,7 @@ use crate::tunnel::Profile;
 
 use super::RING;
 
-/// Share of the speed that a vehicle may make by moving before the beams of its heads are cast anew.
+/// By what share the speed may change while a vehicle moves, before the beams of its heads are cast anew.
 const SHARE: f64 = 0.002;
 /// The least and the most that it may move across the tunnel meanwhile, m: what the target leaves may be next to nothing;
 /// and what is hidden moves along with the vehicle.
