@@ -102,8 +102,9 @@ fn every_jump_lands_in_the_state_of_a_dive_played_through() {
     let folder = logs();
     for log in ["dive.mcap", "ticks.mcap", "parts"] {
         let ticks = through(&folder, log);
-        let (begun, end) = (ticks[0].0, ticks[ticks.len() - 1].0);
-        let span = end.since(begun).0;
+        // Before the last two ticks, where a step has no end of its own to stand at.
+        let (begun, late) = (ticks[0].0, ticks[ticks.len() - 3].0);
+        let span = late.since(begun).0;
         for between in [Duration::from_millis(5), Duration::from_millis(40), Duration::MAX] {
             let mut runner = proptest::test_runner::TestRunner::new(ProptestConfig {
                 cases: 8,
@@ -128,6 +129,40 @@ fn every_jump_lands_in_the_state_of_a_dive_played_through() {
             result.unwrap_or_else(|why| panic!("{log}, {between:?} between states: {why}"));
         }
     }
+}
+
+#[test]
+fn at_the_end_it_stands_until_it_is_sent_back() {
+    let folder = logs();
+    let ticks = through(&folder, "ticks.mcap");
+    let [begun, before, last] = [0, ticks.len() - 2, ticks.len() - 1].map(|number| ticks[number]);
+    let beyond = last.0 + DurNs(5_000_000_000);
+    let wishes = [
+        Wish::Pause,
+        Wish::Seek(before.0),
+        Wish::Step(1),
+        Wish::Step(1),
+        Wish::Seek(beyond),
+        Wish::Step(2),
+        Wish::Seek(begun.0),
+        Wish::Go,
+    ];
+    let (stood, digest) = play(&folder, "ticks.mcap", &wishes, Duration::from_millis(5));
+    let at = |(at, tick, digest): (MonoNs, u64, u64), ended| (at, tick, digest, ended);
+    // Each time that it comes to the end, or is sent on from there.
+    let expected = [
+        at(before, false),
+        at(last, false),
+        at(last, true),
+        at(last, true),
+        at(last, false),
+        at(last, true),
+        at(last, true),
+        at(begun, false),
+        at(last, true),
+    ];
+    assert_eq!(stood.0[1..], expected);
+    assert_eq!(digest, last.2);
 }
 
 #[test]

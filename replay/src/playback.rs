@@ -133,6 +133,10 @@ impl<'a> Playback<'a> {
             let due = self.driver.due(self.player)?;
             let wish = match due {
                 None => {
+                    // There are no ticks left to run; none are owed after a jump back, either.
+                    if let Going::Ticks(_) = self.going {
+                        self.going = Going::Still;
+                    }
                     watcher.stands(self.dive, self.now, true);
                     match wishes.recv() {
                         Ok(wish) => Some(wish),
