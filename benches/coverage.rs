@@ -14,10 +14,10 @@ use std::collections::HashMap;
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
-use headrace_core::coverage::hole::FARTHEST_M;
-use headrace_core::coverage::{HoleFinder, SampleStore, StoreLayout, WallSample};
-use headrace_core::math;
-use headrace_core::tunnel::named;
+use headrace_coverage::hole::FARTHEST_M;
+use headrace_coverage::{HoleFinder, SampleStore, StoreLayout, WallSample};
+use headrace_geometry::math;
+use headrace_geometry::tunnel::shapes;
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use spade::{DelaunayTriangulation, Point2, Triangulation};
 
@@ -57,7 +57,7 @@ fn main() {
 
 /// Samples of ideal heads together at the circle's centre, in the order in which they fall.
 fn helix(steps: u32, turn_s: f64, heads: u32) -> Vec<WallSample> {
-    let profile = named::ceran().unwrap();
+    let profile = shapes::ceran().unwrap();
     let per_ping_m = SPEED_MPS * turn_s / f64::from(steps);
     let mut last: Vec<Option<f64>> = vec![None; heads as usize];
     let mut samples = Vec::new();
@@ -76,7 +76,7 @@ fn helix(steps: u32, turn_s: f64, heads: u32) -> Vec<WallSample> {
 }
 
 fn perimeter_m() -> f64 {
-    named::ceran().unwrap().perimeter_m()
+    shapes::ceran().unwrap().perimeter_m()
 }
 
 fn store(length_m: f64, capacity: u32) -> SampleStore {

@@ -21,13 +21,13 @@ use std::thread;
 use std::time::Duration;
 
 use crossbeam::queue::SegQueue;
-use headrace_core::app::App;
-use headrace_core::app::device::Direction;
-use headrace_core::app::driver::{Carrier, Driver, DriverSetup, Standing, Wire};
-use headrace_core::config::{Connect, SerialPort, UsbIdentity};
-use headrace_core::time::{DurNs, MonoNs};
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_monitor::App;
 use headrace_ports::{Crew, Hand, Stand, now, wait_for_any};
 use headrace_replay::simulate::{START, Scene, Simulation};
+use headrace_sensor::connect::{Connect, SerialPort, UsbIdentity};
+use headrace_sensor::device::Direction;
+use headrace_sensor::driver::{Carrier, Driver, DriverSetup, Standing, Wire};
 
 const LOCAL: IpAddr = IpAddr::V4(Ipv4Addr::LOCALHOST);
 /// Until all lines are open and the heads have found their places.
@@ -326,7 +326,7 @@ fn rehearse(scene: &Scene, ends: Vec<Ends>, measured: Duration) -> Measured {
     let vehicle = &scene.vehicle;
     let mut app = App::new(vehicle.mission());
     for sensor in &vehicle.sensors {
-        app.add_plugin(sensor.as_ref()).unwrap();
+        app.add_device(sensor.as_ref()).unwrap();
     }
     let mut dive = app.arm(vehicle.navigation()).unwrap();
     let mut programs = vehicle.programs().unwrap().into_iter();

@@ -15,21 +15,20 @@ use std::time::{Duration, Instant};
 
 use bevy_ecs::schedule::{IntoScheduleConfigs, Schedule, SingleThreadedExecutor};
 use bevy_ecs::world::World;
-use headrace_core::app::device::{Decoder, Direction};
-use headrace_core::app::flow::{Coverage, Tally};
-use headrace_core::app::reading::{Decoded, Packet};
-use headrace_core::app::run::Loop;
-use headrace_core::app::{App, Mission, SourceSpec};
-use headrace_core::codec::CodecCounts;
-use headrace_core::coverage::hole::FARTHEST_M;
-use headrace_core::coverage::{
-    GridLayout, HoleFinder, SampleStore, Sections, Soundings, StoreLayout, WallSample,
-};
-use headrace_core::math;
-use headrace_core::snapshot::{Restorer, Saver, SnapshotError, Stateful};
-use headrace_core::time::{DurNs, MonoNs};
-use headrace_core::tunnel::named;
+use headrace_coverage::hole::FARTHEST_M;
+use headrace_coverage::{GridLayout, HoleFinder, SampleStore, Sections, Soundings, StoreLayout, WallSample};
+use headrace_geometry::math;
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_geometry::tunnel::shapes;
+use headrace_monitor::flow::{Coverage, Tally};
+use headrace_monitor::run::Loop;
+use headrace_monitor::{App, SourceSpec};
 use headrace_replay::simulate::{START, Scene, Simulation};
+use headrace_sensor::codec::CodecCounts;
+use headrace_sensor::device::{Decoder, Direction};
+use headrace_sensor::reading::{Decoded, Packet};
+use headrace_snapshot::{Restorer, Saver, SnapshotError, Stateful};
+use headrace_vehicle::Mission;
 
 const SCENE: &str = "vehicle = \"vita2-4.toml\"\n[vehicle_changes]\nheads.planned_speed_mps = 0.197\n[trajectory]\n\
     [[trajectory.legs]]\ndistance_m = 120\nspeed_mps = 0.197\n";
@@ -95,7 +94,7 @@ fn armed(scene: &Scene, decoding: bool) -> Loop {
     let mut app = App::new(Mission { length_m: 200.0, ..vehicle.mission() });
     for (sensor, config) in vehicle.sensors.iter().zip(&vehicle.sensor_configs) {
         if decoding {
-            app.add_plugin(sensor.as_ref()).unwrap();
+            app.add_device(sensor.as_ref()).unwrap();
         } else {
             let id = config.id.clone();
             let decoder = Box::new(Nothing);
@@ -220,7 +219,7 @@ fn idle_tick() {
 
 /// Samples of ideal heads together at the circle's centre, in the order in which they fall.
 fn helix(steps: u32, turn_s: f64, heads: u32, length_m: f64) -> Vec<(f64, f64, usize)> {
-    let profile = named::ceran().unwrap();
+    let profile = shapes::ceran().unwrap();
     let per_ping_m = SPEED_MPS * turn_s / f64::from(steps);
     let pings = math::floor_to_i64(length_m / per_ping_m);
     let mut samples = Vec::new();
@@ -236,7 +235,7 @@ fn helix(steps: u32, turn_s: f64, heads: u32, length_m: f64) -> Vec<(f64, f64, u
 
 fn store(length_m: f64, capacity: usize) -> SampleStore {
     SampleStore::new(StoreLayout {
-        perimeter_m: named::ceran().unwrap().perimeter_m(),
+        perimeter_m: shapes::ceran().unwrap().perimeter_m(),
         from_m: -1.0,
         to_m: length_m + 1.0,
         cell_m: 0.25,
@@ -249,9 +248,9 @@ fn cover(samples: &[(f64, f64, usize)], length_m: f64) -> Coverage {
     let mut coverage = Coverage {
         store: store(length_m, samples.len()),
         sections: Sections::new(0.25, 0.5, -1.0, length_m + 1.0),
-        frontier: headrace_core::coverage::Frontier::default(),
+        frontier: headrace_coverage::Frontier::default(),
         soundings: Soundings::new(GridLayout {
-            perimeter_m: named::ceran().unwrap().perimeter_m(),
+            perimeter_m: shapes::ceran().unwrap().perimeter_m(),
             from_m: 0.0,
             to_m: length_m,
             node_m: 0.5,

@@ -8,8 +8,8 @@ use std::path::Path;
 use std::process::Command;
 use std::time::{Duration, Instant};
 
-use headrace_core::time::MonoNs;
-use headrace_core::tunnel::named;
+use headrace_geometry::time::MonoNs;
+use headrace_geometry::tunnel::shapes;
 use headrace_replay::log::{Companion, LogHeader, LogReader, LogWriter, Made, MessageKind};
 use headrace_replay::record::result_channels;
 use headrace_replay::view::{Site, View};
@@ -106,7 +106,7 @@ fn read(log: &Path) -> (LogHeader, Vec<Entry>) {
 fn view() -> View {
     // The demonstration's tunnel and heads.
     View::new(Site {
-        profile: named::ceran().unwrap(),
+        profile: shapes::ceran().unwrap(),
         target_m: 0.5,
         section_m: 0.25,
         length_m: 1000.0,

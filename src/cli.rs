@@ -5,10 +5,10 @@ mod amounts;
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
-use headrace_core::config::Connect;
-use headrace_core::sampling::layout::HeadLayout;
-use headrace_core::time::DurNs;
+use headrace_geometry::time::DurNs;
 use headrace_replay::log::Every;
+use headrace_sampling::layout::HeadLayout;
+use headrace_sensor::connect::Connect;
 
 use crate::import::Kind;
 pub(crate) use amounts::time;

@@ -2,15 +2,16 @@
 
 use std::path::{Path, PathBuf};
 
-use headrace_core::app::report::{LogReport, PartReport, Report};
-use headrace_core::config::vehicle::Loader;
-use headrace_core::config::{Document, VehicleConfig};
-use headrace_core::time::DurNs;
+use headrace_config::Document;
+use headrace_config::Loader;
+use headrace_geometry::time::DurNs;
+use headrace_monitor::report::{LogReport, PartReport, Report};
 use headrace_replay::drive::Pace;
 use headrace_replay::log::format::VEHICLE_FILE;
 use headrace_replay::log::{LogInfo, file_digest, files_digest, files_of};
 use headrace_replay::player::{Player, SimulationFeed};
 use headrace_replay::simulate::{Scene, Simulation};
+use headrace_vehicle::VehicleConfig;
 use serde_json::json;
 
 use crate::cli::{Check, Demo, Output, Replay, Run};

@@ -1,6 +1,6 @@
 //! The device kinds of this build. Adding a device adds a line here.
 
-use headrace_core::app::device::DeviceKind;
+use headrace_sensor::device::DeviceKind;
 
 /// Every kind of device that a vehicle file may name.
 pub(crate) const KINDS: [&dyn DeviceKind; 7] = [

@@ -2,15 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use headrace_core::app::App;
-use headrace_core::app::device::Sense;
-use headrace_core::app::flow::Tally;
-use headrace_core::app::outlet::{NoticeOutlet, NoticeReceiver};
-use headrace_core::app::plugin::Plugin;
-use headrace_core::app::report::{LineReport, LogReport, Report};
-use headrace_core::app::run::Loop;
-use headrace_core::config::VehicleConfig;
-use headrace_core::fusion::Navigation;
+use headrace_fusion::Navigation;
+use headrace_monitor::App;
+use headrace_monitor::flow::Tally;
+use headrace_monitor::outlet::{NoticeOutlet, NoticeReceiver};
+use headrace_monitor::report::{LineReport, LogReport, Report};
+use headrace_monitor::run::Loop;
 use headrace_ports::Crew;
 use headrace_replay::drive::{Feed, Pace, drive};
 use headrace_replay::log::{
@@ -20,6 +17,8 @@ use headrace_replay::log::{
 use headrace_replay::player::seconds;
 use headrace_replay::record::{QUEUE_BYTES, RecorderOutlet, result_channels};
 use headrace_replay::view::{Site, View};
+use headrace_sensor::device::Sense;
+use headrace_vehicle::VehicleConfig;
 
 use crate::commands::parts;
 use crate::failure::{self, Failure};
@@ -121,8 +120,7 @@ pub(crate) fn assemble_with(
 fn app(vehicle: &VehicleConfig) -> Result<(App, NoticeReceiver), Failure> {
     let mut app = App::new(vehicle.mission());
     for sensor in &vehicle.sensors {
-        let plugin: &dyn Plugin = sensor.as_ref();
-        app.add_plugin(plugin)?;
+        app.add_device(sensor.as_ref())?;
     }
     let (outlet, notices) = NoticeOutlet::new(NOTICES);
     app.add_plugin(&outlet)?;

@@ -2,12 +2,14 @@
 
 use std::path::Path;
 
-use headrace_core::app::device::Direction;
-use headrace_core::app::driver::Carrier;
-use headrace_core::config::{self, Connect, Document};
-use headrace_core::time::{DurNs, MonoNs};
+use headrace_config as config;
+use headrace_config::Document;
+use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_ports::{Stand, wait_for_any};
 use headrace_replay::simulate::{START, Scene, Simulation};
+use headrace_sensor::connect::Connect;
+use headrace_sensor::device::Direction;
+use headrace_sensor::driver::Carrier;
 
 use crate::cli::Emulate;
 use crate::devices::KINDS;

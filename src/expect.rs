@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use headrace_core::app::report::Report;
+use headrace_monitor::report::Report;
 use serde_json::Value;
 
 use crate::failure::Failure;

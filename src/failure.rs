@@ -2,10 +2,9 @@
 
 use std::path::PathBuf;
 
-use headrace_core::app::plugin::PluginError;
-use headrace_core::config::ConfigError;
-use headrace_core::sampling::SamplingError;
+use headrace_config::ConfigError;
 use headrace_experiments::ExperimentError;
+use headrace_monitor::plugin::PluginError;
 use headrace_replay::drive::DriveError;
 use headrace_replay::import::ImportError;
 use headrace_replay::log::LogError;
@@ -13,6 +12,7 @@ use headrace_replay::playback::PlaybackError;
 use headrace_replay::simulate::SceneError;
 use headrace_replay::smooth::SmoothError;
 use headrace_replay::states::StatesError;
+use headrace_sampling::SamplingError;
 
 use crate::pictures::PictureError;
 

@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use headrace_core::app::report::Report;
+use headrace_monitor::report::Report;
 
 use crate::failure::Failure;
 

@@ -3,8 +3,9 @@
 mod asking;
 mod words;
 
-use headrace_core::config::{Connect, VehicleConfig};
 use headrace_ports::{Answer, Found, Machine, Presence, Trouble, discover, presence};
+use headrace_sensor::connect::Connect;
+use headrace_vehicle::VehicleConfig;
 use serde_json::{Value, json};
 
 use crate::cli::Devices;

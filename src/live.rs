@@ -5,11 +5,12 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use headrace_core::app::driver::DriverSetup;
-use headrace_core::config::{Connect, ConnectError, VehicleConfig};
-use headrace_core::time::{DurNs, MonoNs};
+use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_ports::{Crew, Hand, Phase, SentSink, Status};
 use headrace_replay::log::part_path;
+use headrace_sensor::connect::{Connect, ConnectError};
+use headrace_sensor::driver::DriverSetup;
+use headrace_vehicle::VehicleConfig;
 
 use crate::cli::Run;
 use crate::commands::{finish, watch};

@@ -3,7 +3,7 @@
 use std::fmt::{self, Write as _};
 use std::io::{BufWriter, Write};
 
-use headrace_core::app::report::Report;
+use headrace_monitor::report::Report;
 
 use crate::failure::Failure;
 

@@ -5,15 +5,15 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use crossbeam::channel::{Sender, unbounded};
-use headrace_core::app::outlet::NoticeReceiver;
-use headrace_core::app::report::Report;
-use headrace_core::app::run::Loop;
-use headrace_core::config::VehicleConfig;
-use headrace_core::time::{DurNs, MonoNs};
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_monitor::outlet::NoticeReceiver;
+use headrace_monitor::report::Report;
+use headrace_monitor::run::Loop;
 use headrace_replay::drive::Pace;
 use headrace_replay::playback::{Playback, Watcher, Wish};
 use headrace_replay::player::Player;
 use headrace_replay::states::{States, identity, log_identity};
+use headrace_vehicle::VehicleConfig;
 
 use crate::cli::{COMMANDS, speed, time};
 use crate::dive::Dive;

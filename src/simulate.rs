@@ -4,13 +4,13 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use headrace_core::app::device::Direction;
-use headrace_core::config::Document;
-use headrace_core::time::MonoNs;
+use headrace_config::Document;
+use headrace_geometry::time::MonoNs;
 use headrace_replay::log::LogWriter;
 use headrace_replay::simulate::effects::KINDS as EFFECTS;
 use headrace_replay::simulate::surroundings::What;
 use headrace_replay::simulate::{Added, START, Scene, Simulation, SoundingTruth, Stage, TruthRow};
+use headrace_sensor::device::Direction;
 use serde_json::json;
 
 use crate::cli::Simulate;

@@ -2,20 +2,20 @@
 
 use std::path::{Path, PathBuf};
 
-use headrace_core::app::MAX_SOURCES;
-use headrace_core::app::flow::Navigator;
-use headrace_core::app::report::Report;
-use headrace_core::app::run::Loop;
-use headrace_core::app::smoothing::SmoothingReport;
-use headrace_core::config::VehicleConfig;
-use headrace_core::fusion::NavigationConfig;
-use headrace_core::fusion::filter::FilterNavigation;
-use headrace_core::fusion::filter::sources::Consistency;
-use headrace_core::fusion::smooth::journal::Journal;
-use headrace_core::fusion::smooth::track::TrackNavigation;
+use headrace_fusion::filter::FilterNavigation;
+use headrace_fusion::filter::sources::Consistency;
+use headrace_fusion::smooth::journal::Journal;
+use headrace_fusion::smooth::track::TrackNavigation;
+use headrace_monitor::flow::Navigator;
+use headrace_monitor::report::Report;
+use headrace_monitor::run::Loop;
+use headrace_monitor::smoothing::SmoothingReport;
 use headrace_replay::drive::Pace;
 use headrace_replay::player::Player;
 use headrace_replay::smooth::Steps;
+use headrace_sensor::reading::MAX_SOURCES;
+use headrace_vehicle::NavigationConfig;
+use headrace_vehicle::VehicleConfig;
 
 use crate::dive::{WhatIf, assemble_with};
 use crate::failure::Failure;

@@ -1,9 +1,9 @@
 //! The end of a dive in words.
 
-use headrace_core::app::report::{Report, ReturnReport, RunReport};
-use headrace_core::app::smoothing::{ChangeReport, JudgedReport, SmoothingReport};
+use headrace_monitor::report::{Report, ReturnReport, RunReport};
+use headrace_monitor::smoothing::{ChangeReport, JudgedReport, SmoothingReport};
 
-use headrace_core::app::words::station;
+use headrace_monitor::words::station;
 
 /// The report in a few lines.
 pub(crate) fn summary(report: &Report) -> String {

@@ -1,8 +1,8 @@
 //! `headrace verify`: a replay held against what the live dive published.
 
-use headrace_core::app::SourceInfo;
-use headrace_core::app::trail::WordKind;
-use headrace_core::time::DurNs;
+use headrace_geometry::time::DurNs;
+use headrace_monitor::SourceInfo;
+use headrace_monitor::trail::WordKind;
 use headrace_replay::drive::Pace;
 use headrace_replay::log::{TRIMMED, files_of};
 use headrace_replay::player::Player;

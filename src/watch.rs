@@ -3,14 +3,14 @@
 
 use std::io::IsTerminal;
 
-use headrace_core::app::Mission;
-use headrace_core::app::alerts::Alerts;
-use headrace_core::app::flow::{AdviceEntry, Coverage, Notice, Tally};
-use headrace_core::app::run::Loop;
-use headrace_core::app::words::{Missed, advice_words, alert_words, cleared_words, flag_words, station};
-use headrace_core::coverage::{Run, RunChange, RunId, Section, Sections, Verdict};
-use headrace_core::time::{DurNs, MonoNs};
+use headrace_coverage::{Run, RunChange, RunId, Section, Sections, Verdict};
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_monitor::alerts::Alerts;
+use headrace_monitor::flow::{AdviceEntry, Coverage, Notice, Tally};
+use headrace_monitor::run::Loop;
+use headrace_monitor::words::{Missed, advice_words, alert_words, cleared_words, flag_words, station};
 use headrace_ports::{Phase, Status};
+use headrace_vehicle::Mission;
 
 use crate::output::{put, say};
 

@@ -18,10 +18,10 @@ mod shipped;
 use std::fmt::Write as _;
 
 use advised::{Advised, dive};
-use headrace_core::app::flow::AdviceEntry;
-use headrace_core::sampling::advice::{Reason, Remedy};
-use headrace_core::time::DurNs;
+use headrace_geometry::time::DurNs;
+use headrace_monitor::flow::AdviceEntry;
 use headrace_replay::simulate::Scene;
+use headrace_sampling::advice::{Reason, Remedy};
 
 const TICK: DurNs = DurNs(20_000_000);
 /// Where dives begin, and the length of tunnel that is judged, m.

@@ -22,8 +22,8 @@ mod watched;
 use std::sync::LazyLock;
 
 use flags::{EVERY, Flag, Journey, wall_until};
-use headrace_core::math;
-use headrace_core::time::MonoNs;
+use headrace_geometry::math;
+use headrace_geometry::time::MonoNs;
 use seeded::{Kind, Seeded, seeded};
 use watched::Dive;
 

@@ -21,10 +21,10 @@ use std::fmt::Write as _;
 use std::sync::Arc;
 
 use common::{Folder, raw_messages, write_log};
-use headrace_core::app::report::{SectionReport, SpreadReport};
-use headrace_core::math::{self, TAU};
-use headrace_core::time::DurNs;
-use headrace_core::tunnel::{Piece, Profile};
+use headrace_geometry::math::{self, TAU};
+use headrace_geometry::time::DurNs;
+use headrace_geometry::tunnel::{Piece, Profile};
+use headrace_monitor::report::{SectionReport, SpreadReport};
 use mcap::{Channel, Message, WriteOptions};
 use seeded::seeded;
 use serde_json::Value;

@@ -24,9 +24,9 @@ use std::collections::BTreeMap;
 use std::sync::LazyLock;
 
 use flags::{first_failing_m, reached};
-use headrace_core::app::report::{SectionReport, SpreadReport};
-use headrace_core::math::{self, TAU};
-use headrace_core::time::MonoNs;
+use headrace_geometry::math::{self, TAU};
+use headrace_geometry::time::MonoNs;
+use headrace_monitor::report::{SectionReport, SpreadReport};
 use seeded::{Draw, Seeded, seeded};
 use spacings::{Spacing, spacings, spread};
 use wall::{Place, Wall};

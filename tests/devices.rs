@@ -12,12 +12,14 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, JoinHandle};
 
-use headrace_core::app::device::{DeviceKind, Direction, Emulated, EmulatorSetup};
-use headrace_core::app::driver::{Carrier, Probe};
-use headrace_core::config::{Connect, Document, VehicleConfig};
-use headrace_core::site::Site;
-use headrace_core::time::DurNs;
+use headrace_config::Document;
+use headrace_geometry::site::Site;
+use headrace_geometry::time::DurNs;
 use headrace_ports::{Answer, Stand, probe, wait_for_any};
+use headrace_sensor::connect::Connect;
+use headrace_sensor::device::{DeviceKind, Direction, Emulated, EmulatorSetup};
+use headrace_sensor::driver::{Carrier, Probe};
+use headrace_vehicle::VehicleConfig;
 use serde_json::Value;
 
 const KINDS: [&dyn DeviceKind; 2] = [&headrace_imagenex881::Kind, &headrace_ping1d::Kind];

@@ -15,9 +15,9 @@ mod shipped;
 mod tracking;
 
 use field::{Figures, POSE, TURN_S, field, figures, nees, rms, share};
-use headrace_core::fusion::direct::DirectNavigation;
-use headrace_core::fusion::filter::sources::Consistency;
-use headrace_core::math;
+use headrace_fusion::direct::DirectNavigation;
+use headrace_fusion::filter::sources::Consistency;
+use headrace_geometry::math;
 use headrace_replay::simulate::START;
 use tracking::{Silence, Track, dive, filter};
 

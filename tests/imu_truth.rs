@@ -15,15 +15,15 @@ use std::fs::File;
 use std::io::Read as _;
 
 use ahrs::{Ahrs as _, Madgwick, Mahony};
-use headrace_core::frames::{Body, Point3, Rot, Tunnel, Vec3};
-use headrace_core::fusion::filter::factors::Factors;
-use headrace_core::fusion::filter::inertial::{Felt, Leg};
-use headrace_core::fusion::filter::measure::{self, Row};
-use headrace_core::fusion::filter::settings::Settings;
-use headrace_core::fusion::filter::state::{
+use headrace_fusion::filter::factors::Factors;
+use headrace_fusion::filter::inertial::{Felt, Leg};
+use headrace_fusion::filter::measure::{self, Row};
+use headrace_fusion::filter::settings::Settings;
+use headrace_fusion::filter::state::{
     ATTITUDE, ERRORS, FORCE_BIAS, POSITION, RATE_BIAS, State, VELOCITY, put,
 };
-use headrace_core::math;
+use headrace_geometry::frames::{Body, Point3, Rot, Tunnel, Vec3};
+use headrace_geometry::math;
 use nalgebra_of_peers as peers;
 
 const FILE: &str = concat!(

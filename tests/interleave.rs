@@ -9,16 +9,16 @@
     reason = "clippy.toml's leave for tests doesn't reach their helpers"
 )]
 
-use headrace_core::frames::{Mount, Rot, Vec3};
-use headrace_core::math::{PI, TAU, floor_to_i64};
-use headrace_core::sampling::SamplingError::{HeadCount, Negative, NotPositive, SectorNeedsHeads};
-use headrace_core::sampling::head::{HeadBody, HeadProgram, HeadSpec};
-use headrace_core::sampling::layout::HeadLayout::{self, PhaseShift, SectorOffset};
-use headrace_core::sampling::layout::{
+use headrace_geometry::frames::{Mount, Rot, Vec3};
+use headrace_geometry::math::{PI, TAU, floor_to_i64};
+use headrace_geometry::time::DurNs;
+use headrace_sampling::SamplingError::{HeadCount, Negative, NotPositive, SectorNeedsHeads};
+use headrace_sampling::head::{HeadBody, HeadProgram, HeadSpec};
+use headrace_sampling::layout::HeadLayout::{self, PhaseShift, SectorOffset};
+use headrace_sampling::layout::{
     InSector, Sector, alternating_m, hull_rule, in_step, programs, sectors, turned_over_rad,
 };
-use headrace_core::sampling::schedule::Schedule;
-use headrace_core::time::DurNs;
+use headrace_sampling::schedule::Schedule;
 use proptest::{prelude::*, test_runner::RngSeed};
 
 /// Angles closer together than this are one, radians: far above rounding, far below a step.

@@ -27,13 +27,13 @@ use std::time::Duration;
 
 use common::{Folder, VEHICLE};
 use crossbeam::queue::SegQueue;
-use headrace_core::app::App;
-use headrace_core::app::driver::{Driver, DriverSetup, Standing, Wire};
-use headrace_core::app::run::Loop;
-use headrace_core::config::{Connect, UsbIdentity};
-use headrace_core::time::{DurNs, MonoNs};
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_monitor::App;
+use headrace_monitor::run::Loop;
 use headrace_ports::{Crew, Hand, LineHistory, Phase, Stand, Status, now};
 use headrace_replay::simulate::Simulation;
+use headrace_sensor::connect::{Connect, UsbIdentity};
+use headrace_sensor::driver::{Driver, DriverSetup, Standing, Wire};
 use headrace_tether_hid::report::REFERENCE_DESCRIPTOR;
 use hidapi::HidApi;
 use serde_json::Value;
@@ -132,7 +132,7 @@ impl Rehearsal {
         let vehicle = &scene.vehicle;
         let mut app = App::new(vehicle.mission());
         for sensor in &vehicle.sensors {
-            app.add_plugin(sensor.as_ref()).unwrap();
+            app.add_device(sensor.as_ref()).unwrap();
         }
         let mut dive = app.arm(vehicle.navigation()).unwrap();
         let mut hands = Vec::new();

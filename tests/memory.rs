@@ -3,12 +3,13 @@
 #[path = "common/shipped.rs"]
 mod shipped;
 
-use headrace_core::app::device::Direction;
-use headrace_core::app::flow::{AdviceLog, Coverage};
-use headrace_core::app::run::Loop;
-use headrace_core::app::{App, Mission};
-use headrace_core::time::{DurNs, MonoNs};
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_monitor::App;
+use headrace_monitor::flow::{AdviceLog, Coverage};
+use headrace_monitor::run::Loop;
 use headrace_replay::simulate::{START, Simulation};
+use headrace_sensor::device::Direction;
+use headrace_vehicle::Mission;
 
 /// A minute on the way, then standing for an hour with noise.
 const SCENE: &str = "vehicle = \"vita2-4.toml\"\n[trajectory]\nkind = \"waypoints\"\n\
@@ -30,7 +31,7 @@ fn standing_still_for_long_fills_no_memory() {
     let scene = shipped::scene(SCENE);
     let mut app = App::new(Mission { length_m: 100.0, ..scene.vehicle.mission() });
     for sensor in &scene.vehicle.sensors {
-        app.add_plugin(sensor.as_ref()).unwrap();
+        app.add_device(sensor.as_ref()).unwrap();
     }
     let mut dive = app.arm(scene.vehicle.navigation()).unwrap();
     let count = dive.sources().len();

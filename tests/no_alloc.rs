@@ -17,19 +17,20 @@ use std::cell::Cell;
 
 use headrace_a50::decoder::{self as a50, A50Decoder};
 use headrace_a50::report::{Against, Velocity};
-use headrace_core::app::device::{Decoder, Direction};
-use headrace_core::app::outlet::NoticeOutlet;
-use headrace_core::app::reading::Packet;
-use headrace_core::app::{App, Mission};
-use headrace_core::fusion::NavigationConfig;
-use headrace_core::fusion::filter::FilterNavigation;
-use headrace_core::fusion::smooth::journal::Journal;
-use headrace_core::time::DurNs;
+use headrace_fusion::filter::FilterNavigation;
+use headrace_fusion::smooth::journal::Journal;
+use headrace_geometry::time::DurNs;
 use headrace_mavlink::decoder::{self as mavlink, MavlinkDecoder, Part};
 use headrace_mavlink::message::{Imu, ImuMessage, Message, Sender};
+use headrace_monitor::App;
+use headrace_monitor::outlet::NoticeOutlet;
 use headrace_replay::log::{LogHeader, Recorder, SourceInfo};
 use headrace_replay::record::{QUEUE_BYTES, RecorderOutlet, result_channels};
 use headrace_replay::simulate::{START, Simulation};
+use headrace_sensor::device::{Decoder, Direction};
+use headrace_sensor::reading::Packet;
+use headrace_vehicle::Mission;
+use headrace_vehicle::NavigationConfig;
 
 struct Counting;
 
@@ -88,7 +89,7 @@ fn a_million_packets_without_one_allocation() {
     let vehicle = &scene.vehicle;
     let mut app = App::new(Mission { length_m: 1000.0, ..vehicle.mission() });
     for sensor in &vehicle.sensors {
-        app.add_plugin(sensor.as_ref()).unwrap();
+        app.add_device(sensor.as_ref()).unwrap();
     }
     // Nobody empties this one: dropping the oldest must not allocate either.
     let (outlet, notices) = NoticeOutlet::new(1000);

@@ -10,15 +10,15 @@
     reason = "clippy.toml's leave for tests doesn't reach their helpers"
 )]
 
-use headrace_core::frames::{Mount, Point3, Pose, Rot, Vec3};
-use headrace_core::math::{self, PI, TAU};
-use headrace_core::sampling::head::{Basis, HeadBody, HeadMode, HeadSpec, Turn};
-use headrace_core::sampling::layout::HeadLayout::{self, PhaseShift, SectorOffset};
-use headrace_core::sampling::occlusion::Obstacle;
-use headrace_core::sampling::plan::{Inspection, Planner};
-use headrace_core::sampling::ring::Standing;
-use headrace_core::time::DurNs;
-use headrace_core::tunnel::{Profile, named};
+use headrace_geometry::frames::{Mount, Point3, Pose, Rot, Vec3};
+use headrace_geometry::math::{self, PI, TAU};
+use headrace_geometry::time::DurNs;
+use headrace_geometry::tunnel::{Profile, shapes};
+use headrace_sampling::head::{Basis, HeadBody, HeadMode, HeadSpec, Turn};
+use headrace_sampling::layout::HeadLayout::{self, PhaseShift, SectorOffset};
+use headrace_sampling::occlusion::Obstacle;
+use headrace_sampling::plan::{Inspection, Planner};
+use headrace_sampling::ring::Standing;
 
 const MODES: [(&str, f64, f64); 3] = [("medium", 0.6, 10.8), ("fast", 0.9, 8.0), ("fastest", 2.4, 4.8)];
 
@@ -75,7 +75,7 @@ fn inspection(profile: Profile, heads: Vec<Head>, layout: HeadLayout) -> Inspect
 }
 
 fn ceran(heads: Vec<Head>, layout: HeadLayout) -> Inspection {
-    inspection(named::ceran().unwrap(), heads, layout)
+    inspection(shapes::ceran().unwrap(), heads, layout)
 }
 
 /// Where the vehicle is: chainage is left out, it goes steadily.
@@ -262,14 +262,14 @@ fn heads_on_a_real_hull() {
             ("VITA 2, three heads", ceran(side(), PhaseShift), "medium", 0.8, straight),
             (
                 "one above the other in a pipe",
-                inspection(named::circle(1.2).unwrap(), over(0.3), PhaseShift),
+                inspection(shapes::circle(1.2).unwrap(), over(0.3), PhaseShift),
                 "fast",
                 0.3,
                 straight,
             ),
             (
                 "side by side in a pipe",
-                inspection(named::circle(1.0).unwrap(), vita_2_4(), PhaseShift),
+                inspection(shapes::circle(1.0).unwrap(), vita_2_4(), PhaseShift),
                 "fast",
                 0.3,
                 straight,
@@ -326,7 +326,7 @@ fn heads_out_of_step_and_hidden_slivers() {
             least: Vec3::new(-0.5, -width_m / 2.0, -0.4),
             most: Vec3::new(0.5, width_m / 2.0, -0.3),
         }],
-        ..inspection(named::circle(3.0).unwrap(), ideal(1), PhaseShift)
+        ..inspection(shapes::circle(3.0).unwrap(), ideal(1), PhaseShift)
     };
     hold(
         vec![

@@ -16,15 +16,15 @@ use std::time::Duration;
 
 use common::Folder;
 use crossbeam::channel::unbounded;
-use headrace_core::app::App;
-use headrace_core::app::run::Loop;
-use headrace_core::config::VehicleConfig;
-use headrace_core::time::{DurNs, MonoNs};
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_monitor::App;
+use headrace_monitor::run::Loop;
 use headrace_replay::drive::{Pace, drive};
 use headrace_replay::log::files_of;
 use headrace_replay::playback::{Playback, Watcher, Wish};
 use headrace_replay::player::Player;
 use headrace_replay::states::States;
+use headrace_vehicle::VehicleConfig;
 use proptest::prelude::*;
 
 /// Each place where the dive stood: the moment, the tick, the digest, and whether it was the end.
@@ -52,7 +52,7 @@ fn vehicle() -> VehicleConfig {
 fn armed(vehicle: &VehicleConfig) -> Loop {
     let mut app = App::new(vehicle.mission());
     for sensor in &vehicle.sensors {
-        app.add_plugin(sensor.as_ref()).unwrap();
+        app.add_device(sensor.as_ref()).unwrap();
     }
     app.arm(vehicle.navigation()).unwrap()
 }

@@ -11,13 +11,13 @@
     reason = "clippy.toml's leave for tests doesn't reach their helpers"
 )]
 
-use headrace_core::app::device::Decoder as _;
-use headrace_core::app::reading::{Decoded, Packet, Reading};
-use headrace_core::frames::{Rot, Vec3};
-use headrace_core::time::{DurNs, MonoNs};
+use headrace_geometry::frames::{Rot, Vec3};
+use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_mavlink::decoder::{MavlinkDecoder, Meaning, Part};
 use headrace_mavlink::message::{ImuMessage, PressureMessage};
 use headrace_mavlink::tlog::Tlog;
+use headrace_sensor::device::Decoder as _;
+use headrace_sensor::reading::{Decoded, Packet, Reading};
 
 const FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data/bluerov2_ardusub_logs/small.tlog");
 
@@ -100,13 +100,13 @@ fn a_bluerovs_attitude_rates_and_forces_are_read() {
 /// The angle between a force and up by the attitude last told before it, degrees: small for a vehicle that hardly moves,
 /// and only if both have their axes right.
 fn up(
-    attitudes: &[(MonoNs, Rot<headrace_core::app::reading::Level, headrace_core::frames::Sensor>)],
+    attitudes: &[(MonoNs, Rot<headrace_sensor::reading::Level, headrace_geometry::frames::Sensor>)],
     at: MonoNs,
-    force: Vec3<headrace_core::frames::Sensor>,
+    force: Vec3<headrace_geometry::frames::Sensor>,
 ) -> f64 {
     let before = attitudes.partition_point(|(told, _)| *told <= at).max(1) - 1;
     let level = attitudes[before].1 * force;
-    headrace_core::math::acos((level.z() / level.norm()).clamp(-1.0, 1.0)).to_degrees()
+    headrace_geometry::math::acos((level.z() / level.norm()).clamp(-1.0, 1.0)).to_degrees()
 }
 
 #[test]

@@ -15,10 +15,10 @@ use std::io::Cursor;
 use common::{Folder, raw_messages};
 use headrace_bar100::calibration::Overrides;
 use headrace_bar100::decoder::{Bar100Decoder, Meaning};
-use headrace_core::app::device::Decoder as _;
-use headrace_core::app::reading::{Packet, Reading};
-use headrace_core::time::{DurNs, MonoNs};
+use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_imagenex881::codec::{Header, Model};
+use headrace_sensor::device::Decoder as _;
+use headrace_sensor::reading::{Packet, Reading};
 use mcap::{Message, WriteOptions};
 
 /// Plain CDR, little-endian: the encapsulation's four bytes, then numbers aligned from behind them.

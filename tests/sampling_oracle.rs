@@ -9,14 +9,14 @@
     reason = "clippy.toml's leave for tests doesn't reach their helpers"
 )]
 
-use headrace_core::frames::{Body, Mount, Point3, Pose, Rot, Tunnel, Vec3};
-use headrace_core::math::{self, FRAC_PI_2, TAU};
-use headrace_core::sampling::head::Turn;
-use headrace_core::sampling::layout::{InSector, Sector, in_step, start_rad, start_reversed_rad};
-use headrace_core::sampling::ring::{Sounding, Standing};
-use headrace_core::sampling::section;
-use headrace_core::sampling::spacing::{self, Spiral};
-use headrace_core::tunnel::{Profile, named};
+use headrace_geometry::frames::{Body, Mount, Point3, Pose, Rot, Tunnel, Vec3};
+use headrace_geometry::math::{self, FRAC_PI_2, TAU};
+use headrace_geometry::tunnel::{Profile, shapes};
+use headrace_sampling::head::Turn;
+use headrace_sampling::layout::{InSector, Sector, in_step, start_rad, start_reversed_rad};
+use headrace_sampling::ring::{Sounding, Standing};
+use headrace_sampling::section;
+use headrace_sampling::spacing::{self, Spiral};
 
 const ROWS: &str = include_str!("oracles/sampling.csv");
 /// One unit in the last place of a number near 1.
@@ -172,9 +172,9 @@ fn val_algorithm_1() {
 
 fn shape(number: f64) -> Profile {
     match math::round_to_i64(number) {
-        0 => named::rectangle(4.0, 3.0).unwrap(),
-        1 => named::circle(3.0).unwrap(),
-        _ => named::trimmed_circle(6.05, 10.4).unwrap(),
+        0 => shapes::rectangle(4.0, 3.0).unwrap(),
+        1 => shapes::circle(3.0).unwrap(),
+        _ => shapes::trimmed_circle(6.05, 10.4).unwrap(),
     }
 }
 

@@ -112,7 +112,7 @@ fn keeping_the_truth_changes_nothing_of_the_log() {
     for row in rows.iter().filter(|row| row[column("sense")] == "profiling_head") {
         // The tunnel's radius is 3 m, its middle 3 m above the floor.
         let (y, z) = (number(row, "wall_y_m"), number(row, "wall_z_m"));
-        assert!((headrace_core::math::hypot(y, z - 3.0) - 3.0).abs() < 1e-9, "{row:?}");
+        assert!((headrace_geometry::math::hypot(y, z - 3.0) - 3.0).abs() < 1e-9, "{row:?}");
         let noise = number(row, "measured_range_m") - number(row, "true_range_m");
         assert!(noise.abs() < 0.05 * 6.0 && row[column("effects")].contains("range_noise range_m"));
     }

@@ -17,17 +17,17 @@ mod tracking;
 
 use common::Folder;
 use field::{Figures, POSE, SETTINGS, field, field_with, figures, nees, rms, share};
-use headrace_core::app::MAX_SOURCES;
-use headrace_core::frames::Pose;
-use headrace_core::fusion::NavigationConfig;
-use headrace_core::fusion::filter::state::State;
-use headrace_core::fusion::smooth::backward::Backward;
-use headrace_core::fusion::smooth::journal::Journal;
-use headrace_core::fusion::smooth::step::Placed;
-use headrace_core::fusion::smooth::track::TrackNavigation;
-use headrace_core::math;
-use headrace_core::time::MonoNs;
+use headrace_fusion::filter::state::State;
+use headrace_fusion::smooth::backward::Backward;
+use headrace_fusion::smooth::journal::Journal;
+use headrace_fusion::smooth::step::Placed;
+use headrace_fusion::smooth::track::TrackNavigation;
+use headrace_geometry::frames::Pose;
+use headrace_geometry::math;
+use headrace_geometry::time::MonoNs;
 use headrace_replay::simulate::{START, Scene, Simulation};
+use headrace_sensor::reading::MAX_SOURCES;
+use headrace_vehicle::NavigationConfig;
 use tracking::{Epoch, Silence, Track, dive, filter};
 
 const SEEDS: u64 = 3;

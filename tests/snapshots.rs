@@ -10,13 +10,13 @@ mod common;
 #[path = "common/shipped.rs"]
 mod shipped;
 
-use headrace_core::app::App;
-use headrace_core::app::device::Direction;
-use headrace_core::app::ring::Port;
-use headrace_core::app::run::Loop;
-use headrace_core::config::VehicleConfig;
-use headrace_core::time::MonoNs;
+use headrace_geometry::time::MonoNs;
+use headrace_monitor::App;
+use headrace_monitor::ring::Port;
+use headrace_monitor::run::Loop;
 use headrace_replay::simulate::{Scene, Simulation};
+use headrace_sensor::device::Direction;
+use headrace_vehicle::VehicleConfig;
 
 struct Packet {
     source: usize,
@@ -46,7 +46,7 @@ fn packets(scene: &Scene) -> Vec<Packet> {
 fn armed(vehicle: &VehicleConfig) -> (Loop, Vec<Port>) {
     let mut app = App::new(vehicle.mission());
     for sensor in &vehicle.sensors {
-        app.add_plugin(sensor.as_ref()).unwrap();
+        app.add_device(sensor.as_ref()).unwrap();
     }
     let mut dive = app.arm(vehicle.navigation()).unwrap();
     let ports = (0..vehicle.sensors.len()).map(|source| dive.take_port(source).unwrap()).collect();
@@ -85,7 +85,7 @@ fn goes_on_from_anywhere(scene: &Scene) {
         dive.finish(&mut |_, _| {});
     }
     assert_eq!(other.0.digest(), whole.0.digest());
-    let reports = [&whole.0, &other.0].map(headrace_core::app::report::Report::of);
+    let reports = [&whole.0, &other.0].map(headrace_monitor::report::Report::of);
     assert_eq!(serde_json::to_value(&reports[0]).unwrap(), serde_json::to_value(&reports[1]).unwrap());
     assert!(reports[0].dive.samples_valid > 100);
 }

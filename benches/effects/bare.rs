@@ -2,12 +2,12 @@
 
 use std::hint::black_box;
 
-use headrace_core::app::device::{Emulated, Emulator, EmulatorSetup};
-use headrace_core::app::measurement::Sounding;
+use headrace_sensor::device::{Emulated, Emulator, EmulatorSetup};
+use headrace_sensor::measurement::Sounding;
 
-use headrace_core::frames::{Body, Mount, Point3, Rot, Tunnel, head_direction};
-use headrace_core::time::{DurNs, MonoNs};
-use headrace_core::tunnel::Profile;
+use headrace_geometry::frames::{Body, Mount, Point3, Rot, Tunnel, head_direction};
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_geometry::tunnel::Profile;
 use headrace_replay::simulate::{START, Scene, Simulation};
 
 use crate::{SPEED_MPS, best, shipped, text, timed};

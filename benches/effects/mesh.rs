@@ -1,6 +1,6 @@
 //! A wall of a million triangles beside the profile that it follows.
 
-use headrace_core::tunnel::Profile;
+use headrace_geometry::tunnel::Profile;
 use headrace_replay::simulate::Simulation;
 
 use crate::{ROUNDS, best, shipped, timed};

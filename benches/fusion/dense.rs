@@ -2,9 +2,9 @@
 
 use std::hint::black_box;
 
-use headrace_core::fusion::filter::factors::Factors;
-use headrace_core::fusion::filter::settings::Settings;
-use headrace_core::fusion::filter::state::ERRORS;
+use headrace_fusion::filter::factors::Factors;
+use headrace_fusion::filter::settings::Settings;
+use headrace_fusion::filter::state::ERRORS;
 use kfilter::kalman::{Kalman, KalmanLinearNoInput, KalmanPredict as _, KalmanUpdate as _};
 use kfilter::measurement::LinearMeasurement;
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};

@@ -1,21 +1,21 @@
 //! A vehicle at rest in the middle of a tunnel: every sensor shows what it should, so that nothing is gated.
 
-use headrace_core::app::MAX_SOURCES;
-use headrace_core::app::reading::{EchoRange, Reading, TetherLength, WaterPressure};
-use headrace_core::frames::{Body, Mount, Point3, Rot, Sensor, Vec3};
-use headrace_core::fusion::filter::factors::Factors;
-use headrace_core::fusion::filter::inertial::{Felt, Leg};
-use headrace_core::fusion::filter::running::{Context, Running};
-use headrace_core::fusion::filter::settings::Settings;
-use headrace_core::fusion::filter::sources::Source;
-use headrace_core::fusion::filter::state::{ERRORS, State};
-use headrace_core::fusion::filter::trail::Trail;
-use headrace_core::fusion::filter::window::{Waiting, Window};
-use headrace_core::fusion::{SensorInfo, SensorKind};
-use headrace_core::math;
-use headrace_core::site::Site;
-use headrace_core::time::{DurNs, MonoNs};
-use headrace_core::tunnel::named;
+use headrace_fusion::filter::factors::Factors;
+use headrace_fusion::filter::inertial::{Felt, Leg};
+use headrace_fusion::filter::running::{Context, Running};
+use headrace_fusion::filter::settings::Settings;
+use headrace_fusion::filter::sources::Source;
+use headrace_fusion::filter::state::{ERRORS, State};
+use headrace_fusion::filter::trail::Trail;
+use headrace_fusion::filter::window::{Waiting, Window};
+use headrace_geometry::frames::{Body, Mount, Point3, Rot, Sensor, Vec3};
+use headrace_geometry::math;
+use headrace_geometry::site::Site;
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_geometry::tunnel::shapes;
+use headrace_sensor::device::{SensorInfo, SensorKind};
+use headrace_sensor::reading::MAX_SOURCES;
+use headrace_sensor::reading::{EchoRange, Reading, TetherLength, WaterPressure};
 
 pub(crate) const GRAVITY_MPS2: f64 = 9.806_65;
 /// Between two inertial samples, s.
@@ -52,7 +52,7 @@ impl Dive {
     }
 
     fn begin() -> Self {
-        let profile = named::ceran().unwrap();
+        let profile = shapes::ceran().unwrap();
         let [y_m, z_m] = profile.reference();
         let state = State::at_rest(Point3::new(10.0, y_m, z_m), Rot::identity());
         let site = Site::default();

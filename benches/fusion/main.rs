@@ -14,12 +14,12 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use ahrs::{Ahrs as _, Madgwick};
-use headrace_core::frames::Vec3;
-use headrace_core::fusion::filter::factors::Factors;
-use headrace_core::fusion::filter::inertial::{Felt, Leg};
-use headrace_core::fusion::filter::measure;
-use headrace_core::fusion::filter::settings::Settings;
-use headrace_core::time::DurNs;
+use headrace_fusion::filter::factors::Factors;
+use headrace_fusion::filter::inertial::{Felt, Leg};
+use headrace_fusion::filter::measure;
+use headrace_fusion::filter::settings::Settings;
+use headrace_geometry::frames::Vec3;
+use headrace_geometry::time::DurNs;
 use nalgebra_of_peers as peers;
 
 use dense::{Dense, Published};

@@ -1,7 +1,7 @@
 //! §8.3: what heads side by side hide from each other.
 
-use headrace_core::math::{self, TAU};
-use headrace_core::sampling::layout::HeadLayout;
+use headrace_geometry::math::{self, TAU};
+use headrace_sampling::layout::HeadLayout;
 use serde::Serialize;
 
 use crate::runs::{Dive, Dives, Sample, Setting};

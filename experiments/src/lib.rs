@@ -2,7 +2,7 @@
 //! what that needs beyond a dive: surfaces through samples and their distance from the wall (§8.2,
 //! 8.3), the perimeter as a wide beam sees it (§9.2), and the Wilcoxon signed-rank test (§8.1).
 //!
-//! Deterministic: one thread, no clock, no randomness, no hash containers; mathematics through `headrace_core::math`.
+//! Deterministic: one thread, no clock, no randomness, no hash containers; mathematics through `headrace_geometry::math`.
 
 pub mod figures;
 mod hidden;
@@ -17,10 +17,10 @@ pub mod surface;
 mod tables;
 pub mod wilcoxon;
 
-use headrace_core::sampling::SamplingError;
-use headrace_core::sampling::paper::PaperError;
-use headrace_core::tunnel::ProfileError;
+use headrace_geometry::tunnel::ProfileError;
 use headrace_replay::simulate::SceneError;
+use headrace_sampling::SamplingError;
+use headrace_sampling::paper::PaperError;
 
 pub use hidden::HiddenRow;
 pub use meshes::MeshRow;

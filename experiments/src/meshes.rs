@@ -1,6 +1,6 @@
 //! §8.2 and §8.3: surfaces through the samples, and their distance from the wall.
 
-use headrace_core::sampling::layout::HeadLayout;
+use headrace_sampling::layout::HeadLayout;
 use serde::Serialize;
 
 use crate::Spread;

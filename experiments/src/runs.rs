@@ -1,12 +1,12 @@
 //! Simulated dives for the experiments: a vehicle as the paper has it, a straight stretch, and the effects that the
 //! paper's own simulation had.
 
-use headrace_core::app::device::{DeviceKind, Sense};
-use headrace_core::config::Document;
-use headrace_core::frames::{Point3, Tunnel};
-use headrace_core::sampling::layout::HeadLayout;
-use headrace_core::tunnel::Profile;
+use headrace_config::Document;
+use headrace_geometry::frames::{Point3, Tunnel};
+use headrace_geometry::tunnel::Profile;
 use headrace_replay::simulate::{FileLoader, Scene, SceneError, Simulation};
+use headrace_sampling::layout::HeadLayout;
+use headrace_sensor::device::{DeviceKind, Sense};
 
 /// The speed that the paper states, m/s (§7.2).
 pub const SPEED_MPS: f64 = 0.197;

@@ -1,7 +1,7 @@
 //! The paper's spacings, measured on simulated samples: T_y from ping to ping, T_x from pass to pass, T of both.
 
-use headrace_core::math::{self, TAU};
-use headrace_core::sampling::layout::HeadLayout;
+use headrace_geometry::math::{self, TAU};
+use headrace_sampling::layout::HeadLayout;
 use serde::Serialize;
 
 use crate::Spread;

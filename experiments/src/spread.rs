@@ -1,6 +1,6 @@
 //! Mean, standard deviation, least and largest of unsigned lengths.
 
-use headrace_core::math;
+use headrace_geometry::math;
 use serde::Serialize;
 
 /// How unsigned lengths are spread, m; all zero of none.

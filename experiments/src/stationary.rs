@@ -1,7 +1,7 @@
 //! §9.2: the perimeter of the cross-section from a turn of a vehicle that stands still, seen with a beam of some width.
 
-use headrace_core::math::{self, PI, TAU};
-use headrace_core::tunnel::named;
+use headrace_geometry::math::{self, PI, TAU};
+use headrace_geometry::tunnel::shapes;
 use serde::Serialize;
 
 use crate::ExperimentError;
@@ -39,7 +39,7 @@ pub struct Perimeter {
 ///
 /// Errors: none that can occur.
 pub(crate) fn perimeter() -> Result<Perimeter, ExperimentError> {
-    let profile = named::ceran_blueprint()?;
+    let profile = shapes::ceran_blueprint()?;
     let centre = profile.reference();
     let range_m = |angle_rad: f64| {
         let (sin, cos) = math::sin_cos(angle_rad);

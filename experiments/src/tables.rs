@@ -1,7 +1,7 @@
 //! Tables 3 to 5: our simulated runs beside the paper's, and the Wilcoxon tests of §8.1.
 
-use headrace_core::sampling::layout::HeadLayout;
-use headrace_core::sampling::paper::{Measured, PaperError, Printed, Spacings, Tables, measured, tables};
+use headrace_sampling::layout::HeadLayout;
+use headrace_sampling::paper::{Measured, PaperError, Printed, Spacings, Tables, measured, tables};
 use serde::Serialize;
 
 use crate::runs::{Dives, SPEED_MPS, Setting};
@@ -90,7 +90,7 @@ pub(crate) fn runs(dives: &Dives<'_>, progress: Progress<'_>) -> Result<Vec<RunR
             progress(&format!("{} with {} heads", run.mode, run.heads));
             let setting = setting(&run, layout);
             let dive = dives.dive(&setting)?;
-            let turn_s = dive.ping_period_s * headrace_core::math::TAU / dive.step_rad;
+            let turn_s = dive.ping_period_s * headrace_geometry::math::TAU / dive.step_rad;
             rows.push(row(&run, layout, &paper, &spacing(&dive, layout), turn_s));
         }
     }

@@ -7,7 +7,7 @@
 //!
 //! Source: Wilcoxon 1945; Pratt 1959. The paper's §8.1 doesn't say which way with zeros.
 
-use headrace_core::math;
+use headrace_geometry::math;
 
 /// Most pairs for which the exact distribution is taken.
 pub const EXACT_MAX: usize = 50;

@@ -4,7 +4,7 @@
 
 use std::path::PathBuf;
 
-use headrace_core::time::MonoNs;
+use headrace_geometry::time::MonoNs;
 
 use crate::log::{DiveLog, LogError, MessageKind};
 

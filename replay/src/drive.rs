@@ -2,10 +2,10 @@
 
 use std::time::{Duration, Instant};
 
-use headrace_core::app::reading::SourceId;
-use headrace_core::app::ring::{Port, RingError};
-use headrace_core::app::run::Loop;
-use headrace_core::time::{DurNs, MonoNs};
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_monitor::ring::{Port, RingError};
+use headrace_monitor::run::Loop;
+use headrace_sensor::reading::SourceId;
 
 use crate::log::LogError;
 

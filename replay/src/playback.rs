@@ -3,9 +3,9 @@
 use std::time::{Duration, Instant};
 
 use crossbeam::channel::{Receiver, RecvTimeoutError};
-use headrace_core::app::run::Loop;
-use headrace_core::snapshot::SnapshotError;
-use headrace_core::time::{DurNs, MonoNs};
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_monitor::run::Loop;
+use headrace_snapshot::SnapshotError;
 
 use crate::drive::{Clock, DriveError, Driver, Pace};
 use crate::log::LogError;

@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use headrace_core::app::SourceInfo;
-use headrace_core::app::reading::SourceId;
-use headrace_core::app::ring::{MAX_PACKET_BYTES, NO_ORDER, Port, RingError};
-use headrace_core::time::MonoNs;
+use headrace_geometry::time::MonoNs;
+use headrace_monitor::SourceInfo;
+use headrace_monitor::ring::{MAX_PACKET_BYTES, NO_ORDER, Port, RingError};
+use headrace_sensor::reading::SourceId;
 use serde::{Deserialize, Serialize};
 
 use crate::clocks::{self, Clock};
@@ -215,7 +215,7 @@ impl SimulationFeed {
 impl Feed for SimulationFeed {
     fn coming(&mut self) -> Result<Option<Coming>, LogError> {
         while let Some(message) = self.simulation.peek_message() {
-            if message.direction == headrace_core::app::device::Direction::Received {
+            if message.direction == headrace_sensor::device::Direction::Received {
                 let (at, source, len) = (message.at, SourceId(message.source), message.bytes.len());
                 return Ok(Some(Coming { at, source, len }));
             }

@@ -1,10 +1,10 @@
 //! The recorder as an outlet of the loop.
 
-use headrace_core::app::App;
-use headrace_core::app::flow::{Digests, TickTime};
-use headrace_core::app::merge::{Inbox, MAX_TICK_BYTES, MAX_TICK_PACKETS};
-use headrace_core::app::plugin::{Plugin, PluginError};
-use headrace_core::app::stage::Stage;
+use headrace_monitor::App;
+use headrace_monitor::flow::{Digests, TickTime};
+use headrace_monitor::merge::{Inbox, MAX_TICK_BYTES, MAX_TICK_PACKETS};
+use headrace_monitor::plugin::{Plugin, PluginError};
+use headrace_monitor::stage::Stage;
 
 use bevy_ecs::prelude::{Res, ResMut, Resource};
 use std::cell::Cell;
@@ -27,7 +27,7 @@ pub(crate) const STREAMS: [&str; 4] = ["poses", "pings", "judgements", "advice"]
 /// The stream that has something for each echo.
 const ECHOES: &str = "pings";
 /// Encoding of their messages: the tick's index and the number of the records before it, then the words of
-/// [`headrace_core::app::trail`], all u64, little-endian.
+/// [`headrace_monitor::trail`], all u64, little-endian.
 const ENCODING: &str = "headrace-trail";
 /// Words before a message's records.
 const HEAD_WORDS: usize = 2;

@@ -6,11 +6,11 @@ use std::fs::{File, OpenOptions};
 use std::io::{BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::PathBuf;
 
-use headrace_core::fusion::filter::settings::Settings;
-use headrace_core::fusion::smooth::backward::Backward;
-use headrace_core::fusion::smooth::journal::JournalReader;
-use headrace_core::fusion::smooth::step::{Placed, WORDS, Words};
-use headrace_core::fusion::smooth::track::Track;
+use headrace_fusion::filter::settings::Settings;
+use headrace_fusion::smooth::backward::Backward;
+use headrace_fusion::smooth::journal::JournalReader;
+use headrace_fusion::smooth::step::{Placed, WORDS, Words};
+use headrace_fusion::smooth::track::Track;
 
 /// Bytes of a record.
 const RECORD: usize = 8 * WORDS;

@@ -3,9 +3,9 @@
 use std::collections::VecDeque;
 use std::path::PathBuf;
 
-use headrace_core::app::flow::Digests;
-use headrace_core::app::run::Loop;
-use headrace_core::app::trail::{Record, RecordKind, WordKind, first_record};
+use headrace_monitor::flow::Digests;
+use headrace_monitor::run::Loop;
+use headrace_monitor::trail::{Record, RecordKind, WordKind, first_record};
 
 use crate::log::{DiveLog, LogError, MessageKind};
 use crate::record::{STREAMS, read_results, stream_of};

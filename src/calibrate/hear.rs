@@ -1,13 +1,13 @@
 //! The readings of a part of a log, as the loop's decoders give them.
 
-use headrace_core::app::flow::{Event, Events, SensorTable};
-use headrace_core::app::ring::{Port, RingError};
-use headrace_core::app::run::Loop;
-use headrace_core::fusion::SensorInfo;
-use headrace_core::time::{DurNs, MonoNs};
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_monitor::flow::{Event, Events, SensorTable};
+use headrace_monitor::ring::{Port, RingError};
+use headrace_monitor::run::Loop;
 use headrace_replay::drive::{Coming, Feed, Pace, drive};
 use headrace_replay::log::LogError;
 use headrace_replay::player::Player;
+use headrace_sensor::device::SensorInfo;
 
 use crate::cli::Calibrate;
 use crate::failure::Failure;

@@ -4,17 +4,18 @@ mod hear;
 mod table;
 mod words;
 
-use headrace_core::app::flow::Event;
-use headrace_core::config::VehicleConfig;
-use headrace_core::fusion::calibration::heads::{Heads, heads};
-use headrace_core::fusion::calibration::still::longest;
-use headrace_core::fusion::calibration::timing::{Lag, lags};
-use headrace_core::fusion::calibration::zero::{self, Zero};
-use headrace_core::fusion::calibration::{Material, Untold};
-use headrace_core::fusion::filter::settings::Settings;
-use headrace_core::fusion::{NavigationConfig, SensorInfo, SensorKind};
+use headrace_calibration::heads::{Heads, heads};
+use headrace_calibration::still::longest;
+use headrace_calibration::timing::{Lag, lags};
+use headrace_calibration::zero::{self, Zero};
+use headrace_calibration::{Material, Untold};
+use headrace_fusion::filter::settings::Settings;
+use headrace_monitor::flow::Event;
 use headrace_replay::log::files_of;
 use headrace_replay::player::Player;
+use headrace_sensor::device::{SensorInfo, SensorKind};
+use headrace_vehicle::NavigationConfig;
+use headrace_vehicle::VehicleConfig;
 
 use crate::cli::Calibrate;
 use crate::commands::{attached_vehicle, vehicle_file};

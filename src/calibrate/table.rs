@@ -1,10 +1,10 @@
 //! What was found beside what the vehicle file says, and the lines to put into it.
 
-use headrace_core::config::VehicleConfig;
-use headrace_core::fusion::calibration::heads::Head;
-use headrace_core::fusion::calibration::zero::Zero;
-use headrace_core::fusion::calibration::{Estimate, Untold};
-use headrace_core::sampling::head::faces_aft;
+use headrace_calibration::heads::Head;
+use headrace_calibration::zero::Zero;
+use headrace_calibration::{Estimate, Untold};
+use headrace_sampling::head::faces_aft;
+use headrace_vehicle::VehicleConfig;
 
 use super::Findings;
 

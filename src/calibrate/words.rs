@@ -1,6 +1,6 @@
 //! Calibration in words, and as JSON.
 
-use headrace_core::config::VehicleConfig;
+use headrace_vehicle::VehicleConfig;
 use serde_json::{Value as Json, json};
 
 use super::Findings;
@@ -108,7 +108,7 @@ pub(super) fn json(
 ) -> Json {
     let still = findings.heads.as_ref().ok().map(|heads| {
         let [y, z] = heads.place_m;
-        let of_head = |head: &headrace_core::fusion::calibration::heads::Head| {
+        let of_head = |head: &headrace_calibration::heads::Head| {
             json!({
                 "id": vehicle.sensor_configs.get(head.source).map(|sensor| &sensor.id),
                 "used": head.used,

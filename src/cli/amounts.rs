@@ -1,6 +1,6 @@
 //! Sizes, times and stretches as people write them on the command line.
 
-use headrace_core::time::DurNs;
+use headrace_geometry::time::DurNs;
 use headrace_replay::log::Every;
 
 /// A size or a time after which a part of a recording ends.

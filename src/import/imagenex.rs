@@ -1,6 +1,6 @@
 //! Files of Imagenex' own software.
 
-use headrace_core::time::DurNs;
+use headrace_geometry::time::DurNs;
 use headrace_imagenex881::logfile::{LogFile, LogFileError};
 use headrace_replay::import::{Clock, Entry, Format, Step};
 

@@ -12,13 +12,14 @@ use std::fs::File;
 use std::io::{BufRead as _, BufReader, Read};
 use std::path::Path;
 
-use headrace_core::config::{Document, VehicleConfig};
+use headrace_config::Document;
 use headrace_replay::import::candump::Candump;
 use headrace_replay::import::csv::Csv;
 use headrace_replay::import::ros::bag::Bag;
 use headrace_replay::import::ros::mcap::Mcap;
 use headrace_replay::import::{Format, Import, ImportError, Imported, Input, Source, Taker, detect};
 use headrace_replay::log::{LogError, LogHeader, LogWriter};
+use headrace_vehicle::VehicleConfig;
 use serde_json::json;
 
 use crate::cli;

@@ -1,7 +1,8 @@
 //! Recordings of ROS: whose topics are which sensor's.
 
-use headrace_core::config::{Document, VehicleConfig};
+use headrace_config::Document;
 use headrace_replay::import::ros::{Feeds, MatchError, Topic};
+use headrace_vehicle::VehicleConfig;
 
 use crate::cli;
 use crate::failure::Failure;

@@ -1,11 +1,12 @@
 //! Which sensor listens to which line of a foreign log.
 
-use headrace_core::app::device::DeviceKind as _;
-use headrace_core::app::driver::DriverSetup;
-use headrace_core::config::{Connect, VehicleConfig};
-use headrace_core::time::MonoNs;
+use headrace_geometry::time::MonoNs;
 use headrace_replay::import::Taker;
 use headrace_replay::log::SourceInfo;
+use headrace_sensor::connect::Connect;
+use headrace_sensor::device::DeviceKind as _;
+use headrace_sensor::driver::DriverSetup;
+use headrace_vehicle::VehicleConfig;
 
 use super::{Kind, imagenex, ping, tlog};
 use crate::failure::Failure;

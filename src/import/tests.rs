@@ -1,10 +1,11 @@
 //! The formats on bytes of their own making, and on any.
 
-use headrace_core::codec::Bytes;
-use headrace_core::config::{Document, VehicleConfig};
+use headrace_config::Document;
 use headrace_mavlink::frame::{Frame, Version};
 use headrace_replay::import::csv::Csv;
 use headrace_replay::import::{Entry, Format, Step};
+use headrace_sensor::codec::Bytes;
+use headrace_vehicle::VehicleConfig;
 use proptest::prelude::*;
 
 use super::imagenex::ImagenexFormat;

@@ -1,9 +1,9 @@
 //! Telemetry logs of MAVLink.
 
-use headrace_core::codec::{Framing as _, Verdict};
 use headrace_mavlink::frame::Frames;
 use headrace_mavlink::tlog::{Tlog, TlogError};
 use headrace_replay::import::{Clock, Entry, Format, Step};
+use headrace_sensor::codec::{Framing as _, Verdict};
 
 /// The format; its one stream is [`STREAM`].
 #[derive(Debug, Default)]

@@ -1,8 +1,8 @@
 //! What is asked on the lines: each kind of device that can be.
 
-use headrace_core::app::driver::{Carrier, Probe};
-use headrace_core::config::Connect;
 use headrace_ports::{Found, probe};
+use headrace_sensor::connect::Connect;
+use headrace_sensor::driver::{Carrier, Probe};
 
 use super::Asked;
 use crate::devices::KINDS;

@@ -1,7 +1,7 @@
 //! What `headrace devices` says to people: a block for each device, with what is wrong and what mends it under it.
 
-use headrace_core::app::driver::Carrier;
 use headrace_ports::{Answer, Found, Trouble};
+use headrace_sensor::driver::Carrier;
 
 use super::{Asked, Inventory, Sensor, State};
 use crate::output::append;

@@ -1,7 +1,7 @@
 //! The experiments in words.
 
-use headrace_core::sampling::paper::SOURCE;
 use headrace_experiments::{Experiments, HiddenRow, MeshRow, Pair, Perimeter, RunRow, SignedRankRow};
+use headrace_sampling::paper::SOURCE;
 
 use crate::output::append;
 

@@ -4,8 +4,8 @@ mod experiments;
 mod pictures;
 mod tables;
 
-use headrace_core::sampling::paper;
 use headrace_experiments::{Dives, run};
+use headrace_sampling::paper;
 
 use crate::cli::Paper;
 use crate::devices::KINDS;

@@ -1,6 +1,6 @@
 //! The paper's tables on the terminal.
 
-use headrace_core::sampling::paper::{
+use headrace_sampling::paper::{
     AtBothSpeeds, Cell, Combined, CombinedRow, Digits, ModeRow, Note, OneHeadRow, OverlapRow,
     SeveralHeadsRow, Table, Tables,
 };

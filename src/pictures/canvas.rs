@@ -2,7 +2,7 @@
 
 use std::cell::RefCell;
 
-use headrace_core::math;
+use headrace_geometry::math;
 use svg::node::element;
 use svg::{Document, Node};
 

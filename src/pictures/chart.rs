@@ -3,7 +3,7 @@
 use super::canvas::{BLACK, BOLD, Canvas, Colour, Letters, NORMAL, Px, SMALL, Side};
 use super::look::{AXIS, GRID, Look};
 use super::polyline::Frame;
-use headrace_core::math;
+use headrace_geometry::math;
 
 /// Length of the mark at a number, pixels.
 const TICK_PX: f64 = 4.0;

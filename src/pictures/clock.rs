@@ -1,7 +1,7 @@
 //! Places of the wall as people call them.
 
-use headrace_core::math;
-use headrace_core::tunnel::Profile;
+use headrace_geometry::math;
+use headrace_geometry::tunnel::Profile;
 
 use super::canvas::{NORMAL, Side};
 use super::chart::Chart;
@@ -64,12 +64,12 @@ pub(crate) fn at_right(chart: &Chart<'_>, profile: &Profile) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use headrace_core::tunnel::named;
+    use headrace_geometry::tunnel::shapes;
 
     #[test]
     fn hours_are_where_the_profile_says() {
         for profile in
-            [named::ceran().unwrap(), named::rectangle(3.0, 4.0).unwrap(), named::circle(0.5).unwrap()]
+            [shapes::ceran().unwrap(), shapes::rectangle(3.0, 4.0).unwrap(), shapes::circle(0.5).unwrap()]
         {
             let hours = hours(&profile);
             assert!(hours.windows(2).all(|pair| pair[0].sigma_m < pair[1].sigma_m), "{hours:?}");

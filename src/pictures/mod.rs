@@ -12,7 +12,7 @@ pub(crate) mod scale;
 #[cfg(test)]
 pub(crate) mod xml;
 
-use headrace_core::sampling::SamplingError;
+use headrace_sampling::SamplingError;
 
 /// Why there is no picture.
 #[derive(Debug, thiserror::Error)]

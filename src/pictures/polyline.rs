@@ -1,6 +1,6 @@
 //! Lines through points: cut off at a frame, and thinned.
 
-use headrace_core::math;
+use headrace_geometry::math;
 
 use super::canvas::Px;
 

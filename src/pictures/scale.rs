@@ -1,6 +1,6 @@
 //! A scale of colours, from pale to dark: a larger value is darker in print and for the colour-blind, too.
 
-use headrace_core::math;
+use headrace_geometry::math;
 
 use super::canvas::{Canvas, Colour, NORMAL, Px, SMALL, Side};
 

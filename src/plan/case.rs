@@ -2,16 +2,18 @@
 
 use std::path::Path;
 
-use headrace_core::app::device::Device;
-use headrace_core::config::vehicle::{Loader, TunnelConfig};
-use headrace_core::config::{Document, SensorConfig};
-use headrace_core::frames::{Mount, Rot, Vec3};
-use headrace_core::sampling::head::{HeadMode, HeadSpec};
-use headrace_core::sampling::layout::HeadLayout;
-use headrace_core::sampling::occlusion::Obstacle;
-use headrace_core::sampling::plan::{Inspection, Question};
-use headrace_core::site::Site;
-use headrace_core::time::DurNs;
+use headrace_config::Document;
+use headrace_config::Loader;
+use headrace_geometry::frames::{Mount, Rot, Vec3};
+use headrace_geometry::site::Site;
+use headrace_geometry::time::DurNs;
+use headrace_sampling::head::{HeadMode, HeadSpec};
+use headrace_sampling::layout::HeadLayout;
+use headrace_sampling::occlusion::Obstacle;
+use headrace_sampling::plan::{Inspection, Question};
+use headrace_sensor::SensorConfig;
+use headrace_sensor::device::Device;
+use headrace_vehicle::TunnelConfig;
 
 use crate::cli::Plan;
 use crate::commands::vehicle_file;

@@ -1,6 +1,6 @@
 //! The modes of a plan as a table for spreadsheets: one row a mode, SI units in the headings.
 
-use headrace_core::sampling::plan::{Answer, Spacing};
+use headrace_sampling::plan::{Answer, Spacing};
 
 const HEADINGS: &str = "mode,step_deg,steps_per_turn,turn_s,turn_basis,overlap,t_y_min_rest_m,t_y_mean_rest_m,\
 t_y_max_rest_m,t_yp_m,t_y2_m,v_max_mps,needed_h,reason,speed_mps,advance_m,pitch_m,t_x_m,t_x_hidden_m,t_y_min_m,\

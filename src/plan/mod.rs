@@ -7,7 +7,7 @@ mod table;
 
 use std::path::Path;
 
-use headrace_core::sampling::plan::{Answer, Briefing, Planner, Question};
+use headrace_sampling::plan::{Answer, Briefing, Planner, Question};
 use serde_json::json;
 
 use crate::cli::Plan;

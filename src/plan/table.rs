@@ -1,8 +1,8 @@
 //! A plan on the terminal.
 
-use headrace_core::sampling::head::Basis;
-use headrace_core::sampling::layout::HeadLayout;
-use headrace_core::sampling::plan::{Answer, Briefing, Heard, Spacing, ThinStrip};
+use headrace_sampling::head::Basis;
+use headrace_sampling::layout::HeadLayout;
+use headrace_sampling::plan::{Answer, Briefing, Heard, Spacing, ThinStrip};
 
 use super::{Findings, printed_mps};
 
@@ -198,7 +198,7 @@ fn start_lines(findings: &Findings, briefing: &Briefing) -> Vec<String> {
     let mut lines = Vec::new();
     lines.extend(briefing.exposures.iter().map(|heard| heard_words(heard, &names)));
     if findings.heads.len() > 1 {
-        let degrees = |start: &headrace_core::sampling::plan::Start| {
+        let degrees = |start: &headrace_sampling::plan::Start| {
             let way = if start.growing { '+' } else { '-' };
             let sector = start.sector_deg.map_or_else(String::new, |[least, size]| {
                 format!(" within {:.0} to {:.0}", least, least + size)

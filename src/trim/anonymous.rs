@@ -2,9 +2,10 @@
 //!
 //! The vehicle file is gone through as text, string by string: what its keys mean stays, and so does every number.
 
-use headrace_core::config::{Connect, SerialPort, VehicleConfig};
 use headrace_replay::log::format::{FORMAT_KEY, VEHICLE_FILE};
 use headrace_replay::log::{DiveLog, LogHeader, SourceInfo, TRIMMED};
+use headrace_sensor::connect::{Connect, SerialPort};
+use headrace_vehicle::VehicleConfig;
 
 use crate::devices::KINDS;
 use crate::failure::Failure;
@@ -41,7 +42,7 @@ impl Anonymous {
             .zip(&info.attachments)
             .map(|((_, name), (_, content))| (name.clone(), content.clone()))
             .collect();
-        let document = headrace_core::config::Document::new(VEHICLE_FILE, &vehicle_toml);
+        let document = headrace_config::Document::new(VEHICLE_FILE, &vehicle_toml);
         VehicleConfig::parse(document, &KINDS, &files::attached(&attachments))?;
         Ok(Self { vehicle_toml, names, left: left(log, vehicle) })
     }
@@ -239,7 +240,7 @@ inner."name" = "name 6"
             let clean = anonymised(&text, &[]);
             assert!(!clean.contains('#') && !clean.contains("VITA") && !clean.contains("192.168"), "{clean}");
             let read = |text: &str| {
-                let document = headrace_core::config::Document::new(name, text);
+                let document = headrace_config::Document::new(name, text);
                 VehicleConfig::parse(document, &KINDS, &|_| Err("no file".to_owned())).unwrap()
             };
             let (before, after) = (read(&text), read(&clean));

@@ -6,16 +6,16 @@ use std::fs::OpenOptions;
 use std::io::{BufWriter, Write};
 use std::path::PathBuf;
 
-use headrace_core::app::device::Needless;
-use headrace_core::app::flow::Navigator;
-use headrace_core::config::VehicleConfig;
-use headrace_core::time::{DurNs, MonoNs};
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_monitor::flow::Navigator;
 use headrace_replay::drive::Pace;
 use headrace_replay::log::{
     DiveLog, LogHeader, LogInfo, Trim as Work, Trimmed, files_digest, files_of, trim as rewrite,
 };
 use headrace_replay::player::{Player, seconds};
 use headrace_replay::record::result_channels;
+use headrace_sensor::device::Needless;
+use headrace_vehicle::VehicleConfig;
 use serde_json::json;
 
 use crate::cli::Trim;

@@ -3,16 +3,16 @@
 #![allow(dead_code, reason = "each takes what it needs")]
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
 
-use headrace_core::app::App;
-use headrace_core::app::device::Direction;
-use headrace_core::app::flow::{AdviceEntry, Notice, Notices};
-use headrace_core::app::reading::SourceId;
-use headrace_core::app::report::Report;
-use headrace_core::app::ring::{Port, RingError};
-use headrace_core::time::DurNs;
+use headrace_geometry::time::DurNs;
+use headrace_monitor::App;
+use headrace_monitor::flow::{AdviceEntry, Notice, Notices};
+use headrace_monitor::report::Report;
+use headrace_monitor::ring::{Port, RingError};
 use headrace_replay::drive::{Coming, Feed, Pace, drive};
 use headrace_replay::log::LogError;
 use headrace_replay::simulate::{Scene, Simulation};
+use headrace_sensor::device::Direction;
+use headrace_sensor::reading::SourceId;
 
 /// A simulated dive one of whose sources may be dumb.
 struct Partly {
@@ -54,13 +54,13 @@ pub(crate) fn dive(scene: &Scene, dumb: Option<&str>, tick: DurNs) -> Advised {
     let vehicle = &scene.vehicle;
     let mut app = App::new(vehicle.mission());
     for sensor in &vehicle.sensors {
-        app.add_plugin(sensor.as_ref()).unwrap();
+        app.add_device(sensor.as_ref()).unwrap();
     }
     let mut dive = app.arm(vehicle.navigation()).unwrap();
     let dumb = dumb.map(|id| dive.sources().iter().position(|source| source.id == id).unwrap());
     let mut feed = Partly { simulation: Simulation::new(scene).unwrap_or_else(|why| panic!("{why}")), dumb };
     let mut beats = Vec::new();
-    let mut note = |dive: &headrace_core::app::run::Loop| {
+    let mut note = |dive: &headrace_monitor::run::Loop| {
         for notice in &dive.world().resource::<Notices>().0 {
             if let Notice::Advice(entry) = notice {
                 beats.push(*entry);

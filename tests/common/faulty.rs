@@ -11,12 +11,12 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-use headrace_core::app::device::{Direction, Emulated, Emulator};
-use headrace_core::app::driver::Carrier;
-use headrace_core::app::measurement::Measurement;
-use headrace_core::config::{Connect, SerialPort};
-use headrace_core::time::{DurNs, MonoNs};
+use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_ports::{Stand, wait_for_any};
+use headrace_sensor::connect::{Connect, SerialPort};
+use headrace_sensor::device::{Direction, Emulated, Emulator};
+use headrace_sensor::driver::Carrier;
+use headrace_sensor::measurement::Measurement;
 
 const LOCAL: IpAddr = IpAddr::V4(Ipv4Addr::LOCALHOST);
 const WAIT_NS: u32 = 1_000_000;

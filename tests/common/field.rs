@@ -3,10 +3,10 @@
 #![allow(dead_code, reason = "each takes what it needs")]
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
 
-use headrace_core::frames::{Tunnel, Vec3};
-use headrace_core::fusion::Fix;
-use headrace_core::math;
-use headrace_core::time::MonoNs;
+use headrace_fusion::Fix;
+use headrace_geometry::frames::{Tunnel, Vec3};
+use headrace_geometry::math;
+use headrace_geometry::time::MonoNs;
 use headrace_replay::simulate::Scene;
 use nalgebra::{SMatrix, SVector};
 

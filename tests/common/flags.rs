@@ -9,10 +9,10 @@
 
 use std::ops::Range;
 
-use headrace_core::app::report::SectionReport;
-use headrace_core::frames::{Pose, head_direction};
-use headrace_core::math::TAU;
-use headrace_core::time::{DurNs, MonoNs};
+use headrace_geometry::frames::{Pose, head_direction};
+use headrace_geometry::math::TAU;
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_monitor::report::SectionReport;
 
 use crate::wall::Wall;
 use crate::watched::{Dive, Ping};

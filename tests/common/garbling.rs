@@ -1,8 +1,8 @@
 //! What becomes of bytes on bad lines, the same each time.
 
-use headrace_core::codec::Codec;
 use headrace_imagenex881::codec::{Model, ReturnCodec, Returns};
 use headrace_ping1d::codec::PingCodec;
+use headrace_sensor::codec::Codec;
 
 use super::faulty::{Fault, Wire};
 use super::random::Random;

@@ -10,19 +10,20 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use headrace_core::app::App;
-use headrace_core::app::device::{DeviceKind, Emulated, EmulatorSetup};
-use headrace_core::app::driver::DriverSetup;
-use headrace_core::app::plugin::Plugin;
-use headrace_core::app::report::Report;
-use headrace_core::app::run::Loop;
-use headrace_core::config::{Connect, Document, VehicleConfig};
-use headrace_core::time::DurNs;
+use headrace_config::Document;
+use headrace_geometry::time::DurNs;
+use headrace_monitor::App;
+use headrace_monitor::report::Report;
+use headrace_monitor::run::Loop;
 use headrace_ports::{Crew, Hand, LineHistory, Phase, SentSink};
 use headrace_replay::drive::{Pace, drive};
 use headrace_replay::log::{LogHeader, Recorder, RecorderHandle, SourceInfo};
 use headrace_replay::player::Player;
 use headrace_replay::record::{QUEUE_BYTES, RecorderOutlet, result_channels};
+use headrace_sensor::connect::Connect;
+use headrace_sensor::device::{DeviceKind, Emulated, EmulatorSetup};
+use headrace_sensor::driver::DriverSetup;
+use headrace_vehicle::VehicleConfig;
 
 use super::faulty::{Control, End, Fault, Faulty};
 
@@ -265,8 +266,7 @@ fn neutral(words: &str, places: &[String]) -> String {
 fn assemble(vehicle: &VehicleConfig, text: &str, log: Option<&Path>) -> (Loop, Option<RecorderHandle>) {
     let mut app = App::new(vehicle.mission());
     for sensor in &vehicle.sensors {
-        let plugin: &dyn Plugin = sensor.as_ref();
-        app.add_plugin(plugin).unwrap();
+        app.add_device(sensor.as_ref()).unwrap();
     }
     let mut handle = None;
     if let Some(log) = log {

@@ -5,7 +5,7 @@
 
 use std::fmt::Write as _;
 
-use headrace_core::math;
+use headrace_geometry::math;
 
 /// What is the matter with a dive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

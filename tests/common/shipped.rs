@@ -8,9 +8,9 @@ mod devices;
 
 use std::path::Path;
 
-use headrace_core::app::App;
-use headrace_core::app::report::Report;
-use headrace_core::config::Document;
+use headrace_config::Document;
+use headrace_monitor::App;
+use headrace_monitor::report::Report;
 use headrace_replay::drive::{Pace, drive};
 use headrace_replay::player::SimulationFeed;
 use headrace_replay::simulate::{FileLoader, Scene, Simulation};
@@ -42,7 +42,7 @@ pub(crate) fn report(scene: &Scene) -> Report {
     let vehicle = &scene.vehicle;
     let mut app = App::new(vehicle.mission());
     for sensor in &vehicle.sensors {
-        app.add_plugin(sensor.as_ref()).unwrap();
+        app.add_device(sensor.as_ref()).unwrap();
     }
     let mut dive = app.arm(vehicle.navigation()).unwrap();
     let simulation = Simulation::new(scene).unwrap_or_else(|why| panic!("{why}"));

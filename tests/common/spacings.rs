@@ -7,7 +7,7 @@
 
 #![allow(dead_code, reason = "each takes what it needs")]
 
-use headrace_core::math;
+use headrace_geometry::math;
 
 use crate::watched::{Ping, Sample};
 

@@ -5,22 +5,24 @@
 
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
-use headrace_core::app::App;
-use headrace_core::app::reading::Reading;
-use headrace_core::app::report::Report;
-use headrace_core::frames::Pose;
-use headrace_core::fusion::filter::FilterNavigation;
-use headrace_core::fusion::filter::factors::Factors;
-use headrace_core::fusion::filter::settings::Settings;
-use headrace_core::fusion::filter::sources::Consistency;
-use headrace_core::fusion::filter::state::{ERRORS, Errors, State};
-use headrace_core::fusion::relative::Relative;
-use headrace_core::fusion::{Fix, Navigation, NavigationConfig, NoFix, SensorInfo, Times};
-use headrace_core::snapshot::{Restorer, Saver, SnapshotError, Stateful};
-use headrace_core::time::MonoNs;
+use headrace_fusion::filter::FilterNavigation;
+use headrace_fusion::filter::factors::Factors;
+use headrace_fusion::filter::settings::Settings;
+use headrace_fusion::filter::sources::Consistency;
+use headrace_fusion::filter::state::{ERRORS, Errors, State};
+use headrace_fusion::relative::Relative;
+use headrace_fusion::{Fix, Navigation, NoFix, Times};
+use headrace_geometry::frames::Pose;
+use headrace_geometry::time::MonoNs;
+use headrace_monitor::App;
+use headrace_monitor::report::Report;
 use headrace_replay::drive::{Pace, drive};
 use headrace_replay::player::SimulationFeed;
 use headrace_replay::simulate::{START, Scene, Simulation};
+use headrace_sensor::device::SensorInfo;
+use headrace_sensor::reading::Reading;
+use headrace_snapshot::{Restorer, Saver, SnapshotError, Stateful};
+use headrace_vehicle::NavigationConfig;
 
 /// More than a dive of an hour says.
 const MOST_SAID: usize = 1 << 20;
@@ -70,9 +72,9 @@ pub(crate) trait Transparent: Navigation + 'static {
     }
 }
 
-impl Transparent for headrace_core::fusion::direct::DirectNavigation {}
+impl Transparent for headrace_fusion::direct::DirectNavigation {}
 
-impl Transparent for headrace_core::fusion::smooth::track::TrackNavigation {}
+impl Transparent for headrace_fusion::smooth::track::TrackNavigation {}
 
 impl Transparent for FilterNavigation {
     fn estimate(&self) -> Option<(MonoNs, State, Factors<ERRORS>)> {
@@ -172,7 +174,7 @@ pub(crate) fn dive(scene: &Scene, inner: impl Transparent, silence: Silence) -> 
     let vehicle = &scene.vehicle;
     let mut app = App::new(vehicle.mission());
     for sensor in &vehicle.sensors {
-        app.add_plugin(sensor.as_ref()).unwrap();
+        app.add_device(sensor.as_ref()).unwrap();
     }
     let (said, heard) = sync_channel(MOST_SAID);
     let told = vec![Consistency::default(); vehicle.sensors.len()];

@@ -4,7 +4,7 @@
 #![allow(dead_code, reason = "each takes what it needs")]
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
 
-use headrace_core::math;
+use headrace_geometry::math;
 use spade::{DelaunayTriangulation, HasPosition, Point2, Triangulation};
 
 /// Smaller coordinates are zero: the triangulation's exact predicates take none below 1e-142.

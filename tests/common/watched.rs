@@ -4,19 +4,20 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
 
 use bevy_ecs::prelude::{Res, ResMut, Resource};
-use headrace_core::app::flow::{Outcome, Placed, PlacedList};
-use headrace_core::app::plugin::{Plugin, PluginError};
-use headrace_core::app::report::Report;
-use headrace_core::app::stage::Stage;
-use headrace_core::app::{App, Mission};
-use headrace_core::config::VehicleConfig;
-use headrace_core::frames::{Mount, Pose};
-use headrace_core::math::TAU;
-use headrace_core::time::{DurNs, MonoNs};
-use headrace_core::tunnel::Profile;
+use headrace_geometry::frames::{Mount, Pose};
+use headrace_geometry::math::TAU;
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_geometry::tunnel::Profile;
+use headrace_monitor::App;
+use headrace_monitor::flow::{Outcome, Placed, PlacedList};
+use headrace_monitor::plugin::{Plugin, PluginError};
+use headrace_monitor::report::Report;
+use headrace_monitor::stage::Stage;
 use headrace_replay::drive::{Pace, drive};
 use headrace_replay::player::SimulationFeed;
 use headrace_replay::simulate::{Scene, Simulation};
+use headrace_vehicle::Mission;
+use headrace_vehicle::VehicleConfig;
 
 use crate::shipped;
 
@@ -129,7 +130,7 @@ fn parse(vehicle: &str, polygon: &str, scene: &str) -> Scene {
 fn watched(scene: &Scene, vehicle: &VehicleConfig, mission: Mission, pace: Pace) -> Dive {
     let mut app = App::new(mission);
     for sensor in &vehicle.sensors {
-        app.add_plugin(sensor.as_ref()).unwrap();
+        app.add_device(sensor.as_ref()).unwrap();
     }
     app.add_plugin(&Watch).unwrap();
     let mut dive = app.arm(vehicle.navigation()).unwrap();

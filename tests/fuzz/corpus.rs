@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 use std::io::Cursor;
 use std::path::Path;
 
-use headrace_core::codec::Bytes;
-use headrace_core::time::DurNs;
+use headrace_geometry::time::DurNs;
 use headrace_mavlink::frame::{Frame, Version};
 use headrace_replay::log::{LogHeader, LogWriter, SourceInfo};
+use headrace_sensor::codec::Bytes;
 use mcap::{Compression, WriteOptions};
 
 use crate::BEGIN;

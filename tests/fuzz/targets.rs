@@ -3,9 +3,8 @@
 use std::collections::BTreeMap;
 use std::io::Cursor;
 
-use headrace_core::app::driver::DriverSetup;
-use headrace_core::config::{Document, VehicleConfig};
-use headrace_core::time::MonoNs;
+use headrace_config::Document;
+use headrace_geometry::time::MonoNs;
 use headrace_replay::import::candump::Candump;
 use headrace_replay::import::csv::Csv;
 use headrace_replay::import::detect::looks_like;
@@ -14,6 +13,8 @@ use headrace_replay::import::ros::mcap::Mcap;
 use headrace_replay::import::ros::{Feeds, Topic};
 use headrace_replay::import::{Format, Import, Input, Source, Taker};
 use headrace_replay::log::{LogHeader, LogReader, LogWriter, MessageKind, SourceInfo};
+use headrace_sensor::driver::DriverSetup;
+use headrace_vehicle::VehicleConfig;
 
 use crate::corpus::{Corpus, Kind};
 use crate::devices::KINDS;

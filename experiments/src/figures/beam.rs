@@ -1,9 +1,9 @@
 //! Figure 15: how much of a flat wall a beam covers.
 
-use headrace_core::math;
-use headrace_core::sampling::section::{beam_width_m, footprint_m};
-use headrace_core::tunnel::{Profile, named};
+use headrace_geometry::math;
+use headrace_geometry::tunnel::{Profile, shapes};
 use headrace_replay::simulate::effects::Cone;
+use headrace_sampling::section::{beam_width_m, footprint_m};
 
 use crate::ExperimentError;
 
@@ -48,7 +48,7 @@ pub struct Footprint {
 ///
 /// Errors: none that can occur.
 pub fn footprints() -> Result<Footprints, ExperimentError> {
-    let profile = named::ceran_blueprint()?;
+    let profile = shapes::ceran_blueprint()?;
     let [_, height_m] = profile.reference();
     let half_m = floor_half_m(&profile);
     let corner_deg = math::atan2(half_m, height_m).to_degrees();

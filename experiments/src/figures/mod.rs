@@ -4,7 +4,7 @@ mod beam;
 mod patterns;
 mod walls;
 
-use headrace_core::math;
+use headrace_geometry::math;
 
 use crate::runs::{Dive, Sample};
 

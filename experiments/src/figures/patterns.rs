@@ -1,8 +1,8 @@
 //! Figures 6 and 8: what heads in phase shift and in sector offset lay on the wall.
 
-use headrace_core::math::{self, TAU};
-use headrace_core::sampling::layout::{self, HeadLayout};
-use headrace_core::tunnel::Profile;
+use headrace_geometry::math::{self, TAU};
+use headrace_geometry::tunnel::Profile;
+use headrace_sampling::layout::{self, HeadLayout};
 
 use super::{Place, Way, Window, add_step};
 use crate::ExperimentError;

@@ -1,7 +1,7 @@
 //! Figures 12 and 13: samples on a stretch of wall, and how far the Poisson surface is from it.
 
-use headrace_core::math::{self, TAU};
-use headrace_core::tunnel::Profile;
+use headrace_geometry::math::{self, TAU};
+use headrace_geometry::tunnel::Profile;
 
 use super::{Place, Window};
 use crate::Spread;
@@ -119,7 +119,7 @@ pub fn walls(
     all.sort_by(f64::total_cmp);
     let last = math::floor_to_i64(SCALE_SHARE * all.len() as f64);
     let most_m = all.get(crate::index(last)).copied().unwrap_or_default();
-    let profile = headrace_core::tunnel::named::ceran_blueprint()?;
+    let profile = headrace_geometry::tunnel::shapes::ceran_blueprint()?;
     // A round number of centimetres.
     let most_m = (most_m * 100.0).ceil().max(1.0) / 100.0;
     Ok(Walls { profile, speed_mps: SPEED_MPS, dive_m: LENGTH_M, length_m: SHOWN_M, panels, most_m })

@@ -1,6 +1,6 @@
 //! Echoes of a turn: strength over angle and range.
 
-use headrace_core::math::{self, TAU};
+use headrace_geometry::math::{self, TAU};
 
 use super::{PerimeterError, Ping, Settings};
 

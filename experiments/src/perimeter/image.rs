@@ -1,6 +1,6 @@
 //! A black and white image of a cross-section, the head in its middle.
 
-use headrace_core::math::{self, TAU};
+use headrace_geometry::math::{self, TAU};
 
 use super::Settings;
 use super::echo::Echoes;

@@ -6,7 +6,7 @@ mod echo;
 mod image;
 mod thin;
 
-use headrace_core::math::{self, TAU};
+use headrace_geometry::math::{self, TAU};
 
 pub use chain::Chain;
 
@@ -17,7 +17,7 @@ use image::Image;
 /// One ping: the head's angle, and where its beam's rays met the wall.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ping {
-    /// Angle of the head in [`headrace_core::frames`]'s sense, radians: 0 down, 90 degrees to the left.
+    /// Angle of the head in [`headrace_geometry::frames`]'s sense, radians: 0 down, 90 degrees to the left.
     pub angle_rad: f64,
     /// Range of every ray in the beam, m; rays that are no number or beyond range give no echo.
     pub ranges_m: Vec<f64>,

@@ -1,5 +1,5 @@
-use headrace_core::math::PI;
-use headrace_core::tunnel::{Profile, Yz, named};
+use headrace_geometry::math::PI;
+use headrace_geometry::tunnel::{Profile, Yz, shapes};
 
 use super::*;
 
@@ -24,7 +24,7 @@ fn close(value: f64, wanted: f64, share: f64) {
 
 #[test]
 fn a_circles_polygon_falls_short_by_its_chords() {
-    let profile = named::circle(4.0).unwrap();
+    let profile = shapes::circle(4.0).unwrap();
     let pings = turn(&profile, [0.0, 4.0], 0.0, 1);
     let chords = 1200.0 * 8.0 * math::sin(PI / 1200.0);
     close(polygon_m(&least_ranges(&pings)).unwrap(), chords, 1e-12);
@@ -38,7 +38,7 @@ fn a_circles_polygon_falls_short_by_its_chords() {
 #[test]
 fn a_circles_skeleton_has_its_perimeter_once_corrected() {
     for (centre, radius) in [([0.0, 4.0], 4.0), ([0.6, 4.3], 4.0), ([0.0, 2.0], 2.0)] {
-        let profile = named::circle(radius).unwrap();
+        let profile = shapes::circle(radius).unwrap();
         let chain = skeleton(&turn(&profile, centre, 0.0, 1), &Settings::of_paper()).unwrap();
         close(chain.corrected_m, TAU * radius, 0.01);
         close(chain.steps_m, TAU * radius * 1.055, 0.02);
@@ -47,7 +47,7 @@ fn a_circles_skeleton_has_its_perimeter_once_corrected() {
 
 #[test]
 fn ceran_comes_out_of_a_thin_beam() {
-    let profile = named::ceran_blueprint().unwrap();
+    let profile = shapes::ceran_blueprint().unwrap();
     let pings = turn(&profile, profile.reference(), 0.0, 1);
     close(polygon_m(&least_ranges(&pings)).unwrap(), 34.17, 1e-3);
     let chain = skeleton(&pings, &Settings::of_paper()).unwrap();
@@ -56,7 +56,7 @@ fn ceran_comes_out_of_a_thin_beam() {
 
 #[test]
 fn a_wide_beam_rounds_corners_off() {
-    let profile = named::ceran_blueprint().unwrap();
+    let profile = shapes::ceran_blueprint().unwrap();
     let pings = turn(&profile, profile.reference(), 1.4, 29);
     let first = polygon_m(&least_ranges(&pings)).unwrap();
     let chain = skeleton(&pings, &Settings::of_paper()).unwrap();
@@ -66,7 +66,7 @@ fn a_wide_beam_rounds_corners_off() {
 
 #[test]
 fn a_square_is_a_square() {
-    let profile = named::rectangle(4.0, 4.0).unwrap();
+    let profile = shapes::rectangle(4.0, 4.0).unwrap();
     let chain = skeleton(&turn(&profile, [0.0, 2.0], 0.0, 1), &Settings::of_paper()).unwrap();
     close(chain.steps_m, 16.0, 0.01);
     close(chain.corrected_m, 16.0, 0.03);
@@ -74,7 +74,7 @@ fn a_square_is_a_square() {
 
 #[test]
 fn a_gap_is_bridged_by_interpolation_or_said() {
-    let profile = named::circle(4.0).unwrap();
+    let profile = shapes::circle(4.0).unwrap();
     let mut pings = turn(&profile, [0.0, 4.0], 0.0, 1);
     pings.retain(|p| p.angle_rad > 0.5);
     close(skeleton(&pings, &Settings::of_paper()).unwrap().corrected_m, TAU * 4.0, 0.01);
@@ -86,7 +86,7 @@ fn a_gap_is_bridged_by_interpolation_or_said() {
 
 #[test]
 fn specks_inside_change_nothing() {
-    let profile = named::circle(4.0).unwrap();
+    let profile = shapes::circle(4.0).unwrap();
     let clean = turn(&profile, [0.0, 4.0], 0.0, 1);
     let mut noisy = clean.clone();
     for ping in noisy.iter_mut().step_by(100) {

@@ -1,7 +1,7 @@
 //! Deviations from the design, interpolated on the unrolled wall: linear over the Delaunay triangles of the samples.
 
-use headrace_core::math;
-use headrace_core::tunnel::Profile;
+use headrace_geometry::math;
+use headrace_geometry::tunnel::Profile;
 use spade::{DelaunayTriangulation, FloatTriangulation, HasPosition, Point2, Triangulation};
 
 use super::Xyz;
@@ -120,7 +120,7 @@ fn plain(coordinate: f64) -> f64 {
 mod tests {
     use super::super::wall;
     use super::*;
-    use headrace_core::tunnel::named;
+    use headrace_geometry::tunnel::shapes;
 
     fn lattice(perimeter_m: f64, value: impl Fn(f64, f64) -> f64) -> Vec<Deviation> {
         let at = |i: i32, k: i32| {
@@ -160,7 +160,7 @@ mod tests {
 
     #[test]
     fn a_place_has_the_deviation_it_was_put_at() {
-        let profile = named::ceran_blueprint().unwrap();
+        let profile = shapes::ceran_blueprint().unwrap();
         for k in 0..300 {
             let (sigma, off) = (f64::from(k) * 0.113, math::sin(f64::from(k)) * 0.4);
             let there = Deviation::of(&profile, wall::place(&profile, 3.0, sigma, off));

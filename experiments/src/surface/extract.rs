@@ -159,7 +159,7 @@ mod tests {
                 dot(a, cross) / 6.0
             })
             .sum();
-        let exact = 4.0 / 3.0 * headrace_core::math::PI;
+        let exact = 4.0 / 3.0 * headrace_geometry::math::PI;
         assert!(volume < exact && volume > 0.98 * exact, "{volume}");
     }
 

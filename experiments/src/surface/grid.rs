@@ -1,6 +1,6 @@
 //! A box of cubic cells with a quadratic B-spline field on it.
 
-use headrace_core::math;
+use headrace_geometry::math;
 
 use super::{Xyz, band};
 

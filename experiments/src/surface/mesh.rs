@@ -1,6 +1,6 @@
 //! Triangle meshes and the distance to them.
 
-use headrace_core::math;
+use headrace_geometry::math;
 
 use super::{Xyz, dot, norm, sub};
 

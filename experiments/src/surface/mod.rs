@@ -40,5 +40,5 @@ pub(crate) fn dot(a: Xyz, b: Xyz) -> f64 {
 }
 
 pub(crate) fn norm(a: Xyz) -> f64 {
-    headrace_core::math::sqrt(dot(a, a))
+    headrace_geometry::math::sqrt(dot(a, a))
 }

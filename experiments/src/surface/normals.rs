@@ -1,7 +1,7 @@
 //! Normals of samples, for surfaces that need them.
 
-use headrace_core::math;
-use headrace_core::tunnel::Profile;
+use headrace_geometry::math;
+use headrace_geometry::tunnel::Profile;
 
 use super::{Sample, Xyz};
 
@@ -32,11 +32,11 @@ pub fn of_design(profile: &Profile, places: &[Xyz]) -> Vec<Sample> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use headrace_core::tunnel::named;
+    use headrace_geometry::tunnel::shapes;
 
     #[test]
     fn both_look_inwards_and_agree_on_an_arc_about_the_reference() {
-        let profile = named::ceran_blueprint().unwrap();
+        let profile = shapes::ceran_blueprint().unwrap();
         let places: Vec<Xyz> =
             (0..200).map(|k| profile.point_at(f64::from(k) * 0.17)).map(|[y, z]| [1.0, y, z]).collect();
         let (axis, design) = (towards_axis(&profile, &places), of_design(&profile, &places));

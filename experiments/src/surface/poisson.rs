@@ -11,7 +11,7 @@
 //!
 //! Source: Kazhdan, Hoppe, "Screened Poisson surface reconstruction", 2013; the paper's §8.2.
 
-use headrace_core::math;
+use headrace_geometry::math;
 
 use super::grid::Grid;
 use super::mesh::Mesh;

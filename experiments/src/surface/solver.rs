@@ -1,6 +1,6 @@
 //! The screened Poisson equation on a grid, by conjugate gradients.
 
-use headrace_core::math;
+use headrace_geometry::math;
 
 use super::band::Band;
 use super::grid::{Grid, Local};

@@ -1,7 +1,7 @@
 //! Distances between a surface and the wall, both ways.
 
-use headrace_core::math;
-use headrace_core::tunnel::Profile;
+use headrace_geometry::math;
+use headrace_geometry::tunnel::Profile;
 
 use super::{Mesh, MeshIndex, Xyz};
 use crate::Spread;
@@ -61,7 +61,7 @@ pub fn to_design(profile: &Profile, surface: &Mesh, stretch: &Stretch) -> Spread
 #[cfg(test)]
 mod tests {
     use super::*;
-    use headrace_core::tunnel::named;
+    use headrace_geometry::tunnel::shapes;
 
     /// The design's own tube, shifted outwards by `off_m` along rays.
     fn tube(profile: &Profile, off_m: f64) -> Mesh {
@@ -81,7 +81,7 @@ mod tests {
 
     #[test]
     fn a_tube_a_known_way_off_is_so_far_off_both_ways() {
-        let profile = named::circle(2.0).unwrap();
+        let profile = shapes::circle(2.0).unwrap();
         let stretch = Stretch { from_m: 1.0, to_m: 9.0, step_m: 0.1 };
         let mesh = tube(&profile, 0.05);
         let index = MeshIndex::new(&mesh, 0.3).unwrap();

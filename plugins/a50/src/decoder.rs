@@ -4,12 +4,12 @@
 //! In air, and close to things, the device is known to send valid velocities that are none, and to repeat itself; what
 //! looks so is withheld, and counted by reason.
 
-use headrace_core::app::device::Decoder;
-use headrace_core::app::reading::{Decoded, Packet, Reading};
-use headrace_core::codec::{Codec as _, CodecCounts, Framing as _, LineClock};
-use headrace_core::frames::{Sensor, Vec3};
-use headrace_core::stateful;
-use headrace_core::time::{DurNs, MonoNs};
+use headrace_sensor::codec::{Codec as _, CodecCounts, Framing as _, LineClock};
+use headrace_sensor::device::Decoder;
+use headrace_sensor::geometry::frames::{Sensor, Vec3};
+use headrace_sensor::geometry::time::{DurNs, MonoNs};
+use headrace_sensor::reading::{Decoded, Packet, Reading};
+use headrace_sensor::stateful;
 use serde::{Deserialize, Serialize};
 
 use crate::report::{Against, LineCodec, Lines, Velocity};

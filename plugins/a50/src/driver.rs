@@ -1,7 +1,7 @@
 //! The host's side of the connection: it listens.
 
-use headrace_core::app::driver::{Carrier, Listener};
-use headrace_core::time::DurNs;
+use headrace_sensor::driver::{Carrier, Listener};
+use headrace_sensor::geometry::time::DurNs;
 
 use crate::report::{Lines, MAX_LINE_BYTES};
 

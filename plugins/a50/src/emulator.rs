@@ -1,8 +1,8 @@
 //! The device's side of the connection: reports at a fixed rate.
 
-use headrace_core::app::device::{Direction, Emulator, LineSink};
-use headrace_core::app::measurement::GroundVelocity;
-use headrace_core::time::{DurNs, MonoNs};
+use headrace_sensor::device::{Direction, Emulator, LineSink};
+use headrace_sensor::geometry::time::{DurNs, MonoNs};
+use headrace_sensor::measurement::GroundVelocity;
 
 use crate::report::{Against, Velocity};
 

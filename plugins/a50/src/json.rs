@@ -219,7 +219,7 @@ mod tests {
     }
 
     proptest! {
-        #![proptest_config(headrace_core::codec::contract::config())]
+        #![proptest_config(headrace_sensor::codec::contract::config())]
 
         #[test]
         fn what_another_writer_writes_is_json(value in any_value(), pretty in any::<bool>()) {

@@ -1,11 +1,9 @@
 //! The vehicle file's part of an A50, and its place in the loop.
 
-use headrace_core::app::App;
-use headrace_core::app::components::VelocityLog;
-use headrace_core::app::device::{Device, DeviceKind, Emulated, EmulatorSetup, Sense};
-use headrace_core::app::driver::{Carrier, Driver, DriverSetup};
-use headrace_core::app::plugin::{Plugin, PluginError};
-use headrace_core::config::{ConfigError, Section, SensorConfig};
+use headrace_sensor::SensorConfig;
+use headrace_sensor::config::{ConfigError, Section};
+use headrace_sensor::device::{Device, DeviceKind, Emulated, EmulatorSetup, Sense, SensorKind, SensorSpec};
+use headrace_sensor::driver::{Carrier, Driver, DriverSetup};
 
 use crate::decoder::{A50Decoder, Meaning};
 use crate::driver;
@@ -46,14 +44,16 @@ impl DeviceKind for Kind {
     }
 }
 
-impl Plugin for A50 {
-    fn build(&self, app: &mut App) -> Result<(), PluginError> {
-        app.add_sensor(&self.sensor, Box::new(A50Decoder::new(self.meaning)), RING_BYTES, VelocityLog)?;
-        Ok(())
-    }
-}
-
 impl Device for A50 {
+    fn specification(&self) -> SensorSpec {
+        SensorSpec {
+            sensor: self.sensor.clone(),
+            kind: SensorKind::VelocityLog,
+            decoder: Box::new(A50Decoder::new(self.meaning)),
+            ring_bytes: RING_BYTES,
+        }
+    }
+
     fn sense(&self) -> Sense {
         Sense::Velocity
     }

@@ -2,8 +2,8 @@
 //!
 //! Source: Water Linked, "DVL A50/A125 TCP JSON API", json_v3 to json_v3.3.
 
-use headrace_core::codec::{Framed, Framing, Verdict};
-use headrace_core::math;
+use headrace_sensor::codec::{Framed, Framing, Verdict};
+use headrace_sensor::geometry::math;
 use serde::{Deserialize, Serialize};
 
 use crate::json::Cursor;
@@ -201,8 +201,8 @@ impl Framing for Lines {
 
 #[cfg(test)]
 pub(crate) mod tests {
-    use headrace_core::codec::contract::decode_all;
-    use headrace_core::codec::{Codec as _, CodecCounts};
+    use headrace_sensor::codec::contract::decode_all;
+    use headrace_sensor::codec::{Codec as _, CodecCounts};
     use proptest::prelude::*;
 
     use super::*;
@@ -312,7 +312,7 @@ pub(crate) mod tests {
     }
 
     proptest! {
-        #![proptest_config(headrace_core::codec::contract::config())]
+        #![proptest_config(headrace_sensor::codec::contract::config())]
 
         #[test]
         fn fields_are_those_that_another_reader_finds(velocity in any_velocity()) {
@@ -329,7 +329,7 @@ pub(crate) mod tests {
         }
     }
 
-    headrace_core::codec_contract!(
+    headrace_sensor::codec_contract!(
         contract,
         codec: LineCodec::default(),
         values: any_velocity(),

@@ -1,16 +1,15 @@
 //! From a vehicle file's table to readings, by way of the emulated device.
 
-use headrace_core::app::device::{
+use headrace_sensor::SensorConfig;
+use headrace_sensor::config::Document;
+use headrace_sensor::device::{
     Decoder as _, Device, DeviceKind as _, Direction, Emulated, EmulatorSetup, Sense,
 };
-use headrace_core::app::measurement::GroundVelocity;
-use headrace_core::app::reading::{Decoded, Packet, Reading};
-use headrace_core::app::{App, Mission};
-use headrace_core::config::{Document, SensorConfig};
-use headrace_core::frames::{Mount, Rot, Sensor, Vec3};
-use headrace_core::site::Site;
-use headrace_core::time::{DurNs, MonoNs};
-use headrace_core::tunnel::named;
+use headrace_sensor::geometry::frames::{Mount, Rot, Sensor, Vec3};
+use headrace_sensor::geometry::site::Site;
+use headrace_sensor::geometry::time::{DurNs, MonoNs};
+use headrace_sensor::measurement::GroundVelocity;
+use headrace_sensor::reading::{Decoded, Packet, Reading};
 
 use crate::Kind;
 use crate::decoder::{A50Decoder, Meaning, Withheld};
@@ -31,7 +30,7 @@ fn configured(own: &str) -> Result<Box<dyn Device>, String> {
     let root = Document::new("v.toml", own).root().unwrap();
     let device = Kind.configure(&sensor, &root).map_err(|error| error.to_string())?;
     root.finish().map_err(|error| error.to_string())?;
-    device.build(&mut App::new(Mission::new(named::circle(2.5).unwrap(), 0.5))).unwrap();
+    assert_eq!(device.specification().sensor, sensor);
     Ok(device)
 }
 

@@ -1,6 +1,6 @@
 //! From counts to pressure: the limits and the kind of sensor, as its memory or the vehicle file gives them.
 
-use headrace_core::math;
+use headrace_sensor::geometry::math;
 use serde::{Deserialize, Serialize};
 
 use crate::codec::MemoryWord;

@@ -7,7 +7,7 @@
 //! Words are most significant byte first. The status byte is `0 1 busy mode(2) memory-error x x`.
 //! Source: Keller, Communication Protocol 4LD...9LD, v2.6.
 
-use headrace_core::codec::{Framed, Framing, Verdict};
+use headrace_sensor::codec::{Framed, Framing, Verdict};
 
 /// The command that starts a conversion.
 pub const MEASURE: u8 = 0xAC;
@@ -211,7 +211,7 @@ impl Framing for Transactions {
 
 #[cfg(test)]
 mod tests {
-    use headrace_core::codec::{Codec as _, CodecCounts};
+    use headrace_sensor::codec::{Codec as _, CodecCounts};
 
     use super::*;
 
@@ -295,7 +295,7 @@ mod tests {
         }
     }
 
-    headrace_core::codec_contract!(
+    headrace_sensor::codec_contract!(
         contract,
         codec: Bar100Codec::default(),
         values: any_transaction(),

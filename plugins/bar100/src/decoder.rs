@@ -1,10 +1,10 @@
 //! Transactions to readings of absolute pressure.
 
-use headrace_core::app::device::Decoder;
-use headrace_core::app::reading::{Decoded, Packet, Reading, WaterPressure};
-use headrace_core::codec::{Codec as _, CodecCounts};
-use headrace_core::snapshot::{Restorer, Saver, SnapshotError, Stateful};
-use headrace_core::time::DurNs;
+use headrace_sensor::codec::{Codec as _, CodecCounts};
+use headrace_sensor::device::Decoder;
+use headrace_sensor::geometry::time::DurNs;
+use headrace_sensor::reading::{Decoded, Packet, Reading, WaterPressure};
+use headrace_sensor::snapshot::{Restorer, Saver, SnapshotError, Stateful};
 
 use crate::calibration::{Calibration, CalibrationCells, CalibrationError, Overrides};
 use crate::codec::{Bar100Codec, Measurement, Transaction};

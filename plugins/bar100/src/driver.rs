@@ -1,7 +1,7 @@
 //! The host's side of the bus: calibration first, then a measurement at a fixed rate.
 
-use headrace_core::app::driver::{Carrier, Driver, Standing, Wire};
-use headrace_core::time::{DurNs, MonoNs};
+use headrace_sensor::driver::{Carrier, Driver, Standing, Wire};
+use headrace_sensor::geometry::time::{DurNs, MonoNs};
 
 use crate::calibration::CALIBRATION_CELLS;
 use crate::codec::{MEASURE, MEASURE_BYTES, MEMORY_BYTES, Transaction, TransactionError};

@@ -1,9 +1,9 @@
 //! The sensor's side of the bus: it is asked for its calibration, then for measurements, at a fixed rate by an emulated host or
 //! when a real one does.
 
-use headrace_core::app::device::{Direction, Emulator, EmulatorSetup, LineSink};
-use headrace_core::app::measurement::Pressure;
-use headrace_core::time::{DurNs, MonoNs};
+use headrace_sensor::device::{Direction, Emulator, EmulatorSetup, LineSink};
+use headrace_sensor::geometry::time::{DurNs, MonoNs};
+use headrace_sensor::measurement::Pressure;
 
 use crate::calibration::{Calibration, Scaling0};
 use crate::codec::{MEASURE, Measurement, MemoryWord, Status};

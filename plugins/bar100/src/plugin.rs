@@ -1,11 +1,9 @@
 //! The vehicle file's part of a Bar100, and its place in the loop.
 
-use headrace_core::app::App;
-use headrace_core::app::components::DepthSensor;
-use headrace_core::app::device::{Device, DeviceKind, Emulated, EmulatorSetup, Sense};
-use headrace_core::app::driver::{Carrier, Driver, DriverSetup};
-use headrace_core::app::plugin::{Plugin, PluginError};
-use headrace_core::config::{ConfigError, Section, SensorConfig};
+use headrace_sensor::SensorConfig;
+use headrace_sensor::config::{ConfigError, Section};
+use headrace_sensor::device::{Device, DeviceKind, Emulated, EmulatorSetup, Sense, SensorKind, SensorSpec};
+use headrace_sensor::driver::{Carrier, Driver, DriverSetup};
 
 use crate::calibration::{Calibration, Overrides, PressureMode, STANDARD_ATMOSPHERE_BAR};
 use crate::decoder::{Bar100Decoder, Meaning};
@@ -64,14 +62,16 @@ impl DeviceKind for Kind {
     }
 }
 
-impl Plugin for Bar100 {
-    fn build(&self, app: &mut App) -> Result<(), PluginError> {
-        app.add_sensor(&self.sensor, Box::new(Bar100Decoder::new(self.meaning)), RING_BYTES, DepthSensor)?;
-        Ok(())
-    }
-}
-
 impl Device for Bar100 {
+    fn specification(&self) -> SensorSpec {
+        SensorSpec {
+            sensor: self.sensor.clone(),
+            kind: SensorKind::Depth,
+            decoder: Box::new(Bar100Decoder::new(self.meaning)),
+            ring_bytes: RING_BYTES,
+        }
+    }
+
     fn sense(&self) -> Sense {
         Sense::Depth
     }

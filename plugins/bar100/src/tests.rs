@@ -1,16 +1,15 @@
 //! From a vehicle file's table to readings, by way of the emulated sensor.
 
-use headrace_core::app::device::{Decoder as _, Device, DeviceKind as _, Direction, Emulated, EmulatorSetup};
-use headrace_core::app::measurement::Pressure;
-use headrace_core::app::reading::{Decoded, Packet, Reading, WaterPressure};
-use headrace_core::app::report::Report;
-use headrace_core::app::{App, Mission};
-use headrace_core::config::{Document, SensorConfig};
-use headrace_core::frames::{Mount, Rot, Vec3};
-use headrace_core::fusion::direct::DirectNavigation;
-use headrace_core::site::Site;
-use headrace_core::time::{DurNs, MonoNs};
-use headrace_core::tunnel::named;
+use headrace_sensor::SensorConfig;
+use headrace_sensor::config::Document;
+use headrace_sensor::device::{
+    Decoder as _, Device, DeviceKind as _, Direction, Emulated, EmulatorSetup, SensorKind,
+};
+use headrace_sensor::geometry::frames::{Mount, Rot, Vec3};
+use headrace_sensor::geometry::site::Site;
+use headrace_sensor::geometry::time::{DurNs, MonoNs};
+use headrace_sensor::measurement::Pressure;
+use headrace_sensor::reading::{Decoded, Packet, Reading, WaterPressure};
 
 use crate::Kind;
 use crate::calibration::{Overrides, STANDARD_ATMOSPHERE_BAR};
@@ -24,10 +23,6 @@ fn sensor() -> SensorConfig {
         mount: Mount { position: Vec3::new(0.0, 0.0, -0.3), rotation: Rot::identity() },
         latency: DurNs::from_millis(9),
     }
-}
-
-fn app() -> App {
-    App::new(Mission::new(named::circle(2.5).unwrap(), 0.5))
 }
 
 fn configured(own: &str) -> Result<Box<dyn Device>, String> {
@@ -79,22 +74,9 @@ fn readings_are_withheld_until_the_calibration_is_known() {
 }
 
 #[test]
-fn the_report_tells_what_was_withheld() {
-    let mut app = app();
-    configured("").unwrap().build(&mut app).unwrap();
-    let navigation = DirectNavigation::new(named::circle(2.5).unwrap(), Site::default());
-    let mut armed = app.arm(Box::new(navigation)).unwrap();
-    let mut port = armed.take_port(0).unwrap();
-    port.send(MonoNs(1), &[0xAC, 0x40, 0x46, 0x46, 0x4F, 0xA0]).unwrap();
-    armed.tick(MonoNs(2));
-    let source = &Report::of(&armed).sources[0];
-    assert_eq!((source.frames, source.readings, source.withheld), (1, 0, 1));
-}
-
-#[test]
 fn a_log_that_begins_in_the_middle_is_read_with_the_files_calibration() {
     let device = configured("p_min_bar = 0\np_max_bar = 100\np_mode = \"paa\"\n").unwrap();
-    device.build(&mut app()).unwrap();
+    assert_eq!(device.specification().kind, SensorKind::Depth);
     let overrides = Overrides {
         p_min_bar: Some(0.0),
         p_max_bar: Some(100.0),

@@ -6,9 +6,9 @@
 
 use std::collections::VecDeque;
 
-use headrace_core::app::driver::{Carrier, Cutter, Driver, DriverSetup, Standing, Wire};
-use headrace_core::sampling::head::HeadProgram;
-use headrace_core::time::{DurNs, MonoNs};
+use headrace_sensor::driver::{Carrier, Cutter, Driver, DriverSetup, Standing, Wire};
+use headrace_sensor::geometry::time::{DurNs, MonoNs};
+use headrace_sensor::sampling::head::HeadProgram;
 
 use crate::codec::{COMMAND_BYTES, COUNTS_PER_TURN, Command, Header, MAX_RETURN_BYTES, Model, Returns};
 use crate::homing;

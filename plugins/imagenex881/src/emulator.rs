@@ -2,12 +2,12 @@
 
 use std::collections::VecDeque;
 
-use headrace_core::app::device::{Direction, Emulator, EmulatorSetup, LineSink};
-use headrace_core::app::measurement::Sounding;
-use headrace_core::codec::{Bytes, Codec as _};
-use headrace_core::math;
-use headrace_core::sampling::head::HeadProgram;
-use headrace_core::time::{DurNs, MonoNs};
+use headrace_sensor::codec::{Bytes, Codec as _};
+use headrace_sensor::device::{Direction, Emulator, EmulatorSetup, LineSink};
+use headrace_sensor::geometry::math;
+use headrace_sensor::geometry::time::{DurNs, MonoNs};
+use headrace_sensor::measurement::Sounding;
+use headrace_sensor::sampling::head::HeadProgram;
 
 use crate::codec::{
     COUNTS_PER_TURN, Command, CommandCodec, Header, MAX_ECHO_BYTES, Model, Points, Return, Status, Tag,

@@ -1,6 +1,6 @@
 //! From where a head is to where its program starts.
 
-use headrace_core::sampling::head::HeadProgram;
+use headrace_sensor::sampling::head::HeadProgram;
 
 use crate::codec::{COUNTS_PER_TURN, Command, step_at_most, step_deg};
 use crate::settings::{Settings, usual_pulse_us};
@@ -54,7 +54,7 @@ pub fn commands(settings: &Settings, now: Standing, program: &HeadProgram) -> Ve
 
 #[cfg(test)]
 mod tests {
-    use headrace_core::math::{self, TAU};
+    use headrace_sensor::geometry::math::{self, TAU};
 
     use super::*;
     use crate::emulator::Head;

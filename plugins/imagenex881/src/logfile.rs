@@ -3,7 +3,7 @@
 //! Sure for the 852 (`.852`) and the 81S; inferred for the heads' own (`.81A`, `.81B`, `.31L`).
 //! Source: Imagenex 852 file format.
 
-use headrace_core::time::DurNs;
+use headrace_sensor::geometry::time::DurNs;
 
 const HEADER_BYTES: usize = 100;
 const MAGICS: [[u8; 3]; 5] = [*b"852", *b"81A", *b"81B", *b"81S", *b"31L"];
@@ -149,7 +149,7 @@ fn sound_speed_mps(field: &[u8]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use headrace_core::codec::Codec as _;
+    use headrace_sensor::codec::Codec as _;
 
     use super::*;
     use crate::codec::{Model, Return, ReturnCodec, Tag};

@@ -1,16 +1,16 @@
 //! Registration of a head with the loop, and its returns as readings.
 
-use headrace_core::app::App;
-use headrace_core::app::components::SonarHead;
-use headrace_core::app::device::{Decoder, Device, DeviceKind, Emulated, EmulatorSetup, Needless, Sense};
-use headrace_core::app::driver::{Carrier, Driver, DriverSetup, Probe};
-use headrace_core::app::plugin::{Plugin, PluginError};
-use headrace_core::app::reading::{Decoded, Packet, Reading, SonarReturn};
-use headrace_core::codec::{Bytes, Codec as _, CodecCounts, LineClock};
-use headrace_core::config::{ConfigError, Section, SensorConfig};
-use headrace_core::sampling::head::{HeadMode, HeadSpec};
-use headrace_core::stateful;
-use headrace_core::time::DurNs;
+use headrace_sensor::SensorConfig;
+use headrace_sensor::codec::{Bytes, Codec as _, CodecCounts, LineClock};
+use headrace_sensor::config::{ConfigError, Section};
+use headrace_sensor::device::{
+    Decoder, Device, DeviceKind, Emulated, EmulatorSetup, Needless, Sense, SensorKind, SensorSpec,
+};
+use headrace_sensor::driver::{Carrier, Driver, DriverSetup, Probe};
+use headrace_sensor::geometry::time::DurNs;
+use headrace_sensor::reading::{Decoded, Packet, Reading, SonarReturn};
+use headrace_sensor::sampling::head::{HeadMode, HeadSpec};
+use headrace_sensor::stateful;
 use serde::{Deserialize, Serialize};
 
 use crate::codec::{Header, Model, Return, ReturnCodec, Returns, Tag};
@@ -57,15 +57,6 @@ pub struct Imagenex881 {
     settings: Settings,
 }
 
-impl Plugin for Imagenex881 {
-    fn build(&self, app: &mut App) -> Result<(), PluginError> {
-        let head = SonarHead { spec: self.spec(), modes: self.settings.modes(self.settings.command.range_m) };
-        let decoder = HeadDecoder::new(self.settings.clone(), self.sensor.latency);
-        app.add_sensor(&self.sensor, Box::new(decoder), RING_BYTES, head)?;
-        Ok(())
-    }
-}
-
 impl Imagenex881 {
     fn spec(&self) -> HeadSpec {
         HeadSpec {
@@ -81,6 +72,15 @@ impl Imagenex881 {
 }
 
 impl Device for Imagenex881 {
+    fn specification(&self) -> SensorSpec {
+        SensorSpec {
+            sensor: self.sensor.clone(),
+            kind: SensorKind::Head,
+            decoder: Box::new(HeadDecoder::new(self.settings.clone(), self.sensor.latency)),
+            ring_bytes: RING_BYTES,
+        }
+    }
+
     fn head(&self) -> Option<HeadSpec> {
         Some(self.spec())
     }

@@ -1,7 +1,7 @@
 //! Whether a head is on a line, and which: it is asked for one short ping where it stands.
 
-use headrace_core::app::driver::Probe;
-use headrace_core::codec::Codec as _;
+use headrace_sensor::codec::Codec as _;
+use headrace_sensor::driver::Probe;
 
 use crate::codec::{Command, Header, Model, Points, ReturnCodec, ZERO_COUNT};
 
@@ -67,9 +67,9 @@ impl Probe for HeadProbe {
 
 #[cfg(test)]
 mod tests {
-    use headrace_core::app::device::{Direction, Emulator as _, EmulatorSetup};
-    use headrace_core::site::Site;
-    use headrace_core::time::{DurNs, MonoNs};
+    use headrace_sensor::device::{Direction, Emulator as _, EmulatorSetup};
+    use headrace_sensor::geometry::site::Site;
+    use headrace_sensor::geometry::time::{DurNs, MonoNs};
 
     use super::*;
     use crate::codec::CommandCodec;

@@ -1,7 +1,7 @@
 //! A head's program as commands, ping by ping.
 
-use headrace_core::sampling::head::HeadProgram;
-use headrace_core::time::{DurNs, MonoNs};
+use headrace_sensor::geometry::time::{DurNs, MonoNs};
+use headrace_sensor::sampling::head::HeadProgram;
 
 use crate::codec::{COMMAND_BYTES, COUNTS_PER_TURN, Command, step_at_most, step_deg};
 use crate::emulator::Head;

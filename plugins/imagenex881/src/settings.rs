@@ -1,9 +1,10 @@
 //! A head's settings: the keys of its table in the vehicle file, the modes, and its angles.
 
-use headrace_core::config::{ConfigError, Section, SensorConfig};
-use headrace_core::math::{self, TAU};
-use headrace_core::sampling::head::{Basis, HeadBody, HeadMode, Turn};
-use headrace_core::time::DurNs;
+use headrace_sensor::SensorConfig;
+use headrace_sensor::config::{ConfigError, Section};
+use headrace_sensor::geometry::math::{self, TAU};
+use headrace_sensor::geometry::time::DurNs;
+use headrace_sensor::sampling::head::{Basis, HeadBody, HeadMode, Turn};
 
 use crate::codec::{COUNTS_PER_TURN, Command, Points, RANGES_M, ZERO_COUNT};
 use crate::plugin::SOUND_SPEED_MPS;
@@ -302,8 +303,8 @@ pub(crate) fn usual_pulse_us(range_m: u8) -> f64 {
 
 #[cfg(test)]
 pub(crate) mod tests {
-    use headrace_core::config::Document;
-    use headrace_core::frames::{Mount, Rot, Vec3};
+    use headrace_sensor::config::Document;
+    use headrace_sensor::geometry::frames::{Mount, Rot, Vec3};
 
     use super::*;
 

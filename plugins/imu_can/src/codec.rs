@@ -1,6 +1,6 @@
 //! Frames to the messages of one maker's set.
 
-use headrace_core::codec::{Framed, Framing, Verdict};
+use headrace_sensor::codec::{Framed, Framing, Verdict};
 
 use crate::frame::{CanFrame, FRAME_BYTES};
 use crate::sets::{MessageError, bosch, j1939, sbg, xsens};

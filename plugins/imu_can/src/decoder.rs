@@ -1,11 +1,12 @@
 //! Messages to readings, each as it arrives: the frames of one sample come one behind the other.
 
-use headrace_core::app::device::Decoder;
-use headrace_core::app::reading::{Decoded, Level, Packet, Reading};
-use headrace_core::codec::{Codec as _, CodecCounts, Framing as _};
-use headrace_core::frames::{Rot, Sensor, Vec3};
-use headrace_core::stateful;
-use headrace_core::time::{ClockReport, DeviceClock, DurNs, MonoNs};
+use headrace_sensor::codec::{Codec as _, CodecCounts, Framing as _};
+use headrace_sensor::device::Decoder;
+use headrace_sensor::device_clock::{ClockReport, DeviceClock};
+use headrace_sensor::geometry::frames::{Rot, Sensor, Vec3};
+use headrace_sensor::geometry::time::{DurNs, MonoNs};
+use headrace_sensor::reading::{Decoded, Level, Packet, Reading};
+use headrace_sensor::stateful;
 use serde::{Deserialize, Serialize};
 
 use crate::codec::{ImuCodec, Message, MessageSet};

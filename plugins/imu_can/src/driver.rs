@@ -1,7 +1,7 @@
 //! The host's side of the bus: it listens.
 
-use headrace_core::app::driver::{Carrier, MessageListener};
-use headrace_core::time::DurNs;
+use headrace_sensor::driver::{Carrier, MessageListener};
+use headrace_sensor::geometry::time::DurNs;
 
 use crate::frame::{CanFrame, FRAME_BYTES};
 

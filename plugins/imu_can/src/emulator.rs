@@ -1,9 +1,9 @@
 //! The unit's side of the bus: at a fixed rate, the frames of one sample.
 
-use headrace_core::app::device::{Direction, Emulator, LineSink};
-use headrace_core::app::measurement::Inertia;
-use headrace_core::math;
-use headrace_core::time::{DurNs, MonoNs};
+use headrace_sensor::device::{Direction, Emulator, LineSink};
+use headrace_sensor::geometry::math;
+use headrace_sensor::geometry::time::{DurNs, MonoNs};
+use headrace_sensor::measurement::Inertia;
 
 use crate::codec::{Message, MessageSet};
 use crate::decoder::Meaning;

@@ -1,12 +1,12 @@
 //! The vehicle file's part of an inertial unit, and its place in the loop.
 
-use headrace_core::app::App;
-use headrace_core::app::components::Imu;
-use headrace_core::app::device::{Decoder, Device, DeviceKind, Emulated, EmulatorSetup, Sense};
-use headrace_core::app::driver::{Carrier, Driver, DriverSetup};
-use headrace_core::app::plugin::{Plugin, PluginError};
-use headrace_core::config::{ConfigError, Section, SensorConfig};
-use headrace_core::time::DurNs;
+use headrace_sensor::SensorConfig;
+use headrace_sensor::config::{ConfigError, Section};
+use headrace_sensor::device::{
+    Decoder, Device, DeviceKind, Emulated, EmulatorSetup, Sense, SensorKind, SensorSpec,
+};
+use headrace_sensor::driver::{Carrier, Driver, DriverSetup};
+use headrace_sensor::geometry::time::DurNs;
 
 use crate::codec::MessageSet;
 use crate::dbc::decoder::DbcDecoder;
@@ -114,18 +114,15 @@ fn id_base(own: &Section<'_>) -> Result<Option<u32>, ConfigError> {
     Ok(base)
 }
 
-impl Plugin for CanImu {
-    fn build(&self, app: &mut App) -> Result<(), PluginError> {
+impl Device for CanImu {
+    fn specification(&self) -> SensorSpec {
         let decoder: Box<dyn Decoder> = match &self.known {
             Known::Preset(meaning) => Box::new(ImuDecoder::new(*meaning)),
             Known::Dbc(mapping) => Box::new(DbcDecoder::new(mapping)),
         };
-        app.add_sensor(&self.sensor, decoder, RING_BYTES, Imu)?;
-        Ok(())
+        SensorSpec { sensor: self.sensor.clone(), kind: SensorKind::Imu, decoder, ring_bytes: RING_BYTES }
     }
-}
 
-impl Device for CanImu {
     fn sense(&self) -> Sense {
         Sense::Inertial
     }

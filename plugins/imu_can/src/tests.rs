@@ -1,15 +1,14 @@
 //! From a vehicle file's table to readings, by way of the emulated unit.
 
-use headrace_core::app::device::{Decoder as _, Device, DeviceKind as _, Direction, Emulated, EmulatorSetup};
-use headrace_core::app::measurement::Inertia;
-use headrace_core::app::reading::{Decoded, Level, Packet, Reading};
-use headrace_core::app::{App, Mission};
-use headrace_core::config::{Document, SensorConfig};
-use headrace_core::frames::{Body, Mount, Rot, Sensor, Vec3};
-use headrace_core::math;
-use headrace_core::site::Site;
-use headrace_core::time::{DurNs, MonoNs};
-use headrace_core::tunnel::named;
+use headrace_sensor::SensorConfig;
+use headrace_sensor::config::Document;
+use headrace_sensor::device::{Decoder as _, Device, DeviceKind as _, Direction, Emulated, EmulatorSetup};
+use headrace_sensor::geometry::frames::{Body, Mount, Rot, Sensor, Vec3};
+use headrace_sensor::geometry::math;
+use headrace_sensor::geometry::site::Site;
+use headrace_sensor::geometry::time::{DurNs, MonoNs};
+use headrace_sensor::measurement::Inertia;
+use headrace_sensor::reading::{Decoded, Level, Packet, Reading};
 
 use crate::Kind;
 use crate::codec::{Message, MessageSet};
@@ -66,15 +65,11 @@ fn sensor() -> SensorConfig {
     }
 }
 
-fn app() -> App {
-    App::new(Mission::new(named::circle(2.5).unwrap(), 0.5))
-}
-
 fn configured(own: &str) -> Result<Box<dyn Device>, String> {
     let root = Document::new("v.toml", own).root().unwrap();
     let device = Kind.configure(&sensor(), &root).map_err(|error| error.to_string())?;
     root.finish().map_err(|error| error.to_string())?;
-    device.build(&mut app()).unwrap();
+    assert_eq!(device.specification().sensor, sensor());
     Ok(device)
 }
 

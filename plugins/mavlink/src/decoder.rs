@@ -1,12 +1,12 @@
 //! Frames to readings of one part of the vehicle; other good frames are passed over.
 
-use headrace_core::app::device::Decoder;
-use headrace_core::app::reading::{Decoded, EchoRange, Packet, Reading, WaterPressure};
-use headrace_core::codec::{Codec as _, CodecCounts, Framing as _, LineClock};
-use headrace_core::frames::{Rot, Vec3};
-use headrace_core::math;
-use headrace_core::stateful;
-use headrace_core::time::DurNs;
+use headrace_sensor::codec::{Codec as _, CodecCounts, Framing as _, LineClock};
+use headrace_sensor::device::Decoder;
+use headrace_sensor::geometry::frames::{Rot, Vec3};
+use headrace_sensor::geometry::math;
+use headrace_sensor::geometry::time::DurNs;
+use headrace_sensor::reading::{Decoded, EchoRange, Packet, Reading, WaterPressure};
+use headrace_sensor::stateful;
 use serde::{Deserialize, Serialize};
 
 use crate::frame::{Frame, Frames, MavlinkCodec};

@@ -1,10 +1,10 @@
 //! The host's side of a telemetry link: it listens for its part, and says that it is there.
 
-use headrace_core::app::device::Decoder as _;
-use headrace_core::app::driver::{Carrier, Cutter, Driver, Standing, Wire};
-use headrace_core::app::reading::Packet;
-use headrace_core::codec::Bytes;
-use headrace_core::time::{DurNs, MonoNs};
+use headrace_sensor::codec::Bytes;
+use headrace_sensor::device::Decoder as _;
+use headrace_sensor::driver::{Carrier, Cutter, Driver, Standing, Wire};
+use headrace_sensor::geometry::time::{DurNs, MonoNs};
+use headrace_sensor::reading::Packet;
 
 use crate::decoder::{MavlinkDecoder, Meaning};
 use crate::frame::{Frame, Frames, MAX_FRAME_BYTES, Version};

@@ -1,9 +1,9 @@
 //! The autopilot's side of the line: at a fixed rate, the messages of one part.
 
-use headrace_core::app::device::{Direction, Emulator, EmulatorSetup, LineSink};
-use headrace_core::app::measurement::{Inertia, Measurement, Pressure as Felt, Sounding};
-use headrace_core::math;
-use headrace_core::time::{DurNs, MonoNs};
+use headrace_sensor::device::{Direction, Emulator, EmulatorSetup, LineSink};
+use headrace_sensor::geometry::math;
+use headrace_sensor::geometry::time::{DurNs, MonoNs};
+use headrace_sensor::measurement::{Inertia, Measurement, Pressure as Felt, Sounding};
 
 use crate::decoder::{DistancePart, Meaning, Part};
 use crate::message::{

@@ -9,7 +9,7 @@
 //! follow for the rest of it.
 //! Source: MAVLink guide, "Packet Serialization" and "Message Signing".
 
-use headrace_core::codec::{Bytes, Framed, Framing, TooLong, Verdict};
+use headrace_sensor::codec::{Bytes, Framed, Framing, TooLong, Verdict};
 
 use crate::checksum::{accumulate, known};
 
@@ -217,8 +217,8 @@ pub(crate) fn without_identity(packet: &[u8], shorter: &mut Vec<u8>) -> Option<(
 
 #[cfg(test)]
 mod tests {
-    use headrace_core::codec::contract::decode_all;
-    use headrace_core::codec::{Codec as _, CodecCounts};
+    use headrace_sensor::codec::contract::decode_all;
+    use headrace_sensor::codec::{Codec as _, CodecCounts};
     use proptest::prelude::*;
 
     use super::*;
@@ -316,7 +316,7 @@ mod tests {
         )
     }
 
-    headrace_core::codec_contract!(
+    headrace_sensor::codec_contract!(
         contract,
         codec: MavlinkCodec::default(),
         values: any_frame(),

@@ -4,7 +4,7 @@
 //! Source: MAVLink common message set (common.xml): ATTITUDE, RAW_IMU, SCALED_IMU to SCALED_IMU3, SCALED_PRESSURE to
 //! SCALED_PRESSURE3, DISTANCE_SENSOR.
 
-use headrace_core::codec::Bytes;
+use headrace_sensor::codec::Bytes;
 
 use crate::frame::{Frame, Version};
 
@@ -341,7 +341,7 @@ impl Payload {
 
 #[cfg(test)]
 mod tests {
-    use headrace_core::codec::contract::decode_all;
+    use headrace_sensor::codec::contract::decode_all;
     use proptest::prelude::*;
 
     use super::*;
@@ -410,7 +410,7 @@ mod tests {
     }
 
     proptest! {
-        #![proptest_config(headrace_core::codec::contract::config())]
+        #![proptest_config(headrace_sensor::codec::contract::config())]
 
         #[test]
         fn a_message_comes_back_though_its_last_zeros_are_not_sent(message in any_message()) {

@@ -1,11 +1,11 @@
 //! The vehicle file's part of an autopilot's part, and its place in the loop.
 
-use headrace_core::app::App;
-use headrace_core::app::components::{DepthSensor, Echosounder, Imu};
-use headrace_core::app::device::{Device, DeviceKind, Emulated, EmulatorSetup, Needless, Sense};
-use headrace_core::app::driver::{Carrier, Driver, DriverSetup};
-use headrace_core::app::plugin::{Plugin, PluginError};
-use headrace_core::config::{ConfigError, Section, SensorConfig};
+use headrace_sensor::SensorConfig;
+use headrace_sensor::config::{ConfigError, Section};
+use headrace_sensor::device::{
+    Device, DeviceKind, Emulated, EmulatorSetup, Needless, Sense, SensorKind, SensorSpec,
+};
+use headrace_sensor::driver::{Carrier, Driver, DriverSetup};
 
 use crate::decoder::{DistancePart, MavlinkDecoder, Meaning, Part};
 use crate::driver::{self, MavlinkDriver};
@@ -108,22 +108,21 @@ fn byte(own: &Section<'_>, key: &'static str, least: i64) -> Result<Option<u8>, 
     Ok(own.integer(key, least..=255)?.and_then(|value| u8::try_from(value).ok()))
 }
 
-impl Plugin for Autopilot {
-    fn build(&self, app: &mut App) -> Result<(), PluginError> {
-        let decoder = Box::new(MavlinkDecoder::new(self.meaning));
-        match self.meaning.part {
-            Part::Imu { .. } => app.add_sensor(&self.sensor, decoder, RING_BYTES, Imu)?,
-            Part::Pressure { .. } => app.add_sensor(&self.sensor, decoder, RING_BYTES, DepthSensor)?,
-            Part::Distance(_) => {
-                let echosounder = Echosounder { min_confidence: self.min_confidence };
-                app.add_sensor(&self.sensor, decoder, RING_BYTES, echosounder)?
-            }
-        };
-        Ok(())
-    }
-}
-
 impl Device for Autopilot {
+    fn specification(&self) -> SensorSpec {
+        let kind = match self.meaning.part {
+            Part::Imu { .. } => SensorKind::Imu,
+            Part::Pressure { .. } => SensorKind::Depth,
+            Part::Distance(_) => SensorKind::Echosounder { min_confidence: self.min_confidence },
+        };
+        SensorSpec {
+            sensor: self.sensor.clone(),
+            kind,
+            decoder: Box::new(MavlinkDecoder::new(self.meaning)),
+            ring_bytes: RING_BYTES,
+        }
+    }
+
     fn sense(&self) -> Sense {
         match self.meaning.part {
             Part::Imu { .. } => Sense::Inertial,

@@ -3,8 +3,8 @@
 
 use std::collections::VecDeque;
 
-use headrace_core::app::driver::{Carrier, Cutter, Driver, Standing, Wire};
-use headrace_core::time::{DurNs, MonoNs};
+use headrace_sensor::driver::{Carrier, Cutter, Driver, Standing, Wire};
+use headrace_sensor::geometry::time::{DurNs, MonoNs};
 
 use crate::codec::{Addressed, DeviceInformation, Frame, Frames, MAX_FRAME_BYTES, Message, id};
 use crate::settings::{Polling, Settings};

@@ -2,11 +2,11 @@
 
 use std::collections::VecDeque;
 
-use headrace_core::app::device::{Direction, Emulator, EmulatorSetup, LineSink};
-use headrace_core::app::measurement::Sounding;
-use headrace_core::codec::{Bytes, Codec as _};
-use headrace_core::math;
-use headrace_core::time::{DurNs, MonoNs};
+use headrace_sensor::codec::{Bytes, Codec as _};
+use headrace_sensor::device::{Direction, Emulator, EmulatorSetup, LineSink};
+use headrace_sensor::geometry::math;
+use headrace_sensor::geometry::time::{DurNs, MonoNs};
+use headrace_sensor::measurement::Sounding;
 
 use crate::codec::{
     Addressed, DeviceInformation, Distance, DistanceSimple, MAX_STRENGTHS, Message, PingCodec, Profile,

@@ -1,15 +1,15 @@
 //! Registration of an echosounder with the loop, and its messages as readings.
 
-use headrace_core::app::App;
-use headrace_core::app::components::Echosounder;
-use headrace_core::app::device::{Decoder, Device, DeviceKind, Emulated, EmulatorSetup, Needless, Sense};
-use headrace_core::app::driver::{Carrier, Driver, DriverSetup, Probe};
-use headrace_core::app::plugin::{Plugin, PluginError};
-use headrace_core::app::reading::{Decoded, EchoRange, Packet, Reading};
-use headrace_core::codec::{Codec as _, CodecCounts, Framing as _, LineClock};
-use headrace_core::config::{ConfigError, Section, SensorConfig};
-use headrace_core::stateful;
-use headrace_core::time::DurNs;
+use headrace_sensor::SensorConfig;
+use headrace_sensor::codec::{Codec as _, CodecCounts, Framing as _, LineClock};
+use headrace_sensor::config::{ConfigError, Section};
+use headrace_sensor::device::{
+    Decoder, Device, DeviceKind, Emulated, EmulatorSetup, Needless, Sense, SensorKind, SensorSpec,
+};
+use headrace_sensor::driver::{Carrier, Driver, DriverSetup, Probe};
+use headrace_sensor::geometry::time::DurNs;
+use headrace_sensor::reading::{Decoded, EchoRange, Packet, Reading};
+use headrace_sensor::stateful;
 
 use crate::codec::{Addressed, Distance, DistanceSimple, Frame, Frames, Message, PingCodec};
 use crate::driver::{CARRIERS, PingDriver};
@@ -53,20 +53,16 @@ pub struct Ping1d {
     settings: Settings,
 }
 
-impl Plugin for Ping1d {
-    fn build(&self, app: &mut App) -> Result<(), PluginError> {
-        let echosounder = Echosounder { min_confidence: self.settings.min_confidence };
-        app.add_sensor(
-            &self.sensor,
-            Box::new(PingDecoder::new(self.settings, self.sensor.latency)),
-            RING_BYTES,
-            echosounder,
-        )?;
-        Ok(())
-    }
-}
-
 impl Device for Ping1d {
+    fn specification(&self) -> SensorSpec {
+        SensorSpec {
+            sensor: self.sensor.clone(),
+            kind: SensorKind::Echosounder { min_confidence: self.settings.min_confidence },
+            decoder: Box::new(PingDecoder::new(self.settings, self.sensor.latency)),
+            ring_bytes: RING_BYTES,
+        }
+    }
+
     fn sense(&self) -> Sense {
         Sense::Echosounder
     }

@@ -1,7 +1,7 @@
 //! Whether a Ping device is on a line, and which: it is asked for its version and what it is, whatever its id.
 
-use headrace_core::app::driver::Probe;
-use headrace_core::codec::Codec as _;
+use headrace_sensor::codec::Codec as _;
+use headrace_sensor::driver::Probe;
 
 use crate::codec::{Addressed, DeviceInformation, Message, PingCodec, ProtocolVersion, id};
 
@@ -57,9 +57,9 @@ impl Probe for PingProbe {
 
 #[cfg(test)]
 mod tests {
-    use headrace_core::app::device::{Emulator as _, EmulatorSetup};
-    use headrace_core::site::Site;
-    use headrace_core::time::{DurNs, MonoNs};
+    use headrace_sensor::device::{Emulator as _, EmulatorSetup};
+    use headrace_sensor::geometry::site::Site;
+    use headrace_sensor::geometry::time::{DurNs, MonoNs};
 
     use super::*;
     use crate::emulator::PingEmulator;

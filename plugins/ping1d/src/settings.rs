@@ -1,8 +1,9 @@
 //! An echosounder's settings: the keys of its table in the vehicle file.
 
-use headrace_core::config::{ConfigError, Section, SensorConfig};
-use headrace_core::math;
-use headrace_core::time::DurNs;
+use headrace_sensor::SensorConfig;
+use headrace_sensor::config::{ConfigError, Section};
+use headrace_sensor::geometry::math;
+use headrace_sensor::geometry::time::DurNs;
 
 use crate::codec::ScanRange;
 
@@ -70,8 +71,8 @@ impl Settings {
 
 #[cfg(test)]
 pub(crate) mod tests {
-    use headrace_core::config::Document;
-    use headrace_core::frames::{Mount, Rot, Vec3};
+    use headrace_sensor::config::Document;
+    use headrace_sensor::geometry::frames::{Mount, Rot, Vec3};
 
     use super::*;
 

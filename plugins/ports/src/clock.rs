@@ -2,7 +2,7 @@
 
 use std::time::{Duration, SystemTime};
 
-use headrace_core::time::{DurNs, MonoNs, UtcNs};
+use headrace_geometry::time::{DurNs, MonoNs, UtcNs};
 use rustix::time::{ClockId, clock_gettime};
 
 /// Now, on the host's monotonic clock: it counts from the machine's start and is never set.

@@ -7,10 +7,10 @@ use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use crossbeam::sync::Parker;
-use headrace_core::app::driver::Driver;
-use headrace_core::app::ring::Port;
-use headrace_core::app::run::Loop;
-use headrace_core::config::{Connect, ConnectError};
+use headrace_monitor::ring::Port;
+use headrace_monitor::run::Loop;
+use headrace_sensor::connect::{Connect, ConnectError};
+use headrace_sensor::driver::Driver;
 
 use crate::clock;
 use crate::service::{Berth, Common, SentSink, Service};

@@ -9,7 +9,7 @@ mod presence;
 mod rights;
 mod serial;
 
-use headrace_core::app::driver::Carrier;
+use headrace_sensor::driver::Carrier;
 
 pub use machine::{Machine, User};
 pub use presence::{Presence, presence};

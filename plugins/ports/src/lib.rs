@@ -1,7 +1,7 @@
 //! What the drivers of all devices share: the clock, lines of every carrier, and the life of a line: opened, read with stamps,
 //! lost, and opened again. Also what is plugged in, what keeps us from it, and what answers there.
 //!
-//! The drivers themselves are in the devices' crates and do no I/O; see [`headrace_core::app::driver`].
+//! The drivers themselves are in the devices' crates and do no I/O; see [`headrace_sensor::driver`].
 
 mod clock;
 mod crew;

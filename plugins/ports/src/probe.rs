@@ -3,9 +3,9 @@
 use std::io;
 use std::time::Duration;
 
-use headrace_core::app::driver::Probe;
-use headrace_core::config::Connect;
-use headrace_core::time::DurNs;
+use headrace_geometry::time::DurNs;
+use headrace_sensor::connect::Connect;
+use headrace_sensor::driver::Probe;
 
 use crate::clock;
 use crate::lines::{self, Line, READ_BYTES};

@@ -8,10 +8,10 @@ use std::thread;
 use std::time::Duration;
 
 use crossbeam::sync::Unparker;
-use headrace_core::app::driver::{Driver, Standing, Wire};
-use headrace_core::app::ring::{MAX_PACKET_BYTES, Port};
-use headrace_core::config::{Connect, ConnectError};
-use headrace_core::time::{DurNs, MonoNs};
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_monitor::ring::{MAX_PACKET_BYTES, Port};
+use headrace_sensor::connect::{Connect, ConnectError};
+use headrace_sensor::driver::{Driver, Standing, Wire};
 
 use crate::clock;
 use crate::lines::{self, Line, READ_BYTES};

@@ -6,8 +6,8 @@ use std::io::{self, Read as _, Write as _};
 use std::net::{IpAddr, SocketAddr, TcpListener, TcpStream, ToSocketAddrs, UdpSocket};
 use std::os::fd::{AsFd, BorrowedFd};
 
-use headrace_core::app::driver::Carrier;
-use headrace_core::config::{Connect, SerialPort, UsbIdentity};
+use headrace_sensor::connect::{Connect, SerialPort, UsbIdentity};
+use headrace_sensor::driver::Carrier;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::io;
 
-use headrace_core::config::ConnectError;
+use headrace_sensor::connect::ConnectError;
 
 use crate::discover::remedy_for;
 use crate::remedy;

@@ -1,10 +1,11 @@
 //! Reports and lines to readings of cable length.
 
-use headrace_core::app::device::Decoder;
-use headrace_core::app::reading::{Decoded, Packet, Reading, TetherLength};
-use headrace_core::codec::{Codec as _, CodecCounts, Framing as _, LineClock};
-use headrace_core::stateful;
-use headrace_core::time::{ClockReport, DeviceClock, DurNs};
+use headrace_sensor::codec::{Codec as _, CodecCounts, Framing as _, LineClock};
+use headrace_sensor::device::Decoder;
+use headrace_sensor::device_clock::{ClockReport, DeviceClock};
+use headrace_sensor::geometry::time::DurNs;
+use headrace_sensor::reading::{Decoded, Packet, Reading, TetherLength};
+use headrace_sensor::stateful;
 
 use crate::line::{LineCodec, Lines};
 use crate::report::{LayoutError, Report, ReportCodec, ReportLayout};

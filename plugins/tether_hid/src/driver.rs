@@ -1,7 +1,7 @@
 //! The host's side of a counter's line: it listens.
 
-use headrace_core::app::driver::{Carrier, Listener, MessageListener};
-use headrace_core::time::DurNs;
+use headrace_sensor::driver::{Carrier, Listener, MessageListener};
+use headrace_sensor::geometry::time::DurNs;
 
 use crate::line::{Lines, MAX_LINE_BYTES};
 use crate::report::ReportLayout;

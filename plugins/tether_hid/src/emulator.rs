@@ -1,10 +1,9 @@
 //! The counter's side of the line: a report, or a text line, at a fixed rate.
 
-use headrace_core::app::components::Tether;
-use headrace_core::app::device::{Direction, Emulator, LineSink};
-use headrace_core::app::measurement::Payout;
-use headrace_core::math;
-use headrace_core::time::{DurNs, MonoNs};
+use headrace_sensor::device::{Direction, Emulator, LineSink};
+use headrace_sensor::geometry::math;
+use headrace_sensor::geometry::time::{DurNs, MonoNs};
+use headrace_sensor::measurement::Payout;
 
 use crate::decoder::Counter;
 use crate::line::{Decimal, LineReading};
@@ -20,8 +19,10 @@ const LINE_PLACES: u8 = 3;
 /// When an emulated counter reports, and what it measures.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reeling {
-    /// Where the counter is zero, and its scale.
-    pub tether: Tether,
+    /// Chainage of the vehicle where the counter reads zero, m.
+    pub zero_at_m: f64,
+    /// Metres of chainage for a metre of cable.
+    pub scale: f64,
     /// Reports a second.
     pub rate_hz: f64,
     /// From validity to receive time.
@@ -65,7 +66,7 @@ impl Reeling {
 
     /// Cable paid out, m.
     fn length_m(&self, payout: &Payout) -> f64 {
-        (payout.chainage_m - self.tether.zero_at_m) / self.tether.scale
+        (payout.chainage_m - self.zero_at_m) / self.scale
     }
 }
 

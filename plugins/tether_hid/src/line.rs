@@ -8,8 +8,8 @@
 //! in decimal, of the codes of all characters before it. Anything may stand before a line.
 //! Source: LCI-90 Operator Manual, p. 48; a recorded LCI-90i line whose sum confirms the order of the fields.
 
-use headrace_core::codec::{Framed, Framing, Verdict};
-use headrace_core::math;
+use headrace_sensor::codec::{Framed, Framing, Verdict};
+use headrace_sensor::geometry::math;
 
 /// Shapes of the two lines: 9 stands for a digit, # for a character of a number, all else for itself.
 const PLAIN: &[u8] = b"RD,########,########,########,9999\r\n";
@@ -227,8 +227,8 @@ impl Framing for Lines {
 
 #[cfg(test)]
 mod tests {
-    use headrace_core::codec::Codec as _;
-    use headrace_core::codec::contract::decode_all;
+    use headrace_sensor::codec::Codec as _;
+    use headrace_sensor::codec::contract::decode_all;
 
     use super::*;
 
@@ -308,7 +308,7 @@ mod tests {
             .prop_map(|(stamp, tension, speed, payout)| LineReading { stamp, tension, speed, payout })
     }
 
-    headrace_core::codec_contract!(
+    headrace_sensor::codec_contract!(
         contract,
         codec: LineCodec::default(),
         values: any_line(),

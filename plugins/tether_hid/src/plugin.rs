@@ -1,11 +1,11 @@
 //! The vehicle file's part of a cable counter, and its place in the loop.
 
-use headrace_core::app::App;
-use headrace_core::app::components::Tether;
-use headrace_core::app::device::{Decoder, Device, DeviceKind, Emulated, EmulatorSetup, Sense};
-use headrace_core::app::driver::{Carrier, Driver, DriverSetup};
-use headrace_core::app::plugin::{Plugin, PluginError};
-use headrace_core::config::{ConfigError, Section, SensorConfig};
+use headrace_sensor::SensorConfig;
+use headrace_sensor::config::{ConfigError, Section};
+use headrace_sensor::device::{
+    Decoder, Device, DeviceKind, Emulated, EmulatorSetup, Sense, SensorKind, SensorSpec,
+};
+use headrace_sensor::driver::{Carrier, Driver, DriverSetup};
 
 use crate::decoder::{Counter, HidDecoder, LineDecoder};
 use crate::driver;
@@ -64,7 +64,8 @@ impl DeviceKind for Kind {
         }
         let zero_at_m = own.number("zero_at_m", -1.0e6..=1.0e6)?.unwrap_or(0.0);
         let reeling = Reeling {
-            tether: Tether { zero_at_m, scale },
+            zero_at_m,
+            scale,
             rate_hz: own.number("rate_hz", 0.1..=1000.0)?.unwrap_or(usual_rate_hz),
             latency: sensor.latency,
         };
@@ -155,20 +156,22 @@ fn report_layout(own: &Section<'_>) -> Result<ReportLayout, ConfigError> {
     Ok(layout)
 }
 
-impl Plugin for CableCounter {
-    fn build(&self, app: &mut App) -> Result<(), PluginError> {
+impl Device for CableCounter {
+    fn specification(&self) -> SensorSpec {
         let decoder: Box<dyn Decoder> = match &self.wire {
             Wire::Hid { decoder, .. } => decoder.clone(),
             Wire::Line { metres_per_unit } => {
                 Box::new(LineDecoder::new(*metres_per_unit, self.reeling.latency))
             }
         };
-        app.add_sensor(&self.sensor, decoder, RING_BYTES, self.reeling.tether)?;
-        Ok(())
+        SensorSpec {
+            sensor: self.sensor.clone(),
+            kind: SensorKind::Tether { zero_at_m: self.reeling.zero_at_m, scale: self.reeling.scale },
+            decoder,
+            ring_bytes: RING_BYTES,
+        }
     }
-}
 
-impl Device for CableCounter {
     fn sense(&self) -> Sense {
         Sense::Tether
     }

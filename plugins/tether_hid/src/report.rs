@@ -6,7 +6,7 @@
 //!          id   sequence  status  count, i32 little  auxiliary, i32 little
 //! ```
 
-use headrace_core::codec::{Framed, Framing, Verdict};
+use headrace_sensor::codec::{Framed, Framing, Verdict};
 
 /// The longest report: an id and what a full-speed interrupt transfer carries.
 pub const MAX_REPORT_BYTES: usize = 65;
@@ -282,7 +282,7 @@ impl Framing for ReportLayout {
 
 #[cfg(test)]
 mod tests {
-    use headrace_core::codec::{Codec as _, CodecCounts};
+    use headrace_sensor::codec::{Codec as _, CodecCounts};
 
     use super::*;
 
@@ -395,7 +395,7 @@ mod tests {
         assert_eq!(signed.decode(&[7, 0, 0xFA, 0xFF, 0]).unwrap().count, -6);
     }
 
-    headrace_core::codec_contract!(
+    headrace_sensor::codec_contract!(
         reference_contract,
         codec: ReportCodec::new(ReportLayout::REFERENCE),
         values: (any::<u8>(), any::<u8>(), any::<i32>(), any::<i32>()).prop_map(
@@ -410,7 +410,7 @@ mod tests {
         frames: [EXAMPLE],
     );
 
-    headrace_core::codec_contract!(
+    headrace_sensor::codec_contract!(
         plain_contract,
         codec: ReportCodec::new(PLAIN),
         values: (any::<u8>(), any::<u16>()).prop_map(|(status, count)| Report {

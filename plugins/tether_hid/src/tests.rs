@@ -1,14 +1,13 @@
 //! From a vehicle file's table to readings, by way of the emulated counter.
 
-use headrace_core::app::device::{Decoder, Device, DeviceKind as _, Emulated, EmulatorSetup};
-use headrace_core::app::measurement::Payout;
-use headrace_core::app::reading::{Decoded, Packet, Reading, TetherLength};
-use headrace_core::app::{App, Mission};
-use headrace_core::config::{Document, SensorConfig};
-use headrace_core::frames::{Mount, Rot, Vec3};
-use headrace_core::site::Site;
-use headrace_core::time::{DurNs, MonoNs};
-use headrace_core::tunnel::named;
+use headrace_sensor::SensorConfig;
+use headrace_sensor::config::Document;
+use headrace_sensor::device::{Decoder, Device, DeviceKind as _, Emulated, EmulatorSetup};
+use headrace_sensor::geometry::frames::{Mount, Rot, Vec3};
+use headrace_sensor::geometry::site::Site;
+use headrace_sensor::geometry::time::{DurNs, MonoNs};
+use headrace_sensor::measurement::Payout;
+use headrace_sensor::reading::{Decoded, Packet, Reading, TetherLength};
 
 use crate::Kind;
 use crate::decoder::{Counter, HidDecoder, LineDecoder};
@@ -18,10 +17,6 @@ use crate::tracker::Counting;
 /// Chainage of a vehicle that goes in at 0.5 m/s from chainage 20 m.
 fn chainage_m(at: MonoNs) -> f64 {
     20.0 + 0.5 * at.as_secs_f64()
-}
-
-fn app() -> App {
-    App::new(Mission::new(named::circle(2.5).unwrap(), 0.5))
 }
 
 fn configured(own: &str) -> Result<Box<dyn Device>, String> {
@@ -35,7 +30,7 @@ fn configured(own: &str) -> Result<Box<dyn Device>, String> {
     let root = Document::new("v.toml", own).root().unwrap();
     let device = Kind.configure(&sensor, &root).map_err(|error| error.to_string())?;
     root.finish().map_err(|error| error.to_string())?;
-    device.build(&mut app()).unwrap();
+    assert_eq!(device.specification().sensor, sensor);
     Ok(device)
 }
 

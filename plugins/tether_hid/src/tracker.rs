@@ -8,8 +8,8 @@
 //!   - Otherwise the counter's new word is taken as it is.
 //! - Either way, and whenever counts may have been lost, the length is no longer sure: re-zero needed, from then on.
 
-use headrace_core::stateful;
-use headrace_core::time::MonoNs;
+use headrace_sensor::geometry::time::MonoNs;
+use headrace_sensor::stateful;
 use serde::{Deserialize, Serialize};
 
 use crate::report::{Report, Width};

@@ -1,11 +1,12 @@
 //! Tables of values (CSV), a row a moment: each sensor's own emulator puts them into the bytes that it would have sent, so that
 //! its ordinary decoder reads them.
 
-use headrace_core::app::device::Sense;
-use headrace_core::config::{ConfigError, Section, VehicleConfig};
-use headrace_core::frames::Rot;
-use headrace_core::math::PI;
-use headrace_core::time::MonoNs;
+use headrace_config::{ConfigError, Section};
+use headrace_geometry::frames::Rot;
+use headrace_geometry::math::PI;
+use headrace_geometry::time::MonoNs;
+use headrace_sensor::device::Sense;
+use headrace_vehicle::VehicleConfig;
 
 use super::emulated::{EmulatedSensor, Value};
 use super::{Clock, Entry, Format, Step};

@@ -1,12 +1,13 @@
 //! A sensor of a vehicle file as its emulator, which makes the bytes that the sensor would have sent of foreign values.
 
-use headrace_core::app::device::{Device, Direction, Emulated, EmulatorSetup, Sense};
-use headrace_core::app::measurement::{GroundVelocity, Inertia, Payout, Pressure, Sounding};
-use headrace_core::app::reading::Level;
-use headrace_core::config::{ConfigError, Section, VehicleConfig};
-use headrace_core::frames::{Rot, Sensor, Vec3};
-use headrace_core::sampling::head::HeadProgram;
-use headrace_core::time::{DurNs, MonoNs};
+use headrace_config::{ConfigError, Section};
+use headrace_geometry::frames::{Rot, Sensor, Vec3};
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_sampling::head::HeadProgram;
+use headrace_sensor::device::{Device, Direction, Emulated, EmulatorSetup, Sense};
+use headrace_sensor::measurement::{GroundVelocity, Inertia, Payout, Pressure, Sounding};
+use headrace_sensor::reading::Level;
+use headrace_vehicle::VehicleConfig;
 
 /// What an inertial sample says of its own period, which foreign values don't.
 const PERIOD: DurNs = DurNs(10_000_000);

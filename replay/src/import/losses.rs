@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use headrace_core::time::MonoNs;
+use headrace_geometry::time::MonoNs;
 
 /// What was lost so far.
 #[derive(Debug, Clone, Default)]

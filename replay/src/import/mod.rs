@@ -20,7 +20,7 @@ mod tests;
 
 use std::io::{Read, Write};
 
-use headrace_core::time::{DurNs, MonoNs};
+use headrace_geometry::time::{DurNs, MonoNs};
 
 use crate::log::{LogError, LogWriter};
 

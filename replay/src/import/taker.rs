@@ -1,7 +1,7 @@
 //! A sensor of the vehicle file, as it listens to a foreign log.
 
-use headrace_core::app::driver::{Driver, Wire};
-use headrace_core::time::{DurNs, MonoNs};
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_sensor::driver::{Driver, Wire};
 
 /// Takes what its sensor would have heard.
 pub struct Taker {

@@ -1,6 +1,6 @@
 //! What works beside the recorder, on its thread: it makes more messages of the results that are written.
 
-use headrace_core::time::MonoNs;
+use headrace_geometry::time::MonoNs;
 
 /// A message that a companion has made.
 #[derive(Debug, Clone, PartialEq, Eq)]

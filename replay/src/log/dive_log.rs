@@ -8,7 +8,7 @@ use std::fs::File;
 use std::io::{Read, Seek};
 use std::path::{Path, PathBuf};
 
-use headrace_core::time::MonoNs;
+use headrace_geometry::time::MonoNs;
 use serde::{Deserialize, Serialize};
 
 use super::part::{Part, Progress, named_part};

@@ -5,7 +5,7 @@
 //! | `/raw/<source id>` | bytes as received: one device frame, datagram, CAN frame, HID report or I2C transaction | receive time | time of validity, where the device gives one, else the receive time |
 //! | `/sent/<source id>` | bytes sent to the device | when | when |
 //! | `/loop/tick` | one tick of the loop, see [`Tick`] | the tick's moment | the same |
-//! | `/result/poses`, `/result/pings`, `/result/judgements`, `/result/advice` | what the loop published in a tick, word by word ([`headrace_core::app::trail`]): u64 tick, u64 number of the first record, records; for `verify`, never read by a replay | the tick's moment | the same |
+//! | `/result/poses`, `/result/pings`, `/result/judgements`, `/result/advice` | what the loop published in a tick, word by word ([`headrace_monitor::trail`]): u64 tick, u64 number of the first record, records; for `verify`, never read by a replay | the tick's moment | the same |
 //! | `/result/view/...` | the same for people's viewers, in JSON: [`crate::view`] | the tick's moment | the same |
 //!
 //! Times are nanoseconds of the host's monotonic clock. Every channel counts its messages from 0 (`sequence`).
@@ -14,7 +14,7 @@
 
 use std::collections::BTreeMap;
 
-use headrace_core::time::MonoNs;
+use headrace_geometry::time::MonoNs;
 use sha2::{Digest, Sha256};
 
 /// Version of what this module describes.

@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use headrace_core::time::MonoNs;
+use headrace_geometry::time::MonoNs;
 use serde::{Deserialize, Serialize};
 
 /// The most losses that are listed; what comes after makes the last reach further.

@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::{Read, Seek};
 use std::path::Path;
 
-use headrace_core::time::MonoNs;
+use headrace_geometry::time::MonoNs;
 use mcap::records::op;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};

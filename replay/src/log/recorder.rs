@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::{self, JoinHandle};
 
 use crossbeam::queue::ArrayQueue;
-use headrace_core::time::MonoNs;
+use headrace_geometry::time::MonoNs;
 use ringbuf::HeapRb;
 use ringbuf::traits::{Observer as _, Producer as _};
 use ringbuf::wrap::{Cons, Prod};

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::io::{Read, Seek, Write};
 
-use headrace_core::time::MonoNs;
+use headrace_geometry::time::MonoNs;
 
 use super::format::BYTES_ENCODING;
 use super::writer::Lane;

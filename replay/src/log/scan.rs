@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 use std::io::{Read, Seek};
 
-use headrace_core::time::MonoNs;
+use headrace_geometry::time::MonoNs;
 
 use super::channels::{Channels, listed};
 use super::chunk::{Unpacked, summary_holds, unpack};

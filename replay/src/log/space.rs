@@ -7,7 +7,7 @@
 use std::fs::File;
 use std::time::{Duration, Instant};
 
-use headrace_core::time::MonoNs;
+use headrace_geometry::time::MonoNs;
 
 use super::LogError;
 use super::writer::LogWriter;

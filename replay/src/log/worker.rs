@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use headrace_core::time::MonoNs;
+use headrace_geometry::time::MonoNs;
 use ringbuf::HeapRb;
 use ringbuf::traits::{Consumer as _, Observer as _};
 use ringbuf::wrap::Cons;

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use headrace_core::math;
+use headrace_geometry::math;
 
 use super::error::MeshError;
 use super::{Role, Triangles};

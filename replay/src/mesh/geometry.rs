@@ -5,7 +5,7 @@
 //! sign alone, so that the two triangles of an edge agree, or both find zero, which counts as inside: nothing passes
 //! between them.
 
-use headrace_core::math;
+use headrace_geometry::math;
 
 /// Where the order of two rounded products leaves the place in a triangle open: seen edge-on, or a needle. A few
 /// thousand units in the last place.

@@ -20,7 +20,7 @@ mod tests_read;
 
 use std::cell::Cell;
 
-use headrace_core::math;
+use headrace_geometry::math;
 use parry3d_f64::bounding_volume::Aabb;
 use parry3d_f64::math::Vector;
 use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy, BvhNode};

@@ -2,7 +2,7 @@
 //!
 //! Source: G. Turk, "The PLY Polygon File Format", Stanford, 1994.
 
-use headrace_core::math;
+use headrace_geometry::math;
 
 use super::error::{MeshError, Place};
 use super::read::{MeshFormat, Triangles, number, quoted, words};

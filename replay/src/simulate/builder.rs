@@ -5,7 +5,7 @@ use bevy_ecs::prelude::{Component, IntoScheduleConfigs, SystemSet, World};
 use bevy_ecs::schedule::{Schedule, ScheduleConfigs};
 use bevy_ecs::system::{IntoSystem, ScheduleSystem};
 
-use headrace_core::sampling::head::HeadProgram;
+use headrace_sampling::head::HeadProgram;
 
 use super::notes;
 use super::random::Stream;

@@ -1,8 +1,8 @@
 //! Clocks of devices that aren't right.
 
 use bevy_ecs::prelude::Component;
-use headrace_core::math;
-use headrace_core::time::{DurNs, MonoNs};
+use headrace_geometry::math;
+use headrace_geometry::time::{DurNs, MonoNs};
 
 use super::START;
 

@@ -21,10 +21,10 @@ pub mod way;
 use bevy_ecs::entity::Entity;
 use bevy_ecs::prelude::World;
 use bevy_ecs::schedule::Schedule;
-use headrace_core::app::device::{Emulated, EmulatorSetup, Sense};
-use headrace_core::app::measurement::{GroundVelocity, Inertia, Measurement, Payout, Pressure, Sounding};
-use headrace_core::frames::Pose;
-use headrace_core::time::{DurNs, MonoNs};
+use headrace_geometry::frames::Pose;
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_sensor::device::{Emulated, EmulatorSetup, Sense};
+use headrace_sensor::measurement::{GroundVelocity, Inertia, Measurement, Payout, Pressure, Sounding};
 
 use builder::{Builder, Programs};
 use notes::{Before, LineBefore, Notes};

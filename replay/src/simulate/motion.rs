@@ -1,10 +1,10 @@
 //! What an ideal inertial unit feels, from the true pose.
 
-use headrace_core::app::measurement::Inertia;
-use headrace_core::app::reading::Level;
-use headrace_core::frames::{Mount, Point3, Rot, Sensor, Tunnel, Vec3};
-use headrace_core::math;
-use headrace_core::time::{DurNs, MonoNs};
+use headrace_geometry::frames::{Mount, Point3, Rot, Sensor, Tunnel, Vec3};
+use headrace_geometry::math;
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_sensor::measurement::Inertia;
+use headrace_sensor::reading::Level;
 
 use super::sensing::Scenery;
 

@@ -2,7 +2,7 @@
 //! asked for its truth has it.
 
 use bevy_ecs::prelude::{Component, Query, ResMut, Resource};
-use headrace_core::app::measurement::{GroundVelocity, Inertia, Measurement, Payout, Pressure, Sounding};
+use headrace_sensor::measurement::{GroundVelocity, Inertia, Measurement, Payout, Pressure, Sounding};
 
 use super::sensing::{Line, Samples, Source};
 

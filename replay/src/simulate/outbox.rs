@@ -1,7 +1,7 @@
 //! Messages of all lines in one order: (time, source, place on the line).
 
-use headrace_core::app::device::Direction;
-use headrace_core::time::MonoNs;
+use headrace_geometry::time::MonoNs;
+use headrace_sensor::device::Direction;
 
 use super::sensing::Line;
 

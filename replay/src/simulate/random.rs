@@ -4,7 +4,7 @@
 //! Source: Salmon et al., "Parallel Random Numbers: As Easy as 1, 2, 3", SC 2011 (Philox4x32-10); Wichura, "Algorithm
 //! AS 241", Applied Statistics 37, 1988 (normal quantiles).
 
-use headrace_core::math;
+use headrace_geometry::math;
 use sha2::{Digest as _, Sha256};
 
 const MULTIPLIERS: [u32; 2] = [0xD251_1F53, 0xCD9E_8D57];

@@ -1,10 +1,12 @@
 //! `SCENE.toml`: a vehicle file, a tunnel as it truly is, a trajectory, and the effects to simulate.
 
-use headrace_core::app::device::{DeviceKind, Sense};
-use headrace_core::config::vehicle::Loader;
-use headrace_core::config::{self, ConfigError, Document, VehicleConfig};
-use headrace_core::sampling::head::{HeadProgram, HeadSpec};
-use headrace_core::sampling::occlusion::Obstacle;
+use headrace_config as config;
+use headrace_config::Loader;
+use headrace_config::{ConfigError, Document};
+use headrace_sampling::head::{HeadProgram, HeadSpec};
+use headrace_sampling::occlusion::Obstacle;
+use headrace_sensor::device::{DeviceKind, Sense};
+use headrace_vehicle::VehicleConfig;
 
 use super::effects::{self, Named};
 use super::surroundings::Surroundings;

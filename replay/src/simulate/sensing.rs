@@ -3,13 +3,13 @@
 //! A simulation goes slice by slice; within one, each system works through all measurements of its kind at once.
 
 use bevy_ecs::prelude::{Component, Resource};
-use headrace_core::app::device::{Direction, Emulator};
-use headrace_core::app::measurement::Measurement;
-use headrace_core::frames::{Mount, Point3, Pose, Rot, Tunnel, Vec3};
-use headrace_core::math;
-use headrace_core::sampling::head::HeadSpec;
-use headrace_core::site::Site;
-use headrace_core::time::{DurNs, MonoNs};
+use headrace_geometry::frames::{Mount, Point3, Pose, Rot, Tunnel, Vec3};
+use headrace_geometry::math;
+use headrace_geometry::site::Site;
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_sampling::head::HeadSpec;
+use headrace_sensor::device::{Direction, Emulator};
+use headrace_sensor::measurement::Measurement;
 
 use super::START;
 use super::SceneError;

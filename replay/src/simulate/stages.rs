@@ -3,9 +3,9 @@
 #![allow(clippy::needless_pass_by_value, reason = "bevy hands systems their arguments by value")]
 
 use bevy_ecs::prelude::{Component, Query, Res, With, Without};
-use headrace_core::app::measurement::{GroundVelocity, Inertia, Measurement, Payout, Pressure, Sounding};
-use headrace_core::frames::{Mount, Pose, Vec3, head_direction};
-use headrace_core::math::{self, TAU};
+use headrace_geometry::frames::{Mount, Pose, Vec3, head_direction};
+use headrace_geometry::math::{self, TAU};
+use headrace_sensor::measurement::{GroundVelocity, Inertia, Measurement, Payout, Pressure, Sounding};
 
 use super::clock::Clock;
 use super::motion::{motion, velocity};

@@ -2,9 +2,9 @@
 
 use std::fmt::Write as _;
 
-use headrace_core::app::device::{DeviceKind, Direction};
-use headrace_core::config::Document;
-use headrace_core::time::{DurNs, MonoNs};
+use headrace_config::Document;
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_sensor::device::{DeviceKind, Direction};
 
 use super::{Scene, SceneError, Simulation, TruthRow};
 
@@ -162,7 +162,7 @@ impl Dived {
 
 /// That a share of `of` trials fell as often as its probability says, within five standard deviations.
 pub(super) fn assert_share(count: usize, of: usize, probability: f64) {
-    let deviation = headrace_core::math::sqrt(probability * (1.0 - probability) / of as f64);
+    let deviation = headrace_geometry::math::sqrt(probability * (1.0 - probability) / of as f64);
     let share = count as f64 / of as f64;
     assert!((share - probability).abs() <= 5.0 * deviation, "{count} of {of}, not {probability}");
 }

@@ -1,9 +1,9 @@
 //! A bench for effects: a vehicle with one device or two of each kind, dived along short ways.
 
-use headrace_core::app::device::Direction;
-use headrace_core::app::measurement::Measurement;
-use headrace_core::config::Document;
-use headrace_core::time::{DurNs, MonoNs};
+use headrace_config::Document;
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_sensor::device::Direction;
+use headrace_sensor::measurement::Measurement;
 
 use super::sensing::Samples;
 use super::testing::KINDS;

@@ -2,10 +2,10 @@
 
 use bevy_ecs::entity::Entity;
 use bevy_ecs::prelude::World;
-use headrace_core::app::device::Sense;
-use headrace_core::app::measurement::{GroundVelocity, Inertia, Measurement, Payout, Pressure, Sounding};
-use headrace_core::frames::{Point3, Pose, Tunnel, Vec3};
-use headrace_core::time::MonoNs;
+use headrace_geometry::frames::{Point3, Pose, Tunnel, Vec3};
+use headrace_geometry::time::MonoNs;
+use headrace_sensor::device::Sense;
+use headrace_sensor::measurement::{GroundVelocity, Inertia, Measurement, Payout, Pressure, Sounding};
 
 use super::notes::{Note, Notes};
 use super::sensing::{Echosounder, Rays, Samples, Scenery, Source};

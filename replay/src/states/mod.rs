@@ -7,7 +7,7 @@
 //! | kind | key | bytes |
 //! |---|---|---|
 //! | 0 | digest of the content | a block: a part of one or more states |
-//! | 1 | the moment, ns | a state: the place in the log, and the keys of the blocks of [`Loop::save`](headrace_core::app::run::Loop::save), which stand before it |
+//! | 1 | the moment, ns | a state: the place in the log, and the keys of the blocks of [`Loop::save`](headrace_monitor::run::Loop::save), which stand before it |
 
 mod blocks;
 mod file;
@@ -17,7 +17,7 @@ use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
-use headrace_core::time::MonoNs;
+use headrace_geometry::time::MonoNs;
 use xxhash_rust::xxh64::xxh64;
 
 use crate::player::PlayerPlace;

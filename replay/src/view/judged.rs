@@ -2,11 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use headrace_core::app::words::{
-    CauseFigures, Missed as MissedWords, cause_words, cleared_words, flag_words,
-};
-use headrace_core::coverage::{Cause, Judgement, RunChange, Verdict};
-use headrace_core::time::{DurNs, MonoNs};
+use headrace_coverage::{Cause, Judgement, RunChange, Verdict};
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_monitor::words::{CauseFigures, Missed as MissedWords, cause_words, cleared_words, flag_words};
 
 use super::Site;
 use super::messages::{Level, Log, Missed, Section, Stretch, rounded};

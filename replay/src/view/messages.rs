@@ -2,7 +2,7 @@
 //!
 //! Numbers are rounded to what a viewer can show, so that their text is short.
 
-use headrace_core::time::MonoNs;
+use headrace_geometry::time::MonoNs;
 use serde::Serialize;
 
 /// A time as Foxglove's schemas have it. Ours is the host's monotonic clock, as everywhere in a log.

@@ -1,4 +1,4 @@
-//! A dive for people's viewers: what the loop publishes word by word ([`headrace_core::app::trail`]) as messages that
+//! A dive for people's viewers: what the loop publishes word by word ([`headrace_monitor::trail`]) as messages that
 //! Foxglove and Lichtblick know, under Foxglove's schemas and some of our own.
 //!
 //! | topic below `/result/view/` | schema | what, how often |
@@ -13,7 +13,7 @@
 //! | `advice` | `headrace.Advice` | the advice when it changes, and every second |
 //! | `alerts` | `foxglove.Log` | what the pilot is told |
 //!
-//! Frame `tunnel` is ours ([`headrace_core::frames`]): z is up, as viewers have it, so that none has to be turned. `wall`
+//! Frame `tunnel` is ours ([`headrace_geometry::frames`]): z is up, as viewers have it, so that none has to be turned. `wall`
 //! lies flat beside it: x is chainage, y the arc length. It is made on the recorder's thread ([`Companion`]); the loop has no
 //! part in it, and nothing here is read back by a replay.
 
@@ -26,15 +26,15 @@ mod wall;
 #[cfg(test)]
 mod tests;
 
-use headrace_core::app::alerts::AlertKind;
-use headrace_core::app::trail::{Record, RecordKind, first_record, text_of};
-use headrace_core::app::words::{AdviceFigures, CauseFigures, advice_words, alert_words};
-use headrace_core::coverage::{Cause, Verdict};
-use headrace_core::frames::{Body, Rot, Tunnel};
-use headrace_core::fusion::NoFix;
-use headrace_core::sampling::advice::{Reason, Remedy};
-use headrace_core::time::{DurNs, MonoNs};
-use headrace_core::tunnel::Profile;
+use headrace_coverage::{Cause, Verdict};
+use headrace_fusion::NoFix;
+use headrace_geometry::frames::{Body, Rot, Tunnel};
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_geometry::tunnel::Profile;
+use headrace_monitor::alerts::AlertKind;
+use headrace_monitor::trail::{Record, RecordKind, first_record, text_of};
+use headrace_monitor::words::{AdviceFigures, CauseFigures, advice_words, alert_words};
+use headrace_sampling::advice::{Reason, Remedy};
 use serde::Serialize;
 
 use self::judged::{Judged, Sections};

@@ -1,6 +1,6 @@
 //! Samples as clouds of points, half a second of them in one.
 
-use headrace_core::time::{DurNs, MonoNs};
+use headrace_geometry::time::{DurNs, MonoNs};
 
 use super::TUNNEL;
 use super::messages::{Field, PointCloud, Pose, Turn, Xyz, base64, rounded};

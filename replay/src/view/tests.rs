@@ -1,14 +1,14 @@
 use std::collections::BTreeMap;
 
-use headrace_core::coverage::{Judgement, RunChange};
-use headrace_core::tunnel::named;
+use headrace_coverage::{Judgement, RunChange};
+use headrace_geometry::tunnel::shapes;
 use serde_json::Value;
 
 use super::*;
 
 fn view() -> View {
     View::new(Site {
-        profile: named::circle(3.0).unwrap(),
+        profile: shapes::circle(3.0).unwrap(),
         target_m: 0.5,
         section_m: 0.25,
         length_m: 100.0,

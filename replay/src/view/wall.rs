@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use headrace_core::coverage::Verdict;
-use headrace_core::math;
-use headrace_core::time::{DurNs, MonoNs};
+use headrace_coverage::Verdict;
+use headrace_geometry::math;
+use headrace_geometry::time::{DurNs, MonoNs};
 
 use super::messages::{Field, Grid, Pose, Turn, Xy, Xyz, base64, rounded};
 use super::{Site, WALL};

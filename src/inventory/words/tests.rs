@@ -5,8 +5,8 @@ use std::os::unix::fs::{MetadataExt as _, PermissionsExt as _, symlink};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use headrace_core::config::Connect;
 use headrace_ports::{Machine, Presence, User, discover, presence};
+use headrace_sensor::connect::Connect;
 use insta::assert_snapshot;
 use serde_json::json;
 

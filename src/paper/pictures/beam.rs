@@ -1,7 +1,7 @@
 //! Figure 15: how much wall a beam covers.
 
-use headrace_core::math;
 use headrace_experiments::figures::{Footprint, Footprints};
+use headrace_geometry::math;
 
 use crate::pictures::PictureError;
 use crate::pictures::canvas::{self, BOLD, Canvas, NORMAL, SMALL, Side};

@@ -1,7 +1,7 @@
 //! Figures 12 and 13: samples on the unrolled wall, and how far the surface through them is from it.
 
-use headrace_core::math;
 use headrace_experiments::figures::{Panel, Walls};
+use headrace_geometry::math;
 
 use crate::pictures::PictureError;
 use crate::pictures::canvas::{self, BLACK, BOLD, Canvas, Colour, Letters, Px, SMALL, Side, width_px};

@@ -1,7 +1,7 @@
 //! The pattern that heads lay on the wall, and the part of it in which all of them have passed.
 
-use headrace_core::math;
-use headrace_core::sampling::plan::PatternSample;
+use headrace_geometry::math;
+use headrace_sampling::plan::PatternSample;
 
 use super::{PictureError, Shown};
 

@@ -9,7 +9,7 @@ mod perimeter;
 mod speeds;
 mod wall;
 
-use headrace_core::sampling::plan::{Planner, Question};
+use headrace_sampling::plan::{Planner, Question};
 
 pub(crate) use crate::pictures::PictureError;
 pub(crate) use hours::hours;

@@ -1,6 +1,6 @@
 //! What speeds and hours have in common: the modes, by name and with what they reach.
 
-use headrace_core::sampling::plan::Planner;
+use headrace_sampling::plan::Planner;
 
 use super::{PictureError, Shown};
 use crate::pictures::look::{self, Look};

@@ -9,7 +9,7 @@ use crate::pictures::clock::{self, Hour};
 use crate::pictures::labels::{self, Label};
 use crate::pictures::look::{self, Look};
 use crate::pictures::polyline::Frame;
-use headrace_core::sampling::plan::WallPlace;
+use headrace_sampling::plan::WallPlace;
 
 const FRAME: Frame = Frame { left: 66.0, top: 72.0, right: 724.0, bottom: 444.0 };
 /// Places around the wall at which spacing is computed.

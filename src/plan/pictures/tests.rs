@@ -1,9 +1,9 @@
 //! Every picture of every kind of plan: well-formed, the same each time, and says what it shows.
 
 use clap::Parser;
-use headrace_core::frames::Vec3;
-use headrace_core::sampling::occlusion::Obstacle;
-use headrace_core::sampling::plan::{Inspection, Planner, Question};
+use headrace_geometry::frames::Vec3;
+use headrace_sampling::occlusion::Obstacle;
+use headrace_sampling::plan::{Inspection, Planner, Question};
 
 use super::*;
 use crate::cli::{Cli, Command};

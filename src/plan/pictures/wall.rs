@@ -1,8 +1,8 @@
 //! Where spacing is at its worst, and the strips that not all heads see.
 
-use headrace_core::math;
-use headrace_core::sampling::plan::{Planner, WallPlace};
-use headrace_core::sampling::strips::Strips;
+use headrace_geometry::math;
+use headrace_sampling::plan::{Planner, WallPlace};
+use headrace_sampling::strips::Strips;
 
 /// The place where T is largest; of those as good as equal the one nearest to the left wall.
 pub(super) fn worst(planner: &Planner, places: &[WallPlace]) -> Option<WallPlace> {

@@ -2,8 +2,8 @@
 //!
 //! Source: Imagenex 881A serial interface, switch data command.
 
-use headrace_core::codec::{Framed, Framing, Verdict};
-use headrace_core::math;
+use headrace_sensor::codec::{Framed, Framing, Verdict};
+use headrace_sensor::geometry::math;
 
 /// Length of a command.
 pub const COMMAND_BYTES: usize = 27;

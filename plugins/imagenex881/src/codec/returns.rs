@@ -2,7 +2,7 @@
 //!
 //! Source: Imagenex 881A serial interface, return data; Imagenex 852 serial interface specification 1.04.
 
-use headrace_core::codec::{Bytes, Framed, Framing, Verdict};
+use headrace_sensor::codec::{Bytes, Framed, Framing, Verdict};
 
 /// The longest echo.
 pub const MAX_ECHO_BYTES: usize = MAX_ECHO as usize;

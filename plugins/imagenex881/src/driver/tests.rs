@@ -1,9 +1,9 @@
 //! The driver against an emulated head, on a line that may lose, break, double and hold back bytes; no port, no clock.
 
-use headrace_core::app::device::{Direction, Emulator as _, EmulatorSetup};
-use headrace_core::app::measurement::Sounding;
-use headrace_core::math::{PI, TAU};
-use headrace_core::site::Site;
+use headrace_sensor::device::{Direction, Emulator as _, EmulatorSetup};
+use headrace_sensor::geometry::math::{PI, TAU};
+use headrace_sensor::geometry::site::Site;
+use headrace_sensor::measurement::Sounding;
 
 use super::*;
 use crate::codec::{Return, Status};

@@ -1,7 +1,7 @@
-use headrace_core::app::device::Decoder as _;
-use headrace_core::app::reading::{Packet, Reading, SonarReturn};
-use headrace_core::math::{PI, TAU};
-use headrace_core::site::Site;
+use headrace_sensor::device::Decoder as _;
+use headrace_sensor::geometry::math::{PI, TAU};
+use headrace_sensor::geometry::site::Site;
+use headrace_sensor::reading::{Packet, Reading, SonarReturn};
 
 use super::*;
 use crate::plugin::HeadDecoder;

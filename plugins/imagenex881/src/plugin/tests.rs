@@ -1,7 +1,5 @@
-use headrace_core::app::Mission;
-use headrace_core::math::PI;
-use headrace_core::time::MonoNs;
-use headrace_core::tunnel::named;
+use headrace_sensor::geometry::math::PI;
+use headrace_sensor::geometry::time::MonoNs;
 
 use super::*;
 use crate::codec::Status;
@@ -125,12 +123,10 @@ fn after_a_silence_a_new_return_is_not_given_an_old_time() {
 }
 
 #[test]
-fn a_head_registers_once_and_says_what_it_is() {
+fn a_head_says_what_it_is() {
     let settings = settings("mode = \"slow\"\nangle_offset_deg = 90").unwrap();
     let head = Imagenex881 { sensor: sensor(), settings };
-    let mut app = App::new(Mission::new(named::ceran().unwrap(), 0.5));
-    assert_eq!(head.build(&mut app), Ok(()));
-    assert_eq!(head.build(&mut app), Err(PluginError::DuplicateSource { id: "front".to_owned() }));
+    assert_eq!(head.specification().kind, SensorKind::Head);
     let spec = head.head().unwrap();
     assert_eq!((spec.ping_period_s, spec.range_m[1]), (0.018, 10.0));
     assert!((spec.step_rad - 0.3_f64.to_radians()).abs() < 1e-15);

@@ -1,6 +1,6 @@
 //! Every worked example of the makers' sets, and the codec's contract for each set.
 
-use headrace_core::codec::{Codec as _, CodecCounts};
+use headrace_sensor::codec::{Codec as _, CodecCounts};
 
 use super::*;
 use crate::frame::{CanId, FrameKind};
@@ -69,9 +69,9 @@ fn worked_example_4_quaternion() {
     let xsens::Message::Quaternion(raw) = xsens("021#76410000000030FB") else { panic!() };
     let [w, x, y, z] = scaled(raw, xsens::QUATERNION_QUANTUM);
     near([w, x, y, z], [0.923_887, 0.0, 0.0, 0.382_671], 1e-6);
-    let norm = headrace_core::math::sqrt(w * w + z * z);
+    let norm = headrace_sensor::geometry::math::sqrt(w * w + z * z);
     near([norm], [1.000_002_2], 5e-8);
-    near([2.0 * headrace_core::math::atan2(z, w).to_degrees()], [44.998], 5e-4);
+    near([2.0 * headrace_sensor::geometry::math::atan2(z, w).to_degrees()], [44.998], 5e-4);
 }
 
 #[test]
@@ -275,7 +275,7 @@ fn encode(set: MessageSet) -> impl Fn(&Message) -> [u8; FRAME_BYTES] {
     move |message| set.encode(message).unwrap().encode()
 }
 
-headrace_core::codec_contract!(
+headrace_sensor::codec_contract!(
     xsens_contract,
     codec: ImuCodec::new(XSENS),
     values: strategies::xsens(),
@@ -283,7 +283,7 @@ headrace_core::codec_contract!(
     frames: ["034#0000000009CF", "021#76410000000030FB"].map(|text| frame(text).encode()),
 );
 
-headrace_core::codec_contract!(
+headrace_sensor::codec_contract!(
     sbg_contract,
     codec: ImuCodec::new(MessageSet::Sbg),
     values: strategies::sbg(),
@@ -291,7 +291,7 @@ headrace_core::codec_contract!(
     frames: [frame("132#E8030CFE983A").encode()],
 );
 
-headrace_core::codec_contract!(
+headrace_sensor::codec_contract!(
     j1939_contract,
     codec: ImuCodec::new(J1939),
     values: strategies::j1939(),
@@ -299,7 +299,7 @@ headrace_core::codec_contract!(
     frames: ["0CF02980#00C07D00E07B0000", "0CF02DE2#007D007DD5800005"].map(|text| frame(text).encode()),
 );
 
-headrace_core::codec_contract!(
+headrace_sensor::codec_contract!(
     bosch_contract,
     codec: ImuCodec::new(MessageSet::Bosch),
     values: strategies::bosch(),

@@ -1,11 +1,12 @@
 //! Frames to readings by a mapping.
 
-use headrace_core::app::device::Decoder;
-use headrace_core::app::reading::{Decoded, Packet, Reading};
-use headrace_core::codec::{Codec as _, CodecCounts, Framed, Framing, Verdict};
-use headrace_core::frames::{Rot, Vec3};
-use headrace_core::stateful;
-use headrace_core::time::{ClockReport, DeviceClock, DurNs, MonoNs};
+use headrace_sensor::codec::{Codec as _, CodecCounts, Framed, Framing, Verdict};
+use headrace_sensor::device::Decoder;
+use headrace_sensor::device_clock::{ClockReport, DeviceClock};
+use headrace_sensor::geometry::frames::{Rot, Vec3};
+use headrace_sensor::geometry::time::{DurNs, MonoNs};
+use headrace_sensor::reading::{Decoded, Packet, Reading};
+use headrace_sensor::stateful;
 
 use super::layout::DATA_BYTES;
 use super::mapping::{Attitude, Axes, Condition, Mapping, Part, Stamp};

@@ -1,8 +1,8 @@
 //! The unit's side of the bus: at a fixed rate, the frames of one sample as the DBC lays them out.
 
-use headrace_core::app::device::{Direction, Emulator, LineSink};
-use headrace_core::app::measurement::Inertia;
-use headrace_core::time::{DurNs, MonoNs};
+use headrace_sensor::device::{Direction, Emulator, LineSink};
+use headrace_sensor::geometry::time::{DurNs, MonoNs};
+use headrace_sensor::measurement::Inertia;
 
 use super::file::Place;
 use super::layout::DATA_BYTES;

@@ -1,7 +1,7 @@
 //! The keys of a vehicle file that say what a DBC's signals are.
 
-use headrace_core::config::{ConfigError, NamedFile, Section};
-use headrace_core::time::DurNs;
+use headrace_sensor::config::{ConfigError, NamedFile, Section};
+use headrace_sensor::geometry::time::DurNs;
 
 use super::file::{DbcError, DbcFile, Signal};
 use super::mapping::{Attitude, Axes, Condition, Conditions, Kind, Mapping, Part, Stamp};

@@ -122,7 +122,7 @@ impl Bits {
 
 fn libm_round(value: f64) -> f64 {
     // Beyond 2^53 every double is whole; up to there the integer holds it.
-    if value.abs() < 9e15 { headrace_core::math::round_to_i64(value) as f64 } else { value }
+    if value.abs() < 9e15 { headrace_sensor::geometry::math::round_to_i64(value) as f64 } else { value }
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! What a unit's signals are, ready for the loop.
 
-use headrace_core::time::DurNs;
+use headrace_sensor::geometry::time::DurNs;
 
 use super::file::{Place, Signal};
 use super::layout::Bits;

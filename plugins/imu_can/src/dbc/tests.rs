@@ -2,15 +2,14 @@
 
 use std::sync::LazyLock;
 
-use headrace_core::app::device::{Decoder, Device, DeviceKind as _, Emulated, EmulatorSetup};
-use headrace_core::app::measurement::Inertia;
-use headrace_core::app::reading::{Decoded, Packet, Reading};
-use headrace_core::app::{App, Mission};
-use headrace_core::config::{Document, NamedFile, SensorConfig};
-use headrace_core::frames::{Mount, Rot, Vec3};
-use headrace_core::site::Site;
-use headrace_core::time::{DurNs, MonoNs};
-use headrace_core::tunnel::named;
+use headrace_sensor::SensorConfig;
+use headrace_sensor::config::{Document, NamedFile};
+use headrace_sensor::device::{Decoder, Device, DeviceKind as _, Emulated, EmulatorSetup};
+use headrace_sensor::geometry::frames::{Mount, Rot, Vec3};
+use headrace_sensor::geometry::site::Site;
+use headrace_sensor::geometry::time::{DurNs, MonoNs};
+use headrace_sensor::measurement::Inertia;
+use headrace_sensor::reading::{Decoded, Packet, Reading};
 use proptest::prelude::*;
 
 use super::decoder::DbcDecoder;
@@ -407,7 +406,7 @@ fn configured(own: &str) -> Result<Box<dyn Device>, String> {
     let root = Document::new("v.toml", own).root().unwrap().with_files(&load);
     let device = Kind.configure(&sensor, &root).map_err(|error| error.to_string())?;
     root.finish().map_err(|error| error.to_string())?;
-    device.build(&mut App::new(Mission::new(named::circle(2.5).unwrap(), 0.5))).unwrap();
+    assert_eq!(device.specification().sensor, sensor);
     Ok(device)
 }
 

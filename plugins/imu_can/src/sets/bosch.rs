@@ -72,7 +72,7 @@ impl RawAcceleration {
 }
 
 fn raw(value: f64, quantum: f64, offset: f64) -> u16 {
-    let raw = headrace_core::math::round_to_i64((value - offset) / quantum);
+    let raw = headrace_sensor::geometry::math::round_to_i64((value - offset) / quantum);
     u16::try_from(raw.clamp(0, i64::from(u16::MAX))).unwrap_or_default()
 }
 

@@ -176,11 +176,11 @@ pub(crate) fn acceleration_raw(mps2: f64) -> u16 {
 
 /// An angle in degrees as on the wire.
 pub(crate) fn slope_raw(deg: f64) -> u32 {
-    let raw = headrace_core::math::round_to_i64((deg - ANGLE_OFFSET_DEG) / SLOPE_QUANTUM_DEG);
+    let raw = headrace_sensor::geometry::math::round_to_i64((deg - ANGLE_OFFSET_DEG) / SLOPE_QUANTUM_DEG);
     u32::try_from(raw.clamp(0, 0xFD_FFFF)).unwrap_or_default()
 }
 
 fn raw(value: f64, quantum: f64, offset: f64) -> u16 {
-    let raw = headrace_core::math::round_to_i64((value - offset) / quantum);
+    let raw = headrace_sensor::geometry::math::round_to_i64((value - offset) / quantum);
     u16::try_from(raw.clamp(0, 0xFDFF)).unwrap_or_default()
 }

@@ -1,6 +1,6 @@
 //! Little-endian fields of a payload: read with a check, written with a bound.
 
-use headrace_core::codec::{Bytes, TooLong};
+use headrace_sensor::codec::{Bytes, TooLong};
 
 use super::MAX_PAYLOAD_BYTES;
 

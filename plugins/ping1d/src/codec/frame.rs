@@ -2,7 +2,7 @@
 //!
 //! Source: Ping protocol, packet format. All numbers are little-endian.
 
-use headrace_core::codec::{Bytes, TooLong, Verdict};
+use headrace_sensor::codec::{Bytes, TooLong, Verdict};
 
 /// The longest frame that is taken. The protocol itself allows 65 545 bytes, but no echosounder comes near this.
 pub const MAX_FRAME_BYTES: usize = 4096;

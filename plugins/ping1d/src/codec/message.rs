@@ -2,7 +2,7 @@
 //!
 //! Source: Ping protocol, common and ping1d messages.
 
-use headrace_core::codec::{Bytes, TooLong};
+use headrace_sensor::codec::{Bytes, TooLong};
 
 use super::fields::{Field, Payload, record};
 use super::{Frame, MAX_PAYLOAD_BYTES};

@@ -4,7 +4,7 @@ mod fields;
 mod frame;
 mod message;
 
-use headrace_core::codec::{Bytes, Framed, Framing, Verdict};
+use headrace_sensor::codec::{Bytes, Framed, Framing, Verdict};
 
 pub use frame::{Frame, MAX_FRAME_BYTES, MAX_PAYLOAD_BYTES};
 pub use message::{

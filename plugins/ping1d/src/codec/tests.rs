@@ -1,4 +1,4 @@
-use headrace_core::codec::{Codec as _, CodecCounts, TooLong};
+use headrace_sensor::codec::{Codec as _, CodecCounts, TooLong};
 use proptest::prelude::*;
 
 use super::*;
@@ -271,7 +271,7 @@ fn values() -> impl Strategy<Value = Addressed> {
     })
 }
 
-headrace_core::codec_contract!(
+headrace_sensor::codec_contract!(
     contract,
     codec: PingCodec::default(),
     values: values(),

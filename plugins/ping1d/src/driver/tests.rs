@@ -1,8 +1,8 @@
 //! The driver against an emulated device, on a line that may lose messages; no port, no clock.
 
-use headrace_core::app::device::{Emulator as _, EmulatorSetup};
-use headrace_core::app::measurement::Sounding;
-use headrace_core::site::Site;
+use headrace_sensor::device::{Emulator as _, EmulatorSetup};
+use headrace_sensor::geometry::site::Site;
+use headrace_sensor::measurement::Sounding;
 
 use super::*;
 use crate::emulator::PingEmulator;

@@ -1,6 +1,6 @@
-use headrace_core::app::device::Decoder as _;
-use headrace_core::app::reading::{EchoRange, Packet, Reading};
-use headrace_core::site::Site;
+use headrace_sensor::device::Decoder as _;
+use headrace_sensor::geometry::site::Site;
+use headrace_sensor::reading::{EchoRange, Packet, Reading};
 
 use super::*;
 use crate::plugin::PingDecoder;

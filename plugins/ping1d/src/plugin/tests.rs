@@ -1,7 +1,5 @@
-use headrace_core::app::Mission;
-use headrace_core::codec::Bytes;
-use headrace_core::time::MonoNs;
-use headrace_core::tunnel::named;
+use headrace_sensor::codec::Bytes;
+use headrace_sensor::geometry::time::MonoNs;
 
 use super::*;
 use crate::codec::{Profile, ScanRange};
@@ -89,11 +87,9 @@ fn a_frame_cut_short_delays_nothing_after_a_silence() {
 }
 
 #[test]
-fn an_echosounder_registers_once() {
+fn an_echosounder_says_what_it_is() {
     let ping = Ping1d { sensor: sensor(), settings: settings("").unwrap() };
-    let mut app = App::new(Mission::new(named::ceran().unwrap(), 0.5));
-    assert_eq!(ping.build(&mut app), Ok(()));
-    assert_eq!(ping.build(&mut app), Err(PluginError::DuplicateSource { id: "left".to_owned() }));
+    assert!(matches!(ping.specification().kind, SensorKind::Echosounder { .. }));
     assert!(ping.head().is_none());
 }
 

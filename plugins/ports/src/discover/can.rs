@@ -1,7 +1,7 @@
 //! CAN interfaces, as `/sys/class/net` lists them.
 
-use headrace_core::app::driver::Carrier;
-use headrace_core::config::Connect;
+use headrace_sensor::connect::Connect;
+use headrace_sensor::driver::Carrier;
 
 use super::{Found, Machine};
 use crate::remedy;

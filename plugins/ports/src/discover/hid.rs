@@ -2,8 +2,8 @@
 
 use std::fs;
 
-use headrace_core::app::driver::Carrier;
-use headrace_core::config::{Connect, UsbIdentity};
+use headrace_sensor::connect::{Connect, UsbIdentity};
+use headrace_sensor::driver::Carrier;
 
 use super::{Found, Machine, Rights};
 

@@ -1,6 +1,6 @@
 //! I2C buses, as `/sys/bus/i2c` lists them.
 
-use headrace_core::app::driver::Carrier;
+use headrace_sensor::driver::Carrier;
 
 use super::{Found, Machine, Rights};
 use crate::remedy;

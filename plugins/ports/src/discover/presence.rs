@@ -1,6 +1,6 @@
 //! Whether what a `connect` names is there and may be opened.
 
-use headrace_core::config::{Connect, SerialPort, UsbIdentity};
+use headrace_sensor::connect::{Connect, SerialPort, UsbIdentity};
 
 use super::{Machine, Rights, can, hid, i2c, serial};
 use crate::trouble::Trouble;

@@ -3,8 +3,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use headrace_core::app::driver::Carrier;
-use headrace_core::config::{Connect, SerialPort, UsbIdentity};
+use headrace_sensor::connect::{Connect, SerialPort, UsbIdentity};
+use headrace_sensor::driver::Carrier;
 
 use super::machine::text;
 use super::{Found, Machine, Rights};

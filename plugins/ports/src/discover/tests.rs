@@ -4,7 +4,7 @@ use std::fs;
 use std::os::unix::fs::{MetadataExt as _, PermissionsExt as _, symlink};
 use std::path::{Path, PathBuf};
 
-use headrace_core::config::Connect;
+use headrace_sensor::connect::Connect;
 
 use super::*;
 use crate::trouble::TroubleKind;

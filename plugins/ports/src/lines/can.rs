@@ -3,7 +3,7 @@
 use std::io;
 use std::time::Duration;
 
-use headrace_core::time::MonoNs;
+use headrace_geometry::time::MonoNs;
 use socketcan::{
     CanFrame, CanSocket, EmbeddedFrame as _, ExtendedId, Frame as _, Id, Socket as _, SocketOptions as _,
     StandardId,

@@ -3,8 +3,8 @@
 use std::io;
 use std::time::Duration;
 
-use headrace_core::config::UsbIdentity;
-use headrace_core::time::MonoNs;
+use headrace_geometry::time::MonoNs;
+use headrace_sensor::connect::UsbIdentity;
 use hidapi::{DeviceInfo, HidApi, HidDevice, HidError};
 
 use super::{Line, READ_BYTES};

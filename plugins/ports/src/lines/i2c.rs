@@ -5,7 +5,7 @@ use std::thread;
 use std::time::Duration;
 
 use embedded_hal::i2c::I2c;
-use headrace_core::time::{DurNs, MonoNs};
+use headrace_geometry::time::{DurNs, MonoNs};
 use linux_embedded_hal::I2cdev;
 
 use super::{Line, READ_BYTES};

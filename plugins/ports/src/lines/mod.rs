@@ -13,8 +13,8 @@ mod udp;
 use std::io;
 use std::time::Duration;
 
-use headrace_core::config::Connect;
-use headrace_core::time::{DurNs, MonoNs};
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_sensor::connect::Connect;
 
 use crate::trouble::Trouble;
 

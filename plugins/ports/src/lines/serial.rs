@@ -3,8 +3,8 @@
 use std::io::{self, Read as _, Write as _};
 use std::time::Duration;
 
-use headrace_core::config::{SerialPort, UsbIdentity};
-use headrace_core::time::{DurNs, MonoNs};
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_sensor::connect::{SerialPort, UsbIdentity};
 use serialport::{SerialPort as _, SerialPortType, TTYPort};
 
 use super::{Line, READ_BYTES, waited};

@@ -4,7 +4,7 @@ use std::io::{self, Read as _, Write as _};
 use std::net::{TcpStream, ToSocketAddrs as _};
 use std::time::Duration;
 
-use headrace_core::time::MonoNs;
+use headrace_geometry::time::MonoNs;
 
 use super::{Line, READ_BYTES, ReadTimeout, waited};
 use crate::clock;

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use headrace_core::frames::Rot;
-use headrace_core::time::MonoNs;
+use headrace_geometry::frames::Rot;
+use headrace_geometry::time::MonoNs;
 
 use super::clocks::{Base, Clocks};
 use super::message::{Read, Type, Values, read};
@@ -172,7 +172,7 @@ impl Feed {
         let mut beyond = 0_u64;
         for Beam { angle_rad, range_m, after_s } in &told.beams {
             let from_s = if at.1 { *after_s } else { after_s - last_s };
-            let at_ns = at.0.saturating_add_signed(headrace_core::time::DurNs::from_secs_f64(from_s).0);
+            let at_ns = at.0.saturating_add_signed(headrace_geometry::time::DurNs::from_secs_f64(from_s).0);
             let reached = |range: f64| reach_m.is_none_or(|[least, most]| (least..=most).contains(&range));
             beyond += u64::from(range_m.is_some_and(|range| !reached(range)));
             let value = Value::Beam(*angle_rad, *range_m);

@@ -1,7 +1,8 @@
 //! Which topic feeds which sensor: by a mapping, or where there is no choice.
 
-use headrace_core::app::device::Sense;
-use headrace_core::config::{ConfigError, Section, VehicleConfig};
+use headrace_config::{ConfigError, Section};
+use headrace_sensor::device::Sense;
+use headrace_vehicle::VehicleConfig;
 
 use super::clocks::Base;
 use super::feed::{Feed, Manner};

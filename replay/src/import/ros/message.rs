@@ -3,7 +3,7 @@
 //! Sources: the .msg files of ROS' common_interfaces (sensor_msgs, geometry_msgs, std_msgs), REP 103 (axes and units), REP 117 (ranges),
 //! REP 145 (inertial units).
 
-use headrace_core::app::device::Sense;
+use headrace_sensor::device::Sense;
 
 use super::points::{Beams, cloud, points, scan};
 use super::wire::{Encoding, Header, Wire};

@@ -3,7 +3,7 @@
 //! A scan turns about its own z, counted from x towards y. The head's x is that axis, its 0 (down, -z) the scan's x, its y the
 //! scan's y. A cloud's points are in the head's own frame, its beam in the plane of y and z, unless the mapping says `xy`.
 
-use headrace_core::math;
+use headrace_geometry::math;
 
 use super::message::heard;
 use super::wire::Wire;
@@ -18,7 +18,7 @@ const OFF_PLANE: f64 = 0.1;
 /// One beam.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Beam {
-    /// As [`headrace_core::app::reading::SonarReturn::angle_rad`].
+    /// As [`headrace_sensor::reading::SonarReturn::angle_rad`].
     pub(super) angle_rad: f64,
     /// `None` where nothing was heard.
     pub(super) range_m: Option<f64>,
@@ -255,7 +255,7 @@ pub(super) fn cloud(wire: &mut Wire<'_>, stamp_ns: u64) -> Option<Result<Beams, 
 mod tests {
     use core::f64::consts::FRAC_PI_2;
 
-    use headrace_core::frames::head_direction;
+    use headrace_geometry::frames::head_direction;
 
     use super::*;
 

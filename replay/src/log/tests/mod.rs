@@ -9,7 +9,7 @@ mod round_trip;
 
 use std::io::Cursor;
 
-use headrace_core::time::MonoNs;
+use headrace_geometry::time::MonoNs;
 
 use super::{LogHeader, LogReader, Loss, MessageKind, ResultChannel, SourceInfo};
 

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use headrace_core::time::DurNs;
+use headrace_geometry::time::DurNs;
 
 use super::super::{DiveLog, Every, LogError, LogWriter, Recorder, Rotation, files_of, part_path, recover};
 use super::*;

@@ -3,10 +3,10 @@
 mod bins;
 
 use bevy_ecs::prelude::{Component, Query, Res};
-use headrace_core::app::device::Sense;
-use headrace_core::app::measurement::Sounding;
-use headrace_core::config::{ConfigError, Section};
-use headrace_core::math::{self, TAU};
+use headrace_config::{ConfigError, Section};
+use headrace_geometry::math::{self, TAU};
+use headrace_sensor::device::Sense;
+use headrace_sensor::measurement::Sounding;
 
 use super::geometry::{square_to, squareness};
 use super::{Effect, EffectKind, PerSensor};

@@ -1,7 +1,7 @@
 //! Heads that don't make every step that they are told to make.
 
-use headrace_core::app::measurement::Sounding;
-use headrace_core::math::{self, TAU};
+use headrace_geometry::math::{self, TAU};
+use headrace_sensor::measurement::Sounding;
 
 /// How far a head is off its commands. Hosts command steps, not angles, so that a step that isn't made is never made up.
 #[derive(Debug, Clone, Copy, Default)]

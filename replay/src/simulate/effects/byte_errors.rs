@@ -1,9 +1,9 @@
 //! Bytes are changed, lost and made up on a line.
 
 use bevy_ecs::prelude::{Component, Query};
-use headrace_core::app::device::Direction;
-use headrace_core::config::{ConfigError, Section};
-use headrace_core::math;
+use headrace_config::{ConfigError, Section};
+use headrace_geometry::math;
+use headrace_sensor::device::Direction;
 
 use super::line_delay::SENSES;
 use super::{Effect, EffectKind, PerSensor, keys};
@@ -170,7 +170,7 @@ fn below(count: f64, which: f64) -> u8 {
 
 #[cfg(test)]
 mod tests {
-    use headrace_core::time::MonoNs;
+    use headrace_geometry::time::MonoNs;
 
     use super::*;
     use crate::simulate::testing_motion::{Bench, refusal, same_in_any_slices};

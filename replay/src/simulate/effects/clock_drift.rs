@@ -1,9 +1,9 @@
 //! Devices' clocks go wrong.
 
 use bevy_ecs::prelude::Query;
-use headrace_core::app::device::Sense;
-use headrace_core::app::measurement::{Inertia, Measurement, Payout, Pressure};
-use headrace_core::config::{ConfigError, Section};
+use headrace_config::{ConfigError, Section};
+use headrace_sensor::device::Sense;
+use headrace_sensor::measurement::{Inertia, Measurement, Payout, Pressure};
 
 use super::{Effect, EffectKind, PerSensor};
 use crate::simulate::SceneError;
@@ -74,7 +74,7 @@ fn true_times<M: Measurement>(mut devices: Query<'_, '_, (&mut Samples<M>, &Cloc
 
 #[cfg(test)]
 mod tests {
-    use headrace_core::time::DurNs;
+    use headrace_geometry::time::DurNs;
 
     use super::*;
     use crate::simulate::START;

@@ -1,7 +1,7 @@
 //! Water that flows along the tunnel.
 
-use headrace_core::config::{ConfigError, Section};
-use headrace_core::math;
+use headrace_config::{ConfigError, Section};
+use headrace_geometry::math;
 
 use super::{Effect, EffectKind, keys};
 use crate::simulate::SceneError;

@@ -1,10 +1,10 @@
 //! Depth comes in steps.
 
 use bevy_ecs::prelude::{Component, Query, Res};
-use headrace_core::app::device::Sense;
-use headrace_core::app::measurement::Pressure;
-use headrace_core::config::{ConfigError, Section};
-use headrace_core::math;
+use headrace_config::{ConfigError, Section};
+use headrace_geometry::math;
+use headrace_sensor::device::Sense;
+use headrace_sensor::measurement::Pressure;
 
 use super::{Effect, EffectKind, PerSensor};
 use crate::simulate::SceneError;
@@ -76,7 +76,7 @@ mod tests {
         let keys = format!("{wander}[effects.depth_steps]\n");
         let (plain, stepped) =
             (Bench::on(LEGS, wander).run::<Pressure>("depth"), Bench::on(LEGS, &keys).run("depth"));
-        let site = headrace_core::site::Site { surface_above_floor_m: 50.0, ..Default::default() };
+        let site = headrace_geometry::site::Site { surface_above_floor_m: 50.0, ..Default::default() };
         let mut steps = Vec::new();
         for (plain, stepped) in plain.iter().zip(&stepped) {
             let [was_m, is_m] = [plain, stepped].map(|p| site.depth_m(p.pressure_pa));

@@ -1,7 +1,7 @@
 //! Directions about a beam, and what happens to sound at a wall.
 
-use headrace_core::frames::{Tunnel, Vec3};
-use headrace_core::math;
+use headrace_geometry::frames::{Tunnel, Vec3};
+use headrace_geometry::math;
 
 /// A beam counts as along the tunnel where its direction's share along it is more than this.
 const ALONG: f64 = 0.9;

@@ -1,10 +1,10 @@
 //! Heads that stand still for a while.
 
 use bevy_ecs::prelude::{Component, Query};
-use headrace_core::app::device::Sense;
-use headrace_core::app::measurement::Sounding;
-use headrace_core::config::{ConfigError, Section};
-use headrace_core::time::{DurNs, MonoNs};
+use headrace_config::{ConfigError, Section};
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_sensor::device::Sense;
+use headrace_sensor::measurement::Sounding;
 
 use super::behind::Behind;
 use super::{Effect, EffectKind, PerSensor, keys};
@@ -114,7 +114,7 @@ fn stall(mut heads: Query<'_, '_, (&mut Samples<Sounding>, &mut HeadStalls)>) {
 
 #[cfg(test)]
 mod tests {
-    use headrace_core::math;
+    use headrace_geometry::math;
 
     use super::*;
     use crate::simulate::testing_motion::{Bench, refusal, same_in_any_slices};

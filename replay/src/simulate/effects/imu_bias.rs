@@ -1,13 +1,13 @@
 //! Biases of inertial units.
 
 use bevy_ecs::prelude::{Component, Query};
-use headrace_core::app::device::Sense;
-use headrace_core::app::measurement::Inertia;
-use headrace_core::app::reading::Level;
-use headrace_core::config::{ConfigError, Section};
-use headrace_core::frames::{Rot, Vec3};
-use headrace_core::math;
-use headrace_core::time::{DurNs, MonoNs};
+use headrace_config::{ConfigError, Section};
+use headrace_geometry::frames::{Rot, Vec3};
+use headrace_geometry::math;
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_sensor::device::Sense;
+use headrace_sensor::measurement::Inertia;
+use headrace_sensor::reading::Level;
 
 use super::{Effect, EffectKind, PerSensor, keys};
 use crate::simulate::builder::Builder;

@@ -1,11 +1,11 @@
 //! Noise of inertial units.
 
 use bevy_ecs::prelude::{Component, Query};
-use headrace_core::app::device::Sense;
-use headrace_core::app::measurement::Inertia;
-use headrace_core::config::{ConfigError, Section};
-use headrace_core::frames::{Rot, Sensor, Vec3};
-use headrace_core::math;
+use headrace_config::{ConfigError, Section};
+use headrace_geometry::frames::{Rot, Sensor, Vec3};
+use headrace_geometry::math;
+use headrace_sensor::device::Sense;
+use headrace_sensor::measurement::Inertia;
 
 use super::{Effect, EffectKind, PerSensor, keys};
 use crate::simulate::SceneError;

@@ -3,13 +3,13 @@
 mod pings;
 
 use bevy_ecs::prelude::{Component, Query, Res};
-use headrace_core::app::device::Sense;
-use headrace_core::app::measurement::Sounding;
-use headrace_core::config::{ConfigError, Section};
-use headrace_core::frames::{Point3, Tunnel};
-use headrace_core::math;
-use headrace_core::sampling::head::HeadSpec;
-use headrace_core::time::MonoNs;
+use headrace_config::{ConfigError, Section};
+use headrace_geometry::frames::{Point3, Tunnel};
+use headrace_geometry::math;
+use headrace_geometry::time::MonoNs;
+use headrace_sampling::head::HeadSpec;
+use headrace_sensor::device::Sense;
+use headrace_sensor::measurement::Sounding;
 
 use super::geometry::between_rad;
 use super::occlusion::Stopped;

@@ -2,7 +2,7 @@
 
 use std::ops::RangeInclusive;
 
-use headrace_core::config::{ConfigError, Section};
+use headrace_config::{ConfigError, Section};
 
 /// The table of an effect that is for the vehicle or the tunnel, not for sensors one by one.
 ///

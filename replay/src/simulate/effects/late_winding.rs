@@ -1,10 +1,10 @@
 //! The tender winds late, and in bursts.
 
 use bevy_ecs::prelude::{Component, Query};
-use headrace_core::app::device::Sense;
-use headrace_core::app::measurement::Payout;
-use headrace_core::config::{ConfigError, Section};
-use headrace_core::time::MonoNs;
+use headrace_config::{ConfigError, Section};
+use headrace_geometry::time::MonoNs;
+use headrace_sensor::device::Sense;
+use headrace_sensor::measurement::Payout;
 
 use super::{Effect, EffectKind, PerSensor};
 use crate::simulate::SceneError;
@@ -89,8 +89,8 @@ impl LateWinding {
 
 #[cfg(test)]
 mod tests {
-    use headrace_core::math;
-    use headrace_core::time::DurNs;
+    use headrace_geometry::math;
+    use headrace_geometry::time::DurNs;
 
     use super::*;
     use crate::simulate::START;

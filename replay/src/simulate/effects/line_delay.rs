@@ -1,10 +1,10 @@
 //! Messages come late.
 
 use bevy_ecs::prelude::{Component, Query};
-use headrace_core::app::device::{Direction, Sense};
-use headrace_core::config::{ConfigError, Section};
-use headrace_core::math;
-use headrace_core::time::{DurNs, MonoNs};
+use headrace_config::{ConfigError, Section};
+use headrace_geometry::math;
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_sensor::device::{Direction, Sense};
 
 use super::{Effect, EffectKind, PerSensor, keys};
 use crate::simulate::SceneError;

@@ -1,12 +1,12 @@
 //! Steel in the lining pulls compasses.
 
 use bevy_ecs::prelude::{Component, Query, Res};
-use headrace_core::app::device::Sense;
-use headrace_core::app::measurement::Inertia;
-use headrace_core::app::reading::Level;
-use headrace_core::config::{ConfigError, Section};
-use headrace_core::frames::Rot;
-use headrace_core::math;
+use headrace_config::{ConfigError, Section};
+use headrace_geometry::frames::Rot;
+use headrace_geometry::math;
+use headrace_sensor::device::Sense;
+use headrace_sensor::measurement::Inertia;
+use headrace_sensor::reading::Level;
 
 use super::targets::targets;
 use super::{Effect, EffectKind, keys};

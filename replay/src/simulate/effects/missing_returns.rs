@@ -1,10 +1,10 @@
 //! Some pings come back with nothing.
 
 use bevy_ecs::prelude::{Component, Query};
-use headrace_core::app::device::Sense;
-use headrace_core::app::measurement::Sounding;
-use headrace_core::config::{ConfigError, Section};
-use headrace_core::math;
+use headrace_config::{ConfigError, Section};
+use headrace_geometry::math;
+use headrace_sensor::device::Sense;
+use headrace_sensor::measurement::Sounding;
 
 use super::geometry::squareness;
 use super::occlusion::Stopped;
@@ -233,7 +233,7 @@ mod tests {
         let mut bands = [(0, 0, 0.0); 10];
         for row in &dive.dive(effects).rows {
             let (hit, _) = row.wall().unwrap();
-            let headrace_core::app::measurement::Sounding { angle_rad, range_m, .. } =
+            let headrace_sensor::measurement::Sounding { angle_rad, range_m, .. } =
                 row.sounding.unwrap().measured;
             // A wall of the rectangle: incidence from the angle to the nearest axis.
             let across = math::sin(angle_rad).abs();

@@ -37,7 +37,7 @@ mod tether_quantum;
 mod tether_slack;
 mod tether_slip;
 
-use headrace_core::config::{ConfigError, Section};
+use headrace_config::{ConfigError, Section};
 
 use super::SceneError;
 use super::builder::{Builder, Programs};

@@ -1,7 +1,7 @@
 //! Heads look from where the vehicle is at each ping.
 
-use headrace_core::app::device::Sense;
-use headrace_core::config::{ConfigError, Section};
+use headrace_config::{ConfigError, Section};
+use headrace_sensor::device::Sense;
 
 use super::targets::targets;
 use super::{Effect, EffectKind};

@@ -1,9 +1,9 @@
 //! Some echoes come by way of two walls.
 
 use bevy_ecs::prelude::{Component, Query, Res};
-use headrace_core::app::device::Sense;
-use headrace_core::app::measurement::Sounding;
-use headrace_core::config::{ConfigError, Section};
+use headrace_config::{ConfigError, Section};
+use headrace_sensor::device::Sense;
+use headrace_sensor::measurement::Sounding;
 
 use super::geometry::{mirrored, squareness};
 use super::occlusion::Stopped;
@@ -108,9 +108,9 @@ fn bounce(scenery: Res<'_, Scenery>, mut sonars: Query<'_, '_, Bouncing<'_>>) {
 
 #[cfg(test)]
 mod tests {
-    use headrace_core::frames::{Point3, Vec3};
-    use headrace_core::math;
-    use headrace_core::tunnel::named;
+    use headrace_geometry::frames::{Point3, Vec3};
+    use headrace_geometry::math;
+    use headrace_geometry::tunnel::shapes;
 
     use super::*;
     use crate::simulate::testing::{Dive, assert_share};
@@ -125,7 +125,7 @@ mod tests {
     #[test]
     fn verif_in_a_rectangle_the_way_is_that_to_an_image() {
         let (half_width_m, height_m, [y, z]) = (3.0, 5.0, [0.7, 2.1]);
-        let room = Surroundings::straight(named::rectangle(2.0 * half_width_m, height_m).unwrap());
+        let room = Surroundings::straight(shapes::rectangle(2.0 * half_width_m, height_m).unwrap());
         for k in 0..720 {
             let angle_rad = (f64::from(k) + 0.37) * math::TAU / 720.0;
             let ray = cast(&room, [y, z], angle_rad);
@@ -153,7 +153,7 @@ mod tests {
     #[test]
     fn verif_in_a_circle_the_second_way_is_a_chord_of_the_same_incidence() {
         let (radius_m, out_m) = (4.0, 1.5);
-        let pipe = Surroundings::straight(named::circle(radius_m).unwrap());
+        let pipe = Surroundings::straight(shapes::circle(radius_m).unwrap());
         // The circle stands on the floor: its centre is a radius above it.
         for k in 0..720 {
             let angle_rad = (f64::from(k) + 0.37) * math::TAU / 720.0;

@@ -1,11 +1,11 @@
 //! Parts of the vehicle stand in the beams' way.
 
 use bevy_ecs::prelude::{Component, Query};
-use headrace_core::app::device::Sense;
-use headrace_core::app::measurement::Sounding;
-use headrace_core::config::{ConfigError, Section};
-use headrace_core::frames::{Body, Mount, Vec3, head_direction};
-use headrace_core::sampling::occlusion::Obstacle;
+use headrace_config::{ConfigError, Section};
+use headrace_geometry::frames::{Body, Mount, Vec3, head_direction};
+use headrace_sampling::occlusion::Obstacle;
+use headrace_sensor::device::Sense;
+use headrace_sensor::measurement::Sounding;
 
 use super::{Effect, EffectKind, PerSensor};
 use crate::simulate::SceneError;
@@ -147,7 +147,7 @@ fn stop(mut sonars: Query<'_, '_, Occluded<'_>>) {
 
 #[cfg(test)]
 mod tests {
-    use headrace_core::math;
+    use headrace_geometry::math;
 
     use crate::simulate::testing::Dive;
 

@@ -1,9 +1,9 @@
 //! Some returns have nothing to do with the wall.
 
 use bevy_ecs::prelude::{Component, Query};
-use headrace_core::app::device::Sense;
-use headrace_core::app::measurement::Sounding;
-use headrace_core::config::{ConfigError, Section};
+use headrace_config::{ConfigError, Section};
+use headrace_sensor::device::Sense;
+use headrace_sensor::measurement::Sounding;
 
 use super::{Effect, EffectKind, PerSensor};
 use crate::simulate::SceneError;
@@ -97,7 +97,7 @@ fn stray(mut sonars: Query<'_, '_, (&mut Samples<Sounding>, &Outliers)>) {
 
 #[cfg(test)]
 mod tests {
-    use headrace_core::math;
+    use headrace_geometry::math;
 
     use crate::simulate::testing::{Dive, assert_share};
 

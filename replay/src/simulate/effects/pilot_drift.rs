@@ -1,6 +1,6 @@
 //! The vehicle wanders about its way.
 
-use headrace_core::config::{ConfigError, Section};
+use headrace_config::{ConfigError, Section};
 
 use super::{Effect, EffectKind, keys};
 use crate::simulate::SceneError;
@@ -66,7 +66,7 @@ impl Effect for Drift {
 
 #[cfg(test)]
 mod tests {
-    use headrace_core::math;
+    use headrace_geometry::math;
 
     use crate::simulate::testing_motion::{Bench, LONG};
 

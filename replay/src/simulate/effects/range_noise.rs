@@ -1,9 +1,9 @@
 //! Ranges scatter about the true one.
 
 use bevy_ecs::prelude::{Component, Query};
-use headrace_core::app::device::Sense;
-use headrace_core::app::measurement::Sounding;
-use headrace_core::config::{ConfigError, Section};
+use headrace_config::{ConfigError, Section};
+use headrace_sensor::device::Sense;
+use headrace_sensor::measurement::Sounding;
 
 use super::{Effect, EffectKind, PerSensor};
 use crate::simulate::SceneError;

@@ -1,10 +1,10 @@
 //! Ranges come in steps.
 
 use bevy_ecs::prelude::{Component, Query, Res};
-use headrace_core::app::device::Sense;
-use headrace_core::app::measurement::Sounding;
-use headrace_core::config::{ConfigError, Section};
-use headrace_core::math;
+use headrace_config::{ConfigError, Section};
+use headrace_geometry::math;
+use headrace_sensor::device::Sense;
+use headrace_sensor::measurement::Sounding;
 
 use super::targets::targets;
 use super::{Effect, EffectKind, PerSensor};
@@ -95,7 +95,7 @@ fn round(scenery: Res<'_, Scenery>, mut sonars: Query<'_, '_, Stepped<'_>>) {
 
 #[cfg(test)]
 mod tests {
-    use headrace_core::math;
+    use headrace_geometry::math;
 
     use crate::simulate::testing::Dive;
 

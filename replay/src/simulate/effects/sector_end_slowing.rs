@@ -1,11 +1,11 @@
 //! Heads turn round softly at the ends of their sectors.
 
 use bevy_ecs::prelude::{Component, Query};
-use headrace_core::app::device::Sense;
-use headrace_core::app::measurement::Sounding;
-use headrace_core::config::{ConfigError, Section};
-use headrace_core::math::{self, TAU};
-use headrace_core::time::MonoNs;
+use headrace_config::{ConfigError, Section};
+use headrace_geometry::math::{self, TAU};
+use headrace_geometry::time::MonoNs;
+use headrace_sensor::device::Sense;
+use headrace_sensor::measurement::Sounding;
 
 use super::targets::targets;
 use super::{Effect, EffectKind, PerSensor};

@@ -1,11 +1,11 @@
 //! Sound goes out, and is heard, beside the beam.
 
 use bevy_ecs::prelude::{Component, Query, Res};
-use headrace_core::app::device::Sense;
-use headrace_core::app::measurement::Sounding;
-use headrace_core::config::{ConfigError, Section};
-use headrace_core::frames::{Tunnel, Vec3};
-use headrace_core::math;
+use headrace_config::{ConfigError, Section};
+use headrace_geometry::frames::{Tunnel, Vec3};
+use headrace_geometry::math;
+use headrace_sensor::device::Sense;
+use headrace_sensor::measurement::Sounding;
 
 use super::geometry::{square_to, squareness};
 use super::occlusion::Stopped;

@@ -1,9 +1,9 @@
 //! Steps that a head is told to make, but doesn't.
 
 use bevy_ecs::prelude::{Component, Query};
-use headrace_core::app::device::Sense;
-use headrace_core::app::measurement::Sounding;
-use headrace_core::config::{ConfigError, Section};
+use headrace_config::{ConfigError, Section};
+use headrace_sensor::device::Sense;
+use headrace_sensor::measurement::Sounding;
 
 use super::behind::Behind;
 use super::{Effect, EffectKind, PerSensor, keys};
@@ -76,7 +76,7 @@ fn skip(mut heads: Query<'_, '_, (&mut Samples<Sounding>, &mut SkippedSteps)>) {
 
 #[cfg(test)]
 mod tests {
-    use headrace_core::math;
+    use headrace_geometry::math;
 
     use super::*;
     use crate::simulate::testing_motion::{Bench, refusal, same_in_any_slices};

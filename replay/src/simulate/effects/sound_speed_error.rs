@@ -1,9 +1,9 @@
 //! Sound is faster or slower in the water than those believe who set the vehicle up.
 
 use bevy_ecs::prelude::{Component, Query};
-use headrace_core::app::device::Sense;
-use headrace_core::app::measurement::Sounding;
-use headrace_core::config::{ConfigError, Section};
+use headrace_config::{ConfigError, Section};
+use headrace_sensor::device::Sense;
+use headrace_sensor::measurement::Sounding;
 
 use super::{Effect, EffectKind, PerSensor};
 use crate::simulate::SceneError;

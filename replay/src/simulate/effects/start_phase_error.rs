@@ -1,9 +1,9 @@
 //! Heads begin off their planned phase.
 
-use headrace_core::app::device::Sense;
-use headrace_core::config::{ConfigError, Section};
-use headrace_core::math::{self, TAU};
-use headrace_core::sampling::head::HeadProgram;
+use headrace_config::{ConfigError, Section};
+use headrace_geometry::math::{self, TAU};
+use headrace_sampling::head::HeadProgram;
+use headrace_sensor::device::Sense;
 
 use super::targets::targets;
 use super::{Effect, EffectKind, PerSensor};
@@ -47,7 +47,7 @@ fn offset(table: &Section<'_>, facts: &Facts) -> Result<Offset, ConfigError> {
     let degrees = |key, most: f64| table.number(key, 0.0..=most).map(|deg| deg.map(f64::to_radians));
     let given = table.numbers("offsets_deg", -360.0..=360.0)?;
     match (degrees("max_deg", 180.0)?, degrees("sd_deg", 180.0)?, given) {
-        (None, None, None) => Ok(Offset::Even { max_rad: headrace_core::math::PI }),
+        (None, None, None) => Ok(Offset::Even { max_rad: headrace_geometry::math::PI }),
         (Some(max_rad), None, None) => Ok(Offset::Even { max_rad }),
         (None, Some(sd_rad), None) => Ok(Offset::Normal { sd_rad }),
         (None, None, Some(given)) => {
@@ -101,7 +101,7 @@ fn begun_off(program: HeadProgram, off_rad: f64) -> HeadProgram {
 
 #[cfg(test)]
 mod tests {
-    use headrace_core::app::measurement::Sounding;
+    use headrace_sensor::measurement::Sounding;
 
     use super::*;
     use crate::simulate::testing_motion::{Bench, refusal};
@@ -150,7 +150,7 @@ mod tests {
             let most = angles.iter().fold(0.0, |most: f64, angle| most.max(angle.abs()));
             (mean, angles.iter().map(|a| a * a).sum::<f64>() / n, most)
         };
-        let tolerance = 5.0 / headrace_core::math::sqrt(count as f64);
+        let tolerance = 5.0 / headrace_geometry::math::sqrt(count as f64);
         let (mean, variance, most) = angles(Offset::Even { max_rad: 0.3 });
         assert!(mean.abs() < 0.3 * tolerance && most <= 0.3 && (variance / 0.03 - 1.0).abs() < tolerance);
         let (mean, variance, _) = angles(Offset::Normal { sd_rad: 0.2 });

@@ -1,7 +1,7 @@
 //! Which sensors an effect is for.
 
-use headrace_core::app::device::Sense;
-use headrace_core::config::{ConfigError, Section};
+use headrace_config::{ConfigError, Section};
+use headrace_sensor::device::Sense;
 
 use crate::simulate::scene::Facts;
 

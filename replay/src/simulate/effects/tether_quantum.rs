@@ -1,10 +1,10 @@
 //! The cable counter counts in steps.
 
 use bevy_ecs::prelude::{Component, Query};
-use headrace_core::app::device::Sense;
-use headrace_core::app::measurement::Payout;
-use headrace_core::config::{ConfigError, Section};
-use headrace_core::math;
+use headrace_config::{ConfigError, Section};
+use headrace_geometry::math;
+use headrace_sensor::device::Sense;
+use headrace_sensor::measurement::Payout;
 
 use super::{Effect, EffectKind, PerSensor};
 use crate::simulate::SceneError;

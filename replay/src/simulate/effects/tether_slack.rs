@@ -1,9 +1,9 @@
 //! The cable hangs slack, now more, now less.
 
 use bevy_ecs::prelude::{Component, Query};
-use headrace_core::app::device::Sense;
-use headrace_core::app::measurement::Payout;
-use headrace_core::config::{ConfigError, Section};
+use headrace_config::{ConfigError, Section};
+use headrace_sensor::device::Sense;
+use headrace_sensor::measurement::Payout;
 
 use super::{Effect, EffectKind, PerSensor};
 use crate::simulate::builder::Builder;
@@ -73,7 +73,7 @@ fn hang(mut counters: Query<'_, '_, (&mut Samples<Payout>, &TetherSlack)>) {
 
 #[cfg(test)]
 mod tests {
-    use headrace_core::math;
+    use headrace_geometry::math;
 
     use super::*;
     use crate::simulate::testing_motion::{Bench, LONG, refusal, same_in_any_slices};

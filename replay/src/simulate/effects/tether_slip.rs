@@ -1,9 +1,9 @@
 //! Cable slips over the counter's wheel.
 
 use bevy_ecs::prelude::{Component, Query, Res};
-use headrace_core::app::device::Sense;
-use headrace_core::app::measurement::Payout;
-use headrace_core::config::{ConfigError, Section};
+use headrace_config::{ConfigError, Section};
+use headrace_sensor::device::Sense;
+use headrace_sensor::measurement::Payout;
 
 use super::{Effect, EffectKind, PerSensor, keys};
 use crate::simulate::SceneError;
@@ -116,7 +116,7 @@ impl TetherSlip {
 
 #[cfg(test)]
 mod tests {
-    use headrace_core::math;
+    use headrace_geometry::math;
 
     use super::*;
     use crate::simulate::testing_motion::{Bench, refusal, same_in_any_slices};

@@ -4,10 +4,10 @@
 //! no more than half a turn between any two places. Hence it comes nowhere near itself, each place of the tunnel has one
 //! nearest place of the axis, and along a straight line through the tunnel chainage only grows or only falls.
 
-use headrace_core::config::{ConfigError, Section};
-use headrace_core::frames::{Point3, Tunnel};
-use headrace_core::math::{self, PI};
-use headrace_core::tunnel::Yz;
+use headrace_config::{ConfigError, Section};
+use headrace_geometry::frames::{Point3, Tunnel};
+use headrace_geometry::math::{self, PI};
+use headrace_geometry::tunnel::Yz;
 
 /// Radius of a bend, in half-widths of the tunnel, at least.
 pub(super) const LEAST_RADIUS_HALF_WIDTHS: f64 = 2.0;

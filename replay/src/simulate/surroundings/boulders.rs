@@ -1,7 +1,7 @@
 //! Boulders: one, many, or the pieces of a heap.
 
-use headrace_core::config::{ConfigError, Section};
-use headrace_core::math::{self, TAU};
+use headrace_config::{ConfigError, Section};
+use headrace_geometry::math::{self, TAU};
 
 use super::features::{self, Ground, Placed};
 use super::heaps::{self, Heap};

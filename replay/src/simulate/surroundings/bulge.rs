@@ -1,6 +1,6 @@
 //! Where the wall isn't on the profile: displaced towards the reference point, or away from it.
 
-use headrace_core::math::{self, PI};
+use headrace_geometry::math::{self, PI};
 
 /// A displaced patch of wall, a raised cosine along the tunnel and along the wall.
 ///

@@ -1,7 +1,7 @@
 //! The `[[tunnel.features]]` of a scene.
 
-use headrace_core::config::{ConfigError, Section};
-use headrace_core::tunnel::Profile;
+use headrace_config::{ConfigError, Section};
+use headrace_geometry::tunnel::Profile;
 
 use super::axis::Axis;
 use super::heaps::Heap;

@@ -1,8 +1,8 @@
 //! Features that displace the wall: bulges, falls of the vault, heaps of debris.
 
-use headrace_core::config::{ConfigError, Section};
-use headrace_core::math;
-use headrace_core::tunnel::Profile;
+use headrace_config::{ConfigError, Section};
+use headrace_geometry::math;
+use headrace_geometry::tunnel::Profile;
 
 use super::axis::LEAST_RADIUS_HALF_WIDTHS;
 use super::bulge::Bulge;

@@ -1,6 +1,6 @@
 //! What is near a stretch of chainage, found without looking at the rest.
 
-use headrace_core::math;
+use headrace_geometry::math;
 
 /// Things by the metres of chainage that they reach into.
 #[derive(Debug, Clone, Default)]

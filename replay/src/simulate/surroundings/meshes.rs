@@ -4,9 +4,9 @@
 
 use std::sync::Arc;
 
-use headrace_core::config::{ConfigError, Section};
-use headrace_core::math;
-use headrace_core::tunnel::Yz;
+use headrace_config::{ConfigError, Section};
+use headrace_geometry::math;
+use headrace_geometry::tunnel::Yz;
 
 use super::bulge::Bulge;
 use super::features::{self, Kind, Placed, Site};

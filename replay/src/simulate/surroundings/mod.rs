@@ -24,10 +24,11 @@ mod steepness;
 mod tube;
 mod vector;
 
-use headrace_core::config::vehicle::{Loader, TunnelConfig};
-use headrace_core::config::{ConfigError, Section};
-use headrace_core::frames::{Point3, Tunnel, Vec3};
-use headrace_core::tunnel::Profile;
+use headrace_config::Loader;
+use headrace_config::{ConfigError, Section};
+use headrace_geometry::frames::{Point3, Tunnel, Vec3};
+use headrace_geometry::tunnel::Profile;
+use headrace_vehicle::TunnelConfig;
 
 pub use axis::Axis;
 

@@ -1,6 +1,6 @@
 //! In place of `meshes.rs` in a build without the feature `mesh`: there are none, and a scene that has one is refused.
 
-use headrace_core::config::{ConfigError, Section};
+use headrace_config::{ConfigError, Section};
 
 use super::bulge::Bulge;
 use super::features::{self, Kind, Placed, Site};

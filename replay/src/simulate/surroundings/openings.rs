@@ -1,7 +1,7 @@
 //! Hollows that open from the tunnel: rock traps, side tunnels, the slots of gates.
 
-use headrace_core::config::{ConfigError, Section};
-use headrace_core::math;
+use headrace_config::{ConfigError, Section};
+use headrace_geometry::math;
 
 use super::features::{self, Ground, Placed};
 use super::shapes::{Hollow, Ring, Solid};

@@ -3,8 +3,8 @@
 //! A body offers where a ray first meets it, a hollow how far a ray that is inside it goes. A shape of another kind is a
 //! variant more of [`Solid`] or [`Hollow`].
 
-use headrace_core::math;
-use headrace_core::tunnel::{Profile, Yz};
+use headrace_geometry::math;
+use headrace_geometry::tunnel::{Profile, Yz};
 
 use super::axis::Station;
 #[cfg(feature = "mesh")]

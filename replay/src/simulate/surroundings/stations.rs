@@ -1,6 +1,6 @@
 //! How the profile's size changes along the tunnel.
 
-use headrace_core::config::{ConfigError, Section};
+use headrace_config::{ConfigError, Section};
 
 /// The wall may move by as much as this along the ray from the floor's centre, for each metre of chainage.
 const STEEPEST: f64 = 1.0;

@@ -1,7 +1,7 @@
 //! How fast the gauge of a place can change: the bound by which rays are followed.
 
-use headrace_core::math::{self, TAU};
-use headrace_core::tunnel::Profile;
+use headrace_geometry::math::{self, TAU};
+use headrace_geometry::tunnel::Profile;
 
 use super::bulge::Bulge;
 

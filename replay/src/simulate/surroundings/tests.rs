@@ -1,9 +1,9 @@
 //! Scenes as text, numbers that look random, and the tests by what they are about.
 
-use headrace_core::config::Document;
-use headrace_core::frames::{Point3, Vec3};
-use headrace_core::math;
-use headrace_core::tunnel::named;
+use headrace_config::Document;
+use headrace_geometry::frames::{Point3, Vec3};
+use headrace_geometry::math;
+use headrace_geometry::tunnel::shapes;
 
 use super::*;
 

@@ -9,8 +9,8 @@
 //! Where a mesh is the wall, it has a stretch to itself. The planes across its ends are wall, too, where water on one side
 //! meets rock on the other, so that nothing gets out where profile and mesh don't fit.
 
-use headrace_core::math;
-use headrace_core::tunnel::{Profile, Yz};
+use headrace_geometry::math;
+use headrace_geometry::tunnel::{Profile, Yz};
 
 use super::axis::{Axis, Piece, Station};
 use super::bulge::Bulge;
@@ -374,7 +374,7 @@ impl Tube {
     }
 
     /// The profile's wall beyond an unscaled place, seen from the reference point; its distance from there, m.
-    fn outwards(&self, unscaled: Yz) -> Option<(headrace_core::tunnel::WallHit, f64)> {
+    fn outwards(&self, unscaled: Yz) -> Option<(headrace_geometry::tunnel::WallHit, f64)> {
         let [ry, rz] = self.profile.reference();
         let out = [unscaled[0] - ry, unscaled[1] - rz];
         let hit = self.profile.cast_from_inside([ry, rz], out)?;

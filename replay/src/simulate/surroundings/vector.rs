@@ -1,6 +1,6 @@
 //! Rays and the few operations on places that casting them takes.
 
-use headrace_core::math;
+use headrace_geometry::math;
 
 /// A place or direction in the tunnel's frame, m.
 pub(super) type V3 = [f64; 3];

@@ -1,6 +1,6 @@
 //! Smooth motion through knots at equal times: uniform cubic B-splines, whose acceleration has no jumps.
 
-use headrace_core::math;
+use headrace_geometry::math;
 
 use crate::simulate::random::Stream;
 

@@ -2,9 +2,9 @@
 
 use std::ops::RangeInclusive;
 
-use headrace_core::config::vehicle::Loader;
-use headrace_core::config::{ConfigError, Section};
-use headrace_core::tunnel::Profile;
+use headrace_config::Loader;
+use headrace_config::{ConfigError, Section};
+use headrace_geometry::tunnel::Profile;
 
 use super::pilot::{Pilot, Piloted};
 use super::waypoints::{self, Waypoint};

@@ -1,6 +1,6 @@
 //! A pilot at the joystick: goes, stops, goes back to look again, and wanders all the while.
 
-use headrace_core::math;
+use headrace_geometry::math;
 
 use super::{Knots, Offsets, Place, wandering};
 use crate::simulate::random::Stream;

@@ -1,6 +1,6 @@
 //! A way that was recorded: a line for each moment.
 
-use headrace_core::math;
+use headrace_geometry::math;
 
 use super::waypoints::through;
 use super::{Knots, Offsets};

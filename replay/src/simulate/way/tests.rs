@@ -1,5 +1,6 @@
-use headrace_core::config::{Document, TunnelConfig};
-use headrace_core::math;
+use headrace_config::Document;
+use headrace_geometry::math;
+use headrace_vehicle::TunnelConfig;
 
 use super::*;
 use crate::simulate::random::Stream;

@@ -1,6 +1,6 @@
 //! From waypoint to waypoint, at one speed on each stretch.
 
-use headrace_core::math;
+use headrace_geometry::math;
 
 use super::{Knots, Offsets};
 

@@ -1,4 +1,4 @@
-use headrace_core::codec::Codec as _;
+use headrace_sensor::codec::Codec as _;
 use proptest::prelude::*;
 
 use super::*;
@@ -148,7 +148,7 @@ prop_compose! {
     }
 }
 
-headrace_core::codec_contract!(
+headrace_sensor::codec_contract!(
     contract,
     codec: CommandCodec::default(),
     values: commands(),

@@ -1,4 +1,4 @@
-use headrace_core::codec::Codec as _;
+use headrace_sensor::codec::Codec as _;
 use proptest::prelude::*;
 
 use super::*;
@@ -160,7 +160,7 @@ proptest! {
     }
 }
 
-headrace_core::codec_contract!(
+headrace_sensor::codec_contract!(
     contract_of_profiles,
     codec: ReturnCodec::default(),
     values: profiles(),
@@ -168,7 +168,7 @@ headrace_core::codec_contract!(
     frames: [EXAMPLE_4, EXAMPLE_5, EXAMPLE_6],
 );
 
-headrace_core::codec_contract!(
+headrace_sensor::codec_contract!(
     contract_of_echoes,
     codec: ReturnCodec::default(),
     values: echoes(),

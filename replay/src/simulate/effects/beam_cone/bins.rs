@@ -1,6 +1,6 @@
 //! Strength of a ping's echo over bins of range.
 
-use headrace_core::math;
+use headrace_geometry::math;
 
 /// Strengths over bins of equal width, centred on its multiples.
 ///

@@ -1,6 +1,6 @@
-use headrace_core::frames::{Point3, Vec3};
-use headrace_core::sampling::section::footprint_m;
-use headrace_core::tunnel::named;
+use headrace_geometry::frames::{Point3, Vec3};
+use headrace_geometry::tunnel::shapes;
+use headrace_sampling::section::footprint_m;
 
 use super::*;
 use crate::simulate::testing::Dive;
@@ -11,7 +11,7 @@ fn down(angle_rad: f64, height_m: f64) -> Ray {
 }
 
 fn wide_tunnel() -> Surroundings {
-    Surroundings::straight(named::rectangle(60.0, 20.0).unwrap())
+    Surroundings::straight(shapes::rectangle(60.0, 20.0).unwrap())
 }
 
 #[test]

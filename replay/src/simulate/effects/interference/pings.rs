@@ -1,8 +1,8 @@
 //! A head's pings as others hear them.
 
-use headrace_core::frames::{Point3, Tunnel, Vec3};
-use headrace_core::math;
-use headrace_core::time::{DurNs, MonoNs};
+use headrace_geometry::frames::{Point3, Tunnel, Vec3};
+use headrace_geometry::math;
+use headrace_geometry::time::{DurNs, MonoNs};
 
 use crate::simulate::effects::geometry::{between_rad, dot};
 use crate::simulate::sensing::Ray;

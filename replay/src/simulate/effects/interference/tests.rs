@@ -1,6 +1,6 @@
-use headrace_core::frames::{Vec3, head_direction};
-use headrace_core::time::DurNs;
-use headrace_core::tunnel::named;
+use headrace_geometry::frames::{Vec3, head_direction};
+use headrace_geometry::time::DurNs;
+use headrace_geometry::tunnel::shapes;
 
 use super::*;
 use crate::simulate::surroundings::Surroundings;
@@ -32,7 +32,7 @@ fn the_way_by_the_wall_and_the_straight_way_take_their_time() {
     let dive = pair();
     let spec = head(&dive, 0);
     let other_spec = head(&dive, 1);
-    let room = Surroundings::straight(named::rectangle(6.0, 5.0).unwrap());
+    let room = Surroundings::straight(shapes::rectangle(6.0, 5.0).unwrap());
     let scene = dive.scene("").unwrap();
     let scenery = Scenery {
         surroundings: room.clone(),

@@ -1,4 +1,4 @@
-use headrace_core::app::measurement::{Inertia, Payout, Pressure, Sounding};
+use headrace_sensor::measurement::{Inertia, Payout, Pressure, Sounding};
 
 use crate::simulate::testing_motion::{Bench, same_in_any_slices};
 

@@ -76,8 +76,8 @@ fn tables_treat_sensors_differently() {
             .map(|(was, is)| (is.unwrap() - was.unwrap()) / if by_range { was.unwrap() } else { 1.0 })
             .collect();
         let count = errors.len() as f64;
-        let sd = headrace_core::math::sqrt(errors.iter().map(|error| error * error).sum::<f64>() / count);
-        (sd, 5.0 / headrace_core::math::sqrt(2.0 * count))
+        let sd = headrace_geometry::math::sqrt(errors.iter().map(|error| error * error).sum::<f64>() / count);
+        (sd, 5.0 / headrace_geometry::math::sqrt(2.0 * count))
     };
     let ((first, allowed), (second, _)) = (off(0, false), off(1, true));
     assert!((first / 0.01 - 1.0).abs() < allowed && (second / 0.1 - 1.0).abs() < allowed);

@@ -7,7 +7,7 @@ const TEXT: &str = "[[tunnel.axis]]\nlength_m = 20\n[[tunnel.axis]]\nradius_m = 
                     [[tunnel.axis]]\nradius_m = 1000\nturn_deg = -0.5\n";
 
 fn axis() -> Axis {
-    parse(TEXT, &named::ceran().unwrap()).axis().clone()
+    parse(TEXT, &shapes::ceran().unwrap()).axis().clone()
 }
 
 #[test]
@@ -42,7 +42,7 @@ fn the_axis_is_smooth_and_its_heading_is_its_direction() {
 
 #[test]
 fn positive_turns_and_headings_are_to_the_left() {
-    let axis = parse("[[tunnel.axis]]\nradius_m = 20\nturn_deg = 90", &named::ceran().unwrap());
+    let axis = parse("[[tunnel.axis]]\nradius_m = 20\nturn_deg = 90", &shapes::ceran().unwrap());
     let end = axis.axis().place(20.0 * math::FRAC_PI_2, [0.0, 1.0]);
     assert!((end - Point3::new(20.0, 20.0, 1.0)).norm() < 1e-12);
     assert!((axis.axis().heading_rad(50.0) - math::FRAC_PI_2).abs() < 1e-12);

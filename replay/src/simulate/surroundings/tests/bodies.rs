@@ -31,7 +31,7 @@ fn a_boulder_is_an_ellipsoid_that_is_sunk_into_the_floor() {
 fn a_boulder_on_a_round_wall_leans_with_it() {
     let quarter = 3.0 * math::FRAC_PI_2;
     let text = feature("boulder", &format!("chainage_m = 10\nsize_m = 1\nsunk = 0\nsigma_m = {quarter}"));
-    let surroundings = parse(&text, &named::circle(3.0).unwrap());
+    let surroundings = parse(&text, &shapes::circle(3.0).unwrap());
     let hit = cast(&surroundings, [10.0, 0.0, 3.0], [0.0, 1.0, 0.0]).unwrap();
     assert!((hit.range_m - 2.0).abs() < 1e-12 && hit.what == What::Feature(0), "{hit:?}");
 }
@@ -53,7 +53,7 @@ fn a_rock_trap_is_a_ditch_across_the_floor() {
 #[test]
 fn a_side_tunnel_is_as_long_as_it_says() {
     let keys = "chainage_m = 10\nside = \"left\"\nwidth_m = 3\nheight_m = 2\nsill_m = 1\nlength_m = 30";
-    let surroundings = parse(&feature("side_tunnel", keys), &named::rectangle(8.0, 5.0).unwrap());
+    let surroundings = parse(&feature("side_tunnel", keys), &shapes::rectangle(8.0, 5.0).unwrap());
     let hit = cast(&surroundings, [10.0, -1.0, 2.0], [0.0, 1.0, 0.0]).unwrap();
     assert!((hit.range_m - 35.0).abs() < 1e-12 && hit.what == What::Feature(0), "{hit:?}");
     // From inside it back to the opposite wall, and to its own.
@@ -70,7 +70,7 @@ fn a_side_tunnel_is_as_long_as_it_says() {
 #[test]
 fn a_slanting_side_tunnel_leads_forwards() {
     let keys = "chainage_m = 10\nside = \"right\"\nwidth_m = 3\nheight_m = 2\nlength_m = 10\nangle_deg = 30";
-    let surroundings = parse(&feature("side_tunnel", keys), &named::rectangle(8.0, 5.0).unwrap());
+    let surroundings = parse(&feature("side_tunnel", keys), &shapes::rectangle(8.0, 5.0).unwrap());
     // Its middle line meets the wall at chainage 10.
     let (sin, cos) = math::sin_cos(math::PI / 6.0);
     let hit = cast(&surroundings, [10.0 - sin, -4.0 + cos, 1.0], [sin, -cos, 0.0]).unwrap();
@@ -93,10 +93,10 @@ fn a_gate_has_slots_and_when_closed_a_bulkhead() {
         let (y, z) = (p[1], p[2] - 3.0);
         (p[0] - 10.0).abs() <= 0.4 && y * y + z * z < 3.4 * 3.4
     }));
-    let open = parse(&feature("gate", keys), &named::circle(3.0).unwrap());
+    let open = parse(&feature("gate", keys), &shapes::circle(3.0).unwrap());
     let met = oracle.compare(&open, 34, 3_000, [8.0, 12.0]);
     assert!(met[0] > 100, "{met:?}");
-    let closed = parse(&feature("gate", &format!("{keys}\nclosed = true")), &named::circle(3.0).unwrap());
+    let closed = parse(&feature("gate", &format!("{keys}\nclosed = true")), &shapes::circle(3.0).unwrap());
     oracle.solids.push(Box::new(|p, _| (p[0] - 10.0).abs() < 0.24));
     let met = oracle.compare(&closed, 35, 3_000, [8.0, 12.0]);
     assert!(met[0] > 500, "{met:?}");

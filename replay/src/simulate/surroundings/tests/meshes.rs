@@ -10,7 +10,7 @@ const SIDES: u32 = 240;
 const SAGITTA: f64 = 8.6e-5;
 
 fn circle() -> Profile {
-    named::circle(RADIUS_M).unwrap()
+    shapes::circle(RADIUS_M).unwrap()
 }
 
 /// A prism about the circle's axis as PLY, from x = 0 to `length_m` in `rings`; without the faces told by number.

@@ -32,9 +32,9 @@ pub(super) struct Oracle {
 impl Shape {
     pub(super) fn profile(self) -> Profile {
         match self {
-            Self::Circle(radius) => named::circle(radius),
-            Self::Rectangle(width, height) => named::rectangle(width, height),
-            Self::Trimmed(radius, base) => named::trimmed_circle(radius, base),
+            Self::Circle(radius) => shapes::circle(radius),
+            Self::Rectangle(width, height) => shapes::rectangle(width, height),
+            Self::Trimmed(radius, base) => shapes::trimmed_circle(radius, base),
         }
         .unwrap()
     }

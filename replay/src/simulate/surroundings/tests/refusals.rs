@@ -4,7 +4,7 @@ use super::*;
 
 /// The error's text for a scene in the Ceran tunnel of 100 m.
 fn error(text: &str) -> String {
-    try_parse(text, &named::ceran().unwrap()).err().map_or("accepted".to_owned(), |error| error.to_string())
+    try_parse(text, &shapes::ceran().unwrap()).err().map_or("accepted".to_owned(), |error| error.to_string())
 }
 
 fn refused(text: &str, place: &str, problem: &str) {

@@ -7,7 +7,7 @@ const CERAN: Shape = Shape::Trimmed(6.05, 10.4);
 
 #[test]
 fn the_plain_case_is_the_profile_bit_for_bit() {
-    let profile = named::ceran().unwrap();
+    let profile = shapes::ceran().unwrap();
     let far_feature = "[tunnel]\n[[tunnel.features]]\nkind = \"boulder\"\nchainage_m = 90\nsize_m = 1";
     let bare = Surroundings::straight(profile.clone());
     let empty = parse("[tunnel]", &profile);
@@ -31,13 +31,13 @@ fn the_plain_case_is_the_profile_bit_for_bit() {
 #[test]
 fn another_tunnel_than_the_design_stands_as_built() {
     let text = "[tunnel.as_built]\nprofile = \"circle\"\nradius_m = 4";
-    let surroundings = parse(text, &named::ceran().unwrap());
+    let surroundings = parse(text, &shapes::ceran().unwrap());
     Oracle::new(Shape::Circle(4.0)).compare(&surroundings, 2, 1_000, [0.0, 50.0]);
     let mut oracle = Oracle::new(Shape::Circle(4.0));
     oracle.stations = vec![(10.0, 0.5), (20.0, 1.0), (40.0, 1.5)];
     let stations = "\n[[tunnel.stations]]\nchainage_m = 10\nscale = 0.5\n[[tunnel.stations]]\nchainage_m = 20\n\
                     scale = 1\n[[tunnel.stations]]\nchainage_m = 40\nscale = 1.5";
-    let surroundings = parse(&format!("{text}{stations}"), &named::ceran().unwrap());
+    let surroundings = parse(&format!("{text}{stations}"), &shapes::ceran().unwrap());
     oracle.compare(&surroundings, 3, 3_000, [0.0, 50.0]);
 }
 
@@ -81,7 +81,7 @@ fn bulges_displace_the_wall() {
 
 #[test]
 fn a_thin_bulge_is_not_skipped() {
-    let surroundings = parse(&bulge(&[10.0, 0.02, 0.0, 0.02, 0.02]), &named::ceran().unwrap());
+    let surroundings = parse(&bulge(&[10.0, 0.02, 0.0, 0.02, 0.02]), &shapes::ceran().unwrap());
     let centre = surroundings.design.reference();
     let hit = cast(&surroundings, [10.0, centre[0], centre[1]], [0.0, 0.0, -1.0]).unwrap();
     assert!((hit.range_m - (centre[1] - 0.02)).abs() < 1e-9 && hit.what == What::Feature(0), "{hit:?}");
@@ -131,7 +131,7 @@ fn bends_stations_and_bulges_together() {
 
 #[test]
 fn sigma_is_the_designs_in_the_axis_chart() {
-    let design = named::ceran().unwrap();
+    let design = shapes::ceran().unwrap();
     let surroundings =
         parse(&format!("{}[tunnel.as_built]\nprofile = \"circle\"\nradius_m = 4", bends()), &design);
     for (chainage, y, z) in [(3.0, 1.0, 0.5), (17.0, -2.0, 6.0), (40.0, 2.0, 5.0)] {

@@ -1,0 +1,307 @@
+//! Why a section failed, from what was measured while it was passed.
+//!
+//! A cause is what, taken away, would have let the section pass: each is tried on the figures of the passage. What gave no
+//! sample counts where it was aimed into the hole itself. `docs/coverage.md` has the order and its reasons.
+
+use serde::{Deserialize, Serialize};
+
+use super::hole::Hole;
+use super::passage::{Loss, Passage, lost_within};
+use crate::Reach;
+use headrace_sampling::spacing;
+
+/// The one cause that a fail is put down to. Source: metrics.md, "Sections and verdicts".
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Cause {
+    /// The distance between passes was too large at the speed driven.
+    TooFast,
+    /// The angle between pings alone leaves such holes; slower won't help.
+    AngularStep,
+    /// Returns that should have come did not.
+    MissingReturns,
+    /// The wall was farther than the heads' range setting.
+    OutOfRange,
+    /// The vehicle itself stood in the beams' way.
+    Occluded,
+    /// The vehicle was out of the middle, or turned so that its beams swung along the tunnel.
+    OffAxis,
+    /// The heads' passes were unevenly spread; evenly spread they would have met the target.
+    Phase,
+    /// A head stood still.
+    HeadStalled,
+    /// Returns came but could not be placed.
+    PositionLost,
+    /// The hole reaches beyond the stretch that was passed.
+    NotPassed,
+}
+
+impl Cause {
+    /// All of them.
+    pub const ALL: [Self; 10] = [
+        Self::TooFast,
+        Self::AngularStep,
+        Self::MissingReturns,
+        Self::OutOfRange,
+        Self::Occluded,
+        Self::OffAxis,
+        Self::Phase,
+        Self::HeadStalled,
+        Self::PositionLost,
+        Self::NotPassed,
+    ];
+
+    /// The word used in reports and logs.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::TooFast => "too_fast",
+            Self::AngularStep => "angular_step",
+            Self::MissingReturns => "missing_returns",
+            Self::OutOfRange => "out_of_range",
+            Self::Occluded => "occluded",
+            Self::OffAxis => "off_axis",
+            Self::Phase => "phase",
+            Self::HeadStalled => "head_stalled",
+            Self::PositionLost => "position_lost",
+            Self::NotPassed => "not_passed",
+        }
+    }
+
+    fn of_loss(loss: Loss) -> Self {
+        match loss {
+            Loss::Missing => Self::MissingReturns,
+            Loss::OutOfRange => Self::OutOfRange,
+            Loss::Occluded => Self::Occluded,
+        }
+    }
+}
+
+/// The figures behind a cause: means over the pings made within the section that was driven worst, of those that the hole
+/// touches; shares and counts over all of these.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Evidence {
+    /// The cause.
+    pub cause: Cause,
+    /// Speed along the tunnel, m/s.
+    pub speed_mps: f64,
+    /// Largest speed that would have met the target with the heads evenly spread, m/s; zero where none.
+    pub even_v_max_mps: f64,
+    /// Time between passes, seconds.
+    pub pass_gap_s: f64,
+    /// Time between passes had they been spread evenly, seconds.
+    pub even_pass_gap_s: f64,
+    /// The same, had all heads turned, seconds.
+    pub all_pass_gap_s: f64,
+    /// Share of pings without a return, beyond range or not.
+    pub missing_share: f64,
+    /// Share of pings that the vehicle itself stopped.
+    pub occluded_share: f64,
+    /// Share of pings of a head that stood still.
+    pub standing_share: f64,
+    /// Parts of the hole's wall, a 64th of the perimeter in a section each, at which pings were aimed in vain.
+    pub lost_in_hole: u32,
+    /// Largest distance between neighbours of one turn that geometry gives, m.
+    pub t_y_m: f64,
+    /// The same from the middle of the tunnel, level, m.
+    pub middle_t_y_m: f64,
+    /// How far the beams swung along the tunnel between two passes, m.
+    pub swing_m: f64,
+}
+
+/// A failed hole and its surroundings.
+#[derive(Debug, Clone, Copy)]
+pub struct Case<'a> {
+    /// The hole.
+    pub hole: &'a Hole,
+    /// The stretch that every head had swept by then.
+    pub swept_by_all: Option<Reach>,
+    /// Target T, m.
+    pub target_m: f64,
+    /// Perimeter of the profile, m.
+    pub perimeter_m: f64,
+}
+
+/// Names the cause of a hole from the sections that it touches, each with the chainages at which it begins and ends.
+pub fn explain<'a>(
+    case: &Case<'_>,
+    sections: &(impl Iterator<Item = ((f64, f64), &'a Passage)> + Clone),
+) -> Evidence {
+    let Case { hole, swept_by_all, target_m, perimeter_m } = *case;
+    // What makes it a fail is an empty circle of the target's size; the hole may still shrink from ahead.
+    let radius_m = hole.diameter_m.min(target_m) / 2.0;
+    let lost = lost_within(hole, radius_m, perimeter_m, sections.clone());
+    let seen = Seen::over(sections.clone().map(|(_, passage)| passage));
+    let worst = sections
+        .clone()
+        .filter(|(_, passage)| passage.placed > 0)
+        .map(|(_, passage)| Driven::of(passage))
+        .max_by(|a, b| a.t_m().total_cmp(&b.t_m()))
+        .unwrap_or_default();
+    let passed = swept_by_all
+        .is_some_and(|swept| hole.x_m - radius_m >= swept.from_m && hole.x_m + radius_m <= swept.to_m);
+    let lost_in_hole = lost.iter().sum();
+    let whole = passed && hole.bounded;
+    // A hole that is much larger than driving makes it has another cause, unless driving alone is bad enough: what was lost
+    // has then only made it larger.
+    let explained =
+        worst.t_m() * EXPLAINED > hole.diameter_m || worst.t_m() > BAD_ENOUGH * target_m && lost_in_hole > 0;
+    let driving_explains = worst.t_m() > target_m && explained;
+    let cause = if seen.is_unseen(lost_in_hole) && !driving_explains {
+        Cause::PositionLost
+    } else if seen.pings == 0 || (!whole && lost_in_hole == 0) {
+        Cause::NotPassed
+    } else if driving_explains {
+        worst.likeliest(&seen, target_m)
+    } else if let Some(loss) = most_lost(lost) {
+        Cause::of_loss(loss)
+    } else if seen.head_stood() {
+        Cause::HeadStalled
+    } else {
+        // Everything came, and none of it was aimed into the hole: samples lie where navigation has jumped.
+        Cause::PositionLost
+    };
+    let even_v_max =
+        spacing::speed_for_target_mps(target_m, worst.t_y_m, worst.even_gap_s, worst.ping_period_s);
+    Evidence {
+        cause,
+        speed_mps: worst.speed_mps,
+        even_v_max_mps: even_v_max.unwrap_or(0.0),
+        pass_gap_s: worst.gap_s,
+        even_pass_gap_s: worst.even_gap_s,
+        all_pass_gap_s: worst.all_gap_s,
+        missing_share: seen.share(seen.missing),
+        occluded_share: seen.share(seen.occluded),
+        standing_share: seen.share(seen.standing),
+        lost_in_hole,
+        t_y_m: worst.t_y_m,
+        middle_t_y_m: worst.middle_t_y_m,
+        swing_m: worst.swing_m,
+    }
+}
+
+/// The reason for which most pings into the hole were lost.
+fn most_lost(lost: [u32; Loss::ALL.len()]) -> Option<Loss> {
+    let most =
+        Loss::ALL.into_iter().zip(lost).filter(|(_, count)| *count > 0).max_by_key(|(_, count)| *count);
+    most.map(|(loss, _)| loss)
+}
+
+/// Counts over all the sections that a hole touches.
+#[derive(Debug, Clone, Copy, Default)]
+struct Seen {
+    pings: u32,
+    missing: u32,
+    occluded: u32,
+    unplaced: u32,
+    standing: u32,
+    unseen: bool,
+}
+
+/// Heads that stand still for a smaller share of the pings don't matter.
+const STANDING_SHARE: f64 = 0.02;
+/// A hole may be larger than T as driven by this factor: figures are means over a section.
+const EXPLAINED: f64 = 1.5;
+/// Beyond so many times the target, driving would have failed without anything else.
+const BAD_ENOUGH: f64 = 1.1;
+/// What leaves more of T than this when it is taken away isn't the cause.
+const HELPS: f64 = 0.99;
+
+impl Seen {
+    fn over<'a>(passages: impl Iterator<Item = &'a Passage>) -> Self {
+        passages.fold(Self::default(), |sum, passage| Self {
+            pings: sum.pings.saturating_add(passage.pings),
+            missing: sum.missing.saturating_add(passage.missing).saturating_add(passage.out_of_range),
+            occluded: sum.occluded.saturating_add(passage.occluded),
+            unplaced: sum.unplaced.saturating_add(passage.unplaced),
+            standing: sum.standing.saturating_add(passage.standing),
+            unseen: sum.unseen || passage.unseen,
+        })
+    }
+
+    fn share(&self, count: u32) -> f64 {
+        f64::from(count) / f64::from(self.pings.max(1))
+    }
+
+    fn head_stood(&self) -> bool {
+        self.share(self.standing) > STANDING_SHARE
+    }
+
+    /// Whether the vehicle's place was not known while most of what isn't there should have come.
+    fn is_unseen(&self, lost_in_hole: u32) -> bool {
+        self.unseen || self.unplaced > self.missing.max(lost_in_hole)
+    }
+}
+
+/// How a section was driven: means over its pings.
+#[derive(Debug, Clone, Copy, Default)]
+struct Driven {
+    speed_mps: f64,
+    gap_s: f64,
+    even_gap_s: f64,
+    all_gap_s: f64,
+    ping_period_s: f64,
+    swing_m: f64,
+    t_y_m: f64,
+    middle_t_y_m: f64,
+}
+
+impl Driven {
+    fn of(passage: &Passage) -> Self {
+        let mean = |sum: f64| sum / f64::from(passage.placed.max(1));
+        let t_y_m = passage.t_y_m;
+        Self {
+            speed_mps: mean(passage.speed_sum_mps),
+            gap_s: mean(passage.pass_gap_sum_s),
+            even_gap_s: mean(passage.even_gap_sum_s),
+            all_gap_s: mean(passage.all_gap_sum_s),
+            ping_period_s: mean(passage.ping_period_sum_s),
+            swing_m: mean(passage.swing_sum_m),
+            t_y_m,
+            middle_t_y_m: passage.middle_t_y_m.min(t_y_m),
+        }
+    }
+
+    /// T_max as it was driven. Source: Eq. 16, the swing added to the distance between passes.
+    fn t_m(&self) -> f64 {
+        spacing::t_max_m(
+            self.speed_mps * self.gap_s + self.swing_m,
+            self.speed_mps * self.ping_period_s,
+            self.t_y_m,
+        )
+    }
+
+    fn on_axis(&self) -> Self {
+        Self { swing_m: 0.0, t_y_m: self.middle_t_y_m, ..*self }
+    }
+
+    fn in_phase(&self) -> Self {
+        Self { gap_s: self.even_gap_s.min(self.gap_s), ..*self }
+    }
+
+    /// Where all turn already, nothing changes: their phases are another matter.
+    fn all_turning(&self) -> Self {
+        let gap_s = if self.all_gap_s < HELPS * self.even_gap_s { self.all_gap_s } else { self.gap_s };
+        Self { gap_s: gap_s.min(self.gap_s), ..*self }
+    }
+
+    /// The cause without which the target would have been met; where several are needed, the one that costs most.
+    fn likeliest(&self, seen: &Seen, target_m: f64) -> Cause {
+        if self.middle_t_y_m >= target_m {
+            return Cause::AngularStep;
+        }
+        let absent = if seen.head_stood() { Cause::HeadStalled } else { Cause::MissingReturns };
+        let without =
+            [(absent, self.all_turning()), (Cause::Phase, self.in_phase()), (Cause::OffAxis, self.on_axis())];
+        let helps = |then: &Self| then.t_m() < HELPS * self.t_m();
+        let least = |a: &(Cause, Self), b: &(Cause, Self)| a.1.t_m().total_cmp(&b.1.t_m());
+        let alone =
+            without.into_iter().filter(|(_, then)| helps(then) && then.t_m() <= target_m).min_by(least);
+        let best = Self { gap_s: self.all_gap_s.min(self.gap_s), ..self.on_axis() };
+        let together =
+            || without.into_iter().min_by(least).filter(|(_, then)| helps(then) && best.t_m() <= target_m);
+        alone.or_else(together).map_or(Cause::TooFast, |(cause, _)| cause)
+    }
+}
+
+#[cfg(test)]
+mod tests;

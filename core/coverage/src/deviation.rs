@@ -1,0 +1,132 @@
+//! How far the wall is from where the design says, section by section.
+
+use serde::{Deserialize, Serialize};
+
+use headrace_geometry::tunnel::{Profile, Yz};
+
+/// What the samples of a section say of its wall against the design profile. Beyond the design is positive.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Deviation {
+    samples: u32,
+    /// Samples farther from the design than the wall can be.
+    contradicting: u32,
+    sum_m: f64,
+    /// Farthest inside the design, m, at most zero.
+    inmost_m: f64,
+    /// Farthest beyond it, m, at least zero.
+    outmost_m: f64,
+    /// Areas between neighbouring samples of a sweep as seen from the reference point, and the same of the design, m2.
+    swept_m2: f64,
+    design_m2: f64,
+}
+
+impl Deviation {
+    /// Takes in a sample at `point`, which the design has at arc length `sigma_m`; `before` is the sample from which the
+    /// same head has come here in a single step, with its arc length. Gives how far it is beyond the design, m.
+    ///
+    /// Source: the distance along the ray from the profile's reference point, as arc length is measured.
+    pub fn add(
+        &mut self,
+        profile: &Profile,
+        (point, sigma_m): (Yz, f64),
+        before: Option<(Yz, f64)>,
+        contradiction_m: f64,
+    ) -> f64 {
+        let centre = profile.reference();
+        let design = profile.point_at(sigma_m);
+        let off_m = distance_m(centre, point) - distance_m(centre, design);
+        self.samples += 1;
+        self.contradicting += u32::from(off_m.abs() > contradiction_m);
+        self.sum_m += off_m;
+        self.inmost_m = self.inmost_m.min(off_m);
+        self.outmost_m = self.outmost_m.max(off_m);
+        if let Some((last, last_sigma_m)) = before {
+            self.swept_m2 += triangle_m2(centre, last, point);
+            self.design_m2 += triangle_m2(centre, profile.point_at(last_sigma_m), design);
+        }
+        off_m
+    }
+
+    /// Mean of the samples, m; `None` without any.
+    pub fn mean_m(&self) -> Option<f64> {
+        (self.samples > 0).then(|| self.sum_m / f64::from(self.samples))
+    }
+
+    /// The farthest inside and the farthest beyond the design, m; `None` without samples.
+    pub fn extremes_m(&self) -> Option<[f64; 2]> {
+        (self.samples > 0).then_some([self.inmost_m, self.outmost_m])
+    }
+
+    /// Area of the cross-section over that of the design, where sweeps have gone; `None` without any.
+    pub fn area_ratio(&self) -> Option<f64> {
+        (self.design_m2 > 0.0).then(|| self.swept_m2 / self.design_m2)
+    }
+
+    /// Whether most samples are farther off than the wall can be: the profile isn't that of this tunnel, or the position
+    /// is wrong. The median of their distances is then over the limit.
+    pub fn contradicts(&self) -> bool {
+        2 * self.contradicting > self.samples
+    }
+}
+
+fn distance_m(a: Yz, b: Yz) -> f64 {
+    headrace_geometry::math::hypot(b[0] - a[0], b[1] - a[1])
+}
+
+/// Area of the triangle of a point and two others, m2, without its sign.
+fn triangle_m2([y, z]: Yz, a: Yz, b: Yz) -> f64 {
+    ((a[0] - y) * (b[1] - z) - (a[1] - z) * (b[0] - y)).abs() / 2.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use headrace_geometry::math::{self, TAU};
+    use headrace_geometry::tunnel::shapes;
+
+    /// A turn of samples on a circle of radius `true_m` about the reference point of one of 3 m.
+    fn turned(true_m: f64, samples: u32) -> Deviation {
+        let profile = shapes::circle(3.0).unwrap();
+        let [y, z] = profile.reference();
+        let mut deviation = Deviation::default();
+        let mut before = None;
+        for k in 0..=samples {
+            let angle = TAU * f64::from(k) / f64::from(samples);
+            let point = [y + true_m * math::sin(angle), z - true_m * math::cos(angle)];
+            let at = (point, profile.sigma_of(point));
+            deviation.add(&profile, at, before, 0.5);
+            before = Some(at);
+        }
+        deviation
+    }
+
+    #[test]
+    fn a_wider_tunnel_is_beyond_its_design_by_as_much_all_round() {
+        let deviation = turned(3.2, 400);
+        assert!((deviation.mean_m().unwrap() - 0.2).abs() < 1e-9);
+        let [inmost_m, outmost_m] = deviation.extremes_m().unwrap();
+        assert!(inmost_m.abs() < 1e-9 && (outmost_m - 0.2).abs() < 1e-9);
+        assert!((deviation.area_ratio().unwrap() - (3.2_f64 / 3.0) * (3.2 / 3.0)).abs() < 1e-9);
+        assert!(!deviation.contradicts());
+    }
+
+    #[test]
+    fn a_profile_that_most_samples_contradict_is_said_to_be_wrong() {
+        assert!(turned(3.6, 100).contradicts() && turned(2.4, 100).contradicts());
+        let mut rock = turned(3.0, 100);
+        let profile = shapes::circle(3.0).unwrap();
+        let point = [0.0, 1.0];
+        for _ in 0..40 {
+            rock.add(&profile, (point, profile.sigma_of(point)), None, 0.5);
+        }
+        assert!(!rock.contradicts(), "a heap on the floor isn't another tunnel");
+        assert!((rock.extremes_m().unwrap()[0] + 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn nothing_is_said_of_a_wall_without_samples() {
+        let deviation = Deviation::default();
+        assert_eq!((deviation.mean_m(), deviation.extremes_m(), deviation.area_ratio()), (None, None, None));
+        assert!(!deviation.contradicts());
+    }
+}

@@ -1,0 +1,231 @@
+//! Where samples may still land: what decides when a section is open and when it is judged.
+
+use core::ops::Range;
+
+use serde::{Deserialize, Serialize};
+
+use headrace_geometry::time::{DurNs, MonoNs};
+
+/// A head that has given no return for so long isn't waited for.
+const SILENT: DurNs = DurNs(2_000_000_000);
+/// The most heads.
+const MAX_HEADS: usize = headrace_sampling::head::MAX_HEADS;
+
+/// The stretch of tunnel on which a head lands samples now.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Reach {
+    /// Least chainage, m.
+    pub from_m: f64,
+    /// Greatest chainage, m.
+    pub to_m: f64,
+}
+
+/// Follows the reach of all heads along the tunnel.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+pub struct Frontier {
+    heads: [Option<Head>; MAX_HEADS],
+    /// Every chainage that any head's reach has covered.
+    swept: Option<Reach>,
+    /// Sections, by index, that samples may still change.
+    zone: Option<Range<i64>>,
+    /// When sections last came into it or left it.
+    zone_moved: Option<MonoNs>,
+    /// When a head first pinged where somebody knew.
+    begun: Option<MonoNs>,
+    course: Option<Course>,
+}
+
+/// Which way the vehicle goes.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+struct Course {
+    /// The farthest that it has come on this course, m: the middle of what its heads reach.
+    farthest_m: f64,
+    astern: bool,
+}
+
+/// A vehicle that has gone back by less than this still goes the way it went, m: yaw and slack look the same.
+const TURNED_M: f64 = 0.25;
+
+impl Course {
+    /// On to where the middle of the reach is now.
+    fn to(self, middle_m: f64) -> Self {
+        let ahead_m = if self.astern { self.farthest_m - middle_m } else { middle_m - self.farthest_m };
+        match ahead_m {
+            ahead_m if ahead_m > 0.0 => Self { farthest_m: middle_m, ..self },
+            ahead_m if ahead_m < -TURNED_M => Self { farthest_m: middle_m, astern: !self.astern },
+            _ => self,
+        }
+    }
+}
+
+/// One head.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+struct Head {
+    last: MonoNs,
+    reach: Reach,
+    /// Every chainage that this head's reach has covered.
+    swept: Reach,
+}
+
+/// What a head's return has changed.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Moved {
+    /// Sections that lie behind now and did not before.
+    pub left_behind: Range<i64>,
+    /// Sections that lie ahead now and did not before: the vehicle goes back.
+    pub left_ahead: Range<i64>,
+    /// Where samples may land without turning back.
+    pub to_come: Option<Reach>,
+}
+
+impl Frontier {
+    /// Every chainage that has been within reach of a head.
+    pub fn swept(&self) -> Option<Reach> {
+        self.swept
+    }
+
+    /// A head has pinged where nobody knows: it is alive, and waited for where it was last.
+    pub fn heard(&mut self, head: usize, now: MonoNs) {
+        if let Some(head) = self.heads.get_mut(head).and_then(Option::as_mut) {
+            head.last = now;
+        }
+    }
+
+    /// Where a head landed samples when its place was last known.
+    pub fn last_reach(&self, head: usize) -> Option<Reach> {
+        self.heads.get(head).copied().flatten().map(|head| head.reach)
+    }
+
+    /// The stretch that every head that is alive has covered, or `None` where there is none.
+    pub fn swept_by_all(&self, now: MonoNs) -> Option<Reach> {
+        let common = |a: Reach, b: Reach| Reach { from_m: a.from_m.max(b.from_m), to_m: a.to_m.min(b.to_m) };
+        self.alive(now).map(|head| head.swept).reduce(common).filter(|all| all.from_m <= all.to_m)
+    }
+
+    /// The sections, by index, that samples may still change, when for some time none has come or gone: the vehicle stands,
+    /// or nearly. Not before it is known which heads are alive.
+    pub fn still_zone(&self, now: MonoNs) -> Option<Range<i64>> {
+        let over = |since: Option<MonoNs>| since.is_some_and(|since| now.since(since).0 > SILENT.0);
+        self.zone.clone().filter(|_| over(self.begun) && over(self.zone_moved))
+    }
+
+    /// Where the heads that are alive land samples now.
+    fn reach(&self, now: MonoNs) -> Option<Reach> {
+        self.alive(now).map(|head| head.reach).reduce(Reach::with)
+    }
+
+    /// Where they may land samples without turning back: from here on, all that lies ahead.
+    pub fn to_come(&self, now: MonoNs) -> Option<Reach> {
+        let reach = self.reach(now)?;
+        Some(match self.course {
+            Some(Course { astern: true, .. }) => Reach { from_m: f64::NEG_INFINITY, ..reach },
+            _ => Reach { to_m: f64::INFINITY, ..reach },
+        })
+    }
+
+    fn alive(&self, now: MonoNs) -> impl Iterator<Item = &Head> {
+        self.heads.iter().flatten().filter(move |head| now.since(head.last).0.abs() <= SILENT.0)
+    }
+
+    /// A head has pinged, with or without a return. A section is out of the way when it is farther than `margin_m` from
+    /// the reach of every head that is alive.
+    pub fn advance(
+        &mut self,
+        head: usize,
+        now: MonoNs,
+        reach: Reach,
+        section_m: f64,
+        margin_m: f64,
+    ) -> Moved {
+        if let Some(slot) = self.heads.get_mut(head) {
+            let swept = slot.map_or(reach, |head| head.swept.with(reach));
+            *slot = Some(Head { last: now, reach, swept });
+        }
+        self.swept = Some(self.swept.map_or(reach, |swept| swept.with(reach)));
+        let Some(all) = self.reach(now) else { return Moved::default() };
+        let middle_m = all.middle_m();
+        let course = self.course.unwrap_or(Course { farthest_m: middle_m, astern: false });
+        self.course = Some(course.to(middle_m));
+        // Section k = [kL, (k+1)L) is behind when (k+1)L + margin <= from, ahead when kL - margin >= to.
+        let first = headrace_geometry::math::floor_to_i64((all.from_m - margin_m) / section_m);
+        let end = -headrace_geometry::math::floor_to_i64(-(all.to_m + margin_m) / section_m);
+        let zone = first..end;
+        self.begun = self.begun.or(Some(now));
+        if self.zone.as_ref() != Some(&zone) {
+            self.zone_moved = Some(now);
+        }
+        let before = self.zone.replace(zone.clone()).unwrap_or(zone.clone());
+        Moved {
+            left_behind: before.start..zone.start,
+            left_ahead: zone.end..before.end,
+            to_come: self.to_come(now),
+        }
+    }
+}
+
+impl Reach {
+    /// The middle of the stretch, m.
+    pub fn middle_m(&self) -> f64 {
+        f64::midpoint(self.from_m, self.to_m)
+    }
+
+    fn with(self, other: Self) -> Self {
+        Self { from_m: self.from_m.min(other.from_m), to_m: self.to_m.max(other.to_m) }
+    }
+}
+
+/// How far a chainage is from where samples may still land, m; infinite where none may.
+pub fn clear_of(to_come: Option<Reach>, x_m: f64) -> f64 {
+    to_come.map_or(f64::INFINITY, |reach| (reach.from_m - x_m).max(x_m - reach.to_m).max(0.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(x_m: f64) -> Reach {
+        Reach { from_m: x_m, to_m: x_m }
+    }
+
+    #[test]
+    fn a_section_is_left_when_the_last_head_is_a_margin_past_it() {
+        let mut frontier = Frontier::default();
+        frontier.advance(0, MonoNs(0), at(1.0), 0.25, 0.25);
+        frontier.advance(1, MonoNs(0), at(0.5), 0.25, 0.25);
+        let moved = frontier.advance(1, MonoNs(1), at(0.749), 0.25, 0.25);
+        assert_eq!(moved.left_behind, 1..1);
+        let moved = frontier.advance(1, MonoNs(2), at(0.75), 0.25, 0.25);
+        assert_eq!(moved.left_behind, 1..2, "section [0.25, 0.5) is left once 0.75 is reached");
+    }
+
+    #[test]
+    fn going_back_leaves_sections_ahead() {
+        let mut frontier = Frontier::default();
+        frontier.advance(0, MonoNs(0), at(2.0), 0.25, 0.25);
+        let moved = frontier.advance(0, MonoNs(1), at(1.7), 0.25, 0.25);
+        assert_eq!(moved.left_ahead, 8..9);
+        assert!(moved.left_behind.is_empty());
+    }
+
+    #[test]
+    fn what_lies_ahead_may_still_come_until_the_vehicle_has_turned_back() {
+        let mut frontier = Frontier::default();
+        for x_m in [1.0, 2.0, 1.8] {
+            frontier.advance(0, MonoNs(0), at(x_m), 0.25, 0.25);
+        }
+        let clear = |frontier: &Frontier, x_m: f64| clear_of(frontier.to_come(MonoNs(0)), x_m);
+        assert_eq!([1.0, 1.8, 2.5].map(|x_m| clear(&frontier, x_m) > 0.5), [true, false, false]);
+        frontier.advance(0, MonoNs(0), at(1.7), 0.25, 0.25);
+        assert_eq!([1.0, 1.7, 2.5].map(|x_m| clear(&frontier, x_m) > 0.5), [false, false, true]);
+        assert!(clear_of(frontier.to_come(MonoNs(3_000_000_000)), 1.7) > 1e9, "nobody is alive");
+    }
+
+    #[test]
+    fn a_silent_head_is_not_waited_for() {
+        let mut frontier = Frontier::default();
+        frontier.advance(1, MonoNs(0), at(0.0), 0.25, 0.0);
+        frontier.advance(0, MonoNs(0), at(1.0), 0.25, 0.0);
+        let moved = frontier.advance(0, MonoNs(2_000_000_001), at(1.0), 0.25, 0.0);
+        assert_eq!(moved.left_behind, 0..4);
+    }
+}

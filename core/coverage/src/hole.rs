@@ -1,0 +1,287 @@
+//! The largest hole of a section: the largest empty circle on the unrolled wall with its centre in the section.
+//!
+//! Let f(c) be the distance from a place c to the nearest sample. D = 2 max f over the section (metrics.md). The section
+//! is laid out in tiles. A tile is divided among a few samples, each share a convex polygon on which the distance to its
+//! own sample is largest at a corner; the farthest corner is a bound for the tile, since further samples only bring f
+//! down. Whatever sample is nearest to that corner either proves the bound or gets a share itself, and lowers it. Tiles
+//! whose bound can't beat the best place found are dropped, so that only the worst places are ever divided finely. What
+//! the clipping gives is exact but for rounding; nothing depends on a triangulation, so that lattices, lines and repeated
+//! samples need no care.
+
+use serde::{Deserialize, Serialize};
+
+use self::division::Division;
+use self::window::{Nearest, Window};
+use super::store::SampleStore;
+use headrace_geometry::math;
+use headrace_snapshot::stateful;
+
+mod certain;
+mod division;
+mod window;
+
+/// A place is looked for no farther than this from its nearest sample, m; beyond, the wall counts as not passed.
+pub const FARTHEST_M: f64 = 12.0;
+/// Half diagonal below which a tile isn't halved: its bound is within 2e-10 m of the truth.
+const NO_FINER_M: f64 = 1e-10;
+/// A corner this much farther than its nearest sample is as good as proven, m: rounding.
+const PROVEN_M: f64 = 1e-11;
+
+/// The largest empty circle with its centre in a section.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Hole {
+    /// Diameter of the largest empty circle that was found among the samples kept, m.
+    pub diameter_m: f64,
+    /// D is no less than this, m: `diameter_m`, less what samples that aren't kept could have taken from it.
+    pub least_m: f64,
+    /// D is no more than this, m; infinite when not `bounded`.
+    pub most_m: f64,
+    /// Chainage of its centre, m.
+    pub x_m: f64,
+    /// Arc length of its centre, m.
+    pub sigma_m: f64,
+    /// Whether there are samples around it. When not, the hole is at least `diameter_m` large.
+    pub bounded: bool,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Tile {
+    /// Middle, from the section's beginning, m.
+    x_m: f64,
+    sigma_m: f64,
+    half_x_m: f64,
+    half_sigma_m: f64,
+    /// The sample nearest to the middle, from there, m.
+    owner: (f64, f64),
+    /// No place in the tile is farther than this from its nearest sample.
+    bound_m: f64,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Best {
+    distance_m: f64,
+    x_m: f64,
+    sigma_m: f64,
+    /// The largest bound of what was dropped.
+    dropped_m: f64,
+}
+
+/// No sample is within reach of a place.
+#[derive(Debug, Clone, Copy)]
+struct Beyond {
+    x_m: f64,
+    sigma_m: f64,
+}
+
+impl Tile {
+    /// Distance from the middle to a corner.
+    fn half_m(&self) -> f64 {
+        math::sqrt(self.half_x_m * self.half_x_m + self.half_sigma_m * self.half_sigma_m)
+    }
+
+    /// The tile cut across its longer side.
+    fn halves(&self) -> [Self; 2] {
+        let along_x = self.half_x_m > self.half_sigma_m;
+        [-0.5, 0.5].map(|side| {
+            if along_x {
+                Self { x_m: self.x_m + side * self.half_x_m, half_x_m: self.half_x_m / 2.0, ..*self }
+            } else {
+                let sigma_m = self.sigma_m + side * self.half_sigma_m;
+                Self { sigma_m, half_sigma_m: self.half_sigma_m / 2.0, ..*self }
+            }
+        })
+    }
+
+    /// A sample's place from the middle: the same to the bit, whichever place it was found from.
+    fn relative(&self, found: &Nearest, perimeter_m: f64) -> (f64, f64) {
+        (found.x_m - self.x_m, (found.sigma_m - self.sigma_m) + found.turns * perimeter_m)
+    }
+}
+
+/// Covers a section with about square tiles.
+fn first_tiles(perimeter_m: f64, length_m: f64) -> impl Iterator<Item = Tile> {
+    let half_x_m = length_m / 2.0;
+    let count = math::floor_to_i64(perimeter_m / length_m).clamp(1, 8192) + 1;
+    let half_sigma_m = perimeter_m / (2 * count) as f64;
+    (0..count).map(move |k| Tile {
+        x_m: half_x_m,
+        sigma_m: (2 * k + 1) as f64 * half_sigma_m,
+        half_x_m,
+        half_sigma_m,
+        owner: (0.0, 0.0),
+        bound_m: f64::INFINITY,
+    })
+}
+
+/// Finds the largest hole of a stretch of wall; keeps its working memory from one search to the next.
+#[derive(Debug)]
+pub struct HoleFinder {
+    tolerance_m: f64,
+    /// Radius of the last hole, m: the next is likely alike.
+    last_m: f64,
+    window: Window,
+    tiles: Vec<Tile>,
+    division: Division,
+}
+
+impl Default for HoleFinder {
+    fn default() -> Self {
+        Self::new(0.0)
+    }
+}
+
+stateful!(HoleFinder { state: last_m; fixed: tolerance_m, window, tiles, division; });
+
+impl HoleFinder {
+    /// A search that finds D to within a tolerance, m; zero is exact.
+    ///
+    /// Allocates: startup only; all that it will ever use.
+    pub fn new(tolerance_m: f64) -> Self {
+        Self {
+            tolerance_m,
+            last_m: 0.0,
+            window: Window::default(),
+            tiles: Vec::with_capacity(16_384),
+            division: Division::default(),
+        }
+    }
+
+    /// The largest hole whose centre has a chainage in [`from_m`, `to_m`].
+    ///
+    /// Allocates: never, unless a section is over 4,000 cells large.
+    pub fn largest(&mut self, store: &SampleStore, from_m: f64, to_m: f64) -> Hole {
+        let length_m = to_m - from_m;
+        let mut reach_m = (1.25 * self.last_m + 0.1).min(FARTHEST_M);
+        loop {
+            self.window.fill(store, from_m, (-reach_m, length_m + reach_m), cell_m(reach_m));
+            match self.search(length_m, reach_m) {
+                Ok(best) => {
+                    self.last_m = best.distance_m;
+                    return self.bounded(store, &best, length_m);
+                }
+                Err(beyond) if reach_m >= FARTHEST_M => return unbounded(&self.window, &beyond),
+                Err(_) => reach_m = (2.0 * reach_m + 0.5).min(FARTHEST_M),
+            }
+        }
+    }
+
+    /// The farthest place from all samples, provided that none is farther than the window shows.
+    fn search(&mut self, length_m: f64, reach_m: f64) -> Result<Best, Beyond> {
+        let mut best = Best { distance_m: 0.0, x_m: 0.0, sigma_m: 0.0, dropped_m: 0.0 };
+        self.tiles.clear();
+        // A good first guess spares most of the work: every tile's middle is looked at before any is divided, and the
+        // most promising is divided first.
+        let mut within_m = reach_m;
+        for tile in first_tiles(self.window.perimeter_m(), length_m) {
+            let tile = looked_at(&self.window, tile, within_m.min(reach_m), &mut best)?;
+            // f changes by no more than one moves.
+            within_m = math::hypot(tile.owner.0, tile.owner.1) + 2.0 * tile.half_sigma_m + 1e-6;
+            self.tiles.push(tile);
+        }
+        self.tiles.sort_unstable_by(|a, b| a.bound_m.total_cmp(&b.bound_m));
+        while let Some(tile) = self.tiles.pop() {
+            if self.is_settled(&tile, reach_m, &mut best)? {
+                continue;
+            }
+            for part in tile.halves() {
+                let part = looked_at(&self.window, part, reach_m, &mut best)?;
+                self.tiles.push(part);
+            }
+        }
+        Ok(best)
+    }
+
+    /// Divides a tile as far as needed to see that it can't beat the best place, which may be in it. False when it is too
+    /// large for that.
+    fn is_settled(&mut self, tile: &Tile, reach_m: f64, best: &mut Best) -> Result<bool, Beyond> {
+        let enough = |best: &Best| best.distance_m + self.tolerance_m / 2.0;
+        if tile.bound_m <= enough(best) || tile.half_m() < NO_FINER_M {
+            best.dropped_m = best.dropped_m.max(tile.bound_m);
+            return Ok(true);
+        }
+        self.division.begin((tile.half_x_m, tile.half_sigma_m), tile.owner);
+        while let Some(worst) = self.division.worst() {
+            let bound_m = math::sqrt(worst.farthest2);
+            if bound_m <= enough(best) {
+                best.dropped_m = best.dropped_m.max(bound_m);
+                return Ok(true);
+            }
+            let x_m = tile.x_m + (worst.owner.0 + worst.farthest.0);
+            let sigma_m = tile.sigma_m + (worst.owner.1 + worst.farthest.1);
+            let Some(found) = self.window.nearest(x_m, sigma_m, bound_m.min(reach_m)) else {
+                if bound_m > reach_m {
+                    return Err(Beyond { x_m, sigma_m });
+                }
+                // Its own sample is nearest, but for rounding.
+                best.take(bound_m, x_m, sigma_m);
+                return Ok(true);
+            };
+            let distance_m = math::sqrt(found.distance2);
+            best.take(distance_m, x_m, sigma_m);
+            if distance_m >= bound_m - PROVEN_M {
+                best.dropped_m = best.dropped_m.max(bound_m);
+                return Ok(true);
+            }
+            if !self.division.add(tile.relative(&found, self.window.perimeter_m())) {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+
+    fn bounded(&self, store: &SampleStore, best: &Best, length_m: f64) -> Hole {
+        let radius_m = best.distance_m.max(best.dropped_m);
+        let from_m = self.window.chainage_m(-radius_m);
+        let fidelity = store.fidelity(from_m, self.window.chainage_m(length_m + radius_m));
+        let diameter_m = 2.0 * best.distance_m;
+        // What there was no room to look at could only have made it smaller.
+        let least_m = diameter_m - 2.0 * (fidelity.thinned_m + fidelity.moved_m);
+        Hole {
+            diameter_m,
+            least_m: if self.window.overfull { 0.0 } else { least_m.max(0.0) },
+            most_m: 2.0 * (radius_m + fidelity.moved_m),
+            x_m: self.window.chainage_m(best.x_m),
+            sigma_m: math::wrap(best.sigma_m, self.window.perimeter_m()),
+            bounded: true,
+        }
+    }
+}
+
+impl Best {
+    fn take(&mut self, distance_m: f64, x_m: f64, sigma_m: f64) {
+        if distance_m > self.distance_m {
+            *self = Self { distance_m, x_m, sigma_m, ..*self };
+        }
+    }
+}
+
+/// The tile with its owner and a bound by it; its middle may be the best place so far.
+fn looked_at(window: &Window, tile: Tile, within_m: f64, best: &mut Best) -> Result<Tile, Beyond> {
+    let beyond = Beyond { x_m: tile.x_m, sigma_m: tile.sigma_m };
+    let found = window.nearest(tile.x_m, tile.sigma_m, within_m).ok_or(beyond)?;
+    best.take(math::sqrt(found.distance2), tile.x_m, tile.sigma_m);
+    let owner = tile.relative(&found, window.perimeter_m());
+    let (dx, dsigma) = (owner.0.abs() + tile.half_x_m, owner.1.abs() + tile.half_sigma_m);
+    let bound_m = tile.bound_m.min(math::sqrt(dx * dx + dsigma * dsigma));
+    Ok(Tile { owner, bound_m, ..tile })
+}
+
+/// Cells that suit a search this far.
+fn cell_m(reach_m: f64) -> f64 {
+    (reach_m / 3.0).clamp(0.05, 0.5)
+}
+
+fn unbounded(window: &Window, beyond: &Beyond) -> Hole {
+    let diameter_m = 2.0 * FARTHEST_M;
+    Hole {
+        diameter_m,
+        least_m: diameter_m,
+        most_m: f64::INFINITY,
+        x_m: window.chainage_m(beyond.x_m),
+        sigma_m: math::wrap(beyond.sigma_m, window.perimeter_m()),
+        bounded: false,
+    }
+}
+
+#[cfg(test)]
+mod tests;

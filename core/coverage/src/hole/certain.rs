@@ -1,0 +1,90 @@
+//! Whether a fail is certain before its hole is: whether an empty circle lies wholly where no sample can come any more.
+
+use super::{HoleFinder, Tile, cell_m, first_tiles};
+use crate::frontier::{Reach, clear_of};
+use crate::store::SampleStore;
+use headrace_geometry::math;
+
+/// Places are told apart to this, m; a circle that is only so much larger isn't certain yet.
+const FINE_M: f64 = 1e-3;
+
+impl HoleFinder {
+    /// Whether a circle of `radius_m` with its centre between two chainages holds no sample and lies outside of `reach`,
+    /// where samples may still land.
+    ///
+    /// The distance to the nearest sample or to the reach changes by no more than one moves: as for holes, tiles whose
+    /// bound is too small are dropped and the others halved.
+    /// Allocates: never, unless a section is over 4,000 cells large.
+    pub fn has_circle(
+        &mut self,
+        store: &SampleStore,
+        (from_m, to_m): (f64, f64),
+        reach: Option<Reach>,
+        radius_m: f64,
+    ) -> bool {
+        let Self { window, tiles, .. } = self;
+        let length_m = to_m - from_m;
+        let around_m = radius_m + length_m;
+        window.fill(store, from_m, (-around_m, length_m + around_m), cell_m(radius_m));
+        tiles.clear();
+        tiles.extend(first_tiles(store.perimeter_m(), length_m));
+        while let Some(tile) = tiles.pop() {
+            let half_m = tile.half_m();
+            let clear_m = clear_of(reach, from_m + tile.x_m);
+            if clear_m + tile.half_x_m < radius_m {
+                continue;
+            }
+            let nearest = window.nearest(tile.x_m, tile.sigma_m, radius_m + half_m);
+            let nearest_m = nearest.map_or(f64::INFINITY, |found| math::sqrt(found.distance2));
+            if nearest_m.min(clear_m) > radius_m {
+                return true;
+            }
+            if nearest_m + half_m > radius_m && half_m > FINE_M {
+                tiles.extend::<[Tile; 2]>(tile.halves());
+            }
+        }
+        false
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::store::{StoreLayout, WallSample};
+    use proptest::prelude::*;
+
+    const PERIMETER_M: f64 = 6.0;
+
+    proptest! {
+        /// Against looking at every place of a fine grid.
+        #[test]
+        fn a_circle_is_found_where_there_is_one_and_nowhere_else(
+            samples in proptest::collection::vec((0.0f64..4.0, 0.0f64..PERIMETER_M), 0..40),
+            reach_m in 1.0f64..4.0,
+            radius_m in 0.1f64..1.2,
+        ) {
+            let layout =
+                StoreLayout { perimeter_m: PERIMETER_M, from_m: -2.0, to_m: 6.0, cell_m: 0.3, capacity: 1000 };
+            let mut store = SampleStore::new(layout);
+            for (x_m, sigma_m) in &samples {
+                store.insert(WallSample { x_m: *x_m, sigma_m: *sigma_m, head: 0, step_m: None }).unwrap();
+            }
+            let reach = Some(Reach { from_m: reach_m, to_m: 5.0 });
+            let clear = |x_m: f64, sigma_m: f64| {
+                let nearest = samples.iter().map(|(x, s)| {
+                    let around = (s - sigma_m).abs() % PERIMETER_M;
+                    math::hypot(x - x_m, around.min(PERIMETER_M - around))
+                });
+                nearest.fold(f64::INFINITY, f64::min).min(reach_m - x_m)
+            };
+            let places = (0..=25).flat_map(|i| (0..600).map(move |k| {
+                (1.0 + 0.01 * f64::from(i), 0.01 * f64::from(k))
+            }));
+            let best = places.map(|(x, s)| clear(x, s)).fold(0.0, f64::max);
+            let found = HoleFinder::default().has_circle(&store, (1.0, 1.25), reach, radius_m);
+            // The grid is 5 mm off a place at most in each direction, and the search a millimetre.
+            prop_assert!(!found || best + 0.008 > radius_m, "found {radius_m}, there is {best}");
+            prop_assert!(found || best <= radius_m + 0.002, "not found {radius_m}, there is {best}");
+        }
+    }
+}

@@ -1,0 +1,304 @@
+use super::super::store::{Kept, StoreLayout, WallSample};
+use super::*;
+use proptest::prelude::*;
+
+const PERIMETER_M: f64 = 9.0;
+
+fn store(perimeter_m: f64, samples: &[(f64, f64)]) -> SampleStore {
+    let layout = StoreLayout { perimeter_m, from_m: -20.0, to_m: 40.0, cell_m: 0.4, capacity: 100_000 };
+    let mut store = SampleStore::new(layout);
+    for (x_m, sigma_m) in samples {
+        store.insert(WallSample { x_m: *x_m, sigma_m: *sigma_m, head: 0, step_m: None }).unwrap();
+    }
+    store
+}
+
+fn largest(perimeter_m: f64, samples: &[(f64, f64)], from_m: f64, to_m: f64) -> Hole {
+    HoleFinder::default().largest(&store(perimeter_m, samples), from_m, to_m)
+}
+
+/// Distance from a place to the nearest sample, looking at all.
+fn nearest_m(perimeter_m: f64, samples: &[(f64, f64)], place: (f64, f64)) -> f64 {
+    let distance = |s: &(f64, f64)| {
+        let around = (s.1 - place.1).abs() % perimeter_m;
+        math::hypot(s.0 - place.0, around.min(perimeter_m - around))
+    };
+    samples.iter().map(distance).fold(f64::INFINITY, f64::min)
+}
+
+/// Every place where f can be largest, by solving for it: circumcentres of three samples (or their images), and the
+/// places on the two edges that are equally far from two. Shares nothing with the search.
+fn brute_force(perimeter_m: f64, samples: &[(f64, f64)], from_m: f64, to_m: f64) -> f64 {
+    let images: Vec<(f64, f64)> =
+        samples.iter().flat_map(|s| [-perimeter_m, 0.0, perimeter_m].map(|turn| (s.0, s.1 + turn))).collect();
+    let mut candidates = Vec::new();
+    for (i, a) in images.iter().enumerate() {
+        for (j, b) in images.iter().enumerate().skip(i + 1) {
+            // |c - a| = |c - b|: n . c = k.
+            let n = (b.0 - a.0, b.1 - a.1);
+            let k = (b.0 * b.0 + b.1 * b.1 - a.0 * a.0 - a.1 * a.1) / 2.0;
+            if n.1.abs() > 1e-12 {
+                candidates.extend([from_m, to_m].map(|x| (x, (k - n.0 * x) / n.1)));
+            }
+            for c in images.iter().skip(j + 1) {
+                let m = (c.0 - a.0, c.1 - a.1);
+                let l = (c.0 * c.0 + c.1 * c.1 - a.0 * a.0 - a.1 * a.1) / 2.0;
+                let det = n.0 * m.1 - n.1 * m.0;
+                if det.abs() > 1e-12 {
+                    candidates.push(((k * m.1 - n.1 * l) / det, (n.0 * l - k * m.0) / det));
+                }
+            }
+        }
+    }
+    let f = |place: &(f64, f64)| {
+        images.iter().map(|s| math::hypot(s.0 - place.0, s.1 - place.1)).fold(f64::INFINITY, f64::min)
+    };
+    let inside = |place: &&(f64, f64)| {
+        place.0 >= from_m - 1e-12 && place.0 <= to_m + 1e-12 && (0.0..perimeter_m).contains(&place.1)
+    };
+    2.0 * candidates.iter().filter(inside).map(f).fold(0.0, f64::max)
+}
+
+proptest! {
+    #[test]
+    fn verif_scattered_samples_agree_with_brute_force(
+        samples in proptest::collection::vec((-2.0f64..3.0, 0.0f64..PERIMETER_M), 1..14),
+    ) {
+        let hole = largest(PERIMETER_M, &samples, 0.0, 0.5);
+        let expected = brute_force(PERIMETER_M, &samples, 0.0, 0.5);
+        prop_assert!((hole.diameter_m - expected).abs() < 1e-9, "{} and {}", hole.diameter_m, expected);
+        let at_centre = 2.0 * nearest_m(PERIMETER_M, &samples, (hole.x_m, hole.sigma_m));
+        prop_assert!((at_centre - hole.diameter_m).abs() < 1e-9, "its centre is where it says");
+        prop_assert!(hole.least_m <= hole.diameter_m && hole.most_m - hole.least_m < 1e-9, "{:?}", hole);
+    }
+
+    /// The window's search against looking at all.
+    #[test]
+    fn the_nearest_is_the_nearest(
+        samples in proptest::collection::vec((-3.0f64..4.0, 0.0f64..PERIMETER_M), 0..60),
+        place in (0.0f64..1.0, -8.0f64..16.0),
+        within_m in 0.05f64..3.0,
+        cell_m in 0.05f64..1.0,
+    ) {
+        let mut window = Window::default();
+        window.fill(&store(PERIMETER_M, &samples), 0.0, (-3.0, 4.0), cell_m);
+        let expected = Some(nearest_m(PERIMETER_M, &samples, place)).filter(|d| *d <= within_m);
+        let found = window.nearest(place.0, place.1, within_m);
+        match (found, expected) {
+            (Some(found), Some(expected)) => {
+                prop_assert!((math::sqrt(found.distance2) - expected).abs() < 1e-12);
+                let image_m = found.sigma_m + found.turns * PERIMETER_M - place.1;
+                let by_image_m = math::hypot(found.x_m - place.0, image_m);
+                prop_assert!((by_image_m - expected).abs() < 1e-12, "its image is the near one");
+            }
+            (found, expected) => prop_assert_eq!(found.is_some(), expected.is_some()),
+        }
+    }
+
+    /// D lies within the bounds that a tolerant search states, and no farther apart than it was told. A verdict from them
+    /// is the exact one, or none where T lies between them.
+    #[test]
+    fn verif_bounds_of_a_tolerant_search_hold(
+        samples in proptest::collection::vec((-2.0f64..3.0, 0.0f64..PERIMETER_M), 1..14),
+        tolerance_m in 0.0f64..0.5,
+        target_m in 0.1f64..6.0,
+    ) {
+        let expected = brute_force(PERIMETER_M, &samples, 0.0, 0.5);
+        let hole = HoleFinder::new(tolerance_m).largest(&store(PERIMETER_M, &samples), 0.0, 0.5);
+        prop_assert!(hole.least_m <= expected + 1e-9 && expected <= hole.most_m + 1e-9, "{:?}, {}", hole, expected);
+        prop_assert!(hole.most_m - hole.least_m <= tolerance_m + 1e-9);
+        let said = (hole.most_m <= target_m, hole.least_m > target_m);
+        if (expected - target_m).abs() > tolerance_m + 1e-9 {
+            prop_assert_eq!(said, (expected <= target_m, expected > target_m));
+        } else {
+            prop_assert!(said == (false, false) || said == (expected <= target_m, expected > target_m));
+        }
+    }
+
+    /// The same of samples that were packed before: moved, and the bounds say by how much.
+    #[test]
+    fn verif_bounds_after_packing_hold(
+        samples in proptest::collection::vec((-2.0f64..3.0, 0.0f64..PERIMETER_M), 1..14),
+    ) {
+        let layout = StoreLayout { perimeter_m: PERIMETER_M, from_m: -20.0, to_m: 340.0, cell_m: 0.4, capacity: 1000 };
+        let mut store = SampleStore::new(layout);
+        let far = (0..120).map(|k| (339.0 - 1.7 * f64::from(k), 0.0));
+        for (x_m, sigma_m) in samples.iter().copied().chain(far) {
+            store.insert(WallSample { x_m, sigma_m, head: 0, step_m: None }).unwrap();
+        }
+        let expected = brute_force(PERIMETER_M, &samples, 0.0, 0.5);
+        let hole = HoleFinder::default().largest(&store, 0.0, 0.5);
+        prop_assert!(hole.least_m <= expected && expected <= hole.most_m, "{:?} and {}", hole, expected);
+        let width_m = hole.most_m - hole.least_m;
+        prop_assert!(width_m > 0.0 && width_m < 1e-4, "{:?}", hole);
+    }
+
+    /// And of a cell so full that samples were left out.
+    #[test]
+    fn verif_bounds_after_thinning_hold(
+        crowd in proptest::collection::vec((0.0f64..0.4, 4.0f64..4.4), 200..500),
+    ) {
+        let mut samples: Vec<_> = crowd.into_iter().filter(|s| s.1 < 4.15 || s.1 > 4.25).collect();
+        // Elsewhere nothing is as far apart as the gap in the crowd.
+        let fence = (-6..=14).flat_map(|i| (0..180).map(move |k| (f64::from(i) * 0.05, f64::from(k) * 0.05)));
+        samples.extend(fence.filter(|s| !(4.0..4.4).contains(&s.1)));
+        let thinned = store(PERIMETER_M, &samples);
+        prop_assume!(thinned.usage().thinned > 0);
+        let hole = HoleFinder::default().largest(&thinned, 0.1, 0.3);
+        let fine = StoreLayout { perimeter_m: PERIMETER_M, from_m: -1.0, to_m: 1.0, cell_m: 0.05, capacity: 100_000 };
+        let mut all = SampleStore::new(fine);
+        for (x_m, sigma_m) in &samples {
+            let kept = all.insert(WallSample { x_m: *x_m, sigma_m: *sigma_m, head: 0, step_m: None });
+            prop_assume!(kept == Ok(Kept::Stored));
+        }
+        let exact = HoleFinder::default().largest(&all, 0.1, 0.3);
+        prop_assert!(hole.least_m < hole.diameter_m && hole.most_m - hole.diameter_m < 1e-9);
+        prop_assert!(
+            hole.least_m <= exact.diameter_m && exact.diameter_m <= hole.most_m + 1e-12,
+            "{:?} {:?}", hole, exact
+        );
+    }
+
+    /// A small pipe: holes wider than the wall goes round.
+    #[test]
+    fn verif_a_pipe_narrower_than_its_holes(
+        samples in proptest::collection::vec((-2.0f64..3.0, 0.0f64..1.1), 1..10),
+    ) {
+        let hole = largest(1.1, &samples, 0.0, 0.5);
+        let expected = brute_force(1.1, &samples, 0.0, 0.5);
+        prop_assert!((hole.diameter_m - expected).abs() < 1e-9, "{} and {}", hole.diameter_m, expected);
+    }
+
+    /// On a lattice every place of interest is equally far from four samples.
+    #[test]
+    fn verif_a_perfect_lattice(dx in 0.11f64..0.7, around in 6u32..24, shift in 0.0f64..1.0) {
+        let dsigma = PERIMETER_M / f64::from(around);
+        let mut samples = Vec::new();
+        for i in -12..=12 {
+            for k in 0..around {
+                samples.push((f64::from(i) * dx + shift, f64::from(k) * dsigma));
+            }
+        }
+        let expected = (dx * dx + dsigma * dsigma).sqrt();
+        // A section longer than the lattice's step holds a middle.
+        let hole = largest(PERIMETER_M, &samples, 0.0, dx * 1.01);
+        prop_assert!((hole.diameter_m - expected).abs() < 1e-9, "{} and {}", hole.diameter_m, expected);
+    }
+
+    /// Order of the samples, seam and start of the axis are arbitrary.
+    #[test]
+    fn meta_shifted_mirrored_reversed(
+        samples in proptest::collection::vec((-2.0f64..3.0, 0.0f64..PERIMETER_M), 1..30),
+        turn in 0.0f64..PERIMETER_M,
+    ) {
+        let plain = largest(PERIMETER_M, &samples, 0.0, 0.5).diameter_m;
+        let turned: Vec<_> = samples.iter().map(|s| (s.0, (s.1 + turn) % PERIMETER_M)).collect();
+        let mirrored: Vec<_> = samples.iter().map(|s| (0.5 - s.0, PERIMETER_M - s.1)).collect();
+        let reversed: Vec<_> = samples.iter().rev().copied().collect();
+        for (what, other) in [("turned", turned), ("mirrored", mirrored), ("reversed", reversed)] {
+            let got = largest(PERIMETER_M, &other, 0.0, 0.5).diameter_m;
+            prop_assert!((got - plain).abs() < 1e-9, "{}: {} and {}", what, got, plain);
+        }
+    }
+}
+
+#[test]
+fn no_sample_in_reach_is_an_unbounded_hole() {
+    let empty = largest(PERIMETER_M, &[], 0.0, 0.25);
+    assert!(!empty.bounded);
+    let far = largest(PERIMETER_M, &[(35.0, 1.0)], 0.0, 0.25);
+    assert!(!far.bounded && far.diameter_m >= 2.0 * FARTHEST_M);
+}
+
+#[test]
+fn one_sample_is_antipodal_to_its_hole() {
+    let hole = largest(PERIMETER_M, &[(0.0, 1.0)], 0.0, 0.25);
+    let expected = 2.0 * math::hypot(0.25, PERIMETER_M / 2.0);
+    assert!((hole.diameter_m - expected).abs() < 1e-9, "{hole:?}");
+    assert!((hole.sigma_m - 5.5).abs() < 1e-6, "{hole:?}");
+}
+
+#[test]
+fn samples_on_a_line_and_repeated_and_all_in_one_place() {
+    let line: Vec<_> = (0..90).map(|i| (0.1, f64::from(i) * 0.1)).collect();
+    let expected = brute_force(PERIMETER_M, &line[..20], 0.0, 0.25);
+    let hole = largest(PERIMETER_M, &line[..20], 0.0, 0.25);
+    assert!((hole.diameter_m - expected).abs() < 1e-9, "{hole:?} and {expected}");
+    let repeated: Vec<_> = (0..50).flat_map(|_| line.clone()).collect();
+    let once = largest(PERIMETER_M, &line, 0.0, 0.25);
+    let many = largest(PERIMETER_M, &repeated, 0.0, 0.25);
+    assert!((once.diameter_m - many.diameter_m).abs() < 1e-9);
+    let one_place = largest(PERIMETER_M, &[(0.0, 1.0); 33], 0.0, 0.25);
+    assert!((one_place.diameter_m - 2.0 * math::hypot(0.25, PERIMETER_M / 2.0)).abs() < 1e-9);
+}
+
+#[test]
+fn spacings_of_a_nanometre_and_of_metres_in_one_set() {
+    let mut samples: Vec<_> = (0..20).map(|i| (f64::from(i) * 1e-9, 3.0 + f64::from(i % 3) * 1e-9)).collect();
+    samples.extend([(0.3, 6.0), (-0.4, 0.5), (0.2, 8.0)]);
+    let few = [(0.0, 3.0), (0.3, 6.0), (-0.4, 0.5), (0.2, 8.0)];
+    let hole = largest(PERIMETER_M, &samples, 0.0, 0.25);
+    let expected = brute_force(PERIMETER_M, &few, 0.0, 0.25);
+    assert!((hole.diameter_m - expected).abs() < 1e-7, "{hole:?} and {expected}");
+}
+
+/// Far along the tunnel the answer is the same to what a double holds there.
+#[test]
+fn chainage_of_seven_and_of_a_thousand_kilometres() {
+    let samples: Vec<_> =
+        (0..60).map(|i| (f64::from(i) * 0.05 - 1.0, (f64::from(i) * 2.3) % PERIMETER_M)).collect();
+    let near = largest(PERIMETER_M, &samples, 0.0, 0.25).diameter_m;
+    for (chainage, error) in [(7_000.0, 1e-9), (1e6, 1e-8)] {
+        let layout = StoreLayout {
+            perimeter_m: PERIMETER_M,
+            from_m: chainage - 5.0,
+            to_m: chainage + 5.0,
+            cell_m: 0.4,
+            capacity: 100,
+        };
+        let mut store = SampleStore::new(layout);
+        for (x_m, sigma_m) in &samples {
+            store
+                .insert(WallSample { x_m: x_m + chainage, sigma_m: *sigma_m, head: 0, step_m: None })
+                .unwrap();
+        }
+        let hole = HoleFinder::default().largest(&store, chainage, chainage + 0.25);
+        assert!((hole.diameter_m - near).abs() < error, "{chainage}: {hole:?} and {near}");
+    }
+}
+
+/// metrics.md's reference values: `ceran`, 0.197 m/s, heads at the circle's centre in phase shift, as positions only.
+#[test]
+fn val_reference_holes_of_ideal_helices() {
+    let profile = headrace_geometry::tunnel::shapes::ceran().unwrap();
+    let perimeter_m = profile.perimeter_m();
+    let modes = [
+        ("SLOW", 1200, 21.6, [4.248, 2.125, 1.064]),
+        ("MEDIUM", 600, 10.8, [2.128, 1.067, 0.542]),
+        ("FAST", 400, 8.0, [1.582, 0.803, 0.427]),
+        ("FASTER", 300, 6.6, [1.317, 0.687, 0.397]),
+        ("FASTEST", 150, 4.8, [1.030, 0.630, 0.452]),
+    ];
+    for (mode, steps, turn_s, expected) in modes {
+        for (heads, expected) in [1_u32, 2, 4].into_iter().zip(expected) {
+            let layout =
+                StoreLayout { perimeter_m, from_m: 0.0, to_m: 24.0, cell_m: 0.25, capacity: 100_000 };
+            let mut store = SampleStore::new(layout);
+            let per_ping_m = 0.197 * turn_s / f64::from(steps);
+            for ping in 0..math::floor_to_i64(23.0 / per_ping_m) {
+                for head in 0..heads {
+                    let angle =
+                        math::TAU * (ping as f64 / f64::from(steps) + f64::from(head) / f64::from(heads));
+                    let hit =
+                        profile.cast(profile.reference(), [math::sin(angle), -math::cos(angle)]).unwrap();
+                    let (x_m, sigma_m, head) = (ping as f64 * per_ping_m, hit.sigma_m, head as usize);
+                    store.insert(WallSample { x_m, sigma_m, head, step_m: None }).unwrap();
+                }
+            }
+            let mut finder = HoleFinder::default();
+            let holes = (0..36).map(|k| 7.0 + 0.25 * f64::from(k));
+            let d = holes.map(|x| finder.largest(&store, x, x + 0.25).diameter_m).fold(0.0, f64::max);
+            assert!((d / expected - 1.0).abs() < 2e-3, "{mode} x {heads}: {d} and {expected}");
+        }
+    }
+}

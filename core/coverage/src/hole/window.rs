@@ -1,0 +1,261 @@
+//! The samples about a section, sorted into fine cells: what the search looks at.
+
+use crate::store::SampleStore;
+use headrace_geometry::math;
+
+/// Samples for which there is room.
+const ROOM: usize = 1 << 20;
+/// Cells for which there is room.
+const CELLS: usize = 1 << 20;
+
+/// A sample's place: chainage from the window's origin, and arc length, m.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+struct Spot {
+    x_m: f64,
+    sigma_m: f64,
+}
+
+/// The nearest sample to a place.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Nearest {
+    /// Its chainage from the window's origin, m.
+    pub x_m: f64,
+    /// Its arc length, in [0, perimeter), m.
+    pub sigma_m: f64,
+    /// Turns to add to the arc length for the image that is nearest.
+    pub turns: f64,
+    /// Distance on the unrolled wall, squared.
+    pub distance2: f64,
+}
+
+/// A stretch of wall with all its samples.
+#[derive(Debug)]
+pub(super) struct Window {
+    perimeter_m: f64,
+    /// Chainage of the origin, m.
+    origin_m: f64,
+    /// Chainage of the first row from the origin, m.
+    from_m: f64,
+    cell_m: f64,
+    column_m: f64,
+    /// One over the perimeter, a cell's length and its width: the same for sorting samples in and for finding them.
+    per_m: [f64; 3],
+    rows: usize,
+    columns: usize,
+    /// Where each cell's samples begin; row by row, with one more at the end.
+    begins: Vec<u32>,
+    spots: Vec<Spot>,
+    unsorted: Vec<(u32, Spot)>,
+    /// Whether there were more samples than fit.
+    pub overfull: bool,
+}
+
+impl Default for Window {
+    fn default() -> Self {
+        Self {
+            perimeter_m: 1.0,
+            origin_m: 0.0,
+            from_m: 0.0,
+            cell_m: 1.0,
+            column_m: 1.0,
+            per_m: [1.0; 3],
+            rows: 0,
+            columns: 1,
+            begins: Vec::with_capacity(CELLS + 2),
+            spots: Vec::with_capacity(ROOM),
+            unsorted: Vec::with_capacity(ROOM),
+            overfull: false,
+        }
+    }
+}
+
+impl Window {
+    /// Takes in all samples between two chainages, in cells of about a wanted size. Chainages are from `origin_m` on.
+    ///
+    /// Allocates: never.
+    pub(super) fn fill(
+        &mut self,
+        store: &SampleStore,
+        origin_m: f64,
+        (from_m, to_m): (f64, f64),
+        cell_m: f64,
+    ) {
+        self.lay_out(store.perimeter_m(), origin_m, (from_m, to_m), cell_m);
+        self.unsorted.clear();
+        self.overfull = false;
+        let (rows, columns) = (self.rows as f64, self.columns - 1);
+        let [_, per_row, per_column] = self.per_m;
+        store.visit_between(origin_m + from_m, origin_m + to_m, |x_m, sigma_m| {
+            let spot = Spot { x_m: x_m - origin_m, sigma_m };
+            let row = (spot.x_m - self.from_m) * per_row;
+            if !(0.0..rows).contains(&row) {
+                return;
+            }
+            if self.unsorted.len() == ROOM {
+                self.overfull = true;
+                return;
+            }
+            let cell = whole(row) * self.columns + whole(sigma_m * per_column).min(columns);
+            if let Some(count) = self.begins.get_mut(cell + 2) {
+                *count += 1;
+            }
+            self.unsorted.push((u32::try_from(cell).unwrap_or(u32::MAX), spot));
+        });
+        self.sort();
+    }
+
+    fn lay_out(&mut self, perimeter_m: f64, origin_m: f64, (from_m, to_m): (f64, f64), cell_m: f64) {
+        let cells = (to_m - from_m) * perimeter_m;
+        // Coarser cells where there would be more than there is room for.
+        let cell_m = cell_m.max(1.5 * math::sqrt(cells / CELLS as f64));
+        (self.perimeter_m, self.origin_m, self.from_m, self.cell_m) = (perimeter_m, origin_m, from_m, cell_m);
+        self.rows = whole((to_m - from_m) / cell_m) + 1;
+        self.columns = whole(perimeter_m / cell_m).clamp(1, CELLS / self.rows);
+        self.column_m = perimeter_m / self.columns as f64;
+        self.per_m = [1.0 / perimeter_m, 1.0 / cell_m, 1.0 / self.column_m];
+        self.begins.clear();
+        self.begins.resize(self.rows * self.columns + 2, 0);
+    }
+
+    /// Sorts samples by cell. Counts stand two places on; sums over them are where each cell begins, and while samples
+    /// are put in place each becomes where the next one does.
+    fn sort(&mut self) {
+        let mut sum = 0;
+        for begin in &mut self.begins {
+            sum += *begin;
+            *begin = sum;
+        }
+        self.spots.clear();
+        self.spots.resize(self.unsorted.len(), Spot::default());
+        for (cell, spot) in &self.unsorted {
+            let Some(next) = self.begins.get_mut(*cell as usize + 1) else { continue };
+            if let Some(place) = self.spots.get_mut(*next as usize) {
+                *place = *spot;
+            }
+            *next += 1;
+        }
+    }
+
+    /// Chainage from the window's origin to chainage along the tunnel, m.
+    pub(super) fn chainage_m(&self, x_m: f64) -> f64 {
+        self.origin_m + x_m
+    }
+
+    /// Perimeter, m.
+    pub(super) fn perimeter_m(&self) -> f64 {
+        self.perimeter_m
+    }
+
+    /// The nearest sample to a place, no farther than a distance; of equally near ones the first that is come by.
+    pub(super) fn nearest(&self, x_m: f64, sigma_m: f64, within_m: f64) -> Option<Nearest> {
+        let [per_turn, per_row, _] = self.per_m;
+        let turn = libm::floor(sigma_m * per_turn);
+        let sigma_m = sigma_m - turn * self.perimeter_m;
+        let mut best = Search { x_m, sigma_m, limit2: within_m * within_m, found: None };
+        let centre = whole((x_m - self.from_m) * per_row).min(self.rows - 1);
+        // Outwards from the place's own row: first both neighbours, then theirs.
+        self.look_in_row(centre, &mut best);
+        for ring in 1..self.rows {
+            let below = (centre >= ring).then(|| centre - ring);
+            let above = Some(centre + ring).filter(|row| *row < self.rows);
+            let mut in_reach = false;
+            for row in [below, above].into_iter().flatten() {
+                in_reach |= self.look_in_row(row, &mut best);
+            }
+            if !in_reach {
+                break;
+            }
+        }
+        let (spot, turns) = best.found?;
+        let turns = turns + turn;
+        Some(Nearest { x_m: spot.x_m, sigma_m: spot.sigma_m, turns, distance2: best.limit2 })
+    }
+
+    /// Looks at what a row has near a place; gives false when the whole row is too far away.
+    fn look_in_row(&self, row: usize, best: &mut Search) -> bool {
+        let low = self.from_m + row as f64 * self.cell_m - best.x_m;
+        let away = low.max(-(low + self.cell_m)).max(0.0);
+        let width2 = best.limit2 - away * away;
+        // A hair more, since sums of rounded edges are rounded.
+        if width2 < -1e-9 {
+            return false;
+        }
+        let width_m = math::sqrt(width2.max(0.0)) + 1e-9;
+        let first = row * self.columns;
+        if 2.0 * width_m + self.column_m >= self.perimeter_m {
+            self.look_all_round(first, best);
+            return true;
+        }
+        // A turn on, so that nothing is negative.
+        let on_m = best.sigma_m + self.perimeter_m;
+        let [_, _, per_column] = self.per_m;
+        let (left, right) = (whole((on_m - width_m) * per_column), whole((on_m + width_m) * per_column));
+        let columns = self.columns;
+        if left < columns {
+            self.look_at(first + left, first + columns, -1.0, best);
+        }
+        if right >= 2 * columns {
+            self.look_at(first, first + right - 2 * columns + 1, 1.0, best);
+        }
+        let (left, right) = (left.max(columns) - columns, right.min(2 * columns - 1) - columns);
+        self.look_at(first + left, first + right + 1, 0.0, best);
+        true
+    }
+
+    /// The samples of some cells in a row.
+    fn spots(&self, from: usize, to: usize) -> &[Spot] {
+        let (Some(begin), Some(end)) = (self.begins.get(from), self.begins.get(to)) else { return &[] };
+        self.spots.get(*begin as usize..*end as usize).unwrap_or_default()
+    }
+
+    /// Looks at the samples of some cells in a row, so many turns on.
+    fn look_at(&self, from: usize, to: usize, turns: f64, best: &mut Search) {
+        let sigma_m = best.sigma_m - turns * self.perimeter_m;
+        for spot in self.spots(from, to) {
+            let (dx, dsigma) = (spot.x_m - best.x_m, spot.sigma_m - sigma_m);
+            best.take(spot, turns, dx * dx + dsigma * dsigma);
+        }
+    }
+
+    /// Looks at all samples of a row, each the short way round.
+    fn look_all_round(&self, first: usize, best: &mut Search) {
+        let half_m = self.perimeter_m / 2.0;
+        for spot in self.spots(first, first + self.columns) {
+            let (dx, straight) = (spot.x_m - best.x_m, spot.sigma_m - best.sigma_m);
+            let turns = if straight >= half_m {
+                -1.0
+            } else if straight < -half_m {
+                1.0
+            } else {
+                0.0
+            };
+            let dsigma = straight + turns * self.perimeter_m;
+            best.take(spot, turns, dx * dx + dsigma * dsigma);
+        }
+    }
+}
+
+/// A search for the nearest.
+struct Search {
+    x_m: f64,
+    sigma_m: f64,
+    limit2: f64,
+    found: Option<(Spot, f64)>,
+}
+
+impl Search {
+    fn take(&mut self, spot: &Spot, turns: f64, distance2: f64) {
+        if distance2 < self.limit2 || (distance2 <= self.limit2 && self.found.is_none()) {
+            (self.limit2, self.found) = (distance2, Some((*spot, turns)));
+        }
+    }
+}
+
+/// The whole part of what isn't negative.
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "float to integer casts saturate, which is what is wanted"
+)]
+fn whole(x: f64) -> usize {
+    x as usize
+}

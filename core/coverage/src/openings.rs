@@ -1,0 +1,133 @@
+//! Declared openings of the wall, side tunnels and gates: what has no wall can't be covered. They are left out of holes,
+//! and listed; never passed silently.
+
+use super::store::{SampleStore, StoreError, WallSample};
+use headrace_geometry::math;
+use headrace_geometry::tunnel::Profile;
+
+/// A stretch of wall that isn't there.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Opening {
+    /// What people call it.
+    pub name: String,
+    /// Chainage at which it begins, m.
+    pub from_m: f64,
+    /// Chainage at which it ends, m.
+    pub to_m: f64,
+    /// Arc length at which it begins, and how far it goes on, m; `None` for all round.
+    pub arc_m: Option<(f64, f64)>,
+}
+
+/// Places of an opening are no farther apart than this, m, or a tenth of the target.
+const SPACING_M: f64 = 0.05;
+
+impl Opening {
+    /// Its extent along the perimeter, m.
+    fn arc(&self, perimeter_m: f64) -> (f64, f64) {
+        self.arc_m.map_or((0.0, perimeter_m), |(from_m, length_m)| (from_m, length_m.min(perimeter_m)))
+    }
+
+    /// How many places stand for it at a spacing.
+    fn counts(&self, perimeter_m: f64, spacing_m: f64) -> (i64, i64) {
+        let over = |length_m: f64| (-math::floor_to_i64(-length_m / spacing_m)).max(1);
+        (over(self.to_m - self.from_m), over(self.arc(perimeter_m).1))
+    }
+
+    /// How many places stand for it.
+    pub fn places(&self, perimeter_m: f64, target_m: f64) -> i64 {
+        let (along, around) = self.counts(perimeter_m, spacing_m(target_m));
+        (along + 1) * (around + 1)
+    }
+
+    /// Fills it with places, so that no circle without a sample reaches farther into it than half their spacing.
+    ///
+    /// Errors: there is no room, or it lies outside of what the store covers.
+    pub fn fill(&self, store: &mut SampleStore, target_m: f64) -> Result<(), StoreError> {
+        let perimeter_m = store.perimeter_m();
+        let (along, around) = self.counts(perimeter_m, spacing_m(target_m));
+        let (first_m, length_m) = self.arc(perimeter_m);
+        for i in 0..=along {
+            let x_m = self.from_m + (self.to_m - self.from_m) * i as f64 / along as f64;
+            for k in 0..=around {
+                let sigma_m = math::wrap(first_m + length_m * k as f64 / around as f64, perimeter_m);
+                store.insert(WallSample { x_m, sigma_m, head: 0, step_m: None })?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The share of a section's wall that it takes, 0 to 1.
+    pub fn share_of(&self, from_m: f64, to_m: f64, profile: &Profile) -> f64 {
+        let along_m = (to_m.min(self.to_m) - from_m.max(self.from_m)).max(0.0);
+        let perimeter_m = profile.perimeter_m();
+        along_m / (to_m - from_m) * self.arc(perimeter_m).1 / perimeter_m
+    }
+}
+
+fn spacing_m(target_m: f64) -> f64 {
+    SPACING_M.min(target_m / 10.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::hole::HoleFinder;
+    use crate::store::StoreLayout;
+    use headrace_geometry::tunnel::shapes;
+
+    fn gate() -> Opening {
+        Opening { name: "gate".to_owned(), from_m: 4.0, to_m: 6.0, arc_m: Some((17.0, 4.0)) }
+    }
+
+    /// A wall sampled every half metre, but for the opening.
+    fn store(profile: &Profile, with_opening: bool) -> SampleStore {
+        let layout = StoreLayout {
+            perimeter_m: profile.perimeter_m(),
+            from_m: -5.0,
+            to_m: 15.0,
+            cell_m: 0.25,
+            capacity: 100_000,
+        };
+        let mut store = SampleStore::new(layout);
+        for i in 0..=20 {
+            for k in 0..37 {
+                let (x_m, sigma_m) = (0.5 * f64::from(i), profile.perimeter_m() * f64::from(k) / 37.0);
+                let around_m = math::wrap(sigma_m - 17.0, profile.perimeter_m());
+                if (4.0..=6.0).contains(&x_m) && around_m <= 4.0 {
+                    continue;
+                }
+                store.insert(WallSample { x_m, sigma_m, head: 0, step_m: None }).unwrap();
+            }
+        }
+        if with_opening {
+            gate().fill(&mut store, 0.8).unwrap();
+        }
+        store
+    }
+
+    #[test]
+    fn a_declared_opening_is_no_hole_and_an_undeclared_one_is() {
+        let profile = shapes::circle(3.0).unwrap();
+        let hole = |with: bool, from_m: f64| {
+            let store = store(&profile, with);
+            let found = HoleFinder::default().largest(&store, from_m, from_m + 0.25);
+            found.diameter_m
+        };
+        assert!(hole(false, 5.0) > 2.0);
+        for from_m in [3.5, 3.75, 4.0, 5.0, 6.0, 6.25] {
+            let diameter_m = hole(true, from_m);
+            assert!((0.68..0.8).contains(&diameter_m), "at {from_m} m: {diameter_m} m");
+        }
+    }
+
+    #[test]
+    fn its_share_of_a_section_is_that_of_its_area() {
+        let profile = shapes::circle(3.0).unwrap();
+        let share = |from_m: f64| gate().share_of(from_m, from_m + 0.25, &profile);
+        assert!((share(5.0) - 4.0 / profile.perimeter_m()).abs() < 1e-12);
+        assert!((share(3.875) - 2.0 / profile.perimeter_m()).abs() < 1e-12);
+        assert!(share(6.5) <= 0.0);
+        let all_round = Opening { arc_m: None, ..gate() };
+        assert!((all_round.share_of(5.0, 5.25, &profile) - 1.0).abs() < 1e-12);
+    }
+}

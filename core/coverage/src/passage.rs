@@ -1,0 +1,185 @@
+//! How a section was passed: what its pings say, for the cause of a fail.
+
+use serde::{Deserialize, Serialize};
+
+use super::hole::Hole;
+use headrace_fusion::Fix;
+use headrace_fusion::relative::Relative;
+use headrace_geometry::frames::Vec3;
+use headrace_geometry::math;
+use headrace_geometry::tunnel::Profile;
+
+/// What the pings made within a section say of how it was passed.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Passage {
+    /// All pings, whatever came of them.
+    pub pings: u32,
+    /// Pings made where the vehicle's place was known.
+    pub placed: u32,
+    /// Pings without a return where the wall was within range, or its place not known.
+    pub missing: u32,
+    /// Pings without a return where the wall was farther than the range setting.
+    pub out_of_range: u32,
+    /// Pings that the vehicle itself stopped.
+    pub occluded: u32,
+    /// Returns that could not be placed.
+    pub unplaced: u32,
+    /// Pings of a head that stood still.
+    pub standing: u32,
+    /// The vehicle went through while nobody knew where it was.
+    pub unseen: bool,
+    /// Where on this section's wall pings of it and of others would have fallen that gave no sample.
+    pub lost: Lost,
+    /// Sum of the speeds at the pings, m/s.
+    pub speed_sum_mps: f64,
+    /// Sum of the times between passes, seconds.
+    pub pass_gap_sum_s: f64,
+    /// Sum of what those times would have been, spread evenly, seconds.
+    pub even_gap_sum_s: f64,
+    /// The same, had all heads turned, seconds.
+    pub all_gap_sum_s: f64,
+    /// Sum of how far the beams swung along the tunnel between two passes, m.
+    pub swing_sum_m: f64,
+    /// Sum of the times between pings, seconds.
+    pub ping_period_sum_s: f64,
+    /// The largest T_y that geometry predicted, m.
+    pub t_y_m: f64,
+    /// What it would have been from the middle of the tunnel, level, m.
+    pub middle_t_y_m: f64,
+    /// How far one pass may be off against another.
+    pub doubt: Doubt,
+}
+
+/// Why a ping that was aimed at a place of the wall gave no sample there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Loss {
+    /// No return, though the wall was within range.
+    Missing,
+    /// The wall was farther than the range setting.
+    OutOfRange,
+    /// The vehicle itself stood in the way.
+    Occluded,
+}
+
+impl Loss {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Missing, Self::OutOfRange, Self::Occluded];
+}
+
+/// Parts of the perimeter that are told apart.
+const PARTS: f64 = 64.0;
+
+/// Where round the wall of a section pings gave no sample: one bit for each of 64 parts of the perimeter, by reason.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Lost([u64; Loss::ALL.len()]);
+
+impl Lost {
+    /// Notes that a ping was lost at `sigma_m`, in [0, perimeter).
+    pub fn note(&mut self, loss: Loss, sigma_m: f64, perimeter_m: f64) {
+        if let Some(bits) = self.0.get_mut(loss as usize) {
+            *bits |= 1 << part(sigma_m, perimeter_m);
+        }
+    }
+
+    /// How many parts within `within_m` of an arc length have lost pings, by reason.
+    pub fn near(&self, sigma_m: f64, within_m: f64, perimeter_m: f64) -> [u32; Loss::ALL.len()] {
+        let near = (0..64_u32).fold(0_u64, |near, k| {
+            let middle_m = (f64::from(k) + 0.5) * perimeter_m / PARTS;
+            let off_m = math::wrap_signed(middle_m - sigma_m, perimeter_m).abs();
+            // A part counts when its nearer edge is in reach.
+            near | (u64::from(off_m - perimeter_m / (2.0 * PARTS) < within_m) << k)
+        });
+        self.0.map(|bits| (bits & near).count_ones())
+    }
+}
+
+fn part(sigma_m: f64, perimeter_m: f64) -> u32 {
+    u32::try_from(math::floor_to_i64(sigma_m / perimeter_m * PARTS).clamp(0, 63)).unwrap_or(0)
+}
+
+/// Pings lost within an empty circle, by reason, over the sections that it touches: each with the chainages at which it
+/// begins and ends.
+pub fn lost_within<'a>(
+    hole: &Hole,
+    radius_m: f64,
+    perimeter_m: f64,
+    sections: impl Iterator<Item = ((f64, f64), &'a Passage)>,
+) -> [u32; Loss::ALL.len()] {
+    let mut sum = [0; Loss::ALL.len()];
+    for ((from_m, to_m), passage) in sections {
+        let off_m = (from_m - hole.x_m).max(hole.x_m - to_m).max(0.0);
+        if off_m >= radius_m {
+            continue;
+        }
+        let within_m = math::sqrt((radius_m - off_m) * (radius_m + off_m));
+        let near = passage.lost.near(hole.sigma_m, within_m, perimeter_m);
+        sum = core::array::from_fn(|k| sum.get(k).copied().unwrap_or(0) + near.get(k).copied().unwrap_or(0));
+    }
+    sum
+}
+
+/// The largest hole of a section is looked for where errors have made it large: so much more is it off than the distance of
+/// two passes at one place. Measured over the field dives of `tests/fusion.rs`.
+const LARGEST_OF_MANY: f64 = 1.2;
+
+/// How far the samples of a pass may be off along the tunnel against those of the pass before.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Doubt {
+    /// The errors that move them.
+    pub relative: Relative,
+    /// Where the vehicle was in the cross-section, m.
+    pub from_m: [f64; 2],
+}
+
+impl Doubt {
+    /// Of a fix.
+    pub fn of(fix: &Fix) -> Self {
+        Self { relative: fix.relative, from_m: [fix.pose.position.y(), fix.pose.position.z()] }
+    }
+
+    /// Keeps the larger of the two.
+    pub fn add(&mut self, other: &Self) {
+        if other.relative.sigma_m(Vec3::zero()) >= self.relative.sigma_m(Vec3::zero()) {
+            *self = *other;
+        }
+    }
+
+    /// The largest standard deviation of a hole's diameter round the profile, m.
+    pub fn worst_m(&self, profile: &Profile) -> f64 {
+        const PLACES: u32 = 64;
+        let place = |k: u32| profile.point_at(profile.perimeter_m() * f64::from(k) / f64::from(PLACES));
+        (0..PLACES).map(|k| self.sigma_m(place(k))).fold(0.0, f64::max)
+    }
+
+    /// Standard deviation of the diameter of a hole there on the wall, m: one edge of it is a pass, the other edge the next.
+    pub fn sigma_m(&self, wall_m: [f64; 2]) -> f64 {
+        LARGEST_OF_MANY
+            * self.relative.sigma_m(Vec3::new(0.0, wall_m[0] - self.from_m[0], wall_m[1] - self.from_m[1]))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lost_pings_are_found_where_they_were_lost_and_across_the_seam() {
+        let mut lost = Lost::default();
+        lost.note(Loss::Missing, 0.05, 6.4);
+        lost.note(Loss::Occluded, 6.35, 6.4);
+        lost.note(Loss::Occluded, 3.2, 6.4);
+        assert_eq!(lost.near(6.39, 0.15, 6.4), [1, 0, 1]);
+        assert_eq!(lost.near(1.0, 0.5, 6.4), [0; 3]);
+        assert_eq!(lost.near(1.0, 3.3, 6.4), [1, 0, 2]);
+    }
+
+    #[test]
+    fn a_circle_is_narrower_towards_its_ends() {
+        let mut passage = Passage::default();
+        passage.lost.note(Loss::OutOfRange, 1.75, 6.4);
+        let hole = Hole { diameter_m: 2.0, least_m: 2.0, most_m: 2.0, x_m: 5.0, sigma_m: 1.0, bounded: true };
+        let within =
+            |from_m: f64| lost_within(&hole, 1.0, 6.4, core::iter::once(((from_m, from_m + 0.25), &passage)));
+        assert_eq!((within(5.0), within(5.75), within(6.0)), ([0, 1, 0], [0; 3], [0; 3]));
+    }
+}

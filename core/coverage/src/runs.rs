@@ -1,0 +1,277 @@
+//! Runs: neighbouring failed sections with one cause, told as one event with a number that stays.
+
+use serde::{Deserialize, Serialize};
+
+use super::cause::Cause;
+use super::hole::Hole;
+use headrace_geometry::time::MonoNs;
+use headrace_snapshot::stateful;
+
+/// Failed sections of one cause belong together when they are no farther apart than this, m.
+const JOIN_M: f64 = 0.5;
+
+/// Number of a run; it is never given again.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub struct RunId(pub u32);
+
+/// Neighbouring failed sections with one cause.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Run {
+    /// Why they failed.
+    pub cause: Cause,
+    /// Index of the first section.
+    pub from: i64,
+    /// Index after the last.
+    pub to: i64,
+    /// How many of them fail.
+    pub failed: u32,
+    /// The section with the largest hole, and the hole; the last one before it was cleared.
+    pub worst: (i64, Hole),
+    /// When the first of its flags was raised.
+    pub raised: MonoNs,
+    /// When it last changed.
+    pub changed: MonoNs,
+    /// Nothing of it fails any more, since then.
+    pub cleared: Option<MonoNs>,
+    /// It has become part of another.
+    pub merged_into: Option<RunId>,
+}
+
+impl Run {
+    /// Whether some of it still fails.
+    pub fn is_open(&self) -> bool {
+        self.failed > 0
+    }
+}
+
+/// What has become of a run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RunChange {
+    /// It is new.
+    Raised,
+    /// Its ends, its worst place or its extent have changed.
+    Changed,
+    /// Nothing of it fails any more, by a later pass or because its cause has turned out to be another.
+    Cleared,
+    /// It has become part of another.
+    Merged,
+}
+
+/// All runs of a dive.
+#[derive(Debug, Clone)]
+pub struct Runs {
+    first: i64,
+    join: i64,
+    runs: Vec<Run>,
+    /// By section: its run, one more than its number, or zero.
+    member: Vec<u32>,
+}
+
+stateful!(Runs { lists: runs; slots: member; fixed: first, join; });
+
+/// What runs need besides to take in what is said of a section.
+pub struct Telling<'a> {
+    /// The moment.
+    pub at: MonoNs,
+    /// The hole of any section.
+    pub hole: &'a dyn Fn(i64) -> Option<Hole>,
+    /// Hears of every run that changes.
+    pub tell: &'a mut dyn FnMut(RunId, RunChange),
+}
+
+impl Runs {
+    /// None yet, over `count` sections of `section_m` from index `first` on.
+    ///
+    /// Allocates: startup only; all that it will ever use.
+    pub fn new(first: i64, count: usize, section_m: f64) -> Self {
+        let join = headrace_geometry::math::floor_to_i64(JOIN_M / section_m + 1e-9).max(0) + 1;
+        Self { first, join, runs: Vec::with_capacity(count), member: vec![0; count] }
+    }
+
+    /// All that ever were, by number.
+    pub fn all(&self) -> &[Run] {
+        &self.runs
+    }
+
+    /// A run by its number.
+    pub fn get(&self, id: RunId) -> Option<&Run> {
+        self.runs.get(id.0 as usize)
+    }
+
+    /// The run that a section belongs to.
+    pub fn of(&self, section: i64) -> Option<RunId> {
+        self.member.get(self.slot(section)?).copied()?.checked_sub(1).map(RunId)
+    }
+
+    /// Takes in what is now said of a section: that it fails for a cause, or, with `None`, that it doesn't.
+    ///
+    /// Allocates: never.
+    pub fn set(&mut self, section: i64, cause: Option<Cause>, telling: &mut Telling<'_>) {
+        let before = self.of(section);
+        let same = before.filter(|id| self.get(*id).map(|run| run.cause) == cause);
+        if let Some(id) = same {
+            self.measure_again(id, section, telling);
+            (telling.tell)(id, RunChange::Changed);
+            return;
+        }
+        if let Some(id) = before {
+            self.leave(section, id, telling);
+        }
+        if let Some(cause) = cause {
+            self.join(section, cause, telling);
+        }
+    }
+
+    /// A section that fails joins the runs of its cause near by, which become one, or begins a run.
+    fn join(&mut self, section: i64, cause: Cause, telling: &mut Telling<'_>) {
+        let near = |side: i64| {
+            let run = |step: i64| self.of(section + side * step);
+            (1..=self.join).filter_map(run).find(|id| self.get(*id).is_some_and(|run| run.cause == cause))
+        };
+        let (kept, other) = match (near(-1), near(1)) {
+            (Some(a), Some(b)) if a != b => (a.min(b), Some(a.max(b))),
+            (Some(id), _) | (None, Some(id)) => (id, None),
+            (None, None) => {
+                if let Some(id) = self.begin(section, cause, telling) {
+                    (telling.tell)(id, RunChange::Raised);
+                }
+                return;
+            }
+        };
+        self.put(section, kept);
+        self.add(kept, section, telling);
+        if let Some(other) = other {
+            self.merge(other, kept, telling.at);
+            (telling.tell)(other, RunChange::Merged);
+        }
+        (telling.tell)(kept, RunChange::Changed);
+    }
+
+    /// A section leaves its run, which shrinks, falls in two, or is cleared.
+    fn leave(&mut self, section: i64, id: RunId, telling: &mut Telling<'_>) {
+        self.take_out(section);
+        let Some(run) = self.get(id).copied() else { return };
+        let mut after = (section + 1..run.to).filter(|index| self.of(*index) == Some(id));
+        let later = after.next();
+        let earlier = (run.from..section).rev().find(|index| self.of(*index) == Some(id));
+        if let (Some(earlier), Some(later)) = (earlier, later)
+            && later - earlier > self.join
+            && let Some(new) = self.begin(later, run.cause, telling)
+        {
+            for index in later..run.to {
+                if self.of(index) == Some(id) {
+                    self.put(index, new);
+                }
+            }
+            self.measure(new, telling);
+            (telling.tell)(new, RunChange::Raised);
+        }
+        self.measure(id, telling);
+        let open = self.get(id).is_some_and(Run::is_open);
+        (telling.tell)(id, if open { RunChange::Changed } else { RunChange::Cleared });
+    }
+
+    fn begin(&mut self, section: i64, cause: Cause, telling: &Telling<'_>) -> Option<RunId> {
+        if self.runs.len() == self.runs.capacity() {
+            // There have been more than sections: this one is still flagged, but in no run.
+            return None;
+        }
+        let id = RunId(u32::try_from(self.runs.len()).ok()?);
+        let worst = (section, (telling.hole)(section)?);
+        let (from, to, at) = (section, section + 1, telling.at);
+        self.runs.push(Run {
+            cause,
+            from,
+            to,
+            failed: 1,
+            worst,
+            raised: at,
+            changed: at,
+            cleared: None,
+            merged_into: None,
+        });
+        self.put(section, id);
+        Some(id)
+    }
+
+    fn merge(&mut self, other: RunId, kept: RunId, at: MonoNs) {
+        let Some(run) = self.get(other).copied() else { return };
+        for index in run.from..run.to {
+            if self.of(index) == Some(other) {
+                self.put(index, kept);
+            }
+        }
+        if let Some(kept) = self.runs.get_mut(kept.0 as usize) {
+            kept.failed += run.failed;
+            kept.worst = larger(kept.worst, run.worst);
+        }
+        if let Some(run) = self.runs.get_mut(other.0 as usize) {
+            (run.failed, run.changed, run.cleared, run.merged_into) = (0, at, Some(at), Some(kept));
+        }
+    }
+
+    /// Counts in a section that has just come in.
+    fn add(&mut self, id: RunId, section: i64, telling: &Telling<'_>) {
+        let hole = (telling.hole)(section);
+        if let Some(run) = self.runs.get_mut(id.0 as usize) {
+            run.failed += 1;
+            run.changed = telling.at;
+            run.worst = hole.map_or(run.worst, |hole| larger(run.worst, (section, hole)));
+        }
+    }
+
+    /// Looks at a section of the run whose hole has changed.
+    fn measure_again(&mut self, id: RunId, section: i64, telling: &Telling<'_>) {
+        let (Some(run), Some(hole)) = (self.runs.get_mut(id.0 as usize), (telling.hole)(section)) else {
+            return;
+        };
+        if run.worst.0 == section && hole.diameter_m < run.worst.1.diameter_m {
+            self.measure(id, telling);
+        } else {
+            run.changed = telling.at;
+            run.worst = larger(run.worst, (section, hole));
+        }
+    }
+
+    /// Counts a run's sections anew, and looks for its ends and its worst place.
+    fn measure(&mut self, id: RunId, telling: &Telling<'_>) {
+        let Some(run) = self.get(id).copied() else { return };
+        let members = || (run.from..run.to).filter(|index| self.of(*index) == Some(id));
+        let failed = u32::try_from(members().count()).unwrap_or(u32::MAX);
+        let holes = members().filter_map(|index| Some((index, (telling.hole)(index)?)));
+        let worst = holes.reduce(larger).unwrap_or(run.worst);
+        let ends = members().next().zip(members().next_back());
+        let (from, to) = ends.map_or((run.from, run.to), |(first, last)| (first, last + 1));
+        let cleared = (failed == 0).then_some(telling.at);
+        if let Some(run) = self.runs.get_mut(id.0 as usize) {
+            *run = Run { failed, worst, from, to, cleared, changed: telling.at, ..*run };
+        }
+    }
+
+    fn put(&mut self, section: i64, id: RunId) {
+        if let Some(slot) = self.slot(section).and_then(|slot| self.member.get_mut(slot)) {
+            *slot = id.0 + 1;
+        }
+        if let Some(run) = self.runs.get_mut(id.0 as usize) {
+            (run.from, run.to) = (run.from.min(section), run.to.max(section + 1));
+        }
+    }
+
+    fn take_out(&mut self, section: i64) {
+        if let Some(slot) = self.slot(section).and_then(|slot| self.member.get_mut(slot)) {
+            *slot = 0;
+        }
+    }
+
+    fn slot(&self, section: i64) -> Option<usize> {
+        usize::try_from(section - self.first).ok().filter(|slot| *slot < self.member.len())
+    }
+}
+
+/// The place with the larger hole; of equal ones the first.
+fn larger(a: (i64, Hole), b: (i64, Hole)) -> (i64, Hole) {
+    if b.1.diameter_m > a.1.diameter_m { b } else { a }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,196 @@
+//! One section: what was measured in it, its hole, its verdict, and its flag.
+
+use serde::{Deserialize, Serialize};
+
+use super::cause::Evidence;
+use super::deviation::Deviation;
+use super::hole::Hole;
+use super::passage::Passage;
+use headrace_geometry::math;
+use headrace_geometry::time::MonoNs;
+
+/// What is said of a section. Source: metrics.md, "Sections and verdicts".
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum Verdict {
+    /// Samples may still come without turning back.
+    #[default]
+    Open,
+    /// D + 2 sigma_D <= T.
+    Pass,
+    /// D - 2 sigma_D > T.
+    Fail,
+    /// Neither can be said for sure.
+    CannotSay,
+}
+
+impl Verdict {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Open, Self::Pass, Self::Fail, Self::CannotSay];
+
+    /// The word used in reports and logs.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Open => "open",
+            Self::Pass => "pass",
+            Self::Fail => "fail",
+            Self::CannotSay => "cannot_say",
+        }
+    }
+}
+
+/// Count, mean, deviation and extremes of a quantity.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Spread {
+    /// Values.
+    pub count: u32,
+    /// The smallest.
+    pub min: f64,
+    /// The largest.
+    pub max: f64,
+    mean: f64,
+    /// Sum of the squares of their distances from the mean.
+    scatter: f64,
+}
+
+impl Default for Spread {
+    fn default() -> Self {
+        Self { count: 0, min: f64::INFINITY, max: f64::NEG_INFINITY, mean: 0.0, scatter: 0.0 }
+    }
+}
+
+impl Spread {
+    /// Takes a value in.
+    pub fn add(&mut self, value: f64) {
+        self.merge(&Self { count: 1, min: value, max: value, mean: value, scatter: 0.0 });
+    }
+
+    /// Takes in all that another has seen.
+    ///
+    /// Source: Chan, Golub, LeVeque 1983: sums of squares about the mean keep the digits that plain ones lose.
+    pub fn merge(&mut self, other: &Self) {
+        if other.count == 0 {
+            return;
+        }
+        let (a, b) = (f64::from(self.count), f64::from(other.count));
+        let (off, share) = (other.mean - self.mean, b / (a + b));
+        self.mean += off * share;
+        self.scatter += other.scatter + off * off * a * share;
+        self.count += other.count;
+        self.min = self.min.min(other.min);
+        self.max = self.max.max(other.max);
+    }
+
+    /// Mean; `None` without values.
+    pub fn mean(&self) -> Option<f64> {
+        (self.count > 0).then_some(self.mean)
+    }
+
+    /// Standard deviation of the values themselves; `None` without values.
+    pub fn sd(&self) -> Option<f64> {
+        (self.count > 0).then(|| math::sqrt(self.scatter / f64::from(self.count)))
+    }
+}
+
+/// What judging a section has changed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Judgement {
+    /// The verdict or the hole has a new value.
+    Updated,
+    /// A flag was raised.
+    Raised,
+    /// A flag was cleared.
+    Cleared,
+}
+
+/// One section.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Section {
+    /// The verdict so far.
+    pub verdict: Verdict,
+    /// The hole as last measured.
+    pub hole: Option<Hole>,
+    /// Standard deviation of the hole's diameter, m.
+    pub hole_sigma_m: f64,
+    /// Whether no later sample on the way forward can change the verdict, nor the hole of a fail.
+    pub settled: bool,
+    /// When the fail was flagged.
+    pub flagged: Option<MonoNs>,
+    /// When a later pass filled the hole.
+    pub cleared: Option<MonoNs>,
+    /// Why it failed.
+    pub evidence: Option<Evidence>,
+    /// How it was passed.
+    pub passage: Passage,
+    /// T_x of its samples, m.
+    pub t_x_m: Spread,
+    /// T_y of its samples, m.
+    pub t_y_m: Spread,
+    /// T of its samples, m.
+    pub t_m: Spread,
+    /// Samples on its wall.
+    pub samples: u32,
+    /// How far its wall is from the design.
+    pub deviation: Deviation,
+    /// Share of its wall that is a declared opening.
+    pub masked_share: f64,
+    /// Samples have come within the target of it since it was last judged.
+    pub(super) stale: bool,
+}
+
+/// Fewer samples than this don't contradict a profile.
+const FEW: u32 = 20;
+/// More of a section than this is an opening: there is no wall to speak of.
+const ALL_MASKED: f64 = 0.999;
+
+impl Section {
+    /// Whether it has a flag that no later pass has cleared.
+    pub fn is_flagged(&self) -> bool {
+        self.flagged.is_some() && self.cleared.is_none()
+    }
+
+    /// Whether its samples contradict the design profile, on which everything else is measured.
+    pub fn contradicts(&self) -> bool {
+        self.samples >= FEW && self.deviation.contradicts()
+    }
+
+    /// Whether a small hole says nothing: the profile is wrong, or there is no wall.
+    pub(super) fn is_doubtful(&self) -> bool {
+        self.contradicts() || self.masked_share > ALL_MASKED
+    }
+
+    /// Raises or clears its flag as its verdict demands.
+    pub(super) fn flag(&mut self, at: MonoNs) -> Judgement {
+        match self.verdict {
+            Verdict::Fail if !self.is_flagged() => {
+                (self.flagged, self.cleared) = (Some(at), None);
+                Judgement::Raised
+            }
+            Verdict::Pass if self.is_flagged() => {
+                self.cleared = Some(at);
+                Judgement::Cleared
+            }
+            _ => Judgement::Updated,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_spread_keeps_its_digits_far_from_zero_and_whatever_is_merged() {
+        let values = [1e8 + 1.0, 1e8 + 2.0, 1e8 + 4.0, 1e8 + 9.0];
+        let (mut whole, mut first, mut second) = (Spread::default(), Spread::default(), Spread::default());
+        for (k, value) in values.into_iter().enumerate() {
+            whole.add(value);
+            if k < 3 { first.add(value) } else { second.add(value) }
+        }
+        first.merge(&second);
+        for spread in [whole, first] {
+            assert!((spread.mean().unwrap() - 1e8 - 4.0).abs() < 1e-7);
+            assert!((spread.sd().unwrap() - 9.5_f64.sqrt()).abs() < 1e-7, "{:?}", spread.sd());
+        }
+        assert_eq!((Spread::default().mean(), Spread::default().sd()), (None, None));
+    }
+}

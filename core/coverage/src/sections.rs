@@ -1,0 +1,386 @@
+//! Sections of the tunnel: what was measured in each, its hole, its verdict, and its flag.
+
+use core::ops::Range;
+
+use super::cause::{Case, Evidence, explain};
+use super::frontier::{Frontier, Moved, Reach, clear_of};
+use super::hole::{FARTHEST_M, Hole, HoleFinder};
+use super::openings::Opening;
+use super::runs::{RunChange, RunId, Runs, Telling};
+use super::section::{Judgement, Section, Verdict};
+use super::store::SampleStore;
+use headrace_geometry::math;
+use headrace_geometry::time::MonoNs;
+use headrace_geometry::tunnel::Profile;
+use headrace_snapshot::stateful;
+
+/// Asks for a section to be judged as of a moment.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Request {
+    /// Index of the section, from chainage zero.
+    pub section: i64,
+    /// The moment.
+    pub at: MonoNs,
+    /// The stretch that every head had swept by then.
+    pub swept_by_all: Option<Reach>,
+    /// Where samples may land without the vehicle turning back.
+    pub to_come: Option<Reach>,
+    /// It is known to fail already: an empty circle, not its largest, is out of the way.
+    pub fails: bool,
+}
+
+impl Request {
+    /// Asks for sections as of one moment.
+    fn at(at: MonoNs, frontier: &Frontier) -> impl Fn(i64) -> Self {
+        let (swept_by_all, to_come) = (frontier.swept_by_all(at), frontier.to_come(at));
+        move |section| Self { section, at, swept_by_all, to_come, fails: false }
+    }
+}
+
+/// What judging looks at, and who hears of the runs that it changes.
+pub struct Judging<'a> {
+    /// The samples.
+    pub store: &'a SampleStore,
+    /// The search, with its memory.
+    pub finder: &'a mut HoleFinder,
+    /// The design profile.
+    pub profile: &'a Profile,
+    /// Hears of every run that changes.
+    pub tell: &'a mut dyn FnMut(RunId, RunChange),
+}
+
+/// All sections of the stretch of tunnel that the store covers, and the runs of those that are flagged.
+#[derive(Debug, Clone)]
+pub struct Sections {
+    section_m: f64,
+    target_m: f64,
+    first: i64,
+    sections: Vec<Section>,
+    runs: Runs,
+}
+
+stateful!(Sections { state: runs; slots: sections; fixed: section_m, target_m, first; });
+
+impl Sections {
+    /// Sections of `section_m` over [`from_m`, `to_m`].
+    ///
+    /// Allocates: startup only; all that it will ever use.
+    pub fn new(section_m: f64, target_m: f64, from_m: f64, to_m: f64) -> Self {
+        let first = math::floor_to_i64(from_m / section_m);
+        let end = -math::floor_to_i64(-to_m / section_m);
+        let count = usize::try_from(end - first).unwrap_or(0);
+        let runs = Runs::new(first, count, section_m);
+        Self { section_m, target_m, first, sections: vec![Section::default(); count], runs }
+    }
+
+    /// The runs of flagged sections.
+    pub fn runs(&self) -> &Runs {
+        &self.runs
+    }
+
+    /// Leaves a declared opening out of the sections that it lies in.
+    pub fn mask(&mut self, opening: &Opening, profile: &Profile) {
+        for index in self.index_of(opening.from_m)..=self.index_of(opening.to_m) {
+            let (from_m, to_m) = self.bounds_m(index);
+            let share = opening.share_of(from_m, to_m, profile);
+            if let Some(section) = self.get_mut(index) {
+                section.masked_share = (section.masked_share + share).min(1.0);
+            }
+        }
+    }
+
+    /// How many sections there are.
+    pub fn len(&self) -> usize {
+        self.sections.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.sections.is_empty()
+    }
+
+    /// Length of a section, m.
+    pub fn section_m(&self) -> f64 {
+        self.section_m
+    }
+
+    /// Target T, m.
+    pub fn target_m(&self) -> f64 {
+        self.target_m
+    }
+
+    /// How far from a sample it may change a verdict of pass or fail, m.
+    pub fn margin_m(&self, relative_sigma_m: f64) -> f64 {
+        self.target_m / 2.0 + relative_sigma_m
+    }
+
+    /// Index of the section at a chainage.
+    pub fn index_of(&self, x_m: f64) -> i64 {
+        math::floor_to_i64(x_m / self.section_m)
+    }
+
+    /// Chainages at which a section begins and ends, m.
+    pub fn bounds_m(&self, index: i64) -> (f64, f64) {
+        (index as f64 * self.section_m, (index + 1) as f64 * self.section_m)
+    }
+
+    /// A section by its index from chainage zero.
+    pub fn get(&self, index: i64) -> Option<&Section> {
+        self.sections.get(usize::try_from(index - self.first).ok()?)
+    }
+
+    /// The same, to be changed.
+    pub fn get_mut(&mut self, index: i64) -> Option<&mut Section> {
+        self.sections.get_mut(usize::try_from(index - self.first).ok()?)
+    }
+
+    /// Notes that a sample fell at `x_m`: every section within the target of it is open to judgement again.
+    pub fn touch(&mut self, x_m: f64) {
+        let (from, to) = (self.index_of(x_m - self.target_m), self.index_of(x_m + self.target_m));
+        for index in from..=to {
+            if let Some(section) = self.get_mut(index) {
+                section.stale = true;
+            }
+        }
+    }
+
+    /// Calls `ask` for every section that is to be judged after the heads have moved: those that were left, and those whose
+    /// hole may be out of the way now.
+    ///
+    /// Allocates: never.
+    pub fn due(&mut self, moved: &Moved, frontier: &Frontier, at: MonoNs, ask: &mut impl FnMut(Request)) {
+        if moved.left_behind.is_empty() && moved.left_ahead.is_empty() {
+            return;
+        }
+        if moved.to_come.is_none() {
+            return;
+        }
+        let passed = self.passed(frontier.swept());
+        let ask_for = Request::at(at, frontier);
+        for range in [&moved.left_behind, &moved.left_ahead] {
+            for index in clamp(range.clone(), &passed) {
+                let Some(section) = self.get_mut(index) else { continue };
+                if section.stale || section.hole.is_none() {
+                    section.stale = false;
+                    section.settled = false;
+                    ask(ask_for(index));
+                }
+            }
+        }
+        let far = math::floor_to_i64(FARTHEST_M / self.section_m) + 1;
+        let behind = moved.left_behind.end - far..moved.left_behind.end;
+        let ahead = moved.left_ahead.start..moved.left_ahead.start + far;
+        for range in [behind, ahead] {
+            for index in clamp(range, &passed) {
+                let target_m = self.target_m;
+                let Some(section) = self.get_mut(index).filter(|section| !section.settled) else { continue };
+                let Some(hole) = section.hole else { continue };
+                let clear_m = clear_of(moved.to_come, hole.x_m);
+                let left_m = hole.least_m.min(2.0 * clear_m);
+                let fails =
+                    section.verdict == Verdict::Open && left_m - 2.0 * section.hole_sigma_m > target_m;
+                if fails || clear_m >= hole.diameter_m / 2.0 {
+                    ask(ask_for(index));
+                }
+            }
+        }
+    }
+
+    /// Calls `ask` for sections between those that are left and those that aren't reached yet: that fail for certain, though
+    /// their hole isn't out of the way, and flagged ones that have got samples since they were judged. Without it, nothing
+    /// would be said of them while the vehicle stands.
+    ///
+    /// Allocates: never.
+    pub fn look_around(
+        &mut self,
+        (frontier, at): (&Frontier, MonoNs),
+        store: &SampleStore,
+        finder: &mut HoleFinder,
+        profile: &Profile,
+        ask: &mut impl FnMut(Request),
+    ) {
+        let Some(zone) = frontier.still_zone(at) else { return };
+        let to_come = frontier.to_come(at);
+        let ask_for = Request::at(at, frontier);
+        for index in clamp(zone, &self.passed(frontier.swept())) {
+            let Some(section) = self.get_mut(index) else { continue };
+            if section.is_flagged() {
+                if core::mem::take(&mut section.stale) {
+                    ask(ask_for(index));
+                }
+                continue;
+            }
+            if self.fails_already(index, to_come, store, finder, profile) {
+                ask(Request { fails: true, ..ask_for(index) });
+            }
+        }
+    }
+
+    /// Whether an empty circle of a section, too large for the target, lies where no sample will come any more.
+    fn fails_already(
+        &self,
+        index: i64,
+        to_come: Option<Reach>,
+        store: &SampleStore,
+        finder: &mut HoleFinder,
+        profile: &Profile,
+    ) -> bool {
+        let Some(section) = self.get(index) else { return false };
+        let bounds_m = self.bounds_m(index);
+        let radius_m = self.target_m / 2.0 + section.passage.doubt.worst_m(profile);
+        let clear_m = clear_of(to_come, bounds_m.0).max(clear_of(to_come, bounds_m.1));
+        clear_m > radius_m && finder.has_circle(store, bounds_m, to_come, radius_m)
+    }
+
+    /// Measures a section's hole and says what it means.
+    ///
+    /// Allocates: never.
+    pub fn judge(&mut self, request: &Request, judging: &mut Judging<'_>) -> Option<Judgement> {
+        let (from_m, to_m) = self.bounds_m(request.section);
+        let target_m = self.target_m;
+        let section = self.get_mut(request.section)?;
+        let hole = judging.finder.largest(judging.store, from_m, to_m);
+        let sigma_m = section.passage.doubt.sigma_m(judging.profile.point_at(hole.sigma_m));
+        let clear_m = clear_of(request.to_come, hole.x_m);
+        section.hole = Some(hole);
+        section.hole_sigma_m = sigma_m;
+        section.verdict = match verdict(&hole, sigma_m, target_m, clear_m) {
+            Verdict::Pass if section.is_doubtful() => Verdict::CannotSay,
+            Verdict::Open | Verdict::CannotSay if request.fails => Verdict::Fail,
+            verdict => verdict,
+        };
+        // Of a hole no larger than the target, nothing can come nearer than its own edge.
+        section.settled = section.verdict == Verdict::Pass || clear_m >= hole.diameter_m / 2.0;
+        if section.verdict == Verdict::Fail {
+            let evidence = self.explain(&hole, request.swept_by_all, judging.profile.perimeter_m());
+            self.get_mut(request.section)?.evidence = Some(evidence);
+        }
+        let judgement = self.get_mut(request.section)?.flag(request.at);
+        self.tell_runs(request, judging);
+        Some(judgement)
+    }
+
+    /// Puts a flagged section into its run, and one whose flag was cleared out of it.
+    fn tell_runs(&mut self, request: &Request, judging: &mut Judging<'_>) {
+        let Self { sections, runs, first, .. } = self;
+        let get = |index: i64| sections.get(usize::try_from(index - *first).ok()?);
+        let flagged = get(request.section).filter(|section| section.is_flagged());
+        let cause = flagged.and_then(|section| section.evidence).map(|evidence| evidence.cause);
+        if cause.is_none() && runs.of(request.section).is_none() {
+            return;
+        }
+        let hole = |index: i64| get(index)?.hole;
+        runs.set(request.section, cause, &mut Telling { at: request.at, hole: &hole, tell: judging.tell });
+    }
+
+    /// The cause of a hole, from the passages of the sections that it touches.
+    fn explain(&self, hole: &Hole, swept_by_all: Option<Reach>, perimeter_m: f64) -> Evidence {
+        let radius_m = hole.diameter_m / 2.0;
+        let touched = self.index_of(hole.x_m - radius_m)..self.index_of(hole.x_m + radius_m) + 1;
+        let passages = touched.filter_map(|index| Some((self.bounds_m(index), &self.get(index)?.passage)));
+        explain(&Case { hole, swept_by_all, target_m: self.target_m, perimeter_m }, &passages)
+    }
+
+    /// Calls `ask` for every section that was passed and isn't settled, at the end of a dive.
+    pub fn unsettled(
+        &mut self,
+        (frontier, at): (&Frontier, MonoNs),
+        store: &SampleStore,
+        finder: &mut HoleFinder,
+        profile: &Profile,
+        ask: &mut impl FnMut(Request),
+    ) {
+        let ask_for = Request::at(at, frontier);
+        let to_come = frontier.to_come(at);
+        for index in self.passed(frontier.swept()) {
+            let Some(section) = self.get_mut(index) else { continue };
+            // The hole of a fail may have been narrowed from farther away than a pass depends on.
+            if section.stale || !section.settled || section.verdict != Verdict::Pass {
+                section.stale = false;
+                let fails = self.fails_already(index, to_come, store, finder, profile);
+                ask(Request { fails, ..ask_for(index) });
+            }
+        }
+    }
+
+    /// Indexes of the sections that a swept stretch touches and the table holds.
+    pub fn passed(&self, swept: Option<Reach>) -> Range<i64> {
+        let Some(reach) = swept else { return 0..0 };
+        let end = self.first + i64::try_from(self.sections.len()).unwrap_or(i64::MAX);
+        clamp(self.index_of(reach.from_m)..self.index_of(reach.to_m) + 1, &(self.first..end))
+    }
+}
+
+/// What is said of a hole whose centre is `clear_m` from where samples may still land. `pass` when D + 2 sigma <= T: more
+/// samples won't make it larger. `fail` when D - 2 sigma > T for whatever D will be: samples come no nearer than `clear_m`.
+/// In between `open` while D may change, then `cannot_say`. A verdict holds for both bounds of D. Wall without samples
+/// around it fails.
+pub(super) fn verdict(hole: &Hole, sigma_m: f64, target_m: f64, clear_m: f64) -> Verdict {
+    let is_left = 2.0 * clear_m >= hole.diameter_m;
+    if hole.bounded && hole.most_m + 2.0 * sigma_m <= target_m {
+        Verdict::Pass
+    } else if hole.least_m.min(2.0 * clear_m) - 2.0 * sigma_m > target_m || !hole.bounded && is_left {
+        Verdict::Fail
+    } else if is_left {
+        Verdict::CannotSay
+    } else {
+        Verdict::Open
+    }
+}
+
+fn clamp(range: Range<i64>, within: &Range<i64>) -> Range<i64> {
+    range.start.max(within.start)..range.end.min(within.end)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const BEHIND: f64 = f64::INFINITY;
+
+    fn hole(diameter_m: f64) -> Hole {
+        Hole { diameter_m, least_m: diameter_m, most_m: diameter_m, x_m: 0.0, sigma_m: 0.0, bounded: true }
+    }
+
+    #[test]
+    fn a_wall_without_samples_never_passes() {
+        let hole = Hole { bounded: false, ..hole(2.0 * FARTHEST_M) };
+        assert_eq!(verdict(&hole, 0.0, 100.0, BEHIND), Verdict::Fail);
+        assert_eq!(verdict(&hole, 0.0, 100.0, 1.0), Verdict::Open);
+    }
+
+    #[test]
+    fn the_verdict_needs_two_standard_deviations() {
+        for (diameter_m, expected) in [
+            (0.79, Verdict::Pass),
+            (0.81, Verdict::CannotSay),
+            (1.19, Verdict::CannotSay),
+            (1.21, Verdict::Fail),
+        ] {
+            assert_eq!(verdict(&hole(diameter_m), 0.1, 1.0, BEHIND), expected, "{diameter_m}");
+        }
+        assert_eq!(verdict(&hole(1.0), 0.0, 1.0, BEHIND), Verdict::Pass, "as large as the target passes");
+    }
+
+    #[test]
+    fn what_samples_may_still_fill_is_open_until_enough_of_it_is_out_of_their_reach() {
+        let at = |clear_m: f64| verdict(&hole(2.0), 0.1, 1.0, clear_m);
+        assert_eq!(
+            [0.0, 0.59, 0.61, 1.0].map(at),
+            [Verdict::Open, Verdict::Open, Verdict::Fail, Verdict::Fail]
+        );
+        let unsure = |clear_m: f64| verdict(&hole(1.1), 0.1, 1.0, clear_m);
+        assert_eq!([0.5, 0.56].map(unsure), [Verdict::Open, Verdict::CannotSay]);
+    }
+
+    #[test]
+    fn bounds_on_either_side_of_the_target_say_nothing() {
+        let within = |diameter_m: f64, least_m: f64, most_m: f64| {
+            verdict(&Hole { least_m, most_m, ..hole(diameter_m) }, 0.0, 0.5, BEHIND)
+        };
+        assert_eq!(within(0.51, 0.49, 0.51), Verdict::CannotSay);
+        assert_eq!(within(0.51, 0.501, 0.51), Verdict::Fail);
+        assert_eq!(within(0.49, 0.49, 0.505), Verdict::CannotSay);
+        assert_eq!(within(0.49, 0.45, 0.5), Verdict::Pass);
+    }
+}

@@ -1,0 +1,412 @@
+//! Samples on the unrolled wall, in bricks: some rows of square cells round the perimeter.
+//!
+//! Bricks near the vehicle are open: samples as they came, listed by cell. Those farther away are packed to four bytes a
+//! sample and opened again when the vehicle comes back or a pass is looked for in them. A cell that is full of samples
+//! keeps only those that add something. Memory in use so grows with the wall that was seen, not with the time spent
+//! there. All of it is allocated before the loop is armed; the system maps a page only when something falls on it.
+
+mod open;
+mod packed;
+mod passes;
+mod thinning;
+
+use serde::{Deserialize, Serialize};
+
+use self::open::{CellAt, OpenBricks};
+use self::packed::{Arena, Lattice, MOST_WORDS, Packed, Reader, Writer};
+use headrace_geometry::math;
+use headrace_sampling::head::MAX_HEADS;
+use headrace_snapshot::stateful;
+
+/// Bricks that are open at a time. At a metre each they reach farther than any search, to either side of where it is.
+const OPEN_BRICKS: usize = 64;
+/// Least length of a brick, m.
+const BRICK_M: f64 = 1.0;
+/// Rows of a brick at most: those of an open one have a bit each.
+const MOST_ROWS: usize = 32;
+/// Samples for which there is room in open bricks.
+const OPEN_SAMPLES: usize = 1 << 18;
+/// Words that a brick may leave unused in its last block, and those that name its heads.
+const WORDS_PER_BRICK: usize = 48;
+
+/// A sample on the unrolled wall.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WallSample {
+    /// Chainage, m.
+    pub x_m: f64,
+    /// Arc length along the profile, m.
+    pub sigma_m: f64,
+    /// Number of the head, below [`MAX_HEADS`].
+    pub head: usize,
+    /// The way from the sample before, along the tunnel and along the perimeter, m, when the same head has come from
+    /// there in a single step of the same sweep.
+    pub step_m: Option<[f64; 2]>,
+}
+
+/// Extent and resolution of a [`SampleStore`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StoreLayout {
+    /// Perimeter of the profile, m.
+    pub perimeter_m: f64,
+    /// First chainage of which samples are kept, m.
+    pub from_m: f64,
+    /// Last chainage, m.
+    pub to_m: f64,
+    /// Wanted edge of a cell, m; half the target suits the searches.
+    pub cell_m: f64,
+    /// Samples for which there is room at least.
+    pub capacity: u32,
+}
+
+impl StoreLayout {
+    /// The edge of a cell that suits searches for holes about as large as the target, m.
+    pub fn cell_for_target_m(target_m: f64) -> f64 {
+        (target_m / 2.0).clamp(0.05, 0.5)
+    }
+}
+
+/// What became of a sample.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kept {
+    /// It is kept.
+    Stored,
+    /// Its cell is full and has one close by; that one stands for it.
+    Thinned,
+}
+
+/// Why a sample was not kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum StoreError {
+    /// Its chainage is outside the store's extent, or its coordinates are no numbers.
+    #[error("the sample lies outside the stretch of tunnel that the store covers")]
+    Outside,
+    /// The store is full.
+    #[error("the store is full")]
+    Full,
+}
+
+/// By how much the samples of a stretch may differ from those that came.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Fidelity {
+    /// A sample that isn't kept is no farther than this from one that is, m.
+    pub thinned_m: f64,
+    /// No kept sample is farther than this from where it fell, m.
+    pub moved_m: f64,
+}
+
+/// What a store holds, and the memory that it has used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct StoreUse {
+    /// Samples kept.
+    pub kept: u64,
+    /// Samples that others stand for.
+    pub thinned: u64,
+    /// Bytes that hold samples, or have held some: what the system has mapped.
+    pub bytes: usize,
+}
+
+/// Some rows of cells.
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
+struct Brick {
+    /// Its first block in the arena, or zero.
+    first_block: u32,
+    /// Its samples.
+    count: u32,
+    /// One more than its slot when it is open, or zero.
+    slot: u16,
+    /// How coarsely it was thinned at most.
+    tier: u8,
+    /// Whether it has been packed before.
+    moved: bool,
+}
+
+impl Brick {
+    fn open_slot(&self) -> Option<usize> {
+        self.slot.checked_sub(1).map(usize::from)
+    }
+}
+
+/// See the module's description.
+#[derive(Debug, Clone)]
+pub struct SampleStore {
+    layout: StoreLayout,
+    rows: i64,
+    columns: i64,
+    column_m: f64,
+    /// Rows of a brick, as a power of two.
+    rows_shift: u32,
+    bricks: Vec<Brick>,
+    open: OpenBricks,
+    arena: Arena,
+    /// The longest single step so far, along the tunnel and along the perimeter, m.
+    longest_step_m: [f64; 2],
+    kept: u64,
+    thinned: u64,
+}
+
+stateful!(SampleStore { state: open, arena, longest_step_m, kept, thinned; slots: bricks; fixed: layout, rows, columns, column_m, rows_shift; });
+
+impl SampleStore {
+    /// An empty store.
+    ///
+    /// Allocates: startup only; all that it will ever use.
+    pub fn new(layout: StoreLayout) -> Self {
+        let rows = math::floor_to_i64((layout.to_m - layout.from_m) / layout.cell_m).max(0) + 1;
+        let columns = math::floor_to_i64(layout.perimeter_m / layout.cell_m).max(1);
+        let to_usize = |count: i64| usize::try_from(count).unwrap_or(0);
+        let rows_of_brick = math::floor_to_i64(BRICK_M / layout.cell_m - 1e-9) + 1;
+        let rows_per_brick = to_usize(rows_of_brick).next_power_of_two().min(MOST_ROWS);
+        let bricks = to_usize(rows).div_ceil(rows_per_brick);
+        let capacity = layout.capacity as usize;
+        let open_samples = OPEN_SAMPLES.min(capacity);
+        // Nearly all samples take one word; what is open has room for the worst.
+        let words = capacity
+            + capacity / 8
+            + MOST_WORDS * (open_samples + 1)
+            + WORDS_PER_BRICK * (bricks + OPEN_BRICKS);
+        Self {
+            layout,
+            rows,
+            columns,
+            column_m: layout.perimeter_m / columns as f64,
+            rows_shift: rows_per_brick.trailing_zeros(),
+            bricks: vec![Brick::default(); bricks],
+            open: OpenBricks::new(OPEN_BRICKS.min(bricks), (rows_per_brick, to_usize(columns)), open_samples),
+            arena: Arena::new(words / packed::ROOM + 1),
+            longest_step_m: [0.0; 2],
+            kept: 0,
+            thinned: 0,
+        }
+    }
+
+    /// Gives all samples and their memory back; nothing is stored any more, but how many others stood for is still known.
+    pub fn release(&mut self) {
+        let layout = StoreLayout { to_m: self.layout.from_m, capacity: 0, ..self.layout };
+        *self = Self { thinned: self.thinned, ..Self::new(layout) };
+    }
+
+    /// Perimeter of the profile, m.
+    pub fn perimeter_m(&self) -> f64 {
+        self.layout.perimeter_m
+    }
+
+    /// Chainages between which samples are kept, m.
+    pub fn extent_m(&self) -> (f64, f64) {
+        (self.layout.from_m, self.layout.to_m)
+    }
+
+    /// Whether a place is within the stretch of which samples are kept, and its coordinates are numbers.
+    pub fn covers(&self, x_m: f64, sigma_m: f64) -> bool {
+        self.row(x_m).is_some() && sigma_m.is_finite()
+    }
+
+    /// What is held and used now.
+    pub fn usage(&self) -> StoreUse {
+        StoreUse {
+            kept: self.kept,
+            thinned: self.thinned,
+            bytes: self.bricks.len() * size_of::<Brick>()
+                + self.open.touched_bytes()
+                + self.arena.touched_bytes(),
+        }
+    }
+
+    /// Keeps a sample, unless its cell is full and holds one close by.
+    ///
+    /// Errors: it lies outside, or the store is full.
+    /// Allocates: never.
+    pub fn insert(&mut self, sample: WallSample) -> Result<Kept, StoreError> {
+        let row = self.row(sample.x_m).filter(|_| sample.sigma_m.is_finite()).ok_or(StoreError::Outside)?;
+        let sigma_m = math::wrap(sample.sigma_m, self.layout.perimeter_m);
+        let number = self.brick_of(row);
+        let slot = self.opened(number, true).ok_or(StoreError::Full)?;
+        let cell = self.cell_at(slot, row, self.column(sigma_m));
+        if let Some(tier) =
+            thinning::stands_for(&self.open, cell, (sample.x_m, sigma_m), sample.step_m, self.edge_m())
+        {
+            self.thinned += 1;
+            if let Some(brick) = self.bricks.get_mut(number as usize) {
+                brick.tier = brick.tier.max(tier);
+            }
+            return Ok(Kept::Thinned);
+        }
+        // Whatever is open must find room when it is packed.
+        if self.arena.free_words() < MOST_WORDS * (self.open.used() + 1) + WORDS_PER_BRICK * OPEN_BRICKS {
+            return Err(StoreError::Full);
+        }
+        self.make_room(number, 1);
+        let step_m = sample.step_m.unwrap_or_default();
+        if !self.open.add(cell, sample.head, (sample.x_m, sigma_m, step_m)) {
+            return Err(StoreError::Full);
+        }
+        for (longest, step) in self.longest_step_m.iter_mut().zip(step_m) {
+            *longest = longest.max(step.abs());
+        }
+        if let Some(brick) = self.bricks.get_mut(number as usize) {
+            brick.count += 1;
+        }
+        self.kept += 1;
+        Ok(Kept::Stored)
+    }
+
+    /// Calls `visit` with chainage and arc length of all samples between two chainages, m, and perhaps of some beyond.
+    ///
+    /// Allocates: never.
+    pub fn visit_between(&self, from_m: f64, to_m: f64, mut visit: impl FnMut(f64, f64)) {
+        for number in self.bricks_between(from_m, to_m) {
+            let Some(brick) = self.bricks.get(number as usize).filter(|brick| brick.count > 0) else {
+                continue;
+            };
+            match brick.open_slot() {
+                Some(slot) => {
+                    let (first, last) =
+                        (self.row_near(from_m - packed::MOVED_M), self.row_near(to_m + packed::MOVED_M));
+                    let in_brick =
+                        i64::from(number) << self.rows_shift..i64::from(number + 1) << self.rows_shift;
+                    for row in in_brick.start.max(first)..in_brick.end.min(last + 1) {
+                        for column in 0..self.columns {
+                            for node in self.open.in_cell(self.cell_at(slot, row, column)) {
+                                visit(node.x_m, node.sigma_m);
+                            }
+                        }
+                    }
+                }
+                None => {
+                    for (_, sample) in self.packed_samples(number, brick) {
+                        visit(sample.x_m, sample.sigma_m);
+                    }
+                }
+            }
+        }
+    }
+
+    /// How true the samples between two chainages are.
+    pub fn fidelity(&self, from_m: f64, to_m: f64) -> Fidelity {
+        let mut worst = Fidelity::default();
+        for number in self.bricks_between(from_m, to_m) {
+            let Some(brick) = self.bricks.get(number as usize) else { continue };
+            worst.thinned_m = worst.thinned_m.max(thinning::delta_m(brick.tier, self.edge_m()));
+            if brick.moved {
+                worst.moved_m = packed::MOVED_M;
+            }
+        }
+        worst
+    }
+
+    fn bricks_between(&self, from_m: f64, to_m: f64) -> core::ops::RangeInclusive<u32> {
+        // A sample near the edge of a brick may have been moved beyond it.
+        self.brick_of(self.row_near(from_m - packed::MOVED_M))
+            ..=self.brick_of(self.row_near(to_m + packed::MOVED_M))
+    }
+
+    fn packed_samples(&self, number: u32, brick: &Brick) -> Reader<'_> {
+        Reader::new(&self.arena, self.lattice(number), brick.first_block, brick.count)
+    }
+
+    fn lattice(&self, number: u32) -> Lattice {
+        let from_m = self.layout.from_m + (i64::from(number) << self.rows_shift) as f64 * self.layout.cell_m;
+        Lattice::new(from_m, self.layout.perimeter_m)
+    }
+
+    /// The slot of a brick, which is opened if it is packed, or if it has no samples and one is `wanted`.
+    fn opened(&mut self, number: u32, wanted: bool) -> Option<usize> {
+        let brick = *self.bricks.get(number as usize)?;
+        if brick.slot > 0 || (brick.count == 0 && !wanted) {
+            return brick.open_slot();
+        }
+        self.make_room(number, brick.count as usize);
+        let slot = match self.open.free_slot() {
+            Some(slot) => slot,
+            None => self.pack_farthest_from(number)?,
+        };
+        if self.open.room() < brick.count as usize {
+            return None;
+        }
+        self.open.place(slot, number);
+        self.unpack(number, slot, &brick);
+        if let Some(entry) = self.bricks.get_mut(number as usize) {
+            (entry.slot, entry.first_block) = (u16::try_from(slot + 1).unwrap_or(0), 0);
+        }
+        self.arena.release(brick.first_block);
+        Some(slot)
+    }
+
+    fn unpack(&mut self, number: u32, slot: usize, brick: &Brick) {
+        let (rows_shift, columns, column_m) = (self.rows_shift, self.columns, self.column_m);
+        let layout = self.layout;
+        let first_row = i64::from(number) << rows_shift;
+        let reader = Reader::new(&self.arena, self.lattice(number), brick.first_block, brick.count);
+        for (head, Packed { x_m, sigma_m, step_m }) in reader {
+            let row = math::floor_to_i64((x_m - layout.from_m) / layout.cell_m) - first_row;
+            let row = row.clamp(0, (1 << rows_shift) - 1);
+            let column = math::floor_to_i64(sigma_m / column_m).clamp(0, columns - 1);
+            let at = CellAt {
+                slot,
+                row: usize::try_from(row).unwrap_or(0),
+                column: usize::try_from(column).unwrap_or(0),
+            };
+            self.open.add(at, head, (x_m, sigma_m, step_m));
+        }
+    }
+
+    /// Packs bricks far from one until there is room for so many samples in it.
+    fn make_room(&mut self, number: u32, samples: usize) {
+        while self.open.room() < samples && self.pack_farthest_from(number).is_some() {}
+    }
+
+    fn pack_farthest_from(&mut self, number: u32) -> Option<usize> {
+        let (slot, far) = self.open.farthest_from(number)?;
+        let lattice = self.lattice(far);
+        let mut writer = Writer::new(&mut self.arena, lattice);
+        for head in 0..MAX_HEADS {
+            let mut samples = self.open.of_head(slot, head).peekable();
+            if samples.peek().is_some() {
+                writer.head(head)?;
+            }
+            for node in samples {
+                writer.sample(Packed { x_m: node.x_m, sigma_m: node.sigma_m, step_m: node.step_m })?;
+            }
+        }
+        let first_block = writer.finish();
+        self.open.clear(slot);
+        let brick = self.bricks.get_mut(far as usize)?;
+        (brick.first_block, brick.slot, brick.moved) = (first_block, 0, brick.moved || brick.count > 0);
+        Some(slot)
+    }
+
+    /// The longer edge of a cell, m.
+    fn edge_m(&self) -> f64 {
+        self.layout.cell_m.max(self.column_m)
+    }
+
+    fn row(&self, x_m: f64) -> Option<i64> {
+        let inside = x_m >= self.layout.from_m && x_m <= self.layout.to_m;
+        inside.then(|| self.row_near(x_m))
+    }
+
+    /// The row at a chainage, or the one nearest to it.
+    fn row_near(&self, x_m: f64) -> i64 {
+        math::floor_to_i64((x_m - self.layout.from_m) / self.layout.cell_m).clamp(0, self.rows - 1)
+    }
+
+    fn brick_of(&self, row: i64) -> u32 {
+        u32::try_from(row >> self.rows_shift).unwrap_or(0)
+    }
+
+    fn row_in_brick(&self, row: i64) -> i64 {
+        row & ((1 << self.rows_shift) - 1)
+    }
+
+    fn column(&self, sigma_m: f64) -> i64 {
+        math::floor_to_i64(sigma_m / self.column_m).clamp(0, self.columns - 1)
+    }
+
+    fn cell_at(&self, slot: usize, row: i64, column: i64) -> CellAt {
+        let row = self.row_in_brick(row);
+        let [row, column] = [row, column].map(|number| usize::try_from(number).unwrap_or(usize::MAX));
+        CellAt { slot, row, column }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,212 @@
+//! Samples near the vehicle, as they came, in lists by cell and by head.
+
+use serde::{Deserialize, Serialize};
+
+use headrace_sampling::head::MAX_HEADS;
+use headrace_snapshot::stateful;
+
+/// A place in one of the lists: one more than an index, or zero for none.
+type Link = u32;
+
+/// A sample in the pool.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+pub(super) struct Node {
+    /// Chainage, m.
+    pub x_m: f64,
+    /// Arc length, in [0, perimeter).
+    pub sigma_m: f64,
+    /// The single step that led here, along the tunnel and the perimeter, m; zero without one.
+    pub step_m: [f64; 2],
+    next_in_cell: Link,
+    next_of_head: Link,
+}
+
+/// A cell of an open brick.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct CellAt {
+    /// The brick's slot.
+    pub slot: usize,
+    /// Row within the brick.
+    pub row: usize,
+    /// Column.
+    pub column: usize,
+}
+
+/// A cell's samples.
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
+struct Cell {
+    latest: Link,
+    count: u32,
+}
+
+/// A head's samples of a brick, in the order in which they came.
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
+struct Chain {
+    first: Link,
+    last: Link,
+}
+
+/// A fixed number of bricks with a common pool of samples.
+#[derive(Debug, Clone)]
+pub(super) struct OpenBricks {
+    rows: usize,
+    columns: usize,
+    cells: Vec<Cell>,
+    /// For each column of a slot, a bit for each row that has samples there.
+    rows_seen: Vec<u32>,
+    chains: Vec<[Chain; MAX_HEADS]>,
+    /// The brick in each slot.
+    bricks: Vec<Option<u32>>,
+    nodes: Vec<Node>,
+    most_nodes: usize,
+    /// Nodes given back, linked as in a cell.
+    free: Link,
+    used: usize,
+}
+
+stateful!(OpenBricks { state: free, used; lists: nodes; slots: cells, rows_seen, chains, bricks; fixed: rows, columns, most_nodes; });
+
+impl OpenBricks {
+    /// Allocates: startup only.
+    pub(super) fn new(slots: usize, (rows, columns): (usize, usize), most_nodes: usize) -> Self {
+        Self {
+            rows,
+            columns,
+            cells: vec![Cell::default(); slots * rows * columns],
+            rows_seen: vec![0; slots * columns],
+            chains: vec![[Chain::default(); MAX_HEADS]; slots],
+            bricks: vec![None; slots],
+            nodes: Vec::with_capacity(most_nodes),
+            most_nodes,
+            free: 0,
+            used: 0,
+        }
+    }
+
+    /// Samples for which there is room still.
+    pub(super) fn room(&self) -> usize {
+        self.most_nodes - self.used
+    }
+
+    /// Samples in the open bricks.
+    pub(super) fn used(&self) -> usize {
+        self.used
+    }
+
+    /// Bytes that hold samples or have held some.
+    pub(super) fn touched_bytes(&self) -> usize {
+        self.nodes.len() * size_of::<Node>() + self.cells.len() * size_of::<Cell>()
+    }
+
+    /// A slot that holds no brick.
+    pub(super) fn free_slot(&self) -> Option<usize> {
+        self.bricks.iter().position(Option::is_none)
+    }
+
+    /// The slot of the open brick farthest from another, and that brick.
+    pub(super) fn farthest_from(&self, brick: u32) -> Option<(usize, u32)> {
+        let held = self.bricks.iter().enumerate().filter_map(|(slot, held)| Some((slot, (*held)?)));
+        held.filter(|(_, held)| *held != brick).max_by_key(|(_, held)| held.abs_diff(brick))
+    }
+
+    /// Puts a brick without samples into a slot.
+    pub(super) fn place(&mut self, slot: usize, brick: u32) {
+        if let Some(held) = self.bricks.get_mut(slot) {
+            *held = Some(brick);
+        }
+    }
+
+    /// Adds a sample of a head to a cell of a slot; gives false when there is no room.
+    pub(super) fn add(
+        &mut self,
+        at: CellAt,
+        head: usize,
+        (x_m, sigma_m, step_m): (f64, f64, [f64; 2]),
+    ) -> bool {
+        let index = self.index(at);
+        let Some(list) = self.cells.get_mut(index) else { return false };
+        let node = Node { x_m, sigma_m, step_m, next_in_cell: list.latest, next_of_head: 0 };
+        let link = self.free;
+        let link =
+            if let Some(unused) = link.checked_sub(1).and_then(|index| self.nodes.get_mut(index as usize)) {
+                self.free = unused.next_in_cell;
+                *unused = node;
+                link
+            } else if self.nodes.len() < self.most_nodes {
+                self.nodes.push(node);
+                u32::try_from(self.nodes.len()).unwrap_or(0)
+            } else {
+                return false;
+            };
+        list.latest = link;
+        list.count += 1;
+        self.used += 1;
+        if let Some(rows) = self.rows_seen.get_mut(at.slot * self.columns + at.column) {
+            *rows |= 1 << at.row;
+        }
+        let chain = self.chains.get_mut(at.slot).and_then(|chains| chains.get_mut(head.min(MAX_HEADS - 1)));
+        if let Some(chain) = chain {
+            match chain.last.checked_sub(1).and_then(|index| self.nodes.get_mut(index as usize)) {
+                Some(last) => last.next_of_head = link,
+                None => chain.first = link,
+            }
+            chain.last = link;
+        }
+        true
+    }
+
+    fn index(&self, at: CellAt) -> usize {
+        (at.slot * self.rows + at.row) * self.columns + at.column
+    }
+
+    /// A bit for each row of a slot that has samples in a column.
+    pub(super) fn rows_seen(&self, slot: usize, column: usize) -> u32 {
+        self.rows_seen.get(slot * self.columns + column).copied().unwrap_or(0)
+    }
+
+    /// Samples in a cell of a slot.
+    pub(super) fn count(&self, at: CellAt) -> u32 {
+        self.cells.get(self.index(at)).map_or(0, |list| list.count)
+    }
+
+    /// The samples of a cell of a slot, the latest first.
+    pub(super) fn in_cell(&self, at: CellAt) -> impl Iterator<Item = &Node> {
+        let latest = self.cells.get(self.index(at)).map_or(0, |list| list.latest);
+        self.list(latest, |node| node.next_in_cell)
+    }
+
+    /// The samples of a head in a slot, the earliest first.
+    pub(super) fn of_head(&self, slot: usize, head: usize) -> impl Iterator<Item = &Node> {
+        let chain = self.chains.get(slot).and_then(|chains| chains.get(head));
+        self.list(chain.map_or(0, |chain| chain.first), |node| node.next_of_head)
+    }
+
+    fn list(&self, first: Link, next: impl Fn(&Node) -> Link) -> impl Iterator<Item = &Node> {
+        let node = |link: Link| self.nodes.get(link.checked_sub(1)? as usize);
+        core::iter::successors(node(first), move |before| node(next(before)))
+    }
+
+    /// Empties a slot.
+    pub(super) fn clear(&mut self, slot: usize) {
+        let per_brick = self.rows * self.columns;
+        let Self { cells, nodes, free, used, .. } = self;
+        for list in cells.iter_mut().skip(slot * per_brick).take(per_brick) {
+            let mut link = list.latest;
+            while let Some(node) = link.checked_sub(1).and_then(|index| nodes.get_mut(index as usize)) {
+                let next = node.next_in_cell;
+                node.next_in_cell = *free;
+                *free = link;
+                *used -= 1;
+                link = next;
+            }
+            *list = Cell::default();
+        }
+        self.rows_seen.iter_mut().skip(slot * self.columns).take(self.columns).for_each(|rows| *rows = 0);
+        if let Some(chains) = self.chains.get_mut(slot) {
+            *chains = [Chain::default(); MAX_HEADS];
+        }
+        if let Some(held) = self.bricks.get_mut(slot) {
+            *held = None;
+        }
+    }
+}

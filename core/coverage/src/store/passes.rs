@@ -1,0 +1,107 @@
+//! The nearest pass: where a head came by before, at the same arc length.
+
+use core::ops::Range;
+
+use super::SampleStore;
+use super::open::Node;
+use headrace_geometry::math;
+
+/// A place that passes are looked for at.
+#[derive(Debug, Clone, Copy)]
+struct Place {
+    x_m: f64,
+    /// In [0, perimeter).
+    sigma_m: f64,
+    perimeter_m: f64,
+}
+
+impl Place {
+    /// Distance in chainage to where a sample's step crosses the arc length, if it does.
+    fn to_crossing_m(self, end: &Node) -> Option<f64> {
+        let [along_m, around_m] = end.step_m;
+        let mut to_end = end.sigma_m - self.sigma_m;
+        if to_end >= self.perimeter_m / 2.0 {
+            to_end -= self.perimeter_m;
+        } else if to_end < -self.perimeter_m / 2.0 {
+            to_end += self.perimeter_m;
+        }
+        let to_start = to_end - around_m;
+        // The start belongs to the step before.
+        let crosses = (to_start < 0.0 && to_end >= 0.0) || (to_start > 0.0 && to_end <= 0.0);
+        crosses.then(|| (end.x_m - along_m * (to_end / around_m) - self.x_m).abs())
+    }
+}
+
+/// The brick that a search has come to on one side.
+#[derive(Debug, Clone, Copy, Default)]
+struct Side {
+    brick: Option<u32>,
+    slot: usize,
+    /// A bit for each of its rows where there may be a pass.
+    rows: u32,
+}
+
+impl SampleStore {
+    /// Distance in chainage to the nearest pass over `sigma_m`, no farther than `within_m`; to some micrometres where a
+    /// packed brick had to be opened for it.
+    ///
+    /// A pass is a single step of a head from one sample to the next; where it crosses `sigma_m` its chainage is
+    /// interpolated. Source: metrics.md, T_x.
+    /// Allocates: never.
+    pub fn nearest_pass_m(&mut self, x_m: f64, sigma_m: f64, within_m: f64) -> Option<f64> {
+        let perimeter_m = self.layout.perimeter_m;
+        let place = Place { x_m, sigma_m: math::wrap(sigma_m, perimeter_m), perimeter_m };
+        let centre = math::floor_to_i64((x_m - self.layout.from_m) / self.layout.cell_m);
+        let into_row = (x_m - self.layout.from_m) - centre as f64 * self.layout.cell_m;
+        let inner = into_row.min(self.layout.cell_m - into_row).max(0.0);
+        // A step ends at most its own length from where it crosses sigma.
+        let [along_m, around_m] = self.longest_step_m;
+        let left = math::floor_to_i64((place.sigma_m - around_m) / self.column_m);
+        let right = math::floor_to_i64((place.sigma_m + around_m) / self.column_m);
+        let columns = left..(right + 1).min(left + self.columns);
+        let mut best: Option<f64> = None;
+        let mut sides = [Side::default(); 2];
+        for ring in 0..=self.rows {
+            let nearest = inner + (ring - 1) as f64 * self.layout.cell_m;
+            if ring > 0 && nearest > best.unwrap_or(within_m) + along_m {
+                break;
+            }
+            let rows = [centre - ring, centre + ring].into_iter().take(if ring == 0 { 1 } else { 2 });
+            for (row, side) in rows.zip(&mut sides) {
+                if !(0..self.rows).contains(&row) {
+                    continue;
+                }
+                let brick = self.brick_of(row);
+                if side.brick != Some(brick) {
+                    *side = self.side(brick, &columns);
+                }
+                if side.rows & (1 << self.row_in_brick(row)) == 0 {
+                    continue;
+                }
+                for column in columns.clone() {
+                    let at = self.cell_at(side.slot, row, self.wrapped(column));
+                    for distance_m in self.open.in_cell(at).filter_map(|end| place.to_crossing_m(end)) {
+                        if distance_m <= best.unwrap_or(within_m) {
+                            best = Some(distance_m);
+                        }
+                    }
+                }
+            }
+        }
+        best
+    }
+
+    /// Opens a brick, and sees in which of its rows there are samples in some columns.
+    fn side(&mut self, brick: u32, columns: &Range<i64>) -> Side {
+        let Some(slot) = self.opened(brick, false) else {
+            return Side { brick: Some(brick), slot: 0, rows: 0 };
+        };
+        let seen = |column| usize::try_from(self.wrapped(column)).map_or(0, |c| self.open.rows_seen(slot, c));
+        Side { brick: Some(brick), slot, rows: columns.clone().map(seen).fold(0, |all, rows| all | rows) }
+    }
+
+    /// A column that may lie beyond the seam.
+    fn wrapped(&self, column: i64) -> i64 {
+        if (0..self.columns).contains(&column) { column } else { column.rem_euclid(self.columns) }
+    }
+}

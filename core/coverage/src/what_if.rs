@@ -1,0 +1,116 @@
+//! What the same samples say of other targets and other lengths of section.
+
+use super::frontier::{Frontier, Reach, clear_of};
+use super::hole::{Hole, HoleFinder};
+use super::passage::Doubt;
+use super::section::Verdict;
+use super::sections::{Sections, verdict};
+use super::store::SampleStore;
+use headrace_geometry::math;
+use headrace_geometry::time::MonoNs;
+use headrace_geometry::tunnel::Profile;
+
+/// Metres of tunnel by verdict.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Metres {
+    /// That pass.
+    pub pass_m: f64,
+    /// That fail.
+    pub fail_m: f64,
+    /// Of which nothing can be said for sure.
+    pub cannot_say_m: f64,
+    /// That going on may still fill.
+    pub open_m: f64,
+}
+
+impl Metres {
+    /// Counts in a section.
+    pub fn add(&mut self, verdict: Verdict, section_m: f64) {
+        *match verdict {
+            Verdict::Pass => &mut self.pass_m,
+            Verdict::Fail => &mut self.fail_m,
+            Verdict::CannotSay => &mut self.cannot_say_m,
+            Verdict::Open => &mut self.open_m,
+        } += section_m;
+    }
+}
+
+/// A section's hole, whatever the target.
+#[derive(Debug, Clone, Copy)]
+struct Measured {
+    hole: Hole,
+    sigma_m: f64,
+    /// The profile is wrong there, or there is no wall.
+    doubtful: bool,
+}
+
+impl Sections {
+    /// Metres by verdict for each of some targets, in sections of another length; with the same length, of the holes as they
+    /// were measured last, which don't depend on the target once a dive has ended.
+    pub fn what_if(
+        &self,
+        section_m: f64,
+        targets_m: &[f64],
+        (frontier, at): (&Frontier, MonoNs),
+        (store, finder): (&SampleStore, &mut HoleFinder),
+        profile: &Profile,
+    ) -> Vec<Metres> {
+        let to_come = frontier.to_come(at);
+        let measured = if (section_m - self.section_m()).abs() > 0.0 {
+            self.measured_anew(section_m, frontier, store, finder, profile)
+        } else {
+            self.measured(frontier)
+        };
+        targets_m.iter().map(|target_m| metres(&measured, section_m, *target_m, to_come)).collect()
+    }
+
+    fn measured(&self, frontier: &Frontier) -> Vec<Measured> {
+        let section = |index: i64| {
+            let section = self.get(index)?;
+            Some(Measured {
+                hole: section.hole?,
+                sigma_m: section.hole_sigma_m,
+                doubtful: section.is_doubtful(),
+            })
+        };
+        self.passed(frontier.swept()).filter_map(section).collect()
+    }
+
+    fn measured_anew(
+        &self,
+        section_m: f64,
+        frontier: &Frontier,
+        store: &SampleStore,
+        finder: &mut HoleFinder,
+        profile: &Profile,
+    ) -> Vec<Measured> {
+        let passed = self.passed(frontier.swept());
+        let (first_m, end_m) = (self.bounds_m(passed.start).0, self.bounds_m(passed.end).0);
+        let indexes = math::floor_to_i64(first_m / section_m)..-math::floor_to_i64(-end_m / section_m);
+        let section = |index: i64| {
+            let (from_m, to_m) = (index as f64 * section_m, (index + 1) as f64 * section_m);
+            let hole = finder.largest(store, from_m, to_m);
+            let mut doubt = Doubt::default();
+            let mut doubtful = false;
+            // A hair inside, so that a common border is no overlap.
+            for old in self.index_of(from_m + 1e-9)..=self.index_of(to_m - 1e-9) {
+                if let Some(section) = self.get(old) {
+                    doubt.add(&section.passage.doubt);
+                    doubtful |= section.is_doubtful();
+                }
+            }
+            Measured { hole, sigma_m: doubt.sigma_m(profile.point_at(hole.sigma_m)), doubtful }
+        };
+        indexes.map(section).collect()
+    }
+}
+
+fn metres(measured: &[Measured], section_m: f64, target_m: f64, to_come: Option<Reach>) -> Metres {
+    let mut metres = Metres::default();
+    for Measured { hole, sigma_m, doubtful } in measured {
+        let said = verdict(hole, *sigma_m, target_m, clear_of(to_come, hole.x_m));
+        let said = if said == Verdict::Pass && *doubtful { Verdict::CannotSay } else { said };
+        metres.add(said, section_m);
+    }
+    metres
+}

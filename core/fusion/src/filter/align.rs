@@ -1,0 +1,309 @@
+//! The first estimate: what the sensors say within the first second, taken together.
+
+use serde::{Deserialize, Serialize};
+
+use super::factors::Factors;
+use super::running::{Context, in_tunnel, with_quantum};
+use super::settings::Settings;
+use super::state::{
+    ATTITUDE, DEPTH, ERRORS, FORCE_BIAS, HEADING, POSITION, RATE_BIAS, SCALE, SLACK, SLACK_RATE, State,
+    VELOCITY,
+};
+use crate::NoFix;
+use crate::section::{Echo, settle};
+use headrace_geometry::frames::{Body, Point3, Rot, Tunnel, Vec3};
+use headrace_geometry::math;
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_sensor::device::{SensorInfo, SensorKind};
+use headrace_sensor::reading::MAX_SOURCES;
+use headrace_sensor::reading::Reading;
+use headrace_snapshot::stateful;
+
+/// How long sensors are listened to.
+pub const LISTENS: DurNs = DurNs(1_000_000_000);
+/// Echoes of one sounder of which the middle one is taken.
+const ECHOES: usize = 9;
+/// Standard deviations at the start: of the place in the section by echoes, and without them; of a chainage that nobody
+/// has told; of the yaw of a vehicle that has no compass and is set to look along the tunnel; of velocity; of tilt.
+const PLACE_SD_M: f64 = 0.3;
+const PLACE_UNSEEN_SD_M: f64 = 2.0;
+const CHAINAGE_UNTOLD_SD_M: f64 = 10.0;
+const YAW_UNTOLD_SD_RAD: f64 = 0.2;
+const VELOCITY_SD_MPS: f64 = 0.5;
+const TILT_SD_RAD: f64 = 0.05;
+
+/// What has been heard so far.
+#[derive(Debug, Clone)]
+pub struct Listening {
+    since: Option<MonoNs>,
+    /// Chainage of an estimate before, and its standard deviation, m.
+    before: Option<(f64, f64)>,
+    hears_wall: bool,
+    attitude: Option<Rot<Tunnel, Body>>,
+    force: Option<Vec3<Body>>,
+    told: Option<Told>,
+    height_m: Option<f64>,
+    echoes: [Heard; MAX_SOURCES],
+}
+
+stateful!(Listening { state: since, before, hears_wall, attitude, force, told, height_m; slots: echoes; });
+
+/// What a cable said.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+struct Told {
+    at: MonoNs,
+    chainage_m: f64,
+    /// From where the cable's scale counts, m.
+    way_m: f64,
+    sd_m: f64,
+}
+
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+struct Heard {
+    sensor: Option<SensorInfo>,
+    ranges_m: [f64; ECHOES],
+    count: usize,
+}
+
+impl Default for Listening {
+    fn default() -> Self {
+        Self {
+            since: None,
+            before: None,
+            hears_wall: false,
+            attitude: None,
+            force: None,
+            told: None,
+            height_m: None,
+            echoes: [Heard { sensor: None, ranges_m: [0.0; ECHOES], count: 0 }; MAX_SOURCES],
+        }
+    }
+}
+
+impl Listening {
+    /// Takes a reading.
+    pub fn hear(
+        &mut self,
+        context: &Context,
+        source: usize,
+        sensor: &SensorInfo,
+        at: MonoNs,
+        reading: &Reading,
+    ) {
+        self.since.get_or_insert(at);
+        let heard_wall = self.hears_wall;
+        let site = &context.site;
+        match (sensor.kind, reading) {
+            (SensorKind::Imu, Reading::Attitude(level)) => {
+                self.attitude = Some(in_tunnel(site, *level) * sensor.mount.rotation.inverse());
+            }
+            (SensorKind::Imu, Reading::SpecificForce(force)) => {
+                let force = sensor.mount.rotation * *force;
+                self.force = Some(self.force.map_or(force, |mean| mean + (force + -mean).scaled(0.05)));
+            }
+            (SensorKind::Tether { zero_at_m, scale }, Reading::TetherLength(length)) => {
+                let way_m = scale * length.length_m;
+                let sd_m = with_quantum(context.settings.tether_sd_m, length.resolution_m * scale.abs());
+                self.told = Some(Told { at, chainage_m: zero_at_m + way_m, way_m, sd_m });
+            }
+            (SensorKind::Depth, Reading::Pressure(water)) => {
+                let up_m = self.attitude.map_or(0.0, |attitude| (attitude * sensor.mount.position).z());
+                self.height_m = Some(site.surface_above_floor_m - site.depth_m(water.pressure_pa) - up_m);
+            }
+            (SensorKind::Head, Reading::Sonar(sonar)) => self.hears_wall |= sonar.range_m.is_some(),
+            (SensorKind::Echosounder { min_confidence }, Reading::Echo(echo))
+                if echo.confidence >= min_confidence =>
+            {
+                self.hears_wall |= echo.range_m.is_some();
+                if let (Some(range_m), Some(heard)) = (echo.range_m, self.echoes.get_mut(source)) {
+                    heard.hear(sensor, site.rescaled_range_m(range_m, echo.sound_speed_mps));
+                }
+            }
+            _ => {}
+        }
+        if self.before.is_some() && self.hears_wall && !heard_wall {
+            // The others may speak again only now, too.
+            self.since = Some(at);
+        }
+    }
+
+    /// After an estimate that was lost: its chainage, m, and how far off that may be.
+    pub fn after(before: Option<(f64, f64)>) -> Self {
+        Self { before, ..Self::default() }
+    }
+
+    /// The chainage of an estimate that was lost, m, and how far off that may be.
+    pub fn before(&self) -> Option<(f64, f64)> {
+        self.before
+    }
+
+    /// What is missing yet.
+    pub fn lacks(&self) -> NoFix {
+        if self.attitude.is_none() && self.force.is_none() {
+            NoFix::Heading
+        } else if self.told.is_none() {
+            NoFix::Chainage
+        } else {
+            NoFix::Section
+        }
+    }
+
+    /// When the first reading was valid.
+    pub fn since(&self) -> Option<MonoNs> {
+        self.since
+    }
+
+    /// The first estimate as of `at`, once sensors have been listened to for long enough.
+    pub fn settle(&self, at: MonoNs, context: &Context) -> Option<(State, Factors<ERRORS>)> {
+        // An estimate that was lost is not begun anew before it could be any better.
+        if at.since(self.since?).0 < LISTENS.0 || (self.before.is_some() && !self.hears_wall) {
+            return None;
+        }
+        let attitude = self.attitude.or_else(|| self.force.map(level))?;
+        let [reference_y, reference_z] = context.profile.reference();
+        let start = [reference_y, reference_z];
+        let echoes = self.echoes.iter().filter_map(Heard::middle);
+        let has_echoes = echoes.clone().count() > 0;
+        let weak = [PLACE_UNSEEN_SD_M; 2];
+        let echo_sd_m = context.settings.echo_sd_m;
+        let place = settle(&context.profile, attitude, start, (start, weak), echo_sd_m, &echoes);
+        let before_m = self.before.map_or(0.0, |(chainage_m, _)| chainage_m);
+        let chainage_m = self.told.map_or(before_m, |told| told.chainage_m);
+        let body = Point3::new(chainage_m, place.at_m[0], place.at_m[1]);
+        let mut state = State::at_rest(body + attitude * context.unit_at, attitude);
+        if let (true, Some(height_m)) = (place.is_height_seen, self.height_m) {
+            state.depth_offset_m = height_m - place.at_m[1];
+        }
+        let sd_m = |is_seen: bool| if is_seen { PLACE_SD_M } else { PLACE_UNSEEN_SD_M };
+        let place_sd_m = [sd_m(has_echoes), sd_m(place.is_height_seen)];
+        Some((state, self.factors(at, &context.settings, place_sd_m)))
+    }
+
+    /// A chainage and a yaw that were read are off by what is wrong with the cable and the compass, so that reading these
+    /// again says nothing new; and the slack goes with its rate.
+    fn factors(&self, at: MonoNs, settings: &Settings, [y_sd_m, z_sd_m]: [f64; 2]) -> Factors<ERRORS> {
+        let mut sds = [0.0; ERRORS];
+        let untold_sd_m = self.before.map_or(0.0, |(_, sd_m)| sd_m).max(CHAINAGE_UNTOLD_SD_M);
+        let chainage_sd_m = self.told.map_or(untold_sd_m, |told| {
+            math::hypot(told.sd_m, VELOCITY_SD_MPS * at.since(told.at).as_secs_f64())
+        });
+        let yaw_sd = self.attitude.map_or(YAW_UNTOLD_SD_RAD, |_| settings.heading_sd_rad);
+        let threes = [
+            (POSITION, [chainage_sd_m, y_sd_m, z_sd_m]),
+            (VELOCITY, [VELOCITY_SD_MPS; 3]),
+            (ATTITUDE, [TILT_SD_RAD, TILT_SD_RAD, yaw_sd]),
+            (FORCE_BIAS, [settings.force_bias.reach; 3]),
+            (RATE_BIAS, [settings.rate_bias.reach; 3]),
+        ];
+        for (from, three) in threes {
+            for (slot, sd) in sds.iter_mut().skip(from).zip(three) {
+                *slot = sd;
+            }
+        }
+        let ones = [
+            // What doesn't go with the rate.
+            (SLACK, settings.slack.reach / core::f64::consts::SQRT_2),
+            (SLACK_RATE, settings.slack.drive()),
+            (SCALE, settings.scale_sd),
+            (DEPTH, settings.depth_offset_sd_m),
+            (HEADING, settings.heading.reach),
+        ];
+        for (i, sd) in ones {
+            if let Some(slot) = sds.get_mut(i) {
+                *slot = sd;
+            }
+        }
+        let mut factors = Factors::independent(sds.map(|sd| sd * sd));
+        factors.shear(|e, _| {
+            let [slack, rate, scale, heading] =
+                [SLACK, SLACK_RATE, SCALE, HEADING].map(|i| e.get(i).copied().unwrap_or(0.0));
+            let slack = slack + rate * settings.slack.time_s / 2.0;
+            let shown = self.told.map_or(0.0, |told| slack + scale * told.way_m);
+            let deviates = if self.attitude.is_some() { heading } else { 0.0 };
+            for (i, change) in [(POSITION, -shown), (ATTITUDE + 2, -deviates)] {
+                if let Some(slot) = e.get_mut(i) {
+                    *slot += change;
+                }
+            }
+            if let Some(slot) = e.get_mut(SLACK) {
+                *slot = slack;
+            }
+        });
+        factors
+    }
+}
+
+impl Heard {
+    fn hear(&mut self, sensor: &SensorInfo, range_m: f64) {
+        self.sensor = Some(*sensor);
+        if let Some(slot) = self.ranges_m.get_mut(self.count % ECHOES) {
+            *slot = range_m;
+            self.count += 1;
+        }
+    }
+
+    fn middle(&self) -> Option<Echo> {
+        let mut ranges_m = self.ranges_m;
+        let heard = ranges_m.get_mut(..self.count.min(ECHOES))?;
+        heard.sort_unstable_by(f64::total_cmp);
+        let range_m = heard.get(heard.len() / 2).copied()?;
+        Some(Echo { mount: self.sensor?.mount, range_m })
+    }
+}
+
+/// The attitude of a body at rest that looks along the tunnel, by which way is up.
+fn level(force: Vec3<Body>) -> Rot<Tunnel, Body> {
+    let roll = math::atan2(force.y(), force.z());
+    let pitch = math::atan2(-force.x(), math::hypot(force.y(), force.z()));
+    Rot::from_roll_pitch_yaw(roll, pitch, 0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::measure;
+    use super::*;
+    use headrace_geometry::frames::{Mount, Sensor};
+    use headrace_geometry::site::Site;
+    use headrace_geometry::tunnel::shapes;
+    use headrace_sensor::reading::{Level, TetherLength};
+
+    /// What a cable and a compass have said is not said anew by their next readings: the chainage and the yaw stay as
+    /// uncertain as the slack, the scale and the deviation are.
+    #[test]
+    fn readings_that_made_the_first_estimate_do_not_count_twice() {
+        let context = Context {
+            profile: shapes::ceran().unwrap(),
+            site: Site::default(),
+            settings: Settings::default(),
+            unit_at: Vec3::zero(),
+        };
+        let mount = Mount { position: Vec3::zero(), rotation: Rot::<Body, Sensor>::identity() };
+        let tether = SensorInfo { mount, kind: SensorKind::Tether { zero_at_m: 20.0, scale: 1.0 } };
+        let imu = SensorInfo { mount, kind: SensorKind::Imu };
+        let mut listening = Listening::default();
+        let at = MonoNs(1_000_000_000);
+        let level = Reading::Attitude(Rot::<Level, Sensor>::identity());
+        let length = Reading::TetherLength(TetherLength { length_m: 100.0, resolution_m: 0.001 });
+        listening.hear(&context, 0, &imu, MonoNs(0), &level);
+        listening.hear(&context, 1, &tether, at, &length);
+        let (state, mut factors) = listening.settle(at, &context).unwrap();
+        assert!((state.position.x() - 120.0).abs() < 1e-12);
+        let Settings { slack, scale_sd, heading, tether_sd_m, .. } = context.settings;
+        let chainage = slack.reach * slack.reach + 1e4 * scale_sd * scale_sd;
+        let yaw = heading.reach * heading.reach;
+        let both = factors.covariance(SLACK, SLACK_RATE);
+        assert!((factors.variance(SLACK) / (slack.reach * slack.reach) - 1.0).abs() < 1e-12);
+        assert!((both * slack.time_s / (slack.reach * slack.reach) - 1.0).abs() < 1e-12);
+        for _ in 0..50 {
+            let row = measure::chainage(&state, Vec3::zero(), 20.0, 120.0, tether_sd_m);
+            factors.measure(&row.h, row.noise);
+            for row in measure::attitude(&state, state.attitude, 0.03, 0.01) {
+                factors.measure(&row.h, row.noise);
+            }
+            for (is, least) in [(POSITION, chainage), (ATTITUDE + 2, yaw)] {
+                let is = factors.variance(is);
+                assert!(is >= 0.999 * least && is < 1.1 * least, "{is}, not {least}");
+            }
+        }
+    }
+}

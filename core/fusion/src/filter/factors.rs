@@ -1,0 +1,379 @@
+//! A covariance kept as its factors: P = U D U^T, U unit upper triangular, D diagonal.
+//!
+//! Updates touch D by products and quotients of what is positive alone, so that P can't lose its symmetry or its
+//! sign however ill the scales are; an update by the covariance itself does, Joseph's form included, when a precise
+//! measurement follows a long drift (see the tests).
+//!
+//! Source: Bierman, Factorization Methods for Discrete Sequential Estimation, 1977: V.3 (measurement), III.4
+//! (addition of a dyad, after Agee and Turner).
+
+use headrace_snapshot::{Restorer, Saver, SnapshotError, Stateful};
+
+/// Factors of the covariance of `N` errors.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Factors<const N: usize> {
+    /// Columns of U: `u[j][i]` is its element (i, j). Below the diagonal nothing is read; on it is 1.
+    u: [[f64; N]; N],
+    d: [f64; N],
+}
+
+/// What a measurement of one row does.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Gain<const N: usize> {
+    /// Change of each error for a unit of innovation.
+    pub k: [f64; N],
+    /// Variance of the innovation.
+    pub variance: f64,
+}
+
+/// Noise that is to be added to one error or two.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Noise {
+    variance: f64,
+    /// Which errors, and their weights; the first is the later one.
+    weights: [(usize, f64); 2],
+}
+
+impl<const N: usize> Stateful for Factors<N> {
+    fn save(&self, to: &mut Saver) {
+        to.list(self.u.as_flattened());
+        to.list(&self.d);
+    }
+
+    fn restore(&mut self, from: &mut Restorer<'_>) -> Result<(), SnapshotError> {
+        from.slots(self.u.as_flattened_mut())?;
+        from.slots(&mut self.d)
+    }
+}
+
+impl<const N: usize> Factors<N> {
+    /// Independent errors of these variances, none negative.
+    pub fn independent(variances: [f64; N]) -> Self {
+        let mut u = [[0.0; N]; N];
+        for (j, column) in u.iter_mut().enumerate() {
+            if let Some(diagonal) = column.get_mut(j) {
+                *diagonal = 1.0;
+            }
+        }
+        Self { u, d: variances }
+    }
+
+    /// Covariance of the errors `i` and `j`.
+    pub fn covariance(&self, i: usize, j: usize) -> f64 {
+        let columns = self.u.iter().zip(&self.d).skip(i.max(j));
+        columns.map(|(column, d)| at(column, i) * d * at(column, j)).sum()
+    }
+
+    /// Variance of one error.
+    pub fn variance(&self, i: usize) -> f64 {
+        self.covariance(i, i)
+    }
+
+    /// Rows of the covariance.
+    pub fn rows<const M: usize>(&self, rows: [usize; M]) -> [[f64; N]; M] {
+        rows.map(|i| core::array::from_fn(|j| self.covariance(i, j)))
+    }
+
+    /// Variance of the sum of the errors, weighted by `h`.
+    pub fn variance_along(&self, h: &[f64; N]) -> f64 {
+        let columns = self.u.iter().zip(&self.d).enumerate();
+        let terms = columns.map(|(j, (column, d))| {
+            let f = dot(column, h, j + 1);
+            f * f * d
+        });
+        terms.sum()
+    }
+
+    /// Covariances of all errors with their sum, weighted by `h`: P h.
+    pub fn along(&self, h: &[f64; N]) -> [f64; N] {
+        let mut along = [0.0; N];
+        for (j, (column, d)) in self.u.iter().zip(&self.d).enumerate() {
+            let f = d * dot(column, h, j + 1);
+            for (along, u) in along.iter_mut().zip(column).take(j + 1) {
+                *along += f * u;
+            }
+        }
+        along
+    }
+
+    /// e^T P^-1 e: how unlikely these errors are, chi-square with `N` degrees of freedom. Infinite where P says that an
+    /// error is known exactly, and it isn't zero.
+    pub fn distance(&self, errors: &[f64; N]) -> f64 {
+        let mut rest = *errors;
+        let mut sum = 0.0;
+        for (j, (column, d)) in self.u.iter().zip(&self.d).enumerate().rev() {
+            let y = at(&rest, j);
+            for (rest, u) in rest.iter_mut().zip(column).take(j) {
+                *rest -= u * y;
+            }
+            if y != 0.0 {
+                sum += y * y / d;
+            }
+        }
+        sum
+    }
+
+    /// P^-1 e, by back substitution. What P says is known exactly counts as nothing.
+    pub fn solve(&self, errors: &[f64; N]) -> [f64; N] {
+        let mut rest = *errors;
+        for (j, column) in self.u.iter().enumerate().rev() {
+            let y = at(&rest, j);
+            for (rest, u) in rest.iter_mut().zip(column).take(j) {
+                *rest -= u * y;
+            }
+        }
+        for (rest, d) in rest.iter_mut().zip(&self.d) {
+            *rest = if *d > 0.0 { *rest / d } else { 0.0 };
+        }
+        for (j, column) in self.u.iter().enumerate() {
+            let before = dot(column, &rest, j);
+            if let Some(rest) = rest.get_mut(j) {
+                *rest -= before;
+            }
+        }
+        rest
+    }
+
+    /// Factors of the covariance of a sum of independent errors, each transformed by the rows of a matrix.
+    ///
+    /// Source: Thornton's modified weighted Gram-Schmidt, in Bierman 1977, VI.4.
+    pub fn of_sum<const M: usize>(parts: [(&Self, &[[f64; N]; N]); M]) -> Self {
+        let mut w: [[[f64; N]; M]; N] = core::array::from_fn(|i| {
+            parts.map(|(factors, rows)| rows.get(i).map_or([0.0; N], |row| factors.through(row)))
+        });
+        let mut sum = Self::independent([0.0; N]);
+        for (j, (column, d)) in sum.u.iter_mut().zip(&mut sum.d).enumerate().rev() {
+            let (above, from) = w.split_at_mut(j);
+            let Some(own) = from.first() else { continue };
+            let weighted: [[f64; N]; M] = core::array::from_fn(|m| {
+                let weights = parts.get(m).map_or([0.0; N], |(factors, _)| factors.d);
+                let own = own.get(m).copied().unwrap_or([0.0; N]);
+                core::array::from_fn(|k| at(&own, k) * at(&weights, k))
+            });
+            let with =
+                |row: &[[f64; N]; M]| row.iter().zip(&weighted).map(|(a, b)| dot(a, b, N)).sum::<f64>();
+            *d = with(own);
+            if *d > 0.0 {
+                for (row, u) in above.iter_mut().zip(column) {
+                    *u = with(row) / *d;
+                    for (w, own) in row.as_flattened_mut().iter_mut().zip(own.as_flattened()) {
+                        *w -= *u * own;
+                    }
+                }
+            }
+        }
+        sum
+    }
+
+    /// A row times U.
+    fn through(&self, row: &[f64; N]) -> [f64; N] {
+        core::array::from_fn(|j| self.u.get(j).map_or(0.0, |column| dot(column, row, j + 1)))
+    }
+
+    /// The elements above the diagonal of U and those of D, column by column.
+    pub fn numbers(&self) -> impl Iterator<Item = f64> + '_ {
+        let columns = self.u.iter().zip(&self.d).enumerate();
+        columns.flat_map(|(j, (column, d))| column.iter().take(j).copied().chain([*d]))
+    }
+
+    /// Factors of such numbers; `None` when there are too few.
+    pub fn of_numbers(numbers: &mut impl Iterator<Item = f64>) -> Option<Self> {
+        let mut factors = Self::independent([0.0; N]);
+        for (j, (column, d)) in factors.u.iter_mut().zip(&mut factors.d).enumerate() {
+            for slot in column.iter_mut().take(j).chain([d]) {
+                *slot = numbers.next()?;
+            }
+        }
+        Some(factors)
+    }
+
+    /// Takes a measurement of the errors weighted by `h`, with noise of a variance that is positive.
+    ///
+    /// Source: Bierman 1977, V.3.
+    pub fn measure(&mut self, h: &[f64; N], noise: f64) -> Gain<N> {
+        let mut k = [0.0; N];
+        let mut variance = noise;
+        for (j, (column, d)) in self.u.iter_mut().zip(&mut self.d).enumerate() {
+            let f = dot(column, h, j + 1);
+            let g = *d * f;
+            let before = variance;
+            variance += f * g;
+            let lambda = -f / before;
+            *d *= before / variance;
+            for (u, k) in column.iter_mut().zip(&mut k).take(j) {
+                let was = *u;
+                *u = was + *k * lambda;
+                *k += g * was;
+            }
+            if let Some(k) = k.get_mut(j) {
+                *k = g;
+            }
+        }
+        Gain { k: k.map(|k| k / variance), variance }
+    }
+
+    /// Adds noise of a variance to the errors, weighted by `a`, of which those from `len` on are zero.
+    pub fn add(&mut self, mut variance: f64, mut a: [f64; N], len: usize) {
+        for (j, (column, d)) in self.u.iter_mut().zip(&mut self.d).enumerate().take(len).rev() {
+            enter(j, column, d, &mut variance, &mut a);
+        }
+    }
+
+    /// Adds noise of a variance to one error.
+    pub fn add_to(&mut self, i: usize, variance: f64) {
+        self.add_all([Noise::of_one(i, variance)]);
+    }
+
+    /// Adds noises, the first first.
+    ///
+    /// They take turns column by column. That gives the same bits as one after the other, as none needs more of those
+    /// before it than the column it is at; and while one waits for its quotient, on which its next column depends, the
+    /// processor is at the others.
+    pub fn add_all<const M: usize>(&mut self, noises: [Noise; M]) {
+        let mut variances = noises.map(|noise| noise.variance);
+        let lens = noises.map(|noise| noise.weights[0].0 + 1);
+        let mut a = [[0.0; N]; M];
+        for (a, noise) in a.iter_mut().zip(&noises) {
+            noise.put(a);
+        }
+        for (j, (column, d)) in self.u.iter_mut().zip(&mut self.d).enumerate().rev() {
+            for ((a, variance), len) in a.iter_mut().zip(&mut variances).zip(&lens) {
+                if *len > j {
+                    enter(j, column, d, variance, a);
+                }
+            }
+        }
+    }
+
+    /// Replaces the errors e by F e, where F is unit upper triangular: `transform` works on one vector of errors, of which
+    /// those from a number on are zero.
+    pub fn shear(&mut self, transform: impl Fn(&mut [f64; N], usize)) {
+        for (j, column) in self.u.iter_mut().enumerate() {
+            transform(column, j + 1);
+        }
+    }
+
+    /// Multiplies one error by a factor, which isn't zero.
+    pub fn scale(&mut self, i: usize, factor: f64) {
+        if let Some(column) = self.u.get_mut(i) {
+            for u in column.iter_mut().take(i) {
+                *u /= factor;
+            }
+        }
+        for column in self.u.iter_mut().skip(i + 1) {
+            if let Some(u) = column.get_mut(i) {
+                *u *= factor;
+            }
+        }
+        if let Some(d) = self.d.get_mut(i) {
+            *d *= factor * factor;
+        }
+    }
+
+    /// Whether all are finite numbers and no variance is negative.
+    pub fn is_sound(&self) -> bool {
+        self.d.iter().all(|d| d.is_finite() && *d >= 0.0)
+            && self.u.as_flattened().iter().all(|u| u.is_finite())
+    }
+}
+
+impl Noise {
+    /// Noise of a variance in one error.
+    pub fn of_one(i: usize, variance: f64) -> Self {
+        Self { variance, weights: [(i, 1.0); 2] }
+    }
+
+    /// Noise of a variance in an error, and by a share in one before it.
+    pub fn of_two(i: usize, (before, share): (usize, f64), variance: f64) -> Self {
+        Self { variance, weights: [(i, 1.0), (before, share)] }
+    }
+
+    fn put<const N: usize>(&self, a: &mut [f64; N]) {
+        for (i, weight) in self.weights {
+            if let Some(slot) = a.get_mut(i) {
+                *slot = weight;
+            }
+        }
+    }
+}
+
+/// Enters noise into column `j` of the factors, once it has entered those after it; what is left of its variance and its
+/// weights is for those before.
+///
+/// Source: Agee and Turner 1972, in Bierman 1977, III.4.
+fn enter<const N: usize>(j: usize, column: &mut [f64; N], d: &mut f64, variance: &mut f64, a: &mut [f64; N]) {
+    let s = at(a, j);
+    let sum = *d + *variance * s * s;
+    if sum > 0.0 {
+        let b = *variance / sum;
+        *variance = b * *d;
+        for (a, u) in a.iter_mut().zip(column).take(j) {
+            *a -= s * *u;
+            *u += s * b * *a;
+        }
+    }
+    *d = sum;
+}
+
+fn at<const N: usize>(column: &[f64; N], i: usize) -> f64 {
+    column.get(i).copied().unwrap_or(0.0)
+}
+
+/// Product of the first `len` elements, in four sums of fixed order.
+fn dot<const N: usize>(a: &[f64; N], b: &[f64; N], len: usize) -> f64 {
+    let (a, b) = (a.get(..len).unwrap_or_default(), b.get(..len).unwrap_or_default());
+    let mut sums = [0.0; 4];
+    let (a4, a_rest) = a.as_chunks::<4>();
+    let (b4, b_rest) = b.as_chunks::<4>();
+    for (a, b) in a4.iter().zip(b4) {
+        for ((sum, a), b) in sums.iter_mut().zip(a).zip(b) {
+            *sum += a * b;
+        }
+    }
+    let rest: f64 = a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum();
+    (sums[0] + sums[2]) + (sums[1] + sums[3]) + rest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The same as it stands in the book, one noise at a time.
+    fn add_alone(factors: &mut Factors<7>, noise: &Noise) {
+        let (mut c, mut a) = (noise.variance, [0.0; 7]);
+        noise.put(&mut a);
+        for j in (0..=noise.weights[0].0).rev() {
+            let (s, d) = (a[j], factors.d[j]);
+            factors.d[j] = d + c * s * s;
+            if factors.d[j] > 0.0 {
+                let b = c / factors.d[j];
+                c = b * d;
+                for (a, u) in a[..j].iter_mut().zip(&mut factors.u[j]) {
+                    *a -= s * *u;
+                    *u += s * b * *a;
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn noises_that_take_turns_give_the_bits_of_one_after_the_other() {
+        let noises: [Noise; 9] = core::array::from_fn(|i| match i {
+            7 => Noise::of_two(5, (2, -1.3), 0.11),
+            8 => Noise::of_two(6, (5, 0.7), 0.2),
+            _ => Noise::of_one((3 * i) % 7, 0.3 / (i + 1) as f64),
+        });
+        for start in [[0.0; 7], [1.0, 0.1, 0.0, 3.0, 1e-9, 0.0, 7.0]] {
+            let (mut alone, mut together) = (Factors::independent(start), Factors::independent(start));
+            for _ in 0..3 {
+                for noise in &noises {
+                    add_alone(&mut alone, noise);
+                }
+                together.add_all(noises);
+            }
+            assert_eq!(alone.d.map(f64::to_bits), together.d.map(f64::to_bits));
+            assert_eq!(alone.u.map(|c| c.map(f64::to_bits)), together.u.map(|c| c.map(f64::to_bits)));
+            assert!(together.is_sound());
+        }
+    }
+}

@@ -1,0 +1,317 @@
+//! From moment to moment: what gyros and accelerometers make of the estimate and of its errors.
+//!
+//! Derivation: `docs/fusion.md`, "Propagation".
+
+use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
+
+use super::factors::{Factors, Noise};
+use super::settings::{Settings, Wander};
+use super::state::{
+    ATTITUDE, DEPTH, ERRORS, Errors, FORCE_BIAS, HEADING, POSITION, RATE_BIAS, SCALE, SLACK, SLACK_RATE,
+    State, VELOCITY, cross, matrix, rotation,
+};
+use headrace_geometry::frames::{Body, Vec3};
+use headrace_geometry::math;
+
+/// What an inertial unit felt in the mean over some time, turned into the body's frame.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Felt {
+    /// Turn rate, rad/s; `None` where no gyro speaks: the attitude then stays, and its error grows fast.
+    pub rate_radps: Option<Vec3<Body>>,
+    /// Specific force, m/s^2; `None` where no accelerometer speaks: the velocity then stays, and its error grows fast.
+    pub force_mps2: Option<Vec3<Body>>,
+}
+
+/// How many numbers a leg is made of.
+pub const LEG_NUMBERS: usize = 1 + 5 * 9 + 2 * 3 + 2;
+
+/// What has been propagated since the errors were last moved on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Leg {
+    dt_s: f64,
+    /// Integral of the rotation while gyros speak.
+    turned: Matrix3<f64>,
+    /// The same while accelerometers speak, and the integral of that.
+    pushed: Matrix3<f64>,
+    pushed_twice: Matrix3<f64>,
+    /// Velocity and way by specific force, without gravity.
+    velocity: Vector3<f64>,
+    way: Vector3<f64>,
+    /// What a gyro's bias does to velocity and way by tilting the force.
+    tilting: Matrix3<f64>,
+    tilting_twice: Matrix3<f64>,
+    /// Time without gyros, and without accelerometers.
+    blind_s: [f64; 2],
+}
+
+impl Default for Leg {
+    fn default() -> Self {
+        Self {
+            dt_s: 0.0,
+            turned: Matrix3::zeros(),
+            pushed: Matrix3::zeros(),
+            pushed_twice: Matrix3::zeros(),
+            velocity: Vector3::zeros(),
+            way: Vector3::zeros(),
+            tilting: Matrix3::zeros(),
+            tilting_twice: Matrix3::zeros(),
+            blind_s: [0.0; 2],
+        }
+    }
+}
+
+impl State {
+    /// Moves the estimate on by what was felt over `dt_s`, and notes in `leg` what that does to its errors.
+    pub fn go_on(&mut self, felt: &Felt, dt_s: f64, gravity_mps2: f64, leg: &mut Leg) {
+        let (turn, force) = self.move_on(felt, dt_s, gravity_mps2);
+        leg.add(dt_s, turn, force, felt.rate_radps.is_some());
+    }
+
+    /// Moves the estimate on by what was felt over `dt_s`; gives its attitude in the middle of that, and the specific force
+    /// in the tunnel's frame.
+    pub fn move_on(
+        &mut self,
+        felt: &Felt,
+        dt_s: f64,
+        gravity_mps2: f64,
+    ) -> (Matrix3<f64>, Option<Vector3<f64>>) {
+        let half = felt.rate_radps.map(|rate| rotation((rate + -self.rate_bias_radps).scaled(dt_s / 2.0)));
+        let middle = half.map_or(self.attitude, |half| self.attitude * half);
+        let turn = matrix(middle);
+        let force = felt.force_mps2.map(|force| turn * (force + -self.force_bias_mps2).0);
+        let lift = Vector3::new(0.0, 0.0, -gravity_mps2);
+        let gain = Vec3::of(force.map_or_else(Vector3::zeros, |force| (force + lift) * dt_s));
+        self.position = self.position + (self.velocity_mps + gain.scaled(0.5)).scaled(dt_s);
+        self.velocity_mps = self.velocity_mps + gain;
+        self.attitude = half.map_or(self.attitude, |half| middle * half);
+        (turn, force)
+    }
+}
+
+impl Leg {
+    fn add(&mut self, dt_s: f64, turn: Matrix3<f64>, force: Option<Vector3<f64>>, turns: bool) {
+        let half = dt_s * dt_s / 2.0;
+        let turning = if turns { turn } else { Matrix3::zeros() };
+        self.way += self.velocity * dt_s;
+        self.pushed_twice += self.pushed * dt_s;
+        self.tilting_twice += self.tilting * dt_s;
+        if let Some(force) = force {
+            let tilting = cross(force) * (self.turned + turning * (dt_s / 2.0));
+            self.tilting_twice += tilting * half;
+            self.tilting += tilting * dt_s;
+            self.way += force * half;
+            self.velocity += force * dt_s;
+            self.pushed_twice += turn * half;
+            self.pushed += turn * dt_s;
+        }
+        self.turned += turning * dt_s;
+        self.dt_s += dt_s;
+        let [without_rate, without_force] = &mut self.blind_s;
+        *without_rate += if turns { 0.0 } else { dt_s };
+        *without_force += if force.is_some() { 0.0 } else { dt_s };
+    }
+
+    /// Two equal lags in a row, driven by white noise.
+    fn slack_noises(&self, settings: &Settings) -> [Noise; 2] {
+        let slack = settings.slack;
+        let lags = self.dt_s / slack.time_s;
+        let left = math::exp(-2.0 * lags);
+        let drive = slack.drive();
+        let of_rate = drive * drive * (1.0 - left);
+        let of_both = drive * drive * slack.time_s / 2.0 * (1.0 - left * (1.0 + 2.0 * lags));
+        let of_slack = slack.reach * slack.reach * (1.0 - left * (1.0 + 2.0 * lags * (1.0 + lags)));
+        if of_rate <= 0.0 {
+            return [Noise::of_one(SLACK, 0.0); 2];
+        }
+        [
+            Noise::of_two(SLACK_RATE, (SLACK, of_both / of_rate), of_rate),
+            Noise::of_one(SLACK, (of_slack - of_both * of_both / of_rate).max(0.0)),
+        ]
+    }
+
+    /// Its numbers, for a record.
+    pub fn numbers(&self) -> impl Iterator<Item = f64> + '_ {
+        let squares = [&self.turned, &self.pushed, &self.pushed_twice, &self.tilting, &self.tilting_twice];
+        let squares = squares.into_iter().flat_map(|matrix| matrix.iter().copied());
+        let ways = [&self.velocity, &self.way].into_iter().flat_map(|way| way.iter().copied());
+        [self.dt_s].into_iter().chain(squares).chain(ways).chain(self.blind_s)
+    }
+
+    /// The leg of such numbers; `None` when there are too few.
+    pub fn of_numbers(numbers: &mut impl Iterator<Item = f64>) -> Option<Self> {
+        let mut leg = Self { dt_s: numbers.next()?, ..Self::default() };
+        let squares = [
+            &mut leg.turned,
+            &mut leg.pushed,
+            &mut leg.pushed_twice,
+            &mut leg.tilting,
+            &mut leg.tilting_twice,
+        ];
+        let squares = squares.into_iter().flat_map(|matrix| matrix.iter_mut());
+        let ways = [&mut leg.velocity, &mut leg.way].into_iter().flat_map(|way| way.iter_mut());
+        for slot in squares.chain(ways).chain(&mut leg.blind_s) {
+            *slot = numbers.next()?;
+        }
+        Some(leg)
+    }
+
+    /// Its length, s.
+    pub fn dt_s(&self) -> f64 {
+        self.dt_s
+    }
+
+    /// How errors at its beginning show at its end.
+    pub fn transition(&self, settings: &Settings) -> Transition {
+        let fading = |time_s: f64| math::exp(-self.dt_s / time_s).max(LEAST_FADING);
+        Transition {
+            dt_s: self.dt_s,
+            velocity_tilted: -cross(self.velocity),
+            way_tilted: -cross(self.way),
+            turned: -self.turned,
+            velocity_pushed: -self.pushed,
+            way_pushed: -self.pushed_twice,
+            velocity_turned: self.tilting,
+            way_turned: self.tilting_twice,
+            fading: [
+                (FORCE_BIAS, fading(settings.force_bias.time_s)),
+                (FORCE_BIAS + 1, fading(settings.force_bias.time_s)),
+                (FORCE_BIAS + 2, fading(settings.force_bias.time_s)),
+                (RATE_BIAS, fading(settings.rate_bias.time_s)),
+                (RATE_BIAS + 1, fading(settings.rate_bias.time_s)),
+                (RATE_BIAS + 2, fading(settings.rate_bias.time_s)),
+                (SLACK, fading(settings.slack.time_s)),
+                (SLACK_RATE, fading(settings.slack.time_s)),
+                (HEADING, fading(settings.heading.time_s)),
+            ],
+        }
+    }
+
+    /// Adds what can't be known of the way: noise of the sensors, and wandering of what is wrong with them.
+    pub fn disturb(&self, settings: &Settings, transition: &Transition, factors: &mut Factors<ERRORS>) {
+        let [blind_rate_s, blind_force_s] = self.blind_s;
+        let variance = |density: f64, blind_density: f64, blind_s: f64| {
+            density * density * (self.dt_s - blind_s).max(0.0) + blind_density * blind_density * blind_s
+        };
+        let force = variance(settings.force_noise, settings.blind_force_noise, blind_force_s);
+        let rate = variance(settings.rate_noise, settings.blind_rate_noise, blind_rate_s);
+        for k in 0..3 {
+            factors.add_all([
+                // White force over the leg: velocity and way vary together, and the way by a twelfth on its own.
+                Noise::of_two(VELOCITY + k, (POSITION + k, self.dt_s / 2.0), force),
+                Noise::of_one(POSITION + k, force * self.dt_s * self.dt_s / 12.0),
+                Noise::of_one(ATTITUDE + k, rate),
+            ]);
+        }
+        factors.add_all(self.wandering(settings, transition));
+    }
+
+    /// How what is wrong with the sensors wanders.
+    fn wandering(&self, settings: &Settings, transition: &Transition) -> [Noise; 11] {
+        let fading = |i: usize, wander: Wander| {
+            let left = transition.left_of(i);
+            Noise::of_one(i, wander.reach * wander.reach * (1.0 - left * left))
+        };
+        let force = |k: usize| fading(FORCE_BIAS + k, settings.force_bias);
+        let rate = |k: usize| fading(RATE_BIAS + k, settings.rate_bias);
+        let white = |i: usize, noise: f64| Noise::of_one(i, noise * noise * self.dt_s);
+        let [slack, slack_alone] = self.slack_noises(settings);
+        [
+            slack,
+            slack_alone,
+            force(0),
+            force(1),
+            force(2),
+            rate(0),
+            rate(1),
+            rate(2),
+            fading(HEADING, settings.heading),
+            white(SCALE, settings.scale_noise),
+            white(DEPTH, settings.depth_noise),
+        ]
+    }
+}
+
+/// Beyond this little of an error is left to matter; to have none left would divide by zero.
+const LEAST_FADING: f64 = 1e-3;
+
+/// How errors at a moment show at a later one: e' = F e.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Transition {
+    dt_s: f64,
+    velocity_tilted: Matrix3<f64>,
+    way_tilted: Matrix3<f64>,
+    turned: Matrix3<f64>,
+    velocity_pushed: Matrix3<f64>,
+    way_pushed: Matrix3<f64>,
+    velocity_turned: Matrix3<f64>,
+    way_turned: Matrix3<f64>,
+    /// Errors that fade by themselves, and what is left of them.
+    fading: [(usize, f64); 9],
+}
+
+impl Transition {
+    /// Moves the factors on.
+    pub fn carry(&self, factors: &mut Factors<ERRORS>) {
+        factors.shear(|column, len| self.shear(column, len));
+        for (i, fading) in self.fading {
+            factors.scale(i, fading);
+        }
+    }
+
+    /// Moves on what is wrong with the sensors: left to itself, it fades towards nothing.
+    pub fn fade(&self, state: &mut State) {
+        state.force_bias_mps2 = state.force_bias_mps2.scaled(self.left_of(FORCE_BIAS));
+        state.rate_bias_radps = state.rate_bias_radps.scaled(self.left_of(RATE_BIAS));
+        state.slack_m = (state.slack_m + state.slack_rate_mps * self.dt_s) * self.left_of(SLACK);
+        state.slack_rate_mps *= self.left_of(SLACK_RATE);
+        state.heading_offset_rad *= self.left_of(HEADING);
+    }
+
+    /// What is left of an error by itself.
+    fn left_of(&self, error: usize) -> f64 {
+        self.fading.iter().find(|(i, _)| *i == error).map_or(1.0, |(_, left)| *left)
+    }
+
+    /// Moves errors on.
+    pub fn apply(&self, errors: &mut Errors) {
+        self.shear(errors, ERRORS);
+        for (i, fading) in self.fading {
+            if let Some(error) = errors.get_mut(i) {
+                *error *= fading;
+            }
+        }
+    }
+
+    /// What doesn't fade; errors from `len` on are zero.
+    fn shear(&self, e: &mut Errors, len: usize) {
+        if len <= VELOCITY {
+            return;
+        }
+        let part = |from: usize| Vector3::from_fn(|k, _| e.get(from + k).copied().unwrap_or(0.0));
+        let mut way = part(VELOCITY) * self.dt_s;
+        let mut velocity = Vector3::zeros();
+        let mut turn = Vector3::zeros();
+        if len > ATTITUDE {
+            let tilt = part(ATTITUDE);
+            way += self.way_tilted * tilt;
+            velocity += self.velocity_tilted * tilt;
+        }
+        if len > FORCE_BIAS {
+            let (force, rate) = (part(FORCE_BIAS), part(RATE_BIAS));
+            way += self.way_pushed * force + self.way_turned * rate;
+            velocity += self.velocity_pushed * force + self.velocity_turned * rate;
+            turn += self.turned * rate;
+        }
+        if let Some([slack, rate]) =
+            e.get_mut(SLACK..=SLACK_RATE).and_then(|pair| <&mut [f64; 2]>::try_from(pair).ok())
+        {
+            *slack += *rate * self.dt_s;
+        }
+        for (from, change) in [(POSITION, way), (VELOCITY, velocity), (ATTITUDE, turn)] {
+            for (e, change) in e.iter_mut().skip(from).zip(change.iter()) {
+                *e += change;
+            }
+        }
+    }
+}

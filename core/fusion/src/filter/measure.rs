@@ -1,0 +1,218 @@
+//! Measurement models: what a sensor should show by the estimate, and how each error would change that.
+//!
+//! Derivation: `docs/fusion.md`, "Measurements".
+
+use super::state::{
+    ATTITUDE, DEPTH, ERRORS, Errors, HEADING, POSITION, RATE_BIAS, SCALE, SLACK, State, VELOCITY, put,
+    rotation_vector,
+};
+use headrace_geometry::frames::{Body, Rot, Sensor, Tunnel, Vec3};
+use headrace_geometry::math;
+use headrace_geometry::tunnel::Profile;
+
+/// One number that was measured.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Row {
+    /// Change of what should be measured for a unit of each error.
+    pub h: Errors,
+    /// Measured less expected.
+    pub residual: f64,
+    /// Variance of the measurement itself.
+    pub noise: f64,
+    /// For a range, how the beam leans along the tunnel.
+    pub lean: Option<Lean>,
+    /// Second derivatives of what should be measured: by the place, 1/m; by a turn, m; by both. The row leaves them out.
+    pub bends: [f64; 3],
+}
+
+/// How a beam leans along the tunnel. It makes the range longer whichever way it leans: a filter that isn't sure which way
+/// would take its first guess for proven.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Lean {
+    /// Component of the beam along the tunnel.
+    pub along: f64,
+    /// Its change for a unit of each error.
+    pub by: Errors,
+    /// Change of the range for a unit of `along`, for each unit of it, m.
+    pub slope_m: f64,
+}
+
+impl Row {
+    fn new(residual: f64, noise: f64) -> Self {
+        Self { h: [0.0; ERRORS], residual, noise, lean: None, bends: [0.0; 3] }
+    }
+
+    /// One error itself.
+    pub fn of(error: usize, residual: f64, noise: f64) -> Self {
+        Self::new(residual, noise).with_one(error, 1.0)
+    }
+
+    fn with<F: Copy>(mut self, from: usize, part: Vec3<F>) -> Self {
+        put(&mut self.h, from, part);
+        self
+    }
+
+    fn with_one(mut self, i: usize, part: f64) -> Self {
+        if let Some(slot) = self.h.get_mut(i) {
+            *slot = part;
+        }
+        self
+    }
+
+    /// The same row, without what it says of the beam's lean where that isn't known: `sd_of` gives the standard deviation of
+    /// a sum of errors.
+    #[must_use]
+    pub fn unless_sure(mut self, sd_of: impl Fn(&Errors) -> f64) -> Self {
+        let Some(lean) = self.lean else { return self };
+        let sd = sd_of(&lean.by);
+        if lean.along.abs() < SURE * sd {
+            for (h, by) in self.h.iter_mut().zip(&lean.by) {
+                *h -= lean.slope_m * lean.along * by;
+            }
+            let unknown_m = lean.slope_m * sd * (lean.along.abs() + sd / 2.0);
+            self.noise += unknown_m * unknown_m;
+        }
+        self
+    }
+
+    /// The same row for errors at a moment `later_s` after the measurement.
+    #[must_use]
+    pub fn seen_later(mut self, later_s: f64) -> Self {
+        for k in 0..3 {
+            let along = self.h.get(POSITION + k).copied().unwrap_or(0.0);
+            if let Some(slot) = self.h.get_mut(VELOCITY + k) {
+                *slot -= along * later_s;
+            }
+        }
+        self
+    }
+}
+
+/// Beams that graze the wall more than this say little of where they start, and much of the wall's roughness.
+const LEAST_COSINE: f64 = 0.5;
+/// A wall nearer than this is not taken to bend more, m.
+const LEAST_HEIGHT_M: f64 = 0.5;
+/// A lean is known when it is so many standard deviations from none.
+const SURE: f64 = 3.0;
+
+/// A sonar's beam.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Beam {
+    /// From the inertial unit, in the body's frame.
+    pub offset: Vec3<Body>,
+    /// Where its middle looks.
+    pub along: Vec3<Body>,
+    /// Angle from its middle within which the wall answers first where it is nearest, radians.
+    pub first_rad: f64,
+    /// Angle within which it may answer so, or not: nobody knows of this sonar, radians.
+    pub unsure_rad: f64,
+}
+
+/// Range of the first answer of the design wall. `None` where the beam meets no wall, or grazes it.
+pub fn range(state: &State, profile: &Profile, beam: &Beam, range_m: f64, sd_m: f64) -> Option<Row> {
+    let arm = state.attitude * beam.offset;
+    let origin = state.position + arm;
+    let along = state.attitude * beam.along;
+    let hit = profile.cast([origin.y(), origin.z()], [along.y(), along.z()])?;
+    let normal = Vec3::<Tunnel>::new(0.0, hit.normal[0], hit.normal[1]);
+    let cosine = -normal.dot(&along);
+    if cosine < LEAST_COSINE {
+        return None;
+    }
+    // The wall is a plane at `height_m`; the ray of the cone that is nearest to its normal answers first.
+    let height_m = hit.range_m * cosine;
+    let incidence = math::acos(cosine);
+    let nearest = (incidence - beam.first_rad).max(0.0);
+    let (sin, cos) = math::sin_cos(nearest);
+    let expected_m = height_m / cos;
+    // d expected / d incidence, and d incidence = turn . (along x normal) / sin(incidence).
+    let slope = if nearest > 0.0 { expected_m * sin / cos / math::sin(incidence) } else { 0.0 };
+    let turning = arm.cross(&normal).scaled(1.0 / cos) + along.cross(&normal).scaled(slope);
+    // It may be anything down to the nearest of the wider cone: of what is spread evenly over that, the mean square.
+    let soonest_m = height_m / math::cos((incidence - beam.unsure_rad).max(0.0));
+    let unsure_m = (expected_m - soonest_m).max(0.0) / math::sqrt(3.0);
+    let mut row = Row::new(range_m - expected_m, sd_m * sd_m + unsure_m * unsure_m);
+    let mut by = [0.0; ERRORS];
+    put(&mut by, ATTITUDE, Vec3::<Tunnel>::new(0.0, along.z(), -along.y()));
+    let across = 1.0 - along.x() * along.x();
+    // The wall as if it bent like a circle about the sonar; and of height / cos(incidence).
+    let secant = 1.0 / cosine;
+    let by_turn = expected_m * (2.0 * secant * secant - 1.0);
+    let tangent = math::sqrt((secant * secant - 1.0).max(0.0));
+    row.bends = [secant / height_m.max(LEAST_HEIGHT_M), by_turn, secant * tangent];
+    row.lean = Some(Lean { along: along.x(), by, slope_m: expected_m / across });
+    Some(row.with(POSITION, normal.scaled(1.0 / cos)).with(ATTITUDE, turning))
+}
+
+/// Height of a pressure sensor at `offset` from the inertial unit, m above the tunnel's floor.
+pub fn height(state: &State, offset: Vec3<Body>, height_m: f64, sd_m: f64) -> Row {
+    let arm = state.attitude * offset;
+    let expected_m = state.position.z() + arm.z() + state.depth_offset_m;
+    Row::new(height_m - expected_m, sd_m * sd_m)
+        .with(POSITION, Vec3::<Tunnel>::new(0.0, 0.0, 1.0))
+        .with(ATTITUDE, Vec3::<Tunnel>::new(arm.y(), -arm.x(), 0.0))
+        .with_one(DEPTH, 1.0)
+}
+
+/// Chainage that the cable shows, whose end is at `offset` from the inertial unit; its scale counts from `from_m`.
+pub fn chainage(state: &State, offset: Vec3<Body>, from_m: f64, chainage_m: f64, sd_m: f64) -> Row {
+    let arm = state.attitude * offset;
+    let way_m = state.position.x() + arm.x() - from_m;
+    let expected_m = from_m + way_m * (1.0 + state.scale) + state.slack_m;
+    let share = 1.0 + state.scale;
+    Row::new(chainage_m - expected_m, sd_m * sd_m)
+        .with(POSITION, Vec3::<Tunnel>::new(share, 0.0, 0.0))
+        .with(ATTITUDE, Vec3::<Tunnel>::new(0.0, arm.z() * share, -arm.y() * share))
+        .with_one(SLACK, 1.0)
+        .with_one(SCALE, way_m)
+}
+
+/// Attitude as a unit's own computer has it, about the tunnel's x, y and z. About z it is a compass, with its deviation.
+///
+/// Smooth at any attitude, a pitch of 90 degrees included: it compares rotations, and no angles.
+pub fn attitude(state: &State, measured: Rot<Tunnel, Body>, tilt_sd: f64, heading_sd: f64) -> [Row; 3] {
+    let off = rotation_vector(measured * state.attitude.inverse());
+    let row =
+        |residual: f64, axis: usize, sd: f64| Row::new(residual, sd * sd).with_one(ATTITUDE + axis, 1.0);
+    [
+        row(off.x(), 0, tilt_sd),
+        row(off.y(), 1, tilt_sd),
+        row(off.z() - state.heading_offset_rad, 2, heading_sd).with_one(HEADING, 1.0),
+    ]
+}
+
+/// Velocity over ground in the frame of a sensor at `offset`, m/s, with the turn rate of the body.
+pub fn velocity(
+    state: &State,
+    (offset, mounted): (Vec3<Body>, Rot<Body, Sensor>),
+    rate_radps: Vec3<Body>,
+    measured_mps: Vec3<Sensor>,
+    sd_mps: f64,
+) -> [Row; 3] {
+    let moved = state.velocity_mps;
+    let in_body = state.attitude.inverse() * moved + rate_radps.cross(&offset);
+    let off = measured_mps + -(mounted.inverse() * in_body);
+    let axes = [Vec3::new(1.0, 0.0, 0.0), Vec3::new(0.0, 1.0, 0.0), Vec3::new(0.0, 0.0, 1.0)];
+    let residuals = [off.x(), off.y(), off.z()];
+    core::array::from_fn(|k| {
+        // The sensor's axis in the tunnel's frame.
+        let axis = state.attitude * (mounted * axes.get(k).copied().unwrap_or_else(Vec3::zero));
+        let residual = residuals.get(k).copied().unwrap_or(0.0);
+        Row::new(residual, sd_mps * sd_mps).with(VELOCITY, axis).with(ATTITUDE, axis.cross(&moved))
+    })
+}
+
+/// Of a unit that doesn't turn, the mean rate is its bias, rad/s.
+pub fn no_turn(state: &State, mean_radps: Vec3<Body>, sd_radps: f64) -> [Row; 3] {
+    let off = mean_radps + -state.rate_bias_radps;
+    let off = [off.x(), off.y(), off.z()];
+    core::array::from_fn(|k| Row::of(RATE_BIAS + k, off.get(k).copied().unwrap_or(0.0), sd_radps * sd_radps))
+}
+
+/// Rest: no velocity.
+pub fn rest(state: &State, sd_mps: f64) -> [Row; 3] {
+    let moved = [state.velocity_mps.x(), state.velocity_mps.y(), state.velocity_mps.z()];
+    core::array::from_fn(|k| {
+        Row::new(-moved.get(k).copied().unwrap_or(0.0), sd_mps * sd_mps).with_one(VELOCITY + k, 1.0)
+    })
+}

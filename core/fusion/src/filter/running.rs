@@ -1,0 +1,469 @@
+//! The filter at work: an epoch is a leg of propagation, and the measurements of its time.
+
+use core::ops::Range;
+
+use super::agreement::Agreement;
+use super::factors::Factors;
+use super::inertial::Leg;
+use super::measure::{self, Beam, Row};
+use super::settings::Settings;
+use super::sources::Source;
+use super::state::{ATTITUDE, ERRORS, Errors, POSITION, SCALE, State, VELOCITY, put, vec};
+use super::trail::Trail;
+use super::window::{Waiting, Window};
+use crate::NoFix;
+use crate::relative::Relative;
+use crate::smooth::step::{Move, Step};
+use headrace_geometry::frames::{Body, Point3, Rot, Sensor, Tunnel, Vec3, head_direction};
+use headrace_geometry::math;
+use headrace_geometry::site::Site;
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_geometry::tunnel::Profile;
+use headrace_sensor::device::SensorKind;
+use headrace_sensor::reading::MAX_SOURCES;
+use headrace_sensor::reading::{Level, Reading};
+use headrace_snapshot::stateful;
+
+/// Room for the moments of an epoch at which an inertial unit spoke.
+const KNOTS: usize = 256;
+/// A vehicle that rests moves by so much, m/s: the sea's, or the deck's.
+const REST_SD_MPS: f64 = 0.02;
+/// And turns by so much in the mean of a second, rad/s.
+const REST_SD_RADPS: f64 = 1e-3;
+/// It doesn't rest when that is more unlikely than once in ten thousand times.
+const REST_GATE: f64 = 15.1;
+/// A wall is as good as flat over so little, m, unless ranges are better still.
+const NEAR_M: f64 = 0.03;
+/// How fast a vehicle is, m/s, when nobody knows.
+const SPEED_SD_MPS: f64 = 0.5;
+/// How far off an estimate beyond the wall may be, m.
+const BEYOND_M: f64 = 1.5;
+
+/// Most steps of an epoch: its leg, and two at which errors may turn out larger than was believed; and an end.
+const STEPS: usize = 4;
+/// Samples are placed while the place in the section and the yaw are known so well, m and radians.
+const PLACE_LIMIT_M: f64 = 0.5;
+const YAW_LIMIT_RAD: f64 = 0.25;
+/// The same of chainage, against that when the heads last passed, and against the cable's length.
+const ALONG_LIMIT_M: f64 = 1.0;
+
+/// What doesn't change during a dive.
+#[derive(Debug, Clone)]
+pub struct Context {
+    /// The design.
+    pub profile: Profile,
+    /// The water and the place.
+    pub site: Site,
+    /// How far sensors are trusted.
+    pub settings: Settings,
+    /// Where the inertial unit is on the vehicle.
+    pub unit_at: Vec3<Body>,
+}
+
+stateful!(Context { state: unit_at; fixed: profile, site, settings; });
+
+/// The estimate at a moment, and how far it may be off.
+#[derive(Debug, Clone)]
+pub struct Running {
+    /// The moment: all that was valid before has been fused.
+    pub at: MonoNs,
+    /// The estimate then.
+    pub state: State,
+    /// The covariance of its errors.
+    pub factors: Factors<ERRORS>,
+    /// Errors against those before.
+    pub trail: Trail,
+    /// When the way along the tunnel was last sought anew.
+    pub way_sought: Option<MonoNs>,
+    /// The estimate through the last epoch, before its measurements.
+    knots: Vec<(MonoNs, State)>,
+    agreement: Agreement,
+    /// What led from estimate to estimate in the last epoch, for smoothing; nothing unless it is kept.
+    pub steps: Vec<Step>,
+    keeps_steps: bool,
+}
+
+stateful!(Running { state: at, state, factors, trail, way_sought, agreement; lists: knots; fixed: steps, keeps_steps; });
+
+impl Default for Running {
+    /// Room for what an estimate needs, before there is one.
+    fn default() -> Self {
+        Self {
+            at: MonoNs(0),
+            state: State::at_rest(Point3::zero(), Rot::identity()),
+            factors: Factors::independent([0.0; ERRORS]),
+            trail: Trail::default(),
+            way_sought: None,
+            knots: Vec::with_capacity(KNOTS),
+            agreement: Agreement::default(),
+            steps: Vec::new(),
+            keeps_steps: false,
+        }
+    }
+}
+
+impl Running {
+    /// Keeps from now on in `steps` what smoothing needs of an epoch. Whoever wants them takes them out after each.
+    ///
+    /// Allocates: their room.
+    pub fn keep_steps(&mut self) {
+        self.steps.reserve_exact(STEPS);
+        self.keeps_steps = true;
+    }
+
+    /// Begins with an estimate and its covariance.
+    pub fn begin(&mut self, at: MonoNs, state: State, factors: Factors<ERRORS>) {
+        (self.at, self.state, self.factors) = (at, state, factors);
+        self.trail.clear();
+        self.agreement = Agreement::default();
+        self.way_sought = None;
+    }
+
+    /// Goes on to a later moment, and fuses what the window has up to it.
+    pub fn advance(
+        &mut self,
+        to: MonoNs,
+        context: &Context,
+        window: &mut Window,
+        sources: &mut [Option<Source>; MAX_SOURCES],
+    ) {
+        let (mut nominal, leg) = self.propagate(to, context, window);
+        let transition = leg.transition(&context.settings);
+        transition.fade(&mut nominal);
+        self.keep(to, &Move::Leg(leg), nominal);
+        transition.carry(&mut self.factors);
+        leg.disturb(&context.settings, &transition, &mut self.factors);
+        self.trail.carry(&transition);
+        let mut errors = [0.0; ERRORS];
+        while let Some(waiting) = window.pop(to) {
+            let Some(Some(source)) = sources.get_mut(waiting.source) else { continue };
+            // Each reading is compared with the best estimate so far: after a silence the first ones move it far.
+            let known = errors;
+            let later_s = to.since(waiting.at).as_secs_f64();
+            let mut then = self.state_at(waiting.at);
+            then.correct(&earlier(&known, later_s));
+            for (number, row) in rows(&then, context, source, &waiting, window).into_iter().enumerate() {
+                let again = |state: &State| {
+                    rows(state, context, source, &waiting, window).get(number).copied().flatten()
+                };
+                if let Some(row) = row.and_then(|row| self.straight(row, &then, again)) {
+                    self.fuse(&row.seen_later(later_s), &context.settings, source, (&known, &mut errors));
+                }
+            }
+        }
+        (self.at, self.state) = (to, nominal);
+        self.state.correct(&errors);
+        self.bound_speed();
+        self.stay_inside(&context.profile);
+        self.trail.note(to, &self.factors);
+        if let Some(variances) = self.agreement.seek() {
+            if variances.get(POSITION).is_some_and(|along| *along > 0.0) {
+                self.way_sought = Some(to);
+            }
+            self.widen(&variances);
+        }
+    }
+
+    /// Adds to the errors' variances: the estimate stays, and is less sure.
+    fn widen(&mut self, variances: &Errors) {
+        self.keep(self.at, &Move::Widened(*variances), self.state);
+        widen(&mut self.factors, variances);
+    }
+
+    /// Keeps a step that begins with the present estimate.
+    fn keep(&mut self, to: MonoNs, by: &Move, predicted: State) {
+        if self.keeps_steps && self.steps.len() < STEPS {
+            let (at, state, factors) = (self.at, self.state, self.factors);
+            self.steps.push(Step { at, to, state, factors, by: *by, predicted });
+        }
+    }
+
+    /// Keeps that the estimate goes no further than this.
+    pub fn keep_end(&mut self) {
+        self.keep(self.at, &Move::End, self.state);
+    }
+
+    /// Fuses that the vehicle doesn't move, unless that is too unlikely; and that a mean turn rate is its bias.
+    pub fn rest(&mut self, mean_radps: Option<Vec3<Body>>) {
+        let rows = measure::rest(&self.state, REST_SD_MPS);
+        let unlikely = |row: &Row| {
+            row.residual * row.residual > REST_GATE * (self.factors.variance_along(&row.h) + row.noise)
+        };
+        if rows.iter().any(unlikely) {
+            return;
+        }
+        let mut errors = [0.0; ERRORS];
+        let turns = mean_radps.map(|mean| measure::no_turn(&self.state, mean, REST_SD_RADPS));
+        for row in rows.iter().chain(turns.iter().flatten()) {
+            self.correct(row, &[0.0; ERRORS], &mut errors);
+        }
+        self.state.correct(&errors);
+    }
+
+    /// Whether the estimate is made of numbers.
+    pub fn is_sound(&self) -> bool {
+        self.state.is_sound() && self.factors.is_sound()
+    }
+
+    fn propagate(&mut self, to: MonoNs, context: &Context, window: &Window) -> (State, Leg) {
+        let mut leg = Leg::default();
+        let (mut now, mut state) = (self.at, self.state);
+        self.knots.clear();
+        self.knots.push((now, state));
+        while now < to {
+            let (felt, until) = window.felt(now, to);
+            state.go_on(&felt, until.since(now).as_secs_f64(), context.site.gravity_mps2, &mut leg);
+            now = until;
+            if self.knots.len() < KNOTS {
+                self.knots.push((now, state));
+            }
+        }
+        (state, leg)
+    }
+
+    /// The estimate at a moment of the last epoch, before its measurements.
+    fn state_at(&self, at: MonoNs) -> State {
+        let next = self.knots.partition_point(|(knot, _)| *knot < at);
+        let (before, after) = (self.knots.get(next.saturating_sub(1)), self.knots.get(next));
+        let (Some((from, before)), Some((to, after))) = (before, after) else {
+            return before.or(after).map_or(self.state, |(_, state)| *state);
+        };
+        if to <= from {
+            return *after;
+        }
+        let share = at.since(*from).as_secs_f64() / to.since(*from).as_secs_f64();
+        before.between(after, share)
+    }
+
+    /// Takes a row whose residual is against the estimate corrected by the errors that were known.
+    fn fuse(
+        &mut self,
+        row: &Row,
+        settings: &Settings,
+        source: &mut Source,
+        (known, errors): (&Errors, &mut Errors),
+    ) {
+        let mut row = row.unless_sure(|by| math::sqrt(self.factors.variance_along(by)));
+        row.noise += self.left_out(row.bends);
+        let innovation = row.residual - since(&row, known, errors);
+        let variance = self.factors.variance_along(&row.h) + row.noise;
+        let nis = innovation * innovation / variance;
+        let agrees = nis <= settings.gate;
+        let kind = source.sensor.kind;
+        self.agreement.note(kind, &row, agrees);
+        source.consistency.count(nis, settings.gate, variance, settings.usual_variance(kind));
+        if agrees {
+            self.correct(&row, known, errors);
+        }
+    }
+
+    /// Variance of what a row leaves out, by its second derivatives. It matters only while the place or the attitude is
+    /// hardly known.
+    ///
+    /// Of a normal error e, f'' e^2 / 2 has a square of mean 3/4 (f'' sigma^2)^2.
+    fn left_out(&self, [by_place, by_turn, by_both]: [f64; 3]) -> f64 {
+        let sum = |axes: Range<usize>| axes.map(|i| self.factors.variance(i)).sum::<f64>();
+        let (place, turn) = (sum(POSITION + 1..POSITION + 3), sum(ATTITUDE..ATTITUDE + 3));
+        let bent = by_place * place + by_turn * turn + 2.0 * by_both * math::sqrt(place * turn);
+        0.75 * bent * bent
+    }
+
+    /// A row as noisy as what it measures is bent: looked at from a standard deviation to either side. `None` where there is
+    /// nothing to be seen from there.
+    fn straight(&self, mut row: Row, then: &State, again: impl Fn(&State) -> Option<Row>) -> Option<Row> {
+        let variance = self.factors.variance_along(&row.h);
+        if row.lean.is_none() || variance < row.noise.min(NEAR_M * NEAR_M) {
+            return Some(row);
+        }
+        let sd_m = math::sqrt(variance);
+        let step = self.factors.along(&row.h).map(|covariance| covariance / sd_m);
+        let mut bent_m = 0.0_f64;
+        for side in [1.0, -1.0] {
+            let mut moved = *then;
+            moved.correct(&step.map(|step| side * step));
+            let straight_m = row.residual - side * sd_m;
+            bent_m = bent_m.max((again(&moved)?.residual - straight_m).abs());
+        }
+        row.noise += bent_m * bent_m;
+        Some(row)
+    }
+
+    /// The vehicle is in the tunnel: an estimate beyond the wall, from where no beam could be told, is drawn back.
+    fn stay_inside(&mut self, profile: &Profile) {
+        let place = [self.state.position.y(), self.state.position.z()];
+        if profile.contains(place) {
+            return;
+        }
+        let reference = profile.reference();
+        let reach_m = profile.farthest_m(reference);
+        let mut variances = [0.0; ERRORS];
+        put(&mut variances, POSITION, Vec3::<Tunnel>::new(0.0, BEYOND_M * BEYOND_M, BEYOND_M * BEYOND_M));
+        self.widen(&variances);
+        let mut errors = [0.0; ERRORS];
+        for (axis, (is, middle)) in (1..3).zip(place.into_iter().zip(reference)) {
+            self.correct(
+                &Row::of(POSITION + axis, middle - is, reach_m * reach_m),
+                &[0.0; ERRORS],
+                &mut errors,
+            );
+        }
+        self.state.correct(&errors);
+    }
+
+    /// How far off the estimate may be.
+    pub fn sigmas(&self) -> Sigmas {
+        Sigmas::of(&self.state, &self.factors)
+    }
+
+    /// Vehicles are no faster than a little, whatever an accelerometer without anything beside it makes of gravity.
+    fn bound_speed(&mut self) {
+        let mut errors = [0.0; ERRORS];
+        for (axis, row) in measure::rest(&self.state, SPEED_SD_MPS).iter().enumerate() {
+            if self.factors.variance(VELOCITY + axis) > SPEED_SD_MPS * SPEED_SD_MPS {
+                self.correct(row, &[0.0; ERRORS], &mut errors);
+            }
+        }
+        self.state.correct(&errors);
+    }
+
+    fn correct(&mut self, row: &Row, known: &Errors, errors: &mut Errors) {
+        let innovation = row.residual - since(row, known, errors);
+        let gain = self.factors.measure(&row.h, row.noise);
+        self.trail.measure(&row.h, &gain);
+        for (error, k) in errors.iter_mut().zip(&gain.k) {
+            *error += k * innovation;
+        }
+    }
+}
+
+/// What a row would have measured of the errors that have been found since those that were known.
+fn since(row: &Row, known: &Errors, errors: &Errors) -> f64 {
+    row.h.iter().zip(errors.iter().zip(known)).map(|(h, (error, known))| h * (error - known)).sum()
+}
+
+/// Standard deviations of an estimate.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sigmas {
+    /// Of the chainage, its cable's scale left out, m.
+    pub along_m: f64,
+    /// Of the place in the section, in the worse direction, m.
+    pub place_m: f64,
+    /// Of roll or pitch, radians.
+    pub tilt_rad: f64,
+    /// Of yaw, radians.
+    pub yaw_rad: f64,
+}
+
+impl Sigmas {
+    /// Those of an estimate and the covariance of its errors.
+    pub fn of(state: &State, factors: &Factors<ERRORS>) -> Self {
+        let of = |i: usize| math::sqrt(factors.variance(i));
+        let mut along = [0.0; ERRORS];
+        for (i, share) in [(POSITION, 1.0), (SCALE, state.position.x())] {
+            if let Some(slot) = along.get_mut(i) {
+                *slot = share;
+            }
+        }
+        Self {
+            along_m: math::sqrt(factors.variance_along(&along)),
+            place_m: of(POSITION + 1).max(of(POSITION + 2)),
+            tilt_rad: of(ATTITUDE).max(of(ATTITUDE + 1)),
+            yaw_rad: of(ATTITUDE + 2),
+        }
+    }
+
+    /// Whether samples may be placed by such an estimate, with errors against those a pass before.
+    ///
+    /// Errors: what is too uncertain.
+    pub fn standing(&self, relative: Relative) -> Result<Relative, NoFix> {
+        if self.yaw_rad > YAW_LIMIT_RAD {
+            Err(NoFix::Heading)
+        } else if self.place_m > PLACE_LIMIT_M {
+            Err(NoFix::Section)
+        } else if relative.sigma_m(Vec3::zero()) > ALONG_LIMIT_M || self.along_m > ALONG_LIMIT_M {
+            Err(NoFix::Chainage)
+        } else {
+            Ok(relative)
+        }
+    }
+}
+
+/// Adds to the variances of errors.
+pub fn widen(factors: &mut Factors<ERRORS>, variances: &Errors) {
+    for (i, variance) in variances.iter().enumerate().filter(|(_, variance)| **variance > 0.0) {
+        factors.add_to(i, *variance);
+    }
+}
+
+/// Errors as they were `by_s` before.
+fn earlier(errors: &Errors, by_s: f64) -> Errors {
+    let mut then = *errors;
+    put(&mut then, POSITION, vec::<Tunnel>(errors, POSITION) + vec::<Tunnel>(errors, VELOCITY).scaled(-by_s));
+    then
+}
+
+/// What a reading measures; nothing where it can't be said.
+fn rows(
+    state: &State,
+    context: &Context,
+    source: &Source,
+    waiting: &Waiting,
+    window: &Window,
+) -> [Option<Row>; 3] {
+    let Context { profile, site, settings, unit_at } = context;
+    let mount = source.sensor.mount;
+    let offset = mount.position + -*unit_at;
+    let beam = |along: Vec3<Sensor>, first_rad: f64, unsure_rad: f64| {
+        let along = mount.rotation * along;
+        Beam { offset, along, first_rad, unsure_rad }
+    };
+    let one = |row: Option<Row>| [row, None, None];
+    match (source.sensor.kind, waiting.reading) {
+        (SensorKind::Echosounder { .. }, Reading::Echo(echo)) => one(echo.range_m.and_then(|range_m| {
+            let range_m = site.rescaled_range_m(range_m, echo.sound_speed_mps);
+            let beam = beam(Vec3::new(1.0, 0.0, 0.0), 0.0, settings.echo_beam_rad / 2.0);
+            measure::range(state, profile, &beam, range_m, settings.echo_sd_m)
+        })),
+        (SensorKind::Head, Reading::Sonar(sonar)) => one(sonar.range_m.and_then(|range_m| {
+            let range_m = site.rescaled_range_m(range_m, sonar.sound_speed_mps);
+            let beam = beam(head_direction(sonar.angle_rad), settings.return_beam_rad / 2.0, 0.0);
+            let sd_m = with_quantum(settings.return_sd_m, sonar.resolution_m);
+            measure::range(state, profile, &beam, range_m, sd_m)
+        })),
+        (SensorKind::Depth, Reading::Pressure(water)) => {
+            let height_m = site.surface_above_floor_m - site.depth_m(water.pressure_pa);
+            let quantum_m = site.depth_m(site.surface_pressure_pa + water.resolution_pa);
+            let sd_m = with_quantum(settings.depth_sd_m, quantum_m);
+            one(Some(measure::height(state, offset, height_m, sd_m)))
+        }
+        (SensorKind::Tether { zero_at_m, scale }, Reading::TetherLength(length)) => {
+            let sd_m = with_quantum(settings.tether_sd_m, length.resolution_m * scale.abs());
+            let chainage_m = zero_at_m + scale * length.length_m;
+            one(Some(measure::chainage(state, -*unit_at, zero_at_m, chainage_m, sd_m)))
+        }
+        (SensorKind::Imu, Reading::Attitude(level)) => {
+            let measured = in_tunnel(site, level) * mount.rotation.inverse();
+            let (felt, _) = window.felt(waiting.at, waiting.at + DurNs(1));
+            let seeing = felt.rate_radps.is_some() && felt.force_mps2.is_some();
+            let tilt_sd = if seeing { settings.tilt_sd_rad } else { settings.attitude_sd_rad };
+            measure::attitude(state, measured, tilt_sd, settings.heading_sd_rad).map(Some)
+        }
+        (SensorKind::VelocityLog, Reading::VelocityOverGround(moved)) => {
+            let (felt, _) = window.felt(waiting.at, waiting.at + DurNs(1));
+            let rate = felt.rate_radps.map_or_else(Vec3::zero, |rate| rate + -state.rate_bias_radps);
+            let sensor = (offset, mount.rotation);
+            measure::velocity(state, sensor, rate, moved, settings.velocity_sd_mps).map(Some)
+        }
+        _ => [None; 3],
+    }
+}
+
+/// An attitude of a unit against its own level, in the tunnel.
+pub fn in_tunnel(site: &Site, level: Rot<Level, Sensor>) -> Rot<Tunnel, Sensor> {
+    Rot::<Tunnel, Level>::from_roll_pitch_yaw(0.0, 0.0, -site.axis_yaw_rad) * level
+}
+
+/// A noise with that of rounding to a quantum.
+pub fn with_quantum(sd: f64, quantum: f64) -> f64 {
+    math::hypot(sd, quantum / math::sqrt(12.0))
+}

@@ -1,0 +1,129 @@
+//! How far each sensor is trusted. Defaults suit a small vehicle with a MEMS unit; a vehicle file's `[navigation]` table
+//! changes them.
+
+use headrace_geometry::time::DurNs;
+use headrace_sensor::device::SensorKind;
+
+/// In radians.
+const DEGREE: f64 = core::f64::consts::PI / 180.0;
+/// Something that wanders about zero: a Gauss-Markov process.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Wander {
+    /// Standard deviation, in the units of what wanders.
+    pub reach: f64,
+    /// Time over which it forgets itself, s.
+    pub time_s: f64,
+}
+
+impl Wander {
+    /// Standard deviation of what drives a process of two equal lags in a row, whose own is `reach`: it wanders smoothly.
+    pub fn drive(&self) -> f64 {
+        core::f64::consts::SQRT_2 * self.reach / self.time_s
+    }
+}
+
+/// See the module's description. Every number is positive.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// White noise of the gyros, rad/s/sqrt(Hz).
+    pub rate_noise: f64,
+    /// White noise of the accelerometers, m/s^2/sqrt(Hz).
+    pub force_noise: f64,
+    /// The same where no gyro, or no accelerometer, speaks: how a vehicle turns and speeds up by itself.
+    pub blind_rate_noise: f64,
+    /// See `blind_rate_noise`.
+    pub blind_force_noise: f64,
+    /// Bias of the gyros, rad/s.
+    pub rate_bias: Wander,
+    /// Bias of the accelerometers, m/s^2.
+    pub force_bias: Wander,
+    /// A tether counter's noise beside its quantum, m.
+    pub tether_sd_m: f64,
+    /// Slack of the cable, m, which wanders smoothly: two lags in a row.
+    pub slack: Wander,
+    /// Scale of the cable at the start, a share, and how it wanders, a share per root of a second.
+    pub scale_sd: f64,
+    /// See `scale_sd`.
+    pub scale_noise: f64,
+    /// A depth sensor's noise beside its quantum, m.
+    pub depth_sd_m: f64,
+    /// Its offset at the start, m, and how that wanders, m per root of a second: water level, density, surface pressure.
+    pub depth_offset_sd_m: f64,
+    /// See `depth_offset_sd_m`.
+    pub depth_noise: f64,
+    /// Noise of an attitude about the vertical, radians.
+    pub heading_sd_rad: f64,
+    /// A compass's deviation, radians.
+    pub heading: Wander,
+    /// Noise of an attitude about level axes, radians, where gyros and accelerometers speak for themselves.
+    pub tilt_sd_rad: f64,
+    /// Noise of an attitude where they don't.
+    pub attitude_sd_rad: f64,
+    /// Noise of an echosounder, m, the wall's own roughness included.
+    pub echo_sd_m: f64,
+    /// Full width of its beam, radians: within it nobody knows which part of the wall answers.
+    pub echo_beam_rad: f64,
+    /// Noise of a head's return, m, the wall's own roughness included.
+    pub return_sd_m: f64,
+    /// Full width of its beam, radians: the nearest part of the wall answers.
+    pub return_beam_rad: f64,
+    /// Angle between two returns of a head that are used, radians: nearer ones see the same roughness.
+    pub return_step_rad: f64,
+    /// Noise of a velocity over ground, m/s.
+    pub velocity_sd_mps: f64,
+    /// A measurement is left out when its innovation squared is more than this many times its variance.
+    pub gate: f64,
+    /// Readings older than this when they come are too late.
+    pub window: DurNs,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            rate_noise: 0.01 * DEGREE,
+            force_noise: 0.003,
+            blind_rate_noise: 2.0 * DEGREE,
+            blind_force_noise: 0.03,
+            rate_bias: Wander { reach: 0.2 * DEGREE, time_s: 1000.0 },
+            force_bias: Wander { reach: 0.03, time_s: 300.0 },
+            tether_sd_m: 0.005,
+            slack: Wander { reach: 0.06, time_s: 10.0 },
+            scale_sd: 0.002,
+            scale_noise: 1e-5,
+            depth_sd_m: 0.02,
+            depth_offset_sd_m: 0.5,
+            depth_noise: 0.001,
+            heading_sd_rad: 1.0 * DEGREE,
+            heading: Wander { reach: 4.0 * DEGREE, time_s: 30.0 },
+            tilt_sd_rad: 2.0 * DEGREE,
+            attitude_sd_rad: 1.0 * DEGREE,
+            echo_sd_m: 0.03,
+            echo_beam_rad: 25.0 * DEGREE,
+            return_sd_m: 0.03,
+            return_beam_rad: 1.4 * DEGREE,
+            return_step_rad: 3.0 * DEGREE,
+            velocity_sd_mps: 0.02,
+            gate: GATE_999,
+            window: DurNs::from_millis(200),
+        }
+    }
+}
+
+/// Chi-square with one degree of freedom is above this once in a thousand times.
+const GATE_999: f64 = 10.828;
+
+impl Settings {
+    /// Variance of a measurement of a kind of sensor by itself, in its unit: the measure of what innovations have.
+    pub fn usual_variance(&self, kind: SensorKind) -> f64 {
+        let sd = match kind {
+            SensorKind::Head => self.return_sd_m,
+            SensorKind::Echosounder { .. } => self.echo_sd_m,
+            SensorKind::Depth => self.depth_sd_m,
+            SensorKind::Imu => self.tilt_sd_rad,
+            SensorKind::VelocityLog => self.velocity_sd_mps,
+            SensorKind::Tether { .. } => self.tether_sd_m,
+            SensorKind::Other => 1.0,
+        };
+        sd * sd
+    }
+}

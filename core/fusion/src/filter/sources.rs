@@ -1,0 +1,115 @@
+//! What the filter keeps of each source: how it sits, what it said last, and how well it agrees.
+
+use serde::{Deserialize, Serialize};
+
+use headrace_geometry::math;
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_sensor::device::SensorInfo;
+use headrace_sensor::reading::SonarReturn;
+
+/// A source that hasn't been heard for so long is off.
+const SILENT: DurNs = DurNs(3_000_000_000);
+/// Share of a new rate of turning in the mean.
+const RATE_SHARE: f64 = 0.05;
+
+/// How a source's innovations are spread: a filter that is right has a mean NIS of 1.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Consistency {
+    /// Measurements that were used.
+    pub used: u64,
+    /// Measurements that were too unlikely to be used.
+    pub gated: u64,
+    /// Readings that came after their time.
+    pub late: u64,
+    /// Readings that weren't numbers, or for which there was no room.
+    pub dropped: u64,
+    /// Sum of the normalised innovations squared (NIS) of those that were used.
+    pub nis_sum: f64,
+    /// Minus twice the logarithm of the likelihood of all innovations, up to a constant for each measurement: a sum of NIS,
+    /// at the gate where they are beyond it, less 1, and of the logarithm of their variance against the usual one. Between two
+    /// ways of reading the same log, the one with less of it is likelier.
+    pub surprise: f64,
+}
+
+impl Consistency {
+    /// Counts an innovation of this variance, and whether it was used.
+    pub fn count(&mut self, nis: f64, gate: f64, variance: f64, usual: f64) {
+        self.surprise += nis.min(gate) - 1.0 + math::ln(variance / usual);
+        if nis <= gate {
+            self.used += 1;
+            self.nis_sum += nis;
+        } else {
+            self.gated += 1;
+        }
+    }
+
+    /// Mean NIS of the measurements that were used; `None` without any.
+    pub fn nis(&self) -> Option<f64> {
+        (self.used > 0).then(|| self.nis_sum / self.used as f64)
+    }
+}
+
+/// See the module's description.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Source {
+    /// How it sits, and what it is.
+    pub sensor: SensorInfo,
+    /// How well it agrees.
+    pub consistency: Consistency,
+    /// When a reading of it was last put into the window.
+    pub taken: Option<MonoNs>,
+    /// For a head, how it turns.
+    pub turning: Turning,
+}
+
+/// How a head turns, as far as navigation cares.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Turning {
+    last: Option<(MonoNs, f64)>,
+    used_rad: Option<f64>,
+    rate_radps: f64,
+}
+
+impl Source {
+    /// A source that hasn't said anything.
+    pub fn new(sensor: SensorInfo) -> Self {
+        Self { sensor, consistency: Consistency::default(), taken: None, turning: Turning::default() }
+    }
+
+    /// Whether `period` has gone since its last reading in the window; then this one is the last.
+    pub fn is_due(&mut self, at: MonoNs, period: DurNs) -> bool {
+        let due = self.taken.is_none_or(|taken| at.since(taken).0.abs() >= period.0);
+        if due {
+            self.taken = Some(at);
+        }
+        due
+    }
+}
+
+impl Turning {
+    /// Notes a ping; whether it looks elsewhere than the last one that was used by `step_rad` or more.
+    pub fn ping(&mut self, at: MonoNs, sonar: &SonarReturn, step_rad: f64) -> bool {
+        if let Some((before, angle_rad)) = self.last {
+            let dt_s = at.since(before).as_secs_f64();
+            if dt_s > 0.0 && dt_s < 1.0 {
+                let rate = math::wrap_signed(sonar.angle_rad - angle_rad, math::TAU).abs() / dt_s;
+                let share = if self.rate_radps > 0.0 { RATE_SHARE } else { 1.0 };
+                self.rate_radps += share * (rate - self.rate_radps);
+            }
+        }
+        self.last = Some((at, sonar.angle_rad));
+        let elsewhere = self
+            .used_rad
+            .is_none_or(|used| math::wrap_signed(sonar.angle_rad - used, math::TAU).abs() >= step_rad);
+        if elsewhere && sonar.range_m.is_some() {
+            self.used_rad = Some(sonar.angle_rad);
+        }
+        elsewhere && sonar.range_m.is_some()
+    }
+
+    /// Its turns in a second; `None` when it doesn't turn.
+    pub fn turns_per_s(&self, now: MonoNs) -> Option<f64> {
+        let (last, _) = self.last?;
+        (now.since(last).0.abs() <= SILENT.0 && self.rate_radps > 0.0).then(|| self.rate_radps / math::TAU)
+    }
+}

@@ -1,0 +1,215 @@
+//! What the filter estimates, and the errors by which it differs from the truth.
+
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use serde::{Deserialize, Serialize};
+
+use headrace_geometry::frames::{Body, Point3, Rot, Tunnel, Vec3};
+use headrace_geometry::math;
+
+/// How many errors there are.
+pub const ERRORS: usize = 20;
+/// Of the inertial unit's position, m, in the tunnel's frame.
+pub const POSITION: usize = 0;
+/// Of its velocity, m/s, in the tunnel's frame.
+pub const VELOCITY: usize = 3;
+/// Of the attitude: the rotation vector in the tunnel's frame that takes the estimate to the truth, radians.
+pub const ATTITUDE: usize = 6;
+/// Of the accelerometers' bias, m/s^2, in the body's frame.
+pub const FORCE_BIAS: usize = 9;
+/// Of the gyros' bias, rad/s, in the body's frame.
+pub const RATE_BIAS: usize = 12;
+/// Of the cable's slack, m.
+pub const SLACK: usize = 15;
+/// Of how fast the slack grows by itself, m/s.
+pub const SLACK_RATE: usize = 16;
+/// Of the cable's scale, a share.
+pub const SCALE: usize = 17;
+/// Of the depth sensor's offset, m of height.
+pub const DEPTH: usize = 18;
+/// Of the compass's deviation, radians.
+pub const HEADING: usize = 19;
+
+/// How many numbers a state is made of.
+pub const STATE_NUMBERS: usize = ERRORS + 1;
+
+/// One number for each error. Errors that drive others come after them: see `docs/fusion.md`.
+pub type Errors = [f64; ERRORS];
+
+/// The estimate.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct State {
+    /// Where the inertial unit is.
+    pub position: Point3<Tunnel>,
+    /// How fast it moves, m/s.
+    pub velocity_mps: Vec3<Tunnel>,
+    /// Body to tunnel.
+    pub attitude: Rot<Tunnel, Body>,
+    /// What the accelerometers show too much, m/s^2.
+    pub force_bias_mps2: Vec3<Body>,
+    /// What the gyros show too much, rad/s.
+    pub rate_bias_radps: Vec3<Body>,
+    /// Chainage that the cable shows too much, m.
+    pub slack_m: f64,
+    /// What drives the slack, m/s: it fades as the slack does.
+    pub slack_rate_mps: f64,
+    /// Share of the way by which the cable shows too much.
+    pub scale: f64,
+    /// Height that the depth sensor shows too much, m.
+    pub depth_offset_m: f64,
+    /// Angle by which the compass shows too much, radians, positive to the left.
+    pub heading_offset_rad: f64,
+}
+
+impl State {
+    /// At rest at a place, nothing known of what is wrong with the sensors.
+    pub fn at_rest(position: Point3<Tunnel>, attitude: Rot<Tunnel, Body>) -> Self {
+        Self {
+            position,
+            velocity_mps: Vec3::zero(),
+            attitude,
+            force_bias_mps2: Vec3::zero(),
+            rate_bias_radps: Vec3::zero(),
+            slack_m: 0.0,
+            slack_rate_mps: 0.0,
+            scale: 0.0,
+            depth_offset_m: 0.0,
+            heading_offset_rad: 0.0,
+        }
+    }
+
+    /// Corrects the estimate by errors that have been estimated.
+    pub fn correct(&mut self, errors: &Errors) {
+        self.position = self.position + vec(errors, POSITION);
+        self.velocity_mps = self.velocity_mps + vec(errors, VELOCITY);
+        self.attitude = rotation(vec(errors, ATTITUDE)) * self.attitude;
+        self.force_bias_mps2 = self.force_bias_mps2 + vec(errors, FORCE_BIAS);
+        self.rate_bias_radps = self.rate_bias_radps + vec(errors, RATE_BIAS);
+        let [slack_m, slack_rate_mps, scale, depth_m, heading_rad] =
+            [SLACK, SLACK_RATE, SCALE, DEPTH, HEADING].map(|i| errors.get(i).copied().unwrap_or(0.0));
+        self.slack_m += slack_m;
+        self.slack_rate_mps += slack_rate_mps;
+        self.scale += scale;
+        self.depth_offset_m += depth_m;
+        self.heading_offset_rad += heading_rad;
+    }
+
+    /// The errors that would take this estimate to another, the truth for instance.
+    pub fn errors_to(&self, truth: &Self) -> Errors {
+        let mut errors = [0.0; ERRORS];
+        put(&mut errors, POSITION, truth.position - self.position);
+        put(&mut errors, VELOCITY, truth.velocity_mps + -self.velocity_mps);
+        put(&mut errors, ATTITUDE, rotation_vector(truth.attitude * self.attitude.inverse()));
+        put(&mut errors, FORCE_BIAS, truth.force_bias_mps2 + -self.force_bias_mps2);
+        put(&mut errors, RATE_BIAS, truth.rate_bias_radps + -self.rate_bias_radps);
+        let scalars = [
+            (SLACK, truth.slack_m - self.slack_m),
+            (SLACK_RATE, truth.slack_rate_mps - self.slack_rate_mps),
+            (SCALE, truth.scale - self.scale),
+            (DEPTH, truth.depth_offset_m - self.depth_offset_m),
+            (HEADING, truth.heading_offset_rad - self.heading_offset_rad),
+        ];
+        for (i, value) in scalars {
+            if let Some(slot) = errors.get_mut(i) {
+                *slot = value;
+            }
+        }
+        errors
+    }
+
+    /// The estimate between this and another, at a share of the way; what is wrong with the sensors is the other's.
+    #[must_use]
+    pub fn between(&self, other: &Self, share: f64) -> Self {
+        let turn = rotation_vector(other.attitude * self.attitude.inverse());
+        Self {
+            position: self.position + (other.position - self.position).scaled(share),
+            velocity_mps: self.velocity_mps + (other.velocity_mps + -self.velocity_mps).scaled(share),
+            attitude: rotation(turn.scaled(share)) * self.attitude,
+            ..*other
+        }
+    }
+
+    /// Its numbers, in the order of the errors; the attitude as a quaternion.
+    pub fn numbers(&self) -> [f64; STATE_NUMBERS] {
+        let [px, py, pz] = self.position.0.into();
+        let [vx, vy, vz] = self.velocity_mps.0.into();
+        let [w, x, y, z] = self.attitude.wxyz();
+        let [fx, fy, fz] = self.force_bias_mps2.0.into();
+        let [rx, ry, rz] = self.rate_bias_radps.0.into();
+        let (slack, heading) = ([self.slack_m, self.slack_rate_mps], self.heading_offset_rad);
+        let (scale, depth) = (self.scale, self.depth_offset_m);
+        let [s, r] = slack;
+        [px, py, pz, vx, vy, vz, w, x, y, z, fx, fy, fz, rx, ry, rz, s, r, scale, depth, heading]
+    }
+
+    /// The estimate of such numbers; `None` when the attitude is none.
+    pub fn of_numbers(numbers: [f64; STATE_NUMBERS]) -> Option<Self> {
+        let [px, py, pz, vx, vy, vz, w, x, y, z, fx, fy, fz, rx, ry, rz, s, r, scale, depth, heading] =
+            numbers;
+        Some(Self {
+            position: Point3::new(px, py, pz),
+            velocity_mps: Vec3::new(vx, vy, vz),
+            attitude: Rot::from_wxyz(w, x, y, z)?,
+            force_bias_mps2: Vec3::new(fx, fy, fz),
+            rate_bias_radps: Vec3::new(rx, ry, rz),
+            slack_m: s,
+            slack_rate_mps: r,
+            scale,
+            depth_offset_m: depth,
+            heading_offset_rad: heading,
+        })
+    }
+
+    /// Whether every number is finite.
+    pub fn is_sound(&self) -> bool {
+        let scalars =
+            [self.slack_m, self.slack_rate_mps, self.scale, self.depth_offset_m, self.heading_offset_rad];
+        self.position.is_finite()
+            && self.velocity_mps.is_finite()
+            && self.attitude.wxyz().iter().all(|c| c.is_finite())
+            && self.force_bias_mps2.is_finite()
+            && self.rate_bias_radps.is_finite()
+            && scalars.iter().all(|c| c.is_finite())
+    }
+}
+
+/// Three errors from a place on.
+pub fn vec<F>(errors: &Errors, from: usize) -> Vec3<F> {
+    let [x, y, z] = [0, 1, 2].map(|k| errors.get(from + k).copied().unwrap_or(0.0));
+    Vec3::new(x, y, z)
+}
+
+/// Sets three errors from a place on.
+pub fn put<F: Copy>(errors: &mut Errors, from: usize, value: Vec3<F>) {
+    for (slot, value) in errors.iter_mut().skip(from).zip(value.0.iter()) {
+        *slot = *value;
+    }
+}
+
+/// The rotation by a rotation vector, radians.
+pub fn rotation<To: Copy>(by: Vec3<To>) -> Rot<To, To> {
+    let angle = by.norm();
+    // sin(a / 2) / a, by its series where the quotient loses its digits.
+    let share = if angle < 1e-4 { 0.5 - angle * angle / 48.0 } else { math::sin(angle / 2.0) / angle };
+    let [x, y, z] = [by.x() * share, by.y() * share, by.z() * share];
+    Rot::from_wxyz(math::cos(angle / 2.0), x, y, z).unwrap_or_else(Rot::identity)
+}
+
+/// The rotation vector of a rotation, radians, of length 0 to pi.
+pub fn rotation_vector<To: Copy, From: Copy>(rotation: Rot<To, From>) -> Vec3<To> {
+    let [w, x, y, z] = rotation.wxyz();
+    // Antipodal quaternions are the same rotation: the short way round.
+    let (w, v) = if w < 0.0 { (-w, Vec3::new(-x, -y, -z)) } else { (w, Vec3::new(x, y, z)) };
+    let sine = v.norm();
+    let share = if sine < 1e-5 { 2.0 + sine * sine / 3.0 } else { 2.0 * math::atan2(sine, w) / sine };
+    v.scaled(share)
+}
+
+/// The matrix of a rotation.
+pub fn matrix<To: Copy, From: Copy>(rotation: Rot<To, From>) -> Matrix3<f64> {
+    *UnitQuaternion::to_rotation_matrix(rotation.0).matrix()
+}
+
+/// The matrix of a cross product from the left.
+pub fn cross(v: Vector3<f64>) -> Matrix3<f64> {
+    v.cross_matrix()
+}

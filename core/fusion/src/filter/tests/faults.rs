@@ -1,0 +1,269 @@
+//! Sensors that fail: frozen, saturated, jumping, silent, disturbed, or saying what is no number.
+
+use super::rig::{
+    DEPTH, ECHOES, Event, HEADS, IMU, OTHER, Rig, TETHER, VELOCITY_LOG, Way, at, cruise, rest, seconds,
+};
+use crate::{Navigation as _, NoFix};
+use headrace_geometry::frames::{Point3, Pose, Rot, Vec3};
+use headrace_geometry::math;
+use headrace_sensor::reading::{EchoRange, Reading, SonarReturn, TetherLength, WaterPressure};
+
+const ALL: [usize; 9] = [0, 1, 2, 3, 4, 5, 6, 7, 8];
+const NOT_UNIT: [usize; 8] = [1, 2, 3, 4, 5, 6, 7, 8];
+const RANGES: [usize; 6] = [3, 4, 5, 6, 7, 8];
+/// When faults begin.
+const FAULT_S: f64 = 20.0;
+
+/// What sources say for some time after faults begin, and how they say it.
+fn say_otherwise(
+    events: &mut [Event],
+    sources: &[usize],
+    for_s: f64,
+    with: impl Fn(&Reading, f64) -> Reading,
+) {
+    for event in events.iter_mut().filter(|event| sources.contains(&event.source)) {
+        let t = seconds(event.valid);
+        if (FAULT_S..FAULT_S + for_s).contains(&t) {
+            event.reading = with(&event.reading, t);
+        }
+    }
+}
+
+/// A source repeats what it said last before.
+fn freeze(events: &mut [Event], source: usize, for_s: f64) {
+    let before = events.to_vec();
+    let last = |like: &Reading| {
+        let like = core::mem::discriminant(like);
+        let mut heard = before.iter().rev().filter(|e| e.source == source && seconds(e.valid) < FAULT_S);
+        heard.find(|e| core::mem::discriminant(&e.reading) == like).unwrap().reading
+    };
+    say_otherwise(events, &[source], for_s, |reading, _| last(reading));
+}
+
+/// Hears without a check what nobody could tell from a vehicle that moves so, and checks that all is right after it.
+fn recovers(rig: &Rig, events: &[Event], wrong_until_s: f64) {
+    let mut nav = rig.navigation();
+    let parts = [0.0, FAULT_S, wrong_until_s, f64::INFINITY];
+    for (part, bounds) in parts.windows(2).enumerate() {
+        let within = |event: &&Event| (bounds[0]..bounds[1]).contains(&seconds(event.valid));
+        let heard: Vec<Event> = events.iter().filter(within).copied().collect();
+        if part == 1 {
+            for event in &heard {
+                Rig::hear(&mut nav, event);
+            }
+            assert!(nav.running().unwrap().is_sound());
+        } else {
+            rig.run(&mut nav, &heard);
+        }
+    }
+    let last = events.last().unwrap().received;
+    assert!(nav.fix(last).is_ok(), "{:?}", nav.fix(last));
+}
+
+#[test]
+fn a_long_silence_is_survived_and_nothing_is_invented() {
+    /// Who, of which vehicle, for how long, and whether there is no fix at the end.
+    type Silence = (&'static str, Way, &'static [usize], f64, bool);
+    let near_wall: Way = |t| Pose {
+        position: Point3::new(3.0 + 0.1 * t, 5.2, 3.0),
+        attitude: Rot::from_roll_pitch_yaw(0.0, 0.0, 0.1 * math::sin(t / 6.0)),
+    };
+    let silences: [Silence; 7] = [
+        ("the unit", cruise, &[IMU], 30.0, false),
+        ("all", cruise, &ALL, 30.0, true),
+        ("all, for an hour", rest, &ALL, 3600.0, true),
+        ("all but the unit", rest, &NOT_UNIT, 600.0, true),
+        ("all that range, near the wall", near_wall, &RANGES, 100.0, true),
+        ("the tether", cruise, &[TETHER], 100.0, true),
+        ("the depth", cruise, &[DEPTH], 100.0, false),
+    ];
+    for (name, way, sources, for_s, is_lost) in silences {
+        let rig = Rig::new(way, 1);
+        let mut nav = rig.navigation();
+        rig.run(&mut nav, &rig.events(0.0, FAULT_S));
+        if sources.len() < ALL.len() {
+            let mut events = rig.events(FAULT_S, FAULT_S + for_s);
+            events.retain(|event| !sources.contains(&event.source));
+            rig.run(&mut nav, &events);
+        }
+        let end_s = FAULT_S + for_s;
+        assert_eq!(nav.fix(at(end_s)).is_err(), is_lost, "{name}: {:?}", nav.fix(at(end_s)));
+        let tally = rig.run(&mut nav, &rig.events(end_s, end_s + 40.0));
+        assert!(nav.fix(at(end_s + 40.0)).is_ok(), "{name}: {tally:?}");
+        assert!(nav.restarts() <= 1, "{name}");
+    }
+}
+
+#[test]
+fn uncertainty_grows_while_nothing_is_heard() {
+    let rig = Rig::new(rest, 1);
+    let mut nav = rig.navigation();
+    rig.run(&mut nav, &rig.events(0.0, FAULT_S));
+    let mut before = nav.running().unwrap().factors;
+    for k in 1..30 {
+        let t = at(FAULT_S + 0.5 * f64::from(k));
+        let beat = Event { received: t, valid: t, source: OTHER, reading: rig.rate(0.0) };
+        Rig::hear(&mut nav, &beat);
+        let running = nav.running().unwrap();
+        for i in 0..9 {
+            assert!(running.factors.variance(i) > before.variance(i), "error {i} at beat {k}");
+        }
+        before = running.factors;
+    }
+    assert!(matches!(nav.fix(at(FAULT_S + 14.5)), Err(NoFix::Chainage | NoFix::Section | NoFix::Heading)));
+    // Nor does the estimate go anywhere that it wasn't going.
+    assert!((nav.running().unwrap().state.position - rig.unit(0.0)).norm() < 1.0);
+}
+
+#[test]
+fn what_is_no_number_is_dropped_and_counted() {
+    let rig = Rig::new(cruise, 1);
+    for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        for source in ALL {
+            let mut events = rig.events(0.0, 40.0);
+            say_otherwise(&mut events, &[source], 5.0, |reading, _| spoilt(reading, bad));
+            let spoilt = events.iter().filter(|event| !event.reading.is_finite()).count();
+            let mut nav = rig.navigation();
+            rig.run(&mut nav, &events);
+            assert!(spoilt > 0);
+            assert_eq!(nav.consistency(source).unwrap().dropped, spoilt as u64, "source {source}");
+        }
+    }
+}
+
+fn spoilt(reading: &Reading, bad: f64) -> Reading {
+    match reading {
+        Reading::Sonar(sonar) => Reading::Sonar(SonarReturn { angle_rad: bad, ..*sonar }),
+        Reading::Echo(echo) => Reading::Echo(EchoRange { range_m: Some(bad), ..*echo }),
+        Reading::Pressure(water) => Reading::Pressure(WaterPressure { pressure_pa: bad, ..*water }),
+        Reading::Attitude(_) => Reading::Attitude(Rot::from_roll_pitch_yaw(bad, 0.0, 0.0)),
+        Reading::AngularRate(_) => Reading::AngularRate(Vec3::new(0.0, bad, 0.0)),
+        Reading::SpecificForce(_) => Reading::SpecificForce(Vec3::new(bad, 0.0, 9.8)),
+        Reading::VelocityOverGround(_) => Reading::VelocityOverGround(Vec3::new(0.0, 0.0, bad)),
+        Reading::TetherLength(length) => Reading::TetherLength(TetherLength { length_m: bad, ..*length }),
+    }
+}
+
+#[test]
+fn a_saturated_unit_is_not_believed() {
+    let rig = Rig::new(cruise, 1);
+    for (magnitude, for_s) in [(156.9, 0.02), (156.9, 1.0), (1e300, 0.02), (f64::MAX, 5.0)] {
+        for is_rate in [true, false] {
+            let mut events = rig.events(0.0, 60.0);
+            say_otherwise(&mut events, &[IMU], for_s, |reading, _| match reading {
+                Reading::AngularRate(_) if is_rate => Reading::AngularRate(Vec3::new(0.0, 0.0, magnitude)),
+                Reading::SpecificForce(_) if !is_rate => {
+                    Reading::SpecificForce(Vec3::new(-magnitude, magnitude, magnitude))
+                }
+                other => *other,
+            });
+            let mut nav = rig.navigation();
+            let tally = rig.run(&mut nav, &events);
+            assert!(nav.consistency(IMU).unwrap().dropped > 0);
+            assert_eq!(tally.lacking, 0, "{magnitude} for {for_s} s: {tally:?}");
+        }
+    }
+}
+
+#[test]
+fn a_compass_may_be_disturbed() {
+    for off_deg in [5.0_f64, 10.0, 20.0, 60.0, 180.0] {
+        for sudden in [true, false] {
+            let rig = Rig::new(cruise, 1);
+            let mut events = rig.events(0.0, 110.0);
+            say_otherwise(&mut events, &[IMU], 60.0, |reading, t| {
+                let share = if sudden { 1.0 } else { math::sin((t - FAULT_S) / 60.0 * math::PI) };
+                match reading {
+                    Reading::Attitude(_) => Reading::Attitude(rig.level(t, off_deg.to_radians() * share)),
+                    other => *other,
+                }
+            });
+            let mut nav = rig.navigation();
+            let tally = rig.run(&mut nav, &events);
+            assert_eq!(tally.lacking, 0, "{off_deg} degrees: {tally:?}");
+            assert!(off_deg < 20.0 || !sudden || nav.consistency(IMU).unwrap().gated > 300);
+        }
+    }
+}
+
+#[test]
+fn a_sensor_that_jumps_and_comes_back_is_left_out() {
+    type Jump = fn(&Reading) -> Reading;
+    let jumps: [(usize, Jump); 5] = [
+        (TETHER, |reading| match reading {
+            Reading::TetherLength(length) => {
+                Reading::TetherLength(TetherLength { length_m: length.length_m + 5.0, ..*length })
+            }
+            other => *other,
+        }),
+        (DEPTH, |reading| match reading {
+            Reading::Pressure(water) => {
+                Reading::Pressure(WaterPressure { pressure_pa: water.pressure_pa + 2e4, ..*water })
+            }
+            other => *other,
+        }),
+        (ECHOES, |reading| ranged(reading, 0.5)),
+        (HEADS, |reading| ranged(reading, 3.0)),
+        (VELOCITY_LOG, |reading| match reading {
+            Reading::VelocityOverGround(_) => Reading::VelocityOverGround(Vec3::new(2.0, -1.0, 0.5)),
+            other => *other,
+        }),
+    ];
+    for (source, jump) in jumps {
+        let rig = Rig::new(cruise, 1);
+        let mut events = rig.events(0.0, 60.0);
+        events.extend((0..600).map(|k| {
+            let t = 0.013 + 0.1 * f64::from(k);
+            Event { received: at(t), valid: at(t), source: VELOCITY_LOG, reading: rig.velocity(t) }
+        }));
+        events.sort_by_key(|event| event.valid);
+        say_otherwise(&mut events, &[source], 3.0, |reading, _| jump(reading));
+        let mut nav = rig.navigation();
+        let tally = rig.run(&mut nav, &events);
+        let consistency = nav.consistency(source).unwrap();
+        assert!(tally.lacking == 0 && consistency.gated >= 6, "source {source}: {consistency:?}");
+    }
+}
+
+fn ranged(reading: &Reading, share: f64) -> Reading {
+    match reading {
+        Reading::Echo(echo) => {
+            Reading::Echo(EchoRange { range_m: echo.range_m.map(|range_m| range_m * share), ..*echo })
+        }
+        Reading::Sonar(sonar) => {
+            Reading::Sonar(SonarReturn { range_m: sonar.range_m.map(|range_m| range_m * share), ..*sonar })
+        }
+        other => *other,
+    }
+}
+
+#[test]
+fn a_jump_that_a_vehicle_could_make_is_got_over() {
+    // A knock, or a unit that lies: no single sensor could tell, and until the others have put it right the fix is wrong.
+    let forces = [(5.0, 0.2), (5.0, 1.0), (1.0, 5.0), (0.2, 20.0)].map(|jump| (jump, false));
+    let rates = [(5.0, 0.02), (5.0, 0.2), (1.0, 1.0), (0.1, 5.0), (0.01, 20.0)].map(|jump| (jump, true));
+    for ((by, for_s), is_rate) in forces.into_iter().chain(rates) {
+        let rig = Rig::new(cruise, 1);
+        let mut events = rig.events(0.0, 120.0);
+        say_otherwise(&mut events, &[IMU], for_s, |reading, _| match reading {
+            Reading::SpecificForce(force) if !is_rate => {
+                Reading::SpecificForce(*force + Vec3::new(by, by, by))
+            }
+            Reading::AngularRate(rate) if is_rate => Reading::AngularRate(*rate + Vec3::new(by, by, by)),
+            other => *other,
+        });
+        recovers(&rig, &events, FAULT_S + for_s + 60.0);
+    }
+}
+
+#[test]
+fn a_frozen_sensor_is_got_over() {
+    // The depth and one head are outvoted at once. An echosounder drags the place off by centimetres before its range is
+    // too unlikely.
+    for (source, wrong_s) in [(DEPTH, 0.0), (HEADS, 0.0), (ECHOES, 35.0), (ECHOES + 2, 35.0), (IMU, 75.0)] {
+        let rig = Rig::new(cruise, 1);
+        let mut events = rig.events(0.0, 110.0);
+        freeze(&mut events, source, 30.0);
+        recovers(&rig, &events, FAULT_S + wrong_s);
+    }
+}

@@ -1,0 +1,313 @@
+//! Time, order, attitude and scale at their worst. What comes of each is a fix that is right by its own sigmas, or what it
+//! lacks by name.
+
+use super::super::factors::Factors;
+use super::super::inertial::{Felt, Leg};
+use super::super::settings::Settings;
+use super::super::state::{ERRORS, State, rotation_vector};
+use super::rig::{
+    DEPTH, ECHOES, Event, HEADS, IMU, OTHER, Rig, TETHER, Tally, VELOCITY_LOG, Way, at, cruise, rest, seconds,
+};
+use crate::Navigation as _;
+use headrace_geometry::frames::{Point3, Pose, Rot, Vec3};
+use headrace_geometry::math::{self, FRAC_PI_2};
+use headrace_geometry::time::DurNs;
+use headrace_sensor::reading::Reading;
+
+const HOUR: DurNs = DurNs(3_600_000_000_000);
+
+/// The estimate and its covariance, a second after the last reading was valid: the window has passed over all.
+fn outcome(rig: &Rig, events: &[Event]) -> (State, Factors<ERRORS>) {
+    let mut nav = rig.navigation();
+    let last = events.iter().map(|event| event.valid).max().unwrap();
+    let end = last + DurNs::from_millis(1000);
+    let beat = Event { received: end, valid: end, source: OTHER, reading: rig.rate(0.0) };
+    for event in events.iter().chain([&beat]) {
+        Rig::hear(&mut nav, event);
+    }
+    let running = nav.running().unwrap();
+    (running.state, running.factors)
+}
+
+#[test]
+fn an_ordinary_minute_is_right_and_agrees_with_itself() {
+    for seed in 1..5 {
+        let rig = Rig::new(cruise, seed);
+        let mut nav = rig.navigation();
+        let mut events = rig.events(0.0, 60.0);
+        let logged = (0..240).map(|k| {
+            let t = 0.019 + 0.25 * f64::from(k);
+            Event { received: at(t), valid: at(t), source: VELOCITY_LOG, reading: rig.velocity(t) }
+        });
+        events.extend(logged);
+        events.sort_by_key(|event| event.valid);
+        let tally = rig.run(&mut nav, &events);
+        assert_eq!(tally.lacking, 0, "seed {seed}");
+        for source in [TETHER, DEPTH, ECHOES, ECHOES + 3, HEADS, HEADS + 1, VELOCITY_LOG] {
+            let consistency = nav.consistency(source).unwrap();
+            let nis = consistency.nis().unwrap();
+            assert!((0.75..1.25).contains(&nis), "seed {seed}, source {source}: {consistency:?}");
+            assert!(consistency.late + consistency.dropped == 0, "source {source}: {consistency:?}");
+        }
+    }
+}
+
+#[test]
+fn ten_hours_of_dead_reckoning_end_with_one_precise_fix() {
+    let rig = Rig { imu_s: 0.1, ..Rig::new(cruise, 1) };
+    let mut nav = rig.navigation();
+    rig.run(&mut nav, &rig.events(0.0, 20.0));
+    let (begin_s, end_s) = (20, 36_020);
+    let mut tally = Tally::default();
+    for from_s in (begin_s..end_s).step_by(100) {
+        let mut events = rig.events(f64::from(from_s), f64::from(from_s + 100));
+        events.retain(|event| event.source == IMU && !matches!(event.reading, Reading::Attitude(_)));
+        for event in &events {
+            Rig::hear(&mut nav, event);
+        }
+        rig.check(&nav, events.last().unwrap().received, &mut tally);
+    }
+    assert!(nav.running().is_none() && nav.fix(at(f64::from(end_s))).is_err(), "nothing is invented");
+    assert_eq!(nav.consistency(IMU).unwrap().dropped, 0, "what nobody waits for takes no room");
+    rig.run(&mut nav, &rig.events(f64::from(end_s), f64::from(end_s + 60)));
+    let fix = nav.fix(at(f64::from(end_s + 60)));
+    assert!(fix.is_ok(), "{fix:?} {:?}", nav.running().map(super::super::running::Running::sigmas));
+    assert!(nav.running().unwrap().sigmas().place_m < 0.05);
+    assert_eq!(nav.restarts(), 1);
+}
+
+#[test]
+fn noise_of_any_scale_keeps_the_covariance_sound() {
+    let (exact, vague) = (1e-5, 1e5);
+    for (tether_sd_m, echo_sd_m, return_sd_m, depth_sd_m) in
+        [(exact, exact, vague, vague), (vague, vague, exact, exact), (exact, vague, exact, vague)]
+    {
+        let mut rig = Rig { noise: 0.0, ..Rig::new(cruise, 1) };
+        rig.settings = Settings { tether_sd_m, depth_sd_m, echo_sd_m, return_sd_m, ..rig.settings };
+        let mut nav = rig.navigation();
+        let tally = rig.run(&mut nav, &rig.events(0.0, 40.0));
+        assert!(tally.fixes + tally.lacking > 300);
+    }
+}
+
+#[test]
+fn a_leg_of_any_length_adds_what_it_should() {
+    let settings = Settings::default();
+    let felt =
+        Felt { rate_radps: Some(Vec3::new(0.1, 0.2, -0.1)), force_mps2: Some(Vec3::new(0.1, 0.0, 9.8)) };
+    for (dt_s, times) in [(0.0, 10), (1e-9, 1000), (0.01, 100), (30.0, 3), (36_000.0, 2)] {
+        for felt in [felt, Felt { rate_radps: None, force_mps2: None }] {
+            let mut state = State::at_rest(Point3::new(1.0, 0.0, 3.0), Rot::identity());
+            let mut factors = Factors::independent([1e-4; ERRORS]);
+            let mut leg = Leg::default();
+            for _ in 0..times {
+                state.go_on(&felt, dt_s, 9.8, &mut leg);
+                let transition = leg.transition(&settings);
+                transition.carry(&mut factors);
+                leg.disturb(&settings, &transition, &mut factors);
+            }
+            assert!(state.is_sound() && factors.is_sound(), "{dt_s} s: {state:?}");
+            for i in 0..ERRORS {
+                // Errors of the pose never shrink by waiting; those that fade do.
+                let least = if i < 9 { 1e-4 * (1.0 - 1e-12) } else { 0.0 };
+                assert!(factors.variance(i) > least, "{dt_s} s, error {i}: {}", factors.variance(i));
+            }
+            if dt_s == 0.0 {
+                assert_eq!(state, State::at_rest(Point3::new(1.0, 0.0, 3.0), Rot::identity()));
+                assert!((factors.variance(0) - 1e-4).abs() < 1e-18);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_sample_told_twice_counts_once() {
+    let rig = Rig::new(cruise, 1);
+    let events = rig.events(0.0, 20.0);
+    let right = outcome(&rig, &events);
+    // At the same time; a nanosecond later; and with a time that has gone back.
+    for (later, delay) in [(0, 0), (1, 1), (0, 90_000_000)] {
+        let mut again = events.clone();
+        let inertial = events.iter().filter(|event| !matches!(event.reading, Reading::Attitude(_)));
+        again.extend(inertial.filter(|event| event.source == IMU).map(|event| Event {
+            valid: event.valid + DurNs(later),
+            received: event.received + DurNs(delay),
+            ..*event
+        }));
+        again.sort_by_key(|event| event.received);
+        assert_eq!(outcome(&rig, &again), right, "{later} ns later, {delay} ns on the way");
+    }
+}
+
+#[test]
+fn all_sensors_may_speak_at_once() {
+    let rig = Rig::new(cruise, 3);
+    let mut events = Vec::new();
+    for k in 1..=400 {
+        let t = 0.1 * f64::from(k);
+        let mut say = |source, reading| events.push(Event { received: at(t), valid: at(t), source, reading });
+        say(TETHER, rig.tether(t));
+        say(DEPTH, rig.pressure(t));
+        (ECHOES..ECHOES + 4).for_each(|source| say(source, rig.echo(source, t)));
+        (HEADS..HEADS + 2).for_each(|source| say(source, rig.sonar(source, t)));
+        say(VELOCITY_LOG, rig.velocity(t));
+        say(IMU, rig.attitude(t));
+    }
+    let felt = rig.events(0.0, 40.0);
+    events.extend(
+        felt.iter().filter(|event| event.source == IMU && !matches!(event.reading, Reading::Attitude(_))),
+    );
+    events.sort_by_key(|event| event.valid);
+    let mut nav = rig.navigation();
+    let tally = rig.run(&mut nav, &events);
+    assert!(tally.fixes > 380 && tally.lacking == 0, "{tally:?}");
+}
+
+#[test]
+fn readings_of_one_time_may_come_in_any_order() {
+    let rig = Rig::new(cruise, 2);
+    let events = rig.events(0.0, 30.0);
+    let right = outcome(&rig, &events);
+    // Each source has its own delay, so that they overtake each other; all of it within the window.
+    for shift in 1..4 {
+        let mut mixed = events.clone();
+        for event in mixed.iter_mut().filter(|event| seconds(event.valid) > 2.0) {
+            let delay_ms = (event.source as i64 * 37 * shift) % 190;
+            event.received = event.valid + DurNs::from_millis(delay_ms);
+        }
+        mixed.sort_by_key(|event| event.received);
+        assert_eq!(outcome(&rig, &mixed), right, "shift {shift}");
+    }
+    // And a beat in between, however often, changes nothing.
+    let mut beaten = events.clone();
+    beaten.extend((1..9000).map(|k| {
+        let t = at(f64::from(k) / 300.0);
+        Event { received: t, valid: t, source: OTHER, reading: rig.rate(1.0) }
+    }));
+    beaten.sort_by_key(|event| event.received);
+    assert_eq!(outcome(&rig, &beaten), right);
+}
+
+#[test]
+fn late_readings_are_counted_and_change_nothing() {
+    let rig = Rig::new(cruise, 1);
+    let window_ms = rig.settings.window.0 / 1_000_000;
+    for (delay_ms, is_late) in [(window_ms - 1, false), (window_ms + 101, true)] {
+        let mut events = rig.events(0.0, 30.0);
+        for event in events.iter_mut().filter(|e| e.source == ECHOES && seconds(e.valid) > 5.0) {
+            event.received = event.valid + DurNs::from_millis(delay_ms);
+        }
+        events.sort_by_key(|event| event.received);
+        let mut nav = rig.navigation();
+        let tally = rig.run(&mut nav, &events);
+        assert_eq!(tally.lacking, 0);
+        assert_eq!(nav.consistency(ECHOES).unwrap().late, if is_late { 250 } else { 0 });
+        let with = outcome(&rig, &events);
+        events.retain(|e| e.source != ECHOES || seconds(e.valid) <= 5.0);
+        assert_eq!(with == outcome(&rig, &events), is_late, "{delay_ms} ms");
+    }
+}
+
+#[test]
+fn any_attitude_is_as_good_as_another() {
+    let ways: [(&str, Way); 6] = [
+        ("nose up, over and back", |t| tilting(t, -1.8)),
+        ("nose down, over and back", |t| tilting(t, 1.8)),
+        ("straight up", |t| still(t, -FRAC_PI_2, 0.0)),
+        ("straight down", |t| still(t, FRAC_PI_2, 0.4)),
+        ("round and round", |t| still(t, 0.01, 0.3 * t)),
+        ("about the yaw of 180 degrees", |t| still(t, 0.0, math::PI + 0.2 * math::sin(t / 4.0))),
+    ];
+    for (name, way) in ways {
+        for seed in 2..4 {
+            let rig = Rig::new(way, seed);
+            let mut nav = rig.navigation();
+            let tally = rig.run(&mut nav, &rig.events(0.0, 70.0));
+            // Where no echosounder looks up or down, the first estimate doesn't know its height.
+            assert!(tally.lacking <= 2, "{name}: {tally:?}");
+        }
+    }
+}
+
+fn tilting(t: f64, most_rad: f64) -> Pose {
+    let pitch = most_rad * (1.0 - math::cos(t / 10.0)) / 2.0;
+    Pose { attitude: Rot::from_roll_pitch_yaw(0.0, pitch, 0.1), ..still(t, 0.0, 0.0) }
+}
+
+fn still(t: f64, pitch: f64, yaw: f64) -> Pose {
+    Pose {
+        position: Point3::new(3.0 + 0.05 * t, 0.4, 4.0),
+        attitude: Rot::from_roll_pitch_yaw(0.02, pitch, yaw),
+    }
+}
+
+#[test]
+fn a_quaternion_may_have_either_sign_and_any_length() {
+    let rig = Rig::new(|t| still(t, 0.02, math::PI + 0.2 * math::sin(t / 4.0)), 1);
+    let events = rig.events(0.0, 30.0);
+    let (right, _) = outcome(&rig, &events);
+    for factor in [-1.0, 1e-5, -1e5] {
+        let mut other = events.clone();
+        for (k, event) in other.iter_mut().enumerate() {
+            if let (0, Reading::Attitude(level)) = (k % 2, event.reading) {
+                let [w, x, y, z] = level.wxyz().map(|c| c * factor);
+                event.reading = Reading::Attitude(Rot::from_wxyz(w, x, y, z).unwrap());
+            }
+        }
+        let (state, _) = outcome(&rig, &other);
+        let off = state.errors_to(&right).iter().fold(0.0, |most: f64, e| most.max(e.abs()));
+        assert!(off < 1e-9, "off by {off:e} with quaternions times {factor}");
+    }
+}
+
+#[test]
+fn a_fix_of_a_moment_ago_is_turned_back_too() {
+    let rig = Rig::new(|t| still(t, 0.01, 0.5 * t), 1);
+    let mut nav = rig.navigation();
+    rig.run(&mut nav, &rig.events(0.0, 30.0));
+    for back_s in [0.3, 0.5, 0.9] {
+        let (fix, truth) = (nav.fix(at(30.0 - back_s)).unwrap(), (rig.way)(30.0 - back_s));
+        let off = rotation_vector(truth.attitude * fix.pose.attitude.inverse());
+        assert!(off.norm() < 0.03, "{back_s} s ago: {off:?}");
+    }
+}
+
+#[test]
+fn the_receive_time_may_do_anything() {
+    let rig = Rig::new(rest, 2);
+    // Stands still for a second at a time; then goes back by as much with each.
+    for (stamp, back) in [(1_000_000_000_u64, false), (100_000_000, true)] {
+        let mut events = rig.events(0.0, 40.0);
+        for event in &mut events {
+            let within = event.received.0 % stamp;
+            event.received.0 -= if back { 2 * within } else { within };
+            event.valid = event.valid.min(event.received);
+        }
+        let mut nav = rig.navigation();
+        let tally = rig.run(&mut nav, &events);
+        assert!(tally.fixes > 30, "{tally:?}");
+    }
+    // An hour is left out.
+    let mut events = rig.events(0.0, 90.0);
+    for event in events.iter_mut().filter(|event| seconds(event.valid) > 30.0) {
+        (event.valid, event.received) = (event.valid + HOUR, event.received + HOUR);
+    }
+    let mut nav = rig.navigation();
+    let tally = rig.run(&mut nav, &events);
+    assert_eq!(nav.restarts(), 1, "{tally:?}");
+    assert!(nav.fix(at(90.0) + HOUR).is_ok(), "{:?}", nav.fix(at(90.0) + HOUR));
+    // One reading is stamped an hour on, and again one that claims to be valid then; the rest goes on as before.
+    let mut events = rig.events(0.0, 60.0);
+    let middle = events.len() / 2;
+    events[middle].received = events[middle].received + HOUR;
+    events[middle + 1000].valid = events[middle + 1000].valid + HOUR;
+    let source = events[middle + 1000].source;
+    let mut nav = rig.navigation();
+    for event in &events {
+        Rig::hear(&mut nav, event);
+    }
+    // Once for the silence that an hour's jump looks like, and once when the clock comes back.
+    assert_eq!(nav.restarts(), 2);
+    assert_eq!(nav.consistency(source).unwrap().dropped, 1);
+    assert!(nav.fix(at(60.0)).is_ok());
+}

@@ -1,0 +1,389 @@
+//! verif_: the rows of the measurements and the transition are the derivatives of what they stand for.
+//!
+//! Central differences of the nonlinear functions, through `State::correct` and `State::go_on`, at states drawn at random:
+//! attitudes all over the sphere, sensors anywhere on the vehicle, biases and offsets of any sign.
+
+use crate::filter::inertial::{Felt, Leg, Transition};
+use crate::filter::measure::{self, Beam, Row};
+use crate::filter::settings::Settings;
+use crate::filter::state::{
+    ATTITUDE, DEPTH, ERRORS, Errors, FORCE_BIAS, HEADING, POSITION, RATE_BIAS, SCALE, SLACK, SLACK_RATE,
+    State, VELOCITY, rotation,
+};
+use headrace_geometry::frames::{Body, Point3, Rot, Sensor, Tunnel, Vec3};
+use headrace_geometry::math::{self, PI};
+use headrace_geometry::tunnel::{Profile, shapes};
+
+const STATES: u64 = 300;
+const GRAVITY_MPS2: f64 = 9.81;
+/// Step of the differences. What they leave out is of the order of its square (1e-8 for numbers near one), and rounding
+/// of the order of 1e-16 / 1e-4 times the numbers themselves, which reach some hundreds of metres: 1e-10.
+const STEP: f64 = 1e-4;
+/// Both of these with room to spare; a wrong sign or a missing term is wrong by a hundredth at least.
+const TOLERANCE: f64 = 1e-6;
+
+/// Knuth's MMIX generator: the upper half of its state, as a share of one.
+pub(super) struct Draws(u64);
+
+impl Draws {
+    pub(super) fn new(seed: u64) -> Self {
+        let mut draws = Self(seed);
+        for _ in 0..4 {
+            draws.share();
+        }
+        draws
+    }
+
+    fn share(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 32) as f64 / 4_294_967_296.0
+    }
+
+    /// In [-reach, reach).
+    pub(super) fn within(&mut self, reach: f64) -> f64 {
+        reach * (2.0 * self.share() - 1.0)
+    }
+
+    pub(super) fn vector<F>(&mut self, reach: f64) -> Vec3<F> {
+        Vec3::new(self.within(reach), self.within(reach), self.within(reach))
+    }
+
+    /// Near to normal: variance 1.
+    pub(super) fn normal(&mut self) -> f64 {
+        (0..12).map(|_| self.within(0.5)).sum()
+    }
+
+    /// All attitudes, upright ones, and some near a pitch of 90 degrees.
+    fn attitude<From>(&mut self) -> Rot<Tunnel, From> {
+        let pitch = match self.0 >> 62 {
+            0 => PI / 2.0 + self.within(1e-3),
+            1 => self.within(0.2),
+            _ => self.within(PI / 2.0),
+        };
+        Rot::from_roll_pitch_yaw(self.within(PI), pitch, self.within(PI))
+    }
+
+    fn mounted(&mut self) -> Rot<Body, Sensor> {
+        let any = self.attitude::<Body>().wxyz();
+        Rot::from_wxyz(any[0], any[1], any[2], any[3]).unwrap()
+    }
+
+    pub(super) fn state(&mut self) -> State {
+        State {
+            position: Point3::new(self.within(200.0), self.within(1.5), 4.0 + self.within(1.5)),
+            velocity_mps: self.vector(1.0),
+            attitude: self.attitude(),
+            force_bias_mps2: self.vector(0.1),
+            rate_bias_radps: self.vector(0.02),
+            slack_m: self.within(0.5),
+            slack_rate_mps: self.within(0.1),
+            scale: self.within(0.05),
+            depth_offset_m: self.within(1.0),
+            heading_offset_rad: self.within(0.3),
+        }
+    }
+}
+
+fn moved(state: &State, error: usize, by: f64) -> State {
+    let mut errors = [0.0; ERRORS];
+    errors[error] = by;
+    let mut state = *state;
+    state.correct(&errors);
+    state
+}
+
+/// What a row says against the differences of its residual: the expected is the measured less the residual.
+fn check_row(what: &str, state: &State, tolerance: f64, row: impl Fn(&State) -> Option<Row>) -> bool {
+    let Some(at) = row(state) else { return false };
+    for error in 0..ERRORS {
+        let (Some(above), Some(below)) = (row(&moved(state, error, STEP)), row(&moved(state, error, -STEP)))
+        else {
+            return false;
+        };
+        let slope = (below.residual - above.residual) / (2.0 * STEP);
+        let off = (slope - at.h[error]).abs();
+        assert!(off < tolerance, "{what}, error {error}: {slope}, the row says {}: {state:?}", at.h[error]);
+    }
+    true
+}
+
+/// The walls of a rectangle are the planes for which the row is derived; a beam whose differences cross a corner is left
+/// out, as its wall isn't one.
+#[test]
+fn verif_a_beam_on_flat_walls() {
+    let profile = shapes::rectangle(7.0, 8.0).unwrap();
+    let mut draws = Draws::new(1);
+    // A sounder's edge, a head's cone, and one so wide that the nearest of the wall answers.
+    for first_rad in [0.0, 0.012, 0.4] {
+        let checked =
+            (0..STATES).filter(|_| check_beam(&mut draws, &profile, first_rad, |_| TOLERANCE)).count();
+        assert!(checked > 100, "{checked} of {STATES} beams with {first_rad} met a wall");
+    }
+}
+
+/// A cone's expected range is the least of its rays', and what is unsure reaches to the least of the wider cone.
+#[test]
+fn verif_the_nearest_ray_of_a_cone() {
+    // Rays by rings and round each: the least of a grid is too long by the square of half a mesh, 5e-3 rad, at most.
+    const RINGS: u32 = 200;
+    let profile = shapes::rectangle(60.0, 60.0).unwrap();
+    let mut draws = Draws::new(11);
+    for _ in 0..40 {
+        // Leaning sideways and along the tunnel, over a floor that is too wide for a cone to meet a wall.
+        let lean = rotation(Vec3::new(draws.within(0.6), draws.within(0.6), 0.0)) * Rot::identity();
+        let position = Point3::new(0.0, 0.0, 3.0);
+        let state = State { position, attitude: lean, ..draws.state() };
+        let along = Vec3::<Body>::new(0.0, 0.0, -1.0);
+        let least_m = |half_rad: f64| {
+            let around = (0..=RINGS).flat_map(|ring| (0..200).map(move |turn| (ring, turn)));
+            let ranges = around.map(|(ring, turn)| {
+                let (sin, cos) = math::sin_cos(half_rad * f64::from(ring) / f64::from(RINGS));
+                let (across, up) = math::sin_cos(PI * f64::from(turn) / 100.0);
+                let ray = state.attitude * Vec3::<Body>::new(sin * across, sin * up, -cos);
+                3.0 / -ray.z()
+            });
+            ranges.fold(f64::INFINITY, f64::min)
+        };
+        for (first_rad, unsure_rad) in [(0.0, 0.22), (0.012, 0.0), (0.012, 0.3)] {
+            let beam = Beam { offset: Vec3::zero(), along, first_rad, unsure_rad };
+            let row = measure::range(&state, &profile, &beam, 0.0, 0.1).unwrap();
+            let expected_m = least_m(first_rad);
+            assert!((-row.residual - expected_m).abs() < 1e-3, "{row:?}, not {expected_m}");
+            let unsure_m = (expected_m - least_m(unsure_rad.max(first_rad))) / math::sqrt(3.0);
+            let says_m = math::sqrt((row.noise - 0.01).max(0.0));
+            assert!((says_m - unsure_m).abs() < 1e-3, "unsure by {says_m}, not {unsure_m}");
+        }
+    }
+}
+
+/// Without a cone the row is exact on any wall. With one, the plane that touches the wall where the middle of the beam
+/// meets it turns as that place moves, by 1 / radius for a metre: the row leaves out range x sin(first) / cos^2 of it, and
+/// the place moves by at most 1 m / cosine for a metre or `range` / cosine for a radian. So small is the neglect.
+#[test]
+fn verif_a_beam_on_round_walls() {
+    const RADIUS_M: f64 = 4.0;
+    let profile = shapes::circle(RADIUS_M).unwrap();
+    let mut draws = Draws::new(2);
+    let checked = (0..STATES).filter(|_| check_beam(&mut draws, &profile, 0.0, |_| TOLERANCE)).count();
+    assert!(checked > 100, "{checked}");
+    let first_rad = 0.012;
+    let neglect = |range_m: f64| range_m * math::sin(first_rad) * 4.0 * (2.0 * range_m.max(1.0) / RADIUS_M);
+    let checked = (0..STATES).filter(|_| check_beam(&mut draws, &profile, first_rad, neglect)).count();
+    assert!(checked > 100, "{checked}");
+}
+
+fn check_beam(draws: &mut Draws, profile: &Profile, first_rad: f64, tolerance: impl Fn(f64) -> f64) -> bool {
+    const CORNER_M: f64 = 0.05;
+    let state = draws.state();
+    let along = draws.mounted() * Vec3::new(1.0, 0.0, 0.0);
+    let beam = Beam { offset: draws.vector(0.5), along, first_rad, unsure_rad: 0.0 };
+    // The row's own expectation, from a range of nothing.
+    let Some(row) = measure::range(&state, profile, &beam, 0.0, 0.1) else { return false };
+    let origin = state.position + state.attitude * beam.offset;
+    let looks = state.attitude * along;
+    let hit = profile.cast([origin.y(), origin.z()], [looks.y(), looks.z()]).unwrap();
+    // Where the cone just ceases to hold the normal, the slope has a kink.
+    let incidence = math::acos(-(hit.normal[0] * looks.y() + hit.normal[1] * looks.z()));
+    let edge = [origin.y() + looks.y() * hit.range_m, origin.z() + looks.z() * hit.range_m];
+    let corner = (edge[0].abs() - 3.5).abs() < CORNER_M
+        && ((edge[1] - 8.0).abs() < CORNER_M || edge[1].abs() < CORNER_M);
+    if corner || (incidence - first_rad).abs() < 0.01 {
+        return false;
+    }
+    check_row("range", &state, tolerance(-row.residual), |state| {
+        measure::range(state, profile, &beam, 0.0, 0.1)
+    })
+}
+
+#[test]
+fn verif_height_and_chainage() {
+    let mut draws = Draws::new(3);
+    for _ in 0..STATES {
+        let (state, offset) = (draws.state(), draws.vector(0.8));
+        let (height_m, from_m) = (draws.within(5.0), draws.within(50.0));
+        assert!(check_row("height", &state, TOLERANCE, |state| {
+            Some(measure::height(state, offset, height_m, 0.1))
+        }));
+        assert!(check_row("chainage", &state, TOLERANCE, |state| {
+            Some(measure::chainage(state, offset, from_m, 0.0, 0.1))
+        }));
+    }
+}
+
+/// The rows of an attitude hold where measured and estimated agree, which is where a filter that works is: off by an angle,
+/// they are wrong by half of it. So the measured is within 1e-7 of the estimate, deviation included.
+#[test]
+fn verif_attitude() {
+    let mut draws = Draws::new(4);
+    for _ in 0..STATES {
+        let state = State { heading_offset_rad: 0.0, ..draws.state() };
+        let measured = rotation(draws.vector::<Tunnel>(1e-7)) * state.attitude;
+        for k in 0..3 {
+            assert!(check_row("attitude", &state, TOLERANCE, |state| {
+                Some(measure::attitude(state, measured, 0.1, 0.1)[k])
+            }));
+        }
+    }
+}
+
+/// A compass that deviates turns what it measures about the tunnel's z: then nothing is left over.
+#[test]
+fn verif_a_deviating_compass_is_expected() {
+    let mut draws = Draws::new(5);
+    for _ in 0..STATES {
+        let state = draws.state();
+        let deviated = rotation(Vec3::<Tunnel>::new(0.0, 0.0, state.heading_offset_rad)) * state.attitude;
+        for row in measure::attitude(&state, deviated, 0.1, 0.1) {
+            assert!(row.residual.abs() < 1e-12, "{row:?}");
+        }
+    }
+}
+
+/// The turn rate is given, so that the bias of the gyros is no error of the row: see "What is left out" in
+/// `docs/fusion.md`.
+#[test]
+fn verif_velocity_and_rest() {
+    let mut draws = Draws::new(6);
+    for _ in 0..STATES {
+        let state = draws.state();
+        let (offset, mounted): (Vec3<Body>, _) = (draws.vector(0.8), draws.mounted());
+        let rate = draws.vector(1.0);
+        for k in 0..3 {
+            assert!(check_row("velocity", &state, TOLERANCE, |state| {
+                Some(measure::velocity(state, (offset, mounted), rate, Vec3::zero(), 0.1)[k])
+            }));
+            assert!(check_row("rest", &state, TOLERANCE, |state| Some(measure::rest(state, 0.1)[k])));
+        }
+    }
+}
+
+/// A point fixed to a turning body moves as it should: the lever arm's velocity by differences of the point's place.
+#[test]
+fn verif_velocity_of_a_sensor_on_an_arm() {
+    let mut draws = Draws::new(7);
+    for _ in 0..STATES {
+        let state = draws.state();
+        let (offset, mounted): (Vec3<Body>, _) = (draws.vector(0.8), draws.mounted());
+        let rate: Vec3<Body> = draws.vector(1.0);
+        let place = |at_s: f64| {
+            let attitude = state.attitude * rotation(rate.scaled(at_s));
+            state.position + state.velocity_mps.scaled(at_s) + attitude * offset
+        };
+        let moved = (place(STEP) - place(-STEP)).scaled(0.5 / STEP);
+        let in_sensor = mounted.inverse() * (state.attitude.inverse() * moved);
+        for row in measure::velocity(&state, (offset, mounted), rate, in_sensor, 0.1) {
+            assert!(row.residual.abs() < TOLERANCE, "{row:?}");
+        }
+    }
+}
+
+/// Over a tenth of a second the place then is the place now less the way: exact for what moves evenly.
+#[test]
+fn verif_a_row_seen_later() {
+    const LATER_S: f64 = 0.07;
+    let mut draws = Draws::new(8);
+    for _ in 0..STATES {
+        let (state, offset) = (draws.state(), draws.vector(0.8));
+        let row = |now: &State| {
+            let then = State { position: now.position + now.velocity_mps.scaled(-LATER_S), ..*now };
+            Some(measure::chainage(&then, offset, 3.0, 0.0, 0.1).seen_later(LATER_S))
+        };
+        assert!(check_row("seen later", &state, TOLERANCE, row));
+    }
+}
+
+/// An epoch of ten samples; `None` for what isn't felt.
+fn go_on(start: &State, felt: &[Felt]) -> (State, Transition) {
+    let (mut state, mut leg) = (*start, Leg::default());
+    for felt in felt {
+        state.go_on(felt, 0.01, GRAVITY_MPS2, &mut leg);
+    }
+    let transition = leg.transition(&Settings::default());
+    transition.fade(&mut state);
+    (state, transition)
+}
+
+/// The transition holds the rotation of a sample's middle for all of it: wrong by up to a quarter of the angle turned in a
+/// sample, 0.01 rad, and that in the terms of a bias alone, of which the largest is 0.1 s of turning, or 0.05 s^2 of force:
+/// 0.1 x 0.0025. What a wrong factor or a term left out makes is larger for each but the way that a gyro's bias makes by
+/// tilting, 10 m/s^2 x 0.1^3 / 6: so each block is compared with its own size.
+#[test]
+fn verif_the_transition() {
+    let blocks = [(POSITION, 3), (VELOCITY, 3), (ATTITUDE, 3), (FORCE_BIAS, 3), (RATE_BIAS, 3)];
+    let ones = [SLACK, SLACK_RATE, SCALE, DEPTH, HEADING].map(|i| (i, 1));
+    let blocks: Vec<_> = blocks.into_iter().chain(ones).collect();
+    let mut draws = Draws::new(9);
+    for round in 0..STATES {
+        let start = draws.state();
+        let (rate, force) = (draws.vector(0.6), draws.vector(3.0) + Vec3::new(0.0, 0.0, 9.0));
+        // Some rounds without one or the other, for a part of the epoch or for all of it.
+        let blind = |k: u64, part: u64| round % 4 == part && k >= round % 3 * 4;
+        let felt: Vec<_> = (0..10)
+            .map(|k| Felt {
+                rate_radps: (!blind(k, 1)).then(|| rate + draws.vector(0.3)),
+                force_mps2: (!blind(k, 2)).then(|| force + draws.vector(1.0)),
+            })
+            .collect();
+        let (_, transition) = go_on(&start, &felt);
+        let columns: Vec<(Errors, Errors)> = (0..ERRORS)
+            .map(|error| {
+                let (above, _) = go_on(&moved(&start, error, STEP), &felt);
+                let (below, _) = go_on(&moved(&start, error, -STEP), &felt);
+                let mut says = [0.0; ERRORS];
+                says[error] = 1.0;
+                transition.apply(&mut says);
+                (below.errors_to(&above).map(|e| e / (2.0 * STEP)), says)
+            })
+            .collect();
+        for (from, from_len) in &blocks {
+            for (to, to_len) in &blocks {
+                let (mut off, mut size) = (0.0, 0.0);
+                for (slope, says) in &columns[*from..from + from_len] {
+                    for i in *to..to + to_len {
+                        off += (slope[i] - says[i]) * (slope[i] - says[i]);
+                        size += slope[i] * slope[i];
+                    }
+                }
+                let (off, size) = (math::sqrt(off), math::sqrt(size));
+                assert!(
+                    off < 3e-3 * size + 1e-9,
+                    "round {round}: of {from} on {to} off by {off} of {size}: {start:?}"
+                );
+            }
+        }
+    }
+}
+
+/// Factors moved on by the transition are those of F P F^T.
+#[test]
+fn verif_the_transition_carries_factors() {
+    use crate::filter::factors::Factors;
+    let mut draws = Draws::new(10);
+    for _ in 0..20 {
+        let start = draws.state();
+        let felt = [Felt { rate_radps: Some(draws.vector(0.6)), force_mps2: Some(draws.vector(10.0)) }; 10];
+        let (_, transition) = go_on(&start, &felt);
+        let mut factors = Factors::independent([0.01; ERRORS]);
+        for i in 0..ERRORS {
+            let along: Errors = core::array::from_fn(|k| ((i * 7 + k * 3) % 11) as f64 / 5.0 - 1.0);
+            factors.add(0.2, along, ERRORS);
+        }
+        let before: [Errors; ERRORS] = factors.rows(core::array::from_fn(|i| i));
+        transition.carry(&mut factors);
+        // F P, then F (F P)^T, by columns.
+        let carried = |mut columns: [Errors; ERRORS]| {
+            for column in &mut columns {
+                transition.apply(column);
+            }
+            columns
+        };
+        let once = carried(before);
+        let twice = carried(core::array::from_fn(|i| once.map(|column| column[i])));
+        for (i, column) in twice.iter().enumerate() {
+            for (j, should) in column.iter().enumerate() {
+                let off = (should - factors.covariance(i, j)).abs();
+                assert!(off < 1e-10, "({i}, {j}): off by {off}");
+            }
+        }
+    }
+}

@@ -1,0 +1,264 @@
+//! The factors against values of 100 digits: `tests/oracles/fusion.py` made `fusion.csv` with mpmath.
+//!
+//! Inputs are doubles taken as exact, so that each tolerance is what rounding within the computation may do. Elements of a
+//! covariance are held against sqrt(P_ii P_jj), the scale that errors of these two have.
+
+use super::super::factors::{Factors, Gain};
+use headrace_geometry::math;
+
+const LINES: &str = include_str!("../../../../../tests/oracles/fusion.csv");
+
+/// A covariance that can be taken through the steps of the file.
+trait Covariance<const N: usize> {
+    fn start(variances: [f64; N]) -> Self;
+    fn element(&self, i: usize, j: usize) -> f64;
+    fn measure(&mut self, h: &[f64; N], noise: f64) -> Gain<N>;
+    fn add(&mut self, variance: f64, a: [f64; N]);
+    /// By F, unit upper triangular.
+    fn shear(&mut self, f: &[[f64; N]; N]);
+    fn scale(&mut self, i: usize, factor: f64);
+    fn distance(&self, e: &[f64; N]) -> Option<f64>;
+}
+
+impl<const N: usize> Covariance<N> for Factors<N> {
+    fn start(variances: [f64; N]) -> Self {
+        Self::independent(variances)
+    }
+
+    fn element(&self, i: usize, j: usize) -> f64 {
+        self.covariance(i, j)
+    }
+
+    fn measure(&mut self, h: &[f64; N], noise: f64) -> Gain<N> {
+        Self::measure(self, h, noise)
+    }
+
+    fn add(&mut self, variance: f64, a: [f64; N]) {
+        let len = a.iter().rposition(|a| *a != 0.0).map_or(0, |last| last + 1);
+        Self::add(self, variance, a, len);
+    }
+
+    fn shear(&mut self, f: &[[f64; N]; N]) {
+        Self::shear(self, |column, len| {
+            let was = *column;
+            for (slot, row) in column.iter_mut().zip(f) {
+                *slot = row.iter().zip(was).take(len).map(|(f, e)| f * e).sum();
+            }
+        });
+    }
+
+    fn scale(&mut self, i: usize, factor: f64) {
+        Self::scale(self, i, factor);
+    }
+
+    fn distance(&self, e: &[f64; N]) -> Option<f64> {
+        Some(Self::distance(self, e))
+    }
+}
+
+/// The covariance itself, whole, with the update of the textbooks; `JOSEPH`: with the one that keeps its sign, they say.
+#[derive(Clone, Copy)]
+struct Whole<const N: usize, const JOSEPH: bool>([[f64; N]; N]);
+
+impl<const N: usize, const JOSEPH: bool> Whole<N, JOSEPH> {
+    /// F P F^T.
+    fn carried(&self, f: &[[f64; N]; N]) -> Self {
+        let half: [[f64; N]; N] =
+            f.map(|row| core::array::from_fn(|j| (0..N).map(|k| row[k] * self.0[k][j]).sum()));
+        Self(half.map(|row| f.map(|other| row.iter().zip(other).map(|(a, b)| a * b).sum())))
+    }
+
+    fn plus(mut self, variance: f64, a: &[f64; N]) -> Self {
+        for (i, row) in self.0.iter_mut().enumerate() {
+            for (p, a_j) in row.iter_mut().zip(a) {
+                *p += variance * a[i] * a_j;
+            }
+        }
+        self
+    }
+}
+
+impl<const N: usize, const JOSEPH: bool> Covariance<N> for Whole<N, JOSEPH> {
+    fn start(variances: [f64; N]) -> Self {
+        Self(core::array::from_fn(|i| core::array::from_fn(|j| if i == j { variances[i] } else { 0.0 })))
+    }
+
+    fn element(&self, i: usize, j: usize) -> f64 {
+        self.0[i][j]
+    }
+
+    fn measure(&mut self, h: &[f64; N], noise: f64) -> Gain<N> {
+        let ph = self.0.map(|row| row.iter().zip(h).map(|(p, h)| p * h).sum::<f64>());
+        let variance = ph.iter().zip(h).map(|(p, h)| p * h).sum::<f64>() + noise;
+        let k = ph.map(|p| p / variance);
+        *self = if JOSEPH {
+            let left =
+                core::array::from_fn(|i| core::array::from_fn(|j| f64::from(u8::from(i == j)) - k[i] * h[j]));
+            self.carried(&left).plus(noise, &k)
+        } else {
+            self.plus(-1.0 / variance, &ph)
+        };
+        Gain { k, variance }
+    }
+
+    fn add(&mut self, variance: f64, a: [f64; N]) {
+        *self = self.plus(variance, &a);
+    }
+
+    fn shear(&mut self, f: &[[f64; N]; N]) {
+        *self = self.carried(f);
+    }
+
+    fn scale(&mut self, i: usize, factor: f64) {
+        let unit = |r: usize, c: usize| f64::from(u8::from(r == c));
+        let f = core::array::from_fn(|r| {
+            core::array::from_fn(|c| unit(r, c) * if r == i { factor } else { 1.0 })
+        });
+        *self = self.carried(&f);
+    }
+
+    fn distance(&self, _: &[f64; N]) -> Option<f64> {
+        None
+    }
+}
+
+/// How far off a covariance was at its worst, in its own scale.
+#[derive(Debug, Default, Clone, Copy)]
+struct Worst {
+    covariance: f64,
+    gain: f64,
+    distance: f64,
+    is_sign_lost: bool,
+}
+
+/// NaN is as far off as can be.
+fn note(worst: &mut f64, off: f64) {
+    *worst = if off.is_nan() { f64::INFINITY } else { worst.max(off) };
+}
+
+fn part<const N: usize>(numbers: &[f64]) -> [f64; N] {
+    numbers.try_into().unwrap()
+}
+
+fn follow<const N: usize, C: Covariance<N>>(case: &str) -> Worst {
+    let mut worst = Worst::default();
+    let mut p = C::start([0.0; N]);
+    let mut gain = Gain { k: [0.0; N], variance: 0.0 };
+    let mut lines = 0;
+    for line in LINES.lines().filter(|line| !line.starts_with('#')) {
+        let fields: Vec<&str> = line.split(',').collect();
+        if fields[0] != case || fields[1].parse() != Ok(N) {
+            continue;
+        }
+        lines += 1;
+        let numbers: Vec<f64> = fields[3..].iter().map(|field| field.parse().unwrap()).collect();
+        match fields[2] {
+            "start" => p = C::start(part(&numbers)),
+            "measure" => gain = p.measure(&part(&numbers[1..]), numbers[0]),
+            "add" => p.add(numbers[0], part(&numbers[1..])),
+            "shear" => {
+                let mut entries = numbers.iter();
+                p.shear(&core::array::from_fn(|i| {
+                    core::array::from_fn(|j| match i.cmp(&j) {
+                        core::cmp::Ordering::Less => *entries.next().unwrap(),
+                        core::cmp::Ordering::Equal => 1.0,
+                        core::cmp::Ordering::Greater => 0.0,
+                    })
+                }));
+            }
+            "scale" => p.scale(fields[3].parse().unwrap(), numbers[1]),
+            "gain" => {
+                note(&mut worst.gain, (gain.variance / numbers[0] - 1.0).abs());
+                // Against the largest, as gains of one measurement act together.
+                let size = numbers[1..].iter().fold(0.0, |size: f64, k| size.max(k.abs()));
+                for (k, right) in gain.k.iter().zip(&numbers[1..]) {
+                    note(&mut worst.gain, (k - right).abs() / size);
+                }
+            }
+            "distance" => {
+                let (e, right) = numbers.split_at(N);
+                if let Some(distance) = p.distance(&part(e)) {
+                    note(&mut worst.distance, (distance / right[0] - 1.0).abs());
+                }
+            }
+            "is" => {
+                let mut right = [[0.0; N]; N];
+                let mut elements = numbers.iter();
+                for (i, row) in right.iter_mut().enumerate() {
+                    for slot in row.iter_mut().skip(i) {
+                        *slot = *elements.next().unwrap();
+                    }
+                }
+                for i in 0..N {
+                    worst.is_sign_lost |= p.element(i, i) <= 0.0;
+                    for j in i..N {
+                        let off = (p.element(i, j) - right[i][j]).abs();
+                        note(&mut worst.covariance, off / math::sqrt(right[i][i] * right[j][j]));
+                    }
+                }
+            }
+            other => panic!("unknown step {other}"),
+        }
+    }
+    assert!(lines > 0, "no case {case} of {N} errors");
+    worst
+}
+
+/// By factors, by the plain form, and by Joseph's.
+fn all(case: &str, n: usize) -> [Worst; 3] {
+    fn of<const N: usize>(case: &str) -> [Worst; 3] {
+        [follow::<N, Factors<N>>(case), follow::<N, Whole<N, false>>(case), follow::<N, Whole<N, true>>(case)]
+    }
+    if n == 4 { of::<4>(case) } else { of::<6>(case) }
+}
+
+/// How far the factors may be off in a case: about ten times what they are. Doubles alone allow some units in the last
+/// place times the ratio of the largest standard deviation to the smallest in any direction, 1e12 after ten hours.
+const CASES: [(&str, usize, f64); 13] = [
+    ("mild", 4, 1e-14),
+    ("mild", 6, 1e-14),
+    ("ill_scaled", 4, 1e-12),
+    ("ill_scaled", 6, 1e-12),
+    ("exact_prior", 4, 1e-14),
+    ("drift", 4, 1e-8),
+    ("drift", 6, 1e-6),
+    ("unknown_then_known", 4, 1e-13),
+    ("unknown_then_known", 6, 1e-13),
+    ("nearly_parallel", 4, 2e-7),
+    ("nearly_parallel", 6, 1e-10),
+    ("swinging", 4, 1e-9),
+    ("swinging", 6, 1e-5),
+];
+/// An update by the whole covariance fails a case when it is so many times further off than the factors may be.
+const FAILS: f64 = 30.0;
+
+#[test]
+fn verif_factors_agree_with_the_textbook_at_100_digits() {
+    for (case, n, tolerance) in CASES {
+        let [factors, _, _] = all(case, n);
+        assert!(!factors.is_sign_lost, "{case} {n}: {factors:?}");
+        let worst = factors.covariance.max(factors.gain).max(factors.distance);
+        assert!(worst <= tolerance, "{case} {n}: {factors:?}, allowed {tolerance:e}");
+    }
+}
+
+#[test]
+fn the_covariance_itself_fails_where_its_factors_do_not() {
+    for (case, n, tolerance) in CASES {
+        let is_hard = !matches!(case, "mild" | "ill_scaled");
+        let [_, plain, joseph] = all(case, n);
+        let fails = |worst: Worst| worst.is_sign_lost || worst.covariance > FAILS * tolerance;
+        if is_hard {
+            assert!(fails(plain), "{case} {n}: {plain:?}");
+            assert!(fails(joseph), "{case} {n}: {joseph:?}");
+        }
+        // Neither is a straw man: with nothing hard about a case both are right.
+        if case == "mild" {
+            assert!(plain.covariance.max(joseph.covariance) < 1e-13, "{plain:?} {joseph:?}");
+        }
+    }
+    let sign_lost =
+        |which: usize| CASES.iter().filter(|(case, n, _)| all(case, *n)[which].is_sign_lost).count();
+    assert!(sign_lost(1) >= 5, "the plain form keeps its sign, which it didn't");
+    assert!(sign_lost(2) >= 2, "Joseph's form keeps its sign, which it didn't");
+}

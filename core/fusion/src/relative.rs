@@ -1,0 +1,66 @@
+//! How well two moments are known against each other.
+
+use serde::{Deserialize, Serialize};
+
+use headrace_geometry::frames::{Tunnel, Vec3};
+use headrace_geometry::math;
+
+/// Covariance of the errors that move a sample along the tunnel, of one moment against another: chainage, pitch, yaw.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Relative([[f64; 3]; 3]);
+
+impl Relative {
+    /// From the covariance of chainage, m, and of pitch and yaw, radians.
+    pub fn new(covariance: [[f64; 3]; 3]) -> Self {
+        Self(covariance)
+    }
+
+    /// Nothing but an error of chainage of this standard deviation, m.
+    pub fn along(sigma_m: f64) -> Self {
+        Self([[sigma_m * sigma_m, 0.0, 0.0], [0.0; 3], [0.0; 3]])
+    }
+
+    /// Standard deviation of the chainage of a place at `arm` from the vehicle, m.
+    pub fn sigma_m(&self, arm: Vec3<Tunnel>) -> f64 {
+        let weights = [1.0, arm.z(), -arm.y()];
+        let rows = self.0.iter().zip(weights);
+        let sum: f64 =
+            rows.map(|(row, w)| w * row.iter().zip(weights).map(|(c, w)| c * w).sum::<f64>()).sum();
+        math::sqrt(sum.max(0.0))
+    }
+
+    /// The same, told of another place of the vehicle that is `arm` from this one.
+    #[must_use]
+    pub fn moved(&self, arm: Vec3<Tunnel>) -> Self {
+        let sheared = |[x, pitch, yaw]: [f64; 3]| [x + arm.z() * pitch - arm.y() * yaw, pitch, yaw];
+        // Symmetric: rows, then columns.
+        let once = self.0.map(sheared);
+        let columns = [0, 1, 2].map(|c| sheared(once.map(|row| row.get(c).copied().unwrap_or(0.0))));
+        Self(columns)
+    }
+
+    /// The sum of shares of two.
+    #[must_use]
+    pub fn weighted(&self, share: f64, other: &Self, other_share: f64) -> Self {
+        let mut sum = [[0.0; 3]; 3];
+        for ((sum, a), b) in
+            sum.as_flattened_mut().iter_mut().zip(self.0.as_flattened()).zip(other.0.as_flattened())
+        {
+            *sum = a * share + b * other_share;
+        }
+        Self(sum)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_place_is_as_uncertain_from_wherever_its_arm_begins() {
+        let relative = Relative::new([[0.04, 0.003, -0.002], [0.003, 0.01, 0.001], [-0.002, 0.001, 0.02]]);
+        let (whole, part) = (Vec3::new(0.3, 2.0, -1.5), Vec3::new(-0.1, 0.4, 0.7));
+        let moved = relative.moved(part).sigma_m(whole + -part);
+        assert!((moved - relative.sigma_m(whole)).abs() < 1e-12, "{moved}");
+    }
+}

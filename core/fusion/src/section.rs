@@ -1,0 +1,84 @@
+//! The place in the cross-section where echosounders' ranges agree best with the design profile.
+
+use serde::{Deserialize, Serialize};
+
+use headrace_geometry::frames::{Body, Mount, Rot, Sensor, Tunnel, Vec3};
+use headrace_geometry::tunnel::Profile;
+
+/// Beams that graze the wall more than this don't take part.
+const LEAST_COSINE: f64 = 0.1;
+/// A beam that leans so far up or down says something of the height.
+const STEEP: f64 = 0.7;
+const ROUNDS: usize = 3;
+
+/// A range to the wall, along the x of its sensor.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Echo {
+    /// How the sonar sits.
+    pub mount: Mount,
+    /// Range at the site's speed of sound, m.
+    pub range_m: f64,
+}
+
+/// A place in the section, and whether the echoes had a say in its height.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Place {
+    /// y and z, m.
+    pub at_m: [f64; 2],
+    /// Whether its height is that of the echoes.
+    pub is_height_seen: bool,
+}
+
+/// Gauss-Newton from `start` on sum((measured - predicted)^2 / sd^2) with a prior (place and standard deviations),
+/// d range / d place = -n / (n . beam). Stays where it came to when a step would leave the section.
+pub fn settle(
+    profile: &Profile,
+    attitude: Rot<Tunnel, Body>,
+    start: [f64; 2],
+    (prior, prior_sd_m): ([f64; 2], [f64; 2]),
+    echo_sd_m: f64,
+    echoes: &(impl Iterator<Item = Echo> + Clone),
+) -> Place {
+    let mut place = Place { at_m: start, is_height_seen: false };
+    let [wy, wz] = prior_sd_m.map(weight);
+    for _ in 0..ROUNDS {
+        let at = place.at_m;
+        let (mut hyy, mut hyz, mut hzz) = (wy, 0.0, wz);
+        let (mut gy, mut gz) = (wy * (prior[0] - at[0]), wz * (prior[1] - at[1]));
+        for echo in echoes.clone() {
+            let offset = attitude * echo.mount.position;
+            let beam = attitude * (echo.mount.rotation * Vec3::<Sensor>::new(1.0, 0.0, 0.0));
+            let Some(hit) = profile.cast([at[0] + offset.y(), at[1] + offset.z()], [beam.y(), beam.z()])
+            else {
+                continue;
+            };
+            let cosine = hit.normal[0] * beam.y() + hit.normal[1] * beam.z();
+            if cosine.abs() < LEAST_COSINE {
+                continue;
+            }
+            let slope = [-hit.normal[0] / cosine, -hit.normal[1] / cosine];
+            place.is_height_seen |= slope[1].abs() > STEEP;
+            let weight = weight(echo_sd_m);
+            let residual = echo.range_m - hit.range_m;
+            hyy += weight * slope[0] * slope[0];
+            hyz += weight * slope[0] * slope[1];
+            hzz += weight * slope[1] * slope[1];
+            gy += weight * slope[0] * residual;
+            gz += weight * slope[1] * residual;
+        }
+        // The prior keeps the determinant above zero.
+        let determinant = hyy * hzz - hyz * hyz;
+        let moved =
+            [at[0] + (hzz * gy - hyz * gz) / determinant, at[1] + (hyy * gz - hyz * gy) / determinant];
+        if !profile.contains(moved) {
+            break;
+        }
+        place.at_m = moved;
+    }
+    place
+}
+
+/// Weight of an observation of this standard deviation.
+fn weight(sigma_m: f64) -> f64 {
+    1.0 / (sigma_m * sigma_m)
+}

@@ -1,0 +1,118 @@
+//! From the dive's end to its beginning: each estimate of the filter is corrected by what was learnt after it.
+
+use super::kernel::Gain;
+use super::later::Later;
+use super::step::{Move, Placed, Step};
+use super::track::{Piece, Point, Track};
+use crate::filter::factors::Factors;
+use crate::filter::running::Sigmas;
+use crate::filter::settings::Settings;
+use crate::filter::state::{ERRORS, State};
+use crate::relative::Relative;
+use headrace_geometry::time::MonoNs;
+
+/// A smoothed estimate.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Estimate {
+    /// Its moment.
+    pub at: MonoNs,
+    /// What it is.
+    pub state: State,
+    /// The covariance of its errors.
+    pub factors: Factors<ERRORS>,
+}
+
+/// Takes the filter's steps from the last to the first, and makes a track of them.
+pub struct Backward {
+    settings: Settings,
+    now: Option<(u32, Estimate)>,
+    later: Later,
+    /// The last first, as are their points.
+    pieces: Vec<Piece>,
+    points: Vec<Point>,
+    relatives: Vec<(MonoNs, Relative)>,
+}
+
+impl Backward {
+    /// With the settings that the filter had.
+    pub fn new(settings: Settings) -> Self {
+        Self {
+            settings,
+            now: None,
+            later: Later::default(),
+            pieces: Vec::new(),
+            points: Vec::new(),
+            relatives: Vec::new(),
+        }
+    }
+
+    /// Takes a step, that before the one taken last.
+    ///
+    /// Allocates: its point of the track.
+    pub fn take(&mut self, placed: &Placed) {
+        let step = &placed.step;
+        let after = self.now.filter(|(piece, _)| *piece == placed.piece).map(|(_, after)| after);
+        let smoothed = after.and_then(|after| self.smooth(step, &after));
+        let now = smoothed.unwrap_or_else(|| {
+            // Nothing later is known of it: it is as the filter left it.
+            self.end_piece();
+            self.pieces.push(Piece::begin(placed, self.points.len(), self.relatives.len()));
+            Estimate { at: step.at, state: step.state, factors: step.factors }
+        });
+        if self.later.is_due(now.at) {
+            let number = self.relatives.len();
+            self.relatives.push((now.at, Relative::default()));
+            if let Some((number, relative)) = self.later.note(number, now.at, placed.gap, &now.factors) {
+                answer(&mut self.relatives, number, relative);
+            }
+        }
+        self.points.push(Point::of(&now, &Sigmas::of(&now.state, &now.factors)));
+        self.now = Some((placed.piece, now));
+    }
+
+    /// The estimate that was smoothed last, the earliest so far.
+    pub fn now(&self) -> Option<&Estimate> {
+        self.now.as_ref().map(|(_, now)| now)
+    }
+
+    /// The track of all steps.
+    pub fn finish(mut self) -> Track {
+        self.end_piece();
+        Track::of_reversed(self.pieces, self.points, self.relatives)
+    }
+
+    /// The step's beginning, of the smoothed estimate at its end; `None` where numbers fail.
+    fn smooth(&mut self, step: &Step, after: &Estimate) -> Option<Estimate> {
+        if matches!(step.by, Move::End) {
+            return None;
+        }
+        let settings = &self.settings;
+        let predicted = step.by.predict(settings, &step.factors);
+        let gain = Gain::new(&step.factors, |errors| step.by.carry(settings, errors), &predicted);
+        let mut noisy = after.factors;
+        step.by.disturb(settings, &mut noisy);
+        let factors = gain.smoothed(&step.factors, &noisy);
+        let mut state = step.state;
+        state.correct(&gain.back(&step.predicted.errors_to(&after.state)));
+        if !(state.is_sound() && factors.is_sound()) {
+            return None;
+        }
+        let relatives = &mut self.relatives;
+        self.later.back(step.at, &gain, &factors, |(number, relative)| answer(relatives, number, relative));
+        Some(Estimate { at: step.at, state, factors })
+    }
+
+    fn end_piece(&mut self) {
+        let relatives = &mut self.relatives;
+        self.later.end(|(number, relative)| answer(relatives, number, relative));
+        if let Some(piece) = self.pieces.last_mut() {
+            piece.end(self.points.len(), self.relatives.len());
+        }
+    }
+}
+
+fn answer(relatives: &mut [(MonoNs, Relative)], number: usize, relative: Relative) {
+    if let Some((_, slot)) = relatives.get_mut(number) {
+        *slot = relative;
+    }
+}

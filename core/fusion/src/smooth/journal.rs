@@ -1,0 +1,76 @@
+//! The way out for the filter's steps: a bounded queue, emptied between ticks by whoever keeps them.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use crossbeam::queue::ArrayQueue;
+
+use super::step::{Placed, Step, Words};
+use headrace_geometry::frames::{Body, Vec3};
+use headrace_geometry::time::DurNs;
+
+/// The end at which steps go in.
+pub struct Journal {
+    queue: Arc<Shared>,
+    piece: u32,
+    clock: u32,
+}
+
+/// The end at which their records come out, in order.
+#[derive(Clone)]
+pub struct JournalReader {
+    queue: Arc<Shared>,
+}
+
+struct Shared {
+    records: ArrayQueue<Words>,
+    dropped: AtomicU64,
+}
+
+impl Journal {
+    /// A queue with room for so many records, and the end at which they come out.
+    ///
+    /// Allocates: all of it.
+    pub fn new(capacity: usize) -> (Self, JournalReader) {
+        let queue =
+            Arc::new(Shared { records: ArrayQueue::new(capacity.max(1)), dropped: AtomicU64::new(0) });
+        (Self { queue: Arc::clone(&queue), piece: 0, clock: 0 }, JournalReader { queue })
+    }
+
+    /// A new first estimate: what follows has nothing to do with what was before.
+    pub fn begin(&mut self) {
+        self.piece = self.piece.saturating_add(1);
+    }
+
+    /// The clock has been set back.
+    pub fn clock_set(&mut self) {
+        self.clock = self.clock.saturating_add(1);
+    }
+
+    /// Writes a step. One that isn't sound, or finds no room, cuts the track there: no later one can correct those before.
+    ///
+    /// Allocates: never.
+    pub fn write(&mut self, step: &Step, unit_at: Vec3<Body>, gap: DurNs) {
+        let placed = Placed { step: *step, unit_at, gap, piece: self.piece, clock: self.clock };
+        let is_sound = step.is_sound();
+        if is_sound && self.queue.records.push(placed.words()).is_ok() {
+            return;
+        }
+        self.begin();
+        if is_sound {
+            self.queue.dropped.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+}
+
+impl JournalReader {
+    /// The oldest record that is waiting.
+    pub fn next(&self) -> Option<Words> {
+        self.queue.records.pop()
+    }
+
+    /// How many found no room.
+    pub fn dropped(&self) -> u64 {
+        self.queue.dropped.load(Ordering::Relaxed)
+    }
+}

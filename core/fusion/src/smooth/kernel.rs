@@ -1,0 +1,54 @@
+//! A step of the smoother of Rauch, Tung and Striebel, on factors: neither a covariance's sign nor its symmetry can be lost.
+//!
+//! Source: H. E. Rauch, F. Tung, C. T. Striebel, Maximum likelihood estimates of linear dynamic systems, AIAA J. 3, 1965.
+
+use crate::filter::factors::Factors;
+
+/// How errors at a step's beginning follow from those at its end, once these are known better.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Gain<const N: usize> {
+    /// Rows of C = P F^T (F P F^T + Q)^-1.
+    rows: [[f64; N]; N],
+    /// Rows of I - C F: what the end says nothing of.
+    rest: [[f64; N]; N],
+}
+
+impl<const N: usize> Gain<N> {
+    /// Of a covariance at the step's beginning, what the step does to errors, and the covariance at its end before the
+    /// measurements there.
+    pub fn new(before: &Factors<N>, carry: impl Fn(&mut [f64; N]), predicted: &Factors<N>) -> Self {
+        let unit: [[f64; N]; N] =
+            core::array::from_fn(|j| core::array::from_fn(|i| if i == j { 1.0 } else { 0.0 }));
+        let rows = unit.map(|unit| {
+            let mut column = before.along(&unit);
+            carry(&mut column);
+            predicted.solve(&column)
+        });
+        let carried = unit.map(|mut unit| {
+            carry(&mut unit);
+            unit
+        });
+        let mut rest = unit;
+        for (rest, row) in rest.iter_mut().zip(&rows) {
+            for (slot, column) in rest.iter_mut().zip(&carried) {
+                *slot -= sum(row, column);
+            }
+        }
+        Self { rows, rest }
+    }
+
+    /// Errors at the beginning, of those at the end.
+    pub fn back(&self, errors: &[f64; N]) -> [f64; N] {
+        self.rows.map(|row| sum(&row, errors))
+    }
+
+    /// The smoothed covariance at the beginning, of that of the filter there and the smoothed one S at the end with the
+    /// step's noise Q added to it: `(I - C F) P (I - C F)^T + C (S + Q) C^T`, which is P + C (S - F P F^T - Q) C^T.
+    pub fn smoothed(&self, before: &Factors<N>, end_and_noise: &Factors<N>) -> Factors<N> {
+        Factors::of_sum([(before, &self.rest), (end_and_noise, &self.rows)])
+    }
+}
+
+fn sum<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}

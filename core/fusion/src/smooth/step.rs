@@ -1,0 +1,165 @@
+//! What leads from one estimate of the filter to the next, and its record.
+
+use crate::filter::factors::Factors;
+use crate::filter::inertial::{LEG_NUMBERS, Leg};
+use crate::filter::running::widen;
+use crate::filter::settings::Settings;
+use crate::filter::state::{ERRORS, Errors, STATE_NUMBERS, State};
+use headrace_geometry::frames::{Body, Vec3};
+use headrace_geometry::time::{DurNs, MonoNs};
+
+/// Numbers of a covariance's factors.
+const FACTOR_NUMBERS: usize = ERRORS * (ERRORS + 1) / 2;
+/// Words of a record that aren't the numbers of a step: the two times, the kind of move, piece, clock and gap.
+const HEADER: usize = 6;
+/// Words of a record.
+pub const WORDS: usize = HEADER + 3 + 2 * STATE_NUMBERS + FACTOR_NUMBERS + LEG_NUMBERS;
+
+/// A record: integers as they are, numbers as their bits. A small part of it is empty where a step needs less.
+pub type Words = [u64; WORDS];
+
+/// What happens between two estimates beside measurements.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[expect(clippy::large_enum_variant, reason = "most are legs, and few are kept at a time")]
+pub enum Move {
+    /// The vehicle goes on.
+    Leg(Leg),
+    /// It is seen that the errors' variances are larger by so much than was believed.
+    Widened(Errors),
+    /// Nothing: this was the last estimate of its piece.
+    End,
+}
+
+/// A step from an estimate, measurements included, to the one before the next measurements.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Step {
+    /// When it begins.
+    pub at: MonoNs,
+    /// When it ends.
+    pub to: MonoNs,
+    /// The estimate at its beginning.
+    pub state: State,
+    /// The covariance of its errors.
+    pub factors: Factors<ERRORS>,
+    /// What happens.
+    pub by: Move,
+    /// The estimate at its end, before the measurements there.
+    pub predicted: State,
+}
+
+/// A step and its place in the dive.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Placed {
+    /// The step.
+    pub step: Step,
+    /// Where the inertial unit, whose place the estimate is, sits on the vehicle, m.
+    pub unit_at: Vec3<Body>,
+    /// Time between two passes of heads over a place.
+    pub gap: DurNs,
+    /// Number of the piece, of steps that follow upon each other.
+    pub piece: u32,
+    /// How often the clock had been set back.
+    pub clock: u32,
+}
+
+impl Step {
+    /// Whether all its numbers can be reckoned with.
+    pub fn is_sound(&self) -> bool {
+        self.state.is_sound() && self.predicted.is_sound() && self.factors.is_sound()
+    }
+}
+
+impl Move {
+    /// How errors at the beginning show at the end.
+    pub fn carry(&self, settings: &Settings, errors: &mut Errors) {
+        if let Self::Leg(leg) = self {
+            leg.transition(settings).apply(errors);
+        }
+    }
+
+    /// Adds to the covariance at the end what can't be known of the way.
+    pub fn disturb(&self, settings: &Settings, factors: &mut Factors<ERRORS>) {
+        match self {
+            Self::Leg(leg) => leg.disturb(settings, &leg.transition(settings), factors),
+            Self::Widened(variances) => widen(factors, variances),
+            Self::End => {}
+        }
+    }
+
+    /// The covariance before the measurements at the end: the same bits as the filter's own.
+    pub fn predict(&self, settings: &Settings, factors: &Factors<ERRORS>) -> Factors<ERRORS> {
+        let mut predicted = *factors;
+        if let Self::Leg(leg) = self {
+            leg.transition(settings).carry(&mut predicted);
+        }
+        self.disturb(settings, &mut predicted);
+        predicted
+    }
+
+    fn kind(&self) -> u64 {
+        match self {
+            Self::Leg(_) => 0,
+            Self::Widened(_) => 1,
+            Self::End => 2,
+        }
+    }
+}
+
+impl Placed {
+    /// The record.
+    pub fn words(&self) -> Words {
+        let Step { at, to, state, factors, by, predicted } = &self.step;
+        let header: [u64; HEADER] =
+            [at.0, to.0, by.kind(), u64::from(self.piece), u64::from(self.clock), self.gap.0.cast_unsigned()];
+        let leg = match by {
+            Move::Leg(leg) => Some(leg.numbers()),
+            _ => None,
+        };
+        let widened = match by {
+            Move::Widened(variances) => variances.as_slice(),
+            _ => &[],
+        };
+        let numbers = self.unit_at.0.iter().copied();
+        let numbers = numbers.chain(state.numbers()).chain(predicted.numbers()).chain(factors.numbers());
+        let numbers = numbers.chain(leg.into_iter().flatten()).chain(widened.iter().copied());
+        let mut words = [0; WORDS];
+        for (slot, word) in words.iter_mut().zip(header.into_iter().chain(numbers.map(f64::to_bits))) {
+            *slot = word;
+        }
+        words
+    }
+
+    /// What a record says; `None` of one that isn't whole.
+    pub fn of_words(words: &Words) -> Option<Self> {
+        let (header, numbers) = words.split_first_chunk::<HEADER>()?;
+        let [at, to, kind, piece, clock, gap] = *header;
+        let mut numbers = numbers.iter().map(|bits| f64::from_bits(*bits));
+        let unit_at = Vec3::new(numbers.next()?, numbers.next()?, numbers.next()?);
+        let state = state_of(&mut numbers)?;
+        let predicted = state_of(&mut numbers)?;
+        let factors = Factors::of_numbers(&mut numbers)?;
+        let by = match kind {
+            0 => Move::Leg(Leg::of_numbers(&mut numbers)?),
+            1 => {
+                let mut variances = [0.0; ERRORS];
+                for slot in &mut variances {
+                    *slot = numbers.next()?;
+                }
+                Move::Widened(variances)
+            }
+            2 => Move::End,
+            _ => return None,
+        };
+        let step = Step { at: MonoNs(at), to: MonoNs(to), state, factors, by, predicted };
+        let (piece, clock) = (u32::try_from(piece).ok()?, u32::try_from(clock).ok()?);
+        Some(Self { step, unit_at, gap: DurNs(gap.cast_signed()), piece, clock })
+    }
+}
+
+fn state_of(numbers: &mut impl Iterator<Item = f64>) -> Option<State> {
+    let mut all = [0.0; STATE_NUMBERS];
+    for slot in &mut all {
+        *slot = numbers.next()?;
+    }
+    State::of_numbers(all)
+}

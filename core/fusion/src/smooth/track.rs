@@ -1,0 +1,196 @@
+//! Where the vehicle was, as is known after the dive, and navigation along it.
+
+use core::ops::Range;
+
+use super::backward::Estimate;
+use super::step::Placed;
+use crate::filter::running::Sigmas;
+use crate::filter::sources::Consistency;
+use crate::filter::state::{rotation, rotation_vector};
+use crate::filter::{CARRIES, CLOCK_JUMP, EPOCH};
+use crate::relative::Relative;
+use crate::{Fix, Navigation, NoFix, Times};
+use headrace_geometry::frames::{Body, Pose, Vec3};
+use headrace_geometry::time::MonoNs;
+use headrace_sensor::device::SensorInfo;
+use headrace_sensor::reading::MAX_SOURCES;
+use headrace_sensor::reading::Reading;
+use headrace_snapshot::stateful;
+
+/// The inertial unit at a moment.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Point {
+    at: MonoNs,
+    pose: Pose,
+    speed_mps: f64,
+    sigmas: Sigmas,
+}
+
+/// A stretch of time without a break.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Piece {
+    clock: u32,
+    unit_at: Vec3<Body>,
+    points: Range<usize>,
+    relatives: Range<usize>,
+}
+
+/// See the module's description.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Track {
+    pieces: Vec<Piece>,
+    points: Vec<Point>,
+    relatives: Vec<(MonoNs, Relative)>,
+}
+
+impl Point {
+    pub(super) fn of(estimate: &Estimate, sigmas: &Sigmas) -> Self {
+        let Estimate { at, state, .. } = estimate;
+        let pose = Pose { position: state.position, attitude: state.attitude };
+        Self { at: *at, pose, speed_mps: state.velocity_mps.x(), sigmas: *sigmas }
+    }
+}
+
+impl Piece {
+    /// Begins, from behind, where there are so many points and relatives.
+    pub(super) fn begin(placed: &Placed, points: usize, relatives: usize) -> Self {
+        Self {
+            clock: placed.clock,
+            unit_at: placed.unit_at,
+            points: points..points,
+            relatives: relatives..relatives,
+        }
+    }
+
+    pub(super) fn end(&mut self, points: usize, relatives: usize) {
+        (self.points.end, self.relatives.end) = (points, relatives);
+    }
+}
+
+impl Track {
+    /// Of pieces, points and relatives from the last to the first.
+    pub(super) fn of_reversed(
+        mut pieces: Vec<Piece>,
+        mut points: Vec<Point>,
+        mut relatives: Vec<(MonoNs, Relative)>,
+    ) -> Self {
+        points.reverse();
+        relatives.reverse();
+        pieces.reverse();
+        let turned = |range: &Range<usize>, len: usize| len - range.end..len - range.start;
+        for piece in &mut pieces {
+            piece.points = turned(&piece.points, points.len());
+            piece.relatives = turned(&piece.relatives, relatives.len());
+        }
+        Self { pieces, points, relatives }
+    }
+
+    /// How many pieces it has: one more than it has breaks.
+    pub fn pieces(&self) -> usize {
+        self.pieces.len()
+    }
+
+    /// How many moments it is known at.
+    pub fn len(&self) -> usize {
+        self.points.len()
+    }
+
+    /// Whether nothing is known of it.
+    pub fn is_empty(&self) -> bool {
+        self.points.is_empty()
+    }
+
+    /// Where the vehicle was at a moment of a clock that had been set back so often.
+    ///
+    /// Errors: what isn't known well enough there.
+    pub fn fix(&self, clock: u32, at: MonoNs) -> Result<Fix, NoFix> {
+        let begun = |piece: &&Piece| {
+            piece.clock == clock && self.points_of(piece).first().is_some_and(|first| first.at <= at)
+        };
+        let piece = self.pieces.iter().rev().find(begun).ok_or(NoFix::Heading)?;
+        let points = self.points_of(piece);
+        // Beyond the last point, on along the last leg.
+        let next = points.partition_point(|point| point.at <= at).min(points.len().saturating_sub(1));
+        let (before, after) = (points.get(next.saturating_sub(1)), points.get(next));
+        let (before, after) = before.zip(after).ok_or(NoFix::Heading)?;
+        let span = after.at.since(before.at);
+        if span.0 > CARRIES.0 || at.since(after.at).0 > EPOCH.0 {
+            return Err(NoFix::Heading);
+        }
+        let share = if span.0 > 0 { at.since(before.at).as_secs_f64() / span.as_secs_f64() } else { 1.0 };
+        let relative = self.relative(piece, at);
+        before.sigmas.standing(relative)?;
+        after.sigmas.standing(relative)?;
+        let pose = between(&before.pose, &after.pose, share);
+        let arm = pose.attitude * -piece.unit_at;
+        let speed_mps = before.speed_mps + (after.speed_mps - before.speed_mps) * share;
+        let pose = Pose { position: pose.position + arm, attitude: pose.attitude };
+        Ok(Fix { pose, speed_mps, relative: relative.moved(arm) })
+    }
+
+    fn points_of(&self, piece: &Piece) -> &[Point] {
+        self.points.get(piece.points.clone()).unwrap_or_default()
+    }
+
+    /// Errors against those when the heads last passed, between moments in proportion.
+    fn relative(&self, piece: &Piece, at: MonoNs) -> Relative {
+        let known = self.relatives.get(piece.relatives.clone()).unwrap_or_default();
+        let next = known.partition_point(|(moment, _)| *moment <= at);
+        match (next.checked_sub(1).and_then(|before| known.get(before)), known.get(next)) {
+            (Some((from, before)), Some((to, after))) => {
+                let share = at.since(*from).as_secs_f64() / to.since(*from).as_secs_f64();
+                before.weighted(1.0 - share, after, share)
+            }
+            (before, after) => before.or(after).map_or_else(Relative::default, |(_, relative)| *relative),
+        }
+    }
+}
+
+/// The pose at a share of the way from one to another, or beyond.
+fn between(from: &Pose, to: &Pose, share: f64) -> Pose {
+    let turn = rotation_vector(to.attitude * from.attitude.inverse());
+    Pose {
+        position: from.position + (to.position - from.position).scaled(share),
+        attitude: rotation(turn.scaled(share)) * from.attitude,
+    }
+}
+
+/// Navigation along a track, whatever the sensors say.
+pub struct TrackNavigation {
+    track: Track,
+    consistency: [Option<Consistency>; MAX_SOURCES],
+    clock: u32,
+    received: MonoNs,
+}
+
+stateful!(TrackNavigation { state: clock, received; slots: consistency; fixed: track; });
+
+impl TrackNavigation {
+    /// Along a track that a filter made, which had found its sources to agree so well.
+    pub fn new(track: Track, consistency: [Option<Consistency>; MAX_SOURCES]) -> Self {
+        Self { track, consistency, clock: 0, received: MonoNs(0) }
+    }
+}
+
+impl Navigation for TrackNavigation {
+    fn update(&mut self, _: usize, _: &SensorInfo, times: Times, _: &Reading) {
+        // As the filter counts it.
+        if self.received.since(times.received) > CLOCK_JUMP {
+            self.clock = self.clock.saturating_add(1);
+            self.received = times.received;
+        }
+        self.received = self.received.max(times.received);
+    }
+
+    fn consistency(&self, source: usize) -> Option<Consistency> {
+        self.consistency.get(source).copied().flatten()
+    }
+
+    fn fix(&self, at: MonoNs) -> Result<Fix, NoFix> {
+        // The first ping after the clock was set back is asked for before it is known to have been.
+        if self.received.since(at) > CLOCK_JUMP {
+            return Err(NoFix::Heading);
+        }
+        self.track.fix(self.clock, at)
+    }
+}

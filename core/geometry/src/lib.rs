@@ -1,0 +1,12 @@
+//! Units, integer time, frames, mathematics, the site, and tunnels: what every other crate counts and measures with.
+//!
+//! Pure: no I/O, no threads, no clock, no randomness. Transcendental functions come from [`math`] alone.
+
+#![cfg_attr(not(test), warn(clippy::cast_possible_truncation))]
+#![cfg_attr(test, allow(clippy::cast_possible_truncation))]
+
+pub mod frames;
+pub mod math;
+pub mod site;
+pub mod time;
+pub mod tunnel;

@@ -1,0 +1,131 @@
+//! Time as integer nanoseconds, in three types that can't be mixed up.
+//!
+//! The loop knows only [`MonoNs`]: the host's monotonic clock, as stamped by the thread that received the bytes,
+//! or as a log or a simulation gives it. UTC appears at the edges alone.
+
+use serde::{Deserialize, Serialize};
+
+use core::ops::{Add, Neg, Sub};
+
+const NS_PER_S: f64 = 1e9;
+
+/// A moment on the host's monotonic clock, in nanoseconds since an arbitrary origin.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize)]
+pub struct MonoNs(pub u64);
+
+/// A moment in UTC, in nanoseconds since 1970-01-01 (negative before). Used at the edges only.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize)]
+pub struct UtcNs(pub i64);
+
+/// A signed span of time in nanoseconds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize)]
+pub struct DurNs(pub i64);
+
+impl DurNs {
+    /// No time at all.
+    pub const ZERO: Self = Self(0);
+
+    /// Whole milliseconds; saturates beyond 292 years.
+    pub const fn from_millis(millis: i64) -> Self {
+        Self(millis.saturating_mul(1_000_000))
+    }
+
+    /// Seconds rounded to the nearest nanosecond; NaN gives zero, and values beyond 292 years saturate.
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "float to integer casts saturate, which is what is wanted"
+    )]
+    pub fn from_secs_f64(seconds: f64) -> Self {
+        Self(libm::rint(seconds * NS_PER_S) as i64)
+    }
+
+    /// This span in seconds. The one place where time becomes a float: at a model's edge.
+    pub fn as_secs_f64(self) -> f64 {
+        self.0 as f64 / NS_PER_S
+    }
+}
+
+impl MonoNs {
+    /// The signed span from `earlier` to `self`; saturates beyond 292 years.
+    pub fn since(self, earlier: Self) -> DurNs {
+        let span = i128::from(self.0) - i128::from(earlier.0);
+        DurNs(i64::try_from(span).unwrap_or(if span < 0 { i64::MIN } else { i64::MAX }))
+    }
+
+    /// This moment in seconds since the clock's origin; for reports, never for differences.
+    pub fn as_secs_f64(self) -> f64 {
+        self.0 as f64 / NS_PER_S
+    }
+}
+
+impl Add<DurNs> for MonoNs {
+    type Output = Self;
+
+    /// Saturates at the clock's origin and at its end.
+    fn add(self, span: DurNs) -> Self {
+        Self(self.0.saturating_add_signed(span.0))
+    }
+}
+
+impl Sub<DurNs> for MonoNs {
+    type Output = Self;
+
+    fn sub(self, span: DurNs) -> Self {
+        self + -span
+    }
+}
+
+impl Neg for DurNs {
+    type Output = Self;
+
+    fn neg(self) -> Self {
+        Self(self.0.saturating_neg())
+    }
+}
+
+impl Add for DurNs {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self(self.0.saturating_add(other.0))
+    }
+}
+
+impl Sub for DurNs {
+    type Output = Self;
+
+    fn sub(self, other: Self) -> Self {
+        Self(self.0.saturating_sub(other.0))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_span_is_signed_and_never_wraps() {
+        assert_eq!(MonoNs(5).since(MonoNs(8)), DurNs(-3));
+        assert_eq!(MonoNs(u64::MAX).since(MonoNs(0)), DurNs(i64::MAX));
+        assert_eq!(MonoNs(0).since(MonoNs(u64::MAX)), DurNs(i64::MIN));
+        assert_eq!(MonoNs(3) - DurNs(8), MonoNs(0));
+        assert_eq!(-DurNs(i64::MIN), DurNs(i64::MAX));
+    }
+
+    #[test]
+    fn seconds_round_to_the_nearest_nanosecond() {
+        assert_eq!(DurNs::from_secs_f64(0.018), DurNs(18_000_000));
+        assert_eq!(DurNs::from_secs_f64(f64::NAN), DurNs::ZERO);
+        assert_eq!(DurNs::from_secs_f64(1e300), DurNs(i64::MAX));
+    }
+
+    #[test]
+    fn ten_hours_of_steps_sum_exactly() {
+        let step = DurNs::from_secs_f64(0.0048);
+        let mut now = MonoNs(0);
+        for _ in 0..7_500_000 {
+            now = now + step;
+        }
+        assert_eq!(now, MonoNs(36_000 * 1_000_000_000));
+    }
+}

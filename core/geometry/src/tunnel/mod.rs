@@ -1,0 +1,6 @@
+//! The tunnel: design profiles with exact ray casting, and the unrolled wall.
+
+mod profile;
+pub mod shapes;
+
+pub use profile::{Nearest, Piece, Profile, ProfileError, WallHit, Yz};

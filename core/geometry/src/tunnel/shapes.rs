@@ -1,0 +1,77 @@
+//! Profiles by their dimensions: rectangle, circle, arch, trimmed circle, and the paper's tunnel.
+
+use super::profile::{Piece, Profile, ProfileError};
+use crate::math::{self, PI, TAU};
+
+/// Base of the Ceran tunnel, m (the paper's §7.3).
+const CERAN_BASE_M: f64 = 10.4;
+/// Radius of the Ceran tunnel's trimmed circle, m (the paper's §7.3).
+const CERAN_RADIUS_M: f64 = 6.05;
+/// Perimeter on the plant's blueprint, m (the paper's §9.2), which the dimensions above don't give (35.90 m).
+const CERAN_BLUEPRINT_PERIMETER_M: f64 = 34.17;
+
+/// A rectangle, its reference point in the middle.
+///
+/// Errors: dimensions that make no profile.
+pub fn rectangle(width_m: f64, height_m: f64) -> Result<Profile, ProfileError> {
+    let half = width_m / 2.0;
+    let corners = [[half, 0.0], [half, height_m], [-half, height_m], [-half, 0.0]];
+    Profile::new([0.0, 0.0], &corners.map(Piece::LineTo), [0.0, height_m / 2.0])
+}
+
+/// A circle, its reference point in the middle.
+///
+/// Errors: dimensions that make no profile.
+pub fn circle(radius_m: f64) -> Result<Profile, ProfileError> {
+    let centre = [0.0, radius_m];
+    Profile::new([0.0, 0.0], &[Piece::Arc { centre, sweep_rad: TAU }], centre)
+}
+
+/// The paper's Fig. 2: upright walls under an arc of radius `arch_radius_m` >= width / 2; `height_m` is that of the
+/// crown. The reference point is half way up.
+///
+/// Errors: dimensions that make no profile.
+pub fn arch(width_m: f64, height_m: f64, arch_radius_m: f64) -> Result<Profile, ProfileError> {
+    let half = width_m / 2.0;
+    let centre = [0.0, height_m - arch_radius_m];
+    let spring_m = centre[1] + math::sqrt(arch_radius_m * arch_radius_m - half * half);
+    let sweep_rad = 2.0 * math::asin(half / arch_radius_m);
+    let pieces = [
+        Piece::LineTo([half, 0.0]),
+        Piece::LineTo([half, spring_m]),
+        Piece::Arc { centre, sweep_rad },
+        Piece::LineTo([-half, 0.0]),
+    ];
+    Profile::new([0.0, 0.0], &pieces, [0.0, height_m / 2.0])
+}
+
+/// A circle with its lower part cut off by a flat floor of width `base_m`; the reference point is the circle's centre,
+/// which is above the floor.
+///
+/// Errors: dimensions that make no profile.
+pub fn trimmed_circle(radius_m: f64, base_m: f64) -> Result<Profile, ProfileError> {
+    let half = base_m / 2.0;
+    let centre_m = math::sqrt(radius_m * radius_m - half * half);
+    let sweep_rad = PI + 2.0 * math::asin(centre_m / radius_m);
+    let centre = [0.0, centre_m];
+    let pieces = [Piece::LineTo([half, 0.0]), Piece::Arc { centre, sweep_rad }, Piece::LineTo([0.0, 0.0])];
+    Profile::new([0.0, 0.0], &pieces, centre)
+}
+
+/// The tunnel of the paper with its stated dimensions: perimeter 35.90 m.
+///
+/// Errors: none that can occur.
+pub fn ceran() -> Result<Profile, ProfileError> {
+    trimmed_circle(CERAN_RADIUS_M, CERAN_BASE_M)
+}
+
+/// The same shape, scaled to the perimeter of the blueprint, 34.17 m.
+///
+/// Errors: none that can occur.
+pub fn ceran_blueprint() -> Result<Profile, ProfileError> {
+    let scale = CERAN_BLUEPRINT_PERIMETER_M / ceran()?.perimeter_m();
+    trimmed_circle(CERAN_RADIUS_M * scale, CERAN_BASE_M * scale)
+}
+
+#[cfg(test)]
+mod tests;

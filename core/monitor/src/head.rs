@@ -1,0 +1,190 @@
+//! How a head turns, measured from its returns.
+
+use bevy_ecs::prelude::Component;
+use serde::{Deserialize, Serialize};
+
+use headrace_geometry::math::{self, TAU};
+use headrace_geometry::time::{DurNs, MonoNs};
+
+/// Angles closer together than this are equal, radians: well under the finest head's step (0.3 degrees).
+const SAME_ANGLE_RAD: f64 = 1e-6;
+/// The turn rate is measured over at least this angle, radians, once there has been so much.
+const RATE_SPAN_RAD: f64 = TAU / 2.0;
+/// A step this many times as long as the usual one passed over something.
+const LONG_STEP: f64 = 1.5;
+
+/// After standing still or being silent for so long, the turn rate is measured anew.
+const STANDING: DurNs = DurNs(1_000_000_000);
+
+/// What a ping says of its place in the head's motion.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Turned {
+    /// The head has come here from the ping before in one step.
+    pub single_step: bool,
+    /// The head has turned round, or its motion isn't known: a new sweep begins.
+    pub new_sweep: bool,
+    /// The head has stood still for longer than it ever does between two pings.
+    pub standing: bool,
+}
+
+/// The motion of one head as measured: state of the loop.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Component, Serialize, Deserialize)]
+pub struct HeadTrack {
+    last: Option<(MonoNs, f64)>,
+    /// Signed angle of the last step, radians.
+    last_step_rad: f64,
+    /// Angle turned through since the last turning point or start, radians, without sign.
+    since_turning_rad: f64,
+    /// Size of the last whole sweep between two turning points.
+    sector_rad: Option<f64>,
+    /// Whether the present sweep began at a turning point.
+    from_turning_point: bool,
+    /// All the angle ever turned through, and the moments from which the rate is measured.
+    turned_rad: f64,
+    anchors: [Option<(MonoNs, f64)>; 2],
+    step_rad: Option<f64>,
+}
+
+impl HeadTrack {
+    /// When and where the head last pinged.
+    pub fn last(&self) -> Option<(MonoNs, f64)> {
+        self.last
+    }
+
+    /// Angle between pings, radians; `None` until two steps have agreed.
+    pub fn step_rad(&self) -> Option<f64> {
+        self.step_rad
+    }
+
+    /// Turn rate with its sign, rad/s; `None` until it has turned a little.
+    pub fn rate_radps(&self) -> Option<f64> {
+        let (now, _) = self.last?;
+        let (then, turned_then) = self.anchors.iter().flatten().next()?;
+        let turned = self.turned_rad - turned_then;
+        let span_s = now.since(*then).as_secs_f64();
+        let enough = self.step_rad.is_some_and(|step| turned >= 4.0 * step);
+        (enough && span_s > 0.0).then(|| turned / span_s * self.last_step_rad.signum())
+    }
+
+    /// Size of the sector, radians, once it has turned round twice; forgotten when it turns on.
+    pub fn sector_rad(&self) -> Option<f64> {
+        self.sector_rad
+    }
+
+    /// Takes a ping at `angle_rad` into account.
+    pub fn ping(&mut self, at: MonoNs, angle_rad: f64) -> Turned {
+        let Some((last, before)) = self.last else {
+            self.last = Some((at, angle_rad));
+            self.anchors = [Some((at, 0.0)), None];
+            return Turned { single_step: false, new_sweep: true, standing: false };
+        };
+        let step = math::wrap_signed(angle_rad - before, TAU);
+        let size = step.abs();
+        if size < SAME_ANGLE_RAD {
+            // A head that stands still has not turned: `last` grows old, and the rate stays what it was.
+            let standing = at.since(last).as_secs_f64() > self.stands_after_s();
+            return Turned { single_step: false, new_sweep: false, standing };
+        }
+        self.last = Some((at, angle_rad));
+        if at.since(last).0.abs() > STANDING.0 {
+            self.anchors = [Some((at, self.turned_rad + size)), None];
+        }
+        let reversed = step * self.last_step_rad < 0.0;
+        if reversed {
+            self.sector_rad = self.from_turning_point.then_some(self.since_turning_rad);
+            self.since_turning_rad = 0.0;
+            self.from_turning_point = true;
+        }
+        if (size - self.last_step_rad.abs()).abs() < SAME_ANGLE_RAD {
+            self.step_rad = Some(size);
+        }
+        self.last_step_rad = step;
+        self.since_turning_rad += size;
+        if self.since_turning_rad > TAU + size / 2.0 {
+            self.sector_rad = None;
+            self.from_turning_point = false;
+        }
+        self.turned_rad += size;
+        self.move_anchors(at);
+        let usual = self.step_rad.unwrap_or(size);
+        let single_step = !reversed && size < LONG_STEP * usual;
+        Turned { single_step, new_sweep: reversed, standing: false }
+    }
+
+    /// How long the same angle is no standing still yet, seconds: four pings.
+    fn stands_after_s(&self) -> f64 {
+        let ping_period_s = self.step_rad.zip(self.rate_radps()).map(|(step, rate)| step / rate.abs());
+        ping_period_s.map_or(STANDING.as_secs_f64(), |period_s| 4.0 * period_s)
+    }
+
+    /// Keeps two anchors half a turn apart, so that the older is always between a half and a whole turn back.
+    fn move_anchors(&mut self, at: MonoNs) {
+        match self.anchors {
+            [Some((_, older)), None] if self.turned_rad - older >= RATE_SPAN_RAD => {
+                self.anchors[1] = Some((at, self.turned_rad));
+            }
+            [Some(_), Some((when, newer))] if self.turned_rad - newer >= RATE_SPAN_RAD => {
+                self.anchors = [Some((when, newer)), Some((at, self.turned_rad))];
+            }
+            _ => {}
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn run(angles_deg: impl Iterator<Item = f64>) -> (HeadTrack, Vec<Turned>) {
+        let mut track = HeadTrack::default();
+        let turned = (0..)
+            .zip(angles_deg)
+            .map(|(k, angle)| track.ping(MonoNs(k * 20_000_000), angle.to_radians()))
+            .collect();
+        (track, turned)
+    }
+
+    #[test]
+    fn a_turning_head_has_its_rate_step_and_no_sector() {
+        let (track, turned) = run((0..1000).map(|k| f64::from(k) * 0.9 - 170.0));
+        assert!((track.rate_radps().unwrap() - f64::to_radians(45.0)).abs() < 1e-9);
+        assert!((track.step_rad().unwrap() - f64::to_radians(0.9)).abs() < 1e-9);
+        assert_eq!(track.sector_rad(), None);
+        assert!(turned.iter().skip(1).all(|t| t.single_step && !t.new_sweep));
+    }
+
+    #[test]
+    fn a_head_in_a_sector_turns_round_at_its_ends() {
+        let (track, turned) = run((0..500).map(|k| {
+            let phase = f64::from(k % 200);
+            if phase <= 100.0 { phase * 0.9 } else { (200.0 - phase) * 0.9 }
+        }));
+        assert!((track.sector_rad().unwrap() - f64::to_radians(90.0)).abs() < 1e-9);
+        let rounds: Vec<_> = (0..500).filter(|k| turned[*k].new_sweep).collect();
+        assert_eq!(rounds, [0, 101, 201, 301, 401]);
+    }
+
+    #[test]
+    fn a_stalled_head_grows_old_and_starts_with_a_fresh_rate() {
+        let mut track = HeadTrack::default();
+        for k in 0..100 {
+            track.ping(MonoNs(k * 20_000_000), f64::to_radians(0.9 * k as f64));
+        }
+        for k in 100..500 {
+            track.ping(MonoNs(k * 20_000_000), f64::to_radians(0.9 * 99.0));
+        }
+        assert_eq!(track.last().unwrap().0, MonoNs(99 * 20_000_000));
+        assert!((track.rate_radps().unwrap() - f64::to_radians(45.0)).abs() < 1e-9);
+        for k in 500..510 {
+            track.ping(MonoNs(k * 20_000_000), f64::to_radians(0.9 * (k - 400) as f64));
+        }
+        assert!((track.rate_radps().unwrap() - f64::to_radians(45.0)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_step_over_missing_pings_is_not_a_single_one() {
+        let (track, turned) = run([0.0, 0.9, 1.8, 2.7, 4.5, 5.4].into_iter());
+        assert!(!turned[4].single_step && turned[5].single_step);
+        assert!((track.step_rad().unwrap() - f64::to_radians(0.9)).abs() < 1e-9);
+    }
+}

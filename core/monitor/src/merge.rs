@@ -1,0 +1,167 @@
+//! From the sources' rings to one total order of packets.
+
+use bevy_ecs::prelude::Resource;
+
+use super::ring::{PacketHeader, PortReader};
+use headrace_geometry::time::MonoNs;
+use headrace_sensor::reading::{MAX_SOURCES, Packet, SourceId};
+
+/// The most packets that one tick takes; what comes beyond is taken by the next.
+pub const MAX_TICK_PACKETS: usize = 4096;
+/// The most bytes that one tick takes.
+pub const MAX_TICK_BYTES: usize = 256 * 1024;
+
+/// The packets of this tick, in the order in which they are consumed.
+#[derive(Debug, Resource)]
+pub struct Inbox {
+    packets: Vec<Received>,
+    bytes: Vec<u8>,
+    /// What waits first in each source's ring.
+    heads: Vec<Option<PacketHeader>>,
+    /// Bytes that the next tick may take: an outlet that must not lose any lowers it while it is behind.
+    pub allowance_bytes: usize,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Received {
+    source: SourceId,
+    received: MonoNs,
+    from: usize,
+    to: usize,
+}
+
+impl Default for Inbox {
+    fn default() -> Self {
+        Self {
+            packets: Vec::with_capacity(MAX_TICK_PACKETS),
+            bytes: Vec::with_capacity(MAX_TICK_BYTES),
+            heads: Vec::with_capacity(MAX_SOURCES),
+            allowance_bytes: MAX_TICK_BYTES,
+        }
+    }
+}
+
+impl Inbox {
+    /// The packets, in order.
+    pub fn iter(&self) -> impl Iterator<Item = (SourceId, Packet<'_>)> {
+        self.packets.iter().map(|packet| {
+            let bytes = self.bytes.get(packet.from..packet.to).unwrap_or_default();
+            (packet.source, Packet { received: packet.received, bytes })
+        })
+    }
+
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        self.packets.len()
+    }
+
+    /// Whether nothing has come.
+    pub fn is_empty(&self) -> bool {
+        self.packets.is_empty()
+    }
+
+    /// Takes what has come, least (recorded order, receive time, source, sequence) first.
+    ///
+    /// Within one source packets stay as they came, whatever their stamps say. Allocates: never.
+    pub(super) fn fill(&mut self, readers: &mut [PortReader]) {
+        self.packets.clear();
+        self.bytes.clear();
+        self.heads.clear();
+        // A ring is looked at again only once its first packet has been taken.
+        self.heads.extend(readers.iter().map(PortReader::peek));
+        let limit = self.allowance_bytes.min(MAX_TICK_BYTES);
+        while self.packets.len() < MAX_TICK_PACKETS {
+            let Some((source, header)) = first(&self.heads) else { return };
+            let from = self.bytes.len();
+            let to = from + header.len;
+            if to > limit {
+                return;
+            }
+            self.bytes.resize(to, 0);
+            let number = usize::from(source);
+            if let (Some(reader), Some(head), Some(into)) =
+                (readers.get_mut(number), self.heads.get_mut(number), self.bytes.get_mut(from..to))
+            {
+                reader.take(into);
+                *head = reader.peek();
+            }
+            self.packets.push(Received { source: SourceId(source), received: header.received, from, to });
+        }
+    }
+}
+
+/// The source whose next packet comes first.
+fn first(heads: &[Option<PacketHeader>]) -> Option<(u16, PacketHeader)> {
+    (0_u16..)
+        .zip(heads)
+        .filter_map(|(source, head)| head.map(|header| (source, header)))
+        .min_by_key(|(source, header)| (header.order, header.received, *source))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::ring::{Port, ring};
+    use super::*;
+    use proptest::prelude::*;
+
+    fn ports(count: usize) -> (Vec<Port>, Vec<PortReader>) {
+        (0..count).map(|_| ring(1 << 16)).unzip()
+    }
+
+    fn drain(inbox: &mut Inbox, readers: &mut [PortReader]) -> Vec<(u16, u64, Vec<u8>)> {
+        inbox.fill(readers);
+        inbox.iter().map(|(s, p)| (s.0, p.received.0, p.bytes.to_vec())).collect()
+    }
+
+    proptest! {
+        /// However a stream is cut into ticks at moments of its own time, the order is the same.
+        #[test]
+        fn order_does_not_depend_on_the_ticks(
+            packets in proptest::collection::vec((0u64..200, 0u16..4), 1..80),
+            tick in 1u64..60,
+        ) {
+            let mut packets: Vec<_> =
+                packets.iter().enumerate().map(|(i, (t, s))| (*t, *s, vec![i as u8])).collect();
+            packets.sort_by_key(|p| p.0);
+            let expected = {
+                let mut sorted: Vec<_> = packets.iter().map(|(t, s, b)| (*s, *t, b.clone())).collect();
+                sorted.sort_by_key(|(s, t, _)| (*t, *s));
+                sorted
+            };
+            let (mut to, mut readers) = ports(4);
+            let mut inbox = Inbox::default();
+            let mut got = Vec::new();
+            let mut next = packets.iter().peekable();
+            let mut until = 0;
+            while next.peek().is_some() {
+                until += tick;
+                while let Some((t, s, b)) = next.next_if(|p| p.0 < until) {
+                    to[usize::from(*s)].send(MonoNs(*t), b).unwrap();
+                }
+                got.extend(drain(&mut inbox, &mut readers));
+            }
+            prop_assert_eq!(got, expected);
+        }
+    }
+
+    #[test]
+    fn a_recorded_order_is_kept_against_the_stamps() {
+        let (mut to, mut readers) = ports(2);
+        to[0].send_in_order(MonoNs(5), 1, &[1]).unwrap();
+        to[1].send_in_order(MonoNs(9), 0, &[2]).unwrap();
+        let order: Vec<_> = drain(&mut Inbox::default(), &mut readers).iter().map(|p| p.0).collect();
+        assert_eq!(order, [1, 0]);
+    }
+
+    #[test]
+    fn an_outlet_that_is_behind_holds_packets_back_and_loses_none() {
+        let (mut to, mut readers) = ports(1);
+        for i in 0..10 {
+            to[0].send(MonoNs(i), &[i as u8; 10]).unwrap();
+        }
+        let mut inbox = Inbox { allowance_bytes: 35, ..Inbox::default() };
+        assert_eq!(drain(&mut inbox, &mut readers).len(), 3);
+        inbox.allowance_bytes = MAX_TICK_BYTES;
+        assert_eq!(drain(&mut inbox, &mut readers).len(), 7);
+    }
+}

@@ -1,0 +1,72 @@
+//! Advice in the report.
+
+use serde::Serialize;
+
+use crate::flow::AdviceEntry;
+use headrace_sampling::advice::{Alternative, Left};
+
+/// Advice at a moment.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct AdviceReport {
+    /// Seconds on the log's clock.
+    pub at_s: f64,
+    /// Chainage, m.
+    pub chainage_m: Option<f64>,
+    /// Speed, m/s.
+    pub speed_mps: f64,
+    /// Largest speed that meets the target, m/s.
+    pub v_max_mps: f64,
+    /// Why.
+    pub reason: &'static str,
+    /// T predicted at the present speed, m.
+    pub predicted_t_m: Option<f64>,
+    /// At the present speed the present turn will exceed the target.
+    pub will_exceed: bool,
+    /// By how much the head farthest out of its phase is, degrees of its turn.
+    pub phase_error_deg: Option<f64>,
+    /// Hours at `v_max_mps` for what is left of the tunnel.
+    pub needed_h: Option<f64>,
+    /// Whether the time that is left is enough.
+    pub suffices: Option<bool>,
+    /// What would help where slower doesn't: `centre`, `steady`, or a mode.
+    pub remedy: Option<String>,
+    /// What the heads could do in each of their modes.
+    pub alternatives: Vec<AlternativeReport>,
+}
+
+/// What the heads could do in one of their modes.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct AlternativeReport {
+    /// The mode.
+    pub mode: String,
+    /// Largest speed that meets the target, m/s.
+    pub v_max_mps: f64,
+    /// Hours at that speed for what is left of the tunnel.
+    pub needed_h: Option<f64>,
+    /// Whether the time that is left is enough.
+    pub suffices: Option<bool>,
+}
+
+pub(super) fn advice_report(entry: &AdviceEntry) -> AdviceReport {
+    let (left, others) = (entry.advice.left, entry.advice.alternatives.iter().flatten());
+    AdviceReport {
+        at_s: entry.at.as_secs_f64(),
+        chainage_m: entry.chainage_m,
+        speed_mps: entry.speed_mps,
+        v_max_mps: entry.advice.v_max_mps,
+        reason: entry.advice.reason.as_str(),
+        predicted_t_m: entry.advice.predicted_t_m,
+        will_exceed: entry.advice.will_exceed,
+        phase_error_deg: entry.advice.phase_error_rad.map(f64::to_degrees),
+        needed_h: left.hours_at(entry.advice.v_max_mps),
+        suffices: left.suffices_at(entry.advice.v_max_mps),
+        remedy: entry.advice.remedy.map(|remedy| remedy.as_str().to_owned()),
+        alternatives: others.map(|other| alternative_report(other, &left)).collect(),
+    }
+}
+
+fn alternative_report(other: &Alternative, left: &Left) -> AlternativeReport {
+    let Alternative { mode, v_max_mps } = *other;
+    let (needed_h, suffices) = (left.hours_at(v_max_mps), left.suffices_at(v_max_mps));
+    AlternativeReport { mode: mode.as_str().to_owned(), v_max_mps, needed_h, suffices }
+}

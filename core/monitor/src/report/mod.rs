@@ -1,0 +1,349 @@
+//! The report: what a dive has shown, as plain values with units in their names. Its JSON is versioned; docs/ has the
+//! schema.
+
+use serde::Serialize;
+
+use super::alerts::{Alert, Alerts};
+use super::flow::{AdviceLog, Coverage, SourceTallies, Tally};
+use super::run::Loop;
+use super::smoothing::SmoothingReport;
+use super::stages::WaterSound;
+use super::what_if::WhatIfReport;
+use headrace_coverage::openings::Opening;
+use headrace_coverage::{Section, Spread, Verdict};
+use headrace_geometry::time::MonoNs;
+
+mod advice;
+mod runs;
+mod sections;
+mod sources;
+mod survey;
+
+pub use advice::{AdviceReport, AlternativeReport};
+pub use runs::{ReturnReport, RunReport};
+pub use sections::{DeviationReport, SectionReport};
+pub use sources::{DeviceClockReport, LineReport, NavigationReport, SourceReport};
+pub use survey::{HolidayReport, NodeRowReport, SurveyReport};
+
+/// Version of the report's form.
+pub const REPORT_VERSION: u32 = 2;
+
+/// A whole report. Field names are the contract.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Report {
+    /// Version of this form.
+    pub report_version: u32,
+    /// The log, where the dive was read from or written to one.
+    pub log: Option<LogReport>,
+    /// Digest of all results, 16 hexadecimal digits.
+    pub digest: String,
+    /// Target T, m.
+    pub target_m: f64,
+    /// Length of a section, m.
+    pub section_m: f64,
+    /// The dive as a whole.
+    pub dive: DiveReport,
+    /// Metres by verdict, and the spacings over all sections.
+    pub summary: SummaryReport,
+    /// Every section passed, in the order of chainage.
+    pub sections: Vec<SectionReport>,
+    /// Neighbouring flagged sections of one cause, by the number that each has had since its first flag.
+    pub runs: Vec<RunReport>,
+    /// What to pass again on the way home, from the far end to the portal.
+    pub way_home: Vec<ReturnReport>,
+    /// Samples by node of a square grid, as surveyors' specifications are written.
+    pub survey: SurveyReport,
+    /// Metres by verdict for the targets and lengths of section that were asked for besides.
+    pub what_if: Vec<WhatIfReport>,
+    /// Declared openings of the wall, which no verdict speaks of.
+    pub openings: Vec<OpeningReport>,
+    /// What was wrong with the dive as a whole.
+    pub alerts: Vec<AlertReport>,
+    /// The advice over time.
+    pub advice: Vec<AdviceReport>,
+    /// Advice left out for want of room.
+    pub advice_dropped: u64,
+    /// What each source has sent.
+    pub sources: Vec<SourceReport>,
+    /// What smoothing has changed; `None` where nothing was smoothed.
+    pub smoothing: Option<SmoothingReport>,
+}
+
+/// The log that a dive was read from or written to.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct LogReport {
+    /// Its path as given.
+    pub path: String,
+    /// Its SHA-256, hexadecimal; of parts, that of their bytes one after the other.
+    pub sha256: String,
+    /// Messages of sources.
+    pub messages: u64,
+    /// What was lost, in words, each with its time span.
+    pub losses: Vec<String>,
+    /// What was odd and what was done about it, in words; nothing was lost by it.
+    pub notes: Vec<String>,
+    /// Its files in their order, where it is a recording in parts.
+    pub parts: Vec<PartReport>,
+}
+
+/// A part of a recording.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct PartReport {
+    /// Its path.
+    pub path: String,
+    /// Its SHA-256, hexadecimal.
+    pub sha256: String,
+    /// Messages of sources.
+    pub messages: u64,
+}
+
+/// The dive as a whole.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DiveReport {
+    /// First to last packet, seconds.
+    pub duration_s: f64,
+    /// First packet on the log's clock, seconds.
+    pub start_s: f64,
+    /// Least chainage that any head's reach covered, m.
+    pub from_m: Option<f64>,
+    /// Greatest, m.
+    pub to_m: Option<f64>,
+    /// Between them, m.
+    pub distance_m: f64,
+    /// Whether any ping of a profiling head came; without, there is no coverage to speak of.
+    pub sonar: bool,
+    /// The least speed of sound by which ranges were reckoned, m/s.
+    pub sound_speed_least_mps: f64,
+    /// The greatest, m/s.
+    pub sound_speed_most_mps: f64,
+    /// Samples on the wall.
+    pub samples_valid: u64,
+    /// Of these, samples that others stand for, since their surroundings are full.
+    pub samples_thinned: u64,
+    /// Pings that gave none, by reason.
+    pub samples_rejected: RejectedReport,
+}
+
+/// Pings that gave no sample.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct RejectedReport {
+    /// No return though the wall was within range.
+    pub missing: u64,
+    /// No return, the wall out of range.
+    pub out_of_range: u64,
+    /// Stopped by the vehicle itself.
+    pub occluded: u64,
+    /// A return without a fix.
+    pub no_fix: u64,
+    /// Beyond the ends of the tunnel.
+    pub outside: u64,
+    /// No room.
+    pub not_stored: u64,
+}
+
+/// Count, mean, deviation and extremes; `None` where there is no value.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct SpreadReport {
+    /// Values.
+    pub count: u32,
+    /// Smallest, m.
+    pub min_m: Option<f64>,
+    /// Mean, m.
+    pub mean_m: Option<f64>,
+    /// Largest, m.
+    pub max_m: Option<f64>,
+    /// Standard deviation, m.
+    pub sd_m: Option<f64>,
+}
+
+/// Metres by verdict, and spacings.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SummaryReport {
+    /// Metres of sections that passed.
+    pub pass_m: f64,
+    /// That failed.
+    pub fail_m: f64,
+    /// Of which nothing can be said for sure.
+    pub cannot_say_m: f64,
+    /// That are still open.
+    pub open_m: f64,
+    /// Fails that were flagged, and flags that a later pass cleared.
+    pub flags_raised: u32,
+    /// See `flags_raised`.
+    pub flags_cleared: u32,
+    /// Distance between passes.
+    pub t_x: SpreadReport,
+    /// Distance between neighbours of one sweep.
+    pub t_y: SpreadReport,
+    /// Lattice diagonal.
+    pub t: SpreadReport,
+    /// Holes of the sections.
+    pub hole: SpreadReport,
+}
+
+/// A declared opening of the wall.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct OpeningReport {
+    /// What people call it.
+    pub name: String,
+    /// Where it begins, m.
+    pub from_m: f64,
+    /// Where it ends, m.
+    pub to_m: f64,
+    /// Arc length at which it begins, m; `None` for all round.
+    pub sigma_m: Option<f64>,
+    /// Its length along the perimeter, m; `None` for all round.
+    pub arc_m: Option<f64>,
+}
+
+/// Something that was wrong with the dive as a whole.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct AlertReport {
+    /// `outside_tunnel` or `profile_contradicted`.
+    pub kind: &'static str,
+    /// When it was first seen, seconds on the log's clock.
+    pub since_s: f64,
+    /// How often: samples, or judgements of sections.
+    pub count: u64,
+    /// Chainage at which it was first seen, m.
+    pub x_m: f64,
+    /// How far off at worst, m: beyond the end of the tunnel, or a section's mean from the design profile.
+    pub worst_m: f64,
+}
+
+impl Report {
+    /// The report of what a loop has seen so far.
+    pub fn of(dive: &Loop) -> Self {
+        let world = dive.world();
+        let (coverage, tally) = (world.resource::<Coverage>(), *world.resource::<Tally>());
+        let log = world.resource::<AdviceLog>();
+        let sections = &coverage.sections;
+        let passed =
+            || sections.passed(coverage.frontier.swept()).filter_map(|k| Some((k, sections.get(k)?)));
+        Self {
+            report_version: REPORT_VERSION,
+            log: None,
+            digest: format!("{:016x}", dive.digest()),
+            target_m: sections.target_m(),
+            section_m: sections.section_m(),
+            dive: dive_report(coverage, &tally, dive.world().resource::<WaterSound>().span_mps()),
+            summary: summarise(sections.section_m(), passed().map(|(_, section)| section)),
+            sections: passed()
+                .map(|(k, section)| sections::section_report(sections, k, section, dive))
+                .collect(),
+            runs: runs::run_reports(sections, &dive.mission().profile),
+            way_home: runs::way_home(sections, log),
+            survey: survey::survey(coverage, &dive.mission().profile),
+            what_if: Vec::new(),
+            openings: dive.mission().coverage.openings.iter().map(opening_report).collect(),
+            alerts: world.resource::<Alerts>().iter().map(alert_report).collect(),
+            advice: log.entries.iter().map(advice::advice_report).collect(),
+            advice_dropped: log.dropped,
+            sources: sources::source_reports(dive, world.resource::<SourceTallies>()),
+            smoothing: None,
+        }
+    }
+
+    /// Whether anything that was received has been lost on the way to the results.
+    pub fn lost_data(&self) -> bool {
+        let rejected = &self.dive.samples_rejected;
+        let dropped =
+            self.sources.iter().flat_map(|source| &source.line).any(|line| line.dropped_packets > 0);
+        rejected.not_stored > 0 || dropped || self.log.as_ref().is_some_and(|log| !log.losses.is_empty())
+    }
+}
+
+fn dive_report(coverage: &Coverage, tally: &Tally, sound_mps: [f64; 2]) -> DiveReport {
+    let [sound_speed_least_mps, sound_speed_most_mps] = sound_mps;
+    let swept = coverage.frontier.swept();
+    let (first, last) = tally.span.unwrap_or((MonoNs(0), MonoNs(0)));
+    DiveReport {
+        duration_s: last.since(first).as_secs_f64(),
+        start_s: first.as_secs_f64(),
+        from_m: swept.map(|reach| reach.from_m),
+        to_m: swept.map(|reach| reach.to_m),
+        distance_m: swept.map_or(0.0, |reach| reach.to_m - reach.from_m),
+        sonar: tally.samples + tally.missing + tally.out_of_range + tally.occluded + tally.unplaced > 0,
+        sound_speed_least_mps,
+        sound_speed_most_mps,
+        samples_valid: tally.samples - tally.outside - tally.not_stored,
+        samples_thinned: coverage.store.usage().thinned,
+        samples_rejected: RejectedReport {
+            missing: tally.missing,
+            out_of_range: tally.out_of_range,
+            occluded: tally.occluded,
+            no_fix: tally.unplaced,
+            outside: tally.outside,
+            not_stored: tally.not_stored,
+        },
+    }
+}
+
+fn summarise<'a>(section_m: f64, sections: impl Iterator<Item = &'a Section>) -> SummaryReport {
+    let (mut t_x, mut t_y, mut t, mut hole) =
+        (Spread::default(), Spread::default(), Spread::default(), Spread::default());
+    let (mut counts, mut raised, mut cleared) = ([0_u32; 4], 0, 0);
+    for section in sections {
+        t_x.merge(&section.t_x_m);
+        t_y.merge(&section.t_y_m);
+        t.merge(&section.t_m);
+        if let Some(found) = section.hole {
+            hole.add(found.diameter_m);
+        }
+        let place = match section.verdict {
+            Verdict::Pass => 0,
+            Verdict::Fail => 1,
+            Verdict::CannotSay => 2,
+            Verdict::Open => 3,
+        };
+        if let Some(count) = counts.get_mut(place) {
+            *count += 1;
+        }
+        raised += u32::from(section.flagged.is_some());
+        cleared += u32::from(section.cleared.is_some());
+    }
+    let [pass_m, fail_m, cannot_say_m, open_m] = counts.map(|count| f64::from(count) * section_m);
+    SummaryReport {
+        pass_m,
+        fail_m,
+        cannot_say_m,
+        open_m,
+        flags_raised: raised,
+        flags_cleared: cleared,
+        t_x: spread_report(&t_x),
+        t_y: spread_report(&t_y),
+        t: spread_report(&t),
+        hole: spread_report(&hole),
+    }
+}
+
+fn opening_report(opening: &Opening) -> OpeningReport {
+    OpeningReport {
+        name: opening.name.clone(),
+        from_m: opening.from_m,
+        to_m: opening.to_m,
+        sigma_m: opening.arc_m.map(|(from_m, _)| from_m),
+        arc_m: opening.arc_m.map(|(_, length_m)| length_m),
+    }
+}
+
+fn alert_report(alert: &Alert) -> AlertReport {
+    AlertReport {
+        kind: alert.kind.as_str(),
+        since_s: alert.since.as_secs_f64(),
+        count: alert.count,
+        x_m: alert.x_m,
+        worst_m: alert.worst_m,
+    }
+}
+
+fn spread_report(spread: &Spread) -> SpreadReport {
+    let known = |value: f64| (spread.count > 0).then_some(value);
+    SpreadReport {
+        count: spread.count,
+        min_m: known(spread.min),
+        mean_m: spread.mean(),
+        max_m: known(spread.max),
+        sd_m: spread.sd(),
+    }
+}

@@ -1,0 +1,103 @@
+//! Runs of flagged sections in the report, and what to pass again.
+
+use serde::Serialize;
+
+use crate::flow::{AdviceEntry, AdviceLog};
+use headrace_coverage::{Action, Run, RunId, Runs, Sections};
+use headrace_geometry::time::MonoNs;
+use headrace_geometry::tunnel::Profile;
+
+/// Neighbouring flagged sections with one cause.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RunReport {
+    /// Its number, which stays.
+    pub id: u32,
+    /// One of the causes of metrics.md.
+    pub cause: &'static str,
+    /// Where it begins, m.
+    pub start_m: f64,
+    /// Where it ends, m.
+    pub end_m: f64,
+    /// Metres of it that fail.
+    pub failed_m: f64,
+    /// Its largest hole, m; the last one before it was cleared.
+    pub hole_m: f64,
+    /// Chainage of that hole's centre, m.
+    pub hole_x_m: f64,
+    /// The same on a clock seen along the tunnel.
+    pub hole_clock: String,
+    /// When its first flag was raised, seconds on the log's clock.
+    pub raised_s: f64,
+    /// When nothing of it failed any more.
+    pub cleared_s: Option<f64>,
+    /// The run that it has become part of.
+    pub merged_into: Option<u32>,
+}
+
+/// A stretch to pass again.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ReturnReport {
+    /// The run that it is for.
+    pub run: u32,
+    /// Where it ends, farther in, m.
+    pub from_m: f64,
+    /// Where it begins, m.
+    pub to_m: f64,
+    /// What must be other than it was: `slower`, `finer_mode`, `longer_range`, `other_side`, `middle`, `in_phase`, `head`,
+    /// `position`, or `again`.
+    pub action: &'static str,
+    /// At most so fast, m/s; zero where no speed would do as the heads were.
+    pub at_most_mps: f64,
+    /// Seconds at that speed.
+    pub takes_s: Option<f64>,
+}
+
+pub(super) fn run_reports(sections: &Sections, profile: &Profile) -> Vec<RunReport> {
+    let bounds = |run: &Run| (sections.bounds_m(run.from).0, sections.bounds_m(run.to - 1).1);
+    (0..)
+        .zip(sections.runs().all())
+        .map(|(id, run)| {
+            let ((start_m, end_m), (_, hole)) = (bounds(run), run.worst);
+            RunReport {
+                id,
+                cause: run.cause.as_str(),
+                start_m,
+                end_m,
+                failed_m: f64::from(run.failed) * sections.section_m(),
+                hole_m: hole.diameter_m,
+                hole_x_m: hole.x_m,
+                hole_clock: profile.clock(hole.sigma_m),
+                raised_s: run.raised.as_secs_f64(),
+                cleared_s: run.cleared.map(MonoNs::as_secs_f64),
+                merged_into: run.merged_into.map(|id| id.0),
+            }
+        })
+        .collect()
+}
+
+/// How near a run advice counts for it, m.
+const NEAR_M: f64 = 1.0;
+
+/// What still fails, from the far end to the portal.
+pub(super) fn way_home(sections: &Sections, log: &AdviceLog) -> Vec<ReturnReport> {
+    let runs: &Runs = sections.runs();
+    let open = (0..).map(RunId).zip(runs.all()).filter(|(_, run)| run.is_open());
+    let mut stops: Vec<ReturnReport> = open.map(|(id, run)| stop(sections, log, id, run)).collect();
+    stops.sort_by(|a, b| b.from_m.total_cmp(&a.from_m));
+    stops
+}
+
+fn stop(sections: &Sections, log: &AdviceLog, id: RunId, run: &Run) -> ReturnReport {
+    let (to_m, from_m) = (sections.bounds_m(run.from).0, sections.bounds_m(run.to - 1).1);
+    let near = |entry: &&AdviceEntry| {
+        entry.chainage_m.is_some_and(|x_m| (to_m - NEAR_M..from_m + NEAR_M).contains(&x_m))
+    };
+    let advised = log.entries.iter().filter(near).map(|entry| entry.advice.v_max_mps);
+    // Where nothing could be advised, as if the heads that turned had been evenly spread.
+    let evidence = |index: i64| sections.get(index).filter(|section| section.is_flagged())?.evidence;
+    let evenly = (run.from..run.to).filter_map(evidence).map(|evidence| evidence.even_v_max_mps);
+    let at_most_mps = advised.filter(|mps| *mps > 0.0).reduce(f64::min).or_else(|| evenly.reduce(f64::min));
+    let at_most_mps = at_most_mps.unwrap_or(0.0);
+    let takes_s = (at_most_mps > 0.0).then(|| (from_m - to_m) / at_most_mps);
+    ReturnReport { run: id.0, from_m, to_m, action: Action::of(run.cause).as_str(), at_most_mps, takes_s }
+}

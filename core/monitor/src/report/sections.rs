@@ -1,0 +1,115 @@
+//! Sections in the report.
+
+use serde::Serialize;
+
+use super::{SpreadReport, spread_report};
+use crate::run::Loop;
+use headrace_coverage::{Evidence, Section, Sections, Verdict};
+use headrace_geometry::time::MonoNs;
+
+/// One section.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SectionReport {
+    /// Where it begins, m.
+    pub start_m: f64,
+    /// Where it ends, m.
+    pub end_m: f64,
+    /// Diameter of its largest hole, m; `None` where it wasn't measured.
+    pub hole_m: Option<f64>,
+    /// The hole is no smaller than this, m: samples that aren't kept may have parted it.
+    pub hole_least_m: Option<f64>,
+    /// No larger, m; `None` where nothing bounds it.
+    pub hole_most_m: Option<f64>,
+    /// False where the hole is at least that large, for want of samples around it.
+    pub hole_bounded: bool,
+    /// Standard deviation of the hole, m.
+    pub hole_sigma_m: f64,
+    /// Chainage of the hole's centre, m.
+    pub hole_x_m: Option<f64>,
+    /// Where it is on the perimeter, m from the floor's centre via the left wall.
+    pub hole_sigma_at_m: Option<f64>,
+    /// The same as a clock seen along the tunnel: 6 is the floor's centre, 9 the left wall.
+    pub hole_clock: Option<String>,
+    /// Distance between passes.
+    pub t_x: SpreadReport,
+    /// Distance between neighbours of one sweep.
+    pub t_y: SpreadReport,
+    /// Lattice diagonal.
+    pub t: SpreadReport,
+    /// Samples on it.
+    pub samples: u32,
+    /// Samples a square metre of wall.
+    pub density_perm2: f64,
+    /// How far its wall is from the design profile; `None` without samples.
+    pub deviation: Option<DeviationReport>,
+    /// Share of its wall that is a declared opening.
+    pub masked_share: f64,
+    /// `pass`, `fail`, `cannot_say` or `open`.
+    pub verdict: &'static str,
+    /// Why it failed, as long as it does.
+    pub cause: Option<Evidence>,
+    /// When it was flagged, seconds on the log's clock.
+    pub flagged_s: Option<f64>,
+    /// When a later pass cleared the flag.
+    pub cleared_s: Option<f64>,
+}
+
+/// A section's wall against the design profile, along the rays from the reference point; beyond the design is positive.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct DeviationReport {
+    /// Mean, m.
+    pub mean_m: f64,
+    /// Farthest inside the design, m.
+    pub inmost_m: f64,
+    /// Farthest beyond it, m.
+    pub outmost_m: f64,
+    /// Area of the cross-section over the design's; `None` where no sweep has gone.
+    pub area_ratio: Option<f64>,
+    /// Whether most samples are farther off than the wall can be.
+    pub contradicts: bool,
+}
+
+pub(super) fn section_report(
+    sections: &Sections,
+    index: i64,
+    section: &Section,
+    dive: &Loop,
+) -> SectionReport {
+    let (start_m, end_m) = sections.bounds_m(index);
+    let profile = &dive.mission().profile;
+    let area_m2 = profile.perimeter_m() * sections.section_m();
+    SectionReport {
+        start_m,
+        end_m,
+        hole_m: section.hole.map(|hole| hole.diameter_m),
+        hole_least_m: section.hole.map(|hole| hole.least_m),
+        hole_most_m: section.hole.map(|hole| hole.most_m).filter(|most_m| most_m.is_finite()),
+        hole_bounded: section.hole.is_some_and(|hole| hole.bounded),
+        hole_sigma_m: section.hole_sigma_m,
+        hole_x_m: section.hole.map(|hole| hole.x_m),
+        hole_sigma_at_m: section.hole.map(|hole| hole.sigma_m),
+        hole_clock: section.hole.map(|hole| profile.clock(hole.sigma_m)),
+        t_x: spread_report(&section.t_x_m),
+        t_y: spread_report(&section.t_y_m),
+        t: spread_report(&section.t_m),
+        samples: section.samples,
+        density_perm2: f64::from(section.samples) / area_m2,
+        deviation: deviation_report(section),
+        masked_share: section.masked_share,
+        verdict: section.verdict.as_str(),
+        cause: section.evidence.filter(|_| section.verdict == Verdict::Fail),
+        flagged_s: section.flagged.map(MonoNs::as_secs_f64),
+        cleared_s: section.cleared.map(MonoNs::as_secs_f64),
+    }
+}
+
+fn deviation_report(section: &Section) -> Option<DeviationReport> {
+    let [inmost_m, outmost_m] = section.deviation.extremes_m()?;
+    Some(DeviationReport {
+        mean_m: section.deviation.mean_m()?,
+        inmost_m,
+        outmost_m,
+        area_ratio: section.deviation.area_ratio(),
+        contradicts: section.contradicts(),
+    })
+}

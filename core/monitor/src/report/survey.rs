@@ -1,0 +1,90 @@
+//! Soundings by node in the report.
+
+use serde::Serialize;
+
+use crate::flow::Coverage;
+use headrace_coverage::soundings::ENOUGH;
+use headrace_geometry::tunnel::Profile;
+
+/// Samples by node of a square grid over the sections that were passed.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SurveyReport {
+    /// Edge of a node along the tunnel, m.
+    pub node_m: f64,
+    /// The same round the perimeter, m.
+    pub around_m: f64,
+    /// Samples that a node should have.
+    pub enough: u16,
+    /// Nodes passed.
+    pub nodes: u32,
+    /// Share of them that have enough; `None` without nodes.
+    pub enough_share: Option<f64>,
+    /// Nodes without a sample.
+    pub empty: u32,
+    /// Row by row along the tunnel.
+    pub rows: Vec<NodeRowReport>,
+    /// The first of the empty ones, in the order of chainage.
+    pub holidays: Vec<HolidayReport>,
+}
+
+/// A row of nodes round the perimeter.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct NodeRowReport {
+    /// Where it begins, m.
+    pub start_m: f64,
+    /// Its nodes.
+    pub nodes: u32,
+    /// Those with enough samples.
+    pub enough: u32,
+    /// Those without any.
+    pub empty: u32,
+}
+
+/// A node without a sample.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct HolidayReport {
+    /// Chainage of its middle, m.
+    pub x_m: f64,
+    /// Arc length of its middle, m.
+    pub sigma_m: f64,
+    /// The same on a clock.
+    pub clock: String,
+}
+
+/// Empty nodes that are listed; their number is always told.
+const LISTED: usize = 1000;
+
+pub(super) fn survey(coverage: &Coverage, profile: &Profile) -> SurveyReport {
+    let Coverage { soundings, sections, frontier, .. } = coverage;
+    let [node_m, around_m] = soundings.node_m();
+    let passed = sections.passed(frontier.swept());
+    let (from_m, to_m) = (sections.bounds_m(passed.start).0, sections.bounds_m(passed.end).0);
+    let all = soundings.summary(from_m, to_m);
+    let mut rows: Vec<NodeRowReport> = Vec::new();
+    for node in soundings.nodes_between(from_m, to_m) {
+        let start_m = node.x_m - node_m / 2.0;
+        if rows.last().is_none_or(|row| row.start_m < start_m) {
+            rows.push(NodeRowReport { start_m, nodes: 0, enough: 0, empty: 0 });
+        }
+        if let Some(row) = rows.last_mut() {
+            row.nodes += 1;
+            row.enough += u32::from(node.count >= ENOUGH);
+            row.empty += u32::from(node.count == 0);
+        }
+    }
+    let holidays = soundings.empty_between(from_m, to_m).take(LISTED).map(|node| HolidayReport {
+        x_m: node.x_m,
+        sigma_m: node.sigma_m,
+        clock: profile.clock(node.sigma_m),
+    });
+    SurveyReport {
+        node_m,
+        around_m,
+        enough: ENOUGH,
+        nodes: all.nodes,
+        enough_share: all.enough_share(),
+        empty: all.empty,
+        holidays: holidays.collect(),
+        rows,
+    }
+}

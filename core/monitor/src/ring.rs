@@ -1,0 +1,154 @@
+//! The way from a port's thread to the loop: a bounded ring of packets, one writer, one reader, no lock.
+
+use ringbuf::traits::{Consumer as _, Observer as _, Producer as _, Split as _};
+use ringbuf::{HeapCons, HeapProd, HeapRb};
+
+use headrace_geometry::time::MonoNs;
+
+/// Bytes of the header that stands before each packet in the ring: receive time, order, length.
+const HEADER_BYTES: usize = 20;
+
+/// The longest packet that a ring takes.
+pub const MAX_PACKET_BYTES: usize = 4096;
+
+/// Order of consumption where a log has recorded it; live packets have none.
+pub const NO_ORDER: u64 = u64::MAX;
+
+/// A packet that did not fit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum RingError {
+    /// The ring is full; try again after a tick, or count the packet as dropped.
+    #[error("ring has room for {free} bytes and a packet needs {needed}")]
+    Full {
+        /// Free bytes.
+        free: usize,
+        /// Bytes needed, header included.
+        needed: usize,
+    },
+    /// No ring takes a packet of that length.
+    #[error("packet of {len} bytes; the longest allowed is {MAX_PACKET_BYTES}")]
+    TooLong {
+        /// Its length.
+        len: usize,
+    },
+}
+
+/// The writing end: a port's thread, a player or a simulator.
+pub struct Port {
+    ring: HeapProd<u8>,
+}
+
+/// The reading end, in the loop.
+pub(super) struct PortReader {
+    ring: HeapCons<u8>,
+}
+
+/// What stands before a packet.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct PacketHeader {
+    pub(super) received: MonoNs,
+    pub(super) order: u64,
+    pub(super) len: usize,
+}
+
+/// Makes a ring of `capacity_bytes`, at least large enough for the longest packet.
+pub(super) fn ring(capacity_bytes: usize) -> (Port, PortReader) {
+    let (producer, consumer) = HeapRb::new(capacity_bytes.max(HEADER_BYTES + MAX_PACKET_BYTES)).split();
+    (Port { ring: producer }, PortReader { ring: consumer })
+}
+
+impl Port {
+    /// Hands over a packet received at `received`. Never blocks.
+    ///
+    /// Errors: the ring is full, or the packet too long; nothing was written.
+    pub fn send(&mut self, received: MonoNs, bytes: &[u8]) -> Result<(), RingError> {
+        self.send_in_order(received, NO_ORDER, bytes)
+    }
+
+    /// Like [`Port::send`], with the packet's recorded place in the order of consumption.
+    ///
+    /// Errors: as for [`Port::send`].
+    pub fn send_in_order(&mut self, received: MonoNs, order: u64, bytes: &[u8]) -> Result<(), RingError> {
+        let len = u32::try_from(bytes.len()).ok().filter(|_| bytes.len() <= MAX_PACKET_BYTES);
+        let len = len.ok_or(RingError::TooLong { len: bytes.len() })?;
+        let needed = HEADER_BYTES + bytes.len();
+        let free = self.ring.vacant_len();
+        if free < needed {
+            return Err(RingError::Full { free, needed });
+        }
+        let mut header = [0; HEADER_BYTES];
+        let (time, rest) = header.split_at_mut(8);
+        let (place, length) = rest.split_at_mut(8);
+        time.copy_from_slice(&received.0.to_le_bytes());
+        place.copy_from_slice(&order.to_le_bytes());
+        length.copy_from_slice(&len.to_le_bytes());
+        // The reader takes a packet only when all of it is there, so that two writes need no further care.
+        self.ring.push_slice(&header);
+        self.ring.push_slice(bytes);
+        Ok(())
+    }
+
+    /// Whether a packet of `len` bytes would fit now.
+    pub fn has_room(&self, len: usize) -> bool {
+        self.ring.vacant_len() >= HEADER_BYTES + len
+    }
+}
+
+impl PortReader {
+    /// The next packet's header, when the whole packet is there.
+    pub(super) fn peek(&self) -> Option<PacketHeader> {
+        let mut header = [0; HEADER_BYTES];
+        if self.ring.occupied_len() < HEADER_BYTES || self.ring.peek_slice(&mut header) < HEADER_BYTES {
+            return None;
+        }
+        let word = |at: usize| {
+            let mut bytes = [0; 8];
+            bytes.copy_from_slice(header.get(at..at + 8).unwrap_or(&[0; 8]));
+            u64::from_le_bytes(bytes)
+        };
+        let len = (word(12) >> 32) as usize;
+        let whole = self.ring.occupied_len() >= HEADER_BYTES + len;
+        whole.then_some(PacketHeader { received: MonoNs(word(0)), order: word(8), len })
+    }
+
+    /// Drops what waits.
+    pub(super) fn clear(&mut self) {
+        self.ring.clear();
+    }
+
+    /// Takes the packet that [`PortReader::peek`] has shown into `into`, whose length must be the packet's.
+    pub(super) fn take(&mut self, into: &mut [u8]) {
+        self.ring.skip(HEADER_BYTES);
+        self.ring.pop_slice(into);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn packets_come_out_as_they_went_in() {
+        let (mut port, mut reader) = ring(8192);
+        for round in 0..1000_u64 {
+            let bytes: Vec<u8> = (0..round % 97).map(|i| (i ^ round) as u8).collect();
+            port.send_in_order(MonoNs(round), round * 3, &bytes).unwrap();
+            let header = reader.peek().unwrap();
+            assert_eq!(header, PacketHeader { received: MonoNs(round), order: round * 3, len: bytes.len() });
+            let mut got = vec![0; header.len];
+            reader.take(&mut got);
+            assert_eq!(got, bytes);
+        }
+        assert_eq!(reader.peek(), None);
+    }
+
+    #[test]
+    fn a_full_ring_refuses_and_keeps_what_it_has() {
+        let (mut port, reader) = ring(0);
+        port.send(MonoNs(1), &[0; MAX_PACKET_BYTES]).unwrap();
+        assert!(matches!(port.send(MonoNs(2), &[1]), Err(RingError::Full { free: 0, .. })));
+        assert!(matches!(port.send(MonoNs(2), &[0; MAX_PACKET_BYTES + 1]), Err(RingError::TooLong { .. })));
+        assert_eq!(reader.peek().unwrap().received, MonoNs(1));
+    }
+}

@@ -1,0 +1,85 @@
+//! How fast one may go.
+
+use bevy_ecs::prelude::{Res, ResMut, Resource};
+
+use crate::flow::{AdviceEntry, AdviceLog, Digests, Notice, Notices, Placed, PlacedList, Tally};
+use crate::trail::{RecordKind, Trail};
+use headrace_geometry::frames::Vec3;
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_sampling::advice::{self, Advice, Remedy, Steady};
+use headrace_sampling::passes::{Phasing, Situation};
+use headrace_sampling::swing::{Looks, Swing};
+use headrace_snapshot::stateful;
+
+/// What gives the advice, and how long the dive may take from its first packet.
+#[derive(Debug, Clone, Resource)]
+pub(crate) struct Advisor {
+    pub(crate) advisor: advice::Advisor,
+    pub(crate) dive_time: Option<DurNs>,
+    looks: Looks,
+    steady: Steady,
+}
+
+stateful!(Advisor { state: advisor, looks, steady; fixed: dive_time; });
+
+impl Advisor {
+    /// Allocates: all that it will ever use.
+    pub(crate) fn new(advisor: advice::Advisor, target_m: f64, dive_time: Option<DurNs>) -> Self {
+        Self { advisor, dive_time, looks: Looks::default(), steady: Steady::new(target_m) }
+    }
+
+    /// What to show at a beat, `begun` being when the first packet came.
+    fn advise(&mut self, at: MonoNs, situation: &Situation, begun: Option<MonoNs>) -> Advice {
+        let left = self.dive_time.zip(begun).map(|(time, begun)| (time - at.since(begun)).as_secs_f64());
+        let advice = self.advisor.advise(situation, swing(&mut self.looks, at, situation), left);
+        self.steady.show(at, advice)
+    }
+}
+
+/// How the vehicle swings between two passes.
+fn swing(looks: &mut Looks, at: MonoNs, situation: &Situation) -> Swing {
+    if let Some(pose) = situation.pose {
+        looks.keep(at, pose.attitude * Vec3::new(1.0, 0.0, 0.0));
+    }
+    let passes = Phasing::of(situation).at(situation.speed_mps);
+    looks.swing(at, passes.gap_s(passes.heads()).unwrap_or(0.0))
+}
+
+fn digest(trail: &mut Trail, at: MonoNs, advice: &Advice) {
+    let [width_m, arc_m] = advice.unseen_m.unwrap_or_default();
+    trail
+        .record(RecordKind::Advice)
+        .integer(at.0)
+        .number(advice.v_max_mps)
+        .integer(advice.reason as u64)
+        .integer(u64::from(advice.will_exceed))
+        .number(advice.phase_error_rad.unwrap_or(0.0))
+        .number(advice.t_y_m)
+        .number(width_m)
+        .number(arc_m)
+        .integer(advice.remedy.map_or(0, Remedy::number))
+        .text(if let Some(Remedy::Mode(name)) = &advice.remedy { name.as_str() } else { "" });
+    for other in advice.alternatives.iter().flatten() {
+        trail.number(other.v_max_mps);
+    }
+}
+
+pub(super) fn advise(
+    placed: Res<'_, PlacedList>,
+    tally: Res<'_, Tally>,
+    mut advisor: ResMut<'_, Advisor>,
+    mut log: ResMut<'_, AdviceLog>,
+    mut notices: ResMut<'_, Notices>,
+    mut digests: ResMut<'_, Digests>,
+) {
+    for item in &placed.0 {
+        let Placed::Situation(at, situation) = item else { continue };
+        let begun = tally.span.map(|(first, _)| first);
+        let advice = advisor.advise(*at, situation, begun);
+        digest(&mut digests.advice, *at, &advice);
+        let chainage_m = situation.pose.map(|pose| pose.position.x());
+        let entry = AdviceEntry { at: *at, chainage_m, speed_mps: situation.speed_mps, advice };
+        log.take(&entry);
+        notices.0.push(Notice::Advice(entry));
+    }
+}

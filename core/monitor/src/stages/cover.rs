@@ -1,0 +1,251 @@
+//! Places to samples, passes and sections, and sections to verdicts.
+//!
+//! Both in one pass over the pings: which sections are judged, and on what evidence, depends on the verdicts before.
+
+use bevy_ecs::prelude::{Res, ResMut, Resource};
+use serde::{Deserialize, Serialize};
+
+use super::advise::Advisor;
+use super::driving::{Driven, Driving};
+use super::judge::{Results, digest_alert, judge_one};
+use crate::alerts::{AlertKind, Alerts};
+use crate::flow::{
+    Coverage, Digests, Finder, Notice, Notices, Outcome, Place, Placed, PlacedList, PlacedPing, Requests,
+    Tally,
+};
+use headrace_coverage::hole::FARTHEST_M;
+use headrace_coverage::{Doubt, Loss, StoreError, WallSample};
+use headrace_geometry::frames::{Point3, Tunnel, Vec3};
+use headrace_geometry::math;
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_sampling::head::MAX_HEADS;
+use headrace_sampling::spacing;
+
+/// How often sections are looked at that are neither left nor ahead.
+const LOOK_AROUND: DurNs = DurNs(1_000_000_000);
+
+/// What is remembered of each head's sweep.
+#[derive(Debug, Clone, Copy, Default, Resource, Serialize, Deserialize)]
+pub(crate) struct HeadSweeps {
+    last: [Option<LastSample>; MAX_HEADS],
+    /// The head has pinged where nobody knew, and hasn't since where somebody does.
+    unseen: [bool; MAX_HEADS],
+}
+
+/// The last valid sample of a head in its present sweep.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+struct LastSample {
+    point: Point3<Tunnel>,
+    sigma_m: f64,
+    /// Every ping since has been a single step with a return.
+    unbroken: bool,
+}
+
+#[expect(clippy::too_many_arguments, reason = "a system's arguments are what it reads and writes")]
+pub(super) fn cover(
+    placed: Res<'_, PlacedList>,
+    context: Res<'_, Place>,
+    mut coverage: ResMut<'_, Coverage>,
+    advisor: Res<'_, Advisor>,
+    mut sweeps: ResMut<'_, HeadSweeps>,
+    mut driving: ResMut<'_, Driving>,
+    mut requests: ResMut<'_, Requests>,
+    mut tally: ResMut<'_, Tally>,
+    mut finder: ResMut<'_, Finder>,
+    mut notices: ResMut<'_, Notices>,
+    mut digests: ResMut<'_, Digests>,
+    mut alerts: ResMut<'_, Alerts>,
+) {
+    notices.0.clear();
+    for item in &placed.0 {
+        match item {
+            Placed::Situation(at, situation) => {
+                driving.note(*at, situation, &context.profile, &advisor.advisor);
+                if at.0 % LOOK_AROUND.0.unsigned_abs() == 0 {
+                    look_around(&mut coverage, &mut finder, &context, *at, &mut requests);
+                }
+            }
+            Placed::Ping(ping) => {
+                count(&mut tally, &ping.outcome);
+                note_passage(&mut coverage, &mut sweeps, &driving.now, ping);
+                if let Some(beyond_m) = beyond_end_m(ping, context.length_m)
+                    && alerts.note(AlertKind::OutsideTunnel, ping.received, beyond_m.0, beyond_m.1)
+                {
+                    notices.0.push(Notice::Alert(AlertKind::OutsideTunnel));
+                    digest_alert(&mut digests, AlertKind::OutsideTunnel, ping.received, beyond_m);
+                }
+                if let Err(error) = note_sample(&mut coverage, &mut sweeps, &context, ping) {
+                    match error {
+                        StoreError::Outside => tally.outside += 1,
+                        StoreError::Full => tally.not_stored += 1,
+                    }
+                }
+                note_frontier(&mut coverage, ping, &mut requests);
+            }
+        }
+        for request in requests.0.drain(..) {
+            let mut results = Results {
+                finder: &mut finder,
+                notices: &mut notices,
+                digests: &mut digests,
+                alerts: &mut alerts,
+            };
+            judge_one(&request, &context.profile, &mut coverage, &mut results);
+        }
+    }
+}
+
+fn count(tally: &mut Tally, outcome: &Outcome) {
+    match outcome {
+        Outcome::Sample { .. } => tally.samples += 1,
+        Outcome::Lost(Loss::Missing, _) => tally.missing += 1,
+        Outcome::Lost(Loss::OutOfRange, _) => tally.out_of_range += 1,
+        Outcome::Lost(Loss::Occluded, _) => tally.occluded += 1,
+        Outcome::Unplaced(_) => tally.unplaced += 1,
+    }
+}
+
+/// Adds a ping to the passage of the section that its head is in, and what it lost to that of the section it was aimed at.
+fn note_passage(coverage: &mut Coverage, sweeps: &mut HeadSweeps, driven: &Driven, ping: &PlacedPing) {
+    note_unseen(coverage, sweeps, ping);
+    let perimeter_m = coverage.store.perimeter_m();
+    if let Outcome::Lost(loss, Some(aim)) = ping.outcome {
+        let index = coverage.sections.index_of(aim.x_m);
+        if let Some(section) = coverage.sections.get_mut(index) {
+            section.passage.lost.note(loss, aim.sigma_m, perimeter_m);
+        }
+    }
+    // Without a fix, a ping counts where its head was last known to be.
+    let Some(reach) = ping.reach.or_else(|| coverage.frontier.last_reach(ping.head)) else { return };
+    let index = coverage.sections.index_of(reach.middle_m());
+    let Some(section) = coverage.sections.get_mut(index) else { return };
+    let passage = &mut section.passage;
+    passage.pings += 1;
+    passage.standing += u32::from(ping.standing);
+    match ping.outcome {
+        Outcome::Sample { .. } => {}
+        Outcome::Lost(Loss::Missing, _) => passage.missing += 1,
+        Outcome::Lost(Loss::OutOfRange, _) => passage.out_of_range += 1,
+        Outcome::Lost(Loss::Occluded, _) => passage.occluded += 1,
+        Outcome::Unplaced(_) => passage.unplaced += 1,
+    }
+    let Some(fix) = ping.fix else { return };
+    passage.placed += 1;
+    passage.speed_sum_mps += fix.speed_mps.abs();
+    passage.pass_gap_sum_s += driven.gap_s;
+    passage.even_gap_sum_s += driven.even_gap_s;
+    passage.all_gap_sum_s += driven.all_gap_s;
+    passage.ping_period_sum_s += driven.ping_period_s;
+    passage.swing_sum_m += driven.swing_m;
+    passage.middle_t_y_m = passage.middle_t_y_m.max(driven.middle_t_y_m);
+    passage.doubt.add(&Doubt::of(&fix));
+}
+
+/// Sections that a head went through while nobody knew where.
+fn note_unseen(coverage: &mut Coverage, sweeps: &mut HeadSweeps, ping: &PlacedPing) {
+    let Some(unseen) = sweeps.unseen.get_mut(ping.head) else { return };
+    let Some(reach) = ping.reach else {
+        *unseen = true;
+        return;
+    };
+    if !core::mem::take(unseen) {
+        return;
+    }
+    let Some(before) = coverage.frontier.last_reach(ping.head) else { return };
+    let (from_m, to_m) = (before.middle_m().min(reach.middle_m()), before.middle_m().max(reach.middle_m()));
+    let passed = coverage.sections.index_of(from_m)..=coverage.sections.index_of(to_m);
+    for index in passed {
+        if let Some(section) = coverage.sections.get_mut(index) {
+            section.passage.unseen = true;
+        }
+    }
+}
+
+/// Asks for the sections that are neither left nor ahead, of which something is certain already.
+fn look_around(
+    coverage: &mut Coverage,
+    finder: &mut Finder,
+    context: &Place,
+    at: MonoNs,
+    requests: &mut Requests,
+) {
+    let Coverage { store, sections, frontier, .. } = coverage;
+    let now = (&*frontier, at);
+    let mut ask = |request| requests.0.push(request);
+    sections.look_around(now, store, &mut finder.0, &context.profile, &mut ask);
+}
+
+/// Chainage of a sample before the portal or behind the tunnel's end, and by how much, m.
+fn beyond_end_m(ping: &PlacedPing, length_m: f64) -> Option<(f64, f64)> {
+    let Outcome::Sample { point, .. } = ping.outcome else { return None };
+    let x_m = point.x();
+    let beyond_m = (-x_m).max(x_m - length_m);
+    (beyond_m > 0.0).then_some((x_m, beyond_m))
+}
+
+/// Keeps a sample and adds its spacings to its section.
+fn note_sample(
+    coverage: &mut Coverage,
+    sweeps: &mut HeadSweeps,
+    context: &Place,
+    ping: &PlacedPing,
+) -> Result<(), StoreError> {
+    let Some(slot) = sweeps.last.get_mut(ping.head) else { return Ok(()) };
+    if ping.new_sweep {
+        *slot = None;
+    }
+    let Outcome::Sample { point, sigma_m } = ping.outcome else {
+        if let Some(last) = slot {
+            last.unbroken = false;
+        }
+        return Ok(());
+    };
+    if !coverage.store.covers(point.x(), sigma_m) {
+        *slot = None;
+        return Err(StoreError::Outside);
+    }
+    let before = *slot;
+    let step_from = before.filter(|last| last.unbroken && ping.single_step);
+    let t_x_m = coverage.store.nearest_pass_m(point.x(), sigma_m, FARTHEST_M);
+    let perimeter_m = coverage.store.perimeter_m();
+    let step_m = step_from
+        .map(|last| [point.x() - last.point.x(), math::wrap_signed(sigma_m - last.sigma_m, perimeter_m)]);
+    let kept = coverage.store.insert(WallSample { x_m: point.x(), sigma_m, head: ping.head, step_m });
+    *slot = kept.ok().map(|_| LastSample { point, sigma_m, unbroken: true });
+    kept?;
+    coverage.soundings.add(point.x(), sigma_m);
+    coverage.sections.touch(point.x());
+    let index = coverage.sections.index_of(point.x());
+    let Some(section) = coverage.sections.get_mut(index) else { return Ok(()) };
+    section.samples += 1;
+    let yz = |point: &Point3<Tunnel>| [point.y(), point.z()];
+    let from = step_from.map(|last| (yz(&last.point), last.sigma_m));
+    section.deviation.add(&context.profile, (yz(&point), sigma_m), from, context.contradiction_m);
+    if let Some(t_x_m) = t_x_m {
+        section.t_x_m.add(t_x_m);
+    }
+    if let Some(last) = before {
+        let t_y_m = (point - last.point).norm();
+        section.t_y_m.add(t_y_m);
+        let advance_m = (point.x() - last.point.x()).abs();
+        if let Some(t_x_m) = t_x_m {
+            section.t_m.add(spacing::t_max_m(t_x_m, advance_m, t_y_m));
+        }
+    }
+    if let Some([_, around_m]) = step_m {
+        section.passage.t_y_m = section.passage.t_y_m.max(around_m.abs());
+    }
+    Ok(())
+}
+
+/// Moves the frontier on, and asks for the sections that are out of the way now.
+fn note_frontier(coverage: &mut Coverage, ping: &PlacedPing, requests: &mut Requests) {
+    let Coverage { sections, frontier, .. } = coverage;
+    let (Some(fix), Some(reach)) = (ping.fix, ping.reach) else {
+        frontier.heard(ping.head, ping.received);
+        return;
+    };
+    let margin_m = sections.margin_m(fix.relative.sigma_m(Vec3::zero()));
+    let moved = frontier.advance(ping.head, ping.received, reach, sections.section_m(), margin_m);
+    sections.due(&moved, frontier, ping.received, &mut |request| requests.0.push(request));
+}

@@ -1,0 +1,70 @@
+//! A section to its verdict, its flag and its run.
+
+use crate::alerts::{AlertKind, Alerts};
+use crate::flow::{Coverage, Digests, Finder, Notice, Notices};
+use crate::trail::RecordKind;
+use headrace_coverage::{Judging, Request, RunChange, RunId};
+use headrace_geometry::time::MonoNs;
+use headrace_geometry::tunnel::Profile;
+
+/// What judging changes besides the sections.
+pub(crate) struct Results<'a> {
+    pub(crate) finder: &'a mut Finder,
+    pub(crate) notices: &'a mut Notices,
+    pub(crate) digests: &'a mut Digests,
+    pub(crate) alerts: &'a mut Alerts,
+}
+
+/// Judges one section and says what has changed.
+pub(crate) fn judge_one(
+    request: &Request,
+    profile: &Profile,
+    coverage: &mut Coverage,
+    results: &mut Results<'_>,
+) {
+    let Coverage { store, sections, .. } = coverage;
+    let Results { finder, notices, digests, alerts } = results;
+    let mut tell = |id: RunId, change: RunChange| {
+        notices.0.push(Notice::Run { id, at: request.at, change });
+        digests.judgements.record(RecordKind::Run).integer(u64::from(id.0)).integer(change as u64);
+    };
+    let mut judging = Judging { store, finder: &mut finder.0, profile, tell: &mut tell };
+    let Some(change) = sections.judge(request, &mut judging) else { return };
+    notices.0.push(Notice::Section { section: request.section, at: request.at, change });
+    let Some(section) = sections.get(request.section) else { return };
+    digests
+        .judgements
+        .record(RecordKind::Section)
+        .integer(request.at.0)
+        .integer(request.section as u64)
+        .integer(change as u64)
+        .integer(section.verdict as u64)
+        .number(section.hole.map_or(0.0, |hole| hole.diameter_m))
+        .number(section.hole_sigma_m)
+        .integer(section.evidence.map_or(u64::MAX, |evidence| evidence.cause as u64))
+        .number(section.hole.map_or(0.0, |hole| hole.x_m))
+        .number(section.hole.map_or(0.0, |hole| hole.sigma_m));
+    if let Some(evidence) = section.evidence {
+        digests
+            .judgements
+            .number(evidence.speed_mps)
+            .number(evidence.t_y_m)
+            .number(evidence.middle_t_y_m)
+            .number(evidence.missing_share)
+            .number(evidence.swing_m);
+    }
+    if section.contradicts() {
+        let off_m = section.deviation.mean_m().unwrap_or(0.0);
+        let x_m = sections.bounds_m(request.section).0;
+        if alerts.note(AlertKind::ProfileContradicted, request.at, x_m, off_m) {
+            notices.0.push(Notice::Alert(AlertKind::ProfileContradicted));
+            digest_alert(digests, AlertKind::ProfileContradicted, request.at, (x_m, off_m));
+        }
+    }
+}
+
+/// Publishes that something is wrong at a chainage, by so much.
+pub(crate) fn digest_alert(digests: &mut Digests, kind: AlertKind, at: MonoNs, at_off_m: (f64, f64)) {
+    let alert = digests.judgements.record(RecordKind::Alert).integer(at.0).integer(kind as u64);
+    alert.number(at_off_m.0).number(at_off_m.1);
+}

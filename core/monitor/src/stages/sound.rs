@@ -1,0 +1,129 @@
+//! The water's speed of sound while one dives in it, by a depth sensor's temperature; what sonars say is corrected for it.
+
+use bevy_ecs::prelude::Resource;
+
+use headrace_geometry::site::fresh_water_sound_speed_mps;
+use headrace_geometry::time::MonoNs;
+use headrace_sensor::reading::{Decoded, Reading, SourceId};
+use headrace_snapshot::stateful;
+
+/// Temperatures that water has, degrees Celsius; a sensor that says others is out of order, or out of the water.
+const WATER_DEGC: core::ops::RangeInclusive<f64> = 0.0..=40.0;
+/// How slowly the water's temperature is taken to change, s: what is faster is the sensor's noise.
+const SLOWNESS_S: f64 = 60.0;
+
+/// The speed of sound that holds now.
+#[derive(Debug, Clone, Resource)]
+pub(crate) struct WaterSound {
+    /// The depth sensor that tells it; without, the site's holds.
+    source: Option<SourceId>,
+    site_mps: f64,
+    now_mps: f64,
+    heard: Option<MonoNs>,
+    /// The least and the greatest so far.
+    span_mps: [f64; 2],
+}
+
+stateful!(WaterSound { state: now_mps, heard, span_mps; fixed: source, site_mps; });
+
+impl WaterSound {
+    /// The site's speed, until `source` tells another.
+    pub(crate) fn new(site_mps: f64, source: Option<SourceId>) -> Self {
+        Self { source, site_mps, now_mps: site_mps, heard: None, span_mps: [site_mps; 2] }
+    }
+
+    /// The least and the greatest by which ranges were reckoned, m/s.
+    pub(crate) fn span_mps(&self) -> [f64; 2] {
+        self.span_mps
+    }
+
+    /// Heeds what a depth sensor says, and corrects what a sonar does: consumers reckon with the site's speed, so that the
+    /// speed a device is said to reckon with makes up for the difference.
+    pub(super) fn pass(&mut self, source: SourceId, decoded: &mut Decoded) {
+        match &mut decoded.reading {
+            Reading::Pressure(water)
+                if self.source == Some(source) && WATER_DEGC.contains(&water.temperature_degc) =>
+            {
+                let told_mps = fresh_water_sound_speed_mps(water.temperature_degc, water.pressure_pa);
+                self.hear(decoded.valid_at, told_mps);
+            }
+            Reading::Sonar(sonar) => sonar.sound_speed_mps = self.corrected(sonar.sound_speed_mps),
+            Reading::Echo(echo) => echo.sound_speed_mps = self.corrected(echo.sound_speed_mps),
+            _ => (),
+        }
+    }
+
+    fn hear(&mut self, at: MonoNs, told_mps: f64) {
+        match self.heard {
+            None => {
+                self.now_mps = told_mps;
+                self.span_mps = [told_mps; 2];
+            }
+            Some(last) => {
+                let elapsed_s = at.since(last).as_secs_f64().max(0.0);
+                self.now_mps += (told_mps - self.now_mps) * (elapsed_s / (elapsed_s + SLOWNESS_S));
+            }
+        }
+        self.heard = Some(self.heard.map_or(at, |last| last.max(at)));
+        let [least, most] = self.span_mps;
+        self.span_mps = [least.min(self.now_mps), most.max(self.now_mps)];
+    }
+
+    fn corrected(&self, device_mps: f64) -> f64 {
+        // Without a sensor to tell it, not a bit is changed.
+        if self.heard.is_none() { device_mps } else { device_mps * (self.site_mps / self.now_mps) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use headrace_geometry::site::Site;
+    use headrace_geometry::time::DurNs;
+    use headrace_sensor::reading::{EchoRange, WaterPressure};
+
+    const DEPTH: SourceId = SourceId(3);
+
+    fn depth(at_s: f64, temperature_degc: f64) -> Decoded {
+        let water = WaterPressure { pressure_pa: 101_325.0, resolution_pa: 300.0, temperature_degc };
+        Decoded { valid_at: MonoNs(0) + DurNs::from_secs_f64(at_s), reading: Reading::Pressure(water) }
+    }
+
+    /// What becomes of 4 m that a device has reckoned with 1500 m/s.
+    fn metres(sound: &mut WaterSound, site: &Site) -> f64 {
+        let echo = EchoRange { range_m: Some(4.0), confidence: 1.0, sound_speed_mps: 1500.0 };
+        let mut decoded = Decoded { valid_at: MonoNs(0), reading: Reading::Echo(echo) };
+        sound.pass(SourceId(0), &mut decoded);
+        let Reading::Echo(echo) = decoded.reading else { panic!("{decoded:?}") };
+        site.rescaled_range_m(4.0, echo.sound_speed_mps)
+    }
+
+    #[test]
+    fn ranges_are_those_of_the_water_that_the_sensor_is_in() {
+        let site = Site::default();
+        let mut sound = WaterSound::new(site.sound_speed_mps, Some(DEPTH));
+        assert!((metres(&mut sound, &site) - 4.0 * 1447.0 / 1500.0).abs() < 1e-12);
+        // Another sensor's, and what no water has, are not heeded.
+        sound.pass(SourceId(2), &mut depth(1.0, 20.0));
+        sound.pass(DEPTH, &mut depth(1.0, 85.0));
+        assert!((metres(&mut sound, &site) - 4.0 * 1447.0 / 1500.0).abs() < 1e-12);
+        sound.pass(DEPTH, &mut depth(1.0, 20.0));
+        assert!((metres(&mut sound, &site) - 4.0 * 1482.34 / 1500.0).abs() < 1e-3);
+        assert!((sound.span_mps()[0] - 1482.34).abs() < 0.1);
+    }
+
+    #[test]
+    fn noise_is_smoothed_and_a_change_is_followed() {
+        let site = Site::default();
+        let mut sound = WaterSound::new(site.sound_speed_mps, Some(DEPTH));
+        for tick in 0..20_000 {
+            let noise = if tick % 2 == 0 { 0.5 } else { -0.5 };
+            sound.pass(DEPTH, &mut depth(f64::from(tick) * 0.05, 10.0 + noise));
+        }
+        assert!((sound.now_mps - 1447.3).abs() < 0.1, "{}", sound.now_mps);
+        for tick in 0..12_000 {
+            sound.pass(DEPTH, &mut depth(1000.0 + f64::from(tick) * 0.05, 5.0));
+        }
+        assert!((sound.now_mps - 1426.16).abs() < 0.1, "{}", sound.now_mps);
+    }
+}

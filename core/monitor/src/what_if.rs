@@ -1,0 +1,50 @@
+//! What a dive's samples say of other targets and lengths of section.
+
+use bevy_ecs::world::Mut;
+use serde::Serialize;
+
+use super::flow::{Coverage, Finder, Tally};
+use super::run::Loop;
+use headrace_geometry::time::MonoNs;
+
+/// Metres by verdict for another target, or in sections of another length.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct WhatIfReport {
+    /// Target T, m.
+    pub target_m: f64,
+    /// Length of a section, m.
+    pub section_m: f64,
+    /// Metres of sections that would pass.
+    pub pass_m: f64,
+    /// That would fail.
+    pub fail_m: f64,
+    /// Of which nothing could be said for sure.
+    pub cannot_say_m: f64,
+    /// That would still be open.
+    pub open_m: f64,
+}
+
+impl Loop {
+    /// What its samples say of every target in sections of every length, once the dive has ended.
+    pub fn what_if(&mut self, targets_m: &[f64], sections_m: &[f64]) -> Vec<WhatIfReport> {
+        let at = self.world().resource::<Tally>().span.map_or(MonoNs(0), |(_, last)| last);
+        let profile = self.mission().profile.clone();
+        let mut all = Vec::new();
+        self.world_mut().resource_scope(|world, mut finder: Mut<'_, Finder>| {
+            let Coverage { store, sections, frontier, .. } = world.resource::<Coverage>();
+            for section_m in sections_m {
+                let searched = (store, &mut finder.0);
+                let metres = sections.what_if(*section_m, targets_m, (frontier, at), searched, &profile);
+                all.extend(targets_m.iter().zip(metres).map(|(target_m, metres)| WhatIfReport {
+                    target_m: *target_m,
+                    section_m: *section_m,
+                    pass_m: metres.pass_m,
+                    fail_m: metres.fail_m,
+                    cannot_say_m: metres.cannot_say_m,
+                    open_m: metres.open_m,
+                }));
+            }
+        });
+        all
+    }
+}

@@ -1,0 +1,438 @@
+//! How fast one may go, from what is measured now, and what else one could do.
+
+mod answer;
+mod look;
+mod search;
+mod steady;
+
+use super::error::SamplingError;
+use super::head::{HeadMode, HeadMotion, HeadSet, HeadSpec, MAX_HEADS};
+use super::layout::{self, HeadLayout};
+use super::occlusion::{self, AngleRange, Obstacle};
+use super::passes::{self, Passes, Phasing, Situation};
+use super::ring::Ring;
+use super::strips::{Going, Strips, View};
+use super::swing::Swing;
+use headrace_geometry::frames::{Point3, Pose, Rot};
+use headrace_geometry::math;
+use headrace_geometry::tunnel::Profile;
+use headrace_snapshot::stateful;
+use look::AdvisedHead;
+
+pub use answer::{Advice, Alternative, Left, ModeName, Reason, Remedy};
+pub use steady::Steady;
+
+/// Share of the speed kept back for the error of its measurement.
+pub const SPEED_MARGIN: f64 = 0.01;
+/// The most modes of a head that alternatives are given for.
+pub const MAX_MODES: usize = 8;
+
+/// Soundings of a head's ring: the finest steps of the heads that there are (0.3 degrees).
+const RING: u32 = 1200;
+
+/// Alternatives are thought over anew every so many pieces of advice.
+const ALTERNATIVES_EVERY: u32 = 25;
+/// Slower than this, m/s, a vehicle goes the way it went before.
+const UNDER_WAY_MPS: f64 = 0.02;
+/// Stretches of wall out of a head's reach that there is room for.
+const OUT_OF_REACH: usize = 16;
+
+/// The largest speed for a target that was found.
+struct Fastest {
+    /// The speed, m/s.
+    speed_mps: f64,
+    /// What is advised of it, m/s.
+    advised_mps: f64,
+    /// T_y where it is the largest, m.
+    t_y_m: f64,
+}
+
+/// What the advice is given for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Task {
+    /// Target T, m.
+    pub target_m: f64,
+    /// Length of the tunnel, m.
+    pub length_m: f64,
+    /// How the heads share the work.
+    pub layout: HeadLayout,
+    /// Speed of sound in the tunnel's water, m/s.
+    pub sound_speed_mps: f64,
+}
+
+/// Gives advice; remembers the beams of heads that keep their place in the section.
+#[derive(Debug, Clone)]
+pub struct Advisor {
+    profile: Profile,
+    task: Task,
+    heads: Vec<AdvisedHead>,
+    views: Vec<View>,
+    /// The wall as the heads are set now, and in each of their modes.
+    now: Strips,
+    modes: Strips,
+    /// The largest steps in each mode in the middle of the tunnel, m.
+    centred_m: Vec<f64>,
+    /// What each head sees from there.
+    middle: Vec<Ring>,
+    parallax_rad: f64,
+    /// How many soundings of its ring the step of each head that turns passes over.
+    strides: [Option<usize>; MAX_HEADS],
+    /// The head whose ring is looked at first.
+    next: usize,
+    /// Pieces of advice until alternatives are thought over, and what they were.
+    until_alternatives: u32,
+    alternatives: [Option<Alternative>; MAX_MODES],
+    astern: bool,
+    /// The largest speed found last: where it still does, no other is looked for.
+    last_mps: Option<f64>,
+    /// How far the vehicle may move before beams are cast anew, m.
+    still_m: f64,
+}
+
+stateful!(Advisor { state: now, parallax_rad, next, until_alternatives, alternatives, astern, last_mps, still_m; slots: strides; each: heads, views; fixed: profile, task, modes, centred_m, middle; });
+
+impl Advisor {
+    /// For heads with the modes that each has, and the parts of the hull that may stand in their way.
+    ///
+    /// Allocates: startup only.
+    pub fn new(
+        profile: &Profile,
+        task: Task,
+        heads: &[(HeadSpec, Vec<HeadMode>)],
+        hull: &[Obstacle],
+    ) -> Self {
+        let specs: Vec<HeadSpec> = heads.iter().map(|(spec, _)| *spec).collect();
+        let hidden = occlusion::hidden_by_vehicle(&specs, hull);
+        let programs = layout::programs(&specs, task.layout, 0.0).unwrap_or_default();
+        let sector = |head: usize| {
+            let (from_rad, size_rad) = programs.get(head)?.sector?;
+            Some(AngleRange { from_rad, size_rad })
+        };
+        let advised =
+            heads.iter().zip(hidden).enumerate().map(|(number, ((spec, modes), hidden))| AdvisedHead {
+                spec: *spec,
+                modes: modes.iter().copied().take(MAX_MODES).collect(),
+                hidden,
+                sector: sector(number),
+                ring: Ring::default(),
+                cast_at: None,
+            });
+        let heads: Vec<AdvisedHead> = advised.collect();
+        let room = |head: &AdvisedHead| head.hidden.len() + OUT_OF_REACH;
+        let view = |head: &AdvisedHead| View { sector: None, hidden: Vec::with_capacity(room(head)) };
+        let arcs = heads.iter().map(|head| room(head) + 1).sum();
+        let mut advisor = Self {
+            profile: profile.clone(),
+            task,
+            views: heads.iter().map(view).collect(),
+            heads,
+            now: Strips::with_room(arcs, 1, RING),
+            modes: Strips::with_room(arcs, MAX_MODES, RING),
+            centred_m: Vec::new(),
+            middle: Vec::new(),
+            parallax_rad: 0.0,
+            strides: [None; MAX_HEADS],
+            next: 0,
+            until_alternatives: 0,
+            alternatives: [None; MAX_MODES],
+            astern: false,
+            last_mps: None,
+            still_m: 0.0,
+        };
+        advisor.look_from_the_middle();
+        advisor
+    }
+
+    /// Casting once makes the room that later casts use; a head that is outside there has nothing to remember.
+    fn look_from_the_middle(&mut self) {
+        let [y, z] = self.profile.reference();
+        let centre = Pose { position: Point3::new(0.0, y, z), attitude: Rot::identity() };
+        for (head, view) in self.heads.iter_mut().zip(&mut self.views) {
+            if head.cast(&self.profile, &centre).is_ok() {
+                head.look(&self.profile, &centre, self.task.sound_speed_mps, view);
+            }
+        }
+        self.now.rebuild(self.profile.perimeter_m(), &self.views);
+        self.measure_modes();
+        self.centred_m = (0..MAX_MODES).map(|mode| self.modes.largest_step_m(mode)).collect();
+        self.middle = self.heads.iter().map(|head| head.ring.clone()).collect();
+        for head in &mut self.heads {
+            head.cast_at = None;
+        }
+    }
+
+    /// The angles that the vehicle hides from each head, in the heads' own frames.
+    pub fn hidden_angles(&self) -> impl Iterator<Item = &[AngleRange]> {
+        self.heads.iter().map(|head| head.hidden.as_slice())
+    }
+
+    /// Soundings of a ring that a step passes over: steps of as many are alike to [`Advisor::middle_step_m`].
+    pub fn stride(step_rad: f64) -> usize {
+        Ring::stride(step_rad, RING)
+    }
+
+    /// The largest distance along the wall of two pings `step_rad` apart, from the middle of the tunnel, level, m.
+    ///
+    /// Allocates: never.
+    pub fn middle_step_m(&self, step_rad: f64) -> f64 {
+        let largest_m = |ring: &Ring| {
+            let pairs = ring.pairs(Ring::stride(step_rad, RING));
+            let steps =
+                pairs.map(|(a, b)| math::wrap_signed(b.sigma_m - a.sigma_m, ring.perimeter_m()).abs());
+            steps.fold(0.0, f64::max)
+        };
+        self.middle.iter().map(largest_m).fold(0.0, f64::max)
+    }
+
+    /// The largest speed at which the predicted T_max stays within the target, by inverting Eq. 16 with what is
+    /// measured: turn period, step, number and phases of the heads as they would meet the wall at that speed, what
+    /// the vehicle hides from them or is out of their reach, its place and attitude, and how it swings. `left_s` is the
+    /// time that is left, where it is known.
+    ///
+    /// Heads apart along the hull keep their phases at some speeds only: the largest is the end of the stretch of speeds
+    /// in which the vehicle goes now, if that meets the target; else of the stretch advised last, else of any.
+    /// Source: metrics.md, "Speed advice".
+    /// Allocates: never.
+    pub fn advise(&mut self, situation: &Situation, swing: Swing, left_s: Option<f64>) -> Advice {
+        let Some(pose) = situation.pose else { return Advice::nothing(Reason::NoHeadingOrFix) };
+        if situation.heads.iter().all(Option::is_none) {
+            return Advice::nothing(Reason::NoReturns);
+        }
+        if !self.look(situation, &pose) {
+            return Advice::nothing(Reason::NoHeadingOrFix);
+        }
+        if situation.speed_mps.abs() > UNDER_WAY_MPS {
+            self.astern = situation.speed_mps < 0.0;
+        }
+        let phasing = Phasing::of(situation);
+        let passes = phasing.at(situation.speed_mps).beside(self.parallax_rad);
+        let ping_period_s =
+            situation.heads.iter().flatten().map(HeadMotion::ping_period_s).fold(0.0, f64::max);
+        let farthest_m = self.profile.farthest_m([pose.position.y(), pose.position.z()]);
+        let going = Going {
+            ping_period_s,
+            swing_mps: swing.rate_radps * farthest_m,
+            shift_m: 0.0,
+            apart_m: phasing.apart_m(),
+            swing_most_m: Some(swing.most_rad * farthest_m),
+        };
+        // What is just within the target, but not surely, can't pass; where no speed leaves such room, the target alone counts.
+        let sure_m = self.task.target_m - margin_m(situation.doubt_m, self.task.target_m);
+        let fastest = self
+            .fastest_mps(situation, &passes, &going, sure_m)
+            .or_else(|_| self.fastest_mps(situation, &passes, &going, self.task.target_m));
+        let possible = fastest.as_ref().ok().filter(|fastest| fastest.speed_mps > 0.0);
+        let advised_mps = possible.map(|fastest| fastest.advised_mps);
+        self.last_mps = possible.map(|fastest| fastest.speed_mps);
+        self.still_m = self.still_m_for(&fastest, &going);
+        let predicted_t_m = self.now.t_max_m(0, &passes, situation.speed_mps.abs(), &going);
+        let x_m = pose.position.x();
+        let left_m = if self.astern { x_m } else { self.task.length_m - x_m };
+        self.think_over(&passes, &going);
+        let unseen_m = match fastest {
+            Err(SamplingError::UnseenStrip { width_m, sigma_m, .. }) => Some([width_m, sigma_m]),
+            _ => None,
+        };
+        let errors = passes.phase_errors_rad(self.heads.len()).into_iter().flatten();
+        let helps = advised_mps.is_some();
+        Advice {
+            v_max_mps: advised_mps.unwrap_or(0.0),
+            reason: if helps { Reason::HelixPitch } else { Reason::AngularStep },
+            predicted_t_m: predicted_t_m.is_finite().then_some(predicted_t_m),
+            will_exceed: predicted_t_m > self.task.target_m,
+            pass_gap_s: passes.gap_s(passes.heads()).unwrap_or(0.0),
+            even_pass_gap_s: passes.even_gap_s(),
+            t_y_m: self.now.largest_step_m(0),
+            ping_period_s,
+            phase_error_rad: errors
+                .max_by(|a, b| a.abs().total_cmp(&b.abs()))
+                .filter(|_| passes.heads().len() > 1),
+            left: Left { length_m: left_m.clamp(0.0, self.task.length_m), time_s: left_s },
+            unseen_m,
+            remedy: if helps { None } else { self.remedy(situation, &passes, &going, unseen_m.is_some()) },
+            alternatives: self.alternatives,
+        }
+    }
+
+    /// Looks at the wall from where the vehicle is; `false` when no head that turns can.
+    ///
+    /// A head's beams are cast anew when the vehicle has moved; of several whose beams are old, one a call, since a
+    /// vehicle doesn't move far between two.
+    fn look(&mut self, situation: &Situation, pose: &Pose) -> bool {
+        let count = self.heads.len().max(1);
+        let present = |number: usize| situation.heads.get(number).is_some_and(Option::is_some);
+        let first = self.next;
+        let mut may_cast = true;
+        let mut cast = false;
+        for number in (first..first + count).map(|number| number % count).filter(|number| present(*number)) {
+            let (Some(head), Some(view)) = (self.heads.get_mut(number), self.views.get_mut(number)) else {
+                continue;
+            };
+            if head.cast_at.is_none() || may_cast && !head.is_near(pose, self.still_m) {
+                may_cast &= head.cast_at.is_none();
+                if head.cast(&self.profile, pose).is_ok() {
+                    head.look(&self.profile, pose, self.task.sound_speed_mps, view);
+                }
+                self.next = (number + 1) % count;
+                cast = true;
+            }
+        }
+        let stride = |motion: Option<HeadMotion>| Some(Ring::stride(motion?.step_rad, RING));
+        let strides = situation.heads.map(stride);
+        if cast || strides != self.strides {
+            self.strides = strides;
+            self.measure_now(pose);
+        }
+        self.heads.iter().enumerate().any(|(number, head)| present(number) && head.cast_at.is_some())
+    }
+
+    fn measure_now(&mut self, pose: &Pose) {
+        let mut places = [[0.0; 2]; MAX_HEADS];
+        let mut known = 0;
+        for (head, slot) in self.heads.iter().filter(|head| head.cast_at.is_some()).zip(&mut places) {
+            let place = pose.place(head.spec.mount.position);
+            *slot = [place.y(), place.z()];
+            known += 1;
+        }
+        self.parallax_rad = passes::parallax_rad(&self.profile, places.get(..known).unwrap_or_default());
+        self.now.rebuild(self.profile.perimeter_m(), &self.views);
+        // Most heads' rings are those of the last piece of advice.
+        for (head, stride) in self.heads.iter_mut().zip(self.strides) {
+            if let Some(stride) = stride {
+                head.ring.keep_steps(stride);
+            }
+        }
+        let rings = self.heads.iter().map(|head| &head.ring);
+        self.now.measure(1, rings, |_, head| self.strides.get(head).copied().flatten());
+    }
+
+    /// The largest speed at which the phases measured now meet a target, and what to advise of it.
+    ///
+    /// Errors: no speed would.
+    fn fastest_mps(
+        &self,
+        situation: &Situation,
+        passes: &Passes,
+        going: &Going,
+        target_m: f64,
+    ) -> Result<Fastest, SamplingError> {
+        // However the heads were phased, no speed beyond this one would do.
+        let bound_mps = target_m / (passes.even_gap_s() + going.ping_period_s);
+        let t_y_m = self.now.bound_for_target(0, passes, target_m, going)?.t_y_m;
+        let heading = if self.astern { -1.0 } else { 1.0 };
+        let phasing = Phasing::of(situation);
+        let meets = |speed_mps: f64| {
+            let then = phasing.at(heading * speed_mps).beside(self.parallax_rad);
+            // No strip has more passes than all heads make: most speeds are ruled out by these alone.
+            let gap_s = then.gap_s(then.heads()).unwrap_or(f64::INFINITY);
+            speed_mps * gap_s <= target_m && self.now.meets(0, &then, speed_mps, target_m, going)
+        };
+        let now_mps = Some(situation.speed_mps.abs()).filter(|now_mps| *now_mps > UNDER_WAY_MPS);
+        let known = now_mps.into_iter().chain(self.last_mps);
+        let from_mps = known.into_iter().find(|speed_mps| *speed_mps < bound_mps && meets(*speed_mps));
+        let speed_mps = match from_mps {
+            Some(from_mps) => search::upwards_mps(from_mps, bound_mps, meets),
+            None => search::downwards_mps(bound_mps, meets),
+        };
+        let advised_mps = search::kept_back_mps(speed_mps, SPEED_MARGIN, meets);
+        Ok(Fastest { speed_mps, advised_mps, t_y_m })
+    }
+
+    /// How far the vehicle may move before beams are cast anew, m.
+    fn still_m_for(&self, fastest: &Result<Fastest, SamplingError>, going: &Going) -> f64 {
+        let (t_y_m, swing_share) = match fastest {
+            Ok(fastest) => (fastest.t_y_m, going.swing_mps / fastest.speed_mps.max(UNDER_WAY_MPS)),
+            // A swing too wide for any speed is so from a bit aside, too.
+            Err(SamplingError::OffAxis { .. }) => (self.now.largest_step_m(0), 0.0),
+            // Any step may be what stands in the way.
+            Err(_) => (self.task.target_m, 0.0),
+        };
+        look::still_m(self.task.target_m, t_y_m, self.profile.perimeter_m() / math::TAU, swing_share)
+    }
+
+    /// Thinks over what each mode that all heads have would allow, those that turn now started in phase.
+    fn think_over(&mut self, passes: &Passes, going: &Going) {
+        if let Some(left) = self.until_alternatives.checked_sub(1) {
+            self.until_alternatives = left;
+            return;
+        }
+        self.until_alternatives = ALTERNATIVES_EVERY - 1;
+        self.measure_modes();
+        let names = self.heads.first().map(|head| head.modes.as_slice()).unwrap_or_default();
+        let mut alternatives = [None; MAX_MODES];
+        for (number, (slot, mode)) in alternatives.iter_mut().zip(names).enumerate() {
+            let Some(v_mps) = self.mode_speed_mps(number, passes.heads(), going) else { continue };
+            *slot =
+                Some(Alternative { mode: ModeName::new(mode.name), v_max_mps: v_mps * (1.0 - SPEED_MARGIN) });
+        }
+        self.alternatives = alternatives;
+    }
+
+    fn measure_modes(&mut self) {
+        let Self { heads, modes, views, profile, .. } = self;
+        modes.rebuild(profile.perimeter_m(), views);
+        let name = |mode: usize| heads.first()?.modes.get(mode).map(|mode| mode.name);
+        let rings = heads.iter().map(|head| &head.ring);
+        modes.measure(MAX_MODES, rings, |mode, head| {
+            let turn = heads.get(head)?.mode(name(mode)?)?.turn;
+            Some(Ring::stride(turn.step_rad(), RING))
+        });
+    }
+
+    /// The largest speed in a mode, zero where none is; `None` when a head doesn't have it.
+    fn mode_speed_mps(&self, number: usize, heads: HeadSet, going: &Going) -> Option<f64> {
+        let name = self.heads.first()?.modes.get(number)?.name;
+        let turn = |head: usize| self.heads.get(head)?.mode(name).map(|mode| mode.turn);
+        let (mut longest_s, mut ping_period_s) = (0.0_f64, 0.0_f64);
+        for head in heads.iter() {
+            longest_s = longest_s.max(turn(head)?.period_s());
+            ping_period_s = ping_period_s.max(turn(head)?.ping_period_s());
+        }
+        let passes = match self.task.layout {
+            // Sectors stay as large as they are, however many heads are left.
+            HeadLayout::SectorOffset => {
+                Passes::in_sectors(heads, 2.0 * longest_s / self.heads.len().max(1) as f64)
+            }
+            HeadLayout::PhaseShift => {
+                Passes::evenly_phased(heads, |head| turn(head).map_or(0.0, |turn| turn.period_s()))
+            }
+        };
+        let passes = passes.ok()?.beside(self.parallax_rad);
+        let going = Going { ping_period_s, ..*going };
+        let bound = self.modes.bound_for_target(number, &passes, self.task.target_m, &going);
+        Some(bound.map_or(0.0, |bound| bound.speed_mps))
+    }
+
+    /// What would help: a steady heading, where that alone would; the middle, where the same steps are short enough
+    /// there; or the mode that is fastest.
+    fn remedy(&self, situation: &Situation, passes: &Passes, going: &Going, unseen: bool) -> Option<Remedy> {
+        let target_m = self.task.target_m;
+        let steady = Going { ping_period_s: going.ping_period_s, ..Going::default() };
+        if going.swing_mps > 0.0 && self.now.bound_for_target(0, passes, target_m, &steady).is_ok() {
+            return Some(Remedy::Steady);
+        }
+        let stride = situation.heads.iter().flatten().map(|motion| Ring::stride(motion.step_rad, RING)).max();
+        let same = |mode: &HeadMode| Some(Ring::stride(mode.turn.step_rad(), RING)) == stride;
+        let modes = self.heads.first().map(|head| head.modes.as_slice()).unwrap_or_default();
+        let centred_m = modes.iter().position(same).and_then(|mode| self.centred_m.get(mode));
+        if !unseen
+            && self.now.largest_step_m(0) >= target_m
+            && centred_m.is_some_and(|centred_m| *centred_m < target_m)
+        {
+            return Some(Remedy::Centre);
+        }
+        let best = self.alternatives.iter().flatten().max_by(|a, b| a.v_max_mps.total_cmp(&b.v_max_mps));
+        best.filter(|best| best.v_max_mps > 0.0).map(|best| Remedy::Mode(best.mode))
+    }
+}
+
+/// What of the target is left to errors of position, m: two standard deviations, as a verdict of pass wants; a fifth of the
+/// target at most, since no speed makes up for a lost position.
+fn margin_m(doubt_m: f64, target_m: f64) -> f64 {
+    /// Less is nothing: a navigation that doesn't know its errors says so much.
+    const NOTHING_M: f64 = 0.002;
+    (2.0 * (doubt_m - NOTHING_M).max(0.0)).min(target_m / 5.0)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,78 @@
+//! How a head sees the wall from where the vehicle is.
+
+use crate::error::SamplingError;
+use crate::head::{HeadMode, HeadSpec};
+use crate::occlusion::AngleRange;
+use crate::ring::{Ring, Standing};
+use crate::strips::{Arc, View};
+use headrace_geometry::frames::Pose;
+use headrace_geometry::tunnel::Profile;
+use headrace_snapshot::stateful;
+
+use super::RING;
+
+/// By what share the speed may change while a vehicle moves, before the beams of its heads are cast anew.
+const SHARE: f64 = 0.002;
+/// The least and the most that it may move across the tunnel meanwhile, m: what the target leaves may be next to nothing;
+/// and what is hidden moves along with the vehicle.
+const STILL_M: [f64; 2] = [0.004, 0.1];
+/// And turn for each metre of that, as a quaternion's component (half an angle, rad).
+const TURN_PER_M: f64 = 0.2;
+
+/// How far the vehicle may move across the tunnel, m, before the beams of its heads are cast anew, where steps of `t_y_m` on
+/// a wall `range_m` away bound the speed v for a target T, and the beams' swing w takes `swing_share` = w / v of it.
+///
+/// Of v + w ~ T_x = sqrt(T^2 - T_y^2) a change dT_y takes (T_y / T_x)^2 dT_y / T_y, and a step changes with its range, twice
+/// as much where the wall falls away.
+pub(super) fn still_m(target_m: f64, t_y_m: f64, range_m: f64, swing_share: f64) -> f64 {
+    let around2 = t_y_m * t_y_m;
+    let along2 = (target_m * target_m - around2).max(0.0);
+    (SHARE * range_m / (2.0 * around2 / along2 * (1.0 + swing_share))).clamp(STILL_M[0], STILL_M[1])
+}
+
+/// A head, and its ring as last cast.
+#[derive(Debug, Clone)]
+pub(super) struct AdvisedHead {
+    pub(super) spec: HeadSpec,
+    pub(super) modes: Vec<HeadMode>,
+    /// Angles that the vehicle hides, and the sector, in the sensor's frame.
+    pub(super) hidden: Vec<AngleRange>,
+    pub(super) sector: Option<AngleRange>,
+    pub(super) ring: Ring,
+    pub(super) cast_at: Option<Pose>,
+}
+
+stateful!(AdvisedHead { state: ring, cast_at; fixed: spec, modes, hidden, sector; });
+
+impl AdvisedHead {
+    /// Whether the vehicle is where its ring was cast, within `still_m` and [`TURN_PER_M`] of that.
+    pub(super) fn is_near(&self, pose: &Pose, still_m: f64) -> bool {
+        let Some(cast_at) = &self.cast_at else { return false };
+        let near = |a: &[f64], b: &[f64], by: f64| a.iter().zip(b).all(|(a, b)| (a - b).abs() <= by);
+        let place = |pose: &Pose| [pose.position.y(), pose.position.z()];
+        near(&place(cast_at), &place(pose), still_m)
+            && near(&cast_at.attitude.wxyz(), &pose.attitude.wxyz(), still_m * TURN_PER_M)
+    }
+
+    /// Casts the head's ring anew; a head that can't look from there keeps what it saw last.
+    pub(super) fn cast(&mut self, profile: &Profile, pose: &Pose) -> Result<(), SamplingError> {
+        self.cast_at = None;
+        let standing = Standing::new(profile, pose, &self.spec.mount)?;
+        self.ring.recast(&standing, 0.0, RING)?;
+        self.cast_at = Some(*pose);
+        Ok(())
+    }
+
+    /// Where on the wall its sector is, and what it doesn't see.
+    pub(super) fn look(&self, profile: &Profile, pose: &Pose, sound_speed_mps: f64, view: &mut View) {
+        view.hidden.clear();
+        let Ok(standing) = Standing::new(profile, pose, &self.spec.mount) else { return };
+        view.sector = self.sector.and_then(|angles| Arc::of(&standing, &angles).ok());
+        view.hidden.extend(self.hidden.iter().filter_map(|angles| Arc::of(&standing, angles).ok()));
+        view.hide_out_of_reach(&self.ring, self.spec.reach_m(sound_speed_mps));
+    }
+
+    pub(super) fn mode(&self, name: &str) -> Option<&HeadMode> {
+        self.modes.iter().find(|mode| mode.name == name)
+    }
+}

@@ -1,0 +1,340 @@
+use super::*;
+use crate::fixtures;
+use crate::head::{Basis, Turn};
+use crate::spacing;
+use headrace_geometry::frames::Vec3;
+use headrace_geometry::math::TAU;
+use headrace_geometry::tunnel::shapes;
+
+const LENGTH_M: f64 = 1000.0;
+
+fn spec(position: [f64; 3], radius_m: f64) -> HeadSpec {
+    fixtures::head(position, false, radius_m)
+}
+
+fn modes() -> Vec<HeadMode> {
+    let mode = |name, step_deg: f64, period_s| HeadMode {
+        name,
+        turn: Turn::new(step_deg.to_radians(), period_s).unwrap(),
+        basis: Basis::Table,
+    };
+    vec![mode("slow", 0.3, 21.6), mode("fast", 0.9, 8.0), mode("fastest", 2.4, 4.8)]
+}
+
+struct Case {
+    profile: Profile,
+    specs: Vec<HeadSpec>,
+    situation: Situation,
+    target_m: f64,
+    left_s: Option<f64>,
+}
+
+impl Case {
+    /// Heads at x along the hull with these angles, all in FAST, in the middle of `ceran`.
+    fn new(angles_deg: &[f64], x_m: &[f64], speed_mps: f64, target_m: f64) -> Self {
+        let profile = shapes::ceran().unwrap();
+        let specs: Vec<HeadSpec> = x_m.iter().map(|x| spec([*x, 0.0, 0.0], 0.0)).collect();
+        let mut heads = [None; MAX_HEADS];
+        for ((slot, angle), spec) in heads.iter_mut().zip(angles_deg).zip(&specs) {
+            *slot = Some(HeadMotion {
+                mount: spec.mount,
+                angle_rad: angle.to_radians(),
+                rate_radps: TAU / 8.0,
+                step_rad: spec.step_rad,
+                sector_rad: None,
+            });
+        }
+        let [y, z] = profile.reference();
+        let pose = Pose { position: Point3::new(100.0, y, z), attitude: Rot::identity() };
+        let situation = Situation {
+            pose: Some(pose),
+            doubt_m: 0.0,
+            speed_mps,
+            layout: HeadLayout::PhaseShift,
+            configured: specs.len(),
+            heads,
+        };
+        Self { profile, specs, situation, target_m, left_s: None }
+    }
+
+    fn advisor(&self) -> Advisor {
+        let heads: Vec<_> = self.specs.iter().map(|spec| (*spec, modes())).collect();
+        let task = Task {
+            target_m: self.target_m,
+            length_m: LENGTH_M,
+            layout: self.situation.layout,
+            sound_speed_mps: 1500.0,
+        };
+        Advisor::new(&self.profile, task, &heads, &[])
+    }
+
+    fn advice(&self) -> Advice {
+        self.advisor().advise(&self.situation, Swing::default(), self.left_s)
+    }
+}
+
+#[test]
+fn at_the_largest_speed_the_target_is_just_met() {
+    let advice = Case::new(&[10.0, 100.0, 190.0, 280.0], &[0.0; 4], 0.2, 0.5).advice();
+    assert!((advice.pass_gap_s - 2.0).abs() < 1e-9 && (advice.even_pass_gap_s - 2.0).abs() < 1e-12);
+    assert_eq!((advice.reason, advice.remedy), (Reason::HelixPitch, None));
+    let v = advice.v_max_mps / (1.0 - SPEED_MARGIN);
+    let t_m = spacing::t_max_m(v * advice.pass_gap_s, v * advice.ping_period_s, advice.t_y_m);
+    assert!((t_m - 0.5).abs() < 1e-9);
+    assert!(advice.phase_error_rad.unwrap().abs() < 1e-9);
+}
+
+#[test]
+fn the_largest_speed_is_one_at_which_the_phases_of_heads_apart_hold() {
+    let case = Case::new(&[0.0, 0.0], &[0.8, 0.0], 0.2, 1.0);
+    let advice = case.advice();
+    let t_at = |speed_mps: f64| {
+        let passes = Phasing::of(&case.situation).at(speed_mps);
+        let gap_s = passes.gap_s(passes.heads()).unwrap();
+        spacing::t_max_m(speed_mps * gap_s, speed_mps * advice.ping_period_s, advice.t_y_m)
+    };
+    let v_max = advice.v_max_mps / (1.0 - SPEED_MARGIN);
+    assert!((t_at(v_max) - 1.0).abs() < 1e-6, "{v_max}: {}", t_at(v_max));
+    assert!(t_at(1.02 * v_max) > 1.0);
+    // Evenly spread at every speed, they could go faster.
+    let even = spacing::speed_for_target_mps(1.0, advice.t_y_m, 4.0, advice.ping_period_s).unwrap();
+    assert!(v_max < 0.99 * even, "{v_max} and {even}");
+    let faster = Case::new(&[0.0, 0.0], &[0.8, 0.0], 0.5, 1.0).advice();
+    assert!(advice.phase_error_rad.unwrap().abs() < 1e-9 && faster.phase_error_rad.unwrap().abs() > 0.5);
+    // Too fast, it is told of a speed that will do.
+    let passes = Phasing::of(&case.situation).at(faster.v_max_mps);
+    let t_m = |v: f64| spacing::t_max_m(v * passes.gap_s(passes.heads()).unwrap(), v * 0.02, faster.t_y_m);
+    assert!(faster.v_max_mps > 0.1 && t_m(faster.v_max_mps) <= 1.0);
+}
+
+#[test]
+fn a_speed_that_meets_the_target_is_not_called_too_fast() {
+    // Heads 1.1 m apart meet 0.5 m in narrow stretches of speed only; the vehicle goes in one of them.
+    let phase_deg = |v: f64| 180.0 - 360.0 * 1.1 / (v * 8.0);
+    for v in [0.06, 0.085, 0.1, 0.105] {
+        let case = Case::new(&[0.0, phase_deg(v)], &[0.0, -1.1], v, 0.5);
+        let advice = case.advice();
+        assert!(advice.predicted_t_m.unwrap() <= 0.5, "{v}: {advice:?}");
+        assert!(advice.v_max_mps >= v * (1.0 - SPEED_MARGIN), "{v}: {}", advice.v_max_mps);
+    }
+}
+
+#[test]
+fn in_sectors_a_head_that_is_gone_leaves_its_sector_unseen() {
+    let mut case = Case::new(&[10.0, 190.0], &[0.0; 2], 0.05, 0.8);
+    case.situation.layout = HeadLayout::SectorOffset;
+    let whole = case.advice();
+    assert!(whole.v_max_mps > 0.08 && whole.phase_error_rad.is_none(), "{whole:?}");
+    assert!((whole.pass_gap_s - 8.0).abs() < 1e-9);
+    case.situation.heads[1] = None;
+    let half = case.advice();
+    assert_eq!((half.v_max_mps, half.reason), (0.0, Reason::AngularStep));
+    let [width_m, sigma_m] = half.unseen_m.unwrap();
+    assert!((width_m - 17.95).abs() < 0.1 && (sigma_m - 26.9).abs() < 0.2, "{width_m} {sigma_m}");
+    assert!(half.remedy.is_none() && half.predicted_t_m.unwrap() > 17.0);
+}
+
+#[test]
+fn a_wall_out_of_reach_is_not_seen() {
+    let mut case = Case::new(&[0.0], &[0.0], 0.2, 0.5);
+    case.specs[0].range_m[1] = 2.0;
+    let advice = case.advice();
+    assert!(advice.v_max_mps <= 0.0 && advice.predicted_t_m.is_none(), "{advice:?}");
+}
+
+#[test]
+fn at_rest_the_way_out_stays_the_way_out() {
+    let case = Case::new(&[0.0, 180.0], &[0.0; 2], 0.2, 1.0);
+    let mut advisor = case.advisor();
+    let mut then = case.situation;
+    for (speed_mps, expected_m) in [(0.2, 900.0), (-1e-3, 900.0), (-0.1, 100.0), (1e-3, 100.0), (0.1, 900.0)]
+    {
+        then.speed_mps = speed_mps;
+        let left_m = advisor.advise(&then, Swing::default(), None).left.length_m;
+        assert!((left_m - expected_m).abs() < 1e-9, "{speed_mps}");
+    }
+}
+
+#[test]
+fn on_the_way_back_the_phases_and_the_length_of_the_way_back_count() {
+    let case = Case::new(&[30.0, 250.0], &[0.9, -0.3], -0.2, 1.0);
+    let advice = case.advice();
+    let v = advice.v_max_mps / (1.0 - SPEED_MARGIN);
+    let passes = Phasing::of(&case.situation).at(-v);
+    let gap_s = passes.gap_s(passes.heads()).unwrap();
+    assert!(spacing::t_max_m(v * gap_s, v * advice.ping_period_s, advice.t_y_m) <= 1.0 + 1e-6);
+    assert!(
+        (advice.left.hours_at(advice.v_max_mps).unwrap() - 100.0 / advice.v_max_mps / 3600.0).abs() < 1e-12
+    );
+}
+
+#[test]
+fn alternatives_give_speed_hours_and_whether_they_suffice() {
+    let mut case = Case::new(&[0.0, 180.0], &[0.0, 0.0], 0.2, 1.0);
+    assert_eq!(case.advice().left.suffices_at(1.0), None);
+    case.left_s = Some(3000.0);
+    let advice = case.advice();
+    let names: Vec<_> = advice.alternatives.iter().flatten().map(|other| other.mode.as_str()).collect();
+    assert_eq!(names, ["slow", "fast", "fastest"]);
+    let [slow, fast, _] = [0, 1, 2].map(|k| advice.alternatives[k].unwrap());
+    // The present mode, in phase: what is advised anyway.
+    assert!((fast.v_max_mps - advice.v_max_mps).abs() < 1e-9);
+    assert!((slow.v_max_mps - 1.0 / 10.818 * 0.99).abs() < 1e-3);
+    assert!((advice.left.hours_at(fast.v_max_mps).unwrap() - 900.0 / fast.v_max_mps / 3600.0).abs() < 1e-12);
+    // 900 m in 3,000 s take 0.3 m/s.
+    let suffices = |v_mps| advice.left.suffices_at(v_mps).unwrap();
+    assert!(!suffices(0.299) && suffices(0.301) && !suffices(slow.v_max_mps));
+}
+
+#[test]
+fn where_slower_does_not_help_it_says_what_would() {
+    let mut case = Case::new(&[0.0], &[0.0], 0.2, 0.1);
+    let advice = case.advice();
+    assert_eq!((advice.v_max_mps, advice.reason), (0.0, Reason::AngularStep));
+    assert_eq!(advice.remedy, Some(Remedy::Mode(ModeName::new("slow"))));
+    assert_eq!(advice.left.hours_at(advice.v_max_mps), None);
+    assert!(advice.alternatives[0].unwrap().v_max_mps > 0.0);
+
+    // Near the floor's corner the same mode's steps are too long; in the middle they aren't.
+    case = Case::new(&[0.0], &[0.0], 0.2, 0.25);
+    assert_eq!(case.advice().reason, Reason::HelixPitch);
+    case.situation.pose =
+        case.situation.pose.map(|pose| Pose { position: Point3::new(100.0, 3.0, 1.5), ..pose });
+    let aside = case.advice();
+    assert_eq!((aside.reason, aside.remedy), (Reason::AngularStep, Some(Remedy::Centre)), "{aside:?}");
+
+    case.situation.pose = None;
+    assert_eq!(case.advice().reason, Reason::NoHeadingOrFix);
+    let blind = Case::new(&[], &[0.0], 0.2, 0.5);
+    assert_eq!(blind.advice().reason, Reason::NoReturns);
+    let mut outside = Case::new(&[0.0], &[0.0], 0.2, 0.5);
+    outside.situation.pose = Some(Pose { position: Point3::new(0.0, 9.0, 0.0), attitude: Rot::identity() });
+    assert_eq!(outside.advice().reason, Reason::NoHeadingOrFix);
+}
+
+#[test]
+fn heads_that_hide_the_wall_from_each_other_slow_the_vehicle_down() {
+    let free = Case::new(&[0.0, 90.0, 180.0, 270.0], &[0.0; 4], 0.1, 0.5).advice();
+    let case = hiding_each_other();
+    let mut advisor = case.advisor();
+    let hidden = advisor.advise(&case.situation, Swing::default(), None);
+    assert!((hidden.pass_gap_s - 2.0).abs() < 0.15, "{hidden:?}");
+    // Both heads on one side look at the other wall past a neighbour: half of the passes are missing there.
+    let parallax_s = advisor.parallax_rad / TAU * 8.0;
+    assert!((0.1..0.15).contains(&parallax_s), "{parallax_s}");
+    // The hidden strips lie where steps are short.
+    let t_m = spacing::t_max_m(0.125 * (4.0 + parallax_s), 0.125 * 0.02, 0.1);
+    assert!((hidden.predicted_t_m.unwrap() - t_m).abs() < 0.01, "{hidden:?}");
+    assert!(hidden.v_max_mps < 0.6 * free.v_max_mps, "{} and {}", hidden.v_max_mps, free.v_max_mps);
+}
+
+#[test]
+fn old_rings_are_cast_one_a_call_and_the_same_in_the_end() {
+    let mut case = Case::new(&[0.0, 120.0, 240.0], &[0.0; 3], 0.1, 0.5);
+    for (spec, y_m) in case.specs.iter_mut().zip([-0.5, 0.0, 0.5]) {
+        spec.mount.position = Vec3::new(0.0, y_m, 0.0);
+    }
+    let mut advisor = case.advisor();
+    advisor.advise(&case.situation, Swing::default(), None);
+    let pose = case.situation.pose.unwrap();
+    assert!(advisor.heads.iter().all(|head| head.is_near(&pose, 1e-9)), "at first all are cast");
+    let moved = Pose { position: Point3::new(100.0, 1.0, pose.position.z()), ..pose };
+    let then = Situation { pose: Some(moved), ..case.situation };
+    for cast in 1..=3 {
+        advisor.advise(&then, Swing::default(), None);
+        assert_eq!(advisor.heads.iter().filter(|head| head.is_near(&moved, 1e-9)).count(), cast);
+    }
+    let fresh = case.advisor().advise(&then, Swing::default(), None).t_y_m;
+    assert!((advisor.advise(&then, Swing::default(), None).t_y_m - fresh).abs() < 1e-12);
+}
+
+/// Heads beside each other, so that each hides some of the wall from the next.
+fn hiding_each_other() -> Case {
+    let mut case = Case::new(&[0.0, 90.0, 180.0, 270.0], &[0.0; 4], 0.125, 0.5);
+    let places = [[0.5, 0.15, 0.0], [0.5, -0.15, 0.0], [-0.5, 0.15, 0.0], [-0.5, -0.15, 0.0]];
+    for ((spec, motion), place) in case.specs.iter_mut().zip(&mut case.situation.heads).zip(places) {
+        *spec = self::spec(place, 0.04);
+        // Phased for 0.125 m/s, at which 1 m is a whole turn's advance.
+        if let Some(motion) = motion {
+            motion.mount = spec.mount;
+        }
+    }
+    case
+}
+
+/// The largest share by which the speed of an advisor that remembers is off that of one that looks anew, on a way to and fro
+/// and round about, at 1.5 cm/s and half a degree a second; and how many rings it has cast in 600 pieces of advice.
+fn off_by(case: &Case, swing: Swing) -> (f64, usize) {
+    let [y_m, z_m] = case.profile.reference();
+    let mut advisor = case.advisor();
+    let (mut most, mut cast) = (0.0_f64, 0);
+    for beat in 0..600 {
+        let s = f64::from(beat) * 0.2;
+        let position = Point3::new(100.0, y_m + 0.9 * math::sin(s / 90.0), z_m + 0.5 * math::sin(s / 70.0));
+        let [roll, pitch, yaw] =
+            [(0.15, 31.0), (0.1, 23.0), (0.2, 47.0)].map(|(most, at)| most * math::sin(s / at));
+        let pose = Pose { position, attitude: Rot::from_roll_pitch_yaw(roll, pitch, yaw) };
+        let then = Situation { pose: Some(pose), ..case.situation };
+        let before: Vec<_> = advisor.heads.iter().map(|head| head.cast_at).collect();
+        let kept_mps = advisor.advise(&then, swing, None).v_max_mps;
+        cast += advisor.heads.iter().zip(before).filter(|(head, before)| head.cast_at != *before).count();
+        if beat % 7 == 0 {
+            let fresh_mps = case.advisor().advise(&then, swing, None).v_max_mps;
+            most = most.max((kept_mps / fresh_mps - 1.0).abs());
+        }
+    }
+    (most, cast)
+}
+
+#[test]
+fn what_an_advisor_remembers_hardly_changes_its_advice() {
+    let around = || Case::new(&[10.0, 100.0, 190.0, 280.0], &[0.0; 4], 0.2, 0.5);
+    let (still, swing) = (Swing::default(), Swing { rate_radps: 0.01, most_rad: 1.0 });
+    for (name, case, swing, wanted, casts) in [
+        ("four heads", around(), still, 0.005, 0..200),
+        ("hiding each other", hiding_each_other(), still, 0.002, 0..100),
+        ("a wide target", Case::new(&[0.0], &[0.0], 0.1, 1.0), still, 0.002, 0..30),
+        ("swinging", around(), swing, 0.006, 0..250),
+        // Steps are nearly as long as the target: each centimetre counts, so it looks more often.
+        ("a target hard to meet", Case::new(&[0.0, 180.0], &[0.0; 2], 0.1, 0.3), still, 0.02, 250..600),
+    ] {
+        let (off, cast) = off_by(&case, swing);
+        assert!(off < wanted && casts.contains(&cast), "{name}: {off}, {cast} rings cast");
+    }
+}
+
+#[test]
+fn the_swing_of_the_vehicle_slows_it_down_and_a_steady_heading_helps() {
+    let case = Case::new(&[0.0, 180.0], &[0.0, 0.0], 0.2, 1.0);
+    let advise = |swing: Swing| case.advisor().advise(&case.situation, swing, None);
+    let still = advise(Swing::default());
+    let swing = Swing { rate_radps: 0.01, most_rad: 1.0 };
+    let swung = advise(swing);
+    // What the beams sweep comes off the speed, as far as they reach.
+    let lost_mps = (still.v_max_mps - swung.v_max_mps) / (1.0 - SPEED_MARGIN);
+    assert!((0.05..0.07).contains(&lost_mps), "{lost_mps}");
+    assert!(swung.predicted_t_m > still.predicted_t_m && swung.reason == Reason::HelixPitch);
+    assert!(swung.alternatives[1].unwrap().v_max_mps < still.alternatives[1].unwrap().v_max_mps);
+    // To and fro by little, it costs no more than that, however fast.
+    let little = advise(Swing { rate_radps: 0.05, most_rad: 0.01 });
+    assert!(little.v_max_mps > swung.v_max_mps, "{little:?}");
+    let wild = advise(Swing { rate_radps: 0.2, most_rad: 1.0 });
+    assert_eq!((wild.v_max_mps, wild.reason), (0.0, Reason::AngularStep));
+    assert_eq!(wild.remedy, Some(Remedy::Steady));
+    assert!(wild.will_exceed && !still.will_exceed);
+}
+
+#[test]
+fn a_swing_goes_on_while_heads_apart_follow_each_other() {
+    let together = Case::new(&[0.0, 180.0], &[0.0, 0.0], 0.2, 1.5);
+    let apart = Case::new(&[0.0, 0.0], &[0.8, 0.0], 0.2, 1.5);
+    let swing = Swing { rate_radps: 0.01, most_rad: 1.0 };
+    let t_m = |case: &Case| {
+        let advice = case.advisor().advise(&case.situation, swing, None);
+        assert!((advice.pass_gap_s - 4.0).abs() < 1e-9, "{advice:?}");
+        advice.predicted_t_m.unwrap()
+    };
+    // 0.8 m at 0.2 m/s take as long as from pass to pass.
+    let swept_m = 0.01 * 4.0 * 6.05;
+    assert!((t_m(&apart) - t_m(&together) - swept_m).abs() < 0.02, "{} {}", t_m(&apart), t_m(&together));
+}

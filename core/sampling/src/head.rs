@@ -1,0 +1,262 @@
+//! A profiling head as sampling theory sees it: how it turns, how it sits, what it is told to do.
+
+use serde::{Deserialize, Serialize};
+
+use super::error::{SamplingError, positive};
+use headrace_geometry::frames::{Body, Mount, Rot, Sensor, head_direction};
+use headrace_geometry::math::{self, TAU};
+
+/// The most heads of one vehicle.
+pub const MAX_HEADS: usize = 8;
+
+/// By how many steps a turn may miss being a whole number of them: steps come from decimal degrees.
+const WHOLE_STEPS: f64 = 1e-6;
+/// The most steps of a turn.
+const MAX_STEPS: f64 = 100_000.0;
+
+/// How a head turns: equal steps, a ping at each, a whole number of them to a turn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Turn {
+    step_rad: f64,
+    period_s: f64,
+    steps: u32,
+}
+
+impl Turn {
+    /// A turn of `period_s` seconds in steps of `step_rad`, from one step a turn to 100,000.
+    ///
+    /// Errors: a step or period that isn't above zero; a step that doesn't divide a turn.
+    /// Source: Jorge et al. 2021, Eq. 3 (n = 2 pi / theta).
+    pub fn new(step_rad: f64, period_s: f64) -> Result<Self, SamplingError> {
+        positive("the step in radians", step_rad)?;
+        positive("the turn's period in seconds", period_s)?;
+        let steps = TAU / step_rad;
+        let whole = math::round_to_i64(steps);
+        let refused = SamplingError::StepDoesNotDivide { step_deg: step_rad.to_degrees(), steps };
+        if whole < 1 || steps > MAX_STEPS || (steps - whole as f64).abs() > WHOLE_STEPS {
+            return Err(refused);
+        }
+        let steps = u32::try_from(whole).map_err(|_| refused)?;
+        Ok(Self { step_rad, period_s, steps })
+    }
+
+    /// theta: angle between two pings, radians.
+    pub fn step_rad(&self) -> f64 {
+        self.step_rad
+    }
+
+    /// T: time of a whole turn, seconds.
+    pub fn period_s(&self) -> f64 {
+        self.period_s
+    }
+
+    /// n: pings to a turn. Source: Eq. 3.
+    pub fn steps(&self) -> u32 {
+        self.steps
+    }
+
+    /// T_s: time between two pings, seconds.
+    pub fn ping_period_s(&self) -> f64 {
+        self.period_s / f64::from(self.steps)
+    }
+
+    /// omega: angle turned per second, rad/s. Source: Eq. 4.
+    pub fn rate_radps(&self) -> f64 {
+        TAU / self.period_s
+    }
+}
+
+/// Where the period of a mode comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Basis {
+    /// Measured on this head at this range setting, as the vehicle file says.
+    Measured,
+    /// The maker's table, at the range setting that it is for.
+    Table,
+    /// Carried over from another range setting.
+    Estimated,
+}
+
+impl Basis {
+    /// The word used in tables.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Measured => "measured",
+            Self::Table => "table",
+            Self::Estimated => "estimated",
+        }
+    }
+}
+
+/// A way of turning that a head can be set to, at its range setting.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HeadMode {
+    /// Its name in vehicle files.
+    pub name: &'static str,
+    /// Step and period.
+    pub turn: Turn,
+    /// Where the period comes from.
+    pub basis: Basis,
+}
+
+/// The body of a head, a cylinder about its axis: what may stand in its neighbours' way.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HeadBody {
+    /// Radius, m; zero for a head without a body.
+    pub radius_m: f64,
+    /// How far it reaches ahead of the beam along the sensor's +x, m.
+    pub ahead_m: f64,
+    /// How far it reaches behind the beam, m.
+    pub behind_m: f64,
+}
+
+/// What a schedule of heads needs to know of one head.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HeadSpec {
+    /// How it sits on the vehicle.
+    pub mount: Mount,
+    /// Angle between two pings, radians.
+    pub step_rad: f64,
+    /// Time between two pings, seconds.
+    pub ping_period_s: f64,
+    /// The nearest and the farthest that it hears at its setting, m, as it reckons ranges.
+    pub range_m: [f64; 2],
+    /// The speed of sound by which it reckons them, m/s.
+    pub sound_speed_mps: f64,
+    /// zeta: full width of its beam, radians.
+    pub beam_rad: f64,
+    /// Its body.
+    pub body: HeadBody,
+}
+
+impl HeadSpec {
+    /// The nearest and the farthest wall that it hears in water with this speed of sound, m.
+    pub fn reach_m(&self, sound_speed_mps: f64) -> [f64; 2] {
+        self.range_m.map(|range_m| range_m * sound_speed_mps / self.sound_speed_mps)
+    }
+}
+
+/// What a head does during a dive: where it begins and between which angles it turns. Angles in the sensor's frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HeadProgram {
+    /// Angle of the first ping, radians.
+    pub start_rad: f64,
+    /// Whether the first step goes towards growing angles.
+    pub growing: bool,
+    /// The sector to go back and forth in as (least angle, size), radians; `None` turns on for ever.
+    pub sector: Option<(f64, f64)>,
+}
+
+/// What has been measured of one head that is turning.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HeadMotion {
+    /// How it sits on the vehicle.
+    pub mount: Mount,
+    /// Its angle now, in the sensor's frame, radians.
+    pub angle_rad: f64,
+    /// Angle turned per second, positive where the angle grows.
+    pub rate_radps: f64,
+    /// Angle between two pings, radians, positive.
+    pub step_rad: f64,
+    /// Size of the sector between its last turning points; `None` while it turns on.
+    pub sector_rad: Option<f64>,
+}
+
+impl HeadMotion {
+    /// Time of a whole turn at this rate, seconds.
+    pub fn turn_period_s(&self) -> f64 {
+        TAU / self.rate_radps.abs()
+    }
+
+    /// Time between two pings, seconds.
+    pub fn ping_period_s(&self) -> f64 {
+        self.step_rad / self.rate_radps.abs()
+    }
+}
+
+/// Whether a head's axis points aft, so that its angles grow the other way round in the body's frame.
+pub fn faces_aft(rotation: Rot<Body, Sensor>) -> bool {
+    (rotation * head_direction(math::FRAC_PI_2)).y() < 0.0
+}
+
+/// A set of heads by their numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct HeadSet(u8);
+
+impl HeadSet {
+    /// The heads 0 to `count` - 1.
+    pub fn first(count: usize) -> Self {
+        (0..count).fold(Self::default(), Self::with)
+    }
+
+    /// This set and one more head; numbers from [`MAX_HEADS`] up are left out.
+    #[must_use]
+    pub fn with(self, head: usize) -> Self {
+        Self(self.0 | Self::bit(head))
+    }
+
+    /// This set without a head.
+    #[must_use]
+    pub fn without(self, head: usize) -> Self {
+        Self(self.0 & !Self::bit(head))
+    }
+
+    /// Whether a head is of it.
+    pub fn has(self, head: usize) -> bool {
+        self.0 & Self::bit(head) != 0
+    }
+
+    /// How many heads it has.
+    pub fn len(self) -> usize {
+        self.0.count_ones() as usize
+    }
+
+    /// Whether it has none.
+    pub fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+
+    /// The heads' numbers, growing.
+    pub fn iter(self) -> impl Iterator<Item = usize> {
+        (0..MAX_HEADS).filter(move |head| self.has(*head))
+    }
+
+    fn bit(head: usize) -> u8 {
+        if head < MAX_HEADS { 1 << head } else { 0 }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_turn_has_a_whole_number_of_steps() {
+        for (step_deg, steps) in [(0.3, 1200), (0.6, 600), (0.9, 400), (1.2, 300), (2.4, 150), (360.0, 1)] {
+            let turn = Turn::new(f64::to_radians(step_deg), 8.0).unwrap();
+            assert_eq!(turn.steps(), steps);
+            assert!((turn.ping_period_s() * f64::from(steps) - 8.0).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn what_makes_no_turn_is_named() {
+        let why =
+            |step_deg: f64, period_s| Turn::new(step_deg.to_radians(), period_s).unwrap_err().to_string();
+        assert!(why(0.7, 8.0).starts_with("a step of 0.7"), "{}", why(0.7, 8.0));
+        assert!(why(361.0, 8.0).contains("doesn't divide a turn"));
+        assert_eq!(why(0.9, 0.0), "the turn's period in seconds is 0; it must be a finite number above zero");
+        for step_deg in [0.0, -0.9, f64::NAN, f64::INFINITY] {
+            assert!(why(step_deg, 8.0).starts_with("the step in radians"));
+        }
+        assert!(why(1e-12, 8.0).contains("doesn't divide"));
+        assert!(why(0.9, f64::NAN).contains("period"));
+    }
+
+    #[test]
+    fn a_set_of_heads_counts_and_lists_them() {
+        let set = HeadSet::first(4).without(1).with(7).with(99);
+        assert_eq!(set.iter().collect::<Vec<_>>(), [0, 2, 3, 7]);
+        assert_eq!((set.len(), set.is_empty(), HeadSet::default().is_empty()), (4, false, true));
+    }
+}

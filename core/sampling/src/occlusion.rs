@@ -1,0 +1,326 @@
+//! What stands in a beam's way on the vehicle itself: neighbouring heads and the hull.
+
+use super::head::{HeadSpec, MAX_HEADS};
+use headrace_geometry::frames::{Body, Mount, Vec3, head_direction};
+use headrace_geometry::math::{self, TAU};
+
+/// Angles are searched at this spacing; what hides less of a turn may be missed, radians (0.05 degrees).
+const SEARCH_STEP_RAD: f64 = TAU / 7200.0;
+
+/// A solid part of the vehicle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Obstacle {
+    /// A box along the body's axes, by its least and its largest corner, m.
+    Box {
+        /// The corner with the least coordinates.
+        least: Vec3<Body>,
+        /// The corner with the largest.
+        most: Vec3<Body>,
+    },
+    /// A capped cylinder.
+    Cylinder {
+        /// Middle of its first end.
+        from: Vec3<Body>,
+        /// Way to the middle of its other end, m.
+        along: Vec3<Body>,
+        /// Its radius, m.
+        radius_m: f64,
+    },
+}
+
+/// A range of angles of a head, in the sensor's frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AngleRange {
+    /// Where it begins, radians, in [0, 2 pi).
+    pub from_rad: f64,
+    /// Its size, radians, up to 2 pi.
+    pub size_rad: f64,
+}
+
+impl AngleRange {
+    /// Whether an angle is in it, its ends included.
+    pub fn has(&self, angle_rad: f64) -> bool {
+        math::wrap(angle_rad - self.from_rad, TAU) <= self.size_rad
+    }
+
+    /// Its middle, radians.
+    pub fn middle_rad(&self) -> f64 {
+        self.from_rad + self.size_rad / 2.0
+    }
+}
+
+impl Obstacle {
+    /// The body of a head.
+    pub fn of_head(spec: &HeadSpec) -> Self {
+        let along = |x_m| spec.mount.rotation * Vec3::new(x_m, 0.0, 0.0);
+        Self::Cylinder {
+            from: spec.mount.position + along(-spec.body.behind_m),
+            along: along(spec.body.behind_m + spec.body.ahead_m),
+            radius_m: spec.body.radius_m,
+        }
+    }
+
+    /// Whether a place is within a box; cylinders are heads, which may share a place.
+    pub fn holds(&self, place: Vec3<Body>) -> bool {
+        match self {
+            Self::Box { least, most } => {
+                let within = |((low, at), high): ((&f64, &f64), &f64)| low < at && at < high;
+                least.0.iter().zip(place.0.iter()).zip(most.0.iter()).all(within)
+            }
+            Self::Cylinder { .. } => false,
+        }
+    }
+
+    /// Whether a ray from outside meets it; one from inside never does, so that a head isn't hidden by what holds it.
+    pub fn stops(&self, from: Vec3<Body>, direction: Vec3<Body>) -> bool {
+        self.enters_m(from, direction).is_some()
+    }
+
+    /// Where a ray from outside meets it, in lengths of `direction`: metres along a unit vector. `None` for a ray that
+    /// misses it, or that begins inside.
+    pub fn enters_m(&self, from: Vec3<Body>, direction: Vec3<Body>) -> Option<f64> {
+        match self {
+            Self::Box { least, most } => box_entered(*least, *most, from, direction),
+            Self::Cylinder { from: base, along, radius_m } => {
+                cylinder_entered(*base, *along, *radius_m, from, direction)
+            }
+        }
+    }
+}
+
+fn box_entered(least: Vec3<Body>, most: Vec3<Body>, from: Vec3<Body>, direction: Vec3<Body>) -> Option<f64> {
+    let (mut enter, mut leave) = (f64::NEG_INFINITY, f64::INFINITY);
+    let axes = least.0.iter().zip(most.0.iter()).zip(from.0.iter().zip(direction.0.iter()));
+    for ((low, high), (at, towards)) in axes {
+        if *towards == 0.0 {
+            if at <= low || at >= high {
+                return None;
+            }
+            continue;
+        }
+        let (a, b) = ((low - at) / towards, (high - at) / towards);
+        enter = enter.max(a.min(b));
+        leave = leave.min(a.max(b));
+    }
+    (enter > 0.0 && enter < leave).then_some(enter)
+}
+
+fn cylinder_entered(
+    base: Vec3<Body>,
+    along: Vec3<Body>,
+    radius_m: f64,
+    from: Vec3<Body>,
+    direction: Vec3<Body>,
+) -> Option<f64> {
+    let length_m = along.norm();
+    if radius_m <= 0.0 || length_m <= 0.0 {
+        return None;
+    }
+    let axis = along.scaled(1.0 / length_m).0;
+    let (offset, direction) = ((from + -base).0, direction.0);
+    let (height, climb) = (offset.dot(&axis), direction.dot(&axis));
+    let (across, drift) = (offset - axis * height, direction - axis * climb);
+    // Where the ray is within the endless cylinder, then where it is between the ends.
+    let (a, b) = (drift.dot(&drift), across.dot(&drift));
+    let c = across.dot(&across) - radius_m * radius_m;
+    let (mut enter, mut leave) = (f64::NEG_INFINITY, f64::INFINITY);
+    if a > 0.0 {
+        let discriminant = b * b - a * c;
+        if discriminant <= 0.0 {
+            return None;
+        }
+        let root = math::sqrt(discriminant);
+        (enter, leave) = ((-b - root) / a, (-b + root) / a);
+    } else if c >= 0.0 {
+        return None;
+    }
+    if climb == 0.0 {
+        if height <= 0.0 || height >= length_m {
+            return None;
+        }
+    } else {
+        let (first, second) = (-height / climb, (length_m - height) / climb);
+        enter = enter.max(first.min(second));
+        leave = leave.min(first.max(second));
+    }
+    (enter > 0.0 && enter < leave).then_some(enter)
+}
+
+/// The angles at which obstacles hide the wall from a head, in order of angle; edges are good to 1e-12 rad.
+///
+/// The beam is taken as a ray; a beam of some width is weakened for half its width more on either side.
+pub fn hidden_angles(mount: &Mount, obstacles: &[Obstacle]) -> Vec<AngleRange> {
+    let hidden = |angle_rad: f64| {
+        let direction = mount.rotation * head_direction(angle_rad);
+        obstacles.iter().any(|obstacle| obstacle.stops(mount.position, direction))
+    };
+    let count = math::round_to_i64(TAU / SEARCH_STEP_RAD);
+    let at = |k: i64| k as f64 * SEARCH_STEP_RAD;
+    let Some(first_clear) = (0..count).find(|k| !hidden(at(*k))) else {
+        return vec![AngleRange { from_rad: 0.0, size_rad: TAU }];
+    };
+    let mut found = Vec::new();
+    let mut began = None;
+    let mut before = false;
+    for k in first_clear + 1..=first_clear + count {
+        let now = hidden(at(k));
+        if now != before {
+            let edge = edge_rad(&hidden, at(k - 1), at(k));
+            match began.take() {
+                None => began = Some(edge),
+                Some(from) => {
+                    found.push(AngleRange { from_rad: math::wrap(from, TAU), size_rad: edge - from });
+                }
+            }
+        }
+        before = now;
+    }
+    found.sort_by(|a, b| a.from_rad.total_cmp(&b.from_rad));
+    found
+}
+
+/// Where between two angles the beam begins or ceases to be hidden.
+fn edge_rad(hidden: &impl Fn(f64) -> bool, from_rad: f64, to_rad: f64) -> f64 {
+    let (mut low, mut high) = (from_rad, to_rad);
+    let at_low = hidden(low);
+    while high - low > 1e-13 * (1.0 + high.abs()) {
+        let middle = f64::midpoint(low, high);
+        if hidden(middle) == at_low {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    f64::midpoint(low, high)
+}
+
+/// For each head, the angles that the other heads' bodies and the hull hide.
+///
+/// A neighbour whose axis runs through the head itself is no obstacle to it: such heads are idealised ones that share
+/// a place.
+pub fn hidden_by_vehicle(heads: &[HeadSpec], hull: &[Obstacle]) -> Vec<Vec<AngleRange>> {
+    heads
+        .iter()
+        .take(MAX_HEADS)
+        .enumerate()
+        .map(|(number, head)| {
+            let others = heads.iter().enumerate().filter(|(other, _)| *other != number);
+            let obstacles: Vec<Obstacle> =
+                others.map(|(_, other)| Obstacle::of_head(other)).chain(hull.iter().copied()).collect();
+            hidden_angles(&head.mount, &obstacles)
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixtures;
+
+    fn head(position: [f64; 3], aft: bool) -> HeadSpec {
+        fixtures::head(position, aft, 0.04)
+    }
+
+    #[test]
+    fn heads_side_by_side_hide_an_angle_from_each_other() {
+        let pair = [head([0.5, 0.15, 0.0], false), head([0.5, -0.15, 0.0], false)];
+        let hidden = hidden_by_vehicle(&pair, &[]);
+        for (ranges, middle_deg) in hidden.iter().zip([270.0, 90.0]) {
+            assert_eq!(ranges.len(), 1);
+            // A ray touches a cylinder of radius r at a distance g at asin(r / g) from its axis.
+            let expected = 2.0 * math::asin(0.04 / 0.3);
+            assert!((ranges[0].size_rad - expected).abs() < 1e-11, "{}", ranges[0].size_rad.to_degrees());
+            assert!((ranges[0].middle_rad().to_degrees() - middle_deg).abs() < 1e-9);
+            assert!((ranges[0].size_rad.to_degrees() - 15.1).abs() < 0.3);
+        }
+    }
+
+    #[test]
+    fn heads_apart_along_the_hull_and_heads_in_one_place_hide_nothing() {
+        let apart = [head([0.551, 0.1, 0.0], false), head([-0.551, -0.1, 0.0], true)];
+        assert!(hidden_by_vehicle(&apart, &[]).iter().all(Vec::is_empty));
+        let together = [head([0.0; 3], false), head([0.0; 3], false)];
+        assert!(hidden_by_vehicle(&together, &[]).iter().all(Vec::is_empty));
+        // Back to back, the one's body ends where the other's begins: it reaches 0.2 m behind each beam.
+        let near = [head([0.1, 0.1, 0.0], false), head([-0.05, -0.1, 0.0], true)];
+        assert!(hidden_by_vehicle(&near, &[]).iter().all(|ranges| ranges.len() == 1));
+    }
+
+    #[test]
+    fn a_hull_below_hides_the_floor_about_the_seam_of_angles() {
+        let hull = Obstacle::Box { least: Vec3::new(-1.0, -0.2, -0.5), most: Vec3::new(1.0, 0.2, -0.1) };
+        let hidden = hidden_angles(&head([0.0; 3], false).mount, &[hull]);
+        assert_eq!(hidden.len(), 1);
+        let expected = 2.0 * math::atan2(0.2, 0.1);
+        assert!((hidden[0].size_rad - expected).abs() < 1e-11);
+        assert!(hidden[0].has(0.0) && hidden[0].has(TAU - 0.1) && !hidden[0].has(math::PI));
+    }
+
+    #[test]
+    fn a_ray_enters_where_it_first_touches() {
+        let x = Vec3::new(1.0, 0.0, 0.0);
+        let hull = Obstacle::Box { least: Vec3::new(2.0, -1.0, -1.0), most: Vec3::new(3.0, 1.0, 1.0) };
+        assert_eq!(hull.enters_m(Vec3::zero(), x), Some(2.0));
+        assert_eq!(hull.enters_m(Vec3::zero(), x.scaled(-1.0)), None);
+        assert_eq!(hull.enters_m(Vec3::new(2.5, 0.0, 0.0), x), None);
+        let post = Obstacle::Cylinder {
+            from: Vec3::new(2.0, 0.0, -1.0),
+            along: Vec3::new(0.0, 0.0, 2.0),
+            radius_m: 0.5,
+        };
+        assert_eq!(post.enters_m(Vec3::zero(), x), Some(1.5));
+        assert_eq!(post.enters_m(Vec3::new(2.0, 0.0, 4.0), Vec3::new(0.0, 0.0, -1.0)), Some(3.0));
+        assert_eq!(post.enters_m(Vec3::new(2.0, 0.0, 0.0), x), None);
+    }
+
+    #[test]
+    fn a_head_inside_the_hull_s_box_sees_all_and_one_in_a_tube_nothing() {
+        let around = Obstacle::Box { least: Vec3::new(-1.0, -1.0, -1.0), most: Vec3::new(1.0, 1.0, 1.0) };
+        assert!(hidden_angles(&head([0.0; 3], false).mount, &[around]).is_empty());
+        let ring: Vec<Obstacle> = (0..4)
+            .map(|k| {
+                let (sine, cosine) = math::sin_cos(f64::from(k) * math::FRAC_PI_2);
+                Obstacle::Cylinder {
+                    from: Vec3::new(-1.0, sine, cosine),
+                    along: Vec3::new(2.0, 0.0, 0.0),
+                    radius_m: 0.9,
+                }
+            })
+            .collect();
+        assert_eq!(
+            hidden_angles(&head([0.0; 3], false).mount, &ring),
+            [AngleRange { from_rad: 0.0, size_rad: TAU }]
+        );
+    }
+
+    #[test]
+    fn oracle_rays_against_cylinders_agree_with_points_along_the_ray() {
+        let cylinder = Obstacle::Cylinder {
+            from: Vec3::new(0.3, 0.2, -0.4),
+            along: Vec3::new(0.2, -0.1, 0.5),
+            radius_m: 0.15,
+        };
+        let axis = Vec3::<Body>::new(0.2, -0.1, 0.5);
+        let inside = |p: Vec3<Body>| {
+            let offset = p + -Vec3::new(0.3, 0.2, -0.4);
+            let height = offset.0.dot(&axis.0) / axis.norm();
+            (offset.0 - axis.0 * (height / axis.norm())).norm() < 0.15 && (0.0..axis.norm()).contains(&height)
+        };
+        let mut met = 0;
+        for k in 0..4000 {
+            let (a, b) = (f64::from(k) * 0.618, f64::from(k) * 0.377);
+            let ((sa, ca), (sb, cb)) = (math::sin_cos(a), math::sin_cos(b));
+            let direction = Vec3::new(ca * cb, sa * cb, sb);
+            let marched = (0..4000).any(|i| inside(direction.scaled(f64::from(i) * 5e-4)));
+            let stops = cylinder.stops(Vec3::zero(), direction);
+            if let Some(enters_m) = cylinder.enters_m(Vec3::zero(), direction) {
+                assert!(!inside(direction.scaled(enters_m - 1e-9)), "direction {direction:?}");
+                assert!(inside(direction.scaled(enters_m + 1e-9)) || !marched, "direction {direction:?}");
+            }
+            // Marching may step over a ray that only grazes.
+            assert!(stops || !marched, "direction {direction:?}");
+            met += i32::from(stops && marched) - i32::from(stops && !marched);
+        }
+        assert!(met > 80, "{met}");
+    }
+}

@@ -1,0 +1,449 @@
+//! When the heads of a vehicle pass a place of the wall, and the longest time between two passes.
+
+use super::error::SamplingError;
+use super::head::{HeadMotion, HeadSet, MAX_HEADS, faces_aft};
+use super::layout::HeadLayout;
+use headrace_geometry::frames::{Mount, Pose, Rot, Tunnel, Vec3};
+use headrace_geometry::math::{self, TAU};
+use headrace_geometry::tunnel::{Profile, Yz};
+
+/// Slower than this, a vehicle stands still, m/s: its heads' offsets along the hull have no phase.
+const AT_REST_MPS: f64 = 1e-3;
+/// Turns that differ by a larger share run out of step while one looks.
+const SAME_TURN: f64 = 0.02;
+/// A head's plane that stands more askew than this (the cosine of the angle between its axis and the tunnel's) meets
+/// the wall nowhere near the vehicle.
+const ASKEW: f64 = 0.1;
+
+/// Everything that is measured of a vehicle and its heads at a moment.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Situation {
+    /// Where the vehicle is; `None` without a fix.
+    pub pose: Option<Pose>,
+    /// Speed along the tunnel, m/s; below zero on the way back.
+    pub speed_mps: f64,
+    /// Standard deviation of the distance between two passes, at most round the wall, m.
+    pub doubt_m: f64,
+    /// How the heads share the work, as the vehicle file says.
+    pub layout: HeadLayout,
+    /// How many heads the vehicle has.
+    pub configured: usize,
+    /// The heads that are turning and ping, by number.
+    pub heads: [Option<HeadMotion>; MAX_HEADS],
+}
+
+/// The passes of a vehicle's heads at one speed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Passes {
+    heads: HeadSet,
+    /// Time of a turn of each head, seconds.
+    turns_s: [f64; MAX_HEADS],
+    pattern: Pattern,
+    /// By how much heads beside each other can miss the times that their angles say, seconds.
+    parallax_s: f64,
+    /// At no speed to speak of, phases along the tunnel mean nothing.
+    at_rest: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Pattern {
+    /// All turn on, alike: by head, where in a turn's advance its passes fall, in [0, 1).
+    Turning([f64; MAX_HEADS]),
+    /// Each goes back and forth; the time of the longest sweep there and back, seconds.
+    Sectors(f64),
+    /// They turn against each other, or out of step: they meet a place at uneven times, and one of them can be counted
+    /// on.
+    Loose,
+}
+
+/// How the heads are phased now: what their passes are at any speed follows from it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Phasing {
+    heads: HeadSet,
+    turns_s: [f64; MAX_HEADS],
+    pattern: Pattern,
+    ahead_m: [f64; MAX_HEADS],
+}
+
+impl Phasing {
+    /// From what is measured. Without a fix, the vehicle is taken to lie along the tunnel.
+    pub fn of(situation: &Situation) -> Self {
+        let motions = &situation.heads;
+        let present = motions.iter().enumerate().filter(|(_, motion)| motion.is_some());
+        let heads = present.fold(HeadSet::default(), |set, (head, _)| set.with(head));
+        let attitude = situation.pose.map_or_else(Rot::identity, |pose| pose.attitude);
+        let ahead =
+            motions.map(|motion| motion.map_or(Some(0.0), |motion| ahead_m(&attitude, &motion.mount)));
+        let pattern = match situation.layout {
+            HeadLayout::SectorOffset => {
+                let share_rad = TAU / situation.configured.max(1) as f64;
+                let sweep_s = |motion: &HeadMotion| {
+                    2.0 * motion.sector_rad.unwrap_or(share_rad) / motion.rate_radps.abs()
+                };
+                Pattern::Sectors(motions.iter().flatten().map(sweep_s).fold(0.0, f64::max))
+            }
+            HeadLayout::PhaseShift if ahead.iter().any(Option::is_none) => Pattern::Loose,
+            HeadLayout::PhaseShift => phases(motions).map_or(Pattern::Loose, Pattern::Turning),
+        };
+        Self {
+            heads,
+            turns_s: motions.map(|motion| motion.map_or(0.0, |motion| motion.turn_period_s())),
+            pattern,
+            ahead_m: ahead.map(Option::unwrap_or_default),
+        }
+    }
+
+    /// How far apart the heads that follow each other over a place meet the wall, along the tunnel, m: zero for those
+    /// that have a sector, or the work, for themselves.
+    pub fn apart_m(&self) -> f64 {
+        let Pattern::Turning(_) = self.pattern else { return 0.0 };
+        let ahead_m = || self.heads.iter().filter_map(|head| self.ahead_m.get(head)).copied();
+        (ahead_m().fold(f64::MIN, f64::max) - ahead_m().fold(f64::MAX, f64::min)).max(0.0)
+    }
+
+    /// The passes, were the vehicle to go at `speed_mps`.
+    ///
+    /// Heads that turn on: head k passes the vertical at the times t_k + i T, and as it sits x_k ahead of the vehicle's
+    /// origin, on the wall at chainages x_k + v (t_k + i T). Divided by v T these are phases on a circle.
+    /// Heads in sectors: a place near a sector's end waits for a sweep there and back, twice the time of one.
+    /// Source: Jorge et al. 2021, §5.1 and §5.2.
+    pub fn at(&self, speed_mps: f64) -> Passes {
+        let Self { heads, turns_s, mut pattern, ahead_m } = *self;
+        let at_rest = speed_mps.abs() <= AT_REST_MPS;
+        if let Pattern::Turning(phases) = &mut pattern {
+            for ((phase, ahead_m), turn_s) in phases.iter_mut().zip(ahead_m).zip(turns_s) {
+                let apart = ahead_m.abs() > 0.0 && turn_s > 0.0 && !at_rest;
+                let ahead = if apart { ahead_m / speed_mps / turn_s } else { 0.0 };
+                *phase = math::wrap(*phase + ahead, 1.0);
+            }
+        }
+        Passes { heads, turns_s, pattern, parallax_s: 0.0, at_rest }
+    }
+}
+
+/// When, as a share of a turn, each head next passes the vertical; `None` when they turn against each other or at
+/// different rates.
+fn phases(motions: &[Option<HeadMotion>; MAX_HEADS]) -> Option<[f64; MAX_HEADS]> {
+    let turning = || motions.iter().flatten();
+    let turns_s = || turning().map(HeadMotion::turn_period_s);
+    let (longest_s, shortest_s) = (turns_s().fold(0.0, f64::max), turns_s().fold(f64::INFINITY, f64::min));
+    if longest_s - shortest_s > SAME_TURN * shortest_s {
+        return None;
+    }
+    // Seen in a mirror, heads that all turn the other way turn this way.
+    let mirror = if turning().all(|motion| body_rate(motion) < 0.0) { -1.0 } else { 1.0 };
+    let mut phases = [0.0; MAX_HEADS];
+    for (motion, phase) in motions.iter().zip(&mut phases) {
+        let Some(motion) = motion else { continue };
+        if mirror * body_rate(motion) <= 0.0 {
+            return None;
+        }
+        *phase = math::wrap(-mirror * body_sign(motion) * motion.angle_rad, TAU) / TAU;
+    }
+    Some(phases)
+}
+
+/// How far ahead of the vehicle's origin a head meets the wall, measured along the tunnel, m: the same at every place
+/// of the wall but for what all heads with parallel axes share. `None` for a head whose plane lies along the tunnel.
+///
+/// Its samples lie in the plane through the head across its axis n: x n_x + y n_y + z n_z = (head) n.
+pub fn ahead_m(attitude: &Rot<Tunnel, headrace_geometry::frames::Body>, mount: &Mount) -> Option<f64> {
+    let axis = *attitude * (mount.rotation * Vec3::new(1.0, 0.0, 0.0));
+    let offset = *attitude * mount.position;
+    (axis.x().abs() > ASKEW).then(|| offset.0.dot(&axis.0) / axis.x())
+}
+
+/// By how much the angles at which heads beside each other look at one place of the wall differ, at most, radians.
+pub fn parallax_rad(profile: &Profile, heads: &[Yz]) -> f64 {
+    const PLACES: u32 = 72;
+    let angle = |head: &Yz, place: Yz| math::atan2(place[0] - head[0], head[1] - place[1]);
+    let Some(first) = heads.first().filter(|_| heads.len() > 1) else { return 0.0 };
+    let mut most_rad = 0.0_f64;
+    for k in 0..PLACES {
+        let place = profile.point_at(profile.perimeter_m() * f64::from(k) / f64::from(PLACES));
+        let from_first = angle(first, place);
+        let (mut least, mut most) = (0.0_f64, 0.0_f64);
+        for head in heads.iter().skip(1) {
+            let off = math::wrap_signed(angle(head, place) - from_first, TAU);
+            (least, most) = (least.min(off), most.max(off));
+        }
+        most_rad = most_rad.max(most - least);
+    }
+    most_rad
+}
+
+impl Passes {
+    /// These passes of heads beside each other, whose angles at one place differ by up to `parallax_rad`.
+    #[must_use]
+    pub fn beside(self, parallax_rad: f64) -> Self {
+        let turn_s = self.turns_s.into_iter().fold(0.0, f64::max);
+        Self { parallax_s: parallax_rad / TAU * turn_s, ..self }
+    }
+
+    /// These heads turning on, evenly spread in the order of their numbers: what a schedule for this speed gives where
+    /// their turns take the same time. Where they don't, heads run out of step, and no phase can be counted on.
+    ///
+    /// `turn_s` gives the time of a head's turn.
+    /// Errors: no head.
+    pub fn evenly_phased(heads: HeadSet, turn_s: impl Fn(usize) -> f64) -> Result<Self, SamplingError> {
+        const IN_STEP: f64 = 1e-6;
+        let Some(first) = heads.iter().next() else { return Err(SamplingError::HeadCount { heads: 0 }) };
+        let (mut phases, mut turns_s) = ([0.0; MAX_HEADS], [0.0; MAX_HEADS]);
+        for (rank, head) in heads.iter().enumerate() {
+            if let (Some(phase), Some(turn)) = (phases.get_mut(head), turns_s.get_mut(head)) {
+                (*phase, *turn) = (math::wrap(scheduled_phase(rank, heads.len()), 1.0), turn_s(head));
+            }
+        }
+        let in_step = heads.iter().all(|head| (turn_s(head) / turn_s(first) - 1.0).abs() < IN_STEP);
+        let pattern = if in_step { Pattern::Turning(phases) } else { Pattern::Loose };
+        Ok(Self { heads, turns_s, pattern, parallax_s: 0.0, at_rest: false })
+    }
+
+    /// Heads in sectors whose sweep there and back takes `sweep_s`.
+    ///
+    /// Errors: no head.
+    pub fn in_sectors(heads: HeadSet, sweep_s: f64) -> Result<Self, SamplingError> {
+        if heads.is_empty() {
+            return Err(SamplingError::HeadCount { heads: 0 });
+        }
+        let pattern = Pattern::Sectors(sweep_s);
+        Ok(Self { heads, turns_s: [0.0; MAX_HEADS], pattern, parallax_s: 0.0, at_rest: false })
+    }
+
+    /// The heads that pass.
+    pub fn heads(&self) -> HeadSet {
+        self.heads
+    }
+
+    /// The longest time between two passes over a place that these heads see, seconds; `None` where none does.
+    pub fn gap_s(&self, seen_by: HeadSet) -> Option<f64> {
+        let passing = || seen_by.iter().filter(|head| self.heads.has(*head));
+        passing().next()?;
+        let turns_s = || passing().filter_map(|head| self.turns_s.get(head)).copied();
+        Some(match &self.pattern {
+            Pattern::Sectors(sweep_s) => *sweep_s,
+            Pattern::Loose => turns_s().fold(f64::INFINITY, f64::min),
+            Pattern::Turning(phases) => {
+                let mut known = [0.0; MAX_HEADS];
+                let mut count = 0;
+                for (slot, head) in known.iter_mut().zip(passing()) {
+                    *slot = phases.get(head).copied().unwrap_or_default();
+                    count += 1;
+                }
+                let beside_s = if count > 1 { self.parallax_s } else { 0.0 };
+                turns_s().fold(0.0, f64::max) * largest_gap(known.get_mut(..count).unwrap_or_default())
+                    + beside_s
+            }
+        })
+    }
+
+    /// What [`Passes::gap_s`] of all heads would be if they were evenly phased, seconds; zero without a head.
+    pub fn even_gap_s(&self) -> f64 {
+        let turn_s = self.turns_s.into_iter().fold(0.0, f64::max);
+        match self.pattern {
+            Pattern::Turning(_) => turn_s / self.heads.len().max(1) as f64,
+            Pattern::Sectors(_) | Pattern::Loose => self.gap_s(self.heads).unwrap_or(0.0),
+        }
+    }
+
+    /// By how much each head is out of its phase against the first that turns, radians of its turn, in [-pi, pi).
+    ///
+    /// Positive: it passes a place later, farther ahead, than the schedule for `scheduled` heads has it. `None` for a
+    /// head that isn't there, for heads that don't all turn on, and at rest.
+    /// Source: Jorge et al. 2021, §5.1 (phi(k) = 2 pi k / s).
+    pub fn phase_errors_rad(&self, scheduled: usize) -> [Option<f64>; MAX_HEADS] {
+        let mut errors = [None; MAX_HEADS];
+        let Pattern::Turning(phases) = &self.pattern else { return errors };
+        if self.at_rest {
+            return errors;
+        }
+        let late = |head: usize| phases.get(head).map(|phase| phase - scheduled_phase(head, scheduled));
+        let Some(first) = self.heads.iter().next().and_then(late) else { return errors };
+        for (head, error) in errors.iter_mut().enumerate().filter(|(head, _)| self.heads.has(*head)) {
+            *error = late(head).map(|here| math::wrap_signed(here - first, 1.0) * TAU);
+        }
+        errors
+    }
+}
+
+/// Where in a turn's advance the passes of head `head` of `heads` belong: a head that is ahead in angle passes a place
+/// earlier.
+fn scheduled_phase(head: usize, heads: usize) -> f64 {
+    -(head as f64) / heads.max(1) as f64
+}
+
+/// The largest gap between neighbours on a circle of circumference 1; sorts them.
+fn largest_gap(phases: &mut [f64]) -> f64 {
+    phases.sort_unstable_by(f64::total_cmp);
+    let wrapped = phases.first().zip(phases.last()).map_or(1.0, |(first, last)| first + 1.0 - last);
+    let between = phases.windows(2).map(|pair| match pair {
+        [a, b] => b - a,
+        _ => 0.0,
+    });
+    between.fold(wrapped, f64::max)
+}
+
+/// 1 where the head's own angles are the body's, -1 where they grow the other way.
+fn body_sign(motion: &HeadMotion) -> f64 {
+    if faces_aft(motion.mount.rotation) { -1.0 } else { 1.0 }
+}
+
+fn body_rate(motion: &HeadMotion) -> f64 {
+    body_sign(motion) * motion.rate_radps
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn situation(angles_deg: &[f64], x_m: &[f64]) -> Situation {
+        let mut heads = [None; MAX_HEADS];
+        for ((slot, angle), x) in heads.iter_mut().zip(angles_deg).zip(x_m) {
+            *slot = Some(HeadMotion {
+                mount: Mount { position: Vec3::new(*x, 0.0, 0.0), rotation: Rot::identity() },
+                angle_rad: angle.to_radians(),
+                rate_radps: TAU / 8.0,
+                step_rad: f64::to_radians(0.9),
+                sector_rad: None,
+            });
+        }
+        let configured = angles_deg.len();
+        Situation {
+            pose: None,
+            speed_mps: 0.2,
+            doubt_m: 0.0,
+            layout: HeadLayout::PhaseShift,
+            configured,
+            heads,
+        }
+    }
+
+    fn passes(angles_deg: &[f64], x_m: &[f64]) -> Passes {
+        Phasing::of(&situation(angles_deg, x_m)).at(0.2)
+    }
+
+    fn all(passes: &Passes) -> f64 {
+        passes.gap_s(passes.heads()).unwrap()
+    }
+
+    #[test]
+    fn evenly_phased_heads_share_the_turn() {
+        let passes = passes(&[10.0, 100.0, 190.0, 280.0], &[0.0; 4]);
+        assert!((all(&passes) - 2.0).abs() < 1e-9 && (passes.even_gap_s() - 2.0).abs() < 1e-12);
+        let errors = passes.phase_errors_rad(4);
+        assert!(errors[..4].iter().all(|error| error.unwrap().abs() < 1e-9) && errors[4].is_none());
+        let planned = Passes::evenly_phased(HeadSet::first(4), |_| 8.0).unwrap();
+        assert!((all(&planned) - 2.0).abs() < 1e-12);
+        // Beside each other, they look at a place at angles that differ by up to 9 degrees: a fortieth of a turn.
+        assert!((all(&planned.beside(TAU / 40.0)) - 2.2).abs() < 1e-12);
+        assert!((planned.beside(TAU / 40.0).gap_s(HeadSet::first(1)).unwrap() - 8.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn where_heads_do_not_see_a_place_the_others_leave_longer_gaps() {
+        let passes = Passes::evenly_phased(HeadSet::first(4), |_| 8.0).unwrap();
+        let gap_s =
+            |hidden: [usize; 2]| passes.gap_s(passes.heads().without(hidden[0]).without(hidden[1])).unwrap();
+        // Half a turn apart: doubled. A quarter apart: two passes in a row are missing.
+        assert!((gap_s([0, 2]) - 4.0).abs() < 1e-12 && (gap_s([0, 1]) - 6.0).abs() < 1e-12);
+        assert_eq!(passes.gap_s(HeadSet::default()), None);
+        assert_eq!(passes.gap_s(HeadSet::default().with(6)), None);
+    }
+
+    #[test]
+    fn heads_together_pass_together() {
+        let together = passes(&[0.0, 0.0], &[0.0, 0.0]);
+        assert!((all(&together) - 8.0).abs() < 1e-9 && (together.even_gap_s() - 4.0).abs() < 1e-12);
+        assert!((together.phase_errors_rad(2)[1].unwrap().abs() - math::PI).abs() < 1e-9);
+        // Half a pitch apart along the hull, the same angles interleave: 0.2 m/s, 8 s a turn, 0.8 m.
+        let apart = passes(&[0.0, 0.0], &[0.8, 0.0]);
+        assert!((all(&apart) - 4.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn turned_round_the_vehicle_s_heads_are_apart_the_other_way() {
+        let mut back = situation(&[0.0, 90.0], &[0.9, -0.3]);
+        let out = Phasing::of(&back).at(0.2);
+        let turned = Rot::from_roll_pitch_yaw(0.0, 0.0, math::PI);
+        back.pose = Some(Pose { position: headrace_geometry::frames::Point3::zero(), attitude: turned });
+        // Going back nose first is going out nose first, seen from the other end; tail first either way is not.
+        assert!((all(&Phasing::of(&back).at(-0.2)) - all(&out)).abs() < 1e-9);
+        assert!((all(&Phasing::of(&back).at(0.2)) - all(&out)).abs() > 0.1);
+        // Askew, heads are farther apart along the tunnel; with their planes along it, nothing can be counted on.
+        let askew = |yaw: f64| Rot::from_roll_pitch_yaw(0.0, 0.0, yaw);
+        let mount = Mount { position: Vec3::new(1.0, 0.0, 0.0), rotation: Rot::identity() };
+        assert!((ahead_m(&askew(0.5), &mount).unwrap() - 1.0 / math::cos(0.5)).abs() < 1e-12);
+        assert_eq!(ahead_m(&askew(math::FRAC_PI_2), &mount), None);
+    }
+
+    #[test]
+    fn a_head_that_is_late_has_a_positive_error() {
+        // The second of two belongs half a turn ahead; it is 30 degrees short of that.
+        let passes = passes(&[0.0, 150.0], &[0.0, 0.0]);
+        assert!((passes.phase_errors_rad(2)[1].unwrap() - f64::to_radians(30.0)).abs() < 1e-9);
+        // Ten per cent faster than scheduled, a head 1.6 m (a turn's advance) astern is early by a tenth / 1.1 of a turn.
+        let at = |speed| Phasing::of(&situation(&[0.0, 180.0], &[1.6, 0.0])).at(speed).phase_errors_rad(2)[1];
+        assert!(at(0.2).unwrap().abs() < 1e-9);
+        assert!((at(0.22).unwrap() - TAU * (1.0 - 1.0 / 1.1)).abs() < 1e-9, "{:?}", at(0.22));
+        assert_eq!(at(0.0), None);
+    }
+
+    #[test]
+    fn heads_that_all_turn_the_other_way_are_phased_alike_and_opposed_ones_are_not() {
+        let mut mirrored = situation(&[0.0, 180.0], &[0.0, 0.0]);
+        for head in mirrored.heads.iter_mut().flatten() {
+            head.rate_radps = -head.rate_radps;
+        }
+        assert!((all(&Phasing::of(&mirrored).at(0.2)) - 4.0).abs() < 1e-9);
+        if let Some(first) = mirrored.heads.iter_mut().flatten().next() {
+            first.rate_radps = -first.rate_radps;
+        }
+        let opposed = Phasing::of(&mirrored).at(0.2);
+        assert!((all(&opposed) - 8.0).abs() < 1e-9 && opposed.phase_errors_rad(2) == [None; MAX_HEADS]);
+    }
+
+    #[test]
+    fn heads_out_of_step_leave_the_faster_one_to_count_on() {
+        let mut mixed = situation(&[0.0, 180.0], &[0.0, 0.0]);
+        if let Some(second) = mixed.heads.iter_mut().flatten().nth(1) {
+            second.rate_radps = TAU / 21.6;
+        }
+        assert!((all(&Phasing::of(&mixed).at(0.2)) - 8.0).abs() < 1e-9);
+        let planned = Passes::evenly_phased(HeadSet::first(2), |head| 8.0 + 0.01 * head as f64).unwrap();
+        assert!((all(&planned) - 8.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_turning_point_makes_no_sector_of_a_layout_that_turns_on() {
+        let mut jerked = situation(&[0.0, 180.0], &[0.0, 0.0]);
+        for head in jerked.heads.iter_mut().flatten() {
+            head.sector_rad = Some(f64::to_radians(0.9));
+        }
+        assert!((all(&Phasing::of(&jerked).at(0.2)) - 4.0).abs() < 1e-9);
+        // In sectors, what isn't measured yet is half of a turn for two heads, there and back.
+        let mut sectors = situation(&[0.0, 180.0], &[0.0, 0.0]);
+        sectors.layout = HeadLayout::SectorOffset;
+        assert!((all(&Phasing::of(&sectors).at(0.2)) - 8.0).abs() < 1e-9);
+        assert_eq!(Phasing::of(&sectors).at(0.2).phase_errors_rad(2), [None; MAX_HEADS]);
+    }
+
+    #[test]
+    fn heads_that_are_left_share_the_turn_evenly() {
+        let three = Passes::evenly_phased(HeadSet::first(4).without(1), |_| 9.0).unwrap();
+        assert!((all(&three) - 3.0).abs() < 1e-12);
+        let none = HeadSet::default();
+        assert_eq!(Passes::evenly_phased(none, |_| 8.0), Err(SamplingError::HeadCount { heads: 0 }));
+        assert_eq!(Passes::in_sectors(none, 16.0), Err(SamplingError::HeadCount { heads: 0 }));
+        assert!((all(&Passes::in_sectors(HeadSet::first(2), 8.0).unwrap()) - 8.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn parallax_grows_as_the_wall_comes_near() {
+        let wide = headrace_geometry::tunnel::shapes::circle(6.0).unwrap();
+        let narrow = headrace_geometry::tunnel::shapes::circle(1.0).unwrap();
+        let of = |profile: &Profile, z: f64| parallax_rad(profile, &[[0.15, z], [-0.15, z]]);
+        // Seen from the far side, 0.3 m at 6 m.
+        assert!((of(&wide, 6.0) - 0.05).abs() < 1e-3 && of(&narrow, 1.0) > 0.29);
+        assert!(parallax_rad(&wide, &[[0.1, 6.0]]) <= 0.0 && parallax_rad(&wide, &[]) <= 0.0);
+    }
+}

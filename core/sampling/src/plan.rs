@@ -1,0 +1,422 @@
+//! The day before: what heads, modes, layout and speed give in a tunnel, before there is anything to measure.
+
+mod answer;
+mod briefing;
+mod wall;
+
+use super::error::{SamplingError, not_negative, positive};
+use super::head::{HeadMode, HeadSet, HeadSpec};
+use super::layout::{self, HeadLayout};
+use super::occlusion::{self, AngleRange, Obstacle};
+use super::passes::{self, Passes};
+use super::ring::{Ring, Standing};
+use super::schedule::Schedule;
+use super::strips::{Arc, Going, Strips, View};
+use headrace_geometry::frames::{Point3, Pose, Rot};
+use headrace_geometry::math::TAU;
+use headrace_geometry::tunnel::{Profile, Yz};
+
+pub use answer::{Answer, Question, Spacing};
+pub use briefing::{Briefing, Heard, Hidden, HullAdvice, Start, ThinStrip};
+pub use wall::{PatternSample, WallPlace};
+
+/// Soundings of a ring: 0.1 degrees apart, so that a step is looked at from many starts.
+const RING: u32 = 3600;
+
+/// A tunnel, a vehicle and what to allow for.
+#[derive(Debug, Clone)]
+pub struct Inspection {
+    /// Design profile.
+    pub profile: Profile,
+    /// Length to inspect, m.
+    pub length_m: f64,
+    /// Where in the cross-section the vehicle is to go.
+    pub place: Yz,
+    /// Its heads with the modes of each; all heads are set to the same one.
+    pub heads: Vec<(HeadSpec, Vec<HeadMode>)>,
+    /// Parts of the vehicle that may stand in a head's way.
+    pub hull: Vec<Obstacle>,
+    /// How the heads share the work.
+    pub layout: HeadLayout,
+    /// How far the pilot may drift, up, down and sideways, m.
+    pub drift_m: f64,
+    /// How far from the tunnel's axis it may head, steadily, radians.
+    pub yaw_rad: f64,
+    /// How fast it may turn about, rad/s: between two passes, beams swing along the wall.
+    pub yaw_rate_radps: f64,
+    /// Speed of sound in the tunnel's water, m/s.
+    pub sound_speed_mps: f64,
+}
+
+/// A vehicle at one of the places and headings that are allowed for.
+#[derive(Debug, Clone)]
+struct Stance {
+    strips: Strips,
+    farthest_m: f64,
+    parallax_rad: f64,
+    /// By how much heads apart are out of the places along the tunnel that their schedule is for, m.
+    shift_m: f64,
+    /// How far apart they are along the tunnel, m.
+    apart_m: f64,
+}
+
+/// One way in which all heads can be set.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlannedMode {
+    /// The mode, of the first head: step and name are those of all.
+    pub mode: HeadMode,
+    /// Smallest, mean and largest distance between neighbours of one turn, the vehicle where it should be and at rest;
+    /// straight through the water, of any head, m. Source: the general case of Eq. 5, 6 and 10.
+    pub chords_m: [f64; 3],
+    /// The largest distance between neighbours of one turn on the unrolled wall, anywhere the vehicle may be, m.
+    pub t_y2_m: f64,
+    passes: Passes,
+    ping_period_s: f64,
+}
+
+/// Answers questions about an inspection.
+#[derive(Debug, Clone)]
+pub struct Planner {
+    inspection: Inspection,
+    hidden: Vec<Vec<AngleRange>>,
+    stances: Vec<Stance>,
+    modes: Vec<PlannedMode>,
+}
+
+impl Planner {
+    /// Looks at the wall from everywhere that the vehicle may be.
+    ///
+    /// Errors: a layout that so many heads can't have; a length, drift or yaw out of range; a head that would be
+    /// outside the profile somewhere, or a beam along the tunnel; heads that have no mode in common.
+    pub fn new(inspection: Inspection) -> Result<Self, SamplingError> {
+        inspection.layout.check(inspection.heads.len())?;
+        positive("the length in metres", inspection.length_m)?;
+        not_negative("the drift in metres", inspection.drift_m)?;
+        not_negative("the yaw in radians", inspection.yaw_rad)?;
+        let specs: Vec<HeadSpec> = inspection.heads.iter().map(|(spec, _)| *spec).collect();
+        let hidden = occlusion::hidden_by_vehicle(&specs, &inspection.hull);
+        let common = common_modes(&inspection.heads);
+        if common.is_empty() {
+            return Err(SamplingError::NoCommonMode);
+        }
+        not_negative("the rate of yaw in rad/s", inspection.yaw_rate_radps)?;
+        positive("the speed of sound in m/s", inspection.sound_speed_mps)?;
+        let mut stances = Vec::new();
+        let mut chords = Vec::new();
+        for pose in poses(&inspection) {
+            let rings = rings(&inspection, &pose)?;
+            if stances.is_empty() {
+                chords = common.iter().map(|modes| chords_m(&rings, modes)).collect();
+            }
+            stances.push(stance(&inspection, &hidden, &common, &pose, &rings)?);
+        }
+        let mut modes = Vec::with_capacity(common.len());
+        for (number, (of_heads, chords_m)) in common.iter().zip(chords).enumerate() {
+            let t_y2_m =
+                stances.iter().map(|stance| stance.strips.largest_step_m(number)).fold(0.0, f64::max);
+            modes.push(planned_mode(&inspection, of_heads, chords_m, t_y2_m)?);
+        }
+        Ok(Self { inspection, hidden, stances, modes })
+    }
+
+    /// What is planned.
+    pub fn inspection(&self) -> &Inspection {
+        &self.inspection
+    }
+
+    /// The modes that all heads have, in the order of the first head's.
+    pub fn modes(&self) -> &[PlannedMode] {
+        &self.modes
+    }
+
+    /// T_max at a speed with the heads phased for it, m: the largest anywhere that the vehicle may be, the strips that
+    /// it hides from some of its heads included; infinite where a strip is seen by none.
+    ///
+    /// Errors: a speed that isn't above zero.
+    /// Source: Jorge et al. 2021, Eq. 16.
+    pub fn t_max_m(&self, mode: usize, speed_mps: f64) -> Result<f64, SamplingError> {
+        positive("the speed in m/s", speed_mps)?;
+        let t_m = |stance: &Stance, passes: &Passes, going: &Going| {
+            stance.strips.t_max_m(mode, passes, speed_mps, going)
+        };
+        Ok(self.over_stances(mode, t_m).fold(0.0, f64::max))
+    }
+
+    /// The largest speed at which T_max is the target, with the heads phased for it, m/s: the inverse of
+    /// [`Planner::t_max_m`].
+    ///
+    /// Errors: a target that isn't above zero, or that no speed meets.
+    pub fn v_max_mps(&self, mode: usize, target_m: f64) -> Result<f64, SamplingError> {
+        positive("the target in metres", target_m)?;
+        let speed = |stance: &Stance, passes: &Passes, going: &Going| {
+            stance.strips.bound_for_target(mode, passes, target_m, going).map(|bound| bound.speed_mps)
+        };
+        let mut slowest = f64::INFINITY;
+        let mut refused = None;
+        for speed in self.over_stances(mode, speed) {
+            match speed {
+                Ok(speed) => slowest = slowest.min(speed),
+                Err(why) => refused = worse(refused, why),
+            }
+        }
+        match refused {
+            Some(why) => Err(why),
+            None => positive("the largest speed in m/s", slowest),
+        }
+    }
+
+    fn over_stances<T>(
+        &self,
+        mode: usize,
+        of: impl Fn(&Stance, &Passes, &Going) -> T,
+    ) -> impl Iterator<Item = T> {
+        let planned = self.modes.get(mode);
+        self.stances.iter().filter_map(move |stance| {
+            let planned = planned?;
+            let going = Going {
+                ping_period_s: planned.ping_period_s,
+                swing_mps: self.inspection.yaw_rate_radps * stance.farthest_m,
+                shift_m: stance.shift_m,
+                apart_m: stance.apart_m,
+                swing_most_m: None,
+            };
+            Some(of(stance, &planned.passes.beside(stance.parallax_rad), &going))
+        })
+    }
+
+    /// Time between passes over a place that all heads see, and the longest over any that some head sees, seconds, the
+    /// vehicle where it should be.
+    pub fn gaps_s(&self, mode: usize) -> Option<(f64, f64)> {
+        let planned = self.modes.get(mode)?;
+        let gap_s = |seen_by| planned.passes.gap_s(seen_by);
+        let strips = self.nominal_strips()?.as_slice();
+        let longest = strips.iter().filter_map(|strip| gap_s(strip.seen_by)).fold(0.0, f64::max);
+        Some((gap_s(planned.passes.heads())?, longest))
+    }
+
+    /// The strips of the wall with the vehicle where it should be.
+    pub fn nominal_strips(&self) -> Option<&Strips> {
+        self.stances.first().map(|stance| &stance.strips)
+    }
+
+    /// The longest range from any head to the wall: where the vehicle should be, and anywhere it may be, m.
+    pub fn farthest_m(&self) -> (f64, f64) {
+        let far = || self.stances.iter().map(|stance| stance.farthest_m);
+        (far().next().unwrap_or(0.0), far().fold(0.0, f64::max))
+    }
+
+    /// Length of the first head's footprint on the wall in the plane in which it turns, the shortest and the longest of
+    /// a turn, m, the vehicle where it should be.
+    ///
+    /// Errors: as for [`Standing::footprint`].
+    /// Source: Jorge et al. 2021, Fig. 15.
+    pub fn footprints_m(&self) -> Result<[f64; 2], SamplingError> {
+        const LOOKED_AT: u32 = 720;
+        let (spec, _) = self.inspection.heads.first().ok_or(SamplingError::HeadCount { heads: 0 })?;
+        let standing = Standing::new(&self.inspection.profile, &self.nominal_pose(), &spec.mount)?;
+        let mut found = [f64::INFINITY, 0.0];
+        for k in 0..LOOKED_AT {
+            let angle_rad = TAU * f64::from(k) / f64::from(LOOKED_AT);
+            let length_m = standing.footprint(angle_rad, spec.beam_rad)?.in_plane_m;
+            found = [found[0].min(length_m), found[1].max(length_m)];
+        }
+        Ok(found)
+    }
+
+    /// The farthest wall that every head hears, m.
+    pub fn reach_m(&self) -> f64 {
+        let reach = |(spec, _): &(HeadSpec, Vec<HeadMode>)| spec.reach_m(self.inspection.sound_speed_mps)[1];
+        self.inspection.heads.iter().map(reach).fold(f64::INFINITY, f64::min)
+    }
+
+    /// For each head the angles hidden from it, in its own frame.
+    pub fn hidden(&self) -> &[Vec<AngleRange>] {
+        &self.hidden
+    }
+
+    /// The vehicle where it should be, at chainage 0.
+    pub fn nominal_pose(&self) -> Pose {
+        pose(&self.inspection, [0.0, 0.0], 0.0)
+    }
+
+    /// The heads as they are in a mode.
+    pub fn specs(&self, mode: usize) -> Vec<HeadSpec> {
+        let name = self.modes.get(mode).map(|planned| planned.mode.name);
+        let of_head = |(spec, modes): &(HeadSpec, Vec<HeadMode>)| {
+            let turn = modes.iter().find(|mode| Some(mode.name) == name)?.turn;
+            Some(HeadSpec { step_rad: turn.step_rad(), ping_period_s: turn.ping_period_s(), ..*spec })
+        };
+        self.inspection.heads.iter().filter_map(of_head).collect()
+    }
+
+    /// What the heads are told to do in a mode at a speed.
+    ///
+    /// Errors: as for [`Schedule::new`].
+    pub fn schedule(&self, mode: usize, speed_mps: f64) -> Result<Schedule, SamplingError> {
+        Schedule::new(&self.specs(mode), self.inspection.layout, positive("the speed in m/s", speed_mps)?)
+    }
+}
+
+impl PlannedMode {
+    /// T_s: time between two pings, the longest of any head, seconds.
+    pub fn ping_period_s(&self) -> f64 {
+        self.ping_period_s
+    }
+
+    /// When the heads pass.
+    pub fn passes(&self) -> &Passes {
+        &self.passes
+    }
+}
+
+/// Of two reasons, a strip that no head sees before a step, and the larger.
+fn worse(known: Option<SamplingError>, other: SamplingError) -> Option<SamplingError> {
+    let weight = |why: &SamplingError| match why {
+        SamplingError::UnseenStrip { width_m, .. } => (1, *width_m),
+        SamplingError::AngularStep { t_y_m, .. } => (0, *t_y_m),
+        _ => (2, 0.0),
+    };
+    known.filter(|known| weight(known) >= weight(&other)).or(Some(other))
+}
+
+/// For each mode that all heads have, the mode of each.
+fn common_modes(heads: &[(HeadSpec, Vec<HeadMode>)]) -> Vec<Vec<HeadMode>> {
+    let Some((_, first)) = heads.first() else { return Vec::new() };
+    let of_all = |name: &str| -> Option<Vec<HeadMode>> {
+        heads.iter().map(|(_, modes)| modes.iter().find(|mode| mode.name == name).copied()).collect()
+    };
+    first.iter().filter_map(|mode| of_all(mode.name)).collect()
+}
+
+/// The place where the vehicle should be, then those where it may be.
+fn poses(inspection: &Inspection) -> Vec<Pose> {
+    let sides = |most: f64| if most > 0.0 { vec![0.0, -most, most] } else { vec![0.0] };
+    let mut poses = Vec::new();
+    for y in sides(inspection.drift_m) {
+        for z in sides(inspection.drift_m) {
+            poses.extend(sides(inspection.yaw_rad).into_iter().map(|yaw| pose(inspection, [y, z], yaw)));
+        }
+    }
+    poses
+}
+
+fn pose(inspection: &Inspection, aside: Yz, yaw_rad: f64) -> Pose {
+    let [y, z] = inspection.place;
+    Pose {
+        position: Point3::new(0.0, y + aside[0], z + aside[1]),
+        attitude: Rot::from_roll_pitch_yaw(0.0, 0.0, yaw_rad),
+    }
+}
+
+fn rings(inspection: &Inspection, pose: &Pose) -> Result<Vec<Ring>, SamplingError> {
+    let ring = |(spec, _): &(HeadSpec, Vec<HeadMode>)| {
+        Ring::cast(&Standing::new(&inspection.profile, pose, &spec.mount)?, 0.0, RING)
+    };
+    inspection.heads.iter().map(ring).collect()
+}
+
+fn stride(mode: &HeadMode) -> usize {
+    stride_of(mode.turn.step_rad())
+}
+
+fn stride_of(step_rad: f64) -> usize {
+    Ring::stride(step_rad, RING)
+}
+
+fn chords_m(rings: &[Ring], modes: &[HeadMode]) -> [f64; 3] {
+    let mut all = [f64::INFINITY, 0.0, 0.0];
+    for (ring, mode) in rings.iter().zip(modes) {
+        let [least, mean, most] = ring.chords_m(stride(mode));
+        all = [all[0].min(least), all[1] + mean / rings.len() as f64, all[2].max(most)];
+    }
+    all
+}
+
+fn stance(
+    inspection: &Inspection,
+    hidden: &[Vec<AngleRange>],
+    common: &[Vec<HeadMode>],
+    pose: &Pose,
+    rings: &[Ring],
+) -> Result<Stance, SamplingError> {
+    let specs: Vec<HeadSpec> = inspection.heads.iter().map(|(spec, _)| *spec).collect();
+    let perimeter_m = inspection.profile.perimeter_m();
+    let mut strips = Strips::default();
+    strips.rebuild(perimeter_m, &views(inspection, &specs, hidden, pose, rings)?);
+    strips.measure(common.len(), rings.iter(), |setting, head| Some(stride(common.get(setting)?.get(head)?)));
+    let place = |spec: &HeadSpec| {
+        let place = pose.place(spec.mount.position);
+        [place.y(), place.z()]
+    };
+    let places: Vec<Yz> = specs.iter().map(place).collect();
+    let ahead_m =
+        |spec: &HeadSpec| passes::ahead_m(&pose.attitude, &spec.mount).ok_or(SamplingError::HeadAskew);
+    let ahead_m = specs.iter().map(ahead_m).collect::<Result<Vec<f64>, _>>()?;
+    let off_m = ahead_m.iter().zip(&specs).map(|(ahead_m, spec)| ahead_m - spec.mount.position.x());
+    Ok(Stance {
+        strips,
+        farthest_m: rings.iter().map(Ring::longest_range_m).fold(0.0, f64::max),
+        parallax_rad: passes::parallax_rad(&inspection.profile, &places),
+        shift_m: spread(off_m),
+        apart_m: spread(ahead_m.iter().copied()),
+    })
+}
+
+/// The largest less the least.
+fn spread(values: impl Iterator<Item = f64> + Clone) -> f64 {
+    (values.clone().fold(f64::MIN, f64::max) - values.fold(f64::MAX, f64::min)).max(0.0)
+}
+
+/// What each head sees of the wall.
+fn views(
+    inspection: &Inspection,
+    specs: &[HeadSpec],
+    hidden: &[Vec<AngleRange>],
+    pose: &Pose,
+    rings: &[Ring],
+) -> Result<Vec<View>, SamplingError> {
+    /// Room for stretches of wall out of reach: every other sounding.
+    const OUT_OF_REACH: usize = RING as usize / 2;
+    let programs = layout::programs(specs, inspection.layout, 0.0)?;
+    let mut views = Vec::with_capacity(specs.len());
+    for (((spec, program), hidden), ring) in specs.iter().zip(&programs).zip(hidden).zip(rings) {
+        let standing = Standing::new(&inspection.profile, pose, &spec.mount)?;
+        let arc = |angles: &AngleRange| Arc::of(&standing, angles);
+        let sector = program.sector.map(|(from_rad, size_rad)| AngleRange { from_rad, size_rad });
+        let mut view = View { sector: sector.as_ref().map(arc).transpose()?, hidden: Vec::new() };
+        view.hidden = hidden.iter().map(arc).collect::<Result<_, _>>()?;
+        view.hidden.reserve(OUT_OF_REACH);
+        view.hide_out_of_reach(ring, spec.reach_m(inspection.sound_speed_mps));
+        views.push(view);
+    }
+    Ok(views)
+}
+
+fn planned_mode(
+    inspection: &Inspection,
+    of_heads: &[HeadMode],
+    chords_m: [f64; 3],
+    t_y2_m: f64,
+) -> Result<PlannedMode, SamplingError> {
+    let mode = of_heads.first().copied().ok_or(SamplingError::NoCommonMode)?;
+    let ping_period_s = of_heads.iter().map(|mode| mode.turn.ping_period_s()).fold(0.0, f64::max);
+    let heads = HeadSet::first(of_heads.len());
+    let turn_s = |head: usize| of_heads.get(head).map_or(0.0, |mode| mode.turn.period_s());
+    let passes = match inspection.layout {
+        HeadLayout::PhaseShift => Passes::evenly_phased(heads, turn_s)?,
+        HeadLayout::SectorOffset => {
+            let set = |((spec, _), mode): (&(HeadSpec, Vec<HeadMode>), &HeadMode)| HeadSpec {
+                step_rad: mode.turn.step_rad(),
+                ping_period_s: mode.turn.ping_period_s(),
+                ..*spec
+            };
+            let specs: Vec<HeadSpec> = inspection.heads.iter().zip(of_heads).map(set).collect();
+            let sweep_s = Schedule::new(&specs, inspection.layout, 0.0)?.sweep_s();
+            Passes::in_sectors(heads, sweep_s.ok_or(SamplingError::NoCommonMode)?)?
+        }
+    };
+    Ok(PlannedMode { mode, chords_m, t_y2_m, passes, ping_period_s })
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,212 @@
+//! What an engineer asks of a plan, and the answer for each mode.
+
+use serde::Serialize;
+
+use super::Planner;
+use crate::error::{SamplingError, positive};
+use crate::section;
+use crate::spacing::Spiral;
+
+/// What is asked. A target asks for the speed, a speed or a time for the target that they allow; both ask whether one
+/// meets the other.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Question {
+    /// Target T, m.
+    pub target_m: Option<f64>,
+    /// Speed, m/s.
+    pub speed_mps: Option<f64>,
+    /// Time for the whole length, seconds.
+    pub time_s: Option<f64>,
+}
+
+/// The answer for one mode; figures along the tunnel are at `speed_mps`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Answer {
+    /// The mode.
+    pub mode: &'static str,
+    /// theta, degrees.
+    pub step_deg: f64,
+    /// n: pings to a turn. Eq. 3.
+    pub steps_per_turn: u32,
+    /// T: time of a turn, seconds.
+    pub turn_s: f64,
+    /// Where that time comes from: `measured`, `table` or `estimated`.
+    pub turn_basis: &'static str,
+    /// epsilon: overlap of neighbouring beams; below 1, none. Eq. 22.
+    pub overlap: f64,
+    /// T_y at rest and where the vehicle should be, straight from sample to sample: smallest, m. Eq. 5 or 7.
+    pub t_y_min_rest_m: f64,
+    /// The same: mean, m. Eq. 10.
+    pub t_y_mean_rest_m: f64,
+    /// The same: largest, m. Eq. 6.
+    pub t_y_max_rest_m: f64,
+    /// T_yp: what the mean is at most, m. Eq. 10.
+    pub t_yp_m: f64,
+    /// T_y2: the largest distance between neighbours of one turn on the wall, anywhere the vehicle may be, m.
+    pub t_y2_m: f64,
+    /// The largest speed that meets the target, m/s.
+    pub v_max_mps: Option<f64>,
+    /// Hours at that speed for the whole length.
+    pub needed_h: Option<f64>,
+    /// Why no speed does: `angular_step`, `unseen_strip` or `off_axis`.
+    pub reason: Option<&'static str>,
+    /// The same in words.
+    pub refused: Option<String>,
+    /// The speed for which the rest is: the one asked about, or else `v_max_mps`, m/s.
+    pub speed_mps: Option<f64>,
+    /// What it gives.
+    pub spacing: Option<Spacing>,
+    /// Whether the target is met at the speed asked about.
+    pub meets_target: Option<bool>,
+    /// Whether the time asked about is enough at `v_max_mps`.
+    pub suffices: Option<bool>,
+    /// Whether it is the best choice of the modes.
+    pub best: bool,
+}
+
+/// Distances between samples at a speed, m.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Spacing {
+    /// d: way gone between two pings. Eq. 11.
+    pub advance_m: f64,
+    /// v T: way gone in a turn. Eq. 12.
+    pub pitch_m: f64,
+    /// T_x where all heads see the wall.
+    pub t_x_m: f64,
+    /// T_x where the fewest do.
+    pub t_x_hidden_m: f64,
+    /// T_ymin, the way gone included. Eq. 14.
+    pub t_y_min_m: f64,
+    /// Mean T_y, the way gone included.
+    pub t_y_mean_m: f64,
+    /// T_ymax, the way gone included. Eq. 13.
+    pub t_y_max_m: f64,
+    /// T_min. Eq. 18.
+    pub t_min_m: f64,
+    /// T_mean. Eq. 17.
+    pub t_mean_m: f64,
+    /// T_max anywhere the vehicle may be, hidden strips included. Eq. 16. `None` where a strip is seen by no head.
+    pub t_max_m: Option<f64>,
+    /// The smallest feature that is sure to be hit once.
+    pub hit_once_m: Option<f64>,
+    /// The smallest feature that is sure to be hit twice: the sampling theorem's size.
+    pub hit_twice_m: Option<f64>,
+}
+
+impl Planner {
+    /// The answers for all modes, or for the one named.
+    ///
+    /// Errors: nothing asked; a target, speed or time that isn't above zero. A target that a mode can't meet is an
+    /// answer.
+    pub fn answers(&self, question: &Question, only: Option<&str>) -> Result<Vec<Answer>, SamplingError> {
+        let Question { target_m, speed_mps, time_s } = *question;
+        let length_m = self.inspection().length_m;
+        let positive = |what, value: Option<f64>| value.map(|value| positive(what, value)).transpose();
+        let target_m = positive("the target in metres", target_m)?;
+        let needed_mps = positive("the time in seconds", time_s)?.map(|time_s| length_m / time_s);
+        let asked_mps = positive("the speed in m/s", speed_mps)?.or(needed_mps);
+        if target_m.is_none() && asked_mps.is_none() {
+            return Err(SamplingError::NothingAsked);
+        }
+        let asked = Asked { target_m, asked_mps, needed_mps };
+        let wanted = |mode: &str| only.is_none_or(|only| only == mode);
+        let modes = self.modes().iter().enumerate().filter(|(_, planned)| wanted(planned.mode.name));
+        let mut answers = modes.map(|(mode, _)| self.answer(mode, &asked)).collect::<Result<Vec<_>, _>>()?;
+        mark_best(&mut answers, &asked);
+        Ok(answers)
+    }
+
+    fn answer(&self, mode: usize, asked: &Asked) -> Result<Answer, SamplingError> {
+        let planned = self.modes().get(mode).ok_or(SamplingError::NoCommonMode)?;
+        let turn = planned.mode.turn;
+        let beam_rad = self.inspection().heads.first().map_or(0.0, |(spec, _)| spec.beam_rad);
+        let v_max = asked.target_m.map(|target_m| self.v_max_mps(mode, target_m));
+        let (v_max_mps, refused) = match v_max {
+            None => (None, None),
+            Some(Ok(v_mps)) => (Some(v_mps), None),
+            Some(Err(
+                why @ (SamplingError::AngularStep { .. }
+                | SamplingError::UnseenStrip { .. }
+                | SamplingError::OffAxis { .. }),
+            )) => (None, Some(why)),
+            Some(Err(why)) => return Err(why),
+        };
+        let speed_mps = asked.asked_mps.or(v_max_mps);
+        let spacing = speed_mps.map(|speed_mps| self.spacing(mode, speed_mps)).transpose()?;
+        let t_max_m = spacing.and_then(|spacing| spacing.t_max_m);
+        let meets = |target_m: f64| t_max_m.is_some_and(|t_m| t_m <= target_m);
+        Ok(Answer {
+            mode: planned.mode.name,
+            step_deg: turn.step_rad().to_degrees(),
+            steps_per_turn: turn.steps(),
+            turn_s: turn.period_s(),
+            turn_basis: planned.mode.basis.as_str(),
+            overlap: section::overlap(beam_rad, turn.step_rad())?,
+            t_y_min_rest_m: planned.chords_m[0],
+            t_y_mean_rest_m: planned.chords_m[1],
+            t_y_max_rest_m: planned.chords_m[2],
+            t_yp_m: section::t_yp_m(self.inspection().profile.perimeter_m(), turn.steps())?,
+            t_y2_m: planned.t_y2_m,
+            v_max_mps,
+            needed_h: v_max_mps.map(|v_mps| self.inspection().length_m / v_mps / 3600.0),
+            reason: refused.map(|why| match why {
+                SamplingError::UnseenStrip { .. } => "unseen_strip",
+                SamplingError::OffAxis { .. } => "off_axis",
+                _ => "angular_step",
+            }),
+            refused: refused.map(|why| why.to_string()),
+            speed_mps,
+            spacing,
+            meets_target: asked.asked_mps.and(asked.target_m).map(meets),
+            suffices: asked
+                .needed_mps
+                .filter(|_| asked.target_m.is_some())
+                .map(|needed| v_max_mps.is_some_and(|v_mps| v_mps >= needed)),
+            best: false,
+        })
+    }
+
+    fn spacing(&self, mode: usize, speed_mps: f64) -> Result<Spacing, SamplingError> {
+        let planned = self.modes().get(mode).ok_or(SamplingError::NoCommonMode)?;
+        let (gap_s, hidden_gap_s) = self.gaps_s(mode).ok_or(SamplingError::NoCommonMode)?;
+        let turn = planned.mode.turn;
+        let spiral = Spiral::new(speed_mps, turn, turn.period_s() / gap_s)?;
+        let [least_m, mean_m, most_m] = planned.chords_m;
+        let t_max_m = Some(self.t_max_m(mode, speed_mps)?).filter(|t_m| t_m.is_finite());
+        Ok(Spacing {
+            advance_m: spiral.advance_m(),
+            pitch_m: spiral.pitch_m(),
+            t_x_m: spiral.t_x_m(),
+            t_x_hidden_m: speed_mps * hidden_gap_s,
+            t_y_min_m: spiral.t_y_min_m(least_m),
+            t_y_mean_m: spiral.t_y_mean_m(mean_m),
+            t_y_max_m: spiral.t_y_max_m(most_m),
+            t_min_m: spiral.t_min_m(spiral.t_y_min_m(least_m)),
+            t_mean_m: spiral.t_mean_m(spiral.t_y_mean_m(mean_m)),
+            t_max_m,
+            hit_once_m: t_max_m,
+            hit_twice_m: t_max_m.map(|t_m| 2.0 * t_m),
+        })
+    }
+}
+
+struct Asked {
+    target_m: Option<f64>,
+    asked_mps: Option<f64>,
+    needed_mps: Option<f64>,
+}
+
+/// Best is the mode that is fastest for the target, or finest at the speed asked about.
+fn mark_best(answers: &mut [Answer], asked: &Asked) {
+    let t_max = |answer: &Answer| answer.spacing.and_then(|spacing| spacing.t_max_m);
+    let best = if asked.asked_mps.is_some() {
+        let finest = answers.iter().enumerate().filter_map(|(k, answer)| Some((k, t_max(answer)?)));
+        finest.min_by(|a, b| a.1.total_cmp(&b.1))
+    } else {
+        let fastest = answers.iter().enumerate().filter_map(|(k, answer)| Some((k, answer.v_max_mps?)));
+        fastest.max_by(|a, b| a.1.total_cmp(&b.1))
+    };
+    if let Some(answer) = best.and_then(|(k, _)| answers.get_mut(k)) {
+        answer.best = true;
+    }
+}

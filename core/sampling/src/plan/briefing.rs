@@ -1,0 +1,207 @@
+//! What the crew has to know besides the figures of a mode: what the vehicle hides, how heads start, who disturbs whom.
+
+use serde::Serialize;
+
+use super::Planner;
+use crate::error::SamplingError;
+use crate::interference;
+use crate::layout::{self, HeadLayout};
+use crate::ring::Standing;
+use crate::strips::Arc;
+use headrace_geometry::math::{self, TAU};
+
+/// The briefing for one mode at one speed.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Briefing {
+    /// The mode.
+    pub mode: &'static str,
+    /// The speed, m/s.
+    pub speed_mps: f64,
+    /// What is hidden from each head.
+    pub hidden: Vec<Hidden>,
+    /// Strips of the wall that not all heads see, or, in sectors, none does.
+    pub strips: Vec<ThinStrip>,
+    /// How each head starts.
+    pub starts: Vec<Start>,
+    /// For heads apart along the hull, what would make them start at equal angles.
+    pub hull_rules: Vec<HullAdvice>,
+    /// Pairs of heads that can hear each other.
+    pub exposures: Vec<Heard>,
+}
+
+/// A range of angles that the vehicle hides from a head.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Hidden {
+    /// The head.
+    pub head: usize,
+    /// Its middle, degrees in the head's own frame.
+    pub middle_deg: f64,
+    /// Its size, degrees.
+    pub size_deg: f64,
+    /// What it hides of the wall, m.
+    pub wall_m: f64,
+    /// Where the middle of that is, o'clock seen looking along the tunnel.
+    pub clock: String,
+}
+
+/// A strip of the wall with fewer passes than the rest.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ThinStrip {
+    /// Where it begins, arc length in m.
+    pub from_m: f64,
+    /// Its width, m.
+    pub width_m: f64,
+    /// Where its middle is, o'clock.
+    pub clock: String,
+    /// The heads that see it.
+    pub seen_by: Vec<usize>,
+    /// T_x there over T_x where all see; `None` where none does.
+    pub t_x_factor: Option<f64>,
+}
+
+/// What a head is told to do.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Start {
+    /// The head.
+    pub head: usize,
+    /// Angle of its first ping, degrees in its own frame.
+    pub angle_deg: f64,
+    /// Whether its angles grow from there.
+    pub growing: bool,
+    /// Its sector: least angle and size, degrees.
+    pub sector_deg: Option<[f64; 2]>,
+}
+
+/// The spacing rule x = q v T / s for a head.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct HullAdvice {
+    /// The head.
+    pub head: usize,
+    /// How far it is behind the foremost, m.
+    pub behind_m: f64,
+    /// s-ths of a turn in which the vehicle goes that far, to the nearest.
+    pub q: u32,
+    /// The speed that would fit, m/s.
+    pub speed_mps: f64,
+    /// The distance that would fit, m.
+    pub apart_m: f64,
+}
+
+/// How long two heads can hear each other.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Heard {
+    /// The two heads.
+    pub heads: [usize; 2],
+    /// Face to face, seconds of each turn or sweep.
+    pub facing_s: f64,
+    /// On the same patch of wall, seconds of each.
+    pub same_patch_s: f64,
+    /// The turn or sweep, seconds.
+    pub of_s: f64,
+}
+
+impl Planner {
+    /// The briefing for a mode at a speed, the vehicle where it should be.
+    ///
+    /// Errors: a speed that isn't above zero.
+    pub fn briefing(&self, mode: usize, speed_mps: f64) -> Result<Briefing, SamplingError> {
+        let name = self.modes().get(mode).ok_or(SamplingError::NoCommonMode)?.mode.name;
+        Ok(Briefing {
+            mode: name,
+            speed_mps,
+            hidden: self.hidden_ranges()?,
+            strips: self.thin_strips(mode),
+            starts: self.starts(mode, speed_mps)?,
+            hull_rules: self.hull_rules(mode, speed_mps)?,
+            exposures: self.exposures(mode, speed_mps)?,
+        })
+    }
+
+    fn hidden_ranges(&self) -> Result<Vec<Hidden>, SamplingError> {
+        let (profile, pose) = (&self.inspection().profile, self.nominal_pose());
+        let mut found = Vec::new();
+        for (head, ((spec, _), ranges)) in self.inspection().heads.iter().zip(self.hidden()).enumerate() {
+            let standing = Standing::new(profile, &pose, &spec.mount)?;
+            for range in ranges {
+                let arc = Arc::of(&standing, range)?;
+                found.push(Hidden {
+                    head,
+                    middle_deg: math::wrap(range.middle_rad(), TAU).to_degrees(),
+                    size_deg: range.size_rad.to_degrees(),
+                    wall_m: arc.length_m,
+                    clock: profile.clock(arc.from_m + arc.length_m / 2.0),
+                });
+            }
+        }
+        Ok(found)
+    }
+
+    fn thin_strips(&self, mode: usize) -> Vec<ThinStrip> {
+        let (Some(strips), Some(planned)) = (self.nominal_strips(), self.modes().get(mode)) else {
+            return Vec::new();
+        };
+        let passes = planned.passes();
+        let gaps = || strips.as_slice().iter().filter_map(|strip| passes.gap_s(strip.seen_by));
+        let least_s = gaps().fold(f64::INFINITY, f64::min);
+        let factor = |strip: &crate::strips::Strip| Some(passes.gap_s(strip.seen_by)? / least_s);
+        let thin =
+            strips.as_slice().iter().filter(|strip| factor(strip).is_none_or(|factor| factor > 1.0 + 1e-9));
+        thin.map(|strip| ThinStrip {
+            from_m: strip.arc.from_m,
+            width_m: strip.arc.length_m,
+            clock: self.inspection().profile.clock(strip.arc.from_m + strip.arc.length_m / 2.0),
+            seen_by: strip.seen_by.iter().collect(),
+            t_x_factor: factor(strip),
+        })
+        .collect()
+    }
+
+    fn starts(&self, mode: usize, speed_mps: f64) -> Result<Vec<Start>, SamplingError> {
+        let schedule = self.schedule(mode, speed_mps)?;
+        let start = |(head, program): (usize, &crate::head::HeadProgram)| Start {
+            head,
+            angle_deg: math::wrap(program.start_rad, TAU).to_degrees(),
+            growing: program.growing,
+            sector_deg: program.sector.map(|(least, size)| [least.to_degrees(), size.to_degrees()]),
+        };
+        Ok(schedule.programs().enumerate().map(start).collect())
+    }
+
+    fn hull_rules(&self, mode: usize, speed_mps: f64) -> Result<Vec<HullAdvice>, SamplingError> {
+        let specs = self.specs(mode);
+        let Some(planned) = self.modes().get(mode) else { return Ok(Vec::new()) };
+        if self.inspection().layout != HeadLayout::PhaseShift {
+            return Ok(Vec::new());
+        }
+        let foremost_m = specs.iter().map(|spec| spec.mount.position.x()).fold(f64::MIN, f64::max);
+        let mut rules = Vec::new();
+        for (head, spec) in specs.iter().enumerate() {
+            let behind_m = foremost_m - spec.mount.position.x();
+            if behind_m > 0.0 {
+                let period_s = planned.mode.turn.period_s();
+                let rule = layout::hull_rule(behind_m, specs.len(), speed_mps, period_s)?;
+                rules.push(HullAdvice {
+                    head,
+                    behind_m,
+                    q: rule.q,
+                    speed_mps: rule.speed_mps,
+                    apart_m: rule.apart_m,
+                });
+            }
+        }
+        Ok(rules)
+    }
+
+    fn exposures(&self, mode: usize, speed_mps: f64) -> Result<Vec<Heard>, SamplingError> {
+        let schedule = self.schedule(mode, speed_mps)?;
+        let profile = &self.inspection().profile;
+        let found = interference::exposures(&self.specs(mode), &schedule, profile, &self.nominal_pose())?;
+        let heard = |exposure: interference::Exposure| Heard {
+            heads: [exposure.heads.0, exposure.heads.1],
+            facing_s: exposure.facing_s,
+            same_patch_s: exposure.same_patch_s,
+            of_s: exposure.of_s,
+        };
+        Ok(found.into_iter().map(heard).collect())
+    }
+}

@@ -1,0 +1,240 @@
+use super::*;
+use crate::fixtures;
+use crate::head::{Basis, Turn};
+use headrace_geometry::math;
+use headrace_geometry::tunnel::shapes;
+
+const MODES: [(&str, f64, f64); 5] = [
+    ("slow", 0.3, 21.6),
+    ("medium", 0.6, 10.8),
+    ("fast", 0.9, 8.0),
+    ("faster", 1.2, 6.6),
+    ("fastest", 2.4, 4.8),
+];
+
+fn modes() -> Vec<HeadMode> {
+    let mode = |(name, step_deg, period_s): (&'static str, f64, f64)| HeadMode {
+        name,
+        turn: Turn::new(step_deg.to_radians(), period_s).unwrap(),
+        basis: Basis::Table,
+    };
+    MODES.into_iter().map(mode).collect()
+}
+
+fn head(position: [f64; 3], aft: bool, radius_m: f64) -> (HeadSpec, Vec<HeadMode>) {
+    (fixtures::head(position, aft, radius_m), modes())
+}
+
+fn inspection(heads: Vec<(HeadSpec, Vec<HeadMode>)>, layout: HeadLayout) -> Inspection {
+    let profile = shapes::ceran().unwrap();
+    let place = profile.reference();
+    Inspection {
+        profile,
+        length_m: 7000.0,
+        place,
+        heads,
+        hull: Vec::new(),
+        layout,
+        drift_m: 0.0,
+        yaw_rad: 0.0,
+        yaw_rate_radps: 0.0,
+        sound_speed_mps: 1500.0,
+    }
+}
+
+fn ideal(count: usize) -> Inspection {
+    inspection(vec![head([0.0; 3], false, 0.0); count], HeadLayout::PhaseShift)
+}
+
+/// VITA 2 with four heads: two side by side in front, two aft.
+fn vita_2(layout: HeadLayout) -> Inspection {
+    let places = [([0.551, 0.15, 0.0], false), ([0.551, -0.15, 0.0], false)];
+    let aft = [([-0.551, 0.15, 0.0], true), ([-0.551, -0.15, 0.0], true)];
+    let heads = places.into_iter().chain(aft).map(|(place, aft)| head(place, aft, 0.04)).collect();
+    inspection(heads, layout)
+}
+
+fn speed(target_m: f64) -> Question {
+    Question { target_m: Some(target_m), ..Question::default() }
+}
+
+#[test]
+fn v_max_put_back_into_the_forward_equations_is_the_target() {
+    let drifting = Inspection { drift_m: 1.0, yaw_rad: 0.2, ..vita_2(HeadLayout::PhaseShift) };
+    let sectors = vita_2(HeadLayout::SectorOffset);
+    for inspection in [ideal(1), ideal(2), ideal(4), vita_2(HeadLayout::PhaseShift), drifting, sectors] {
+        let planner = Planner::new(inspection).unwrap();
+        let mut met = 0;
+        for mode in 0..MODES.len() {
+            for target_m in [0.1, 0.3, 0.5, 1.0, 3.0] {
+                let Ok(v_mps) = planner.v_max_mps(mode, target_m) else { continue };
+                let t_m = planner.t_max_m(mode, v_mps).unwrap();
+                assert!((t_m - target_m).abs() < 1e-9, "mode {mode}, {target_m}: {t_m}");
+                assert!(planner.t_max_m(mode, 1.001 * v_mps).unwrap() > target_m);
+                met += 1;
+            }
+        }
+        assert!(met >= 9, "{met}");
+    }
+}
+
+/// metrics.md's table: T_max of Eq. 16, here for the worst start of a head's pings, which is at most a little more.
+#[test]
+fn val_ideal_heads_give_the_reference_table() {
+    let expected = [
+        [4.259, 2.132, 1.069],
+        [2.134, 1.074, 0.548],
+        [1.589, 0.811, 0.434],
+        [1.325, 0.695, 0.404],
+        [1.042, 0.639, 0.513],
+    ];
+    for (column, heads) in [1, 2, 4].into_iter().enumerate() {
+        let planner = Planner::new(ideal(heads)).unwrap();
+        for (mode, row) in expected.iter().enumerate() {
+            let t_m = planner.t_max_m(mode, 0.197).unwrap();
+            assert!(
+                (-2e-3..0.05).contains(&(t_m / row[column] - 1.0)),
+                "{heads} {mode}: {t_m} {}",
+                row[column]
+            );
+        }
+    }
+}
+
+#[test]
+fn side_walls_that_neighbours_hide_get_half_of_the_passes() {
+    let planner = Planner::new(vita_2(HeadLayout::PhaseShift)).unwrap();
+    let fast = 2;
+    let (gap_s, hidden_s) = planner.gaps_s(fast).unwrap();
+    assert!((gap_s - 2.0).abs() < 1e-12 && (hidden_s - 4.0).abs() < 1e-12);
+    let hidden: Vec<_> =
+        planner.nominal_strips().unwrap().as_slice().iter().filter(|strip| strip.seen_by.len() < 4).collect();
+    assert_eq!(hidden.len(), 2);
+    for strip in hidden {
+        assert!(strip.seen_by.len() == 2 && (strip.arc.length_m - 1.7).abs() < 0.1, "{strip:?}");
+    }
+    // Steps are short on the side walls; the corners, seen by all, don't come to as much.
+    let t_m = planner.t_max_m(fast, 0.1).unwrap();
+    assert!((0.41..0.43).contains(&t_m), "{t_m}");
+}
+
+#[test]
+fn in_sectors_heads_look_outwards_and_leave_their_distance_at_floor_and_crown() {
+    let planner = Planner::new(vita_2(HeadLayout::SectorOffset)).unwrap();
+    assert!(planner.hidden().iter().all(|ranges| ranges.len() == 1));
+    let strips = planner.nominal_strips().unwrap().as_slice();
+    let unseen: Vec<_> = strips.iter().filter(|strip| strip.seen_by.is_empty()).collect();
+    // Nothing is hidden in the sectors that they take; but between 0.3 m apart they see neither floor nor crown.
+    assert_eq!(unseen.len(), 2, "{strips:?}");
+    assert!(unseen.iter().all(|strip| (strip.arc.length_m - 0.3).abs() < 0.01));
+    let answers = planner.answers(&speed(0.4), None).unwrap();
+    let fastest = &answers[4];
+    assert_eq!((fastest.reason, fastest.v_max_mps), (Some("angular_step"), None));
+    assert!(fastest.refused.as_ref().unwrap().contains("met at no speed"));
+    let slow = planner.answers(&speed(0.25), None).unwrap();
+    assert_eq!(slow[0].reason, Some("unseen_strip"), "{:?}", slow[0].refused);
+    assert!(slow[0].refused.as_ref().unwrap().contains("no head sees 0.30 m of the wall"));
+}
+
+#[test]
+fn a_target_asks_for_speed_and_a_time_for_the_target() {
+    let planner = Planner::new(ideal(2)).unwrap();
+    let answers = planner.answers(&speed(1.0), None).unwrap();
+    let best: Vec<_> = answers.iter().filter(|answer| answer.best).map(|answer| answer.mode).collect();
+    assert_eq!(best, ["fastest"]);
+    let fast = &answers[2];
+    assert!((fast.needed_h.unwrap() - 7000.0 / fast.v_max_mps.unwrap() / 3600.0).abs() < 1e-9);
+    assert!((fast.spacing.unwrap().t_max_m.unwrap() - 1.0).abs() < 1e-9);
+    assert_eq!((fast.meets_target, fast.suffices), (None, None));
+
+    let day = Question { time_s: Some(8.0 * 3600.0), ..Question::default() };
+    let answers = planner.answers(&day, Some("fast")).unwrap();
+    assert_eq!(answers.len(), 1);
+    let spacing = answers[0].spacing.unwrap();
+    assert!((answers[0].speed_mps.unwrap() - 7000.0 / 28_800.0).abs() < 1e-12);
+    assert!((spacing.hit_twice_m.unwrap() - 2.0 * spacing.hit_once_m.unwrap()).abs() < 1e-12);
+
+    let both = Question { target_m: Some(1.0), ..day };
+    let answers = planner.answers(&both, None).unwrap();
+    for answer in &answers {
+        assert_eq!(answer.meets_target, answer.suffices, "{answer:?}");
+    }
+    assert!(answers.iter().any(|answer| answer.suffices == Some(true)));
+    assert!(answers.iter().any(|answer| answer.suffices == Some(false)));
+}
+
+#[test]
+fn what_cannot_be_planned_is_named() {
+    let why = |inspection| Planner::new(inspection).unwrap_err();
+    assert_eq!(why(ideal(0)), SamplingError::HeadCount { heads: 0 });
+    let one = Inspection { layout: HeadLayout::SectorOffset, ..ideal(1) };
+    assert_eq!(why(one), SamplingError::SectorNeedsHeads { heads: 1 });
+    assert!(matches!(why(Inspection { drift_m: 9.0, ..ideal(1) }), SamplingError::HeadOutside { .. }));
+    let yawed = Inspection { yaw_rad: math::FRAC_PI_2, ..ideal(1) };
+    assert!(matches!(why(yawed), SamplingError::BeamAlongTunnel { .. }));
+    let none = inspection(vec![(head([0.0; 3], false, 0.0).0, Vec::new())], HeadLayout::PhaseShift);
+    assert_eq!(why(none), SamplingError::NoCommonMode);
+    for (length_m, drift_m) in [(7000.0, -1.0), (7000.0, f64::NAN), (0.0, 0.0), (f64::INFINITY, 0.0)] {
+        let error = why(Inspection { length_m, drift_m, ..ideal(1) });
+        assert!(
+            matches!(error, SamplingError::Negative { .. } | SamplingError::NotPositive { .. }),
+            "{error}"
+        );
+    }
+    let planner = Planner::new(ideal(1)).unwrap();
+    assert_eq!(planner.answers(&Question::default(), None), Err(SamplingError::NothingAsked));
+    for bad in [0.0, -1.0, f64::NAN] {
+        assert!(planner.answers(&speed(bad), None).is_err() && planner.t_max_m(0, bad).is_err());
+    }
+    // A target that a mode can't meet is an answer.
+    let answers = planner.answers(&speed(0.1), None).unwrap();
+    assert!(answers[0].v_max_mps.is_some() && answers[4].reason == Some("angular_step"));
+}
+
+#[test]
+fn drift_and_yaw_only_make_it_worse() {
+    let still = Planner::new(ideal(2)).unwrap();
+    let drifting =
+        Planner::new(Inspection { drift_m: 1.5, yaw_rad: f64::to_radians(15.0), ..ideal(2) }).unwrap();
+    for mode in 0..MODES.len() {
+        assert!(drifting.modes()[mode].t_y2_m > 1.5 * still.modes()[mode].t_y2_m);
+        assert!(drifting.v_max_mps(mode, 3.0).unwrap() < still.v_max_mps(mode, 3.0).unwrap());
+        // What the vehicle does where it should be stays the same.
+        let same = drifting.modes()[mode].chords_m.iter().zip(still.modes()[mode].chords_m);
+        assert!(same.into_iter().all(|(a, b)| (a - b).abs() < 1e-12));
+    }
+    assert!(drifting.farthest_m().1 > still.farthest_m().1 + 1.0);
+}
+
+#[test]
+fn the_perimeter_shows_the_corners_the_hidden_strips_and_the_sectors() {
+    let planner = Planner::new(vita_2(HeadLayout::PhaseShift)).unwrap();
+    let places = planner.perimeter(2, 0.1, 720).unwrap();
+    let most = places.iter().map(|place| place.t_y_m).fold(0.0, f64::max);
+    assert!((most - planner.modes()[2].t_y2_m).abs() < 1e-9);
+    assert!(places.iter().all(|place| place.t_y_m > 0.04));
+    let at = |t_x_m: f64| places.iter().filter(|p| (p.t_x_m.unwrap()[1] - t_x_m).abs() < 1e-9).count();
+    assert_eq!(at(0.2) + at(0.4), 720);
+    assert!((at(0.4) as f64 * 35.9 / 720.0 - 3.4).abs() < 0.3, "{}", at(0.4));
+
+    let sectors = inspection(vec![head([0.0; 3], false, 0.0); 3], HeadLayout::SectorOffset);
+    let planner = Planner::new(sectors).unwrap();
+    for place in planner.perimeter(0, 0.1, 360).unwrap() {
+        let [smaller, larger] = place.t_x_m.unwrap();
+        assert!((smaller + larger - 2.0 * 0.1 * 21.6 / 3.0).abs() < 1e-9 && smaller <= larger);
+    }
+}
+
+#[test]
+fn the_pattern_is_what_the_heads_lay() {
+    let planner = Planner::new(vita_2(HeadLayout::PhaseShift)).unwrap();
+    let samples = planner.pattern(2, 0.1, 2.0).unwrap();
+    assert_eq!(samples.len(), 4 * 801);
+    assert_eq!(samples.iter().filter(|sample| sample.new_sweep).count(), 4);
+    let hidden = samples.iter().filter(|sample| sample.hidden).count() as f64 / samples.len() as f64;
+    assert!((hidden - 15.33 / 360.0).abs() < 2e-3, "{hidden}");
+    let sectors = inspection(vec![head([0.0; 3], false, 0.0); 2], HeadLayout::SectorOffset);
+    let samples = Planner::new(sectors).unwrap().pattern(2, 0.1, 2.0).unwrap();
+    // Two turns are four sweeps of half a turn: three turning points within.
+    assert_eq!(samples.iter().filter(|sample| sample.new_sweep).count(), 2 * 4);
+}

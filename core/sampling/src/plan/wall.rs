@@ -1,0 +1,171 @@
+//! What a plan leaves on the wall, place by place.
+
+use super::Planner;
+use crate::error::{SamplingError, positive};
+use crate::head::{HeadProgram, HeadSpec};
+use crate::layout;
+use crate::ring::{Ring, Standing};
+use crate::spacing;
+use headrace_geometry::math;
+use headrace_geometry::time::DurNs;
+
+/// Spacing at a place of the perimeter, the vehicle where it should be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WallPlace {
+    /// Its arc length, m.
+    pub sigma_m: f64,
+    /// Distance between neighbours of one turn on the wall, the largest of the heads that see it, m.
+    pub t_y_m: f64,
+    /// Distance between passes, m, the smaller and the larger where two alternate; `None` where no head sees it.
+    pub t_x_m: Option<[f64; 2]>,
+    /// T of both, m.
+    pub t_m: Option<f64>,
+}
+
+/// A sample of the pattern.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PatternSample {
+    /// Number of the head.
+    pub head: usize,
+    /// Chainage, m, zero where the vehicle's origin is at the start.
+    pub x_m: f64,
+    /// Arc length, m.
+    pub sigma_m: f64,
+    /// The vehicle stands in its way.
+    pub hidden: bool,
+    /// The first of a head, or after a turning point.
+    pub new_sweep: bool,
+}
+
+impl Planner {
+    /// Spacing around the perimeter in a mode at a speed, at so many equal places.
+    ///
+    /// Errors: a speed that isn't above zero; as for [`Standing::sounding`].
+    pub fn perimeter(
+        &self,
+        mode: usize,
+        speed_mps: f64,
+        places: usize,
+    ) -> Result<Vec<WallPlace>, SamplingError> {
+        positive("the speed in m/s", speed_mps)?;
+        let planned = self.modes().get(mode).ok_or(SamplingError::NoCommonMode)?;
+        let specs = self.specs(mode);
+        let programs = layout::programs(&specs, self.inspection().layout, 0.0)?;
+        let mut around = Around::new(self.inspection().profile.perimeter_m(), places);
+        for (number, (spec, program)) in specs.iter().zip(&programs).enumerate() {
+            around.add(self, number, spec, program)?;
+        }
+        let passes = planned.passes();
+        let ping_s = planned.ping_period_s();
+        let strips = self.nominal_strips().ok_or(SamplingError::NoCommonMode)?;
+        let seen_by = |sigma_m: f64| strips.at(sigma_m).map(|strip| strip.seen_by);
+        let place = |k: usize| {
+            let sigma_m = around.sigma_m(k);
+            let gap_s = seen_by(sigma_m).and_then(|heads| passes.gap_s(heads));
+            let share = around.share.get(k).copied().flatten();
+            let t_x_m = gap_s.map(|gap_s| {
+                let longest_m = speed_mps * gap_s;
+                // In a sector two distances alternate, of which this is the sum.
+                share.map_or([longest_m; 2], |share| layout::divided_m(longest_m, share))
+            });
+            let t_y_m = around.t_y_m.get(k).copied().unwrap_or(0.0);
+            let t_m = t_x_m.map(|[_, larger]| spacing::t_max_m(larger, speed_mps * ping_s, t_y_m));
+            WallPlace { sigma_m, t_y_m, t_x_m, t_m }
+        };
+        Ok((0..places).map(place).collect())
+    }
+
+    /// The samples of some turns in a mode at a speed, head by head, each in order of time.
+    ///
+    /// Errors: a speed or number of turns that isn't above zero; as for [`Standing::sounding`].
+    pub fn pattern(
+        &self,
+        mode: usize,
+        speed_mps: f64,
+        turns: f64,
+    ) -> Result<Vec<PatternSample>, SamplingError> {
+        positive("the number of turns", turns)?;
+        let schedule = self.schedule(mode, speed_mps)?;
+        let pose = self.nominal_pose();
+        let mut samples = Vec::new();
+        for (head, (spec, hidden)) in self.specs(mode).iter().zip(self.hidden()).enumerate() {
+            let standing = Standing::new(&self.inspection().profile, &pose, &spec.mount)?;
+            let pings = math::floor_to_i64(turns * math::TAU / spec.step_rad + 1e-6).min(1_000_000);
+            let (mut last, mut growing) = (None, None);
+            for ping in 0..=pings {
+                let since_s = ping as f64 * spec.ping_period_s;
+                let Some(angle_rad) = schedule.angle_rad(head, DurNs::from_secs_f64(since_s)) else {
+                    continue;
+                };
+                let grows = last.map(|last| math::wrap_signed(angle_rad - last, math::TAU) > 0.0);
+                let sounding = standing.sounding(angle_rad)?;
+                samples.push(PatternSample {
+                    head,
+                    x_m: speed_mps * since_s + spec.mount.position.x() + sounding.beam.x(),
+                    sigma_m: sounding.sigma_m,
+                    hidden: hidden.iter().any(|range| range.has(angle_rad)),
+                    new_sweep: last.is_none() || growing.is_some() && grows != growing,
+                });
+                (last, growing) = (Some(angle_rad), grows.or(growing));
+            }
+        }
+        Ok(samples)
+    }
+}
+
+/// Equal places around the perimeter, filled head by head.
+struct Around {
+    perimeter_m: f64,
+    t_y_m: Vec<f64>,
+    /// Where in its head's sector a place is, from 0 to 1.
+    share: Vec<Option<f64>>,
+}
+
+impl Around {
+    fn new(perimeter_m: f64, places: usize) -> Self {
+        Self { perimeter_m, t_y_m: vec![0.0; places], share: vec![None; places] }
+    }
+
+    fn sigma_m(&self, place: usize) -> f64 {
+        self.perimeter_m * (place as f64 + 0.5) / self.t_y_m.len() as f64
+    }
+
+    /// The step of a head that passes over each place that it sees.
+    fn add(
+        &mut self,
+        planner: &Planner,
+        number: usize,
+        spec: &HeadSpec,
+        program: &HeadProgram,
+    ) -> Result<(), SamplingError> {
+        let standing = Standing::new(&planner.inspection().profile, &planner.nominal_pose(), &spec.mount)?;
+        let ring = Ring::cast(&standing, 0.0, super::RING)?;
+        let hidden = planner.hidden().get(number).map_or(&[][..], Vec::as_slice);
+        let places = self.t_y_m.len();
+        let stride = super::stride_of(spec.step_rad);
+        for ((sounding, next), step_m) in ring.pairs(stride).zip(ring.steps_m(stride)) {
+            if hidden.iter().any(|range| range.has(sounding.angle_rad)) {
+                continue;
+            }
+            let share = program.sector.map(|(least_rad, size_rad)| {
+                math::wrap(sounding.angle_rad - least_rad, math::TAU) / size_rad
+            });
+            if share.is_some_and(|share| share > 1.0) {
+                continue;
+            }
+            let way_m = math::wrap_signed(next.sigma_m - sounding.sigma_m, self.perimeter_m);
+            let from_m = if way_m < 0.0 { next.sigma_m } else { sounding.sigma_m };
+            let place_m = self.perimeter_m / places as f64;
+            let first = math::floor_to_i64(from_m / place_m);
+            let last = math::floor_to_i64((from_m + way_m.abs()) / place_m);
+            for place in first..=last {
+                let Ok(place) = usize::try_from(place.rem_euclid(places as i64)) else { continue };
+                if let (Some(t_y_m), Some(here)) = (self.t_y_m.get_mut(place), self.share.get_mut(place)) {
+                    *t_y_m = t_y_m.max(step_m);
+                    *here = here.or(share);
+                }
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,299 @@
+//! The general case: where the beams of a head that stands still meet the wall of any profile, from any place and in
+//! any attitude, by ray casting.
+
+use serde::{Deserialize, Serialize};
+
+use super::error::{SamplingError, positive};
+use headrace_geometry::frames::{Mount, Point3, Pose, Rot, Sensor, Tunnel, Vec3, head_direction};
+use headrace_geometry::math::{self, TAU};
+use headrace_geometry::tunnel::{Profile, WallHit};
+use headrace_snapshot::stateful;
+
+/// A beam that needs more than this to the wall runs along the tunnel, m.
+const ALONG_M: f64 = 1000.0;
+
+/// A head that stands still in a straight tunnel.
+#[derive(Debug, Clone, Copy)]
+pub struct Standing<'a> {
+    profile: &'a Profile,
+    head: Point3<Tunnel>,
+    turn: Rot<Tunnel, Sensor>,
+}
+
+/// Where a beam meets the wall.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Sounding {
+    /// Head angle, radians in the sensor's frame.
+    pub angle_rad: f64,
+    /// Way from the head to the wall: chainage gained, left, up, m. Its length is the range.
+    pub beam: Vec3<Tunnel>,
+    /// Arc length of the place on the wall, m.
+    pub sigma_m: f64,
+    /// Cosine of the angle between beam and wall's normal: 1 where the beam meets the wall squarely.
+    pub squareness: f64,
+}
+
+/// The patch of wall that a beam of some width covers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Footprint {
+    /// Its extent in the plane in which the head turns, measured on the unrolled wall, m.
+    pub in_plane_m: f64,
+    /// Its extent across that plane, m.
+    pub across_m: f64,
+}
+
+impl<'a> Standing<'a> {
+    /// A head on a vehicle.
+    ///
+    /// Errors: a head outside the profile.
+    pub fn new(profile: &'a Profile, pose: &Pose, mount: &Mount) -> Result<Self, SamplingError> {
+        let head = pose.place(mount.position);
+        let inside = head.is_finite() && profile.contains([head.y(), head.z()]);
+        inside
+            .then(|| Self { profile, head, turn: pose.attitude * mount.rotation })
+            .ok_or(SamplingError::HeadOutside { y_m: head.y(), z_m: head.z() })
+    }
+
+    /// The profile's perimeter, m.
+    pub fn perimeter_m(&self) -> f64 {
+        self.profile.perimeter_m()
+    }
+
+    /// Where the beam at `angle_rad` (the sensor's frame) meets the wall.
+    ///
+    /// Errors: a beam that meets no wall within a kilometre.
+    pub fn sounding(&self, angle_rad: f64) -> Result<Sounding, SamplingError> {
+        self.sounding_along(angle_rad, head_direction(angle_rad))
+    }
+
+    /// The same, the angle's direction being known.
+    fn sounding_along(&self, angle_rad: f64, beam: Vec3<Sensor>) -> Result<Sounding, SamplingError> {
+        let direction = self.turn * beam;
+        let hit = self.hit(direction);
+        let hit = hit.ok_or(SamplingError::BeamAlongTunnel { angle_deg: angle_rad.to_degrees() })?;
+        let squareness = -(direction.y() * hit.normal[0] + direction.z() * hit.normal[1]);
+        Ok(Sounding { angle_rad, beam: direction.scaled(hit.range_m), sigma_m: hit.sigma_m, squareness })
+    }
+
+    /// The patch that a beam of full width `beam_rad` covers about `angle_rad`.
+    ///
+    /// In the plane of turning, from the beam's one edge to the other along the unrolled wall; across it, between the
+    /// edges tilted forwards and back.
+    /// Errors: as for [`Standing::sounding`], of each edge; a width that isn't above zero.
+    /// Source: Jorge et al. 2021, §9.2 and Fig. 15, for any wall.
+    pub fn footprint(&self, angle_rad: f64, beam_rad: f64) -> Result<Footprint, SamplingError> {
+        positive("the beam's width in radians", beam_rad)?;
+        let half = beam_rad / 2.0;
+        let (early, late) = (self.sounding(angle_rad - half)?, self.sounding(angle_rad + half)?);
+        let (sine, cosine) = math::sin_cos(half);
+        let tilted = |sign: f64| {
+            let lean = Vec3::new(sign * sine, 0.0, 0.0) + head_direction(angle_rad).scaled(cosine);
+            let direction = self.turn * lean;
+            let hit = self.hit(direction);
+            let hit = hit.ok_or(SamplingError::BeamAlongTunnel { angle_deg: angle_rad.to_degrees() })?;
+            Ok(direction.scaled(hit.range_m))
+        };
+        let (ahead, behind) = (tilted(1.0)?, tilted(-1.0)?);
+        Ok(Footprint {
+            in_plane_m: early.step_m(&late, self.perimeter_m()),
+            across_m: (ahead + -behind).norm(),
+        })
+    }
+
+    fn hit(&self, direction: Vec3<Tunnel>) -> Option<WallHit> {
+        let hit =
+            self.profile.cast_from_inside([self.head.y(), self.head.z()], [direction.y(), direction.z()])?;
+        (hit.range_m <= ALONG_M).then_some(hit)
+    }
+}
+
+impl Sounding {
+    /// The range, m.
+    pub fn range_m(&self) -> f64 {
+        self.beam.norm()
+    }
+
+    /// Distance to another sounding of the same head on the unrolled wall, the short way round, m: what holes are
+    /// measured by.
+    pub fn step_m(&self, other: &Self, perimeter_m: f64) -> f64 {
+        let around_m = math::wrap_signed(other.sigma_m - self.sigma_m, perimeter_m);
+        math::hypot(other.beam.x() - self.beam.x(), around_m)
+    }
+
+    /// Distance to another sounding of the same head straight through the water, m: the paper's T_y.
+    pub fn chord_m(&self, other: &Self) -> f64 {
+        (other.beam + -self.beam).norm()
+    }
+}
+
+/// The soundings of a whole turn at equal angles; room that can be used again.
+#[derive(Debug, Clone, Default)]
+pub struct Ring {
+    soundings: Vec<Sounding>,
+    /// Way along the perimeter from the first sounding to each, m, and at last all the way round; negative where the
+    /// head turns against arc length.
+    way_m: Vec<f64>,
+    perimeter_m: f64,
+    /// The angles of the soundings and their directions, which stay from cast to cast.
+    beams: Vec<(f64, Vec3<Sensor>)>,
+    /// Distances between soundings so many apart, of the last cast; none while it is zero.
+    stride: usize,
+    steps_m: Vec<f64>,
+}
+
+stateful!(Ring { state: perimeter_m, stride; lists: soundings, way_m, beams, steps_m; });
+
+impl Ring {
+    /// A ring of `count` soundings, the first at `start_rad`.
+    ///
+    /// Errors: as for [`Standing::sounding`]; a count of zero.
+    pub fn cast(standing: &Standing<'_>, start_rad: f64, count: u32) -> Result<Self, SamplingError> {
+        let mut ring = Self::default();
+        ring.recast(standing, start_rad, count)?;
+        Ok(ring)
+    }
+
+    /// Casts anew in place; without soundings after an error.
+    ///
+    /// Errors: as for [`Ring::cast`].
+    /// Allocates: not when the ring has had as many soundings before.
+    pub fn recast(
+        &mut self,
+        standing: &Standing<'_>,
+        start_rad: f64,
+        count: u32,
+    ) -> Result<(), SamplingError> {
+        positive("the number of soundings", f64::from(count))?;
+        self.perimeter_m = standing.perimeter_m();
+        self.soundings.clear();
+        self.way_m.clear();
+        self.stride = 0;
+        self.aim(start_rad, count);
+        for (angle_rad, beam) in &self.beams {
+            match standing.sounding_along(*angle_rad, *beam) {
+                Ok(sounding) => self.soundings.push(sounding),
+                Err(why) => {
+                    self.soundings.clear();
+                    return Err(why);
+                }
+            }
+        }
+        let mut way_m = 0.0;
+        for (a, b) in self.soundings.iter().zip(self.soundings.iter().cycle().skip(1)) {
+            self.way_m.push(way_m);
+            way_m += math::wrap_signed(b.sigma_m - a.sigma_m, self.perimeter_m);
+        }
+        self.way_m.push(way_m);
+        // Room for what `keep_steps` may be asked for later, when nothing may allocate.
+        self.steps_m.clear();
+        self.steps_m.reserve(self.soundings.len());
+        Ok(())
+    }
+
+    /// Notes the directions of a turn's beams, unless they are those of the last.
+    fn aim(&mut self, start_rad: f64, count: u32) {
+        let from_rad = self.beams.first().map(|(angle_rad, _)| angle_rad.to_bits());
+        if self.beams.len() == count as usize && from_rad == Some((start_rad + 0.0).to_bits()) {
+            return;
+        }
+        let angle_rad = |k: u32| start_rad + TAU * (f64::from(k) / f64::from(count));
+        self.beams.clear();
+        self.beams.extend((0..count).map(angle_rad).map(|angle_rad| (angle_rad, head_direction(angle_rad))));
+    }
+
+    /// Measures the distances between soundings `stride` apart once, for as long as the ring stays as it is.
+    ///
+    /// Allocates: not when the ring has had as many soundings before.
+    pub fn keep_steps(&mut self, stride: usize) {
+        if self.stride != stride {
+            let mut steps_m = core::mem::take(&mut self.steps_m);
+            steps_m.clear();
+            steps_m.extend(self.steps_m(stride));
+            (self.stride, self.steps_m) = (stride, steps_m);
+        }
+    }
+
+    /// The distances of [`Ring::keep_steps`]; `None` where they are those of another stride.
+    pub fn kept_steps_m(&self, stride: usize) -> Option<&[f64]> {
+        (self.stride == stride).then_some(self.steps_m.as_slice())
+    }
+
+    /// How many of `count` soundings a step passes over, rounded up; at least one.
+    pub fn stride(step_rad: f64, count: u32) -> usize {
+        let soundings = -math::floor_to_i64(-(step_rad * f64::from(count) / TAU - 1e-6));
+        usize::try_from(soundings.clamp(1, i64::from(count.max(1)))).unwrap_or(1)
+    }
+
+    /// The profile's perimeter, m.
+    pub fn perimeter_m(&self) -> f64 {
+        self.perimeter_m
+    }
+
+    /// The way all round the perimeter as the head turns, m: below zero where that is against arc length.
+    pub fn way_round_m(&self) -> f64 {
+        self.way_m.last().copied().unwrap_or(0.0)
+    }
+
+    /// The soundings, in order of angle.
+    pub fn soundings(&self) -> &[Sounding] {
+        &self.soundings
+    }
+
+    /// Pairs of soundings `stride` apart, the turn closed: what a head lays that pings at every `stride`-th.
+    pub fn pairs(&self, stride: usize) -> impl Iterator<Item = (&Sounding, &Sounding)> {
+        let count = self.soundings.len().max(1);
+        self.soundings.iter().zip(self.soundings.iter().cycle().skip(stride % count))
+    }
+
+    /// T_y2 in general, m: the largest distance on the unrolled wall between soundings `stride` apart, wherever in the
+    /// turn the first ping falls; zero without soundings.
+    ///
+    /// Source: Eq. 6 where the paper's assumptions hold.
+    pub fn largest_step_m(&self, stride: usize) -> f64 {
+        self.steps_m(stride).fold(0.0, f64::max)
+    }
+
+    /// Distances on the unrolled wall from each sounding to the one `stride` further, m, the way that the head turns:
+    /// a head that pings once a turn has the whole perimeter between its pings.
+    pub fn steps_m(&self, stride: usize) -> impl Iterator<Item = f64> {
+        let count = self.soundings.len().max(1);
+        let whole_m = self.way_round_m();
+        let way_m = |k: usize| self.way_m.get(k).copied().unwrap_or(0.0);
+        let (turns, rest) = (stride / count, stride % count);
+        self.pairs(stride).enumerate().map(move |(k, (a, b))| {
+            let (to, turns) =
+                if k + rest < count { (k + rest, turns) } else { (k + rest - count, turns + 1) };
+            // The soundings' own difference keeps its digits; the way says how often it goes round, mostly not at all.
+            let short_m = math::wrap_signed(b.sigma_m - a.sigma_m, self.perimeter_m);
+            let round_m = way_m(to) + whole_m * turns as f64 - way_m(k) - short_m;
+            let rounds = if round_m.abs() < 0.4 * self.perimeter_m {
+                0
+            } else {
+                math::round_to_i64(round_m / self.perimeter_m)
+            };
+            math::hypot(b.beam.x() - a.beam.x(), short_m + rounds as f64 * self.perimeter_m)
+        })
+    }
+
+    /// Smallest, mean and largest chord between soundings `stride` apart, m; zeros without soundings.
+    pub fn chords_m(&self, stride: usize) -> [f64; 3] {
+        let chords = || self.pairs(stride).map(|(a, b)| a.chord_m(b));
+        let count = self.soundings.len();
+        if count == 0 {
+            return [0.0; 3];
+        }
+        [
+            chords().fold(f64::INFINITY, f64::min),
+            chords().sum::<f64>() / count as f64,
+            chords().fold(0.0, f64::max),
+        ]
+    }
+
+    /// The longest range of the turn, m; zero without soundings.
+    pub fn longest_range_m(&self) -> f64 {
+        self.soundings.iter().map(Sounding::range_m).fold(0.0, f64::max)
+    }
+}
+
+#[cfg(test)]
+mod tests;

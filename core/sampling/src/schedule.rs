@@ -1,0 +1,109 @@
+//! The angle that each head of a vehicle should have at any time.
+
+use super::error::SamplingError;
+use super::head::{HeadProgram, HeadSpec};
+use super::layout::{self, HeadLayout, steps_over};
+use headrace_geometry::math;
+use headrace_geometry::time::DurNs;
+
+/// Programs for real heads and where they lead: heads step, ping where they are, and turn round at a sector's ends,
+/// the step before an end being shorter where the sector isn't a whole number of them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Schedule {
+    heads: Vec<(HeadSpec, HeadProgram)>,
+}
+
+impl Schedule {
+    /// For heads in the order given, laid out for a speed; see [`layout::programs`].
+    ///
+    /// Errors: as for [`layout::programs`].
+    pub fn new(heads: &[HeadSpec], layout: HeadLayout, speed_mps: f64) -> Result<Self, SamplingError> {
+        let programs = layout::programs(heads, layout, speed_mps)?;
+        Ok(Self { heads: heads.iter().copied().zip(programs).collect() })
+    }
+
+    /// What each head is told to do, in their order.
+    pub fn programs(&self) -> impl Iterator<Item = &HeadProgram> {
+        self.heads.iter().map(|(_, program)| program)
+    }
+
+    /// Angle of a head at its last ping up to `since` the start, in the sensor's frame, radians in [0, 2 pi) of a turn
+    /// or within its sector; `None` for a head that isn't there, or before the start.
+    pub fn angle_rad(&self, head: usize, since: DurNs) -> Option<f64> {
+        let (spec, program) = self.heads.get(head)?;
+        let since = (since >= DurNs::ZERO).then_some(since)?;
+        let pings = math::floor_to_i64(since.as_secs_f64() / spec.ping_period_s + 1e-6);
+        Some(match program.sector {
+            None => {
+                let step = if program.growing { spec.step_rad } else { -spec.step_rad };
+                math::wrap(program.start_rad + pings as f64 * step, math::TAU)
+            }
+            Some(sector) => back_and_forth(program, sector, spec.step_rad, pings),
+        })
+    }
+
+    /// Time of one sweep there and back of the heads in sectors, seconds: the longest, or `None` when they turn on.
+    pub fn sweep_s(&self) -> Option<f64> {
+        let sweep = |(spec, program): &(HeadSpec, HeadProgram)| {
+            let (_, size_rad) = program.sector?;
+            Some(2.0 * steps_over(size_rad, spec.step_rad) as f64 * spec.ping_period_s)
+        };
+        self.heads.iter().filter_map(sweep).max_by(f64::total_cmp)
+    }
+}
+
+fn back_and_forth(
+    program: &HeadProgram,
+    (least_rad, size_rad): (f64, f64),
+    step_rad: f64,
+    pings: i64,
+) -> f64 {
+    let along_rad = (program.start_rad - least_rad).clamp(0.0, size_rad);
+    let to_end_rad = if program.growing { size_rad - along_rad } else { along_rad };
+    let first = steps_over(to_end_rad, step_rad);
+    let (mut from_rad, mut growing, mut left) = (along_rad, program.growing, pings);
+    if pings > first {
+        let sweep = steps_over(size_rad, step_rad).max(1);
+        growing ^= (pings - first - 1) / sweep % 2 == 0;
+        from_rad = if growing { 0.0 } else { size_rad };
+        left = (pings - first - 1) % sweep + 1;
+    }
+    let gone_rad = left as f64 * step_rad;
+    least_rad + if growing { (from_rad + gone_rad).min(size_rad) } else { (from_rad - gone_rad).max(0.0) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixtures;
+
+    fn head(step_deg: f64) -> HeadSpec {
+        HeadSpec { step_rad: step_deg.to_radians(), ..fixtures::head([0.0; 3], false, 0.0) }
+    }
+
+    fn angles_deg(schedule: &Schedule, head: usize, pings: i64) -> Vec<f64> {
+        let at = |k| schedule.angle_rad(head, DurNs::from_millis(20 * k)).unwrap().to_degrees();
+        (0..pings).map(|k| math::round_to_i64(at(k) * 10.0) as f64 / 10.0).collect()
+    }
+
+    #[test]
+    fn a_head_that_turns_on_steps_with_its_pings() {
+        let schedule = Schedule::new(&[head(120.0), head(120.0)], HeadLayout::PhaseShift, 0.0).unwrap();
+        assert_eq!(angles_deg(&schedule, 0, 4), [0.0, 120.0, 240.0, 0.0]);
+        assert_eq!(angles_deg(&schedule, 1, 3), [180.0, 300.0, 60.0]);
+        assert_eq!(
+            schedule.angle_rad(0, DurNs::from_millis(39)),
+            schedule.angle_rad(0, DurNs::from_millis(20))
+        );
+        assert_eq!((schedule.angle_rad(0, DurNs(-1)), schedule.angle_rad(2, DurNs::ZERO)), (None, None));
+    }
+
+    #[test]
+    fn a_sector_that_is_no_whole_number_of_steps_ends_with_a_short_one() {
+        let schedule = Schedule::new(&[head(75.0), head(75.0)], HeadLayout::SectorOffset, 0.0).unwrap();
+        let there_and_back = [0.0, 75.0, 150.0, 180.0, 105.0, 30.0, 0.0, 75.0, 150.0, 180.0, 105.0];
+        assert_eq!(angles_deg(&schedule, 0, 11), there_and_back);
+        assert_eq!(angles_deg(&schedule, 1, 11), there_and_back.map(|angle| angle + 180.0));
+        assert!((schedule.sweep_s().unwrap() - 0.12).abs() < 1e-12);
+    }
+}

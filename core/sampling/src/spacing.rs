@@ -1,0 +1,148 @@
+//! The paper's equations for a head that turns while it is carried along: the spacing of its samples.
+
+use super::error::{SamplingError, not_negative, positive};
+use super::head::Turn;
+use headrace_geometry::math;
+
+/// T_max, m: the longer diagonal of the parallelogram that four neighbouring samples make.
+///
+/// `t_x_m` is the distance between passes, `advance_m` (d) the way gone between two pings, `t_y_m` the largest distance
+/// between neighbours within a turn; all finite.
+/// Source: Jorge et al. 2021, Eq. 16.
+pub fn t_max_m(t_x_m: f64, advance_m: f64, t_y_m: f64) -> f64 {
+    math::hypot(t_x_m + advance_m, t_y_m)
+}
+
+/// The speed at which T_max equals the target, m/s; `None` where `t_y_m` alone is as large as the target, or the
+/// times aren't positive.
+///
+/// `pass_gap_s` is the time between passes (T_rev / s for s evenly interleaved heads), `ping_period_s` that between
+/// pings (T_s).
+/// Source: Eq. 16 solved for v (metrics.md, "Speed advice").
+pub fn speed_for_target_mps(target_m: f64, t_y_m: f64, pass_gap_s: f64, ping_period_s: f64) -> Option<f64> {
+    let time_s = pass_gap_s + ping_period_s;
+    along_m(target_m, t_y_m).filter(|_| time_s > 0.0).map(|along_m| along_m / time_s)
+}
+
+/// What T_max leaves for the distance between passes and pings, m: sqrt(T^2 - T_y^2); `None` where `t_y_m` alone is as
+/// large as the target.
+pub(super) fn along_m(target_m: f64, t_y_m: f64) -> Option<f64> {
+    // (T - t)(T + t) keeps its digits as the two meet.
+    (t_y_m < target_m).then(|| math::sqrt((target_m - t_y_m) * (target_m + t_y_m)))
+}
+
+/// The spiral that heads leave on the wall at a constant speed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Spiral {
+    speed_mps: f64,
+    turn: Turn,
+    passes_per_turn: f64,
+}
+
+impl Spiral {
+    /// `passes_per_turn` is how often a place is passed in the time of one turn: 1 for a single head, s for s heads in
+    /// phase shift, s / 2 for s heads in sectors.
+    ///
+    /// Errors: a speed below zero, passes that aren't above zero, or what isn't finite. A speed of zero is a limit that
+    /// exists: all distances along the tunnel are zero.
+    pub fn new(speed_mps: f64, turn: Turn, passes_per_turn: f64) -> Result<Self, SamplingError> {
+        not_negative("the speed in m/s", speed_mps)?;
+        positive("the number of passes in a turn", passes_per_turn)?;
+        Ok(Self { speed_mps, turn, passes_per_turn })
+    }
+
+    /// d, m: the way gone between two pings. Source: Jorge et al. 2021, Eq. 11.
+    pub fn advance_m(&self) -> f64 {
+        self.speed_mps * self.turn.ping_period_s()
+    }
+
+    /// T_x of one head, m: the way gone in a turn. Source: Eq. 12.
+    pub fn pitch_m(&self) -> f64 {
+        self.speed_mps * self.turn.period_s()
+    }
+
+    /// Distance along the tunnel between passes over a place, m: T_x / s, or 2 T_x / s at its largest in sectors.
+    /// Source: §5.1 and §5.2.
+    pub fn t_x_m(&self) -> f64 {
+        self.pitch_m() / self.passes_per_turn
+    }
+
+    /// T_ymax, m, of the largest step `t_y2_m` of a head that stands still. Source: Eq. 13.
+    pub fn t_y_max_m(&self, t_y2_m: f64) -> f64 {
+        math::hypot(self.advance_m(), t_y2_m)
+    }
+
+    /// T_ymin, m, of the smallest step of a head that stands still: T_y1 or T_c. Source: Eq. 14.
+    pub fn t_y_min_m(&self, smallest_step_m: f64) -> f64 {
+        math::hypot(self.advance_m(), smallest_step_m)
+    }
+
+    /// Mean step, m, of the mean step `t_yp_m` of a head that stands still, as Eq. 15 is printed.
+    ///
+    /// (n d)^2 under its root is a whole turn's way added to a single step's length: with [`Spiral::t_y_mean_m`] beside
+    /// it, both can be shown.
+    /// Source: Eq. 15.
+    pub fn t_y_mean_printed_m(&self, t_yp_m: f64) -> f64 {
+        math::hypot(f64::from(self.turn.steps()) * self.advance_m(), t_yp_m)
+    }
+
+    /// Mean step, m: that of a head that stands still, with the way gone during one step.
+    pub fn t_y_mean_m(&self, t_yp_m: f64) -> f64 {
+        math::hypot(self.advance_m(), t_yp_m)
+    }
+
+    /// T_max, m, of the largest step `t_y2_m` of a head that stands still. Source: Eq. 16.
+    pub fn t_max_m(&self, t_y2_m: f64) -> f64 {
+        t_max_m(self.t_x_m(), self.advance_m(), t_y2_m)
+    }
+
+    /// T_mean, m, of the mean step, the way gone included. Source: Eq. 17.
+    pub fn t_mean_m(&self, t_y_mean_m: f64) -> f64 {
+        t_max_m(self.t_x_m(), self.advance_m(), t_y_mean_m)
+    }
+
+    /// T_min, m, of the smallest step, the way gone included. Source: Eq. 18.
+    pub fn t_min_m(&self, t_y_min_m: f64) -> f64 {
+        t_max_m(self.t_x_m(), self.advance_m(), t_y_min_m)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn verif_hand_computed_values() {
+        let fast = Turn::new(f64::to_radians(0.9), 8.0).unwrap();
+        let one = Spiral::new(0.197, fast, 1.0).unwrap();
+        assert!((one.advance_m() - 0.003_94).abs() < 1e-15);
+        assert!((one.pitch_m() - 1.576).abs() < 1e-12 && (one.t_x_m() - 1.576).abs() < 1e-12);
+        let four = Spiral::new(0.197, fast, 4.0).unwrap();
+        assert!((four.t_x_m() - 0.394).abs() < 1e-12);
+        // sqrt(0.39794^2 + 0.18^2)
+        assert!((four.t_max_m(0.18) - 0.436_756_6).abs() < 1e-6);
+        assert!((one.t_y_mean_printed_m(0.085) - math::hypot(1.576, 0.085)).abs() < 1e-12);
+        assert!((one.t_y_mean_m(0.085) - 0.085_091_3).abs() < 1e-6);
+    }
+
+    #[test]
+    fn at_rest_all_distances_along_the_tunnel_are_zero() {
+        let turn = Turn::new(f64::to_radians(0.9), 8.0).unwrap();
+        let rest = Spiral::new(0.0, turn, 2.0).unwrap();
+        assert_eq!((rest.advance_m(), rest.t_x_m(), rest.t_max_m(0.2)), (0.0, 0.0, 0.2));
+        for speed in [-0.1, f64::NAN, f64::INFINITY] {
+            let why = Spiral::new(speed, turn, 2.0).unwrap_err().to_string();
+            assert!(why.starts_with("the speed in m/s is"), "{why}");
+        }
+        assert!(Spiral::new(0.2, turn, 0.0).is_err());
+    }
+
+    #[test]
+    fn speed_and_target_are_each_other_s_inverse() {
+        let v = speed_for_target_mps(0.5, 0.12, 2.0, 0.02).unwrap();
+        assert!((t_max_m(v * 2.0, v * 0.02, 0.12) - 0.5).abs() < 1e-12);
+        assert_eq!(speed_for_target_mps(0.5, 0.5, 2.0, 0.02), None);
+        assert_eq!(speed_for_target_mps(0.5, 0.1, 0.0, 0.0), None);
+        assert_eq!(speed_for_target_mps(f64::NAN, 0.1, 2.0, 0.02).filter(|v| v.is_finite()), None);
+    }
+}

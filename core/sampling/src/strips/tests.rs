@@ -1,0 +1,213 @@
+use super::*;
+use headrace_geometry::frames::{Mount, Point3, Pose, Rot, Vec3};
+use headrace_geometry::tunnel::{Profile, shapes};
+
+const SOUNDINGS: u32 = 3600;
+const STEP: usize = 24;
+const PING_S: f64 = 0.02;
+const GOING: Going =
+    Going { ping_period_s: PING_S, swing_mps: 0.0, shift_m: 0.0, apart_m: 0.0, swing_most_m: None };
+
+/// A pipe of 30 m around, on whose axis every step is as long as the other.
+fn pipe() -> Profile {
+    shapes::circle(30.0 / math::TAU).unwrap()
+}
+
+fn ring(profile: &Profile) -> Ring {
+    let [y, z] = profile.reference();
+    let pose = Pose { position: Point3::new(0.0, y, z), attitude: Rot::identity() };
+    let mount = Mount { position: Vec3::zero(), rotation: Rot::identity() };
+    Ring::cast(&Standing::new(profile, &pose, &mount).unwrap(), 0.0, SOUNDINGS).unwrap()
+}
+
+fn arc(from_m: f64, length_m: f64) -> Arc {
+    Arc { from_m, length_m }
+}
+
+/// 2.4 degrees a step: 0.2 m.
+fn strips(views: &[View]) -> Strips {
+    let ring = ring(&pipe());
+    let mut strips = Strips::default();
+    strips.rebuild(30.0, views);
+    strips.measure(1, views.iter().map(|_| &ring), |_, _| Some(STEP));
+    strips
+}
+
+fn all_around(hidden: &[Arc]) -> View {
+    View { sector: None, hidden: hidden.to_vec() }
+}
+
+fn turning(heads: usize) -> Passes {
+    Passes::evenly_phased(HeadSet::first(heads), |_| 8.0).unwrap()
+}
+
+fn speed(strips: &Strips, passes: &Passes, target_m: f64) -> Result<f64, SamplingError> {
+    strips.bound_for_target(0, passes, target_m, &GOING).map(|bound| bound.speed_mps)
+}
+
+fn closed(target_m: f64, t_y_m: f64, gap_s: f64) -> f64 {
+    spacing::speed_for_target_mps(target_m, t_y_m, gap_s, PING_S).unwrap()
+}
+
+#[test]
+fn where_all_see_all_there_is_one_strip() {
+    let one = strips(&[all_around(&[]), all_around(&[])]);
+    let whole = Strip { arc: arc(0.0, 30.0), seen_by: HeadSet::first(2), hidden: false };
+    assert_eq!(one.as_slice(), [whole]);
+    assert!((one.largest_step_m(0) - 0.2).abs() < 1e-9);
+    let v = speed(&one, &turning(2), 0.5).unwrap();
+    assert!((v - closed(0.5, 0.2, 4.0)).abs() < 1e-9);
+    assert!((one.t_max_m(0, &turning(2), v, &GOING) - 0.5).abs() < 1e-12);
+}
+
+#[test]
+fn a_hidden_strip_crosses_the_seam() {
+    let some = strips(&[all_around(&[arc(29.0, 2.0)]), all_around(&[])]);
+    let widths: Vec<f64> = some.as_slice().iter().map(|strip| strip.arc.length_m).collect();
+    assert_eq!(widths, [28.0, 2.0]);
+    assert_eq!(some.at(0.5).unwrap().seen_by, HeadSet::first(2).without(0));
+    assert_eq!(some.at(29.5), some.at(0.5));
+    assert_eq!(some.at(15.0).unwrap().seen_by, HeadSet::first(2));
+}
+
+#[test]
+fn fewer_passes_on_a_hidden_strip_slow_the_vehicle_down() {
+    let hidden = [arc(7.0, 1.7)];
+    let views = [all_around(&hidden), all_around(&[]), all_around(&hidden), all_around(&[])];
+    let some = strips(&views);
+    let v = speed(&some, &turning(4), 0.5).unwrap();
+    assert!((v - closed(0.5, 0.2, 4.0)).abs() < 1e-9);
+    assert!((some.t_max_m(0, &turning(4), v, &GOING) - 0.5).abs() < 1e-12);
+}
+
+#[test]
+fn a_narrow_hidden_strip_counts_as_a_long_step_if_that_is_better() {
+    let some = strips(&[all_around(&[arc(7.0, 0.1)]), all_around(&[])]);
+    // Pings may end a step before it on either side.
+    let v = speed(&some, &turning(2), 0.8).unwrap();
+    assert!((v - closed(0.8, 0.5, 4.0)).abs() < 1e-9);
+    // Narrower than the spacing of the ring's soundings, it is noticed all the same.
+    let sliver = strips(&[all_around(&[arc(7.0013, 1e-4)])]);
+    let v = speed(&sliver, &turning(1), 0.8).unwrap();
+    assert!((v - closed(0.8, 0.4001, 8.0)).abs() < 1e-9, "{v}: {sliver:?}");
+}
+
+#[test]
+fn a_strip_that_no_head_sees_can_make_every_speed_too_high() {
+    let views = [all_around(&[arc(7.0, 0.7)]), all_around(&[arc(7.0, 0.7)])];
+    let why = speed(&strips(&views), &turning(2), 0.5).unwrap_err();
+    assert!(
+        matches!(why, SamplingError::UnseenStrip { width_m, sigma_m, .. }
+            if (width_m - 0.7).abs() < 1e-9 && (sigma_m - 7.35).abs() < 1e-9),
+        "{why}"
+    );
+    assert!(speed(&strips(&views), &turning(2), 1.2).is_ok());
+    let blind = strips(&[all_around(&[arc(0.0, 30.0)])]);
+    assert!(speed(&blind, &turning(1), 0.5).is_err());
+    assert!(blind.t_max_m(0, &turning(1), 0.1, &GOING).is_infinite());
+    let coarse = speed(&strips(&[all_around(&[])]), &turning(1), 0.15).unwrap_err();
+    assert!(matches!(coarse, SamplingError::AngularStep { t_y_m, .. } if (t_y_m - 0.2).abs() < 1e-9));
+}
+
+#[test]
+fn sectors_that_leave_a_place_out_are_noticed_and_pinged_up_to_their_ends() {
+    let views = [
+        View { sector: Some(arc(0.2, 14.8)), hidden: Vec::new() },
+        View { sector: Some(arc(15.0, 14.9)), hidden: Vec::new() },
+    ];
+    let passes = Passes::in_sectors(HeadSet::first(2), 8.0).unwrap();
+    let some = strips(&views);
+    let unseen: Vec<&Strip> = some.as_slice().iter().filter(|strip| strip.seen_by.is_empty()).collect();
+    assert!(unseen.len() == 1 && (unseen[0].arc.length_m - 0.3).abs() < 1e-9);
+    let v = speed(&some, &passes, 1.0).unwrap();
+    assert!((v - closed(1.0, 0.3, 8.0)).abs() < 1e-9);
+}
+
+#[test]
+fn steps_count_where_they_are() {
+    // A rectangle's steps are long in its corners; a strip in the middle of the floor has none of these.
+    let profile = shapes::rectangle(8.0, 4.0).unwrap();
+    let ring = ring(&profile);
+    let mut some = Strips::default();
+    some.rebuild(profile.perimeter_m(), &[all_around(&[arc(0.5, 0.2)]), all_around(&[])]);
+    some.measure(1, [&ring, &ring].into_iter(), |_, _| Some(STEP));
+    let of = |k: usize| some.steps_m[k];
+    assert!(of(0)[0] < 0.12 && of(1)[0] > 0.3, "{:?}", some.steps_m);
+    assert!((some.largest_step_m(0) - ring.largest_step_m(STEP)).abs() < 1e-12);
+}
+
+#[test]
+fn what_swings_or_is_shifted_makes_passes_farther_apart() {
+    let one = strips(&[all_around(&[])]);
+    let rough = Going { swing_mps: 0.01, shift_m: 0.05, apart_m: 0.2, ..GOING };
+    let v = one.bound_for_target(0, &turning(1), 0.5, &rough).unwrap().speed_mps;
+    assert!((one.t_max_m(0, &turning(1), v, &rough) - 0.5).abs() < 1e-12);
+    assert!(v < speed(&one, &turning(1), 0.5).unwrap() - 0.01);
+    let worse = Going { swing_mps: 0.1, ..rough };
+    assert!(one.bound_for_target(0, &turning(1), 0.5, &worse).is_err());
+    // A swing that comes to an end leaves room for speed.
+    let to_and_fro = Going { swing_most_m: Some(0.1), ..worse };
+    let v = one.bound_for_target(0, &turning(1), 0.5, &to_and_fro).unwrap().speed_mps;
+    assert!((one.t_max_m(0, &turning(1), v, &to_and_fro) - 0.5).abs() < 1e-12);
+    assert!(v > 0.02 && one.t_max_m(0, &turning(1), 1.02 * v, &to_and_fro) > 0.5);
+}
+
+#[test]
+fn what_is_out_of_reach_is_hidden() {
+    let profile = shapes::rectangle(8.0, 4.0).unwrap();
+    let ring = ring(&profile);
+    let hidden = |reach_m: [f64; 2]| {
+        let mut view = View { sector: None, hidden: Vec::with_capacity(8) };
+        view.hide_out_of_reach(&ring, reach_m);
+        view.hidden
+    };
+    assert!(hidden([0.1, 5.0]).is_empty());
+    // The four corners are 4.5 m away, the end walls 4 m.
+    let corners = hidden([0.1, 4.2]);
+    assert_eq!(corners.len(), 4);
+    let far_m: f64 = corners.iter().map(|arc| arc.length_m).sum();
+    let expected_m = 4.0 * ((4.0 - math::sqrt(4.2 * 4.2 - 4.0)) + (2.0 - math::sqrt(4.2 * 4.2 - 16.0)));
+    assert!((far_m - expected_m).abs() < 0.1, "{far_m} and {expected_m}");
+    assert_eq!(hidden([0.1, 1.0]), [arc(0.0, 24.0)]);
+    assert_eq!(hidden([3.0, 10.0]).len(), 2);
+}
+
+#[test]
+fn a_strip_over_the_seam_is_one() {
+    let mut some = Strips::default();
+    some.rebuild(10.0, &[all_around(&[arc(8.0, 4.0), arc(1.0, 2.0)])]);
+    let unseen: Vec<&Strip> = some.as_slice().iter().filter(|strip| strip.seen_by.is_empty()).collect();
+    assert!(unseen.len() == 1 && (unseen[0].arc.length_m - 5.0).abs() < 1e-9, "{some:?}");
+    assert!((unseen[0].arc.from_m - 8.0).abs() < 1e-9);
+    for (sigma_m, seen) in [(0.5, false), (2.9, false), (3.1, true), (7.9, true), (8.1, false)] {
+        assert_eq!(some.at(sigma_m).unwrap().seen_by.is_empty(), !seen, "{sigma_m}");
+    }
+}
+
+#[test]
+fn without_room_more_is_hidden_and_not_less() {
+    // Slots all around, out of reach, and two views with too little room for them.
+    let points: Vec<[f64; 2]> = (0..240)
+        .map(|k| {
+            let (sine, cosine) = math::sin_cos(math::TAU * (f64::from(k) + 0.3) / 240.0);
+            let r = if k % 6 == 0 { 3.4 } else { 3.0 };
+            [r * sine, r * cosine]
+        })
+        .collect();
+    let profile = Profile::polygon(&points, Some([0.0, 0.0])).unwrap();
+    let ring = ring(&profile);
+    let hidden = |room: usize| {
+        let mut view = View { sector: None, hidden: Vec::with_capacity(room) };
+        view.hide_out_of_reach(&ring, [0.1, 3.2]);
+        assert!(view.hidden.capacity() == room && view.hidden.len() <= room);
+        view
+    };
+    let (all, few) = (hidden(100), hidden(5));
+    assert_eq!((all.hidden.len(), few.hidden.len()), (40, 5));
+    let perimeter_m = profile.perimeter_m();
+    let is_hidden = |view: &View, sigma_m: f64| view.hidden.iter().any(|arc| arc.has(sigma_m, perimeter_m));
+    for k in 0..2000 {
+        let sigma_m = perimeter_m * f64::from(k) / 2000.0;
+        assert!(is_hidden(&few, sigma_m) || !is_hidden(&all, sigma_m), "{sigma_m}");
+    }
+}

@@ -1,0 +1,265 @@
+//! Framing with rescanning, written once for every codec.
+
+use super::{Codec, CodecCounts};
+use headrace_snapshot::{Restorer, Saver, SnapshotError, Stateful};
+
+/// What a candidate at the front of what is held turned out to be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Verdict {
+    /// No frame begins here.
+    NotAStart,
+    /// A frame may begin here, and needs at least this many bytes in all before more can be said.
+    Need(usize),
+    /// A whole frame of this many bytes.
+    Frame(usize),
+    /// A start marker was followed by something that is no frame.
+    Bad,
+}
+
+impl Verdict {
+    /// On a candidate of `len` bytes that `is_good` tells from a broken one once all of it is there.
+    pub fn on(front: &[u8], len: usize, is_good: impl FnOnce(&[u8]) -> bool) -> Self {
+        match front.get(..len) {
+            None => Self::Need(len),
+            Some(frame) if is_good(frame) => Self::Frame(len),
+            Some(_) => Self::Bad,
+        }
+    }
+}
+
+/// How the frames of one protocol look; [`Framed`] makes a codec of it.
+pub trait Framing: Copy {
+    /// See [`Codec::Value`].
+    type Value: Clone + PartialEq + core::fmt::Debug;
+
+    /// See [`Codec::WHOLE_MESSAGES`].
+    const WHOLE_MESSAGES: bool = false;
+
+    /// What `front`, one byte or more, begins with. A function of these bytes alone.
+    fn judge(&self, front: &[u8]) -> Verdict;
+
+    /// What a frame says that [`Framing::judge`] found good; `None` for nothing of use.
+    fn read(&self, frame: &[u8]) -> Option<Self::Value>;
+}
+
+/// The codec of a [`Framing`]: holds an incomplete frame between pushes and finds frames in whatever comes.
+///
+/// `N` is the longest frame; a candidate that wants more is bad.
+/// On a byte stream the scan goes on from the second byte of a failed candidate, so that a frame hidden in a false one
+/// is found; a byte that begins none is skipped without counting a bad frame. A whole message with anything else than
+/// frames in it is one bad frame from there to its end: what looks like a frame further on is none.
+/// Allocates: never.
+#[derive(Debug, Clone)]
+pub struct Framed<F, const N: usize> {
+    framing: F,
+    held: [u8; N],
+    len: usize,
+    /// The message that is coming in has turned out bad.
+    astray: bool,
+    counts: CodecCounts,
+}
+
+impl<F: Default, const N: usize> Default for Framed<F, N> {
+    fn default() -> Self {
+        Self::new(F::default())
+    }
+}
+
+impl<F, const N: usize> Framed<F, N> {
+    /// A codec that has seen nothing yet.
+    pub fn new(framing: F) -> Self {
+        Self { framing, held: [0; N], len: 0, astray: false, counts: CodecCounts::default() }
+    }
+}
+
+/// What is held of a frame begun, and the counts.
+impl<F, const N: usize> Stateful for Framed<F, N> {
+    fn save(&self, to: &mut Saver) {
+        to.value(&(self.astray, self.counts));
+        to.raw(self.held.get(..self.len).unwrap_or_default());
+    }
+
+    fn restore(&mut self, from: &mut Restorer<'_>) -> Result<(), SnapshotError> {
+        (self.astray, self.counts) = from.value()?;
+        let held = from.raw()?;
+        let Some(place) = self.held.get_mut(..held.len()) else {
+            return Err(from.unfit(format!("{} bytes of a frame of at most {N}", held.len())));
+        };
+        place.copy_from_slice(held);
+        self.len = held.len();
+        Ok(())
+    }
+}
+
+impl<F: Framing, const N: usize> Framed<F, N> {
+    /// Like [`Codec::push`], but hands out each frame's bytes, and how far back they begin: the number of bytes from
+    /// the frame's first to the last that has come.
+    pub fn push_frames(&mut self, mut bytes: &[u8], mut take: impl FnMut(&[u8], usize)) {
+        while !bytes.is_empty() && !self.astray {
+            let (now, later) = bytes.split_at(bytes.len().min(N - self.len));
+            if let Some(free) = self.held.get_mut(self.len..self.len + now.len()) {
+                free.copy_from_slice(now);
+            }
+            self.len += now.len();
+            bytes = later;
+            self.scan(bytes.len(), false, &mut take);
+        }
+        self.counts.skipped_bytes += bytes.len() as u64;
+    }
+
+    /// Like [`Codec::flush`], but hands out frames as [`Framed::push_frames`] does.
+    pub fn flush_frames(&mut self, mut take: impl FnMut(&[u8], usize)) {
+        self.scan(0, true, &mut take);
+        self.astray = false;
+    }
+
+    fn scan(&mut self, later: usize, give_up: bool, take: &mut impl FnMut(&[u8], usize)) {
+        let mut start = 0;
+        while start < self.len {
+            let front = self.held.get(start..self.len).unwrap_or_default();
+            start += match self.framing.judge(front) {
+                Verdict::Frame(n) if (1..=front.len()).contains(&n) => {
+                    self.counts.good_frames += 1;
+                    take(front.get(..n).unwrap_or_default(), front.len() + later);
+                    n
+                }
+                Verdict::Need(n) if n <= N && n > front.len() && !give_up => break,
+                verdict => {
+                    self.astray = F::WHOLE_MESSAGES;
+                    self.counts.bad_frames += u64::from(self.astray || verdict != Verdict::NotAStart);
+                    let skipped = if self.astray { front.len() } else { 1 };
+                    self.counts.skipped_bytes += skipped as u64;
+                    skipped
+                }
+            };
+        }
+        self.held.copy_within(start..self.len, 0);
+        self.len -= start;
+    }
+}
+
+impl<F: Framing, const N: usize> Codec for Framed<F, N> {
+    type Value = F::Value;
+
+    const MAX_FRAME_BYTES: usize = N;
+    const WHOLE_MESSAGES: bool = F::WHOLE_MESSAGES;
+
+    fn push(&mut self, bytes: &[u8], sink: &mut dyn FnMut(F::Value)) {
+        let framing = self.framing;
+        self.push_frames(bytes, |frame, _| framing.read(frame).into_iter().for_each(&mut *sink));
+    }
+
+    fn flush(&mut self, sink: &mut dyn FnMut(F::Value)) {
+        let framing = self.framing;
+        self.flush_frames(|frame, _| framing.read(frame).into_iter().for_each(&mut *sink));
+    }
+
+    fn counts(&self) -> CodecCounts {
+        self.counts
+    }
+
+    fn held_bytes(&self) -> usize {
+        self.len
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+
+    /// Frames: 0xA5, length n up to 5, n bytes, 0x5A.
+    #[derive(Debug, Clone, Copy, Default)]
+    pub(crate) struct Marked<const WHOLE_MESSAGES: bool>;
+
+    impl<const WHOLE_MESSAGES: bool> Framing for Marked<WHOLE_MESSAGES> {
+        type Value = Vec<u8>;
+
+        const WHOLE_MESSAGES: bool = WHOLE_MESSAGES;
+
+        fn judge(&self, front: &[u8]) -> Verdict {
+            match *front {
+                [0xA5] => Verdict::Need(2),
+                [0xA5, n, ..] if n <= 5 => {
+                    Verdict::on(front, usize::from(n) + 3, |frame| frame.last() == Some(&0x5A))
+                }
+                [0xA5, ..] => Verdict::Bad,
+                _ => Verdict::NotAStart,
+            }
+        }
+
+        fn read(&self, frame: &[u8]) -> Option<Vec<u8>> {
+            Some(frame[2..frame.len() - 1].to_vec())
+        }
+    }
+
+    fn pushed(codec: &mut impl Codec<Value = Vec<u8>>, bytes: &[u8]) -> Vec<Vec<u8>> {
+        let mut values = Vec::new();
+        codec.push(bytes, &mut |value| values.push(value));
+        values
+    }
+
+    #[test]
+    fn a_frame_inside_a_false_one_is_found() {
+        let mut codec = Framed::<Marked<false>, 8>::default();
+        assert_eq!(pushed(&mut codec, &[0xA5, 5, 0xA5, 1, 7, 0x5A, 0, 0]), [[7]]);
+        assert_eq!(codec.counts(), CodecCounts { good_frames: 1, bad_frames: 1, skipped_bytes: 4 });
+    }
+
+    #[test]
+    fn silence_frees_a_frame_that_a_false_start_held_back() {
+        let mut codec = Framed::<Marked<false>, 8>::default();
+        assert!(pushed(&mut codec, &[0xA5, 5, 0xA5, 0, 0x5A]).is_empty());
+        assert_eq!(codec.held_bytes(), 5);
+        let mut frames = 0;
+        codec.flush(&mut |_| frames += 1);
+        assert_eq!((frames, codec.held_bytes()), (1, 0));
+    }
+
+    #[test]
+    fn each_frame_comes_with_how_far_back_it_begins() {
+        let mut codec = Framed::<Marked<false>, 8>::default();
+        let mut behind = Vec::new();
+        codec.push_frames(&[0, 0xA5, 5, 0xA5], |_, back| behind.push(back));
+        // The false start is held with the first byte of a frame, and more comes than there is room for.
+        codec.push_frames(&[1, 7, 0x5A, 0, 0, 0xA5, 0, 0x5A, 0], |_, back| behind.push(back));
+        assert_eq!(behind, [10, 4]);
+    }
+
+    #[test]
+    fn a_candidate_longer_than_there_is_room_for_is_bad() {
+        let mut codec = Framed::<Marked<false>, 7>::default();
+        assert_eq!(pushed(&mut codec, &[0xA5, 5, 0xA5, 1, 7, 0x5A]), [[7]]);
+    }
+
+    #[test]
+    fn a_message_that_goes_astray_is_left_out_to_its_end() {
+        let good = [0xA5, 1, 7, 0x5A];
+        let mut codec = Framed::<Marked<true>, 8>::default();
+        for start in [&[0xA5, 5, 1][..], &[0x11], &[0xA5, 9], &[0xA5, 0, 0]] {
+            let bad = [start, &good, &good].concat();
+            assert!(pushed(&mut codec, &bad[..2]).is_empty());
+            assert!(pushed(&mut codec, &bad[2..]).is_empty());
+            codec.flush(&mut |value| panic!("{value:?}"));
+            assert_eq!(codec.held_bytes(), 0);
+            assert_eq!(pushed(&mut codec, &good), [[7]], "after {start:02X?}");
+        }
+        assert_eq!(codec.counts(), CodecCounts { good_frames: 4, bad_frames: 4, skipped_bytes: 41 });
+    }
+
+    #[test]
+    fn a_message_cut_short_holds_no_other() {
+        let mut codec = Framed::<Marked<true>, 8>::default();
+        assert!(pushed(&mut codec, &[0xA5, 5, 0xA5, 0, 0x5A]).is_empty());
+        codec.flush(&mut |value| panic!("{value:?}"));
+        assert_eq!(codec.counts(), CodecCounts { good_frames: 0, bad_frames: 1, skipped_bytes: 5 });
+    }
+
+    #[cfg(feature = "contract")]
+    crate::codec_contract!(
+        contract_of_messages,
+        codec: Framed::<Marked<true>, 8>::default(),
+        values: proptest::collection::vec(any::<u8>(), 0..=5),
+        encode: |body: &Vec<u8>| [&[0xA5, u8::try_from(body.len()).unwrap()][..], body, &[0x5A]].concat(),
+        frames: [[0xA5, 1, 7, 0x5A]],
+    );
+}

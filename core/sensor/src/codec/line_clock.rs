@@ -1,0 +1,155 @@
+//! When the frames of a byte stream came.
+
+use serde::{Deserialize, Serialize};
+
+use super::{Codec as _, Framed, Framing};
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_snapshot::stateful;
+
+/// Packets of which a [`LineClock`] keeps account: a kilobyte from a port that hands over 32 bytes at a time.
+const MAX_PARTS: usize = 32;
+
+/// Gives each frame of a byte stream the receive time of the packet that brought its first byte, whatever was held
+/// before it, and ends a frame begun when the line falls silent.
+///
+/// Of a frame in more packets than it keeps account of, those at the end are told as one; a frame that begins among
+/// them, because the first was a false one, is given too early a time.
+/// Allocates: never.
+#[derive(Debug, Clone)]
+pub struct LineClock {
+    silence: DurNs,
+    last: MonoNs,
+    /// The packets that brought what is held, oldest first.
+    parts: [Part; MAX_PARTS],
+    len: usize,
+}
+
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
+struct Part {
+    received: MonoNs,
+    bytes: usize,
+}
+
+stateful!(LineClock { state: last, len; slots: parts; fixed: silence; });
+
+impl LineClock {
+    /// For a line on which a frame's bytes follow one another: after a pause of more than `silence` between two packets
+    /// no more belong to the one begun.
+    pub fn new(silence: DurNs) -> Self {
+        Self { silence, last: MonoNs(0), parts: [Part::default(); MAX_PARTS], len: 0 }
+    }
+
+    /// Pushes a packet's bytes into `codec`; `take` receives each whole frame and when it came.
+    pub fn push<F: Framing, const N: usize>(
+        &mut self,
+        codec: &mut Framed<F, N>,
+        received: MonoNs,
+        bytes: &[u8],
+        mut take: impl FnMut(MonoNs, &[u8]),
+    ) {
+        if received.since(self.last) > self.silence {
+            codec.flush_frames(|frame, behind| take(self.received(behind), frame));
+            self.len = 0;
+        }
+        self.last = received;
+        self.note(Part { received, bytes: bytes.len() });
+        codec.push_frames(bytes, |frame, behind| take(self.received(behind), frame));
+        self.keep(codec.held_bytes());
+    }
+
+    fn parts(&self) -> &[Part] {
+        self.parts.get(..self.len).unwrap_or_default()
+    }
+
+    fn note(&mut self, part: Part) {
+        if let Some(free) = self.parts.get_mut(self.len) {
+            *free = part;
+            self.len += 1;
+        } else if let Some(last) = self.parts.last_mut() {
+            last.bytes += part.bytes;
+        }
+    }
+
+    /// When the byte came that stands `behind` bytes before the end, itself counted.
+    fn received(&self, behind: usize) -> MonoNs {
+        let mut after = 0;
+        let holds = |part: &&Part| {
+            after += part.bytes;
+            after >= behind
+        };
+        self.parts().iter().rev().find(holds).map_or(self.last, |part| part.received)
+    }
+
+    /// Forgets what is before the last `held` bytes.
+    fn keep(&mut self, held: usize) {
+        let mut after = 0;
+        let needed = self.parts().iter().rev().take_while(|part| {
+            let before = after;
+            after += part.bytes;
+            before < held
+        });
+        let first = self.len - needed.count();
+        self.parts.copy_within(first..self.len, 0);
+        self.len -= first;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::framed::tests::Marked;
+    use super::*;
+
+    /// Receive times that `packets`, one a millisecond, give to their frames.
+    fn times(clock: &mut LineClock, packets: &[&[u8]]) -> Vec<u64> {
+        let mut codec = Framed::<Marked<false>, 8>::default();
+        let mut times = Vec::new();
+        for (packet, ms) in packets.iter().zip(1..) {
+            let received = MonoNs(ms * 1_000_000);
+            clock.push(&mut codec, received, packet, |at, _| times.push(at.0 / 1_000_000));
+        }
+        times
+    }
+
+    fn clock(silence_ms: i64) -> LineClock {
+        LineClock::new(DurNs::from_millis(silence_ms))
+    }
+
+    #[test]
+    fn a_frame_in_pieces_came_with_its_first_byte() {
+        let packets: [&[u8]; 4] = [&[0xA5], &[2, 8], &[9, 0x5A, 0xA5, 0, 0x5A, 0xA5], &[0, 0x5A]];
+        assert_eq!(times(&mut clock(5), &packets), [1, 3, 3]);
+    }
+
+    #[test]
+    fn a_frame_held_back_by_a_false_start_keeps_its_own_time() {
+        let packets: [&[u8]; 4] = [&[0xA5, 5], &[0xA5], &[1, 7], &[0x5A, 0, 0]];
+        assert_eq!(times(&mut clock(5), &packets), [2]);
+    }
+
+    #[test]
+    fn silence_frees_a_frame_with_the_time_it_had() {
+        let false_start = [&[0xA5, 5][..], &[0xA5, 0, 0x5A]];
+        let mut codec = Framed::<Marked<false>, 8>::default();
+        let mut clock = clock(5);
+        for (packet, received) in false_start.iter().zip([MonoNs(1), MonoNs(2)]) {
+            clock.push(&mut codec, received, packet, |at, _| panic!("at {at:?}"));
+        }
+        let mut times = Vec::new();
+        let after = MonoNs(2) + DurNs::from_millis(5);
+        clock.push(&mut codec, after, &[], |at, _| panic!("not yet, at {at:?}"));
+        clock.push(&mut codec, after + DurNs(5_000_001), &[0xA5, 0, 0x5A], |at, _| times.push(at));
+        assert_eq!(times, [MonoNs(2), after + DurNs(5_000_001)]);
+    }
+
+    #[test]
+    fn any_number_of_packets_is_endured() {
+        let mut clock = clock(5);
+        let mut packets: Vec<&[u8]> = vec![&[]; 100];
+        packets[0] = &[0xA5, 5];
+        packets[99] = &[0xA5, 0, 0x5A, 0, 0, 0];
+        assert_eq!(times(&mut clock, &packets), [32]);
+        packets[0] = &[0xA5, 3, 1, 2, 3];
+        packets[99] = &[0x5A];
+        assert_eq!(times(&mut self::clock(5), &packets), [1]);
+    }
+}

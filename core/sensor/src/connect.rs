@@ -1,0 +1,339 @@
+//! Where a sensor is connected: `connect` in vehicle files.
+
+use core::fmt;
+use core::num::ParseIntError;
+
+use crate::driver::Carrier;
+
+/// The serial rate of the devices that name none.
+const USUAL_BAUD: u32 = 115_200;
+/// Rates beyond this are no serial line's.
+const MAX_BAUD: u32 = 12_000_000;
+
+/// A USB device by what it says of itself, which stays when it is plugged in elsewhere.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct UsbIdentity {
+    /// Vendor.
+    pub vendor: u16,
+    /// Product.
+    pub product: u16,
+    /// Serial number, where there may be several of them.
+    pub serial: Option<String>,
+}
+
+/// Which serial port.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum SerialPort {
+    /// A device file; those below `/dev/serial/by-id` are the same after replugging.
+    Path(String),
+    /// The port of a USB adapter, wherever it is plugged in.
+    Usb(UsbIdentity),
+}
+
+/// A parsed `connect`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Connect {
+    /// `serial:/dev/serial/by-id/...?baud=115200` or `serial:usb:VID:PID[:SERIAL]?baud=115200`.
+    Serial {
+        /// Which port.
+        port: SerialPort,
+        /// Bits a second; 8 data bits, no parity, 1 stop bit.
+        baud: u32,
+    },
+    /// `tcp:HOST:PORT`, which we connect to.
+    Tcp {
+        /// Name or address and port.
+        address: String,
+    },
+    /// `udp:HOST:PORT`, which we send to, and whose answers we hear.
+    Udp {
+        /// Name or address and port.
+        address: String,
+    },
+    /// `udp-listen:ADDRESS:PORT`, ours, where others send to.
+    UdpListen {
+        /// Our address and port.
+        address: String,
+    },
+    /// `can:INTERFACE`.
+    Can {
+        /// Name of the network interface.
+        interface: String,
+    },
+    /// `hid:VID:PID[:SERIAL]`.
+    Hid(UsbIdentity),
+    /// `i2c:/dev/i2c-1:0x40`.
+    I2c {
+        /// The bus.
+        bus: String,
+        /// Address of the device, 7 bits.
+        address: u8,
+    },
+}
+
+/// Why a `connect` can't be used.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("connect = {text:?}: {problem}; {allowed}")]
+pub struct ConnectError {
+    /// As written.
+    pub text: String,
+    /// What is wrong.
+    pub problem: String,
+    /// What is right, with an example.
+    pub allowed: String,
+}
+
+/// All forms, for those who have written none of them.
+const FORMS: &str = "allowed are serial:/dev/serial/by-id/NAME?baud=115200, serial:usb:VID:PID[:SERIAL]?baud=115200, \
+     tcp:HOST:PORT, udp:HOST:PORT, udp-listen:ADDRESS:PORT, can:INTERFACE, hid:VID:PID[:SERIAL], i2c:/dev/i2c-1:0x40";
+
+impl Connect {
+    /// Reads a `connect` as it stands in a vehicle file.
+    ///
+    /// Errors: another form than those of [`Connect`], in words, with what would be right.
+    pub fn parse(text: &str) -> Result<Self, ConnectError> {
+        let refused = |problem: &str, allowed: &str| ConnectError {
+            text: text.to_owned(),
+            problem: problem.to_owned(),
+            allowed: allowed.to_owned(),
+        };
+        if text.is_empty() {
+            return Err(refused("nothing is said of where the sensor is", FORMS));
+        }
+        let (scheme, rest) = text.split_once(':').ok_or_else(|| refused("there is no colon", FORMS))?;
+        match scheme {
+            "serial" => serial(rest).map_err(|problem| {
+                refused(
+                    &problem,
+                    "allowed is serial:/dev/serial/by-id/NAME?baud=115200 or serial:usb:0403:6001:A10K",
+                )
+            }),
+            "tcp" => host_and_port(rest)
+                .map(|address| Self::Tcp { address })
+                .map_err(|problem| refused(&problem, "allowed is tcp:192.168.0.5:4040")),
+            "udp" => host_and_port(rest)
+                .map(|address| Self::Udp { address })
+                .map_err(|problem| refused(&problem, "allowed is udp:192.168.2.2:9090")),
+            "udp-listen" => host_and_port(rest)
+                .map(|address| Self::UdpListen { address })
+                .map_err(|problem| refused(&problem, "allowed is udp-listen:0.0.0.0:14550")),
+            "can" => can_interface(rest)
+                .map(|interface| Self::Can { interface })
+                .map_err(|problem| refused(&problem, "allowed is can:can0")),
+            "hid" => usb(rest).map(Self::Hid).map_err(|problem| {
+                refused(
+                    &problem,
+                    "allowed is hid:VID:PID[:SERIAL] with four hexadecimal digits each, hid:1209:0001",
+                )
+            }),
+            "i2c" => i2c(rest).map_err(|problem| refused(&problem, "allowed is i2c:/dev/i2c-1:0x40")),
+            _ => Err(refused(&format!("{scheme:?} is no way to connect"), FORMS)),
+        }
+    }
+
+    /// What carries the bytes.
+    pub fn carrier(&self) -> Carrier {
+        match self {
+            Self::Serial { .. } => Carrier::Serial,
+            Self::Tcp { .. } => Carrier::Tcp,
+            Self::Udp { .. } | Self::UdpListen { .. } => Carrier::Udp,
+            Self::Can { .. } => Carrier::Can,
+            Self::Hid(_) => Carrier::Hid,
+            Self::I2c { .. } => Carrier::I2c,
+        }
+    }
+
+    /// The same, for a device that can do with these carriers only.
+    ///
+    /// Errors: a carrier that isn't among them.
+    pub fn among(self, carriers: &[Carrier]) -> Result<Self, ConnectError> {
+        if carriers.contains(&self.carrier()) {
+            return Ok(self);
+        }
+        let names: Vec<&str> = carriers.iter().map(|carrier| carrier.as_str()).collect();
+        let names = match names.split_last() {
+            Some((last, [])) => (*last).to_owned(),
+            Some((last, others)) => format!("{} or {last}", others.join(", ")),
+            None => String::new(),
+        };
+        Err(ConnectError {
+            text: self.to_string(),
+            problem: format!("a device of this kind isn't connected by {}", self.carrier().as_str()),
+            allowed: format!("it is by {names}"),
+        })
+    }
+}
+
+impl Carrier {
+    /// Its name in `connect`.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Serial => "serial:",
+            Self::Tcp => "tcp:",
+            Self::Udp => "udp:",
+            Self::Can => "can:",
+            Self::Hid => "hid:",
+            Self::I2c => "i2c:",
+        }
+    }
+}
+
+impl fmt::Display for UsbIdentity {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:04x}:{:04x}", self.vendor, self.product)?;
+        self.serial.as_ref().map_or(Ok(()), |serial| write!(f, ":{serial}"))
+    }
+}
+
+impl fmt::Display for Connect {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Serial { port: SerialPort::Path(path), baud } => write!(f, "serial:{path}?baud={baud}"),
+            Self::Serial { port: SerialPort::Usb(usb), baud } => write!(f, "serial:usb:{usb}?baud={baud}"),
+            Self::Tcp { address } => write!(f, "tcp:{address}"),
+            Self::Udp { address } => write!(f, "udp:{address}"),
+            Self::UdpListen { address } => write!(f, "udp-listen:{address}"),
+            Self::Can { interface } => write!(f, "can:{interface}"),
+            Self::Hid(usb) => write!(f, "hid:{usb}"),
+            Self::I2c { bus, address } => write!(f, "i2c:{bus}:{address:#04x}"),
+        }
+    }
+}
+
+fn serial(rest: &str) -> Result<Connect, String> {
+    let (place, options) =
+        rest.split_once('?').map_or((rest, None), |(place, options)| (place, Some(options)));
+    let mut baud = USUAL_BAUD;
+    for option in options.iter().flat_map(|options| options.split('&')) {
+        match option.split_once('=') {
+            Some(("baud", rate)) => {
+                baud =
+                    rate.parse().ok().filter(|rate| (1..=MAX_BAUD).contains(rate)).ok_or_else(|| {
+                        format!("baud={rate:?} must be a whole number from 1 to {MAX_BAUD}")
+                    })?;
+            }
+            _ => return Err(format!("{option:?} is no option; there is baud=RATE")),
+        }
+    }
+    let port = match place.strip_prefix("usb:") {
+        Some(identity) => SerialPort::Usb(usb(identity)?),
+        None if place.starts_with('/') => SerialPort::Path(place.to_owned()),
+        None => return Err(format!("{place:?} is no path; it must begin with /")),
+    };
+    Ok(Connect::Serial { port, baud })
+}
+
+fn usb(rest: &str) -> Result<UsbIdentity, String> {
+    let mut parts = rest.splitn(3, ':');
+    let mut number = |what: &str| {
+        let digits = parts.next().filter(|digits| !digits.is_empty());
+        let digits = digits.ok_or_else(|| format!("there is no {what} id"))?;
+        let parsed: Result<u16, ParseIntError> = u16::from_str_radix(digits, 16);
+        parsed.map_err(|_| format!("{what} id {digits:?} must be hexadecimal, 0000 to ffff"))
+    };
+    let (vendor, product) = (number("vendor")?, number("product")?);
+    let serial = parts.next().map(str::to_owned);
+    if serial.as_ref().is_some_and(String::is_empty) {
+        return Err("the serial number is empty; leave its colon out for any".to_owned());
+    }
+    Ok(UsbIdentity { vendor, product, serial })
+}
+
+fn host_and_port(rest: &str) -> Result<String, String> {
+    let (host, port) = rest.rsplit_once(':').ok_or_else(|| "there is no port".to_owned())?;
+    if host.is_empty() {
+        return Err("there is no host".to_owned());
+    }
+    match port.parse::<u16>() {
+        Ok(1..) => Ok(rest.to_owned()),
+        _ => Err(format!("port {port:?} must be a whole number from 1 to 65535")),
+    }
+}
+
+/// Names of network interfaces have 15 characters at most. Source: Linux, IFNAMSIZ.
+fn can_interface(rest: &str) -> Result<String, String> {
+    let allowed = |c: char| c.is_ascii_graphic() && c != '/' && c != ':';
+    if rest.is_empty() || rest.len() > 15 || !rest.chars().all(allowed) {
+        return Err(format!("{rest:?} is no name of an interface"));
+    }
+    Ok(rest.to_owned())
+}
+
+fn i2c(rest: &str) -> Result<Connect, String> {
+    let (bus, address) = rest.rsplit_once(':').ok_or_else(|| "there is no address".to_owned())?;
+    if !bus.starts_with('/') {
+        return Err(format!("bus {bus:?} is no path; it must begin with /"));
+    }
+    let digits = address.strip_prefix("0x");
+    let number = digits.and_then(|digits| u8::from_str_radix(digits, 16).ok());
+    // Addresses below 8 and above 119 are reserved. Source: I2C specification, UM10204, table 4.
+    match number {
+        Some(address @ 0x08..=0x77) => Ok(Connect::I2c { bus: bus.to_owned(), address }),
+        _ => Err(format!("address {address:?} must be 0x08 to 0x77")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn error(text: &str) -> String {
+        Connect::parse(text).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn every_form_is_read_and_written_alike() {
+        for text in [
+            "serial:/dev/serial/by-id/usb-FTDI_A10K-if00?baud=115200",
+            "serial:usb:0403:6001?baud=9600",
+            "serial:usb:0403:6001:A10K?baud=115200",
+            "tcp:192.168.0.5:4040",
+            "udp:blueos.local:9090",
+            "udp-listen:0.0.0.0:14550",
+            "can:vcan0",
+            "hid:1209:0001",
+            "hid:1209:0001:COUNTER-7",
+            "i2c:/dev/i2c-1:0x40",
+        ] {
+            assert_eq!(Connect::parse(text).unwrap().to_string(), text);
+        }
+        let Connect::Serial { baud, .. } = Connect::parse("serial:/dev/ttyS0").unwrap() else { panic!() };
+        assert_eq!(baud, 115_200);
+    }
+
+    #[test]
+    fn what_is_wrong_is_named_with_what_would_be_right() {
+        for (text, named, right) in [
+            ("", "nothing is said", "tcp:HOST:PORT"),
+            ("/dev/ttyUSB0", "no colon", "serial:/dev"),
+            ("usb:1", "\"usb\" is no way to connect", "can:INTERFACE"),
+            ("serial:ttyUSB0", "\"ttyUSB0\" is no path", "serial:/dev"),
+            ("serial:/dev/a?baud=fast", "baud=\"fast\"", "serial:/dev"),
+            ("serial:/dev/a?speed=9600", "\"speed=9600\" is no option", "serial:/dev"),
+            ("tcp:192.168.0.5", "no port", "tcp:192.168.0.5:4040"),
+            ("tcp::80", "no host", "tcp:192.168.0.5:4040"),
+            ("udp:host:0", "port \"0\"", "udp:192.168.2.2:9090"),
+            ("udp:host:70000", "port \"70000\"", "udp:192.168.2.2:9090"),
+            ("can:", "\"\" is no name", "can:can0"),
+            ("can:an interface", "is no name", "can:can0"),
+            ("hid:1209", "no product id", "hid:1209:0001"),
+            ("hid:1209:xyz", "product id \"xyz\"", "hid:1209:0001"),
+            ("hid:1209:0001:", "serial number is empty", "hid:1209:0001"),
+            ("i2c:/dev/i2c-1", "no address", "i2c:/dev/i2c-1:0x40"),
+            ("i2c:/dev/i2c-1:64", "address \"64\"", "i2c:/dev/i2c-1:0x40"),
+            ("i2c:/dev/i2c-1:0x7f", "address \"0x7f\"", "i2c:/dev/i2c-1:0x40"),
+        ] {
+            let error = error(text);
+            assert!(error.contains(named) && error.contains(right), "{text}: {error}");
+        }
+    }
+
+    #[test]
+    fn a_device_on_another_carrier_is_refused() {
+        let error = Connect::parse("can:can0").unwrap().among(&[Carrier::Serial, Carrier::Tcp]).unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "connect = \"can:can0\": a device of this kind isn't connected by can:; it is by serial: or tcp:"
+        );
+    }
+}

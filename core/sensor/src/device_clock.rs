@@ -1,0 +1,372 @@
+//! A device's own clock beside ours: ticks that wrap to time since it began, and how fast it runs.
+//!
+//! A stamp reaches us late by a delay that is never below some least one: buses and queues only add. How far the receive
+//! time is ahead of the device's therefore has a lower edge, whose slope is the drift. Of each stretch of time the least
+//! late stamp is kept, and a straight line is laid through those by least squares: delays of the same kind throughout move
+//! all of them alike, which is the offset's affair and not the slope's. When all places are taken, stretches are joined
+//! two by two, so that ten hours need no more memory than two minutes.
+
+use serde::{Deserialize, Serialize};
+
+use headrace_geometry::math;
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_snapshot::array;
+
+/// Stretches that are kept.
+const PLACES: usize = 128;
+
+/// Length of a stretch on the device's clock, at first.
+const FIRST_SPAN_NS: i64 = 1_000_000_000;
+
+/// Stretches that a drift is told from: with fewer, what they scatter by says little of how far it may be off.
+const LEAST_STRETCHES: usize = 8;
+
+/// A stamp farther than this from where the last one and the receive times would have it is of another epoch; less is
+/// put down to queues. A clock that goes round sooner has a quarter of its round.
+const MOST_QUEUED_NS: i64 = 10_000_000_000;
+
+/// By how much the least delays of two stretches may differ, and by how much more for each unit of time between them: no
+/// clock is off by more. A stretch that is later was spent in a queue, and isn't kept.
+const MOST_SHIFT_NS: f64 = 0.5e9;
+const MOST_DRIFT: f64 = 500e-6;
+
+/// No queue lasts longer than this: stretches that go on being shifted are of another epoch.
+const LONGEST_QUEUE_NS: i64 = 30_000_000_000;
+
+const LONGEST_TICK_NS: i64 = 900_000_000_000;
+
+const PPM: f64 = 1e6;
+
+/// What is known of a device's clock.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ClockReport {
+    /// Stamps seen.
+    pub stamps: u64,
+    /// How often it began anew, or fell behind by more than queues explain.
+    pub restarts: u64,
+    /// How often it ran ahead by more than queues explain.
+    pub jumps: u64,
+    /// Length of the epoch that the drift is from, on the device's clock.
+    pub span: DurNs,
+    /// How fast it runs against ours; `None` before there is enough to tell.
+    pub drift: Option<Drift>,
+}
+
+/// A rate against our clock, parts per million. Positive: the device's clock is fast.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Drift {
+    /// The rate.
+    pub ppm: f64,
+    /// Its standard deviation.
+    pub sd_ppm: f64,
+}
+
+/// Follows a device's clock. Allocates: never.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct DeviceClock {
+    /// The clock goes round after this many ticks.
+    round: i128,
+    tick: DurNs,
+    stamps: u64,
+    restarts: u64,
+    jumps: u64,
+    epoch: Option<Epoch>,
+    /// The best drift of the epochs before, and their spans.
+    before: Option<(Drift, DurNs)>,
+}
+
+/// Time since a start of the device.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+struct Epoch {
+    /// The first stamp, of which device time is counted.
+    begun: MonoNs,
+    /// The last stamp as it came, unwrapped, and when.
+    raw: i128,
+    elapsed_ticks: i128,
+    received: MonoNs,
+    edge: Edge,
+}
+
+/// The least late stamps.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+struct Edge {
+    #[serde(with = "array")]
+    kept: [Stamp; PLACES],
+    len: usize,
+    span_ns: i64,
+    /// The stretch that is under way, and its least late stamp.
+    open: Option<(i64, Stamp)>,
+    /// By which stamps of one stretch are compared.
+    slope: f64,
+    /// Since when, on the device's clock, stretches have been shifted.
+    shifted_since_ns: Option<i64>,
+}
+
+/// A stamp by device time since the epoch's first and by how much later it came than that one, ns.
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
+struct Stamp {
+    device_ns: i64,
+    late_ns: i64,
+}
+
+/// A straight line through stamps: late = `mean_late` + `slope` (device - `mean_device`).
+struct Line {
+    slope: f64,
+    slope_sd: f64,
+    mean_device_ns: f64,
+    mean_late_ns: f64,
+}
+
+/// What a stretch that ended says of the epoch.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Shift {
+    None,
+    Behind,
+    Ahead,
+}
+
+impl DeviceClock {
+    /// A clock of `bits` bits (1 to 64) whose ticks are `tick` long (1 ns to 15 minutes); what is outside is brought inside.
+    pub fn new(bits: u32, tick: DurNs) -> Self {
+        Self {
+            round: 1 << bits.clamp(1, 64),
+            tick: DurNs(tick.0.clamp(1, LONGEST_TICK_NS)),
+            stamps: 0,
+            restarts: 0,
+            jumps: 0,
+            epoch: None,
+            before: None,
+        }
+    }
+
+    /// Takes a stamp that came at `received`; bits beyond the clock's are left out. Gives the time on the device's clock
+    /// since the epoch's first stamp, wraps undone.
+    pub fn take(&mut self, ticks: u64, received: MonoNs) -> DurNs {
+        self.stamps += 1;
+        let raw = i128::from(ticks).rem_euclid(self.round);
+        let Some(epoch) = &mut self.epoch else { return self.begin(raw, received) };
+        let waited = received.since(epoch.received);
+        let advance = advance(raw - epoch.raw, self.round, self.tick, waited);
+        let ahead_ns = advance * i128::from(self.tick.0) - i128::from(waited.0);
+        let most_ns = i128::from(MOST_QUEUED_NS).min(self.round * i128::from(self.tick.0) / 4);
+        if advance < 0 || ahead_ns < -most_ns {
+            self.restarts += 1;
+            return self.begin(raw, received);
+        }
+        if ahead_ns > most_ns {
+            self.jumps += 1;
+            return self.begin(raw, received);
+        }
+        epoch.raw = raw;
+        epoch.elapsed_ticks += advance;
+        epoch.received = received;
+        let device = saturated(epoch.elapsed_ticks * i128::from(self.tick.0));
+        let late = received.since(epoch.begun) - device;
+        match epoch.edge.take(Stamp { device_ns: device.0, late_ns: late.0 }) {
+            Shift::None => return device,
+            Shift::Behind => self.restarts += 1,
+            Shift::Ahead => self.jumps += 1,
+        }
+        self.begin(raw, received)
+    }
+
+    /// When a stamp would come, at the earliest, that the device makes at `device`, a time as [`Self::take`] gives them;
+    /// `None` before there is a drift.
+    pub fn earliest(&self, device: DurNs) -> Option<MonoNs> {
+        let epoch = self.epoch.as_ref()?;
+        let line = epoch.edge.line(self.tick)?;
+        let least = |stamp: &Stamp| stamp.late_ns as f64 - line.late_ns(stamp.device_ns);
+        let least_ns = epoch.edge.kept().iter().map(least).fold(f64::INFINITY, f64::min);
+        let late = DurNs(math::round_to_i64(line.late_ns(device.0) + least_ns));
+        Some(epoch.begun + device + late)
+    }
+
+    /// What is known so far. The drift is that of the epoch from which it is known best.
+    pub fn report(&self) -> ClockReport {
+        let now = self.drift_now();
+        let best =
+            [self.before, now].into_iter().flatten().min_by(|(a, _), (b, _)| a.sd_ppm.total_cmp(&b.sd_ppm));
+        let span = self.epoch.as_ref().map_or(DurNs::ZERO, |epoch| self.span(epoch));
+        ClockReport {
+            stamps: self.stamps,
+            restarts: self.restarts,
+            jumps: self.jumps,
+            span: best.map_or(span, |(_, span)| span),
+            drift: best.map(|(drift, _)| drift),
+        }
+    }
+
+    fn begin(&mut self, raw: i128, received: MonoNs) -> DurNs {
+        let report = self.report();
+        self.before = report.drift.map(|drift| (drift, report.span));
+        self.epoch = Some(Epoch { begun: received, raw, elapsed_ticks: 0, received, edge: Edge::new() });
+        DurNs::ZERO
+    }
+
+    fn span(&self, epoch: &Epoch) -> DurNs {
+        saturated(epoch.elapsed_ticks * i128::from(self.tick.0))
+    }
+
+    fn drift_now(&self) -> Option<(Drift, DurNs)> {
+        let epoch = self.epoch.as_ref()?;
+        let line = epoch.edge.line(self.tick)?;
+        // A second of the device's is 1 + slope of ours.
+        let rate = 1.0 / (1.0 + line.slope);
+        let drift = Drift { ppm: (rate - 1.0) * PPM, sd_ppm: line.slope_sd * rate * rate * PPM };
+        Some((drift, self.span(epoch)))
+    }
+}
+
+impl Edge {
+    /// With the epoch's first stamp, by which the others are counted.
+    fn new() -> Self {
+        Self {
+            kept: [Stamp::default(); PLACES],
+            len: 0,
+            span_ns: FIRST_SPAN_NS,
+            open: Some((0, Stamp::default())),
+            slope: 0.0,
+            shifted_since_ns: None,
+        }
+    }
+
+    fn take(&mut self, stamp: Stamp) -> Shift {
+        let stretch = stamp.device_ns.div_euclid(self.span_ns);
+        match &mut self.open {
+            Some((open, least)) if *open == stretch => {
+                *least = earlier(*least, stamp, self.slope);
+                Shift::None
+            }
+            _ => {
+                let shift = self.close();
+                let stretch = stamp.device_ns.div_euclid(self.span_ns);
+                self.open = Some((stretch, stamp));
+                shift
+            }
+        }
+    }
+
+    fn kept(&self) -> &[Stamp] {
+        self.kept.get(..self.len).unwrap_or_default()
+    }
+
+    /// Keeps what the open stretch has left, unless it was spent in a queue.
+    fn close(&mut self) -> Shift {
+        let Some((_, stamp)) = self.open.take() else { return Shift::None };
+        let shift = self.shift(stamp);
+        if shift != Shift::None {
+            if shift == Shift::Ahead && stamp.device_ns < LONGEST_QUEUE_NS {
+                // It is rather those before it that were late: the epoch began within a queue.
+                self.len = 0;
+            } else {
+                let since = *self.shifted_since_ns.get_or_insert(stamp.device_ns);
+                return if stamp.device_ns.saturating_sub(since) > LONGEST_QUEUE_NS {
+                    shift
+                } else {
+                    Shift::None
+                };
+            }
+        }
+        self.shifted_since_ns = None;
+        self.keep(stamp);
+        Shift::None
+    }
+
+    /// Whether a stamp comes at another time than the last one kept would have it.
+    fn shift(&self, stamp: Stamp) -> Shift {
+        let Some(last) = self.kept().last() else { return Shift::None };
+        let between_ns = stamp.device_ns.saturating_sub(last.device_ns) as f64;
+        let late_ns = stamp.late_ns.saturating_sub(last.late_ns) as f64 - self.slope * between_ns;
+        let most_ns = MOST_SHIFT_NS + MOST_DRIFT * between_ns;
+        // A clock that lags behind makes stamps that seem to come late.
+        if late_ns > most_ns {
+            Shift::Behind
+        } else if late_ns < -most_ns {
+            Shift::Ahead
+        } else {
+            Shift::None
+        }
+    }
+
+    fn keep(&mut self, stamp: Stamp) {
+        if self.len == PLACES {
+            self.join();
+        }
+        if let Some(free) = self.kept.get_mut(self.len) {
+            *free = stamp;
+            self.len += 1;
+        }
+        if let Some(line) = self.line(DurNs::ZERO) {
+            self.slope = line.slope;
+        }
+    }
+
+    /// Makes stretches twice as long.
+    fn join(&mut self) {
+        self.span_ns = self.span_ns.saturating_mul(2);
+        let mut joined = [Stamp::default(); PLACES];
+        let mut len = 0;
+        let mut last_stretch = None;
+        for stamp in self.kept() {
+            let stretch = stamp.device_ns.div_euclid(self.span_ns);
+            if last_stretch != Some(stretch) {
+                len += 1;
+            }
+            let Some(place) = joined.get_mut(len - 1) else { break };
+            *place = if last_stretch == Some(stretch) { earlier(*place, *stamp, self.slope) } else { *stamp };
+            last_stretch = Some(stretch);
+        }
+        (self.kept, self.len) = (joined, len);
+    }
+
+    /// The line through what is kept, for a clock whose stamps are whole ticks.
+    fn line(&self, tick: DurNs) -> Option<Line> {
+        let kept = self.kept();
+        if kept.len() < LEAST_STRETCHES {
+            return None;
+        }
+        let n = kept.len() as f64;
+        let mean_device_ns = kept.iter().map(|stamp| stamp.device_ns as f64).sum::<f64>() / n;
+        let mean_late_ns = kept.iter().map(|stamp| stamp.late_ns as f64).sum::<f64>() / n;
+        let about =
+            |stamp: &Stamp| (stamp.device_ns as f64 - mean_device_ns, stamp.late_ns as f64 - mean_late_ns);
+        let (mut xx, mut xy) = (0.0, 0.0);
+        for (x, y) in kept.iter().map(about) {
+            xx += x * x;
+            xy += x * y;
+        }
+        let slope = xy / xx;
+        let left = |(x, y): (f64, f64)| (y - slope * x) * (y - slope * x);
+        let scatter = kept.iter().map(about).map(left).sum::<f64>() / (n - 2.0);
+        // Where nothing scatters, a stamp may still be anywhere within its tick.
+        let quantum = tick.0 as f64 * tick.0 as f64 / 12.0;
+        let slope_sd = math::sqrt((scatter + quantum) / xx);
+        (xx > 0.0).then_some(Line { slope, slope_sd, mean_device_ns, mean_late_ns })
+    }
+}
+
+impl Line {
+    fn late_ns(&self, device_ns: i64) -> f64 {
+        self.mean_late_ns + self.slope * (device_ns as f64 - self.mean_device_ns)
+    }
+}
+
+/// Ticks gone by: `difference` and as many rounds as bring it nearest to the time `waited`.
+fn advance(difference: i128, round: i128, tick: DurNs, waited: DurNs) -> i128 {
+    let expected = i128::from(waited.0).div_euclid(i128::from(tick.0));
+    let rounds = (expected - difference + round / 2).div_euclid(round);
+    difference + rounds * round
+}
+
+/// The one that came less late, by a line of this slope.
+fn earlier(a: Stamp, b: Stamp, slope: f64) -> Stamp {
+    let allowed = slope * b.device_ns.saturating_sub(a.device_ns) as f64;
+    if (b.late_ns.saturating_sub(a.late_ns) as f64) < allowed { b } else { a }
+}
+
+fn saturated(ns: i128) -> DurNs {
+    DurNs(i64::try_from(ns).unwrap_or(if ns < 0 { i64::MIN } else { i64::MAX }))
+}
+
+#[cfg(test)]
+mod tests;

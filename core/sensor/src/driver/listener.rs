@@ -1,0 +1,91 @@
+//! Drivers of devices that talk without being asked.
+
+use super::{Cutter, Driver, Standing, Wire};
+use crate::codec::Framing;
+use headrace_geometry::time::{DurNs, MonoNs};
+
+/// Listens to a row of bytes, and hands on everything, frame by frame.
+pub struct Listener<F, const N: usize> {
+    cutter: Cutter<F, N>,
+    patience: DurNs,
+}
+
+impl<F: Framing, const N: usize> Listener<F, N> {
+    /// For frames whose bytes follow one another without more than `silence` between them, of a device that says
+    /// something at least every `patience`.
+    pub fn new(framing: F, silence: DurNs, patience: DurNs) -> Self {
+        Self { cutter: Cutter::new(framing, silence), patience }
+    }
+}
+
+impl<F: Framing + Send, const N: usize> Driver for Listener<F, N> {
+    fn opened(&mut self, _: MonoNs, _: &mut dyn Wire) {}
+
+    fn closed(&mut self, wire: &mut dyn Wire) {
+        self.cutter.flush(&mut |piece| wire.deliver(piece.received, piece.bytes));
+    }
+
+    fn heard(&mut self, received: MonoNs, bytes: &[u8], wire: &mut dyn Wire) {
+        self.cutter.push(received, bytes, &mut |piece| wire.deliver(piece.received, piece.bytes));
+    }
+
+    fn due(&self) -> Option<MonoNs> {
+        self.cutter.gives_up()
+    }
+
+    fn wake(&mut self, now: MonoNs, wire: &mut dyn Wire) {
+        self.heard(now, &[], wire);
+    }
+
+    fn patience(&self) -> DurNs {
+        self.patience
+    }
+
+    fn standing(&self) -> Standing {
+        Standing { good_frames: self.cutter.counts().good_frames, ..Standing::default() }
+    }
+}
+
+/// Says what is wrong with a message, if anything is.
+pub type Judge = Box<dyn Fn(&[u8]) -> Option<String> + Send>;
+
+/// Listens to whole messages, and hands on each.
+pub struct MessageListener {
+    judge: Judge,
+    patience: DurNs,
+    good_frames: u64,
+    complaint: Option<String>,
+}
+
+impl MessageListener {
+    /// For a device that says something at least every `patience`; `judge` tells messages that are none of its own.
+    pub fn new(judge: Judge, patience: DurNs) -> Self {
+        Self { judge, patience, good_frames: 0, complaint: None }
+    }
+}
+
+impl Driver for MessageListener {
+    fn opened(&mut self, _: MonoNs, _: &mut dyn Wire) {
+        self.complaint = None;
+    }
+
+    fn heard(&mut self, received: MonoNs, bytes: &[u8], wire: &mut dyn Wire) {
+        wire.deliver(received, bytes);
+        self.complaint = (self.judge)(bytes);
+        self.good_frames += u64::from(self.complaint.is_none());
+    }
+
+    fn due(&self) -> Option<MonoNs> {
+        None
+    }
+
+    fn wake(&mut self, _: MonoNs, _: &mut dyn Wire) {}
+
+    fn patience(&self) -> DurNs {
+        self.patience
+    }
+
+    fn standing(&self) -> Standing {
+        Standing { good_frames: self.good_frames, identity: None, complaint: self.complaint.clone() }
+    }
+}

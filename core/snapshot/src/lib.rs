@@ -1,0 +1,324 @@
+//! State as bytes: saved at a tick, and put back into a loop of the same vehicle and the same program.
+//!
+//! Values (numbers, enums, small records) go as serde has them. What holds memory that must not be given up, or
+//! settings that aren't state, is restored in place: [`stateful!`](crate::stateful) takes the fields of such a type
+//! apart by what they are, every one of them, so that a new field can't be forgotten.
+//!
+//! Bytes are for the program that wrote them: no version reads another's.
+
+#![cfg_attr(not(test), warn(clippy::cast_possible_truncation))]
+#![cfg_attr(test, allow(clippy::cast_possible_truncation))]
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+/// Something with state that a run can be continued from.
+pub trait Stateful {
+    /// Adds the state to a snapshot.
+    fn save(&self, to: &mut Saver);
+
+    /// Takes the state out of a snapshot, in the order in which it was saved. Settings and rooms stay as they are.
+    ///
+    /// Errors: the bytes are another's; what is restored may then be anything, and must not be used.
+    fn restore(&mut self, from: &mut Restorer<'_>) -> Result<(), SnapshotError>;
+}
+
+/// Why a snapshot can't be written or used.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SnapshotError {
+    /// The bytes aren't what was saved of this loop.
+    #[error("restoring {part} from a snapshot: {why}; it is of another vehicle, another version, or damaged")]
+    Unfit {
+        /// The part of the state that was being restored.
+        part: String,
+        /// What is wrong.
+        why: String,
+    },
+    /// A value that can't be written.
+    #[error("saving {part}: {why}")]
+    Unsaved {
+        /// The part of the state.
+        part: String,
+        /// What is wrong.
+        why: String,
+    },
+}
+
+/// A snapshot as it is written.
+#[derive(Debug, Default)]
+pub struct Saver {
+    bytes: Vec<u8>,
+    failed: Option<SnapshotError>,
+    part: &'static str,
+}
+
+impl Saver {
+    /// Begins a part, so that errors can name it.
+    pub fn part(&mut self, name: &'static str) {
+        self.part = name;
+        self.value(&name);
+    }
+
+    /// Adds a value.
+    pub fn value(&mut self, value: &(impl Serialize + ?Sized)) {
+        match postcard::to_extend(value, core::mem::take(&mut self.bytes)) {
+            Ok(bytes) => self.bytes = bytes,
+            Err(error) => {
+                let error = SnapshotError::Unsaved { part: self.part.to_owned(), why: error.to_string() };
+                self.failed.get_or_insert(error);
+            }
+        }
+    }
+
+    /// Adds the elements of a list, and how many there are.
+    pub fn list<T: Serialize>(&mut self, list: &[T]) {
+        self.value(&list.len());
+        for element in list {
+            self.value(element);
+        }
+    }
+
+    /// Adds things that are stateful themselves, as many as there always are.
+    pub fn each<'a, T: Stateful + ?Sized + 'a>(&mut self, each: impl Iterator<Item = &'a T>) {
+        each.for_each(|one| one.save(self));
+    }
+
+    /// Adds bytes as they are, and how many there are.
+    pub fn raw(&mut self, bytes: &[u8]) {
+        self.value(&bytes.len());
+        self.bytes.extend_from_slice(bytes);
+    }
+
+    /// The whole.
+    ///
+    /// Errors: something could not be written.
+    pub fn finish(self) -> Result<Vec<u8>, SnapshotError> {
+        self.failed.map_or(Ok(self.bytes), Err)
+    }
+}
+
+/// A snapshot as it is read.
+#[derive(Debug)]
+pub struct Restorer<'a> {
+    bytes: &'a [u8],
+    part: &'static str,
+}
+
+impl<'a> Restorer<'a> {
+    /// From what [`Saver::finish`] gave.
+    pub fn new(bytes: &'a [u8]) -> Self {
+        Self { bytes, part: "the beginning" }
+    }
+
+    /// Begins the part of this name.
+    ///
+    /// Errors: another follows.
+    pub fn part(&mut self, name: &'static str) -> Result<(), SnapshotError> {
+        self.part = name;
+        let found: &str = self.take()?;
+        if found == name { Ok(()) } else { Err(self.unfit(format!("part {found:?} is in its place"))) }
+    }
+
+    /// Takes a value.
+    ///
+    /// Errors: what follows isn't one.
+    pub fn value<T: DeserializeOwned>(&mut self) -> Result<T, SnapshotError> {
+        self.take()
+    }
+
+    fn take<T: serde::Deserialize<'a>>(&mut self) -> Result<T, SnapshotError> {
+        let (value, rest) =
+            postcard::take_from_bytes(self.bytes).map_err(|error| self.unfit(error.to_string()))?;
+        self.bytes = rest;
+        Ok(value)
+    }
+
+    /// Fills a list, in the room that it has where that is enough.
+    ///
+    /// Errors: fewer elements than there should be, or something that is none.
+    pub fn list<T: DeserializeOwned>(&mut self, list: &mut Vec<T>) -> Result<(), SnapshotError> {
+        let count: usize = self.value()?;
+        if count > self.bytes.len() {
+            return Err(self.unfit(format!("{count} elements in {} bytes", self.bytes.len())));
+        }
+        list.clear();
+        list.reserve_exact(count);
+        for _ in 0..count {
+            list.push(self.value()?);
+        }
+        Ok(())
+    }
+
+    /// Fills elements whose number doesn't change.
+    ///
+    /// Errors: another number of them, or something that is none.
+    pub fn slots<T: DeserializeOwned>(&mut self, slots: &mut [T]) -> Result<(), SnapshotError> {
+        let count: usize = self.value()?;
+        if count != slots.len() {
+            return Err(self.unfit(format!("{count} elements in place of {}", slots.len())));
+        }
+        slots.iter_mut().try_for_each(|slot| self.value().map(|value| *slot = value))
+    }
+
+    /// Restores things that are stateful themselves, as many as there always are.
+    ///
+    /// Errors: as theirs.
+    pub fn each<'t, T: Stateful + ?Sized + 't>(
+        &mut self,
+        mut each: impl Iterator<Item = &'t mut T>,
+    ) -> Result<(), SnapshotError> {
+        each.try_for_each(|one| one.restore(self))
+    }
+
+    /// Takes bytes that were added as they are.
+    ///
+    /// Errors: fewer than were added.
+    pub fn raw(&mut self) -> Result<&'a [u8], SnapshotError> {
+        let count: usize = self.value()?;
+        let (bytes, rest) =
+            self.bytes.split_at_checked(count).ok_or_else(|| self.unfit("it ends early".to_owned()))?;
+        self.bytes = rest;
+        Ok(bytes)
+    }
+
+    /// What is wrong with the part that is being restored.
+    pub fn unfit(&self, why: String) -> SnapshotError {
+        SnapshotError::Unfit { part: self.part.to_owned(), why }
+    }
+
+    /// Whether all has been taken.
+    pub fn is_empty(&self) -> bool {
+        self.bytes.is_empty()
+    }
+}
+
+impl<T: Serialize + DeserializeOwned> Stateful for T {
+    fn save(&self, to: &mut Saver) {
+        to.value(self);
+    }
+
+    fn restore(&mut self, from: &mut Restorer<'_>) -> Result<(), SnapshotError> {
+        *self = from.value()?;
+        Ok(())
+    }
+}
+
+/// For serde's `with`: arrays of more elements than serde takes by itself.
+pub mod array {
+    use serde::de::{Deserialize, Deserializer, Error};
+    use serde::ser::{Serialize, Serializer};
+
+    /// The elements as a list.
+    pub fn serialize<S: Serializer, T: Serialize, const N: usize>(
+        array: &[T; N],
+        to: S,
+    ) -> Result<S::Ok, S::Error> {
+        to.collect_seq(array)
+    }
+
+    /// A list of as many.
+    pub fn deserialize<'de, D: Deserializer<'de>, T: Deserialize<'de>, const N: usize>(
+        from: D,
+    ) -> Result<[T; N], D::Error> {
+        let list = Vec::deserialize(from)?;
+        list.try_into()
+            .map_err(|list: Vec<T>| D::Error::invalid_length(list.len(), &"another number of them"))
+    }
+}
+
+/// Makes a type [`Stateful`](crate::Stateful), its fields named by what they are: `state` (values, or
+/// stateful themselves), `lists` (a `Vec` of values whose room stays), `slots` (values whose number stays), `each`
+/// (stateful things whose number is a setting) and `fixed` (settings and working memory: not saved). A field that isn't
+/// named doesn't compile.
+#[macro_export]
+macro_rules! stateful {
+    ($type:ty {
+        $(state: $($state:ident),+;)?
+        $(lists: $($list:ident),+;)?
+        $(slots: $($slots:ident),+;)?
+        $(each: $($each:ident),+;)?
+        $(fixed: $($fixed:ident),+;)?
+    }) => {
+        impl $crate::Stateful for $type {
+            fn save(&self, to: &mut $crate::Saver) {
+                let Self { $($($state,)+)? $($($list,)+)? $($($slots,)+)? $($($each,)+)? $($($fixed: _,)+)? } = self;
+                $($($crate::Stateful::save($state, to);)+)?
+                $($(to.list($list);)+)?
+                $($(to.list($slots);)+)?
+                $($(to.each($each.iter());)+)?
+            }
+
+            fn restore(
+                &mut self,
+                from: &mut $crate::Restorer<'_>,
+            ) -> Result<(), $crate::SnapshotError> {
+                let Self { $($($state,)+)? $($($list,)+)? $($($slots,)+)? $($($each,)+)? $($($fixed: _,)+)? } = self;
+                $($($crate::Stateful::restore($state, from)?;)+)?
+                $($(from.list($list)?;)+)?
+                $($(from.slots($slots)?;)+)?
+                $($(from.each($each.iter_mut())?;)+)?
+                Ok(())
+            }
+        }
+    };
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[derive(Debug, PartialEq)]
+    struct Machine {
+        name: &'static str,
+        turned: f64,
+        seen: Vec<u16>,
+        places: [Option<u8>; 40],
+    }
+
+    stateful!(Machine { state: turned; lists: seen; slots: places; fixed: name; });
+
+    fn machine(name: &'static str, seen: &[u16]) -> Machine {
+        let mut room = Vec::with_capacity(8);
+        room.extend_from_slice(seen);
+        Machine { name, turned: f64::from_bits(0x7ff8_0000_dead_beef), seen: room, places: [Some(3); 40] }
+    }
+
+    fn saved(machine: &Machine) -> Vec<u8> {
+        let mut saver = Saver::default();
+        saver.part("machine");
+        machine.save(&mut saver);
+        saver.finish().unwrap()
+    }
+
+    #[test]
+    fn state_comes_back_bit_for_bit_and_settings_stay() {
+        let bytes = saved(&machine("a", &[1, 2, 3]));
+        let mut other = machine("b", &[]);
+        (other.turned, other.places) = (0.0, [None; 40]);
+        let mut from = Restorer::new(&bytes);
+        from.part("machine").unwrap();
+        other.restore(&mut from).unwrap();
+        assert!(from.is_empty());
+        assert_eq!((other.name, &other.seen[..], other.seen.capacity()), ("b", &[1, 2, 3][..], 8));
+        assert_eq!((other.turned.to_bits(), other.places), (0x7ff8_0000_dead_beef, [Some(3); 40]));
+    }
+
+    #[test]
+    fn another_s_bytes_are_refused_and_the_part_is_named() {
+        let bytes = saved(&machine("a", &[1, 2, 3]));
+        let mut from = Restorer::new(&bytes);
+        from.part("machine").unwrap();
+        from.value::<f64>().unwrap();
+        let words = from.slots(&mut [0_u16; 2]).unwrap_err().to_string();
+        insta::assert_snapshot!(words, @"restoring machine from a snapshot: 3 elements in place of 2; it is of another vehicle, another version, or damaged");
+        assert!(Restorer::new(&bytes).part("engine").is_err());
+        for cut in 0..bytes.len() {
+            let mut from = Restorer::new(&bytes[..cut]);
+            assert!(
+                from.part("machine").and_then(|()| machine("b", &[]).restore(&mut from)).is_err(),
+                "{cut}"
+            );
+        }
+    }
+}

@@ -1,0 +1,93 @@
+//! `[coverage]` and `[[openings]]` of a vehicle file: how the wall is judged, and where it has none.
+
+use headrace_config::{ConfigError, Section};
+use headrace_coverage::openings::Opening;
+use headrace_coverage::soundings::NODE_M;
+use headrace_geometry::math::{self, TAU};
+use headrace_geometry::tunnel::Profile;
+
+/// How the wall is judged.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CoverageConfig {
+    /// How far the bounds of a hole may be apart, m; zero where it is measured exactly.
+    pub hole_tolerance_m: f64,
+    /// Samples farther than this from the design profile contradict it, m; where most do, nothing passes.
+    pub contradiction_m: f64,
+    /// Edge of a node of the grid on which soundings are counted, m.
+    pub node_m: f64,
+    /// Where there is no wall to cover.
+    pub openings: Vec<Opening>,
+}
+
+impl Default for CoverageConfig {
+    fn default() -> Self {
+        Self { hole_tolerance_m: 0.0, contradiction_m: 0.5, node_m: NODE_M, openings: Vec::new() }
+    }
+}
+
+/// The most places that stand for openings.
+const MAX_PLACES: i64 = 1_000_000;
+
+impl CoverageConfig {
+    /// Reads both tables from the root of a vehicle file.
+    ///
+    /// Errors: the first key that is missing, unknown or out of range.
+    pub fn from_root(root: &Section<'_>, profile: &Profile, target_m: f64) -> Result<Self, ConfigError> {
+        let mut config = Self::default();
+        if let Some(section) = root.section("coverage")? {
+            config.contradiction_m =
+                section.number("contradiction_m", 0.05..=100.0)?.unwrap_or(config.contradiction_m);
+            config.node_m = section.number("node_m", 0.05..=10.0)?.unwrap_or(config.node_m);
+            config.hole_tolerance_m = parse_tolerance_m(&section, target_m)?;
+            section.finish()?;
+        }
+        for section in root.sections("openings")? {
+            config.openings.push(parse_opening(section, profile)?);
+        }
+        let places = |opening: &Opening| opening.places(profile.perimeter_m(), target_m);
+        if config.openings.iter().map(places).sum::<i64>() > MAX_PLACES {
+            return Err(root.invalid(
+                "openings",
+                "take more than 2500 square metres together; leave them out of the tunnel",
+            ));
+        }
+        Ok(config)
+    }
+}
+
+fn parse_tolerance_m(section: &Section<'_>, target_m: f64) -> Result<f64, ConfigError> {
+    let exact = section.choice("hole", &[("exact", true), ("grid", false)])?.unwrap_or(true);
+    let tolerance_m = section.number("tolerance_m", 1e-6..=1.0)?;
+    if exact && tolerance_m.is_some() {
+        return Err(section.invalid("tolerance_m", "is for hole = \"grid\" alone"));
+    }
+    Ok(if exact { 0.0 } else { tolerance_m.unwrap_or(target_m / 50.0) })
+}
+
+fn parse_opening(section: Section<'_>, profile: &Profile) -> Result<Opening, ConfigError> {
+    let name = section.required("name", section.text("name")?)?;
+    let from_m = section.required("from_m", section.number("from_m", 0.0..=1.0e5)?)?;
+    let to_m = section.required("to_m", section.number("to_m", 0.0..=1.0e5)?)?;
+    if to_m <= from_m {
+        return Err(section.invalid("to_m", "must be larger than from_m"));
+    }
+    let clock = (section.number("clock_from", 0.0..=12.0)?, section.number("clock_to", 0.0..=12.0)?);
+    let arc_m = match clock {
+        (None, None) => None,
+        (Some(from), Some(to)) => {
+            let (from_m, to_m) = (sigma_at_hour_m(profile, from), sigma_at_hour_m(profile, to));
+            Some((from_m, math::wrap(to_m - from_m, profile.perimeter_m())))
+        }
+        (Some(_), None) => return Err(section.invalid("clock_from", "needs clock_to beside it")),
+        (None, Some(_)) => return Err(section.invalid("clock_to", "needs clock_from beside it")),
+    };
+    section.finish()?;
+    Ok(Opening { name, from_m, to_m, arc_m })
+}
+
+/// Arc length at an hour of a clock seen looking along the tunnel from the reference point: 6 is the floor, 9 the left wall.
+fn sigma_at_hour_m(profile: &Profile, hour: f64) -> f64 {
+    let angle = (hour - 6.0) / 12.0 * TAU;
+    let direction = [math::sin(angle), -math::cos(angle)];
+    profile.cast(profile.reference(), direction).map_or(0.0, |wall| wall.sigma_m)
+}

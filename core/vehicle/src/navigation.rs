@@ -1,0 +1,98 @@
+//! `[navigation]` of a vehicle file: which way it navigates, and how far each sensor is trusted.
+
+use core::ops::RangeInclusive;
+
+use headrace_config::{ConfigError, Section};
+use headrace_fusion::Navigation;
+use headrace_fusion::direct::DirectNavigation;
+use headrace_fusion::filter::FilterNavigation;
+use headrace_fusion::filter::settings::Settings;
+use headrace_geometry::site::Site;
+use headrace_geometry::tunnel::Profile;
+
+/// In radians.
+const DEGREE: f64 = core::f64::consts::PI / 180.0;
+/// What a noise may be: zero would make the filter believe one sensor against all others.
+const DEGREES: RangeInclusive<f64> = 1e-4..=90.0;
+const METRES: RangeInclusive<f64> = 1e-4..=100.0;
+const SMALL: RangeInclusive<f64> = 1e-9..=10.0;
+const SECONDS: RangeInclusive<f64> = 0.1..=1e6;
+
+/// Which way a vehicle navigates: the `[navigation]` table of its file.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[expect(clippy::large_enum_variant, reason = "there is one of it")]
+pub enum NavigationConfig {
+    /// By the filter.
+    Filter(Settings),
+    /// Without one.
+    Direct,
+}
+
+impl NavigationConfig {
+    /// Reads the table; without one, a filter with the usual settings.
+    ///
+    /// Errors: the first key that is unknown or out of range.
+    pub fn parse(section: Option<Section<'_>>) -> Result<Self, ConfigError> {
+        let Some(section) = section else { return Ok(Self::Filter(Settings::default())) };
+        let by_filter = section.choice("way", &[("filter", true), ("direct", false)])?.unwrap_or(true);
+        let settings = settings(&section)?;
+        section.finish()?;
+        Ok(if by_filter { Self::Filter(settings) } else { Self::Direct })
+    }
+
+    /// Navigation that knows nothing yet.
+    pub fn begin(&self, profile: &Profile, site: Site) -> Box<dyn Navigation> {
+        match self {
+            Self::Filter(settings) => Box::new(FilterNavigation::new(profile.clone(), site, *settings)),
+            Self::Direct => Box::new(DirectNavigation::new(profile.clone(), site)),
+        }
+    }
+}
+
+/// Reads a vehicle file's `[navigation]` table; what it leaves out is as usual.
+///
+/// Errors: the first key whose value is out of range.
+fn settings(section: &Section<'_>) -> Result<Settings, ConfigError> {
+    let mut settings = Settings::default();
+    let keys: [(&'static str, RangeInclusive<f64>, f64, &mut f64); 10] = [
+        ("gyro_bias_degps", DEGREES, DEGREE, &mut settings.rate_bias.reach),
+        ("gyro_bias_time_s", SECONDS, 1.0, &mut settings.rate_bias.time_s),
+        ("accel_bias_mps2", SMALL, 1.0, &mut settings.force_bias.reach),
+        ("accel_bias_time_s", SECONDS, 1.0, &mut settings.force_bias.time_s),
+        ("slack_sd_m", METRES, 1.0, &mut settings.slack.reach),
+        ("slack_time_s", SECONDS, 1.0, &mut settings.slack.time_s),
+        ("deviation_deg", DEGREES, DEGREE, &mut settings.heading.reach),
+        ("deviation_time_s", SECONDS, 1.0, &mut settings.heading.time_s),
+        ("gyro_noise_degps_rthz", SMALL, DEGREE, &mut settings.rate_noise),
+        ("accel_noise_mps2_rthz", SMALL, 1.0, &mut settings.force_noise),
+    ];
+    read(section, keys)?;
+    let keys: [(&'static str, RangeInclusive<f64>, f64, &mut f64); 12] = [
+        ("tether_sd_m", METRES, 1.0, &mut settings.tether_sd_m),
+        ("tether_scale_sd", SMALL, 1.0, &mut settings.scale_sd),
+        ("depth_sd_m", METRES, 1.0, &mut settings.depth_sd_m),
+        ("depth_offset_sd_m", METRES, 1.0, &mut settings.depth_offset_sd_m),
+        ("heading_sd_deg", DEGREES, DEGREE, &mut settings.heading_sd_rad),
+        ("tilt_sd_deg", DEGREES, DEGREE, &mut settings.tilt_sd_rad),
+        ("attitude_sd_deg", DEGREES, DEGREE, &mut settings.attitude_sd_rad),
+        ("echo_sd_m", METRES, 1.0, &mut settings.echo_sd_m),
+        ("echo_beam_deg", DEGREES, DEGREE, &mut settings.echo_beam_rad),
+        ("return_sd_m", METRES, 1.0, &mut settings.return_sd_m),
+        ("return_beam_deg", DEGREES, DEGREE, &mut settings.return_beam_rad),
+        ("velocity_sd_mps", SMALL, 1.0, &mut settings.velocity_sd_mps),
+    ];
+    read(section, keys)?;
+    Ok(settings)
+}
+
+fn read<const N: usize>(
+    section: &Section<'_>,
+    keys: [(&'static str, RangeInclusive<f64>, f64, &mut f64); N],
+) -> Result<(), ConfigError> {
+    for (key, range, unit, slot) in keys {
+        if let Some(value) = section.number(key, range)? {
+            *slot = value * unit;
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,124 @@
+//! `[tunnel]` of a vehicle or scene file: a profile by name and dimensions, and a length.
+
+use headrace_config::{ConfigError, Loader, Section};
+use headrace_geometry::math;
+use headrace_geometry::tunnel::{Profile, Yz, shapes};
+
+/// The `[tunnel]` table.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TunnelConfig {
+    /// What the profile is called in the file.
+    pub name: String,
+    /// Design profile of the cross-section.
+    pub profile: Profile,
+    /// Length along the axis, m: chainage 0 at the portal to this.
+    pub length_m: f64,
+}
+
+impl TunnelConfig {
+    /// Reads a tunnel's table, without the keys that concern the site.
+    ///
+    /// Errors: the first key that is missing, unknown or out of range.
+    pub fn from_section(section: Section<'_>, load: Loader<'_>) -> Result<Self, ConfigError> {
+        let (name, profile) = parse(&section, load)?;
+        let length_m = section.number("length_m", 0.1..=1.0e5)?.unwrap_or(10_000.0);
+        section.finish()?;
+        Ok(Self { name, profile, length_m })
+    }
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Shape {
+    Ceran,
+    CeranBlueprint,
+    Rectangle,
+    Circle,
+    Arch,
+    TrimmedCircle,
+    Polyline,
+}
+
+const SHAPES: [(&str, Shape); 7] = [
+    ("ceran", Shape::Ceran),
+    ("ceran-blueprint", Shape::CeranBlueprint),
+    ("rectangle", Shape::Rectangle),
+    ("circle", Shape::Circle),
+    ("arch", Shape::Arch),
+    ("trimmed_circle", Shape::TrimmedCircle),
+    ("polyline", Shape::Polyline),
+];
+
+const DIMENSION_M: core::ops::RangeInclusive<f64> = 0.1..=200.0;
+
+/// Reads `profile` and its dimensions from a `[tunnel]` table; gives the profile's name too.
+///
+/// Errors: a key missing or out of range, or dimensions that make no profile.
+fn parse(section: &Section<'_>, load: Loader<'_>) -> Result<(String, Profile), ConfigError> {
+    let kind = section.required("profile", section.choice("profile", &SHAPES)?)?;
+    let name = section.text("profile")?.unwrap_or_default();
+    let dimension = |key| section.required(key, section.number(key, DIMENSION_M)?);
+    let profile = match kind {
+        Shape::Ceran => shapes::ceran(),
+        Shape::CeranBlueprint => shapes::ceran_blueprint(),
+        Shape::Rectangle => shapes::rectangle(dimension("width_m")?, dimension("height_m")?),
+        Shape::Circle => shapes::circle(dimension("radius_m")?),
+        Shape::Arch => {
+            let (width, height) = (dimension("width_m")?, dimension("height_m")?);
+            let radius = dimension("arch_radius_m")?;
+            if radius < width / 2.0 || radius - math::sqrt(radius * radius - width * width / 4.0) > height {
+                let problem = "must be at least width_m / 2, and the arc no higher than height_m";
+                return Err(section.invalid("arch_radius_m", problem));
+            }
+            shapes::arch(width, height, radius)
+        }
+        Shape::TrimmedCircle => {
+            let (radius, base) = (dimension("radius_m")?, dimension("base_m")?);
+            if base >= 2.0 * radius {
+                return Err(section.invalid("base_m", "must be less than 2 radius_m"));
+            }
+            shapes::trimmed_circle(radius, base)
+        }
+        Shape::Polyline => {
+            let file = section.required("file", section.text("file")?)?;
+            let reference = match section.numbers("reference_m", -200.0..=200.0)?.as_deref() {
+                None => None,
+                Some([y, z]) => Some([*y, *z]),
+                Some(_) => return Err(section.invalid("reference_m", "must be two numbers [y, z]")),
+            };
+            let text = load(&file).map_err(|why| section.invalid("file", &why))?;
+            let points = parse_points(&text).map_err(|why| section.invalid("file", &why))?;
+            Profile::polygon(&points, reference)
+        }
+    };
+    let profile = profile.map_err(|why| section.invalid("profile", &why.to_string()))?;
+    Ok((name, profile))
+}
+
+/// Reads a polyline: a line `y_m,z_m` a vertex; a first line of other text and lines that begin with # are passed over.
+fn parse_points(text: &str) -> Result<Vec<Yz>, String> {
+    let mut points = Vec::new();
+    for (number, line) in text.lines().enumerate() {
+        let line = line.trim();
+        if line.is_empty() || line.starts_with('#') {
+            continue;
+        }
+        let mut fields = line.split(',').map(|field| field.trim().parse::<f64>().ok());
+        match (fields.next().flatten(), fields.next().flatten(), fields.next()) {
+            (Some(y), Some(z), None) => points.push([y, z]),
+            _ if number == 0 => {}
+            _ => return Err(format!("line {} of it is {line:?}; wanted is y_m,z_m", number + 1)),
+        }
+    }
+    Ok(points)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_polyline_file_says_which_line_is_wrong() {
+        assert_eq!(parse_points("y_m,z_m\n1, 2\n# floor\n-1,2\n").unwrap(), [[1.0, 2.0], [-1.0, 2.0]]);
+        assert_eq!(parse_points("1,2\n3;4\n").unwrap_err(), "line 2 of it is \"3;4\"; wanted is y_m,z_m");
+    }
+}

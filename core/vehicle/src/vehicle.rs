@@ -1,0 +1,312 @@
+//! `VEHICLE.toml`: the vehicle, its sensors, the tunnel and the target.
+
+use core::cell::RefCell;
+
+use crate::Mission;
+use crate::NavigationConfig;
+use crate::coverage::CoverageConfig;
+use crate::tunnel::TunnelConfig;
+use headrace_config::{ConfigError, Document, Loader, Section};
+use headrace_coverage::StoreLayout;
+use headrace_fusion::Navigation;
+use headrace_geometry::frames::{Mount, Rot, Vec3};
+use headrace_geometry::site::Site;
+use headrace_geometry::time::DurNs;
+use headrace_sampling::SamplingError;
+use headrace_sampling::head::{HeadProgram, HeadSpec};
+use headrace_sampling::layout::{self, HeadLayout};
+use headrace_sampling::occlusion::Obstacle;
+use headrace_sensor::SensorConfig;
+use headrace_sensor::device::{Device, DeviceKind, Sense};
+
+/// A whole vehicle file, checked.
+pub struct VehicleConfig {
+    /// What people call the vehicle.
+    pub name: String,
+    /// Target T: the largest hole that passes, m.
+    pub target_m: f64,
+    /// Length of a section along the tunnel, m.
+    pub section_m: f64,
+    /// Water, gravity, levels.
+    pub site: Site,
+    /// The depth sensor whose temperature tells the speed of sound, in place of the site's.
+    pub sound_speed_from: Option<String>,
+    /// The tunnel.
+    pub tunnel: TunnelConfig,
+    /// How the heads share the work.
+    pub layout: HeadLayout,
+    /// The speed for which the heads' phases are set, m/s; zero sets them without regard to their places along the hull.
+    pub planned_speed_mps: f64,
+    /// Parts of the vehicle that may stand in a head's way.
+    pub hull: Vec<Obstacle>,
+    /// How the wall is judged.
+    pub coverage: CoverageConfig,
+    /// How it navigates.
+    pub navigation: NavigationConfig,
+    /// How long the dive may take.
+    pub dive_time: Option<DurNs>,
+    /// The sensors, in the order of the file, which is the order of their sources.
+    pub sensors: Vec<Box<dyn Device>>,
+    /// The common part of each sensor's table, in the same order.
+    pub sensor_configs: Vec<SensorConfig>,
+    /// Files that this one names, with their text: what a log needs to be replayed without them.
+    pub attachments: Vec<(String, String)>,
+}
+
+/// The `[water]` table and levels; see [`Site`].
+pub type WaterConfig = Site;
+
+const SENSOR_DISTANCE_M: core::ops::RangeInclusive<f64> = -20.0..=20.0;
+const DEGREES: core::ops::RangeInclusive<f64> = -360.0..=360.0;
+
+/// Bounds on what is allocated before a dive: some hundred megabytes of sections, and of cells of the wall.
+const MAX_SECTIONS: f64 = 400_000.0;
+const MAX_CELLS: f64 = 2e8;
+
+/// Cells of the wall that the sample store will have.
+fn wall_cells(tunnel: &TunnelConfig, target_m: f64) -> f64 {
+    let cell_m = StoreLayout::cell_for_target_m(target_m);
+    tunnel.length_m * tunnel.profile.perimeter_m() / (cell_m * cell_m)
+}
+
+impl VehicleConfig {
+    /// Parses and checks a vehicle file against the device kinds that this build has.
+    ///
+    /// Errors: the first key that is missing, unknown or out of range, with its line.
+    pub fn parse(
+        document: Document<'_>,
+        kinds: &[&dyn DeviceKind],
+        load: Loader<'_>,
+    ) -> Result<Self, ConfigError> {
+        let root = document.root()?;
+        let vehicle = Self::from_section(&root, kinds, load)?;
+        root.finish()?;
+        Ok(vehicle)
+    }
+
+    /// Like [`VehicleConfig::parse`], from a table that may hold other keys besides.
+    ///
+    /// Errors: as for [`VehicleConfig::parse`].
+    pub fn from_section(
+        root: &Section<'_>,
+        kinds: &[&dyn DeviceKind],
+        load: Loader<'_>,
+    ) -> Result<Self, ConfigError> {
+        let name = root.text("name")?.unwrap_or_else(|| "unnamed vehicle".to_owned());
+        let target_m = root.required("target_m", root.number("target_m", 0.01..=20.0)?)?;
+        let section_m = root.number("section_m", 0.05..=10.0)?.unwrap_or(0.25);
+        let tunnel_section = root.required("tunnel", root.section("tunnel")?)?;
+        let axis_yaw_rad = tunnel_section.number("axis_yaw_deg", DEGREES)?.unwrap_or(0.0).to_radians();
+        let attachments = RefCell::new(Vec::new());
+        let load = |name: &str| {
+            let text = load(name)?;
+            let mut attachments = attachments.borrow_mut();
+            if attachments.iter().all(|(attached, _)| attached != name) {
+                attachments.push((name.to_owned(), text.clone()));
+            }
+            Ok(text)
+        };
+        let tunnel = TunnelConfig::from_section(tunnel_section, &load)?;
+        if tunnel.length_m / section_m > MAX_SECTIONS || wall_cells(&tunnel, target_m) > MAX_CELLS {
+            let problem = "is too fine for so long a tunnel; make tunnel.length_m smaller, or this and section_m larger";
+            return Err(root.invalid("target_m", problem));
+        }
+        let (site, sound_speed_from) = match root.section("water")? {
+            Some(water) => parse_water(water, axis_yaw_rad)?,
+            None => (Site { axis_yaw_rad, ..Site::default() }, None),
+        };
+        let navigation = NavigationConfig::parse(root.section("navigation")?)?;
+        let coverage = CoverageConfig::from_root(root, &tunnel.profile, target_m)?;
+        let dive_time = root.number("dive_hours", 0.01..=1000.0)?;
+        let hull = root.sections("hull")?.into_iter().map(parse_hull).collect::<Result<Vec<_>, _>>()?;
+        let mut sensors = Vec::new();
+        let mut sensor_configs: Vec<SensorConfig> = Vec::new();
+        for section in root.sections("sensors")? {
+            let (config, device) = parse_sensor(section.with_files(&load), &sensor_configs, kinds)?;
+            sensors.push(device);
+            sensor_configs.push(config);
+        }
+        if sensors.is_empty() {
+            return Err(
+                root.invalid("sensors", "has no sensor; at least one table headed [[sensors]] is needed")
+            );
+        }
+        let (layout, planned_speed_mps) = match root.section("heads")? {
+            Some(section) => parse_heads(section, &sensors)?,
+            None => (HeadLayout::PhaseShift, 0.0),
+        };
+        check_heads(root, &sensors, &hull)?;
+        check_sound(root, sound_speed_from.as_deref(), &sensors, &sensor_configs)?;
+        Ok(Self {
+            name,
+            target_m,
+            section_m,
+            site,
+            sound_speed_from,
+            tunnel,
+            layout,
+            planned_speed_mps,
+            hull,
+            coverage,
+            navigation,
+            dive_time: dive_time.map(|hours| DurNs::from_secs_f64(hours * 3600.0)),
+            sensors,
+            sensor_configs,
+            attachments: attachments.into_inner(),
+        })
+    }
+}
+
+impl VehicleConfig {
+    /// What a loop works for with this vehicle.
+    pub fn mission(&self) -> Mission {
+        Mission {
+            profile: self.tunnel.profile.clone(),
+            site: self.site,
+            sound_speed_from: self.sound_speed_from.clone(),
+            target_m: self.target_m,
+            section_m: self.section_m,
+            length_m: self.tunnel.length_m,
+            layout: self.layout,
+            hull: self.hull.clone(),
+            coverage: self.coverage.clone(),
+            dive_time: self.dive_time,
+        }
+    }
+
+    /// Navigation at the start of a dive.
+    pub fn navigation(&self) -> Box<dyn Navigation> {
+        self.navigation.begin(&self.tunnel.profile, self.site)
+    }
+
+    /// What the heads do, in the order of the file; none without heads.
+    ///
+    /// Errors: heads that no program fits.
+    pub fn programs(&self) -> Result<Vec<HeadProgram>, SamplingError> {
+        let heads = self.heads();
+        if heads.is_empty() {
+            return Ok(Vec::new());
+        }
+        layout::programs(&heads, self.layout, self.planned_speed_mps)
+    }
+
+    /// The profiling heads, in the order of the file.
+    pub fn heads(&self) -> Vec<HeadSpec> {
+        self.sensors.iter().filter_map(|sensor| sensor.head()).collect()
+    }
+}
+
+fn parse_water(section: Section<'_>, axis_yaw_rad: f64) -> Result<(Site, Option<String>), ConfigError> {
+    let usual = Site::default();
+    let or = |value: Option<f64>, default| value.unwrap_or(default);
+    let site = Site {
+        sound_speed_mps: or(section.number("sound_speed_mps", 1300.0..=1700.0)?, usual.sound_speed_mps),
+        density_kgpm3: or(section.number("density_kgpm3", 900.0..=1100.0)?, usual.density_kgpm3),
+        gravity_mps2: or(section.number("gravity_mps2", 9.7..=9.9)?, usual.gravity_mps2),
+        surface_pressure_pa: or(
+            section.number("surface_pressure_pa", Site::SURFACE_PRESSURE_PA)?,
+            usual.surface_pressure_pa,
+        ),
+        surface_above_floor_m: or(
+            section.number("surface_above_floor_m", 0.0..=1000.0)?,
+            usual.surface_above_floor_m,
+        ),
+        axis_yaw_rad,
+    };
+    let sound_speed_from = section.text("sound_speed_from")?;
+    section.finish()?;
+    Ok((site, sound_speed_from))
+}
+
+fn parse_hull(section: Section<'_>) -> Result<Obstacle, ConfigError> {
+    let corner = |key: &'static str| section.required(key, section.triple(key, SENSOR_DISTANCE_M)?);
+    let (least, most) = (corner("least_m")?, corner("most_m")?);
+    if least.iter().zip(&most).any(|(least, most)| least >= most) {
+        return Err(section.invalid("most_m", "must be larger than least_m in each of x, y, z"));
+    }
+    section.finish()?;
+    let point = |[x, y, z]: [f64; 3]| Vec3::new(x, y, z);
+    Ok(Obstacle::Box { least: point(least), most: point(most) })
+}
+
+/// That the sensor that is to tell the speed of sound is there, and feels the water.
+fn check_sound(
+    root: &Section<'_>,
+    told_by: Option<&str>,
+    sensors: &[Box<dyn Device>],
+    configs: &[SensorConfig],
+) -> Result<(), ConfigError> {
+    let Some(id) = told_by else { return Ok(()) };
+    let told_by = configs.iter().zip(sensors).find(|(config, _)| config.id == id);
+    if told_by.is_some_and(|(_, sensor)| sensor.sense() == Sense::Depth) {
+        return Ok(());
+    }
+    let problem =
+        format!("sound_speed_from = {id:?} names no depth sensor of this file; it must be the id of one");
+    Err(root.invalid("water", &problem))
+}
+
+/// That there are no more heads than tables hold, and that none is inside a box of the hull, which it would see through.
+fn check_heads(
+    root: &Section<'_>,
+    sensors: &[Box<dyn Device>],
+    hull: &[Obstacle],
+) -> Result<(), ConfigError> {
+    let heads: Vec<HeadSpec> = sensors.iter().filter_map(|sensor| sensor.head()).collect();
+    if !heads.is_empty() {
+        HeadLayout::PhaseShift.check(heads.len()).map_err(|why| root.invalid("sensors", &why.to_string()))?;
+    }
+    for (number, part) in hull.iter().enumerate() {
+        if heads.iter().any(|head| part.holds(head.mount.position)) {
+            let problem = format!(
+                "box {number} (from 0) has a profiling head inside; a head must be clear of the hull"
+            );
+            return Err(root.invalid("hull", &problem));
+        }
+    }
+    Ok(())
+}
+
+fn parse_heads(section: Section<'_>, sensors: &[Box<dyn Device>]) -> Result<(HeadLayout, f64), ConfigError> {
+    let layout = section.choice("layout", &HeadLayout::NAMES)?.unwrap_or(HeadLayout::PhaseShift);
+    if layout == HeadLayout::SectorOffset {
+        let heads = sensors.iter().filter(|sensor| sensor.head().is_some()).count();
+        layout.check(heads).map_err(|why| section.invalid("layout", &why.to_string()))?;
+    }
+    let speed = section.number("planned_speed_mps", 0.0..=5.0)?.unwrap_or(0.0);
+    section.finish()?;
+    Ok((layout, speed))
+}
+
+fn parse_sensor(
+    section: Section<'_>,
+    before: &[SensorConfig],
+    kinds: &[&dyn DeviceKind],
+) -> Result<(SensorConfig, Box<dyn Device>), ConfigError> {
+    let id = section.required("id", section.text("id")?)?;
+    let simple = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+    if id.is_empty() || id.len() > 32 || !id.chars().all(simple) {
+        return Err(section.invalid("id", "must be 1 to 32 letters, digits, _ or -"));
+    }
+    if before.iter().any(|other| other.id == id) {
+        return Err(section.invalid("id", "is the id of an earlier sensor; ids must differ"));
+    }
+    let choices: Vec<(&str, usize)> = kinds.iter().enumerate().map(|(i, kind)| (kind.name(), i)).collect();
+    let index = section.required("plugin", section.choice("plugin", &choices)?)?;
+    let position = section.triple("position_m", SENSOR_DISTANCE_M)?.unwrap_or_default();
+    let angles = section.triple("angles_deg", DEGREES)?.unwrap_or_default().map(f64::to_radians);
+    let config = SensorConfig {
+        id,
+        plugin: kinds.get(index).map(|kind| kind.name().to_owned()).unwrap_or_default(),
+        connect: section.text("connect")?.unwrap_or_default(),
+        mount: Mount {
+            position: Vec3::new(position[0], position[1], position[2]),
+            rotation: Rot::from_roll_pitch_yaw(angles[0], angles[1], angles[2]),
+        },
+        latency: DurNs::from_secs_f64(section.number("latency_ms", 0.0..=1000.0)?.unwrap_or(0.0) / 1000.0),
+    };
+    let kind = kinds.get(index).ok_or_else(|| section.invalid("plugin", "is not in this build"))?;
+    let device = kind.configure(&config, &section)?;
+    section.finish()?;
+    Ok((config, device))
+}

@@ -1,0 +1,317 @@
+//! Robust least squares of the vehicle's place and of how its heads sit, against the design profile.
+//!
+//! Gauss-Newton, each round a recursive fit: [`Factors`] start with what is known beforehand and take one return after the
+//! other, so that what returns can't tell stays at the vehicle file's, with its own uncertainty.
+
+use super::median;
+use super::scan::{EchoScan, HeadScan, Return};
+use headrace_fusion::filter::factors::Factors;
+use headrace_fusion::filter::measure::{self, Beam, Row};
+use headrace_fusion::filter::settings::Settings;
+use headrace_fusion::filter::state::{ATTITUDE, POSITION, State, rotation, vec};
+use headrace_geometry::frames::{Body, Mount, Point3, Rot, Sensor, Tunnel, Vec3, head_direction};
+use headrace_geometry::math;
+use headrace_geometry::tunnel::Profile;
+
+/// Unknowns that all heads share: the vehicle's y and z, m; the rotation vector that takes the inertial unit's attitude to
+/// the true one, radians; the share by which ranges are too long.
+pub const COMMON: usize = 6;
+/// Unknowns of each head: its angle about its own axis, radians; how far left and up of the file's place it sits, m.
+pub const OWN: usize = 3;
+
+/// The vehicle may be anywhere in the section.
+const PLACE_SD_M: f64 = 10.0;
+/// What a unit at rest is off by in roll and pitch. Source: data sheets of MEMS units, static accuracy 0.2 degrees.
+const TILT_SD_RAD: f64 = 0.2 * DEGREE;
+/// Share by which a speed of sound from tables is off: 1 degree of water temperature.
+const SCALE_SD: f64 = 0.003;
+/// How far off a vehicle file's mounts are: a tape measure on a round hull, and a head's bracket.
+pub const ANGLE_SD_RAD: f64 = 10.0 * DEGREE;
+/// See [`ANGLE_SD_RAD`].
+pub const OFFSET_SD_M: f64 = 0.05;
+const DEGREE: f64 = core::f64::consts::PI / 180.0;
+
+/// Returns are never taken for better than this, m: walls are rough.
+const LEAST_SCALE_M: f64 = 0.01;
+/// Residuals beyond these many scales count less, and not at all. Source: the usual constants of Huber and Tukey.
+const HUBER: f64 = 1.5;
+const TUKEY: f64 = 4.685;
+/// Rounds before Tukey's weights: they need a good start.
+const HUBER_ROUNDS: usize = 3;
+/// What one piece of wall may cost at most, and one that a beam grazes or misses, in squared standard deviations.
+const MOST_COST: f64 = 9.0;
+const MISSED_COST: f64 = 4.5;
+/// The same of an echosounder: there are few, and they tell the sides apart.
+const MOST_ECHO_COST: f64 = 100.0;
+/// No step turns a head by more, radians.
+const MOST_STEP_RAD: f64 = 0.2;
+
+/// What is to be fitted.
+#[derive(Debug, Clone, Copy)]
+pub struct Problem<'a> {
+    /// The design.
+    pub profile: &'a Profile,
+    /// How far sonars are trusted.
+    pub settings: &'a Settings,
+    /// The heads, at most as many as there are unknowns for.
+    pub heads: &'a [HeadScan],
+    /// Echosounders.
+    pub echoes: &'a [EchoScan],
+    /// How the vehicle hung while these were heard.
+    pub attitude: Rot<Tunnel, Body>,
+    /// For each head, whether it turns the other way round than the file says.
+    pub mirrored: &'a [bool],
+    /// Every so many returns are looked at.
+    pub stride: usize,
+}
+
+/// What came of it. Unknowns as [`COMMON`] and then, for each head, [`OWN`] say.
+#[derive(Debug, Clone, Copy)]
+pub struct Fit<const N: usize> {
+    /// The unknowns.
+    pub x: [f64; N],
+    /// Their covariance.
+    pub factors: Factors<N>,
+    /// How badly returns, echoes and what is known beforehand agree, in squared standard deviations.
+    pub cost: f64,
+    /// Robust standard deviation of the residuals, m.
+    pub scale_m: f64,
+}
+
+/// A return against what it should be.
+#[derive(Debug, Clone, Copy)]
+pub struct Residual<const N: usize> {
+    /// Number of its head.
+    pub head: usize,
+    /// Its share of its piece of wall.
+    pub share: f64,
+    /// Measured less expected, m; `None` where the beam grazes the wall or meets none.
+    pub row: Option<([f64; N], f64)>,
+}
+
+/// The unknown number `i` of head `head`.
+pub fn own(head: usize, i: usize) -> usize {
+    COMMON + OWN * head + i
+}
+
+fn at<const N: usize>(x: &[f64; N], i: usize) -> f64 {
+    x.get(i).copied().unwrap_or(0.0)
+}
+
+fn add<const N: usize>(x: &mut [f64; N], i: usize, value: f64) {
+    if let Some(slot) = x.get_mut(i) {
+        *slot += value;
+    }
+}
+
+/// The mount of a head whose angle about its axis and whose place are off by these, and which perhaps turns the other way.
+pub fn moved(mount: &Mount, [angle_rad, left_m, up_m]: [f64; 3], is_mirrored: bool) -> Mount {
+    let turned: Rot<Body, Sensor> = mount.rotation * about_x(angle_rad);
+    // Seen from the other side, angles grow the other way round.
+    let yaw = if is_mirrored { math::PI } else { 0.0 };
+    Mount {
+        position: mount.position + Vec3::new(0.0, left_m, up_m),
+        rotation: turned * Rot::<Sensor, Sensor>::from_roll_pitch_yaw(0.0, 0.0, yaw),
+    }
+}
+
+fn about_x(angle_rad: f64) -> Rot<Sensor, Sensor> {
+    Rot::from_roll_pitch_yaw(angle_rad, 0.0, 0.0)
+}
+
+impl Problem<'_> {
+    /// Standard deviations of what is known beforehand.
+    fn known<const N: usize>(&self) -> [f64; N] {
+        let yaw = self.settings.heading.reach;
+        let common = [PLACE_SD_M, PLACE_SD_M, TILT_SD_RAD, TILT_SD_RAD, yaw, SCALE_SD];
+        let of_head = [ANGLE_SD_RAD, OFFSET_SD_M, OFFSET_SD_M];
+        let mut all = common.into_iter().chain(of_head.into_iter().cycle());
+        core::array::from_fn(|_| all.next().unwrap_or(1.0))
+    }
+
+    /// Fits from `start`, in so many rounds.
+    pub fn fit<const N: usize>(&self, start: [f64; N], rounds: usize) -> Fit<N> {
+        let known = self.known::<N>();
+        let mut prior = start;
+        // Only the place is known by where the fit starts; all else is as the file says.
+        prior.iter_mut().skip(2).for_each(|slot| *slot = 0.0);
+        let mut x = start;
+        let mut factors = Factors::independent(known.map(|sd| sd * sd));
+        let mut scale_m = LEAST_SCALE_M;
+        for round in 0..rounds {
+            let residuals = self.residuals(&x);
+            scale_m = scale(&residuals);
+            factors = Factors::independent(known.map(|sd| sd * sd));
+            let mut step: [f64; N] = core::array::from_fn(|i| at(&prior, i) - at(&x, i));
+            let mut take = |h: &[f64; N], residual: f64, variance: f64| {
+                let shown: f64 = h.iter().zip(&step).map(|(h, e)| h * e).sum();
+                let gain = factors.measure(h, variance);
+                for (e, k) in step.iter_mut().zip(&gain.k) {
+                    *e += k * (residual - shown);
+                }
+            };
+            for residual in &residuals {
+                let Some((h, off_m)) = &residual.row else { continue };
+                let weight = residual.share * weight(off_m / scale_m, round >= HUBER_ROUNDS);
+                if weight > 1e-3 * residual.share {
+                    take(h, *off_m, scale_m * scale_m / weight);
+                }
+            }
+            for (h, off_m, variance) in self.echo_rows(&x) {
+                let weight = weight(off_m / math::sqrt(variance), false);
+                take(&h, off_m, variance / weight);
+            }
+            self.go(&mut x, &step);
+            if round > HUBER_ROUNDS && step.iter().all(|e| e.abs() < 1e-7) {
+                break;
+            }
+        }
+        let cost = self.cost(&x, &prior, &known);
+        Fit { x, factors, cost, scale_m }
+    }
+
+    /// Takes a step, less of it where it would turn a head too far or leave the tunnel.
+    fn go<const N: usize>(&self, x: &mut [f64; N], step: &[f64; N]) {
+        let turns = (0..self.heads.len()).map(|head| at(step, own(head, 0)).abs());
+        let most_rad = turns.fold(0.0, f64::max);
+        let mut share = if most_rad > MOST_STEP_RAD { MOST_STEP_RAD / most_rad } else { 1.0 };
+        for _ in 0..8 {
+            if self.profile.contains([at(x, 0) + share * at(step, 0), at(x, 1) + share * at(step, 1)]) {
+                for (x, e) in x.iter_mut().zip(step) {
+                    *x += share * e;
+                }
+                return;
+            }
+            share /= 2.0;
+        }
+    }
+
+    /// All returns against what they should be.
+    pub fn residuals<const N: usize>(&self, x: &[f64; N]) -> Vec<Residual<N>> {
+        let mut all = Vec::new();
+        for (head, scan) in self.heads.iter().enumerate() {
+            let is_mirrored = self.mirrored.get(head).copied().unwrap_or(false);
+            for one in scan.returns.iter().step_by(self.stride.max(1)) {
+                let row = self.row(x, head, &scan.mount, one, is_mirrored);
+                all.push(Residual { head, share: one.share * self.stride.max(1) as f64, row });
+            }
+        }
+        all
+    }
+
+    fn row<const N: usize>(
+        &self,
+        x: &[f64; N],
+        head: usize,
+        mount: &Mount,
+        one: &Return,
+        is_mirrored: bool,
+    ) -> Option<([f64; N], f64)> {
+        let [angle_rad, left_m, up_m] = [0, 1, 2].map(|i| at(x, own(head, i)));
+        let rotation = mount.rotation * about_x(angle_rad);
+        let looks = head_direction(if is_mirrored { -one.angle_rad } else { one.angle_rad });
+        let offset = mount.position + Vec3::new(0.0, left_m, up_m);
+        let beam = Beam {
+            offset,
+            along: rotation * looks,
+            first_rad: self.settings.return_beam_rad / 2.0,
+            unsure_rad: 0.0,
+        };
+        let state = state(x, one.attitude);
+        let (mut h, row) = self.common_row(x, &state, &beam, one.range_m, 1.0)?;
+        let place = vec::<Tunnel>(&row.h, POSITION);
+        // The beam turns about the head's axis, and its origin stays.
+        let swing = vec::<Tunnel>(&row.h, ATTITUDE) + -(state.attitude * offset).cross(&place);
+        let [axis, left, up] =
+            [rotation * Vec3::new(1.0, 0.0, 0.0), Vec3::new(0.0, 1.0, 0.0), Vec3::new(0.0, 0.0, 1.0)];
+        add(&mut h, own(head, 0), swing.dot(&(state.attitude * axis)));
+        add(&mut h, own(head, 1), place.dot(&(state.attitude * left)));
+        add(&mut h, own(head, 2), place.dot(&(state.attitude * up)));
+        Some((h, row.residual))
+    }
+
+    /// A range as the filter sees it, by the unknowns that all sonars share.
+    fn common_row<const N: usize>(
+        &self,
+        x: &[f64; N],
+        state: &State,
+        beam: &Beam,
+        range_m: f64,
+        sd_m: f64,
+    ) -> Option<([f64; N], Row)> {
+        let range_m = range_m / (1.0 + at(x, 5));
+        let row = measure::range(state, self.profile, beam, range_m, sd_m)?;
+        let mut h = [0.0; N];
+        for (i, from) in
+            [POSITION + 1, POSITION + 2, ATTITUDE, ATTITUDE + 1, ATTITUDE + 2].into_iter().enumerate()
+        {
+            add(&mut h, i, at(&row.h, from));
+        }
+        add(&mut h, 5, range_m - row.residual);
+        Some((h, row))
+    }
+
+    /// Echosounders: derivatives, residual and variance, that of their own mounts included.
+    fn echo_rows<const N: usize>(&self, x: &[f64; N]) -> Vec<([f64; N], f64, f64)> {
+        let state = state(x, self.attitude);
+        let row = |echo: &EchoScan| {
+            let beam = Beam {
+                offset: echo.mount.position,
+                along: echo.mount.rotation * Vec3::new(1.0, 0.0, 0.0),
+                first_rad: 0.0,
+                unsure_rad: self.settings.echo_beam_rad / 2.0,
+            };
+            let sd_m = math::hypot(self.settings.echo_sd_m, OFFSET_SD_M);
+            let (h, row) = self.common_row(x, &state, &beam, echo.range_m, sd_m)?;
+            Some((h, row.residual, row.noise))
+        };
+        self.echoes.iter().filter_map(row).collect()
+    }
+
+    fn cost<const N: usize>(&self, x: &[f64; N], prior: &[f64; N], known: &[f64; N]) -> f64 {
+        let sd_m = self.settings.return_sd_m;
+        let of_return = |residual: &Residual<N>| {
+            let cost =
+                residual.row.map_or(MISSED_COST, |(_, off_m)| (off_m * off_m / sd_m / sd_m).min(MOST_COST));
+            residual.share * cost
+        };
+        let returns: f64 = self.residuals(x).iter().map(of_return).sum();
+        let of_echo =
+            |(_, off_m, variance): ([f64; N], f64, f64)| (off_m * off_m / variance).min(MOST_ECHO_COST);
+        let echoes: f64 = self.echo_rows(x).into_iter().map(of_echo).sum();
+        let square = |i: usize| (at(x, i) - at(prior, i)) / at(known, i);
+        let beforehand: f64 = (2..N).map(|i| square(i) * square(i)).sum();
+        returns + echoes + beforehand
+    }
+}
+
+/// The vehicle by the unknowns, its body's origin in the place of the inertial unit.
+fn state<const N: usize>(x: &[f64; N], attitude: Rot<Tunnel, Body>) -> State {
+    let turn = rotation(Vec3::<Tunnel>::new(at(x, 2), at(x, 3), at(x, 4)));
+    State::at_rest(Point3::new(0.0, at(x, 0), at(x, 1)), turn * attitude)
+}
+
+/// Robust standard deviation of residuals, from the median of their sizes.
+fn scale<const N: usize>(residuals: &[Residual<N>]) -> f64 {
+    let mut sizes: Vec<f64> =
+        residuals.iter().filter_map(|residual| residual.row.map(|(_, off_m)| off_m.abs())).collect();
+    // Of normal numbers half are within 0.6745 standard deviations.
+    (median(&mut sizes).unwrap_or(0.0) / 0.6745).max(LEAST_SCALE_M)
+}
+
+fn weight(off: f64, is_near: bool) -> f64 {
+    let size = off.abs();
+    if is_near {
+        let inside = 1.0 - (size / TUKEY) * (size / TUKEY);
+        if size < TUKEY { inside * inside } else { 0.0 }
+    } else if size > HUBER {
+        HUBER / size
+    } else {
+        1.0
+    }
+}
+
+/// Whether a residual of this size is an outlier at this scale.
+pub fn is_outlier(off_m: f64, scale_m: f64) -> bool {
+    off_m.abs() > TUKEY * scale_m
+}

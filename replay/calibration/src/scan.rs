@@ -1,0 +1,179 @@
+//! What was heard of the wall while the vehicle stood still.
+
+use std::collections::BTreeMap;
+
+use super::still::Still;
+use super::{Material, Untold, median};
+use headrace_fusion::filter::running::in_tunnel;
+use headrace_geometry::frames::{Body, Mount, Rot, Tunnel};
+use headrace_geometry::math::{self, TAU};
+use headrace_geometry::time::MonoNs;
+use headrace_monitor::flow::Event;
+use headrace_sensor::device::{SensorInfo, SensorKind};
+use headrace_sensor::reading::Reading;
+
+/// Returns nearer together than this see the same roughness of the wall: together they count as one.
+pub(super) const SAME_WALL_RAD: f64 = TAU / SECTORS as f64;
+const SECTORS: usize = 120;
+/// More returns than these of one piece of wall say nothing new.
+const MOST_OF_A_SECTOR: usize = 8;
+
+/// A return of a head.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Return {
+    /// Where the head said that it looked, in its own frame, radians.
+    pub angle_rad: f64,
+    /// Range at the site's speed of sound, m.
+    pub range_m: f64,
+    /// How the vehicle hung then.
+    pub attitude: Rot<Tunnel, Body>,
+    /// Its share of what is known of its piece of wall.
+    pub share: f64,
+}
+
+/// All returns of a head.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HeadScan {
+    /// The source.
+    pub source: usize,
+    /// How it sits by the vehicle file.
+    pub mount: Mount,
+    /// Its returns.
+    pub returns: Vec<Return>,
+}
+
+/// What an echosounder said.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EchoScan {
+    /// How it sits by the vehicle file.
+    pub mount: Mount,
+    /// The middle one of its ranges, at the site's speed of sound, m.
+    pub range_m: f64,
+}
+
+/// See the module's description.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scan {
+    /// How the vehicle hung in the middle of the time.
+    pub attitude: Rot<Tunnel, Body>,
+    /// The heads that heard the wall.
+    pub heads: Vec<HeadScan>,
+    /// The echosounders that heard it.
+    pub echoes: Vec<EchoScan>,
+}
+
+impl HeadScan {
+    /// How much of the wall it has seen, radians of its own turn.
+    pub fn seen_rad(&self) -> f64 {
+        let mut seen = [false; SECTORS];
+        for one in &self.returns {
+            if let Some(slot) = seen.get_mut(sector(one.angle_rad)) {
+                *slot = true;
+            }
+        }
+        seen.iter().filter(|seen| **seen).count() as f64 * SAME_WALL_RAD
+    }
+
+    /// Leaves out what says nothing new, and shares out what is left.
+    fn thin(&mut self) {
+        let mut counts = [0_usize; SECTORS];
+        for one in &self.returns {
+            if let Some(count) = counts.get_mut(sector(one.angle_rad)) {
+                *count += 1;
+            }
+        }
+        let mut passed = [0_usize; SECTORS];
+        let mut kept = [0_usize; SECTORS];
+        self.returns.retain(|one| {
+            let of = sector(one.angle_rad);
+            let (Some(count), Some(passed), Some(kept)) =
+                (counts.get(of), passed.get_mut(of), kept.get_mut(of))
+            else {
+                return false;
+            };
+            let keep = (*passed).is_multiple_of(count.div_ceil(MOST_OF_A_SECTOR));
+            *passed += 1;
+            *kept += usize::from(keep);
+            keep
+        });
+        for one in &mut self.returns {
+            let count = kept.get(sector(one.angle_rad)).copied().unwrap_or(1);
+            one.share = 1.0 / count.max(1) as f64;
+        }
+    }
+}
+
+fn sector(angle_rad: f64) -> usize {
+    let sector = math::floor_to_i64(math::wrap(angle_rad, TAU) / SAME_WALL_RAD);
+    usize::try_from(sector).unwrap_or(0).min(SECTORS - 1)
+}
+
+/// Gathers what was heard during a stand.
+///
+/// Errors: no attitude, or no head that heard the wall.
+pub fn gather(material: &Material<'_>, still: &Still) -> Result<Scan, Untold> {
+    let attitudes = attitudes(material, still);
+    let middle = attitudes.get(attitudes.len() / 2);
+    let (_, attitude) = *middle.ok_or(Untold::Missing { what: "an inertial unit's attitude" })?;
+    let heads = heads(material, still, &attitudes);
+    if heads.is_empty() {
+        return Err(Untold::Missing { what: "any profiling head" });
+    }
+    Ok(Scan { attitude, heads, echoes: echoes(material, still) })
+}
+
+/// How the vehicle hung, by time.
+fn attitudes(material: &Material<'_>, still: &Still) -> Vec<(MonoNs, Rot<Tunnel, Body>)> {
+    let attitude = |(event, sensor): (&Event, &SensorInfo)| match (sensor.kind, event.reading) {
+        (SensorKind::Imu, Reading::Attitude(level)) => {
+            let attitude = in_tunnel(&material.site, level) * sensor.mount.rotation.inverse();
+            Some((event.valid_at, attitude))
+        }
+        _ => None,
+    };
+    material.during(still.from, still.to).filter_map(attitude).collect()
+}
+
+/// The heads that heard the wall, by source.
+fn heads(material: &Material<'_>, still: &Still, attitudes: &[(MonoNs, Rot<Tunnel, Body>)]) -> Vec<HeadScan> {
+    let mut heads: BTreeMap<usize, HeadScan> = BTreeMap::new();
+    for (event, sensor) in material.during(still.from, still.to) {
+        let (SensorKind::Head, Reading::Sonar(sonar)) = (sensor.kind, event.reading) else { continue };
+        let before = attitudes.partition_point(|(at, _)| *at <= event.valid_at).saturating_sub(1);
+        let (Some(range_m), Some((_, attitude)), true) =
+            (sonar.range_m, attitudes.get(before), event.reading.is_finite())
+        else {
+            continue;
+        };
+        let range_m = material.site.rescaled_range_m(range_m, sonar.sound_speed_mps);
+        let source = event.source.index();
+        let head = heads.entry(source).or_insert_with(|| HeadScan {
+            source,
+            mount: sensor.mount,
+            returns: Vec::new(),
+        });
+        head.returns.push(Return { angle_rad: sonar.angle_rad, range_m, attitude: *attitude, share: 1.0 });
+    }
+    heads.values_mut().for_each(HeadScan::thin);
+    heads.into_values().collect()
+}
+
+/// The echosounders that heard the wall, by source.
+fn echoes(material: &Material<'_>, still: &Still) -> Vec<EchoScan> {
+    let mut heard: BTreeMap<usize, (Mount, Vec<f64>)> = BTreeMap::new();
+    for (event, sensor) in material.during(still.from, still.to) {
+        let (SensorKind::Echosounder { min_confidence }, Reading::Echo(echo)) = (sensor.kind, event.reading)
+        else {
+            continue;
+        };
+        let is_sure = echo.confidence >= min_confidence && event.reading.is_finite();
+        if let (Some(range_m), true) = (echo.range_m, is_sure) {
+            let range_m = material.site.rescaled_range_m(range_m, echo.sound_speed_mps);
+            heard.entry(event.source.index()).or_insert((sensor.mount, Vec::new())).1.push(range_m);
+        }
+    }
+    let middle = |(mount, mut ranges_m): (Mount, Vec<f64>)| {
+        median(&mut ranges_m).map(|range_m| EchoScan { mount, range_m })
+    };
+    heard.into_values().filter_map(middle).collect()
+}

@@ -1,0 +1,64 @@
+//! Rows of returns against central differences.
+
+use super::super::fit::{COMMON, OWN, Problem};
+use super::super::scan::gather;
+use super::super::still::longest;
+use super::stand::{Stand, Wrong, profiles};
+use headrace_fusion::filter::settings::Settings;
+
+const N: usize = COMMON + 2 * OWN;
+const STEP: f64 = 1e-6;
+
+/// Of a narrow beam rows are exact but at a wall's edges, where a ray of a difference may be on the other side. Turns are
+/// taken for small: derivatives by them hold at none.
+#[test]
+fn verif_every_derivative() {
+    for (name, profile) in profiles() {
+        let wrong = [Wrong::default(), Wrong { is_mirrored: true, ..Wrong::default() }];
+        let stand = Stand::new(profile, &wrong, 1);
+        stand.ask(|material| {
+            let scan = gather(material, &longest(material).unwrap()).unwrap();
+            let settings = Settings { return_beam_rad: 1e-9, ..stand.settings };
+            let problem = Problem {
+                profile: material.profile,
+                settings: &settings,
+                heads: &scan.heads,
+                echoes: &scan.echoes,
+                attitude: scan.attitude,
+                mirrored: &[false, true],
+                stride: 3,
+            };
+            let x: [f64; N] = [0.5, 2.2, 0.0, 0.0, 0.0, 0.01, 0.1, 0.02, -0.03, -0.2, 0.04, 0.01];
+            let residuals = |i: usize, by: f64| {
+                let mut x = x;
+                x[i] += by;
+                problem.residuals(&x)
+            };
+            let rows = problem.residuals(&x);
+            let (mut compared, mut edges) = (0, 0);
+            for i in 0..N {
+                let (less, more) = (residuals(i, -STEP), residuals(i, STEP));
+                for ((row, less), more) in rows.iter().zip(&less).zip(&more) {
+                    let (Some((h, off)), Some((_, less)), Some((_, more))) = (row.row, less.row, more.row)
+                    else {
+                        continue;
+                    };
+                    let difference = (less - more) / (2.0 * STEP);
+                    let kink = ((more - off) - (off - less)).abs() / STEP;
+                    if kink > 1e-3 {
+                        edges += 1;
+                        continue;
+                    }
+                    // Of the scale a row has the expected range in place of the measured one, which is as much at the end.
+                    let expected = if i == 5 { (h[5] + off) / (1.0 + x[5]) } else { h[i] };
+                    assert!(
+                        (difference - expected).abs() < 1e-4,
+                        "{name}, {i}: {difference}, not {expected}"
+                    );
+                    compared += 1;
+                }
+            }
+            assert!(compared > 1000 && edges < 20, "{name}: {compared}, {edges}");
+        });
+    }
+}
