@@ -8,6 +8,8 @@
 )]
 
 mod common;
+#[path = "common/skipped.rs"]
+mod skipped;
 
 use std::io::Write as _;
 use std::process::{Command, Stdio};
@@ -186,7 +188,7 @@ fn a_log_copied_with_python_has_the_same_digest() {
     if python(&["-"], "import importlib.util, sys; sys.exit(importlib.util.find_spec('mcap') is None)")
         != Some(true)
     {
-        eprintln!("skipped: python3 with the package mcap is not there");
+        skipped::skipped("python3 with the package mcap is not there");
         return;
     }
     assert_eq!(python(&["-"], COPY), Some(true), "copying with Python");

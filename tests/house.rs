@@ -126,6 +126,18 @@ fn no_file_is_long() {
     }
 }
 
+/// Of passed tests cargo shows nothing that they print, and `.ci/count-skipped` couldn't count it.
+#[test]
+fn what_is_skipped_is_said_by_the_one_helper() {
+    // In pieces, so that this file isn't found.
+    let printed = ["println!(\"", "skipped: "].concat();
+    for folder in ["src", "core", "plugins", "replay", "experiments", "tests"] {
+        for (path, text) in sources(&root().join(folder)) {
+            assert!(!text.contains(&printed), "{}: use tests/common/skipped.rs", path.display());
+        }
+    }
+}
+
 #[test]
 fn every_crate_says_what_it_is() {
     for (name, package) in crates() {

@@ -1,5 +1,5 @@
-//! val: foreign logs become ours, and the ordinary decoders read them. Recordings of others are in `../shared/data`; what needs
-//! them is skipped where they are absent.
+//! val: foreign logs become ours, and the ordinary decoders read them. Recordings of others are in `recordings/`, trimmed;
+//! where `HEADRACE_RECORDINGS` is set, they are read at full length, too.
 
 #![allow(
     clippy::unwrap_used,
@@ -8,6 +8,8 @@
 )]
 
 mod common;
+#[path = "common/recordings.rs"]
+mod recordings;
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -15,7 +17,7 @@ use std::path::Path;
 use common::{Answer, Folder, VEHICLE, raw_messages};
 use serde_json::Value;
 
-const DATA: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data/");
+const TELEMETRY: &str = "bluerov2_ardusub_logs/small.tlog";
 
 const TUNNEL: &str = r#"name = "BlueROV2"
 target_m = 1
@@ -48,15 +50,6 @@ mode = "fastest"
 range_m = 10
 "#;
 
-fn recording(name: &str) -> Option<String> {
-    let path = format!("{DATA}{name}");
-    let there = Path::new(&path).exists();
-    if !there {
-        eprintln!("skipped: {path} not there");
-    }
-    there.then_some(path)
-}
-
 fn json(answer: &Answer) -> Value {
     serde_json::from_str(&answer.stdout).unwrap_or_else(|error| panic!("{error}: {}", answer.stderr))
 }
@@ -71,23 +64,39 @@ fn refused(folder: &Folder, arguments: &[&str], words: &[&str]) {
     assert!(!folder.path("out.mcap").exists(), "no log of a file that is none");
 }
 
+/// How many entries of a telemetry log are whole, and what its vehicle's sensors get of them.
+struct Telemetry {
+    entries: u64,
+    attitude: u64,
+    depth: u64,
+}
+
 #[test]
 fn telemetry_of_a_bluerov_replays() {
-    let Some(file) = recording("bluerov2_ardusub_logs/small.tlog") else { return };
+    // As `oracles/tlog.py` counts them: attitude is ATTITUDE and RAW_IMU, depth is SCALED_PRESSURE2.
+    let trimmed = Telemetry { entries: 6499 - 4, attitude: 776 + 81, depth: 188 };
+    let full_length = Telemetry { entries: 35_916 - 4, attitude: 5245 + 528, depth: 635 };
+    for (path, wanted) in recordings::both(TELEMETRY, trimmed, full_length) {
+        check_telemetry(path.to_str().unwrap(), &wanted);
+    }
+}
+
+fn check_telemetry(file: &str, wanted: &Telemetry) {
     let folder = Folder::new();
     folder.write("vehicle.toml", format!("{TUNNEL}{AUTOPILOT}"));
-    let answer = folder.headrace(&["import", &file, "--vehicle", "vehicle.toml", "-o", "out.mcap", "--json"]);
+    let answer = folder.headrace(&["import", file, "--vehicle", "vehicle.toml", "-o", "out.mcap", "--json"]);
     // Four frames of its camera have a checksum that fits no definition.
     assert_eq!(answer.code, Some(3), "{}", answer.stderr);
     let shown = json(&answer);
     assert!(answer.stderr.contains("4 times"), "{}", answer.stderr);
-    assert_eq!(shown["messages"], serde_json::json!({"attitude": 5245 + 528, "depth": 635}));
-    assert_eq!(shown["entries"], 35_912);
-    assert_eq!(shown["passed_over"], 35_912 - 5245 - 528 - 635);
+    let &Telemetry { entries, attitude, depth } = wanted;
+    assert_eq!(shown["messages"], serde_json::json!({"attitude": attitude, "depth": depth}));
+    assert_eq!(shown["entries"], entries);
+    assert_eq!(shown["passed_over"], entries - attitude - depth);
     let (code, report) = folder.replay("out.mcap", &[]);
     assert_eq!(code, Some(1), "a dive without sonar");
     assert_eq!(report["log"]["losses"], serde_json::json!([]));
-    for (source, frames) in report["sources"].as_array().unwrap().iter().zip([5773, 635]) {
+    for (source, frames) in report["sources"].as_array().unwrap().iter().zip([attitude, depth]) {
         assert_eq!((&source["frames"], &source["bad_frames"]), (&frames.into(), &0.into()), "{source}");
     }
     let log = folder.read("out.mcap");
@@ -99,16 +108,15 @@ fn telemetry_of_a_bluerov_replays() {
     assert_eq!((metadata["import_format"].as_str(), metadata["import_clock"].as_str()), ("tlog", "utc"));
     assert_eq!(metadata["clock_anchor_monotonic_ns"], "1000000000");
     let utc_ns: u64 = metadata["clock_anchor_utc_ns"].parse().unwrap();
-    let bytes = std::fs::read(&file).unwrap();
+    let bytes = std::fs::read(file).unwrap();
     assert_eq!(utc_ns, u64::from_be_bytes(bytes[..8].try_into().unwrap()) * 1000);
 }
 
 #[test]
 fn a_telemetry_log_cut_off_gives_what_is_whole_and_says_so() {
-    let Some(file) = recording("bluerov2_ardusub_logs/small.tlog") else { return };
     let folder = Folder::new();
     folder.write("vehicle.toml", format!("{TUNNEL}{AUTOPILOT}"));
-    folder.write("cut.tlog", &std::fs::read(file).unwrap()[..100_005]);
+    folder.write("cut.tlog", &std::fs::read(recordings::trimmed(TELEMETRY)).unwrap()[..100_005]);
     let answer = folder.headrace(&["import", "cut.tlog", "--vehicle", "vehicle.toml", "-o", "out.mcap"]);
     assert_eq!(answer.code, Some(3), "{}", answer.stderr);
     assert!(answer.stderr.contains("cut off"), "{}", answer.stderr);
@@ -159,15 +167,21 @@ fn candump_of_a_simulated_dive_has_the_same_bytes_at_the_same_times() {
 
 #[test]
 fn an_imagenex_file_gives_its_returns_at_its_times() {
-    let Some(file) = recording("imagenex852_cidco/19_26_51-2016_11_18-sonar.852") else { return };
+    for (path, shots) in recordings::both("imagenex852_cidco/19_26_51-2016_11_18-sonar.852", 300, 917) {
+        check_shots(&path, shots);
+    }
+}
+
+fn check_shots(path: &Path, shots: usize) {
+    let file = path.to_str().unwrap();
     let folder = Folder::new();
     folder.write("vehicle.toml", format!("{TUNNEL}{HEAD}"));
-    let answer = folder.headrace(&["import", &file, "--vehicle", "vehicle.toml", "-o", "out.mcap"]);
+    let answer = folder.headrace(&["import", file, "--vehicle", "vehicle.toml", "-o", "out.mcap"]);
     assert_eq!(answer.code, Some(0), "{}", answer.stderr);
     let log = folder.read("out.mcap");
     let got = raw_messages(&log);
-    assert_eq!(got.len(), 917);
-    let bytes = std::fs::read(&file).unwrap();
+    assert_eq!(got.len(), shots);
+    let bytes = std::fs::read(path).unwrap();
     for (message, shot) in got.iter().zip(bytes.chunks(640)) {
         let len = usize::from(u16::from_be_bytes([shot[6], shot[7]]));
         assert_eq!(message.data[..], shot[100..100 + len]);
@@ -177,23 +191,26 @@ fn an_imagenex_file_gives_its_returns_at_its_times() {
 
 #[test]
 fn an_imagenex_file_without_times_is_no_dive() {
-    let Some(file) = recording("imagenex852_cidco/hydroball.852") else { return };
-    let folder = Folder::new();
-    folder.write("vehicle.toml", format!("{TUNNEL}{HEAD}"));
-    let words = ["there is no shot in its 113280 bytes", "no date and time: 177 times, 113280 bytes"];
-    refused(&folder, &[&file, "--vehicle", "vehicle.toml", "-o", "out.mcap"], &words);
+    let trimmed = ["there is no shot in its 32000 bytes", "no date and time: 50 times, 32000 bytes"];
+    let full_length = ["there is no shot in its 113280 bytes", "no date and time: 177 times, 113280 bytes"];
+    for (path, words) in recordings::both("imagenex852_cidco/hydroball.852", trimmed, full_length) {
+        let folder = Folder::new();
+        folder.write("vehicle.toml", format!("{TUNNEL}{HEAD}"));
+        refused(&folder, &[path.to_str().unwrap(), "--vehicle", "vehicle.toml", "-o", "out.mcap"], &words);
+    }
 }
 
 #[test]
 fn bare_ping_frames_have_no_times_and_are_named() {
-    let name = "ping360_tank_rgu/Uniform_Pipe__50__1N__2024-03-12_11-31-02Gain_1.bin";
-    let Some(file) = recording(name) else { return };
-    let folder = Folder::new();
-    refused(
-        &folder,
-        &[&file, "--source", "ping=ping", "-o", "out.mcap"],
-        &["bare Ping frames, which have no times"],
-    );
+    let real = "ping360_tank_rgu/Uniform_Pipe__50__1N__2024-03-12_11-31-02Gain_1.bin";
+    let made_up = recordings::trimmed("ping360_made_up/frames.bin");
+    for path in [made_up].into_iter().chain(recordings::full_length(real)) {
+        refused(
+            &Folder::new(),
+            &[path.to_str().unwrap(), "--source", "ping=ping", "-o", "out.mcap"],
+            &["bare Ping frames, which have no times"],
+        );
+    }
 }
 
 const TABLE: &str = "t_s,depth (mbar),roll,pitch,yaw,p,q,r,ax,ay,az,left,along

@@ -1,7 +1,7 @@
 //! The paper's Tables 1 to 5 computed anew: each printed number, ours beside it, and where the fault is the paper's.
 //!
 //! Source: Jorge et al., "Analytical Approach to Sampling Estimation of Underwater Tunnels Using Mechanical Profiling
-//! Sonars", Sensors 2021, 21, 1900 (CC BY 4.0). Its numbers are in `paper/*.csv`, as printed.
+//! Sonars", Sensors 2021, 21, 1900 (CC BY 4.0). Its numbers are in the modules below, as printed.
 
 mod baseline;
 mod cell;

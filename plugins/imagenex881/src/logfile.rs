@@ -148,21 +148,15 @@ fn sound_speed_mps(field: &[u8]) -> f64 {
 }
 
 #[cfg(test)]
+#[path = "../../../tests/common/recordings.rs"]
+mod recordings;
+
+#[cfg(test)]
 mod tests {
     use headrace_sensor::codec::Codec as _;
 
     use super::*;
     use crate::codec::{Model, Return, ReturnCodec, Tag};
-
-    const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data/imagenex852_cidco/");
-
-    fn recording(name: &str) -> Option<Vec<u8>> {
-        let bytes = std::fs::read(format!("{FOLDER}{name}")).ok();
-        if bytes.is_none() {
-            eprintln!("skipped: {FOLDER}{name} not there");
-        }
-        bytes
-    }
 
     fn returns(file: &[u8]) -> Vec<Return> {
         LogFile::new(file).map(|shot| Return::decode(shot.unwrap().raw, None).unwrap()).collect()
@@ -189,31 +183,38 @@ mod tests {
 
     #[test]
     fn a_real_sounder_log_reads() {
-        let Some(file) = recording("19_26_51-2016_11_18-sonar.852") else { return };
-        let returns = returns(&file);
-        assert_eq!(returns.len(), 917);
-        check_all(&returns);
-        check_stream(&file, &returns);
-        let with_echo: Vec<u32> =
-            returns.iter().filter_map(|value| value.header.profile_mm(Model::Sounder852)).collect();
-        assert_eq!((with_echo.len(), with_echo.iter().max()), (452, Some(&9960)));
-        let first = LogFile::new(&file).next().unwrap().unwrap();
-        assert_eq!(first.date, Some((18, 11, 2016)));
-        assert_eq!(first.time_of_day, Some(DurNs::from_millis(70_150_170)));
-        assert_eq!(first.sound_speed_mps.to_bits(), 1460.0_f64.to_bits());
+        // Shots, and those with an echo.
+        let counts = [(300, 203), (917, 452)];
+        let name = "imagenex852_cidco/19_26_51-2016_11_18-sonar.852";
+        for (path, (shots, echoes)) in recordings::both(name, counts[0], counts[1]) {
+            let file = std::fs::read(path).unwrap();
+            let returns = returns(&file);
+            assert_eq!(returns.len(), shots);
+            check_all(&returns);
+            check_stream(&file, &returns);
+            let with_echo: Vec<u32> =
+                returns.iter().filter_map(|value| value.header.profile_mm(Model::Sounder852)).collect();
+            assert_eq!((with_echo.len(), with_echo.iter().max()), (echoes, Some(&9960)));
+            let first = LogFile::new(&file).next().unwrap().unwrap();
+            assert_eq!(first.date, Some((18, 11, 2016)));
+            assert_eq!(first.time_of_day, Some(DurNs::from_millis(70_150_170)));
+            assert_eq!(first.sound_speed_mps.to_bits(), 1460.0_f64.to_bits());
+        }
     }
 
     #[test]
     fn a_real_log_whose_time_field_holds_sonar_bytes_reads() {
-        let Some(file) = recording("hydroball.852") else { return };
-        let returns = returns(&file);
-        assert_eq!(returns.len(), 177);
-        check_all(&returns);
-        check_stream(&file, &returns);
-        assert_eq!(returns[0].header.profile_mm(Model::Sounder852), Some(4480));
-        for shot in LogFile::new(&file) {
-            let shot = shot.unwrap();
-            assert_eq!((shot.date.map(|date| date.2), shot.time_of_day), (Some(2019), None));
+        for (path, shots) in recordings::both("imagenex852_cidco/hydroball.852", 50, 177) {
+            let file = std::fs::read(path).unwrap();
+            let returns = returns(&file);
+            assert_eq!(returns.len(), shots);
+            check_all(&returns);
+            check_stream(&file, &returns);
+            assert_eq!(returns[0].header.profile_mm(Model::Sounder852), Some(4480));
+            for shot in LogFile::new(&file) {
+                let shot = shot.unwrap();
+                assert_eq!((shot.date.map(|date| date.2), shot.time_of_day), (Some(2019), None));
+            }
         }
     }
 

@@ -3,6 +3,9 @@ use proptest::prelude::*;
 
 use super::*;
 
+#[path = "../../../../tests/common/recordings.rs"]
+mod recordings;
+
 fn hex(text: &str) -> Vec<u8> {
     text.split_whitespace().map(|byte| u8::from_str_radix(byte, 16).unwrap()).collect()
 }
@@ -193,16 +196,15 @@ fn the_longest_frame_is_taken_and_a_longer_one_is_not() {
 }
 
 #[test]
-fn a_ping360s_own_frames_are_framed_and_summed_right() {
-    const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data/ping360_tank_rgu/");
-    for name in [
-        "Uniform_Pipe__50__1N__2024-03-12_11-31-02Gain_1.bin",
-        "Uniform_Pipe__90__1N__2024-03-12_11-38-25Gain_1.bin",
-    ] {
-        let Ok(file) = std::fs::read(format!("{FOLDER}{name}")) else {
-            eprintln!("skipped: {FOLDER}{name} not there");
-            continue;
-        };
+fn a_ping360s_frames_are_framed_and_summed_right() {
+    let real = [
+        "ping360_tank_rgu/Uniform_Pipe__50__1N__2024-03-12_11-31-02Gain_1.bin",
+        "ping360_tank_rgu/Uniform_Pipe__90__1N__2024-03-12_11-38-25Gain_1.bin",
+    ];
+    let made_up = (recordings::trimmed("ping360_made_up/frames.bin"), 20);
+    let real = real.into_iter().filter_map(recordings::full_length).map(|path| (path, 101));
+    for (path, good_frames) in [made_up].into_iter().chain(real) {
+        let file = std::fs::read(path).unwrap();
         for piece in [file.len(), 1000, 1] {
             let (mut codec, mut again) = (PingCodec::default(), Vec::new());
             for bytes in file.chunks(piece) {
@@ -212,7 +214,7 @@ fn a_ping360s_own_frames_are_framed_and_summed_right() {
                     again.extend_from_slice(&encode(&value));
                 });
             }
-            let counts = CodecCounts { good_frames: 101, ..CodecCounts::default() };
+            let counts = CodecCounts { good_frames, ..CodecCounts::default() };
             assert_eq!((codec.counts(), codec.held_bytes()), (counts, 0));
             assert_eq!(again, file);
         }
