@@ -18,12 +18,16 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Tables 1 to 5: each printed number, ours beside it, and where the fault is the paper's.
+    #[command(after_help = "Example:\n  cargo run --release -p headrace_experiments -- tables --json")]
     Tables {
         /// Print JSON.
         #[arg(long)]
         json: bool,
     },
     /// The simulated and real experiments (§8 and §9); takes a minute or two.
+    #[command(
+        after_help = "Example:\n  cargo run --release -p headrace_experiments -- experiments --svg pictures"
+    )]
     Experiments {
         /// Print JSON.
         #[arg(long)]
