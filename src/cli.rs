@@ -112,11 +112,6 @@ pub(crate) enum Command {
     /// Say what is wrong with a vehicle file, or what it describes.
     #[command(after_help = "Example:\n  headrace check deploy/vehicles/vita2-4.toml")]
     Check(Check),
-    /// The numbers of the paper that the theory is from, ours beside them, and where the fault is the paper's.
-    #[command(
-        after_help = "Example:\n  headrace paper --tables\n  headrace paper --experiments --svg pictures"
-    )]
-    Paper(Paper),
 }
 
 #[derive(Debug, Args)]
@@ -451,22 +446,6 @@ pub(crate) struct Check {
     /// Vehicle file.
     pub(crate) vehicle: PathBuf,
     /// Print it as JSON.
-    #[arg(long)]
-    pub(crate) json: bool,
-}
-
-#[derive(Debug, Args)]
-pub(crate) struct Paper {
-    /// Tables 1 to 5, computed anew.
-    #[arg(long, conflicts_with = "experiments")]
-    pub(crate) tables: bool,
-    /// Its simulated and real experiments (§8 and §9), run anew; takes a minute or two.
-    #[arg(long)]
-    pub(crate) experiments: bool,
-    /// Folder to draw pictures like its Figures 6, 8, 12, 13 and 15 into, with --experiments.
-    #[arg(long, value_name = "DIR", requires = "experiments")]
-    pub(crate) svg: Option<PathBuf>,
-    /// Print JSON.
     #[arg(long)]
     pub(crate) json: bool,
 }

@@ -3,7 +3,6 @@
 use std::path::PathBuf;
 
 use headrace_config::ConfigError;
-use headrace_experiments::ExperimentError;
 use headrace_monitor::plugin::PluginError;
 use headrace_replay::drive::DriveError;
 use headrace_replay::import::ImportError;
@@ -13,8 +12,6 @@ use headrace_replay::simulate::SceneError;
 use headrace_replay::smooth::SmoothError;
 use headrace_replay::states::StatesError;
 use headrace_sampling::SamplingError;
-
-use crate::pictures::PictureError;
 
 /// Exit code of a command that did all it was asked, on all the data.
 pub(crate) const OK: u8 = 0;
@@ -57,10 +54,6 @@ pub(crate) enum Failure {
     Json(#[from] serde_json::Error),
     #[error("planning: {0}")]
     Plan(#[from] SamplingError),
-    #[error("the paper's experiments: {0}")]
-    Experiment(#[from] ExperimentError),
-    #[error(transparent)]
-    Picture(#[from] PictureError),
     #[error("{what}: {source}")]
     System { what: &'static str, source: std::io::Error },
     #[error("{0}")]

@@ -56,18 +56,6 @@ pub(crate) fn built_in(name: &str) -> Result<Vec<u8>, String> {
     if name == DEMO_VEHICLE.0 { Ok(DEMO_VEHICLE.1.into()) } else { Err("is not built in".to_owned()) }
 }
 
-/// Loads the shipped vehicle files by their names alone.
-pub(crate) fn built_in_vehicle(name: &str) -> Result<Vec<u8>, String> {
-    let text = match name {
-        "vita1.toml" => include_str!("../deploy/vehicles/vita1.toml"),
-        "vita2-2.toml" => include_str!("../deploy/vehicles/vita2-2.toml"),
-        "vita2-3.toml" => include_str!("../deploy/vehicles/vita2-3.toml"),
-        "vita2-4.toml" => DEMO_VEHICLE.1,
-        _ => return Err("is not built in".to_owned()),
-    };
-    Ok(text.into())
-}
-
 /// Loads a file that was attached to a log.
 pub(crate) fn attached(attachments: &[(String, Vec<u8>)]) -> impl Fn(&str) -> Result<String, String> {
     move |name| {

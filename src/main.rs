@@ -13,8 +13,6 @@ mod import;
 mod inventory;
 mod live;
 mod output;
-mod paper;
-mod pictures;
 mod plan;
 mod play;
 mod progress;
@@ -48,7 +46,6 @@ fn main() -> ExitCode {
         Command::Emulate(args) => emulate::emulate(&args),
         Command::Devices(args) => inventory::devices(&args),
         Command::Check(check) => commands::check(&check),
-        Command::Paper(args) => paper::paper(&args),
     };
     match result {
         Ok(code) => ExitCode::from(code),

@@ -22,7 +22,6 @@ use headrace_mavlink::decoder::{MavlinkDecoder, Meaning, Part};
 use headrace_mavlink::message::{ImuMessage, PressureMessage};
 use headrace_mavlink::tlog::Tlog;
 use headrace_sensor::device::Decoder as _;
-use headrace_sensor::device::Decoder as _;
 use headrace_sensor::reading::{Decoded, Packet, Reading};
 
 /// Frames of the camera (component 100) whose checksum fits no definition.

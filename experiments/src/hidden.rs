@@ -4,7 +4,7 @@ use headrace_geometry::math::{self, TAU};
 use headrace_sampling::layout::HeadLayout;
 use serde::Serialize;
 
-use crate::runs::{Dive, Dives, Sample, Setting};
+use crate::runs::{Dive, Sample, Setting};
 use crate::spacing::{gaps_m, passes};
 use crate::{ExperimentError, Progress};
 
@@ -39,7 +39,7 @@ const ARRANGEMENTS: [(u8, &str); 4] = [(3, ""), (4, ""), (4, "[0, 0, -90, 90]"),
 /// All arrangements, MEDIUM as in Figure 13.
 ///
 /// Errors: none with the vehicles that are built in.
-pub(crate) fn rows(dives: &Dives<'_>, progress: Progress<'_>) -> Result<Vec<HiddenRow>, ExperimentError> {
+pub(crate) fn rows(progress: Progress<'_>) -> Result<Vec<HiddenRow>, ExperimentError> {
     let mut rows = Vec::new();
     for (heads, offsets) in ARRANGEMENTS {
         let effects = match offsets {
@@ -57,7 +57,7 @@ pub(crate) fn rows(dives: &Dives<'_>, progress: Progress<'_>) -> Result<Vec<Hidd
             effects,
             seed: 1,
         };
-        let dive = dives.dive(&setting)?;
+        let dive = setting.dive()?;
         rows.push(row(heads, &dive));
     }
     Ok(rows)

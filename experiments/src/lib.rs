@@ -1,35 +1,37 @@
-//! The paper's §8 and §9 repeated: simulated dives, their spacings (Tables 3 to 5), what heads hide from each other, and
-//! what that needs beyond a dive: surfaces through samples and their distance from the wall (§8.2,
-//! 8.3), the perimeter as a wide beam sees it (§9.2), and the Wilcoxon signed-rank test (§8.1).
+//! The paper's tables computed anew (`paper`), and its §8 and §9 repeated: simulated dives, their spacings (Tables 3 to
+//! 5), what heads hide from each other, and what that needs beyond a dive: surfaces through samples and their distance
+//! from the wall (§8.2, 8.3), the perimeter as a wide beam sees it (§9.2), and the Wilcoxon signed-rank test (§8.1).
 //!
 //! Deterministic: one thread, no clock, no randomness, no hash containers; mathematics through `headrace_geometry::math`.
 
-pub mod figures;
+mod compared;
+pub mod drawings;
+mod figures;
 mod hidden;
 mod meshes;
-pub mod perimeter;
+pub mod paper;
+mod perimeter;
 mod report;
 mod runs;
 mod spacing;
 mod spread;
 mod stationary;
-pub mod surface;
-mod tables;
-pub mod wilcoxon;
+mod surface;
+mod wilcoxon;
+pub mod words;
 
 use headrace_geometry::tunnel::ProfileError;
 use headrace_replay::simulate::SceneError;
 use headrace_sampling::SamplingError;
-use headrace_sampling::paper::PaperError;
 
+use paper::PaperError;
+use spread::Spread;
+
+pub use compared::{Pair, RunRow, SignedRankRow};
 pub use hidden::HiddenRow;
 pub use meshes::MeshRow;
 pub use report::{Experiments, Finding, run};
-pub use runs::{Dive, Dives, SPEED_MPS, Sample, Setting};
-pub use spacing::Spacing;
-pub use spread::Spread;
 pub use stationary::Perimeter;
-pub use tables::{Pair, RunRow, SignedRankRow};
 
 /// Is told what is being done.
 pub type Progress<'a> = &'a dyn Fn(&str);

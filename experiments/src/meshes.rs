@@ -4,7 +4,7 @@ use headrace_sampling::layout::HeadLayout;
 use serde::Serialize;
 
 use crate::Spread;
-use crate::runs::{Dive, Dives, Setting};
+use crate::runs::{Dive, Setting};
 use crate::surface::chart::{Chart, Deviation};
 use crate::surface::poisson::{Settings, Surface};
 use crate::surface::wall::{self, Stretch};
@@ -63,14 +63,14 @@ const PAPER: [Configuration; 10] = [
 /// All of them.
 ///
 /// Errors: a surface that can't be made; none with the vehicles that are built in.
-pub(crate) fn rows(dives: &Dives<'_>, progress: Progress<'_>) -> Result<Vec<MeshRow>, ExperimentError> {
+pub(crate) fn rows(progress: Progress<'_>) -> Result<Vec<MeshRow>, ExperimentError> {
     let mut rows = Vec::new();
     for (heads, mode, sectors, aligned, paper_m) in PAPER {
         let mut found = Vec::new();
         for seed in 1..=if aligned { 1 } else { SEEDS } {
             progress(&format!("a surface through {heads} heads' samples, seed {seed}"));
             let setting = setting((heads, mode, sectors, aligned), LENGTH_M, seed);
-            found.push(distances(&dives.dive(&setting)?)?);
+            found.push(distances(&setting.dive()?)?);
         }
         let mean = |which: usize| {
             let of = |spread: fn(&Spread) -> f64| {

@@ -2,11 +2,11 @@
 
 use serde::Serialize;
 
+use crate::compared::{self, RunRow, SignedRankRow};
 use crate::hidden::{self, HiddenRow};
 use crate::meshes::{self, MeshRow};
-use crate::runs::{Dives, SPEED_MPS};
+use crate::runs::SPEED_MPS;
 use crate::stationary::{self, Perimeter};
-use crate::tables::{self, RunRow, SignedRankRow};
 use crate::{ExperimentError, Progress};
 
 /// Ours beside the paper's.
@@ -42,11 +42,11 @@ pub struct Finding {
 /// Runs all of them. `progress` is told what is being done.
 ///
 /// Errors: none with the vehicles that are built in.
-pub fn run(dives: &Dives<'_>, progress: Progress<'_>) -> Result<Experiments, ExperimentError> {
-    let runs = tables::runs(dives, progress)?;
-    let signed_ranks = tables::signed_ranks(&runs)?;
-    let meshes = meshes::rows(dives, progress)?;
-    let hidden = hidden::rows(dives, progress)?;
+pub fn run(progress: Progress<'_>) -> Result<Experiments, ExperimentError> {
+    let runs = compared::runs(progress)?;
+    let signed_ranks = compared::signed_ranks(&runs)?;
+    let meshes = meshes::rows(progress)?;
+    let hidden = hidden::rows(progress)?;
     progress("the perimeter from a stationary turn");
     let perimeter = stationary::perimeter()?;
     let findings = findings(&meshes, &hidden);

@@ -4,16 +4,16 @@
 use headrace_config::Document;
 use headrace_geometry::frames::{Point3, Tunnel};
 use headrace_geometry::tunnel::Profile;
-use headrace_replay::simulate::{FileLoader, Scene, SceneError, Simulation};
+use headrace_replay::simulate::{Scene, SceneError, Simulation};
 use headrace_sampling::layout::HeadLayout;
 use headrace_sensor::device::{DeviceKind, Sense};
 
 /// The speed that the paper states, m/s (§7.2).
-pub const SPEED_MPS: f64 = 0.197;
+pub(crate) const SPEED_MPS: f64 = 0.197;
 
 /// What a dive is simulated with.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Setting {
+pub(crate) struct Setting {
     /// How many heads: one is VITA 1, more are VITA 2.
     pub heads: u8,
     /// Their mode.
@@ -34,7 +34,7 @@ pub struct Setting {
 
 /// A ping of a head.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sample {
+pub(crate) struct Sample {
     /// Which head.
     pub head: u16,
     /// Its angle in the sensor's frame, radians.
@@ -50,7 +50,7 @@ pub struct Sample {
 }
 
 /// A simulated dive.
-pub struct Dive {
+pub(crate) struct Dive {
     /// The tunnel's profile.
     pub profile: Profile,
     /// All pings of all heads in order of time that heard something, by head.
@@ -61,23 +61,34 @@ pub struct Dive {
     pub ping_period_s: f64,
 }
 
-/// What dives are simulated with: the devices that vehicle files may name, and the vehicle files by name.
-#[derive(Clone, Copy)]
-pub struct Dives<'a> {
-    /// The kinds of devices.
-    pub kinds: &'a [&'a dyn DeviceKind],
-    /// Gives a vehicle file.
-    pub load: FileLoader<'a>,
+/// The kinds of devices that the vehicle files name.
+const KINDS: [&dyn DeviceKind; 5] = [
+    &headrace_imagenex881::Kind,
+    &headrace_ping1d::Kind,
+    &headrace_bar100::Kind,
+    &headrace_imu_can::Kind,
+    &headrace_tether_hid::Kind,
+];
+
+/// The shipped vehicle files by name.
+fn vehicle(name: &str) -> Result<Vec<u8>, String> {
+    let text = match name {
+        "vita1.toml" => include_str!("../../deploy/vehicles/vita1.toml"),
+        "vita2-2.toml" => include_str!("../../deploy/vehicles/vita2-2.toml"),
+        "vita2-3.toml" => include_str!("../../deploy/vehicles/vita2-3.toml"),
+        "vita2-4.toml" => include_str!("../../deploy/vehicles/vita2-4.toml"),
+        _ => return Err("is not built in".to_owned()),
+    };
+    Ok(text.into())
 }
 
-impl Dives<'_> {
-    /// Simulates a dive.
+impl Setting {
+    /// Simulates the dive.
     ///
-    /// Errors: a scene that isn't one; none with the vehicles that are built in.
-    pub fn dive(&self, setting: &Setting) -> Result<Dive, SceneError> {
-        let text = scene_text(setting);
-        let scene =
-            Scene::parse(Document::new("experiment", &text), self.kinds, self.load, Some(setting.seed))?;
+    /// Errors: a scene that can't be read; none for 1 to 4 heads and a mode and effects that exist.
+    pub(crate) fn dive(&self) -> Result<Dive, SceneError> {
+        let text = scene_text(self);
+        let scene = Scene::parse(Document::new("experiment", &text), &KINDS, &vehicle, Some(self.seed))?;
         run(&scene)
     }
 }

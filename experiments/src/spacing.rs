@@ -14,7 +14,7 @@ const STEP_SHARE: f64 = 0.25;
 
 /// What the paper's Tables 3 to 5 say of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Spacing {
+pub(crate) struct Spacing {
     /// Along the tunnel, from pass to pass: what each line of the wall has in the mean; for sectors, what lines at their
     /// ends have, which is twice the mean.
     pub t_x_m: f64,

@@ -5,7 +5,7 @@ use serde::Serialize;
 
 /// How unsigned lengths are spread, m; all zero of none.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
-pub struct Spread {
+pub(crate) struct Spread {
     /// How many.
     pub count: usize,
     /// Mean, m.
@@ -20,7 +20,7 @@ pub struct Spread {
 
 impl Spread {
     /// Of the absolute values of `lengths_m`, summed in the order given; those that are no number are left out.
-    pub fn of(lengths_m: impl IntoIterator<Item = f64>) -> Self {
+    pub(crate) fn of(lengths_m: impl IntoIterator<Item = f64>) -> Self {
         let (mut mean, mut squares) = (0.0, 0.0);
         let mut spread = Self { min_m: f64::INFINITY, ..Self::default() };
         // Welford's updates: a sum of squares would lose the spread of lengths that are nearly equal.

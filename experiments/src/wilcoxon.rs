@@ -10,11 +10,11 @@
 use headrace_geometry::math;
 
 /// Most pairs for which the exact distribution is taken.
-pub const EXACT_MAX: usize = 50;
+pub(crate) const EXACT_MAX: usize = 50;
 
 /// What becomes of differences of zero.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Zeros {
+pub(crate) enum Zeros {
     /// Left out before ranking.
     #[default]
     Wilcoxon,
@@ -24,7 +24,7 @@ pub enum Zeros {
 
 /// How the test is made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Options {
+pub(crate) struct Options {
     /// What becomes of zeros.
     pub zeros: Zeros,
     /// Whether the normal approximation moves W+ by a half towards its mean.
@@ -33,7 +33,7 @@ pub struct Options {
 
 /// Where p comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Method {
+pub(crate) enum Method {
     /// The distribution of W+ over all signs.
     Exact,
     /// A normal distribution.
@@ -42,7 +42,7 @@ pub enum Method {
 
 /// The test's outcome. The p values are under the hypothesis that differences are symmetric about zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SignedRank {
+pub(crate) struct SignedRank {
     /// Sum of the ranks of differences above zero.
     pub w_plus: f64,
     /// Sum of the ranks of differences below zero.
@@ -64,7 +64,7 @@ pub struct SignedRank {
 /// Why there is no test.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
-pub enum WilcoxonError {
+pub(crate) enum WilcoxonError {
     /// Two lists differ in length.
     #[error("pairs need lists of one length; these have {left} and {right}")]
     Lengths {
@@ -87,7 +87,7 @@ pub enum WilcoxonError {
 /// Of `left` minus `right`, pair by pair.
 ///
 /// Errors: see [`WilcoxonError`].
-pub fn of_pairs(left: &[f64], right: &[f64], options: Options) -> Result<SignedRank, WilcoxonError> {
+pub(crate) fn of_pairs(left: &[f64], right: &[f64], options: Options) -> Result<SignedRank, WilcoxonError> {
     if left.len() != right.len() {
         return Err(WilcoxonError::Lengths { left: left.len(), right: right.len() });
     }
@@ -98,7 +98,7 @@ pub fn of_pairs(left: &[f64], right: &[f64], options: Options) -> Result<SignedR
 /// Of differences. Those equal in size but for rounding aren't ties: round them first where they are meant to be.
 ///
 /// Errors: see [`WilcoxonError`].
-pub fn of_differences(differences: &[f64], options: Options) -> Result<SignedRank, WilcoxonError> {
+pub(crate) fn of_differences(differences: &[f64], options: Options) -> Result<SignedRank, WilcoxonError> {
     if let Some(index) = differences.iter().position(|d| !d.is_finite()) {
         return Err(WilcoxonError::NotFinite { index });
     }

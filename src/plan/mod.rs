@@ -7,6 +7,7 @@ mod table;
 
 use std::path::Path;
 
+use headrace_sampling::SamplingError;
 use headrace_sampling::plan::{Answer, Briefing, Planner, Question};
 use serde_json::json;
 
@@ -16,8 +17,6 @@ use crate::files;
 use crate::output::{deliver, put, say};
 use case::Case;
 use pictures::Shown;
-
-pub(crate) use pictures::PictureError;
 
 /// Everything that one run of the command has found.
 struct Findings {
@@ -94,7 +93,7 @@ fn is_met(answer: &Answer) -> bool {
 /// For what doesn't depend on the speed.
 const ANY_SPEED_MPS: f64 = 0.1;
 
-type Picture = fn(&Shown<'_>) -> Result<String, PictureError>;
+type Picture = fn(&Shown<'_>) -> Result<String, SamplingError>;
 
 const PICTURES: [(&str, Picture); 4] = [
     ("perimeter.svg", pictures::perimeter),

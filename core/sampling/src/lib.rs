@@ -15,7 +15,6 @@ pub mod head;
 pub mod interference;
 pub mod layout;
 pub mod occlusion;
-pub mod paper;
 pub mod passes;
 pub mod plan;
 pub mod ring;

@@ -20,7 +20,7 @@ const SIMULATED: u32 = 6;
 
 /// Figure 15.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Footprints {
+pub(crate) struct Footprints {
     /// Square to a wall, by the range to it, m.
     pub by_range: Vec<Footprint>,
     /// On the floor, by the angle from straight down, degrees.
@@ -35,7 +35,7 @@ pub struct Footprints {
 
 /// A beam's footprints.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Footprint {
+pub(crate) struct Footprint {
     /// The beam's full width, degrees.
     pub beam_deg: f64,
     /// Range or angle, and the footprint by the formula, m.
@@ -47,7 +47,7 @@ pub struct Footprint {
 /// Computes them for the blueprint's tunnel.
 ///
 /// Errors: none that can occur.
-pub fn footprints() -> Result<Footprints, ExperimentError> {
+pub(crate) fn footprints() -> Result<Footprints, ExperimentError> {
     let profile = shapes::ceran_blueprint()?;
     let [_, height_m] = profile.reference();
     let half_m = floor_half_m(&profile);

@@ -4,17 +4,17 @@ mod beam;
 mod patterns;
 mod walls;
 
-use headrace_geometry::math;
+use headrace_pictures::polyline;
 
 use crate::runs::{Dive, Sample};
 
-pub use beam::{Footprint, Footprints, footprints};
-pub use patterns::{PhaseShift, Sectors, phase_shift, sectors};
-pub use walls::{AT_GAPS, Gap, PHASES, Panel, Walls, walls};
+pub(crate) use beam::{Footprint, Footprints, footprints};
+pub(crate) use patterns::{PhaseShift, Sectors, phase_shift, sectors};
+pub(crate) use walls::{AT_GAPS, PHASES, Panel, Walls, walls};
 
 /// A sample on the unrolled wall.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Place {
+pub(crate) struct Place {
     /// Which head's.
     pub head: u16,
     /// Way along the tunnel from where the picture begins, m.
@@ -25,7 +25,7 @@ pub struct Place {
 
 /// A piece of a head's way over the unrolled wall that doesn't cross its seam.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Way {
+pub(crate) struct Way {
     /// Which head's.
     pub head: u16,
     /// Way along the tunnel from where the picture begins, and arc length, m.
@@ -70,21 +70,14 @@ impl Window {
 
 /// Adds a step to the way that it continues, if it does; one over the seam as two that end and begin there.
 fn add_step(ways: &mut Vec<Way>, head: u16, perimeter_m: f64, from: [f64; 2], to: [f64; 2]) {
-    let around_m = math::wrap_signed(to[1] - from[1], perimeter_m);
-    let mut add = |begin: [f64; 2], end: [f64; 2]| match ways.last_mut() {
-        // A step that ends on the seam goes no way beyond it.
-        _ if (begin[0] - end[0]).abs() + (begin[1] - end[1]).abs() <= 0.0 => (),
-        Some(way) if way.head == head && way.points.last() == Some(&begin) => way.points.push(end),
-        _ => ways.push(Way { head, points: vec![begin, end] }),
-    };
-    if (to[1] - from[1] - around_m).abs() < 1e-9 {
-        add(from, to);
-        return;
+    for [begin, end] in polyline::over_seam(perimeter_m, from, to) {
+        match ways.last_mut() {
+            // A step that ends on the seam goes no way beyond it.
+            _ if (begin[0] - end[0]).abs() + (begin[1] - end[1]).abs() <= 0.0 => (),
+            Some(way) if way.head == head && way.points.last() == Some(&begin) => way.points.push(end),
+            _ => ways.push(Way { head, points: vec![begin, end] }),
+        }
     }
-    let (leaving_m, entering_m) = if around_m > 0.0 { (perimeter_m, 0.0) } else { (0.0, perimeter_m) };
-    let x_m = from[0] + (leaving_m - from[1]) / around_m * (to[0] - from[0]);
-    add(from, [x_m, leaving_m]);
-    add([x_m, entering_m], to);
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use headrace_sampling::layout::{self, HeadLayout};
 
 use super::{Place, Way, Window, add_step};
 use crate::ExperimentError;
-use crate::runs::{Dive, Dives, SPEED_MPS, Setting};
+use crate::runs::{Dive, SPEED_MPS, Setting};
 use crate::spacing::passes_of;
 
 /// Way before the picture, so that every head has passed where it begins, m.
@@ -20,7 +20,7 @@ const FASTER_STEP_DEG: u32 = 2;
 
 /// Figure 6: heads in phase shift over two turns.
 #[derive(Debug, Clone)]
-pub struct PhaseShift {
+pub(crate) struct PhaseShift {
     /// The tunnel's profile.
     pub profile: Profile,
     /// How many heads.
@@ -47,7 +47,7 @@ pub struct PhaseShift {
 
 /// Figure 8: two heads in sector offset over three sweeps there and back.
 #[derive(Debug, Clone)]
-pub struct Sectors {
+pub(crate) struct Sectors {
     /// The tunnel's profile.
     pub profile: Profile,
     /// The mode of the heads.
@@ -86,10 +86,10 @@ fn pitch_m(dive: &Dive) -> f64 {
 /// Simulates four heads, FASTEST.
 ///
 /// Errors: none with the vehicles that are built in.
-pub fn phase_shift(dives: &Dives<'_>) -> Result<PhaseShift, ExperimentError> {
+pub(crate) fn phase_shift() -> Result<PhaseShift, ExperimentError> {
     const HEADS: u8 = 4;
     const MODE: &str = "FASTEST";
-    let dive = dives.dive(&setting(HEADS, MODE, HeadLayout::PhaseShift, 12.0))?;
+    let dive = setting(HEADS, MODE, HeadLayout::PhaseShift, 12.0).dive()?;
     let (profile, t_x_m) = (&dive.profile, pitch_m(&dive));
     let first = dive.heads.first().map(Vec::as_slice).unwrap_or_default();
     // The picture begins where the first head passes the floor's centre.
@@ -155,10 +155,10 @@ fn faster(dive: &Dive, gain_m: f64, length_m: f64) -> Vec<Way> {
 /// Simulates two heads, MEDIUM.
 ///
 /// Errors: none with the vehicles that are built in.
-pub fn sectors(dives: &Dives<'_>) -> Result<Sectors, ExperimentError> {
+pub(crate) fn sectors() -> Result<Sectors, ExperimentError> {
     const HEADS: u8 = 2;
     const MODE: &str = "MEDIUM";
-    let dive = dives.dive(&setting(HEADS, MODE, HeadLayout::SectorOffset, 16.0))?;
+    let dive = setting(HEADS, MODE, HeadLayout::SectorOffset, 16.0).dive()?;
     let t_x_m = pitch_m(&dive) / f64::from(HEADS);
     let first = dive.heads.first().map(Vec::as_slice).unwrap_or_default();
     let [y_m, z_m] = dive.profile.reference();

@@ -1,4 +1,4 @@
-//! What needs no dive; the dives' figures are tested where devices are known.
+//! The seam and the beams; figures of whole dives are tested with their drawings.
 
 use super::*;
 

@@ -6,7 +6,7 @@ use headrace_geometry::tunnel::Profile;
 use super::{Place, Window};
 use crate::Spread;
 use crate::meshes::{LENGTH_M, cloud, poisson, setting};
-use crate::runs::{Dive, Dives, SPEED_MPS};
+use crate::runs::{Dive, SPEED_MPS};
 use crate::spacing::passes_of;
 use crate::surface::{MeshIndex, wall};
 use crate::{ExperimentError, Progress};
@@ -28,10 +28,10 @@ const SCALE_SHARE: f64 = 0.93;
 type Configuration = (u8, &'static str, bool, bool);
 
 /// Figure 12: two heads with and without their phases aligned.
-pub const PHASES: [Configuration; 4] =
+pub(crate) const PHASES: [Configuration; 4] =
     [(2, "slow", false, false), (2, "slow", false, true), (2, "slow", true, false), (2, "slow", true, true)];
 /// Figure 13: heads that hide the wall from each other.
-pub const AT_GAPS: [Configuration; 4] = [
+pub(crate) const AT_GAPS: [Configuration; 4] = [
     (3, "medium", false, true),
     (4, "medium", false, true),
     (3, "medium", true, true),
@@ -40,7 +40,7 @@ pub const AT_GAPS: [Configuration; 4] = [
 
 /// Panels side by side, of one stretch.
 #[derive(Debug, Clone)]
-pub struct Walls {
+pub(crate) struct Walls {
     /// The tunnel's profile.
     pub profile: Profile,
     /// Speed, m/s.
@@ -57,7 +57,7 @@ pub struct Walls {
 
 /// A configuration's stretch of wall.
 #[derive(Debug, Clone)]
-pub struct Panel {
+pub(crate) struct Panel {
     /// How many heads.
     pub heads: u8,
     /// Their mode.
@@ -86,7 +86,7 @@ pub struct Panel {
 
 /// Wall between two passes.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Gap {
+pub(crate) struct Gap {
     /// The line's arc length, m.
     pub sigma_m: f64,
     /// Where it begins and ends, from where the picture begins, m.
@@ -95,7 +95,7 @@ pub struct Gap {
 
 impl Gap {
     /// How long it is, m.
-    pub fn length_m(&self) -> f64 {
+    pub(crate) fn length_m(&self) -> f64 {
         self.x_m[1] - self.x_m[0]
     }
 }
@@ -103,8 +103,7 @@ impl Gap {
 /// Simulates dives as the meshes' and looks at a stretch in their middle.
 ///
 /// Errors: a surface that can't be made; none with the vehicles that are built in.
-pub fn walls(
-    dives: &Dives<'_>,
+pub(crate) fn walls(
     configurations: &[Configuration],
     progress: Progress<'_>,
 ) -> Result<Walls, ExperimentError> {
@@ -112,7 +111,7 @@ pub fn walls(
     let mut panels = Vec::new();
     for configuration in configurations {
         progress(&format!("a picture of {} heads' samples", configuration.0));
-        let dive = dives.dive(&setting(*configuration, LENGTH_M, 1))?;
+        let dive = setting(*configuration, LENGTH_M, 1).dive()?;
         panels.push(panel(&dive, window, *configuration)?);
     }
     let mut all: Vec<f64> = panels.iter().flat_map(|panel| panel.distances_m.iter().copied()).collect();

@@ -7,7 +7,7 @@ use super::image::Image;
 
 /// A closed line of pixels round the head.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Chain {
+pub(crate) struct Chain {
     /// Steps to a pixel beside, above or below.
     pub straight: usize,
     /// Steps to a pixel over a corner.

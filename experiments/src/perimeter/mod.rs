@@ -8,7 +8,7 @@ mod thin;
 
 use headrace_geometry::math::{self, TAU};
 
-pub use chain::Chain;
+pub(crate) use chain::Chain;
 
 use chain::trace;
 use echo::Echoes;
@@ -16,7 +16,7 @@ use image::Image;
 
 /// One ping: the head's angle, and where its beam's rays met the wall.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Ping {
+pub(crate) struct Ping {
     /// Angle of the head in [`headrace_geometry::frames`]'s sense, radians: 0 down, 90 degrees to the left.
     pub angle_rad: f64,
     /// Range of every ray in the beam, m; rays that are no number or beyond range give no echo.
@@ -26,7 +26,7 @@ pub struct Ping {
 /// How echoes become a skeleton.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
-pub struct Settings {
+pub(crate) struct Settings {
     /// Range of the last bin's end, m.
     pub range_max_m: f64,
     /// Bins of an echo; 8 to 10,000.
@@ -43,7 +43,7 @@ pub struct Settings {
 
 impl Settings {
     /// The paper's where it states them: 10 m, 500 points (§9.2). Pulse, pixel and threshold are ours.
-    pub fn of_paper() -> Self {
+    pub(crate) fn of_paper() -> Self {
         Self { range_max_m: 10.0, bins: 500, pulse_m: 0.05, pixel_m: 0.02, threshold: 0.5, grow_px: 2 }
     }
 }
@@ -83,7 +83,7 @@ pub enum PerimeterError {
 /// angles. Of places at one angle, the order given counts.
 ///
 /// Errors: fewer than three places that are numbers.
-pub fn polygon_m(places: &[(f64, f64)]) -> Result<f64, PerimeterError> {
+pub(crate) fn polygon_m(places: &[(f64, f64)]) -> Result<f64, PerimeterError> {
     let good = |(angle, range): &&(f64, f64)| angle.is_finite() && range.is_finite();
     let mut sorted: Vec<(f64, f64)> =
         places.iter().filter(good).map(|(angle, range)| (math::wrap(*angle, TAU), *range)).collect();
@@ -101,13 +101,13 @@ pub fn polygon_m(places: &[(f64, f64)]) -> Result<f64, PerimeterError> {
 }
 
 /// Each ping's angle and least range: what a head reports that takes the first echo. Pings without echo are left out.
-pub fn least_ranges(pings: &[Ping]) -> Vec<(f64, f64)> {
+pub(crate) fn least_ranges(pings: &[Ping]) -> Vec<(f64, f64)> {
     let least = |p: &Ping| p.ranges_m.iter().copied().filter(|r| r.is_finite()).fold(f64::INFINITY, f64::min);
     pings.iter().map(|p| (p.angle_rad, least(p))).filter(|(_, range)| range.is_finite()).collect()
 }
 
 /// Each ping's angle and mean range. Pings without echo are left out.
-pub fn mean_ranges(pings: &[Ping]) -> Vec<(f64, f64)> {
+pub(crate) fn mean_ranges(pings: &[Ping]) -> Vec<(f64, f64)> {
     let mean = |p: &Ping| {
         let known = p.ranges_m.iter().filter(|r| r.is_finite());
         known.clone().sum::<f64>() / known.count() as f64
@@ -120,7 +120,7 @@ pub fn mean_ranges(pings: &[Ping]) -> Vec<(f64, f64)> {
 ///
 /// Errors: see [`PerimeterError`].
 /// Source: the paper's §9.2.
-pub fn skeleton(pings: &[Ping], settings: &Settings) -> Result<Chain, PerimeterError> {
+pub(crate) fn skeleton(pings: &[Ping], settings: &Settings) -> Result<Chain, PerimeterError> {
     check(settings)?;
     let echoes = Echoes::of(pings, settings)?;
     let mut image = Image::of(&echoes, settings);

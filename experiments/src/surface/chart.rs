@@ -13,7 +13,7 @@ const TINY_M: f64 = 1e-100;
 
 /// A sample on the unrolled wall.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Deviation {
+pub(crate) struct Deviation {
     /// Chainage, m.
     pub x_m: f64,
     /// Arc length of the design's place seen from the reference point through the sample, m.
@@ -24,7 +24,7 @@ pub struct Deviation {
 
 impl Deviation {
     /// Of a place in the tunnel.
-    pub fn of(profile: &Profile, place: Xyz) -> Self {
+    pub(crate) fn of(profile: &Profile, place: Xyz) -> Self {
         let centre = profile.reference();
         let direction = [place[1] - centre[0], place[2] - centre[1]];
         let length_m = math::hypot(direction[0], direction[1]);
@@ -57,14 +57,14 @@ pub struct ChartError {
 }
 
 /// The interpolated wall.
-pub struct Chart {
+pub(crate) struct Chart {
     triangles: DelaunayTriangulation<Vertex>,
     perimeter_m: f64,
 }
 
 /// How an interpolated wall differs from the true one.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ChartSpread {
+pub(crate) struct ChartSpread {
     /// Unsigned differences along the ray from the reference point.
     pub spread: Spread,
     /// Places outside the samples' hull, which have no value.
@@ -75,7 +75,7 @@ impl Chart {
     /// Of two samples at one place the later counts.
     ///
     /// Errors: a coordinate that is no number, or is beyond 1e60.
-    pub fn new(perimeter_m: f64, samples: &[Deviation]) -> Result<Self, ChartError> {
+    pub(crate) fn new(perimeter_m: f64, samples: &[Deviation]) -> Result<Self, ChartError> {
         let vertices = samples.iter().flat_map(|s| images(perimeter_m, s)).collect();
         let triangles = DelaunayTriangulation::bulk_load(vertices);
         let triangles = triangles.map_err(|why| ChartError { why: why.to_string() })?;
@@ -83,13 +83,13 @@ impl Chart {
     }
 
     /// The wall's deviation at (x, sigma), m; `None` outside the samples' hull.
-    pub fn deviation_m(&self, x_m: f64, sigma_m: f64) -> Option<f64> {
+    pub(crate) fn deviation_m(&self, x_m: f64, sigma_m: f64) -> Option<f64> {
         let at = Point2::new(plain(x_m), plain(math::wrap(sigma_m, self.perimeter_m)));
         self.triangles.barycentric().interpolate(|vertex| vertex.data().deviation_m, at)
     }
 
     /// Differences from the true deviations, `reference`(x, sigma) in metres, over a stretch.
-    pub fn compare(&self, stretch: &Stretch, reference: impl Fn(f64, f64) -> f64) -> ChartSpread {
+    pub(crate) fn compare(&self, stretch: &Stretch, reference: impl Fn(f64, f64) -> f64) -> ChartSpread {
         let mut uncovered = 0;
         let differences = stretch.places(self.perimeter_m).filter_map(|(x, sigma)| {
             let here = self.deviation_m(x, sigma);

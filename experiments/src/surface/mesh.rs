@@ -6,7 +6,7 @@ use super::{Xyz, dot, norm, sub};
 
 /// A surface made of triangles.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Mesh {
+pub(crate) struct Mesh {
     /// Corners, m.
     pub vertices: Vec<Xyz>,
     /// Three indices each.
@@ -15,7 +15,7 @@ pub struct Mesh {
 
 /// Triangles sorted into cubic bins, for the nearest one.
 #[derive(Debug, Clone)]
-pub struct MeshIndex<'a> {
+pub(crate) struct MeshIndex<'a> {
     mesh: &'a Mesh,
     origin: Xyz,
     bin_m: f64,
@@ -31,7 +31,7 @@ const BINS_MAX: f64 = 4e6;
 impl MeshIndex<'_> {
     /// `bin_m` is the side of a bin, m: about that of a triangle. It is made larger where there would be too many.
     /// `None` for a mesh without triangles, with an index beyond its vertices or a corner that is no number.
-    pub fn new(mesh: &Mesh, bin_m: f64) -> Option<MeshIndex<'_>> {
+    pub(crate) fn new(mesh: &Mesh, bin_m: f64) -> Option<MeshIndex<'_>> {
         let known = |t: &[u32; 3]| t.iter().all(|k| (*k as usize) < mesh.vertices.len());
         let finite = |p: &Xyz| p.iter().all(|c| c.is_finite());
         let (least, most) = bounds(&mesh.vertices);
@@ -97,7 +97,7 @@ impl MeshIndex<'_> {
     }
 
     /// Distance from a place to the mesh, m. The place must be within about a million bins of it.
-    pub fn distance_m(&self, place: Xyz) -> f64 {
+    pub(crate) fn distance_m(&self, place: Xyz) -> f64 {
         let centre = self.bin(place);
         let outside = centre.iter().zip(&self.bins).map(|(c, n)| (-c).max(c - (n - 1)).max(0));
         let first = outside.max().unwrap_or(0);

@@ -1,26 +1,26 @@
 //! Surfaces through scattered samples of a tunnel's wall, and how far they are from the wall.
 //!
 //! `poisson` closes a surface round the samples as the paper did; `chart` interpolates deviations on the unrolled wall;
-//! `wall` measures both ways between a surface and the design.
+//! `wall` measures how far the wall is from a surface.
 
 mod band;
-pub mod chart;
+pub(crate) mod chart;
 mod extract;
 mod grid;
 mod mesh;
-pub mod normals;
-pub mod poisson;
+pub(crate) mod normals;
+pub(crate) mod poisson;
 mod solver;
-pub mod wall;
+pub(crate) mod wall;
 
-pub use mesh::{Mesh, MeshIndex};
+pub(crate) use mesh::{Mesh, MeshIndex};
 
 /// A place in the tunnel's frame: x chainage, y left, z up, metres.
-pub type Xyz = [f64; 3];
+pub(crate) type Xyz = [f64; 3];
 
 /// A sample of the wall.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sample {
+pub(crate) struct Sample {
     /// Where the wall was hit.
     pub place: Xyz,
     /// Unit normal there, towards the water.

@@ -15,7 +15,7 @@ use headrace_geometry::math;
 
 use super::grid::Grid;
 use super::mesh::Mesh;
-use super::solver::{Screened, divergence};
+use super::solver::{Screened, Solved, divergence};
 use super::{Sample, Xyz, extract};
 
 /// Most functions of a grid: about 1.5 GB.
@@ -31,7 +31,7 @@ const COARSER_LEVELS: usize = 4;
 /// What to reconstruct with.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
-pub struct Settings {
+pub(crate) struct Settings {
     /// A cell is `scale` times the largest extent of the samples over 2^depth; 2 to 12.
     pub depth: u32,
     /// How much it counts that the surface passes through the samples; 0 to 1000.
@@ -50,7 +50,7 @@ pub struct Settings {
 
 impl Settings {
     /// The paper's: depth 8, one sample a node, point weight 5 (§8.2); the cube 1.1 times the samples, as its tool has it.
-    pub fn of_paper() -> Self {
+    pub(crate) fn of_paper() -> Self {
         Self {
             depth: 8,
             point_weight: 5.0,
@@ -95,16 +95,22 @@ pub enum PoissonError {
         /// Nodes wanted.
         nodes: f64,
     },
+    /// The solver took all its steps and is still short of its tolerance.
+    #[error("after {steps} steps the residual is still {residual:e} of the right-hand side")]
+    NotSolved {
+        /// Steps taken on the finest grid.
+        steps: usize,
+        /// Length of the residual over that of the right-hand side.
+        residual: f64,
+    },
 }
 
 /// A field whose level set is the surface.
 #[derive(Debug, Clone)]
-pub struct Surface {
+pub(crate) struct Surface {
     grid: Grid,
     field: Vec<f64>,
     level: f64,
-    steps: usize,
-    residual: f64,
 }
 
 /// Samples with what they stand for.
@@ -121,38 +127,32 @@ impl Surface {
     /// Through samples of a wall with unit normals towards the water.
     ///
     /// Errors: see [`PoissonError`].
-    pub fn through(samples: &[Sample], settings: &Settings) -> Result<Self, PoissonError> {
+    pub(crate) fn through(samples: &[Sample], settings: &Settings) -> Result<Self, PoissonError> {
         check(samples, settings)?;
         let grid = grid_round(samples, settings)?;
         let cloud = Cloud::measure(samples, &grid, settings.samples_per_node);
-        let (field, steps, residual) = solve(&grid, &cloud, settings, COARSER_LEVELS);
+        let (field, Solved { steps, residual }) = solve(&grid, &cloud, settings, COARSER_LEVELS);
+        // The solver stops at the tolerance to rounding.
+        if residual > settings.tolerance * (1.0 + 1e-9) {
+            return Err(PoissonError::NotSolved { steps, residual });
+        }
         let weighted = cloud.samples.iter().zip(&cloud.areas_m2);
         let sum: f64 = weighted.map(|(sample, area)| area * grid.value(&field, sample.place)).sum();
-        Ok(Self { grid, field, level: sum / cloud.area_m2, steps, residual })
+        Ok(Self { grid, field, level: sum / cloud.area_m2 })
     }
 
     /// Above zero towards the water, below behind the wall; the step across the wall is about one.
-    pub fn value(&self, place: Xyz) -> f64 {
+    pub(crate) fn value(&self, place: Xyz) -> f64 {
         self.grid.value(&self.field, place) - self.level
     }
 
     /// Side of a cell, m.
-    pub fn cell_m(&self) -> f64 {
+    pub(crate) fn cell_m(&self) -> f64 {
         self.grid.cell_m
     }
 
-    /// Unknowns solved for.
-    pub fn nodes(&self) -> usize {
-        self.grid.len()
-    }
-
-    /// Steps of the solver on the finest grid, and the residual over the right-hand side that was left.
-    pub fn convergence(&self) -> (usize, f64) {
-        (self.steps, self.residual)
-    }
-
     /// The surface as triangles with their corners on it, on the grid's cells.
-    pub fn mesh(&self) -> Mesh {
+    pub(crate) fn mesh(&self) -> Mesh {
         extract::mesh(&self.grid, |place| self.value(place))
     }
 }
@@ -254,8 +254,8 @@ fn levels_up(per_cell: f64, wanted: f64) -> usize {
     (0..COARSER_LEVELS).take_while(|level| per_cell * f64::from(1_u32 << (2 * level)) < wanted).count()
 }
 
-/// Coefficients of the field, the solver's steps and what residual it left. Coarser grids give a first solution.
-fn solve(grid: &Grid, cloud: &Cloud<'_>, settings: &Settings, coarser: usize) -> (Vec<f64>, usize, f64) {
+/// Coefficients of the field, and how well they solve the equation. Coarser grids give a first solution.
+fn solve(grid: &Grid, cloud: &Cloud<'_>, settings: &Settings, coarser: usize) -> (Vec<f64>, Solved) {
     let level = COARSER_LEVELS - coarser;
     let mut field = if coarser > 0 && grid.cells.iter().all(|n| *n >= 8) {
         let coarse = grid.coarser();
@@ -269,7 +269,7 @@ fn solve(grid: &Grid, cloud: &Cloud<'_>, settings: &Settings, coarser: usize) ->
     let weight = settings.point_weight * area_cells / cloud.samples.len() as f64;
     let system = Screened::new(grid, places, weight);
     let solved = system.solve(&rhs, &mut field, settings.tolerance, settings.steps_max);
-    (field, solved.steps, solved.residual)
+    (field, solved)
 }
 
 #[cfg(test)]

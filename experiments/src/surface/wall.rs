@@ -1,14 +1,14 @@
-//! Distances between a surface and the wall, both ways.
+//! Distances from the wall to a surface.
 
 use headrace_geometry::math;
 use headrace_geometry::tunnel::Profile;
 
-use super::{Mesh, MeshIndex, Xyz};
+use super::{MeshIndex, Xyz};
 use crate::Spread;
 
 /// A stretch of wall, looked at on a lattice of places.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Stretch {
+pub(crate) struct Stretch {
     /// Where it begins along the tunnel, m.
     pub from_m: f64,
     /// Where it ends, m.
@@ -21,7 +21,7 @@ pub struct Stretch {
 impl Stretch {
     /// Chainages and arc lengths of its places, x outermost: whole steps from `from_m`, and as many round the wall as
     /// divide it evenly.
-    pub fn places(&self, perimeter_m: f64) -> impl Iterator<Item = (f64, f64)> + use<> {
+    pub(crate) fn places(&self, perimeter_m: f64) -> impl Iterator<Item = (f64, f64)> + use<> {
         let Self { from_m, to_m, step_m } = *self;
         let along = math::floor_to_i64((to_m - from_m) / step_m + 1e-9).max(-1);
         let round = math::round_to_i64(perimeter_m / step_m).max(1);
@@ -33,7 +33,7 @@ impl Stretch {
 
 /// The place at a chainage and arc length of a wall that stands off its design by `deviation_m` along the ray from the
 /// reference point, outwards positive.
-pub fn place(profile: &Profile, x_m: f64, sigma_m: f64, deviation_m: f64) -> Xyz {
+pub(crate) fn place(profile: &Profile, x_m: f64, sigma_m: f64, deviation_m: f64) -> Xyz {
     let (centre, wall) = (profile.reference(), profile.point_at(sigma_m));
     let out = [wall[0] - centre[0], wall[1] - centre[1]];
     let scale = 1.0 + deviation_m / math::hypot(out[0], out[1]);
@@ -42,7 +42,7 @@ pub fn place(profile: &Profile, x_m: f64, sigma_m: f64, deviation_m: f64) -> Xyz
 
 /// Unsigned distances from places of the true wall to a surface: what of the wall was missed. `reference` gives the
 /// wall's deviation from the design at (x, sigma), m.
-pub fn from_wall(
+pub(crate) fn from_wall(
     profile: &Profile,
     surface: &MeshIndex<'_>,
     stretch: &Stretch,
@@ -52,16 +52,12 @@ pub fn from_wall(
     Spread::of(places.map(|(x, sigma)| surface.distance_m(place(profile, x, sigma, reference(x, sigma)))))
 }
 
-/// Unsigned distances from a surface's corners within a stretch to the design, an endless tube: what was made up.
-pub fn to_design(profile: &Profile, surface: &Mesh, stretch: &Stretch) -> Spread {
-    let within = |p: &&Xyz| (stretch.from_m..=stretch.to_m).contains(&p[0]);
-    Spread::of(surface.vertices.iter().filter(within).map(|p| profile.nearest([p[1], p[2]]).distance_m))
-}
-
 #[cfg(test)]
 mod tests {
-    use super::*;
     use headrace_geometry::tunnel::shapes;
+
+    use super::super::Mesh;
+    use super::*;
 
     /// The design's own tube, shifted outwards by `off_m` along rays.
     fn tube(profile: &Profile, off_m: f64) -> Mesh {
@@ -80,16 +76,13 @@ mod tests {
     }
 
     #[test]
-    fn a_tube_a_known_way_off_is_so_far_off_both_ways() {
+    fn a_tube_a_known_way_off_is_so_far_off() {
         let profile = shapes::circle(2.0).unwrap();
         let stretch = Stretch { from_m: 1.0, to_m: 9.0, step_m: 0.1 };
         let mesh = tube(&profile, 0.05);
         let index = MeshIndex::new(&mesh, 0.3).unwrap();
-        for spread in
-            [from_wall(&profile, &index, &stretch, |_, _| 0.0), to_design(&profile, &mesh, &stretch)]
-        {
-            assert!((spread.mean_m - 0.05).abs() < 1e-4 && spread.sd_m < 1e-4, "{spread:?}");
-        }
+        let spread = from_wall(&profile, &index, &stretch, |_, _| 0.0);
+        assert!((spread.mean_m - 0.05).abs() < 1e-4 && spread.sd_m < 1e-4, "{spread:?}");
         let right = from_wall(&profile, &index, &stretch, |_, _| 0.05);
         assert!(right.max_m < 1e-4, "{right:?}");
     }

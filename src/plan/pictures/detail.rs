@@ -1,11 +1,12 @@
 //! A piece of the pattern to scale, about the emptiest place.
 
+use headrace_pictures::canvas::{Canvas, NORMAL, Px, SMALL, Side};
+use headrace_pictures::chart::{Axis, Chart, short};
+use headrace_pictures::look::{self, Look};
+use headrace_pictures::polyline::Frame;
+
 use super::laid::Laid;
 use super::pattern::CIRCLE;
-use crate::pictures::canvas::{Canvas, NORMAL, Px, SMALL, Side};
-use crate::pictures::chart::{Axis, Chart, short};
-use crate::pictures::look::{self, Look};
-use crate::pictures::polyline::Frame;
 
 const FRAME: Frame = Frame { left: 676.0, top: 92.0, right: 886.0, bottom: 302.0 };
 /// Where the words below it begin, pixels.

@@ -1,12 +1,14 @@
 //! Hours against T.
 
+use headrace_pictures::canvas::{BOLD, Canvas, Colour, NORMAL, Side, width_px};
+use headrace_pictures::chart::{Axis, Chart, short};
+use headrace_pictures::labels::{self, Label};
+use headrace_pictures::look::{self, Look};
+use headrace_pictures::polyline::Frame;
+use headrace_sampling::SamplingError;
+
+use super::Shown;
 use super::modes::{self, Mode};
-use super::{PictureError, Shown};
-use crate::pictures::canvas::{self, BOLD, Colour, Drawn, NORMAL, Side, width_px};
-use crate::pictures::chart::{Axis, Chart, short};
-use crate::pictures::labels::{self, Label};
-use crate::pictures::look::{self, Look};
-use crate::pictures::polyline::Frame;
 
 const FRAME: Frame = Frame { left: 66.0, top: 92.0, right: 752.0, bottom: 482.0 };
 /// By how much a speed exceeds the one before it on a curve.
@@ -24,27 +26,32 @@ struct Sought {
 }
 
 /// Hours for the whole length, one way, against T for every mode.
-pub(crate) fn hours(shown: &Shown<'_>) -> Result<String, PictureError> {
+pub(crate) fn hours(shown: &Shown<'_>) -> Result<String, SamplingError> {
     let modes = modes::all(shown)?;
     let sought = sought(shown, &modes)?;
     let most = ends(shown, &modes, &sought)?;
     let title = format!("Hours for {} m, one way, against T", shown.planner.inspection().length_m);
-    canvas::sheet(&title, &shown.subtitle(), |canvas| {
-        let x = Axis::new("T: a feature this large is hit, m", 0.0, most[0], 12);
-        let chart = Chart::new(canvas, FRAME, &x, &Axis::new("hours, one way", 0.0, most[1], 9));
-        let words = modes::blind_words(&modes);
-        if modes.iter().any(|mode| !mode.blind) {
-            curves(&chart, shown, &modes, &sought, most)?;
-        }
-        if !words.is_empty() {
-            chart.instead(&words);
-        }
-        Ok(())
-    })
+    let canvas = Canvas::new(&title, &shown.subtitle());
+    let x = Axis::new("T: a feature this large is hit, m", 0.0, most[0], 12);
+    let chart = Chart::new(&canvas, FRAME, &x, &Axis::new("hours, one way", 0.0, most[1], 9));
+    let words = modes::blind_words(&modes);
+    if modes.iter().any(|mode| !mode.blind) {
+        curves(&chart, shown, &modes, &sought, most)?;
+    }
+    if !words.is_empty() {
+        chart.instead(&words);
+    }
+    Ok(canvas.into_svg())
 }
 
 /// All that is drawn where some mode gives a T.
-fn curves(chart: &Chart<'_>, shown: &Shown<'_>, modes: &[Mode], sought: &Sought, most: [f64; 2]) -> Drawn {
+fn curves(
+    chart: &Chart<'_>,
+    shown: &Shown<'_>,
+    modes: &[Mode],
+    sought: &Sought,
+    most: [f64; 2],
+) -> Result<(), SamplingError> {
     chart.line(&least(shown, modes, most[0]), &BAND);
     legend(chart);
     let mut right: Vec<Label> = asked(chart, shown, sought).into_iter().collect();
@@ -59,7 +66,7 @@ fn curves(chart: &Chart<'_>, shown: &Shown<'_>, modes: &[Mode], sought: &Sought,
 }
 
 /// The target, or else the T that the speed asked about gives.
-fn sought(shown: &Shown<'_>, modes: &[Mode]) -> Result<Sought, PictureError> {
+fn sought(shown: &Shown<'_>, modes: &[Mode]) -> Result<Sought, SamplingError> {
     let length_m = shown.planner.inspection().length_m;
     let t_m = match shown.question.target_m {
         Some(target_m) => target_m,
@@ -72,7 +79,7 @@ fn sought(shown: &Shown<'_>, modes: &[Mode]) -> Result<Sought, PictureError> {
 }
 
 /// The right and the upper end.
-fn ends(shown: &Shown<'_>, modes: &[Mode], sought: &Sought) -> Result<[f64; 2], PictureError> {
+fn ends(shown: &Shown<'_>, modes: &[Mode], sought: &Sought) -> Result<[f64; 2], SamplingError> {
     let length_m = shown.planner.inspection().length_m;
     let all = || sought.hours.iter().flatten().copied();
     let (least_h, most_h) = (all().fold(f64::INFINITY, f64::min), all().fold(0.0, f64::max));
@@ -96,7 +103,7 @@ fn legend(chart: &Chart<'_>) {
     chart.canvas.text_on_white([x - 46.0, y], "takes least time", Side::Left, NORMAL);
 }
 
-fn curve(shown: &Shown<'_>, mode: &Mode, [most_m, most_h]: [f64; 2]) -> Result<Vec<[f64; 2]>, PictureError> {
+fn curve(shown: &Shown<'_>, mode: &Mode, [most_m, most_h]: [f64; 2]) -> Result<Vec<[f64; 2]>, SamplingError> {
     /// Enough for a speed to grow a thousandfold.
     const POINTS: u32 = 400;
     let length_m = shown.planner.inspection().length_m;

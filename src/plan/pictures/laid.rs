@@ -1,9 +1,11 @@
 //! The pattern that heads lay on the wall, and the part of it in which all of them have passed.
 
 use headrace_geometry::math;
+use headrace_pictures::polyline;
+use headrace_sampling::SamplingError;
 use headrace_sampling::plan::PatternSample;
 
-use super::{PictureError, Shown};
+use super::Shown;
 
 /// The most samples that are computed for a picture.
 const MOST_SAMPLES: f64 = 400_000.0;
@@ -31,7 +33,7 @@ pub(super) struct Pass {
 }
 
 /// Lays enough turns for the picture and its detail.
-pub(super) fn lay(shown: &Shown<'_>) -> Result<Laid, PictureError> {
+pub(super) fn lay(shown: &Shown<'_>) -> Result<Laid, SamplingError> {
     let planner = shown.planner;
     let specs = planner.specs(shown.mode);
     let turn = planner.modes().get(shown.mode).map(|planned| planned.mode.turn);
@@ -83,7 +85,8 @@ impl Laid {
             }
             // A step to or from a hidden sample is one over wall that isn't sampled.
             let hidden = here.hidden || before.hidden;
-            for [begin, end] in self.over_seam([before.x_m, before.sigma_m], [here.x_m, here.sigma_m]) {
+            let (from, to) = ([before.x_m, before.sigma_m], [here.x_m, here.sigma_m]);
+            for [begin, end] in polyline::over_seam(self.perimeter_m, from, to) {
                 match passes.last_mut() {
                     Some(pass)
                         if pass.head == here.head
@@ -97,19 +100,6 @@ impl Laid {
             }
         }
         passes
-    }
-
-    /// A step as one segment, or as two that end and begin at the seam.
-    fn over_seam(&self, from: [f64; 2], to: [f64; 2]) -> Vec<[[f64; 2]; 2]> {
-        let way_m = math::wrap_signed(to[1] - from[1], self.perimeter_m);
-        if (to[1] - from[1] - way_m).abs() < 1e-9 {
-            return vec![[from, to]];
-        }
-        let (leaving_m, entering_m) =
-            if way_m > 0.0 { (self.perimeter_m, 0.0) } else { (0.0, self.perimeter_m) };
-        let share = (leaving_m - from[1]) / way_m;
-        let x_m = from[0] + share * (to[0] - from[0]);
-        vec![[from, [x_m, leaving_m]], [[x_m, entering_m], to]]
     }
 
     /// Samples not hidden near a place, their arc length on this side of the seam; within `half_m` either way.

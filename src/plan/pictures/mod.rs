@@ -11,7 +11,6 @@ mod wall;
 
 use headrace_sampling::plan::{Planner, Question};
 
-pub(crate) use crate::pictures::PictureError;
 pub(crate) use hours::hours;
 pub(crate) use pattern::pattern;
 pub(crate) use perimeter::perimeter;

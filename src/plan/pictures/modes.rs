@@ -1,9 +1,10 @@
 //! What speeds and hours have in common: the modes, by name and with what they reach.
 
+use headrace_pictures::look::{self, Look};
+use headrace_sampling::SamplingError;
 use headrace_sampling::plan::Planner;
 
-use super::{PictureError, Shown};
-use crate::pictures::look::{self, Look};
+use super::Shown;
 
 /// A mode as the pictures show it.
 #[derive(Debug, Clone)]
@@ -18,9 +19,9 @@ pub(super) struct Mode {
 }
 
 /// All modes.
-pub(super) fn all(shown: &Shown<'_>) -> Result<Vec<Mode>, PictureError> {
+pub(super) fn all(shown: &Shown<'_>) -> Result<Vec<Mode>, SamplingError> {
     let count = shown.planner.modes().len();
-    let mode = |number: usize| -> Result<Mode, PictureError> {
+    let mode = |number: usize| -> Result<Mode, SamplingError> {
         let reached =
             shown.question.target_m.and_then(|target_m| shown.planner.v_max_mps(number, target_m).ok());
         Ok(Mode {

@@ -1,15 +1,17 @@
 //! The pattern on the unrolled wall.
 
+use headrace_pictures::canvas::{BOLD, Canvas, Colour, Letters, NORMAL, Px, SMALL, Side};
+use headrace_pictures::chart::{Axis, Chart};
+use headrace_pictures::clock;
+use headrace_pictures::look::{self, Look};
+use headrace_pictures::polyline::Frame;
+use headrace_sampling::SamplingError;
+
+use super::Shown;
 use super::detail;
 use super::laid::{self, Laid};
 use super::modes;
 use super::wall;
-use super::{PictureError, Shown};
-use crate::pictures::canvas::{self, BOLD, Canvas, Colour, Letters, NORMAL, Px, SMALL, Side};
-use crate::pictures::chart::{Axis, Chart};
-use crate::pictures::clock;
-use crate::pictures::look::{self, Look};
-use crate::pictures::polyline::Frame;
 
 const FRAME: Frame = Frame { left: 66.0, top: 92.0, right: 548.0, bottom: 482.0 };
 /// The inside of the circle.
@@ -20,7 +22,7 @@ const LEGEND: Px = [634.0, 412.0];
 const PLACES: usize = 360;
 
 /// The samples of some turns on the unrolled wall, with the circle that none of its like escapes.
-pub(crate) fn pattern(shown: &Shown<'_>) -> Result<String, PictureError> {
+pub(crate) fn pattern(shown: &Shown<'_>) -> Result<String, SamplingError> {
     let laid = laid::lay(shown)?;
     let places = shown.planner.perimeter(shown.mode, shown.speed_mps, PLACES)?;
     let worst = wall::worst(shown.planner, &places);
@@ -30,21 +32,20 @@ pub(crate) fn pattern(shown: &Shown<'_>) -> Result<String, PictureError> {
     let from_m = centre.map_or(laid.from_m, |[x_m, _]| x_m - length_m / 2.0);
     let from_m = from_m.max(laid.from_m).min(laid.to_m - length_m);
     let title = format!("Pattern on the unrolled wall: {}", modes::at_speed(shown));
-    canvas::sheet(&title, &shown.subtitle(), |canvas| {
-        let chart = chart(canvas, &laid, length_m);
-        if let (Some(centre), Some(t_m)) = (centre, laid.t_m) {
-            circle(&chart, [centre[0] - from_m, centre[1]], t_m);
-        }
-        let ways = passes(&chart, &laid, from_m);
-        numbers(&chart, laid.heads, &ways);
-        clock::at_right(&chart, &shown.planner.inspection().profile);
-        legend(canvas, &laid);
-        match (centre, laid.t_m) {
-            (Some(centre), Some(t_m)) => detail::draw(canvas, &laid, centre, from_m, t_m),
-            _ => unseen(canvas),
-        }
-        Ok(())
-    })
+    let canvas = Canvas::new(&title, &shown.subtitle());
+    let chart = chart(&canvas, &laid, length_m);
+    if let (Some(centre), Some(t_m)) = (centre, laid.t_m) {
+        circle(&chart, [centre[0] - from_m, centre[1]], t_m);
+    }
+    let ways = passes(&chart, &laid, from_m);
+    numbers(&chart, laid.heads, &ways);
+    clock::at_right(&chart, &shown.planner.inspection().profile);
+    legend(&canvas, &laid);
+    match (centre, laid.t_m) {
+        (Some(centre), Some(t_m)) => detail::draw(&canvas, &laid, centre, from_m, t_m),
+        _ => unseen(&canvas),
+    }
+    Ok(canvas.into_svg())
 }
 
 fn chart<'c>(canvas: &'c Canvas, laid: &Laid, length_m: f64) -> Chart<'c> {

@@ -1,15 +1,17 @@
 //! Spacing around the wall.
 
+use headrace_pictures::canvas::{self, Canvas, Colour, NORMAL, PALE, SMALL, Side, width_px};
+use headrace_pictures::chart::{Axis, Chart, short};
+use headrace_pictures::clock::{self, Hour};
+use headrace_pictures::labels::{self, Label};
+use headrace_pictures::look::{self, Look};
+use headrace_pictures::polyline::Frame;
+use headrace_sampling::SamplingError;
+use headrace_sampling::plan::WallPlace;
+
+use super::Shown;
 use super::modes;
 use super::wall::{self, Thin};
-use super::{PictureError, Shown};
-use crate::pictures::canvas::{self, Canvas, Colour, NORMAL, PALE, SMALL, Side, width_px};
-use crate::pictures::chart::{Axis, Chart, short};
-use crate::pictures::clock::{self, Hour};
-use crate::pictures::labels::{self, Label};
-use crate::pictures::look::{self, Look};
-use crate::pictures::polyline::Frame;
-use headrace_sampling::plan::WallPlace;
 
 const FRAME: Frame = Frame { left: 66.0, top: 72.0, right: 724.0, bottom: 444.0 };
 /// Places around the wall at which spacing is computed.
@@ -30,7 +32,7 @@ struct Around {
 }
 
 /// Spacing along the perimeter: T_y, T_x, T of both, the target, and who sees what.
-pub(crate) fn perimeter(shown: &Shown<'_>) -> Result<String, PictureError> {
+pub(crate) fn perimeter(shown: &Shown<'_>) -> Result<String, SamplingError> {
     let places = shown.planner.perimeter(shown.mode, shown.speed_mps, PLACES)?;
     let around = Around {
         worst: wall::worst(shown.planner, &places),
@@ -39,28 +41,27 @@ pub(crate) fn perimeter(shown: &Shown<'_>) -> Result<String, PictureError> {
         places,
     };
     let title = format!("Spacing around the wall: {}", modes::at_speed(shown));
-    canvas::sheet(&title, &shown.subtitle(), |canvas| {
-        let chart = chart(canvas, shown, &around);
-        let stretches = wall::thin(shown.planner);
-        for stretch in &stretches {
-            shade(&chart, stretch);
-        }
-        clocks(&chart, &clock::hours(&shown.planner.inspection().profile));
-        if let Some(target_m) = shown.question.target_m {
-            chart.across(target_m, &look::TARGET);
-        }
-        match around.worst {
-            Some(worst) => curves(&chart, shown, &around.places, &worst),
-            None => chart.instead(&[
-                "No head sees the wall anywhere:".to_owned(),
-                "there is no spacing to show.".to_owned(),
-            ]),
-        }
-        captions(&chart, &stretches);
-        across(&chart, &around);
-        canvas.text([14.0, 546.0], &note(shown, &around), Side::Right, SMALL);
-        Ok(())
-    })
+    let canvas = Canvas::new(&title, &shown.subtitle());
+    let chart = chart(&canvas, shown, &around);
+    let stretches = wall::thin(shown.planner);
+    for stretch in &stretches {
+        shade(&chart, stretch);
+    }
+    clocks(&chart, &clock::hours(&shown.planner.inspection().profile));
+    if let Some(target_m) = shown.question.target_m {
+        chart.across(target_m, &look::TARGET);
+    }
+    match around.worst {
+        Some(worst) => curves(&chart, shown, &around.places, &worst),
+        None => chart.instead(&[
+            "No head sees the wall anywhere:".to_owned(),
+            "there is no spacing to show.".to_owned(),
+        ]),
+    }
+    captions(&chart, &stretches);
+    across(&chart, &around);
+    canvas.text([14.0, 546.0], &note(shown, &around), Side::Right, SMALL);
+    Ok(canvas.into_svg())
 }
 
 impl Around {

@@ -1,45 +1,46 @@
 //! T against speed.
 
+use headrace_pictures::canvas::{BOLD, Canvas, NORMAL, Side};
+use headrace_pictures::chart::{Axis, Chart};
+use headrace_pictures::labels::{self, Label};
+use headrace_pictures::look;
+use headrace_pictures::polyline::Frame;
+use headrace_sampling::SamplingError;
+
+use super::Shown;
 use super::modes::{self, Mode};
-use super::{PictureError, Shown};
-use crate::pictures::canvas::{self, BOLD, Canvas, NORMAL, Side};
-use crate::pictures::chart::{Axis, Chart};
-use crate::pictures::labels::{self, Label};
-use crate::pictures::look;
-use crate::pictures::polyline::Frame;
 
 const FRAME: Frame = Frame { left: 66.0, top: 92.0, right: 708.0, bottom: 482.0 };
 /// Speeds at which T is computed.
 const SPEEDS: u32 = 400;
 
 /// T of every mode against speed, with the target and the speed asked about.
-pub(crate) fn speeds(shown: &Shown<'_>) -> Result<String, PictureError> {
+pub(crate) fn speeds(shown: &Shown<'_>) -> Result<String, SamplingError> {
     let modes = modes::all(shown)?;
     let most_mps = most_mps(shown, &modes);
     let curves = modes.iter().filter(|mode| !mode.blind);
     let curves = curves.map(|mode| Ok((mode, curve(shown, mode, most_mps)?)));
-    let curves = curves.collect::<Result<Vec<_>, PictureError>>()?;
+    let curves = curves.collect::<Result<Vec<_>, SamplingError>>()?;
     let most_m = most_m(shown, &curves);
-    canvas::sheet("T against speed: how fast each mode may go", &shown.subtitle(), |canvas| {
-        let x = Axis::new("speed along the tunnel, m/s", 0.0, most_mps, 10);
-        let y = Axis::new("T: a feature this large is hit, m", 0.0, most_m, 9);
-        let chart = Chart::new(canvas, FRAME, &x, &y);
-        if let Some(target_m) = shown.question.target_m {
-            chart.across(target_m, &look::TARGET);
-        }
-        let asked = asked(&chart, shown);
-        let mut ends = Ends::default();
-        for (mode, points) in &curves {
-            ends.add(&chart, shown, mode, points);
-        }
-        marks(&chart, shown, &modes);
-        ends.draw(canvas, shown.question.target_m.is_some());
-        if let Some((x, words)) = asked {
-            canvas.text_on_white([x, FRAME.bottom - 14.0], &words, Side::Middle, NORMAL);
-        }
-        blind(&chart, &modes);
-        Ok(())
-    })
+    let canvas = Canvas::new("T against speed: how fast each mode may go", &shown.subtitle());
+    let x = Axis::new("speed along the tunnel, m/s", 0.0, most_mps, 10);
+    let y = Axis::new("T: a feature this large is hit, m", 0.0, most_m, 9);
+    let chart = Chart::new(&canvas, FRAME, &x, &y);
+    if let Some(target_m) = shown.question.target_m {
+        chart.across(target_m, &look::TARGET);
+    }
+    let asked = asked(&chart, shown);
+    let mut ends = Ends::default();
+    for (mode, points) in &curves {
+        ends.add(&chart, shown, mode, points);
+    }
+    marks(&chart, shown, &modes);
+    ends.draw(&canvas, shown.question.target_m.is_some());
+    if let Some((x, words)) = asked {
+        canvas.text_on_white([x, FRAME.bottom - 14.0], &words, Side::Middle, NORMAL);
+    }
+    blind(&chart, &modes);
+    Ok(canvas.into_svg())
 }
 
 /// The right end of the axis, m/s.
@@ -74,7 +75,7 @@ fn highest_m(curves: &[(&Mode, Vec<[f64; 2]>)]) -> f64 {
     curves.iter().flat_map(|(_, points)| points).map(|[_, t_m]| *t_m).fold(0.0, f64::max)
 }
 
-fn curve(shown: &Shown<'_>, mode: &Mode, most_mps: f64) -> Result<Vec<[f64; 2]>, PictureError> {
+fn curve(shown: &Shown<'_>, mode: &Mode, most_mps: f64) -> Result<Vec<[f64; 2]>, SamplingError> {
     let point = |k: u32| {
         // Not at rest, where there is no T, but hardly moving.
         let v_mps = most_mps * f64::from(k).max(0.01) / f64::from(SPEEDS);

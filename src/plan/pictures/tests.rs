@@ -2,12 +2,13 @@
 
 use clap::Parser;
 use headrace_geometry::frames::Vec3;
+use headrace_pictures::xml::well_formed;
+use headrace_sampling::SamplingError;
 use headrace_sampling::occlusion::Obstacle;
 use headrace_sampling::plan::{Inspection, Planner, Question};
 
 use super::*;
 use crate::cli::{Cli, Command};
-use crate::pictures::xml::well_formed;
 use crate::plan::case::Case;
 
 const FAST: usize = 2;
@@ -19,7 +20,7 @@ const VITA_2: &str = "--vehicle deploy/vehicles/vita2-4.toml";
 const SECTORS: &str = "--vehicle deploy/vehicles/vita2-4.toml --layout sector_offset";
 const ONE: &str = "--tunnel ceran --length 7000";
 
-type Picture = fn(&Shown<'_>) -> Result<String, PictureError>;
+type Picture = fn(&Shown<'_>) -> Result<String, SamplingError>;
 
 const PICTURES: [(&str, Picture); 4] =
     [("perimeter", perimeter), ("pattern", pattern), ("speeds", speeds), ("hours", hours)];

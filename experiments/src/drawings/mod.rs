@@ -1,0 +1,28 @@
+//! Pictures like the paper's Figures 6, 8, 12, 13 and 15.
+
+mod beam;
+mod patterns;
+mod scale;
+#[cfg(test)]
+mod tests;
+mod walls;
+
+use crate::{ExperimentError, Progress, figures};
+
+/// The pictures by file name, as SVG. `progress` is told what is being done.
+///
+/// Errors: none with the vehicles that are built in.
+pub fn all(progress: Progress<'_>) -> Result<Vec<(&'static str, String)>, ExperimentError> {
+    let phases = figures::walls(&figures::PHASES, progress)?;
+    let at_gaps = figures::walls(&figures::AT_GAPS, progress)?;
+    Ok(vec![
+        ("fig06.svg", patterns::phase_shift(&figures::phase_shift()?)),
+        ("fig08.svg", patterns::sectors(&figures::sectors()?)),
+        ("fig12.svg", walls::walls("Figure 12: two heads with and without their phases aligned", &phases)),
+        (
+            "fig13.svg",
+            walls::walls("Figure 13: heads side by side hide the side walls from each other", &at_gaps),
+        ),
+        ("fig15.svg", beam::footprints(&figures::footprints()?)),
+    ])
+}

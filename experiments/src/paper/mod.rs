@@ -1,0 +1,112 @@
+//! The paper's Tables 1 to 5 computed anew: each printed number, ours beside it, and where the fault is the paper's.
+//!
+//! Source: Jorge et al., "Analytical Approach to Sampling Estimation of Underwater Tunnels Using Mechanical Profiling
+//! Sonars", Sensors 2021, 21, 1900 (CC BY 4.0). Its numbers are in the `*.csv` files here, as printed.
+
+mod baseline;
+mod cell;
+mod combined;
+mod drift;
+mod findings;
+mod measured;
+mod modes;
+mod printed;
+
+use headrace_geometry::tunnel::{ProfileError, shapes};
+use headrace_sampling::SamplingError;
+use serde::Serialize;
+
+pub use baseline::{AtBothSpeeds, OneHeadRow, SeveralHeadsRow};
+pub use cell::{Cell, Note, NoteKind, Table};
+pub use combined::{Combined, CombinedCell, CombinedRow};
+pub use measured::{Measured, Spacings, measured};
+pub use modes::{ModeRow, OverlapRow};
+pub use printed::{Digits, Interval, Printed};
+
+/// The paper's name.
+pub const SOURCE: &str = "Jorge et al., Sensors 2021, 21, 1900 (CC BY 4.0)";
+/// The speed of the paper's experiments, m/s (§7.2).
+pub const STATED_SPEED_MPS: f64 = 0.197;
+/// The speed that Table 4's baseline was computed for, m/s: the only one to a tenth of a millimetre a second that gives
+/// its printed digits.
+pub const FITTING_SPEED_MPS: f64 = 0.196;
+
+/// Tables 1 to 5.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Tables {
+    /// Where the printed numbers are from.
+    pub source: &'static str,
+    /// The speed that the paper states, m/s.
+    pub stated_speed_mps: f64,
+    /// The speed that Table 4's baseline was computed for, m/s.
+    pub fitting_speed_mps: f64,
+    /// Speeds that give all printed T_x of Table 4's baseline, m/s.
+    pub consistent_speed_mps: Interval,
+    /// The perimeter that our means are for, m.
+    pub perimeter_m: f64,
+    /// Perimeters that give all printed means of Tables 3 and 4, rounded, m; copied rows apart.
+    pub consistent_perimeter_m: Interval,
+    /// Overlap of beams.
+    pub table_1: Table<OverlapRow>,
+    /// Modes.
+    pub table_2: Table<ModeRow>,
+    /// One head.
+    pub table_3: Table<OneHeadRow>,
+    /// Several heads.
+    pub table_4: Table<SeveralHeadsRow>,
+    /// T.
+    pub table_5: Table<CombinedRow>,
+}
+
+/// Why the tables can't be computed: a slip in the built-in numbers.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum PaperError {
+    /// A column is missing or no number.
+    #[error("table {table}, line {line}: {column} is missing or no number of up to 6 decimals")]
+    Printed {
+        /// Number of the table.
+        table: u8,
+        /// Line of its file, from 1.
+        line: usize,
+        /// Name of the column.
+        column: &'static str,
+    },
+    /// A mode that Table 2 doesn't have.
+    #[error("mode {name} isn't in table 2")]
+    Mode {
+        /// Its name.
+        name: &'static str,
+    },
+    /// A number that sampling theory refuses.
+    #[error(transparent)]
+    Sampling(#[from] SamplingError),
+    /// A tunnel that is none.
+    #[error(transparent)]
+    Profile(#[from] ProfileError),
+}
+
+/// All five tables.
+///
+/// Errors: none with the numbers that are built in.
+pub fn tables() -> Result<Tables, PaperError> {
+    let baselines = baseline::Baselines::new()?;
+    let [_, consistent_speed_mps] = findings::speeds_mps(&baselines)?;
+    let [consistent_perimeter_m, _] = findings::perimeters_m(&baselines)?;
+    Ok(Tables {
+        source: SOURCE,
+        stated_speed_mps: STATED_SPEED_MPS,
+        fitting_speed_mps: FITTING_SPEED_MPS,
+        consistent_speed_mps,
+        perimeter_m: shapes::ceran_blueprint()?.perimeter_m(),
+        consistent_perimeter_m,
+        table_1: modes::overlaps()?,
+        table_2: modes::speeds()?,
+        table_3: baseline::one_head(&baselines)?,
+        table_4: baseline::several_heads(&baselines)?,
+        table_5: combined::combined(&baselines)?,
+    })
+}
+
+#[cfg(test)]
+mod tests;

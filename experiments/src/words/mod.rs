@@ -1,0 +1,7 @@
+//! Tables and experiments in words, for a terminal.
+
+mod experiments;
+mod tables;
+
+pub use experiments::words as experiments;
+pub use tables::words as tables;

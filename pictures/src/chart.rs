@@ -1,0 +1,206 @@
+//! A chart: a frame with two axes, and the way from metres to pixels.
+
+use headrace_geometry::math;
+
+use super::canvas::{BLACK, BOLD, Canvas, Colour, Letters, NORMAL, Px, SMALL, Side};
+use super::look::{AXIS, GRID, Look};
+use super::polyline::Frame;
+
+/// Length of the mark at a number, pixels.
+const TICK_PX: f64 = 4.0;
+const NUMBER: Letters = Letters { colour: BLACK, ..SMALL };
+
+/// What an axis shows.
+#[derive(Debug, Clone)]
+#[must_use]
+pub struct Axis {
+    from: f64,
+    to: f64,
+    ticks: Vec<f64>,
+    digits: usize,
+    name: String,
+    /// How far its name is from it, pixels.
+    name_px: f64,
+    numbered: bool,
+}
+
+impl Axis {
+    /// An axis with at most so many ticks.
+    pub fn new(name: &str, from: f64, to: f64, most_ticks: u32) -> Self {
+        let (ticks, digits) = ticks(from, to, most_ticks);
+        Self { from, to, ticks, digits, name: name.to_owned(), name_px: 36.0, numbered: true }
+    }
+
+    /// With its name so far off, pixels.
+    pub fn with_name_at(self, name_px: f64) -> Self {
+        Self { name_px, ..self }
+    }
+
+    /// Without name and numbers, where the chart beside it has them.
+    pub fn bare(self) -> Self {
+        Self { name: String::new(), numbered: false, ..self }
+    }
+}
+
+/// Round numbers within a range, and the digits that they take after the point.
+fn ticks(from: f64, to: f64, most: u32) -> (Vec<f64>, usize) {
+    const DECADES: [(f64, usize); 10] = [
+        (1e-4, 4),
+        (1e-3, 3),
+        (1e-2, 2),
+        (0.1, 1),
+        (1.0, 0),
+        (10.0, 0),
+        (100.0, 0),
+        (1e3, 0),
+        (1e4, 0),
+        (1e5, 0),
+    ];
+    let steps = DECADES.iter().flat_map(|(decade, digits)| {
+        [1.0, 2.0, 5.0].into_iter().map(move |factor| (factor * decade, *digits))
+    });
+    let wide_enough = |(step, _): &(f64, usize)| (to - from) / step <= f64::from(most);
+    let Some((step, digits)) = steps.into_iter().find(wide_enough) else { return (Vec::new(), 0) };
+    let first = (from / step - 1e-9).ceil();
+    let tick = |k: u32| step * (first + f64::from(k));
+    ((0..=most).map(tick).filter(|tick| *tick <= to + 1e-9 * step).collect(), digits)
+}
+
+/// A number with about three figures.
+pub fn short(value: f64) -> String {
+    match value.abs() {
+        size if size < 0.0995 => format!("{value:.3}"),
+        size if size < 9.995 => format!("{value:.2}"),
+        size if size < 99.95 => format!("{value:.1}"),
+        _ => format!("{value:.0}"),
+    }
+}
+
+/// A chart on a canvas.
+pub struct Chart<'c> {
+    /// What it is drawn on.
+    pub canvas: &'c Canvas,
+    /// Where on the sheet its axes meet and end.
+    pub frame: Frame,
+    x: [f64; 2],
+    y: [f64; 2],
+}
+
+impl<'c> Chart<'c> {
+    /// Draws the grid and both axes.
+    pub fn new(canvas: &'c Canvas, frame: Frame, x: &Axis, y: &Axis) -> Self {
+        let chart = Self { canvas, frame, x: [x.from, x.to], y: [y.from, y.to] };
+        let Frame { left, top, right, bottom } = frame;
+        for tick in &x.ticks {
+            let [at, _] = chart.px([*tick, y.from]);
+            canvas.line(&[[at, top], [at, bottom]], &GRID);
+            canvas.line(&[[at, bottom], [at, bottom + TICK_PX]], &AXIS);
+            if x.numbered {
+                let words = format!("{tick:.*}", x.digits);
+                canvas.text([at, bottom + 14.0], &words, Side::Middle, NUMBER);
+            }
+        }
+        for tick in &y.ticks {
+            let [_, at] = chart.px([x.from, *tick]);
+            canvas.line(&[[left, at], [right, at]], &GRID);
+            canvas.line(&[[left - TICK_PX, at], [left, at]], &AXIS);
+            if y.numbered {
+                let words = format!("{tick:.*}", y.digits);
+                canvas.text([left - 8.0, at], &words, Side::Left, NUMBER);
+            }
+        }
+        canvas.line(&[[left, top], [left, bottom], [right, bottom]], &AXIS);
+        let middle = [f64::midpoint(left, right), f64::midpoint(top, bottom)];
+        if x.numbered {
+            canvas.text([middle[0], bottom + x.name_px], &x.name, Side::Middle, NORMAL);
+        }
+        if y.numbered {
+            canvas.text(
+                [left - y.name_px - 8.0, middle[1]],
+                &y.name,
+                Side::Middle,
+                Letters { upright: true, ..NORMAL },
+            );
+        }
+        chart
+    }
+
+    /// Where a point is on the sheet.
+    pub fn px(&self, [x, y]: [f64; 2]) -> Px {
+        let share = |value: f64, [from, to]: [f64; 2]| (value - from) / (to - from);
+        let Frame { left, top, right, bottom } = self.frame;
+        [left + share(x, self.x) * (right - left), bottom - share(y, self.y) * (bottom - top)]
+    }
+
+    /// The line through these points, as far as it is within the frame; gives its pieces on the sheet.
+    pub fn line(&self, points: &[[f64; 2]], look: &Look) -> Vec<Vec<Px>> {
+        let places: Vec<Px> = points.iter().map(|point| self.px(*point)).collect();
+        let pieces = self.frame.cut(&places);
+        for piece in &pieces {
+            self.canvas.line(piece, look);
+        }
+        pieces
+    }
+
+    /// A line from the left to the right.
+    pub fn across(&self, y: f64, look: &Look) {
+        self.line(&[[self.x[0], y], [self.x[1], y]], look);
+    }
+
+    /// A line from the bottom to the top.
+    pub fn upright(&self, x: f64, look: &Look) {
+        self.line(&[[x, self.y[0]], [x, self.y[1]]], look);
+    }
+
+    /// An ellipse about a place on the sheet, as far as it is within the frame.
+    pub fn ellipse(&self, centre: Px, radii: Px, ground: Colour, look: &Look) {
+        /// Corners of the polygon that stands for it.
+        const CORNERS: u32 = 72;
+        let Frame { left, top, right, bottom } = self.frame;
+        let corner = |k: u32| {
+            let (sine, cosine) = math::sin_cos(math::TAU * f64::from(k) / f64::from(CORNERS));
+            [centre[0] + radii[0] * cosine, centre[1] + radii[1] * sine]
+        };
+        let corners: Vec<Px> = (0..=CORNERS).map(corner).collect();
+        let within: Vec<Px> =
+            corners.iter().map(|[x, y]| [x.clamp(left, right), y.clamp(top, bottom)]).collect();
+        self.canvas.polygon(&within, ground);
+        for piece in self.frame.cut(&corners) {
+            self.canvas.line(&piece, look);
+        }
+    }
+
+    /// Words in place of what can't be drawn, in the middle of the frame.
+    pub fn instead(&self, lines: &[String]) {
+        let Frame { left, top, right, bottom } = self.frame;
+        let first = f64::midpoint(top, bottom) - 10.0 * (lines.len() as f64 - 1.0);
+        for (k, line) in lines.iter().enumerate() {
+            let place = [f64::midpoint(left, right), first + 20.0 * k as f64];
+            self.canvas.text_on_white(place, line, Side::Middle, BOLD);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ticks_are_round_and_few() {
+        assert_eq!(ticks(0.0, 35.9, 10), (vec![0.0, 5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 35.0], 0));
+        let (fine, digits) = ticks(0.0, 0.13, 7);
+        assert_eq!((fine.len(), digits), (7, 2));
+        assert_eq!(ticks(-0.5, 0.5, 5).0, [-0.4, -0.2, 0.0, 0.2, 0.4]);
+        for (from, to) in [(0.0, 1e-3), (3.0, 4.0), (0.0, 9e4)] {
+            let (ticks, _) = ticks(from, to, 8);
+            assert!(ticks.len() >= 3 && ticks.iter().all(|tick| (from..=to).contains(tick)), "{ticks:?}");
+        }
+    }
+
+    #[test]
+    fn numbers_have_three_figures() {
+        for (value, text) in [(0.0641, "0.064"), (0.5, "0.50"), (16.94, "16.9"), (121.04, "121")] {
+            assert_eq!(short(value), text);
+        }
+    }
+}

@@ -1,0 +1,80 @@
+//! Places of the wall as people call them.
+
+use headrace_geometry::math;
+use headrace_geometry::tunnel::Profile;
+
+use super::canvas::{NORMAL, Side};
+use super::chart::Chart;
+use super::look::AXIS;
+
+/// A place of the perimeter with the hour it has on a clock.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Hour {
+    /// Arc length, m.
+    pub sigma_m: f64,
+    /// The hour alone.
+    pub clock: String,
+    /// What is there; empty between floor, walls and crown.
+    pub place: &'static str,
+}
+
+impl Hour {
+    /// The hour, and what is there.
+    pub fn words(&self) -> String {
+        format!("{} {}", self.clock, self.place).trim_end().to_owned()
+    }
+}
+
+/// Every hour and a half from floor to floor, seen looking along the tunnel from the profile's reference point.
+pub fn hours(profile: &Profile) -> Vec<Hour> {
+    const NAMES: [(&str, &str); 9] = [
+        ("6:00", "floor"),
+        ("7:30", ""),
+        ("9:00", "left"),
+        ("10:30", ""),
+        ("12:00", "crown"),
+        ("1:30", ""),
+        ("3:00", "right"),
+        ("4:30", ""),
+        ("6:00", "floor"),
+    ];
+    let [y_m, z_m] = profile.reference();
+    let hour = |(k, (clock, place)): (u32, (&str, &'static str))| {
+        let (sine, cosine) = math::sin_cos(math::TAU * f64::from(k) / 8.0);
+        let sigma_m = match k {
+            // The seam itself may come out on either side of it.
+            0 => 0.0,
+            8 => profile.perimeter_m(),
+            _ => profile.sigma_of([y_m + sine, z_m - cosine]),
+        };
+        Hour { sigma_m, clock: clock.to_owned(), place }
+    };
+    (0..).zip(NAMES).map(hour).collect()
+}
+
+/// Hours to the right of a chart that has arc lengths upwards.
+pub fn at_right(chart: &Chart<'_>, profile: &Profile) {
+    for hour in hours(profile) {
+        let y = chart.px([0.0, hour.sigma_m])[1];
+        let x = chart.frame.right;
+        chart.canvas.line(&[[x, y], [x + 4.0, y]], &AXIS);
+        chart.canvas.text([x + 7.0, y], &hour.words(), Side::Right, NORMAL);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use headrace_geometry::tunnel::shapes;
+
+    #[test]
+    fn hours_are_where_the_profile_says() {
+        for profile in
+            [shapes::ceran().unwrap(), shapes::rectangle(3.0, 4.0).unwrap(), shapes::circle(0.5).unwrap()]
+        {
+            let hours = hours(&profile);
+            assert!(hours.windows(2).all(|pair| pair[0].sigma_m < pair[1].sigma_m), "{hours:?}");
+            assert!(hours.iter().all(|hour| profile.clock(hour.sigma_m) == hour.clock), "{hours:?}");
+        }
+    }
+}
