@@ -20,7 +20,7 @@ use headrace_coverage::{GridLayout, HoleFinder, SampleStore, Sections, Soundings
 use headrace_geometry::math;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_geometry::tunnel::shapes;
-use headrace_monitor::flow::{Coverage, Tally};
+use headrace_monitor::resources::Coverage;
 use headrace_monitor::run::Loop;
 use headrace_monitor::{App, SourceSpec};
 use headrace_replay::simulate::{START, Scene, Simulation};
@@ -153,7 +153,7 @@ fn whole_loop() {
     let full = best(|| {
         let mut dive = armed(&scene, true);
         ticks = run(&mut dive, &messages);
-        samples = dive.world().resource::<Tally>().samples;
+        samples = dive.tally().samples;
         ticks.iter().sum()
     });
     let bare = best(|| run(&mut armed(&scene, false), &messages).iter().sum());

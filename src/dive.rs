@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 
 use headrace_fusion::Navigation;
 use headrace_monitor::App;
-use headrace_monitor::flow::Tally;
 use headrace_monitor::outlet::{NoticeOutlet, NoticeReceiver};
 use headrace_monitor::report::{LineReport, LogReport, Report};
 use headrace_monitor::run::Loop;
@@ -205,7 +204,7 @@ impl Dive {
         let mut progress = Progress::start();
         let driven = drive(&mut self.armed, feed, pace, &mut |dive| {
             if watch.is_quiet() {
-                let tally = dive.world().resource::<Tally>();
+                let tally = dive.tally();
                 progress.at(|| format!("{} packets, {} samples", tally.packets, tally.samples));
             }
             while let Some(notice) = notices.next() {

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use headrace_config::ConfigError;
-use headrace_monitor::plugin::PluginError;
+use headrace_monitor::PluginError;
 use headrace_replay::drive::DriveError;
 use headrace_replay::import::ImportError;
 use headrace_replay::log::LogError;

@@ -6,7 +6,6 @@ use headrace_fusion::filter::FilterNavigation;
 use headrace_fusion::filter::sources::Consistency;
 use headrace_fusion::smooth::journal::Journal;
 use headrace_fusion::smooth::track::TrackNavigation;
-use headrace_monitor::flow::Navigator;
 use headrace_monitor::report::Report;
 use headrace_monitor::run::Loop;
 use headrace_monitor::smoothing::SmoothingReport;
@@ -64,6 +63,5 @@ pub(crate) fn smoothed(
 }
 
 fn consistencies(dive: &Loop) -> [Option<Consistency>; MAX_SOURCES] {
-    let navigation = &dive.world().resource::<Navigator>().navigation;
-    core::array::from_fn(|source| navigation.consistency(source))
+    core::array::from_fn(|source| dive.consistency(source))
 }

@@ -2,7 +2,7 @@
 
 use headrace_geometry::time::DurNs;
 use headrace_monitor::SourceInfo;
-use headrace_monitor::trail::WordKind;
+use headrace_monitor::result_stream::WordKind;
 use headrace_replay::drive::Pace;
 use headrace_replay::log::{TRIMMED, files_of};
 use headrace_replay::player::Player;

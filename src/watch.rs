@@ -5,8 +5,8 @@ use std::io::IsTerminal;
 
 use headrace_coverage::{Run, RunChange, RunId, Section, Sections, Verdict};
 use headrace_geometry::time::{DurNs, MonoNs};
-use headrace_monitor::alerts::Alerts;
-use headrace_monitor::flow::{AdviceEntry, Coverage, Notice, Tally};
+use headrace_monitor::advice_log::AdviceEntry;
+use headrace_monitor::messages::Notice;
 use headrace_monitor::run::Loop;
 use headrace_monitor::words::{Missed, advice_words, alert_words, cleared_words, flag_words, station};
 use headrace_ports::{Phase, Status};
@@ -64,7 +64,7 @@ impl Watch {
             Notice::Section { section, .. } => self.section(*section, sections(dive)),
             Notice::Run { id, change, .. } => self.run(*id, *change, dive),
             Notice::Alert(kind) => {
-                if let Some(alert) = dive.world().resource::<Alerts>().get(*kind) {
+                if let Some(alert) = dive.alerts().get(*kind) {
                     self.line(&format!("ALERT    {}", alert_words(alert.kind, alert.x_m, alert.worst_m)));
                 }
             }
@@ -86,7 +86,7 @@ impl Watch {
             let seconds = time.as_secs_f64();
             let (h, min, s) = (seconds / 3600.0, seconds / 60.0 % 60.0, seconds % 60.0);
             let end = if ended { ", the end" } else { "" };
-            let tally = dive.world().resource::<Tally>();
+            let tally = dive.tally();
             self.line(&format!(
                 "AT       {}:{:02}:{s:06.3}{end}: tick {}, {} samples, digest {:016x}",
                 h.floor(),
@@ -202,5 +202,5 @@ impl Watch {
 }
 
 fn sections(dive: &Loop) -> &Sections {
-    &dive.world().resource::<Coverage>().sections
+    &dive.coverage().sections
 }

@@ -19,7 +19,7 @@ use std::fmt::Write as _;
 
 use advised::{Advised, dive};
 use headrace_geometry::time::DurNs;
-use headrace_monitor::flow::AdviceEntry;
+use headrace_monitor::advice_log::AdviceEntry;
 use headrace_replay::simulate::Scene;
 use headrace_sampling::advice::{Reason, Remedy};
 

@@ -5,7 +5,6 @@ mod shipped;
 
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::App;
-use headrace_monitor::flow::{AdviceLog, Coverage};
 use headrace_monitor::run::Loop;
 use headrace_replay::simulate::{START, Simulation};
 use headrace_sensor::device::Direction;
@@ -20,10 +19,7 @@ const SCENE: &str = "vehicle = \"vita2-4.toml\"\n[trajectory]\nkind = \"waypoint
 
 /// What grows at all once the loop is armed: bytes of samples, and entries of the advice's history.
 fn used(dive: &Loop) -> [usize; 2] {
-    [
-        dive.world().resource::<Coverage>().store.usage().bytes,
-        dive.world().resource::<AdviceLog>().entries.len(),
-    ]
+    [dive.coverage().store.usage().bytes, dive.advice_log().entries.len()]
 }
 
 #[test]

@@ -8,7 +8,7 @@ use headrace_geometry::site::Site;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_geometry::tunnel::shapes;
 use headrace_monitor::App;
-use headrace_monitor::plugin::PluginError;
+use headrace_monitor::PluginError;
 use headrace_monitor::report::Report;
 use headrace_sensor::SensorConfig;
 use headrace_sensor::device::{Device, DeviceKind};

@@ -1,10 +1,10 @@
 //! The recorder as an outlet of the loop.
 
 use headrace_monitor::App;
-use headrace_monitor::flow::{Digests, TickTime};
 use headrace_monitor::merge::{Inbox, MAX_TICK_BYTES, MAX_TICK_PACKETS};
-use headrace_monitor::plugin::{Plugin, PluginError};
+use headrace_monitor::resources::{Digests, TickTime};
 use headrace_monitor::stage::Stage;
+use headrace_monitor::{Plugin, PluginError};
 
 use bevy_ecs::prelude::{Res, ResMut, Resource};
 use std::cell::Cell;

@@ -3,9 +3,8 @@
 use std::collections::VecDeque;
 use std::path::PathBuf;
 
-use headrace_monitor::flow::Digests;
+use headrace_monitor::result_stream::{Record, RecordKind, WordKind, first_record};
 use headrace_monitor::run::Loop;
-use headrace_monitor::trail::{Record, RecordKind, WordKind, first_record};
 
 use crate::log::{DiveLog, LogError, MessageKind};
 use crate::record::{STREAMS, read_results, stream_of};
@@ -147,7 +146,7 @@ impl Verifier {
     ///
     /// Errors: the log can't be read on.
     pub fn after_tick(&mut self, dive: &Loop) -> Result<(), LogError> {
-        let digests = dive.world().resource::<Digests>();
+        let digests = dive.digests();
         for (number, (name, trail)) in digests.streams().into_iter().enumerate() {
             let mut rest = trail.words();
             while let Some((record, after)) = first_record(rest) {

@@ -1,7 +1,7 @@
 //! The readings of a part of a log, as the loop's decoders give them.
 
 use headrace_geometry::time::{DurNs, MonoNs};
-use headrace_monitor::flow::{Event, Events, SensorTable};
+use headrace_monitor::messages::Event;
 use headrace_monitor::ring::{Port, RingError};
 use headrace_monitor::run::Loop;
 use headrace_replay::drive::{Coming, Feed, Pace, drive};
@@ -80,11 +80,11 @@ pub(super) fn hear(mut dive: Loop, player: &mut Player, args: &Calibrate) -> Res
     let end = at_surface.map_or(to, |[_, surface_to]| to.max(surface_to));
     let is_wanted =
         |at: MonoNs| (at >= from && at < to) || at_surface.is_some_and(|[from, to]| at >= from && at < to);
-    let sensors = dive.world().resource::<SensorTable>().0.clone();
+    let sensors = dive.sensors();
     let mut events: Vec<Event> = Vec::new();
     let mut progress = Progress::start();
     drive(&mut dive, &mut Until { player, end }, Pace::default(), &mut |dive| {
-        let heard = &dive.world().resource::<Events>().0;
+        let heard = dive.readings();
         events.extend(heard.iter().filter(|event| is_wanted(event.received)));
         progress.at(|| format!("{} readings", events.len()));
     })?;

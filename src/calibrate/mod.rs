@@ -10,7 +10,7 @@ use headrace_calibration::timing::{Lag, lags};
 use headrace_calibration::zero::{self, Zero};
 use headrace_calibration::{Material, Untold};
 use headrace_fusion::filter::settings::Settings;
-use headrace_monitor::flow::Event;
+use headrace_monitor::messages::Event;
 use headrace_replay::log::files_of;
 use headrace_replay::player::Player;
 use headrace_sensor::device::{SensorInfo, SensorKind};

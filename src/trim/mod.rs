@@ -7,7 +7,6 @@ use std::io::{BufWriter, Write};
 use std::path::PathBuf;
 
 use headrace_geometry::time::{DurNs, MonoNs};
-use headrace_monitor::flow::Navigator;
 use headrace_replay::drive::Pace;
 use headrace_replay::log::{
     DiveLog, LogHeader, LogInfo, Trim as Work, Trimmed, files_digest, files_of, trim as rewrite,
@@ -105,7 +104,7 @@ fn when_within(
     let pace = Pace { tick: TICK, speed: None };
     dive.run_beside(&mut player, pace, &mut Watch::quiet(), &mut |dive| {
         let now = dive.now();
-        let Ok(fix) = dive.world().resource::<Navigator>().navigation.fix(now) else { return };
+        let Ok(fix) = dive.fix(now) else { return };
         if !(from_m..=to_m).contains(&fix.pose.position.x()) {
             return;
         }

@@ -5,7 +5,8 @@
 
 use headrace_geometry::time::DurNs;
 use headrace_monitor::App;
-use headrace_monitor::flow::{AdviceEntry, Notice, Notices};
+use headrace_monitor::advice_log::AdviceEntry;
+use headrace_monitor::messages::Notice;
 use headrace_monitor::report::Report;
 use headrace_monitor::ring::{Port, RingError};
 use headrace_replay::drive::{Coming, Feed, Pace, drive};
@@ -61,7 +62,7 @@ pub(crate) fn dive(scene: &Scene, dumb: Option<&str>, tick: DurNs) -> Advised {
     let mut feed = Partly { simulation: Simulation::new(scene).unwrap_or_else(|why| panic!("{why}")), dumb };
     let mut beats = Vec::new();
     let mut note = |dive: &headrace_monitor::run::Loop| {
-        for notice in &dive.world().resource::<Notices>().0 {
+        for notice in dive.notices() {
             if let Notice::Advice(entry) = notice {
                 beats.push(*entry);
             }

@@ -9,10 +9,10 @@ use headrace_geometry::math::TAU;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_geometry::tunnel::Profile;
 use headrace_monitor::App;
-use headrace_monitor::flow::{Outcome, Placed, PlacedList};
-use headrace_monitor::plugin::{Plugin, PluginError};
+use headrace_monitor::messages::{Outcome, Placed, PlacedList};
 use headrace_monitor::report::Report;
 use headrace_monitor::stage::Stage;
+use headrace_monitor::{Plugin, PluginError};
 use headrace_replay::drive::{Pace, drive};
 use headrace_replay::player::SimulationFeed;
 use headrace_replay::simulate::{Scene, Simulation};
@@ -139,7 +139,7 @@ fn watched(scene: &Scene, vehicle: &VehicleConfig, mission: Mission, pace: Pace)
     dive.finish(&mut |_, _| {});
     let heads = vehicle.heads();
     Dive {
-        pings: dive.world().resource::<Seen>().0.clone(),
+        pings: dive.resource::<Seen>().unwrap().0.clone(),
         report: Report::of(&dive),
         profile: dive.mission().profile.clone(),
         ranges_m: heads.iter().map(|head| head.reach_m(vehicle.site.sound_speed_mps)[1]).collect(),

@@ -4,12 +4,8 @@ use core::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
-use headrace_geometry::time::{DurNs, MonoNs};
-
-/// A head that has given no return for so long isn't waited for.
-const SILENT: DurNs = DurNs(2_000_000_000);
-/// The most heads.
-const MAX_HEADS: usize = headrace_sampling::head::MAX_HEADS;
+use headrace_geometry::time::MonoNs;
+use headrace_sampling::head::SILENT_AFTER;
 
 /// The stretch of tunnel on which a head lands samples now.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -20,10 +16,42 @@ pub struct Reach {
     pub to_m: f64,
 }
 
-/// Follows the reach of all heads along the tunnel.
+/// Where one head lands samples: the latest stretch, and all that it has swept.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct HeadReach {
+    /// When the head was last heard, with or without a fix.
+    heard: MonoNs,
+    /// The stretch at its last ping with a fix.
+    latest: Reach,
+    /// Every chainage that its reach has covered.
+    swept: Reach,
+}
+
+impl HeadReach {
+    /// The reach after a ping at `now` with a fix, `before` being that of the pings until then.
+    pub fn after(before: Option<Self>, now: MonoNs, reach: Reach) -> Self {
+        let swept = before.map_or(reach, |before| before.swept.with(reach));
+        Self { heard: now, latest: reach, swept }
+    }
+
+    /// Notes a ping without a fix: the head is alive, and waited for where it was last.
+    pub fn heard(&mut self, now: MonoNs) {
+        self.heard = now;
+    }
+
+    /// Where it landed samples when its place was last known.
+    pub fn latest(&self) -> Reach {
+        self.latest
+    }
+
+    fn is_alive(&self, now: MonoNs) -> bool {
+        now.since(self.heard).0.abs() <= SILENT_AFTER.0
+    }
+}
+
+/// Follows the reach of all heads along the tunnel. Each head's own is kept with the head and handed in.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct Frontier {
-    heads: [Option<Head>; MAX_HEADS],
     /// Every chainage that any head's reach has covered.
     swept: Option<Reach>,
     /// Sections, by index, that samples may still change.
@@ -58,13 +86,19 @@ impl Course {
     }
 }
 
-/// One head.
-#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
-struct Head {
-    last: MonoNs,
-    reach: Reach,
-    /// Every chainage that this head's reach has covered.
-    swept: Reach,
+/// Where samples have landed and may still land, as of one time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Outlook {
+    /// The time.
+    pub at: MonoNs,
+    /// Every chainage that has been within reach of a head.
+    pub swept: Option<Reach>,
+    /// The stretch that every head that is alive has covered, or `None` where there is none.
+    pub swept_by_all: Option<Reach>,
+    /// Where samples may land without turning back.
+    pub to_come: Option<Reach>,
+    /// Sections that samples may still change, once none has come or gone for some time: the vehicle stands, or nearly.
+    pub still_zone: Option<Range<i64>>,
 }
 
 /// What a head's return has changed.
@@ -84,65 +118,46 @@ impl Frontier {
         self.swept
     }
 
-    /// A head has pinged where nobody knows: it is alive, and waited for where it was last.
-    pub fn heard(&mut self, head: usize, now: MonoNs) {
-        if let Some(head) = self.heads.get_mut(head).and_then(Option::as_mut) {
-            head.last = now;
+    /// The outlook at `at`, given all heads' reaches.
+    pub fn outlook(&self, heads: impl Iterator<Item = HeadReach> + Clone, at: MonoNs) -> Outlook {
+        let common = |a: Reach, b: Reach| Reach { from_m: a.from_m.max(b.from_m), to_m: a.to_m.min(b.to_m) };
+        let alive = heads.clone().filter(|head| head.is_alive(at));
+        Outlook {
+            at,
+            swept: self.swept,
+            swept_by_all: alive.map(|head| head.swept).reduce(common).filter(|all| all.from_m <= all.to_m),
+            to_come: self.to_come(heads, at),
+            still_zone: self.still_zone(at),
         }
     }
 
-    /// Where a head landed samples when its place was last known.
-    pub fn last_reach(&self, head: usize) -> Option<Reach> {
-        self.heads.get(head).copied().flatten().map(|head| head.reach)
-    }
-
-    /// The stretch that every head that is alive has covered, or `None` where there is none.
-    pub fn swept_by_all(&self, now: MonoNs) -> Option<Reach> {
-        let common = |a: Reach, b: Reach| Reach { from_m: a.from_m.max(b.from_m), to_m: a.to_m.min(b.to_m) };
-        self.alive(now).map(|head| head.swept).reduce(common).filter(|all| all.from_m <= all.to_m)
-    }
-
-    /// The sections, by index, that samples may still change, when for some time none has come or gone: the vehicle stands,
-    /// or nearly. Not before it is known which heads are alive.
-    pub fn still_zone(&self, now: MonoNs) -> Option<Range<i64>> {
-        let over = |since: Option<MonoNs>| since.is_some_and(|since| now.since(since).0 > SILENT.0);
+    /// Not before it is known which heads are alive.
+    fn still_zone(&self, now: MonoNs) -> Option<Range<i64>> {
+        let over = |since: Option<MonoNs>| since.is_some_and(|since| now.since(since).0 > SILENT_AFTER.0);
         self.zone.clone().filter(|_| over(self.begun) && over(self.zone_moved))
     }
 
-    /// Where the heads that are alive land samples now.
-    fn reach(&self, now: MonoNs) -> Option<Reach> {
-        self.alive(now).map(|head| head.reach).reduce(Reach::with)
-    }
-
-    /// Where they may land samples without turning back: from here on, all that lies ahead.
-    pub fn to_come(&self, now: MonoNs) -> Option<Reach> {
-        let reach = self.reach(now)?;
+    /// Where samples may land without turning back: from here on, all that lies ahead.
+    fn to_come(&self, heads: impl Iterator<Item = HeadReach>, now: MonoNs) -> Option<Reach> {
+        let reach = reach(heads, now)?;
         Some(match self.course {
             Some(Course { astern: true, .. }) => Reach { from_m: f64::NEG_INFINITY, ..reach },
             _ => Reach { to_m: f64::INFINITY, ..reach },
         })
     }
 
-    fn alive(&self, now: MonoNs) -> impl Iterator<Item = &Head> {
-        self.heads.iter().flatten().filter(move |head| now.since(head.last).0.abs() <= SILENT.0)
-    }
-
-    /// A head has pinged, with or without a return. A section is out of the way when it is farther than `margin_m` from
-    /// the reach of every head that is alive.
+    /// A head has pinged at `now` where its reach is `pinged`; `heads` are all, that one included. A section is out of the
+    /// way when it is farther than `margin_m` from the reach of every head that is alive.
     pub fn advance(
         &mut self,
-        head: usize,
+        pinged: Reach,
+        heads: impl Iterator<Item = HeadReach> + Clone,
         now: MonoNs,
-        reach: Reach,
         section_m: f64,
         margin_m: f64,
     ) -> Moved {
-        if let Some(slot) = self.heads.get_mut(head) {
-            let swept = slot.map_or(reach, |head| head.swept.with(reach));
-            *slot = Some(Head { last: now, reach, swept });
-        }
-        self.swept = Some(self.swept.map_or(reach, |swept| swept.with(reach)));
-        let Some(all) = self.reach(now) else { return Moved::default() };
+        self.swept = Some(self.swept.map_or(pinged, |swept| swept.with(pinged)));
+        let Some(all) = reach(heads.clone(), now) else { return Moved::default() };
         let middle_m = all.middle_m();
         let course = self.course.unwrap_or(Course { farthest_m: middle_m, astern: false });
         self.course = Some(course.to(middle_m));
@@ -158,8 +173,20 @@ impl Frontier {
         Moved {
             left_behind: before.start..zone.start,
             left_ahead: zone.end..before.end,
-            to_come: self.to_come(now),
+            to_come: self.to_come(heads, now),
         }
+    }
+}
+
+/// Where the heads that are alive land samples now.
+fn reach(heads: impl Iterator<Item = HeadReach>, now: MonoNs) -> Option<Reach> {
+    heads.filter(|head| head.is_alive(now)).map(|head| head.latest).reduce(Reach::with)
+}
+
+impl Moved {
+    /// Whether no section has been left, or no head is alive.
+    pub fn is_nothing(&self) -> bool {
+        self.left_behind.is_empty() && self.left_ahead.is_empty() || self.to_come.is_none()
     }
 }
 
@@ -183,49 +210,65 @@ pub fn clear_of(to_come: Option<Reach>, x_m: f64) -> f64 {
 mod tests {
     use super::*;
 
-    fn at(x_m: f64) -> Reach {
-        Reach { from_m: x_m, to_m: x_m }
+    /// A frontier with its heads.
+    #[derive(Default)]
+    struct Fixture {
+        frontier: Frontier,
+        heads: [Option<HeadReach>; 2],
+    }
+
+    impl Fixture {
+        fn advance(&mut self, head: usize, now: MonoNs, x_m: f64, section_m: f64, margin_m: f64) -> Moved {
+            let reach = Reach { from_m: x_m, to_m: x_m };
+            self.heads[head] = Some(HeadReach::after(self.heads[head], now, reach));
+            let Self { frontier, heads } = self;
+            frontier.advance(reach, heads.iter().flatten().copied(), now, section_m, margin_m)
+        }
+
+        fn to_come(&self, now: MonoNs) -> Option<Reach> {
+            self.frontier.outlook(self.heads.iter().flatten().copied(), now).to_come
+        }
     }
 
     #[test]
     fn a_section_is_left_when_the_last_head_is_a_margin_past_it() {
-        let mut frontier = Frontier::default();
-        frontier.advance(0, MonoNs(0), at(1.0), 0.25, 0.25);
-        frontier.advance(1, MonoNs(0), at(0.5), 0.25, 0.25);
-        let moved = frontier.advance(1, MonoNs(1), at(0.749), 0.25, 0.25);
+        let mut frontier = Fixture::default();
+        frontier.advance(0, MonoNs(0), 1.0, 0.25, 0.25);
+        frontier.advance(1, MonoNs(0), 0.5, 0.25, 0.25);
+        let moved = frontier.advance(1, MonoNs(1), 0.749, 0.25, 0.25);
         assert_eq!(moved.left_behind, 1..1);
-        let moved = frontier.advance(1, MonoNs(2), at(0.75), 0.25, 0.25);
+        let moved = frontier.advance(1, MonoNs(2), 0.75, 0.25, 0.25);
         assert_eq!(moved.left_behind, 1..2, "section [0.25, 0.5) is left once 0.75 is reached");
     }
 
     #[test]
     fn going_back_leaves_sections_ahead() {
-        let mut frontier = Frontier::default();
-        frontier.advance(0, MonoNs(0), at(2.0), 0.25, 0.25);
-        let moved = frontier.advance(0, MonoNs(1), at(1.7), 0.25, 0.25);
+        let mut frontier = Fixture::default();
+        frontier.advance(0, MonoNs(0), 2.0, 0.25, 0.25);
+        let moved = frontier.advance(0, MonoNs(1), 1.7, 0.25, 0.25);
         assert_eq!(moved.left_ahead, 8..9);
         assert!(moved.left_behind.is_empty());
     }
 
     #[test]
     fn what_lies_ahead_may_still_come_until_the_vehicle_has_turned_back() {
-        let mut frontier = Frontier::default();
+        let mut frontier = Fixture::default();
         for x_m in [1.0, 2.0, 1.8] {
-            frontier.advance(0, MonoNs(0), at(x_m), 0.25, 0.25);
+            frontier.advance(0, MonoNs(0), x_m, 0.25, 0.25);
         }
-        let clear = |frontier: &Frontier, x_m: f64| clear_of(frontier.to_come(MonoNs(0)), x_m);
+        let clear = |frontier: &Fixture, x_m: f64| clear_of(frontier.to_come(MonoNs(0)), x_m);
         assert_eq!([1.0, 1.8, 2.5].map(|x_m| clear(&frontier, x_m) > 0.5), [true, false, false]);
-        frontier.advance(0, MonoNs(0), at(1.7), 0.25, 0.25);
+        frontier.advance(0, MonoNs(0), 1.7, 0.25, 0.25);
         assert_eq!([1.0, 1.7, 2.5].map(|x_m| clear(&frontier, x_m) > 0.5), [false, false, true]);
         assert!(clear_of(frontier.to_come(MonoNs(3_000_000_000)), 1.7) > 1e9, "nobody is alive");
     }
 
     #[test]
     fn a_silent_head_is_not_waited_for() {
-        let mut frontier = Frontier::default();
-        frontier.advance(1, MonoNs(0), at(0.0), 0.25, 0.0);
-        frontier.advance(0, MonoNs(0), at(1.0), 0.25, 0.0);
-        let moved = frontier.advance(0, MonoNs(2_000_000_001), at(1.0), 0.25, 0.0);
+        let mut frontier = Fixture::default();
+        frontier.advance(1, MonoNs(0), 0.0, 0.25, 0.0);
+        frontier.advance(0, MonoNs(0), 1.0, 0.25, 0.0);
+        let moved = frontier.advance(0, MonoNs(2_000_000_001), 1.0, 0.25, 0.0);
         assert_eq!(moved.left_behind, 0..4);
     }
 }

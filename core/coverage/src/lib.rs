@@ -19,7 +19,7 @@ pub mod what_if;
 
 pub use action::Action;
 pub use cause::{Cause, Evidence};
-pub use frontier::{Frontier, Reach};
+pub use frontier::{Frontier, HeadReach, Outlook, Reach};
 pub use hole::{Hole, HoleFinder};
 pub use passage::{Doubt, Loss, Passage};
 pub use runs::{Run, RunChange, RunId, Runs};

@@ -3,7 +3,7 @@
 use core::ops::Range;
 
 use super::cause::{Case, Evidence, explain};
-use super::frontier::{Frontier, Moved, Reach, clear_of};
+use super::frontier::{Moved, Outlook, Reach, clear_of};
 use super::hole::{FARTHEST_M, Hole, HoleFinder};
 use super::openings::Opening;
 use super::runs::{RunChange, RunId, Runs, Telling};
@@ -30,9 +30,9 @@ pub struct Request {
 }
 
 impl Request {
-    /// Asks for sections as of one moment.
-    fn at(at: MonoNs, frontier: &Frontier) -> impl Fn(i64) -> Self {
-        let (swept_by_all, to_come) = (frontier.swept_by_all(at), frontier.to_come(at));
+    /// Asks for sections as of one time.
+    fn at(outlook: &Outlook) -> impl Fn(i64) -> Self + use<> {
+        let Outlook { at, swept_by_all, to_come, .. } = *outlook;
         move |section| Self { section, at, swept_by_all, to_come, fails: false }
     }
 }
@@ -148,15 +148,9 @@ impl Sections {
     /// hole may be out of the way now.
     ///
     /// Allocates: never.
-    pub fn due(&mut self, moved: &Moved, frontier: &Frontier, at: MonoNs, ask: &mut impl FnMut(Request)) {
-        if moved.left_behind.is_empty() && moved.left_ahead.is_empty() {
-            return;
-        }
-        if moved.to_come.is_none() {
-            return;
-        }
-        let passed = self.passed(frontier.swept());
-        let ask_for = Request::at(at, frontier);
+    pub fn due(&mut self, moved: &Moved, outlook: &Outlook, ask: &mut impl FnMut(Request)) {
+        let passed = self.passed(outlook.swept);
+        let ask_for = Request::at(outlook);
         for range in [&moved.left_behind, &moved.left_ahead] {
             for index in clamp(range.clone(), &passed) {
                 let Some(section) = self.get_mut(index) else { continue };
@@ -193,16 +187,15 @@ impl Sections {
     /// Allocates: never.
     pub fn look_around(
         &mut self,
-        (frontier, at): (&Frontier, MonoNs),
+        outlook: &Outlook,
         store: &SampleStore,
         finder: &mut HoleFinder,
         profile: &Profile,
         ask: &mut impl FnMut(Request),
     ) {
-        let Some(zone) = frontier.still_zone(at) else { return };
-        let to_come = frontier.to_come(at);
-        let ask_for = Request::at(at, frontier);
-        for index in clamp(zone, &self.passed(frontier.swept())) {
+        let Some(zone) = outlook.still_zone.clone() else { return };
+        let ask_for = Request::at(outlook);
+        for index in clamp(zone, &self.passed(outlook.swept)) {
             let Some(section) = self.get_mut(index) else { continue };
             if section.is_flagged() {
                 if core::mem::take(&mut section.stale) {
@@ -210,7 +203,7 @@ impl Sections {
                 }
                 continue;
             }
-            if self.fails_already(index, to_come, store, finder, profile) {
+            if self.fails_already(index, outlook.to_come, store, finder, profile) {
                 ask(Request { fails: true, ..ask_for(index) });
             }
         }
@@ -284,20 +277,19 @@ impl Sections {
     /// Calls `ask` for every section that was passed and isn't settled, at the end of a dive.
     pub fn unsettled(
         &mut self,
-        (frontier, at): (&Frontier, MonoNs),
+        outlook: &Outlook,
         store: &SampleStore,
         finder: &mut HoleFinder,
         profile: &Profile,
         ask: &mut impl FnMut(Request),
     ) {
-        let ask_for = Request::at(at, frontier);
-        let to_come = frontier.to_come(at);
-        for index in self.passed(frontier.swept()) {
+        let ask_for = Request::at(outlook);
+        for index in self.passed(outlook.swept) {
             let Some(section) = self.get_mut(index) else { continue };
             // The hole of a fail may have been narrowed from farther away than a pass depends on.
             if section.stale || !section.settled || section.verdict != Verdict::Pass {
                 section.stale = false;
-                let fails = self.fails_already(index, to_come, store, finder, profile);
+                let fails = self.fails_already(index, outlook.to_come, store, finder, profile);
                 ask(Request { fails, ..ask_for(index) });
             }
         }

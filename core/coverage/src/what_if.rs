@@ -1,13 +1,12 @@
 //! What the same samples say of other targets and other lengths of section.
 
-use super::frontier::{Frontier, Reach, clear_of};
+use super::frontier::{Outlook, Reach, clear_of};
 use super::hole::{Hole, HoleFinder};
 use super::passage::Doubt;
 use super::section::Verdict;
 use super::sections::{Sections, verdict};
 use super::store::SampleStore;
 use headrace_geometry::math;
-use headrace_geometry::time::MonoNs;
 use headrace_geometry::tunnel::Profile;
 
 /// Metres of tunnel by verdict.
@@ -51,20 +50,19 @@ impl Sections {
         &self,
         section_m: f64,
         targets_m: &[f64],
-        (frontier, at): (&Frontier, MonoNs),
+        outlook: &Outlook,
         (store, finder): (&SampleStore, &mut HoleFinder),
         profile: &Profile,
     ) -> Vec<Metres> {
-        let to_come = frontier.to_come(at);
         let measured = if (section_m - self.section_m()).abs() > 0.0 {
-            self.measured_anew(section_m, frontier, store, finder, profile)
+            self.measured_anew(section_m, outlook.swept, store, finder, profile)
         } else {
-            self.measured(frontier)
+            self.measured(outlook.swept)
         };
-        targets_m.iter().map(|target_m| metres(&measured, section_m, *target_m, to_come)).collect()
+        targets_m.iter().map(|target_m| metres(&measured, section_m, *target_m, outlook.to_come)).collect()
     }
 
-    fn measured(&self, frontier: &Frontier) -> Vec<Measured> {
+    fn measured(&self, swept: Option<Reach>) -> Vec<Measured> {
         let section = |index: i64| {
             let section = self.get(index)?;
             Some(Measured {
@@ -73,18 +71,18 @@ impl Sections {
                 doubtful: section.is_doubtful(),
             })
         };
-        self.passed(frontier.swept()).filter_map(section).collect()
+        self.passed(swept).filter_map(section).collect()
     }
 
     fn measured_anew(
         &self,
         section_m: f64,
-        frontier: &Frontier,
+        swept: Option<Reach>,
         store: &SampleStore,
         finder: &mut HoleFinder,
         profile: &Profile,
     ) -> Vec<Measured> {
-        let passed = self.passed(frontier.swept());
+        let passed = self.passed(swept);
         let (first_m, end_m) = (self.bounds_m(passed.start).0, self.bounds_m(passed.end).0);
         let indexes = math::floor_to_i64(first_m / section_m)..-math::floor_to_i64(-end_m / section_m);
         let section = |index: i64| {

@@ -6,9 +6,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use bevy_ecs::prelude::{Res, Resource};
 use crossbeam::queue::ArrayQueue;
 
-use super::App;
-use super::flow::{Notice, Notices};
-use super::plugin::{Plugin, PluginError};
+use super::app::{App, Plugin};
+use super::error::PluginError;
+use super::messages::{Notice, Notices};
 use super::stage::Stage;
 
 /// Copies every notice into a queue. When nobody empties it the oldest notices are dropped, and counted.

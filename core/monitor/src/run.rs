@@ -1,44 +1,31 @@
 //! The armed loop.
 
+use bevy_ecs::component::Component;
+use bevy_ecs::prelude::Resource;
 use bevy_ecs::schedule::Schedule;
 use bevy_ecs::world::{Mut, World};
 
+use super::advice_log::AdviceLog;
 use super::alerts::Alerts;
-use super::components::{Mounted, SonarHead};
+use super::app::{App, SourceInfo};
 use super::digest::Digest;
-use super::flow::{
-    AdviceLog, Coverage, Digests, Events, Finder, HeadTable, HiddenAngles, MAX_TICK_READINGS, Navigator,
-    Notice, Notices, Place, PlacedList, PositionedList, Requests, SensorTable, SourceTallies, Tally,
-    TickTime,
-};
-use super::head::HeadTrack;
-use super::merge::{Inbox, MAX_TICK_PACKETS};
-use super::plugin::PluginError;
+use super::entities::{HeadFrontier, Mounted, Navigator, SensorDecoder, SensorHealth, VehicleState};
+use super::loop_snapshot;
+use super::merge::Inbox;
+use super::messages::{Event, Events, Notice, Notices};
+use super::resources::{Coverage, Digests, Finder, Tally, TickTime, VehicleEntities};
 use super::ring::{Port, PortReader};
-use super::saving;
-use super::stages::{Advisor, Decoders, Driving, HeadSweeps, Results, WaterSound, judge_one};
-use super::{App, SourceInfo};
-use headrace_coverage::{
-    Frontier, GridLayout, HoleFinder, Request, SampleStore, Sections, Soundings, StoreLayout,
-};
-use headrace_fusion::Navigation;
+use super::stages::{Results, SoundSpeed, judge_one};
+use headrace_coverage::{Outlook, Request};
+use headrace_fusion::filter::sources::Consistency;
+use headrace_fusion::{Fix, NoFix};
 use headrace_geometry::time::MonoNs;
-use headrace_sampling::advice::{self, Task};
-use headrace_sampling::head::{HeadMode, HeadSpec, MAX_HEADS};
-use headrace_sensor::device::{SensorInfo, SensorKind};
-use headrace_sensor::reading::{MAX_SOURCES, SourceId};
+use headrace_sensor::codec::CodecCounts;
+use headrace_sensor::device::SensorInfo;
+use headrace_sensor::device_clock::ClockReport;
 use headrace_snapshot::{Restorer, Saver, SnapshotError};
 use headrace_vehicle::Mission;
 
-/// Room beyond both ends of the tunnel for heads that sit ahead of or behind the vehicle's origin, m.
-const ROOM_BEYOND_M: f64 = 25.0;
-/// Samples for which there is room, for a metre of tunnel and at most. Four heads at 0.2 m/s lay 1,000 a metre.
-const SAMPLES_PER_M: f64 = 4_000.0;
-const MIN_SAMPLES: f64 = 4_000_000.0;
-const MAX_SAMPLES: f64 = 40_000_000.0;
-
-/// A section that is judged may change its run and two others, and raise an alert.
-const NOTICES_EACH: usize = 5;
 /// Sections judged at the end of a dive before their notices are heard.
 const FINISHED_AT_ONCE: usize = 256;
 
@@ -55,70 +42,15 @@ pub struct Loop {
 }
 
 impl Loop {
-    pub(super) fn new(app: App, navigation: Box<dyn Navigation>) -> Result<Self, PluginError> {
-        let App { mission, mut world, mut schedule, sources, decoders, ports, readers } = app;
-        let (sensors, heads, specs) = tables(&mut world, sources.len())?;
-        world.insert_resource(sensors);
-        world.insert_resource(heads);
-        world.insert_resource(Decoders(decoders));
-        let told_by = sound_source(&mission, &sources)?;
-        world.insert_resource(WaterSound::new(mission.site.sound_speed_mps, told_by));
-        world.insert_resource(Inbox::default());
-        world.insert_resource(Events(Vec::with_capacity(MAX_TICK_READINGS)));
-        world.insert_resource(PositionedList(Vec::with_capacity(2 * MAX_TICK_READINGS)));
-        world.insert_resource(PlacedList(Vec::with_capacity(2 * MAX_TICK_READINGS)));
-        world.insert_resource(Navigator { navigation, next_beat: None });
-        world.insert_resource(HeadSweeps::default());
-        world.insert_resource(Driving::default());
-        world.insert_resource(Finder(HoleFinder::new(mission.coverage.hole_tolerance_m)));
-        world.insert_resource(Alerts::default());
-        let task = Task {
-            target_m: mission.target_m,
-            length_m: mission.length_m,
-            layout: mission.layout,
-            sound_speed_mps: mission.site.sound_speed_mps,
-        };
-        let advisor = advice::Advisor::new(&mission.profile, task, &specs, &mission.hull);
-        world.insert_resource(HiddenAngles(advisor.hidden_angles().map(<[_]>::to_vec).collect()));
-        world.insert_resource(Advisor::new(advisor, mission.target_m, mission.dive_time));
-        world.insert_resource(AdviceLog::default());
-        if world.get_resource::<Digests>().is_none() {
-            world.insert_resource(Digests::default());
-        }
-        world.insert_resource(Tally::default());
-        world.insert_resource(TickTime::default());
-        world.insert_resource(SourceTallies::new(sources.len()));
-        let coverage = coverage(&mission)?;
-        // A jump along the tunnel may ask for every section at once.
-        let most = coverage.sections.len() + MAX_TICK_PACKETS;
-        world.insert_resource(Requests(Vec::with_capacity(most)));
-        world.insert_resource(Notices(Vec::with_capacity(NOTICES_EACH * most + MAX_TICK_PACKETS)));
-        world.insert_resource(coverage);
-        world.insert_resource(Place {
-            profile: mission.profile.clone(),
-            site: mission.site,
-            target_m: mission.target_m,
-            layout: mission.layout,
-            length_m: mission.length_m,
-            contradiction_m: mission.coverage.contradiction_m,
-        });
-        schedule
-            .initialize(&mut world)
-            .map_err(|error| PluginError::Schedule { why: format!("{error:?}") })?;
-        let mut armed = Self {
-            world,
-            schedule,
-            readers,
-            ports: ports.into_iter().map(Some).collect(),
-            sources,
-            mission,
-            ticks: 0,
-            finished: false,
-        };
+    /// From an app whose world has all that the stages need.
+    pub(super) fn new(app: App) -> Self {
+        let App { mission, world, schedule, sources, ports, readers, .. } = app;
+        let ports = ports.into_iter().map(Some).collect();
+        let mut armed = Self { world, schedule, readers, ports, sources, mission, ticks: 0, finished: false };
         // The first run of a schedule allocates; with nothing to do it has no other effect.
         armed.tick(MonoNs(0));
         armed.ticks = 0;
-        Ok(armed)
+        armed
     }
 
     /// Takes what has come and works it off. Gives the number of packets consumed.
@@ -166,9 +98,95 @@ impl Loop {
         self.world.resource::<TickTime>().now
     }
 
-    /// What happens in the world, for plugins, tests and reports.
-    pub fn world(&self) -> &World {
-        &self.world
+    /// A plugin's own resource.
+    pub fn resource<T: Resource>(&self) -> Option<&T> {
+        self.world.get_resource::<T>()
+    }
+
+    /// Where the vehicle was at the last beat, and how well that is known.
+    pub fn vehicle(&self) -> &VehicleState {
+        self.of_vehicle()
+    }
+
+    /// Where the vehicle is at `at`, which may be a little before or after the last reading.
+    ///
+    /// Errors: what is missing.
+    pub fn fix(&self, at: MonoNs) -> Result<Fix, NoFix> {
+        self.of_vehicle::<Navigator>().navigation.fix(at)
+    }
+
+    /// How well a source agrees with the others; `None` where that isn't known.
+    pub fn consistency(&self, source: usize) -> Option<Consistency> {
+        self.of_vehicle::<Navigator>().navigation.consistency(source)
+    }
+
+    /// The readings of the last tick, in order.
+    pub fn readings(&self) -> &[Event] {
+        &self.world.resource::<Events>().0
+    }
+
+    /// The notices of the last tick, in order.
+    pub fn notices(&self) -> &[Notice] {
+        &self.world.resource::<Notices>().0
+    }
+
+    /// What is known of the wall.
+    pub fn coverage(&self) -> &Coverage {
+        self.world.resource()
+    }
+
+    /// Counts over the whole dive.
+    pub fn tally(&self) -> &Tally {
+        self.world.resource()
+    }
+
+    /// What is wrong with the dive as a whole.
+    pub fn alerts(&self) -> &Alerts {
+        self.world.resource()
+    }
+
+    /// The advice over time.
+    pub fn advice_log(&self) -> &AdviceLog {
+        self.world.resource()
+    }
+
+    /// The streams of results with their digests.
+    pub fn digests(&self) -> &Digests {
+        self.world.resource()
+    }
+
+    /// The least and the greatest speed of sound by which ranges were computed, m/s.
+    pub fn sound_speeds_mps(&self) -> [f64; 2] {
+        self.world.resource::<SoundSpeed>().span_mps()
+    }
+
+    /// How each sensor sits and what it is, in the order of sources.
+    pub fn sensors(&self) -> Vec<SensorInfo> {
+        self.of_sensors::<Mounted>().map(|mounted| mounted.info).collect()
+    }
+
+    /// What has come from each sensor, in the order of sources.
+    pub fn health(&self) -> impl Iterator<Item = &SensorHealth> {
+        self.of_sensors()
+    }
+
+    /// A component of every sensor, in the order of sources.
+    fn of_sensors<T: Component>(&self) -> impl Iterator<Item = &T> + Clone {
+        let entities = self.world.resource::<VehicleEntities>();
+        entities.by_source.iter().filter_map(|entity| self.world.get(*entity))
+    }
+
+    /// A component that the vehicle has since the loop was armed.
+    fn of_vehicle<T: Component>(&self) -> &T {
+        let vehicle = self.world.entity(self.world.resource::<VehicleEntities>().vehicle);
+        #[expect(clippy::expect_used, reason = "arming has put it there, and nothing takes it away")]
+        vehicle.get().expect("the vehicle's components are there from arming on")
+    }
+
+    /// Where samples have landed and may still land, as of the last packet.
+    pub(super) fn outlook(&self) -> Outlook {
+        let at = self.tally().span.map_or(MonoNs(0), |(_, last)| last);
+        self.coverage().frontier.outlook(self.of_sensors().filter_map(|reach: &HeadFrontier| reach.0), at)
     }
 
     pub(super) fn world_mut(&mut self) -> &mut World {
@@ -178,7 +196,10 @@ impl Loop {
     /// Judges what is still open: the dive has ended, and no sample will come. `hear` is given the notices of it, some
     /// sections' at a time, and the loop as it is then: those of a long dive at once would take more than its samples.
     pub fn finish(&mut self, hear: &mut dyn FnMut(&Notice, &Self)) {
-        self.world.resource_mut::<Navigator>().navigation.end();
+        let vehicle = self.world.resource::<VehicleEntities>().vehicle;
+        if let Some(mut navigator) = self.world.get_mut::<Navigator>(vehicle) {
+            navigator.navigation.end();
+        }
         self.world.resource_mut::<Digests>().next_tick();
         self.finished = true;
         let (open, common) = self.open_requests();
@@ -196,17 +217,17 @@ impl Loop {
 
     /// The sections that are to be judged at the end, which of them are known to fail, and what they have in common.
     fn open_requests(&mut self) -> (Vec<(i64, bool)>, Option<Request>) {
-        let at = self.world.resource::<Tally>().span.map_or(MonoNs(0), |(_, last)| last);
+        let outlook = self.outlook();
         let profile = &self.mission.profile;
         let (mut open, mut common) = (Vec::new(), None);
         self.world.resource_scope(|world, mut coverage: Mut<'_, Coverage>| {
             let mut finder = world.resource_mut::<Finder>();
-            let Coverage { store, sections, frontier, .. } = &mut *coverage;
+            let Coverage { store, sections, .. } = &mut *coverage;
             let mut ask = |request: Request| {
                 open.push((request.section, request.fails));
                 common = Some(request);
             };
-            sections.unsettled((frontier, at), store, &mut finder.0, profile, &mut ask);
+            sections.unsettled(&outlook, store, &mut finder.0, profile, &mut ask);
         });
         (open, common)
     }
@@ -242,7 +263,7 @@ impl Loop {
         let mut to = Saver::default();
         to.part("ticks");
         to.value(&self.ticks);
-        saving::save(&self.world, &mut to);
+        loop_snapshot::save(&self.world, &mut to);
         to.finish()
     }
 
@@ -253,7 +274,7 @@ impl Loop {
         let mut from = Restorer::new(snapshot);
         from.part("ticks")?;
         self.ticks = from.value()?;
-        saving::restore(&mut self.world, &mut from)?;
+        loop_snapshot::restore(&mut self.world, &mut from)?;
         self.readers.iter_mut().for_each(PortReader::clear);
         if from.is_empty() { Ok(()) } else { Err(from.unfit("there is more of it".to_owned())) }
     }
@@ -269,18 +290,18 @@ impl Loop {
     }
 
     /// What each source's codec has seen, in the order of the sources.
-    pub fn decoder_counts(&self) -> Vec<headrace_sensor::codec::CodecCounts> {
-        self.world.resource::<Decoders>().0.iter().map(|decoder| decoder.counts()).collect()
+    pub fn decoder_counts(&self) -> Vec<CodecCounts> {
+        self.of_sensors::<SensorDecoder>().map(|decoder| decoder.0.counts()).collect()
     }
 
     /// Readings that each source's decoder understood but did not hand on, in the order of the sources.
     pub fn decoder_withheld(&self) -> Vec<u64> {
-        self.world.resource::<Decoders>().0.iter().map(|decoder| decoder.withheld()).collect()
+        self.of_sensors::<SensorDecoder>().map(|decoder| decoder.0.withheld()).collect()
     }
 
     /// How each source's own clock goes, in the order of the sources.
-    pub fn decoder_clocks(&self) -> Vec<Option<headrace_sensor::device_clock::ClockReport>> {
-        self.world.resource::<Decoders>().0.iter().map(|decoder| decoder.clock()).collect()
+    pub fn decoder_clocks(&self) -> Vec<Option<ClockReport>> {
+        self.of_sensors::<SensorDecoder>().map(|decoder| decoder.0.clock()).collect()
     }
 
     /// Digest of all results so far: poses, places, judgements and advice.
@@ -292,82 +313,4 @@ impl Loop {
         }
         all.value()
     }
-}
-
-/// The source that tells the speed of sound.
-fn sound_source(mission: &Mission, sources: &[SourceInfo]) -> Result<Option<SourceId>, PluginError> {
-    let Some(id) = &mission.sound_speed_from else { return Ok(None) };
-    let place =
-        sources.iter().position(|source| source.id == *id).and_then(|place| u16::try_from(place).ok());
-    place.map(|place| Some(SourceId(place))).ok_or_else(|| PluginError::MissingSource { id: id.clone() })
-}
-
-fn coverage(mission: &Mission) -> Result<Coverage, PluginError> {
-    let (from_m, to_m) = (-ROOM_BEYOND_M, mission.length_m + ROOM_BEYOND_M);
-    let samples = headrace_geometry::math::round_to_i64(
-        ((to_m - from_m) * SAMPLES_PER_M).clamp(MIN_SAMPLES, MAX_SAMPLES),
-    );
-    let mut store = SampleStore::new(StoreLayout {
-        perimeter_m: mission.profile.perimeter_m(),
-        from_m,
-        to_m,
-        cell_m: StoreLayout::cell_for_target_m(mission.target_m),
-        capacity: u32::try_from(samples).unwrap_or(u32::MAX),
-    });
-    let mut sections = Sections::new(mission.section_m, mission.target_m, 0.0, mission.length_m);
-    for opening in &mission.coverage.openings {
-        let name = || opening.name.clone();
-        opening
-            .fill(&mut store, mission.target_m)
-            .map_err(|why| PluginError::Opening { name: name(), why: why.to_string() })?;
-        sections.mask(opening, &mission.profile);
-    }
-    let soundings = Soundings::new(GridLayout {
-        perimeter_m: mission.profile.perimeter_m(),
-        from_m: 0.0,
-        to_m: mission.length_m,
-        node_m: mission.coverage.node_m,
-    });
-    Ok(Coverage { store, sections, frontier: Frontier::default(), soundings })
-}
-
-/// What stages look up by source: navigation's view of each sensor, and the number and entity of each head; and the
-/// heads themselves, by number.
-#[expect(clippy::type_complexity, reason = "three tables, taken apart at once")]
-fn tables(
-    world: &mut World,
-    sources: usize,
-) -> Result<(SensorTable, HeadTable, Vec<(HeadSpec, Vec<HeadMode>)>), PluginError> {
-    let nothing = SensorInfo {
-        mount: headrace_geometry::frames::Mount {
-            position: headrace_geometry::frames::Vec3::zero(),
-            rotation: headrace_geometry::frames::Rot::identity(),
-        },
-        kind: SensorKind::Other,
-    };
-    let mut sensors = vec![nothing; sources.min(MAX_SOURCES)];
-    let mut heads = vec![None; sources.min(MAX_SOURCES)];
-    let mut found = Vec::new();
-    let mut query = world.query::<(bevy_ecs::entity::Entity, &Mounted, Option<&SonarHead>)>();
-    for (entity, mounted, head) in query.iter(world) {
-        if let Some(slot) = sensors.get_mut(mounted.source.index()) {
-            *slot = mounted.info;
-        }
-        if mounted.info.kind == SensorKind::Head {
-            found.push((mounted.source, entity, head.cloned()));
-        }
-    }
-    found.sort_unstable_by_key(|(source, ..)| *source);
-    if found.len() > MAX_HEADS {
-        return Err(PluginError::TooManyHeads { count: found.len(), max: MAX_HEADS });
-    }
-    let mut specs = Vec::new();
-    for (number, (source, entity, head)) in found.into_iter().enumerate() {
-        specs.extend(head.map(|head| (head.spec, head.modes)));
-        world.entity_mut(entity).insert(HeadTrack::default());
-        if let Some(slot) = heads.get_mut(source.index()) {
-            *slot = Some((number, entity));
-        }
-    }
-    Ok((SensorTable(sensors), HeadTable(heads), specs))
 }

@@ -11,8 +11,8 @@ pub enum Stage {
     Decode,
     /// Readings to fixes.
     Navigate,
-    /// Returns to places on the wall.
-    Place,
+    /// Returns to points on the wall.
+    Georeference,
     /// Places to samples, passes and sections; each section that is out of reach to its verdict, there and then.
     Cover,
     /// For plugins that look at verdicts before there is advice.
@@ -36,7 +36,7 @@ pub(super) fn schedule() -> Schedule {
         (
             Stage::Decode,
             Stage::Navigate,
-            Stage::Place,
+            Stage::Georeference,
             Stage::Cover,
             Stage::Judge,
             Stage::Advise,

@@ -3,9 +3,8 @@
 use bevy_ecs::world::Mut;
 use serde::Serialize;
 
-use super::flow::{Coverage, Finder, Tally};
+use super::resources::{Coverage, Finder};
 use super::run::Loop;
-use headrace_geometry::time::MonoNs;
 
 /// Metres by verdict for another target, or in sections of another length.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -27,14 +26,14 @@ pub struct WhatIfReport {
 impl Loop {
     /// What its samples say of every target in sections of every length, once the dive has ended.
     pub fn what_if(&mut self, targets_m: &[f64], sections_m: &[f64]) -> Vec<WhatIfReport> {
-        let at = self.world().resource::<Tally>().span.map_or(MonoNs(0), |(_, last)| last);
+        let outlook = self.outlook();
         let profile = self.mission().profile.clone();
         let mut all = Vec::new();
         self.world_mut().resource_scope(|world, mut finder: Mut<'_, Finder>| {
-            let Coverage { store, sections, frontier, .. } = world.resource::<Coverage>();
+            let Coverage { store, sections, .. } = world.resource::<Coverage>();
             for section_m in sections_m {
                 let searched = (store, &mut finder.0);
-                let metres = sections.what_if(*section_m, targets_m, (frontier, at), searched, &profile);
+                let metres = sections.what_if(*section_m, targets_m, &outlook, searched, &profile);
                 all.extend(targets_m.iter().zip(metres).map(|(target_m, metres)| WhatIfReport {
                     target_m: *target_m,
                     section_m: *section_m,

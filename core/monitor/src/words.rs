@@ -1,7 +1,7 @@
 //! What is said to the pilot, in words: on the terminal, and in the log for people's viewers.
 
+use super::advice_log::AdviceEntry;
 use super::alerts::AlertKind;
-use super::flow::AdviceEntry;
 use headrace_coverage::{Action, Cause, Evidence};
 use headrace_geometry::tunnel::Profile;
 use headrace_sampling::advice::{Reason, Remedy};

@@ -5,9 +5,13 @@ use serde::{Deserialize, Serialize};
 use super::error::{SamplingError, positive};
 use headrace_geometry::frames::{Body, Mount, Rot, Sensor, head_direction};
 use headrace_geometry::math::{self, TAU};
+use headrace_geometry::time::DurNs;
 
 /// The most heads of one vehicle.
 pub const MAX_HEADS: usize = 8;
+
+/// A head that has given no return for so long is silent: it is neither waited for nor counted in the advice.
+pub const SILENT_AFTER: DurNs = DurNs(2_000_000_000);
 
 /// By how many steps a turn may miss being a whole number of them: steps come from decimal degrees.
 const WHOLE_STEPS: f64 = 1e-6;

@@ -10,7 +10,7 @@ use super::reading::{Decoded, Packet};
 use crate::codec::CodecCounts;
 use crate::device_clock::ClockReport;
 use headrace_config::{ConfigError, Section};
-use headrace_geometry::frames::Mount;
+use headrace_geometry::frames::{Mount, Rot, Vec3};
 use headrace_geometry::site::Site;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sampling::head::{HeadMode, HeadProgram, HeadSpec};
@@ -39,6 +39,13 @@ pub struct SensorInfo {
     pub mount: Mount,
     /// What it is.
     pub kind: SensorKind,
+}
+
+impl SensorInfo {
+    /// At the vehicle's origin, of no use to navigation.
+    pub fn other() -> Self {
+        Self { mount: Mount { position: Vec3::zero(), rotation: Rot::identity() }, kind: SensorKind::Other }
+    }
 }
 
 /// Kinds of sensor.

@@ -20,7 +20,7 @@ use headrace_fusion::filter::settings::Settings;
 use headrace_geometry::site::Site;
 use headrace_geometry::time::MonoNs;
 use headrace_geometry::tunnel::Profile;
-use headrace_monitor::flow::Event;
+use headrace_monitor::messages::Event;
 use headrace_sensor::device::SensorInfo;
 
 /// What there is to calibrate by.

@@ -8,7 +8,7 @@ use headrace_fusion::filter::running::in_tunnel;
 use headrace_geometry::frames::{Body, Mount, Rot, Tunnel};
 use headrace_geometry::math::{self, TAU};
 use headrace_geometry::time::MonoNs;
-use headrace_monitor::flow::Event;
+use headrace_monitor::messages::Event;
 use headrace_sensor::device::{SensorInfo, SensorKind};
 use headrace_sensor::reading::Reading;
 

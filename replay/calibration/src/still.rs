@@ -6,7 +6,7 @@ use super::{Material, Untold, median};
 use headrace_fusion::filter::state::rotation_vector;
 use headrace_geometry::frames::{Rot, Sensor};
 use headrace_geometry::time::{DurNs, MonoNs};
-use headrace_monitor::flow::Event;
+use headrace_monitor::messages::Event;
 use headrace_sensor::device::{SensorInfo, SensorKind};
 use headrace_sensor::reading::{Level, Reading};
 

@@ -6,7 +6,7 @@ use headrace_fusion::filter::FilterNavigation;
 use headrace_fusion::{Navigation, Times};
 use headrace_geometry::math;
 use headrace_geometry::time::{DurNs, MonoNs};
-use headrace_monitor::flow::Event;
+use headrace_monitor::messages::Event;
 use headrace_sensor::device::SensorKind;
 
 /// How far offsets are looked for to either side, and in which steps, s.

@@ -32,7 +32,7 @@ use headrace_geometry::frames::{Body, Rot, Tunnel};
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_geometry::tunnel::Profile;
 use headrace_monitor::alerts::AlertKind;
-use headrace_monitor::trail::{Record, RecordKind, first_record, text_of};
+use headrace_monitor::result_stream::{Record, RecordKind, first_record, text_of};
 use headrace_monitor::words::{AdviceFigures, CauseFigures, advice_words, alert_words};
 use headrace_sampling::advice::{Reason, Remedy};
 use serde::Serialize;

@@ -23,6 +23,7 @@ use headrace_sensor::device::SensorKind;
 use headrace_sensor::reading::MAX_SOURCES;
 use headrace_sensor::reading::{Level, Reading};
 use headrace_snapshot::stateful;
+use serde::{Deserialize, Serialize};
 
 /// Room for the moments of an epoch at which an inertial unit spoke.
 const KNOTS: usize = 256;
@@ -342,7 +343,7 @@ fn since(row: &Row, known: &Errors, errors: &Errors) -> f64 {
 }
 
 /// Standard deviations of an estimate.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Sigmas {
     /// Of the chainage, its cable's scale left out, m.
     pub along_m: f64,

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::flow::AdviceEntry;
+use crate::advice_log::AdviceEntry;
 use headrace_sampling::advice::{Alternative, Left};
 
 /// Advice at a moment.

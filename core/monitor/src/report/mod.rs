@@ -3,11 +3,10 @@
 
 use serde::Serialize;
 
-use super::alerts::{Alert, Alerts};
-use super::flow::{AdviceLog, Coverage, SourceTallies, Tally};
+use super::alerts::Alert;
+use super::resources::{Coverage, Tally};
 use super::run::Loop;
 use super::smoothing::SmoothingReport;
-use super::stages::WaterSound;
 use super::what_if::WhatIfReport;
 use headrace_coverage::openings::Opening;
 use headrace_coverage::{Section, Spread, Verdict};
@@ -214,9 +213,7 @@ pub struct AlertReport {
 impl Report {
     /// The report of what a loop has seen so far.
     pub fn of(dive: &Loop) -> Self {
-        let world = dive.world();
-        let (coverage, tally) = (world.resource::<Coverage>(), *world.resource::<Tally>());
-        let log = world.resource::<AdviceLog>();
+        let (coverage, tally, log) = (dive.coverage(), dive.tally(), dive.advice_log());
         let sections = &coverage.sections;
         let passed =
             || sections.passed(coverage.frontier.swept()).filter_map(|k| Some((k, sections.get(k)?)));
@@ -226,7 +223,7 @@ impl Report {
             digest: format!("{:016x}", dive.digest()),
             target_m: sections.target_m(),
             section_m: sections.section_m(),
-            dive: dive_report(coverage, &tally, dive.world().resource::<WaterSound>().span_mps()),
+            dive: dive_report(coverage, tally, dive.sound_speeds_mps()),
             summary: summarise(sections.section_m(), passed().map(|(_, section)| section)),
             sections: passed()
                 .map(|(k, section)| sections::section_report(sections, k, section, dive))
@@ -236,10 +233,10 @@ impl Report {
             survey: survey::survey(coverage, &dive.mission().profile),
             what_if: Vec::new(),
             openings: dive.mission().coverage.openings.iter().map(opening_report).collect(),
-            alerts: world.resource::<Alerts>().iter().map(alert_report).collect(),
+            alerts: dive.alerts().iter().map(alert_report).collect(),
             advice: log.entries.iter().map(advice::advice_report).collect(),
             advice_dropped: log.dropped,
-            sources: sources::source_reports(dive, world.resource::<SourceTallies>()),
+            sources: sources::source_reports(dive),
             smoothing: None,
         }
     }

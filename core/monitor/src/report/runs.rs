@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::flow::{AdviceEntry, AdviceLog};
+use crate::advice_log::{AdviceEntry, AdviceLog};
 use headrace_coverage::{Action, Run, RunId, Runs, Sections};
 use headrace_geometry::time::MonoNs;
 use headrace_geometry::tunnel::Profile;

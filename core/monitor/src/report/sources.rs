@@ -2,7 +2,6 @@
 
 use serde::Serialize;
 
-use crate::flow::{Navigator, SourceTallies};
 use crate::run::Loop;
 use headrace_sensor::device_clock::ClockReport;
 
@@ -95,12 +94,11 @@ pub struct NavigationReport {
     pub nis: Option<f64>,
 }
 
-pub(super) fn source_reports(dive: &Loop, tallies: &SourceTallies) -> Vec<SourceReport> {
+pub(super) fn source_reports(dive: &Loop) -> Vec<SourceReport> {
     let decoders = dive.decoder_counts().into_iter().zip(dive.decoder_withheld()).zip(dive.decoder_clocks());
-    let navigation = &dive.world().resource::<Navigator>().navigation;
     dive.sources()
         .iter()
-        .zip(&tallies.0)
+        .zip(dive.health())
         .zip(decoders)
         .enumerate()
         .map(|(number, ((source, tally), ((counts, withheld), clock)))| {
@@ -118,7 +116,7 @@ pub(super) fn source_reports(dive: &Loop, tallies: &SourceTallies) -> Vec<Source
                 longest_gap_s: tally.longest_gap.as_secs_f64(),
                 rate_hz: if span_s > 0.0 { intervals / span_s } else { 0.0 },
                 device_clock: clock.map(DeviceClockReport::from),
-                navigation: navigation.consistency(number).map(|consistency| NavigationReport {
+                navigation: dive.consistency(number).map(|consistency| NavigationReport {
                     used: consistency.used,
                     gated: consistency.gated,
                     late: consistency.late,

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::flow::Coverage;
+use crate::resources::Coverage;
 use headrace_coverage::soundings::ENOUGH;
 use headrace_geometry::tunnel::Profile;
 

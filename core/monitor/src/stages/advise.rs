@@ -2,8 +2,10 @@
 
 use bevy_ecs::prelude::{Res, ResMut, Resource};
 
-use crate::flow::{AdviceEntry, AdviceLog, Digests, Notice, Notices, Placed, PlacedList, Tally};
-use crate::trail::{RecordKind, Trail};
+use crate::advice_log::{AdviceEntry, AdviceLog};
+use crate::messages::{Notice, Notices, Placed, PlacedList};
+use crate::resources::{Digests, Tally};
+use crate::result_stream::{RecordKind, ResultStream};
 use headrace_geometry::frames::Vec3;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sampling::advice::{self, Advice, Remedy, Steady};
@@ -45,9 +47,9 @@ fn swing(looks: &mut Looks, at: MonoNs, situation: &Situation) -> Swing {
     looks.swing(at, passes.gap_s(passes.heads()).unwrap_or(0.0))
 }
 
-fn digest(trail: &mut Trail, at: MonoNs, advice: &Advice) {
+fn digest(stream: &mut ResultStream, at: MonoNs, advice: &Advice) {
     let [width_m, arc_m] = advice.unseen_m.unwrap_or_default();
-    trail
+    stream
         .record(RecordKind::Advice)
         .integer(at.0)
         .number(advice.v_max_mps)
@@ -60,7 +62,7 @@ fn digest(trail: &mut Trail, at: MonoNs, advice: &Advice) {
         .integer(advice.remedy.map_or(0, Remedy::number))
         .text(if let Some(Remedy::Mode(name)) = &advice.remedy { name.as_str() } else { "" });
     for other in advice.alternatives.iter().flatten() {
-        trail.number(other.v_max_mps);
+        stream.number(other.v_max_mps);
     }
 }
 

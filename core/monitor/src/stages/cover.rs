@@ -2,53 +2,34 @@
 //!
 //! Both in one pass over the pings: which sections are judged, and on what evidence, depends on the verdicts before.
 
-use bevy_ecs::prelude::{Res, ResMut, Resource};
-use serde::{Deserialize, Serialize};
+use bevy_ecs::prelude::{Query, Res, ResMut, Single};
 
 use super::advise::Advisor;
 use super::driving::{Driven, Driving};
 use super::judge::{Results, digest_alert, judge_one};
 use crate::alerts::{AlertKind, Alerts};
-use crate::flow::{
-    Coverage, Digests, Finder, Notice, Notices, Outcome, Place, Placed, PlacedList, PlacedPing, Requests,
-    Tally,
-};
+use crate::entities::{HeadFrontier, HeadSweep, LastSample};
+use crate::messages::{Notice, Notices, Outcome, Placed, PlacedList, PlacedPing, Requests};
+use crate::resources::{Coverage, Digests, Finder, Tally, TunnelDesign, VehicleEntities};
 use headrace_coverage::hole::FARTHEST_M;
-use headrace_coverage::{Doubt, Loss, StoreError, WallSample};
+use headrace_coverage::{Doubt, HeadReach, Loss, Outlook, StoreError, WallSample};
 use headrace_geometry::frames::{Point3, Tunnel, Vec3};
 use headrace_geometry::math;
-use headrace_geometry::time::{DurNs, MonoNs};
-use headrace_sampling::head::MAX_HEADS;
+use headrace_geometry::time::DurNs;
 use headrace_sampling::spacing;
 
 /// How often sections are looked at that are neither left nor ahead.
 const LOOK_AROUND: DurNs = DurNs(1_000_000_000);
 
-/// What is remembered of each head's sweep.
-#[derive(Debug, Clone, Copy, Default, Resource, Serialize, Deserialize)]
-pub(crate) struct HeadSweeps {
-    last: [Option<LastSample>; MAX_HEADS],
-    /// The head has pinged where nobody knew, and hasn't since where somebody does.
-    unseen: [bool; MAX_HEADS],
-}
-
-/// The last valid sample of a head in its present sweep.
-#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
-struct LastSample {
-    point: Point3<Tunnel>,
-    sigma_m: f64,
-    /// Every ping since has been a single step with a return.
-    unbroken: bool,
-}
-
 #[expect(clippy::too_many_arguments, reason = "a system's arguments are what it reads and writes")]
 pub(super) fn cover(
     placed: Res<'_, PlacedList>,
-    context: Res<'_, Place>,
+    tunnel: Res<'_, TunnelDesign>,
+    entities: Res<'_, VehicleEntities>,
+    mut heads: Query<'_, '_, (&mut HeadSweep, &mut HeadFrontier)>,
+    mut driving: Single<'_, '_, &mut Driving>,
     mut coverage: ResMut<'_, Coverage>,
     advisor: Res<'_, Advisor>,
-    mut sweeps: ResMut<'_, HeadSweeps>,
-    mut driving: ResMut<'_, Driving>,
     mut requests: ResMut<'_, Requests>,
     mut tally: ResMut<'_, Tally>,
     mut finder: ResMut<'_, Finder>,
@@ -60,27 +41,33 @@ pub(super) fn cover(
     for item in &placed.0 {
         match item {
             Placed::Situation(at, situation) => {
-                driving.note(*at, situation, &context.profile, &advisor.advisor);
+                driving.note(*at, situation, &tunnel.profile, &advisor.advisor);
                 if at.0 % LOOK_AROUND.0.unsigned_abs() == 0 {
-                    look_around(&mut coverage, &mut finder, &context, *at, &mut requests);
+                    let reaches = heads.iter().filter_map(|(_, frontier)| frontier.0);
+                    let outlook = coverage.frontier.outlook(reaches, *at);
+                    look_around(&mut coverage, &mut finder, &tunnel, &outlook, &mut requests);
                 }
             }
             Placed::Ping(ping) => {
                 count(&mut tally, &ping.outcome);
-                note_passage(&mut coverage, &mut sweeps, &driving.now, ping);
-                if let Some(beyond_m) = beyond_end_m(ping, context.length_m)
+                let head = entities.of_head(ping.head).and_then(|entity| heads.get_mut(entity).ok());
+                let Some((mut sweep, mut frontier)) = head else { continue };
+                note_passage(&mut coverage, &mut sweep, &frontier, &driving.now, ping);
+                if let Some(beyond_m) = beyond_end_m(ping, tunnel.length_m)
                     && alerts.note(AlertKind::OutsideTunnel, ping.received, beyond_m.0, beyond_m.1)
                 {
                     notices.0.push(Notice::Alert(AlertKind::OutsideTunnel));
                     digest_alert(&mut digests, AlertKind::OutsideTunnel, ping.received, beyond_m);
                 }
-                if let Err(error) = note_sample(&mut coverage, &mut sweeps, &context, ping) {
+                if let Err(error) = note_sample(&mut coverage, &mut sweep, &tunnel, ping) {
                     match error {
                         StoreError::Outside => tally.outside += 1,
                         StoreError::Full => tally.not_stored += 1,
                     }
                 }
-                note_frontier(&mut coverage, ping, &mut requests);
+                note_reach(&mut frontier, ping);
+                let reaches = heads.iter().filter_map(|(_, frontier)| frontier.0);
+                note_frontier(&mut coverage, reaches, ping, &mut requests);
             }
         }
         for request in requests.0.drain(..) {
@@ -90,7 +77,7 @@ pub(super) fn cover(
                 digests: &mut digests,
                 alerts: &mut alerts,
             };
-            judge_one(&request, &context.profile, &mut coverage, &mut results);
+            judge_one(&request, &tunnel.profile, &mut coverage, &mut results);
         }
     }
 }
@@ -106,8 +93,14 @@ fn count(tally: &mut Tally, outcome: &Outcome) {
 }
 
 /// Adds a ping to the passage of the section that its head is in, and what it lost to that of the section it was aimed at.
-fn note_passage(coverage: &mut Coverage, sweeps: &mut HeadSweeps, driven: &Driven, ping: &PlacedPing) {
-    note_unseen(coverage, sweeps, ping);
+fn note_passage(
+    coverage: &mut Coverage,
+    sweep: &mut HeadSweep,
+    frontier: &HeadFrontier,
+    driven: &Driven,
+    ping: &PlacedPing,
+) {
+    note_unseen(coverage, sweep, frontier, ping);
     let perimeter_m = coverage.store.perimeter_m();
     if let Outcome::Lost(loss, Some(aim)) = ping.outcome {
         let index = coverage.sections.index_of(aim.x_m);
@@ -116,7 +109,7 @@ fn note_passage(coverage: &mut Coverage, sweeps: &mut HeadSweeps, driven: &Drive
         }
     }
     // Without a fix, a ping counts where its head was last known to be.
-    let Some(reach) = ping.reach.or_else(|| coverage.frontier.last_reach(ping.head)) else { return };
+    let Some(reach) = ping.reach.or_else(|| Some(frontier.0?.latest())) else { return };
     let index = coverage.sections.index_of(reach.middle_m());
     let Some(section) = coverage.sections.get_mut(index) else { return };
     let passage = &mut section.passage;
@@ -142,16 +135,15 @@ fn note_passage(coverage: &mut Coverage, sweeps: &mut HeadSweeps, driven: &Drive
 }
 
 /// Sections that a head went through while nobody knew where.
-fn note_unseen(coverage: &mut Coverage, sweeps: &mut HeadSweeps, ping: &PlacedPing) {
-    let Some(unseen) = sweeps.unseen.get_mut(ping.head) else { return };
+fn note_unseen(coverage: &mut Coverage, sweep: &mut HeadSweep, frontier: &HeadFrontier, ping: &PlacedPing) {
     let Some(reach) = ping.reach else {
-        *unseen = true;
+        sweep.unseen = true;
         return;
     };
-    if !core::mem::take(unseen) {
+    if !core::mem::take(&mut sweep.unseen) {
         return;
     }
-    let Some(before) = coverage.frontier.last_reach(ping.head) else { return };
+    let Some(before) = frontier.0.map(|reach| reach.latest()) else { return };
     let (from_m, to_m) = (before.middle_m().min(reach.middle_m()), before.middle_m().max(reach.middle_m()));
     let passed = coverage.sections.index_of(from_m)..=coverage.sections.index_of(to_m);
     for index in passed {
@@ -165,14 +157,13 @@ fn note_unseen(coverage: &mut Coverage, sweeps: &mut HeadSweeps, ping: &PlacedPi
 fn look_around(
     coverage: &mut Coverage,
     finder: &mut Finder,
-    context: &Place,
-    at: MonoNs,
+    tunnel: &TunnelDesign,
+    outlook: &Outlook,
     requests: &mut Requests,
 ) {
-    let Coverage { store, sections, frontier, .. } = coverage;
-    let now = (&*frontier, at);
+    let Coverage { store, sections, .. } = coverage;
     let mut ask = |request| requests.0.push(request);
-    sections.look_around(now, store, &mut finder.0, &context.profile, &mut ask);
+    sections.look_around(outlook, store, &mut finder.0, &tunnel.profile, &mut ask);
 }
 
 /// Chainage of a sample before the portal or behind the tunnel's end, and by how much, m.
@@ -186,11 +177,11 @@ fn beyond_end_m(ping: &PlacedPing, length_m: f64) -> Option<(f64, f64)> {
 /// Keeps a sample and adds its spacings to its section.
 fn note_sample(
     coverage: &mut Coverage,
-    sweeps: &mut HeadSweeps,
-    context: &Place,
+    sweep: &mut HeadSweep,
+    tunnel: &TunnelDesign,
     ping: &PlacedPing,
 ) -> Result<(), StoreError> {
-    let Some(slot) = sweeps.last.get_mut(ping.head) else { return Ok(()) };
+    let slot = &mut sweep.last;
     if ping.new_sweep {
         *slot = None;
     }
@@ -220,7 +211,7 @@ fn note_sample(
     section.samples += 1;
     let yz = |point: &Point3<Tunnel>| [point.y(), point.z()];
     let from = step_from.map(|last| (yz(&last.point), last.sigma_m));
-    section.deviation.add(&context.profile, (yz(&point), sigma_m), from, context.contradiction_m);
+    section.deviation.add(&tunnel.profile, (yz(&point), sigma_m), from, tunnel.contradiction_m);
     if let Some(t_x_m) = t_x_m {
         section.t_x_m.add(t_x_m);
     }
@@ -238,14 +229,31 @@ fn note_sample(
     Ok(())
 }
 
+/// Moves the head's own reach on.
+fn note_reach(frontier: &mut HeadFrontier, ping: &PlacedPing) {
+    match (ping.fix, ping.reach) {
+        (Some(_), Some(reach)) => frontier.0 = Some(HeadReach::after(frontier.0, ping.received, reach)),
+        _ => {
+            if let Some(reach) = &mut frontier.0 {
+                reach.heard(ping.received);
+            }
+        }
+    }
+}
+
 /// Moves the frontier on, and asks for the sections that are out of the way now.
-fn note_frontier(coverage: &mut Coverage, ping: &PlacedPing, requests: &mut Requests) {
+fn note_frontier(
+    coverage: &mut Coverage,
+    heads: impl Iterator<Item = HeadReach> + Clone,
+    ping: &PlacedPing,
+    requests: &mut Requests,
+) {
     let Coverage { sections, frontier, .. } = coverage;
-    let (Some(fix), Some(reach)) = (ping.fix, ping.reach) else {
-        frontier.heard(ping.head, ping.received);
-        return;
-    };
+    let (Some(fix), Some(reach)) = (ping.fix, ping.reach) else { return };
     let margin_m = sections.margin_m(fix.relative.sigma_m(Vec3::zero()));
-    let moved = frontier.advance(ping.head, ping.received, reach, sections.section_m(), margin_m);
-    sections.due(&moved, frontier, ping.received, &mut |request| requests.0.push(request));
+    let moved = frontier.advance(reach, heads.clone(), ping.received, sections.section_m(), margin_m);
+    if !moved.is_nothing() {
+        let outlook = frontier.outlook(heads, ping.received);
+        sections.due(&moved, &outlook, &mut |request| requests.0.push(request));
+    }
 }

@@ -1,6 +1,6 @@
 //! How the vehicle is driven and its heads turn, beat by beat: what a section's passage remembers of its pings.
 
-use bevy_ecs::prelude::Resource;
+use bevy_ecs::prelude::Component;
 use serde::{Deserialize, Serialize};
 
 use headrace_geometry::frames::Vec3;
@@ -35,7 +35,7 @@ pub(super) struct Driven {
 }
 
 /// The last beat, and which way the vehicle looked at those before.
-#[derive(Debug, Clone, Default, Resource)]
+#[derive(Debug, Clone, Default, Component)]
 pub(crate) struct Driving {
     pub(super) now: Driven,
     /// The step for which `middle_t_y_m` was looked up, in soundings of a ring.

@@ -1,8 +1,9 @@
 //! A section to its verdict, its flag and its run.
 
 use crate::alerts::{AlertKind, Alerts};
-use crate::flow::{Coverage, Digests, Finder, Notice, Notices};
-use crate::trail::RecordKind;
+use crate::messages::{Notice, Notices};
+use crate::resources::{Coverage, Digests, Finder};
+use crate::result_stream::RecordKind;
 use headrace_coverage::{Judging, Request, RunChange, RunId};
 use headrace_geometry::time::MonoNs;
 use headrace_geometry::tunnel::Profile;

@@ -6,28 +6,26 @@ mod advise;
 mod cover;
 mod decode;
 mod driving;
+mod georeference;
 mod judge;
 mod navigate;
-mod place;
-mod sound;
+mod sound_speed;
 
 use bevy_ecs::schedule::{IntoScheduleConfigs, Schedule};
 
 use super::stage::Stage;
 
 pub(super) use advise::Advisor;
-pub(super) use cover::HeadSweeps;
-pub(super) use decode::Decoders;
 pub(super) use driving::Driving;
 pub(super) use judge::{Results, judge_one};
-pub(super) use sound::WaterSound;
+pub(super) use sound_speed::SoundSpeed;
 
 /// Adds the core's systems to their stages.
 pub(super) fn add(schedule: &mut Schedule) {
     schedule.add_systems((
         decode::decode.in_set(Stage::Decode),
         navigate::navigate.in_set(Stage::Navigate),
-        place::place.in_set(Stage::Place),
+        georeference::georeference.in_set(Stage::Georeference),
         cover::cover.in_set(Stage::Cover),
         advise::advise.in_set(Stage::Advise),
     ));

@@ -1,37 +1,42 @@
 //! Readings to fixes.
 
-use bevy_ecs::prelude::{Res, ResMut};
+use bevy_ecs::prelude::{Query, Res, ResMut, Single};
 
-use crate::flow::{ADVICE_PERIOD, Digests, Events, Navigator, Positioned, PositionedList, SensorTable};
-use crate::trail::{RecordKind, Trail};
-use headrace_fusion::filter::running::Sigmas;
-use headrace_fusion::{Fix, NoFix, Times};
+use crate::advice_log::ADVICE_PERIOD;
+use crate::entities::{Mounted, Navigator, VehicleState};
+use crate::messages::{Events, Positioned, PositionedList};
+use crate::resources::{Digests, VehicleEntities};
+use crate::result_stream::{RecordKind, ResultStream};
+use headrace_fusion::Times;
 use headrace_geometry::time::MonoNs;
 use headrace_sensor::reading::Reading;
 
 pub(super) fn navigate(
     events: Res<'_, Events>,
-    sensors: Res<'_, SensorTable>,
-    mut navigator: ResMut<'_, Navigator>,
+    entities: Res<'_, VehicleEntities>,
+    sensors: Query<'_, '_, &Mounted>,
+    vehicle: Single<'_, '_, (&mut Navigator, &mut VehicleState)>,
     mut list: ResMut<'_, PositionedList>,
     mut digests: ResMut<'_, Digests>,
 ) {
     list.0.clear();
+    let (mut navigator, mut state) = vehicle.into_inner();
     let navigator = &mut *navigator;
     for (index, event) in events.0.iter().enumerate() {
         // Time may stand still or go back; a beat is passed once. After a gap only the last beat counts.
         if let Some(at) = beat_before(&mut navigator.next_beat, event.received) {
             let fix = navigator.navigation.fix(at);
-            digest(&mut digests.poses, at, &fix, navigator.navigation.sigmas());
+            *state = VehicleState { at: Some(at), fix, sd: navigator.navigation.sigmas() };
+            digest(&mut digests.poses, at, &state);
             list.0.push(Positioned::Beat { at, fix });
         }
         if matches!(event.reading, Reading::Sonar(_)) {
             let fix = navigator.navigation.fix(event.valid_at);
             list.0.push(Positioned::Ping { event: index, fix });
         }
-        if let Some(sensor) = sensors.0.get(event.source.index()) {
+        if let Some(sensor) = entities.of_source(event.source).and_then(|entity| sensors.get(entity).ok()) {
             let times = Times { received: event.received, valid: event.valid_at };
-            navigator.navigation.update(event.source.index(), sensor, times, &event.reading);
+            navigator.navigation.update(event.source.index(), &sensor.info, times, &event.reading);
         }
     }
 }
@@ -53,8 +58,8 @@ fn beat_before(next: &mut Option<MonoNs>, now: MonoNs) -> Option<MonoNs> {
     }
 }
 
-fn digest(poses: &mut Trail, at: MonoNs, fix: &Result<Fix, NoFix>, sigmas: Option<Sigmas>) {
-    let fix = match fix {
+fn digest(poses: &mut ResultStream, at: MonoNs, state: &VehicleState) {
+    let fix = match &state.fix {
         Ok(fix) => fix,
         Err(lacking) => {
             poses.record(RecordKind::NoPose).integer(at.0).integer(*lacking as u64);
@@ -67,7 +72,7 @@ fn digest(poses: &mut Trail, at: MonoNs, fix: &Result<Fix, NoFix>, sigmas: Optio
         poses.number(part);
     }
     poses.number(fix.speed_mps);
-    if let Some(Sigmas { along_m, place_m, tilt_rad, yaw_rad }) = sigmas {
-        poses.number(along_m).number(place_m).number(tilt_rad).number(yaw_rad);
+    if let Some(sd) = state.sd {
+        poses.number(sd.along_m).number(sd.place_m).number(sd.tilt_rad).number(sd.yaw_rad);
     }
 }

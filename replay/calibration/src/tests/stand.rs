@@ -7,7 +7,7 @@ use headrace_geometry::math::{self, FRAC_PI_2, TAU};
 use headrace_geometry::site::Site;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_geometry::tunnel::{Profile, shapes};
-use headrace_monitor::flow::Event;
+use headrace_monitor::messages::Event;
 use headrace_sensor::device::{SensorInfo, SensorKind};
 use headrace_sensor::reading::{
     EchoRange, Level, Reading, SonarReturn, SourceId, TetherLength, WaterPressure,

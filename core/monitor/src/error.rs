@@ -1,14 +1,4 @@
-//! Plugins: values that add themselves to an [`App`].
-
-use super::App;
-
-/// Something that can be added to the loop: a device, an outlet, a stage.
-pub trait Plugin {
-    /// Registers sources, components, systems in a named stage, outlets.
-    ///
-    /// Errors: what the plugin needs isn't there, or is there twice.
-    fn build(&self, app: &mut App) -> Result<(), PluginError>;
-}
+//! Why a loop can't be put together.
 
 /// Why a plugin could not be added.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]

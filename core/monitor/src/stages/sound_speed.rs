@@ -14,7 +14,7 @@ const SLOWNESS_S: f64 = 60.0;
 
 /// The speed of sound that holds now.
 #[derive(Debug, Clone, Resource)]
-pub(crate) struct WaterSound {
+pub(crate) struct SoundSpeed {
     /// The depth sensor that tells it; without, the site's holds.
     source: Option<SourceId>,
     site_mps: f64,
@@ -24,9 +24,9 @@ pub(crate) struct WaterSound {
     span_mps: [f64; 2],
 }
 
-stateful!(WaterSound { state: now_mps, heard, span_mps; fixed: source, site_mps; });
+stateful!(SoundSpeed { state: now_mps, heard, span_mps; fixed: source, site_mps; });
 
-impl WaterSound {
+impl SoundSpeed {
     /// The site's speed, until `source` tells another.
     pub(crate) fn new(site_mps: f64, source: Option<SourceId>) -> Self {
         Self { source, site_mps, now_mps: site_mps, heard: None, span_mps: [site_mps; 2] }
@@ -90,7 +90,7 @@ mod tests {
     }
 
     /// What becomes of 4 m that a device has reckoned with 1500 m/s.
-    fn metres(sound: &mut WaterSound, site: &Site) -> f64 {
+    fn metres(sound: &mut SoundSpeed, site: &Site) -> f64 {
         let echo = EchoRange { range_m: Some(4.0), confidence: 1.0, sound_speed_mps: 1500.0 };
         let mut decoded = Decoded { valid_at: MonoNs(0), reading: Reading::Echo(echo) };
         sound.pass(SourceId(0), &mut decoded);
@@ -101,7 +101,7 @@ mod tests {
     #[test]
     fn ranges_are_those_of_the_water_that_the_sensor_is_in() {
         let site = Site::default();
-        let mut sound = WaterSound::new(site.sound_speed_mps, Some(DEPTH));
+        let mut sound = SoundSpeed::new(site.sound_speed_mps, Some(DEPTH));
         assert!((metres(&mut sound, &site) - 4.0 * 1447.0 / 1500.0).abs() < 1e-12);
         // Another sensor's, and what no water has, are not heeded.
         sound.pass(SourceId(2), &mut depth(1.0, 20.0));
@@ -115,7 +115,7 @@ mod tests {
     #[test]
     fn noise_is_smoothed_and_a_change_is_followed() {
         let site = Site::default();
-        let mut sound = WaterSound::new(site.sound_speed_mps, Some(DEPTH));
+        let mut sound = SoundSpeed::new(site.sound_speed_mps, Some(DEPTH));
         for tick in 0..20_000 {
             let noise = if tick % 2 == 0 { 0.5 } else { -0.5 };
             sound.pass(DEPTH, &mut depth(f64::from(tick) * 0.05, 10.0 + noise));

@@ -29,7 +29,7 @@ pub struct Turned {
 
 /// The motion of one head as measured: state of the loop.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Component, Serialize, Deserialize)]
-pub struct HeadTrack {
+pub struct MeasuredMotion {
     last: Option<(MonoNs, f64)>,
     /// Signed angle of the last step, radians.
     last_step_rad: f64,
@@ -45,7 +45,7 @@ pub struct HeadTrack {
     step_rad: Option<f64>,
 }
 
-impl HeadTrack {
+impl MeasuredMotion {
     /// When and where the head last pinged.
     pub fn last(&self) -> Option<(MonoNs, f64)> {
         self.last
@@ -135,8 +135,8 @@ impl HeadTrack {
 mod tests {
     use super::*;
 
-    fn run(angles_deg: impl Iterator<Item = f64>) -> (HeadTrack, Vec<Turned>) {
-        let mut track = HeadTrack::default();
+    fn run(angles_deg: impl Iterator<Item = f64>) -> (MeasuredMotion, Vec<Turned>) {
+        let mut track = MeasuredMotion::default();
         let turned = (0..)
             .zip(angles_deg)
             .map(|(k, angle)| track.ping(MonoNs(k * 20_000_000), angle.to_radians()))
@@ -166,7 +166,7 @@ mod tests {
 
     #[test]
     fn a_stalled_head_grows_old_and_starts_with_a_fresh_rate() {
-        let mut track = HeadTrack::default();
+        let mut track = MeasuredMotion::default();
         for k in 0..100 {
             track.ping(MonoNs(k * 20_000_000), f64::to_radians(0.9 * k as f64));
         }

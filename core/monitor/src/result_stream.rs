@@ -144,7 +144,7 @@ impl RecordKind {
 
 /// A stream of results.
 #[derive(Debug, Clone, Default)]
-pub struct Trail {
+pub struct ResultStream {
     digest: Digest,
     words: Vec<u64>,
     /// Room for words of a tick; none while nobody keeps them.
@@ -154,9 +154,9 @@ pub struct Trail {
     lost: u64,
 }
 
-stateful!(Trail { state: digest, records, lost; fixed: words, room, head; });
+stateful!(ResultStream { state: digest, records, lost; fixed: words, room, head; });
 
-impl Trail {
+impl ResultStream {
     /// Keeps the words of each tick from now on. Allocates: all that it will need.
     pub fn keep(&mut self) {
         self.room = MAX_TICK_WORDS;
@@ -268,35 +268,35 @@ pub fn first_record(words: &[u64]) -> Option<(Record<'_>, &[u64])> {
 mod tests {
     use super::*;
 
-    fn filled() -> Trail {
-        let mut trail = Trail::default();
-        trail.keep();
-        trail.record(RecordKind::Run).integer(7).integer(1);
-        trail.record(RecordKind::Advice).integer(5).number(0.25).integer(0).integer(1).number(-0.0);
-        trail
+    fn filled() -> ResultStream {
+        let mut stream = ResultStream::default();
+        stream.keep();
+        stream.record(RecordKind::Run).integer(7).integer(1);
+        stream.record(RecordKind::Advice).integer(5).number(0.25).integer(0).integer(1).number(-0.0);
+        stream
     }
 
     #[test]
     fn records_come_out_as_they_went_in() {
-        let trail = filled();
-        let (first, rest) = first_record(trail.words()).unwrap();
+        let stream = filled();
+        let (first, rest) = first_record(stream.words()).unwrap();
         assert_eq!(first, Record { kind: Some(RecordKind::Run), words: &[7, 1] });
         let (second, rest) = first_record(rest).unwrap();
         assert_eq!(second.words, [5, 0.25_f64.to_bits(), 0, 1, 0]);
         assert_eq!(second.kind.map(|kind| kind.field(1)), Some(("v_max_mps", WordKind::Number)));
         assert_eq!(second.kind.map(|kind| kind.field(11).0), Some("alternative_v_max_mps"));
         assert_eq!(first_record(rest), None);
-        assert_eq!((trail.records(), trail.lost()), (2, 0));
+        assert_eq!((stream.records(), stream.lost()), (2, 0));
         assert_eq!(first_record(&[5 << 8 | 1, 2]), None);
     }
 
     #[test]
     fn a_short_text_comes_back_and_a_long_one_is_cut() {
         for (text, back) in [("", ""), ("0.3 deg", "0.3 deg"), ("a mode's long name", "a mode's long na")] {
-            let mut trail = Trail::default();
-            trail.keep();
-            trail.record(RecordKind::Advice).text(text);
-            let (record, _) = first_record(trail.words()).unwrap();
+            let mut stream = ResultStream::default();
+            stream.keep();
+            stream.record(RecordKind::Advice).text(text);
+            let (record, _) = first_record(stream.words()).unwrap();
             assert_eq!(text_of([record.words[0], record.words[1]]), back);
         }
     }
@@ -304,15 +304,15 @@ mod tests {
     /// Keeping changes no digest, nor does the lack of room.
     #[test]
     fn the_digest_is_of_the_words_alone() {
-        let mut plain = Trail::default();
+        let mut plain = ResultStream::default();
         plain.record(RecordKind::Run).integer(7).integer(1);
         plain.record(RecordKind::Advice).integer(5).number(0.25).integer(0).integer(1).number(0.0);
         assert_eq!(plain.value(), filled().value());
         assert!(plain.words().is_empty());
         let (mut kept, mut plain) = (filled(), filled());
-        for trail in [&mut kept, &mut plain] {
+        for stream in [&mut kept, &mut plain] {
             for value in 0..2 * MAX_TICK_WORDS as u64 {
-                trail.record(RecordKind::Run).integer(value);
+                stream.record(RecordKind::Run).integer(value);
             }
         }
         plain.next_tick();

@@ -1,0 +1,126 @@
+//! The advice over time.
+
+use bevy_ecs::prelude::Resource;
+use serde::{Deserialize, Serialize};
+
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_sampling::advice::Advice;
+use headrace_snapshot::stateful;
+
+/// Advice is given at every multiple of this in data time.
+pub const ADVICE_PERIOD: DurNs = DurNs(200_000_000);
+
+/// One entry of the advice's history.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct AdviceEntry {
+    /// The moment, in data time.
+    pub at: MonoNs,
+    /// Chainage then, m; `None` without a fix.
+    pub chainage_m: Option<f64>,
+    /// Speed then, m/s.
+    pub speed_mps: f64,
+    /// The advice.
+    pub advice: Advice,
+}
+
+/// The advice over time, kept whenever it has changed enough to matter, or ten seconds have gone.
+///
+/// When it is full every other entry is dropped, and from then on entries are at least twice as far apart in time as they
+/// had to be before: a longer dive is told more coarsely, from its beginning to its end.
+#[derive(Debug, Clone, Resource)]
+pub struct AdviceLog {
+    /// The entries, in order.
+    pub entries: Vec<AdviceEntry>,
+    /// Entries for which there was no room.
+    pub dropped: u64,
+    /// Least time between two entries.
+    apart: DurNs,
+}
+
+stateful!(AdviceLog { state: dropped, apart; lists: entries; });
+
+impl Default for AdviceLog {
+    fn default() -> Self {
+        Self { entries: Vec::with_capacity(Self::CAPACITY), dropped: 0, apart: DurNs(0) }
+    }
+}
+
+impl AdviceLog {
+    /// An entry has some 400 bytes.
+    const CAPACITY: usize = 1 << 13;
+    const EVERY: DurNs = DurNs(10_000_000_000);
+    const CHANGE_MPS: f64 = 0.01;
+
+    pub(super) fn take(&mut self, entry: &AdviceEntry) {
+        let unchanged = |last: &AdviceEntry| {
+            last.advice.reason == entry.advice.reason
+                && last.advice.will_exceed == entry.advice.will_exceed
+                && (last.advice.v_max_mps - entry.advice.v_max_mps).abs() < Self::CHANGE_MPS
+                && (last.speed_mps - entry.speed_mps).abs() < Self::CHANGE_MPS
+                && entry.at.since(last.at).0 < Self::EVERY.0
+        };
+        if self.entries.last().is_some_and(unchanged) {
+            return;
+        }
+        if self.entries.last().is_some_and(|last| entry.at.since(last.at).0 < self.apart.0) {
+            self.dropped += 1;
+            return;
+        }
+        if self.entries.len() == Self::CAPACITY {
+            self.thin_out();
+        }
+        self.entries.push(*entry);
+    }
+
+    fn thin_out(&mut self) {
+        let before = self.entries.len();
+        let mut number = 0_usize;
+        self.entries.retain(|_| {
+            number += 1;
+            number % 2 == 1
+        });
+        self.dropped += (before - self.entries.len()) as u64;
+        self.apart = DurNs((2 * self.apart.0).max(2 * ADVICE_PERIOD.0));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use headrace_geometry::tunnel::shapes;
+    use headrace_sampling::advice::{Advisor, Task};
+    use headrace_sampling::layout::HeadLayout;
+    use headrace_sampling::passes::Situation;
+    use headrace_sampling::swing::Swing;
+
+    /// Advice that changes at every beat of ten hours is told from beginning to end in the room that there is.
+    #[test]
+    fn the_advice_s_history_does_not_grow_with_hours() {
+        let profile = shapes::circle(3.0).unwrap();
+        let task =
+            Task { target_m: 0.5, length_m: 100.0, layout: HeadLayout::PhaseShift, sound_speed_mps: 1447.0 };
+        let nowhere = Situation {
+            pose: None,
+            speed_mps: 0.0,
+            doubt_m: 0.0,
+            layout: HeadLayout::PhaseShift,
+            configured: 0,
+            heads: [None; headrace_sampling::head::MAX_HEADS],
+        };
+        let advice = Advisor::new(&profile, task, &[], &[]).advise(&nowhere, Swing::default(), None);
+        let mut log = AdviceLog::default();
+        let room = log.entries.capacity();
+        let beats = 180_000_u32;
+        for beat in 0..beats {
+            let at = MonoNs(u64::from(beat) * ADVICE_PERIOD.0.unsigned_abs());
+            let speed_mps = f64::from(beat % 2);
+            log.take(&AdviceEntry { at, chainage_m: None, speed_mps, advice });
+        }
+        assert_eq!(log.entries.capacity(), room);
+        assert!(log.entries.len() > AdviceLog::CAPACITY / 2 - 1, "{}", log.entries.len());
+        assert!(log.dropped > 0, "what is left out is counted");
+        let apart_s = log.entries.windows(2).map(|two| two[1].at.since(two[0].at).as_secs_f64());
+        assert!(apart_s.fold(0.0, f64::max) < 12.0);
+        assert_eq!(log.entries[0].at, MonoNs(0));
+    }
+}

@@ -1,0 +1,167 @@
+//! The loop while it is put together: sources, sensors, plugins.
+
+use bevy_ecs::component::Mutable;
+use bevy_ecs::entity::Entity;
+use bevy_ecs::prelude::Resource;
+use bevy_ecs::schedule::{IntoScheduleConfigs, Schedule};
+use bevy_ecs::system::ScheduleSystem;
+use bevy_ecs::world::World;
+
+use super::entities::{HeadSpecification, Mounted, SensorDecoder, SensorHealth};
+use super::error::PluginError;
+use super::loop_snapshot::StateParts;
+use super::resources::Digests;
+use super::ring::{self, Port, PortReader};
+use super::stage::{self, Stage};
+use super::stages;
+use headrace_sensor::device::{Decoder, Device, SensorInfo, SensorSpec};
+use headrace_sensor::reading::{MAX_SOURCES, SourceId};
+use headrace_snapshot::Stateful;
+use headrace_vehicle::Mission;
+
+/// A source of bytes, as a plugin registers it.
+pub struct SourceSpec {
+    /// Name, also of its channel in the log.
+    pub id: String,
+    /// Kind of device.
+    pub plugin: String,
+    /// Where it is connected, as written in the vehicle file.
+    pub connect: String,
+    /// Bytes to readings.
+    pub decoder: Box<dyn Decoder>,
+    /// Bytes that the ring before the loop holds.
+    pub ring_bytes: usize,
+}
+
+/// A source without its decoder: what reports and logs say of it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SourceInfo {
+    /// Name.
+    pub id: String,
+    /// Kind of device.
+    pub plugin: String,
+    /// Where it is connected.
+    pub connect: String,
+}
+
+/// Something that can be added to the loop: an outlet, a stage.
+pub trait Plugin {
+    /// Registers sources, components, systems in a named stage, outlets.
+    ///
+    /// Errors: what the plugin needs isn't there, or is there twice.
+    fn build(&self, app: &mut App) -> Result<(), PluginError>;
+}
+
+/// The loop while it is put together. [`App::arm`] turns it into one that runs.
+pub struct App {
+    pub(super) mission: Mission,
+    pub(super) world: World,
+    pub(super) schedule: Schedule,
+    pub(super) sources: Vec<SourceInfo>,
+    /// The entity of each source.
+    pub(super) entities: Vec<Entity>,
+    pub(super) ports: Vec<Port>,
+    pub(super) readers: Vec<PortReader>,
+}
+
+impl App {
+    /// A loop without sources.
+    pub fn new(mission: Mission) -> Self {
+        let mut schedule = stage::schedule();
+        stages::add(&mut schedule);
+        let mut world = World::new();
+        world.insert_resource(StateParts::of_the_loop());
+        Self {
+            mission,
+            world,
+            schedule,
+            sources: Vec::new(),
+            entities: Vec::new(),
+            ports: Vec::new(),
+            readers: Vec::new(),
+        }
+    }
+
+    /// Adds a plugin.
+    ///
+    /// Errors: what the plugin needs isn't there, or is there twice.
+    pub fn add_plugin(&mut self, plugin: &(impl Plugin + ?Sized)) -> Result<&mut Self, PluginError> {
+        plugin.build(self)?;
+        Ok(self)
+    }
+
+    /// Registers a source; its port fills the ring that the loop reads.
+    ///
+    /// Errors: an id that is there already, or more than [`MAX_SOURCES`].
+    pub fn add_source(&mut self, spec: SourceSpec) -> Result<SourceId, PluginError> {
+        if self.sources.iter().any(|other| other.id == spec.id) {
+            return Err(PluginError::DuplicateSource { id: spec.id });
+        }
+        let id = u16::try_from(self.sources.len()).ok().filter(|id| usize::from(*id) < MAX_SOURCES);
+        let id = id.ok_or_else(|| PluginError::TooManySources { id: spec.id.clone(), max: MAX_SOURCES })?;
+        let (port, reader) = ring::ring(spec.ring_bytes);
+        self.sources.push(SourceInfo { id: spec.id, plugin: spec.plugin, connect: spec.connect });
+        self.ports.push(port);
+        self.readers.push(reader);
+        let source = SourceId(id);
+        let entity = self.world.spawn((
+            Mounted { source, info: SensorInfo::other() },
+            SensorDecoder(spec.decoder),
+            SensorHealth::default(),
+        ));
+        self.entities.push(entity.id());
+        Ok(source)
+    }
+
+    /// Adds a sensor: its source, and an entity with its mount and what it is.
+    ///
+    /// Errors: as for [`App::add_source`].
+    pub fn add_device(&mut self, device: &dyn Device) -> Result<SourceId, PluginError> {
+        let SensorSpec { sensor, kind, decoder, ring_bytes } = device.specification();
+        let source = self.add_source(SourceSpec {
+            id: sensor.id,
+            plugin: sensor.plugin,
+            connect: sensor.connect,
+            decoder,
+            ring_bytes,
+        })?;
+        let mut entity = self.world.spawn(Mounted { source, info: SensorInfo { mount: sensor.mount, kind } });
+        if let Some(spec) = device.head() {
+            let modes = device.modes(None).unwrap_or_default();
+            entity.insert(HeadSpecification { spec, modes });
+        }
+        Ok(source)
+    }
+
+    /// Adds a resource for a plugin's own systems.
+    pub fn insert_resource(&mut self, resource: impl Resource) {
+        self.world.insert_resource(resource);
+    }
+
+    /// Adds a resource of which results depend: snapshots have it as the part of this name.
+    pub fn insert_state(
+        &mut self,
+        name: &'static str,
+        resource: impl Resource<Mutability = Mutable> + Stateful,
+    ) {
+        self.world.resource_mut::<StateParts>().add_of(name, &resource);
+        self.world.insert_resource(resource);
+    }
+
+    /// Keeps the words of all results, tick by tick, for those who record or compare them.
+    pub fn keep_results(&mut self) {
+        let mut digests = Digests::default();
+        digests.keep();
+        self.world.insert_resource(digests);
+    }
+
+    /// Adds systems to a stage. Two of one stage that touch the same data must be ordered by whoever adds them.
+    pub fn add_systems<M>(&mut self, stage: Stage, systems: impl IntoScheduleConfigs<ScheduleSystem, M>) {
+        self.schedule.add_systems(systems.in_set(stage));
+    }
+
+    /// The sources so far, in the order of their ids.
+    pub fn sources(&self) -> &[SourceInfo] {
+        &self.sources
+    }
+}

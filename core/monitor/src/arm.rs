@@ -1,0 +1,184 @@
+//! Arming: all that a loop will ever need is allocated here.
+
+use bevy_ecs::entity::Entity;
+use bevy_ecs::world::World;
+
+use super::advice_log::AdviceLog;
+use super::alerts::Alerts;
+use super::app::{App, SourceInfo};
+use super::entities::{
+    Head, HeadFrontier, HeadSpecification, HeadSweep, HiddenAngles, MeasuredMotion, Mounted, Navigator,
+    VehicleState,
+};
+use super::error::PluginError;
+use super::merge::{Inbox, MAX_TICK_BYTES, MAX_TICK_PACKETS};
+use super::messages::{Events, Notices, PlacedList, PositionedList, Requests};
+use super::resources::{Coverage, Digests, Finder, Tally, Target, TickTime, TunnelDesign, VehicleEntities};
+use super::run::Loop;
+use super::stages::{Advisor, Driving, SoundSpeed};
+use headrace_coverage::{Frontier, GridLayout, HoleFinder, SampleStore, Sections, Soundings, StoreLayout};
+use headrace_fusion::Navigation;
+use headrace_sampling::advice::{self, Task};
+use headrace_sampling::head::{HeadMode, HeadSpec, MAX_HEADS};
+use headrace_sensor::device::SensorKind;
+use headrace_sensor::reading::SourceId;
+use headrace_vehicle::Mission;
+
+/// Room for the readings of one tick: the shortest frame of any device has over ten bytes.
+const MAX_TICK_READINGS: usize = MAX_TICK_BYTES / 8;
+
+/// Room beyond both ends of the tunnel for heads that sit ahead of or behind the vehicle's origin, m.
+const ROOM_BEYOND_M: f64 = 25.0;
+/// Samples for which there is room, for a metre of tunnel and at most. Four heads at 0.2 m/s lay 1,000 a metre.
+const SAMPLES_PER_M: f64 = 4_000.0;
+const MIN_SAMPLES: f64 = 4_000_000.0;
+const MAX_SAMPLES: f64 = 40_000_000.0;
+
+/// A section that is judged may change its run and two others, and raise an alert.
+const NOTICES_EACH: usize = 5;
+
+impl App {
+    /// Allocates all that the loop will ever need and makes it ready to run. From here on no tick allocates or locks.
+    ///
+    /// Errors: more heads than the loop's tables hold, or systems whose order matters but isn't stated.
+    pub fn arm(mut self, navigation: Box<dyn Navigation>) -> Result<Loop, PluginError> {
+        let mission = &self.mission;
+        let specs = number_heads(&mut self.world, &self.entities)?;
+        let task = Task {
+            target_m: mission.target_m,
+            length_m: mission.length_m,
+            layout: mission.layout,
+            sound_speed_mps: mission.site.sound_speed_mps,
+        };
+        let advisor = advice::Advisor::new(&mission.profile, task, &specs, &mission.hull);
+        let entities = self.spawn_entities(navigation, &advisor);
+        self.insert_resources(entities, advisor)?;
+        self.insert_messages();
+        self.schedule
+            .initialize(&mut self.world)
+            .map_err(|error| PluginError::Schedule { why: format!("{error:?}") })?;
+        Ok(Loop::new(self))
+    }
+
+    /// The vehicle, and the heads' remaining components.
+    fn spawn_entities(
+        &mut self,
+        navigation: Box<dyn Navigation>,
+        advisor: &advice::Advisor,
+    ) -> VehicleEntities {
+        let world = &mut self.world;
+        let navigator = Navigator { navigation, next_beat: None };
+        let vehicle = world.spawn((navigator, VehicleState::default(), Driving::default())).id();
+        let mut hidden = advisor.hidden_angles();
+        let mut heads = Vec::new();
+        for entity in &self.entities {
+            if world.get::<Head>(*entity).is_none() {
+                continue;
+            }
+            let hidden = HiddenAngles(hidden.next().map(<[_]>::to_vec).unwrap_or_default());
+            let state = (MeasuredMotion::default(), HeadSweep::default(), HeadFrontier::default());
+            world.entity_mut(*entity).insert((hidden, state));
+            heads.push(*entity);
+        }
+        VehicleEntities { vehicle, by_source: self.entities.clone(), heads }
+    }
+
+    fn insert_resources(
+        &mut self,
+        entities: VehicleEntities,
+        advisor: advice::Advisor,
+    ) -> Result<(), PluginError> {
+        let Self { mission, world, sources, .. } = self;
+        world.insert_resource(entities);
+        let told_by = sound_source(mission, sources)?;
+        world.insert_resource(SoundSpeed::new(mission.site.sound_speed_mps, told_by));
+        world.insert_resource(Finder(HoleFinder::new(mission.coverage.hole_tolerance_m)));
+        world.insert_resource(Alerts::default());
+        world.insert_resource(Advisor::new(advisor, mission.target_m, mission.dive_time));
+        world.insert_resource(AdviceLog::default());
+        if world.get_resource::<Digests>().is_none() {
+            world.insert_resource(Digests::default());
+        }
+        world.insert_resource(Tally::default());
+        world.insert_resource(TickTime::default());
+        world.insert_resource(coverage(mission)?);
+        world.insert_resource(TunnelDesign {
+            profile: mission.profile.clone(),
+            site: mission.site,
+            length_m: mission.length_m,
+            contradiction_m: mission.coverage.contradiction_m,
+        });
+        world.insert_resource(Target { target_m: mission.target_m, layout: mission.layout });
+        Ok(())
+    }
+
+    fn insert_messages(&mut self) {
+        let world = &mut self.world;
+        // A jump along the tunnel may ask for every section at once.
+        let most = world.resource::<Coverage>().sections.len() + MAX_TICK_PACKETS;
+        world.insert_resource(Inbox::default());
+        world.insert_resource(Events(Vec::with_capacity(MAX_TICK_READINGS)));
+        world.insert_resource(PositionedList(Vec::with_capacity(2 * MAX_TICK_READINGS)));
+        world.insert_resource(PlacedList(Vec::with_capacity(2 * MAX_TICK_READINGS)));
+        world.insert_resource(Requests(Vec::with_capacity(most)));
+        world.insert_resource(Notices(Vec::with_capacity(NOTICES_EACH * most + MAX_TICK_PACKETS)));
+    }
+}
+
+/// Numbers the heads in the order of sources; gives what each is.
+fn number_heads(
+    world: &mut World,
+    sensors: &[Entity],
+) -> Result<Vec<(HeadSpec, Vec<HeadMode>)>, PluginError> {
+    let is_head = |entity: &&Entity| {
+        world.get::<Mounted>(**entity).is_some_and(|mounted| mounted.info.kind == SensorKind::Head)
+    };
+    let heads: Vec<Entity> = sensors.iter().filter(is_head).copied().collect();
+    if heads.len() > MAX_HEADS {
+        return Err(PluginError::TooManyHeads { count: heads.len(), max: MAX_HEADS });
+    }
+    let mut specs = Vec::new();
+    for (number, entity) in heads.into_iter().enumerate() {
+        let head = world.get::<HeadSpecification>(entity).cloned();
+        specs.extend(head.map(|head| (head.spec, head.modes)));
+        world.entity_mut(entity).insert(Head(number));
+    }
+    Ok(specs)
+}
+
+/// The source that tells the speed of sound.
+fn sound_source(mission: &Mission, sources: &[SourceInfo]) -> Result<Option<SourceId>, PluginError> {
+    let Some(id) = &mission.sound_speed_from else { return Ok(None) };
+    let place =
+        sources.iter().position(|source| source.id == *id).and_then(|place| u16::try_from(place).ok());
+    place.map(|place| Some(SourceId(place))).ok_or_else(|| PluginError::MissingSource { id: id.clone() })
+}
+
+fn coverage(mission: &Mission) -> Result<Coverage, PluginError> {
+    let (from_m, to_m) = (-ROOM_BEYOND_M, mission.length_m + ROOM_BEYOND_M);
+    let samples = headrace_geometry::math::round_to_i64(
+        ((to_m - from_m) * SAMPLES_PER_M).clamp(MIN_SAMPLES, MAX_SAMPLES),
+    );
+    let mut store = SampleStore::new(StoreLayout {
+        perimeter_m: mission.profile.perimeter_m(),
+        from_m,
+        to_m,
+        cell_m: StoreLayout::cell_for_target_m(mission.target_m),
+        capacity: u32::try_from(samples).unwrap_or(u32::MAX),
+    });
+    let mut sections = Sections::new(mission.section_m, mission.target_m, 0.0, mission.length_m);
+    for opening in &mission.coverage.openings {
+        let name = || opening.name.clone();
+        opening
+            .fill(&mut store, mission.target_m)
+            .map_err(|why| PluginError::Opening { name: name(), why: why.to_string() })?;
+        sections.mask(opening, &mission.profile);
+    }
+    let soundings = Soundings::new(GridLayout {
+        perimeter_m: mission.profile.perimeter_m(),
+        from_m: 0.0,
+        to_m: mission.length_m,
+        node_m: mission.coverage.node_m,
+    });
+    Ok(Coverage { store, sections, frontier: Frontier::default(), soundings })
+}

@@ -1,0 +1,167 @@
+//! The dive's entities: the vehicle, and each of its sensors, heads among them.
+//!
+//! The vehicle has [`Navigator`], [`VehicleState`] and how it is driven. Every sensor has [`Mounted`], [`SensorDecoder`] and
+//! [`SensorHealth`]; a head has besides [`Head`], [`HeadSpecification`], [`MeasuredMotion`], [`HeadSweep`],
+//! [`HeadFrontier`] and [`HiddenAngles`].
+
+use bevy_ecs::prelude::Component;
+use serde::{Deserialize, Serialize};
+
+pub use super::head_motion::MeasuredMotion;
+use headrace_coverage::HeadReach;
+use headrace_fusion::filter::running::Sigmas;
+use headrace_fusion::{Fix, Navigation, NoFix};
+use headrace_geometry::frames::{Point3, Tunnel};
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_sampling::head::{HeadMode, HeadSpec};
+use headrace_sampling::occlusion::AngleRange;
+use headrace_sensor::device::{Decoder, SensorInfo};
+use headrace_sensor::reading::SourceId;
+use headrace_snapshot::{Restorer, Saver, SnapshotError, Stateful};
+
+/// The vehicle's estimator: readings to fixes.
+#[derive(Component)]
+pub struct Navigator {
+    /// The way of navigating.
+    pub navigation: Box<dyn Navigation>,
+    /// The next multiple of the advice period; `None` before the first packet.
+    pub next_beat: Option<MonoNs>,
+}
+
+impl Stateful for Navigator {
+    fn save(&self, to: &mut Saver) {
+        self.navigation.save(to);
+        to.value(&self.next_beat);
+    }
+
+    fn restore(&mut self, from: &mut Restorer<'_>) -> Result<(), SnapshotError> {
+        self.navigation.restore(from)?;
+        self.next_beat = from.value()?;
+        Ok(())
+    }
+}
+
+/// Where the vehicle was at the last beat, and how well that is known.
+#[derive(Debug, Clone, Copy, PartialEq, Component, Serialize, Deserialize)]
+pub struct VehicleState {
+    /// The beat; `None` before the first.
+    pub at: Option<MonoNs>,
+    /// Pose and speed, or what a fix lacks: the vehicle's health.
+    pub fix: Result<Fix, NoFix>,
+    /// Standard deviations of the pose, from its covariance; `None` where the way of navigating doesn't know them.
+    pub sd: Option<Sigmas>,
+}
+
+impl Default for VehicleState {
+    fn default() -> Self {
+        Self { at: None, fix: Err(NoFix::Heading), sd: None }
+    }
+}
+
+/// Which source a sensor's readings come from, how it sits on the vehicle, and what it is.
+#[derive(Debug, Clone, Copy, PartialEq, Component)]
+pub struct Mounted {
+    /// The source.
+    pub source: SourceId,
+    /// Mount and kind.
+    pub info: SensorInfo,
+}
+
+/// Bytes of a sensor to its readings.
+#[derive(Component)]
+pub struct SensorDecoder(pub Box<dyn Decoder>);
+
+impl Stateful for SensorDecoder {
+    fn save(&self, to: &mut Saver) {
+        self.0.save(to);
+    }
+
+    fn restore(&mut self, from: &mut Restorer<'_>) -> Result<(), SnapshotError> {
+        self.0.restore(from)
+    }
+}
+
+/// What has come from a sensor, and when.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Component, Serialize, Deserialize)]
+pub struct SensorHealth {
+    /// Packets.
+    pub packets: u64,
+    /// Their bytes.
+    pub bytes: u64,
+    /// Readings that they gave.
+    pub readings: u64,
+    /// First and last receive time.
+    pub span: Option<(MonoNs, MonoNs)>,
+    /// Longest time between two packets.
+    pub longest_gap: DurNs,
+}
+
+impl SensorHealth {
+    /// Counts a packet and the readings that it gave.
+    pub(super) fn count(&mut self, received: MonoNs, bytes: usize, readings: usize) {
+        self.packets += 1;
+        self.bytes += bytes as u64;
+        self.readings += readings as u64;
+        if let Some((_, last)) = self.span {
+            self.longest_gap = self.longest_gap.max(received.since(last));
+        }
+        self.span = Some(widened(self.span, received));
+    }
+
+    /// How long the sensor has been silent at `now`; `None` if it was never heard.
+    pub fn silent_for(&self, now: MonoNs) -> Option<DurNs> {
+        self.span.map(|(_, last)| now.since(last))
+    }
+}
+
+/// A span of time that includes `at`.
+pub(super) fn widened(span: Option<(MonoNs, MonoNs)>, at: MonoNs) -> (MonoNs, MonoNs) {
+    span.map_or((at, at), |(first, last)| (first.min(at), last.max(at)))
+}
+
+/// A profiling head: its number among the heads, from zero in the order of sources.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Component)]
+pub struct Head(pub usize);
+
+/// A profiling head, as configured.
+#[derive(Debug, Clone, PartialEq, Component)]
+pub struct HeadSpecification {
+    /// How it sits and turns.
+    pub spec: HeadSpec,
+    /// The modes that it could be set to instead.
+    pub modes: Vec<HeadMode>,
+}
+
+/// The angles that the vehicle hides from a head, in the head's own frame.
+#[derive(Debug, Clone, PartialEq, Default, Component)]
+pub struct HiddenAngles(pub Vec<AngleRange>);
+
+impl HiddenAngles {
+    /// Whether the vehicle stands in the beam at this angle of the head.
+    pub fn hides(&self, angle_rad: f64) -> bool {
+        self.0.iter().any(|range| range.has(angle_rad))
+    }
+}
+
+/// What is remembered of a head's sweep.
+#[derive(Debug, Clone, Copy, Default, Component, Serialize, Deserialize)]
+pub struct HeadSweep {
+    /// The last valid sample in the present sweep.
+    pub(super) last: Option<LastSample>,
+    /// The head pinged during a navigation outage, and not since the fix returned.
+    pub(super) unseen: bool,
+}
+
+/// The last valid sample of a head in its present sweep.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+pub(super) struct LastSample {
+    pub(super) point: Point3<Tunnel>,
+    /// Its arc length, m.
+    pub(super) sigma_m: f64,
+    /// Every ping since has been a single step with a return.
+    pub(super) unbroken: bool,
+}
+
+/// Where a head lands samples; `None` before its first ping with a fix.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Component, Serialize, Deserialize)]
+pub struct HeadFrontier(pub Option<HeadReach>);

@@ -1,0 +1,164 @@
+//! The dive's state that belongs to no one sensor: the tunnel, the target, what is known of the wall, and counts.
+
+use bevy_ecs::entity::Entity;
+use bevy_ecs::prelude::Resource;
+use serde::{Deserialize, Serialize};
+
+use super::result_stream::ResultStream;
+use headrace_coverage::{Frontier, HoleFinder, SampleStore, Sections, Soundings};
+use headrace_geometry::site::Site;
+use headrace_geometry::time::MonoNs;
+use headrace_geometry::tunnel::Profile;
+use headrace_sampling::layout::HeadLayout;
+use headrace_sensor::reading::SourceId;
+use headrace_snapshot::{Restorer, Saver, SnapshotError, Stateful, stateful};
+
+/// The tunnel as designed, and its water.
+#[derive(Debug, Clone, Resource)]
+pub struct TunnelDesign {
+    /// Design profile.
+    pub profile: Profile,
+    /// Water, gravity, levels.
+    pub site: Site,
+    /// Length of the tunnel, m.
+    pub length_m: f64,
+    /// Samples farther than this from the design profile contradict it, m.
+    pub contradiction_m: f64,
+}
+
+/// What is to be reached.
+#[derive(Debug, Clone, Copy, Resource)]
+pub struct Target {
+    /// Target T, m.
+    pub target_m: f64,
+    /// How the heads share the work.
+    pub layout: HeadLayout,
+}
+
+/// The vehicle's entity, that of each sensor by source, and that of each head by number.
+#[derive(Debug, Clone, Resource)]
+pub struct VehicleEntities {
+    pub(super) vehicle: Entity,
+    pub(super) by_source: Vec<Entity>,
+    pub(super) heads: Vec<Entity>,
+}
+
+impl VehicleEntities {
+    /// The vehicle, then its sensors in the order of sources.
+    pub(super) fn all(&self) -> impl Iterator<Item = Entity> + '_ {
+        core::iter::once(self.vehicle).chain(self.by_source.iter().copied())
+    }
+
+    /// The sensor that a source's bytes come from.
+    pub fn of_source(&self, source: SourceId) -> Option<Entity> {
+        self.by_source.get(source.index()).copied()
+    }
+
+    /// The head of this number, from zero in the order of sources.
+    pub fn of_head(&self, head: usize) -> Option<Entity> {
+        self.heads.get(head).copied()
+    }
+}
+
+/// What is known of the wall.
+#[derive(Debug, Resource)]
+pub struct Coverage {
+    /// Samples.
+    pub store: SampleStore,
+    /// Verdicts.
+    pub sections: Sections,
+    /// Where samples may still land.
+    pub frontier: Frontier,
+    /// Samples by node of a square grid.
+    pub soundings: Soundings,
+}
+
+stateful!(Coverage { state: store, sections, frontier, soundings; });
+
+/// The search for holes with its working memory.
+#[derive(Debug, Default, Resource)]
+pub struct Finder(pub HoleFinder);
+
+impl Stateful for Finder {
+    fn save(&self, to: &mut Saver) {
+        self.0.save(to);
+    }
+
+    fn restore(&mut self, from: &mut Restorer<'_>) -> Result<(), SnapshotError> {
+        self.0.restore(from)
+    }
+}
+
+/// The streams of results with their digests; together, the dive's.
+#[derive(Debug, Default, Resource)]
+pub struct Digests {
+    /// Poses at the beats.
+    pub poses: ResultStream,
+    /// Placed pings.
+    pub pings: ResultStream,
+    /// Judgements.
+    pub judgements: ResultStream,
+    /// Advice.
+    pub advice: ResultStream,
+}
+
+stateful!(Digests { state: poses, pings, judgements, advice; });
+
+impl Digests {
+    /// The streams by name, in the order in which a log has them.
+    pub fn streams(&self) -> [(&'static str, &ResultStream); 4] {
+        [
+            ("poses", &self.poses),
+            ("pings", &self.pings),
+            ("judgements", &self.judgements),
+            ("advice", &self.advice),
+        ]
+    }
+
+    /// Keeps the words of each tick from now on.
+    pub fn keep(&mut self) {
+        self.poses.keep();
+        self.pings.keep();
+        self.judgements.keep();
+        self.advice.keep();
+    }
+
+    pub(super) fn next_tick(&mut self) {
+        self.poses.next_tick();
+        self.pings.next_tick();
+        self.judgements.next_tick();
+        self.advice.next_tick();
+    }
+}
+
+/// Counts over the whole dive.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Resource, Serialize, Deserialize)]
+pub struct Tally {
+    /// Packets consumed.
+    pub packets: u64,
+    /// First and last receive time.
+    pub span: Option<(MonoNs, MonoNs)>,
+    /// Samples on the wall.
+    pub samples: u64,
+    /// Pings without a return, the wall within range or its distance not known.
+    pub missing: u64,
+    /// Pings without a return where the wall was out of range.
+    pub out_of_range: u64,
+    /// Pings that the vehicle itself stopped.
+    pub occluded: u64,
+    /// Returns without a fix.
+    pub unplaced: u64,
+    /// Samples outside the stretch that is kept.
+    pub outside: u64,
+    /// Samples for which there was no room.
+    pub not_stored: u64,
+}
+
+/// The tick that runs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Resource, Serialize, Deserialize)]
+pub struct TickTime {
+    /// Its number, from zero.
+    pub index: u64,
+    /// Its end.
+    pub now: MonoNs,
+}
