@@ -125,7 +125,9 @@ impl App {
             decoder,
             ring_bytes,
         })?;
-        let mut entity = self.world.spawn(Mounted { source, info: SensorInfo { mount: sensor.mount, kind } });
+        let Some(entity) = self.entities.get(source.index()) else { return Ok(source) };
+        let mut entity = self.world.entity_mut(*entity);
+        entity.insert(Mounted { source, info: SensorInfo { mount: sensor.mount, kind } });
         if let Some(spec) = device.head() {
             let modes = device.modes(None).unwrap_or_default();
             entity.insert(HeadSpecification { spec, modes });
