@@ -12,7 +12,6 @@ use headrace_replay::log::LogError;
 use headrace_replay::playback::PlaybackError;
 use headrace_replay::simulate::SceneError;
 use headrace_replay::smooth::SmoothError;
-use headrace_replay::states::StatesError;
 
 use crate::pictures::PictureError;
 
@@ -51,8 +50,6 @@ pub(crate) enum Failure {
     Drive(#[from] DriveError),
     #[error(transparent)]
     Playback(#[from] PlaybackError),
-    #[error(transparent)]
-    States(#[from] StatesError),
     #[error("making JSON of the report: {0}")]
     Json(#[from] serde_json::Error),
     #[error("planning: {0}")]
