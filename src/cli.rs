@@ -198,8 +198,8 @@ pub(crate) struct Replay {
     /// Length of a tick in milliseconds; no result depends on it.
     #[arg(long, value_name = "MS", default_value = "20", value_parser = clap::value_parser!(u32).range(1..=60_000))]
     pub(crate) tick_ms: u32,
-    /// Begin at this time of the dive (90s, 1h20min, 1:23:45); what came before counts all the same. States of the dive are
-    /// kept in LOG.states, so that it takes a moment the next time.
+    /// Show the dive from this time on (90s, 1h20min, 1:23:45). What came before is played as fast as possible and counts
+    /// all the same.
     #[arg(long, value_name = "TIME", value_parser = time, conflicts_with = "smooth")]
     pub(crate) from: Option<DurNs>,
     #[arg(short, long, conflicts_with = "smooth", help = format!("Take lines from standard input while it plays: {COMMANDS}"))]

@@ -22,7 +22,7 @@ use crate::failure::{self, Failure};
 use crate::files;
 use crate::live;
 use crate::output::{deliver, deliver_json, put, say};
-use crate::play::{self, Playing};
+use crate::play::Playing;
 use crate::smooth;
 use crate::summary::summary;
 use crate::watch::Watch;
@@ -85,8 +85,7 @@ pub(crate) fn replay(args: &Replay) -> Result<u8, Failure> {
         player.connect(dive.armed.sources());
         let mut watch = watch(&args.output);
         if args.from.is_some() || args.interactive {
-            let states = play::states(log, &files, &vehicle, &text)?;
-            let playing = Playing { from: args.from, interactive: args.interactive, states, pace };
+            let playing = Playing { from: args.from, interactive: args.interactive, pace };
             playing.play(dive, &mut player, &mut watch)?
         } else {
             dive.run(&mut player, pace, &mut watch)?

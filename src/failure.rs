@@ -10,7 +10,6 @@ use headrace_replay::log::LogError;
 use headrace_replay::playback::PlaybackError;
 use headrace_replay::simulate::SceneError;
 use headrace_replay::smooth::SmoothError;
-use headrace_replay::states::StatesError;
 use headrace_sampling::SamplingError;
 
 /// Exit code of a command that did all it was asked, on all the data.
@@ -48,8 +47,6 @@ pub(crate) enum Failure {
     Drive(#[from] DriveError),
     #[error(transparent)]
     Playback(#[from] PlaybackError),
-    #[error(transparent)]
-    States(#[from] StatesError),
     #[error("making JSON of the report: {0}")]
     Json(#[from] serde_json::Error),
     #[error("planning: {0}")]

@@ -1,7 +1,6 @@
-//! A replay that people watch: from where it begins, and what they say by lines on standard input.
+//! `replay --from` and `replay --interactive`: playback, with commands by lines on standard input.
 
 use std::io::BufRead;
-use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use crossbeam::channel::{Sender, unbounded};
@@ -10,107 +9,82 @@ use headrace_monitor::outlet::NoticeReceiver;
 use headrace_monitor::report::Report;
 use headrace_monitor::run::Loop;
 use headrace_replay::drive::Pace;
-use headrace_replay::playback::{Playback, Watcher, Wish};
+use headrace_replay::playback::{Playback, PlaybackCommand, PlaybackObserver};
 use headrace_replay::player::Player;
-use headrace_replay::states::{States, identity, log_identity};
-use headrace_vehicle::VehicleConfig;
+use headrace_replay::snapshot_store::SnapshotStore;
 
 use crate::cli::{COMMANDS, speed, time};
 use crate::dive::Dive;
 use crate::failure::Failure;
 use crate::watch::Watch;
 
-/// From one state to the next it takes so long to replay: with what a jump takes besides, well under a second.
-const BETWEEN_STATES: Duration = Duration::from_millis(300);
+/// Work between two snapshots: with the time to restore one, a jump takes well under a second.
+const SNAPSHOT_INTERVAL: Duration = Duration::from_millis(300);
+/// Memory for snapshots. When it is full, every other one is dropped and the interval doubled.
+const SNAPSHOT_BYTES: usize = 256 << 20;
 
-/// How a replay is watched.
+/// A replay with `--from` or `--interactive`.
 pub(crate) struct Playing {
     pub(crate) from: Option<DurNs>,
     pub(crate) interactive: bool,
-    pub(crate) states: States,
     pub(crate) pace: Pace,
-}
-
-/// The states of a dive, in the file beside its log; where there can be none, for this replay alone.
-pub(crate) fn states(
-    log: &Path,
-    files: &[PathBuf],
-    vehicle: &VehicleConfig,
-    text: &str,
-) -> Result<States, Failure> {
-    let program = std::env::current_exe()
-        .map_err(|source| Failure::System { what: "finding this program's file", source })?;
-    let attached = format!("{:?}", vehicle.attachments);
-    let mission = format!("{:?}", vehicle.mission());
-    let logs: Result<Vec<[u8; 8]>, _> =
-        files.iter().map(|file| log_identity(file).map(u64::to_le_bytes)).collect();
-    let logs = logs?;
-    let settings = [logs.as_flattened(), text.as_bytes(), attached.as_bytes(), mission.as_bytes()];
-    let identity = identity(&[&program], &settings)?;
-    // Beside a folder of parts, not in it.
-    let mut path = log.components().collect::<PathBuf>().into_os_string();
-    path.push(".states");
-    match States::open(&PathBuf::from(path), identity) {
-        Ok(states) => Ok(states),
-        Err(error) => {
-            eprintln!("headrace: {error}; states are kept for this replay alone");
-            Ok(States::temporary()?)
-        }
-    }
 }
 
 impl Playing {
     /// Plays a dive, shows what happens, and gives the report.
     pub(crate) fn play(self, dive: Dive, player: &mut Player, watch: &mut Watch) -> Result<Report, Failure> {
-        let Self { from, interactive, states, pace } = self;
+        let Self { from, interactive, pace } = self;
+        // Without commands nothing jumps back.
+        let interval = if interactive { SNAPSHOT_INTERVAL } else { Duration::MAX };
         dive.play(watch, |armed, notices, watch| {
-            let (to_say, wishes) = unbounded();
-            let mut shown = Shown { notices, watch, begun: MonoNs(0) };
-            let mut playback = Playback::new(armed, player, states, pace, BETWEEN_STATES)?;
-            shown.begun = playback.begun();
+            let (sender, commands) = unbounded();
+            let mut screen = Screen { notices, watch, begun: MonoNs(0) };
+            let store = SnapshotStore::new(SNAPSHOT_BYTES, interval);
+            let mut playback = Playback::new(armed, player, store, pace)?;
+            screen.begun = playback.begun();
             if let Some(from) = from {
-                playback.seek(shown.begun + from, &mut shown)?;
+                playback.seek(screen.begun + from, &mut screen)?;
             }
             if interactive {
-                listen(to_say, shown.begun);
+                listen(sender, screen.begun);
             } else {
-                drop(to_say);
+                drop(sender);
             }
-            Ok(playback.play(&wishes, &mut shown)?)
+            Ok(playback.play(&commands, &mut screen)?)
         })
     }
 }
 
-/// What a person sees of it.
-struct Shown<'a> {
+/// Shows playback on the terminal.
+struct Screen<'a> {
     notices: &'a NoticeReceiver,
     watch: &'a mut Watch,
     begun: MonoNs,
 }
 
-impl Watcher for Shown<'_> {
-    fn ticked(&mut self, dive: &Loop) {
+impl PlaybackObserver for Screen<'_> {
+    fn after_tick(&mut self, dive: &Loop) {
         while let Some(notice) = self.notices.next() {
             self.watch.notice(&notice, dive);
         }
     }
 
-    fn passed(&mut self, _: &Loop) {
+    fn after_skipped_tick(&mut self, _: &Loop) {
         while self.notices.next().is_some() {}
     }
 
-    fn stands(&mut self, dive: &Loop, at: MonoNs, ended: bool) {
-        self.watch.stands(dive, at.since(self.begun), ended);
+    fn stopped(&mut self, dive: &Loop, at: MonoNs, ended: bool) {
+        self.watch.stopped(dive, at.since(self.begun), ended);
     }
 }
 
-/// Reads wishes from standard input, on a thread that ends with it.
-fn listen(to: Sender<Wish>, begun: MonoNs) {
+/// Reads commands from standard input, on a thread that ends with it.
+fn listen(to: Sender<PlaybackCommand>, begun: MonoNs) {
     std::thread::spawn(move || {
         for line in std::io::stdin().lock().lines().map_while(Result::ok) {
-            match wish(&line, begun) {
-                Ok(wish) => {
-                    if to.send(wish).is_err() {
+            match command(&line, begun) {
+                Ok(command) => {
+                    if to.send(command).is_err() {
                         return;
                     }
                 }
@@ -120,25 +94,25 @@ fn listen(to: Sender<Wish>, begun: MonoNs) {
     });
 }
 
-/// What a line wishes.
-fn wish(line: &str, begun: MonoNs) -> Result<Wish, String> {
+/// Parses a command; `begun` is the log's first time.
+fn command(line: &str, begun: MonoNs) -> Result<PlaybackCommand, String> {
     let mut words = line.split_whitespace();
     let (word, argument) = (words.next().unwrap_or_default(), words.next());
     let unknown = || format!("{:?} isn't understood; there are {COMMANDS}", line.trim());
     let moment = || argument.ok_or_else(unknown).and_then(time);
-    let wish = match (word, argument) {
-        ("pause", None) => Wish::Pause,
-        ("go", None) => Wish::Go,
-        ("end", None) => Wish::End,
-        ("step", None) => Wish::Step(1),
-        ("step", Some(ticks)) => Wish::Step(ticks.parse().map_err(|_| unknown())?),
-        ("speed", Some(text)) => Wish::Speed(speed(text)?.0),
-        ("seek", _) => Wish::Seek(begun + moment()?),
-        ("ahead", _) => Wish::Skip(moment()?),
-        ("back", _) => Wish::Skip(DurNs(-moment()?.0)),
+    let command = match (word, argument) {
+        ("pause", None) => PlaybackCommand::Pause,
+        ("go", None) => PlaybackCommand::Go,
+        ("end", None) => PlaybackCommand::End,
+        ("step", None) => PlaybackCommand::Step(1),
+        ("step", Some(ticks)) => PlaybackCommand::Step(ticks.parse().map_err(|_| unknown())?),
+        ("speed", Some(text)) => PlaybackCommand::Speed(speed(text)?.0),
+        ("seek", _) => PlaybackCommand::Seek(begun + moment()?),
+        ("ahead", _) => PlaybackCommand::Skip(moment()?),
+        ("back", _) => PlaybackCommand::Skip(DurNs(-moment()?.0)),
         _ => return Err(unknown()),
     };
-    if words.next().is_some() { Err(unknown()) } else { Ok(wish) }
+    if words.next().is_some() { Err(unknown()) } else { Ok(command) }
 }
 
 #[cfg(test)]
@@ -146,15 +120,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lines_are_wishes_or_refused_with_what_there_is() {
-        let wish = |line| wish(line, MonoNs(5));
-        assert_eq!(wish(" step 12 "), Ok(Wish::Step(12)));
-        assert_eq!(wish("seek 10s"), Ok(Wish::Seek(MonoNs(10_000_000_005))));
-        assert_eq!(wish("back 1min"), Ok(Wish::Skip(DurNs(-60_000_000_000))));
-        assert_eq!(wish("speed max"), Ok(Wish::Speed(None)));
+    fn lines_are_commands_or_refused_with_what_there_is() {
+        let command = |line| command(line, MonoNs(5));
+        assert_eq!(command(" step 12 "), Ok(PlaybackCommand::Step(12)));
+        assert_eq!(command("seek 10s"), Ok(PlaybackCommand::Seek(MonoNs(10_000_000_005))));
+        assert_eq!(command("back 1min"), Ok(PlaybackCommand::Skip(DurNs(-60_000_000_000))));
+        assert_eq!(command("speed max"), Ok(PlaybackCommand::Speed(None)));
         for line in ["", "stop", "step -1", "seek", "pause 5", "go go", "step 1 2"] {
-            assert!(wish(line).is_err(), "{line:?}");
+            assert!(command(line).is_err(), "{line:?}");
         }
-        insta::assert_snapshot!(wish("stop").unwrap_err(), @r#""stop" isn't understood; there are pause, go, step [TICKS], seek TIME, ahead TIME, back TIME, speed N|max, end"#);
+        insta::assert_snapshot!(command("stop").unwrap_err(), @r#""stop" isn't understood; there are pause, go, step [TICKS], seek TIME, ahead TIME, back TIME, speed N|max, end"#);
     }
 }

@@ -79,8 +79,8 @@ impl Watch {
         }
     }
 
-    /// A replay stands still so long after its beginning, or has gone there.
-    pub(crate) fn stands(&mut self, dive: &Loop, time: DurNs, ended: bool) {
+    /// A replay has paused, jumped or ended at `time` after its beginning.
+    pub(crate) fn stopped(&mut self, dive: &Loop, time: DurNs, ended: bool) {
         (self.shown, self.run) = (None, None);
         if !self.quiet {
             let seconds = time.as_secs_f64();

@@ -13,14 +13,17 @@ use std::fmt::Write as _;
 
 use common::{Folder, SCENE, VEHICLE};
 
-/// A box of 1 m as OBJ, on its lower side.
+/// A box of 1 m as PLY, on its lower side.
 fn cuboid() -> String {
-    let mut text = String::from("# a box\n");
+    let mut text = String::from(
+        "ply\nformat ascii 1.0\nelement vertex 8\nproperty float x\nproperty float y\nproperty float z\n\
+         element face 6\nproperty list uchar int vertex_indices\nend_header\n",
+    );
     for corner in 0..8_u8 {
         let [x, y, z] = [0, 1, 2].map(|k| f64::from(corner >> k & 1));
-        writeln!(text, "v {} {} {z}", x - 0.5, y - 0.5).unwrap();
+        writeln!(text, "{} {} {z}", x - 0.5, y - 0.5).unwrap();
     }
-    text + "f 1 3 7 5\nf 2 4 8 6\nf 1 2 6 5\nf 3 4 8 7\nf 1 2 4 3\nf 5 6 8 7\n"
+    text + "4 0 2 6 4\n4 1 3 7 5\n4 0 1 5 4\n4 2 3 7 6\n4 0 1 3 2\n4 4 5 7 6\n"
 }
 
 fn folder(keys: &str) -> Folder {
@@ -41,8 +44,8 @@ fn column(truth: &str, (key, value): (&str, &str), wanted: &str) -> Vec<String> 
 
 #[test]
 fn a_body_on_the_floor_is_what_sounders_measure() {
-    let folder = folder("file = \"box.obj\"\nname = \"car\"\nchainage_m = 5");
-    folder.write("box.obj", cuboid());
+    let folder = folder("file = \"box.ply\"\nname = \"car\"\nchainage_m = 5");
+    folder.write("box.ply", cuboid());
     let arguments = ["simulate", "scene.toml", "-o", "dive.mcap", "--truth", "truth.csv"];
     let answer = folder.headrace(&arguments);
     assert_eq!(answer.code, Some(0), "{}", answer.stderr);
@@ -67,15 +70,15 @@ fn a_body_on_the_floor_is_what_sounders_measure() {
 
 #[test]
 fn a_mesh_that_is_none_is_refused_with_the_place() {
-    let folder = folder("file = \"box.obj\"\nchainage_m = 5");
-    let place = "scene.toml:13: tunnel.features[0].file = \"box.obj\"";
+    let folder = folder("file = \"box.ply\"\nchainage_m = 5");
+    let place = "scene.toml:13: tunnel.features[0].file = \"box.ply\"";
     folder.refuses_scene(&[place, "can't be read"]);
-    folder.write("box.obj", cuboid().replace("f 5 6 8 7\n", ""));
+    folder.write("box.ply", cuboid().replace("face 6", "face 5").replace("4 4 5 7 6\n", ""));
     folder.refuses_scene(&[place, "1 hole(s)", "4 edges"]);
-    folder.write("box.obj", cuboid().replace("v 0.5 0.5 0", "v 0.5"));
-    folder.refuses_scene(&[place, "reading OBJ: line 5"]);
-    folder.write("box.obj", &cuboid()[..100]);
+    folder.write("box.ply", cuboid().replace("\n0.5 0.5 0\n", "\n0.5\n"));
+    folder.refuses_scene(&[place, "reading PLY: Line 13: "]);
+    folder.write("box.ply", &cuboid()[..200]);
     folder.refuses_scene(&[place]);
-    folder.write("box.obj", cuboid().replace(" 1\n", " 9\n"));
+    folder.write("box.ply", cuboid().replace(" 1\n", " 9\n"));
     folder.refuses_scene(&["leads through mesh_0"]);
 }

@@ -1,4 +1,4 @@
-//! A recorded dive is watched from anywhere: pauses, single ticks, jumps on and back change no result.
+//! Playback of a recorded dive: pauses, single ticks, jumps forwards and back change no result and hide no loss.
 
 #![allow(
     clippy::unwrap_used,
@@ -11,7 +11,7 @@ mod common;
 mod shipped;
 
 use std::io::Write;
-use std::process::{Command, Stdio};
+use std::process::{Command, Output, Stdio};
 use std::time::Duration;
 
 use common::Folder;
@@ -21,22 +21,22 @@ use headrace_monitor::App;
 use headrace_monitor::run::Loop;
 use headrace_replay::drive::{Pace, drive};
 use headrace_replay::log::files_of;
-use headrace_replay::playback::{Playback, Watcher, Wish};
+use headrace_replay::playback::{Playback, PlaybackCommand, PlaybackObserver};
 use headrace_replay::player::Player;
-use headrace_replay::states::States;
+use headrace_replay::snapshot_store::SnapshotStore;
 use headrace_vehicle::VehicleConfig;
 use proptest::prelude::*;
 
-/// Each place where the dive stood: the moment, the tick, the digest, and whether it was the end.
+/// Each stop: the time, the tick, the digest, and whether it was the end.
 #[derive(Default)]
-struct Stood(Vec<(MonoNs, u64, u64, bool)>);
+struct Stops(Vec<(MonoNs, u64, u64, bool)>);
 
-impl Watcher for Stood {
-    fn ticked(&mut self, _: &Loop) {}
+impl PlaybackObserver for Stops {
+    fn after_tick(&mut self, _: &Loop) {}
 
-    fn passed(&mut self, _: &Loop) {}
+    fn after_skipped_tick(&mut self, _: &Loop) {}
 
-    fn stands(&mut self, dive: &Loop, at: MonoNs, ended: bool) {
+    fn stopped(&mut self, dive: &Loop, at: MonoNs, ended: bool) {
         self.0.push((at, dive.ticks(), dive.digest(), ended));
     }
 }
@@ -57,26 +57,39 @@ fn armed(vehicle: &VehicleConfig) -> Loop {
     app.arm(vehicle.navigation()).unwrap()
 }
 
-/// Plays a log by wishes; where it stood, and its digest at the end of what it played.
-fn play(folder: &Folder, log: &str, wishes: &[Wish], between: Duration) -> (Stood, u64) {
+/// What is left of a dive that has ended.
+#[derive(Debug, PartialEq)]
+struct Outcome {
+    digest: u64,
+    messages: u64,
+    losses: Vec<String>,
+}
+
+impl Outcome {
+    fn of(dive: &Loop, player: &Player) -> Self {
+        Self { digest: dive.digest(), messages: player.played(), losses: player.losses() }
+    }
+}
+
+/// Executes commands, a snapshot after each `interval` of work; where it stopped, and how it ended.
+fn play(folder: &Folder, log: &str, commands: &[PlaybackCommand], interval: Duration) -> (Stops, Outcome) {
     let mut dive = armed(&vehicle());
     let mut player = Player::open(&files_of(&[folder.path(log)]).unwrap()).unwrap();
     player.connect(dive.sources());
-    let (to_say, said) = unbounded();
-    for wish in wishes {
-        to_say.send(*wish).unwrap();
+    let (sender, receiver) = unbounded();
+    for command in commands {
+        sender.send(*command).unwrap();
     }
-    drop(to_say);
-    let mut stood = Stood::default();
-    let states = States::temporary().unwrap();
-    let mut playback = Playback::new(&mut dive, &mut player, states, Pace::default(), between).unwrap();
-    playback.play(&said, &mut stood).unwrap();
-    assert!(player.losses().is_empty(), "{:?}", player.losses());
-    (stood, dive.digest())
+    drop(sender);
+    let mut stops = Stops::default();
+    let store = SnapshotStore::new(64 << 20, interval);
+    let mut playback = Playback::new(&mut dive, &mut player, store, Pace::default()).unwrap();
+    playback.play(&receiver, &mut stops).unwrap();
+    (stops, Outcome::of(&dive, &player))
 }
 
-/// Digest and tick at the end of each tick of a dive that is played through.
-fn through(folder: &Folder, log: &str) -> Vec<(MonoNs, u64, u64)> {
+/// Time, tick and digest at the end of each tick of a log that is replayed straight through, and how it ended.
+fn through(folder: &Folder, log: &str) -> (Vec<(MonoNs, u64, u64)>, Outcome) {
     let mut dive = armed(&vehicle());
     let mut player = Player::open(&files_of(&[folder.path(log)]).unwrap()).unwrap();
     player.connect(dive.sources());
@@ -85,7 +98,7 @@ fn through(folder: &Folder, log: &str) -> Vec<(MonoNs, u64, u64)> {
         ticks.push((dive.now(), dive.ticks(), dive.digest()));
     })
     .unwrap();
-    ticks
+    (ticks, Outcome::of(&dive, &player))
 }
 
 /// The dive as a simulation gives it, by log time; as our recorder writes it, by ticks; and so in parts.
@@ -98,14 +111,15 @@ fn logs() -> Folder {
 }
 
 #[test]
-fn every_jump_lands_in_the_state_of_a_dive_played_through() {
+fn every_jump_lands_in_the_state_of_a_log_played_through() {
     let folder = logs();
     for log in ["dive.mcap", "ticks.mcap", "parts"] {
-        let ticks = through(&folder, log);
+        let (ticks, outcome) = through(&folder, log);
+        assert!(outcome.losses.is_empty(), "{:?}", outcome.losses);
         // Before the last two ticks, where a step has no end of its own to stand at.
         let (begun, late) = (ticks[0].0, ticks[ticks.len() - 3].0);
         let span = late.since(begun).0;
-        for between in [Duration::from_millis(5), Duration::from_millis(40), Duration::MAX] {
+        for interval in [Duration::from_millis(5), Duration::from_millis(40), Duration::MAX] {
             let mut runner = proptest::test_runner::TestRunner::new(ProptestConfig {
                 cases: 8,
                 failure_persistence: None,
@@ -113,41 +127,42 @@ fn every_jump_lands_in_the_state_of_a_dive_played_through() {
             });
             let jumps = proptest::collection::vec(0..span, 2..8);
             let result = runner.run(&jumps, |jumps| {
-                let mut wishes = vec![Wish::Pause];
-                wishes.extend(jumps.iter().flat_map(|to| [Wish::Seek(begun + DurNs(*to)), Wish::Step(1)]));
-                wishes.push(Wish::Go);
-                let (stood, digest) = play(&folder, log, &wishes, between);
-                for (at, tick, digest, _) in &stood.0[1..] {
+                let mut commands = vec![PlaybackCommand::Pause];
+                let jump = |to: &i64| [PlaybackCommand::Seek(begun + DurNs(*to)), PlaybackCommand::Step(1)];
+                commands.extend(jumps.iter().flat_map(jump));
+                commands.push(PlaybackCommand::Go);
+                let (stops, ended) = play(&folder, log, &commands, interval);
+                for (at, tick, digest, _) in &stops.0[1..] {
                     let expected = ticks.iter().find(|(now, ..)| now == at);
                     prop_assert_eq!(expected, Some(&(*at, *tick, *digest)));
                 }
-                prop_assert_eq!(stood.0.len(), 2 + 2 * jumps.len());
-                prop_assert_eq!(stood.0[stood.0.len() - 1].3, true);
-                prop_assert_eq!(digest, ticks[ticks.len() - 1].2);
+                prop_assert_eq!(stops.0.len(), 2 + 2 * jumps.len());
+                prop_assert_eq!(stops.0[stops.0.len() - 1].3, true);
+                prop_assert_eq!(&ended, &outcome);
                 Ok(())
             });
-            result.unwrap_or_else(|why| panic!("{log}, {between:?} between states: {why}"));
+            result.unwrap_or_else(|why| panic!("{log}, a snapshot each {interval:?}: {why}"));
         }
     }
 }
 
 #[test]
-fn at_the_end_it_stands_until_it_is_sent_back() {
+fn at_the_end_it_waits_until_it_is_sent_back() {
     let folder = logs();
-    let ticks = through(&folder, "ticks.mcap");
+    let (ticks, outcome) = through(&folder, "ticks.mcap");
     let [begun, before, last] = [0, ticks.len() - 2, ticks.len() - 1].map(|number| ticks[number]);
     let beyond = last.0 + DurNs(5_000_000_000);
-    let wishes = [
-        Wish::Pause,
-        Wish::Seek(before.0),
-        Wish::Step(1),
-        Wish::Step(1),
-        Wish::Seek(beyond),
-        Wish::Step(2),
-        Wish::Seek(begun.0),
-        Wish::Go,
+    let commands = [
+        PlaybackCommand::Pause,
+        PlaybackCommand::Seek(before.0),
+        PlaybackCommand::Step(1),
+        PlaybackCommand::Step(1),
+        PlaybackCommand::Seek(beyond),
+        PlaybackCommand::Step(2),
+        PlaybackCommand::Seek(begun.0),
+        PlaybackCommand::Go,
     ];
-    let (stood, digest) = play(&folder, "ticks.mcap", &wishes, Duration::from_millis(5));
+    let (stops, ended) = play(&folder, "ticks.mcap", &commands, Duration::from_millis(5));
     let at = |(at, tick, digest): (MonoNs, u64, u64), ended| (at, tick, digest, ended);
     // Each time that it comes to the end, or is sent on from there.
     let expected = [
@@ -161,65 +176,105 @@ fn at_the_end_it_stands_until_it_is_sent_back() {
         at(begun, false),
         at(last, true),
     ];
-    assert_eq!(stood.0[1..], expected);
-    assert_eq!(digest, last.2);
+    assert_eq!(stops.0[1..], expected);
+    assert_eq!(ended, outcome);
+}
+
+/// Changes a byte in each of three chunks of a log: two next to each other in the middle, and a later one.
+fn damage(folder: &Folder, log: &str) {
+    let mut bytes = folder.read(log);
+    let mut chunks = Vec::new();
+    let mut at = mcap::MAGIC.len();
+    while at + 9 <= bytes.len() - mcap::MAGIC.len() {
+        if bytes[at] == mcap::records::op::CHUNK {
+            chunks.push(at);
+        }
+        let len = u64::from_le_bytes(bytes[at + 1..at + 9].try_into().unwrap());
+        at += 9 + usize::try_from(len).unwrap();
+    }
+    for number in [chunks.len() / 2, chunks.len() / 2 + 1, chunks.len() * 3 / 4] {
+        // Behind its head.
+        bytes[chunks[number] + 100] ^= 0x55;
+    }
+    folder.write(log, bytes);
 }
 
 #[test]
-fn a_replay_from_the_middle_gives_the_whole_dive_s_report() {
+fn a_jump_over_damage_and_back_loses_what_a_replay_straight_through_does() {
+    let folder = logs();
+    damage(&folder, "dive.mcap");
+    damage(&folder, "ticks.mcap");
+    damage(&folder, "parts/dive.part002.mcap");
+    damage(&folder, "parts/dive.part003.mcap");
+    for log in ["dive.mcap", "ticks.mcap", "parts"] {
+        let (ticks, outcome) = through(&folder, log);
+        assert_eq!(outcome.losses.len(), if log == "parts" { 6 } else { 3 }, "{log}: {:?}", outcome.losses);
+        let at = |share: usize| PlaybackCommand::Seek(ticks[(ticks.len() - 1) * share / 100].0);
+        for interval in [Duration::from_millis(5), Duration::MAX] {
+            // To the end, back to before the damage, to a snapshot behind it, between the damaged places.
+            for jumps in [&[95, 10][..], &[100, 20, 90, 10], &[60, 5, 58, 96, 56]] {
+                let mut commands = vec![PlaybackCommand::Pause];
+                commands.extend(jumps.iter().map(|share| at(*share)));
+                commands.push(PlaybackCommand::Go);
+                let (_, ended) = play(&folder, log, &commands, interval);
+                assert_eq!(ended, outcome, "{log}, a snapshot each {interval:?}, jumps to {jumps:?} %");
+            }
+        }
+    }
+    // The same for the report and the exit code.
+    for log in ["ticks.mcap", "parts"] {
+        let (code, straight) = folder.replay(log, &[]);
+        assert_eq!(code, Some(3));
+        let lines = "pause\nseek 18s\nback 16s\nahead 15s\nseek 1s\ngo\n";
+        let answer = interactive(&folder, &[log, "--json"], lines);
+        assert_eq!(answer.status.code(), Some(3), "{}", String::from_utf8_lossy(&answer.stderr));
+        let report: serde_json::Value = serde_json::from_slice(&answer.stdout).unwrap();
+        assert_eq!(report, straight, "{log}");
+    }
+}
+
+#[test]
+fn a_replay_shown_from_the_middle_gives_the_whole_dive_s_report() {
     let folder = logs();
     let (code, whole) = folder.replay("ticks.mcap", &[]);
     assert_eq!(code, Some(0));
-    // The first makes the states, the second begins with them.
-    for _ in 0..2 {
-        let (code, later) = folder.replay("ticks.mcap", &["--from", "0:15"]);
-        assert_eq!(code, Some(0));
-        assert_eq!(later, whole);
-        let (code, in_parts) = folder.replay("parts", &["--from", "0:15"]);
-        assert_eq!((code, &in_parts["digest"]), (Some(0), &whole["digest"]));
-        assert_eq!(in_parts["log"]["messages"], whole["log"]["messages"]);
-    }
-    assert!(folder.path("parts.states").exists());
-    let states = folder.read("ticks.mcap.states");
-    assert!(states.starts_with(b"headrace states\n"));
-    // With another target they are another dive's, and are made anew.
-    let (_, other) = folder.replay("ticks.mcap", &["--target", "0.7"]);
-    assert_eq!(folder.replay("ticks.mcap", &["--target", "0.7", "--from", "15s"]).1, other);
-    assert_ne!(folder.read("ticks.mcap.states"), states);
-    // A file that is cut goes as far as it goes; one that is damaged is named; another kind of file stays as it is.
-    let states = folder.read("ticks.mcap.states");
-    folder.write("ticks.mcap.states", &states[..states.len() * 2 / 3]);
-    assert_eq!(folder.replay("ticks.mcap", &["--target", "0.7", "--from", "15s"]).1, other);
-    folder.write("ticks.mcap.states", "somebody's notes");
-    let answer = folder.headrace(&["replay", "ticks.mcap", "--from", "15s"]);
-    assert_eq!(answer.code, Some(0));
-    assert!(answer.stderr.contains("it is another kind of file, and stays as it is"), "{}", answer.stderr);
-    assert_eq!(folder.read("ticks.mcap.states"), b"somebody's notes");
+    let (code, later) = folder.replay("ticks.mcap", &["--from", "0:15"]);
+    assert_eq!(code, Some(0));
+    assert_eq!(later, whole);
+    let (code, in_parts) = folder.replay("parts", &["--from", "0:15"]);
+    assert_eq!((code, &in_parts["digest"]), (Some(0), &whole["digest"]));
+    assert_eq!(in_parts["log"]["messages"], whole["log"]["messages"]);
 }
 
-#[test]
-fn lines_on_standard_input_pause_step_and_seek() {
-    let folder = logs();
+/// Runs `replay --interactive` with these lines on standard input.
+fn interactive(folder: &Folder, arguments: &[&str], lines: &str) -> Output {
     let mut program = Command::new(env!("CARGO_BIN_EXE_headrace"))
-        .args(["replay", "ticks.mcap", "--speed", "1x", "--interactive"])
+        .args(["replay", "--interactive"])
+        .args(arguments)
         .current_dir(folder.path("."))
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
-    let lines = "pause\nseek 12s\nstep 3\nback 5s\nstop\nahead 0:02\nspeed max\ngo\n";
     program.stdin.take().unwrap().write_all(lines.as_bytes()).unwrap();
-    let answer = program.wait_with_output().unwrap();
+    program.wait_with_output().unwrap()
+}
+
+#[test]
+fn lines_on_standard_input_pause_step_and_seek() {
+    let folder = logs();
+    let lines = "pause\nseek 12s\nstep 3\nback 5s\nstop\nahead 0:02\nspeed max\ngo\n";
+    let answer = interactive(&folder, &["ticks.mcap", "--speed", "1x"], lines);
     let (stdout, stderr) = (String::from_utf8_lossy(&answer.stdout), String::from_utf8_lossy(&answer.stderr));
     assert_eq!(answer.status.code(), Some(0), "{stderr}");
-    let stood: Vec<&str> = stdout
+    let stops: Vec<&str> = stdout
         .lines()
         .filter_map(|line| line.strip_prefix("AT       "))
         .map(|line| line.split(": tick").next().unwrap())
         .collect();
     assert_eq!(
-        stood[1..],
+        stops[1..],
         ["0:00:12.000", "0:00:12.060", "0:00:07.060", "0:00:09.060", "0:00:20.020, the end"]
     );
     insta::assert_snapshot!(stderr, @r#"headrace: "stop" isn't understood; there are pause, go, step [TICKS], seek TIME, ahead TIME, back TIME, speed N|max, end"#);

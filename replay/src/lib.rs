@@ -11,6 +11,6 @@ pub mod player;
 pub mod record;
 pub mod simulate;
 pub mod smooth;
-pub mod states;
+pub mod snapshot_store;
 pub mod verify;
 pub mod view;

@@ -1,37 +1,40 @@
-//! A recorded dive as people watch it: with pauses, single ticks, other speeds, and jumps to any of its moments.
+//! Interactive playback of a recorded dive: pause, single ticks, other speeds, and jumps to any time.
 
 use std::time::{Duration, Instant};
 
 use crossbeam::channel::{Receiver, RecvTimeoutError};
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::run::Loop;
-use headrace_snapshot::SnapshotError;
+use headrace_snapshot::{Restorer, Saver, SnapshotError};
 
 use crate::drive::{Clock, DriveError, Driver, Pace};
 use crate::log::LogError;
 use crate::player::Player;
-use crate::states::{States, StatesError};
+use crate::snapshot_store::SnapshotStore;
 
-/// What whoever watches wishes; each is granted when the one before has been.
+/// Parts of a snapshot: the player's place in the log, then the loop's state.
+const PLACE_PART: &str = "place in the log";
+
+/// A command to playback; commands are executed in order.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Wish {
-    /// To stop between two ticks.
+pub enum PlaybackCommand {
+    /// Pauses between two ticks.
     Pause,
-    /// To go on.
+    /// Plays on.
     Go,
-    /// To run so many ticks, and stop.
+    /// Runs this many ticks, then pauses.
     Step(u32),
-    /// Seconds of the dive for a second of ours; `None` as fast as it can.
+    /// Sets the speed: seconds of the dive per second of wall time, or `None` for as fast as possible.
     Speed(Option<f64>),
-    /// To go to a moment of the log's clock, before or behind, and on from there as it was going.
+    /// Jumps to a time of the log's clock, forwards or back; playing or paused as before.
     Seek(MonoNs),
-    /// To go so far on, or back.
+    /// Jumps by a time, back where it is negative.
     Skip(DurNs),
-    /// To stop here for good.
+    /// Ends playback at the current tick.
     End,
 }
 
-/// Why a dive can't be played on.
+/// Why playback failed.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PlaybackError {
@@ -41,62 +44,58 @@ pub enum PlaybackError {
     /// The log can't be read.
     #[error(transparent)]
     Log(#[from] LogError),
-    /// States can't be kept or had back.
-    #[error(transparent)]
-    States(#[from] StatesError),
-    /// A state can't be saved or restored.
+    /// A snapshot can't be taken or restored.
     #[error(transparent)]
     Snapshot(#[from] SnapshotError),
 }
 
-/// What is seen while a dive is played.
-pub trait Watcher {
-    /// After a tick.
-    fn ticked(&mut self, dive: &Loop);
+/// Shows playback to its user.
+pub trait PlaybackObserver {
+    /// After a tick that is played.
+    fn after_tick(&mut self, dive: &Loop);
 
-    /// After a tick on the way to somewhere else: what it has to tell is to be passed over.
-    fn passed(&mut self, dive: &Loop);
+    /// After a tick on the way of a jump: its notices aren't shown.
+    fn after_skipped_tick(&mut self, dive: &Loop);
 
-    /// The dive stands still at a moment, or has gone there at once; `ended` at its end.
-    fn stands(&mut self, dive: &Loop, at: MonoNs, ended: bool);
+    /// Paused, arrived after a jump, or `ended` at the end of the log; `at` is the end of the last tick.
+    fn stopped(&mut self, dive: &Loop, at: MonoNs, ended: bool);
 }
 
-/// A dive that is played.
+/// Playback of a log.
 pub struct Playback<'a> {
     dive: &'a mut Loop,
     player: &'a mut Player,
-    states: States,
+    store: SnapshotStore,
     driver: Driver,
     clock: Clock,
     speed: Option<f64>,
     /// The end of the last tick.
     now: MonoNs,
-    /// The log's first moment.
+    /// The log's first time.
     begun: MonoNs,
-    going: Going,
-    /// A state is kept when so much work has been done since the last.
-    between: Duration,
+    mode: Mode,
+    /// Wall time spent in ticks since the last snapshot.
     worked: Duration,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Going {
-    On,
-    Still,
-    Ticks(u32),
+enum Mode {
+    Playing,
+    Paused,
+    /// Ticks left to run before it pauses.
+    Stepping(u32),
 }
 
 impl<'a> Playback<'a> {
-    /// Of a log from its beginning, the player connected with the loop. A state is kept when the loop has worked for
-    /// `between` since the last, so that from one to the next it never takes longer.
+    /// Playback of a log from its beginning; the player is connected with the loop. A snapshot goes into the store
+    /// whenever its interval of work has passed since the last one, so that no jump takes much longer than that.
     ///
-    /// Errors: the log can't be read, or the first state not be kept.
+    /// Errors: the log can't be read, or the first snapshot not be taken.
     pub fn new(
         dive: &'a mut Loop,
         player: &'a mut Player,
-        states: States,
+        store: SnapshotStore,
         pace: Pace,
-        between: Duration,
     ) -> Result<Self, PlaybackError> {
         let driver = Driver::new(dive, pace.tick)?;
         let begun = driver.due(player)?.map_or(MonoNs(0), |until| until - pace.tick);
@@ -104,71 +103,72 @@ impl<'a> Playback<'a> {
         let mut playback = Self {
             dive,
             player,
-            states,
+            store,
             driver,
             clock,
             speed: pace.speed,
             now: begun,
             begun,
-            going: Going::On,
-            between,
+            mode: Mode::Playing,
             worked: Duration::ZERO,
         };
-        if playback.states.latest(begun).is_none() {
-            playback.keep()?;
-        }
+        playback.take_snapshot()?;
         Ok(playback)
     }
 
-    /// The log's first moment.
+    /// The log's first time.
     pub fn begun(&self) -> MonoNs {
         self.begun
     }
 
-    /// Plays until the log ends and nobody can wish anything any more, or [`Wish::End`].
+    /// Plays until [`PlaybackCommand::End`], or until the log has ended and no command can come any more.
     ///
     /// Errors: see [`PlaybackError`].
-    pub fn play(&mut self, wishes: &Receiver<Wish>, watcher: &mut dyn Watcher) -> Result<(), PlaybackError> {
+    pub fn play(
+        &mut self,
+        commands: &Receiver<PlaybackCommand>,
+        observer: &mut dyn PlaybackObserver,
+    ) -> Result<(), PlaybackError> {
         loop {
             let due = self.driver.due(self.player)?;
-            let wish = match due {
+            let command = match due {
                 None => {
-                    // There are no ticks left to run; none are owed after a jump back, either.
-                    if let Going::Ticks(_) = self.going {
-                        self.going = Going::Still;
+                    // Steps left over at the end aren't made up for after a jump back.
+                    if let Mode::Stepping(_) = self.mode {
+                        self.mode = Mode::Paused;
                     }
-                    watcher.stands(self.dive, self.now, true);
-                    match wishes.recv() {
-                        Ok(wish) => Some(wish),
+                    observer.stopped(self.dive, self.now, true);
+                    match commands.recv() {
+                        Ok(command) => Some(command),
                         Err(_) => return Ok(()),
                     }
                 }
-                Some(until) => self.wait(until, wishes),
+                Some(until) => self.wait(until, commands),
             };
-            match wish {
-                Some(Wish::End) => return Ok(()),
-                Some(wish) => self.grant(wish, watcher)?,
-                None => self.tick(watcher)?,
+            match command {
+                Some(PlaybackCommand::End) => return Ok(()),
+                Some(command) => self.execute(command, observer)?,
+                None => self.tick(observer)?,
             }
         }
     }
 
-    /// Waits until a tick is due, and for as long as the dive is to stand still; gives what is wished before.
-    fn wait(&mut self, until: MonoNs, wishes: &Receiver<Wish>) -> Option<Wish> {
-        match self.going {
-            Going::Still => {
-                // With nobody left to say otherwise it goes on.
-                let wish = wishes.recv().ok();
-                if wish.is_none() {
-                    (self.going, self.clock) = (Going::On, Clock::start(self.now, self.speed));
+    /// Waits until a tick is due, or while paused; gives the command that comes before.
+    fn wait(&mut self, until: MonoNs, commands: &Receiver<PlaybackCommand>) -> Option<PlaybackCommand> {
+        match self.mode {
+            Mode::Paused => {
+                // When no command can come any more, it plays on to the end.
+                let command = commands.recv().ok();
+                if command.is_none() {
+                    (self.mode, self.clock) = (Mode::Playing, Clock::start(self.now, self.speed));
                 }
-                wish
+                command
             }
-            Going::Ticks(_) => None,
-            Going::On => match self.clock.left(until) {
-                None => wishes.try_recv().ok(),
-                Some(left) => match wishes.recv_timeout(left) {
-                    Ok(wish) => Some(wish),
+            Mode::Stepping(_) => None,
+            Mode::Playing => match self.clock.left(until) {
+                None => commands.try_recv().ok(),
+                Some(left) => match commands.recv_timeout(left) {
+                    Ok(command) => Some(command),
                     Err(RecvTimeoutError::Timeout) => None,
                     Err(RecvTimeoutError::Disconnected) => {
                         std::thread::sleep(self.clock.left(until).unwrap_or(Duration::ZERO));
@@ -179,12 +179,12 @@ impl<'a> Playback<'a> {
         }
     }
 
-    fn tick(&mut self, watcher: &mut dyn Watcher) -> Result<(), PlaybackError> {
-        self.advance(&mut |dive| watcher.ticked(dive))?;
-        if let Going::Ticks(left) = self.going {
-            self.going = if left > 1 { Going::Ticks(left - 1) } else { Going::Still };
-            if self.going == Going::Still {
-                watcher.stands(self.dive, self.now, false);
+    fn tick(&mut self, observer: &mut dyn PlaybackObserver) -> Result<(), PlaybackError> {
+        self.advance(&mut |dive| observer.after_tick(dive))?;
+        if let Mode::Stepping(left) = self.mode {
+            self.mode = if left > 1 { Mode::Stepping(left - 1) } else { Mode::Paused };
+            if self.mode == Mode::Paused {
+                observer.stopped(self.dive, self.now, false);
             }
         }
         Ok(())
@@ -192,7 +192,7 @@ impl<'a> Playback<'a> {
 
     #[expect(
         clippy::disallowed_methods,
-        reason = "where states are kept is for speed; no result depends on it"
+        reason = "when snapshots are taken decides how fast jumps are; no result depends on it"
     )]
     fn advance(&mut self, after_tick: &mut dyn FnMut(&Loop)) -> Result<(), PlaybackError> {
         let Some(until) = self.driver.due(self.player)? else { return Ok(()) };
@@ -200,51 +200,71 @@ impl<'a> Playback<'a> {
         self.driver.tick(self.dive, self.player, after_tick)?;
         self.now = until;
         self.worked += begun.elapsed();
-        if self.states.latest(until).is_some_and(|latest| latest > before) {
+        if self.store.latest(until).is_some_and(|latest| latest > before) {
             self.worked = Duration::ZERO;
-        } else if self.worked >= self.between {
-            self.keep()?;
+        } else if self.worked >= self.store.interval() {
+            self.take_snapshot()?;
         }
         Ok(())
     }
 
-    fn keep(&mut self) -> Result<(), PlaybackError> {
+    fn take_snapshot(&mut self) -> Result<(), PlaybackError> {
+        let mut saver = Saver::default();
+        saver.part(PLACE_PART);
+        saver.value(&self.player.place());
+        saver.raw(&self.dive.save()?);
+        self.store.insert(self.now, &saver.finish()?);
         self.worked = Duration::ZERO;
-        Ok(self.states.keep(self.now, &self.player.place(), &self.dive.save()?)?)
+        Ok(())
     }
 
-    fn grant(&mut self, wish: Wish, watcher: &mut dyn Watcher) -> Result<(), PlaybackError> {
-        match wish {
-            Wish::Pause => self.going = Going::Still,
-            Wish::Go => self.going = Going::On,
-            Wish::Step(ticks) => self.going = if ticks > 0 { Going::Ticks(ticks) } else { Going::Still },
-            Wish::Speed(speed) => self.speed = speed,
-            Wish::Seek(to) => self.seek(to, watcher)?,
-            Wish::Skip(by) => self.seek(self.now + by, watcher)?,
-            Wish::End => {}
+    /// Restores the snapshot of a time that the store gave.
+    fn restore(&mut self, at: MonoNs) -> Result<(), PlaybackError> {
+        let Some(snapshot) = self.store.load(at) else { return Ok(()) };
+        let mut restorer = Restorer::new(&snapshot);
+        restorer.part(PLACE_PART)?;
+        self.player.go_to(&restorer.value()?)?;
+        self.dive.restore(restorer.raw()?)?;
+        self.driver.jump_to(at);
+        (self.now, self.worked) = (at, Duration::ZERO);
+        Ok(())
+    }
+
+    fn execute(
+        &mut self,
+        command: PlaybackCommand,
+        observer: &mut dyn PlaybackObserver,
+    ) -> Result<(), PlaybackError> {
+        match command {
+            PlaybackCommand::Pause => self.mode = Mode::Paused,
+            PlaybackCommand::Go => self.mode = Mode::Playing,
+            PlaybackCommand::Step(ticks) => {
+                self.mode = if ticks > 0 { Mode::Stepping(ticks) } else { Mode::Paused };
+            }
+            PlaybackCommand::Speed(speed) => self.speed = speed,
+            PlaybackCommand::Seek(to) => self.seek(to, observer)?,
+            PlaybackCommand::Skip(by) => self.seek(self.now + by, observer)?,
+            PlaybackCommand::End => {}
         }
-        if matches!(wish, Wish::Pause | Wish::Seek(_) | Wish::Skip(_)) {
-            watcher.stands(self.dive, self.now, false);
+        if matches!(command, PlaybackCommand::Pause | PlaybackCommand::Seek(_) | PlaybackCommand::Skip(_)) {
+            observer.stopped(self.dive, self.now, false);
         }
         self.clock = Clock::start(self.now, self.speed);
         Ok(())
     }
 
-    /// Goes to the last tick that ends at or before a moment: from the nearest state before it, or from here.
+    /// Jumps to the last tick that ends at or before `to`: from here, or from the latest snapshot before it where that is
+    /// nearer.
     ///
     /// Errors: see [`PlaybackError`].
-    pub fn seek(&mut self, to: MonoNs, watcher: &mut dyn Watcher) -> Result<(), PlaybackError> {
+    pub fn seek(&mut self, to: MonoNs, observer: &mut dyn PlaybackObserver) -> Result<(), PlaybackError> {
         let to = to.max(self.begun);
-        let near = self.states.latest(to);
-        if let Some(near) = near.filter(|near| to < self.now || *near > self.now) {
-            let (place, snapshot) = self.states.take(near)?;
-            self.dive.restore(&snapshot)?;
-            self.player.go_to(&place)?;
-            self.driver.jump_to(near);
-            (self.now, self.worked) = (near, Duration::ZERO);
+        let latest = self.store.latest(to);
+        if let Some(at) = latest.filter(|at| to < self.now || *at > self.now) {
+            self.restore(at)?;
         }
         while self.driver.due(self.player)?.is_some_and(|until| until <= to) {
-            self.advance(&mut |dive| watcher.passed(dive))?;
+            self.advance(&mut |dive| observer.after_skipped_tick(dive))?;
         }
         self.clock = Clock::start(self.now, self.speed);
         Ok(())

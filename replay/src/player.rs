@@ -32,7 +32,7 @@ pub struct Player {
     astray: BTreeMap<String, (u64, MonoNs)>,
 }
 
-/// Where a player stands in its log.
+/// A player's position in its log, to continue from.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PlayerPlace {
     log: DivePlace,
@@ -81,7 +81,7 @@ impl Player {
         self.sources = self.ids.iter().map(find).collect();
     }
 
-    /// Where it stands, between two ticks.
+    /// The current position, between two ticks.
     pub fn place(&self) -> PlayerPlace {
         PlayerPlace {
             log: self.reader.place(),
@@ -94,7 +94,8 @@ impl Player {
         }
     }
 
-    /// Goes on from a place where it, or another player of the same log and vehicle, has stood.
+    /// Continues from a position of this player or another one of the same log and vehicle. What was lost is counted as if
+    /// the log had been played straight through.
     ///
     /// Errors: the log can't be read there.
     pub fn go_to(&mut self, place: &PlayerPlace) -> Result<(), LogError> {

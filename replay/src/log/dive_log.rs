@@ -57,7 +57,7 @@ pub struct PartFile {
 /// Opens the log with that number in the list.
 type Open<R> = Box<dyn FnMut(usize) -> Result<LogReader<R>, LogError>>;
 
-/// Where a reader stands in a dive's log.
+/// A position in a dive's log, to continue reading from.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct DivePlace {
     /// The file.
@@ -246,7 +246,7 @@ impl<R: Read + Seek> DiveLog<R> {
         Ok(Some(message))
     }
 
-    /// Where it stands.
+    /// The current position.
     pub fn place(&self) -> DivePlace {
         DivePlace {
             at: self.at,
@@ -257,7 +257,7 @@ impl<R: Read + Seek> DiveLog<R> {
         }
     }
 
-    /// Goes on from a place where it, or another reader of the same files, has stood.
+    /// Continues from a position of this reader or another one of the same files, see [`LogReader::go_to`].
     ///
     /// Errors: the medium fails.
     pub fn go_to(&mut self, place: &DivePlace) -> Result<(), LogError> {

@@ -27,6 +27,7 @@
 mod channels;
 mod chunk;
 mod companion;
+mod digest;
 mod dive_log;
 mod error;
 mod fields;
@@ -47,13 +48,12 @@ mod worker;
 mod writer;
 
 pub use companion::{Companion, Made};
+pub use digest::{file_digest, files_digest};
 pub use dive_log::{DiveLog, DivePlace, PartFile, files_of};
 pub use error::LogError;
 pub use loss::{Loss, LossKind};
 pub use part::{Part, PartEnd, PartHead, Progress, dive_name, part_path};
-pub use reader::{
-    ChannelInfo, LogInfo, LogMessage, LogPlace, LogReader, MessageKind, file_digest, files_digest,
-};
+pub use reader::{ChannelInfo, LogInfo, LogMessage, LogPlace, LogReader, MessageKind};
 pub use recorder::{Full, Recorder, RecorderHandle, RecorderPort, SentPort};
 pub use recover::{RECOVERED_FROM, Recovered, recover};
 pub use rotate::{Every, Rotation};

@@ -8,12 +8,11 @@ use std::path::Path;
 use headrace_geometry::time::MonoNs;
 use mcap::records::op;
 use serde::{Deserialize, Serialize};
-use sha2::{Digest, Sha256};
 
 use super::channels::{Channels, Kind};
 use super::chunk::{Unpacked, data_section_holds, unpack};
 use super::fields::Fields;
-use super::format::{VEHICLE_FILE, hex};
+use super::format::VEHICLE_FILE;
 use super::framing::{ChunkPlace, Definition, LogFile};
 use super::loss::Losses;
 use super::merge::{Batch, Merge};
@@ -81,13 +80,15 @@ pub struct LogMessage<'a> {
     pub data: &'a [u8],
 }
 
-/// Where a reader stands in a log.
+/// A position in a log, to continue reading from.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct LogPlace {
     /// Pieces that have been read.
     read: usize,
-    /// Those of them that hold messages still: number, and messages taken.
+    /// Those of them with messages left: number, and messages taken.
     open: Vec<(usize, usize)>,
+    /// Times of pieces already read, where the heads of their chunks said otherwise.
+    corrected: Vec<(usize, (u64, u64))>,
     latest: u64,
     late: u64,
     losses: Vec<Loss>,
@@ -124,6 +125,8 @@ pub struct LogReader<R = File> {
     losses: Losses,
     /// Pieces in the order of the file.
     spans: Vec<Span>,
+    /// What the heads of chunks said of their times, by piece, where their messages had others.
+    stated: BTreeMap<usize, (u64, u64)>,
     /// Numbers of the pieces in the order in which they are read.
     plan: Vec<u32>,
     /// How many of the plan have been read.
@@ -174,6 +177,7 @@ impl<R: Read + Seek> LogReader<R> {
             schemas: scan.schemas,
             losses: scan.losses,
             spans: scan.spans,
+            stated: BTreeMap::new(),
             plan,
             read: 0,
             merge: Merge::new(by_time),
@@ -296,30 +300,50 @@ impl<R: Read + Seek> LogReader<R> {
         }
     }
 
-    /// Where the reader stands.
+    /// The current position.
     pub fn place(&self) -> LogPlace {
+        let times = |number: &usize| self.spans.get(*number).map(|span| (*number, (span.from, span.to)));
         LogPlace {
             read: self.read,
             open: self.merge.open().collect(),
+            corrected: self.stated.keys().filter_map(times).collect(),
             latest: self.latest,
             late: self.late,
             losses: self.losses.list().to_vec(),
         }
     }
 
-    /// Goes on from a place where it, or another reader of the same file, has stood.
+    /// Continues from a position of this reader or another one of the same file: messages, their order and losses are those
+    /// of a log read straight through, whatever has been read in the meantime.
     ///
     /// Errors: the medium fails.
     pub fn go_to(&mut self, place: &LogPlace) -> Result<(), LogError> {
         self.merge.clear();
+        // The times of pieces decide the order of reading and date the losses.
+        for (number, stated) in core::mem::take(&mut self.stated) {
+            self.correct(number, stated);
+        }
+        self.stated.clear();
+        for (number, times) in &place.corrected {
+            self.correct(*number, *times);
+        }
         for (number, next) in &place.open {
             self.read_span(*number, *next)?;
         }
         (self.read, self.latest, self.late) = (place.read, place.latest, place.late);
-        // What was damaged before is known again, and what lies behind is told when it has been read.
+        // Damage behind the position is found again when it is read.
         self.losses = Losses::of(place.losses.clone());
         self.finished = false;
         Ok(())
+    }
+
+    /// Sets the times of a piece, and notes what its head said of them.
+    fn correct(&mut self, number: usize, times: (u64, u64)) {
+        let Some(span) = self.spans.get_mut(number).filter(|span| (span.from, span.to) != times) else {
+            return;
+        };
+        self.stated.entry(number).or_insert((span.from, span.to));
+        (span.from, span.to) = times;
     }
 
     fn read_piece(&mut self) -> Result<(), LogError> {
@@ -345,9 +369,8 @@ impl<R: Read + Seek> LogReader<R> {
             self.lose(number, kind);
         }
         let times = batch.entries.iter().map(|entry| entry.head.log_time);
-        if let Some(span) = self.spans.get_mut(number) {
-            (span.from, span.to) = (times.clone().min().unwrap_or(0), times.max().unwrap_or(0));
-        }
+        let times = (times.clone().min().unwrap_or(0), times.max().unwrap_or(0));
+        self.correct(number, times);
         self.merge.add(number, batch, next);
         Ok(())
     }
@@ -458,33 +481,4 @@ fn place_entries(batch: &mut Batch, channels: &Channels, found: &mut Vec<LossKin
     found.extend(
         unknown.into_iter().map(|(channel, messages)| LossKind::UnknownChannel { channel, messages }),
     );
-}
-
-/// SHA-256 of a file, in hex.
-///
-/// Errors: the file can't be read.
-pub fn file_digest(path: &Path) -> Result<String, LogError> {
-    files_digest(&[path])
-}
-
-/// SHA-256 of the bytes of files one after the other, in hex.
-///
-/// Errors: a file can't be read.
-pub fn files_digest(paths: &[impl AsRef<Path>]) -> Result<String, LogError> {
-    let mut hasher = Sha256::new();
-    let mut block = vec![0; 1 << 16];
-    for path in paths {
-        let path = path.as_ref();
-        let failed = |source| LogError::Open { path: path.to_owned(), source };
-        let mut file = File::open(path).map_err(failed)?;
-        loop {
-            match file.read(&mut block) {
-                Ok(0) => break,
-                Ok(len) => hasher.update(block.get(..len).unwrap_or_default()),
-                Err(error) if error.kind() == std::io::ErrorKind::Interrupted => {}
-                Err(source) => return Err(failed(source)),
-            }
-        }
-    }
-    Ok(hex(&hasher.finalize()))
 }

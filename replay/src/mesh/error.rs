@@ -2,42 +2,13 @@
 
 use core::fmt;
 
-use super::MeshFormat;
-
-/// A place in a file.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Place {
-    /// Of a text: the line, from 1.
-    Line(usize),
-    /// Of binary data: the offset of the byte, from 0.
-    Byte(usize),
-}
-
-impl fmt::Display for Place {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Line(line) => write!(f, "line {line}"),
-            Self::Byte(byte) => write!(f, "byte {byte}"),
-        }
-    }
-}
-
 /// Why a mesh can't be used. Positions are in the file's own axes.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MeshError {
-    /// The file isn't as its format says.
-    #[error("reading {format}: {place}: expected {expected}, found {found}")]
-    File {
-        /// The format it was read as.
-        format: MeshFormat,
-        /// Where.
-        place: Place,
-        /// What should be there.
-        expected: String,
-        /// What is there.
-        found: String,
-    },
+    /// The file can't be read as PLY.
+    #[error("reading PLY: {0}")]
+    File(String),
     /// No triangle is left.
     #[error("the mesh has no face ({given} given; those with two corners in one place don't count)")]
     NoFaces {

@@ -1,4 +1,4 @@
-//! A ray against a box and a triangle, without gaps between triangles; the distance from a point to a triangle.
+//! A ray against a box and a triangle, without gaps between triangles.
 //!
 //! Source: S. Woop, C. Benthin, I. Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013. The side of the ray on
 //! which an edge passes is a difference of two products. Rounding keeps their order and swapping the ends changes the
@@ -165,33 +165,6 @@ pub(super) fn normal_against(triangle: [[f64; 3]; 3], direction: [f64; 3]) -> [f
     } else {
         direction.map(|d| -d)
     }
-}
-
-/// The square of the distance from a point to a box; zero inside.
-pub(super) fn square_to_box(point: [f64; 3], low: [f64; 3], high: [f64; 3]) -> f64 {
-    let out = [0, 1, 2].map(|k| (low[k] - point[k]).max(point[k] - high[k]).max(0.0));
-    dot(out, out)
-}
-
-/// The square of the distance from a point to a triangle, which may be without area.
-pub(super) fn square_to_triangle(point: [f64; 3], triangle: [[f64; 3]; 3]) -> f64 {
-    let [a, b, c] = triangle;
-    let normal = cross(minus(b, a), minus(c, a));
-    let is_left = |p: [f64; 3], q: [f64; 3]| dot(cross(minus(q, p), minus(point, p)), normal) >= 0.0;
-    let square = dot(normal, normal);
-    if square > 0.0 && is_left(a, b) && is_left(b, c) && is_left(c, a) {
-        let off = dot(minus(point, a), normal);
-        return off * off / square;
-    }
-    square_to_side(point, a, b).min(square_to_side(point, b, c)).min(square_to_side(point, c, a))
-}
-
-fn square_to_side(point: [f64; 3], p: [f64; 3], q: [f64; 3]) -> f64 {
-    let (side, to) = (minus(q, p), minus(point, p));
-    let square = dot(side, side);
-    let share = if square > 0.0 { (dot(to, side) / square).clamp(0.0, 1.0) } else { 0.0 };
-    let off = minus(to, side.map(|s| s * share));
-    dot(off, off)
 }
 
 fn minus(p: [f64; 3], q: [f64; 3]) -> [f64; 3] {

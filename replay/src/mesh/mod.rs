@@ -1,4 +1,4 @@
-//! Triangle meshes for the simulator, from files: a stretch of a tunnel's wall, or a body in the water.
+//! Triangle meshes for the simulator, from PLY files: a stretch of a tunnel's wall, or a body in the water.
 //!
 //! A mesh is checked when it is made, so that a ray from within can't leave through a gap between triangles. Which way
 //! round triangles are given doesn't matter.
@@ -6,10 +6,7 @@
 mod check;
 mod error;
 mod geometry;
-mod obj;
 mod ply;
-mod read;
-mod stl;
 
 #[cfg(test)]
 mod tests;
@@ -20,7 +17,6 @@ mod tests_read;
 
 use std::cell::Cell;
 
-use headrace_geometry::math;
 use parry3d_f64::bounding_volume::Aabb;
 use parry3d_f64::math::Vector;
 use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy, BvhNode};
@@ -28,8 +24,8 @@ use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy, BvhNode};
 use check::Surface;
 use geometry::{Crossing, Ray};
 
-pub use error::{MeshError, Place};
-pub use read::{MeshFormat, Triangles, read};
+pub use error::MeshError;
+pub use ply::{Triangles, read};
 
 /// Share of the mesh's size by which boxes in the tree are wider than what they hold: more than rounding moves a
 /// triangle that is seen from up to a thousand times that far.
@@ -69,10 +65,8 @@ pub struct MeshHit {
 /// A checked surface of triangles, ready for rays. Its frame is that of the triangles given, metres.
 #[derive(Debug, Clone)]
 pub struct Mesh {
-    role: Role,
     surface: Surface,
     tree: Bvh,
-    left_out: usize,
 }
 
 impl Mesh {
@@ -85,7 +79,6 @@ impl Mesh {
     /// a body or in a wall between its ends, a wall with a closed end.
     /// Allocates: about 190 bytes a face, and twice that while building; the same tree on any machine.
     pub fn new(triangles: Triangles, role: Role) -> Result<Self, MeshError> {
-        let given = triangles.faces.len();
         let mut surface = Surface::new(triangles, role)?;
         let largest = surface.low.iter().chain(&surface.high).fold(0.0_f64, |most, c| most.max(c.abs()));
         let slack = SLACK * (largest + check::diagonal(surface.low, surface.high));
@@ -99,8 +92,7 @@ impl Mesh {
             Aabb::new(Vector::from(low), Vector::from(high))
         });
         let tree = Bvh::from_iter(BvhBuildStrategy::Binned, boxes.enumerate());
-        let left_out = given - surface.faces.len();
-        Ok(Self { role, surface, tree, left_out })
+        Ok(Self { surface, tree })
     }
 
     /// The nearest place where a ray meets the mesh, from either side, no further than `far_m`.
@@ -161,16 +153,6 @@ impl Mesh {
         Some(is_odd)
     }
 
-    /// Distance from a place to the surface, on either side, metres. A wall's openings aren't surface.
-    pub fn distance_m(&self, point: [f64; 3]) -> f64 {
-        let nearest = self.tree.find_best(
-            f64::MAX,
-            |node, _| geometry::square_to_box(point, node.mins().into(), node.maxs().into()),
-            |leaf, _| Some(geometry::square_to_triangle(point, self.surface.triangle(leaf))),
-        );
-        nearest.map_or(f64::INFINITY, |(_, square)| math::sqrt(square))
-    }
-
     /// The corners of the box around the mesh with the least and the greatest coordinates, metres.
     pub fn bounds(&self) -> ([f64; 3], [f64; 3]) {
         (self.surface.low, self.surface.high)
@@ -184,21 +166,6 @@ impl Mesh {
         let triangles = self.surface.caps.iter().flat_map(|cap| cap.triangles.as_flattened());
         let rims = triangles.map(|corner| corner[0]);
         rims.fold((low, high), |(from, to), x| if x < middle { (from.max(x), to) } else { (from, to.min(x)) })
-    }
-
-    /// Number of triangles.
-    pub fn faces(&self) -> usize {
-        self.surface.faces.len()
-    }
-
-    /// Number of triangles given that were left out, as they have two corners in one place.
-    pub fn left_out(&self) -> usize {
-        self.left_out
-    }
-
-    /// What the mesh stands for.
-    pub fn role(&self) -> Role {
-        self.role
     }
 }
 

@@ -3,6 +3,7 @@
 mod damage;
 mod foreign;
 mod parts;
+mod places;
 mod recorder;
 mod recover;
 mod round_trip;

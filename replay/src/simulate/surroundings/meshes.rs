@@ -13,7 +13,7 @@ use super::features::{self, Kind, Placed, Site};
 use super::shapes::{Frame, Solid};
 use super::tube::Face;
 use super::vector::{Ray, V3};
-use crate::mesh::{self, Mesh, MeshFormat, Role};
+use crate::mesh::{self, Mesh, Role};
 use crate::simulate::FileLoader;
 
 /// Where a mesh's origin may lie, m: it may have been surveyed from far away.
@@ -243,11 +243,11 @@ impl Place {
 fn read(table: &Section<'_>, role: Role, load: FileLoader<'_>) -> Result<Mesh, ConfigError> {
     let name = table.required("file", table.text("file")?)?;
     let refuse = |why: &str| table.invalid("file", why);
-    let extension = name.rsplit_once('.').map_or("", |(_, extension)| extension);
-    let format =
-        MeshFormat::from_extension(extension).ok_or_else(|| refuse("must end in .ply, .obj or .stl"))?;
+    if !name.to_ascii_lowercase().ends_with(".ply") {
+        return Err(refuse("must end in .ply"));
+    }
     let bytes = load(&name).map_err(|why| refuse(&why))?;
-    let triangles = mesh::read(format, &bytes).map_err(|error| refuse(&error.to_string()))?;
+    let triangles = mesh::read(&bytes).map_err(|error| refuse(&error.to_string()))?;
     Mesh::new(triangles, role).map_err(|error| refuse(&error.to_string()))
 }
 

@@ -35,14 +35,17 @@ fn tube(radius_m: f64, length_m: f64, rings: u32, without: &[u32]) -> String {
     )
 }
 
-/// A box from -half to half, as OBJ.
+/// A box from -half to half, as PLY.
 fn cuboid(half: V3) -> String {
-    let mut text = String::new();
+    let mut text = String::from(
+        "ply\nformat ascii 1.0\nelement vertex 8\nproperty double x\nproperty double y\nproperty double z\n\
+         element face 6\nproperty list uchar int vertex_indices\nend_header\n",
+    );
     for corner in 0..8 {
         let [x, y, z] = [0, 1, 2].map(|k| if corner >> k & 1 == 1 { half[k] } else { -half[k] });
-        writeln!(text, "v {x} {y} {z}").unwrap();
+        writeln!(text, "{x} {y} {z}").unwrap();
     }
-    text + "f 1 3 7 5\nf 2 4 8 6\nf 1 2 6 5\nf 3 4 8 7\nf 1 2 4 3\nf 5 6 8 7\n"
+    text + "4 0 2 6 4\n4 1 3 7 5\n4 0 1 5 4\n4 2 3 7 6\n4 0 1 3 2\n4 4 5 7 6\n"
 }
 
 fn table(keys: &str) -> String {
@@ -211,8 +214,8 @@ fn a_wall_follows_the_axis_behind_a_bend() {
 fn a_box_of_triangles_is_a_box() {
     let half = [0.5, 0.4, 0.3];
     let file = cuboid(half);
-    let keys = "file = \"box.obj\"\nname = \"car\"\nchainage_m = 20\nacross_m = [0.5, 1.5]\n";
-    let straight = with(&table(keys), &[("box.obj", &file)]).unwrap();
+    let keys = "file = \"box.ply\"\nname = \"car\"\nchainage_m = 20\nacross_m = [0.5, 1.5]\n";
+    let straight = with(&table(keys), &[("box.ply", &file)]).unwrap();
     let hit = cast(&straight, [17.0, 0.4, 1.4], [1.0, 0.0, 0.0]).unwrap();
     assert!((hit.range_m - 2.5).abs() < 1e-12 && (hit.normal.x() + 1.0).abs() < 1e-12, "{hit:?}");
     assert_eq!((hit.what, straight.feature_name(0)), (What::Feature(0), "car"));
@@ -221,7 +224,7 @@ fn a_box_of_triangles_is_a_box() {
     assert!(!straight.is_water(to_point([20.4, 0.5, 1.5])));
     assert!(straight.is_water(to_point([20.6, 0.5, 1.5])));
 
-    let surroundings = with(&table(&format!("{keys}yaw_deg = 30")), &[("box.obj", &file)]).unwrap();
+    let surroundings = with(&table(&format!("{keys}yaw_deg = 30")), &[("box.ply", &file)]).unwrap();
     let (sin, cos) = math::sin_cos(30.0_f64.to_radians());
     let axes = [[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]];
     let block = Solid::Block(shapes::Frame { origin: [20.0, 0.5, 1.5], axes }, half);
@@ -244,8 +247,8 @@ fn a_box_of_triangles_is_a_box() {
 
 #[test]
 fn a_body_stands_in_the_way() {
-    let keys = "file = \"box.obj\"\nchainage_m = 20\nacross_m = [0, 3]";
-    let surroundings = with(&table(keys), &[("box.obj", &cuboid([0.5; 3]))]).unwrap();
+    let keys = "file = \"box.ply\"\nchainage_m = 20\nacross_m = [0, 3]";
+    let surroundings = with(&table(keys), &[("box.ply", &cuboid([0.5; 3]))]).unwrap();
     let way = |from: V3, to: V3| surroundings.first_obstruction(to_point(from), to_point(to));
     let hit = way([15.0, 0.0, 3.0], [25.0, 0.1, 3.1]).unwrap();
     assert_eq!(hit.what, What::Feature(0));
@@ -266,40 +269,44 @@ fn refused(text: &str, files: &[(&str, &str)], words: &[&str]) {
 #[test]
 fn files_that_are_no_mesh_are_refused_with_the_place() {
     let good = cuboid([0.5; 3]);
-    let keys = table("chainage_m = 20\nfile = \"box.obj\"");
-    let place = "s.toml:4: tunnel.features[0].file = \"box.obj\": ";
-    let open = good.replace("f 5 6 8 7\n", "");
-    refused(&keys, &[("box.obj", &open)], &[place, "1 hole(s)", "4 edges", "0.500)"]);
-    refused(&keys, &[("box.obj", &good.replace("f 1 3 7 5", "f 1 3 9 5"))], &[place, "reading OBJ: line 9:"]);
+    let keys = table("chainage_m = 20\nfile = \"box.ply\"");
+    let place = "s.toml:4: tunnel.features[0].file = \"box.ply\": ";
+    let open = good.replace("face 6", "face 5").replace("4 4 5 7 6\n", "");
+    refused(&keys, &[("box.ply", &open)], &[place, "1 hole(s)", "4 edges", "0.500)"]);
+    refused(
+        &keys,
+        &[("box.ply", &good.replace("4 0 2 6 4", "4 0 2 8 4"))],
+        &[place, "has vertex 8 as a corner"],
+    );
     refused(&keys, &[], &[place, "can't be read"]);
     let ply = tube(3.0, 10.0, 1, &[]);
     let cut = ply.get(..ply.len() / 2).unwrap();
     let wall = table("file = \"t.ply\"\nrole = \"wall\"\nchainage_m = 40");
     let place = "s.toml:3: tunnel.features[0].file = \"t.ply\": ";
-    refused(&wall, &[("t.ply", cut)], &[place, "reading PLY: line ", "expected"]);
+    refused(&wall, &[("t.ply", cut)], &[place, "reading PLY: Line ", "but found nothing"]);
     let hole = tube(3.0, 10.0, 5, &[2 * SIDES]);
     refused(&wall, &[("t.ply", &hole)], &[place, "1 hole(s)", "(4.000, 3.000, 3.000)"]);
-    let closed = "file = \"box.obj\"\nrole = \"wall\"\nchainage_m = 40";
-    refused(&table(closed), &[("box.obj", &good)], &["closed at its end at x = -0.500 m"]);
-    refused(&table("file = \"box.dae\""), &[], &["file = \"box.dae\"", ".ply, .obj or .stl"]);
+    let closed = "file = \"box.ply\"\nrole = \"wall\"\nchainage_m = 40";
+    refused(&table(closed), &[("box.ply", &good)], &["closed at its end at x = -0.500 m"]);
+    refused(&table("file = \"box.dae\""), &[], &["file = \"box.dae\"", "must end in .ply"]);
     refused(&table("chainage_m = 3"), &[], &["features[0].file", "is missing"]);
-    refused(&table("file = \"box.obj\"\nrole = \"floor\""), &[], &["role = \"floor\"", "body, wall"]);
-    refused(&format!("{keys}scale = 2"), &[("box.obj", &good)], &["features[0].scale", "is not a key here"]);
-    refused(&table("file = \"box.obj\"\nacross_m = [1]"), &[], &["across_m = [1]", "[left, up]"]);
+    refused(&table("file = \"box.ply\"\nrole = \"floor\""), &[], &["role = \"floor\"", "body, wall"]);
+    refused(&format!("{keys}scale = 2"), &[("box.ply", &good)], &["features[0].scale", "is not a key here"]);
+    refused(&table("file = \"box.ply\"\nacross_m = [1]"), &[], &["across_m = [1]", "[left, up]"]);
 }
 
 #[test]
 fn meshes_that_cannot_be_where_they_are() {
     let body = cuboid([0.5; 3]);
     let tube = tube(3.0, 10.0, 1, &[]);
-    let files = [("box.obj", body.as_str()), ("t.ply", tube.as_str())];
+    let files = [("box.ply", body.as_str()), ("t.ply", tube.as_str())];
     let wall = |rest: &str| table(&format!("file = \"t.ply\"\nrole = \"wall\"\n{rest}"));
     refused(
-        &table("file = \"box.obj\""),
+        &table("file = \"box.ply\""),
         &files,
         &["file = ", "from -0.500 to 0.500 m", "out of the tunnel"],
     );
-    refused(&table("file = \"box.obj\"\nchainage_m = 99.6"), &files, &["chainage_m = 99.6", "100 m"]);
+    refused(&table("file = \"box.ply\"\nchainage_m = 99.6"), &files, &["chainage_m = 99.6", "100 m"]);
     refused(&wall("chainage_m = 101"), &files, &["chainage_m = 101", "is outside the tunnel"]);
     refused(&wall("yaw_deg = 3"), &files, &["yaw_deg = 3", "for a body"]);
     let station =

@@ -1,17 +1,16 @@
-//! Where bytes are cut into blocks, so that two states share what they have in common.
+//! Content-defined chunking: cuts bytes into blocks so that two snapshots share what they have in common.
 //!
-//! By what the bytes are and not by where they stand (content-defined chunking with a gear hash: Xia et al., "FastCDC",
-//! USENIX ATC 2016): bytes put in somewhere change the blocks there and none behind. Most of a dive's state is what was
-//! seen of the wall behind the vehicle, which doesn't change any more.
+//! Cuts depend on the bytes around them and not on their offset (gear hash: Xia et al., "FastCDC", USENIX ATC 2016), so an
+//! insertion changes the blocks around it and none behind.
 
-/// No block is shorter, but the last.
-const LEAST_BYTES: usize = 8 << 10;
-/// No block is longer.
-const MOST_BYTES: usize = 128 << 10;
-/// A cut where these bits of the hash are zero: every 24 KiB beyond the least.
+/// Least length of a block but the last, bytes.
+const MIN_BYTES: usize = 8 << 10;
+/// Greatest length of a block, bytes.
+const MAX_BYTES: usize = 128 << 10;
+/// A block ends where these bits of the hash are zero: on average every 32 KiB beyond the least length.
 const CUT_MASK: u64 = 0x7fff << 48;
 
-/// One number for each byte, as splitmix64 gives them.
+/// A pseudorandom number for each value of a byte (splitmix64).
 const GEAR: [u64; 256] = gear();
 
 const fn gear() -> [u64; 256] {
@@ -29,7 +28,7 @@ const fn gear() -> [u64; 256] {
     table
 }
 
-/// The blocks of some bytes, in order; together they are the bytes.
+/// The blocks in order; concatenated they are `bytes`.
 pub(super) fn blocks(bytes: &[u8]) -> impl Iterator<Item = &[u8]> {
     let mut rest = bytes;
     core::iter::from_fn(move || {
@@ -41,15 +40,15 @@ pub(super) fn blocks(bytes: &[u8]) -> impl Iterator<Item = &[u8]> {
 
 /// Length of the first block.
 fn first_len(bytes: &[u8]) -> Option<usize> {
-    if bytes.len() <= LEAST_BYTES {
+    if bytes.len() <= MIN_BYTES {
         return (!bytes.is_empty()).then_some(bytes.len());
     }
-    let most = bytes.len().min(MOST_BYTES);
+    let most = bytes.len().min(MAX_BYTES);
     let mut hash = 0_u64;
-    let sought = bytes.iter().enumerate().take(most).skip(LEAST_BYTES - 64);
+    let sought = bytes.iter().enumerate().take(most).skip(MIN_BYTES - 64);
     for (place, byte) in sought {
         hash = (hash << 1).wrapping_add(GEAR.get(usize::from(*byte)).copied().unwrap_or(0));
-        if place >= LEAST_BYTES && hash & CUT_MASK == 0 {
+        if place >= MIN_BYTES && hash & CUT_MASK == 0 {
             return Some(place + 1);
         }
     }
@@ -71,19 +70,19 @@ mod tests {
     }
 
     #[test]
-    fn blocks_are_of_a_size_and_make_up_the_whole() {
+    fn blocks_have_bounded_lengths_and_make_up_the_whole() {
         let bytes = noise(4 << 20, 1);
         let cut: Vec<&[u8]> = blocks(&bytes).collect();
         assert_eq!(cut.concat(), bytes);
         let (last, others) = cut.split_last().unwrap();
-        assert!(others.iter().all(|block| (LEAST_BYTES..=MOST_BYTES).contains(&block.len())));
-        assert!(last.len() <= MOST_BYTES);
+        assert!(others.iter().all(|block| (MIN_BYTES..=MAX_BYTES).contains(&block.len())));
+        assert!(last.len() <= MAX_BYTES);
         let mean = bytes.len() / cut.len();
         assert!((24 << 10..56 << 10).contains(&mean), "{mean}");
     }
 
     #[test]
-    fn what_is_put_in_changes_a_few_blocks_alone() {
+    fn an_insertion_changes_the_blocks_around_it_alone() {
         let bytes = noise(4 << 20, 2);
         let mut longer = bytes.clone();
         longer.splice(1_000_000..1_000_000, noise(777, 3));
@@ -94,7 +93,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn any_bytes_are_cut_and_put_together_again(bytes in proptest::collection::vec(any::<u8>(), 0..40_000)) {
+        fn blocks_of_any_bytes_concatenate_to_them(bytes in proptest::collection::vec(any::<u8>(), 0..40_000)) {
             prop_assert_eq!(blocks(&bytes).collect::<Vec<_>>().concat(), bytes);
         }
     }

@@ -1,0 +1,163 @@
+//! Snapshots of a replay in progress, held in memory so that playback can jump back without starting over.
+//!
+//! Snapshots are cut into blocks by content and each distinct block is held once: most of a dive's state is wall already
+//! behind the vehicle, which consecutive snapshots have in common.
+
+mod blocks;
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+use std::time::Duration;
+
+use headrace_geometry::time::MonoNs;
+
+/// Snapshots by time, within a fixed amount of memory.
+#[derive(Debug)]
+pub struct SnapshotStore {
+    snapshots: BTreeMap<MonoNs, Vec<Arc<[u8]>>>,
+    /// Every block of any snapshot, once.
+    blocks: BTreeSet<Arc<[u8]>>,
+    /// Memory of the blocks and of the references to them, bytes.
+    used_bytes: usize,
+    max_bytes: usize,
+    interval: Duration,
+}
+
+impl SnapshotStore {
+    /// An empty store for at most `max_bytes` of snapshots, wanted whenever `interval` of work has been done since the last.
+    ///
+    /// The first snapshot is held whatever its size.
+    pub fn new(max_bytes: usize, interval: Duration) -> Self {
+        Self { snapshots: BTreeMap::new(), blocks: BTreeSet::new(), used_bytes: 0, max_bytes, interval }
+    }
+
+    /// Work between two snapshots; doubled each time the store was full.
+    pub fn interval(&self) -> Duration {
+        self.interval
+    }
+
+    /// Time of the latest snapshot not after `at`.
+    pub fn latest(&self, at: MonoNs) -> Option<MonoNs> {
+        self.snapshots.range(..=at).next_back().map(|(time, _)| *time)
+    }
+
+    /// Adds a snapshot, unless there is one of that time. When there is no room, every other snapshot is dropped and the
+    /// interval doubled until there is; a snapshot that doesn't fit beside the first alone isn't kept.
+    pub fn insert(&mut self, at: MonoNs, snapshot: &[u8]) {
+        if self.snapshots.contains_key(&at) {
+            return;
+        }
+        let cut: Vec<&[u8]> = blocks::blocks(snapshot).collect();
+        let distinct: BTreeSet<&[u8]> = cut.iter().copied().collect();
+        let references = cut.len() * size_of::<Arc<[u8]>>();
+        while !self.snapshots.is_empty()
+            && self.used_bytes + self.growth(&distinct) + references > self.max_bytes
+        {
+            self.interval = self.interval.saturating_mul(2);
+            if self.snapshots.len() == 1 {
+                return;
+            }
+            self.thin();
+        }
+        let shared = cut.into_iter().map(|block| self.share(block)).collect();
+        self.snapshots.insert(at, shared);
+        self.used_bytes += references;
+    }
+
+    /// The bytes of a snapshot at a time that [`SnapshotStore::latest`] gave.
+    pub fn load(&self, at: MonoNs) -> Option<Vec<u8>> {
+        self.snapshots.get(&at).map(|blocks| blocks.concat())
+    }
+
+    /// Memory of those blocks that aren't held yet.
+    fn growth(&self, blocks: &BTreeSet<&[u8]>) -> usize {
+        blocks.iter().filter(|block| !self.blocks.contains(**block)).map(|block| block_bytes(block)).sum()
+    }
+
+    fn share(&mut self, block: &[u8]) -> Arc<[u8]> {
+        if let Some(held) = self.blocks.get(block) {
+            return held.clone();
+        }
+        let held: Arc<[u8]> = block.into();
+        self.used_bytes += block_bytes(block);
+        self.blocks.insert(held.clone());
+        held
+    }
+
+    /// Drops every other snapshot but the first, and the blocks that no other has.
+    fn thin(&mut self) {
+        let mut is_kept = false;
+        self.snapshots.retain(|_, _| {
+            is_kept = !is_kept;
+            is_kept
+        });
+        // The set itself holds one reference.
+        self.blocks.retain(|block| Arc::strong_count(block) > 1);
+        let blocks: usize = self.blocks.iter().map(|block| block_bytes(block)).sum();
+        let references: usize = self.snapshots.values().map(Vec::len).sum();
+        self.used_bytes = blocks + references * size_of::<Arc<[u8]>>();
+    }
+}
+
+/// Memory of a block: its bytes, its two reference counts, its place in the set.
+fn block_bytes(block: &[u8]) -> usize {
+    block.len() + 2 * size_of::<usize>() + size_of::<Arc<[u8]>>()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const INTERVAL: Duration = Duration::from_millis(300);
+
+    /// Bytes that compare with no others'.
+    fn noise(len: usize, seed: u64) -> Vec<u8> {
+        let mut state = seed;
+        let mut next = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            (state >> 56) as u8
+        };
+        (0..len).map(|_| next()).collect()
+    }
+
+    #[test]
+    fn a_full_store_drops_every_other_snapshot_and_asks_for_fewer() {
+        let mut store = SnapshotStore::new(16 << 20, INTERVAL);
+        let snapshot = |number: u64| noise(1 << 20, number);
+        for number in 0..100 {
+            store.insert(MonoNs(number), &snapshot(number));
+            assert!(store.used_bytes <= 16 << 20, "{}", store.used_bytes);
+            assert_eq!(store.latest(MonoNs(0)), Some(MonoNs(0)));
+        }
+        let times: Vec<u64> = store.snapshots.keys().map(|at| at.0).collect();
+        assert!((8..=15).contains(&times.len()), "{times:?}");
+        for at in times {
+            assert_eq!(store.load(MonoNs(at)).unwrap(), snapshot(at));
+        }
+        // Each time that it was full there was room for half as many again.
+        assert!(store.interval() > 4 * INTERVAL);
+        assert_eq!(store.load(MonoNs(1)), None);
+    }
+
+    #[test]
+    fn snapshots_share_the_blocks_that_they_have_in_common() {
+        let mut store = SnapshotStore::new(16 << 20, INTERVAL);
+        let wall = noise(4 << 20, 1);
+        for number in 0..100_u64 {
+            let snapshot = [&number.to_le_bytes()[..], &wall, &noise(1000, number + 2)].concat();
+            store.insert(MonoNs(number), &snapshot);
+            assert_eq!(store.load(MonoNs(number)).unwrap(), snapshot);
+        }
+        assert_eq!((store.snapshots.len(), store.interval()), (100, INTERVAL));
+    }
+
+    #[test]
+    fn the_first_snapshot_is_kept_and_one_too_large_beside_it_is_not() {
+        let mut store = SnapshotStore::new(1 << 20, INTERVAL);
+        store.insert(MonoNs(5), &noise(2 << 20, 1));
+        store.insert(MonoNs(6), &noise(2 << 20, 2));
+        assert_eq!(store.latest(MonoNs(9)), Some(MonoNs(5)));
+        assert_eq!(store.latest(MonoNs(4)), None);
+        assert_eq!(store.interval(), 2 * INTERVAL);
+    }
+}
