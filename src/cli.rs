@@ -1,18 +1,22 @@
 //! The command line.
 
-mod amounts;
+mod value_parsers;
 
 use std::path::PathBuf;
 
-use clap::{Args, Parser, Subcommand};
+use clap::{ArgAction, Args, Parser, Subcommand};
 use headrace_geometry::time::DurNs;
 use headrace_replay::log::Every;
 use headrace_sampling::layout::HeadLayout;
 use headrace_sensor::connect::Connect;
+use tracing::level_filters::LevelFilter;
 
-use crate::import::Kind;
-pub(crate) use amounts::time;
-use amounts::{every, stretch};
+use crate::import::kind::Kind;
+pub(crate) use value_parsers::{Speed, speed, time};
+use value_parsers::{
+    address, chainage, chainage_range, drift, hours, layout, length, place, rotation, seconds, seconds_range,
+    section, sound_speed, source_line, speed_mps, target, yaw,
+};
 
 /// What `replay --interactive` understands.
 pub(crate) const COMMANDS: &str =
@@ -24,6 +28,35 @@ pub(crate) const COMMANDS: &str =
 pub(crate) struct Cli {
     #[command(subcommand)]
     pub(crate) command: Command,
+    #[command(flatten)]
+    pub(crate) verbosity: Verbosity,
+}
+
+/// How much is logged on stderr.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Log messages, on stderr")]
+pub(crate) struct Verbosity {
+    /// Log ports, files, phases and their durations too; -vv logs everything.
+    ///
+    /// Without it only warnings and errors are logged. RUST_LOG sets the level (error, warn, info, debug, trace, off) by
+    /// crate or module: RUST_LOG=headrace_ports=debug,headrace_replay::log=trace.
+    #[arg(short, long, action = ArgAction::Count, global = true)]
+    verbose: u8,
+    /// Log errors only.
+    #[arg(short, long, global = true, conflicts_with = "verbose")]
+    quiet: bool,
+}
+
+impl Verbosity {
+    /// The level of this program's crates; `None` where nothing is asked for.
+    pub(crate) fn level(&self) -> Option<LevelFilter> {
+        match (self.quiet, self.verbose) {
+            (true, _) => Some(LevelFilter::ERROR),
+            (false, 0) => None,
+            (false, 1) => Some(LevelFilter::DEBUG),
+            (false, _) => Some(LevelFilter::TRACE),
+        }
+    }
 }
 
 #[derive(Debug, Subcommand)]
@@ -135,7 +168,7 @@ pub(crate) struct Run {
     pub(crate) record: Option<PathBuf>,
     /// Record in parts, each a log of its own (dive.part001.mcap for dive.mcap): a new one once there are so many bytes (1GiB,
     /// 500MB) or so much time (30min, 2h) in the last.
-    #[arg(long, value_name = "1GiB|30min", value_parser = every, conflicts_with = "no_record")]
+    #[arg(long, value_name = "1GiB|30min", value_parser = rotation, conflicts_with = "no_record")]
     pub(crate) rotate: Option<Every>,
     /// Write no log.
     #[arg(long, conflicts_with = "record")]
@@ -144,10 +177,10 @@ pub(crate) struct Run {
     #[arg(long, value_name = "ID,..", value_delimiter = ',')]
     pub(crate) require: Vec<String>,
     /// Seconds that a required sensor has until it runs.
-    #[arg(long, value_name = "SECONDS", default_value = "30", value_parser = moment, requires = "require")]
+    #[arg(long, value_name = "SECONDS", default_value = "30", value_parser = seconds, requires = "require")]
     pub(crate) require_within: f64,
     /// End the dive after so many seconds.
-    #[arg(long = "for", value_name = "SECONDS", value_parser = moment)]
+    #[arg(long = "for", value_name = "SECONDS", value_parser = seconds)]
     pub(crate) duration: Option<f64>,
     #[arg(long, value_name = "max|Nx", default_value = "1x", value_parser = speed, help = SPEED_HELP)]
     pub(crate) speed: Speed,
@@ -169,10 +202,10 @@ pub(crate) struct Emulate {
     #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1")]
     pub(crate) listen: std::net::IpAddr,
     /// Seconds for which the vehicle stands once all sensors are called: heads find their places.
-    #[arg(long, value_name = "SECONDS", default_value = "8", value_parser = moment)]
+    #[arg(long, value_name = "SECONDS", default_value = "8", value_parser = seconds)]
     pub(crate) stand: f64,
     /// Seconds for which the devices go on once the way has ended.
-    #[arg(long, value_name = "SECONDS", default_value = "5", value_parser = moment)]
+    #[arg(long, value_name = "SECONDS", default_value = "5", value_parser = seconds)]
     pub(crate) linger: f64,
 }
 
@@ -261,7 +294,7 @@ pub(crate) struct Trim {
     #[arg(long, value_name = "TIME", value_parser = time, conflicts_with = "chainage")]
     pub(crate) to: Option<DurNs>,
     /// While the vehicle was between these places, metres from the portal; the log is replayed to find out when.
-    #[arg(long, value_name = "FROM..TO", value_parser = stretch, allow_hyphen_values = true)]
+    #[arg(long, value_name = "FROM..TO", value_parser = chainage_range, allow_hyphen_values = true)]
     pub(crate) chainage: Option<[f64; 2]>,
     /// Without echo strengths, where a device's messages tell the range beside them; replays give the same results.
     #[arg(long)]
@@ -376,7 +409,7 @@ pub(crate) struct Plan {
     #[arg(long, value_name = "METRES", value_parser = target)]
     pub(crate) target: Option<f64>,
     /// Speed along the tunnel, m/s.
-    #[arg(long, value_name = "MPS", value_parser = metres_a_second, conflicts_with = "hours")]
+    #[arg(long, value_name = "MPS", value_parser = speed_mps, conflicts_with = "hours")]
     pub(crate) speed: Option<f64>,
     /// Hours for the whole length, one way.
     #[arg(long, value_name = "HOURS", value_parser = hours)]
@@ -409,13 +442,13 @@ pub(crate) struct Calibrate {
     #[arg(long, value_name = "FILE")]
     pub(crate) vehicle: Option<PathBuf>,
     /// From here on, in seconds from the log's first message.
-    #[arg(long, value_name = "SECONDS", value_parser = moment, default_value = "0")]
+    #[arg(long, value_name = "SECONDS", value_parser = seconds, default_value = "0")]
     pub(crate) from: f64,
     /// Up to here, in seconds from the log's first message; 1200 s at most, and as many without this.
-    #[arg(long, value_name = "SECONDS", value_parser = moment)]
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     pub(crate) to: Option<f64>,
     /// When the depth sensor was at the water's surface or above it, in seconds from the log's first message.
-    #[arg(long, value_name = "FROM..TO", value_parser = span)]
+    #[arg(long, value_name = "FROM..TO", value_parser = seconds_range)]
     pub(crate) at_surface: Option<[f64; 2]>,
     /// Where the vehicle truly stood still, metres from the portal.
     #[arg(long, value_name = "METRES", value_parser = chainage, allow_hyphen_values = true)]
@@ -461,95 +494,3 @@ pub(crate) struct Output {
 }
 
 const SPEED_HELP: &str = "Seconds of the dive for a second of yours, or max";
-
-/// How fast a dive is played; `None` is as fast as it can.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Speed(pub(crate) Option<f64>);
-
-pub(crate) fn speed(text: &str) -> Result<Speed, String> {
-    if text == "max" {
-        return Ok(Speed(None));
-    }
-    let number = text.strip_suffix('x').unwrap_or(text).parse::<f64>().ok();
-    number
-        .filter(|factor| (0.01..=10_000.0).contains(factor))
-        .map(|factor| Speed(Some(factor)))
-        .ok_or_else(|| "wanted is max, or a number from 0.01x to 10000x".to_owned())
-}
-
-fn address(text: &str) -> Result<Connect, String> {
-    match Connect::parse(text) {
-        Ok(connect @ (Connect::Tcp { .. } | Connect::Udp { .. })) => Ok(connect),
-        _ => Err("wanted is tcp:HOST:PORT or udp:HOST:PORT".to_owned()),
-    }
-}
-
-fn source_line(text: &str) -> Result<(String, String), String> {
-    let both = text.split_once('=').filter(|(id, line)| !id.is_empty() && !line.is_empty());
-    let both = both.map(|(id, line)| (id.to_owned(), line.to_owned()));
-    both.ok_or_else(|| "wanted is ID=LINE, a sensor's id and what it listens to: imu=can0".to_owned())
-}
-
-fn target(text: &str) -> Result<f64, String> {
-    within(text, "metres", 0.01, 20.0)
-}
-
-fn section(text: &str) -> Result<f64, String> {
-    within(text, "metres", 0.05, 10.0)
-}
-
-fn sound_speed(text: &str) -> Result<f64, String> {
-    within(text, "metres a second", 1300.0, 1700.0)
-}
-
-fn length(text: &str) -> Result<f64, String> {
-    within(text, "metres", 0.1, 1.0e5)
-}
-
-fn metres_a_second(text: &str) -> Result<f64, String> {
-    within(text, "metres a second", 0.001, 5.0)
-}
-
-fn hours(text: &str) -> Result<f64, String> {
-    within(text, "hours", 0.01, 10_000.0)
-}
-
-fn drift(text: &str) -> Result<f64, String> {
-    within(text, "metres", 0.0, 100.0)
-}
-
-fn yaw(text: &str) -> Result<f64, String> {
-    within(text, "degrees", 0.0, 80.0)
-}
-
-fn within(text: &str, unit: &str, least: f64, most: f64) -> Result<f64, String> {
-    let number = text.parse::<f64>().ok().filter(|number| (least..=most).contains(number));
-    number.ok_or_else(|| format!("wanted is a number of {unit} from {least} to {most}"))
-}
-
-fn moment(text: &str) -> Result<f64, String> {
-    within(text, "seconds", 0.0, 1.0e7)
-}
-
-fn span(text: &str) -> Result<[f64; 2], String> {
-    let both = text.split_once("..").and_then(|(from, to)| Some([moment(from).ok()?, moment(to).ok()?]));
-    both.filter(|[from, to]| from < to)
-        .ok_or_else(|| "wanted are two numbers of seconds, FROM..TO, the first one less".to_owned())
-}
-
-fn chainage(text: &str) -> Result<f64, String> {
-    within(text, "metres", -1000.0, 1.0e5)
-}
-
-fn place(text: &str) -> Result<[f64; 2], String> {
-    let number = |text: &str| within(text.trim(), "metres", -200.0, 200.0);
-    match text.split_once(',') {
-        Some((y, z)) => Ok([number(y)?, number(z)?]),
-        None => Err("wanted are two numbers of metres, y,z".to_owned()),
-    }
-}
-
-fn layout(text: &str) -> Result<HeadLayout, String> {
-    let known = HeadLayout::NAMES.iter().find(|(name, _)| *name == text);
-    known.map(|(_, layout)| *layout).ok_or_else(|| "wanted is phase_shift or sector_offset".to_owned())
-}

@@ -1,30 +1,27 @@
 //! The commands.
 
-use std::path::{Path, PathBuf};
-
 use headrace_config::Document;
-use headrace_config::Loader;
 use headrace_geometry::time::DurNs;
-use headrace_monitor::report::{LogReport, PartReport, Report};
 use headrace_replay::drive::Pace;
-use headrace_replay::log::format::VEHICLE_FILE;
-use headrace_replay::log::{LogInfo, file_digest, files_digest, files_of};
+use headrace_replay::log::files_of;
 use headrace_replay::player::{Player, SimulationFeed};
 use headrace_replay::simulate::{Scene, Simulation};
 use headrace_vehicle::VehicleConfig;
 use serde_json::json;
 
-use crate::cli::{Check, Demo, Output, Replay, Run};
+use crate::cli::{Check, Demo, Replay, Run};
 use crate::devices::KINDS;
-use crate::dive::{self, Clock, Recording, WhatIf, assemble};
+use crate::dive::{Clock, Recording, WhatIf, assemble};
 use crate::expect;
 use crate::failure::{self, Failure};
 use crate::files;
 use crate::live;
-use crate::output::{deliver, deliver_json, put, say};
+use crate::output::{deliver, put, say};
 use crate::play::Playing;
+use crate::report_output::{exit_code, finish, note_losses};
 use crate::smooth;
 use crate::summary::summary;
+use crate::vehicle_file;
 use crate::watch::Watch;
 
 /// Shows a simulated dive.
@@ -45,12 +42,12 @@ pub(crate) fn demo(args: &Demo) -> Result<u8, Failure> {
     files::write_json(&report_file, &report)?;
     put(&format!("\n{}", summary(&report)));
     say(&format!("report {}\nlog    {}  (headrace replay it)", report_file.display(), log.display()));
-    Ok(dive::exit_code(&report))
+    Ok(exit_code(&report))
 }
 
 /// The dive itself.
 pub(crate) fn run(args: &Run) -> Result<u8, Failure> {
-    let (text, vehicle) = vehicle_file(&args.vehicle)?;
+    let (text, vehicle) = vehicle_file::read(&args.vehicle)?;
     let Some(log) = &args.source else { return live::run(args, &text, &vehicle) };
     let mut player = Player::open(&files_of(std::slice::from_ref(log))?)?;
     let recording =
@@ -63,18 +60,18 @@ pub(crate) fn run(args: &Run) -> Result<u8, Failure> {
     let dive = assemble(&vehicle, &text, recording)?;
     player.connect(dive.armed.sources());
     let pace = Pace { speed: args.speed.0, ..Pace::default() };
-    let mut report = dive.run(&mut player, pace, &mut watch(&args.output))?;
+    let mut report = dive.run(&mut player, pace, &mut Watch::unless(args.output.json))?;
     note_losses(&mut report, log, &player)?;
     finish(&report, &args.output)
 }
 
 /// Runs a recorded dive through the loop.
 pub(crate) fn replay(args: &Replay) -> Result<u8, Failure> {
-    let (files, log) = (files_of(&args.logs)?, named(&args.logs));
+    let (files, log) = (files_of(&args.logs)?, files::first_named(&args.logs));
     let mut player = Player::open(&files)?;
     let (text, mut vehicle) = match &args.vehicle {
-        Some(path) => vehicle_file(path),
-        None => attached_vehicle(player.info(), &player.losses(), log),
+        Some(path) => vehicle_file::read(path),
+        None => vehicle_file::attached(player.info(), &player.losses(), log),
     }?;
     let what_if = what_if(args, &mut vehicle);
     let pace = Pace { tick: DurNs::from_millis(i64::from(args.tick_ms)), speed: args.speed.0 };
@@ -83,7 +80,7 @@ pub(crate) fn replay(args: &Replay) -> Result<u8, Failure> {
     } else {
         let dive = assemble(&vehicle, &text, None)?.asking(what_if);
         player.connect(dive.armed.sources());
-        let mut watch = watch(&args.output);
+        let mut watch = Watch::unless(args.output.json);
         if args.from.is_some() || args.interactive {
             let playing = Playing { from: args.from, interactive: args.interactive, pace };
             playing.play(dive, &mut player, &mut watch)?
@@ -115,7 +112,7 @@ fn what_if(args: &Replay, vehicle: &mut VehicleConfig) -> WhatIf {
 
 /// Says what a vehicle file describes.
 pub(crate) fn check(args: &Check) -> Result<u8, Failure> {
-    let (_, vehicle) = vehicle_file(&args.vehicle)?;
+    let (_, vehicle) = vehicle_file::read(&args.vehicle)?;
     let sensors = vehicle.sensor_configs.iter();
     if args.json {
         let list: Vec<_> =
@@ -152,86 +149,4 @@ pub(crate) fn check(args: &Check) -> Result<u8, Failure> {
         say("nothing is wrong with it");
     }
     Ok(failure::OK)
-}
-
-/// Reads and checks a vehicle file; gives its text too.
-pub(crate) fn vehicle_file(path: &Path) -> Result<(String, VehicleConfig), Failure> {
-    let text = files::read(path)?;
-    let vehicle = parse_vehicle(&path.display().to_string(), &text, &files::beside(path))?;
-    Ok((text, vehicle))
-}
-
-pub(crate) fn attached_vehicle(
-    info: &LogInfo,
-    losses: &[String],
-    log: &Path,
-) -> Result<(String, VehicleConfig), Failure> {
-    let text = info.vehicle_toml.clone().ok_or_else(|| {
-        let damage =
-            losses.first().map(|loss| format!(" can be read from this log, which is damaged ({loss})"));
-        let which = damage.unwrap_or_else(|| " is attached to this log".to_owned());
-        Failure::Usage(format!("reading {}: no vehicle file{which}; give one with --vehicle", log.display()))
-    })?;
-    // As if the log were a folder.
-    let vehicle = parse_vehicle(
-        &format!("{}/{VEHICLE_FILE}", log.display()),
-        &text,
-        &files::attached(&info.attachments),
-    )?;
-    Ok((text, vehicle))
-}
-
-fn parse_vehicle(name: &str, text: &str, load: Loader<'_>) -> Result<VehicleConfig, Failure> {
-    Ok(VehicleConfig::parse(Document::new(name, text), &KINDS, load)?)
-}
-
-pub(crate) fn watch(output: &Output) -> Watch {
-    if output.json { Watch::quiet() } else { Watch::loud() }
-}
-
-/// The log as a person has named it: the first of several files.
-pub(crate) fn named(logs: &[PathBuf]) -> &Path {
-    logs.first().map_or(Path::new(""), PathBuf::as_path)
-}
-
-/// Adds to the report what the log read from is, and what of it was lost.
-fn note_losses(report: &mut Report, path: &Path, player: &Player) -> Result<(), Failure> {
-    let recorded = report.log.take();
-    let mut losses = player.losses();
-    losses.extend(recorded.into_iter().flat_map(|log| log.losses));
-    let files: Vec<_> = player.files().iter().map(|file| (file.path.as_path(), file.messages)).collect();
-    let paths: Vec<&Path> = files.iter().map(|(path, _)| *path).collect();
-    report.log = Some(LogReport {
-        path: path.display().to_string(),
-        sha256: files_digest(&paths)?,
-        messages: player.played(),
-        losses,
-        notes: player.notes(),
-        parts: parts(path, &files)?,
-    });
-    Ok(())
-}
-
-/// The files of a log, where it isn't just the one that was named.
-pub(crate) fn parts(named: &Path, files: &[(&Path, u64)]) -> Result<Vec<PartReport>, Failure> {
-    if matches!(files, [(only, _)] if *only == named) {
-        return Ok(Vec::new());
-    }
-    let part = |&(path, messages): &(&Path, u64)| {
-        let sha256 = file_digest(path)?;
-        Ok(PartReport { path: path.display().to_string(), sha256, messages })
-    };
-    files.iter().map(part).collect()
-}
-
-pub(crate) fn finish(report: &Report, output: &Output) -> Result<u8, Failure> {
-    if let Some(path) = &output.report {
-        files::write_json(path, report)?;
-    }
-    if output.json {
-        deliver_json(report)?;
-    } else {
-        put(&summary(report));
-    }
-    Ok(dive::exit_code(report))
 }

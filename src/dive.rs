@@ -19,9 +19,10 @@ use headrace_replay::view::{Site, View};
 use headrace_sensor::device::Sense;
 use headrace_vehicle::VehicleConfig;
 
-use crate::commands::parts;
-use crate::failure::{self, Failure};
+use crate::failure::Failure;
+use crate::phase::Phase;
 use crate::progress::Progress;
+use crate::report_output::parts;
 use crate::watch::Watch;
 
 /// Notices that may wait for the terminal; a tick of 20 ms has a handful. Each slot is some 400 bytes, and all are
@@ -81,7 +82,7 @@ pub(crate) fn assemble(
 pub(crate) fn assemble_kept(vehicle: &VehicleConfig) -> Result<Dive, Failure> {
     let (mut app, notices) = app(vehicle)?;
     app.keep_results();
-    let armed = app.arm(vehicle.navigation())?;
+    let armed = arm(app, vehicle, vehicle.navigation())?;
     Ok(Dive { armed, notices, recorder: None, what_if: WhatIf::default() })
 }
 
@@ -112,7 +113,25 @@ pub(crate) fn assemble_with(
             Some((path.to_owned(), handle))
         }
     };
-    Ok(Dive { armed: app.arm(navigation)?, notices, recorder, what_if: WhatIf::default() })
+    Ok(Dive { armed: arm(app, vehicle, navigation)?, notices, recorder, what_if: WhatIf::default() })
+}
+
+/// Arms the loop, which allocates all that it will need.
+fn arm(app: App, vehicle: &VehicleConfig, navigation: Box<dyn Navigation>) -> Result<Loop, Failure> {
+    let armed = app.arm(navigation)?;
+    if tracing::enabled!(tracing::Level::INFO) {
+        let ring_bytes: usize = vehicle.sensors.iter().map(|sensor| sensor.specification().ring_bytes).sum();
+        let (sensors, resident_kib) = (vehicle.sensors.len(), resident_kib());
+        tracing::info!(sensors, ring_bytes, resident_kib, "loop armed");
+    }
+    Ok(armed)
+}
+
+/// Resident memory of this process, KiB; `None` where the system doesn't tell.
+fn resident_kib() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;
+    line.split_whitespace().next()?.parse().ok()
 }
 
 /// The vehicle's sensors, and the way out to the terminal.
@@ -201,6 +220,7 @@ impl Dive {
         beside: &mut dyn FnMut(&Loop),
     ) -> Result<Report, Failure> {
         let notices = self.notices.clone();
+        let phase = Phase::start("replay");
         let mut progress = Progress::start();
         let driven = drive(&mut self.armed, feed, pace, &mut |dive| {
             if watch.is_quiet() {
@@ -213,6 +233,7 @@ impl Dive {
             beside(dive);
         });
         drop(progress);
+        drop(phase);
         let report = self.end(watch, beside)?;
         driven?;
         Ok(report)
@@ -225,7 +246,9 @@ impl Dive {
         direct: impl FnOnce(&mut Loop, &NoticeReceiver, &mut Watch) -> Result<(), Failure>,
     ) -> Result<Report, Failure> {
         let notices = self.notices.clone();
+        let phase = Phase::start("playback");
         let played = direct(&mut self.armed, &notices, watch);
+        drop(phase);
         let report = self.end(watch, &mut |_| ())?;
         played?;
         Ok(report)
@@ -241,6 +264,7 @@ impl Dive {
         beside: &mut dyn FnMut(&Crew, &mut Watch),
     ) -> Result<Report, Failure> {
         let notices = self.notices.clone();
+        let phase = Phase::start("dive");
         crew.run(&mut self.armed, ended, &mut |dive| {
             while let Some(notice) = notices.next() {
                 watch.notice(&notice, dive);
@@ -248,6 +272,7 @@ impl Dive {
             beside(&crew, watch);
         });
         let histories = crew.stop(&mut self.armed, &mut |_| ());
+        drop(phase);
         while let Some(notice) = notices.next() {
             watch.notice(&notice, &self.armed);
         }
@@ -270,6 +295,7 @@ impl Dive {
 
     /// Ends the dive and gives the report.
     fn end(mut self, watch: &mut Watch, beside: &mut dyn FnMut(&Loop)) -> Result<Report, Failure> {
+        let _phase = Phase::start("report");
         self.armed.finish(&mut |notice, dive| watch.notice(notice, dive));
         // While there still are samples.
         let what_if = self.armed.what_if(&self.what_if.targets_m, &self.what_if.sections_m);
@@ -326,15 +352,4 @@ fn unrecorded(written: &Summary) -> Vec<String> {
 fn left_out(left: LeftOut) -> String {
     let span = left.span.map(|(from, to)| format!(", {} to {}", seconds(from), seconds(to)));
     format!("{}{}", left.words(), span.unwrap_or_default())
-}
-
-/// The exit code that a finished dive deserves.
-pub(crate) fn exit_code(report: &Report) -> u8 {
-    if report.lost_data() {
-        failure::DATA_LOST
-    } else if report.dive.sonar {
-        failure::OK
-    } else {
-        failure::FAILED
-    }
 }

@@ -14,6 +14,11 @@ pub(crate) const DEMO_SCENE: (&str, &str) =
 const DEMO_VEHICLE: (&str, &str) =
     ("../vehicles/vita2-4.toml", include_str!("../deploy/vehicles/vita2-4.toml"));
 
+/// The first of the logs named on the command line; messages name it for all of them.
+pub(crate) fn first_named(logs: &[PathBuf]) -> &Path {
+    logs.first().map_or(Path::new(""), PathBuf::as_path)
+}
+
 /// Reads a text file.
 pub(crate) fn read(path: &Path) -> Result<String, Failure> {
     std::fs::read_to_string(path).map_err(|source| Failure::Read { path: path.to_owned(), source })

@@ -13,10 +13,10 @@ use headrace_sensor::driver::DriverSetup;
 use headrace_vehicle::VehicleConfig;
 
 use crate::cli::Run;
-use crate::commands::{finish, watch};
 use crate::dive::{Clock, Dive, Recording, assemble};
 use crate::failure::Failure;
 use crate::output::say;
+use crate::report_output::finish;
 use crate::watch::Watch;
 
 /// The dive itself.
@@ -30,7 +30,7 @@ pub(crate) fn run(args: &Run, text: &str, vehicle: &VehicleConfig) -> Result<u8,
     let crew = crew(&mut dive, vehicle, begun)?;
     let interrupted = interrupts()?;
     let until = args.duration.map(|seconds| begun + DurNs::from_secs_f64(seconds));
-    let mut watch = watch(&args.output);
+    let mut watch = Watch::unless(args.output.json);
     if !watch.is_quiet() {
         let where_to = match (args.no_record, args.rotate) {
             (true, _) => "not recorded".to_owned(),

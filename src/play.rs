@@ -16,6 +16,7 @@ use headrace_replay::snapshot_store::SnapshotStore;
 use crate::cli::{COMMANDS, speed, time};
 use crate::dive::Dive;
 use crate::failure::Failure;
+use crate::phase::Phase;
 use crate::watch::Watch;
 
 /// Work between two snapshots: with the time to restore one, a jump takes well under a second.
@@ -43,6 +44,7 @@ impl Playing {
             let mut playback = Playback::new(armed, player, store, pace)?;
             screen.begun = playback.begun();
             if let Some(from) = from {
+                let _phase = Phase::start("seek");
                 playback.seek(screen.begun + from, &mut screen)?;
             }
             if interactive {

@@ -3,57 +3,84 @@
 use std::io::{IsTerminal, Write};
 use std::time::{Duration, Instant};
 
+use crate::transient;
+
 const AFTER: Duration = Duration::from_secs(1);
 const EVERY: Duration = Duration::from_millis(200);
 /// Calls between two looks at the clock.
 const CALLS: u32 = 1000;
 
-/// Shows progress as a line that overwrites itself, and removes it at the end.
+/// Progress is logged at this interval at most.
+const LOG_EVERY: Duration = Duration::from_secs(5);
+
+/// Shows progress as a line that overwrites itself, and removes it at the end; and logs it.
 pub(crate) struct Progress {
     terminal: bool,
     started: Instant,
     shown: Option<Instant>,
+    logged: Duration,
     calls: u32,
 }
 
 impl Progress {
     #[expect(clippy::disallowed_methods, reason = "progress is for people; no result depends on it")]
     pub(crate) fn start() -> Self {
-        Self { terminal: std::io::stderr().is_terminal(), started: Instant::now(), shown: None, calls: 0 }
+        Self {
+            terminal: std::io::stderr().is_terminal(),
+            started: Instant::now(),
+            shown: None,
+            logged: Duration::ZERO,
+            calls: 0,
+        }
     }
 
     /// `words` is called only when the line is due.
     pub(crate) fn at(&mut self, words: impl FnOnce() -> String) {
         self.calls += 1;
-        if !self.terminal || !self.calls.is_multiple_of(CALLS) || self.started.elapsed() < AFTER {
+        if !self.calls.is_multiple_of(CALLS) {
             return;
         }
-        if self.shown.is_some_and(|shown| shown.elapsed() < EVERY) {
+        let elapsed = self.started.elapsed();
+        let logs = elapsed - self.logged >= LOG_EVERY && tracing::enabled!(tracing::Level::DEBUG);
+        let shows =
+            self.terminal && elapsed >= AFTER && self.shown.is_none_or(|shown| shown.elapsed() >= EVERY);
+        if !logs && !shows {
             return;
         }
-        self.show(&words());
+        let words = words();
+        if logs {
+            self.logged = elapsed;
+            tracing::debug!("{words}");
+        }
+        if shows {
+            self.show(&words);
+        }
     }
 
     /// Shows the next of a few long steps.
     pub(crate) fn step(&mut self, words: &str) {
+        tracing::info!("{words}");
         if self.terminal {
             self.show(words);
         }
     }
 
     fn show(&mut self, words: &str) {
-        eprint!("\r\x1b[K{words}");
-        if std::io::stderr().flush().is_err() {
+        let mut stderr = std::io::stderr().lock();
+        let written = stderr.write_all(transient::CLEAR).and_then(|()| stderr.write_all(words.as_bytes()));
+        if written.and_then(|()| stderr.flush()).is_err() {
             self.terminal = false;
         }
+        transient::shown();
         self.shown = Some(self.started + self.started.elapsed());
     }
 }
 
 impl Drop for Progress {
     fn drop(&mut self) {
-        if self.shown.is_some() {
-            eprint!("\r\x1b[K");
+        if self.shown.is_some() && transient::take() {
+            // A terminal that has gone away needs no clearing.
+            std::io::stderr().write_all(transient::CLEAR).ok();
         }
     }
 }

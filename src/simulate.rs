@@ -19,6 +19,7 @@ use crate::dive::log_header;
 use crate::failure::{self, Failure};
 use crate::files;
 use crate::output::{append, deliver, put, say};
+use crate::phase::Phase;
 use crate::progress::Progress;
 
 /// Turns a scene into a log, or explains what it would simulate.
@@ -38,6 +39,7 @@ pub(crate) fn simulate(args: &Simulate) -> Result<u8, Failure> {
         if args.truth.is_some() { Simulation::with_truth(&scene)? } else { Simulation::new(&scene)? };
     let mut truth = args.truth.as_deref().map(|path| Truth::create(path, &scene, &simulation)).transpose()?;
     let mut writer = LogWriter::create(output, &log_header(&scene.vehicle, &scene.vehicle_text, false))?;
+    let _phase = Phase::start("simulate");
     let mut progress = Progress::start();
     let duration_s = simulation.duration_s();
     while let Some(message) = simulation.next_message() {

@@ -18,6 +18,7 @@ use headrace_vehicle::VehicleConfig;
 
 use crate::dive::{WhatIf, assemble_with};
 use crate::failure::Failure;
+use crate::phase::Phase;
 use crate::watch::Watch;
 
 /// Records that may wait: a tick has a minute at most, ten epochs a second, and up to three records of each.
@@ -46,13 +47,18 @@ pub(crate) fn smoothed(
     let mut first = Player::open(files)?;
     first.connect(dive.armed.sources());
     let mut consistency = [None; MAX_SOURCES];
+    let forward = Phase::start("forward pass");
     let before = dive.run_beside(&mut first, pace, &mut Watch::quiet(), &mut |dive| {
         steps.take();
         consistency = consistencies(dive);
     })?;
+    drop(forward);
+    let backward = Phase::start("backward pass");
     let records = steps.records();
     let track = steps.smooth(settings)?;
     tracing::debug!(records, pieces = track.pieces(), dropped = reader.dropped(), "smoothed");
+    drop(backward);
+    let _judging = Phase::start("pass along the smoothed track");
     let (estimates, pieces) = (track.len() as u64, track.pieces() as u64);
     let dive = assemble_with(vehicle, Box::new(TrackNavigation::new(track, consistency)), text, None)?
         .asking(what_if);

@@ -1,9 +1,8 @@
 //! The end of a dive in words.
 
-use headrace_monitor::report::{Report, ReturnReport, RunReport};
+use headrace_monitor::pilot_text::{action_text, cause_text, station};
+use headrace_monitor::report::{Report, RunReport};
 use headrace_monitor::smoothing::{ChangeReport, JudgedReport, SmoothingReport};
-
-use headrace_monitor::words::station;
 
 /// The report in a few lines.
 pub(crate) fn summary(report: &Report) -> String {
@@ -77,41 +76,25 @@ pub(crate) fn summary(report: &Report) -> String {
     text
 }
 
-/// What is still missed, a line each, with what to do about it on the way home.
+/// The stretches that are still missed along the tunnel, a line each, with what to do about them on the way home.
 fn missed(report: &Report) -> Vec<String> {
     let open = report.runs.iter().filter(|run| run.cleared_s.is_none());
     let mut open: Vec<_> = open.collect();
     open.sort_by(|a, b| a.start_m.total_cmp(&b.start_m));
     let line = |run: &&RunReport| {
+        let cause = run.figures.as_ref().map_or_else(|| run.cause.as_str().to_owned(), cause_text);
         let back = report.way_home.iter().find(|back| back.run == run.id);
+        let action =
+            back.map(|back| format!("; {}", action_text(back.action, run.start_m, back.at_most_mps)));
         format!(
-            "  missed ch {} to {}: {}, holes up to {:.2} m{}",
+            "  missed ch {} to {}: {cause}, holes up to {:.2} m{}",
             station(run.start_m),
             station(run.end_m),
-            run.cause,
             run.hole_m,
-            back.map_or_else(String::new, what_to_do)
+            action.unwrap_or_default()
         )
     };
     open.iter().map(line).collect()
-}
-
-fn what_to_do(back: &ReturnReport) -> String {
-    let how = match back.action {
-        "slower" => "",
-        "finer_mode" => "in a finer mode, ",
-        "longer_range" => "with a longer range, ",
-        "other_side" => "turned or rolled, ",
-        "middle" => "in the middle and steady, ",
-        "in_phase" => "heads in phase, ",
-        "head" => "with that head mended or without it, ",
-        "position" => "with a position, ",
-        _ => "from end to end, ",
-    };
-    match back.at_most_mps {
-        at_most_mps if at_most_mps > 0.0 => format!("; again {how}at most {at_most_mps:.2} m/s"),
-        _ => format!("; again {how}at another speed, mode or target"),
-    }
 }
 
 /// What smoothing changed: metres by verdict, and a line for each run of neighbouring sections with the same change.

@@ -10,10 +10,11 @@ use headrace_replay::verify::{Difference, Verified, Verifier, What};
 use serde_json::{Value, json};
 
 use crate::cli::Verify;
-use crate::commands::{attached_vehicle, named, vehicle_file};
 use crate::dive::assemble_kept;
 use crate::failure::{self, Failure};
+use crate::files;
 use crate::output::{deliver, say};
+use crate::vehicle_file;
 use crate::watch::Watch;
 
 /// Replays a log and compares.
@@ -21,8 +22,8 @@ pub(crate) fn verify(args: &Verify) -> Result<u8, Failure> {
     let files = files_of(&args.logs)?;
     let mut player = Player::open(&files)?;
     let (_, vehicle) = match &args.vehicle {
-        Some(path) => vehicle_file(path),
-        None => attached_vehicle(player.info(), &player.losses(), named(&args.logs)),
+        Some(path) => vehicle_file::read(path),
+        None => vehicle_file::attached(player.info(), &player.losses(), files::first_named(&args.logs)),
     }?;
     let dive = assemble_kept(&vehicle)?;
     let sources: Vec<SourceInfo> = dive.armed.sources().to_vec();

@@ -7,12 +7,13 @@ use headrace_coverage::{Run, RunChange, RunId, Section, Sections, Verdict};
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::advice_log::AdviceEntry;
 use headrace_monitor::messages::Notice;
+use headrace_monitor::pilot_text::{Missed, advice_text, alert_text, cleared_text, flag_text, station};
 use headrace_monitor::run::Loop;
-use headrace_monitor::words::{Missed, advice_words, alert_words, cleared_words, flag_words, station};
 use headrace_ports::{Phase, Status};
 use headrace_vehicle::Mission;
 
 use crate::output::{put, say};
+use crate::transient;
 
 /// How often the state is shown where lines can't be overwritten, in the dive's own time.
 const LINE_EVERY: DurNs = DurNs(10_000_000_000);
@@ -49,6 +50,11 @@ impl Watch {
         Self { quiet: true, ..Self::loud() }
     }
 
+    /// Shows nothing when the output is JSON, which is for programs.
+    pub(crate) fn unless(json: bool) -> Self {
+        if json { Self::quiet() } else { Self::loud() }
+    }
+
     /// Whether nothing is shown.
     pub(crate) fn is_quiet(&self) -> bool {
         self.quiet
@@ -65,7 +71,7 @@ impl Watch {
             Notice::Run { id, change, .. } => self.run(*id, *change, dive),
             Notice::Alert(kind) => {
                 if let Some(alert) = dive.alerts().get(*kind) {
-                    self.line(&format!("ALERT    {}", alert_words(alert.kind, alert.x_m, alert.worst_m)));
+                    self.line(&format!("ALERT    {}", alert_text(alert.kind, alert.x_m, alert.worst_m)));
                 }
             }
         }
@@ -116,13 +122,14 @@ impl Watch {
         let line = format!(
             "{place:<14} {:5.2} m/s   {}",
             entry.speed_mps,
-            advice_words(&entry.into(), &mission.profile)
+            advice_text(&entry.into(), &mission.profile)
         );
         if self.terminal {
             let advice = &entry.advice;
             let wrong = advice.will_exceed || advice.predicted_t_m.is_none();
             let colour = if wrong { "\x1b[33m" } else { "\x1b[32m" };
             put(&format!("\r\x1b[K{colour}{line}\x1b[0m"));
+            transient::shown();
             self.status_open = true;
         } else {
             say(&line);
@@ -153,7 +160,7 @@ impl Watch {
                 // What has only turned out to have another cause is told as that.
                 if !(run.from..run.to).filter_map(|index| sections.get(index)).any(Section::is_flagged) {
                     let (from_m, to_m) = (sections.bounds_m(run.from).0, sections.bounds_m(run.to - 1).1);
-                    self.line(&cleared_words(from_m, to_m));
+                    self.line(&cleared_text(from_m, to_m));
                 }
             }
             RunChange::Changed | RunChange::Merged => {}
@@ -170,7 +177,7 @@ impl Watch {
             target_m: sections.target_m(),
             v_max_mps: self.v_max_mps,
         };
-        self.line(&format!("FLAG     {}", flag_words(&missed, &dive.mission().profile)));
+        self.line(&format!("FLAG     {}", flag_text(&missed, &dive.mission().profile)));
     }
 
     /// Says how far the run went, once that is known.
@@ -195,7 +202,10 @@ impl Watch {
 
     fn close_status(&mut self) {
         if self.status_open {
-            say("");
+            // A log message has cleared it already.
+            if transient::take() {
+                say("");
+            }
             self.status_open = false;
         }
     }

@@ -188,7 +188,7 @@ fn a_vehicle_file_is_held_against_what_is_there() {
     std::fs::write(&file, vehicle_text(&there)).unwrap();
     let (code, told, _) = headrace(&["--vehicle", path]);
     assert_eq!(code, Some(0), "{told}");
-    assert!(told.contains(": there, /dev/pts/") && told.contains("only run and --probe can tell"), "{told}");
+    assert!(told.contains(": present, /dev/pts/") && told.contains("not probed (--probe)"), "{told}");
     let (code, told, _) = headrace(&["--vehicle", path, "--probe"]);
     assert_eq!(code, Some(0), "{told}");
     assert!(told.contains("Imagenex 881 family or 852 sounder, head_id = 0x12"), "{told}");

@@ -6,29 +6,14 @@ use headrace_geometry::math;
 use svg::node::element;
 use svg::{Document, Node};
 
+use super::colour::{BLACK, Colour, DIM, WHITE};
 use super::look::{Look, Marker};
-use super::polyline;
-
-/// A place on the sheet: to the right and down, pixels.
-pub type Px = [f64; 2];
+use super::polyline::{self, Px};
 
 /// Usual width and height of a sheet, pixels.
 pub const SIZE_PX: [u32; 2] = [900, 560];
 /// Mean width of a letter of the usual fonts, plain and bold, as a share of their size; rather too wide.
 const LETTER: [f64; 2] = [0.56, 0.65];
-
-/// A colour as red, green and blue.
-#[derive(Debug, Clone, Copy)]
-pub struct Colour(pub u8, pub u8, pub u8);
-
-/// Text and the main curves.
-pub const BLACK: Colour = Colour(0, 0, 0);
-/// Small text, axes, targets.
-pub const DIM: Colour = Colour(85, 85, 85);
-/// Leaders from labels, what is hidden.
-pub const PALE: Colour = Colour(150, 150, 150);
-/// The paper.
-pub const WHITE: Colour = Colour(255, 255, 255);
 
 /// Where a text stands with respect to its place.
 #[derive(Debug, Clone, Copy)]

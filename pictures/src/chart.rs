@@ -2,9 +2,11 @@
 
 use headrace_geometry::math;
 
-use super::canvas::{BLACK, BOLD, Canvas, Colour, Letters, NORMAL, Px, SMALL, Side};
+use super::canvas::{BOLD, Canvas, Letters, NORMAL, SMALL, Side};
+use super::colour::{BLACK, Colour};
 use super::look::{AXIS, GRID, Look};
 use super::polyline::Frame;
+use super::polyline::Px;
 
 /// Length of the mark at a number, pixels.
 const TICK_PX: f64 = 4.0;

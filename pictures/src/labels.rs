@@ -1,8 +1,9 @@
 //! Labels at the ends of curves, moved apart where they would cover each other.
 
-use super::canvas::{Canvas, Letters, NORMAL, Px, Side, width_px};
+use super::canvas::{Canvas, Letters, NORMAL, Side, width_px};
 use super::look::{LEADER, Look};
 use super::polyline::Frame;
+use super::polyline::Px;
 
 /// Height of a line of text, pixels.
 const LINE_PX: f64 = 16.0;

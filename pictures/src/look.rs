@@ -1,6 +1,6 @@
 //! How lines and markers look: never by colour alone.
 
-use super::canvas::{BLACK, Colour, DIM, PALE};
+use super::colour::{BLACK, Colour, DIM, PALE};
 
 /// The colours of Okabe and Ito, which most colour-blind people tell apart, without those too pale for lines.
 const BLUE: Colour = Colour(0, 114, 178);

@@ -2,7 +2,8 @@
 
 use headrace_geometry::math;
 
-use super::canvas::Px;
+/// A place on the sheet: to the right and down, pixels.
+pub type Px = [f64; 2];
 
 /// How far a thinned line may be from the one it stands for, pixels.
 const THINNED_PX: f64 = 0.1;

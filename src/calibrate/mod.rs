@@ -1,12 +1,13 @@
 //! `headrace calibrate`: a log through the loop, and what its readings tell of the vehicle file.
 
+mod findings;
 mod hear;
 mod table;
 mod words;
 
 use headrace_calibration::heads::{Heads, heads};
 use headrace_calibration::still::longest;
-use headrace_calibration::timing::{Lag, lags};
+use headrace_calibration::timing::lags;
 use headrace_calibration::zero::{self, Zero};
 use headrace_calibration::{Material, Untold};
 use headrace_fusion::filter::settings::Settings;
@@ -18,30 +19,21 @@ use headrace_vehicle::NavigationConfig;
 use headrace_vehicle::VehicleConfig;
 
 use crate::cli::Calibrate;
-use crate::commands::{attached_vehicle, vehicle_file};
 use crate::dive::assemble;
 use crate::failure::{self, Failure};
 use crate::output::{deliver, put};
 use crate::progress::Progress;
+use crate::vehicle_file;
+use findings::Findings;
 use hear::Heard;
 use table::Table;
-
-/// What each estimator said.
-struct Findings {
-    heads: Result<Heads, Untold>,
-    surface: Result<Zero, Untold>,
-    level: Result<Zero, Untold>,
-    /// With what the file says.
-    tethers: Result<Vec<(Zero, f64)>, Untold>,
-    lags: Result<Vec<Lag>, Untold>,
-}
 
 /// Finds what a log tells of the vehicle file.
 pub(crate) fn calibrate(args: &Calibrate) -> Result<u8, Failure> {
     let mut player = Player::open(&files_of(std::slice::from_ref(&args.log))?)?;
     let (text, vehicle) = match &args.vehicle {
-        Some(path) => vehicle_file(path),
-        None => attached_vehicle(player.info(), &player.losses(), &args.log),
+        Some(path) => vehicle_file::read(path),
+        None => vehicle_file::attached(player.info(), &player.losses(), &args.log),
     }?;
     let dive = assemble(&vehicle, &text, None)?;
     player.connect(dive.armed.sources());

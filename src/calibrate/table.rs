@@ -6,7 +6,7 @@ use headrace_calibration::{Estimate, Untold};
 use headrace_sampling::head::faces_aft;
 use headrace_vehicle::VehicleConfig;
 
-use super::Findings;
+use super::findings::Findings;
 
 /// A value in the unit of its row.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -3,7 +3,7 @@
 use headrace_vehicle::VehicleConfig;
 use serde_json::{Value as Json, json};
 
-use super::Findings;
+use super::findings::Findings;
 use super::hear::Heard;
 use super::table::{Found, Table, Value};
 use crate::cli::Calibrate;

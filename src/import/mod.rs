@@ -1,6 +1,7 @@
 //! `import`: a foreign log becomes one of ours.
 
 mod imagenex;
+pub(crate) mod kind;
 mod ping;
 mod ros;
 mod takers;
@@ -23,31 +24,13 @@ use headrace_vehicle::VehicleConfig;
 use serde_json::json;
 
 use crate::cli;
-use crate::commands::vehicle_file;
 use crate::dive::log_header;
 use crate::failure::{self, Failure};
 use crate::files;
 use crate::output::{deliver, say};
 use crate::progress::Progress;
-
-/// A kind of foreign log.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-pub(crate) enum Kind {
-    /// Telemetry log of MAVLink.
-    Tlog,
-    /// Text of `candump -l` or `-L`.
-    Candump,
-    /// File of the software of Imagenex 881 and 852.
-    Imagenex,
-    /// Log of Ping Viewer.
-    Ping,
-    /// Table of values, with --map.
-    Csv,
-    /// Bag of ROS 1.
-    Rosbag,
-    /// Recording of ROS 2 (or 1) in MCAP.
-    Mcap,
-}
+use crate::vehicle_file;
+use kind::Kind;
 
 /// Imports a foreign log.
 pub(crate) fn import(args: &cli::Import) -> Result<u8, Failure> {
@@ -55,7 +38,7 @@ pub(crate) fn import(args: &cli::Import) -> Result<u8, Failure> {
         Some(kind) => kind,
         None => Kind::of(&args.file)?,
     };
-    let vehicle = args.vehicle.as_deref().map(vehicle_file).transpose()?;
+    let vehicle = args.vehicle.as_deref().map(vehicle_file::read).transpose()?;
     let mut header = match &vehicle {
         Some((text, vehicle)) => log_header(vehicle, text, false),
         None => LogHeader {
@@ -206,27 +189,6 @@ impl Kind {
                      --format tlog|candump|imagenex|ping|csv|rosbag|mcap says it for any name";
                 Err(named(path, &format!("importing {}: {problem}", path.display())))
             }
-        }
-    }
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::Tlog => "tlog",
-            Self::Candump => "candump",
-            Self::Imagenex => "imagenex",
-            Self::Ping => "ping",
-            Self::Csv => "csv",
-            Self::Rosbag => "rosbag",
-            Self::Mcap => "mcap",
-        }
-    }
-
-    /// What one of its entries is called.
-    fn entries(self) -> &'static str {
-        match self {
-            Self::Tlog | Self::Candump => "frame",
-            Self::Imagenex => "shot",
-            Self::Ping | Self::Csv | Self::Rosbag | Self::Mcap => "message",
         }
     }
 }

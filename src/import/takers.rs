@@ -8,7 +8,8 @@ use headrace_sensor::device::DeviceKind as _;
 use headrace_sensor::driver::DriverSetup;
 use headrace_vehicle::VehicleConfig;
 
-use super::{Kind, imagenex, ping, tlog};
+use super::kind::Kind;
+use super::{imagenex, ping, tlog};
 use crate::failure::Failure;
 
 /// The sensors that listen, by the vehicle file and what was said besides.

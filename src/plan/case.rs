@@ -16,10 +16,10 @@ use headrace_sensor::device::Device;
 use headrace_vehicle::TunnelConfig;
 
 use crate::cli::Plan;
-use crate::commands::vehicle_file;
 use crate::devices::KINDS;
 use crate::failure::Failure;
 use crate::files;
+use crate::vehicle_file;
 
 /// The heads that are planned with when no vehicle file names any.
 const USUAL_HEAD: &str = "imagenex881";
@@ -72,7 +72,7 @@ impl Case {
         question: Question,
         args: &Plan,
     ) -> Result<Self, Failure> {
-        let (_, vehicle) = vehicle_file(path)?;
+        let (_, vehicle) = vehicle_file::read(path)?;
         let question = Question { target_m: question.target_m.or(Some(vehicle.target_m)), ..question };
         let configs = vehicle.sensors.iter().zip(&vehicle.sensor_configs);
         let ids = configs.filter(|(sensor, _)| sensor.head().is_some()).map(|(_, config)| config.id.clone());

@@ -2,13 +2,14 @@
 
 mod case;
 mod csv;
+mod findings;
 mod pictures;
 mod table;
 
 use std::path::Path;
 
 use headrace_sampling::SamplingError;
-use headrace_sampling::plan::{Answer, Briefing, Planner, Question};
+use headrace_sampling::plan::{Answer, Planner};
 use serde_json::json;
 
 use crate::cli::Plan;
@@ -16,24 +17,8 @@ use crate::failure::{self, Failure};
 use crate::files;
 use crate::output::{deliver, put, say};
 use case::Case;
+use findings::{Findings, printed_mps};
 use pictures::Shown;
-
-/// Everything that one run of the command has found.
-struct Findings {
-    planner: Planner,
-    /// Ids of the heads.
-    heads: Vec<String>,
-    tunnel: String,
-    /// The range setting, m.
-    range_m: f64,
-    /// The shortest and the longest stretch of perimeter that a beam covers, m.
-    footprints_m: [f64; 2],
-    question: Question,
-    answers: Vec<Answer>,
-    /// The mode that briefing and pictures are for, with its speed; `None` where no mode gives one.
-    shown: Option<(usize, f64)>,
-    briefing: Briefing,
-}
 
 /// Plans an inspection.
 pub(crate) fn plan(args: &Plan) -> Result<u8, Failure> {
@@ -76,12 +61,6 @@ fn find(case: Case, args: &Plan) -> Result<Findings, Failure> {
     let briefing = planner.briefing(mode, speed_mps)?;
     let footprints_m = planner.footprints_m()?;
     Ok(Findings { planner, heads, tunnel, range_m, footprints_m, question, answers, shown, briefing })
-}
-
-/// A speed as it is printed: whole millimetres a second, rounded down, so that what is printed meets the target, too.
-fn printed_mps(speed_mps: f64) -> f64 {
-    let down = (speed_mps * 1000.0 + 1e-6).floor() / 1000.0;
-    if down > 0.0 { down } else { speed_mps }
 }
 
 /// Whether what was asked for can be had in a mode.

@@ -4,7 +4,7 @@ use headrace_sampling::head::Basis;
 use headrace_sampling::layout::HeadLayout;
 use headrace_sampling::plan::{Answer, Briefing, Heard, Spacing, ThinStrip};
 
-use super::{Findings, printed_mps};
+use super::findings::{Findings, printed_mps};
 
 /// The plan in words and a table.
 pub(super) fn table(findings: &Findings) -> String {

@@ -18,10 +18,11 @@ use headrace_vehicle::VehicleConfig;
 use serde_json::json;
 
 use crate::cli::Trim;
-use crate::commands::{attached_vehicle, named, vehicle_file};
 use crate::dive::assemble_kept;
 use crate::failure::{self, Failure};
+use crate::files;
 use crate::output::{deliver, say};
+use crate::vehicle_file;
 use crate::watch::Watch;
 use anonymous::Anonymous;
 
@@ -55,8 +56,8 @@ fn vehicle(args: &Trim, files: &[PathBuf], info: &LogInfo) -> Result<Option<Vehi
     }
     let losses = Player::open(files)?.losses();
     let (_, vehicle) = match &args.vehicle {
-        Some(path) => vehicle_file(path),
-        None => attached_vehicle(info, &losses, named(&args.logs)),
+        Some(path) => vehicle_file::read(path),
+        None => vehicle_file::attached(info, &losses, files::first_named(&args.logs)),
     }?;
     Ok(Some(vehicle))
 }
@@ -72,7 +73,7 @@ fn spans(
         if spans.is_empty() {
             return Err(Failure::Usage(format!(
                 "trim: the vehicle wasn't between {from_m} and {to_m} m at any time of {}",
-                named(&args.logs).display()
+                files::first_named(&args.logs).display()
             )));
         }
         return Ok(spans);

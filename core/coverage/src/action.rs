@@ -1,5 +1,7 @@
 //! What to do about a failed stretch.
 
+use serde::{Serialize, Serializer};
+
 use super::cause::Cause;
 
 /// What must be other than it was when a stretch is passed again.
@@ -26,6 +28,19 @@ pub enum Action {
 }
 
 impl Action {
+    /// All of them.
+    pub const ALL: [Self; 9] = [
+        Self::Slower,
+        Self::FinerMode,
+        Self::LongerRange,
+        Self::OtherSide,
+        Self::Middle,
+        Self::InPhase,
+        Self::Head,
+        Self::Position,
+        Self::Again,
+    ];
+
     /// What helps against a cause.
     pub fn of(cause: Cause) -> Self {
         match cause {
@@ -54,5 +69,11 @@ impl Action {
             Self::Position => "position",
             Self::Again => "again",
         }
+    }
+}
+
+impl Serialize for Action {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.as_str())
     }
 }

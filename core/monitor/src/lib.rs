@@ -18,6 +18,7 @@ mod loop_snapshot;
 pub mod merge;
 pub mod messages;
 pub mod outlet;
+pub mod pilot_text;
 pub mod report;
 pub mod resources;
 pub mod result_stream;
@@ -27,7 +28,6 @@ pub mod smoothing;
 pub mod stage;
 mod stages;
 pub mod what_if;
-pub mod words;
 
 pub use app::{App, Plugin, SourceInfo, SourceSpec};
 pub use error::PluginError;

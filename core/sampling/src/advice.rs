@@ -17,7 +17,7 @@ use headrace_geometry::frames::{Point3, Pose, Rot};
 use headrace_geometry::math;
 use headrace_geometry::tunnel::Profile;
 use headrace_snapshot::stateful;
-use look::AdvisedHead;
+use look::{AdvisedHead, RING};
 
 pub use answer::{Advice, Alternative, Left, ModeName, Reason, Remedy};
 pub use steady::Steady;
@@ -26,9 +26,6 @@ pub use steady::Steady;
 pub const SPEED_MARGIN: f64 = 0.01;
 /// The most modes of a head that alternatives are given for.
 pub const MAX_MODES: usize = 8;
-
-/// Soundings of a head's ring: the finest steps of the heads that there are (0.3 degrees).
-const RING: u32 = 1200;
 
 /// Alternatives are thought over anew every so many pieces of advice.
 const ALTERNATIVES_EVERY: u32 = 25;

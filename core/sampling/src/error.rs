@@ -1,6 +1,6 @@
 //! What sampling theory refuses, each with its reason.
 
-use super::head::MAX_HEADS;
+use super::head_set::MAX_HEADS;
 
 /// Why no number can be given.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]

@@ -1,14 +1,10 @@
 //! A profiling head as sampling theory sees it: how it turns, how it sits, what it is told to do.
 
-use serde::{Deserialize, Serialize};
-
 use super::error::{SamplingError, positive};
+pub use super::head_set::{HeadSet, MAX_HEADS};
 use headrace_geometry::frames::{Body, Mount, Rot, Sensor, head_direction};
 use headrace_geometry::math::{self, TAU};
 use headrace_geometry::time::DurNs;
-
-/// The most heads of one vehicle.
-pub const MAX_HEADS: usize = 8;
 
 /// A head that has given no return for so long is silent: it is neither waited for nor counted in the advice.
 pub const SILENT_AFTER: DurNs = DurNs(2_000_000_000);
@@ -183,53 +179,6 @@ pub fn faces_aft(rotation: Rot<Body, Sensor>) -> bool {
     (rotation * head_direction(math::FRAC_PI_2)).y() < 0.0
 }
 
-/// A set of heads by their numbers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub struct HeadSet(u8);
-
-impl HeadSet {
-    /// The heads 0 to `count` - 1.
-    pub fn first(count: usize) -> Self {
-        (0..count).fold(Self::default(), Self::with)
-    }
-
-    /// This set and one more head; numbers from [`MAX_HEADS`] up are left out.
-    #[must_use]
-    pub fn with(self, head: usize) -> Self {
-        Self(self.0 | Self::bit(head))
-    }
-
-    /// This set without a head.
-    #[must_use]
-    pub fn without(self, head: usize) -> Self {
-        Self(self.0 & !Self::bit(head))
-    }
-
-    /// Whether a head is of it.
-    pub fn has(self, head: usize) -> bool {
-        self.0 & Self::bit(head) != 0
-    }
-
-    /// How many heads it has.
-    pub fn len(self) -> usize {
-        self.0.count_ones() as usize
-    }
-
-    /// Whether it has none.
-    pub fn is_empty(self) -> bool {
-        self.0 == 0
-    }
-
-    /// The heads' numbers, growing.
-    pub fn iter(self) -> impl Iterator<Item = usize> {
-        (0..MAX_HEADS).filter(move |head| self.has(*head))
-    }
-
-    fn bit(head: usize) -> u8 {
-        if head < MAX_HEADS { 1 << head } else { 0 }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -255,12 +204,5 @@ mod tests {
         }
         assert!(why(1e-12, 8.0).contains("doesn't divide"));
         assert!(why(0.9, f64::NAN).contains("period"));
-    }
-
-    #[test]
-    fn a_set_of_heads_counts_and_lists_them() {
-        let set = HeadSet::first(4).without(1).with(7).with(99);
-        assert_eq!(set.iter().collect::<Vec<_>>(), [0, 2, 3, 7]);
-        assert_eq!((set.len(), set.is_empty(), HeadSet::default().is_empty()), (4, false, true));
     }
 }

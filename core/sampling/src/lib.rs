@@ -12,6 +12,7 @@ pub mod error;
 #[cfg(test)]
 mod fixtures;
 pub mod head;
+pub mod head_set;
 pub mod interference;
 pub mod layout;
 pub mod occlusion;

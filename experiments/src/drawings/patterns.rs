@@ -1,10 +1,12 @@
 //! Figures 6 and 8: patterns of heads in phase shift and in sector offset.
 
-use headrace_pictures::canvas::{BLACK, BOLD, Canvas, Colour, Letters, NORMAL, Px, SMALL, Side, width_px};
+use headrace_pictures::canvas::{BOLD, Canvas, Letters, NORMAL, SMALL, Side, width_px};
 use headrace_pictures::chart::{Axis, Chart};
 use headrace_pictures::clock;
+use headrace_pictures::colour::{BLACK, Colour};
 use headrace_pictures::look::{self, Look, Marker};
 use headrace_pictures::polyline::Frame;
+use headrace_pictures::polyline::Px;
 
 use crate::figures::{PhaseShift, Place, Sectors, Way};
 

@@ -1,7 +1,9 @@
 //! A scale of colours, from pale to dark: a larger value is darker in print and for the colour-blind, too.
 
 use headrace_geometry::math;
-use headrace_pictures::canvas::{Canvas, Colour, NORMAL, Px, SMALL, Side};
+use headrace_pictures::canvas::{Canvas, NORMAL, SMALL, Side};
+use headrace_pictures::colour::Colour;
+use headrace_pictures::polyline::Px;
 
 /// Evenly spaced. Source: Nuñez, Anderton, Renslow, "Optimizing colormaps with consideration for color vision
 /// deficiency", 2018 (cividis), from its end.

@@ -1,11 +1,13 @@
 //! Figures 12 and 13: samples on the unrolled wall, and how far the surface through them is from it.
 
 use headrace_geometry::math;
-use headrace_pictures::canvas::{BLACK, BOLD, Canvas, Colour, Letters, Px, SMALL, Side, width_px};
+use headrace_pictures::canvas::{BOLD, Canvas, Letters, SMALL, Side, width_px};
 use headrace_pictures::chart::{Axis, Chart};
 use headrace_pictures::clock;
+use headrace_pictures::colour::{BLACK, Colour};
 use headrace_pictures::look::{Look, Marker};
 use headrace_pictures::polyline::Frame;
+use headrace_pictures::polyline::Px;
 
 use super::scale;
 use crate::figures::{Panel, Walls};

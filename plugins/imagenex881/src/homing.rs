@@ -57,8 +57,8 @@ mod tests {
     use headrace_sensor::geometry::math::{self, TAU};
 
     use super::*;
-    use crate::emulator::Head;
     use crate::settings::tests::settings;
+    use crate::stepping::Head;
 
     /// An emulated head obeys the commands, and then its program's first one.
     #[test]

@@ -13,5 +13,6 @@ pub mod plugin;
 pub mod probe;
 pub mod program;
 pub mod settings;
+pub mod stepping;
 
 pub use plugin::Kind;

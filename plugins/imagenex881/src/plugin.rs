@@ -13,14 +13,11 @@ use headrace_sensor::sampling::head::{HeadMode, HeadSpec};
 use headrace_sensor::stateful;
 use serde::{Deserialize, Serialize};
 
-use crate::codec::{Header, Model, Return, ReturnCodec, Returns, Tag};
+use crate::codec::{Header, Model, Return, ReturnCodec, Returns, SOUND_SPEED_MPS, Tag};
 use crate::driver::{CARRIERS, HeadDriver};
 use crate::emulator::HeadEmulator;
 use crate::probe::HeadProbe;
 use crate::settings::{Settings, range_setting};
-
-/// Speed of sound by which the family computes every range. Source: Imagenex 881A serial interface, profile range.
-pub const SOUND_SPEED_MPS: f64 = 1500.0;
 
 /// The kind's name in vehicle files and logs.
 const NAME: &str = "imagenex881";

@@ -73,8 +73,9 @@ mod tests {
 
     use super::*;
     use crate::codec::CommandCodec;
-    use crate::emulator::{Head, HeadEmulator};
+    use crate::emulator::HeadEmulator;
     use crate::settings::tests::settings;
+    use crate::stepping::Head;
 
     /// What a head with these keys answers to all questions, in order.
     fn answers(keys: &str) -> Vec<Vec<u8>> {

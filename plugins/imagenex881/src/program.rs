@@ -4,8 +4,8 @@ use headrace_sensor::geometry::time::{DurNs, MonoNs};
 use headrace_sensor::sampling::head::HeadProgram;
 
 use crate::codec::{COMMAND_BYTES, COUNTS_PER_TURN, Command, step_at_most, step_deg};
-use crate::emulator::Head;
 use crate::settings::{Settings, counts_of_rad};
+use crate::stepping::Head;
 
 /// The host's side: which command comes next, so that the head follows its program.
 ///

@@ -6,8 +6,7 @@ use headrace_sensor::geometry::math::{self, TAU};
 use headrace_sensor::geometry::time::DurNs;
 use headrace_sensor::sampling::head::{Basis, HeadBody, HeadMode, Turn};
 
-use crate::codec::{COUNTS_PER_TURN, Command, Points, RANGES_M, ZERO_COUNT};
-use crate::plugin::SOUND_SPEED_MPS;
+use crate::codec::{COUNTS_PER_TURN, Command, Points, RANGES_M, SOUND_SPEED_MPS, ZERO_COUNT};
 
 /// A scanning speed by the maker's name: the step, and how long a turn takes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

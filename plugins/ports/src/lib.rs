@@ -5,6 +5,7 @@
 
 mod clock;
 mod crew;
+mod diagnosis;
 mod discover;
 mod lines;
 mod probe;

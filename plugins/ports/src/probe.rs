@@ -8,6 +8,7 @@ use headrace_sensor::connect::Connect;
 use headrace_sensor::driver::Probe;
 
 use crate::clock;
+use crate::diagnosis;
 use crate::lines::{self, Line, READ_BYTES};
 use crate::trouble::Trouble;
 
@@ -30,11 +31,14 @@ pub enum Answer {
 ///
 /// Errors: the line can't be opened, or breaks; with what would mend it.
 pub fn probe(connect: &Connect, probes: &mut [Box<dyn Probe>]) -> Result<Answer, Trouble> {
+    let _span = tracing::info_span!("probe", address = %connect).entered();
+    tracing::info!(kinds = probes.len(), "probing");
     let mut line = lines::open(connect)?;
     let mut unknown = 0;
     for probe in probes {
         let asked = ask(line.as_mut(), probe.as_mut(), &mut unknown);
-        if let Some(identity) = asked.map_err(|error| Trouble::asking(&connect.to_string(), &error))? {
+        if let Some(identity) = asked.map_err(|error| diagnosis::probing(&connect.to_string(), &error))? {
+            tracing::info!(identity, "device identified");
             return Ok(Answer::Is(identity));
         }
     }

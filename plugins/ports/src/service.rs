@@ -14,9 +14,9 @@ use headrace_sensor::connect::{Connect, ConnectError};
 use headrace_sensor::driver::{Driver, Standing, Wire};
 
 use crate::clock;
+use crate::diagnosis;
 use crate::lines::{self, Line, READ_BYTES};
 use crate::status::{Board, LineHistory, Phase, Status};
-use crate::trouble;
 
 /// The least and the longest wait before a line is tried again; what is plugged into this machine costs little to try.
 const FIRST_PAUSE: DurNs = DurNs::from_millis(250);
@@ -125,6 +125,9 @@ impl Service {
 
     /// Runs until it is told to end; gives what each sensor's line has been through.
     pub(crate) fn run(mut self) -> Vec<(usize, LineHistory)> {
+        let sensors: Vec<usize> = self.seats.iter().map(|seat| seat.berth.source).collect();
+        let address = self.connect.as_ref().map_or_else(|error| error.text.clone(), Connect::to_string);
+        let _span = tracing::info_span!("port", address, ?sensors).entered();
         let mut pause = FIRST_PAUSE;
         while !self.stopping() {
             match self.connect.clone() {
@@ -135,8 +138,12 @@ impl Service {
                     continue;
                 }
                 Ok(connect) => match lines::open(&connect) {
-                    Err(trouble) => self.say_all(Phase::Closed, &trouble.to_string()),
+                    Err(trouble) => {
+                        tracing::debug!(%trouble, "port not opened");
+                        self.say_all(Phase::Closed, &trouble.to_string());
+                    }
                     Ok(mut line) => {
+                        tracing::info!("port opened");
                         let opened = clock::now();
                         let ended = self.serve(line.as_mut(), opened);
                         self.closed();
@@ -147,11 +154,17 @@ impl Service {
                         match ended {
                             Ok(Served::ToTheEnd) => (),
                             // What is to be said of that has been said, and holds until it speaks again.
-                            Ok(Served::InSilence) => self.count_lost(),
+                            Ok(Served::InSilence) => {
+                                tracing::info!("no data, reopening the port");
+                                self.count_lost();
+                            }
                             Err(error) => self.lost(&connect, &error),
                         }
                     }
                 },
+            }
+            if !self.stopping() {
+                tracing::debug!(backoff_s = pause.as_secs_f64(), "waiting before the next attempt");
             }
             self.wait(pause);
             pause = (pause + pause).min(self.longest_pause());
@@ -179,7 +192,8 @@ impl Service {
 
     fn lost(&mut self, connect: &Connect, error: &io::Error) {
         self.count_lost();
-        let why = trouble::losing(error);
+        let why = diagnosis::losing(error);
+        tracing::info!(%error, why, "connection lost");
         self.say_all(Phase::Closed, &format!("lost {connect}: {why}; it is tried again"));
     }
 
@@ -368,6 +382,7 @@ impl Seat {
         if self.status.as_ref().is_some_and(|(last, said)| *last == phase && said == words) {
             return;
         }
+        tracing::debug!(sensor = self.berth.source, phase = phase.as_str(), words, "status of a sensor");
         self.status = Some((phase, words.to_owned()));
         let status = Status { source: self.berth.source, since, phase, words: words.to_owned() };
         self.history.last = status.to_string();

@@ -1,11 +1,9 @@
 //! Why a line can't be opened, and what would mend it.
 
 use std::fmt;
-use std::io;
 
 use headrace_sensor::connect::ConnectError;
 
-use crate::discover::remedy_for;
 use crate::remedy;
 
 /// What kind of trouble.
@@ -34,25 +32,6 @@ pub struct Trouble {
     pub remedy: Option<String>,
 }
 
-/// Why an open line has failed, in words.
-pub(crate) fn losing(error: &io::Error) -> String {
-    /// Input/output error; no such device or address; no such device. Source: Linux, errno.
-    const UNPLUGGED: [i32; 3] = [5, 6, 19];
-    use io::ErrorKind as E;
-    if error.raw_os_error().is_some_and(|number| UNPLUGGED.contains(&number)) {
-        return "the port is gone".to_owned();
-    }
-    match error.kind() {
-        E::ConnectionRefused => "nobody listens there".to_owned(),
-        E::ConnectionReset | E::ConnectionAborted => "the device has closed the connection".to_owned(),
-        // The serial library's own has neither a number nor words.
-        E::BrokenPipe if error.raw_os_error().is_some() => "the device has closed the connection".to_owned(),
-        E::BrokenPipe if error.get_ref().is_none() => "the port is gone".to_owned(),
-        E::TimedOut | E::WouldBlock => "it doesn't take what is sent to it".to_owned(),
-        _ => error.to_string(),
-    }
-}
-
 impl fmt::Display for Trouble {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.why)?;
@@ -63,48 +42,6 @@ impl fmt::Display for Trouble {
 impl Trouble {
     pub(crate) fn new(kind: TroubleKind, why: String, remedy: Option<&str>) -> Self {
         Self { kind, why, remedy: remedy.map(str::to_owned) }
-    }
-
-    /// An open line has failed while its device was asked.
-    pub(crate) fn asking(what: &str, error: &io::Error) -> Self {
-        let Self { kind, remedy, .. } = Self::opening(what, error);
-        let why = match kind {
-            TroubleKind::Absent => format!("asking at {what}: nobody answers there ({error})"),
-            _ => format!("asking at {what}: {error}"),
-        };
-        Self { kind, why, remedy }
-    }
-
-    /// Opening `what` has failed.
-    pub(crate) fn opening(what: &str, error: &io::Error) -> Self {
-        use io::ErrorKind as E;
-        let why = |words: &str| format!("opening {what}: {words}");
-        match error.kind() {
-            E::NotFound => Self::not_there(what),
-            E::PermissionDenied => Self::denied(what, &remedy_for(what)),
-            E::ConnectionRefused => {
-                Self::new(TroubleKind::Absent, why("nobody listens there"), Some(remedy::NOBODY_LISTENS))
-            }
-            E::TimedOut | E::HostUnreachable | E::NetworkUnreachable => {
-                Self::new(TroubleKind::Absent, why("nobody answers there"), Some(remedy::NOBODY_ANSWERS))
-            }
-            E::ResourceBusy | E::AddrInUse => {
-                Self::new(TroubleKind::Busy, why("another program has it"), Some("close that one"))
-            }
-            _ => Self::new(TroubleKind::Other, why(&error.to_string()), None),
-        }
-    }
-
-    /// Opening a CAN interface has failed.
-    pub(crate) fn can(interface: &str, error: &io::Error) -> Self {
-        /// No such device; network is down; address family not supported. Source: Linux, errno.
-        const ENODEV: i32 = 19;
-        const EAFNOSUPPORT: i32 = 97;
-        match error.raw_os_error() {
-            Some(ENODEV) => Self::no_interface(interface),
-            Some(EAFNOSUPPORT) => Self::no_can(interface),
-            _ => Self::opening(interface, error),
-        }
     }
 
     /// There is no such device file or host.

@@ -304,6 +304,7 @@ impl<S: Source> Import<S> {
         takers: &mut [Taker],
         beside: &mut dyn FnMut(u64),
     ) -> Result<Imported, ImportError> {
+        tracing::info!(file = self.input.name(), clock = self.clock.as_str(), "import started");
         let sources = takers.iter().map(|taker| usize::from(taker.source) + 1).max().unwrap_or(0);
         let mut imported = Imported { messages: vec![0; sources], last: BEGIN, ..Imported::default() };
         let mut before_ns = self.first_ns;
@@ -335,6 +336,8 @@ impl<S: Source> Import<S> {
         let told = self.input.told();
         imported.losses = [told.losses, losses.words()].concat();
         imported.remarks = told.remarks;
+        let Imported { entries, passed_over, .. } = imported;
+        tracing::info!(entries, passed_over, losses = imported.losses.len(), "import finished");
         Ok(imported)
     }
 }

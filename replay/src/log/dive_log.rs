@@ -94,10 +94,13 @@ impl DiveLog<File> {
     ///
     /// Errors: no file can be read, isn't MCAP, or is of a later format; several that aren't the parts of one recording.
     pub fn open(files: &[PathBuf]) -> Result<Self, LogError> {
-        match files {
-            [file] => Ok(Self::single(LogReader::open(file)?, file)),
-            files => Self::parts(files),
-        }
+        let log = match files {
+            [file] => Self::single(LogReader::open(file)?, file),
+            files => Self::parts(files)?,
+        };
+        let span_s = log.times.map(|(from, to)| to.since(from).as_secs_f64());
+        tracing::info!(files = ?files, sources = log.info.sources.len(), ticks = log.has_ticks, span_s, "log opened");
+        Ok(log)
     }
 
     fn single(reader: LogReader<File>, file: &Path) -> Self {

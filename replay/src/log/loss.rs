@@ -200,6 +200,7 @@ impl Losses {
     }
 
     pub(super) fn push(&mut self, loss: Loss) {
+        tracing::debug!(%loss, "log is damaged");
         if self.0.len() < MAX_LOSSES {
             self.0.push(loss);
         } else if let Some(last) = self.0.last_mut() {

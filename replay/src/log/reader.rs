@@ -166,6 +166,7 @@ impl<R: Read + Seek> LogReader<R> {
         };
         take_vehicle_file(&mut info);
         let by_time = !channels.has_ticks();
+        tracing::debug!(log = %file.name(), chunks = scan.spans.len(), sources = info.sources.len(), by_time, "log scanned");
         let mut plan: Vec<u32> = (0..).take(scan.spans.len()).collect();
         if by_time {
             plan.sort_by_key(|number| scan.spans.get(*number as usize).map(|span| span.from));
@@ -368,6 +369,7 @@ impl<R: Read + Seek> LogReader<R> {
         for kind in found {
             self.lose(number, kind);
         }
+        tracing::trace!(number, messages = batch.entries.len(), "chunk read");
         let times = batch.entries.iter().map(|entry| entry.head.log_time);
         let times = (times.clone().min().unwrap_or(0), times.max().unwrap_or(0));
         self.correct(number, times);

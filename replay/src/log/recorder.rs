@@ -200,6 +200,7 @@ fn new_file(path: &Path) -> Result<SyncedFile, LogError> {
     let failed = |source| LogError::Create { path: path.to_owned(), source };
     let file = OpenOptions::new().write(true).create_new(true).open(path).map_err(failed)?;
     sync_folder_of(path).map_err(failed)?;
+    tracing::info!(path = %path.display(), "log created");
     Ok(SyncedFile(BufWriter::new(file)))
 }
 

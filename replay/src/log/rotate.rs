@@ -109,6 +109,7 @@ impl<W: Write> Parts<W> {
         let last = core::mem::replace(log, next);
         let last_path = core::mem::replace(&mut self.path, path);
         self.header = header;
+        tracing::info!(from = %last_path.display(), to = %self.path.display(), "recording goes on in the next part");
         if let Every::Bytes(bytes) = self.every {
             self.ends_at = bytes;
         }

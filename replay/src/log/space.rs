@@ -78,8 +78,11 @@ impl Space {
         if self.asked.is_some_and(|asked| now.duration_since(asked) < ASK_EVERY) {
             return;
         }
-        self.asked = Some(now);
+        let first = self.asked.replace(now).is_none();
         let Some(free) = (self.ask)() else { return };
+        if first {
+            tracing::debug!(free_bytes = free, "disk of the recording");
+        }
         self.free = free;
         let free_mb = free / 1_000_000;
         // Once echoes are left out they stay so until there is much more room.

@@ -250,6 +250,17 @@ impl<'a, W: Write> Worker<'a, W> {
         let count = |count: &AtomicU64| count.load(Ordering::Relaxed);
         let (sent_dropped, results_missing) =
             (count(&self.state.sent_dropped), count(&self.state.results_missing));
-        finished.map(|summary| Summary { left_out, sent_dropped, results_missing, ..summary })
+        let summary =
+            finished.map(|summary| Summary { left_out, sent_dropped, results_missing, ..summary })?;
+        let Summary { messages, bytes, .. } = summary;
+        tracing::info!(
+            messages,
+            bytes,
+            left_out = left_out.messages,
+            sent_dropped,
+            results_missing,
+            "recording finished"
+        );
+        Ok(summary)
     }
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use headrace_coverage::{Cause, Judgement, RunChange, Verdict};
 use headrace_geometry::time::{DurNs, MonoNs};
-use headrace_monitor::words::{CauseFigures, Missed as MissedWords, cause_words, cleared_words, flag_words};
+use headrace_monitor::pilot_text::{CauseFigures, Missed as MissedText, cause_text, cleared_text, flag_text};
 
 use super::Site;
 use super::messages::{Level, Log, Missed, Section, Stretch, rounded};
@@ -76,20 +76,20 @@ impl Sections {
             let (from, to) = self.runs.remove(&id)?;
             // What has only turned out to have another cause is told as that.
             let open = self.flagged.range(from..=to).next().is_some();
-            let words = cleared_words(from as f64 * site.section_m, (to + 1) as f64 * site.section_m);
+            let words = cleared_text(from as f64 * site.section_m, (to + 1) as f64 * site.section_m);
             return (!open).then(|| Log::new(judged.at, Level::Info, words));
         }
         *span = (span.0.min(index), span.1.max(index));
         let figures = judged.cause.filter(|_| judged.verdict == Verdict::Fail)?;
         (change == RunChange::Raised as u64).then(|| {
-            let missed = MissedWords {
+            let missed = MissedText {
                 start_m: index as f64 * site.section_m,
                 figures,
                 hole_arc_m: judged.hole_arc_m,
                 target_m: site.target_m,
                 v_max_mps,
             };
-            Log::new(judged.at, Level::Warning, flag_words(&missed, &site.profile))
+            Log::new(judged.at, Level::Warning, flag_text(&missed, &site.profile))
         })
     }
 
@@ -151,6 +151,6 @@ fn shown(judged: &Judged, flagged: bool, site: &Site) -> Section {
         target_m: site.target_m,
         flagged,
         cause: cause.map_or("", |figures| figures.cause.as_str()),
-        words: cause.as_ref().map(cause_words).unwrap_or_default(),
+        words: cause.as_ref().map(cause_text).unwrap_or_default(),
     }
 }

@@ -32,8 +32,8 @@ use headrace_geometry::frames::{Body, Rot, Tunnel};
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_geometry::tunnel::Profile;
 use headrace_monitor::alerts::AlertKind;
+use headrace_monitor::pilot_text::{AdviceFigures, CauseFigures, advice_text, alert_text};
 use headrace_monitor::result_stream::{Record, RecordKind, first_record, text_of};
-use headrace_monitor::words::{AdviceFigures, CauseFigures, advice_words, alert_words};
 use headrace_sampling::advice::{Reason, Remedy};
 use serde::Serialize;
 
@@ -275,7 +275,7 @@ impl View {
             unseen_m: (width_m > 0.0).then_some([width_m, arc_m]),
             remedy,
         };
-        let said = advice_words(&figures, &self.site.profile);
+        let said = advice_text(&figures, &self.site.profile);
         if turned {
             let is_grave = will_exceed || reason != Reason::HelixPitch;
             let level = if is_grave { Level::Warning } else { Level::Info };
@@ -302,7 +302,7 @@ fn alert(words: &mut Words<'_>, made: &mut Outbox<'_>) -> Option<()> {
     let at = MonoNs(words.integer()?);
     let kind = words.one_of(&AlertKind::ALL, |kind| kind as u64)?;
     let [x_m, off_m] = words.numbers()?;
-    made.push(Topic::Alerts, &Log::new(at, Level::Error, alert_words(kind, x_m, off_m)));
+    made.push(Topic::Alerts, &Log::new(at, Level::Error, alert_text(kind, x_m, off_m)));
     Some(())
 }
 

@@ -1,9 +1,10 @@
 //! A piece of the pattern to scale, about the emptiest place.
 
-use headrace_pictures::canvas::{Canvas, NORMAL, Px, SMALL, Side};
+use headrace_pictures::canvas::{Canvas, NORMAL, SMALL, Side};
 use headrace_pictures::chart::{Axis, Chart, short};
 use headrace_pictures::look::{self, Look};
 use headrace_pictures::polyline::Frame;
+use headrace_pictures::polyline::Px;
 
 use super::laid::Laid;
 use super::pattern::CIRCLE;

@@ -1,10 +1,12 @@
 //! The pattern on the unrolled wall.
 
-use headrace_pictures::canvas::{BOLD, Canvas, Colour, Letters, NORMAL, Px, SMALL, Side};
+use headrace_pictures::canvas::{BOLD, Canvas, Letters, NORMAL, SMALL, Side};
 use headrace_pictures::chart::{Axis, Chart};
 use headrace_pictures::clock;
+use headrace_pictures::colour::Colour;
 use headrace_pictures::look::{self, Look};
 use headrace_pictures::polyline::Frame;
+use headrace_pictures::polyline::Px;
 use headrace_sampling::SamplingError;
 
 use super::Shown;

@@ -1,8 +1,9 @@
 //! Spacing around the wall.
 
-use headrace_pictures::canvas::{self, Canvas, Colour, NORMAL, PALE, SMALL, Side, width_px};
+use headrace_pictures::canvas::{self, Canvas, NORMAL, SMALL, Side, width_px};
 use headrace_pictures::chart::{Axis, Chart, short};
 use headrace_pictures::clock::{self, Hour};
+use headrace_pictures::colour::{BLACK, Colour, PALE};
 use headrace_pictures::labels::{self, Label};
 use headrace_pictures::look::{self, Look};
 use headrace_pictures::polyline::Frame;
@@ -176,7 +177,7 @@ fn captions(chart: &Chart<'_>, stretches: &[Thin]) {
             continue;
         }
         for (k, word) in words.iter().enumerate() {
-            let letters = canvas::Letters { colour: canvas::BLACK, ..SMALL };
+            let letters = canvas::Letters { colour: BLACK, ..SMALL };
             chart.canvas.text([x, chart.frame.top + 11.0 + 14.0 * k as f64], word, Side::Middle, letters);
         }
         last = Some((x, words));

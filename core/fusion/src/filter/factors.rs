@@ -224,6 +224,13 @@ impl<const N: usize> Factors<N> {
         self.add_all([Noise::of_one(i, variance)]);
     }
 
+    /// Adds to the variances of the errors; entries that aren't above zero change nothing.
+    pub fn widen(&mut self, variances: &[f64; N]) {
+        for (i, variance) in variances.iter().enumerate().filter(|(_, variance)| **variance > 0.0) {
+            self.add_to(i, *variance);
+        }
+    }
+
     /// Adds noises, the first first.
     ///
     /// They take turns column by column. That gives the same bits as one after the other, as none needs more of those

@@ -168,7 +168,7 @@ impl Running {
     /// Adds to the errors' variances: the estimate stays, and is less sure.
     fn widen(&mut self, variances: &Errors) {
         self.keep(self.at, &Move::Widened(*variances), self.state);
-        widen(&mut self.factors, variances);
+        self.factors.widen(variances);
     }
 
     /// Keeps a step that begins with the present estimate.
@@ -386,13 +386,6 @@ impl Sigmas {
         } else {
             Ok(relative)
         }
-    }
-}
-
-/// Adds to the variances of errors.
-pub fn widen(factors: &mut Factors<ERRORS>, variances: &Errors) {
-    for (i, variance) in variances.iter().enumerate().filter(|(_, variance)| **variance > 0.0) {
-        factors.add_to(i, *variance);
     }
 }
 

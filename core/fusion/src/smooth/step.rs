@@ -2,7 +2,6 @@
 
 use crate::filter::factors::Factors;
 use crate::filter::inertial::{LEG_NUMBERS, Leg};
-use crate::filter::running::widen;
 use crate::filter::settings::Settings;
 use crate::filter::state::{ERRORS, Errors, STATE_NUMBERS, State};
 use headrace_geometry::frames::{Body, Vec3};
@@ -81,7 +80,7 @@ impl Move {
     pub fn disturb(&self, settings: &Settings, factors: &mut Factors<ERRORS>) {
         match self {
             Self::Leg(leg) => leg.disturb(settings, &leg.transition(settings), factors),
-            Self::Widened(variances) => widen(factors, variances),
+            Self::Widened(variances) => factors.widen(variances),
             Self::End => {}
         }
     }

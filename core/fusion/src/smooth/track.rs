@@ -2,11 +2,10 @@
 
 use core::ops::Range;
 
-use super::backward::Estimate;
 use super::step::Placed;
 use crate::filter::running::Sigmas;
 use crate::filter::sources::Consistency;
-use crate::filter::state::{rotation, rotation_vector};
+use crate::filter::state::{State, rotation, rotation_vector};
 use crate::filter::{CARRIES, CLOCK_JUMP, EPOCH};
 use crate::relative::Relative;
 use crate::{Fix, Navigation, NoFix, Times};
@@ -44,10 +43,9 @@ pub struct Track {
 }
 
 impl Point {
-    pub(super) fn of(estimate: &Estimate, sigmas: &Sigmas) -> Self {
-        let Estimate { at, state, .. } = estimate;
+    pub(super) fn of(at: MonoNs, state: &State, sigmas: &Sigmas) -> Self {
         let pose = Pose { position: state.position, attitude: state.attitude };
-        Self { at: *at, pose, speed_mps: state.velocity_mps.x(), sigmas: *sigmas }
+        Self { at, pose, speed_mps: state.velocity_mps.x(), sigmas: *sigmas }
     }
 }
 

@@ -3,7 +3,8 @@
 use serde::Serialize;
 
 use crate::advice_log::{AdviceEntry, AdviceLog};
-use headrace_coverage::{Action, Run, RunId, Runs, Sections};
+use crate::pilot_text::CauseFigures;
+use headrace_coverage::{Action, Cause, Run, RunId, Runs, Sections};
 use headrace_geometry::time::MonoNs;
 use headrace_geometry::tunnel::Profile;
 
@@ -12,8 +13,11 @@ use headrace_geometry::tunnel::Profile;
 pub struct RunReport {
     /// Its number, which stays.
     pub id: u32,
-    /// One of the causes of metrics.md.
-    pub cause: &'static str,
+    /// Its cause.
+    pub cause: Cause,
+    /// The cause's figures, for its text; those of the section with the largest hole.
+    #[serde(skip)]
+    pub figures: Option<CauseFigures>,
     /// Where it begins, m.
     pub start_m: f64,
     /// Where it ends, m.
@@ -43,9 +47,8 @@ pub struct ReturnReport {
     pub from_m: f64,
     /// Where it begins, m.
     pub to_m: f64,
-    /// What must be other than it was: `slower`, `finer_mode`, `longer_range`, `other_side`, `middle`, `in_phase`, `head`,
-    /// `position`, or `again`.
-    pub action: &'static str,
+    /// What must be other than it was.
+    pub action: Action,
     /// At most so fast, m/s; zero where no speed would do as the heads were.
     pub at_most_mps: f64,
     /// Seconds at that speed.
@@ -60,7 +63,8 @@ pub(super) fn run_reports(sections: &Sections, profile: &Profile) -> Vec<RunRepo
             let ((start_m, end_m), (_, hole)) = (bounds(run), run.worst);
             RunReport {
                 id,
-                cause: run.cause.as_str(),
+                cause: run.cause,
+                figures: figures(sections, run),
                 start_m,
                 end_m,
                 failed_m: f64::from(run.failed) * sections.section_m(),
@@ -73,6 +77,13 @@ pub(super) fn run_reports(sections: &Sections, profile: &Profile) -> Vec<RunRepo
             }
         })
         .collect()
+}
+
+/// Figures of the run's cause: those of its worst section, or of another where that one's cause is a different one by now.
+fn figures(sections: &Sections, run: &Run) -> Option<CauseFigures> {
+    let evidence = |index: i64| sections.get(index)?.evidence.filter(|evidence| evidence.cause == run.cause);
+    let evidence = evidence(run.worst.0).or_else(|| (run.from..run.to).find_map(evidence))?;
+    Some((&evidence).into())
 }
 
 /// How near a run advice counts for it, m.
@@ -99,5 +110,5 @@ fn stop(sections: &Sections, log: &AdviceLog, id: RunId, run: &Run) -> ReturnRep
     let at_most_mps = advised.filter(|mps| *mps > 0.0).reduce(f64::min).or_else(|| evenly.reduce(f64::min));
     let at_most_mps = at_most_mps.unwrap_or(0.0);
     let takes_s = (at_most_mps > 0.0).then(|| (from_m - to_m) / at_most_mps);
-    ReturnReport { run: id.0, from_m, to_m, action: Action::of(run.cause).as_str(), at_most_mps, takes_s }
+    ReturnReport { run: id.0, from_m, to_m, action: Action::of(run.cause), at_most_mps, takes_s }
 }

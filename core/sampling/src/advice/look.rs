@@ -9,8 +9,8 @@ use headrace_geometry::frames::Pose;
 use headrace_geometry::tunnel::Profile;
 use headrace_snapshot::stateful;
 
-use super::RING;
-
+/// Soundings of a head's ring: the finest steps of the heads that there are (0.3 degrees).
+pub(super) const RING: u32 = 1200;
 /// By what share the speed may change while a vehicle moves, before the beams of its heads are cast anew.
 const SHARE: f64 = 0.002;
 /// The least and the most that it may move across the tunnel meanwhile, m: what the target leaves may be next to nothing;

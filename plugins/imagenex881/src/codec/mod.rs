@@ -15,3 +15,6 @@ pub const COUNTS_PER_TURN: i32 = 1200;
 
 /// The count that a head reports at 0 degrees. Source: Imagenex 881A serial interface, head position.
 pub const ZERO_COUNT: i32 = 600;
+
+/// Speed of sound by which the family computes every range. Source: Imagenex 881A serial interface, profile range.
+pub const SOUND_SPEED_MPS: f64 = 1500.0;

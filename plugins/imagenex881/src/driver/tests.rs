@@ -7,8 +7,9 @@ use headrace_sensor::measurement::Sounding;
 
 use super::*;
 use crate::codec::{Return, Status};
-use crate::emulator::{Head, HeadEmulator};
+use crate::emulator::HeadEmulator;
 use crate::settings::tests::settings;
+use crate::stepping::Head;
 
 const BEGUN: MonoNs = MonoNs(2_000_000_000);
 /// A pause that doesn't end.

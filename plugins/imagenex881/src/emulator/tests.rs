@@ -5,6 +5,7 @@ use headrace_sensor::reading::{Packet, Reading, SonarReturn};
 
 use super::*;
 use crate::plugin::HeadDecoder;
+use crate::settings::counts_of_rad;
 use crate::settings::tests::settings;
 
 /// The wall is as far as this all round.

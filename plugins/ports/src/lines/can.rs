@@ -9,8 +9,9 @@ use socketcan::{
     StandardId,
 };
 
-use super::{Line, READ_BYTES, ReadTimeout, waited};
+use super::line::{Line, READ_BYTES, ReadTimeout, waited};
 use crate::clock;
+use crate::diagnosis;
 use crate::discover::{self, Machine};
 use crate::trouble::Trouble;
 
@@ -41,7 +42,7 @@ pub(super) fn open(interface: &str) -> Result<Box<dyn Line>, Trouble> {
         socket.set_error_filter_accept_all()?;
         Ok(socket)
     };
-    let socket = opening().map_err(|error| Trouble::can(interface, &error))?;
+    let socket = opening().map_err(|error| diagnosis::opening_can(interface, &error))?;
     Ok(Box::new(Can {
         socket,
         timeout: ReadTimeout::default(),

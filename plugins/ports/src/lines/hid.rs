@@ -7,22 +7,24 @@ use headrace_geometry::time::MonoNs;
 use headrace_sensor::connect::UsbIdentity;
 use hidapi::{DeviceInfo, HidApi, HidDevice, HidError};
 
-use super::{Line, READ_BYTES};
+use super::line::{Line, READ_BYTES};
 use crate::clock;
+use crate::diagnosis;
 use crate::trouble::Trouble;
 
 struct Hid(HidDevice);
 
 pub(super) fn open(identity: &UsbIdentity) -> Result<Box<dyn Line>, Trouble> {
     let what = format!("hid:{identity}");
-    let api = HidApi::new().map_err(|error| Trouble::opening(&what, &io_error(&error)))?;
+    let api = HidApi::new().map_err(|error| diagnosis::opening(&what, &io_error(&error)))?;
     let mut fitting = api.device_list().filter(|device| is_it(device, identity));
     let Some(device) = fitting.next() else { return Err(Trouble::not_plugged_in(&what)) };
     let path = device.path().to_string_lossy().into_owned();
     if let Some(other) = fitting.find(|other| other.path() != device.path()) {
         return Err(Trouble::ambiguous(&what, &[path, other.path().to_string_lossy().into_owned()]));
     }
-    let opened = api.open_path(device.path()).map_err(|error| Trouble::opening(&path, &io_error(&error)))?;
+    let opened =
+        api.open_path(device.path()).map_err(|error| diagnosis::opening(&path, &io_error(&error)))?;
     Ok(Box::new(Hid(opened)))
 }
 

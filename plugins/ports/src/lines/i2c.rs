@@ -8,8 +8,9 @@ use embedded_hal::i2c::I2c;
 use headrace_geometry::time::{DurNs, MonoNs};
 use linux_embedded_hal::I2cdev;
 
-use super::{Line, READ_BYTES};
+use super::line::{Line, READ_BYTES};
 use crate::clock;
+use crate::diagnosis;
 use crate::trouble::Trouble;
 
 /// A device on a bus.
@@ -20,10 +21,10 @@ struct Bus<B> {
 
 pub(super) fn open(bus: &str, address: u8) -> Result<Box<dyn Line>, Trouble> {
     let opened =
-        I2cdev::new(bus).map_err(|error| Trouble::opening(bus, &io::Error::other(error.to_string())));
+        I2cdev::new(bus).map_err(|error| diagnosis::opening(bus, &io::Error::other(error.to_string())));
     // The crate's error hides the kind; the file's own tells it.
     let opened = opened.map_err(|trouble| match std::fs::File::open(bus) {
-        Err(error) => Trouble::opening(bus, &error),
+        Err(error) => diagnosis::opening(bus, &error),
         Ok(_) => trouble,
     })?;
     Ok(Box::new(Bus { bus: opened, address }))

@@ -7,8 +7,9 @@ use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::connect::{SerialPort, UsbIdentity};
 use serialport::{SerialPort as _, SerialPortType, TTYPort};
 
-use super::{Line, READ_BYTES, waited};
+use super::line::{Line, READ_BYTES, waited};
 use crate::clock;
+use crate::diagnosis;
 use crate::trouble::Trouble;
 
 /// Bits on the line for a byte: start, eight, stop.
@@ -29,8 +30,8 @@ pub(super) fn open(port: &SerialPort, baud: u32) -> Result<Box<dyn Line>, Troubl
         SerialPort::Usb(identity) => path_of(identity)?,
     };
     let builder = serialport::new(&path, baud).timeout(WRITE_TIME);
-    let port = TTYPort::open(&builder).map_err(|error| Trouble::opening(&path, &error.into()))?;
-    port.clear(serialport::ClearBuffer::All).map_err(|error| Trouble::opening(&path, &error.into()))?;
+    let port = TTYPort::open(&builder).map_err(|error| diagnosis::opening(&path, &error.into()))?;
+    port.clear(serialport::ClearBuffer::All).map_err(|error| diagnosis::opening(&path, &error.into()))?;
     let byte_time = DurNs(BITS_A_BYTE * 1_000_000_000 / i64::from(baud.max(1)));
     Ok(Box::new(Serial { port, byte_time, emptied: clock::now() }))
 }
@@ -38,7 +39,7 @@ pub(super) fn open(port: &SerialPort, baud: u32) -> Result<Box<dyn Line>, Troubl
 /// The path that a USB adapter's port has now.
 fn path_of(identity: &UsbIdentity) -> Result<String, Trouble> {
     let what = format!("serial:usb:{identity}");
-    let ports = serialport::available_ports().map_err(|error| Trouble::opening(&what, &error.into()))?;
+    let ports = serialport::available_ports().map_err(|error| diagnosis::opening(&what, &error.into()))?;
     let is_it = |kind: &SerialPortType| match kind {
         SerialPortType::UsbPort(usb) => {
             (usb.vid, usb.pid) == (identity.vendor, identity.product)

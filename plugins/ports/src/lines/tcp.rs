@@ -6,8 +6,9 @@ use std::time::Duration;
 
 use headrace_geometry::time::MonoNs;
 
-use super::{Line, READ_BYTES, ReadTimeout, waited};
+use super::line::{Line, READ_BYTES, ReadTimeout, waited};
 use crate::clock;
+use crate::diagnosis;
 use crate::trouble::Trouble;
 
 const CONNECT_TIME: Duration = Duration::from_secs(2);
@@ -21,7 +22,7 @@ struct Tcp {
 pub(super) fn open(address: &str) -> Result<Box<dyn Line>, Trouble> {
     connect(address)
         .map(|line| Box::new(line) as Box<dyn Line>)
-        .map_err(|error| Trouble::opening(address, &error))
+        .map_err(|error| diagnosis::opening(address, &error))
 }
 
 fn connect(address: &str) -> io::Result<Tcp> {

@@ -6,8 +6,9 @@ use std::time::Duration;
 
 use headrace_geometry::time::{DurNs, MonoNs};
 
-use super::{Line, READ_BYTES, ReadTimeout, waited};
+use super::line::{Line, READ_BYTES, ReadTimeout, waited};
 use crate::clock;
+use crate::diagnosis;
 use crate::trouble::Trouble;
 
 struct Udp {
@@ -31,11 +32,11 @@ pub(super) fn open(address: &str) -> Result<Box<dyn Line>, Trouble> {
         line.knock()?;
         Ok(line)
     };
-    calling().map(|line| Box::new(line) as Box<dyn Line>).map_err(|error| Trouble::opening(address, &error))
+    calling().map(|line| Box::new(line) as Box<dyn Line>).map_err(|error| diagnosis::opening(address, &error))
 }
 
 pub(super) fn listen(address: &str) -> Result<Box<dyn Line>, Trouble> {
-    let socket = UdpSocket::bind(address).map_err(|error| Trouble::opening(address, &error))?;
+    let socket = UdpSocket::bind(address).map_err(|error| diagnosis::opening(address, &error))?;
     Ok(Box::new(Udp { socket, timeout: ReadTimeout::default(), peer: None, calls: false }))
 }
 

@@ -1,4 +1,4 @@
-//! What a person reads of a machine that is made of files.
+//! Text and JSON for a machine that is made of files.
 
 use std::fs;
 use std::os::unix::fs::{MetadataExt as _, PermissionsExt as _, symlink};
@@ -90,8 +90,8 @@ impl Tree {
 
 fn sensor(machine: &Machine, id: &str, connect: &str) -> Sensor {
     let state = presence(machine, &Connect::parse(connect).unwrap()).map(|presence| match presence {
-        Presence::There(name) => State::There(name),
-        Presence::Elsewhere => State::NotAsked,
+        Presence::There(name) => State::Present(name),
+        Presence::Elsewhere => State::NotProbed,
     });
     Sensor { id: id.to_owned(), connect: connect.to_owned(), state }
 }
@@ -122,7 +122,7 @@ fn inventory() -> Inventory {
 }
 
 #[test]
-fn each_device_is_told_with_what_is_wrong_and_what_mends_it() {
+fn each_device_is_listed_with_its_errors_and_their_fixes() {
     assert_snapshot!(text(&inventory()), @r#"
     Serial ports
       /dev/ttyUSB0  FT230X Basic UART
@@ -136,36 +136,36 @@ fn each_device_is_told_with_what_is_wrong_and_what_mends_it() {
         connect = "hid:1209:0001:HR-0001"
         USB         1209:0001:HR-0001
         usage page  0x7f00
-        rights      root:dialout 600, not for this user
+        rights      root:dialout 600, this user may not open it
         PROBLEM     opening /dev/hidraw0: this user may not open it
-        mend by     install deploy/udev/70-headrace.rules, with the ids of this device in it, and sudo udevadm trigger
+        fix         install deploy/udev/70-headrace.rules, with the ids of this device in it, and sudo udevadm trigger
     CAN interfaces
       can0  an adapter
         connect = "can:can0"
         state       down
         PROBLEM     opening can0: the interface is down
-        mend by     sudo ip link set can0 up type can bitrate 250000, with the rate of the bus
+        fix         sudo ip link set can0 up type can bitrate 250000, with the rate of the bus
     I2C buses
       /dev/i2c-1  bcm2835 (i2c@7e804000)
         connect = "i2c:/dev/i2c-1:ADDRESS"
         PROBLEM     opening /dev/i2c-1: the bus has no device file
-        mend by     sudo modprobe i2c-dev; to have it at each start: echo i2c-dev | sudo tee /etc/modules-load.d/i2c.conf
+        fix         sudo modprobe i2c-dev; to have it at each start: echo i2c-dev | sudo tee /etc/modules-load.d/i2c.conf
     Addresses
       tcp:192.168.0.5:4040
         answers     Imagenex 881 family, head_id = 0x10
       udp:192.168.2.2:9090
-        answers     nothing; is it switched on?
+        answers     no answer; is it powered?
       udp:192.168.2.2:9091
-        answers     812 bytes that no kind of ours understands
+        answers     812 bytes of an unknown protocol
     Sensors
-      ping_left  serial:usb:0403:6015:DM00QXYZ: there, /dev/ttyUSB0
+      ping_left  serial:usb:0403:6015:DM00QXYZ: present, /dev/ttyUSB0
       imu        can:can0
         PROBLEM     opening can0: the interface is down
-        mend by     sudo ip link set can0 up type can bitrate 250000, with the rate of the bus
+        fix         sudo ip link set can0 up type can bitrate 250000, with the rate of the bus
       tether     hid:1209:0001
         PROBLEM     opening /dev/hidraw0: this user may not open it
-        mend by     install deploy/udev/70-headrace.rules, with the ids of this device in it, and sudo udevadm trigger
-      front      tcp:192.168.0.5:4040: an address; only run and --probe can tell
+        fix         install deploy/udev/70-headrace.rules, with the ids of this device in it, and sudo udevadm trigger
+      front      tcp:192.168.0.5:4040: network address, not probed (--probe)
     "#);
 }
 
@@ -180,7 +180,7 @@ fn a_machine_without_anything_says_so() {
 }
 
 #[test]
-fn a_sensor_whose_port_is_not_well_fails_the_command() {
+fn a_sensor_whose_port_is_not_ready_fails_the_command() {
     let mut inventory = inventory();
     assert_eq!(inventory.exit_code(), 1);
     let shown = inventory.json();

@@ -1,24 +1,24 @@
-//! What is asked on the lines: each kind of device that can be.
+//! Probes of the device kinds, and the ports and addresses that they are sent to.
 
 use headrace_ports::{Found, probe};
 use headrace_sensor::connect::Connect;
 use headrace_sensor::driver::{Carrier, Probe};
 
-use super::Asked;
+use super::state::Probed;
 use crate::devices::KINDS;
 
-/// What can be asked by kind, in the order in which it is.
+/// Probes of all kinds that have one, in the order in which they are sent.
 fn all() -> Vec<Box<dyn Probe>> {
     KINDS.iter().filter_map(|kind| kind.probe()).collect()
 }
 
-/// What asks for a kind that a vehicle file names, if anything does.
+/// The probe of a device kind by its name in vehicle files; `None` where it has none.
 pub(super) fn kind(name: &str) -> Option<Box<dyn Probe>> {
     KINDS.iter().find(|kind| kind.name() == name)?.probe()
 }
 
-/// Asks on a serial port that may be opened; on others nothing can be.
-pub(super) fn port(found: &Found) -> Option<Asked> {
+/// Probes a serial port that may be opened; `None` for other ports.
+pub(super) fn port(found: &Found) -> Option<Probed> {
     if found.carrier != Carrier::Serial || !found.troubles.is_empty() {
         return None;
     }
@@ -26,7 +26,7 @@ pub(super) fn port(found: &Found) -> Option<Asked> {
     Some(address(&connect))
 }
 
-/// Asks at an address.
-pub(super) fn address(connect: &Connect) -> Asked {
+/// Probes an address.
+pub(super) fn address(connect: &Connect) -> Probed {
     probe(connect, &mut all())
 }

@@ -1,12 +1,12 @@
-//! What `headrace devices` says to people: a block for each device, with what is wrong and what mends it under it.
+//! Text of `headrace devices`: a block for each device, with its errors and what fixes them.
 
 use headrace_ports::{Answer, Found, Trouble};
 use headrace_sensor::driver::Carrier;
 
-use super::{Asked, Inventory, Sensor, State};
+use super::state::{Inventory, Probed, Sensor, State};
 use crate::output::append;
 
-/// Where values begin, below a device's name.
+/// Width of the key column, characters.
 const KEY: usize = 10;
 
 const CARRIERS: [(Carrier, &str); 4] = [
@@ -16,7 +16,7 @@ const CARRIERS: [(Carrier, &str); 4] = [
     (Carrier::I2c, "I2C buses"),
 ];
 
-/// All of it.
+/// The whole text.
 pub(super) fn text(inventory: &Inventory) -> String {
     let mut text = String::new();
     for (carrier, title) in CARRIERS {
@@ -26,28 +26,28 @@ pub(super) fn text(inventory: &Inventory) -> String {
             continue;
         }
         append(&mut text, format_args!("{title}\n"));
-        for (found, asked) in found {
-            device(&mut text, found, asked.as_ref());
+        for (found, probed) in found {
+            device(&mut text, found, probed.as_ref());
         }
     }
     if !inventory.addresses.is_empty() {
         append(&mut text, format_args!("Addresses\n"));
-        for (connect, asked) in &inventory.addresses {
+        for (connect, probed) in &inventory.addresses {
             append(&mut text, format_args!("  {connect}\n"));
-            answer(&mut text, asked);
+            answer(&mut text, probed);
         }
     }
     if let Some(sensors) = &inventory.sensors {
         append(&mut text, format_args!("Sensors\n"));
         let width = sensors.iter().map(|sensor| sensor.id.len()).max().unwrap_or(0);
         for sensor in sensors {
-            say_sensor(&mut text, sensor, width);
+            sensor_line(&mut text, sensor, width);
         }
     }
     text
 }
 
-fn device(text: &mut String, found: &Found, asked: Option<&Asked>) {
+fn device(text: &mut String, found: &Found, probed: Option<&Probed>) {
     let says = found.says.as_ref().map(|says| format!("  {says}")).unwrap_or_default();
     append(text, format_args!("  {}{says}\n", found.name));
     if let Some(connect) = &found.connect {
@@ -57,14 +57,14 @@ fn device(text: &mut String, found: &Found, asked: Option<&Asked>) {
         row(text, what, value);
     }
     if let Some(rights) = &found.rights {
-        let may = if rights.may_open { "this user may open it" } else { "not for this user" };
+        let may = if rights.may_open { "this user may open it" } else { "this user may not open it" };
         row(text, "rights", &format!("{}:{} {:03o}, {may}", rights.owner, rights.group, rights.mode));
     }
     for wrong in &found.troubles {
         trouble(text, wrong);
     }
-    if let Some(asked) = asked {
-        answer(text, asked);
+    if let Some(probed) = probed {
+        answer(text, probed);
     }
 }
 
@@ -75,31 +75,31 @@ fn row(text: &mut String, what: &str, value: &str) {
 fn trouble(text: &mut String, trouble: &Trouble) {
     row(text, "PROBLEM", &trouble.why);
     if let Some(remedy) = &trouble.remedy {
-        row(text, "mend by", remedy);
+        row(text, "fix", remedy);
     }
 }
 
-fn answer(text: &mut String, asked: &Asked) {
-    match asked {
-        Ok(answer) => row(text, "answers", &answer_words(answer)),
+fn answer(text: &mut String, probed: &Probed) {
+    match probed {
+        Ok(answer) => row(text, "answers", &answer_text(answer)),
         Err(wrong) => trouble(text, wrong),
     }
 }
 
-fn answer_words(answer: &Answer) -> String {
+fn answer_text(answer: &Answer) -> String {
     match answer {
         Answer::Is(identity) => identity.clone(),
-        Answer::Unknown(bytes) => format!("{bytes} bytes that no kind of ours understands"),
-        Answer::Silence => "nothing; is it switched on?".to_owned(),
+        Answer::Unknown(bytes) => format!("{bytes} bytes of an unknown protocol"),
+        Answer::Silence => "no answer; is it powered?".to_owned(),
     }
 }
 
-fn say_sensor(text: &mut String, sensor: &Sensor, width: usize) {
+fn sensor_line(text: &mut String, sensor: &Sensor, width: usize) {
     let Sensor { id, connect, state } = sensor;
     let state = match state {
-        Ok(State::There(name)) => format!("there, {name}"),
-        Ok(State::Answered(answer)) => answer_words(answer),
-        Ok(State::NotAsked) => "an address; only run and --probe can tell".to_owned(),
+        Ok(State::Present(name)) => format!("present, {name}"),
+        Ok(State::Answered(answer)) => answer_text(answer),
+        Ok(State::NotProbed) => "network address, not probed (--probe)".to_owned(),
         Err(wrong) => {
             append(text, format_args!("  {id:<width$}  {connect}\n"));
             return trouble(text, wrong);

@@ -1,4 +1,5 @@
-//! What is said to the pilot, in words: on the terminal, and in the log for people's viewers.
+//! Texts for the pilot, with figures and units: the one table of causes, remedies and advice in words. The terminal, the log for
+//! viewers and the summary of a report use it; the words in JSON are the enums' `as_str`.
 
 use super::advice_log::AdviceEntry;
 use super::alerts::AlertKind;
@@ -15,7 +16,7 @@ pub fn station(chainage_m: f64) -> String {
     format!("{sign}{kilometres:.0}+{metres:06.2}")
 }
 
-/// What the words for a cause need of its evidence.
+/// The figures of a cause's evidence that its text states.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CauseFigures {
     /// The cause.
@@ -39,8 +40,8 @@ impl From<&Evidence> for CauseFigures {
     }
 }
 
-/// A cause in a pilot's words.
-pub fn cause_words(figures: &CauseFigures) -> String {
+/// A cause, with its figures.
+pub fn cause_text(figures: &CauseFigures) -> String {
     match figures.cause {
         Cause::TooFast => format!("too fast ({:.2} m/s)", figures.speed_mps),
         Cause::AngularStep => format!("steps of {:.2} m along the wall", figures.t_y_m),
@@ -55,6 +56,40 @@ pub fn cause_words(figures: &CauseFigures) -> String {
         Cause::Phase => format!("heads out of phase ({:.2} m/s)", figures.speed_mps),
         Cause::PositionLost => "position lost".to_owned(),
         Cause::NotPassed => "not passed on both sides".to_owned(),
+    }
+}
+
+/// What to do about a missed stretch that begins at `start_m`, m, and at which speed, m/s; zero where no speed is known to
+/// meet the target.
+pub fn action_text(action: Action, start_m: f64, at_most_mps: f64) -> String {
+    let start = station(start_m);
+    let text = match action {
+        // The speed is for the present mode and range setting.
+        Action::FinerMode => return "slower won't help, a finer mode will".to_owned(),
+        Action::LongerRange => return "set a longer range".to_owned(),
+        Action::Slower if at_most_mps > 0.0 => format!("go back to {start}, then"),
+        Action::Slower => format!("go back to {start}"),
+        Action::OtherSide => format!("pass {start} again turned or rolled,"),
+        Action::Middle => format!("go back to {start}, then in the middle and steady,"),
+        Action::InPhase => format!("go back to {start}, then with the heads in phase,"),
+        Action::Head => format!("go back to {start}, then with that head repaired or without it,"),
+        Action::Position => format!("pass {start} again once the position is back,"),
+        Action::Again => "pass it again from end to end,".to_owned(),
+    };
+    if at_most_mps > 0.0 {
+        format!("{text} at most {at_most_mps:.2} m/s")
+    } else {
+        text.trim_end_matches(',').to_owned()
+    }
+}
+
+/// What would help where slower doesn't.
+fn remedy_text(remedy: Option<Remedy>) -> String {
+    match remedy {
+        Some(Remedy::Steady) => "hold the heading, the beams swing".to_owned(),
+        Some(Remedy::Centre) => "go to the middle of the tunnel".to_owned(),
+        Some(Remedy::Mode(mode)) => format!("set the heads to {}", mode.as_str().to_uppercase()),
+        None => "no mode meets the target here".to_owned(),
     }
 }
 
@@ -73,41 +108,25 @@ pub struct Missed {
     pub v_max_mps: f64,
 }
 
-/// What is said when a stretch is flagged.
-pub fn flag_words(missed: &Missed, profile: &Profile) -> String {
+/// A flag: where, why, and what to do.
+pub fn flag_text(missed: &Missed, profile: &Profile) -> String {
+    let Missed { start_m, figures, hole_arc_m, target_m, v_max_mps } = missed;
     format!(
-        "ch {}  {}: holes over {} m at {} o'clock; {}",
-        station(missed.start_m),
-        cause_words(&missed.figures),
-        missed.target_m,
-        profile.clock(missed.hole_arc_m),
-        what_to_do(missed),
+        "ch {}  {}: holes over {target_m} m at {} o'clock; {}",
+        station(*start_m),
+        cause_text(figures),
+        profile.clock(*hole_arc_m),
+        action_text(Action::of(figures.cause), *start_m, *v_max_mps),
     )
 }
 
-/// What a pilot does about a missed stretch.
-fn what_to_do(missed: &Missed) -> String {
-    let Missed { start_m, v_max_mps, figures: CauseFigures { cause, .. }, .. } = *missed;
-    match Action::of(cause) {
-        Action::FinerMode => "slower won't help, a finer mode will".to_owned(),
-        Action::LongerRange => "set a longer range".to_owned(),
-        Action::Again if cause == Cause::NotPassed => "pass it again from end to end".to_owned(),
-        Action::OtherSide => format!("pass {} again turned or rolled", station(start_m)),
-        Action::Position => format!("pass {} again once the position is back", station(start_m)),
-        _ if v_max_mps > 0.0 => {
-            format!("go back to {}, then at most {v_max_mps:.2} m/s", station(start_m))
-        }
-        _ => format!("go back to {}", station(start_m)),
-    }
-}
-
-/// What is said when a stretch was passed again and is flagged no more.
-pub fn cleared_words(from_m: f64, to_m: f64) -> String {
+/// A stretch that was passed again and is no longer flagged.
+pub fn cleared_text(from_m: f64, to_m: f64) -> String {
     format!("cleared  ch {} to {}", station(from_m), station(to_m))
 }
 
-/// What is said of something wrong at a chainage, by so much, m.
-pub fn alert_words(kind: AlertKind, x_m: f64, off_m: f64) -> String {
+/// An alert at a chainage, m, with how far off something is, m.
+pub fn alert_text(kind: AlertKind, x_m: f64, off_m: f64) -> String {
     let x = station(x_m);
     match kind {
         AlertKind::OutsideTunnel => {
@@ -119,7 +138,7 @@ pub fn alert_words(kind: AlertKind, x_m: f64, off_m: f64) -> String {
     }
 }
 
-/// What the words for advice need of it.
+/// The figures of advice that its text states.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AdviceFigures {
     /// Speed now, m/s.
@@ -156,8 +175,8 @@ impl From<&AdviceEntry> for AdviceFigures {
     }
 }
 
-/// Advice in a pilot's words.
-pub fn advice_words(advice: &AdviceFigures, profile: &Profile) -> String {
+/// Advice, with its figures.
+pub fn advice_text(advice: &AdviceFigures, profile: &Profile) -> String {
     match advice.reason {
         Reason::HelixPitch if advice.will_exceed && advice.speed_mps.abs() > advice.v_max_mps => {
             format!("TOO FAST: at most {:.2} m/s", advice.v_max_mps)
@@ -168,20 +187,16 @@ pub fn advice_words(advice: &AdviceFigures, profile: &Profile) -> String {
         }
         Reason::HelixPitch => format!("may go {:.2} m/s (distance between turns)", advice.v_max_mps),
         Reason::AngularStep => {
-            let remedy = match advice.remedy {
-                Some(Remedy::Steady) => {
-                    return "slower won't help: hold the heading, the beams swing".to_owned();
-                }
-                Some(Remedy::Centre) => "go to the middle of the tunnel".to_owned(),
-                Some(Remedy::Mode(mode)) => format!("set the heads to {}", mode.as_str().to_uppercase()),
-                None => "no mode meets the target here".to_owned(),
-            };
-            match advice.unseen_m {
-                Some([width_m, sigma_m]) => {
-                    let clock = profile.clock(sigma_m);
+            let remedy = remedy_text(advice.remedy);
+            match (advice.remedy, advice.unseen_m) {
+                (Some(Remedy::Steady), _) => format!("slower won't help: {remedy}"),
+                (_, Some([width_m, arc_m])) => {
+                    let clock = profile.clock(arc_m);
                     format!("slower won't help: no head sees {width_m:.2} m of the wall at {clock}; {remedy}")
                 }
-                None => format!("slower won't help: steps of {:.2} m along the wall; {remedy}", advice.t_y_m),
+                (_, None) => {
+                    format!("slower won't help: steps of {:.2} m along the wall; {remedy}", advice.t_y_m)
+                }
             }
         }
         Reason::NoHeadingOrFix => "no speed can be given: no position or heading".to_owned(),
@@ -204,5 +219,22 @@ mod tests {
         ] {
             assert_eq!(station(chainage_m), text);
         }
+    }
+    #[test]
+    fn every_action_says_what_to_do_and_a_speed_where_it_holds() {
+        let at = |action, at_most_mps| action_text(action, 1240.5, at_most_mps);
+        for action in Action::ALL {
+            let without = at(action, 0.0);
+            assert!(!without.contains("m/s") && !without.ends_with([',', ' ']), "{without:?}");
+            let with = at(action, 0.25);
+            let has_speed = !matches!(action, Action::FinerMode | Action::LongerRange);
+            assert_eq!(with.ends_with("at most 0.25 m/s"), has_speed, "{with:?}");
+        }
+        assert_eq!(at(Action::Slower, 0.25), "go back to 1+240.50, then at most 0.25 m/s");
+        assert_eq!(
+            at(Action::Middle, 0.25),
+            "go back to 1+240.50, then in the middle and steady, at most 0.25 m/s"
+        );
+        assert_eq!(at(Action::Again, 0.0), "pass it again from end to end");
     }
 }

@@ -1,0 +1,65 @@
+//! Sets of a vehicle's heads.
+
+use serde::{Deserialize, Serialize};
+
+/// The most heads of one vehicle.
+pub const MAX_HEADS: usize = 8;
+
+/// A set of heads by their numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct HeadSet(u8);
+
+impl HeadSet {
+    /// The heads 0 to `count` - 1.
+    pub fn first(count: usize) -> Self {
+        (0..count).fold(Self::default(), Self::with)
+    }
+
+    /// This set and one more head; numbers from [`MAX_HEADS`] up are left out.
+    #[must_use]
+    pub fn with(self, head: usize) -> Self {
+        Self(self.0 | Self::bit(head))
+    }
+
+    /// This set without a head.
+    #[must_use]
+    pub fn without(self, head: usize) -> Self {
+        Self(self.0 & !Self::bit(head))
+    }
+
+    /// Whether a head is of it.
+    pub fn has(self, head: usize) -> bool {
+        self.0 & Self::bit(head) != 0
+    }
+
+    /// How many heads it has.
+    pub fn len(self) -> usize {
+        self.0.count_ones() as usize
+    }
+
+    /// Whether it has none.
+    pub fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+
+    /// The heads' numbers, growing.
+    pub fn iter(self) -> impl Iterator<Item = usize> {
+        (0..MAX_HEADS).filter(move |head| self.has(*head))
+    }
+
+    fn bit(head: usize) -> u8 {
+        if head < MAX_HEADS { 1 << head } else { 0 }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_set_of_heads_counts_and_lists_them() {
+        let set = HeadSet::first(4).without(1).with(7).with(99);
+        assert_eq!(set.iter().collect::<Vec<_>>(), [0, 2, 3, 7]);
+        assert_eq!((set.len(), set.is_empty(), HeadSet::default().is_empty()), (4, false, true));
+    }
+}

@@ -1,0 +1,14 @@
+//! Colours of figures.
+
+/// A colour as red, green and blue.
+#[derive(Debug, Clone, Copy)]
+pub struct Colour(pub u8, pub u8, pub u8);
+
+/// Text and the main curves.
+pub const BLACK: Colour = Colour(0, 0, 0);
+/// Small text, axes, targets.
+pub const DIM: Colour = Colour(85, 85, 85);
+/// Leaders from labels, what is hidden.
+pub const PALE: Colour = Colour(150, 150, 150);
+/// The paper.
+pub const WHITE: Colour = Colour(255, 255, 255);

@@ -1,0 +1,67 @@
+//! How a head moves: a ping at its position, then a step as the command says, within the command's sector.
+
+use crate::codec::{COUNTS_PER_TURN, Command, ZERO_COUNT};
+use crate::settings::counts_of_rad;
+
+/// A ping's position, and the direction of the step after it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Ping {
+    /// Its position, 0 to 1199.
+    pub position: u16,
+    /// Whether the step is towards growing positions.
+    pub clockwise: bool,
+}
+
+/// A head's position and direction.
+#[derive(Debug, Clone)]
+pub struct Head {
+    position: i32,
+    growing: bool,
+}
+
+impl Head {
+    /// A head at `position` (0 to 1199) that would step towards growing positions, or the other way.
+    pub fn new(position: i32, growing: bool) -> Self {
+        Self { position: position.rem_euclid(COUNTS_PER_TURN), growing }
+    }
+
+    /// Where it is, 0 to 1199.
+    pub fn position(&self) -> i32 {
+        self.position
+    }
+
+    /// Whether its next step goes towards growing positions.
+    pub fn growing(&self) -> bool {
+        self.growing
+    }
+
+    /// Obeys one command: pings where it is, and steps.
+    pub fn obey(&mut self, command: &Command) -> Ping {
+        self.growing ^= command.reverse;
+        let next = self.next_position(command);
+        let position = u16::try_from(self.position).unwrap_or(0);
+        self.position = next;
+        Ping { position, clockwise: self.growing }
+    }
+
+    /// Where the command's step leads; turns round at the ends of a sector narrower than the whole turn.
+    fn next_position(&mut self, command: &Command) -> i32 {
+        let step = command.step_counts();
+        if command.sector_deg >= 360.0 {
+            let stepped = if self.growing { self.position + step } else { self.position - step };
+            return stepped.rem_euclid(COUNTS_PER_TURN);
+        }
+        let half = counts_of_deg(command.sector_deg) / 2;
+        let centre = counts_of_deg(command.train_deg) + ZERO_COUNT;
+        let turn = COUNTS_PER_TURN;
+        let along = (self.position - centre + turn / 2).rem_euclid(turn) - turn / 2;
+        let beyond = if self.growing { along >= half } else { along <= -half };
+        self.growing ^= beyond;
+        let stepped = if self.growing { (along + step).min(half) } else { (along - step).max(-half) };
+        (centre + stepped).rem_euclid(turn)
+    }
+}
+
+fn counts_of_deg(angle_deg: f64) -> i32 {
+    counts_of_rad(angle_deg.to_radians())
+}

@@ -1,0 +1,123 @@
+//! Log messages: tracing's events on stderr, filtered by `-v`, `-q` and `RUST_LOG`.
+
+use std::io::{self, IsTerminal as _, Write};
+
+use tracing::level_filters::LevelFilter;
+use tracing_subscriber::filter::Targets;
+use tracing_subscriber::fmt;
+use tracing_subscriber::prelude::*;
+
+use crate::cli::Verbosity;
+use crate::transient;
+
+/// The variable that filters by crate or module.
+const VARIABLE: &str = "RUST_LOG";
+/// What the targets of this program's crates begin with.
+const OURS: &str = "headrace";
+
+/// Writes log messages to stderr from here on. A caller of this library that has its own subscriber keeps it.
+pub(crate) fn start(verbosity: &Verbosity) {
+    let (filter, error) = filter(verbosity.level(), std::env::var(VARIABLE).ok().as_deref());
+    let colour =
+        io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
+    let layer = fmt::layer().with_ansi(colour).with_writer(|| Stderr);
+    if tracing_subscriber::registry().with(layer.with_filter(filter)).try_init().is_err() {
+        return;
+    }
+    if let Some(error) = error {
+        tracing::warn!("{error}");
+    }
+}
+
+/// Warnings of everything; this program's crates at `level` where it is given; and what `RUST_LOG` names as that says. Gives
+/// also what is wrong with `RUST_LOG`, which is then disregarded.
+fn filter(level: Option<LevelFilter>, variable: Option<&str>) -> (Targets, Option<String>) {
+    let parsed = match variable.filter(|text| !text.trim().is_empty()) {
+        Some(text) => text.parse::<Targets>().map_err(|error| {
+            format!(
+                "{VARIABLE} = {text:?}: {error}; expected LEVEL or CRATE=LEVEL, separated by commas; ignored"
+            )
+        }),
+        None => Ok(Targets::new()),
+    };
+    let (mut filter, error) = match parsed {
+        Ok(filter) => (filter, None),
+        Err(error) => (Targets::new(), Some(error)),
+    };
+    if filter.default_level().is_none() {
+        filter = filter.with_default(LevelFilter::WARN);
+    }
+    if let Some(level) = level {
+        filter = filter.with_target(OURS, level);
+    }
+    (filter, error)
+}
+
+/// Stderr, which log messages share with lines that overwrite themselves. What can't be written is dropped: a closed stderr
+/// must not end a dive.
+struct Stderr;
+
+impl Write for Stderr {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let mut stderr = io::stderr().lock();
+        let cleared = if stderr.is_terminal() && transient::take() {
+            stderr.write_all(transient::CLEAR)
+        } else {
+            Ok(())
+        };
+        cleared.and_then(|()| stderr.write_all(bytes)).ok();
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use tracing::Level;
+
+    use super::*;
+
+    fn enabled(level: Option<LevelFilter>, variable: Option<&str>) -> impl Fn(&str, Level) -> bool {
+        let (filter, error) = filter(level, variable);
+        assert_eq!(error, None);
+        move |target, level| filter.would_enable(target, &level)
+    }
+
+    #[test]
+    fn only_warnings_without_flags() {
+        let shows = enabled(None, None);
+        assert!(shows("headrace_replay::log", Level::WARN) && shows("other", Level::WARN));
+        assert!(!shows("headrace", Level::INFO) && !shows("other", Level::INFO));
+        assert!(!enabled(None, Some(""))("headrace", Level::INFO));
+    }
+
+    #[test]
+    fn flags_are_for_all_crates_of_this_program() {
+        let shows = enabled(Some(LevelFilter::DEBUG), None);
+        assert!(shows("headrace_ports::service", Level::DEBUG) && shows("headrace", Level::DEBUG));
+        assert!(!shows("headrace", Level::TRACE) && !shows("other", Level::INFO));
+        assert!(!enabled(Some(LevelFilter::ERROR), None)("headrace_replay", Level::WARN));
+    }
+
+    #[test]
+    fn the_variable_is_for_the_crates_that_it_names() {
+        let shows = enabled(None, Some("headrace_ports=debug"));
+        assert!(shows("headrace_ports::service", Level::DEBUG) && shows("headrace_replay", Level::WARN));
+        assert!(!shows("headrace_replay", Level::INFO));
+        let shows = enabled(Some(LevelFilter::ERROR), Some("debug,headrace_ports=trace"));
+        assert!(shows("headrace_ports", Level::TRACE) && shows("other", Level::DEBUG));
+        assert!(!shows("headrace_replay", Level::WARN), "-q outweighs the bare level");
+    }
+
+    #[test]
+    fn a_variable_that_cannot_be_read_is_named_and_ignored() {
+        let (filter, error) = filter(None, Some("headrace=loud"));
+        assert!(error.unwrap().starts_with("RUST_LOG = \"headrace=loud\": "));
+        assert!(
+            filter.would_enable("headrace", &Level::WARN) && !filter.would_enable("headrace", &Level::INFO)
+        );
+    }
+}

@@ -1,0 +1,26 @@
+//! What a plan found, for the table, the JSON and the pictures.
+
+use headrace_sampling::plan::{Answer, Briefing, Planner, Question};
+
+/// Results of one planning run.
+pub(super) struct Findings {
+    pub(super) planner: Planner,
+    /// Ids of the heads.
+    pub(super) heads: Vec<String>,
+    pub(super) tunnel: String,
+    /// The range setting, m.
+    pub(super) range_m: f64,
+    /// The shortest and the longest stretch of perimeter that a beam covers, m.
+    pub(super) footprints_m: [f64; 2],
+    pub(super) question: Question,
+    pub(super) answers: Vec<Answer>,
+    /// The mode that briefing and pictures are for, with its speed; `None` where no mode gives one.
+    pub(super) shown: Option<(usize, f64)>,
+    pub(super) briefing: Briefing,
+}
+
+/// A speed as it is printed: whole millimetres a second, rounded down, so that what is printed meets the target, too.
+pub(super) fn printed_mps(speed_mps: f64) -> f64 {
+    let down = (speed_mps * 1000.0 + 1e-6).floor() / 1000.0;
+    if down > 0.0 { down } else { speed_mps }
+}

@@ -1,0 +1,53 @@
+//! Vehicle files: from disk, or attached to a log.
+
+use std::path::Path;
+
+use headrace_config::{Document, Loader};
+use headrace_replay::log::LogInfo;
+use headrace_replay::log::format::VEHICLE_FILE;
+use headrace_vehicle::VehicleConfig;
+
+use crate::devices::KINDS;
+use crate::failure::Failure;
+use crate::files;
+
+/// Reads and checks a vehicle file; gives its text too.
+pub(crate) fn read(path: &Path) -> Result<(String, VehicleConfig), Failure> {
+    let text = files::read(path)?;
+    let vehicle = parse(&path.display().to_string(), &text, &files::beside(path))?;
+    Ok((text, vehicle))
+}
+
+/// Parses the vehicle file attached to a log; gives its text too.
+///
+/// Errors: none is attached or readable (`losses` say what damaged the log); it is wrong.
+pub(crate) fn attached(
+    info: &LogInfo,
+    losses: &[String],
+    log: &Path,
+) -> Result<(String, VehicleConfig), Failure> {
+    let text = info.vehicle_toml.clone().ok_or_else(|| {
+        let damage =
+            losses.first().map(|loss| format!(" can be read from this log, which is damaged ({loss})"));
+        let which = damage.unwrap_or_else(|| " is attached to this log".to_owned());
+        Failure::Usage(format!("reading {}: no vehicle file{which}; give one with --vehicle", log.display()))
+    })?;
+    // As if the log were a folder.
+    let vehicle =
+        parse(&format!("{}/{VEHICLE_FILE}", log.display()), &text, &files::attached(&info.attachments))?;
+    Ok((text, vehicle))
+}
+
+fn parse(name: &str, text: &str, load: Loader<'_>) -> Result<VehicleConfig, Failure> {
+    let vehicle = VehicleConfig::parse(Document::new(name, text), &KINDS, load)?;
+    tracing::info!(
+        file = name,
+        vehicle = vehicle.name,
+        sensors = vehicle.sensors.len(),
+        "vehicle file parsed"
+    );
+    for (number, sensor) in vehicle.sensor_configs.iter().enumerate() {
+        tracing::debug!(number, id = sensor.id, plugin = sensor.plugin, connect = sensor.connect, "sensor");
+    }
+    Ok(vehicle)
+}
