@@ -1,10 +1,11 @@
 //! The formats on bytes of their own making, and on any.
 
 use headrace_config::Document;
-use headrace_mavlink::frame::{Frame, Version};
+use headrace_mavlink::MavHeader;
+use headrace_mavlink::dialect::ATTITUDE_DATA;
+use headrace_mavlink::message::Message;
 use headrace_replay::import::csv::Csv;
 use headrace_replay::import::{Entry, Format, Step};
-use headrace_sensor::codec::Bytes;
 use headrace_vehicle::VehicleConfig;
 use proptest::prelude::*;
 
@@ -33,16 +34,10 @@ fn cut(format: &mut dyn Format, mut file: &[u8]) -> (Vec<Entry>, Vec<(usize, &'s
 }
 
 fn frame(sequence: u8) -> Vec<u8> {
-    let payload = Bytes::new(&[0; 28]).unwrap();
-    let frame = Frame {
-        version: Version::V2(None),
-        sequence,
-        system_id: 1,
-        component_id: 1,
-        message_id: 30,
-        payload,
-    };
-    frame.encode().unwrap().as_slice().to_vec()
+    // Its last field isn't zero, so that all 28 bytes are sent.
+    let attitude = ATTITUDE_DATA { yawspeed: 1.0, ..ATTITUDE_DATA::DEFAULT };
+    let frame = Message::Attitude(attitude).to_frame(MavHeader { system_id: 1, component_id: 1, sequence });
+    frame.raw_bytes().to_vec()
 }
 
 fn tlog(numbers: core::ops::Range<u8>) -> Vec<u8> {

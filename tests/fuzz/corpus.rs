@@ -5,9 +5,10 @@ use std::io::Cursor;
 use std::path::Path;
 
 use headrace_geometry::time::DurNs;
-use headrace_mavlink::frame::{Frame, Version};
+use headrace_mavlink::MavHeader;
+use headrace_mavlink::dialect::ATTITUDE_DATA;
+use headrace_mavlink::message::Message;
 use headrace_replay::log::{LogHeader, LogWriter, SourceInfo};
-use headrace_sensor::codec::Bytes;
 use mcap::{Compression, WriteOptions};
 
 use crate::BEGIN;
@@ -151,10 +152,10 @@ fn foreign(messages: u64, set: impl FnOnce(WriteOptions) -> WriteOptions) -> Vec
 }
 
 fn frame(sequence: u8) -> Vec<u8> {
-    let payload = Bytes::new(&[0; 28]).unwrap();
-    let version = Version::V2(None);
-    let frame = Frame { version, sequence, system_id: 1, component_id: 1, message_id: 30, payload };
-    frame.encode().unwrap().as_slice().to_vec()
+    // Its last field isn't zero, so that all 28 bytes are sent.
+    let attitude = ATTITUDE_DATA { yawspeed: 1.0, ..ATTITUDE_DATA::DEFAULT };
+    let frame = Message::Attitude(attitude).to_frame(MavHeader { system_id: 1, component_id: 1, sequence });
+    frame.raw_bytes().to_vec()
 }
 
 fn text(text: &str) -> Vec<u8> {

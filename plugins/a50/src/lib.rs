@@ -1,14 +1,13 @@
 //! Water Linked DVL A50, a velocity log, over TCP: lines of JSON to velocity over ground, and back.
 //!
-//! [`json`] looks through a line without keeping anything, [`report`] finds in it what is of use, [`decoder`] makes
-//! readings for the loop, [`emulator`] is the device's side for simulations and [`plugin`] reads the vehicle file.
+//! [`report`] reads velocity reports out of lines, [`decoder`] makes readings for the loop, [`emulator`] is the device's side
+//! for simulations and [`plugin`] reads the vehicle file.
 
 #![cfg_attr(not(test), warn(clippy::indexing_slicing))]
 
 pub mod decoder;
 pub mod driver;
 pub mod emulator;
-pub mod json;
 pub mod plugin;
 pub mod report;
 

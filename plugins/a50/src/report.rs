@@ -4,12 +4,17 @@
 
 use headrace_sensor::codec::{Framed, Framing, Verdict};
 use headrace_sensor::geometry::math;
+use hifijson::num::LexWrite as _;
+use hifijson::str::{Lex as _, LexWrite as _};
+use hifijson::token::Lex as _;
+use hifijson::{Error, Expect, SliceLexer};
 use serde::{Deserialize, Serialize};
-
-use crate::json::Cursor;
 
 /// The longest line that is taken. A velocity report has about 1,100 bytes.
 pub const MAX_LINE_BYTES: usize = 4096;
+
+/// How deep arrays and objects may be nested in a line; a report needs three levels.
+const MAX_DEPTH: usize = 8;
 
 /// What the velocity is against.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -91,30 +96,33 @@ struct Found {
 }
 
 impl Found {
-    /// Takes the value of a key. One of an unexpected type is no report.
-    fn take(&mut self, key: &[u8], value: &mut Cursor<'_>) -> Option<()> {
+    /// Takes the value of a key, which begins with `next`. One of an unexpected type is no report.
+    fn take(&mut self, key: &[u8], next: u8, lexer: &mut SliceLexer<'_>) -> Result<(), Error> {
         let [x, y, z] = &mut self.velocity_mps;
         let [validity, transmission] = &mut self.times_us;
         match key {
-            b"vx" => *x = Some(value.number()?),
-            b"vy" => *y = Some(value.number()?),
-            b"vz" => *z = Some(value.number()?),
-            b"fom" => self.fom_mps = Some(value.number()?),
-            b"altitude" => self.altitude_m = Some(value.number()?),
-            b"transducers" => self.valid_beams = Some(valid_beams(value)?),
-            b"velocity_valid" => self.is_valid = Some(value.boolean()?),
-            b"status" => self.status = Some(u8::try_from(math::round_to_i64(value.number()?)).ok()?),
-            b"time_of_validity" => *validity = Some(math::round_to_i64(value.number()?)),
-            b"time_of_transmission" => *transmission = Some(math::round_to_i64(value.number()?)),
+            b"vx" => *x = Some(number(lexer)?),
+            b"vy" => *y = Some(number(lexer)?),
+            b"vz" => *z = Some(number(lexer)?),
+            b"fom" => self.fom_mps = Some(number(lexer)?),
+            b"altitude" => self.altitude_m = Some(number(lexer)?),
+            b"transducers" => self.valid_beams = Some(valid_beams(next, lexer)?),
+            b"velocity_valid" => self.is_valid = Some(boolean(next, lexer)?),
+            b"status" => {
+                let status = math::round_to_i64(number(lexer)?);
+                self.status = Some(u8::try_from(status).map_err(|_| Expect::Value)?);
+            }
+            b"time_of_validity" => *validity = Some(math::round_to_i64(number(lexer)?)),
+            b"time_of_transmission" => *transmission = Some(math::round_to_i64(number(lexer)?)),
             b"type" => {
-                self.against = Some(match value.text()? {
+                self.against = Some(match text(next, lexer)? {
                     b"velocity_water" => Against::Water,
                     _ => Against::Bottom,
                 });
             }
-            _ => value.skip()?,
+            _ => skip(next, lexer, MAX_DEPTH - 1)?,
         }
-        Some(())
+        Ok(())
     }
 
     /// The report, where all of it was there.
@@ -134,40 +142,96 @@ impl Found {
     }
 }
 
-fn valid_beams(transducers: &mut Cursor<'_>) -> Option<u8> {
+fn valid_beams(next: u8, lexer: &mut SliceLexer<'_>) -> Result<u8, Error> {
     let mut valid = 0_u8;
-    transducers.array(&mut |beam| {
-        beam.object(&mut |key, value| {
-            match key {
-                b"beam_valid" => valid = valid.checked_add(u8::from(value.boolean()?))?,
-                _ => value.skip()?,
+    lexer.expect(|_| Some(next), b'[').ok_or(Expect::Value)?;
+    lexer.seq(b']', SliceLexer::ws_peek, |next, lexer| {
+        object(next, lexer, |key, next, lexer| match key {
+            b"beam_valid" => {
+                valid = valid.checked_add(u8::from(boolean(next, lexer)?)).ok_or(Expect::Value)?;
+                Ok(())
             }
-            Some(())
+            _ => skip(next, lexer, MAX_DEPTH - 3),
         })
     })?;
-    Some(valid)
+    Ok(valid)
 }
 
-/// Whether the object's `type` is one of the velocity reports; `None` where it is no object.
-fn is_velocity(line: &[u8]) -> Option<bool> {
-    let (mut is_velocity, mut cursor) = (false, Cursor::new(line)?);
-    cursor.object(&mut |key, value| {
-        if key == b"type" {
-            is_velocity = matches!(value.text()?, b"velocity" | b"velocity_water");
-            return Some(());
-        }
-        value.skip()
+/// Whether the object's `type` is one of the velocity reports.
+fn is_velocity(line: &str) -> Result<bool, Error> {
+    let mut is_velocity = false;
+    SliceLexer::new(line.as_bytes()).exactly_one(SliceLexer::ws_peek, |next, lexer| {
+        object(next, lexer, |key, next, lexer| {
+            if key == b"type" {
+                is_velocity = matches!(text(next, lexer)?, b"velocity" | b"velocity_water");
+                return Ok(());
+            }
+            skip(next, lexer, MAX_DEPTH - 1)
+        })
     })?;
-    cursor.is_at_end().then_some(is_velocity)
+    Ok(is_velocity)
 }
 
+/// What a line says; `None` where it is no object, or a velocity report that lacks something.
 fn line(line: &[u8]) -> Option<Line> {
-    if !is_velocity(line)? {
+    let line = core::str::from_utf8(line).ok()?;
+    if !is_velocity(line).ok()? {
         return Some(Line::Other);
     }
     let mut found = Found::default();
-    Cursor::new(line)?.object(&mut |key, value| found.take(key, value))?;
+    SliceLexer::new(line.as_bytes())
+        .exactly_one(SliceLexer::ws_peek, |next, lexer| {
+            object(next, lexer, |key, next, lexer| found.take(key, next, lexer))
+        })
+        .ok()?;
     found.whole().map(Line::Velocity)
+}
+
+/// Calls `field` for each key of an object, escapes as they are sent, with the first byte of the key's value, which
+/// `field` has to take.
+fn object<'a>(
+    next: u8,
+    lexer: &mut SliceLexer<'a>,
+    mut field: impl FnMut(&'a [u8], u8, &mut SliceLexer<'a>) -> Result<(), Error>,
+) -> Result<(), Error> {
+    lexer.expect(|_| Some(next), b'{').ok_or(Expect::Value)?;
+    lexer.seq(b'}', SliceLexer::ws_peek, |next, lexer| {
+        let key = text(next, lexer)?;
+        lexer.expect(SliceLexer::ws_peek, b':').ok_or(Expect::Colon)?;
+        let next = lexer.ws_peek().ok_or(Expect::Value)?;
+        field(key, next, lexer)
+    })
+}
+
+/// A string, escapes as they are sent.
+fn text<'a>(next: u8, lexer: &mut SliceLexer<'a>) -> Result<&'a [u8], Error> {
+    let mut text = <&[u8]>::default();
+    lexer.expect(|_| Some(next), b'"').ok_or(Expect::String)?;
+    lexer.str_bytes(&mut text)?;
+    Ok(text)
+}
+
+/// A number that is finite as a double.
+fn number(lexer: &mut SliceLexer<'_>) -> Result<f64, Error> {
+    let (text, _) = lexer.num_string().validated()?;
+    Ok(text.parse().ok().filter(|number: &f64| number.is_finite()).ok_or(Expect::Value)?)
+}
+
+fn boolean(next: u8, lexer: &mut SliceLexer<'_>) -> Result<bool, Error> {
+    let word = next.is_ascii_lowercase().then(|| lexer.null_or_bool());
+    Ok(word.flatten().flatten().ok_or(Expect::Value)?)
+}
+
+/// Skips a value that holds no more than `depth` levels of arrays and objects.
+fn skip(next: u8, lexer: &mut SliceLexer<'_>, depth: usize) -> Result<(), Error> {
+    match next {
+        b'[' | b'{' if depth == 0 => Err(Error::Depth),
+        b'[' => lexer.discarded().seq(b']', SliceLexer::ws_peek, |next, lexer| skip(next, lexer, depth - 1)),
+        b'{' => object(next, lexer, |_, next, lexer| skip(next, lexer, depth - 1)),
+        b'"' => Ok(lexer.discarded().str_ignore()?),
+        b'a'..=b'z' => Ok(lexer.null_or_bool().map(|_| ()).ok_or(Expect::Value)?),
+        _ => number(lexer).map(|_| ()),
+    }
 }
 
 /// How lines stand in a stream of bytes. A velocity report that lacks something is no good line.
@@ -204,6 +268,7 @@ pub(crate) mod tests {
     use headrace_sensor::codec::contract::decode_all;
     use headrace_sensor::codec::{Codec as _, CodecCounts};
     use proptest::prelude::*;
+    use serde_json::Value;
 
     use super::*;
 
@@ -290,6 +355,62 @@ pub(crate) mod tests {
         assert_eq!((got.len(), codec.counts().skipped_bytes), (1, endless.len() as u64));
     }
 
+    /// Whether a line with this value is a good one.
+    fn is_good(value: &str) -> bool {
+        line(format!("{{\"a\":{value}}}\n").as_bytes()).is_some()
+    }
+
+    #[test]
+    fn depth_is_bounded() {
+        let nested = |depth: usize| ["[".repeat(depth), "]".repeat(depth)].concat();
+        assert!(is_good(&nested(MAX_DEPTH - 1)));
+        assert!(!is_good(&nested(MAX_DEPTH)));
+        assert!(!is_good(&"[".repeat(100_000)));
+    }
+
+    #[test]
+    fn what_is_no_json_is_refused() {
+        for value in [
+            "",
+            "{",
+            "{}}",
+            "{\"a\"}",
+            "{\"a\":}",
+            "[1,]",
+            "01",
+            "1.",
+            ".5",
+            "1e",
+            "+1",
+            "NaN",
+            "1e999",
+            "tru",
+            "1 2",
+            "\"\\q\"",
+            "\"\t\"",
+            "1{\"a\":1",
+        ] {
+            assert!(!is_good(value), "{value}");
+        }
+    }
+
+    fn any_value() -> impl Strategy<Value = Value> {
+        let leaf = prop_oneof![
+            Just(Value::Null),
+            any::<bool>().prop_map(Value::from),
+            any::<i64>().prop_map(Value::from),
+            any::<f64>().prop_map(Value::from),
+            ".{0,8}".prop_map(Value::from),
+        ];
+        leaf.prop_recursive(4, 32, 5, |inner| {
+            prop_oneof![
+                proptest::collection::vec(inner.clone(), 0..5).prop_map(Value::from),
+                proptest::collection::vec(("[a-z_]{1,6}", inner), 0..5)
+                    .prop_map(|pairs| Value::Object(pairs.into_iter().collect())),
+            ]
+        })
+    }
+
     fn any_velocity() -> impl Strategy<Value = Velocity> {
         let number = || prop_oneof![-10.0..10.0_f64, any::<f64>().prop_filter("finite", |x| x.is_finite())];
         let times = proptest::option::of([0..1_i64 << 52, 0..1_i64 << 52]);
@@ -315,9 +436,29 @@ pub(crate) mod tests {
         #![proptest_config(headrace_sensor::codec::contract::config())]
 
         #[test]
+        fn what_another_writer_writes_is_json(value in any_value(), pretty in any::<bool>()) {
+            let text = if pretty { serde_json::to_string_pretty(&value) } else { serde_json::to_string(&value) };
+            prop_assert!(is_good(&text.unwrap()));
+        }
+
+        #[test]
+        fn what_is_json_here_is_json_to_another_reader(
+            value in any_value(),
+            at in any::<prop::sample::Index>(),
+            byte in any::<u8>(),
+            cut in any::<bool>(),
+        ) {
+            let mut text = format!("{{\"a\":{value}}}").into_bytes();
+            let at = at.index(text.len());
+            if cut { text.remove(at); } else { text[at] = byte; }
+            let wanted = serde_json::from_slice::<Value>(&text).is_ok_and(|value| value.is_object());
+            prop_assert_eq!(line(&text).is_some(), wanted, "{:?}", text);
+        }
+
+        #[test]
         fn fields_are_those_that_another_reader_finds(velocity in any_velocity()) {
             let line = velocity.encode();
-            let value: serde_json::Value = serde_json::from_slice(&line).unwrap();
+            let value: Value = serde_json::from_slice(&line).unwrap();
             let got = decode_all(&mut LineCodec::default(), &line)[0];
             for (key, got) in ["vx", "vy", "vz"].into_iter().zip(got.velocity_mps) {
                 prop_assert_eq!(value[key].as_f64(), Some(got));

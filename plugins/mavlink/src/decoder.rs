@@ -9,10 +9,11 @@ use headrace_sensor::reading::{Decoded, EchoRange, Packet, Reading, WaterPressur
 use headrace_sensor::stateful;
 use serde::{Deserialize, Serialize};
 
+use crate::dialect::ATTITUDE_DATA;
 use crate::frame::{Frame, Frames, MavlinkCodec};
 use crate::message::{
-    Attitude, Distance, HECTOPASCAL, Imu, ImuMessage, MILLI_G_MPS2, MILLIRADPS, Message, Pressure,
-    PressureMessage, to_ours,
+    Distance, HECTOPASCAL, Imu, ImuMessage, MILLI_G_MPS2, MILLIRADPS, Message, Pressure, PressureMessage,
+    to_ours,
 };
 
 /// A frame's bytes follow one another: the longest takes 50 ms at 57,600 baud.
@@ -148,14 +149,15 @@ impl Decoder for MavlinkDecoder {
 impl State {
     fn take(&mut self, frame: &Frame, sink: &mut dyn FnMut(Reading)) {
         let Meaning { part, system_id, component_id, .. } = self.meaning;
-        let is_ours = system_id.is_none_or(|id| id == frame.system_id)
-            && component_id.is_none_or(|id| id == frame.component_id);
+        let is_ours = system_id.is_none_or(|id| u32::from(id) == frame.header.system_id)
+            && component_id.is_none_or(|id| id == frame.header.component_id);
         match (part, Message::of(frame).filter(|_| is_ours)) {
             (Part::Imu { message }, Some(Message::Attitude(attitude))) => {
                 self.boot.note(attitude.time_boot_ms);
                 self.tell(self::attitude(&attitude), sink);
                 if message.is_none() {
-                    self.tell(Some(rate(attitude.rates_radps.map(f64::from))), sink);
+                    let rates = [attitude.rollspeed, attitude.pitchspeed, attitude.yawspeed];
+                    self.tell(Some(rate(rates.map(f64::from))), sink);
                 }
             }
             (Part::Imu { message: Some(message) }, Some(Message::Imu(imu)))
@@ -188,8 +190,8 @@ impl State {
 }
 
 /// Turned about z, then y, then x of the turned axes is about fixed x, then y, then z: what [`Rot`] takes.
-fn attitude(attitude: &Attitude) -> Option<Reading> {
-    let [roll, pitch, yaw] = to_ours(attitude.angles_rad.map(f64::from));
+fn attitude(attitude: &ATTITUDE_DATA) -> Option<Reading> {
+    let [roll, pitch, yaw] = to_ours([attitude.roll, attitude.pitch, attitude.yaw].map(f64::from));
     let within = |angle: f64, most: f64| angle.abs() <= most + ANGLE_TOLERANCE_RAD;
     let possible = within(roll, math::PI) && within(pitch, math::FRAC_PI_2) && within(yaw, math::PI);
     possible.then(|| Reading::Attitude(Rot::from_roll_pitch_yaw(roll, pitch, yaw)))

@@ -1,13 +1,15 @@
 //! The host's side of a telemetry link: it listens for its part, and says that it is there.
 
-use headrace_sensor::codec::Bytes;
 use headrace_sensor::device::Decoder as _;
 use headrace_sensor::driver::{Carrier, Cutter, Driver, Standing, Wire};
 use headrace_sensor::geometry::time::{DurNs, MonoNs};
 use headrace_sensor::reading::Packet;
 
+use mavlink::{MAVLinkV2MessageRaw, MavHeader};
+
 use crate::decoder::{MavlinkDecoder, Meaning};
-use crate::frame::{Frame, Frames, MAX_FRAME_BYTES, Version};
+use crate::dialect::{HEARTBEAT_DATA, MavAutopilot, MavComponent, MavModeFlag, MavState, MavType};
+use crate::frame::{Frames, MAX_FRAME_BYTES, encode};
 
 /// What may carry telemetry.
 pub const CARRIERS: [Carrier; 3] = [Carrier::Udp, Carrier::Tcp, Carrier::Serial];
@@ -16,11 +18,8 @@ pub const CARRIERS: [Carrier; 3] = [Carrier::Udp, Carrier::Tcp, Carrier::Serial]
 const SILENCE: DurNs = DurNs::from_millis(100);
 /// Routers send only to those who speak. Source: MAVLink, heartbeat protocol, once a second.
 const HEARTBEAT_PERIOD: DurNs = DurNs::from_millis(1_000);
-const HEARTBEAT: u32 = 0;
-/// Custom mode (4 bytes), MAV_TYPE_ONBOARD_CONTROLLER, MAV_AUTOPILOT_INVALID, base mode, MAV_STATE_ACTIVE, version 3.
-const HEARTBEAT_PAYLOAD: [u8; 9] = [0, 0, 0, 0, 18, 8, 0, 4, 3];
-/// We are a part of the vehicle: MAV_COMP_ID_ONBOARD_COMPUTER.
-const COMPONENT_ID: u8 = 191;
+/// We are a part of the vehicle.
+const COMPONENT_ID: u8 = MavComponent::MAV_COMP_ID_ONBOARD_COMPUTER as u8;
 const SYSTEM_ID: u8 = 1;
 
 /// A part's driver. Messages of other parts aren't handed on: where several share a line, each is recorded once.
@@ -47,17 +46,18 @@ impl MavlinkDriver {
         }
     }
 
-    fn heartbeat(&mut self) -> Option<Bytes<MAX_FRAME_BYTES>> {
+    fn heartbeat(&mut self) -> MAVLinkV2MessageRaw {
         self.sequence = self.sequence.wrapping_add(1);
-        let frame = Frame {
-            version: Version::V2(None),
-            sequence: self.sequence,
-            system_id: self.system_id,
-            component_id: COMPONENT_ID,
-            message_id: HEARTBEAT,
-            payload: Bytes::new(&HEARTBEAT_PAYLOAD).ok()?,
+        let system_id = u32::from(self.system_id);
+        let header = MavHeader { system_id, component_id: COMPONENT_ID, sequence: self.sequence };
+        let heartbeat = HEARTBEAT_DATA {
+            mavtype: MavType::MAV_TYPE_ONBOARD_CONTROLLER,
+            autopilot: MavAutopilot::MAV_AUTOPILOT_INVALID,
+            base_mode: MavModeFlag::empty(),
+            system_status: MavState::MAV_STATE_ACTIVE,
+            ..HEARTBEAT_DATA::DEFAULT
         };
-        frame.encode().ok()
+        encode(header, &heartbeat)
     }
 }
 
@@ -90,9 +90,7 @@ impl Driver for MavlinkDriver {
         self.heard(now, &[], wire);
         if now >= self.next_at {
             self.next_at = now + HEARTBEAT_PERIOD;
-            if let Some(bytes) = self.heartbeat() {
-                wire.send(bytes.as_slice());
-            }
+            wire.send(self.heartbeat().raw_bytes());
         }
     }
 

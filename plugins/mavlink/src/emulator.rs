@@ -5,10 +5,11 @@ use headrace_sensor::geometry::math;
 use headrace_sensor::geometry::time::{DurNs, MonoNs};
 use headrace_sensor::measurement::{Inertia, Measurement, Pressure as Felt, Sounding};
 
+use mavlink::MavHeader;
+
 use crate::decoder::{DistancePart, Meaning, Part};
-use crate::message::{
-    Attitude, Distance, HECTOPASCAL, Imu, MILLI_G_MPS2, MILLIRADPS, Message, Pressure, Sender, to_ours,
-};
+use crate::dialect::ATTITUDE_DATA;
+use crate::message::{Distance, HECTOPASCAL, Imu, MILLI_G_MPS2, MILLIRADPS, Message, Pressure, to_ours};
 
 /// Limits that an emulated distance sensor tells, cm: about those of a Ping1D.
 const LEAST_CM: u16 = 30;
@@ -53,16 +54,13 @@ impl AutopilotEmulator {
     }
 
     fn send(&mut self, at: MonoNs, message: &Message, line: LineSink<'_>) {
-        let sender = Sender {
-            system_id: self.meaning.system_id.unwrap_or(1),
+        let header = MavHeader {
+            system_id: u32::from(self.meaning.system_id.unwrap_or(1)),
             component_id: self.meaning.component_id.unwrap_or(1),
             sequence: self.sequence,
         };
         self.sequence = self.sequence.wrapping_add(1);
-        // No message here is longer than a frame.
-        if let Ok(bytes) = message.to_frame(sender).encode() {
-            line(Direction::Received, at + self.meaning.latency, bytes.as_slice());
-        }
+        line(Direction::Received, at + self.meaning.latency, message.to_frame(header).raw_bytes());
     }
 
     fn since_boot_us(&self, at: MonoNs) -> u64 {
@@ -84,17 +82,16 @@ impl Emulator<Inertia> for AutopilotEmulator {
         let Part::Imu { message } = self.meaning.part else { return };
         let (roll, pitch, yaw) = motion.attitude.roll_pitch_yaw();
         let rates_radps = to_ours(motion.rate_radps.0.into());
-        let attitude = Attitude {
-            time_boot_ms: self.since_boot_ms(motion.at),
-            angles_rad: to_ours([roll, pitch, yaw]).map(single),
-            rates_radps: rates_radps.map(single),
-        };
+        let [rollspeed, pitchspeed, yawspeed] = rates_radps.map(single);
+        let time_boot_ms = self.since_boot_ms(motion.at);
         // What wasn't measured is no number, and no message tells it.
         let is_known = |values: &[f64]| values.iter().all(|value| value.is_finite());
         if !is_known(&rates_radps) {
             return;
         }
         if is_known(&[roll, pitch, yaw]) {
+            let [roll, pitch, yaw] = to_ours([roll, pitch, yaw]).map(single);
+            let attitude = ATTITUDE_DATA { time_boot_ms, roll, pitch, yaw, rollspeed, pitchspeed, yawspeed };
             self.send(motion.at, &Message::Attitude(attitude), line);
         }
         let Some(message) = message.filter(|_| motion.force_mps2.is_finite()) else { return };

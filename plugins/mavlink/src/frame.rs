@@ -4,143 +4,106 @@
 //!   FE length sequence system component id                     payload CRC16              first version
 //!   FD length incompatible compatible sequence system component id id id payload CRC16 [signature 13]
 //! ```
+//! Definitions, checksum and packing are the mavlink crate's. Its reader isn't used: it doesn't tell where a frame began,
+//! which its receive time depends on, counts nothing, and takes frames of the first version of any length.
 //! The second version leaves zeros at a payload's end unsent. A signature's truth isn't checked: who may send on the
 //! vehicle's own network is the network's affair. A frame that is cut off in its signature therefore takes the bytes that
 //! follow for the rest of it.
 //! Source: MAVLink guide, "Packet Serialization" and "Message Signing".
 
-use headrace_sensor::codec::{Bytes, Framed, Framing, TooLong, Verdict};
+use headrace_sensor::codec::{Bytes, Framed, Framing, Verdict};
+use mavlink::consts::{CHECKSUM_SIZE, MAX_PAYLOAD_LEN, STX_SIZE, v1, v2};
+use mavlink::{
+    MAV_STX, MAV_STX_V2, MAVLinkV2MessageRaw, MavHeader, MavlinkVersion, Message as _, MessageData,
+    calculate_crc,
+};
 
-use crate::checksum::{accumulate, known};
+use crate::dialect::{self, MavMessage};
 
-/// The longest payload.
-pub const MAX_PAYLOAD_BYTES: usize = 255;
 /// The longest frame: header, payload, checksum, signature.
-pub const MAX_FRAME_BYTES: usize = V2_HEADER_BYTES + MAX_PAYLOAD_BYTES + CRC_BYTES + SIGNATURE_BYTES;
-/// Length of a signature.
-pub const SIGNATURE_BYTES: usize = 13;
+pub const MAX_FRAME_BYTES: usize = V2_HEADER_BYTES + MAX_PAYLOAD_LEN + CHECKSUM_SIZE + v2::SIGNATURE_SIZE;
 
-const V1_START: u8 = 0xFE;
-const V2_START: u8 = 0xFD;
-const V1_HEADER_BYTES: usize = 6;
-const V2_HEADER_BYTES: usize = 10;
-const CRC_BYTES: usize = 2;
-/// The one incompatible feature that is defined. Frames with others must not be read.
-const SIGNED: u8 = 1;
+const V1_HEADER_BYTES: usize = STX_SIZE + v1::HEADER_SIZE;
+const V2_HEADER_BYTES: usize = STX_SIZE + v2::MIN_HEADER_SIZE;
 
-/// Which version a frame is of.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Version {
-    /// The first.
-    V1,
-    /// The second, with a signature or without.
-    V2(Option<[u8; SIGNATURE_BYTES]>),
-}
-
-/// A frame.
+/// A frame whose checksum is right.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Frame {
     /// Its version.
-    pub version: Version,
-    /// Counts a component's frames, modulo 256.
-    pub sequence: u8,
-    /// The sender's vehicle.
-    pub system_id: u8,
-    /// The sender within it.
-    pub component_id: u8,
+    pub version: MavlinkVersion,
+    /// Who sends it, and its number.
+    pub header: MavHeader,
     /// Which message it is; up to 24 bits, 8 in the first version.
     pub message_id: u32,
     /// The message's fields, as far as they are sent.
-    pub payload: Bytes<MAX_PAYLOAD_BYTES>,
+    pub payload: Bytes<MAX_PAYLOAD_LEN>,
 }
 
 /// What a header announces.
 #[derive(Debug, Clone, Copy)]
 struct Header {
-    version_bytes: usize,
+    version: MavlinkVersion,
     payload_bytes: usize,
     signed: bool,
-    sender: [u8; 3],
+    sender: MavHeader,
     message_id: u32,
 }
 
 impl Header {
     /// The header that `front` begins with. `None` where it isn't whole.
     fn of(front: &[u8]) -> Option<Self> {
-        match *front {
-            [V1_START, len, sequence, system, component, id, ..] => Some(Self {
-                version_bytes: V1_HEADER_BYTES,
-                payload_bytes: usize::from(len),
-                signed: false,
-                sender: [sequence, system, component],
-                message_id: u32::from(id),
-            }),
-            [V2_START, len, incompatible, _, sequence, system, component, i0, i1, i2, ..] => Some(Self {
-                version_bytes: V2_HEADER_BYTES,
-                payload_bytes: usize::from(len),
-                signed: incompatible & SIGNED != 0,
-                sender: [sequence, system, component],
-                message_id: u32::from_le_bytes([i0, i1, i2, 0]),
-            }),
-            _ => None,
+        let (version, payload_bytes, signed, [sequence, system_id, component_id], message_id) = match *front {
+            [MAV_STX, len, n, system, component, id, ..] => {
+                (MavlinkVersion::V1, len, false, [n, system, component], u32::from(id))
+            }
+            [MAV_STX_V2, len, incompatible, _, n, system, component, i0, i1, i2, ..] => {
+                let signed = incompatible & v2::IFLAG_SIGNED != 0;
+                let id = u32::from_le_bytes([i0, i1, i2, 0]);
+                (MavlinkVersion::V2, len, signed, [n, system, component], id)
+            }
+            _ => return None,
+        };
+        let sender = MavHeader { system_id: u32::from(system_id), component_id, sequence };
+        Some(Self { version, payload_bytes: usize::from(payload_bytes), signed, sender, message_id })
+    }
+
+    /// Where the payload begins.
+    fn header_bytes(&self) -> usize {
+        match self.version {
+            MavlinkVersion::V1 => V1_HEADER_BYTES,
+            MavlinkVersion::V2 => V2_HEADER_BYTES,
         }
     }
 
     /// Where the payload ends.
     fn summed_bytes(&self) -> usize {
-        self.version_bytes + self.payload_bytes
+        self.header_bytes() + self.payload_bytes
     }
 
     fn whole_bytes(&self) -> usize {
-        self.summed_bytes() + CRC_BYTES + if self.signed { SIGNATURE_BYTES } else { 0 }
+        self.summed_bytes() + CHECKSUM_SIZE + if self.signed { v2::SIGNATURE_SIZE } else { 0 }
+    }
+
+    /// Whether its message can be checked; in the first version that takes the one length that the message has.
+    fn is_known(&self) -> bool {
+        match self.version {
+            MavlinkVersion::V1 => v1_payload_bytes(self.message_id) == Some(self.payload_bytes),
+            MavlinkVersion::V2 => MavMessage::all_ids().binary_search(&self.message_id).is_ok(),
+        }
     }
 }
 
-impl Frame {
-    /// The frame as bytes. Zeros at the end of a payload are sent or not as they are held.
-    ///
-    /// Errors: never for what [`Frames`] has read; a message that isn't in the list has no checksum, and its frame none
-    /// that another side would take.
-    pub fn encode(&self) -> Result<Bytes<MAX_FRAME_BYTES>, TooLong> {
-        let payload = self.payload.as_slice();
-        let len = u8::try_from(payload.len())
-            .map_err(|_| TooLong { len: payload.len(), max: MAX_PAYLOAD_BYTES })?;
-        let [i0, i1, i2, _] = self.message_id.to_le_bytes();
-        let sender = [self.sequence, self.system_id, self.component_id];
-        let mut bytes = Bytes::default();
-        let signature = match self.version {
-            Version::V1 => {
-                bytes.extend(&[V1_START, len])?;
-                bytes.extend(&sender)?;
-                bytes.extend(&[i0])?;
-                None
-            }
-            Version::V2(signature) => {
-                bytes.extend(&[V2_START, len, if signature.is_some() { SIGNED } else { 0 }, 0])?;
-                bytes.extend(&sender)?;
-                bytes.extend(&[i0, i1, i2])?;
-                signature
-            }
-        };
-        bytes.extend(payload)?;
-        let crc = checksum(bytes.as_slice(), self.message_id).unwrap_or_default();
-        bytes.extend(&crc.to_le_bytes())?;
-        bytes.extend(signature.as_ref().map_or(&[], |signature| signature.as_slice()))?;
-        Ok(bytes)
-    }
+/// Length of a message's payload in the first version: of all its fields but extensions.
+fn v1_payload_bytes(message_id: u32) -> Option<usize> {
+    let message = MavMessage::default_message_from_id(message_id)?;
+    Some(message.ser(MavlinkVersion::V1, &mut [0; MAX_PAYLOAD_LEN]))
+}
 
-    /// Reads a whole frame that was found good.
-    fn decode(frame: &[u8]) -> Option<Self> {
-        let header = Header::of(frame)?;
-        let [sequence, system_id, component_id] = header.sender;
-        let version = match (header.version_bytes, header.signed) {
-            (V1_HEADER_BYTES, _) => Version::V1,
-            (_, false) => Version::V2(None),
-            (_, true) => Version::V2(Some(*frame.last_chunk()?)),
-        };
-        let payload = Bytes::new(frame.get(header.version_bytes..header.summed_bytes())?).ok()?;
-        Some(Self { version, sequence, system_id, component_id, message_id: header.message_id, payload })
-    }
+/// A message as a frame of the second version.
+pub fn encode(header: MavHeader, message: &impl MessageData) -> MAVLinkV2MessageRaw {
+    let mut frame = MAVLinkV2MessageRaw::new();
+    frame.serialize_message_data(header, message);
+    frame
 }
 
 /// Length of the frame that `front` begins with, as its header announces it; `None` where there is no whole header.
@@ -148,15 +111,9 @@ pub(crate) fn announced_bytes(front: &[u8]) -> Option<usize> {
     Header::of(front).map(|header| header.whole_bytes())
 }
 
-/// The checksum of what is before it, the start marker included in `bytes` but not in the sum.
-fn checksum(bytes: &[u8], message_id: u32) -> Option<u16> {
-    let extra = known(message_id)?.extra;
-    Some(accumulate(accumulate(0xFFFF, bytes.get(1..)?), &[extra]))
-}
-
 /// How frames stand in a stream of bytes.
 ///
-/// A frame whose message isn't in the list, and one with an incompatible feature that isn't known, are no start: they
+/// A frame whose message isn't known, and one with an incompatible feature other than a signature, are no start: they
 /// can't be told from noise, and their bytes are skipped.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Frames;
@@ -169,36 +126,54 @@ impl Framing for Frames {
 
     fn judge(&self, front: &[u8]) -> Verdict {
         match front {
-            [V2_START, _, incompatible, ..] if incompatible & !SIGNED != 0 => return Verdict::NotAStart,
-            [V1_START | V2_START, ..] => (),
+            [MAV_STX_V2, _, incompatible, ..] if incompatible & !v2::IFLAG_SIGNED != 0 => {
+                return Verdict::NotAStart;
+            }
+            [MAV_STX | MAV_STX_V2, ..] => (),
             _ => return Verdict::NotAStart,
         }
         let Some(header) = Header::of(front) else {
-            let v1 = front.first() == Some(&V1_START);
+            let v1 = front.first() == Some(&MAV_STX);
             return Verdict::Need(if v1 { V1_HEADER_BYTES } else { V2_HEADER_BYTES });
         };
-        let Some(known) = known(header.message_id) else { return Verdict::NotAStart };
-        if header.version_bytes == V1_HEADER_BYTES && header.payload_bytes != usize::from(known.base_bytes) {
+        if !header.is_known() {
             return Verdict::NotAStart;
         }
         Verdict::on(front, header.whole_bytes(), |frame| {
-            let sum =
-                frame.get(..header.summed_bytes()).and_then(|summed| checksum(summed, header.message_id));
-            let sent = frame.get(header.summed_bytes()..).and_then(<[u8]>::first_chunk);
-            sum.is_some() && sum == sent.map(|sent| u16::from_le_bytes(*sent))
+            let summed = frame.get(STX_SIZE..header.summed_bytes()).unwrap_or_default();
+            let sum = calculate_crc(summed, MavMessage::extra_crc(header.message_id));
+            frame.get(header.summed_bytes()..).and_then(<[u8]>::first_chunk) == Some(&sum.to_le_bytes())
         })
     }
 
     fn read(&self, frame: &[u8]) -> Option<Frame> {
-        Frame::decode(frame)
+        let header = Header::of(frame)?;
+        let payload = Bytes::new(frame.get(header.header_bytes()..header.summed_bytes())?).ok()?;
+        let Header { version, sender, message_id, .. } = header;
+        Some(Frame { version, header: sender, message_id, payload })
     }
 }
 
-/// Messages that tell a place on Earth, a machine's own number, or what people wrote; none of them is read here: GPS_RAW_INT,
-/// GPS_STATUS, GLOBAL_POSITION_INT, SET_GPS_GLOBAL_ORIGIN, GPS_GLOBAL_ORIGIN, GLOBAL_POSITION_INT_COV, MISSION_ITEM_INT,
-/// POSITION_TARGET_GLOBAL_INT, HIL_GPS, GPS2_RAW, TERRAIN_REPORT, AUTOPILOT_VERSION, GPS_INPUT, HOME_POSITION, STATUSTEXT,
-/// OPEN_DRONE_ID_BASIC_ID. Source: MAVLink common message set.
-const IDENTITY: [u32; 16] = [24, 25, 33, 48, 49, 63, 73, 87, 113, 124, 136, 148, 232, 242, 253, 12900];
+/// Messages that tell a place on Earth, a machine's own number, or what people wrote; none of them is read here.
+#[expect(deprecated, reason = "older autopilots send superseded messages")]
+const IDENTITY: [u32; 16] = [
+    dialect::GPS_RAW_INT_DATA::ID,
+    dialect::GPS_STATUS_DATA::ID,
+    dialect::GLOBAL_POSITION_INT_DATA::ID,
+    dialect::SET_GPS_GLOBAL_ORIGIN_DATA::ID,
+    dialect::GPS_GLOBAL_ORIGIN_DATA::ID,
+    dialect::GLOBAL_POSITION_INT_COV_DATA::ID,
+    dialect::MISSION_ITEM_INT_DATA::ID,
+    dialect::POSITION_TARGET_GLOBAL_INT_DATA::ID,
+    dialect::HIL_GPS_DATA::ID,
+    dialect::GPS2_RAW_DATA::ID,
+    dialect::TERRAIN_REPORT_DATA::ID,
+    dialect::AUTOPILOT_VERSION_DATA::ID,
+    dialect::GPS_INPUT_DATA::ID,
+    dialect::HOME_POSITION_DATA::ID,
+    dialect::STATUSTEXT_DATA::ID,
+    dialect::OPEN_DRONE_ID_BASIC_ID_DATA::ID,
+];
 
 /// The frames of a packet that holds whole ones alone, without those of [`IDENTITY`]; `None` where it holds something else, or
 /// none of them.
@@ -225,7 +200,28 @@ mod tests {
     use crate::tests::{RECORDED_ATTITUDE, RECORDED_PRESSURE};
 
     fn encoded(frame: &Frame) -> Vec<u8> {
-        frame.encode().unwrap().as_slice().to_vec()
+        let MavHeader { system_id, component_id, sequence } = frame.header;
+        let sender = [sequence, u8::try_from(system_id).unwrap(), component_id];
+        let payload = frame.payload.as_slice();
+        let len = u8::try_from(payload.len()).unwrap();
+        let id = frame.message_id.to_le_bytes();
+        let mut bytes = match frame.version {
+            MavlinkVersion::V1 => [&[MAV_STX, len][..], &sender, &id[..1], payload].concat(),
+            MavlinkVersion::V2 => [&[MAV_STX_V2, len, 0, 0][..], &sender, &id[..3], payload].concat(),
+        };
+        let sum = calculate_crc(&bytes[STX_SIZE..], MavMessage::extra_crc(frame.message_id));
+        bytes.extend(sum.to_le_bytes());
+        bytes
+    }
+
+    /// With the feature of signatures, and a signature of the given bytes.
+    fn signed(frame: &[u8], signature: [u8; v2::SIGNATURE_SIZE]) -> Vec<u8> {
+        let message = Frames.read(frame).unwrap().message_id;
+        let (front, _) = frame.split_at(frame.len() - CHECKSUM_SIZE);
+        let mut bytes = front.to_vec();
+        bytes[v2::INCOMPAT_FLAGS_OFFSET] = v2::IFLAG_SIGNED;
+        let sum = calculate_crc(&bytes[STX_SIZE..], MavMessage::extra_crc(message));
+        [&bytes[..], &sum.to_le_bytes(), &signature].concat()
     }
 
     /// RAW_IMU of the first version, all fields zero but the first.
@@ -233,21 +229,42 @@ mod tests {
         let mut payload = [0; 26];
         payload[0] = 0xFD;
         Frame {
-            version: Version::V1,
-            sequence: 7,
-            system_id: 1,
-            component_id: 1,
+            version: MavlinkVersion::V1,
+            header: MavHeader { system_id: 1, component_id: 1, sequence: 7 },
             message_id: 27,
             payload: Bytes::new(&payload).unwrap(),
         }
     }
 
     #[test]
+    fn messages_are_known_by_their_definitions_without_extensions() {
+        assert!(MavMessage::all_ids().is_sorted());
+        for id in MavMessage::all_ids() {
+            assert!(v1_payload_bytes(*id).is_some(), "{id}");
+        }
+        for (id, extra, base_bytes) in [
+            (26, 170, 22),
+            (27, 144, 26),
+            (29, 115, 14),
+            (30, 39, 28),
+            (116, 76, 22),
+            (129, 46, 22),
+            (132, 85, 14),
+            (137, 195, 14),
+            (143, 131, 14),
+        ] {
+            assert_eq!((MavMessage::extra_crc(id), v1_payload_bytes(id)), (extra, Some(base_bytes)), "{id}");
+        }
+        assert_eq!(v1_payload_bytes(60_000), None);
+    }
+
+    #[test]
     fn a_recorded_frame_is_read_and_written() {
         let got = decode_all(&mut MavlinkCodec::default(), RECORDED_PRESSURE);
         let frame = got[0];
-        assert_eq!((frame.version, frame.message_id), (Version::V2(None), 137));
-        assert_eq!((frame.system_id, frame.component_id, frame.payload.as_slice().len()), (1, 1, 14));
+        assert_eq!((frame.version, frame.message_id), (MavlinkVersion::V2, 137));
+        let MavHeader { system_id, component_id, .. } = frame.header;
+        assert_eq!((system_id, component_id, frame.payload.as_slice().len()), (1, 1, 14));
         assert_eq!(encoded(&frame), RECORDED_PRESSURE);
     }
 
@@ -262,10 +279,8 @@ mod tests {
 
     #[test]
     fn a_signed_frame_is_taken_whole() {
-        let mut frame = decode_all(&mut MavlinkCodec::default(), RECORDED_ATTITUDE)[0];
-        frame.version = Version::V2(Some([0xFE; SIGNATURE_BYTES]));
-        let bytes = encoded(&frame);
-        assert_eq!(bytes.len(), RECORDED_ATTITUDE.len() + SIGNATURE_BYTES);
+        let bytes = signed(RECORDED_ATTITUDE, [0xFE; v2::SIGNATURE_SIZE]);
+        assert_eq!(bytes.len(), RECORDED_ATTITUDE.len() + v2::SIGNATURE_SIZE);
         let mut codec = MavlinkCodec::default();
         assert_eq!(decode_all(&mut codec, &[&bytes, RECORDED_PRESSURE].concat()).len(), 2);
         assert_eq!(codec.counts(), CodecCounts { good_frames: 2, ..CodecCounts::default() });
@@ -299,16 +314,19 @@ mod tests {
     fn any_frame() -> impl Strategy<Value = Frame> {
         let ids = proptest::sample::select(vec![0_u32, 26, 27, 29, 30, 116, 132, 137, 143, 253, 11_032]);
         let payload = proptest::collection::vec(any::<u8>(), 255);
-        (any::<[u8; 3]>(), ids, any::<bool>(), 1..=MAX_PAYLOAD_BYTES, payload).prop_map(
-            |([sequence, system_id, component_id], message_id, first, len, payload)| {
-                let base_bytes = known(message_id).unwrap().base_bytes;
+        (any::<[u8; 3]>(), ids, any::<bool>(), 1..=MAX_PAYLOAD_LEN, payload).prop_map(
+            |([sequence, system_id, component_id], message_id, first, len, payload): (
+                [u8; 3],
+                _,
+                _,
+                _,
+                _,
+            )| {
                 let first = first && message_id < 256;
-                let len = if first { usize::from(base_bytes) } else { len };
+                let len = if first { v1_payload_bytes(message_id).unwrap() } else { len };
                 Frame {
-                    version: if first { Version::V1 } else { Version::V2(None) },
-                    sequence,
-                    system_id,
-                    component_id,
+                    version: if first { MavlinkVersion::V1 } else { MavlinkVersion::V2 },
+                    header: MavHeader { system_id: u32::from(system_id), component_id, sequence },
                     message_id,
                     payload: Bytes::new(&payload[..len]).unwrap(),
                 }

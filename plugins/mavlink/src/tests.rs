@@ -13,10 +13,11 @@ use headrace_sensor::geometry::time::{DurNs, MonoNs};
 use headrace_sensor::measurement::{Inertia, Measurement, Pressure, Sounding};
 use headrace_sensor::reading::{Decoded, Level, Packet, Reading};
 
-use crate::Kind;
 use crate::decoder::{DistancePart, MavlinkDecoder, Meaning, Part};
+use crate::dialect::ATTITUDE_DATA;
 use crate::frame::without_identity;
-use crate::message::{Attitude, Distance, ImuMessage, Message, Pressure as Told, PressureMessage, Sender};
+use crate::message::{Distance, ImuMessage, Message, Pressure as Told, PressureMessage};
+use crate::{Kind, MavHeader};
 
 /// ATTITUDE, RAW_IMU and SCALED_PRESSURE2 of an ArduSub, from a telemetry log.
 pub(crate) const RECORDED_ATTITUDE: &[u8] = &[
@@ -68,8 +69,8 @@ fn decode(decoder: &mut MavlinkDecoder, received: MonoNs, bytes: &[u8]) -> Vec<D
 }
 
 fn decode_message(decoder: &mut MavlinkDecoder, message: &Message) -> Vec<Reading> {
-    let frame = message.to_frame(Sender { system_id: 1, component_id: 1, sequence: 0 });
-    let readings = decode(decoder, START, frame.encode().unwrap().as_slice());
+    let frame = message.to_frame(MavHeader { system_id: 1, component_id: 1, sequence: 0 });
+    let readings = decode(decoder, START, frame.raw_bytes());
     readings.into_iter().map(|decoded| decoded.reading).collect()
 }
 
@@ -200,7 +201,15 @@ fn distances_come_back_and_none_where_nothing_is_heard() {
 
 #[test]
 fn axes_that_point_down_and_right_are_turned() {
-    let attitude = Attitude { time_boot_ms: 1, angles_rad: [0.1, 0.2, 0.3], rates_radps: [1.0, 2.0, 3.0] };
+    let attitude = ATTITUDE_DATA {
+        time_boot_ms: 1,
+        roll: 0.1,
+        pitch: 0.2,
+        yaw: 0.3,
+        rollspeed: 1.0,
+        pitchspeed: 2.0,
+        yawspeed: 3.0,
+    };
     let mut decoder = decoder(Part::Imu { message: None });
     let readings = decode_message(&mut decoder, &Message::Attitude(attitude));
     let Reading::Attitude(attitude) = readings[0] else { panic!() };
@@ -241,8 +250,9 @@ fn only_the_wanted_sender_is_heard() {
 
 #[test]
 fn values_that_cannot_be_are_withheld() {
-    let attitude =
-        |angles_rad| Message::Attitude(Attitude { time_boot_ms: 1, angles_rad, rates_radps: [0.0; 3] });
+    let attitude = |[roll, pitch, yaw]: [f32; 3]| {
+        Message::Attitude(ATTITUDE_DATA { roll, pitch, yaw, ..ATTITUDE_DATA::DEFAULT })
+    };
     let pressure = |absolute_hpa| {
         let message = PressureMessage::Second;
         Message::Pressure(Told { message, time_boot_ms: 1, absolute_hpa, temperature_cdegc: 0 })
