@@ -24,10 +24,10 @@ use crossbeam::queue::SegQueue;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::App;
 use headrace_ports::{Crew, Hand, Stand, now, wait_for_any};
-use headrace_replay::simulate::{START, Scene, Simulation};
 use headrace_sensor::connect::{Connect, SerialPort, UsbIdentity};
 use headrace_sensor::device::Direction;
 use headrace_sensor::driver::{Carrier, Driver, DriverSetup, Standing, Wire};
+use headrace_simulator::{START, Scene, Simulation};
 
 const LOCAL: IpAddr = IpAddr::V4(Ipv4Addr::LOCALHOST);
 /// Until all lines are open and the heads have found their places.

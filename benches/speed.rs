@@ -23,10 +23,10 @@ use headrace_geometry::tunnel::shapes;
 use headrace_monitor::resources::Coverage;
 use headrace_monitor::run::Loop;
 use headrace_monitor::{App, SourceSpec};
-use headrace_replay::simulate::{START, Scene, Simulation};
 use headrace_sensor::codec::CodecCounts;
 use headrace_sensor::device::{Decoder, Direction};
 use headrace_sensor::reading::{Decoded, Packet};
+use headrace_simulator::{START, Scene, Simulation};
 use headrace_snapshot::{Restorer, Saver, SnapshotError, Stateful};
 use headrace_vehicle::Mission;
 

@@ -6,16 +6,16 @@ use std::path::PathBuf;
 
 use clap::{ArgAction, Args, Parser, Subcommand};
 use headrace_geometry::time::DurNs;
+use headrace_import::FileKind;
 use headrace_replay::log::Every;
 use headrace_sampling::layout::HeadLayout;
 use headrace_sensor::connect::Connect;
 use tracing::level_filters::LevelFilter;
 
-use crate::import::kind::Kind;
 pub(crate) use value_parsers::{Speed, speed, time};
 use value_parsers::{
-    address, chainage, chainage_range, drift, hours, layout, length, place, rotation, seconds, seconds_range,
-    section, sound_speed, source_line, speed_mps, target, yaw,
+    address, chainage, chainage_range, drift, file_kind, hours, layout, length, place, rotation, seconds,
+    seconds_range, section, sound_speed, source_line, speed_mps, target, yaw,
 };
 
 /// What `replay --interactive` understands.
@@ -350,8 +350,8 @@ pub(crate) struct Import {
     #[arg(long, value_name = "MAPPING.toml")]
     pub(crate) map: Option<PathBuf>,
     /// Format of the file, where its name doesn't say.
-    #[arg(long, value_enum)]
-    pub(crate) format: Option<Kind>,
+    #[arg(long, value_parser = file_kind())]
+    pub(crate) format: Option<FileKind>,
     /// Print a summary as JSON.
     #[arg(long)]
     pub(crate) json: bool,

@@ -2,10 +2,11 @@
 
 use headrace_config::Document;
 use headrace_geometry::time::DurNs;
+use headrace_replay::SimulationFeed;
 use headrace_replay::drive::Pace;
 use headrace_replay::log::files_of;
-use headrace_replay::player::{Player, SimulationFeed};
-use headrace_replay::simulate::{Scene, Simulation};
+use headrace_replay::player::Player;
+use headrace_simulator::{Scene, Simulation};
 use headrace_vehicle::VehicleConfig;
 use serde_json::json;
 

@@ -6,10 +6,10 @@ use headrace_config as config;
 use headrace_config::Document;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_ports::{Stand, wait_for_any};
-use headrace_replay::simulate::{START, Scene, Simulation};
 use headrace_sensor::connect::Connect;
 use headrace_sensor::device::Direction;
 use headrace_sensor::driver::Carrier;
+use headrace_simulator::{START, Scene, Simulation};
 
 use crate::cli::Emulate;
 use crate::devices::KINDS;

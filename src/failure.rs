@@ -2,15 +2,17 @@
 
 use std::path::PathBuf;
 
+use headrace_calibration::collect::CollectError;
 use headrace_config::ConfigError;
+use headrace_import::ImportError;
+use headrace_import::routing::RoutingError;
 use headrace_monitor::PluginError;
 use headrace_replay::drive::DriveError;
-use headrace_replay::import::ImportError;
 use headrace_replay::log::LogError;
 use headrace_replay::playback::PlaybackError;
-use headrace_replay::simulate::SceneError;
 use headrace_replay::smooth::SmoothError;
 use headrace_sampling::SamplingError;
+use headrace_simulator::SceneError;
 
 /// Exit code of a command that did all it was asked, on all the data.
 pub(crate) const OK: u8 = 0;
@@ -41,6 +43,10 @@ pub(crate) enum Failure {
     Log(#[from] LogError),
     #[error(transparent)]
     Import(#[from] ImportError),
+    #[error(transparent)]
+    Collect(#[from] CollectError),
+    #[error("import: {0}")]
+    Routing(#[from] RoutingError),
     #[error("smoothing: {0}")]
     Smooth(#[from] SmoothError),
     #[error(transparent)]
@@ -63,7 +69,13 @@ impl Failure {
     /// The exit code that goes with it.
     pub(crate) fn exit_code(&self) -> u8 {
         match self {
-            Self::Config(_) | Self::Scene(_) | Self::Usage(_) | Self::Plan(_) | Self::Read { .. } => USAGE,
+            Self::Config(_)
+            | Self::Scene(_)
+            | Self::Usage(_)
+            | Self::Plan(_)
+            | Self::Read { .. }
+            | Self::Routing(_)
+            | Self::Collect(CollectError::Backwards { .. } | CollectError::TooLong { .. }) => USAGE,
             _ => FAILED,
         }
     }

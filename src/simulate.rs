@@ -7,10 +7,10 @@ use std::path::{Path, PathBuf};
 use headrace_config::Document;
 use headrace_geometry::time::MonoNs;
 use headrace_replay::log::LogWriter;
-use headrace_replay::simulate::effects::KINDS as EFFECTS;
-use headrace_replay::simulate::surroundings::What;
-use headrace_replay::simulate::{Added, START, Scene, Simulation, SoundingTruth, Stage, TruthRow};
 use headrace_sensor::device::Direction;
+use headrace_simulator::effects::KINDS as EFFECTS;
+use headrace_simulator::environment::What;
+use headrace_simulator::{Added, START, Scene, Simulation, SoundingTruth, Stage, TruthRow};
 use serde_json::json;
 
 use crate::cli::Simulate;
@@ -95,7 +95,7 @@ fn explain(scene: &Scene, as_json: bool) -> Result<u8, Failure> {
                 "systems": effect.systems.iter().map(system).collect::<Vec<_>>(),
                 "replaces": effect.replaces,
                 "components": effect.components.iter().map(|(name, on)| json!({"component": name, "sensors": on})).collect::<Vec<_>>(),
-                "streams": effect.streams, "way": effect.way,
+                "streams": effect.streams, "trajectory": effect.trajectory,
             })
         };
         let shown = json!({
@@ -145,8 +145,8 @@ fn in_words(added: &Added) -> String {
     if !added.streams.is_empty() {
         line("random", format!("a stream each for {}", added.streams.join(", ")));
     }
-    if let Some(way) = &added.way {
-        line("way", way.clone());
+    if let Some(what) = &added.trajectory {
+        line("trajectory", what.clone());
     }
     text
 }
@@ -169,7 +169,7 @@ impl Truth {
         let file = BufWriter::new(File::create(path).map_err(failed)?);
         let effects = simulation.added().iter().map(|added| added.effect).collect();
         let features =
-            simulation.scenery().map(|scenery| scenery.surroundings.features().to_vec()).unwrap_or_default();
+            simulation.scenery().map(|scenery| scenery.environment.features().to_vec()).unwrap_or_default();
         let mut truth = Self { path: path.to_owned(), file, effects, features, rows: 0 };
         truth.line(&format!("# {}, seed {}", scene.name.replace('\n', " "), scene.seed))?;
         truth.line(COLUMNS)?;

@@ -20,8 +20,8 @@ use std::fmt::Write as _;
 use advised::{Advised, dive};
 use headrace_geometry::time::DurNs;
 use headrace_monitor::advice_log::AdviceEntry;
-use headrace_replay::simulate::Scene;
 use headrace_sampling::advice::{Reason, Remedy};
+use headrace_simulator::Scene;
 
 const TICK: DurNs = DurNs(20_000_000);
 /// Where dives begin, and the length of tunnel that is judged, m.

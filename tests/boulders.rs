@@ -12,8 +12,8 @@ mod shipped;
 
 use std::fmt::Write as _;
 
-use headrace_replay::simulate::surroundings::What;
-use headrace_replay::simulate::{Scene, Simulation};
+use headrace_simulator::environment::What;
+use headrace_simulator::{Scene, Simulation};
 
 /// Between neighbouring boulders, m: no beam across the tunnel meets two of them.
 const SPACING_M: f64 = 2.5;

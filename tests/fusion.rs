@@ -18,7 +18,7 @@ use field::{Figures, POSE, TURN_S, field, figures, nees, rms, share};
 use headrace_fusion::direct::DirectNavigation;
 use headrace_fusion::filter::sources::Consistency;
 use headrace_geometry::math;
-use headrace_replay::simulate::START;
+use headrace_simulator::START;
 use tracking::{Silence, Track, dive, filter};
 
 /// Seeds; the bounds below are those of so many dives.

@@ -6,8 +6,8 @@ mod shipped;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::App;
 use headrace_monitor::run::Loop;
-use headrace_replay::simulate::{START, Simulation};
 use headrace_sensor::device::Direction;
+use headrace_simulator::{START, Simulation};
 use headrace_vehicle::Mission;
 
 /// A minute on the way, then standing for an hour with noise.

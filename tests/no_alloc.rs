@@ -27,9 +27,9 @@ use headrace_monitor::App;
 use headrace_monitor::outlet::NoticeOutlet;
 use headrace_replay::log::{LogHeader, Recorder, SourceInfo};
 use headrace_replay::record::{QUEUE_BYTES, RecorderOutlet, result_channels};
-use headrace_replay::simulate::{START, Simulation};
 use headrace_sensor::device::{Decoder, Direction};
 use headrace_sensor::reading::Packet;
+use headrace_simulator::{START, Simulation};
 use headrace_vehicle::Mission;
 use headrace_vehicle::NavigationConfig;
 

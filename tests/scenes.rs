@@ -11,7 +11,7 @@ mod shipped;
 
 use std::path::{Path, PathBuf};
 
-use headrace_replay::simulate::Simulation;
+use headrace_simulator::Simulation;
 
 fn files() -> Vec<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("deploy/scenes");

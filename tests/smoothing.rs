@@ -25,8 +25,8 @@ use headrace_fusion::smooth::track::TrackNavigation;
 use headrace_geometry::frames::Pose;
 use headrace_geometry::math;
 use headrace_geometry::time::MonoNs;
-use headrace_replay::simulate::{START, Scene, Simulation};
 use headrace_sensor::reading::MAX_SOURCES;
+use headrace_simulator::{START, Scene, Simulation};
 use headrace_vehicle::NavigationConfig;
 use tracking::{Epoch, Silence, Track, dive, filter};
 

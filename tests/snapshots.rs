@@ -14,8 +14,8 @@ use headrace_geometry::time::MonoNs;
 use headrace_monitor::App;
 use headrace_monitor::ring::Port;
 use headrace_monitor::run::Loop;
-use headrace_replay::simulate::{Scene, Simulation};
 use headrace_sensor::device::Direction;
+use headrace_simulator::{Scene, Simulation};
 use headrace_vehicle::VehicleConfig;
 
 struct Packet {

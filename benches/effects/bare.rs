@@ -8,7 +8,7 @@ use headrace_sensor::measurement::Sounding;
 use headrace_geometry::frames::{Body, Mount, Point3, Rot, Tunnel, head_direction};
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_geometry::tunnel::Profile;
-use headrace_replay::simulate::{START, Scene, Simulation};
+use headrace_simulator::{START, Scene, Simulation};
 
 use crate::{SPEED_MPS, best, shipped, text, timed};
 

@@ -15,7 +15,7 @@ mod shipped;
 
 use std::time::Instant;
 
-use headrace_replay::simulate::{Scene, Simulation};
+use headrace_simulator::{Scene, Simulation};
 
 const ROUNDS: usize = 15;
 

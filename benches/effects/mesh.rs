@@ -1,7 +1,7 @@
 //! A wall of a million triangles beside the profile that it follows.
 
 use headrace_geometry::tunnel::Profile;
-use headrace_replay::simulate::Simulation;
+use headrace_simulator::Simulation;
 
 use crate::{ROUNDS, best, shipped, timed};
 

@@ -21,8 +21,8 @@ mod wilcoxon;
 pub mod words;
 
 use headrace_geometry::tunnel::ProfileError;
-use headrace_replay::simulate::SceneError;
 use headrace_sampling::SamplingError;
+use headrace_simulator::SceneError;
 
 use paper::PaperError;
 use spread::Spread;

@@ -4,9 +4,9 @@
 use headrace_config::Document;
 use headrace_geometry::frames::{Point3, Tunnel};
 use headrace_geometry::tunnel::Profile;
-use headrace_replay::simulate::{Scene, SceneError, Simulation};
 use headrace_sampling::layout::HeadLayout;
 use headrace_sensor::device::{DeviceKind, Sense};
+use headrace_simulator::{Scene, SceneError, Simulation};
 
 /// The speed that the paper states, m/s (§7.2).
 pub(crate) const SPEED_MPS: f64 = 0.197;

@@ -1,11 +1,11 @@
 //! Calibration in words, and as JSON.
 
+use headrace_calibration::collect::Collected;
+use headrace_calibration::findings::Findings;
+use headrace_calibration::table::{Found, Table, Value};
 use headrace_vehicle::VehicleConfig;
 use serde_json::{Value as Json, json};
 
-use super::findings::Findings;
-use super::hear::Heard;
-use super::table::{Found, Table, Value};
 use crate::cli::Calibrate;
 use crate::output::append;
 
@@ -13,18 +13,18 @@ use crate::output::append;
 pub(super) fn text(
     args: &Calibrate,
     vehicle: &VehicleConfig,
-    heard: &Heard,
+    collected: &Collected,
     findings: &Findings,
     table: &Table,
     losses: &[String],
 ) -> String {
     let mut text = String::new();
     let mut line = |words: &str| append(&mut text, format_args!("{}\n", words.trim_end()));
-    let [from_s, to_s] = [heard.from, heard.to].map(|at| heard.seconds(at));
+    let [from_s, to_s] = [collected.from, collected.to].map(|at| collected.seconds(at));
     line(&format!("{}: {from_s:.1} to {to_s:.1} s, {}", args.log.display(), vehicle.name));
     if let Ok(heads) = &findings.heads {
         let [y, z] = heads.place_m;
-        let [from_s, to_s] = [heads.still.from, heads.still.to].map(|at| heard.seconds(at));
+        let [from_s, to_s] = [heads.still.from, heads.still.to].map(|at| collected.seconds(at));
         line(&format!(
             "still from {from_s:.1} to {to_s:.1} s, {:.3} m left of the middle and {:.3} m above the floor (sd {:.3}, {:.3})",
             y.value, z.value, y.sd, z.sd
@@ -101,7 +101,7 @@ fn toml(table: &Table) -> String {
 pub(super) fn json(
     args: &Calibrate,
     vehicle: &VehicleConfig,
-    heard: &Heard,
+    collected: &Collected,
     findings: &Findings,
     table: &Table,
     losses: &[String],
@@ -118,8 +118,8 @@ pub(super) fn json(
             })
         };
         json!({
-            "from_s": heard.seconds(heads.still.from),
-            "to_s": heard.seconds(heads.still.to),
+            "from_s": collected.seconds(heads.still.from),
+            "to_s": collected.seconds(heads.still.to),
             "y_m": y.value,
             "y_sd_m": y.sd,
             "z_m": z.value,
@@ -151,8 +151,8 @@ pub(super) fn json(
     json!({
         "log": args.log.display().to_string(),
         "vehicle": vehicle.name,
-        "from_s": heard.seconds(heard.from),
-        "to_s": heard.seconds(heard.to),
+        "from_s": collected.seconds(collected.from),
+        "to_s": collected.seconds(collected.to),
         "still": still,
         "found": found.collect::<Vec<_>>(),
         "untold": open.collect::<Vec<_>>(),

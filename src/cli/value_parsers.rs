@@ -1,6 +1,8 @@
 //! Parsers of the values of command line arguments, with their allowed ranges.
 
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use headrace_geometry::time::DurNs;
+use headrace_import::FileKind;
 use headrace_replay::log::Every;
 use headrace_sampling::layout::HeadLayout;
 use headrace_sensor::connect::Connect;
@@ -190,4 +192,11 @@ mod tests {
             assert!(time(text).is_err(), "{text}");
         }
     }
+}
+
+/// A kind of foreign log by its name.
+pub(crate) fn file_kind() -> impl TypedValueParser<Value = FileKind> {
+    let value = |kind: FileKind| PossibleValue::new(kind.name()).help(kind.summary());
+    PossibleValuesParser::new(FileKind::ALL.map(value))
+        .try_map(|name| FileKind::named(&name).ok_or("is no kind of foreign log"))
 }

@@ -1,24 +1,18 @@
 //! `import`: a foreign log becomes one of ours.
 
-mod imagenex;
-pub(crate) mod kind;
-mod ping;
 mod ros;
-mod takers;
-#[cfg(test)]
-mod tests;
-mod tlog;
 
 use std::fs::File;
 use std::io::{BufRead as _, BufReader, Read};
 use std::path::Path;
 
 use headrace_config::Document;
-use headrace_replay::import::candump::Candump;
-use headrace_replay::import::csv::Csv;
-use headrace_replay::import::ros::bag::Bag;
-use headrace_replay::import::ros::mcap::Mcap;
-use headrace_replay::import::{Format, Import, ImportError, Imported, Input, Source, Taker, detect};
+use headrace_import::csv::Csv;
+use headrace_import::ros::bag::Bag;
+use headrace_import::ros::mcap::Mcap;
+use headrace_import::{
+    BEGIN, FileKind, Format, Import, ImportError, Imported, Input, Source, Taker, detect, routing,
+};
 use headrace_replay::log::{LogError, LogHeader, LogWriter};
 use headrace_vehicle::VehicleConfig;
 use serde_json::json;
@@ -30,13 +24,12 @@ use crate::files;
 use crate::output::{deliver, say};
 use crate::progress::Progress;
 use crate::vehicle_file;
-use kind::Kind;
 
 /// Imports a foreign log.
 pub(crate) fn import(args: &cli::Import) -> Result<u8, Failure> {
     let kind = match args.format {
         Some(kind) => kind,
-        None => Kind::of(&args.file)?,
+        None => kind_of(&args.file)?,
     };
     let vehicle = args.vehicle.as_deref().map(vehicle_file::read).transpose()?;
     let mut header = match &vehicle {
@@ -46,15 +39,15 @@ pub(crate) fn import(args: &cli::Import) -> Result<u8, Failure> {
             ..LogHeader::default()
         },
     };
-    let mut takers = takers::takers(kind, vehicle.as_ref().map(|(_, vehicle)| vehicle), &args.source)?;
+    let mut takers = routing::takers(kind, vehicle.as_ref().map(|(_, vehicle)| vehicle), &args.source)?;
     if vehicle.is_none() {
-        header.sources = takers::sources(kind, &args.source);
+        header.sources = routing::sources(kind, &args.source);
     }
     same_file(&args.file, &args.output)?;
     let name = args.file.display().to_string();
     let file = File::open(&args.file).map_err(|source| Failure::Read { path: args.file.clone(), source })?;
     let vehicle = vehicle.as_ref().map(|(_, vehicle)| vehicle);
-    if kind == Kind::Mcap {
+    if kind == FileKind::Mcap {
         let recording = Mcap::open(&name, file).map_err(|error| unusable(&args.file, error))?;
         let feeds = ros::feeds(args, vehicle, &recording.topics())?;
         return write(args, kind, recording.feeding(feeds), header, &mut takers);
@@ -66,7 +59,7 @@ pub(crate) fn import(args: &cli::Import) -> Result<u8, Failure> {
 /// Writes the log of what the sensors take.
 fn write<S: Source>(
     args: &cli::Import,
-    kind: Kind,
+    kind: FileKind,
     input: S,
     mut header: LogHeader,
     takers: &mut [Taker],
@@ -88,37 +81,32 @@ fn write<S: Source>(
 }
 
 fn format(
-    kind: Kind,
+    kind: FileKind,
     args: &cli::Import,
     vehicle: Option<&VehicleConfig>,
 ) -> Result<Box<dyn Format>, Failure> {
-    if args.map.is_some() != (kind == Kind::Csv) && kind != Kind::Rosbag {
+    if args.map.is_some() != (kind == FileKind::Csv) && kind != FileKind::Rosbag {
         let what = "import: --map MAPPING.toml says what the columns of CSV and the topics of ROS are; CSV wants it, other \
                     formats know it themselves";
         return Err(Failure::Usage(what.to_owned()));
     }
-    Ok(match kind {
-        Kind::Tlog => Box::<tlog::TlogFormat>::default(),
-        Kind::Candump => Box::new(Candump),
-        Kind::Imagenex => Box::new(imagenex::ImagenexFormat),
-        Kind::Ping => Box::<ping::PingFormat>::default(),
-        Kind::Rosbag | Kind::Mcap => {
-            let failed = |source| Failure::Read { path: args.file.clone(), source };
-            let file = File::open(&args.file).map_err(failed)?;
-            let topics = Bag::topics(&args.file.display().to_string(), file)
-                .map_err(|error| unusable(&args.file, error))?;
-            Box::new(Bag::new(ros::feeds(args, vehicle, &topics)?))
-        }
-        Kind::Csv => {
-            let (Some(map), Some(vehicle)) = (&args.map, vehicle) else {
-                let what = "import: CSV wants --vehicle VEHICLE.toml, whose sensors' bytes its values become";
-                return Err(Failure::Usage(what.to_owned()));
-            };
-            let (text, name) = (files::read(map)?, map.display().to_string());
-            let mapping = Document::new(&name, &text).root()?;
-            Box::new(Csv::new(mapping, vehicle, &first_line(&args.file)?)?)
-        }
-    })
+    if let Some(format) = kind.format() {
+        return Ok(format);
+    }
+    if kind != FileKind::Csv {
+        let failed = |source| Failure::Read { path: args.file.clone(), source };
+        let file = File::open(&args.file).map_err(failed)?;
+        let topics = Bag::topics(&args.file.display().to_string(), file)
+            .map_err(|error| unusable(&args.file, error))?;
+        return Ok(Box::new(Bag::new(ros::feeds(args, vehicle, &topics)?)));
+    }
+    let (Some(map), Some(vehicle)) = (&args.map, vehicle) else {
+        let what = "import: CSV wants --vehicle VEHICLE.toml, whose sensors' bytes its values become";
+        return Err(Failure::Usage(what.to_owned()));
+    };
+    let (text, name) = (files::read(map)?, map.display().to_string());
+    let mapping = Document::new(&name, &text).root()?;
+    Ok(Box::new(Csv::new(mapping, vehicle, &first_line(&args.file)?)?))
 }
 
 /// The first line, where it is not too long to be one.
@@ -131,10 +119,10 @@ fn first_line(path: &Path) -> Result<String, Failure> {
 }
 
 /// Says what came of it.
-fn tell(args: &cli::Import, kind: Kind, ids: &[String], imported: &Imported) -> Result<u8, Failure> {
+fn tell(args: &cli::Import, kind: FileKind, ids: &[String], imported: &Imported) -> Result<u8, Failure> {
     let counts = |id: &usize| imported.messages.get(*id).copied().unwrap_or(0);
     let heard: u64 = imported.messages.iter().sum();
-    let seconds = imported.last.since(headrace_replay::import::BEGIN).as_secs_f64();
+    let seconds = imported.last.since(BEGIN).as_secs_f64();
     if args.json {
         let sources: serde_json::Map<String, serde_json::Value> =
             ids.iter().enumerate().map(|(number, id)| (id.clone(), json!(counts(&number)))).collect();
@@ -171,26 +159,17 @@ fn tell(args: &cli::Import, kind: Kind, ids: &[String], imported: &Imported) -> 
     Ok(if imported.losses.is_empty() { failure::OK } else { failure::DATA_LOST })
 }
 
-impl Kind {
-    /// By the file's name.
-    fn of(path: &Path) -> Result<Self, Failure> {
-        let extension = path.extension().map(|extension| extension.to_string_lossy().to_ascii_lowercase());
-        match extension.as_deref() {
-            Some("tlog") => Ok(Self::Tlog),
-            Some("log") => Ok(Self::Candump),
-            Some("852" | "81a" | "81b" | "81s" | "31l") => Ok(Self::Imagenex),
-            Some("bin") => Ok(Self::Ping),
-            Some("csv") => Ok(Self::Csv),
-            Some("bag") => Ok(Self::Rosbag),
-            Some("mcap") => Ok(Self::Mcap),
-            _ => {
-                let problem = "its name doesn't say which format it has; known are .tlog, .log (candump), .852, .81a, .81b, \
-                     .81s, .31l (imagenex), .bin (ping), .csv, .bag (rosbag) and .mcap (of ROS); \
-                     --format tlog|candump|imagenex|ping|csv|rosbag|mcap says it for any name";
-                Err(named(path, &format!("importing {}: {problem}", path.display())))
-            }
-        }
-    }
+/// The kind of a file by its name.
+fn kind_of(path: &Path) -> Result<FileKind, Failure> {
+    FileKind::of(path).map_or_else(
+        || {
+            let problem = "its name doesn't say which format it has; known are .tlog, .log (candump), .852, .81a, .81b, \
+                 .81s, .31l (imagenex), .bin (ping), .csv, .bag (rosbag) and .mcap (of ROS); \
+                 --format tlog|candump|imagenex|ping|csv|rosbag|mcap says it for any name";
+            Err(named(path, &format!("importing {}: {problem}", path.display())))
+        },
+        Ok,
+    )
 }
 
 /// Why a file can't be imported, with what it looks like where it is the wrong one.

@@ -1,7 +1,7 @@
 //! Recordings of ROS: whose topics are which sensor's.
 
 use headrace_config::Document;
-use headrace_replay::import::ros::{Feeds, MatchError, Topic};
+use headrace_import::ros::{Feeds, MatchError, Topic};
 use headrace_vehicle::VehicleConfig;
 
 use crate::cli;

@@ -11,9 +11,9 @@ use headrace_monitor::report::Report;
 use headrace_monitor::ring::{Port, RingError};
 use headrace_replay::drive::{Coming, Feed, Pace, drive};
 use headrace_replay::log::LogError;
-use headrace_replay::simulate::{Scene, Simulation};
 use headrace_sensor::device::Direction;
 use headrace_sensor::reading::SourceId;
+use headrace_simulator::{Scene, Simulation};
 
 /// A simulated dive one of whose sources may be dumb.
 struct Partly {

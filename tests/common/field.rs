@@ -7,7 +7,7 @@ use headrace_fusion::Fix;
 use headrace_geometry::frames::{Tunnel, Vec3};
 use headrace_geometry::math;
 use headrace_geometry::time::MonoNs;
-use headrace_replay::simulate::Scene;
+use headrace_simulator::Scene;
 use nalgebra::{SMatrix, SVector};
 
 use crate::shipped;

@@ -11,9 +11,9 @@ use std::path::Path;
 use headrace_config::Document;
 use headrace_monitor::App;
 use headrace_monitor::report::Report;
+use headrace_replay::SimulationFeed;
 use headrace_replay::drive::{Pace, drive};
-use headrace_replay::player::SimulationFeed;
-use headrace_replay::simulate::{FileLoader, Scene, Simulation};
+use headrace_simulator::{FileLoader, Scene, Simulation};
 
 /// A file of `deploy/vehicles`.
 pub(crate) fn vehicle_file(name: &str) -> Result<Vec<u8>, String> {

@@ -16,11 +16,11 @@ use headrace_geometry::frames::Pose;
 use headrace_geometry::time::MonoNs;
 use headrace_monitor::App;
 use headrace_monitor::report::Report;
+use headrace_replay::SimulationFeed;
 use headrace_replay::drive::{Pace, drive};
-use headrace_replay::player::SimulationFeed;
-use headrace_replay::simulate::{START, Scene, Simulation};
 use headrace_sensor::device::SensorInfo;
 use headrace_sensor::reading::Reading;
+use headrace_simulator::{START, Scene, Simulation};
 use headrace_snapshot::{Restorer, Saver, SnapshotError, Stateful};
 use headrace_vehicle::NavigationConfig;
 

@@ -13,9 +13,9 @@ use headrace_monitor::messages::{Outcome, Placed, PlacedList};
 use headrace_monitor::report::Report;
 use headrace_monitor::stage::Stage;
 use headrace_monitor::{Plugin, PluginError};
+use headrace_replay::SimulationFeed;
 use headrace_replay::drive::{Pace, drive};
-use headrace_replay::player::SimulationFeed;
-use headrace_replay::simulate::{Scene, Simulation};
+use headrace_simulator::{Scene, Simulation};
 use headrace_vehicle::Mission;
 use headrace_vehicle::VehicleConfig;
 

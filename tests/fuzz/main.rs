@@ -27,12 +27,6 @@ mod targets;
 
 #[path = "../../src/devices.rs"]
 mod devices;
-#[path = "../../src/import/imagenex.rs"]
-mod imagenex;
-#[path = "../../src/import/ping.rs"]
-mod ping;
-#[path = "../../src/import/tlog.rs"]
-mod tlog;
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::panic::{AssertUnwindSafe, catch_unwind};

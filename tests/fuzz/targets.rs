@@ -5,22 +5,22 @@ use std::io::Cursor;
 
 use headrace_config::Document;
 use headrace_geometry::time::MonoNs;
-use headrace_replay::import::candump::Candump;
-use headrace_replay::import::csv::Csv;
-use headrace_replay::import::detect::looks_like;
-use headrace_replay::import::ros::bag::Bag;
-use headrace_replay::import::ros::mcap::Mcap;
-use headrace_replay::import::ros::{Feeds, Topic};
-use headrace_replay::import::{Format, Import, Input, Source, Taker};
+use headrace_import::candump::Candump;
+use headrace_import::csv::Csv;
+use headrace_import::detect::looks_like;
+use headrace_import::imagenex::{self, ImagenexFormat};
+use headrace_import::ping::{self, PingFormat};
+use headrace_import::ros::bag::Bag;
+use headrace_import::ros::mcap::Mcap;
+use headrace_import::ros::{Feeds, Topic};
+use headrace_import::tlog::{self, TlogFormat};
+use headrace_import::{Format, Import, Input, Source, Taker};
 use headrace_replay::log::{LogHeader, LogReader, LogWriter, MessageKind, SourceInfo};
 use headrace_sensor::driver::DriverSetup;
 use headrace_vehicle::VehicleConfig;
 
 use crate::corpus::{Corpus, Kind};
 use crate::devices::KINDS;
-use crate::imagenex::ImagenexFormat;
-use crate::ping::PingFormat;
-use crate::tlog::TlogFormat;
 
 /// Messages of a log: time and content, and how often.
 pub(crate) type Said = BTreeMap<(u64, Vec<u8>), u32>;
@@ -88,9 +88,9 @@ impl Surroundings {
     /// Every sensor listens to the line of this name, and to one named as itself.
     fn takers(&self, kind: Kind) -> Vec<Taker> {
         let line = match kind {
-            Kind::Tlog => crate::tlog::STREAM,
-            Kind::Imagenex => crate::imagenex::STREAM,
-            Kind::Ping => crate::ping::STREAM,
+            Kind::Tlog => tlog::STREAM,
+            Kind::Imagenex => imagenex::STREAM,
+            Kind::Ping => ping::STREAM,
             _ => "can0",
         };
         let setup = DriverSetup { begun: MonoNs(0), head: None };

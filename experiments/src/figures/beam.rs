@@ -2,8 +2,8 @@
 
 use headrace_geometry::math;
 use headrace_geometry::tunnel::{Profile, shapes};
-use headrace_replay::simulate::effects::Cone;
 use headrace_sampling::section::{beam_width_m, footprint_m};
+use headrace_simulator::effects::Cone;
 
 use crate::ExperimentError;
 

@@ -3,8 +3,8 @@
 //! Gauss-Newton, each round a recursive fit: [`Factors`] start with what is known beforehand and take one return after the
 //! other, so that what returns can't tell stays at the vehicle file's, with its own uncertainty.
 
-use super::median;
-use super::scan::{EchoScan, HeadScan, Return};
+use crate::estimate::median;
+use crate::scan::{EchoScan, HeadScan, Return};
 use headrace_fusion::filter::factors::Factors;
 use headrace_fusion::filter::measure::{self, Beam, Row};
 use headrace_fusion::filter::settings::Settings;

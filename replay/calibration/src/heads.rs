@@ -1,9 +1,10 @@
 //! How the heads sit, by turns of a vehicle that stands still in a tunnel whose profile is known.
 
-use super::fit::{ANGLE_SD_RAD, COMMON, Fit, OFFSET_SD_M, OWN, Problem, is_outlier, moved, own};
-use super::scan::{HeadScan, Scan, gather};
-use super::still::{Still, longest};
-use super::{Estimate, Material, Untold, median};
+use crate::estimate::{Estimate, Untold, median};
+use crate::fit::{ANGLE_SD_RAD, COMMON, Fit, OFFSET_SD_M, OWN, Problem, is_outlier, moved, own};
+use crate::material::Material;
+use crate::scan::{HeadScan, Scan, gather};
+use crate::still::{Still, longest};
 use headrace_fusion::section::{Echo, settle};
 use headrace_geometry::frames::{Mount, Vec3};
 use headrace_geometry::math::{self, TAU};

@@ -2,8 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use super::still::Still;
-use super::{Material, Untold, median};
+use crate::estimate::{Untold, median};
+use crate::material::Material;
+use crate::still::Still;
 use headrace_fusion::filter::running::in_tunnel;
 use headrace_geometry::frames::{Body, Mount, Rot, Tunnel};
 use headrace_geometry::math::{self, TAU};

@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use super::{Material, Untold, median};
+use crate::estimate::{Untold, median};
+use crate::material::Material;
 use headrace_fusion::filter::state::rotation_vector;
 use headrace_geometry::frames::{Rot, Sensor};
 use headrace_geometry::time::{DurNs, MonoNs};

@@ -1,7 +1,8 @@
 //! How late each source is, by the likelihood of the whole log: the filter is run over it with the times of one source
 //! shifted, and the shift is sought at which all innovations together are likeliest.
 
-use super::{Estimate, Material, Untold};
+use crate::estimate::{Estimate, Untold};
+use crate::material::Material;
 use headrace_fusion::filter::FilterNavigation;
 use headrace_fusion::{Navigation, Times};
 use headrace_geometry::math;

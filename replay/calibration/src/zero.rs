@@ -1,8 +1,9 @@
 //! Where depth sensors and cable counters count from.
 
-use super::heads::Heads;
-use super::still::Still;
-use super::{Estimate, Material, Untold, median};
+use crate::estimate::{Estimate, Untold, median};
+use crate::heads::Heads;
+use crate::material::Material;
+use crate::still::Still;
 use headrace_fusion::filter::running::{in_tunnel, with_quantum};
 use headrace_geometry::frames::Rot;
 use headrace_geometry::math;

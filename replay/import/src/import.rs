@@ -1,0 +1,136 @@
+//! An import: entries in order of time, moved to the log's clock and handed to the sensors that would have heard them.
+
+use std::io::{Read, Write};
+
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_replay::log::LogWriter;
+
+use crate::entry::Clock;
+use crate::error::ImportError;
+use crate::format::Format;
+use crate::input::{Input, Source};
+use crate::losses::Losses;
+use crate::order::Order;
+use crate::taker::Taker;
+
+/// Log time of a file's first entry, as that of a simulation.
+pub const BEGIN: MonoNs = MonoNs(1_000_000_000);
+
+/// Times that go on by more than this were not of one recording, or somebody set the clock.
+const LONGEST_GAP: DurNs = DurNs(3_600_000_000_000);
+
+/// A file that is being imported.
+pub struct Import<S> {
+    pub(crate) input: S,
+    pub(crate) order: Order,
+    /// The stamp that becomes [`BEGIN`].
+    first_ns: u64,
+    clock: Clock,
+}
+
+/// What has come of an import.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Imported {
+    /// Entries of the file.
+    pub entries: u64,
+    /// Entries that no sensor takes: other parts, other lines.
+    pub passed_over: u64,
+    /// Messages written, for each source of the log.
+    pub messages: Vec<u64>,
+    /// Log time of the last message.
+    pub last: MonoNs,
+    /// What was lost, in words.
+    pub losses: Vec<String>,
+    /// What is no loss, and should be known all the same.
+    pub remarks: Vec<String>,
+}
+
+impl<R: Read> Import<Input<R>> {
+    /// Reads as far as it takes to know when the file begins. `what` is what its entries are called.
+    ///
+    /// Errors: the file can't be read, or has no entry.
+    pub fn open(
+        name: &str,
+        reader: R,
+        format: Box<dyn Format>,
+        what: &'static str,
+    ) -> Result<Self, ImportError> {
+        Self::of(Input::new(name, reader, format), what)
+    }
+}
+
+impl<S: Source> Import<S> {
+    /// Reads as far as it takes to know when the recording begins. `what` is what its entries are called.
+    ///
+    /// Errors: it can't be read, or has no entry.
+    pub fn of(mut input: S, what: &'static str) -> Result<Self, ImportError> {
+        let mut order = Order::reaching(input.reach_ns());
+        while !order.is_full() && input.more(&mut order)? {}
+        let Some(first_ns) = order.first_ns() else {
+            let why = input.told().losses.into_iter().next().map_or(String::new(), |why| format!("; {why}"));
+            return Err(ImportError::Nothing {
+                name: input.name().to_owned(),
+                what,
+                bytes: input.bytes(),
+                why,
+            });
+        };
+        let clock = input.clock();
+        Ok(Self { input, order, first_ns, clock })
+    }
+
+    /// What the log's metadata say of its clock: where it comes from and, where that is known, what time of day it was.
+    pub fn clock_metadata(&self) -> Vec<(String, String)> {
+        let mut all = vec![("import_clock".to_owned(), self.clock.as_str().to_owned())];
+        if self.clock == Clock::Utc {
+            all.push(("clock_anchor_monotonic_ns".to_owned(), BEGIN.0.to_string()));
+            all.push(("clock_anchor_utc_ns".to_owned(), self.first_ns.to_string()));
+        } else {
+            all.push(("import_clock_first_ns".to_owned(), self.first_ns.to_string()));
+        }
+        all
+    }
+
+    /// Writes all that the sensors would have heard. `beside` learns how many entries there have been.
+    ///
+    /// Errors: the file can't be read on, or the log not be written.
+    pub fn write<W: Write>(
+        mut self,
+        log: &mut LogWriter<W>,
+        takers: &mut [Taker],
+        beside: &mut dyn FnMut(u64),
+    ) -> Result<Imported, ImportError> {
+        let sources = takers.iter().map(|taker| usize::from(taker.source) + 1).max().unwrap_or(0);
+        let mut imported = Imported { messages: vec![0; sources], last: BEGIN, ..Imported::default() };
+        let mut before_ns = self.first_ns;
+        let mut losses = Losses::default();
+        loop {
+            while !self.order.is_full() && self.input.more(&mut self.order)? {}
+            let Some(entry) = self.order.pop() else { break };
+            let at = BEGIN + DurNs(i64::try_from(entry.stamp_ns - self.first_ns).unwrap_or(i64::MAX / 2));
+            if entry.stamp_ns - before_ns > LONGEST_GAP.0.unsigned_abs() {
+                losses.gap(entry.stamp_ns - before_ns, at);
+            }
+            before_ns = entry.stamp_ns;
+            imported.entries += 1;
+            beside(imported.entries);
+            let mut taken = false;
+            for taker in takers.iter_mut().filter(|taker| taker.listens_to(&entry.stream)) {
+                for (received, bytes) in taker.take(at, entry.bytes.as_slice()) {
+                    log.raw(taker.source, received, received, &bytes)?;
+                    taken = true;
+                    if let Some(count) = imported.messages.get_mut(usize::from(taker.source)) {
+                        *count += 1;
+                    }
+                    imported.last = imported.last.max(received);
+                }
+            }
+            imported.passed_over += u64::from(!taken);
+        }
+        losses.late(self.order.late());
+        let told = self.input.told();
+        imported.losses = [told.losses, losses.words()].concat();
+        imported.remarks = told.remarks;
+        Ok(imported)
+    }
+}

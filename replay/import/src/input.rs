@@ -1,0 +1,137 @@
+//! Where entries come from.
+
+use std::io::Read;
+
+use crate::entry::{Clock, Entry, Step, Told};
+use crate::error::ImportError;
+use crate::format::Format;
+use crate::losses::Losses;
+use crate::order::Order;
+
+/// Bytes that are read at a time.
+pub(crate) const READ_BYTES: usize = 1 << 16;
+
+/// Where entries come from: a file that a [`Format`] cuts, or one that another reader reads.
+pub trait Source {
+    /// The file.
+    fn name(&self) -> &str;
+
+    /// Puts the next entries in order. `false` at the end.
+    ///
+    /// Errors: the file can't be read on.
+    fn more(&mut self, order: &mut Order) -> Result<bool, ImportError>;
+
+    /// What its times count from, as far as has been read.
+    fn clock(&self) -> Clock;
+
+    /// How long before the latest entry one may be that comes later, ns.
+    fn reach_ns(&self) -> u64;
+
+    /// Bytes that have been read.
+    fn bytes(&self) -> u64;
+
+    /// What was lost so far, and what else should be known.
+    fn told(&self) -> Told;
+}
+
+/// A file and the format that cuts it.
+pub struct Input<R, F = Box<dyn Format>> {
+    name: String,
+    reader: R,
+    pub(crate) format: F,
+    pub(crate) held: Vec<u8>,
+    /// Of what is held, how much is done with.
+    done: usize,
+    /// Place in the file of the first byte that is held.
+    offset: u64,
+    end: bool,
+    found: Vec<Entry>,
+    pub(crate) losses: Losses,
+}
+
+impl<R: Read, F: Format> Source for Input<R, F> {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn clock(&self) -> Clock {
+        self.format.clock()
+    }
+
+    fn reach_ns(&self) -> u64 {
+        self.format.reach_ns()
+    }
+
+    fn bytes(&self) -> u64 {
+        self.offset + self.done as u64
+    }
+
+    fn told(&self) -> Told {
+        let Told { losses, remarks } = self.format.told();
+        Told { losses: [self.losses.words(), losses].concat(), remarks }
+    }
+
+    fn more(&mut self, order: &mut Order) -> Result<bool, ImportError> {
+        let front = self.held.get(self.done..).unwrap_or_default();
+        if front.is_empty() && self.end {
+            return Ok(false);
+        }
+        let at = self.offset + self.done as u64;
+        let step =
+            if front.is_empty() { Step::More } else { self.format.step(front, self.end, &mut self.found) };
+        let left = front.len();
+        match step {
+            Step::Took(bytes) => self.done += bytes.clamp(1, left),
+            Step::Lost(bytes, why) => {
+                let bytes = bytes.clamp(1, left);
+                self.losses.lost(at, bytes, why);
+                self.done += bytes;
+            }
+            Step::More if self.end => {
+                self.losses.cut_off(at, left);
+                self.done += left;
+            }
+            Step::Held => (),
+            Step::More if left >= self.format.most_held() => {
+                self.losses.lost(at, left, "no end of an entry within what can be held");
+                self.done += left;
+            }
+            Step::More => self.read()?,
+        }
+        for entry in self.found.drain(..) {
+            order.push(entry);
+        }
+        Ok(true)
+    }
+}
+
+impl<R: Read, F: Format> Input<R, F> {
+    /// A file that nothing has been read of.
+    pub fn new(name: &str, reader: R, format: F) -> Self {
+        Self {
+            name: name.to_owned(),
+            reader,
+            format,
+            held: Vec::new(),
+            done: 0,
+            offset: 0,
+            end: false,
+            found: Vec::new(),
+            losses: Losses::default(),
+        }
+    }
+
+    fn read(&mut self) -> Result<(), ImportError> {
+        self.held.drain(..self.done);
+        self.offset += self.done as u64;
+        self.done = 0;
+        let mut part = (&mut self.reader).take(READ_BYTES as u64);
+        let read = part.read_to_end(&mut self.held).map_err(|source| ImportError::Read {
+            name: self.name.clone(),
+            offset: self.offset + self.held.len() as u64,
+            source,
+        })?;
+        self.end = read < READ_BYTES;
+        Ok(())
+    }
+}

@@ -1,0 +1,146 @@
+//! The kinds of foreign logs that are known.
+
+use std::path::Path;
+
+use headrace_sensor::connect::Connect;
+use headrace_sensor::device::DeviceKind as _;
+
+use crate::candump::Candump;
+use crate::format::Format;
+use crate::imagenex::{self, ImagenexFormat};
+use crate::ping::{self, PingFormat};
+use crate::tlog::{self, TlogFormat};
+
+/// A kind of foreign log.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FileKind {
+    /// Telemetry log of MAVLink.
+    Tlog,
+    /// Text of `candump -l` or `-L`.
+    Candump,
+    /// File of the software of Imagenex 881 and 852.
+    Imagenex,
+    /// Log of Ping Viewer.
+    Ping,
+    /// Table of values, with a mapping of its columns.
+    Csv,
+    /// Bag of ROS 1.
+    Rosbag,
+    /// Recording of ROS 2 (or 1) in MCAP.
+    Mcap,
+}
+
+impl FileKind {
+    /// All kinds.
+    pub const ALL: [Self; 7] =
+        [Self::Tlog, Self::Candump, Self::Imagenex, Self::Ping, Self::Csv, Self::Rosbag, Self::Mcap];
+
+    /// By the extension of a file's name, whatever its case.
+    pub fn of(path: &Path) -> Option<Self> {
+        let extension = path.extension()?.to_string_lossy().to_ascii_lowercase();
+        match extension.as_str() {
+            "tlog" => Some(Self::Tlog),
+            "log" => Some(Self::Candump),
+            "852" | "81a" | "81b" | "81s" | "31l" => Some(Self::Imagenex),
+            "bin" => Some(Self::Ping),
+            "csv" => Some(Self::Csv),
+            "bag" => Some(Self::Rosbag),
+            "mcap" => Some(Self::Mcap),
+            _ => None,
+        }
+    }
+
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Tlog => "tlog",
+            Self::Candump => "candump",
+            Self::Imagenex => "imagenex",
+            Self::Ping => "ping",
+            Self::Csv => "csv",
+            Self::Rosbag => "rosbag",
+            Self::Mcap => "mcap",
+        }
+    }
+
+    /// By its name.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|kind| kind.name() == name)
+    }
+
+    /// What such a file is, in a line.
+    pub fn summary(self) -> &'static str {
+        match self {
+            Self::Tlog => "Telemetry log of MAVLink",
+            Self::Candump => "Text of `candump -l` or `-L`",
+            Self::Imagenex => "File of the software of Imagenex 881 and 852",
+            Self::Ping => "Log of Ping Viewer",
+            Self::Csv => "Table of values, with --map",
+            Self::Rosbag => "Bag of ROS 1",
+            Self::Mcap => "Recording of ROS 2 (or 1) in MCAP",
+        }
+    }
+
+    /// What one of its entries is called.
+    pub fn entries(self) -> &'static str {
+        match self {
+            Self::Tlog | Self::Candump => "frame",
+            Self::Imagenex => "shot",
+            Self::Ping | Self::Csv | Self::Rosbag | Self::Mcap => "message",
+        }
+    }
+
+    /// Its format, where that needs neither a vehicle file nor a mapping.
+    pub fn format(self) -> Option<Box<dyn Format>> {
+        match self {
+            Self::Tlog => Some(Box::<TlogFormat>::default()),
+            Self::Candump => Some(Box::new(Candump)),
+            Self::Imagenex => Some(Box::new(ImagenexFormat)),
+            Self::Ping => Some(Box::<PingFormat>::default()),
+            Self::Csv | Self::Rosbag | Self::Mcap => None,
+        }
+    }
+
+    /// Whether such files have values, of which emulators make bytes.
+    pub fn has_values(self) -> bool {
+        matches!(self, Self::Csv | Self::Rosbag | Self::Mcap)
+    }
+
+    /// Whether such a file is of one device.
+    pub(crate) fn has_one_device(self) -> bool {
+        matches!(self, Self::Imagenex | Self::Ping)
+    }
+
+    /// The plugin of the sensors whose bytes such files have; empty where they have values.
+    pub(crate) fn plugin(self) -> &'static str {
+        match self {
+            Self::Tlog => headrace_mavlink::Kind.name(),
+            Self::Candump => headrace_imu_can::Kind.name(),
+            Self::Imagenex => headrace_imagenex881::Kind.name(),
+            Self::Ping => headrace_ping1d::Kind.name(),
+            Self::Csv | Self::Rosbag | Self::Mcap => "",
+        }
+    }
+
+    /// The line that a sensor listens to that is connected like this.
+    pub(crate) fn usual_line(self, connect: &str) -> Option<String> {
+        match self {
+            Self::Candump => match Connect::parse(connect) {
+                Ok(Connect::Can { interface }) => Some(interface),
+                _ => None,
+            },
+            other => Some(other.line_form().to_owned()),
+        }
+    }
+
+    /// How a line is named.
+    pub(crate) fn line_form(self) -> &'static str {
+        match self {
+            Self::Tlog => tlog::STREAM,
+            Self::Candump => "INTERFACE",
+            Self::Imagenex => imagenex::STREAM,
+            Self::Ping => ping::STREAM,
+            Self::Csv | Self::Rosbag | Self::Mcap => "ID",
+        }
+    }
+}

@@ -1,0 +1,73 @@
+//! Order of time, within what can be held.
+
+use std::collections::BTreeMap;
+
+use crate::Entry;
+
+/// Entries within this of the latest one are held back: what comes after them may be older.
+pub(super) const WINDOW_NS: u64 = 2_000_000_000;
+/// However close together, no more are held than this.
+const MOST_ENTRIES: usize = 1 << 15;
+const MOST_BYTES: usize = 1 << 24;
+/// And where they have to be held for longer than usual.
+const MOST_REACHING: usize = 1 << 18;
+
+/// Gives entries in order of their stamps, those with the same one as they came.
+#[derive(Debug)]
+pub struct Order {
+    window_ns: u64,
+    most_entries: usize,
+    held: BTreeMap<(u64, u64), Entry>,
+    bytes: usize,
+    count: u64,
+    given_ns: u64,
+    late: u64,
+}
+
+impl Default for Order {
+    fn default() -> Self {
+        Self::reaching(WINDOW_NS)
+    }
+}
+
+impl Order {
+    /// For entries that may come so much later than they are.
+    pub(super) fn reaching(window_ns: u64) -> Self {
+        let most_entries = if window_ns > WINDOW_NS { MOST_REACHING } else { MOST_ENTRIES };
+        Self { window_ns, most_entries, held: BTreeMap::new(), bytes: 0, count: 0, given_ns: 0, late: 0 }
+    }
+
+    /// Takes an entry, unless a later one has been given already.
+    pub(super) fn push(&mut self, entry: Entry) {
+        if entry.stamp_ns < self.given_ns {
+            self.late += 1;
+            return;
+        }
+        self.count += 1;
+        self.bytes += entry.bytes.len();
+        self.held.insert((entry.stamp_ns, self.count), entry);
+    }
+
+    /// Whether an entry has to be given before another is taken.
+    pub(super) fn is_full(&self) -> bool {
+        let ends = self.held.first_key_value().zip(self.held.last_key_value());
+        let spans = ends.is_some_and(|((first, _), (last, _))| last.0 - first.0 > self.window_ns);
+        spans || self.held.len() >= self.most_entries || self.bytes >= MOST_BYTES
+    }
+
+    pub(super) fn pop(&mut self) -> Option<Entry> {
+        let (_, entry) = self.held.pop_first()?;
+        self.bytes -= entry.bytes.len();
+        self.given_ns = entry.stamp_ns;
+        Some(entry)
+    }
+
+    pub(super) fn first_ns(&self) -> Option<u64> {
+        self.held.first_key_value().map(|((stamp_ns, _), _)| *stamp_ns)
+    }
+
+    /// Entries that were left out since they came too late.
+    pub(super) fn late(&self) -> u64 {
+        self.late
+    }
+}

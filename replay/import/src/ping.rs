@@ -1,0 +1,115 @@
+//! Logs of Ping Viewer: after a preface, for each message the time of day and the message.
+//!
+//! Source: Ping Viewer, docs, "Binary log file structure": big-endian; a text is its length in bytes, u32, and UTF-16.
+
+use crate::{Clock, Entry, Format, Step};
+
+/// The format; its one stream is [`STREAM`].
+#[derive(Debug, Default)]
+pub struct PingFormat {
+    begun: bool,
+    /// Whole days since the first one.
+    days: u64,
+    last_of_day_ns: u64,
+}
+
+/// The line of all messages.
+pub const STREAM: &str = "ping";
+
+/// Texts before the two numbers that end the preface, the version of four bytes after the first of them.
+const TEXTS: usize = 5;
+const TITLE: &str = "PingViewer sensor log file";
+const DAY_NS: u64 = 86_400_000_000_000;
+/// A time that is earlier by this is of the next day; by less, it came out of order.
+const MIDNIGHT_NS: u64 = DAY_NS / 2;
+/// Longer than any text or message of such a log.
+const MOST_BYTES: usize = 1 << 16;
+
+/// Why no field can be read.
+enum Stop {
+    More,
+    Bad,
+}
+
+impl Format for PingFormat {
+    fn clock(&self) -> Clock {
+        Clock::Own
+    }
+
+    fn step(&mut self, front: &[u8], _: bool, out: &mut Vec<Entry>) -> Step {
+        let mut rest = front;
+        let done = if self.begun { self.record(&mut rest, out) } else { self.preface(&mut rest) };
+        match done {
+            Ok(()) => Step::Took(front.len() - rest.len()),
+            Err(Stop::More) => Step::More,
+            // Records have no mark to find the next one by.
+            Err(Stop::Bad) if self.begun => Step::Lost(front.len(), "no time and message where one must be"),
+            Err(Stop::Bad) => Step::Lost(front.len(), "no preface of Ping Viewer"),
+        }
+    }
+}
+
+impl PingFormat {
+    fn preface(&mut self, rest: &mut &[u8]) -> Result<(), Stop> {
+        if text(rest)? != TITLE {
+            return Err(Stop::Bad);
+        }
+        number(rest)?;
+        for _ in 0..TEXTS {
+            text(rest)?;
+        }
+        number(rest)?;
+        number(rest)?;
+        self.begun = true;
+        Ok(())
+    }
+
+    fn record(&mut self, rest: &mut &[u8], out: &mut Vec<Entry>) -> Result<(), Stop> {
+        let of_day_ns = time_of_day_ns(&text(rest)?).ok_or(Stop::Bad)?;
+        let message = sized(rest)?;
+        if self.last_of_day_ns > of_day_ns + MIDNIGHT_NS {
+            self.days += 1;
+        }
+        self.last_of_day_ns = of_day_ns;
+        let stamp_ns = self.days * DAY_NS + of_day_ns;
+        out.push(Entry { stamp_ns, stream: STREAM.to_owned(), bytes: message.to_vec() });
+        Ok(())
+    }
+}
+
+fn number(rest: &mut &[u8]) -> Result<u32, Stop> {
+    let (bytes, behind) = rest.split_first_chunk().ok_or(Stop::More)?;
+    *rest = behind;
+    Ok(u32::from_be_bytes(*bytes))
+}
+
+fn sized<'a>(rest: &mut &'a [u8]) -> Result<&'a [u8], Stop> {
+    // Qt's mark of a text that isn't there.
+    let len = match number(rest)? {
+        u32::MAX => 0,
+        len => usize::try_from(len).map_err(|_| Stop::Bad)?,
+    };
+    if len > MOST_BYTES {
+        return Err(Stop::Bad);
+    }
+    let (bytes, behind) = rest.split_at_checked(len).ok_or(Stop::More)?;
+    *rest = behind;
+    Ok(bytes)
+}
+
+fn text(rest: &mut &[u8]) -> Result<String, Stop> {
+    let (units, odd) = sized(rest)?.as_chunks::<2>();
+    let units: Vec<u16> = units.iter().map(|unit| u16::from_be_bytes(*unit)).collect();
+    String::from_utf16(&units).ok().filter(|_| odd.is_empty()).ok_or(Stop::Bad)
+}
+
+/// `hh:mm:ss.zzz`, perhaps with a zero behind it.
+fn time_of_day_ns(text: &str) -> Option<u64> {
+    let text = text.trim_end_matches('\0');
+    let (clock, milliseconds) = text.split_once('.')?;
+    let mut parts = clock.split(':');
+    let mut part = |limit: u64| parts.next()?.parse::<u64>().ok().filter(|part| *part < limit);
+    let seconds = (part(24)? * 60 + part(60)?) * 60 + part(60)?;
+    let milliseconds = milliseconds.parse::<u64>().ok().filter(|part| *part < 1000)?;
+    parts.next().is_none().then_some((seconds * 1000 + milliseconds) * 1_000_000)
+}

@@ -1,0 +1,372 @@
+//! Bags of ROS 1.
+//!
+//! Source: ROS wiki, "Bags/Format/2.0". A record is a header of fields, each `name=value`, and data, both with their lengths before
+//! them; messages stand in chunks, definitions of their connections in chunks and once more at the end.
+
+use std::collections::BTreeMap;
+use std::io::{Read, Seek, SeekFrom};
+
+use super::unpack::{MOST_UNPACKED, Unpacked, unpack};
+use super::{Encoding, Feeds, Topic, Type};
+use crate::order::Order;
+use crate::{Clock, Entry, Format, ImportError, Input, Source as _, Step, Told};
+
+const MAGIC: &[u8] = b"#ROSBAG V2.0\n";
+/// More than names and numbers in a header take.
+const MOST_HEADER: usize = 1 << 16;
+/// The part with the definitions, at the end of a bag, is read at once.
+const MOST_INDEX: u64 = 64 << 20;
+/// Times below this, in 2001, are no time of day.
+pub(super) const FIRST_UTC_NS: u64 = 1_000_000_000_000_000_000;
+
+const NO_RECORD: &str = "no record of a bag";
+
+/// A bag as a format; its streams are the sensors' ids.
+#[derive(Default)]
+pub struct Bag {
+    feeds: Feeds,
+    begun: bool,
+    /// Whether the place of the next record isn't known.
+    astray: bool,
+    connections: BTreeMap<u32, Topic>,
+    /// The chunk that is being read, and how far.
+    chunk: Option<Chunk>,
+    first_ns: Option<u64>,
+    /// What its header says of it.
+    stated: Option<Stated>,
+    chunks: u64,
+    lost: BTreeMap<&'static str, u64>,
+}
+
+/// What a bag says of itself.
+#[derive(Debug, Clone, Copy)]
+struct Stated {
+    index_at: u64,
+    connections: u32,
+    chunks: u32,
+}
+
+/// A chunk that is unpacked, and what is to be said of it when it has been read.
+struct Chunk {
+    bytes: Vec<u8>,
+    at: usize,
+    step: Step,
+}
+
+/// A record: its fields, its data, and the length of both.
+struct Record<'a> {
+    fields: Fields<'a>,
+    data: &'a [u8],
+    len: usize,
+}
+
+/// What a record was.
+enum Accepted<'a> {
+    /// One that is done with.
+    Read,
+    /// A chunk, packed in this way.
+    Chunk(&'a [u8]),
+}
+
+/// Why no record can be had.
+enum Stop<'a> {
+    /// It isn't all there: its fields and what there is of its data, where the fields are.
+    More(Option<(Fields<'a>, &'a [u8])>),
+    Bad,
+}
+
+/// Fields of a header.
+#[derive(Clone, Copy)]
+struct Fields<'a>(&'a [u8]);
+
+impl<'a> Fields<'a> {
+    fn get(&self, name: &[u8]) -> Option<&'a [u8]> {
+        let mut rest = self.0;
+        while let Some((field, behind)) = sized(rest) {
+            rest = behind;
+            let equals = field.iter().position(|byte| *byte == b'=')?;
+            if field.get(..equals) == Some(name) {
+                return field.get(equals + 1..);
+            }
+        }
+        None
+    }
+
+    fn is_whole(&self) -> bool {
+        let mut rest = self.0;
+        while let Some((_, behind)) = sized(rest) {
+            rest = behind;
+        }
+        rest.is_empty()
+    }
+
+    fn u8(&self, name: &[u8]) -> Option<u8> {
+        self.get(name)?.first().copied()
+    }
+
+    fn u32(&self, name: &[u8]) -> Option<u32> {
+        Some(u32::from_le_bytes(self.get(name)?.try_into().ok()?))
+    }
+
+    fn u64(&self, name: &[u8]) -> Option<u64> {
+        Some(u64::from_le_bytes(self.get(name)?.try_into().ok()?))
+    }
+
+    /// Seconds, then nanoseconds.
+    fn time_ns(&self, name: &[u8]) -> Option<u64> {
+        let (seconds, nanoseconds) = self.get(name)?.split_at_checked(4)?;
+        let number = |bytes: &[u8]| Some(u64::from(u32::from_le_bytes(bytes.try_into().ok()?)));
+        Some(number(seconds)? * 1_000_000_000 + number(nanoseconds)?)
+    }
+
+    fn text(&self, name: &[u8]) -> Option<String> {
+        Some(String::from_utf8_lossy(self.get(name)?).into_owned())
+    }
+}
+
+/// Bytes with their length before them, and what is behind.
+fn sized(bytes: &[u8]) -> Option<(&[u8], &[u8])> {
+    let (len, rest) = bytes.split_first_chunk()?;
+    rest.split_at_checked(usize::try_from(u32::from_le_bytes(*len)).ok()?)
+}
+
+fn record(front: &[u8]) -> Result<Record<'_>, Stop<'_>> {
+    let length = |bytes: &[u8]| {
+        let len = bytes.first_chunk().map(|len| u32::from_le_bytes(*len));
+        len.map(|len| usize::try_from(len).unwrap_or(usize::MAX))
+    };
+    let header_len = length(front).ok_or(Stop::More(None))?;
+    // The shortest has its kind: a length, `op=` and a byte.
+    if !(8..=MOST_HEADER).contains(&header_len) {
+        return Err(Stop::Bad);
+    }
+    // Astray, lengths are made of anything; but no name begins with anything.
+    if front.get(8).is_some_and(|byte| !byte.is_ascii_lowercase()) {
+        return Err(Stop::Bad);
+    }
+    let (header, behind) = sized(front).ok_or(Stop::More(None))?;
+    let fields = Fields(header);
+    if !fields.is_whole() || fields.u8(b"op").is_none() {
+        return Err(Stop::Bad);
+    }
+    let data_len = length(behind).ok_or(Stop::More(None))?;
+    if data_len > MOST_UNPACKED {
+        return Err(Stop::Bad);
+    }
+    let Some((data, rest)) = sized(behind) else {
+        return Err(Stop::More(Some((fields, behind.get(4..).unwrap_or_default()))));
+    };
+    Ok(Record { fields, data, len: front.len() - rest.len() })
+}
+
+impl Format for Bag {
+    fn clock(&self) -> Clock {
+        if self.first_ns.is_some_and(|first_ns| first_ns >= FIRST_UTC_NS) { Clock::Utc } else { Clock::Own }
+    }
+
+    fn most_held(&self) -> usize {
+        MOST_UNPACKED + MOST_HEADER + 8
+    }
+
+    fn reach_ns(&self) -> u64 {
+        self.feeds.reach_ns()
+    }
+
+    fn step(&mut self, front: &[u8], end: bool, out: &mut Vec<Entry>) -> Step {
+        if !self.begun {
+            return self.begin(front, end);
+        }
+        if let Some(chunk) = self.chunk.take() {
+            return self.read_on(chunk, out);
+        }
+        let record = record(front);
+        let was_astray = core::mem::replace(&mut self.astray, matches!(record, Err(Stop::Bad)));
+        match record {
+            Ok(Record { fields, data, len }) => match self.accept(fields, data, out) {
+                None => Step::Lost(len, NO_RECORD),
+                Some(Accepted::Read) => Step::Took(len),
+                Some(Accepted::Chunk(packing)) => self.open(fields, data, packing, len, false),
+            },
+            Err(Stop::Bad) => Step::Lost(1, NO_RECORD),
+            Err(Stop::More(None)) if was_astray => {
+                self.astray = true;
+                // What seems to be a long header astray is likely none, but only the file's end can tell.
+                if end { Step::Lost(1, NO_RECORD) } else { Step::More }
+            }
+            // A chunk that the file's end cuts holds messages all the same.
+            Err(Stop::More(Some((fields, data)))) if end && fields.u8(b"op") == Some(5) => {
+                match fields.get(b"compression") {
+                    Some(packing) => self.open(fields, data, packing, front.len(), true),
+                    None => Step::More,
+                }
+            }
+            Err(Stop::More(_)) => Step::More,
+        }
+    }
+
+    fn told(&self) -> Told {
+        let mut told = self.feeds.told();
+        told.losses.extend(self.lost.iter().map(|(why, count)| format!("{count} {why}")));
+        if self.begun && self.stated.is_none() {
+            told.losses.push("the bag's own header is missing".to_owned());
+        }
+        if let Some(Stated { index_at, chunks, .. }) = self.stated {
+            if index_at == 0 {
+                told.losses.push("the bag was not closed, so that its end may be missing".to_owned());
+            } else if self.chunks != u64::from(chunks) {
+                let found = self.chunks;
+                told.losses.push(format!("the bag says that it has {chunks} chunks; there are {found}"));
+            }
+        }
+        told
+    }
+}
+
+impl Bag {
+    /// A bag whose messages go to these.
+    pub fn new(feeds: Feeds) -> Self {
+        Self { feeds, ..Self::default() }
+    }
+
+    /// The topics of a bag: by the part of it that lists them, or else by all of it.
+    ///
+    /// Errors: the file can't be read, or is no bag.
+    pub fn topics<R: Read + Seek>(name: &str, mut file: R) -> Result<Vec<Topic>, ImportError> {
+        let failed = |source| ImportError::Read { name: name.to_owned(), offset: 0, source };
+        let mut front = Vec::new();
+        (&mut file).take(MOST_HEADER as u64).read_to_end(&mut front).map_err(failed)?;
+        if !front.starts_with(MAGIC) {
+            let found = front.get(..MAGIC.len()).unwrap_or(&front).trim_ascii_end();
+            let found = String::from_utf8_lossy(found).into_owned();
+            return Err(ImportError::NoBag { name: name.to_owned(), found });
+        }
+        let mut bag = Self { begun: true, ..Self::default() };
+        if let Ok(Record { fields, .. }) = record(front.get(MAGIC.len()..).unwrap_or_default())
+            && let Some(stated) = Self::bag_header(fields)
+            && stated.index_at > 0
+        {
+            let mut index = Vec::new();
+            file.seek(SeekFrom::Start(stated.index_at)).map_err(failed)?;
+            (&mut file).take(MOST_INDEX).read_to_end(&mut index).map_err(failed)?;
+            let mut rest = index.as_slice();
+            while let Ok(Record { fields, data, len }) = record(rest) {
+                if fields.u8(b"op") != Some(5) {
+                    bag.accept(fields, data, &mut Vec::new());
+                }
+                rest = rest.get(len..).unwrap_or_default();
+            }
+            if rest.is_empty() && bag.connections.len() as u64 == u64::from(stated.connections) {
+                return Ok(bag.connections.into_values().collect());
+            }
+        }
+        file.seek(SeekFrom::Start(0)).map_err(failed)?;
+        let mut input = Input::new(name, file, Self::default());
+        loop {
+            let mut nobodys = Order::default();
+            if !input.more(&mut nobodys)? {
+                break;
+            }
+        }
+        let mut topics: Vec<Topic> = Vec::new();
+        for topic in input.format.connections.into_values() {
+            if !topics.contains(&topic) {
+                topics.push(topic);
+            }
+        }
+        Ok(topics)
+    }
+
+    fn begin(&mut self, front: &[u8], end: bool) -> Step {
+        if front.len() < MAGIC.len() && !end {
+            return Step::More;
+        }
+        self.begun = true;
+        if front.starts_with(MAGIC) { Step::Took(MAGIC.len()) } else { Step::Lost(1, NO_RECORD) }
+    }
+
+    fn bag_header(fields: Fields<'_>) -> Option<Stated> {
+        Some(Stated {
+            index_at: fields.u64(b"index_pos")?,
+            connections: fields.u32(b"conn_count")?,
+            chunks: fields.u32(b"chunk_count")?,
+        })
+    }
+
+    /// Takes a record. `None` for one that lacks what its kind must have.
+    fn accept<'a>(&mut self, fields: Fields<'a>, data: &[u8], out: &mut Vec<Entry>) -> Option<Accepted<'a>> {
+        match fields.u8(b"op")? {
+            2 => self.message(fields.u32(b"conn")?, fields.time_ns(b"time")?, data, out),
+            3 => self.stated = Some(Self::bag_header(fields)?),
+            5 => return Some(Accepted::Chunk(fields.get(b"compression")?)),
+            7 => self.connection(fields.u32(b"conn")?, fields, Fields(data))?,
+            // Indexes say what stands elsewhere; later kinds may be passed over.
+            _ => (),
+        }
+        Some(Accepted::Read)
+    }
+
+    fn connection(&mut self, number: u32, fields: Fields<'_>, data: Fields<'_>) -> Option<()> {
+        let (name, type_name) = (fields.text(b"topic")?, data.text(b"type")?);
+        let md5 = data.text(b"md5sum").unwrap_or_else(|| "*".to_owned());
+        let known = match Type::named(&type_name) {
+            Some(known) if known.is_defined_as(&md5) => Ok(known),
+            Some(_) => Err(format!("its {type_name} is defined otherwise (MD5 {md5}) than ROS has it")),
+            None => Err(format!("messages of type {type_name} aren't known")),
+        };
+        let topic = Topic { name, type_name, known };
+        if *self.connections.entry(number).or_insert_with(|| topic.clone()) != topic {
+            let what = "connections that are defined a second time, otherwise: the first holds";
+            *self.lost.entry(what).or_default() += 1;
+        }
+        Some(())
+    }
+
+    fn message(&mut self, connection: u32, record_ns: u64, data: &[u8], out: &mut Vec<Entry>) {
+        let Some(topic) = self.connections.get(&connection) else {
+            *self.lost.entry("messages of a connection that is defined nowhere before them").or_default() +=
+                1;
+            return;
+        };
+        self.first_ns = Some(self.first_ns.map_or(record_ns, |first_ns| first_ns.min(record_ns)));
+        self.feeds.take(topic, Encoding::Ros1, record_ns, data, out);
+    }
+
+    fn open(&mut self, fields: Fields<'_>, data: &[u8], packing: &[u8], len: usize, cut: bool) -> Step {
+        let Some(size) = fields.u32(b"size") else { return Step::Lost(len, NO_RECORD) };
+        self.chunks += 1;
+        let (bytes, step) = match unpack(packing, data, size, cut) {
+            Unpacked::Whole(bytes) => (bytes, Step::Took(len)),
+            Unpacked::Cut(bytes) => (bytes, Step::More),
+            Unpacked::Bad(why) => return Step::Lost(len, why),
+        };
+        self.chunk = Some(Chunk { bytes, at: 0, step });
+        Step::Held
+    }
+
+    /// Takes a record of the chunk.
+    fn read_on(&mut self, mut chunk: Chunk, out: &mut Vec<Entry>) -> Step {
+        let rest = chunk.bytes.get(chunk.at..).unwrap_or_default();
+        match record(rest) {
+            _ if rest.is_empty() => return chunk.step,
+            Ok(Record { fields, data, len }) => {
+                // A chunk holds no chunks.
+                let taken = fields.u8(b"op") != Some(5) && self.accept(fields, data, out).is_some();
+                if !taken {
+                    *self.lost.entry("records in chunks that can't be there").or_default() += 1;
+                }
+                chunk.at += len;
+            }
+            Err(Stop::More(_)) if chunk.step == Step::More => return Step::More,
+            Err(_) => {
+                *self.lost.entry("chunks whose rest is no record").or_default() += 1;
+                return chunk.step;
+            }
+        }
+        self.chunk = Some(chunk);
+        Step::Held
+    }
+}
+
+#[cfg(test)]
+#[path = "bag_tests.rs"]
+mod tests;

@@ -1,0 +1,131 @@
+//! Bags of this file's own writing.
+
+use std::io::Cursor;
+
+use proptest::prelude::*;
+
+use super::*;
+use crate::Import;
+
+fn field(name: &str, value: &[u8]) -> Vec<u8> {
+    let len = u32::try_from(name.len() + 1 + value.len()).unwrap();
+    [&len.to_le_bytes(), name.as_bytes(), b"=", value].concat()
+}
+
+fn sized_bytes(bytes: &[u8]) -> Vec<u8> {
+    [&u32::try_from(bytes.len()).unwrap().to_le_bytes(), bytes].concat()
+}
+
+fn whole(op: u8, fields: &[(&str, &[u8])], data: &[u8]) -> Vec<u8> {
+    let header =
+        fields.iter().fold(field("op", &[op]), |all, (name, value)| [all, field(name, value)].concat());
+    [sized_bytes(&header), sized_bytes(data)].concat()
+}
+
+fn connection(number: u8, topic: &str) -> Vec<u8> {
+    let data = [field("topic", topic.as_bytes()), field("type", b"std_msgs/Float64"), field("md5sum", b"*")]
+        .concat();
+    whole(7, &[("conn", &[number, 0, 0, 0]), ("topic", topic.as_bytes())], &data)
+}
+
+fn message(number: u8, seconds: u8) -> Vec<u8> {
+    whole(2, &[("conn", &[number, 0, 0, 0]), ("time", &[seconds, 0, 0, 0, 0, 0, 0, 0])], &[0; 8])
+}
+
+fn chunk(records: &[Vec<u8>]) -> Vec<u8> {
+    let bytes = records.concat();
+    let size = u32::try_from(bytes.len()).unwrap().to_le_bytes();
+    whole(5, &[("compression", b"none"), ("size", &size)], &bytes)
+}
+
+/// A bag that says to have so many chunks; its index is everything from the first connection outside chunks on.
+fn bag(chunks: &[Vec<u8>], index: &[Vec<u8>]) -> Vec<u8> {
+    let header = |at: usize| {
+        let connections = u32::try_from(index.len()).unwrap().to_le_bytes();
+        let count = u32::try_from(chunks.len()).unwrap().to_le_bytes();
+        let at = (at as u64).to_le_bytes();
+        let fields = [("index_pos", &at[..]), ("conn_count", &connections), ("chunk_count", &count)];
+        [MAGIC.to_vec(), whole(3, &fields, b"   ")].concat()
+    };
+    let at = header(0).len() + chunks.concat().len();
+    [header(at), chunks.concat(), index.concat()].concat()
+}
+
+/// Entries that are nobody's, and what is said at the end.
+fn read(file: &[u8]) -> (usize, Vec<String>) {
+    let mut input = Input::new("bag", Cursor::new(file.to_vec()), Bag::default());
+    let (mut order, mut count) = (Order::default(), 0);
+    while input.more(&mut order).unwrap() {
+        while order.pop().is_some() {
+            count += 1;
+        }
+    }
+    (count, input.told().losses)
+}
+
+fn three() -> [Vec<u8>; 2] {
+    [chunk(&[connection(0, "/a"), message(0, 1), message(0, 2)]), chunk(&[message(0, 3)])]
+}
+
+#[test]
+fn a_bag_is_read_and_its_topics_are_known_by_its_index() {
+    let file = bag(&three(), &[connection(0, "/a")]);
+    assert_eq!(read(&file), (3, Vec::new()));
+    let topics = Bag::topics("bag", Cursor::new(&file)).unwrap();
+    assert_eq!(topics.iter().map(|topic| topic.name.as_str()).collect::<Vec<_>>(), ["/a"]);
+    assert_eq!(topics[0].known, Ok(Type::Float64));
+    // Without the index all of it is looked at.
+    let cut = &file[..file.len() - 10];
+    assert_eq!(Bag::topics("bag", Cursor::new(cut)).unwrap(), topics);
+    assert!(Import::of(Input::new("bag", Cursor::new(MAGIC), Bag::default()), "message").is_err());
+}
+
+#[test]
+fn damage_costs_its_chunk_and_is_named() {
+    let [first, second] = three();
+    let mut broken = second.clone();
+    let at = broken.windows(4).position(|window| window == b"none").unwrap();
+    broken[at..at + 4].copy_from_slice(b"zstd");
+    let (count, losses) = read(&bag(&[first.clone(), broken], &[]));
+    assert_eq!(count, 2);
+    assert!(losses[0].contains("packed in a way that isn't known"), "{losses:?}");
+    let garbage = [bag(std::slice::from_ref(&first), &[]), vec![0xEE; 30], second].concat();
+    let (count, losses) = read(&garbage);
+    assert_eq!(count, 3);
+    assert!(losses[0].contains("no record of a bag: 1 times, 30 bytes"), "{losses:?}");
+    assert!(losses[1].contains("says that it has 1 chunks; there are 2"), "{losses:?}");
+    let wild = [chunk(&[vec![9; 20]]), chunk(&[chunk(&[])]), chunk(&[message(7, 1)])];
+    let said = read(&bag(&wild, &[])).1.join("; ");
+    for words in
+        ["whose rest is no record", "records in chunks that can't be there", "defined nowhere before them"]
+    {
+        assert!(said.contains(words), "{words}: {said}");
+    }
+}
+
+#[test]
+fn a_bag_cut_anywhere_gives_the_messages_before_the_cut() {
+    let file = bag(&three(), &[connection(0, "/a")]);
+    let mut before = 0;
+    for cut in MAGIC.len()..file.len() {
+        let (count, losses) = read(&file[..cut]);
+        assert!(!losses.is_empty() || count == 3, "cut at {cut}");
+        assert!((before..=3).contains(&count), "cut at {cut}");
+        before = count;
+    }
+    assert_eq!(before, 3);
+}
+
+proptest! {
+    #[test]
+    fn any_bytes_are_taken_or_lost(
+        bytes in proptest::collection::vec(any::<u8>(), 0..600),
+        at in 0_usize..400,
+    ) {
+        let file = bag(&three(), &[connection(0, "/a")]);
+        let at = at.min(file.len());
+        let mixed = [&file[..at], &bytes].concat();
+        read(&mixed);
+        drop(Bag::topics("bag", Cursor::new(&mixed)));
+    }
+}

@@ -1,0 +1,244 @@
+//! A topic and the sensor that its messages are of.
+
+use std::collections::BTreeMap;
+
+use headrace_geometry::frames::Rot;
+use headrace_geometry::time::MonoNs;
+
+use super::clocks::{Base, Clocks};
+use super::message::{Read, Type, Values, read};
+use super::points::{Beam, Beams, Plane};
+use super::wire::Encoding;
+use crate::emulated::{EmulatedSensor, Value};
+use crate::{Entry, Told};
+
+/// What a mapping says of a topic besides its sensor.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Manner {
+    pub(super) base: Base,
+    /// Of pressures and lengths: their unit's size in ours.
+    pub(super) unit: f64,
+    pub(super) plane: Plane,
+}
+
+impl Default for Manner {
+    fn default() -> Self {
+        Self { base: Base::Record, unit: 1.0, plane: Plane::Yz }
+    }
+}
+
+/// Takes the messages of a topic.
+pub(super) struct Feed {
+    of: Type,
+    sensor: EmulatedSensor,
+    manner: Manner,
+    clocks: Clocks,
+    taken: u64,
+    frame_id: Option<Vec<u8>>,
+    /// Messages of another frame than the first.
+    other_frames: u64,
+    /// Sum of the specific force along z, m/s^2.
+    upward_mps2: f64,
+    /// Highest pressure, Pa.
+    highest_pa: f64,
+    /// Messages that are lost, by why.
+    lost: BTreeMap<&'static str, u64>,
+    /// What is no loss but worth saying.
+    noted: BTreeMap<&'static str, u64>,
+}
+
+/// No pressure under water is lower than this, Pa: half an atmosphere.
+const LEAST_PA: f64 = 50_000.0;
+
+impl Feed {
+    pub(super) fn new(of: Type, sensor: EmulatedSensor, manner: Manner) -> Self {
+        Self {
+            of,
+            sensor,
+            manner,
+            clocks: Clocks::new(manner.base),
+            taken: 0,
+            frame_id: None,
+            other_frames: 0,
+            upward_mps2: 0.0,
+            highest_pa: 0.0,
+            lost: BTreeMap::new(),
+            noted: BTreeMap::new(),
+        }
+    }
+
+    pub(super) fn is_of(&self, of: Type) -> bool {
+        self.of == of
+    }
+
+    pub(super) fn is_of_head(&self) -> bool {
+        self.sensor.reach_m.is_some()
+    }
+
+    pub(super) fn sensor_id(&self) -> &str {
+        &self.sensor.id
+    }
+
+    /// Takes a message.
+    pub(super) fn take(&mut self, encoding: Encoding, record_ns: u64, bytes: &[u8], out: &mut Vec<Entry>) {
+        self.taken += 1;
+        let taken = read(self.of, encoding, bytes).and_then(|read| self.values(&read, record_ns, out));
+        if let Err(why) = taken {
+            *self.lost.entry(why).or_default() += 1;
+        }
+    }
+
+    fn values(&mut self, read: &Read<'_>, record_ns: u64, out: &mut Vec<Entry>) -> Result<(), &'static str> {
+        if let Some(header) = read.header {
+            let first = self.frame_id.get_or_insert_with(|| header.frame_id.to_vec());
+            self.other_frames += u64::from(first != header.frame_id);
+        }
+        let (at_ns, stamped) = self.clocks.time(record_ns, read.header.map(|header| header.stamp_ns));
+        let value = match &read.values {
+            Values::Beams(beams) => return self.beams(beams, (at_ns, stamped), out),
+            Values::Inertial { wxyz, rate_radps, force_mps2 } => {
+                self.inertia(*wxyz, *rate_radps, *force_mps2)?
+            }
+            Values::Range(range_m) => Value::Range(*range_m),
+            Values::Scalar(value) if !value.is_finite() => return Err("whose value is no number"),
+            Values::Scalar(value) if self.of == Type::FluidPressure => {
+                let pressure_pa = value * self.manner.unit;
+                self.highest_pa = self.highest_pa.max(pressure_pa);
+                Value::Pressure(pressure_pa)
+            }
+            Values::Scalar(value) => Value::Payout(value * self.manner.unit),
+            Values::Velocity(velocity) if velocity.iter().all(|part| part.is_finite()) => {
+                Value::Velocity(*velocity)
+            }
+            Values::Velocity(_) => return Err("whose value is no number"),
+        };
+        self.say((at_ns, stamped), &value, out)
+    }
+
+    /// Parts that are missing are left out, where there is a part.
+    fn inertia(
+        &mut self,
+        wxyz: Option<[f64; 4]>,
+        rate: Option<[f64; 3]>,
+        force: Option<[f64; 3]>,
+    ) -> Result<Value, &'static str> {
+        if wxyz.is_none() && rate.is_none() && force.is_none() {
+            return Err("without orientation, turn rate and specific force");
+        }
+        let nowhere = || Rot::from_roll_pitch_yaw(f64::NAN, f64::NAN, f64::NAN);
+        let length = |[w, x, y, z]: [f64; 4]| w * w + x * x + y * y + z * z;
+        let attitude = match wxyz {
+            Some(wxyz) if (0.81..=1.21).contains(&length(wxyz)) => {
+                let [w, x, y, z] = wxyz;
+                Rot::from_wxyz(w, x, y, z).unwrap_or_else(nowhere)
+            }
+            Some(_) => return Err("whose orientation is no unit quaternion"),
+            None => nowhere(),
+        };
+        for (missing, what) in [
+            (wxyz.is_none(), "without orientation"),
+            (rate.is_none(), "without turn rate"),
+            (force.is_none(), "without specific force"),
+        ] {
+            if missing {
+                *self.noted.entry(what).or_default() += 1;
+            }
+        }
+        let [_, _, upward_mps2] = force.unwrap_or_default();
+        self.upward_mps2 += upward_mps2;
+        let unknown = [f64::NAN; 3];
+        Ok(Value::Inertia(attitude, rate.unwrap_or(unknown), force.unwrap_or(unknown)))
+    }
+
+    /// A message's beams. It is recorded when the last of them is known; its stamp is the time of the first.
+    fn beams(&mut self, beams: &Beams, at: (u64, bool), out: &mut Vec<Entry>) -> Result<(), &'static str> {
+        let told = beams.told(self.manner.plane)?;
+        for (count, what) in [(told.nowhere, "points that are nowhere: nothing heard, no angle known")] {
+            if count > 0 {
+                *self.noted.entry(what).or_default() += count;
+            }
+        }
+        if told.off_plane > 0 {
+            *self.lost.entry("points outside the plane that the beam turns in (`plane`)").or_default() +=
+                told.off_plane;
+        }
+        let last_s = told.beams.last().map_or(0.0, |beam| beam.after_s);
+        let first_s = told.beams.first().map_or(0.0, |beam| beam.after_s);
+        if told.beams.len() > 1 && last_s <= first_s {
+            *self.noted.entry("of several beams without times: all are given one").or_default() += 1;
+        }
+        let reach_m = self.sensor.reach_m;
+        let mut unsaid = 0_u64;
+        let mut beyond = 0_u64;
+        for Beam { angle_rad, range_m, after_s } in &told.beams {
+            let from_s = if at.1 { *after_s } else { after_s - last_s };
+            let at_ns = at.0.saturating_add_signed(headrace_geometry::time::DurNs::from_secs_f64(from_s).0);
+            let reached = |range: f64| reach_m.is_none_or(|[least, most]| (least..=most).contains(&range));
+            beyond += u64::from(range_m.is_some_and(|range| !reached(range)));
+            let value = Value::Beam(*angle_rad, *range_m);
+            unsaid += u64::from(self.say((at_ns, at.1), &value, out).is_err());
+        }
+        if beyond > 0 {
+            let what = "ranges that the head doesn't tell at its range setting: as if nothing was heard";
+            *self.lost.entry(what).or_default() += beyond;
+        }
+        if unsaid > 0 { Err("with beams that the sensor can't say") } else { Ok(()) }
+    }
+
+    /// Puts a value into bytes. Values with a stamp of their own are received after the sensor's delays; those without when they
+    /// were recorded.
+    fn say(
+        &mut self,
+        (at_ns, stamped): (u64, bool),
+        value: &Value,
+        out: &mut Vec<Entry>,
+    ) -> Result<(), &'static str> {
+        let stream = self.sensor.id.clone();
+        let said = self.sensor.tell(MonoNs(at_ns), value, &mut |received, bytes| {
+            let stamp_ns = if stamped { received.0 } else { at_ns };
+            out.push(Entry { stamp_ns, stream: stream.clone(), bytes: bytes.to_vec() });
+        });
+        if said { Ok(()) } else { Err("with values that the sensor can't say") }
+    }
+
+    /// Says what became of it.
+    pub(super) fn tell(&self, topic: &str, told: &mut Told) {
+        let counted = |counts: &BTreeMap<&'static str, u64>| -> Vec<String> {
+            counts.iter().map(|(why, count)| format!("{topic}: {count} {}{why}", messages(why))).collect()
+        };
+        told.losses.extend(counted(&self.lost));
+        told.remarks.extend(counted(&self.noted));
+        let mut remark = |words: String| told.remarks.push(format!("{topic}: {words}"));
+        for words in self.clocks.words() {
+            remark(words);
+        }
+        if self.taken == 0 {
+            remark(format!("no message for {}", self.sensor_id()));
+        }
+        if self.other_frames > 0 {
+            let (count, first) = (self.other_frames, self.frame_id.as_deref().unwrap_or_default());
+            let first = String::from_utf8_lossy(first);
+            remark(format!(
+                "{count} messages are of another frame than the first, {first:?}; the vehicle file has one mount for all"
+            ));
+        }
+        let upward_mps2 = self.upward_mps2 / self.taken.max(1) as f64;
+        if upward_mps2 < -4.0 {
+            remark(format!(
+                "specific force along z is {upward_mps2:.1} m/s^2 on average, so that z is down; `angles_deg` of {} must say so",
+                self.sensor_id()
+            ));
+        }
+        if self.of == Type::FluidPressure && self.taken > 0 && self.highest_pa < LEAST_PA {
+            let highest_pa = self.highest_pa;
+            remark(format!(
+                "no pressure is above {highest_pa:.1} Pa, less than that of the air; `unit` of a mapping says what they are in"
+            ));
+        }
+    }
+}
+
+/// Reasons tell of messages, unless they begin with what else is counted.
+fn messages(why: &str) -> &'static str {
+    if why.starts_with("points") || why.starts_with("ranges") { "" } else { "messages " }
+}

@@ -1,0 +1,177 @@
+//! Which topic feeds which sensor: by a mapping, or where there is no choice.
+
+use headrace_config::{ConfigError, Section};
+use headrace_sensor::device::Sense;
+use headrace_vehicle::VehicleConfig;
+
+use super::clocks::Base;
+use super::feed::{Feed, Manner};
+use super::message::Type;
+use super::points::Plane;
+use super::{Feeds, Topic};
+use crate::csv::{LENGTH, PRESSURE};
+use crate::emulated::EmulatedSensor;
+
+/// Why topics and sensors can't be matched.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum MatchError {
+    /// The mapping is wrong.
+    #[error(transparent)]
+    Mapping(#[from] ConfigError),
+    /// There are several ways.
+    #[error(
+        "which {sense} is which? topics {topics}, sensors {sensors}; --map MAPPING.toml says which topic is of which sensor"
+    )]
+    Several {
+        /// What they sense.
+        sense: &'static str,
+        /// The topics.
+        topics: String,
+        /// The sensors.
+        sensors: String,
+    },
+    /// There is none.
+    #[error("no topic is of a sensor of the vehicle file: topics {topics}; sensors {sensors}")]
+    None {
+        /// The topics, their types, and what is wrong with them.
+        topics: String,
+        /// The sensors and what they sense.
+        sensors: String,
+    },
+}
+
+const SENSES: [Sense; 5] = [Sense::Head, Sense::Echosounder, Sense::Depth, Sense::Inertial, Sense::Velocity];
+
+/// What of an error is shown of topics, which may be hundreds.
+const MOST_SHOWN: usize = 20;
+
+impl Feeds {
+    /// By what there is: a sensor and a topic of a fitting type are matched where each is the only one of its kind.
+    ///
+    /// Errors: there are several of a kind, or none.
+    pub fn matching(vehicle: &VehicleConfig, topics: &[Topic]) -> Result<Self, MatchError> {
+        let mut feeds = Self::default();
+        for sense in SENSES {
+            let fitting =
+                |topic: &&Topic| topic.of().is_some_and(|of| of.is_telling() && of.sense() == sense);
+            let fitting: Vec<&Topic> = topics.iter().filter(fitting).collect();
+            let sensors: Vec<_> =
+                EmulatedSensor::all(vehicle).filter(|(_, device)| device.sense() == sense).collect();
+            match (fitting.as_slice(), sensors.as_slice()) {
+                ([], _) | (_, []) => (),
+                ([topic], [(id, device)]) => {
+                    let Some(of) = topic.of() else { continue };
+                    let sensor = EmulatedSensor::new(id, *device, vehicle);
+                    feeds.matched.push(format!("{} ({}) is taken for {id}", topic.name, topic.type_name));
+                    feeds.by_topic.insert(topic.name.clone(), Feed::new(of, sensor, Manner::default()));
+                }
+                (topics, sensors) => {
+                    let ids: Vec<&str> = sensors.iter().map(|(id, _)| *id).collect();
+                    let topics = shown(topics.iter().copied());
+                    return Err(MatchError::Several {
+                        sense: sense.as_str(),
+                        topics,
+                        sensors: ids.join(", "),
+                    });
+                }
+            }
+        }
+        if feeds.by_topic.is_empty() {
+            let sensors: Vec<String> = EmulatedSensor::all(vehicle)
+                .map(|(id, device)| format!("{id} ({})", device.sense().as_str()))
+                .collect();
+            return Err(MatchError::None { topics: shown(topics.iter()), sensors: sensors.join(", ") });
+        }
+        Ok(feeds)
+    }
+
+    /// By a mapping, and no other way.
+    ///
+    /// Errors: a key with a value that isn't allowed, a sensor or a topic that isn't there or can't be of the other.
+    pub fn mapped(
+        mapping: Section<'_>,
+        vehicle: &VehicleConfig,
+        topics: &[Topic],
+    ) -> Result<Self, MatchError> {
+        let mut feeds = Self::default();
+        let sections = mapping.sections("topics")?;
+        if sections.is_empty() {
+            return Err(mapping
+                .invalid("topics", "is missing; it says which topic is of which sensor")
+                .into());
+        }
+        for section in sections {
+            let (topic, feed) = feed(&section, vehicle, topics)?;
+            if let Some(other) = feeds.by_topic.values().find(|other| other.sensor_id() == feed.sensor_id()) {
+                let problem = format!("has a topic already: {}", other.sensor_id());
+                return Err(section.invalid("sensor", &problem).into());
+            }
+            if feeds.by_topic.insert(topic, feed).is_some() {
+                return Err(section.invalid("topic", "is named twice").into());
+            }
+            section.finish()?;
+        }
+        mapping.finish()?;
+        Ok(feeds)
+    }
+}
+
+fn feed(
+    section: &Section<'_>,
+    vehicle: &VehicleConfig,
+    topics: &[Topic],
+) -> Result<(String, Feed), MatchError> {
+    let name = section.required("topic", section.text("topic")?)?;
+    let Some(topic) = topics.iter().find(|topic| topic.name == name) else {
+        let problem = format!("is no topic of the file; there are {}", shown(topics.iter()));
+        return Err(section.invalid("topic", &problem).into());
+    };
+    let of = match &topic.known {
+        Ok(of) => *of,
+        Err(why) => return Err(section.invalid("topic", &format!("can't be read: {why}")).into()),
+    };
+    let id = section.required("sensor", section.text("sensor")?)?;
+    let sensor = EmulatedSensor::named(section, vehicle, &id)?;
+    if sensor.sense != of.sense() {
+        let (is, wants) = (sensor.sense.as_str(), of.sense().as_str());
+        let problem = format!("is a {is}, and a topic of {} is that of a {wants}", topic.type_name);
+        return Err(section.invalid("sensor", &problem).into());
+    }
+    let base = section.choice("time", &[("record", Base::Record), ("header", Base::Header)])?;
+    if base == Some(Base::Header) && !of.is_telling() {
+        return Err(section.invalid("time", "must be \"record\": such messages have no header").into());
+    }
+    let units = if of.sense() == Sense::Depth { PRESSURE } else { LENGTH };
+    let takes_unit = matches!(of.sense(), Sense::Depth | Sense::Tether);
+    let unit = if takes_unit { section.choice("unit", units)? } else { None };
+    let factor = if takes_unit { section.number("factor", -1e9..=1e9)? } else { None };
+    let takes_plane = matches!(of, Type::PointCloud | Type::PointCloud2);
+    let planes = [("yz", Plane::Yz), ("xy", Plane::Xy)];
+    let plane = if takes_plane { section.choice("plane", &planes)? } else { None };
+    let manner = Manner {
+        base: base.unwrap_or_default(),
+        unit: unit.unwrap_or(1.0) * factor.unwrap_or(1.0),
+        plane: plane.unwrap_or(Plane::Yz),
+    };
+    Ok((name, Feed::new(of, sensor, manner)))
+}
+
+impl Topic {
+    fn of(&self) -> Option<Type> {
+        self.known.as_ref().ok().copied()
+    }
+}
+
+fn shown<'a>(topics: impl ExactSizeIterator<Item = &'a Topic>) -> String {
+    let further = topics.len().saturating_sub(MOST_SHOWN);
+    let mut all: Vec<String> =
+        topics.take(MOST_SHOWN).map(|topic| format!("{} ({})", topic.name, topic.type_name)).collect();
+    if all.is_empty() {
+        return "none".to_owned();
+    }
+    if further > 0 {
+        all.push(format!("and {further} others"));
+    }
+    all.join(", ")
+}

@@ -1,0 +1,125 @@
+//! Recordings of ROS 2 in MCAP; also those of ROS 1 that were turned into MCAP.
+//!
+//! Sources: MCAP format specification and its "well-known" profiles and encodings; the log reader has the rest.
+
+use std::collections::BTreeMap;
+use std::io::{Read, Seek};
+
+use super::bag::FIRST_UTC_NS;
+use super::{Encoding, Feeds, Topic, Type};
+use crate::order::Order;
+use crate::{Clock, Entry, ImportError, Source};
+use headrace_replay::log::format::FORMAT_KEY;
+use headrace_replay::log::{ChannelInfo, LogReader};
+
+/// Messages that are read at a time.
+const AT_A_TIME: usize = 64;
+
+/// A recording in MCAP.
+pub struct Mcap<R> {
+    name: String,
+    reader: LogReader<R>,
+    bytes: u64,
+    channels: BTreeMap<u16, (Topic, Encoding)>,
+    feeds: Feeds,
+    found: Vec<Entry>,
+    first_ns: Option<u64>,
+}
+
+impl<R: Read + Seek> Mcap<R> {
+    /// Opens a recording.
+    ///
+    /// Errors: the file can't be read, is no MCAP, or is a dive log.
+    pub fn open(name: &str, mut file: R) -> Result<Self, ImportError> {
+        let failed = |source| ImportError::Read { name: name.to_owned(), offset: 0, source };
+        let bytes = file.seek(std::io::SeekFrom::End(0)).map_err(failed)?;
+        let reader = LogReader::new(file, name.to_owned())?;
+        if reader.header().metadata.contains_key(FORMAT_KEY) {
+            return Err(ImportError::DiveLog { name: name.to_owned() });
+        }
+        let channels = reader.channels().map(|channel| (channel.id, topic(&channel))).collect();
+        Ok(Self {
+            name: name.to_owned(),
+            reader,
+            bytes,
+            channels,
+            feeds: Feeds::default(),
+            found: Vec::new(),
+            first_ns: None,
+        })
+    }
+
+    /// Its topics.
+    pub fn topics(&self) -> Vec<Topic> {
+        let mut topics: Vec<Topic> = Vec::new();
+        for (topic, _) in self.channels.values() {
+            if !topics.contains(topic) {
+                topics.push(topic.clone());
+            }
+        }
+        topics
+    }
+
+    /// Sends its messages to these.
+    #[must_use]
+    pub fn feeding(self, feeds: Feeds) -> Self {
+        Self { feeds, ..self }
+    }
+}
+
+fn topic(channel: &ChannelInfo<'_>) -> (Topic, Encoding) {
+    let (encoding, schema) = (channel.encoding, channel.schema.unwrap_or_default());
+    let known = match (encoding, Type::named(schema)) {
+        ("cdr" | "ros1", Some(known)) => Ok(known),
+        ("cdr" | "ros1", None) => Err(format!("messages of type {schema} aren't known")),
+        (encoding, _) => Err(format!("messages are encoded as {encoding:?}; cdr and ros1 are known")),
+    };
+    let topic = Topic { name: channel.topic.to_owned(), type_name: schema.to_owned(), known };
+    (topic, if encoding == "ros1" { Encoding::Ros1 } else { Encoding::Cdr })
+}
+
+impl<R: Read + Seek> Source for Mcap<R> {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn more(&mut self, order: &mut Order) -> Result<bool, ImportError> {
+        for _ in 0..AT_A_TIME {
+            let Some(message) = self.reader.next()? else { return Ok(false) };
+            let at_ns = message.log_time.0;
+            self.first_ns = Some(self.first_ns.map_or(at_ns, |first_ns| first_ns.min(at_ns)));
+            if let Some((topic, encoding)) = self.channels.get(&message.channel) {
+                self.feeds.take(topic, *encoding, at_ns, message.data, &mut self.found);
+            }
+            self.found.drain(..).for_each(|entry| order.push(entry));
+            if order.is_full() {
+                break;
+            }
+        }
+        Ok(true)
+    }
+
+    fn clock(&self) -> Clock {
+        if self.first_ns.is_some_and(|first_ns| first_ns >= FIRST_UTC_NS) { Clock::Utc } else { Clock::Own }
+    }
+
+    fn reach_ns(&self) -> u64 {
+        self.feeds.reach_ns()
+    }
+
+    fn bytes(&self) -> u64 {
+        self.bytes
+    }
+
+    fn told(&self) -> crate::Told {
+        let mut told = self.feeds.told();
+        told.losses.extend(self.reader.losses().iter().map(ToString::to_string));
+        if self.reader.late() > 0 {
+            told.losses.push(format!(
+                "{} messages stand too late in the file to be put in order",
+                self.reader.late()
+            ));
+        }
+        told
+    }
+}

@@ -1,0 +1,204 @@
+//! The messages that are known, and what of them a sensor says.
+//!
+//! Sources: the .msg files of ROS' common_interfaces (sensor_msgs, geometry_msgs, std_msgs), REP 103 (axes and units), REP 117 (ranges),
+//! REP 145 (inertial units).
+
+use headrace_sensor::device::Sense;
+
+use super::points::{Beams, cloud, points, scan};
+use super::ranges::heard;
+use super::wire::{Encoding, Header, Wire};
+
+/// A type of message.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Type {
+    /// Attitude, turn rate, specific force.
+    Imu,
+    /// One distance.
+    Range,
+    /// Pressure.
+    FluidPressure,
+    /// Ranges about an axis.
+    LaserScan,
+    /// Points, by fields.
+    PointCloud2,
+    /// Points.
+    PointCloud,
+    /// Velocity.
+    Twist,
+    /// Velocity, with how far it is trusted.
+    TwistWithCovariance,
+    /// A number.
+    Float32,
+    /// A number of double precision.
+    Float64,
+}
+
+/// Types, their names and what ROS 1 makes of their definitions (MD5).
+const TYPES: [(Type, &str, &str); 10] = [
+    (Type::Imu, "sensor_msgs/Imu", "6a62c6daae103f4ff57a132d6f95cec2"),
+    (Type::Range, "sensor_msgs/Range", "c005c34273dc426c67a020a87bc24148"),
+    (Type::FluidPressure, "sensor_msgs/FluidPressure", "804dc5cea1c5306d6a2eb80b9833befe"),
+    (Type::LaserScan, "sensor_msgs/LaserScan", "90c7ef2dc6895d81024acba2ac42f369"),
+    (Type::PointCloud2, "sensor_msgs/PointCloud2", "1158d486dd51d683ce2f1be655c3c181"),
+    (Type::PointCloud, "sensor_msgs/PointCloud", "d8e9c3f5afbdd8a130fd1d2763945fca"),
+    (Type::Twist, "geometry_msgs/TwistStamped", "98d34b0043a2093cf9d9345ab6eef12e"),
+    (
+        Type::TwistWithCovariance,
+        "geometry_msgs/TwistWithCovarianceStamped",
+        "8927a1a12fb2607ceea095b2dc440a96",
+    ),
+    (Type::Float32, "std_msgs/Float32", "73fcbf46b49191e672908e50842a83d4"),
+    (Type::Float64, "std_msgs/Float64", "fdb28210bfa9d7c91146260178d9a584"),
+];
+
+impl Type {
+    /// By its name, as ROS 1 or ROS 2 (`sensor_msgs/msg/Imu`) writes it.
+    pub(super) fn named(name: &str) -> Option<Self> {
+        let name = name.replacen("/msg/", "/", 1);
+        TYPES.iter().find(|(_, known, _)| *known == name).map(|(known, ..)| *known)
+    }
+
+    /// Whether a ROS 1 definition is the one that is known here; `*` is said by who doesn't know it.
+    pub(super) fn is_defined_as(self, md5: &str) -> bool {
+        md5 == "*" || TYPES.iter().any(|(known, _, known_md5)| *known == self && *known_md5 == md5)
+    }
+
+    /// Which sensors it may be of.
+    pub(super) fn sense(self) -> Sense {
+        match self {
+            Self::Imu => Sense::Inertial,
+            Self::Range => Sense::Echosounder,
+            Self::FluidPressure => Sense::Depth,
+            Self::LaserScan | Self::PointCloud2 | Self::PointCloud => Sense::Head,
+            Self::Twist | Self::TwistWithCovariance => Sense::Velocity,
+            Self::Float32 | Self::Float64 => Sense::Tether,
+        }
+    }
+
+    /// Whether it says what it is of: a bare number may be anything.
+    pub(super) fn is_telling(self) -> bool {
+        !matches!(self, Self::Float32 | Self::Float64)
+    }
+}
+
+/// What a message says, in its own units and axes.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Values {
+    /// Parts that the sender says it doesn't have are `None`.
+    Inertial {
+        wxyz: Option<[f64; 4]>,
+        rate_radps: Option<[f64; 3]>,
+        force_mps2: Option<[f64; 3]>,
+    },
+    /// `None` where nothing was heard.
+    Range(Option<f64>),
+    /// A pressure, or a length of cable: in what the mapping says, or else SI.
+    Scalar(f64),
+    Velocity([f64; 3]),
+    Beams(Beams),
+}
+
+/// A message: its stamp and frame where it has them, and what it says.
+pub(super) struct Read<'a> {
+    pub(super) header: Option<Header<'a>>,
+    pub(super) values: Values,
+}
+
+/// Reads a message.
+///
+/// Errors: in words, why it is none of its type.
+pub(super) fn read(of: Type, encoding: Encoding, bytes: &[u8]) -> Result<Read<'_>, &'static str> {
+    let mut wire = Wire::new(bytes, encoding).ok_or("in another encapsulation than plain CDR")?;
+    let read =
+        fields(of, &mut wire).ok_or("shorter than their type says, or with a count that can't be")??;
+    if !wire.is_done() {
+        return Err("longer than their type says");
+    }
+    Ok(read)
+}
+
+fn fields<'a>(of: Type, wire: &mut Wire<'a>) -> Option<Result<Read<'a>, &'static str>> {
+    let header = if of.is_telling() { Some(wire.header()?) } else { None };
+    let values = match of {
+        Type::Imu => inertial(wire)?,
+        Type::Range => range(wire)?,
+        Type::FluidPressure => {
+            let [pressure, _variance] = wire.doubles()?;
+            Values::Scalar(pressure)
+        }
+        Type::LaserScan => Values::Beams(scan(wire)?),
+        Type::PointCloud2 => match cloud(wire, header?.stamp_ns)? {
+            Ok(beams) => Values::Beams(beams),
+            Err(why) => return Some(Err(why)),
+        },
+        Type::PointCloud => Values::Beams(points(wire)?),
+        Type::Twist | Type::TwistWithCovariance => {
+            let [x, y, z, _, _, _] = wire.doubles()?;
+            if of == Type::TwistWithCovariance {
+                let _covariance: [f64; 36] = wire.doubles()?;
+            }
+            Values::Velocity([x, y, z])
+        }
+        Type::Float32 => Values::Scalar(wire.f32()?.into()),
+        Type::Float64 => Values::Scalar(wire.f64()?),
+    };
+    Some(Ok(Read { header, values }))
+}
+
+/// A covariance that begins with -1 says that there is no such value.
+fn inertial(wire: &mut Wire<'_>) -> Option<Values> {
+    let [x, y, z, w] = wire.doubles()?;
+    let told = |covariance: [f64; 9]| covariance.first().is_none_or(|first| !is_minus_one(*first));
+    let wxyz = told(wire.doubles()?).then_some([w, x, y, z]);
+    let rate: [f64; 3] = wire.doubles()?;
+    let rate_radps = told(wire.doubles()?).then_some(rate);
+    let force: [f64; 3] = wire.doubles()?;
+    let force_mps2 = told(wire.doubles()?).then_some(force);
+    let whole = |values: &[f64]| values.iter().all(|value| value.is_finite());
+    // All zeros is what a sender leaves that never heard of an orientation.
+    let wxyz = wxyz.filter(|wxyz| whole(wxyz) && wxyz.iter().any(|part| part.abs() > 0.0));
+    Some(Values::Inertial {
+        wxyz,
+        rate_radps: rate_radps.filter(|it| whole(it)),
+        force_mps2: force_mps2.filter(|it| whole(it)),
+    })
+}
+
+fn is_minus_one(value: f64) -> bool {
+    value.to_bits() == (-1.0_f64).to_bits()
+}
+
+fn range(wire: &mut Wire<'_>) -> Option<Values> {
+    let _radiation = wire.u8()?;
+    let [_field_of_view, least, most, range] = wire.singles()?;
+    // The variance, which newer definitions have behind it.
+    if !wire.is_done() {
+        wire.f32()?;
+    }
+    Some(Values::Range(heard(range, least, most)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn types_are_known_by_both_names() {
+        assert_eq!(Type::named("sensor_msgs/Imu"), Some(Type::Imu));
+        assert_eq!(Type::named("sensor_msgs/msg/LaserScan"), Some(Type::LaserScan));
+        assert_eq!(Type::named("sensor_msgs/Image"), None);
+        assert!(!Type::Imu.is_defined_as("c005c34273dc426c67a020a87bc24148"));
+    }
+
+    #[test]
+    fn lengths_that_are_wrong_are_named() {
+        let whole = [[0; 16].as_slice(), &[0; 37 * 8]].concat();
+        assert!(read(Type::Imu, Encoding::Ros1, &whole).is_ok());
+        assert!(read(Type::Imu, Encoding::Ros1, &whole[1..]).err().unwrap().contains("shorter"));
+        let longer = [&whole[..], &[0]].concat();
+        assert!(read(Type::Imu, Encoding::Ros1, &longer).err().unwrap().contains("longer"));
+        let other = read(Type::Imu, Encoding::Cdr, &[0, 9, 0, 0]).err().unwrap();
+        assert!(other.contains("encapsulation"));
+    }
+}

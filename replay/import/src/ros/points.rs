@@ -1,0 +1,283 @@
+//! Scans and clouds of points of a profiling head, as beams: an angle, a range and a time each.
+//!
+//! A scan turns about its own z, counted from x towards y. The head's x is that axis, its 0 (down, -z) the scan's x, its y the
+//! scan's y. A cloud's points are in the head's own frame, its beam in the plane of y and z, unless the mapping says `xy`.
+
+use headrace_geometry::math;
+
+use super::ranges::heard;
+use super::wire::Wire;
+
+/// More than any head makes of a turn.
+const MOST_BEAMS: usize = 1 << 16;
+/// Longest time that a message may tell of.
+const LONGEST_S: f64 = 120.0;
+/// How far a point may be from the beam's plane, as a share of its range.
+const OFF_PLANE: f64 = 0.1;
+
+/// One beam.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Beam {
+    /// As [`headrace_sensor::reading::SonarReturn::angle_rad`].
+    pub(super) angle_rad: f64,
+    /// `None` where nothing was heard.
+    pub(super) range_m: Option<f64>,
+    /// After the message's stamp.
+    pub(super) after_s: f64,
+}
+
+/// A plane that a beam turns in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Plane {
+    /// The head's own axes.
+    Yz,
+    /// Those of a laser scanner.
+    Xy,
+}
+
+/// What a message has of beams.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Beams {
+    /// With angles of their own, which may be anything.
+    Turned(Vec<Beam>),
+    /// Points, and how long after the stamp.
+    Points(Vec<([f64; 3], f64)>),
+}
+
+/// Beams that can be told, and what speaks against others.
+#[derive(Debug, Default)]
+pub(super) struct Told {
+    /// In order of time.
+    pub(super) beams: Vec<Beam>,
+    /// Points that aren't in the plane.
+    pub(super) off_plane: u64,
+    /// Points of no number, or at the origin: nothing heard, nobody knows where.
+    pub(super) nowhere: u64,
+}
+
+impl Beams {
+    /// Errors: in words, why they are no head's.
+    pub(super) fn told(&self, plane: Plane) -> Result<Told, &'static str> {
+        let mut told = Told::default();
+        match self {
+            Self::Turned(beams) => {
+                if beams.iter().any(|beam| !beam.angle_rad.is_finite() || beam.angle_rad.abs() > 1e3) {
+                    return Err("with angles that are none");
+                }
+                told.beams.clone_from(beams);
+            }
+            Self::Points(points) => {
+                for (point, after_s) in points {
+                    told.point(*point, *after_s, plane);
+                }
+            }
+        }
+        if told.beams.len() > MOST_BEAMS {
+            return Err("with more than 65536 beams, which no head makes");
+        }
+        if told.beams.iter().any(|beam| !(-LONGEST_S..=LONGEST_S).contains(&beam.after_s)) {
+            return Err("whose beams take more than 120 s");
+        }
+        told.beams.sort_by(|one, other| one.after_s.total_cmp(&other.after_s));
+        Ok(told)
+    }
+}
+
+impl Told {
+    fn point(&mut self, [x, y, z]: [f64; 3], after_s: f64, plane: Plane) {
+        let (across, along, off) = match plane {
+            Plane::Yz => (y, -z, x),
+            Plane::Xy => (y, x, z),
+        };
+        let range_m = math::hypot(math::hypot(across, along), off);
+        if !range_m.is_finite() || range_m <= 0.0 {
+            self.nowhere += 1;
+        } else if off.abs() > OFF_PLANE * range_m {
+            self.off_plane += 1;
+        } else {
+            let angle_rad = math::atan2(across, along);
+            self.beams.push(Beam { angle_rad, range_m: Some(range_m), after_s });
+        }
+    }
+}
+
+/// sensor_msgs/LaserScan behind its header.
+pub(super) fn scan(wire: &mut Wire<'_>) -> Option<Beams> {
+    let [first, _last, step, each_s, _scan_s, least, most] = wire.singles()?;
+    let ranges = wire.single_sequence()?;
+    let _strengths = wire.single_sequence()?;
+    let beam = |(number, range): (u32, &f32)| {
+        let number = f64::from(number);
+        // A scan of one beam may have no step.
+        let turned = |each: f64| if number > 0.0 { number * each } else { 0.0 };
+        Beam {
+            angle_rad: first + turned(step),
+            range_m: heard((*range).into(), least, most),
+            after_s: turned(each_s),
+        }
+    };
+    Some(Beams::Turned((0..).zip(&ranges).map(beam).collect()))
+}
+
+/// sensor_msgs/PointCloud behind its header.
+pub(super) fn points(wire: &mut Wire<'_>) -> Option<Beams> {
+    let count = wire.count(12)?;
+    let points = (0..count).map(|_| Some((wire.singles()?, 0.0))).collect::<Option<Vec<_>>>()?;
+    for _ in 0..wire.count(8)? {
+        let (_name, _values) = (wire.text()?, wire.single_sequence()?);
+    }
+    Some(Beams::Points(points))
+}
+
+/// How a number stands in a point of sensor_msgs/PointCloud2.
+#[derive(Debug, Clone, Copy)]
+enum Number {
+    U32,
+    F32,
+    F64,
+}
+
+/// A field of a point.
+#[derive(Debug, Clone, Copy)]
+struct Field {
+    offset: usize,
+    number: Number,
+}
+
+/// What a field of time counts.
+#[derive(Debug, Clone, Copy)]
+enum Time {
+    /// Nanoseconds after the stamp.
+    After,
+    /// Seconds after the stamp.
+    AfterSeconds,
+    /// Seconds of the stamp's clock.
+    Seconds,
+}
+
+impl Field {
+    fn of(self, point: &[u8], big_endian: bool) -> Option<f64> {
+        let rest = point.get(self.offset..)?;
+        Some(match self.number {
+            Number::U32 => {
+                let bytes = *rest.first_chunk()?;
+                f64::from(if big_endian { u32::from_be_bytes(bytes) } else { u32::from_le_bytes(bytes) })
+            }
+            Number::F32 => {
+                let bytes = *rest.first_chunk()?;
+                f64::from(if big_endian { f32::from_be_bytes(bytes) } else { f32::from_le_bytes(bytes) })
+            }
+            Number::F64 => {
+                let bytes = *rest.first_chunk()?;
+                if big_endian { f64::from_be_bytes(bytes) } else { f64::from_le_bytes(bytes) }
+            }
+        })
+    }
+}
+
+/// The fields that are needed of those that a cloud has.
+#[derive(Debug, Default)]
+struct Layout {
+    place: [Option<Field>; 3],
+    time: Option<(Field, Time)>,
+}
+
+impl Layout {
+    /// Drivers of Ouster (`t`), Velodyne (`time`) and Hesai (`timestamp`) name a point's time so.
+    fn add(&mut self, name: &[u8], offset: usize, datatype: u8) {
+        let number = match datatype {
+            6 => Number::U32,
+            7 => Number::F32,
+            8 => Number::F64,
+            _ => return,
+        };
+        let field = Field { offset, number };
+        let [x, y, z] = &mut self.place;
+        match (name, number) {
+            (b"x", Number::F32 | Number::F64) => *x = Some(field),
+            (b"y", Number::F32 | Number::F64) => *y = Some(field),
+            (b"z", Number::F32 | Number::F64) => *z = Some(field),
+            (b"t", Number::U32) => self.time = Some((field, Time::After)),
+            (b"time", Number::F32 | Number::F64) => self.time = Some((field, Time::AfterSeconds)),
+            (b"timestamp", Number::F64) => self.time = Some((field, Time::Seconds)),
+            _ => (),
+        }
+    }
+
+    fn point(&self, point: &[u8], big_endian: bool, stamp_ns: u64) -> Option<([f64; 3], f64)> {
+        let [x, y, z] = self.place;
+        let place = [x?.of(point, big_endian)?, y?.of(point, big_endian)?, z?.of(point, big_endian)?];
+        let Some((field, time)) = self.time else { return Some((place, 0.0)) };
+        let time_of = field.of(point, big_endian)?;
+        let after_s = match time {
+            Time::After => time_of / 1e9,
+            Time::AfterSeconds => time_of,
+            Time::Seconds => time_of - stamp_ns as f64 / 1e9,
+        };
+        Some((place, after_s))
+    }
+}
+
+/// sensor_msgs/PointCloud2 behind its header.
+pub(super) fn cloud(wire: &mut Wire<'_>, stamp_ns: u64) -> Option<Result<Beams, &'static str>> {
+    let (height, width) = (usize::try_from(wire.u32()?).ok()?, usize::try_from(wire.u32()?).ok()?);
+    let mut layout = Layout::default();
+    for _ in 0..wire.count(13)? {
+        let (name, offset, datatype, _count) = (wire.text()?, wire.u32()?, wire.u8()?, wire.u32()?);
+        layout.add(name, usize::try_from(offset).ok()?, datatype);
+    }
+    let big_endian = wire.u8()? != 0;
+    let (point_step, row_step) = (usize::try_from(wire.u32()?).ok()?, usize::try_from(wire.u32()?).ok()?);
+    let data = wire.bytes()?;
+    let _is_dense = wire.u8()?;
+    if layout.place.iter().any(Option::is_none) {
+        return Some(Err("without x, y and z in floating point"));
+    }
+    let count = height.checked_mul(width)?;
+    if count > MOST_BEAMS {
+        return Some(Err("with more than 65536 beams, which no head makes"));
+    }
+    let mut points = Vec::new();
+    for row in 0..height.min(count) {
+        for column in 0..width {
+            let start = row.checked_mul(row_step)?.checked_add(column.checked_mul(point_step)?)?;
+            let point = data.get(start..start.checked_add(point_step)?);
+            match point.and_then(|point| layout.point(point, big_endian, stamp_ns)) {
+                Some(point) => points.push(point),
+                None => return Some(Err("with less data than width, height and steps say")),
+            }
+        }
+    }
+    Some(Ok(Beams::Points(points)))
+}
+
+#[cfg(test)]
+mod tests {
+    use core::f64::consts::FRAC_PI_2;
+
+    use headrace_geometry::frames::head_direction;
+
+    use super::*;
+
+    #[test]
+    fn points_come_back_as_the_head_would_point() {
+        for quarter in -3_i32..=4 {
+            let angle_rad = f64::from(quarter) * FRAC_PI_2 / 2.0;
+            let at = head_direction(angle_rad).scaled(3.0);
+            let told = Beams::Points(vec![([at.x(), at.y(), at.z()], 0.0)]).told(Plane::Yz).unwrap();
+            let beam = told.beams[0];
+            assert!((beam.angle_rad - angle_rad).abs() < 1e-12, "{angle_rad}: {beam:?}");
+            assert!((beam.range_m.unwrap() - 3.0).abs() < 1e-12);
+            // As a scanner whose x is the head's 0 and whose y is the head's y sees it.
+            let told = Beams::Points(vec![([-at.z(), at.y(), at.x()], 0.0)]).told(Plane::Xy).unwrap();
+            assert!((told.beams[0].angle_rad - angle_rad).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn points_that_no_beam_reaches_are_counted() {
+        let all = [[3.0, 0.0, 1.0], [0.0, f64::NAN, 1.0], [0.0; 3], [0.0, 1.0, 1.0]];
+        let told = Beams::Points(all.map(|point| (point, 0.0)).to_vec()).told(Plane::Yz).unwrap();
+        assert_eq!((told.beams.len(), told.off_plane, told.nowhere), (1, 1, 2));
+    }
+}

@@ -1,0 +1,25 @@
+//! What a range says.
+
+/// A range by REP 117: infinite where nothing was in reach or something was too near, NaN where nothing was measured; beyond its
+/// limits it means nothing, where these mean something.
+pub(super) fn heard(range_m: f64, least_m: f64, most_m: f64) -> Option<f64> {
+    let limited = most_m > 0.0 && least_m <= most_m;
+    let within = !limited || (least_m..=most_m).contains(&range_m);
+    (range_m.is_finite() && range_m > 0.0 && within).then_some(range_m)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranges_mean_what_rep_117_says() {
+        assert_eq!(heard(2.0, 0.5, 5.0), Some(2.0));
+        for none in [f64::INFINITY, f64::NEG_INFINITY, f64::NAN, 0.4, 5.1, 0.0, -1.0] {
+            assert_eq!(heard(none, 0.5, 5.0), None, "{none}");
+        }
+        assert_eq!(heard(7.0, 0.0, 0.0), Some(7.0), "limits of zero are none");
+        assert_eq!(heard(7.0, 0.0, f64::INFINITY), Some(7.0));
+        assert_eq!(heard(7.0, f64::NAN, f64::NAN), Some(7.0));
+    }
+}

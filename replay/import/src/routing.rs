@@ -1,0 +1,157 @@
+//! Which sensor listens to which line of a foreign log.
+
+use headrace_geometry::time::MonoNs;
+use headrace_replay::log::SourceInfo;
+use headrace_sensor::driver::DriverSetup;
+use headrace_vehicle::VehicleConfig;
+
+use crate::kind::FileKind;
+use crate::taker::Taker;
+
+/// Why the lines of a file can't be routed to sensors. Texts name the options of `headrace import`.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum RoutingError {
+    /// A sensor is named that the vehicle file doesn't have.
+    #[error("--source {id}: the vehicle file has no such sensor; allowed are {allowed}")]
+    NoSuchSensor {
+        /// Its name.
+        id: String,
+        /// Those that there are.
+        allowed: String,
+    },
+    /// No sensor of the vehicle file would have heard such a file.
+    #[error("the vehicle file has no sensor {which} to take it; --source ID={line} names one")]
+    NoTaker {
+        /// Which sensors would have.
+        which: String,
+        /// How a line is named.
+        line: &'static str,
+    },
+    /// Several sensors could be the one device that the file is of.
+    #[error("the file is of one device, and {several} are of plugin {plugin}; --source ID={line} says which")]
+    SeveralTakers {
+        /// Their names.
+        several: String,
+        /// Their plugin.
+        plugin: &'static str,
+        /// How the line is named.
+        line: &'static str,
+    },
+    /// Values become bytes of a vehicle's sensors, and there is no vehicle file.
+    #[error("{format} wants --vehicle VEHICLE.toml, whose sensors' bytes its values become")]
+    NoVehicle {
+        /// The kind of file.
+        format: &'static str,
+    },
+    /// Neither a vehicle file nor an option names a sensor.
+    #[error("which sensors are the messages of? --vehicle VEHICLE.toml says so, or --source ID={line}")]
+    NoSensor {
+        /// How a line is named.
+        line: &'static str,
+    },
+    /// Lines are named for a file of values.
+    #[error("--source isn't for {format}; a mapping file names the sensors")]
+    NoLines {
+        /// The kind of file.
+        format: &'static str,
+    },
+    /// A line is named that the file doesn't have.
+    #[error("--source {id}={line}: such a file has one line, {only}")]
+    NoSuchLine {
+        /// The sensor.
+        id: String,
+        /// The line.
+        line: String,
+        /// The one that it has.
+        only: &'static str,
+    },
+    /// A sensor is named twice.
+    #[error("--source {id}: named twice; a sensor listens to one line")]
+    Twice {
+        /// Its name.
+        id: String,
+    },
+}
+
+/// The sensors that listen: by the vehicle file, or those of `explicit`, pairs of a sensor's id and its line, which override
+/// the vehicle file's.
+///
+/// Errors: see [`RoutingError`].
+pub fn takers(
+    kind: FileKind,
+    vehicle: Option<&VehicleConfig>,
+    explicit: &[(String, String)],
+) -> Result<Vec<Taker>, RoutingError> {
+    check_lines(kind, explicit)?;
+    if let (true, Some(vehicle)) = (kind.has_values(), vehicle) {
+        let taker = |(source, id): (u16, &String)| Taker { source, stream: id.clone(), driver: None };
+        return Ok((0..).zip(vehicle.sensor_configs.iter().map(|config| &config.id)).map(taker).collect());
+    }
+    let Some(vehicle) = vehicle else { return without_vehicle(kind, explicit) };
+    let ids: Vec<&str> = vehicle.sensor_configs.iter().map(|sensor| sensor.id.as_str()).collect();
+    if let Some((id, _)) = explicit.iter().find(|(id, _)| !ids.contains(&id.as_str())) {
+        return Err(RoutingError::NoSuchSensor { id: id.clone(), allowed: ids.join(", ") });
+    }
+    let mut takers = Vec::new();
+    for ((source, config), device) in (0..).zip(&vehicle.sensor_configs).zip(&vehicle.sensors) {
+        let own = explicit.iter().find(|(id, _)| *id == config.id).map(|(_, line)| line.clone());
+        let is_of_kind = kind == FileKind::Candump || config.plugin == kind.plugin();
+        let usual = kind.usual_line(&config.connect).filter(|_| is_of_kind);
+        let Some(stream) = own.or(usual.filter(|_| explicit.is_empty())) else { continue };
+        // All of a telemetry link is on one line; the driver of a part knows its own.
+        let setup = DriverSetup { begun: MonoNs(0), head: None };
+        let has_driver = kind == FileKind::Tlog && config.plugin == kind.plugin();
+        takers.push(Taker { source, stream, driver: has_driver.then(|| device.driver(&setup)) });
+    }
+    let (plugin, line) = (kind.plugin(), kind.line_form());
+    if takers.is_empty() {
+        let which = match kind {
+            FileKind::Candump => "with connect = \"can:INTERFACE\"".to_owned(),
+            _ => format!("of plugin {plugin}"),
+        };
+        return Err(RoutingError::NoTaker { which, line });
+    }
+    if kind.has_one_device() && takers.len() > 1 {
+        let several: Vec<&str> =
+            takers.iter().filter_map(|taker| ids.get(usize::from(taker.source)).copied()).collect();
+        return Err(RoutingError::SeveralTakers { several: several.join(", "), plugin, line });
+    }
+    Ok(takers)
+}
+
+/// The log's sources where there is no vehicle file.
+pub fn sources(kind: FileKind, explicit: &[(String, String)]) -> Vec<SourceInfo> {
+    let source = |(id, _): &(String, String)| SourceInfo {
+        id: id.clone(),
+        plugin: kind.plugin().to_owned(),
+        connect: String::new(),
+    };
+    explicit.iter().map(source).collect()
+}
+
+fn without_vehicle(kind: FileKind, explicit: &[(String, String)]) -> Result<Vec<Taker>, RoutingError> {
+    if kind.has_values() {
+        return Err(RoutingError::NoVehicle { format: kind.name() });
+    }
+    if explicit.is_empty() {
+        return Err(RoutingError::NoSensor { line: kind.line_form() });
+    }
+    let takers =
+        (0..).zip(explicit).map(|(source, (_, line))| Taker { source, stream: line.clone(), driver: None });
+    Ok(takers.collect())
+}
+
+fn check_lines(kind: FileKind, explicit: &[(String, String)]) -> Result<(), RoutingError> {
+    let only = kind.line_form();
+    if kind.has_values() && !explicit.is_empty() {
+        return Err(RoutingError::NoLines { format: kind.name() });
+    }
+    let wrong = explicit.iter().find(|(_, line)| kind != FileKind::Candump && line != only);
+    if let Some((id, line)) = wrong {
+        return Err(RoutingError::NoSuchLine { id: id.clone(), line: line.clone(), only });
+    }
+    let mut pairs = explicit.iter().enumerate();
+    let doubled = pairs.find(|(at, (id, _))| explicit.iter().take(*at).any(|(other, _)| other == id));
+    doubled.map_or(Ok(()), |(_, (id, _))| Err(RoutingError::Twice { id: id.clone() }))
+}

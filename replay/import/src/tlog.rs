@@ -1,0 +1,59 @@
+//! Telemetry logs of MAVLink.
+
+use crate::{Clock, Entry, Format, Step};
+use headrace_mavlink::frame::Frames;
+use headrace_mavlink::tlog::{Tlog, TlogError};
+use headrace_sensor::codec::{Framing as _, Verdict};
+
+/// The format; its one stream is [`STREAM`].
+#[derive(Debug, Default)]
+pub struct TlogFormat {
+    /// Whether the place of the next entry isn't known.
+    astray: bool,
+    last_us: u64,
+}
+
+/// The line of all frames.
+pub const STREAM: &str = "mavlink";
+
+/// Where an entry is looked for, its time is within a day of the last one's.
+const DAY_US: u64 = 86_400_000_000;
+/// Times beyond 2106 aren't any, µs.
+const LATEST_US: u64 = 4_294_967_296_000_000;
+
+impl Format for TlogFormat {
+    fn clock(&self) -> Clock {
+        Clock::Utc
+    }
+
+    fn step(&mut self, front: &[u8], _: bool, out: &mut Vec<Entry>) -> Step {
+        let logged = match Tlog::new(front).next() {
+            // Astray, what seems to be cut off is likely no entry at all; but only the file's end can tell.
+            None | Some(Err(TlogError::Short { .. })) => return Step::More,
+            Some(Err(_)) => return self.lost(),
+            Some(Ok(logged)) => logged,
+        };
+        let used = front.len().min(8 + logged.frame.len());
+        let good = matches!(Frames.judge(logged.frame), Verdict::Frame(_));
+        let near = logged.utc_us <= LATEST_US
+            && (self.last_us == 0 || logged.utc_us.abs_diff(self.last_us) < DAY_US);
+        if self.astray && !(good && near) || logged.utc_us > LATEST_US {
+            return self.lost();
+        }
+        self.astray = false;
+        if !good {
+            return Step::Lost(used, "frames that fit no known message and its checksum");
+        }
+        self.last_us = logged.utc_us;
+        let (stamp_ns, stream) = (logged.utc_us.saturating_mul(1000), STREAM.to_owned());
+        out.push(Entry { stamp_ns, stream, bytes: logged.frame.to_vec() });
+        Step::Took(used)
+    }
+}
+
+impl TlogFormat {
+    fn lost(&mut self) -> Step {
+        self.astray = true;
+        Step::Lost(1, "no time and frame where one must be")
+    }
+}

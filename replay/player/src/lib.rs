@@ -1,0 +1,17 @@
+//! headrace's dive logs: the recorder and the reader, the drive that feeds a loop from a log or a simulation, playback,
+//! and what compares, smooths and shows a recorded dive.
+
+mod clocks;
+pub mod drive;
+pub mod log;
+pub mod playback;
+pub mod player;
+pub mod record;
+mod results;
+mod simulation_feed;
+pub mod smooth;
+pub mod snapshot_store;
+pub mod verify;
+pub mod view;
+
+pub use simulation_feed::SimulationFeed;

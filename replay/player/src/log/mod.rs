@@ -1,0 +1,66 @@
+//! The dive log: an MCAP file with the bytes of every device as they came, the order in which the loop took them, and
+//! what the loop made of them.
+//!
+//! [`mod@format`] names channels and metadata and lays out `/loop/tick`. [`LogWriter`] writes a log, [`Recorder`] does so
+//! on a thread of its own behind a lock-free queue, and [`LogReader`] reads logs, ours and others', whole or damaged.
+//!
+//! A log that we write, in the order of the file:
+//!
+//! | record | content |
+//! |---|---|
+//! | metadata `headrace` | [`format::FORMAT_KEY`] and what the caller gave: version, digest of the configuration, clock anchors |
+//! | metadata `headrace.part` | only where a recording has several parts: which this one is ([`PartHead`]) |
+//! | attachments | `vehicle.toml` and the files that it names |
+//! | a chunk | definitions of all channels, nothing else |
+//! | metadata `headrace.channels` | the same definitions once more, so that a log survives the loss of that chunk |
+//! | metadata `headrace.losses` | only where something is missing: what, from when to when ([`format::LOSSES`]) |
+//! | chunks | messages, each chunk at most half a second of a dive |
+//! | metadata `headrace.part.end` | only in a part: whether another follows ([`PartEnd`]) |
+//! | summary | what viewers need to find their way |
+//!
+//! [`DiveLog`] reads one log, or the parts of a recording as one.
+//!
+//! The file is only ever appended to: nothing that has been written is touched again, whatever the power does.
+
+#![cfg_attr(not(test), warn(clippy::indexing_slicing))]
+
+mod channels;
+mod chunk;
+mod companion;
+mod digest;
+mod dive_log;
+mod error;
+mod fields;
+pub mod format;
+mod framing;
+mod loss;
+mod merge;
+mod part;
+mod queue;
+mod reader;
+mod recorder;
+mod recover;
+mod rotate;
+mod scan;
+mod search;
+mod space;
+mod trim;
+mod worker;
+mod writer;
+
+pub use companion::{Companion, Made};
+pub use digest::{file_digest, files_digest};
+pub use dive_log::{DiveLog, DivePlace, PartFile, files_of};
+pub use error::LogError;
+pub use loss::{Loss, LossKind};
+pub use part::{Part, PartEnd, PartHead, Progress, dive_name, part_path};
+pub use reader::{ChannelInfo, LogInfo, LogMessage, LogPlace, LogReader, MessageKind};
+pub use recorder::{Full, Recorder, RecorderHandle, RecorderPort, SentPort};
+pub use recover::{RECOVERED_FROM, Recovered, recover};
+pub use rotate::{Every, Rotation};
+pub use space::LeftOut;
+pub use trim::{Change, TRIMMED, Trim, Trimmed, trim};
+pub use writer::{LogHeader, LogWriter, PartSummary, ResultChannel, SourceInfo, Summary};
+
+#[cfg(test)]
+mod tests;

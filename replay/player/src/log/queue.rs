@@ -1,0 +1,93 @@
+//! The queue between the loop and the recorder's thread: its entries, and what both ends share besides.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64};
+
+use crossbeam::queue::ArrayQueue;
+use headrace_geometry::time::MonoNs;
+use ringbuf::HeapRb;
+use ringbuf::traits::{Consumer as _, Observer as _};
+use ringbuf::wrap::Cons;
+
+use super::fields::Fields;
+use super::writer::Lane;
+
+/// Bytes before each entry in the queue: kind, a spare byte, number, length, log time, publish time.
+pub(super) const ENTRY_HEAD_BYTES: usize = 24;
+
+/// What the ends of a recorder share besides the queue.
+pub(super) struct State {
+    pub(super) stopping: AtomicBool,
+    pub(super) failed: AtomicBool,
+    /// What the ports' threads have sent to the devices: it doesn't pass the loop.
+    pub(super) sent: ArrayQueue<SentMessage>,
+    pub(super) sent_dropped: AtomicU64,
+    pub(super) results_missing: AtomicU64,
+}
+
+/// Bytes sent to a device.
+pub(super) struct SentMessage {
+    pub(super) source: u16,
+    pub(super) at: MonoNs,
+    pub(super) bytes: Vec<u8>,
+}
+
+/// What stands before a message of `len` bytes in the queue.
+pub(super) fn entry_head(
+    lane: Lane,
+    log_time: MonoNs,
+    publish_time: MonoNs,
+    len: u32,
+) -> [u8; ENTRY_HEAD_BYTES] {
+    let (kind, number) = match lane {
+        Lane::Raw(source) => (0_u8, source),
+        Lane::Sent(source) => (1, source),
+        Lane::Tick => (2, 0),
+        Lane::Result(channel) => (3, channel),
+    };
+    let mut head = [0; ENTRY_HEAD_BYTES];
+    let values = [kind, 0].into_iter().chain(number.to_le_bytes()).chain(len.to_le_bytes());
+    let values = values.chain(log_time.0.to_le_bytes()).chain(publish_time.0.to_le_bytes());
+    head.iter_mut().zip(values).for_each(|(byte, value)| *byte = value);
+    head
+}
+
+/// The thread's end of the queue.
+pub(super) struct Queue {
+    pub(super) ring: Cons<Arc<HeapRb<u8>>>,
+    /// The message of the entry taken last.
+    pub(super) message: Vec<u8>,
+}
+
+/// An entry without its message.
+pub(super) struct Entry {
+    pub(super) lane: Lane,
+    pub(super) log_time: MonoNs,
+    pub(super) publish_time: MonoNs,
+}
+
+impl Queue {
+    /// The next entry, if all of it is there; its message is then in `message`.
+    pub(super) fn take(&mut self) -> Option<Entry> {
+        let mut head = [0; ENTRY_HEAD_BYTES];
+        if self.ring.peek_slice(&mut head) < ENTRY_HEAD_BYTES {
+            return None;
+        }
+        let mut fields = Fields::new(&head);
+        let (kind, _, number) = (fields.u8()?, fields.u8()?, fields.u16()?);
+        let len = usize::try_from(fields.u32()?).ok()?;
+        if self.ring.occupied_len() < ENTRY_HEAD_BYTES + len {
+            return None;
+        }
+        let lane = match kind {
+            0 => Lane::Raw(number),
+            1 => Lane::Sent(number),
+            2 => Lane::Tick,
+            _ => Lane::Result(number),
+        };
+        self.ring.skip(ENTRY_HEAD_BYTES);
+        self.message.resize(len, 0);
+        self.ring.pop_slice(&mut self.message);
+        Some(Entry { lane, log_time: MonoNs(fields.u64()?), publish_time: MonoNs(fields.u64()?) })
+    }
+}

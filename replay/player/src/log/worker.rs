@@ -1,0 +1,223 @@
+//! The recorder's thread: takes entries from the queue and writes them.
+
+use std::io::Write;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use super::LogError;
+use super::companion::{Companion, Made};
+use super::queue::{Entry, Queue, State};
+use super::rotate::Parts;
+use super::space::{LONGEST_KEPT_BYTES, Space};
+use super::writer::{Lane, LogHeader, LogWriter, Summary};
+
+/// How long the thread sleeps when the queue is empty. The loop can't wake it: that would be a system call.
+const NAP: Duration = Duration::from_millis(2);
+/// How often a chunk is closed and brought to the medium. Half of the second that a power cut may cost, since closing
+/// and syncing take their time too.
+const FLUSH_PERIOD: Duration = Duration::from_millis(500);
+/// Entries between two looks at the clock.
+const BATCH: usize = 256;
+
+/// What the thread does.
+pub(super) struct Worker<'a, W: Write> {
+    /// `None` once it has failed.
+    log: Option<LogWriter<W>>,
+    error: Option<LogError>,
+    discarded: u64,
+    flushed: Instant,
+    /// Whether something was written since.
+    open: bool,
+    /// Where the recording is one in parts.
+    parts: Option<Parts<W>>,
+    space: Space,
+    echoes: Echoes,
+    beside: Beside,
+    state: &'a State,
+}
+
+/// A companion, and room for what it makes.
+pub(super) struct Beside {
+    companion: Option<Box<dyn Companion>>,
+    made: Vec<Made>,
+}
+
+impl Beside {
+    pub(super) fn new(companion: Option<Box<dyn Companion>>) -> Self {
+        Self { companion, made: Vec::new() }
+    }
+}
+
+/// Which messages are left out when the disk fills.
+pub(super) struct Echoes {
+    sonars: Vec<u16>,
+    /// Which results follow echo by echo.
+    results: Vec<bool>,
+}
+
+impl Echoes {
+    pub(super) fn of(header: &LogHeader) -> Self {
+        let results = header.results.iter().map(|result| result.follows_echoes).collect();
+        Self { sonars: header.sonars.clone(), results }
+    }
+
+    fn is_echo(&self, lane: Lane, len: usize) -> bool {
+        match lane {
+            Lane::Raw(source) => len > LONGEST_KEPT_BYTES && self.sonars.contains(&source),
+            Lane::Result(number) => self.results.get(usize::from(number)).copied().unwrap_or_default(),
+            Lane::Sent(_) | Lane::Tick => false,
+        }
+    }
+}
+
+#[expect(
+    clippy::disallowed_methods,
+    reason = "how long a chunk stays open is wall time, and no result depends on it"
+)]
+fn wall_clock() -> Instant {
+    Instant::now()
+}
+
+impl<'a, W: Write> Worker<'a, W> {
+    pub(super) fn new(
+        log: LogWriter<W>,
+        parts: Option<Parts<W>>,
+        space: Space,
+        echoes: Echoes,
+        beside: Beside,
+        state: &'a State,
+    ) -> Self {
+        let (log, flushed) = (Some(log), wall_clock());
+        Self { log, error: None, discarded: 0, flushed, open: false, parts, space, echoes, beside, state }
+    }
+
+    pub(super) fn run(mut self, mut queue: Queue) -> Result<Summary, LogError> {
+        loop {
+            self.space.look(wall_clock());
+            // Read before the queue is looked at: what was pushed before the flag was set is then taken.
+            let stopping = self.state.stopping.load(Ordering::Acquire);
+            let taken =
+                (0..BATCH).map_while(|_| queue.take().map(|entry| self.write_all(&entry, &queue.message)));
+            let taken = taken.count() + self.write_sent();
+            self.flush_in_time();
+            if taken == 0 && stopping {
+                return self.finish();
+            }
+            if taken == 0 {
+                thread::park_timeout(NAP);
+            }
+        }
+    }
+
+    /// Writes an entry and what the companion makes of it.
+    fn write_all(&mut self, entry: &Entry, message: &[u8]) {
+        self.write(entry, message);
+        if let Lane::Result(number) = entry.lane {
+            self.write_made(|companion, made| companion.take(number, entry.log_time, message, made));
+        }
+    }
+
+    fn write_made(&mut self, make: impl FnOnce(&mut dyn Companion, &mut Vec<Made>)) {
+        // Of a dive that goes on unrecorded nothing is to be made.
+        let Some(companion) = self.beside.companion.as_mut().filter(|_| self.log.is_some()) else { return };
+        let mut made = core::mem::take(&mut self.beside.made);
+        make(companion.as_mut(), &mut made);
+        for Made { channel, at, bytes } in made.drain(..) {
+            if usize::from(channel) < self.echoes.results.len() {
+                self.write(&Entry { lane: Lane::Result(channel), log_time: at, publish_time: at }, &bytes);
+            }
+        }
+        self.beside.made = made;
+    }
+
+    fn write(&mut self, entry: &Entry, message: &[u8]) {
+        self.discarded += u64::from(self.log.is_none());
+        self.open = true;
+        self.rotate_in_time(entry);
+        if self.space.is_scarce() && self.echoes.is_echo(entry.lane, message.len()) {
+            if let Some(words) = self.space.leave_out(entry.log_time, message.len()) {
+                self.attempt(|log| log.lost(Some(entry.log_time), None, &words));
+            }
+            return;
+        }
+        self.attempt(|log| log.message(entry.lane, entry.log_time, entry.publish_time, message));
+    }
+
+    fn rotate_in_time(&mut self, entry: &Entry) {
+        let (Some(mut parts), Some(log)) = (self.parts.take(), self.log.as_ref()) else { return };
+        if parts.is_due(entry.lane, entry.log_time, log) {
+            self.attempt(|log| parts.rotate(entry.log_time, log));
+        }
+        self.parts = Some(parts);
+    }
+
+    /// Writes what has been sent to the devices; gives the number of messages.
+    fn write_sent(&mut self) -> usize {
+        let state = self.state;
+        let mut written = 0;
+        while let Some(message) = state.sent.pop() {
+            let entry =
+                Entry { lane: Lane::Sent(message.source), log_time: message.at, publish_time: message.at };
+            self.write(&entry, &message.bytes);
+            written += 1;
+        }
+        written
+    }
+
+    fn flush_in_time(&mut self) {
+        let now = wall_clock();
+        if !self.open {
+            self.flushed = now;
+        } else if now.duration_since(self.flushed) >= FLUSH_PERIOD {
+            self.attempt(LogWriter::flush);
+            (self.flushed, self.open) = (now, false);
+        }
+    }
+
+    fn attempt(&mut self, action: impl FnOnce(&mut LogWriter<W>) -> Result<(), LogError>) {
+        let Some(log) = self.log.as_mut() else { return };
+        if let Err(error) = action(log) {
+            tracing::error!("the dive goes on unrecorded: {error}");
+            self.error = Some(error);
+            self.log = None;
+            self.state.failed.store(true, Ordering::Release);
+        }
+    }
+
+    fn finish(mut self) -> Result<Summary, LogError> {
+        self.write_made(|companion, made| companion.end(made));
+        let left_out = self.space.left_out();
+        if let Some((from, to)) = left_out.span {
+            self.attempt(|log| log.lost(Some(from), Some(to), &left_out.words()));
+        }
+        let finished = match (self.log, self.error) {
+            (Some(log), _) => match self.parts {
+                Some(parts) => parts.finish(log),
+                None => log.finish().map(|(_, summary)| summary),
+            },
+            (None, Some(error)) => {
+                Err(LogError::Stopped { discarded: self.discarded, source: Box::new(error) })
+            }
+            (None, None) => Err(LogError::Panicked),
+        };
+        if finished.is_err() {
+            self.state.failed.store(true, Ordering::Release);
+        }
+        let count = |count: &AtomicU64| count.load(Ordering::Relaxed);
+        let (sent_dropped, results_missing) =
+            (count(&self.state.sent_dropped), count(&self.state.results_missing));
+        let summary =
+            finished.map(|summary| Summary { left_out, sent_dropped, results_missing, ..summary })?;
+        let Summary { messages, bytes, .. } = summary;
+        tracing::info!(
+            messages,
+            bytes,
+            left_out = left_out.messages,
+            sent_dropped,
+            results_missing,
+            "recording finished"
+        );
+        Ok(summary)
+    }
+}

@@ -1,0 +1,207 @@
+//! A recorded dive as a feed.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use headrace_geometry::time::MonoNs;
+use headrace_monitor::SourceInfo;
+use headrace_monitor::ring::{MAX_PACKET_BYTES, NO_ORDER, Port, RingError};
+use headrace_sensor::reading::SourceId;
+use serde::{Deserialize, Serialize};
+
+use crate::clocks::{self, Clock};
+use crate::drive::{Coming, Feed};
+use crate::log::{DiveLog, DivePlace, LogError, LogInfo, Loss, MessageKind, PartFile};
+
+/// Plays the sources' messages of a log.
+pub struct Player {
+    reader: DiveLog,
+    /// For each source of the log, the loop's source of that name.
+    sources: Vec<Option<SourceId>>,
+    ids: Vec<String>,
+    next: Option<Coming>,
+    bytes: Vec<u8>,
+    order: u64,
+    played: u64,
+    /// Messages that no sensor of the vehicle file takes, by the source's name.
+    unmatched: BTreeMap<String, u64>,
+    too_long: u64,
+    /// The clock that most messages are stamped by.
+    clock: Option<Clock>,
+    /// Messages stamped by another, by the source's name: how many, and the first one's time.
+    astray: BTreeMap<String, (u64, MonoNs)>,
+}
+
+/// A player's position in its log, to continue from.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct PlayerPlace {
+    log: DivePlace,
+    /// The message that was looked at and not sent yet: receive time, source, bytes.
+    next: Option<(MonoNs, u16, Vec<u8>)>,
+    order: u64,
+    played: u64,
+    unmatched: BTreeMap<String, u64>,
+    too_long: u64,
+    astray: BTreeMap<String, (u64, MonoNs)>,
+}
+
+impl Player {
+    /// Opens a log, or the parts of a recording.
+    ///
+    /// Errors: see [`DiveLog::open`].
+    pub fn open(files: &[PathBuf]) -> Result<Self, LogError> {
+        let reader = DiveLog::open(files)?;
+        let ids: Vec<String> = reader.header().sources.iter().map(|source| source.id.clone()).collect();
+        Ok(Self {
+            sources: vec![None; ids.len()],
+            ids,
+            next: None,
+            bytes: Vec::new(),
+            order: 0,
+            played: 0,
+            unmatched: BTreeMap::new(),
+            too_long: 0,
+            clock: clocks::of(files, reader.times())?,
+            astray: BTreeMap::new(),
+            reader,
+        })
+    }
+
+    /// What the log says about itself.
+    pub fn info(&self) -> &LogInfo {
+        self.reader.header()
+    }
+
+    /// Matches the log's sources with the loop's, by name. Until then every message counts as unmatched.
+    pub fn connect(&mut self, sources: &[SourceInfo]) {
+        let find = |id: &String| {
+            let index = sources.iter().position(|source| source.id == *id)?;
+            u16::try_from(index).ok().map(SourceId)
+        };
+        self.sources = self.ids.iter().map(find).collect();
+    }
+
+    /// The current position, between two ticks.
+    pub fn place(&self) -> PlayerPlace {
+        PlayerPlace {
+            log: self.reader.place(),
+            next: self.next.map(|next| (next.at, next.source.0, self.bytes.clone())),
+            order: self.order,
+            played: self.played,
+            unmatched: self.unmatched.clone(),
+            too_long: self.too_long,
+            astray: self.astray.clone(),
+        }
+    }
+
+    /// Continues from a position of this player or another one of the same log and vehicle. What was lost is counted as if
+    /// the log had been played straight through.
+    ///
+    /// Errors: the log can't be read there.
+    pub fn go_to(&mut self, place: &PlayerPlace) -> Result<(), LogError> {
+        self.reader.go_to(&place.log)?;
+        self.next = place.next.as_ref().map(|(at, source, bytes)| {
+            self.bytes.clone_from(bytes);
+            Coming { at: *at, source: SourceId(*source), len: bytes.len() }
+        });
+        (self.order, self.played, self.too_long) = (place.order, place.played, place.too_long);
+        self.unmatched.clone_from(&place.unmatched);
+        self.astray.clone_from(&place.astray);
+        Ok(())
+    }
+
+    /// The files that it is read from, in their order.
+    pub fn files(&self) -> &[PartFile] {
+        self.reader.files()
+    }
+
+    /// Messages handed over so far.
+    pub fn played(&self) -> u64 {
+        self.played
+    }
+
+    /// What was lost or left out so far, in words.
+    pub fn losses(&self) -> Vec<String> {
+        let mut all: Vec<String> = self.reader.losses().iter().map(Loss::to_string).collect();
+        for (id, count) in &self.unmatched {
+            all.push(format!("{count} messages of source {id:?}, which the vehicle file doesn't have"));
+        }
+        if self.too_long > 0 {
+            all.push(format!("{} messages of over {MAX_PACKET_BYTES} bytes", self.too_long));
+        }
+        if self.reader.late() > 0 {
+            all.push(format!(
+                "{} messages out of order by more than can be held, taken where they stand",
+                self.reader.late()
+            ));
+        }
+        let clock = self.clock.iter().flat_map(|clock| self.astray.iter().map(move |found| (clock, found)));
+        for (clock, (id, (count, first))) in clock {
+            all.push(format!(
+                "{count} messages of source {id:?} left out: they are stamped by another clock, {} the one of most messages",
+                clock.distance(*first)
+            ));
+        }
+        all
+    }
+
+    /// What was odd so far and what was done about it, in words; nothing was lost by it.
+    pub fn notes(&self) -> Vec<String> {
+        let note = |(topic, ids): (String, Vec<u16>)| {
+            let ids: Vec<String> = ids.iter().map(u16::to_string).collect();
+            format!("channels {} are all called {topic:?}: read as one", ids.join(", "))
+        };
+        self.reader.doubles().into_iter().map(note).collect()
+    }
+
+    /// Reads on to the next message of a source that the loop has.
+    fn read(&mut self) -> Result<Option<Coming>, LogError> {
+        while let Some(message) = self.reader.next()? {
+            let MessageKind::Raw { source } = message.kind else { continue };
+            let index = usize::from(source);
+            let Some(id) = self.sources.get(index).copied().flatten() else {
+                let name = self.ids.get(index).cloned().unwrap_or_else(|| source.to_string());
+                *self.unmatched.entry(name).or_default() += 1;
+                continue;
+            };
+            if self.clock.is_some_and(|clock| !clock.is_of(message.log_time)) {
+                let name = self.ids.get(index).cloned().unwrap_or_default();
+                self.astray.entry(name).or_insert((0, message.log_time)).0 += 1;
+                continue;
+            }
+            if message.data.len() > MAX_PACKET_BYTES {
+                self.too_long += 1;
+                continue;
+            }
+            self.bytes.clear();
+            self.bytes.extend_from_slice(message.data);
+            return Ok(Some(Coming { at: message.log_time, source: id, len: self.bytes.len() }));
+        }
+        Ok(None)
+    }
+}
+
+impl Feed for Player {
+    fn coming(&mut self) -> Result<Option<Coming>, LogError> {
+        if self.next.is_none() {
+            self.next = self.read()?;
+        }
+        Ok(self.next)
+    }
+
+    fn send(&mut self, port: &mut Port) -> Result<(), RingError> {
+        let Some(coming) = self.next else { return Ok(()) };
+        // Our own logs stand in the order in which the loop consumed them, others' in that of their times.
+        let order = if self.reader.has_ticks() { self.order } else { NO_ORDER };
+        port.send_in_order(coming.at, order, &self.bytes)?;
+        self.order += 1;
+        self.played += 1;
+        self.next = None;
+        Ok(())
+    }
+}
+
+/// A moment as people read it in messages: seconds on the log's clock.
+pub fn seconds(at: MonoNs) -> String {
+    format!("{:.3} s", at.as_secs_f64())
+}

@@ -1,0 +1,128 @@
+//! The recorder as an outlet of the loop.
+
+use headrace_monitor::App;
+use headrace_monitor::merge::{Inbox, MAX_TICK_BYTES, MAX_TICK_PACKETS};
+use headrace_monitor::resources::{Digests, TickTime};
+use headrace_monitor::stage::Stage;
+use headrace_monitor::{Plugin, PluginError};
+
+use bevy_ecs::prelude::{Res, ResMut, Resource};
+use std::cell::Cell;
+
+use crate::log::format::RESULT_PREFIX;
+use crate::log::{RecorderPort, ResultChannel};
+use crate::results::{HEAD_WORDS, STREAMS};
+use crate::view;
+
+/// What the recorder's queue must have free for the largest tick: packets, their headers, and their order.
+const LARGEST_TICK_BYTES: usize = MAX_TICK_BYTES + MAX_TICK_PACKETS * 64 + 4096;
+
+/// Room for a tick's results of one stream; more are recorded in part.
+const MAX_RESULT_BYTES: usize = 1 << 19;
+
+/// Size of the recorder's queue, bytes.
+pub const QUEUE_BYTES: usize = 4 * LARGEST_TICK_BYTES;
+
+/// The stream that has something for each echo.
+const ECHOES: &str = "pings";
+/// How a stream's messages are written: see [`crate::results`].
+const ENCODING: &str = "headrace-trail";
+/// The channels of a loop's results: the streams, then those of a view.
+pub fn result_channels() -> Vec<ResultChannel> {
+    let channel = |name: &&str| ResultChannel {
+        topic: format!("{RESULT_PREFIX}{name}"),
+        schema_name: "headrace.trail".to_owned(),
+        schema_encoding: String::new(),
+        schema: String::new(),
+        message_encoding: ENCODING.to_owned(),
+        follows_echoes: *name == ECHOES,
+    };
+    STREAMS.iter().map(channel).chain(view::channels()).collect()
+}
+
+/// Records every packet that the loop consumes, in the order of consumption, every tick, and every result.
+///
+/// When the queue can't take another largest tick the loop takes nothing in until it can: recorded input is never
+/// dropped. When the recorder's thread has failed the dive goes on without it; its handle tells.
+pub struct RecorderOutlet {
+    port: Cell<Option<RecorderPort>>,
+}
+
+impl RecorderOutlet {
+    /// For the loop's end of a recorder with a queue of [`QUEUE_BYTES`]. The outlet can be added to one loop.
+    pub fn new(port: RecorderPort) -> Self {
+        Self { port: Cell::new(Some(port)) }
+    }
+}
+
+#[derive(Resource)]
+struct Recording {
+    port: RecorderPort,
+    order: Vec<u16>,
+    /// A stream's message.
+    message: Vec<u8>,
+    /// Records of each stream before the tick.
+    records: [u64; STREAMS.len()],
+}
+
+impl Plugin for RecorderOutlet {
+    fn build(&self, app: &mut App) -> Result<(), PluginError> {
+        if let Some(port) = self.port.take() {
+            app.keep_results();
+            app.insert_resource(Recording {
+                port,
+                order: Vec::with_capacity(MAX_TICK_PACKETS),
+                message: Vec::with_capacity(MAX_RESULT_BYTES),
+                records: [0; STREAMS.len()],
+            });
+            app.add_systems(Stage::Publish, record);
+        }
+        Ok(())
+    }
+}
+
+#[expect(clippy::needless_pass_by_value, reason = "bevy hands systems their arguments by value")]
+fn record(
+    mut inbox: ResMut<'_, Inbox>,
+    time: Res<'_, TickTime>,
+    results: Res<'_, Digests>,
+    mut recording: ResMut<'_, Recording>,
+) {
+    let Recording { port, order, message, records } = &mut *recording;
+    if port.failed() {
+        inbox.allowance_bytes = MAX_TICK_BYTES;
+        return;
+    }
+    order.clear();
+    for (source, packet) in inbox.iter() {
+        // The allowance has left room for all of this.
+        if port.raw(source.0, packet.received, packet.received, packet.bytes).is_ok() {
+            order.push(source.0);
+        }
+    }
+    if !order.is_empty() && port.tick(time.index, time.now, order).is_err() {
+        order.clear();
+    }
+    let streams = results.streams().into_iter().zip(records).take(port.result_channels());
+    for (channel, ((_, trail), before)) in (0..).zip(streams) {
+        if !trail.words().is_empty() {
+            let whole = fill(message, time.index, *before, trail.words());
+            // What there is no room for is missing from the record, which numbers what it has; the input goes first.
+            if port.result(channel, time.now, message).is_err() || !whole {
+                port.miss_results();
+            }
+        }
+        *before = trail.records();
+    }
+    inbox.allowance_bytes = if port.vacant_bytes() >= LARGEST_TICK_BYTES { MAX_TICK_BYTES } else { 0 };
+}
+
+/// Puts a stream's words into a message, without allocating; `false` when it hasn't room for all.
+fn fill(message: &mut Vec<u8>, tick: u64, before: u64, words: &[u64]) -> bool {
+    message.clear();
+    let room = message.capacity() / 8 - HEAD_WORDS;
+    for word in [tick, before].iter().chain(words.iter().take(room)) {
+        message.extend_from_slice(&word.to_le_bytes());
+    }
+    words.len() <= room
+}

@@ -1,0 +1,23 @@
+//! The streams of results in a log. A message holds the tick's index, the number of the records before it, and the words
+//! of [`headrace_monitor::trail`], all u64, little-endian.
+
+use crate::log::format::RESULT_PREFIX;
+
+/// The streams of results in a log; [`headrace_monitor::resources::Digests::streams`] has them in the same order.
+pub(crate) const STREAMS: [&str; 4] = ["poses", "pings", "judgements", "advice"];
+/// Words before a message's records.
+pub(crate) const HEAD_WORDS: usize = 2;
+
+/// The stream of results that a topic is of.
+pub(crate) fn stream_of(topic: &str) -> Option<usize> {
+    let name = topic.strip_prefix(RESULT_PREFIX)?;
+    STREAMS.iter().position(|stream| *stream == name)
+}
+
+/// A message of a stream: the tick's index, the number of the first record, the words.
+pub(crate) fn read_results(message: &[u8]) -> Option<(u64, u64, Vec<u64>)> {
+    let (words, rest) = message.as_chunks::<8>();
+    let mut words = words.iter().map(|word| u64::from_le_bytes(*word));
+    let (tick, first) = (words.next()?, words.next()?);
+    rest.is_empty().then(|| (tick, first, words.collect()))
+}

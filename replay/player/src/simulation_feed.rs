@@ -1,0 +1,42 @@
+//! A simulated dive as a feed.
+
+use headrace_monitor::ring::{Port, RingError};
+use headrace_sensor::device::Direction;
+use headrace_sensor::reading::SourceId;
+use headrace_simulator::Simulation;
+
+use crate::drive::{Coming, Feed};
+use crate::log::LogError;
+
+/// A simulated dive as a feed; what is sent to the devices is left out.
+pub struct SimulationFeed {
+    simulation: Simulation,
+}
+
+impl SimulationFeed {
+    /// From the dive's first message on.
+    pub fn new(simulation: Simulation) -> Self {
+        Self { simulation }
+    }
+}
+
+impl Feed for SimulationFeed {
+    fn coming(&mut self) -> Result<Option<Coming>, LogError> {
+        while let Some(message) = self.simulation.peek_message() {
+            if message.direction == Direction::Received {
+                let (at, source, len) = (message.at, SourceId(message.source), message.bytes.len());
+                return Ok(Some(Coming { at, source, len }));
+            }
+            self.simulation.next_message();
+        }
+        Ok(None)
+    }
+
+    fn send(&mut self, port: &mut Port) -> Result<(), RingError> {
+        if let Some(message) = self.simulation.peek_message() {
+            port.send(message.at, message.bytes)?;
+            self.simulation.next_message();
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,292 @@
+//! What a live dive published, held against a replay of it, record by record and bit for bit.
+
+use std::collections::VecDeque;
+use std::path::PathBuf;
+
+use headrace_monitor::result_stream::{Record, RecordKind, WordKind, first_record};
+use headrace_monitor::run::Loop;
+
+use crate::log::{DiveLog, LogError, MessageKind};
+use crate::results::{STREAMS, read_results, stream_of};
+
+/// Where a replay first parts from the dive.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Difference {
+    /// The live dive's tick that published it.
+    pub tick: u64,
+    /// The stream: poses, pings, judgements or advice.
+    pub stream: &'static str,
+    /// Number of the record in its stream, from zero.
+    pub record: u64,
+    /// What differs.
+    pub what: What,
+}
+
+/// What differs between two records.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum What {
+    /// A field of a record.
+    Field {
+        /// The kind of record.
+        kind: RecordKind,
+        /// For a ping, the number of its source.
+        source: Option<u64>,
+        /// The field.
+        field: &'static str,
+        /// What it is.
+        word: WordKind,
+        /// Its bits in the live dive.
+        live: u64,
+        /// Its bits in the replay.
+        replayed: u64,
+    },
+    /// A record of another kind, or with another number of fields.
+    Kind {
+        /// In the live dive.
+        live: &'static str,
+        /// In the replay.
+        replayed: &'static str,
+    },
+    /// The dive published a record that the replay doesn't have.
+    Missing,
+    /// The replay has a record that the dive didn't publish.
+    Added,
+}
+
+/// Compares while a replay goes on.
+pub struct Verifier {
+    reader: DiveLog,
+    streams: [Stream; STREAMS.len()],
+    /// The tick of the results read last.
+    last_tick: u64,
+    has_results: bool,
+    at_end: bool,
+}
+
+/// A stream of the live dive.
+#[derive(Default)]
+struct Stream {
+    waiting: VecDeque<Batch>,
+    /// Number of the replay's next record.
+    next: u64,
+    same: u64,
+    unrecorded: u64,
+    difference: Option<Difference>,
+}
+
+/// A tick's records that have been read.
+struct Batch {
+    tick: u64,
+    /// Number of the record that begins at `at`.
+    next: u64,
+    words: Vec<u64>,
+    at: usize,
+}
+
+impl Batch {
+    fn rest(&self) -> &[u64] {
+        self.words.get(self.at..).unwrap_or_default()
+    }
+}
+
+impl Stream {
+    /// The live record with the replay's next number, when the front of what waits has it.
+    fn front(&self) -> Option<(u64, Record<'_>)> {
+        let batch = self.waiting.front().filter(|batch| batch.next == self.next)?;
+        first_record(batch.rest()).map(|(record, _)| (batch.tick, record))
+    }
+
+    /// Goes on to the next record.
+    fn step(&mut self) {
+        self.next += 1;
+        if let Some(batch) = self.waiting.front_mut()
+            && batch.next < self.next
+        {
+            let rest = first_record(batch.rest()).map_or(0, |(_, rest)| rest.len());
+            batch.at = batch.words.len() - rest;
+            batch.next += 1;
+        }
+        self.drop_empty();
+    }
+
+    fn drop_empty(&mut self) {
+        while self.waiting.front().is_some_and(|batch| first_record(batch.rest()).is_none()) {
+            self.waiting.pop_front();
+        }
+    }
+
+    fn part(&mut self, tick: u64, stream: &'static str, what: What) {
+        self.difference = Some(Difference { tick, stream, record: self.next, what });
+    }
+}
+
+/// How a comparison came out.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Verified {
+    /// Records that are the same.
+    pub same: u64,
+    /// Records of the dive that its log doesn't have.
+    pub unrecorded: u64,
+    /// The first difference of each stream that has one, the earliest tick first.
+    pub differences: Vec<Difference>,
+    /// Whether the log has results to compare with.
+    pub has_results: bool,
+}
+
+impl Verifier {
+    /// For a log; reads it beside the replay, with as much of it in memory as the two are apart.
+    ///
+    /// Errors: the log can't be read.
+    pub fn open(log: &[PathBuf]) -> Result<Self, LogError> {
+        let streams = core::array::from_fn(|_| Stream::default());
+        Ok(Self { reader: DiveLog::open(log)?, streams, last_tick: 0, has_results: false, at_end: false })
+    }
+
+    /// Compares what the replay's last tick gave.
+    ///
+    /// Errors: the log can't be read on.
+    pub fn after_tick(&mut self, dive: &Loop) -> Result<(), LogError> {
+        let digests = dive.digests();
+        for (number, (name, trail)) in digests.streams().into_iter().enumerate() {
+            let mut rest = trail.words();
+            while let Some((record, after)) = first_record(rest) {
+                rest = after;
+                self.compare(number, name, record)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The replay has ended.
+    ///
+    /// Errors: the log can't be read on.
+    pub fn finish(mut self) -> Result<Verified, LogError> {
+        while self.read()? {}
+        for (stream, name) in self.streams.iter_mut().zip(STREAMS) {
+            let left = stream.waiting.front().map(|batch| batch.tick).filter(|_| stream.difference.is_none());
+            if let Some(tick) = left {
+                stream.part(tick, name, What::Missing);
+            }
+        }
+        let same = self.streams.iter().map(|stream| stream.same).sum();
+        let unrecorded = self.streams.iter().map(|stream| stream.unrecorded).sum();
+        let mut differences: Vec<Difference> =
+            self.streams.into_iter().filter_map(|stream| stream.difference).collect();
+        // A log that has none at all isn't one of a live dive.
+        differences.retain(|_| self.has_results);
+        differences.sort_by_key(|difference| difference.tick);
+        Ok(Verified { same, unrecorded, differences, has_results: self.has_results })
+    }
+
+    /// Compares a record of the replay with the live dive's of the same number.
+    fn compare(&mut self, number: usize, name: &'static str, record: Record<'_>) -> Result<(), LogError> {
+        while self.streams.get(number).is_some_and(|stream| stream.waiting.is_empty()) && self.read()? {}
+        // A log that was cut off ends before its dive did.
+        let cut_off = self.reader.has_losses();
+        let Some(stream) = self.streams.get_mut(number).filter(|stream| stream.difference.is_none()) else {
+            return Ok(());
+        };
+        match stream.front() {
+            Some((tick, live)) => match difference(live, record) {
+                None => stream.same += 1,
+                Some(what) => stream.part(tick, name, what),
+            },
+            None if cut_off || !stream.waiting.is_empty() => stream.unrecorded += 1,
+            None => stream.part(self.last_tick, name, What::Added),
+        }
+        if stream.difference.is_none() {
+            stream.step();
+        }
+        Ok(())
+    }
+
+    /// Reads on to the next results; false at the end.
+    fn read(&mut self) -> Result<bool, LogError> {
+        while !self.at_end {
+            let Some(message) = self.reader.next()? else {
+                self.at_end = true;
+                return Ok(false);
+            };
+            let MessageKind::Result { topic } = message.kind else { continue };
+            let found = stream_of(topic).and_then(|number| self.streams.get_mut(number));
+            let (Some(stream), Some((tick, next, words))) = (found, read_results(message.data)) else {
+                continue;
+            };
+            self.has_results = true;
+            self.last_tick = tick;
+            stream.waiting.push_back(Batch { tick, next, words, at: 0 });
+            stream.drop_empty();
+            return Ok(true);
+        }
+        Ok(false)
+    }
+}
+
+/// What differs between a record of the live dive and the replay's.
+fn difference(live: Record<'_>, replayed: Record<'_>) -> Option<What> {
+    let (Some(kind), true) =
+        (live.kind, live.kind == replayed.kind && live.words.len() == replayed.words.len())
+    else {
+        let name = |record: Record<'_>| record.kind.map_or("a kind that is not known", RecordKind::as_str);
+        return Some(What::Kind { live: name(live), replayed: name(replayed) });
+    };
+    let place = live.words.iter().zip(replayed.words).position(|(live, replayed)| live != replayed)?;
+    let (field, word) = kind.field(place);
+    let is_ping = matches!(kind, RecordKind::Sample | RecordKind::NoSample);
+    Some(What::Field {
+        kind,
+        source: live.words.get(1).copied().filter(|_| is_ping),
+        field,
+        word,
+        live: live.words.get(place).copied()?,
+        replayed: replayed.words.get(place).copied()?,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sample(x_m: f64) -> Vec<u64> {
+        vec![17, 2, 0, x_m.to_bits(), 0, 0, 0]
+    }
+
+    fn record(words: &[u64]) -> Record<'_> {
+        Record { kind: Some(RecordKind::Sample), words }
+    }
+
+    #[test]
+    fn one_bit_of_one_field_is_found_and_named() {
+        let (live, replayed) = (sample(12.5), sample(12.5_f64.next_up()));
+        assert_eq!(difference(record(&live), record(&live)), None);
+        let expected = What::Field {
+            kind: RecordKind::Sample,
+            source: Some(2),
+            field: "x_m",
+            word: WordKind::Number,
+            live: 12.5_f64.to_bits(),
+            replayed: 12.5_f64.to_bits() + 1,
+        };
+        assert_eq!(difference(record(&live), record(&replayed)), Some(expected));
+        let shorter = record(&live[..4]);
+        assert_eq!(
+            difference(record(&live), shorter),
+            Some(What::Kind { live: "sample", replayed: "sample" })
+        );
+    }
+
+    #[test]
+    fn what_a_log_lacks_is_passed_over_by_its_number() {
+        let mut stream = Stream::default();
+        let head = RecordKind::Run as u64 | (1 << 8);
+        stream.waiting.push_back(Batch { tick: 4, next: 0, words: vec![head, 7], at: 0 });
+        stream.waiting.push_back(Batch { tick: 9, next: 2, words: vec![head, 8], at: 0 });
+        assert_eq!(stream.front().map(|(tick, record)| (tick, record.words.to_vec())), Some((4, vec![7])));
+        stream.step();
+        assert_eq!(stream.front(), None);
+        stream.step();
+        assert_eq!(stream.front().map(|(tick, record)| (tick, record.words.to_vec())), Some((9, vec![8])));
+        stream.step();
+        assert!(stream.waiting.is_empty());
+    }
+}

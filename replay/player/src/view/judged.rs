@@ -1,0 +1,156 @@
+//! What was judged: each section as it is, the stretches that are missed now, and what the pilot was told of them.
+
+use std::collections::BTreeMap;
+
+use headrace_coverage::{Cause, Judgement, RunChange, Verdict};
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_monitor::pilot_text::{CauseFigures, Missed as MissedText, cause_text, cleared_text, flag_text};
+
+use super::messages::{Level, Log, Missed, Section, Stretch, rounded};
+use super::site::Site;
+
+/// The list of missed stretches is shown so often, where it has changed.
+const EVERY: DurNs = DurNs(2_000_000_000);
+/// And tells no more than these, the last along the tunnel: a dive that misses everything still has a small log.
+const MOST_STRETCHES: usize = 40;
+
+/// A judgement of a section, as published.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Judged {
+    pub(super) at: MonoNs,
+    pub(super) section: i64,
+    pub(super) change: u64,
+    pub(super) verdict: Verdict,
+    pub(super) hole_m: f64,
+    pub(super) hole_sigma_m: f64,
+    pub(super) hole_x_m: f64,
+    pub(super) hole_arc_m: f64,
+    pub(super) cause: Option<CauseFigures>,
+}
+
+/// What has been judged so far.
+#[derive(Debug, Default)]
+pub(super) struct Sections {
+    /// Flagged sections with the cause and the hole.
+    flagged: BTreeMap<i64, (Cause, f64)>,
+    /// First and last section of each run.
+    runs: BTreeMap<u64, (i64, i64)>,
+    /// Runs that have changed; the section that changed them is told next.
+    changed_runs: Vec<(u64, u64)>,
+    shown: Option<MonoNs>,
+    changed: bool,
+}
+
+impl Sections {
+    /// A run has changed.
+    pub(super) fn run(&mut self, id: u64, change: u64) {
+        self.changed_runs.push((id, change));
+    }
+
+    /// A section was judged. Gives it, and what the pilot is told, the speed that is advised being known.
+    pub(super) fn judge(&mut self, judged: &Judged, site: &Site, v_max_mps: f64) -> (Section, Vec<Log>) {
+        let index = judged.section;
+        let flagged = match judged.change {
+            change if change == Judgement::Raised as u64 => true,
+            change if change == Judgement::Cleared as u64 => false,
+            _ => self.flagged.contains_key(&index),
+        };
+        let before = self.flagged.get(&index).copied();
+        let now = judged.cause.filter(|_| flagged).map(|figures| (figures.cause, judged.hole_m));
+        match now {
+            Some(now) => self.flagged.insert(index, now),
+            None => self.flagged.remove(&index),
+        };
+        self.changed |= before != now;
+        let said = core::mem::take(&mut self.changed_runs);
+        let said = said.into_iter().filter_map(|(id, change)| self.say(id, change, judged, site, v_max_mps));
+        let said = said.collect();
+        (shown(judged, flagged, site), said)
+    }
+
+    /// What the pilot is told of a run that a section has changed.
+    fn say(&mut self, id: u64, change: u64, judged: &Judged, site: &Site, v_max_mps: f64) -> Option<Log> {
+        let index = judged.section;
+        let span = self.runs.entry(id).or_insert((index, index));
+        if change == RunChange::Cleared as u64 {
+            let (from, to) = self.runs.remove(&id)?;
+            // What has only turned out to have another cause is told as that.
+            let open = self.flagged.range(from..=to).next().is_some();
+            let words = cleared_text(from as f64 * site.section_m, (to + 1) as f64 * site.section_m);
+            return (!open).then(|| Log::new(judged.at, Level::Info, words));
+        }
+        *span = (span.0.min(index), span.1.max(index));
+        let figures = judged.cause.filter(|_| judged.verdict == Verdict::Fail)?;
+        (change == RunChange::Raised as u64).then(|| {
+            let missed = MissedText {
+                start_m: index as f64 * site.section_m,
+                figures,
+                hole_arc_m: judged.hole_arc_m,
+                target_m: site.target_m,
+                v_max_mps,
+            };
+            Log::new(judged.at, Level::Warning, flag_text(&missed, &site.profile))
+        })
+    }
+
+    /// It is time to show what has changed.
+    pub(super) fn hurry(&mut self) {
+        self.shown = None;
+    }
+
+    /// The missed stretches, when they have changed and it is time to.
+    pub(super) fn show(&mut self, at: MonoNs, site: &Site) -> Option<Missed> {
+        let waits = self.shown.is_some_and(|shown| (0..EVERY.0).contains(&at.since(shown).0));
+        (self.changed && !waits).then(|| {
+            (self.shown, self.changed) = (Some(at), false);
+            let missed_m = rounded(self.flagged.len() as f64 * site.section_m, 1e3);
+            Missed { timestamp: at.into(), missed_m, stretches: self.stretches(site) }
+        })
+    }
+
+    /// Neighbouring flagged sections with one cause, along the tunnel.
+    fn stretches(&self, site: &Site) -> Vec<Stretch> {
+        let mut stretches: Vec<Stretch> = Vec::new();
+        let mut last = None;
+        for (index, (cause, hole_m)) in self.flagged.iter().rev() {
+            let (from_m, to_m) = bounds_m(*index, site);
+            let hole_m = rounded(*hole_m, 1e3);
+            let goes_on = last == Some((*index + 1, *cause));
+            last = Some((*index, *cause));
+            if let Some(stretch) = stretches.last_mut().filter(|_| goes_on) {
+                stretch.from_m = from_m;
+                stretch.hole_m = stretch.hole_m.max(hole_m);
+            } else if stretches.len() < MOST_STRETCHES {
+                stretches.push(Stretch { from_m, to_m, hole_m, cause: cause.as_str() });
+            } else {
+                break;
+            }
+        }
+        stretches.reverse();
+        stretches
+    }
+}
+
+fn bounds_m(index: i64, site: &Site) -> (f64, f64) {
+    let end = |index: i64| rounded(index as f64 * site.section_m, 1e4);
+    (end(index), end(index + 1))
+}
+
+fn shown(judged: &Judged, flagged: bool, site: &Site) -> Section {
+    let (start_m, end_m) = bounds_m(judged.section, site);
+    let cause = judged.cause.filter(|_| flagged || judged.verdict == Verdict::Fail);
+    Section {
+        timestamp: judged.at.into(),
+        start_m,
+        end_m,
+        verdict: judged.verdict.as_str(),
+        hole_m: rounded(judged.hole_m, 1e3),
+        hole_sd_m: rounded(judged.hole_sigma_m, 1e3),
+        hole_x_m: rounded(judged.hole_x_m, 1e2),
+        hole_clock: site.profile.clock(judged.hole_arc_m),
+        target_m: site.target_m,
+        flagged,
+        cause: cause.map_or("", |figures| figures.cause.as_str()),
+        words: cause.as_ref().map(cause_text).unwrap_or_default(),
+    }
+}

@@ -1,0 +1,356 @@
+//! A dive for people's viewers: what the loop publishes word by word ([`headrace_monitor::trail`]) as messages that
+//! Foxglove and Lichtblick know, under Foxglove's schemas and some of our own.
+//!
+//! | topic below `/result/view/` | schema | what, how often |
+//! |---|---|---|
+//! | `transforms` | `foxglove.FrameTransforms` | `tunnel` to `vehicle` and to `wall`, at each beat (5 Hz) |
+//! | `pose` | `foxglove.PoseInFrame` | the vehicle, at each beat |
+//! | `vehicle` | `headrace.Vehicle` | the same for plots, with speed and standard deviations |
+//! | `points` | `foxglove.PointCloud` | samples of half a second, with the number of the head |
+//! | `wall` | `foxglove.Grid` | the unrolled wall within 8 m of the vehicle, every 2 s |
+//! | `sections` | `headrace.Section` | each section as it is judged |
+//! | `missed` | `headrace.Missed` | the stretches that are flagged, every 2 s where they change |
+//! | `advice` | `headrace.Advice` | the advice when it changes, and every second |
+//! | `alerts` | `foxglove.Log` | what the pilot is told |
+//!
+//! Frame `tunnel` is ours ([`headrace_geometry::frames`]): z is up, as viewers have it, so that none has to be turned. `wall`
+//! lies flat beside it: x is chainage, y the arc length. It is made on the recorder's thread ([`Companion`]); the loop has no
+//! part in it, and nothing here is read back by a replay.
+
+mod judged;
+mod messages;
+mod points;
+mod schemas;
+mod site;
+mod topic;
+mod wall;
+
+#[cfg(test)]
+mod tests;
+
+use headrace_coverage::{Cause, Verdict};
+use headrace_fusion::NoFix;
+use headrace_geometry::frames::{Body, Rot, Tunnel};
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_monitor::alerts::AlertKind;
+use headrace_monitor::pilot_text::{AdviceFigures, CauseFigures, advice_text, alert_text};
+use headrace_monitor::result_stream::{Record, RecordKind, first_record, text_of};
+use headrace_sampling::advice::{Reason, Remedy};
+use serde::Serialize;
+
+use self::judged::{Judged, Sections};
+use self::messages::{
+    Advice, Deviations, FrameTransform, FrameTransforms, Known, Level, Log, Pose, PoseInFrame, Turn, Vehicle,
+    Xyz, rounded,
+};
+use self::points::Points;
+use self::site::{TUNNEL, VEHICLE, WALL};
+use self::topic::Topic;
+use self::wall::Wall;
+use crate::log::{Companion, Made};
+use crate::results::{STREAMS, read_results};
+
+pub use schemas::channels;
+pub use site::Site;
+
+/// The wall is shown so far beside the tunnel, m.
+const BESIDE_M: f64 = 1.0;
+/// Advice that doesn't change is told so often.
+const ADVICE_EVERY: DurNs = DurNs(1_000_000_000);
+/// Speeds nearer than this are the same advice, m/s.
+const SAME_MPS: f64 = 0.005;
+
+/// Makes messages for viewers of what the loop publishes.
+#[derive(Debug)]
+pub struct View {
+    site: Site,
+    beside_m: f64,
+    points: Points,
+    wall: Wall,
+    sections: Sections,
+    /// Chainage and speed at the last beat with a position.
+    last: Option<(f64, f64)>,
+    v_max_mps: f64,
+    told: Option<Told>,
+    at: MonoNs,
+}
+
+/// The advice that was told last.
+#[derive(Debug)]
+struct Told {
+    at: MonoNs,
+    v_max_mps: f64,
+    reason: Reason,
+    will_exceed: bool,
+}
+
+impl View {
+    /// For a dive of which nothing has been published yet.
+    pub fn new(site: Site) -> Self {
+        let steps = 64;
+        let arcs = (0..steps).map(|step| f64::from(step) / f64::from(steps) * site.profile.perimeter_m());
+        let left_m =
+            arcs.map(|arc_m| site.profile.point_at(arc_m)).fold(0.0, |most, [y, _]| f64::max(most, y));
+        Self {
+            wall: Wall::new(&site),
+            beside_m: rounded(left_m + BESIDE_M, 1e2),
+            points: Points::default(),
+            sections: Sections::default(),
+            last: None,
+            v_max_mps: 0.0,
+            told: None,
+            at: MonoNs(0),
+            site,
+        }
+    }
+
+    fn record(&mut self, record: Record<'_>, made: &mut Outbox<'_>) -> Option<()> {
+        let mut words = Words(record.words);
+        match record.kind? {
+            RecordKind::Pose => self.pose(&mut words, made),
+            RecordKind::NoPose => self.no_pose(&mut words, made),
+            RecordKind::Sample => self.sample(&mut words, made),
+            RecordKind::Section => self.section(&mut words, made),
+            RecordKind::Run => {
+                self.sections.run(words.integer()?, words.integer()?);
+                Some(())
+            }
+            RecordKind::Alert => alert(&mut words, made),
+            RecordKind::Advice => self.advice(&mut words, made),
+            RecordKind::NoSample => Some(()),
+        }
+    }
+
+    fn pose(&mut self, words: &mut Words<'_>, made: &mut Outbox<'_>) -> Option<()> {
+        let at = MonoNs(words.integer()?);
+        let [x_m, y_m, z_m] = words.numbers()?;
+        let wxyz: [f64; 4] = words.numbers()?;
+        let speed_mps = words.number()?;
+        let attitude = Rot::<Tunnel, Body>::from_wxyz(wxyz[0], wxyz[1], wxyz[2], wxyz[3])?;
+        let (roll, pitch, yaw) = attitude.roll_pitch_yaw();
+        let (position, orientation) = (Xyz::new([x_m, y_m, z_m]), Turn::of_wxyz(attitude.wxyz()));
+        self.last = Some((x_m, speed_mps));
+        let frame = |child, translation, rotation| FrameTransform {
+            timestamp: at.into(),
+            parent_frame_id: TUNNEL,
+            child_frame_id: child,
+            translation,
+            rotation,
+        };
+        let beside = Xyz::new([0.0, self.beside_m, 0.0]);
+        let transforms = vec![frame(VEHICLE, position, orientation), frame(WALL, beside, Turn::NONE)];
+        made.push(Topic::Transforms, &FrameTransforms { transforms });
+        let pose = Pose { position, orientation };
+        made.push(Topic::Pose, &PoseInFrame { timestamp: at.into(), frame_id: TUNNEL, pose });
+        let degrees = |angle_rad: f64| rounded(angle_rad.to_degrees(), 1e2);
+        let deviations = words.numbers().map(|[along_m, place_m, tilt_rad, yaw_rad]| Deviations {
+            chainage_sd_m: rounded(along_m, 1e3),
+            place_sd_m: rounded(place_m, 1e3),
+            tilt_sd_deg: degrees(tilt_rad),
+            yaw_sd_deg: degrees(yaw_rad),
+        });
+        let known = Known {
+            chainage_m: rounded(x_m, 1e3),
+            left_m: rounded(y_m, 1e3),
+            up_m: rounded(z_m, 1e3),
+            roll_deg: degrees(roll),
+            pitch_deg: degrees(pitch),
+            yaw_deg: degrees(yaw),
+            speed_mps: rounded(speed_mps, 1e3),
+        };
+        let vehicle = Vehicle { timestamp: at.into(), position: "known", known: Some(known), deviations };
+        made.push(Topic::Vehicle, &vehicle);
+        self.beat(at, made);
+        Some(())
+    }
+
+    fn no_pose(&mut self, words: &mut Words<'_>, made: &mut Outbox<'_>) -> Option<()> {
+        let at = MonoNs(words.integer()?);
+        let lacking = words.one_of(&NoFix::ALL, |lacking| lacking as u64)?;
+        let vehicle =
+            Vehicle { timestamp: at.into(), position: lacking.as_str(), known: None, deviations: None };
+        made.push(Topic::Vehicle, &vehicle);
+        self.beat(at, made);
+        Some(())
+    }
+
+    /// What is shown from time to time.
+    fn beat(&mut self, at: MonoNs, made: &mut Outbox<'_>) {
+        self.at = at;
+        made.push_some(Topic::Points, self.points.close_before(at).as_ref());
+        if let Some((x_m, _)) = self.last {
+            made.push_some(Topic::Wall, self.wall.show(at, x_m).as_ref());
+        }
+        made.push_some(Topic::Missed, self.sections.show(at, &self.site).as_ref());
+    }
+
+    fn sample(&mut self, words: &mut Words<'_>, made: &mut Outbox<'_>) -> Option<()> {
+        let (at, source, _) = (MonoNs(words.integer()?), words.integer()?, words.integer()?);
+        let [x_m, y_m, z_m, arc_m] = words.numbers()?;
+        let head = self.site.heads.iter().position(|head| *head == source);
+        let head = head.and_then(|head| u8::try_from(head).ok()).unwrap_or(u8::MAX);
+        self.wall.sample(x_m, arc_m);
+        made.push_some(Topic::Points, self.points.add(at, head, [x_m, y_m, z_m]).as_ref());
+        Some(())
+    }
+
+    fn section(&mut self, words: &mut Words<'_>, made: &mut Outbox<'_>) -> Option<()> {
+        let at = MonoNs(words.integer()?);
+        let section = words.integer()?.cast_signed();
+        let change = words.integer()?;
+        let verdict = words.one_of(&Verdict::ALL, |verdict| verdict as u64)?;
+        let [hole_m, hole_sigma_m] = words.numbers()?;
+        let cause = words.one_of(&Cause::ALL, |cause| cause as u64);
+        let [hole_x_m, hole_arc_m] = words.numbers()?;
+        let figures = words.numbers().zip(cause);
+        let cause = figures.map(|([speed_mps, t_y_m, middle_t_y_m, missing_share, swing_m], cause)| {
+            CauseFigures { cause, speed_mps, t_y_m, middle_t_y_m, missing_share, swing_m }
+        });
+        let judged =
+            Judged { at, section, change, verdict, hole_m, hole_sigma_m, hole_x_m, hole_arc_m, cause };
+        self.wall.judge(section, verdict);
+        let (shown, said) = self.sections.judge(&judged, &self.site, self.v_max_mps);
+        made.push(Topic::Sections, &shown);
+        for line in &said {
+            made.push(Topic::Alerts, line);
+        }
+        Some(())
+    }
+
+    fn advice(&mut self, words: &mut Words<'_>, made: &mut Outbox<'_>) -> Option<()> {
+        let at = MonoNs(words.integer()?);
+        let v_max_mps = words.number()?;
+        let reason = words.one_of(&Reason::ALL, |reason| reason as u64)?;
+        let will_exceed = words.integer()? != 0;
+        let [phase_error_rad, t_y_m, width_m, arc_m] = words.numbers()?;
+        let (remedy, mode) = (words.integer()?, [words.integer()?, words.integer()?]);
+        let remedy = Remedy::of(remedy, &text_of(mode));
+        self.v_max_mps = v_max_mps;
+        let speed_mps = self.last.map(|(_, speed_mps)| speed_mps);
+        let told = self.told.as_ref();
+        let turned = told.is_none_or(|told| told.reason != reason || told.will_exceed != will_exceed);
+        let same = |told: &Told| {
+            (told.v_max_mps - v_max_mps).abs() < SAME_MPS
+                && (0..ADVICE_EVERY.0).contains(&at.since(told.at).0)
+        };
+        if !turned && told.is_some_and(same) {
+            return Some(());
+        }
+        let figures = AdviceFigures {
+            speed_mps: speed_mps.unwrap_or(0.0),
+            v_max_mps,
+            reason,
+            will_exceed,
+            phase_error_rad,
+            t_y_m,
+            unseen_m: (width_m > 0.0).then_some([width_m, arc_m]),
+            remedy,
+        };
+        let said = advice_text(&figures, &self.site.profile);
+        if turned {
+            let is_grave = will_exceed || reason != Reason::HelixPitch;
+            let level = if is_grave { Level::Warning } else { Level::Info };
+            made.push(Topic::Alerts, &Log::new(at, level, said.clone()));
+        }
+        made.push(
+            Topic::Advice,
+            &Advice {
+                timestamp: at.into(),
+                v_max_mps: rounded(v_max_mps, 1e3),
+                speed_mps: speed_mps.map(|speed_mps| rounded(speed_mps, 1e3)),
+                will_exceed,
+                reason: reason.as_str(),
+                words: said,
+            },
+        );
+        self.told = Some(Told { at, v_max_mps, reason, will_exceed });
+        Some(())
+    }
+}
+
+/// Something is wrong with the dive as a whole.
+fn alert(words: &mut Words<'_>, made: &mut Outbox<'_>) -> Option<()> {
+    let at = MonoNs(words.integer()?);
+    let kind = words.one_of(&AlertKind::ALL, |kind| kind as u64)?;
+    let [x_m, off_m] = words.numbers()?;
+    made.push(Topic::Alerts, &Log::new(at, Level::Error, alert_text(kind, x_m, off_m)));
+    Some(())
+}
+
+impl Companion for View {
+    fn take(&mut self, channel: u16, at: MonoNs, message: &[u8], made: &mut Vec<Made>) {
+        if usize::from(channel) >= STREAMS.len() {
+            return;
+        }
+        let Some((_, _, words)) = read_results(message) else { return };
+        let mut made = Outbox { at, made };
+        let mut rest = words.as_slice();
+        while let Some((record, after)) = first_record(rest) {
+            rest = after;
+            // A record that isn't as this version has it has nothing to show.
+            let _ = self.record(record, &mut made);
+        }
+        self.at = at;
+    }
+
+    fn end(&mut self, made: &mut Vec<Made>) {
+        let at = self.at;
+        let mut made = Outbox { at, made };
+        made.push_some(Topic::Points, self.points.close().as_ref());
+        // Whatever was shown last, the end is shown.
+        self.wall.hurry();
+        self.sections.hurry();
+        if let Some((x_m, _)) = self.last {
+            made.push_some(Topic::Wall, self.wall.show(at, x_m).as_ref());
+        }
+        made.push_some(Topic::Missed, self.sections.show(at, &self.site).as_ref());
+    }
+}
+
+/// Where messages go.
+struct Outbox<'a> {
+    /// Their log time: that of the results that they are made of, so that times in a log don't go back.
+    at: MonoNs,
+    made: &'a mut Vec<Made>,
+}
+
+impl Outbox<'_> {
+    fn push<T: Serialize>(&mut self, topic: Topic, message: &T) {
+        let channel = STREAMS.len() + topic as usize;
+        let (Ok(channel), Ok(bytes)) = (u16::try_from(channel), serde_json::to_vec(message)) else { return };
+        self.made.push(Made { channel, at: self.at, bytes });
+    }
+
+    fn push_some<T: Serialize>(&mut self, topic: Topic, message: Option<&T>) {
+        if let Some(message) = message {
+            self.push(topic, message);
+        }
+    }
+}
+
+/// Words of a record, taken one after the other.
+struct Words<'a>(&'a [u64]);
+
+impl Words<'_> {
+    fn integer(&mut self) -> Option<u64> {
+        let (first, rest) = self.0.split_first()?;
+        self.0 = rest;
+        Some(*first)
+    }
+
+    fn number(&mut self) -> Option<f64> {
+        self.integer().map(f64::from_bits)
+    }
+
+    fn numbers<const N: usize>(&mut self) -> Option<[f64; N]> {
+        let (first, rest) = self.0.split_first_chunk::<N>()?;
+        self.0 = rest;
+        Some(first.map(f64::from_bits))
+    }
+
+    /// The one of some kinds that has the next word's number.
+    fn one_of<T: Copy>(&mut self, all: &[T], number: impl Fn(T) -> u64) -> Option<T> {
+        let word = self.integer()?;
+        all.iter().copied().find(|kind| number(*kind) == word)
+    }
+}

@@ -1,0 +1,237 @@
+//! The channels of a view and their schemas.
+//!
+//! Names and keys of `foxglove.*` are those of Foxglove's published JSON Schemas (docs.foxglove.dev, "Message schemas").
+//! Only what viewers' readers of schemas take is used: `type` is one word, nothing refers to anything, nothing is null. Of
+//! enumerations the type is said beside their names, which some readers want and others pass over.
+
+use serde_json::{Value, json};
+
+use super::topic::Topic;
+use crate::log::ResultChannel;
+use crate::log::format::VIEW_PREFIX;
+
+/// The channels of a view, in the order of their numbers after those of the streams of results.
+pub fn channels() -> Vec<ResultChannel> {
+    let channel = |topic: &Topic| {
+        let (name, schema_name, schema) = schema_of(*topic);
+        ResultChannel {
+            topic: format!("{VIEW_PREFIX}{name}"),
+            schema_name: schema_name.to_owned(),
+            schema_encoding: "jsonschema".to_owned(),
+            schema: titled(schema_name, schema).to_string(),
+            message_encoding: "json".to_owned(),
+            // All of it can be made again from the rest of the log: it goes first.
+            follows_echoes: true,
+        }
+    };
+    Topic::ALL.iter().map(channel).collect()
+}
+
+/// A topic's name, its schema's, and the schema.
+fn schema_of(topic: Topic) -> (&'static str, &'static str, Value) {
+    match topic {
+        Topic::Transforms => ("transforms", "foxglove.FrameTransforms", transforms()),
+        Topic::Pose => ("pose", "foxglove.PoseInFrame", pose_in_frame()),
+        Topic::Vehicle => ("vehicle", "headrace.Vehicle", vehicle()),
+        Topic::Points => ("points", "foxglove.PointCloud", point_cloud()),
+        Topic::Wall => ("wall", "foxglove.Grid", grid()),
+        Topic::Sections => ("sections", "headrace.Section", section()),
+        Topic::Missed => ("missed", "headrace.Missed", missed()),
+        Topic::Advice => ("advice", "headrace.Advice", advice()),
+        Topic::Alerts => ("alerts", "foxglove.Log", log()),
+    }
+}
+
+/// An object whose keys are all required, but for those named.
+fn object(properties: &Value, optional: &[&str]) -> Value {
+    let keys = properties.as_object().into_iter().flat_map(|properties| properties.keys());
+    let required: Vec<&String> = keys.filter(|key| !optional.contains(&key.as_str())).collect();
+    json!({"type": "object", "required": required, "properties": properties})
+}
+
+/// The same schema under a title.
+fn titled(title: &str, mut schema: Value) -> Value {
+    if let Some(schema) = schema.as_object_mut() {
+        schema.insert("title".to_owned(), title.into());
+    }
+    schema
+}
+
+fn described(kind: &str, words: &str) -> Value {
+    json!({"type": kind, "description": words})
+}
+
+fn number(words: &str) -> Value {
+    described("number", words)
+}
+
+fn text(words: &str) -> Value {
+    described("string", words)
+}
+
+fn count() -> Value {
+    json!({"type": "integer", "minimum": 0})
+}
+
+fn time() -> Value {
+    let nsec = json!({"type": "integer", "minimum": 0, "maximum": 999_999_999});
+    titled("time", object(&json!({"sec": count(), "nsec": nsec}), &[]))
+}
+
+fn components(keys: &[&str]) -> Value {
+    let properties: Value = keys.iter().map(|key| ((*key).to_owned(), json!({"type": "number"}))).collect();
+    object(&properties, &[])
+}
+
+fn vector3() -> Value {
+    components(&["x", "y", "z"])
+}
+
+fn quaternion() -> Value {
+    components(&["x", "y", "z", "w"])
+}
+
+fn pose() -> Value {
+    object(&json!({"position": vector3(), "orientation": quaternion()}), &[])
+}
+
+fn list(items: &Value) -> Value {
+    json!({"type": "array", "items": items})
+}
+
+/// Names for numbers, from the first on.
+fn names(first: u32, names: &[&str]) -> Value {
+    let named: Vec<Value> =
+        (first..).zip(names).map(|(number, name)| json!({"title": name, "const": number})).collect();
+    json!({"type": "integer", "oneOf": named})
+}
+
+fn packed_fields() -> Value {
+    let kinds = ["UNKNOWN", "UINT8", "INT8", "UINT16", "INT16", "UINT32", "INT32", "FLOAT32", "FLOAT64"];
+    let kind = names(0, &kinds);
+    list(&object(&json!({"name": {"type": "string"}, "offset": count(), "type": kind}), &[]))
+}
+
+fn packed() -> Value {
+    json!({"type": "string", "contentEncoding": "base64"})
+}
+
+fn transforms() -> Value {
+    let transform = json!({
+        "timestamp": time(),
+        "parent_frame_id": {"type": "string"},
+        "child_frame_id": {"type": "string"},
+        "translation": vector3(),
+        "rotation": quaternion(),
+    });
+    object(&json!({"transforms": list(&object(&transform, &[]))}), &[])
+}
+
+fn pose_in_frame() -> Value {
+    object(&json!({"timestamp": time(), "frame_id": {"type": "string"}, "pose": pose()}), &[])
+}
+
+fn point_cloud() -> Value {
+    let properties = json!({
+        "timestamp": time(),
+        "frame_id": {"type": "string"},
+        "pose": pose(),
+        "point_stride": count(),
+        "fields": packed_fields(),
+        "data": packed(),
+    });
+    object(&properties, &[])
+}
+
+fn grid() -> Value {
+    let properties = json!({
+        "timestamp": time(),
+        "frame_id": {"type": "string"},
+        "pose": pose(),
+        "column_count": count(),
+        "cell_size": components(&["x", "y"]),
+        "row_stride": count(),
+        "cell_stride": count(),
+        "fields": packed_fields(),
+        "data": packed(),
+    });
+    object(&properties, &[])
+}
+
+fn log() -> Value {
+    let properties = json!({
+        "timestamp": time(),
+        "level": names(0, &["UNKNOWN", "DEBUG", "INFO", "WARNING", "ERROR", "FATAL"]),
+        "message": {"type": "string"},
+        "name": {"type": "string"},
+        "file": {"type": "string"},
+        "line": count(),
+    });
+    object(&properties, &[])
+}
+
+fn vehicle() -> Value {
+    let properties = json!({
+        "timestamp": time(),
+        "position": text("\"known\", or what it lacks."),
+        "chainage_m": number("Chainage, metres."),
+        "left_m": number("Place left of the axis, metres."),
+        "up_m": number("Place above the floor's centre, metres."),
+        "roll_deg": number("Roll, degrees."),
+        "pitch_deg": number("Pitch, degrees."),
+        "yaw_deg": number("Yaw against the tunnel, degrees."),
+        "speed_mps": number("Speed along the tunnel, metres a second, positive inwards."),
+        "chainage_sd_m": number("Standard deviation of the chainage, metres."),
+        "place_sd_m": number("Standard deviation of the place in the section, in the worse direction, metres."),
+        "tilt_sd_deg": number("Standard deviation of roll or pitch, degrees."),
+        "yaw_sd_deg": number("Standard deviation of yaw, degrees."),
+    });
+    let known = ["chainage_m", "left_m", "up_m", "roll_deg", "pitch_deg", "yaw_deg", "speed_mps"];
+    let deviations = ["chainage_sd_m", "place_sd_m", "tilt_sd_deg", "yaw_sd_deg"];
+    object(&properties, &[known.as_slice(), &deviations].concat())
+}
+
+fn section() -> Value {
+    let properties = json!({
+        "timestamp": time(),
+        "start_m": number("Chainage at which it begins, metres."),
+        "end_m": number("Chainage at which it ends, metres."),
+        "verdict": text("pass, fail, cannot_say or open."),
+        "hole_m": number("Diameter of its largest hole, metres."),
+        "hole_sd_m": number("Standard deviation of that, metres."),
+        "hole_x_m": number("Chainage of the hole's centre, metres."),
+        "hole_clock": text("Its place on a clock seen looking along the tunnel."),
+        "target_m": number("The target, metres."),
+        "flagged": described("boolean", "Going on won't mend it."),
+        "cause": text("Why it fails; empty where it doesn't."),
+        "words": text("The same for people."),
+    });
+    object(&properties, &[])
+}
+
+fn missed() -> Value {
+    let stretch = json!({
+        "from_m": number("Chainage at which it begins, metres."),
+        "to_m": number("Chainage at which it ends, metres."),
+        "hole_m": number("Diameter of its largest hole, metres."),
+        "cause": text("Why it was missed."),
+    });
+    let properties = json!({
+        "timestamp": time(),
+        "missed_m": number("Length of tunnel that is flagged in all, metres."),
+        "stretches": list(&object(&stretch, &[])),
+    });
+    object(&properties, &[])
+}
+
+fn advice() -> Value {
+    let properties = json!({
+        "timestamp": time(),
+        "v_max_mps": number("The largest speed at which the target is met, metres a second; 0 where none is."),
+        "speed_mps": number("Speed then, metres a second."),
+        "will_exceed": described("boolean", "The present turn will exceed the target."),
+        "reason": text("What decides."),
+        "words": text("The same for people."),
+    });
+    object(&properties, &["speed_mps"])
+}

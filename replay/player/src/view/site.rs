@@ -1,0 +1,23 @@
+//! The place that is shown, and its frames.
+
+use headrace_geometry::tunnel::Profile;
+
+/// The frames' names.
+pub(super) const TUNNEL: &str = "tunnel";
+pub(super) const VEHICLE: &str = "vehicle";
+pub(super) const WALL: &str = "wall";
+
+/// What a view has to know of the dive's place.
+#[derive(Debug, Clone)]
+pub struct Site {
+    /// Design profile.
+    pub profile: Profile,
+    /// Target T, m.
+    pub target_m: f64,
+    /// Length of a section, m.
+    pub section_m: f64,
+    /// Length of the tunnel, m.
+    pub length_m: f64,
+    /// Numbers of the sources that are heads.
+    pub heads: Vec<u64>,
+}

@@ -1,0 +1,223 @@
+//! What a simulation is assembled with: effects add systems, components and random streams here, and nowhere else.
+
+use bevy_ecs::entity::Entity;
+use bevy_ecs::prelude::{Component, IntoScheduleConfigs, SystemSet, World};
+use bevy_ecs::schedule::{Schedule, ScheduleConfigs};
+use bevy_ecs::system::{IntoSystem, ScheduleSystem};
+
+use headrace_sampling::head::HeadProgram;
+
+use crate::facts::Facts;
+use crate::notes;
+use crate::random::Stream;
+use crate::sensing::Scenery;
+use crate::stages::Stage;
+
+/// What an effect has added, for people.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Added {
+    /// Its name in scenes.
+    pub effect: &'static str,
+    /// Its systems, each with its stage.
+    pub systems: Vec<(Stage, String)>,
+    /// Systems that every simulation has, but this one not, because the effect does their work.
+    pub replaces: Vec<&'static str>,
+    /// Its components, each with the sensors that have it.
+    pub components: Vec<(String, Vec<String>)>,
+    /// Sources that it draws random numbers for.
+    pub streams: Vec<String>,
+    /// What it does to the vehicle's trajectory, before the dive begins.
+    pub trajectory: Option<String>,
+}
+
+/// A place in the chain of systems.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, SystemSet)]
+struct Slot(usize);
+
+type Configs = ScheduleConfigs<ScheduleSystem>;
+
+/// What heads are told to do, while it can still be changed.
+pub struct Programs<'a> {
+    pub(crate) facts: &'a mut Facts,
+    pub(crate) seed: u64,
+    pub(crate) effect: &'static str,
+    /// Sources that random numbers were drawn for, each with its effect.
+    pub(crate) drawn: &'a mut Vec<(&'static str, String)>,
+}
+
+impl Programs<'_> {
+    /// The random numbers of the effect for a sensor.
+    pub fn stream(&mut self, source: usize) -> Stream {
+        let id = self.facts.sensors.get(source).map_or_else(String::new, |sensor| sensor.id.clone());
+        let stream = Stream::new(self.seed, self.effect, &id);
+        self.drawn.push((self.effect, id));
+        stream
+    }
+
+    /// Changes a head's program.
+    pub fn change(&mut self, source: usize, how: impl FnOnce(HeadProgram) -> HeadProgram) {
+        if let Some(sensor) = self.facts.sensors.get_mut(source) {
+            sensor.program = sensor.program.map(how);
+        }
+    }
+}
+
+/// A simulation that is being assembled.
+pub struct Builder<'a> {
+    world: &'a mut World,
+    facts: &'a Facts,
+    seed: u64,
+    entities: &'a [Entity],
+    systems: Vec<(Stage, Option<u16>, Configs)>,
+    /// Which effect is being built; none for the base.
+    current: Option<usize>,
+    added: Vec<Added>,
+    base_systems: Vec<(Stage, String)>,
+}
+
+impl<'a> Builder<'a> {
+    pub(crate) fn new(world: &'a mut World, facts: &'a Facts, seed: u64, entities: &'a [Entity]) -> Self {
+        Self {
+            world,
+            facts,
+            seed,
+            entities,
+            systems: Vec::new(),
+            current: None,
+            added: Vec::new(),
+            base_systems: Vec::new(),
+        }
+    }
+
+    /// What the scene has.
+    pub fn facts(&self) -> &'a Facts {
+        self.facts
+    }
+
+    /// The random numbers of the effect that is being built for a sensor.
+    pub fn stream(&mut self, source: usize) -> Stream {
+        let id = self.facts.sensors.get(source).map_or("", |sensor| sensor.id.as_str());
+        self.stream_for(id)
+    }
+
+    /// The random numbers of the effect that is being built for something that isn't a sensor.
+    pub fn stream_for(&mut self, what: &str) -> Stream {
+        let seed = self.seed;
+        let effect = self.now().map_or("", |now| {
+            now.streams.push(what.to_owned());
+            now.effect
+        });
+        Stream::new(seed, effect, what)
+    }
+
+    /// Random numbers that the effect has drawn before it was built.
+    pub(crate) fn has_drawn(&mut self, sources: impl Iterator<Item = String>) {
+        if let Some(now) = self.now() {
+            now.streams.extend(sources);
+        }
+    }
+
+    /// Gives a sensor a component.
+    pub fn insert<C: Component>(&mut self, source: usize, component: C) {
+        let Some(entity) = self.entities.get(source) else { return };
+        self.world.entity_mut(*entity).insert(component);
+        let id = self.facts.sensors.get(source).map_or_else(String::new, |sensor| sensor.id.clone());
+        let name = short_name(core::any::type_name::<C>());
+        let Some(now) = self.now() else { return };
+        match now.components.iter_mut().find(|(known, _)| *known == name) {
+            Some((_, sensors)) => sensors.push(id),
+            None => now.components.push((name, vec![id])),
+        }
+    }
+
+    /// Adds a system to a stage, after those that are there.
+    pub fn system<Marker>(
+        &mut self,
+        stage: Stage,
+        system: impl IntoSystem<(), (), Marker> + IntoScheduleConfigs<ScheduleSystem, Marker>,
+    ) {
+        let name = short_name(core::any::type_name_of_val(&system));
+        let effect = self.current.and_then(|index| u16::try_from(index).ok());
+        match self.now() {
+            Some(now) => now.systems.push((stage, name)),
+            None => self.base_systems.push((stage, name)),
+        }
+        self.systems.push((stage, effect, system.into_configs()));
+    }
+
+    /// The scene's tunnel and the vehicle's trajectory, for effects that change them; `what` says how.
+    pub fn scenery(&mut self, what: String) -> Option<bevy_ecs::change_detection::Mut<'_, Scenery>> {
+        if let Some(now) = self.now() {
+            now.trajectory = Some(what);
+        }
+        self.world.get_resource_mut::<Scenery>()
+    }
+
+    /// How long the dive takes, s, with what effects so far have made of the trajectory.
+    pub fn duration_s(&self) -> f64 {
+        self.world.get_resource::<Scenery>().map_or(0.0, |scenery| scenery.trajectory.duration_s())
+    }
+
+    /// Takes the place of a base system, which isn't to be added then.
+    pub fn replace(&mut self, base: &'static str) {
+        if let Some(now) = self.now() {
+            now.replaces.push(base);
+        }
+    }
+
+    /// Whether an effect takes the place of a base system.
+    pub(crate) fn replaced(&self, base: &str) -> bool {
+        self.added.iter().any(|added| added.replaces.contains(&base))
+    }
+
+    /// What follows is of this effect.
+    pub(crate) fn effect(&mut self, effect: &'static str) {
+        self.current = Some(self.added.len());
+        self.added.push(Added { effect, ..Added::default() });
+    }
+
+    /// What follows every simulation has.
+    pub(crate) fn base(&mut self) {
+        self.current = None;
+    }
+
+    fn now(&mut self) -> Option<&mut Added> {
+        self.current.and_then(|index| self.added.get_mut(index))
+    }
+
+    /// The schedule: all systems in one chain, by stage, base systems first; with `noting`, after each one a look at
+    /// what it has changed.
+    pub(crate) fn schedule(self, noting: bool) -> (Schedule, Vec<Added>, Vec<(Stage, String)>) {
+        let mut schedule = Schedule::default();
+        schedule.set_executor(bevy_ecs::schedule::SingleThreadedExecutor::new());
+        let mut systems = self.systems;
+        systems.sort_by_key(|(stage, effect, _)| (*stage, effect.is_some(), *effect));
+        let mut slots = 0;
+        let mut add = |schedule: &mut Schedule, configs: Configs| {
+            schedule.add_systems(configs.in_set(Slot(slots)));
+            if slots > 0 {
+                schedule.configure_sets(Slot(slots).after(Slot(slots - 1)));
+            }
+            slots += 1;
+        };
+        for (_, effect, configs) in systems {
+            add(&mut schedule, configs);
+            if noting {
+                add(&mut schedule, notes::note(effect).into_configs());
+            }
+        }
+        (schedule, self.added, self.base_systems)
+    }
+}
+
+/// The last two parts of a type's path; of what it is for, the last one.
+fn short_name(name: &str) -> String {
+    let last = |path: &str, count: usize| {
+        let parts: Vec<&str> = path.rsplit("::").take(count).collect();
+        parts.into_iter().rev().collect::<Vec<_>>().join("::")
+    };
+    match name.split_once('<') {
+        Some((plain, inner)) => format!("{}<{}>", last(plain, 2), last(inner.trim_end_matches('>'), 1)),
+        None => last(name, 2),
+    }
+}

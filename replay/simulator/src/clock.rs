@@ -1,0 +1,67 @@
+//! The clock of a simulated dive, and clocks of devices that are off.
+
+use bevy_ecs::prelude::Component;
+use headrace_geometry::math;
+use headrace_geometry::time::{DurNs, MonoNs};
+
+/// Simulated dives begin at this moment of their clock.
+pub const START: MonoNs = MonoNs(1_000_000_000);
+
+/// Parts of a rate: a clock's drift is kept as a whole number of them, so that no sum depends on rounding.
+const PARTS: i128 = 1_000_000_000_000;
+
+/// A clock that is right at the start and gains or loses evenly.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Component)]
+pub(crate) struct Clock {
+    /// By how much what it takes for a span is longer than that, of [`PARTS`].
+    longer: i128,
+}
+
+impl Clock {
+    /// A clock whose seconds are longer than true ones by `ppm` millionths: a device with it samples late. Up to 10^5
+    /// either way.
+    pub(crate) fn slow_by_ppm(ppm: f64) -> Self {
+        let per_ppm = (PARTS / 1_000_000) as f64;
+        Self { longer: i128::from(math::round_to_i64(ppm.clamp(-1e5, 1e5) * per_ppm)) }
+    }
+
+    /// When it truly is what the clock shows as `shown`.
+    pub(crate) fn truly(&self, shown: MonoNs) -> MonoNs {
+        let span = i128::from(shown.since(START).0);
+        let true_span = span + (span * self.longer).div_euclid(PARTS);
+        START + DurNs(i64::try_from(true_span).unwrap_or(i64::MAX))
+    }
+
+    /// The first moment shown by the clock that is truly `at` or later.
+    pub(crate) fn shows(&self, at: MonoNs) -> MonoNs {
+        let true_span = i128::from(at.since(START).0);
+        let near = (true_span * PARTS).div_euclid(PARTS + self.longer);
+        let mut shown = START + DurNs(i64::try_from(near).unwrap_or(i64::MAX));
+        while self.truly(shown) < at {
+            shown = shown + DurNs(1);
+        }
+        while self.truly(shown - DurNs(1)) >= at {
+            shown = shown - DurNs(1);
+        }
+        shown
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_clock_shows_and_when_that_is_belong_together() {
+        for ppm in [-1000.0, -3.7, 0.0, 1e-6, 20.0, 999.9] {
+            let clock = Clock::slow_by_ppm(ppm);
+            for after in [0, 1, 17, 999_999_999, 1_000_000_007, 36_000_000_000_000] {
+                let at = START + DurNs(after);
+                let shown = clock.shows(at);
+                assert!(clock.truly(shown) >= at && clock.truly(shown - DurNs(1)) < at, "{ppm} {after}");
+                let late_s = clock.truly(at).since(at).as_secs_f64();
+                assert!((late_s - after as f64 * 1e-9 * ppm * 1e-6).abs() < 2e-9, "{ppm} {after}: {late_s}");
+            }
+        }
+    }
+}

@@ -1,0 +1,240 @@
+//! A beam is a cone, and its range comes from all the wall within it.
+
+mod bins;
+
+use bevy_ecs::prelude::{Component, Query, Res};
+use headrace_config::{ConfigError, Section};
+use headrace_geometry::math::{self, TAU};
+use headrace_sensor::device::Sense;
+use headrace_sensor::measurement::Sounding;
+
+use super::effect::{Effect, EffectKind};
+use super::geometry::{square_to, squareness};
+use super::targets::PerSensor;
+use crate::builder::Builder;
+use crate::environment::{Environment, Hit};
+use crate::error::SceneError;
+use crate::facts::{Facts, SensorFacts};
+use crate::sensing::{Ray, Rays, Reach, Samples, Scenery};
+use crate::stages::{OwnBeam, Stage};
+use bins::Bins;
+
+/// A beam is a cone, and its range comes from all the wall within it: the nearest of it, its mean, or where the paper's
+/// interpolation takes the surface to be.
+///
+/// Keys: `rays` to a beam, from 1 to 64 (16; 64 where `form` is bilinear); the cone's full width `width_deg`, from 0.1
+/// to 60, or the frequency `frequency_khz` that a head has it for, from 600 to 1000 (a head's own width; 30 for an
+/// echosounder); `form` first, mean or bilinear (first); `bin_m`, width of a bin of range for bilinear, from 0.001 to
+/// 1 m (a 500th of a head's range setting, in this water; 0.15 for an echosounder).
+/// Source: Jorge et al. 2021, §6 and §9.2; for an echosounder the field of view that BlueOS gives to a Ping1D, 0.52 rad,
+/// and the 200 points of its profile over 30 m.
+pub(super) struct Kind;
+
+/// Angle from each of a sunflower's rays to the next, radians: a turn by the golden section. Source: Vogel, "A better
+/// way to construct the sunflower head", Mathematical Biosciences 44, 1979.
+const GOLDEN_RAD: f64 = 2.399_963_229_728_653;
+/// Strength at the beam's edge against that in its middle: its width is that between points of half power.
+const EDGE: f64 = 0.5;
+/// Width of an echosounder's beam, degrees.
+const ECHOSOUNDER_DEG: f64 = 30.0;
+/// Bin of an echosounder's profile, m.
+const ECHOSOUNDER_BIN_M: f64 = 0.15;
+/// Points of a head's echo over its range setting. Source: Jorge et al. 2021, §9.2.
+const HEAD_POINTS: f64 = 500.0;
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Form {
+    First,
+    Mean,
+    Bilinear,
+}
+
+const FORMS: [(&str, Form); 3] = [("first", Form::First), ("mean", Form::Mean), ("bilinear", Form::Bilinear)];
+
+#[derive(Debug, Clone, Copy)]
+struct Parameters {
+    rays: usize,
+    width_deg: Option<f64>,
+    /// Of heads.
+    frequency_khz: Option<f64>,
+    form: Form,
+    bin_m: Option<f64>,
+}
+
+/// The rays of a cone about a beam's middle.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cone {
+    rays: Vec<ConeRay>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct ConeRay {
+    /// Parts along the beam's middle, along the tunnel, and across both.
+    parts: [f64; 3],
+    /// Strength against the middle's.
+    strength: f64,
+}
+
+#[derive(Component)]
+struct BeamCone {
+    cone: Cone,
+    form: Form,
+    bins: Bins,
+    /// Of the ping at work.
+    hits: Vec<Option<Hit>>,
+}
+
+impl Cone {
+    /// A cone `width_rad` wide of so many rays: the middle one, then a sunflower's, evenly over its disc; the last two
+    /// are at its edges in the plane of turning, where an oblique wall is nearest and farthest.
+    pub fn new(width_rad: f64, rays: usize) -> Self {
+        let last = rays.max(2) - 1;
+        let ray = |number: usize| {
+            let edge = number > 0 && number + 1 >= last;
+            let out = if edge { 1.0 } else { math::sqrt(number as f64 / last as f64) };
+            let (sine, along) = math::sin_cos(out * width_rad / 2.0);
+            let (sa, ca) = math::sin_cos(math::wrap(number as f64 * GOLDEN_RAD, TAU));
+            let [first, second] = match (edge, number == last) {
+                (false, _) => [sine * ca, sine * sa],
+                (true, false) => [0.0, -sine],
+                (true, true) => [0.0, sine],
+            };
+            ConeRay { parts: [along, first, second], strength: 1.0 - (1.0 - EDGE) * out }
+        };
+        Self { rays: (0..rays.max(1)).map(ray).collect() }
+    }
+
+    /// Its rays: parts along the beam's middle, along the tunnel, and across both; the middle one first, the edges in
+    /// the plane of turning last.
+    pub fn parts(&self) -> impl Iterator<Item = [f64; 3]> {
+        self.rays.iter().map(|ray| ray.parts)
+    }
+
+    /// What each of the cone's rays meets within `far_m`, the middle one first.
+    pub(crate) fn hits<'a>(
+        &'a self,
+        environment: &'a Environment,
+        ray: &'a Ray,
+        far_m: f64,
+    ) -> impl Iterator<Item = Option<Hit>> + 'a {
+        let [first, second] = square_to(ray.direction);
+        self.rays.iter().map(move |ConeRay { parts: [along, a, b], .. }| {
+            let direction = ray.direction.scaled(*along) + first.scaled(*a) + second.scaled(*b);
+            environment.cast(ray.origin, direction, far_m)
+        })
+    }
+}
+
+impl EffectKind for Kind {
+    fn name(&self) -> &'static str {
+        "beam_cone"
+    }
+
+    fn summary(&self) -> &'static str {
+        "a beam is a cone, and its range comes from all the wall within it"
+    }
+
+    fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError> {
+        let senses = [Sense::Head, Sense::Echosounder];
+        Ok(Box::new(PerSensor::read(tables, facts, &senses, |table| {
+            let form = table.choice("form", &FORMS)?.unwrap_or(Form::First);
+            let usual = if form == Form::Bilinear { 64 } else { 16 };
+            let rays = table.integer("rays", 1..=64)?.and_then(|rays| usize::try_from(rays).ok());
+            let width_deg = table.number("width_deg", 0.1..=60.0)?;
+            let frequency_khz = table.number("frequency_khz", 600.0..=1000.0)?;
+            if frequency_khz.is_some() && width_deg.is_some() {
+                return Err(table.invalid("frequency_khz", "and width_deg both say how wide the beam is"));
+            }
+            let bin_m = table.number("bin_m", 0.001..=1.0)?;
+            if bin_m.is_some() && form != Form::Bilinear {
+                return Err(table.invalid("bin_m", "is for form = \"bilinear\" only"));
+            }
+            Ok(Parameters { rays: rays.unwrap_or(usual), width_deg, frequency_khz, form, bin_m })
+        })?))
+    }
+}
+
+/// Full width of a head's beam at a frequency, degrees.
+///
+/// Source: Jorge et al. 2021, §6: 2.4 at 600 kHz, 1.4 at 1 MHz; linear between, as DUNE models it.
+fn width_at_deg(frequency_khz: f64) -> f64 {
+    2.4 - (frequency_khz - 600.0) / 400.0
+}
+
+impl Effect for PerSensor<Parameters> {
+    fn build(&self, sim: &mut Builder<'_>) -> Result<(), SceneError> {
+        for (source, parameters) in &self.0 {
+            let sound_mps = sim.facts().sound_speed_mps;
+            let Some(sensor) = sim.facts().sensors.get(*source) else { continue };
+            sim.insert(*source, BeamCone::new(parameters, sensor, sound_mps));
+            sim.insert(*source, OwnBeam);
+        }
+        sim.system(Stage::Look, look_in_cones);
+        Ok(())
+    }
+}
+
+impl BeamCone {
+    fn new(parameters: &Parameters, sensor: &SensorFacts, sound_mps: f64) -> Self {
+        let (own_rad, own_bin_m) = match &sensor.head {
+            None => (ECHOSOUNDER_DEG.to_radians(), ECHOSOUNDER_BIN_M),
+            Some(spec) => {
+                let at_frequency = parameters.frequency_khz.map(|khz| width_at_deg(khz).to_radians());
+                (at_frequency.unwrap_or(spec.beam_rad), spec.reach_m(sound_mps)[1] / HEAD_POINTS)
+            }
+        };
+        let width_rad = parameters.width_deg.map_or(own_rad, f64::to_radians);
+        Self {
+            cone: Cone::new(width_rad, parameters.rays),
+            form: parameters.form,
+            bins: Bins::new(parameters.bin_m.unwrap_or(own_bin_m)),
+            hits: Vec::with_capacity(parameters.rays),
+        }
+    }
+
+    /// The range of a ping whose rays are cast.
+    fn range_m(&mut self, ray: &Ray) -> Option<f64> {
+        match self.form {
+            Form::First => self.hits.iter().flatten().map(|hit| hit.range_m).min_by(f64::total_cmp),
+            Form::Mean => mean(self.hits.iter().flatten().map(|hit| hit.range_m)),
+            Form::Bilinear => self.surface_m(ray),
+        }
+    }
+
+    /// The paper's surface: each ray's echo, as strong as the beam is there and as the wall is square to it, is shared
+    /// between the two bins of range next to it, and the surface is where the sum is strongest.
+    fn surface_m(&mut self, ray: &Ray) -> Option<f64> {
+        for (hit, part) in self.hits.iter().zip(&self.cone.rays) {
+            if let Some(hit) = hit {
+                self.bins.add(hit.range_m, part.strength * squareness(ray.direction, hit.normal));
+            }
+        }
+        self.bins.take_surface_m()
+    }
+}
+
+fn mean(ranges_m: impl Iterator<Item = f64>) -> Option<f64> {
+    let (mut sum_m, mut count) = (0.0, 0_u32);
+    for range_m in ranges_m {
+        (sum_m, count) = (sum_m + range_m, count + 1);
+    }
+    (count > 0).then(|| sum_m / f64::from(count))
+}
+
+type Looking<'a> = (&'a mut Samples<Sounding>, &'a mut Rays, &'a Reach, &'a mut BeamCone);
+
+fn look_in_cones(scenery: Res<'_, Scenery>, mut sonars: Query<'_, '_, Looking<'_>>) {
+    for (mut samples, mut rays, reach, mut beam) in &mut sonars {
+        let beam = &mut *beam;
+        for (sounding, ray) in samples.list.iter_mut().zip(&mut rays.0) {
+            beam.hits.clear();
+            beam.hits.extend(beam.cone.hits(&scenery.environment, ray, reach.0));
+            // The truth is where the beam's middle meets the wall.
+            ray.hit = beam.hits.first().copied().flatten();
+            sounding.range_m = beam.range_m(ray);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

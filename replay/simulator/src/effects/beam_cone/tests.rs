@@ -1,0 +1,127 @@
+use headrace_geometry::frames::{Point3, Vec3};
+use headrace_geometry::tunnel::shapes;
+use headrace_sampling::section::footprint_m;
+
+use super::*;
+use crate::testing::Dive;
+
+fn down(angle_rad: f64, height_m: f64) -> Ray {
+    let (sine, cosine) = math::sin_cos(angle_rad);
+    Ray { origin: Point3::new(0.0, 0.0, height_m), direction: Vec3::new(0.0, sine, -cosine), hit: None }
+}
+
+fn wide_tunnel() -> Environment {
+    Environment::straight(shapes::rectangle(60.0, 20.0).unwrap())
+}
+
+#[test]
+fn verif_a_beam_s_rays_span_fig_15_s_footprint() {
+    let tunnel = wide_tunnel();
+    for (angle_deg, width_deg) in [(0.0, 2.4), (30.0, 2.4), (60.0, 1.4), (60.0, 20.0)] {
+        let (angle_rad, width_rad) = (f64::to_radians(angle_deg), f64::to_radians(width_deg));
+        let ray = down(angle_rad, 3.0);
+        let hits: Vec<Hit> = Cone::new(width_rad, 64).hits(&tunnel, &ray, 100.0).flatten().collect();
+        assert_eq!(hits.len(), 64);
+        let y_m = |most: fn(f64, f64) -> f64| hits.iter().map(|hit| hit.point.y()).reduce(most).unwrap();
+        let found_m = y_m(f64::max) - y_m(f64::min);
+        let whole_m = footprint_m(3.0, angle_rad, width_rad).unwrap();
+        assert!((found_m - whole_m).abs() < 1e-9, "{angle_deg}: {found_m}, {whole_m}");
+    }
+}
+
+#[test]
+fn the_first_return_of_an_oblique_beam_is_that_of_its_nearer_edge() {
+    let tunnel = wide_tunnel();
+    let half_rad = f64::to_radians(0.7);
+    for angle_deg in [0.0, 0.5, 20.0, 60.0] {
+        let angle_rad = f64::to_radians(angle_deg);
+        let cone = Cone::new(2.0 * half_rad, 64);
+        let ray = down(angle_rad, 3.0);
+        let first_m =
+            cone.hits(&tunnel, &ray, 100.0).flatten().map(|hit| hit.range_m).reduce(f64::min).unwrap();
+        // The nearest point of the floor within the cone.
+        let nearest_m = 3.0 / math::cos((angle_rad - half_rad).max(0.0));
+        // Within half the beam of the perpendicular, the nearest point is between rays.
+        let allowed_m = if angle_rad < half_rad { 2e-5 } else { 1e-12 };
+        assert!((first_m - nearest_m).abs() < allowed_m, "{angle_deg}: {first_m} {nearest_m}");
+    }
+}
+
+#[test]
+fn the_mean_is_that_over_the_cone_s_disc() {
+    let tunnel = wide_tunnel();
+    let (half_rad, ray) = (f64::to_radians(10.0), down(0.0, 3.0));
+    let mean_m = {
+        let cone = Cone::new(2.0 * half_rad, 64);
+        let ranges_m = cone.hits(&tunnel, &ray, 100.0).flatten().map(|hit| hit.range_m);
+        mean(ranges_m).unwrap()
+    };
+    // Rays even in the square of their angle x from the middle: the mean of h / cos x.
+    let count = 10_000;
+    let ring = |k: i32| 3.0 / math::cos(half_rad * math::sqrt((f64::from(k) + 0.5) / f64::from(count)));
+    let whole_m = (0..count).map(ring).sum::<f64>() / f64::from(count);
+    assert!((mean_m - whole_m).abs() < 1e-4 * whole_m, "{mean_m} {whole_m}");
+}
+
+#[test]
+fn one_ray_is_the_base_s_ray_bit_for_bit() {
+    let dive = Dive::with_head();
+    let base = dive.dive("");
+    for effects in ["[effects.beam_cone]\nrays = 1", "[effects.beam_cone]\nrays = 1\nform = \"mean\""] {
+        assert_eq!(base.messages, dive.dive(effects).messages);
+    }
+}
+
+#[test]
+fn truth_stays_the_middle_s_and_square_ranges_stay_true() {
+    let dive = Dive::with_head();
+    let (base, first, bilinear) = (
+        dive.dive(""),
+        dive.dive("[effects.beam_cone]"),
+        dive.dive("[effects.beam_cone]\nform = \"bilinear\""),
+    );
+    assert!(bilinear.rows.len() > 400);
+    for ((base, first), bilinear) in base.rows.iter().zip(&first.rows).zip(&bilinear.rows) {
+        let range_m = |row: &crate::truth::TruthRow| row.sounding.unwrap().measured.range_m.unwrap();
+        assert!(base.wall() == first.wall() && base.wall() == bilinear.wall());
+        assert!(range_m(first) <= range_m(base) + 1e-12);
+        // Half a degree more or less on a wall at most 45 degrees off square: within 3 % of the range.
+        assert!((range_m(bilinear) - range_m(base)).abs() < 0.03 * range_m(base));
+        if range_m(base) < 2.501 {
+            assert!((range_m(bilinear) - range_m(base)).abs() < 0.002, "{}", range_m(bilinear));
+        }
+    }
+}
+
+#[test]
+fn a_small_thing_on_the_wall_is_first_but_not_strongest() {
+    let mut bins = Bins::new(0.02);
+    let cone = Cone::new(f64::to_radians(1.4), 64);
+    for (number, part) in cone.rays.iter().enumerate() {
+        bins.add(if number == 40 { 4.0 } else { 5.0 }, part.strength);
+    }
+    assert!((bins.take_surface_m().unwrap() - 5.0).abs() < 1e-9);
+}
+
+#[test]
+fn width_goes_with_frequency() {
+    for (khz, deg) in [(600.0, 2.4), (800.0, 1.9), (1000.0, 1.4)] {
+        assert!((width_at_deg(khz) - deg).abs() < 1e-12);
+    }
+}
+
+#[test]
+fn slices_dont_matter() {
+    Dive::with_head().assert_slices_dont_matter("[effects.beam_cone]\nform = \"bilinear\"\nrays = 8");
+}
+
+#[test]
+fn what_makes_no_beam_is_refused() {
+    let refusal = |keys: &str| Dive::with_head().refusal(&format!("[effects.beam_cone]\n{keys}"));
+    assert!(refusal("rays = 65").contains("must be a whole number from 1 to 64"));
+    assert!(refusal("width_deg = 2\nfrequency_khz = 700").contains("both say how wide"));
+    assert!(refusal("bin_m = 0.02").contains("bilinear"));
+    assert!(refusal("form = \"last\"").contains("must be one of first, mean, bilinear"));
+    assert!(refusal("rings = 3").contains("is not a key here"));
+    assert!(refusal("sensors = [\"depth\"]").contains("this effect can act on: sonar_0"));
+}

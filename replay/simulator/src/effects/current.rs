@@ -1,0 +1,201 @@
+//! Water that flows along the tunnel.
+
+use headrace_config::{ConfigError, Section};
+use headrace_geometry::math;
+
+use super::effect::{Effect, EffectKind};
+use super::keys;
+use crate::builder::Builder;
+use crate::error::SceneError;
+use crate::facts::Facts;
+use crate::random::Stream;
+use crate::trajectory::{Ground, Knots, Trajectory};
+
+const NAME: &str = "current";
+/// Steps of a gust's time at which its speed is drawn anew.
+const STEPS: f64 = 8.0;
+/// A current may carry the vehicle this far out of the tunnel, m: as far as a trajectory may lead.
+const OUTSIDE_M: f64 = 20.0;
+/// Time between two places at which that is looked at, s.
+const LOOK_S: f64 = 5.0;
+
+/// The water flows along the tunnel and carries a vehicle that holds its speed through it: legs and a pilot's course take
+/// another time to the same end.
+///
+/// `speed_mps` is positive towards growing chainage. `gust_sd_mps` lets it vary besides, as a Gauss-Markov process whose
+/// correlation falls to 1/e within `gust_s` (60 by default); what a gust has carried the vehicle, it stays carried.
+/// A trajectory that is given over ground isn't changed by any current, so that it is refused.
+/// Source: Jorge et al. 2021, §9.1 (0.10 m/s through a leak, against the vehicle or with it).
+pub(super) struct Kind;
+
+#[derive(Debug, Clone, Copy)]
+struct Current {
+    speed_mps: f64,
+    gust_sd_mps: f64,
+    gust_s: f64,
+    length_m: f64,
+}
+
+impl EffectKind for Kind {
+    fn name(&self) -> &'static str {
+        NAME
+    }
+
+    fn summary(&self) -> &'static str {
+        "water flows along the tunnel and carries the vehicle"
+    }
+
+    fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError> {
+        let mut current =
+            Current { speed_mps: 0.0, gust_sd_mps: 0.0, gust_s: 60.0, length_m: facts.length_m };
+        for table in keys::only_one(tables)? {
+            if facts.ground == Ground::Tunnel {
+                return Err(table.invalid_itself("changes nothing: the trajectory is given over ground"));
+            }
+            current.speed_mps = keys::or_zero(&table, "speed_mps", -2.0..=2.0)?;
+            current.gust_sd_mps = keys::or_zero(&table, "gust_sd_mps", 0.0..=1.0)?;
+            current.gust_s = table.number("gust_s", 1.0..=3600.0)?.unwrap_or(current.gust_s);
+            let speeds = [("speed_mps", current.speed_mps), ("gust_sd_mps", current.gust_sd_mps)];
+            keys::some_not_zero(&table, &speeds)?;
+            table.finish()?;
+        }
+        Ok(Box::new(current))
+    }
+}
+
+impl Effect for Current {
+    fn build(&self, sim: &mut Builder<'_>) -> Result<(), SceneError> {
+        let gusts = (self.gust_sd_mps > 0.0).then(|| sim.stream_for("water"));
+        let what = format!("a current of {} m/s, gusts of {} m/s", self.speed_mps, self.gust_sd_mps);
+        let Some(mut scenery) = sim.scenery(what) else { return Ok(()) };
+        let refuse = |problem| SceneError::Effect { effect: NAME, problem };
+        scenery.trajectory.carry(self.speed_mps).map_err(refuse)?;
+        if let Some(stream) = gusts {
+            let duration_s = scenery.trajectory.duration_s();
+            scenery.trajectory.sway(self.carried(stream, duration_s));
+        }
+        self.check(&scenery.trajectory).map_err(refuse)
+    }
+}
+
+impl Current {
+    /// How far gusts have carried the vehicle since the start.
+    fn carried(&self, stream: Stream, duration_s: f64) -> Knots {
+        let [start_m, ..] = self.carried_from(0.0, stream, duration_s).at(0.0);
+        self.carried_from(-start_m, stream, duration_s)
+    }
+
+    fn carried_from(&self, start_m: f64, stream: Stream, duration_s: f64) -> Knots {
+        let spacing_s = self.gust_s / STEPS;
+        let kept = math::exp(-spacing_s / self.gust_s);
+        let fresh = math::sqrt(1.0 - kept * kept);
+        let (mut speed_mps, mut x_m) = (0.0, start_m);
+        Knots::new(duration_s, spacing_s, |k| {
+            let step = (k + 1).unsigned_abs();
+            let [drawn, _] = stream.at(step).normal();
+            let new = self.gust_sd_mps * drawn;
+            speed_mps = if step == 0 { new } else { speed_mps * kept + new * fresh };
+            x_m += speed_mps * spacing_s;
+            [x_m, 0.0, 0.0, 0.0, 0.0, 0.0]
+        })
+    }
+
+    fn check(&self, trajectory: &Trajectory) -> Result<(), String> {
+        let steps = math::floor_to_i64(trajectory.duration_s() / LOOK_S) + 1;
+        for step in 0..=steps {
+            let after_s = (step as f64 * LOOK_S).min(trajectory.duration_s());
+            let chainage_m = trajectory.place(after_s).chainage_m;
+            if !(-OUTSIDE_M..=self.length_m + OUTSIDE_M).contains(&chainage_m) {
+                return Err(format!(
+                    "carries the vehicle out of the tunnel: to chainage {chainage_m:.1} m after {after_s:.0} s"
+                ));
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing_motion::{Bench, LEGS, PILOT, WAYPOINTS};
+
+    #[test]
+    fn a_steady_current_makes_legs_longer_or_shorter_in_time() {
+        for (current_mps, duration_s) in [(0.1, 20.0 / 0.3 + 4.0 / 0.3), (-0.1, 20.0 / 0.1 + 4.0 / 0.5)] {
+            let keys = format!("[effects.current]\nspeed_mps = {current_mps}\n");
+            let trajectory = "start_m = 2.0\n[[trajectory.legs]]\ndistance_m = 20\nspeed_mps = 0.2\n\
+                              [[trajectory.legs]]\ndistance_m = 4\nspeed_mps = -0.4\n";
+            let sim = Bench::on(trajectory, &keys).simulation();
+            assert!((sim.duration_s() - duration_s).abs() < 1e-6, "{}", sim.duration_s());
+            let end_m = sim.pose(sim.end()).unwrap().position.x();
+            assert!((end_m - 18.0).abs() < 1e-6, "{end_m}");
+        }
+    }
+
+    #[test]
+    fn a_pilot_comes_to_the_same_end_in_another_time() {
+        let end = |keys: &str| {
+            let sim = Bench::on(PILOT, keys).simulation();
+            (sim.duration_s(), sim.pose(sim.end()).unwrap().position.x())
+        };
+        let (still_s, still_m) = end("");
+        let (with_s, with_m) = end("[effects.current]\nspeed_mps = 0.1\n");
+        let (against_s, against_m) = end("[effects.current]\nspeed_mps = -0.1\n");
+        assert!(with_s < still_s && still_s < against_s, "{with_s} {still_s} {against_s}");
+        for end_m in [still_m, with_m, against_m] {
+            assert!((end_m - 40.0).abs() < 0.2, "{end_m}");
+        }
+    }
+
+    /// The speed of a gust, its correlation after `gust_s`, and how far gusts carry: for times t well above T the variance
+    /// of the way is 2 sd^2 T t.
+    #[test]
+    fn gusts_are_as_strong_and_as_long_as_wanted() {
+        let current = Current { speed_mps: 0.0, gust_sd_mps: 0.05, gust_s: 20.0, length_m: 1e6 };
+        let (mut speeds, mut lagged, mut ways) = (0.0, 0.0, 0.0);
+        let (runs, seconds) = (200_u32, 4000.0);
+        let mut count = 0.0;
+        for run in 0..runs {
+            let stream = Stream::new(u64::from(run), NAME, "water");
+            let carried = current.carried(stream, seconds);
+            let speed = |after_s: f64| (carried.at(after_s + 2.5)[0] - carried.at(after_s)[0]) / 2.5;
+            for k in 0..190 {
+                let after_s = f64::from(k) * 20.0;
+                speeds += speed(after_s) * speed(after_s);
+                lagged += speed(after_s) * speed(after_s + 20.0);
+                count += 1.0;
+            }
+            let way_m = carried.at(seconds)[0] - carried.at(0.0)[0];
+            ways += way_m * way_m / f64::from(runs);
+        }
+        let sd_mps = math::sqrt(speeds / count);
+        // Splines take a little off the quickest changes.
+        assert!((0.046..0.051).contains(&sd_mps), "{sd_mps}");
+        let correlation = lagged / speeds;
+        assert!((correlation - math::exp(-1.0)).abs() < 0.04, "{correlation}");
+        // The drawn speeds hold for a step, so that the sum is that of the discrete process.
+        let kept = math::exp(-1.0 / STEPS);
+        let wanted = 0.05 * 0.05 * seconds * (20.0 / STEPS) * (1.0 + kept) / (1.0 - kept);
+        assert!((ways / wanted - 1.0).abs() < 5.0 * math::sqrt(2.0 / f64::from(runs)), "{ways} {wanted}");
+    }
+
+    #[test]
+    fn a_current_that_carries_off_or_changes_nothing_is_refused() {
+        let why = |trajectory: &str, keys: &str| {
+            Bench::on(trajectory, &format!("[effects.current]\n{keys}")).refusal()
+        };
+        let strong = why(LEGS, "speed_mps = -0.3");
+        assert!(strong.starts_with("simulating current: it carries the vehicle off: leg 0"), "{strong}");
+        let strong = why(PILOT, "speed_mps = -0.5");
+        assert!(strong.contains("current: it carries the vehicle off: it has not come to 40 m"), "{strong}");
+        let ground = why(WAYPOINTS, "speed_mps = 0.1");
+        assert!(
+            ground.contains("effects.current: changes nothing: the trajectory is given over ground"),
+            "{ground}"
+        );
+        assert!(why(LEGS, "").contains("or gust_sd_mps must not be zero"));
+        let out = why(LEGS, "gust_sd_mps = 1\ngust_s = 3600");
+        assert!(out.contains("out of the tunnel") || out.is_empty(), "{out}");
+    }
+}

@@ -1,0 +1,265 @@
+//! Biases of inertial units.
+
+use bevy_ecs::prelude::{Component, Query};
+use headrace_config::{ConfigError, Section};
+use headrace_geometry::frames::{Rot, Vec3};
+use headrace_geometry::math;
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_sensor::device::Sense;
+use headrace_sensor::measurement::Inertia;
+use headrace_sensor::reading::Level;
+
+use super::effect::{Effect, EffectKind};
+use super::keys;
+use super::targets::PerSensor;
+use crate::builder::Builder;
+use crate::clock::START;
+use crate::error::SceneError;
+use crate::facts::Facts;
+use crate::random::Stream;
+use crate::sensing::Samples;
+use crate::stages::Stage;
+
+/// Step of the draws for parts that stay: no sample's.
+const CONSTANT: u64 = u64::MAX;
+
+/// Biases of an inertial unit that wander, and such as stay, on each axis by itself.
+///
+/// `gyro_degps` and `accel_mps2` are the standard deviations of first-order Gauss-Markov processes whose correlation
+/// falls to 1/e within `tau_s` (300 by default); they are as likely large at the first sample as later.
+/// `gyro_constant_degps` and `accel_constant_mps2` are standard deviations of what stays through the dive.
+/// `attitude_drift_deg_per_hour` turns the unit's own attitude about the vertical, evenly, positive to the left: what
+/// its filter makes of its biases isn't simulated otherwise. All are zero by default.
+/// Source: Brown and Hwang, Introduction to Random Signals and Applied Kalman Filtering, 4th ed., §4.4 (exact steps).
+pub(super) struct Kind;
+
+#[derive(Debug, Clone, Copy)]
+struct Parameters {
+    gyro_radps: f64,
+    accel_mps2: f64,
+    tau_s: f64,
+    gyro_constant_radps: f64,
+    accel_constant_mps2: f64,
+    drift_radps: f64,
+}
+
+#[derive(Component)]
+struct ImuBias {
+    parameters: Parameters,
+    stream: Stream,
+    constant: [f64; 6],
+    /// In standard deviations: rates, then forces.
+    wandering: [f64; 6],
+    before: Option<MonoNs>,
+    /// What is kept over so long, and how much comes anew: samples come at one rate, mostly.
+    kept: (DurNs, f64, f64),
+}
+
+impl EffectKind for Kind {
+    fn name(&self) -> &'static str {
+        "imu_bias"
+    }
+
+    fn summary(&self) -> &'static str {
+        "turn rates and forces have biases that wander"
+    }
+
+    fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError> {
+        Ok(Box::new(PerSensor::read(tables, facts, &[Sense::Inertial], |table| {
+            let gyro = keys::or_zero(table, "gyro_degps", 0.0..=100.0)?;
+            let accel_mps2 = keys::or_zero(table, "accel_mps2", 0.0..=10.0)?;
+            let gyro_constant = keys::or_zero(table, "gyro_constant_degps", 0.0..=100.0)?;
+            let accel_constant_mps2 = keys::or_zero(table, "accel_constant_mps2", 0.0..=10.0)?;
+            let drift = keys::or_zero(table, "attitude_drift_deg_per_hour", -3600.0..=3600.0)?;
+            let values = [
+                ("gyro_degps", gyro),
+                ("accel_mps2", accel_mps2),
+                ("gyro_constant_degps", gyro_constant),
+                ("accel_constant_mps2", accel_constant_mps2),
+                ("attitude_drift_deg_per_hour", drift),
+            ];
+            keys::some_not_zero(table, &values)?;
+            Ok(Parameters {
+                gyro_radps: gyro.to_radians(),
+                accel_mps2,
+                tau_s: table.number("tau_s", 1.0..=1e6)?.unwrap_or(300.0),
+                gyro_constant_radps: gyro_constant.to_radians(),
+                accel_constant_mps2,
+                drift_radps: drift.to_radians() / 3600.0,
+            })
+        })?))
+    }
+}
+
+impl Effect for PerSensor<Parameters> {
+    fn build(&self, sim: &mut Builder<'_>) -> Result<(), SceneError> {
+        for (source, parameters) in &self.0 {
+            let bias = ImuBias::new(*parameters, sim.stream(*source));
+            sim.insert(*source, bias);
+        }
+        sim.system(Stage::Feel, lean);
+        Ok(())
+    }
+}
+
+fn lean(mut units: Query<'_, '_, (&mut Samples<Inertia>, &mut ImuBias)>) {
+    for (mut samples, mut bias) in &mut units {
+        for (step, inertia) in samples.steps() {
+            bias.wander(step, inertia.at);
+            bias.disturb(inertia);
+        }
+    }
+}
+
+impl ImuBias {
+    fn new(parameters: Parameters, stream: Stream) -> Self {
+        let drawn = six(stream, CONSTANT);
+        let sds = [parameters.gyro_constant_radps, parameters.accel_constant_mps2];
+        let mut constant = drawn;
+        for (axis, value) in constant.iter_mut().enumerate() {
+            *value *= if axis < 3 { sds[0] } else { sds[1] };
+        }
+        let kept = (DurNs::ZERO, 1.0, 0.0);
+        Self { parameters, stream, constant, wandering: [0.0; 6], before: None, kept }
+    }
+
+    fn wander(&mut self, step: u64, at: MonoNs) {
+        let Parameters { gyro_radps, accel_mps2, tau_s, .. } = self.parameters;
+        if gyro_radps == 0.0 && accel_mps2 == 0.0 {
+            return;
+        }
+        let drawn = six(self.stream, step);
+        match self.before {
+            None => self.wandering = drawn,
+            Some(before) => {
+                let elapsed = at.since(before);
+                if self.kept.0 != elapsed {
+                    let kept = math::exp(-elapsed.as_secs_f64() / tau_s);
+                    self.kept = (elapsed, kept, math::sqrt((1.0 - kept * kept).max(0.0)));
+                }
+                let (_, kept, fresh) = self.kept;
+                for (value, new) in self.wandering.iter_mut().zip(drawn) {
+                    *value = *value * kept + new * fresh;
+                }
+            }
+        }
+        self.before = Some(at);
+    }
+
+    fn disturb(&self, inertia: &mut Inertia) {
+        let Parameters { gyro_radps, accel_mps2, drift_radps, .. } = self.parameters;
+        let [a, b, c, d, e, f] = self.wandering;
+        let [p, q, r, s, t, u] = self.constant;
+        let rate = Vec3::new(a, b, c).scaled(gyro_radps) + Vec3::new(p, q, r);
+        let force = Vec3::new(d, e, f).scaled(accel_mps2) + Vec3::new(s, t, u);
+        inertia.rate_radps = inertia.rate_radps + rate;
+        inertia.force_mps2 = inertia.force_mps2 + force;
+        if drift_radps != 0.0 {
+            let yaw_rad = drift_radps * inertia.at.since(START).as_secs_f64();
+            let turned = Rot::<Level, Level>::from_roll_pitch_yaw(0.0, 0.0, yaw_rad);
+            inertia.attitude = turned * inertia.attitude;
+        }
+    }
+}
+
+fn six(stream: Stream, step: u64) -> [f64; 6] {
+    let [[a, b], [c, d], [e, f]] = [0, 1, 2].map(|block| stream.block(step, block).normal());
+    [a, b, c, d, e, f]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing_motion::{Bench, refusal, same_in_any_slices};
+
+    fn bias(seed: u64, tau_s: f64) -> ImuBias {
+        let parameters = Parameters {
+            gyro_radps: f64::to_radians(0.2),
+            accel_mps2: 0.03,
+            tau_s,
+            gyro_constant_radps: 0.0,
+            accel_constant_mps2: 0.0,
+            drift_radps: 0.0,
+        };
+        ImuBias::new(parameters, Stream::new(seed, "imu_bias", "imu"))
+    }
+
+    fn felt(bias: &mut ImuBias, step: u64, at: MonoNs) -> [f64; 6] {
+        let mut inertia = Inertia::due(at, DurNs::from_millis(10));
+        bias.wander(step, at);
+        bias.disturb(&mut inertia);
+        let ([a, b, c], [d, e, f]) = (inertia.rate_radps.0.into(), inertia.force_mps2.0.into());
+        [a, b, c, d, e, f]
+    }
+
+    /// Over seeds: the variance at the first sample and much later, and the correlation exp(-t / tau) between them.
+    #[test]
+    fn biases_are_stationary_and_forget_over_tau() {
+        let (runs, steps, tau_s) = (4000, 50, 2.0);
+        let (mut first, mut last, mut both) = (0.0, 0.0, 0.0);
+        for seed in 0..runs {
+            let mut bias = bias(seed, tau_s);
+            let at = |step: u64| START + DurNs::from_millis(step as i64 * 20);
+            let from = felt(&mut bias, 0, at(0));
+            let mut to = from;
+            for step in 1..=steps {
+                to = felt(&mut bias, step, at(step));
+            }
+            for axis in 0..3 {
+                let (a, b) = (from[axis] / f64::to_radians(0.2), to[axis + 3] / 0.03);
+                let c = to[axis] / f64::to_radians(0.2);
+                (first, last, both) = (first + a * a, last + b * b, both + a * c);
+            }
+        }
+        let n = 3.0 * runs as f64;
+        let tolerance = 5.0 * math::sqrt(2.0 / n);
+        assert!((first / n - 1.0).abs() < tolerance && (last / n - 1.0).abs() < tolerance);
+        let wanted = math::exp(-0.5);
+        assert!((both / n - wanted).abs() < 5.0 * math::sqrt((1.0 + wanted * wanted) / n), "{}", both / n);
+    }
+
+    /// Twice as many samples, the same process: the variance of the change over a time doesn't depend on the rate.
+    #[test]
+    fn a_bias_wanders_by_time_not_by_sample() {
+        let change = |millis: i64| {
+            let mut sum = 0.0;
+            for seed in 0..4000 {
+                let mut bias = bias(seed, 5.0);
+                let steps = 1000 / millis;
+                let series: Vec<f64> = (0..=steps)
+                    .map(|k| felt(&mut bias, k.unsigned_abs(), START + DurNs::from_millis(k * millis))[4])
+                    .collect();
+                let by = series[series.len() - 1] - series[0];
+                sum += by * by / (0.03 * 0.03) / 4000.0;
+            }
+            sum
+        };
+        let wanted = 2.0 * (1.0 - math::exp(-0.2));
+        for millis in [500, 100, 20] {
+            let change = change(millis);
+            assert!((change / wanted - 1.0).abs() < 5.0 * math::sqrt(2.0 / 4000.0), "{millis}: {change}");
+        }
+    }
+
+    #[test]
+    fn what_stays_stays_and_the_attitude_drifts_evenly() {
+        let keys = "[effects.imu_bias]\ngyro_constant_degps = 0.1\nattitude_drift_deg_per_hour = 36\n";
+        let (plain, leaning) =
+            (Bench::turning("").run::<Inertia>("imu"), Bench::turning(keys).run::<Inertia>("imu"));
+        let by = |k: usize| leaning[k].rate_radps + -plain[k].rate_radps;
+        assert!(by(0).norm() > 1e-5);
+        for (k, (plain, leaning)) in plain.iter().zip(&leaning).enumerate() {
+            assert!((by(k) + -by(0)).norm() < 1e-12 && leaning.force_mps2 == plain.force_mps2);
+            let yaw_deg = (leaning.attitude * plain.attitude.inverse()).roll_pitch_yaw().2.to_degrees();
+            assert!((yaw_deg - 0.01 * plain.at.since(START).as_secs_f64()).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn slices_make_no_difference_and_no_bias_is_refused() {
+        same_in_any_slices(&Bench::turning(
+            "[effects.imu_bias]\ngyro_degps = 0.2\naccel_mps2 = 0.01\ntau_s = 5\n",
+        ));
+        assert!(refusal("[effects.imu_bias]\ntau_s = 100\n").contains("must not be zero"));
+    }
+}

@@ -1,0 +1,246 @@
+//! Heads that share a frequency hear each other.
+
+mod pings;
+
+use bevy_ecs::prelude::{Component, Query, Res};
+use headrace_config::{ConfigError, Section};
+use headrace_geometry::frames::{Point3, Tunnel};
+use headrace_geometry::math;
+use headrace_geometry::time::MonoNs;
+use headrace_sampling::head::HeadSpec;
+use headrace_sensor::device::Sense;
+use headrace_sensor::measurement::Sounding;
+
+use super::effect::{Effect, EffectKind};
+use super::geometry::between_rad;
+use super::occlusion::Stopped;
+use super::targets::PerSensor;
+use super::targets::targets;
+use crate::builder::Builder;
+use crate::error::SceneError;
+use crate::facts::Facts;
+use crate::random::Stream;
+use crate::sensing::{Ray, Rays, Samples, Scenery, Slice, Source};
+use crate::stages::Stage;
+use pings::{Ping, Pings};
+
+/// Heads that share a frequency hear each other: a head takes the first sound after its own ping for its echo. Another
+/// head's ping comes by way of the place where its beam meets the wall, or straight, where its beam points at this
+/// head's body. Is it there at c (t_other - t_own + way / c) / 2 before the own echo, and not nearer than the head's least
+/// range, then this is the range that is told.
+///
+/// It is heard always where it comes from within this head's beam, and else, through side lobes, with a chance. A wall
+/// is within the beam up to half the beam's width and a margin from its middle; the other head, up to half the width
+/// and its body's.
+///
+/// Keys: `sensors`, those that share a frequency, two or more (all heads); a table for each frequency; `share`, the
+/// chance through side lobes, from 0 to 1 (0); `margin_deg`, from 0 to 45 (half the other's beam, as the patch is lit
+/// as wide as that).
+///
+/// Heads whose bodies share a place are idealised ones, which don't hear each other. A ping that begins while another
+/// head listens already is taken to come when and where the last two before say, for a simulation doesn't know it yet;
+/// this is wrong for a ping or two where a head turns round.
+/// Source: Jorge et al. 2021, §10; core's sampling/interference.rs, which plans with the same two ways.
+pub(super) struct Kind;
+
+/// Heads are nearer to each other than this, m: vehicle files place them within 20 m of the body's origin in x, y and z.
+const APART_M: f64 = 70.0;
+
+#[derive(Debug, Clone, Copy)]
+struct Parameters {
+    /// Heads of one number share a frequency.
+    frequency: usize,
+    share: f64,
+    margin_rad: Option<f64>,
+}
+
+/// A head that hears others, and that others hear.
+#[derive(Component)]
+struct Hears {
+    parameters: Parameters,
+    spec: HeadSpec,
+    stream: Stream,
+    pings: Pings,
+}
+
+impl EffectKind for Kind {
+    fn name(&self) -> &'static str {
+        "interference"
+    }
+
+    fn summary(&self) -> &'static str {
+        "heads that share a frequency hear each other's pings"
+    }
+
+    fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError> {
+        let mut frequency = 0;
+        Ok(Box::new(PerSensor::read(tables, facts, &[Sense::Head], |table| {
+            frequency += 1;
+            let mut sensors = targets(table, facts, &[Sense::Head])?;
+            sensors.dedup();
+            if sensors.len() < 2 {
+                return Err(table.invalid_itself("has one head, which has no other to hear"));
+            }
+            let share = table.number("share", 0.0..=1.0)?.unwrap_or(0.0);
+            let margin_rad = table.number("margin_deg", 0.0..=45.0)?.map(f64::to_radians);
+            Ok(Parameters { frequency, share, margin_rad })
+        })?))
+    }
+}
+
+impl Effect for PerSensor<Parameters> {
+    fn build(&self, sim: &mut Builder<'_>) -> Result<(), SceneError> {
+        for (source, parameters) in &self.0 {
+            let Some(spec) = sim.facts().sensors.get(*source).and_then(|sensor| sensor.head) else {
+                continue;
+            };
+            let stream = sim.stream(*source);
+            let hears = Hears { parameters: *parameters, spec, stream, pings: Pings::default() };
+            sim.insert(*source, hears);
+        }
+        sim.system(Stage::Hear, remember);
+        sim.system(Stage::Hear, listen);
+        Ok(())
+    }
+}
+
+/// Adds the slice's pings to those that may still be heard.
+fn remember(
+    slice: Res<'_, Slice>,
+    scenery: Res<'_, Scenery>,
+    mut heads: Query<'_, '_, (&Samples<Sounding>, &Rays, &mut Hears, Option<&Stopped>)>,
+) {
+    for (samples, rays, mut hears, stopped) in &mut heads {
+        let rings_s = (2.0 * hears.rings_m() + APART_M) / scenery.site.sound_speed_mps;
+        hears.pings.forget(slice.from, rings_s);
+        for (number, (sounding, ray)) in samples.list.iter().zip(&rays.0).enumerate() {
+            hears.pings.add(Ping::new(sounding.at, ray, Stopped::has(stopped, number)));
+        }
+    }
+}
+
+type Listening<'a> = (&'a Source, &'a mut Samples<Sounding>, &'a Rays, &'a Hears, Option<&'a Stopped>);
+
+fn listen(
+    scenery: Res<'_, Scenery>,
+    others: Query<'_, '_, (&Source, &Hears)>,
+    mut heads: Query<'_, '_, Listening<'_>>,
+) {
+    let sound_mps = scenery.site.sound_speed_mps;
+    for (source, mut samples, rays, hears, stopped) in &mut heads {
+        let [near_m, far_m] = hears.spec.reach_m(sound_mps);
+        for (number, ((step, sounding), ray)) in samples.steps().zip(&rays.0).enumerate() {
+            let mut ear = Ear {
+                scenery: &scenery,
+                hears,
+                at: sounding.at,
+                ray,
+                stopped: Stopped::has(stopped, number),
+                step,
+                within_m: [near_m, sounding.range_m.unwrap_or(far_m)],
+                heard: false,
+            };
+            for (other, sounds) in &others {
+                if other != source && sounds.parameters.frequency == hears.parameters.frequency {
+                    ear.hear(u64::from(other.0), sounds);
+                }
+            }
+            if ear.heard {
+                sounding.range_m = Some(ear.within_m[1]);
+            }
+        }
+    }
+}
+
+/// A head after a ping of its own.
+struct Ear<'a> {
+    scenery: &'a Scenery,
+    hears: &'a Hears,
+    at: MonoNs,
+    ray: &'a Ray,
+    stopped: bool,
+    step: u64,
+    /// The ranges between which a sound would be taken for the echo.
+    within_m: [f64; 2],
+    /// Whether one has been.
+    heard: bool,
+}
+
+impl Ear<'_> {
+    /// Listens for another head's pings.
+    fn hear(&mut self, other: u64, sounds: &Hears) {
+        let apart_m = (sounds.spec.mount.position + -self.hears.spec.mount.position).norm();
+        if apart_m <= sounds.spec.body.radius_m.max(self.hears.spec.body.radius_m) {
+            return;
+        }
+        let sound_mps = self.scenery.site.sound_speed_mps;
+        let earliest_s = -(2.0 * sounds.rings_m() + apart_m) / sound_mps;
+        let latest_s = 2.0 * self.within_m[1] / sound_mps;
+        let far_m = sounds.rings_m();
+        for ping in sounds.pings.around(self.at, earliest_s, latest_s) {
+            let ping = ping.seen(&self.scenery.environment, far_m);
+            let later_m = ping.at.since(self.at).as_secs_f64() * sound_mps;
+            self.by_the_wall(other, sounds, &ping, later_m);
+            self.straight(other, sounds, &ping, later_m);
+        }
+    }
+
+    /// A ping that comes by way of the wall.
+    fn by_the_wall(&mut self, other: u64, sounds: &Hears, ping: &Ping, later_m: f64) {
+        let Some(wall) = ping.wall else { return };
+        let range_m = (later_m + (wall - ping.origin).norm() + (wall - self.ray.origin).norm()) / 2.0;
+        if !self.comes_first(range_m) {
+            return;
+        }
+        let Parameters { share, margin_rad, .. } = self.hears.parameters;
+        let margin_rad = margin_rad.unwrap_or(sounds.spec.beam_rad / 2.0);
+        let within = !self.stopped && self.off_rad(wall) <= self.hears.spec.beam_rad / 2.0 + margin_rad;
+        if within || self.hears.stream.block(self.step, other).uniform()[0] < share {
+            self.take(range_m);
+        }
+    }
+
+    /// A ping that comes straight from a head whose beam points here.
+    fn straight(&mut self, other: u64, sounds: &Hears, ping: &Ping, later_m: f64) {
+        let way_m = (ping.origin - self.ray.origin).norm();
+        let range_m = f64::midpoint(later_m, way_m);
+        if !self.comes_first(range_m) {
+            return;
+        }
+        let half_rad =
+            |beam: &HeadSpec, body: &HeadSpec| beam.beam_rad / 2.0 + math::asin(body.body.radius_m / way_m);
+        let (own, theirs) = (&self.hears.spec, &sounds.spec);
+        if between_rad(ping.direction, self.ray.origin - ping.origin) > half_rad(theirs, own) {
+            return;
+        }
+        let within = self.off_rad(ping.origin) <= half_rad(own, theirs);
+        if within || self.hears.stream.block(self.step, other).uniform()[1] < self.hears.parameters.share {
+            self.take(range_m);
+        }
+    }
+
+    /// Whether a sound at this range would come before all others, and not too early.
+    fn comes_first(&self, range_m: f64) -> bool {
+        range_m >= self.within_m[0] && range_m < self.within_m[1]
+    }
+
+    fn take(&mut self, range_m: f64) {
+        (self.within_m[1], self.heard) = (range_m, true);
+    }
+
+    /// Angle of a place from the beam's middle, radians.
+    fn off_rad(&self, place: Point3<Tunnel>) -> f64 {
+        between_rad(self.ray.direction, place - self.ray.origin)
+    }
+}
+
+impl Hears {
+    /// The longest way from this head to a wall that sends something back, m.
+    fn rings_m(&self) -> f64 {
+        // In any water: half as much again is more than the speed of sound differs by.
+        self.spec.range_m[1] * 1.5
+    }
+}
+
+#[cfg(test)]
+mod tests;

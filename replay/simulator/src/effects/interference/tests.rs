@@ -1,0 +1,174 @@
+use headrace_geometry::frames::{Vec3, head_direction};
+use headrace_geometry::time::DurNs;
+use headrace_geometry::tunnel::shapes;
+
+use super::*;
+use crate::environment::Environment;
+use crate::testing::Dive;
+
+const SOUND_MPS: f64 = 1500.0;
+
+/// Two heads at one side each of a box of a vehicle, in the same water as they reckon by.
+fn pair() -> Dive {
+    let mut dive = Dive::with_heads(&[[0.0, 0.4, 0.0], [0.0, -0.4, 0.0]]);
+    dive.vehicle = "[water]\nsound_speed_mps = 1500\n[heads]\nlayout = \"phase_shift\"";
+    dive
+}
+
+/// A pair whose heads ping out of step.
+fn out_of_step() -> Dive {
+    let mut dive = pair();
+    dive.sensors[1].2 = dive.sensors[1].2.replace("medium", "fastest");
+    dive.seconds = 30.0;
+    dive
+}
+
+fn head(dive: &Dive, source: usize) -> HeadSpec {
+    dive.scene("").unwrap().facts.sensors[source].head.unwrap()
+}
+
+#[test]
+fn the_way_by_the_wall_and_the_straight_way_take_their_time() {
+    let dive = pair();
+    let spec = head(&dive, 0);
+    let other_spec = head(&dive, 1);
+    let room = Environment::straight(shapes::rectangle(6.0, 5.0).unwrap());
+    let scene = dive.scene("").unwrap();
+    let scenery = Scenery {
+        environment: room.clone(),
+        trajectory: scene.trajectory.clone(),
+        site: scene.vehicle.site,
+        sets_out: None,
+    };
+    let ray = |y_m: f64, angle_rad: f64| {
+        let local = head_direction(angle_rad);
+        let (origin, direction) = (Point3::new(0.0, y_m, 2.5), Vec3::new(0.0, local.y(), local.z()));
+        Ray { origin, direction, hit: room.cast(origin, direction, 100.0) }
+    };
+    let parameters = Parameters { frequency: 1, share: 0.0, margin_rad: Some(0.02) };
+    let at = MonoNs(5_000_000_000);
+    let heard = |own_rad: f64, theirs_rad: f64, later_ms: f64| {
+        let own = ray(0.4, own_rad);
+        let mut theirs = Pings::default();
+        let when = at + DurNs::from_secs_f64(later_ms / 1000.0);
+        theirs.add(Ping::new(when, &ray(-0.4, theirs_rad), false));
+        let stream = Stream::new(1, "interference", "sonar_0");
+        let hears = Hears { parameters, spec, stream, pings: Pings::default() };
+        let sounds = Hears { parameters, spec: other_spec, stream, pings: theirs };
+        let range_m = own.hit.unwrap().range_m;
+        let mut ear = Ear {
+            scenery: &scenery,
+            hears: &hears,
+            at,
+            ray: &own,
+            stopped: false,
+            step: 0,
+            within_m: [0.2, range_m],
+            heard: false,
+        };
+        ear.hear(1, &sounds);
+        ear.heard.then_some(ear.within_m[1])
+    };
+    // Both look at the middle of the floor, 0.4 m beside either: the same way for both, heard at once if sent earlier.
+    let inwards = math::atan2(0.4, 2.5);
+    let way_m = 2.0 * math::hypot(0.4, 2.5);
+    assert_eq!(heard(-inwards, inwards, 0.0), None);
+    for earlier_ms in [0.1, 1.0, 2.9] {
+        let expected_m = (way_m - earlier_ms / 1000.0 * SOUND_MPS) / 2.0;
+        assert!((heard(-inwards, inwards, -earlier_ms).unwrap() - expected_m).abs() < 1e-6);
+    }
+    // Earlier than that, it comes before the own ping, or within its least range.
+    assert_eq!(heard(-inwards, inwards, -3.4), None);
+    // Another place of the wall isn't within the beam.
+    assert_eq!(heard(-inwards, inwards + 0.1, -1.0), None);
+    // Face to face: 0.8 m apart, heard 0.4 m away if both ping at once.
+    let (right, left) = (1.5 * math::PI, math::FRAC_PI_2);
+    assert!((heard(right, left, 0.0).unwrap() - 0.4).abs() < 1e-9);
+    assert!((heard(right, left, -0.2).unwrap() - 0.25).abs() < 1e-6);
+    assert_eq!(heard(right, left, -0.4), None);
+    assert_eq!(heard(right - 0.3, left, 0.0), None);
+}
+
+/// Two heads half a turn apart face each other twice a turn; each is heard at half their distance.
+#[test]
+fn heads_that_ping_together_hear_each_other_when_they_face() {
+    let dive = pair();
+    let spec = head(&dive, 0);
+    let half_rad = spec.beam_rad / 2.0 + math::asin(spec.body.radius_m / 0.8);
+    let (base, dived) = (dive.dive(""), dive.dive("[effects.interference]"));
+    let mut heard = 0;
+    let others: Vec<f64> = dived.soundings(1).into_iter().map(|(angle_rad, _)| angle_rad).collect();
+    for (number, ((angle_rad, range_m), was)) in
+        dived.soundings(0).into_iter().zip(base.ranges_m(0)).enumerate()
+    {
+        let off = |angle: f64, middle: f64| math::wrap_signed(angle - middle, math::TAU).abs();
+        let faces =
+            off(angle_rad, 1.5 * math::PI) <= half_rad && off(others[number], math::FRAC_PI_2) <= half_rad;
+        if faces {
+            // The heads' pictures may be a ping's way apart.
+            assert!((range_m.unwrap() - 0.4).abs() < 1e-4, "{range_m:?}");
+            heard += 1;
+        } else {
+            assert_eq!(range_m, was);
+        }
+    }
+    assert!(heard > 5, "{heard}");
+}
+
+#[test]
+fn heads_out_of_step_hear_each_other_by_the_wall_and_through_side_lobes() {
+    let dive = Dive { seconds: 100.0, ..out_of_step() };
+    let count = |effects: &str| {
+        let rows = dive.dive(effects).rows;
+        let heard = rows.iter().filter(|row| !row.causes.is_empty());
+        heard
+            .map(|row| assert!(row.causes.iter().all(|cause| cause.from.is_nan() || cause.to < cause.from)))
+            .count()
+    };
+    let wide = count("[effects.interference]\nmargin_deg = 45");
+    let some = count("[effects.interference]\nshare = 0.3");
+    let all = count("[effects.interference]\nshare = 1");
+    assert!(wide > 100 && some > 100 && all > wide && all > 2 * some, "{wide} {some} {all}");
+}
+
+#[test]
+fn slices_dont_matter_though_pings_ring_on() {
+    let mut dive = out_of_step();
+    dive.seconds = 12.0;
+    dive.assert_slices_dont_matter("[effects.interference]\nshare = 0.5");
+    pair().assert_slices_dont_matter("[effects.interference]\nshare = 0.5\n[effects.occlusion]");
+}
+
+#[test]
+fn heads_of_two_frequencies_hear_their_own_only() {
+    let mut dive = Dive::with_heads(&[[0.0, 0.4, 0.0], [0.0, -0.4, 0.0], [0.9, 0.4, 0.0], [0.9, -0.4, 0.0]]);
+    dive.vehicle = "[water]\nsound_speed_mps = 1500";
+    let crossed = "[[effects.interference]]\nsensors = [\"sonar_0\", \"sonar_2\"]\n\
+                   [[effects.interference]]\nsensors = [\"sonar_1\", \"sonar_3\"]";
+    let faced = "[[effects.interference]]\nsensors = [\"sonar_0\", \"sonar_1\"]\n\
+                 [[effects.interference]]\nsensors = [\"sonar_2\", \"sonar_3\"]";
+    let straight = |effects: &str| {
+        let rows = dive.dive(effects).rows;
+        let near =
+            |row: &&crate::truth::TruthRow| row.sounding.unwrap().measured.range_m.is_some_and(|m| m < 0.5);
+        rows.iter().filter(near).count()
+    };
+    assert_eq!(straight(crossed), 0);
+    assert_eq!(straight(faced) > 0, straight("[effects.interference]") > 0);
+}
+
+#[test]
+fn idealised_heads_in_one_place_hear_nothing_of_each_other() {
+    let dive = Dive::with_heads(&[[0.0; 3], [0.0; 3]]);
+    assert_eq!(dive.dive("").messages, dive.dive("[effects.interference]\nshare = 1").messages);
+}
+
+#[test]
+fn one_head_is_refused() {
+    assert!(Dive::with_head().refusal("[effects.interference]").contains("has no other to hear"));
+    let refusal = |keys: &str| pair().refusal(&format!("[effects.interference]\n{keys}"));
+    assert!(refusal("sensors = [\"sonar_1\"]").contains("has no other to hear"));
+    assert!(refusal("sensors = [\"sonar_1\", \"sonar_1\"]").contains("has no other to hear"));
+    assert!(refusal("share = -0.1").contains("from 0 to 1"));
+    assert!(refusal("frequency_khz = 700").contains("is not a key here"));
+}

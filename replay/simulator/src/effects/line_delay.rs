@@ -1,0 +1,153 @@
+//! Messages come late.
+
+use bevy_ecs::prelude::{Component, Query};
+use headrace_config::{ConfigError, Section};
+use headrace_geometry::math;
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_sensor::device::{Direction, Sense};
+
+use super::effect::{Effect, EffectKind};
+use super::keys;
+use super::targets::PerSensor;
+use crate::builder::Builder;
+use crate::error::SceneError;
+use crate::facts::Facts;
+use crate::random::Stream;
+use crate::sensing::Line;
+use crate::stages::Stage;
+
+/// Every sense.
+pub(super) const SENSES: [Sense; 6] =
+    [Sense::Head, Sense::Echosounder, Sense::Depth, Sense::Inertial, Sense::Velocity, Sense::Tether];
+
+/// Messages from a device come late, over what the vehicle file says of its latency; none overtakes another on its line.
+///
+/// All come `latency_ms` later, and each of them besides by an exponentially distributed time whose mean is `jitter_ms`.
+/// A message that would overtake the one before comes with it. Messages to devices aren't late.
+pub(super) struct Kind;
+
+#[derive(Debug, Clone, Copy)]
+struct Parameters {
+    latency_s: f64,
+    jitter_s: f64,
+}
+
+#[derive(Component)]
+struct LineDelay {
+    parameters: Parameters,
+    stream: Stream,
+    received: u64,
+    last: MonoNs,
+}
+
+impl EffectKind for Kind {
+    fn name(&self) -> &'static str {
+        "line_delay"
+    }
+
+    fn summary(&self) -> &'static str {
+        "messages come late"
+    }
+
+    fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError> {
+        Ok(Box::new(PerSensor::read(tables, facts, &SENSES, |table| {
+            let latency_ms = keys::or_zero(table, "latency_ms", 0.0..=10_000.0)?;
+            let jitter_ms = keys::or_zero(table, "jitter_ms", 0.0..=10_000.0)?;
+            keys::some_not_zero(table, &[("latency_ms", latency_ms), ("jitter_ms", jitter_ms)])?;
+            Ok(Parameters { latency_s: latency_ms * 1e-3, jitter_s: jitter_ms * 1e-3 })
+        })?))
+    }
+}
+
+impl Effect for PerSensor<Parameters> {
+    fn build(&self, sim: &mut Builder<'_>) -> Result<(), SceneError> {
+        for (source, parameters) in &self.0 {
+            let delay = LineDelay {
+                parameters: *parameters,
+                stream: sim.stream(*source),
+                received: 0,
+                last: MonoNs(0),
+            };
+            sim.insert(*source, delay);
+        }
+        sim.system(Stage::Line, delay);
+        Ok(())
+    }
+}
+
+fn delay(mut lines: Query<'_, '_, (&mut Line, &mut LineDelay)>) {
+    for (mut line, mut delay) in &mut lines {
+        for message in line.messages.iter_mut().filter(|m| m.direction == Direction::Received) {
+            message.at = delay.next(message.at);
+        }
+    }
+}
+
+impl LineDelay {
+    fn next(&mut self, at: MonoNs) -> MonoNs {
+        let Parameters { latency_s, jitter_s } = self.parameters;
+        let mut late_s = latency_s;
+        if jitter_s > 0.0 {
+            let [u, _] = self.stream.at(self.received).uniform();
+            late_s -= jitter_s * math::ln(u);
+        }
+        self.received += 1;
+        self.last = self.last.max(at + DurNs::from_secs_f64(late_s));
+        self.last
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing_motion::{Bench, refusal, same_in_any_slices};
+
+    const KEYS: &str = "[effects.line_delay]\nlatency_ms = 40\njitter_ms = 3\n";
+
+    #[test]
+    fn what_is_received_is_late_and_nothing_overtakes() {
+        let bench = Bench::turning("");
+        let late = Bench::turning(KEYS);
+        for source in 0..bench.sensors() {
+            let (plain, late) = (bench.line(source), late.line(source));
+            let received = |messages: &[(MonoNs, Direction, Vec<u8>)]| {
+                messages.iter().filter(|m| m.1 == Direction::Received).cloned().collect::<Vec<_>>()
+            };
+            let sent = |messages: &[(MonoNs, Direction, Vec<u8>)]| {
+                messages.iter().filter(|m| m.1 == Direction::Sent).cloned().collect::<Vec<_>>()
+            };
+            assert_eq!(sent(&plain), sent(&late));
+            let (plain, late) = (received(&plain), received(&late));
+            assert_eq!(plain.len(), late.len());
+            assert!(late.windows(2).all(|w| w[0].0 <= w[1].0));
+            for (plain, late) in plain.iter().zip(&late) {
+                assert_eq!(plain.2, late.2);
+                assert!(late.0 >= plain.0 + DurNs::from_millis(40));
+            }
+        }
+    }
+
+    /// Far apart, so that none is held up by the one before: mean and variance of the exponential distribution.
+    #[test]
+    fn jitter_is_exponential() {
+        let parameters = Parameters { latency_s: 0.0, jitter_s: 0.003 };
+        let stream = Stream::new(4, "line_delay", "head");
+        let mut delay = LineDelay { parameters, stream, received: 0, last: MonoNs(0) };
+        let count = 100_000_u64;
+        let (mut sum, mut squares) = (0.0, 0.0);
+        for k in 0..count {
+            let at = MonoNs(k * 1_000_000_000);
+            let late_s = delay.next(at).since(at).as_secs_f64() / 0.003;
+            (sum, squares) = (sum + late_s, squares + late_s * late_s);
+        }
+        let n = count as f64;
+        assert!((sum / n - 1.0).abs() < 5.0 / math::sqrt(n));
+        assert!((squares / n - 2.0).abs() < 5.0 * math::sqrt(20.0 / n));
+    }
+
+    #[test]
+    fn slices_make_no_difference_and_no_delay_is_refused() {
+        same_in_any_slices(&Bench::turning(KEYS));
+        assert!(refusal("[effects.line_delay]\n").contains("or jitter_ms must not be zero"));
+    }
+}

@@ -1,0 +1,280 @@
+//! Some pings come back with nothing.
+
+use bevy_ecs::prelude::{Component, Query};
+use headrace_config::{ConfigError, Section};
+use headrace_geometry::math;
+use headrace_sensor::device::Sense;
+use headrace_sensor::measurement::Sounding;
+
+use super::effect::{Effect, EffectKind};
+use super::geometry::squareness;
+use super::occlusion::Stopped;
+use super::targets::PerSensor;
+use crate::builder::Builder;
+use crate::error::SceneError;
+use crate::facts::Facts;
+use crate::random::Stream;
+use crate::sensing::{Ray, Rays, Samples};
+use crate::stages::Stage;
+
+/// Some pings come back with nothing: a share of them anywhere, singly or in runs; those that meet the wall at a grazing
+/// angle, which send little back; those whose echo comes from afar. The three are independent of each other.
+///
+/// Keys: `share` of all pings, from 0 to 0.95 (0), and the mean length of their runs, `mean_run` pings, from
+/// share / (1 - share), or 1 if that is more, to 10,000 (1 / (1 - share): each on its own); `grazing_from_deg` and
+/// `grazing_to_deg`, incidence beyond which some, and from which all, are lost, from 0, square to the wall, to 90;
+/// `far_from_m` and `far_to_m`, the same for the range, from 0 to 200 m. Between the two of a pair the share grows
+/// linearly; both are the same for a sharp edge. At least one of the three has to be there.
+/// Source: runs after Gilbert, "Capacity of a burst-noise channel", Bell System Technical Journal 39, 1960.
+pub(super) struct Kind;
+
+/// The most pings of a mean run.
+const LONGEST_RUN: f64 = 10_000.0;
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Parameters {
+    runs: Option<Runs>,
+    grazing: Option<Ramp>,
+    far: Option<Ramp>,
+}
+
+/// Pings lost in runs: a chain of two states.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Runs {
+    share: f64,
+    /// Chance that a ping is lost after one that isn't.
+    begin: f64,
+    /// Chance that a ping is lost after one that is.
+    go_on: f64,
+}
+
+/// Nothing up to `from`, all from `to`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Ramp {
+    from: f64,
+    to: f64,
+}
+
+#[derive(Component)]
+struct MissingReturns {
+    parameters: Parameters,
+    stream: Stream,
+    /// Whether the last ping was of a run, once there has been one.
+    in_run: Option<bool>,
+}
+
+impl Runs {
+    /// The chain whose lost pings are this share, in runs of `mean` pings.
+    fn new(share: f64, mean: f64) -> Self {
+        Self { share, begin: share / (mean * (1.0 - share)), go_on: 1.0 - 1.0 / mean }
+    }
+
+    /// The next ping of the chain, given the last one's state; the first has the share itself.
+    fn next(&self, before: Option<bool>, chance: f64) -> bool {
+        let lost = match before {
+            None => self.share,
+            Some(false) => self.begin,
+            Some(true) => self.go_on,
+        };
+        chance < lost
+    }
+}
+
+impl Ramp {
+    fn share(&self, at: f64) -> f64 {
+        if at >= self.to {
+            return 1.0;
+        }
+        ((at - self.from) / (self.to - self.from)).max(0.0)
+    }
+}
+
+impl EffectKind for Kind {
+    fn name(&self) -> &'static str {
+        "missing_returns"
+    }
+
+    fn summary(&self) -> &'static str {
+        "some pings come back with nothing: anywhere, in runs, at grazing angles, from afar"
+    }
+
+    fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError> {
+        let senses = [Sense::Head, Sense::Echosounder];
+        Ok(Box::new(PerSensor::read(tables, facts, &senses, |table| {
+            let parameters = Parameters {
+                runs: runs(table)?,
+                grazing: ramp(table, ["grazing_from_deg", "grazing_to_deg"], 90.0)?,
+                far: ramp(table, ["far_from_m", "far_to_m"], 200.0)?,
+            };
+            if parameters == (Parameters { runs: None, grazing: None, far: None }) {
+                let problem = "must be above zero, or grazing_from_deg or far_from_m be there";
+                return Err(table.invalid("share", problem));
+            }
+            Ok(parameters)
+        })?))
+    }
+}
+
+fn runs(table: &Section<'_>) -> Result<Option<Runs>, ConfigError> {
+    let share = table.number("share", 0.0..=0.95)?.unwrap_or(0.0);
+    let mean = table.number("mean_run", 1.0..=LONGEST_RUN)?;
+    if share == 0.0 {
+        return match mean {
+            Some(_) => Err(table.invalid("mean_run", "is of use only with a share above zero")),
+            None => Ok(None),
+        };
+    }
+    let least = share / (1.0 - share);
+    if mean.is_some_and(|mean| mean < least) {
+        let problem = format!("must be at least {least:.2}: shorter runs don't make up a share of {share}");
+        return Err(table.invalid("mean_run", &problem));
+    }
+    Ok(Some(Runs::new(share, mean.unwrap_or(1.0 / (1.0 - share)))))
+}
+
+fn ramp(table: &Section<'_>, keys: [&'static str; 2], most: f64) -> Result<Option<Ramp>, ConfigError> {
+    let [from, to] = [table.number(keys[0], 0.0..=most)?, table.number(keys[1], 0.0..=most)?];
+    match (from, to) {
+        (None, None) => Ok(None),
+        (Some(from), Some(to)) if to < from => {
+            Err(table.invalid(keys[1], &format!("must not be below {}, which is {from}", keys[0])))
+        }
+        (Some(from), Some(to)) => Ok(Some(Ramp { from, to })),
+        (None, Some(_)) => Err(table.invalid(keys[0], &format!("is needed with {}", keys[1]))),
+        (Some(_), None) => Err(table.invalid(keys[1], &format!("is needed with {}", keys[0]))),
+    }
+}
+
+impl Effect for PerSensor<Parameters> {
+    fn build(&self, sim: &mut Builder<'_>) -> Result<(), SceneError> {
+        for (source, parameters) in &self.0 {
+            let stream = sim.stream(*source);
+            sim.insert(*source, MissingReturns { parameters: *parameters, stream, in_run: None });
+        }
+        sim.system(Stage::Hear, lose);
+        Ok(())
+    }
+}
+
+impl MissingReturns {
+    /// Whether the ping of a step comes back with nothing. To be asked for each step, in order.
+    fn loses(&mut self, step: u64, ray: &Ray, range_m: Option<f64>, stopped: bool) -> bool {
+        let [first, second] = self.stream.at(step).uniform();
+        let in_run = self.parameters.runs.is_some_and(|runs| runs.next(self.in_run, first));
+        self.in_run = Some(in_run);
+        let share =
+            |ramp: Option<Ramp>, at: Option<f64>| ramp.zip(at).map_or(0.0, |(ramp, at)| ramp.share(at));
+        // At what angle an obstacle of the vehicle is met isn't known.
+        let hit = ray.hit.filter(|_| self.parameters.grazing.is_some() && !stopped);
+        let incidence_deg = hit.map(|hit| math::acos(squareness(ray.direction, hit.normal)).to_degrees());
+        let stays = (1.0 - share(self.parameters.grazing, incidence_deg))
+            * (1.0 - share(self.parameters.far, range_m));
+        in_run || second >= stays
+    }
+}
+
+type Losing<'a> = (&'a mut Samples<Sounding>, &'a Rays, &'a mut MissingReturns, Option<&'a Stopped>);
+
+fn lose(mut sonars: Query<'_, '_, Losing<'_>>) {
+    for (mut samples, rays, mut missing, stopped) in &mut sonars {
+        for (number, ((step, sounding), ray)) in samples.steps().zip(&rays.0).enumerate() {
+            if missing.loses(step, ray, sounding.range_m, Stopped::has(stopped, number)) {
+                sounding.range_m = None;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{Dive, assert_share};
+
+    fn lost(dive: &Dive, keys: &str) -> Vec<bool> {
+        let dived = dive.dive(&format!("[effects.missing_returns]\n{keys}"));
+        dived.ranges_m(0).iter().map(Option::is_none).collect()
+    }
+
+    #[test]
+    fn a_share_is_lost_each_on_its_own() {
+        let dive = Dive { seconds: 500.0, ..Dive::with_head() };
+        let lost = lost(&dive, "share = 0.3");
+        assert_share(lost.iter().filter(|lost| **lost).count(), lost.len(), 0.3);
+        let after: Vec<bool> = lost.windows(2).filter(|pair| pair[0]).map(|pair| pair[1]).collect();
+        assert_share(after.iter().filter(|lost| **lost).count(), after.len(), 0.3);
+    }
+
+    #[test]
+    fn runs_have_their_mean_length_and_keep_the_share() {
+        let (share, mean) = (0.2, 8.0);
+        let dive = Dive { seconds: 2000.0, ..Dive::with_head() };
+        let lost = lost(&dive, "share = 0.2\nmean_run = 8");
+        let runs: Vec<usize> = lost
+            .chunk_by(|a, b| a == b)
+            .filter(|run| run.first() == Some(&true))
+            .map(<[bool]>::len)
+            .collect();
+        let (count, whole) = (runs.len() as f64, lost.len() as f64);
+        // Lengths are geometric: variance mean (mean - 1).
+        let found = runs.iter().sum::<usize>() as f64 / count;
+        assert!((found - mean).abs() < 5.0 * math::sqrt(mean * (mean - 1.0) / count), "{found}");
+        assert_share(runs.iter().filter(|run| **run == 1).count(), runs.len(), 1.0 / mean);
+        // The share's variance is that of independent pings, by (1 + r) / (1 - r), r the chain's correlation.
+        let chain = Runs::new(share, mean);
+        let correlation = chain.go_on - chain.begin;
+        let variance = share * (1.0 - share) / whole * (1.0 + correlation) / (1.0 - correlation);
+        let found = runs.iter().sum::<usize>() as f64 / whole;
+        assert!((found - share).abs() < 5.0 * math::sqrt(variance), "{found}");
+    }
+
+    #[test]
+    fn grazing_pings_are_lost_by_their_incidence() {
+        let dive = Dive { seconds: 500.0, ..Dive::with_head() };
+        let effects = "[effects.missing_returns]\ngrazing_from_deg = 20\ngrazing_to_deg = 40";
+        let mut bands = [(0, 0, 0.0); 10];
+        for row in &dive.dive(effects).rows {
+            let (hit, _) = row.wall().unwrap();
+            let headrace_sensor::measurement::Sounding { angle_rad, range_m, .. } =
+                row.sounding.unwrap().measured;
+            // A wall of the rectangle: incidence from the angle to the nearest axis.
+            let across = math::sin(angle_rad).abs();
+            let square = if hit.normal.z().abs() > 0.5 { math::cos(angle_rad).abs() } else { across };
+            let incidence_deg = math::acos(square).to_degrees();
+            let ramp = ((incidence_deg - 20.0) / 20.0).clamp(0.0, 1.0);
+            let band = &mut bands[usize::try_from(math::floor_to_i64(incidence_deg / 5.1)).unwrap()];
+            *band = (band.0 + usize::from(range_m.is_none()), band.1 + 1, band.2 + ramp);
+        }
+        for (lost, of, expected) in bands.into_iter().filter(|(_, of, _)| *of > 0) {
+            let probability = expected / of as f64;
+            assert_share(lost, of, probability);
+        }
+        assert!(bands[0].1 > 0 && bands[8].1 > 0);
+    }
+
+    #[test]
+    fn far_walls_are_lost_sharply_where_the_ramp_has_no_length() {
+        let dive = Dive::with_head();
+        let base = dive.dive("").ranges_m(0);
+        let lost = lost(&dive, "far_from_m = 3\nfar_to_m = 3");
+        for (was, lost) in base.iter().zip(lost) {
+            assert_eq!(lost, was.unwrap() >= 3.0);
+        }
+    }
+
+    #[test]
+    fn slices_dont_matter() {
+        Dive::with_head().assert_slices_dont_matter("[effects.missing_returns]\nshare = 0.3\nmean_run = 20");
+    }
+
+    #[test]
+    fn losses_that_cannot_be_are_refused() {
+        let refusal = |keys: &str| Dive::with_head().refusal(&format!("[effects.missing_returns]\n{keys}"));
+        assert!(refusal("").contains("must be above zero, or"));
+        assert!(refusal("share = 0.99").contains("from 0 to 0.95"));
+        assert!(refusal("share = 0.9\nmean_run = 2").contains("must be at least 9.00"));
+        assert!(refusal("mean_run = 2").contains("only with a share"));
+        assert!(refusal("grazing_from_deg = 50").contains("is needed with grazing_from_deg"));
+        assert!(refusal("far_from_m = 9\nfar_to_m = 8").contains("must not be below far_from_m"));
+        assert!(refusal("share = 0.1\nshares = 0.1").contains("is not a key here"));
+    }
+}

@@ -1,0 +1,109 @@
+//! The effects that a scene may name: one file each, each a plugin of its own. One that isn't named adds no system, no
+//! component and no random number.
+
+#![allow(clippy::needless_pass_by_value, reason = "bevy hands systems their arguments by value")]
+
+mod behind;
+mod effect;
+mod geometry;
+mod keys;
+mod targets;
+
+mod beam_cone;
+mod byte_errors;
+mod clock_drift;
+mod current;
+mod depth_steps;
+mod head_stalls;
+mod imu_bias;
+mod imu_noise;
+mod interference;
+mod line_delay;
+mod magnetic_disturbance;
+mod missing_returns;
+mod motion_within_turn;
+mod multipath;
+mod occlusion;
+mod outliers;
+mod pilot_drift;
+mod range_noise;
+mod range_quantisation;
+mod sector_end_slowing;
+mod side_lobes;
+mod skipped_steps;
+mod sound_speed_error;
+mod start_phase_error;
+mod tether_lag;
+mod tether_quantum;
+mod tether_slack;
+mod tether_slip;
+
+use headrace_config::{ConfigError, Section};
+
+use crate::facts::Facts;
+
+pub use beam_cone::Cone;
+pub use effect::{Effect, EffectKind};
+pub use targets::PerSensor;
+
+/// All effects. Within a stage, systems run in this order, whatever the order of the scene.
+pub const KINDS: [&dyn EffectKind; 28] = [
+    // How heads turn, and from where they look.
+    &start_phase_error::Kind,
+    &sector_end_slowing::Kind,
+    &skipped_steps::Kind,
+    &head_stalls::Kind,
+    &motion_within_turn::Kind,
+    // What a beam meets.
+    &beam_cone::Kind,
+    &occlusion::Kind,
+    // The sound's paths.
+    &multipath::Kind,
+    &side_lobes::Kind,
+    &interference::Kind,
+    // What a sonar makes of it.
+    &missing_returns::Kind,
+    &outliers::Kind,
+    &sound_speed_error::Kind,
+    &range_noise::Kind,
+    &range_quantisation::Kind,
+    // The vehicle's trajectory.
+    &current::Kind,
+    &pilot_drift::Kind,
+    // Depth and motion.
+    &depth_steps::Kind,
+    &imu_noise::Kind,
+    &imu_bias::Kind,
+    &magnetic_disturbance::Kind,
+    // The cable.
+    &tether_slack::Kind,
+    &tether_slip::Kind,
+    &tether_lag::Kind,
+    &tether_quantum::Kind,
+    // Clocks and lines.
+    &clock_drift::Kind,
+    &line_delay::Kind,
+    &byte_errors::Kind,
+];
+
+/// The effects that a scene names, in the order of [`KINDS`].
+pub struct Named(pub(crate) Vec<(&'static dyn EffectKind, Box<dyn Effect>)>);
+
+/// Reads the `[effects]` table.
+///
+/// Errors: a name that is no effect; see [`EffectKind::read`].
+pub(crate) fn parse(section: Option<Section<'_>>, facts: &Facts) -> Result<Named, ConfigError> {
+    let mut named = Vec::new();
+    let Some(section) = section else { return Ok(Named(named)) };
+    for kind in KINDS {
+        let tables = section.tables(kind.name())?;
+        if !tables.is_empty() {
+            named.push((kind, kind.read(tables, facts)?));
+        }
+    }
+    section.finish()?;
+    Ok(Named(named))
+}
+
+#[cfg(test)]
+mod tests;

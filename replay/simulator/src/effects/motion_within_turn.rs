@@ -1,0 +1,43 @@
+//! Heads look from where the vehicle is at each ping.
+
+use headrace_config::{ConfigError, Section};
+use headrace_sensor::device::Sense;
+
+use super::effect::{Effect, EffectKind};
+use super::targets::targets;
+use crate::builder::Builder;
+use crate::error::SceneError;
+use crate::facts::Facts;
+use crate::stages::{AIM_HELD, Stage, aim_moving};
+
+/// Heads look from where the vehicle is at each ping. Without it, a turn is one picture, taken where the vehicle was as
+/// the turn began, as simulators do that take a scan at once.
+pub(super) struct Kind;
+
+struct Moving;
+
+impl EffectKind for Kind {
+    fn name(&self) -> &'static str {
+        "motion_within_turn"
+    }
+
+    fn summary(&self) -> &'static str {
+        "the vehicle goes on while a head turns; without it, a turn is one picture from where it began"
+    }
+
+    fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError> {
+        for table in tables {
+            targets(&table, facts, &[Sense::Head])?;
+            table.finish()?;
+        }
+        Ok(Box::new(Moving))
+    }
+}
+
+impl Effect for Moving {
+    fn build(&self, sim: &mut Builder<'_>) -> Result<(), SceneError> {
+        sim.replace(AIM_HELD);
+        sim.system(Stage::Aim, aim_moving);
+        Ok(())
+    }
+}

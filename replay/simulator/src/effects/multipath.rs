@@ -1,0 +1,210 @@
+//! Some echoes come by way of two walls.
+
+use bevy_ecs::prelude::{Component, Query, Res};
+use headrace_config::{ConfigError, Section};
+use headrace_sensor::device::Sense;
+use headrace_sensor::measurement::Sounding;
+
+use super::effect::{Effect, EffectKind};
+use super::geometry::{mirrored, squareness};
+use super::occlusion::Stopped;
+use super::targets::PerSensor;
+use crate::builder::Builder;
+use crate::environment::Environment;
+use crate::error::SceneError;
+use crate::facts::Facts;
+use crate::random::Stream;
+use crate::sensing::{Ray, Rays, Reach, Samples, Scenery};
+use crate::stages::Stage;
+
+/// Some echoes come by way of two walls: the first mirrors the beam, the second sends it straight back to the sonar. The
+/// range is half of that way, (r1 + r12 + r2) / 2. It is taken where the direct echo is too weak, all the more at
+/// grazing incidence: the direct echo's strength goes with the cosine of incidence.
+///
+/// Keys: the share of the returns where the beam is square to the wall, `square_share` (0), and where it is along the
+/// wall, `share` (0.1), both from 0 to 1; between, it goes with 1 less the cosine of incidence. The echo stays the
+/// direct one where the way round meets no wall within reach, or the second wall isn't seen by the sonar.
+/// Source: geometry of mirrors; the law of the direct echo is Lambert's.
+pub(super) struct Kind;
+
+/// Rays off a wall begin this much before it, m.
+const OFF_WALL_M: f64 = 1e-6;
+
+#[derive(Debug, Clone, Copy)]
+struct Parameters {
+    share: f64,
+    square_share: f64,
+}
+
+#[derive(Component)]
+struct Multipath {
+    parameters: Parameters,
+    stream: Stream,
+}
+
+impl EffectKind for Kind {
+    fn name(&self) -> &'static str {
+        "multipath"
+    }
+
+    fn summary(&self) -> &'static str {
+        "some echoes come by way of two walls"
+    }
+
+    fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError> {
+        let senses = [Sense::Head, Sense::Echosounder];
+        Ok(Box::new(PerSensor::read(tables, facts, &senses, |table| {
+            let share = table.number("share", 0.0..=1.0)?.unwrap_or(0.1);
+            let square_share = table.number("square_share", 0.0..=1.0)?.unwrap_or(0.0);
+            if share == 0.0 && square_share == 0.0 {
+                return Err(table.invalid("share", "or square_share must be above zero"));
+            }
+            Ok(Parameters { share, square_share })
+        })?))
+    }
+}
+
+impl Effect for PerSensor<Parameters> {
+    fn build(&self, sim: &mut Builder<'_>) -> Result<(), SceneError> {
+        for (source, parameters) in &self.0 {
+            let stream = sim.stream(*source);
+            sim.insert(*source, Multipath { parameters: *parameters, stream });
+        }
+        sim.system(Stage::Hear, bounce);
+        Ok(())
+    }
+}
+
+/// The range by way of two walls of a beam that has met the first one, m; `None` where there is no such way within
+/// `far_m`.
+fn double_bounce_m(environment: &Environment, ray: &Ray, far_m: f64) -> Option<f64> {
+    let first = ray.hit?;
+    let from = first.point + first.normal.scaled(OFF_WALL_M);
+    let onward = mirrored(ray.direction, first.normal);
+    let second = environment.cast(from, onward, 2.0 * far_m)?;
+    let seen_from = second.point + second.normal.scaled(OFF_WALL_M);
+    if environment.first_obstruction(seen_from, ray.origin).is_some() {
+        return None;
+    }
+    let range_m = (first.range_m + second.range_m + (second.point - ray.origin).norm()) / 2.0;
+    (range_m <= far_m).then_some(range_m)
+}
+
+type Bouncing<'a> = (&'a mut Samples<Sounding>, &'a Rays, &'a Reach, &'a Multipath, Option<&'a Stopped>);
+
+fn bounce(scenery: Res<'_, Scenery>, mut sonars: Query<'_, '_, Bouncing<'_>>) {
+    for (mut samples, rays, Reach(far_m), multipath, stopped) in &mut sonars {
+        let Parameters { share, square_share } = multipath.parameters;
+        for (number, ((step, sounding), ray)) in samples.steps().zip(&rays.0).enumerate() {
+            let Some(hit) = ray.hit.filter(|_| !Stopped::has(stopped, number)) else { continue };
+            let [chance, _] = multipath.stream.at(step).uniform();
+            let square = squareness(ray.direction, hit.normal);
+            if chance < share + (square_share - share) * square {
+                let bounced_m = double_bounce_m(&scenery.environment, ray, *far_m);
+                sounding.range_m = bounced_m.or(sounding.range_m);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use headrace_geometry::frames::{Point3, Vec3};
+    use headrace_geometry::math;
+    use headrace_geometry::tunnel::shapes;
+
+    use super::*;
+    use crate::testing::{Dive, assert_share};
+
+    fn cast(environment: &Environment, [y, z]: [f64; 2], angle_rad: f64) -> Ray {
+        let (sine, cosine) = math::sin_cos(angle_rad);
+        let (origin, direction) = (Point3::new(5.0, y, z), Vec3::new(0.0, sine, -cosine));
+        Ray { origin, direction, hit: environment.cast(origin, direction, 100.0) }
+    }
+
+    /// Unfolded at the walls that are met, a mirrored beam is straight, through the rooms next door.
+    #[test]
+    fn verif_in_a_rectangle_the_way_is_that_to_an_image() {
+        let (half_width_m, height_m, [y, z]) = (3.0, 5.0, [0.7, 2.1]);
+        let room = Environment::straight(shapes::rectangle(2.0 * half_width_m, height_m).unwrap());
+        for k in 0..720 {
+            let angle_rad = (f64::from(k) + 0.37) * math::TAU / 720.0;
+            let ray = cast(&room, [y, z], angle_rad);
+            let [dy, dz] = [ray.direction.y(), ray.direction.z()];
+            // Along the unfolded beam, when it crosses walls across and along.
+            let to_side = if dy > 0.0 { (half_width_m - y) / dy } else { (-half_width_m - y) / dy };
+            let to_flat = if dz > 0.0 { (height_m - z) / dz } else { -z / dz };
+            let mut crossings =
+                [to_side, to_side + 2.0 * half_width_m / dy.abs(), to_flat, to_flat + height_m / dz.abs()];
+            crossings.sort_by(f64::total_cmp);
+            let along_m = crossings[1];
+            // The place there, folded back into the room.
+            let fold = |at: f64, period: f64| {
+                let at = math::wrap(at, 2.0 * period);
+                if at > period { 2.0 * period - at } else { at }
+            };
+            let back_y = fold(y + along_m * dy + half_width_m, 2.0 * half_width_m) - half_width_m;
+            let back_z = fold(z + along_m * dz, height_m);
+            let expected_m = f64::midpoint(along_m, math::hypot(back_y - y, back_z - z));
+            let found_m = double_bounce_m(&room, &ray, 100.0).unwrap();
+            assert!((found_m - expected_m).abs() < 1e-5, "{k}: {found_m} {expected_m}");
+        }
+    }
+
+    #[test]
+    fn verif_in_a_circle_the_second_way_is_a_chord_of_the_same_incidence() {
+        let (radius_m, out_m) = (4.0, 1.5);
+        let pipe = Environment::straight(shapes::circle(radius_m).unwrap());
+        // The circle stands on the floor: its centre is a radius above it.
+        for k in 0..720 {
+            let angle_rad = (f64::from(k) + 0.37) * math::TAU / 720.0;
+            let ray = cast(&pipe, [out_m, radius_m], angle_rad);
+            // Sine of incidence by the law of sines; a chord's ends are seen from the centre under pi - 2 i.
+            let incidence_rad = math::asin(out_m * ray.direction.z().abs() / radius_m);
+            let chord_m = 2.0 * radius_m * math::cos(incidence_rad);
+            let first_m = radius_m * math::cos(incidence_rad) - out_m * ray.direction.y();
+            // From the first point back along the beam and on at twice the incidence: law of cosines.
+            let cosine = math::cos(2.0 * incidence_rad);
+            let back_m = math::sqrt(first_m * first_m + chord_m * chord_m - 2.0 * first_m * chord_m * cosine);
+            let found_m = double_bounce_m(&pipe, &ray, 100.0).unwrap();
+            assert!((found_m - (first_m + chord_m + back_m) / 2.0).abs() < 1e-5, "{k}");
+        }
+        let ray = cast(&pipe, [0.0, radius_m], 0.3);
+        assert!((double_bounce_m(&pipe, &ray, 100.0).unwrap() - 2.0 * radius_m).abs() < 1e-5);
+        assert!(double_bounce_m(&pipe, &ray, 7.9).is_none());
+    }
+
+    #[test]
+    fn the_share_grows_with_incidence() {
+        let dive = Dive {
+            seconds: 500.0,
+            tunnel: "profile = \"rectangle\"\nwidth_m = 4\nheight_m = 3",
+            ..Dive::with_head()
+        };
+        let effects = "[effects.multipath]\nshare = 0.5\nsquare_share = 0.1";
+        let (mut near, mut oblique) = ((0, 0, 0.0), (0, 0, 0.0));
+        for row in &dive.dive(effects).rows {
+            let angle_rad = row.sounding.unwrap().measured.angle_rad;
+            let flat = row.wall().unwrap().0.normal.z().abs() > 0.5;
+            let square = if flat { math::cos(angle_rad).abs() } else { math::sin(angle_rad).abs() };
+            let band = if square > 0.9 { &mut near } else { &mut oblique };
+            *band = (band.0 + usize::from(!row.causes.is_empty()), band.1 + 1, band.2 + 0.5 - 0.4 * square);
+        }
+        for (bounced, of, expected) in [near, oblique] {
+            assert_share(bounced, of, expected / of as f64);
+        }
+    }
+
+    #[test]
+    fn slices_dont_matter() {
+        Dive::with_head().assert_slices_dont_matter("[effects.multipath]\nshare = 0.5");
+    }
+
+    #[test]
+    fn no_share_and_too_much_are_refused() {
+        let refusal = |keys: &str| Dive::with_head().refusal(&format!("[effects.multipath]\n{keys}"));
+        assert!(refusal("share = 0").contains("must be above zero"));
+        assert!(refusal("share = 2").contains("from 0 to 1"));
+        assert!(refusal("bounces = 2").contains("is not a key here"));
+    }
+}

@@ -1,0 +1,76 @@
+//! Ranges scatter about the true one.
+
+use bevy_ecs::prelude::{Component, Query};
+use headrace_config::{ConfigError, Section};
+use headrace_sensor::device::Sense;
+use headrace_sensor::measurement::Sounding;
+
+use super::effect::{Effect, EffectKind};
+use super::targets::PerSensor;
+use crate::builder::Builder;
+use crate::error::SceneError;
+use crate::facts::Facts;
+use crate::random::Stream;
+use crate::sensing::Samples;
+use crate::stages::Stage;
+
+/// Ranges scatter about the true one: normally, by a length and by a share of the range.
+pub(super) struct Kind;
+
+#[derive(Debug, Clone, Copy)]
+struct Parameters {
+    sd_m: f64,
+    sd_share: f64,
+}
+
+#[derive(Component)]
+struct RangeNoise {
+    parameters: Parameters,
+    stream: Stream,
+}
+
+impl EffectKind for Kind {
+    fn name(&self) -> &'static str {
+        "range_noise"
+    }
+
+    fn summary(&self) -> &'static str {
+        "ranges scatter about the true one"
+    }
+
+    fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError> {
+        let senses = [Sense::Head, Sense::Echosounder];
+        Ok(Box::new(PerSensor::read(tables, facts, &senses, |table| {
+            let sd_m = table.number("sd_m", 0.0..=1.0)?.unwrap_or(0.0);
+            let sd_share = table.number("sd_share", 0.0..=0.5)?.unwrap_or(0.0);
+            if sd_m == 0.0 && sd_share == 0.0 {
+                return Err(table.invalid("sd_m", "or sd_share must be above zero"));
+            }
+            Ok(Parameters { sd_m, sd_share })
+        })?))
+    }
+}
+
+impl Effect for PerSensor<Parameters> {
+    fn build(&self, sim: &mut Builder<'_>) -> Result<(), SceneError> {
+        for (source, parameters) in &self.0 {
+            let stream = sim.stream(*source);
+            sim.insert(*source, RangeNoise { parameters: *parameters, stream });
+        }
+        sim.system(Stage::Hear, scatter);
+        Ok(())
+    }
+}
+
+fn scatter(mut sonars: Query<'_, '_, (&mut Samples<Sounding>, &RangeNoise)>) {
+    for (mut samples, noise) in &mut sonars {
+        let Parameters { sd_m, sd_share } = noise.parameters;
+        for (step, sounding) in samples.steps() {
+            if let Some(range_m) = &mut sounding.range_m {
+                let [by, _] = noise.stream.at(step).normal();
+                // A range is never below nothing.
+                *range_m = (*range_m + by * (sd_m + sd_share * *range_m)).max(0.0);
+            }
+        }
+    }
+}

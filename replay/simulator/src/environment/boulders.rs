@@ -1,0 +1,228 @@
+//! Boulders: one, many, or the pieces of a heap.
+
+use headrace_config::{ConfigError, Section};
+use headrace_geometry::math::{self, TAU};
+
+use super::frame::Frame;
+use super::ground::Ground;
+use super::heaps::Heap;
+use super::keys;
+use super::placing::Placed;
+use super::shapes::Solid;
+use super::widths::floor_m;
+
+/// Sizes of a boulder, m.
+const SIZE_M: core::ops::RangeInclusive<f64> = 0.01..=20.0;
+/// Share of a boulder's thickness that is below the wall, unless given.
+const SUNK: f64 = 0.3;
+/// Scattered boulders are at least this share of their length wide and thick.
+const FLATTEST: f64 = 0.5;
+
+/// An ellipsoid on the wall.
+struct Boulder {
+    chainage_m: f64,
+    sigma_m: f64,
+    /// Full diameters: along the tunnel, along the wall, across it, m.
+    size_m: [f64; 3],
+    /// Turned about the wall's normal.
+    yaw_rad: f64,
+    sunk: f64,
+}
+
+/// Numbers that look random and follow from a seed: SplitMix64.
+///
+/// Source: Steele, Lea, Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014.
+struct Scatter(u64);
+
+/// What many boulders have in common.
+struct Field {
+    from_m: f64,
+    to_m: f64,
+    /// Extent along the wall about the floor's centre, m.
+    width_m: f64,
+    count: i64,
+    size_m: [f64; 2],
+    sunk: f64,
+    seed: u64,
+}
+
+/// Reads one boulder.
+///
+/// Errors: a key missing or out of range.
+pub(super) fn one(
+    table: &Section<'_>,
+    ground: Ground<'_>,
+    feature: u16,
+) -> Result<Placed<Solid>, ConfigError> {
+    let boulder = Boulder {
+        chainage_m: keys::chainage_m(table, ground.length_m)?,
+        sigma_m: table.number("sigma_m", -500.0..=500.0)?.unwrap_or(0.0),
+        size_m: parse_size(table)?,
+        yaw_rad: table.number("yaw_deg", -360.0..=360.0)?.unwrap_or(0.0).to_radians(),
+        sunk: parse_sunk(table)?,
+    };
+    Ok(boulder.placed(ground, feature))
+}
+
+/// Reads a floor full of boulders.
+///
+/// Errors: a key missing or out of range.
+pub(super) fn many(
+    table: &Section<'_>,
+    ground: Ground<'_>,
+    feature: u16,
+) -> Result<Vec<Placed<Solid>>, ConfigError> {
+    let from_m = keys::length_m(table, "from_m", 0.0..=ground.length_m)?;
+    let to_m = keys::length_m(table, "to_m", 0.0..=ground.length_m)?;
+    if to_m <= from_m {
+        return Err(table.invalid("to_m", "must be more than from_m"));
+    }
+    let profile = ground.tube.profile();
+    let width_m = table.number("width_m", 0.0..=profile.perimeter_m())?;
+    let field = Field {
+        from_m,
+        to_m,
+        width_m: width_m.unwrap_or_else(|| floor_m(profile)),
+        count: table.required("count", table.integer("count", 1..=100_000)?)?,
+        size_m: table.required("size_m", parse_sizes(table)?)?,
+        sunk: parse_sunk(table)?,
+        seed: parse_seed(table)?,
+    };
+    Ok(field.scatter(ground, feature))
+}
+
+/// Reads the pieces of a heap, which lie on its inner half.
+///
+/// Errors: a key missing or out of range.
+pub(super) fn pieces(
+    table: &Section<'_>,
+    ground: Ground<'_>,
+    heap: Option<&Heap>,
+) -> Result<Vec<Placed<Solid>>, ConfigError> {
+    let count = table.integer("pieces", 0..=10_000)?.unwrap_or(0);
+    let size_m = parse_sizes(table)?.unwrap_or([0.1, 0.3]);
+    let (sunk, seed) = (parse_sunk(table)?, parse_seed(table)?);
+    let Some(heap) = heap else { return Ok(Vec::new()) };
+    let field = Field {
+        from_m: heap.chainage_m - heap.length_m / 4.0,
+        to_m: heap.chainage_m + heap.length_m / 4.0,
+        width_m: heap.width_m / 2.0,
+        count,
+        size_m,
+        sunk,
+        seed,
+    };
+    Ok(field.scatter(ground, heap.feature))
+}
+
+impl Boulder {
+    fn placed(&self, ground: Ground<'_>, feature: u16) -> Placed<Solid> {
+        let half = self.size_m.map(|diameter| diameter / 2.0);
+        let (wall, [ny, nz]) = ground.tube.wall_place(self.chainage_m, self.sigma_m);
+        let above_m = half[2] * (1.0 - 2.0 * self.sunk);
+        let section = ground.frame(self.chainage_m, [wall[0] + above_m * ny, wall[1] + above_m * nz]);
+        // Across the wall, along it, and along the tunnel, before it is turned.
+        let normal = section.outwards([0.0, ny, nz]);
+        let (sin, cos) = math::sin_cos(self.yaw_rad);
+        let length = section.outwards([cos, -sin * nz, sin * ny]);
+        let width = section.outwards([-sin, -cos * nz, cos * ny]);
+        let frame = Frame { origin: section.origin, axes: [length, width, normal] };
+        let reach_m = half.iter().copied().fold(0.0, f64::max);
+        let span_m = ground.span_m(self.chainage_m, reach_m);
+        Placed { shape: Solid::Ellipsoid(frame, half), feature, span_m }
+    }
+}
+
+impl Field {
+    fn scatter(&self, ground: Ground<'_>, feature: u16) -> Vec<Placed<Solid>> {
+        let mut scatter = Scatter(self.seed);
+        (0..self.count).map(|_| self.boulder(&mut scatter).placed(ground, feature)).collect()
+    }
+
+    /// The next boulder: sizes are as many in each octave; width and thickness are at least half the length.
+    fn boulder(&self, scatter: &mut Scatter) -> Boulder {
+        let chainage_m = scatter.between(self.from_m, self.to_m);
+        let sigma_m = scatter.between(-self.width_m / 2.0, self.width_m / 2.0);
+        let [least_m, most_m] = self.size_m;
+        let size_m = least_m * power(most_m / least_m, scatter.share());
+        let width_m = size_m * scatter.between(FLATTEST, 1.0);
+        let thickness_m = width_m * scatter.between(FLATTEST, 1.0);
+        Boulder {
+            chainage_m,
+            sigma_m,
+            size_m: [size_m, width_m, thickness_m],
+            yaw_rad: scatter.between(0.0, TAU),
+            sunk: self.sunk,
+        }
+    }
+}
+
+impl Scatter {
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    /// A number in [0, 1).
+    fn share(&mut self) -> f64 {
+        (self.next() >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    fn between(&mut self, least: f64, most: f64) -> f64 {
+        least + (most - least) * self.share()
+    }
+}
+
+/// `base` to the power of `exponent` in [0, 1), by square roots: exact rounding makes it the same everywhere.
+fn power(base: f64, exponent: f64) -> f64 {
+    let (mut result, mut root, mut rest) = (1.0, base, exponent);
+    for _ in 0..53 {
+        root = math::sqrt(root);
+        rest *= 2.0;
+        if rest >= 1.0 {
+            rest -= 1.0;
+            result *= root;
+        }
+    }
+    result
+}
+
+/// `size_m`, one number or three.
+fn parse_size(table: &Section<'_>) -> Result<[f64; 3], ConfigError> {
+    if let Ok(Some(size_m)) = table.number("size_m", SIZE_M) {
+        return Ok([size_m; 3]);
+    }
+    let sizes = table.numbers("size_m", SIZE_M);
+    match table.required("size_m", sizes.map_err(|_| size_problem(table))?)?.as_slice() {
+        [along_m, across_m, thick_m] => Ok([*along_m, *across_m, *thick_m]),
+        _ => Err(size_problem(table)),
+    }
+}
+
+fn size_problem(table: &Section<'_>) -> ConfigError {
+    let (least, most) = (SIZE_M.start(), SIZE_M.end());
+    let problem = format!(
+        "must be a diameter from {least} to {most}, or three: along the tunnel, along the wall, across the wall"
+    );
+    table.invalid("size_m", &problem)
+}
+
+/// `size_m`, the least and the most.
+fn parse_sizes(table: &Section<'_>) -> Result<Option<[f64; 2]>, ConfigError> {
+    match table.numbers("size_m", SIZE_M)?.as_deref() {
+        None => Ok(None),
+        Some([least_m, most_m]) if least_m <= most_m => Ok(Some([*least_m, *most_m])),
+        Some(_) => Err(table.invalid("size_m", "must be two numbers [least, most]")),
+    }
+}
+
+fn parse_sunk(table: &Section<'_>) -> Result<f64, ConfigError> {
+    Ok(table.number("sunk", 0.0..=0.9)?.unwrap_or(SUNK))
+}
+
+fn parse_seed(table: &Section<'_>) -> Result<u64, ConfigError> {
+    let seed = table.integer("seed", 0..=i64::MAX)?.unwrap_or(1);
+    Ok(seed.unsigned_abs())
+}

@@ -1,0 +1,76 @@
+//! The `[[tunnel.features]]` of a scene.
+
+use headrace_config::{ConfigError, Section};
+
+use super::ground::Ground;
+use super::heaps::Heap;
+use super::keys::{self, Kind};
+use super::placing::Placed;
+use super::shapes::{Hollow, Solid};
+use super::tube::Tube;
+use super::{boulders, openings};
+
+/// All that isn't wall.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Features {
+    pub(super) names: Vec<String>,
+    pub(super) solids: Vec<Placed<Solid>>,
+    pub(super) hollows: Vec<Placed<Hollow>>,
+}
+
+/// Reads what isn't wall from the tables, whose wall [`super::heaps`] and [`super::meshes`] have read, and checks that no
+/// key is left over. `bodies` are those that are meshes.
+///
+/// Errors: the first key that is missing, unknown or out of range, or what it describes can't be.
+pub(super) fn parse(
+    tables: Vec<Section<'_>>,
+    heaps: &[Heap],
+    bodies: Vec<Placed<Solid>>,
+    tube: &Tube,
+    length_m: f64,
+) -> Result<Features, ConfigError> {
+    let ground = Ground { tube, length_m };
+    let mut features = Features { solids: bodies, ..Features::default() };
+    for (number, table) in (0_u16..).zip(tables) {
+        let kind = keys::kind(&table)?;
+        features.names.push(keys::name(&table, number)?);
+        match kind {
+            Kind::Bulge | Kind::Mesh => {}
+            Kind::Boulder => features.solids.push(boulders::one(&table, ground, number)?),
+            Kind::Boulders => features.solids.extend(boulders::many(&table, ground, number)?),
+            Kind::Debris | Kind::Fall => {
+                let heap = heaps.iter().find(|heap| heap.feature == number);
+                features.solids.extend(boulders::pieces(&table, ground, heap)?);
+            }
+            Kind::RockTrap => {
+                let ditch = openings::rock_trap(&table, ground, number)?;
+                features.hollows.push(opening(ground, &table, ditch)?);
+            }
+            Kind::SideTunnel => {
+                let aside = openings::side_tunnel(&table, ground, number)?;
+                features.hollows.push(opening(ground, &table, aside)?);
+            }
+            Kind::Gate => {
+                let (slot, bulkhead) = openings::gate(&table, ground, number)?;
+                features.hollows.push(opening(ground, &table, slot)?);
+                features.solids.extend(bulkhead);
+            }
+        }
+        table.finish()?;
+    }
+    Ok(features)
+}
+
+/// The hollow, if the wall that it opens from is the tube's.
+fn opening(
+    ground: Ground<'_>,
+    table: &Section<'_>,
+    hollow: Placed<Hollow>,
+) -> Result<Placed<Hollow>, ConfigError> {
+    let (from_m, to_m) = hollow.span_m;
+    let Some(mesh) = ground.tube.mesh_within(from_m, to_m) else { return Ok(hollow) };
+    let problem = format!(
+        "opens within {from_m:.3} to {to_m:.3} m, where the wall is the mesh of tunnel.features[{mesh}]"
+    );
+    Err(table.invalid("chainage_m", &problem))
+}

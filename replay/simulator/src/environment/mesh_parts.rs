@@ -1,0 +1,77 @@
+//! Meshes as parts of the environment: bodies in the water, and walls in place of the tube's.
+
+use std::sync::Arc;
+
+use super::face::Face;
+use super::frame::Frame;
+use super::vector::{Ray, V3};
+use crate::mesh::Mesh;
+
+/// What is within a wall's end plane to rounding is taken as so far into the wall, m: in the plane itself the mesh is open.
+const INTO_M: f64 = 1e-7;
+
+/// A closed mesh in the water.
+#[derive(Debug, Clone)]
+pub(super) struct MeshBody {
+    pub(super) frame: Frame,
+    pub(super) mesh: Arc<Mesh>,
+}
+
+/// A mesh that is the tunnel's wall between two chainages.
+#[derive(Debug, Clone)]
+pub(super) struct MeshWall {
+    pub(super) feature: u16,
+    pub(super) from_m: f64,
+    pub(super) to_m: f64,
+    /// The same in the mesh's x.
+    pub(super) x_m: (f64, f64),
+    pub(super) frame: Frame,
+    pub(super) mesh: Arc<Mesh>,
+}
+
+impl MeshBody {
+    /// Where the ray first meets it: the distance, 0 when it begins inside, and the outward normal.
+    pub(super) fn meet(&self, ray: &Ray) -> Option<(f64, V3)> {
+        let local = self.frame.local_ray(ray);
+        let hit = self.mesh.cast(local.origin, local.direction, f64::MAX)?;
+        let range_m = if self.mesh.contains(local.origin) { 0.0 } else { hit.range_m };
+        Some((range_m, self.frame.outwards(hit.normal)))
+    }
+
+    /// Whether `point` is inside.
+    pub(super) fn contains(&self, point: V3) -> bool {
+        self.mesh.contains(self.frame.local(point))
+    }
+}
+
+impl MeshWall {
+    /// The feature.
+    pub(super) fn feature(&self) -> u16 {
+        self.feature
+    }
+
+    /// Chainages between which it is the wall, m.
+    pub(super) fn span_m(&self) -> (f64, f64) {
+        (self.from_m, self.to_m)
+    }
+
+    /// Whether a place between its end planes, or in one of them, is in the tunnel.
+    pub(super) fn holds(&self, point: V3) -> bool {
+        self.mesh.contains(self.between_ends(self.frame.local(point)))
+    }
+
+    /// From `t_m` along the ray, in the tunnel: where it meets the mesh before `until_m`, at which it passes an end.
+    pub(super) fn leave(&self, ray: &Ray, t_m: f64, until_m: f64) -> Option<(f64, Face)> {
+        let local = self.frame.local_ray(ray);
+        // From a place that the mesh surrounds, from which nothing leads but through the ends.
+        let from = self.between_ends(local.at(t_m));
+        let hit = self.mesh.cast(from, local.direction, until_m - t_m)?;
+        let face = Face { normal: self.frame.outwards(hit.normal), feature: Some(self.feature) };
+        Some(((t_m + hit.range_m).min(until_m), face))
+    }
+
+    fn between_ends(&self, [x, y, z]: V3) -> V3 {
+        let (low_m, high_m) = self.x_m;
+        [x.max(low_m + INTO_M).min(high_m - INTO_M), y, z]
+    }
+}

@@ -1,0 +1,191 @@
+//! Bodies in the water and hollows in the rock.
+//!
+//! A body offers where a ray first meets it, a hollow how far a ray that is inside it goes. A shape of another kind is a
+//! variant more of [`Solid`] or [`Hollow`].
+
+use headrace_geometry::math;
+use headrace_geometry::tunnel::{Profile, Yz};
+
+use super::frame::Frame;
+#[cfg(feature = "mesh")]
+use super::mesh_parts::MeshBody;
+use super::vector::{Ray, V3, along, dot, unit};
+
+/// By how much a ray's place may miss a hollow and still go on in it, m. A hollow's face may lie on the wall itself, as a
+/// ditch's upper one does on a flat floor; rounding must leave no skin between.
+pub(super) const SKIN_M: f64 = 1e-6;
+
+/// What stops a ray.
+#[derive(Debug, Clone)]
+pub(super) enum Solid {
+    /// An ellipsoid with these half diameters along the frame's axes, m.
+    Ellipsoid(Frame, V3),
+    /// A box with these half lengths along the frame's axes, m.
+    Block(Frame, V3),
+    /// Triangles around a body.
+    #[cfg(feature = "mesh")]
+    Mesh(MeshBody),
+}
+
+/// What a ray passes beyond the tunnel's wall.
+#[derive(Debug, Clone)]
+pub(super) enum Hollow {
+    /// A box with these half lengths along the frame's axes, m.
+    Block(Frame, V3),
+    /// A slot all round the tunnel.
+    Ring(Ring),
+}
+
+/// A short length of a wider tunnel: the profile scaled.
+#[derive(Debug, Clone)]
+pub(super) struct Ring {
+    /// Origin on the axis at z = 0; axes along the tunnel, left, up.
+    pub(super) frame: Frame,
+    /// Half its extent along the tunnel, m.
+    pub(super) half_width_m: f64,
+    /// The profile before scaling.
+    pub(super) profile: Profile,
+    /// The place (y, z) that lies at the profile's reference point.
+    pub(super) reference: Yz,
+    /// Scale about that place.
+    pub(super) scale: f64,
+}
+
+/// Ray parameters at which a ray enters and leaves a convex shape, with the outward normals there.
+struct Chord {
+    enter: (f64, V3),
+    leave: (f64, V3),
+}
+
+impl Solid {
+    /// Where the ray first meets it: the distance, 0 when it begins inside, and the outward normal.
+    pub(super) fn meet(&self, ray: &Ray) -> Option<(f64, V3)> {
+        let chord = match self {
+            Self::Ellipsoid(frame, half) => ellipsoid_chord(frame, *half, ray)?,
+            Self::Block(frame, half) => block_chord(frame, *half, ray)?,
+            #[cfg(feature = "mesh")]
+            Self::Mesh(body) => return body.meet(ray),
+        };
+        let (enter_m, normal) = chord.enter;
+        (chord.leave.0 > 0.0).then_some((enter_m.max(0.0), normal))
+    }
+
+    /// Whether `point` is inside.
+    pub(super) fn contains(&self, point: V3) -> bool {
+        match self {
+            Self::Ellipsoid(frame, half) => {
+                let local = frame.local(point);
+                let share: f64 = local.iter().zip(half).map(|(c, h)| (c / h) * (c / h)).sum();
+                share < 1.0
+            }
+            Self::Block(frame, half) => block_contains(frame, half, point),
+            #[cfg(feature = "mesh")]
+            Self::Mesh(body) => body.contains(point),
+        }
+    }
+}
+
+impl Hollow {
+    /// From `t_m` along the ray, which must be inside: where the ray leaves, and the normal towards the water there.
+    pub(super) fn leave(&self, ray: &Ray, t_m: f64) -> Option<(f64, V3)> {
+        match self {
+            Self::Block(frame, half) => {
+                let chord = block_chord(frame, *half, ray)?;
+                let (leave_m, normal) = chord.leave;
+                (chord.enter.0 <= t_m + SKIN_M && leave_m > t_m).then_some((leave_m, normal.map(|c| -c)))
+            }
+            Self::Ring(ring) => ring.leave(ray, t_m),
+        }
+    }
+
+    /// Whether `point` is inside.
+    pub(super) fn contains(&self, point: V3) -> bool {
+        match self {
+            Self::Block(frame, half) => block_contains(frame, half, point),
+            Self::Ring(ring) => ring.holds(ring.frame.local(point)),
+        }
+    }
+}
+
+impl Ring {
+    fn unscaled(&self, [_, y, z]: V3) -> Yz {
+        let [ry, rz] = self.profile.reference();
+        [ry + (y - self.reference[0]) / self.scale, rz + (z - self.reference[1]) / self.scale]
+    }
+
+    fn holds(&self, local: V3) -> bool {
+        local[0].abs() <= self.half_width_m && self.profile.contains(self.unscaled(local))
+    }
+
+    fn leave(&self, ray: &Ray, t_m: f64) -> Option<(f64, V3)> {
+        let ray = self.frame.local_ray(ray);
+        // A hair ahead: on its own wall, rounding decides whether a place is inside.
+        let t_m = t_m + SKIN_M;
+        let at = ray.at(t_m);
+        if !self.holds(at) {
+            return None;
+        }
+        let [dx, dy, dz] = ray.direction;
+        let side = dx.signum();
+        let slab_m = if dx == 0.0 { f64::INFINITY } else { (side * self.half_width_m - at[0]) / dx };
+        let wall = self
+            .profile
+            .cast_from_inside(self.unscaled(at), [dy / self.scale, dz / self.scale])
+            .filter(|hit| hit.range_m < slab_m);
+        let (further_m, normal) = match wall {
+            Some(hit) => (hit.range_m, [0.0, hit.normal[0], hit.normal[1]]),
+            None => (slab_m, [-side, 0.0, 0.0]),
+        };
+        Some((t_m + further_m, self.frame.outwards(normal)))
+    }
+}
+
+fn block_contains(frame: &Frame, half: &V3, point: V3) -> bool {
+    frame.local(point).iter().zip(half).all(|(c, h)| c.abs() <= *h)
+}
+
+fn block_chord(frame: &Frame, half: V3, ray: &Ray) -> Option<Chord> {
+    let local = frame.local_ray(ray);
+    let mut enter = (f64::NEG_INFINITY, [0.0; 3]);
+    let mut leave = (f64::INFINITY, [0.0; 3]);
+    for (k, axis) in frame.axes.iter().enumerate() {
+        let (at, slope) = (local.origin[k], local.direction[k]);
+        if slope == 0.0 {
+            if at.abs() > half[k] {
+                return None;
+            }
+            continue;
+        }
+        let side = slope.signum();
+        let (near, far) = ((-side * half[k] - at) / slope, (side * half[k] - at) / slope);
+        if near > enter.0 {
+            enter = (near, axis.map(|c| -side * c));
+        }
+        if far < leave.0 {
+            leave = (far, axis.map(|c| side * c));
+        }
+    }
+    (enter.0 < leave.0).then_some(Chord { enter, leave })
+}
+
+fn ellipsoid_chord(frame: &Frame, half: V3, ray: &Ray) -> Option<Chord> {
+    let local = frame.local_ray(ray);
+    // In units of the half diameters it is a sphere of radius one. The half chord follows from the ray's least distance
+    // to the centre, which loses no digits where b * b - a * c would.
+    let origin = [local.origin[0] / half[0], local.origin[1] / half[1], local.origin[2] / half[2]];
+    let slope = [local.direction[0] / half[0], local.direction[1] / half[1], local.direction[2] / half[2]];
+    let a = dot(slope, slope);
+    let middle = -dot(origin, slope) / a;
+    let nearest = along(origin, middle, slope);
+    let rest = 1.0 - dot(nearest, nearest);
+    if rest <= 0.0 {
+        return None;
+    }
+    let half_chord = math::sqrt(rest / a);
+    let end = |t: f64| {
+        let on_sphere = along(origin, t, slope);
+        let gradient = [on_sphere[0] / half[0], on_sphere[1] / half[1], on_sphere[2] / half[2]];
+        (t, unit(frame.outwards(gradient)))
+    };
+    Some(Chord { enter: end(middle - half_chord), leave: end(middle + half_chord) })
+}

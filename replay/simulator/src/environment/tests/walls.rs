@@ -1,0 +1,141 @@
+//! The wall: as designed, of another size, displaced, in bends, and all of it together.
+
+use super::oracle::{Oracle, Shape};
+use super::*;
+
+const CERAN: Shape = Shape::Trimmed(6.05, 10.4);
+
+#[test]
+fn the_plain_case_is_the_profile_bit_for_bit() {
+    let profile = shapes::ceran().unwrap();
+    let far_feature = "[tunnel]\n[[tunnel.features]]\nkind = \"boulder\"\nchainage_m = 90\nsize_m = 1";
+    let bare = Environment::straight(profile.clone());
+    let empty = parse("[tunnel]", &profile);
+    let featured = parse(far_feature, &profile);
+    let mut lcg = Lcg(1);
+    for _ in 0..20_000 {
+        let origin = [lcg.between(0.0, 50.0), lcg.between(-7.0, 7.0), lcg.between(-1.0, 9.0)];
+        let d = lcg.direction();
+        let wanted = profile.cast([origin[1], origin[2]], [d[1], d[2]]).map(|hit| hit.range_m);
+        let wanted = wanted.filter(|range| *range <= 30.0).map(f64::to_bits);
+        for environment in [&bare, &empty, &featured] {
+            let range = environment.range_m(to_point(origin), to_vec(d), 30.0);
+            assert_eq!(range.map(f64::to_bits), wanted, "{origin:?} {d:?}");
+            let hit = environment.cast(to_point(origin), to_vec(d), 30.0);
+            assert_eq!(hit.map(|hit| hit.range_m.to_bits()), wanted);
+        }
+    }
+    assert!(bare.range_m(Point3::new(0.0, 0.0, 3.0), Vec3::new(1.0, 0.0, 0.0), 1e9).is_none());
+}
+
+#[test]
+fn another_tunnel_than_the_design_stands_as_built() {
+    let text = "[tunnel.as_built]\nprofile = \"circle\"\nradius_m = 4";
+    let environment = parse(text, &shapes::ceran().unwrap());
+    Oracle::new(Shape::Circle(4.0)).compare(&environment, 2, 1_000, [0.0, 50.0]);
+    let mut oracle = Oracle::new(Shape::Circle(4.0));
+    oracle.stations = vec![(10.0, 0.5), (20.0, 1.0), (40.0, 1.5)];
+    let stations = "\n[[tunnel.stations]]\nchainage_m = 10\nscale = 0.5\n[[tunnel.stations]]\nchainage_m = 20\n\
+                    scale = 1\n[[tunnel.stations]]\nchainage_m = 40\nscale = 1.5";
+    let environment = parse(&format!("{text}{stations}"), &shapes::ceran().unwrap());
+    oracle.compare(&environment, 3, 3_000, [0.0, 50.0]);
+}
+
+#[test]
+fn stations_change_the_size() {
+    for (seed, shape) in [(4, CERAN), (5, Shape::Rectangle(9.0, 4.0))] {
+        let mut oracle = Oracle::new(shape);
+        oracle.stations = vec![(10.0, 1.0), (18.0, 0.6), (25.0, 0.6), (33.0, 1.2)];
+        let table = |(chainage, scale): &(f64, f64)| {
+            format!("[[tunnel.stations]]\nchainage_m = {chainage}\nscale = {scale}\n")
+        };
+        let text: String = oracle.stations.iter().map(table).collect();
+        oracle.compare(&parse(&text, &shape.profile()), seed, 3_000, [2.0, 45.0]);
+    }
+}
+
+fn bulge(b: &[f64; 5]) -> String {
+    format!(
+        "[[tunnel.features]]\nkind = \"bulge\"\nchainage_m = {}\nlength_m = {}\nsigma_m = {}\nwidth_m = {}\ndepth_m = {}\n",
+        b[0], b[1], b[2], b[3], b[4]
+    )
+}
+
+#[test]
+fn bulges_displace_the_wall() {
+    for (seed, shape) in [(6, CERAN), (7, Shape::Rectangle(9.0, 4.0)), (8, Shape::Circle(3.0))] {
+        let mut oracle = Oracle::new(shape);
+        // Inwards, outwards, over the floor's seam, overlapping, and thin.
+        oracle.bulges = vec![
+            [10.0, 4.0, 9.0, 3.0, 1.0],
+            [13.0, 6.0, 11.0, 6.0, -2.0],
+            [17.0, 8.0, 0.5, 4.0, 1.2],
+            [20.0, 0.2, 0.0, 0.3, 0.15],
+            [20.0, 2.0, 8.0, 18.0, -0.5],
+        ];
+        let text: String = oracle.bulges.iter().map(bulge).collect();
+        let met = oracle.compare(&parse(&text, &shape.profile()), seed, 4_000, [6.0, 24.0]);
+        assert!(met[0] > 20 && met[1] > 20 && met[2] > 20 && met[4] > 20, "{met:?}");
+    }
+}
+
+#[test]
+fn a_thin_bulge_is_not_skipped() {
+    let environment = parse(&bulge(&[10.0, 0.02, 0.0, 0.02, 0.02]), &shapes::ceran().unwrap());
+    let centre = environment.design.reference();
+    let hit = cast(&environment, [10.0, centre[0], centre[1]], [0.0, 0.0, -1.0]).unwrap();
+    assert!((hit.range_m - (centre[1] - 0.02)).abs() < 1e-9 && hit.what == What::Feature(0), "{hit:?}");
+    // Along the floor, through the middle of it and over it.
+    let low = cast(&environment, [5.0, 0.0, 0.01], [1.0, 0.0, 0.0]).unwrap();
+    assert!((low.range_m - 4.995).abs() < 1e-9 && low.what == What::Feature(0), "{low:?}");
+    assert!(cast(&environment, [5.0, 0.0, 0.0201], [1.0, 0.0, 0.0]).is_none());
+}
+
+const BENDS: [(f64, f64); 5] =
+    [(8.0, 0.0), (12.0, -1.0 / 15.0), (5.0, 0.0), (20.0, 1.0 / 13.0), (6.0, -1.0 / 30.0)];
+
+fn bends() -> String {
+    let table = |(length, curvature): &(f64, f64)| {
+        if *curvature == 0.0 {
+            return format!("[[tunnel.axis]]\nlength_m = {length}\n");
+        }
+        let turn = (length * curvature).to_degrees();
+        format!("[[tunnel.axis]]\nradius_m = {:?}\nturn_deg = {turn:?}\n", 1.0 / curvature.abs())
+    };
+    BENDS.iter().map(table).collect()
+}
+
+#[test]
+fn the_wall_follows_the_bends() {
+    for (seed, shape) in [(9, CERAN), (10, Shape::Rectangle(9.0, 4.0)), (11, Shape::Circle(3.0))] {
+        let mut oracle = Oracle::new(shape);
+        oracle.axis = BENDS.to_vec();
+        oracle.compare(&parse(&bends(), &shape.profile()), seed, 3_000, [-5.0, 60.0]);
+    }
+}
+
+#[test]
+fn bends_stations_and_bulges_together() {
+    let shape = Shape::Trimmed(5.0, 8.0);
+    let mut oracle = Oracle::new(shape);
+    oracle.axis = BENDS.to_vec();
+    oracle.stations = vec![(5.0, 1.0), (15.0, 0.8), (40.0, 1.1)];
+    oracle.bulges =
+        vec![[12.0, 5.0, 15.0, 5.0, 1.0], [30.0, 8.0, 10.0, 6.0, -0.9], [31.0, 3.0, 9.0, 3.0, 1.0]];
+    let stations =
+        oracle.stations.iter().map(|(c, s)| format!("[[tunnel.stations]]\nchainage_m = {c}\nscale = {s}\n"));
+    let text: String = stations.chain([bends()]).chain(oracle.bulges.iter().map(bulge)).collect();
+    let met = oracle.compare(&parse(&text, &shape.profile()), 12, 4_000, [0.0, 50.0]);
+    assert!(met.iter().all(|count| *count > 5), "{met:?}");
+}
+
+#[test]
+fn sigma_is_the_designs_in_the_axis_chart() {
+    let design = shapes::ceran().unwrap();
+    let environment =
+        parse(&format!("{}[tunnel.as_built]\nprofile = \"circle\"\nradius_m = 4", bends()), &design);
+    for (chainage, y, z) in [(3.0, 1.0, 0.5), (17.0, -2.0, 6.0), (40.0, 2.0, 5.0)] {
+        let place = environment.axis().place(chainage, [y, z]);
+        assert!((environment.sigma_m(place) - design.sigma_of([y, z])).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,471 @@
+//! The tunnel's wall: a profile that follows the axis, changes its size and is displaced in places.
+//!
+//! The gauge of a place is its distance from the reference point over the wall's in the same direction: below 1 in the
+//! tunnel, 1 on the wall. Where axis and size don't change and nothing is displaced, the wall is found in closed form.
+//! Elsewhere the gauge is followed along the ray in steps of (1 - gauge) over a bound on its slope, which can't pass the
+//! wall however thin what juts out of it; only the last steps are made at least [`LEAST_STEP_M`] long, so that a ray
+//! may cross rock unnoticed over less than that.
+//!
+//! Where a mesh is the wall, it has a stretch to itself. The planes across its ends are wall, too, where water on one side
+//! meets rock on the other, so that nothing gets out where profile and mesh don't fit.
+
+use headrace_geometry::math;
+use headrace_geometry::tunnel::{Profile, Yz};
+
+use super::axis::{Axis, Piece, Station};
+use super::bulge::Bulge;
+use super::face::Face;
+use super::mesh_parts::MeshWall;
+use super::stations::Scales;
+use super::steepness::Steepness;
+use super::vector::{Ray, V3, unit};
+use super::widths::half_width_m;
+
+/// The least step along a ray, m.
+const LEAST_STEP_M: f64 = 1e-4;
+/// To this the place where a ray meets the wall is found, m.
+const ROOT_M: f64 = 1e-11;
+/// A displacement of the wall from which on it is called the feature's, m.
+const FEATURE_M: f64 = 1e-3;
+/// Half the distance over which a displaced wall's normal is taken, m.
+const NORMAL_STEP_M: f64 = 1e-5;
+
+/// The wall along the whole tunnel.
+#[derive(Debug, Clone)]
+pub(super) struct Tube {
+    axis: Axis,
+    profile: Profile,
+    /// The floor's centre, about which the profile is scaled.
+    floor: Yz,
+    scales: Scales,
+    bulges: Vec<Bulge>,
+    /// None of which overlaps a bend, another scale, a bulge or another mesh.
+    meshes: Vec<MeshWall>,
+    /// Without gaps, from -infinity to +infinity of chainage.
+    stretches: Vec<Stretch>,
+}
+
+/// A length of tunnel in one piece of the axis, over which the scale is linear and the displacements are the same.
+#[derive(Debug, Clone)]
+struct Stretch {
+    from_m: f64,
+    piece: Piece,
+    /// The planes across its ends; none at infinity.
+    ends: [Option<Station>; 2],
+    /// Scale at its begin, or all along where the slope is zero.
+    scale: f64,
+    scale_slope_pm: f64,
+    /// Numbers of the bulges that reach into it.
+    bulges: Vec<usize>,
+    /// Number of the mesh that is the wall here.
+    mesh: Option<usize>,
+    /// Reciprocal of a bound on the gauge's slope, m.
+    step_m: f64,
+}
+
+/// How far a ray goes in the tube.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Passage {
+    /// Where it leaves, m along the ray; or as far as was asked.
+    pub(super) t_m: f64,
+    /// Whether there is wall.
+    pub(super) wall: bool,
+    /// What that is, where it takes no more to know.
+    pub(super) face: Option<Face>,
+    /// Chainage where it begins and ends, m.
+    pub(super) chainages_m: [f64; 2],
+}
+
+impl Tube {
+    /// The wall of `profile` along `axis`, but for where it is one of the meshes.
+    ///
+    /// Allocates: startup only.
+    pub(super) fn new(
+        axis: Axis,
+        profile: Profile,
+        scales: Scales,
+        bulges: Vec<Bulge>,
+        meshes: Vec<MeshWall>,
+    ) -> Self {
+        let floor = profile.point_at(0.0);
+        let mut breaks: Vec<f64> = axis.pieces().iter().map(|piece| piece.from_m).collect();
+        breaks.extend(scales.breaks());
+        breaks.extend(bulges.iter().flat_map(|bulge| [bulge.begin_m(), bulge.end_m()]));
+        // A mesh's stretch is one, though straight pieces of the axis may meet in it.
+        let spans: Vec<(f64, f64)> = meshes.iter().map(MeshWall::span_m).collect();
+        breaks.retain(|at_m| !spans.iter().any(|(from_m, to_m)| from_m < at_m && at_m < to_m));
+        breaks.extend(spans.iter().flat_map(|(from_m, to_m)| [*from_m, *to_m]));
+        breaks.sort_by(f64::total_cmp);
+        breaks.dedup();
+        let steepness = Steepness::new(&profile);
+        let mut tube = Self { axis, profile, floor, scales, bulges, meshes, stretches: Vec::new() };
+        let ends = breaks.iter().copied().skip(1).chain([f64::INFINITY]);
+        tube.stretches =
+            breaks.iter().zip(ends).map(|(from_m, to_m)| tube.stretch(*from_m, to_m, &steepness)).collect();
+        tube
+    }
+
+    fn stretch(&self, from_m: f64, to_m: f64, steepness: &Steepness) -> Stretch {
+        let middle_m = match (from_m.is_finite(), to_m.is_finite()) {
+            (true, true) => f64::midpoint(from_m, to_m),
+            (true, false) => from_m + 1.0,
+            (false, true) => to_m - 1.0,
+            (false, false) => 0.0,
+        };
+        let (_, piece) = self.axis.piece_at(middle_m);
+        let reaches = |bulge: &Bulge| bulge.begin_m() < to_m && from_m < bulge.end_m();
+        let bulges: Vec<usize> =
+            self.bulges.iter().enumerate().filter(|(_, bulge)| reaches(bulge)).map(|(k, _)| k).collect();
+        let scale_slope_pm = self.scales.slope_pm(from_m, to_m);
+        let near: Vec<Bulge> = bulges.iter().map(|k| self.bulges[*k]).collect();
+        let least_scale = self.scales.smallest(from_m, to_m);
+        let slope_pm = steepness.gauge_slope_pm(&near, least_scale, scale_slope_pm, piece.curvature_pm());
+        let end = |chainage_m: f64| chainage_m.is_finite().then(|| piece.station(chainage_m));
+        Stretch {
+            from_m,
+            piece: *piece,
+            ends: [end(from_m), end(to_m)],
+            scale: if scale_slope_pm == 0.0 { self.scales.at(middle_m) } else { self.scales.at(from_m) },
+            scale_slope_pm,
+            bulges,
+            mesh: self.mesh_over(from_m, to_m).map(|(number, _)| number),
+            step_m: 1.0 / slope_pm,
+        }
+    }
+
+    /// Number of the mesh that is the wall somewhere between two chainages, and the mesh.
+    fn mesh_over(&self, from_m: f64, to_m: f64) -> Option<(usize, &MeshWall)> {
+        let overlaps = |(begin_m, end_m): (f64, f64)| begin_m < to_m && from_m < end_m;
+        self.meshes.iter().enumerate().find(|(_, mesh)| overlaps(mesh.span_m()))
+    }
+
+    /// The feature whose mesh is the wall somewhere between two chainages.
+    pub(super) fn mesh_within(&self, from_m: f64, to_m: f64) -> Option<u16> {
+        self.mesh_over(from_m, to_m).map(|(_, mesh)| mesh.feature())
+    }
+
+    /// The axis.
+    pub(super) fn axis(&self) -> &Axis {
+        &self.axis
+    }
+
+    /// The profile before it is scaled or displaced.
+    pub(super) fn profile(&self) -> &Profile {
+        &self.profile
+    }
+
+    /// How far the tube reaches to the sides of its axis, m.
+    pub(super) fn reach_m(&self) -> f64 {
+        let outwards_m = self.bulges.iter().map(|bulge| -bulge.depth_m).fold(0.0, f64::max);
+        half_width_m(&self.profile) * self.scales.largest() + outwards_m
+    }
+
+    /// Scale of the profile at `chainage_m`.
+    pub(super) fn scale(&self, chainage_m: f64) -> f64 {
+        self.scales.at(chainage_m)
+    }
+
+    /// A place of the unscaled profile where it is at `chainage_m`.
+    pub(super) fn scaled(&self, chainage_m: f64, unscaled: Yz) -> Yz {
+        let scale = self.scale(chainage_m);
+        let [fy, fz] = self.floor;
+        [fy + (unscaled[0] - fy) * scale, fz + (unscaled[1] - fz) * scale]
+    }
+
+    /// Place (y, z) of the wall at `chainage_m` and `sigma_m` of the unscaled profile, displacements included; and the
+    /// profile's normal there, inwards.
+    pub(super) fn wall_place(&self, chainage_m: f64, sigma_m: f64) -> (Yz, Yz) {
+        let reference = self.profile.reference();
+        let [wy, wz] = self.profile.point_at(sigma_m);
+        let out = [wy - reference[0], wz - reference[1]];
+        let normal = self.profile.cast_from_inside(reference, out).map_or([0.0, 1.0], |hit| hit.normal);
+        let radius_m = self.scale(chainage_m) * math::hypot(out[0], out[1]);
+        let perimeter_m = self.profile.perimeter_m();
+        let inwards_m: f64 =
+            self.bulges.iter().map(|b| b.displacement_m(chainage_m, sigma_m, perimeter_m)).sum();
+        let share = 1.0 - inwards_m / radius_m;
+        let place = [reference[0] + share * out[0], reference[1] + share * out[1]];
+        (self.scaled(chainage_m, place), normal)
+    }
+
+    /// Distance along the unit vector `direction` (y, z) from a place of the section at `chainage_m` to the profile's wall,
+    /// without displacements; `None` from outside.
+    pub(super) fn section_range_m(&self, chainage_m: f64, from: Yz, direction: Yz) -> Option<f64> {
+        let scale = self.scale(chainage_m);
+        let hit = self.profile.cast(self.unscaled(from, scale), direction.map(|c| c / scale))?;
+        Some(hit.range_m)
+    }
+
+    /// Whether `point` is in the tube.
+    pub(super) fn contains(&self, point: V3) -> bool {
+        let (number, _) = self.locate(point);
+        self.stretches.get(number).is_some_and(|stretch| self.holds(stretch, point))
+    }
+
+    /// How far the ray goes from `t_m` before it leaves the tube, at most to `far_m`; `None` when it isn't in there.
+    pub(super) fn leave(&self, ray: &Ray, t_m: f64, far_m: f64) -> Option<Passage> {
+        let start = ray.at(t_m);
+        let (mut number, start_m) = self.locate(start);
+        let first = self.stretches.get(number)?;
+        if !self.holds(first, start) {
+            return None;
+        }
+        // Along a straight line chainage only grows or only falls, which is known where it begins.
+        let [tx, ty] = first.piece.station(start_m).tangent;
+        let forwards = ray.direction[0] * tx + ray.direction[1] * ty >= 0.0;
+        let mut t_m = t_m;
+        while let Some(stretch) = self.stretches.get(number) {
+            let until_m = stretch.end_m(ray, forwards).max(t_m).min(far_m);
+            let mut left = self.leave_stretch(stretch, ray, t_m, until_m);
+            number = if forwards { number + 1 } else { number.wrapping_sub(1) };
+            if left.is_none() && until_m < far_m {
+                left = self.end_wall(stretch, number, ray, until_m).map(|face| (until_m, Some(face)));
+            }
+            if left.is_some() || until_m >= far_m {
+                let (t_m, face) = left.unwrap_or((far_m, None));
+                let end_m = stretch.chainage_m(ray.at(t_m));
+                let chainages_m = [start_m, end_m];
+                return Some(Passage { t_m, wall: left.is_some(), face, chainages_m });
+            }
+            t_m = until_m;
+        }
+        None
+    }
+
+    /// What the wall is at a place on it.
+    pub(super) fn face(&self, point: V3) -> Face {
+        let (number, chainage_m) = self.locate(point);
+        let wall = Face { normal: [0.0; 3], feature: None };
+        let Some(stretch) = self.stretches.get(number) else { return wall };
+        let section = [stretch.piece.left_of([point[0], point[1]]), point[2]];
+        let scale = stretch.scale_at(chainage_m);
+        let Some((hit, _)) = self.outwards(self.unscaled(section, scale)) else { return wall };
+        if stretch.is_constant() {
+            let [tx, ty] = stretch.piece.station(chainage_m).tangent;
+            let [ny, nz] = hit.normal;
+            return Face { normal: [-ty * ny, tx * ny, nz], feature: None };
+        }
+        Face {
+            normal: self.falling(stretch, point),
+            feature: self.displaced_by(stretch, chainage_m, hit.sigma_m),
+        }
+    }
+
+    /// Stretch and chainage of a place.
+    fn locate(&self, point: V3) -> (usize, f64) {
+        let (_, chainage_m, _) = self.axis.locate([point[0], point[1]]);
+        let after = self.stretches.partition_point(|stretch| stretch.from_m <= chainage_m);
+        (after.saturating_sub(1), chainage_m)
+    }
+
+    fn holds(&self, stretch: &Stretch, point: V3) -> bool {
+        if let Some(mesh) = self.mesh_of(stretch) {
+            return mesh.holds(point);
+        }
+        if stretch.is_constant() {
+            let section = [stretch.piece.left_of([point[0], point[1]]), point[2]];
+            return self.profile.contains(self.unscaled(section, stretch.scale));
+        }
+        self.gauge(stretch, point) < 1.0
+    }
+
+    fn mesh_of(&self, stretch: &Stretch) -> Option<&MeshWall> {
+        stretch.mesh.and_then(|number| self.meshes.get(number))
+    }
+
+    /// Where the ray leaves the tube between `t_m` and `until_m`, all within the stretch, and a mesh's face there.
+    fn leave_stretch(
+        &self,
+        stretch: &Stretch,
+        ray: &Ray,
+        t_m: f64,
+        until_m: f64,
+    ) -> Option<(f64, Option<Face>)> {
+        if let Some(mesh) = self.mesh_of(stretch) {
+            return mesh.leave(ray, t_m, until_m).map(|(t_m, face)| (t_m, Some(face)));
+        }
+        let left = if stretch.is_plain() {
+            self.leave_plain(stretch, ray, t_m).filter(|leave_m| *leave_m <= until_m)
+        } else {
+            self.leave_warped(stretch, ray, t_m, until_m)
+        };
+        left.map(|t_m| (t_m, None))
+    }
+
+    /// The wall that the plane between two stretches is where the ray comes to it, `t_m` along: at a mesh's end, where
+    /// beyond is no water.
+    fn end_wall(&self, from: &Stretch, to: usize, ray: &Ray, t_m: f64) -> Option<Face> {
+        let to = self.stretches.get(to)?;
+        let mesh = self.mesh_of(to).or(self.mesh_of(from))?;
+        if self.holds(to, ray.at(t_m)) {
+            return None;
+        }
+        // At a mesh the axis is straight.
+        let [tx, ty] =
+            if to.mesh.is_some() { to.piece.station(to.from_m) } else { from.piece.station(from.from_m) }
+                .tangent;
+        let against = -(ray.direction[0] * tx + ray.direction[1] * ty).signum();
+        Some(Face { normal: [against * tx, against * ty, 0.0], feature: Some(mesh.feature()) })
+    }
+
+    /// In closed form: straight axis, one profile.
+    fn leave_plain(&self, stretch: &Stretch, ray: &Ray, t_m: f64) -> Option<f64> {
+        let at = ray.at(t_m);
+        let [tx, ty] = stretch.piece.station(0.0).tangent;
+        let direction = [ray.direction[1] * tx - ray.direction[0] * ty, ray.direction[2]];
+        let section = [stretch.piece.left_of([at[0], at[1]]), at[2]];
+        let hit = self.profile.cast_from_inside(
+            self.unscaled(section, stretch.scale),
+            [direction[0] / stretch.scale, direction[1] / stretch.scale],
+        );
+        match hit {
+            Some(hit) => Some(t_m + hit.range_m),
+            // Only a place on the wall itself has none ahead, but for rays along the axis.
+            None => (self.gauge(stretch, at) > 1.0 - 1e-9).then_some(t_m),
+        }
+    }
+
+    fn leave_warped(&self, stretch: &Stretch, ray: &Ray, t_m: f64, until_m: f64) -> Option<f64> {
+        let gauge = |t_m: f64| self.gauge(stretch, ray.at(t_m)) - 1.0;
+        let mut inside = (t_m, gauge(t_m));
+        if inside.1 >= 0.0 {
+            return Some(t_m);
+        }
+        while inside.0 < until_m {
+            let t_m = (inside.0 + (-inside.1 * stretch.step_m).max(LEAST_STEP_M)).min(until_m);
+            let next = (t_m, gauge(t_m));
+            if next.1 >= 0.0 {
+                return Some(root(inside, next, gauge));
+            }
+            inside = next;
+        }
+        None
+    }
+
+    /// Distance from the reference point over that of the wall in the same direction.
+    fn gauge(&self, stretch: &Stretch, point: V3) -> f64 {
+        let plan = [point[0], point[1]];
+        if stretch.is_constant() {
+            let section = [stretch.piece.left_of(plan), point[2]];
+            let hit = self.outwards(self.unscaled(section, stretch.scale));
+            return hit.map_or(0.0, |(hit, _)| 1.0 / hit.range_m);
+        }
+        let (chainage_m, left_m) = stretch.piece.chart(plan);
+        let scale = stretch.scale_at(chainage_m);
+        let Some((hit, distance_m)) = self.outwards(self.unscaled([left_m, point[2]], scale)) else {
+            return 0.0;
+        };
+        if stretch.bulges.is_empty() {
+            return 1.0 / hit.range_m;
+        }
+        let perimeter_m = self.profile.perimeter_m();
+        let near = stretch.bulges.iter().filter_map(|k| self.bulges.get(*k));
+        let inwards_m: f64 =
+            near.map(|bulge| bulge.displacement_m(chainage_m, hit.sigma_m, perimeter_m)).sum();
+        distance_m * scale / (distance_m * hit.range_m * scale - inwards_m)
+    }
+
+    /// The profile's wall beyond an unscaled place, seen from the reference point; its distance from there, m.
+    fn outwards(&self, unscaled: Yz) -> Option<(headrace_geometry::tunnel::WallHit, f64)> {
+        let [ry, rz] = self.profile.reference();
+        let out = [unscaled[0] - ry, unscaled[1] - rz];
+        let hit = self.profile.cast_from_inside([ry, rz], out)?;
+        Some((hit, math::sqrt(out[0] * out[0] + out[1] * out[1])))
+    }
+
+    #[expect(clippy::float_cmp, reason = "any other scale, however near, is one")]
+    fn unscaled(&self, section: Yz, scale: f64) -> Yz {
+        // Without this the floor's place could cost a bit, and the plain case must equal the profile's own.
+        if scale == 1.0 {
+            return section;
+        }
+        let [fy, fz] = self.floor;
+        [fy + (section[0] - fy) / scale, fz + (section[1] - fz) / scale]
+    }
+
+    /// The direction in which the gauge falls, of length one.
+    fn falling(&self, stretch: &Stretch, point: V3) -> V3 {
+        let mut fall = [0.0; 3];
+        for (k, fall) in fall.iter_mut().enumerate() {
+            let (mut before, mut after) = (point, point);
+            before[k] -= NORMAL_STEP_M;
+            after[k] += NORMAL_STEP_M;
+            *fall = self.gauge(stretch, before) - self.gauge(stretch, after);
+        }
+        unit(fall)
+    }
+
+    /// The feature that displaces the wall most.
+    fn displaced_by(&self, stretch: &Stretch, chainage_m: f64, sigma_m: f64) -> Option<u16> {
+        let perimeter_m = self.profile.perimeter_m();
+        let near = stretch.bulges.iter().filter_map(|k| self.bulges.get(*k));
+        near.map(|bulge| (bulge.displacement_m(chainage_m, sigma_m, perimeter_m).abs(), bulge.feature))
+            .filter(|(by_m, _)| *by_m > FEATURE_M)
+            .max_by(|a, b| a.0.total_cmp(&b.0))
+            .map(|(_, feature)| feature)
+    }
+}
+
+impl Stretch {
+    /// Whether sections of it are all the same.
+    fn is_constant(&self) -> bool {
+        self.scale_slope_pm == 0.0 && self.bulges.is_empty()
+    }
+
+    /// Whether it is a prism.
+    fn is_plain(&self) -> bool {
+        self.is_constant() && self.piece.curvature_pm() == 0.0
+    }
+
+    fn scale_at(&self, chainage_m: f64) -> f64 {
+        if self.scale_slope_pm == 0.0 {
+            return self.scale;
+        }
+        self.scale + self.scale_slope_pm * (chainage_m - self.from_m)
+    }
+
+    fn chainage_m(&self, point: V3) -> f64 {
+        self.piece.chart([point[0], point[1]]).0
+    }
+
+    /// Where the ray passes the plane across the end that it goes to, m; infinity when it never does.
+    fn end_m(&self, ray: &Ray, forwards: bool) -> f64 {
+        let Some(end) = self.ends[usize::from(forwards)] else { return f64::INFINITY };
+        let [tx, ty] = end.tangent;
+        let speed = ray.direction[0] * tx + ray.direction[1] * ty;
+        if speed == 0.0 || (speed > 0.0) != forwards {
+            return f64::INFINITY;
+        }
+        ((end.at[0] - ray.origin[0]) * tx + (end.at[1] - ray.origin[1]) * ty) / speed
+    }
+}
+
+/// Where a function crosses zero between a place where it is negative and one where it isn't, by the Illinois method.
+fn root(mut below: (f64, f64), mut above: (f64, f64), f: impl Fn(f64) -> f64) -> f64 {
+    let mut kept = 0;
+    for _ in 0..100 {
+        if above.0 - below.0 <= ROOT_M || above.1 == 0.0 {
+            break;
+        }
+        let t = below.0 - below.1 * (above.0 - below.0) / (above.1 - below.1);
+        let value = f(t);
+        // The end that stays a second time counts half, or the bracket would shrink from one side only.
+        if value < 0.0 {
+            below = (t, value);
+            if kept == 1 {
+                above.1 /= 2.0;
+            }
+            kept = 1;
+        } else {
+            above = (t, value);
+            if kept == -1 {
+                below.1 /= 2.0;
+            }
+            kept = -1;
+        }
+        if value.abs() < 1e-13 {
+            return t;
+        }
+    }
+    f64::midpoint(below.0, above.0)
+}

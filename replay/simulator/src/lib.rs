@@ -1,0 +1,40 @@
+//! The simulator: a scene becomes the bytes that its devices would send.
+//!
+//! Only what a scene names is simulated. Without effects a device is ideal but for the quanta of its own wire format.
+
+mod builder;
+mod clock;
+pub mod effects;
+pub mod environment;
+mod error;
+mod facts;
+mod files;
+#[cfg(feature = "mesh")]
+pub mod mesh;
+mod motion;
+mod notes;
+mod outbox;
+mod random;
+mod scene;
+mod sensing;
+mod simulation;
+mod stages;
+#[cfg(test)]
+mod testing;
+#[cfg(test)]
+mod testing_motion;
+pub mod trajectory;
+mod truth;
+
+pub use builder::Added;
+pub use clock::START;
+pub use error::SceneError;
+pub use facts::{Facts, SensorFacts};
+pub use files::FileLoader;
+pub use outbox::Message;
+pub use scene::Scene;
+pub use sensing::Scenery;
+pub use simulation::Simulation;
+pub use stages::Stage;
+pub use trajectory::{Leg, Trajectory};
+pub use truth::{Cause, SoundingTruth, TruthRow};

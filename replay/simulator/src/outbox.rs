@@ -1,0 +1,200 @@
+//! Messages of all lines in one order: (time, source, place on the line).
+
+use headrace_geometry::time::MonoNs;
+use headrace_sensor::device::Direction;
+
+use crate::sensing::Line;
+
+/// Bytes on the line of one source.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Message<'a> {
+    /// When they crossed the line.
+    pub at: MonoNs,
+    /// The source, in the order of the vehicle file.
+    pub source: u16,
+    /// Which way they went.
+    pub direction: Direction,
+    /// The bytes.
+    pub bytes: &'a [u8],
+}
+
+const NEVER: MonoNs = MonoNs(u64::MAX);
+
+/// Messages that wait for those of other lines before them: merged as they are asked for, their bytes where the devices
+/// put them.
+#[derive(Debug, Default)]
+pub(crate) struct Outbox {
+    /// One for each source, in its order.
+    lanes: Vec<Lane>,
+    /// When the next message of each lane is due; `NEVER` where none waits.
+    due: Vec<MonoNs>,
+    /// What crosses its line before this may go.
+    until: MonoNs,
+    /// The lane with the next message that may go.
+    front: Option<usize>,
+}
+
+/// What waits on one line.
+#[derive(Debug, Default)]
+struct Lane {
+    /// In order of time.
+    line: Line,
+    next: usize,
+}
+
+impl Lane {
+    /// When its next message is due.
+    fn due(&self) -> MonoNs {
+        self.line.messages.get(self.next).map_or(NEVER, |message| message.at)
+    }
+
+    /// Takes a slice's messages in exchange for room. What still waits, which is little, moves in before them.
+    fn take(&mut self, line: &mut Line) {
+        std::mem::swap(&mut self.line, line);
+        self.line.put_first(line, self.next);
+        self.next = 0;
+        line.clear();
+        // A message without bytes is none.
+        self.line.messages.retain(|message| message.bytes.0 < message.bytes.1);
+        // An answer may come after the next question.
+        if !self.line.messages.is_sorted_by_key(|message| message.at) {
+            self.line.messages.sort_by_key(|message| message.at);
+        }
+    }
+}
+
+impl Outbox {
+    /// An outbox for so many sources.
+    pub(crate) fn new(sources: usize) -> Self {
+        let lanes = (0..sources).map(|_| Lane::default()).collect();
+        Self { lanes, due: vec![NEVER; sources], ..Self::default() }
+    }
+
+    /// Whether [`Outbox::next`] gives a message.
+    pub(crate) fn has_next(&self) -> bool {
+        self.front.is_some()
+    }
+
+    /// The next message that nothing can come before any more.
+    pub(crate) fn next(&mut self) -> Option<Message<'_>> {
+        let front = self.front?;
+        let lane = self.lanes.get_mut(front)?;
+        let sent = lane.next;
+        lane.next += 1;
+        *self.due.get_mut(front)? = lane.due();
+        self.find_front();
+        self.message(front, sent)
+    }
+
+    /// What [`Outbox::next`] would give.
+    pub(crate) fn peek(&self) -> Option<Message<'_>> {
+        let front = self.front?;
+        self.message(front, self.lanes.get(front)?.next)
+    }
+
+    fn message(&self, lane: usize, number: usize) -> Option<Message<'_>> {
+        let line = &self.lanes.get(lane)?.line;
+        let message = line.messages.get(number)?;
+        let source = u16::try_from(lane).ok()?;
+        Some(Message { at: message.at, source, direction: message.direction, bytes: line.bytes_of(message) })
+    }
+
+    /// Takes what a slice has put on a source's line, and leaves the line empty.
+    pub(crate) fn take(&mut self, source: usize, line: &mut Line) {
+        if let Some(lane) = self.lanes.get_mut(source) {
+            lane.take(line);
+        }
+    }
+
+    /// Releases what crossed its line before `until`.
+    pub(crate) fn release(&mut self, until: MonoNs) {
+        self.until = until;
+        self.look();
+    }
+
+    /// Releases everything; false when it had done so before, and there is nothing more to come.
+    pub(crate) fn finish(&mut self) -> bool {
+        let more = self.until < NEVER;
+        self.release(NEVER);
+        more
+    }
+
+    /// Passes over what is released.
+    pub(crate) fn skip(&mut self) {
+        let until = self.until;
+        for lane in &mut self.lanes {
+            lane.next = lane.line.messages.partition_point(|message| message.at < until);
+        }
+        self.look();
+    }
+
+    /// Looks when each lane is due.
+    fn look(&mut self) {
+        for (due, lane) in self.due.iter_mut().zip(&self.lanes) {
+            *due = lane.due();
+        }
+        self.find_front();
+    }
+
+    fn find_front(&mut self) {
+        let first = self.due.iter().enumerate().min_by_key(|(_, at)| **at);
+        self.front = first.filter(|(_, at)| **at < self.until).map(|(number, _)| number);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SENT: Direction = Direction::Sent;
+
+    fn line(times: &[u64]) -> Line {
+        let mut line = Line::default();
+        for (sample, at) in times.iter().enumerate() {
+            line.send(MonoNs(*at), SENT, &[u8::try_from(sample).unwrap()], sample);
+        }
+        line
+    }
+
+    /// Time, source and byte of what may go.
+    fn going(outbox: &mut Outbox) -> Vec<(u64, u16, u8)> {
+        let mut gone = Vec::new();
+        while outbox.has_next() {
+            let peeked = outbox.peek().unwrap();
+            let expected = (peeked.at.0, peeked.source, peeked.bytes[0]);
+            let next = outbox.next().unwrap();
+            assert_eq!((next.at.0, next.source, next.bytes[0]), expected);
+            gone.push(expected);
+        }
+        gone
+    }
+
+    #[test]
+    fn messages_go_by_time_then_source_then_place_and_late_ones_wait() {
+        let mut outbox = Outbox::new(2);
+        outbox.take(0, &mut line(&[1, 5, 5, 12]));
+        outbox.take(1, &mut line(&[0, 11, 5, 1]));
+        outbox.release(MonoNs(10));
+        assert_eq!(going(&mut outbox), [(0, 1, 0), (1, 0, 0), (1, 1, 3), (5, 0, 1), (5, 0, 2), (5, 1, 2)]);
+        outbox.take(0, &mut line(&[10, 13]));
+        outbox.release(MonoNs(13));
+        assert_eq!(going(&mut outbox), [(10, 0, 0), (11, 1, 1), (12, 0, 3)]);
+        assert!(outbox.finish());
+        assert_eq!(going(&mut outbox), [(13, 0, 1)]);
+        assert!(!outbox.finish());
+    }
+
+    #[test]
+    fn a_message_without_bytes_is_none_and_what_is_skipped_is_gone() {
+        let mut outbox = Outbox::new(1);
+        let mut with_empty = line(&[1, 3]);
+        with_empty.send(MonoNs(2), SENT, &[], 2);
+        outbox.take(0, &mut with_empty);
+        outbox.release(MonoNs(3));
+        outbox.skip();
+        assert!(!outbox.has_next());
+        outbox.take(0, &mut line(&[4]));
+        outbox.release(MonoNs(10));
+        assert_eq!(going(&mut outbox), [(3, 0, 1), (4, 0, 0)]);
+    }
+}

@@ -1,0 +1,207 @@
+//! What a simulation keeps: an entity for each sensor, and what all of them share.
+//!
+//! A simulation goes slice by slice; within one, each system works through all measurements of its kind at once.
+
+use bevy_ecs::prelude::{Component, Resource};
+use headrace_geometry::frames::{Mount, Point3, Pose, Rot, Tunnel, Vec3};
+use headrace_geometry::math;
+use headrace_geometry::site::Site;
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_sampling::head::HeadSpec;
+use headrace_sensor::device::{Direction, Emulator};
+use headrace_sensor::measurement::Measurement;
+
+use crate::clock::START;
+use crate::environment::{Environment, Hit, What};
+use crate::error::SceneError;
+use crate::trajectory::Trajectory;
+
+/// Time between two places at which the trajectory is checked, s.
+const CHECK_S: f64 = 0.5;
+
+/// The stretch of time that is being simulated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Resource)]
+pub(crate) struct Slice {
+    /// Its beginning.
+    pub from: MonoNs,
+    /// Its end, excluded.
+    pub until: MonoNs,
+}
+
+/// The tunnel, the vehicle's trajectory through it, the water.
+#[derive(Debug, Resource)]
+pub struct Scenery {
+    /// What is round the vehicle.
+    pub environment: Environment,
+    /// Its trajectory.
+    pub trajectory: Trajectory,
+    /// Water and levels, as they truly are.
+    pub site: Site,
+    /// When the vehicle sets out from where it stands; without it, it is under way as the dive begins.
+    pub sets_out: Option<MonoNs>,
+}
+
+/// A sensor by its place in the vehicle file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Component)]
+pub(crate) struct Source(pub u16);
+
+/// How it sits on the vehicle.
+#[derive(Debug, Clone, Copy, PartialEq, Component)]
+pub(crate) struct Mounted(pub Mount);
+
+/// The device's side of its wire.
+#[derive(Component)]
+pub(crate) struct Device<M: Measurement>(pub Box<dyn Emulator<M>>);
+
+/// A profiling head.
+#[derive(Debug, Clone, Copy, PartialEq, Component)]
+pub(crate) struct Head(pub HeadSpec);
+
+/// A fixed echosounder.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Component)]
+pub(crate) struct Echosounder;
+
+/// The slice's measurements, in order of time.
+#[derive(Debug, Clone, Component)]
+pub(crate) struct Samples<M: Measurement> {
+    /// Number of the first, counted through the dive: the step by which effects draw.
+    pub first: u64,
+    /// The measurements.
+    pub list: Vec<M>,
+}
+
+/// Where the slice's soundings go, one for one with the samples.
+#[derive(Debug, Clone, Default, Component)]
+pub(crate) struct Rays(pub Vec<Ray>);
+
+/// A beam's middle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Ray {
+    /// Where the sonar is.
+    pub origin: Point3<Tunnel>,
+    /// Where it looks, a unit vector.
+    pub direction: Vec3<Tunnel>,
+    /// What its ray meets; `None` where that is nothing within reach.
+    pub hit: Option<Hit>,
+}
+
+/// The farthest that a sonar hears at its setting, m of water, and a little beyond.
+#[derive(Debug, Clone, Copy, PartialEq, Component)]
+pub(crate) struct Reach(pub f64);
+
+/// What the slice puts on a line.
+#[derive(Debug, Clone, Default, Component)]
+pub(crate) struct Line {
+    /// The messages, in the order in which the device sent them.
+    pub messages: Vec<LineMessage>,
+    /// Their bytes.
+    pub bytes: Vec<u8>,
+}
+
+/// A message on a line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct LineMessage {
+    /// When its first byte crosses the line.
+    pub at: MonoNs,
+    /// Which way.
+    pub direction: Direction,
+    /// Where its bytes begin and end in the line's.
+    pub bytes: (usize, usize),
+    /// The sample that it tells, counted within the slice.
+    pub sample: usize,
+}
+
+impl<M: Measurement> Default for Samples<M> {
+    fn default() -> Self {
+        Self { first: 0, list: Vec::new() }
+    }
+}
+
+impl<M: Measurement> Samples<M> {
+    /// The measurements with their steps.
+    pub(crate) fn steps(&mut self) -> impl Iterator<Item = (u64, &mut M)> {
+        (self.first..).zip(&mut self.list)
+    }
+}
+
+impl Scenery {
+    /// The vehicle's true pose.
+    pub fn pose(&self, at: MonoNs) -> Pose {
+        let place = self.trajectory.place(self.under_way_s(at));
+        let axis = self.environment.axis();
+        let [roll, pitch, yaw] = place.turned_rad;
+        let yaw = if axis.is_straight() { yaw } else { yaw + axis.heading_rad(place.chainage_m) };
+        let attitude = if roll == 0.0 && pitch == 0.0 && yaw == 0.0 {
+            Rot::identity()
+        } else {
+            Rot::from_roll_pitch_yaw(roll, pitch, yaw)
+        };
+        Pose { position: axis.place(place.chainage_m, place.across_m), attitude }
+    }
+
+    /// The chainage that the vehicle has truly come to, m.
+    pub fn chainage_m(&self, at: MonoNs) -> f64 {
+        self.trajectory.place(self.under_way_s(at)).chainage_m
+    }
+
+    /// How long it has been under way, s.
+    fn under_way_s(&self, at: MonoNs) -> f64 {
+        self.sets_out
+            .map_or_else(|| at.since(START).as_secs_f64(), |out| at.since(out).as_secs_f64().max(0.0))
+    }
+
+    /// Checks that the trajectory leads through water alone.
+    ///
+    /// Errors: the first place where it doesn't.
+    pub(crate) fn check(&self) -> Result<(), SceneError> {
+        let steps = math::floor_to_i64(self.trajectory.duration_s() / CHECK_S) + 1;
+        let at = |step: i64| (step as f64 * CHECK_S).min(self.trajectory.duration_s());
+        let mut from = self.pose(START).position;
+        for step in 1..=steps {
+            let after_s = at(step);
+            let to = self.pose(START + DurNs::from_secs_f64(after_s)).position;
+            if let Some(hit) = self.environment.first_obstruction(from, to) {
+                let [chainage_m, y_m, z_m] = self.environment.axis().chart(hit.point);
+                let what = match hit.what {
+                    What::Wall => "the wall".to_owned(),
+                    What::Feature(feature) => self.environment.feature_name(feature).to_owned(),
+                };
+                return Err(SceneError::Blocked { after_s, chainage_m, y_m, z_m, what });
+            }
+            from = to;
+        }
+        Ok(())
+    }
+}
+
+impl Line {
+    /// Adds a message.
+    pub(crate) fn send(&mut self, at: MonoNs, direction: Direction, bytes: &[u8], sample: usize) {
+        let from = self.bytes.len();
+        self.bytes.extend_from_slice(bytes);
+        self.messages.push(LineMessage { at, direction, bytes: (from, self.bytes.len()), sample });
+    }
+
+    /// The bytes of a message of this line.
+    pub(crate) fn bytes_of(&self, message: &LineMessage) -> &[u8] {
+        let (from, to) = message.bytes;
+        self.bytes.get(from..to).unwrap_or_default()
+    }
+
+    /// Puts another line's messages, from its `first` on, before its own.
+    pub(crate) fn put_first(&mut self, other: &Self, first: usize) {
+        let bytes = &mut self.bytes;
+        let moved = other.messages.iter().skip(first).map(|message| {
+            let from = bytes.len();
+            bytes.extend_from_slice(other.bytes_of(message));
+            LineMessage { bytes: (from, bytes.len()), ..*message }
+        });
+        drop(self.messages.splice(0..0, moved));
+    }
+
+    /// Forgets the slice's messages.
+    pub(crate) fn clear(&mut self) {
+        self.messages.clear();
+        self.bytes.clear();
+    }
+}

@@ -1,0 +1,377 @@
+//! A dive that is being simulated: an ECS world with an entity for each sensor, base systems that ask, aim, look, feel
+//! and tell, and between them the systems of the effects that the scene names. Its schedule runs once for each slice of
+//! the dive.
+
+use bevy_ecs::entity::Entity;
+use bevy_ecs::prelude::World;
+use bevy_ecs::schedule::Schedule;
+use headrace_geometry::frames::Pose;
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_sensor::device::{Emulated, EmulatorSetup, Sense};
+use headrace_sensor::measurement::{GroundVelocity, Inertia, Measurement, Payout, Pressure, Sounding};
+
+use crate::builder::{Added, Builder, Programs};
+use crate::clock::START;
+use crate::error::SceneError;
+use crate::facts::Facts;
+use crate::notes::{Before, LineBefore, Notes};
+use crate::outbox::{Message, Outbox};
+use crate::scene::Scene;
+use crate::sensing::{
+    Device, Echosounder, Head, Line, Mounted, Rays, Reach, Samples, Scenery, Slice, Source,
+};
+use crate::stages::{self, AIM_HELD, Held, Stage};
+use crate::truth::{self, TruthRow};
+
+/// Length of a slice: long enough that a schedule's cost is nothing beside its measurements.
+const SLICE: DurNs = DurNs(1_000_000_000);
+/// A sonar is asked for walls this much beyond its reach, for effects that bring them nearer.
+const REACH_SHARE: f64 = 1.25;
+/// Reach of an echosounder, m.
+const ECHOSOUNDER_REACH_M: f64 = 100.0;
+
+/// A moment that doesn't come.
+const NEVER: MonoNs = MonoNs(u64::MAX);
+
+/// Who asks the devices for measurements.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Asker {
+    /// Emulated hosts.
+    Itself,
+    /// The same, and the truth is kept.
+    Noted,
+    /// Real ones.
+    Hosts,
+}
+
+/// A dive that is being simulated: messages in the order of (time, source, sequence).
+pub struct Simulation {
+    world: World,
+    schedule: Schedule,
+    entities: Vec<Entity>,
+    end: MonoNs,
+    slice: DurNs,
+    outbox: Outbox,
+    added: Vec<Added>,
+    base: Vec<(Stage, String)>,
+    truth: Option<Vec<TruthRow>>,
+}
+
+impl Simulation {
+    /// Puts the scene's devices into its tunnel. Heads follow the scene's programs.
+    ///
+    /// Errors: effects that contradict each other or the scene; a trajectory through a wall.
+    pub fn new(scene: &Scene) -> Result<Self, SceneError> {
+        Self::assemble(scene, Asker::Itself)
+    }
+
+    /// A simulation whose devices do what hosts ask of them through [`Simulation::hear`], while time goes on as
+    /// [`Simulation::go_on`] is told. The vehicle stands until [`Simulation::set_out`].
+    ///
+    /// Errors: as for [`Simulation::new`].
+    pub fn for_hosts(scene: &Scene) -> Result<Self, SceneError> {
+        let mut simulation = Self::assemble(scene, Asker::Hosts)?;
+        simulation.set_out(NEVER);
+        Ok(simulation)
+    }
+
+    /// A simulation that keeps its truth for [`Simulation::take_truth`].
+    ///
+    /// Errors: as for [`Simulation::new`].
+    pub fn with_truth(scene: &Scene) -> Result<Self, SceneError> {
+        Self::assemble(scene, Asker::Noted)
+    }
+
+    fn assemble(scene: &Scene, asker: Asker) -> Result<Self, SceneError> {
+        let noting = asker == Asker::Noted;
+        let mut world = World::new();
+        world.insert_resource(Slice { from: START, until: START });
+        world.insert_resource(Scenery {
+            environment: scene.environment.clone(),
+            trajectory: scene.trajectory.clone(),
+            site: scene.vehicle.site,
+            sets_out: None,
+        });
+        let (facts, drawn) = programmed(scene);
+        let entities = spawn_sensors(&mut world, scene, &facts, asker);
+        if noting {
+            world.insert_resource(Notes::default());
+        }
+        let mut sim = Builder::new(&mut world, &facts, scene.seed, &entities);
+        for (kind, effect) in &scene.effects.0 {
+            sim.effect(kind.name());
+            sim.has_drawn(drawn.iter().filter(|(name, _)| *name == kind.name()).map(|(_, id)| id.clone()));
+            effect.build(&mut sim)?;
+        }
+        sim.base();
+        add_base_systems(&mut sim);
+        let (schedule, added, base) = sim.schedule(noting);
+        let duration_s = match world.get_resource::<Scenery>() {
+            Some(scenery) => {
+                scenery.check()?;
+                scenery.trajectory.duration_s()
+            }
+            None => 0.0,
+        };
+        let end = START + DurNs::from_secs_f64(duration_s);
+        let truth = noting.then(Vec::new);
+        let outbox = Outbox::new(entities.len());
+        Ok(Self { world, schedule, entities, end, slice: SLICE, outbox, added, base, truth })
+    }
+
+    /// When the dive ends.
+    pub fn end(&self) -> MonoNs {
+        self.end
+    }
+
+    /// How long it takes, s.
+    pub fn duration_s(&self) -> f64 {
+        self.scenery().map_or(0.0, |scenery| scenery.trajectory.duration_s())
+    }
+
+    /// Where the vehicle truly is.
+    pub fn pose(&self, at: MonoNs) -> Option<Pose> {
+        self.world.get_resource::<Scenery>().map(|scenery| scenery.pose(at))
+    }
+
+    /// What is round the vehicle, and its trajectory.
+    pub fn scenery(&self) -> Option<&Scenery> {
+        self.world.get_resource::<Scenery>()
+    }
+
+    /// What each effect of the scene has added.
+    pub fn added(&self) -> &[Added] {
+        &self.added
+    }
+
+    /// The systems that this simulation would have without effects, less those that effects replace.
+    pub fn base_systems(&self) -> &[(Stage, String)] {
+        &self.base
+    }
+
+    /// The next message, or `None` at the end of the dive.
+    pub fn next_message(&mut self) -> Option<Message<'_>> {
+        self.come().then(|| self.outbox.next()).flatten()
+    }
+
+    /// The next message, which stays the next one.
+    pub fn peek_message(&mut self) -> Option<Message<'_>> {
+        self.come().then(|| self.outbox.peek()).flatten()
+    }
+
+    /// Simulates on until a message can be given; false at the end of the dive.
+    fn come(&mut self) -> bool {
+        while !self.outbox.has_next() {
+            if !self.next_slice() {
+                return false;
+            }
+        }
+        true
+    }
+
+    /// The truth of all measurements since the last call; none without [`Simulation::with_truth`].
+    pub fn take_truth(&mut self) -> Vec<TruthRow> {
+        self.truth.as_mut().map(std::mem::take).unwrap_or_default()
+    }
+
+    /// Simulates on for a second of the dive and forgets the messages, for those who want the truth alone; false at the end.
+    pub fn advance(&mut self) -> bool {
+        let more = self.next_slice();
+        self.outbox.skip();
+        more
+    }
+
+    /// Bytes that a host has sent to a device, by its number in the vehicle file, at `at`, which must not be before what
+    /// has been simulated.
+    pub fn hear(&mut self, source: usize, at: MonoNs, bytes: &[u8]) {
+        let Some(entity) = self.entities.get(source).copied() else { return };
+        hear::<Sounding>(&mut self.world, entity, at, bytes);
+        hear::<Pressure>(&mut self.world, entity, at, bytes);
+        hear::<Inertia>(&mut self.world, entity, at, bytes);
+        hear::<Payout>(&mut self.world, entity, at, bytes);
+        hear::<GroundVelocity>(&mut self.world, entity, at, bytes);
+    }
+
+    /// The vehicle sets out at `at`; the dive ends when its trajectory does.
+    pub fn set_out(&mut self, at: MonoNs) {
+        if let Some(mut scenery) = self.world.get_resource_mut::<Scenery>() {
+            scenery.sets_out = Some(at);
+            self.end =
+                if at == NEVER { NEVER } else { at + DurNs::from_secs_f64(scenery.trajectory.duration_s()) };
+        }
+    }
+
+    /// Simulates on to `until`, for hosts; [`Simulation::next_message`] has what crossed the lines before it.
+    pub fn go_on(&mut self, until: MonoNs) {
+        let Some(slice) = self.world.get_resource::<Slice>() else { return };
+        if until > slice.until {
+            self.simulate(until);
+        }
+    }
+
+    /// The next message that has crossed its line, without simulating on for one.
+    pub fn waiting_message(&mut self) -> Option<Message<'_>> {
+        self.outbox.has_next().then(|| self.outbox.next()).flatten()
+    }
+
+    /// Simulates the next slice; false when there is none.
+    fn next_slice(&mut self) -> bool {
+        let Some(slice) = self.world.get_resource::<Slice>() else { return false };
+        // A measurement at the very end is still made.
+        let last = self.end + DurNs(1);
+        if slice.until >= last {
+            return self.outbox.finish();
+        }
+        let until = (slice.until + self.slice).min(last);
+        self.simulate(until);
+        true
+    }
+
+    fn simulate(&mut self, until: MonoNs) {
+        if let Some(mut slice) = self.world.get_resource_mut::<Slice>() {
+            slice.from = slice.until;
+            slice.until = until;
+        }
+        self.schedule.run(&mut self.world);
+        if let Some(rows) = &mut self.truth {
+            truth::collect(&mut self.world, &self.entities, rows);
+        }
+        for (source, entity) in self.entities.iter().enumerate() {
+            if let Some(mut line) = self.world.get_mut::<Line>(*entity) {
+                self.outbox.take(source, &mut line);
+            }
+        }
+        self.outbox.release(until);
+    }
+}
+
+#[cfg(test)]
+impl Simulation {
+    /// The same in slices of another length, of which nothing may depend.
+    pub(crate) fn in_slices(self, slice: DurNs) -> Self {
+        Self { slice, ..self }
+    }
+
+    /// Takes the other sensors from the vehicle.
+    fn keep_only(&mut self, source: usize) {
+        for (other, entity) in self.entities.iter().enumerate() {
+            if other != source {
+                self.world.despawn(*entity);
+            }
+        }
+    }
+
+    /// All that a sensor measures to the end of the dive, without the others.
+    pub(crate) fn measurements_of<M: Measurement>(mut self, source: usize) -> Vec<M> {
+        self.keep_only(source);
+        let mut all: Vec<M> = Vec::new();
+        while self.next_slice() {
+            let samples = self.world.get::<Samples<M>>(self.entities[source]).unwrap();
+            if samples.first == all.len() as u64 {
+                all.extend_from_slice(&samples.list);
+            }
+        }
+        all
+    }
+}
+
+/// Lets a device that measures `M` hear a host; what it answers at once is on its line.
+fn hear<M: Measurement>(world: &mut World, entity: Entity, at: MonoNs, bytes: &[u8]) {
+    let mut entity = world.entity_mut(entity);
+    let Ok((mut device, mut line)) = entity.get_components_mut::<(&mut Device<M>, &mut Line)>() else {
+        return;
+    };
+    device.0.hear(at, bytes, &mut |direction, at, bytes| line.send(at, direction, bytes, 0));
+}
+
+/// The scene's facts with what effects make of the heads' programs, and what they have drawn for it.
+fn programmed(scene: &Scene) -> (Facts, Vec<(&'static str, String)>) {
+    let (mut facts, mut drawn) = (scene.facts.clone(), Vec::new());
+    for (kind, effect) in &scene.effects.0 {
+        let (effect_name, seed) = (kind.name(), scene.seed);
+        effect.begin(&mut Programs { facts: &mut facts, seed, effect: effect_name, drawn: &mut drawn });
+    }
+    (facts, drawn)
+}
+
+fn spawn_sensors(world: &mut World, scene: &Scene, facts: &Facts, asker: Asker) -> Vec<Entity> {
+    let (noting, polled) = (asker == Asker::Noted, asker != Asker::Hosts);
+    let sensors = scene.vehicle.sensors.iter().zip(&scene.vehicle.sensor_configs).zip(&facts.sensors);
+    let site = scene.vehicle.site;
+    let mut entities = Vec::new();
+    for (number, ((sensor, config), facts)) in (0..).zip(sensors) {
+        let setup = EmulatorSetup { start: START, head: facts.program, site, polled };
+        let entity = world.spawn((Source(number), Mounted(config.mount), Line::default())).id();
+        if noting {
+            world.entity_mut(entity).insert(LineBefore::default());
+        }
+        match sensor.emulator(&setup) {
+            Emulated::Head(device) => {
+                spawn_device(world, entity, Device(device), noting);
+                let mut head = world.entity_mut(entity);
+                head.insert((Rays::default(), Held::default()));
+                if let Some(spec) = facts.head {
+                    let [_, reach_m] = spec.reach_m(site.sound_speed_mps);
+                    head.insert((Head(spec), Reach(reach_m * REACH_SHARE)));
+                }
+            }
+            Emulated::Echosounder(device) => {
+                spawn_device(world, entity, Device(device), noting);
+                let parts = (Echosounder, Rays::default(), Reach(ECHOSOUNDER_REACH_M));
+                world.entity_mut(entity).insert(parts);
+            }
+            Emulated::Depth(device) => spawn_device(world, entity, Device(device), noting),
+            Emulated::Inertial(device) => spawn_device(world, entity, Device(device), noting),
+            Emulated::VelocityLog(device) => spawn_device(world, entity, Device(device), noting),
+            Emulated::Tether(device) => spawn_device(world, entity, Device(device), noting),
+        }
+        entities.push(entity);
+    }
+    entities
+}
+
+fn spawn_device<M: Measurement>(world: &mut World, entity: Entity, device: Device<M>, noting: bool) {
+    world.entity_mut(entity).insert((device, Samples::<M>::default()));
+    if noting {
+        world.entity_mut(entity).insert(Before::<M>::default());
+    }
+}
+
+/// Systems for the senses that the vehicle has, but for those whose work an effect does.
+fn add_base_systems(sim: &mut Builder<'_>) {
+    let has = |sense: Sense| sim.facts().sensors.iter().any(|sensor| sensor.sense == sense);
+    let [head, echosounder, depth, inertial, velocity, tether] =
+        [Sense::Head, Sense::Echosounder, Sense::Depth, Sense::Inertial, Sense::Velocity, Sense::Tether]
+            .map(has);
+    if head && !sim.replaced(AIM_HELD) {
+        sim.system(Stage::Aim, stages::aim_held);
+    }
+    if echosounder {
+        sim.system(Stage::Aim, stages::aim_echosounders);
+    }
+    if head || echosounder {
+        sim.system(Stage::Begin, stages::begin::<Sounding>);
+        sim.system(Stage::Look, stages::look);
+        sim.system(Stage::Tell, stages::tell::<Sounding>);
+    }
+    if depth {
+        sim.system(Stage::Begin, stages::begin::<Pressure>);
+        sim.system(Stage::Feel, stages::feel_pressure);
+        sim.system(Stage::Tell, stages::tell::<Pressure>);
+    }
+    if inertial {
+        sim.system(Stage::Begin, stages::begin::<Inertia>);
+        sim.system(Stage::Feel, stages::feel_motion);
+        sim.system(Stage::Tell, stages::tell::<Inertia>);
+    }
+    if velocity {
+        sim.system(Stage::Begin, stages::begin::<GroundVelocity>);
+        sim.system(Stage::Feel, stages::feel_velocity);
+        sim.system(Stage::Tell, stages::tell::<GroundVelocity>);
+    }
+    if tether {
+        sim.system(Stage::Begin, stages::begin::<Payout>);
+        sim.system(Stage::Feel, stages::feel_cable);
+        sim.system(Stage::Tell, stages::tell::<Payout>);
+    }
+}

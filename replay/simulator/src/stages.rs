@@ -1,0 +1,221 @@
+//! What every simulation does: ask the devices, aim, look, feel, tell. Effects come between.
+
+#![allow(clippy::needless_pass_by_value, reason = "bevy hands systems their arguments by value")]
+
+use bevy_ecs::prelude::{Component, Query, Res, With, Without};
+use headrace_geometry::frames::{Mount, Pose, Vec3, head_direction};
+use headrace_geometry::math::{self, TAU};
+use headrace_sensor::measurement::{GroundVelocity, Inertia, Measurement, Payout, Pressure, Sounding};
+
+use crate::clock::Clock;
+use crate::motion::{motion, velocity};
+use crate::sensing::{Device, Echosounder, Head, Line, Mounted, Ray, Rays, Reach, Samples, Scenery, Slice};
+
+/// Name of the system [`aim_held`], for effects that take its place.
+pub(crate) const AIM_HELD: &str = "aim_held";
+/// Angles by which a turn may miss being whole, radians.
+const SAME_ANGLE_RAD: f64 = 1e-9;
+
+/// The order in which a slice is worked through. Within a stage, base systems come first, then effects in the order of
+/// [`crate::effects::KINDS`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Stage {
+    /// The devices say what they measure, and when.
+    Begin,
+    /// Heads turn: effects on angles.
+    Turn,
+    /// Where each sonar is and looks.
+    Aim,
+    /// What each beam meets.
+    Look,
+    /// What is made of it: effects on ranges.
+    Hear,
+    /// Pressure, motion and cable, and the effects on them.
+    Feel,
+    /// Devices put it into bytes.
+    Tell,
+    /// Effects on the lines.
+    Line,
+}
+
+impl Stage {
+    /// Its name for people.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Begin => "begin",
+            Self::Turn => "turn",
+            Self::Aim => "aim",
+            Self::Look => "look",
+            Self::Hear => "hear",
+            Self::Feel => "feel",
+            Self::Tell => "tell",
+            Self::Line => "line",
+        }
+    }
+}
+
+/// For a head whose turn is seen as one picture: where that was taken, and how far the head has turned since.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Component)]
+pub(crate) struct Held {
+    pose: Option<Pose>,
+    last_rad: f64,
+    last_step_rad: f64,
+    turned_rad: f64,
+}
+
+impl Held {
+    /// Whether a new turn, or sweep, begins with a ping at this angle.
+    fn begins(&mut self, angle_rad: f64) -> bool {
+        // The first ping has come from nowhere.
+        let came_rad = if self.pose.is_some() { angle_rad - self.last_rad } else { 0.0 };
+        let step_rad = math::wrap_signed(came_rad, TAU);
+        self.turned_rad += step_rad.abs();
+        let reversed = step_rad * self.last_step_rad < 0.0;
+        let begins = self.pose.is_none() || reversed || self.turned_rad >= TAU - SAME_ANGLE_RAD;
+        if begins {
+            self.turned_rad = 0.0;
+        }
+        (self.last_rad, self.last_step_rad) = (angle_rad, step_rad);
+        begins
+    }
+}
+
+type Beginning<'a, M> = (&'a mut Device<M>, &'a mut Samples<M>, Option<&'a Clock>);
+
+/// Asks the devices for the slice's measurements. One with a clock of its own is asked up to what that shows as the
+/// slice ends; its effect then says when the measurements truly are.
+pub(crate) fn begin<M: Measurement>(slice: Res<'_, Slice>, mut devices: Query<'_, '_, Beginning<'_, M>>) {
+    for (mut device, mut samples, clock) in &mut devices {
+        let samples = &mut *samples;
+        samples.first += samples.list.len() as u64;
+        samples.list.clear();
+        let until = clock.map_or(slice.until, |clock| clock.shows(slice.until));
+        device.0.begin(until, &mut samples.list);
+    }
+}
+
+/// The ray of a head at a sensor's angle.
+pub(crate) fn head_ray(pose: &Pose, mount: &Mount, angle_rad: f64) -> Ray {
+    let direction = pose.attitude * (mount.rotation * head_direction(angle_rad));
+    Ray { origin: pose.place(mount.position), direction, hit: None }
+}
+
+type Aimed<'a, Kind> = (&'a Samples<Sounding>, &'a Mounted, &'a mut Rays, Kind);
+
+/// Heads look from where the vehicle was when their turn began: one picture a turn.
+pub(crate) fn aim_held(
+    scenery: Res<'_, Scenery>,
+    mut heads: Query<'_, '_, Aimed<'_, &mut Held>, With<Head>>,
+) {
+    for (samples, mounted, mut rays, mut held) in &mut heads {
+        rays.0.clear();
+        for sounding in &samples.list {
+            if held.begins(sounding.angle_rad) {
+                held.pose = Some(scenery.pose(sounding.at));
+            }
+            if let Some(pose) = &held.pose {
+                rays.0.push(head_ray(pose, &mounted.0, sounding.angle_rad));
+            }
+        }
+    }
+}
+
+/// Heads look from where the vehicle is at each ping.
+pub(crate) fn aim_moving(
+    scenery: Res<'_, Scenery>,
+    mut heads: Query<'_, '_, (&Samples<Sounding>, &Mounted, &mut Rays), With<Head>>,
+) {
+    for (samples, mounted, mut rays) in &mut heads {
+        rays.0.clear();
+        for sounding in &samples.list {
+            rays.0.push(head_ray(&scenery.pose(sounding.at), &mounted.0, sounding.angle_rad));
+        }
+    }
+}
+
+/// Echosounders look along their own x from where the vehicle is.
+pub(crate) fn aim_echosounders(
+    scenery: Res<'_, Scenery>,
+    mut sounders: Query<'_, '_, (&Samples<Sounding>, &Mounted, &mut Rays), With<Echosounder>>,
+) {
+    for (samples, mounted, mut rays) in &mut sounders {
+        rays.0.clear();
+        for sounding in &samples.list {
+            let pose = scenery.pose(sounding.at);
+            let direction = pose.attitude * (mounted.0.rotation * Vec3::new(1.0, 0.0, 0.0));
+            rays.0.push(Ray { origin: pose.place(mounted.0.position), direction, hit: None });
+        }
+    }
+}
+
+type Looking<'a> = (&'a mut Samples<Sounding>, &'a mut Rays, &'a Reach);
+
+/// Beams whose rays aren't cast by the base system: an effect does it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Component)]
+pub(crate) struct OwnBeam;
+
+/// Each beam is a ray, and what it meets first is heard.
+pub(crate) fn look(scenery: Res<'_, Scenery>, mut sonars: Query<'_, '_, Looking<'_>, Without<OwnBeam>>) {
+    for (mut samples, mut rays, reach) in &mut sonars {
+        for (sounding, ray) in samples.list.iter_mut().zip(&mut rays.0) {
+            ray.hit = scenery.environment.cast(ray.origin, ray.direction, reach.0);
+            sounding.range_m = ray.hit.map(|hit| hit.range_m);
+        }
+    }
+}
+
+/// Depth sensors feel the water's pressure.
+pub(crate) fn feel_pressure(
+    scenery: Res<'_, Scenery>,
+    mut sensors: Query<'_, '_, (&mut Samples<Pressure>, &Mounted)>,
+) {
+    for (mut samples, mounted) in &mut sensors {
+        for pressure in &mut samples.list {
+            let height_m = scenery.pose(pressure.at).place(mounted.0.position).z();
+            let site = &scenery.site;
+            pressure.pressure_pa = site.pressure_pa(site.surface_above_floor_m - height_m);
+        }
+    }
+}
+
+/// Inertial units feel the vehicle's motion.
+pub(crate) fn feel_motion(
+    scenery: Res<'_, Scenery>,
+    mut units: Query<'_, '_, (&mut Samples<Inertia>, &Mounted)>,
+) {
+    for (mut samples, mounted) in &mut units {
+        for inertia in &mut samples.list {
+            *inertia = motion(&scenery, &mounted.0, inertia.at, inertia.period);
+        }
+    }
+}
+
+/// Velocity logs feel their own velocity.
+pub(crate) fn feel_velocity(
+    scenery: Res<'_, Scenery>,
+    mut logs: Query<'_, '_, (&mut Samples<GroundVelocity>, &Mounted)>,
+) {
+    for (mut samples, mounted) in &mut logs {
+        for moved in &mut samples.list {
+            moved.velocity_mps = velocity(&scenery, &mounted.0, moved.at);
+        }
+    }
+}
+
+/// The cable reaches as far as the vehicle has come.
+pub(crate) fn feel_cable(scenery: Res<'_, Scenery>, mut counters: Query<'_, '_, &mut Samples<Payout>>) {
+    for mut samples in &mut counters {
+        for payout in &mut samples.list {
+            payout.chainage_m = scenery.chainage_m(payout.at);
+        }
+    }
+}
+
+/// Devices put what they measured on their lines.
+pub(crate) fn tell<M: Measurement>(mut devices: Query<'_, '_, (&mut Device<M>, &Samples<M>, &mut Line)>) {
+    for (mut device, samples, mut line) in &mut devices {
+        for (number, measured) in samples.list.iter().enumerate() {
+            device.0.tell(measured, &mut |direction, at, bytes| line.send(at, direction, bytes, number));
+        }
+    }
+}

@@ -1,0 +1,73 @@
+//! Stretches gone at one speed each.
+
+use super::place::Place;
+
+/// The slowest that a leg may be gone, m/s.
+const SLOWEST_MPS: f64 = 1e-3;
+
+/// A stretch gone at one speed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Leg {
+    /// How far, m, positive.
+    pub distance_m: f64,
+    /// How fast over ground, m/s; negative goes back.
+    pub speed_mps: f64,
+}
+
+impl Leg {
+    fn duration_s(&self) -> f64 {
+        self.distance_m / self.speed_mps.abs()
+    }
+}
+
+/// Legs one after the other, along the axis, level, at one place of the cross-section.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Legs {
+    across_m: [f64; 2],
+    legs: Vec<Leg>,
+    /// When each begins, s, and at which chainage, m.
+    begins: Vec<(f64, f64)>,
+    start_m: f64,
+}
+
+impl Legs {
+    pub(super) fn new(start_m: f64, across_m: [f64; 2], legs: Vec<Leg>) -> Self {
+        let mut begins = Vec::with_capacity(legs.len());
+        let (mut at_s, mut at_m) = (0.0, start_m);
+        for leg in &legs {
+            begins.push((at_s, at_m));
+            at_s += leg.duration_s();
+            at_m += leg.distance_m * leg.speed_mps.signum();
+        }
+        Self { across_m, legs, begins, start_m }
+    }
+
+    pub(super) fn duration_s(&self) -> f64 {
+        self.legs.iter().map(Leg::duration_s).sum()
+    }
+
+    pub(super) fn place(&self, after_s: f64) -> Place {
+        let leg = self.begins.partition_point(|(begins_s, _)| *begins_s <= after_s).saturating_sub(1);
+        let (begins_s, from_m) = self.begins.get(leg).copied().unwrap_or((0.0, self.start_m));
+        let speed_mps = self.legs.get(leg).map_or(0.0, |leg| leg.speed_mps);
+        let chainage_m = from_m + (after_s - begins_s) * speed_mps;
+        Place { chainage_m, across_m: self.across_m, turned_rad: [0.0; 3] }
+    }
+
+    pub(super) fn carry(&mut self, current_mps: f64) -> Result<(), String> {
+        let mut legs = Vec::with_capacity(self.legs.len());
+        for (number, leg) in self.legs.iter().enumerate() {
+            let speed_mps = leg.speed_mps + current_mps;
+            if speed_mps * leg.speed_mps.signum() < SLOWEST_MPS {
+                return Err(format!(
+                    "carries the vehicle off: leg {number} (from 0) goes {} m/s through the water, so {speed_mps} \
+                     m/s over ground",
+                    leg.speed_mps
+                ));
+            }
+            legs.push(Leg { speed_mps, ..*leg });
+        }
+        *self = Self::new(self.start_m, self.across_m, legs);
+        Ok(())
+    }
+}

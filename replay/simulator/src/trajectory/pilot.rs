@@ -1,0 +1,151 @@
+//! A pilot at the joystick: goes, stops, goes back to look again, and wanders all the while.
+
+use headrace_geometry::math;
+
+use super::knots::{Knots, Offsets, wandering};
+use super::place::Place;
+use crate::random::Stream;
+
+/// Time between two decisions, s.
+const STEP_S: f64 = 0.5;
+/// How fast the vehicle follows the stick, s.
+const RESPONSE_S: f64 = 2.0;
+/// A dive that takes so many times as long as without stops never ends.
+const MOST_TIMES_AS_LONG: f64 = 50.0;
+
+/// How a pilot goes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Pilot {
+    /// From and to which chainage, m.
+    pub(super) from_m: f64,
+    pub(super) to_m: f64,
+    /// Place in the cross-section about which it wanders: y, z, m.
+    pub(super) across_m: [f64; 2],
+    /// Speed while going, m/s.
+    pub(super) speed_mps: f64,
+    /// Stops and goings back, each so many an hour.
+    pub(super) stops_per_hour: f64,
+    pub(super) backs_per_hour: f64,
+    /// The shortest and longest stop, s, and distance gone back, m.
+    pub(super) stop_s: [f64; 2],
+    pub(super) back_m: [f64; 2],
+    /// How far it wanders left, up; rolls, pitches, yaws; m and radians; over which time, s.
+    pub(super) reach: Offsets,
+    pub(super) period_s: f64,
+}
+
+/// A trajectory as a pilot steers it, and the pilot, who takes another one in a current.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Piloted {
+    pilot: Pilot,
+    stick: Stream,
+    wander: Stream,
+    along: Knots,
+    beside: Knots,
+    duration_s: f64,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Doing {
+    Going,
+    Standing { left_s: f64 },
+    Back { left_m: f64 },
+}
+
+impl Pilot {
+    /// The chainage at each step, and once before the first.
+    ///
+    /// Errors: in words, a trajectory that has no end.
+    fn chainages_m(&self, stick: Stream, current_mps: f64) -> Result<Vec<f64>, String> {
+        let towards = (self.to_m - self.from_m).signum();
+        let plain_s = (self.to_m - self.from_m).abs() / self.speed_mps;
+        let most = math::floor_to_i64((plain_s + 60.0) * MOST_TIMES_AS_LONG / STEP_S);
+        let (mut x_m, mut speed_mps, mut doing) = (self.from_m, 0.0, Doing::Going);
+        let mut xs = vec![x_m, x_m];
+        for step in 0.. {
+            if (x_m - self.to_m) * towards >= 0.0 {
+                break;
+            }
+            if step > most {
+                return Err(format!("has not come to {} m after {most} half seconds", self.to_m));
+            }
+            doing = self.decide(doing, stick, step as u64);
+            if (x_m - self.from_m) * towards <= 0.0 && matches!(doing, Doing::Back { .. }) {
+                doing = Doing::Going;
+            }
+            let wanted = match doing {
+                Doing::Going => self.speed_mps * towards,
+                Doing::Standing { .. } => 0.0,
+                Doing::Back { .. } => -self.speed_mps * towards,
+            };
+            speed_mps += (wanted - speed_mps) * (STEP_S / RESPONSE_S);
+            x_m += (speed_mps + current_mps) * STEP_S;
+            xs.push(x_m);
+        }
+        Ok(xs)
+    }
+
+    fn decide(&self, doing: Doing, stream: Stream, step: u64) -> Doing {
+        let [chance, size] = stream.at(step).uniform();
+        let between = |[least, most]: [f64; 2]| least + (most - least) * size;
+        match doing {
+            Doing::Standing { left_s } if left_s > STEP_S => Doing::Standing { left_s: left_s - STEP_S },
+            Doing::Back { left_m } if left_m > self.speed_mps * STEP_S => {
+                Doing::Back { left_m: left_m - self.speed_mps * STEP_S }
+            }
+            Doing::Standing { .. } | Doing::Back { .. } => Doing::Going,
+            Doing::Going => {
+                let [stop, back] = [self.stops_per_hour, self.backs_per_hour].map(|n| n * STEP_S / 3600.0);
+                if chance < stop {
+                    Doing::Standing { left_s: between(self.stop_s) }
+                } else if chance < stop + back {
+                    Doing::Back { left_m: between(self.back_m) }
+                } else {
+                    Doing::Going
+                }
+            }
+        }
+    }
+}
+
+impl Piloted {
+    /// A pilot's trajectory in still water.
+    ///
+    /// Errors: in words, a trajectory that has no end.
+    pub(super) fn new(pilot: Pilot, stick: Stream, wander: Stream) -> Result<Self, String> {
+        let nowhere = Knots::new(0.0, STEP_S, |_| [0.0; 6]);
+        let (along, beside) = (nowhere.clone(), nowhere);
+        let mut piloted = Self { pilot, stick, wander, along, beside, duration_s: 0.0 };
+        piloted.go(0.0)?;
+        Ok(piloted)
+    }
+
+    pub(super) fn duration_s(&self) -> f64 {
+        self.duration_s
+    }
+
+    pub(super) fn place(&self, after_s: f64) -> Place {
+        let mut place = Place::from_offsets(self.along.at(after_s));
+        place.shift(&self.beside.at(after_s));
+        place
+    }
+
+    /// The same pilot in a current.
+    pub(super) fn carry(&mut self, current_mps: f64) -> Result<(), String> {
+        self.go(current_mps).map_err(|why| format!("carries the vehicle off: it {why}"))
+    }
+
+    fn go(&mut self, current_mps: f64) -> Result<(), String> {
+        let pilot = self.pilot;
+        let xs = pilot.chainages_m(self.stick, current_mps)?;
+        let [y, z] = pilot.across_m;
+        self.duration_s = xs.len().saturating_sub(2) as f64 * STEP_S;
+        self.along = Knots::new(self.duration_s, STEP_S, |k| {
+            let index = usize::try_from(k + 1).unwrap_or(0);
+            let x = xs.get(index).or(xs.last()).copied().unwrap_or(pilot.from_m);
+            [x, y, z, 0.0, 0.0, 0.0]
+        });
+        self.beside = wandering(self.wander, self.duration_s, pilot.period_s, pilot.reach);
+        Ok(())
+    }
+}

@@ -1,0 +1,80 @@
+//! A recorded trajectory: a line for each moment.
+
+use headrace_geometry::math;
+
+use super::knots::{Knots, Offsets};
+use super::waypoints::through;
+
+/// Time between two knots, s; what was recorded is smoothed over four of them.
+const SPACING_S: f64 = 0.1;
+/// The most seconds that a recorded trajectory may take: two days.
+const MAX_S: f64 = 172_800.0;
+
+/// A place with its time, s.
+type Timed = (f64, Offsets);
+
+/// Reads lines `t_s,chainage_m,y_m,z_m[,roll_deg,pitch_deg,yaw_deg]`; gives the places, times from the first. Lines that
+/// begin with #, and the first of the others where that is text, are passed over; times grow. Angles go the short way.
+///
+/// Errors: in words, with the line.
+pub(super) fn parse(text: &str) -> Result<Vec<Timed>, String> {
+    let mut begun = false;
+    let mut timed: Vec<Timed> = Vec::new();
+    for (number, line) in text.lines().enumerate() {
+        let line = line.trim();
+        if line.is_empty() || line.starts_with('#') {
+            continue;
+        }
+        let first = !std::mem::replace(&mut begun, true);
+        let Some((at_s, mut place)) = fields(line) else {
+            if first {
+                continue;
+            }
+            let wanted = "t_s,chainage_m,y_m,z_m and, if known, roll_deg,pitch_deg,yaw_deg";
+            return Err(format!("line {} of it is {line:?}; wanted is {wanted}", number + 1));
+        };
+        if timed.last().is_some_and(|(before_s, _)| at_s <= *before_s) {
+            return Err(format!("line {} of it has the time {at_s} s, not after the one before", number + 1));
+        }
+        if let Some((_, before)) = timed.last() {
+            turn_short(before, &mut place);
+        }
+        timed.push((at_s, place));
+    }
+    let (Some((first_s, _)), Some((last_s, _))) = (timed.first().copied(), timed.last().copied()) else {
+        return Err("has no line with a place".to_owned());
+    };
+    let duration_s = last_s - first_s;
+    if !(duration_s > 0.0 && duration_s <= MAX_S) {
+        return Err(format!("takes {duration_s} s; allowed are up to {MAX_S} s, and more than none"));
+    }
+    for (at_s, _) in &mut timed {
+        *at_s -= first_s;
+    }
+    Ok(timed)
+}
+
+/// The knots of a trajectory through recorded places, and how long it takes, s.
+pub(super) fn knots(timed: &[Timed]) -> (Knots, f64) {
+    let duration_s = timed.last().map_or(0.0, |(last_s, _)| *last_s);
+    (through(timed, SPACING_S, duration_s), duration_s)
+}
+
+/// Brings angles to within half a turn of those before: 179 degrees and -179 are near each other.
+fn turn_short([.., roll, pitch, yaw]: &Offsets, [.., new_roll, new_pitch, new_yaw]: &mut Offsets) {
+    for (before, angle) in [(roll, new_roll), (pitch, new_pitch), (yaw, new_yaw)] {
+        *angle = before + math::wrap_signed(*angle - before, math::TAU);
+    }
+}
+
+fn fields(line: &str) -> Option<Timed> {
+    let numbers: Option<Vec<f64>> =
+        line.split(',').map(|field| field.trim().parse().ok().filter(|n: &f64| n.is_finite())).collect();
+    match *numbers?.as_slice() {
+        [t, x, y, z] => Some((t, [x, y, z, 0.0, 0.0, 0.0])),
+        [t, x, y, z, roll, pitch, yaw] => {
+            Some((t, [x, y, z, roll.to_radians(), pitch.to_radians(), yaw.to_radians()]))
+        }
+        _ => None,
+    }
+}

@@ -1,0 +1,64 @@
+//! From waypoint to waypoint, at one speed on each stretch.
+
+use headrace_geometry::math;
+
+use super::knots::{Knots, Offsets};
+
+/// Time between two knots, s: corners are rounded over four of them.
+pub(super) const SPACING_S: f64 = 0.5;
+
+/// A place to go through.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Waypoint {
+    /// Where, and how turned.
+    pub(super) at: Offsets,
+    /// How fast to go there from the one before, m/s.
+    pub(super) speed_mps: f64,
+    /// How long to stay, s.
+    pub(super) stay_s: f64,
+}
+
+/// The knots of a trajectory through waypoints, and how long it takes, s.
+pub(super) fn knots(waypoints: &[Waypoint]) -> (Knots, f64) {
+    let mut timed: Vec<(f64, Offsets)> = Vec::new();
+    let mut at_s = 0.0;
+    for point in waypoints {
+        if let Some((_, before)) = timed.last() {
+            at_s += distance_m(before, &point.at) / point.speed_mps;
+        }
+        timed.push((at_s, point.at));
+        if point.stay_s > 0.0 {
+            at_s += point.stay_s;
+            timed.push((at_s, point.at));
+        }
+    }
+    (through(&timed, SPACING_S, at_s), at_s)
+}
+
+/// Knots on the straight lines between places with their times, s, which grow or repeat.
+pub(super) fn through(timed: &[(f64, Offsets)], spacing_s: f64, duration_s: f64) -> Knots {
+    Knots::new(duration_s, spacing_s, |k| {
+        let at_s = k as f64 * spacing_s;
+        let after = timed.partition_point(|(when_s, _)| *when_s <= at_s);
+        let from = timed.get(after.saturating_sub(1)).or(timed.last());
+        match (from, timed.get(after)) {
+            (Some((from_s, from)), Some((to_s, to))) if at_s > *from_s => {
+                between(from, to, (at_s - from_s) / (to_s - from_s))
+            }
+            (Some((_, from)), _) => *from,
+            (None, _) => [0.0; 6],
+        }
+    })
+}
+
+fn between(from: &Offsets, to: &Offsets, share: f64) -> Offsets {
+    let mut place = *from;
+    for (value, to) in place.iter_mut().zip(to) {
+        *value += (to - *value) * share;
+    }
+    place
+}
+
+fn distance_m([x, y, z, ..]: &Offsets, [u, v, w, ..]: &Offsets) -> f64 {
+    math::hypot(math::hypot(u - x, v - y), w - z)
+}

@@ -1,0 +1,143 @@
+//! What was true: for each measurement the vehicle's pose, the place on the wall, and what effects did to it.
+
+use bevy_ecs::entity::Entity;
+use bevy_ecs::prelude::World;
+use headrace_geometry::frames::{Point3, Pose, Tunnel, Vec3};
+use headrace_geometry::time::MonoNs;
+use headrace_sensor::device::Sense;
+use headrace_sensor::measurement::{GroundVelocity, Inertia, Measurement, Payout, Pressure, Sounding};
+
+use crate::environment::Hit;
+use crate::notes::{Note, Notes};
+use crate::sensing::{Echosounder, Rays, Samples, Scenery, Source};
+
+/// One measurement.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TruthRow {
+    /// When it was made.
+    pub at: MonoNs,
+    /// The sensor, in the order of the vehicle file.
+    pub source: u16,
+    /// What it senses.
+    pub sense: Sense,
+    /// Number of the measurement among this sensor's.
+    pub number: u64,
+    /// Where the vehicle was.
+    pub pose: Pose,
+    /// The vehicle's chainage, m.
+    pub chainage_m: f64,
+    /// For a sonar, what its ping met.
+    pub sounding: Option<SoundingTruth>,
+    /// What effects did, in the order in which they did it.
+    pub causes: Vec<Cause>,
+}
+
+/// A ping as it truly was, and what was measured.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SoundingTruth {
+    /// The measurement.
+    pub measured: Sounding,
+    /// Where the sonar was.
+    pub origin: Point3<Tunnel>,
+    /// Where its beam's middle looked, a unit vector.
+    pub direction: Vec3<Tunnel>,
+    /// What the beam's middle met, with the arc length there, m.
+    pub wall: Option<(Hit, f64)>,
+}
+
+impl TruthRow {
+    /// For a sonar, what its beam's middle met, with the arc length there, m.
+    pub fn wall(&self) -> Option<(Hit, f64)> {
+        self.sounding.and_then(|sounding| sounding.wall)
+    }
+}
+
+impl SoundingTruth {
+    /// The place that the measured range means, were all else known.
+    pub fn measured_point(&self) -> Option<Point3<Tunnel>> {
+        self.measured.range_m.map(|range_m| self.origin + self.direction.scaled(range_m))
+    }
+}
+
+/// A change that an effect has made.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Cause {
+    /// The effect, by its place among those that the scene names.
+    pub effect: u16,
+    /// What was changed, with its unit.
+    pub what: &'static str,
+    /// From which value, not a number where there was none.
+    pub from: f64,
+    /// To which value.
+    pub to: f64,
+}
+
+/// Adds the slice's measurements, sensor by sensor, to `rows`.
+pub(crate) fn collect(world: &mut World, entities: &[Entity], rows: &mut Vec<TruthRow>) {
+    let mut notes =
+        world.get_resource_mut::<Notes>().map(|mut notes| std::mem::take(&mut notes.0)).unwrap_or_default();
+    notes.sort_by_key(|note| (note.source, note.sample));
+    let Some(scenery) = world.get_resource::<Scenery>() else { return };
+    for entity in entities {
+        let Some(Source(source)) = world.get::<Source>(*entity).copied() else { continue };
+        let from = notes.partition_point(|note| note.source < source);
+        let to = notes.partition_point(|note| note.source <= source);
+        let base = Base { scenery, source, notes: notes.get(from..to).unwrap_or_default() };
+        if let (Some(samples), Some(rays)) =
+            (world.get::<Samples<Sounding>>(*entity), world.get::<Rays>(*entity))
+        {
+            let echosounder = world.get::<Echosounder>(*entity).is_some();
+            let sense = if echosounder { Sense::Echosounder } else { Sense::Head };
+            for (row, (sounding, ray)) in base.rows(samples, sense).zip(samples.list.iter().zip(&rays.0)) {
+                let wall = ray.hit.map(|hit| (hit, scenery.environment.sigma_m(hit.point)));
+                let (measured, origin, direction) = (*sounding, ray.origin, ray.direction);
+                let sounding = Some(SoundingTruth { measured, origin, direction, wall });
+                rows.push(TruthRow { sounding, ..row });
+            }
+        }
+        if let Some(samples) = world.get::<Samples<Pressure>>(*entity) {
+            rows.extend(base.rows(samples, Sense::Depth));
+        }
+        if let Some(samples) = world.get::<Samples<Inertia>>(*entity) {
+            rows.extend(base.rows(samples, Sense::Inertial));
+        }
+        if let Some(samples) = world.get::<Samples<GroundVelocity>>(*entity) {
+            rows.extend(base.rows(samples, Sense::Velocity));
+        }
+        if let Some(samples) = world.get::<Samples<Payout>>(*entity) {
+            rows.extend(base.rows(samples, Sense::Tether));
+        }
+    }
+}
+
+struct Base<'a> {
+    scenery: &'a Scenery,
+    source: u16,
+    notes: &'a [Note],
+}
+
+impl<'a> Base<'a> {
+    fn rows<M: Measurement>(
+        &'a self,
+        samples: &'a Samples<M>,
+        sense: Sense,
+    ) -> impl Iterator<Item = TruthRow> + 'a {
+        (samples.first..).zip(samples.list.iter().enumerate()).map(move |(number, (sample, measured))| {
+            let at = measured.at();
+            let from = self.notes.partition_point(|note| note.sample < sample);
+            let notes = self.notes.iter().skip(from).take_while(|note| note.sample == sample);
+            let cause =
+                |note: &Note| Cause { effect: note.effect, what: note.what, from: note.from, to: note.to };
+            TruthRow {
+                at,
+                source: self.source,
+                sense,
+                number,
+                pose: self.scenery.pose(at),
+                chainage_m: self.scenery.chainage_m(at),
+                sounding: None,
+                causes: notes.map(cause).collect(),
+            }
+        })
+    }
+}
