@@ -1,4 +1,4 @@
-//! The commands.
+//! The commands `demo`, `run`, `replay` and `check`.
 
 use headrace_config::Document;
 use headrace_geometry::time::DurNs;
@@ -25,13 +25,13 @@ use crate::summary::summary;
 use crate::vehicle_file;
 use crate::watch::Watch;
 
-/// Shows a simulated dive.
+/// `headrace demo`.
 pub(crate) fn demo(args: &Demo) -> Result<u8, Failure> {
     let (name, text) = files::DEMO_SCENE;
     let scene = Scene::parse(Document::new(name, text), &KINDS, &files::built_in, None)?;
     std::fs::create_dir_all(&args.out).map_err(|source| Failure::Write { path: args.out.clone(), source })?;
     let (log, report_file) = (args.out.join("dive.mcap"), args.out.join("report.json"));
-    // A dive is never recorded over another; the demonstration's own last one is no loss.
+    // The recorder never overwrites a log; the last demonstration's may go.
     if log.exists() {
         std::fs::remove_file(&log).map_err(|source| Failure::Write { path: log.clone(), source })?;
     }
@@ -42,11 +42,11 @@ pub(crate) fn demo(args: &Demo) -> Result<u8, Failure> {
     let report = dive.run(&mut feed, pace, &mut Watch::loud())?;
     files::write_json(&report_file, &report)?;
     put(&format!("\n{}", summary(&report)));
-    say(&format!("report {}\nlog    {}  (headrace replay it)", report_file.display(), log.display()));
+    say(&format!("report {}\nlog    {}  (headrace replay)", report_file.display(), log.display()));
     Ok(exit_code(&report))
 }
 
-/// The dive itself.
+/// `headrace run`.
 pub(crate) fn run(args: &Run) -> Result<u8, Failure> {
     let (text, vehicle) = vehicle_file::read(&args.vehicle)?;
     let Some(log) = &args.source else { return live::run(args, &text, &vehicle) };
@@ -55,7 +55,7 @@ pub(crate) fn run(args: &Run) -> Result<u8, Failure> {
         args.record.as_deref().map(|path| Recording { path, clock: Clock::Theirs, rotate: args.rotate });
     if let (None, Some(_)) = (&recording, args.rotate) {
         return Err(Failure::Usage(
-            "run: --rotate is for a recording; with --source it wants --record".to_owned(),
+            "run: --rotate needs a recording; with --source, add --record".to_owned(),
         ));
     }
     let dive = assemble(&vehicle, &text, recording)?;
@@ -66,7 +66,7 @@ pub(crate) fn run(args: &Run) -> Result<u8, Failure> {
     finish(&report, &args.output)
 }
 
-/// Runs a recorded dive through the loop.
+/// `headrace replay`.
 pub(crate) fn replay(args: &Replay) -> Result<u8, Failure> {
     let (files, log) = (files_of(&args.logs)?, files::first_named(&args.logs));
     let mut player = Player::open(&files)?;
@@ -98,8 +98,8 @@ pub(crate) fn replay(args: &Replay) -> Result<u8, Failure> {
     }
 }
 
-/// Changes the vehicle by what was asked for; the first of several targets and lengths of section is the dive's own. Gives all
-/// of them where there are several.
+/// Overrides the vehicle's settings by the options. Of several targets and section lengths the first is the dive's own; all are
+/// returned for evaluation as alternatives.
 fn what_if(args: &Replay, vehicle: &mut VehicleConfig) -> WhatIf {
     vehicle.target_m = args.target.first().copied().unwrap_or(vehicle.target_m);
     vehicle.section_m = args.section.first().copied().unwrap_or(vehicle.section_m);
@@ -111,7 +111,7 @@ fn what_if(args: &Replay, vehicle: &mut VehicleConfig) -> WhatIf {
     WhatIf { targets_m: or(&args.target, vehicle.target_m), sections_m: or(&args.section, vehicle.section_m) }
 }
 
-/// Says what a vehicle file describes.
+/// `headrace check`.
 pub(crate) fn check(args: &Check) -> Result<u8, Failure> {
     let (_, vehicle) = vehicle_file::read(&args.vehicle)?;
     let sensors = vehicle.sensor_configs.iter();
@@ -147,7 +147,7 @@ pub(crate) fn check(args: &Check) -> Result<u8, Failure> {
         return Ok(failure::USAGE);
     }
     if !args.json {
-        say("nothing is wrong with it");
+        say("no errors");
     }
     Ok(failure::OK)
 }

@@ -2,7 +2,7 @@
 
 use headrace_sensor::device::DeviceKind;
 
-/// Every kind of device that a vehicle file may name.
+/// The device kinds that vehicle files may name.
 pub(crate) const KINDS: [&dyn DeviceKind; 7] = [
     &headrace_imagenex881::Kind,
     &headrace_ping1d::Kind,

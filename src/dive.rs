@@ -1,4 +1,4 @@
-//! A dive from assembled loop to report: shared by `demo`, `run` and `replay`.
+//! A dive from the assembled loop to the report: shared by `demo`, `run` and `replay`.
 
 use std::path::{Path, PathBuf};
 
@@ -25,11 +25,11 @@ use crate::progress::Progress;
 use crate::report_output::parts;
 use crate::watch::Watch;
 
-/// Notices that may wait for the terminal; a tick of 20 ms has a handful. Each slot is some 400 bytes, and all are
-/// touched.
+/// Capacity of the queue of notices to the terminal; a tick of 20 ms has a handful. A slot takes some 400 bytes, allocated at
+/// arming.
 const NOTICES: usize = 1 << 10;
 
-/// A loop with the vehicle's sensors and ways out for its results.
+/// An armed loop with the vehicle's sensors, and the consumers of its results.
 pub(crate) struct Dive {
     pub(crate) armed: Loop,
     notices: NoticeReceiver,
@@ -42,27 +42,27 @@ pub(crate) struct Dive {
 pub(crate) struct Recording<'a> {
     pub(crate) path: &'a Path,
     pub(crate) clock: Clock,
-    /// When a part of it ends, where it is to have parts.
+    /// Size or duration of its parts; `None` for a single file.
     pub(crate) rotate: Option<Every>,
 }
 
 impl<'a> Recording<'a> {
-    /// In one file.
+    /// A single file.
     pub(crate) fn whole(path: &'a Path, clock: Clock) -> Self {
         Self { path, clock, rotate: None }
     }
 }
 
-/// Whose clock the stamps are of.
+/// The clock of the timestamps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Clock {
-    /// This machine's.
+    /// This machine's monotonic clock.
     Ours,
-    /// A recorded or a simulated dive's.
+    /// That of a recorded or simulated dive.
     Theirs,
 }
 
-/// Targets and lengths of section that a dive is to be judged by besides, m.
+/// Alternative targets and section lengths to evaluate at the end, m.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct WhatIf {
     pub(crate) targets_m: Vec<f64>,
@@ -78,7 +78,7 @@ pub(crate) fn assemble(
     assemble_with(vehicle, vehicle.navigation(), vehicle_text, record_to)
 }
 
-/// The same, keeping the words of all results for those who compare them.
+/// The same, keeping all results for a comparison, and without a recording.
 pub(crate) fn assemble_kept(vehicle: &VehicleConfig) -> Result<Dive, Failure> {
     let (mut app, notices) = app(vehicle)?;
     app.keep_results();
@@ -86,7 +86,7 @@ pub(crate) fn assemble_kept(vehicle: &VehicleConfig) -> Result<Dive, Failure> {
     Ok(Dive { armed, notices, recorder: None, what_if: WhatIf::default() })
 }
 
-/// The same with another way of navigating than the vehicle file's.
+/// The same with another navigation than the vehicle file's.
 pub(crate) fn assemble_with(
     vehicle: &VehicleConfig,
     navigation: Box<dyn Navigation>,
@@ -134,7 +134,7 @@ fn resident_kib() -> Option<u64> {
     line.split_whitespace().next()?.parse().ok()
 }
 
-/// The vehicle's sensors, and the way out to the terminal.
+/// The vehicle's sensors, and the queue of notices to the terminal.
 fn app(vehicle: &VehicleConfig) -> Result<(App, NoticeReceiver), Failure> {
     let mut app = App::new(vehicle.mission());
     for sensor in &vehicle.sensors {
@@ -145,7 +145,7 @@ fn app(vehicle: &VehicleConfig) -> Result<(App, NoticeReceiver), Failure> {
     Ok((app, notices))
 }
 
-/// What people's viewers are shown the dive against.
+/// What viewers need to know of the tunnel and the heads.
 fn view_site(vehicle: &VehicleConfig) -> Site {
     let heads = (0..).zip(&vehicle.sensors).filter(|(_, sensor)| sensor.head().is_some());
     Site {
@@ -157,20 +157,20 @@ fn view_site(vehicle: &VehicleConfig) -> Site {
     }
 }
 
-/// Notes what time of day it is on the clock of the stamps.
+/// Stores the UTC time of the clock of the timestamps.
 fn anchor(header: &mut LogHeader) {
     let (monotonic, utc) = headrace_ports::clock_anchor();
     header.metadata.insert("clock_anchor_monotonic_ns".to_owned(), monotonic.0.to_string());
     header.metadata.insert("clock_anchor_utc_ns".to_owned(), utc.0.to_string());
 }
 
-/// A name that no other recording has.
+/// A unique name for a recording.
 fn new_dive() -> String {
     let (monotonic, utc) = headrace_ports::clock_anchor();
     dive_name(&[monotonic.0, utc.0.cast_unsigned(), std::process::id().into()])
 }
 
-/// What a log of this vehicle begins with.
+/// The header of this vehicle's log.
 pub(crate) fn log_header(vehicle: &VehicleConfig, vehicle_text: &str, ticks: bool) -> LogHeader {
     let sources = vehicle.sensor_configs.iter().map(|sensor| SourceInfo {
         id: sensor.id.clone(),
@@ -201,17 +201,17 @@ fn sonars(vehicle: &VehicleConfig) -> Vec<u16> {
 }
 
 impl Dive {
-    /// Judged by these besides, once it has ended.
+    /// Evaluates these alternatives at the end.
     pub(crate) fn asking(self, what_if: WhatIf) -> Self {
         Self { what_if, ..self }
     }
 
-    /// Runs the loop until the feed ends, shows what happens, and gives the report.
+    /// Runs the loop until the feed ends; returns the report.
     pub(crate) fn run(self, feed: &mut dyn Feed, pace: Pace, watch: &mut Watch) -> Result<Report, Failure> {
         self.run_beside(feed, pace, watch, &mut |_| {})
     }
 
-    /// The same; `beside` sees the loop after every tick, and at the end.
+    /// The same; `beside` is called after every tick and at the end.
     pub(crate) fn run_beside(
         mut self,
         feed: &mut dyn Feed,
@@ -239,7 +239,7 @@ impl Dive {
         Ok(report)
     }
 
-    /// Lets `direct` run the loop, and gives the report.
+    /// Lets `direct` run the loop; returns the report.
     pub(crate) fn play(
         mut self,
         watch: &mut Watch,
@@ -254,8 +254,7 @@ impl Dive {
         Ok(report)
     }
 
-    /// Runs the loop on the ports that a crew serves, until `ended` says so, and gives the report. `beside` sees the crew
-    /// after every tick.
+    /// Runs the loop on the ports until `ended` returns true; returns the report. `beside` is called after every tick.
     pub(crate) fn run_live(
         mut self,
         crew: Crew,
@@ -288,23 +287,23 @@ impl Dive {
         Ok(report)
     }
 
-    /// An end of the recorder for what is sent to the devices.
+    /// The recorder's input for bytes sent to devices.
     pub(crate) fn sent_port(&self) -> Option<SentPort> {
         self.recorder.as_ref().map(|(_, handle)| handle.sent_port())
     }
 
-    /// Ends the dive and gives the report.
+    /// Ends the dive; returns the report.
     fn end(mut self, watch: &mut Watch, beside: &mut dyn FnMut(&Loop)) -> Result<Report, Failure> {
         let _phase = Phase::start("report");
         self.armed.finish(&mut |notice, dive| watch.notice(notice, dive));
-        // While there still are samples.
+        // Needs the samples, which are released below.
         let what_if = self.armed.what_if(&self.what_if.targets_m, &self.what_if.sections_m);
         watch.end(&self.armed);
         beside(&self.armed);
-        // What the end has judged is recorded, too.
+        // Records the last judgements, too.
         let now = self.armed.now();
         self.armed.tick(now);
-        // A long dive's report takes as much room as its samples, which it needs no more.
+        // A long dive's report takes as much memory as its samples, which aren't needed any more.
         self.armed.release_samples();
         let mut report = Report::of(&self.armed);
         report.what_if = what_if;
@@ -332,23 +331,20 @@ impl Dive {
     }
 }
 
-/// What a recording that has ended in good order lacks, in words.
+/// What is missing in a recording that ended normally, as text.
 fn unrecorded(written: &Summary) -> Vec<String> {
     let mut losses: Vec<String> =
         Some(written.left_out).filter(|left| left.messages > 0).map(left_out).into_iter().collect();
     let counts = [
-        (
-            written.sent_dropped,
-            "messages to devices not recorded: they came faster than the recorder took them",
-        ),
-        (written.results_missing, "ticks not recorded with all their results: there were too many"),
+        (written.sent_dropped, "messages to devices not recorded: the recorder's queue was full"),
+        (written.results_missing, "ticks recorded without all their results: too many"),
     ];
     losses
         .extend(counts.iter().filter(|(count, _)| *count > 0).map(|(count, what)| format!("{count} {what}")));
     losses
 }
 
-/// What the recorder left out, with when.
+/// What the recorder left out, and when.
 fn left_out(left: LeftOut) -> String {
     let span = left.span.map(|(from, to)| format!(", {} to {}", seconds(from), seconds(to)));
     format!("{}{}", left.words(), span.unwrap_or_default())

@@ -1,4 +1,4 @@
-//! `headrace emulate`: a scene's devices on real ports, at real speed.
+//! `headrace emulate`: a scene's devices emulated on real ports in real time.
 
 use std::path::Path;
 
@@ -18,10 +18,10 @@ use crate::files;
 use crate::live::connections;
 use crate::output::say;
 
-/// How long it waits for a host at most before it goes on: a measurement is told at most so late.
+/// Longest wait for a host, ns, and so the largest delay of a measurement.
 const WAIT_NS: u32 = 1_000_000;
 
-/// Puts a scene's devices on ports.
+/// `headrace emulate`.
 pub(crate) fn emulate(args: &Emulate) -> Result<u8, Failure> {
     let (name, text) = (args.scene.display().to_string(), files::read(&args.scene)?);
     let load = files::bytes_beside(&args.scene);
@@ -39,7 +39,7 @@ pub(crate) fn emulate(args: &Emulate) -> Result<u8, Failure> {
     Ok(failure::OK)
 }
 
-/// A port for each sensor: the one that its `connect` asks for, or UDP where this machine has none of it.
+/// A port for each sensor, of the carrier of its `connect`, or UDP where this machine doesn't have that.
 fn stands(scene: &Scene, args: &Emulate) -> Result<Vec<Stand>, Failure> {
     let mut stands = Vec::new();
     for ((id, asked), device) in connections(&scene.vehicle).into_iter().zip(&scene.vehicle.sensors) {
@@ -53,7 +53,7 @@ fn stands(scene: &Scene, args: &Emulate) -> Result<Vec<Stand>, Failure> {
             _ => Stand::new(carrier, args.listen),
         };
         let stand = stand.or_else(|error| {
-            eprintln!("headrace: {id}: no {} here ({error}); UDP takes its place", carrier.as_str());
+            eprintln!("headrace: {id}: no {} on this machine ({error}); using UDP", carrier.as_str());
             Stand::new(Carrier::Udp, args.listen)
         });
         stands.push(stand.map_err(|source| Failure::System { what: "opening a port for a device", source })?);
@@ -61,7 +61,7 @@ fn stands(scene: &Scene, args: &Emulate) -> Result<Vec<Stand>, Failure> {
     Ok(stands)
 }
 
-/// Writes the vehicle file of the rehearsal and the files that it names.
+/// Writes the vehicle file and the files that it refers to.
 fn write_vehicle(scene: &Scene, stands: &[Stand], folder: &Path, file: &Path) -> Result<(), Failure> {
     let failed = |path: &Path, source| Failure::Write { path: path.to_owned(), source };
     let ids = scene.vehicle.sensor_configs.iter().map(|config| &config.id);
@@ -81,7 +81,7 @@ fn write_vehicle(scene: &Scene, stands: &[Stand], folder: &Path, file: &Path) ->
     files::write(file, text.as_bytes())
 }
 
-/// The scene's vehicle file with a `connect` in each sensor's table: one that is only simulated needs none.
+/// The scene's vehicle file with a `connect` in each sensor's table; it may lack some, as simulations need none.
 fn with_connects(scene: &Scene) -> String {
     let missing: Vec<String> = scene
         .vehicle
@@ -104,11 +104,11 @@ fn with_connects(scene: &Scene) -> String {
     text
 }
 
-/// Devices in a simulated tunnel, and the ports that they are on.
+/// The simulated devices and their ports.
 struct Rehearsal {
     simulation: Simulation,
     stands: Vec<Stand>,
-    /// When the simulation began, on our clock.
+    /// Start of the simulation on this machine's clock.
     origin: MonoNs,
 }
 
@@ -123,10 +123,10 @@ impl Rehearsal {
         }
         let sets_out = self.now() + DurNs::from_secs_f64(args.stand);
         self.simulation.set_out(sets_out);
-        say(&format!("all sensors are called; sets out in {} s", args.stand));
+        say(&format!("all sensors are connected; starting in {} s", args.stand));
         let end = self.simulation.end();
         self.go_on_until(end)?;
-        say("the way has ended");
+        say("end of the trajectory");
         self.go_on_until(end + DurNs::from_secs_f64(args.linger))
     }
 
@@ -141,9 +141,9 @@ impl Rehearsal {
         Ok(())
     }
 
-    /// What hosts have sent goes to the devices, and what the devices say by now onto the lines.
+    /// Passes bytes from hosts to the devices, and the devices' bytes that are due to the ports.
     fn go_on(&mut self) -> Result<(), Failure> {
-        let failed = |source| Failure::System { what: "rehearsing on a device's port", source };
+        let failed = |source| Failure::System { what: "emulating a device on its port", source };
         wait_for_any(&self.stands, WAIT_NS);
         let now = self.now();
         for (number, stand) in self.stands.iter_mut().enumerate() {

@@ -1,4 +1,4 @@
-//! Comparison of a report with one made before.
+//! Comparison of a report with a golden one.
 
 use std::path::Path;
 
@@ -8,14 +8,14 @@ use serde_json::Value;
 use crate::failure::Failure;
 use crate::files;
 
-/// Differences that are shown one by one.
+/// Most differences that are listed.
 const SHOWN: usize = 20;
 
-/// Whether the report differs from a golden one in anything but the log's own name and hash, what the ports' lines went
-/// through, and what the golden one itself allows; says where on stderr.
+/// Whether the report differs from a golden one. The log's name and hash, the history of ports and the golden report's
+/// tolerances are disregarded. Lists the differences on stderr.
 pub(crate) fn differs(report: &Report, golden: &Path) -> Result<bool, Failure> {
     let wrong = |why: String| {
-        Failure::Usage(format!("reading {}: {why}; wanted is a report of headrace", golden.display()))
+        Failure::Usage(format!("reading {}: {why}; expected a report of headrace", golden.display()))
     };
     let mut expected: Value =
         serde_json::from_str(&files::read(golden)?).map_err(|error| wrong(error.to_string()))?;
@@ -24,8 +24,7 @@ pub(crate) fn differs(report: &Report, golden: &Path) -> Result<bool, Failure> {
     Ok(tell(&expected, &without_log(report)?, &allowed))
 }
 
-/// Writes the report as the golden one, without the log's own name and hash, and with what that one allows; says on stderr
-/// what it changes.
+/// Replaces the golden report, without the log's name and hash, keeping its tolerances. Lists the differences on stderr.
 pub(crate) fn bless(report: &Report, golden: &Path) -> Result<(), Failure> {
     let mut got = without_log(report)?;
     let old: Option<Value> =
@@ -36,39 +35,41 @@ pub(crate) fn bless(report: &Report, golden: &Path) -> Result<(), Failure> {
             let allowed = Allowed::take(&mut old).unwrap_or_default();
             drop_log(&mut old);
             if !tell(&old, &got, &allowed) {
-                eprintln!("{}: nothing has changed", golden.display());
+                eprintln!("{}: unchanged", golden.display());
                 return Ok(());
             }
             if let (Some(stated), Some(report)) = (stated, got.as_object_mut()) {
                 report.insert(TOLERANCES.to_owned(), stated);
             }
         }
-        None => eprintln!("{}: a new golden report", golden.display()),
+        None => eprintln!("{}: new golden report", golden.display()),
     }
     let mut text = serde_json::to_string_pretty(&got)?;
     text.push('\n');
     files::write(golden, text.as_bytes())
 }
 
-/// Key of a golden report with what may differ: from a path, in which `*` stands for any one name or number, to how far
-/// apart two numbers may be, or `"any"`.
+/// Key of a golden report for its tolerances: by path, in which `*` stands for any one name or index, the largest difference
+/// of two numbers, or `"any"`.
 const TOLERANCES: &str = "tolerances";
 
-/// What may differ.
+/// Tolerances by path; `None` allows any difference.
 #[derive(Debug, Default)]
 struct Allowed(Vec<(Vec<String>, Option<f64>)>);
 
 impl Allowed {
-    /// Takes it out of a golden report.
+    /// Removes them from a golden report.
     fn take(golden: &mut Value) -> Result<Self, String> {
         let stated = golden.as_object_mut().and_then(|golden| golden.remove(TOLERANCES));
         let Some(stated) = stated else { return Ok(Self::default()) };
-        let entries = stated.as_object().ok_or_else(|| format!("{TOLERANCES} is no table"))?;
+        let entries = stated.as_object().ok_or_else(|| format!("{TOLERANCES} isn't an object"))?;
         let entry = |(path, within): (&String, &Value)| {
             let within = match within {
                 Value::String(any) if any == "any" => None,
                 other => Some(other.as_f64().filter(|within| *within >= 0.0).ok_or_else(|| {
-                    format!("{TOLERANCES} of {path:?} is {other}; allowed are a number from zero and \"any\"")
+                    format!(
+                        "{TOLERANCES} of {path:?} is {other}; expected a number not below zero or \"any\""
+                    )
                 })?),
             };
             Ok((path.split('/').map(str::to_owned).collect(), within))
@@ -76,11 +77,11 @@ impl Allowed {
         entries.iter().map(entry).collect::<Result<_, String>>().map(Self)
     }
 
-    /// Whether two values that differ may do so.
+    /// Whether the difference of two values is allowed.
     fn covers(&self, path: &str, expected: &Value, got: &Value) -> bool {
         let names: Vec<&str> = path.split('/').collect();
         let fits = |wanted: &[String]| {
-            // Below what may be anything, all may.
+            // "any" covers everything below its path.
             wanted.len() <= names.len()
                 && wanted.iter().zip(&names).all(|(wanted, name)| {
                     wanted == "*" || wanted == name || name.split('[').next() == Some(wanted)
@@ -111,7 +112,7 @@ fn drop_log(report: &mut Value) {
     }
 }
 
-/// Says where two reports differ; whether they do.
+/// Lists the differences of two reports; returns whether there are any.
 fn tell(expected: &Value, got: &Value, allowed: &Allowed) -> bool {
     let mut differences = Vec::new();
     compare("", expected, got, allowed, &mut differences);
@@ -125,7 +126,7 @@ fn tell(expected: &Value, got: &Value, allowed: &Allowed) -> bool {
     !differences.is_empty()
 }
 
-/// What is told first: the report as a whole, sections' verdicts, the rest of the sections, all else.
+/// Order of the list: the report as a whole, sections' verdicts, the rest of the sections, everything else.
 fn rank(difference: &str) -> u8 {
     let path = difference.split(": ").next().unwrap_or_default();
     match path {
@@ -136,7 +137,7 @@ fn rank(difference: &str) -> u8 {
     }
 }
 
-/// What an entry of a list is called: a section by where it lies, anything else by its number.
+/// Name of a list's entry: its index, for a section with its bounds.
 fn entry_name(index: usize, entry: &Value) -> String {
     let metres = |key: &str| entry.get(key).and_then(Value::as_f64);
     match (metres("start_m"), metres("end_m")) {
@@ -161,14 +162,14 @@ fn compare(path: &str, expected: &Value, got: &Value, allowed: &Allowed, differe
         }
         (Value::Array(a), Value::Array(b)) => {
             if a.len() != b.len() && !allowed.covers(path, expected, got) {
-                differences.push(format!("{path}: {} entries in place of {}", b.len(), a.len()));
+                differences.push(format!("{path}: {} entries, expected {}", b.len(), a.len()));
             }
             for (index, (a, b)) in a.iter().zip(b).enumerate() {
                 compare(&format!("{path}/{}", entry_name(index, a)), a, b, allowed, differences);
             }
         }
         _ if expected != got && !allowed.covers(path, expected, got) => {
-            differences.push(format!("{path}: {got} in place of {expected}"));
+            differences.push(format!("{path}: {got}, expected {expected}"));
         }
         _ => {}
     }

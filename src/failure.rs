@@ -1,4 +1,4 @@
-//! What ends a command, and with which exit code.
+//! Errors of commands, and their exit codes.
 
 use std::path::PathBuf;
 
@@ -14,19 +14,18 @@ use headrace_replay::smooth::SmoothError;
 use headrace_sampling::SamplingError;
 use headrace_simulator::SceneError;
 
-/// Exit code of a command that did all it was asked, on all the data.
+/// Exit code: success, on all the data.
 pub(crate) const OK: u8 = 0;
-/// The command failed, or what was expected differs.
+/// Exit code: failed, or the result differs from the expected one.
 pub(crate) const FAILED: u8 = 1;
-/// A file or an argument is wrong.
+/// Exit code: a file or an argument is wrong.
 pub(crate) const USAGE: u8 = 2;
-/// The command finished, but data was lost.
+/// Exit code: finished, but data was lost.
 pub(crate) const DATA_LOST: u8 = 3;
-
-/// The replay isn't the dive.
+/// Exit code: the replay differs from the dive.
 pub(crate) const DIVERGED: u8 = 4;
 
-/// Why a command could not do what it was asked.
+/// Why a command failed.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum Failure {
     #[error("reading {}: {source}", path.display())]
@@ -53,7 +52,7 @@ pub(crate) enum Failure {
     Drive(#[from] DriveError),
     #[error(transparent)]
     Playback(#[from] PlaybackError),
-    #[error("making JSON of the report: {0}")]
+    #[error("writing the report as JSON: {0}")]
     Json(#[from] serde_json::Error),
     #[error("planning: {0}")]
     Plan(#[from] SamplingError),
@@ -66,7 +65,7 @@ pub(crate) enum Failure {
 }
 
 impl Failure {
-    /// The exit code that goes with it.
+    /// Its exit code.
     pub(crate) fn exit_code(&self) -> u8 {
         match self {
             Self::Config(_)

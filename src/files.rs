@@ -1,4 +1,4 @@
-//! Reading and writing files, and the ones that are built in.
+//! Files: reading, writing, built-in and attached ones.
 
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -8,7 +8,7 @@ use headrace_monitor::report::Report;
 
 use crate::failure::Failure;
 
-/// The demonstration's scene and its vehicle, so that the binary needs no file beside it.
+/// The demonstration's scene, built in so that the binary needs no files.
 pub(crate) const DEMO_SCENE: (&str, &str) =
     ("deploy/scenes/demo.toml", include_str!("../deploy/scenes/demo.toml"));
 const DEMO_VEHICLE: (&str, &str) =
@@ -29,7 +29,7 @@ pub(crate) fn write(path: &Path, content: &[u8]) -> Result<(), Failure> {
     std::fs::write(path, content).map_err(|source| Failure::Write { path: path.to_owned(), source })
 }
 
-/// Writes a report as JSON, piece by piece: that of a long dive would take more memory than the dive.
+/// Writes a report as JSON, without holding all of it in memory: a long dive's would take more than the dive.
 pub(crate) fn write_json(path: &Path, report: &Report) -> Result<(), Failure> {
     let failed = |source| Failure::Write { path: path.to_owned(), source };
     let mut file = BufWriter::new(File::create(path).map_err(failed)?);
@@ -37,7 +37,7 @@ pub(crate) fn write_json(path: &Path, report: &Report) -> Result<(), Failure> {
     file.flush().map_err(failed)
 }
 
-/// Loads the files that `file` names, relative to its folder.
+/// Loader of the text files that `file` refers to, relative to its folder.
 pub(crate) fn beside(file: &Path) -> impl Fn(&str) -> Result<String, String> {
     let folder: PathBuf = file.parent().map(Path::to_owned).unwrap_or_default();
     move |name| {
@@ -47,7 +47,7 @@ pub(crate) fn beside(file: &Path) -> impl Fn(&str) -> Result<String, String> {
     }
 }
 
-/// Loads the files of any content that `file` names, relative to its folder.
+/// Loader of the files that `file` refers to, relative to its folder.
 pub(crate) fn bytes_beside(file: &Path) -> impl Fn(&str) -> Result<Vec<u8>, String> {
     let folder: PathBuf = file.parent().map(Path::to_owned).unwrap_or_default();
     move |name| {
@@ -56,16 +56,17 @@ pub(crate) fn bytes_beside(file: &Path) -> impl Fn(&str) -> Result<Vec<u8>, Stri
     }
 }
 
-/// Loads the built-in files that the demonstration names.
+/// Loader of the demonstration's built-in files.
 pub(crate) fn built_in(name: &str) -> Result<Vec<u8>, String> {
     if name == DEMO_VEHICLE.0 { Ok(DEMO_VEHICLE.1.into()) } else { Err("is not built in".to_owned()) }
 }
 
-/// Loads a file that was attached to a log.
+/// Loader of the text files attached to a log.
 pub(crate) fn attached(attachments: &[(String, Vec<u8>)]) -> impl Fn(&str) -> Result<String, String> {
     move |name| {
         let content = attachments.iter().find(|(attached, _)| attached == name).map(|(_, content)| content);
         let content = content.ok_or_else(|| "is not attached to the log".to_owned())?;
-        String::from_utf8(content.clone()).map_err(|_| "is attached to the log, but is no text".to_owned())
+        String::from_utf8(content.clone())
+            .map_err(|_| "is attached to the log, but isn't UTF-8 text".to_owned())
     }
 }

@@ -1,4 +1,4 @@
-//! `headrace run` on real ports: each sensor's line and driver, and how they are doing.
+//! `headrace run` on real ports: connections, drivers, and the state of each sensor.
 
 use std::cell::RefCell;
 use std::path::PathBuf;
@@ -19,7 +19,7 @@ use crate::output::say;
 use crate::report_output::finish;
 use crate::watch::Watch;
 
-/// The dive itself.
+/// Runs a dive on the vehicle's ports.
 pub(crate) fn run(args: &Run, text: &str, vehicle: &VehicleConfig) -> Result<u8, Failure> {
     let required = required(args, vehicle)?;
     let log = args.record.clone().unwrap_or_else(new_log);
@@ -35,31 +35,35 @@ pub(crate) fn run(args: &Run, text: &str, vehicle: &VehicleConfig) -> Result<u8,
         let where_to = match (args.no_record, args.rotate) {
             (true, _) => "not recorded".to_owned(),
             (false, None) => format!("recorded to {}", log.display()),
-            (false, Some(_)) => format!("recorded in parts, from {} on", part_path(&log, 1).display()),
+            (false, Some(_)) => format!("recorded in parts, starting with {}", part_path(&log, 1).display()),
         };
         say(&format!("{}, target {} m: {where_to}; Ctrl-C ends the dive", vehicle.name, vehicle.target_m));
     }
-    let lamps =
-        RefCell::new(Lamps::new(vehicle, required, begun, begun + DurNs::from_secs_f64(args.require_within)));
+    let states = RefCell::new(SensorStates::new(
+        vehicle,
+        required,
+        begun,
+        begun + DurNs::from_secs_f64(args.require_within),
+    ));
     let ended = || {
         let now = headrace_ports::now();
         interrupted.load(Ordering::Relaxed)
             || until.is_some_and(|until| now >= until)
-            || lamps.borrow().missing(now).is_some()
+            || states.borrow().missing(now).is_some()
     };
     let report = dive.run_live(crew, &ended, &mut watch, &mut |crew, watch| {
         while let Some(status) = crew.next_status() {
-            lamps.borrow_mut().show(&status, watch);
+            states.borrow_mut().show(&status, watch);
         }
     })?;
     let code = finish(&report, &args.output)?;
-    match lamps.borrow().missing(headrace_ports::now()) {
+    match states.borrow().missing(headrace_ports::now()) {
         Some(why) => Err(Failure::Required(why)),
         None => Ok(code),
     }
 }
 
-/// Each sensor's id and where it is, or why that can't be.
+/// Each sensor's id and its connection, or why its `connect` is invalid.
 pub(crate) fn connections(vehicle: &VehicleConfig) -> Vec<(&str, Result<Connect, ConnectError>)> {
     let sensors = vehicle.sensor_configs.iter().zip(&vehicle.sensors);
     let connect = sensors.map(|(config, device)| {
@@ -69,9 +73,9 @@ pub(crate) fn connections(vehicle: &VehicleConfig) -> Vec<(&str, Result<Connect,
     connect.collect()
 }
 
-/// The sensors without which the dive is not to go on, by number.
+/// Numbers of the required sensors.
 ///
-/// Errors: an id that the vehicle doesn't have; a required sensor whose `connect` can't be used.
+/// Errors: an id that the vehicle doesn't have; a required sensor with an invalid `connect`.
 fn required(args: &Run, vehicle: &VehicleConfig) -> Result<Vec<usize>, Failure> {
     let connections = connections(vehicle);
     let all = args.require.iter().any(|id| id == "all");
@@ -79,7 +83,7 @@ fn required(args: &Run, vehicle: &VehicleConfig) -> Result<Vec<usize>, Failure> 
     if let Some(unknown) = args.require.iter().find(|id| *id != "all" && !ids.contains(&id.as_str())) {
         let known = ids.join(", ");
         return Err(Failure::Usage(format!(
-            "--require {unknown}: the vehicle has no such sensor; it has {known}, or all"
+            "--require {unknown}: no such sensor; expected all, or ids of {known}"
         )));
     }
     let mut required = Vec::new();
@@ -92,7 +96,7 @@ fn required(args: &Run, vehicle: &VehicleConfig) -> Result<Vec<usize>, Failure> 
     Ok(required)
 }
 
-/// A thread for each line, with the drivers of those on it.
+/// A thread per connection, with the drivers of the sensors on it.
 fn crew(dive: &mut Dive, vehicle: &VehicleConfig, begun: MonoNs) -> Result<Crew, Failure> {
     let mut programs = vehicle.programs().map_err(Failure::Plan)?.into_iter();
     let mut hands = Vec::new();
@@ -108,14 +112,13 @@ fn crew(dive: &mut Dive, vehicle: &VehicleConfig, begun: MonoNs) -> Result<Crew,
         });
         sink
     });
-    Crew::start(hands, sent)
-        .map_err(|source| Failure::System { what: "starting the threads of the ports", source })
+    Crew::start(hands, sent).map_err(|source| Failure::System { what: "starting the port threads", source })
 }
 
-/// Set by an interrupt or a request to end; a second one ends the program at once.
+/// A flag set by SIGINT or SIGTERM; a second signal ends the program at once.
 fn interrupts() -> Result<Arc<AtomicBool>, Failure> {
     use signal_hook::consts::{SIGINT, SIGTERM};
-    let failed = |source| Failure::System { what: "listening for interrupts", source };
+    let failed = |source| Failure::System { what: "installing the signal handlers", source };
     let flag = Arc::new(AtomicBool::new(false));
     for signal in [SIGINT, SIGTERM] {
         signal_hook::flag::register_conditional_shutdown(signal, 1, Arc::clone(&flag)).map_err(failed)?;
@@ -124,24 +127,24 @@ fn interrupts() -> Result<Arc<AtomicBool>, Failure> {
     Ok(flag)
 }
 
-/// A name for the log that no earlier one has: the time of day, which nothing is ordered by.
+/// A default name for the log, from the time of day.
 fn new_log() -> PathBuf {
     let (_, utc) = headrace_ports::clock_anchor();
     PathBuf::from(format!("dive-{}.mcap", utc.0 / 1_000_000_000))
 }
 
-/// How each sensor is doing.
-struct Lamps {
+/// State of each sensor.
+struct SensorStates {
     ids: Vec<String>,
     words: Vec<String>,
-    /// Required sensors that haven't run yet.
+    /// Numbers of required sensors that aren't running yet.
     required: Vec<usize>,
-    /// By when they must have.
+    /// Deadline for these.
     required_by: MonoNs,
     begun: MonoNs,
 }
 
-impl Lamps {
+impl SensorStates {
     fn new(vehicle: &VehicleConfig, required: Vec<usize>, begun: MonoNs, required_by: MonoNs) -> Self {
         let ids: Vec<String> = vehicle.sensor_configs.iter().map(|config| config.id.clone()).collect();
         Self { words: vec![String::new(); ids.len()], ids, required, required_by, begun }
@@ -158,12 +161,12 @@ impl Lamps {
         }
     }
 
-    /// A required sensor that hasn't run in the time that it has for it, with why.
+    /// A required sensor that wasn't running by the deadline, with its last status, as text.
     fn missing(&self, now: MonoNs) -> Option<String> {
         let number = *self.required.first().filter(|_| now > self.required_by)?;
         let within_s = self.required_by.since(self.begun).as_secs_f64();
         Some(format!(
-            "sensor {:?} is required and didn't run within {within_s} s: {}",
+            "required sensor {:?} wasn't running within {within_s} s: {}",
             self.ids.get(number)?,
             self.words.get(number)?
         ))

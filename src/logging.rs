@@ -12,7 +12,7 @@ use crate::transient;
 
 /// The variable that filters by crate or module.
 const VARIABLE: &str = "RUST_LOG";
-/// What the targets of this program's crates begin with.
+/// Prefix of the targets of this program's crates.
 const OURS: &str = "headrace";
 
 /// Writes log messages to stderr from here on. A caller of this library that has its own subscriber keeps it.
@@ -29,8 +29,8 @@ pub(crate) fn start(verbosity: &Verbosity) {
     }
 }
 
-/// Warnings of everything; this program's crates at `level` where it is given; and what `RUST_LOG` names as that says. Gives
-/// also what is wrong with `RUST_LOG`, which is then disregarded.
+/// The filter: warnings of all crates, `level` for this program's, and the targets that `RUST_LOG` names at its levels. Returns
+/// an error text, too, if `RUST_LOG` is invalid and ignored.
 fn filter(level: Option<LevelFilter>, variable: Option<&str>) -> (Targets, Option<String>) {
     let parsed = match variable.filter(|text| !text.trim().is_empty()) {
         Some(text) => text.parse::<Targets>().map_err(|error| {

@@ -1,4 +1,4 @@
-//! Words for people, on stdout. A terminal that has gone away ends neither a dive nor its recording.
+//! Output on stdout. A closed terminal ends neither a dive nor its recording.
 
 use std::fmt::{self, Write as _};
 use std::io::{BufWriter, Write};
@@ -7,11 +7,11 @@ use headrace_monitor::report::Report;
 
 use crate::failure::Failure;
 
-/// Writes `text` as it is. What can't be written is let go: a closed pipe or a lost session is no reason to stop.
+/// Writes `text`. Errors are only logged: a closed pipe or a lost session doesn't end a dive.
 pub(crate) fn put(text: &str) {
     let mut stdout = std::io::stdout().lock();
     if let Err(error) = stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
-        tracing::debug!(%error, "stdout takes no more");
+        tracing::debug!(%error, "stdout is closed");
     }
 }
 
@@ -20,9 +20,9 @@ pub(crate) fn say(text: &str) {
     put(&format!("{text}\n"));
 }
 
-/// Writes what a program asked for.
+/// Writes output for another program, and a line end.
 ///
-/// Errors: stdout takes it not, or not all.
+/// Errors: stdout is closed or the write is short.
 pub(crate) fn deliver(text: &str) -> Result<(), Failure> {
     let mut stdout = std::io::stdout().lock();
     stdout
@@ -32,9 +32,9 @@ pub(crate) fn deliver(text: &str) -> Result<(), Failure> {
         .map_err(|source| Failure::Write { path: "standard output".into(), source })
 }
 
-/// Writes a report for a program as JSON, piece by piece.
+/// Writes a report as JSON, without holding all of it in memory.
 ///
-/// Errors: stdout takes it not, or not all.
+/// Errors: stdout is closed or the write is short.
 pub(crate) fn deliver_json(report: &Report) -> Result<(), Failure> {
     let failed = |source| Failure::Write { path: "standard output".into(), source };
     let mut stdout = BufWriter::new(std::io::stdout().lock());
@@ -42,8 +42,8 @@ pub(crate) fn deliver_json(report: &Report) -> Result<(), Failure> {
     stdout.write_all(b"\n").and_then(|()| stdout.flush()).map_err(failed)
 }
 
-/// Adds words to a text.
-pub(crate) fn append(text: &mut String, words: fmt::Arguments<'_>) {
+/// Appends formatted text.
+pub(crate) fn append(text: &mut String, arguments: fmt::Arguments<'_>) {
     // Writing to a String can't fail.
-    let _written = text.write_fmt(words);
+    let _written = text.write_fmt(arguments);
 }

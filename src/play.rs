@@ -32,7 +32,7 @@ pub(crate) struct Playing {
 }
 
 impl Playing {
-    /// Plays a dive, shows what happens, and gives the report.
+    /// Plays a dive; returns the report.
     pub(crate) fn play(self, dive: Dive, player: &mut Player, watch: &mut Watch) -> Result<Report, Failure> {
         let Self { from, interactive, pace } = self;
         // Without commands nothing jumps back.
@@ -100,7 +100,7 @@ fn listen(to: Sender<PlaybackCommand>, begun: MonoNs) {
 fn command(line: &str, begun: MonoNs) -> Result<PlaybackCommand, String> {
     let mut words = line.split_whitespace();
     let (word, argument) = (words.next().unwrap_or_default(), words.next());
-    let unknown = || format!("{:?} isn't understood; there are {COMMANDS}", line.trim());
+    let unknown = || format!("{:?} isn't a command; expected one of: {COMMANDS}", line.trim());
     let moment = || argument.ok_or_else(unknown).and_then(time);
     let command = match (word, argument) {
         ("pause", None) => PlaybackCommand::Pause,
@@ -131,6 +131,6 @@ mod tests {
         for line in ["", "stop", "step -1", "seek", "pause 5", "go go", "step 1 2"] {
             assert!(command(line).is_err(), "{line:?}");
         }
-        insta::assert_snapshot!(command("stop").unwrap_err(), @r#""stop" isn't understood; there are pause, go, step [TICKS], seek TIME, ahead TIME, back TIME, speed N|max, end"#);
+        insta::assert_snapshot!(command("stop").unwrap_err(), @r#""stop" isn't a command; expected one of: pause, go, step [TICKS], seek TIME, ahead TIME, back TIME, speed N|max, end"#);
     }
 }

@@ -1,4 +1,4 @@
-//! How far a command has come, on stderr, once it has taken over a second and where a person may be looking.
+//! Progress of a command on stderr, if that is a terminal and the command takes over a second.
 
 use std::io::{IsTerminal, Write};
 use std::time::{Duration, Instant};
@@ -7,7 +7,7 @@ use crate::transient;
 
 const AFTER: Duration = Duration::from_secs(1);
 const EVERY: Duration = Duration::from_millis(200);
-/// Calls between two looks at the clock.
+/// Calls between two reads of the clock.
 const CALLS: u32 = 1000;
 
 /// Progress is logged at this interval at most.
@@ -34,14 +34,15 @@ impl Progress {
         }
     }
 
-    /// `words` is called only when the line is due.
+    /// Shows progress when an update is due; only then is `words` called.
     pub(crate) fn at(&mut self, words: impl FnOnce() -> String) {
         self.calls += 1;
         if !self.calls.is_multiple_of(CALLS) {
             return;
         }
         let elapsed = self.started.elapsed();
-        let logs = elapsed - self.logged >= LOG_EVERY && tracing::enabled!(tracing::Level::DEBUG);
+        let logs =
+            elapsed.saturating_sub(self.logged) >= LOG_EVERY && tracing::enabled!(tracing::Level::DEBUG);
         let shows =
             self.terminal && elapsed >= AFTER && self.shown.is_none_or(|shown| shown.elapsed() >= EVERY);
         if !logs && !shows {
@@ -57,7 +58,7 @@ impl Progress {
         }
     }
 
-    /// Shows the next of a few long steps.
+    /// Shows the start of a long step.
     pub(crate) fn step(&mut self, words: &str) {
         tracing::info!("{words}");
         if self.terminal {

@@ -1,4 +1,4 @@
-//! `headrace recover`: what reads of a damaged log, as an orderly one.
+//! `headrace recover`: the readable part of a damaged log as a valid one.
 
 use std::fs::OpenOptions;
 use std::io::{BufWriter, Write};
@@ -12,9 +12,9 @@ use crate::cli::Recover;
 use crate::failure::{self, Failure};
 use crate::output::{deliver, say};
 
-/// Rewrites a log and says what is lost.
+/// `headrace recover`.
 pub(crate) fn recover(args: &Recover) -> Result<u8, Failure> {
-    // Nothing is made where the log is none.
+    // Fails before the output is created.
     let files = files_of(&args.logs)?;
     DiveLog::open(&files)?;
     let recovered = write(&files, &args.output)?;
@@ -22,7 +22,7 @@ pub(crate) fn recover(args: &Recover) -> Result<u8, Failure> {
     Ok(if recovered.losses.is_empty() { failure::OK } else { failure::DATA_LOST })
 }
 
-/// Writes the new log; takes it away again when that fails.
+/// Writes the new log; deletes it again if that fails.
 fn write(files: &[PathBuf], output: &Path) -> Result<Recovered, Failure> {
     let failed = |source| Failure::Write { path: output.to_owned(), source };
     let names: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();

@@ -1,4 +1,4 @@
-//! A finished dive's report: what it says of its log, where it goes, and the exit code.
+//! A finished dive's report: its log's entry, output, and the exit code.
 
 use std::path::Path;
 
@@ -12,7 +12,7 @@ use crate::files;
 use crate::output::{deliver_json, put};
 use crate::summary::summary;
 
-/// Adds to the report what the log read from is, and what of it was lost.
+/// Adds the replayed log and its losses to the report.
 pub(crate) fn note_losses(report: &mut Report, path: &Path, player: &Player) -> Result<(), Failure> {
     let recorded = report.log.take();
     let mut losses = player.losses();
@@ -30,7 +30,7 @@ pub(crate) fn note_losses(report: &mut Report, path: &Path, player: &Player) -> 
     Ok(())
 }
 
-/// The files of a log, where it isn't just the one that was named.
+/// The files of a log; empty where it is only the file named.
 pub(crate) fn parts(named: &Path, files: &[(&Path, u64)]) -> Result<Vec<PartReport>, Failure> {
     if matches!(files, [(only, _)] if *only == named) {
         return Ok(Vec::new());
@@ -54,7 +54,7 @@ pub(crate) fn finish(report: &Report, output: &Output) -> Result<u8, Failure> {
     Ok(exit_code(report))
 }
 
-/// The exit code that a finished dive deserves.
+/// Exit code of a finished dive.
 pub(crate) fn exit_code(report: &Report) -> u8 {
     if report.lost_data() {
         failure::DATA_LOST

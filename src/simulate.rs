@@ -1,4 +1,4 @@
-//! `simulate`: a scene becomes a log, with its truth beside it; or what would be simulated is explained.
+//! `headrace simulate`: a scene as a log, with its ground truth; or a list of what would be simulated.
 
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -22,7 +22,7 @@ use crate::output::{append, deliver, put, say};
 use crate::phase::Phase;
 use crate::progress::Progress;
 
-/// Turns a scene into a log, or explains what it would simulate.
+/// `headrace simulate`.
 pub(crate) fn simulate(args: &Simulate) -> Result<u8, Failure> {
     let text = files::read(&args.scene)?;
     let name = args.scene.display().to_string();
@@ -32,7 +32,7 @@ pub(crate) fn simulate(args: &Simulate) -> Result<u8, Failure> {
         return explain(&scene, args.json);
     }
     let Some(output) = &args.output else {
-        let what = "simulate: where to? -o LOG.mcap names the log, or --explain says what would be simulated";
+        let what = "simulate: needs -o LOG.mcap for the log, or --explain to list what would be simulated";
         return Err(Failure::Usage(what.to_owned()));
     };
     let mut simulation =
@@ -75,13 +75,13 @@ pub(crate) fn simulate(args: &Simulate) -> Result<u8, Failure> {
             output.display()
         ));
         if let Some(truth) = truth {
-            say(&format!("truth of {} measurements in {}", truth.rows, truth.path.display()));
+            say(&format!("ground truth of {} measurements in {}", truth.rows, truth.path.display()));
         }
     }
     Ok(failure::OK)
 }
 
-/// Says which systems, components and random streams a scene calls for, and what it leaves out.
+/// Lists the systems, components and random streams of a scene, and the effects that it doesn't name.
 fn explain(scene: &Scene, as_json: bool) -> Result<u8, Failure> {
     let simulation = Simulation::new(scene)?;
     let added = simulation.added();
@@ -108,7 +108,7 @@ fn explain(scene: &Scene, as_json: bool) -> Result<u8, Failure> {
         return Ok(failure::OK);
     }
     let mut text = format!(
-        "{}: {:.0} s of {}, seed {}\n\nevery simulation of this vehicle:\n",
+        "{}: {:.0} s of {}, seed {}\n\nalways simulated for this vehicle:\n",
         scene.name,
         simulation.duration_s(),
         scene.vehicle.name,
@@ -117,11 +117,11 @@ fn explain(scene: &Scene, as_json: bool) -> Result<u8, Failure> {
     for (stage, name) in simulation.base_systems() {
         append(&mut text, format_args!("  {:<6} {name}\n", stage.as_str()));
     }
-    text.push_str(if added.is_empty() { "\nno effects\n" } else { "\neffects that the scene names:\n" });
+    text.push_str(if added.is_empty() { "\nno effects\n" } else { "\neffects of the scene:\n" });
     for effect in added {
         text.push_str(&in_words(effect));
     }
-    text.push_str("\nleft out, at no cost:\n");
+    text.push_str("\nnot simulated:\n");
     for kind in left_out {
         append(&mut text, format_args!("  {:<22} {}\n", kind.name(), kind.summary()));
     }
@@ -151,7 +151,7 @@ fn in_words(added: &Added) -> String {
     text
 }
 
-/// The truth file: CSV, a line for each measurement.
+/// The ground truth: CSV, a row per measurement.
 struct Truth {
     path: PathBuf,
     file: BufWriter<File>,
@@ -223,7 +223,7 @@ impl Truth {
         text
     }
 
-    /// The columns of a sounding.
+    /// The columns of a sounding's row.
     fn sounding(&self, sounding: &SoundingTruth) -> String {
         let mut text = format!(",{}", sounding.measured.angle_rad.to_degrees());
         match &sounding.wall {
@@ -255,7 +255,7 @@ impl Truth {
     }
 }
 
-/// A moment of the dive's clock with all its digits.
+/// A time of the dive's clock, seconds, exact to the nanosecond.
 fn seconds(at: MonoNs) -> String {
     format!("{}.{:09}", at.0 / 1_000_000_000, at.0 % 1_000_000_000)
 }

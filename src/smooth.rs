@@ -1,4 +1,4 @@
-//! `replay --smooth`: a dive by the filter, its track smoothed, and the dive once more along that.
+//! `replay --smooth`: a replay with the filter, smoothing, and a replay along the smoothed trajectory.
 
 use std::path::{Path, PathBuf};
 
@@ -21,10 +21,10 @@ use crate::failure::Failure;
 use crate::phase::Phase;
 use crate::watch::Watch;
 
-/// Records that may wait: a tick has a minute at most, ten epochs a second, and up to three records of each.
+/// Capacity of the queue of filter steps: a tick has a minute at most, with ten epochs a second and up to three steps each.
 const RECORDS: usize = 4096;
 
-/// The report of a dive judged along its smoothed track. `player` plays the log from its beginning, for its losses.
+/// The report of a dive judged along its smoothed trajectory. `player` plays the log from its beginning, for its losses.
 pub(crate) fn smoothed(
     files: &[PathBuf],
     player: &mut Player,
@@ -34,8 +34,8 @@ pub(crate) fn smoothed(
 ) -> Result<Report, Failure> {
     let NavigationConfig::Filter(settings) = vehicle.navigation else {
         return Err(Failure::Usage(format!(
-            "replaying {}: --smooth needs the filter, and the vehicle file says [navigation] way = \"direct\"; wanted is \
-             way = \"filter\"",
+            "replaying {}: --smooth needs [navigation] way = \"filter\"; the vehicle file has \
+             way = \"direct\"",
             files.first().map_or(Path::new(""), PathBuf::as_path).display()
         )));
     };
@@ -58,7 +58,7 @@ pub(crate) fn smoothed(
     let track = steps.smooth(settings)?;
     tracing::debug!(records, pieces = track.pieces(), dropped = reader.dropped(), "smoothed");
     drop(backward);
-    let _judging = Phase::start("pass along the smoothed track");
+    let _judging = Phase::start("replay along the smoothed trajectory");
     let (estimates, pieces) = (track.len() as u64, track.pieces() as u64);
     let dive = assemble_with(vehicle, Box::new(TrackNavigation::new(track, consistency)), text, None)?
         .asking(what_if);

@@ -1,10 +1,10 @@
-//! The end of a dive in words.
+//! Summary of a report as text.
 
 use headrace_monitor::pilot_text::{action_text, cause_text, station};
 use headrace_monitor::report::{Report, RunReport};
 use headrace_monitor::smoothing::{ChangeReport, JudgedReport, SmoothingReport};
 
-/// The report in a few lines.
+/// The summary.
 pub(crate) fn summary(report: &Report) -> String {
     let mut text = String::new();
     let mut line = |words: String| {
@@ -46,10 +46,7 @@ pub(crate) fn summary(report: &Report) -> String {
             metres(sum.t_y.max_m)
         ));
     } else {
-        line(
-            "NO COVERAGE: no return of any profiling sonar in this dive; nothing has been inspected"
-                .to_owned(),
-        );
+        line("NO COVERAGE: no profiling sonar returns in this dive; nothing was inspected".to_owned());
     }
     for change in report.smoothing.iter().flat_map(smoothing) {
         line(change);
@@ -58,10 +55,10 @@ pub(crate) fn summary(report: &Report) -> String {
     let lost = [
         (rejected.missing, "pings without a return"),
         (rejected.out_of_range, "pings beyond the range setting"),
-        (rejected.occluded, "pings stopped by the vehicle itself"),
+        (rejected.occluded, "pings blocked by the vehicle itself"),
         (rejected.no_fix, "returns without a position"),
         (rejected.outside, "returns beyond the ends of the tunnel"),
-        (rejected.not_stored, "returns for which there was no room"),
+        (rejected.not_stored, "returns not stored: the sample store was full"),
     ];
     for (count, what) in lost.iter().filter(|(count, _)| *count > 0) {
         line(format!("  {count} {what}"));
@@ -97,7 +94,7 @@ fn missed(report: &Report) -> Vec<String> {
     open.iter().map(line).collect()
 }
 
-/// What smoothing changed: metres by verdict, and a line for each run of neighbouring sections with the same change.
+/// What smoothing changed: metres by verdict, and a line per run of neighbouring sections with the same change.
 fn smoothing(report: &SmoothingReport) -> Vec<String> {
     let was = &report.before;
     let mut lines = vec![format!(
@@ -117,8 +114,8 @@ fn smoothing(report: &SmoothingReport) -> Vec<String> {
             "  changed ch {} to {}: {} to {}, holes {} to {} m",
             station(first.start_m),
             station(end_m),
-            words(first.before),
-            words(first.after),
+            verdict_text(first.before),
+            verdict_text(first.after),
             holes(run.iter().filter_map(|change| change.before)),
             holes(run.iter().filter_map(|change| change.after)),
         ));
@@ -126,9 +123,9 @@ fn smoothing(report: &SmoothingReport) -> Vec<String> {
     lines
 }
 
-/// Whether a change goes on from `end_m` as the first of its run does; then the run ends with it.
+/// Whether a change continues the run that ends at `end_m`; then the run's end moves to its end.
 fn follows(first: &ChangeReport, next: &ChangeReport, end_m: &mut f64) -> bool {
-    let verdicts = |change: &ChangeReport| [change.before, change.after].map(words);
+    let verdicts = |change: &ChangeReport| [change.before, change.after].map(verdict_text);
     let goes_on = (next.start_m - *end_m).abs() < 1e-6 && verdicts(first) == verdicts(next);
     if goes_on {
         *end_m = next.end_m;
@@ -136,7 +133,7 @@ fn follows(first: &ChangeReport, next: &ChangeReport, end_m: &mut f64) -> bool {
     goes_on
 }
 
-fn words(judged: Option<JudgedReport>) -> &'static str {
+fn verdict_text(judged: Option<JudgedReport>) -> &'static str {
     match judged.map(|judged| judged.verdict) {
         None => "not passed",
         Some("cannot_say") => "can't say",
@@ -144,7 +141,7 @@ fn words(judged: Option<JudgedReport>) -> &'static str {
     }
 }
 
-/// The largest hole of a run, and how sure it is.
+/// The largest hole of a run with its standard deviation, m.
 fn holes(run: impl Iterator<Item = JudgedReport>) -> String {
     let measured = run.filter_map(|judged| Some((judged.hole_m?, judged.hole_sigma_m)));
     let largest = measured.max_by(|a, b| a.0.total_cmp(&b.0));

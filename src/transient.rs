@@ -1,5 +1,5 @@
-//! Whether the terminal's last line is one that will be overwritten: a progress line or the dive's state. Whoever writes a
-//! permanent line from any thread clears it first.
+//! Whether the terminal's last line is a transient one, without a line end: progress, or the dive's state. Log messages, from
+//! any thread, clear it first.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -8,12 +8,12 @@ pub(crate) const CLEAR: &[u8] = b"\r\x1b[K";
 
 static SHOWN: AtomicBool = AtomicBool::new(false);
 
-/// Such a line has been written, without a line end.
+/// A transient line was written.
 pub(crate) fn shown() {
     SHOWN.store(true, Ordering::Relaxed);
 }
 
-/// Whether such a line stands there; it no longer counts as shown.
+/// Whether a transient line is shown; it is taken as cleared from now on.
 pub(crate) fn take() -> bool {
     SHOWN.swap(false, Ordering::Relaxed)
 }

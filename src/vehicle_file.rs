@@ -11,24 +11,23 @@ use crate::devices::KINDS;
 use crate::failure::Failure;
 use crate::files;
 
-/// Reads and checks a vehicle file; gives its text too.
+/// Reads and parses a vehicle file; returns its text, too.
 pub(crate) fn read(path: &Path) -> Result<(String, VehicleConfig), Failure> {
     let text = files::read(path)?;
     let vehicle = parse(&path.display().to_string(), &text, &files::beside(path))?;
     Ok((text, vehicle))
 }
 
-/// Parses the vehicle file attached to a log; gives its text too.
+/// Parses the vehicle file attached to a log; returns its text, too.
 ///
-/// Errors: none is attached or readable (`losses` say what damaged the log); it is wrong.
+/// Errors: none is attached or it can't be read (`losses` are the log's); it is invalid.
 pub(crate) fn attached(
     info: &LogInfo,
     losses: &[String],
     log: &Path,
 ) -> Result<(String, VehicleConfig), Failure> {
     let text = info.vehicle_toml.clone().ok_or_else(|| {
-        let damage =
-            losses.first().map(|loss| format!(" can be read from this log, which is damaged ({loss})"));
+        let damage = losses.first().map(|loss| format!(" can be read from this damaged log ({loss})"));
         let which = damage.unwrap_or_else(|| " is attached to this log".to_owned());
         Failure::Usage(format!("reading {}: no vehicle file{which}; give one with --vehicle", log.display()))
     })?;

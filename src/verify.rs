@@ -1,4 +1,4 @@
-//! `headrace verify`: a replay held against what the live dive published.
+//! `headrace verify`: a replay compared with the results published live.
 
 use headrace_geometry::time::DurNs;
 use headrace_monitor::SourceInfo;
@@ -17,7 +17,7 @@ use crate::output::{deliver, say};
 use crate::vehicle_file;
 use crate::watch::Watch;
 
-/// Replays a log and compares.
+/// `headrace verify`.
 pub(crate) fn verify(args: &Verify) -> Result<u8, Failure> {
     let files = files_of(&args.logs)?;
     let mut player = Player::open(&files)?;
@@ -74,45 +74,46 @@ fn tell(
     if !verified.has_results {
         say(match trimmed {
             Some(_) => {
-                "nothing to compare: this log was cut from another, without the results of the dive; verify that one"
+                "nothing to compare: this log is an extract without live results; verify the original log"
             }
-            None => {
-                "nothing to compare: this log has no results of a live dive; headrace run and demo record them"
-            }
+            None => "nothing to compare: this log has no live results; headrace run and demo record them",
         });
         return Ok(code);
     }
     for difference in &verified.differences {
-        say(&words(difference, sources));
+        say(&text(difference, sources));
     }
     let unrecorded = match verified.unrecorded {
         0 => String::new(),
-        count => format!("; {count} that the dive made aren't in the log"),
+        count => format!("; {count} live results are missing in the log"),
     };
-    let verdict =
-        if verified.differences.is_empty() { "the replay is the dive" } else { "the replay is another dive" };
-    say(&format!("{verdict}: {} results are the same, bit for bit{unrecorded}", verified.same));
+    let verdict = if verified.differences.is_empty() {
+        "the replay equals the dive"
+    } else {
+        "the replay differs from the dive"
+    };
+    say(&format!("{verdict}: {} results are identical bit for bit{unrecorded}", verified.same));
     Ok(code)
 }
 
-fn words(difference: &Difference, sources: &[SourceInfo]) -> String {
+fn text(difference: &Difference, sources: &[SourceInfo]) -> String {
     let Difference { tick, stream, record, what } = difference;
-    let place = format!("{stream}: first parts at tick {tick}, result {record}");
+    let place = format!("{stream}: first difference at tick {tick}, result {record}");
     match what {
         What::Field { kind, source, field, word, live, replayed } => {
             let of = source.map(|source| format!(" of {}", name(source, sources))).unwrap_or_default();
             let (kind, live, replayed) = (kind.as_str(), value(*word, *live), value(*word, *replayed));
-            format!("{place}: {kind}{of}: {field} was {live}, replayed {replayed}")
+            format!("{place}: {kind}{of}: {field} live {live}, replayed {replayed}")
         }
         What::Kind { live, replayed } => {
-            format!("{place}: was a {live}, replayed a {replayed}, or with other fields")
+            format!("{place}: live {live}, replayed {replayed}, or with other fields")
         }
-        What::Missing => format!("{place}: the replay doesn't have it"),
-        What::Added => format!("{place}: the dive didn't publish it"),
+        What::Missing => format!("{place}: missing in the replay"),
+        What::Added => format!("{place}: only in the replay"),
     }
 }
 
-/// A word as a person reads it, and its bits.
+/// A value as text; a float with its bits.
 fn value(word: WordKind, bits: u64) -> String {
     match word {
         WordKind::Integer => format!("{bits}"),
@@ -128,7 +129,7 @@ fn name(source: u64, sources: &[SourceInfo]) -> String {
 fn as_json(difference: &Difference, sources: &[SourceInfo]) -> Value {
     let Difference { tick, stream, record, what } = difference;
     let mut told =
-        json!({"tick": tick, "stream": stream, "record": record, "what": words(difference, sources)});
+        json!({"tick": tick, "stream": stream, "record": record, "what": text(difference, sources)});
     if let (What::Field { source, field, live, replayed, .. }, Some(told)) = (what, told.as_object_mut()) {
         told.insert("source".to_owned(), json!(source.map(|source| name(source, sources))));
         told.insert("field".to_owned(), json!(field));

@@ -1,5 +1,4 @@
-//! What a person sees on the terminal while a dive runs: where the vehicle is, how fast it may go, and each missed
-//! stretch, once.
+//! Terminal output during a dive: position, advised speed, and each missed stretch once.
 
 use std::io::IsTerminal;
 
@@ -15,25 +14,25 @@ use headrace_vehicle::Mission;
 use crate::output::{put, say};
 use crate::transient;
 
-/// How often the state is shown where lines can't be overwritten, in the dive's own time.
+/// Interval of state lines where they can't be overwritten, in the dive's time.
 const LINE_EVERY: DurNs = DurNs(10_000_000_000);
-/// How often where they can.
+/// Interval where they can.
 const REFRESH_EVERY: DurNs = DurNs(1_000_000_000);
 
-/// Shows a dive on stdout, or nothing when it is quiet.
+/// Shows a dive on stdout, unless quiet.
 pub(crate) struct Watch {
     quiet: bool,
     terminal: bool,
     shown: Option<MonoNs>,
     status_open: bool,
-    /// The run whose flag was said last, until it is known how far it goes.
+    /// The run that was flagged last, until its end is shown.
     run: Option<RunId>,
-    /// The speed advised last, m/s.
+    /// The latest advised speed, m/s; zero for none.
     v_max_mps: f64,
 }
 
 impl Watch {
-    /// Shows what happens.
+    /// Shows the dive.
     pub(crate) fn loud() -> Self {
         Self {
             quiet: false,
@@ -60,7 +59,7 @@ impl Watch {
         self.quiet
     }
 
-    /// Takes a result of the loop.
+    /// Shows a result of the loop.
     pub(crate) fn notice(&mut self, notice: &Notice, dive: &Loop) {
         if self.quiet {
             return;
@@ -77,7 +76,7 @@ impl Watch {
         }
     }
 
-    /// A sensor does better or worse than before.
+    /// Shows a change of a sensor's state.
     pub(crate) fn sensor(&mut self, id: &str, status: &Status) {
         if !self.quiet {
             let amber = (status.phase != Phase::Running).then_some("\x1b[33m");
@@ -91,7 +90,7 @@ impl Watch {
         if !self.quiet {
             let seconds = time.as_secs_f64();
             let (h, min, s) = (seconds / 3600.0, seconds / 60.0 % 60.0, seconds % 60.0);
-            let end = if ended { ", the end" } else { "" };
+            let end = if ended { "  (end)" } else { "" };
             let tally = dive.tally();
             self.line(&format!(
                 "AT       {}:{:02}:{s:06.3}{end}: tick {}, {} samples, digest {:016x}",
@@ -104,7 +103,7 @@ impl Watch {
         }
     }
 
-    /// The dive has ended.
+    /// Ends the output of a dive.
     pub(crate) fn end(&mut self, dive: &Loop) {
         self.close_run(sections(dive));
         self.close_status();
@@ -136,9 +135,9 @@ impl Watch {
         }
     }
 
-    /// A section that doesn't fail, next to the run said last, is its end.
+    /// Shows the end of the run flagged last at a neighbouring section that doesn't fail.
     fn section(&mut self, section: i64, sections: &Sections) {
-        // What is open may yet become part of it.
+        // An open section may still become part of the run.
         let other = |section: &Section| !section.is_flagged() && section.verdict != Verdict::Open;
         let ends = sections.get(section).is_some_and(other);
         let run = self.run.and_then(|id| sections.runs().get(id));
@@ -157,7 +156,7 @@ impl Watch {
                 self.flag(run, dive);
             }
             RunChange::Cleared => {
-                // What has only turned out to have another cause is told as that.
+                // Sections that now have another cause are in another run, which is shown.
                 if !(run.from..run.to).filter_map(|index| sections.get(index)).any(Section::is_flagged) {
                     let (from_m, to_m) = (sections.bounds_m(run.from).0, sections.bounds_m(run.to - 1).1);
                     self.line(&cleared_text(from_m, to_m));
@@ -180,7 +179,7 @@ impl Watch {
         self.line(&format!("FLAG     {}", flag_text(&missed, &dive.mission().profile)));
     }
 
-    /// Says how far the run went, once that is known.
+    /// Shows the bounds of the run flagged last.
     fn close_run(&mut self, sections: &Sections) {
         let Some(run) = self.run.take().and_then(|id| sections.runs().get(id)) else { return };
         let (from_m, to_m) = (sections.bounds_m(run.from).0, sections.bounds_m(run.to - 1).1);

@@ -435,7 +435,7 @@ fn without_sonar_there_is_no_coverage_and_no_section_passes() {
     insta::assert_snapshot!(words, @"
     no position     0.00 m/s   no speed can be given: no position or heading
     ch 0+005.04     0.20 m/s   no speed can be given: no sonar returns
-    NO COVERAGE: no return of any profiling sonar in this dive; nothing has been inspected
+    NO COVERAGE: no profiling sonar returns in this dive; nothing was inspected
     ");
     let (code, report) = folder.replay("deaf.mcap", &[]);
     assert_eq!((code, &report["dive"]["sonar"]), (Some(1), &Value::Bool(false)));

@@ -173,7 +173,7 @@ fn the_command_lists_this_machine_and_asks_at_addresses() {
     assert!(shown["found"].is_array() && shown["sensors"].is_null());
     let (code, _, refused) = headrace(&["--address", "can:can0"]);
     assert_eq!(code, Some(2));
-    assert!(refused.contains("wanted is tcp:HOST:PORT or udp:HOST:PORT"), "{refused}");
+    assert!(refused.contains("expected tcp:HOST:PORT or udp:HOST:PORT"), "{refused}");
 }
 
 #[test]

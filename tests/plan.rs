@@ -49,7 +49,7 @@ fn a_vehicle_s_plan_in_words() {
     1.66 m of wall at 9:00 are seen by sonar_0, sonar_2 only: passes there are 2.000 times as far apart
     1.66 m of wall at 3:00 are seen by sonar_1, sonar_3 only: passes there are 2.000 times as far apart
     start angles in faster at 0.141 m/s, degrees, + growing: sonar_0 0.0+; sonar_1 90.0+; sonar_2 246.3-; sonar_3 156.3-
-    1.102 m apart along the hull, heads are at equal angles at 0.134 m/s, or 1.163 m apart at this speed (q = 5)
+    heads 1.102 m apart along the hull start at equal angles at 0.134 m/s; at this speed, 1.163 m apart (q = 5)
     ");
 }
 
@@ -60,7 +60,7 @@ fn a_plan_with_drift_yaw_and_a_deadline_in_words() {
     let answer = plan(&Folder::new(), &[&args[..], &allowed].concat());
     assert_eq!(answer.code, Some(1), "{}", answer.stderr);
     insta::assert_snapshot!(answer.stdout, @r"
-    ceran: perimeter 35.90 m, 7000 m long; vehicle at y 0.00 m, z 3.09 m; drift of 1 m and yaw of 10.0 degrees, held steadily, allowed for
+    ceran: perimeter 35.90 m, 7000 m long; vehicle at y 0.00 m, z 3.09 m; allowing for a constant offset of 1 m and yaw of 10.0 degrees
     2 heads in sector offset, range setting 20 m; a beam covers 0.08 to 0.28 m of wall
     target 0.6 m, 30 h for the whole length, one way: 0.065 m/s
 
@@ -74,7 +74,7 @@ fn a_plan_with_drift_yaw_and_a_deadline_in_words() {
 
     fastest: a target of 0.6 m is met at no speed: neighbours of one turn are 0.782 m apart, whatever the speed
     * finest at this speed: faster; it misses the target
-    ~ carried over from another range setting; measure the turn and put it into the vehicle file
+    ~ extrapolated from another range setting; measure the turn period and add it to the vehicle file
     start angles in faster at 0.065 m/s, degrees, + growing: head_0 0.0+ within 0 to 180; head_1 180.0+ within 180 to 360
     ");
 }
@@ -193,7 +193,7 @@ fn what_cannot_be_planned_is_refused_with_its_reason() {
     }
     insta::assert_snapshot!(said, @r#"
 
-        headrace: plan: give --tunnel, or --vehicle with a vehicle file
+        headrace: plan: needs --tunnel or --vehicle
     --vehicle sectors.toml
         headrace: sectors.toml:2: heads.layout = "sector_offset": sector offset divides a turn among heads: it needs at least 2, not 1
     --vehicle hull.toml
@@ -217,15 +217,15 @@ fn what_cannot_be_planned_is_refused_with_its_reason() {
     --tunnel ceran --target 0.5 --at 9,1
         headrace: planning: a head at y = 9.000 m, z = 1.000 m is outside the tunnel's profile
     --tunnel ceran --target 0.5 --mode hasty
-        headrace: --mode hasty: wanted is all, or one of slow, medium, fast, faster, fastest
+        headrace: --mode hasty: expected all or one of slow, medium, fast, faster, fastest
     --tunnel ceran --target 0.5 --range 7
         headrace: --range: 7 m is no range setting of the head; it has [1, 2, 3, 4, 5, 10, 20, 30, 40, 50, 60, 80, 100]
     --tunnel ceran --speed 0
-        error: invalid value '0' for '--speed <MPS>': wanted is a number of metres a second from 0.001 to 5
+        error: invalid value '0' for '--speed <MPS>': expected a number from 0.001 to 5 m/s
     --tunnel ceran --speed=-0.2
-        error: invalid value '-0.2' for '--speed <MPS>': wanted is a number of metres a second from 0.001 to 5
+        error: invalid value '-0.2' for '--speed <MPS>': expected a number from 0.001 to 5 m/s
     --tunnel ceran --target nan
-        error: invalid value 'nan' for '--target <METRES>': wanted is a number of metres from 0.01 to 20
+        error: invalid value 'nan' for '--target <METRES>': expected a number from 0.01 to 20 metres
     "#);
 }
 

@@ -95,7 +95,7 @@ fn live(folder: &Folder, scene: &Path) -> Value {
     let mut run = Running(run);
     let mut shown = run.0.stdout.take().unwrap();
     let reader = std::thread::spawn(move || std::io::read_to_string(&mut shown).unwrap());
-    assert!(said.any(|line| line == "the way has ended"), "the rehearsal ended early");
+    assert!(said.any(|line| line == "end of the trajectory"), "the rehearsal ended early");
     interrupt(&run.0);
     let status = run.0.wait().unwrap();
     let shown = reader.join().unwrap();

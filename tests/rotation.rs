@@ -66,7 +66,11 @@ fn a_dive_in_parts_replays_and_verifies_as_the_same_dive() {
         assert_eq!(report["log"]["sha256"], digest.as_str());
     }
     let answer = folder.headrace(&["verify", "parts"]);
-    assert!(answer.code == Some(0) && answer.stdout.contains("the replay is the dive"), "{}", answer.stdout);
+    assert!(
+        answer.code == Some(0) && answer.stdout.contains("the replay equals the dive"),
+        "{}",
+        answer.stdout
+    );
 
     // Together they become one log again.
     let answer = folder.headrace(&["recover", "parts", "-o", "joined.mcap"]);

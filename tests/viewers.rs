@@ -238,7 +238,7 @@ fn the_first_pose_that_differs_is_named() {
     folder.write("other.toml", VEHICLE.replace("counts_per_metre = 2000", "counts_per_metre = 2000.000001"));
     let answer = folder.headrace(&["verify", "live.mcap", "--vehicle", "other.toml"]);
     assert_eq!(answer.code, Some(4), "{}{}", answer.stdout, answer.stderr);
-    assert!(answer.stdout.contains("poses: first parts at tick"), "{}", answer.stdout);
+    assert!(answer.stdout.contains("poses: first difference at tick"), "{}", answer.stdout);
 }
 
 /// A layout names what is there: topics, and keys of their schemas.

@@ -7,10 +7,11 @@ use headrace_replay::log::Every;
 use headrace_sampling::layout::HeadLayout;
 use headrace_sensor::connect::Connect;
 
-/// A size or a time after which a part of a recording ends.
+/// Size or duration of a part of a recording.
 pub(super) fn rotation(text: &str) -> Result<Every, String> {
-    let wanted =
-        || "wanted is a size from 100kB (kB, MB, GB, KiB, MiB, GiB) or a time from 1s (s, min, h)".to_owned();
+    let wanted = || {
+        "expected a size from 100kB (kB, MB, GB, KiB, MiB, GiB) or a duration from 1s (s, min, h)".to_owned()
+    };
     let (number, unit) = text.split_at(text.find(|c: char| c.is_ascii_alphabetic()).ok_or_else(wanted)?);
     let number: f64 = number.trim().parse().map_err(|_| wanted())?;
     let bytes = |factor: f64| {
@@ -43,7 +44,7 @@ pub(crate) fn time(text: &str) -> Result<DurNs, String> {
     let seconds = seconds.filter(|seconds| (0.0..=1.0e7).contains(seconds));
     seconds
         .map(DurNs::from_secs_f64)
-        .ok_or_else(|| format!("{text:?} is no time; wanted is one like 90s, 1h20min or 1:23:45"))
+        .ok_or_else(|| format!("{text:?} isn't a time; expected one like 90s, 1h20min or 1:23:45"))
 }
 
 fn by_colons(text: &str) -> Option<f64> {
@@ -72,14 +73,14 @@ fn by_units(text: &str) -> Option<f64> {
     (!text.is_empty()).then_some(total)
 }
 
-/// A stretch of the tunnel, metres.
+/// A range of chainage, metres.
 pub(super) fn chainage_range(text: &str) -> Result<[f64; 2], String> {
     let both = text.split_once("..").and_then(|(from, to)| Some([chainage(from).ok()?, chainage(to).ok()?]));
     both.filter(|[from, to]| from < to)
-        .ok_or_else(|| "wanted are two numbers of metres, FROM..TO, the first one less".to_owned())
+        .ok_or_else(|| "expected FROM..TO in metres, FROM less than TO".to_owned())
 }
 
-/// How fast a dive is played; `None` is as fast as it can.
+/// Playback speed relative to real time; `None` is as fast as possible.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Speed(pub(crate) Option<f64>);
 
@@ -91,20 +92,22 @@ pub(crate) fn speed(text: &str) -> Result<Speed, String> {
     number
         .filter(|factor| (0.01..=10_000.0).contains(factor))
         .map(|factor| Speed(Some(factor)))
-        .ok_or_else(|| "wanted is max, or a number from 0.01x to 10000x".to_owned())
+        .ok_or_else(|| "expected max, or a factor from 0.01x to 10000x".to_owned())
 }
 
 pub(super) fn address(text: &str) -> Result<Connect, String> {
     match Connect::parse(text) {
         Ok(connect @ (Connect::Tcp { .. } | Connect::Udp { .. })) => Ok(connect),
-        _ => Err("wanted is tcp:HOST:PORT or udp:HOST:PORT".to_owned()),
+        _ => Err("expected tcp:HOST:PORT or udp:HOST:PORT".to_owned()),
     }
 }
 
 pub(super) fn source_line(text: &str) -> Result<(String, String), String> {
     let both = text.split_once('=').filter(|(id, line)| !id.is_empty() && !line.is_empty());
     let both = both.map(|(id, line)| (id.to_owned(), line.to_owned()));
-    both.ok_or_else(|| "wanted is ID=LINE, a sensor's id and what it listens to: imu=can0".to_owned())
+    both.ok_or_else(|| {
+        "expected ID=STREAM, a sensor's id and the stream that it receives: imu=can0".to_owned()
+    })
 }
 
 pub(super) fn target(text: &str) -> Result<f64, String> {
@@ -116,7 +119,7 @@ pub(super) fn section(text: &str) -> Result<f64, String> {
 }
 
 pub(super) fn sound_speed(text: &str) -> Result<f64, String> {
-    within(text, "metres a second", 1300.0, 1700.0)
+    within(text, "m/s", 1300.0, 1700.0)
 }
 
 pub(super) fn length(text: &str) -> Result<f64, String> {
@@ -124,7 +127,7 @@ pub(super) fn length(text: &str) -> Result<f64, String> {
 }
 
 pub(super) fn speed_mps(text: &str) -> Result<f64, String> {
-    within(text, "metres a second", 0.001, 5.0)
+    within(text, "m/s", 0.001, 5.0)
 }
 
 pub(super) fn hours(text: &str) -> Result<f64, String> {
@@ -141,7 +144,7 @@ pub(super) fn yaw(text: &str) -> Result<f64, String> {
 
 fn within(text: &str, unit: &str, least: f64, most: f64) -> Result<f64, String> {
     let number = text.parse::<f64>().ok().filter(|number| (least..=most).contains(number));
-    number.ok_or_else(|| format!("wanted is a number of {unit} from {least} to {most}"))
+    number.ok_or_else(|| format!("expected a number from {least} to {most} {unit}"))
 }
 
 pub(super) fn seconds(text: &str) -> Result<f64, String> {
@@ -151,7 +154,7 @@ pub(super) fn seconds(text: &str) -> Result<f64, String> {
 pub(super) fn seconds_range(text: &str) -> Result<[f64; 2], String> {
     let both = text.split_once("..").and_then(|(from, to)| Some([seconds(from).ok()?, seconds(to).ok()?]));
     both.filter(|[from, to]| from < to)
-        .ok_or_else(|| "wanted are two numbers of seconds, FROM..TO, the first one less".to_owned())
+        .ok_or_else(|| "expected FROM..TO in seconds, FROM less than TO".to_owned())
 }
 
 pub(super) fn chainage(text: &str) -> Result<f64, String> {
@@ -162,13 +165,13 @@ pub(super) fn place(text: &str) -> Result<[f64; 2], String> {
     let number = |text: &str| within(text.trim(), "metres", -200.0, 200.0);
     match text.split_once(',') {
         Some((y, z)) => Ok([number(y)?, number(z)?]),
-        None => Err("wanted are two numbers of metres, y,z".to_owned()),
+        None => Err("expected Y,Z in metres".to_owned()),
     }
 }
 
 pub(super) fn layout(text: &str) -> Result<HeadLayout, String> {
     let known = HeadLayout::NAMES.iter().find(|(name, _)| *name == text);
-    known.map(|(_, layout)| *layout).ok_or_else(|| "wanted is phase_shift or sector_offset".to_owned())
+    known.map(|(_, layout)| *layout).ok_or_else(|| "expected phase_shift or sector_offset".to_owned())
 }
 
 #[cfg(test)]

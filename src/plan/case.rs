@@ -1,4 +1,4 @@
-//! What is to be planned, from a vehicle file, or from arguments alone.
+//! The inspection to plan, from a vehicle file or from options alone.
 
 use std::path::Path;
 
@@ -21,12 +21,12 @@ use crate::failure::Failure;
 use crate::files;
 use crate::vehicle_file;
 
-/// The heads that are planned with when no vehicle file names any.
+/// Kind of the heads if no vehicle file is given.
 const USUAL_HEAD: &str = "imagenex881";
-/// Their range setting, m: that for which the times of their modes are known.
+/// Their range setting, m: that of the maker's table of modes.
 const USUAL_RANGE_M: f64 = 10.0;
 
-/// An inspection with the names that people know it by.
+/// An inspection with its names.
 pub(super) struct Case {
     pub(super) inspection: Inspection,
     pub(super) heads: Vec<String>,
@@ -38,7 +38,7 @@ pub(super) struct Case {
 type Head = (HeadSpec, Vec<HeadMode>);
 
 impl Case {
-    /// From arguments; those given outweigh the vehicle file's values.
+    /// From the options, which override the vehicle file.
     pub(super) fn of(args: &Plan) -> Result<Self, Failure> {
         let question = Question {
             target_m: args.target,
@@ -60,9 +60,7 @@ impl Case {
                     args,
                 ))
             }
-            (None, None) => {
-                Err(Failure::Usage("plan: give --tunnel, or --vehicle with a vehicle file".to_owned()))
-            }
+            (None, None) => Err(Failure::Usage("plan: needs --tunnel or --vehicle".to_owned())),
         }
     }
 
@@ -117,7 +115,7 @@ impl Case {
     }
 }
 
-/// A tunnel from `NAME`, `NAME,KEY=VALUE,...` with a vehicle file's keys, or the file of a polyline.
+/// A tunnel from `NAME`, `NAME,KEY=VALUE,...` with the keys of a vehicle file, or a polyline file.
 fn tunnel(text: &str) -> Result<TunnelConfig, Failure> {
     let mut parts = text.split(',');
     let name = parts.next().unwrap_or_default().trim();
@@ -139,7 +137,7 @@ fn tunnel(text: &str) -> Result<TunnelConfig, Failure> {
     Ok(TunnelConfig::from_section(root, load)?)
 }
 
-/// The heads of a vehicle, at another range setting where one is given.
+/// The heads of a vehicle, at `range_m` if given.
 fn heads_of(path: &Path, sensors: &[Box<dyn Device>], range_m: Option<f64>) -> Result<Vec<Head>, Failure> {
     let mut heads = Vec::new();
     for sensor in sensors {
@@ -154,7 +152,7 @@ fn heads_of(path: &Path, sensors: &[Box<dyn Device>], range_m: Option<f64>) -> R
     Ok(heads)
 }
 
-/// Heads that all sit at the vehicle's origin: what the closed forms are for.
+/// Heads that are all at the vehicle's origin, as the closed forms assume.
 fn ideal_heads(args: &Plan) -> Result<Vec<(String, Head)>, Failure> {
     let kind = KINDS.iter().find(|kind| kind.name() == USUAL_HEAD);
     let kind = kind.ok_or_else(|| Failure::Usage(format!("plan: this build has no {USUAL_HEAD}")))?;

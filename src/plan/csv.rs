@@ -1,4 +1,4 @@
-//! The modes of a plan as a table for spreadsheets: one row a mode, SI units in the headings.
+//! The modes of a plan as CSV: a row per mode, units in the headings.
 
 use headrace_sampling::plan::{Answer, Spacing};
 
@@ -6,7 +6,7 @@ const HEADINGS: &str = "mode,step_deg,steps_per_turn,turn_s,turn_basis,overlap,t
 t_y_max_rest_m,t_yp_m,t_y2_m,v_max_mps,needed_h,reason,speed_mps,advance_m,pitch_m,t_x_m,t_x_hidden_m,t_y_min_m,\
 t_y_mean_m,t_y_max_m,t_min_m,t_mean_m,t_max_m,hit_once_m,hit_twice_m,meets_target,suffices,best";
 
-/// The table, without a line end after its last row.
+/// The table, without a final line end.
 pub(super) fn csv(answers: &[Answer]) -> String {
     let rows = answers.iter().map(|answer| row(answer).join(","));
     std::iter::once(HEADINGS.to_owned()).chain(rows).collect::<Vec<_>>().join("\n")
@@ -54,7 +54,7 @@ fn known(value: Option<f64>) -> String {
     value.map(number).unwrap_or_default()
 }
 
-/// Six digits after the point: micrometres.
+/// At most six decimals.
 fn number(value: f64) -> String {
     let text = format!("{value:.6}");
     text.trim_end_matches('0').trim_end_matches('.').to_owned()

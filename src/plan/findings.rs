@@ -19,7 +19,7 @@ pub(super) struct Findings {
     pub(super) briefing: Briefing,
 }
 
-/// A speed as it is printed: whole millimetres a second, rounded down, so that what is printed meets the target, too.
+/// A speed as printed, m/s: rounded down to 1 mm/s, so that the printed speed meets the target, too.
 pub(super) fn printed_mps(speed_mps: f64) -> f64 {
     let down = (speed_mps * 1000.0 + 1e-6).floor() / 1000.0;
     if down > 0.0 { down } else { speed_mps }

@@ -1,4 +1,4 @@
-//! `headrace plan`: the day before a dive.
+//! `headrace plan`: spacing, speed and hours before a dive.
 
 mod case;
 mod csv;
@@ -20,7 +20,7 @@ use case::Case;
 use findings::{Findings, printed_mps};
 use pictures::Shown;
 
-/// Plans an inspection.
+/// `headrace plan`.
 pub(crate) fn plan(args: &Plan) -> Result<u8, Failure> {
     let findings = find(Case::of(args)?, args)?;
     if let Some(folder) = &args.svg {
@@ -47,7 +47,7 @@ fn find(case: Case, args: &Plan) -> Result<Findings, Failure> {
     if answers.is_empty() {
         let names: Vec<_> = planner.modes().iter().map(|planned| planned.mode.name).collect();
         let names = names.join(", ");
-        return Err(Failure::Usage(format!("--mode {}: wanted is all, or one of {names}", args.mode)));
+        return Err(Failure::Usage(format!("--mode {}: expected all or one of {names}", args.mode)));
     }
     let best = answers.iter().find(|answer| answer.best);
     let shown = best.and_then(|best| {
@@ -56,20 +56,20 @@ fn find(case: Case, args: &Plan) -> Result<Findings, Failure> {
         let speed_mps = best.speed_mps?;
         Some((number, if asked { speed_mps } else { printed_mps(speed_mps) }))
     });
-    // What the vehicle hides is to be known all the more where no mode will do.
+    // Occlusion is reported even where no mode meets the target.
     let (mode, speed_mps) = shown.unwrap_or((0, ANY_SPEED_MPS));
     let briefing = planner.briefing(mode, speed_mps)?;
     let footprints_m = planner.footprints_m()?;
     Ok(Findings { planner, heads, tunnel, range_m, footprints_m, question, answers, shown, briefing })
 }
 
-/// Whether what was asked for can be had in a mode.
+/// Whether a mode meets the request.
 fn is_met(answer: &Answer) -> bool {
     answer.meets_target.unwrap_or(answer.refused.is_none())
         && answer.spacing.is_some_and(|spacing| spacing.t_max_m.is_some())
 }
 
-/// For what doesn't depend on the speed.
+/// Speed for results that don't depend on it, m/s.
 const ANY_SPEED_MPS: f64 = 0.1;
 
 type Picture = fn(&Shown<'_>) -> Result<String, SamplingError>;

@@ -1,4 +1,4 @@
-//! A plan on the terminal.
+//! A plan as text.
 
 use headrace_sampling::head::Basis;
 use headrace_sampling::layout::HeadLayout;
@@ -6,7 +6,7 @@ use headrace_sampling::plan::{Answer, Briefing, Heard, Spacing, ThinStrip};
 
 use super::findings::{Findings, printed_mps};
 
-/// The plan in words and a table.
+/// The plan as text with a table of modes.
 pub(super) fn table(findings: &Findings) -> String {
     let mut lines = vec![tunnel_line(findings), heads_line(findings), question_line(findings), String::new()];
     lines.extend(range_warning(findings));
@@ -23,7 +23,7 @@ pub(super) fn table(findings: &Findings) -> String {
     lines.iter().map(|line| line.trim_end()).collect::<Vec<_>>().join("\n")
 }
 
-/// How many heads, and how they share the work.
+/// Number and layout of the heads.
 pub(super) fn heads(findings: &Findings) -> String {
     let layout = match findings.planner.inspection().layout {
         HeadLayout::PhaseShift => "phase shift",
@@ -41,7 +41,7 @@ fn tunnel_line(findings: &Findings) -> String {
     let allowed = match (inspection.drift_m > 0.0, inspection.yaw_rad > 0.0) {
         (false, false) => String::new(),
         _ => format!(
-            "; drift of {} m and yaw of {:.1} degrees, held steadily, allowed for",
+            "; allowing for a constant offset of {} m and yaw of {:.1} degrees",
             inspection.drift_m,
             inspection.yaw_rad.to_degrees()
         ),
@@ -72,12 +72,12 @@ fn question_line(findings: &Findings) -> String {
     asked.join(", ")
 }
 
-/// Said where a head can't hear the wall.
+/// Warning where the wall is out of range.
 fn range_warning(findings: &Findings) -> Option<String> {
     let ((here_m, allowed_m), reach_m) = (findings.planner.farthest_m(), findings.planner.reach_m());
     (allowed_m > reach_m).then(|| {
-        let where_it_is = if here_m > reach_m { "" } else { ", for the drift and yaw allowed for" };
-        format!("OUT OF RANGE: the wall is up to {allowed_m:.1} m away{where_it_is}; heads hear to {reach_m:.1} m\n")
+        let where_it_is = if here_m > reach_m { "" } else { " with that offset and yaw" };
+        format!("OUT OF RANGE: the wall is up to {allowed_m:.1} m away{where_it_is}; the heads reach {reach_m:.1} m\n")
     })
 }
 
@@ -146,7 +146,7 @@ fn notes(findings: &Findings) -> Vec<String> {
     }
     if findings.answers.iter().any(|answer| answer.turn_basis == Basis::Estimated.as_str()) {
         notes.push(
-            "~ carried over from another range setting; measure the turn and put it into the vehicle file"
+            "~ extrapolated from another range setting; measure the turn period and add it to the vehicle file"
                 .to_owned(),
         );
     }
@@ -171,7 +171,7 @@ fn best_words(best: &Answer) -> String {
     }
 }
 
-/// What the vehicle hides, and where that leaves fewer passes.
+/// Occlusion by the vehicle, and strips of the wall with fewer passes.
 fn hidden_lines(findings: &Findings, briefing: &Briefing) -> Vec<String> {
     let names = |heads: &[usize]| names(findings, heads);
     let hidden = briefing.hidden.iter().map(|hidden| {
@@ -192,7 +192,7 @@ fn names(findings: &Findings, heads: &[usize]) -> String {
     heads.iter().map(name).collect::<Vec<_>>().join(", ")
 }
 
-/// How heads start, who disturbs whom, and what would make starts simpler.
+/// Start angles, interference between heads, and distances along the hull with equal start angles.
 fn start_lines(findings: &Findings, briefing: &Briefing) -> Vec<String> {
     let names = |heads: &[usize]| names(findings, heads);
     let mut lines = Vec::new();
@@ -217,7 +217,7 @@ fn start_lines(findings: &Findings, briefing: &Briefing) -> Vec<String> {
     let mut said = Vec::new();
     for rule in &briefing.hull_rules {
         let text = format!(
-            "{:.3} m apart along the hull, heads are at equal angles at {:.3} m/s, or {:.3} m apart at this speed (q = {})",
+            "heads {:.3} m apart along the hull start at equal angles at {:.3} m/s; at this speed, {:.3} m apart (q = {})",
             rule.behind_m, rule.speed_mps, rule.apart_m, rule.q
         );
         if !said.contains(&text) {
@@ -247,12 +247,7 @@ fn heard_words(heard: &Heard, names: &impl Fn(&[usize]) -> String) -> String {
         ways.push(format!("face each other for {:.2} s", heard.facing_s));
     }
     if heard.same_patch_s > 0.0 {
-        ways.push(format!("look at one patch for {:.2} s", heard.same_patch_s));
+        ways.push(format!("look at the same patch for {:.2} s", heard.same_patch_s));
     }
-    format!(
-        "{} {} of every {:.1} s: they may hear each other",
-        names(&heard.heads),
-        ways.join(" and "),
-        heard.of_s
-    )
+    format!("{} {} of every {:.1} s: they may interfere", names(&heard.heads), ways.join(" and "), heard.of_s)
 }

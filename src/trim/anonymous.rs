@@ -1,6 +1,6 @@
-//! A log's beginning without what tells whose it is: comments, names, addresses, serial numbers, the time of day.
+//! Anonymised header of a log: without comments, names, addresses, serial numbers and time of day.
 //!
-//! The vehicle file is gone through as text, string by string: what its keys mean stays, and so does every number.
+//! The vehicle file is edited as text, string by string; keys and numbers are kept.
 
 use headrace_replay::log::format::{FORMAT_KEY, VEHICLE_FILE};
 use headrace_replay::log::{DiveLog, LogHeader, SourceInfo, TRIMMED};
@@ -11,24 +11,24 @@ use crate::devices::KINDS;
 use crate::failure::Failure;
 use crate::files;
 
-/// Keys of the log's metadata that tell nothing of anybody.
+/// Metadata keys that are kept: they identify nobody.
 const KEPT_KEYS: [&str; 4] = [FORMAT_KEY, "version", "import_format", TRIMMED];
-/// Log times from here on, the beginning of the year 2000, are of UTC and no monotonic clock's.
+/// Log times later than this, the beginning of the year 2000, are UTC, not those of a monotonic clock.
 const UTC_FROM_NS: u64 = 946_684_800_000_000_000;
 
-/// What takes the place of a log's beginning.
+/// The anonymised header.
 pub(crate) struct Anonymous {
     vehicle_toml: String,
-    /// Names of attachments, as they were and as they are.
+    /// Names of attachments, before and after.
     names: Vec<(String, String)>,
-    /// What is left in it, in words.
+    /// What couldn't be removed, as text.
     pub(crate) left: Vec<String>,
 }
 
 impl Anonymous {
     /// For a log and its vehicle.
     ///
-    /// Errors: the vehicle file doesn't read any more, which would be a fault of ours.
+    /// Errors: the anonymised vehicle file can't be parsed, which would be a bug.
     pub(crate) fn of(log: &DiveLog, vehicle: &VehicleConfig) -> Result<Self, Failure> {
         let info = log.header();
         let text = info.vehicle_toml.clone().unwrap_or_default();
@@ -47,7 +47,7 @@ impl Anonymous {
         Ok(Self { vehicle_toml, names, left: left(log, vehicle) })
     }
 
-    /// The beginning of the new log.
+    /// The header of the new log.
     pub(crate) fn header(&self, mut header: LogHeader) -> LogHeader {
         header.vehicle_toml.clone_from(&self.vehicle_toml);
         for (name, _) in &mut header.attachments {
@@ -63,7 +63,7 @@ impl Anonymous {
     }
 }
 
-/// What can't be taken out, in words.
+/// What can't be removed, as text.
 fn left(log: &DiveLog, vehicle: &VehicleConfig) -> Vec<String> {
     let info = log.header();
     let ids = |sources: &[SourceInfo]| {
@@ -72,7 +72,7 @@ fn left(log: &DiveLog, vehicle: &VehicleConfig) -> Vec<String> {
     let mut left = vec![
         format!("left: the sensors' ids ({})", ids(&info.sources)),
         format!("left: the tunnel's shape ({}) and all numbers of the vehicle file", vehicle.tunnel.name),
-        "left: what devices have sent, but for places, texts and machine numbers of MAVLink; it may hold serial numbers, versions \
+        "left: device data except positions, texts and system ids of MAVLink; it may contain serial numbers, versions \
          and the time of day (CAN units, velocity logs, depth sensors when they are opened)"
             .to_owned(),
     ];
@@ -80,17 +80,17 @@ fn left(log: &DiveLog, vehicle: &VehicleConfig) -> Vec<String> {
         left.push("left: the content of the attached files".to_owned());
     }
     if log.times().is_some_and(|(_, to)| to.0 >= UTC_FROM_NS) {
-        left.push("left: the messages' times, which count from 1970 and tell the day".to_owned());
+        left.push("left: the messages' times, which are UTC and tell the date".to_owned());
     }
     left
 }
 
-/// What a file's name ends in, so that its kind can still be told.
+/// A file name's extension, with the dot.
 fn ending(name: &str) -> &str {
     name.rfind('.').and_then(|dot| name.get(dot..)).unwrap_or_default()
 }
 
-/// A place where something is connected, of the same kind, without what tells which.
+/// A `connect` of the same carrier without identifying parts; `number` keeps them apart.
 fn connect(text: &str, number: usize) -> String {
     // Addresses for documents, RFC 5737.
     let host = |address: &str| {
@@ -115,7 +115,7 @@ fn connect(text: &str, number: usize) -> String {
     connect.to_string()
 }
 
-/// A vehicle file without comments, and with other texts for names, addresses and attached files.
+/// The vehicle file without comments, and with names, addresses and attached files replaced.
 fn anonymised(text: &str, names: &[(String, String)]) -> String {
     let (mut clean, mut rest, mut count) = (String::new(), text, 0);
     while let Some(c) = rest.chars().next() {
@@ -162,7 +162,7 @@ fn key_before(text: &str) -> &str {
     key.rsplit('.').next().unwrap_or_default().trim().trim_matches(['"', '\''])
 }
 
-/// A string of the file as it may be handed on.
+/// The anonymised form of a string of the vehicle file.
 fn other_string(string: &str, key: &str, names: &[(String, String)], count: &mut usize) -> String {
     let inner = string.trim_matches(['"', '\'']);
     if let Some((_, other)) = names.iter().find(|(name, _)| name == inner) {

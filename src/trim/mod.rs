@@ -1,4 +1,4 @@
-//! `headrace trim`: a log with less in it.
+//! `headrace trim`: part of a log.
 
 mod anonymous;
 
@@ -26,12 +26,12 @@ use crate::vehicle_file;
 use crate::watch::Watch;
 use anonymous::Anonymous;
 
-/// A tick of the replay that finds out when the vehicle was where.
+/// Tick length of the replay that finds when the vehicle was where.
 const TICK: DurNs = DurNs::from_millis(20);
-/// The vehicle may be away for so long, or nowhere, without a cut in the log.
+/// Gaps outside the range of chainage, or without a fix, that are not cut out.
 const BRIDGED: DurNs = DurNs::from_millis(2000);
 
-/// Trims a log, and says what was done.
+/// `headrace trim`.
 pub(crate) fn trim(args: &Trim) -> Result<u8, Failure> {
     let files = files_of(&args.logs)?;
     let log = DiveLog::open(&files)?;
@@ -49,7 +49,7 @@ pub(crate) fn trim(args: &Trim) -> Result<u8, Failure> {
     Ok(if trimmed.losses > 0 { failure::DATA_LOST } else { failure::OK })
 }
 
-/// The vehicle, where what is asked for needs it.
+/// The vehicle, if the options need it.
 fn vehicle(args: &Trim, files: &[PathBuf], info: &LogInfo) -> Result<Option<VehicleConfig>, Failure> {
     if args.chainage.is_none() && !args.drop_echoes && !args.anonymise {
         return Ok(None);
@@ -62,7 +62,7 @@ fn vehicle(args: &Trim, files: &[PathBuf], info: &LogInfo) -> Result<Option<Vehi
     Ok(Some(vehicle))
 }
 
-/// The log times that are kept; none where all are.
+/// The spans of log time that are kept; empty where all are.
 fn spans(
     args: &Trim,
     files: &[PathBuf],
@@ -72,7 +72,7 @@ fn spans(
         let spans = when_within(files, vehicle, from_m, to_m)?;
         if spans.is_empty() {
             return Err(Failure::Usage(format!(
-                "trim: the vehicle wasn't between {from_m} and {to_m} m at any time of {}",
+                "trim: the vehicle was never between {from_m} and {to_m} m in {}",
                 files::first_named(&args.logs).display()
             )));
         }
@@ -91,7 +91,7 @@ fn spans(
     Ok(vec![(from, to)])
 }
 
-/// When the vehicle was on a stretch, by a replay.
+/// Spans of log time in which the vehicle was in a range of chainage, m, found by a replay.
 fn when_within(
     files: &[PathBuf],
     vehicle: &VehicleConfig,
@@ -118,7 +118,7 @@ fn when_within(
     Ok(spans)
 }
 
-/// What is done, in words.
+/// The changes, as text.
 fn what_is_done(args: &Trim, files: &[PathBuf], spans: &[(MonoNs, MonoNs)]) -> Result<Vec<String>, Failure> {
     let mut said = Vec::new();
     if args.anonymise {
@@ -133,15 +133,15 @@ fn what_is_done(args: &Trim, files: &[PathBuf], spans: &[(MonoNs, MonoNs)]) -> R
         said.push("cut in time".to_owned());
     }
     if !spans.is_empty() {
-        said.push("without the results of the dive".to_owned());
+        said.push("without live results".to_owned());
     }
     if args.drop_echoes {
-        said.push("without echo strengths".to_owned());
+        said.push("without echo data".to_owned());
     }
     Ok(said)
 }
 
-/// Writes the new log; takes it away again when that fails.
+/// Writes the new log; deletes it again if that fails.
 fn write(
     args: &Trim,
     files: &[PathBuf],
@@ -208,11 +208,11 @@ fn tell(args: &Trim, trimmed: &Trimmed, spans: &[(MonoNs, MonoNs)], said: &[Stri
     }
     if changed > 0 {
         say(&format!(
-            "changed  {changed} messages of sensors, of which {emptied} have nothing left; {bytes_before} bytes are {bytes_after}"
+            "changed  {changed} sensor messages, {emptied} of them now empty; from {bytes_before} to {bytes_after} bytes"
         ));
     }
     if losses > 0 {
-        say(&format!("lost     {losses} losses that the log had are stated in the new one"));
+        say(&format!("lost     {losses} losses of the source log are stated in the new one"));
     }
     let span = span.map(|(from, to)| format!(", {} to {}", seconds(from), seconds(to))).unwrap_or_default();
     let results = if results > 0 { format!(" and {results} of results") } else { String::new() };

@@ -35,7 +35,7 @@ fn figure_6_shows_passes_evenly_spaced_and_a_faster_head() {
             "T_x/s = 0.236 m",
             "about T_x/s",
             "4 times as fast",
-            "way along the tunnel, m",
+            "distance along the tunnel, m",
             "9:00 left",
         ],
     );

@@ -1,4 +1,4 @@
-//! The experiments in words.
+//! The experiments as text.
 
 use crate::paper::SOURCE;
 use crate::{Experiments, HiddenRow, MeshRow, Pair, Perimeter, RunRow, SignedRankRow};
@@ -6,7 +6,7 @@ use crate::{Experiments, HiddenRow, MeshRow, Pair, Perimeter, RunRow, SignedRank
 /// All of it.
 pub fn words(report: &Experiments) -> String {
     let mut text = format!(
-        "Experiments of {SOURCE}, run anew at {} m/s in the blueprint's tunnel. Each pair is the paper's figure and ours.\n",
+        "Experiments of {SOURCE}, repeated at {} m/s in the blueprint's tunnel. Each pair is the paper's figure and ours.\n",
         report.speed_mps
     );
     runs(&mut text, "Table 3. One head", report.runs.iter().filter(|row| row.heads == 1));

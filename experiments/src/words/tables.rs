@@ -1,11 +1,11 @@
-//! The paper's tables on the terminal.
+//! The paper's tables as text.
 
 use crate::paper::{
     AtBothSpeeds, Cell, Combined, CombinedRow, Digits, ModeRow, Note, OneHeadRow, OverlapRow,
     SeveralHeadsRow, Table, Tables,
 };
 
-/// Columns of a terminal that notes are kept to.
+/// Line length of notes, characters.
 const WIDTH: usize = 108;
 
 /// All five.

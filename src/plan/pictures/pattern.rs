@@ -51,7 +51,7 @@ pub(crate) fn pattern(shown: &Shown<'_>) -> Result<String, SamplingError> {
 }
 
 fn chart<'c>(canvas: &'c Canvas, laid: &Laid, length_m: f64) -> Chart<'c> {
-    let x = Axis::new("way along the tunnel, m", 0.0, length_m, 10);
+    let x = Axis::new("distance along the tunnel, m", 0.0, length_m, 10);
     let y = Axis::new("arc length from the floor's centre, via the left wall, m", 0.0, laid.perimeter_m, 10);
     Chart::new(canvas, FRAME, &x, &y)
 }
@@ -60,7 +60,7 @@ fn chart<'c>(canvas: &'c Canvas, laid: &Laid, length_m: f64) -> Chart<'c> {
 fn circle(chart: &Chart<'_>, centre: [f64; 2], t_m: f64) {
     let (middle, corner) = (chart.px(centre), chart.px([centre[0] + t_m / 2.0, centre[1] + t_m / 2.0]));
     chart.ellipse(middle, [corner[0] - middle[0], middle[1] - corner[1]], CIRCLE, &look::T);
-    let note = "Left: along the tunnel and around it the scales differ, so that the circle is no circle.";
+    let note = "Left: the scales along and around the tunnel differ, so the circle appears as an ellipse.";
     chart.canvas.text([14.0, 546.0], note, Side::Right, SMALL);
 }
 

@@ -115,7 +115,7 @@ fn pattern_shows_every_head_the_circle_and_what_is_hidden() {
         &svg,
         &["Pattern on the unrolled wall: FAST at 0.115 m/s", "head 0", "head 3", "hidden by the vehicle"],
     );
-    says(&svg, &[" m (T). Any feature as", "true to scale", "9:00 left", "way along the tunnel, m"]);
+    says(&svg, &[" m (T). Any feature as", "true to scale", "9:00 left", "distance along the tunnel, m"]);
     silent(&draw(inspection(ONE), FAST, 0.058, TARGET, "pattern"), &["head 1", "hidden by"]);
 }
 
