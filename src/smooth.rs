@@ -7,8 +7,8 @@ use headrace_fusion::filter::sources::Consistency;
 use headrace_fusion::smooth::journal::Journal;
 use headrace_fusion::smooth::track::TrackNavigation;
 use headrace_monitor::report::Report;
+use headrace_monitor::report::smoothing_changes;
 use headrace_monitor::run::Loop;
-use headrace_monitor::smoothing::SmoothingReport;
 use headrace_replay::drive::Pace;
 use headrace_replay::player::Player;
 use headrace_replay::smooth::Steps;
@@ -64,7 +64,7 @@ pub(crate) fn smoothed(
         .asking(what_if);
     player.connect(dive.armed.sources());
     let mut report = dive.run(player, pace, &mut Watch::quiet())?;
-    report.smoothing = Some(SmoothingReport::of(&before, &report, estimates, pieces));
+    report.smoothing = Some(smoothing_changes::compare(&before, &report, estimates, pieces));
     Ok(report)
 }
 

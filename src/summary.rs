@@ -1,8 +1,8 @@
 //! Summary of a report as text.
 
 use headrace_monitor::pilot_text::{action_text, cause_text, station};
+use headrace_monitor::report::{ChangeReport, JudgedReport, SmoothingReport};
 use headrace_monitor::report::{Report, RunReport};
-use headrace_monitor::smoothing::{ChangeReport, JudgedReport, SmoothingReport};
 
 /// The summary.
 pub(crate) fn summary(report: &Report) -> String {

@@ -24,7 +24,6 @@ pub mod resources;
 pub mod result_stream;
 pub mod ring;
 pub mod run;
-pub mod smoothing;
 pub mod stage;
 mod stages;
 pub mod what_if;

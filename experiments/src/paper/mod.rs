@@ -4,6 +4,7 @@
 //! Sonars", Sensors 2021, 21, 1900 (CC BY 4.0). Its numbers are in the `*.csv` files here, as printed.
 
 mod baseline;
+mod baseline_tables;
 mod cell;
 mod combined;
 mod drift;
@@ -16,7 +17,7 @@ use headrace_geometry::tunnel::{ProfileError, shapes};
 use headrace_sampling::SamplingError;
 use serde::Serialize;
 
-pub use baseline::{AtBothSpeeds, OneHeadRow, SeveralHeadsRow};
+pub use baseline_tables::{AtBothSpeeds, OneHeadRow, SeveralHeadsRow};
 pub use cell::{Cell, Note, NoteKind, Table};
 pub use combined::{Combined, CombinedCell, CombinedRow};
 pub use measured::{Measured, Spacings, measured};
@@ -102,8 +103,8 @@ pub fn tables() -> Result<Tables, PaperError> {
         consistent_perimeter_m,
         table_1: modes::overlaps()?,
         table_2: modes::speeds()?,
-        table_3: baseline::one_head(&baselines)?,
-        table_4: baseline::several_heads(&baselines)?,
+        table_3: baseline_tables::one_head(&baselines)?,
+        table_4: baseline_tables::several_heads(&baselines)?,
         table_5: combined::combined(&baselines)?,
     })
 }

@@ -2,7 +2,7 @@
 
 use core::f64::consts::SQRT_2;
 
-use super::PerimeterError;
+use super::error::PerimeterError;
 use super::image::Image;
 
 /// A closed line of pixels round the head.

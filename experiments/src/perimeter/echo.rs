@@ -2,7 +2,8 @@
 
 use headrace_geometry::math::{self, TAU};
 
-use super::{PerimeterError, Ping, Settings};
+use super::error::PerimeterError;
+use super::settings::{Ping, Settings};
 
 /// Echoes sorted by angle.
 pub(super) struct Echoes {

@@ -2,8 +2,8 @@
 
 use headrace_geometry::math::{self, TAU};
 
-use super::Settings;
 use super::echo::Echoes;
+use super::settings::Settings;
 
 /// Square, with a border that is never set, so that every set pixel has eight neighbours.
 #[derive(Debug, Clone, PartialEq)]

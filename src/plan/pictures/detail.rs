@@ -2,13 +2,15 @@
 
 use headrace_pictures::canvas::{Canvas, NORMAL, SMALL, Side};
 use headrace_pictures::chart::{Axis, Chart, short};
+use headrace_pictures::colour::Colour;
 use headrace_pictures::look::{self, Look};
 use headrace_pictures::polyline::Frame;
 use headrace_pictures::polyline::Px;
 
 use super::laid::Laid;
-use super::pattern::CIRCLE;
 
+/// The inside of the circle.
+pub(super) const CIRCLE: Colour = Colour(255, 240, 190);
 const FRAME: Frame = Frame { left: 676.0, top: 92.0, right: 886.0, bottom: 302.0 };
 /// Where the words below it begin, pixels.
 const WORDS: Px = [634.0, 348.0];

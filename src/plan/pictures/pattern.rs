@@ -3,21 +3,18 @@
 use headrace_pictures::canvas::{BOLD, Canvas, Letters, NORMAL, SMALL, Side};
 use headrace_pictures::chart::{Axis, Chart};
 use headrace_pictures::clock;
-use headrace_pictures::colour::Colour;
 use headrace_pictures::look::{self, Look};
 use headrace_pictures::polyline::Frame;
 use headrace_pictures::polyline::Px;
 use headrace_sampling::SamplingError;
 
 use super::Shown;
-use super::detail;
+use super::detail::{self, CIRCLE};
 use super::laid::{self, Laid};
 use super::modes;
 use super::wall;
 
 const FRAME: Frame = Frame { left: 66.0, top: 92.0, right: 548.0, bottom: 482.0 };
-/// The inside of the circle.
-pub(super) const CIRCLE: Colour = Colour(255, 240, 190);
 /// Where the legend begins, pixels.
 const LEGEND: Px = [634.0, 412.0];
 /// Places around the wall at which spacing is compared.

@@ -6,7 +6,6 @@ use serde::Serialize;
 use super::alerts::Alert;
 use super::resources::{Coverage, Tally};
 use super::run::Loop;
-use super::smoothing::SmoothingReport;
 use super::what_if::WhatIfReport;
 use headrace_coverage::openings::Opening;
 use headrace_coverage::{Section, Spread, Verdict};
@@ -15,13 +14,19 @@ use headrace_geometry::time::MonoNs;
 mod advice;
 mod runs;
 mod sections;
+mod smoothing;
+pub mod smoothing_changes;
 mod sources;
+mod spread;
 mod survey;
 
 pub use advice::{AdviceReport, AlternativeReport};
 pub use runs::{ReturnReport, RunReport};
 pub use sections::{DeviationReport, SectionReport};
+pub use smoothing::{ChangeReport, JudgedReport, MetresReport, SmoothingReport};
 pub use sources::{DeviceClockReport, LineReport, NavigationReport, SourceReport};
+pub use spread::SpreadReport;
+use spread::spread_report;
 pub use survey::{HolidayReport, NodeRowReport, SurveyReport};
 
 /// Version of the report's form.
@@ -138,21 +143,6 @@ pub struct RejectedReport {
     pub outside: u64,
     /// No room.
     pub not_stored: u64,
-}
-
-/// Count, mean, deviation and extremes; `None` where there is no value.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct SpreadReport {
-    /// Values.
-    pub count: u32,
-    /// Smallest, m.
-    pub min_m: Option<f64>,
-    /// Mean, m.
-    pub mean_m: Option<f64>,
-    /// Largest, m.
-    pub max_m: Option<f64>,
-    /// Standard deviation, m.
-    pub sd_m: Option<f64>,
 }
 
 /// Metres by verdict, and spacings.
@@ -331,16 +321,5 @@ fn alert_report(alert: &Alert) -> AlertReport {
         count: alert.count,
         x_m: alert.x_m,
         worst_m: alert.worst_m,
-    }
-}
-
-fn spread_report(spread: &Spread) -> SpreadReport {
-    let known = |value: f64| (spread.count > 0).then_some(value);
-    SpreadReport {
-        count: spread.count,
-        min_m: known(spread.min),
-        mean_m: spread.mean(),
-        max_m: known(spread.max),
-        sd_m: spread.sd(),
     }
 }

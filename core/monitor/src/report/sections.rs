@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::{SpreadReport, spread_report};
+use super::spread::{SpreadReport, spread_report};
 use crate::run::Loop;
 use headrace_coverage::{Evidence, Section, Sections, Verdict};
 use headrace_geometry::time::MonoNs;

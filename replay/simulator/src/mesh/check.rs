@@ -5,7 +5,16 @@ use std::collections::BTreeMap;
 use headrace_geometry::math;
 
 use super::error::MeshError;
-use super::{Role, Triangles};
+use super::ply::Triangles;
+
+/// What a mesh stands for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Role {
+    /// The tunnel's wall over the mesh's own extent along x; open there at both ends, and closed elsewhere.
+    Wall,
+    /// A closed solid in the water.
+    Body,
+}
 
 /// Coordinates beyond this are a mistake of units or of origin, metres.
 const FAR_M: f64 = 100_000.0;

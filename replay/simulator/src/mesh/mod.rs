@@ -24,6 +24,7 @@ use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy, BvhNode};
 use check::Surface;
 use geometry::{Crossing, Ray};
 
+pub use check::Role;
 pub use error::MeshError;
 pub use ply::{Triangles, read};
 
@@ -41,15 +42,6 @@ const WAYS_OUT: [[f64; 3]; 6] = [
     [0.593, 0.331, 0.739],
     [-0.701, 0.613, -0.367],
 ];
-
-/// What a mesh stands for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Role {
-    /// The tunnel's wall over the mesh's own extent along x; open there at both ends, and closed elsewhere.
-    Wall,
-    /// A closed solid in the water.
-    Body,
-}
 
 /// Where a ray meets a mesh.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,0 +1,45 @@
+//! What smoothing changed: a dive's report against that of the same dive by the filter alone.
+
+use super::sections::SectionReport;
+use super::smoothing::{ChangeReport, JudgedReport, MetresReport, SmoothingReport};
+use super::{Report, SummaryReport};
+
+/// Compares the dive by the filter with the same smoothed, over so many estimates in so many pieces.
+pub fn compare(filter: &Report, smoothed: &Report, estimates: u64, pieces: u64) -> SmoothingReport {
+    SmoothingReport {
+        filter_digest: filter.digest.clone(),
+        estimates,
+        pieces,
+        before: metres(&filter.summary),
+        after: metres(&smoothed.summary),
+        changed: changes(&filter.sections, &smoothed.sections),
+    }
+}
+
+fn metres(summary: &SummaryReport) -> MetresReport {
+    let SummaryReport { pass_m, fail_m, cannot_say_m, open_m, .. } = *summary;
+    MetresReport { pass_m, fail_m, cannot_say_m, open_m }
+}
+
+fn judged(section: &SectionReport) -> JudgedReport {
+    let SectionReport { verdict, hole_m, hole_sigma_m, .. } = *section;
+    JudgedReport { verdict, hole_m, hole_sigma_m }
+}
+
+/// Both are in the order of chainage; either may have sections that the other hasn't.
+fn changes(before: &[SectionReport], after: &[SectionReport]) -> Vec<ChangeReport> {
+    let (mut before, mut after) = (before.iter().peekable(), after.iter().peekable());
+    let mut changed = Vec::new();
+    loop {
+        let next = [before.peek(), after.peek()].map(|next| next.map_or(f64::INFINITY, |s| s.start_m));
+        let start_m = next[0].min(next[1]);
+        let was = before.next_if(|section| section.start_m <= start_m);
+        let is = after.next_if(|section| section.start_m <= start_m);
+        let Some(section) = was.or(is) else { return changed };
+        if was.map(|section| section.verdict) != is.map(|section| section.verdict) {
+            let SectionReport { start_m, end_m, .. } = *section;
+            let [before, after] = [was, is].map(|section| section.map(judged));
+            changed.push(ChangeReport { start_m, end_m, before, after });
+        }
+    }
+}

@@ -1,0 +1,31 @@
+//! How a quantity is spread over a dive or a section.
+
+use serde::Serialize;
+
+use headrace_coverage::Spread;
+
+/// Count, mean, deviation and extremes; `None` where there is no value.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct SpreadReport {
+    /// Values.
+    pub count: u32,
+    /// Smallest, m.
+    pub min_m: Option<f64>,
+    /// Mean, m.
+    pub mean_m: Option<f64>,
+    /// Largest, m.
+    pub max_m: Option<f64>,
+    /// Standard deviation, m.
+    pub sd_m: Option<f64>,
+}
+
+pub(super) fn spread_report(spread: &Spread) -> SpreadReport {
+    let known = |value: f64| (spread.count > 0).then_some(value);
+    SpreadReport {
+        count: spread.count,
+        min_m: known(spread.min),
+        mean_m: spread.mean(),
+        max_m: known(spread.max),
+        sd_m: spread.sd(),
+    }
+}
