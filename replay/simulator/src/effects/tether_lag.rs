@@ -17,9 +17,9 @@ use crate::stages::Stage;
 /// The tender lets out and takes in cable in bursts: the counter stands until the vehicle is so far ahead or behind that
 /// someone winds, and then catches up.
 ///
-/// While it stands, the count stays. Once vehicle and cable are `hold_m` apart (0.5 by default), the drum
-/// winds at `speed_mps` (0.5 by default) until they agree. A drum slower than the vehicle never catches up. Like slack,
-/// the difference counts from its value as the counter was set to zero, so that it is of either sign.
+/// While it stands, the count stays. Once vehicle and cable are `hold_m` apart (0.5 by default), the drum winds at
+/// `speed_mps` (0.5 by default) until they agree. A drum slower than the vehicle never catches up. Like slack, the
+/// difference counts from its value as the counter was set to zero, so that it is of either sign.
 pub(super) struct Kind;
 
 #[derive(Debug, Clone, Copy)]
