@@ -1,7 +1,7 @@
 //! Covering and holes beside others, on the same samples in the same process, and the memory that samples take. Prints
 //! Markdown.
 //!
-//! `cargo bench --bench coverage` takes about a minute; `-- FAST` runs one mode alone, `-- memory` no mode. Absolute times drift on shared machines; the ratios hold.
+//! `cargo bench -p headrace_benches --bench coverage` takes about a minute; `-- FAST` runs one mode alone, `-- memory` no mode. Absolute times drift on shared machines; the ratios hold.
 //! kiddo's tree and the hash map answer for places alone: a grid of them gives D to some centimetres, where ours and
 //! the triangulation are exact. kiddo before version 6 panicked where more than 32 samples share a coordinate; ideal
 //! heads lay no more than a few.

@@ -1,15 +1,12 @@
 //! How long bytes take from the device's end of a port to the loop's ring, and what serving ports costs, each figure beside
 //! a bare read loop on another port of the same kind in the same run. Prints Markdown.
 //!
-//! `cargo bench --bench ports` takes about two minutes; `-- 20` measures for twenty seconds a part, `-- latency` and `-- cpu`
+//! `cargo bench -p headrace_benches --bench ports` takes about two minutes; `-- 20` measures for twenty seconds a part, `-- latency` and `-- cpu`
 //! are its parts. The devices are emulated at their own rates by a thread of this process. On CAN (vcan0, up) and HID
 //! (`/dev/uhid`) only where they are there: in `tests/vm`, for one. Absolute times drift on shared machines, tails most.
 
 #![expect(clippy::unwrap_used, reason = "a benchmark stops at what it can't do")]
 #![expect(clippy::panic, reason = "the same")]
-
-#[path = "../tests/common/shipped.rs"]
-mod shipped;
 
 use std::collections::VecDeque;
 use std::io::Read as _;
@@ -28,6 +25,7 @@ use headrace_sensor::connect::{Connect, SerialPort, UsbIdentity};
 use headrace_sensor::device::Direction;
 use headrace_sensor::driver::{Carrier, Driver, DriverSetup, Standing, Wire};
 use headrace_simulator::{START, Scene, Simulation};
+use headrace_tests::scenes;
 
 const LOCAL: IpAddr = IpAddr::V4(Ipv4Addr::LOCALHOST);
 /// Until all lines are open and the heads have found their places.
@@ -444,7 +442,7 @@ fn latency(measured: Duration) {
             Err(error) => println!("| {what} | {} | skipped: {error} | | | |", carrier.as_str()),
         }
     }
-    let scene = shipped::scene_from(&format!("vehicle = \"vehicle.toml\"\n{WAY}"), &|_| {
+    let scene = scenes::scene_from(&format!("vehicle = \"vehicle.toml\"\n{WAY}"), &|_| {
         Ok(vehicle.clone().into_bytes())
     });
     let measured = rehearse(&scene, ends, measured);
@@ -466,7 +464,7 @@ fn four_heads(measured: Duration) {
     println!(
         "Share of one core, the vehicle with four heads (vita2-4.toml, 11 sensors: TCP, UDP; CAN and HID where they are)\n"
     );
-    let scene = shipped::scene(&format!("vehicle = \"vita2-4.toml\"\n{WAY}"));
+    let scene = scenes::scene(&format!("vehicle = \"vita2-4.toml\"\n{WAY}"));
     let mut ends = Vec::new();
     for (number, (config, device)) in
         scene.vehicle.sensor_configs.iter().zip(&scene.vehicle.sensors).enumerate()

@@ -1,7 +1,7 @@
 //! A long dive replayed by the binary, beside reading its log with `mcap` alone. Prints Markdown.
 //!
-//! `cargo bench --bench replay` takes the first kilometre of `deploy/scenes/seven-kilometres.toml`, about a minute;
-//! `cargo bench --bench replay -- 7` all of it. The log goes to the system's folder for temporary files, 145 MB a kilometre,
+//! `cargo bench -p headrace_benches --bench replay` takes the first kilometre of `deploy/scenes/seven-kilometres.toml`, about a minute;
+//! `cargo bench -p headrace_benches --bench replay -- 7` all of it. The log goes to the system's folder for temporary files, 145 MB a kilometre,
 //! and is removed again.
 
 #![expect(clippy::disallowed_methods, reason = "a benchmark reads the clock")]
@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 
 use mcap::sans_io::{LinearReadEvent, LinearReader};
 
-const HEADRACE: &str = env!("CARGO_BIN_EXE_headrace");
+const HEADRACE: &str = env!("CARGO_BIN_EXE_headrace_measured");
 
 fn main() {
     let km: u32 = std::env::args().skip(1).find_map(|word| word.parse().ok()).unwrap_or(1).clamp(1, 7);
@@ -51,7 +51,7 @@ fn main() {
 
 /// The log of the scene's first kilometres.
 fn simulated(folder: &Path, km: u32) -> PathBuf {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let root = headrace_tests::root();
     let text = std::fs::read_to_string(root.join("deploy/scenes/seven-kilometres.toml")).unwrap();
     let vehicle = root.join("deploy/vehicles/vita2-4.toml");
     let text = text

@@ -1,13 +1,10 @@
 //! How fast the loop is, each figure beside a yardstick measured in the same run. Prints Markdown.
 //!
-//! `cargo bench` runs it on one core for about a minute. Absolute times drift on shared machines; the ratios hold.
+//! `cargo bench -p headrace_benches` runs it on one core for about a minute. Absolute times drift on shared machines; the ratios hold.
 
 #![expect(clippy::disallowed_methods, reason = "a benchmark reads the clock")]
 #![expect(clippy::disallowed_types, reason = "std's hash map is a yardstick here")]
 #![expect(clippy::unwrap_used, reason = "a benchmark stops at what it can't do")]
-
-#[path = "../tests/common/shipped.rs"]
-mod shipped;
 
 use std::collections::HashMap;
 use std::hint::black_box;
@@ -28,6 +25,7 @@ use headrace_sensor::device::{Decoder, Direction};
 use headrace_sensor::reading::{Decoded, Packet};
 use headrace_simulator::{START, Scene, Simulation};
 use headrace_snapshot::{Restorer, Saver, SnapshotError, Stateful};
+use headrace_tests::scenes;
 use headrace_vehicle::Mission;
 
 const SCENE: &str = "vehicle = \"vita2-4.toml\"\n[vehicle_changes]\nheads.planned_speed_mps = 0.197\n[trajectory]\n\
@@ -45,7 +43,7 @@ fn main() {
         ROUNDS
     );
     println!("| what | figure | yardstick in the same run | ratio |\n|---|---|---|---|");
-    // `cargo bench -- holes` runs one alone.
+    // `cargo bench -p headrace_benches -- holes` runs one alone.
     let wanted = std::env::args().nth(1).filter(|word| !word.starts_with('-'));
     let benches: [(&str, fn()); 4] =
         [("loop", whole_loop), ("idle", idle_tick), ("covering", covering), ("holes", holes)];
@@ -139,7 +137,7 @@ fn run(dive: &mut Loop, messages: &[Kept]) -> Vec<Duration> {
 }
 
 fn whole_loop() {
-    let scene = shipped::scene(SCENE);
+    let scene = scenes::scene(SCENE);
     let mut simulation = Simulation::new(&scene).unwrap();
     let data_s = simulation.duration_s();
     let mut messages: Vec<Kept> = Vec::new();
@@ -189,7 +187,7 @@ fn nothing() {}
 
 fn idle_tick() {
     const RUNS: u32 = 200_000;
-    let mut dive = armed(&shipped::scene(SCENE), true);
+    let mut dive = armed(&scenes::scene(SCENE), true);
     let idle = best(|| {
         let started = Instant::now();
         for _ in 0..RUNS {

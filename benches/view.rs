@@ -14,7 +14,7 @@ use headrace_replay::log::{Companion, LogHeader, LogReader, LogWriter, Made, Mes
 use headrace_replay::record::result_channels;
 use headrace_replay::view::{Site, View};
 
-const HEADRACE: &str = env!("CARGO_BIN_EXE_headrace");
+const HEADRACE: &str = env!("CARGO_BIN_EXE_headrace_measured");
 /// Of several passes the fastest counts.
 const PASSES: u32 = 5;
 

@@ -24,7 +24,8 @@ pub(crate) const COMMANDS: &str =
 
 /// On-board coverage monitor for sonar inspection of flooded hydroelectric tunnels.
 #[derive(Debug, Parser)]
-#[command(version, arg_required_else_help = true)]
+// Help names the program, whatever file it runs from.
+#[command(bin_name = "headrace", version, arg_required_else_help = true)]
 pub(crate) struct Cli {
     #[command(subcommand)]
     pub(crate) command: Command,

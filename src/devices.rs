@@ -2,8 +2,8 @@
 
 use headrace_sensor::device::DeviceKind;
 
-/// The device kinds that vehicle files may name.
-pub(crate) const KINDS: [&dyn DeviceKind; 7] = [
+/// Every kind of device that a vehicle file may name.
+pub const KINDS: [&dyn DeviceKind; 7] = [
     &headrace_imagenex881::Kind,
     &headrace_ping1d::Kind,
     &headrace_bar100::Kind,

@@ -4,13 +4,13 @@
 mod calibrate;
 mod cli;
 mod commands;
-mod devices;
+pub mod devices;
 mod dive;
 mod emulate;
 mod expect;
 mod failure;
 mod files;
-mod import;
+pub mod import;
 mod inventory;
 mod live;
 mod logging;

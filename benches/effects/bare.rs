@@ -9,8 +9,9 @@ use headrace_geometry::frames::{Body, Mount, Point3, Rot, Tunnel, head_direction
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_geometry::tunnel::Profile;
 use headrace_simulator::{START, Scene, Simulation};
+use headrace_tests::scenes;
 
-use crate::{SPEED_MPS, best, shipped, text, timed};
+use crate::{SPEED_MPS, best, text, timed};
 
 /// Many, for a figure that is the difference of two that are nearly the same.
 const ROUNDS: usize = 40;
@@ -37,7 +38,7 @@ impl Said {
 /// Prints what the schedule adds; heads and nothing else.
 pub(crate) fn bare() {
     let text = text(LENGTH_M, "phase_shift", "");
-    let scene = shipped::scene_from(&text, &|name| shipped::vehicle_file(name).map(heads_alone));
+    let scene = scenes::scene_from(&text, &|name| scenes::vehicle_file(name).map(heads_alone));
     let [mut by_hand, mut simulated] = [Said::default(); 2];
     let [hand_s, whole_s] = best(
         ROUNDS,

@@ -1,6 +1,6 @@
 //! What each effect of the simulator costs, and what leaving it out would cost in truth. Prints Markdown.
 //!
-//! `cargo bench --bench effects` runs all; `-- bare`, `-- cost`, `-- fidelity`, `-- seven` one part alone, and in a build
+//! `cargo bench -p headrace_benches --bench effects` runs all; `-- bare`, `-- cost`, `-- fidelity`, `-- seven` one part alone, and in a build
 //! with `--features mesh` `-- mesh`.
 //! Times are the least of several rounds, taken in turns; the machine should have nothing else to do.
 
@@ -10,12 +10,11 @@
 mod bare;
 #[cfg(feature = "mesh")]
 mod mesh;
-#[path = "../../tests/common/shipped.rs"]
-mod shipped;
 
 use std::time::Instant;
 
 use headrace_simulator::{Scene, Simulation};
+use headrace_tests::scenes;
 
 const ROUNDS: usize = 15;
 
@@ -72,7 +71,7 @@ fn main() {
 
 /// VITA 2 with four heads over `length_m` metres.
 fn scene(length_m: f64, layout: &str, rest: &str) -> Scene {
-    shipped::scene(&text(length_m, layout, rest))
+    scenes::scene(&text(length_m, layout, rest))
 }
 
 fn text(length_m: f64, layout: &str, rest: &str) -> String {
@@ -155,7 +154,7 @@ struct Figures {
 
 /// What the loop makes of a scene.
 fn dive(scene: &Scene) -> Figures {
-    let report = serde_json::to_value(shipped::report(scene)).unwrap();
+    let report = serde_json::to_value(scenes::report(scene)).unwrap();
     let summary =
         |pointer: &str| report.pointer(pointer).and_then(serde_json::Value::as_f64).unwrap_or(f64::NAN);
     Figures {

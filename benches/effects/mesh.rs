@@ -2,8 +2,9 @@
 
 use headrace_geometry::tunnel::Profile;
 use headrace_simulator::Simulation;
+use headrace_tests::scenes;
 
-use crate::{ROUNDS, best, shipped, timed};
+use crate::{ROUNDS, best, timed};
 
 const EFFECTS: [(&str, &str); 2] = [
     ("rays", "motion_within_turn = {}\n"),
@@ -58,8 +59,8 @@ pub(crate) fn mesh() {
              [[trajectory.legs]]\ndistance_m = 60\nspeed_mps = 0.197\n[effects]\n{effects}{tunnel}"
         );
         let load =
-            |name: &str| if name == "rock.ply" { Ok(rock.to_vec()) } else { shipped::vehicle_file(name) };
-        shipped::scene_from(&text, &load)
+            |name: &str| if name == "rock.ply" { Ok(rock.to_vec()) } else { scenes::vehicle_file(name) };
+        scenes::scene_from(&text, &load)
     };
     let rock = rough(&scene("", "", &[]).vehicle.tunnel.profile);
     println!(

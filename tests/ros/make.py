@@ -1,4 +1,4 @@
-"""Recordings of ROS and the same values as tables, for tests/ros_import.rs.
+"""Recordings of ROS and the same values as tables, for tests/tests/import/ros_import.rs.
 
 Written by rosbags, which shares nothing with the reader that they test. To repeat:
 

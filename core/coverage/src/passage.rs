@@ -119,7 +119,7 @@ pub fn lost_within<'a>(
 }
 
 /// The largest hole of a section is looked for where errors have made it large: so much more is it off than the distance of
-/// two passes at one place. Measured over the field dives of `tests/fusion.rs`.
+/// two passes at one place. Measured over the field dives of `tests/tests/navigation/fusion.rs`.
 const LARGEST_OF_MANY: f64 = 1.2;
 
 /// How far the samples of a pass may be off along the tunnel against those of the pass before.

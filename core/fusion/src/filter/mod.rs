@@ -61,7 +61,7 @@ const MOST_FORCE_MPS2: f64 = 50.0;
 const AHEAD: usize = 512;
 /// Of several heads, only some of the neighbouring passes are those of heads apart along the hull, and holes between these
 /// grow by less than they are parted. With this share of the time apart, D is within two of its standard deviations 93 %
-/// of the time over the dives of `tests/fusion.rs` with four heads; over dives like them with none of it 80 %, with all of
+/// of the time over the dives of `tests/tests/navigation/fusion.rs` with four heads; over dives like them with none of it 80 %, with all of
 /// it 99 %.
 const APART_SHARE: f64 = 0.4;
 /// Slower than this, m/s, a vehicle stands still.

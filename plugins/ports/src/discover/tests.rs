@@ -9,9 +9,6 @@ use headrace_sensor::connect::Connect;
 use super::*;
 use crate::trouble::TroubleKind;
 
-#[path = "../../../../tests/common/skipped.rs"]
-mod skipped;
-
 /// Another machine's files in a folder of ours, which goes with it. All are ours, and our group is called dialout there.
 struct Tree(PathBuf);
 
@@ -273,7 +270,7 @@ fn this_machine_can_be_looked_at() {
     }
     let names: Vec<&str> = found.iter().map(|found| found.name.as_str()).collect();
     let Ok(ports) = serialport::available_ports() else {
-        skipped::skipped("this system lists no serial ports");
+        headrace_recordings::skipped("this system lists no serial ports");
         return;
     };
     for port in ports {

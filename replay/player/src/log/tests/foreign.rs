@@ -10,9 +10,6 @@ use proptest::prelude::*;
 use super::super::{LogWriter, Loss, LossKind};
 use super::*;
 
-#[path = "../../../../../tests/common/skipped.rs"]
-mod skipped;
-
 const TOPICS: [&str; 4] = ["/raw/zeta", "/tf", "/raw/alpha", "/sent/alpha"];
 
 /// Messages in the order in which they are written: neither by time nor by channel. Topic, log time, sequence.
@@ -301,7 +298,7 @@ writer.finish()
 fn logs_of_the_python_writer_are_read() {
     let python = |arguments: &[&str]| Command::new("python3").args(arguments).output();
     if !python(&["-c", "import mcap.writer"]).is_ok_and(|output| output.status.success()) {
-        skipped::skipped("python3 with the package mcap is not there");
+        headrace_recordings::skipped("python3 with the package mcap is not there");
         return;
     }
     let path = std::env::temp_dir().join(format!("headrace-python-{}.mcap", std::process::id()));

@@ -1,0 +1,88 @@
+//! Dives whose advice is read beat by beat, as a pilot sees it, and followed.
+
+use headrace_geometry::time::DurNs;
+use headrace_monitor::App;
+use headrace_monitor::advice_log::AdviceEntry;
+use headrace_monitor::messages::Notice;
+use headrace_monitor::report::Report;
+use headrace_monitor::ring::{Port, RingError};
+use headrace_replay::drive::{Coming, Feed, Pace, drive};
+use headrace_replay::log::LogError;
+use headrace_sensor::device::Direction;
+use headrace_sensor::reading::SourceId;
+use headrace_simulator::{Scene, Simulation};
+
+/// A simulated dive one of whose sources may be dumb.
+struct Partly {
+    simulation: Simulation,
+    dumb: Option<usize>,
+}
+
+impl Feed for Partly {
+    fn coming(&mut self) -> Result<Option<Coming>, LogError> {
+        while let Some(message) = self.simulation.peek_message() {
+            let dumb = self.dumb == Some(usize::from(message.source));
+            if message.direction == Direction::Received && !dumb {
+                let source = SourceId(message.source);
+                return Ok(Some(Coming { at: message.at, source, len: message.bytes.len() }));
+            }
+            self.simulation.next_message();
+        }
+        Ok(None)
+    }
+
+    fn send(&mut self, port: &mut Port) -> Result<(), RingError> {
+        if let Some(message) = self.simulation.peek_message() {
+            port.send(message.at, message.bytes)?;
+            self.simulation.next_message();
+        }
+        Ok(())
+    }
+}
+
+/// What was advised at each beat, and what came of the dive.
+pub struct Advised {
+    /// Advice at each beat.
+    pub beats: Vec<AdviceEntry>,
+    /// Report of the dive.
+    pub report: Report,
+    /// Digest of the dive.
+    pub digest: u64,
+}
+
+/// Dives a scene in ticks of a length; the source of this id says nothing.
+pub fn dive(scene: &Scene, dumb: Option<&str>, tick: DurNs) -> Advised {
+    let vehicle = &scene.vehicle;
+    let mut app = App::new(vehicle.mission());
+    for sensor in &vehicle.sensors {
+        app.add_device(sensor.as_ref()).unwrap();
+    }
+    let mut dive = app.arm(vehicle.navigation()).unwrap();
+    let dumb = dumb.map(|id| dive.sources().iter().position(|source| source.id == id).unwrap());
+    let mut feed = Partly { simulation: Simulation::new(scene).unwrap_or_else(|why| panic!("{why}")), dumb };
+    let mut beats = Vec::new();
+    let mut note = |dive: &headrace_monitor::run::Loop| {
+        for notice in dive.notices() {
+            if let Notice::Advice(entry) = notice {
+                beats.push(*entry);
+            }
+        }
+    };
+    drive(&mut dive, &mut feed, Pace { tick, ..Pace::default() }, &mut note).unwrap();
+    dive.finish(&mut |_, _| {});
+    Advised { beats, report: Report::of(&dive), digest: dive.digest() }
+}
+
+impl Advised {
+    /// The beats of the second half of the dive.
+    pub fn settled(&self) -> &[AdviceEntry] {
+        &self.beats[self.beats.len() / 2..]
+    }
+
+    /// The median of a figure over the second half of the dive.
+    pub fn median(&self, of: impl Fn(&AdviceEntry) -> f64) -> f64 {
+        let mut values: Vec<f64> = self.settled().iter().map(of).collect();
+        values.sort_by(f64::total_cmp);
+        values[values.len() / 2]
+    }
+}

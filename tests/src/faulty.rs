@@ -1,0 +1,352 @@
+//! Emulated devices on real ports, and faults of their lines.
+
+use std::net::{IpAddr, Ipv4Addr};
+use std::os::unix::fs::symlink;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::thread::{self, JoinHandle};
+use std::time::Duration;
+
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_ports::{Stand, wait_for_any};
+use headrace_sensor::connect::{Connect, SerialPort};
+use headrace_sensor::device::{Direction, Emulated, Emulator};
+use headrace_sensor::driver::Carrier;
+use headrace_sensor::measurement::Measurement;
+
+const LOCAL: IpAddr = IpAddr::V4(Ipv4Addr::LOCALHOST);
+const WAIT_NS: u32 = 1_000_000;
+const BAUD: u32 = 115_200;
+
+/// What becomes of what crosses a line.
+pub trait Fault: Send {
+    /// A frame of the device, the `number`th.
+    fn to_host(&mut self, number: u64, frame: &[u8], line: &mut Wire) {
+        let _ = number;
+        line.whole(frame);
+    }
+
+    /// Bytes of the host, and what of them the device hears.
+    fn to_device(&mut self, bytes: Vec<u8>) -> Vec<u8> {
+        bytes
+    }
+
+    /// Called all the time.
+    fn meanwhile(&mut self, line: &mut Wire) {
+        let _ = line;
+    }
+}
+
+/// No fault.
+pub struct Healthy;
+
+impl Fault for Healthy {}
+
+/// A device's end that can be unplugged and plugged in again where it was.
+pub struct End {
+    connect: Connect,
+    /// Of a serial port: the stable name of whatever the system calls it.
+    link: Option<PathBuf>,
+    stand: Option<Stand>,
+    /// Whether it is on the line of the sensor before it.
+    beside: bool,
+}
+
+impl End {
+    /// A serial port with a name in `folder` that stays, as udev's links by identity do.
+    pub fn serial(folder: &std::path::Path, name: &str) -> Self {
+        let link = folder.join(name);
+        let port = SerialPort::Path(link.display().to_string());
+        let mut end = Self {
+            connect: Connect::Serial { port, baud: BAUD },
+            link: Some(link),
+            stand: None,
+            beside: false,
+        };
+        end.plug();
+        end
+    }
+
+    /// A TCP port on this machine.
+    pub fn tcp() -> Self {
+        Self::of_network(Carrier::Tcp)
+    }
+
+    /// A UDP port on this machine.
+    pub fn udp() -> Self {
+        Self::of_network(Carrier::Udp)
+    }
+
+    fn of_network(carrier: Carrier) -> Self {
+        let stand = Stand::new(carrier, LOCAL).unwrap();
+        Self { connect: stand.connect().clone(), link: None, stand: Some(stand), beside: false }
+    }
+
+    /// On the same line as the sensor before, whose end this is.
+    pub fn beside(other: &Self) -> Self {
+        Self { connect: other.connect.clone(), link: None, stand: None, beside: true }
+    }
+
+    /// True if it shares the line of the sensor before it.
+    pub fn is_beside(&self) -> bool {
+        self.beside
+    }
+
+    /// The same, not plugged in yet.
+    #[must_use]
+    pub fn absent(mut self) -> Self {
+        self.unplug();
+        self
+    }
+
+    /// Address that the host opens.
+    pub fn connect(&self) -> &Connect {
+        &self.connect
+    }
+
+    fn plug(&mut self) {
+        let Some(link) = &self.link else {
+            self.stand = Some(Stand::again(&self.connect).unwrap());
+            return;
+        };
+        let stand = Stand::new(Carrier::Serial, LOCAL).unwrap();
+        let Connect::Serial { port: SerialPort::Path(path), .. } = stand.connect() else { panic!("a port") };
+        symlink(path, link).unwrap();
+        self.stand = Some(stand);
+    }
+
+    fn unplug(&mut self) {
+        if let Some(link) = &self.link {
+            std::fs::remove_file(link).unwrap();
+        }
+        self.stand = None;
+    }
+}
+
+/// What a test says to a device, and hears of it.
+#[derive(Default)]
+pub struct Control {
+    unplugged: AtomicBool,
+    silent: AtomicBool,
+    /// It has fallen silent.
+    quiet: AtomicBool,
+    gone: AtomicBool,
+    healed: AtomicBool,
+    whole: AtomicU64,
+}
+
+impl Control {
+    /// Unplugs the device as soon as it has been asked something.
+    pub fn unplug(&self) {
+        self.unplugged.store(true, Ordering::SeqCst);
+    }
+
+    /// Plugs the device in again.
+    pub fn plug(&self) {
+        self.unplugged.store(false, Ordering::SeqCst);
+    }
+
+    /// From now on the device says nothing.
+    pub fn fall_silent(&self) {
+        self.silent.store(true, Ordering::SeqCst);
+        while !self.quiet.load(Ordering::SeqCst) {
+            thread::sleep(Duration::from_millis(1));
+        }
+    }
+
+    /// It speaks again.
+    pub fn speak(&self) {
+        self.quiet.store(false, Ordering::SeqCst);
+        self.silent.store(false, Ordering::SeqCst);
+    }
+
+    /// From now on its line is sound.
+    pub fn heal(&self) {
+        self.healed.store(true, Ordering::SeqCst);
+    }
+
+    /// Frames that it has sent whole.
+    pub fn whole(&self) -> u64 {
+        self.whole.load(Ordering::SeqCst)
+    }
+}
+
+/// The device's end of the line, as faults see it.
+pub struct Wire {
+    end: End,
+    control: Arc<Control>,
+}
+
+impl Wire {
+    /// Sends a frame whole.
+    pub fn whole(&mut self, frame: &[u8]) {
+        self.part(frame);
+        let called = self.end.stand.as_ref().is_some_and(Stand::is_called);
+        self.control.whole.fetch_add(u64::from(called), Ordering::SeqCst);
+    }
+
+    /// Sends what is no whole frame.
+    pub fn part(&mut self, bytes: &[u8]) {
+        if let Some(stand) = &mut self.end.stand {
+            stand.write(bytes).unwrap();
+        }
+    }
+
+    /// Counts frames that were sent whole in other ways.
+    pub fn count(&self, frames: u64) {
+        self.control.whole.fetch_add(frames, Ordering::SeqCst);
+    }
+
+    /// Lets time pass.
+    pub fn pause(ms: u64) {
+        thread::sleep(Duration::from_millis(ms));
+    }
+}
+
+/// A device on a line that may fail, in a thread of its own.
+pub struct Faulty {
+    control: Arc<Control>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Faulty {
+    /// Starts the devices of one line; they run until this is dropped.
+    pub fn start(devices: Vec<Emulated>, end: End, fault: Box<dyn Fault>) -> Self {
+        let control = Arc::new(Control::default());
+        control.unplugged.store(end.stand.is_none(), Ordering::SeqCst);
+        let wire = Wire { end, control: Arc::clone(&control) };
+        let mut life = Life { devices, wire, fault, told: 0, out: Vec::new() };
+        let thread = thread::spawn(move || life.live());
+        Self { control, thread: Some(thread) }
+    }
+
+    /// Controls of this line.
+    pub fn control(&self) -> &Control {
+        &self.control
+    }
+}
+
+impl Drop for Faulty {
+    fn drop(&mut self) {
+        self.control.gone.store(true, Ordering::SeqCst);
+        let ended = self.thread.take().unwrap().join();
+        assert!(ended.is_ok() || thread::panicking(), "a device's thread has panicked");
+    }
+}
+
+struct Life {
+    devices: Vec<Emulated>,
+    wire: Wire,
+    fault: Box<dyn Fault>,
+    told: u64,
+    out: Vec<Vec<u8>>,
+}
+
+impl Life {
+    fn live(&mut self) {
+        let control = Arc::clone(&self.wire.control);
+        let is = |flag: &AtomicBool| flag.load(Ordering::SeqCst);
+        while !is(&control.gone) {
+            let plugged = self.wire.end.stand.is_some();
+            control.quiet.store(is(&control.silent), Ordering::SeqCst);
+            if plugged {
+                self.serve(is(&control.silent), is(&control.unplugged));
+            } else {
+                self.step(None);
+                self.out.clear();
+                thread::sleep(Duration::from_millis(1));
+                if !is(&control.unplugged) {
+                    self.wire.end.plug();
+                }
+            }
+        }
+    }
+
+    /// What the host says goes to the device, and what the device says by now onto the line.
+    fn serve(&mut self, silent: bool, unplugging: bool) {
+        if let Some(stand) = &self.wire.end.stand {
+            wait_for_any(std::slice::from_ref(stand), WAIT_NS);
+        }
+        let mut asked = false;
+        while let Some(bytes) = self.wire.end.stand.as_mut().and_then(|stand| stand.read().unwrap()) {
+            asked |= !bytes.is_empty();
+            let healed = self.wire.control.healed.load(Ordering::SeqCst);
+            let heard = if healed { bytes } else { self.fault.to_device(bytes) };
+            if !heard.is_empty() {
+                self.step(Some(&heard));
+            }
+        }
+        self.step(None);
+        let out = std::mem::take(&mut self.out);
+        if unplugging && asked {
+            // Since the host has asked again, it has read all earlier answers; of this one it gets half.
+            if let Some(frame) = out.first() {
+                self.wire.part(&frame[..frame.len() / 2]);
+            }
+            self.wire.end.unplug();
+            return;
+        }
+        if silent {
+            return;
+        }
+        for frame in out {
+            self.told += 1;
+            if self.wire.control.healed.load(Ordering::SeqCst) {
+                self.wire.whole(&frame);
+            } else {
+                self.fault.to_host(self.told, &frame, &mut self.wire);
+            }
+        }
+        if !self.wire.control.healed.load(Ordering::SeqCst) {
+            self.fault.meanwhile(&mut self.wire);
+        }
+    }
+
+    fn step(&mut self, heard: Option<&[u8]>) {
+        let (now, out) = (headrace_ports::now(), &mut self.out);
+        for device in &mut self.devices {
+            feel(device, heard, now, out);
+        }
+    }
+}
+
+/// Lets a device hear and measure, always the same.
+fn feel(device: &mut Emulated, heard: Option<&[u8]>, now: MonoNs, out: &mut Vec<Vec<u8>>) {
+    match device {
+        Emulated::Head(device) | Emulated::Echosounder(device) => {
+            step(device.as_mut(), heard, now, out, |sounding| sounding.range_m = Some(3.0));
+        }
+        Emulated::Depth(device) => {
+            step(device.as_mut(), heard, now, out, |pressure| pressure.pressure_pa = 150_000.0);
+        }
+        Emulated::Tether(device) => {
+            step(device.as_mut(), heard, now, out, |payout| payout.chainage_m = 5.0);
+        }
+        Emulated::Inertial(device) => step(device.as_mut(), heard, now, out, |_| ()),
+        Emulated::VelocityLog(device) => step(device.as_mut(), heard, now, out, |_| ()),
+    }
+}
+
+fn step<M: Measurement>(
+    device: &mut dyn Emulator<M>,
+    heard: Option<&[u8]>,
+    now: MonoNs,
+    out: &mut Vec<Vec<u8>>,
+    feel: impl Fn(&mut M),
+) {
+    let mut line = |direction, _, bytes: &[u8]| {
+        if direction == Direction::Received {
+            out.push(bytes.to_vec());
+        }
+    };
+    if let Some(bytes) = heard {
+        device.hear(now, bytes, &mut line);
+    }
+    let mut due = Vec::new();
+    device.begin(now + DurNs(1), &mut due);
+    for mut measured in due {
+        feel(&mut measured);
+        device.tell(&measured, &mut line);
+    }
+}

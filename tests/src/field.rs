@@ -1,0 +1,142 @@
+//! The field scene with settings that suit it, and figures of how well dives are tracked.
+
+use headrace_fusion::Fix;
+use headrace_geometry::frames::{Tunnel, Vec3};
+use headrace_geometry::math;
+use headrace_geometry::time::MonoNs;
+use headrace_simulator::Scene;
+use nalgebra::{SMatrix, SVector};
+
+use crate::scenes;
+use crate::tracking::{self, Track};
+
+/// A turn of a head in mode SLOW.
+pub const TURN_S: f64 = 21.6;
+
+/// Root mean squares of a dive's errors.
+#[derive(Debug, Default, Clone, Copy)]
+pub struct Figures {
+    /// Across the tunnel, m.
+    pub across_m: f64,
+    /// Vertical, m.
+    pub up_m: f64,
+    /// Chainage, m.
+    pub along_m: f64,
+    /// Displacement over a turn of a head, m.
+    pub turn_m: f64,
+    /// Standard deviation that was given for that displacement, m.
+    pub turn_sigma_m: f64,
+    /// Heading, degrees.
+    pub yaw_deg: f64,
+    /// Roll and pitch together, degrees.
+    pub tilt_deg: f64,
+    /// Share of pings with a fix, 0 to 1.
+    pub fixed: f64,
+}
+
+/// Root mean square; 0 of nothing.
+pub fn rms(values: impl IntoIterator<Item = f64>) -> f64 {
+    let (mut n, mut sum) = (0.0, 0.0);
+    for value in values {
+        n += 1.0;
+        sum += value * value;
+    }
+    math::sqrt(sum / f64::max(n, 1.0))
+}
+
+/// Errors of a dive's fixes against the truth.
+pub fn figures(track: &Track) -> Figures {
+    let known: Vec<_> = track.fixes.iter().filter_map(|t| Some((t.at, t.fix.ok()?, t.truth))).collect();
+    let off: Vec<Vec3<Tunnel>> =
+        known.iter().map(|(_, fix, truth)| fix.pose.position - truth.position).collect();
+    let turned = known.iter().map(|(_, fix, truth)| fix.pose.attitude * truth.attitude.inverse());
+    let turned: Vec<_> = turned.map(|off| off.roll_pitch_yaw()).collect();
+    let turns =
+        turns(&known.iter().map(|(at, fix, truth)| (*at, *fix, truth.position.x())).collect::<Vec<_>>());
+    Figures {
+        across_m: rms(off.iter().map(Vec3::y)),
+        up_m: rms(off.iter().map(Vec3::z)),
+        along_m: rms(off.iter().map(Vec3::x)),
+        turn_m: rms(turns.iter().map(|(error, _)| *error)),
+        turn_sigma_m: rms(turns.iter().map(|(_, sigma)| *sigma)),
+        yaw_deg: rms(turned.iter().map(|(_, _, yaw)| yaw.to_degrees())),
+        tilt_deg: rms(turned.iter().map(|(roll, pitch, _)| math::hypot(*roll, *pitch).to_degrees())),
+        fixed: known.len() as f64 / track.fixes.len() as f64,
+    }
+}
+
+/// Error of the displacement over a turn, and the standard deviation that was given.
+pub fn turns(known: &[(MonoNs, Fix, f64)]) -> Vec<(f64, f64)> {
+    let mut before = 0;
+    let mut turns = Vec::new();
+    for (at, fix, x_m) in known {
+        while at.since(known[before].0).as_secs_f64() > TURN_S {
+            before += 1;
+        }
+        if before > 0 {
+            let (_, then, x_then_m) = &known[before];
+            let moved_m = fix.pose.position.x() - then.pose.position.x();
+            turns.push((moved_m - (x_m - x_then_m), fix.relative.sigma_m(Vec3::zero())));
+        }
+    }
+    turns
+}
+
+/// What the field scene does to the sensors: rays instead of cones for the echosounders, rounding of cable and depth as
+/// noise.
+pub const SETTINGS: &str = "[navigation]
+gyro_noise_degps_rthz = 0.007
+accel_noise_mps2_rthz = 0.001
+accel_bias_mps2 = 0.02
+gyro_bias_time_s = 300
+tether_sd_m = 0.003
+tether_scale_sd = 1e-4
+slack_sd_m = 0.085
+slack_time_s = 15
+deviation_deg = 5
+depth_sd_m = 0.009
+heading_sd_deg = 0.3
+tilt_sd_deg = 0.3
+echo_sd_m = 0.02
+echo_beam_deg = 0.1
+return_sd_m = 0.011
+
+[heads]";
+
+/// The field scene over so many metres.
+pub fn field(seed: u64, length_m: f64) -> Scene {
+    field_with(seed, length_m, SETTINGS, "")
+}
+
+/// The same with other settings, and without a line of it.
+pub fn field_with(seed: u64, length_m: f64, settings: &str, without: &str) -> Scene {
+    let scene = include_str!("../../deploy/scenes/vita1-field.toml");
+    let length = format!("distance_m = {length_m}");
+    let shorter = scene.replace("distance_m = 130", &length).replace("../vehicles/", "").replace(without, "");
+    assert!(shorter.contains(&length) && scene.contains(without));
+    let load = |name: &str| {
+        let text = String::from_utf8(scenes::vehicle_file(name)?).map_err(|error| error.to_string())?;
+        Ok(text.replace("[heads]", settings).into_bytes())
+    };
+    scenes::seeded(&shorter, &load, Some(seed))
+}
+
+/// Degrees of freedom of a pose.
+pub const POSE: [usize; 6] = [0, 1, 2, 6, 7, 8];
+
+/// Normalised estimation error squared (NEES) of the pose.
+pub fn nees(epoch: &tracking::Epoch) -> f64 {
+    let covariance = SMatrix::<f64, 6, 6>::from_fn(|i, j| epoch.factors.covariance(POSE[i], POSE[j]));
+    let error = SVector::<f64, 6>::from_fn(|i, _| epoch.errors[POSE[i]]);
+    error.dot(&covariance.cholesky().unwrap().solve(&error))
+}
+
+/// Share of values that are true, 0 to 1; 0 of nothing.
+pub fn share(of: impl Iterator<Item = bool>) -> f64 {
+    let (mut n, mut yes) = (0.0, 0.0);
+    for is in of {
+        n += 1.0;
+        yes += f64::from(u8::from(is));
+    }
+    yes / f64::max(n, 1.0)
+}

@@ -1,0 +1,184 @@
+//! When a fail can no longer be undone by going on forward: from the poses of a dive and all its samples.
+//!
+//! A place fails for good at the first moment at which a circle about it, larger than the target by what position errors
+//! may make of it, is empty, and no head that goes on forward can lay a sample into it: all that any head reaches lies
+//! beyond the circle. A head's reach is what rays in its plane meet at its present attitude.
+
+use std::ops::Range;
+
+use headrace_geometry::frames::{Pose, head_direction};
+use headrace_geometry::math::TAU;
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_monitor::report::SectionReport;
+
+use crate::instrumented::{Dive, Ping};
+use crate::wall::Wall;
+
+/// Poses are looked at so often.
+pub const EVERY: DurNs = DurNs(100_000_000);
+/// Rays round a head.
+const RAYS: u32 = 48;
+/// Lines across a section on which its earliest fail is looked for.
+const LINES: u32 = 20;
+/// Shorter ways back are wobbling.
+const WAY_BACK_M: f64 = 0.05;
+
+/// What heads reach at a moment, and whether the vehicle goes forward.
+#[derive(Debug, Clone, Copy)]
+pub struct Reached {
+    /// When.
+    pub at: MonoNs,
+    /// The least chainage on which a head can lay a sample, m.
+    pub rear_m: f64,
+}
+
+/// What was within reach during a dive.
+pub fn reached(dive: &Dive) -> Vec<Reached> {
+    let mut all: Vec<Reached> = Vec::new();
+    for (index, ping) in dive.pings.iter().enumerate() {
+        let due = all.last().is_none_or(|last| ping.received.since(last.at).0 >= EVERY.0);
+        // The last one too: it is where the dive ends.
+        let due = due || index + 1 == dive.pings.len();
+        if let Some(pose) = ping.pose.filter(|_| due) {
+            all.push(Reached { at: ping.received, rear_m: rear_m(dive, &pose) });
+        }
+    }
+    all
+}
+
+fn rear_m(dive: &Dive, pose: &Pose) -> f64 {
+    let mut rear_m = f64::INFINITY;
+    for (mount, range_m) in dive.mounts.iter().zip(&dive.ranges_m) {
+        let head = pose.place(mount.position);
+        for ray in 0..RAYS {
+            let angle_rad = TAU * f64::from(ray) / f64::from(RAYS);
+            let direction = pose.attitude * (mount.rotation * head_direction(angle_rad));
+            let hit = dive.profile.cast([head.y(), head.z()], [direction.y(), direction.z()]);
+            let chainage_m =
+                hit.filter(|hit| hit.range_m <= *range_m).map(|hit| head.x() + hit.range_m * direction.x());
+            rear_m = rear_m.min(chainage_m.unwrap_or(f64::INFINITY));
+        }
+    }
+    rear_m
+}
+
+/// The least chainage in a section about which a circle of this radius is empty, as far as lines across it show.
+pub fn first_failing_m(wall: &Wall, [from_m, to_m]: [f64; 2], radius_m: f64) -> Option<f64> {
+    let line = |k: u32| from_m + (to_m - from_m) * f64::from(k) / f64::from(LINES);
+    let empty = |x_m: &f64| wall.largest_on(*x_m).is_some_and(|circle| circle.radius_m > radius_m);
+    (0..=LINES).map(line).find(empty)
+}
+
+/// The first moment, among these, at which all that is in reach lies beyond a chainage.
+pub fn left_behind(reached: &[Reached], chainage_m: f64) -> Option<MonoNs> {
+    reached.iter().find(|reached| reached.rear_m >= chainage_m).map(|reached| reached.at)
+}
+
+/// The wall as sampled until a moment.
+pub fn wall_until(dive: &Dive, until: MonoNs) -> Wall {
+    let before = |ping: &&Ping| ping.received <= until;
+    let samples = dive.pings.iter().filter(before).filter_map(|ping| ping.sample);
+    Wall::new(samples.map(|sample| sample.place), dive.profile.perimeter_m())
+}
+
+/// What a section's flag should have been, and what it was.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Flag {
+    /// Chainage at which the section begins, m.
+    pub start_m: f64,
+    /// The first moment from which going on forward couldn't undo the fail, seconds.
+    pub due_s: Option<f64>,
+    /// The same, were it as early as the lines across the section leave open.
+    pub may_s: Option<f64>,
+    /// When the dive ended.
+    pub end_s: f64,
+    /// When the loop raised it, seconds.
+    pub raised_s: Option<f64>,
+    /// When the loop cleared it, seconds.
+    pub cleared_s: Option<f64>,
+    /// Whether the section fails, all samples counted.
+    pub fails: bool,
+}
+
+impl Flag {
+    /// Raised by the end of the dive alone.
+    pub fn raised_at_the_end(&self) -> bool {
+        self.may_s.is_none() && self.raised_s.is_some_and(|at_s| at_s >= self.end_s - 1e-6)
+    }
+
+    /// How long after its moment, seconds.
+    pub fn late_s(&self) -> Option<f64> {
+        Some(self.raised_s? - self.due_s?)
+    }
+}
+
+/// A dive's way, out and on again, with what has been sampled.
+pub struct Journey {
+    reached: Vec<Reached>,
+    /// From which to which of these moments the vehicle goes back the longest way; empty at the end where it doesn't.
+    back: Range<usize>,
+    /// All that has been sampled in the end, and when the vehicle turned back.
+    whole: Wall,
+    turned: Option<Wall>,
+    end_s: f64,
+}
+
+impl Journey {
+    /// Reach and samples of a dive.
+    pub fn of(dive: &Dive) -> Self {
+        let reached = reached(dive);
+        let (mut most, mut back, mut longest_m) = (0, reached.len()..reached.len(), WAY_BACK_M);
+        for (k, here) in reached.iter().enumerate() {
+            if here.rear_m > reached[most].rear_m {
+                most = k;
+            }
+            if reached[most].rear_m - here.rear_m > longest_m {
+                longest_m = reached[most].rear_m - here.rear_m;
+                back = most..k;
+            }
+        }
+        let turned = reached.get(back.start).map(|turned| wall_until(dive, turned.at));
+        let end_s = dive.report.dive.start_s + dive.report.dive.duration_s;
+        Self { reached, back, whole: wall_until(dive, MonoNs(u64::MAX)), turned, end_s }
+    }
+
+    /// When the vehicle turned back, seconds; never is infinite.
+    pub fn turned_back_s(&self) -> f64 {
+        self.reached.get(self.back.start).map_or(f64::INFINITY, |reached| reached.at.as_secs_f64())
+    }
+
+    /// When it went forward again.
+    pub fn turned_on_s(&self) -> f64 {
+        self.reached.get(self.back.end).map_or(f64::INFINITY, |reached| reached.at.as_secs_f64())
+    }
+
+    /// The flags of a dive. A fail is a hole larger than the target by `sigmas` of its standard deviation.
+    pub fn flags(&self, dive: &Dive, sigmas: f64) -> Vec<Flag> {
+        let target_m = dive.report.target_m;
+        dive.report.sections.iter().map(|section| self.flag(target_m, section, sigmas)).collect()
+    }
+
+    fn flag(&self, target_m: f64, section: &SectionReport, sigmas: f64) -> Flag {
+        let ends = [section.start_m, section.end_m];
+        let radius_m = 0.5 * (target_m + sigmas * section.hole_sigma_m);
+        let due = |wall: &Wall, reached: &[Reached], early_m: f64| {
+            left_behind(reached, first_failing_m(wall, ends, radius_m)? + radius_m - early_m)
+        };
+        let on = if self.turned.is_some() { self.back.end } else { 0 };
+        let first = |early_m: f64| {
+            let out =
+                self.turned.as_ref().and_then(|wall| due(wall, &self.reached[..self.back.start], early_m));
+            out.or_else(|| due(&self.whole, &self.reached[on..], early_m)).map(MonoNs::as_secs_f64)
+        };
+        let line_m = (section.end_m - section.start_m) / f64::from(LINES);
+        Flag {
+            start_m: section.start_m,
+            due_s: first(0.0),
+            may_s: first(line_m),
+            end_s: self.end_s,
+            raised_s: section.flagged_s,
+            cleared_s: section.cleared_s,
+            fails: self.whole.largest(ends[0], ends[1]).is_none_or(|circle| circle.radius_m > radius_m),
+        }
+    }
+}

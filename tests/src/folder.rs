@@ -1,0 +1,131 @@
+//! The program under test, and a folder for it that goes away by itself.
+
+use std::path::PathBuf;
+use std::process::Command;
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use serde_json::Value;
+
+use crate::short_dive::{SCENE, VEHICLE};
+
+/// The program under test, to be given arguments.
+pub fn program() -> Command {
+    // Cargo tells the tests that it runs. A test that is run by itself, as in `tests/vm`, looks where cargo puts programs.
+    Command::new(std::env::var_os("CARGO_BIN_EXE_headrace_under_test").map_or_else(built, PathBuf::from))
+}
+
+fn built() -> PathBuf {
+    let test = std::env::current_exe().unwrap();
+    let folder = test.ancestors().nth(2).unwrap();
+    folder.join(format!("headrace_under_test{}", std::env::consts::EXE_SUFFIX))
+}
+
+/// A new folder for one test, removed with all that is in it. Commands run in it, so that messages name files alone.
+pub struct Folder(PathBuf);
+
+/// What the program answered.
+pub struct Answer {
+    /// Exit code; `None` if a signal ended the program.
+    pub code: Option<i32>,
+    /// Standard output.
+    pub stdout: String,
+    /// Standard error.
+    pub stderr: String,
+}
+
+impl Folder {
+    /// An empty folder below the system's folder for temporary files.
+    pub fn new() -> Self {
+        static COUNT: AtomicU32 = AtomicU32::new(0);
+        let name = format!("headrace-test-{}-{}", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed));
+        let path = std::env::temp_dir().join(name);
+        std::fs::create_dir_all(&path).unwrap();
+        Self(path)
+    }
+
+    /// A folder with the short dive: `vehicle.toml`, `scene.toml` and `dive.mcap`.
+    pub fn with_dive() -> Self {
+        let folder = Self::new();
+        folder.write("vehicle.toml", VEHICLE);
+        folder.write("scene.toml", SCENE);
+        folder.simulate("scene.toml", "dive.mcap");
+        folder
+    }
+
+    /// Path of a file in this folder.
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.0.join(name)
+    }
+
+    /// Writes a file in this folder.
+    pub fn write(&self, name: &str, content: impl AsRef<[u8]>) {
+        std::fs::write(self.path(name), content).unwrap();
+    }
+
+    /// Content of a file in this folder.
+    pub fn read(&self, name: &str) -> Vec<u8> {
+        std::fs::read(self.path(name)).unwrap()
+    }
+
+    /// Runs the binary in this folder.
+    pub fn headrace(&self, arguments: &[&str]) -> Answer {
+        let output = program().args(arguments).current_dir(&self.0).output().unwrap();
+        let text = |bytes| String::from_utf8(bytes).unwrap();
+        Answer { code: output.status.code(), stdout: text(output.stdout), stderr: text(output.stderr) }
+    }
+
+    /// Simulates a scene; the command must succeed.
+    pub fn simulate(&self, scene: &str, log: &str) {
+        let answer = self.headrace(&["simulate", scene, "-o", log]);
+        assert_eq!(answer.code, Some(0), "{}", answer.stderr);
+    }
+
+    /// Dives a log of `vehicle.toml` as if it came from ports, as fast as it can, and records it; what the program answered.
+    #[track_caller]
+    pub fn record(&self, from: &str, to: &str, further: &[&str]) -> Answer {
+        let arguments = ["run", "vehicle.toml", "--source", from, "--record", to, "--speed", "max"];
+        let answer = self.headrace(&[&arguments[..], further].concat());
+        assert_eq!(answer.code, Some(0), "{}", answer.stderr);
+        answer
+    }
+
+    /// `scene.toml` is refused: exit code 2, these words, and no log.
+    #[track_caller]
+    pub fn refuses_scene(&self, words: &[&str]) {
+        let answer = self.headrace(&["simulate", "scene.toml", "-o", "dive.mcap"]);
+        assert_eq!(answer.code, Some(2), "{}", answer.stderr);
+        for word in words {
+            assert!(answer.stderr.contains(word), "{word:?} is not in {}", answer.stderr);
+        }
+        assert!(!self.path("dive.mcap").exists(), "no log of a scene that is none");
+    }
+
+    /// Exit code and report of `replay LOG --json` with further arguments.
+    pub fn replay(&self, log: &str, further: &[&str]) -> (Option<i32>, Value) {
+        let answer = self.headrace(&[&["replay", log, "--json"], further].concat());
+        let report = serde_json::from_str(&answer.stdout)
+            .unwrap_or_else(|error| panic!("{log}: {error}: {}", answer.stderr));
+        (answer.code, report)
+    }
+
+    /// The digest of a replay that must find nothing amiss.
+    pub fn digest(&self, log: &str, further: &[&str]) -> String {
+        let (code, report) = self.replay(log, further);
+        assert_eq!(code, Some(0), "{log} {further:?}: {:?}", report["log"]["losses"]);
+        report["digest"].as_str().unwrap().to_owned()
+    }
+}
+
+impl Default for Folder {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        if let Err(error) = std::fs::remove_dir_all(&self.0) {
+            eprintln!("removing {}: {error}", self.0.display());
+        }
+    }
+}

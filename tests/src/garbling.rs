@@ -1,0 +1,77 @@
+//! What becomes of bytes on bad lines, the same each time.
+
+use headrace_imagenex881::codec::{Model, ReturnCodec, Returns};
+use headrace_ping1d::codec::PingCodec;
+use headrace_sensor::codec::Codec;
+
+use crate::faulty::{Fault, Wire};
+use crate::random::Random;
+
+/// How many good frames a codec finds in bytes that stand alone.
+pub type Count = fn(&[u8]) -> u64;
+
+/// Good frames of an echosounder.
+pub fn of_ping(bytes: &[u8]) -> u64 {
+    counted(&mut PingCodec::default(), bytes)
+}
+
+/// Good frames of a profiling head.
+pub fn of_head(bytes: &[u8]) -> u64 {
+    counted(&mut ReturnCodec::new(Returns { model: Some(Model::Head881) }), bytes)
+}
+
+fn counted(codec: &mut impl Codec, bytes: &[u8]) -> u64 {
+    codec.push(bytes, &mut |_| ());
+    codec.flush(&mut |_| ());
+    codec.counts().good_frames
+}
+
+/// Bytes are changed on their way. Not each change can be told: a head's returns have no checksum.
+pub struct Garbled {
+    random: Random,
+    change: fn(&mut Random, &[u8]) -> Vec<u8>,
+    count: Count,
+}
+
+impl Garbled {
+    /// Passes all bytes through `change`; `count` counts the frames that survive.
+    pub fn new(seed: u64, count: Count, change: fn(&mut Random, &[u8]) -> Vec<u8>) -> Self {
+        Self { random: Random(seed), change, count }
+    }
+}
+
+impl Fault for Garbled {
+    fn to_host(&mut self, _: u64, frame: &[u8], line: &mut Wire) {
+        let changed = (self.change)(&mut self.random, frame);
+        if changed == frame {
+            line.whole(frame);
+        } else {
+            line.part(&changed);
+            line.count((self.count)(&changed));
+        }
+    }
+
+    fn to_device(&mut self, bytes: Vec<u8>) -> Vec<u8> {
+        (self.change)(&mut self.random, &bytes)
+    }
+}
+
+/// Flips one bit in about one byte of a hundred.
+pub fn flipped(random: &mut Random, bytes: &[u8]) -> Vec<u8> {
+    let flip = |byte: &u8| if random.one_in(100) { byte ^ (1 << (random.bits() % 8)) } else { *byte };
+    bytes.iter().map(flip).collect()
+}
+
+/// Drops about one byte of a hundred.
+pub fn thinned(random: &mut Random, bytes: &[u8]) -> Vec<u8> {
+    bytes.iter().copied().filter(|_| !random.one_in(100)).collect()
+}
+
+/// What is done with each frame, by its number.
+pub struct EachFrame<F>(pub F);
+
+impl<F: FnMut(u64, &[u8], &mut Wire) + Send> Fault for EachFrame<F> {
+    fn to_host(&mut self, number: u64, frame: &[u8], line: &mut Wire) {
+        (self.0)(number, frame, line);
+    }
+}

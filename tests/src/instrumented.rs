@@ -1,0 +1,152 @@
+//! Dives whose placed pings are copied out of the loop: all that an oracle of coverage may know.
+
+use bevy_ecs::prelude::{Res, ResMut, Resource};
+use headrace_geometry::frames::{Mount, Pose};
+use headrace_geometry::math::TAU;
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_geometry::tunnel::Profile;
+use headrace_monitor::App;
+use headrace_monitor::messages::{Outcome, Placed, PlacedList};
+use headrace_monitor::report::Report;
+use headrace_monitor::stage::Stage;
+use headrace_monitor::{Plugin, PluginError};
+use headrace_replay::SimulationFeed;
+use headrace_replay::drive::{Pace, drive};
+use headrace_simulator::{Scene, Simulation};
+use headrace_vehicle::Mission;
+use headrace_vehicle::VehicleConfig;
+
+use crate::scenes;
+
+/// A return on the wall.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sample {
+    /// Chainage and arc length, m.
+    pub place: [f64; 2],
+    /// The same in space: the tunnel's frame, m.
+    pub point: [f64; 3],
+}
+
+/// A ping of a profiling head.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ping {
+    /// Number of the head.
+    pub head: usize,
+    /// Receive time of the ping.
+    pub received: MonoNs,
+    /// The head has turned round since its last ping.
+    pub new_sweep: bool,
+    /// The head has come here from its last ping in one step.
+    pub single_step: bool,
+    /// The vehicle then, where it was known.
+    pub pose: Option<Pose>,
+    /// Return on the wall, if there was one that could be placed.
+    pub sample: Option<Sample>,
+}
+
+/// What a dive has shown, and what it was made from.
+pub struct Dive {
+    /// In the order in which the loop placed them.
+    pub pings: Vec<Ping>,
+    /// Report of the dive.
+    pub report: Report,
+    /// Cross-section as the loop knows it.
+    pub profile: Profile,
+    /// How each head sits, by number.
+    pub mounts: Vec<Mount>,
+    /// How far each head hears in the site's water, m.
+    pub ranges_m: Vec<f64>,
+    /// Longest time of a turn of any head, seconds.
+    pub turn_s: f64,
+}
+
+impl Dive {
+    /// All samples, in order.
+    pub fn samples(&self) -> impl Iterator<Item = &Sample> {
+        self.pings.iter().filter_map(|ping| ping.sample.as_ref())
+    }
+}
+
+#[derive(Resource, Default)]
+struct Seen(Vec<Ping>);
+
+/// Copies what has been placed, and touches nothing.
+struct Watch;
+
+impl Plugin for Watch {
+    fn build(&self, app: &mut App) -> Result<(), PluginError> {
+        app.insert_resource(Seen::default());
+        app.add_systems(Stage::Judge, watch);
+        Ok(())
+    }
+}
+
+#[expect(clippy::needless_pass_by_value, reason = "systems take their parameters by value")]
+fn watch(placed: Res<'_, PlacedList>, mut seen: ResMut<'_, Seen>) {
+    for item in &placed.0 {
+        let Placed::Ping(ping) = item else { continue };
+        let sample = match ping.outcome {
+            Outcome::Sample { point, sigma_m } => {
+                Some(Sample { place: [point.x(), sigma_m], point: [point.x(), point.y(), point.z()] })
+            }
+            Outcome::Lost(..) | Outcome::Unplaced(_) => None,
+        };
+        seen.0.push(Ping {
+            head: ping.head,
+            received: ping.received,
+            new_sweep: ping.new_sweep,
+            single_step: ping.single_step,
+            pose: ping.fix.map(|fix| fix.pose),
+            sample,
+        });
+    }
+}
+
+/// Dives a scene of these two files, in ticks of 20 ms.
+pub fn dive(vehicle: &str, scene: &str) -> Dive {
+    dive_in_ticks(vehicle, scene, Pace::default().tick)
+}
+
+/// Dives a scene in ticks of another length.
+pub fn dive_in_ticks(vehicle: &str, scene: &str, tick: DurNs) -> Dive {
+    let scene = parse(vehicle, "", scene);
+    watched(&scene, &scene.vehicle, scene.vehicle.mission(), Pace { tick, ..Pace::default() })
+}
+
+/// Dives a scene, the loop being told that the wall's arc length begins elsewhere.
+pub fn dive_with_profile(vehicle: &str, scene: &str, profile: Profile) -> Dive {
+    let scene = parse(vehicle, "", scene);
+    watched(&scene, &scene.vehicle, Mission { profile, ..scene.vehicle.mission() }, Pace::default())
+}
+
+/// Dives a scene in a polygon, whose corners are `y_m,z_m` a line, while the loop believes in another vehicle and polygon.
+pub fn dive_believing(vehicle: [&str; 2], polygon: [&str; 2], scene: &str) -> Dive {
+    let [true_scene, believed] = [0, 1].map(|k| parse(vehicle[k], polygon[k], scene));
+    watched(&true_scene, &believed.vehicle, believed.vehicle.mission(), Pace::default())
+}
+
+fn parse(vehicle: &str, polygon: &str, scene: &str) -> Scene {
+    let file = |name: &str| if name.contains("vehicle") { vehicle } else { polygon };
+    scenes::scene_from(scene, &|name| Ok(file(name).as_bytes().to_vec()))
+}
+
+fn watched(scene: &Scene, vehicle: &VehicleConfig, mission: Mission, pace: Pace) -> Dive {
+    let mut app = App::new(mission);
+    for sensor in &vehicle.sensors {
+        app.add_device(sensor.as_ref()).unwrap();
+    }
+    app.add_plugin(&Watch).unwrap();
+    let mut dive = app.arm(vehicle.navigation()).unwrap();
+    let simulation = Simulation::new(scene).unwrap_or_else(|why| panic!("{why}"));
+    drive(&mut dive, &mut SimulationFeed::new(simulation), pace, &mut |_| {}).unwrap();
+    dive.finish(&mut |_, _| {});
+    let heads = vehicle.heads();
+    Dive {
+        pings: dive.resource::<Seen>().unwrap().0.clone(),
+        report: Report::of(&dive),
+        profile: dive.mission().profile.clone(),
+        ranges_m: heads.iter().map(|head| head.reach_m(vehicle.site.sound_speed_mps)[1]).collect(),
+        mounts: heads.iter().map(|head| head.mount).collect(),
+        turn_s: heads.iter().map(|head| TAU / head.step_rad * head.ping_period_s).fold(0.0, f64::max),
+    }
+}

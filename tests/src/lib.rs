@@ -1,0 +1,39 @@
+//! Fixtures of the tests and benches: the program under test in a folder of its own, scenes, dives that are watched from
+//! inside, oracles, and devices on real ports.
+
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
+
+pub mod advised;
+#[cfg(unix)]
+pub mod faulty;
+pub mod field;
+pub mod flags;
+mod folder;
+#[cfg(unix)]
+pub mod garbling;
+pub mod instrumented;
+pub mod json_schema;
+mod log_files;
+pub mod random;
+pub mod random_dives;
+#[cfg(unix)]
+pub mod rig;
+pub mod scenes;
+mod short_dive;
+pub mod spacings;
+pub mod tracking;
+pub mod wall;
+
+use std::path::Path;
+
+pub use headrace_recordings as recordings;
+pub use headrace_recordings::skipped;
+
+pub use folder::{Answer, Folder, program};
+pub use log_files::{raw_messages, write_log};
+pub use short_dive::{SCENE, VEHICLE, other_vehicle};
+
+/// The repository's root.
+pub fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap()
+}

@@ -1,0 +1,312 @@
+//! A dive on real ports in one process: the loop and its crew on one side, and on the other emulated devices whose lines
+//! can be made to fail.
+
+use std::cell::{Cell, RefCell};
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use headrace::devices::KINDS;
+use headrace_config::Document;
+use headrace_geometry::time::DurNs;
+use headrace_monitor::App;
+use headrace_monitor::report::Report;
+use headrace_monitor::run::Loop;
+use headrace_ports::{Crew, Hand, LineHistory, Phase, SentSink};
+use headrace_replay::drive::{Pace, drive};
+use headrace_replay::log::{LogHeader, Recorder, RecorderHandle, SourceInfo};
+use headrace_replay::player::Player;
+use headrace_replay::record::{QUEUE_BYTES, RecorderOutlet, result_channels};
+use headrace_sensor::connect::Connect;
+use headrace_sensor::device::{Emulated, EmulatorSetup};
+use headrace_sensor::driver::DriverSetup;
+use headrace_vehicle::VehicleConfig;
+
+use crate::faulty::{Control, End, Fault, Faulty};
+
+/// Nothing that is waited for takes as long.
+const LONG: DurNs = DurNs::from_millis(20_000);
+
+/// Vehicle file up to its sensors.
+pub const HEADING: &str = r#"name = "faults"
+target_m = 1.2
+
+[tunnel]
+profile = "circle"
+radius_m = 3
+length_m = 20
+"#;
+
+/// A head whose turn takes some seconds.
+pub const HEAD: &str = "plugin = \"imagenex881\"\nmode = \"fastest\"\nrange_m = 5\n";
+/// An echosounder that is asked twenty times a second.
+pub const PING: &str = "plugin = \"ping1d\"\ninterval_ms = 50\n";
+/// A counter whose reports go by UDP.
+pub const COUNTER: &str = "plugin = \"tether_hid\"\ncounts_per_metre = 2000\nrate_hz = 50\n";
+/// A depth sensor on a bus.
+pub const DEPTH: &str = "plugin = \"bar100\"\n";
+
+/// A sensor of a rig: its part of the vehicle file, where its device is, and what becomes of what crosses its line.
+pub struct Sensor {
+    /// Table of the sensor, without id and connect.
+    pub text: &'static str,
+    /// End of the device.
+    pub end: End,
+    /// Fault of the line.
+    pub fault: Box<dyn Fault>,
+}
+
+/// What is known of a dive at a moment.
+#[derive(Debug, Clone, Default)]
+pub struct View {
+    /// Good frames that each sensor's decoder has found.
+    pub good: Vec<u64>,
+    /// Frames that each device has sent whole.
+    pub whole: Vec<u64>,
+    /// The last status of each.
+    pub phases: Vec<Option<Phase>>,
+    /// All that has been said of each, in order, each status once.
+    pub said: Vec<Vec<String>>,
+}
+
+/// A dive on real ports and its emulated devices.
+pub struct Rig {
+    dive: Loop,
+    crew: Crew,
+    devices: Vec<Faulty>,
+    /// Which of them each sensor is on.
+    on: Vec<usize>,
+    view: View,
+    places: Vec<String>,
+    recorded: Option<(PathBuf, RecorderHandle, String)>,
+}
+
+/// What a dive has come to.
+pub struct Ended {
+    /// View at the end.
+    pub view: View,
+    /// History of each line.
+    pub lines: Vec<LineHistory>,
+    /// Report of the dive.
+    pub report: Report,
+}
+
+impl Rig {
+    /// With all devices plugged in but those whose end says otherwise.
+    pub fn new(sensors: Vec<Sensor>) -> Self {
+        Self::recorded(sensors, None)
+    }
+
+    /// The same, recorded to a new file.
+    pub fn recorded(sensors: Vec<Sensor>, log: Option<&Path>) -> Self {
+        let places: Vec<String> = sensors.iter().map(|sensor| sensor.end.connect().to_string()).collect();
+        let mut text = HEADING.to_owned();
+        for (number, (sensor, place)) in sensors.iter().zip(&places).enumerate() {
+            let own = sensor.text;
+            write!(text, "\n[[sensors]]\nid = \"s{number}\"\nconnect = \"{place}\"\n{own}").unwrap();
+        }
+        let document = Document::new("vehicle.toml", &text);
+        let vehicle = VehicleConfig::parse(document, &KINDS, &|_| unreachable!("no file is named")).unwrap();
+        let begun = headrace_ports::now();
+        let (mut dive, handle) = assemble(&vehicle, &text, log);
+        let mut programs = vehicle.programs().unwrap().into_iter();
+        let (mut hands, mut lines) = (Vec::new(), Vec::<(Vec<Emulated>, _, _)>::new());
+        let mut on = Vec::new();
+        for (source, (sensor, device)) in sensors.into_iter().zip(&vehicle.sensors).enumerate() {
+            let head = device.head().and_then(|_| programs.next());
+            let setup = EmulatorSetup { start: begun, head, site: vehicle.site, polled: false };
+            let connect = Connect::parse(&vehicle.sensor_configs[source].connect);
+            let connect = connect.and_then(|connect| connect.among(device.carriers()));
+            let driver = device.driver(&DriverSetup { begun, head });
+            hands.push(Hand { source, connect, port: dive.take_port(source).unwrap(), driver });
+            match lines.last_mut().filter(|_| sensor.end.is_beside()) {
+                Some((devices, ..)) => devices.push(device.emulator(&setup)),
+                None => lines.push((vec![device.emulator(&setup)], sensor.end, sensor.fault)),
+            }
+            on.push(lines.len() - 1);
+        }
+        let start = |(devices, end, fault)| Faulty::start(devices, end, fault);
+        let devices: Vec<Faulty> = lines.into_iter().map(start).collect();
+        let sent = handle.as_ref().map(|handle| {
+            let port = handle.sent_port();
+            let sink: SentSink = Arc::new(move |source, at, bytes: &[u8]| {
+                port.sent(u16::try_from(source).unwrap(), at, bytes);
+            });
+            sink
+        });
+        let crew = Crew::start(hands, sent).unwrap();
+        let count = on.len();
+        let view = View {
+            good: vec![0; count],
+            whole: vec![0; count],
+            phases: vec![None; count],
+            said: vec![Vec::new(); count],
+        };
+        let recorded = log.zip(handle).map(|(log, handle)| (log.to_owned(), handle, text));
+        Self { dive, crew, devices, on, view, places, recorded }
+    }
+
+    /// Unplugs and plugs a device, and the like.
+    pub fn control(&self, number: usize) -> &Control {
+        self.devices[self.on[number]].control()
+    }
+
+    /// View when the dive was last looked at.
+    pub fn view(&self) -> &View {
+        &self.view
+    }
+
+    /// Lets the dive go on until `condition` holds; gives the view then.
+    #[track_caller]
+    pub fn until(&mut self, what: &str, condition: impl Fn(&View) -> bool) -> View {
+        let Self { dive, crew, devices, on, view, places, .. } = self;
+        let deadline = headrace_ports::now() + LONG;
+        let (met, view) = (Cell::new(false), RefCell::new(view));
+        crew.run(dive, &|| met.get() || headrace_ports::now() > deadline, &mut |dive| {
+            let mut view = view.borrow_mut();
+            view.look(dive, crew, (devices, on), places);
+            met.set(condition(&view));
+        });
+        let view = view.into_inner();
+        assert!(met.get(), "within {LONG:?}, {what}: {view:#?}");
+        view.clone()
+    }
+
+    /// Waits until a sensor has `more` good frames.
+    #[track_caller]
+    pub fn more(&mut self, number: usize, more: u64) -> View {
+        let from = self.view.good[number];
+        self.until(&format!("{more} more of {number}"), |view| view.good[number] >= from + more)
+    }
+
+    /// Waits until something has been said of a sensor that begins so or contains it, from now on.
+    #[track_caller]
+    pub fn says(&mut self, number: usize, words: &str) -> View {
+        self.until(&format!("{number} says {words:?}"), |view| {
+            view.said[number].last().is_some_and(|said| said.contains(words))
+        })
+    }
+
+    /// Lets all devices fall silent, waits until every frame that they have sent whole has come, and ends the dive.
+    #[track_caller]
+    pub fn end(mut self) -> Ended {
+        for device in &self.devices {
+            device.control().fall_silent();
+        }
+        self.until("all frames that were sent whole", |view| {
+            view.good.iter().zip(&view.whole).all(|(good, whole)| good >= whole)
+        });
+        let Self { mut dive, crew, devices, on, mut view, places, recorded } = self;
+        view.look(&dive, &crew, (&devices, &on), &places);
+        let lines = crew.stop(&mut dive, &mut |_| ());
+        view.good = dive.decoder_counts().iter().map(|counts| counts.good_frames).collect();
+        drop(devices);
+        dive.finish(&mut |_, _| ());
+        let (report, digest) = (Report::of(&dive), dive.digest());
+        drop(dive);
+        if let Some((log, handle, text)) = recorded {
+            handle.finish().unwrap();
+            assert_eq!(replayed(&log, &text), digest, "the digest of the replay");
+        }
+        Ended { view, lines, report }
+    }
+}
+
+impl Ended {
+    /// Every frame that was sent whole was used, by every sensor, and nothing that wasn't.
+    #[track_caller]
+    pub fn all_used(&self) {
+        let Self { view, lines, .. } = self;
+        assert_eq!(view.good, view.whole, "good frames, and those sent whole: {view:#?} {lines:#?}");
+        assert!(lines.iter().all(|line| line.dropped == 0), "{lines:#?}");
+    }
+
+    /// This sensor was never troubled.
+    #[track_caller]
+    pub fn untroubled(&self, number: usize) {
+        let (line, said) = (&self.lines[number], &self.view.said[number]);
+        assert_eq!((line.opened, line.lost, line.dropped), (1, 0, 0), "{line:?} {said:?}");
+        assert_eq!(self.view.good[number], self.view.whole[number]);
+        assert_eq!(self.report.sources[number].frames, self.view.whole[number]);
+        // On a busy machine its line may be looked at before its first frame has come.
+        let after_opening =
+            said.strip_prefix(&["silent: the line is open, and no frame has come yet".to_owned()]);
+        assert_eq!(after_opening.unwrap_or(said), ["running"], "the healthy sensor");
+    }
+}
+
+impl View {
+    fn look(&mut self, dive: &Loop, crew: &Crew, devices: (&[Faulty], &[usize]), places: &[String]) {
+        let (devices, on) = devices;
+        // First what has been sent: what comes of it is counted later.
+        self.whole = on.iter().map(|line| devices[*line].control().whole()).collect();
+        self.good = dive.decoder_counts().iter().map(|counts| counts.good_frames).collect();
+        while let Some(status) = crew.next_status() {
+            self.phases[status.source] = Some(status.phase);
+            self.said[status.source].push(neutral(&status.to_string(), places));
+        }
+    }
+}
+
+/// Words without the places that the system has chosen.
+fn neutral(words: &str, places: &[String]) -> String {
+    let mut words = words.to_owned();
+    for place in places {
+        words = words.replace(place, "<line>");
+        let bare = place.split_once(':').map_or("", |(_, rest)| rest);
+        words = words.replace(bare.split('?').next().unwrap(), "<place>");
+    }
+    words
+}
+
+fn assemble(vehicle: &VehicleConfig, text: &str, log: Option<&Path>) -> (Loop, Option<RecorderHandle>) {
+    let mut app = App::new(vehicle.mission());
+    for sensor in &vehicle.sensors {
+        app.add_device(sensor.as_ref()).unwrap();
+    }
+    let mut handle = None;
+    if let Some(log) = log {
+        let sources = vehicle.sensor_configs.iter().map(|sensor| SourceInfo {
+            id: sensor.id.clone(),
+            plugin: sensor.plugin.clone(),
+            connect: sensor.connect.clone(),
+        });
+        let header = LogHeader {
+            vehicle_toml: text.to_owned(),
+            attachments: Vec::new(),
+            metadata: BTreeMap::new(),
+            sources: sources.collect(),
+            ticks: true,
+            results: result_channels(),
+            ..LogHeader::default()
+        };
+        let (port, recorder) = Recorder::create(log, &header, QUEUE_BYTES, None).unwrap();
+        app.add_plugin(&RecorderOutlet::new(port)).unwrap();
+        handle = Some(recorder);
+    }
+    (app.arm(vehicle.navigation()).unwrap(), handle)
+}
+
+/// The emulated device of a sensor, for a host in another process.
+pub fn emulated(text: &str) -> Emulated {
+    let text = format!("{HEADING}\n[[sensors]]\nid = \"s0\"\n{text}");
+    let document = Document::new("vehicle.toml", &text);
+    let vehicle = VehicleConfig::parse(document, &KINDS, &|_| unreachable!("no file is named")).unwrap();
+    let head = vehicle.programs().unwrap().first().copied();
+    let start = headrace_ports::now();
+    vehicle.sensors[0].emulator(&EmulatorSetup { start, head, site: vehicle.site, polled: false })
+}
+
+/// The digest of a replay of this log.
+fn replayed(log: &Path, text: &str) -> u64 {
+    let document = Document::new("vehicle.toml", text);
+    let vehicle = VehicleConfig::parse(document, &KINDS, &|_| unreachable!("no file is named")).unwrap();
+    let (mut dive, _) = assemble(&vehicle, text, None);
+    let mut player = Player::open(&[log.to_owned()]).unwrap();
+    player.connect(dive.sources());
+    drive(&mut dive, &mut player, Pace::default(), &mut |_| ()).unwrap();
+    assert_eq!(player.losses(), [""; 0]);
+    dive.finish(&mut |_, _| ());
+    dive.digest()
+}

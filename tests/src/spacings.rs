@@ -1,0 +1,115 @@
+//! T_x, T_y and T of every sample of a dive as the definitions say, each sample against all before it.
+//!
+//! A *pass* over a place of the perimeter is one step of a head, between two pings of which both returned, whose arc (the
+//! shorter way round) holds that place; where it passed is linear between the two on the unrolled wall. A step over
+//! pings without a return has not sampled what lies between. A step is earlier than a sample when both its ends are.
+//! Whether the very end of a row of steps belongs to it is left open: such samples have two values.
+
+use headrace_geometry::math;
+
+use crate::instrumented::{Ping, Sample};
+
+/// Shares of a step so near to its ends may be rounding.
+const ROUNDING: f64 = 1e-9;
+
+/// A sample's spacings, m.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Spacing {
+    /// Chainage, m.
+    pub x_m: f64,
+    /// T_x: chainage to the nearest earlier pass; without ends of rows, and with them.
+    pub t_x_m: [Option<f64>; 2],
+    /// T_y: distance to the last sample of the same head.
+    pub t_y_m: Option<f64>,
+    /// T of both; without ends of rows, and with them.
+    pub t_m: [Option<f64>; 2],
+}
+
+struct Step {
+    from: [f64; 2],
+    /// Chainage and arc length from there, the shorter way round.
+    by: [f64; 2],
+    /// Whether steps the same way join it at its beginning and its end.
+    joined: [bool; 2],
+}
+
+impl Step {
+    /// Where it passed over an arc length.
+    fn x_at(&self, sigma_m: f64, perimeter_m: f64, with_ends: bool) -> Option<f64> {
+        let along_m = math::wrap_signed(sigma_m - self.from[1], perimeter_m);
+        let share = along_m / self.by[1];
+        let reach = self.joined.map(|joined| if joined || with_ends { ROUNDING } else { -ROUNDING });
+        (-reach[0]..=1.0 + reach[1])
+            .contains(&share)
+            .then(|| self.from[0] + share.clamp(0.0, 1.0) * self.by[0])
+    }
+}
+
+#[derive(Clone, Default)]
+struct Head {
+    /// Its last sample in this sweep.
+    last: Option<Sample>,
+    /// Whether its last ping returned.
+    returned: bool,
+    /// Number of the step that led to its last ping.
+    step: Option<usize>,
+}
+
+/// Spacings of all samples, in order.
+pub fn spacings(pings: &[Ping], perimeter_m: f64) -> Vec<Spacing> {
+    let heads = pings.iter().map(|ping| ping.head + 1).max().unwrap_or(0);
+    let mut heads = vec![Head::default(); heads];
+    let mut steps: Vec<Step> = Vec::new();
+    let mut all = Vec::new();
+    for ping in pings {
+        let head = &mut heads[ping.head];
+        if ping.new_sweep {
+            *head = Head::default();
+        }
+        let Some(sample) = ping.sample else {
+            (head.returned, head.step) = (false, None);
+            continue;
+        };
+        let last = head.last.replace(sample);
+        let one_step = std::mem::replace(&mut head.returned, true) && ping.single_step;
+        all.push(spacing(&sample, last.as_ref(), &steps, perimeter_m));
+        let before = head.step.take();
+        if let Some(last) = last.filter(|_| one_step) {
+            let [from, to] = [last.place, sample.place];
+            let by = [to[0] - from[0], math::wrap_signed(to[1] - from[1], perimeter_m)];
+            let before = before.filter(|number| steps[*number].by[1] * by[1] > 0.0);
+            if let Some(number) = before {
+                steps[number].joined[1] = true;
+            }
+            head.step = Some(steps.len());
+            steps.push(Step { from, by, joined: [before.is_some(), false] });
+        }
+    }
+    all
+}
+
+fn spacing(sample: &Sample, last: Option<&Sample>, steps: &[Step], perimeter_m: f64) -> Spacing {
+    let [x_m, sigma_m] = sample.place;
+    let t_x_m = [false, true].map(|with_ends| {
+        let passes = steps.iter().filter_map(|step| step.x_at(sigma_m, perimeter_m, with_ends));
+        passes.map(|x| (x - x_m).abs()).reduce(f64::min)
+    });
+    let t_y_m = last.map(|last| distance_m(last.point, sample.point));
+    let d_m = last.map(|last| (x_m - last.place[0]).abs());
+    let t_m = t_x_m.map(|t_x_m| Some(math::hypot(t_x_m? + d_m?, t_y_m?)));
+    Spacing { x_m, t_x_m, t_y_m, t_m }
+}
+
+fn distance_m(a: [f64; 3], b: [f64; 3]) -> f64 {
+    math::hypot(math::hypot(a[0] - b[0], a[1] - b[1]), a[2] - b[2])
+}
+
+/// Least, mean, greatest value and variance; `None` without values.
+pub fn spread(values: &[f64]) -> Option<[f64; 4]> {
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    let variance = values.iter().map(|value| (value - mean) * (value - mean)).sum::<f64>() / n;
+    let least = values.iter().copied().reduce(f64::min)?;
+    let most = values.iter().copied().reduce(f64::max)?;
+    Some([least, mean, most, variance])
+}

@@ -1,0 +1,218 @@
+//! Dives whose navigation is looked over its shoulder: where it says the vehicle is, and where that truly is.
+
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+
+use headrace_fusion::filter::FilterNavigation;
+use headrace_fusion::filter::factors::Factors;
+use headrace_fusion::filter::settings::Settings;
+use headrace_fusion::filter::sources::Consistency;
+use headrace_fusion::filter::state::{ERRORS, Errors, State};
+use headrace_fusion::relative::Relative;
+use headrace_fusion::{Fix, Navigation, NoFix, Times};
+use headrace_geometry::frames::Pose;
+use headrace_geometry::time::MonoNs;
+use headrace_monitor::App;
+use headrace_monitor::report::Report;
+use headrace_replay::SimulationFeed;
+use headrace_replay::drive::{Pace, drive};
+use headrace_sensor::device::SensorInfo;
+use headrace_sensor::reading::Reading;
+use headrace_simulator::{START, Scene, Simulation};
+use headrace_snapshot::{Restorer, Saver, SnapshotError, Stateful};
+use headrace_vehicle::NavigationConfig;
+
+/// More than a dive of an hour says.
+const MOST_SAID: usize = 1 << 20;
+
+/// A fix that was asked for, and the truth.
+pub struct Tracked {
+    /// When it was asked for.
+    pub at: MonoNs,
+    /// Fix, or why there is none.
+    pub fix: Result<Fix, NoFix>,
+    /// True pose.
+    pub truth: Pose,
+}
+
+/// The filter at the end of an epoch.
+pub struct Epoch {
+    /// Time of the estimate.
+    pub at: MonoNs,
+    /// Factors of its covariance.
+    pub factors: Box<Factors<ERRORS>>,
+    /// What takes the estimate to the truth; of pose alone, other errors aren't known.
+    pub errors: Errors,
+}
+
+/// What a dive's navigation said.
+pub struct Track {
+    /// Fixes in the order in which they were asked for.
+    pub fixes: Vec<Tracked>,
+    /// Estimates in order of time.
+    pub epochs: Vec<Epoch>,
+    /// How well sources agree, whenever one has been fused: time of the last epoch, source, and all so far.
+    pub consistency: Vec<(MonoNs, usize, Consistency)>,
+    /// Report of the dive.
+    pub report: Report,
+}
+
+/// Sources that fall silent, by their numbers, from and to seconds of the dive.
+#[derive(Debug, Clone, Default)]
+pub struct Silence {
+    /// Numbers of the sources.
+    pub sources: Vec<usize>,
+    /// Start, seconds from the beginning of the dive.
+    pub from_s: f64,
+    /// End, seconds from the beginning of the dive.
+    pub to_s: f64,
+}
+
+enum Said {
+    Fix(MonoNs, Result<Fix, NoFix>),
+    Epoch(MonoNs, Box<(State, Factors<ERRORS>)>),
+    Consistency(usize, Consistency),
+}
+
+/// What there is to see in a way of navigating.
+pub trait Transparent: Navigation + 'static {
+    /// Estimate with its time, from those that have one.
+    fn estimate(&self) -> Option<(MonoNs, State, Factors<ERRORS>)> {
+        None
+    }
+}
+
+impl Transparent for headrace_fusion::direct::DirectNavigation {}
+
+impl Transparent for headrace_fusion::smooth::track::TrackNavigation {}
+
+impl Transparent for FilterNavigation {
+    fn estimate(&self) -> Option<(MonoNs, State, Factors<ERRORS>)> {
+        self.running().map(|running| (running.at, running.state, running.factors))
+    }
+}
+
+/// Navigation that knows the truth.
+struct Truth(Simulation);
+
+impl Stateful for Truth {
+    fn save(&self, _: &mut Saver) {}
+
+    fn restore(&mut self, _: &mut Restorer<'_>) -> Result<(), SnapshotError> {
+        Ok(())
+    }
+}
+
+impl Navigation for Truth {
+    fn update(&mut self, _: usize, _: &SensorInfo, _: Times, _: &Reading) {}
+
+    fn fix(&self, at: MonoNs) -> Result<Fix, NoFix> {
+        let pose = self.0.pose(at).ok_or(NoFix::Chainage)?;
+        Ok(Fix { pose, speed_mps: 0.0, relative: Relative::default() })
+    }
+}
+
+impl Transparent for Truth {}
+
+/// Dives a scene, the samples placed where they truly are.
+pub fn true_dive(scene: &Scene) -> Track {
+    dive(scene, Truth(Simulation::new(scene).unwrap()), Silence::default())
+}
+
+struct Overheard<N> {
+    inner: N,
+    silence: Silence,
+    last: Option<MonoNs>,
+    told: Vec<Consistency>,
+    said: SyncSender<Said>,
+}
+
+/// What was overheard is no state.
+impl<N: Transparent> Stateful for Overheard<N> {
+    fn save(&self, to: &mut Saver) {
+        self.inner.save(to);
+    }
+
+    fn restore(&mut self, from: &mut Restorer<'_>) -> Result<(), SnapshotError> {
+        self.inner.restore(from)
+    }
+}
+
+impl<N: Transparent> Navigation for Overheard<N> {
+    fn update(&mut self, source: usize, sensor: &SensorInfo, times: Times, reading: &Reading) {
+        let at_s = times.received.since(START).as_secs_f64();
+        let silent = self.silence.from_s..self.silence.to_s;
+        if self.silence.sources.contains(&source) && silent.contains(&at_s) {
+            return;
+        }
+        self.inner.update(source, sensor, times, reading);
+        if let Some((at, state, factors)) = self.inner.estimate().filter(|(at, ..)| self.last != Some(*at)) {
+            self.last = Some(at);
+            self.said.try_send(Said::Epoch(at, Box::new((state, factors)))).unwrap();
+        }
+        if let (Some(consistency), Some(told)) = (self.inner.consistency(source), self.told.get_mut(source))
+            && *told != consistency
+        {
+            *told = consistency;
+            self.said.try_send(Said::Consistency(source, consistency)).unwrap();
+        }
+    }
+
+    fn end(&mut self) {
+        self.inner.end();
+    }
+
+    fn fix(&self, at: MonoNs) -> Result<Fix, NoFix> {
+        let fix = self.inner.fix(at);
+        self.said.try_send(Said::Fix(at, fix)).unwrap();
+        fix
+    }
+}
+
+/// The filter with a scene's settings.
+pub fn filter(scene: &Scene) -> FilterNavigation {
+    let vehicle = &scene.vehicle;
+    let settings = match vehicle.navigation {
+        NavigationConfig::Filter(settings) => settings,
+        NavigationConfig::Direct => Settings::default(),
+    };
+    FilterNavigation::new(vehicle.tunnel.profile.clone(), vehicle.site, settings)
+}
+
+/// Dives a scene with a way of navigating.
+pub fn dive(scene: &Scene, inner: impl Transparent, silence: Silence) -> Track {
+    let vehicle = &scene.vehicle;
+    let mut app = App::new(vehicle.mission());
+    for sensor in &vehicle.sensors {
+        app.add_device(sensor.as_ref()).unwrap();
+    }
+    let (said, heard) = sync_channel(MOST_SAID);
+    let told = vec![Consistency::default(); vehicle.sensors.len()];
+    let mut dive = app.arm(Box::new(Overheard { inner, silence, last: None, told, said })).unwrap();
+    let simulation = Simulation::new(scene).unwrap();
+    drive(&mut dive, &mut SimulationFeed::new(simulation), Pace::default(), &mut |_| {}).unwrap();
+    dive.finish(&mut |_, _| {});
+    sort(scene, &heard, Report::of(&dive))
+}
+
+fn sort(scene: &Scene, heard: &Receiver<Said>, report: Report) -> Track {
+    let simulation = Simulation::new(scene).unwrap();
+    let truth = |at: MonoNs| simulation.pose(at).unwrap();
+    let (mut fixes, mut epochs, mut consistency) = (Vec::new(), Vec::<Epoch>::new(), Vec::new());
+    while let Ok(said) = heard.try_recv() {
+        match said {
+            Said::Fix(at, fix) => fixes.push(Tracked { at, fix, truth: truth(at) }),
+            Said::Epoch(at, estimate) => {
+                let (state, factors) = *estimate;
+                let truth = truth(at);
+                let errors =
+                    state.errors_to(&State { position: truth.position, attitude: truth.attitude, ..state });
+                epochs.push(Epoch { at, factors: Box::new(factors), errors });
+            }
+            Said::Consistency(source, counted) => {
+                let at = epochs.last().map_or(START, |epoch| epoch.at);
+                consistency.push((at, source, counted));
+            }
+        }
+    }
+    Track { fixes, epochs, consistency, report }
+}

@@ -1,0 +1,474 @@
+//! Input that is wrong: each message names file, line, key, value and what is allowed, and each exit code is the right
+//! one (0 ok, 1 failed, 2 usage, 3 finished but data was lost). Of a damaged log all that can be read is used, and what
+//! is lost is said with its time span.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use headrace_tests::{Folder, SCENE, VEHICLE, raw_messages, write_log};
+use mcap::{Compression, WriteOptions};
+use serde_json::Value;
+
+/// A text with one thing changed, which must be there exactly once.
+fn change(text: &str, from: &str, to: &str) -> String {
+    assert_eq!(text.matches(from).count(), 1, "{from:?}");
+    text.replace(from, to)
+}
+
+/// What the program says of each wrong text, where every answer must be a usage error with nothing on stdout.
+fn refusals(command: &[&str], file: &str, text: &str, cases: &[(&str, &str, &str)]) -> String {
+    let folder = Folder::with_dive();
+    let mut said = String::new();
+    for (what, from, to) in cases {
+        folder.write(file, change(text, from, to));
+        let answer = folder.headrace(command);
+        assert_eq!((answer.code, answer.stdout.as_str()), (Some(2), ""), "{what}: {}", answer.stderr);
+        write!(said, "{what}\n    {}", answer.stderr).unwrap();
+    }
+    said
+}
+
+#[test]
+fn a_wrong_vehicle_file_is_refused_with_file_line_key_value_and_what_is_allowed() {
+    let cases = [
+        ("key missing", "target_m = 1.2\n", ""),
+        ("key of a sensor missing", "counts_per_metre = 2000\n", ""),
+        ("dimension missing", "radius_m = 3\n", ""),
+        ("table missing", "[tunnel]\nprofile = \"circle\"\nradius_m = 3\nlength_m = 100\n", ""),
+        ("unknown key", "target_m = 1.2", "target_m = 1.2\ncolour = \"red\""),
+        ("unknown key in a table", "sound_speed_mps = 1447", "sound_speed_mps = 1447\nsalt = 3"),
+        ("unknown key of a sensor", "counts_per_metre = 2000", "counts_per_metre = 2000\ncolour = \"red\""),
+        ("unknown table", "[heads]\n", "[head]\n"),
+        ("text in place of a number", "target_m = 1.2", "target_m = \"1.2\""),
+        ("number in place of a text", "name = \"test vehicle\"", "name = 7"),
+        ("number in place of a table", "[water]\nsound_speed_mps = 1447\n", "[[water]]\n"),
+        ("two numbers in place of three", "angles_deg = [0, 0, 90]", "angles_deg = [0, 90]"),
+        ("no number at all", "radius_m = 3", "radius_m = nan"),
+        ("negative", "radius_m = 3", "radius_m = -3"),
+        ("too large", "sound_speed_mps = 1447", "sound_speed_mps = 14470"),
+        ("zero", "counts_per_metre = 2000", "counts_per_metre = 0"),
+        (
+            "not a setting of the head",
+            "0.5:4040\"\nmode = \"fastest\"\nrange_m = 5",
+            "0.5:4040\"\nmode = \"fastest\"\nrange_m = 7",
+        ),
+        ("unknown mode", "0.5:4040\"\nmode = \"fastest\"", "0.5:4040\"\nmode = \"hasty\""),
+        ("same id twice", "id = \"ping_right\"", "id = \"ping_left\""),
+        ("id with a space", "id = \"ping_right\"", "id = \"ping right\""),
+        ("unknown plugin", "plugin = \"bar100\"", "plugin = \"bar300\""),
+        ("unknown profile", "profile = \"circle\"", "profile = \"egg\""),
+        ("unknown preset", "preset = \"xsens_mti600\"", "preset = \"xsens\""),
+        ("not TOML", "target_m = 1.2", "target_m = = 1.2"),
+        ("key twice", "target_m = 1.2", "target_m = 1.2\ntarget_m = 1.3"),
+        ("text without an end", "name = \"test vehicle\"", "name = \"test vehicle"),
+    ];
+    insta::assert_snapshot!(refusals(&["check", "vehicle.toml"], "vehicle.toml", VEHICLE, &cases), @r#"
+    key missing
+        headrace: vehicle.toml:1: target_m: is missing
+    key of a sensor missing
+        headrace: vehicle.toml:58: sensors[8].counts_per_metre: is missing
+    dimension missing
+        headrace: vehicle.toml:4: tunnel.radius_m: is missing
+    table missing
+        headrace: vehicle.toml:1: tunnel: is missing
+    unknown key
+        headrace: vehicle.toml:3: colour: is not a key here; known are name, target_m, section_m, tunnel, water, navigation, coverage, openings, dive_hours, hull, sensors, heads
+    unknown key in a table
+        headrace: vehicle.toml:11: water.salt: is not a key here; known are sound_speed_mps, density_kgpm3, gravity_mps2, surface_pressure_pa, surface_above_floor_m, sound_speed_from
+    unknown key of a sensor
+        headrace: vehicle.toml:62: sensors[8].colour: is not a key here; known are id, plugin, position_m, angles_deg, connect, latency_ms, kind, scale, zero_at_m, rate_hz, report_id, width_bits, report_bytes, offset, signed, endian, sequence_offset, status_offset, clock_ms_offset, mode, counts_per_metre, max_speed_mps
+    unknown table
+        headrace: vehicle.toml:12: head: is not a key here; known are name, target_m, section_m, tunnel, water, navigation, coverage, openings, dive_hours, hull, sensors, heads
+    text in place of a number
+        headrace: vehicle.toml:2: target_m = "1.2": must be a number from 0.01 to 20
+    number in place of a text
+        headrace: vehicle.toml:1: name = 7: must be a text in quotes
+    number in place of a table
+        headrace: vehicle.toml:9: water = [[water]]: must be a table
+    two numbers in place of three
+        headrace: vehicle.toml:32: sensors[2].angles_deg = [0, 90]: must be three numbers [a, b, c], each from -360 to 360
+    no number at all
+        headrace: vehicle.toml:6: tunnel.radius_m = nan: must be a number from 0.1 to 200
+    negative
+        headrace: vehicle.toml:6: tunnel.radius_m = -3: must be a number from 0.1 to 200
+    too large
+        headrace: vehicle.toml:10: water.sound_speed_mps = 14470: must be a number from 1300 to 1700
+    zero
+        headrace: vehicle.toml:61: sensors[8].counts_per_metre = 0: must be at least 0.1 away from zero
+    not a setting of the head
+        headrace: vehicle.toml:27: sensors[1].range_m = 7: switch command: range of 7; allowed are 1, 2, 3, 4, 5, 10, 20, 30, 40, 50, 60, 80, 100 m
+    unknown mode
+        headrace: vehicle.toml:26: sensors[1].mode = "hasty": must be one of slow, medium, fast, faster, fastest
+    same id twice
+        headrace: vehicle.toml:35: sensors[3].id = "ping_left": is the id of an earlier sensor; ids must differ
+    id with a space
+        headrace: vehicle.toml:35: sensors[3].id = "ping right": must be 1 to 32 letters, digits, _ or -
+    unknown plugin
+        headrace: vehicle.toml:51: sensors[6].plugin = "bar300": must be one of imagenex881, ping1d, bar100, imu_can, tether_hid, mavlink, a50
+    unknown profile
+        headrace: vehicle.toml:5: tunnel.profile = "egg": must be one of ceran, ceran-blueprint, rectangle, circle, arch, trimmed_circle, polyline
+    unknown preset
+        headrace: vehicle.toml:56: sensors[7].preset = "xsens": must be one of xsens_mti600, sbg_ellipse, j1939, bosch_mm5
+    not TOML
+        headrace: vehicle.toml:2: TOML: extra `=`, expected nothing
+    key twice
+        headrace: vehicle.toml:3: TOML: duplicate key
+    text without an end
+        headrace: vehicle.toml:1: TOML: invalid basic string, expected `"`
+    "#);
+}
+
+#[test]
+fn a_wrong_scene_is_refused_with_file_line_key_value_and_what_is_allowed() {
+    let cases = [
+        ("key missing", "vehicle = \"vehicle.toml\"\n", ""),
+        ("vehicle file not there", "vehicle = \"vehicle.toml\"", "vehicle = \"boat.toml\""),
+        ("speed missing", "speed_mps = 0.2\n", ""),
+        ("no legs", "[[trajectory.legs]]\ndistance_m = 4\nspeed_mps = 0.2\n", ""),
+        ("unknown key", "start_m = 3", "start_m = 3\nend_m = 7"),
+        ("unknown table", "[trajectory]", "[weather]\n[trajectory]"),
+        ("unknown effect", "[trajectory]", "[effects]\nfish = 12\n[trajectory]"),
+        ("text in place of a number", "start_m = 3", "start_m = \"portal\""),
+        ("no distance", "distance_m = 4", "distance_m = 0"),
+        ("never arrives", "speed_mps = 0.2", "speed_mps = 0"),
+        ("outside the tunnel", "start_m = 3", "start_m = 3\nplace_m = [3.5, 3]"),
+        ("before its beginning", "start_m = 3", "start_m = -50"),
+        ("not TOML", "[trajectory]", "[trajectory"),
+    ];
+    let command = ["simulate", "scene.toml", "-o", "other.mcap"];
+    insta::assert_snapshot!(refusals(&command, "scene.toml", SCENE, &cases), @r#"
+    key missing
+        headrace: scene.toml:1: vehicle: is missing
+    vehicle file not there
+        headrace: scene.toml:2: vehicle = "boat.toml": can't be read at boat.toml: No such file or directory (os error 2)
+    speed missing
+        headrace: scene.toml:7: trajectory.legs[0].speed_mps: is missing
+    no legs
+        headrace: scene.toml:4: trajectory.legs: has no leg; at least one table headed [[trajectory.legs]] is needed
+    unknown key
+        headrace: scene.toml:6: trajectory.end_m: is not a key here; known are kind, start_m, place_m, legs
+    unknown table
+        headrace: scene.toml:4: weather: is not a key here; known are name, seed, vehicle, vehicle_changes, tunnel, trajectory, effects
+    unknown effect
+        headrace: scene.toml:5: effects.fish: is not a key here; known are start_phase_error, sector_end_slowing, skipped_steps, head_stalls, motion_within_turn, beam_cone, occlusion, multipath, side_lobes, interference, missing_returns, outliers, sound_speed_error, range_noise, range_quantisation, current, pilot_drift, depth_steps, imu_noise, imu_bias, magnetic_disturbance, tether_slack, tether_slip, late_winding, tether_quantum, clock_drift, line_delay, byte_errors
+    text in place of a number
+        headrace: scene.toml:5: trajectory.start_m = "portal": must be a number from -20 to 1000000
+    no distance
+        headrace: scene.toml:8: trajectory.legs[0].distance_m = 0: must be a number from 0.01 to 1000000
+    never arrives
+        headrace: scene.toml:9: trajectory.legs[0].speed_mps = 0: must be at least 0.001 either way, or the leg has no end
+    outside the tunnel
+        headrace: scene.toml:6: trajectory.place_m = [3.5, 3]: must be inside the tunnel's profile
+    before its beginning
+        headrace: scene.toml:5: trajectory.start_m = -50: must be a number from -20 to 1000000
+    not TOML
+        headrace: scene.toml:4: TOML: unclosed table, expected `]`
+    "#);
+}
+
+#[test]
+fn a_wrong_polyline_is_refused_with_its_line_or_vertex() {
+    let folder = Folder::new();
+    let tunnel = "profile = \"polyline\"\nfile = \"profile.csv\"\n";
+    folder.write("vehicle.toml", change(VEHICLE, "profile = \"circle\"\nradius_m = 3\n", tunnel));
+    let mut said = String::new();
+    let mut refuse = |what: &str, points: Option<&str>| {
+        if let Some(points) = points {
+            folder.write("profile.csv", points);
+        }
+        let answer = folder.headrace(&["check", "vehicle.toml"]);
+        assert_eq!((answer.code, answer.stdout.as_str()), (Some(2), ""), "{what}: {}", answer.stderr);
+        write!(said, "{what}\n    {}", answer.stderr).unwrap();
+    };
+    refuse("not there", None);
+    refuse("empty", Some(""));
+    refuse("two points", Some("y_m,z_m\n-2,0\n2,0\n"));
+    refuse("no number", Some("y_m,z_m\n-2,0\n2,zero\n2,4\n-2,4\n"));
+    refuse("one number", Some("y_m,z_m\n-2,0\n2\n2,4\n-2,4\n"));
+    refuse("not finite", Some("-2,0\n2,0\n2,inf\n-2,4\n"));
+    // A side chamber behind a corner, which the middle doesn't see.
+    refuse("not star-shaped", Some("-2,0\n2,0\n2,1\n5,1\n5,6\n4.5,6\n4.5,2\n2,2\n2,4\n-2,4\n"));
+    refuse("crosses itself", Some("-2,0\n2,4\n2,0\n-2,4\n"));
+    insta::assert_snapshot!(said, @r#"
+    not there
+        headrace: vehicle.toml:6: tunnel.file = "profile.csv": can't be read at profile.csv: No such file or directory (os error 2)
+    empty
+        headrace: vehicle.toml:5: tunnel.profile = "polyline": a profile needs at least 3 distinct points; this one has 0
+    two points
+        headrace: vehicle.toml:5: tunnel.profile = "polyline": a profile needs at least 3 distinct points; this one has 2
+    no number
+        headrace: vehicle.toml:6: tunnel.file = "profile.csv": line 3 of it is "2,zero"; wanted is y_m,z_m
+    one number
+        headrace: vehicle.toml:6: tunnel.file = "profile.csv": line 3 of it is "2"; wanted is y_m,z_m
+    not finite
+        headrace: vehicle.toml:5: tunnel.profile = "polyline": vertex 2 has a coordinate that is no number within 1000 m
+    not star-shaped
+        headrace: vehicle.toml:5: tunnel.profile = "polyline": the profile isn't star-shaped about (0.9523809523809526, 2.119047619047619): it runs backwards or crosses itself at vertex 5
+    crosses itself
+        headrace: vehicle.toml:5: tunnel.profile = "polyline": the profile isn't star-shaped about (-2, 0): it runs backwards or crosses itself at vertex 0
+    "#);
+}
+
+#[test]
+fn a_profile_from_a_polyline_goes_into_the_log_and_replays_without_the_file() {
+    let folder = Folder::new();
+    let tunnel = "profile = \"polyline\"\nfile = \"profile.csv\"\n";
+    folder.write("vehicle.toml", change(VEHICLE, "profile = \"circle\"\nradius_m = 3\n", tunnel));
+    folder.write("profile.csv", "y_m,z_m\n-2,0\n2,0\n2,4\n-2,4\n");
+    folder.write("scene.toml", SCENE);
+    folder.simulate("scene.toml", "dive.mcap");
+    let digest = folder.digest("dive.mcap", &["--vehicle", "vehicle.toml"]);
+    std::fs::remove_file(folder.path("profile.csv")).unwrap();
+    assert_eq!(folder.digest("dive.mcap", &[]), digest);
+}
+
+#[test]
+fn a_dbc_goes_into_the_log_and_replays_without_the_file() {
+    let folder = Folder::new();
+    let dbc = include_str!("../../../plugins/imu_can/dbc/xsens_mti600.dbc");
+    let keys = "dbc = \"imu.dbc\"\nsignals = { rate = [\"GyroX\", \"GyroY\", \"GyroZ\"], force = [\"AccX\", \"AccY\", \"AccZ\"], \
+                quaternion = [\"QuatW\", \"QuatX\", \"QuatY\", \"QuatZ\"], sample_time = \"SampleTime\" }\n";
+    folder.write("vehicle.toml", change(VEHICLE, "preset = \"xsens_mti600\"\n", keys));
+    folder.write("scene.toml", SCENE);
+    folder.write("imu.dbc", dbc.replace("SG_ GyroY : 23|16@0-", "SG_ GyroY : 23|16@3-"));
+    let answer = folder.headrace(&["check", "vehicle.toml"]);
+    assert_eq!(answer.code, Some(2), "{}", answer.stderr);
+    assert!(answer.stderr.contains("imu.dbc:43: DBC: \"SG_ GyroY : 23|16@3-"), "{}", answer.stderr);
+
+    folder.write("imu.dbc", dbc);
+    folder.simulate("scene.toml", "dive.mcap");
+    let (_, report) = folder.replay("dive.mcap", &["--vehicle", "vehicle.toml"]);
+    let imu = report["sources"].as_array().unwrap().iter().find(|source| source["id"] == "imu").unwrap();
+    assert_eq!(imu["device_clock"]["restarts"], 0);
+    assert!(imu["device_clock"]["drift_ppm"].as_f64().unwrap().abs() < 1.0, "{imu}");
+    std::fs::remove_file(folder.path("imu.dbc")).unwrap();
+    assert_eq!(folder.digest("dive.mcap", &[]), report["digest"].as_str().unwrap());
+}
+
+/// A log of the short dive in chunks of about a second, with the vehicle file in it.
+fn chunked_log(folder: &Folder, log: &str) -> usize {
+    let dive = folder.read("dive.mcap");
+    let messages = raw_messages(&dive);
+    let options = WriteOptions::new().compression(Some(Compression::Lz4)).chunk_size(Some(32 << 10));
+    write_log(&folder.path(log), options, Some(VEHICLE), &messages);
+    messages.len()
+}
+
+fn losses(report: &Value) -> Vec<&str> {
+    report["log"]["losses"].as_array().unwrap().iter().map(|loss| loss.as_str().unwrap()).collect()
+}
+
+/// The number after `word` in a loss, as "after 9.800 s".
+fn seconds(loss: &str, word: &str) -> f64 {
+    let (_, rest) = loss.split_once(word).unwrap_or_else(|| panic!("no {word:?} in {loss:?}"));
+    rest.split_whitespace().next().unwrap().parse().unwrap()
+}
+
+/// Every number as #, for texts whose words matter.
+fn without_numbers(text: &str) -> String {
+    let mut short = String::new();
+    for c in text.chars().map(|c| if c.is_ascii_digit() { '#' } else { c }) {
+        if !(c == '#' && short.ends_with('#')) {
+            short.push(c);
+        }
+    }
+    short
+}
+
+#[test]
+fn of_a_truncated_log_the_beginning_is_used_and_the_rest_said_to_be_lost() {
+    let folder = Folder::with_dive();
+    let count = chunked_log(&folder, "chunked.mcap");
+    let dive = folder.read("dive.mcap");
+    let messages = raw_messages(&dive);
+    for log in ["dive.mcap", "chunked.mcap"] {
+        let whole = folder.read(log);
+        let mut read_before = 0;
+        for tenths in [1, 3, 5, 7, 9] {
+            folder.write("cut.mcap", &whole[..whole.len() * tenths / 10]);
+            let (code, report) = folder.replay("cut.mcap", &[]);
+            assert_eq!(code, Some(3), "{log} {tenths}");
+            let read = usize::try_from(report["log"]["messages"].as_u64().unwrap()).unwrap();
+            assert!(read_before <= read && read <= count, "{log} {tenths}: {read} of {count}");
+            read_before = read;
+            let losses = losses(&report);
+            assert_eq!(losses.len(), 1, "{losses:?}");
+            if read == 0 {
+                continue;
+            }
+            let last_s = messages[read - 1].log_time as f64 * 1e-9;
+            assert!((seconds(losses[0], "after") - last_s).abs() < 1e-3, "{losses:?}, last {last_s}");
+
+            // What was read counts as if it had been the whole dive.
+            write_log(&folder.path("short.mcap"), WriteOptions::new(), Some(VEHICLE), &messages[..read]);
+            let (_, short) = folder.replay("short.mcap", &[]);
+            assert_eq!(report["digest"], short["digest"], "{log} {tenths}");
+            assert_eq!(report["sections"], short["sections"], "{log} {tenths}");
+        }
+        assert!(read_before > 0);
+    }
+
+    folder.write("cut.mcap", &dive[..dive.len() / 5]);
+    let answer = folder.headrace(&["replay", "cut.mcap"]);
+    assert_eq!(answer.code, Some(3));
+    let lost = answer.stdout.lines().find(|line| line.contains("LOST")).unwrap();
+    insta::assert_snapshot!(without_numbers(lost), @"  LOST: byte #: the file ends before its closing records (# bytes, after #.# s)");
+}
+
+#[test]
+fn of_a_corrupt_log_all_but_the_broken_chunk_is_used() {
+    let folder = Folder::with_dive();
+    let count = chunked_log(&folder, "chunked.mcap");
+    let whole = folder.read("chunked.mcap");
+    let chunks = mcap::Summary::read(&whole).unwrap().unwrap().chunk_indexes;
+    assert!(chunks.len() > 10, "{}", chunks.len());
+    let first_ns = chunks.iter().map(|chunk| chunk.message_start_time).min().unwrap();
+    let last_ns = chunks.iter().map(|chunk| chunk.message_end_time).max().unwrap();
+    for chunk in [0, chunks.len() / 2, chunks.len() - 1] {
+        let chunk = &chunks[chunk];
+        let middle = usize::try_from(chunk.chunk_start_offset + chunk.chunk_length / 2).unwrap();
+        let mut broken = whole.clone();
+        for byte in &mut broken[middle..middle + 16] {
+            *byte ^= 0xFF;
+        }
+        folder.write("broken.mcap", broken);
+        let (code, report) = folder.replay("broken.mcap", &[]);
+        assert_eq!(code, Some(3));
+        let read = usize::try_from(report["log"]["messages"].as_u64().unwrap()).unwrap();
+        assert!(read < count && read > count * 8 / 10, "{read} of {count}");
+        // The loss reaches from the last message before the chunk to the first one after it.
+        let [loss] = losses(&report)[..] else { panic!("{:?}", losses(&report)) };
+        let close = |word, at_ns: u64| (seconds(loss, word) - at_ns as f64 * 1e-9).abs() < 0.02;
+        assert_eq!(chunk.message_start_time > first_ns, loss.contains("after"), "{loss}");
+        assert!(!loss.contains("after") || close("after", chunk.message_start_time), "{loss}");
+        assert_eq!(chunk.message_end_time < last_ns, loss.contains("before"), "{loss}");
+        assert!(!loss.contains("before") || close("before", chunk.message_end_time), "{loss}");
+    }
+}
+
+#[test]
+fn a_byte_changed_anywhere_is_noticed_or_changes_nothing() {
+    let folder = Folder::with_dive();
+    chunked_log(&folder, "chunked.mcap");
+    for log in ["dive.mcap", "chunked.mcap"] {
+        let whole = folder.read(log);
+        let (_, expected) = folder.replay(log, &["--vehicle", "vehicle.toml"]);
+        let mut noticed = 0;
+        for k in 0..40 {
+            let mut broken = whole.clone();
+            let place = whole.len() * k / 40 + k;
+            broken[place] ^= 1 << (k % 8);
+            folder.write("broken.mcap", broken);
+            let (code, report) = folder.replay("broken.mcap", &["--vehicle", "vehicle.toml"]);
+            match code {
+                Some(0) => assert_eq!(report["digest"], expected["digest"], "{log}, byte {place}"),
+                Some(3) => {
+                    assert!(!losses(&report).is_empty(), "{log}, byte {place}");
+                    noticed += 1;
+                }
+                other => panic!("{log}, byte {place}: exit code {other:?}"),
+            }
+        }
+        assert!(noticed > 5, "{log}: {noticed}");
+    }
+}
+
+#[test]
+fn what_is_no_log_is_named() {
+    let folder = Folder::with_dive();
+    folder.write("empty.mcap", "");
+    folder.write("text.mcap", VEHICLE);
+    let mut said = String::new();
+    for log in ["empty.mcap", "text.mcap", "missing.mcap", "."] {
+        let answer = folder.headrace(&["replay", log, "--vehicle", "vehicle.toml"]);
+        assert!(matches!(answer.code, Some(1 | 2)), "{log}: {:?}", answer.code);
+        assert_eq!(answer.stdout, "", "{log}");
+        said.push_str(&answer.stderr);
+    }
+    insta::assert_snapshot!(said, @"
+    headrace: empty.mcap is not an MCAP file: it begins with [], and [89 4d 43 41 50 30 0d 0a] is wanted
+    headrace: text.mcap is not an MCAP file: it begins with [6e 61 6d 65 20 3d 20 22], and [89 4d 43 41 50 30 0d 0a] is wanted
+    headrace: could not open missing.mcap: No such file or directory (os error 2)
+    headrace: ./dive.mcap is not a part of a recording, and only the parts of one are read as one log; name a single log, or the parts alone
+    ");
+}
+
+#[test]
+fn a_log_without_a_vehicle_file_needs_one_given() {
+    let folder = Folder::with_dive();
+    let dive = folder.read("dive.mcap");
+    write_log(&folder.path("bare.mcap"), WriteOptions::new(), None, &raw_messages(&dive));
+    let answer = folder.headrace(&["replay", "bare.mcap"]);
+    assert_eq!((answer.code, answer.stdout.as_str()), (Some(2), ""));
+    insta::assert_snapshot!(answer.stderr, @"headrace: reading bare.mcap: no vehicle file is attached to this log; give one with --vehicle");
+    assert_eq!(folder.digest("bare.mcap", &["--vehicle", "vehicle.toml"]), folder.digest("dive.mcap", &[]));
+}
+
+#[test]
+fn a_source_that_the_vehicle_file_lacks_is_lost_and_said_so() {
+    let folder = Folder::with_dive();
+    folder.write("other.toml", change(VEHICLE, "id = \"sonar_1\"", "id = \"front\""));
+    let answer = folder.headrace(&["replay", "dive.mcap", "--vehicle", "other.toml"]);
+    assert_eq!(answer.code, Some(3));
+    let lost = answer.stdout.lines().find(|line| line.contains("LOST")).unwrap();
+    insta::assert_snapshot!(lost, @r#"  LOST: 790 messages of source "sonar_1", which the vehicle file doesn't have"#);
+}
+
+#[test]
+fn without_sonar_there_is_no_coverage_and_no_section_passes() {
+    let folder = Folder::with_dive();
+    let dive = folder.read("dive.mcap");
+    let messages: Vec<_> =
+        raw_messages(&dive).into_iter().filter(|m| !m.channel.topic.starts_with("/raw/sonar")).collect();
+    write_log(&folder.path("deaf.mcap"), WriteOptions::new(), Some(VEHICLE), &messages);
+    let answer = folder.headrace(&["replay", "deaf.mcap"]);
+    assert_eq!(answer.code, Some(1));
+    let (words, _) = answer.stdout.split_once("digest").unwrap();
+    insta::assert_snapshot!(words, @"
+    no position     0.00 m/s   no speed can be given: no position or heading
+    ch 0+005.04     0.20 m/s   no speed can be given: no sonar returns
+    NO COVERAGE: no profiling sonar returns in this dive; nothing was inspected
+    ");
+    let (code, report) = folder.replay("deaf.mcap", &[]);
+    assert_eq!((code, &report["dive"]["sonar"]), (Some(1), &Value::Bool(false)));
+    assert_eq!(report["summary"]["pass_m"], 0.0);
+    assert!(report["sections"].as_array().unwrap().iter().all(|section| section["verdict"] != "pass"));
+}
+
+#[test]
+fn wrong_arguments_are_usage_errors() {
+    let folder = Folder::with_dive();
+    for arguments in [
+        &["replay"][..],
+        &["replay", "dive.mcap", "--tick-ms", "0"],
+        &["replay", "dive.mcap", "--target", "-1"],
+        &["replay", "dive.mcap", "--target", "nan"],
+        &["replay", "dive.mcap", "--speed", "fast"],
+        &["simulate", "scene.toml"],
+        &["dive"],
+        &[],
+    ] {
+        let answer = folder.headrace(arguments);
+        assert_eq!((answer.code, answer.stdout.as_str()), (Some(2), ""), "{arguments:?}");
+        assert!(!answer.stderr.is_empty(), "{arguments:?}");
+    }
+    assert!(!Path::new(&folder.path("other.mcap")).exists());
+}
+
+#[test]
+fn every_command_has_help_with_an_example() {
+    let folder = Folder::new();
+    let help = folder.headrace(&["--help"]).stdout;
+    let (_, list) = help.split_once("Commands:\n").unwrap();
+    let commands: Vec<&str> = list
+        .lines()
+        .take_while(|line| !line.is_empty())
+        .filter_map(|line| line.split_whitespace().next())
+        .collect();
+    assert!(commands.contains(&"replay") && commands.contains(&"demo"), "{commands:?}");
+    for command in commands.into_iter().filter(|command| *command != "help") {
+        let answer = folder.headrace(&[command, "--help"]);
+        assert_eq!((answer.code, answer.stderr.as_str()), (Some(0), ""), "{command}");
+        assert!(answer.stdout.contains(&format!("Example:\n  headrace {command}")), "{}", answer.stdout);
+    }
+}

@@ -1,0 +1,10 @@
+//! The command line: what it answers, refuses and draws, and the files that it writes for people and programs.
+
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
+
+mod bad_input;
+mod logging;
+mod plan;
+mod registration;
+mod report_schema;
+mod viewers;

@@ -1,0 +1,267 @@
+//! `headrace plan`: what people read, what programs read, and what is refused with which reason.
+
+use std::fmt::Write as _;
+
+use headrace_tests::Folder;
+use serde_json::Value;
+
+const VITA_2: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../deploy/vehicles/vita2-4.toml");
+
+fn plan(folder: &Folder, args: &[&str]) -> headrace_tests::Answer {
+    folder.headrace(&[&["plan"], args].concat())
+}
+
+fn json(folder: &Folder, args: &[&str]) -> Value {
+    let answer = plan(folder, &[args, &["--json"]].concat());
+    serde_json::from_str(&answer.stdout).unwrap_or_else(|error| panic!("{error}: {}", answer.stderr))
+}
+
+#[test]
+fn a_vehicle_s_plan_in_words() {
+    let answer = plan(&Folder::new(), &["--vehicle", VITA_2]);
+    assert_eq!((answer.code, answer.stderr.as_str()), (Some(0), ""));
+    insta::assert_snapshot!(answer.stdout, @r"
+    ceran: perimeter 35.90 m, 7000 m long; vehicle at y 0.00 m, z 3.09 m
+    4 heads in phase shift, range setting 10 m; a beam covers 0.08 to 0.28 m of wall
+    target 0.5 m
+
+                                       T_y at rest, m         at  T_x, m, seen by   T_max  sure to hit, m   v_max   hours
+      mode     step   turn  overlap    min   mean  worst     m/s    all    fewest       m   once    twice     m/s  needed
+      slow      0.3   21.60     4.67  0.016  0.030  0.064   0.044  0.242     0.483   0.500   0.50     1.00   0.044    43.4
+      medium    0.6   10.80     2.33  0.032  0.060  0.126   0.088  0.240     0.480   0.500   0.50     1.00   0.088    21.9
+      fast      0.9    8.00     1.56  0.049  0.090  0.188   0.118  0.237     0.474   0.500   0.50     1.00   0.118    16.4
+    * faster    1.2    6.60     1.17  0.065  0.120  0.249   0.141  0.233     0.467   0.500   0.50     1.00   0.141    13.7
+      fastest   2.4    4.80     0.58  0.130  0.239  0.481   0.105  0.127     0.254   0.500   0.50     1.00   0.105    18.4
+
+    * fastest for the target: faster, at most 0.141 m/s, 13.7 h one way
+    sonar_0: 15.3 degrees about 270 are hidden by the vehicle, 1.66 m of wall at 3:00
+    sonar_1: 15.3 degrees about 90 are hidden by the vehicle, 1.66 m of wall at 9:00
+    sonar_2: 15.3 degrees about 90 are hidden by the vehicle, 1.66 m of wall at 3:00
+    sonar_3: 15.3 degrees about 270 are hidden by the vehicle, 1.66 m of wall at 9:00
+    1.66 m of wall at 9:00 are seen by sonar_0, sonar_2 only: passes there are 2.000 times as far apart
+    1.66 m of wall at 3:00 are seen by sonar_1, sonar_3 only: passes there are 2.000 times as far apart
+    start angles in faster at 0.141 m/s, degrees, + growing: sonar_0 0.0+; sonar_1 90.0+; sonar_2 246.3-; sonar_3 156.3-
+    heads 1.102 m apart along the hull start at equal angles at 0.134 m/s; at this speed, 1.163 m apart (q = 5)
+    ");
+}
+
+#[test]
+fn a_plan_with_drift_yaw_and_a_deadline_in_words() {
+    let args = ["--tunnel", "ceran", "--length", "7000", "--heads", "2", "--layout", "sector_offset"];
+    let allowed = ["--target", "0.6", "--drift", "1", "--yaw", "10", "--hours", "30", "--range", "20"];
+    let answer = plan(&Folder::new(), &[&args[..], &allowed].concat());
+    assert_eq!(answer.code, Some(1), "{}", answer.stderr);
+    insta::assert_snapshot!(answer.stdout, @r"
+    ceran: perimeter 35.90 m, 7000 m long; vehicle at y 0.00 m, z 3.09 m; allowing for a constant offset of 1 m and yaw of 10.0 degrees
+    2 heads in sector offset, range setting 20 m; a beam covers 0.08 to 0.28 m of wall
+    target 0.6 m, 30 h for the whole length, one way: 0.065 m/s
+
+                                       T_y at rest, m         at  T_x, m, seen by   T_max  sure to hit, m   v_max   hours
+      mode     step   turn  overlap    min   mean  worst     m/s    all    fewest       m   once    twice     m/s  needed
+      slow      0.3 ~ 37.60     4.67  0.016  0.030  0.108   0.065  2.437     2.437   2.441   2.44     4.88   0.015   124.0
+      medium    0.6 ~ 18.80     2.33  0.032  0.060  0.213   0.065  1.219     1.219   1.239   1.24     2.48   0.029    65.3
+      fast      0.9 ~ 13.33     1.56  0.049  0.090  0.315   0.065  0.864     0.864   0.922   0.92     1.84   0.038    50.9
+    * faster    1.2 ~ 10.60     1.17  0.065  0.120  0.414   0.065  0.687     0.687   0.804   0.80     1.61   0.040    47.6
+      fastest   2.4 ~  6.80     0.58  0.130  0.239  0.782   0.065  0.441     0.441   0.899   0.90     1.80    none
+
+    fastest: a target of 0.6 m is met at no speed: neighbours of one turn are 0.782 m apart, whatever the speed
+    * finest at this speed: faster; it misses the target
+    ~ extrapolated from another range setting; measure the turn period and add it to the vehicle file
+    start angles in faster at 0.065 m/s, degrees, + growing: head_0 0.0+ within 0 to 180; head_1 180.0+ within 180 to 360
+    ");
+}
+
+#[test]
+fn programs_read_the_same_figures_as_json_and_csv() {
+    let folder = Folder::new();
+    let args = ["--tunnel", "ceran-blueprint", "--heads", "3", "--speed", "0.2", "--target", "0.9"];
+    let plan_json = json(&folder, &args);
+    assert_eq!(
+        (plan_json["plan_version"].as_u64(), plan_json["layout"].as_str()),
+        (Some(1), Some("phase_shift"))
+    );
+    let csv = plan(&folder, &[&args[..], &["--csv"]].concat()).stdout;
+    let mut rows = csv.lines().map(|line| line.split(',').collect::<Vec<_>>());
+    let headings = rows.next().unwrap();
+    let modes = plan_json["modes"].as_array().unwrap();
+    let rows: Vec<_> = rows.collect();
+    assert_eq!((rows.len(), modes.len()), (5, 5));
+    for (row, mode) in rows.iter().zip(modes) {
+        assert_eq!(row.len(), headings.len());
+        let cell = |heading: &str| row[headings.iter().position(|h| *h == heading).unwrap()];
+        assert_eq!(cell("mode"), mode["mode"]);
+        for (heading, value) in [
+            ("t_y2_m", &mode["t_y2_m"]),
+            ("v_max_mps", &mode["v_max_mps"]),
+            ("t_max_m", &mode["spacing"]["t_max_m"]),
+            ("pitch_m", &mode["spacing"]["pitch_m"]),
+        ] {
+            let (cell, value) = (cell(heading).parse::<f64>().unwrap(), value.as_f64().unwrap());
+            assert!((cell - value).abs() < 1e-6, "{heading}: {cell} and {value}");
+        }
+        assert_eq!(cell("meets_target") == "yes", mode["meets_target"].as_bool().unwrap());
+    }
+}
+
+#[test]
+fn v_max_asked_back_as_a_speed_gives_the_target() {
+    let folder = Folder::new();
+    for tunnel in ["ceran", "rectangle,width_m=4,height_m=3", "circle,radius_m=1.2"] {
+        for layout in ["phase_shift", "sector_offset"] {
+            let args = ["--tunnel", tunnel, "--heads", "2", "--layout", layout, "--mode", "medium"];
+            let there = json(&folder, &[&args[..], &["--target", "0.7"]].concat());
+            let v_mps = there["modes"][0]["v_max_mps"].as_f64().unwrap();
+            let back = json(&folder, &[&args[..], &["--speed", &v_mps.to_string()]].concat());
+            let t_m = back["modes"][0]["spacing"]["t_max_m"].as_f64().unwrap();
+            assert!((t_m - 0.7).abs() < 1e-9, "{tunnel} {layout}: {t_m}");
+        }
+    }
+}
+
+#[test]
+fn measured_turns_of_a_vehicle_file_outweigh_the_table() {
+    let folder = Folder::new();
+    let measured = "mode = \"fast\"\nrange_m = 5\nturn_period_s = 6\n\
+                    [[sensors.measured_turns]]\nmode = \"slow\"\nrange_m = 4\nturn_period_s = 15\n\
+                    [[sensors.measured_turns]]\nmode = \"slow\"\nrange_m = 10\nturn_period_s = 21\n";
+    let vehicle = format!(
+        "target_m = 0.5\n[tunnel]\nprofile = \"circle\"\nradius_m = 3\n\
+         [[sensors]]\nid = \"sonar\"\nplugin = \"imagenex881\"\n{measured}"
+    );
+    folder.write("vehicle.toml", vehicle);
+    let found = json(&folder, &["--vehicle", "vehicle.toml"]);
+    let turn = |name: &str| {
+        let mode = found["modes"].as_array().unwrap().iter().find(|mode| mode["mode"] == name).unwrap();
+        (mode["turn_s"].as_f64().unwrap(), mode["turn_basis"].as_str().unwrap().to_owned())
+    };
+    assert_eq!(turn("fast"), (6.0, "measured".to_owned()));
+    // A sixth of the way from 4 m to 10 m.
+    assert_eq!(turn("slow"), (16.0, "estimated".to_owned()));
+    // 5 m less, there and back, 600 pings: 4 s of sound at 1500 m/s.
+    let (medium_s, basis) = turn("medium");
+    assert!((medium_s - (10.8 - 600.0 * 10.0 / 1500.0)).abs() < 1e-6 && basis == "estimated", "{medium_s}");
+}
+
+#[test]
+fn what_cannot_be_planned_is_refused_with_its_reason() {
+    let folder = Folder::new();
+    folder.write("bow.csv", "y_m,z_m\n-1,0\n1,0\n-1,2\n1,2\n");
+    let vehicle = |more: &str| {
+        format!(
+            "target_m = 0.5\n{more}[tunnel]\nprofile = \"circle\"\nradius_m = 3\n\
+             [[sensors]]\nid = \"sonar\"\nplugin = \"imagenex881\"\nmode = \"fast\"\n"
+        )
+    };
+    folder.write("sectors.toml", vehicle("heads = { layout = \"sector_offset\" }\n"));
+    folder.write("hull.toml", vehicle("hull = [{ least_m = [0, 0, 1], most_m = [1, 1, 0] }]\n"));
+    folder.write(
+        "sensors.toml",
+        vehicle("").replace("imagenex881", "tether_hid").replace("mode = \"fast\"", "counts_per_metre = 1"),
+    );
+    let cases: [&[&str]; 17] = [
+        &[],
+        &["--vehicle", "sectors.toml"],
+        &["--vehicle", "hull.toml"],
+        &["--vehicle", "sensors.toml"],
+        &["--tunnel", "ceran"],
+        &["--tunnel", "egg", "--target", "0.5"],
+        &["--tunnel", "circle,radius_m=-3", "--target", "0.5"],
+        &["--tunnel", "circle,radius=3", "--target", "0.5"],
+        &["--tunnel", "bow.csv", "--target", "0.5"],
+        &["--tunnel", "ceran", "--target", "0.5", "--layout", "sector_offset"],
+        &["--tunnel", "ceran", "--target", "0.5", "--drift", "8"],
+        &["--tunnel", "ceran", "--target", "0.5", "--at", "9,1"],
+        &["--tunnel", "ceran", "--target", "0.5", "--mode", "hasty"],
+        &["--tunnel", "ceran", "--target", "0.5", "--range", "7"],
+        &["--tunnel", "ceran", "--speed", "0"],
+        &["--tunnel", "ceran", "--speed=-0.2"],
+        &["--tunnel", "ceran", "--target", "nan"],
+    ];
+    let mut said = String::new();
+    for args in cases {
+        let answer = plan(&folder, args);
+        assert_eq!((answer.code, answer.stdout.as_str()), (Some(2), ""), "{args:?}");
+        writeln!(said, "{}\n    {}", args.join(" "), answer.stderr.lines().next().unwrap()).unwrap();
+    }
+    insta::assert_snapshot!(said, @r#"
+
+        headrace: plan: needs --tunnel or --vehicle
+    --vehicle sectors.toml
+        headrace: sectors.toml:2: heads.layout = "sector_offset": sector offset divides a turn among heads: it needs at least 2, not 1
+    --vehicle hull.toml
+        headrace: hull.toml:2: hull[0].most_m = [1, 1, 0]: must be larger than least_m in each of x, y, z
+    --vehicle sensors.toml
+        headrace: plan: sensors.toml has no profiling head
+    --tunnel ceran
+        headrace: planning: nothing is asked: give a target, a speed or a time
+    --tunnel egg --target 0.5
+        headrace: --tunnel:1: profile = "egg": must be one of ceran, ceran-blueprint, rectangle, circle, arch, trimmed_circle, polyline
+    --tunnel circle,radius_m=-3 --target 0.5
+        headrace: --tunnel:2: radius_m = -3: must be a number from 0.1 to 200
+    --tunnel circle,radius=3 --target 0.5
+        headrace: --tunnel:1: radius_m: is missing
+    --tunnel bow.csv --target 0.5
+        headrace: --tunnel:1: profile = "polyline": the profile isn't star-shaped about (-1, 0): it runs backwards or crosses itself at vertex 0
+    --tunnel ceran --target 0.5 --layout sector_offset
+        headrace: planning: sector offset divides a turn among heads: it needs at least 2, not 1
+    --tunnel ceran --target 0.5 --drift 8
+        headrace: planning: a head at y = 0.000 m, z = -4.908 m is outside the tunnel's profile
+    --tunnel ceran --target 0.5 --at 9,1
+        headrace: planning: a head at y = 9.000 m, z = 1.000 m is outside the tunnel's profile
+    --tunnel ceran --target 0.5 --mode hasty
+        headrace: --mode hasty: expected all or one of slow, medium, fast, faster, fastest
+    --tunnel ceran --target 0.5 --range 7
+        headrace: --range: 7 m is no range setting of the head; it has [1, 2, 3, 4, 5, 10, 20, 30, 40, 50, 60, 80, 100]
+    --tunnel ceran --speed 0
+        error: invalid value '0' for '--speed <MPS>': expected a number from 0.001 to 5 m/s
+    --tunnel ceran --speed=-0.2
+        error: invalid value '-0.2' for '--speed <MPS>': expected a number from 0.001 to 5 m/s
+    --tunnel ceran --target nan
+        error: invalid value 'nan' for '--target <METRES>': expected a number from 0.01 to 20 metres
+    "#);
+}
+
+#[test]
+fn a_target_that_no_mode_meets_is_an_answer_with_exit_code_1() {
+    let folder = Folder::new();
+    let args = ["--tunnel", "ceran", "--target", "0.02"];
+    let answer = plan(&folder, &args);
+    assert_eq!(answer.code, Some(1));
+    assert!(answer.stdout.contains("a target of 0.02 m is met at no speed"), "{}", answer.stdout);
+    assert!(!answer.stdout.contains("NaN") && !answer.stdout.contains("inf"));
+    let modes = &json(&folder, &args)["modes"];
+    assert!(modes.as_array().unwrap().iter().all(|mode| mode["reason"] == "angular_step"));
+    let drawn = plan(&folder, &[&args[..], &["--svg", "pictures"]].concat());
+    assert_eq!(drawn.code, Some(2), "{}", drawn.stderr);
+}
+
+#[test]
+fn pictures_are_drawn_and_the_same_each_time() {
+    let folder = Folder::new();
+    for pictures in ["once", "twice"] {
+        let answer = plan(&folder, &["--vehicle", VITA_2, "--svg", pictures]);
+        assert_eq!(answer.code, Some(0), "{}", answer.stderr);
+    }
+    for name in ["perimeter", "pattern", "speeds", "hours"] {
+        let [once, twice] = ["once", "twice"].map(|pictures| folder.read(&format!("{pictures}/{name}.svg")));
+        assert!(once == twice && once.starts_with(b"<svg"), "{name}");
+    }
+}
+
+/// The pages show what the command draws now: where a picture has changed on purpose, the command in docs/plan/README.md
+/// makes it anew.
+#[test]
+fn the_pages_show_the_pictures_that_are_drawn() {
+    let folder = Folder::new();
+    let args = ["--vehicle", VITA_2, "--target", "0.5", "--mode", "fast", "--svg", "pictures"];
+    assert_eq!(plan(&folder, &args).code, Some(0));
+    for name in ["perimeter", "pattern", "speeds", "hours"] {
+        let page = headrace_tests::root().join(format!("docs/plan/{name}.svg"));
+        let shown = std::fs::read(&page).unwrap();
+        assert!(
+            shown == folder.read(&format!("pictures/{name}.svg")),
+            "{} differs from what is drawn",
+            page.display()
+        );
+    }
+}

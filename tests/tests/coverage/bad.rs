@@ -1,0 +1,108 @@
+//! What a wall can't be: samples outside of the tunnel, and a profile that they contradict. Said once, counted, never a pass.
+
+use headrace_tests::{Folder, SCENE, VEHICLE};
+use serde_json::Value;
+
+/// The short dive with another scene and vehicle; its report, and what the terminal said.
+fn dive(vehicle: &str, scene: &str) -> (Value, String) {
+    let folder = Folder::new();
+    folder.write("vehicle.toml", vehicle);
+    folder.write("scene.toml", scene);
+    folder.simulate("scene.toml", "dive.mcap");
+    let answer = folder.headrace(&["replay", "dive.mcap", "--report", "r.json"]);
+    (serde_json::from_slice(&folder.read("r.json")).unwrap(), answer.stdout)
+}
+
+fn metres(report: &Value, verdict: &str) -> f64 {
+    report["summary"][format!("{verdict}_m")].as_f64().unwrap()
+}
+
+#[test]
+fn a_profile_that_the_returns_contradict_passes_nowhere_and_is_said_once() {
+    let vehicle = VEHICLE.replace("[water]", "[navigation]\nway = \"direct\"\n\n[water]");
+    let as_built = "\n[tunnel.as_built]\nprofile = \"rectangle\"\nwidth_m = 7.6\nheight_m = 7.6\n";
+    let (right, _) = dive(&vehicle, SCENE);
+    let (wrong, said) = dive(&vehicle, &format!("{SCENE}{as_built}"));
+    assert!(metres(&right, "pass") > 2.0 && right["alerts"].as_array().unwrap().is_empty());
+    assert!(metres(&wrong, "pass") <= 0.0, "{}", wrong["summary"]);
+    let alerts = wrong["alerts"].as_array().unwrap();
+    assert_eq!(alerts.len(), 1, "{alerts:?}");
+    assert_eq!(alerts[0]["kind"], "profile_contradicted");
+    assert!(alerts[0]["count"].as_u64().unwrap() > 5 && alerts[0]["worst_m"].as_f64().unwrap() > 0.5);
+    assert_eq!(said.matches("ALERT").count(), 1, "{said}");
+}
+
+#[test]
+fn samples_behind_the_portal_are_said_once_with_how_far() {
+    let scene = SCENE.replace("start_m = 3", "start_m = 0.6");
+    let vehicle = VEHICLE.replace(
+        "id = \"sonar_1\"\nplugin = \"imagenex881\"\n",
+        "id = \"sonar_1\"\nplugin = \"imagenex881\"\nposition_m = [-1.4, 0, 0]\n",
+    );
+    let (report, said) = dive(&vehicle, &scene);
+    let alerts = report["alerts"].as_array().unwrap();
+    assert_eq!((alerts.len(), &alerts[0]["kind"]), (1, &Value::from("outside_tunnel")));
+    assert!((0.3..1.0).contains(&alerts[0]["worst_m"].as_f64().unwrap()), "{alerts:?}");
+    assert_eq!(said.matches("outside the tunnel").count(), 1, "{said}");
+    assert!(report["sections"].as_array().unwrap().iter().all(|s| s["start_m"].as_f64().unwrap() >= 0.0));
+}
+
+#[test]
+fn a_declared_opening_is_listed_and_does_not_fail() {
+    let (scene, vehicle) = (
+        format!("{SCENE}\n[effects.missing_returns]\nshare = 0.0001\n"),
+        format!(
+            "{VEHICLE}\n[[openings]]\nname = \"adit\"\nfrom_m = 4.2\nto_m = 5.4\nclock_from = 8\nclock_to = 10\n"
+        ),
+    );
+    let (report, _) = dive(&vehicle, &scene);
+    assert_eq!(report["openings"][0]["name"], "adit");
+    let masked: Vec<f64> = report["sections"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter(|section| section["masked_share"].as_f64().unwrap() > 0.0)
+        .map(|section| section["start_m"].as_f64().unwrap())
+        .collect();
+    assert_eq!(masked, [4.0, 4.25, 4.5, 4.75, 5.0, 5.25]);
+    let all_round = vehicle.replace("clock_from = 8\nclock_to = 10\n", "");
+    let (report, _) = dive(&all_round, &scene);
+    let sections = report["sections"].as_array().unwrap();
+    let of = |start_m: f64| sections.iter().find(|s| s["start_m"] == start_m).unwrap();
+    assert_eq!(of(4.5)["verdict"], "cannot_say", "there is no wall to pass");
+}
+
+#[test]
+fn other_targets_and_sections_are_judged_in_one_pass_as_by_themselves() {
+    let folder = Folder::with_dive();
+    let (_, together) = folder.replay("dive.mcap", &["--target", "0.5,1.2,2", "--section", "0.25,1"]);
+    let others = together["what_if"].as_array().unwrap();
+    assert_eq!(others.len(), 6);
+    for other in others {
+        let of = |key: &str| other[key].as_f64().unwrap();
+        let (target, section) = (of("target_m").to_string(), of("section_m").to_string());
+        let (_, alone) = folder.replay("dive.mcap", &["--target", &target, "--section", &section]);
+        assert!(alone["what_if"].as_array().unwrap().is_empty());
+        for verdict in ["pass", "fail", "cannot_say", "open"] {
+            let (a, b) = (of(&format!("{verdict}_m")), metres(&alone, verdict));
+            // A fail that is certain before its hole is: what is asked besides waits for the hole.
+            let apart_m =
+                if verdict == "fail" || verdict == "open" { 0.51 * of("section_m").max(0.5) } else { 1e-9 };
+            assert!(
+                (a - b).abs() <= apart_m,
+                "target {target}, sections {section}: {verdict} {a}, alone {b}"
+            );
+        }
+    }
+}
+
+#[test]
+fn another_speed_of_sound_moves_the_wall() {
+    let folder = Folder::with_dive();
+    let mean = |report: &Value| report["sections"][8]["deviation"]["mean_m"].as_f64().unwrap();
+    let (_, as_told) = folder.replay("dive.mcap", &[]);
+    let (_, faster) = folder.replay("dive.mcap", &["--sound-speed", "1500"]);
+    assert!(mean(&as_told).abs() < 0.02, "{}", mean(&as_told));
+    // 3.7 per cent of three metres.
+    assert!((0.06..0.15).contains(&mean(&faster)), "{}", mean(&faster));
+}

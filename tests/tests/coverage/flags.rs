@@ -1,0 +1,178 @@
+//! Flags of two hundred short dives against the definition: raised when a fail can no longer be undone by going on
+//! forward, cleared when a later pass fills the hole. The oracle has the poses and all samples, and knows nothing of
+//! the order in which sections are judged.
+
+use std::sync::LazyLock;
+
+use headrace_geometry::math;
+use headrace_geometry::time::MonoNs;
+use headrace_tests::flags::{EVERY, Flag, Journey, wall_until};
+use headrace_tests::instrumented::Dive;
+use headrace_tests::random_dives::{Kind, Seeded};
+
+use crate::dives::DIVES;
+
+/// A dive with its flags, if a fail is a hole larger than the target, or larger by two of its standard deviations.
+struct Judged {
+    seeded: &'static Seeded,
+    dive: &'static Dive,
+    journey: Journey,
+    at_target: Vec<Flag>,
+    by_two_sigma: Vec<Flag>,
+}
+
+static JUDGED: LazyLock<Vec<Judged>> = LazyLock::new(|| {
+    let judge = |(seeded, dive): &'static (Seeded, Dive)| {
+        let journey = Journey::of(dive);
+        let [at_target, by_two_sigma] = [0.0, 2.0].map(|sigmas| journey.flags(dive, sigmas));
+        Judged { seeded, dive, journey, at_target, by_two_sigma }
+    };
+    DIVES.iter().map(judge).collect()
+});
+
+/// Says of each section of the dives named what is wrong with its flags: as due at the target, and by two sigma.
+#[track_caller]
+fn every_flag(
+    dives: impl Fn(&Judged) -> bool,
+    wrong: impl Fn(&Judged, &Flag, &Flag) -> Option<&'static str>,
+) {
+    let (mut said, mut raised) = (Vec::new(), 0);
+    for judged in JUDGED.iter().filter(|judged| dives(judged)) {
+        for (at_target, by_two_sigma) in judged.at_target.iter().zip(&judged.by_two_sigma) {
+            raised += u32::from(at_target.raised_s.is_some());
+            let Seeded { seed, kind, .. } = *judged.seeded;
+            let wrong = wrong(judged, at_target, by_two_sigma);
+            said.extend(wrong.map(|wrong| format!("seed {seed} ({kind:?}): {wrong}: {by_two_sigma:?}")));
+        }
+    }
+    assert!(raised > 20, "{raised} flags");
+    assert!(said.is_empty(), "{} of {raised} flags: {:#?}", said.len(), &said[..said.len().min(8)]);
+}
+
+/// Flags wait for the section's end to go by, or for the vehicle to stand.
+const SOON_S: f64 = 3.0;
+
+/// Whether a flag was raised before its moment, or without one.
+fn is_early(due: &Flag) -> bool {
+    due.raised_s
+        .is_some_and(|raised_s| due.may_s.is_none_or(|may_s| raised_s < may_s - 1.5 * EVERY.as_secs_f64()))
+}
+
+fn forward(judged: &Judged) -> bool {
+    judged.seeded.kind != Kind::Reversing
+}
+
+fn direct(judged: &Judged) -> bool {
+    judged.seeded.vehicle.contains("way = \"direct\"")
+}
+
+#[test]
+fn no_fail_that_going_on_can_not_undo_is_without_its_flag() {
+    every_flag(forward, |_, _, due| {
+        let due_s = due.due_s.filter(|due_s| due_s + SOON_S < due.end_s);
+        (due_s.is_some() && due.raised_s.is_none()).then_some("never raised")
+    });
+}
+
+#[test]
+fn no_flag_is_raised_while_going_on_can_still_bring_the_hole_within_the_target() {
+    every_flag(forward, |_, due, _| is_early(due).then_some("raised though going on could have undone it"));
+}
+
+#[test]
+fn a_flag_is_raised_within_a_turn_of_its_moment_unless_the_vehicle_stands() {
+    every_flag(
+        |judged| forward(judged) && judged.seeded.kind != Kind::Parked,
+        |judged, _, due| {
+            due.late_s().is_some_and(|late_s| late_s > judged.dive.turn_s).then_some("raised late")
+        },
+    );
+}
+
+#[test]
+fn without_turning_back_no_flag_is_cleared() {
+    every_flag(forward, |_, due, _| due.cleared_s.map(|_| "cleared"));
+}
+
+#[test]
+fn where_position_is_sure_the_sections_flagged_are_those_that_fail() {
+    every_flag(
+        |judged| forward(judged) && direct(judged),
+        |_, _, due| {
+            let stands = due.raised_s.is_some() && due.cleared_s.is_none();
+            (stands && !due.fails).then_some("its flag stands, and it doesn't fail")
+        },
+    );
+}
+
+#[test]
+fn a_flag_is_cleared_only_when_a_later_pass_has_filled_the_hole() {
+    let reversing = |judged: &Judged| judged.seeded.kind == Kind::Reversing;
+    every_flag(reversing, |judged, due, _| {
+        let cleared_s = due.cleared_s?;
+        let until =
+            |at_s: f64| wall_until(judged.dive, MonoNs(math::round_to_i64(at_s * 1e9).unsigned_abs()));
+        let hole_m = |at_s: f64| {
+            let section =
+                judged.dive.report.sections.iter().find(|section| section.start_m >= due.start_m)?;
+            Some(2.0 * until(at_s).largest(section.start_m, section.end_m)?.radius_m)
+        };
+        let target_m = judged.dive.report.target_m;
+        let raised_s = due.raised_s?;
+        let filled = hole_m(raised_s)? > target_m && hole_m(cleared_s)? <= target_m;
+        (!filled || raised_s >= cleared_s).then_some("cleared, not filled")
+    });
+}
+
+#[test]
+fn a_hole_that_a_later_pass_has_surely_filled_keeps_no_flag() {
+    let reversing = |judged: &Judged| judged.seeded.kind == Kind::Reversing;
+    every_flag(reversing, |judged, due, _| {
+        let section = judged.dive.report.sections.iter().find(|section| section.start_m >= due.start_m)?;
+        let stands = due.raised_s.is_some() && due.cleared_s.is_none();
+        (stands && section.verdict == "pass").then_some("passes, and keeps its flag")
+    });
+}
+
+#[test]
+fn on_the_way_out_flags_of_a_dive_that_turns_back_are_raised_like_others() {
+    every_flag(
+        |judged| judged.seeded.kind == Kind::Reversing && direct(judged),
+        |judged, due, _| {
+            let raised_s = due.raised_s.filter(|at_s| *at_s < judged.journey.turned_back_s())?;
+            let moment_s = due.due_s.filter(|at_s| *at_s <= judged.journey.turned_back_s());
+            let late = moment_s.is_none_or(|moment_s| raised_s - moment_s > judged.dive.turn_s);
+            (late || is_early(due)).then_some("raised at another time")
+        },
+    );
+}
+
+#[test]
+fn no_flag_is_raised_by_the_end_of_a_dive() {
+    every_flag(forward, |_, due, _| due.raised_at_the_end().then_some("raised by the end"));
+}
+
+#[test]
+fn no_flag_is_raised_while_going_on_can_still_undo_the_fail() {
+    // By the deviation in the end: under a filter it was another when the flag was raised.
+    every_flag(
+        |judged| forward(judged) && direct(judged),
+        |_, _, due| is_early(due).then_some("raised though going on could have undone it"),
+    );
+}
+
+#[test]
+fn a_vehicle_that_stands_or_turns_back_has_its_flags_within_a_turn() {
+    every_flag(
+        |judged| direct(judged) && matches!(judged.seeded.kind, Kind::Parked | Kind::Reversing),
+        |judged, _, due| {
+            // Who turns back at that moment may undo it.
+            let due_s = due.due_s.filter(|due_s| {
+                let back_s = judged.journey.turned_back_s();
+                !(back_s - 3.0..judged.journey.turned_on_s()).contains(due_s)
+            })?;
+            let late_s = due.raised_s.map_or(f64::INFINITY, |raised_s| raised_s - due_s);
+            (late_s > judged.dive.turn_s).then_some("raised late, or never")
+        },
+    );
+}

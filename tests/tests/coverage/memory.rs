@@ -1,0 +1,54 @@
+//! Memory grows with metres, not with hours: a vehicle that stands for long fills nothing.
+
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_monitor::App;
+use headrace_monitor::run::Loop;
+use headrace_sensor::device::Direction;
+use headrace_simulator::{START, Simulation};
+use headrace_tests::scenes;
+use headrace_vehicle::Mission;
+
+/// A minute on the way, then standing for an hour with noise.
+const SCENE: &str = "vehicle = \"vita2-4.toml\"\n[trajectory]\nkind = \"waypoints\"\n\
+    [[trajectory.waypoints]]\nchainage_m = 5\n\
+    [[trajectory.waypoints]]\nchainage_m = 17\nspeed_mps = 0.2\nstay_s = 3600\n\
+    [[trajectory.waypoints]]\nchainage_m = 17.1\nspeed_mps = 0.2\n\
+    [effects]\nrange_noise = { sd_m = 0.02 }\n";
+
+/// What grows at all once the loop is armed: bytes of samples, and entries of the advice's history.
+fn used(dive: &Loop) -> [usize; 2] {
+    [dive.coverage().store.usage().bytes, dive.advice_log().entries.len()]
+}
+
+#[test]
+fn standing_still_for_long_fills_no_memory() {
+    let scene = scenes::scene(SCENE);
+    let mut app = App::new(Mission { length_m: 100.0, ..scene.vehicle.mission() });
+    for sensor in &scene.vehicle.sensors {
+        app.add_device(sensor.as_ref()).unwrap();
+    }
+    let mut dive = app.arm(scene.vehicle.navigation()).unwrap();
+    let count = dive.sources().len();
+    let mut ports: Vec<_> = (0..count).map(|source| dive.take_port(source).unwrap()).collect();
+    let mut simulation = Simulation::new(&scene).unwrap();
+    let mut seen: Vec<(MonoNs, [usize; 2])> = Vec::new();
+    let mut until = START;
+    while simulation.peek_message().is_some() {
+        until = until + DurNs(20_000_000);
+        while simulation.peek_message().is_some_and(|message| message.at < until) {
+            let message = simulation.next_message().unwrap();
+            if message.direction == Direction::Received {
+                ports[usize::from(message.source)].send(message.at, message.bytes).unwrap();
+            }
+        }
+        dive.tick(until);
+        if (until.0 - START.0).is_multiple_of(300_000_000_000) {
+            seen.push((until, used(&dive)));
+            println!("{:.0} s: {:?}", until.since(START).as_secs_f64(), used(&dive));
+        }
+    }
+    let [early, late] = [seen[seen.len() / 2].1, seen.last().unwrap().1];
+    assert!(late[0] * 100 <= early[0] * 105, "samples: {early:?}, then {late:?} bytes");
+    // An entry every ten seconds, and a few.
+    assert!(late[1] < 500, "advice: {late:?} entries");
+}

@@ -1,0 +1,287 @@
+//! Holes, spacings and verdicts of two hundred short dives against an oracle that has all samples and the definitions, and
+//! no more: no cells, no search radius, no order in which sections are judged. `flags.rs` has the flags.
+
+use std::collections::BTreeMap;
+
+use headrace_geometry::math::{self, TAU};
+use headrace_geometry::time::MonoNs;
+use headrace_monitor::report::{SectionReport, SpreadReport};
+use headrace_tests::flags::{first_failing_m, reached};
+use headrace_tests::instrumented::{Dive, Ping, Sample};
+use headrace_tests::random_dives::Draw;
+use headrace_tests::spacings::{Spacing, spacings, spread};
+use headrace_tests::wall::{Place, Wall};
+
+use crate::dives::DIVES;
+
+const TOLERANCE_M: f64 = 1e-9;
+/// Where the search for a hole ends: the report calls larger ones unbounded.
+const SEARCH_M: f64 = 12.0;
+
+/// Holds every section of every dive to what `misses` has to say of it.
+#[track_caller]
+fn every_section(mut misses: impl FnMut(&Dive, &Wall, &SectionReport) -> Option<String>) {
+    let mut said = Vec::new();
+    for (seeded, dive) in DIVES.iter() {
+        let wall = Wall::new(dive.samples().map(|sample| sample.place), dive.profile.perimeter_m());
+        for section in &dive.report.sections {
+            let miss = misses(dive, &wall, section);
+            said.extend(miss.map(|miss| {
+                format!("seed {} ({:?}), section {}: {miss}", seeded.seed, seeded.kind, section.start_m)
+            }));
+        }
+    }
+    assert!(said.is_empty(), "{} sections: {:#?}", said.len(), &said[..said.len().min(10)]);
+}
+
+#[test]
+fn dives_of_every_kind_have_sections_of_every_verdict() {
+    let mut count = BTreeMap::new();
+    for (seeded, dive) in DIVES.iter() {
+        for section in &dive.report.sections {
+            *count.entry((seeded.kind, section.verdict)).or_insert(0) += 1;
+        }
+    }
+    for (verdict, least) in [("pass", 200), ("fail", 1000), ("cannot_say", 50)] {
+        let all: u32 = count.iter().filter(|((_, v), _)| *v == verdict).map(|(_, n)| n).sum();
+        assert!(all >= least, "{verdict}: {all} sections of {count:?}");
+    }
+}
+
+#[test]
+fn a_sample_lies_where_the_ray_from_the_reference_point_meets_the_design() {
+    for (seeded, dive) in DIVES.iter() {
+        for Sample { place, point } in dive.samples() {
+            let off_m = dive.profile.sigma_of([point[1], point[2]]) - place[1];
+            let off_m = math::wrap_signed(off_m, dive.profile.perimeter_m());
+            assert!(off_m.abs() < TOLERANCE_M, "seed {}: {point:?} at {place:?}", seeded.seed);
+            assert!(point[0].to_bits() == place[0].to_bits(), "seed {}: chainage", seeded.seed);
+        }
+    }
+}
+
+#[test]
+fn val_holes_are_the_largest_empty_circles() {
+    every_section(|_, wall, section| {
+        let Some(hole_m) = section.hole_m else { return Some("not measured".to_owned()) };
+        let largest = wall.largest(section.start_m, section.end_m)?;
+        let expected_m = 2.0 * largest.radius_m;
+        if largest.radius_m > SEARCH_M {
+            let said =
+                !section.hole_bounded && hole_m <= expected_m && ["fail", "open"].contains(&section.verdict);
+            return (!said).then(|| format!("{hole_m} m, bounded, not {expected_m} m"));
+        }
+        let right = section.hole_bounded && (hole_m - expected_m).abs() <= TOLERANCE_M;
+        (!right).then(|| format!("{hole_m} m, not {expected_m} m about {:?}", largest.centre))
+    });
+}
+
+#[test]
+fn a_hole_is_where_it_is_said_to_be() {
+    every_section(|_, wall, section| {
+        let centre = section.hole_x_m.zip(section.hole_sigma_at_m).filter(|_| section.hole_bounded);
+        let (x_m, sigma_m) = centre?;
+        let clear_m = 2.0 * wall.clear_m([x_m, sigma_m]);
+        let within = (section.start_m - TOLERANCE_M..=section.end_m + TOLERANCE_M).contains(&x_m);
+        let right = within && (clear_m - section.hole_m?).abs() <= TOLERANCE_M;
+        (!right).then(|| format!("{clear_m} m about {x_m}, {sigma_m}, not {:?}", section.hole_m))
+    });
+}
+
+#[test]
+fn val_verdicts_follow_from_hole_sigma_and_target() {
+    every_section(|dive, wall, section| {
+        let largest = wall.largest(section.start_m, section.end_m)?;
+        let (hole_m, target_m, twice_m) =
+            (2.0 * largest.radius_m, dive.report.target_m, 2.0 * section.hole_sigma_m);
+        // What going on forward could still fill is open.
+        let rear_m = reached(dive).last()?.rear_m;
+        let radius_m = f64::midpoint(target_m, twice_m);
+        let first_m = first_failing_m(wall, [section.start_m, section.end_m], radius_m);
+        // Where the first such circle is, is known to a twentieth of the section; the program goes by the largest deviation
+        // round the wall, and by the farthest wall for the reach of a tilted head.
+        let near_m = (section.end_m - section.start_m) / 20.0 + 2.0 * section.hole_sigma_m + 0.03;
+        let clear_m = first_m.map_or(f64::NEG_INFINITY, |first_m| rear_m - first_m - radius_m);
+        let behind_m = rear_m - largest.centre[0] - largest.radius_m;
+        let expected = match section.verdict {
+            _ if hole_m + twice_m <= target_m => "pass",
+            either @ ("fail" | "open") if clear_m.abs() <= near_m => either,
+            either @ ("fail" | "cannot_say") if (hole_m - twice_m - target_m).abs() < 0.01 => either,
+            either @ ("open" | "cannot_say") if behind_m.abs() <= near_m => either,
+            _ if clear_m > 0.0 => "fail",
+            _ if behind_m < 0.0 => "open",
+            _ => "cannot_say",
+        };
+        (section.verdict != expected)
+            .then(|| format!("{}, not {expected}: {hole_m} m, {twice_m} m", section.verdict))
+    });
+}
+
+/// Why a spread isn't that of these values; `None` if it is. Variances are compared: where all values are equal, a
+/// deviation is the root of rounding.
+fn differs(got: &SpreadReport, values: &[f64]) -> Option<String> {
+    let expected = spread(values);
+    let figures = [got.min_m, got.mean_m, got.max_m, got.sd_m.map(|sd_m| sd_m * sd_m)];
+    let same = expected.map_or(got.count == 0, |expected| {
+        let near = |(got, expected): (&Option<f64>, f64)| {
+            got.is_some_and(|got| (got - expected).abs() <= TOLERANCE_M)
+        };
+        usize::try_from(got.count).unwrap() == values.len() && figures.iter().zip(expected).all(near)
+    });
+    (!same).then(|| format!("{got:?}, not {} of {expected:?}", values.len()))
+}
+
+#[test]
+fn val_spacings_of_every_section() {
+    let (mut judged, mut sections) = (0, 0);
+    for (seeded, dive) in DIVES.iter() {
+        let all = spacings(&dive.pings, dive.profile.perimeter_m());
+        for section in &dive.report.sections {
+            let within = |spacing: &&Spacing| (section.start_m..section.end_m).contains(&spacing.x_m);
+            let here: Vec<&Spacing> = all.iter().filter(within).collect();
+            let values = |of: &dyn Fn(&Spacing) -> Option<f64>| -> Vec<f64> {
+                here.iter().filter_map(|spacing| of(spacing)).collect()
+            };
+            let at = format!("seed {} ({:?}), section {}", seeded.seed, seeded.kind, section.start_m);
+            assert_eq!(usize::try_from(section.samples).unwrap(), here.len(), "{at}: samples");
+            let miss = differs(&section.t_y, &values(&|spacing| spacing.t_y_m));
+            assert!(miss.is_none(), "{at}: T_y {miss:?}");
+
+            let [fewest, most] = [0, 1].map(|k| values(&|spacing| spacing.t_x_m[k]));
+            let count = usize::try_from(section.t_x.count).unwrap();
+            assert!((fewest.len()..=most.len()).contains(&count), "{at}: {count} T_x");
+            sections += 1;
+            let same = |[a, b]: [Option<f64>; 2]| match (a, b) {
+                (Some(a), Some(b)) => (a - b).abs() <= TOLERANCE_M,
+                _ => a.is_none() && b.is_none(),
+            };
+            if here.iter().all(|spacing| same(spacing.t_x_m)) {
+                judged += 1;
+                let miss = differs(&section.t_x, &fewest);
+                assert!(miss.is_none(), "{at}: T_x {miss:?}");
+                let miss = differs(&section.t, &values(&|spacing| spacing.t_m[0]));
+                assert!(miss.is_none(), "{at}: T {miss:?}");
+            }
+        }
+    }
+    assert!(10 * judged > 7 * sections, "{judged} of {sections} sections without ends of rows");
+}
+
+// What the oracle itself must get right.
+
+fn lattice(rows: u32, columns: u32, at: impl Fn(f64, f64) -> Place) -> Vec<Place> {
+    let row = |i| (0..columns).map(move |j| (f64::from(i), f64::from(j)));
+    (0..rows).flat_map(row).map(|(i, j)| at(i, j)).collect()
+}
+
+#[track_caller]
+fn holds(wall: &Wall, from_m: f64, to_m: f64, expected_m: f64) {
+    let hole_m = 2.0 * wall.largest(from_m, to_m).unwrap().radius_m;
+    assert!((hole_m - expected_m).abs() < 1e-12 * (1.0 + expected_m), "{hole_m}, not {expected_m}");
+}
+
+#[test]
+fn lattices_have_holes_that_are_known() {
+    let diagonal_m = math::sqrt(2.0);
+    // Squares of 0.25 m, all corners on common circles; then as far as a section that holds no centre sees of them.
+    let squares = Wall::new(lattice(20, 24, |i, j| [0.25 * i, 0.25 * j]), 6.0);
+    holds(&squares, 1.0, 1.25, 0.25 * diagonal_m);
+    holds(&squares, 1.0, 1.05, 2.0 * math::hypot(0.05, 0.125));
+    // Rows set off by half a step: triangles with sides of 0.4 m.
+    let height_m = 0.2 * math::sqrt(3.0);
+    let triangles = Wall::new(lattice(20, 10, |i, j| [height_m * i, 0.4 * j + 0.2 * (i % 2.0)]), 4.0);
+    holds(&triangles, 1.0, 2.0, 0.8 / math::sqrt(3.0));
+    // One ring: the farther away, the larger.
+    let ring = Wall::new(lattice(1, 10, |_, j| [0.0, 0.3 * j]), 3.0);
+    holds(&ring, 1.0, 2.0, 2.0 * math::hypot(2.0, 0.15));
+    // One sample, again and again: the far side of the perimeter.
+    let one = Wall::new(vec![[5.0, 0.0]; 7], 8.0);
+    holds(&one, 5.0, 8.0, 10.0);
+    assert!(Wall::new(Vec::new(), 8.0).largest(0.0, 1.0).is_none());
+}
+
+fn scattered(seed: u64, count: usize, perimeter_m: f64) -> Vec<Place> {
+    let mut draw = Draw::new(seed);
+    (0..count).map(|_| [draw.between(-0.4, 0.9), draw.between(0.0, perimeter_m)]).collect()
+}
+
+#[test]
+fn holes_of_small_sets_are_what_a_dense_search_finds() {
+    let (perimeter_m, step_m) = (2.0, 0.004);
+    for seed in 0..30 {
+        let wall =
+            Wall::new(scattered(seed, 1 + usize::try_from(seed).unwrap() % 9, perimeter_m), perimeter_m);
+        let along = (0..=125).map(|i| f64::from(i) * step_m);
+        let around = || (0..500).map(|j| f64::from(j) * step_m);
+        let dense_m = along
+            .flat_map(|x| around().map(move |sigma| [x, sigma]))
+            .map(|at| wall.clear_m(at))
+            .fold(0.0, f64::max);
+        let exact = wall.largest(0.0, 0.5).unwrap();
+        let short_m = exact.radius_m - dense_m;
+        // The distance to the nearest sample changes by no more than one moves.
+        assert!((-1e-12..=step_m / math::sqrt(2.0)).contains(&short_m), "{seed}: {exact:?}, {dense_m}");
+    }
+}
+
+#[test]
+fn the_seam_may_lie_anywhere() {
+    let perimeter_m = 3.0;
+    for seed in 0..20 {
+        let samples = scattered(seed, 60, perimeter_m);
+        let shift_m = 0.13 * seed as f64;
+        let shifted = samples.iter().map(|[x, sigma]| [*x, math::wrap(sigma + shift_m, perimeter_m)]);
+        let [here, there] = [Wall::new(samples.clone(), perimeter_m), Wall::new(shifted, perimeter_m)];
+        let holes = [here, there].map(|wall| wall.largest(0.0, 0.5).unwrap().radius_m);
+        assert!((holes[0] - holes[1]).abs() < 1e-12, "{seed}: {holes:?}");
+    }
+}
+
+/// One head on a circle, `count` pings a turn, `d_m` of chainage a ping.
+fn helix(radius_m: f64, count: u32, d_m: f64, pings: u32) -> Vec<Ping> {
+    let ping = |k: u32| {
+        let angle = TAU * f64::from(k % count) / f64::from(count);
+        let (sin, cos) = math::sin_cos(angle);
+        let x_m = d_m * f64::from(k);
+        Ping {
+            head: 0,
+            received: MonoNs(u64::from(k)),
+            single_step: k > 0,
+            new_sweep: k == 0,
+            pose: None,
+            sample: Some(Sample {
+                place: [x_m, angle * radius_m],
+                point: [x_m, radius_m * sin, -radius_m * cos],
+            }),
+        }
+    };
+    (0..pings).map(ping).collect()
+}
+
+#[test]
+fn a_helix_has_the_spacings_of_its_formulas() {
+    let (radius_m, count, d_m) = (2.0, 40, 0.01);
+    let mut pings = helix(radius_m, count, d_m, 130);
+    let chord_m = 2.0 * radius_m * math::sin(TAU / 80.0);
+    let t_y_m = math::hypot(chord_m, d_m);
+    let t_x_m = 40.0 * d_m;
+    let all = spacings(&pings, TAU * radius_m);
+    assert!(all[..40].iter().all(|spacing| spacing.t_x_m == [None, None]));
+    assert_eq!(all[40].t_x_m[0], None, "the first ping of all is an end of its row");
+    for spacing in &all[41..] {
+        for t_x in spacing.t_x_m {
+            assert!((t_x.unwrap() - t_x_m).abs() < 1e-12);
+        }
+        assert!((spacing.t_y_m.unwrap() - t_y_m).abs() < 1e-12);
+        assert!((spacing.t_m[0].unwrap() - math::hypot(t_x_m + d_m, t_y_m)).abs() < 1e-12);
+    }
+    // A return that stays away: the next turn has nothing over its two steps, T_y is measured across the gap.
+    pings[20].sample = None;
+    let all = spacings(&pings, TAU * radius_m);
+    assert!(
+        (all[20].t_y_m.unwrap() - math::hypot(2.0 * radius_m * math::sin(TAU / 40.0), 2.0 * d_m)).abs()
+            < 1e-12
+    );
+    assert_eq!(all[59].t_x_m, [None, None]);
+    assert!(all[61].t_x_m[0].is_some());
+}

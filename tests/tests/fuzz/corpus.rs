@@ -1,0 +1,189 @@
+//! Files of each kind that are whole: small logs of our own making, and fixtures of foreign formats.
+
+use std::collections::BTreeMap;
+use std::io::Cursor;
+
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_mavlink::MavHeader;
+use headrace_mavlink::dialect::ATTITUDE_DATA;
+use headrace_mavlink::message::Message;
+use headrace_replay::log::{LogHeader, LogWriter, SourceInfo};
+use headrace_tests::random::Random;
+use mcap::{Compression, WriteOptions};
+
+use crate::messages::{Said, said};
+use crate::mutate::broken;
+
+/// Begin of the logs that are broken.
+const BEGIN: MonoNs = MonoNs(1_000_000_000);
+
+/// What reads a file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Kind {
+    Log,
+    Tlog,
+    Candump,
+    Imagenex,
+    Ping,
+    Csv,
+    Bag,
+    Mcap,
+}
+
+const KINDS: [(Kind, &str); 8] = [
+    (Kind::Log, "log"),
+    (Kind::Tlog, "tlog"),
+    (Kind::Candump, "candump"),
+    (Kind::Imagenex, "imagenex"),
+    (Kind::Ping, "ping"),
+    (Kind::Csv, "csv"),
+    (Kind::Bag, "bag"),
+    (Kind::Mcap, "mcap"),
+];
+
+impl Kind {
+    pub(crate) fn name(self) -> &'static str {
+        KINDS.iter().find(|(kind, _)| *kind == self).map_or("", |(_, name)| name)
+    }
+
+    pub(crate) fn named(name: &str) -> Option<Self> {
+        KINDS.iter().find(|(_, known)| *known == name).map(|(kind, _)| *kind)
+    }
+}
+
+pub(crate) struct File {
+    pub(crate) kind: Kind,
+    pub(crate) bytes: Vec<u8>,
+}
+
+pub(crate) struct Corpus {
+    pub(crate) files: Vec<File>,
+    /// What the logs say, all of them: a broken one says as much, or what it has lost. By the log that it was.
+    pub(crate) said: Vec<Said>,
+}
+
+impl Corpus {
+    pub(crate) fn new() -> Self {
+        let mut files = Vec::new();
+        let mut add = |kind, bytes| files.push(File { kind, bytes });
+        // Three times as often as foreign files: they are what must not be lost.
+        for messages in [12, 60] {
+            add(Kind::Log, ours(messages));
+            add(
+                Kind::Log,
+                foreign(messages, |options| {
+                    options.compression(Some(Compression::Lz4)).chunk_size(Some(300))
+                }),
+            );
+            add(Kind::Log, foreign(messages, |options| options.compression(None).chunk_size(Some(500))));
+            add(Kind::Log, foreign(messages, |options| options.use_chunks(false)));
+        }
+        let telemetry = (0..40).flat_map(|n: u8| {
+            [(1_600_000_000_000_000 + u64::from(n) * 1000).to_be_bytes().to_vec(), frame(n)].concat()
+        });
+        add(Kind::Tlog, telemetry.collect());
+        let line =
+            |n: u32| format!("(1436509052.{:06}) can0 {:03X}#2A366C2B{:02X}\n", n * 1000, 0x21 + n % 4, n);
+        add(Kind::Candump, (0..60).map(line).collect::<String>().into_bytes());
+        add(Kind::Imagenex, (10..30).flat_map(shot).collect());
+        add(Kind::Ping, ping_log(20));
+        add(Kind::Csv, fixture("values.csv")[..3000].to_vec());
+        add(Kind::Csv, fixture("heads.csv"));
+        for name in ["none.bag", "lz4.bag", "bz2.bag"] {
+            add(Kind::Bag, fixture(name));
+        }
+        for name in ["humble.mcap", "jazzy.mcap"] {
+            add(Kind::Mcap, fixture(name));
+        }
+        let said = files
+            .iter()
+            .filter(|file| file.kind == Kind::Log)
+            .map(|file| said(&file.bytes).unwrap().0)
+            .collect();
+        Self { files, said }
+    }
+
+    /// A broken file.
+    pub(crate) fn mutant(&self, random: &mut Random) -> (Kind, Vec<u8>) {
+        let file = &self.files[random.below(self.files.len())];
+        let others: Vec<&File> =
+            self.files.iter().filter(|other| other.kind == file.kind || random.below(20) == 0).collect();
+        let other = others[random.below(others.len())];
+        (file.kind, broken(random, &file.bytes, &other.bytes))
+    }
+}
+
+fn fixture(name: &str) -> Vec<u8> {
+    std::fs::read(headrace_tests::root().join("tests/ros").join(name)).unwrap()
+}
+
+/// Content that is told from any other, of several lengths.
+fn content(number: u64) -> Vec<u8> {
+    let mut random = Random(number);
+    (0..=number % 40).map(|_| random.bits().to_le_bytes()[3]).collect()
+}
+
+fn ours(messages: u64) -> Vec<u8> {
+    let source = |id: &str| SourceInfo { id: id.to_owned(), ..SourceInfo::default() };
+    let header = LogHeader { sources: vec![source("depth"), source("imu")], ..LogHeader::default() };
+    let mut log = LogWriter::new(Cursor::new(Vec::new()), &header).unwrap();
+    for number in 0..messages {
+        // Several chunks of at most half a second.
+        let at = BEGIN + DurNs::from_millis(i64::try_from(number * 40).unwrap());
+        log.raw(u16::try_from(number % 2).unwrap(), at, at, &content(number)).unwrap();
+    }
+    log.finish().unwrap().0.into_inner()
+}
+
+fn foreign(messages: u64, set: impl FnOnce(WriteOptions) -> WriteOptions) -> Vec<u8> {
+    let mut file = Cursor::new(Vec::new());
+    let mut writer = set(WriteOptions::new().profile("")).create(&mut file).unwrap();
+    let channels =
+        ["/raw/depth", "/raw/imu"].map(|topic| writer.add_channel(0, topic, "", &BTreeMap::new()).unwrap());
+    for number in 0..messages {
+        let log_time = BEGIN.0 + number * 40_000_000;
+        let channel_id = channels[usize::try_from(number % 2).unwrap()];
+        let sequence = u32::try_from(number).unwrap();
+        let head = mcap::records::MessageHeader { channel_id, sequence, log_time, publish_time: log_time };
+        writer.write_to_known_channel(&head, &content(number)).unwrap();
+    }
+    writer.finish().unwrap();
+    drop(writer);
+    file.into_inner()
+}
+
+fn frame(sequence: u8) -> Vec<u8> {
+    // Its last field isn't zero, so that all 28 bytes are sent.
+    let attitude = ATTITUDE_DATA { yawspeed: 1.0, ..ATTITUDE_DATA::DEFAULT };
+    let frame = Message::Attitude(attitude).to_frame(MavHeader { system_id: 1, component_id: 1, sequence });
+    frame.raw_bytes().to_vec()
+}
+
+fn text(text: &str) -> Vec<u8> {
+    let units: Vec<u8> = text.encode_utf16().flat_map(u16::to_be_bytes).collect();
+    [&u32::try_from(units.len()).unwrap().to_be_bytes()[..], &units].concat()
+}
+
+fn ping_log(records: u32) -> Vec<u8> {
+    let mut file = [text("PingViewer sensor log file"), 1_u32.to_be_bytes().to_vec()].concat();
+    for words in ["abc", "2024-01-01", "v2.4", "Linux", "12"] {
+        file.extend(text(words));
+    }
+    file.extend([0, 0, 0, 1, 0, 0, 0, 1]);
+    for number in 0..records {
+        file.extend(text(&format!("23:59:5{}.{:03}", number % 10, number)));
+        let message = content(u64::from(number));
+        file.extend(u32::try_from(message.len()).unwrap().to_be_bytes());
+        file.extend(message);
+    }
+    file
+}
+
+fn shot(seconds: u8) -> Vec<u8> {
+    let mut shot = vec![0; 128];
+    shot[..8].copy_from_slice(b"81A\0\0\x80\0\x0D");
+    shot[8..19].copy_from_slice(b"18-Nov-2016");
+    shot[20..32].copy_from_slice(format!("19:29:{seconds:02}\0.17").as_bytes());
+    shot[100] = b'I';
+    shot
+}

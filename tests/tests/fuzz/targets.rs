@@ -1,0 +1,231 @@
+//! What reads files, and what must hold of it.
+
+use std::io::Cursor;
+
+use headrace::devices::KINDS;
+use headrace_config::Document;
+use headrace_geometry::time::MonoNs;
+use headrace_import::candump::Candump;
+use headrace_import::csv::Csv;
+use headrace_import::detect::looks_like;
+use headrace_import::imagenex::{self, ImagenexFormat};
+use headrace_import::ping::{self, PingFormat};
+use headrace_import::ros::bag::Bag;
+use headrace_import::ros::mcap::Mcap;
+use headrace_import::ros::{Feeds, Topic};
+use headrace_import::tlog::{self, TlogFormat};
+use headrace_import::{Format, Import, Input, Source, Taker};
+use headrace_replay::log::{LogHeader, LogWriter, SourceInfo};
+use headrace_sensor::driver::DriverSetup;
+use headrace_vehicle::VehicleConfig;
+
+use crate::corpus::{Corpus, Kind};
+use crate::messages::{Said, said};
+
+/// What files need about them: a vehicle, and mappings.
+pub(crate) struct Surroundings {
+    vehicle: VehicleConfig,
+}
+
+const VEHICLE: &str = r#"target_m = 1.2
+[tunnel]
+profile = "circle"
+radius_m = 3
+length_m = 100
+[[sensors]]
+id = "imu"
+plugin = "imu_can"
+preset = "xsens_mti600"
+[[sensors]]
+id = "depth"
+plugin = "bar100"
+[[sensors]]
+id = "tether"
+plugin = "tether_hid"
+counts_per_metre = 2000
+[[sensors]]
+id = "ping_left"
+plugin = "ping1d"
+[[sensors]]
+id = "sonar_0"
+plugin = "imagenex881"
+mode = "fastest"
+range_m = 5
+[[sensors]]
+id = "sonar_1"
+plugin = "imagenex881"
+mode = "fastest"
+range_m = 5
+[[sensors]]
+id = "autopilot"
+plugin = "mavlink"
+part = "imu"
+"#;
+
+const TOPICS: [(&str, &str); 6] = [
+    ("/imu/data", "imu"),
+    ("/pressure", "depth"),
+    ("/cable", "tether"),
+    ("/ping/left", "ping_left"),
+    ("/sonar/scan", "sonar_0"),
+    ("/sonar/points", "sonar_1"),
+];
+
+impl Surroundings {
+    pub(crate) fn new() -> Self {
+        let vehicle =
+            VehicleConfig::parse(
+                Document::new("vehicle.toml", VEHICLE),
+                &KINDS,
+                &|name| Err(name.to_owned()),
+            );
+        Self { vehicle: vehicle.unwrap() }
+    }
+
+    /// Every sensor listens to the line of this name, and to one named as itself.
+    fn takers(&self, kind: Kind) -> Vec<Taker> {
+        let line = match kind {
+            Kind::Tlog => tlog::STREAM,
+            Kind::Imagenex => imagenex::STREAM,
+            Kind::Ping => ping::STREAM,
+            _ => "can0",
+        };
+        let setup = DriverSetup { begun: MonoNs(0), head: None };
+        let sensors = (0..).zip(&self.vehicle.sensor_configs).zip(&self.vehicle.sensors);
+        sensors
+            .map(|((source, config), device)| {
+                let own = matches!(kind, Kind::Csv | Kind::Bag | Kind::Mcap);
+                let stream = if own { config.id.clone() } else { line.to_owned() };
+                let driver =
+                    (kind == Kind::Tlog && config.plugin == "mavlink").then(|| device.driver(&setup));
+                Taker { source, stream, driver }
+            })
+            .collect()
+    }
+
+    /// As a mapping says, for the topics that there are; stamps are followed in half of them.
+    fn feeds(&self, topics: &[Topic]) -> Feeds {
+        let there = TOPICS.iter().filter(|(name, _)| topics.iter().any(|topic| topic.name == *name));
+        let text = there.fold(String::new(), |text, (topic, sensor)| {
+            let time = if sensor.starts_with("sonar") { "time = \"header\"" } else { "" };
+            format!("{text}[[topics]]\ntopic = \"{topic}\"\nsensor = \"{sensor}\"\n{time}\n")
+        });
+        let mapping = Document::new("topics.toml", &text).root().unwrap();
+        Feeds::mapped(mapping, &self.vehicle, topics).unwrap_or_default()
+    }
+}
+
+/// Tries a file that may be anything.
+///
+/// Errors: what is wrong with how it was read, in words.
+pub(crate) fn try_one(
+    kind: Kind,
+    bytes: &[u8],
+    corpus: &Corpus,
+    around: &Surroundings,
+) -> Result<(), String> {
+    looks_like(bytes);
+    if kind != Kind::Log {
+        imported(kind, bytes, around);
+        return Ok(());
+    }
+    let Ok((said, silent)) = said(bytes) else { return Ok(()) };
+    if !silent || !is_vouched_for(bytes) {
+        return Ok(());
+    }
+    // Parts of other logs may have come into it; but one it must be whole.
+    let holds =
+        |whole: &Said| whole.iter().all(|(message, count)| said.get(message).is_some_and(|got| got >= count));
+    if corpus.said.iter().any(holds) {
+        Ok(())
+    } else {
+        Err(format!("{} messages, and no loss is said", said.len()))
+    }
+}
+
+/// Whether checksums are there: zero says that there is none, and then nobody can tell that a byte has changed.
+fn is_vouched_for(log: &[u8]) -> bool {
+    let mut rest = &log[8..];
+    while let Some((head, behind)) = rest.split_first_chunk::<9>() {
+        let len = u64::from_le_bytes(head[1..].try_into().unwrap());
+        let Some((body, next)) = usize::try_from(len).ok().and_then(|len| behind.split_at_checked(len))
+        else {
+            break;
+        };
+        let sum = match head[0] {
+            0x06 => body.get(24..28),
+            0x0F => body.get(..4),
+            _ => None,
+        };
+        if sum == Some(&[0; 4]) {
+            return false;
+        }
+        rest = next;
+    }
+    true
+}
+
+/// How much a file gives.
+pub(crate) fn gives(kind: Kind, bytes: &[u8], around: &Surroundings) -> u64 {
+    match kind {
+        Kind::Log => said(bytes).unwrap().0.len() as u64,
+        kind => imported(kind, bytes, around),
+    }
+}
+
+/// Imports a file into a log, which must be whole.
+fn imported(kind: Kind, bytes: &[u8], around: &Surroundings) -> u64 {
+    let format: Box<dyn Format> = match kind {
+        Kind::Log | Kind::Mcap => {
+            let Ok(recording) = Mcap::open("file", Cursor::new(bytes)) else { return 0 };
+            let feeds = around.feeds(&recording.topics());
+            return written(kind, recording.feeding(feeds), around);
+        }
+        Kind::Tlog => Box::<TlogFormat>::default(),
+        Kind::Candump => Box::new(Candump),
+        Kind::Imagenex => Box::new(ImagenexFormat),
+        Kind::Ping => Box::<PingFormat>::default(),
+        Kind::Csv => {
+            let Some(table) = table(bytes, around) else { return 0 };
+            Box::new(table)
+        }
+        Kind::Bag => {
+            let Ok(topics) = Bag::topics("file", Cursor::new(bytes)) else { return 0 };
+            Box::new(Bag::new(around.feeds(&topics)))
+        }
+    };
+    written(kind, Input::new("file", Cursor::new(bytes.to_vec()), format), around)
+}
+
+/// A table of an inertial unit and a depth sensor, or of a head.
+fn table(bytes: &[u8], around: &Surroundings) -> Option<Csv> {
+    let columns = |columns: &[[&str; 4]]| {
+        let head = "time_column = \"t\"\nutc = true\n".to_owned();
+        columns.iter().fold(head, |text, [column, sensor, quantity, unit]| {
+            format!("{text}[[columns]]\ncolumn = \"{column}\"\nsensor = \"{sensor}\"\nquantity = \"{quantity}\"\nunit = \"{unit}\"\n")
+        })
+    };
+    let values = columns(&[["depth", "depth", "pressure", "Pa"], ["tether", "tether", "chainage", "m"]]);
+    let heads = columns(&[["angle", "sonar_0", "angle", "rad"], ["range", "sonar_0", "range", "m"]]);
+    let line = bytes.split(|byte| *byte == b'\n').next().unwrap_or_default();
+    let line = String::from_utf8_lossy(line);
+    [values, heads].iter().find_map(|text| {
+        Csv::new(Document::new("map.toml", text).root().unwrap(), &around.vehicle, &line).ok()
+    })
+}
+
+fn written<S: Source>(kind: Kind, input: S, around: &Surroundings) -> u64 {
+    let Ok(import) = Import::of(input, "entry") else { return 0 };
+    let ids = around.vehicle.sensor_configs.iter().map(|config| config.id.clone());
+    let sources = ids.map(|id| SourceInfo { id, ..SourceInfo::default() }).collect();
+    let header = LogHeader { sources, ..LogHeader::default() };
+    let mut log = LogWriter::new(Cursor::new(Vec::new()), &header).unwrap();
+    let Ok(imported) = import.write(&mut log, &mut around.takers(kind), &mut |_| ()) else { return 0 };
+    let file = log.finish().unwrap().0.into_inner();
+    let (said, whole) = said(&file).unwrap();
+    let messages: u64 = imported.messages.iter().sum();
+    assert!(whole, "a log that was just written has losses");
+    assert_eq!(said.values().map(|count| u64::from(*count)).sum::<u64>(), messages, "messages of the log");
+    assert!(imported.losses.iter().chain(&imported.remarks).all(|words| !words.is_empty()));
+    messages
+}

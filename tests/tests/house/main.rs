@@ -1,0 +1,9 @@
+//! Rules of this repository: layers, circles, what the core may use, and what each crate states about itself.
+
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
+
+mod circles;
+mod imports;
+mod known_circles;
+mod tidy;
+mod workspace;

@@ -1,0 +1,300 @@
+//! val: foreign logs become ours, and the ordinary decoders read them. Recordings of others are in `recordings/`, trimmed;
+//! where `HEADRACE_RECORDINGS` is set, they are read at full length, too.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use headrace_tests::recordings;
+use headrace_tests::{Answer, Folder, VEHICLE, raw_messages};
+use serde_json::Value;
+
+const TELEMETRY: &str = "bluerov2_ardusub_logs/small.tlog";
+
+const TUNNEL: &str = r#"name = "BlueROV2"
+target_m = 1
+[tunnel]
+profile = "circle"
+radius_m = 3
+length_m = 100
+"#;
+
+const AUTOPILOT: &str = r#"
+[[sensors]]
+id = "attitude"
+plugin = "mavlink"
+part = "imu"
+system_id = 1
+component_id = 1
+
+[[sensors]]
+id = "depth"
+plugin = "mavlink"
+part = "pressure"
+system_id = 1
+"#;
+
+const HEAD: &str = r#"
+[[sensors]]
+id = "sonar_0"
+plugin = "imagenex881"
+mode = "fastest"
+range_m = 10
+"#;
+
+fn json(answer: &Answer) -> Value {
+    serde_json::from_str(&answer.stdout).unwrap_or_else(|error| panic!("{error}: {}", answer.stderr))
+}
+
+#[track_caller]
+fn refused(folder: &Folder, arguments: &[&str], words: &[&str]) {
+    let answer = folder.headrace(&[&["import"], arguments].concat());
+    assert_eq!(answer.code, Some(2), "{}", answer.stderr);
+    for word in words {
+        assert!(answer.stderr.contains(word), "{word:?} is not in {}", answer.stderr);
+    }
+    assert!(!folder.path("out.mcap").exists(), "no log of a file that is none");
+}
+
+/// How many entries of a telemetry log are whole, and what its vehicle's sensors get of them.
+struct Telemetry {
+    entries: u64,
+    attitude: u64,
+    depth: u64,
+}
+
+#[test]
+fn telemetry_of_a_bluerov_replays() {
+    // As `oracles/tlog.py` counts them: attitude is ATTITUDE and RAW_IMU, depth is SCALED_PRESSURE2.
+    let trimmed = Telemetry { entries: 6499 - 4, attitude: 776 + 81, depth: 188 };
+    let full_length = Telemetry { entries: 35_916 - 4, attitude: 5245 + 528, depth: 635 };
+    for (path, wanted) in recordings::both(TELEMETRY, trimmed, full_length) {
+        check_telemetry(path.to_str().unwrap(), &wanted);
+    }
+}
+
+fn check_telemetry(file: &str, wanted: &Telemetry) {
+    let folder = Folder::new();
+    folder.write("vehicle.toml", format!("{TUNNEL}{AUTOPILOT}"));
+    let answer = folder.headrace(&["import", file, "--vehicle", "vehicle.toml", "-o", "out.mcap", "--json"]);
+    // Four frames of its camera have a checksum that fits no definition.
+    assert_eq!(answer.code, Some(3), "{}", answer.stderr);
+    let shown = json(&answer);
+    assert!(answer.stderr.contains("4 times"), "{}", answer.stderr);
+    let &Telemetry { entries, attitude, depth } = wanted;
+    assert_eq!(shown["messages"], serde_json::json!({"attitude": attitude, "depth": depth}));
+    assert_eq!(shown["entries"], entries);
+    assert_eq!(shown["passed_over"], entries - attitude - depth);
+    let (code, report) = folder.replay("out.mcap", &[]);
+    assert_eq!(code, Some(1), "a dive without sonar");
+    assert_eq!(report["log"]["losses"], serde_json::json!([]));
+    for (source, frames) in report["sources"].as_array().unwrap().iter().zip([attitude, depth]) {
+        assert_eq!((&source["frames"], &source["bad_frames"]), (&frames.into(), &0.into()), "{source}");
+    }
+    let log = folder.read("out.mcap");
+    let summary = mcap::Summary::read(&log).unwrap().unwrap();
+    let first = raw_messages(&log).first().unwrap().log_time;
+    assert!((1_000_000_000..2_000_000_000).contains(&first), "{first}");
+    let metadata = summary.metadata_indexes.iter().find(|index| index.name == "headrace").unwrap();
+    let metadata = mcap::read::metadata(&log, metadata).unwrap().metadata;
+    assert_eq!((metadata["import_format"].as_str(), metadata["import_clock"].as_str()), ("tlog", "utc"));
+    assert_eq!(metadata["clock_anchor_monotonic_ns"], "1000000000");
+    let utc_ns: u64 = metadata["clock_anchor_utc_ns"].parse().unwrap();
+    let bytes = std::fs::read(file).unwrap();
+    assert_eq!(utc_ns, u64::from_be_bytes(bytes[..8].try_into().unwrap()) * 1000);
+}
+
+#[test]
+fn a_telemetry_log_cut_off_gives_what_is_whole_and_says_so() {
+    let folder = Folder::new();
+    folder.write("vehicle.toml", format!("{TUNNEL}{AUTOPILOT}"));
+    folder.write("cut.tlog", &std::fs::read(recordings::trimmed(TELEMETRY)).unwrap()[..100_005]);
+    let answer = folder.headrace(&["import", "cut.tlog", "--vehicle", "vehicle.toml", "-o", "out.mcap"]);
+    assert_eq!(answer.code, Some(3), "{}", answer.stderr);
+    assert!(answer.stderr.contains("cut off"), "{}", answer.stderr);
+    assert_eq!(folder.replay("out.mcap", &[]).0, Some(1));
+}
+
+#[test]
+fn candump_of_a_simulated_dive_has_the_same_bytes_at_the_same_times() {
+    let folder = Folder::with_dive();
+    let vehicle =
+        VEHICLE.replace("preset = \"xsens_mti600\"", "connect = \"can:can3\"\npreset = \"xsens_mti600\"");
+    folder.write("can.toml", vehicle);
+    let dive = folder.read("dive.mcap");
+    let messages = raw_messages(&dive);
+    let frames: Vec<_> = messages.iter().filter(|message| message.channel.topic == "/raw/imu").collect();
+    assert!(frames.len() > 1000);
+    let mut text = String::new();
+    for message in &frames {
+        let (id, len) =
+            (u32::from_le_bytes(message.data[..4].try_into().unwrap()), usize::from(message.data[4]));
+        let id = if id >> 31 == 1 { format!("{:08X}", id & 0x1FFF_FFFF) } else { format!("{id:03X}") };
+        let data =
+            message.data[8..8 + len].iter().fold(String::new(), |data, byte| format!("{data}{byte:02X}"));
+        let (seconds, rest) = (message.log_time / 1_000_000_000, message.log_time % 1_000_000_000);
+        writeln!(text, "({}.{rest:09}) can3 {id}#{data}", 1_700_000_000 + seconds).unwrap();
+        writeln!(text, "({}.{rest:09}) can4 001#00", 1_700_000_000 + seconds).unwrap();
+    }
+    folder.write("dive.log", text);
+    for further in [&[][..], &["--source", "imu=can3"]] {
+        let arguments = ["import", "dive.log", "--vehicle", "can.toml", "-o", "out.mcap"];
+        let answer = folder.headrace(&[&arguments[..], further].concat());
+        assert_eq!(answer.code, Some(0), "{}", answer.stderr);
+        assert!(
+            answer.stdout.contains(&format!("{} frames are of no sensor", frames.len())),
+            "{}",
+            answer.stdout
+        );
+        let log = folder.read("out.mcap");
+        let got = raw_messages(&log);
+        assert_eq!(got.len(), frames.len());
+        let shift = frames[0].log_time - got[0].log_time;
+        for (got, wanted) in got.iter().zip(&frames) {
+            assert_eq!(got.channel.topic, "/raw/imu");
+            assert_eq!((&got.data, got.log_time + shift), (&wanted.data, wanted.log_time));
+        }
+    }
+}
+
+#[test]
+fn an_imagenex_file_gives_its_returns_at_its_times() {
+    for (path, shots) in recordings::both("imagenex852_cidco/19_26_51-2016_11_18-sonar.852", 300, 917) {
+        check_shots(&path, shots);
+    }
+}
+
+fn check_shots(path: &Path, shots: usize) {
+    let file = path.to_str().unwrap();
+    let folder = Folder::new();
+    folder.write("vehicle.toml", format!("{TUNNEL}{HEAD}"));
+    let answer = folder.headrace(&["import", file, "--vehicle", "vehicle.toml", "-o", "out.mcap"]);
+    assert_eq!(answer.code, Some(0), "{}", answer.stderr);
+    let log = folder.read("out.mcap");
+    let got = raw_messages(&log);
+    assert_eq!(got.len(), shots);
+    let bytes = std::fs::read(path).unwrap();
+    for (message, shot) in got.iter().zip(bytes.chunks(640)) {
+        let len = usize::from(u16::from_be_bytes([shot[6], shot[7]]));
+        assert_eq!(message.data[..], shot[100..100 + len]);
+    }
+    assert!(got.iter().zip(&got[1..]).all(|(one, next)| one.log_time <= next.log_time));
+}
+
+#[test]
+fn an_imagenex_file_without_times_is_no_dive() {
+    let trimmed = ["there is no shot in its 32000 bytes", "no date and time: 50 times, 32000 bytes"];
+    let full_length = ["there is no shot in its 113280 bytes", "no date and time: 177 times, 113280 bytes"];
+    for (path, words) in recordings::both("imagenex852_cidco/hydroball.852", trimmed, full_length) {
+        let folder = Folder::new();
+        folder.write("vehicle.toml", format!("{TUNNEL}{HEAD}"));
+        refused(&folder, &[path.to_str().unwrap(), "--vehicle", "vehicle.toml", "-o", "out.mcap"], &words);
+    }
+}
+
+#[test]
+fn bare_ping_frames_have_no_times_and_are_named() {
+    let real = "ping360_tank_rgu/Uniform_Pipe__50__1N__2024-03-12_11-31-02Gain_1.bin";
+    let made_up = recordings::trimmed("ping360_made_up/frames.bin");
+    for path in [made_up].into_iter().chain(recordings::full_length(real)) {
+        refused(
+            &Folder::new(),
+            &[path.to_str().unwrap(), "--source", "ping=ping", "-o", "out.mcap"],
+            &["bare Ping frames, which have no times"],
+        );
+    }
+}
+
+const TABLE: &str = "t_s,depth (mbar),roll,pitch,yaw,p,q,r,ax,ay,az,left,along
+1700000000.00,1500.5,1,2,3,0.1,0.2,0.3,0,0,1,2.5,10
+1700000000.05,,1.5,2,3,0.1,0.2,0.3,0,0,1,,10.005
+1700000000.10,1501.25,2,oops,3,0.1,0.2,0.3,0,0,1,2.75,10.01
+1700000000.15,1502,2,2,3,0.1,0.2,0.3,0,0,1,2.75,10.015
+";
+
+fn mapping(columns: &[(&str, &str, &str, &str)]) -> String {
+    let head = "time_column = \"t_s\"\nutc = true\n".to_owned();
+    columns.iter().fold(head, |text, (column, sensor, quantity, unit)| {
+        format!(
+            "{text}[[columns]]\ncolumn = \"{column}\"\nsensor = \"{sensor}\"\nquantity = \"{quantity}\"\nunit = \"{unit}\"\n"
+        )
+    })
+}
+
+#[test]
+fn a_table_becomes_the_bytes_that_its_sensors_would_have_sent() {
+    let folder = Folder::new();
+    folder.write("vehicle.toml", VEHICLE);
+    folder.write("table.csv", TABLE);
+    let columns = [
+        ("depth (mbar)", "depth", "pressure", "mbar"),
+        ("roll", "imu", "roll", "deg"),
+        ("pitch", "imu", "pitch", "deg"),
+        ("yaw", "imu", "yaw", "deg"),
+        ("p", "imu", "rate_x", "deg/s"),
+        ("q", "imu", "rate_y", "deg/s"),
+        ("r", "imu", "rate_z", "deg/s"),
+        ("ax", "imu", "force_x", "g"),
+        ("ay", "imu", "force_y", "g"),
+        ("az", "imu", "force_z", "g"),
+        ("left", "ping_left", "range", "m"),
+        ("along", "tether", "chainage", "m"),
+    ];
+    folder.write("map.toml", mapping(&columns));
+    let arguments = ["import", "table.csv", "--vehicle", "vehicle.toml", "-o", "out.mcap", "--map"];
+    let answer = folder.headrace(&[&arguments[..], &["map.toml", "--json"]].concat());
+    assert_eq!(answer.code, Some(3), "{}", answer.stderr);
+    assert!(answer.stderr.contains("rows with a cell that is no number: 1 times"), "{}", answer.stderr);
+    let shown = json(&answer);
+    let counts = &shown["messages"];
+    assert_eq!((&counts["imu"], &counts["ping_left"], &counts["tether"]), (&12.into(), &3.into(), &4.into()));
+    assert_eq!(counts["sonar_0"], 0);
+    let (_, report) = folder.replay("out.mcap", &[]);
+    let sources = report["sources"].as_array().unwrap();
+    assert!(sources.iter().all(|source| source["bad_frames"] == 0), "{sources:?}");
+    let heard =
+        |id: &str| sources.iter().find(|source| source["id"] == id).unwrap()["frames"].as_u64().unwrap();
+    assert_eq!((heard("imu"), heard("ping_left"), heard("tether")), (12, 3, 4));
+    // Three pressures, after the calibration that the sensor's memory gives.
+    assert_eq!(counts["depth"], heard("depth"));
+    assert!(heard("depth") > 3);
+    std::fs::remove_file(folder.path("out.mcap")).unwrap();
+    for (columns, words) in [
+        (&columns[..4], "rate_x, rate_y, rate_z, force_x, force_y, force_z"),
+        (&[("deep", "depth", "pressure", "mbar")], "is no column; there are t_s, depth (mbar), roll"),
+        (&[("along", "depth", "pressure", "m")], "must be one of Pa, hPa, mbar, kPa, bar"),
+        (&[("along", "dvl", "velocity_x", "m/s")], "is no sensor of the vehicle file"),
+    ] {
+        folder.write("wrong.toml", mapping(columns));
+        refused(&folder, &[&arguments[1..], &["wrong.toml"]].concat(), &["wrong.toml:", words]);
+    }
+    refused(&folder, &arguments[1..6], &["--map MAPPING.toml"]);
+}
+
+#[test]
+fn what_is_no_such_file_is_named_with_what_it_looks_like() {
+    let folder = Folder::new();
+    folder.write("vehicle.toml", format!("{TUNNEL}{AUTOPILOT}{HEAD}"));
+    folder.write("empty.tlog", b"");
+    folder.write("bag.tlog", b"#ROSBAG V2.0\nmuch more");
+    folder.write("text.log", "not a log at all\n");
+    folder.write("what.dat", b"(1.0) can0 123#11\n");
+    let with = ["--vehicle", "vehicle.toml", "-o", "out.mcap"];
+    for (file, words) in [
+        ("empty.tlog", &["in its 0 bytes", "empty"][..]),
+        ("bag.tlog", &["a ROS bag"]),
+        ("what.dat", &["--format tlog|candump|imagenex|ping|csv", "a log of candump"]),
+        ("absent.tlog", &["reading absent.tlog"]),
+    ] {
+        refused(&folder, &[&[file][..], &with].concat(), words);
+    }
+    refused(
+        &folder,
+        &["text.log", "--source", "imu=can0", "-o", "out.mcap"],
+        &["no line of candump", "text"],
+    );
+    refused(&folder, &["text.log", "--vehicle", "vehicle.toml", "-o", "out.mcap"], &["can:INTERFACE"]);
+    refused(&folder, &["bag.tlog", "-o", "out.mcap"], &["--source ID=mavlink"]);
+    let unknown = ["bag.tlog", "--vehicle", "vehicle.toml", "--source", "imu=mavlink", "-o", "out.mcap"];
+    refused(&folder, &unknown, &["allowed are attitude, depth, sonar_0"]);
+    refused(&folder, &["text.log", "--source", "imu=can0", "-o", "text.log"], &["would be overwritten"]);
+}

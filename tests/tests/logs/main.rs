@@ -1,0 +1,14 @@
+//! Dive logs: recorded, replayed, verified, recovered and trimmed; damaged, foreign and odd ones.
+
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
+
+mod determinism;
+mod foreign_log;
+mod golden;
+mod odd_logs;
+mod playback;
+mod recover;
+mod rotation;
+mod snapshots;
+mod trim;
+mod verify;

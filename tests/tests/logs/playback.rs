@@ -1,0 +1,275 @@
+//! Playback of a recorded dive: pauses, single ticks, jumps forwards and back change no result and hide no loss.
+
+use std::io::Write;
+use std::process::{Output, Stdio};
+use std::time::Duration;
+
+use crossbeam::channel::unbounded;
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_monitor::App;
+use headrace_monitor::run::Loop;
+use headrace_replay::drive::{Pace, drive};
+use headrace_replay::log::files_of;
+use headrace_replay::playback::{Playback, PlaybackCommand, PlaybackObserver};
+use headrace_replay::player::Player;
+use headrace_replay::snapshot_store::SnapshotStore;
+use headrace_tests::Folder;
+use headrace_tests::scenes;
+use headrace_vehicle::VehicleConfig;
+use proptest::prelude::*;
+
+/// Each stop: the time, the tick, the digest, and whether it was the end.
+#[derive(Default)]
+struct Stops(Vec<(MonoNs, u64, u64, bool)>);
+
+impl PlaybackObserver for Stops {
+    fn after_tick(&mut self, _: &Loop) {}
+
+    fn after_skipped_tick(&mut self, _: &Loop) {}
+
+    fn stopped(&mut self, dive: &Loop, at: MonoNs, ended: bool) {
+        self.0.push((at, dive.ticks(), dive.digest(), ended));
+    }
+}
+
+fn vehicle() -> VehicleConfig {
+    scenes::scene_from(
+        "vehicle = \"vehicle.toml\"\n[trajectory]\n[[trajectory.legs]]\ndistance_m = 1\nspeed_mps = 0.2\n",
+        &|_| Ok(headrace_tests::VEHICLE.into()),
+    )
+    .vehicle
+}
+
+fn armed(vehicle: &VehicleConfig) -> Loop {
+    let mut app = App::new(vehicle.mission());
+    for sensor in &vehicle.sensors {
+        app.add_device(sensor.as_ref()).unwrap();
+    }
+    app.arm(vehicle.navigation()).unwrap()
+}
+
+/// What is left of a dive that has ended.
+#[derive(Debug, PartialEq)]
+struct Outcome {
+    digest: u64,
+    messages: u64,
+    losses: Vec<String>,
+}
+
+impl Outcome {
+    fn of(dive: &Loop, player: &Player) -> Self {
+        Self { digest: dive.digest(), messages: player.played(), losses: player.losses() }
+    }
+}
+
+/// Executes commands, a snapshot after each `interval` of work; where it stopped, and how it ended.
+fn play(folder: &Folder, log: &str, commands: &[PlaybackCommand], interval: Duration) -> (Stops, Outcome) {
+    let mut dive = armed(&vehicle());
+    let mut player = Player::open(&files_of(&[folder.path(log)]).unwrap()).unwrap();
+    player.connect(dive.sources());
+    let (sender, receiver) = unbounded();
+    for command in commands {
+        sender.send(*command).unwrap();
+    }
+    drop(sender);
+    let mut stops = Stops::default();
+    let store = SnapshotStore::new(64 << 20, interval);
+    let mut playback = Playback::new(&mut dive, &mut player, store, Pace::default()).unwrap();
+    playback.play(&receiver, &mut stops).unwrap();
+    (stops, Outcome::of(&dive, &player))
+}
+
+/// Time, tick and digest at the end of each tick of a log that is replayed straight through, and how it ended.
+fn through(folder: &Folder, log: &str) -> (Vec<(MonoNs, u64, u64)>, Outcome) {
+    let mut dive = armed(&vehicle());
+    let mut player = Player::open(&files_of(&[folder.path(log)]).unwrap()).unwrap();
+    player.connect(dive.sources());
+    let mut ticks = Vec::new();
+    drive(&mut dive, &mut player, Pace::default(), &mut |dive| {
+        ticks.push((dive.now(), dive.ticks(), dive.digest()));
+    })
+    .unwrap();
+    (ticks, Outcome::of(&dive, &player))
+}
+
+/// The dive as a simulation gives it, by log time; as our recorder writes it, by ticks; and so in parts.
+fn logs() -> Folder {
+    let folder = Folder::with_dive();
+    folder.record("dive.mcap", "ticks.mcap", &[]);
+    std::fs::create_dir(folder.path("parts")).unwrap();
+    folder.record("dive.mcap", "parts/dive.mcap", &["--rotate", "5s"]);
+    folder
+}
+
+#[test]
+fn every_jump_lands_in_the_state_of_a_log_played_through() {
+    let folder = logs();
+    for log in ["dive.mcap", "ticks.mcap", "parts"] {
+        let (ticks, outcome) = through(&folder, log);
+        assert!(outcome.losses.is_empty(), "{:?}", outcome.losses);
+        // Before the last two ticks, where a step has no end of its own to stand at.
+        let (begun, late) = (ticks[0].0, ticks[ticks.len() - 3].0);
+        let span = late.since(begun).0;
+        for interval in [Duration::from_millis(5), Duration::from_millis(40), Duration::MAX] {
+            let mut runner = proptest::test_runner::TestRunner::new(ProptestConfig {
+                cases: 8,
+                failure_persistence: None,
+                ..ProptestConfig::default()
+            });
+            let jumps = proptest::collection::vec(0..span, 2..8);
+            let result = runner.run(&jumps, |jumps| {
+                let mut commands = vec![PlaybackCommand::Pause];
+                let jump = |to: &i64| [PlaybackCommand::Seek(begun + DurNs(*to)), PlaybackCommand::Step(1)];
+                commands.extend(jumps.iter().flat_map(jump));
+                commands.push(PlaybackCommand::Go);
+                let (stops, ended) = play(&folder, log, &commands, interval);
+                for (at, tick, digest, _) in &stops.0[1..] {
+                    let expected = ticks.iter().find(|(now, ..)| now == at);
+                    prop_assert_eq!(expected, Some(&(*at, *tick, *digest)));
+                }
+                prop_assert_eq!(stops.0.len(), 2 + 2 * jumps.len());
+                prop_assert_eq!(stops.0[stops.0.len() - 1].3, true);
+                prop_assert_eq!(&ended, &outcome);
+                Ok(())
+            });
+            result.unwrap_or_else(|why| panic!("{log}, a snapshot each {interval:?}: {why}"));
+        }
+    }
+}
+
+#[test]
+fn at_the_end_it_waits_until_it_is_sent_back() {
+    let folder = logs();
+    let (ticks, outcome) = through(&folder, "ticks.mcap");
+    let [begun, before, last] = [0, ticks.len() - 2, ticks.len() - 1].map(|number| ticks[number]);
+    let beyond = last.0 + DurNs(5_000_000_000);
+    let commands = [
+        PlaybackCommand::Pause,
+        PlaybackCommand::Seek(before.0),
+        PlaybackCommand::Step(1),
+        PlaybackCommand::Step(1),
+        PlaybackCommand::Seek(beyond),
+        PlaybackCommand::Step(2),
+        PlaybackCommand::Seek(begun.0),
+        PlaybackCommand::Go,
+    ];
+    let (stops, ended) = play(&folder, "ticks.mcap", &commands, Duration::from_millis(5));
+    let at = |(at, tick, digest): (MonoNs, u64, u64), ended| (at, tick, digest, ended);
+    // Each time that it comes to the end, or is sent on from there.
+    let expected = [
+        at(before, false),
+        at(last, false),
+        at(last, true),
+        at(last, true),
+        at(last, false),
+        at(last, true),
+        at(last, true),
+        at(begun, false),
+        at(last, true),
+    ];
+    assert_eq!(stops.0[1..], expected);
+    assert_eq!(ended, outcome);
+}
+
+/// Changes a byte in each of three chunks of a log: two next to each other in the middle, and a later one.
+fn damage(folder: &Folder, log: &str) {
+    let mut bytes = folder.read(log);
+    let mut chunks = Vec::new();
+    let mut at = mcap::MAGIC.len();
+    while at + 9 <= bytes.len() - mcap::MAGIC.len() {
+        if bytes[at] == mcap::records::op::CHUNK {
+            chunks.push(at);
+        }
+        let len = u64::from_le_bytes(bytes[at + 1..at + 9].try_into().unwrap());
+        at += 9 + usize::try_from(len).unwrap();
+    }
+    for number in [chunks.len() / 2, chunks.len() / 2 + 1, chunks.len() * 3 / 4] {
+        // Behind its head.
+        bytes[chunks[number] + 100] ^= 0x55;
+    }
+    folder.write(log, bytes);
+}
+
+#[test]
+fn a_jump_over_damage_and_back_loses_what_a_replay_straight_through_does() {
+    let folder = logs();
+    damage(&folder, "dive.mcap");
+    damage(&folder, "ticks.mcap");
+    damage(&folder, "parts/dive.part002.mcap");
+    damage(&folder, "parts/dive.part003.mcap");
+    for log in ["dive.mcap", "ticks.mcap", "parts"] {
+        let (ticks, outcome) = through(&folder, log);
+        assert_eq!(outcome.losses.len(), if log == "parts" { 6 } else { 3 }, "{log}: {:?}", outcome.losses);
+        let at = |share: usize| PlaybackCommand::Seek(ticks[(ticks.len() - 1) * share / 100].0);
+        for interval in [Duration::from_millis(5), Duration::MAX] {
+            // To the end, back to before the damage, to a snapshot behind it, between the damaged places.
+            for jumps in [&[95, 10][..], &[100, 20, 90, 10], &[60, 5, 58, 96, 56]] {
+                let mut commands = vec![PlaybackCommand::Pause];
+                commands.extend(jumps.iter().map(|share| at(*share)));
+                commands.push(PlaybackCommand::Go);
+                let (_, ended) = play(&folder, log, &commands, interval);
+                assert_eq!(ended, outcome, "{log}, a snapshot each {interval:?}, jumps to {jumps:?} %");
+            }
+        }
+    }
+    // The same for the report and the exit code.
+    for log in ["ticks.mcap", "parts"] {
+        let (code, straight) = folder.replay(log, &[]);
+        assert_eq!(code, Some(3));
+        let lines = "pause\nseek 18s\nback 16s\nahead 15s\nseek 1s\ngo\n";
+        let answer = interactive(&folder, &[log, "--json"], lines);
+        assert_eq!(answer.status.code(), Some(3), "{}", String::from_utf8_lossy(&answer.stderr));
+        let report: serde_json::Value = serde_json::from_slice(&answer.stdout).unwrap();
+        assert_eq!(report, straight, "{log}");
+    }
+}
+
+#[test]
+fn a_replay_shown_from_the_middle_gives_the_whole_dive_s_report() {
+    let folder = logs();
+    let (code, whole) = folder.replay("ticks.mcap", &[]);
+    assert_eq!(code, Some(0));
+    let (code, later) = folder.replay("ticks.mcap", &["--from", "0:15"]);
+    assert_eq!(code, Some(0));
+    assert_eq!(later, whole);
+    let (code, in_parts) = folder.replay("parts", &["--from", "0:15"]);
+    assert_eq!((code, &in_parts["digest"]), (Some(0), &whole["digest"]));
+    assert_eq!(in_parts["log"]["messages"], whole["log"]["messages"]);
+}
+
+/// Runs `replay --interactive` with these lines on standard input.
+fn interactive(folder: &Folder, arguments: &[&str], lines: &str) -> Output {
+    let mut program = headrace_tests::program()
+        .args(["replay", "--interactive"])
+        .args(arguments)
+        .current_dir(folder.path("."))
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    program.stdin.take().unwrap().write_all(lines.as_bytes()).unwrap();
+    program.wait_with_output().unwrap()
+}
+
+#[test]
+fn lines_on_standard_input_pause_step_and_seek() {
+    let folder = logs();
+    let lines = "pause\nseek 12s\nstep 3\nback 5s\nstop\nahead 0:02\nspeed max\ngo\n";
+    let answer = interactive(&folder, &["ticks.mcap", "--speed", "1x"], lines);
+    let (stdout, stderr) = (String::from_utf8_lossy(&answer.stdout), String::from_utf8_lossy(&answer.stderr));
+    assert_eq!(answer.status.code(), Some(0), "{stderr}");
+    let stops: Vec<&str> = stdout
+        .lines()
+        .filter_map(|line| line.strip_prefix("AT       "))
+        .map(|line| line.split(": tick").next().unwrap())
+        .collect();
+    assert_eq!(
+        stops[1..],
+        ["0:00:12.000", "0:00:12.060", "0:00:07.060", "0:00:09.060", "0:00:20.020, the end"]
+    );
+    insta::assert_snapshot!(stderr, @r#"headrace: "stop" isn't a command; expected one of: pause, go, step [TICKS], seek TIME, ahead TIME, back TIME, speed N|max, end"#);
+    let whole = folder.replay("ticks.mcap", &[]).1;
+    let digest = whole["digest"].as_str().unwrap();
+    assert!(stdout.contains(&format!("digest {digest}")), "{stdout}");
+}

@@ -1,0 +1,142 @@
+//! Damaged logs and full disks through the program: exit codes, what is said, and that what is left replays to the same digest.
+
+use std::process::Command;
+
+use headrace_tests::Folder;
+use serde_json::Value;
+
+/// A dive that was recorded live, and the log of it.
+fn recorded() -> (Folder, Vec<u8>) {
+    let folder = Folder::with_dive();
+    folder.record("dive.mcap", "live.mcap", &[]);
+    let log = folder.read("live.mcap");
+    (folder, log)
+}
+
+fn recover(folder: &Folder, log: &str, output: &str) -> (Option<i32>, Value) {
+    let answer = folder.headrace(&["recover", log, "-o", output, "--json"]);
+    (
+        answer.code,
+        serde_json::from_str(&answer.stdout).unwrap_or_else(|error| panic!("{error}: {}", answer.stderr)),
+    )
+}
+
+#[test]
+fn a_damaged_log_and_the_one_recovered_from_it_are_the_same_dive() {
+    let (folder, whole) = recorded();
+    let mut spotted = whole.clone();
+    // As a medium loses a block.
+    spotted[whole.len() / 2..][..4096].fill(0);
+    for (name, bytes) in [("cut", &whole[..whole.len() * 2 / 3]), ("spotted", &spotted)] {
+        let (log, fixed) = (format!("{name}.mcap"), format!("{name}-fixed.mcap"));
+        folder.write(&log, bytes);
+        let (code, told) = recover(&folder, &log, &fixed);
+        assert_eq!(code, Some(3), "{told}");
+        let loss = &told["losses"][0];
+        assert!(loss["from_ns"].is_u64() && loss["what"].as_str().unwrap().contains("after "), "{told}");
+        let ((before, damaged), (after, recovered)) = (folder.replay(&log, &[]), folder.replay(&fixed, &[]));
+        assert_eq!((before, after), (Some(3), Some(3)), "{name}: the loss is still said");
+        assert_eq!(recovered["digest"], damaged["digest"], "{name}");
+        assert_eq!(recovered["sections"], damaged["sections"], "{name}");
+        assert_eq!(recovered["log"]["messages"], damaged["log"]["messages"], "{name}");
+        let losses = |report: &Value| report["log"]["losses"].as_array().unwrap().len();
+        assert_eq!(losses(&recovered), losses(&damaged), "{name}: {}", recovered["log"]["losses"]);
+    }
+    // What the dive published live is kept, too.
+    let answer = folder.headrace(&["verify", "cut-fixed.mcap", "--json"]);
+    let told: Value = serde_json::from_str(&answer.stdout).unwrap();
+    assert_eq!(answer.code, Some(3), "{told}");
+    assert!(told["same_records"].as_u64().unwrap() > 100 && told["differences"][0].is_null(), "{told}");
+}
+
+#[test]
+fn nothing_is_overwritten_and_what_is_no_log_leaves_nothing() {
+    let (folder, _) = recorded();
+    let (code, told) = recover(&folder, "live.mcap", "fixed.mcap");
+    assert_eq!((code, &told["losses"]), (Some(0), &Value::Array(Vec::new())), "{told}");
+    assert_eq!(folder.digest("fixed.mcap", &[]), folder.digest("live.mcap", &[]));
+    for output in ["fixed.mcap", "live.mcap"] {
+        let answer = folder.headrace(&["recover", "live.mcap", "-o", output]);
+        assert_eq!(answer.code, Some(1), "{}", answer.stderr);
+        assert!(answer.stderr.contains(output) && answer.stderr.contains("exists"), "{}", answer.stderr);
+    }
+    let answer = folder.headrace(&["recover", "vehicle.toml", "-o", "none.mcap"]);
+    assert_eq!(answer.code, Some(1));
+    assert!(answer.stderr.contains("is not an MCAP file"), "{}", answer.stderr);
+    assert!(!folder.path("none.mcap").exists());
+}
+
+#[test]
+fn logs_cut_or_changed_anywhere_end_in_the_exit_codes_of_the_design() {
+    let (folder, whole) = recorded();
+    let digest = folder.digest("live.mcap", &[]);
+    let mut lost = 0;
+    for case in 1..=40 {
+        let mut bytes = whole.clone();
+        if case % 2 == 0 {
+            bytes.truncate(whole.len() * case / 41);
+        } else {
+            bytes[whole.len() * case / 41] ^= 1 << (case % 8);
+        }
+        folder.write("damaged.mcap", &bytes);
+        let answer = folder.headrace(&["replay", "damaged.mcap", "--json"]);
+        match answer.code {
+            Some(0) => {
+                let report: Value = serde_json::from_str(&answer.stdout).unwrap();
+                assert_eq!(report["digest"], digest.as_str(), "case {case}");
+            }
+            Some(3) => {
+                let report: Value = serde_json::from_str(&answer.stdout).unwrap();
+                assert!(report["log"]["losses"][0].is_string(), "case {case}");
+                lost += 1;
+            }
+            // The vehicle file is damaged, or behind the cut.
+            Some(2) => assert!(answer.stderr.contains("no vehicle file"), "case {case}: {}", answer.stderr),
+            code => panic!("case {case}: {code:?}: {}", answer.stderr),
+        }
+    }
+    assert!(lost > 20, "{lost} of 40");
+}
+
+/// Records the short dive on a disk of so many kB, and takes the log from there; `None` where no disk can be made.
+fn on_a_disk_of(folder: &Folder, kilobytes: u32) -> Option<(i32, Value, String)> {
+    std::fs::create_dir_all(folder.path("disk")).unwrap();
+    let program = headrace_tests::program();
+    let program = program.get_program().to_str().unwrap();
+    // A mount that nobody else sees, and that goes with the shell.
+    let script = format!(
+        "mount -t tmpfs -o size={kilobytes}k none disk || exit 99
+        '{program}' run vehicle.toml --source dive.mcap --record disk/log.mcap --speed max --json > report.json 2> said.txt
+        code=$?; cp disk/log.mcap small.mcap; exit $code"
+    );
+    let output =
+        Command::new("unshare").args(["-rm", "sh", "-c", &script]).current_dir(folder.path("")).output();
+    let code = output.ok()?.status.code()?;
+    let report = serde_json::from_slice(&std::fs::read(folder.path("report.json")).ok()?).ok()?;
+    Some((code, report, String::from_utf8(folder.read("said.txt")).unwrap()))
+}
+
+#[test]
+fn a_disk_that_is_nearly_full_costs_the_echoes_and_a_full_one_the_recording() {
+    let folder = Folder::with_dive();
+    let digest = folder.digest("dive.mcap", &[]);
+    // Room for all that is small; and for a few seconds.
+    for (kilobytes, words) in [(20_000, "echo returns"), (80, "recording failed")] {
+        let Some((code, report, said)) = on_a_disk_of(&folder, kilobytes) else {
+            headrace_tests::skipped("unshare and mount are not allowed here");
+            return;
+        };
+        assert_eq!((code, &report["digest"]), (3, &digest.as_str().into()), "the dive goes on: {said}");
+        let losses = report["log"]["losses"].to_string();
+        assert!(losses.contains(words), "{losses}");
+        assert!(said.contains("MB left"), "a warning while the dive goes on: {said}");
+        // What was kept reads, and says what is missing.
+        let (code, replayed) = folder.replay("small.mcap", &[]);
+        let losses = replayed["log"]["losses"].to_string();
+        assert!(code == Some(3) && losses.contains("echo returns out"), "{code:?}: {losses}");
+        if kilobytes > 1000 {
+            // These heads send ranges, which are short: all of them are kept, and only the results of pings left out.
+            assert_eq!(replayed["digest"], digest.as_str());
+        }
+    }
+}

@@ -1,0 +1,155 @@
+//! Trimmed logs: with nothing cut the same dive, cut the same verdicts inside, and no name left where none is to be.
+
+use headrace_tests::{Folder, VEHICLE, raw_messages, write_log};
+use mcap::WriteOptions;
+use serde_json::Value;
+
+/// Two minutes: a steady way, long enough for an inside.
+const LONG: &str = r#"name = "long dive"
+vehicle = "vehicle.toml"
+
+[trajectory]
+start_m = 3
+
+[[trajectory.legs]]
+distance_m = 24
+speed_mps = 0.2
+"#;
+
+/// A dive that was recorded live.
+fn recorded(scene: &str, vehicle: &str) -> Folder {
+    let folder = Folder::new();
+    folder.write("vehicle.toml", vehicle);
+    folder.write("scene.toml", scene);
+    folder.simulate("scene.toml", "dive.mcap");
+    folder.record("dive.mcap", "live.mcap", &[]);
+    folder
+}
+
+fn trim(folder: &Folder, output: &str, further: &[&str]) -> Value {
+    let answer = folder.headrace(&[&["trim", "live.mcap", "--json", "-o", output], further].concat());
+    assert_eq!(answer.code, Some(0), "{}", answer.stderr);
+    serde_json::from_str(&answer.stdout).unwrap()
+}
+
+/// Verdict and hole of each section that lies within a stretch.
+fn within(report: &Value, from_m: f64, to_m: f64) -> Vec<(f64, String)> {
+    let sections = report["sections"].as_array().unwrap().iter();
+    let inside = sections.filter_map(|section| {
+        let start_m = section["start_m"].as_f64().unwrap();
+        let verdict = section["verdict"].as_str().unwrap().to_owned();
+        (from_m..to_m).contains(&start_m).then_some((start_m, verdict))
+    });
+    inside.collect()
+}
+
+#[test]
+fn with_nothing_cut_it_is_the_same_dive_down_to_its_results() {
+    let folder = recorded(headrace_tests::SCENE, VEHICLE);
+    let digest = folder.digest("live.mcap", &[]);
+    for (name, further) in
+        [("copy.mcap", &[][..]), ("echoless.mcap", &["--drop-echoes"]), ("public.mcap", &["--anonymise"])]
+    {
+        let told = trim(&folder, name, further);
+        assert_eq!((&told["cut"], &told["results_left_out"]), (&0.into(), &0.into()), "{told}");
+        assert_eq!(folder.digest(name, &[]), digest, "{name}");
+        let answer = folder.headrace(&["verify", name]);
+        assert_eq!(answer.code, Some(0), "{name}: {}", answer.stdout);
+    }
+    let answer = folder.headrace(&["trim", "live.mcap", "-o", "copy.mcap"]);
+    assert!(answer.code == Some(1) && answer.stderr.contains("exists"), "{}", answer.stderr);
+}
+
+#[test]
+fn a_cut_says_that_it_is_one_and_judges_its_inside_as_the_whole() {
+    let folder = recorded(LONG, VEHICLE);
+    let (_, whole) = folder.replay("live.mcap", &[]);
+    let expected = within(&whole, 12.0, 19.0);
+    assert_eq!(expected.len(), 28);
+    for (name, further) in
+        [("time.mcap", &["--from", "20s", "--to", "1.75min"][..]), ("place.mcap", &["--chainage", "7..24"])]
+    {
+        let told = trim(&folder, name, further);
+        assert!(told["cut"].as_u64().unwrap() > 100, "{told}");
+        assert!(told["results_left_out"].as_u64().unwrap() > 10, "{told}");
+        assert_eq!(told["spans"].as_array().unwrap().len(), 1, "{told}");
+        let (code, report) = folder.replay(name, &[]);
+        let losses = report["log"]["losses"].to_string();
+        assert_eq!(code, Some(3), "{name}: {losses}");
+        assert!(losses.contains("what came before was cut off by headrace trim (before "), "{losses}");
+        assert!(losses.contains("what came after was cut off by headrace trim (after "), "{losses}");
+        assert_eq!(within(&report, 12.0, 19.0), expected, "{name}");
+        let answer = folder.headrace(&["verify", name]);
+        assert_eq!(answer.code, Some(1), "{}", answer.stdout);
+        assert!(answer.stdout.contains("this log was cut from another"), "{}", answer.stdout);
+    }
+    // Only what there was is said to be missing.
+    for (name, further, said, unsaid) in [
+        ("later.mcap", ["--from", "20s"], "before was cut off", "after was cut off"),
+        ("earlier.mcap", ["--to", "20s"], "after was cut off", "before was cut off"),
+    ] {
+        trim(&folder, name, &further);
+        let losses = folder.replay(name, &[]).1["log"]["losses"].to_string();
+        assert!(losses.contains(said) && !losses.contains(unsaid), "{losses}");
+    }
+    let answer = folder.headrace(&["trim", "live.mcap", "-o", "none.mcap", "--chainage", "60..70"]);
+    assert_eq!(answer.code, Some(2), "{}", answer.stdout);
+    assert!(answer.stderr.contains("wasn't between 60 and 70 m"), "{}", answer.stderr);
+    assert!(!folder.path("none.mcap").exists());
+}
+
+#[test]
+fn echoes_go_and_ranges_stay() {
+    // Heads that send their echo, 252 bytes of it, with the range.
+    let folder = recorded(headrace_tests::SCENE, VEHICLE);
+    let dive = folder.read("dive.mcap");
+    let mut messages = raw_messages(&dive);
+    for message in &mut messages {
+        if message.data.starts_with(b"IPX") && message.data.len() == 13 {
+            let mut long = message.data.to_vec();
+            (long[1], long[10], long[11]) = (b'M', 0x7C, 0x01);
+            long.pop();
+            long.extend(std::iter::repeat_n(0x5A, 252));
+            long.push(0xFC);
+            message.data = long.into();
+        }
+    }
+    write_log(&folder.path("live.mcap"), WriteOptions::new().compression(None), Some(VEHICLE), &messages);
+    let digest = folder.digest("live.mcap", &[]);
+    let told = trim(&folder, "echoless.mcap", &["--drop-echoes"]);
+    assert!(told["changed"].as_u64().unwrap() > 1000, "{told}");
+    let bytes = |key: &str| told[key].as_u64().unwrap();
+    assert!(bytes("sensor_bytes") * 2 < bytes("sensor_bytes_before"), "{told}");
+    assert_eq!(folder.digest("echoless.mcap", &[]), digest);
+    assert!(folder.read("echoless.mcap").len() * 2 < folder.read("live.mcap").len());
+}
+
+#[test]
+fn an_anonymous_log_has_no_name_address_comment_or_time_of_day() {
+    let vehicle = VEHICLE
+        .replace("name = \"test vehicle\"", "name = \"VITA of Upperplant\" # bought by Anna")
+        .replace("profile = \"circle\"\nradius_m = 3", "profile = \"polyline\"\nfile = \"upperplant.csv\"");
+    let folder = Folder::new();
+    folder.write("upperplant.csv", "y_m,z_m\n-2.6,0\n2.6,0\n2.6,5.2\n-2.6,5.2\n");
+    folder.write("vehicle.toml", &vehicle);
+    folder.write("scene.toml", headrace_tests::SCENE);
+    folder.simulate("scene.toml", "plain.mcap");
+    folder.record("plain.mcap", "live.mcap", &[]);
+    let told = trim(&folder, "public.mcap", &["--anonymise"]);
+    // Attachments and metadata aren't compressed; so is nothing after this.
+    let answer = folder.headrace(&["recover", "public.mcap", "-o", "again.mcap"]);
+    assert_eq!(answer.code, Some(0), "{}", answer.stderr);
+    let text = String::from_utf8_lossy(&folder.read("public.mcap")).to_lowercase();
+    for word in ["upperplant", "anna", "192.168", "vita", "clock_anchor", "live.mcap"] {
+        assert!(!text.contains(word), "{word}");
+    }
+    assert!(text.contains("file1.csv") && text.contains("192.0.2."));
+    assert_eq!(folder.digest("public.mcap", &[]), folder.digest("live.mcap", &[]));
+    let left = told["done"].to_string();
+    assert!(
+        left.contains("the sensors' ids (sonar_0") && left.contains("content of the attached files"),
+        "{left}"
+    );
+    let answer = folder.headrace(&["trim", "live.mcap", "-o", "more.mcap", "--from", "5s", "--to", "5s"]);
+    assert_eq!(answer.code, Some(2), "{}", answer.stdout);
+}

@@ -1,0 +1,230 @@
+//! `headrace calibrate`: logs of a vehicle whose heads sit otherwise than the file says, and whose messages come late.
+
+use std::fmt::Write as _;
+
+use headrace_tests::Folder;
+use serde_json::Value;
+
+/// Two heads and all that gives a position; narrow beams, since the simulated ones are rays here.
+fn vehicle(front: &str, aft: &str, zero_at_m: f64) -> String {
+    let pings = [("left", "0, 90"), ("right", "0, -90"), ("up", "-90, 0"), ("down", "90, 0")];
+    let pings = pings.map(|(id, angles)| {
+        format!("[[sensors]]\nid = \"ping_{id}\"\nplugin = \"ping1d\"\nangles_deg = [0, {angles}]\n")
+    });
+    format!(
+        r#"name = "test vehicle"
+target_m = 1.2
+[tunnel]
+profile = "ceran"
+length_m = 100
+[water]
+surface_above_floor_m = 3
+[navigation]
+return_beam_deg = 0.01
+echo_beam_deg = 0.01
+[[sensors]]
+id = "front"
+plugin = "imagenex881"
+mode = "fastest"
+range_m = 10
+{front}
+[[sensors]]
+id = "aft"
+plugin = "imagenex881"
+mode = "fastest"
+range_m = 10
+{aft}
+{}
+[[sensors]]
+id = "depth"
+plugin = "bar100"
+[[sensors]]
+id = "imu"
+plugin = "imu_can"
+preset = "xsens_mti600"
+[[sensors]]
+id = "tether"
+plugin = "tether_hid"
+counts_per_metre = 2000
+zero_at_m = {zero_at_m}
+"#,
+        pings.concat()
+    )
+}
+
+/// As the file has it.
+fn filed() -> String {
+    vehicle("position_m = [0.1, 0, 0]", "position_m = [-0.1, 0, 0]\nangles_deg = [0, 0, 180]", 0.0)
+}
+
+/// A stand of twelve seconds, and a way of thirty on which the vehicle yaws, rolls and pitches.
+fn scene(stand: bool, effects: &str) -> String {
+    let mut scene =
+        "name = \"calibration\"\nvehicle = \"true.toml\"\n[trajectory]\nkind = \"waypoints\"\n".to_owned();
+    let mut go = |chainage: f64, place: [f64; 2], angles: [f64; 3], stay: f64| {
+        let [roll, pitch, yaw] = angles;
+        write!(
+            scene,
+            "[[trajectory.waypoints]]\nchainage_m = {chainage}\nplace_m = {place:?}\nroll_deg = {roll}\n\
+             pitch_deg = {pitch}\nyaw_deg = {yaw}\nspeed_mps = 0.35\nstay_s = {stay}\n"
+        )
+        .unwrap();
+    };
+    go(10.0, [0.6, 2.3], [1.0, 0.0, 2.0], if stand { 12.0 } else { 0.0 });
+    for k in 1..=9 {
+        let side = if k % 2 == 0 { 1.0 } else { -1.0 };
+        let tilt = [5.0, 3.0, -4.0, -2.0][k % 4];
+        go(10.0 + k as f64, [0.4 * side, 2.3 + 0.1 * tilt], [1.5 * tilt, tilt, 12.0 * side], 0.0);
+    }
+    scene + "[effects]\nmotion_within_turn = {}\nrange_noise = { sd_m = 0.01 }\n" + effects
+}
+
+fn folder(stand: bool, truth: &str, effects: &str) -> Folder {
+    let folder = Folder::new();
+    folder.write("true.toml", truth);
+    folder.write("filed.toml", filed());
+    folder.write("scene.toml", scene(stand, effects));
+    folder.simulate("scene.toml", "dive.mcap");
+    folder
+}
+
+fn found<'a>(report: &'a Value, of: &str, what: &str) -> &'a Value {
+    let rows = report["found"].as_array().unwrap();
+    rows.iter()
+        .find(|row| row["of"] == of && row["what"] == what)
+        .unwrap_or_else(|| panic!("{of} {what}: {report:#}"))
+}
+
+/// That a latency was found within three of its own standard deviations, and better than `most_ms`.
+#[track_caller]
+fn assert_latency(report: &Value, of: &str, truth_ms: f64, most_ms: f64) {
+    let row = found(report, of, "latency");
+    let (value, sd) = (row["found"].as_f64().unwrap(), row["sd"].as_f64().unwrap());
+    assert!((value - truth_ms).abs() <= 3.0 * sd && (value - truth_ms).abs() < most_ms, "{of}: {row}");
+}
+
+const LATE_UNIT: &str =
+    "line_delay = { sensors = [\"imu\"], latency_ms = 80 }\noutliers = { share = 0.08 }\n";
+const LATE_HEAD: &str = "line_delay = { sensors = [\"front\"], latency_ms = 50 }\n";
+
+/// A head that is turned and another that faces the other way, a counter that was zeroed elsewhere, a unit that is late.
+#[test]
+fn what_is_wrong_with_the_file_is_found_and_offered() {
+    let front = "position_m = [0.1, 0, 0.04]\nangles_deg = [4, 0, 0]";
+    let truth = vehicle(front, "position_m = [-0.1, 0, 0]\nangles_deg = [0, 0, 0]", 1.5);
+    let folder = folder(true, &truth, LATE_UNIT);
+    let answer = folder.headrace(&[
+        "calibrate",
+        "dive.mcap",
+        "--vehicle",
+        "filed.toml",
+        "--chainage",
+        "10",
+        "--at-surface",
+        "0..5",
+    ]);
+    assert_eq!((answer.code, answer.stderr.as_str()), (Some(0), ""));
+    insta::assert_snapshot!(answer.stdout, @r#"
+    dive.mcap: 0.0 to 47.7 s, test vehicle
+    still from 0.0 to 12.0 s, 0.599 m left of the middle and 2.312 m above the floor (sd 0.027, 0.027)
+    half of the returns within 0.008 m of the profile; ranges +0.00 % long (sd 0.02)
+      front: 327 returns used, 48 rejected, rms 1.0 cm, 360 degrees of wall
+      aft: 332 returns used, 43 rejected, rms 0.9 cm, 360 degrees of wall
+
+    found                                           file      found       sd
+    water        pressure at the surface          101325     108240       88 Pa  differs
+    water        surface above the floor here      3.000      2.312    0.035 m  differs
+    front        faces                           forward    forward
+    front        angle about its axis               0.00       3.98     0.20 deg  differs
+    front        left                              0.000      0.001    0.002 m
+    front        up                                0.000      0.020    0.001 m  differs
+    aft          faces                               aft    forward            differs
+    aft          angle about its axis               0.00       0.00     0.20 deg
+    aft          left                              0.000     -0.001    0.002 m
+    aft          up                                0.000     -0.020    0.001 m  differs
+    tether       chainage at zero                  0.000      1.500    0.060 m  differs
+    front        latency                             0.0        7.5      9.0 ms
+    aft          latency                             0.0       -7.8      8.2 ms
+    ping_left    latency                             0.0        0.1      7.2 ms
+    ping_right   latency                             0.0       -0.6      7.6 ms
+    ping_up      latency                             0.0       14.5     13.5 ms
+    ping_down    latency                             0.0        7.3     12.6 ms
+    depth        latency                             0.0       -3.2     22.1 ms
+    imu          latency                             0.0       72.9      5.4 ms  differs
+    tether       latency                             0.0       -7.2     19.2 ms
+
+    for the vehicle file
+    [water]
+    surface_pressure_pa = 108240
+    surface_above_floor_m = 2.312
+    [[sensors]]  # id = "front"
+    angles_deg = [3.98, 0, 0]
+    position_m = [0.1, 0, 0.02]
+    [[sensors]]  # id = "aft"
+    angles_deg = [0, 0, 0]
+    position_m = [-0.1, 0, -0.02]
+    [[sensors]]  # id = "tether"
+    zero_at_m = 1.5
+    [[sensors]]  # id = "imu"
+    latency_ms = 72.9
+    "#);
+}
+
+#[test]
+fn a_late_head_is_found_and_nothing_else_is_late() {
+    let folder = folder(true, &filed(), LATE_HEAD);
+    let answer = folder.headrace(&["calibrate", "dive.mcap", "--json"]);
+    assert_eq!(answer.code, Some(0), "{}", answer.stderr);
+    let report: Value = serde_json::from_str(&answer.stdout).unwrap();
+    assert_latency(&report, "front", 50.0, 30.0);
+    for of in ["aft", "imu", "ping_left", "ping_right", "ping_up", "ping_down"] {
+        assert_latency(&report, of, 0.0, 30.0);
+    }
+    let lines = report["vehicle_file"].as_object().unwrap();
+    let late: Vec<_> = lines.iter().filter(|(_, lines)| lines.to_string().contains("latency_ms")).collect();
+    assert!(late.len() == 1 && late[0].0 == "sensors.front", "{lines:?}");
+    assert_eq!(found(&report, "front", "faces")["found"], "forward");
+    assert_eq!(report["untold"][0]["of"], "water");
+}
+
+/// Without a stand there are no mounts and no zeros; with little of the log there is nothing at all.
+#[test]
+fn a_vehicle_that_moves_is_told_so() {
+    let folder = folder(false, &filed(), "");
+    let answer =
+        folder.headrace(&["calibrate", "dive.mcap", "--from", "8", "--to", "8.9", "--chainage", "10"]);
+    assert_eq!(answer.code, Some(1), "{}", answer.stdout);
+    let moved = folder.headrace(&[
+        "calibrate",
+        "dive.mcap",
+        "--from",
+        "5",
+        "--to",
+        "12",
+        "--chainage",
+        "10",
+        "--json",
+    ]);
+    let report: Value = serde_json::from_str(&moved.stdout).unwrap();
+    let why = |of: &str| {
+        let rows = report["untold"].as_array().unwrap();
+        rows.iter().find(|row| row["of"] == of).unwrap()["why"].as_str().unwrap().to_owned()
+    };
+    assert!(why("heads").starts_with("the vehicle moved: "), "{report:#}");
+    assert_eq!(why("heads"), why("cable counters"));
+    assert_eq!(report["still"], Value::Null);
+}
+
+#[test]
+fn options_that_make_no_sense_are_refused() {
+    let folder = folder(false, &filed(), "");
+    for (options, words) in [
+        (["--from", "9", "--to", "9"], "--to 9 is not after --from 9"),
+        (["--from", "0", "--to", "2000"], "the most is 1200 s"),
+        (["--at-surface", "9..3", "--from", "0"], "FROM..TO, the first one less"),
+    ] {
+        let answer = folder.headrace(&[&["calibrate", "dive.mcap"], &options[..]].concat());
+        assert_eq!(answer.code, Some(2), "{}", answer.stdout);
+        assert!(answer.stderr.contains(words), "{}", answer.stderr);
+    }
+}

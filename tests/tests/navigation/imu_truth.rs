@@ -1,0 +1,306 @@
+//! val: attitude by gyros and accelerometers alone against optical motion capture, beside the filters of Madgwick and
+//! Mahony (crate `ahrs`) on the same samples.
+//!
+//! The recording is trial 12 of BROAD (slow hand motion within about a metre; `recordings/imu_broad`), its first 105 s
+//! and, where `HEADRACE_RECORDINGS` is set, all 196 s. With `--nocapture` the test prints, in degrees, the error of the
+//! inclination while the unit moves, and by how much the heading drifts over the recording.
+
+use std::fs::File;
+use std::io::Read as _;
+use std::path::Path;
+
+use ahrs::{Ahrs as _, Madgwick, Mahony};
+use headrace_fusion::filter::factors::Factors;
+use headrace_fusion::filter::inertial::{Felt, Leg};
+use headrace_fusion::filter::measure::{self, Row};
+use headrace_fusion::filter::settings::Settings;
+use headrace_fusion::filter::state::{
+    ATTITUDE, ERRORS, FORCE_BIAS, POSITION, RATE_BIAS, State, VELOCITY, put,
+};
+use headrace_geometry::frames::{Body, Point3, Rot, Tunnel, Vec3};
+use headrace_geometry::math;
+use headrace_tests::recordings;
+use nalgebra_of_peers as peers;
+
+const NAME: &str = "imu_broad/derived_12_undisturbed_slow_translation_C_95Hz.csv.gz";
+/// What is taken of the recording, which at full length has other columns, too.
+const COLUMNS: [&str; 11] = ["gx", "gy", "gz", "ax", "ay", "az", "qw", "qx", "qy", "qz", "movement"];
+const DEGREE: f64 = core::f64::consts::PI / 180.0;
+const GRAVITY_MPS2: f64 = 9.81;
+const SAMPLE_S: f64 = 0.0105;
+/// The errors move on so often, as in the filter: about 0.1 s.
+const EPOCH: usize = 10;
+/// A second.
+const SECOND: usize = 95;
+/// A hand's usual speed: what is known of velocity when nothing measures it.
+const HAND_MPS: f64 = 0.5;
+/// A unit lies still when over a second neither rate nor force varies by more than this: a few times their noise.
+const STILL_RADPS: f64 = DEGREE;
+const STILL_MPS2: f64 = 0.8;
+const STILL_SD_MPS: f64 = 0.01;
+
+/// A sample: its axes are the body's, and east, north and up are the tunnel's.
+#[derive(Clone, Copy)]
+struct Sample {
+    rate_radps: Vec3<Body>,
+    force_mps2: Vec3<Body>,
+    truth: Option<Rot<Tunnel, Body>>,
+    moving: bool,
+}
+
+fn samples(path: &Path) -> Vec<Sample> {
+    let mut text = String::new();
+    flate2::read::GzDecoder::new(File::open(path).unwrap()).read_to_string(&mut text).unwrap();
+    let mut lines = text.lines();
+    let names: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let columns = COLUMNS.map(|column| names.iter().position(|name| *name == column).unwrap());
+    lines.map(|line| sample(line, columns)).collect()
+}
+
+fn sample(line: &str, columns: [usize; 11]) -> Sample {
+    let cells: Vec<&str> = line.split(',').collect();
+    let [gx, gy, gz, ax, ay, az, w, x, y, z, moving] =
+        columns.map(|column| cells[column].parse::<f64>().unwrap());
+    Sample {
+        rate_radps: Vec3::new(gx, gy, gz),
+        force_mps2: Vec3::new(ax, ay, az),
+        truth: Rot::from_wxyz(w, x, y, z),
+        moving: moving > 0.5,
+    }
+}
+
+fn mean(vectors: impl Iterator<Item = Vec3<Body>>) -> Vec3<Body> {
+    let (sum, count) = vectors.fold((Vec3::zero(), 0.0), |(sum, count), v| (sum + v, count + 1.0));
+    sum.scaled(1.0 / count)
+}
+
+/// Length of the box around vectors.
+fn spread(vectors: impl Iterator<Item = Vec3<Body>> + Clone) -> f64 {
+    let first = vectors.clone().next().unwrap().0;
+    let (low, high) = vectors.fold((first, first), |(low, high), v| (low.inf(&v.0), high.sup(&v.0)));
+    (high - low).norm()
+}
+
+/// The attitude with which every filter begins: level by the first second's force.
+fn first_attitude(samples: &[Sample]) -> Rot<Tunnel, Body> {
+    let force = mean(samples.iter().take(SECOND).map(|sample| sample.force_mps2));
+    let roll = math::atan2(force.y(), force.z());
+    let pitch = math::atan2(-force.x(), math::hypot(force.y(), force.z()));
+    Rot::from_roll_pitch_yaw(roll, pitch, 0.0)
+}
+
+/// How far a filter was off, in degrees.
+#[derive(Debug, Clone, Copy)]
+struct Off {
+    inclination_rms: f64,
+    inclination_max: f64,
+    /// At the end, against the first truth.
+    drift: f64,
+}
+
+/// Runs a filter over all samples.
+fn judge(samples: &[Sample], mut filter: impl FnMut(&Sample) -> Rot<Tunnel, Body>) -> Off {
+    let (mut squares, mut count, mut most) = (0.0, 0.0, 0.0_f64);
+    let (mut first, mut drift) = (None, 0.0);
+    for sample in samples {
+        let estimate = filter(sample);
+        let Some(truth) = sample.truth else { continue };
+        let [w, x, y, z] = (estimate * truth.inverse()).wxyz();
+        let heading = 2.0 * math::atan2(z, w);
+        drift = math::wrap_signed(heading - *first.get_or_insert(heading), math::TAU);
+        if sample.moving {
+            let inclination = 2.0 * math::atan2(math::hypot(x, y), math::hypot(w, z));
+            most = most.max(inclination);
+            (squares, count) = (squares + inclination * inclination, count + 1.0);
+        }
+    }
+    Off {
+        inclination_rms: math::sqrt(squares / count) / DEGREE,
+        inclination_max: most / DEGREE,
+        drift: drift / DEGREE,
+    }
+}
+
+/// The filter's own parts for a unit that has nothing beside it.
+struct Alone {
+    settings: Settings,
+    state: State,
+    factors: Factors<ERRORS>,
+    leg: Leg,
+    second: Vec<Sample>,
+}
+
+impl Alone {
+    /// With the usual settings: they are those of such a unit, whose samples at rest show 0.011 deg/s and 0.0045 m/s^2
+    /// per root of a hertz. Nothing was chosen by this recording.
+    fn new(attitude: Rot<Tunnel, Body>) -> Self {
+        let settings = Settings::default();
+        let mut sds = [1e-3; ERRORS];
+        for (from, sd) in [
+            (POSITION, 0.5),
+            (VELOCITY, 0.1),
+            (ATTITUDE, DEGREE),
+            (FORCE_BIAS, settings.force_bias.reach),
+            (RATE_BIAS, settings.rate_bias.reach),
+        ] {
+            put(&mut sds, from, Vec3::<Body>::new(sd, sd, sd));
+        }
+        Self {
+            settings,
+            state: State::at_rest(Point3::zero(), attitude),
+            factors: Factors::independent(sds.map(|sd| sd * sd)),
+            leg: Leg::default(),
+            second: Vec::new(),
+        }
+    }
+
+    fn take(&mut self, sample: &Sample) -> Rot<Tunnel, Body> {
+        let felt = Felt { rate_radps: Some(sample.rate_radps), force_mps2: Some(sample.force_mps2) };
+        self.state.go_on(&felt, SAMPLE_S, GRAVITY_MPS2, &mut self.leg);
+        self.second.push(*sample);
+        if self.second.len().is_multiple_of(EPOCH) || self.second.len() == SECOND {
+            self.end_leg();
+        }
+        if self.second.len() == SECOND {
+            self.end_second();
+        }
+        self.state.attitude
+    }
+
+    fn end_leg(&mut self) {
+        let leg = core::mem::take(&mut self.leg);
+        let transition = leg.transition(&self.settings);
+        transition.fade(&mut self.state);
+        transition.carry(&mut self.factors);
+        leg.disturb(&self.settings, &transition, &mut self.factors);
+    }
+
+    /// Once a second velocity is about that of a hand, or none at all and the gyros show their bias.
+    fn end_second(&mut self) {
+        let rates = self.second.iter().map(|sample| sample.rate_radps);
+        let forces = self.second.iter().map(|sample| sample.force_mps2);
+        if spread(rates.clone()) < STILL_RADPS && spread(forces) < STILL_MPS2 {
+            let rows = measure::no_turn(&self.state, mean(rates), self.settings.rate_noise);
+            self.fuse(&rows);
+            self.fuse(&measure::rest(&self.state, STILL_SD_MPS));
+        } else {
+            self.fuse(&measure::rest(&self.state, HAND_MPS));
+        }
+        self.second.clear();
+    }
+
+    fn fuse(&mut self, rows: &[Row]) {
+        let mut errors = [0.0; ERRORS];
+        for row in rows {
+            let expected: f64 = row.h.iter().zip(&errors).map(|(h, e)| h * e).sum();
+            let gain = self.factors.measure(&row.h, row.noise);
+            for (error, k) in errors.iter_mut().zip(&gain.k) {
+                *error += k * (row.residual - expected);
+            }
+        }
+        self.state.correct(&errors);
+    }
+}
+
+fn ours(samples: &[Sample]) -> Off {
+    let mut alone = Alone::new(first_attitude(samples));
+    judge(samples, |sample| alone.take(sample))
+}
+
+type PeerVector = peers::Vector3<f64>;
+type PeerRotation = peers::UnitQuaternion<f64>;
+
+/// Judges a peer, whose step takes its own types.
+fn judge_peer(samples: &[Sample], mut step: impl FnMut(PeerVector, PeerVector) -> PeerRotation) -> Off {
+    let vector = |v: Vec3<Body>| PeerVector::new(v.x(), v.y(), v.z());
+    judge(samples, |sample| {
+        let q = step(vector(sample.rate_radps), vector(sample.force_mps2));
+        Rot::from_wxyz(q.w, q.i, q.j, q.k).unwrap()
+    })
+}
+
+fn peer_start(samples: &[Sample]) -> PeerRotation {
+    let [w, x, y, z] = first_attitude(samples).wxyz();
+    PeerRotation::new_unchecked(peers::Quaternion::new(w, x, y, z))
+}
+
+fn madgwick(samples: &[Sample], beta: f64) -> Off {
+    let mut filter = Madgwick::new_with_quat(SAMPLE_S, beta, peer_start(samples));
+    judge_peer(samples, |rate, force| *filter.update_imu(&rate, &force).unwrap())
+}
+
+fn mahony(samples: &[Sample], kp: f64, ki: f64) -> Off {
+    let mut filter = Mahony::new_with_quat(SAMPLE_S, kp, ki, peer_start(samples));
+    judge_peer(samples, |rate, force| *filter.update_imu(&rate, &force).unwrap())
+}
+
+/// A filter by name, and how far it was off.
+type Judged = (String, Off);
+
+/// The least inclined of many.
+fn best(many: impl Iterator<Item = Judged>) -> Judged {
+    many.min_by(|(_, a), (_, b)| a.inclination_rms.total_cmp(&b.inclination_rms)).unwrap()
+}
+
+/// The peers with the gains that their crate gives them.
+fn usual_peers(samples: &[Sample]) -> [Judged; 2] {
+    [
+        ("Madgwick, usual gain 0.1".to_owned(), madgwick(samples, 0.1)),
+        ("Mahony, usual gains 0.5, 0".to_owned(), mahony(samples, 0.5, 0.0)),
+    ]
+}
+
+/// The peers with the gains that incline them least in this very recording.
+fn best_peers(samples: &[Sample]) -> [Judged; 2] {
+    let betas = [0.0005, 0.001, 0.002, 0.003, 0.005, 0.01, 0.02, 0.033, 0.05, 0.1, 0.2];
+    let kps = [0.01, 0.02, 0.05, 0.07, 0.1, 0.2, 0.5, 1.0, 2.0];
+    let kis = [0.0, 0.0001, 0.0002, 0.0005, 0.001, 0.002, 0.005, 0.01, 0.02, 0.05];
+    let gains = kps.into_iter().flat_map(|kp| kis.map(|ki| (kp, ki)));
+    [
+        best(betas.into_iter().map(|beta| (format!("Madgwick, best gain {beta}"), madgwick(samples, beta)))),
+        best(gains.map(|(kp, ki)| (format!("Mahony, best gains {kp}, {ki}"), mahony(samples, kp, ki)))),
+    ]
+}
+
+fn say(name: &str, off: &Off) {
+    println!("{name:<60} {:>6.3} {:>7.3} {:>8.2}", off.inclination_rms, off.inclination_max, off.drift);
+}
+
+/// The same samples without the gyros' mean over the rest before the motion.
+fn unbiased(samples: &[Sample]) -> Vec<Sample> {
+    let rest = samples.iter().take_while(|sample| !sample.moving);
+    let bias = mean(rest.map(|sample| sample.rate_radps));
+    samples.iter().map(|sample| Sample { rate_radps: sample.rate_radps + -bias, ..*sample }).collect()
+}
+
+#[test]
+fn val_attitude_by_rates_and_forces_alone_is_no_worse_than_published_filters() {
+    for (path, rows) in recordings::both(NAME, 10_000, 18_707) {
+        let samples = samples(&path);
+        assert_eq!(samples.len(), rows);
+        no_worse_than_published_filters(&samples);
+    }
+}
+
+fn no_worse_than_published_filters(samples: &[Sample]) {
+    println!(
+        "{:<60} {:>6} {:>7} {:>8}",
+        "degrees: inclination, and what heading has gained", "rms", "max", "end"
+    );
+    let ours = ours(samples);
+    say("headrace", &ours);
+    for (name, off) in usual_peers(samples).into_iter().chain(best_peers(samples)) {
+        say(&name, &off);
+        assert!(ours.inclination_rms <= off.inclination_rms, "{name}: {off:?}; ours {ours:?}");
+        assert!(ours.drift.abs() <= off.drift.abs(), "{name}: {off:?}; ours {ours:?}");
+    }
+    // Told their bias beforehand, the peers still need gains that suit this recording to come as near.
+    let unbiased = unbiased(samples);
+    for (name, off) in usual_peers(&unbiased) {
+        say(&format!("{name}, told the bias"), &off);
+        assert!(ours.inclination_rms <= off.inclination_rms, "{name}: {off:?}; ours {ours:?}");
+    }
+    for (name, off) in best_peers(&unbiased) {
+        say(&format!("{name}, told the bias"), &off);
+    }
+}

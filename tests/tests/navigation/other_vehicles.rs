@@ -1,0 +1,54 @@
+//! A vehicle whose autopilot owns inertial unit, pressure and distances, and which has a velocity log: devices that came
+//! with their own crates alone go the whole way from the simulator's bytes to navigation.
+
+use headrace_tests::Folder;
+use serde_json::Value;
+
+const SCENE: &str = r#"vehicle = "vehicle.toml"
+[trajectory]
+start_m = 3
+[[trajectory.legs]]
+distance_m = 8
+speed_mps = 0.2
+"#;
+
+fn source<'a>(report: &'a Value, id: &str) -> &'a Value {
+    report["sources"].as_array().unwrap().iter().find(|source| source["id"] == id).unwrap()
+}
+
+#[test]
+fn an_autopilots_parts_and_a_velocity_log_navigate() {
+    let folder = Folder::new();
+    folder.write("vehicle.toml", headrace_tests::other_vehicle());
+    folder.write("scene.toml", SCENE);
+    folder.simulate("scene.toml", "dive.mcap");
+    let (code, report) = folder.replay("dive.mcap", &[]);
+    assert_eq!(code, Some(0), "{}", report["log"]["losses"]);
+    // 40 s, at the rates of their tables.
+    for (id, readings) in [
+        ("imu", 12_000),
+        ("depth", 400),
+        ("left", 400),
+        ("right", 400),
+        ("up", 400),
+        ("down", 400),
+        ("dvl", 320),
+    ] {
+        let source = source(&report, id);
+        let got = source["readings"].as_i64().unwrap();
+        assert!((got - readings).abs() <= readings / 100 + 3, "{id}: {source}");
+        for nothing in ["bad_frames", "skipped_bytes", "withheld"] {
+            assert_eq!(source[nothing], 0, "{id}: {source}");
+        }
+    }
+    // Its axes, its lever and its delay are right: devices without noise agree. With one axis the wrong way it is 0.08.
+    let dvl = &source(&report, "dvl")["navigation"];
+    println!("velocity log: {dvl}");
+    assert_eq!(dvl["gated"], 0, "{dvl}");
+    // The first is of a moment before the filter began: it comes 100 ms after its ping.
+    assert!(dvl["late"].as_u64().unwrap() <= 1 && dvl["used"].as_u64().unwrap() > 900, "{dvl}");
+    assert!(dvl["nis"].as_f64().unwrap() < 0.001, "{dvl}");
+    let dive = &report["dive"];
+    assert!(dive["samples_valid"].as_u64().unwrap() > 1000, "{dive}");
+    assert!((dive["to_m"].as_f64().unwrap() - 11.0).abs() < 0.05, "{dive}");
+}

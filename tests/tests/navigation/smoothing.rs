@@ -1,0 +1,286 @@
+//! Smoothing against the truth of simulated dives, beside the filter on the same data; and `replay --smooth`.
+
+use headrace_fusion::filter::state::State;
+use headrace_fusion::smooth::backward::Backward;
+use headrace_fusion::smooth::journal::Journal;
+use headrace_fusion::smooth::step::Placed;
+use headrace_fusion::smooth::track::TrackNavigation;
+use headrace_geometry::frames::Pose;
+use headrace_geometry::math;
+use headrace_geometry::time::MonoNs;
+use headrace_sensor::reading::MAX_SOURCES;
+use headrace_simulator::{START, Scene, Simulation};
+use headrace_tests::Folder;
+use headrace_tests::field::{Figures, POSE, SETTINGS, field, field_with, figures, nees, rms, share};
+use headrace_tests::tracking::{self, Epoch, Silence, Track, dive, filter};
+use headrace_vehicle::NavigationConfig;
+
+const SEEDS: u64 = 3;
+/// Room for the steps of a dive of ten minutes.
+const STEPS: usize = 1 << 13;
+
+struct Smoothed {
+    /// What the filter said.
+    filter: Track,
+    /// What is said along the smoothed track.
+    dive: Track,
+    /// Smoothed estimates, the earliest first.
+    epochs: Vec<Epoch>,
+}
+
+fn smoothed(scene: &Scene, silence: &Silence) -> Smoothed {
+    let NavigationConfig::Filter(settings) = scene.vehicle.navigation else { panic!("no filter") };
+    let (journal, steps) = Journal::new(STEPS);
+    let by_filter = dive(scene, filter(scene).with_journal(journal), silence.clone());
+    assert_eq!(steps.dropped(), 0);
+    let records: Vec<_> = std::iter::from_fn(|| steps.next()).collect();
+    let truth = Simulation::new(scene).unwrap();
+    let mut backward = Backward::new(settings);
+    let mut epochs = Vec::new();
+    for words in records.iter().rev() {
+        backward.take(&Placed::of_words(words).unwrap());
+        let now = backward.now().unwrap();
+        let Pose { position, attitude } = truth.pose(now.at).unwrap();
+        let errors = now.state.errors_to(&State { position, attitude, ..now.state });
+        epochs.push(Epoch { at: now.at, factors: Box::new(now.factors), errors });
+    }
+    epochs.reverse();
+    let along = TrackNavigation::new(backward.finish(), [None; MAX_SOURCES]);
+    Smoothed { filter: by_filter, dive: dive(scene, along, Silence::default()), epochs }
+}
+
+type Pick = fn(&Figures) -> f64;
+
+/// What the cable shows too much is all that is left of the error along the tunnel: no other sensor sees it, and its model isn't
+/// the scene's (a spline without anything faster than its period), so that no estimate of it need be better than another.
+const SLACK: f64 = 1.25;
+
+struct Dives {
+    smoothed: Smoothed,
+    /// Error of the hole of each section, m, and its standard deviation as told: by the filter, and smoothed.
+    holes: [Vec<(f64, f64)>; 2],
+}
+
+/// The scene's slack remembers a quarter of itself after a turn; a lag of 15 s, which the filter bears, has it remember more
+/// than half. A smoother leans on its model more than a filter does: with that, D is within two sigma 88.9 % of the time.
+fn dives(seed: u64) -> Dives {
+    let scene = field_with(seed, 65.0, &SETTINGS.replace("slack_time_s = 15", "slack_time_s = 8"), "");
+    let smoothed = smoothed(&scene, &Silence::default());
+    let truth = tracking::true_dive(&scene);
+    let holes = [&smoothed.filter, &smoothed.dive].map(|track| {
+        let pairs = track.report.sections.iter().filter_map(|ours| {
+            let same = |other: &f64| (other - ours.start_m).abs() < 1e-6;
+            let true_one = truth.report.sections.iter().find(|other| same(&other.start_m))?;
+            Some((ours.hole_m? - true_one.hole_m?, ours.hole_sigma_m))
+        });
+        pairs.collect()
+    });
+    Dives { smoothed, holes }
+}
+
+/// Smoothed errors are no larger than the filter's, and are known: NEES of a pose is near 6, D within two of its standard
+/// deviations of the truth 90 to 99 % of the time.
+#[test]
+fn smoothed_dives_are_nearer_to_the_truth_and_know_how_near() {
+    let all: Vec<Dives> = std::thread::scope(|scope| {
+        let half =
+            |odd: u64| move || (1..=SEEDS).filter(|seed| seed % 2 == odd).map(dives).collect::<Vec<_>>();
+        let [odd, even] = [1, 0].map(|odd| scope.spawn(half(odd)));
+        odd.join().unwrap().into_iter().chain(even.join().unwrap()).collect()
+    });
+    let by_filter: Vec<Figures> = all.iter().map(|dives| figures(&dives.smoothed.filter)).collect();
+    let smoothed: Vec<Figures> = all.iter().map(|dives| figures(&dives.smoothed.dive)).collect();
+    println!("| rms over {SEEDS} dives | filter | smoothed |\n|---|---|---|");
+    // How much of the filter's error may be left.
+    let rows: [(&str, Pick, f64); 8] = [
+        ("across, m", |f| f.across_m, 0.5),
+        ("up, m", |f| f.up_m, 0.5),
+        ("along, m", |f| f.along_m, SLACK),
+        ("displacement over a turn, m", |f| f.turn_m, SLACK),
+        ("its sigma as told, m", |f| f.turn_sigma_m, 1.0),
+        ("yaw, deg", |f| f.yaw_deg, 0.6),
+        ("roll and pitch, deg", |f| f.tilt_deg, 0.6),
+        ("share of pings with a fix", |f| f.fixed, 1.001),
+    ];
+    for (name, pick, most) in rows {
+        let [was, is] = [&by_filter, &smoothed].map(|all| rms(all.iter().map(pick)));
+        println!("| {name} | {was:.4} | {is:.4} |");
+        assert!(is <= most * was, "{name}: {is}, was {was}");
+    }
+    let means: Vec<f64> = all
+        .iter()
+        .map(|dives| {
+            let epochs = &dives.smoothed.epochs;
+            epochs.iter().map(nees).sum::<f64>() / epochs.len() as f64
+        })
+        .collect();
+    println!("NEES of 6, smoothed: {means:.2?}");
+    let mean = means.iter().sum::<f64>() / means.len() as f64;
+    assert!((4.0..8.0).contains(&mean), "{means:?}");
+    for (name, number) in [("filter", 0), ("smoothed", 1)] {
+        let holes: Vec<(f64, f64)> =
+            all.iter().flat_map(|dives| dives.holes[number].iter().copied()).collect();
+        let within = share(holes.iter().map(|(error, sigma)| error.abs() <= 2.0 * sigma));
+        let [error_m, sigma_m] = [rms(holes.iter().map(|h| h.0)), rms(holes.iter().map(|h| h.1))];
+        println!(
+            "D of {} sections, {name}: error {error_m:.4} m, sigma {sigma_m:.4} m, within two: {within:.3}",
+            holes.len()
+        );
+        assert!((0.9..=0.99).contains(&within), "{name}: {within}");
+    }
+}
+
+/// Root mean square of an error between two times, and how far beyond its standard deviation it comes at most.
+fn between(epochs: &[Epoch], error: usize, from_s: f64, to_s: f64) -> (f64, f64) {
+    let inside = epochs.iter().filter(|epoch| {
+        let at_s = epoch.at.since(START).as_secs_f64();
+        (from_s..to_s).contains(&at_s)
+    });
+    let off: Vec<(f64, f64)> =
+        inside.map(|epoch| (epoch.errors[error], math::sqrt(epoch.factors.variance(error)))).collect();
+    let worst = off.iter().map(|(error, sigma)| error.abs() / sigma).fold(0.0, f64::max);
+    (rms(off.iter().map(|(error, _)| *error)), worst)
+}
+
+#[test]
+fn a_silence_is_bridged_from_both_sides() {
+    let scene = field(3, 33.0);
+    let from_s = 80.0;
+    // Without the wall an estimate is given up as lost after half a minute, and then there is no later side.
+    for (name, sources, errors, to_s) in [
+        ("the tether", vec![7], vec![0], from_s + 60.0),
+        ("all sonars", vec![0, 1, 2, 3, 4], vec![1, 2], from_s + 10.0),
+    ] {
+        let silence = Silence { sources, from_s, to_s };
+        let track = smoothed(&scene, &silence);
+        for error in errors {
+            let (was_m, _) = between(&track.filter.epochs, error, from_s, to_s);
+            let (is_m, worst) = between(&track.epochs, error, from_s, to_s);
+            println!(
+                "{name} silent to {to_s} s, error {error}: filter {was_m:.3} m, smoothed {is_m:.3} m, worst {worst:.1} sigma"
+            );
+            assert!(is_m < 0.7 * was_m, "{name}: {is_m}, was {was_m}");
+            assert!(worst < 3.0, "{name}: {worst}");
+        }
+        let settled = &track.epochs;
+        let off = |epoch: &Epoch| POSE.map(|i| epoch.errors[i].abs() / math::sqrt(epoch.factors.variance(i)));
+        let within = share(settled.iter().flat_map(off).map(|off| off <= 3.0));
+        assert!(within > 0.995, "{name}: {within}");
+    }
+}
+
+/// Displacement over a turn, which verdicts hang on, by a cable that doesn't hang slack.
+#[test]
+fn displacements_are_far_nearer_where_the_cable_is_taut() {
+    let settings = SETTINGS.replace("slack_sd_m = 0.085", "slack_sd_m = 0.001");
+    let scene = field_with(1, 40.0, &settings, "tether_slack = { reach_m = 0.15, period_s = 30 }\n");
+    let track = smoothed(&scene, &Silence::default());
+    let [was, is] = [&track.filter, &track.dive].map(figures);
+    println!("taut cable, over a turn: filter {:.4} m, smoothed {:.4} m", was.turn_m, is.turn_m);
+    assert!(is.turn_m < 0.5 * was.turn_m && is.turn_m < 2.0 * is.turn_sigma_m, "{is:?} {was:?}");
+}
+
+#[test]
+fn a_smoothed_track_is_cut_where_the_estimate_was_lost() {
+    let scene = field(2, 20.0);
+    let sources = (0..8).collect();
+    let track = smoothed(&scene, &Silence { sources, from_s: 40.0, to_s: 60.0 });
+    let unknown = |at: MonoNs| {
+        let at_s = at.since(START).as_secs_f64();
+        (42.0..60.0).contains(&at_s)
+    };
+    let fixed = |inside: bool| {
+        let fixes = track.dive.fixes.iter().filter(move |tracked| unknown(tracked.at) == inside);
+        share(fixes.map(|tracked| tracked.fix.is_ok()))
+    };
+    assert_eq!(fixed(true).to_bits(), 0.0_f64.to_bits());
+    assert!(fixed(false) > 0.9, "{}", fixed(false));
+    assert!(track.epochs.iter().all(|epoch| epoch.factors.is_sound()));
+}
+
+/// Noise, far more slack than the filter reckons with, and steel on the short dive, three times as long.
+const NOISE: &str = "
+[effects]
+imu_noise = { gyro_degps_rthz = 0.01, accel_mps2_rthz = 0.002, attitude_deg = 0.5 }
+tether_slack = { reach_m = 0.4, period_s = 8 }
+magnetic_disturbance = { per_100m = 20, up_to_deg = 10, length_m = 3 }
+pilot_drift = { across_m = 0.5, up_m = 0.3, yaw_deg = 10, pitch_deg = 3, roll_deg = 3, period_s = 20 }
+";
+
+fn noisy() -> Folder {
+    let folder = Folder::new();
+    folder.write("vehicle.toml", headrace_tests::VEHICLE);
+    folder.write("scene.toml", headrace_tests::SCENE.replace("distance_m = 4", "distance_m = 12") + NOISE);
+    folder.simulate("scene.toml", "dive.mcap");
+    folder
+}
+
+#[test]
+fn replay_says_what_smoothing_changed() {
+    let folder = noisy();
+    let answer =
+        folder.headrace(&["replay", "dive.mcap", "--smooth", "--target", "0.7", "--report", "r.json"]);
+    assert_eq!(answer.code, Some(0), "{}", answer.stderr);
+    let about = |line: &&str| ["  smoothed", "  changed"].iter().any(|start| line.starts_with(start));
+    let said: Vec<&str> = answer.stdout.lines().filter(about).collect();
+    insta::assert_snapshot!(said.join("\n"), @r"
+      smoothed 591 estimates; by the filter alone: passed 9.50 m   failed 0.50 m   can't say 1.50 m   open 0.75 m
+      changed ch 0+002.75 to 0+003.00: not passed to fail, holes - to 1.968±0.000 m
+      changed ch 0+003.50 to 0+003.75: can't say to pass, holes 0.554±0.096 to 0.554±0.014 m
+      changed ch 0+004.00 to 0+004.50: can't say to pass, holes 0.604±0.071 to 0.413±0.014 m
+      changed ch 0+004.75 to 0+005.00: can't say to pass, holes 0.527±0.107 to 0.409±0.013 m
+      changed ch 0+005.25 to 0+005.50: can't say to pass, holes 0.572±0.081 to 0.474±0.014 m
+      changed ch 0+010.50 to 0+010.75: can't say to pass, holes 0.667±0.022 to 0.562±0.013 m
+    ");
+    let report: serde_json::Value = serde_json::from_slice(&folder.read("r.json")).unwrap();
+    let smoothing = &report["smoothing"];
+    for (side, summary) in [("after", &report["summary"])] {
+        for key in ["pass_m", "fail_m", "cannot_say_m", "open_m"] {
+            assert_eq!(smoothing[side][key], summary[key], "{side} {key}");
+        }
+    }
+    let changed = smoothing["changed"].as_array().unwrap();
+    assert!(!changed.is_empty());
+    let (_, plain) = folder.replay("dive.mcap", &["--target", "0.7"]);
+    assert_eq!(smoothing["filter_digest"], plain["digest"]);
+    assert!(plain["smoothing"].is_null());
+    let find = |report: &serde_json::Value, start: &serde_json::Value| {
+        let sections = report["sections"].as_array().unwrap();
+        sections.iter().find(|section| section["start_m"] == *start).cloned()
+    };
+    for change in changed {
+        for (side, report) in [("before", &plain), ("after", &report)] {
+            let section = find(report, &change["start_m"]);
+            for key in ["verdict", "hole_m", "hole_sigma_m"] {
+                assert_eq!(
+                    change[side][key],
+                    section.as_ref().map_or(serde_json::Value::Null, |s| s[key].clone())
+                );
+            }
+        }
+        assert_ne!(change["before"]["verdict"], change["after"]["verdict"]);
+    }
+}
+
+#[test]
+fn a_smoothed_replay_is_the_same_in_ticks_of_any_length() {
+    let folder = noisy();
+    let digest = folder.digest("dive.mcap", &["--smooth"]);
+    for tick_ms in ["1", "333", "60000"] {
+        assert_eq!(folder.digest("dive.mcap", &["--smooth", "--tick-ms", tick_ms]), digest, "{tick_ms} ms");
+    }
+    let answer = folder.headrace(&["replay", "dive.mcap", "--smooth", "--report", "golden.json"]);
+    assert_eq!(answer.code, Some(0), "{}", answer.stderr);
+    let again =
+        folder.headrace(&["replay", "dive.mcap", "--smooth", "--expect", "golden.json", "--tick-ms", "7"]);
+    assert_eq!((again.code, again.stderr.as_str()), (Some(0), ""));
+}
+
+#[test]
+fn there_is_nothing_to_smooth_without_a_filter() {
+    let folder = Folder::with_dive();
+    folder.write("direct.toml", headrace_tests::VEHICLE.to_owned() + "\n[navigation]\nway = \"direct\"\n");
+    let answer = folder.headrace(&["replay", "dive.mcap", "--smooth", "--vehicle", "direct.toml"]);
+    assert_eq!(answer.code, Some(2), "{}", answer.stderr);
+    insta::assert_snapshot!(answer.stderr, @r#"headrace: replaying dive.mcap: --smooth needs the filter, and the vehicle file says [navigation] way = "direct"; wanted is way = "filter""#);
+}

@@ -1,0 +1,194 @@
+//! The armed loop allocates nothing: a million packets of a four-head dive, with recorder and notice outlet, under an
+//! allocator that counts on the loop's thread.
+//!
+//! That it takes no lock is kept by clippy.toml, which bars the lock types from the whole workspace.
+
+#![expect(clippy::unwrap_used, reason = "a test stops at what it can't do")]
+#![expect(
+    unsafe_code,
+    reason = "a global allocator is an unsafe trait; this one counts and hands on to the system's"
+)]
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+
+use headrace_a50::decoder::{self as a50, A50Decoder};
+use headrace_a50::report::{Against, Velocity};
+use headrace_fusion::filter::FilterNavigation;
+use headrace_fusion::smooth::journal::Journal;
+use headrace_geometry::time::DurNs;
+use headrace_mavlink::MavHeader;
+use headrace_mavlink::decoder::{self as mavlink, MavlinkDecoder, Part};
+use headrace_mavlink::message::{Imu, ImuMessage, Message};
+use headrace_monitor::App;
+use headrace_monitor::outlet::NoticeOutlet;
+use headrace_replay::log::{LogHeader, Recorder, SourceInfo};
+use headrace_replay::record::{QUEUE_BYTES, RecorderOutlet, result_channels};
+use headrace_sensor::device::{Decoder, Direction};
+use headrace_sensor::reading::Packet;
+use headrace_simulator::{START, Simulation};
+use headrace_tests::scenes;
+use headrace_vehicle::Mission;
+use headrace_vehicle::NavigationConfig;
+
+struct Counting;
+
+thread_local! {
+    static COUNTED: Cell<Option<u64>> = const { Cell::new(None) };
+}
+
+fn count() {
+    // Const-initialised and without a destructor: looking at it allocates nothing.
+    COUNTED.with(|counted| counted.set(counted.get().map(|n| n + 1)));
+}
+
+// SAFETY: every call is handed on to the system's allocator unchanged.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        count();
+        // SAFETY: the caller's promises are passed on.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        count();
+        // SAFETY: as above.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+
+    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        count();
+        // SAFETY: as above.
+        unsafe { System.realloc(pointer, layout, size) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+/// Allocator calls made on this thread while `work` runs.
+fn allocations(work: impl FnOnce()) -> u64 {
+    COUNTED.with(|counted| counted.set(Some(0)));
+    work();
+    COUNTED.with(|counted| counted.replace(None)).unwrap()
+}
+
+/// Forth, too fast for a stretch, back over it, and forth again, so that flags are raised and cleared.
+const SCENE: &str = "vehicle = \"vita2-4.toml\"\n[trajectory]\n
+[[trajectory.legs]]\ndistance_m = 120\nspeed_mps = 0.197\n
+[[trajectory.legs]]\ndistance_m = 40\nspeed_mps = 0.4\n
+[[trajectory.legs]]\ndistance_m = 60\nspeed_mps = -0.2\n
+[[trajectory.legs]]\ndistance_m = 200\nspeed_mps = 0.35\n";
+
+#[test]
+fn a_million_packets_without_one_allocation() {
+    assert!(allocations(|| drop(vec![1])) > 0, "the counter counts");
+
+    let scene = scenes::scene(SCENE);
+    let vehicle = &scene.vehicle;
+    let mut app = App::new(Mission { length_m: 1000.0, ..vehicle.mission() });
+    for sensor in &vehicle.sensors {
+        app.add_device(sensor.as_ref()).unwrap();
+    }
+    // Nobody empties this one: dropping the oldest must not allocate either.
+    let (outlet, notices) = NoticeOutlet::new(1000);
+    app.add_plugin(&outlet).unwrap();
+    let header = LogHeader {
+        vehicle_toml: scene.vehicle_text.clone(),
+        sources: vehicle
+            .sensor_configs
+            .iter()
+            .map(|s| SourceInfo { id: s.id.clone(), plugin: s.plugin.clone(), connect: s.connect.clone() })
+            .collect(),
+        ticks: true,
+        results: result_channels(),
+        ..LogHeader::default()
+    };
+    let (port, recorder) = Recorder::start(std::io::sink(), &header, QUEUE_BYTES).unwrap();
+    app.add_plugin(&RecorderOutlet::new(port)).unwrap();
+    // Nor does anybody empty the journal of the filter's steps.
+    let (journal, steps) = Journal::new(1000);
+    let NavigationConfig::Filter(settings) = vehicle.navigation else { panic!("no filter") };
+    let filter = FilterNavigation::new(vehicle.tunnel.profile.clone(), vehicle.site, settings);
+    let mut dive = app.arm(Box::new(filter.with_journal(journal))).unwrap();
+    let mut ports: Vec<_> =
+        (0..vehicle.sensors.len()).map(|source| dive.take_port(source).unwrap()).collect();
+
+    let mut simulation = Simulation::new(&scene).unwrap();
+    let mut until = START;
+    let (mut packets, mut allocated, mut waited) = (0_usize, 0, 0_u64);
+    while packets < 1_000_000 {
+        until = until + DurNs(20_000_000);
+        while simulation.peek_message().is_some_and(|message| message.at < until) {
+            let message = simulation.next_message().unwrap();
+            if message.direction == Direction::Received {
+                ports[usize::from(message.source)].send(message.at, message.bytes).unwrap();
+            }
+        }
+        while dive.has_waiting() {
+            let mut consumed = 0;
+            allocated += allocations(|| consumed = dive.tick(until));
+            packets += consumed;
+            if consumed == 0 {
+                // The recorder is behind and holds packets back; it loses none.
+                waited += 1;
+                std::thread::sleep(std::time::Duration::from_millis(1));
+            }
+        }
+        assert!(simulation.peek_message().is_some(), "the scene is too short: {packets} packets");
+    }
+    assert_eq!(allocated, 0, "allocator calls in {packets} packets");
+    assert!(notices.dropped() > 0, "the notice queue has overflowed");
+    assert!(steps.dropped() > 0, "the journal has overflowed");
+    drop(dive);
+    let written = recorder.finish().unwrap();
+    println!("{packets} packets, {} messages recorded, waited {waited} times", written.messages);
+    assert!(written.messages >= packets as u64, "recorded input is never dropped");
+}
+
+/// Lines as these devices send them, damaged here and there, in pieces.
+#[test]
+fn decoders_of_other_vehicles_allocate_nothing() {
+    let header = MavHeader { system_id: 1, component_id: 1, sequence: 0 };
+    let imu = Imu {
+        message: ImuMessage::Raw,
+        time_us: 1,
+        force_mg: [0, 0, -1000],
+        rate_mradps: [1, 2, 3],
+        unit: 0,
+    };
+    let frames = Message::Imu(imu).to_frame(header).raw_bytes().repeat(500);
+    let reports: Vec<u8> = (0..500)
+        .flat_map(|number| {
+            let velocity = Velocity {
+                against: Against::Bottom,
+                velocity_mps: [0.2, 0.001 * f64::from(number), 0.0],
+                fom_mps: 0.002,
+                altitude_m: 1.0,
+                valid_beams: 4,
+                is_valid: true,
+                status: 0,
+                times_us: Some([i64::from(number), i64::from(number) + 1000]),
+            };
+            velocity.encode()
+        })
+        .collect();
+    let part = Part::Imu { message: Some(ImuMessage::Raw) };
+    let meaning = mavlink::Meaning { part, system_id: None, component_id: None, latency: DurNs(0) };
+    let mut autopilot = MavlinkDecoder::new(meaning);
+    let mut log = A50Decoder::new(a50::Meaning { fom_max_mps: 0.4, max_speed_mps: 3.0, latency: DurNs(0) });
+    let devices: [(&mut dyn Decoder, Vec<u8>); 2] = [(&mut autopilot, frames), (&mut log, reports)];
+    for (decoder, mut bytes) in devices {
+        bytes.iter_mut().step_by(3001).for_each(|byte| *byte ^= 0x55);
+        let (mut at, mut readings) = (START, 0);
+        let allocated = allocations(|| {
+            for piece in bytes.chunks(97) {
+                at = at + DurNs(1_000_000);
+                decoder.decode(Packet { received: at, bytes: piece }, &mut |_| readings += 1);
+            }
+        });
+        let counts = decoder.counts();
+        assert_eq!(allocated, 0, "{readings} readings, {counts:?}");
+        assert!(readings > 400 && counts.bad_frames > 0, "{readings} readings, {counts:?}");
+    }
+}

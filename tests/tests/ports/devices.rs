@@ -1,0 +1,199 @@
+//! `headrace devices`: emulated devices on real ports say what they are, and what isn't there is said with what mends it.
+
+use std::net::{IpAddr, Ipv4Addr};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::{self, JoinHandle};
+
+use headrace_config::Document;
+use headrace_geometry::site::Site;
+use headrace_geometry::time::DurNs;
+use headrace_ports::{Answer, Stand, probe, wait_for_any};
+use headrace_sensor::connect::Connect;
+use headrace_sensor::device::{DeviceKind, Direction, Emulated, EmulatorSetup};
+use headrace_sensor::driver::{Carrier, Probe};
+use headrace_vehicle::VehicleConfig;
+use serde_json::Value;
+
+const KINDS: [&dyn DeviceKind; 2] = [&headrace_imagenex881::Kind, &headrace_ping1d::Kind];
+const LOCAL: IpAddr = IpAddr::V4(Ipv4Addr::LOCALHOST);
+const HEAD: &str = "plugin = \"imagenex881\"\nmode = \"slow\"\nrange_m = 10\nhead_id = 0x12";
+const PING: &str = "plugin = \"ping1d\"\ndevice_id = 7";
+
+/// A vehicle of sensors with these keys, each with where it is connected.
+fn vehicle_text(sensors: &[(&str, String)]) -> String {
+    let mut text =
+        include_str!("../../../deploy/vehicles/pipe.toml").split("[[sensors]]").next().unwrap().to_owned();
+    for (number, (keys, connect)) in sensors.iter().enumerate() {
+        let table = format!("[[sensors]]\nid = \"sensor_{number}\"\n{keys}\nconnect = \"{connect}\"\n");
+        text.push_str(&table);
+        text.push_str("position_m = [0.1, 0.0, 0.0]\nangles_deg = [0, 0, 0]\n");
+    }
+    text
+}
+
+fn emulator(keys: &str) -> Emulated {
+    let text = vehicle_text(&[(keys, String::new())]);
+    let vehicle =
+        VehicleConfig::parse(Document::new("vehicle.toml", &text), &KINDS, &|_| unreachable!()).unwrap();
+    let start = headrace_ports::now();
+    vehicle.sensors[0].emulator(&EmulatorSetup { start, head: None, site: Site::default(), polled: false })
+}
+
+/// A device on a line, until it is dropped.
+struct Device {
+    connect: Connect,
+    stopping: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Device {
+    /// What it answers is up to `answer`, who gets what a host has sent.
+    fn new(carrier: Carrier, mut answer: impl FnMut(&[u8]) -> Vec<Vec<u8>> + Send + 'static) -> Self {
+        let mut stand = Stand::new(carrier, LOCAL).unwrap();
+        let (connect, stopping) = (stand.connect().clone(), Arc::new(AtomicBool::new(false)));
+        let stops = Arc::clone(&stopping);
+        let thread = thread::spawn(move || {
+            while !stops.load(Ordering::Relaxed) {
+                wait_for_any(std::slice::from_ref(&stand), 1_000_000);
+                while let Some(bytes) = stand.read().unwrap() {
+                    for message in answer(&bytes) {
+                        stand.write(&message).unwrap();
+                    }
+                }
+                thread::yield_now();
+            }
+        });
+        Self { connect, stopping, thread: Some(thread) }
+    }
+
+    fn emulated(carrier: Carrier, keys: &'static str) -> Self {
+        let (Emulated::Head(mut device) | Emulated::Echosounder(mut device)) = emulator(keys) else {
+            panic!()
+        };
+        Self::new(carrier, move |bytes| {
+            let (mut answers, mut due) = (Vec::new(), Vec::new());
+            let at = headrace_ports::now();
+            let mut line = |direction, _, bytes: &[u8]| {
+                assert_eq!(direction, Direction::Received);
+                answers.push(bytes.to_vec());
+            };
+            device.hear(at, bytes, &mut line);
+            device.begin(at + DurNs(1), &mut due);
+            for sounding in &due {
+                device.tell(sounding, &mut line);
+            }
+            answers
+        })
+    }
+}
+
+impl Drop for Device {
+    fn drop(&mut self) {
+        self.stopping.store(true, Ordering::Relaxed);
+        self.thread.take().unwrap().join().unwrap();
+    }
+}
+
+fn probes() -> Vec<Box<dyn Probe>> {
+    KINDS.iter().filter_map(|kind| kind.probe()).collect()
+}
+
+fn asked(device: &Device) -> Answer {
+    probe(&device.connect, &mut probes()).unwrap()
+}
+
+/// Exit code, standard output, standard error.
+fn headrace(arguments: &[&str]) -> (Option<i32>, String, String) {
+    let output = headrace_tests::program().arg("devices").args(arguments).output().unwrap();
+    let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).unwrap();
+    (output.status.code(), text(&output.stdout), text(&output.stderr))
+}
+
+#[test]
+fn devices_on_real_ports_say_what_they_are() {
+    for carrier in [Carrier::Serial, Carrier::Tcp, Carrier::Udp] {
+        for (keys, words) in [
+            (HEAD, "Imagenex 881 family or 852 sounder, head_id = 0x12"),
+            (
+                PING,
+                "Ping echosounder (Ping1D, Ping2), device_id = 7, revision 1, firmware 3.29.0, protocol 1.0.0",
+            ),
+        ] {
+            let device = Device::emulated(carrier, keys);
+            // Twice, since whoever asks leaves the line as it was.
+            for _ in 0..2 {
+                let Answer::Is(identity) = asked(&device) else { panic!("{carrier:?}: {words}: no answer") };
+                assert!(identity.starts_with(words), "{carrier:?}: {identity}");
+            }
+        }
+    }
+}
+
+#[test]
+fn silence_and_bytes_that_nobody_knows_are_told_apart() {
+    let silent = Device::new(Carrier::Serial, |_| Vec::new());
+    assert_eq!(asked(&silent), Answer::Silence);
+    let modem =
+        Device::new(
+            Carrier::Tcp,
+            |bytes| if bytes.is_empty() { vec![] } else { vec![b"ERROR\r\n".to_vec()] },
+        );
+    let Answer::Unknown(bytes) = asked(&modem) else { panic!("the modem answers") };
+    assert!(bytes > 0 && bytes % 7 == 0, "{bytes}");
+    let nobody = Connect::parse("tcp:127.0.0.1:1").unwrap();
+    let trouble = probe(&nobody, &mut probes()).unwrap_err().to_string();
+    assert!(trouble.contains("nobody listens there"), "{trouble}");
+}
+
+#[test]
+fn the_command_lists_this_machine_and_asks_at_addresses() {
+    let (code, plain, _) = headrace(&[]);
+    assert_eq!(code, Some(0));
+    for title in ["Serial ports", "HID devices", "CAN interfaces", "I2C buses"] {
+        assert!(plain.contains(title), "{plain}");
+    }
+    let (head, ping) = (Device::emulated(Carrier::Tcp, HEAD), Device::emulated(Carrier::Udp, PING));
+    let addresses = [head.connect.to_string(), ping.connect.to_string()];
+    let (code, told, _) = headrace(&["--address", &addresses[0], "--address", &addresses[1]]);
+    assert_eq!(code, Some(0));
+    assert!(told.contains(&format!("  {}\n    answers     Imagenex 881 family", addresses[0])), "{told}");
+    assert!(told.contains(&format!("  {}\n    answers     Ping echosounder", addresses[1])), "{told}");
+    let (code, json, _) = headrace(&["--json", "--address", &addresses[0]]);
+    let shown: Value = serde_json::from_str(&json).unwrap();
+    assert_eq!((code, &shown["addresses"][0]["connect"]), (Some(0), &Value::from(addresses[0].as_str())));
+    assert!(shown["found"].is_array() && shown["sensors"].is_null());
+    let (code, _, refused) = headrace(&["--address", "can:can0"]);
+    assert_eq!(code, Some(2));
+    assert!(refused.contains("expected tcp:HOST:PORT or udp:HOST:PORT"), "{refused}");
+}
+
+#[test]
+fn a_vehicle_file_is_held_against_what_is_there() {
+    let folder = std::env::temp_dir().join(format!("headrace-devices-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let file = folder.join("vehicle.toml");
+    let (port, head) = (Device::emulated(Carrier::Serial, PING), Device::emulated(Carrier::Tcp, HEAD));
+    let there = vec![(PING, port.connect.to_string()), (HEAD, head.connect.to_string())];
+    let path = file.to_str().unwrap();
+
+    std::fs::write(&file, vehicle_text(&there)).unwrap();
+    let (code, told, _) = headrace(&["--vehicle", path]);
+    assert_eq!(code, Some(0), "{told}");
+    assert!(told.contains(": present, /dev/pts/") && told.contains("not probed (--probe)"), "{told}");
+    let (code, told, _) = headrace(&["--vehicle", path, "--probe"]);
+    assert_eq!(code, Some(0), "{told}");
+    assert!(told.contains("Imagenex 881 family or 852 sounder, head_id = 0x12"), "{told}");
+
+    let missing = (PING, "serial:usb:0403:6015:NOT-HERE".to_owned());
+    let wrong = (HEAD, "can:can0".to_owned());
+    std::fs::write(&file, vehicle_text(&[there[0].clone(), missing, wrong])).unwrap();
+    let (code, told, _) = headrace(&["--vehicle", path]);
+    std::fs::remove_dir_all(&folder).unwrap();
+    assert_eq!(code, Some(1), "{told}");
+    assert!(
+        told.contains("no such device is plugged in")
+            && told.contains("a device of this kind isn't connected by can:"),
+        "{told}"
+    );
+}

@@ -1,0 +1,15 @@
+//! Devices on real ports: emulated ones, faulty lines, and the kernel's own CAN and HID.
+
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
+
+mod devices;
+#[cfg(unix)]
+mod faults;
+#[cfg(target_os = "linux")]
+mod kernel_can_hid;
+#[cfg(target_os = "linux")]
+mod kernel_drivers;
+#[cfg(unix)]
+mod rehearsal;
+#[cfg(target_os = "linux")]
+mod run_ports;

@@ -1,0 +1,209 @@
+//! `headrace run` and `headrace check` where ports are wrong, missing or silent: each sensor's trouble is named with what
+//! would be right, the dive goes on with what there is, and exit codes are the right ones.
+
+use headrace_tests::faulty::{End, Fault, Faulty, Healthy, Wire};
+use headrace_tests::rig::{COUNTER, HEAD, HEADING, emulated};
+use headrace_tests::{Folder, raw_messages};
+use mcap::MessageStream;
+use serde_json::Value;
+
+/// Sensors whose lines are none, each wrong in another way.
+const WRONG: [(&str, &str, &str); 7] = [
+    ("no_colon", HEAD, "192.168.0.5"),
+    ("no_port", HEAD, "tcp:192.168.0.5"),
+    ("baud", HEAD, "serial:/dev/ttyUSB0?baud=fast"),
+    ("carrier", HEAD, "can:can0"),
+    ("product", COUNTER, "hid:1209"),
+    ("address", "plugin = \"bar100\"\n", "i2c:/dev/i2c-1:0x99"),
+    ("empty", COUNTER, ""),
+];
+
+/// Sensors whose lines aren't there.
+const ABSENT: [(&str, &str, &str); 4] = [
+    ("adapter", HEAD, "serial:/dev/serial/by-id/usb-headrace-none"),
+    ("usb", HEAD, "serial:usb:1209:fffe:none"),
+    ("counter", COUNTER, "hid:1209:fffe:none"),
+    ("imu", "plugin = \"imu_can\"\npreset = \"xsens_mti600\"\n", "can:none77"),
+];
+
+fn vehicle(sensors: &[(&str, &str, &str)]) -> String {
+    let sensor = |(id, text, connect): &(&str, &str, &str)| {
+        format!("\n[[sensors]]\nid = \"{id}\"\nconnect = \"{connect}\"\n{text}")
+    };
+    HEADING.to_owned() + &sensors.iter().map(sensor).collect::<String>()
+}
+
+fn report(folder: &Folder) -> Value {
+    serde_json::from_slice(&folder.read("report.json")).unwrap()
+}
+
+/// Each sensor's last status, a line each.
+fn statuses(report: &Value) -> String {
+    let line = |source: &Value| {
+        format!("{}: {}\n", source["id"].as_str().unwrap(), source["line"]["status"].as_str().unwrap())
+    };
+    report["sources"].as_array().unwrap().iter().map(line).collect()
+}
+
+const RUN: [&str; 7] = ["run", "vehicle.toml", "--no-record", "--report", "report.json", "--for", "3"];
+
+#[test]
+fn check_names_every_connect_that_is_wrong_with_what_is_right() {
+    let folder = Folder::new();
+    folder.write("vehicle.toml", vehicle(&WRONG));
+    let answer = folder.headrace(&["check", "vehicle.toml"]);
+    assert_eq!(answer.code, Some(2), "{}", answer.stdout);
+    assert!(!answer.stdout.contains("no errors"), "{}", answer.stdout);
+    insta::assert_snapshot!(answer.stderr, @r#"
+    headrace: sensor "no_colon": connect = "192.168.0.5": there is no colon; allowed are serial:/dev/serial/by-id/NAME?baud=115200, serial:usb:VID:PID[:SERIAL]?baud=115200, tcp:HOST:PORT, udp:HOST:PORT, udp-listen:ADDRESS:PORT, can:INTERFACE, hid:VID:PID[:SERIAL], i2c:/dev/i2c-1:0x40
+    headrace: sensor "no_port": connect = "tcp:192.168.0.5": there is no port; allowed is tcp:192.168.0.5:4040
+    headrace: sensor "baud": connect = "serial:/dev/ttyUSB0?baud=fast": baud="fast" must be a whole number from 1 to 12000000; allowed is serial:/dev/serial/by-id/NAME?baud=115200 or serial:usb:0403:6001:A10K
+    headrace: sensor "carrier": connect = "can:can0": a device of this kind isn't connected by can:; it is by tcp:, serial: or udp:
+    headrace: sensor "product": connect = "hid:1209": there is no product id; allowed is hid:VID:PID[:SERIAL] with four hexadecimal digits each, hid:1209:0001
+    headrace: sensor "address": connect = "i2c:/dev/i2c-1:0x99": address "0x99" must be 0x08 to 0x77; allowed is i2c:/dev/i2c-1:0x40
+    "#);
+}
+
+#[test]
+fn ports_that_are_wrong_or_not_there_are_named_while_the_dive_goes_on() {
+    let folder = Folder::new();
+    let end = End::tcp();
+    let place = end.connect().to_string();
+    let device = Faulty::start(vec![emulated(HEAD)], end, Box::new(Healthy));
+    let sensors: Vec<_> = [("head", HEAD, place.as_str())].into_iter().chain(WRONG).chain(ABSENT).collect();
+    folder.write("vehicle.toml", vehicle(&sensors[..=WRONG.len()]));
+    let answer = folder.headrace(&RUN);
+    let wrong = report(&folder);
+    assert_eq!(answer.code, Some(0), "{}{}", answer.stdout, answer.stderr);
+    let few: Vec<_> = sensors[..1].iter().chain(&ABSENT).copied().collect();
+    folder.write("vehicle.toml", vehicle(&few));
+    assert_eq!(folder.headrace(&RUN).code, Some(0));
+    let absent = report(&folder);
+    drop(device);
+    for report in [&wrong, &absent] {
+        let head = &report["sources"][0];
+        assert!(head["readings"].as_u64().unwrap() > 0 && head["line"]["opened"] == 1, "{head}");
+        for source in &report["sources"].as_array().unwrap()[1..] {
+            assert_eq!((&source["packets"], &source["line"]["opened"]), (&0.into(), &0.into()), "{source}");
+        }
+        for status in statuses(report).lines() {
+            let said = status.split_once(": ").unwrap().1;
+            assert!(answer.stdout.contains(said) || report == &absent, "{said:?} isn't in {}", answer.stdout);
+        }
+    }
+    insta::assert_snapshot!(statuses(&wrong), @r#"
+    head: running: Imagenex 881 family, head 0x10
+    no_colon: closed: connect = "192.168.0.5": there is no colon; allowed are serial:/dev/serial/by-id/NAME?baud=115200, serial:usb:VID:PID[:SERIAL]?baud=115200, tcp:HOST:PORT, udp:HOST:PORT, udp-listen:ADDRESS:PORT, can:INTERFACE, hid:VID:PID[:SERIAL], i2c:/dev/i2c-1:0x40
+    no_port: closed: connect = "tcp:192.168.0.5": there is no port; allowed is tcp:192.168.0.5:4040
+    baud: closed: connect = "serial:/dev/ttyUSB0?baud=fast": baud="fast" must be a whole number from 1 to 12000000; allowed is serial:/dev/serial/by-id/NAME?baud=115200 or serial:usb:0403:6001:A10K
+    carrier: closed: connect = "can:can0": a device of this kind isn't connected by can:; it is by tcp:, serial: or udp:
+    product: closed: connect = "hid:1209": there is no product id; allowed is hid:VID:PID[:SERIAL] with four hexadecimal digits each, hid:1209:0001
+    address: closed: connect = "i2c:/dev/i2c-1:0x99": address "0x99" must be 0x08 to 0x77; allowed is i2c:/dev/i2c-1:0x40
+    empty: closed: connect = "": nothing is said of where the sensor is; allowed are serial:/dev/serial/by-id/NAME?baud=115200, serial:usb:VID:PID[:SERIAL]?baud=115200, tcp:HOST:PORT, udp:HOST:PORT, udp-listen:ADDRESS:PORT, can:INTERFACE, hid:VID:PID[:SERIAL], i2c:/dev/i2c-1:0x40
+    "#);
+    // A kernel without CAN says so.
+    let absent = statuses(&absent).replace(
+        "this kernel has no CAN; sudo modprobe can-raw",
+        "there is no such interface; plug the adapter in; ip link shows what there is",
+    );
+    insta::assert_snapshot!(absent, @r#"
+    head: running: Imagenex 881 family, head 0x10
+    adapter: closed: opening /dev/serial/by-id/usb-headrace-none: it isn't there; plug it in, or see headrace devices
+    usb: closed: looking for serial:usb:1209:fffe:none: no such device is plugged in; headrace devices shows what is
+    counter: closed: looking for hid:1209:fffe:none: no such device is plugged in; headrace devices shows what is
+    imu: closed: opening none77: there is no such CAN interface; plug the adapter in; ip link shows what there is
+    "#);
+}
+
+#[test]
+fn a_dive_without_any_sensor_fails_and_says_what_each_lacks() {
+    let folder = Folder::new();
+    folder.write("vehicle.toml", vehicle(&ABSENT));
+    let answer = folder.headrace(&RUN);
+    assert_eq!(answer.code, Some(1), "{}{}", answer.stdout, answer.stderr);
+    for (id, ..) in ABSENT {
+        assert!(answer.stdout.contains(&format!("SENSOR   {id:<12} closed: ")), "{}", answer.stdout);
+    }
+}
+
+#[test]
+fn required_sensors_that_can_t_be_end_the_dive() {
+    let folder = Folder::new();
+    let sensors: Vec<_> = WRONG[..1].iter().chain(&ABSENT).copied().collect();
+    folder.write("vehicle.toml", vehicle(&sensors));
+    let refused = |required: &str, code: i32| {
+        let within = ["--require", required, "--require-within", "1", "--report", "report.json"];
+        let answer = folder.headrace(&[&["run", "vehicle.toml", "--no-record"], &within[..]].concat());
+        assert_eq!(answer.code, Some(code), "{required}: {}{}", answer.stdout, answer.stderr);
+        answer.stderr
+    };
+    let mut said = refused("sonar", 2) + &refused("no_colon", 2) + &refused("all", 2);
+    assert!(!folder.path("report.json").exists(), "no dive has begun");
+    said += &refused("adapter", 1);
+    assert!(folder.path("report.json").exists(), "a dive that ends is reported");
+    insta::assert_snapshot!(said, @r#"
+    headrace: --require sonar: no such sensor; expected all, or ids of no_colon, adapter, usb, counter, imu
+    headrace: sensor "no_colon" is required: connect = "192.168.0.5": there is no colon; allowed are serial:/dev/serial/by-id/NAME?baud=115200, serial:usb:VID:PID[:SERIAL]?baud=115200, tcp:HOST:PORT, udp:HOST:PORT, udp-listen:ADDRESS:PORT, can:INTERFACE, hid:VID:PID[:SERIAL], i2c:/dev/i2c-1:0x40
+    headrace: sensor "no_colon" is required: connect = "192.168.0.5": there is no colon; allowed are serial:/dev/serial/by-id/NAME?baud=115200, serial:usb:VID:PID[:SERIAL]?baud=115200, tcp:HOST:PORT, udp:HOST:PORT, udp-listen:ADDRESS:PORT, can:INTERFACE, hid:VID:PID[:SERIAL], i2c:/dev/i2c-1:0x40
+    headrace: required sensor "adapter" wasn't running within 1 s: opening /dev/serial/by-id/usb-headrace-none: it isn't there; plug it in, or see headrace devices
+    "#);
+}
+
+/// Reports that end early, as those of a counter of another make.
+struct Short;
+
+impl Fault for Short {
+    fn to_host(&mut self, _: u64, frame: &[u8], line: &mut Wire) {
+        line.part(&frame[..5]);
+    }
+}
+
+#[test]
+fn reports_that_are_shorter_than_configured_are_named() {
+    let folder = Folder::new();
+    let end = End::udp();
+    folder.write("vehicle.toml", vehicle(&[("counter", COUNTER, &end.connect().to_string())]));
+    let device = Faulty::start(vec![emulated(COUNTER)], end, Box::new(Short));
+    let answer = folder.headrace(&RUN);
+    drop(device);
+    assert_eq!(answer.code, Some(1), "{}", answer.stderr);
+    let report = report(&folder);
+    assert_eq!(report["sources"][0]["readings"], 0);
+    insta::assert_snapshot!(statuses(&report), @r#"
+    counter: wrong: sends reports of 5 bytes; report_bytes says 11
+    "#);
+}
+
+#[test]
+fn a_live_dive_s_log_has_what_was_sent_and_replays_to_the_same_digest() {
+    let folder = Folder::new();
+    let (head, counter) = (End::tcp(), End::udp());
+    let places = [head.connect().to_string(), counter.connect().to_string()];
+    folder.write("vehicle.toml", vehicle(&[("head", HEAD, &places[0]), ("counter", COUNTER, &places[1])]));
+    let devices = [
+        Faulty::start(vec![emulated(HEAD)], head, Box::new(Healthy)),
+        Faulty::start(vec![emulated(COUNTER)], counter, Box::new(Healthy)),
+    ];
+    let answer = folder.headrace(&[
+        "run",
+        "vehicle.toml",
+        "--record",
+        "dive.mcap",
+        "--report",
+        "report.json",
+        "--for",
+        "4",
+        "--require",
+        "all",
+    ]);
+    drop(devices);
+    assert_eq!(answer.code, Some(0), "{}{}", answer.stdout, answer.stderr);
+    let live = report(&folder);
+    assert_eq!(folder.digest("dive.mcap", &[]), live["digest"].as_str().unwrap());
+    let log = folder.read("dive.mcap");
+    let all = MessageStream::new(&log).unwrap().map(Result::unwrap);
+    let sent: Vec<_> = all.filter(|message| message.channel.topic.starts_with("/sent/")).collect();
+    assert!(sent.iter().all(|message| message.channel.topic == "/sent/head" && message.data.len() == 27));
+    let answers = raw_messages(&log).iter().filter(|message| message.channel.topic == "/raw/head").count();
+    assert!(answers > 10 && sent.len() >= answers, "{} sent, {answers} answers", sent.len());
+}

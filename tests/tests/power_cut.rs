@@ -1,0 +1,192 @@
+//! `kill -9` at random moments: every log reads, what the pilot was told more than a second before is in it, and its replay
+//! is the dive, bit for bit, up to there.
+
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
+
+use std::io::{BufRead, BufReader};
+use std::process::Stdio;
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
+
+use headrace_tests::{Folder, VEHICLE};
+use serde_json::Value;
+
+/// How often a dive is killed.
+const KILLS: usize = 200;
+/// How many dives there are at a time.
+const AT_ONCE: usize = 6;
+/// A dive lives so long at most, milliseconds.
+const LONGEST_MS: u64 = 2200;
+/// What a power cut may cost.
+const MAY_COST: Duration = Duration::from_secs(1);
+
+/// A minute and a half, part of it too fast, so that there are flags to lose.
+const SCENE: &str = r#"name = "a dive to kill"
+vehicle = "vehicle.toml"
+
+[trajectory]
+start_m = 3
+
+[[trajectory.legs]]
+distance_m = 4
+speed_mps = 0.2
+
+[[trajectory.legs]]
+distance_m = 20
+speed_mps = 0.8
+
+[[trajectory.legs]]
+distance_m = 10
+speed_mps = 0.2
+"#;
+
+#[expect(
+    clippy::disallowed_methods,
+    reason = "what a power cut costs is wall time, and no result depends on it"
+)]
+fn wall_clock() -> Instant {
+    Instant::now()
+}
+
+/// What came of the kills.
+#[derive(Default)]
+struct Count {
+    /// Before the log had a beginning.
+    before: AtomicUsize,
+    /// After the dive had ended by itself.
+    after: AtomicUsize,
+    /// Lines that pilots had read a second before.
+    lines: AtomicUsize,
+    /// Results that were the same, bit for bit.
+    same: AtomicU64,
+    /// How late this machine woke a thread that had slept, ns: tests may share it with anything.
+    late_ns: AtomicU64,
+}
+
+/// The `n`th of a row of random numbers.
+fn random(n: u64) -> u64 {
+    let mut word = (n + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    word = (word ^ (word >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    word = (word ^ (word >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    word ^ (word >> 31)
+}
+
+/// Lets a dive begin and kills it; gives what it had said a second before, and whether it had ended by itself.
+fn killed(folder: &Folder, arguments: &[&str], after: Duration, count: &Count) -> (Vec<String>, bool) {
+    let mut dive = headrace_tests::program()
+        .args(arguments)
+        .current_dir(folder.path(""))
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let out = BufReader::new(dive.stdout.take().unwrap());
+    let reading = std::thread::spawn(move || {
+        out.lines().map_while(Result::ok).map(|line| (wall_clock(), line)).collect::<Vec<_>>()
+    });
+    std::thread::sleep(after);
+    // Not a second before the kill, but a second before it can have been felt.
+    let moment = wall_clock();
+    let ended = dive.try_wait().unwrap().is_some();
+    dive.kill().ok();
+    dive.wait().unwrap();
+    let may_cost = MAY_COST + Duration::from_nanos(count.late_ns.load(Ordering::Relaxed));
+    let known = reading.join().unwrap().into_iter().filter(|(read, _)| *read + may_cost <= moment);
+    (known.map(|(_, line)| line).collect(), ended)
+}
+
+/// Whether all lines are among the others, in their order.
+fn is_subsequence(lines: &[String], others: &str) -> bool {
+    let mut rest = others.lines();
+    lines.iter().all(|line| rest.any(|other| other == line))
+}
+
+fn kill(folder: &Folder, number: usize, count: &Count) {
+    let seed = random(number as u64);
+    let after = Duration::from_millis(20 + seed % LONGEST_MS);
+    let (out, log) = (format!("out-{number}"), format!("killed-{number}.mcap"));
+    let is_demo = number.is_multiple_of(2);
+    let (arguments, log): (Vec<&str>, String) = if is_demo {
+        (vec!["demo", "--speed", "20x", "--out", &out], format!("{out}/dive.mcap"))
+    } else {
+        (
+            vec!["run", "vehicle.toml", "--source", "dive.mcap", "--record", &log, "--speed", "20x"],
+            log.clone(),
+        )
+    };
+    let (mut lines, ended) = killed(folder, &arguments, after, count);
+    // The demonstration's first line names it.
+    lines.retain(|line| !line.ends_with("a simulated dive"));
+    count.after.fetch_add(usize::from(ended), Ordering::Relaxed);
+    count.lines.fetch_add(lines.len(), Ordering::Relaxed);
+    let which = format!("kill {number} after {after:?} ({arguments:?})");
+
+    let answer = folder.headrace(&["verify", "--json", &log]);
+    let Ok(told) = serde_json::from_str::<Value>(&answer.stdout) else {
+        // The file wasn't there yet, or not yet its header; then there was no dive either.
+        assert!(lines.is_empty(), "{which}: {}, and the pilot had read {lines:?}", answer.stderr);
+        let early = ["could not open", "is not an MCAP file", "no vehicle file can be read"];
+        assert!(early.iter().any(|words| answer.stderr.contains(words)), "{which}: {}", answer.stderr);
+        count.before.fetch_add(1, Ordering::Relaxed);
+        return;
+    };
+    let same = told["same_records"].as_u64().unwrap();
+    assert_eq!(told["differences"], Value::Array(Vec::new()), "{which}: {told}");
+    match answer.code {
+        Some(0) => assert!(ended, "{which}: nothing is said to be lost: {told}"),
+        Some(3) => assert!(same > 0 && told["losses"][0].is_string(), "{which}: {told}"),
+        // Nothing had been published yet.
+        code => assert!(code == Some(1) && same == 0 && lines.is_empty(), "{which}: {code:?}, {told}"),
+    }
+    count.same.fetch_add(same, Ordering::Relaxed);
+    let replayed = folder.headrace(&["replay", &log]).stdout;
+    assert!(
+        is_subsequence(&lines, &replayed),
+        "{which}: the pilot had read {lines:#?}, replayed is {replayed}"
+    );
+    let log = folder.path(&log);
+    std::fs::remove_file(&log).unwrap_or_else(|error| panic!("{}: {error}", log.display()));
+}
+
+#[test]
+fn two_hundred_kills_cost_no_more_than_their_last_second() {
+    let folder = Folder::new();
+    folder.write("vehicle.toml", VEHICLE);
+    folder.write("scene.toml", SCENE);
+    folder.simulate("scene.toml", "dive.mcap");
+    let (count, next, over) = (Count::default(), AtomicUsize::new(0), AtomicBool::new(false));
+    let begun = wall_clock();
+    std::thread::scope(|scope| {
+        scope.spawn(|| {
+            let nap = Duration::from_millis(10);
+            while !over.load(Ordering::Relaxed) {
+                let slept = wall_clock();
+                std::thread::sleep(nap);
+                let late = u64::try_from(slept.elapsed().saturating_sub(nap).as_nanos()).unwrap();
+                count.late_ns.fetch_max(late, Ordering::Relaxed);
+            }
+        });
+        let dives = || {
+            while let number @ ..KILLS = next.fetch_add(1, Ordering::Relaxed) {
+                kill(&folder, number, &count);
+            }
+        };
+        let workers: Vec<_> = (0..AT_ONCE).map(|_| scope.spawn(dives)).collect();
+        let results: Vec<_> = workers.into_iter().map(std::thread::ScopedJoinHandle::join).collect();
+        over.store(true, Ordering::Relaxed);
+        if let Some(panic) = results.into_iter().find_map(Result::err) {
+            std::panic::resume_unwind(panic);
+        }
+    });
+    let [before, after, lines] =
+        [&count.before, &count.after, &count.lines].map(|n| n.load(Ordering::Relaxed));
+    let same = count.same.load(Ordering::Relaxed);
+    eprintln!(
+        "{KILLS} kills in {:.0} s: {before} before there was a log, {after} after the end, {lines} lines that were read a \
+         second before, {same} results the same; threads woke up to {:.0} ms late",
+        begun.elapsed().as_secs_f64(),
+        count.late_ns.load(Ordering::Relaxed) as f64 / 1e6,
+    );
+    assert!(before < KILLS / 4 && after < KILLS / 4, "most kills are in the middle of a dive");
+    assert!(lines > KILLS / 4 && same > 10_000, "there was something to lose");
+}

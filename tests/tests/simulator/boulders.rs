@@ -1,0 +1,79 @@
+//! What a hole D promises: no boulder of D or more is missed, and one of 2 D or more is hit at least twice. A thousand
+//! boulders on the wall of a simulated tunnel, the holes as the loop measures them on the bare one.
+
+use std::fmt::Write as _;
+
+use headrace_simulator::environment::What;
+use headrace_simulator::{Scene, Simulation};
+use headrace_tests::scenes;
+
+/// Between neighbouring boulders, m: no beam across the tunnel meets two of them.
+const SPACING_M: f64 = 2.5;
+const COUNT: usize = 1000;
+/// VITA 2 with four heads in the fastest mode; without effects, nothing hides anything.
+const SCENE: &str = "vehicle = \"vita2-4.toml\"\n[vehicle_changes]\nsensors.all.mode = \"fastest\"\n\
+    heads.planned_speed_mps = 0.5\ntarget_m = 3.0\n[trajectory]\nstart_m = 10\n[[trajectory.legs]]\n\
+    distance_m = 2520\nspeed_mps = 0.5\n[effects]\nmotion_within_turn = {}\n";
+
+fn scene(rest: &str) -> Scene {
+    scenes::scene(&format!("{SCENE}{rest}"))
+}
+
+/// The hole of each section of the bare tunnel, m: chainage where it begins, and D.
+fn holes() -> Vec<(f64, f64)> {
+    let report = scenes::report(&scene(""));
+    report.sections.iter().filter_map(|section| Some((section.start_m, section.hole_m?))).collect()
+}
+
+/// Numbers from 0 to 1, the same in each run.
+struct Numbers(u64);
+
+impl Numbers {
+    fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+    }
+}
+
+/// Boulders half sunk in the wall, anywhere round it, `times` D in size: for each, how often it is hit.
+fn hits(holes: &[(f64, f64)], seed: u64, times: std::ops::Range<f64>) -> Vec<usize> {
+    let mut numbers = Numbers(seed);
+    let perimeter_m = scene("").vehicle.tunnel.profile.perimeter_m();
+    let mut features = String::new();
+    for number in 0..COUNT {
+        let chainage_m = 15.0 + SPACING_M * number as f64 + 0.4 * numbers.next();
+        let at = holes.partition_point(|(start_m, _)| *start_m <= chainage_m) - 1;
+        let (start_m, hole_m) = holes[at];
+        assert!(chainage_m < start_m + 0.25 && hole_m < 1.0, "{chainage_m}: {hole_m} m");
+        let size_m = hole_m * (times.start + (times.end - times.start) * numbers.next());
+        let sigma_m = perimeter_m * numbers.next();
+        writeln!(
+            features,
+            "[[tunnel.features]]\nkind = \"boulder\"\nchainage_m = {chainage_m}\nsigma_m = {sigma_m}\nsize_m = {size_m}\nsunk = 0.5"
+        )
+        .unwrap();
+    }
+    let mut simulation = Simulation::with_truth(&scene(&features)).unwrap();
+    let mut hits = vec![0; COUNT];
+    while simulation.advance() {
+        for wall in simulation.take_truth().iter().filter_map(|row| row.sounding?.wall) {
+            if let What::Feature(boulder) = wall.0.what {
+                hits[usize::from(boulder)] += 1;
+            }
+        }
+    }
+    hits
+}
+
+#[test]
+fn none_of_d_is_missed_and_those_of_two_d_are_hit_twice() {
+    let holes = holes();
+    let least = |hits: &[usize]| *hits.iter().min().unwrap();
+    let of_d = hits(&holes, 1, 1.01..1.3);
+    assert!(least(&of_d) >= 1, "{} boulders of D missed", of_d.iter().filter(|hits| **hits == 0).count());
+    let of_two_d = hits(&holes, 2, 2.02..2.2);
+    assert!(least(&of_two_d) >= 2, "a boulder of 2 D was hit {} times", least(&of_two_d));
+    // The promise is no idle one: what is much smaller than the holes is missed at times.
+    let small = hits(&holes, 3, 0.3..0.4);
+    assert!(small.iter().filter(|hits| **hits == 0).count() > COUNT / 20, "holes are smaller than they say");
+}

@@ -1,0 +1,9 @@
+//! The simulator: scenes, effects, boulders and meshes.
+
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
+
+mod boulders;
+mod effects;
+#[cfg(feature = "mesh")]
+mod mesh_scene;
+mod scenes;
