@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What a log of MAVLink telemetry holds, for tests/recordings.rs: python3 tests/oracles/tlog.py FILE
+"""What a log of MAVLink telemetry holds, for tests/tests/import/recordings.rs: python3 tests/oracles/tlog.py FILE
 
 Written from MAVLink's definitions, without any code of ours: frames, and of the autopilot's ATTITUDE, RAW_IMU,
 SCALED_PRESSURE and SCALED_PRESSURE2 the counts and ranges, in the units and senses of the wire.

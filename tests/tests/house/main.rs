@@ -4,6 +4,5 @@
 
 mod circles;
 mod imports;
-mod known_circles;
 mod tidy;
 mod workspace;

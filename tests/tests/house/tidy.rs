@@ -16,8 +16,16 @@ const FOR_DEVICES: [&str; 1] = ["sensor"];
 /// What the ports need, which connect devices with the loop.
 const FOR_PORTS: [&str; 3] = ["sensor", "geometry", "monitor"];
 
-/// Crates of `replay/` that others there need: logs are read and written by one of them.
-const PLAYERS: [&str; 2] = ["replay", "replay/player"];
+/// What crates of `replay/` need of one another and of the plugins, besides the core.
+const FOR_REPLAY: [(&str, &[&str]); 4] = [
+    ("replay/simulator", &[]),
+    ("replay/player", &["replay/simulator"]),
+    ("replay/calibration", &["replay/player"]),
+    (
+        "replay/import",
+        &["replay/player", "plugins/imagenex881", "plugins/imu_can", "plugins/mavlink", "plugins/ping1d"],
+    ),
+];
 
 /// What the core may not name: time, randomness, files, ports, threads, the environment, locks and unbounded queues.
 const BARRED_FROM_CORE: [&str; 13] = [
@@ -46,8 +54,10 @@ fn may_need(place: &Path, needed: &Path) -> bool {
         "plugins" if place == Path::new("plugins/ports") => one_of(&FOR_PORTS),
         "plugins" => one_of(&FOR_DEVICES),
         "replay" => {
-            let is_player = |place: &Path| PLAYERS.iter().any(|player| place == Path::new(player));
-            core(needed).is_some() || is_player(needed) && !is_player(place)
+            let others =
+                FOR_REPLAY.iter().find(|(name, _)| place == Path::new(name)).map(|(_, others)| *others);
+            let others = others.unwrap_or_else(|| panic!("{} has no layer", place.display()));
+            core(needed).is_some() || others.iter().any(|other| needed == Path::new(other))
         }
         "pictures" => core(needed).is_some(),
         // The two programs may use every library; neither uses the other.
@@ -77,18 +87,19 @@ fn layers_let_nothing_point_back() {
     let pairs = [
         ("core/geometry", "core/snapshot", true),
         ("core/geometry", "core/sampling", false),
-        ("core/monitor", "replay", false),
+        ("core/monitor", "replay/player", false),
         ("plugins/bar100", "core/sensor", true),
         ("plugins/bar100", "core/geometry", false),
         ("plugins/bar100", "plugins/ping1d", false),
         ("plugins/ports", "core/monitor", true),
         ("plugins/ports", "core/coverage", false),
         ("replay/simulator", "core/monitor", true),
-        ("replay/simulator", "replay/player", true),
-        ("replay/player", "replay/simulator", false),
+        ("replay/simulator", "replay/player", false),
+        ("replay/player", "replay/simulator", true),
         ("replay/import", "replay/simulator", false),
-        ("replay/import", "plugins/mavlink", false),
-        ("pictures", "replay", false),
+        ("replay/import", "plugins/mavlink", true),
+        ("replay/import", "plugins/ports", false),
+        ("pictures", "replay/player", false),
         ("", "plugins/mavlink", true),
         ("", "experiments", false),
         ("experiments", "", false),
