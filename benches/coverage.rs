@@ -65,11 +65,11 @@ fn helix(steps: u32, turn_s: f64, heads: u32) -> Vec<WallSample> {
         for head in 0..heads {
             let angle = math::TAU * (ping as f64 / f64::from(steps) + f64::from(head) / f64::from(heads));
             let hit = profile.cast(profile.reference(), [math::sin(angle), -math::cos(angle)]).unwrap();
-            let (sigma_m, head) = (hit.sigma_m, head as usize);
+            let (arc_m, head) = (hit.arc_m, head as usize);
             let around_m =
-                last[head].replace(sigma_m).map(|from| math::wrap_signed(sigma_m - from, perimeter_m()));
+                last[head].replace(arc_m).map(|from| math::wrap_signed(arc_m - from, perimeter_m()));
             let step_m = around_m.map(|around_m| [per_ping_m, around_m]);
-            samples.push(WallSample { x_m: ping as f64 * per_ping_m, sigma_m, head, step_m });
+            samples.push(WallSample { x_m: ping as f64 * per_ping_m, arc_m, head, step_m });
         }
     }
     samples
@@ -87,7 +87,7 @@ fn store(length_m: f64, capacity: u32) -> SampleStore {
 fn covered(samples: &[WallSample]) -> SampleStore {
     let mut store = store(LENGTH_M, u32::try_from(samples.len()).unwrap());
     for sample in samples {
-        black_box(store.nearest_pass_m(sample.x_m, sample.sigma_m, FARTHEST_M));
+        black_box(store.nearest_pass_m(sample.x_m, sample.arc_m, FARTHEST_M));
         store.insert(*sample).unwrap();
     }
     store
@@ -113,7 +113,7 @@ fn covering(what: &str, samples: &[WallSample]) {
     let (hashed, _) = best(|| {
         let mut grid: HashMap<(i64, i64), (u32, f64)> = HashMap::new();
         for sample in samples {
-            let cell = (math::floor_to_i64(sample.x_m / 0.05), math::floor_to_i64(sample.sigma_m / 0.05));
+            let cell = (math::floor_to_i64(sample.x_m / 0.05), math::floor_to_i64(sample.arc_m / 0.05));
             let entry = grid.entry(cell).or_default();
             *entry = (entry.0 + 1, sample.x_m);
         }
@@ -148,7 +148,7 @@ fn holes(what: &str, samples: &[WallSample]) {
         let window = (x - reach_m)..(x + SECTION_M + reach_m);
         let near = samples.iter().filter(move |s| window.contains(&s.x_m));
         // Images beyond the seam.
-        near.flat_map(move |s| [-perimeter_m(), 0.0, perimeter_m()].map(|turn| [s.x_m, s.sigma_m + turn]))
+        near.flat_map(move |s| [-perimeter_m(), 0.0, perimeter_m()].map(|turn| [s.x_m, s.arc_m + turn]))
             .filter(move |s| s[1] > -reach_m - 0.1 && s[1] < perimeter_m() + reach_m + 0.1)
             .collect::<Vec<_>>()
     };
@@ -239,8 +239,8 @@ fn by_hash_map(from_m: f64, near: &[[f64; 2]]) -> f64 {
                 let inside = i.abs() < ring;
                 for k in (-ring..=ring).filter(|k| !inside || k.abs() == ring) {
                     for s in cells.get(&[row + i, column + k]).into_iter().flatten() {
-                        let (dx, dsigma) = (s[0] - place[0], s[1] - place[1]);
-                        best2 = best2.min(dx * dx + dsigma * dsigma);
+                        let (dx, darc) = (s[0] - place[0], s[1] - place[1]);
+                        best2 = best2.min(dx * dx + darc * darc);
                     }
                 }
             }
@@ -271,13 +271,13 @@ fn memory() {
         for ping in 0..pings {
             for (head, last) in last.iter_mut().enumerate() {
                 let turns = f64::from(ping) / 400.0 + head as f64 / 4.0;
-                let sigma_m = math::wrap(turns * perimeter_m + noise_m(), perimeter_m);
+                let arc_m = math::wrap(turns * perimeter_m + noise_m(), perimeter_m);
                 let x_m = length_m * f64::from(ping) / f64::from(pings) + 0.3 * noise_m();
-                let step = |(from_x_m, from_sigma_m): (f64, f64)| {
-                    [x_m - from_x_m, math::wrap_signed(sigma_m - from_sigma_m, perimeter_m)]
+                let step = |(from_x_m, from_arc_m): (f64, f64)| {
+                    [x_m - from_x_m, math::wrap_signed(arc_m - from_arc_m, perimeter_m)]
                 };
-                let step_m = last.replace((x_m, sigma_m)).map(step);
-                store.insert(WallSample { x_m, sigma_m, head, step_m }).unwrap();
+                let step_m = last.replace((x_m, arc_m)).map(step);
+                store.insert(WallSample { x_m, arc_m, head, step_m }).unwrap();
             }
         }
         let (samples, mapped) = (4 * pings, resident() - before);

@@ -225,7 +225,7 @@ fn helix(steps: u32, turn_s: f64, heads: u32, length_m: f64) -> Vec<(f64, f64, u
         for head in 0..heads {
             let angle = math::TAU * (ping as f64 / f64::from(steps) + f64::from(head) / f64::from(heads));
             let hit = profile.cast(profile.reference(), [math::sin(angle), -math::cos(angle)]).unwrap();
-            samples.push((ping as f64 * per_ping_m, hit.sigma_m, head as usize));
+            samples.push((ping as f64 * per_ping_m, hit.arc_m, head as usize));
         }
     }
     samples
@@ -255,15 +255,15 @@ fn cover(samples: &[(f64, f64, usize)], length_m: f64) -> Coverage {
         }),
     };
     let mut last = [None; 8];
-    for (x_m, sigma_m, head) in samples {
-        black_box(coverage.store.nearest_pass_m(*x_m, *sigma_m, FARTHEST_M));
-        let step_m = last[*head].map(|(from_x_m, from_sigma_m): (f64, f64)| {
-            [x_m - from_x_m, math::wrap_signed(sigma_m - from_sigma_m, coverage.store.perimeter_m())]
+    for (x_m, arc_m, head) in samples {
+        black_box(coverage.store.nearest_pass_m(*x_m, *arc_m, FARTHEST_M));
+        let step_m = last[*head].map(|(from_x_m, from_arc_m): (f64, f64)| {
+            [x_m - from_x_m, math::wrap_signed(arc_m - from_arc_m, coverage.store.perimeter_m())]
         });
-        last[*head] = Some((*x_m, *sigma_m));
-        let sample = WallSample { x_m: *x_m, sigma_m: *sigma_m, head: *head, step_m };
+        last[*head] = Some((*x_m, *arc_m));
+        let sample = WallSample { x_m: *x_m, arc_m: *arc_m, head: *head, step_m };
         coverage.store.insert(sample).unwrap();
-        coverage.soundings.add(*x_m, *sigma_m);
+        coverage.soundings.add(*x_m, *arc_m);
         coverage.sections.touch(*x_m);
     }
     coverage
@@ -281,8 +281,8 @@ fn covering() {
     let hashed = best(|| {
         let mut grid: HashMap<(i64, i64), (u32, f64)> = HashMap::new();
         let started = Instant::now();
-        for (x_m, sigma_m, _) in &samples {
-            let cell = (math::floor_to_i64(x_m / 0.05), math::floor_to_i64(sigma_m / 0.05));
+        for (x_m, arc_m, _) in &samples {
+            let cell = (math::floor_to_i64(x_m / 0.05), math::floor_to_i64(arc_m / 0.05));
             let entry = grid.entry(cell).or_default();
             *entry = (entry.0 + 1, *x_m);
         }
@@ -317,8 +317,8 @@ fn holes() {
         let passes = best(|| {
             let mut store = coverage.store.clone();
             let started = Instant::now();
-            for (x_m, sigma_m, _) in &samples {
-                black_box(store.nearest_pass_m(x_m + 0.1, sigma_m + 0.1, FARTHEST_M));
+            for (x_m, arc_m, _) in &samples {
+                black_box(store.nearest_pass_m(x_m + 0.1, arc_m + 0.1, FARTHEST_M));
             }
             started.elapsed()
         });

@@ -161,7 +161,7 @@ struct Truth {
 }
 
 const COLUMNS: &str = "time_s,source,sense,number,chainage_m,x_m,y_m,z_m,roll_deg,pitch_deg,yaw_deg,angle_deg,\
-                       wall_x_m,wall_y_m,wall_z_m,sigma_m,wall,true_range_m,measured_range_m,effects";
+                       wall_x_m,wall_y_m,wall_z_m,arc_m,wall,true_range_m,measured_range_m,effects";
 
 impl Truth {
     fn create(path: &Path, scene: &Scene, simulation: &Simulation) -> Result<Self, Failure> {
@@ -227,10 +227,10 @@ impl Truth {
     fn sounding(&self, sounding: &SoundingTruth) -> String {
         let mut text = format!(",{}", sounding.measured.angle_rad.to_degrees());
         match &sounding.wall {
-            Some((hit, sigma_m)) => append(
+            Some((hit, arc_m)) => append(
                 &mut text,
                 format_args!(
-                    ",{},{},{},{sigma_m},{},{}",
+                    ",{},{},{},{arc_m},{},{}",
                     hit.point.x(),
                     hit.point.y(),
                     hit.point.z(),

@@ -143,7 +143,7 @@ fn verdict_text(judged: Option<JudgedReport>) -> &'static str {
 
 /// The largest hole of a run with its standard deviation, m.
 fn holes(run: impl Iterator<Item = JudgedReport>) -> String {
-    let measured = run.filter_map(|judged| Some((judged.hole_m?, judged.hole_sigma_m)));
+    let measured = run.filter_map(|judged| Some((judged.hole_m?, judged.hole_sd_m)));
     let largest = measured.max_by(|a, b| a.0.total_cmp(&b.0));
-    largest.map_or_else(|| "-".to_owned(), |(hole_m, sigma_m)| format!("{hole_m:.3}±{sigma_m:.3}"))
+    largest.map_or_else(|| "-".to_owned(), |(hole_m, sd_m)| format!("{hole_m:.3}±{sd_m:.3}"))
 }

@@ -172,7 +172,7 @@ impl Watch {
         let missed = Missed {
             start_m: sections.bounds_m(run.from).0,
             figures: (&evidence).into(),
-            hole_arc_m: run.worst.1.sigma_m,
+            hole_arc_m: run.worst.1.arc_m,
             target_m: sections.target_m(),
             v_max_mps: self.v_max_mps,
         };

@@ -95,7 +95,7 @@ fn shadow(samples: &[Sample], dive: &Dive) -> (f64, f64) {
                 // Edges fall between two pings; the step beyond each is half hidden.
                 let turned = math::wrap_signed(before.angle_rad - from.angle_rad, TAU).abs() + dive.step_rad;
                 angle_rad = angle_rad.max(turned);
-                let around = math::wrap_signed(before.sigma_m - from.sigma_m, dive.profile.perimeter_m());
+                let around = math::wrap_signed(before.arc_m - from.arc_m, dive.profile.perimeter_m());
                 gap_m = gap_m.max(around.abs() * (turned / (turned - dive.step_rad)));
             }
             began = None;

@@ -44,7 +44,7 @@ pub(crate) struct Sample {
     /// Where the wall was measured to be.
     pub at: Point3<Tunnel>,
     /// Arc length of the place that was truly met, m.
-    pub sigma_m: f64,
+    pub arc_m: f64,
     /// What was measured is the wall, and no part of the vehicle.
     pub of_wall: bool,
 }
@@ -103,13 +103,13 @@ fn run(scene: &Scene) -> Result<Dive, SceneError> {
         for row in simulation.take_truth() {
             let Some(head) = numbers.iter().position(|number| *number == row.source) else { continue };
             let Some(sounding) = row.sounding else { continue };
-            let (Some(at), Some((hit, sigma_m))) = (sounding.measured_point(), sounding.wall) else {
+            let (Some(at), Some((hit, arc_m))) = (sounding.measured_point(), sounding.wall) else {
                 continue;
             };
             let of_wall = (at - sounding.origin).norm() > 0.5 * hit.range_m;
             let (angle_rad, from) = (sounding.measured.angle_rad, sounding.origin);
             if let (Some(samples), Ok(number)) = (heads.get_mut(head), u16::try_from(head)) {
-                samples.push(Sample { head: number, angle_rad, from, at, sigma_m, of_wall });
+                samples.push(Sample { head: number, angle_rad, from, at, arc_m, of_wall });
             }
         }
     }

@@ -61,8 +61,8 @@ pub(crate) fn passes(dive: &Dive, count: usize) -> Vec<Vec<f64>> {
     let from_m = ends(<[Sample]>::first).fold(f64::NEG_INFINITY, f64::max);
     let to_m = ends(<[Sample]>::last).fold(f64::INFINITY, f64::min);
     let line = |number: usize| {
-        let sigma_m = perimeter_m * (number as f64 + 0.37) / count as f64;
-        let passed = dive.heads.iter().flat_map(|samples| passes_of(dive, samples, sigma_m));
+        let arc_m = perimeter_m * (number as f64 + 0.37) / count as f64;
+        let passed = dive.heads.iter().flat_map(|samples| passes_of(dive, samples, arc_m));
         let mut line: Vec<f64> = passed.filter(|x_m| (from_m..to_m).contains(x_m)).collect();
         line.sort_by(f64::total_cmp);
         line
@@ -71,15 +71,15 @@ pub(crate) fn passes(dive: &Dive, count: usize) -> Vec<Vec<f64>> {
 }
 
 /// The chainages at which a head has passed a line along the wall, in order of time.
-pub(crate) fn passes_of(dive: &Dive, samples: &[Sample], sigma_m: f64) -> impl Iterator<Item = f64> {
+pub(crate) fn passes_of(dive: &Dive, samples: &[Sample], arc_m: f64) -> impl Iterator<Item = f64> {
     let (perimeter_m, step_rad) = (dive.profile.perimeter_m(), dive.step_rad);
     samples.windows(2).filter_map(move |pair| {
         let [a, b] = pair else { return None };
         if !(a.of_wall && b.of_wall) || turned_rad(a, b).abs() > 2.0 * step_rad {
             return None;
         }
-        let around_m = math::wrap_signed(b.sigma_m - a.sigma_m, perimeter_m);
-        let share = math::wrap_signed(sigma_m - a.sigma_m, perimeter_m) / around_m;
+        let around_m = math::wrap_signed(b.arc_m - a.arc_m, perimeter_m);
+        let share = math::wrap_signed(arc_m - a.arc_m, perimeter_m) / around_m;
         (0.0..1.0).contains(&share).then(|| a.at.x() + share * (b.at.x() - a.at.x()))
     })
 }

@@ -11,7 +11,7 @@ use super::look::AXIS;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Hour {
     /// Arc length, m.
-    pub sigma_m: f64,
+    pub arc_m: f64,
     /// The hour alone.
     pub clock: String,
     /// What is there; empty between floor, walls and crown.
@@ -41,13 +41,13 @@ pub fn hours(profile: &Profile) -> Vec<Hour> {
     let [y_m, z_m] = profile.reference();
     let hour = |(k, (clock, place)): (u32, (&str, &'static str))| {
         let (sine, cosine) = math::sin_cos(math::TAU * f64::from(k) / 8.0);
-        let sigma_m = match k {
+        let arc_m = match k {
             // The seam itself may come out on either side of it.
             0 => 0.0,
             8 => profile.perimeter_m(),
-            _ => profile.sigma_of([y_m + sine, z_m - cosine]),
+            _ => profile.arc_of([y_m + sine, z_m - cosine]),
         };
-        Hour { sigma_m, clock: clock.to_owned(), place }
+        Hour { arc_m, clock: clock.to_owned(), place }
     };
     (0..).zip(NAMES).map(hour).collect()
 }
@@ -55,7 +55,7 @@ pub fn hours(profile: &Profile) -> Vec<Hour> {
 /// Hours to the right of a chart that has arc lengths upwards.
 pub fn at_right(chart: &Chart<'_>, profile: &Profile) {
     for hour in hours(profile) {
-        let y = chart.px([0.0, hour.sigma_m])[1];
+        let y = chart.px([0.0, hour.arc_m])[1];
         let x = chart.frame.right;
         chart.canvas.line(&[[x, y], [x + 4.0, y]], &AXIS);
         chart.canvas.text([x + 7.0, y], &hour.words(), Side::Right, NORMAL);
@@ -73,8 +73,8 @@ mod tests {
             [shapes::ceran().unwrap(), shapes::rectangle(3.0, 4.0).unwrap(), shapes::circle(0.5).unwrap()]
         {
             let hours = hours(&profile);
-            assert!(hours.windows(2).all(|pair| pair[0].sigma_m < pair[1].sigma_m), "{hours:?}");
-            assert!(hours.iter().all(|hour| profile.clock(hour.sigma_m) == hour.clock), "{hours:?}");
+            assert!(hours.windows(2).all(|pair| pair[0].arc_m < pair[1].arc_m), "{hours:?}");
+            assert!(hours.iter().all(|hour| profile.clock(hour.arc_m) == hour.clock), "{hours:?}");
         }
     }
 }

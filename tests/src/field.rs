@@ -25,7 +25,7 @@ pub struct Figures {
     /// Displacement over a turn of a head, m.
     pub turn_m: f64,
     /// Standard deviation that was given for that displacement, m.
-    pub turn_sigma_m: f64,
+    pub turn_arc_m: f64,
     /// Heading, degrees.
     pub yaw_deg: f64,
     /// Roll and pitch together, degrees.
@@ -58,7 +58,7 @@ pub fn figures(track: &Track) -> Figures {
         up_m: rms(off.iter().map(Vec3::z)),
         along_m: rms(off.iter().map(Vec3::x)),
         turn_m: rms(turns.iter().map(|(error, _)| *error)),
-        turn_sigma_m: rms(turns.iter().map(|(_, sigma)| *sigma)),
+        turn_arc_m: rms(turns.iter().map(|(_, sigma)| *sigma)),
         yaw_deg: rms(turned.iter().map(|(_, _, yaw)| yaw.to_degrees())),
         tilt_deg: rms(turned.iter().map(|(roll, pitch, _)| math::hypot(*roll, *pitch).to_degrees())),
         fixed: known.len() as f64 / track.fixes.len() as f64,
@@ -76,7 +76,7 @@ pub fn turns(known: &[(MonoNs, Fix, f64)]) -> Vec<(f64, f64)> {
         if before > 0 {
             let (_, then, x_then_m) = &known[before];
             let moved_m = fix.pose.position.x() - then.pose.position.x();
-            turns.push((moved_m - (x_m - x_then_m), fix.relative.sigma_m(Vec3::zero())));
+            turns.push((moved_m - (x_m - x_then_m), fix.relative.sd_m(Vec3::zero())));
         }
     }
     turns

@@ -152,15 +152,15 @@ impl Journey {
         self.reached.get(self.back.end).map_or(f64::INFINITY, |reached| reached.at.as_secs_f64())
     }
 
-    /// The flags of a dive. A fail is a hole larger than the target by `sigmas` of its standard deviation.
-    pub fn flags(&self, dive: &Dive, sigmas: f64) -> Vec<Flag> {
+    /// The flags of a dive. A fail is a hole larger than the target by `sd` of its standard deviation.
+    pub fn flags(&self, dive: &Dive, sd: f64) -> Vec<Flag> {
         let target_m = dive.report.target_m;
-        dive.report.sections.iter().map(|section| self.flag(target_m, section, sigmas)).collect()
+        dive.report.sections.iter().map(|section| self.flag(target_m, section, sd)).collect()
     }
 
-    fn flag(&self, target_m: f64, section: &SectionReport, sigmas: f64) -> Flag {
+    fn flag(&self, target_m: f64, section: &SectionReport, sd: f64) -> Flag {
         let ends = [section.start_m, section.end_m];
-        let radius_m = 0.5 * (target_m + sigmas * section.hole_sigma_m);
+        let radius_m = 0.5 * (target_m + sd * section.hole_sd_m);
         let due = |wall: &Wall, reached: &[Reached], early_m: f64| {
             left_behind(reached, first_failing_m(wall, ends, radius_m)? + radius_m - early_m)
         };

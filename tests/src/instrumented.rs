@@ -86,8 +86,8 @@ fn watch(placed: Res<'_, PlacedList>, mut seen: ResMut<'_, Seen>) {
     for item in &placed.0 {
         let Placed::Ping(ping) = item else { continue };
         let sample = match ping.outcome {
-            Outcome::Sample { point, sigma_m } => {
-                Some(Sample { place: [point.x(), sigma_m], point: [point.x(), point.y(), point.z()] })
+            Outcome::Sample { point, arc_m } => {
+                Some(Sample { place: [point.x(), arc_m], point: [point.x(), point.y(), point.z()] })
             }
             Outcome::Lost(..) | Outcome::Unplaced(_) => None,
         };

@@ -35,8 +35,8 @@ struct Step {
 
 impl Step {
     /// Where it passed over an arc length.
-    fn x_at(&self, sigma_m: f64, perimeter_m: f64, with_ends: bool) -> Option<f64> {
-        let along_m = math::wrap_signed(sigma_m - self.from[1], perimeter_m);
+    fn x_at(&self, arc_m: f64, perimeter_m: f64, with_ends: bool) -> Option<f64> {
+        let along_m = math::wrap_signed(arc_m - self.from[1], perimeter_m);
         let share = along_m / self.by[1];
         let reach = self.joined.map(|joined| if joined || with_ends { ROUNDING } else { -ROUNDING });
         (-reach[0]..=1.0 + reach[1])
@@ -89,9 +89,9 @@ pub fn spacings(pings: &[Ping], perimeter_m: f64) -> Vec<Spacing> {
 }
 
 fn spacing(sample: &Sample, last: Option<&Sample>, steps: &[Step], perimeter_m: f64) -> Spacing {
-    let [x_m, sigma_m] = sample.place;
+    let [x_m, arc_m] = sample.place;
     let t_x_m = [false, true].map(|with_ends| {
-        let passes = steps.iter().filter_map(|step| step.x_at(sigma_m, perimeter_m, with_ends));
+        let passes = steps.iter().filter_map(|step| step.x_at(arc_m, perimeter_m, with_ends));
         passes.map(|x| (x - x_m).abs()).reduce(f64::min)
     });
     let t_y_m = last.map(|last| distance_m(last.point, sample.point));

@@ -21,28 +21,28 @@ pub struct Deviation {
 }
 
 impl Deviation {
-    /// Takes in a sample at `point`, which the design has at arc length `sigma_m`; `before` is the sample from which the
+    /// Takes in a sample at `point`, which the design has at arc length `arc_m`; `before` is the sample from which the
     /// same head has come here in a single step, with its arc length. Gives how far it is beyond the design, m.
     ///
     /// Source: the distance along the ray from the profile's reference point, as arc length is measured.
     pub fn add(
         &mut self,
         profile: &Profile,
-        (point, sigma_m): (Yz, f64),
+        (point, arc_m): (Yz, f64),
         before: Option<(Yz, f64)>,
         contradiction_m: f64,
     ) -> f64 {
         let centre = profile.reference();
-        let design = profile.point_at(sigma_m);
+        let design = profile.point_at(arc_m);
         let off_m = distance_m(centre, point) - distance_m(centre, design);
         self.samples += 1;
         self.contradicting += u32::from(off_m.abs() > contradiction_m);
         self.sum_m += off_m;
         self.inmost_m = self.inmost_m.min(off_m);
         self.outmost_m = self.outmost_m.max(off_m);
-        if let Some((last, last_sigma_m)) = before {
+        if let Some((last, last_arc_m)) = before {
             self.swept_m2 += triangle_m2(centre, last, point);
-            self.design_m2 += triangle_m2(centre, profile.point_at(last_sigma_m), design);
+            self.design_m2 += triangle_m2(centre, profile.point_at(last_arc_m), design);
         }
         off_m
     }
@@ -93,7 +93,7 @@ mod tests {
         for k in 0..=samples {
             let angle = TAU * f64::from(k) / f64::from(samples);
             let point = [y + true_m * math::sin(angle), z - true_m * math::cos(angle)];
-            let at = (point, profile.sigma_of(point));
+            let at = (point, profile.arc_of(point));
             deviation.add(&profile, at, before, 0.5);
             before = Some(at);
         }
@@ -117,7 +117,7 @@ mod tests {
         let profile = shapes::circle(3.0).unwrap();
         let point = [0.0, 1.0];
         for _ in 0..40 {
-            rock.add(&profile, (point, profile.sigma_of(point)), None, 0.5);
+            rock.add(&profile, (point, profile.arc_of(point)), None, 0.5);
         }
         assert!(!rock.contradicts(), "a heap on the floor isn't another tunnel");
         assert!((rock.extremes_m().unwrap()[0] + 1.0).abs() < 1e-9);

@@ -39,7 +39,7 @@ pub struct Hole {
     /// Chainage of its centre, m.
     pub x_m: f64,
     /// Arc length of its centre, m.
-    pub sigma_m: f64,
+    pub arc_m: f64,
     /// Whether there are samples around it. When not, the hole is at least `diameter_m` large.
     pub bounded: bool,
 }
@@ -48,9 +48,9 @@ pub struct Hole {
 struct Tile {
     /// Middle, from the section's beginning, m.
     x_m: f64,
-    sigma_m: f64,
+    arc_m: f64,
     half_x_m: f64,
-    half_sigma_m: f64,
+    half_arc_m: f64,
     /// The sample nearest to the middle, from there, m.
     owner: (f64, f64),
     /// No place in the tile is farther than this from its nearest sample.
@@ -61,7 +61,7 @@ struct Tile {
 struct Best {
     distance_m: f64,
     x_m: f64,
-    sigma_m: f64,
+    arc_m: f64,
     /// The largest bound of what was dropped.
     dropped_m: f64,
 }
@@ -70,31 +70,31 @@ struct Best {
 #[derive(Debug, Clone, Copy)]
 struct Beyond {
     x_m: f64,
-    sigma_m: f64,
+    arc_m: f64,
 }
 
 impl Tile {
     /// Distance from the middle to a corner.
     fn half_m(&self) -> f64 {
-        math::sqrt(self.half_x_m * self.half_x_m + self.half_sigma_m * self.half_sigma_m)
+        math::sqrt(self.half_x_m * self.half_x_m + self.half_arc_m * self.half_arc_m)
     }
 
     /// The tile cut across its longer side.
     fn halves(&self) -> [Self; 2] {
-        let along_x = self.half_x_m > self.half_sigma_m;
+        let along_x = self.half_x_m > self.half_arc_m;
         [-0.5, 0.5].map(|side| {
             if along_x {
                 Self { x_m: self.x_m + side * self.half_x_m, half_x_m: self.half_x_m / 2.0, ..*self }
             } else {
-                let sigma_m = self.sigma_m + side * self.half_sigma_m;
-                Self { sigma_m, half_sigma_m: self.half_sigma_m / 2.0, ..*self }
+                let arc_m = self.arc_m + side * self.half_arc_m;
+                Self { arc_m, half_arc_m: self.half_arc_m / 2.0, ..*self }
             }
         })
     }
 
     /// A sample's place from the middle: the same to the bit, whichever place it was found from.
     fn relative(&self, found: &Nearest, perimeter_m: f64) -> (f64, f64) {
-        (found.x_m - self.x_m, (found.sigma_m - self.sigma_m) + found.turns * perimeter_m)
+        (found.x_m - self.x_m, (found.arc_m - self.arc_m) + found.turns * perimeter_m)
     }
 }
 
@@ -102,12 +102,12 @@ impl Tile {
 fn first_tiles(perimeter_m: f64, length_m: f64) -> impl Iterator<Item = Tile> {
     let half_x_m = length_m / 2.0;
     let count = math::floor_to_i64(perimeter_m / length_m).clamp(1, 8192) + 1;
-    let half_sigma_m = perimeter_m / (2 * count) as f64;
+    let half_arc_m = perimeter_m / (2 * count) as f64;
     (0..count).map(move |k| Tile {
         x_m: half_x_m,
-        sigma_m: (2 * k + 1) as f64 * half_sigma_m,
+        arc_m: (2 * k + 1) as f64 * half_arc_m,
         half_x_m,
-        half_sigma_m,
+        half_arc_m,
         owner: (0.0, 0.0),
         bound_m: f64::INFINITY,
     })
@@ -167,7 +167,7 @@ impl HoleFinder {
 
     /// The farthest place from all samples, provided that none is farther than the window shows.
     fn search(&mut self, length_m: f64, reach_m: f64) -> Result<Best, Beyond> {
-        let mut best = Best { distance_m: 0.0, x_m: 0.0, sigma_m: 0.0, dropped_m: 0.0 };
+        let mut best = Best { distance_m: 0.0, x_m: 0.0, arc_m: 0.0, dropped_m: 0.0 };
         self.tiles.clear();
         // A good first guess spares most of the work: every tile's middle is looked at before any is divided, and the
         // most promising is divided first.
@@ -175,7 +175,7 @@ impl HoleFinder {
         for tile in first_tiles(self.window.perimeter_m(), length_m) {
             let tile = looked_at(&self.window, tile, within_m.min(reach_m), &mut best)?;
             // f changes by no more than one moves.
-            within_m = math::hypot(tile.owner.0, tile.owner.1) + 2.0 * tile.half_sigma_m + 1e-6;
+            within_m = math::hypot(tile.owner.0, tile.owner.1) + 2.0 * tile.half_arc_m + 1e-6;
             self.tiles.push(tile);
         }
         self.tiles.sort_unstable_by(|a, b| a.bound_m.total_cmp(&b.bound_m));
@@ -199,7 +199,7 @@ impl HoleFinder {
             best.dropped_m = best.dropped_m.max(tile.bound_m);
             return Ok(true);
         }
-        self.division.begin((tile.half_x_m, tile.half_sigma_m), tile.owner);
+        self.division.begin((tile.half_x_m, tile.half_arc_m), tile.owner);
         while let Some(worst) = self.division.worst() {
             let bound_m = math::sqrt(worst.farthest2);
             if bound_m <= enough(best) {
@@ -207,17 +207,17 @@ impl HoleFinder {
                 return Ok(true);
             }
             let x_m = tile.x_m + (worst.owner.0 + worst.farthest.0);
-            let sigma_m = tile.sigma_m + (worst.owner.1 + worst.farthest.1);
-            let Some(found) = self.window.nearest(x_m, sigma_m, bound_m.min(reach_m)) else {
+            let arc_m = tile.arc_m + (worst.owner.1 + worst.farthest.1);
+            let Some(found) = self.window.nearest(x_m, arc_m, bound_m.min(reach_m)) else {
                 if bound_m > reach_m {
-                    return Err(Beyond { x_m, sigma_m });
+                    return Err(Beyond { x_m, arc_m });
                 }
                 // Its own sample is nearest, but for rounding.
-                best.take(bound_m, x_m, sigma_m);
+                best.take(bound_m, x_m, arc_m);
                 return Ok(true);
             };
             let distance_m = math::sqrt(found.distance2);
-            best.take(distance_m, x_m, sigma_m);
+            best.take(distance_m, x_m, arc_m);
             if distance_m >= bound_m - PROVEN_M {
                 best.dropped_m = best.dropped_m.max(bound_m);
                 return Ok(true);
@@ -241,28 +241,28 @@ impl HoleFinder {
             least_m: if self.window.overfull { 0.0 } else { least_m.max(0.0) },
             most_m: 2.0 * (radius_m + fidelity.moved_m),
             x_m: self.window.chainage_m(best.x_m),
-            sigma_m: math::wrap(best.sigma_m, self.window.perimeter_m()),
+            arc_m: math::wrap(best.arc_m, self.window.perimeter_m()),
             bounded: true,
         }
     }
 }
 
 impl Best {
-    fn take(&mut self, distance_m: f64, x_m: f64, sigma_m: f64) {
+    fn take(&mut self, distance_m: f64, x_m: f64, arc_m: f64) {
         if distance_m > self.distance_m {
-            *self = Self { distance_m, x_m, sigma_m, ..*self };
+            *self = Self { distance_m, x_m, arc_m, ..*self };
         }
     }
 }
 
 /// The tile with its owner and a bound by it; its middle may be the best place so far.
 fn looked_at(window: &Window, tile: Tile, within_m: f64, best: &mut Best) -> Result<Tile, Beyond> {
-    let beyond = Beyond { x_m: tile.x_m, sigma_m: tile.sigma_m };
-    let found = window.nearest(tile.x_m, tile.sigma_m, within_m).ok_or(beyond)?;
-    best.take(math::sqrt(found.distance2), tile.x_m, tile.sigma_m);
+    let beyond = Beyond { x_m: tile.x_m, arc_m: tile.arc_m };
+    let found = window.nearest(tile.x_m, tile.arc_m, within_m).ok_or(beyond)?;
+    best.take(math::sqrt(found.distance2), tile.x_m, tile.arc_m);
     let owner = tile.relative(&found, window.perimeter_m());
-    let (dx, dsigma) = (owner.0.abs() + tile.half_x_m, owner.1.abs() + tile.half_sigma_m);
-    let bound_m = tile.bound_m.min(math::sqrt(dx * dx + dsigma * dsigma));
+    let (dx, darc) = (owner.0.abs() + tile.half_x_m, owner.1.abs() + tile.half_arc_m);
+    let bound_m = tile.bound_m.min(math::sqrt(dx * dx + darc * darc));
     Ok(Tile { owner, bound_m, ..tile })
 }
 
@@ -278,7 +278,7 @@ fn unbounded(window: &Window, beyond: &Beyond) -> Hole {
         least_m: diameter_m,
         most_m: f64::INFINITY,
         x_m: window.chainage_m(beyond.x_m),
-        sigma_m: math::wrap(beyond.sigma_m, window.perimeter_m()),
+        arc_m: math::wrap(beyond.arc_m, window.perimeter_m()),
         bounded: false,
     }
 }

@@ -49,8 +49,8 @@ impl Opening {
         for i in 0..=along {
             let x_m = self.from_m + (self.to_m - self.from_m) * i as f64 / along as f64;
             for k in 0..=around {
-                let sigma_m = math::wrap(first_m + length_m * k as f64 / around as f64, perimeter_m);
-                store.insert(WallSample { x_m, sigma_m, head: 0, step_m: None })?;
+                let arc_m = math::wrap(first_m + length_m * k as f64 / around as f64, perimeter_m);
+                store.insert(WallSample { x_m, arc_m, head: 0, step_m: None })?;
             }
         }
         Ok(())
@@ -91,12 +91,12 @@ mod tests {
         let mut store = SampleStore::new(layout);
         for i in 0..=20 {
             for k in 0..37 {
-                let (x_m, sigma_m) = (0.5 * f64::from(i), profile.perimeter_m() * f64::from(k) / 37.0);
-                let around_m = math::wrap(sigma_m - 17.0, profile.perimeter_m());
+                let (x_m, arc_m) = (0.5 * f64::from(i), profile.perimeter_m() * f64::from(k) / 37.0);
+                let around_m = math::wrap(arc_m - 17.0, profile.perimeter_m());
                 if (4.0..=6.0).contains(&x_m) && around_m <= 4.0 {
                     continue;
                 }
-                store.insert(WallSample { x_m, sigma_m, head: 0, step_m: None }).unwrap();
+                store.insert(WallSample { x_m, arc_m, head: 0, step_m: None }).unwrap();
             }
         }
         if with_opening {

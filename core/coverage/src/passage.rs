@@ -74,18 +74,18 @@ const PARTS: f64 = 64.0;
 pub struct Lost([u64; Loss::ALL.len()]);
 
 impl Lost {
-    /// Notes that a ping was lost at `sigma_m`, in [0, perimeter).
-    pub fn note(&mut self, loss: Loss, sigma_m: f64, perimeter_m: f64) {
+    /// Notes that a ping was lost at `arc_m`, in [0, perimeter).
+    pub fn note(&mut self, loss: Loss, arc_m: f64, perimeter_m: f64) {
         if let Some(bits) = self.0.get_mut(loss as usize) {
-            *bits |= 1 << part(sigma_m, perimeter_m);
+            *bits |= 1 << part(arc_m, perimeter_m);
         }
     }
 
     /// How many parts within `within_m` of an arc length have lost pings, by reason.
-    pub fn near(&self, sigma_m: f64, within_m: f64, perimeter_m: f64) -> [u32; Loss::ALL.len()] {
+    pub fn near(&self, arc_m: f64, within_m: f64, perimeter_m: f64) -> [u32; Loss::ALL.len()] {
         let near = (0..64_u32).fold(0_u64, |near, k| {
             let middle_m = (f64::from(k) + 0.5) * perimeter_m / PARTS;
-            let off_m = math::wrap_signed(middle_m - sigma_m, perimeter_m).abs();
+            let off_m = math::wrap_signed(middle_m - arc_m, perimeter_m).abs();
             // A part counts when its nearer edge is in reach.
             near | (u64::from(off_m - perimeter_m / (2.0 * PARTS) < within_m) << k)
         });
@@ -93,8 +93,8 @@ impl Lost {
     }
 }
 
-fn part(sigma_m: f64, perimeter_m: f64) -> u32 {
-    u32::try_from(math::floor_to_i64(sigma_m / perimeter_m * PARTS).clamp(0, 63)).unwrap_or(0)
+fn part(arc_m: f64, perimeter_m: f64) -> u32 {
+    u32::try_from(math::floor_to_i64(arc_m / perimeter_m * PARTS).clamp(0, 63)).unwrap_or(0)
 }
 
 /// Pings lost within an empty circle, by reason, over the sections that it touches: each with the chainages at which it
@@ -112,7 +112,7 @@ pub fn lost_within<'a>(
             continue;
         }
         let within_m = math::sqrt((radius_m - off_m) * (radius_m + off_m));
-        let near = passage.lost.near(hole.sigma_m, within_m, perimeter_m);
+        let near = passage.lost.near(hole.arc_m, within_m, perimeter_m);
         sum = core::array::from_fn(|k| sum.get(k).copied().unwrap_or(0) + near.get(k).copied().unwrap_or(0));
     }
     sum
@@ -139,7 +139,7 @@ impl Doubt {
 
     /// Keeps the larger of the two.
     pub fn add(&mut self, other: &Self) {
-        if other.relative.sigma_m(Vec3::zero()) >= self.relative.sigma_m(Vec3::zero()) {
+        if other.relative.sd_m(Vec3::zero()) >= self.relative.sd_m(Vec3::zero()) {
             *self = *other;
         }
     }
@@ -148,13 +148,13 @@ impl Doubt {
     pub fn worst_m(&self, profile: &Profile) -> f64 {
         const PLACES: u32 = 64;
         let place = |k: u32| profile.point_at(profile.perimeter_m() * f64::from(k) / f64::from(PLACES));
-        (0..PLACES).map(|k| self.sigma_m(place(k))).fold(0.0, f64::max)
+        (0..PLACES).map(|k| self.sd_m(place(k))).fold(0.0, f64::max)
     }
 
     /// Standard deviation of the diameter of a hole there on the wall, m: one edge of it is a pass, the other edge the next.
-    pub fn sigma_m(&self, wall_m: [f64; 2]) -> f64 {
+    pub fn sd_m(&self, wall_m: [f64; 2]) -> f64 {
         LARGEST_OF_MANY
-            * self.relative.sigma_m(Vec3::new(0.0, wall_m[0] - self.from_m[0], wall_m[1] - self.from_m[1]))
+            * self.relative.sd_m(Vec3::new(0.0, wall_m[0] - self.from_m[0], wall_m[1] - self.from_m[1]))
     }
 }
 
@@ -177,7 +177,7 @@ mod tests {
     fn a_circle_is_narrower_towards_its_ends() {
         let mut passage = Passage::default();
         passage.lost.note(Loss::OutOfRange, 1.75, 6.4);
-        let hole = Hole { diameter_m: 2.0, least_m: 2.0, most_m: 2.0, x_m: 5.0, sigma_m: 1.0, bounded: true };
+        let hole = Hole { diameter_m: 2.0, least_m: 2.0, most_m: 2.0, x_m: 5.0, arc_m: 1.0, bounded: true };
         let within =
             |from_m: f64| lost_within(&hole, 1.0, 6.4, core::iter::once(((from_m, from_m + 0.25), &passage)));
         assert_eq!((within(5.0), within(5.75), within(6.0)), ([0, 1, 0], [0; 3], [0; 3]));

@@ -110,7 +110,7 @@ pub struct Section {
     /// The hole as last measured.
     pub hole: Option<Hole>,
     /// Standard deviation of the hole's diameter, m.
-    pub hole_sigma_m: f64,
+    pub hole_sd_m: f64,
     /// Whether no later sample on the way forward can change the verdict, nor the hole of a fail.
     pub settled: bool,
     /// When the fail was flagged.

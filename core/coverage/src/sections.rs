@@ -110,8 +110,8 @@ impl Sections {
     }
 
     /// How far from a sample it may change a verdict of pass or fail, m.
-    pub fn margin_m(&self, relative_sigma_m: f64) -> f64 {
-        self.target_m / 2.0 + relative_sigma_m
+    pub fn margin_m(&self, relative_sd_m: f64) -> f64 {
+        self.target_m / 2.0 + relative_sd_m
     }
 
     /// Index of the section at a chainage.
@@ -171,8 +171,7 @@ impl Sections {
                 let Some(hole) = section.hole else { continue };
                 let clear_m = clear_of(moved.to_come, hole.x_m);
                 let left_m = hole.least_m.min(2.0 * clear_m);
-                let fails =
-                    section.verdict == Verdict::Open && left_m - 2.0 * section.hole_sigma_m > target_m;
+                let fails = section.verdict == Verdict::Open && left_m - 2.0 * section.hole_sd_m > target_m;
                 if fails || clear_m >= hole.diameter_m / 2.0 {
                     ask(ask_for(index));
                 }
@@ -233,11 +232,11 @@ impl Sections {
         let target_m = self.target_m;
         let section = self.get_mut(request.section)?;
         let hole = judging.finder.largest(judging.store, from_m, to_m);
-        let sigma_m = section.passage.doubt.sigma_m(judging.profile.point_at(hole.sigma_m));
+        let sd_m = section.passage.doubt.sd_m(judging.profile.point_at(hole.arc_m));
         let clear_m = clear_of(request.to_come, hole.x_m);
         section.hole = Some(hole);
-        section.hole_sigma_m = sigma_m;
-        section.verdict = match verdict(&hole, sigma_m, target_m, clear_m) {
+        section.hole_sd_m = sd_m;
+        section.verdict = match verdict(&hole, sd_m, target_m, clear_m) {
             Verdict::Pass if section.is_doubtful() => Verdict::CannotSay,
             Verdict::Open | Verdict::CannotSay if request.fails => Verdict::Fail,
             verdict => verdict,
@@ -307,11 +306,11 @@ impl Sections {
 /// samples won't make it larger. `fail` when D - 2 sigma > T for whatever D will be: samples come no nearer than `clear_m`.
 /// In between `open` while D may change, then `cannot_say`. A verdict holds for both bounds of D. Wall without samples
 /// around it fails.
-pub(super) fn verdict(hole: &Hole, sigma_m: f64, target_m: f64, clear_m: f64) -> Verdict {
+pub(super) fn verdict(hole: &Hole, sd_m: f64, target_m: f64, clear_m: f64) -> Verdict {
     let is_left = 2.0 * clear_m >= hole.diameter_m;
-    if hole.bounded && hole.most_m + 2.0 * sigma_m <= target_m {
+    if hole.bounded && hole.most_m + 2.0 * sd_m <= target_m {
         Verdict::Pass
-    } else if hole.least_m.min(2.0 * clear_m) - 2.0 * sigma_m > target_m || !hole.bounded && is_left {
+    } else if hole.least_m.min(2.0 * clear_m) - 2.0 * sd_m > target_m || !hole.bounded && is_left {
         Verdict::Fail
     } else if is_left {
         Verdict::CannotSay
@@ -331,7 +330,7 @@ mod tests {
     const BEHIND: f64 = f64::INFINITY;
 
     fn hole(diameter_m: f64) -> Hole {
-        Hole { diameter_m, least_m: diameter_m, most_m: diameter_m, x_m: 0.0, sigma_m: 0.0, bounded: true }
+        Hole { diameter_m, least_m: diameter_m, most_m: diameter_m, x_m: 0.0, arc_m: 0.0, bounded: true }
     }
 
     #[test]

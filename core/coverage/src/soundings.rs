@@ -52,7 +52,7 @@ pub struct GridNode {
     /// Chainage of its middle, m.
     pub x_m: f64,
     /// Arc length of its middle, m.
-    pub sigma_m: f64,
+    pub arc_m: f64,
     /// Samples on it, at most 65,535.
     pub count: u16,
 }
@@ -84,17 +84,17 @@ impl Soundings {
     /// Counts a sample; gives false when it lies outside, or is no number.
     ///
     /// Allocates: never.
-    pub fn add(&mut self, x_m: f64, sigma_m: f64) -> bool {
-        let inside = x_m >= self.layout.from_m && x_m <= self.layout.to_m && sigma_m.is_finite();
-        let Some(index) = inside.then(|| self.index(x_m, sigma_m)).flatten() else { return false };
+    pub fn add(&mut self, x_m: f64, arc_m: f64) -> bool {
+        let inside = x_m >= self.layout.from_m && x_m <= self.layout.to_m && arc_m.is_finite();
+        let Some(index) = inside.then(|| self.index(x_m, arc_m)).flatten() else { return false };
         let Some(count) = self.counts.get_mut(index) else { return false };
         *count = count.saturating_add(1);
         true
     }
 
-    fn index(&self, x_m: f64, sigma_m: f64) -> Option<usize> {
+    fn index(&self, x_m: f64, arc_m: f64) -> Option<usize> {
         let row = math::floor_to_i64(x_m / self.layout.node_m) - self.first_row;
-        let into = math::wrap(sigma_m, self.layout.perimeter_m) / self.node_m()[1];
+        let into = math::wrap(arc_m, self.layout.perimeter_m) / self.node_m()[1];
         usize::try_from(row * self.columns + math::floor_to_i64(into).min(self.columns - 1)).ok()
     }
 
@@ -111,7 +111,7 @@ impl Soundings {
                 let index = usize::try_from(row * self.columns + column).ok()?;
                 Some(GridNode {
                     x_m: ((self.first_row + row) as f64 + 0.5) * along_m,
-                    sigma_m: (column as f64 + 0.5) * around_m,
+                    arc_m: (column as f64 + 0.5) * around_m,
                     count: *self.counts.get(index)?,
                 })
             })
@@ -148,8 +148,8 @@ mod tests {
 
     fn soundings(samples: &[(f64, f64)]) -> Soundings {
         let mut soundings = Soundings::new(LAYOUT);
-        for (x_m, sigma_m) in samples {
-            assert!(soundings.add(*x_m, *sigma_m));
+        for (x_m, arc_m) in samples {
+            assert!(soundings.add(*x_m, *arc_m));
         }
         soundings
     }
@@ -167,7 +167,7 @@ mod tests {
             let on = |node: &GridNode| {
                 let within = |s: &&(f64, f64)| {
                     (s.0 - node.x_m + along_m / 2.0).div_euclid(along_m).abs() < 0.5
-                        && (s.1 - node.sigma_m + around_m / 2.0).div_euclid(around_m).abs() < 0.5
+                        && (s.1 - node.arc_m + around_m / 2.0).div_euclid(around_m).abs() < 0.5
                 };
                 samples.iter().filter(within).count()
             };
@@ -208,10 +208,9 @@ mod tests {
     #[test]
     fn what_lies_outside_is_not_counted_and_counts_saturate() {
         let mut soundings = soundings(&[]);
-        for (x_m, sigma_m) in
-            [(-3.3, 0.0), (20.1, 0.0), (f64::NAN, 0.0), (0.0, f64::NAN), (0.0, f64::INFINITY)]
+        for (x_m, arc_m) in [(-3.3, 0.0), (20.1, 0.0), (f64::NAN, 0.0), (0.0, f64::NAN), (0.0, f64::INFINITY)]
         {
-            assert!(!soundings.add(x_m, sigma_m), "{x_m} {sigma_m}");
+            assert!(!soundings.add(x_m, arc_m), "{x_m} {arc_m}");
         }
         assert_eq!(soundings.summary(-10.0, 30.0).empty, soundings.summary(-10.0, 30.0).nodes);
         for _ in 0..70_000 {

@@ -38,7 +38,7 @@ impl Metres {
 #[derive(Debug, Clone, Copy)]
 struct Measured {
     hole: Hole,
-    sigma_m: f64,
+    sd_m: f64,
     /// The profile is wrong there, or there is no wall.
     doubtful: bool,
 }
@@ -65,11 +65,7 @@ impl Sections {
     fn measured(&self, swept: Option<Reach>) -> Vec<Measured> {
         let section = |index: i64| {
             let section = self.get(index)?;
-            Some(Measured {
-                hole: section.hole?,
-                sigma_m: section.hole_sigma_m,
-                doubtful: section.is_doubtful(),
-            })
+            Some(Measured { hole: section.hole?, sd_m: section.hole_sd_m, doubtful: section.is_doubtful() })
         };
         self.passed(swept).filter_map(section).collect()
     }
@@ -97,7 +93,7 @@ impl Sections {
                     doubtful |= section.is_doubtful();
                 }
             }
-            Measured { hole, sigma_m: doubt.sigma_m(profile.point_at(hole.sigma_m)), doubtful }
+            Measured { hole, sd_m: doubt.sd_m(profile.point_at(hole.arc_m)), doubtful }
         };
         indexes.map(section).collect()
     }
@@ -105,8 +101,8 @@ impl Sections {
 
 fn metres(measured: &[Measured], section_m: f64, target_m: f64, to_come: Option<Reach>) -> Metres {
     let mut metres = Metres::default();
-    for Measured { hole, sigma_m, doubtful } in measured {
-        let said = verdict(hole, *sigma_m, target_m, clear_of(to_come, hole.x_m));
+    for Measured { hole, sd_m, doubtful } in measured {
+        let said = verdict(hole, *sd_m, target_m, clear_of(to_come, hole.x_m));
         let said = if said == Verdict::Pass && *doubtful { Verdict::CannotSay } else { said };
         metres.add(said, section_m);
     }

@@ -10,7 +10,7 @@ pub mod relative;
 pub mod section;
 pub mod smooth;
 
-use self::filter::running::Sigmas;
+use self::filter::running::PoseSd;
 use self::filter::sources::Consistency;
 use headrace_geometry::time::MonoNs;
 use headrace_sensor::device::SensorInfo;
@@ -36,7 +36,7 @@ pub trait Navigation: Stateful + Send + Sync {
     }
 
     /// How far off the estimate may be; `None` where that isn't known.
-    fn sigmas(&self) -> Option<Sigmas> {
+    fn pose_sd(&self) -> Option<PoseSd> {
         None
     }
 

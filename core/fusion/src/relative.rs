@@ -16,12 +16,12 @@ impl Relative {
     }
 
     /// Nothing but an error of chainage of this standard deviation, m.
-    pub fn along(sigma_m: f64) -> Self {
-        Self([[sigma_m * sigma_m, 0.0, 0.0], [0.0; 3], [0.0; 3]])
+    pub fn along(sd_m: f64) -> Self {
+        Self([[sd_m * sd_m, 0.0, 0.0], [0.0; 3], [0.0; 3]])
     }
 
     /// Standard deviation of the chainage of a place at `arm` from the vehicle, m.
-    pub fn sigma_m(&self, arm: Vec3<Tunnel>) -> f64 {
+    pub fn sd_m(&self, arm: Vec3<Tunnel>) -> f64 {
         let weights = [1.0, arm.z(), -arm.y()];
         let rows = self.0.iter().zip(weights);
         let sum: f64 =
@@ -60,7 +60,7 @@ mod tests {
     fn a_place_is_as_uncertain_from_wherever_its_arm_begins() {
         let relative = Relative::new([[0.04, 0.003, -0.002], [0.003, 0.01, 0.001], [-0.002, 0.001, 0.02]]);
         let (whole, part) = (Vec3::new(0.3, 2.0, -1.5), Vec3::new(-0.1, 0.4, 0.7));
-        let moved = relative.moved(part).sigma_m(whole + -part);
-        assert!((moved - relative.sigma_m(whole)).abs() < 1e-12, "{moved}");
+        let moved = relative.moved(part).sd_m(whole + -part);
+        assert!((moved - relative.sd_m(whole)).abs() < 1e-12, "{moved}");
     }
 }

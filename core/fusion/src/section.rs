@@ -79,6 +79,6 @@ pub fn settle(
 }
 
 /// Weight of an observation of this standard deviation.
-fn weight(sigma_m: f64) -> f64 {
-    1.0 / (sigma_m * sigma_m)
+fn weight(sd_m: f64) -> f64 {
+    1.0 / (sd_m * sd_m)
 }

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 pub use super::head_motion::MeasuredMotion;
 use headrace_coverage::HeadReach;
-use headrace_fusion::filter::running::Sigmas;
+use headrace_fusion::filter::running::PoseSd;
 use headrace_fusion::{Fix, Navigation, NoFix};
 use headrace_geometry::frames::{Point3, Tunnel};
 use headrace_geometry::time::{DurNs, MonoNs};
@@ -49,7 +49,7 @@ pub struct VehicleState {
     /// Pose and speed, or what a fix lacks: the vehicle's health.
     pub fix: Result<Fix, NoFix>,
     /// Standard deviations of the pose, from its covariance; `None` where the way of navigating doesn't know them.
-    pub sd: Option<Sigmas>,
+    pub sd: Option<PoseSd>,
 }
 
 impl Default for VehicleState {
@@ -157,7 +157,7 @@ pub struct HeadSweep {
 pub(super) struct LastSample {
     pub(super) point: Point3<Tunnel>,
     /// Its arc length, m.
-    pub(super) sigma_m: f64,
+    pub(super) arc_m: f64,
     /// Every ping since has been a single step with a return.
     pub(super) unbroken: bool,
 }

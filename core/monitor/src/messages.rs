@@ -63,7 +63,7 @@ pub enum Outcome {
         /// Where the beam ended.
         point: Point3<Tunnel>,
         /// Its arc length, m.
-        sigma_m: f64,
+        arc_m: f64,
     },
     /// No return from where one should have come, for a reason; nobody knows where that was without a fix.
     Lost(Loss, Option<Aim>),
@@ -77,7 +77,7 @@ pub struct Aim {
     /// Chainage, m.
     pub x_m: f64,
     /// Arc length, m.
-    pub sigma_m: f64,
+    pub arc_m: f64,
 }
 
 /// A ping with its place.

@@ -81,7 +81,7 @@ impl RecordKind {
                 ("x_m", Number),
                 ("y_m", Number),
                 ("z_m", Number),
-                ("sigma_m", Number),
+                ("arc_m", Number),
             ],
             Self::NoSample => {
                 &[("received_ns", Integer), ("source", Integer), ("outcome", Integer), ("reason", Integer)]
@@ -92,7 +92,7 @@ impl RecordKind {
                 ("change", Integer),
                 ("verdict", Integer),
                 ("hole_m", Number),
-                ("hole_sigma_m", Number),
+                ("hole_sd_m", Number),
                 ("cause", Integer),
                 ("hole_x_m", Number),
                 ("hole_arc_m", Number),

@@ -174,8 +174,7 @@ impl Advisor {
     pub fn middle_step_m(&self, step_rad: f64) -> f64 {
         let largest_m = |ring: &Ring| {
             let pairs = ring.pairs(Ring::stride(step_rad, RING));
-            let steps =
-                pairs.map(|(a, b)| math::wrap_signed(b.sigma_m - a.sigma_m, ring.perimeter_m()).abs());
+            let steps = pairs.map(|(a, b)| math::wrap_signed(b.arc_m - a.arc_m, ring.perimeter_m()).abs());
             steps.fold(0.0, f64::max)
         };
         self.middle.iter().map(largest_m).fold(0.0, f64::max)
@@ -227,7 +226,7 @@ impl Advisor {
         let left_m = if self.astern { x_m } else { self.task.length_m - x_m };
         self.think_over(&passes, &going);
         let unseen_m = match fastest {
-            Err(SamplingError::UnseenStrip { width_m, sigma_m, .. }) => Some([width_m, sigma_m]),
+            Err(SamplingError::UnseenStrip { width_m, arc_m, .. }) => Some([width_m, arc_m]),
             _ => None,
         };
         let errors = passes.phase_errors_rad(self.heads.len()).into_iter().flatten();

@@ -85,7 +85,7 @@ pub enum SamplingError {
     },
     /// A strip of the wall that no head sees is as wide as the target.
     #[error(
-        "a target of {target_m} m is met at no speed: no head sees {width_m:.2} m of the wall, {sigma_m:.2} m from the floor's centre"
+        "a target of {target_m} m is met at no speed: no head sees {width_m:.2} m of the wall, {arc_m:.2} m from the floor's centre"
     )]
     UnseenStrip {
         /// The target, m.
@@ -93,7 +93,7 @@ pub enum SamplingError {
         /// Width of the strip, m.
         width_m: f64,
         /// Its middle, arc length in m.
-        sigma_m: f64,
+        arc_m: f64,
     },
     /// The vehicle heads too far askew, or swings about too fast.
     #[error(

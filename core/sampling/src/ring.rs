@@ -28,7 +28,7 @@ pub struct Sounding {
     /// Way from the head to the wall: chainage gained, left, up, m. Its length is the range.
     pub beam: Vec3<Tunnel>,
     /// Arc length of the place on the wall, m.
-    pub sigma_m: f64,
+    pub arc_m: f64,
     /// Cosine of the angle between beam and wall's normal: 1 where the beam meets the wall squarely.
     pub squareness: f64,
 }
@@ -72,7 +72,7 @@ impl<'a> Standing<'a> {
         let hit = self.hit(direction);
         let hit = hit.ok_or(SamplingError::BeamAlongTunnel { angle_deg: angle_rad.to_degrees() })?;
         let squareness = -(direction.y() * hit.normal[0] + direction.z() * hit.normal[1]);
-        Ok(Sounding { angle_rad, beam: direction.scaled(hit.range_m), sigma_m: hit.sigma_m, squareness })
+        Ok(Sounding { angle_rad, beam: direction.scaled(hit.range_m), arc_m: hit.arc_m, squareness })
     }
 
     /// The patch that a beam of full width `beam_rad` covers about `angle_rad`.
@@ -116,7 +116,7 @@ impl Sounding {
     /// Distance to another sounding of the same head on the unrolled wall, the short way round, m: what holes are
     /// measured by.
     pub fn step_m(&self, other: &Self, perimeter_m: f64) -> f64 {
-        let around_m = math::wrap_signed(other.sigma_m - self.sigma_m, perimeter_m);
+        let around_m = math::wrap_signed(other.arc_m - self.arc_m, perimeter_m);
         math::hypot(other.beam.x() - self.beam.x(), around_m)
     }
 
@@ -181,7 +181,7 @@ impl Ring {
         let mut way_m = 0.0;
         for (a, b) in self.soundings.iter().zip(self.soundings.iter().cycle().skip(1)) {
             self.way_m.push(way_m);
-            way_m += math::wrap_signed(b.sigma_m - a.sigma_m, self.perimeter_m);
+            way_m += math::wrap_signed(b.arc_m - a.arc_m, self.perimeter_m);
         }
         self.way_m.push(way_m);
         // Room for what `keep_steps` may be asked for later, when nothing may allocate.
@@ -264,7 +264,7 @@ impl Ring {
             let (to, turns) =
                 if k + rest < count { (k + rest, turns) } else { (k + rest - count, turns + 1) };
             // The soundings' own difference keeps its digits; the way says how often it goes round, mostly not at all.
-            let short_m = math::wrap_signed(b.sigma_m - a.sigma_m, self.perimeter_m);
+            let short_m = math::wrap_signed(b.arc_m - a.arc_m, self.perimeter_m);
             let round_m = way_m(to) + whole_m * turns as f64 - way_m(k) - short_m;
             let rounds = if round_m.abs() < 0.4 * self.perimeter_m {
                 0

@@ -28,14 +28,14 @@ impl Arc {
     ///
     /// Errors: as for [`Standing::sounding`].
     pub fn of(standing: &Standing<'_>, angles: &AngleRange) -> Result<Self, SamplingError> {
-        let sigma_m = |angle_rad| standing.sounding(angle_rad).map(|sounding| sounding.sigma_m);
+        let arc_m = |angle_rad| standing.sounding(angle_rad).map(|sounding| sounding.arc_m);
         let perimeter_m = standing.perimeter_m();
         if angles.size_rad >= math::TAU {
             return Ok(Self { from_m: 0.0, length_m: perimeter_m });
         }
-        let (first, last) = (sigma_m(angles.from_rad)?, sigma_m(angles.from_rad + angles.size_rad)?);
+        let (first, last) = (arc_m(angles.from_rad)?, arc_m(angles.from_rad + angles.size_rad)?);
         let (middle, whole) = (
-            math::wrap(sigma_m(angles.middle_rad())? - first, perimeter_m),
+            math::wrap(arc_m(angles.middle_rad())? - first, perimeter_m),
             math::wrap(last - first, perimeter_m),
         );
         // A head that faces aft sweeps the wall the other way.
@@ -53,8 +53,8 @@ impl Arc {
         Self { from_m: first.from_m, length_m }
     }
 
-    fn has(&self, sigma_m: f64, perimeter_m: f64) -> bool {
-        math::wrap(sigma_m - self.from_m, perimeter_m) <= self.length_m
+    fn has(&self, arc_m: f64, perimeter_m: f64) -> bool {
+        math::wrap(arc_m - self.from_m, perimeter_m) <= self.length_m
     }
 }
 
@@ -89,9 +89,9 @@ impl View {
             match (heard(sounding.range_m()), began) {
                 (false, None) => began = Some(before_m),
                 (true, Some(from_m)) => {
-                    let way_m = math::wrap_signed(sounding.sigma_m - from_m, ring.perimeter_m());
+                    let way_m = math::wrap_signed(sounding.arc_m - from_m, ring.perimeter_m());
                     let forward = ring.way_round_m() >= 0.0;
-                    let (from_m, way_m) = if forward { (from_m, way_m) } else { (sounding.sigma_m, -way_m) };
+                    let (from_m, way_m) = if forward { (from_m, way_m) } else { (sounding.arc_m, -way_m) };
                     let arc = Arc { from_m, length_m: math::wrap(way_m, ring.perimeter_m()) };
                     let full = self.hidden.len() == self.hidden.capacity();
                     match self.hidden.last_mut().filter(|_| full) {
@@ -102,7 +102,7 @@ impl View {
                 }
                 _ => {}
             }
-            before_m = sounding.sigma_m;
+            before_m = sounding.arc_m;
         }
     }
 }
@@ -240,7 +240,7 @@ impl Strips {
                 let from = ring.soundings().iter().zip(strip_of.iter());
                 let mut note = |((sounding, (strip, left_m)), step_m): ((&Sounding, &(usize, f64)), f64)| {
                     let (strip, is_within) = (*strip, step_m < left_m - NO_WIDTH_M);
-                    let from = Reached { head, sigma_m: sounding.sigma_m, strip, forward, is_within };
+                    let from = Reached { head, arc_m: sounding.arc_m, strip, forward, is_within };
                     note_step(strips, steps_m, setting, &from, step_m, *perimeter_m);
                 };
                 match ring.kept_steps_m(stride) {
@@ -257,8 +257,8 @@ impl Strips {
         let mut number = 0;
         self.strip_of.clear();
         for sounding in ring.soundings() {
-            number = number_near(&self.strips, sounding.sigma_m, self.perimeter_m, number);
-            let from_first_m = math::wrap(sounding.sigma_m - first_m, self.perimeter_m);
+            number = number_near(&self.strips, sounding.arc_m, self.perimeter_m, number);
+            let from_first_m = math::wrap(sounding.arc_m - first_m, self.perimeter_m);
             let left_m = self.strips.get(number).map_or(0.0, |strip| {
                 let into_m = from_first_m - (strip.arc.from_m - first_m);
                 if forward { strip.arc.length_m - into_m } else { into_m }
@@ -273,8 +273,8 @@ impl Strips {
     }
 
     /// The strip at an arc length.
-    pub fn at(&self, sigma_m: f64) -> Option<&Strip> {
-        self.strips.get(number_at(&self.strips, sigma_m, self.perimeter_m))
+    pub fn at(&self, arc_m: f64) -> Option<&Strip> {
+        self.strips.get(number_at(&self.strips, arc_m, self.perimeter_m))
     }
 
     /// The largest step of heads on what they see, in a setting, m.
@@ -345,8 +345,8 @@ impl Strips {
             } else if within.is_some() {
                 SamplingError::OffAxis { target_m }
             } else {
-                let sigma_m = math::wrap(arc.from_m + arc.length_m / 2.0, self.perimeter_m);
-                SamplingError::UnseenStrip { target_m, width_m: arc.length_m, sigma_m }
+                let arc_m = math::wrap(arc.from_m + arc.length_m / 2.0, self.perimeter_m);
+                SamplingError::UnseenStrip { target_m, width_m: arc.length_m, arc_m }
             };
             let fastest = fastest.ok_or(refused)?;
             if fastest.speed_mps < slowest.speed_mps {
@@ -435,7 +435,7 @@ impl<'a> Gaps<'a> {
 /// Where a step begins, and which way it goes.
 struct Reached {
     head: usize,
-    sigma_m: f64,
+    arc_m: f64,
     strip: usize,
     forward: bool,
     /// It surely ends in the strip in which it begins.
@@ -460,7 +460,7 @@ fn note_step(
         return;
     }
     let into_m =
-        strips.get(number).map_or(0.0, |strip| math::wrap(from.sigma_m - strip.arc.from_m, perimeter_m));
+        strips.get(number).map_or(0.0, |strip| math::wrap(from.arc_m - strip.arc.from_m, perimeter_m));
     let mut left_behind_m = if from.forward {
         -into_m
     } else {
@@ -542,9 +542,9 @@ fn strip(views: &[View], arc: Arc, perimeter_m: f64) -> Strip {
 }
 
 /// The same as [`number_at`], where a guess is mostly right: soundings follow each other round the wall.
-fn number_near(strips: &[Strip], sigma_m: f64, perimeter_m: f64, guess: usize) -> usize {
+fn number_near(strips: &[Strip], arc_m: f64, perimeter_m: f64, guess: usize) -> usize {
     let first_m = strips.first().map_or(0.0, |strip| strip.arc.from_m);
-    let from_first_m = math::wrap(sigma_m - first_m, perimeter_m);
+    let from_first_m = math::wrap(arc_m - first_m, perimeter_m);
     let begins = |number: usize| strips.get(number).map(|strip| strip.arc.from_m - first_m <= from_first_m);
     if begins(guess) == Some(true) && begins(guess + 1) != Some(true) {
         return guess;
@@ -553,8 +553,8 @@ fn number_near(strips: &[Strip], sigma_m: f64, perimeter_m: f64, guess: usize) -
 }
 
 /// The number of the strip at an arc length: the last that begins at or before it.
-fn number_at(strips: &[Strip], sigma_m: f64, perimeter_m: f64) -> usize {
-    number_near(strips, sigma_m, perimeter_m, strips.len())
+fn number_at(strips: &[Strip], arc_m: f64, perimeter_m: f64) -> usize {
+    number_near(strips, arc_m, perimeter_m, strips.len())
 }
 
 #[cfg(test)]

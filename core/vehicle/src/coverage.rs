@@ -75,7 +75,7 @@ fn parse_opening(section: Section<'_>, profile: &Profile) -> Result<Opening, Con
     let arc_m = match clock {
         (None, None) => None,
         (Some(from), Some(to)) => {
-            let (from_m, to_m) = (sigma_at_hour_m(profile, from), sigma_at_hour_m(profile, to));
+            let (from_m, to_m) = (arc_at_hour_m(profile, from), arc_at_hour_m(profile, to));
             Some((from_m, math::wrap(to_m - from_m, profile.perimeter_m())))
         }
         (Some(_), None) => return Err(section.invalid("clock_from", "needs clock_to beside it")),
@@ -86,8 +86,8 @@ fn parse_opening(section: Section<'_>, profile: &Profile) -> Result<Opening, Con
 }
 
 /// Arc length at an hour of a clock seen looking along the tunnel from the reference point: 6 is the floor, 9 the left wall.
-fn sigma_at_hour_m(profile: &Profile, hour: f64) -> f64 {
+fn arc_at_hour_m(profile: &Profile, hour: f64) -> f64 {
     let angle = (hour - 6.0) / 12.0 * TAU;
     let direction = [math::sin(angle), -math::cos(angle)];
-    profile.cast(profile.reference(), direction).map_or(0.0, |wall| wall.sigma_m)
+    profile.cast(profile.reference(), direction).map_or(0.0, |wall| wall.arc_m)
 }

@@ -38,7 +38,7 @@ fn heads(chart: &Chart<'_>, ways: &[Way], samples: &[Place], marked: usize) {
         chart.line(&piece.points, &way(piece.head));
     }
     for sample in samples.iter().step_by(marked) {
-        chart.canvas.marker(chart.px([sample.x_m, sample.sigma_m]), &way(sample.head), 3.2, true);
+        chart.canvas.marker(chart.px([sample.x_m, sample.arc_m]), &way(sample.head), 3.2, true);
     }
 }
 
@@ -62,8 +62,8 @@ fn note(canvas: &Canvas, marked: usize, more: &str) {
 }
 
 /// A length measured along the tunnel, its words on white above or below it.
-fn measured(chart: &Chart<'_>, [from_m, to_m]: [f64; 2], sigma_m: f64, look: &Look, words: (&str, f64)) {
-    let (from, to) = (chart.px([from_m, sigma_m]), chart.px([to_m, sigma_m]));
+fn measured(chart: &Chart<'_>, [from_m, to_m]: [f64; 2], arc_m: f64, look: &Look, words: (&str, f64)) {
+    let (from, to) = (chart.px([from_m, arc_m]), chart.px([to_m, arc_m]));
     chart.canvas.span(from, to, look);
     let (words, below_px) = words;
     let letters = Letters { colour: look.colour, ..BOLD };
@@ -74,9 +74,9 @@ fn measured(chart: &Chart<'_>, [from_m, to_m]: [f64; 2], sigma_m: f64, look: &Lo
 }
 
 /// Ends of a measured length that is off its line.
-fn ends(chart: &Chart<'_>, at: [f64; 2], sigma_m: f64, to_px: f64) {
+fn ends(chart: &Chart<'_>, at: [f64; 2], arc_m: f64, to_px: f64) {
     for x_m in at {
-        let [x, y]: Px = chart.px([x_m, sigma_m]);
+        let [x, y]: Px = chart.px([x_m, arc_m]);
         chart.canvas.line(&[[x, y], [x, y + to_px]], &look::AXIS);
     }
 }
@@ -136,8 +136,8 @@ pub(super) fn sectors(figure: &Sectors) -> String {
     );
     let canvas = Canvas::of_size(SIZE_PX, &title, &subtitle);
     let chart = chart(&canvas, figure.length_m, figure.profile.perimeter_m());
-    for sigma_m in [figure.line_m, figure.middle_m] {
-        chart.across(sigma_m, &look::TARGET);
+    for arc_m in [figure.line_m, figure.middle_m] {
+        chart.across(arc_m, &look::TARGET);
     }
     heads(&chart, &figure.ways, &figure.samples, MARKED[1]);
     clock::at_right(&chart, &figure.profile);

@@ -103,19 +103,19 @@ fn figure_13_has_gaps_on_the_side_walls_in_phase_shift_and_strips_without_sample
     let (figure, svg) = drawn(&[AT_GAPS[1], AT_GAPS[3]]);
     let [phase, sector] = figure.panels.as_slice() else { panic!("two panels") };
     let gap = phase.widest.unwrap();
-    let clock = figure.profile.clock(gap.sigma_m);
+    let clock = figure.profile.clock(gap.arc_m);
     assert!(["3:00", "9:00"].contains(&clock.as_str()), "{clock}");
     assert!(gap.length_m() > 1.9 * phase.t_x_m, "{gap:?} {}", phase.t_x_m);
-    assert!(phase.wide_m.len() >= 2 && phase.wide_m.iter().any(|[a, b]| (*a..*b).contains(&gap.sigma_m)));
+    assert!(phase.wide_m.len() >= 2 && phase.wide_m.iter().any(|[a, b]| (*a..*b).contains(&gap.arc_m)));
     let inside = phase.samples.iter().filter(|sample| {
-        (sample.sigma_m - gap.sigma_m).abs() < 0.3
+        (sample.arc_m - gap.arc_m).abs() < 0.3
             && sample.x_m > gap.x_m[0] + 0.05
             && sample.x_m < gap.x_m[1] - 0.05
     });
     assert_eq!(inside.count(), 0, "samples where nothing is seen");
     assert!(phase.unseen_m.is_empty() && !sector.unseen_m.is_empty(), "{:?}", sector.unseen_m);
     for [from_m, to_m] in &sector.unseen_m {
-        let seen = sector.samples.iter().filter(|s| s.sigma_m > from_m + 0.1 && s.sigma_m < to_m - 0.1);
+        let seen = sector.samples.iter().filter(|s| s.arc_m > from_m + 0.1 && s.arc_m < to_m - 0.1);
         assert_eq!(seen.count(), 0);
     }
     check(

@@ -90,10 +90,10 @@ fn samples(chart: &Chart<'_>, panel: &Panel, length_m: f64) {
         }
     }
     let dots: Vec<Px> =
-        panel.samples.iter().step_by(thinned(panel)).map(|s| chart.px([s.x_m, s.sigma_m])).collect();
+        panel.samples.iter().step_by(thinned(panel)).map(|s| chart.px([s.x_m, s.arc_m])).collect();
     chart.canvas.dots(&dots, 1.5, BLACK);
     if let Some(gap) = panel.widest {
-        let (from, to) = (chart.px([gap.x_m[0], gap.sigma_m]), chart.px([gap.x_m[1], gap.sigma_m]));
+        let (from, to) = (chart.px([gap.x_m[0], gap.arc_m]), chart.px([gap.x_m[1], gap.arc_m]));
         chart.canvas.span(from, to, &GAP);
         let words = format!("{:.2} m", gap.length_m());
         let letters = Letters { colour: GAP.colour, ..BOLD };

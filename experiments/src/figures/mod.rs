@@ -20,7 +20,7 @@ pub(crate) struct Place {
     /// Way along the tunnel from where the picture begins, m.
     pub x_m: f64,
     /// Arc length from the floor's centre, m.
-    pub sigma_m: f64,
+    pub arc_m: f64,
 }
 
 /// A piece of a head's way over the unrolled wall that doesn't cross its seam.
@@ -47,14 +47,14 @@ impl Window {
     /// The wall's samples within, in each head's order.
     fn places(&self, dive: &Dive) -> Vec<Place> {
         let within = dive.heads.iter().flatten().filter(|s| s.of_wall && self.has(s.at.x()));
-        within.map(|s| Place { head: s.head, x_m: s.at.x() - self.from_m, sigma_m: s.sigma_m }).collect()
+        within.map(|s| Place { head: s.head, x_m: s.at.x() - self.from_m, arc_m: s.arc_m }).collect()
     }
 
     /// The heads' ways within and a step beyond.
     fn ways(&self, dive: &Dive) -> Vec<Way> {
         let mut ways = Vec::new();
         for samples in &dive.heads {
-            let point = |s: &Sample| [s.at.x() - self.from_m, s.sigma_m];
+            let point = |s: &Sample| [s.at.x() - self.from_m, s.arc_m];
             let near = samples.windows(2).filter(|pair| pair.iter().any(|s| self.has(s.at.x())));
             let steps = near.filter_map(|pair| match pair {
                 [a, b] if a.of_wall && b.of_wall => Some((a.head, point(a), point(b))),

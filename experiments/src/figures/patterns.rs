@@ -119,14 +119,14 @@ pub(crate) fn phase_shift() -> Result<PhaseShift, ExperimentError> {
 
 fn above(profile: &Profile) -> f64 {
     let [y_m, z_m] = profile.reference();
-    profile.sigma_of([y_m, z_m + 1.0])
+    profile.arc_of([y_m, z_m + 1.0])
 }
 
 /// The way of a head that begins at the floor's centre and gains so much in a turn, the way round that the heads turn.
 fn faster(dive: &Dive, gain_m: f64, length_m: f64) -> Vec<Way> {
     let perimeter_m = dive.profile.perimeter_m();
     let around_m = dive.heads.first().and_then(|samples| match samples.as_slice() {
-        [a, b, ..] => Some(math::wrap_signed(b.sigma_m - a.sigma_m, perimeter_m)),
+        [a, b, ..] => Some(math::wrap_signed(b.arc_m - a.arc_m, perimeter_m)),
         _ => None,
     });
     let growing = around_m.is_some_and(|around_m| around_m > 0.0);
@@ -134,12 +134,12 @@ fn faster(dive: &Dive, gain_m: f64, length_m: f64) -> Vec<Way> {
     let point = |number: u32| {
         let turned_rad = f64::from(number * FASTER_STEP_DEG).to_radians();
         let (sine, cosine) = math::sin_cos(if growing { turned_rad } else { -turned_rad });
-        let sigma_m = match number * FASTER_STEP_DEG % 360 {
+        let arc_m = match number * FASTER_STEP_DEG % 360 {
             // The seam itself may come out on either side of it.
             0 => 0.0,
-            _ => dive.profile.sigma_of([y_m + sine, z_m - cosine]),
+            _ => dive.profile.arc_of([y_m + sine, z_m - cosine]),
         };
-        [gain_m * turned_rad / TAU, sigma_m]
+        [gain_m * turned_rad / TAU, arc_m]
     };
     let mut ways = Vec::new();
     let points = (0..).map(point).take_while(|[x_m, _]| *x_m <= length_m + 1e-9);
@@ -164,16 +164,16 @@ pub(crate) fn sectors() -> Result<Sectors, ExperimentError> {
     let [y_m, z_m] = dive.profile.reference();
     // Head 0 sweeps half a turn from the floor's centre, to the side that most of its samples are on.
     let half_m = dive.profile.perimeter_m() / 2.0;
-    let left = first.iter().filter(|sample| sample.sigma_m < half_m).count() * 2 > first.len();
+    let left = first.iter().filter(|sample| sample.arc_m < half_m).count() * 2 > first.len();
     let at_share = |share: f64| {
         let (sine, cosine) = math::sin_cos(share * math::PI);
-        dive.profile.sigma_of([y_m + if left { sine } else { -sine }, z_m - cosine])
+        dive.profile.arc_of([y_m + if left { sine } else { -sine }, z_m - cosine])
     };
     let (line_m, middle_m) = (at_share(SHARE), at_share(0.5));
     let begin = passes_of(&dive, first, at_share(0.02)).find(|x_m| *x_m > START_M + BEFORE_M);
     let window = Window { from_m: begin.unwrap_or_default(), length_m: 3.0 * 2.0 * t_x_m };
-    let passes = |sigma_m: f64| {
-        let passes = passes_of(&dive, first, sigma_m).filter(|x_m| window.has(*x_m));
+    let passes = |arc_m: f64| {
+        let passes = passes_of(&dive, first, arc_m).filter(|x_m| window.has(*x_m));
         passes.map(|x_m| x_m - window.from_m).collect::<Vec<_>>()
     };
     Ok(Sectors {

@@ -88,7 +88,7 @@ pub(crate) struct Panel {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Gap {
     /// The line's arc length, m.
-    pub sigma_m: f64,
+    pub arc_m: f64,
     /// Where it begins and ends, from where the picture begins, m.
     pub x_m: [f64; 2],
 }
@@ -160,8 +160,8 @@ fn distances(dive: &Dive, window: Window) -> Result<Vec<f64>, ExperimentError> {
     let middle = |number: u32, of: u32| (f64::from(number) + 0.5) / f64::from(of);
     let distance_m = |(i, k)| {
         let x_m = window.from_m + window.length_m * middle(i, CELLS[0]);
-        let sigma_m = dive.profile.perimeter_m() * middle(k, CELLS[1]);
-        index.distance_m(wall::place(&dive.profile, x_m, sigma_m, 0.0))
+        let arc_m = dive.profile.perimeter_m() * middle(k, CELLS[1]);
+        index.distance_m(wall::place(&dive.profile, x_m, arc_m, 0.0))
     };
     let cells = (0..CELLS[0]).flat_map(|i| (0..CELLS[1]).map(move |k| (i, k)));
     Ok(cells.map(distance_m).collect())
@@ -169,14 +169,14 @@ fn distances(dive: &Dive, window: Window) -> Result<Vec<f64>, ExperimentError> {
 
 /// A line along the wall with the passes over it within the stretch.
 struct Line {
-    sigma_m: f64,
+    arc_m: f64,
     passes_m: Vec<f64>,
 }
 
 impl Line {
     fn widest(&self) -> Option<Gap> {
         let gaps = self.passes_m.windows(2).filter_map(|pair| match pair {
-            [from, to] => Some(Gap { sigma_m: self.sigma_m, x_m: [*from, *to] }),
+            [from, to] => Some(Gap { arc_m: self.arc_m, x_m: [*from, *to] }),
             _ => None,
         });
         gaps.max_by(|a, b| a.length_m().total_cmp(&b.length_m()))
@@ -186,12 +186,12 @@ impl Line {
 fn lines(dive: &Dive, window: Window) -> Vec<Line> {
     let perimeter_m = dive.profile.perimeter_m();
     let line = |number: u32| {
-        let sigma_m = perimeter_m * (f64::from(number) + 0.5) / f64::from(LINES);
-        let all = dive.heads.iter().flat_map(|samples| passes_of(dive, samples, sigma_m));
+        let arc_m = perimeter_m * (f64::from(number) + 0.5) / f64::from(LINES);
+        let all = dive.heads.iter().flat_map(|samples| passes_of(dive, samples, arc_m));
         let mut passes_m: Vec<f64> =
             all.filter(|x_m| window.has(*x_m)).map(|x_m| x_m - window.from_m).collect();
         passes_m.sort_by(f64::total_cmp);
-        Line { sigma_m, passes_m }
+        Line { arc_m, passes_m }
     };
     (0..LINES).map(line).collect()
 }
@@ -216,7 +216,7 @@ fn strips(lines: &[Line], perimeter_m: f64, kind: impl Fn(&Line) -> bool) -> Vec
     let apart_m = perimeter_m / f64::from(LINES);
     let mut strips: Vec<[f64; 2]> = Vec::new();
     for line in lines.iter().filter(|line| kind(line)) {
-        let [from_m, to_m] = [line.sigma_m - apart_m / 2.0, line.sigma_m + apart_m / 2.0];
+        let [from_m, to_m] = [line.arc_m - apart_m / 2.0, line.arc_m + apart_m / 2.0];
         match strips.last_mut() {
             Some(strip) if (strip[1] - from_m).abs() < apart_m / 4.0 => strip[1] = to_m,
             _ => strips.push([from_m, to_m]),

@@ -17,7 +17,7 @@ pub(crate) struct Deviation {
     /// Chainage, m.
     pub x_m: f64,
     /// Arc length of the design's place seen from the reference point through the sample, m.
-    pub sigma_m: f64,
+    pub arc_m: f64,
     /// How much farther than the design it is from the reference point, m.
     pub deviation_m: f64,
 }
@@ -30,8 +30,8 @@ impl Deviation {
         let length_m = math::hypot(direction[0], direction[1]);
         let hit = profile.cast_from_inside(centre, direction);
         // The range is in lengths of the direction.
-        let (sigma_m, wall_m) = hit.map_or((0.0, 0.0), |hit| (hit.sigma_m, hit.range_m * length_m));
-        Self { x_m: place[0], sigma_m, deviation_m: length_m - wall_m }
+        let (arc_m, wall_m) = hit.map_or((0.0, 0.0), |hit| (hit.arc_m, hit.range_m * length_m));
+        Self { x_m: place[0], arc_m, deviation_m: length_m - wall_m }
     }
 }
 
@@ -83,8 +83,8 @@ impl Chart {
     }
 
     /// The wall's deviation at (x, sigma), m; `None` outside the samples' hull.
-    pub(crate) fn deviation_m(&self, x_m: f64, sigma_m: f64) -> Option<f64> {
-        let at = Point2::new(plain(x_m), plain(math::wrap(sigma_m, self.perimeter_m)));
+    pub(crate) fn deviation_m(&self, x_m: f64, arc_m: f64) -> Option<f64> {
+        let at = Point2::new(plain(x_m), plain(math::wrap(arc_m, self.perimeter_m)));
         self.triangles.barycentric().interpolate(|vertex| vertex.data().deviation_m, at)
     }
 
@@ -104,7 +104,7 @@ impl Chart {
 /// The sample, and its image on the other side of the seam: half a turn of wall beyond each, which no gap outreaches
 /// that a triangle could bridge.
 fn images(perimeter_m: f64, sample: &Deviation) -> [Vertex; 2] {
-    let sigma = math::wrap(sample.sigma_m, perimeter_m);
+    let sigma = math::wrap(sample.arc_m, perimeter_m);
     let other = if sigma < perimeter_m / 2.0 { sigma + perimeter_m } else { sigma - perimeter_m };
     [sigma, other].map(|sigma| Vertex {
         at: Point2::new(plain(sample.x_m), plain(sigma)),
@@ -125,7 +125,7 @@ mod tests {
     fn lattice(perimeter_m: f64, value: impl Fn(f64, f64) -> f64) -> Vec<Deviation> {
         let at = |i: i32, k: i32| {
             let (x, s) = (f64::from(i) * 0.5, f64::from(k) / 40.0 * perimeter_m);
-            Deviation { x_m: x, sigma_m: s, deviation_m: value(x, s) }
+            Deviation { x_m: x, arc_m: s, deviation_m: value(x, s) }
         };
         (0..=20).flat_map(|i| (0..40).map(move |k| (i, k))).map(|(i, k)| at(i, k)).collect()
     }
@@ -165,7 +165,7 @@ mod tests {
             let (sigma, off) = (f64::from(k) * 0.113, math::sin(f64::from(k)) * 0.4);
             let there = Deviation::of(&profile, wall::place(&profile, 3.0, sigma, off));
             assert!((there.deviation_m - off).abs() < 1e-9, "{there:?}");
-            assert!(math::wrap_signed(there.sigma_m - sigma, profile.perimeter_m()).abs() < 1e-9);
+            assert!(math::wrap_signed(there.arc_m - sigma, profile.perimeter_m()).abs() < 1e-9);
         }
     }
 
@@ -174,7 +174,7 @@ mod tests {
         let chart = Chart::new(20.0, &lattice(20.0, |_, _| 1.0)).unwrap();
         assert_eq!(chart.deviation_m(-0.1, 3.0), None);
         assert_eq!(Chart::new(20.0, &[]).unwrap().deviation_m(1.0, 1.0), None);
-        let twin = Deviation { x_m: 1e-200, sigma_m: -1e-200, deviation_m: 2.0 };
+        let twin = Deviation { x_m: 1e-200, arc_m: -1e-200, deviation_m: 2.0 };
         let one = Chart::new(20.0, &[twin; 5]).unwrap();
         assert_eq!(one.deviation_m(5.0, 5.0), None);
         let bad = Deviation { x_m: f64::NAN, ..twin };

@@ -33,8 +33,8 @@ impl Stretch {
 
 /// The place at a chainage and arc length of a wall that stands off its design by `deviation_m` along the ray from the
 /// reference point, outwards positive.
-pub(crate) fn place(profile: &Profile, x_m: f64, sigma_m: f64, deviation_m: f64) -> Xyz {
-    let (centre, wall) = (profile.reference(), profile.point_at(sigma_m));
+pub(crate) fn place(profile: &Profile, x_m: f64, arc_m: f64, deviation_m: f64) -> Xyz {
+    let (centre, wall) = (profile.reference(), profile.point_at(arc_m));
     let out = [wall[0] - centre[0], wall[1] - centre[1]];
     let scale = 1.0 + deviation_m / math::hypot(out[0], out[1]);
     [x_m, centre[0] + scale * out[0], centre[1] + scale * out[1]]

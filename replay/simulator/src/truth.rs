@@ -89,7 +89,7 @@ pub(crate) fn collect(world: &mut World, entities: &[Entity], rows: &mut Vec<Tru
             let echosounder = world.get::<Echosounder>(*entity).is_some();
             let sense = if echosounder { Sense::Echosounder } else { Sense::Head };
             for (row, (sounding, ray)) in base.rows(samples, sense).zip(samples.list.iter().zip(&rays.0)) {
-                let wall = ray.hit.map(|hit| (hit, scenery.environment.sigma_m(hit.point)));
+                let wall = ray.hit.map(|hit| (hit, scenery.environment.arc_m(hit.point)));
                 let (measured, origin, direction) = (*sounding, ray.origin, ray.direction);
                 let sounding = Some(SoundingTruth { measured, origin, direction, wall });
                 rows.push(TruthRow { sounding, ..row });

@@ -33,13 +33,13 @@ struct Detail<'c> {
 /// Draws it.
 pub(super) fn draw(canvas: &Canvas, laid: &Laid, centre: [f64; 2], from_m: f64, t_m: f64) {
     let half_m = HALF * t_m;
-    let [x_m, sigma_m] = [centre[0] - from_m, centre[1]];
+    let [x_m, arc_m] = [centre[0] - from_m, centre[1]];
     let x = Axis::new("m", x_m - half_m, x_m + half_m, 5).with_name_at(30.0);
-    let y = Axis::new("", sigma_m - half_m, sigma_m + half_m, 6);
+    let y = Axis::new("", arc_m - half_m, arc_m + half_m, 6);
     let chart = Chart::new(canvas, FRAME, &x, &y);
     let radius_px = (FRAME.right - FRAME.left) / (4.0 * HALF);
     let outline = Look { width_px: 1.8, ..look::T };
-    chart.ellipse(chart.px([x_m, sigma_m]), [radius_px; 2], CIRCLE, &outline);
+    chart.ellipse(chart.px([x_m, arc_m]), [radius_px; 2], CIRCLE, &outline);
     let detail = Detail { chart, laid, centre, from_m, half_m };
     let samples = detail.samples();
     // Too many to tell apart: the lines of what is sampled say it all.
@@ -67,7 +67,7 @@ impl Detail<'_> {
             let thin = Look { width_px: 0.8, dash: &[], ..look::of_several(pass.head) };
             let look = if pass.hidden { look::HIDDEN } else { thin };
             for turns in [-1.0, 0.0, 1.0] {
-                let place = |[x, sigma]: &[f64; 2]| [x - self.from_m, sigma + turns * self.laid.perimeter_m];
+                let place = |[x, arc]: &[f64; 2]| [x - self.from_m, arc + turns * self.laid.perimeter_m];
                 self.chart.line(&pass.points.iter().map(place).collect::<Vec<_>>(), &look);
             }
         }

@@ -85,7 +85,7 @@ impl Laid {
             }
             // A step to or from a hidden sample is one over wall that isn't sampled.
             let hidden = here.hidden || before.hidden;
-            let (from, to) = ([before.x_m, before.sigma_m], [here.x_m, here.sigma_m]);
+            let (from, to) = ([before.x_m, before.arc_m], [here.x_m, here.arc_m]);
             for [begin, end] in polyline::over_seam(self.perimeter_m, from, to) {
                 match passes.last_mut() {
                     Some(pass)
@@ -105,7 +105,7 @@ impl Laid {
     /// Samples not hidden near a place, their arc length on this side of the seam; within `half_m` either way.
     pub(super) fn near(&self, centre: [f64; 2], half_m: [f64; 2]) -> Vec<(&PatternSample, [f64; 2])> {
         let place = |sample: &PatternSample| {
-            let across_m = math::wrap_signed(sample.sigma_m - centre[1], self.perimeter_m);
+            let across_m = math::wrap_signed(sample.arc_m - centre[1], self.perimeter_m);
             [sample.x_m, centre[1] + across_m]
         };
         let placed = self.samples.iter().map(|sample| (sample, place(sample)));
@@ -116,14 +116,14 @@ impl Laid {
 
     /// The middle of the largest circle without samples about an arc length, within a turn's way: where spacing is at
     /// its worst; and its diameter, m. `None` where T is none.
-    pub(super) fn emptiest(&self, sigma_m: f64) -> Option<([f64; 2], f64)> {
+    pub(super) fn emptiest(&self, arc_m: f64) -> Option<([f64; 2], f64)> {
         /// Places tried along and around.
         const TRIED: [u32; 2] = [120, 40];
         let t_m = self.t_m?;
         // Away from the ends, where samples are missing that would come.
         let room_m = (self.to_m - self.from_m - self.pitch_m).max(0.0) / 2.0;
         let begin_m = self.from_m + room_m;
-        let middle = [begin_m + self.pitch_m / 2.0, sigma_m];
+        let middle = [begin_m + self.pitch_m / 2.0, arc_m];
         let half = [self.pitch_m / 2.0 + t_m, 1.5 * t_m];
         let near: Vec<[f64; 2]> = self
             .near(middle, half)
@@ -142,7 +142,7 @@ impl Laid {
         for (i, j) in (0..TRIED[0]).flat_map(|i| (0..TRIED[1]).map(move |j| (i, j))) {
             let share = |k: u32, of: u32| f64::from(k) / f64::from(of);
             let place =
-                [begin_m + self.pitch_m * share(i, TRIED[0]), sigma_m + t_m * (share(j, TRIED[1]) - 0.5)];
+                [begin_m + self.pitch_m * share(i, TRIED[0]), arc_m + t_m * (share(j, TRIED[1]) - 0.5)];
             let m2 = nearest_m2(place);
             if m2 > best.0 {
                 best = (m2, place);

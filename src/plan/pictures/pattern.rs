@@ -25,8 +25,8 @@ pub(crate) fn pattern(shown: &Shown<'_>) -> Result<String, SamplingError> {
     let laid = laid::lay(shown)?;
     let places = shown.planner.perimeter(shown.mode, shown.speed_mps, PLACES)?;
     let worst = wall::worst(shown.planner, &places);
-    let worst_m = wall::unseen_m(shown.planner).or(worst.map(|place| place.sigma_m));
-    let centre = worst_m.and_then(|sigma_m| laid.emptiest(sigma_m)).map(|(centre, _)| centre);
+    let worst_m = wall::unseen_m(shown.planner).or(worst.map(|place| place.arc_m));
+    let centre = worst_m.and_then(|arc_m| laid.emptiest(arc_m)).map(|(centre, _)| centre);
     let length_m = (laid::turns_shown(laid.heads) * laid.pitch_m).min(laid.to_m - laid.from_m);
     let from_m = centre.map_or(laid.from_m, |[x_m, _]| x_m - length_m / 2.0);
     let from_m = from_m.max(laid.from_m).min(laid.to_m - length_m);
@@ -69,7 +69,7 @@ fn passes(chart: &Chart<'_>, laid: &Laid, from_m: f64) -> Ways {
     let mut ways = Vec::new();
     for pass in laid.passes() {
         let look = if pass.hidden { look::HIDDEN } else { way(pass.head) };
-        let points: Vec<_> = pass.points.iter().map(|[x, sigma]| [x - from_m, *sigma]).collect();
+        let points: Vec<_> = pass.points.iter().map(|[x, arc]| [x - from_m, *arc]).collect();
         let pieces = chart.line(&points, &look);
         ways.extend(pieces.into_iter().filter(|_| !pass.hidden).map(|piece| (pass.head, piece)));
     }

@@ -135,7 +135,7 @@ fn chart<'c>(canvas: &'c Canvas, shown: &Shown<'_>, around: &Around) -> Chart<'c
 }
 
 fn shade(chart: &Chart<'_>, stretch: &Thin) {
-    let [left, right] = [stretch.from_m, stretch.to_m].map(|sigma_m| chart.px([sigma_m, 0.0])[0]);
+    let [left, right] = [stretch.from_m, stretch.to_m].map(|arc_m| chart.px([arc_m, 0.0])[0]);
     let Frame { top, bottom, .. } = chart.frame;
     if stretch.heads > 0 {
         chart.canvas.area([left, top], [right, bottom], FEWER);
@@ -154,7 +154,7 @@ fn clocks(chart: &Chart<'_>, hours: &[Hour]) {
     // Floor, walls and crown first; what is between them where there is room.
     let (named, between): (Vec<&Hour>, Vec<&Hour>) = hours.iter().partition(|hour| !hour.place.is_empty());
     for hour in named.into_iter().chain(between) {
-        let x = chart.px([hour.sigma_m, 0.0])[0];
+        let x = chart.px([hour.arc_m, 0.0])[0];
         let half = width_px(&hour.words(), NORMAL) / 2.0;
         if taken.iter().any(|[from, to]| x + half > *from && x - half < *to) {
             continue;
@@ -190,8 +190,8 @@ fn curves(chart: &Chart<'_>, shown: &Shown<'_>, places: &[WallPlace], largest: &
         places.iter().filter_map(|place| place.t_x_m).any(|[smaller, larger]| larger - smaller > 1e-9);
     if alternate {
         for band in runs(places, |place| place.t_x_m) {
-            let upper = band.iter().map(|(sigma_m, [_, larger])| chart.px([*sigma_m, *larger]));
-            let lower = band.iter().rev().map(|(sigma_m, [smaller, _])| chart.px([*sigma_m, *smaller]));
+            let upper = band.iter().map(|(arc_m, [_, larger])| chart.px([*arc_m, *larger]));
+            let lower = band.iter().rev().map(|(arc_m, [smaller, _])| chart.px([*arc_m, *smaller]));
             chart.canvas.polygon(&upper.chain(lower).collect::<Vec<_>>(), BAND);
         }
         line(chart, places, |place| t_x(place, 0), &Look { width_px: 1.2, ..look::T_X });
@@ -200,7 +200,7 @@ fn curves(chart: &Chart<'_>, shown: &Shown<'_>, places: &[WallPlace], largest: &
     line(chart, places, |place| (place.t_y_m > 0.0).then_some(place.t_y_m), &look::T_Y);
     line(chart, places, |place| place.t_m, &look::T);
     let t_m = largest.t_m.unwrap_or(0.0);
-    chart.canvas.marker(chart.px([largest.sigma_m, t_m]), &look::T, 4.5, true);
+    chart.canvas.marker(chart.px([largest.arc_m, t_m]), &look::T, 4.5, true);
     name_curves(chart, shown, places, largest, alternate);
 }
 
@@ -219,7 +219,7 @@ fn name_curves(
         look,
         bold,
     };
-    let clock = shown.planner.inspection().profile.clock(largest.sigma_m);
+    let clock = shown.planner.inspection().profile.clock(largest.arc_m);
     let most = format!("up to {} m, {clock}", short(largest.t_m.unwrap_or(0.0)));
     let mut labels = Vec::new();
     if let Some(last) = last {
@@ -244,7 +244,7 @@ fn name_curves(
 
 fn line(chart: &Chart<'_>, places: &[WallPlace], of: impl Fn(&WallPlace) -> Option<f64>, look: &Look) {
     for run in runs(places, of) {
-        let points: Vec<_> = run.into_iter().map(|(sigma_m, value_m)| [sigma_m, value_m]).collect();
+        let points: Vec<_> = run.into_iter().map(|(arc_m, value_m)| [arc_m, value_m]).collect();
         chart.line(&points, look);
     }
 }
@@ -254,7 +254,7 @@ fn runs<V>(places: &[WallPlace], of: impl Fn(&WallPlace) -> Option<V>) -> Vec<Ve
     let mut runs = vec![Vec::new()];
     for place in places {
         match (of(place), runs.last_mut()) {
-            (Some(value), Some(run)) => run.push((place.sigma_m, value)),
+            (Some(value), Some(run)) => run.push((place.arc_m, value)),
             (None, Some(run)) if !run.is_empty() => runs.push(Vec::new()),
             _ => {}
         }

@@ -138,9 +138,9 @@ fn verif_no_circle_of_diameter_t_is_empty() {
         let laid = laid::lay(&shown).unwrap();
         let t_m = laid.t_m.unwrap();
         let places = planner.perimeter(FAST, speed_mps, 180).unwrap();
-        let empty_m = |sigma_m: f64| laid.emptiest(sigma_m).unwrap().1;
-        let around_m = places.iter().step_by(9).map(|place| empty_m(place.sigma_m)).fold(0.0, f64::max);
-        let worst_m = wall::unseen_m(&planner).or(wall::worst(&planner, &places).map(|place| place.sigma_m));
+        let empty_m = |arc_m: f64| laid.emptiest(arc_m).unwrap().1;
+        let around_m = places.iter().step_by(9).map(|place| empty_m(place.arc_m)).fold(0.0, f64::max);
+        let worst_m = wall::unseen_m(&planner).or(wall::worst(&planner, &places).map(|place| place.arc_m));
         let shown_m = empty_m(worst_m.unwrap());
         assert!(around_m.max(shown_m) <= 1.001 * t_m, "{arguments}: {around_m} {shown_m} of {t_m}");
         // Steep helices leave less than the diagonal of T_x and T_y.

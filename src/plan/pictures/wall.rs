@@ -10,10 +10,10 @@ pub(super) fn worst(planner: &Planner, places: &[WallPlace]) -> Option<WallPlace
     const EQUAL: f64 = 0.995;
     let profile = &planner.inspection().profile;
     let [y_m, z_m] = profile.reference();
-    let left_m = profile.sigma_of([y_m + 1.0, z_m]);
+    let left_m = profile.arc_of([y_m + 1.0, z_m]);
     let most_m = places.iter().filter_map(|place| place.t_m).fold(0.0, f64::max);
     let worst = places.iter().filter(|place| place.t_m.is_some_and(|t_m| t_m >= EQUAL * most_m));
-    let off_m = |place: &WallPlace| (place.sigma_m - left_m).abs();
+    let off_m = |place: &WallPlace| (place.arc_m - left_m).abs();
     worst.min_by(|a, b| off_m(a).total_cmp(&off_m(b))).copied()
 }
 

@@ -24,7 +24,7 @@ struct Judged {
 static JUDGED: LazyLock<Vec<Judged>> = LazyLock::new(|| {
     let judge = |(seeded, dive): &'static (Seeded, Dive)| {
         let journey = Journey::of(dive);
-        let [at_target, by_two_sigma] = [0.0, 2.0].map(|sigmas| journey.flags(dive, sigmas));
+        let [at_target, by_two_sigma] = [0.0, 2.0].map(|sd| journey.flags(dive, sd));
         Judged { seeded, dive, journey, at_target, by_two_sigma }
     };
     DIVES.iter().map(judge).collect()

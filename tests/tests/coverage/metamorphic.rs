@@ -60,15 +60,14 @@ impl Beside<'_> {
         };
         let cause = |section: &SectionReport| section.cause.map(|evidence| evidence.cause);
         // Of several holes of one size either dive may name another: it must be one here as well.
-        let is_hole_here =
-            b.hole_x_m.zip(b.hole_sigma_at_m).zip(a.hole_m).is_none_or(|((x, sigma), hole_m)| {
-                near(2.0 * wall.clear_m([x - self.along_m, (self.around)(sigma)]), hole_m)
-            });
+        let is_hole_here = b.hole_x_m.zip(b.hole_arc_m).zip(a.hole_m).is_none_or(|((x, sigma), hole_m)| {
+            near(2.0 * wall.clear_m([x - self.along_m, (self.around)(sigma)]), hole_m)
+        });
         [
             ("chainage", near(a.start_m + self.along_m, b.start_m)),
             ("hole", both(a.hole_m, b.hole_m) && a.hole_bounded == b.hole_bounded),
             ("place of the hole", is_hole_here),
-            ("standard deviation", near(a.hole_sigma_m, b.hole_sigma_m)),
+            ("standard deviation", near(a.hole_sd_m, b.hole_sd_m)),
             ("T_x", spreads(&a.t_x, &b.t_x)),
             ("T_y", spreads(&a.t_y, &b.t_y)),
             ("T", spreads(&a.t, &b.t)),
@@ -141,7 +140,7 @@ fn a_mirrored_tunnel_has_mirrored_answers() {
         let here = instrumented::dive_believing([&vehicle; 2], [&polygon; 2], &scene);
         let there = instrumented::dive_believing([&vehicle, &opposite], [&polygon, &mirrored], &scene);
         let perimeter_m = here.profile.perimeter_m();
-        let around = |sigma_m: f64| math::wrap(-sigma_m, perimeter_m);
+        let around = |arc_m: f64| math::wrap(-arc_m, perimeter_m);
         assert!(here.samples().count() > 1000);
         for (a, b) in here.samples().zip(there.samples()) {
             assert!((a.point[1] + b.point[1]).abs() < TOLERANCE_M, "{a:?} isn't mirrored: {b:?}");
@@ -157,7 +156,7 @@ fn chainage_may_begin_elsewhere() {
     let here = dive(3.1);
     for along_m in [16.0, 1000.0] {
         let there = dive(3.1 + along_m);
-        Beside { here: &here, there: &there, along_m, around: &|sigma_m| sigma_m }.agree();
+        Beside { here: &here, there: &there, along_m, around: &|arc_m| arc_m }.agree();
     }
 }
 
@@ -171,7 +170,7 @@ fn arc_length_may_begin_elsewhere() {
         let whole = [Piece::Arc { centre: [y, z], sweep_rad: TAU }];
         let there = Profile::new(here.profile.point_at(begins_m), &whole, [y, z]).unwrap();
         let there = instrumented::dive_with_profile(&vehicle, &scene, there);
-        let around = |sigma_m: f64| math::wrap(sigma_m + begins_m, perimeter_m);
+        let around = |arc_m: f64| math::wrap(arc_m + begins_m, perimeter_m);
         let moved = here.samples().zip(there.samples()).all(|(a, b)| (a.place[1] - b.place[1]).abs() > 0.1);
         assert!(moved, "the loop was told of another beginning");
         Beside { here: &here, there: &there, along_m: 0.0, around: &around }.agree();

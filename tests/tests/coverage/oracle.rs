@@ -52,7 +52,7 @@ fn dives_of_every_kind_have_sections_of_every_verdict() {
 fn a_sample_lies_where_the_ray_from_the_reference_point_meets_the_design() {
     for (seeded, dive) in DIVES.iter() {
         for Sample { place, point } in dive.samples() {
-            let off_m = dive.profile.sigma_of([point[1], point[2]]) - place[1];
+            let off_m = dive.profile.arc_of([point[1], point[2]]) - place[1];
             let off_m = math::wrap_signed(off_m, dive.profile.perimeter_m());
             assert!(off_m.abs() < TOLERANCE_M, "seed {}: {point:?} at {place:?}", seeded.seed);
             assert!(point[0].to_bits() == place[0].to_bits(), "seed {}: chainage", seeded.seed);
@@ -79,12 +79,12 @@ fn val_holes_are_the_largest_empty_circles() {
 #[test]
 fn a_hole_is_where_it_is_said_to_be() {
     every_section(|_, wall, section| {
-        let centre = section.hole_x_m.zip(section.hole_sigma_at_m).filter(|_| section.hole_bounded);
-        let (x_m, sigma_m) = centre?;
-        let clear_m = 2.0 * wall.clear_m([x_m, sigma_m]);
+        let centre = section.hole_x_m.zip(section.hole_arc_m).filter(|_| section.hole_bounded);
+        let (x_m, arc_m) = centre?;
+        let clear_m = 2.0 * wall.clear_m([x_m, arc_m]);
         let within = (section.start_m - TOLERANCE_M..=section.end_m + TOLERANCE_M).contains(&x_m);
         let right = within && (clear_m - section.hole_m?).abs() <= TOLERANCE_M;
-        (!right).then(|| format!("{clear_m} m about {x_m}, {sigma_m}, not {:?}", section.hole_m))
+        (!right).then(|| format!("{clear_m} m about {x_m}, {arc_m}, not {:?}", section.hole_m))
     });
 }
 
@@ -93,14 +93,14 @@ fn val_verdicts_follow_from_hole_sigma_and_target() {
     every_section(|dive, wall, section| {
         let largest = wall.largest(section.start_m, section.end_m)?;
         let (hole_m, target_m, twice_m) =
-            (2.0 * largest.radius_m, dive.report.target_m, 2.0 * section.hole_sigma_m);
+            (2.0 * largest.radius_m, dive.report.target_m, 2.0 * section.hole_sd_m);
         // What going on forward could still fill is open.
         let rear_m = reached(dive).last()?.rear_m;
         let radius_m = f64::midpoint(target_m, twice_m);
         let first_m = first_failing_m(wall, [section.start_m, section.end_m], radius_m);
         // Where the first such circle is, is known to a twentieth of the section; the program goes by the largest deviation
         // round the wall, and by the farthest wall for the reach of a tilted head.
-        let near_m = (section.end_m - section.start_m) / 20.0 + 2.0 * section.hole_sigma_m + 0.03;
+        let near_m = (section.end_m - section.start_m) / 20.0 + 2.0 * section.hole_sd_m + 0.03;
         let clear_m = first_m.map_or(f64::NEG_INFINITY, |first_m| rear_m - first_m - radius_m);
         let behind_m = rear_m - largest.centre[0] - largest.radius_m;
         let expected = match section.verdict {

@@ -45,7 +45,7 @@ fn another_mount_by_a_hair_is_found_with_tick_sensor_field_and_bits() {
     let bits = |key: &str| u64::from_str_radix(first[key].as_str().unwrap(), 16).unwrap();
     let (live, replayed) = (bits("live_bits"), bits("replayed_bits"));
     assert!(live != replayed && (f64::from_bits(live) - f64::from_bits(replayed)).abs() < 1e-9, "{first}");
-    assert!(["x_m", "y_m", "z_m", "sigma_m"].contains(&first["field"].as_str().unwrap()), "{first}");
+    assert!(["x_m", "y_m", "z_m", "arc_m"].contains(&first["field"].as_str().unwrap()), "{first}");
     assert!(first["tick"].as_u64().unwrap() > 0);
 }
 

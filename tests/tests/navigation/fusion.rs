@@ -44,7 +44,7 @@ fn hole_errors(ours: &Track, truth: &Track) -> Vec<(f64, f64)> {
     let pairs = ours.report.sections.iter().filter_map(|ours| {
         let same = |other: &f64| (other - ours.start_m).abs() < 1e-6;
         let true_one = truth.report.sections.iter().find(|other| same(&other.start_m))?;
-        Some((ours.hole_m? - true_one.hole_m?, ours.hole_sigma_m))
+        Some((ours.hole_m? - true_one.hole_m?, ours.hole_sd_m))
     });
     pairs.collect()
 }
@@ -97,7 +97,7 @@ fn accuracy(all: &[Dives]) {
         ("up, m", |f| f.up_m),
         ("along, m", |f| f.along_m),
         ("displacement over a turn, m", |f| f.turn_m),
-        ("its sigma as told, m", |f| f.turn_sigma_m),
+        ("its sigma as told, m", |f| f.turn_arc_m),
         ("yaw, deg", |f| f.yaw_deg),
         ("roll and pitch, deg", |f| f.tilt_deg),
         ("share of pings with a fix", |f| f.fixed),
@@ -185,9 +185,9 @@ fn add_to_bins(bins: &mut [(f64, u64)], track: &Track, source: usize) {
 /// D is within two of its standard deviations of what the same returns give at their true places, 90 to 99 % of the time.
 fn holes_within_their_bounds(holes: &[(f64, f64)]) {
     let within = share(holes.iter().map(|(error, sigma)| error.abs() <= 2.0 * sigma));
-    let [error_m, sigma_m] = [rms(holes.iter().map(|h| h.0)), rms(holes.iter().map(|h| h.1))];
+    let [error_m, arc_m] = [rms(holes.iter().map(|h| h.0)), rms(holes.iter().map(|h| h.1))];
     println!(
-        "D of {} sections: error {error_m:.4} m, sigma {sigma_m:.4} m, within two: {within:.3}",
+        "D of {} sections: error {error_m:.4} m, sigma {arc_m:.4} m, within two: {within:.3}",
         holes.len()
     );
     assert!((0.9..=0.99).contains(&within), "{within}");

@@ -71,7 +71,7 @@ fn dives(seed: u64) -> Dives {
         let pairs = track.report.sections.iter().filter_map(|ours| {
             let same = |other: &f64| (other - ours.start_m).abs() < 1e-6;
             let true_one = truth.report.sections.iter().find(|other| same(&other.start_m))?;
-            Some((ours.hole_m? - true_one.hole_m?, ours.hole_sigma_m))
+            Some((ours.hole_m? - true_one.hole_m?, ours.hole_sd_m))
         });
         pairs.collect()
     });
@@ -97,7 +97,7 @@ fn smoothed_dives_are_nearer_to_the_truth_and_know_how_near() {
         ("up, m", |f| f.up_m, 0.5),
         ("along, m", |f| f.along_m, SLACK),
         ("displacement over a turn, m", |f| f.turn_m, SLACK),
-        ("its sigma as told, m", |f| f.turn_sigma_m, 1.0),
+        ("its sigma as told, m", |f| f.turn_arc_m, 1.0),
         ("yaw, deg", |f| f.yaw_deg, 0.6),
         ("roll and pitch, deg", |f| f.tilt_deg, 0.6),
         ("share of pings with a fix", |f| f.fixed, 1.001),
@@ -121,9 +121,9 @@ fn smoothed_dives_are_nearer_to_the_truth_and_know_how_near() {
         let holes: Vec<(f64, f64)> =
             all.iter().flat_map(|dives| dives.holes[number].iter().copied()).collect();
         let within = share(holes.iter().map(|(error, sigma)| error.abs() <= 2.0 * sigma));
-        let [error_m, sigma_m] = [rms(holes.iter().map(|h| h.0)), rms(holes.iter().map(|h| h.1))];
+        let [error_m, arc_m] = [rms(holes.iter().map(|h| h.0)), rms(holes.iter().map(|h| h.1))];
         println!(
-            "D of {} sections, {name}: error {error_m:.4} m, sigma {sigma_m:.4} m, within two: {within:.3}",
+            "D of {} sections, {name}: error {error_m:.4} m, sigma {arc_m:.4} m, within two: {within:.3}",
             holes.len()
         );
         assert!((0.9..=0.99).contains(&within), "{name}: {within}");
@@ -177,7 +177,7 @@ fn displacements_are_far_nearer_where_the_cable_is_taut() {
     let track = smoothed(&scene, &Silence::default());
     let [was, is] = [&track.filter, &track.dive].map(figures);
     println!("taut cable, over a turn: filter {:.4} m, smoothed {:.4} m", was.turn_m, is.turn_m);
-    assert!(is.turn_m < 0.5 * was.turn_m && is.turn_m < 2.0 * is.turn_sigma_m, "{is:?} {was:?}");
+    assert!(is.turn_m < 0.5 * was.turn_m && is.turn_m < 2.0 * is.turn_arc_m, "{is:?} {was:?}");
 }
 
 #[test]
@@ -251,7 +251,7 @@ fn replay_says_what_smoothing_changed() {
     for change in changed {
         for (side, report) in [("before", &plain), ("after", &report)] {
             let section = find(report, &change["start_m"]);
-            for key in ["verdict", "hole_m", "hole_sigma_m"] {
+            for key in ["verdict", "hole_m", "hole_sd_m"] {
                 assert_eq!(
                     change[side][key],
                     section.as_ref().map_or(serde_json::Value::Null, |s| s[key].clone())

@@ -190,7 +190,7 @@ fn val_where_beams_meet_the_wall() {
             "cast_x" => row.near(hit.beam.x(), tolerance),
             "cast_y" => row.near(row.i(2) + hit.beam.y(), tolerance),
             "cast_z" => row.near(row.i(3) + hit.beam.z(), tolerance),
-            _ => row.around(hit.sigma_m, profile.perimeter_m(), 4.0 * tolerance),
+            _ => row.around(hit.arc_m, profile.perimeter_m(), 4.0 * tolerance),
         }
     }
 }

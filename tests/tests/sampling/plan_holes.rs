@@ -100,7 +100,7 @@ fn samples(planner: &Planner, mode: usize, speed_mps: f64, length_m: f64, way: W
             let hit =
                 Standing::new(&inspection.profile, &pose, &spec.mount).unwrap().sounding(angle).unwrap();
             if hit.range_m() <= spec.range_m[1] {
-                samples.push([head.x() + hit.beam.x(), hit.sigma_m]);
+                samples.push([head.x() + hit.beam.x(), hit.arc_m]);
             }
         }
     }

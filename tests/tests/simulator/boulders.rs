@@ -46,10 +46,10 @@ fn hits(holes: &[(f64, f64)], seed: u64, times: std::ops::Range<f64>) -> Vec<usi
         let (start_m, hole_m) = holes[at];
         assert!(chainage_m < start_m + 0.25 && hole_m < 1.0, "{chainage_m}: {hole_m} m");
         let size_m = hole_m * (times.start + (times.end - times.start) * numbers.next());
-        let sigma_m = perimeter_m * numbers.next();
+        let arc_m = perimeter_m * numbers.next();
         writeln!(
             features,
-            "[[tunnel.features]]\nkind = \"boulder\"\nchainage_m = {chainage_m}\nsigma_m = {sigma_m}\nsize_m = {size_m}\nsunk = 0.5"
+            "[[tunnel.features]]\nkind = \"boulder\"\nchainage_m = {chainage_m}\nsigma_m = {arc_m}\nsize_m = {size_m}\nsunk = 0.5"
         )
         .unwrap();
     }

@@ -20,7 +20,7 @@ fn sound() -> Passage {
 
 fn cause_of(passage: &Passage, diameter_m: f64) -> Cause {
     let hole =
-        Hole { diameter_m, least_m: diameter_m, most_m: diameter_m, x_m: 10.1, sigma_m: 3.0, bounded: true };
+        Hole { diameter_m, least_m: diameter_m, most_m: diameter_m, x_m: 10.1, arc_m: 3.0, bounded: true };
     let swept_by_all = Some(Reach { from_m: 0.0, to_m: 20.0 });
     let case = Case { hole: &hole, swept_by_all, target_m: 0.5, perimeter_m: 18.0 };
     explain(&case, &core::iter::once(((10.0, 10.25), passage))).cause

@@ -34,7 +34,7 @@ impl HoleFinder {
             if clear_m + tile.half_x_m < radius_m {
                 continue;
             }
-            let nearest = window.nearest(tile.x_m, tile.sigma_m, radius_m + half_m);
+            let nearest = window.nearest(tile.x_m, tile.arc_m, radius_m + half_m);
             let nearest_m = nearest.map_or(f64::INFINITY, |found| math::sqrt(found.distance2));
             if nearest_m.min(clear_m) > radius_m {
                 return true;
@@ -66,13 +66,13 @@ mod tests {
             let layout =
                 StoreLayout { perimeter_m: PERIMETER_M, from_m: -2.0, to_m: 6.0, cell_m: 0.3, capacity: 1000 };
             let mut store = SampleStore::new(layout);
-            for (x_m, sigma_m) in &samples {
-                store.insert(WallSample { x_m: *x_m, sigma_m: *sigma_m, head: 0, step_m: None }).unwrap();
+            for (x_m, arc_m) in &samples {
+                store.insert(WallSample { x_m: *x_m, arc_m: *arc_m, head: 0, step_m: None }).unwrap();
             }
             let reach = Some(Reach { from_m: reach_m, to_m: 5.0 });
-            let clear = |x_m: f64, sigma_m: f64| {
+            let clear = |x_m: f64, arc_m: f64| {
                 let nearest = samples.iter().map(|(x, s)| {
-                    let around = (s - sigma_m).abs() % PERIMETER_M;
+                    let around = (s - arc_m).abs() % PERIMETER_M;
                     math::hypot(x - x_m, around.min(PERIMETER_M - around))
                 });
                 nearest.fold(f64::INFINITY, f64::min).min(reach_m - x_m)

@@ -22,9 +22,9 @@ pub(super) struct Share {
 
 impl Share {
     /// The whole of a tile with these half edges, for one owner.
-    fn whole(owner: (f64, f64), (half_x, half_sigma): (f64, f64)) -> Self {
+    fn whole(owner: (f64, f64), (half_x, half_arc): (f64, f64)) -> Self {
         let (left, right) = (-owner.0 - half_x, -owner.0 + half_x);
-        let (low, high) = (-owner.1 - half_sigma, -owner.1 + half_sigma);
+        let (low, high) = (-owner.1 - half_arc, -owner.1 + half_arc);
         let mut share =
             Self { owner, corners: [(0.0, 0.0); MAX_CORNERS], len: 0, farthest2: 0.0, farthest: (0.0, 0.0) };
         for corner in [(left, low), (right, low), (right, high), (left, high)] {

@@ -7,8 +7,8 @@ const PERIMETER_M: f64 = 9.0;
 fn store(perimeter_m: f64, samples: &[(f64, f64)]) -> SampleStore {
     let layout = StoreLayout { perimeter_m, from_m: -20.0, to_m: 40.0, cell_m: 0.4, capacity: 100_000 };
     let mut store = SampleStore::new(layout);
-    for (x_m, sigma_m) in samples {
-        store.insert(WallSample { x_m: *x_m, sigma_m: *sigma_m, head: 0, step_m: None }).unwrap();
+    for (x_m, arc_m) in samples {
+        store.insert(WallSample { x_m: *x_m, arc_m: *arc_m, head: 0, step_m: None }).unwrap();
     }
     store
 }
@@ -67,7 +67,7 @@ proptest! {
         let hole = largest(PERIMETER_M, &samples, 0.0, 0.5);
         let expected = brute_force(PERIMETER_M, &samples, 0.0, 0.5);
         prop_assert!((hole.diameter_m - expected).abs() < 1e-9, "{} and {}", hole.diameter_m, expected);
-        let at_centre = 2.0 * nearest_m(PERIMETER_M, &samples, (hole.x_m, hole.sigma_m));
+        let at_centre = 2.0 * nearest_m(PERIMETER_M, &samples, (hole.x_m, hole.arc_m));
         prop_assert!((at_centre - hole.diameter_m).abs() < 1e-9, "its centre is where it says");
         prop_assert!(hole.least_m <= hole.diameter_m && hole.most_m - hole.least_m < 1e-9, "{:?}", hole);
     }
@@ -87,7 +87,7 @@ proptest! {
         match (found, expected) {
             (Some(found), Some(expected)) => {
                 prop_assert!((math::sqrt(found.distance2) - expected).abs() < 1e-12);
-                let image_m = found.sigma_m + found.turns * PERIMETER_M - place.1;
+                let image_m = found.arc_m + found.turns * PERIMETER_M - place.1;
                 let by_image_m = math::hypot(found.x_m - place.0, image_m);
                 prop_assert!((by_image_m - expected).abs() < 1e-12, "its image is the near one");
             }
@@ -123,8 +123,8 @@ proptest! {
         let layout = StoreLayout { perimeter_m: PERIMETER_M, from_m: -20.0, to_m: 340.0, cell_m: 0.4, capacity: 1000 };
         let mut store = SampleStore::new(layout);
         let far = (0..120).map(|k| (339.0 - 1.7 * f64::from(k), 0.0));
-        for (x_m, sigma_m) in samples.iter().copied().chain(far) {
-            store.insert(WallSample { x_m, sigma_m, head: 0, step_m: None }).unwrap();
+        for (x_m, arc_m) in samples.iter().copied().chain(far) {
+            store.insert(WallSample { x_m, arc_m, head: 0, step_m: None }).unwrap();
         }
         let expected = brute_force(PERIMETER_M, &samples, 0.0, 0.5);
         let hole = HoleFinder::default().largest(&store, 0.0, 0.5);
@@ -147,8 +147,8 @@ proptest! {
         let hole = HoleFinder::default().largest(&thinned, 0.1, 0.3);
         let fine = StoreLayout { perimeter_m: PERIMETER_M, from_m: -1.0, to_m: 1.0, cell_m: 0.05, capacity: 100_000 };
         let mut all = SampleStore::new(fine);
-        for (x_m, sigma_m) in &samples {
-            let kept = all.insert(WallSample { x_m: *x_m, sigma_m: *sigma_m, head: 0, step_m: None });
+        for (x_m, arc_m) in &samples {
+            let kept = all.insert(WallSample { x_m: *x_m, arc_m: *arc_m, head: 0, step_m: None });
             prop_assume!(kept == Ok(Kept::Stored));
         }
         let exact = HoleFinder::default().largest(&all, 0.1, 0.3);
@@ -172,14 +172,14 @@ proptest! {
     /// On a lattice every place of interest is equally far from four samples.
     #[test]
     fn verif_a_perfect_lattice(dx in 0.11f64..0.7, around in 6u32..24, shift in 0.0f64..1.0) {
-        let dsigma = PERIMETER_M / f64::from(around);
+        let darc = PERIMETER_M / f64::from(around);
         let mut samples = Vec::new();
         for i in -12..=12 {
             for k in 0..around {
-                samples.push((f64::from(i) * dx + shift, f64::from(k) * dsigma));
+                samples.push((f64::from(i) * dx + shift, f64::from(k) * darc));
             }
         }
-        let expected = (dx * dx + dsigma * dsigma).sqrt();
+        let expected = (dx * dx + darc * darc).sqrt();
         // A section longer than the lattice's step holds a middle.
         let hole = largest(PERIMETER_M, &samples, 0.0, dx * 1.01);
         prop_assert!((hole.diameter_m - expected).abs() < 1e-9, "{} and {}", hole.diameter_m, expected);
@@ -215,7 +215,7 @@ fn one_sample_is_antipodal_to_its_hole() {
     let hole = largest(PERIMETER_M, &[(0.0, 1.0)], 0.0, 0.25);
     let expected = 2.0 * math::hypot(0.25, PERIMETER_M / 2.0);
     assert!((hole.diameter_m - expected).abs() < 1e-9, "{hole:?}");
-    assert!((hole.sigma_m - 5.5).abs() < 1e-6, "{hole:?}");
+    assert!((hole.arc_m - 5.5).abs() < 1e-6, "{hole:?}");
 }
 
 #[test]
@@ -257,10 +257,8 @@ fn chainage_of_seven_and_of_a_thousand_kilometres() {
             capacity: 100,
         };
         let mut store = SampleStore::new(layout);
-        for (x_m, sigma_m) in &samples {
-            store
-                .insert(WallSample { x_m: x_m + chainage, sigma_m: *sigma_m, head: 0, step_m: None })
-                .unwrap();
+        for (x_m, arc_m) in &samples {
+            store.insert(WallSample { x_m: x_m + chainage, arc_m: *arc_m, head: 0, step_m: None }).unwrap();
         }
         let hole = HoleFinder::default().largest(&store, chainage, chainage + 0.25);
         assert!((hole.diameter_m - near).abs() < error, "{chainage}: {hole:?} and {near}");
@@ -291,8 +289,8 @@ fn val_reference_holes_of_ideal_helices() {
                         math::TAU * (ping as f64 / f64::from(steps) + f64::from(head) / f64::from(heads));
                     let hit =
                         profile.cast(profile.reference(), [math::sin(angle), -math::cos(angle)]).unwrap();
-                    let (x_m, sigma_m, head) = (ping as f64 * per_ping_m, hit.sigma_m, head as usize);
-                    store.insert(WallSample { x_m, sigma_m, head, step_m: None }).unwrap();
+                    let (x_m, arc_m, head) = (ping as f64 * per_ping_m, hit.arc_m, head as usize);
+                    store.insert(WallSample { x_m, arc_m, head, step_m: None }).unwrap();
                 }
             }
             let mut finder = HoleFinder::default();

@@ -12,7 +12,7 @@ const CELLS: usize = 1 << 20;
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 struct Spot {
     x_m: f64,
-    sigma_m: f64,
+    arc_m: f64,
 }
 
 /// The nearest sample to a place.
@@ -21,7 +21,7 @@ pub(super) struct Nearest {
     /// Its chainage from the window's origin, m.
     pub x_m: f64,
     /// Its arc length, in [0, perimeter), m.
-    pub sigma_m: f64,
+    pub arc_m: f64,
     /// Turns to add to the arc length for the image that is nearest.
     pub turns: f64,
     /// Distance on the unrolled wall, squared.
@@ -85,8 +85,8 @@ impl Window {
         self.overfull = false;
         let (rows, columns) = (self.rows as f64, self.columns - 1);
         let [_, per_row, per_column] = self.per_m;
-        store.visit_between(origin_m + from_m, origin_m + to_m, |x_m, sigma_m| {
-            let spot = Spot { x_m: x_m - origin_m, sigma_m };
+        store.visit_between(origin_m + from_m, origin_m + to_m, |x_m, arc_m| {
+            let spot = Spot { x_m: x_m - origin_m, arc_m };
             let row = (spot.x_m - self.from_m) * per_row;
             if !(0.0..rows).contains(&row) {
                 return;
@@ -95,7 +95,7 @@ impl Window {
                 self.overfull = true;
                 return;
             }
-            let cell = whole(row) * self.columns + whole(sigma_m * per_column).min(columns);
+            let cell = whole(row) * self.columns + whole(arc_m * per_column).min(columns);
             if let Some(count) = self.begins.get_mut(cell + 2) {
                 *count += 1;
             }
@@ -147,11 +147,11 @@ impl Window {
     }
 
     /// The nearest sample to a place, no farther than a distance; of equally near ones the first that is come by.
-    pub(super) fn nearest(&self, x_m: f64, sigma_m: f64, within_m: f64) -> Option<Nearest> {
+    pub(super) fn nearest(&self, x_m: f64, arc_m: f64, within_m: f64) -> Option<Nearest> {
         let [per_turn, per_row, _] = self.per_m;
-        let turn = libm::floor(sigma_m * per_turn);
-        let sigma_m = sigma_m - turn * self.perimeter_m;
-        let mut best = Search { x_m, sigma_m, limit2: within_m * within_m, found: None };
+        let turn = libm::floor(arc_m * per_turn);
+        let arc_m = arc_m - turn * self.perimeter_m;
+        let mut best = Search { x_m, arc_m, limit2: within_m * within_m, found: None };
         let centre = whole((x_m - self.from_m) * per_row).min(self.rows - 1);
         // Outwards from the place's own row: first both neighbours, then theirs.
         self.look_in_row(centre, &mut best);
@@ -168,7 +168,7 @@ impl Window {
         }
         let (spot, turns) = best.found?;
         let turns = turns + turn;
-        Some(Nearest { x_m: spot.x_m, sigma_m: spot.sigma_m, turns, distance2: best.limit2 })
+        Some(Nearest { x_m: spot.x_m, arc_m: spot.arc_m, turns, distance2: best.limit2 })
     }
 
     /// Looks at what a row has near a place; gives false when the whole row is too far away.
@@ -187,7 +187,7 @@ impl Window {
             return true;
         }
         // A turn on, so that nothing is negative.
-        let on_m = best.sigma_m + self.perimeter_m;
+        let on_m = best.arc_m + self.perimeter_m;
         let [_, _, per_column] = self.per_m;
         let (left, right) = (whole((on_m - width_m) * per_column), whole((on_m + width_m) * per_column));
         let columns = self.columns;
@@ -210,10 +210,10 @@ impl Window {
 
     /// Looks at the samples of some cells in a row, so many turns on.
     fn look_at(&self, from: usize, to: usize, turns: f64, best: &mut Search) {
-        let sigma_m = best.sigma_m - turns * self.perimeter_m;
+        let arc_m = best.arc_m - turns * self.perimeter_m;
         for spot in self.spots(from, to) {
-            let (dx, dsigma) = (spot.x_m - best.x_m, spot.sigma_m - sigma_m);
-            best.take(spot, turns, dx * dx + dsigma * dsigma);
+            let (dx, darc) = (spot.x_m - best.x_m, spot.arc_m - arc_m);
+            best.take(spot, turns, dx * dx + darc * darc);
         }
     }
 
@@ -221,7 +221,7 @@ impl Window {
     fn look_all_round(&self, first: usize, best: &mut Search) {
         let half_m = self.perimeter_m / 2.0;
         for spot in self.spots(first, first + self.columns) {
-            let (dx, straight) = (spot.x_m - best.x_m, spot.sigma_m - best.sigma_m);
+            let (dx, straight) = (spot.x_m - best.x_m, spot.arc_m - best.arc_m);
             let turns = if straight >= half_m {
                 -1.0
             } else if straight < -half_m {
@@ -229,8 +229,8 @@ impl Window {
             } else {
                 0.0
             };
-            let dsigma = straight + turns * self.perimeter_m;
-            best.take(spot, turns, dx * dx + dsigma * dsigma);
+            let darc = straight + turns * self.perimeter_m;
+            best.take(spot, turns, dx * dx + darc * darc);
         }
     }
 }
@@ -238,7 +238,7 @@ impl Window {
 /// A search for the nearest.
 struct Search {
     x_m: f64,
-    sigma_m: f64,
+    arc_m: f64,
     limit2: f64,
     found: Option<(Spot, f64)>,
 }

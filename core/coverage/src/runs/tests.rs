@@ -34,7 +34,7 @@ impl Rig {
                 least_m: diameter_m,
                 most_m: diameter_m,
                 x_m: 0.0,
-                sigma_m: 0.0,
+                arc_m: 0.0,
                 bounded: true,
             })
         };

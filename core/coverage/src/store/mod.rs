@@ -35,7 +35,7 @@ pub struct WallSample {
     /// Chainage, m.
     pub x_m: f64,
     /// Arc length along the profile, m.
-    pub sigma_m: f64,
+    pub arc_m: f64,
     /// Number of the head, below [`MAX_HEADS`].
     pub head: usize,
     /// The way from the sample before, along the tunnel and along the perimeter, m, when the same head has come from
@@ -196,8 +196,8 @@ impl SampleStore {
     }
 
     /// Whether a place is within the stretch of which samples are kept, and its coordinates are numbers.
-    pub fn covers(&self, x_m: f64, sigma_m: f64) -> bool {
-        self.row(x_m).is_some() && sigma_m.is_finite()
+    pub fn covers(&self, x_m: f64, arc_m: f64) -> bool {
+        self.row(x_m).is_some() && arc_m.is_finite()
     }
 
     /// What is held and used now.
@@ -216,13 +216,13 @@ impl SampleStore {
     /// Errors: it lies outside, or the store is full.
     /// Allocates: never.
     pub fn insert(&mut self, sample: WallSample) -> Result<Kept, StoreError> {
-        let row = self.row(sample.x_m).filter(|_| sample.sigma_m.is_finite()).ok_or(StoreError::Outside)?;
-        let sigma_m = math::wrap(sample.sigma_m, self.layout.perimeter_m);
+        let row = self.row(sample.x_m).filter(|_| sample.arc_m.is_finite()).ok_or(StoreError::Outside)?;
+        let arc_m = math::wrap(sample.arc_m, self.layout.perimeter_m);
         let number = self.brick_of(row);
         let slot = self.opened(number, true).ok_or(StoreError::Full)?;
-        let cell = self.cell_at(slot, row, self.column(sigma_m));
+        let cell = self.cell_at(slot, row, self.column(arc_m));
         if let Some(tier) =
-            thinning::stands_for(&self.open, cell, (sample.x_m, sigma_m), sample.step_m, self.edge_m())
+            thinning::stands_for(&self.open, cell, (sample.x_m, arc_m), sample.step_m, self.edge_m())
         {
             self.thinned += 1;
             if let Some(brick) = self.bricks.get_mut(number as usize) {
@@ -236,7 +236,7 @@ impl SampleStore {
         }
         self.make_room(number, 1);
         let step_m = sample.step_m.unwrap_or_default();
-        if !self.open.add(cell, sample.head, (sample.x_m, sigma_m, step_m)) {
+        if !self.open.add(cell, sample.head, (sample.x_m, arc_m, step_m)) {
             return Err(StoreError::Full);
         }
         for (longest, step) in self.longest_step_m.iter_mut().zip(step_m) {
@@ -266,14 +266,14 @@ impl SampleStore {
                     for row in in_brick.start.max(first)..in_brick.end.min(last + 1) {
                         for column in 0..self.columns {
                             for node in self.open.in_cell(self.cell_at(slot, row, column)) {
-                                visit(node.x_m, node.sigma_m);
+                                visit(node.x_m, node.arc_m);
                             }
                         }
                     }
                 }
                 None => {
                     for (_, sample) in self.packed_samples(number, brick) {
-                        visit(sample.x_m, sample.sigma_m);
+                        visit(sample.x_m, sample.arc_m);
                     }
                 }
             }
@@ -336,16 +336,16 @@ impl SampleStore {
         let layout = self.layout;
         let first_row = i64::from(number) << rows_shift;
         let reader = Reader::new(&self.arena, self.lattice(number), brick.first_block, brick.count);
-        for (head, Packed { x_m, sigma_m, step_m }) in reader {
+        for (head, Packed { x_m, arc_m, step_m }) in reader {
             let row = math::floor_to_i64((x_m - layout.from_m) / layout.cell_m) - first_row;
             let row = row.clamp(0, (1 << rows_shift) - 1);
-            let column = math::floor_to_i64(sigma_m / column_m).clamp(0, columns - 1);
+            let column = math::floor_to_i64(arc_m / column_m).clamp(0, columns - 1);
             let at = CellAt {
                 slot,
                 row: usize::try_from(row).unwrap_or(0),
                 column: usize::try_from(column).unwrap_or(0),
             };
-            self.open.add(at, head, (x_m, sigma_m, step_m));
+            self.open.add(at, head, (x_m, arc_m, step_m));
         }
     }
 
@@ -364,7 +364,7 @@ impl SampleStore {
                 writer.head(head)?;
             }
             for node in samples {
-                writer.sample(Packed { x_m: node.x_m, sigma_m: node.sigma_m, step_m: node.step_m })?;
+                writer.sample(Packed { x_m: node.x_m, arc_m: node.arc_m, step_m: node.step_m })?;
             }
         }
         let first_block = writer.finish();
@@ -397,8 +397,8 @@ impl SampleStore {
         row & ((1 << self.rows_shift) - 1)
     }
 
-    fn column(&self, sigma_m: f64) -> i64 {
-        math::floor_to_i64(sigma_m / self.column_m).clamp(0, self.columns - 1)
+    fn column(&self, arc_m: f64) -> i64 {
+        math::floor_to_i64(arc_m / self.column_m).clamp(0, self.columns - 1)
     }
 
     fn cell_at(&self, slot: usize, row: i64, column: i64) -> CellAt {

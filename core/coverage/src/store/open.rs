@@ -14,7 +14,7 @@ pub(super) struct Node {
     /// Chainage, m.
     pub x_m: f64,
     /// Arc length, in [0, perimeter).
-    pub sigma_m: f64,
+    pub arc_m: f64,
     /// The single step that led here, along the tunnel and the perimeter, m; zero without one.
     pub step_m: [f64; 2],
     next_in_cell: Link,
@@ -121,11 +121,11 @@ impl OpenBricks {
         &mut self,
         at: CellAt,
         head: usize,
-        (x_m, sigma_m, step_m): (f64, f64, [f64; 2]),
+        (x_m, arc_m, step_m): (f64, f64, [f64; 2]),
     ) -> bool {
         let index = self.index(at);
         let Some(list) = self.cells.get_mut(index) else { return false };
-        let node = Node { x_m, sigma_m, step_m, next_in_cell: list.latest, next_of_head: 0 };
+        let node = Node { x_m, arc_m, step_m, next_in_cell: list.latest, next_of_head: 0 };
         let link = self.free;
         let link =
             if let Some(unused) = link.checked_sub(1).and_then(|index| self.nodes.get_mut(index as usize)) {

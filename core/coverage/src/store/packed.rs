@@ -29,7 +29,7 @@ const HEAD: u16 = 2;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Spot {
     x: i64,
-    sigma: i64,
+    arc: i64,
 }
 
 /// Where a brick's lattice lies.
@@ -37,7 +37,7 @@ pub(super) struct Spot {
 pub(super) struct Lattice {
     origin: i64,
     perimeter_m: f64,
-    last_sigma: i64,
+    last_arc: i64,
 }
 
 /// A sample on its way into the arena or out of it.
@@ -46,7 +46,7 @@ pub(super) struct Packed {
     /// Chainage, m.
     pub x_m: f64,
     /// Arc length, m.
-    pub sigma_m: f64,
+    pub arc_m: f64,
     /// The single step that led here, along the tunnel and the perimeter, m; zero without one.
     pub step_m: [f64; 2],
 }
@@ -54,28 +54,27 @@ pub(super) struct Packed {
 impl Lattice {
     pub(super) fn new(from_m: f64, perimeter_m: f64) -> Self {
         // The last whose middle is below the perimeter.
-        let last_sigma = math::floor_to_i64(perimeter_m * QUANTA_PER_M - 0.5 - 1e-6).max(0);
-        Self { origin: math::floor_to_i64(from_m * QUANTA_PER_M), perimeter_m, last_sigma }
+        let last_arc = math::floor_to_i64(perimeter_m * QUANTA_PER_M - 0.5 - 1e-6).max(0);
+        Self { origin: math::floor_to_i64(from_m * QUANTA_PER_M), perimeter_m, last_arc }
     }
 
-    fn spot(&self, x_m: f64, sigma_m: f64) -> Spot {
+    fn spot(&self, x_m: f64, arc_m: f64) -> Spot {
         Spot {
             x: math::floor_to_i64(x_m * QUANTA_PER_M) - self.origin,
-            sigma: math::floor_to_i64(math::wrap(sigma_m, self.perimeter_m) * QUANTA_PER_M)
-                .min(self.last_sigma),
+            arc: math::floor_to_i64(math::wrap(arc_m, self.perimeter_m) * QUANTA_PER_M).min(self.last_arc),
         }
     }
 
     /// The middle of its quantum, m.
     fn place_m(&self, spot: Spot) -> (f64, f64) {
-        (((self.origin + spot.x) as f64 + 0.5) / QUANTA_PER_M, (spot.sigma as f64 + 0.5) / QUANTA_PER_M)
+        (((self.origin + spot.x) as f64 + 0.5) / QUANTA_PER_M, (spot.arc as f64 + 0.5) / QUANTA_PER_M)
     }
 }
 
 /// One word for a sample near the one before it, if it is one.
 fn difference(from: Spot, to: Spot, stepped: bool) -> Option<u32> {
     let along = i16::try_from(to.x - from.x).ok().filter(|along| (-0x4000..0x4000).contains(along))?;
-    let around = i16::try_from(to.sigma - from.sigma).ok().filter(|around| *around != i16::MIN)?;
+    let around = i16::try_from(to.arc - from.arc).ok().filter(|around| *around != i16::MIN)?;
     let upper = ((along as u16) << 1) | u16::from(stepped);
     Some(u32::from(upper) << 16 | u32::from(around as u16))
 }
@@ -204,13 +203,13 @@ impl<'a> Writer<'a> {
 
     /// Gives `None` when there is no room.
     pub(super) fn sample(&mut self, sample: Packed) -> Option<()> {
-        let spot = self.lattice.spot(sample.x_m, sample.sigma_m);
+        let spot = self.lattice.spot(sample.x_m, sample.arc_m);
         let [along_m, around_m] = sample.step_m;
         let stepped = along_m.abs() + around_m.abs() > 0.0;
-        let start_m = (sample.x_m - along_m, math::wrap(sample.sigma_m - around_m, self.lattice.perimeter_m));
+        let start_m = (sample.x_m - along_m, math::wrap(sample.arc_m - around_m, self.lattice.perimeter_m));
         // Rounding apart, the step began at the sample before.
         let follows = |before: &Packed| {
-            (before.x_m - start_m.0).abs() < 1e-9 && (before.sigma_m - start_m.1).abs() < 1e-9
+            (before.x_m - start_m.0).abs() < 1e-9 && (before.arc_m - start_m.1).abs() < 1e-9
         };
         let short = self.before.filter(|(_, before)| !stepped || follows(before));
         let start = match self.before.filter(|(_, before)| follows(before)) {
@@ -227,7 +226,7 @@ impl<'a> Writer<'a> {
     }
 
     fn spot(&mut self, spot: Spot) -> Option<()> {
-        for number in [spot.x, spot.sigma] {
+        for number in [spot.x, spot.arc] {
             self.word(i32::try_from(number).unwrap_or(i32::MAX) as u32)?;
         }
         Some(())
@@ -267,7 +266,7 @@ pub(super) struct Reader<'a> {
 impl<'a> Reader<'a> {
     pub(super) fn new(arena: &'a Arena, lattice: Lattice, first: u32, samples: u32) -> Self {
         let block = first.checked_sub(1).and_then(|index| arena.blocks.get(index as usize));
-        Self { arena, lattice, block, at: 0, left: samples, head: 0, before: Spot { x: 0, sigma: 0 } }
+        Self { arena, lattice, block, at: 0, left: samples, head: 0, before: Spot { x: 0, arc: 0 } }
     }
 
     fn word(&mut self) -> Option<u32> {
@@ -283,7 +282,7 @@ impl<'a> Reader<'a> {
 
     fn spot(&mut self) -> Option<Spot> {
         let mut number = || self.word().map(|word| i64::from(word as i32));
-        Some(Spot { x: number()?, sigma: number()? })
+        Some(Spot { x: number()?, arc: number()? })
     }
 }
 
@@ -299,7 +298,7 @@ impl Iterator for Reader<'_> {
             if lower != ESCAPE {
                 let spot = Spot {
                     x: self.before.x + i64::from((upper as i16) >> 1),
-                    sigma: self.before.sigma + i64::from(lower as i16),
+                    arc: self.before.arc + i64::from(lower as i16),
                 };
                 break (spot, (upper & 1 == 1).then_some(self.before));
             }
@@ -310,11 +309,11 @@ impl Iterator for Reader<'_> {
             }
         };
         self.before = spot;
-        let (x_m, sigma_m) = self.lattice.place_m(spot);
+        let (x_m, arc_m) = self.lattice.place_m(spot);
         let step_m = start.map_or([0.0; 2], |start| {
-            let (from_x_m, from_sigma_m) = self.lattice.place_m(start);
-            [x_m - from_x_m, math::wrap_signed(sigma_m - from_sigma_m, self.lattice.perimeter_m)]
+            let (from_x_m, from_arc_m) = self.lattice.place_m(start);
+            [x_m - from_x_m, math::wrap_signed(arc_m - from_arc_m, self.lattice.perimeter_m)]
         });
-        Some((self.head, Packed { x_m, sigma_m, step_m }))
+        Some((self.head, Packed { x_m, arc_m, step_m }))
     }
 }

@@ -11,7 +11,7 @@ use headrace_geometry::math;
 struct Place {
     x_m: f64,
     /// In [0, perimeter).
-    sigma_m: f64,
+    arc_m: f64,
     perimeter_m: f64,
 }
 
@@ -19,7 +19,7 @@ impl Place {
     /// Distance in chainage to where a sample's step crosses the arc length, if it does.
     fn to_crossing_m(self, end: &Node) -> Option<f64> {
         let [along_m, around_m] = end.step_m;
-        let mut to_end = end.sigma_m - self.sigma_m;
+        let mut to_end = end.arc_m - self.arc_m;
         if to_end >= self.perimeter_m / 2.0 {
             to_end -= self.perimeter_m;
         } else if to_end < -self.perimeter_m / 2.0 {
@@ -42,22 +42,22 @@ struct Side {
 }
 
 impl SampleStore {
-    /// Distance in chainage to the nearest pass over `sigma_m`, no farther than `within_m`; to some micrometres where a
+    /// Distance in chainage to the nearest pass over `arc_m`, no farther than `within_m`; to some micrometres where a
     /// packed brick had to be opened for it.
     ///
-    /// A pass is a single step of a head from one sample to the next; where it crosses `sigma_m` its chainage is
+    /// A pass is a single step of a head from one sample to the next; where it crosses `arc_m` its chainage is
     /// interpolated. Source: metrics.md, T_x.
     /// Allocates: never.
-    pub fn nearest_pass_m(&mut self, x_m: f64, sigma_m: f64, within_m: f64) -> Option<f64> {
+    pub fn nearest_pass_m(&mut self, x_m: f64, arc_m: f64, within_m: f64) -> Option<f64> {
         let perimeter_m = self.layout.perimeter_m;
-        let place = Place { x_m, sigma_m: math::wrap(sigma_m, perimeter_m), perimeter_m };
+        let place = Place { x_m, arc_m: math::wrap(arc_m, perimeter_m), perimeter_m };
         let centre = math::floor_to_i64((x_m - self.layout.from_m) / self.layout.cell_m);
         let into_row = (x_m - self.layout.from_m) - centre as f64 * self.layout.cell_m;
         let inner = into_row.min(self.layout.cell_m - into_row).max(0.0);
         // A step ends at most its own length from where it crosses sigma.
         let [along_m, around_m] = self.longest_step_m;
-        let left = math::floor_to_i64((place.sigma_m - around_m) / self.column_m);
-        let right = math::floor_to_i64((place.sigma_m + around_m) / self.column_m);
+        let left = math::floor_to_i64((place.arc_m - around_m) / self.column_m);
+        let right = math::floor_to_i64((place.arc_m + around_m) / self.column_m);
         let columns = left..(right + 1).min(left + self.columns);
         let mut best: Option<f64> = None;
         let mut sides = [Side::default(); 2];

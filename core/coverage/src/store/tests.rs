@@ -5,20 +5,20 @@ const PERIMETER_M: f64 = 7.3;
 const LAYOUT: StoreLayout =
     StoreLayout { perimeter_m: PERIMETER_M, from_m: -1.0, to_m: 212.0, cell_m: 0.3, capacity: 200_000 };
 
-fn sample(x_m: f64, sigma_m: f64) -> WallSample {
-    WallSample { x_m, sigma_m, head: 0, step_m: None }
+fn sample(x_m: f64, arc_m: f64) -> WallSample {
+    WallSample { x_m, arc_m, head: 0, step_m: None }
 }
 
 /// Single steps of several heads from place to place, the first of each head without one.
 fn steps(places: &[(f64, f64)], heads: usize) -> Vec<WallSample> {
     let mut last = vec![None; heads];
     let mut all = Vec::new();
-    for (k, (x_m, sigma_m)) in places.iter().enumerate() {
+    for (k, (x_m, arc_m)) in places.iter().enumerate() {
         let head = k % heads;
-        let step_m = last[head].replace((*x_m, *sigma_m)).map(|(from_x_m, from_sigma_m): (f64, f64)| {
-            [x_m - from_x_m, math::wrap_signed(sigma_m - from_sigma_m, PERIMETER_M)]
+        let step_m = last[head].replace((*x_m, *arc_m)).map(|(from_x_m, from_arc_m): (f64, f64)| {
+            [x_m - from_x_m, math::wrap_signed(arc_m - from_arc_m, PERIMETER_M)]
         });
-        all.push(WallSample { x_m: *x_m, sigma_m: *sigma_m, head, step_m });
+        all.push(WallSample { x_m: *x_m, arc_m: *arc_m, head, step_m });
     }
     all
 }
@@ -42,20 +42,20 @@ fn pack_the_first_40_m(store: &mut SampleStore) {
 /// What is kept of the first 40 m, in order.
 fn kept(store: &SampleStore) -> Vec<(f64, f64)> {
     let mut kept = Vec::new();
-    store.visit_between(-1.0, 40.0, |x_m, sigma_m| kept.push((x_m, sigma_m)));
+    store.visit_between(-1.0, 40.0, |x_m, arc_m| kept.push((x_m, arc_m)));
     kept.retain(|place| place.0 < 40.0);
     kept.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
     kept
 }
 
 /// Distances in chainage from a place to every crossing of its arc length, by walking along each step.
-fn crossings(samples: &[WallSample], (x_m, sigma_m): (f64, f64)) -> Vec<f64> {
+fn crossings(samples: &[WallSample], (x_m, arc_m): (f64, f64)) -> Vec<f64> {
     let mut found = Vec::new();
     for end in samples {
         let Some([along_m, around_m]) = end.step_m else { continue };
         for turn in [-1.0, 0.0, 1.0] {
-            let start = end.sigma_m - around_m + turn * PERIMETER_M;
-            let share = (sigma_m - start) / around_m;
+            let start = end.arc_m - around_m + turn * PERIMETER_M;
+            let share = (arc_m - start) / around_m;
             if share > 0.0 && share <= 1.0 {
                 found.push((end.x_m - (1.0 - share) * along_m - x_m).abs());
             }
@@ -99,15 +99,15 @@ proptest! {
         place in (-1.0f64..13.0, 0.0f64..PERIMETER_M),
     ) {
         let mut samples = Vec::new();
-        for (head, (x_m, sigma_m, around_m)) in starts.iter().enumerate() {
+        for (head, (x_m, arc_m, around_m)) in starts.iter().enumerate() {
             for k in 0..80 {
-                let sigma_m = math::wrap(sigma_m + around_m * f64::from(k), PERIMETER_M);
+                let arc_m = math::wrap(arc_m + around_m * f64::from(k), PERIMETER_M);
                 let step_m = (k > 0).then_some([0.002, *around_m]);
-                samples.push(WallSample { x_m: x_m + 0.002 * f64::from(k), sigma_m, head, step_m });
+                samples.push(WallSample { x_m: x_m + 0.002 * f64::from(k), arc_m, head, step_m });
             }
         }
         // Where another step's end decides, micrometres may choose the other pass.
-        prop_assume!(samples.iter().all(|s| (s.sigma_m - place.1).abs() > 1e-4));
+        prop_assume!(samples.iter().all(|s| (s.arc_m - place.1).abs() > 1e-4));
         prop_assume!(starts.iter().all(|(_, _, around_m)| around_m.abs() > 0.01));
         let expected = crossings(&samples, place).into_iter().filter(|d| *d <= 9.0).min_by(f64::total_cmp);
         prop_assume!(expected.is_none_or(|d| d < 8.99));
@@ -200,7 +200,7 @@ fn what_is_outside_or_too_much_is_refused() {
     for x_m in [-0.1, 1.1, f64::NAN] {
         assert_eq!(store.insert(WallSample { x_m, ..sample }), Err(StoreError::Outside));
     }
-    assert_eq!(store.insert(WallSample { sigma_m: f64::INFINITY, ..sample }), Err(StoreError::Outside));
+    assert_eq!(store.insert(WallSample { arc_m: f64::INFINITY, ..sample }), Err(StoreError::Outside));
     assert_eq!(store.insert(sample), Ok(Kept::Stored));
     assert_eq!(store.insert(sample), Err(StoreError::Full));
 }
@@ -235,9 +235,9 @@ fn a_parked_vehicle_fills_cells_and_no_more() {
     let pings = 50 * 3600;
     for k in 0..pings {
         for head in 0..4 {
-            let sigma_m = (k as f64 / 400.0 + f64::from(head) / 4.0) * PERIMETER_M + noise_m();
+            let arc_m = (k as f64 / 400.0 + f64::from(head) / 4.0) * PERIMETER_M + noise_m();
             let head = head as usize;
-            store.insert(WallSample { head, ..sample(100.0 + noise_m(), sigma_m) }).unwrap();
+            store.insert(WallSample { head, ..sample(100.0 + noise_m(), arc_m) }).unwrap();
         }
         if k == pings / 2 {
             after_half = Some(store.usage());
@@ -262,8 +262,8 @@ fn back_and_forth_a_hundred_times() {
             // 150 m forth and back, so that the beginning is packed and opened each time.
             let x_m = 0.3 * f64::from(k);
             store.nearest_pass_m(x_m, 1.0, 12.0);
-            let sigma_m = (f64::from(k) * 0.045 + f64::from(round % 7) * 1e-3) % PERIMETER_M;
-            store.insert(sample(x_m + f64::from(round % 5) * 1e-3, sigma_m)).unwrap();
+            let arc_m = (f64::from(k) * 0.045 + f64::from(round % 7) * 1e-3) % PERIMETER_M;
+            store.insert(sample(x_m + f64::from(round % 5) * 1e-3, arc_m)).unwrap();
         }
         if round == 69 {
             after_seventy = Some((kept(&store), store.usage()));

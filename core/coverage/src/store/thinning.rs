@@ -22,7 +22,7 @@ pub(super) fn delta_m(tier: u8, edge_m: f64) -> f64 {
 pub(super) fn stands_for(
     open: &OpenBricks,
     at: CellAt,
-    (x_m, sigma_m): (f64, f64),
+    (x_m, arc_m): (f64, f64),
     step_m: Option<[f64; 2]>,
     edge_m: f64,
 ) -> Option<u8> {
@@ -33,9 +33,8 @@ pub(super) fn stands_for(
     let tier = u8::try_from(tier).ok().filter(|tier| *tier > 0)?;
     let delta_m = delta_m(tier, edge_m);
     let near = open.in_cell(at).any(|kept| {
-        let (dx, dsigma) = (kept.x_m - x_m, kept.sigma_m - sigma_m);
-        dx * dx + dsigma * dsigma <= delta_m * delta_m
-            && (step_m.is_none() || around_m * kept.step_m[1] > 0.0)
+        let (dx, darc) = (kept.x_m - x_m, kept.arc_m - arc_m);
+        dx * dx + darc * darc <= delta_m * delta_m && (step_m.is_none() || around_m * kept.step_m[1] > 0.0)
     });
     near.then_some(tier)
 }

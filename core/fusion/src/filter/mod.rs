@@ -20,7 +20,7 @@ pub mod window;
 mod tests;
 
 use self::align::{LISTENS, Listening};
-use self::running::{Context, Running, Sigmas};
+use self::running::{Context, PoseSd, Running};
 use self::settings::Settings;
 use self::sources::{Consistency, Source};
 use self::state::{State, rotation};
@@ -155,7 +155,7 @@ impl FilterNavigation {
             self.window.forget(to);
             self.write_steps();
             if is_silent {
-                self.begin_anew(self.running.sigmas().along_m);
+                self.begin_anew(self.running.pose_sd().along_m);
                 return;
             }
         }
@@ -189,15 +189,15 @@ impl FilterNavigation {
     }
 
     fn after_epochs(&mut self) {
-        let sigmas = self.running.sigmas();
-        if !self.running.is_sound() || sigmas.place_m > LOST_PLACE_M || sigmas.tilt_rad > LOST_TILT_RAD {
-            self.begin_anew(sigmas.along_m);
+        let sd = self.running.pose_sd();
+        if !self.running.is_sound() || sd.place_m > LOST_PLACE_M || sd.tilt_rad > LOST_TILT_RAD {
+            self.begin_anew(sd.along_m);
             return;
         }
         let pass_gap = self.pass_gap();
         let relative = self.running.trail.relative(pass_gap);
         let relative = relative.unwrap_or_else(|| Relative::along(0.0));
-        self.standing = match sigmas.standing(relative) {
+        self.standing = match sd.standing(relative) {
             Ok(_) if self.has_jumped() => Err(NoFix::Chainage),
             standing => standing,
         };
@@ -315,7 +315,7 @@ impl Navigation for FilterNavigation {
     fn update(&mut self, number: usize, sensor: &SensorInfo, times: Times, reading: &Reading) {
         if self.received.since(times.received) > CLOCK_JUMP {
             // Or the one before was stamped wrongly. Waiting until the time comes again would be no better.
-            let along_m = self.running.sigmas().along_m;
+            let along_m = self.running.pose_sd().along_m;
             self.begin_anew(along_m);
             self.window.clear();
             self.received = times.received;
@@ -371,8 +371,8 @@ impl Navigation for FilterNavigation {
         self.sources.get(source).copied().flatten().map(|source| source.consistency)
     }
 
-    fn sigmas(&self) -> Option<Sigmas> {
-        self.running().map(Running::sigmas)
+    fn pose_sd(&self) -> Option<PoseSd> {
+        self.running().map(Running::pose_sd)
     }
 
     fn fix(&self, at: MonoNs) -> Result<Fix, NoFix> {

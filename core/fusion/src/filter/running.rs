@@ -312,8 +312,8 @@ impl Running {
     }
 
     /// How far off the estimate may be.
-    pub fn sigmas(&self) -> Sigmas {
-        Sigmas::of(&self.state, &self.factors)
+    pub fn pose_sd(&self) -> PoseSd {
+        PoseSd::of(&self.state, &self.factors)
     }
 
     /// Vehicles are no faster than a little, whatever an accelerometer without anything beside it makes of gravity.
@@ -344,7 +344,7 @@ fn since(row: &Row, known: &Errors, errors: &Errors) -> f64 {
 
 /// Standard deviations of an estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Sigmas {
+pub struct PoseSd {
     /// Of the chainage, its cable's scale left out, m.
     pub along_m: f64,
     /// Of the place in the section, in the worse direction, m.
@@ -355,7 +355,7 @@ pub struct Sigmas {
     pub yaw_rad: f64,
 }
 
-impl Sigmas {
+impl PoseSd {
     /// Those of an estimate and the covariance of its errors.
     pub fn of(state: &State, factors: &Factors<ERRORS>) -> Self {
         let of = |i: usize| math::sqrt(factors.variance(i));
@@ -381,7 +381,7 @@ impl Sigmas {
             Err(NoFix::Heading)
         } else if self.place_m > PLACE_LIMIT_M {
             Err(NoFix::Section)
-        } else if relative.sigma_m(Vec3::zero()) > ALONG_LIMIT_M || self.along_m > ALONG_LIMIT_M {
+        } else if relative.sd_m(Vec3::zero()) > ALONG_LIMIT_M || self.along_m > ALONG_LIMIT_M {
             Err(NoFix::Chainage)
         } else {
             Ok(relative)

@@ -5,7 +5,7 @@ use super::later::Later;
 use super::step::{Move, Placed, Step};
 use super::track::{Piece, Point, Track};
 use crate::filter::factors::Factors;
-use crate::filter::running::Sigmas;
+use crate::filter::running::PoseSd;
 use crate::filter::settings::Settings;
 use crate::filter::state::{ERRORS, State};
 use crate::relative::Relative;
@@ -66,7 +66,7 @@ impl Backward {
                 answer(&mut self.relatives, number, relative);
             }
         }
-        self.points.push(Point::of(now.at, &now.state, &Sigmas::of(&now.state, &now.factors)));
+        self.points.push(Point::of(now.at, &now.state, &PoseSd::of(&now.state, &now.factors)));
         self.now = Some((placed.piece, now));
     }
 

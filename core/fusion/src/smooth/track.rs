@@ -3,7 +3,7 @@
 use core::ops::Range;
 
 use super::step::Placed;
-use crate::filter::running::Sigmas;
+use crate::filter::running::PoseSd;
 use crate::filter::sources::Consistency;
 use crate::filter::state::{State, rotation, rotation_vector};
 use crate::filter::{CARRIES, CLOCK_JUMP, EPOCH};
@@ -22,7 +22,7 @@ pub(super) struct Point {
     at: MonoNs,
     pose: Pose,
     speed_mps: f64,
-    sigmas: Sigmas,
+    sd: PoseSd,
 }
 
 /// A stretch of time without a break.
@@ -43,9 +43,9 @@ pub struct Track {
 }
 
 impl Point {
-    pub(super) fn of(at: MonoNs, state: &State, sigmas: &Sigmas) -> Self {
+    pub(super) fn of(at: MonoNs, state: &State, sd: &PoseSd) -> Self {
         let pose = Pose { position: state.position, attitude: state.attitude };
-        Self { at, pose, speed_mps: state.velocity_mps.x(), sigmas: *sigmas }
+        Self { at, pose, speed_mps: state.velocity_mps.x(), sd: *sd }
     }
 }
 
@@ -117,8 +117,8 @@ impl Track {
         }
         let share = if span.0 > 0 { at.since(before.at).as_secs_f64() / span.as_secs_f64() } else { 1.0 };
         let relative = self.relative(piece, at);
-        before.sigmas.standing(relative)?;
-        after.sigmas.standing(relative)?;
+        before.sd.standing(relative)?;
+        after.sd.standing(relative)?;
         let pose = between(&before.pose, &after.pose, share);
         let arm = pose.attitude * -piece.unit_at;
         let speed_mps = before.speed_mps + (after.speed_mps - before.speed_mps) * share;

@@ -45,7 +45,7 @@ pub struct WallHit {
     /// Ray parameter; the distance in metres when the direction has length one.
     pub range_m: f64,
     /// Arc length of the place.
-    pub sigma_m: f64,
+    pub arc_m: f64,
     /// The place.
     pub point: Yz,
     /// Unit normal there, inwards.
@@ -93,7 +93,7 @@ pub enum ProfileError {
 struct Element {
     start: Yz,
     end: Yz,
-    sigma_m: f64,
+    arc_m: f64,
     length_m: f64,
     shape: Shape,
 }
@@ -143,7 +143,7 @@ impl Profile {
         }
         let mut perimeter_m = 0.0;
         for element in &mut elements {
-            element.sigma_m = perimeter_m;
+            element.arc_m = perimeter_m;
             perimeter_m += element.length_m;
         }
         let profile = Self { elements, perimeter_m, reference };
@@ -213,22 +213,22 @@ impl Profile {
 
     /// Arc length of the wall as seen from the reference point through `point`: the chart in which spacing is measured
     /// when the wall isn't where the design says. Zero for the reference point itself.
-    pub fn sigma_of(&self, point: Yz) -> f64 {
+    pub fn arc_of(&self, point: Yz) -> f64 {
         let direction = sub(point, self.reference);
-        self.hit(self.reference, direction).map_or(0.0, |hit| hit.sigma_m)
+        self.hit(self.reference, direction).map_or(0.0, |hit| hit.arc_m)
     }
 
-    /// The place of the wall at arc length `sigma_m`, taken modulo the perimeter.
-    pub fn point_at(&self, sigma_m: f64) -> Yz {
-        let sigma = math::wrap(sigma_m, self.perimeter_m);
-        let index = self.elements.partition_point(|element| element.sigma_m <= sigma).saturating_sub(1);
-        self.elements.get(index).map_or(self.reference, |element| element.point_at(sigma - element.sigma_m))
+    /// The place of the wall at arc length `arc_m`, taken modulo the perimeter.
+    pub fn point_at(&self, arc_m: f64) -> Yz {
+        let arc = math::wrap(arc_m, self.perimeter_m);
+        let index = self.elements.partition_point(|element| element.arc_m <= arc).saturating_sub(1);
+        self.elements.get(index).map_or(self.reference, |element| element.point_at(arc - element.arc_m))
     }
 
     /// Place of an arc length on a clock seen looking along the tunnel from the reference point, to the nearest half hour:
     /// 6 is the floor's centre, 9 the left wall, 12 the crown.
-    pub fn clock(&self, sigma_m: f64) -> String {
-        let place = sub(self.point_at(sigma_m), self.reference);
+    pub fn clock(&self, arc_m: f64) -> String {
+        let place = sub(self.point_at(arc_m), self.reference);
         // Head angle: 0 down, growing to the left.
         let angle = math::wrap(math::atan2(place[0], -place[1]), TAU);
         let half_hours = math::round_to_i64(angle / TAU * 24.0) + 12;
@@ -249,7 +249,7 @@ impl Profile {
     /// Arc lengths at which one element ends and the next begins.
     #[cfg(test)]
     pub(crate) fn corners_m(&self) -> Vec<f64> {
-        self.elements.iter().map(|element| element.sigma_m).collect()
+        self.elements.iter().map(|element| element.arc_m).collect()
     }
 
     fn hit(&self, origin: Yz, direction: Yz) -> Option<WallHit> {
@@ -270,7 +270,7 @@ impl Profile {
         let along = element.along(point).clamp(0.0, element.length_m);
         Some(WallHit {
             range_m: t,
-            sigma_m: math::wrap(element.sigma_m + along, self.perimeter_m),
+            arc_m: math::wrap(element.arc_m + along, self.perimeter_m),
             point,
             normal: element.normal(point),
         })
@@ -417,7 +417,7 @@ impl Element {
 fn build(start: Yz, piece: Piece) -> Element {
     match piece {
         Piece::LineTo(end) => {
-            Element { start, end, sigma_m: 0.0, length_m: norm(sub(end, start)), shape: Shape::Line }
+            Element { start, end, arc_m: 0.0, length_m: norm(sub(end, start)), shape: Shape::Line }
         }
         Piece::Arc { centre, sweep_rad } => {
             let from_centre = sub(start, centre);
@@ -429,7 +429,7 @@ fn build(start: Yz, piece: Piece) -> Element {
             let middle = [cos_middle, sin_middle];
             let cos_half = math::cos(sweep_rad / 2.0);
             let shape = Shape::Arc { centre, radius_m, from_rad, sweep_rad, middle, cos_half };
-            Element { start, end, sigma_m: 0.0, length_m: radius_m * sweep_rad, shape }
+            Element { start, end, arc_m: 0.0, length_m: radius_m * sweep_rad, shape }
         }
     }
 }

@@ -180,9 +180,9 @@ pub struct OpeningReport {
     /// Where it ends, m.
     pub to_m: f64,
     /// Arc length at which it begins, m; `None` for all round.
-    pub sigma_m: Option<f64>,
+    pub arc_from_m: Option<f64>,
     /// Its length along the perimeter, m; `None` for all round.
-    pub arc_m: Option<f64>,
+    pub arc_length_m: Option<f64>,
 }
 
 /// Something that was wrong with the dive as a whole.
@@ -309,8 +309,8 @@ fn opening_report(opening: &Opening) -> OpeningReport {
         name: opening.name.clone(),
         from_m: opening.from_m,
         to_m: opening.to_m,
-        sigma_m: opening.arc_m.map(|(from_m, _)| from_m),
-        arc_m: opening.arc_m.map(|(_, length_m)| length_m),
+        arc_from_m: opening.arc_m.map(|(from_m, _)| from_m),
+        arc_length_m: opening.arc_m.map(|(_, length_m)| length_m),
     }
 }
 

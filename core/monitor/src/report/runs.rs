@@ -70,7 +70,7 @@ pub(super) fn run_reports(sections: &Sections, profile: &Profile) -> Vec<RunRepo
                 failed_m: f64::from(run.failed) * sections.section_m(),
                 hole_m: hole.diameter_m,
                 hole_x_m: hole.x_m,
-                hole_clock: profile.clock(hole.sigma_m),
+                hole_clock: profile.clock(hole.arc_m),
                 raised_s: run.raised.as_secs_f64(),
                 cleared_s: run.cleared.map(MonoNs::as_secs_f64),
                 merged_into: run.merged_into.map(|id| id.0),

@@ -23,11 +23,11 @@ pub struct SectionReport {
     /// False where the hole is at least that large, for want of samples around it.
     pub hole_bounded: bool,
     /// Standard deviation of the hole, m.
-    pub hole_sigma_m: f64,
+    pub hole_sd_m: f64,
     /// Chainage of the hole's centre, m.
     pub hole_x_m: Option<f64>,
     /// Where it is on the perimeter, m from the floor's centre via the left wall.
-    pub hole_sigma_at_m: Option<f64>,
+    pub hole_arc_m: Option<f64>,
     /// The same as a clock seen along the tunnel: 6 is the floor's centre, 9 the left wall.
     pub hole_clock: Option<String>,
     /// Distance between passes.
@@ -85,10 +85,10 @@ pub(super) fn section_report(
         hole_least_m: section.hole.map(|hole| hole.least_m),
         hole_most_m: section.hole.map(|hole| hole.most_m).filter(|most_m| most_m.is_finite()),
         hole_bounded: section.hole.is_some_and(|hole| hole.bounded),
-        hole_sigma_m: section.hole_sigma_m,
+        hole_sd_m: section.hole_sd_m,
         hole_x_m: section.hole.map(|hole| hole.x_m),
-        hole_sigma_at_m: section.hole.map(|hole| hole.sigma_m),
-        hole_clock: section.hole.map(|hole| profile.clock(hole.sigma_m)),
+        hole_arc_m: section.hole.map(|hole| hole.arc_m),
+        hole_clock: section.hole.map(|hole| profile.clock(hole.arc_m)),
         t_x: spread_report(&section.t_x_m),
         t_y: spread_report(&section.t_y_m),
         t: spread_report(&section.t_m),

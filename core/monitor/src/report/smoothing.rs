@@ -53,5 +53,5 @@ pub struct JudgedReport {
     /// Diameter of the largest hole, m; `None` where it wasn't measured.
     pub hole_m: Option<f64>,
     /// Its standard deviation, m.
-    pub hole_sigma_m: f64,
+    pub hole_sd_m: f64,
 }

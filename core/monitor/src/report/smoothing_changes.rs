@@ -22,8 +22,8 @@ fn metres(summary: &SummaryReport) -> MetresReport {
 }
 
 fn judged(section: &SectionReport) -> JudgedReport {
-    let SectionReport { verdict, hole_m, hole_sigma_m, .. } = *section;
-    JudgedReport { verdict, hole_m, hole_sigma_m }
+    let SectionReport { verdict, hole_m, hole_sd_m, .. } = *section;
+    JudgedReport { verdict, hole_m, hole_sd_m }
 }
 
 /// Both are in the order of chainage; either may have sections that the other hasn't.

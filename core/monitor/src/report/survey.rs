@@ -46,7 +46,7 @@ pub struct HolidayReport {
     /// Chainage of its middle, m.
     pub x_m: f64,
     /// Arc length of its middle, m.
-    pub sigma_m: f64,
+    pub arc_m: f64,
     /// The same on a clock.
     pub clock: String,
 }
@@ -74,8 +74,8 @@ pub(super) fn survey(coverage: &Coverage, profile: &Profile) -> SurveyReport {
     }
     let holidays = soundings.empty_between(from_m, to_m).take(LISTED).map(|node| HolidayReport {
         x_m: node.x_m,
-        sigma_m: node.sigma_m,
-        clock: profile.clock(node.sigma_m),
+        arc_m: node.arc_m,
+        clock: profile.clock(node.arc_m),
     });
     SurveyReport {
         node_m,

@@ -105,7 +105,7 @@ fn note_passage(
     if let Outcome::Lost(loss, Some(aim)) = ping.outcome {
         let index = coverage.sections.index_of(aim.x_m);
         if let Some(section) = coverage.sections.get_mut(index) {
-            section.passage.lost.note(loss, aim.sigma_m, perimeter_m);
+            section.passage.lost.note(loss, aim.arc_m, perimeter_m);
         }
     }
     // Without a fix, a ping counts where its head was last known to be.
@@ -185,33 +185,33 @@ fn note_sample(
     if ping.new_sweep {
         *slot = None;
     }
-    let Outcome::Sample { point, sigma_m } = ping.outcome else {
+    let Outcome::Sample { point, arc_m } = ping.outcome else {
         if let Some(last) = slot {
             last.unbroken = false;
         }
         return Ok(());
     };
-    if !coverage.store.covers(point.x(), sigma_m) {
+    if !coverage.store.covers(point.x(), arc_m) {
         *slot = None;
         return Err(StoreError::Outside);
     }
     let before = *slot;
     let step_from = before.filter(|last| last.unbroken && ping.single_step);
-    let t_x_m = coverage.store.nearest_pass_m(point.x(), sigma_m, FARTHEST_M);
+    let t_x_m = coverage.store.nearest_pass_m(point.x(), arc_m, FARTHEST_M);
     let perimeter_m = coverage.store.perimeter_m();
     let step_m = step_from
-        .map(|last| [point.x() - last.point.x(), math::wrap_signed(sigma_m - last.sigma_m, perimeter_m)]);
-    let kept = coverage.store.insert(WallSample { x_m: point.x(), sigma_m, head: ping.head, step_m });
-    *slot = kept.ok().map(|_| LastSample { point, sigma_m, unbroken: true });
+        .map(|last| [point.x() - last.point.x(), math::wrap_signed(arc_m - last.arc_m, perimeter_m)]);
+    let kept = coverage.store.insert(WallSample { x_m: point.x(), arc_m, head: ping.head, step_m });
+    *slot = kept.ok().map(|_| LastSample { point, arc_m, unbroken: true });
     kept?;
-    coverage.soundings.add(point.x(), sigma_m);
+    coverage.soundings.add(point.x(), arc_m);
     coverage.sections.touch(point.x());
     let index = coverage.sections.index_of(point.x());
     let Some(section) = coverage.sections.get_mut(index) else { return Ok(()) };
     section.samples += 1;
     let yz = |point: &Point3<Tunnel>| [point.y(), point.z()];
-    let from = step_from.map(|last| (yz(&last.point), last.sigma_m));
-    section.deviation.add(&tunnel.profile, (yz(&point), sigma_m), from, tunnel.contradiction_m);
+    let from = step_from.map(|last| (yz(&last.point), last.arc_m));
+    section.deviation.add(&tunnel.profile, (yz(&point), arc_m), from, tunnel.contradiction_m);
     if let Some(t_x_m) = t_x_m {
         section.t_x_m.add(t_x_m);
     }
@@ -250,7 +250,7 @@ fn note_frontier(
 ) {
     let Coverage { sections, frontier, .. } = coverage;
     let (Some(fix), Some(reach)) = (ping.fix, ping.reach) else { return };
-    let margin_m = sections.margin_m(fix.relative.sigma_m(Vec3::zero()));
+    let margin_m = sections.margin_m(fix.relative.sd_m(Vec3::zero()));
     let moved = frontier.advance(reach, heads.clone(), ping.received, sections.section_m(), margin_m);
     if !moved.is_nothing() {
         let outlook = frontier.outlook(heads, ping.received);

@@ -21,6 +21,7 @@ use headrace_sensor::reading::{Reading, SonarReturn};
 type Heads<'w, 's> =
     Query<'w, 's, (&'static Head, &'static Mounted, &'static mut MeasuredMotion, &'static HiddenAngles)>;
 
+#[expect(clippy::too_many_arguments, reason = "a system's arguments are what it reads and writes")]
 pub(super) fn georeference(
     events: Res<'_, Events>,
     positioned: Res<'_, PositionedList>,
@@ -83,13 +84,13 @@ fn outcome(
     let range_m = sonar.range_m.map(|range_m| tunnel.site.rescaled_range_m(range_m, sonar.sound_speed_mps));
     let sample = |range_m: f64| {
         let point = origin + beam.scaled(range_m);
-        Outcome::Sample { point, sigma_m: tunnel.profile.sigma_of([point.y(), point.z()]) }
+        Outcome::Sample { point, arc_m: tunnel.profile.arc_of([point.y(), point.z()]) }
     };
     if let Some(range_m) = range_m.filter(|_| !hidden) {
         return sample(range_m);
     }
     let wall = tunnel.profile.cast([origin.y(), origin.z()], [beam.y(), beam.z()]);
-    let aim = wall.map(|wall| Aim { x_m: origin.x() + wall.range_m * beam.x(), sigma_m: wall.sigma_m });
+    let aim = wall.map(|wall| Aim { x_m: origin.x() + wall.range_m * beam.x(), arc_m: wall.arc_m });
     let wall_m = wall.map(|wall| wall.range_m);
     if let Some(range_m) = range_m.filter(|range_m| wall_m.is_none_or(|wall| *range_m > VEHICLE_SHARE * wall))
     {
@@ -153,8 +154,8 @@ fn digest(digests: &mut Digests, event: &Event, ping: &PlacedPing) {
     };
     let digest = digests.pings.record(kind).integer(event.received.0).integer(u64::from(event.source.0));
     match ping.outcome {
-        Outcome::Sample { point, sigma_m } => {
-            digest.integer(0).number(point.x()).number(point.y()).number(point.z()).number(sigma_m);
+        Outcome::Sample { point, arc_m } => {
+            digest.integer(0).number(point.x()).number(point.y()).number(point.z()).number(arc_m);
         }
         Outcome::Lost(loss, _) => {
             digest.integer(1).integer(loss as u64);

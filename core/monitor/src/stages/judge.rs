@@ -41,10 +41,10 @@ pub(crate) fn judge_one(
         .integer(change as u64)
         .integer(section.verdict as u64)
         .number(section.hole.map_or(0.0, |hole| hole.diameter_m))
-        .number(section.hole_sigma_m)
+        .number(section.hole_sd_m)
         .integer(section.evidence.map_or(u64::MAX, |evidence| evidence.cause as u64))
         .number(section.hole.map_or(0.0, |hole| hole.x_m))
-        .number(section.hole.map_or(0.0, |hole| hole.sigma_m));
+        .number(section.hole.map_or(0.0, |hole| hole.arc_m));
     if let Some(evidence) = section.evidence {
         digests
             .judgements

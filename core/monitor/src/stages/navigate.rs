@@ -26,7 +26,7 @@ pub(super) fn navigate(
         // Time may stand still or go back; a beat is passed once. After a gap only the last beat counts.
         if let Some(at) = beat_before(&mut navigator.next_beat, event.received) {
             let fix = navigator.navigation.fix(at);
-            *state = VehicleState { at: Some(at), fix, sd: navigator.navigation.sigmas() };
+            *state = VehicleState { at: Some(at), fix, sd: navigator.navigation.pose_sd() };
             digest(&mut digests.poses, at, &state);
             list.0.push(Positioned::Beat { at, fix });
         }

@@ -129,8 +129,8 @@ fn in_sectors_a_head_that_is_gone_leaves_its_sector_unseen() {
     case.situation.heads[1] = None;
     let half = case.advice();
     assert_eq!((half.v_max_mps, half.reason), (0.0, Reason::AngularStep));
-    let [width_m, sigma_m] = half.unseen_m.unwrap();
-    assert!((width_m - 17.95).abs() < 0.1 && (sigma_m - 26.9).abs() < 0.2, "{width_m} {sigma_m}");
+    let [width_m, arc_m] = half.unseen_m.unwrap();
+    assert!((width_m - 17.95).abs() < 0.1 && (arc_m - 26.9).abs() < 0.2, "{width_m} {arc_m}");
     assert!(half.remedy.is_none() && half.predicted_t_m.unwrap() > 17.0);
 }
 

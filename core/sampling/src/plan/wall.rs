@@ -13,7 +13,7 @@ use headrace_geometry::time::DurNs;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WallPlace {
     /// Its arc length, m.
-    pub sigma_m: f64,
+    pub arc_m: f64,
     /// Distance between neighbours of one turn on the wall, the largest of the heads that see it, m.
     pub t_y_m: f64,
     /// Distance between passes, m, the smaller and the larger where two alternate; `None` where no head sees it.
@@ -30,7 +30,7 @@ pub struct PatternSample {
     /// Chainage, m, zero where the vehicle's origin is at the start.
     pub x_m: f64,
     /// Arc length, m.
-    pub sigma_m: f64,
+    pub arc_m: f64,
     /// The vehicle stands in its way.
     pub hidden: bool,
     /// The first of a head, or after a turning point.
@@ -58,10 +58,10 @@ impl Planner {
         let passes = planned.passes();
         let ping_s = planned.ping_period_s();
         let strips = self.nominal_strips().ok_or(SamplingError::NoCommonMode)?;
-        let seen_by = |sigma_m: f64| strips.at(sigma_m).map(|strip| strip.seen_by);
+        let seen_by = |arc_m: f64| strips.at(arc_m).map(|strip| strip.seen_by);
         let place = |k: usize| {
-            let sigma_m = around.sigma_m(k);
-            let gap_s = seen_by(sigma_m).and_then(|heads| passes.gap_s(heads));
+            let arc_m = around.arc_m(k);
+            let gap_s = seen_by(arc_m).and_then(|heads| passes.gap_s(heads));
             let share = around.share.get(k).copied().flatten();
             let t_x_m = gap_s.map(|gap_s| {
                 let longest_m = speed_mps * gap_s;
@@ -70,7 +70,7 @@ impl Planner {
             });
             let t_y_m = around.t_y_m.get(k).copied().unwrap_or(0.0);
             let t_m = t_x_m.map(|[_, larger]| spacing::t_max_m(larger, speed_mps * ping_s, t_y_m));
-            WallPlace { sigma_m, t_y_m, t_x_m, t_m }
+            WallPlace { arc_m, t_y_m, t_x_m, t_m }
         };
         Ok((0..places).map(place).collect())
     }
@@ -102,7 +102,7 @@ impl Planner {
                 samples.push(PatternSample {
                     head,
                     x_m: speed_mps * since_s + spec.mount.position.x() + sounding.beam.x(),
-                    sigma_m: sounding.sigma_m,
+                    arc_m: sounding.arc_m,
                     hidden: hidden.iter().any(|range| range.has(angle_rad)),
                     new_sweep: last.is_none() || growing.is_some() && grows != growing,
                 });
@@ -126,7 +126,7 @@ impl Around {
         Self { perimeter_m, t_y_m: vec![0.0; places], share: vec![None; places] }
     }
 
-    fn sigma_m(&self, place: usize) -> f64 {
+    fn arc_m(&self, place: usize) -> f64 {
         self.perimeter_m * (place as f64 + 0.5) / self.t_y_m.len() as f64
     }
 
@@ -153,8 +153,8 @@ impl Around {
             if share.is_some_and(|share| share > 1.0) {
                 continue;
             }
-            let way_m = math::wrap_signed(next.sigma_m - sounding.sigma_m, self.perimeter_m);
-            let from_m = if way_m < 0.0 { next.sigma_m } else { sounding.sigma_m };
+            let way_m = math::wrap_signed(next.arc_m - sounding.arc_m, self.perimeter_m);
+            let from_m = if way_m < 0.0 { next.arc_m } else { sounding.arc_m };
             let place_m = self.perimeter_m / places as f64;
             let first = math::floor_to_i64(from_m / place_m);
             let last = math::floor_to_i64((from_m + way_m.abs()) / place_m);

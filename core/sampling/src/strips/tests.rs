@@ -97,8 +97,8 @@ fn a_strip_that_no_head_sees_can_make_every_speed_too_high() {
     let views = [all_around(&[arc(7.0, 0.7)]), all_around(&[arc(7.0, 0.7)])];
     let why = speed(&strips(&views), &turning(2), 0.5).unwrap_err();
     assert!(
-        matches!(why, SamplingError::UnseenStrip { width_m, sigma_m, .. }
-            if (width_m - 0.7).abs() < 1e-9 && (sigma_m - 7.35).abs() < 1e-9),
+        matches!(why, SamplingError::UnseenStrip { width_m, arc_m, .. }
+            if (width_m - 0.7).abs() < 1e-9 && (arc_m - 7.35).abs() < 1e-9),
         "{why}"
     );
     assert!(speed(&strips(&views), &turning(2), 1.2).is_ok());
@@ -179,8 +179,8 @@ fn a_strip_over_the_seam_is_one() {
     let unseen: Vec<&Strip> = some.as_slice().iter().filter(|strip| strip.seen_by.is_empty()).collect();
     assert!(unseen.len() == 1 && (unseen[0].arc.length_m - 5.0).abs() < 1e-9, "{some:?}");
     assert!((unseen[0].arc.from_m - 8.0).abs() < 1e-9);
-    for (sigma_m, seen) in [(0.5, false), (2.9, false), (3.1, true), (7.9, true), (8.1, false)] {
-        assert_eq!(some.at(sigma_m).unwrap().seen_by.is_empty(), !seen, "{sigma_m}");
+    for (arc_m, seen) in [(0.5, false), (2.9, false), (3.1, true), (7.9, true), (8.1, false)] {
+        assert_eq!(some.at(arc_m).unwrap().seen_by.is_empty(), !seen, "{arc_m}");
     }
 }
 
@@ -205,9 +205,9 @@ fn without_room_more_is_hidden_and_not_less() {
     let (all, few) = (hidden(100), hidden(5));
     assert_eq!((all.hidden.len(), few.hidden.len()), (40, 5));
     let perimeter_m = profile.perimeter_m();
-    let is_hidden = |view: &View, sigma_m: f64| view.hidden.iter().any(|arc| arc.has(sigma_m, perimeter_m));
+    let is_hidden = |view: &View, arc_m: f64| view.hidden.iter().any(|arc| arc.has(arc_m, perimeter_m));
     for k in 0..2000 {
-        let sigma_m = perimeter_m * f64::from(k) / 2000.0;
-        assert!(is_hidden(&few, sigma_m) || !is_hidden(&all, sigma_m), "{sigma_m}");
+        let arc_m = perimeter_m * f64::from(k) / 2000.0;
+        assert!(is_hidden(&few, arc_m) || !is_hidden(&all, arc_m), "{arc_m}");
     }
 }

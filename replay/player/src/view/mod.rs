@@ -199,15 +199,14 @@ impl View {
         let section = words.integer()?.cast_signed();
         let change = words.integer()?;
         let verdict = words.one_of(&Verdict::ALL, |verdict| verdict as u64)?;
-        let [hole_m, hole_sigma_m] = words.numbers()?;
+        let [hole_m, hole_sd_m] = words.numbers()?;
         let cause = words.one_of(&Cause::ALL, |cause| cause as u64);
         let [hole_x_m, hole_arc_m] = words.numbers()?;
         let figures = words.numbers().zip(cause);
         let cause = figures.map(|([speed_mps, t_y_m, middle_t_y_m, missing_share, swing_m], cause)| {
             CauseFigures { cause, speed_mps, t_y_m, middle_t_y_m, missing_share, swing_m }
         });
-        let judged =
-            Judged { at, section, change, verdict, hole_m, hole_sigma_m, hole_x_m, hole_arc_m, cause };
+        let judged = Judged { at, section, change, verdict, hole_m, hole_sd_m, hole_x_m, hole_arc_m, cause };
         self.wall.judge(section, verdict);
         let (shown, said) = self.sections.judge(&judged, &self.site, self.v_max_mps);
         made.push(Topic::Sections, &shown);

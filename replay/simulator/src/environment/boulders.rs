@@ -21,7 +21,7 @@ const FLATTEST: f64 = 0.5;
 /// An ellipsoid on the wall.
 struct Boulder {
     chainage_m: f64,
-    sigma_m: f64,
+    arc_m: f64,
     /// Full diameters: along the tunnel, along the wall, across it, m.
     size_m: [f64; 3],
     /// Turned about the wall's normal.
@@ -56,7 +56,7 @@ pub(super) fn one(
 ) -> Result<Placed<Solid>, ConfigError> {
     let boulder = Boulder {
         chainage_m: keys::chainage_m(table, ground.length_m)?,
-        sigma_m: table.number("sigma_m", -500.0..=500.0)?.unwrap_or(0.0),
+        arc_m: table.number("arc_m", -500.0..=500.0)?.unwrap_or(0.0),
         size_m: parse_size(table)?,
         yaw_rad: table.number("yaw_deg", -360.0..=360.0)?.unwrap_or(0.0).to_radians(),
         sunk: parse_sunk(table)?,
@@ -118,7 +118,7 @@ pub(super) fn pieces(
 impl Boulder {
     fn placed(&self, ground: Ground<'_>, feature: u16) -> Placed<Solid> {
         let half = self.size_m.map(|diameter| diameter / 2.0);
-        let (wall, [ny, nz]) = ground.tube.wall_place(self.chainage_m, self.sigma_m);
+        let (wall, [ny, nz]) = ground.tube.wall_place(self.chainage_m, self.arc_m);
         let above_m = half[2] * (1.0 - 2.0 * self.sunk);
         let section = ground.frame(self.chainage_m, [wall[0] + above_m * ny, wall[1] + above_m * nz]);
         // Across the wall, along it, and along the tunnel, before it is turned.
@@ -142,14 +142,14 @@ impl Field {
     /// The next boulder: sizes are as many in each octave; width and thickness are at least half the length.
     fn boulder(&self, scatter: &mut Scatter) -> Boulder {
         let chainage_m = scatter.between(self.from_m, self.to_m);
-        let sigma_m = scatter.between(-self.width_m / 2.0, self.width_m / 2.0);
+        let arc_m = scatter.between(-self.width_m / 2.0, self.width_m / 2.0);
         let [least_m, most_m] = self.size_m;
         let size_m = least_m * power(most_m / least_m, scatter.share());
         let width_m = size_m * scatter.between(FLATTEST, 1.0);
         let thickness_m = width_m * scatter.between(FLATTEST, 1.0);
         Boulder {
             chainage_m,
-            sigma_m,
+            arc_m,
             size_m: [size_m, width_m, thickness_m],
             yaw_rad: scatter.between(0.0, TAU),
             sunk: self.sunk,

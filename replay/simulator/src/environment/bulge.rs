@@ -15,7 +15,7 @@ pub(super) struct Bulge {
     /// Half its extent along the tunnel, m.
     pub(super) half_length_m: f64,
     /// Arc length of its middle on the unscaled profile, m.
-    pub(super) sigma_m: f64,
+    pub(super) arc_m: f64,
     /// Half its extent along the wall of the unscaled profile, m.
     pub(super) half_width_m: f64,
     /// Displacement of its middle, inwards positive, m.
@@ -34,12 +34,12 @@ impl Bulge {
     }
 
     /// Displacement of the wall at a place of the unrolled profile of this perimeter, inwards positive, m.
-    pub(super) fn displacement_m(&self, chainage_m: f64, sigma_m: f64, perimeter_m: f64) -> f64 {
+    pub(super) fn displacement_m(&self, chainage_m: f64, arc_m: f64, perimeter_m: f64) -> f64 {
         let along = (chainage_m - self.chainage_m) / self.half_length_m;
         if along.abs() >= 1.0 {
             return 0.0;
         }
-        let across = self.off_middle_m(sigma_m, perimeter_m) / self.half_width_m;
+        let across = self.off_middle_m(arc_m, perimeter_m) / self.half_width_m;
         if across >= 1.0 {
             return 0.0;
         }
@@ -57,19 +57,19 @@ impl Bulge {
     }
 
     /// Whether it comes within `margin_m` of this arc length.
-    pub(super) fn covers(&self, sigma_m: f64, perimeter_m: f64, margin_m: f64) -> bool {
-        self.off_middle_m(sigma_m, perimeter_m) < self.half_width_m + margin_m
+    pub(super) fn covers(&self, arc_m: f64, perimeter_m: f64, margin_m: f64) -> bool {
+        self.off_middle_m(arc_m, perimeter_m) < self.half_width_m + margin_m
     }
 
     /// Whether the two share a place.
     pub(super) fn overlaps(&self, other: &Self, perimeter_m: f64) -> bool {
         self.begin_m() < other.end_m()
             && other.begin_m() < self.end_m()
-            && self.covers(other.sigma_m, perimeter_m, other.half_width_m)
+            && self.covers(other.arc_m, perimeter_m, other.half_width_m)
     }
 
-    fn off_middle_m(&self, sigma_m: f64, perimeter_m: f64) -> f64 {
-        math::wrap_signed(sigma_m - self.sigma_m, perimeter_m).abs()
+    fn off_middle_m(&self, arc_m: f64, perimeter_m: f64) -> f64 {
+        math::wrap_signed(arc_m - self.arc_m, perimeter_m).abs()
     }
 }
 

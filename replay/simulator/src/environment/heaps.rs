@@ -68,12 +68,12 @@ fn parse_bulge(table: &Section<'_>, site: &Site<'_>, feature: u16) -> Result<Bul
     if depth_m == 0.0 {
         return Err(table.invalid("depth_m", "must not be 0: inwards is positive, outwards negative"));
     }
-    let sigma_m = table.number("sigma_m", -500.0..=500.0)?.unwrap_or_else(|| crown_m(site.profile));
+    let arc_m = table.number("arc_m", -500.0..=500.0)?.unwrap_or_else(|| crown_m(site.profile));
     Ok(Bulge {
         feature,
         chainage_m,
         half_length_m: length_m / 2.0,
-        sigma_m,
+        arc_m,
         half_width_m: width_m / 2.0,
         depth_m,
     })
@@ -114,7 +114,7 @@ impl Heap {
             feature: self.feature,
             chainage_m: self.chainage_m,
             half_length_m: self.length_m / 2.0,
-            sigma_m: 0.0,
+            arc_m: 0.0,
             half_width_m: self.width_m / 2.0,
             depth_m: height_m,
         }
@@ -171,7 +171,7 @@ fn nearest_wall_m(bulge: &Bulge, site: &Site<'_>) -> f64 {
     let [ry, rz] = site.profile.reference();
     let distance_m = |k: u32| {
         let share = 2.0 * f64::from(k) / f64::from(PLACES) - 1.0;
-        let [y, z] = site.profile.point_at(bulge.sigma_m + share * bulge.half_width_m);
+        let [y, z] = site.profile.point_at(bulge.arc_m + share * bulge.half_width_m);
         math::hypot(y - ry, z - rz)
     };
     let least_m = (0..=PLACES).map(distance_m).fold(f64::INFINITY, f64::min);
@@ -181,5 +181,5 @@ fn nearest_wall_m(bulge: &Bulge, site: &Site<'_>) -> f64 {
 /// Arc length of the wall above the reference point, m.
 fn crown_m(profile: &Profile) -> f64 {
     let [y, z] = profile.reference();
-    profile.sigma_of([y, z + 1.0])
+    profile.arc_of([y, z + 1.0])
 }

@@ -253,9 +253,9 @@ impl Environment {
     /// chart.
     ///
     /// Source: metrics.md, "The unrolled wall".
-    pub fn sigma_m(&self, point: Point3<Tunnel>) -> f64 {
+    pub fn arc_m(&self, point: Point3<Tunnel>) -> f64 {
         let [_, y, z] = self.axis().chart(point);
-        self.design.sigma_of([y, z])
+        self.design.arc_of([y, z])
     }
 
     /// Names of the features, in the order of the scene.

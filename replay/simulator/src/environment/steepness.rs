@@ -25,7 +25,7 @@ pub(super) struct Steepness {
 /// The wall in one direction.
 #[derive(Debug, Clone, Copy)]
 struct View {
-    sigma_m: f64,
+    arc_m: f64,
     /// Its distance from the reference point, m.
     radius_m: f64,
     /// The distance of its tangent from there, m.
@@ -42,7 +42,7 @@ impl Steepness {
             let (sin, cos) = math::sin_cos(TAU * f64::from(k) / f64::from(DIRECTIONS));
             let hit = profile.cast_from_inside(reference, [cos, sin])?;
             let tangent_m = -(hit.normal[0] * cos + hit.normal[1] * sin) * hit.range_m;
-            Some(View { sigma_m: hit.sigma_m, radius_m: hit.range_m, tangent_m })
+            Some(View { arc_m: hit.arc_m, radius_m: hit.range_m, tangent_m })
         };
         Self {
             views: (0..DIRECTIONS).filter_map(view).collect(),
@@ -76,7 +76,7 @@ impl Steepness {
         // The way along the wall to the next direction but one.
         let margin_m = 2.0 * TAU / f64::from(DIRECTIONS) * view.radius_m * view.radius_m / view.tangent_m;
         let (mut inwards_m, mut outwards_m, mut along, mut across) = (0.0, 0.0, 0.0, 0.0);
-        for bulge in bulges.iter().filter(|b| b.covers(view.sigma_m, self.perimeter_m, margin_m)) {
+        for bulge in bulges.iter().filter(|b| b.covers(view.arc_m, self.perimeter_m, margin_m)) {
             inwards_m += bulge.depth_m.max(0.0);
             outwards_m += (-bulge.depth_m).max(0.0);
             along += bulge.steepest_along();

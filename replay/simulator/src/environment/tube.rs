@@ -172,17 +172,17 @@ impl Tube {
         [fy + (unscaled[0] - fy) * scale, fz + (unscaled[1] - fz) * scale]
     }
 
-    /// Place (y, z) of the wall at `chainage_m` and `sigma_m` of the unscaled profile, displacements included; and the
+    /// Place (y, z) of the wall at `chainage_m` and `arc_m` of the unscaled profile, displacements included; and the
     /// profile's normal there, inwards.
-    pub(super) fn wall_place(&self, chainage_m: f64, sigma_m: f64) -> (Yz, Yz) {
+    pub(super) fn wall_place(&self, chainage_m: f64, arc_m: f64) -> (Yz, Yz) {
         let reference = self.profile.reference();
-        let [wy, wz] = self.profile.point_at(sigma_m);
+        let [wy, wz] = self.profile.point_at(arc_m);
         let out = [wy - reference[0], wz - reference[1]];
         let normal = self.profile.cast_from_inside(reference, out).map_or([0.0, 1.0], |hit| hit.normal);
         let radius_m = self.scale(chainage_m) * math::hypot(out[0], out[1]);
         let perimeter_m = self.profile.perimeter_m();
         let inwards_m: f64 =
-            self.bulges.iter().map(|b| b.displacement_m(chainage_m, sigma_m, perimeter_m)).sum();
+            self.bulges.iter().map(|b| b.displacement_m(chainage_m, arc_m, perimeter_m)).sum();
         let share = 1.0 - inwards_m / radius_m;
         let place = [reference[0] + share * out[0], reference[1] + share * out[1]];
         (self.scaled(chainage_m, place), normal)
@@ -247,7 +247,7 @@ impl Tube {
         }
         Face {
             normal: self.falling(stretch, point),
-            feature: self.displaced_by(stretch, chainage_m, hit.sigma_m),
+            feature: self.displaced_by(stretch, chainage_m, hit.arc_m),
         }
     }
 
@@ -360,8 +360,7 @@ impl Tube {
         }
         let perimeter_m = self.profile.perimeter_m();
         let near = stretch.bulges.iter().filter_map(|k| self.bulges.get(*k));
-        let inwards_m: f64 =
-            near.map(|bulge| bulge.displacement_m(chainage_m, hit.sigma_m, perimeter_m)).sum();
+        let inwards_m: f64 = near.map(|bulge| bulge.displacement_m(chainage_m, hit.arc_m, perimeter_m)).sum();
         distance_m * scale / (distance_m * hit.range_m * scale - inwards_m)
     }
 
@@ -396,10 +395,10 @@ impl Tube {
     }
 
     /// The feature that displaces the wall most.
-    fn displaced_by(&self, stretch: &Stretch, chainage_m: f64, sigma_m: f64) -> Option<u16> {
+    fn displaced_by(&self, stretch: &Stretch, chainage_m: f64, arc_m: f64) -> Option<u16> {
         let perimeter_m = self.profile.perimeter_m();
         let near = stretch.bulges.iter().filter_map(|k| self.bulges.get(*k));
-        near.map(|bulge| (bulge.displacement_m(chainage_m, sigma_m, perimeter_m).abs(), bulge.feature))
+        near.map(|bulge| (bulge.displacement_m(chainage_m, arc_m, perimeter_m).abs(), bulge.feature))
             .filter(|(by_m, _)| *by_m > FEATURE_M)
             .max_by(|a, b| a.0.total_cmp(&b.0))
             .map(|(_, feature)| feature)

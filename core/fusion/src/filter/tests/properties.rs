@@ -230,7 +230,7 @@ impl Augmented {
     }
 
     /// Standard deviation of the difference of chainage at `arm`, of now against a clone so many back.
-    fn sigma_m(&self, back: usize, arm: Vec3<Tunnel>) -> f64 {
+    fn arc_m(&self, back: usize, arm: Vec3<Tunnel>) -> f64 {
         let (then, cross) = &self.clones[self.clones.len() - 1 - back];
         let weights = [(POSITION, 1.0), (ATTITUDE + 1, arm.z()), (ATTITUDE + 2, -arm.y())];
         let mut sum = 0.0;
@@ -290,11 +290,11 @@ fn the_trail_knows_what_an_augmented_filter_knows() {
             for back in 1..augmented.clones.len().min(60) {
                 let relative = trail.relative(DurNs::from_millis(2000 * back as i64)).unwrap();
                 for arm in [Vec3::zero(), Vec3::new(0.0, 4.0, 0.0), Vec3::new(0.0, -2.0, 5.0)] {
-                    let (is, right) = (relative.sigma_m(arm), augmented.sigma_m(back, arm));
+                    let (is, right) = (relative.sd_m(arm), augmented.arc_m(back, arm));
                     assert!((is / right - 1.0).abs() < 1e-6, "clone {clone}, {back} back: {is}, not {right}");
                 }
             }
         }
-        assert!(trail.relative(DurNs(0)).unwrap().sigma_m(Vec3::zero()) < 1e-12);
+        assert!(trail.relative(DurNs(0)).unwrap().sd_m(Vec3::zero()) < 1e-12);
     }
 }

@@ -26,7 +26,7 @@ pub(super) const OTHER: usize = 10;
 /// When the rig's time is 0 s.
 const ORIGIN: MonoNs = MonoNs(5_000_000_000_000);
 const DEVICE_MPS: f64 = 1500.0;
-/// Errors of the filter may be so many of its own sigmas.
+/// Errors of the filter may be so many of its own sd.
 const MOST_SIGMAS: f64 = 4.0;
 
 /// A reading on its way.
@@ -156,7 +156,7 @@ impl Rig {
     }
 
     /// Holds the filter to what must be so at any time: numbers that are finite, variances above zero, and a fix that is
-    /// right by its own sigmas or none. Once an epoch, since nothing else changes between.
+    /// right by its own sd or none. Once an epoch, since nothing else changes between.
     pub(super) fn check(&self, nav: &FilterNavigation, now: MonoNs, tally: &mut Tally) {
         let Some(running) = nav.running() else {
             assert!(nav.fix(now).is_err());
@@ -210,7 +210,7 @@ impl Rig {
             let turn = (turned.dot(axis), math::sqrt(running.factors.variance(ATTITUDE + k)));
             for (what, (off, sigma)) in [("place", place), ("turn", turn)] {
                 let share = off.abs() / sigma;
-                tally.sigmas = tally.sigmas.max(share);
+                tally.sd = tally.sd.max(share);
                 assert!(
                     share <= MOST_SIGMAS,
                     "{what} {k} at {} s is off by {off}, sigma {sigma}",
@@ -218,7 +218,7 @@ impl Rig {
                 );
             }
         }
-        assert!(fix.speed_mps.is_finite() && fix.relative.sigma_m(Vec3::new(0.0, 3.0, 3.0)).is_finite());
+        assert!(fix.speed_mps.is_finite() && fix.relative.sd_m(Vec3::new(0.0, 3.0, 3.0)).is_finite());
     }
 
     pub(super) fn noisy(&self, t: f64, salt: u64, sd: f64) -> f64 {
@@ -343,6 +343,6 @@ pub(super) struct Tally {
     pub(super) lacking: u32,
     /// What the last of them lacked.
     pub(super) lacks: Option<NoFix>,
-    /// The largest error, in sigmas.
-    pub(super) sigmas: f64,
+    /// The largest error, in sd.
+    pub(super) sd: f64,
 }

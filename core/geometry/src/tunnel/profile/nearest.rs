@@ -9,7 +9,7 @@ pub struct Nearest {
     /// Distance to it, m, never negative.
     pub distance_m: f64,
     /// Its arc length, m.
-    pub sigma_m: f64,
+    pub arc_m: f64,
     /// The place.
     pub point: Yz,
 }
@@ -20,14 +20,14 @@ impl Profile {
     ///
     /// Allocates: no.
     pub fn nearest(&self, point: Yz) -> Nearest {
-        let mut best = Nearest { distance_m: f64::INFINITY, sigma_m: 0.0, point: self.reference };
+        let mut best = Nearest { distance_m: f64::INFINITY, arc_m: 0.0, point: self.reference };
         for element in &self.elements {
             let place = element.nearest(point);
             let distance_m = norm(sub(point, place));
             if distance_m < best.distance_m {
                 let along = element.along(place).clamp(0.0, element.length_m);
-                let sigma_m = math::wrap(element.sigma_m + along, self.perimeter_m);
-                best = Nearest { distance_m, sigma_m, point: place };
+                let arc_m = math::wrap(element.arc_m + along, self.perimeter_m);
+                best = Nearest { distance_m, arc_m, point: place };
             }
         }
         best
@@ -84,7 +84,7 @@ mod tests {
                     let dense = by_places(profile, point);
                     assert!(nearest.distance_m <= dense + 1e-12, "{point:?}");
                     assert!(nearest.distance_m > dense - 3e-4, "{point:?}: {nearest:?}, {dense}");
-                    let there = profile.point_at(nearest.sigma_m);
+                    let there = profile.point_at(nearest.arc_m);
                     assert!(norm(sub(there, nearest.point)) < 1e-9, "{point:?}: {nearest:?}, {there:?}");
                 }
             }
@@ -101,11 +101,11 @@ mod tests {
     fn a_point_of_the_wall_is_no_distance_away() {
         let profile = shapes::ceran_blueprint().unwrap();
         for k in 0..1000 {
-            let sigma_m = f64::from(k) * 0.03417;
-            let nearest = profile.nearest(profile.point_at(sigma_m));
+            let arc_m = f64::from(k) * 0.03417;
+            let nearest = profile.nearest(profile.point_at(arc_m));
             assert!(nearest.distance_m < 1e-9);
-            let off = math::wrap_signed(nearest.sigma_m - sigma_m, profile.perimeter_m());
-            assert!(off.abs() < 1e-9, "{sigma_m}: {nearest:?}");
+            let off = math::wrap_signed(nearest.arc_m - arc_m, profile.perimeter_m());
+            assert!(off.abs() < 1e-9, "{arc_m}: {nearest:?}");
         }
     }
 }

@@ -34,14 +34,14 @@ fn val_ceran_has_the_errata_s_dimensions() {
 }
 
 #[test]
-fn sigma_begins_at_the_floor_s_centre_and_grows_with_the_head_angle() {
+fn arc_length_begins_at_the_floor_s_centre_and_grows_with_the_head_angle() {
     for (name, profile) in all() {
         let mut last = -1.0;
         for degree in 0..360 {
             let d: Vec3<_> = head_direction(f64::from(degree).to_radians());
             let hit = profile.cast(profile.reference(), [d.y(), d.z()]).unwrap();
-            assert!(hit.sigma_m > last, "{name} at {degree} deg: {} after {last}", hit.sigma_m);
-            last = hit.sigma_m;
+            assert!(hit.arc_m > last, "{name} at {degree} deg: {} after {last}", hit.arc_m);
+            last = hit.arc_m;
             if degree == 90 {
                 assert!(hit.point[0] > 0.0, "{name}: 90 deg is left");
             }
@@ -67,8 +67,8 @@ fn verif_ranges_agree_with_a_dense_polyline() {
             let (a, b) =
                 (profile.cast(origin, direction).unwrap(), polyline.cast(origin, direction).unwrap());
             assert!((a.range_m - b.range_m).abs() < 2e-3, "{name}: {} and {}", a.range_m, b.range_m);
-            let apart = math::wrap_signed(a.sigma_m - b.sigma_m, profile.perimeter_m());
-            assert!(apart.abs() < 3e-3, "{name}: {} and {}", a.sigma_m, b.sigma_m);
+            let apart = math::wrap_signed(a.arc_m - b.arc_m, profile.perimeter_m());
+            assert!(apart.abs() < 3e-3, "{name}: {} and {}", a.arc_m, b.arc_m);
         }
     }
 }
@@ -77,13 +77,13 @@ fn verif_ranges_agree_with_a_dense_polyline() {
 fn a_ray_through_a_corner_hits_it_as_do_its_neighbours_an_ulp_away() {
     for (name, profile) in all() {
         let origin = profile.reference();
-        for sigma in profile.corners_m() {
-            let corner = profile.point_at(sigma);
+        for arc in profile.corners_m() {
+            let corner = profile.point_at(arc);
             let exact = [corner[0] - origin[0], corner[1] - origin[1]];
             for direction in [exact, [exact[0].next_up(), exact[1]], [exact[0].next_down(), exact[1]]] {
                 let hit = profile.cast(origin, direction).unwrap();
                 assert!((hit.range_m - 1.0).abs() < 1e-12, "{name} at {corner:?}: {}", hit.range_m);
-                let apart = math::wrap_signed(hit.sigma_m - sigma, profile.perimeter_m());
+                let apart = math::wrap_signed(hit.arc_m - arc, profile.perimeter_m());
                 assert!(apart.abs() < 1e-9, "{name} at {corner:?}");
             }
         }
@@ -105,7 +105,7 @@ fn rays_from_a_millimetre_off_the_wall_and_nearly_along_it_end_on_the_wall() {
                 let (n, t) = (wall.normal, [-wall.normal[1], wall.normal[0]]);
                 let direction = [-n[0] * cos + t[0] * sin, -n[1] * cos + t[1] * sin];
                 let hit = profile.cast(origin, direction).unwrap_or_else(|| panic!("{name} {off_deg}"));
-                let back = profile.point_at(hit.sigma_m);
+                let back = profile.point_at(hit.arc_m);
                 let error = math::hypot(back[0] - hit.point[0], back[1] - hit.point[1]);
                 assert!(error < 1e-9, "{name} {off_deg}: {error}");
                 if off_deg == 0.0 {
@@ -162,7 +162,7 @@ fn repeated_and_collinear_points_and_slivers_change_nothing() {
         let angle = TAU * f64::from(step) / 60.0;
         let direction = [math::cos(angle), math::sin(angle)];
         let (a, b) = (plain.cast([0.5, 1.0], direction).unwrap(), messy.cast([0.5, 1.0], direction).unwrap());
-        assert!((a.range_m - b.range_m).abs() < 1e-11 && (a.sigma_m - b.sigma_m).abs() < 1e-10);
+        assert!((a.range_m - b.range_m).abs() < 1e-11 && (a.arc_m - b.arc_m).abs() < 1e-10);
     }
 }
 
@@ -171,10 +171,10 @@ proptest! {
     #[test]
     fn point_at_and_sigma_of_are_inverse(which in 0usize..7, share in 0.0f64..1.0) {
         let (name, profile) = all().swap_remove(which);
-        let sigma = share * profile.perimeter_m();
-        let back = profile.sigma_of(profile.point_at(sigma));
-        let apart = math::wrap_signed(back - sigma, profile.perimeter_m());
-        prop_assert!(apart.abs() < 1e-9, "{} at {}: {}", name, sigma, back);
+        let arc = share * profile.perimeter_m();
+        let back = profile.arc_of(profile.point_at(arc));
+        let apart = math::wrap_signed(back - arc, profile.perimeter_m());
+        prop_assert!(apart.abs() < 1e-9, "{} at {}: {}", name, arc, back);
     }
 
     /// Casting reversed: from the hit back towards the origin, the origin lies at the same distance.
@@ -184,7 +184,7 @@ proptest! {
         let origin = [profile.reference()[0] + y, profile.reference()[1] + z];
         let direction = [math::cos(turn * TAU), math::sin(turn * TAU)];
         let hit = profile.cast(origin, direction).unwrap();
-        let wall = profile.point_at(hit.sigma_m);
+        let wall = profile.point_at(hit.arc_m);
         let along = [origin[0] + hit.range_m * direction[0], origin[1] + hit.range_m * direction[1]];
         prop_assert!(math::hypot(wall[0] - along[0], wall[1] - along[1]) < 1e-9);
         prop_assert!((math::hypot(hit.normal[0], hit.normal[1]) - 1.0).abs() < 1e-12);

@@ -130,12 +130,12 @@ fn bends_stations_and_bulges_together() {
 }
 
 #[test]
-fn sigma_is_the_designs_in_the_axis_chart() {
+fn arc_length_is_the_designs_in_the_axis_chart() {
     let design = shapes::ceran().unwrap();
     let environment =
         parse(&format!("{}[tunnel.as_built]\nprofile = \"circle\"\nradius_m = 4", bends()), &design);
     for (chainage, y, z) in [(3.0, 1.0, 0.5), (17.0, -2.0, 6.0), (40.0, 2.0, 5.0)] {
         let place = environment.axis().place(chainage, [y, z]);
-        assert!((environment.sigma_m(place) - design.sigma_of([y, z])).abs() < 1e-9);
+        assert!((environment.arc_m(place) - design.arc_of([y, z])).abs() < 1e-9);
     }
 }
