@@ -20,10 +20,10 @@ use std::time::Duration;
 use crossbeam::queue::SegQueue;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::App;
-use headrace_ports::{Crew, Hand, Stand, now, wait_for_any};
+use headrace_ports::{Connection, EmulatedPort, Supervisor, now, wait_for_any};
 use headrace_sensor::connect::{Connect, SerialPort, UsbIdentity};
 use headrace_sensor::device::Direction;
-use headrace_sensor::driver::{Carrier, Driver, DriverSetup, Standing, Wire};
+use headrace_sensor::driver::{Carrier, DeviceHealth, Driver, DriverSetup, Wire};
 use headrace_simulator::{START, Scene, Simulation};
 use headrace_tests::scenes;
 
@@ -193,12 +193,12 @@ impl Driver for Timed {
         self.driver.awaits()
     }
 
-    fn patience(&self) -> DurNs {
-        self.driver.patience()
+    fn silence_timeout(&self) -> DurNs {
+        self.driver.silence_timeout()
     }
 
-    fn standing(&self) -> Standing {
-        self.driver.standing()
+    fn health(&self) -> DeviceHealth {
+        self.driver.health()
     }
 }
 
@@ -257,8 +257,8 @@ fn bare_reads(mut finish: Finish, mut read: impl FnMut(&mut [u8]) -> usize) {
 
 /// The ends of one sensor's two ports: the driver's and the yardstick's; on a bus both hear the same one.
 struct Ends {
-    ours: Stand,
-    twin: Option<Stand>,
+    ours: EmulatedPort,
+    twin: Option<EmulatedPort>,
     courses: [Course; 2],
 }
 
@@ -266,12 +266,15 @@ impl Ends {
     fn new(carrier: Carrier, number: usize, descriptor: Option<&[u8]>) -> std::io::Result<Self> {
         let hid = |name: &str| {
             let serial = Some(format!("{name}-{number}"));
-            Stand::hid(&UsbIdentity { vendor: 0x1209, product: 1, serial }, descriptor.unwrap_or_default())
+            EmulatedPort::hid(
+                &UsbIdentity { vendor: 0x1209, product: 1, serial },
+                descriptor.unwrap_or_default(),
+            )
         };
         let (ours, twin) = match carrier {
             Carrier::Hid => (hid("ours")?, Some(hid("twin")?)),
-            Carrier::Can => (Stand::new(carrier, LOCAL)?, None),
-            _ => (Stand::new(carrier, LOCAL)?, Some(Stand::new(carrier, LOCAL)?)),
+            Carrier::Can => (EmulatedPort::new(carrier, LOCAL)?, None),
+            _ => (EmulatedPort::new(carrier, LOCAL)?, Some(EmulatedPort::new(carrier, LOCAL)?)),
         };
         Ok(Self { ours, twin, courses: Default::default() })
     }
@@ -283,7 +286,7 @@ impl Ends {
     /// Puts a message on both, in turns ours first.
     fn write(&mut self, bytes: &[u8], ours_first: bool) {
         let [ours, twin] = &self.courses;
-        let write = |stand: &mut Stand, courses: &[&Course]| {
+        let write = |stand: &mut EmulatedPort, courses: &[&Course]| {
             if stand.is_called() {
                 let copies: Vec<Vec<u8>> = courses.iter().map(|_| bytes.to_vec()).collect();
                 let at = now();
@@ -329,14 +332,14 @@ fn rehearse(scene: &Scene, ends: Vec<Ends>, measured: Duration) -> Measured {
     let mut dive = app.arm(vehicle.navigation()).unwrap();
     let mut programs = vehicle.programs().unwrap().into_iter();
     let begun = now();
-    let mut hands = Vec::new();
+    let mut connections = Vec::new();
     for (source, ends) in ends.iter().enumerate() {
         let device = &vehicle.sensors[source];
         let head = device.head().and_then(|_| programs.next());
         let driver = device.driver(&DriverSetup { begun, head });
         let driver = Box::new(Timed { driver, finish: Finish::new(&ends.courses[0]) });
         let port = dive.take_port(source).unwrap();
-        hands.push(Hand { source, connect: Ok(ends.ours.connect().clone()), port, driver });
+        connections.push(Connection { source, connect: Ok(ends.ours.connect().clone()), port, driver });
         let (connect, finish) = (ends.twin_connect(), Finish::new(&ends.courses[1]));
         named(&format!("bare {source}"), move || bare(&connect, finish));
     }
@@ -345,11 +348,11 @@ fn rehearse(scene: &Scene, ends: Vec<Ends>, measured: Duration) -> Measured {
     let simulation = Simulation::for_hosts(scene).unwrap();
     let flag = Arc::clone(&ending);
     let devices = named("devices", move || emulate(simulation, ends, &flag));
-    let crew = Crew::start(hands, None).unwrap();
+    let supervisor = Supervisor::start(connections, None).unwrap();
     let flag = Arc::clone(&ending);
     let serving = named("loop", move || {
-        crew.run(&mut dive, &|| flag.load(Ordering::Relaxed), &mut |_| {});
-        crew.stop(&mut dive, &mut |_| ());
+        supervisor.run(&mut dive, &|| flag.load(Ordering::Relaxed), &mut |_| {});
+        supervisor.stop(&mut dive, &mut |_| ());
     });
     thread::sleep(Duration::from_secs_f64(WARMING.as_secs_f64()));
     for course in courses.iter().flatten() {

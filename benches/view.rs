@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use headrace_geometry::time::MonoNs;
 use headrace_geometry::tunnel::shapes;
-use headrace_replay::log::{Companion, LogHeader, LogReader, LogWriter, Made, MessageKind};
+use headrace_replay::log::{DerivedChannels, LogHeader, LogReader, LogWriter, Made, MessageKind};
 use headrace_replay::record::result_channels;
 use headrace_replay::view::{Site, View};
 

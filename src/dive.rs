@@ -7,11 +7,11 @@ use headrace_monitor::App;
 use headrace_monitor::outlet::{NoticeOutlet, NoticeReceiver};
 use headrace_monitor::report::{LineReport, LogReport, Report};
 use headrace_monitor::run::Loop;
-use headrace_ports::Crew;
+use headrace_ports::Supervisor;
 use headrace_replay::drive::{Feed, Pace, drive};
 use headrace_replay::log::{
-    Companion, Every, LeftOut, LogHeader, Recorder, RecorderHandle, Rotation, SentPort, SourceInfo, Summary,
-    dive_name, files_digest, files_of,
+    DerivedChannels, Every, LeftOut, LogHeader, Recorder, RecorderHandle, Rotation, SentPort, SourceInfo,
+    Summary, dive_name, files_digest, files_of,
 };
 use headrace_replay::player::seconds;
 use headrace_replay::record::{QUEUE_BYTES, RecorderOutlet, result_channels};
@@ -101,7 +101,7 @@ pub(crate) fn assemble_with(
             if clock == Clock::Ours {
                 anchor(&mut header);
             }
-            let view: Option<Box<dyn Companion>> = Some(Box::new(View::new(view_site(vehicle))));
+            let view: Option<Box<dyn DerivedChannels>> = Some(Box::new(View::new(view_site(vehicle))));
             let (port, handle) = match rotate {
                 None => Recorder::create(path, &header, QUEUE_BYTES, view),
                 Some(every) => {
@@ -257,20 +257,20 @@ impl Dive {
     /// Runs the loop on the ports until `ended` returns true; returns the report. `beside` is called after every tick.
     pub(crate) fn run_live(
         mut self,
-        crew: Crew,
+        supervisor: Supervisor,
         ended: &dyn Fn() -> bool,
         watch: &mut Watch,
-        beside: &mut dyn FnMut(&Crew, &mut Watch),
+        beside: &mut dyn FnMut(&Supervisor, &mut Watch),
     ) -> Result<Report, Failure> {
         let notices = self.notices.clone();
         let phase = Phase::start("dive");
-        crew.run(&mut self.armed, ended, &mut |dive| {
+        supervisor.run(&mut self.armed, ended, &mut |dive| {
             while let Some(notice) = notices.next() {
                 watch.notice(&notice, dive);
             }
-            beside(&crew, watch);
+            beside(&supervisor, watch);
         });
-        let histories = crew.stop(&mut self.armed, &mut |_| ());
+        let histories = supervisor.stop(&mut self.armed, &mut |_| ());
         drop(phase);
         while let Some(notice) = notices.next() {
             watch.notice(&notice, &self.armed);

@@ -5,7 +5,7 @@ use std::path::Path;
 use headrace_config as config;
 use headrace_config::Document;
 use headrace_geometry::time::{DurNs, MonoNs};
-use headrace_ports::{Stand, wait_for_any};
+use headrace_ports::{EmulatedPort, wait_for_any};
 use headrace_sensor::connect::Connect;
 use headrace_sensor::device::Direction;
 use headrace_sensor::driver::Carrier;
@@ -40,21 +40,21 @@ pub(crate) fn emulate(args: &Emulate) -> Result<u8, Failure> {
 }
 
 /// A port for each sensor, of the carrier of its `connect`, or UDP where this machine doesn't have that.
-fn stands(scene: &Scene, args: &Emulate) -> Result<Vec<Stand>, Failure> {
+fn stands(scene: &Scene, args: &Emulate) -> Result<Vec<EmulatedPort>, Failure> {
     let mut stands = Vec::new();
     for ((id, asked), device) in connections(&scene.vehicle).into_iter().zip(&scene.vehicle.sensors) {
         let carrier = asked.as_ref().map_or(Carrier::Udp, Connect::carrier);
         let stand = match (asked, device.report_descriptor()) {
-            (Ok(Connect::Hid(identity)), Some(descriptor)) => Stand::hid(&identity, &descriptor),
+            (Ok(Connect::Hid(identity)), Some(descriptor)) => EmulatedPort::hid(&identity, &descriptor),
             #[cfg(target_os = "linux")]
             (Ok(Connect::Can { interface }), _) if headrace_ports::is_interface_up(&interface) => {
-                Stand::can(&interface)
+                EmulatedPort::can(&interface)
             }
-            _ => Stand::new(carrier, args.listen),
+            _ => EmulatedPort::new(carrier, args.listen),
         };
         let stand = stand.or_else(|error| {
             eprintln!("headrace: {id}: no {} on this machine ({error}); using UDP", carrier.as_str());
-            Stand::new(Carrier::Udp, args.listen)
+            EmulatedPort::new(Carrier::Udp, args.listen)
         });
         stands.push(stand.map_err(|source| Failure::System { what: "opening a port for a device", source })?);
     }
@@ -62,7 +62,7 @@ fn stands(scene: &Scene, args: &Emulate) -> Result<Vec<Stand>, Failure> {
 }
 
 /// Writes the vehicle file and the files that it refers to.
-fn write_vehicle(scene: &Scene, stands: &[Stand], folder: &Path, file: &Path) -> Result<(), Failure> {
+fn write_vehicle(scene: &Scene, stands: &[EmulatedPort], folder: &Path, file: &Path) -> Result<(), Failure> {
     let failed = |path: &Path, source| Failure::Write { path: path.to_owned(), source };
     let ids = scene.vehicle.sensor_configs.iter().map(|config| &config.id);
     let changed =
@@ -107,7 +107,7 @@ fn with_connects(scene: &Scene) -> String {
 /// The simulated devices and their ports.
 struct Rehearsal {
     simulation: Simulation,
-    stands: Vec<Stand>,
+    stands: Vec<EmulatedPort>,
     /// Start of the simulation on this machine's clock.
     origin: MonoNs,
 }

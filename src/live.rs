@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use headrace_geometry::time::{DurNs, MonoNs};
-use headrace_ports::{Crew, Hand, Phase, SentSink, Status};
+use headrace_ports::{Connection, Phase, SentSink, Status, Supervisor};
 use headrace_replay::log::part_path;
 use headrace_sensor::connect::{Connect, ConnectError};
 use headrace_sensor::driver::DriverSetup;
@@ -27,7 +27,7 @@ pub(crate) fn run(args: &Run, text: &str, vehicle: &VehicleConfig) -> Result<u8,
         (!args.no_record).then_some(Recording { path: &log, clock: Clock::Ours, rotate: args.rotate });
     let mut dive = assemble(vehicle, text, recording)?;
     let begun = headrace_ports::now();
-    let crew = crew(&mut dive, vehicle, begun)?;
+    let supervisor = supervisor(&mut dive, vehicle, begun)?;
     let interrupted = interrupts()?;
     let until = args.duration.map(|seconds| begun + DurNs::from_secs_f64(seconds));
     let mut watch = Watch::unless(args.output.json);
@@ -51,8 +51,8 @@ pub(crate) fn run(args: &Run, text: &str, vehicle: &VehicleConfig) -> Result<u8,
             || until.is_some_and(|until| now >= until)
             || states.borrow().missing(now).is_some()
     };
-    let report = dive.run_live(crew, &ended, &mut watch, &mut |crew, watch| {
-        while let Some(status) = crew.next_status() {
+    let report = dive.run_live(supervisor, &ended, &mut watch, &mut |supervisor, watch| {
+        while let Some(status) = supervisor.next_status() {
             states.borrow_mut().show(&status, watch);
         }
     })?;
@@ -97,14 +97,19 @@ fn required(args: &Run, vehicle: &VehicleConfig) -> Result<Vec<usize>, Failure> 
 }
 
 /// A thread per connection, with the drivers of the sensors on it.
-fn crew(dive: &mut Dive, vehicle: &VehicleConfig, begun: MonoNs) -> Result<Crew, Failure> {
+fn supervisor(dive: &mut Dive, vehicle: &VehicleConfig, begun: MonoNs) -> Result<Supervisor, Failure> {
     let mut programs = vehicle.programs().map_err(Failure::Plan)?.into_iter();
-    let mut hands = Vec::new();
+    let mut served = Vec::new();
     for (source, (_, connect)) in connections(vehicle).into_iter().enumerate() {
         let Some(device) = vehicle.sensors.get(source) else { continue };
         let head = device.head().and_then(|_| programs.next());
         let Some(port) = dive.armed.take_port(source) else { continue };
-        hands.push(Hand { source, connect, port, driver: device.driver(&DriverSetup { begun, head }) });
+        served.push(Connection {
+            source,
+            connect,
+            port,
+            driver: device.driver(&DriverSetup { begun, head }),
+        });
     }
     let sent = dive.sent_port().map(|port| {
         let sink: SentSink = Arc::new(move |source, at, bytes: &[u8]| {
@@ -112,7 +117,8 @@ fn crew(dive: &mut Dive, vehicle: &VehicleConfig, begun: MonoNs) -> Result<Crew,
         });
         sink
     });
-    Crew::start(hands, sent).map_err(|source| Failure::System { what: "starting the port threads", source })
+    Supervisor::start(served, sent)
+        .map_err(|source| Failure::System { what: "starting the port threads", source })
 }
 
 /// A flag set by SIGINT or SIGTERM; a second signal ends the program at once.

@@ -1,12 +1,12 @@
 //! A vehicle at rest in the middle of a tunnel: every sensor shows what it should, so that nothing is gated.
 
+use headrace_fusion::filter::clones::ErrorClones;
+use headrace_fusion::filter::eskf::{Context, Eskf};
 use headrace_fusion::filter::factors::Factors;
 use headrace_fusion::filter::inertial::{Felt, Leg};
-use headrace_fusion::filter::running::{Context, Running};
 use headrace_fusion::filter::settings::Settings;
 use headrace_fusion::filter::sources::Source;
 use headrace_fusion::filter::state::{ERRORS, State};
-use headrace_fusion::filter::trail::Trail;
 use headrace_fusion::filter::window::{Waiting, Window};
 use headrace_geometry::frames::{Body, Mount, Point3, Rot, Sensor, Vec3};
 use headrace_geometry::math;
@@ -22,7 +22,7 @@ pub(crate) const GRAVITY_MPS2: f64 = 9.806_65;
 pub(crate) const SAMPLE_S: f64 = 0.01;
 const SAMPLE: DurNs = DurNs(10_000_000);
 const SAMPLES: usize = 10;
-/// Two minutes fill the trail.
+/// Two minutes fill the clones.
 const EPOCHS_BEFORE: usize = 1300;
 /// The echosounders look left, right and up.
 const YAWS_AND_PITCHES: [(f64, f64); 3] =
@@ -36,7 +36,7 @@ pub(crate) struct Dive {
     context: Context,
     window: Window,
     sources: [Option<Source>; MAX_SOURCES],
-    running: Running,
+    running: Eskf,
     readings: [(usize, Reading); SOUNDERS + 3],
 }
 
@@ -79,7 +79,7 @@ impl Dive {
         let water = WaterPressure { pressure_pa, resolution_pa: 10.0, temperature_degc: 10.0 };
         readings[DEPTH] = (DEPTH, Reading::Pressure(water));
         let settings = Settings::default();
-        let mut running = Running::default();
+        let mut running = Eskf::default();
         running.begin(MonoNs(0), state, Factors::independent([0.01; ERRORS]));
         let context = Context { profile, site, settings, unit_at: Vec3::zero() };
         Self { context, window: Window::default(), sources, running, readings }
@@ -125,9 +125,9 @@ impl Dive {
         self.running.factors
     }
 
-    /// The trail, and when its last clone may have been made.
-    pub(crate) fn trail(&self) -> (Trail, MonoNs) {
-        (self.running.trail.clone(), self.running.at)
+    /// The clones, and when its last clone may have been made.
+    pub(crate) fn clones(&self) -> (ErrorClones, MonoNs) {
+        (self.running.clones.clone(), self.running.at)
     }
 
     /// What an epoch propagates.

@@ -187,7 +187,7 @@ fn sample() {
 /// An epoch with all that the filter does in it.
 fn epoch() {
     let mut dive = Dive::under_way();
-    let ((mut trail, mut at), factors) = (dive.trail(), dive.factors());
+    let ((mut clones, mut at), factors) = (dive.clones(), dive.factors());
     let dense = Dense::<20>::new();
     let [epoch, rows9, note] = in_turns([
         &mut |runs| (0..runs).for_each(|_| dive.epoch()),
@@ -200,11 +200,11 @@ fn epoch() {
         &mut |runs| {
             for _ in 0..runs {
                 at = at + BETWEEN_CLONES;
-                trail.note(at, black_box(&factors));
+                clones.note(at, black_box(&factors));
             }
         },
     ]);
-    let what = "an epoch: 10 inertial samples, 8 measured numbers, the trail";
+    let what = "an epoch: 10 inertial samples, 8 measured numbers, the clones";
     row(what, epoch, "dense predict and 9 rows alone", rows9);
-    row("of it, a clone of a full trail every 20 epochs", note, "those epochs", 20.0 * epoch);
+    row("of it, a clone of a full clones every 20 epochs", note, "those epochs", 20.0 * epoch);
 }

@@ -4,7 +4,7 @@ mod probing;
 mod state;
 mod text;
 
-use headrace_ports::{Machine, Presence, Trouble, discover, presence};
+use headrace_ports::{Machine, OpenError, Presence, discover, presence};
 use headrace_sensor::connect::Connect;
 use headrace_vehicle::VehicleConfig;
 
@@ -40,7 +40,7 @@ pub(crate) fn devices(args: &Devices) -> Result<u8, Failure> {
 fn sensors(machine: &Machine, vehicle: &VehicleConfig, probe: bool) -> Vec<Sensor> {
     let connections = live::connections(vehicle).into_iter().zip(&vehicle.sensor_configs);
     let sensors = connections.map(|((id, connect), config)| {
-        let state = connect.map_err(|error| Trouble::unusable(&error)).and_then(|connect| {
+        let state = connect.map_err(|error| OpenError::unusable(&error)).and_then(|connect| {
             let kind = probing::kind(&config.plugin).filter(|_| probe);
             match presence(machine, &connect)? {
                 Presence::There(name) => Ok(State::Present(name)),

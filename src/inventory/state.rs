@@ -1,13 +1,13 @@
 //! Results of `headrace devices`, and their JSON.
 
-use headrace_ports::{Answer, Found, Trouble};
+use headrace_ports::{Answer, Found, OpenError};
 use headrace_sensor::connect::Connect;
 use serde_json::{Value, json};
 
 use crate::failure;
 
 /// Result of probing a port or an address.
-pub(super) type Probed = Result<Answer, Trouble>;
+pub(super) type Probed = Result<Answer, OpenError>;
 
 /// All results.
 #[derive(Debug, Default)]
@@ -25,7 +25,7 @@ pub(super) struct Inventory {
 pub(super) struct Sensor {
     pub(super) id: String,
     pub(super) connect: String,
-    pub(super) state: Result<State, Trouble>,
+    pub(super) state: Result<State, OpenError>,
 }
 
 /// State of a sensor's port without errors.
@@ -115,6 +115,6 @@ fn answer_json(answer: &Answer) -> Value {
     }
 }
 
-fn trouble_json(trouble: &Trouble) -> Value {
+fn trouble_json(trouble: &OpenError) -> Value {
     json!({"why": trouble.why, "remedy": trouble.remedy})
 }

@@ -1,6 +1,6 @@
 //! Text of `headrace devices`: a block for each device, with its errors and what fixes them.
 
-use headrace_ports::{Answer, Found, Trouble};
+use headrace_ports::{Answer, Found, OpenError};
 use headrace_sensor::driver::Carrier;
 
 use super::state::{Inventory, Probed, Sensor, State};
@@ -72,7 +72,7 @@ fn row(text: &mut String, what: &str, value: &str) {
     append(text, format_args!("    {what:<KEY$}  {value}\n"));
 }
 
-fn trouble(text: &mut String, trouble: &Trouble) {
+fn trouble(text: &mut String, trouble: &OpenError) {
     row(text, "PROBLEM", &trouble.why);
     if let Some(remedy) = &trouble.remedy {
         row(text, "fix", remedy);

@@ -9,7 +9,7 @@ use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use headrace_geometry::time::{DurNs, MonoNs};
-use headrace_ports::{Stand, wait_for_any};
+use headrace_ports::{EmulatedPort, wait_for_any};
 use headrace_sensor::connect::{Connect, SerialPort};
 use headrace_sensor::device::{Direction, Emulated, Emulator};
 use headrace_sensor::driver::Carrier;
@@ -48,7 +48,7 @@ pub struct End {
     connect: Connect,
     /// Of a serial port: the stable name of whatever the system calls it.
     link: Option<PathBuf>,
-    stand: Option<Stand>,
+    stand: Option<EmulatedPort>,
     /// Whether it is on the line of the sensor before it.
     beside: bool,
 }
@@ -79,7 +79,7 @@ impl End {
     }
 
     fn of_network(carrier: Carrier) -> Self {
-        let stand = Stand::new(carrier, LOCAL).unwrap();
+        let stand = EmulatedPort::new(carrier, LOCAL).unwrap();
         Self { connect: stand.connect().clone(), link: None, stand: Some(stand), beside: false }
     }
 
@@ -107,10 +107,10 @@ impl End {
 
     fn plug(&mut self) {
         let Some(link) = &self.link else {
-            self.stand = Some(Stand::again(&self.connect).unwrap());
+            self.stand = Some(EmulatedPort::again(&self.connect).unwrap());
             return;
         };
-        let stand = Stand::new(Carrier::Serial, LOCAL).unwrap();
+        let stand = EmulatedPort::new(Carrier::Serial, LOCAL).unwrap();
         let Connect::Serial { port: SerialPort::Path(path), .. } = stand.connect() else { panic!("a port") };
         symlink(path, link).unwrap();
         self.stand = Some(stand);
@@ -182,7 +182,7 @@ impl Wire {
     /// Sends a frame whole.
     pub fn whole(&mut self, frame: &[u8]) {
         self.part(frame);
-        let called = self.end.stand.as_ref().is_some_and(Stand::is_called);
+        let called = self.end.stand.as_ref().is_some_and(EmulatedPort::is_called);
         self.control.whole.fetch_add(u64::from(called), Ordering::SeqCst);
     }
 

@@ -1,4 +1,4 @@
-//! A dive on real ports in one process: the loop and its crew on one side, and on the other emulated devices whose lines
+//! A dive on real ports in one process: the loop and its supervisor on one side, and on the other emulated devices whose lines
 //! can be made to fail.
 
 use std::cell::{Cell, RefCell};
@@ -13,7 +13,7 @@ use headrace_geometry::time::DurNs;
 use headrace_monitor::App;
 use headrace_monitor::report::Report;
 use headrace_monitor::run::Loop;
-use headrace_ports::{Crew, Hand, LineHistory, Phase, SentSink};
+use headrace_ports::{Connection, LineHistory, Phase, SentSink, Supervisor};
 use headrace_replay::drive::{Pace, drive};
 use headrace_replay::log::{LogHeader, Recorder, RecorderHandle, SourceInfo};
 use headrace_replay::player::Player;
@@ -73,7 +73,7 @@ pub struct View {
 /// A dive on real ports and its emulated devices.
 pub struct Rig {
     dive: Loop,
-    crew: Crew,
+    supervisor: Supervisor,
     devices: Vec<Faulty>,
     /// Which of them each sensor is on.
     on: Vec<usize>,
@@ -111,7 +111,7 @@ impl Rig {
         let begun = headrace_ports::now();
         let (mut dive, handle) = assemble(&vehicle, &text, log);
         let mut programs = vehicle.programs().unwrap().into_iter();
-        let (mut hands, mut lines) = (Vec::new(), Vec::<(Vec<Emulated>, _, _)>::new());
+        let (mut connections, mut lines) = (Vec::new(), Vec::<(Vec<Emulated>, _, _)>::new());
         let mut on = Vec::new();
         for (source, (sensor, device)) in sensors.into_iter().zip(&vehicle.sensors).enumerate() {
             let head = device.head().and_then(|_| programs.next());
@@ -119,7 +119,7 @@ impl Rig {
             let connect = Connect::parse(&vehicle.sensor_configs[source].connect);
             let connect = connect.and_then(|connect| connect.among(device.carriers()));
             let driver = device.driver(&DriverSetup { begun, head });
-            hands.push(Hand { source, connect, port: dive.take_port(source).unwrap(), driver });
+            connections.push(Connection { source, connect, port: dive.take_port(source).unwrap(), driver });
             match lines.last_mut().filter(|_| sensor.end.is_beside()) {
                 Some((devices, ..)) => devices.push(device.emulator(&setup)),
                 None => lines.push((vec![device.emulator(&setup)], sensor.end, sensor.fault)),
@@ -135,7 +135,7 @@ impl Rig {
             });
             sink
         });
-        let crew = Crew::start(hands, sent).unwrap();
+        let supervisor = Supervisor::start(connections, sent).unwrap();
         let count = on.len();
         let view = View {
             good: vec![0; count],
@@ -144,7 +144,7 @@ impl Rig {
             said: vec![Vec::new(); count],
         };
         let recorded = log.zip(handle).map(|(log, handle)| (log.to_owned(), handle, text));
-        Self { dive, crew, devices, on, view, places, recorded }
+        Self { dive, supervisor, devices, on, view, places, recorded }
     }
 
     /// Unplugs and plugs a device, and the like.
@@ -160,12 +160,12 @@ impl Rig {
     /// Lets the dive go on until `condition` holds; gives the view then.
     #[track_caller]
     pub fn until(&mut self, what: &str, condition: impl Fn(&View) -> bool) -> View {
-        let Self { dive, crew, devices, on, view, places, .. } = self;
+        let Self { dive, supervisor, devices, on, view, places, .. } = self;
         let deadline = headrace_ports::now() + LONG;
         let (met, view) = (Cell::new(false), RefCell::new(view));
-        crew.run(dive, &|| met.get() || headrace_ports::now() > deadline, &mut |dive| {
+        supervisor.run(dive, &|| met.get() || headrace_ports::now() > deadline, &mut |dive| {
             let mut view = view.borrow_mut();
-            view.look(dive, crew, (devices, on), places);
+            view.look(dive, supervisor, (devices, on), places);
             met.set(condition(&view));
         });
         let view = view.into_inner();
@@ -197,9 +197,9 @@ impl Rig {
         self.until("all frames that were sent whole", |view| {
             view.good.iter().zip(&view.whole).all(|(good, whole)| good >= whole)
         });
-        let Self { mut dive, crew, devices, on, mut view, places, recorded } = self;
-        view.look(&dive, &crew, (&devices, &on), &places);
-        let lines = crew.stop(&mut dive, &mut |_| ());
+        let Self { mut dive, supervisor, devices, on, mut view, places, recorded } = self;
+        view.look(&dive, &supervisor, (&devices, &on), &places);
+        let lines = supervisor.stop(&mut dive, &mut |_| ());
         view.good = dive.decoder_counts().iter().map(|counts| counts.good_frames).collect();
         drop(devices);
         dive.finish(&mut |_, _| ());
@@ -237,12 +237,18 @@ impl Ended {
 }
 
 impl View {
-    fn look(&mut self, dive: &Loop, crew: &Crew, devices: (&[Faulty], &[usize]), places: &[String]) {
+    fn look(
+        &mut self,
+        dive: &Loop,
+        supervisor: &Supervisor,
+        devices: (&[Faulty], &[usize]),
+        places: &[String],
+    ) {
         let (devices, on) = devices;
         // First what has been sent: what comes of it is counted later.
         self.whole = on.iter().map(|line| devices[*line].control().whole()).collect();
         self.good = dive.decoder_counts().iter().map(|counts| counts.good_frames).collect();
-        while let Some(status) = crew.next_status() {
+        while let Some(status) = supervisor.next_status() {
             self.phases[status.source] = Some(status.phase);
             self.said[status.source].push(neutral(&status.to_string(), places));
         }

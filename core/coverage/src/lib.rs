@@ -21,7 +21,7 @@ pub use action::Action;
 pub use cause::{Cause, Evidence};
 pub use frontier::{Frontier, HeadReach, Outlook, Reach};
 pub use hole::{Hole, HoleFinder};
-pub use passage::{Doubt, Loss, Passage};
+pub use passage::{Loss, PassError, Passage};
 pub use runs::{Run, RunChange, RunId, Runs};
 pub use section::{Judgement, Section, Spread, Verdict};
 pub use sections::{Judging, Request, Sections};

@@ -47,7 +47,7 @@ pub struct Passage {
     /// What it would have been from the middle of the tunnel, level, m.
     pub middle_t_y_m: f64,
     /// How far one pass may be off against another.
-    pub doubt: Doubt,
+    pub pass_error: PassError,
 }
 
 /// Why a ping that was aimed at a place of the wall gave no sample there.
@@ -124,14 +124,14 @@ const LARGEST_OF_MANY: f64 = 1.2;
 
 /// How far the samples of a pass may be off along the tunnel against those of the pass before.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-pub struct Doubt {
+pub struct PassError {
     /// The errors that move them.
     pub relative: Relative,
     /// Where the vehicle was in the cross-section, m.
     pub from_m: [f64; 2],
 }
 
-impl Doubt {
+impl PassError {
     /// Of a fix.
     pub fn of(fix: &Fix) -> Self {
         Self { relative: fix.relative, from_m: [fix.pose.position.y(), fix.pose.position.z()] }

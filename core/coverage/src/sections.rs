@@ -219,7 +219,7 @@ impl Sections {
     ) -> bool {
         let Some(section) = self.get(index) else { return false };
         let bounds_m = self.bounds_m(index);
-        let radius_m = self.target_m / 2.0 + section.passage.doubt.worst_m(profile);
+        let radius_m = self.target_m / 2.0 + section.passage.pass_error.worst_m(profile);
         let clear_m = clear_of(to_come, bounds_m.0).max(clear_of(to_come, bounds_m.1));
         clear_m > radius_m && finder.has_circle(store, bounds_m, to_come, radius_m)
     }
@@ -232,7 +232,7 @@ impl Sections {
         let target_m = self.target_m;
         let section = self.get_mut(request.section)?;
         let hole = judging.finder.largest(judging.store, from_m, to_m);
-        let sd_m = section.passage.doubt.sd_m(judging.profile.point_at(hole.arc_m));
+        let sd_m = section.passage.pass_error.sd_m(judging.profile.point_at(hole.arc_m));
         let clear_m = clear_of(request.to_come, hole.x_m);
         section.hole = Some(hole);
         section.hole_sd_m = sd_m;

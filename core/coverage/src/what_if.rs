@@ -2,7 +2,7 @@
 
 use super::frontier::{Outlook, Reach, clear_of};
 use super::hole::{Hole, HoleFinder};
-use super::passage::Doubt;
+use super::passage::PassError;
 use super::section::Verdict;
 use super::sections::{Sections, verdict};
 use super::store::SampleStore;
@@ -84,16 +84,16 @@ impl Sections {
         let section = |index: i64| {
             let (from_m, to_m) = (index as f64 * section_m, (index + 1) as f64 * section_m);
             let hole = finder.largest(store, from_m, to_m);
-            let mut doubt = Doubt::default();
+            let mut pass_error = PassError::default();
             let mut doubtful = false;
             // A hair inside, so that a common border is no overlap.
             for old in self.index_of(from_m + 1e-9)..=self.index_of(to_m - 1e-9) {
                 if let Some(section) = self.get(old) {
-                    doubt.add(&section.passage.doubt);
+                    pass_error.add(&section.passage.pass_error);
                     doubtful |= section.is_doubtful();
                 }
             }
-            Measured { hole, sd_m: doubt.sd_m(profile.point_at(hole.arc_m)), doubtful }
+            Measured { hole, sd_m: pass_error.sd_m(profile.point_at(hole.arc_m)), doubtful }
         };
         indexes.map(section).collect()
     }

@@ -10,7 +10,7 @@ pub mod relative;
 pub mod section;
 pub mod smooth;
 
-use self::filter::running::PoseSd;
+use self::filter::eskf::PoseSd;
 use self::filter::sources::Consistency;
 use headrace_geometry::time::MonoNs;
 use headrace_sensor::device::SensorInfo;

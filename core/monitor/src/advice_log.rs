@@ -102,7 +102,7 @@ mod tests {
         let nowhere = Situation {
             pose: None,
             speed_mps: 0.0,
-            doubt_m: 0.0,
+            pass_error_m: 0.0,
             layout: HeadLayout::PhaseShift,
             configured: 0,
             heads: [None; headrace_sampling::head::MAX_HEADS],

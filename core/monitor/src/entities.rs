@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 pub use super::head_motion::MeasuredMotion;
 use headrace_coverage::HeadReach;
-use headrace_fusion::filter::running::PoseSd;
+use headrace_fusion::filter::eskf::PoseSd;
 use headrace_fusion::{Fix, Navigation, NoFix};
 use headrace_geometry::frames::{Point3, Tunnel};
 use headrace_geometry::time::{DurNs, MonoNs};

@@ -1,9 +1,9 @@
 //! How fast one may go, from what is measured now, and what else one could do.
 
 mod answer;
-mod look;
+mod hysteresis;
+mod ring_cache;
 mod search;
-mod steady;
 
 use super::error::SamplingError;
 use super::head::{HeadMode, HeadMotion, HeadSet, HeadSpec, MAX_HEADS};
@@ -17,10 +17,10 @@ use headrace_geometry::frames::{Point3, Pose, Rot};
 use headrace_geometry::math;
 use headrace_geometry::tunnel::Profile;
 use headrace_snapshot::stateful;
-use look::{AdvisedHead, RING};
+use ring_cache::{AdvisedHead, RING};
 
 pub use answer::{Advice, Alternative, Left, ModeName, Reason, Remedy};
-pub use steady::Steady;
+pub use hysteresis::Hysteresis;
 
 /// Share of the speed kept back for the error of its measurement.
 pub const SPEED_MARGIN: f64 = 0.01;
@@ -213,7 +213,7 @@ impl Advisor {
             swing_most_m: Some(swing.most_rad * farthest_m),
         };
         // What is just within the target, but not surely, can't pass; where no speed leaves such room, the target alone counts.
-        let sure_m = self.task.target_m - margin_m(situation.doubt_m, self.task.target_m);
+        let sure_m = self.task.target_m - margin_m(situation.pass_error_m, self.task.target_m);
         let fastest = self
             .fastest_mps(situation, &passes, &going, sure_m)
             .or_else(|_| self.fastest_mps(situation, &passes, &going, self.task.target_m));
@@ -343,7 +343,7 @@ impl Advisor {
             // Any step may be what stands in the way.
             Err(_) => (self.task.target_m, 0.0),
         };
-        look::still_m(self.task.target_m, t_y_m, self.profile.perimeter_m() / math::TAU, swing_share)
+        ring_cache::still_m(self.task.target_m, t_y_m, self.profile.perimeter_m() / math::TAU, swing_share)
     }
 
     /// Thinks over what each mode that all heads have would allow, those that turn now started in phase.
@@ -405,7 +405,7 @@ impl Advisor {
         let target_m = self.task.target_m;
         let steady = Going { ping_period_s: going.ping_period_s, ..Going::default() };
         if going.swing_mps > 0.0 && self.now.bound_for_target(0, passes, target_m, &steady).is_ok() {
-            return Some(Remedy::Steady);
+            return Some(Remedy::Hysteresis);
         }
         let stride = situation.heads.iter().flatten().map(|motion| Ring::stride(motion.step_rad, RING)).max();
         let same = |mode: &HeadMode| Some(Ring::stride(mode.turn.step_rad(), RING)) == stride;
@@ -424,10 +424,10 @@ impl Advisor {
 
 /// What of the target is left to errors of position, m: two standard deviations, as a verdict of pass wants; a fifth of the
 /// target at most, since no speed makes up for a lost position.
-fn margin_m(doubt_m: f64, target_m: f64) -> f64 {
+fn margin_m(pass_error_m: f64, target_m: f64) -> f64 {
     /// Less is nothing: a navigation that doesn't know its errors says so much.
     const NOTHING_M: f64 = 0.002;
-    (2.0 * (doubt_m - NOTHING_M).max(0.0)).min(target_m / 5.0)
+    (2.0 * (pass_error_m - NOTHING_M).max(0.0)).min(target_m / 5.0)
 }
 
 #[cfg(test)]

@@ -23,7 +23,7 @@ pub struct Situation {
     /// Speed along the tunnel, m/s; below zero on the way back.
     pub speed_mps: f64,
     /// Standard deviation of the distance between two passes, at most round the wall, m.
-    pub doubt_m: f64,
+    pub pass_error_m: f64,
     /// How the heads share the work, as the vehicle file says.
     pub layout: HeadLayout,
     /// How many heads the vehicle has.
@@ -311,7 +311,7 @@ mod tests {
         Situation {
             pose: None,
             speed_mps: 0.2,
-            doubt_m: 0.0,
+            pass_error_m: 0.0,
             layout: HeadLayout::PhaseShift,
             configured,
             heads,

@@ -55,7 +55,7 @@ pub trait Wire {
 
 /// What is to be thought of a device, as far as its bytes tell.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Standing {
+pub struct DeviceHealth {
     /// Messages that it sent and that were understood.
     pub good_frames: u64,
     /// What it says that it is, once it has.
@@ -88,12 +88,12 @@ pub trait Driver: Send {
     }
 
     /// How long the device may be silent before its line is opened anew.
-    fn patience(&self) -> DurNs {
+    fn silence_timeout(&self) -> DurNs {
         DurNs::from_millis(5_000)
     }
 
     /// What is to be thought of the device.
-    fn standing(&self) -> Standing;
+    fn health(&self) -> DeviceHealth;
 }
 
 /// Finds out whether a device of one kind is on a line, and which. What it sends is harmless to whatever else is there:

@@ -1,6 +1,6 @@
 //! The host's side of the bus: calibration first, then a measurement at a fixed rate.
 
-use headrace_sensor::driver::{Carrier, Driver, Standing, Wire};
+use headrace_sensor::driver::{Carrier, DeviceHealth, Driver, Wire};
 use headrace_sensor::geometry::time::{DurNs, MonoNs};
 
 use crate::calibration::CALIBRATION_CELLS;
@@ -93,10 +93,10 @@ impl Driver for Bar100Driver {
         }
     }
 
-    fn standing(&self) -> Standing {
+    fn health(&self) -> DeviceHealth {
         let identity = (self.cell == CALIBRATION_CELLS.len()).then(|| "Keller LD pressure sensor".to_owned());
         let complaint = self.complaint.as_ref().map(TransactionError::to_string);
-        Standing { good_frames: self.good_frames, identity, complaint }
+        DeviceHealth { good_frames: self.good_frames, identity, complaint }
     }
 }
 

@@ -6,7 +6,7 @@
 
 use std::collections::VecDeque;
 
-use headrace_sensor::driver::{Carrier, Cutter, Driver, DriverSetup, Standing, Wire};
+use headrace_sensor::driver::{Carrier, Cutter, DeviceHealth, Driver, DriverSetup, Wire};
 use headrace_sensor::geometry::time::{DurNs, MonoNs};
 use headrace_sensor::sampling::head::HeadProgram;
 
@@ -281,11 +281,11 @@ impl Driver for HeadDriver {
         self.asked.is_some()
     }
 
-    fn standing(&self) -> Standing {
+    fn health(&self) -> DeviceHealth {
         let good_frames = self.cutter.counts().good_frames;
         let id = self.settings.command.head_id;
         let identity = (good_frames > 0).then(|| format!("Imagenex 881 family, head {id:#04x}"));
-        Standing { good_frames, identity, complaint: self.complaint() }
+        DeviceHealth { good_frames, identity, complaint: self.complaint() }
     }
 }
 

@@ -1,4 +1,4 @@
-//! Classic CAN frames as `SocketCAN` hands them over: `struct can_frame`, 16 bytes.
+//! Classic CAN frames as `SocketCAN` connections them over: `struct can_frame`, 16 bytes.
 //!
 //! ```text
 //!   0 .. 3   identifier, u32 little-endian; bit 31 extended, bit 30 remote, bit 29 error

@@ -1,7 +1,7 @@
 //! The host's side of a telemetry link: it listens for its part, and says that it is there.
 
 use headrace_sensor::device::Decoder as _;
-use headrace_sensor::driver::{Carrier, Cutter, Driver, Standing, Wire};
+use headrace_sensor::driver::{Carrier, Cutter, DeviceHealth, Driver, Wire};
 use headrace_sensor::geometry::time::{DurNs, MonoNs};
 use headrace_sensor::reading::Packet;
 
@@ -94,11 +94,11 @@ impl Driver for MavlinkDriver {
         }
     }
 
-    fn standing(&self) -> Standing {
+    fn health(&self) -> DeviceHealth {
         let others = self.cutter.counts().good_frames > 50 && self.own_frames == 0;
         let complaint = others.then(|| {
             "the autopilot speaks, but not of this part; see message and its stream rates".to_owned()
         });
-        Standing { good_frames: self.own_frames, identity: None, complaint }
+        DeviceHealth { good_frames: self.own_frames, identity: None, complaint }
     }
 }

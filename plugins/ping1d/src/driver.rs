@@ -3,7 +3,7 @@
 
 use std::collections::VecDeque;
 
-use headrace_sensor::driver::{Carrier, Cutter, Driver, Standing, Wire};
+use headrace_sensor::driver::{Carrier, Cutter, DeviceHealth, Driver, Wire};
 use headrace_sensor::geometry::time::{DurNs, MonoNs};
 
 use crate::codec::{Addressed, DeviceInformation, Frame, Frames, MAX_FRAME_BYTES, Message, id};
@@ -239,7 +239,7 @@ impl Driver for PingDriver {
         self.asked.is_some()
     }
 
-    fn standing(&self) -> Standing {
+    fn health(&self) -> DeviceHealth {
         let identity = self.device.map(|device| {
             let DeviceInformation { firmware_major, firmware_minor, firmware_patch, revision, .. } = device;
             let kind = if device.device_type == ECHOSOUNDER { "Ping echosounder" } else { "Ping device" };
@@ -248,7 +248,7 @@ impl Driver for PingDriver {
             )
         });
         let good_frames = self.cutter.counts().good_frames;
-        Standing { good_frames, identity, complaint: self.complaint() }
+        DeviceHealth { good_frames, identity, complaint: self.complaint() }
     }
 }
 

@@ -3,47 +3,47 @@
 use std::io;
 
 use crate::discover::remedy_for;
-use crate::remedy;
-use crate::trouble::{Trouble, TroubleKind};
+use crate::fix_hint;
+use crate::open_error::{OpenError, OpenErrorKind};
 
 /// Probing the device at `what` has failed with `error`.
-pub(crate) fn probing(what: &str, error: &io::Error) -> Trouble {
-    let Trouble { kind, remedy, .. } = opening(what, error);
+pub(crate) fn probing(what: &str, error: &io::Error) -> OpenError {
+    let OpenError { kind, remedy, .. } = opening(what, error);
     let why = match kind {
-        TroubleKind::Absent => format!("asking at {what}: nobody answers there ({error})"),
+        OpenErrorKind::Absent => format!("asking at {what}: nobody answers there ({error})"),
         _ => format!("asking at {what}: {error}"),
     };
-    Trouble { kind, why, remedy }
+    OpenError { kind, why, remedy }
 }
 
 /// Opening `what` has failed with `error`.
-pub(crate) fn opening(what: &str, error: &io::Error) -> Trouble {
+pub(crate) fn opening(what: &str, error: &io::Error) -> OpenError {
     use io::ErrorKind as E;
     let why = |words: &str| format!("opening {what}: {words}");
     match error.kind() {
-        E::NotFound => Trouble::not_there(what),
-        E::PermissionDenied => Trouble::denied(what, &remedy_for(what)),
+        E::NotFound => OpenError::not_there(what),
+        E::PermissionDenied => OpenError::denied(what, &remedy_for(what)),
         E::ConnectionRefused => {
-            Trouble::new(TroubleKind::Absent, why("nobody listens there"), Some(remedy::NOBODY_LISTENS))
+            OpenError::new(OpenErrorKind::Absent, why("nobody listens there"), Some(fix_hint::NOBODY_LISTENS))
         }
         E::TimedOut | E::HostUnreachable | E::NetworkUnreachable => {
-            Trouble::new(TroubleKind::Absent, why("nobody answers there"), Some(remedy::NOBODY_ANSWERS))
+            OpenError::new(OpenErrorKind::Absent, why("nobody answers there"), Some(fix_hint::NOBODY_ANSWERS))
         }
         E::ResourceBusy | E::AddrInUse => {
-            Trouble::new(TroubleKind::Busy, why("another program has it"), Some("close that one"))
+            OpenError::new(OpenErrorKind::Busy, why("another program has it"), Some("close that one"))
         }
-        _ => Trouble::new(TroubleKind::Other, why(&error.to_string()), None),
+        _ => OpenError::new(OpenErrorKind::Other, why(&error.to_string()), None),
     }
 }
 
 /// Opening a CAN interface has failed with `error`.
-pub(crate) fn opening_can(interface: &str, error: &io::Error) -> Trouble {
+pub(crate) fn opening_can(interface: &str, error: &io::Error) -> OpenError {
     /// No such device; network is down; address family not supported. Source: Linux, errno.
     const ENODEV: i32 = 19;
     const EAFNOSUPPORT: i32 = 97;
     match error.raw_os_error() {
-        Some(ENODEV) => Trouble::no_interface(interface),
-        Some(EAFNOSUPPORT) => Trouble::no_can(interface),
+        Some(ENODEV) => OpenError::no_interface(interface),
+        Some(EAFNOSUPPORT) => OpenError::no_can(interface),
         _ => opening(interface, error),
     }
 }

@@ -4,25 +4,25 @@
 //! The drivers themselves are in the devices' crates and do no I/O; see [`headrace_sensor::driver`].
 
 mod clock;
-mod crew;
+mod device_end;
 mod diagnosis;
 mod discover;
+mod fix_hint;
+mod line_thread;
 mod lines;
+mod open_error;
 mod probe;
-mod remedy;
-mod service;
-mod stand;
 mod status;
-mod trouble;
+mod supervisor;
 pub mod uhid;
 
 pub use clock::{clock_anchor, now, of_wall};
-pub use crew::{Crew, Hand};
+pub use device_end::{EmulatedPort, wait_for_any};
 pub use discover::can::is_interface_up;
 pub use discover::{Found, Machine, Presence, Rights, User, discover, presence};
+pub use line_thread::SentSink;
+pub use open_error::{OpenError, OpenErrorKind};
 #[cfg(target_os = "linux")]
 pub use probe::{Answer, probe};
-pub use service::SentSink;
-pub use stand::{Stand, wait_for_any};
 pub use status::{Board, LineHistory, Phase, Status};
-pub use trouble::{Trouble, TroubleKind};
+pub use supervisor::{Connection, Supervisor};

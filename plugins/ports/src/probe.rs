@@ -10,7 +10,7 @@ use headrace_sensor::driver::Probe;
 use crate::clock;
 use crate::diagnosis;
 use crate::lines::{self, Line, READ_BYTES};
-use crate::trouble::Trouble;
+use crate::open_error::OpenError;
 
 /// How long the answer to a question may take.
 const ANSWER_TIME: DurNs = DurNs::from_millis(400);
@@ -30,7 +30,7 @@ pub enum Answer {
 /// answer takes 0.4 s.
 ///
 /// Errors: the line can't be opened, or breaks; with what would mend it.
-pub fn probe(connect: &Connect, probes: &mut [Box<dyn Probe>]) -> Result<Answer, Trouble> {
+pub fn probe(connect: &Connect, probes: &mut [Box<dyn Probe>]) -> Result<Answer, OpenError> {
     let _span = tracing::info_span!("probe", address = %connect).entered();
     tracing::info!(kinds = probes.len(), "probing");
     let mut line = lines::open(connect)?;

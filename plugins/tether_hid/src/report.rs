@@ -253,7 +253,7 @@ impl ReportLayout {
     }
 }
 
-/// What stands before a report in a `uhid_event` that hands it to the kernel: `UHID_INPUT2` and the report's length.
+/// What stands before a report in a `uhid_event` that connections it to the kernel: `UHID_INPUT2` and the report's length.
 ///
 /// Source: linux/uhid.h, `struct uhid_input2_req`, native byte order.
 pub fn uhid_input2_header(report_bytes: u16) -> [u8; 6] {

@@ -6,7 +6,7 @@
 use crate::estimate::median;
 use crate::scan::{EchoScan, HeadScan, Return};
 use headrace_fusion::filter::factors::Factors;
-use headrace_fusion::filter::measure::{self, Beam, Row};
+use headrace_fusion::filter::measure::{self, Beam, ScalarUpdate};
 use headrace_fusion::filter::settings::Settings;
 use headrace_fusion::filter::state::{ATTITUDE, POSITION, State, rotation, vec};
 use headrace_geometry::frames::{Body, Mount, Point3, Rot, Sensor, Tunnel, Vec3, head_direction};
@@ -238,7 +238,7 @@ impl Problem<'_> {
         beam: &Beam,
         range_m: f64,
         sd_m: f64,
-    ) -> Option<([f64; N], Row)> {
+    ) -> Option<([f64; N], ScalarUpdate)> {
         let range_m = range_m / (1.0 + at(x, 5));
         let row = measure::range(state, self.profile, beam, range_m, sd_m)?;
         let mut h = [0.0; N];

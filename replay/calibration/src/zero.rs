@@ -4,7 +4,7 @@ use crate::estimate::{Estimate, Untold, median};
 use crate::heads::Heads;
 use crate::material::Material;
 use crate::still::Still;
-use headrace_fusion::filter::running::{in_tunnel, with_quantum};
+use headrace_fusion::filter::eskf::{in_tunnel, with_quantum};
 use headrace_geometry::frames::Rot;
 use headrace_geometry::math;
 use headrace_geometry::site::Site;

@@ -12,7 +12,7 @@ use std::path::Path;
 use ahrs::{Ahrs as _, Madgwick, Mahony};
 use headrace_fusion::filter::factors::Factors;
 use headrace_fusion::filter::inertial::{Felt, Leg};
-use headrace_fusion::filter::measure::{self, Row};
+use headrace_fusion::filter::measure::{self, ScalarUpdate};
 use headrace_fusion::filter::settings::Settings;
 use headrace_fusion::filter::state::{
     ATTITUDE, ERRORS, FORCE_BIAS, POSITION, RATE_BIAS, State, VELOCITY, put,
@@ -189,7 +189,7 @@ impl Alone {
         self.second.clear();
     }
 
-    fn fuse(&mut self, rows: &[Row]) {
+    fn fuse(&mut self, rows: &[ScalarUpdate]) {
         let mut errors = [0.0; ERRORS];
         for row in rows {
             let expected: f64 = row.h.iter().zip(&errors).map(|(h, e)| h * e).sum();

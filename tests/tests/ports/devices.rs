@@ -8,7 +8,7 @@ use std::thread::{self, JoinHandle};
 use headrace_config::Document;
 use headrace_geometry::site::Site;
 use headrace_geometry::time::DurNs;
-use headrace_ports::{Answer, Stand, probe, wait_for_any};
+use headrace_ports::{Answer, EmulatedPort, probe, wait_for_any};
 use headrace_sensor::connect::Connect;
 use headrace_sensor::device::{DeviceKind, Direction, Emulated, EmulatorSetup};
 use headrace_sensor::driver::{Carrier, Probe};
@@ -50,7 +50,7 @@ struct Device {
 impl Device {
     /// What it answers is up to `answer`, who gets what a host has sent.
     fn new(carrier: Carrier, mut answer: impl FnMut(&[u8]) -> Vec<Vec<u8>> + Send + 'static) -> Self {
-        let mut stand = Stand::new(carrier, LOCAL).unwrap();
+        let mut stand = EmulatedPort::new(carrier, LOCAL).unwrap();
         let (connect, stopping) = (stand.connect().clone(), Arc::new(AtomicBool::new(false)));
         let stops = Arc::clone(&stopping);
         let thread = thread::spawn(move || {

@@ -16,9 +16,9 @@ use crossbeam::queue::SegQueue;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::App;
 use headrace_monitor::run::Loop;
-use headrace_ports::{Crew, Hand, LineHistory, Phase, Stand, Status, now};
+use headrace_ports::{Connection, EmulatedPort, LineHistory, Phase, Status, Supervisor, now};
 use headrace_sensor::connect::{Connect, UsbIdentity};
-use headrace_sensor::driver::{Driver, DriverSetup, Standing, Wire};
+use headrace_sensor::driver::{DeviceHealth, Driver, DriverSetup, Wire};
 use headrace_simulator::Simulation;
 use headrace_tests::scenes;
 use headrace_tests::{Folder, VEHICLE};
@@ -86,9 +86,9 @@ impl Drop for Interface {
     }
 }
 
-fn counter(serial: &str) -> Stand {
+fn counter(serial: &str) -> EmulatedPort {
     let identity = UsbIdentity { vendor: 0x1209, product: 0x0001, serial: Some(serial.to_owned()) };
-    Stand::hid(&identity, &REFERENCE_DESCRIPTOR).unwrap()
+    EmulatedPort::hid(&identity, &REFERENCE_DESCRIPTOR).unwrap()
 }
 
 /// The path that the kernel gives a counter.
@@ -104,9 +104,9 @@ fn path(serial: &str) -> String {
     panic!("{serial} was plugged in and is not listed");
 }
 
-/// An inertial unit and a counter on their lines, a crew that serves them, and a loop that decodes.
+/// An inertial unit and a counter on their lines, a supervisor that serves them, and a loop that decodes.
 struct Rehearsal {
-    crew: Crew,
+    supervisor: Supervisor,
     dive: Loop,
     said: Vec<Status>,
     simulation: Simulation,
@@ -123,16 +123,16 @@ impl Rehearsal {
             app.add_device(sensor.as_ref()).unwrap();
         }
         let mut dive = app.arm(vehicle.navigation()).unwrap();
-        let mut hands = Vec::new();
+        let mut connections = Vec::new();
         for (source, connect) in connects.into_iter().enumerate() {
             let driver = vehicle.sensors[source].driver(&DriverSetup { begun: now(), head: None });
             let port = dive.take_port(source).unwrap();
             let connect = Connect::parse(connect);
-            hands.push(Hand { source, connect, port, driver: change(source, driver) });
+            connections.push(Connection { source, connect, port, driver: change(source, driver) });
         }
-        let crew = Crew::start(hands, None).unwrap();
+        let supervisor = Supervisor::start(connections, None).unwrap();
         let simulation = Simulation::new(&scene).unwrap();
-        Self { crew, dive, said: Vec::new(), simulation, messages: [VecDeque::new(), VecDeque::new()] }
+        Self { supervisor, dive, said: Vec::new(), simulation, messages: [VecDeque::new(), VecDeque::new()] }
     }
 
     /// What the sensor says next.
@@ -151,8 +151,8 @@ impl Rehearsal {
         let until = now() + time;
         let has_ended = Cell::new(false);
         let said = RefCell::new(std::mem::take(&mut self.said));
-        self.crew.run(&mut self.dive, &|| has_ended.get() || now() >= until, &mut |dive| {
-            while let Some(status) = self.crew.next_status() {
+        self.supervisor.run(&mut self.dive, &|| has_ended.get() || now() >= until, &mut |dive| {
+            while let Some(status) = self.supervisor.next_status() {
                 println!("sensor {}: {status}", status.source);
                 said.borrow_mut().push(status);
             }
@@ -190,7 +190,7 @@ impl Rehearsal {
         }
     }
 
-    fn send(&mut self, source: usize, stand: &mut Stand, count: usize) {
+    fn send(&mut self, source: usize, stand: &mut EmulatedPort, count: usize) {
         for _ in 0..count {
             let message = self.next_message(source);
             stand.write(&message).unwrap();
@@ -199,7 +199,7 @@ impl Rehearsal {
 
     /// Talks to a sensor's driver until it hears: what is sent before the line is open is lost.
     #[track_caller]
-    fn call(&mut self, source: usize, stand: &mut Stand) {
+    fn call(&mut self, source: usize, stand: &mut EmulatedPort) {
         let before = self.settle(source);
         let until = now() + LONG;
         while self.good(source) == before {
@@ -211,14 +211,14 @@ impl Rehearsal {
 
     /// Sends so many messages, all of which must be decoded, and no more.
     #[track_caller]
-    fn exactly(&mut self, source: usize, stand: &mut Stand, count: usize) {
+    fn exactly(&mut self, source: usize, stand: &mut EmulatedPort, count: usize) {
         let before = self.settle(source);
         self.exactly_after(before, source, stand, count);
     }
 
     /// The same, at once: there were so many before.
     #[track_caller]
-    fn exactly_after(&mut self, before: u64, source: usize, stand: &mut Stand, count: usize) {
+    fn exactly_after(&mut self, before: u64, source: usize, stand: &mut EmulatedPort, count: usize) {
         for burst in (0..count).step_by(BURST) {
             let size = BURST.min(count - burst);
             self.send(source, stand, size);
@@ -236,7 +236,7 @@ impl Rehearsal {
 
     /// Ends; nothing that came was bad.
     fn end(mut self) -> Vec<LineHistory> {
-        let histories = self.crew.stop(&mut self.dive, &mut |_| ());
+        let histories = self.supervisor.stop(&mut self.dive, &mut |_| ());
         for (counts, history) in self.dive.decoder_counts().iter().zip(&histories) {
             println!("{counts:?} {history:?}");
             assert_eq!((counts.bad_frames, counts.skipped_bytes, history.dropped), (0, 0, 0));
@@ -253,7 +253,7 @@ fn unchanged(_: usize, driver: Box<dyn Driver>) -> Box<dyn Driver> {
 #[ignore = "needs a kernel with vcan and uhid: tests/vm/run"]
 fn every_frame_and_every_report_is_decoded() {
     let _vcan = Interface::up("vcan1");
-    let (mut imu, mut tether) = (Stand::can("vcan1").unwrap(), counter("HR-0001"));
+    let (mut imu, mut tether) = (EmulatedPort::can("vcan1").unwrap(), counter("HR-0001"));
     let mut rehearsal = Rehearsal::new(["can:vcan1", COUNTER], &unchanged);
     rehearsal.call(IMU, &mut imu);
     rehearsal.call(TETHER, &mut tether);
@@ -292,8 +292,8 @@ impl Driver for Dawdler {
         self.driver.wake(now, wire);
     }
 
-    fn standing(&self) -> Standing {
-        self.driver.standing()
+    fn health(&self) -> DeviceHealth {
+        self.driver.health()
     }
 }
 
@@ -301,7 +301,7 @@ impl Driver for Dawdler {
 #[ignore = "needs a kernel with vcan and uhid: tests/vm/run"]
 fn a_frame_is_stamped_when_the_kernel_has_it_however_late_it_is_read() {
     let _vcan = Interface::up("vcan2");
-    let mut imu = Stand::can("vcan2").unwrap();
+    let mut imu = EmulatedPort::can("vcan2").unwrap();
     let noted = Arc::new(SegQueue::new());
     let dawdle = |source, driver| -> Box<dyn Driver> {
         if source == IMU { Box::new(Dawdler { driver, noted: Arc::clone(&noted) }) } else { driver }
@@ -339,7 +339,7 @@ fn a_frame_is_stamped_when_the_kernel_has_it_however_late_it_is_read() {
 #[ignore = "needs a kernel with vcan and uhid: tests/vm/run"]
 fn a_can_interface_that_goes_down_and_up_is_heard_again_from_its_first_frame() {
     let vcan = Interface::up("vcan3");
-    let (mut imu, mut tether) = (Stand::can(vcan.0).unwrap(), counter("HR-0001"));
+    let (mut imu, mut tether) = (EmulatedPort::can(vcan.0).unwrap(), counter("HR-0001"));
     let mut rehearsal = Rehearsal::new(["can:vcan3", COUNTER], &unchanged);
     rehearsal.call(IMU, &mut imu);
     rehearsal.call(TETHER, &mut tether);
@@ -381,7 +381,7 @@ fn a_unit_on_an_interface_that_is_down_is_heard_once_it_is_up() {
     rehearsal.wait_for(IMU, Phase::Closed, "opening vcan4: the interface is down; sudo ip link set vcan4 up");
     rehearsal.wait_for(TETHER, Phase::Closed, "hid:1209:0001:HR-0001: no such device is plugged in");
     ip_link("set vcan4 up");
-    let mut imu = Stand::can(vcan.0).unwrap();
+    let mut imu = EmulatedPort::can(vcan.0).unwrap();
     rehearsal.exactly(IMU, &mut imu, 40);
     rehearsal.wait_for(IMU, Phase::Running, "");
     rehearsal.end();
@@ -391,7 +391,7 @@ fn a_unit_on_an_interface_that_is_down_is_heard_once_it_is_up() {
 #[ignore = "needs a kernel with vcan and uhid: tests/vm/run"]
 fn a_can_adapter_that_is_unplugged_and_plugged_in_again_is_taken_up_again() {
     let vcan = Interface::up("vcan6");
-    let (mut imu, mut tether) = (Stand::can(vcan.0).unwrap(), counter("HR-0001"));
+    let (mut imu, mut tether) = (EmulatedPort::can(vcan.0).unwrap(), counter("HR-0001"));
     let mut rehearsal = Rehearsal::new(["can:vcan6", COUNTER], &unchanged);
     rehearsal.call(IMU, &mut imu);
     rehearsal.call(TETHER, &mut tether);
@@ -419,7 +419,7 @@ fn a_can_adapter_that_is_unplugged_and_plugged_in_again_is_taken_up_again() {
 #[ignore = "needs a kernel with vcan and uhid: tests/vm/run"]
 fn a_counter_that_is_unplugged_is_taken_up_again_under_another_number() {
     let _vcan = Interface::up("vcan7");
-    let (mut imu, mut tether) = (Stand::can("vcan7").unwrap(), counter("HR-0001"));
+    let (mut imu, mut tether) = (EmulatedPort::can("vcan7").unwrap(), counter("HR-0001"));
     let first = path("HR-0001");
     let mut rehearsal = Rehearsal::new(["can:vcan7", COUNTER], &unchanged);
     rehearsal.call(IMU, &mut imu);

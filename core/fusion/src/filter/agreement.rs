@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::measure::Row;
+use super::measure::ScalarUpdate;
 use super::state::{ATTITUDE, ERRORS, Errors, HEADING, POSITION, VELOCITY};
 use headrace_sensor::device::SensorKind;
 
@@ -58,7 +58,7 @@ impl Memory {
 
 impl Agreement {
     /// Notes whether a row of such a sensor passed its gate.
-    pub fn note(&mut self, kind: SensorKind, row: &Row, agrees: bool) {
+    pub fn note(&mut self, kind: SensorKind, row: &ScalarUpdate, agrees: bool) {
         match kind {
             SensorKind::Head | SensorKind::Echosounder { .. } => self.wall.note(agrees),
             SensorKind::Tether { .. } => self.way.note(agrees),

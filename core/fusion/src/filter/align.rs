@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::eskf::{Context, in_tunnel, with_quantum};
 use super::factors::Factors;
-use super::running::{Context, in_tunnel, with_quantum};
 use super::settings::Settings;
 use super::state::{
     ATTITUDE, DEPTH, ERRORS, FORCE_BIAS, HEADING, POSITION, RATE_BIAS, SCALE, SLACK, SLACK_RATE, State,

@@ -12,7 +12,7 @@ use headrace_geometry::tunnel::Profile;
 
 /// One number that was measured.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Row {
+pub struct ScalarUpdate {
     /// Change of what should be measured for a unit of each error.
     pub h: Errors,
     /// Measured less expected.
@@ -37,7 +37,7 @@ pub struct Lean {
     pub slope_m: f64,
 }
 
-impl Row {
+impl ScalarUpdate {
     fn new(residual: f64, noise: f64) -> Self {
         Self { h: [0.0; ERRORS], residual, noise, lean: None, bends: [0.0; 3] }
     }
@@ -109,7 +109,7 @@ pub struct Beam {
 }
 
 /// Range of the first answer of the design wall. `None` where the beam meets no wall, or grazes it.
-pub fn range(state: &State, profile: &Profile, beam: &Beam, range_m: f64, sd_m: f64) -> Option<Row> {
+pub fn range(state: &State, profile: &Profile, beam: &Beam, range_m: f64, sd_m: f64) -> Option<ScalarUpdate> {
     let arm = state.attitude * beam.offset;
     let origin = state.position + arm;
     let along = state.attitude * beam.along;
@@ -131,7 +131,7 @@ pub fn range(state: &State, profile: &Profile, beam: &Beam, range_m: f64, sd_m: 
     // It may be anything down to the nearest of the wider cone: of what is spread evenly over that, the mean square.
     let soonest_m = height_m / math::cos((incidence - beam.unsure_rad).max(0.0));
     let unsure_m = (expected_m - soonest_m).max(0.0) / math::sqrt(3.0);
-    let mut row = Row::new(range_m - expected_m, sd_m * sd_m + unsure_m * unsure_m);
+    let mut row = ScalarUpdate::new(range_m - expected_m, sd_m * sd_m + unsure_m * unsure_m);
     let mut by = [0.0; ERRORS];
     put(&mut by, ATTITUDE, Vec3::<Tunnel>::new(0.0, along.z(), -along.y()));
     let across = 1.0 - along.x() * along.x();
@@ -145,22 +145,22 @@ pub fn range(state: &State, profile: &Profile, beam: &Beam, range_m: f64, sd_m: 
 }
 
 /// Height of a pressure sensor at `offset` from the inertial unit, m above the tunnel's floor.
-pub fn height(state: &State, offset: Vec3<Body>, height_m: f64, sd_m: f64) -> Row {
+pub fn height(state: &State, offset: Vec3<Body>, height_m: f64, sd_m: f64) -> ScalarUpdate {
     let arm = state.attitude * offset;
     let expected_m = state.position.z() + arm.z() + state.depth_offset_m;
-    Row::new(height_m - expected_m, sd_m * sd_m)
+    ScalarUpdate::new(height_m - expected_m, sd_m * sd_m)
         .with(POSITION, Vec3::<Tunnel>::new(0.0, 0.0, 1.0))
         .with(ATTITUDE, Vec3::<Tunnel>::new(arm.y(), -arm.x(), 0.0))
         .with_one(DEPTH, 1.0)
 }
 
 /// Chainage that the cable shows, whose end is at `offset` from the inertial unit; its scale counts from `from_m`.
-pub fn chainage(state: &State, offset: Vec3<Body>, from_m: f64, chainage_m: f64, sd_m: f64) -> Row {
+pub fn chainage(state: &State, offset: Vec3<Body>, from_m: f64, chainage_m: f64, sd_m: f64) -> ScalarUpdate {
     let arm = state.attitude * offset;
     let way_m = state.position.x() + arm.x() - from_m;
     let expected_m = from_m + way_m * (1.0 + state.scale) + state.slack_m;
     let share = 1.0 + state.scale;
-    Row::new(chainage_m - expected_m, sd_m * sd_m)
+    ScalarUpdate::new(chainage_m - expected_m, sd_m * sd_m)
         .with(POSITION, Vec3::<Tunnel>::new(share, 0.0, 0.0))
         .with(ATTITUDE, Vec3::<Tunnel>::new(0.0, arm.z() * share, -arm.y() * share))
         .with_one(SLACK, 1.0)
@@ -170,10 +170,16 @@ pub fn chainage(state: &State, offset: Vec3<Body>, from_m: f64, chainage_m: f64,
 /// Attitude as a unit's own computer has it, about the tunnel's x, y and z. About z it is a compass, with its deviation.
 ///
 /// Smooth at any attitude, a pitch of 90 degrees included: it compares rotations, and no angles.
-pub fn attitude(state: &State, measured: Rot<Tunnel, Body>, tilt_sd: f64, heading_sd: f64) -> [Row; 3] {
+pub fn attitude(
+    state: &State,
+    measured: Rot<Tunnel, Body>,
+    tilt_sd: f64,
+    heading_sd: f64,
+) -> [ScalarUpdate; 3] {
     let off = rotation_vector(measured * state.attitude.inverse());
-    let row =
-        |residual: f64, axis: usize, sd: f64| Row::new(residual, sd * sd).with_one(ATTITUDE + axis, 1.0);
+    let row = |residual: f64, axis: usize, sd: f64| {
+        ScalarUpdate::new(residual, sd * sd).with_one(ATTITUDE + axis, 1.0)
+    };
     [
         row(off.x(), 0, tilt_sd),
         row(off.y(), 1, tilt_sd),
@@ -188,7 +194,7 @@ pub fn velocity(
     rate_radps: Vec3<Body>,
     measured_mps: Vec3<Sensor>,
     sd_mps: f64,
-) -> [Row; 3] {
+) -> [ScalarUpdate; 3] {
     let moved = state.velocity_mps;
     let in_body = state.attitude.inverse() * moved + rate_radps.cross(&offset);
     let off = measured_mps + -(mounted.inverse() * in_body);
@@ -198,21 +204,23 @@ pub fn velocity(
         // The sensor's axis in the tunnel's frame.
         let axis = state.attitude * (mounted * axes.get(k).copied().unwrap_or_else(Vec3::zero));
         let residual = residuals.get(k).copied().unwrap_or(0.0);
-        Row::new(residual, sd_mps * sd_mps).with(VELOCITY, axis).with(ATTITUDE, axis.cross(&moved))
+        ScalarUpdate::new(residual, sd_mps * sd_mps).with(VELOCITY, axis).with(ATTITUDE, axis.cross(&moved))
     })
 }
 
 /// Of a unit that doesn't turn, the mean rate is its bias, rad/s.
-pub fn no_turn(state: &State, mean_radps: Vec3<Body>, sd_radps: f64) -> [Row; 3] {
+pub fn no_turn(state: &State, mean_radps: Vec3<Body>, sd_radps: f64) -> [ScalarUpdate; 3] {
     let off = mean_radps + -state.rate_bias_radps;
     let off = [off.x(), off.y(), off.z()];
-    core::array::from_fn(|k| Row::of(RATE_BIAS + k, off.get(k).copied().unwrap_or(0.0), sd_radps * sd_radps))
+    core::array::from_fn(|k| {
+        ScalarUpdate::of(RATE_BIAS + k, off.get(k).copied().unwrap_or(0.0), sd_radps * sd_radps)
+    })
 }
 
 /// Rest: no velocity.
-pub fn rest(state: &State, sd_mps: f64) -> [Row; 3] {
+pub fn rest(state: &State, sd_mps: f64) -> [ScalarUpdate; 3] {
     let moved = [state.velocity_mps.x(), state.velocity_mps.y(), state.velocity_mps.z()];
     core::array::from_fn(|k| {
-        Row::new(-moved.get(k).copied().unwrap_or(0.0), sd_mps * sd_mps).with_one(VELOCITY + k, 1.0)
+        ScalarUpdate::new(-moved.get(k).copied().unwrap_or(0.0), sd_mps * sd_mps).with_one(VELOCITY + k, 1.0)
     })
 }

@@ -5,30 +5,30 @@
 
 pub mod agreement;
 pub mod align;
+pub mod clones;
+pub mod eskf;
 pub mod factors;
 pub mod inertial;
 pub mod measure;
-pub mod running;
 pub mod settings;
 pub mod sources;
 pub mod state;
-pub mod stillness;
-pub mod trail;
 pub mod window;
+pub mod zupt;
 
 #[cfg(test)]
 mod tests;
 
 use self::align::{LISTENS, Listening};
-use self::running::{Context, PoseSd, Running};
+use self::eskf::{Context, Eskf, PoseSd};
 use self::settings::Settings;
 use self::sources::{Consistency, Source};
 use self::state::{State, rotation};
-use self::stillness::Stillness;
 use self::window::{Waiting, Window};
+use self::zupt::Stillness;
 use super::relative::Relative;
 use super::smooth::journal::Journal;
-use super::smooth::later::UNTIED;
+use super::smooth::relative_backward::UNTIED;
 use super::{Fix, Navigation, NoFix, Times};
 use headrace_geometry::frames::{Pose, Vec3};
 use headrace_geometry::site::Site;
@@ -78,7 +78,7 @@ pub struct FilterNavigation {
     unit: Option<usize>,
     listening: Listening,
     stillness: Stillness,
-    running: Running,
+    running: Eskf,
     is_running: bool,
     /// Epochs begin at this time, and at multiples of their length after it.
     epoch_zero: MonoNs,
@@ -104,7 +104,7 @@ impl FilterNavigation {
             sources: [None; MAX_SOURCES],
             listening: Listening::default(),
             stillness: Stillness::default(),
-            running: Running::default(),
+            running: Eskf::default(),
             is_running: false,
             epoch_zero: MonoNs(0),
             received: MonoNs(0),
@@ -116,7 +116,7 @@ impl FilterNavigation {
     }
 
     /// The estimate and its covariance; `None` before the first.
-    pub fn running(&self) -> Option<&Running> {
+    pub fn running(&self) -> Option<&Eskf> {
         self.is_running.then_some(&self.running)
     }
 
@@ -195,7 +195,7 @@ impl FilterNavigation {
             return;
         }
         let pass_gap = self.pass_gap();
-        let relative = self.running.trail.relative(pass_gap);
+        let relative = self.running.clones.relative(pass_gap);
         let relative = relative.unwrap_or_else(|| Relative::along(0.0));
         self.standing = match sd.standing(relative) {
             Ok(_) if self.has_jumped() => Err(NoFix::Chainage),
@@ -372,7 +372,7 @@ impl Navigation for FilterNavigation {
     }
 
     fn pose_sd(&self) -> Option<PoseSd> {
-        self.running().map(Running::pose_sd)
+        self.running().map(Eskf::pose_sd)
     }
 
     fn fix(&self, at: MonoNs) -> Result<Fix, NoFix> {

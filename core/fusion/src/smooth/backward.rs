@@ -1,11 +1,11 @@
 //! From the dive's end to its beginning: each estimate of the filter is corrected by what was learnt after it.
 
-use super::kernel::Gain;
-use super::later::Later;
+use super::relative_backward::Later;
+use super::rts_step::Gain;
 use super::step::{Move, Placed, Step};
 use super::track::{Piece, Point, Track};
+use crate::filter::eskf::PoseSd;
 use crate::filter::factors::Factors;
-use crate::filter::running::PoseSd;
 use crate::filter::settings::Settings;
 use crate::filter::state::{ERRORS, State};
 use crate::relative::Relative;

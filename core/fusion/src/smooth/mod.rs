@@ -6,8 +6,8 @@
 
 pub mod backward;
 pub mod journal;
-pub mod kernel;
-pub mod later;
+pub mod relative_backward;
+pub mod rts_step;
 pub mod step;
 pub mod track;
 

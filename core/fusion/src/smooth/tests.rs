@@ -2,7 +2,7 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use super::kernel::Gain;
+use super::rts_step::Gain;
 use super::step::{Move, Placed, Step};
 use crate::filter::factors::Factors;
 use crate::filter::inertial::{Felt, Leg};

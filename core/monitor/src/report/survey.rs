@@ -21,7 +21,7 @@ pub struct SurveyReport {
     pub enough_share: Option<f64>,
     /// Nodes without a sample.
     pub empty: u32,
-    /// Row by row along the tunnel.
+    /// ScalarUpdate by row along the tunnel.
     pub rows: Vec<NodeRowReport>,
     /// The first of the empty ones, in the order of chainage.
     pub holidays: Vec<HolidayReport>,

@@ -8,7 +8,7 @@ use crate::resources::{Digests, Tally};
 use crate::result_stream::{RecordKind, ResultStream};
 use headrace_geometry::frames::Vec3;
 use headrace_geometry::time::{DurNs, MonoNs};
-use headrace_sampling::advice::{self, Advice, Remedy, Steady};
+use headrace_sampling::advice::{self, Advice, Hysteresis, Remedy};
 use headrace_sampling::passes::{Phasing, Situation};
 use headrace_sampling::swing::{Looks, Swing};
 use headrace_snapshot::stateful;
@@ -19,22 +19,22 @@ pub(crate) struct Advisor {
     pub(crate) advisor: advice::Advisor,
     pub(crate) dive_time: Option<DurNs>,
     looks: Looks,
-    steady: Steady,
+    hysteresis: Hysteresis,
 }
 
-stateful!(Advisor { state: advisor, looks, steady; fixed: dive_time; });
+stateful!(Advisor { state: advisor, looks, hysteresis; fixed: dive_time; });
 
 impl Advisor {
     /// Allocates: all that it will ever use.
     pub(crate) fn new(advisor: advice::Advisor, target_m: f64, dive_time: Option<DurNs>) -> Self {
-        Self { advisor, dive_time, looks: Looks::default(), steady: Steady::new(target_m) }
+        Self { advisor, dive_time, looks: Looks::default(), hysteresis: Hysteresis::new(target_m) }
     }
 
     /// What to show at a beat, `begun` being when the first packet came.
     fn advise(&mut self, at: MonoNs, situation: &Situation, begun: Option<MonoNs>) -> Advice {
         let left = self.dive_time.zip(begun).map(|(time, begun)| (time - at.since(begun)).as_secs_f64());
         let advice = self.advisor.advise(situation, swing(&mut self.looks, at, situation), left);
-        self.steady.show(at, advice)
+        self.hysteresis.show(at, advice)
     }
 }
 

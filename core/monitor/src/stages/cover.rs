@@ -12,7 +12,7 @@ use crate::entities::{HeadFrontier, HeadSweep, LastSample};
 use crate::messages::{Notice, Notices, Outcome, Placed, PlacedList, PlacedPing, Requests};
 use crate::resources::{Coverage, Digests, Finder, Tally, TunnelDesign, VehicleEntities};
 use headrace_coverage::hole::FARTHEST_M;
-use headrace_coverage::{Doubt, HeadReach, Loss, Outlook, StoreError, WallSample};
+use headrace_coverage::{HeadReach, Loss, Outlook, PassError, StoreError, WallSample};
 use headrace_geometry::frames::{Point3, Tunnel, Vec3};
 use headrace_geometry::math;
 use headrace_geometry::time::DurNs;
@@ -131,7 +131,7 @@ fn note_passage(
     passage.ping_period_sum_s += driven.ping_period_s;
     passage.swing_sum_m += driven.swing_m;
     passage.middle_t_y_m = passage.middle_t_y_m.max(driven.middle_t_y_m);
-    passage.doubt.add(&Doubt::of(&fix));
+    passage.pass_error.add(&PassError::of(&fix));
 }
 
 /// Sections that a head went through while nobody knew where.

@@ -8,7 +8,7 @@ use crate::messages::{
 };
 use crate::resources::{Digests, Target, TunnelDesign, VehicleEntities};
 use crate::result_stream::RecordKind;
-use headrace_coverage::{Doubt, Loss, Reach};
+use headrace_coverage::{Loss, PassError, Reach};
 use headrace_fusion::{Fix, NoFix};
 use headrace_geometry::frames::{Mount, Pose, Vec3, head_direction};
 use headrace_geometry::math;
@@ -139,7 +139,7 @@ fn situation(
     Situation {
         pose: fix.ok().map(|fix| fix.pose),
         speed_mps: fix.map_or(0.0, |fix| fix.speed_mps),
-        doubt_m: fix.map_or(0.0, |fix| Doubt::of(&fix).worst_m(&tunnel.profile)),
+        pass_error_m: fix.map_or(0.0, |fix| PassError::of(&fix).worst_m(&tunnel.profile)),
         layout: target.layout,
         configured: heads.iter().len(),
         heads: motions,

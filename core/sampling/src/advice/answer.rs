@@ -82,14 +82,14 @@ pub enum Remedy {
     /// The middle of the tunnel, level and straight.
     Centre,
     /// A steady heading.
-    Steady,
+    Hysteresis,
 }
 
 impl Remedy {
     /// Its number in what is published; 0 is none.
     pub fn number(self) -> u64 {
         match self {
-            Self::Steady => 1,
+            Self::Hysteresis => 1,
             Self::Centre => 2,
             Self::Mode(_) => 3,
         }
@@ -97,7 +97,7 @@ impl Remedy {
 
     /// The one with that number, and the name of a mode where it is one; `None` for none.
     pub fn of(number: u64, mode: &str) -> Option<Self> {
-        let all = [Self::Steady, Self::Centre, Self::Mode(ModeName::new(mode))];
+        let all = [Self::Hysteresis, Self::Centre, Self::Mode(ModeName::new(mode))];
         all.into_iter().find(|remedy| remedy.number() == number)
     }
 
@@ -106,7 +106,7 @@ impl Remedy {
         match self {
             Self::Mode(name) => name.as_str(),
             Self::Centre => "centre",
-            Self::Steady => "steady",
+            Self::Hysteresis => "steady",
         }
     }
 }

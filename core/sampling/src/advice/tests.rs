@@ -48,7 +48,7 @@ impl Case {
         let pose = Pose { position: Point3::new(100.0, y, z), attitude: Rot::identity() };
         let situation = Situation {
             pose: Some(pose),
-            doubt_m: 0.0,
+            pass_error_m: 0.0,
             speed_mps,
             layout: HeadLayout::PhaseShift,
             configured: specs.len(),
@@ -320,7 +320,7 @@ fn the_swing_of_the_vehicle_slows_it_down_and_a_steady_heading_helps() {
     assert!(little.v_max_mps > swung.v_max_mps, "{little:?}");
     let wild = advise(Swing { rate_radps: 0.2, most_rad: 1.0 });
     assert_eq!((wild.v_max_mps, wild.reason), (0.0, Reason::AngularStep));
-    assert_eq!(wild.remedy, Some(Remedy::Steady));
+    assert_eq!(wild.remedy, Some(Remedy::Hysteresis));
     assert!(wild.will_exceed && !still.will_exceed);
 }
 

@@ -92,7 +92,7 @@ impl<F, const N: usize> Stateful for Framed<F, N> {
 }
 
 impl<F: Framing, const N: usize> Framed<F, N> {
-    /// Like [`Codec::push`], but hands out each frame's bytes, and how far back they begin: the number of bytes from
+    /// Like [`Codec::push`], but connections out each frame's bytes, and how far back they begin: the number of bytes from
     /// the frame's first to the last that has come.
     pub fn push_frames(&mut self, mut bytes: &[u8], mut take: impl FnMut(&[u8], usize)) {
         while !bytes.is_empty() && !self.astray {
@@ -107,7 +107,7 @@ impl<F: Framing, const N: usize> Framed<F, N> {
         self.counts.skipped_bytes += bytes.len() as u64;
     }
 
-    /// Like [`Codec::flush`], but hands out frames as [`Framed::push_frames`] does.
+    /// Like [`Codec::flush`], but connections out frames as [`Framed::push_frames`] does.
     pub fn flush_frames(&mut self, mut take: impl FnMut(&[u8], usize)) {
         self.scan(0, true, &mut take);
         self.astray = false;

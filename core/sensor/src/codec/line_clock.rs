@@ -6,7 +6,7 @@ use super::{Codec as _, Framed, Framing};
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_snapshot::stateful;
 
-/// Packets of which a [`LineClock`] keeps account: a kilobyte from a port that hands over 32 bytes at a time.
+/// Packets of which a [`LineClock`] keeps account: a kilobyte from a port that connections over 32 bytes at a time.
 const MAX_PARTS: usize = 32;
 
 /// Gives each frame of a byte stream the receive time of the packet that brought its first byte, whatever was held

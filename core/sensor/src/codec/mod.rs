@@ -1,6 +1,6 @@
 //! The seam between a device's bytes and its values: codecs without I/O, and the contract that each of them passes.
 //!
-//! A codec is a pure state machine. It is fed bytes in whatever pieces a port delivers and hands out values; it reads
+//! A codec is a pure state machine. It is fed bytes in whatever pieces a port delivers and connections out values; it reads
 //! no clock, opens nothing, and holds no more than one frame's worth of bytes. Ports are another layer.
 
 mod bytes;

@@ -1,20 +1,20 @@
 //! Drivers of devices that talk without being asked.
 
-use super::{Cutter, Driver, Standing, Wire};
+use super::{Cutter, DeviceHealth, Driver, Wire};
 use crate::codec::Framing;
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Listens to a row of bytes, and hands on everything, frame by frame.
+/// Listens to a row of bytes, and connections on everything, frame by frame.
 pub struct Listener<F, const N: usize> {
     cutter: Cutter<F, N>,
-    patience: DurNs,
+    silence_timeout: DurNs,
 }
 
 impl<F: Framing, const N: usize> Listener<F, N> {
     /// For frames whose bytes follow one another without more than `silence` between them, of a device that says
-    /// something at least every `patience`.
-    pub fn new(framing: F, silence: DurNs, patience: DurNs) -> Self {
-        Self { cutter: Cutter::new(framing, silence), patience }
+    /// something at least every `silence_timeout`.
+    pub fn new(framing: F, silence: DurNs, silence_timeout: DurNs) -> Self {
+        Self { cutter: Cutter::new(framing, silence), silence_timeout }
     }
 }
 
@@ -37,30 +37,30 @@ impl<F: Framing + Send, const N: usize> Driver for Listener<F, N> {
         self.heard(now, &[], wire);
     }
 
-    fn patience(&self) -> DurNs {
-        self.patience
+    fn silence_timeout(&self) -> DurNs {
+        self.silence_timeout
     }
 
-    fn standing(&self) -> Standing {
-        Standing { good_frames: self.cutter.counts().good_frames, ..Standing::default() }
+    fn health(&self) -> DeviceHealth {
+        DeviceHealth { good_frames: self.cutter.counts().good_frames, ..DeviceHealth::default() }
     }
 }
 
 /// Says what is wrong with a message, if anything is.
 pub type Judge = Box<dyn Fn(&[u8]) -> Option<String> + Send>;
 
-/// Listens to whole messages, and hands on each.
+/// Listens to whole messages, and connections on each.
 pub struct MessageListener {
     judge: Judge,
-    patience: DurNs,
+    silence_timeout: DurNs,
     good_frames: u64,
     complaint: Option<String>,
 }
 
 impl MessageListener {
-    /// For a device that says something at least every `patience`; `judge` tells messages that are none of its own.
-    pub fn new(judge: Judge, patience: DurNs) -> Self {
-        Self { judge, patience, good_frames: 0, complaint: None }
+    /// For a device that says something at least every `silence_timeout`; `judge` tells messages that are none of its own.
+    pub fn new(judge: Judge, silence_timeout: DurNs) -> Self {
+        Self { judge, silence_timeout, good_frames: 0, complaint: None }
     }
 }
 
@@ -81,11 +81,11 @@ impl Driver for MessageListener {
 
     fn wake(&mut self, _: MonoNs, _: &mut dyn Wire) {}
 
-    fn patience(&self) -> DurNs {
-        self.patience
+    fn silence_timeout(&self) -> DurNs {
+        self.silence_timeout
     }
 
-    fn standing(&self) -> Standing {
-        Standing { good_frames: self.good_frames, identity: None, complaint: self.complaint.clone() }
+    fn health(&self) -> DeviceHealth {
+        DeviceHealth { good_frames: self.good_frames, identity: None, complaint: self.complaint.clone() }
     }
 }

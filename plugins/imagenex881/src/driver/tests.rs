@@ -297,7 +297,7 @@ fn a_silent_head_is_asked_less_often_and_for_ever() {
     let mut rig = Rig::new("mode = \"fast\"", turning(0.0, true), 0.0, faults);
     rig.run(after_s(100));
     assert!((80..130).contains(&rig.sent.len()), "{}", rig.sent.len());
-    assert_eq!(rig.driver.standing(), Standing::default());
+    assert_eq!(rig.driver.health(), DeviceHealth::default());
 }
 
 #[test]
@@ -313,8 +313,8 @@ fn another_head_and_one_that_refuses_are_complained_of() {
     rig.drive(|driver, now, wire| driver.opened(now, wire));
     rig.line.clear();
     rig.drive(|driver, now, wire| driver.heard(now, answer(0x11, 0x40).as_slice(), wire));
-    let said = rig.driver.standing().complaint.unwrap();
+    let said = rig.driver.health().complaint.unwrap();
     assert!(said.contains("head 0x11") && said.contains("0x10"), "{said}");
     rig.drive(|driver, now, wire| driver.heard(now, answer(0x10, 0x00).as_slice(), wire));
-    assert!(rig.driver.standing().complaint.unwrap().contains("doesn't accept"));
+    assert!(rig.driver.health().complaint.unwrap().contains("doesn't accept"));
 }

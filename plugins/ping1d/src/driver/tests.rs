@@ -121,7 +121,7 @@ fn settings_come_first_and_then_a_distance_each_interval() {
     assert_eq!(said(&Message::SetGain(2)), 1);
     assert_eq!(said(&Message::SetPingEnable(true)), 1);
     assert!(rig.heard.iter().all(|(_, message)| !matches!(message, Message::Nack { .. })));
-    let standing = rig.driver.standing();
+    let standing = rig.driver.health();
     assert_eq!(standing.identity.as_deref(), Some("Ping echosounder, revision 1, firmware 3.29.0"));
     assert_eq!(standing.complaint, None);
 }
@@ -188,5 +188,5 @@ fn another_device_on_the_line_is_complained_of() {
     let says = Addressed { source: 2, destination: 0, message: Message::DeviceInformation(device) };
     let bytes = says.encode().unwrap();
     rig.drive(|driver, now, wire| driver.heard(now, bytes.as_slice(), wire));
-    assert!(rig.driver.standing().complaint.unwrap().contains("Ping360"));
+    assert!(rig.driver.health().complaint.unwrap().contains("Ping360"));
 }

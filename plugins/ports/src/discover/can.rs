@@ -4,8 +4,8 @@ use headrace_sensor::connect::Connect;
 use headrace_sensor::driver::Carrier;
 
 use super::{Found, Machine};
-use crate::remedy;
-use crate::trouble::{Trouble, TroubleKind};
+use crate::fix_hint;
+use crate::open_error::{OpenError, OpenErrorKind};
 
 const CLASS: &str = "/sys/class/net";
 /// The kind of network that an interface is of. Source: Linux, `ARPHRD_CAN`.
@@ -40,28 +40,28 @@ fn has_hardware(machine: &Machine, name: &str) -> bool {
 }
 
 /// What keeps an interface from being used: it isn't there, or it is down.
-pub(crate) fn down(machine: &Machine, name: &str) -> Option<Trouble> {
+pub(crate) fn down(machine: &Machine, name: &str) -> Option<OpenError> {
     if is_up(machine, name)? {
         return None;
     }
     let why = format!("opening {name}: the interface is down");
-    let mends = remedy::set_up(name, has_hardware(machine, name));
-    Some(Trouble::new(TroubleKind::Other, why, Some(&mends)))
+    let mends = fix_hint::set_up(name, has_hardware(machine, name));
+    Some(OpenError::new(OpenErrorKind::Other, why, Some(&mends)))
 }
 
 /// What keeps an interface from being used, or would.
-pub(super) fn troubles(machine: &Machine, name: &str) -> Vec<Trouble> {
+pub(super) fn troubles(machine: &Machine, name: &str) -> Vec<OpenError> {
     if !is_can(machine, name) {
-        return vec![Trouble::no_interface(name)];
+        return vec![OpenError::no_interface(name)];
     }
     let state = machine.text(&format!("{CLASS}/{name}/operstate"));
     let silenced = state.as_deref() == Some("down") && is_up(machine, name) == Some(true);
     let silenced = silenced.then(|| {
         let why = format!("opening {name}: the interface is up, but off the bus");
-        Trouble::new(TroubleKind::Other, why, Some(&remedy::back_on_bus(name)))
+        OpenError::new(OpenErrorKind::Other, why, Some(&fix_hint::back_on_bus(name)))
     });
     let has_sockets = machine.has_protocol("CAN_RAW") || machine.has_module("can_raw");
-    let no_sockets = (!has_sockets).then(|| Trouble::no_can(name));
+    let no_sockets = (!has_sockets).then(|| OpenError::no_can(name));
     down(machine, name).into_iter().chain(silenced).chain(no_sockets).collect()
 }
 

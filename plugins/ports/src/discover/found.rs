@@ -3,7 +3,7 @@
 use headrace_sensor::driver::Carrier;
 
 use super::rights::Rights;
-use crate::trouble::Trouble;
+use crate::open_error::OpenError;
 
 /// Something that a sensor may be connected to.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -21,5 +21,5 @@ pub struct Found {
     /// Who may open it; an interface of the network needs no rights.
     pub rights: Option<Rights>,
     /// What keeps us from using it, each with what mends it.
-    pub troubles: Vec<Trouble>,
+    pub troubles: Vec<OpenError>,
 }

@@ -3,8 +3,8 @@
 use headrace_sensor::driver::Carrier;
 
 use super::{Found, Machine, Rights};
-use crate::remedy;
-use crate::trouble::{Trouble, TroubleKind};
+use crate::fix_hint;
+use crate::open_error::{OpenError, OpenErrorKind};
 
 const DEVICES: &str = "/sys/bus/i2c/devices";
 
@@ -30,17 +30,17 @@ fn describe(machine: &Machine, name: &str) -> Found {
 }
 
 /// What keeps a bus from being used.
-pub(super) fn trouble(machine: &Machine, path: &str) -> Option<Trouble> {
+pub(super) fn trouble(machine: &Machine, path: &str) -> Option<OpenError> {
     if let Some(rights) = Rights::of(machine, path) {
         return rights.trouble(path);
     }
     let bus = path.strip_prefix("/dev/").unwrap_or(path);
     let why = |words: &str| format!("opening {path}: {words}");
     Some(if machine.exists(&format!("{DEVICES}/{bus}")) {
-        Trouble::new(TroubleKind::Absent, why("the bus has no device file"), Some(remedy::I2C_DEV))
+        OpenError::new(OpenErrorKind::Absent, why("the bus has no device file"), Some(fix_hint::I2C_DEV))
     } else {
-        Trouble::new(
-            TroubleKind::Absent,
+        OpenError::new(
+            OpenErrorKind::Absent,
             why("there is no such bus"),
             Some("headrace devices shows what there is"),
         )

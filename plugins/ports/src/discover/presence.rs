@@ -3,7 +3,7 @@
 use headrace_sensor::connect::{Connect, SerialPort, UsbIdentity};
 
 use super::{Machine, Rights, can, hid, i2c, serial};
-use crate::trouble::Trouble;
+use crate::open_error::OpenError;
 
 /// What is known of what a `connect` names.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -17,7 +17,7 @@ pub enum Presence {
 /// Whether what `connect` names is there and may be opened. Nothing is opened for it.
 ///
 /// Errors: it isn't there, it is there more than once, or it may not be opened; with what mends it.
-pub fn presence(machine: &Machine, connect: &Connect) -> Result<Presence, Trouble> {
+pub fn presence(machine: &Machine, connect: &Connect) -> Result<Presence, OpenError> {
     match connect {
         Connect::Serial { port: SerialPort::Path(path), .. } => file(machine, path),
         Connect::Serial { port: SerialPort::Usb(identity), .. } => {
@@ -41,17 +41,17 @@ pub fn presence(machine: &Machine, connect: &Connect) -> Result<Presence, Troubl
 }
 
 /// The path of the one device that fits.
-fn one(what: &str, all: Vec<(String, UsbIdentity)>, wanted: &UsbIdentity) -> Result<String, Trouble> {
+fn one(what: &str, all: Vec<(String, UsbIdentity)>, wanted: &UsbIdentity) -> Result<String, OpenError> {
     let fitting = all.into_iter().filter(|(_, got)| serial::fits(got, wanted));
     let mut paths: Vec<String> = fitting.map(|(path, _)| path).collect();
     match paths.len() {
-        0 => Err(Trouble::not_plugged_in(what)),
+        0 => Err(OpenError::not_plugged_in(what)),
         1 => Ok(paths.remove(0)),
-        _ => Err(Trouble::ambiguous(what, &paths)),
+        _ => Err(OpenError::ambiguous(what, &paths)),
     }
 }
 
-fn file(machine: &Machine, path: &str) -> Result<Presence, Trouble> {
-    let rights = Rights::of(machine, path).ok_or_else(|| Trouble::not_there(path))?;
+fn file(machine: &Machine, path: &str) -> Result<Presence, OpenError> {
+    let rights = Rights::of(machine, path).ok_or_else(|| OpenError::not_there(path))?;
     rights.trouble(path).map_or_else(|| Ok(Presence::There(path.to_owned())), Err)
 }

@@ -4,8 +4,8 @@ use std::fs;
 use std::os::unix::fs::MetadataExt as _;
 
 use super::machine::Machine;
-use crate::remedy;
-use crate::trouble::Trouble;
+use crate::fix_hint;
+use crate::open_error::OpenError;
 
 /// Who may open a device file.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -53,17 +53,17 @@ impl Rights {
     }
 
     /// What is wrong with them, where something is.
-    pub(super) fn trouble(&self, path: &str) -> Option<Trouble> {
-        (!self.may_open).then(|| Trouble::denied(path, &self.remedy(path)))
+    pub(super) fn trouble(&self, path: &str) -> Option<OpenError> {
+        (!self.may_open).then(|| OpenError::denied(path, &self.remedy(path)))
     }
 
     fn remedy(&self, path: &str) -> String {
         if self.listed {
-            remedy::log_in_again(&self.group)
+            fix_hint::log_in_again(&self.group)
         } else if self.by_group {
-            remedy::join(&self.group)
+            fix_hint::join(&self.group)
         } else {
-            remedy::rule(path)
+            fix_hint::rule(path)
         }
     }
 }
@@ -71,5 +71,5 @@ impl Rights {
 /// The line that gives whoever runs this program the right to a device file.
 pub(crate) fn remedy_for(path: &str) -> String {
     let rights = Rights::of(&Machine::ours(), path);
-    rights.map_or_else(|| remedy::rule(path), |rights| rights.remedy(path))
+    rights.map_or_else(|| fix_hint::rule(path), |rights| rights.remedy(path))
 }

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use headrace_sensor::connect::Connect;
 
 use super::*;
-use crate::trouble::TroubleKind;
+use crate::open_error::OpenErrorKind;
 
 /// Another machine's files in a folder of ours, which goes with it. All are ours, and our group is called dialout there.
 struct Tree(PathBuf);
@@ -177,7 +177,7 @@ fn who_may_not_open_is_told_what_gives_the_right() {
     ] {
         tree.device("/dev/ttyUSB0", mode);
         let trouble = presence(&machine, &Connect::parse(connect).unwrap()).unwrap_err();
-        assert_eq!(trouble.kind, TroubleKind::Denied);
+        assert_eq!(trouble.kind, OpenErrorKind::Denied);
         assert!(trouble.remedy.as_ref().unwrap().starts_with(right), "{mode:o}: {trouble}");
         let found = discover(&machine).remove(0);
         assert_eq!(found.troubles, [trouble]);

@@ -13,7 +13,7 @@ use super::line::{Line, READ_BYTES, ReadTimeout, waited};
 use crate::clock;
 use crate::diagnosis;
 use crate::discover::{self, Machine};
-use crate::trouble::Trouble;
+use crate::open_error::OpenError;
 
 /// Length of a `can_frame`, and where its data begins.
 const FRAME_BYTES: usize = 16;
@@ -34,7 +34,7 @@ struct Can {
     is_down: bool,
 }
 
-pub(super) fn open(interface: &str) -> Result<Box<dyn Line>, Trouble> {
+pub(super) fn open(interface: &str) -> Result<Box<dyn Line>, OpenError> {
     let opening = || {
         let socket = CanSocket::open(interface)?;
         socket.set_recv_timestamp(true)?;

@@ -10,18 +10,18 @@ use hidapi::{DeviceInfo, HidApi, HidDevice, HidError};
 use super::line::{Line, READ_BYTES};
 use crate::clock;
 use crate::diagnosis;
-use crate::trouble::Trouble;
+use crate::open_error::OpenError;
 
 struct Hid(HidDevice);
 
-pub(super) fn open(identity: &UsbIdentity) -> Result<Box<dyn Line>, Trouble> {
+pub(super) fn open(identity: &UsbIdentity) -> Result<Box<dyn Line>, OpenError> {
     let what = format!("hid:{identity}");
     let api = HidApi::new().map_err(|error| diagnosis::opening(&what, &io_error(&error)))?;
     let mut fitting = api.device_list().filter(|device| is_it(device, identity));
-    let Some(device) = fitting.next() else { return Err(Trouble::not_plugged_in(&what)) };
+    let Some(device) = fitting.next() else { return Err(OpenError::not_plugged_in(&what)) };
     let path = device.path().to_string_lossy().into_owned();
     if let Some(other) = fitting.find(|other| other.path() != device.path()) {
-        return Err(Trouble::ambiguous(&what, &[path, other.path().to_string_lossy().into_owned()]));
+        return Err(OpenError::ambiguous(&what, &[path, other.path().to_string_lossy().into_owned()]));
     }
     let opened =
         api.open_path(device.path()).map_err(|error| diagnosis::opening(&path, &io_error(&error)))?;

@@ -11,7 +11,7 @@ use linux_embedded_hal::I2cdev;
 use super::line::{Line, READ_BYTES};
 use crate::clock;
 use crate::diagnosis;
-use crate::trouble::Trouble;
+use crate::open_error::OpenError;
 
 /// A device on a bus.
 struct Bus<B> {
@@ -19,7 +19,7 @@ struct Bus<B> {
     address: u8,
 }
 
-pub(super) fn open(bus: &str, address: u8) -> Result<Box<dyn Line>, Trouble> {
+pub(super) fn open(bus: &str, address: u8) -> Result<Box<dyn Line>, OpenError> {
     let opened =
         I2cdev::new(bus).map_err(|error| diagnosis::opening(bus, &io::Error::other(error.to_string())));
     // The crate's error hides the kind; the file's own tells it.

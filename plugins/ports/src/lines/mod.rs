@@ -13,13 +13,13 @@ mod udp;
 
 use headrace_sensor::connect::Connect;
 
-use crate::trouble::Trouble;
+use crate::open_error::OpenError;
 pub(crate) use line::{Line, READ_BYTES};
 
 /// Opens what a `connect` names.
 ///
 /// Errors: why it can't be opened, and what would mend it.
-pub(crate) fn open(connect: &Connect) -> Result<Box<dyn Line>, Trouble> {
+pub(crate) fn open(connect: &Connect) -> Result<Box<dyn Line>, OpenError> {
     match connect {
         Connect::Serial { port, baud } => serial::open(port, *baud),
         Connect::Tcp { address } => tcp::open(address),
@@ -32,6 +32,6 @@ pub(crate) fn open(connect: &Connect) -> Result<Box<dyn Line>, Trouble> {
         #[cfg(target_os = "linux")]
         Connect::I2c { bus, address } => i2c::open(bus, *address),
         #[cfg(not(target_os = "linux"))]
-        other => Err(Trouble::unsupported(&other.to_string())),
+        other => Err(OpenError::unsupported(&other.to_string())),
     }
 }

@@ -10,7 +10,7 @@ use serialport::{SerialPort as _, SerialPortType, TTYPort};
 use super::line::{Line, READ_BYTES, waited};
 use crate::clock;
 use crate::diagnosis;
-use crate::trouble::Trouble;
+use crate::open_error::OpenError;
 
 /// Bits on the line for a byte: start, eight, stop.
 const BITS_A_BYTE: i64 = 10;
@@ -24,7 +24,7 @@ struct Serial {
     emptied: MonoNs,
 }
 
-pub(super) fn open(port: &SerialPort, baud: u32) -> Result<Box<dyn Line>, Trouble> {
+pub(super) fn open(port: &SerialPort, baud: u32) -> Result<Box<dyn Line>, OpenError> {
     let path = match port {
         SerialPort::Path(path) => path.clone(),
         SerialPort::Usb(identity) => path_of(identity)?,
@@ -37,7 +37,7 @@ pub(super) fn open(port: &SerialPort, baud: u32) -> Result<Box<dyn Line>, Troubl
 }
 
 /// The path that a USB adapter's port has now.
-fn path_of(identity: &UsbIdentity) -> Result<String, Trouble> {
+fn path_of(identity: &UsbIdentity) -> Result<String, OpenError> {
     let what = format!("serial:usb:{identity}");
     let ports = serialport::available_ports().map_err(|error| diagnosis::opening(&what, &error.into()))?;
     let is_it = |kind: &SerialPortType| match kind {
@@ -48,10 +48,10 @@ fn path_of(identity: &UsbIdentity) -> Result<String, Trouble> {
         _ => false,
     };
     let mut fitting = ports.into_iter().filter(|port| is_it(&port.port_type)).map(|port| port.port_name);
-    let Some(path) = fitting.next() else { return Err(Trouble::not_plugged_in(&what)) };
+    let Some(path) = fitting.next() else { return Err(OpenError::not_plugged_in(&what)) };
     match fitting.next() {
         None => Ok(path),
-        Some(other) => Err(Trouble::ambiguous(&what, &[path, other])),
+        Some(other) => Err(OpenError::ambiguous(&what, &[path, other])),
     }
 }
 

@@ -9,7 +9,7 @@ use headrace_geometry::time::MonoNs;
 use super::line::{Line, READ_BYTES, ReadTimeout, waited};
 use crate::clock;
 use crate::diagnosis;
-use crate::trouble::Trouble;
+use crate::open_error::OpenError;
 
 const CONNECT_TIME: Duration = Duration::from_secs(2);
 const WRITE_TIME: Duration = Duration::from_millis(500);
@@ -19,7 +19,7 @@ struct Tcp {
     timeout: ReadTimeout,
 }
 
-pub(super) fn open(address: &str) -> Result<Box<dyn Line>, Trouble> {
+pub(super) fn open(address: &str) -> Result<Box<dyn Line>, OpenError> {
     connect(address)
         .map(|line| Box::new(line) as Box<dyn Line>)
         .map_err(|error| diagnosis::opening(address, &error))

@@ -9,7 +9,7 @@ use headrace_geometry::time::{DurNs, MonoNs};
 use super::line::{Line, READ_BYTES, ReadTimeout, waited};
 use crate::clock;
 use crate::diagnosis;
-use crate::trouble::Trouble;
+use crate::open_error::OpenError;
 
 struct Udp {
     socket: UdpSocket,
@@ -20,7 +20,7 @@ struct Udp {
     calls: bool,
 }
 
-pub(super) fn open(address: &str) -> Result<Box<dyn Line>, Trouble> {
+pub(super) fn open(address: &str) -> Result<Box<dyn Line>, OpenError> {
     let calling = || {
         let none = || io::Error::new(io::ErrorKind::NotFound, "the name has no address");
         let peer = address.to_socket_addrs()?.next().ok_or_else(none)?;
@@ -35,7 +35,7 @@ pub(super) fn open(address: &str) -> Result<Box<dyn Line>, Trouble> {
     calling().map(|line| Box::new(line) as Box<dyn Line>).map_err(|error| diagnosis::opening(address, &error))
 }
 
-pub(super) fn listen(address: &str) -> Result<Box<dyn Line>, Trouble> {
+pub(super) fn listen(address: &str) -> Result<Box<dyn Line>, OpenError> {
     let socket = UdpSocket::bind(address).map_err(|error| diagnosis::opening(address, &error))?;
     Ok(Box::new(Udp { socket, timeout: ReadTimeout::default(), peer: None, calls: false }))
 }

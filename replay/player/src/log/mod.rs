@@ -26,7 +26,7 @@
 
 mod channels;
 mod chunk;
-mod companion;
+mod derived_channels;
 mod digest;
 mod dive_log;
 mod error;
@@ -48,7 +48,7 @@ mod trim;
 mod worker;
 mod writer;
 
-pub use companion::{Companion, Made};
+pub use derived_channels::{DerivedChannels, Made};
 pub use digest::{file_digest, files_digest};
 pub use dive_log::{DiveLog, DivePlace, PartFile, files_of};
 pub use error::LogError;

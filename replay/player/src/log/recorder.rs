@@ -17,7 +17,7 @@ use ringbuf::traits::{Observer as _, Producer as _};
 use ringbuf::wrap::{Cons, Prod};
 
 use super::LogError;
-use super::companion::Companion;
+use super::derived_channels::DerivedChannels;
 use super::format::{TICK_HEAD_BYTES, order_bytes, tick_head};
 use super::part::part_path;
 use super::queue::{ENTRY_HEAD_BYTES, Queue, SentMessage, State, entry_head};
@@ -98,9 +98,9 @@ impl Recorder {
         writer: W,
         header: &LogHeader,
         queue_bytes: usize,
-        companion: Option<Box<dyn Companion>>,
+        derived: Option<Box<dyn DerivedChannels>>,
     ) -> Result<(RecorderPort, RecorderHandle), LogError> {
-        Self::begin(space, (LogWriter::new(writer, header)?, None), header, queue_bytes, companion)
+        Self::begin(space, (LogWriter::new(writer, header)?, None), header, queue_bytes, derived)
     }
 
     /// Starts the thread of a log that has been begun, perhaps in parts.
@@ -109,7 +109,7 @@ impl Recorder {
         (mut log, parts): (LogWriter<W>, Option<Parts<W>>),
         header: &LogHeader,
         queue_bytes: usize,
-        companion: Option<Box<dyn Companion>>,
+        derived: Option<Box<dyn DerivedChannels>>,
     ) -> Result<(RecorderPort, RecorderHandle), LogError> {
         log.flush()?;
         let ring = Arc::new(HeapRb::new(queue_bytes.max(MIN_QUEUE_BYTES)));
@@ -124,7 +124,7 @@ impl Recorder {
         let thread_state = Arc::clone(&state);
         let thread = thread::Builder::new().name("recorder".to_owned());
         let echoes = Echoes::of(header);
-        let beside = Beside::new(companion);
+        let beside = Beside::new(derived);
         let thread =
             thread.spawn(move || Worker::new(log, parts, space, echoes, beside, &thread_state).run(queue));
         let thread = Some(thread.map_err(|source| LogError::Thread { source })?);
@@ -144,11 +144,11 @@ impl Recorder {
         path: &Path,
         header: &LogHeader,
         queue_bytes: usize,
-        companion: Option<Box<dyn Companion>>,
+        derived: Option<Box<dyn DerivedChannels>>,
     ) -> Result<(RecorderPort, RecorderHandle), LogError> {
         let file = new_file(path)?;
         let space = file.space();
-        Self::start_within(space, file, header, queue_bytes, companion)
+        Self::start_within(space, file, header, queue_bytes, derived)
     }
 
     /// The same in parts, each a log of its own; `path` names the recording, and [`part_path`] its parts.
@@ -159,7 +159,7 @@ impl Recorder {
         header: &LogHeader,
         rotation: &Rotation,
         queue_bytes: usize,
-        companion: Option<Box<dyn Companion>>,
+        derived: Option<Box<dyn DerivedChannels>>,
     ) -> Result<(RecorderPort, RecorderHandle), LogError> {
         let failed = |path: &Path, source| LogError::Create { path: path.to_owned(), source };
         if let Some(other) = in_the_way(path).map_err(|source| failed(path, source))? {
@@ -174,7 +174,7 @@ impl Recorder {
         // All parts are on one disk.
         let first = part_path(path, 1);
         let space = File::open(&first).map_or_else(|_| Space::endless(), Space::of);
-        Self::begin(space, (log, Some(parts)), header, queue_bytes, companion)
+        Self::begin(space, (log, Some(parts)), header, queue_bytes, derived)
     }
 }
 

@@ -6,7 +6,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use super::LogError;
-use super::companion::{Companion, Made};
+use super::derived_channels::{DerivedChannels, Made};
 use super::queue::{Entry, Queue, State};
 use super::rotate::Parts;
 use super::space::{LONGEST_KEPT_BYTES, Space};
@@ -37,15 +37,15 @@ pub(super) struct Worker<'a, W: Write> {
     state: &'a State,
 }
 
-/// A companion, and room for what it makes.
+/// A derived, and room for what it makes.
 pub(super) struct Beside {
-    companion: Option<Box<dyn Companion>>,
+    derived: Option<Box<dyn DerivedChannels>>,
     made: Vec<Made>,
 }
 
 impl Beside {
-    pub(super) fn new(companion: Option<Box<dyn Companion>>) -> Self {
-        Self { companion, made: Vec::new() }
+    pub(super) fn new(derived: Option<Box<dyn DerivedChannels>>) -> Self {
+        Self { derived, made: Vec::new() }
     }
 }
 
@@ -110,19 +110,19 @@ impl<'a, W: Write> Worker<'a, W> {
         }
     }
 
-    /// Writes an entry and what the companion makes of it.
+    /// Writes an entry and what the derived makes of it.
     fn write_all(&mut self, entry: &Entry, message: &[u8]) {
         self.write(entry, message);
         if let Lane::Result(number) = entry.lane {
-            self.write_made(|companion, made| companion.take(number, entry.log_time, message, made));
+            self.write_made(|derived, made| derived.take(number, entry.log_time, message, made));
         }
     }
 
-    fn write_made(&mut self, make: impl FnOnce(&mut dyn Companion, &mut Vec<Made>)) {
+    fn write_made(&mut self, make: impl FnOnce(&mut dyn DerivedChannels, &mut Vec<Made>)) {
         // Of a dive that goes on unrecorded nothing is to be made.
-        let Some(companion) = self.beside.companion.as_mut().filter(|_| self.log.is_some()) else { return };
+        let Some(derived) = self.beside.derived.as_mut().filter(|_| self.log.is_some()) else { return };
         let mut made = core::mem::take(&mut self.beside.made);
-        make(companion.as_mut(), &mut made);
+        make(derived.as_mut(), &mut made);
         for Made { channel, at, bytes } in made.drain(..) {
             if usize::from(channel) < self.echoes.results.len() {
                 self.write(&Entry { lane: Lane::Result(channel), log_time: at, publish_time: at }, &bytes);
@@ -186,7 +186,7 @@ impl<'a, W: Write> Worker<'a, W> {
     }
 
     fn finish(mut self) -> Result<Summary, LogError> {
-        self.write_made(|companion, made| companion.end(made));
+        self.write_made(|derived, made| derived.end(made));
         let left_out = self.space.left_out();
         if let Some((from, to)) = left_out.span {
             self.attempt(|log| log.lost(Some(from), Some(to), &left_out.words()));

@@ -14,7 +14,7 @@
 //! | `alerts` | `foxglove.Log` | what the pilot is told |
 //!
 //! Frame `tunnel` is ours ([`headrace_geometry::frames`]): z is up, as viewers have it, so that none has to be turned. `wall`
-//! lies flat beside it: x is chainage, y the arc length. It is made on the recorder's thread ([`Companion`]); the loop has no
+//! lies flat beside it: x is chainage, y the arc length. It is made on the recorder's thread ([`DerivedChannels`]); the loop has no
 //! part in it, and nothing here is read back by a replay.
 
 mod judged;
@@ -47,7 +47,7 @@ use self::points::Points;
 use self::site::{TUNNEL, VEHICLE, WALL};
 use self::topic::Topic;
 use self::wall::Wall;
-use crate::log::{Companion, Made};
+use crate::log::{DerivedChannels, Made};
 use crate::results::{STREAMS, read_results};
 
 pub use schemas::channels;
@@ -276,7 +276,7 @@ fn alert(words: &mut Words<'_>, made: &mut Outbox<'_>) -> Option<()> {
     Some(())
 }
 
-impl Companion for View {
+impl DerivedChannels for View {
     fn take(&mut self, channel: u16, at: MonoNs, message: &[u8], made: &mut Vec<Made>) {
         if usize::from(channel) >= STREAMS.len() {
             return;

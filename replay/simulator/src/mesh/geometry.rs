@@ -13,7 +13,7 @@ const THIN: f64 = 1e-12;
 /// Widens the interval of a box by more than its own rounding.
 const WIDER: f64 = 1.0 + 1e-15;
 
-/// What a triangle does to a ray that must not be in doubt.
+/// What a triangle does to a ray that must not be in pass_error.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Crossing {
     Beside,

@@ -71,7 +71,7 @@ fn ten_hours_of_dead_reckoning_end_with_one_precise_fix() {
     assert_eq!(nav.consistency(IMU).unwrap().dropped, 0, "what nobody waits for takes no room");
     rig.run(&mut nav, &rig.events(f64::from(end_s), f64::from(end_s + 60)));
     let fix = nav.fix(at(f64::from(end_s + 60)));
-    assert!(fix.is_ok(), "{fix:?} {:?}", nav.running().map(super::super::running::Running::pose_sd));
+    assert!(fix.is_ok(), "{fix:?} {:?}", nav.running().map(super::super::eskf::Eskf::pose_sd));
     assert!(nav.running().unwrap().pose_sd().place_m < 0.05);
     assert_eq!(nav.restarts(), 1);
 }

@@ -4,7 +4,7 @@
 //! attitudes all over the sphere, sensors anywhere on the vehicle, biases and offsets of any sign.
 
 use crate::filter::inertial::{Felt, Leg, Transition};
-use crate::filter::measure::{self, Beam, Row};
+use crate::filter::measure::{self, Beam, ScalarUpdate};
 use crate::filter::settings::Settings;
 use crate::filter::state::{
     ATTITUDE, DEPTH, ERRORS, Errors, FORCE_BIAS, HEADING, POSITION, RATE_BIAS, SCALE, SLACK, SLACK_RATE,
@@ -93,7 +93,12 @@ fn moved(state: &State, error: usize, by: f64) -> State {
 }
 
 /// What a row says against the differences of its residual: the expected is the measured less the residual.
-fn check_row(what: &str, state: &State, tolerance: f64, row: impl Fn(&State) -> Option<Row>) -> bool {
+fn check_row(
+    what: &str,
+    state: &State,
+    tolerance: f64,
+    row: impl Fn(&State) -> Option<ScalarUpdate>,
+) -> bool {
     let Some(at) = row(state) else { return false };
     for error in 0..ERRORS {
         let (Some(above), Some(below)) = (row(&moved(state, error, STEP)), row(&moved(state, error, -STEP)))

@@ -2,12 +2,12 @@
 
 use proptest::prelude::*;
 
+use super::super::clones::ErrorClones;
 use super::super::factors::Factors;
 use super::super::inertial::{Felt, Leg, Transition};
 use super::super::settings::Settings;
 use super::super::sources::{Source, Turning};
 use super::super::state::{ATTITUDE, ERRORS, Errors, POSITION, State};
-use super::super::trail::Trail;
 use super::super::window::{Waiting, Window};
 use super::rig::{ECHOES, Rig, TETHER};
 use crate::section::{Echo, settle};
@@ -255,7 +255,7 @@ fn the_trail_knows_what_an_augmented_filter_knows() {
             now: core::array::from_fn(|i| unit(i).map(|u| u * factors.variance(i))),
             clones: Vec::new(),
         };
-        let mut trail = Trail::default();
+        let mut clones = ErrorClones::default();
         let mut at = MonoNs(0);
         for clone in 0..times {
             for leg_number in 0..legs {
@@ -274,27 +274,27 @@ fn the_trail_knows_what_an_augmented_filter_knows() {
                 let q = core::array::from_fn(|i| core::array::from_fn(|j| noise.covariance(i, j)));
                 transition.carry(&mut factors);
                 leg.disturb(&settings, &transition, &mut factors);
-                trail.carry(&transition);
+                clones.carry(&transition);
                 augmented.carry(&whole(&transition), &q);
                 for number in 0..2 {
                     let h: Errors =
                         core::array::from_fn(|i| rig.noisy(salt, 100 + number * 20 + i as u64, 0.5));
                     let gain = factors.measure(&h, 0.01);
-                    trail.measure(&h, &gain);
+                    clones.measure(&h, &gain);
                     augmented.measure(&h, 0.01);
                 }
             }
             at = at + DurNs::from_millis(2000);
-            trail.note(at, &factors);
+            clones.note(at, &factors);
             augmented.clones.push((augmented.now, augmented.now));
             for back in 1..augmented.clones.len().min(60) {
-                let relative = trail.relative(DurNs::from_millis(2000 * back as i64)).unwrap();
+                let relative = clones.relative(DurNs::from_millis(2000 * back as i64)).unwrap();
                 for arm in [Vec3::zero(), Vec3::new(0.0, 4.0, 0.0), Vec3::new(0.0, -2.0, 5.0)] {
                     let (is, right) = (relative.sd_m(arm), augmented.arc_m(back, arm));
                     assert!((is / right - 1.0).abs() < 1e-6, "clone {clone}, {back} back: {is}, not {right}");
                 }
             }
         }
-        assert!(trail.relative(DurNs(0)).unwrap().sd_m(Vec3::zero()) < 1e-12);
+        assert!(clones.relative(DurNs(0)).unwrap().sd_m(Vec3::zero()) < 1e-12);
     }
 }

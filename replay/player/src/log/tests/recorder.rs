@@ -6,7 +6,7 @@ use std::sync::{Arc, mpsc};
 use std::time::Duration;
 
 use super::super::space::Space;
-use super::super::{Companion, LogError, LossKind, Made, Recorder, RecorderPort};
+use super::super::{DerivedChannels, LogError, LossKind, Made, Recorder, RecorderPort};
 use super::*;
 
 /// A medium that takes its time, and says when something has been flushed to it.
@@ -236,7 +236,7 @@ fn what_there_was_no_room_for_is_counted() {
 /// Makes a message of each result but those of the last channel, for channels that are there and one that isn't.
 struct Echoing;
 
-impl Companion for Echoing {
+impl DerivedChannels for Echoing {
     fn take(&mut self, channel: u16, at: MonoNs, message: &[u8], made: &mut Vec<Made>) {
         assert_eq!(channel, 0, "what it made doesn't come back");
         for channel in [1, 9] {
@@ -256,9 +256,9 @@ fn what_a_companion_makes_follows_its_result_and_goes_first_when_the_disk_fills(
         let mut header = header(true);
         let topic = "/result/view/echo".to_owned();
         header.results.push(ResultChannel { topic, follows_echoes: true, ..ResultChannel::default() });
-        let companion = Some(Box::new(Echoing) as Box<dyn Companion>);
+        let derived = Some(Box::new(Echoing) as Box<dyn DerivedChannels>);
         let space = Space::new(move || free);
-        let (mut port, handle) = Recorder::start_within(space, medium, &header, 0, companion).unwrap();
+        let (mut port, handle) = Recorder::start_within(space, medium, &header, 0, derived).unwrap();
         port.result(0, MonoNs(1), b"one").unwrap();
         port.tick(0, MonoNs(2), &[]).unwrap();
         port.result(0, MonoNs(3), b"two").unwrap();

@@ -18,7 +18,7 @@ fn heard(line: &mut dyn Line, count: usize) -> Vec<u8> {
     all
 }
 
-fn told(stand: &mut Stand, count: usize) -> Vec<u8> {
+fn told(stand: &mut EmulatedPort, count: usize) -> Vec<u8> {
     let mut all = Vec::new();
     for _ in 0..10_000 {
         match stand.read().unwrap() {
@@ -36,7 +36,7 @@ fn told(stand: &mut Stand, count: usize) -> Vec<u8> {
 fn bytes_pass_both_ways_on_every_carrier_that_is_here() {
     let all: Vec<u8> = (0..=255).collect();
     for carrier in [Carrier::Serial, Carrier::Tcp, Carrier::Udp] {
-        let mut stand = Stand::new(carrier, LOCAL).unwrap();
+        let mut stand = EmulatedPort::new(carrier, LOCAL).unwrap();
         let mut line = lines::open(stand.connect()).unwrap();
         line.write(&all).unwrap();
         assert_eq!(told(&mut stand, 256), all, "{carrier:?} to the device");
@@ -49,7 +49,7 @@ fn bytes_pass_both_ways_on_every_carrier_that_is_here() {
 #[test]
 fn a_host_that_goes_and_comes_again_is_served_again() {
     for carrier in [Carrier::Serial, Carrier::Tcp, Carrier::Udp] {
-        let mut stand = Stand::new(carrier, LOCAL).unwrap();
+        let mut stand = EmulatedPort::new(carrier, LOCAL).unwrap();
         for round in 0..3 {
             let mut line = lines::open(stand.connect()).unwrap();
             line.write(&[round]).unwrap();
@@ -64,7 +64,7 @@ fn a_host_that_goes_and_comes_again_is_served_again() {
 #[test]
 fn a_device_that_goes_is_noticed() {
     for carrier in [Carrier::Serial, Carrier::Tcp] {
-        let stand = Stand::new(carrier, LOCAL).unwrap();
+        let stand = EmulatedPort::new(carrier, LOCAL).unwrap();
         let mut stand = stand;
         let mut line = lines::open(stand.connect()).unwrap();
         line.write(&[1]).unwrap();

@@ -11,7 +11,7 @@ use crossbeam::sync::Unparker;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::ring::{MAX_PACKET_BYTES, Port};
 use headrace_sensor::connect::{Connect, ConnectError};
-use headrace_sensor::driver::{Driver, Standing, Wire};
+use headrace_sensor::driver::{DeviceHealth, Driver, Wire};
 
 use crate::clock;
 use crate::diagnosis;
@@ -35,7 +35,7 @@ const KNOCK_PERIOD: DurNs = DurNs::from_millis(1_000);
 pub type SentSink = Arc<dyn Fn(usize, MonoNs, &[u8]) + Send + Sync>;
 
 /// A sensor on a line.
-pub(crate) struct Berth {
+pub(crate) struct Attached {
     /// Its number, in the order of the vehicle file.
     pub source: usize,
     pub port: Port,
@@ -52,15 +52,15 @@ pub(crate) struct Common {
 }
 
 /// A line and those who use it.
-pub(crate) struct Service {
+pub(crate) struct LineThread {
     connect: Result<Connect, ConnectError>,
-    seats: Vec<Seat>,
+    devices: Vec<AttachedState>,
     common: Common,
 }
 
 /// A sensor with what is known of it.
-struct Seat {
-    berth: Berth,
+struct AttachedState {
+    attached: Attached,
     history: LineHistory,
     status: Option<(Phase, String)>,
     /// Good frames so far, those of them that had come when the line was opened, and when there were last more bytes.
@@ -79,7 +79,7 @@ enum Served {
 }
 
 /// What drivers want of the line, noted while they are called.
-enum Wish {
+enum IoRequest {
     Send(Vec<u8>),
     Exchange { write: Vec<u8>, settle: DurNs, read_bytes: usize },
 }
@@ -87,16 +87,16 @@ enum Wish {
 struct Ends<'a> {
     port: &'a mut Port,
     history: &'a mut LineHistory,
-    wishes: &'a mut VecDeque<Wish>,
+    requests: &'a mut VecDeque<IoRequest>,
 }
 
 impl Wire for Ends<'_> {
     fn send(&mut self, bytes: &[u8]) {
-        self.wishes.push_back(Wish::Send(bytes.to_vec()));
+        self.requests.push_back(IoRequest::Send(bytes.to_vec()));
     }
 
     fn exchange(&mut self, write: &[u8], settle: DurNs, read_bytes: usize) {
-        self.wishes.push_back(Wish::Exchange { write: write.to_vec(), settle, read_bytes });
+        self.requests.push_back(IoRequest::Exchange { write: write.to_vec(), settle, read_bytes });
     }
 
     fn deliver(&mut self, received: MonoNs, bytes: &[u8]) {
@@ -108,11 +108,15 @@ impl Wire for Ends<'_> {
     }
 }
 
-impl Service {
-    pub(crate) fn new(connect: Result<Connect, ConnectError>, berths: Vec<Berth>, common: Common) -> Self {
+impl LineThread {
+    pub(crate) fn new(
+        connect: Result<Connect, ConnectError>,
+        attached: Vec<Attached>,
+        common: Common,
+    ) -> Self {
         let now = clock::now();
-        let seat = |berth| Seat {
-            berth,
+        let device = |attached| AttachedState {
+            attached,
             history: LineHistory::default(),
             status: None,
             frames: 0,
@@ -120,12 +124,12 @@ impl Service {
             last_bytes: now,
             last_frame: now,
         };
-        Self { connect, seats: berths.into_iter().map(seat).collect(), common }
+        Self { connect, devices: attached.into_iter().map(device).collect(), common }
     }
 
     /// Runs until it is told to end; gives what each sensor's line has been through.
     pub(crate) fn run(mut self) -> Vec<(usize, LineHistory)> {
-        let sensors: Vec<usize> = self.seats.iter().map(|seat| seat.berth.source).collect();
+        let sensors: Vec<usize> = self.devices.iter().map(|device| device.attached.source).collect();
         let address = self.connect.as_ref().map_or_else(|error| error.text.clone(), Connect::to_string);
         let _span = tracing::info_span!("port", address, ?sensors).entered();
         let mut pause = FIRST_PAUSE;
@@ -148,7 +152,9 @@ impl Service {
                         let ended = self.serve(line.as_mut(), opened);
                         self.closed();
                         let served = clock::now().since(opened);
-                        if served >= LONG_ENOUGH && self.seats.iter().any(|seat| seat.last_frame >= opened) {
+                        if served >= LONG_ENOUGH
+                            && self.devices.iter().any(|device| device.last_frame >= opened)
+                        {
                             pause = FIRST_PAUSE;
                         }
                         match ended {
@@ -169,7 +175,7 @@ impl Service {
             self.wait(pause);
             pause = (pause + pause).min(self.longest_pause());
         }
-        self.seats.into_iter().map(|seat| (seat.berth.source, seat.history)).collect()
+        self.devices.into_iter().map(|device| (device.attached.source, device.history)).collect()
     }
 
     fn longest_pause(&self) -> DurNs {
@@ -199,26 +205,26 @@ impl Service {
 
     /// Has what the drivers hold delivered.
     fn closed(&mut self) {
-        for Seat { berth: Berth { driver, port, .. }, history, .. } in &mut self.seats {
-            driver.closed(&mut Ends { port, history, wishes: &mut VecDeque::new() });
+        for AttachedState { attached: Attached { driver, port, .. }, history, .. } in &mut self.devices {
+            driver.closed(&mut Ends { port, history, requests: &mut VecDeque::new() });
         }
         self.common.waker.unpark();
     }
 
     fn count_lost(&mut self) {
-        for seat in &mut self.seats {
-            seat.history.lost += 1;
+        for device in &mut self.devices {
+            device.history.lost += 1;
         }
     }
 
     /// Serves an open line until it fails, all on it have been silent for too long, or the end.
     fn serve(&mut self, line: &mut dyn Line, opened: MonoNs) -> io::Result<Served> {
-        for seat in &mut self.seats {
-            seat.history.opened += 1;
-            seat.frames_before = seat.berth.driver.standing().good_frames;
-            (seat.last_bytes, seat.last_frame) = (opened, opened);
+        for device in &mut self.devices {
+            device.history.opened += 1;
+            device.frames_before = device.attached.driver.health().good_frames;
+            (device.last_bytes, device.last_frame) = (opened, opened);
         }
-        for number in 0..self.seats.len() {
+        for number in 0..self.devices.len() {
             self.drive(line, number, |driver, wire| driver.opened(opened, wire))?;
         }
         let mut buffer = [0; READ_BYTES];
@@ -240,7 +246,7 @@ impl Service {
             if now >= look_at {
                 look_at = now + STANDING_PERIOD;
                 self.look(line.complaint().as_deref(), now);
-                if self.seats.iter().all(|seat| seat.is_silent(now)) {
+                if self.devices.iter().all(|device| device.is_silent(now)) {
                     return Ok(Served::InSilence);
                 }
             }
@@ -250,14 +256,14 @@ impl Service {
 
     /// How long to wait for bytes before a driver wants to be woken.
     fn wait_for(&self, now: MonoNs) -> Duration {
-        let due = self.seats.iter().filter_map(|seat| seat.berth.driver.due()).min();
+        let due = self.devices.iter().filter_map(|device| device.attached.driver.due()).min();
         due.map_or(LOOK, |due| clock::duration(due.since(now)).min(LOOK))
     }
 
     fn heard(&mut self, line: &mut dyn Line, received: MonoNs, bytes: &[u8]) -> io::Result<()> {
-        for number in 0..self.seats.len() {
-            if let Some(seat) = self.seats.get_mut(number) {
-                seat.last_bytes = clock::now();
+        for number in 0..self.devices.len() {
+            if let Some(device) = self.devices.get_mut(number) {
+                device.last_bytes = clock::now();
             }
             self.drive(line, number, |driver, wire| driver.heard(received, bytes, wire))?;
         }
@@ -268,14 +274,14 @@ impl Service {
     /// Wakes those who are due, unless another on the line awaits an answer. Of several who await one, as when a line has
     /// just been opened, the first gives up first: else each would wait for the others for ever.
     fn wake(&mut self, line: &mut dyn Line) -> io::Result<()> {
-        for number in 0..self.seats.len() {
+        for number in 0..self.devices.len() {
             let now = clock::now();
-            let awaits = |seat: &Seat| seat.berth.driver.awaits();
-            let Some(seat) = self.seats.get(number) else { continue };
-            let rivals = if awaits(seat) { number } else { self.seats.len() };
-            let mut others = self.seats.iter().take(rivals).enumerate();
-            let awaited = others.any(|(other, seat)| other != number && awaits(seat));
-            if seat.berth.driver.due().is_some_and(|due| due <= now) && !awaited {
+            let awaits = |device: &AttachedState| device.attached.driver.awaits();
+            let Some(device) = self.devices.get(number) else { continue };
+            let rivals = if awaits(device) { number } else { self.devices.len() };
+            let mut others = self.devices.iter().take(rivals).enumerate();
+            let awaited = others.any(|(other, device)| other != number && awaits(device));
+            if device.attached.driver.due().is_some_and(|due| due <= now) && !awaited {
                 self.drive(line, number, |driver, wire| driver.wake(now, wire))?;
                 self.common.waker.unpark();
             }
@@ -283,28 +289,28 @@ impl Service {
         Ok(())
     }
 
-    /// Calls a driver, and does what it wishes; a transaction's answer may lead to more wishes.
+    /// Calls a driver, and does what it requests; a transaction's answer may lead to more requests.
     fn drive(
         &mut self,
         line: &mut dyn Line,
         number: usize,
         call: impl FnOnce(&mut dyn Driver, &mut dyn Wire),
     ) -> io::Result<()> {
-        let Some(seat) = self.seats.get_mut(number) else { return Ok(()) };
-        let Seat { berth: Berth { driver, port, source }, history, last_bytes, .. } = seat;
-        let mut wishes = VecDeque::new();
-        call(driver.as_mut(), &mut Ends { port, history, wishes: &mut wishes });
-        while let Some(wish) = wishes.pop_front() {
+        let Some(device) = self.devices.get_mut(number) else { return Ok(()) };
+        let AttachedState { attached: Attached { driver, port, source }, history, last_bytes, .. } = device;
+        let mut requests = VecDeque::new();
+        call(driver.as_mut(), &mut Ends { port, history, requests: &mut requests });
+        while let Some(wish) = requests.pop_front() {
             match wish {
-                Wish::Send(message) => {
+                IoRequest::Send(message) => {
                     self.common.note_sent(*source, &message);
                     line.write(&message)?;
                 }
-                Wish::Exchange { write, settle, read_bytes } => {
+                IoRequest::Exchange { write, settle, read_bytes } => {
                     self.common.note_sent(*source, &write);
                     if let Some((received, answer)) = line.exchange(&write, settle, read_bytes)? {
                         *last_bytes = clock::now();
-                        driver.heard(received, &answer, &mut Ends { port, history, wishes: &mut wishes });
+                        driver.heard(received, &answer, &mut Ends { port, history, requests: &mut requests });
                     }
                 }
             }
@@ -314,21 +320,21 @@ impl Service {
 
     fn say_all(&mut self, phase: Phase, words: &str) {
         let now = clock::now();
-        for seat in &mut self.seats {
-            seat.say(&self.common.board, now, phase, words);
+        for device in &mut self.devices {
+            device.say(&self.common.board, now, phase, words);
         }
     }
 
     /// Looks at how the devices are doing; what the line complains of goes before what is thought of them.
     fn look(&mut self, complaint: Option<&str>, now: MonoNs) {
-        for seat in &mut self.seats {
-            let judged = seat.judge(now);
+        for device in &mut self.devices {
+            let judged = device.judge(now);
             if complaint.is_some() {
                 // The device can't help it.
-                (seat.last_bytes, seat.last_frame) = (now, now);
+                (device.last_bytes, device.last_frame) = (now, now);
             }
             let (phase, words) = complaint.map_or(judged, |words| (Phase::Closed, words.to_owned()));
-            seat.say(&self.common.board, now, phase, &words);
+            device.say(&self.common.board, now, phase, &words);
         }
     }
 }
@@ -341,15 +347,15 @@ impl Common {
     }
 }
 
-impl Seat {
+impl AttachedState {
     fn is_silent(&self, now: MonoNs) -> bool {
-        now.since(self.last_bytes) > self.berth.driver.patience()
+        now.since(self.last_bytes) > self.attached.driver.silence_timeout()
     }
 
     /// How the device is doing, and why.
     fn judge(&mut self, now: MonoNs) -> (Phase, String) {
-        let patience = self.berth.driver.patience();
-        let Standing { good_frames, identity, complaint } = self.berth.driver.standing();
+        let silence_timeout = self.attached.driver.silence_timeout();
+        let DeviceHealth { good_frames, identity, complaint } = self.attached.driver.health();
         if good_frames != self.frames {
             self.frames = good_frames;
             // Not now: a device is as long silent as no frame has come.
@@ -358,8 +364,8 @@ impl Seat {
         if let Some(complaint) = complaint {
             return (Phase::Wrong, complaint);
         }
-        let seconds = patience.as_secs_f64();
-        if now.since(self.last_frame) <= patience {
+        let seconds = silence_timeout.as_secs_f64();
+        if now.since(self.last_frame) <= silence_timeout {
             if good_frames > self.frames_before {
                 return (Phase::Running, identity.unwrap_or_default());
             }
@@ -382,9 +388,9 @@ impl Seat {
         if self.status.as_ref().is_some_and(|(last, said)| *last == phase && said == words) {
             return;
         }
-        tracing::debug!(sensor = self.berth.source, phase = phase.as_str(), words, "status of a sensor");
+        tracing::debug!(sensor = self.attached.source, phase = phase.as_str(), words, "status of a sensor");
         self.status = Some((phase, words.to_owned()));
-        let status = Status { source: self.berth.source, since, phase, words: words.to_owned() };
+        let status = Status { source: self.attached.source, since, phase, words: words.to_owned() };
         self.history.last = status.to_string();
         board.put(status);
     }

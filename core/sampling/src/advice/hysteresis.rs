@@ -18,7 +18,7 @@ const BEYOND: f64 = SPEED_MARGIN / 2.0;
 /// So what is graver shows at once, and what is less so when it has held for a second. Until there has been a speed, or
 /// a reason against any, all is shown as it comes.
 #[derive(Debug, Clone)]
-pub struct Steady {
+pub struct Hysteresis {
     target_m: f64,
     held: [Option<(MonoNs, Advice)>; HELD],
     next: usize,
@@ -26,9 +26,9 @@ pub struct Steady {
     will_exceed: bool,
 }
 
-stateful!(Steady { state: held, next, begun, will_exceed; fixed: target_m; });
+stateful!(Hysteresis { state: held, next, begun, will_exceed; fixed: target_m; });
 
-impl Steady {
+impl Hysteresis {
     /// For a target T, m.
     pub fn new(target_m: f64) -> Self {
         Self { target_m, held: [None; HELD], next: 0, begun: false, will_exceed: false }
@@ -98,7 +98,7 @@ mod tests {
     }
 
     fn shown(of: impl IntoIterator<Item = Advice>) -> Vec<Advice> {
-        let mut steady = Steady::new(TARGET_M);
+        let mut steady = Hysteresis::new(TARGET_M);
         let mut at = MonoNs(3_000_000_000);
         let mut show = |advice| {
             at = at + BEAT;
@@ -167,7 +167,7 @@ mod tests {
 
     #[test]
     fn after_a_silence_nothing_is_held() {
-        let mut steady = Steady::new(TARGET_M);
+        let mut steady = Hysteresis::new(TARGET_M);
         steady.show(MonoNs(0), speed(0.1));
         assert!((steady.show(MonoNs(1_200_000_000), speed(0.2)).v_max_mps - 0.2).abs() < 1e-12);
     }

@@ -36,7 +36,7 @@ struct Moment {
 
 /// See the module's description.
 #[derive(Debug, Clone)]
-pub struct Trail {
+pub struct ErrorClones {
     /// A ring.
     clones: Vec<Moment>,
     count: usize,
@@ -44,15 +44,15 @@ pub struct Trail {
     since: Square,
 }
 
-stateful!(Trail { state: count, since; lists: clones; });
+stateful!(ErrorClones { state: count, since; lists: clones; });
 
-impl Default for Trail {
+impl Default for ErrorClones {
     fn default() -> Self {
         Self { clones: Vec::with_capacity(CLONES), count: 0, since: identity() }
     }
 }
 
-impl Trail {
+impl ErrorClones {
     /// Forgets everything.
     pub fn clear(&mut self) {
         self.clones.clear();

@@ -2,7 +2,7 @@
 
 use headrace_geometry::time::MonoNs;
 
-/// A message that a companion has made.
+/// A message that a derived has made.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Made {
     /// Number of its result channel; one that the log doesn't have is passed over.
@@ -14,7 +14,7 @@ pub struct Made {
 }
 
 /// Makes messages of results as they pass through the recorder. The loop has no part in it.
-pub trait Companion: Send {
+pub trait DerivedChannels: Send {
     /// A message of the result channel with that number. It comes whether or not the disk has room for it.
     fn take(&mut self, channel: u16, at: MonoNs, message: &[u8], made: &mut Vec<Made>);
 

@@ -1,10 +1,10 @@
 //! How well two smoothed moments are known against each other: later moments wait, on the way back, for those a pass of the
 //! heads before them.
 
-use super::kernel::Gain;
+use super::rts_step::Gain;
+use crate::filter::clones::{CLONES, MOVING, STEP};
 use crate::filter::factors::Factors;
 use crate::filter::state::{ERRORS, Errors};
-use crate::filter::trail::{CLONES, MOVING, STEP};
 use crate::relative::Relative;
 use headrace_geometry::time::{DurNs, MonoNs};
 

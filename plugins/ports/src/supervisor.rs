@@ -13,7 +13,7 @@ use headrace_sensor::connect::{Connect, ConnectError};
 use headrace_sensor::driver::Driver;
 
 use crate::clock;
-use crate::service::{Berth, Common, SentSink, Service};
+use crate::line_thread::{Attached, Common, LineThread, SentSink};
 use crate::status::{Board, LineHistory, Status};
 
 /// Statuses that may wait for whoever shows them.
@@ -24,7 +24,7 @@ const PERIOD: Duration = Duration::from_millis(20);
 const BEHIND: Duration = Duration::from_millis(1);
 
 /// A sensor that is to be served.
-pub struct Hand {
+pub struct Connection {
     /// Its number, in the order of the vehicle file.
     pub source: usize,
     /// Where it is, or why that can't be told.
@@ -36,7 +36,7 @@ pub struct Hand {
 }
 
 /// Threads that serve lines, one each. Sensors whose `connect` is the same share one.
-pub struct Crew {
+pub struct Supervisor {
     /// How many sensors the vehicle has, as far as they are served.
     sensors: usize,
     threads: Vec<JoinHandle<Vec<(usize, LineHistory)>>>,
@@ -45,24 +45,24 @@ pub struct Crew {
     parker: Parker,
 }
 
-impl Crew {
+impl Supervisor {
     /// Starts them. `sent` takes what is sent to the devices.
     ///
     /// Errors: a thread can't be started.
-    pub fn start(hands: Vec<Hand>, sent: Option<SentSink>) -> io::Result<Self> {
+    pub fn start(connections: Vec<Connection>, sent: Option<SentSink>) -> io::Result<Self> {
         let parker = Parker::new();
         let stopping = Arc::new(AtomicBool::new(false));
         let board = Board::new(BOARD);
         let waker = parker.unparker().clone();
         let common = Common { stopping: Arc::clone(&stopping), board: board.clone(), waker, sent };
-        let sensors = hands.iter().map(|hand| hand.source + 1).max().unwrap_or(0);
-        let mut crew = Self { sensors, threads: Vec::new(), stopping, board, parker };
-        for (name, connect, berths) in lines(hands) {
-            let service = Service::new(connect, berths, common.clone());
+        let sensors = connections.iter().map(|hand| hand.source + 1).max().unwrap_or(0);
+        let mut supervisor = Self { sensors, threads: Vec::new(), stopping, board, parker };
+        for (name, connect, attached) in lines(connections) {
+            let service = LineThread::new(connect, attached, common.clone());
             let thread = thread::Builder::new().name(name).spawn(move || service.run())?;
-            crew.threads.push(thread);
+            supervisor.threads.push(thread);
         }
-        Ok(crew)
+        Ok(supervisor)
     }
 
     /// The oldest change of a device's status that hasn't been taken.
@@ -103,23 +103,23 @@ impl Crew {
     }
 }
 
-impl Drop for Crew {
+impl Drop for Supervisor {
     fn drop(&mut self) {
         self.stopping.store(true, Ordering::Relaxed);
     }
 }
 
 /// A line: its thread's name, where it is, those on it.
-type LineOf = (String, Result<Connect, ConnectError>, Vec<Berth>);
+type LineOf = (String, Result<Connect, ConnectError>, Vec<Attached>);
 
-fn lines(hands: Vec<Hand>) -> Vec<LineOf> {
+fn lines(connections: Vec<Connection>) -> Vec<LineOf> {
     let mut lines: Vec<LineOf> = Vec::new();
-    for Hand { source, connect, port, driver } in hands {
-        let berth = Berth { source, port, driver };
+    for Connection { source, connect, port, driver } in connections {
+        let attached = Attached { source, port, driver };
         // A connect that can't be understood is no line that could be shared.
         match lines.iter_mut().find(|line| line.1.is_ok() && line.1 == connect) {
-            Some(line) => line.2.push(berth),
-            None => lines.push((format!("line {source}"), connect, vec![berth])),
+            Some(line) => line.2.push(attached),
+            None => lines.push((format!("line {source}"), connect, vec![attached])),
         }
     }
     lines

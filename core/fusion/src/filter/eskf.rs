@@ -3,13 +3,13 @@
 use core::ops::Range;
 
 use super::agreement::Agreement;
+use super::clones::ErrorClones;
 use super::factors::Factors;
 use super::inertial::Leg;
-use super::measure::{self, Beam, Row};
+use super::measure::{self, Beam, ScalarUpdate};
 use super::settings::Settings;
 use super::sources::Source;
 use super::state::{ATTITUDE, ERRORS, Errors, POSITION, SCALE, State, VELOCITY, put, vec};
-use super::trail::Trail;
 use super::window::{Waiting, Window};
 use crate::NoFix;
 use crate::relative::Relative;
@@ -65,7 +65,7 @@ stateful!(Context { state: unit_at; fixed: profile, site, settings; });
 
 /// The estimate at a moment, and how far it may be off.
 #[derive(Debug, Clone)]
-pub struct Running {
+pub struct Eskf {
     /// The moment: all that was valid before has been fused.
     pub at: MonoNs,
     /// The estimate then.
@@ -73,7 +73,7 @@ pub struct Running {
     /// The covariance of its errors.
     pub factors: Factors<ERRORS>,
     /// Errors against those before.
-    pub trail: Trail,
+    pub clones: ErrorClones,
     /// When the way along the tunnel was last sought anew.
     pub way_sought: Option<MonoNs>,
     /// The estimate through the last epoch, before its measurements.
@@ -84,16 +84,16 @@ pub struct Running {
     keeps_steps: bool,
 }
 
-stateful!(Running { state: at, state, factors, trail, way_sought, agreement; lists: knots; fixed: steps, keeps_steps; });
+stateful!(Eskf { state: at, state, factors, clones, way_sought, agreement; lists: knots; fixed: steps, keeps_steps; });
 
-impl Default for Running {
+impl Default for Eskf {
     /// Room for what an estimate needs, before there is one.
     fn default() -> Self {
         Self {
             at: MonoNs(0),
             state: State::at_rest(Point3::zero(), Rot::identity()),
             factors: Factors::independent([0.0; ERRORS]),
-            trail: Trail::default(),
+            clones: ErrorClones::default(),
             way_sought: None,
             knots: Vec::with_capacity(KNOTS),
             agreement: Agreement::default(),
@@ -103,7 +103,7 @@ impl Default for Running {
     }
 }
 
-impl Running {
+impl Eskf {
     /// Keeps from now on in `steps` what smoothing needs of an epoch. Whoever wants them takes them out after each.
     ///
     /// Allocates: their room.
@@ -115,7 +115,7 @@ impl Running {
     /// Begins with an estimate and its covariance.
     pub fn begin(&mut self, at: MonoNs, state: State, factors: Factors<ERRORS>) {
         (self.at, self.state, self.factors) = (at, state, factors);
-        self.trail.clear();
+        self.clones.clear();
         self.agreement = Agreement::default();
         self.way_sought = None;
     }
@@ -134,7 +134,7 @@ impl Running {
         self.keep(to, &Move::Leg(leg), nominal);
         transition.carry(&mut self.factors);
         leg.disturb(&context.settings, &transition, &mut self.factors);
-        self.trail.carry(&transition);
+        self.clones.carry(&transition);
         let mut errors = [0.0; ERRORS];
         while let Some(waiting) = window.pop(to) {
             let Some(Some(source)) = sources.get_mut(waiting.source) else { continue };
@@ -156,7 +156,7 @@ impl Running {
         self.state.correct(&errors);
         self.bound_speed();
         self.stay_inside(&context.profile);
-        self.trail.note(to, &self.factors);
+        self.clones.note(to, &self.factors);
         if let Some(variances) = self.agreement.seek() {
             if variances.get(POSITION).is_some_and(|along| *along > 0.0) {
                 self.way_sought = Some(to);
@@ -187,7 +187,7 @@ impl Running {
     /// Fuses that the vehicle doesn't move, unless that is too unlikely; and that a mean turn rate is its bias.
     pub fn rest(&mut self, mean_radps: Option<Vec3<Body>>) {
         let rows = measure::rest(&self.state, REST_SD_MPS);
-        let unlikely = |row: &Row| {
+        let unlikely = |row: &ScalarUpdate| {
             row.residual * row.residual > REST_GATE * (self.factors.variance_along(&row.h) + row.noise)
         };
         if rows.iter().any(unlikely) {
@@ -239,7 +239,7 @@ impl Running {
     /// Takes a row whose residual is against the estimate corrected by the errors that were known.
     fn fuse(
         &mut self,
-        row: &Row,
+        row: &ScalarUpdate,
         settings: &Settings,
         source: &mut Source,
         (known, errors): (&Errors, &mut Errors),
@@ -271,7 +271,12 @@ impl Running {
 
     /// A row as noisy as what it measures is bent: looked at from a standard deviation to either side. `None` where there is
     /// nothing to be seen from there.
-    fn straight(&self, mut row: Row, then: &State, again: impl Fn(&State) -> Option<Row>) -> Option<Row> {
+    fn straight(
+        &self,
+        mut row: ScalarUpdate,
+        then: &State,
+        again: impl Fn(&State) -> Option<ScalarUpdate>,
+    ) -> Option<ScalarUpdate> {
         let variance = self.factors.variance_along(&row.h);
         if row.lean.is_none() || variance < row.noise.min(NEAR_M * NEAR_M) {
             return Some(row);
@@ -303,7 +308,7 @@ impl Running {
         let mut errors = [0.0; ERRORS];
         for (axis, (is, middle)) in (1..3).zip(place.into_iter().zip(reference)) {
             self.correct(
-                &Row::of(POSITION + axis, middle - is, reach_m * reach_m),
+                &ScalarUpdate::of(POSITION + axis, middle - is, reach_m * reach_m),
                 &[0.0; ERRORS],
                 &mut errors,
             );
@@ -327,10 +332,10 @@ impl Running {
         self.state.correct(&errors);
     }
 
-    fn correct(&mut self, row: &Row, known: &Errors, errors: &mut Errors) {
+    fn correct(&mut self, row: &ScalarUpdate, known: &Errors, errors: &mut Errors) {
         let innovation = row.residual - since(row, known, errors);
         let gain = self.factors.measure(&row.h, row.noise);
-        self.trail.measure(&row.h, &gain);
+        self.clones.measure(&row.h, &gain);
         for (error, k) in errors.iter_mut().zip(&gain.k) {
             *error += k * innovation;
         }
@@ -338,7 +343,7 @@ impl Running {
 }
 
 /// What a row would have measured of the errors that have been found since those that were known.
-fn since(row: &Row, known: &Errors, errors: &Errors) -> f64 {
+fn since(row: &ScalarUpdate, known: &Errors, errors: &Errors) -> f64 {
     row.h.iter().zip(errors.iter().zip(known)).map(|(h, (error, known))| h * (error - known)).sum()
 }
 
@@ -403,7 +408,7 @@ fn rows(
     source: &Source,
     waiting: &Waiting,
     window: &Window,
-) -> [Option<Row>; 3] {
+) -> [Option<ScalarUpdate>; 3] {
     let Context { profile, site, settings, unit_at } = context;
     let mount = source.sensor.mount;
     let offset = mount.position + -*unit_at;
@@ -411,7 +416,7 @@ fn rows(
         let along = mount.rotation * along;
         Beam { offset, along, first_rad, unsure_rad }
     };
-    let one = |row: Option<Row>| [row, None, None];
+    let one = |row: Option<ScalarUpdate>| [row, None, None];
     match (source.sensor.kind, waiting.reading) {
         (SensorKind::Echosounder { .. }, Reading::Echo(echo)) => one(echo.range_m.and_then(|range_m| {
             let range_m = site.rescaled_range_m(range_m, echo.sound_speed_mps);

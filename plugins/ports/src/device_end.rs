@@ -20,7 +20,7 @@ use crate::uhid::{self, Identity, VirtualDevice};
 const BAUD: u32 = 115_200;
 
 /// The device's end of a line.
-pub struct Stand {
+pub struct EmulatedPort {
     end: End,
     /// How the host opens the other end.
     connect: Connect,
@@ -50,7 +50,7 @@ enum End {
 /// The most hosts that a rehearsed bridge answers.
 const MAX_PEERS: usize = 8;
 
-impl Stand {
+impl EmulatedPort {
     /// An end on a carrier; `at` is the address on which the network's ends listen.
     ///
     /// Errors: the system has no such port to give, or refuses it.
@@ -205,10 +205,10 @@ impl Stand {
 }
 
 /// Waits until something has come to one of the ends, or `wait_ns` nanoseconds have passed.
-pub fn wait_for_any<'a>(stands: impl IntoIterator<Item = &'a Stand>, wait_ns: u32) {
+pub fn wait_for_any<'a>(stands: impl IntoIterator<Item = &'a EmulatedPort>, wait_ns: u32) {
     // A terminal that nobody has open would never let it wait.
     let open = stands.into_iter().filter(|stand| !matches!(stand.end, End::Pty { .. }) || stand.is_called());
-    let fds: Vec<BorrowedFd<'_>> = open.flat_map(Stand::fds).collect();
+    let fds: Vec<BorrowedFd<'_>> = open.flat_map(EmulatedPort::fds).collect();
     let mut polled: Vec<PollFd<'_>> = fds.iter().map(|fd| PollFd::new(fd, PollFlags::IN)).collect();
     let wait = Timespec { tv_sec: 0, tv_nsec: i64::from(wait_ns.min(999_999_999)) };
     // Interrupted, it has waited less; that does no harm.
@@ -227,7 +227,7 @@ fn is_gone(error: &io::Error) -> bool {
         )
 }
 
-fn pty() -> io::Result<Stand> {
+fn pty() -> io::Result<EmulatedPort> {
     let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC)?;
     grantpt(&master)?;
     unlockpt(&master)?;
@@ -239,21 +239,21 @@ fn pty() -> io::Result<Stand> {
     let flags = fcntl_getfl(&master)?;
     fcntl_setfl(&master, flags | OFlags::NONBLOCK)?;
     let connect = Connect::Serial { port: SerialPort::Path(path), baud: BAUD };
-    Ok(Stand { end: End::Pty { master: File::from(master) }, connect })
+    Ok(EmulatedPort { end: End::Pty { master: File::from(master) }, connect })
 }
 
-fn tcp(at: impl ToSocketAddrs) -> io::Result<Stand> {
+fn tcp(at: impl ToSocketAddrs) -> io::Result<EmulatedPort> {
     let listener = TcpListener::bind(at)?;
     listener.set_nonblocking(true)?;
     let connect = Connect::Tcp { address: listener.local_addr()?.to_string() };
-    Ok(Stand { end: End::Tcp { listener, stream: None }, connect })
+    Ok(EmulatedPort { end: End::Tcp { listener, stream: None }, connect })
 }
 
-fn udp(at: impl ToSocketAddrs) -> io::Result<Stand> {
+fn udp(at: impl ToSocketAddrs) -> io::Result<EmulatedPort> {
     let socket = UdpSocket::bind(at)?;
     socket.set_nonblocking(true)?;
     let connect = Connect::Udp { address: socket.local_addr()?.to_string() };
-    Ok(Stand { end: End::Udp { socket, peers: Vec::new() }, connect })
+    Ok(EmulatedPort { end: End::Udp { socket, peers: Vec::new() }, connect })
 }
 
 #[cfg(target_os = "linux")]
