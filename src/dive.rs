@@ -8,7 +8,7 @@ use headrace_monitor::outlet::{NoticeOutlet, NoticeReceiver};
 use headrace_monitor::report::{LineReport, LogReport, Report};
 use headrace_monitor::run::Loop;
 use headrace_ports::Supervisor;
-use headrace_replay::drive::{Feed, Pace, drive};
+use headrace_replay::drive::{Pace, PacketSource, drive};
 use headrace_replay::log::{
     DerivedChannels, Every, LeftOut, LogHeader, Recorder, RecorderHandle, Rotation, SentPort, SourceInfo,
     Summary, dive_name, files_digest, files_of,
@@ -207,14 +207,19 @@ impl Dive {
     }
 
     /// Runs the loop until the feed ends; returns the report.
-    pub(crate) fn run(self, feed: &mut dyn Feed, pace: Pace, watch: &mut Watch) -> Result<Report, Failure> {
+    pub(crate) fn run(
+        self,
+        feed: &mut dyn PacketSource,
+        pace: Pace,
+        watch: &mut Watch,
+    ) -> Result<Report, Failure> {
         self.run_beside(feed, pace, watch, &mut |_| {})
     }
 
     /// The same; `beside` is called after every tick and at the end.
     pub(crate) fn run_beside(
         mut self,
-        feed: &mut dyn Feed,
+        feed: &mut dyn PacketSource,
         pace: Pace,
         watch: &mut Watch,
         beside: &mut dyn FnMut(&Loop),

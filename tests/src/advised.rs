@@ -6,7 +6,7 @@ use headrace_monitor::advice_log::AdviceEntry;
 use headrace_monitor::messages::Notice;
 use headrace_monitor::report::Report;
 use headrace_monitor::ring::{Port, RingError};
-use headrace_replay::drive::{Coming, Feed, Pace, drive};
+use headrace_replay::drive::{Coming, Pace, PacketSource, drive};
 use headrace_replay::log::LogError;
 use headrace_sensor::device::Direction;
 use headrace_sensor::reading::SourceId;
@@ -18,7 +18,7 @@ struct Partly {
     dumb: Option<usize>,
 }
 
-impl Feed for Partly {
+impl PacketSource for Partly {
     fn coming(&mut self) -> Result<Option<Coming>, LogError> {
         while let Some(message) = self.simulation.peek_message() {
             let dumb = self.dumb == Some(usize::from(message.source));

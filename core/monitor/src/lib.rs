@@ -13,6 +13,7 @@ mod arm;
 pub mod digest;
 pub mod entities;
 mod error;
+pub mod feed;
 mod head_motion;
 mod loop_snapshot;
 pub mod merge;

@@ -24,7 +24,7 @@ const SHORT: Look = Look { colour: Colour(213, 94, 0), ..MEASURE };
 const FASTER: Look = Look { width_px: 1.2, dash: &[7.0, 5.0], ..MEASURE };
 
 fn chart(canvas: &Canvas, length_m: f64, perimeter_m: f64) -> Chart<'_> {
-    let x = Axis::new("way along the tunnel, m", 0.0, length_m, 12);
+    let x = Axis::new("distance along the tunnel, m", 0.0, length_m, 12);
     let y = Axis::new("arc length from the floor's centre, via the left wall, m", 0.0, perimeter_m, 10);
     Chart::new(canvas, FRAME, &x, &y)
 }

@@ -1,5 +1,6 @@
 //! The threads of all lines, and the loop that lives on them.
 
+use std::convert::Infallible;
 use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -7,6 +8,8 @@ use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use crossbeam::sync::Parker;
+use headrace_geometry::time::MonoNs;
+use headrace_monitor::feed::{self, Feed};
 use headrace_monitor::ring::Port;
 use headrace_monitor::run::Loop;
 use headrace_sensor::connect::{Connect, ConnectError};
@@ -70,13 +73,9 @@ impl Supervisor {
         self.board.next()
     }
 
-    /// Runs the loop until `ended` says so: a tick as soon as something has come, or a period has passed.
+    /// Runs the loop until `ended` returns true: a tick as soon as packets have come, or a period has passed.
     pub fn run(&self, dive: &mut Loop, ended: &dyn Fn() -> bool, after_tick: &mut dyn FnMut(&Loop)) {
-        while !ended() {
-            self.parker.park_timeout(PERIOD);
-            dive.tick(clock::now());
-            after_tick(dive);
-        }
+        let Ok(()) = feed::drive(dive, &mut LiveFeed { supervisor: self, ended }, after_tick);
     }
 
     /// Ends all threads and works off what they have left in the rings; gives what each sensor's line has been through, in
@@ -92,15 +91,37 @@ impl Supervisor {
                 *place = history;
             }
         }
-        while dive.has_waiting() {
-            // An outlet that is behind holds packets back; it is given time.
-            if dive.tick(clock::now()) == 0 {
-                thread::sleep(BEHIND);
-            }
-            after_tick(dive);
+        if dive.has_waiting() {
+            feed::work_off(dive, clock::now(), after_tick, &mut pause);
         }
         all
     }
+}
+
+/// The ports as the feed of a loop: their threads fill the rings.
+struct LiveFeed<'a> {
+    supervisor: &'a Supervisor,
+    ended: &'a dyn Fn() -> bool,
+}
+
+impl Feed for LiveFeed<'_> {
+    type Error = Infallible;
+
+    fn fill(&mut self, _: &mut Loop, _: &mut dyn FnMut(&Loop)) -> Result<Option<MonoNs>, Infallible> {
+        if (self.ended)() {
+            return Ok(None);
+        }
+        self.supervisor.parker.park_timeout(PERIOD);
+        Ok(Some(clock::now()))
+    }
+
+    fn pause(&mut self) {
+        pause();
+    }
+}
+
+fn pause() {
+    thread::sleep(BEHIND);
 }
 
 impl Drop for Supervisor {

@@ -4,7 +4,7 @@ use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::messages::Event;
 use headrace_monitor::ring::{Port, RingError};
 use headrace_monitor::run::Loop;
-use headrace_replay::drive::{Coming, DriveError, Feed, Pace, drive};
+use headrace_replay::drive::{Coming, DriveError, Pace, PacketSource, drive};
 use headrace_replay::log::LogError;
 use headrace_sensor::device::SensorInfo;
 
@@ -83,11 +83,11 @@ impl Collected {
 
 /// A feed that ends early.
 struct Until<'a> {
-    feed: &'a mut dyn Feed,
+    feed: &'a mut dyn PacketSource,
     end: MonoNs,
 }
 
-impl Feed for Until<'_> {
+impl PacketSource for Until<'_> {
     fn coming(&mut self) -> Result<Option<Coming>, LogError> {
         Ok(self.feed.coming()?.filter(|coming| coming.at < self.end))
     }
@@ -105,7 +105,7 @@ impl Feed for Until<'_> {
 /// Errors: see [`CollectError`].
 pub fn collect(
     mut dive: Loop,
-    feed: &mut dyn Feed,
+    feed: &mut dyn PacketSource,
     window: &Window,
     progress: &mut dyn FnMut(usize),
 ) -> Result<Collected, CollectError> {

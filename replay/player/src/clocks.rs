@@ -1,6 +1,6 @@
-//! Logs whose messages are stamped by several clocks: one counts from when its machine was started, another from 1970.
+//! Logs whose messages are stamped by several clocks, e.g. time since boot and UNIX time.
 //!
-//! Such a log has no order. Messages of the clock that stamped most are played, and the others are left out and said to be.
+//! Such timestamps have no common order. Messages of the clock with the most messages are played; the others are dropped and reported.
 
 use std::path::PathBuf;
 
@@ -8,12 +8,12 @@ use headrace_geometry::time::MonoNs;
 
 use crate::log::{DiveLog, LogError, MessageKind};
 
-/// No dive and no stay in the store between two of them lasts so long.
+/// Least offset between two clocks; no dive lasts as long.
 const YEAR_NS: u64 = 365 * 24 * 3600 * 1_000_000_000;
-/// More clocks than that aren't told from one another.
+/// Most clocks that are told apart; messages beyond are counted with the first.
 const MAX_CLOCKS: usize = 100;
 
-/// A clock by the times that it has stamped: none of them is a year from the next.
+/// A clock, as the range of its timestamps; more than a year from any other clock's range.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Clock {
     from: MonoNs,
@@ -22,12 +22,12 @@ pub(crate) struct Clock {
 }
 
 impl Clock {
-    /// Whether a time may be of this clock.
+    /// Whether a timestamp may be of this clock.
     pub(crate) fn is_of(&self, at: MonoNs) -> bool {
         (self.from.0.saturating_sub(YEAR_NS)..=self.to.0.saturating_add(YEAR_NS)).contains(&at.0)
     }
 
-    /// How far another clock's time is from this one's, in words.
+    /// Offset of another clock's timestamp from this one's, as text.
     pub(crate) fn distance(&self, at: MonoNs) -> String {
         let (ns, side) = if at < self.from {
             (self.from.0.saturating_sub(at.0), "before")
@@ -38,8 +38,8 @@ impl Clock {
     }
 }
 
-/// The clock of most messages of sources; `None` where there is but one. The log is only read for it when the heads of its
-/// chunks tell of years.
+/// The clock of most source messages; `None` where there is only one clock. The log is read only if its chunk headers span
+/// more than a year.
 ///
 /// Errors: the log can't be read.
 pub(crate) fn of(files: &[PathBuf], times: Option<(MonoNs, MonoNs)>) -> Result<Option<Clock>, LogError> {
@@ -54,7 +54,7 @@ pub(crate) fn of(files: &[PathBuf], times: Option<(MonoNs, MonoNs)>) -> Result<O
         }
     }
     let several = clocks.len() > 1;
-    // Of two with as many messages the earlier one: a monotonic clock starts at zero.
+    // At equal counts the earlier clock: a monotonic clock starts at zero.
     let most = clocks.into_iter().min_by_key(|clock| (core::cmp::Reverse(clock.messages), clock.from));
     Ok(most.filter(|_| several))
 }

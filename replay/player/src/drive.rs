@@ -1,59 +1,60 @@
-//! Drives a loop from a log or a simulation: fills the rings tick by tick, as the ports' threads would.
+//! Drives a loop from a log or a simulation: fills the packet rings tick by tick, as the port threads would.
 
 use std::time::{Duration, Instant};
 
 use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_monitor::feed::{self, Feed, work_off};
 use headrace_monitor::ring::{Port, RingError};
 use headrace_monitor::run::Loop;
 use headrace_sensor::reading::SourceId;
 
 use crate::log::LogError;
 
-/// What comes next.
+/// The next packet of a feed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Coming {
-    /// Its receive time.
+    /// Receive time.
     pub at: MonoNs,
-    /// The loop's source.
+    /// Source in the loop.
     pub source: SourceId,
-    /// Its length in bytes.
+    /// Length, bytes.
     pub len: usize,
 }
 
-/// Where packets come from when no port is open.
-pub trait Feed {
+/// Source of packets when no port is open.
+pub trait PacketSource {
     /// The next packet, or `None` at the end.
     ///
-    /// Errors: the log can't be read on.
+    /// Errors: reading the log fails.
     fn coming(&mut self) -> Result<Option<Coming>, LogError>;
 
-    /// Puts that packet into its source's ring.
+    /// Puts the next packet into its source's ring.
     ///
-    /// Errors: it doesn't fit; it is still the next one.
+    /// Errors: it doesn't fit and stays the next packet.
     fn send(&mut self, port: &mut Port) -> Result<(), RingError>;
 }
 
-/// How to drive.
+/// Tick length and playback speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pace {
-    /// Length of a tick in the packets' own time, positive.
+    /// Length of a tick in packet time, positive.
     pub tick: DurNs,
-    /// Seconds of the packets' time for a second of ours; `None` goes as fast as it can.
+    /// Seconds of packet time per second of wall time; `None` runs as fast as possible.
     pub speed: Option<f64>,
 }
 
 impl Default for Pace {
-    /// Ticks of 20 ms, as fast as it can.
+    /// Ticks of 20 ms, as fast as possible.
     fn default() -> Self {
         Self { tick: DurNs(20_000_000), speed: None }
     }
 }
 
-/// Why a dive could not be driven to its end.
+/// Why a drive stopped early.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum DriveError {
-    /// The log can't be read on.
+    /// Reading the log fails.
     #[error(transparent)]
     Log(#[from] LogError),
     /// A port of the loop is in use elsewhere.
@@ -64,69 +65,112 @@ pub enum DriveError {
     },
 }
 
-/// Runs the loop until the feed ends; `after_tick` sees it after every tick.
+/// Runs the loop until the source ends; `after_tick` is called after every tick.
 ///
-/// Errors: see [`DriveError`]. What had been fed until then has been worked off.
+/// Errors: see [`DriveError`]. Packets fed before the error have been processed.
 pub fn drive(
     dive: &mut Loop,
-    feed: &mut dyn Feed,
+    source: &mut dyn PacketSource,
     pace: Pace,
     after_tick: &mut dyn FnMut(&Loop),
 ) -> Result<(), DriveError> {
-    let mut driver = Driver::new(dive, pace.tick)?;
-    let mut clock = None;
-    while let Some(until) = driver.due(feed)? {
-        let clock = clock.get_or_insert_with(|| Clock::start(until - pace.tick, pace.speed));
+    let driver = Driver::new(dive, pace.tick)?;
+    feed::drive(dive, &mut PacedFeed { driver, source, pace, clock: None }, after_tick)
+}
+
+/// A packet source at a pace, as the feed of a loop.
+struct PacedFeed<'a> {
+    driver: Driver,
+    source: &'a mut dyn PacketSource,
+    pace: Pace,
+    clock: Option<Clock>,
+}
+
+impl Feed for PacedFeed<'_> {
+    type Error = DriveError;
+
+    fn fill(
+        &mut self,
+        dive: &mut Loop,
+        after_tick: &mut dyn FnMut(&Loop),
+    ) -> Result<Option<MonoNs>, DriveError> {
+        let Some(until) = self.driver.due(self.source)? else { return Ok(None) };
+        let pace = self.pace;
+        let clock = self.clock.get_or_insert_with(|| Clock::start(until - pace.tick, pace.speed));
         if let Some(left) = clock.left(until) {
             std::thread::sleep(left);
         }
-        driver.tick(dive, feed, after_tick)?;
+        self.driver.fill(dive, self.source, until, after_tick)?;
+        Ok(Some(until))
     }
-    Ok(())
+
+    fn pause(&mut self) {
+        pause();
+    }
 }
 
-/// Fills the rings and runs the loop, a tick at a time.
+/// Gives an outlet that is behind some time.
+fn pause() {
+    std::thread::sleep(Duration::from_millis(1));
+}
+
+/// Fills the rings and runs the loop, one tick at a time.
 pub struct Driver {
     ports: Vec<Port>,
     tick: DurNs,
-    /// The end of the tick before; `None` at the beginning.
+    /// End of the previous tick; `None` before the first.
     until: Option<MonoNs>,
 }
 
 impl Driver {
-    /// Takes the loop's ports, for ticks of a length.
+    /// Takes the loop's ports, for ticks of length `tick`.
     ///
     /// Errors: a port is in use elsewhere.
     pub fn new(dive: &mut Loop, tick: DurNs) -> Result<Self, DriveError> {
         Ok(Self { ports: take_ports(dive)?, tick, until: None })
     }
 
-    /// When the next tick ends; `None` at the end of the feed. After a long silence it begins with what ends that.
+    /// End of the next tick; `None` at the end of the feed. After a gap in the feed the tick ends just after the next packet.
     ///
-    /// Errors: the feed can't be read on.
-    pub fn due(&self, feed: &mut dyn Feed) -> Result<Option<MonoNs>, DriveError> {
+    /// Errors: reading the feed fails.
+    pub fn due(&self, feed: &mut dyn PacketSource) -> Result<Option<MonoNs>, DriveError> {
         let Some(next) = feed.coming()? else { return Ok(None) };
         let begun = self.until.map(|until| until + self.tick);
         Ok(Some(begun.map_or(next.at + self.tick, |until| until.max(next.at + DurNs(1)))))
     }
 
-    /// Feeds what comes until the next tick ends, and runs it.
+    /// Feeds packets up to the end of the next tick, then runs it.
     ///
-    /// Errors: see [`DriveError`]. What had been fed until then has been worked off.
+    /// Errors: see [`DriveError`]. Packets fed before the error have been processed.
     pub fn tick(
         &mut self,
         dive: &mut Loop,
-        feed: &mut dyn Feed,
+        feed: &mut dyn PacketSource,
         after_tick: &mut dyn FnMut(&Loop),
     ) -> Result<(), DriveError> {
         let Some(until) = self.due(feed)? else { return Ok(()) };
+        self.fill(dive, feed, until, after_tick)?;
+        work_off(dive, until, after_tick, &mut pause);
+        Ok(())
+    }
+
+    /// Feeds packets received before `until`. On an error what has been fed is processed.
+    fn fill(
+        &mut self,
+        dive: &mut Loop,
+        feed: &mut dyn PacketSource,
+        until: MonoNs,
+        after_tick: &mut dyn FnMut(&Loop),
+    ) -> Result<(), DriveError> {
         self.until = Some(until);
         let sent = send_until(dive, feed, &mut self.ports, until, after_tick);
-        work_off(dive, until, after_tick);
+        if sent.is_err() {
+            work_off(dive, until, after_tick, &mut pause);
+        }
         sent
     }
 
-    /// The feed goes on from elsewhere, and the loop with it: after a tick that ended at `until`.
+    /// Continues after a tick that ended at `until`, when feed and loop have jumped there.
     pub fn jump_to(&mut self, until: MonoNs) {
         self.until = Some(until);
     }
@@ -140,10 +184,10 @@ fn take_ports(dive: &mut Loop) -> Result<Vec<Port>, DriveError> {
         .collect()
 }
 
-/// Sends what comes before `until`.
+/// Sends packets received before `until`.
 fn send_until(
     dive: &mut Loop,
-    feed: &mut dyn Feed,
+    feed: &mut dyn PacketSource,
     ports: &mut [Port],
     until: MonoNs,
     after_tick: &mut dyn FnMut(&Loop),
@@ -151,8 +195,8 @@ fn send_until(
     while let Some(coming) = feed.coming()?.filter(|coming| coming.at < until) {
         let Some(port) = ports.get_mut(coming.source.index()) else { continue };
         if !port.has_room(coming.len) {
-            // Results don't depend on where ticks end; a full ring ends one.
-            work_off(dive, coming.at, after_tick);
+            // Results don't depend on where ticks end, so a full ring may end one.
+            work_off(dive, coming.at, after_tick, &mut pause);
         }
         if let Err(error) = feed.send(port) {
             tracing::error!(%error, "a packet of the feed could not be handed over");
@@ -161,34 +205,20 @@ fn send_until(
     Ok(())
 }
 
-/// Ticks until nothing waits. An outlet that is behind holds packets back; it is given time.
-fn work_off(dive: &mut Loop, now: MonoNs, after_tick: &mut dyn FnMut(&Loop)) {
-    loop {
-        let consumed = dive.tick(now);
-        after_tick(dive);
-        if !dive.has_waiting() {
-            return;
-        }
-        if consumed == 0 {
-            std::thread::sleep(Duration::from_millis(1));
-        }
-    }
-}
-
-/// Relates the packets' time to ours.
+/// Relates packet time to wall time.
 pub(crate) struct Clock {
     origin: MonoNs,
     paced: Option<(Instant, f64)>,
 }
 
 impl Clock {
-    /// That the packets' time is `origin` now, and goes so many seconds for a second of ours; `None` goes without waiting.
+    /// Packet time is `origin` now and advances `speed` seconds per second of wall time; `None` never waits.
     #[expect(clippy::disallowed_methods, reason = "pacing is for people who watch; no result depends on it")]
     pub(crate) fn start(origin: MonoNs, speed: Option<f64>) -> Self {
         Self { origin, paced: speed.map(|speed| (Instant::now(), speed)) }
     }
 
-    /// How long it is, of our time, until that moment of the packets'; `None` when it is over.
+    /// Wall time left until `until` in packet time; `None` when it has passed.
     pub(crate) fn left(&self, until: MonoNs) -> Option<Duration> {
         let (started, speed) = self.paced?;
         let wanted = Duration::try_from_secs_f64(until.since(self.origin).as_secs_f64() / speed).ok()?;

@@ -1,5 +1,5 @@
-//! headrace's dive logs: the recorder and the reader, the drive that feeds a loop from a log or a simulation, playback,
-//! and what compares, smooths and shows a recorded dive.
+//! headrace's dive logs: the recorder and the reader, the driver that feeds a loop from a log or a simulation, playback,
+//! and verification, smoothing and viewer output of a recorded dive.
 
 mod clocks;
 pub mod drive;

@@ -10,7 +10,7 @@ use headrace_sensor::reading::SourceId;
 use serde::{Deserialize, Serialize};
 
 use crate::clocks::{self, Clock};
-use crate::drive::{Coming, Feed};
+use crate::drive::{Coming, PacketSource};
 use crate::log::{DiveLog, DivePlace, LogError, LogInfo, Loss, MessageKind, PartFile};
 
 /// Plays the sources' messages of a log.
@@ -181,7 +181,7 @@ impl Player {
     }
 }
 
-impl Feed for Player {
+impl PacketSource for Player {
     fn coming(&mut self) -> Result<Option<Coming>, LogError> {
         if self.next.is_none() {
             self.next = self.read()?;

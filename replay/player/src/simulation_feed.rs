@@ -5,7 +5,7 @@ use headrace_sensor::device::Direction;
 use headrace_sensor::reading::SourceId;
 use headrace_simulator::Simulation;
 
-use crate::drive::{Coming, Feed};
+use crate::drive::{Coming, PacketSource};
 use crate::log::LogError;
 
 /// A simulated dive as a feed; what is sent to the devices is left out.
@@ -20,7 +20,7 @@ impl SimulationFeed {
     }
 }
 
-impl Feed for SimulationFeed {
+impl PacketSource for SimulationFeed {
     fn coming(&mut self) -> Result<Option<Coming>, LogError> {
         while let Some(message) = self.simulation.peek_message() {
             if message.direction == Direction::Received {

@@ -266,7 +266,7 @@ fn lines_on_standard_input_pause_step_and_seek() {
         .collect();
     assert_eq!(
         stops[1..],
-        ["0:00:12.000", "0:00:12.060", "0:00:07.060", "0:00:09.060", "0:00:20.020, the end"]
+        ["0:00:12.000", "0:00:12.060", "0:00:07.060", "0:00:09.060", "0:00:20.020  (end)"]
     );
     insta::assert_snapshot!(stderr, @r#"headrace: "stop" isn't a command; expected one of: pause, go, step [TICKS], seek TIME, ahead TIME, back TIME, speed N|max, end"#);
     let whole = folder.replay("ticks.mcap", &[]).1;

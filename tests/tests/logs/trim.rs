@@ -81,7 +81,7 @@ fn a_cut_says_that_it_is_one_and_judges_its_inside_as_the_whole() {
         assert_eq!(within(&report, 12.0, 19.0), expected, "{name}");
         let answer = folder.headrace(&["verify", name]);
         assert_eq!(answer.code, Some(1), "{}", answer.stdout);
-        assert!(answer.stdout.contains("this log was cut from another"), "{}", answer.stdout);
+        assert!(answer.stdout.contains("this log is an extract"), "{}", answer.stdout);
     }
     // Only what there was is said to be missing.
     for (name, further, said, unsaid) in [

@@ -221,7 +221,7 @@ fn options_that_make_no_sense_are_refused() {
     for (options, words) in [
         (["--from", "9", "--to", "9"], "--to 9 is not after --from 9"),
         (["--from", "0", "--to", "2000"], "the most is 1200 s"),
-        (["--at-surface", "9..3", "--from", "0"], "FROM..TO, the first one less"),
+        (["--at-surface", "9..3", "--from", "0"], "expected FROM..TO in seconds, FROM less than TO"),
     ] {
         let answer = folder.headrace(&[&["calibrate", "dive.mcap"], &options[..]].concat());
         assert_eq!(answer.code, Some(2), "{}", answer.stdout);

@@ -282,5 +282,5 @@ fn there_is_nothing_to_smooth_without_a_filter() {
     folder.write("direct.toml", headrace_tests::VEHICLE.to_owned() + "\n[navigation]\nway = \"direct\"\n");
     let answer = folder.headrace(&["replay", "dive.mcap", "--smooth", "--vehicle", "direct.toml"]);
     assert_eq!(answer.code, Some(2), "{}", answer.stderr);
-    insta::assert_snapshot!(answer.stderr, @r#"headrace: replaying dive.mcap: --smooth needs the filter, and the vehicle file says [navigation] way = "direct"; wanted is way = "filter""#);
+    insta::assert_snapshot!(answer.stderr, @r#"headrace: replaying dive.mcap: --smooth needs [navigation] way = "filter"; the vehicle file has way = "direct""#);
 }

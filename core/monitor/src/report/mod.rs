@@ -30,7 +30,7 @@ use spread::spread_report;
 pub use survey::{HolidayReport, NodeRowReport, SurveyReport};
 
 /// Version of the report's form.
-pub const REPORT_VERSION: u32 = 2;
+pub const REPORT_VERSION: u32 = 3;
 
 /// A whole report. Field names are the contract.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -8,7 +8,7 @@ use super::format::{
 };
 use super::framing::Definition;
 
-/// Rank of the first channel that isn't raw; sources are counted by a u16.
+/// Rank of the first channel that isn't raw; source numbers are u16.
 const OTHER_RANK: u32 = 1 << 16;
 
 /// What a channel carries.
@@ -30,7 +30,7 @@ pub(super) struct Channel {
     pub(super) rank: u32,
 }
 
-/// All channels that are known.
+/// All known channels.
 #[derive(Debug, Default)]
 pub(super) struct Channels {
     by_id: BTreeMap<u16, Channel>,
@@ -39,8 +39,7 @@ pub(super) struct Channels {
 }
 
 impl Channels {
-    /// Numbers the sources: by their channels' metadata where these number all of them from 0 on, and by name where
-    /// not.
+    /// Numbers the sources: by their channels' metadata where it numbers all of them from 0 on, otherwise by name.
     pub(super) fn new(definitions: BTreeMap<u16, Definition>) -> Self {
         let mut definitions: Vec<Definition> = definitions.into_values().collect();
         let numbers: BTreeMap<&str, Option<u16>> =
@@ -49,7 +48,7 @@ impl Channels {
         let stated = distinct.iter().copied().map(usize::from).eq(0..numbers.len());
         definitions.sort_by_cached_key(|d| (stated.then(|| stated_number(d)), d.topic.clone(), d.id));
         let mut channels = Self::default();
-        // Raw first: a source that only something was sent to comes after those that spoke.
+        // Raw first: sources with only sent bytes come after those that sent something themselves.
         let (raw, others): (Vec<_>, Vec<_>) =
             definitions.into_iter().partition(|d| stated || d.topic.starts_with(RAW_PREFIX));
         for definition in raw.into_iter().chain(others) {
@@ -58,7 +57,7 @@ impl Channels {
         channels
     }
 
-    /// Adds a channel. A source that isn't known yet gets the next number. `false` when it contradicts a known one.
+    /// Adds a channel. A new source gets the next number. `false` if it contradicts a known channel.
     pub(super) fn admit(&mut self, definition: Definition) -> bool {
         if let Some(known) = self.by_id.get(&definition.id) {
             return known.definition == definition;
@@ -103,7 +102,7 @@ impl Channels {
         results.map(|channel| channel.definition.topic.clone()).collect()
     }
 
-    /// Topics that several channels have, with their numbers.
+    /// Topics with several channels, with the channel numbers.
     pub(super) fn doubles(&self) -> Vec<(String, Vec<u16>)> {
         let mut topics: BTreeMap<&str, Vec<u16>> = BTreeMap::new();
         for (id, channel) in &self.by_id {
@@ -120,7 +119,7 @@ impl Channels {
             self.sources.push(SourceInfo { id, plugin: text(PLUGIN_KEY), connect: text(CONNECT_KEY) });
             self.sources.len() - 1
         });
-        // A file has at most 65536 channels, since a u16 counts them.
+        // A file has at most 65536 channels: their numbers are u16.
         u16::try_from(number).unwrap_or(u16::MAX)
     }
 }
@@ -133,7 +132,7 @@ fn stated_number(definition: &Definition) -> Option<u16> {
     definition.metadata.get(SOURCE_KEY)?.parse().ok()
 }
 
-/// The channels in the metadata record that repeats them.
+/// The channels listed in the metadata record that repeats them.
 pub(super) fn listed(entries: &BTreeMap<String, String>) -> Vec<Definition> {
     let mut definitions: BTreeMap<u16, Definition> = BTreeMap::new();
     for (key, value) in entries {

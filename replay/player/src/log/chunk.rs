@@ -1,4 +1,4 @@
-//! Unpacking chunks, and the checksums over larger parts of a file, by the `mcap` crate's own reader.
+//! Unpacking chunks, and checking the checksums over larger parts of a file, with the `mcap` crate's reader.
 
 use std::io::{Read, Seek};
 
@@ -9,32 +9,32 @@ use mcap::{McapError, McapResult};
 use super::framing::{ChunkPlace, LogFile, MAX_RECORD_BYTES};
 use super::{LogError, LossKind};
 
-/// The most that a chunk may hold when unpacked.
+/// Largest unpacked size of a chunk, bytes.
 pub(super) const MAX_CHUNK_BYTES: u64 = MAX_RECORD_BYTES;
-/// The most that is read at once.
+/// Read size, bytes.
 const READ_BYTES: usize = 1 << 20;
 
-/// How unpacking a chunk went.
+/// Outcome of unpacking a chunk.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum Unpacked {
-    /// All of it is good.
+    /// All of it is valid.
     Whole,
-    /// The file ends within it; what came until then has no checksum, but nothing speaks against it.
+    /// The file ends within it; the records before the end parse, but no checksum covers them.
     Cut,
-    /// It is damaged; nothing that came can be trusted.
+    /// Damaged; none of its records can be trusted.
     Bad(LossKind),
 }
 
 /// Calls `sink` with opcode and body of each record in a chunk.
 ///
-/// Errors: only those of the medium.
+/// Errors: I/O only.
 pub(super) fn unpack<R: Read + Seek>(
     file: &mut LogFile<R>,
     place: &ChunkPlace,
     mut sink: impl FnMut(u8, &[u8]),
 ) -> Result<Unpacked, LogError> {
     let mut reader = reader(|options| options.with_skip_start_magic(true).with_validate_chunk_crcs(true));
-    // The head is made anew: in a chunk that the file's end cuts its lengths and checksum are for what isn't there.
+    // The header is rebuilt: in a chunk cut by the end of the file, its lengths and checksum cover data that isn't there.
     let head = chunk_head(place);
     reader.insert(head.len()).copy_from_slice(&head);
     reader.notify_read(head.len());
@@ -51,7 +51,7 @@ pub(super) fn unpack<R: Read + Seek>(
     Ok(match result {
         _ if too_large => Unpacked::Bad(LossKind::TooLarge { limit: MAX_CHUNK_BYTES }),
         Err(McapError::UnsupportedCompression(name)) => Unpacked::Bad(LossKind::Compression(name)),
-        // Nothing vouches for what it holds: a head of zeros makes an empty chunk of anything.
+        // No checksum covers the content: a header of zeros makes an empty chunk of any bytes.
         _ if place.doubtful && place.crc == 0 => Unpacked::Bad(LossKind::Contents),
         _ if place.cut => Unpacked::Cut,
         Ok(()) => Unpacked::Whole,
@@ -60,29 +60,29 @@ pub(super) fn unpack<R: Read + Seek>(
     })
 }
 
-/// Whether the checksum over everything before the data end record fits; also when there is none, or something is too
-/// large to look at.
+/// Whether the checksum over everything before the data end record matches; also true if there is none, or a record is too
+/// large to read.
 pub(super) fn data_section_holds<R: Read + Seek>(file: &mut LogFile<R>) -> Result<bool, LogError> {
     let reader = reader(|options| options.with_emit_chunks(true).with_validate_data_section_crc(true));
     let result = drive(file, 0..u64::MAX, reader, &mut |opcode, _| opcode != op::DATA_END)?;
     Ok(!matches!(result, Err(McapError::BadDataCrc { .. })))
 }
 
-/// Whether the summary, which begins with the data end record at `data_end`, reads and its checksum, if any, fits.
+/// Whether the summary, which begins with the data end record at `data_end`, parses and its checksum, if any, matches.
 pub(super) fn summary_holds<R: Read + Seek>(file: &mut LogFile<R>, data_end: u64) -> Result<bool, LogError> {
     let reader =
         reader(|options| options.with_skip_start_magic(true).with_validate_summary_section_crc(true));
     Ok(drive(file, data_end..u64::MAX, reader, &mut |opcode, _| opcode != op::FOOTER)?.is_ok())
 }
 
-/// A reader that allocates no more than a record's largest length, whatever a file says.
+/// A reader that allocates no more than the largest record length, whatever lengths a file claims.
 fn reader(set: impl FnOnce(LinearReaderOptions) -> LinearReaderOptions) -> LinearReader {
     let limit = usize::try_from(MAX_RECORD_BYTES).unwrap_or(usize::MAX);
     let options = LinearReaderOptions::default().with_skip_end_magic(true).with_record_length_limit(limit);
     LinearReader::new_with_options(set(options))
 }
 
-/// Feeds a part of the file to a reader until that ends, the reader fails, or `sink` says that it is enough.
+/// Feeds a range of the file to a reader until the range ends, the reader fails, or `sink` returns false.
 fn drive<R: Read + Seek>(
     file: &mut LogFile<R>,
     part: core::ops::Range<u64>,
@@ -106,7 +106,7 @@ fn drive<R: Read + Seek>(
     Ok(Ok(()))
 }
 
-/// A chunk's record up to its data.
+/// A chunk record's bytes before its data.
 ///
 /// Source: MCAP format specification, "Chunk (op=0x06)".
 fn chunk_head(place: &ChunkPlace) -> Vec<u8> {

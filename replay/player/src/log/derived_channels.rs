@@ -1,8 +1,8 @@
-//! What works beside the recorder, on its thread: it makes more messages of the results that are written.
+//! Channels derived from recorded results, computed on the recorder's thread.
 
 use headrace_geometry::time::MonoNs;
 
-/// A message that a derived has made.
+/// A derived message.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Made {
     /// Number of its result channel; one that the log doesn't have is passed over.
@@ -13,9 +13,9 @@ pub struct Made {
     pub bytes: Vec<u8>,
 }
 
-/// Makes messages of results as they pass through the recorder. The loop has no part in it.
+/// Derives messages from results as they pass through the recorder. The loop is not involved.
 pub trait DerivedChannels: Send {
-    /// A message of the result channel with that number. It comes whether or not the disk has room for it.
+    /// Takes a message of result channel `channel`; called whether or not the disk has room for the message.
     fn take(&mut self, channel: u16, at: MonoNs, message: &[u8], made: &mut Vec<Made>);
 
     /// The dive has ended.

@@ -16,7 +16,7 @@ pub fn file_digest(path: &Path) -> Result<String, LogError> {
     files_digest(&[path])
 }
 
-/// SHA-256 of the bytes of files one after the other, in hex.
+/// SHA-256 of the concatenated files, in hex.
 ///
 /// Errors: a file can't be read.
 pub fn files_digest(paths: &[impl AsRef<Path>]) -> Result<String, LogError> {

@@ -1,8 +1,8 @@
 //! A dive's log: one file, or the parts of a recording read as one.
 //!
-//! Parts are put in the order of their own numbers, whatever their files are called. Each is looked through once when they
-//! are opened, and then read in its turn: one reader at a time. What a part says of how far those before it went tells
-//! whether one is missing, or isn't the one that was recorded.
+//! Parts are ordered by the part number they contain, not by file name. Each is scanned once on opening, then read in turn, one
+//! reader at a time. The running totals in each part's header show whether a part is missing or isn't the one that was
+//! recorded.
 
 use std::fs::File;
 use std::io::{Read, Seek};
@@ -15,9 +15,9 @@ use super::part::{Part, Progress, named_part};
 use super::rotate::parts_of;
 use super::{LogError, LogInfo, LogMessage, LogPlace, LogReader, Loss, LossKind, MessageKind, SourceInfo};
 
-/// The files of what a person has named: a log, a folder of logs, or a recording in parts by the name that it was given.
+/// Files of the paths a user named: a log, a folder of logs, or a recording in parts by the name it was given.
 ///
-/// Errors: a folder that can't be read, or has no log in it.
+/// Errors: a folder can't be read or contains no log.
 pub fn files_of(named: &[PathBuf]) -> Result<Vec<PathBuf>, LogError> {
     let mut files = Vec::new();
     for path in named {
@@ -35,7 +35,7 @@ pub fn files_of(named: &[PathBuf]) -> Result<Vec<PathBuf>, LogError> {
         } else if path.exists() {
             files.push(path.clone());
         } else {
-            // Where there aren't any, opening the log says that it isn't there.
+            // Without parts, opening the log reports that it doesn't exist.
             let parts = parts_of(path).unwrap_or_default();
             files.extend(if parts.is_empty() { vec![path.clone()] } else { parts });
         }
@@ -48,13 +48,13 @@ pub fn files_of(named: &[PathBuf]) -> Result<Vec<PathBuf>, LogError> {
 pub struct PartFile {
     /// Its path.
     pub path: PathBuf,
-    /// Messages of sources that have been read from it so far.
+    /// Source messages read from it so far.
     pub messages: u64,
-    /// Its number in the recording, where that has parts.
+    /// Part number, where the recording has parts.
     number: Option<u32>,
 }
 
-/// Opens the log with that number in the list.
+/// Opens the log with that index in the list.
 type Open<R> = Box<dyn FnMut(usize) -> Result<LogReader<R>, LogError>>;
 
 /// A position in a dive's log, to continue reading from.
@@ -63,7 +63,7 @@ pub struct DivePlace {
     /// The file.
     at: usize,
     place: LogPlace,
-    /// Messages of sources that have been read from each file.
+    /// Source messages read from each file.
     messages: Vec<u64>,
     earlier: Vec<Loss>,
     late: u64,
@@ -73,17 +73,17 @@ pub struct DivePlace {
 pub struct DiveLog<R = File> {
     open: Open<R>,
     files: Vec<PartFile>,
-    /// The file that is being read.
+    /// Index of the file being read.
     at: usize,
     reader: LogReader<R>,
     info: LogInfo,
     has_ticks: bool,
-    /// The dive's number of each source of the file that is being read.
+    /// For each source of the file being read, its number in the dive.
     numbers: Vec<u16>,
     topics: Vec<String>,
-    /// What is missing between files.
+    /// Losses between files.
     between: Vec<Loss>,
-    /// Losses of the files that have been read.
+    /// Losses of the files already read.
     earlier: Vec<Loss>,
     late: u64,
     times: Option<(MonoNs, MonoNs)>,
@@ -92,7 +92,7 @@ pub struct DiveLog<R = File> {
 impl DiveLog<File> {
     /// Opens a log, or the parts of a recording; see [`files_of`].
     ///
-    /// Errors: no file can be read, isn't MCAP, or is of a later format; several that aren't the parts of one recording.
+    /// Errors: a file can't be read, isn't MCAP, or has a later format; several files that aren't parts of one recording.
     pub fn open(files: &[PathBuf]) -> Result<Self, LogError> {
         let log = match files {
             [file] => Self::single(LogReader::open(file)?, file),
@@ -132,10 +132,10 @@ impl DiveLog<File> {
 }
 
 impl<R: Read + Seek> DiveLog<R> {
-    /// The log of one reader.
+    /// The log of a single reader.
     pub fn of(reader: LogReader<R>) -> Self {
         let file = PartFile { path: PathBuf::new(), messages: 0, number: None };
-        // Nothing follows it.
+        // No file follows.
         let open = |_| Err(LogError::NoLogs { folder: PathBuf::new() });
         Self::start(Box::new(open), reader, vec![file], Vec::new())
     }
@@ -164,48 +164,48 @@ impl<R: Read + Seek> DiveLog<R> {
         log
     }
 
-    /// What the log says about itself; of parts, what the first one does.
+    /// The log's header; that of the first part if there are several.
     pub fn header(&self) -> &LogInfo {
         &self.info
     }
 
-    /// Whether the log has the ticks of the loop that wrote it.
+    /// Whether the log contains the ticks of the loop that wrote it.
     pub fn has_ticks(&self) -> bool {
         self.has_ticks
     }
 
-    /// The files, in the order in which they are read.
+    /// The files, in reading order.
     pub fn files(&self) -> &[PartFile] {
         &self.files
     }
 
-    /// What has been found damaged or missing so far; complete when [`DiveLog::next`] has given `None`.
+    /// Damage and gaps found so far; complete when [`DiveLog::next`] has returned `None`.
     pub fn losses(&self) -> Vec<Loss> {
         let present = self.reader.losses().iter().map(|loss| self.in_part(loss));
         self.between.iter().chain(&self.earlier).cloned().chain(present).collect()
     }
 
-    /// Log times between which the messages lie, as the heads of chunks say.
+    /// First and last log time, from the chunk headers.
     pub fn times(&self) -> Option<(MonoNs, MonoNs)> {
         self.times
     }
 
-    /// Topics that several channels of the file that is being read have, with their numbers: one source each.
+    /// Topics with several channels in the file being read, with the channel numbers: one source each.
     pub fn doubles(&self) -> Vec<(String, Vec<u16>)> {
         self.reader.doubles()
     }
 
-    /// Whether anything has been found damaged or missing so far.
+    /// Whether any damage or gap has been found so far.
     pub fn has_losses(&self) -> bool {
         !(self.between.is_empty() && self.earlier.is_empty() && self.reader.losses().is_empty())
     }
 
-    /// Messages that were delivered after one with a later log time, in a log without ticks.
+    /// Messages delivered after one with a later log time, in a log without ticks.
     pub fn late(&self) -> u64 {
         self.late + self.reader.late()
     }
 
-    /// Topics of the results, and the sources: all whose channels have been read.
+    /// Result topics and sources of all channels read so far.
     pub(super) fn channels_found(&self) -> (Vec<String>, Vec<SourceInfo>) {
         let mut topics = self.topics.clone();
         topics.extend(self.reader.result_topics().into_iter().filter(|topic| !self.topics.contains(topic)));
@@ -217,7 +217,7 @@ impl<R: Read + Seek> DiveLog<R> {
 
     /// The next message, or `None` at the end.
     ///
-    /// Errors: the medium fails; damage is no error.
+    /// Errors: an I/O error; damage is not an error.
     #[expect(
         clippy::should_implement_trait,
         reason = "messages borrow from the reader, which no Iterator allows"
@@ -260,9 +260,9 @@ impl<R: Read + Seek> DiveLog<R> {
         }
     }
 
-    /// Continues from a position of this reader or another one of the same files, see [`LogReader::go_to`].
+    /// Continues from a position of this or another reader of the same files, see [`LogReader::go_to`].
     ///
-    /// Errors: the medium fails.
+    /// Errors: an I/O error.
     pub fn go_to(&mut self, place: &DivePlace) -> Result<(), LogError> {
         if place.at != self.at {
             self.reader = (self.open)(place.at)?;
@@ -276,7 +276,7 @@ impl<R: Read + Seek> DiveLog<R> {
         self.reader.go_to(&place.place)
     }
 
-    /// Goes on with the next file.
+    /// Moves on to the next file.
     fn go_on(&mut self) -> Result<(), LogError> {
         let read: Vec<Loss> = self.reader.losses().iter().map(|loss| self.in_part(loss)).collect();
         self.earlier.extend(read);
@@ -288,7 +288,7 @@ impl<R: Read + Seek> DiveLog<R> {
         Ok(())
     }
 
-    /// Finds the file's sources among the dive's, by name; others are added.
+    /// Maps the file's sources to the dive's by name; new ones are added.
     fn number_sources(&mut self) {
         self.numbers.clear();
         for source in self.reader.sources() {
@@ -312,7 +312,7 @@ impl<R: Read + Seek> DiveLog<R> {
     }
 }
 
-/// What a look at a part tells.
+/// A part's header and totals, from its first scan.
 #[derive(Debug, Clone)]
 struct Glance {
     number: u32,
@@ -326,13 +326,13 @@ impl Glance {
     }
 }
 
-/// Parts in their order, with what is amiss with some.
+/// Parts in order, with the losses of damaged ones.
 struct Arranged {
     parts: Vec<(PathBuf, Glance)>,
     losses: Vec<Loss>,
 }
 
-/// Looks at each file, and puts them in their order.
+/// Scans each file and puts them in order.
 fn arrange(files: &[PathBuf]) -> Result<Arranged, LogError> {
     let (mut parts, mut losses): (Vec<(PathBuf, Glance)>, _) = (Vec::new(), Vec::new());
     let mut unread = None;
@@ -347,7 +347,7 @@ fn arrange(files: &[PathBuf]) -> Result<Arranged, LogError> {
                 }
                 _ => return Err(LogError::NotAPart { path: path.clone() }),
             },
-            // As a power cut leaves it, in the moment in which it was begun.
+            // A file just created when the power failed.
             (Err(LogError::NotMcap { name, found, wanted }), Some(part)) => {
                 losses.push(loss(LossKind::PartUnreadable { part, found: found.clone() }, None, None));
                 unread = Some(LogError::NotMcap { name, found, wanted });
@@ -363,7 +363,7 @@ fn arrange(files: &[PathBuf]) -> Result<Arranged, LogError> {
     }
 }
 
-/// All are of one recording, and none is there twice.
+/// Checks that all parts are of one recording and none occurs twice.
 fn agree(parts: &[(PathBuf, Glance)]) -> Result<(), LogError> {
     let dive = |glance: &Glance| glance.part.as_ref().map(|part| part.head.dive.clone());
     let mut named = parts.iter().filter_map(|(path, glance)| Some((path, dive(glance)?)));
@@ -382,7 +382,7 @@ fn agree(parts: &[(PathBuf, Glance)]) -> Result<(), LogError> {
     Ok(())
 }
 
-/// What is missing before, between and after parts.
+/// Losses before, between and after parts.
 fn between(parts: &[Glance]) -> Vec<Loss> {
     let mut losses = Vec::new();
     let from = |glance: &Glance| glance.times.map(|times| times.1);

@@ -1,18 +1,18 @@
-//! What can go wrong with a log as a whole. Damage within one is a [`super::Loss`].
+//! Errors that concern a log as a whole. Damage within one is a [`super::Loss`].
 
 use std::io;
 use std::path::PathBuf;
 
-/// A log that could not be written, or not be read at all.
+/// A log could not be written, or not be read.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LogError {
-    /// The file could not be made.
+    /// The file could not be created.
     #[error("could not create {}: {source}", path.display())]
     Create {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// Cause.
         source: io::Error,
     },
     /// The file could not be opened.
@@ -20,33 +20,33 @@ pub enum LogError {
     Open {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// Cause.
         source: io::Error,
     },
-    /// The medium failed while it was read.
+    /// An I/O error while reading.
     #[error("could not read {name} at byte {offset}: {source}")]
     Read {
         /// The log, as the caller named it.
         name: String,
-        /// Where.
+        /// Offset, bytes.
         offset: u64,
-        /// Why.
+        /// Cause.
         source: io::Error,
     },
-    /// The medium failed while it was written to: full, gone, read-only.
+    /// An I/O error while writing: medium full, removed or read-only.
     #[error("could not write {what} to the log: {source}")]
     Write {
-        /// What was being written.
+        /// Item being written.
         what: &'static str,
-        /// Why.
+        /// Cause.
         source: io::Error,
     },
-    /// Something that MCAP has no room for.
+    /// Content that MCAP can't represent.
     #[error("could not write {what} to the log: {source}")]
     Encode {
-        /// What was being written.
+        /// Item being written.
         what: &'static str,
-        /// Why.
+        /// Cause.
         source: mcap::McapError,
     },
     /// Not an MCAP file.
@@ -64,9 +64,9 @@ pub enum LogError {
     TooNew {
         /// The log, as the caller named it.
         name: String,
-        /// The format that it says it has.
+        /// Its format version.
         found: String,
-        /// The latest that is known here.
+        /// Latest version supported here.
         known: u32,
     },
     /// A folder without a log.
@@ -75,7 +75,7 @@ pub enum LogError {
         /// The folder.
         folder: PathBuf,
     },
-    /// Several logs, one of which isn't a part of a recording.
+    /// Several logs, one of which isn't part of a recording.
     #[error(
         "{} is not a part of a recording, and only the parts of one are read as one log; name a single log, or the parts alone",
         path.display()
@@ -99,7 +99,7 @@ pub enum LogError {
         /// Its recording.
         other_dive: String,
     },
-    /// A part that is there twice.
+    /// A part that occurs twice.
     #[error("{} and {} are both part {number} of the recording; name one of them", one.display(), other.display())]
     PartTwice {
         /// Its number.
@@ -109,19 +109,19 @@ pub enum LogError {
         /// The other one.
         other: PathBuf,
     },
-    /// A topic of a result outside the place for results.
+    /// A result topic without the result prefix.
     #[error("topic {topic:?} of a result must begin with {:?}", super::format::RESULT_PREFIX)]
     Topic {
         /// The topic.
         topic: String,
     },
-    /// A message for a channel that the header did not announce.
+    /// A message for a channel that the header did not declare.
     #[error("a message for {channel}, which the log's header does not announce")]
     NoChannel {
         /// The channel, by kind and index.
         channel: String,
     },
-    /// More packets in one tick than a message can count.
+    /// More packets in one tick than a tick message can count.
     #[error("a tick of {packets} packets; a message holds up to {}", u32::MAX)]
     TickTooLong {
         /// Packets in the tick.
@@ -130,15 +130,15 @@ pub enum LogError {
     /// The recorder's thread could not be started.
     #[error("could not start the recorder's thread: {source}")]
     Thread {
-        /// Why.
+        /// Cause.
         source: io::Error,
     },
-    /// The recorder stopped writing before its end; what was written until then reads.
+    /// The recorder stopped writing before the end of the dive; the log up to there is readable.
     #[error("{source}; {discarded} messages after that were not recorded")]
     Stopped {
-        /// Messages that were taken from the queue and discarded.
+        /// Messages taken from the queue and discarded.
         discarded: u64,
-        /// What stopped it.
+        /// Cause.
         source: Box<LogError>,
     },
     /// A bug in the recorder.
@@ -147,7 +147,7 @@ pub enum LogError {
 }
 
 impl LogError {
-    /// An error of the MCAP writer, with the system's own error in the message where there is one.
+    /// An error of the MCAP writer; the message includes the operating system's error where there is one.
     pub(super) fn writing(what: &'static str) -> impl Fn(mcap::McapError) -> Self {
         move |error| match error {
             mcap::McapError::Io(source) => Self::Write { what, source },

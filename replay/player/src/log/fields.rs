@@ -1,11 +1,11 @@
-//! The fields of MCAP records, read from bytes that may be anything.
+//! Fields of MCAP records, parsed from untrusted bytes.
 //!
 //! Source: MCAP format specification, "Serialization": little-endian integers, strings and maps with a length in bytes
 //! before them.
 
 use std::collections::BTreeMap;
 
-/// What is left of a record, and how much has been taken from it.
+/// The rest of a record, and the number of bytes taken.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Fields<'a> {
     rest: &'a [u8],
@@ -22,7 +22,7 @@ impl<'a> Fields<'a> {
         self.taken
     }
 
-    /// What is left.
+    /// The remaining bytes.
     pub(super) fn rest(&self) -> &'a [u8] {
         self.rest
     }

@@ -1,4 +1,4 @@
-//! Names and layouts of the dive log: what a reader has to know.
+//! Names and layouts of the dive log.
 //!
 //! | channel | message | log time | publish time |
 //! |---|---|---|---|
@@ -21,74 +21,74 @@ use sha2::{Digest, Sha256};
 pub const FORMAT_VERSION: u32 = 1;
 /// What the `library` of our logs begins with, before this program's version.
 pub const LIBRARY: &str = "headrace ";
-/// Before a source's id: bytes received.
+/// Prefix of a source's id: bytes received.
 pub const RAW_PREFIX: &str = "/raw/";
-/// Before a source's id: bytes sent.
+/// Prefix of a source's id: bytes sent.
 pub const SENT_PREFIX: &str = "/sent/";
-/// Before the topics of results.
+/// Topic prefix of results.
 pub const RESULT_PREFIX: &str = "/result/";
-/// Before the topics of results that are for people's viewers.
+/// Topic prefix of results for viewers.
 pub const VIEW_PREFIX: &str = "/result/view/";
 /// The channel of ticks.
 pub const TICK_TOPIC: &str = "/loop/tick";
-/// Message encoding of raw, sent and tick.
+/// Message encoding of raw, sent and tick channels.
 pub const BYTES_ENCODING: &str = "application/octet-stream";
-/// Name of the metadata record with what the recorder knew: versions, digests, clock anchors.
+/// Name of the metadata record written by the recorder: versions, digests, clock anchors.
 pub const METADATA: &str = "headrace";
 /// Name of the metadata record that repeats the channels: `<number>/topic`, `<number>/<key of its metadata>`; and the
 /// attachments: [`ATTACHMENT_PREFIX`] and name, with the length in bytes as the value.
 pub const CHANNEL_LIST: &str = "headrace.channels";
-/// Name of the metadata records of what this log knows to be missing from it: `<number>` to `<from> <to> <words>`, log times
-/// in ns, `-` where there is none. A recorder on a full disk writes them, and `headrace recover`.
+/// Name of the metadata records of the log's known losses: `<number>` to `<from> <to> <words>`, log times in ns, `-` where
+/// there is none. Written by a recorder on a full disk and by `headrace recover`.
 pub const LOSSES: &str = "headrace.losses";
-/// Before the names of attachments in [`CHANNEL_LIST`].
+/// Prefix of attachment names in [`CHANNEL_LIST`].
 pub const ATTACHMENT_PREFIX: &str = "attachment/";
 /// Key in [`METADATA`] with [`FORMAT_VERSION`].
 pub const FORMAT_KEY: &str = "format";
-/// Key, in the metadata records that we write, with the digest of name and other entries (MCAP has none there).
+/// Key, in the metadata records that we write, of the digest of name and other entries (MCAP has none there).
 pub const DIGEST_KEY: &str = "sha256";
 /// Name of the attachment with the vehicle file.
 pub const VEHICLE_FILE: &str = "vehicle.toml";
 /// Key of a channel's metadata: kind of device.
 pub const PLUGIN_KEY: &str = "plugin";
-/// Key of a channel's metadata: where the device was connected.
+/// Key of a channel's metadata: connection of the device.
 pub const CONNECT_KEY: &str = "connect";
-/// Key of a channel's metadata: the source's number, as `/loop/tick` has it.
+/// Key of a channel's metadata: the source's number in `/loop/tick`.
 pub const SOURCE_KEY: &str = "source";
 
-/// Bytes of a tick's message before the order.
+/// Bytes of a tick message before the order.
 pub const TICK_HEAD_BYTES: usize = 20;
 
-/// One tick of the loop, as the message of `/loop/tick` has it.
+/// One tick of the loop, as stored in a `/loop/tick` message.
 ///
-/// Layout, little-endian: u64 index of the tick, u64 its moment in ns, u32 count, then count u16: the numbers of the
+/// Layout, little-endian: u64 index of the tick, u64 its time in ns, u32 count, then count u16: the numbers of the
 /// sources whose packets the tick consumed, one entry per packet, in the order of consumption. A source's packets are
-/// consumed in the order of their sequence numbers, so that this names each packet.
+/// consumed in the order of their sequence numbers, so the list identifies each packet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Tick<'a> {
     /// Number of the tick, from 0.
     pub index: u64,
-    /// The tick's moment.
+    /// The tick's time.
     pub now: MonoNs,
     order: &'a [u8],
 }
 
-/// A message of `/loop/tick` that isn't one.
+/// A malformed `/loop/tick` message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error(
     "a tick of {packets} packets takes {TICK_HEAD_BYTES} + 2 * {packets} bytes, and the message has {len}"
 )]
 pub struct TickError {
-    /// Packets that the message announces; 0 where it is too short to say.
+    /// Packet count in the message; 0 where it is too short to have one.
     pub packets: u32,
-    /// Its length in bytes.
+    /// Message length, bytes.
     pub len: usize,
 }
 
 impl<'a> Tick<'a> {
     /// Reads a message.
     ///
-    /// Errors: the length isn't what the count asks for. Allocates: never.
+    /// Errors: the length doesn't match the count. Allocates: never.
     pub fn decode(message: &'a [u8]) -> Result<Self, TickError> {
         let fields = || {
             let mut fields = super::fields::Fields::new(message);
@@ -101,13 +101,13 @@ impl<'a> Tick<'a> {
         Ok(Self { index, now: MonoNs(now), order })
     }
 
-    /// Numbers of the sources in the order in which their packets were consumed.
+    /// Numbers of the sources in the order of consumption of their packets.
     pub fn order(&self) -> impl ExactSizeIterator<Item = u16> + 'a {
         self.order.as_chunks::<2>().0.iter().map(|pair| u16::from_le_bytes(*pair))
     }
 }
 
-/// The part of a tick's message before the order. Allocates: never.
+/// A tick message's bytes before the order. Allocates: never.
 pub(super) fn tick_head(index: u64, now: MonoNs, packets: u32) -> [u8; TICK_HEAD_BYTES] {
     let mut head = [0; TICK_HEAD_BYTES];
     let values = index.to_le_bytes().into_iter().chain(now.0.to_le_bytes()).chain(packets.to_le_bytes());
@@ -115,18 +115,18 @@ pub(super) fn tick_head(index: u64, now: MonoNs, packets: u32) -> [u8; TICK_HEAD
     head
 }
 
-/// Bytes of `order` as the message has them.
+/// Bytes of `order` as stored in the message.
 pub(super) fn order_bytes(order: &[u16]) -> impl Iterator<Item = u8> {
     order.iter().flat_map(|source| source.to_le_bytes())
 }
 
-/// A loss as [`LOSSES`] has it.
+/// A loss as stored in [`LOSSES`].
 pub(super) fn stated_loss(from: Option<MonoNs>, to: Option<MonoNs>, words: &str) -> String {
     let time = |time: Option<MonoNs>| time.map_or_else(|| "-".to_owned(), |time| time.0.to_string());
     format!("{} {} {words}", time(from), time(to))
 }
 
-/// Reads what [`stated_loss`] wrote: from, to, words.
+/// Parses what [`stated_loss`] wrote: from, to, words.
 pub(super) fn read_loss(text: &str) -> (Option<MonoNs>, Option<MonoNs>, &str) {
     let mut parts = text.splitn(3, ' ');
     let mut time = || parts.next().and_then(|time| time.parse().ok()).map(MonoNs);
@@ -141,7 +141,7 @@ pub(super) fn seal(name: &str, mut metadata: BTreeMap<String, String>) -> BTreeM
     metadata
 }
 
-/// Takes the digest out of a metadata record; `false` when it doesn't fit. Records of other writers need none.
+/// Removes the digest from a metadata record; `false` if it doesn't match. Records of other writers need none.
 pub(super) fn unseal(name: &str, metadata: &mut BTreeMap<String, String>) -> bool {
     match metadata.remove(DIGEST_KEY) {
         Some(digest) => digest == digest_of(name, metadata),

@@ -1,8 +1,8 @@
-//! Where records begin and end in a file that may be damaged.
+//! Record boundaries in a file that may be damaged.
 //!
-//! A record is an opcode, a u64 length and that many bytes; nothing marks its beginning, so a length that lies takes
-//! everything after it along. Three things find it out: most kinds of records say their length twice (theirs and that
-//! of the fields within), a length must leave room for the next record, and what follows must be a record too.
+//! A record is an opcode, a u64 length and that many bytes, without a start marker, so a wrong length loses everything
+//! after it. Three checks detect it: most kinds of records imply their length twice (record length and field lengths), a
+//! length must leave room for the next record, and a record must follow.
 //!
 //! Source: MCAP format specification, "Records".
 
@@ -15,16 +15,16 @@ use super::LogError;
 use super::fields::{Fields, MessageHead};
 use super::format::LIBRARY;
 
-/// The longest record that is read as a whole. A length above it is a lie; chunks and attachments aside.
+/// Longest record read as a whole. A greater length is taken as damage, except for chunks and attachments.
 pub(super) const MAX_RECORD_BYTES: u64 = 256 << 20;
 /// Opcode and length.
 const RECORD_HEAD_BYTES: usize = 9;
-/// How much of a record is looked at to find out whether it is one: fields of fixed length, and names.
+/// Bytes of a record that are read to identify it: fields of fixed length, and names.
 const GLANCE_BYTES: usize = 1024;
-/// Bytes of a chunk's record before its data, without the name of the compression.
+/// Bytes of a chunk record before its data, without the name of the compression.
 const CHUNK_HEAD_BYTES: u64 = 40;
 
-/// A log's bytes, by their place.
+/// Random access to a log's bytes.
 pub(super) struct LogFile<R> {
     input: BufReader<R>,
     at: u64,
@@ -47,7 +47,7 @@ impl<R: Read + Seek> LogFile<R> {
         &self.name
     }
 
-    /// Reads from `at` until `into` is full or the file ends; gives the number of bytes.
+    /// Reads from `at` until `into` is full or the file ends; returns the number of bytes.
     pub(super) fn read_at(&mut self, at: u64, into: &mut [u8]) -> Result<usize, LogError> {
         let mut done = 0;
         let mut read = || {
@@ -68,7 +68,7 @@ impl<R: Read + Seek> LogFile<R> {
         Ok(done)
     }
 
-    /// The `len` bytes at `at`, or those that there are. `len` must have been bounded.
+    /// Up to `len` bytes at `at`, fewer at the end of the file. The caller bounds `len`.
     pub(super) fn bytes_at(&mut self, at: u64, len: u64) -> Result<Vec<u8>, LogError> {
         let len = len.min(self.len.saturating_sub(at));
         let mut bytes = vec![0; usize::try_from(len).unwrap_or(0)];
@@ -84,11 +84,11 @@ pub(super) struct Definition {
     pub(super) id: u16,
     pub(super) topic: String,
     pub(super) metadata: BTreeMap<String, String>,
-    /// Its schema, and how its messages are put into bytes: of logs of others. Ours don't need them, nor repeat them.
+    /// Schema and message encoding, for logs of other writers. Ours neither need nor repeat them.
     pub(super) form: Option<(u16, String)>,
 }
 
-/// By what makes a channel one of ours: its form is left out, since our list of channels has none.
+/// Compares the fields that our list of channels has; `form` is left out.
 impl PartialEq for Definition {
     fn eq(&self, other: &Self) -> bool {
         (self.id, &self.topic, &self.metadata) == (other.id, &other.topic, &other.metadata)
@@ -109,7 +109,7 @@ pub(super) fn schema(fields: &mut Fields<'_>) -> Option<(u16, String)> {
     Some((fields.u16()?, fields.text()?.to_owned()))
 }
 
-/// A chunk: where its data is and what its head says.
+/// A chunk: position of its data and fields of its header.
 #[derive(Debug, Clone)]
 pub(super) struct ChunkPlace {
     pub(super) data: u64,
@@ -121,11 +121,11 @@ pub(super) struct ChunkPlace {
     pub(super) times: (u64, u64),
     /// Whether the file ends within it.
     pub(super) cut: bool,
-    /// Whether its head is damaged: its length isn't that of its record.
+    /// Whether its header is damaged: its length doesn't match the record length.
     pub(super) doubtful: bool,
 }
 
-/// An attachment: where its data is and what its head says.
+/// An attachment: position of its data and fields of its header.
 #[derive(Debug, Clone)]
 pub(super) struct AttachmentPlace {
     pub(super) name: String,
@@ -134,7 +134,7 @@ pub(super) struct AttachmentPlace {
     pub(super) data_len: u64,
 }
 
-/// What a record is, as far as the framing and the index need to know.
+/// Kind of record, with the fields that framing and index need.
 #[derive(Debug, Clone)]
 pub(super) enum Item {
     Header {
@@ -152,30 +152,30 @@ pub(super) enum Item {
         channels: u32,
     },
     DataEnd,
-    /// Where the summary begins, as it says; 0 where there is none.
+    /// Start of the summary according to the footer; 0 where there is none.
     Footer {
         summary: u64,
     },
     Other,
 }
 
-/// A record and its place.
+/// A record and its position.
 #[derive(Debug, Clone)]
 pub(super) struct Frame {
     pub(super) at: u64,
     pub(super) body: u64,
     pub(super) end: u64,
     pub(super) item: Item,
-    /// Whether the lengths of its fields confirm its own.
+    /// Whether the lengths of its fields confirm the record length.
     pub(super) confirmed: bool,
 }
 
-/// What is found at a place.
+/// Content at a position.
 #[derive(Debug)]
 pub(super) enum Found {
     /// A record that lies within the file.
     Record(Frame),
-    /// A record that the file's end cuts, or whose length lies.
+    /// A record that is cut by the end of the file, or whose length is wrong.
     Cut(Frame),
     /// The closing magic bytes.
     Closing,
@@ -185,7 +185,7 @@ pub(super) enum Found {
     Nothing,
 }
 
-/// What is at `at`.
+/// Identifies the content at `at`.
 pub(super) fn look<R: Read + Seek>(file: &mut LogFile<R>, at: u64) -> Result<Found, LogError> {
     let mut head = [0; RECORD_HEAD_BYTES];
     let got = file.read_at(at, &mut head)?;
@@ -205,7 +205,7 @@ pub(super) fn look<R: Read + Seek>(file: &mut LogFile<R>, at: u64) -> Result<Fou
         return Ok(Found::Nothing);
     }
     let mut glance = [0; GLANCE_BYTES];
-    // A chunk is looked at whatever length it claims, since it has a second one.
+    // A chunk is examined whatever length it claims, since it implies a second one.
     let wanted = if opcode == op::CHUNK { u64::MAX } else { len };
     let wanted = usize::try_from(wanted).unwrap_or(usize::MAX).min(GLANCE_BYTES);
     let got = file.read_at(body, glance.get_mut(..wanted).unwrap_or_default())?;
@@ -216,7 +216,7 @@ pub(super) fn look<R: Read + Seek>(file: &mut LogFile<R>, at: u64) -> Result<Fou
         Some((Item::Chunk(place), _)) => {
             return look_at_chunk(file, frame(end, Item::Other, false), place);
         }
-        // A message's content has no length of its own.
+        // A message's data has no length field.
         Some((item, inner_len)) if inner_len == len && opcode != op::MESSAGE => {
             return Ok(whole_or_cut(file, frame(end, item, true)));
         }
@@ -231,9 +231,9 @@ pub(super) fn look<R: Read + Seek>(file: &mut LogFile<R>, at: u64) -> Result<Fou
     Ok(whole_or_cut(file, frame(end, item, false)))
 }
 
-/// A record whose opcode is damaged, where its content says what it is.
+/// A record whose opcode is damaged, identified by its content.
 fn disguised(opcode: u8, body: u64, glance: &[u8], len: u64) -> Option<Item> {
-    // A message may hold anything; that it looks like a chunk with the right length in both places is no accident.
+    // A message may hold anything, but one that parses as a chunk with matching lengths is no coincidence.
     let kinds: &[u8] =
         if opcode == op::MESSAGE { &[op::CHUNK] } else { &[op::CHUNK, op::ATTACHMENT, op::METADATA] };
     kinds
@@ -242,12 +242,12 @@ fn disguised(opcode: u8, body: u64, glance: &[u8], len: u64) -> Option<Item> {
         .map(|it| it.0)
 }
 
-/// Opcodes that MCAP keeps for its future; it has not used any in years, and damage makes them easily.
+/// Opcodes reserved by MCAP and so far unused; damage easily produces them.
 fn is_reserved(opcode: u8) -> bool {
     (op::DATA_END + 1..0x80).contains(&opcode)
 }
 
-/// What a record is whose names are longer than a glance.
+/// The item of a record whose names are longer than [`GLANCE_BYTES`].
 fn unread(opcode: u8) -> Item {
     match opcode {
         op::SCHEMA => Item::Schema,
@@ -262,7 +262,7 @@ fn record_head(head: [u8; RECORD_HEAD_BYTES]) -> (u8, u64) {
     (opcode, u64::from_le_bytes(len))
 }
 
-/// Whether there may be a record of that kind and length.
+/// Whether a record of that kind can have that length.
 fn is_possible(opcode: u8, len: u64) -> bool {
     opcode != 0 && (len <= MAX_RECORD_BYTES || matches!(opcode, op::CHUNK | op::ATTACHMENT))
 }
@@ -271,8 +271,8 @@ fn whole_or_cut<R: Read + Seek>(file: &LogFile<R>, frame: Frame) -> Found {
     if frame.end <= file.len() { Found::Record(frame) } else { Found::Cut(frame) }
 }
 
-/// A chunk says its length twice. Where the two differ, that one is right after which there is a record. Where both
-/// are the largest number there is, its writer had not closed it.
+/// A chunk implies its length twice. Where the two differ, the one followed by a record is right. Where both are the
+/// largest u64, its writer had not closed it.
 fn look_at_chunk<R: Read + Seek>(
     file: &mut LogFile<R>,
     mut frame: Frame,
@@ -298,7 +298,7 @@ fn look_at_chunk<R: Read + Seek>(
     Ok(whole_or_cut(file, frame))
 }
 
-/// Whether the head at `at` could be a record's; or the file ends there.
+/// Whether the bytes at `at` could be a record's header, or the file ends there.
 fn record_follows<R: Read + Seek>(file: &mut LogFile<R>, at: u64) -> Result<bool, LogError> {
     if at >= file.len() {
         return Ok(at == file.len());
@@ -309,7 +309,7 @@ fn record_follows<R: Read + Seek>(file: &mut LogFile<R>, at: u64) -> Result<bool
     Ok(whole && opcode <= op::DATA_END && is_possible(opcode, len) && len <= file.len() - at)
 }
 
-/// Reads what is needed of a record, and the length that its fields say it has at least.
+/// Parses the needed fields of a record and the least length that its fields imply.
 fn parse(opcode: u8, body: u64, bytes: &[u8]) -> Option<(Item, u64)> {
     let mut fields = Fields::new(bytes);
     let item = match opcode {
@@ -382,7 +382,7 @@ fn parse(opcode: u8, body: u64, bytes: &[u8]) -> Option<(Item, u64)> {
     Some((item, fields.taken()))
 }
 
-/// A record that ends in something with a length before it.
+/// A record that ends in a length-prefixed list.
 fn with_list(mut fields: Fields<'_>, item: Item) -> Option<(Item, u64)> {
     let len = fields.u32()?;
     Some((item, fields.taken() + u64::from(len)))

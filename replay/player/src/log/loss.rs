@@ -1,95 +1,95 @@
-//! What a damaged log has lost, and where.
+//! Losses of a damaged log, with their positions.
 
 use core::fmt;
 
 use headrace_geometry::time::MonoNs;
 use serde::{Deserialize, Serialize};
 
-/// The most losses that are listed; what comes after makes the last reach further.
+/// Most losses that are listed; later ones extend the last.
 const MAX_LOSSES: usize = 1000;
 
-/// What a piece of a log has in the way of damage.
+/// Kind of damage.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum LossKind {
-    /// The file ends before its closing records: the recorder was cut off, or the copy.
+    /// The file ends before its closing records: recording or copying was interrupted.
     Truncated,
-    /// Bytes that are no records: lengths that lie, or overwritten.
+    /// Bytes that are no records: wrong lengths, or overwritten.
     Framing,
-    /// A chunk whose content isn't what its checksum says. None of it is delivered.
+    /// A chunk whose checksum doesn't match. None of it is delivered.
     Checksum,
-    /// A chunk that doesn't unpack, or holds something else than records. None of it is delivered.
+    /// A chunk that doesn't unpack, or contains anything but records. None of it is delivered.
     Contents,
-    /// A chunk compressed in a way that isn't known here.
+    /// A chunk with an unsupported compression.
     Compression(String),
-    /// A chunk or an attachment larger than what is read into memory.
+    /// A chunk or attachment larger than the limit for reading into memory.
     TooLarge {
-        /// The largest allowed, bytes.
+        /// Limit, bytes.
         limit: u64,
     },
-    /// An attachment that fails its checksum, or isn't there though the log says so.
+    /// An attachment that fails its checksum, or that the log lists but doesn't contain.
     Attachment(String),
-    /// A metadata record that fails its checksum, or isn't there in a log of ours.
+    /// A metadata record that fails its checksum, or is missing from a log of ours.
     Metadata(String),
     /// Messages of a channel whose definition isn't in the log.
     UnknownChannel {
         /// The channel's number.
         channel: u16,
-        /// Messages that could not be delivered.
+        /// Messages not delivered.
         messages: u64,
     },
-    /// A second definition of a channel that contradicts the first, which was kept.
+    /// A second definition of a channel that contradicts the first, which is kept.
     Conflict {
         /// The channel's number.
         channel: u16,
     },
-    /// Every record reads, but the log's end stands elsewhere than it says: whole records are missing, or don't belong here.
+    /// Every record is readable, but the end of the log isn't where the footer puts it: records are missing or inserted.
     Displaced,
-    /// Every record reads, but the checksum over all of them does not fit: a byte has changed, and nothing says which.
+    /// Every record is readable, but the checksum over all of them doesn't match: an unlocated byte has changed.
     DataSection,
     /// Damage of one part of a recording.
     InPart {
         /// The part's number.
         part: u32,
-        /// What is the matter with it.
+        /// The damage.
         kind: Box<LossKind>,
     },
-    /// Parts of a recording that aren't there, from the first to the last; the last is `None` where nobody knows.
+    /// Missing parts of a recording, from first to last; the last is `None` where unknown.
     PartsMissing {
-        /// The first that is missing.
+        /// First missing part.
         first: u32,
-        /// The last that is missing.
+        /// Last missing part.
         last: Option<u32>,
     },
-    /// A part of a recording that holds something else than those around it say.
+    /// A part whose content disagrees with the totals of its neighbours.
     PartUnlike {
         /// The part's number.
         part: u32,
-        /// Messages that it and those before it have, as it says itself.
+        /// Messages up to and including this part, by its own total.
         messages: u64,
-        /// The same as the next part says.
+        /// The same by the next part's header.
         wanted: u64,
     },
     /// A part of a recording that isn't an MCAP file.
     PartUnreadable {
-        /// The part's number, by the name of its file.
+        /// The part number in the file name.
         part: u32,
         /// Its first bytes, in hex.
         found: String,
     },
-    /// A part whose own words on which part it is don't read; it was taken for this one by the name of its file.
+    /// A part whose part record is unreadable; its number was taken from the file name.
     PartByName {
         /// The part's number.
         part: u32,
     },
-    /// The log says so itself: its recorder left something out, or it was recovered from a damaged one.
+    /// A loss stated by the log itself: the recorder left messages out, or the log was recovered from a damaged one.
     Stated(String),
 }
 
-/// One piece of a log that is damaged.
+/// One damaged range of a log.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Loss {
-    /// What is the matter.
+    /// The damage.
     pub kind: LossKind,
     /// Where it begins in the file.
     pub offset: u64,

@@ -1,0 +1,51 @@
+//! Driving an armed loop: one way for ports, logs and the simulator, which differ only in their [`Feed`].
+
+use super::run::Loop;
+use headrace_geometry::time::MonoNs;
+
+/// What fills the rings of a loop: ports, a log, or a simulation.
+pub trait Feed {
+    /// Why it can't go on.
+    type Error;
+
+    /// Waits for the next tick, fills the rings for it, and gives the end of its time; `None` at the end. A full ring is
+    /// relieved by [`work_off`].
+    ///
+    /// Errors: the feed can't go on; what has been fed until then has been worked off.
+    fn fill(
+        &mut self,
+        dive: &mut Loop,
+        after_tick: &mut dyn FnMut(&Loop),
+    ) -> Result<Option<MonoNs>, Self::Error>;
+
+    /// Lets some time pass, for an outlet that is behind.
+    fn pause(&mut self);
+}
+
+/// Runs the loop until the feed ends; `after_tick` sees it after every tick.
+///
+/// Errors: those of the feed.
+pub fn drive<F: Feed>(
+    dive: &mut Loop,
+    feed: &mut F,
+    after_tick: &mut dyn FnMut(&Loop),
+) -> Result<(), F::Error> {
+    while let Some(now) = feed.fill(dive, after_tick)? {
+        work_off(dive, now, after_tick, &mut || feed.pause());
+    }
+    Ok(())
+}
+
+/// Ticks until nothing waits in the rings, at least once. An outlet that is behind holds packets back; `pause` gives it time.
+pub fn work_off(dive: &mut Loop, now: MonoNs, after_tick: &mut dyn FnMut(&Loop), pause: &mut dyn FnMut()) {
+    loop {
+        let consumed = dive.tick(now);
+        after_tick(dive);
+        if !dive.has_waiting() {
+            return;
+        }
+        if consumed == 0 {
+            pause();
+        }
+    }
+}
