@@ -37,10 +37,7 @@ pub(crate) struct Cli {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Log messages, on stderr")]
 pub(crate) struct Verbosity {
-    /// Log ports, files, phases and their durations (-vv: everything), not only warnings and errors.
-    ///
-    /// RUST_LOG sets the level (off, error, warn, info, debug, trace) by crate or module, for instance
-    /// RUST_LOG=headrace_ports=debug,headrace_replay::log=trace.
+    /// Log ports, files, phases and durations (-vv: everything); RUST_LOG=debug,headrace_ports=trace sets levels by crate.
     #[arg(short, long, action = ArgAction::Count, global = true)]
     verbose: u8,
     /// Log errors only.

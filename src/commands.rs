@@ -31,7 +31,7 @@ pub(crate) fn demo(args: &Demo) -> Result<u8, Failure> {
     let scene = Scene::parse(Document::new(name, text), &KINDS, &files::built_in, None)?;
     std::fs::create_dir_all(&args.out).map_err(|source| Failure::Write { path: args.out.clone(), source })?;
     let (log, report_file) = (args.out.join("dive.mcap"), args.out.join("report.json"));
-    // The recorder never overwrites a log; the last demonstration's may go.
+    // The recorder never overwrites a log; the last demonstration's may be removed.
     if log.exists() {
         std::fs::remove_file(&log).map_err(|source| Failure::Write { path: log.clone(), source })?;
     }

@@ -116,7 +116,7 @@ pub(crate) fn assemble_with(
     Ok(Dive { armed: arm(app, vehicle, navigation)?, notices, recorder, what_if: WhatIf::default() })
 }
 
-/// Arms the loop, which allocates all that it will need.
+/// Arms the loop, which allocates all its memory.
 fn arm(app: App, vehicle: &VehicleConfig, navigation: Box<dyn Navigation>) -> Result<Loop, Failure> {
     let armed = app.arm(navigation)?;
     if tracing::enabled!(tracing::Level::INFO) {
@@ -127,7 +127,7 @@ fn arm(app: App, vehicle: &VehicleConfig, navigation: Box<dyn Navigation>) -> Re
     Ok(armed)
 }
 
-/// Resident memory of this process, KiB; `None` where the system doesn't tell.
+/// Resident memory of this process, KiB; `None` if the system doesn't provide it.
 fn resident_kib() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;
@@ -145,7 +145,7 @@ fn app(vehicle: &VehicleConfig) -> Result<(App, NoticeReceiver), Failure> {
     Ok((app, notices))
 }
 
-/// What viewers need to know of the tunnel and the heads.
+/// Tunnel and heads for viewers.
 fn view_site(vehicle: &VehicleConfig) -> Site {
     let heads = (0..).zip(&vehicle.sensors).filter(|(_, sensor)| sensor.head().is_some());
     Site {
@@ -157,7 +157,7 @@ fn view_site(vehicle: &VehicleConfig) -> Site {
     }
 }
 
-/// Stores the UTC time of the clock of the timestamps.
+/// Stores the UTC time of the timestamps' clock.
 fn anchor(header: &mut LogHeader) {
     let (monotonic, utc) = headrace_ports::clock_anchor();
     header.metadata.insert("clock_anchor_monotonic_ns".to_owned(), monotonic.0.to_string());
@@ -301,14 +301,14 @@ impl Dive {
     fn end(mut self, watch: &mut Watch, beside: &mut dyn FnMut(&Loop)) -> Result<Report, Failure> {
         let _phase = Phase::start("report");
         self.armed.finish(&mut |notice, dive| watch.notice(notice, dive));
-        // Needs the samples, which are released below.
+        // Before the samples are released below.
         let what_if = self.armed.what_if(&self.what_if.targets_m, &self.what_if.sections_m);
         watch.end(&self.armed);
         beside(&self.armed);
         // Records the last judgements, too.
         let now = self.armed.now();
         self.armed.tick(now);
-        // A long dive's report takes as much memory as its samples, which aren't needed any more.
+        // A long dive's report takes as much memory as its samples, which are no longer needed.
         self.armed.release_samples();
         let mut report = Report::of(&self.armed);
         report.what_if = what_if;

@@ -18,7 +18,7 @@ use crate::files;
 use crate::live::connections;
 use crate::output::say;
 
-/// Longest wait for a host, ns, and so the largest delay of a measurement.
+/// Longest wait for a host, ns; bounds the delay of a measurement.
 const WAIT_NS: u32 = 1_000_000;
 
 /// `headrace emulate`.
@@ -39,7 +39,7 @@ pub(crate) fn emulate(args: &Emulate) -> Result<u8, Failure> {
     Ok(failure::OK)
 }
 
-/// A port for each sensor, of the carrier of its `connect`, or UDP where this machine doesn't have that.
+/// A port for each sensor, of its `connect`'s carrier, or UDP if this machine lacks it.
 fn stands(scene: &Scene, args: &Emulate) -> Result<Vec<EmulatedPort>, Failure> {
     let mut stands = Vec::new();
     for ((id, asked), device) in connections(&scene.vehicle).into_iter().zip(&scene.vehicle.sensors) {
@@ -81,7 +81,7 @@ fn write_vehicle(scene: &Scene, stands: &[EmulatedPort], folder: &Path, file: &P
     files::write(file, text.as_bytes())
 }
 
-/// The scene's vehicle file with a `connect` in each sensor's table; it may lack some, as simulations need none.
+/// The scene's vehicle file with a `connect` in each sensor's table; simulations don't need one, so some may lack it.
 fn with_connects(scene: &Scene) -> String {
     let missing: Vec<String> = scene
         .vehicle
@@ -141,7 +141,7 @@ impl Rehearsal {
         Ok(())
     }
 
-    /// Passes bytes from hosts to the devices, and the devices' bytes that are due to the ports.
+    /// Passes bytes from hosts to the devices, and due bytes from the devices to the ports.
     fn go_on(&mut self) -> Result<(), Failure> {
         let failed = |source| Failure::System { what: "emulating a device on its port", source };
         wait_for_any(&self.stands, WAIT_NS);

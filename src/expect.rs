@@ -8,7 +8,7 @@ use serde_json::Value;
 use crate::failure::Failure;
 use crate::files;
 
-/// Most differences that are listed.
+/// Most differences listed.
 const SHOWN: usize = 20;
 
 /// Whether the report differs from a golden one. The log's name and hash, the history of ports and the golden report's

@@ -15,7 +15,7 @@ const VARIABLE: &str = "RUST_LOG";
 /// Prefix of the targets of this program's crates.
 const OURS: &str = "headrace";
 
-/// Writes log messages to stderr from here on. A caller of this library that has its own subscriber keeps it.
+/// Starts writing log messages to stderr. A caller of this library that has its own subscriber keeps it.
 pub(crate) fn start(verbosity: &Verbosity) {
     let (filter, error) = filter(verbosity.level(), std::env::var(VARIABLE).ok().as_deref());
     let colour =
@@ -53,8 +53,8 @@ fn filter(level: Option<LevelFilter>, variable: Option<&str>) -> (Targets, Optio
     (filter, error)
 }
 
-/// Stderr, which log messages share with lines that overwrite themselves. What can't be written is dropped: a closed stderr
-/// must not end a dive.
+/// Stderr, which log messages share with self-overwriting lines. Failed writes are dropped: a closed stderr must not end a
+/// dive.
 struct Stderr;
 
 impl Write for Stderr {

@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use tracing::span::EnteredSpan;
 
-/// A phase of a command from its start until it is dropped. What is logged meanwhile on this thread is inside its span.
+/// A phase of a command from its start until it is dropped. Log messages of this thread in between are inside its span.
 pub(crate) struct Phase {
     started: Instant,
     _span: EnteredSpan,

@@ -81,7 +81,7 @@ pub(crate) fn simulate(args: &Simulate) -> Result<u8, Failure> {
     Ok(failure::OK)
 }
 
-/// Lists the systems, components and random streams of a scene, and the effects that it doesn't name.
+/// Lists a scene's systems, components and random streams, and the effects it doesn't use.
 fn explain(scene: &Scene, as_json: bool) -> Result<u8, Failure> {
     let simulation = Simulation::new(scene)?;
     let added = simulation.added();

@@ -1,4 +1,4 @@
-//! `headrace calibrate`: a log through the loop, and what its readings tell of the vehicle file.
+//! `headrace calibrate`: replays a log and estimates values for the vehicle file.
 
 mod words;
 
@@ -15,7 +15,7 @@ use crate::output::{deliver, put};
 use crate::progress::Progress;
 use crate::vehicle_file;
 
-/// Finds what a log tells of the vehicle file.
+/// Estimates a vehicle file's values from a log.
 pub(crate) fn calibrate(args: &Calibrate) -> Result<u8, Failure> {
     let mut player = Player::open(&files_of(std::slice::from_ref(&args.log))?)?;
     let (text, vehicle) = match &args.vehicle {

@@ -1,4 +1,4 @@
-//! Calibration in words, and as JSON.
+//! Results of a calibration, as text and as JSON.
 
 use headrace_calibration::collect::Collected;
 use headrace_calibration::findings::Findings;
@@ -9,7 +9,7 @@ use serde_json::{Value as Json, json};
 use crate::cli::Calibrate;
 use crate::output::append;
 
-/// For a person.
+/// The results as text.
 pub(super) fn text(
     args: &Calibrate,
     vehicle: &VehicleConfig,
@@ -82,7 +82,7 @@ fn row(found: &Found) -> String {
     }
 }
 
-/// The lines for the vehicle file, each sensor's under the line that finds it.
+/// Lines for the vehicle file, each sensor's under a heading with its id.
 fn toml(table: &Table) -> String {
     let mut text = String::new();
     for (of, lines) in &table.lines {
@@ -97,7 +97,7 @@ fn toml(table: &Table) -> String {
     text
 }
 
-/// For a program.
+/// The results as JSON.
 pub(super) fn json(
     args: &Calibrate,
     vehicle: &VehicleConfig,

@@ -1,4 +1,4 @@
-//! `import`: a foreign log becomes one of ours.
+//! `headrace import`: converts a foreign log to a headrace log.
 
 mod ros;
 
@@ -56,7 +56,7 @@ pub(crate) fn import(args: &cli::Import) -> Result<u8, Failure> {
     write(args, kind, Input::new(&name, file, format), header, &mut takers)
 }
 
-/// Writes the log of what the sensors take.
+/// Writes the log of the messages that sensors receive.
 fn write<S: Source>(
     args: &cli::Import,
     kind: FileKind,
@@ -109,7 +109,7 @@ fn format(
     Ok(Box::new(Csv::new(mapping, vehicle, &first_line(&args.file)?)?))
 }
 
-/// The first line, where it is not too long to be one.
+/// First line of a file, up to 64 KiB.
 fn first_line(path: &Path) -> Result<String, Failure> {
     let failed = |source| Failure::Read { path: path.to_owned(), source };
     let file = BufReader::new(File::open(path).map_err(failed)?);
@@ -118,7 +118,7 @@ fn first_line(path: &Path) -> Result<String, Failure> {
     Ok(String::from_utf8_lossy(&line).into_owned())
 }
 
-/// Says what came of it.
+/// Prints a summary; returns the exit code.
 fn tell(args: &cli::Import, kind: FileKind, ids: &[String], imported: &Imported) -> Result<u8, Failure> {
     let counts = |id: &usize| imported.messages.get(*id).copied().unwrap_or(0);
     let heard: u64 = imported.messages.iter().sum();
@@ -159,7 +159,7 @@ fn tell(args: &cli::Import, kind: FileKind, ids: &[String], imported: &Imported)
     Ok(if imported.losses.is_empty() { failure::OK } else { failure::DATA_LOST })
 }
 
-/// The kind of a file by its name.
+/// Kind of a file by its extension.
 fn kind_of(path: &Path) -> Result<FileKind, Failure> {
     FileKind::of(path).map_or_else(
         || {
@@ -172,7 +172,7 @@ fn kind_of(path: &Path) -> Result<FileKind, Failure> {
     )
 }
 
-/// Why a file can't be imported, with what it looks like where it is the wrong one.
+/// Error for a file that can't be imported, with its apparent kind if that is another.
 fn unusable(path: &Path, error: ImportError) -> Failure {
     match error {
         ImportError::Nothing { .. }
@@ -183,7 +183,7 @@ fn unusable(path: &Path, error: ImportError) -> Failure {
     }
 }
 
-/// A file that is none of what it should be, with what it looks like.
+/// Error for a file of the wrong kind, with its apparent kind.
 fn named(path: &Path, problem: &str) -> Failure {
     let mut front = Vec::new();
     let read =
@@ -195,7 +195,7 @@ fn named(path: &Path, problem: &str) -> Failure {
     Failure::Usage(format!("{problem}{}", looks.unwrap_or_default()))
 }
 
-/// A log that overwrote what it is made from would be the end of both.
+/// Refuses an output that would overwrite the input.
 fn same_file(from: &Path, to: &Path) -> Result<(), Failure> {
     let both = from.canonicalize().ok().zip(to.canonicalize().ok());
     if both.is_some_and(|(from, to)| from == to) {

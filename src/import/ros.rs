@@ -1,4 +1,4 @@
-//! Recordings of ROS: whose topics are which sensor's.
+//! ROS recordings: assignment of topics to sensors.
 
 use headrace_config::Document;
 use headrace_import::ros::{Feeds, MatchError, Topic};
@@ -8,7 +8,7 @@ use crate::cli;
 use crate::failure::Failure;
 use crate::files;
 
-/// By the mapping file, or else where there is no choice, which is said.
+/// Assignment by the mapping file, or without one by unambiguous matches, which are listed on stderr.
 pub(super) fn feeds(
     args: &cli::Import,
     vehicle: Option<&VehicleConfig>,

@@ -44,7 +44,7 @@ fn sensors(machine: &Machine, vehicle: &VehicleConfig, probe: bool) -> Vec<Senso
             let kind = probing::kind(&config.plugin).filter(|_| probe);
             match presence(machine, &connect)? {
                 Presence::There(name) => Ok(State::Present(name)),
-                // The device sends to this port of ours; there is nothing to probe.
+                // The device sends to this machine's port; there is nothing to probe.
                 Presence::Elsewhere if matches!(connect, Connect::UdpListen { .. }) => Ok(State::NotProbed),
                 Presence::Elsewhere => match kind {
                     Some(probe) => headrace_ports::probe(&connect, &mut [probe]).map(State::Answered),

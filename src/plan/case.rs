@@ -23,7 +23,7 @@ use crate::vehicle_file;
 
 /// Kind of the heads if no vehicle file is given.
 const USUAL_HEAD: &str = "imagenex881";
-/// Their range setting, m: that of the maker's table of modes.
+/// Their range setting, m, as in the maker's table of modes.
 const USUAL_RANGE_M: f64 = 10.0;
 
 /// An inspection with its names.

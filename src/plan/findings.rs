@@ -1,4 +1,4 @@
-//! What a plan found, for the table, the JSON and the pictures.
+//! Results of a plan, for the table, the JSON and the charts.
 
 use headrace_sampling::plan::{Answer, Briefing, Planner, Question};
 
@@ -14,7 +14,7 @@ pub(super) struct Findings {
     pub(super) footprints_m: [f64; 2],
     pub(super) question: Question,
     pub(super) answers: Vec<Answer>,
-    /// The mode that briefing and pictures are for, with its speed; `None` where no mode gives one.
+    /// The mode of the briefing and the charts, with its speed; `None` if no mode gives one.
     pub(super) shown: Option<(usize, f64)>,
     pub(super) briefing: Briefing,
 }

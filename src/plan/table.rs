@@ -89,7 +89,7 @@ const HEADINGS: [&str; 2] = [
 fn row(answer: &Answer) -> String {
     let mark = if answer.best { '*' } else { ' ' };
     let estimated = if answer.turn_basis == Basis::Estimated.as_str() { '~' } else { ' ' };
-    // Nothing is measured where nothing is seen.
+    // No spacing where no head sees the wall.
     let worst = if answer.t_y2_m > 0.0 { format!("{:.3}", answer.t_y2_m) } else { "-".to_owned() };
     let known = format!(
         "{mark} {:<8} {:>4.1} {estimated}{:>6.2} {:>8.2}  {:>5.3}  {:>5.3}  {worst:>5}",
@@ -213,7 +213,7 @@ fn start_lines(findings: &Findings, briefing: &Briefing) -> Vec<String> {
             starts.join("; ")
         ));
     }
-    // Heads as far apart as others say nothing new.
+    // Equal distances give the same rule.
     let mut said = Vec::new();
     for rule in &briefing.hull_rules {
         let text = format!(

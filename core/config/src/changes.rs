@@ -1,4 +1,4 @@
-//! A file with some of its values changed: what a scene says of the vehicle that it borrows.
+//! Overrides of values in a TOML text: a scene's changes to the vehicle file that it uses.
 
 use core::ops::Range;
 
@@ -6,15 +6,15 @@ use toml::de::{DeTable, DeValue};
 
 use super::reader::{ConfigError, Document, Section};
 
-/// Stands for every table of an array that has the key.
+/// Selects every table of an array that has the key.
 const ALL: &str = "all";
-/// Key by which a table of an array is named.
+/// Key that identifies a table of an array.
 const ID: &str = "id";
 
-/// `text` with the values that `changes` gives in their place. `heads.layout = "x"` changes a key of a table,
-/// `sensors.ID.key` one of the array's table with that id, `sensors.all.key` all that have the key.
+/// `text` with the values of the keys in `changes` replaced. `heads.layout = "x"` changes a key of a table,
+/// `sensors.ID.key` that of the array's table with this id, `sensors.all.key` that of every table that has the key.
 ///
-/// Errors: a change whose key isn't in the text; a text that isn't TOML.
+/// Errors: a changed key that isn't in the text; a text that isn't TOML.
 pub fn changed(text: &str, changes: &Section<'_>) -> Result<String, ConfigError> {
     let table = Document::new(changes.file(), text).table()?;
     let mut edits: Vec<(Range<usize>, &str)> = Vec::new();
@@ -39,7 +39,7 @@ pub fn changed(text: &str, changes: &Section<'_>) -> Result<String, ConfigError>
     Ok(changed)
 }
 
-/// The places of the values at `path`.
+/// Finds the byte ranges of the values at `path`.
 fn find(table: &DeTable<'_>, path: &[&str], found: &mut Vec<Range<usize>>) {
     let Some((key, rest)) = path.split_first() else { return };
     let Some(value) = table.get(*key) else { return };

@@ -1,6 +1,6 @@
-//! Files that people write, as TOML: typed access whose errors name file, line, key, value and what is allowed.
+//! Typed access to hand-written TOML files; errors name file, line, key, value and the allowed values.
 //!
-//! Reading the file itself is the caller's.
+//! File I/O is left to the caller.
 
 #![cfg_attr(not(test), warn(clippy::cast_possible_truncation))]
 #![cfg_attr(test, allow(clippy::cast_possible_truncation))]

@@ -1,4 +1,4 @@
-//! Typed access to a TOML text, whose errors name file, line, key, value and what is allowed.
+//! Typed access to a TOML text; errors name file, line, key, value and the allowed values.
 
 use core::cell::RefCell;
 use core::ops::RangeInclusive;
@@ -6,7 +6,7 @@ use core::ops::RangeInclusive;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// What is wrong with a file that a person wrote.
+/// An error in a hand-written file.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{file}:{line}: {key}{}: {problem}", .value.as_ref().map(|v| format!(" = {v}")).unwrap_or_default())]
 pub struct ConfigError {
@@ -16,32 +16,32 @@ pub struct ConfigError {
     pub line: usize,
     /// Dotted path of the key.
     pub key: String,
-    /// The value that stands there, where there is one.
+    /// The value of the key, if present.
     pub value: Option<String>,
-    /// What is wrong and what would be allowed.
+    /// The problem and the allowed values.
     pub problem: String,
 }
 
-/// A text and its name.
+/// A text and its file name.
 #[derive(Debug, Clone, Copy)]
 pub struct Document<'a> {
     file: &'a str,
     text: &'a str,
 }
 
-/// Reads a file that another one names (a polyline profile, a device's definitions), by the name given there.
+/// Reads a file referenced by another one (a polyline profile, a device's definitions), by the name given there.
 pub type Loader<'a> = &'a dyn Fn(&str) -> Result<String, String>;
 
-/// A file that a key names.
+/// A file referenced by a key.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct NamedFile {
-    /// Its name, as the key gives it.
+    /// File name, as written at the key.
     pub name: String,
-    /// What is in it.
+    /// Content of the file.
     pub text: String,
 }
 
-/// Where the files come from that keys name.
+/// Loader of the files referenced by keys, if any.
 #[derive(Clone, Copy)]
 struct Files<'a>(Option<Loader<'a>>);
 
@@ -51,10 +51,10 @@ impl core::fmt::Debug for Files<'_> {
     }
 }
 
-/// A value with its path, its text, and what makes an error about it.
+/// A value's path, its text, and a constructor for errors about it.
 pub(super) type Leaf<'s> = (Vec<String>, &'s str, Box<dyn Fn(&str) -> ConfigError + 's>);
 
-/// One table of a document. Keys that nobody asked for are an error at [`Section::finish`].
+/// One table of a document. Keys that were never read are an error at [`Section::finish`].
 #[derive(Debug)]
 pub struct Section<'a> {
     document: Document<'a>,
@@ -66,7 +66,7 @@ pub struct Section<'a> {
 }
 
 impl<'a> Document<'a> {
-    /// `file` names the text in errors.
+    /// `file` is the name used in errors.
     pub fn new(file: &'a str, text: &'a str) -> Self {
         Self { file, text }
     }
@@ -80,7 +80,7 @@ impl<'a> Document<'a> {
         Ok(Section { document: self, path, at: 0, table, asked, files: Files(None) })
     }
 
-    /// The root table as the parser has it.
+    /// The root table as parsed.
     pub(super) fn table(self) -> Result<DeTable<'a>, ConfigError> {
         match DeTable::parse(self.text) {
             Ok(root) => Ok(root.into_inner()),
@@ -103,13 +103,13 @@ impl<'a> Document<'a> {
 }
 
 impl<'a> Section<'a> {
-    /// This table and those within it, whose keys may name files that `load` reads.
+    /// Lets keys of this table and its subtables reference files, which `load` reads.
     #[must_use]
     pub fn with_files(self, load: Loader<'a>) -> Self {
         Self { files: Files(Some(load)), ..self }
     }
 
-    /// The file that a key names. One that a vehicle file's table names is attached to logs, too.
+    /// The file referenced by a key. Files referenced by a vehicle file are also attached to logs.
     ///
     /// Errors: not a string, or a file that can't be read.
     pub fn named_file(&self, key: &'static str) -> Result<Option<NamedFile>, ConfigError> {
@@ -120,7 +120,7 @@ impl<'a> Section<'a> {
         Ok(Some(NamedFile { name, text }))
     }
 
-    /// A number within `allowed`, in the unit that the key's name ends in.
+    /// A number within `allowed`, in the unit of the key's suffix.
     ///
     /// Errors: not a finite number, or outside `allowed`.
     pub fn number(
@@ -137,7 +137,7 @@ impl<'a> Section<'a> {
         Ok(Some(number))
     }
 
-    /// A whole number within `allowed`; also written 0x...
+    /// A whole number within `allowed`; hexadecimal (0x...) is accepted too.
     ///
     /// Errors: not a whole number, or outside `allowed`.
     pub fn integer(
@@ -153,7 +153,7 @@ impl<'a> Section<'a> {
         }
     }
 
-    /// A text.
+    /// A string.
     ///
     /// Errors: not a string.
     pub fn text(&self, key: &'static str) -> Result<Option<String>, ConfigError> {
@@ -175,7 +175,7 @@ impl<'a> Section<'a> {
         }
     }
 
-    /// One of the given words, with what it stands for.
+    /// One of the given words; returns its associated value.
     ///
     /// Errors: another word; the message lists those allowed.
     pub fn choice<T: Copy>(&self, key: &'static str, among: &[(&str, T)]) -> Result<Option<T>, ConfigError> {
@@ -206,7 +206,7 @@ impl<'a> Section<'a> {
         }
     }
 
-    /// Any count of numbers, each within `allowed`.
+    /// An array of numbers of any length, each within `allowed`.
     ///
     /// Errors: not an array of numbers, or one of them outside.
     pub fn numbers(
@@ -258,7 +258,7 @@ impl<'a> Section<'a> {
         if one { Ok(self.section(key)?.into_iter().collect()) } else { self.sections(key) }
     }
 
-    /// An array of texts.
+    /// An array of strings.
     ///
     /// Errors: the key holds something else.
     pub fn texts(&self, key: &'static str) -> Result<Option<Vec<String>>, ConfigError> {
@@ -276,9 +276,9 @@ impl<'a> Section<'a> {
         value.ok_or_else(|| self.error(key, None, "is missing".to_owned()))
     }
 
-    /// Checks that every key in this table was asked for.
+    /// Checks that every key of this table was read.
     ///
-    /// Errors: the first key that wasn't; the message lists the ones that are known here.
+    /// Errors: the first key that wasn't; the message lists the known ones.
     pub fn finish(self) -> Result<(), ConfigError> {
         let asked = self.asked.borrow();
         let unknown = self.table.keys().filter(|key| !asked.contains(&key.get_ref().as_ref()));
@@ -311,7 +311,7 @@ impl<'a> Section<'a> {
         }
     }
 
-    /// The file that this table is from, as the caller named it.
+    /// File of this table, as the caller named it.
     pub fn file(&self) -> &str {
         self.document.file
     }
@@ -323,7 +323,7 @@ impl<'a> Section<'a> {
         keys.into_iter().map(|key| key.get_ref().as_ref()).collect()
     }
 
-    /// Every value below this table that is no table itself: its path from here, its text, and an error about it.
+    /// All values below this table that aren't tables: path from here, text, and error constructor.
     pub(super) fn leaves(&self) -> Vec<Leaf<'_>> {
         let mut leaves = Vec::new();
         self.collect_leaves(&self.table, &[], &mut leaves);

@@ -1,4 +1,4 @@
-//! Frames as types, so that a vector can't be used in the wrong one.
+//! Reference frames as types, so that vectors of different frames can't be mixed.
 //!
 //! ```text
 //!            z up                       head angle alpha, seen looking along +x:
@@ -33,12 +33,12 @@ pub enum Body {}
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sensor {}
 
-/// A displacement or direction in frame `F`, metres (or without unit where it is a direction).
+/// A displacement or direction in frame `F`, metres (a direction has no unit).
 #[derive(Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(bound = "")]
 pub struct Vec3<F>(pub Vector3<f64>, PhantomData<F>);
 
-/// A place in frame `F`, metres.
+/// A position in frame `F`, metres.
 #[derive(Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(bound = "")]
 pub struct Point3<F>(pub Vector3<f64>, PhantomData<F>);
@@ -61,7 +61,7 @@ macro_rules! components {
                 Self(vector, PhantomData)
             }
 
-            /// The zero of the frame.
+            /// The zero vector, or the frame's origin.
             pub fn zero() -> Self {
                 Self::new(0.0, 0.0, 0.0)
             }
@@ -115,7 +115,7 @@ impl<F> Vec3<F> {
         Self(self.0.cross(&other.0), PhantomData)
     }
 
-    /// The same direction with another length.
+    /// The vector times `factor`.
     #[must_use]
     pub fn scaled(&self, factor: f64) -> Self {
         Self(self.0 * factor, PhantomData)
@@ -155,14 +155,14 @@ impl<F> Sub for Point3<F> {
 }
 
 impl<To, From> Rot<To, From> {
-    /// The frames coincide.
+    /// Identity: the frames coincide.
     pub fn identity() -> Self {
         Self(UnitQuaternion::identity(), PhantomData)
     }
 
-    /// From a quaternion w, x, y, z of any length but zero.
+    /// From a quaternion w, x, y, z of any non-zero length.
     ///
-    /// Errors: `None` for a length that isn't finite or is below 1e-6.
+    /// Errors: `None` for a length that isn't finite or isn't above 1e-6.
     pub fn from_wxyz(w: f64, x: f64, y: f64, z: f64) -> Option<Self> {
         let norm = math::sqrt(w * w + x * x + y * y + z * z);
         if !(norm.is_finite() && norm > 1e-6) {
@@ -203,7 +203,7 @@ impl<To, From> Rot<To, From> {
         [q.w, q.i, q.j, q.k]
     }
 
-    /// The rotation back.
+    /// The inverse rotation.
     pub fn inverse(&self) -> Rot<From, To> {
         Rot(self.0.inverse(), PhantomData)
     }
@@ -231,32 +231,32 @@ impl<To, From> fmt::Debug for Rot<To, From> {
     }
 }
 
-/// Where the vehicle is and how it is turned, in the tunnel.
+/// Position and attitude of the vehicle in the tunnel.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Pose {
-    /// The body frame's origin.
+    /// Origin of the body frame.
     pub position: Point3<Tunnel>,
-    /// Body to tunnel.
+    /// Rotation from body to tunnel frame.
     pub attitude: Rot<Tunnel, Body>,
 }
 
 impl Pose {
-    /// A body-frame place in the tunnel.
+    /// Tunnel-frame position of a body-frame point.
     pub fn place(&self, offset: Vec3<Body>) -> Point3<Tunnel> {
         self.position + self.attitude * offset
     }
 }
 
-/// How a sensor sits on the vehicle.
+/// Mounting of a sensor on the vehicle.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Mount {
-    /// The sensor's origin in the body frame.
+    /// Origin of the sensor frame in the body frame.
     pub position: Vec3<Body>,
-    /// Sensor to body.
+    /// Rotation from sensor to body frame.
     pub rotation: Rot<Body, Sensor>,
 }
 
-/// The direction in which a head looks at `angle_rad`, in its own frame: 0 is down, growing clockwise seen along +x.
+/// Direction of a head's beam at `angle_rad`, in the sensor frame: 0 is down, growing clockwise seen along +x.
 ///
 /// Source: metrics.md, "Frames".
 pub fn head_direction(angle_rad: f64) -> Vec3<Sensor> {

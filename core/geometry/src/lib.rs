@@ -1,4 +1,4 @@
-//! Units, integer time, frames, mathematics, the site, and tunnels: what every other crate counts and measures with.
+//! Units, integer time, frames, mathematics, site constants and tunnel profiles, shared by all other crates.
 //!
 //! Pure: no I/O, no threads, no clock, no randomness. Transcendental functions come from [`math`] alone.
 

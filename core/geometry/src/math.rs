@@ -1,7 +1,7 @@
-//! The only door to transcendental functions: the `libm` crate, whose results are the same on every platform.
+//! The only access to transcendental functions: the `libm` crate, whose results are the same on every platform.
 //!
-//! The standard library's versions call the platform's C library and differ by an ulp between machines, which is
-//! enough to part two replays. A lint (clippy.toml) keeps the others out.
+//! The standard library's versions call the platform's C library and differ by an ulp between machines, enough for two
+//! replays to diverge. A lint (clippy.toml) bans them.
 
 pub use core::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -40,7 +40,7 @@ pub fn atan2(y: f64, x: f64) -> f64 {
     libm::atan2(y, x)
 }
 
-/// Square root; IEEE 754 rounds it exactly, so that the platform's instruction will do.
+/// Square root; IEEE 754 requires correct rounding, so the platform's instruction is used.
 pub fn sqrt(x: f64) -> f64 {
     x.sqrt()
 }
@@ -65,11 +65,11 @@ pub fn erfc(x: f64) -> f64 {
     libm::erfc(x)
 }
 
-/// `value` brought into [0, `modulus`). `modulus` must be positive and finite.
+/// `value` wrapped to [0, `modulus`). `modulus` must be positive and finite.
 pub fn wrap(value: f64, modulus: f64) -> f64 {
-    // Nearly all values are less than a turn off; what follows gives the same bits for them, by a quotient.
+    // Nearly all values are off by less than one modulus; these branches give the same bits as the quotient below.
     if (0.0..modulus).contains(&value) {
-        // Both zeros become the positive one.
+        // -0.0 becomes 0.0.
         return value + 0.0;
     }
     if value < 0.0 && value > -modulus {
@@ -77,13 +77,13 @@ pub fn wrap(value: f64, modulus: f64) -> f64 {
         return if r >= modulus { 0.0 } else { r };
     }
     let r = value - modulus * libm::floor(value / modulus);
-    // Rounding can leave r at the modulus itself, or a hair below zero.
+    // Rounding can leave r at the modulus itself, or slightly below zero.
     if r >= modulus || r < 0.0 { 0.0 } else { r }
 }
 
-/// `difference` brought into [-`modulus`/2, `modulus`/2): the short way round.
+/// `difference` wrapped to [-`modulus`/2, `modulus`/2): the shortest way round.
 pub fn wrap_signed(difference: f64, modulus: f64) -> f64 {
-    // As in `wrap`; near the halves, where rounding decides, the quotient does.
+    // As in `wrap`; near half a modulus, where rounding decides, the quotient is used.
     let size = difference.abs();
     if size < 0.499 * modulus {
         return difference;
@@ -101,7 +101,7 @@ pub fn wrap_signed(difference: f64, modulus: f64) -> f64 {
     reason = "float to integer casts saturate, which is what is wanted"
 )]
 pub fn floor_to_i64(x: f64) -> i64 {
-    // Without a call: cells and sections are looked up by it several times a sample.
+    // Avoids a library call: used several times per sample to look up cells and sections.
     let towards_zero = x as i64;
     if towards_zero as f64 > x { towards_zero.saturating_sub(1) } else { towards_zero }
 }
@@ -112,7 +112,7 @@ pub fn floor_to_i64(x: f64) -> i64 {
     reason = "float to integer casts saturate, which is what is wanted"
 )]
 pub fn round_to_i64(x: f64) -> i64 {
-    /// From here on there is nothing behind the point; adding it rounds what there was, halves to even.
+    /// 2^52: doubles of this size have no fraction, and adding it rounds to integer, halves to even.
     const WHOLE: f64 = 4_503_599_627_370_496.0;
     let size = x.abs();
     if size < WHOLE { ((size + WHOLE) - WHOLE).copysign(x) as i64 } else { x as i64 }
@@ -122,7 +122,7 @@ pub fn round_to_i64(x: f64) -> i64 {
 mod tests {
     use super::*;
 
-    /// What is computed without a quotient has the bits of what is computed with one.
+    /// The shortcuts give the same bits as the quotient.
     #[test]
     fn the_short_ways_give_the_same_bits() {
         let by_quotient = |value: f64, modulus: f64| {

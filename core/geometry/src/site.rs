@@ -1,4 +1,4 @@
-//! Constants of the place: water, gravity, and how the tunnel lies. Recorded with every log.
+//! Site constants: water, gravity and the direction of the tunnel's axis. Recorded with every log.
 
 /// The site's constants.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -17,10 +17,10 @@ pub struct Site {
     pub axis_yaw_rad: f64,
 }
 
-/// Speed of sound in fresh water of 0 to 95 degrees Celsius at an absolute pressure, m/s.
+/// Speed of sound in fresh water at 0 to 95 degrees Celsius and an absolute pressure, m/s.
 ///
-/// Source: Marczak 1997, J. Acoust. Soc. Am. 102, 2776 (pure water at one atmosphere, within 0.02 m/s); depth adds 0.0163 m/s a
-/// metre, Mackenzie 1981, J. Acoust. Soc. Am. 70, 807.
+/// Source: Marczak 1997, J. Acoust. Soc. Am. 102, 2776 (pure water at one atmosphere, within 0.02 m/s); depth adds
+/// 0.0163 m/s per metre, Mackenzie 1981, J. Acoust. Soc. Am. 70, 807.
 pub fn fresh_water_sound_speed_mps(temperature_degc: f64, pressure_pa: f64) -> f64 {
     const COEFFICIENTS: [f64; 6] =
         [1.402_385e3, 5.038_813, -5.799_136e-2, 3.287_156e-4, -1.398_845e-6, 2.787_860e-9];
@@ -46,20 +46,20 @@ impl Default for Site {
 }
 
 impl Site {
-    /// What the air's pressure may be at a place where water stands, Pa: from high in the mountains to below the sea's level.
+    /// Plausible air pressure at the water's surface, Pa: from high mountains to below sea level.
     pub const SURFACE_PRESSURE_PA: core::ops::RangeInclusive<f64> = 40_000.0..=110_000.0;
 
-    /// Depth below the surface in metres of a place at absolute pressure `pressure_pa`, in water at rest.
+    /// Depth below the surface, m, at absolute pressure `pressure_pa`, in still water.
     pub fn depth_m(&self, pressure_pa: f64) -> f64 {
         (pressure_pa - self.surface_pressure_pa) / (self.density_kgpm3 * self.gravity_mps2)
     }
 
-    /// Absolute pressure in Pa at `depth_m` below the surface, in water at rest.
+    /// Absolute pressure, Pa, at `depth_m` below the surface, in still water.
     pub fn pressure_pa(&self, depth_m: f64) -> f64 {
         self.surface_pressure_pa + depth_m * self.density_kgpm3 * self.gravity_mps2
     }
 
-    /// A range that a device computed with `device_mps`, rescaled to the water's own speed of sound.
+    /// Rescales a range that a device computed with `device_mps` to the water's speed of sound, m.
     pub fn rescaled_range_m(&self, range_m: f64, device_mps: f64) -> f64 {
         range_m * (self.sound_speed_mps / device_mps)
     }
@@ -69,7 +69,7 @@ impl Site {
 mod tests {
     use super::fresh_water_sound_speed_mps;
 
-    /// Values of other sources: Del Grosso and Mader 1972, tables of pure water.
+    /// Reference values: Del Grosso and Mader 1972, tables for pure water.
     #[test]
     fn sound_goes_as_fast_as_tables_say() {
         for (degc, mps) in [(0.0, 1402.39), (5.0, 1426.16), (10.0, 1447.27), (20.0, 1482.34), (30.0, 1509.13)]

@@ -1,7 +1,7 @@
 //! Time as integer nanoseconds, in three types that can't be mixed up.
 //!
-//! The loop knows only [`MonoNs`]: the host's monotonic clock, as stamped by the thread that received the bytes,
-//! or as a log or a simulation gives it. UTC appears at the edges alone.
+//! The loop uses [`MonoNs`] only: the host's monotonic clock, as stamped by the thread that received the bytes, or as
+//! given by a log or a simulation. UTC appears at the edges only.
 
 use serde::{Deserialize, Serialize};
 
@@ -9,20 +9,20 @@ use core::ops::{Add, Neg, Sub};
 
 const NS_PER_S: f64 = 1e9;
 
-/// A moment on the host's monotonic clock, in nanoseconds since an arbitrary origin.
+/// A timestamp of the host's monotonic clock, in nanoseconds since an arbitrary origin.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize)]
 pub struct MonoNs(pub u64);
 
-/// A moment in UTC, in nanoseconds since 1970-01-01 (negative before). Used at the edges only.
+/// A UTC timestamp, in nanoseconds since 1970-01-01 (negative before). Used at the edges only.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize)]
 pub struct UtcNs(pub i64);
 
-/// A signed span of time in nanoseconds.
+/// A signed duration in nanoseconds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize)]
 pub struct DurNs(pub i64);
 
 impl DurNs {
-    /// No time at all.
+    /// Zero duration.
     pub const ZERO: Self = Self(0);
 
     /// Whole milliseconds; saturates beyond 292 years.
@@ -39,20 +39,20 @@ impl DurNs {
         Self(libm::rint(seconds * NS_PER_S) as i64)
     }
 
-    /// This span in seconds. The one place where time becomes a float: at a model's edge.
+    /// Duration in seconds, for use at a model's interface; elsewhere durations stay integers.
     pub fn as_secs_f64(self) -> f64 {
         self.0 as f64 / NS_PER_S
     }
 }
 
 impl MonoNs {
-    /// The signed span from `earlier` to `self`; saturates beyond 292 years.
+    /// Signed duration from `earlier` to `self`; saturates beyond 292 years.
     pub fn since(self, earlier: Self) -> DurNs {
         let span = i128::from(self.0) - i128::from(earlier.0);
         DurNs(i64::try_from(span).unwrap_or(if span < 0 { i64::MIN } else { i64::MAX }))
     }
 
-    /// This moment in seconds since the clock's origin; for reports, never for differences.
+    /// Timestamp in seconds since the clock's origin; for reports, never for differences.
     pub fn as_secs_f64(self) -> f64 {
         self.0 as f64 / NS_PER_S
     }
@@ -61,7 +61,7 @@ impl MonoNs {
 impl Add<DurNs> for MonoNs {
     type Output = Self;
 
-    /// Saturates at the clock's origin and at its end.
+    /// Saturates at both ends of the clock's range.
     fn add(self, span: DurNs) -> Self {
         Self(self.0.saturating_add_signed(span.0))
     }

@@ -1,4 +1,4 @@
-//! How fast one may go, from what is measured now, and what else one could do.
+//! Speed advice from the current measurements, and alternatives.
 
 mod answer;
 mod hysteresis;
@@ -22,74 +22,74 @@ use ring_cache::{AdvisedHead, RING};
 pub use answer::{Advice, Alternative, Left, ModeName, Reason, Remedy};
 pub use hysteresis::Hysteresis;
 
-/// Share of the speed kept back for the error of its measurement.
+/// Share of the speed held back for the error of its measurement.
 pub const SPEED_MARGIN: f64 = 0.01;
-/// The most modes of a head that alternatives are given for.
+/// Maximum number of modes per head with alternatives.
 pub const MAX_MODES: usize = 8;
 
-/// Alternatives are thought over anew every so many pieces of advice.
+/// Advice updates per recomputation of the alternatives.
 const ALTERNATIVES_EVERY: u32 = 25;
-/// Slower than this, m/s, a vehicle goes the way it went before.
+/// Below this speed, m/s, the last direction of travel is kept.
 const UNDER_WAY_MPS: f64 = 0.02;
-/// Stretches of wall out of a head's reach that there is room for.
+/// Capacity for stretches of wall out of a head's reach.
 const OUT_OF_REACH: usize = 16;
 
-/// The largest speed for a target that was found.
+/// The largest speed found for a target.
 struct Fastest {
     /// The speed, m/s.
     speed_mps: f64,
-    /// What is advised of it, m/s.
+    /// The advised speed, with the margin taken off, m/s.
     advised_mps: f64,
-    /// T_y where it is the largest, m.
+    /// T_y where it limits the speed, m.
     t_y_m: f64,
 }
 
-/// What the advice is given for.
+/// The inspection task that the advice is given for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Task {
     /// Target T, m.
     pub target_m: f64,
     /// Length of the tunnel, m.
     pub length_m: f64,
-    /// How the heads share the work.
+    /// Layout of the heads.
     pub layout: HeadLayout,
     /// Speed of sound in the tunnel's water, m/s.
     pub sound_speed_mps: f64,
 }
 
-/// Gives advice; remembers the beams of heads that keep their place in the section.
+/// Computes speed advice; caches the rings of the heads until the vehicle has moved.
 #[derive(Debug, Clone)]
 pub struct Advisor {
     profile: Profile,
     task: Task,
     heads: Vec<AdvisedHead>,
     views: Vec<View>,
-    /// The wall as the heads are set now, and in each of their modes.
+    /// Strips of the wall with the heads as set now, and in each of their modes.
     now: Strips,
     modes: Strips,
-    /// The largest steps in each mode in the middle of the tunnel, m.
+    /// Largest step in each mode at the centre of the tunnel, m.
     centred_m: Vec<f64>,
-    /// What each head sees from there.
+    /// Ring of each head there.
     middle: Vec<Ring>,
     parallax_rad: f64,
-    /// How many soundings of its ring the step of each head that turns passes over.
+    /// Ring stride of one step of each head that turns.
     strides: [Option<usize>; MAX_HEADS],
-    /// The head whose ring is looked at first.
+    /// The head whose ring is checked first.
     next: usize,
-    /// Pieces of advice until alternatives are thought over, and what they were.
+    /// Advice updates until the alternatives are recomputed, and the current alternatives.
     until_alternatives: u32,
     alternatives: [Option<Alternative>; MAX_MODES],
     astern: bool,
-    /// The largest speed found last: where it still does, no other is looked for.
+    /// The largest speed found last: kept as a start of the next search while it meets the target.
     last_mps: Option<f64>,
-    /// How far the vehicle may move before beams are cast anew, m.
+    /// How far the vehicle may move before rings are recast, m.
     still_m: f64,
 }
 
 stateful!(Advisor { state: now, parallax_rad, next, until_alternatives, alternatives, astern, last_mps, still_m; slots: strides; each: heads, views; fixed: profile, task, modes, centred_m, middle; });
 
 impl Advisor {
-    /// For heads with the modes that each has, and the parts of the hull that may stand in their way.
+    /// For heads with their modes, and the parts of the hull that may occlude them.
     ///
     /// Allocates: startup only.
     pub fn new(
@@ -140,7 +140,7 @@ impl Advisor {
         advisor
     }
 
-    /// Casting once makes the room that later casts use; a head that is outside there has nothing to remember.
+    /// A first cast allocates the buffers that later casts use; the rings are then marked as outdated.
     fn look_from_the_middle(&mut self) {
         let [y, z] = self.profile.reference();
         let centre = Pose { position: Point3::new(0.0, y, z), attitude: Rot::identity() };
@@ -158,17 +158,17 @@ impl Advisor {
         }
     }
 
-    /// The angles that the vehicle hides from each head, in the heads' own frames.
+    /// The angles that the vehicle hides from each head, in its sensor frame.
     pub fn hidden_angles(&self) -> impl Iterator<Item = &[AngleRange]> {
         self.heads.iter().map(|head| head.hidden.as_slice())
     }
 
-    /// Soundings of a ring that a step passes over: steps of as many are alike to [`Advisor::middle_step_m`].
+    /// Ring stride of a step: steps of equal stride have the same [`Advisor::middle_step_m`].
     pub fn stride(step_rad: f64) -> usize {
         Ring::stride(step_rad, RING)
     }
 
-    /// The largest distance along the wall of two pings `step_rad` apart, from the middle of the tunnel, level, m.
+    /// The largest distance along the wall between two pings `step_rad` apart, from the tunnel's centre, level, m.
     ///
     /// Allocates: never.
     pub fn middle_step_m(&self, step_rad: f64) -> f64 {
@@ -180,13 +180,13 @@ impl Advisor {
         self.middle.iter().map(largest_m).fold(0.0, f64::max)
     }
 
-    /// The largest speed at which the predicted T_max stays within the target, by inverting Eq. 16 with what is
-    /// measured: turn period, step, number and phases of the heads as they would meet the wall at that speed, what
-    /// the vehicle hides from them or is out of their reach, its place and attitude, and how it swings. `left_s` is the
-    /// time that is left, where it is known.
+    /// The largest speed at which the predicted T_max stays within the target, by inverting Eq. 16 with measured
+    /// values: turn period, step, number and phases of the heads (propagated to that speed), the wall hidden by the
+    /// vehicle or out of reach, position, attitude and swing. `left_s` is the remaining time, if known.
     ///
-    /// Heads apart along the hull keep their phases at some speeds only: the largest is the end of the stretch of speeds
-    /// in which the vehicle goes now, if that meets the target; else of the stretch advised last, else of any.
+    /// Heads apart along the hull keep their phases in some intervals of speed only: the result is the upper end of the
+    /// interval that contains the present speed, if that meets the target; else of the one that contains the last
+    /// result, else of any.
     /// Source: metrics.md, "Speed advice".
     /// Allocates: never.
     pub fn advise(&mut self, situation: &Situation, swing: Swing, left_s: Option<f64>) -> Advice {
@@ -212,7 +212,7 @@ impl Advisor {
             apart_m: phasing.apart_m(),
             swing_most_m: Some(swing.most_rad * farthest_m),
         };
-        // What is just within the target, but not surely, can't pass; where no speed leaves such room, the target alone counts.
+        // Keeps a margin for errors of position; where no speed leaves one, the target itself is used.
         let sure_m = self.task.target_m - margin_m(situation.pass_error_m, self.task.target_m);
         let fastest = self
             .fastest_mps(situation, &passes, &going, sure_m)
@@ -250,10 +250,10 @@ impl Advisor {
         }
     }
 
-    /// Looks at the wall from where the vehicle is; `false` when no head that turns can.
+    /// Updates the heads' rings for the vehicle's pose; `false` when no head that turns has a ring.
     ///
-    /// A head's beams are cast anew when the vehicle has moved; of several whose beams are old, one a call, since a
-    /// vehicle doesn't move far between two.
+    /// A head's ring is recast when the vehicle has moved. Of several outdated rings, one is recast per call, since the
+    /// vehicle moves little between calls.
     fn look(&mut self, situation: &Situation, pose: &Pose) -> bool {
         let count = self.heads.len().max(1);
         let present = |number: usize| situation.heads.get(number).is_some_and(Option::is_some);
@@ -292,7 +292,7 @@ impl Advisor {
         }
         self.parallax_rad = passes::parallax_rad(&self.profile, places.get(..known).unwrap_or_default());
         self.now.rebuild(self.profile.perimeter_m(), &self.views);
-        // Most heads' rings are those of the last piece of advice.
+        // Most rings are unchanged since the last advice.
         for (head, stride) in self.heads.iter_mut().zip(self.strides) {
             if let Some(stride) = stride {
                 head.ring.keep_steps(stride);
@@ -302,9 +302,9 @@ impl Advisor {
         self.now.measure(1, rings, |_, head| self.strides.get(head).copied().flatten());
     }
 
-    /// The largest speed at which the phases measured now meet a target, and what to advise of it.
+    /// The largest speed at which the phases measured now meet a target, and the speed to advise.
     ///
-    /// Errors: no speed would.
+    /// Errors: no speed meets it.
     fn fastest_mps(
         &self,
         situation: &Situation,
@@ -312,14 +312,14 @@ impl Advisor {
         going: &Going,
         target_m: f64,
     ) -> Result<Fastest, SamplingError> {
-        // However the heads were phased, no speed beyond this one would do.
+        // Upper bound for any phasing of the heads.
         let bound_mps = target_m / (passes.even_gap_s() + going.ping_period_s);
         let t_y_m = self.now.bound_for_target(0, passes, target_m, going)?.t_y_m;
         let heading = if self.astern { -1.0 } else { 1.0 };
         let phasing = Phasing::of(situation);
         let meets = |speed_mps: f64| {
             let then = phasing.at(heading * speed_mps).beside(self.parallax_rad);
-            // No strip has more passes than all heads make: most speeds are ruled out by these alone.
+            // No strip has more passes than all heads make: this test alone rules out most speeds.
             let gap_s = then.gap_s(then.heads()).unwrap_or(f64::INFINITY);
             speed_mps * gap_s <= target_m && self.now.meets(0, &then, speed_mps, target_m, going)
         };
@@ -334,19 +334,20 @@ impl Advisor {
         Ok(Fastest { speed_mps, advised_mps, t_y_m })
     }
 
-    /// How far the vehicle may move before beams are cast anew, m.
+    /// How far the vehicle may move before rings are recast, m.
     fn still_m_for(&self, fastest: &Result<Fastest, SamplingError>, going: &Going) -> f64 {
         let (t_y_m, swing_share) = match fastest {
             Ok(fastest) => (fastest.t_y_m, going.swing_mps / fastest.speed_mps.max(UNDER_WAY_MPS)),
-            // A swing too wide for any speed is so from a bit aside, too.
+            // A swing too wide for any speed is also too wide from slightly aside.
             Err(SamplingError::OffAxis { .. }) => (self.now.largest_step_m(0), 0.0),
-            // Any step may be what stands in the way.
+            // Any step may be the limiting one.
             Err(_) => (self.task.target_m, 0.0),
         };
         ring_cache::still_m(self.task.target_m, t_y_m, self.profile.perimeter_m() / math::TAU, swing_share)
     }
 
-    /// Thinks over what each mode that all heads have would allow, those that turn now started in phase.
+    /// Computes the speed that each mode common to all heads would allow, with the heads that turn now started in
+    /// phase.
     fn think_over(&mut self, passes: &Passes, going: &Going) {
         if let Some(left) = self.until_alternatives.checked_sub(1) {
             self.until_alternatives = left;
@@ -375,7 +376,7 @@ impl Advisor {
         });
     }
 
-    /// The largest speed in a mode, zero where none is; `None` when a head doesn't have it.
+    /// The largest speed in a mode, zero where none meets the target; `None` when a head lacks the mode.
     fn mode_speed_mps(&self, number: usize, heads: HeadSet, going: &Going) -> Option<f64> {
         let name = self.heads.first()?.modes.get(number)?.name;
         let turn = |head: usize| self.heads.get(head)?.mode(name).map(|mode| mode.turn);
@@ -385,7 +386,7 @@ impl Advisor {
             ping_period_s = ping_period_s.max(turn(head)?.ping_period_s());
         }
         let passes = match self.task.layout {
-            // Sectors stay as large as they are, however many heads are left.
+            // Sectors keep their size, however many heads are left.
             HeadLayout::SectorOffset => {
                 Passes::in_sectors(heads, 2.0 * longest_s / self.heads.len().max(1) as f64)
             }
@@ -399,8 +400,8 @@ impl Advisor {
         Some(bound.map_or(0.0, |bound| bound.speed_mps))
     }
 
-    /// What would help: a steady heading, where that alone would; the middle, where the same steps are short enough
-    /// there; or the mode that is fastest.
+    /// The remedy: a steady heading, where that alone is enough; the centre, where the same steps are short enough
+    /// there; or the fastest mode.
     fn remedy(&self, situation: &Situation, passes: &Passes, going: &Going, unseen: bool) -> Option<Remedy> {
         let target_m = self.task.target_m;
         let steady = Going { ping_period_s: going.ping_period_s, ..Going::default() };
@@ -422,10 +423,10 @@ impl Advisor {
     }
 }
 
-/// What of the target is left to errors of position, m: two standard deviations, as a verdict of pass wants; a fifth of the
-/// target at most, since no speed makes up for a lost position.
+/// Part of the target reserved for errors of position, m: two standard deviations, as for a verdict of pass; at most a
+/// fifth of the target, since no speed makes up for a lost position.
 fn margin_m(pass_error_m: f64, target_m: f64) -> f64 {
-    /// Less is nothing: a navigation that doesn't know its errors says so much.
+    /// Error that needs no margin, m: about what a navigation without error estimates reports.
     const NOTHING_M: f64 = 0.002;
     (2.0 * (pass_error_m - NOTHING_M).max(0.0)).min(target_m / 5.0)
 }

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// The most heads of one vehicle.
+/// Maximum number of heads of a vehicle.
 pub const MAX_HEADS: usize = 8;
 
 /// A set of heads by their numbers.
@@ -15,7 +15,7 @@ impl HeadSet {
         (0..count).fold(Self::default(), Self::with)
     }
 
-    /// This set and one more head; numbers from [`MAX_HEADS`] up are left out.
+    /// This set plus one head; numbers from [`MAX_HEADS`] up are ignored.
     #[must_use]
     pub fn with(self, head: usize) -> Self {
         Self(self.0 | Self::bit(head))
@@ -27,22 +27,22 @@ impl HeadSet {
         Self(self.0 & !Self::bit(head))
     }
 
-    /// Whether a head is of it.
+    /// Whether the set contains a head.
     pub fn has(self, head: usize) -> bool {
         self.0 & Self::bit(head) != 0
     }
 
-    /// How many heads it has.
+    /// Number of heads.
     pub fn len(self) -> usize {
         self.0.count_ones() as usize
     }
 
-    /// Whether it has none.
+    /// Whether the set is empty.
     pub fn is_empty(self) -> bool {
         self.0 == 0
     }
 
-    /// The heads' numbers, growing.
+    /// Head numbers in ascending order.
     pub fn iter(self) -> impl Iterator<Item = usize> {
         (0..MAX_HEADS).filter(move |head| self.has(*head))
     }

@@ -1,8 +1,8 @@
-//! Sampling theory: the spacing of samples on the wall, layouts of several heads, and how fast one may go.
+//! Sampling theory: spacing of samples on the wall, layouts of several heads, and the largest speed for a target.
 //!
-//! `section` and `spacing` have the paper's closed forms; `ring` is the general case beside them. `layout` and `schedule`
-//! say what several heads do, `passes` what comes of it, `swing` how
-//! the vehicle's own turning adds to that. `advice` puts them together for the pilot, `plan` for the engineer.
+//! `section` and `spacing` hold the paper's closed forms; `ring` is the general case. `layout` and `schedule` define
+//! how several heads turn, `passes` gives the times between their passes, `swing` the effect of the vehicle's rotation.
+//! `advice` combines them for the pilot, `plan` for the engineer.
 
 #![cfg_attr(not(test), warn(clippy::cast_possible_truncation))]
 #![cfg_attr(test, allow(clippy::cast_possible_truncation))]

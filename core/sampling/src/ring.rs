@@ -1,5 +1,5 @@
-//! The general case: where the beams of a head that stands still meet the wall of any profile, from any place and in
-//! any attitude, by ray casting.
+//! The general case by ray casting: where the beams of a head at rest meet the wall of any profile, from any position
+//! and attitude.
 
 use serde::{Deserialize, Serialize};
 
@@ -9,10 +9,10 @@ use headrace_geometry::math::{self, TAU};
 use headrace_geometry::tunnel::{Profile, WallHit};
 use headrace_snapshot::stateful;
 
-/// A beam that needs more than this to the wall runs along the tunnel, m.
+/// A beam with a longer range than this runs along the tunnel, m.
 const ALONG_M: f64 = 1000.0;
 
-/// A head that stands still in a straight tunnel.
+/// A head at rest in a straight tunnel.
 #[derive(Debug, Clone, Copy)]
 pub struct Standing<'a> {
     profile: &'a Profile,
@@ -25,20 +25,20 @@ pub struct Standing<'a> {
 pub struct Sounding {
     /// Head angle, radians in the sensor's frame.
     pub angle_rad: f64,
-    /// Way from the head to the wall: chainage gained, left, up, m. Its length is the range.
+    /// Vector from the head to the wall: chainage, left, up, m. Its length is the range.
     pub beam: Vec3<Tunnel>,
-    /// Arc length of the place on the wall, m.
+    /// Arc length of the point on the wall, m.
     pub arc_m: f64,
-    /// Cosine of the angle between beam and wall's normal: 1 where the beam meets the wall squarely.
+    /// Cosine of the angle of incidence: 1 at perpendicular incidence.
     pub squareness: f64,
 }
 
-/// The patch of wall that a beam of some width covers.
+/// Footprint of a beam on the wall.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Footprint {
-    /// Its extent in the plane in which the head turns, measured on the unrolled wall, m.
+    /// Extent in the head's scan plane, along the unrolled wall, m.
     pub in_plane_m: f64,
-    /// Its extent across that plane, m.
+    /// Extent across that plane, m.
     pub across_m: f64,
 }
 
@@ -59,14 +59,14 @@ impl<'a> Standing<'a> {
         self.profile.perimeter_m()
     }
 
-    /// Where the beam at `angle_rad` (the sensor's frame) meets the wall.
+    /// Where the beam at `angle_rad` (sensor frame) meets the wall.
     ///
-    /// Errors: a beam that meets no wall within a kilometre.
+    /// Errors: no wall within a kilometre along the beam.
     pub fn sounding(&self, angle_rad: f64) -> Result<Sounding, SamplingError> {
         self.sounding_along(angle_rad, head_direction(angle_rad))
     }
 
-    /// The same, the angle's direction being known.
+    /// As [`Standing::sounding`], with the direction of the beam already computed.
     fn sounding_along(&self, angle_rad: f64, beam: Vec3<Sensor>) -> Result<Sounding, SamplingError> {
         let direction = self.turn * beam;
         let hit = self.hit(direction);
@@ -75,11 +75,11 @@ impl<'a> Standing<'a> {
         Ok(Sounding { angle_rad, beam: direction.scaled(hit.range_m), arc_m: hit.arc_m, squareness })
     }
 
-    /// The patch that a beam of full width `beam_rad` covers about `angle_rad`.
+    /// Footprint of a beam of full width `beam_rad` about `angle_rad`.
     ///
-    /// In the plane of turning, from the beam's one edge to the other along the unrolled wall; across it, between the
-    /// edges tilted forwards and back.
-    /// Errors: as for [`Standing::sounding`], of each edge; a width that isn't above zero.
+    /// In the scan plane, from one edge of the beam to the other along the unrolled wall; across it, between the edges
+    /// tilted ahead and astern.
+    /// Errors: as for [`Standing::sounding`], for each edge; a width that isn't above zero.
     /// Source: Jorge et al. 2021, §9.2 and Fig. 15, for any wall.
     pub fn footprint(&self, angle_rad: f64, beam_rad: f64) -> Result<Footprint, SamplingError> {
         positive("the beam's width in radians", beam_rad)?;
@@ -113,30 +113,30 @@ impl Sounding {
         self.beam.norm()
     }
 
-    /// Distance to another sounding of the same head on the unrolled wall, the short way round, m: what holes are
-    /// measured by.
+    /// Distance to another sounding of the same head on the unrolled wall, the shortest way round, m: the measure for
+    /// holidays.
     pub fn step_m(&self, other: &Self, perimeter_m: f64) -> f64 {
         let around_m = math::wrap_signed(other.arc_m - self.arc_m, perimeter_m);
         math::hypot(other.beam.x() - self.beam.x(), around_m)
     }
 
-    /// Distance to another sounding of the same head straight through the water, m: the paper's T_y.
+    /// Straight-line distance to another sounding of the same head, m: the paper's T_y.
     pub fn chord_m(&self, other: &Self) -> f64 {
         (other.beam + -self.beam).norm()
     }
 }
 
-/// The soundings of a whole turn at equal angles; room that can be used again.
+/// Soundings of a whole turn at equal angles; its buffers are reused.
 #[derive(Debug, Clone, Default)]
 pub struct Ring {
     soundings: Vec<Sounding>,
-    /// Way along the perimeter from the first sounding to each, m, and at last all the way round; negative where the
-    /// head turns against arc length.
+    /// Signed arc length from the first sounding to each, m, and last that of the whole turn; negative where the head
+    /// turns against arc length.
     way_m: Vec<f64>,
     perimeter_m: f64,
-    /// The angles of the soundings and their directions, which stay from cast to cast.
+    /// Angles and beam directions of the soundings, kept from cast to cast.
     beams: Vec<(f64, Vec3<Sensor>)>,
-    /// Distances between soundings so many apart, of the last cast; none while it is zero.
+    /// Stride of the distances cached in `steps_m`; zero if there are none.
     stride: usize,
     steps_m: Vec<f64>,
 }
@@ -153,7 +153,7 @@ impl Ring {
         Ok(ring)
     }
 
-    /// Casts anew in place; without soundings after an error.
+    /// Recasts in place; without soundings after an error.
     ///
     /// Errors: as for [`Ring::cast`].
     /// Allocates: not when the ring has had as many soundings before.
@@ -184,13 +184,13 @@ impl Ring {
             way_m += math::wrap_signed(b.arc_m - a.arc_m, self.perimeter_m);
         }
         self.way_m.push(way_m);
-        // Room for what `keep_steps` may be asked for later, when nothing may allocate.
+        // Capacity for `keep_steps`, which must not allocate.
         self.steps_m.clear();
         self.steps_m.reserve(self.soundings.len());
         Ok(())
     }
 
-    /// Notes the directions of a turn's beams, unless they are those of the last.
+    /// Computes the beam directions of a turn, unless they are those of the last cast.
     fn aim(&mut self, start_rad: f64, count: u32) {
         let from_rad = self.beams.first().map(|(angle_rad, _)| angle_rad.to_bits());
         if self.beams.len() == count as usize && from_rad == Some((start_rad + 0.0).to_bits()) {
@@ -201,7 +201,7 @@ impl Ring {
         self.beams.extend((0..count).map(angle_rad).map(|angle_rad| (angle_rad, head_direction(angle_rad))));
     }
 
-    /// Measures the distances between soundings `stride` apart once, for as long as the ring stays as it is.
+    /// Caches the distances between soundings `stride` apart until the next cast.
     ///
     /// Allocates: not when the ring has had as many soundings before.
     pub fn keep_steps(&mut self, stride: usize) {
@@ -213,12 +213,12 @@ impl Ring {
         }
     }
 
-    /// The distances of [`Ring::keep_steps`]; `None` where they are those of another stride.
+    /// The distances cached by [`Ring::keep_steps`]; `None` for another stride.
     pub fn kept_steps_m(&self, stride: usize) -> Option<&[f64]> {
         (self.stride == stride).then_some(self.steps_m.as_slice())
     }
 
-    /// How many of `count` soundings a step passes over, rounded up; at least one.
+    /// Soundings per step, of `count` in a turn, rounded up; at least one.
     pub fn stride(step_rad: f64, count: u32) -> usize {
         let soundings = -math::floor_to_i64(-(step_rad * f64::from(count) / TAU - 1e-6));
         usize::try_from(soundings.clamp(1, i64::from(count.max(1)))).unwrap_or(1)
@@ -229,7 +229,7 @@ impl Ring {
         self.perimeter_m
     }
 
-    /// The way all round the perimeter as the head turns, m: below zero where that is against arc length.
+    /// Signed arc length of a whole turn, m: negative where the head turns against arc length.
     pub fn way_round_m(&self) -> f64 {
         self.way_m.last().copied().unwrap_or(0.0)
     }
@@ -239,22 +239,23 @@ impl Ring {
         &self.soundings
     }
 
-    /// Pairs of soundings `stride` apart, the turn closed: what a head lays that pings at every `stride`-th.
+    /// Pairs of soundings `stride` apart, closing the turn: neighbours of a head that pings at every `stride`-th
+    /// sounding.
     pub fn pairs(&self, stride: usize) -> impl Iterator<Item = (&Sounding, &Sounding)> {
         let count = self.soundings.len().max(1);
         self.soundings.iter().zip(self.soundings.iter().cycle().skip(stride % count))
     }
 
-    /// T_y2 in general, m: the largest distance on the unrolled wall between soundings `stride` apart, wherever in the
-    /// turn the first ping falls; zero without soundings.
+    /// T_y2 in general, m: the largest distance on the unrolled wall between soundings `stride` apart, for any angle of
+    /// the first ping; zero without soundings.
     ///
     /// Source: Eq. 6 where the paper's assumptions hold.
     pub fn largest_step_m(&self, stride: usize) -> f64 {
         self.steps_m(stride).fold(0.0, f64::max)
     }
 
-    /// Distances on the unrolled wall from each sounding to the one `stride` further, m, the way that the head turns:
-    /// a head that pings once a turn has the whole perimeter between its pings.
+    /// Distances on the unrolled wall from each sounding to the one `stride` further, m, in the direction of rotation:
+    /// with one ping per turn, the whole perimeter.
     pub fn steps_m(&self, stride: usize) -> impl Iterator<Item = f64> {
         let count = self.soundings.len().max(1);
         let whole_m = self.way_round_m();
@@ -263,7 +264,7 @@ impl Ring {
         self.pairs(stride).enumerate().map(move |(k, (a, b))| {
             let (to, turns) =
                 if k + rest < count { (k + rest, turns) } else { (k + rest - count, turns + 1) };
-            // The soundings' own difference keeps its digits; the way says how often it goes round, mostly not at all.
+            // The direct difference keeps its digits; the cumulative length gives the number of rounds, mostly zero.
             let short_m = math::wrap_signed(b.arc_m - a.arc_m, self.perimeter_m);
             let round_m = way_m(to) + whole_m * turns as f64 - way_m(k) - short_m;
             let rounds = if round_m.abs() < 0.4 * self.perimeter_m {

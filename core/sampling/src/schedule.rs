@@ -1,4 +1,4 @@
-//! The angle that each head of a vehicle should have at any time.
+//! The scheduled angle of each head over time.
 
 use super::error::SamplingError;
 use super::head::{HeadProgram, HeadSpec};
@@ -6,8 +6,8 @@ use super::layout::{self, HeadLayout, steps_over};
 use headrace_geometry::math;
 use headrace_geometry::time::DurNs;
 
-/// Programs for real heads and where they lead: heads step, ping where they are, and turn round at a sector's ends,
-/// the step before an end being shorter where the sector isn't a whole number of them.
+/// Programs of real heads and the resulting angles: heads step, ping at each step, and reverse at a sector's ends, the
+/// last step being shorter where the sector isn't a whole number of steps.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Schedule {
     heads: Vec<(HeadSpec, HeadProgram)>,
@@ -22,13 +22,13 @@ impl Schedule {
         Ok(Self { heads: heads.iter().copied().zip(programs).collect() })
     }
 
-    /// What each head is told to do, in their order.
+    /// Program of each head, in order.
     pub fn programs(&self) -> impl Iterator<Item = &HeadProgram> {
         self.heads.iter().map(|(_, program)| program)
     }
 
-    /// Angle of a head at its last ping up to `since` the start, in the sensor's frame, radians in [0, 2 pi) of a turn
-    /// or within its sector; `None` for a head that isn't there, or before the start.
+    /// Angle of a head at its last ping up to `since` the start, sensor frame, radians: in [0, 2 pi) for continuous
+    /// rotation, or within its sector; `None` for a head that doesn't exist, or before the start.
     pub fn angle_rad(&self, head: usize, since: DurNs) -> Option<f64> {
         let (spec, program) = self.heads.get(head)?;
         let since = (since >= DurNs::ZERO).then_some(since)?;
@@ -42,7 +42,7 @@ impl Schedule {
         })
     }
 
-    /// Time of one sweep there and back of the heads in sectors, seconds: the longest, or `None` when they turn on.
+    /// Period of a sweep there and back of the heads in sectors, seconds: the longest, or `None` without sectors.
     pub fn sweep_s(&self) -> Option<f64> {
         let sweep = |(spec, program): &(HeadSpec, HeadProgram)| {
             let (_, size_rad) = program.sector?;

@@ -1,13 +1,13 @@
-//! The paper's equations for one cross-section: a head that stands still and turns.
+//! The paper's equations for one cross-section: a rotating head on a vehicle at rest.
 //!
-//! The paper writes them for a head midway between floor and crown of a tunnel b high. They hold for any flat wall, or
-//! any circular one, and here take the distance to it: h = b / 2 for the paper's case. Angles count from the
+//! The paper writes them for a head midway between floor and crown of a tunnel of height b. They hold for any flat or
+//! circular wall and here take the distance to it: h = b / 2 in the paper's case. Angles are measured from the
 //! perpendicular to the flat wall.
 
 use super::error::{SamplingError, not_negative, positive};
 use headrace_geometry::math;
 
-/// T_y1, m: the step along a flat wall at the foot of the perpendicular, the smallest there is on it.
+/// T_y1, m: the step along a flat wall at the foot of the perpendicular, the smallest on that wall.
 ///
 /// `distance_m` > 0 is the distance h to the wall, `step_rad` the step theta, in (0, pi/2).
 /// Errors: an argument out of range; a step of 90 degrees or more.
@@ -19,9 +19,9 @@ pub fn t_y1_m(distance_m: f64, step_rad: f64) -> Result<f64, SamplingError> {
 /// T_y2, m: the step along a flat wall from (m - 1) theta to m theta, for any m >= 1; the largest where m theta meets
 /// the corner.
 ///
-/// `distance_m` > 0 is the distance h to the wall. h (tan(m theta) - tan((m - 1) theta)) is computed as
-/// h sin(theta) / (cos(m theta) cos((m - 1) theta)), which loses no digits, with multiples of theta kept to twice a
-/// double's precision, so that a beam almost along the wall keeps its digits as well.
+/// `distance_m` > 0 is the distance h to the wall. h (tan(m theta) - tan((m - 1) theta)) is computed as h sin(theta) /
+/// (cos(m theta) cos((m - 1) theta)), which avoids cancellation. Multiples of theta are kept to twice double precision,
+/// so that a beam almost along the wall keeps its digits as well.
 /// Errors: an argument out of range; m theta of 90 degrees or more.
 /// Source: Jorge et al. 2021, Eq. 6.
 pub fn t_y2_m(distance_m: f64, step_rad: f64, m: u32) -> Result<f64, SamplingError> {
@@ -32,9 +32,9 @@ pub fn t_y2_m(distance_m: f64, step_rad: f64, m: u32) -> Result<f64, SamplingErr
     Ok(distance_m * math::sin(step_rad) / (cosine * cos_of_multiple(m - 1, step_rad)?))
 }
 
-/// T_c, m: the step along a circular wall from its centre, the same everywhere on it.
+/// T_c, m: the step along a circular wall for a head at its centre, the same everywhere on it.
 ///
-/// `radius_m` > 0 is b / 2 of the paper; `step_rad` > 0 the step theta. A chord, straight from sample to sample.
+/// `radius_m` > 0 is the paper's b / 2; `step_rad` > 0 the step theta. The chord from sample to sample.
 /// Errors: an argument out of range.
 /// Source: Jorge et al. 2021, Eq. 7 (b sin(theta / 2)).
 pub fn t_c_m(radius_m: f64, step_rad: f64) -> Result<f64, SamplingError> {
@@ -55,7 +55,7 @@ pub fn t_y2_mean_m(distance_m: f64, step_rad: f64, m: u32) -> Result<f64, Sampli
     Ok(distance_m * sine / cosine / f64::from(m))
 }
 
-/// T_yp, m: what the mean step of a whole turn is at most, wherever the head is: perimeter by pings of a turn.
+/// T_yp, m: upper bound of the mean step of a whole turn, for any head position: perimeter / pings per turn.
 ///
 /// Errors: a perimeter or a number that isn't above zero.
 /// Source: Jorge et al. 2021, Eq. 10.
@@ -63,7 +63,7 @@ pub fn t_yp_m(perimeter_m: f64, steps: u32) -> Result<f64, SamplingError> {
     Ok(positive("the perimeter in metres", perimeter_m)? / positive("the steps of a turn", f64::from(steps))?)
 }
 
-/// epsilon: how far the beams of neighbouring pings overlap; below 1 they don't.
+/// epsilon: overlap of the beams of neighbouring pings (beam width / step); below 1 they don't overlap.
 ///
 /// `beam_rad` is the beam's full width zeta, `step_rad` the step theta.
 /// Errors: an argument that isn't above zero.
@@ -72,9 +72,9 @@ pub fn overlap(beam_rad: f64, step_rad: f64) -> Result<f64, SamplingError> {
     Ok(positive("the beam's width in radians", beam_rad)? / positive("the step in radians", step_rad)?)
 }
 
-/// eta, m: the smallest difference of range that a head can tell, from its range setting and the counts it has for it.
+/// eta, m: range resolution of a head: its span of ranges over the number of counts.
 ///
-/// Errors: no counts, a negative least range, or a range of nothing.
+/// Errors: no counts, a negative least range, or an empty span of ranges.
 /// Source: Jorge et al. 2021, §6.
 pub fn range_resolution_m(least_m: f64, most_m: f64, counts: u32) -> Result<f64, SamplingError> {
     not_negative("the least range in metres", least_m)?;
@@ -82,7 +82,7 @@ pub fn range_resolution_m(least_m: f64, most_m: f64, counts: u32) -> Result<f64,
     Ok(span / positive("the number of counts", f64::from(counts))?)
 }
 
-/// Width of a beam where it meets a wall squarely at `range_m`, m.
+/// Width of a beam at perpendicular incidence on a wall at `range_m`, m.
 ///
 /// `beam_rad` is the full width, in (0, pi).
 /// Errors: an argument out of range.
@@ -94,7 +94,7 @@ pub fn beam_width_m(range_m: f64, beam_rad: f64) -> Result<f64, SamplingError> {
     Ok(2.0 * range_m * math::sin(beam_rad / 2.0) / cosine)
 }
 
-/// Length of a beam's footprint on a flat wall, in the plane in which the head turns, m.
+/// Length of a beam's footprint on a flat wall, in the head's scan plane, m.
 ///
 /// `distance_m` is the perpendicular distance to the wall, `angle_rad` the beam's angle from the perpendicular (either
 /// side), `beam_rad` its full width.
@@ -122,7 +122,7 @@ fn sin_of_multiple(m: u32, x_rad: f64) -> f64 {
 /// cos(a + b) for |a + b| < pi/2.
 fn cos_of_sum(a_rad: f64, b_rad: f64) -> Result<f64, SamplingError> {
     let high = a_rad + b_rad;
-    // What the rounding of the sum left out (Knuth's two-sum).
+    // Rounding error of the sum (Knuth's two-sum).
     let b_part = high - a_rad;
     let low = (a_rad - (high - b_part)) + (b_rad - b_part);
     above_zero(high, math::cos(high) - math::sin(high) * low)
@@ -133,7 +133,7 @@ fn above_zero(angle_rad: f64, cosine: f64) -> Result<f64, SamplingError> {
     meets.then_some(cosine).ok_or(SamplingError::BeamMissesWall { angle_deg: angle_rad.to_degrees() })
 }
 
-/// a b as a double and what its rounding left out (Dekker's product).
+/// a b as a double, and its rounding error (Dekker's product).
 fn product(a: f64, b: f64) -> (f64, f64) {
     const SPLIT: f64 = 134_217_729.0;
     let halves = |x: f64| {
@@ -204,13 +204,13 @@ mod tests {
             prop_assert!(t_y2_m(h, step, m).unwrap() < t_y2_m(h, step, m + 1).unwrap());
         }
 
-        /// T_c < T_y1: a circular crown is sampled more closely than a floor at the same distance.
+        /// T_c < T_y1: a circular crown is sampled more densely than a floor at the same distance.
         #[test]
         fn verif_the_crown_is_closer_than_the_floor(h in 0.01..100.0f64, step in 1e-3..1.5f64) {
             prop_assert!(t_c_m(h, step).unwrap() < t_y1_m(h, step).unwrap());
         }
 
-        /// Eq. 8's mean is that of its terms, and lies between the first and the last.
+        /// The mean of Eq. 8 equals the mean of its terms.
         #[test]
         fn verif_the_mean_of_the_steps(h in 0.01..100.0f64, step in 1e-3..0.3f64) {
             let m = u32::try_from(headrace_geometry::math::floor_to_i64(FRAC_PI_2 / step) - 1).unwrap_or(0);

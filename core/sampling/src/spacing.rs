@@ -1,20 +1,20 @@
-//! The paper's equations for a head that turns while it is carried along: the spacing of its samples.
+//! The paper's equations for a rotating head on a moving vehicle: the spacing of its samples.
 
 use super::error::{SamplingError, not_negative, positive};
 use super::head::Turn;
 use headrace_geometry::math;
 
-/// T_max, m: the longer diagonal of the parallelogram that four neighbouring samples make.
+/// T_max, m: the longer diagonal of the parallelogram of four neighbouring samples.
 ///
-/// `t_x_m` is the distance between passes, `advance_m` (d) the way gone between two pings, `t_y_m` the largest distance
-/// between neighbours within a turn; all finite.
+/// `t_x_m` is the distance between passes, `advance_m` (d) the distance travelled between two pings, `t_y_m` the
+/// largest distance between neighbours within a turn; all finite.
 /// Source: Jorge et al. 2021, Eq. 16.
 pub fn t_max_m(t_x_m: f64, advance_m: f64, t_y_m: f64) -> f64 {
     math::hypot(t_x_m + advance_m, t_y_m)
 }
 
-/// The speed at which T_max equals the target, m/s; `None` where `t_y_m` alone is as large as the target, or the
-/// times aren't positive.
+/// The speed at which T_max equals the target, m/s; `None` where `t_y_m` alone reaches the target, or the times aren't
+/// positive.
 ///
 /// `pass_gap_s` is the time between passes (T_rev / s for s evenly interleaved heads), `ping_period_s` that between
 /// pings (T_s).
@@ -24,14 +24,14 @@ pub fn speed_for_target_mps(target_m: f64, t_y_m: f64, pass_gap_s: f64, ping_per
     along_m(target_m, t_y_m).filter(|_| time_s > 0.0).map(|along_m| along_m / time_s)
 }
 
-/// What T_max leaves for the distance between passes and pings, m: sqrt(T^2 - T_y^2); `None` where `t_y_m` alone is as
-/// large as the target.
+/// Sum of pass distance and ping advance that the target T allows, m: sqrt(T^2 - T_y^2); `None` where `t_y_m` alone
+/// reaches the target.
 pub(super) fn along_m(target_m: f64, t_y_m: f64) -> Option<f64> {
-    // (T - t)(T + t) keeps its digits as the two meet.
+    // (T - t)(T + t) avoids cancellation for t close to T.
     (t_y_m < target_m).then(|| math::sqrt((target_m - t_y_m) * (target_m + t_y_m)))
 }
 
-/// The spiral that heads leave on the wall at a constant speed.
+/// The spiral of samples on the wall at a constant speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Spiral {
     speed_mps: f64,
@@ -40,68 +40,68 @@ pub struct Spiral {
 }
 
 impl Spiral {
-    /// `passes_per_turn` is how often a place is passed in the time of one turn: 1 for a single head, s for s heads in
-    /// phase shift, s / 2 for s heads in sectors.
+    /// `passes_per_turn` is the number of passes over a place in the time of one turn: 1 for a single head, s for s
+    /// heads in phase shift, s / 2 for s heads in sectors.
     ///
-    /// Errors: a speed below zero, passes that aren't above zero, or what isn't finite. A speed of zero is a limit that
-    /// exists: all distances along the tunnel are zero.
+    /// Errors: a negative speed, passes that aren't above zero, or a value that isn't finite. A speed of zero is valid:
+    /// all distances along the tunnel are zero.
     pub fn new(speed_mps: f64, turn: Turn, passes_per_turn: f64) -> Result<Self, SamplingError> {
         not_negative("the speed in m/s", speed_mps)?;
         positive("the number of passes in a turn", passes_per_turn)?;
         Ok(Self { speed_mps, turn, passes_per_turn })
     }
 
-    /// d, m: the way gone between two pings. Source: Jorge et al. 2021, Eq. 11.
+    /// d, m: the distance travelled between two pings. Source: Jorge et al. 2021, Eq. 11.
     pub fn advance_m(&self) -> f64 {
         self.speed_mps * self.turn.ping_period_s()
     }
 
-    /// T_x of one head, m: the way gone in a turn. Source: Eq. 12.
+    /// T_x of one head, m: the distance travelled in a turn. Source: Eq. 12.
     pub fn pitch_m(&self) -> f64 {
         self.speed_mps * self.turn.period_s()
     }
 
-    /// Distance along the tunnel between passes over a place, m: T_x / s, or 2 T_x / s at its largest in sectors.
+    /// Distance along the tunnel between passes over a place, m: T_x / s, or at most 2 T_x / s in sectors.
     /// Source: §5.1 and §5.2.
     pub fn t_x_m(&self) -> f64 {
         self.pitch_m() / self.passes_per_turn
     }
 
-    /// T_ymax, m, of the largest step `t_y2_m` of a head that stands still. Source: Eq. 13.
+    /// T_ymax, m, from the largest step `t_y2_m` of a head at rest. Source: Eq. 13.
     pub fn t_y_max_m(&self, t_y2_m: f64) -> f64 {
         math::hypot(self.advance_m(), t_y2_m)
     }
 
-    /// T_ymin, m, of the smallest step of a head that stands still: T_y1 or T_c. Source: Eq. 14.
+    /// T_ymin, m, from the smallest step of a head at rest: T_y1 or T_c. Source: Eq. 14.
     pub fn t_y_min_m(&self, smallest_step_m: f64) -> f64 {
         math::hypot(self.advance_m(), smallest_step_m)
     }
 
-    /// Mean step, m, of the mean step `t_yp_m` of a head that stands still, as Eq. 15 is printed.
+    /// Mean step, m, from the mean step `t_yp_m` of a head at rest, as Eq. 15 is printed.
     ///
-    /// (n d)^2 under its root is a whole turn's way added to a single step's length: with [`Spiral::t_y_mean_m`] beside
-    /// it, both can be shown.
+    /// (n d)^2 under its root combines a whole turn's advance with a single step; [`Spiral::t_y_mean_m`] uses the
+    /// advance of one step, so that both can be shown.
     /// Source: Eq. 15.
     pub fn t_y_mean_printed_m(&self, t_yp_m: f64) -> f64 {
         math::hypot(f64::from(self.turn.steps()) * self.advance_m(), t_yp_m)
     }
 
-    /// Mean step, m: that of a head that stands still, with the way gone during one step.
+    /// Mean step, m: that of a head at rest combined with the advance of one step.
     pub fn t_y_mean_m(&self, t_yp_m: f64) -> f64 {
         math::hypot(self.advance_m(), t_yp_m)
     }
 
-    /// T_max, m, of the largest step `t_y2_m` of a head that stands still. Source: Eq. 16.
+    /// T_max, m, from the largest step `t_y2_m` of a head at rest. Source: Eq. 16.
     pub fn t_max_m(&self, t_y2_m: f64) -> f64 {
         t_max_m(self.t_x_m(), self.advance_m(), t_y2_m)
     }
 
-    /// T_mean, m, of the mean step, the way gone included. Source: Eq. 17.
+    /// T_mean, m, from the mean step including the advance. Source: Eq. 17.
     pub fn t_mean_m(&self, t_y_mean_m: f64) -> f64 {
         t_max_m(self.t_x_m(), self.advance_m(), t_y_mean_m)
     }
 
-    /// T_min, m, of the smallest step, the way gone included. Source: Eq. 18.
+    /// T_min, m, from the smallest step including the advance. Source: Eq. 18.
     pub fn t_min_m(&self, t_y_min_m: f64) -> f64 {
         t_max_m(self.t_x_m(), self.advance_m(), t_y_min_m)
     }

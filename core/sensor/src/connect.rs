@@ -1,30 +1,30 @@
-//! Where a sensor is connected: `connect` in vehicle files.
+//! Connection of a sensor: `connect` in vehicle files.
 
 use core::fmt;
 use core::num::ParseIntError;
 
 use crate::driver::Carrier;
 
-/// The serial rate of the devices that name none.
+/// Default serial rate, baud.
 const USUAL_BAUD: u32 = 115_200;
-/// Rates beyond this are no serial line's.
+/// Highest serial rate accepted, baud.
 const MAX_BAUD: u32 = 12_000_000;
 
-/// A USB device by what it says of itself, which stays when it is plugged in elsewhere.
+/// A USB device by its descriptors, which are the same on any port.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct UsbIdentity {
-    /// Vendor.
+    /// Vendor id.
     pub vendor: u16,
-    /// Product.
+    /// Product id.
     pub product: u16,
-    /// Serial number, where there may be several of them.
+    /// Serial number, to distinguish devices of the same product.
     pub serial: Option<String>,
 }
 
-/// Which serial port.
+/// A serial port.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum SerialPort {
-    /// A device file; those below `/dev/serial/by-id` are the same after replugging.
+    /// A device file; paths below `/dev/serial/by-id` stay the same after replugging.
     Path(String),
     /// The port of a USB adapter, wherever it is plugged in.
     Usb(UsbIdentity),
@@ -35,24 +35,24 @@ pub enum SerialPort {
 pub enum Connect {
     /// `serial:/dev/serial/by-id/...?baud=115200` or `serial:usb:VID:PID[:SERIAL]?baud=115200`.
     Serial {
-        /// Which port.
+        /// The port.
         port: SerialPort,
-        /// Bits a second; 8 data bits, no parity, 1 stop bit.
+        /// Bits per second; 8 data bits, no parity, 1 stop bit.
         baud: u32,
     },
-    /// `tcp:HOST:PORT`, which we connect to.
+    /// `tcp:HOST:PORT`, which the host connects to.
     Tcp {
-        /// Name or address and port.
+        /// Host name or address, and port.
         address: String,
     },
-    /// `udp:HOST:PORT`, which we send to, and whose answers we hear.
+    /// `udp:HOST:PORT`: packets are sent there, and its answers received.
     Udp {
-        /// Name or address and port.
+        /// Host name or address, and port.
         address: String,
     },
-    /// `udp-listen:ADDRESS:PORT`, ours, where others send to.
+    /// `udp-listen:ADDRESS:PORT`: a local port that the device sends to.
     UdpListen {
-        /// Our address and port.
+        /// Local address and port.
         address: String,
     },
     /// `can:INTERFACE`.
@@ -64,33 +64,33 @@ pub enum Connect {
     Hid(UsbIdentity),
     /// `i2c:/dev/i2c-1:0x40`.
     I2c {
-        /// The bus.
+        /// Device file of the bus.
         bus: String,
         /// Address of the device, 7 bits.
         address: u8,
     },
 }
 
-/// Why a `connect` can't be used.
+/// Error in a `connect`.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("connect = {text:?}: {problem}; {allowed}")]
 pub struct ConnectError {
     /// As written.
     pub text: String,
-    /// What is wrong.
+    /// The fault.
     pub problem: String,
-    /// What is right, with an example.
+    /// Allowed forms, with an example.
     pub allowed: String,
 }
 
-/// All forms, for those who have written none of them.
+/// All forms, for the error of an unknown one.
 const FORMS: &str = "allowed are serial:/dev/serial/by-id/NAME?baud=115200, serial:usb:VID:PID[:SERIAL]?baud=115200, \
      tcp:HOST:PORT, udp:HOST:PORT, udp-listen:ADDRESS:PORT, can:INTERFACE, hid:VID:PID[:SERIAL], i2c:/dev/i2c-1:0x40";
 
 impl Connect {
-    /// Reads a `connect` as it stands in a vehicle file.
+    /// Parses a `connect` of a vehicle file.
     ///
-    /// Errors: another form than those of [`Connect`], in words, with what would be right.
+    /// Errors: none of the forms of [`Connect`]; the message names the allowed ones.
     pub fn parse(text: &str) -> Result<Self, ConnectError> {
         let refused = |problem: &str, allowed: &str| ConnectError {
             text: text.to_owned(),
@@ -131,7 +131,7 @@ impl Connect {
         }
     }
 
-    /// What carries the bytes.
+    /// Carrier of the connection.
     pub fn carrier(&self) -> Carrier {
         match self {
             Self::Serial { .. } => Carrier::Serial,
@@ -143,9 +143,9 @@ impl Connect {
         }
     }
 
-    /// The same, for a device that can do with these carriers only.
+    /// The same connection, checked against the carriers supported by a device.
     ///
-    /// Errors: a carrier that isn't among them.
+    /// Errors: its carrier isn't among them.
     pub fn among(self, carriers: &[Carrier]) -> Result<Self, ConnectError> {
         if carriers.contains(&self.carrier()) {
             return Ok(self);

@@ -1,5 +1,5 @@
-//! What a device's crate offers to the rest: a kind that reads its part of a vehicle file, and for each configured
-//! sensor a plugin, a decoder and an emulator.
+//! Interface of a device's crate: a kind that parses its part of a vehicle file, and for each configured sensor a driver,
+//! a decoder and an emulator.
 //!
 //! Discovering and opening the port, decoding (pure) and applying (in the loop) are three separate things; this file
 //! has the second, and the device's side of the wire for simulations.
@@ -17,32 +17,32 @@ use headrace_sampling::head::{HeadMode, HeadProgram, HeadSpec};
 use headrace_snapshot::Stateful;
 use serde::{Deserialize, Serialize};
 
-/// What every `[[sensors]]` table has.
+/// Keys common to all `[[sensors]]` tables.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SensorConfig {
     /// Name of the sensor and of its channel in the log.
     pub id: String,
     /// Kind of device.
     pub plugin: String,
-    /// Where it is connected, as written.
+    /// Connection, as written.
     pub connect: String,
-    /// How it sits on the vehicle.
+    /// Mount on the vehicle.
     pub mount: Mount,
     /// Time from validity of a value to the receive time of its first byte.
     pub latency: DurNs,
 }
 
-/// A sensor as navigation knows it.
+/// A sensor as seen by navigation.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SensorInfo {
-    /// How it sits on the vehicle.
+    /// Mount on the vehicle.
     pub mount: Mount,
-    /// What it is.
+    /// Kind of sensor.
     pub kind: SensorKind,
 }
 
 impl SensorInfo {
-    /// At the vehicle's origin, of no use to navigation.
+    /// A sensor at the vehicle's origin, unused by navigation.
     pub fn other() -> Self {
         Self { mount: Mount { position: Vec3::zero(), rotation: Rot::identity() }, kind: SensorKind::Other }
     }
@@ -53,9 +53,9 @@ impl SensorInfo {
 pub enum SensorKind {
     /// A profiling head.
     Head,
-    /// An echosounder; readings of less confidence are not used.
+    /// An echosounder; readings below `min_confidence` aren't used.
     Echosounder {
-        /// Least confidence, 0 to 1.
+        /// Minimum confidence, 0 to 1.
         min_confidence: f64,
     },
     /// A pressure sensor.
@@ -68,162 +68,162 @@ pub enum SensorKind {
     Tether {
         /// Chainage where it reads zero, m.
         zero_at_m: f64,
-        /// Metres of chainage for a metre of cable.
+        /// Metres of chainage per metre of cable.
         scale: f64,
     },
-    /// A source that navigation has no use for.
+    /// A source unused by navigation.
     Other,
 }
 
-/// One kind of device, by the name that vehicle files call it: `plugin = "imagenex881"`.
+/// One kind of device, by its name in vehicle files: `plugin = "imagenex881"`.
 pub trait DeviceKind: Sync {
     /// The name in vehicle files and in the logs' channel metadata.
     fn name(&self) -> &'static str;
 
-    /// Reads this device's own keys of a sensor's table. The common ones are in `sensor` already.
+    /// Parses this kind's keys of a sensor's table. The common ones are in `sensor` already.
     ///
     /// Errors: a key with a value that isn't allowed.
     fn configure(&self, sensor: &SensorConfig, own: &Section<'_>) -> Result<Box<dyn Device>, ConfigError>;
 
-    /// Asks what is on a row of bytes whether it is of this kind. `None` where such devices can't be asked.
+    /// Probe for devices of this kind on a byte stream. `None` if they can't be queried.
     fn probe(&self) -> Option<Box<dyn Probe>> {
         None
     }
 }
 
-/// What the loop needs of a configured sensor.
+/// The parts of a configured sensor used by the loop.
 pub struct SensorSpec {
     /// The common part of its table in the vehicle file.
     pub sensor: SensorConfig,
-    /// What it is, as navigation knows it.
+    /// Kind of sensor, for navigation.
     pub kind: SensorKind,
     /// Bytes to readings.
     pub decoder: Box<dyn Decoder>,
-    /// Size of the ring before the loop, bytes.
+    /// Size of the ring buffer ahead of the loop, bytes.
     pub ring_bytes: usize,
 }
 
 /// A configured sensor.
 pub trait Device: Send + Sync {
-    /// What the loop needs of it, with a decoder that has heard nothing yet.
+    /// The parts used by the loop, with a decoder in its initial state.
     fn specification(&self) -> SensorSpec;
 
-    /// For a profiling head, what a schedule of heads needs to know of it.
+    /// For a profiling head, its specification for scheduling.
     fn head(&self) -> Option<HeadSpec> {
         None
     }
 
-    /// For a profiling head, the modes that it could be set to at `range_m`, or at its own range setting.
+    /// For a profiling head, the modes available at `range_m`, or at its configured range.
     ///
-    /// Errors: in words, a range that isn't a setting of it.
+    /// Errors: a message for a range that isn't a setting of it.
     fn modes(&self, range_m: Option<f64>) -> Result<Vec<HeadMode>, String> {
         let _ = range_m;
         Ok(Vec::new())
     }
 
-    /// What it senses: what a simulation has to tell its emulator.
+    /// Quantity measured, for simulations.
     fn sense(&self) -> Sense;
 
     /// The device's side of the wire, for simulations.
     fn emulator(&self, setup: &EmulatorSetup) -> Emulated;
 
-    /// For a HID device, the report descriptor by which a rehearsal introduces it to the kernel.
+    /// For a HID device, the report descriptor that a rehearsal registers with the kernel.
     fn report_descriptor(&self) -> Option<Vec<u8>> {
         None
     }
 
-    /// Puts into `shorter` what a packet of it is without what nobody needs for its readings, and gives `true`; `false` where
-    /// there is nothing of that in it, or where that can't be told from these bytes alone.
+    /// Writes the packet to `shorter` with optional payload stripped and returns `true`; `false` if it has none, or if that
+    /// can't be determined from these bytes alone.
     fn without(&self, _what: Needless, _packet: &[u8], _shorter: &mut Vec<u8>) -> bool {
         false
     }
 
-    /// What may carry its bytes. UDP may stand in for any of them, a message a datagram.
+    /// Supported carriers. UDP may replace any of them, one message per datagram.
     fn carriers(&self) -> &'static [Carrier];
 
-    /// The host's side of its line.
+    /// Host side of its line.
     fn driver(&self, setup: &DriverSetup) -> Box<dyn Driver>;
 }
 
-/// What a log may do without: the readings are the same, bit for bit.
+/// Payload that a log may omit: the readings stay the same, bit for bit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Needless {
-    /// Strengths of echoes, where the range is told beside them.
+    /// Echo strengths, where the range is sent beside them.
     Echoes,
-    /// Places on Earth, and numbers that tell one machine from all others.
+    /// Geographic positions, and identifiers unique to one machine.
     Identity,
 }
 
-/// Bytes to readings: a codec with the device's configuration around it. Pure, in the loop. Its state is what it has heard;
-/// the configuration isn't.
+/// Bytes to readings: a codec with the device's configuration. Pure, runs in the loop. Its state depends on the bytes
+/// decoded so far; the configuration isn't part of it.
 pub trait Decoder: Stateful + Send + Sync {
-    /// Takes a packet and calls `sink` for every reading that it completes.
+    /// Takes a packet and calls `sink` for every reading completed by it.
     ///
     /// Allocates: never.
     fn decode(&mut self, packet: Packet<'_>, sink: &mut dyn FnMut(Decoded));
 
-    /// What the codec has seen so far.
+    /// Counters of the codec.
     fn counts(&self) -> CodecCounts;
 
-    /// Readings that were understood but not handed on: a bad status, another range setting than the configured one, a
-    /// calibration that isn't known, a jump, an orientation that the device itself calls invalid.
+    /// Readings decoded but not passed on: a bad status, a range setting other than the configured one, an unknown
+    /// calibration, a jump, an orientation marked invalid by the device.
     fn withheld(&self) -> u64 {
         0
     }
 
-    /// How the device's own clock goes beside ours, where it sends its time. It is reported and nothing else: readings
-    /// are valid by the receive time.
+    /// Statistics of the device's clock against the host's, if it sends its time. For reports only: readings are valid by the
+    /// receive time.
     fn clock(&self) -> Option<ClockReport> {
         None
     }
 }
 
-/// How an emulated device begins.
+/// Initial conditions of an emulated device.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EmulatorSetup {
-    /// When it is switched on; its first action may be then.
+    /// Power-on time; its first action may be then.
     pub start: MonoNs,
     /// For a head, its program.
     pub head: Option<HeadProgram>,
-    /// The water and the tunnel's place, as those who set it up know them.
+    /// Water and location of the tunnel, as known to the operator.
     pub site: Site,
-    /// Whether the host that polls it is emulated, too; else it does what is asked of it through [`Emulator::hear`].
+    /// Whether the host that polls it is emulated too; otherwise it answers requests passed to [`Emulator::hear`].
     pub polled: bool,
 }
 
-/// Which way bytes went on a line.
+/// Direction of bytes on a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Direction {
-    /// From the device to us.
+    /// From the device to the host.
     Received,
-    /// From us to the device.
+    /// From the host to the device.
     Sent,
 }
 
-/// Takes what crosses a line: which way, when its first byte did, the bytes.
+/// Takes the traffic on a line: direction, time of the first byte, bytes.
 pub type LineSink<'a> = &'a mut dyn FnMut(Direction, MonoNs, &[u8]);
 
-/// The device's side of the wire, together with the host's polling of it; `M` is what the device measures.
+/// Device side of the wire, together with the host's polling of it; `M` is its measurement.
 pub trait Emulator<M>: Send + Sync {
-    /// Adds the measurements that the device makes before `until` and hasn't been asked for yet, in order of time, on
-    /// the device's own clock.
+    /// Adds the measurements that the device makes before `until` and that haven't been returned yet, in order of time, on
+    /// the device's clock.
     fn begin(&mut self, until: MonoNs, due: &mut Vec<M>);
 
-    /// Bytes that a host has sent it, at `at` on the device's own clock; a device that isn't polled heeds none. What it answers
-    /// without measuring goes to `line`.
+    /// Bytes sent by a host, at `at` on the device's clock; a device that isn't polled ignores them. Responses without a
+    /// measurement go to `line`.
     fn hear(&mut self, _at: MonoNs, _bytes: &[u8], _line: LineSink<'_>) {}
 
-    /// Puts what was measured on the line, each message with its time: once for each measurement that has begun, in the
-    /// same order. Of an emulator that is polled by its own host, and that begins nothing, what others have measured: an
-    /// import's. There, values that aren't numbers weren't measured, and no message tells them.
+    /// Encodes a measurement onto the line, each message with its time: once for each measurement begun, in the same order.
+    /// An emulator with an emulated host that has begun none encodes measurements from elsewhere, those of an import; there,
+    /// values that aren't finite weren't measured and no message carries them.
     fn tell(&mut self, measured: &M, line: LineSink<'_>);
 }
 
-/// An emulated device by what it senses.
+/// An emulated device, by its kind of measurement.
 pub enum Emulated {
     /// A profiling head.
     Head(Box<dyn Emulator<Sounding>>),
-    /// A fixed echosounder: it looks along its own x.
+    /// A fixed echosounder, whose beam is along its x axis.
     Echosounder(Box<dyn Emulator<Sounding>>),
     /// A depth sensor.
     Depth(Box<dyn Emulator<Pressure>>),
@@ -235,12 +235,12 @@ pub enum Emulated {
     Tether(Box<dyn Emulator<Payout>>),
 }
 
-/// What a device senses.
+/// Quantity measured by a device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sense {
-    /// The wall, round about.
+    /// Range to the wall, all around.
     Head,
-    /// The wall, in one direction.
+    /// Range to the wall, in one direction.
     Echosounder,
     /// Depth.
     Depth,
@@ -248,12 +248,12 @@ pub enum Sense {
     Inertial,
     /// Velocity over ground.
     Velocity,
-    /// The way gone.
+    /// Distance travelled.
     Tether,
 }
 
 impl Sense {
-    /// What such a device is called.
+    /// Name of such a device.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Head => "profiling head",

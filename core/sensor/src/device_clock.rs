@@ -1,10 +1,10 @@
-//! A device's own clock beside ours: ticks that wrap to time since it began, and how fast it runs.
+//! A device's clock against the host's: unwraps its ticks and estimates its drift.
 //!
-//! A stamp reaches us late by a delay that is never below some least one: buses and queues only add. How far the receive
-//! time is ahead of the device's therefore has a lower edge, whose slope is the drift. Of each stretch of time the least
-//! late stamp is kept, and a straight line is laid through those by least squares: delays of the same kind throughout move
-//! all of them alike, which is the offset's affair and not the slope's. When all places are taken, stretches are joined
-//! two by two, so that ten hours need no more memory than two minutes.
+//! A stamp arrives after a delay that has a minimum: buses and queues only add to it. The receive time less the device
+//! time therefore has a lower envelope, whose slope is the drift. The least delayed stamp of each stretch of time is kept,
+//! and a straight line is fitted to these by least squares: a constant delay shifts all of them alike, which changes the
+//! offset and not the slope. When all slots are taken, stretches are merged in pairs, so that ten hours need no more
+//! memory than two minutes.
 
 use serde::{Deserialize, Serialize};
 
@@ -12,104 +12,104 @@ use headrace_geometry::math;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_snapshot::array;
 
-/// Stretches that are kept.
+/// Maximum number of stretches kept.
 const PLACES: usize = 128;
 
-/// Length of a stretch on the device's clock, at first.
+/// Initial length of a stretch on the device's clock.
 const FIRST_SPAN_NS: i64 = 1_000_000_000;
 
-/// Stretches that a drift is told from: with fewer, what they scatter by says little of how far it may be off.
+/// Fewest stretches for a drift estimate: the scatter of fewer is a poor measure of its error.
 const LEAST_STRETCHES: usize = 8;
 
-/// A stamp farther than this from where the last one and the receive times would have it is of another epoch; less is
-/// put down to queues. A clock that goes round sooner has a quarter of its round.
+/// Largest deviation of a stamp from the prediction by the last one and the receive times that is attributed to queues;
+/// beyond it a new epoch begins. For a clock that wraps sooner, it is a quarter of the wrap period.
 const MOST_QUEUED_NS: i64 = 10_000_000_000;
 
-/// By how much the least delays of two stretches may differ, and by how much more for each unit of time between them: no
-/// clock is off by more. A stretch that is later was spent in a queue, and isn't kept.
+/// Largest difference between the minimum delays of two stretches: a constant, and a share of the time between them (no
+/// clock drifts by more). A stretch delayed by more was spent in a queue, and isn't kept.
 const MOST_SHIFT_NS: f64 = 0.5e9;
 const MOST_DRIFT: f64 = 500e-6;
 
-/// No queue lasts longer than this: stretches that go on being shifted are of another epoch.
+/// Longest queueing delay: stretches that stay shifted for longer belong to a new epoch.
 const LONGEST_QUEUE_NS: i64 = 30_000_000_000;
 
 const LONGEST_TICK_NS: i64 = 900_000_000_000;
 
 const PPM: f64 = 1e6;
 
-/// What is known of a device's clock.
+/// Statistics of a device's clock.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ClockReport {
-    /// Stamps seen.
+    /// Stamps received.
     pub stamps: u64,
-    /// How often it began anew, or fell behind by more than queues explain.
+    /// Number of times it restarted, or fell behind by more than queues explain.
     pub restarts: u64,
-    /// How often it ran ahead by more than queues explain.
+    /// Number of times it ran ahead by more than queues explain.
     pub jumps: u64,
-    /// Length of the epoch that the drift is from, on the device's clock.
+    /// Length of the epoch used for the drift, on the device's clock.
     pub span: DurNs,
-    /// How fast it runs against ours; `None` before there is enough to tell.
+    /// Drift against the host's clock; `None` before there is enough data.
     pub drift: Option<Drift>,
 }
 
-/// A rate against our clock, parts per million. Positive: the device's clock is fast.
+/// Rate error against the host's clock, parts per million. Positive: the device's clock is fast.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Drift {
-    /// The rate.
+    /// The rate error.
     pub ppm: f64,
     /// Its standard deviation.
     pub sd_ppm: f64,
 }
 
-/// Follows a device's clock. Allocates: never.
+/// Tracks a device's clock. Allocates: never.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct DeviceClock {
-    /// The clock goes round after this many ticks.
+    /// The clock wraps after this many ticks.
     round: i128,
     tick: DurNs,
     stamps: u64,
     restarts: u64,
     jumps: u64,
     epoch: Option<Epoch>,
-    /// The best drift of the epochs before, and their spans.
+    /// Best drift of the epochs before, and the span of its epoch.
     before: Option<(Drift, DurNs)>,
 }
 
-/// Time since a start of the device.
+/// An uninterrupted run of the device's clock.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 struct Epoch {
-    /// The first stamp, of which device time is counted.
+    /// Receive time of the first stamp, the zero of device time.
     begun: MonoNs,
-    /// The last stamp as it came, unwrapped, and when.
+    /// The last stamp: raw ticks, unwrapped ticks, receive time.
     raw: i128,
     elapsed_ticks: i128,
     received: MonoNs,
     edge: Edge,
 }
 
-/// The least late stamps.
+/// Lower envelope of the delays: the least delayed stamp of each stretch.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 struct Edge {
     #[serde(with = "array")]
     kept: [Stamp; PLACES],
     len: usize,
     span_ns: i64,
-    /// The stretch that is under way, and its least late stamp.
+    /// The current stretch and its least delayed stamp.
     open: Option<(i64, Stamp)>,
-    /// By which stamps of one stretch are compared.
+    /// Slope for comparing stamps within a stretch.
     slope: f64,
-    /// Since when, on the device's clock, stretches have been shifted.
+    /// Device time since which stretches have been shifted.
     shifted_since_ns: Option<i64>,
 }
 
-/// A stamp by device time since the epoch's first and by how much later it came than that one, ns.
+/// Device time and delay of a stamp, both relative to the epoch's first, ns.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 struct Stamp {
     device_ns: i64,
     late_ns: i64,
 }
 
-/// A straight line through stamps: late = `mean_late` + `slope` (device - `mean_device`).
+/// A straight line fitted to stamps: late = `mean_late` + `slope` (device - `mean_device`).
 struct Line {
     slope: f64,
     slope_sd: f64,
@@ -117,7 +117,7 @@ struct Line {
     mean_late_ns: f64,
 }
 
-/// What a stretch that ended says of the epoch.
+/// Shift of a completed stretch against the epoch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Shift {
     None,
@@ -126,7 +126,7 @@ enum Shift {
 }
 
 impl DeviceClock {
-    /// A clock of `bits` bits (1 to 64) whose ticks are `tick` long (1 ns to 15 minutes); what is outside is brought inside.
+    /// A clock of `bits` bits (1 to 64) whose ticks are `tick` long (1 ns to 15 minutes); values outside are clamped.
     pub fn new(bits: u32, tick: DurNs) -> Self {
         Self {
             round: 1 << bits.clamp(1, 64),
@@ -139,8 +139,8 @@ impl DeviceClock {
         }
     }
 
-    /// Takes a stamp that came at `received`; bits beyond the clock's are left out. Gives the time on the device's clock
-    /// since the epoch's first stamp, wraps undone.
+    /// Takes a stamp received at `received`; bits beyond the clock's width are ignored. Returns the unwrapped time on the
+    /// device's clock since the epoch's first stamp.
     pub fn take(&mut self, ticks: u64, received: MonoNs) -> DurNs {
         self.stamps += 1;
         let raw = i128::from(ticks).rem_euclid(self.round);
@@ -170,8 +170,8 @@ impl DeviceClock {
         self.begin(raw, received)
     }
 
-    /// When a stamp would come, at the earliest, that the device makes at `device`, a time as [`Self::take`] gives them;
-    /// `None` before there is a drift.
+    /// Earliest receive time of a stamp made at device time `device`, as returned by [`Self::take`]; `None` before there is
+    /// a drift.
     pub fn earliest(&self, device: DurNs) -> Option<MonoNs> {
         let epoch = self.epoch.as_ref()?;
         let line = epoch.edge.line(self.tick)?;
@@ -181,7 +181,7 @@ impl DeviceClock {
         Some(epoch.begun + device + late)
     }
 
-    /// What is known so far. The drift is that of the epoch from which it is known best.
+    /// Statistics so far. The drift is that of the epoch with the smallest standard deviation.
     pub fn report(&self) -> ClockReport {
         let now = self.drift_now();
         let best =
@@ -210,7 +210,7 @@ impl DeviceClock {
     fn drift_now(&self) -> Option<(Drift, DurNs)> {
         let epoch = self.epoch.as_ref()?;
         let line = epoch.edge.line(self.tick)?;
-        // A second of the device's is 1 + slope of ours.
+        // One second of device time is 1 + slope seconds of host time.
         let rate = 1.0 / (1.0 + line.slope);
         let drift = Drift { ppm: (rate - 1.0) * PPM, sd_ppm: line.slope_sd * rate * rate * PPM };
         Some((drift, self.span(epoch)))
@@ -218,7 +218,7 @@ impl DeviceClock {
 }
 
 impl Edge {
-    /// With the epoch's first stamp, by which the others are counted.
+    /// An envelope of the epoch's first stamp, the reference of the others.
     fn new() -> Self {
         Self {
             kept: [Stamp::default(); PLACES],
@@ -250,13 +250,13 @@ impl Edge {
         self.kept.get(..self.len).unwrap_or_default()
     }
 
-    /// Keeps what the open stretch has left, unless it was spent in a queue.
+    /// Ends the current stretch and keeps its stamp, unless it was spent in a queue.
     fn close(&mut self) -> Shift {
         let Some((_, stamp)) = self.open.take() else { return Shift::None };
         let shift = self.shift(stamp);
         if shift != Shift::None {
             if shift == Shift::Ahead && stamp.device_ns < LONGEST_QUEUE_NS {
-                // It is rather those before it that were late: the epoch began within a queue.
+                // Rather, the earlier ones were delayed: the epoch began within a queue.
                 self.len = 0;
             } else {
                 let since = *self.shifted_since_ns.get_or_insert(stamp.device_ns);
@@ -272,13 +272,13 @@ impl Edge {
         Shift::None
     }
 
-    /// Whether a stamp comes at another time than the last one kept would have it.
+    /// Shift of a stamp against the last one kept.
     fn shift(&self, stamp: Stamp) -> Shift {
         let Some(last) = self.kept().last() else { return Shift::None };
         let between_ns = stamp.device_ns.saturating_sub(last.device_ns) as f64;
         let late_ns = stamp.late_ns.saturating_sub(last.late_ns) as f64 - self.slope * between_ns;
         let most_ns = MOST_SHIFT_NS + MOST_DRIFT * between_ns;
-        // A clock that lags behind makes stamps that seem to come late.
+        // A clock that falls behind makes its stamps appear delayed.
         if late_ns > most_ns {
             Shift::Behind
         } else if late_ns < -most_ns {
@@ -301,7 +301,7 @@ impl Edge {
         }
     }
 
-    /// Makes stretches twice as long.
+    /// Doubles the length of stretches, merging them in pairs.
     fn join(&mut self) {
         self.span_ns = self.span_ns.saturating_mul(2);
         let mut joined = [Stamp::default(); PLACES];
@@ -319,7 +319,7 @@ impl Edge {
         (self.kept, self.len) = (joined, len);
     }
 
-    /// The line through what is kept, for a clock whose stamps are whole ticks.
+    /// The line fitted to the stamps kept, for a clock quantized to whole ticks.
     fn line(&self, tick: DurNs) -> Option<Line> {
         let kept = self.kept();
         if kept.len() < LEAST_STRETCHES {
@@ -338,7 +338,7 @@ impl Edge {
         let slope = xy / xx;
         let left = |(x, y): (f64, f64)| (y - slope * x) * (y - slope * x);
         let scatter = kept.iter().map(about).map(left).sum::<f64>() / (n - 2.0);
-        // Where nothing scatters, a stamp may still be anywhere within its tick.
+        // Without scatter, the quantization to a tick remains.
         let quantum = tick.0 as f64 * tick.0 as f64 / 12.0;
         let slope_sd = math::sqrt((scatter + quantum) / xx);
         (xx > 0.0).then_some(Line { slope, slope_sd, mean_device_ns, mean_late_ns })
@@ -351,14 +351,14 @@ impl Line {
     }
 }
 
-/// Ticks gone by: `difference` and as many rounds as bring it nearest to the time `waited`.
+/// Ticks elapsed: `difference` plus the number of wraps that brings it nearest to the time `waited`.
 fn advance(difference: i128, round: i128, tick: DurNs, waited: DurNs) -> i128 {
     let expected = i128::from(waited.0).div_euclid(i128::from(tick.0));
     let rounds = (expected - difference + round / 2).div_euclid(round);
     difference + rounds * round
 }
 
-/// The one that came less late, by a line of this slope.
+/// The less delayed of the two, for a line of this slope.
 fn earlier(a: Stamp, b: Stamp, slope: f64) -> Stamp {
     let allowed = slope * b.device_ns.saturating_sub(a.device_ns) as f64;
     if (b.late_ns.saturating_sub(a.late_ns) as f64) < allowed { b } else { a }

@@ -1,8 +1,7 @@
-//! The host's side of a device's line, without I/O: what to send and when, what of the bytes goes to the loop, and what is
-//! to be thought of the device.
+//! Host side of a device's line, without I/O: what to send and when, which bytes go to the loop, and the device's health.
 //!
-//! A driver is a state machine that a port's thread drives. It gets the time with every call, so that tests can let it talk
-//! to an emulated device without a port, a thread or a clock.
+//! A driver is a state machine run by a port's thread. It gets the time with every call, so that tests can run it against
+//! an emulated device without a port, a thread or a clock.
 
 mod cutter;
 mod listener;
@@ -13,98 +12,98 @@ pub use listener::{Judge, Listener, MessageListener};
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sampling::head::HeadProgram;
 
-/// How bytes get to a device and back.
+/// Transport between the host and a device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Carrier {
-    /// A serial port: bytes in a row.
+    /// A serial port: a byte stream.
     Serial,
-    /// A TCP connection that we open: bytes in a row.
+    /// A TCP connection opened by the host: a byte stream.
     Tcp,
-    /// UDP: a message, or a piece of a row of bytes, a datagram.
+    /// UDP: each datagram is a message, or a piece of a byte stream.
     Udp,
-    /// A CAN interface: a `can_frame` of 16 bytes a message.
+    /// A CAN interface: each message is a `can_frame` of 16 bytes.
     Can,
-    /// A HID device: a report a message.
+    /// A HID device: each message is a report.
     Hid,
-    /// An I2C bus: a transaction a message, the bytes written and then the bytes read.
+    /// An I2C bus: each message is a transaction, the bytes written followed by the bytes read.
     I2c,
 }
 
-/// What a driver is told when it is made.
+/// Parameters of a new driver.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DriverSetup {
-    /// When the dive began: heads are at their programs' start then, or where they would have come to since, so that they
-    /// keep their phases among each other without knowing of each other.
+    /// Start of the dive: each head runs its program from then on, or joins it at the position due, so that the heads keep
+    /// their relative phase without communication between their drivers.
     pub begun: MonoNs,
     /// For a head, its program.
     pub head: Option<HeadProgram>,
 }
 
-/// What a driver can do with its line.
+/// I/O operations available to a driver.
 pub trait Wire {
-    /// Puts bytes on the line; on a carrier of messages they are one.
+    /// Sends bytes; on a message-based carrier, as one message.
     fn send(&mut self, bytes: &[u8]);
 
-    /// On a bus that is read on demand: writes, gives the device `settle` to work, and reads `read_bytes`. The bytes written
-    /// and then those read come back through [`Driver::heard`].
+    /// On a bus that is polled: writes, waits `settle` for the device, and reads `read_bytes`. The bytes written followed by
+    /// those read come back through [`Driver::heard`].
     fn exchange(&mut self, write: &[u8], settle: DurNs, read_bytes: usize);
 
-    /// Hands bytes over to the loop, `received` with their first one.
+    /// Passes bytes on to the loop; `received` is the receive time of the first.
     fn deliver(&mut self, received: MonoNs, bytes: &[u8]);
 }
 
-/// What is to be thought of a device, as far as its bytes tell.
+/// Health of a device as inferred from its traffic.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct DeviceHealth {
-    /// Messages that it sent and that were understood.
+    /// Valid messages received from it.
     pub good_frames: u64,
-    /// What it says that it is, once it has.
+    /// Identity reported by the device, once received.
     pub identity: Option<String>,
-    /// What is wrong with it, in words, with what would be right.
+    /// Description of a fault, with its remedy.
     pub complaint: Option<String>,
 }
 
-/// The host's side of one device's line.
+/// Host side of one device's line.
 pub trait Driver: Send {
-    /// The line has been opened, for the first time or again: the device may have been replaced or switched off meanwhile.
+    /// The line has been opened or reopened: the device may have been replaced or switched off meanwhile.
     fn opened(&mut self, now: MonoNs, wire: &mut dyn Wire);
 
-    /// The line has been closed: bytes held for the rest of a frame are delivered as they are, for a whole frame may be among
-    /// them. What is sent goes nowhere.
+    /// The line has been closed: the bytes of an incomplete frame are delivered as they are, for they may contain a complete
+    /// one. Bytes sent are discarded.
     fn closed(&mut self, _wire: &mut dyn Wire) {}
 
-    /// Bytes that came, the first of them at `received`. What isn't delivered is lost to the loop and to the log.
+    /// Received bytes, the first of them at `received`. Bytes that aren't delivered are lost to the loop and to the log.
     fn heard(&mut self, received: MonoNs, bytes: &[u8], wire: &mut dyn Wire);
 
-    /// When it next wants [`Driver::wake`], if it does.
+    /// Time of the next [`Driver::wake`], if any.
     fn due(&self) -> Option<MonoNs>;
 
-    /// The time that [`Driver::due`] gave has come.
+    /// Called at the time given by [`Driver::due`].
     fn wake(&mut self, now: MonoNs, wire: &mut dyn Wire);
 
-    /// Whether an answer is awaited, so that others on the same line keep silent.
+    /// Whether a response is pending, so that others on the same line must not transmit.
     fn awaits(&self) -> bool {
         false
     }
 
-    /// How long the device may be silent before its line is opened anew.
+    /// Silence timeout after which the connection is reopened.
     fn silence_timeout(&self) -> DurNs {
         DurNs::from_millis(5_000)
     }
 
-    /// What is to be thought of the device.
+    /// Health of the device.
     fn health(&self) -> DeviceHealth;
 }
 
-/// Finds out whether a device of one kind is on a line, and which. What it sends is harmless to whatever else is there:
-/// nothing turns, and no setting stays.
+/// Identifies a device of one kind on a line. What it sends is harmless to any other device there: nothing turns, and no
+/// setting persists.
 pub trait Probe: Send {
-    /// What to send, one after the other, each with time for an answer, until there is an identity.
+    /// Requests to send one after the other, each with time for a response, until there is an identity.
     fn questions(&self) -> Vec<Vec<u8>>;
 
-    /// Bytes that came, in whatever pieces.
+    /// Received bytes, in pieces of any size.
     fn heard(&mut self, bytes: &[u8]);
 
-    /// What the device says that it is, once it has.
+    /// Identity reported by the device, once received.
     fn identity(&self) -> Option<String>;
 }

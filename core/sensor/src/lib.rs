@@ -1,8 +1,8 @@
-//! What a device's crate needs, and all that the rest of the program knows of a device.
+//! Interface between the device crates and the rest of the program.
 //!
 //! A device is three separate things: a codec and decoder (bytes to [`reading::Reading`]s, pure), a driver (the host's side
-//! of its line, sans-I/O) and an emulator (the device's own side, for simulations). A crate of a device depends on this
-//! crate alone; the lower ones are re-exported.
+//! of its line, sans-I/O) and an emulator (the device's side, for simulations). A device's crate depends on this crate
+//! alone; the lower ones are re-exported.
 
 #![cfg_attr(not(test), warn(clippy::cast_possible_truncation))]
 #![cfg_attr(test, allow(clippy::cast_possible_truncation))]

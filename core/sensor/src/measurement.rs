@@ -1,49 +1,49 @@
-//! What simulated devices measure, between the water and the wire: an emulated device says when and at which angle it
-//! measures, a simulation says what it feels, and the device puts that into bytes.
+//! Measurements of simulated devices, between the water and the wire: an emulated device sets the time and angle of each,
+//! the simulation fills in the value, and the device encodes it.
 
 use super::reading::Level;
 use headrace_geometry::frames::{Rot, Sensor, Vec3};
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// One measurement of a device of some kind.
+/// A measurement of any kind of device.
 pub trait Measurement: Copy + Send + Sync + 'static {
-    /// The true moment for which it is valid.
+    /// True time of validity.
     fn at(&self) -> MonoNs;
 
-    /// Moves that moment.
+    /// Sets the time of validity.
     fn set_at(&mut self, at: MonoNs);
 }
 
-/// A ping of a profiling head or of a fixed echosounder, which looks along its own x.
+/// A ping of a profiling head, or of a fixed echosounder, whose beam is along its x axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sounding {
-    /// When it pings.
+    /// Time of the ping.
     pub at: MonoNs,
-    /// Where a head's beam truly points, in the sensor's frame, radians; no matter to an echosounder.
+    /// True beam angle of a head in the sensor's frame, radians; unused for an echosounder.
     pub angle_rad: f64,
-    /// Where the head says that it points.
+    /// Beam angle reported by the head, radians.
     pub reported_rad: f64,
-    /// What it hears, in metres of water at the site's speed of sound; `None` where it hears nothing.
+    /// Range in water at the site's speed of sound, m; `None` without an echo.
     pub range_m: Option<f64>,
 }
 
 /// Pressure of the water at a depth sensor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pressure {
-    /// When.
+    /// Time of validity.
     pub at: MonoNs,
-    /// Absolute, Pa.
+    /// Absolute pressure, Pa.
     pub pressure_pa: f64,
 }
 
-/// What an inertial unit feels.
+/// A sample of an inertial unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Inertia {
-    /// When.
+    /// Time of validity.
     pub at: MonoNs,
-    /// From sample to sample.
+    /// Sample period.
     pub period: DurNs,
-    /// Sensor to level.
+    /// Attitude, sensor to level.
     pub attitude: Rot<Level, Sensor>,
     /// Turn rate, mean over the period, rad/s.
     pub rate_radps: Vec3<Sensor>,
@@ -54,18 +54,18 @@ pub struct Inertia {
 /// Velocity over ground at a velocity log.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GroundVelocity {
-    /// When.
+    /// Time of validity.
     pub at: MonoNs,
-    /// Of the sensor itself, turning included, m/s.
+    /// Velocity of the sensor itself, lever-arm rotation included, m/s.
     pub velocity_mps: Vec3<Sensor>,
 }
 
-/// How far into the tunnel the cable has been paid out.
+/// Cable paid out into the tunnel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Payout {
-    /// When.
+    /// Time of validity.
     pub at: MonoNs,
-    /// Chainage that the cable reaches, m.
+    /// Chainage reached by the cable, m.
     pub chainage_m: f64,
 }
 
@@ -86,21 +86,21 @@ macro_rules! measurement {
 measurement!(Sounding, Pressure, Inertia, GroundVelocity, Payout);
 
 impl Sounding {
-    /// A ping that is still to be heard.
+    /// A scheduled ping, without its echo.
     pub fn due(at: MonoNs, angle_rad: f64) -> Self {
         Self { at, angle_rad, reported_rad: angle_rad, range_m: None }
     }
 }
 
 impl Pressure {
-    /// A measurement that is still to be made.
+    /// A scheduled measurement, without its value.
     pub fn due(at: MonoNs) -> Self {
         Self { at, pressure_pa: 0.0 }
     }
 }
 
 impl Inertia {
-    /// A sample that is still to be taken.
+    /// A scheduled sample, without its values.
     pub fn due(at: MonoNs, period: DurNs) -> Self {
         let (attitude, rate_radps, force_mps2) = (Rot::identity(), Vec3::zero(), Vec3::zero());
         Self { at, period, attitude, rate_radps, force_mps2 }
@@ -108,14 +108,14 @@ impl Inertia {
 }
 
 impl GroundVelocity {
-    /// A measurement that is still to be made.
+    /// A scheduled measurement, without its value.
     pub fn due(at: MonoNs) -> Self {
         Self { at, velocity_mps: Vec3::zero() }
     }
 }
 
 impl Payout {
-    /// A count that is still to be made.
+    /// A scheduled count, without its value.
     pub fn due(at: MonoNs) -> Self {
         Self { at, chainage_m: 0.0 }
     }

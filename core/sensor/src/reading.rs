@@ -1,4 +1,4 @@
-//! What sensors say, freed of their protocols: the values that decoders hand to the loop.
+//! Protocol-independent sensor readings: the values that decoders pass to the loop.
 
 use serde::{Deserialize, Serialize};
 
@@ -9,7 +9,7 @@ use headrace_geometry::time::MonoNs;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Level {}
 
-/// The most sources that one loop takes.
+/// Maximum number of sources of one loop.
 pub const MAX_SOURCES: usize = 64;
 
 /// A registered source of bytes; also the second key of the total order of messages.
@@ -23,10 +23,10 @@ impl SourceId {
     }
 }
 
-/// Bytes as they came from a device, or from a log of it.
+/// Bytes as received from a device, or read from a log of it.
 #[derive(Debug, Clone, Copy)]
 pub struct Packet<'a> {
-    /// When the first byte came.
+    /// Receive time of the first byte.
     pub received: MonoNs,
     /// The bytes.
     pub bytes: &'a [u8],
@@ -37,11 +37,11 @@ pub struct Packet<'a> {
 pub enum Reading {
     /// A ping of a profiling head.
     Sonar(SonarReturn),
-    /// A ping of a fixed echosounder, which looks along its own x.
+    /// A ping of a fixed echosounder, whose beam is along its x axis.
     Echo(EchoRange),
     /// Absolute pressure of the water.
     Pressure(WaterPressure),
-    /// Orientation that the device has computed: its own frame to level.
+    /// Orientation computed by the device: sensor frame to level.
     Attitude(Rot<Level, Sensor>),
     /// Turn rate, rad/s.
     AngularRate(Vec3<Sensor>),
@@ -49,7 +49,7 @@ pub enum Reading {
     SpecificForce(Vec3<Sensor>),
     /// Velocity over ground, m/s.
     VelocityOverGround(Vec3<Sensor>),
-    /// Cable paid out, or another measure of distance gone.
+    /// Cable paid out, or another measurement of distance travelled.
     TetherLength(TetherLength),
 }
 
@@ -79,26 +79,26 @@ impl Reading {
 /// A ping of a profiling head.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SonarReturn {
-    /// Head angle in the sensor's frame, radians: 0 down, growing clockwise seen along +x; any turn.
+    /// Head angle in the sensor's frame, radians: 0 down, increasing clockwise seen along +x; may exceed one turn.
     pub angle_rad: f64,
-    /// Slant range in metres as the device computed it, or `None` where nothing was above its threshold.
+    /// Slant range computed by the device, m; `None` if nothing exceeded its threshold.
     pub range_m: Option<f64>,
-    /// Quantum of that range.
+    /// Quantum of the range, m.
     pub resolution_m: f64,
-    /// The range that the head was set to.
+    /// Range setting of the head, m.
     pub max_range_m: f64,
-    /// Speed of sound with which the device computed the range.
+    /// Speed of sound used by the device to compute the range, m/s.
     pub sound_speed_mps: f64,
 }
 
 /// A ping of a fixed echosounder.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct EchoRange {
-    /// Distance in metres as the device computed it; `None` where it found no echo.
+    /// Distance computed by the device, m; `None` if it found no echo.
     pub range_m: Option<f64>,
-    /// The device's own confidence, 0 to 1.
+    /// The device's confidence, 0 to 1.
     pub confidence: f64,
-    /// Speed of sound with which the device computed the range.
+    /// Speed of sound used by the device to compute the range, m/s.
     pub sound_speed_mps: f64,
 }
 
@@ -116,16 +116,16 @@ pub struct WaterPressure {
 /// Cable paid out.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct TetherLength {
-    /// Metres since the counter's zero, growing as the vehicle goes in.
+    /// Length since the counter's zero, m, increasing as the vehicle goes in.
     pub length_m: f64,
-    /// Quantum of the length.
+    /// Quantum of the length, m.
     pub resolution_m: f64,
 }
 
-/// A reading and the moment for which it is valid.
+/// A reading and its time of validity.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Decoded {
-    /// Time of validity: the receive time less what the decoder knows of the delays.
+    /// Time of validity: the receive time less the delays known to the decoder.
     pub valid_at: MonoNs,
     /// The value.
     pub reading: Reading,

@@ -1,10 +1,10 @@
-//! State as bytes: saved at a tick, and put back into a loop of the same vehicle and the same program.
+//! Binary state snapshots: saved at a tick, restored into a loop of the same vehicle and the same program.
 //!
-//! Values (numbers, enums, small records) go as serde has them. What holds memory that must not be given up, or
-//! settings that aren't state, is restored in place: [`stateful!`](crate::stateful) takes the fields of such a type
-//! apart by what they are, every one of them, so that a new field can't be forgotten.
+//! Plain values (numbers, enums, small records) are serialized by serde. Types that own preallocated buffers, or
+//! settings that aren't state, are restored in place: [`stateful!`](crate::stateful) lists all their fields by kind, so
+//! that a new field can't be forgotten.
 //!
-//! Bytes are for the program that wrote them: no version reads another's.
+//! Only the program version that wrote a snapshot can read it.
 
 #![cfg_attr(not(test), warn(clippy::cast_possible_truncation))]
 #![cfg_attr(test, allow(clippy::cast_possible_truncation))]
@@ -12,40 +12,40 @@
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-/// Something with state that a run can be continued from.
+/// State that can be saved and restored to continue a run.
 pub trait Stateful {
-    /// Adds the state to a snapshot.
+    /// Appends the state to a snapshot.
     fn save(&self, to: &mut Saver);
 
-    /// Takes the state out of a snapshot, in the order in which it was saved. Settings and rooms stay as they are.
+    /// Restores the state from a snapshot, in the order it was saved. Settings and buffer capacities are unchanged.
     ///
-    /// Errors: the bytes are another's; what is restored may then be anything, and must not be used.
+    /// Errors: the snapshot doesn't fit; `self` may then be partly restored and must not be used.
     fn restore(&mut self, from: &mut Restorer<'_>) -> Result<(), SnapshotError>;
 }
 
-/// Why a snapshot can't be written or used.
+/// Why a snapshot can't be written or restored.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SnapshotError {
-    /// The bytes aren't what was saved of this loop.
+    /// The bytes aren't a snapshot of this loop.
     #[error("restoring {part} from a snapshot: {why}; it is of another vehicle, another version, or damaged")]
     Unfit {
-        /// The part of the state that was being restored.
+        /// Part of the state that was being restored.
         part: String,
-        /// What is wrong.
+        /// The cause.
         why: String,
     },
     /// A value that can't be written.
     #[error("saving {part}: {why}")]
     Unsaved {
-        /// The part of the state.
+        /// Part of the state that was being saved.
         part: String,
-        /// What is wrong.
+        /// The cause.
         why: String,
     },
 }
 
-/// A snapshot as it is written.
+/// Writes a snapshot.
 #[derive(Debug, Default)]
 pub struct Saver {
     bytes: Vec<u8>,
@@ -54,7 +54,7 @@ pub struct Saver {
 }
 
 impl Saver {
-    /// Begins a part, so that errors can name it.
+    /// Begins a part and writes its name; errors report it.
     pub fn part(&mut self, name: &'static str) {
         self.part = name;
         self.value(&name);
@@ -71,7 +71,7 @@ impl Saver {
         }
     }
 
-    /// Adds the elements of a list, and how many there are.
+    /// Adds a list, preceded by its length.
     pub fn list<T: Serialize>(&mut self, list: &[T]) {
         self.value(&list.len());
         for element in list {
@@ -79,26 +79,26 @@ impl Saver {
         }
     }
 
-    /// Adds things that are stateful themselves, as many as there always are.
+    /// Adds stateful elements without a count: their number is a setting.
     pub fn each<'a, T: Stateful + ?Sized + 'a>(&mut self, each: impl Iterator<Item = &'a T>) {
         each.for_each(|one| one.save(self));
     }
 
-    /// Adds bytes as they are, and how many there are.
+    /// Adds raw bytes, preceded by their length.
     pub fn raw(&mut self, bytes: &[u8]) {
         self.value(&bytes.len());
         self.bytes.extend_from_slice(bytes);
     }
 
-    /// The whole.
+    /// The complete snapshot.
     ///
-    /// Errors: something could not be written.
+    /// Errors: a value could not be written.
     pub fn finish(self) -> Result<Vec<u8>, SnapshotError> {
         self.failed.map_or(Ok(self.bytes), Err)
     }
 }
 
-/// A snapshot as it is read.
+/// Reads a snapshot.
 #[derive(Debug)]
 pub struct Restorer<'a> {
     bytes: &'a [u8],
@@ -106,14 +106,14 @@ pub struct Restorer<'a> {
 }
 
 impl<'a> Restorer<'a> {
-    /// From what [`Saver::finish`] gave.
+    /// From the bytes of [`Saver::finish`].
     pub fn new(bytes: &'a [u8]) -> Self {
         Self { bytes, part: "the beginning" }
     }
 
     /// Begins the part of this name.
     ///
-    /// Errors: another follows.
+    /// Errors: the next part has another name.
     pub fn part(&mut self, name: &'static str) -> Result<(), SnapshotError> {
         self.part = name;
         let found: &str = self.take()?;
@@ -122,7 +122,7 @@ impl<'a> Restorer<'a> {
 
     /// Takes a value.
     ///
-    /// Errors: what follows isn't one.
+    /// Errors: the next bytes aren't a value of this type.
     pub fn value<T: DeserializeOwned>(&mut self) -> Result<T, SnapshotError> {
         self.take()
     }
@@ -134,9 +134,9 @@ impl<'a> Restorer<'a> {
         Ok(value)
     }
 
-    /// Fills a list, in the room that it has where that is enough.
+    /// Fills a list, within its capacity where that suffices.
     ///
-    /// Errors: fewer elements than there should be, or something that is none.
+    /// Errors: the snapshot is too short, or an element can't be read.
     pub fn list<T: DeserializeOwned>(&mut self, list: &mut Vec<T>) -> Result<(), SnapshotError> {
         let count: usize = self.value()?;
         if count > self.bytes.len() {
@@ -150,9 +150,9 @@ impl<'a> Restorer<'a> {
         Ok(())
     }
 
-    /// Fills elements whose number doesn't change.
+    /// Fills a slice of fixed length.
     ///
-    /// Errors: another number of them, or something that is none.
+    /// Errors: another length, or an element that can't be read.
     pub fn slots<T: DeserializeOwned>(&mut self, slots: &mut [T]) -> Result<(), SnapshotError> {
         let count: usize = self.value()?;
         if count != slots.len() {
@@ -161,9 +161,9 @@ impl<'a> Restorer<'a> {
         slots.iter_mut().try_for_each(|slot| self.value().map(|value| *slot = value))
     }
 
-    /// Restores things that are stateful themselves, as many as there always are.
+    /// Restores stateful elements, whose number is a setting.
     ///
-    /// Errors: as theirs.
+    /// Errors: as for each element.
     pub fn each<'t, T: Stateful + ?Sized + 't>(
         &mut self,
         mut each: impl Iterator<Item = &'t mut T>,
@@ -171,9 +171,9 @@ impl<'a> Restorer<'a> {
         each.try_for_each(|one| one.restore(self))
     }
 
-    /// Takes bytes that were added as they are.
+    /// Takes raw bytes.
     ///
-    /// Errors: fewer than were added.
+    /// Errors: the snapshot ends early.
     pub fn raw(&mut self) -> Result<&'a [u8], SnapshotError> {
         let count: usize = self.value()?;
         let (bytes, rest) =
@@ -182,12 +182,12 @@ impl<'a> Restorer<'a> {
         Ok(bytes)
     }
 
-    /// What is wrong with the part that is being restored.
+    /// An error about the part that is being restored.
     pub fn unfit(&self, why: String) -> SnapshotError {
         SnapshotError::Unfit { part: self.part.to_owned(), why }
     }
 
-    /// Whether all has been taken.
+    /// Whether all bytes have been read.
     pub fn is_empty(&self) -> bool {
         self.bytes.is_empty()
     }
@@ -204,12 +204,12 @@ impl<T: Serialize + DeserializeOwned> Stateful for T {
     }
 }
 
-/// For serde's `with`: arrays of more elements than serde takes by itself.
+/// For serde's `with`: arrays longer than serde supports.
 pub mod array {
     use serde::de::{Deserialize, Deserializer, Error};
     use serde::ser::{Serialize, Serializer};
 
-    /// The elements as a list.
+    /// Serializes the array as a list.
     pub fn serialize<S: Serializer, T: Serialize, const N: usize>(
         array: &[T; N],
         to: S,
@@ -217,7 +217,7 @@ pub mod array {
         to.collect_seq(array)
     }
 
-    /// A list of as many.
+    /// Deserializes a list of `N` elements.
     pub fn deserialize<'de, D: Deserializer<'de>, T: Deserialize<'de>, const N: usize>(
         from: D,
     ) -> Result<[T; N], D::Error> {
@@ -227,10 +227,10 @@ pub mod array {
     }
 }
 
-/// Makes a type [`Stateful`](crate::Stateful), its fields named by what they are: `state` (values, or
-/// stateful themselves), `lists` (a `Vec` of values whose room stays), `slots` (values whose number stays), `each`
-/// (stateful things whose number is a setting) and `fixed` (settings and working memory: not saved). A field that isn't
-/// named doesn't compile.
+/// Implements [`Stateful`](crate::Stateful) for a type, given its fields by kind: `state` (values, or stateful fields),
+/// `lists` (a `Vec` of values that keeps its capacity), `slots` (arrays or slices of fixed length), `each` (stateful
+/// elements whose number is a setting) and `fixed` (settings and working memory: not saved). A type with an unlisted
+/// field doesn't compile.
 #[macro_export]
 macro_rules! stateful {
     ($type:ty {

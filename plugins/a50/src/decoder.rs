@@ -1,8 +1,8 @@
 //! Velocity reports to readings of velocity over ground.
 //!
-//! The device's axes are x forward, y right, z down, ours x forward, y left, z up: two of three point the other way.
-//! In air, and close to things, the device is known to send valid velocities that are none, and to repeat itself; what
-//! looks so is withheld, and counted by reason.
+//! Device axes are x forward, y right, z down; ours are x forward, y left, z up: y and z change sign.
+//! In air and close to surfaces the device is known to send wrong velocities as valid and to repeat reports; both are
+//! withheld and counted by reason.
 
 use headrace_sensor::codec::{Codec as _, CodecCounts, Framing as _, LineClock};
 use headrace_sensor::device::Decoder;
@@ -14,59 +14,59 @@ use serde::{Deserialize, Serialize};
 
 use crate::report::{Against, LineCodec, Lines, Velocity};
 
-/// A line's bytes follow one another, if TCP has to send none of them again; its own timer for that is 200 ms at least.
+/// Maximum gap within a line: covers a TCP retransmission, whose timer is at least 200 ms.
 const SILENCE: DurNs = DurNs::from_millis(1000);
 
-/// A velocity has three components.
+/// Least number of beams: a velocity has three components.
 const LEAST_BEAMS: u8 = 3;
-/// Altitudes that an A50 can measure, m.
+/// Altitude range of an A50, m.
 const ALTITUDES_M: core::ops::RangeInclusive<f64> = 0.05..=50.0;
-/// The most that a report may be on its way within the device. Sound takes 70 ms for the way there and back.
+/// Maximum delay within the device. The two-way travel time of sound is 70 ms.
 const MOST_DELAY_US: i64 = 2_000_000;
 
-/// How reports are to be understood.
+/// Decoding settings.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Meaning {
-    /// The largest figure of merit that is taken, m/s.
+    /// Largest accepted figure of merit, m/s.
     pub fom_max_mps: f64,
-    /// The largest speed that is taken, m/s.
+    /// Largest accepted speed, m/s.
     pub max_speed_mps: f64,
-    /// From sending to receive time.
+    /// Delay from sending to receipt.
     pub latency: DurNs,
 }
 
-/// Why reports were left out, and how many.
+/// Withheld reports, by reason.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Withheld {
-    /// The device called them invalid.
+    /// Marked invalid by the device.
     pub invalid: u64,
-    /// Its status wasn't zero: too hot.
+    /// Status not zero: too hot.
     pub status: u64,
-    /// Velocities against the water.
+    /// Velocity relative to the water.
     pub water: u64,
-    /// Fewer than three beams were valid.
+    /// Fewer than three valid beams.
     pub beams: u64,
-    /// Altitudes that it can't measure.
+    /// Altitude outside the measuring range.
     pub altitude: u64,
-    /// Figures of merit that were too large, or below zero.
+    /// Figure of merit too large, or negative.
     pub fom: u64,
-    /// Speeds that were too large.
+    /// Speed too large.
     pub speed: u64,
-    /// Times that contradict each other.
+    /// Contradictory timestamps.
     pub times: u64,
-    /// Reports that repeated the one before.
+    /// Repeats of the previous report.
     pub repeated: u64,
 }
 
 impl Withheld {
-    /// All of them.
+    /// Total of all reasons.
     pub fn total(&self) -> u64 {
         let Self { invalid, status, water, beams, altitude, fom, speed, times, repeated } = self;
         [invalid, status, water, beams, altitude, fom, speed, times, repeated].into_iter().sum()
     }
 }
 
-/// Bytes to readings.
+/// Decodes bytes into readings.
 #[derive(Debug, Clone)]
 pub struct A50Decoder {
     codec: LineCodec,
@@ -85,19 +85,19 @@ struct State {
 
 stateful!(State { state: last, withheld; fixed: meaning; });
 
-/// A vector in the device's axes in ours, or the other way.
+/// Converts a vector from device axes to ours, or back.
 pub fn to_ours([x, y, z]: [f64; 3]) -> Vec3<Sensor> {
     Vec3::new(x, -y, -z)
 }
 
 impl A50Decoder {
-    /// A decoder that has seen nothing yet.
+    /// New decoder.
     pub fn new(meaning: Meaning) -> Self {
         let state = State { meaning, last: None, withheld: Withheld::default() };
         Self { codec: LineCodec::default(), clock: LineClock::new(SILENCE), state }
     }
 
-    /// What has been left out, by reason.
+    /// Withheld reports, by reason.
     pub fn left_out(&self) -> Withheld {
         self.state.withheld
     }
@@ -118,7 +118,7 @@ impl Decoder for A50Decoder {
         self.codec.counts()
     }
 
-    /// Reports that were left out; [`A50Decoder::left_out`] has the reasons.
+    /// Number of withheld reports; [`A50Decoder::left_out`] has the reasons.
     fn withheld(&self) -> u64 {
         self.state.withheld.total()
     }
@@ -159,7 +159,7 @@ impl State {
     }
 }
 
-/// Whether a report is of the same moment as the last, or says the same to the last bit, which no new one does.
+/// True if a report has the same timestamp as the last, or is identical to the last bit, which no new report is.
 fn repeats(report: &Velocity, last: &Velocity) -> bool {
     let [now, before] = [report, last].map(|report| report.times_us.map(|[validity, _]| validity));
     let values = |of: &Velocity| {

@@ -1,4 +1,4 @@
-//! The device's side of the connection: reports at a fixed rate.
+//! Device side of the connection: reports at a fixed rate.
 
 use headrace_sensor::device::{Direction, Emulator, LineSink};
 use headrace_sensor::geometry::time::{DurNs, MonoNs};
@@ -6,25 +6,25 @@ use headrace_sensor::measurement::GroundVelocity;
 
 use crate::report::{Against, Velocity};
 
-/// From the reflection of sound to the sending of its report; the maker's example has 189 ms.
+/// Delay from the reflection of sound to sending the report; the maker's example has 189 ms.
 const DELAY_US: i64 = 100_000;
-/// The device's own clock when it is switched on, microseconds since 1970.
+/// Device clock at power-on, microseconds since 1970.
 const BEGINS_US: i64 = 1_638_191_471_000_000;
-/// Nothing here tells what the beams meet.
+/// Altitude, m: the emulator has no model of the surface that the beams meet.
 const ALTITUDE_M: f64 = 1.0;
-/// Figures of merit, in turn: no device says twice the same, and the decoder takes one that does for stuck.
+/// Alternating figures of merit: the decoder withholds identical reports as repeats.
 const FOMS_MPS: [f64; 2] = [0.001, 0.001_1];
 
-/// What an emulated device is like.
+/// Emulation settings.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Simulated {
-    /// Reports a second.
+    /// Report rate, Hz.
     pub rate_hz: f64,
-    /// From sending to receive time.
+    /// Delay from sending to receipt.
     pub latency: DurNs,
 }
 
-/// An ideal device: no noise, and its numbers are the wire's own.
+/// Ideal device: no noise; values are quantized by the wire format only.
 #[derive(Debug, Clone)]
 pub struct A50Emulator {
     device: Simulated,
@@ -53,7 +53,7 @@ impl Emulator<GroundVelocity> for A50Emulator {
     }
 
     fn tell(&mut self, moved: &GroundVelocity, line: LineSink<'_>) {
-        // To the device's axes as from them: y and z change their sense.
+        // The same conversion as from device axes: y and z change sign.
         let [x, y, z] = moved.velocity_mps.0.into();
         let at_us = BEGINS_US + moved.at.since(self.start).0 / 1000;
         let [even, odd] = FOMS_MPS;

@@ -1,7 +1,7 @@
-//! Water Linked DVL A50, a velocity log, over TCP: lines of JSON to velocity over ground, and back.
+//! Water Linked DVL A50 velocity log over TCP: decodes and encodes lines of JSON with velocity over ground.
 //!
-//! [`report`] reads velocity reports out of lines, [`decoder`] makes readings for the loop, [`emulator`] is the device's side
-//! for simulations and [`plugin`] reads the vehicle file.
+//! [`report`] parses velocity reports, [`decoder`] makes readings for the loop, [`emulator`] is the device side for
+//! simulations and [`plugin`] reads the vehicle file.
 
 #![cfg_attr(not(test), warn(clippy::indexing_slicing))]
 

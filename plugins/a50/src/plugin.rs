@@ -1,4 +1,4 @@
-//! The vehicle file's part of an A50, and its place in the loop.
+//! An A50's table in the vehicle file, and its registration with the loop.
 
 use headrace_sensor::SensorConfig;
 use headrace_sensor::config::{ConfigError, Section};
@@ -12,10 +12,10 @@ use crate::emulator::{A50Emulator, Simulated};
 /// Name in vehicle files.
 pub const NAME: &str = "a50";
 
-/// Some seconds of reports at the highest rate.
+/// Room for some seconds of reports at the highest rate.
 const RING_BYTES: usize = 1 << 17;
 
-/// The A50 as a kind of device.
+/// The A50 device kind.
 #[derive(Debug, Clone, Copy)]
 pub struct Kind;
 

@@ -1,4 +1,4 @@
-//! Lines of the device: each a JSON object and a newline. Velocity reports are read, others are good lines without use.
+//! Lines of the device: a JSON object and a newline. Velocity reports are decoded; other objects are good but unused.
 //!
 //! Source: Water Linked, "DVL A50/A125 TCP JSON API", json_v3 to json_v3.3.
 
@@ -10,13 +10,13 @@ use hifijson::token::Lex as _;
 use hifijson::{Error, Expect, SliceLexer};
 use serde::{Deserialize, Serialize};
 
-/// The longest line that is taken. A velocity report has about 1,100 bytes.
+/// Maximum line length. A velocity report has about 1,100 bytes.
 pub const MAX_LINE_BYTES: usize = 4096;
 
-/// How deep arrays and objects may be nested in a line; a report needs three levels.
+/// Maximum nesting of arrays and objects in a line; a report needs three levels.
 const MAX_DEPTH: usize = 8;
 
-/// What the velocity is against.
+/// Reference of a velocity.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Against {
     /// The ground, or a wall.
@@ -25,29 +25,29 @@ pub enum Against {
     Water,
 }
 
-/// A velocity report, in the device's units and axes: x forward, y right, z down (towards where it looks).
+/// A velocity report, in the device's units and axes: x forward, y right, z down (viewing direction).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Velocity {
-    /// What it is against.
+    /// Reference of the velocity.
     pub against: Against,
     /// Velocity, m/s.
     pub velocity_mps: [f64; 3],
-    /// Figure of merit: how far the velocity may be off, m/s.
+    /// Figure of merit: error estimate of the velocity, m/s.
     pub fom_mps: f64,
-    /// Distance to what reflects, along z, m.
+    /// Distance to the reflecting surface along z, m.
     pub altitude_m: f64,
-    /// Beams that are valid.
+    /// Number of valid beams.
     pub valid_beams: u8,
-    /// Whether the device itself holds velocity and altitude for valid.
+    /// Validity of velocity and altitude according to the device.
     pub is_valid: bool,
-    /// Status bits: 1 for too hot; others are not defined.
+    /// Status bits: 1 = too hot; others are undefined.
     pub status: u8,
-    /// When the sound was reflected, and when the report was sent; microseconds of the device's own clock.
+    /// Device timestamps of the reflection and of sending the report, microseconds.
     pub times_us: Option<[i64; 2]>,
 }
 
 impl Velocity {
-    /// The line that says so, of the fields that are read.
+    /// Encodes the decoded fields as a line.
     pub fn encode(&self) -> Vec<u8> {
         let kind = match self.against {
             Against::Bottom => "velocity",
@@ -75,14 +75,14 @@ impl Velocity {
     }
 }
 
-/// A line that is an object.
+/// A line that is a JSON object.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Line {
     Velocity(Velocity),
     Other,
 }
 
-/// What has been found of a velocity report.
+/// Fields of a velocity report found so far.
 #[derive(Debug, Clone, Copy, Default)]
 struct Found {
     against: Option<Against>,
@@ -96,7 +96,7 @@ struct Found {
 }
 
 impl Found {
-    /// Takes the value of a key, which begins with `next`. One of an unexpected type is no report.
+    /// Reads the value of a key, which begins with `next`. A value of an unexpected type makes the report invalid.
     fn take(&mut self, key: &[u8], next: u8, lexer: &mut SliceLexer<'_>) -> Result<(), Error> {
         let [x, y, z] = &mut self.velocity_mps;
         let [validity, transmission] = &mut self.times_us;
@@ -125,7 +125,7 @@ impl Found {
         Ok(())
     }
 
-    /// The report, where all of it was there.
+    /// The report, if it is complete.
     fn whole(self) -> Option<Velocity> {
         let [x, y, z] = self.velocity_mps;
         let [validity, transmission] = self.times_us;
@@ -157,7 +157,7 @@ fn valid_beams(next: u8, lexer: &mut SliceLexer<'_>) -> Result<u8, Error> {
     Ok(valid)
 }
 
-/// Whether the object's `type` is one of the velocity reports.
+/// True if the object's `type` is a velocity report.
 fn is_velocity(line: &str) -> Result<bool, Error> {
     let mut is_velocity = false;
     SliceLexer::new(line.as_bytes()).exactly_one(SliceLexer::ws_peek, |next, lexer| {
@@ -172,7 +172,7 @@ fn is_velocity(line: &str) -> Result<bool, Error> {
     Ok(is_velocity)
 }
 
-/// What a line says; `None` where it is no object, or a velocity report that lacks something.
+/// Parses a line; `None` if it is no object, or a velocity report that lacks a field.
 fn line(line: &[u8]) -> Option<Line> {
     let line = core::str::from_utf8(line).ok()?;
     if !is_velocity(line).ok()? {
@@ -187,8 +187,7 @@ fn line(line: &[u8]) -> Option<Line> {
     found.whole().map(Line::Velocity)
 }
 
-/// Calls `field` for each key of an object, escapes as they are sent, with the first byte of the key's value, which
-/// `field` has to take.
+/// Calls `field` for each key of an object (escapes as sent) with the first byte of its value, which `field` must consume.
 fn object<'a>(
     next: u8,
     lexer: &mut SliceLexer<'a>,
@@ -203,7 +202,7 @@ fn object<'a>(
     })
 }
 
-/// A string, escapes as they are sent.
+/// A string, escapes as sent.
 fn text<'a>(next: u8, lexer: &mut SliceLexer<'a>) -> Result<&'a [u8], Error> {
     let mut text = <&[u8]>::default();
     lexer.expect(|_| Some(next), b'"').ok_or(Expect::String)?;
@@ -234,11 +233,11 @@ fn skip(next: u8, lexer: &mut SliceLexer<'_>, depth: usize) -> Result<(), Error>
     }
 }
 
-/// How lines stand in a stream of bytes. A velocity report that lacks something is no good line.
+/// Framing of lines in a byte stream. A velocity report that lacks a field is a bad line.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Lines;
 
-/// Bytes of the connection to velocity reports.
+/// Decodes the connection's bytes into velocity reports.
 pub type LineCodec = Framed<Lines, MAX_LINE_BYTES>;
 
 impl Framing for Lines {
@@ -272,7 +271,7 @@ pub(crate) mod tests {
 
     use super::*;
 
-    /// The maker's example of a report, on one line.
+    /// The maker's example report, on one line.
     pub(crate) const EXAMPLE: &str = concat!(
         r#"{"time": 106.3935775756836, "vx": -3.713480691658333e-05, "vy": 5.703703573090024e-05, "#,
         r#""vz": 2.4990416932269e-05, "fom": 0.00016016385052353144, "covariance": "#,
@@ -355,7 +354,7 @@ pub(crate) mod tests {
         assert_eq!((got.len(), codec.counts().skipped_bytes), (1, endless.len() as u64));
     }
 
-    /// Whether a line with this value is a good one.
+    /// True if a line with this value is good.
     fn is_good(value: &str) -> bool {
         line(format!("{{\"a\":{value}}}\n").as_bytes()).is_some()
     }

@@ -1,4 +1,4 @@
-//! From a vehicle file's table to readings, by way of the emulated device.
+//! From a vehicle file's table to readings, through the emulated device.
 
 use headrace_sensor::SensorConfig;
 use headrace_sensor::config::Document;
@@ -44,7 +44,7 @@ fn decode(decoder: &mut A50Decoder, received: MonoNs, bytes: &[u8]) -> Vec<Decod
     readings
 }
 
-/// A report that is taken.
+/// A report that is accepted.
 fn good() -> Velocity {
     Velocity {
         against: Against::Bottom,
@@ -153,7 +153,7 @@ fn repeats_are_heard_once() {
     let reports = [
         (good(), 1),
         (good(), 0),
-        // Of the same moment, though it says something else.
+        // Same timestamp, different velocity.
         (Velocity { velocity_mps: [0.4, 0.0, 0.0], ..good() }, 0),
         (Velocity { velocity_mps: [0.4, 0.0, 0.0], times_us: later, ..good() }, 0),
         (Velocity { times_us: Some([1_200_000, 1_320_000]), ..good() }, 1),

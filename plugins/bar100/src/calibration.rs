@@ -1,34 +1,34 @@
-//! From counts to pressure: the limits and the kind of sensor, as its memory or the vehicle file gives them.
+//! Conversion of counts to pressure, with range and pressure mode from the sensor's memory or the vehicle file.
 
 use headrace_sensor::geometry::math;
 use serde::{Deserialize, Serialize};
 
 use crate::codec::MemoryWord;
 
-/// Cell of the calibration date and the kind of pressure.
+/// Cell of the calibration date and pressure mode.
 pub const CELL_SCALING0: u8 = 0x12;
 /// Cells of the lower limit, high and low word of a float.
 pub const CELLS_P_MIN: [u8; 2] = [0x13, 0x14];
 /// Cells of the upper limit, high and low word of a float.
 pub const CELLS_P_MAX: [u8; 2] = [0x15, 0x16];
-/// All cells that the calibration is in.
+/// All cells of the calibration.
 pub const CALIBRATION_CELLS: [u8; 5] = [0x12, 0x13, 0x14, 0x15, 0x16];
 
-/// One standard atmosphere, the ambient pressure that a vented sensor is taken to have.
+/// One standard atmosphere: default ambient pressure of a vented sensor.
 pub const STANDARD_ATMOSPHERE_BAR: f64 = 1.013_25;
 
 const COUNTS_AT_P_MIN: f64 = 16_384.0;
 const COUNTS_OF_SPAN: f64 = 32_768.0;
 const PA_PER_BAR: f64 = 1.0e5;
 
-/// What a sensor's pressure is counted from.
+/// Reference of a sensor's pressure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PressureMode {
-    /// PR: from the air outside, through a vent.
+    /// PR: ambient air, through a vent.
     Vented,
-    /// PA: from one bar, sealed in.
+    /// PA: one bar, sealed in.
     Sealed,
-    /// PAA: from vacuum.
+    /// PAA: vacuum.
     Absolute,
 }
 
@@ -41,11 +41,11 @@ pub struct Scaling0 {
     pub month: u8,
     /// Day, 1 to 31 (0 to 31 on the wire).
     pub day: u8,
-    /// Kind of pressure, as on the wire: 0 PR, 1 PA, 2 PAA, 3 undefined.
+    /// Pressure mode, as on the wire: 0 PR, 1 PA, 2 PAA, 3 undefined.
     pub mode: u8,
 }
 
-/// A sensor's range and kind, checked.
+/// A sensor's range and pressure mode, checked.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Calibration {
     mode: PressureMode,
@@ -53,14 +53,14 @@ pub struct Calibration {
     p_max_bar: f64,
 }
 
-/// Why counts can't be turned into pressure.
+/// Reason why counts can't be converted to pressure.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CalibrationError {
-    /// The kind of pressure isn't defined.
+    /// Undefined pressure mode.
     #[error("reading cell 0x12: pressure mode {0}; defined are 0 (PR), 1 (PA) and 2 (PAA)")]
     Mode(u8),
-    /// Limits that no sensor has.
+    /// Impossible limits.
     #[error(
         "reading the pressure limits: {p_min_bar} to {p_max_bar} bar; both must be finite, the second larger"
     )]
@@ -75,7 +75,7 @@ pub enum CalibrationError {
 impl PressureMode {
     /// From the two bits of cell 0x12.
     ///
-    /// Errors: 3 or more; to guess would shift the depth by ten metres.
+    /// Errors: 3 or more; a wrong mode would shift the depth by ten metres.
     pub fn from_wire(mode: u8) -> Result<Self, CalibrationError> {
         match mode {
             0 => Ok(Self::Vented),
@@ -104,7 +104,7 @@ impl PressureMode {
 }
 
 impl Scaling0 {
-    /// Takes the word apart.
+    /// Unpacks the word.
     #[expect(clippy::cast_possible_truncation, reason = "each field is masked to less than a byte")]
     pub fn from_word(word: u16) -> Self {
         let bits = |shift: u16, mask: u16| (word >> shift) & mask;
@@ -116,7 +116,7 @@ impl Scaling0 {
         }
     }
 
-    /// Puts the word together; what doesn't fit a field is cut.
+    /// Packs the word; fields are truncated to their bits.
     pub fn to_word(self) -> u16 {
         (self.year.saturating_sub(2010) & 0x1F) << 11
             | (u16::from(self.month) & 0x0F) << 7
@@ -126,9 +126,9 @@ impl Scaling0 {
 }
 
 impl Calibration {
-    /// Limits in bar, in the sensor's own kind of pressure.
+    /// Limits in bar, relative to the mode's reference.
     ///
-    /// Errors: limits that aren't finite, or of which the second isn't larger.
+    /// Errors: limits that aren't finite, or not increasing.
     pub fn new(mode: PressureMode, p_min_bar: f64, p_max_bar: f64) -> Result<Self, CalibrationError> {
         if !(p_min_bar.is_finite() && p_max_bar.is_finite() && p_max_bar > p_min_bar) {
             return Err(CalibrationError::Limits { p_min_bar, p_max_bar });
@@ -136,26 +136,26 @@ impl Calibration {
         Ok(Self { mode, p_min_bar, p_max_bar })
     }
 
-    /// Absolute pressure in Pa; `ambient_bar` is the air outside, for a vented sensor.
+    /// Absolute pressure in Pa; `ambient_bar` is the ambient air pressure, for a vented sensor.
     pub fn pressure_pa(&self, counts: u16, ambient_bar: f64) -> f64 {
         let above_bar =
             (f64::from(counts) - COUNTS_AT_P_MIN) * (self.p_max_bar - self.p_min_bar) / COUNTS_OF_SPAN;
         (above_bar + self.p_min_bar + self.mode.offset_bar(ambient_bar)) * PA_PER_BAR
     }
 
-    /// The counts nearest to an absolute pressure, within what the wire can say (1 to 65535).
+    /// Counts nearest to an absolute pressure, clamped to the wire's range (1 to 65535).
     pub fn counts(&self, pressure_pa: f64, ambient_bar: f64) -> u16 {
         let above_bar = pressure_pa / PA_PER_BAR - self.mode.offset_bar(ambient_bar) - self.p_min_bar;
         let counts = above_bar * COUNTS_OF_SPAN / (self.p_max_bar - self.p_min_bar) + COUNTS_AT_P_MIN;
         u16::try_from(math::round_to_i64(counts).max(1)).unwrap_or(u16::MAX)
     }
 
-    /// One count in Pa.
+    /// Resolution: one count in Pa.
     pub fn resolution_pa(&self) -> f64 {
         (self.p_max_bar - self.p_min_bar) / COUNTS_OF_SPAN * PA_PER_BAR
     }
 
-    /// The five memory words that say this, with a date of calibration.
+    /// The five memory words of this calibration, with its date.
     #[expect(clippy::cast_possible_truncation, reason = "the memory holds single precision")]
     pub fn to_words(&self, date: Scaling0) -> [(u8, u16); 5] {
         let halves = |limit_bar: f64| {
@@ -174,18 +174,18 @@ impl Calibration {
     }
 }
 
-/// What the vehicle file says instead of the sensor's memory, for logs that begin in the middle of a dive.
+/// Values of the vehicle file that override the sensor's memory, for logs that begin in mid-dive.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Overrides {
     /// Lower limit, bar.
     pub p_min_bar: Option<f64>,
     /// Upper limit, bar.
     pub p_max_bar: Option<f64>,
-    /// Kind of pressure.
+    /// Pressure mode.
     pub mode: Option<PressureMode>,
 }
 
-/// The calibration cells as far as they have been read.
+/// The calibration cells read so far.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct CalibrationCells {
     scaling0: Option<u16>,
@@ -194,7 +194,7 @@ pub struct CalibrationCells {
 }
 
 impl CalibrationCells {
-    /// Notes a word; cells that hold no calibration are passed over.
+    /// Stores a word; other cells are ignored.
     pub fn note(&mut self, word: &MemoryWord) {
         let [p_min_high, p_min_low] = &mut self.p_min;
         let [p_max_high, p_max_low] = &mut self.p_max;
@@ -209,9 +209,9 @@ impl CalibrationCells {
         *cell = Some(word.word);
     }
 
-    /// The calibration, once every part of it is known from the memory or from `overrides`, which go first.
+    /// The calibration, once every part is known; `overrides` take precedence over the memory.
     ///
-    /// Errors: an undefined mode, or limits that no sensor has.
+    /// Errors: an undefined mode, or impossible limits.
     pub fn calibration(&self, overrides: &Overrides) -> Result<Option<Calibration>, CalibrationError> {
         let mode = match (overrides.mode, self.scaling0) {
             (Some(mode), _) => mode,

@@ -1,4 +1,4 @@
-//! I2C transactions with the sensor: the bytes written and then the bytes read, as one message.
+//! I2C transactions with the sensor: bytes written and then bytes read, as one message.
 //!
 //! ```text
 //!   measure      AC | status  pressure (2)  temperature (2)      6 bytes
@@ -9,28 +9,28 @@
 
 use headrace_sensor::codec::{Framed, Framing, Verdict};
 
-/// The command that starts a conversion.
+/// Command that starts a conversion.
 pub const MEASURE: u8 = 0xAC;
 
-/// Memory cells lie below the commands, so that the first byte alone tells how long a transaction is.
+/// Memory cells lie below the commands, so the first byte alone gives a transaction's length.
 const FIRST_COMMAND: u8 = 0x80;
 
-/// Length of a measurement's transaction.
+/// Length of a measurement transaction.
 pub const MEASURE_BYTES: usize = 6;
-/// Length of a memory read's.
+/// Length of a memory read transaction.
 pub const MEMORY_BYTES: usize = 4;
 
-/// A status byte that says the result is good.
+/// A status byte of a good result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Status(u8);
 
 /// The result of a conversion, in counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Measurement {
-    /// What the sensor says of itself.
+    /// Sensor status.
     pub status: Status,
-    /// Pressure in counts: 16384 at the lower limit, 49152 at the upper. Never 0, which a sensor answers that was
-    /// asked too soon.
+    /// Pressure in counts: 16384 at the lower limit, 49152 at the upper. Never 0, which a sensor returns before the
+    /// conversion is done.
     pub pressure_counts: u16,
     /// Temperature in counts of 0.05 degrees / 16. Never 0, for the same reason.
     pub temperature_counts: u16,
@@ -39,15 +39,15 @@ pub struct Measurement {
 /// One word of the sensor's memory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct MemoryWord {
-    /// Which cell, 0x00 to 0x7F.
+    /// Cell address, 0x00 to 0x7F.
     pub cell: u8,
-    /// What the sensor says of itself.
+    /// Sensor status.
     pub status: Status,
     /// Its content.
     pub word: u16,
 }
 
-/// A transaction that went well.
+/// A successful transaction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Transaction {
     /// A conversion's result.
@@ -56,23 +56,23 @@ pub enum Transaction {
     Memory(MemoryWord),
 }
 
-/// Why a transaction tells nothing.
+/// Reason why a transaction holds no result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TransactionError {
-    /// The answer was not there yet.
+    /// The result was not ready.
     #[error("reading the status: 0x00, the sensor isn't ready; a good one is 0x40")]
     NotReady,
-    /// Nobody answered.
+    /// No device answered.
     #[error("reading the status: 0xFF, the bus is held high or nobody answers; a good one is 0x40")]
     BusHigh,
-    /// Bits 7 and 6 are constant.
+    /// Bits 7 and 6 are not 01.
     #[error("reading the status: {0:#04X}, bits 7 and 6 must be 01")]
     FixedBits(u8),
-    /// The sensor doesn't measure.
+    /// The sensor isn't in normal mode.
     #[error("reading the status: {0:#04X}, mode (bits 4 and 3) must be 00, normal")]
     Mode(u8),
-    /// The sensor's memory, and so its calibration, is damaged.
+    /// The sensor's memory, and with it the calibration, is corrupt.
     #[error("reading the status: {0:#04X}, bit 2 says that the memory's checksum is wrong; it must be 0")]
     Memory(u8),
     /// Pressure or temperature of zero counts.
@@ -90,7 +90,7 @@ pub enum TransactionError {
         "reading a transaction of {len} bytes that begins with {first:#04X}: known are AC with 6 bytes and 00 to 7F with 4"
     )]
     Unknown {
-        /// The first byte; 0 for no byte at all.
+        /// First byte; 0 if there is none.
         first: u8,
         /// Its length.
         len: usize,
@@ -101,9 +101,9 @@ impl Status {
     /// Ready, normal mode, memory sound.
     pub const IDLE: Self = Self(0x40);
 
-    /// Checks a status byte. A sensor that says it is busy passes: this one nearly always says so.
+    /// Checks a status byte. Busy is accepted: this sensor reports it nearly always.
     ///
-    /// Errors: not ready, bus high, or constant bits, mode or memory bit not as they must be.
+    /// Errors: not ready, bus high, or wrong constant, mode or memory bits.
     /// Source: status checks of Blue Robotics' `KellerLD` library.
     pub fn new(byte: u8) -> Result<Self, TransactionError> {
         match byte {
@@ -116,19 +116,19 @@ impl Status {
         }
     }
 
-    /// Whether the sensor says that a conversion is going on.
+    /// True if the sensor reports a conversion in progress.
     pub fn is_busy(self) -> bool {
         self.0 & 0x20 != 0
     }
 
-    /// As on the wire.
+    /// The status byte.
     pub fn byte(self) -> u8 {
         self.0
     }
 }
 
 impl Measurement {
-    /// Temperature in degrees Celsius; the low four bits say nothing.
+    /// Temperature in degrees Celsius; the low four bits carry no information.
     pub fn temperature_degc(&self) -> f64 {
         (f64::from(self.temperature_counts >> 4) - 24.0) * 0.05 - 50.0
     }
@@ -150,7 +150,7 @@ impl MemoryWord {
 }
 
 impl Transaction {
-    /// Length in bytes of the transaction that begins with `first`, or `None` where no such is known.
+    /// Length in bytes of the transaction that begins with `first`; `None` if unknown.
     pub fn length(first: u8) -> Option<usize> {
         match first {
             MEASURE => Some(MEASURE_BYTES),
@@ -159,9 +159,9 @@ impl Transaction {
         }
     }
 
-    /// Reads one whole transaction.
+    /// Decodes one whole transaction.
     ///
-    /// Errors: an unknown one, a status that isn't good, or a measurement of zeros.
+    /// Errors: an unknown transaction, a bad status, or a measurement of zeros.
     pub fn decode(bytes: &[u8]) -> Result<Self, TransactionError> {
         match *bytes {
             [MEASURE, status, p1, p0, t1, t0] => {
@@ -186,11 +186,11 @@ impl Transaction {
     }
 }
 
-/// How transactions stand in messages: each is one. One with a bad status is left out and counted as a bad frame.
+/// Framing of transactions: one per message. A transaction with a bad status is counted as a bad frame.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Transactions;
 
-/// Bytes to transactions.
+/// Decodes bytes into transactions.
 pub type Bar100Codec = Framed<Transactions, MEASURE_BYTES>;
 
 impl Framing for Transactions {

@@ -9,20 +9,20 @@ use headrace_sensor::snapshot::{Restorer, Saver, SnapshotError, Stateful};
 use crate::calibration::{Calibration, CalibrationCells, CalibrationError, Overrides};
 use crate::codec::{Bar100Codec, Measurement, Transaction};
 
-/// How measurements are to be understood.
+/// Decoding settings.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Meaning {
-    /// What goes before the sensor's memory.
+    /// Values that override the sensor's memory.
     pub overrides: Overrides,
-    /// Pressure of the air outside, bar; only a vented sensor needs it.
+    /// Ambient air pressure, bar; used for a vented sensor only.
     pub ambient_bar: f64,
-    /// Whether a measurement whose status says busy is left out.
+    /// Withhold measurements whose status is busy.
     pub reject_busy: bool,
-    /// From validity to receive time.
+    /// Delay from the measurement's time of validity to its receipt.
     pub latency: DurNs,
 }
 
-/// Bytes to readings. Until the calibration is known, measurements are withheld and counted.
+/// Decodes bytes into readings. Until the calibration is known, measurements are withheld and counted.
 #[derive(Debug, Clone)]
 pub struct Bar100Decoder {
     codec: Bar100Codec,
@@ -47,22 +47,22 @@ impl Stateful for Bar100Decoder {
 }
 
 impl Bar100Decoder {
-    /// A decoder that has seen nothing of the sensor's memory yet.
+    /// New decoder without calibration.
     pub fn new(meaning: Meaning) -> Self {
         let cells = CalibrationCells::default();
         let calibration = cells.calibration(&meaning.overrides);
         Self { codec: Bar100Codec::default(), meaning, cells, calibration, withheld: 0 }
     }
 
-    /// The calibration in use, once it is known.
+    /// The calibration in use, if known.
     ///
-    /// Errors: the sensor's memory says something impossible.
+    /// Errors: impossible values in the sensor's memory.
     pub fn calibration(&self) -> Result<Option<Calibration>, CalibrationError> {
         self.calibration
     }
 }
 
-/// Absolute pressure and temperature that a measurement means.
+/// Absolute pressure and temperature of a measurement.
 fn water_pressure(measured: Measurement, calibration: &Calibration, ambient_bar: f64) -> WaterPressure {
     WaterPressure {
         pressure_pa: calibration.pressure_pa(measured.pressure_counts, ambient_bar),
@@ -96,7 +96,7 @@ impl Decoder for Bar100Decoder {
         self.codec.counts()
     }
 
-    /// Measurements left out because the calibration wasn't known or was refused, or the status said busy.
+    /// Measurements withheld because the calibration was unknown or invalid, or the status was busy.
     fn withheld(&self) -> u64 {
         self.withheld
     }

@@ -1,4 +1,4 @@
-//! The host's side of the bus: calibration first, then a measurement at a fixed rate.
+//! Host side of the bus: reads the calibration, then measures at a fixed rate.
 
 use headrace_sensor::driver::{Carrier, DeviceHealth, Driver, Wire};
 use headrace_sensor::geometry::time::{DurNs, MonoNs};
@@ -6,25 +6,25 @@ use headrace_sensor::geometry::time::{DurNs, MonoNs};
 use crate::calibration::CALIBRATION_CELLS;
 use crate::codec::{MEASURE, MEASURE_BYTES, MEMORY_BYTES, Transaction, TransactionError};
 
-/// What may carry a sensor's transactions.
+/// Supported carriers.
 pub const CARRIERS: [Carrier; 2] = [Carrier::I2c, Carrier::Udp];
 
-/// From asking for a cell of the memory to reading it. Source: Keller's protocol, at least 0.6 ms.
+/// Delay from requesting a memory cell to reading it. Source: Keller's protocol, at least 0.6 ms.
 const MEMORY_SETTLES: DurNs = DurNs(1_000_000);
-/// From the start of a conversion to its result. Source: Keller's protocol, 8 ms at most; drivers wait 9 or 10 ms.
+/// Delay from starting a conversion to reading its result. Source: Keller's protocol, 8 ms at most; drivers wait 9 or 10 ms.
 const CONVERSION: DurNs = DurNs(10_000_000);
-/// Between reading the calibration and the first measurement. Source: `ArduPilot`'s driver.
+/// Delay from reading the calibration to the first measurement. Source: `ArduPilot`'s driver.
 const AFTER_CALIBRATION: DurNs = DurNs::from_millis(150);
-/// Between two tries to read the calibration.
+/// Retry interval of reading the calibration.
 const RETRY: DurNs = DurNs::from_millis(500);
-/// Bad answers in a row after which the calibration is read again: the sensor may have been replaced.
+/// Consecutive bad answers after which the calibration is read again: the sensor may have been replaced.
 const READ_AGAIN_AFTER: u32 = 20;
 
-/// A sensor's driver.
+/// Driver of a Bar100.
 pub struct Bar100Driver {
     period: DurNs,
     next_at: MonoNs,
-    /// The cell of the calibration that is asked for next.
+    /// Index of the next calibration cell to read.
     cell: usize,
     bad_in_a_row: u32,
     good_frames: u64,
@@ -44,7 +44,7 @@ impl Bar100Driver {
                 self.good_frames += 1;
                 self.complaint = None;
                 self.bad_in_a_row = 0;
-                // Of two answers to one question the second is none to the next.
+                // A second answer to the same request must not stand for the next cell.
                 let asked = CALIBRATION_CELLS.get(self.cell);
                 if matches!(&transaction, Transaction::Memory(read) if Some(&read.cell) == asked) {
                     self.cell += 1;
@@ -82,7 +82,7 @@ impl Driver for Bar100Driver {
     }
 
     fn wake(&mut self, now: MonoNs, wire: &mut dyn Wire) {
-        // What doesn't answer at all is asked again, too.
+        // A cell without an answer is requested again.
         if let Some(cell) = CALIBRATION_CELLS.get(self.cell) {
             self.next_at = now + RETRY;
             wire.exchange(&[*cell], MEMORY_SETTLES, MEMORY_BYTES - 1);
@@ -120,8 +120,8 @@ mod tests {
         fn deliver(&mut self, _: MonoNs, _: &[u8]) {}
     }
 
-    /// The first cell is asked for twice since its answer is late; its second answer is none to the question after it, which
-    /// is lost and asked again.
+    /// A late answer makes the driver request the first cell twice; the second answer doesn't answer the next request, which is
+    /// lost and repeated.
     #[test]
     fn a_late_answer_stands_for_no_other_cell() {
         let (mut driver, mut bus) = (Bar100Driver::new(10.0), Bus::default());

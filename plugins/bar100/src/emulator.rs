@@ -1,5 +1,5 @@
-//! The sensor's side of the bus: it is asked for its calibration, then for measurements, at a fixed rate by an emulated host or
-//! when a real one does.
+//! Sensor side of the bus: answers requests for calibration and measurements, from an emulated host at a fixed rate or from
+//! a real one.
 
 use headrace_sensor::device::{Direction, Emulator, EmulatorSetup, LineSink};
 use headrace_sensor::geometry::time::{DurNs, MonoNs};
@@ -8,40 +8,40 @@ use headrace_sensor::measurement::Pressure;
 use crate::calibration::{Calibration, Scaling0};
 use crate::codec::{MEASURE, Measurement, MemoryWord, Status};
 
-/// Date of calibration that the emulated memory gives.
+/// Calibration date in the emulated memory.
 const CALIBRATED: Scaling0 = Scaling0 { year: 2021, month: 6, day: 15, mode: 0 };
 
 /// Ten degrees Celsius in counts: ((10 + 50) / 0.05 + 24) * 16.
 const TEMPERATURE_COUNTS: u16 = 0x4C80;
 
-/// What an emulated sensor is like.
+/// Emulation settings.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Simulated {
-    /// Its range and kind.
+    /// Range and pressure mode.
     pub calibration: Calibration,
-    /// Pressure of the air outside, bar.
+    /// Ambient air pressure, bar.
     pub ambient_bar: f64,
-    /// Measurements a second.
+    /// Measurement rate, Hz.
     pub rate_hz: f64,
-    /// From validity to receive time.
+    /// Delay from the measurement's time of validity to its receipt.
     pub latency: DurNs,
 }
 
-/// An ideal sensor: no noise and no delay of its own, but whole counts.
+/// Ideal sensor: no noise and no added delay, but whole counts.
 #[derive(Debug, Clone)]
 pub struct Bar100Emulator {
     sensor: Simulated,
     start: MonoNs,
     begun: u64,
-    /// Whether the host is emulated, too.
+    /// True if the host is emulated as well.
     polled: bool,
-    /// Measurements that a real host has asked for and that haven't begun.
+    /// Measurements requested by a real host, not yet started.
     waiting: Vec<Pressure>,
     calibration_told: bool,
 }
 
 impl Bar100Emulator {
-    /// A sensor that is switched on, and first measures, as the setup says.
+    /// A sensor that is switched on, and first measures, at the setup's start.
     pub fn new(sensor: Simulated, setup: &EmulatorSetup) -> Self {
         let (start, polled) = (setup.start, setup.polled);
         Self { sensor, start, begun: 0, polled, waiting: Vec::new(), calibration_told: !polled }
@@ -78,7 +78,7 @@ impl Emulator<Pressure> for Bar100Emulator {
         due.extend(self.waiting.drain(..begun));
     }
 
-    /// What was written, and last how many bytes are to be read.
+    /// Receives a host's request: bytes to write, then the number of bytes to read.
     fn hear(&mut self, at: MonoNs, bytes: &[u8], line: LineSink<'_>) {
         let Some(asked) = bytes.first() else { return };
         if *asked == MEASURE {
@@ -86,7 +86,7 @@ impl Emulator<Pressure> for Bar100Emulator {
             return;
         }
         let words = self.sensor.calibration.to_words(CALIBRATED);
-        // Cells that aren't the calibration's are erased.
+        // Other cells read as erased.
         let word = words.iter().find(|(cell, _)| cell == asked).map_or(0xFFFF, |(_, word)| *word);
         let read = MemoryWord { cell: *asked, status: Status::IDLE, word };
         line(Direction::Received, at + self.sensor.latency, &read.encode());

@@ -1,4 +1,4 @@
-//! The vehicle file's part of a Bar100, and its place in the loop.
+//! A Bar100's table in the vehicle file, and its registration with the loop.
 
 use headrace_sensor::SensorConfig;
 use headrace_sensor::config::{ConfigError, Section};
@@ -13,13 +13,13 @@ use crate::emulator::{Bar100Emulator, Simulated};
 /// Name in vehicle files.
 pub const NAME: &str = "bar100";
 
-/// Two minutes of measurements at the usual rate.
+/// Room for two minutes of measurements at the usual rate.
 const RING_BYTES: usize = 1 << 16;
 
-/// The range of the part as sold, bar.
+/// Pressure range of the part as sold, bar.
 const PART_LIMITS_BAR: (f64, f64) = (0.0, 100.0);
 
-/// The Bar100 as a kind of device.
+/// The Bar100 device kind.
 #[derive(Debug, Clone, Copy)]
 pub struct Kind;
 

@@ -1,8 +1,8 @@
-//! The host's side of a head's line: one command in flight, and the head kept to its program.
+//! Host side of a head's line: one command in flight, and the head kept to its program.
 //!
-//! A head is first asked where it is, taken the short way to where its program would have it, and then asked for the
-//! program's pings, each when it is due. An answer that is late or lost puts the head behind; it catches up by being asked as
-//! soon as it has answered. One that is far off, since it was switched off or turned elsewhere, is taken back.
+//! The driver first locates the head, homes it the short way to its program's current position, and then requests the
+//! program's pings, each when due. A late or lost answer puts the head behind; it catches up by being polled as soon as it
+//! has answered. A head far off its program (power-cycled, or turned elsewhere) is homed again.
 
 use std::collections::VecDeque;
 
@@ -15,57 +15,57 @@ use crate::homing;
 use crate::program::{Planned, Timetable};
 use crate::settings::Settings;
 
-/// What may carry a head's bytes: Ethernet for the 881L, RS-485 or RS-232 for the 881A.
+/// Supported carriers: Ethernet for the 881L, RS-485 or RS-232 for the 881A.
 pub const CARRIERS: [Carrier; 3] = [Carrier::Tcp, Carrier::Serial, Carrier::Udp];
 
-/// A return's bytes follow one another on the line.
+/// Maximum gap within a return.
 const SILENCE: DurNs = DurNs::from_millis(100);
-/// What a head may take for an answer beyond the sound's way and the line's.
+/// Allowance for the head's own processing in the answer timeout.
 const LEISURE: DurNs = DurNs::from_millis(60);
-/// The slowest that sound and line are taken to be, for how long an answer may take, m/s and bits a second.
+/// Lower bounds of sound speed (m/s) and line rate (bit/s) for the answer timeout.
 const SLOWEST_SOUND_MPS: f64 = 1300.0;
 const LINE_BAUD: f64 = 115_200.0;
-/// Silence after which a head is asked less often. Source: LSTS DUNE asks again after a second.
+/// Unanswered commands after which the head is polled less often. Source: LSTS DUNE asks again after a second.
 const ASK_SELDOM_AFTER: u32 = 10;
 const SELDOM: DurNs = DurNs::from_millis(1_000);
-/// The share of a turn that a head may be behind its program before it is taken there; ahead it may be a few pings.
+/// A lag beyond 1/n of the program makes the driver home the head, as does a lead of more than a few pings.
 const BEHIND_SHARE: u64 = 4;
 const AHEAD_PINGS: u64 = 10;
-/// Turns behind its program after which a head that answers is said to be too slow for its settings.
+/// A lag beyond 1/n of the program is reported, if the head answers, as too slow for its settings.
 const TOO_SLOW_SHARE: u64 = 8;
 
-/// Commands of the last 32 that went unanswered from which on it is the line that keeps a head behind.
+/// Unanswered commands among the last 32 from which the line, not the head, is blamed for the lag.
 const LOSSY_FROM: u32 = 3;
 
-/// What the last command was for.
+/// Purpose of a command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Aim {
-    /// To know where the head is.
+    /// Find the head's position.
     Locate,
-    /// To take it nearer to its program.
+    /// Move it towards its program.
     Home,
-    /// The program's ping of this number.
+    /// Ping of this number in the program.
     Ping(u64),
 }
 
-/// A head's driver.
+/// Driver of a head.
 pub struct HeadDriver {
     settings: Settings,
     timetable: Timetable,
     cutter: Cutter<Returns, MAX_RETURN_BYTES>,
     timeout: DurNs,
-    /// What is in flight, and when it went.
+    /// Purpose and send time of the command in flight.
     asked: Option<(Aim, MonoNs)>,
-    /// When the next command goes, unless one is in flight.
+    /// Time of the next command, unless one is in flight.
     next_at: MonoNs,
     aim: Aim,
     way_home: VecDeque<Command>,
-    /// The ping to go on with after the way home.
+    /// Program ping to continue with after homing.
     joins_at: u64,
     unanswered: u32,
-    /// The last commands, a bit each, the latest the lowest: whether it went unanswered.
+    /// History of the last commands, one bit each, latest lowest: set if unanswered.
     losses: u32,
-    /// Whether it has once been on its program.
+    /// True once the head has followed its program.
     joined: bool,
     last_position: Option<u16>,
     foreign_id: Option<u8>,
@@ -74,7 +74,7 @@ pub struct HeadDriver {
 }
 
 impl HeadDriver {
-    /// For a head with these settings. Without a program it turns on for ever from the sensor frame's 0.
+    /// Driver for a head with these settings. Without a program it rotates continuously from the sensor frame's 0.
     pub fn new(settings: Settings, setup: &DriverSetup) -> Self {
         let idle = HeadProgram { start_rad: 0.0, growing: true, sector: None };
         let program = setup.head.unwrap_or(idle);
@@ -111,7 +111,7 @@ impl HeadDriver {
         self.asked = Some((self.aim, now));
     }
 
-    /// A ping at the settings of the dive, so that it counts, after which the head is where it was.
+    /// A ping at the dive's settings, so that it counts, without a step.
     fn standing_still(&self) -> Option<[u8; COMMAND_BYTES]> {
         Command { step_deg: 0.0, reverse: false, ..self.settings.command }.encode().ok()
     }
@@ -121,7 +121,7 @@ impl HeadDriver {
         self.next_at = at;
     }
 
-    /// A return that came at `now`.
+    /// Handles a return received at `now`.
     fn answered(&mut self, header: &Header, now: MonoNs) {
         if header.head_id != self.settings.command.head_id {
             self.foreign_id = Some(header.head_id);
@@ -130,7 +130,7 @@ impl HeadDriver {
         self.foreign_id = None;
         self.refused = !header.status.accepted() || header.status.overrun();
         let position = u16::try_from(i32::from(header.position) % COUNTS_PER_TURN).unwrap_or(0);
-        // The second of two answers to one question, or one that came after all: it answers nothing that is asked now.
+        // A duplicate or late answer doesn't belong to any command in flight.
         let Some((aim, _)) = self.asked else { return };
         if let Aim::Ping(number) = aim {
             let planned = self.timetable.ping(number).map(|ping| ping.position);
@@ -155,7 +155,7 @@ impl HeadDriver {
         self.timetable.ping(number).is_some_and(|ping| ping.position == position)
     }
 
-    /// Goes on with a ping of the program when it is due, or at once if that is past.
+    /// Continues with a ping of the program when due, or at once if overdue.
     fn go_on(&mut self, number: u64, now: MonoNs) {
         self.joined = true;
         self.aim = Aim::Ping(number);
@@ -163,7 +163,7 @@ impl HeadDriver {
         self.behind = self.timetable.first_at(now).saturating_sub(number);
     }
 
-    /// From where the head is to its program.
+    /// Joins the program from the head's position.
     fn join(&mut self, position: u16, clockwise: bool, now: MonoNs) {
         let current = self.timetable.first_at(now);
         let most_behind = if self.joined { self.timetable.len() / BEHIND_SHARE } else { 1 };
@@ -179,7 +179,7 @@ impl HeadDriver {
         let from = homing::Standing { angle_rad: self.settings.sensor_rad(position), growing };
         let current = self.timetable.first_at(now);
         self.joins_at = current;
-        // The way's length depends on where the program is by then, and that on the way's length.
+        // Fixed-point iteration: the way home depends on the program's position on arrival, and that on the length of the way.
         for _ in 0..3 {
             let Some(Planned { position, clockwise, .. }) = self.timetable.ping(self.joins_at).copied()
             else {
@@ -205,7 +205,7 @@ impl HeadDriver {
         }
     }
 
-    /// What is in flight will not be answered any more.
+    /// Gives up the command in flight.
     fn give_up(&mut self, now: MonoNs) {
         self.asked = None;
         self.unanswered = self.unanswered.saturating_add(1);
@@ -289,8 +289,8 @@ impl Driver for HeadDriver {
     }
 }
 
-/// How long an answer may take: the sound's way at the range setting, command and longest return on a serial line, and
-/// leisure; twice all that.
+/// Answer timeout: twice the sum of two-way travel time at the range setting, command and longest return on a serial line,
+/// and processing allowance.
 fn answer_time(command: &Command) -> DurNs {
     let sound_s = 2.0 * f64::from(command.range_m) / SLOWEST_SOUND_MPS;
     let line_s = (COMMAND_BYTES + MAX_RETURN_BYTES) as f64 * 10.0 / LINE_BAUD;

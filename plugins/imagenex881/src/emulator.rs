@@ -1,4 +1,4 @@
-//! An emulated head, polled by an emulated host, one command and one return each ping period, or by a real one.
+//! An emulated head, polled by an emulated host once per ping period, or by a real host.
 
 use std::collections::VecDeque;
 
@@ -16,11 +16,11 @@ use crate::program::Host;
 use crate::settings::Settings;
 use crate::stepping::{Head, Ping};
 
-/// Strength of an emulated echo where the wall is; zero elsewhere.
+/// Strength of an emulated echo at the wall; zero elsewhere.
 const ECHO: u8 = 127;
 
 impl Ping {
-    /// The answer of a head that hears the wall at `range_m`, in metres at 1500 m/s.
+    /// Answer of a head with an echo at `range_m`, in metres at 1500 m/s.
     pub fn answer(self, command: &Command, range_m: Option<f64>) -> Return {
         let heard = range_m
             .filter(|range| *range > 0.0 && *range >= command.min_range_m)
@@ -46,7 +46,7 @@ impl Ping {
     }
 }
 
-/// An 8-bit echo of one point at `part` of the range setting.
+/// An 8-bit echo with one point at the fraction `part` of the range setting.
 fn echo(tag: Tag, part: Option<f64>) -> Bytes<MAX_ECHO_BYTES> {
     let points: usize = match tag {
         Tag::Ipx => return Bytes::default(),
@@ -66,19 +66,19 @@ fn echo(tag: Tag, part: Option<f64>) -> Bytes<MAX_ECHO_BYTES> {
 pub struct HeadEmulator {
     settings: Settings,
     latency: DurNs,
-    /// Metres as the head reckons them for a metre of the site's.
+    /// Metres measured by the head per true metre at the site.
     device_per_site: f64,
-    /// The emulated host; without one, whoever is at the other end of the line asks.
+    /// The emulated host; `None` if a real host polls.
     host: Option<Host>,
     codec: CommandCodec,
     head: Head,
     ping_at: MonoNs,
-    /// Soundings that a real host has asked for and that haven't begun.
+    /// Soundings requested by a real host, not yet started.
     waiting: Vec<Sounding>,
     asked: VecDeque<Asked>,
 }
 
-/// A command that has been obeyed but not yet answered.
+/// An executed command not yet answered.
 #[derive(Debug, Clone)]
 struct Asked {
     command: Command,
@@ -86,8 +86,8 @@ struct Asked {
 }
 
 impl HeadEmulator {
-    /// A head that is at its program's start when switched on, and pings at once. Without a program it turns on for
-    /// ever from the sensor frame's 0.
+    /// A head at its program's start that pings as soon as it is switched on. Without a program it rotates continuously from
+    /// the sensor frame's 0.
     pub fn new(settings: Settings, latency: DurNs, setup: &EmulatorSetup) -> Self {
         let idle = HeadProgram { start_rad: 0.0, growing: true, sector: None };
         let program = setup.head.unwrap_or(idle);
@@ -107,13 +107,13 @@ impl HeadEmulator {
         }
     }
 
-    /// What the emulated host asks for next.
+    /// Next command of the emulated host, executed.
     fn asked_now(&mut self) -> Option<Asked> {
         let command = self.host.as_mut()?.next_command();
         Some(Asked { command, ping: self.head.obey(&command) })
     }
 
-    /// Obeys the commands in what a host has sent at `at`; they begin soundings.
+    /// Executes the commands in the bytes sent by a host at `at`; each begins a sounding.
     fn obey(&mut self, at: MonoNs, bytes: &[u8]) {
         let Self { settings, codec, head, asked, waiting, .. } = self;
         codec.push(bytes, &mut |command| {
@@ -130,7 +130,7 @@ impl HeadEmulator {
 impl Emulator<Sounding> for HeadEmulator {
     fn begin(&mut self, until: MonoNs, due: &mut Vec<Sounding>) {
         while let Some(host) = self.host.as_mut().filter(|_| self.ping_at < until) {
-            // Settings are checked when they are read, so that each command has its bytes.
+            // Settings are checked on reading, so every command encodes.
             if let Ok(bytes) = host.next_command().encode() {
                 self.obey(self.ping_at, &bytes);
             }
@@ -145,7 +145,7 @@ impl Emulator<Sounding> for HeadEmulator {
     }
 
     fn tell(&mut self, sounding: &Sounding, line: LineSink<'_>) {
-        // Who tells what an import has read begins nothing: the emulated host asks for it now.
+        // An import tells soundings without `begin`: the emulated host requests them here.
         let Some(Asked { command, ping }) = self.asked.pop_front().or_else(|| self.asked_now()) else {
             return;
         };

@@ -1,26 +1,26 @@
-//! From where a head is to where its program starts.
+//! Homing of a head to its program's start.
 
 use headrace_sensor::sampling::head::HeadProgram;
 
 use crate::codec::{COUNTS_PER_TURN, Command, step_at_most, step_deg};
 use crate::settings::{Settings, usual_pulse_us};
 
-/// Range setting on the way, m: pings at it are the shortest, and no returns of the one configured.
+/// Range setting while homing, m: gives the shortest pings, and none at the configured setting.
 const RANGE_M: u8 = 1;
 
-/// Where a head is, and which way it would step.
+/// Position and stepping direction of a head.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Standing {
-    /// Its angle in the sensor's frame, radians.
+    /// Angle in the sensor frame, radians.
     pub angle_rad: f64,
-    /// Whether its next step goes towards growing angles of the sensor's frame.
+    /// True if the next step increases the angle in the sensor frame.
     pub growing: bool,
 }
 
-/// The commands that take a head the short way to its program's start and leave it stepping as the program begins.
+/// Commands that move a head the short way to its program's start and leave it stepping in the program's direction.
 ///
-/// A head pings with every command; on the way it does so at another range setting than the configured one, so that
-/// nobody takes these returns for samples. A last command that only turns the direction round moves it no further.
+/// A head pings with every command; while homing it does so at another range setting than the configured one, so that these
+/// returns aren't taken for samples. If only the direction is wrong, a last command reverses it without a step.
 pub fn commands(settings: &Settings, now: Standing, program: &HeadProgram) -> Vec<Command> {
     let normal = settings.angle_sign > 0.0;
     let half = COUNTS_PER_TURN / 2;
@@ -60,7 +60,7 @@ mod tests {
     use crate::settings::tests::settings;
     use crate::stepping::Head;
 
-    /// An emulated head obeys the commands, and then its program's first one.
+    /// An emulated head executes the homing commands, then its program's first one.
     #[test]
     fn a_head_arrives_and_steps_as_its_program_begins() {
         for text in ["mode = \"fast\"", "mode = \"slow\"\nangle_sign = \"inverted\"\nangle_offset_deg = 40"] {

@@ -1,6 +1,6 @@
-//! Log files that the maker's software writes: a 100-byte header before each raw return.
+//! Log files of the maker's software: a 100-byte header before each raw return.
 //!
-//! Sure for the 852 (`.852`) and the 81S; inferred for the heads' own (`.81A`, `.81B`, `.31L`).
+//! Documented for the 852 (`.852`) and the 81S; inferred for the heads (`.81A`, `.81B`, `.31L`).
 //! Source: Imagenex 852 file format.
 
 use headrace_sensor::geometry::time::DurNs;
@@ -12,7 +12,7 @@ const MONTHS: [[u8; 3]; 12] = [
     *b"Dec",
 ];
 
-/// The shots of a log file, in order. Ends after the first error.
+/// Iterates over the shots of a log file. Ends after the first error.
 #[derive(Debug, Clone)]
 pub struct LogFile<'a> {
     bytes: &'a [u8],
@@ -22,56 +22,56 @@ pub struct LogFile<'a> {
 /// One shot.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shot<'a> {
-    /// The three letters that name the model.
+    /// Three-letter model name.
     pub model: [u8; 3],
-    /// Day, month (1 to 12) and year; `None` where the field isn't a date.
+    /// Day, month (1 to 12) and year; `None` if the field isn't a date.
     pub date: Option<(u8, u8, u16)>,
-    /// Time of day; `None` where the field isn't a time.
+    /// Time of day; `None` if the field isn't a time.
     pub time_of_day: Option<DurNs>,
-    /// Speed of sound that the software was set to, m/s.
+    /// Speed of sound setting of the software, m/s.
     pub sound_speed_mps: f64,
-    /// The return as the device sent it.
+    /// The return as sent by the device.
     pub raw: &'a [u8],
 }
 
-/// Why a log file can't be read on.
+/// Reason why a log file can't be read further.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LogFileError {
-    /// No shot begins where one must.
+    /// No shot header at the expected offset.
     #[error("log file: shot at byte {offset} begins with {got:02X?}; allowed are 852, 81A, 81B, 81S, 31L")]
     Magic {
-        /// Where.
+        /// Offset in the file.
         offset: usize,
-        /// The three bytes.
+        /// The three bytes found.
         got: [u8; 3],
     },
     /// The file ends within a shot.
     #[error("log file: shot at byte {offset} needs {needed} bytes and the file has {left} more")]
     Short {
-        /// Where.
+        /// Offset in the file.
         offset: usize,
         /// Bytes needed.
         needed: usize,
-        /// Bytes there.
+        /// Bytes left.
         left: usize,
     },
-    /// The return doesn't fit the shot.
+    /// The return is longer than the shot.
     #[error(
         "log file: shot at byte {offset} takes {total} bytes; a header of 100 and a return of {raw} need more"
     )]
     Lengths {
-        /// Where.
+        /// Offset in the file.
         offset: usize,
-        /// Bytes that the shot takes by its header.
+        /// Length of the shot by its header.
         total: usize,
-        /// Bytes of the return by its header.
+        /// Length of the return by its header.
         raw: usize,
     },
 }
 
 impl<'a> LogFile<'a> {
-    /// Over the bytes of a whole file.
+    /// Reads the bytes of a whole file.
     pub fn new(bytes: &'a [u8]) -> Self {
         Self { bytes, offset: 0 }
     }
@@ -139,7 +139,7 @@ fn two_digits(tens: u8, ones: u8) -> Option<u8> {
     Some(digit(tens)? * 10 + digit(ones)?)
 }
 
-/// Tenths of m/s where bit 15 says that the user set a speed.
+/// Speed of sound, in tenths of m/s if bit 15 marks it as set by the user.
 fn sound_speed_mps(field: &[u8]) -> f64 {
     match *field {
         [high, low] if high & 0x80 != 0 => f64::from(u16::from_be_bytes([high & 0x7F, low])) / 10.0,
@@ -166,7 +166,7 @@ mod tests {
         }
     }
 
-    /// A stream codec must find every return in the whole file, headers and fill being garbage to it.
+    /// Asserts that a stream codec finds every return in the whole file, skipping headers and fill.
     fn check_stream(file: &[u8], expected: &[Return]) {
         for piece in [file.len(), 1, 97] {
             let (mut codec, mut got) = (ReturnCodec::default(), Vec::new());
@@ -179,7 +179,7 @@ mod tests {
 
     #[test]
     fn a_real_sounder_log_reads() {
-        // Shots, and those with an echo.
+        // Numbers of shots, and of those with an echo.
         let counts = [(300, 203), (917, 452)];
         let name = "imagenex852_cidco/19_26_51-2016_11_18-sonar.852";
         for (path, (shots, echoes)) in headrace_recordings::both(name, counts[0], counts[1]) {

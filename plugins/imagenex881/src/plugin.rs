@@ -1,4 +1,4 @@
-//! Registration of a head with the loop, and its returns as readings.
+//! Registration of a head with the loop, and conversion of its returns to readings.
 
 use headrace_sensor::SensorConfig;
 use headrace_sensor::codec::{Bytes, Codec as _, CodecCounts, LineClock};
@@ -19,16 +19,16 @@ use crate::emulator::HeadEmulator;
 use crate::probe::HeadProbe;
 use crate::settings::{Settings, range_setting};
 
-/// The kind's name in vehicle files and logs.
+/// Name in vehicle files and logs.
 const NAME: &str = "imagenex881";
 
-/// Room for some seconds of the longest returns.
+/// Room for several seconds of the longest returns.
 const RING_BYTES: usize = 1 << 17;
 
-/// A return's bytes follow one another on the line; after such a pause no more belong to the one begun.
+/// Maximum gap within a return, after which an unfinished one is dropped.
 const SILENCE: DurNs = DurNs::from_millis(100);
 
-/// The kind of device that vehicle files call `imagenex881`.
+/// The Imagenex 881 device kind.
 #[derive(Debug, Clone, Copy)]
 pub struct Kind;
 
@@ -95,7 +95,7 @@ impl Device for Imagenex881 {
         Emulated::Head(Box::new(HeadEmulator::new(self.settings.clone(), self.sensor.latency, setup)))
     }
 
-    /// A return with its echo says the same as one of the profile point alone.
+    /// Replaces returns with an echo by profile-point-only returns.
     fn without(&self, what: Needless, packet: &[u8], shorter: &mut Vec<u8>) -> bool {
         shorter.clear();
         what == Needless::Echoes && without_echoes(packet, shorter).is_some()
@@ -110,8 +110,8 @@ impl Device for Imagenex881 {
     }
 }
 
-/// The returns of a packet that holds whole ones alone, each as the head would have sent it when told to give the profile point
-/// alone; `None` where the packet holds something else, or no echo.
+/// Writes a packet of whole returns with each reduced to its profile point (`IPX`); `None` if the packet holds anything else,
+/// or no echo.
 fn without_echoes(packet: &[u8], shorter: &mut Vec<u8>) -> Option<()> {
     let mut rest = packet;
     while !rest.is_empty() {
@@ -123,7 +123,7 @@ fn without_echoes(packet: &[u8], shorter: &mut Vec<u8>) -> Option<()> {
             }
             _ => whole,
         };
-        // What our encoding wouldn't give back isn't ours to change.
+        // Returns that don't re-encode identically are left unchanged.
         (whole.encode().ok()?.as_slice() == frame).then_some(())?;
         shorter.extend_from_slice(point.encode().ok()?.as_slice());
         rest = after;
@@ -131,18 +131,18 @@ fn without_echoes(packet: &[u8], shorter: &mut Vec<u8>) -> Option<()> {
     (shorter.len() < packet.len()).then_some(())
 }
 
-/// Whole returns that gave no reading, by reason.
+/// Numbers of whole returns without a reading, by reason.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Rejected {
-    /// The head did not take the command, or lost characters of it.
+    /// The head rejected the command, or lost characters of it.
     pub status: u64,
-    /// Another head's.
+    /// From another head id.
     pub head_id: u64,
-    /// A GS model's, whose further fields aren't known well enough.
+    /// From a GS model, whose extra fields aren't known well enough.
     pub tag: u64,
-    /// At another range setting than the configured one.
+    /// At a range setting other than the configured one.
     pub range_setting: u64,
-    /// A profile range beyond the range setting.
+    /// Profile range beyond the range setting.
     pub beyond_range: u64,
 }
 
@@ -152,7 +152,7 @@ impl Rejected {
     }
 }
 
-/// Returns to readings.
+/// Decodes returns into readings.
 #[derive(Debug, Clone)]
 pub struct HeadDecoder {
     codec: ReturnCodec,
@@ -162,7 +162,7 @@ pub struct HeadDecoder {
 
 stateful!(HeadDecoder { state: codec, clock, reader; });
 
-/// What makes a reading of a whole return; apart from the codec, so that both can be borrowed.
+/// Converts whole returns to readings; separate from the codec, so that both can be borrowed.
 #[derive(Debug, Clone)]
 struct Reader {
     settings: Settings,
@@ -173,14 +173,14 @@ struct Reader {
 stateful!(Reader { state: rejected; fixed: settings, latency; });
 
 impl HeadDecoder {
-    /// For a head with these settings. A position past +180 degrees makes a frame bad, whatever the head id.
+    /// Decoder with these settings. A position past +180 degrees makes a frame bad, whatever the head id.
     pub fn new(settings: Settings, latency: DurNs) -> Self {
         let reader = Reader { settings, latency, rejected: Rejected::default() };
         let codec = ReturnCodec::new(Returns { model: Some(Model::Head881) });
         Self { codec, clock: LineClock::new(SILENCE), reader }
     }
 
-    /// Whole returns that gave no reading so far.
+    /// Numbers of whole returns without a reading so far.
     pub fn rejected(&self) -> Rejected {
         self.reader.rejected
     }

@@ -1,24 +1,24 @@
-//! Whether a head is on a line, and which: it is asked for one short ping where it stands.
+//! Probe for a head: requests one short ping without a step.
 
 use headrace_sensor::codec::Codec as _;
 use headrace_sensor::driver::Probe;
 
 use crate::codec::{Command, Header, Model, Points, ReturnCodec, ZERO_COUNT};
 
-/// The ids that are asked for: as delivered, and those that further heads on one RS-485 line are given first.
+/// Head ids probed: the default, and the first ones usually given to further heads on an RS-485 line.
 const HEAD_IDS: [u8; 4] = [0x10, 0x11, 0x12, 0x13];
 
-/// Degrees of a count of the position.
+/// Degrees per position count.
 const DEGREES_A_COUNT: f64 = 0.3;
 
-/// Asks for a head by id, and takes the first whole return for the answer.
+/// Polls the head ids and takes the first whole return as the answer.
 #[derive(Debug, Clone, Default)]
 pub struct HeadProbe {
     codec: ReturnCodec,
     found: Option<Header>,
 }
 
-/// A ping of the least range and gain after which the head is where it was.
+/// A ping at minimum range and gain, without a step.
 fn standing_still(head_id: u8) -> Command {
     Command {
         head_id,
@@ -54,7 +54,7 @@ impl Probe for HeadProbe {
 
     fn identity(&self) -> Option<String> {
         let Header { tag, head_id, status, position, .. } = self.found?;
-        // An id that sounders have as well; their positions mean nothing.
+        // Sounders share this id; their positions have no meaning.
         if Model::of_head_id(head_id) == Model::Sounder852 {
             return Some(format!("Imagenex 881 family or 852 sounder, head_id = {head_id:#04x}"));
         }
@@ -77,7 +77,7 @@ mod tests {
     use crate::settings::tests::settings;
     use crate::stepping::Head;
 
-    /// What a head with these keys answers to all questions, in order.
+    /// Answers of a head with these keys to all probe questions, in order.
     fn answers(keys: &str) -> Vec<Vec<u8>> {
         let setup = EmulatorSetup { start: MonoNs(0), head: None, site: Site::default(), polled: false };
         let mut head = HeadEmulator::new(settings(keys).unwrap(), DurNs(0), &setup);

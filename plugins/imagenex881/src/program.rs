@@ -1,4 +1,4 @@
-//! A head's program as commands, ping by ping.
+//! A head's program as a sequence of commands, one per ping.
 
 use headrace_sensor::geometry::time::{DurNs, MonoNs};
 use headrace_sensor::sampling::head::HeadProgram;
@@ -7,11 +7,11 @@ use crate::codec::{COMMAND_BYTES, COUNTS_PER_TURN, Command, step_at_most, step_d
 use crate::settings::{Settings, counts_of_rad};
 use crate::stepping::Head;
 
-/// The host's side: which command comes next, so that the head follows its program.
+/// Host side: generates the commands that keep a head on its program.
 ///
-/// Sectors are kept with steps and reversals, not with the head's own sector switches: those know multiples of
-/// 3 degrees only. Both ends of a sector are pinged; where the step doesn't divide it, the last one before an end is
-/// shorter, and an end's ping isn't repeated.
+/// Sectors are swept with steps and reversals, not with the head's own sector switches, which allow multiples of 3 degrees
+/// only. Both ends of a sector are pinged; if the step doesn't divide it, the last step before an end is shorter. An end's
+/// ping isn't repeated.
 #[derive(Debug, Clone)]
 pub struct Host {
     command: Command,
@@ -20,7 +20,7 @@ pub struct Host {
     sector: Option<Sector>,
 }
 
-/// A sector in counts, and how far above its lower end the head is.
+/// A sector in counts, and the head's offset above its lower end.
 #[derive(Debug, Clone, Copy)]
 struct Sector {
     size: i32,
@@ -28,7 +28,7 @@ struct Sector {
 }
 
 impl Host {
-    /// For a head at the program's start that would step in the program's first direction.
+    /// Host for a head at the program's start, stepping in the program's initial direction.
     pub fn new(settings: &Settings, program: &HeadProgram) -> Self {
         let normal = settings.angle_sign > 0.0;
         Self {
@@ -43,12 +43,12 @@ impl Host {
         }
     }
 
-    /// Whether the head would step towards growing positions.
+    /// True if the next step increases the position.
     pub fn growing(&self) -> bool {
         self.growing
     }
 
-    /// The next command. The head pings where it is, then steps as the command says.
+    /// The next command. The head pings at its position, then steps.
     pub fn next_command(&mut self) -> Command {
         let Some(Sector { size, along }) = &mut self.sector else { return self.command };
         let to_end = |growing| if growing { *size - *along } else { *along };
@@ -69,18 +69,18 @@ impl Sector {
     }
 }
 
-/// A ping of a program.
+/// A planned ping of a program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Planned {
-    /// Where the head is, 0 to 1199.
+    /// Head position, 0 to 1199.
     pub position: u16,
-    /// Whether it would step towards growing positions before it is asked.
+    /// True if the head's next step, before the command, would increase the position.
     pub clockwise: bool,
-    /// What asks for the ping, and says how to go on.
+    /// Command that requests the ping and sets the next step.
     pub command: [u8; COMMAND_BYTES],
 }
 
-/// A program in time: ping number k is due k ping periods after the dive has begun. It repeats itself.
+/// A periodic program in time: ping k is due k ping periods after the start of the dive.
 #[derive(Debug, Clone)]
 pub struct Timetable {
     pings: Vec<Planned>,
@@ -88,11 +88,11 @@ pub struct Timetable {
     period: DurNs,
 }
 
-/// A program that hasn't come back to its beginning after so many pings never will; a slow sector has 2,400.
+/// Maximum period of a program, in pings; a slow sector has 2,400.
 const MAX_PINGS: usize = 10_000;
 
 impl Timetable {
-    /// The program of a head that is at its start when the dive begins.
+    /// Program of a head that is at its start when the dive begins.
     pub fn new(settings: &Settings, program: &HeadProgram, begun: MonoNs) -> Self {
         let mut host = Host::new(settings, program);
         let mut head = Head::new(settings.position(program.start_rad), host.growing());
@@ -105,19 +105,19 @@ impl Timetable {
             }
             let command = host.next_command();
             let ping = head.obey(&command);
-            // Settings are checked when they are read, so that each command has its bytes.
+            // Settings are checked on reading, so every command encodes.
             let Ok(command) = command.encode() else { break };
             pings.push(Planned { position: ping.position, clockwise: before.1, command });
         }
         Self { pings, begun, period: settings.ping_period }
     }
 
-    /// Pings until the program repeats itself.
+    /// Period of the program, in pings.
     pub fn len(&self) -> u64 {
         self.pings.len() as u64
     }
 
-    /// Whether the program has no ping, which can't be.
+    /// True if the program has no pings, which never happens.
     pub fn is_empty(&self) -> bool {
         self.pings.is_empty()
     }
@@ -128,18 +128,18 @@ impl Timetable {
         self.pings.get(usize::try_from(place).ok()?)
     }
 
-    /// When it is due.
+    /// Due time of ping `number`.
     pub fn due(&self, number: u64) -> MonoNs {
         self.begun + DurNs(i64::try_from(number).unwrap_or(i64::MAX).saturating_mul(self.period.0))
     }
 
-    /// The first ping that is due at `at` or later.
+    /// Number of the first ping due at `at` or later.
     pub fn first_at(&self, at: MonoNs) -> u64 {
         let since = at.since(self.begun).0.max(0);
         since.unsigned_abs().div_ceil(self.period.0.max(1).unsigned_abs())
     }
 
-    /// The ping nearest to number `near` at which the head is at `position` and would step this way.
+    /// Number of the ping nearest to `near` with this position and stepping direction.
     pub fn nearest(&self, near: u64, position: u16, clockwise: bool) -> Option<u64> {
         let fits = |number: &u64| {
             self.ping(*number).is_some_and(|ping| ping.position == position && ping.clockwise == clockwise)

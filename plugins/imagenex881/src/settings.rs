@@ -1,4 +1,4 @@
-//! A head's settings: the keys of its table in the vehicle file, the modes, and its angles.
+//! A head's settings: the keys of its table in the vehicle file, the scan modes, and angle conversion.
 
 use headrace_sensor::SensorConfig;
 use headrace_sensor::config::{ConfigError, Section};
@@ -8,18 +8,18 @@ use headrace_sensor::sampling::head::{Basis, HeadBody, HeadMode, Turn};
 
 use crate::codec::{COUNTS_PER_TURN, Command, Points, RANGES_M, SOUND_SPEED_MPS, ZERO_COUNT};
 
-/// A scanning speed by the maker's name: the step, and how long a turn takes.
+/// A scan mode by the maker's name: step and turn period.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Mode {
-    /// Its name in vehicle files.
+    /// Name in vehicle files.
     pub name: &'static str,
     /// Step in counts of 0.3 degrees.
     pub step_counts: u8,
-    /// Time of a whole turn at the range setting of the table, ms.
+    /// Turn period at the table's range setting, ms.
     pub turn_ms: i64,
 }
 
-/// The modes. Source: Jorge et al. 2021, Table 2.
+/// Scan modes. Source: Jorge et al. 2021, Table 2.
 pub const MODES: [Mode; 5] = [
     Mode { name: "slow", step_counts: 1, turn_ms: 21_600 },
     Mode { name: "medium", step_counts: 2, turn_ms: 10_800 },
@@ -28,10 +28,10 @@ pub const MODES: [Mode; 5] = [
     Mode { name: "fastest", step_counts: 8, turn_ms: 4_800 },
 ];
 
-/// Range setting for which the table of modes is, m.
+/// Range setting of the table of modes, m.
 const TABLE_RANGE_M: u8 = 10;
 
-/// A turn's period that was measured.
+/// A measured turn period.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct MeasuredTurn {
     step_counts: u8,
@@ -39,32 +39,31 @@ struct MeasuredTurn {
     period: DurNs,
 }
 
-/// The body of a head of the family about its beam. Source: radius from Jorge et al. 2021, §8.3; the lengths are
-/// estimates.
+/// Default housing of the family's heads about the beam. Source: radius from Jorge et al. 2021, §8.3; the lengths are estimates.
 const USUAL_BODY: HeadBody = HeadBody { radius_m: 0.04, ahead_m: 0.03, behind_m: 0.2 };
 
-/// A head's settings, checked: each command that they make can be encoded.
+/// Checked settings of a head: every command built from them can be encoded.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
-    /// The command that asks for a ping in the middle of a turn.
+    /// Command that requests a ping in mid-turn.
     pub command: Command,
-    /// Step in counts of 0.3 degrees: one of those that a command can carry.
+    /// Step in counts of 0.3 degrees, one of those supported by the command.
     pub step_counts: u8,
-    /// Time between two pings.
+    /// Ping period.
     pub ping_period: DurNs,
-    /// 1 where the device's angles grow as the sensor frame's, else -1.
+    /// +1 if device angles grow with the sensor frame's, else -1.
     pub angle_sign: f64,
-    /// Sensor angle where the device reports 0, radians.
+    /// Sensor angle at device angle 0, radians.
     pub angle_offset_rad: f64,
-    /// Its body.
+    /// Housing of the head.
     pub body: HeadBody,
     measured: Vec<MeasuredTurn>,
 }
 
 impl Settings {
-    /// Reads a head's own keys.
+    /// Reads a head's keys.
     ///
-    /// Errors: a key that is missing or not allowed, or a latency that isn't below the ping period.
+    /// Errors: a key missing or not allowed, or a latency not below the ping period.
     pub fn read(sensor: &SensorConfig, own: &Section<'_>) -> Result<Self, ConfigError> {
         let choices = MODES.map(|mode| (mode.name, mode));
         let mode = own.required("mode", own.choice("mode", &choices)?)?;
@@ -95,48 +94,48 @@ impl Settings {
         Ok(settings)
     }
 
-    /// All modes at a range setting, with the periods that are known for it best.
+    /// All modes at a range setting, each with the best known turn period.
     pub fn modes(&self, range_m: u8) -> Vec<HeadMode> {
         modes(range_m, &self.measured)
     }
 
-    /// Full width of the beam at the frequency set, radians.
+    /// Full beam width at the configured frequency, radians.
     pub fn beam_rad(&self) -> f64 {
         beam_rad(self.command.frequency_khz)
     }
 
-    /// The step, radians.
+    /// Step, radians.
     pub fn step_rad(&self) -> f64 {
         rad_of_counts(i32::from(self.step_counts))
     }
 
-    /// Angle in the sensor's frame at a head position, radians.
+    /// Sensor-frame angle of a head position, radians.
     pub fn sensor_rad(&self, position: u16) -> f64 {
         self.angle_sign * rad_of_counts(i32::from(position) - ZERO_COUNT) + self.angle_offset_rad
     }
 
-    /// The head position nearest to an angle in the sensor's frame: 0 to 1199.
+    /// Head position nearest to a sensor-frame angle: 0 to 1199.
     pub fn position(&self, sensor_rad: f64) -> i32 {
         let device_rad = self.angle_sign * (sensor_rad - self.angle_offset_rad);
         (counts_of_rad(device_rad) + ZERO_COUNT).rem_euclid(COUNTS_PER_TURN)
     }
 }
 
-/// The nearest number of counts to an angle in radians; held to a thousand turns either way.
+/// Nearest number of counts of an angle in radians; clamped to a thousand turns either way.
 pub(crate) fn counts_of_rad(angle_rad: f64) -> i32 {
     let most = i64::from(COUNTS_PER_TURN) * 1000;
     let counts = math::round_to_i64(angle_rad * f64::from(COUNTS_PER_TURN) / TAU).clamp(-most, most);
     i32::try_from(counts).unwrap_or(0)
 }
 
-/// Radians of a number of counts.
+/// Counts in radians.
 fn rad_of_counts(counts: i32) -> f64 {
     f64::from(counts) * TAU / f64::from(COUNTS_PER_TURN)
 }
 
-/// A range as the head's setting.
+/// Converts a range to the head's setting.
 ///
-/// Errors: in words, a range that is none of its settings.
+/// Errors: a range that is no setting of the head, as text.
 pub fn range_setting(range_m: f64) -> Result<u8, String> {
     RANGES_M
         .into_iter()
@@ -144,12 +143,12 @@ pub fn range_setting(range_m: f64) -> Result<u8, String> {
         .ok_or_else(|| format!("{range_m} m is no range setting of the head; it has {RANGES_M:?}"))
 }
 
-/// The modes of a head of which nothing has been measured, at a range setting.
+/// Modes at a range setting for a head without measured turn periods.
 pub fn usual_modes(range_m: u8) -> Vec<HeadMode> {
     modes(range_m, &[])
 }
 
-/// Full width of the profiling beam: 2.4 degrees at 600 kHz and less, in equal parts to 1.4 degrees at 1 MHz, radians.
+/// Full width of the profiling beam, radians: 2.4 degrees up to 600 kHz, falling linearly to 1.4 degrees at 1 MHz.
 ///
 /// Source: Jorge et al. 2021, §6; the profiling head's model in LSTS DUNE.
 pub fn beam_rad(frequency_khz: f64) -> f64 {
@@ -171,11 +170,11 @@ fn pings_a_turn(mode: Mode) -> i32 {
     COUNTS_PER_TURN / i32::from(mode.step_counts)
 }
 
-/// How long a turn takes at a range setting.
+/// Turn period at a range setting.
 ///
-/// From the periods measured in this mode and the maker's table at its range: what is known at this very range; between
-/// two ranges, in proportion; and beyond them with the time that sound takes for the difference, to the range and back once
-/// a ping. The rest of a ping's period, stepping and the line, doesn't depend on the range.
+/// Taken from the periods measured in this mode and the maker's table: at a known range the known value, between two ranges
+/// linear interpolation, beyond them extrapolation by the two-way travel time per ping. The rest of the ping period
+/// (stepping, line) doesn't depend on range.
 fn turn_period(mode: Mode, range_m: u8, measured: &[MeasuredTurn]) -> (DurNs, Basis) {
     let table = MeasuredTurn {
         step_counts: mode.step_counts,
@@ -208,12 +207,12 @@ fn turn_period(mode: Mode, range_m: u8, measured: &[MeasuredTurn]) -> (DurNs, Ba
     }
 }
 
-/// The periods that the vehicle file says were measured: `turn_period_s` in the mode and at the range set, and any
-/// others in tables of their own.
+/// Measured turn periods of the vehicle file: `turn_period_s` at the configured mode and range, and those of the
+/// `measured_turns` tables.
 fn measured_turns(mode: Mode, range_m: u8, own: &Section<'_>) -> Result<Vec<MeasuredTurn>, ConfigError> {
     let mut measured = Vec::new();
     let possible = |step_counts: u8, range_m: u8, turn_s: f64| {
-        // Each ping waits for its sound, there and back.
+        // Each ping waits for its two-way travel time.
         let pings = f64::from(COUNTS_PER_TURN / i32::from(step_counts));
         let least_s = pings * 2.0 * f64::from(range_m) / SOUND_SPEED_MPS;
         if turn_s >= least_s {
@@ -246,7 +245,7 @@ fn measured_turns(mode: Mode, range_m: u8, own: &Section<'_>) -> Result<Vec<Meas
     Ok(measured)
 }
 
-/// Times of a turn that can be, seconds.
+/// Allowed turn periods, seconds.
 const TURN_S: core::ops::RangeInclusive<f64> = 0.1..=100.0;
 
 fn command(mode: Mode, own: &Section<'_>) -> Result<Command, ConfigError> {
@@ -258,7 +257,7 @@ fn command(mode: Mode, own: &Section<'_>) -> Result<Command, ConfigError> {
     if frequency_khz % 5 != 0 {
         return Err(own.invalid("frequency_khz", "must be a multiple of 5"));
     }
-    // High frequencies are absorbed more. Source: the settings usual for profiling heads of the family.
+    // Absorption grows with frequency. Source: the settings usual for profiling heads of the family.
     let usual_absorption = if frequency_khz >= 800 { 0.6 } else { 0.2 };
     let logfs = [10, 20, 30, 40];
     let logf_db = byte("logf_db", 10..=40, 20)?;
@@ -269,7 +268,7 @@ fn command(mode: Mode, own: &Section<'_>) -> Result<Command, ConfigError> {
         [("profile", (true, Points::P250)), ("imx", (false, Points::P250)), ("igx", (false, Points::P500))];
     let (profile, points) = own.choice("returns", &returns)?.unwrap_or((true, Points::P250));
     let command = Command {
-        // Up to 252: 253 is the byte that ends a command.
+        // Up to 252: 253 is the command terminator.
         head_id: byte("head_id", 0..=252, 0x10)?,
         range_m,
         reverse: false,
@@ -288,12 +287,12 @@ fn command(mode: Mode, own: &Section<'_>) -> Result<Command, ConfigError> {
         switch_delay_ms: 0.0,
         frequency_khz: frequency_khz as f64,
     };
-    // All but the range is within what its key allows.
+    // All settings but the range are within their keys' limits.
     command.encode().map_err(|error| own.invalid("range_m", &error.to_string()))?;
     Ok(command)
 }
 
-/// Pulse length for a range. Source: the settings usual for profiling heads of the family.
+/// Default pulse length for a range. Source: the settings usual for profiling heads of the family.
 pub(crate) fn usual_pulse_us(range_m: u8) -> f64 {
     const PULSES_US: [u16; RANGES_M.len()] = [20, 20, 20, 20, 60, 60, 100, 160, 220, 260, 320, 420, 540];
     let pulse = RANGES_M.into_iter().zip(PULSES_US).find(|(range, _)| *range == range_m);
@@ -307,7 +306,7 @@ pub(crate) mod tests {
 
     use super::*;
 
-    /// A forward head without latency.
+    /// A forward-looking head without latency.
     pub(crate) fn sensor() -> SensorConfig {
         SensorConfig {
             id: "front".to_owned(),

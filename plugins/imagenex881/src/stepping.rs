@@ -1,4 +1,4 @@
-//! How a head moves: a ping at its position, then a step as the command says, within the command's sector.
+//! Motion of a head: a ping at its position, then a step set by the command, within the command's sector.
 
 use crate::codec::{COUNTS_PER_TURN, Command, ZERO_COUNT};
 use crate::settings::counts_of_rad;
@@ -6,9 +6,9 @@ use crate::settings::counts_of_rad;
 /// A ping's position, and the direction of the step after it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Ping {
-    /// Its position, 0 to 1199.
+    /// Position, 0 to 1199.
     pub position: u16,
-    /// Whether the step is towards growing positions.
+    /// True if the step increases the position.
     pub clockwise: bool,
 }
 
@@ -20,22 +20,22 @@ pub struct Head {
 }
 
 impl Head {
-    /// A head at `position` (0 to 1199) that would step towards growing positions, or the other way.
+    /// A head at `position` (0 to 1199), stepping towards increasing positions if `growing`.
     pub fn new(position: i32, growing: bool) -> Self {
         Self { position: position.rem_euclid(COUNTS_PER_TURN), growing }
     }
 
-    /// Where it is, 0 to 1199.
+    /// Position, 0 to 1199.
     pub fn position(&self) -> i32 {
         self.position
     }
 
-    /// Whether its next step goes towards growing positions.
+    /// True if the next step increases the position.
     pub fn growing(&self) -> bool {
         self.growing
     }
 
-    /// Obeys one command: pings where it is, and steps.
+    /// Executes one command: pings at the position, then steps.
     pub fn obey(&mut self, command: &Command) -> Ping {
         self.growing ^= command.reverse;
         let next = self.next_position(command);
@@ -44,7 +44,7 @@ impl Head {
         Ping { position, clockwise: self.growing }
     }
 
-    /// Where the command's step leads; turns round at the ends of a sector narrower than the whole turn.
+    /// Position after the command's step; reverses at the ends of a sector narrower than a full turn.
     fn next_position(&mut self, command: &Command) -> i32 {
         let step = command.step_counts();
         if command.sector_deg >= 360.0 {

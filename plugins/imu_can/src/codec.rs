@@ -1,14 +1,14 @@
-//! Frames to the messages of one maker's set.
+//! Decodes frames into the messages of one maker's set.
 
 use headrace_sensor::codec::{Framed, Framing, Verdict};
 
 use crate::frame::{CanFrame, FRAME_BYTES};
 use crate::sets::{MessageError, bosch, j1939, sbg, xsens};
 
-/// A maker's set of messages with what of it can be configured.
+/// A maker's message set with its configuration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MessageSet {
-    /// Xsens MTi-600 and kin.
+    /// Xsens MTi-600 and related units.
     Xsens(xsens::Ids),
     /// SBG Ellipse and HPINS.
     Sbg,
@@ -32,9 +32,9 @@ pub enum Message {
 }
 
 impl MessageSet {
-    /// Reads a frame; `None` where it is not of this set. Remote and error frames never are.
+    /// Decodes a frame; `None` if it isn't of this set, as for all remote and error frames.
     ///
-    /// Errors: an identifier of the set with a length that it can't have.
+    /// Errors: an identifier of the set with a wrong length.
     pub fn decode(&self, frame: &CanFrame) -> Result<Option<Message>, MessageError> {
         Ok(match self {
             Self::Xsens(ids) => ids.decode(frame)?.map(Message::Xsens),
@@ -44,7 +44,7 @@ impl MessageSet {
         })
     }
 
-    /// Writes a message; `None` where it is of another set.
+    /// Encodes a message; `None` if it is of another set.
     pub fn encode(&self, message: &Message) -> Option<CanFrame> {
         match (self, message) {
             (Self::Xsens(ids), Message::Xsens(message)) => Some(ids.encode(message)),
@@ -56,10 +56,10 @@ impl MessageSet {
     }
 }
 
-/// Bytes to messages of one set.
+/// Decodes bytes into messages of one set.
 ///
-/// Other devices' frames on the bus, remote frames and error frames are good frames of which nothing is read; a frame of
-/// the set with a wrong length is a bad one, as is a message that holds no classic frame.
+/// Other devices' frames, remote frames and error frames are good frames without a message; a frame of the set with a wrong
+/// length is bad, as is a message that holds no classic frame.
 pub type ImuCodec = Framed<MessageSet, FRAME_BYTES>;
 
 impl Framing for MessageSet {
@@ -77,7 +77,7 @@ impl Framing for MessageSet {
     }
 }
 
-/// The frame that these bytes are.
+/// Parses a CAN frame.
 pub(crate) fn can_frame(bytes: &[u8]) -> Option<CanFrame> {
     CanFrame::decode(bytes.first_chunk()?).ok()
 }

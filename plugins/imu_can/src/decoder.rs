@@ -1,4 +1,4 @@
-//! Messages to readings, each as it arrives: the frames of one sample come one behind the other.
+//! Decodes messages into readings on arrival; the frames of one sample come back to back.
 
 use headrace_sensor::codec::{Codec as _, CodecCounts, Framing as _};
 use headrace_sensor::device::Decoder;
@@ -14,30 +14,29 @@ use crate::sets::{bosch, j1939, sbg, scaled, xsens};
 
 const MICROSECOND: DurNs = DurNs(1000);
 
-/// In which order a J1939 unit sends the axes.
+/// Axis order of a J1939 unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum AxisOrder {
-    /// As the standard: pitch, roll, yaw; lateral, longitudinal, vertical. The figures of merit and the latency are
-    /// heeded.
+    /// Standard order: pitch, roll, yaw; lateral, longitudinal, vertical. Figures of merit and latency are applied.
     Yxz,
-    /// As the `OpenIMU`: x, y, z. Its maker says to ignore the figures of merit and the latency.
+    /// `OpenIMU` order: x, y, z. Its maker says to ignore the figures of merit and the latency.
     Xyz,
 }
 
-/// How a unit's messages are to be understood.
+/// Decoding settings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Meaning {
     /// The maker's set.
     pub set: MessageSet,
-    /// Order of axes; heeded in the J1939 set.
+    /// Axis order; used for the J1939 set.
     pub axis_order: AxisOrder,
-    /// Length of a tick of the sample time; heeded in the Xsens set.
+    /// Tick of the sample time; used for the Xsens set.
     pub sample_time_tick: DurNs,
-    /// From validity to receive time.
+    /// Delay from a reading's time of validity to its receipt.
     pub latency: DurNs,
 }
 
-/// Bytes to readings.
+/// Decodes bytes into readings.
 #[derive(Debug, Clone)]
 pub struct ImuDecoder {
     codec: ImuCodec,
@@ -47,26 +46,26 @@ pub struct ImuDecoder {
 
 stateful!(ImuDecoder { state: codec, state, passed_over; });
 
-/// What a message changes beside giving a reading.
+/// State updated by messages.
 #[derive(Debug, Clone)]
 struct State {
     meaning: Meaning,
     invalid: Invalid,
-    /// A unit that sends both would be heard twice.
+    /// True once a quaternion has come; Euler angles are then ignored, lest the attitude be used twice.
     sends_quaternions: bool,
     sample_time_ticks: Option<u32>,
     clock: Option<DeviceClock>,
     stamped_by_filter: Option<bool>,
     received: MonoNs,
     group: Option<u16>,
-    /// Components that have come since the last complete vector.
+    /// Components received since the last complete vector.
     acceleration_mps2: [Option<f64>; 3],
     withheld: u64,
 }
 
 stateful!(State { state: invalid, sends_quaternions, sample_time_ticks, clock, stamped_by_filter, received, group, acceleration_mps2, withheld; fixed: meaning; });
 
-/// What can't be relied on by the unit's last status.
+/// Quantities marked invalid by the unit's last status.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 struct Invalid {
     orientation: bool,
@@ -74,11 +73,11 @@ struct Invalid {
     force: bool,
 }
 
-/// A reading, and the device's own delay where it tells one.
+/// A reading, with the device's own delay if it sends one.
 type Told = Option<(Reading, DurNs)>;
 
 impl AxisOrder {
-    /// Sensor axes x, y, z of three values in the order of the wire, or the other way.
+    /// Converts three values from wire order to sensor axes x, y, z, or back.
     pub fn swapped(self, [a, b, c]: [f64; 3]) -> [f64; 3] {
         match self {
             Self::Yxz => [b, a, c],
@@ -88,7 +87,7 @@ impl AxisOrder {
 }
 
 impl ImuDecoder {
-    /// A decoder that has seen nothing yet.
+    /// New decoder.
     pub fn new(meaning: Meaning) -> Self {
         let state = State {
             meaning,
@@ -105,18 +104,18 @@ impl ImuDecoder {
         Self { codec: ImuCodec::new(meaning.set), state, passed_over: 0 }
     }
 
-    /// Good frames that are not of the unit.
+    /// Number of good frames from other devices.
     pub fn passed_over(&self) -> u64 {
         self.passed_over
     }
 
-    /// The unit's own time of its last sample, where it tells one; wraps.
+    /// Unit timestamp of its last sample, if sent; wraps.
     pub fn sample_time(&self) -> Option<DurNs> {
         let ticks = self.state.sample_time_ticks?;
         Some(DurNs(self.state.meaning.sample_time_tick.0.saturating_mul(i64::from(ticks))))
     }
 
-    /// Number of the unit's last sample, where it tells one; wraps.
+    /// Number of the unit's last sample, if sent; wraps.
     pub fn group(&self) -> Option<u16> {
         self.state.group
     }
@@ -143,7 +142,7 @@ impl Decoder for ImuDecoder {
         self.codec.counts()
     }
 
-    /// Values left out because the unit itself says that they are no good.
+    /// Values withheld as marked invalid by the unit.
     fn withheld(&self) -> u64 {
         self.state.withheld
     }
@@ -182,7 +181,7 @@ impl State {
             }
             M::RateOfTurn(raw) => return self.rate(scaled(raw, xsens::RATE_QUANTUM_RADPS)),
             M::Acceleration(raw) => return self.force(scaled(raw, xsens::ACCELERATION_QUANTUM_MPS2)),
-            // The high-rate messages are left out: which of the two codes is which isn't sure.
+            // High-rate messages are ignored: sources disagree on the two codes.
             _ => (),
         }
         None
@@ -214,7 +213,7 @@ impl State {
     fn take_j1939(&mut self, message: &j1939::Message) -> Told {
         let order = self.meaning.axis_order;
         let (triple, told) = match message {
-            // Pitch and roll without a yaw are no attitude; the filter has them from gravity.
+            // Pitch and roll without yaw are no full attitude; the filter has them from gravity.
             j1939::Message::Slope(_) => return None,
             j1939::Message::AngularRate(triple) => {
                 let rates = triple.rates_degps().map(|degps| degps.map(f64::to_radians));
@@ -233,8 +232,8 @@ impl State {
         Some((reading, DurNs::from_secs_f64(delay_ms / 1000.0)))
     }
 
-    /// The unit has no turn rate about its pitch axis, so that there is no turn rate to tell; the acceleration is told
-    /// when all three components have come.
+    /// The unit has no turn rate about its pitch axis, so no turn rate is reported; the acceleration is reported once all
+    /// three components have come.
     fn take_bosch(&mut self, message: bosch::Message) -> Told {
         let [x, y, z] = &mut self.acceleration_mps2;
         match message {
@@ -247,15 +246,15 @@ impl State {
         force(complete)
     }
 
-    /// The unit stamps its samples and its filter's solutions with one clock, which stands at different times for them: the
-    /// kind that came first is followed.
+    /// The unit stamps samples and filter solutions with one clock but at different times: only the kind that came first is
+    /// followed.
     fn sbg_stamp(&mut self, time_us: u32, of_filter: bool) {
         if *self.stamped_by_filter.get_or_insert(of_filter) == of_filter {
             self.stamp(time_us, MICROSECOND);
         }
     }
 
-    /// Takes a stamp of the unit's clock of 32 bits.
+    /// Processes a timestamp of the unit's 32-bit clock.
     fn stamp(&mut self, ticks: u32, tick: DurNs) {
         let clock = self.clock.get_or_insert_with(|| DeviceClock::new(u32::BITS, tick));
         clock.take(u64::from(ticks), self.received);

@@ -1,16 +1,16 @@
-//! The host's side of the bus: it listens.
+//! Host side of the bus: it only listens.
 
 use headrace_sensor::driver::{Carrier, MessageListener};
 use headrace_sensor::geometry::time::DurNs;
 
 use crate::frame::{CanFrame, FRAME_BYTES};
 
-/// What may carry frames, each as a `can_frame` of 16 bytes.
+/// Supported carriers; each frame is a `can_frame` of 16 bytes.
 pub const CARRIERS: [Carrier; 2] = [Carrier::Can, Carrier::Udp];
 
 const PATIENCE: DurNs = DurNs::from_millis(5_000);
 
-/// A unit's driver.
+/// Driver of a unit.
 pub fn listener() -> MessageListener {
     MessageListener::new(Box::new(judge), PATIENCE)
 }

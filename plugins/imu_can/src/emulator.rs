@@ -1,4 +1,4 @@
-//! The unit's side of the bus: at a fixed rate, the frames of one sample.
+//! Unit side of the bus: the frames of one sample, at a fixed rate.
 
 use headrace_sensor::device::{Direction, Emulator, LineSink};
 use headrace_sensor::geometry::math;
@@ -9,10 +9,10 @@ use crate::codec::{Message, MessageSet};
 use crate::decoder::Meaning;
 use crate::sets::{bosch, j1939, sbg, xsens};
 
-/// Temperature that an emulated unit gives: 10 degrees Celsius.
+/// Temperature of an emulated unit: 10 degrees Celsius.
 const SBG_TEMPERATURE: i16 = 1000;
 
-/// An ideal unit: no noise, no bias and no delay of its own, but whole counts.
+/// Ideal unit: no noise, bias or added delay, but whole counts.
 #[derive(Debug, Clone)]
 pub struct ImuEmulator {
     meaning: Meaning,
@@ -28,7 +28,7 @@ impl ImuEmulator {
         Self { meaning, rate_hz, start, begun: 0, told: 0 }
     }
 
-    /// From the start to a sample on the unit's own clock.
+    /// Time from the start to a sample on the unit's clock.
     fn elapsed(&self, sample: u64) -> DurNs {
         DurNs::from_secs_f64(sample as f64 / self.rate_hz)
     }
@@ -123,17 +123,17 @@ fn bosch(motion: &Inertia) -> [Option<Message>; 3] {
     .map(|message| message.map(Message::Bosch))
 }
 
-/// What wasn't measured is no number, and no message tells it.
+/// The values, if all are finite; values that weren't measured aren't finite, and aren't sent.
 fn all_finite<const N: usize>(values: [f64; N]) -> Option<[f64; N]> {
     values.iter().all(|value| value.is_finite()).then_some(values)
 }
 
-/// A device's clock of 32 bits.
+/// Value of a 32-bit device clock.
 fn wrapped(ticks: i64) -> u32 {
     u32::try_from(ticks.rem_euclid(1 << 32)).unwrap_or_default()
 }
 
-/// The nearest counts that the wire can say.
+/// Nearest counts in the wire's range.
 fn counts<const N: usize>(values: [f64; N], quantum: f64) -> Option<[i16; N]> {
     let counts = |value| {
         let counts = math::round_to_i64(value / quantum);

@@ -1,4 +1,4 @@
-//! Classic CAN frames as `SocketCAN` connections them over: `struct can_frame`, 16 bytes.
+//! Classic CAN frames as passed by `SocketCAN`: `struct can_frame`, 16 bytes.
 //!
 //! ```text
 //!   0 .. 3   identifier, u32 little-endian; bit 31 extended, bit 30 remote, bit 29 error
@@ -27,14 +27,14 @@ pub enum CanId {
     Extended(u32),
 }
 
-/// What a frame is.
+/// Kind of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FrameKind {
     /// Data from a device.
     Data(CanId),
     /// A request for data.
     Remote(CanId),
-    /// The controller tells of an error; the number says which classes.
+    /// An error frame from the controller, with its error class bits.
     Error(u32),
 }
 
@@ -46,7 +46,7 @@ pub struct CanFrame {
     data: [u8; 8],
 }
 
-/// Why bytes are no frame.
+/// Reason why bytes are no frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FrameError {
@@ -60,7 +60,7 @@ pub enum FrameError {
     Id(u32),
 }
 
-/// Up to eight data bytes, put together piece by piece.
+/// A payload of up to eight bytes, built piece by piece.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Payload {
     len: u8,
@@ -85,7 +85,7 @@ impl CanId {
 }
 
 impl Payload {
-    /// These bytes behind those that are there; what goes beyond eight is cut.
+    /// Appends bytes; those beyond eight are dropped.
     #[must_use]
     pub fn with(mut self, bytes: &[u8]) -> Self {
         for byte in bytes {
@@ -99,7 +99,7 @@ impl Payload {
 }
 
 impl CanFrame {
-    /// A data frame. An identifier with too many bits loses the upper ones.
+    /// A data frame. Excess upper bits of the identifier are dropped.
     pub fn new(id: CanId, payload: Payload) -> Self {
         let id = match id {
             CanId::Standard(id) => CanId::Standard(id & STANDARD_IDS),
@@ -127,12 +127,12 @@ impl CanFrame {
         Ok(Self { kind, len, data })
     }
 
-    /// What it is.
+    /// Kind of the frame.
     pub fn kind(&self) -> FrameKind {
         self.kind
     }
 
-    /// Its data; none in a remote frame.
+    /// Data bytes; none in a remote frame.
     pub fn data(&self) -> &[u8] {
         match self.kind {
             FrameKind::Remote(_) => &[],
@@ -140,7 +140,7 @@ impl CanFrame {
         }
     }
 
-    /// Reads a `can_frame`.
+    /// Decodes a `can_frame`.
     ///
     /// Errors: more than eight bytes, or an identifier with too many bits.
     pub fn decode(bytes: &[u8; FRAME_BYTES]) -> Result<Self, FrameError> {
@@ -162,7 +162,7 @@ impl CanFrame {
         Self::of_kind(kind, data.get(..usize::from(*len)).ok_or(FrameError::Length(usize::from(*len)))?)
     }
 
-    /// Writes a `can_frame`.
+    /// Encodes a `can_frame`.
     pub fn encode(&self) -> [u8; FRAME_BYTES] {
         let bits = match self.kind {
             FrameKind::Data(id) => id.bits(),

@@ -1,8 +1,8 @@
-//! Inertial units on CAN: frames of several makers to attitude, turn rate and specific force, and back.
+//! Inertial units on CAN: decodes and encodes several makers' frames of attitude, turn rate and specific force.
 //!
-//! [`frame`] is the CAN frame itself, [`sets`] the makers' messages, [`codec`] joins the two, [`decoder`] makes readings
-//! for the loop, [`emulator`] is the device's side for simulations, [`dbc`] the same for units that a DBC file describes,
-//! and [`plugin`] reads the vehicle file.
+//! [`frame`] is the CAN frame, [`sets`] has the makers' messages, [`codec`] joins the two, [`decoder`] makes readings for the
+//! loop, [`emulator`] is the device side for simulations, [`dbc`] does the same for units described by a DBC file, and
+//! [`plugin`] reads the vehicle file.
 
 #![cfg_attr(not(test), warn(clippy::indexing_slicing))]
 

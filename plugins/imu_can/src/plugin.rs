@@ -1,4 +1,4 @@
-//! The vehicle file's part of an inertial unit, and its place in the loop.
+//! An inertial unit's table in the vehicle file, and its registration with the loop.
 
 use headrace_sensor::SensorConfig;
 use headrace_sensor::config::{ConfigError, Section};
@@ -21,12 +21,12 @@ use crate::sets::{j1939, xsens};
 /// Name in vehicle files.
 pub const NAME: &str = "imu_can";
 
-/// Several seconds of four frames a sample at the usual rate.
+/// Room for several seconds of four frames per sample at the usual rate.
 const RING_BYTES: usize = 1 << 17;
 
 const USUAL_TICK_US: i64 = 100;
 
-/// Inertial units on CAN as a kind of device.
+/// The device kind of inertial units on CAN.
 #[derive(Debug, Clone, Copy)]
 pub struct Kind;
 
@@ -38,7 +38,7 @@ pub struct CanImu {
     rate_hz: f64,
 }
 
-/// By what its frames are understood.
+/// Source of the frame definitions: preset or DBC.
 #[derive(Debug, Clone)]
 enum Known {
     Preset(Meaning),

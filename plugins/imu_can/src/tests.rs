@@ -1,4 +1,4 @@
-//! From a vehicle file's table to readings, by way of the emulated unit.
+//! From a vehicle file's table to readings, through the emulated unit.
 
 use headrace_sensor::SensorConfig;
 use headrace_sensor::config::Document;
@@ -15,7 +15,7 @@ use crate::codec::{Message, MessageSet};
 use crate::decoder::{AxisOrder, ImuDecoder, Meaning};
 use crate::sets::{bosch, j1939, sbg, xsens};
 
-/// A vehicle that turns at constant rates about its own x and about the vertical.
+/// A vehicle rotating at constant rates about its x axis and about the vertical.
 #[derive(Clone, Copy)]
 struct Going {
     roll_radps: f64,
@@ -38,7 +38,7 @@ impl Going {
         self.body(at) * sensor().mount.rotation
     }
 
-    /// What the unit feels then; it doesn't accelerate.
+    /// Inertial measurement of the unit, which doesn't accelerate.
     fn felt(&self, inertia: Inertia) -> Inertia {
         let yaw = self.body(inertia.at).inverse() * Vec3::<Level>::new(0.0, 0.0, self.yaw_radps);
         let body = yaw + Vec3::new(self.roll_radps, 0.0, 0.0);
@@ -85,7 +85,7 @@ fn meaning(set: MessageSet) -> Meaning {
 const XSENS: MessageSet = MessageSet::Xsens(xsens::Ids { base: None });
 const J1939: MessageSet = MessageSet::J1939(j1939::Network { source_address: None });
 
-/// Hands messages to a decoder as the frames that carry them.
+/// Decodes messages, encoded as frames.
 fn readings(decoder: &mut ImuDecoder, set: MessageSet, messages: &[Message]) -> Vec<Decoded> {
     let mut readings = Vec::new();
     for message in messages {
@@ -96,7 +96,7 @@ fn readings(decoder: &mut ImuDecoder, set: MessageSet, messages: &[Message]) -> 
     readings
 }
 
-/// What the emulated unit says about `truth` in `samples` samples.
+/// Readings of `samples` samples of the emulated unit for `truth`.
 fn emulated(own: &str, decoder: &mut ImuDecoder, truth: &Going, samples: usize) -> Vec<Decoded> {
     let start = MonoNs(2_000_000_000);
     let setup = EmulatorSetup { start, head: None, site: Site::default(), polled: true };
@@ -120,7 +120,7 @@ fn emulated(own: &str, decoder: &mut ImuDecoder, truth: &Going, samples: usize) 
     readings
 }
 
-/// Compares every reading with the truth; the tolerances are one quantum of rate and force.
+/// Compares every reading with the truth; tolerances are one quantum of rate and force.
 fn check(readings: &[Decoded], truth: &Going, rate_quantum: f64, force_quantum: f64) {
     for decoded in readings {
         let felt = truth.felt(Inertia::due(decoded.valid_at, DurNs::ZERO));
@@ -251,7 +251,7 @@ fn euler_angles_are_heard_unless_there_are_quaternions() {
 #[test]
 fn an_sbg_at_rest_feels_gravity_upwards_and_its_yaw_grows_to_the_left() {
     let mut decoder = ImuDecoder::new(meaning(MessageSet::Sbg));
-    // At rest the device's own z, which points down, reads -9.81; a heading of -1.5 is nearly west, to the left of north.
+    // At rest the device's z axis, which points down, reads -9.81; a heading of -1.5 is nearly west, to the left of north.
     let messages = [sbg::Message::Acceleration([0, 0, -981]), sbg::Message::Euler([0, 1000, -15_000])];
     let got = readings(&mut decoder, MessageSet::Sbg, &messages.map(Message::Sbg));
     let Reading::SpecificForce(force) = got[0].reading else { panic!() };
@@ -276,7 +276,7 @@ fn values_that_a_j1939_unit_calls_wrong_are_withheld_and_its_latency_counts() {
     assert_eq!((got.len(), decoder.withheld()), (2, 2));
     assert_eq!(got[0].valid_at, MonoNs(1_000_000_000 - 3_000_000 - 2_500_000));
     assert_eq!(got[1].valid_at, MonoNs(1_000_000_000 - 3_000_000));
-    // The first rate is pitch: about y.
+    // The first rate is pitch, about y.
     let Reading::AngularRate(rate) = got[1].reading else { panic!() };
     assert_eq!(rate, Vec3::new(0.0, 1.0_f64.to_radians(), 0.0));
 }
@@ -313,7 +313,7 @@ fn what_an_sbg_calls_unfit_is_withheld() {
     let info = |status| sbg::Message::ImuInfo { time_us: 0, status: sbg::ImuStatus(status), temperature: 0 };
     let samples = [sbg::Message::Acceleration([0; 3]), sbg::Message::Rate([0; 3])];
     assert_eq!(readings(&mut decoder, MessageSet::Sbg, &samples.map(Message::Sbg)).len(), 2);
-    // Accelerometer bits, gyro bits, and that the unit answers at all; the overall test is their sum and not asked.
+    // Accelerometer bits, gyro bits and the response bit; the overall test bit is their combination and isn't checked.
     for (bit, expected) in [(0, 0), (1, 2), (2, 1), (4, 1), (5, 1), (7, 1), (8, 1), (9, 1), (10, 2)] {
         let messages = [info(0x3FF & !(1 << bit)), samples[0], samples[1]].map(Message::Sbg);
         assert_eq!(readings(&mut decoder, MessageSet::Sbg, &messages).len(), expected, "bit {bit}");

@@ -1,4 +1,4 @@
-//! Frames to readings of one part of the vehicle; other good frames are passed over.
+//! Decodes frames into readings of one part of the vehicle; other good frames are ignored.
 
 use headrace_sensor::codec::{Codec as _, CodecCounts, Framing as _, LineClock};
 use headrace_sensor::device::Decoder;
@@ -16,61 +16,61 @@ use crate::message::{
     to_ours,
 };
 
-/// A frame's bytes follow one another: the longest takes 50 ms at 57,600 baud.
+/// Maximum gap within a frame: the longest takes 50 ms at 57,600 baud.
 const SILENCE: DurNs = DurNs::from_millis(100);
 
-/// Angles may be off their range by a rounding.
+/// Tolerance of angle limits, for rounding.
 const ANGLE_TOLERANCE_RAD: f64 = 1e-3;
 
-/// The quality that says that a distance is no good.
+/// Quality that marks a distance as invalid.
 const QUALITY_INVALID_PERCENT: u8 = 1;
 
-/// How a part's messages are to be understood.
+/// Decoding settings of a part.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Meaning {
-    /// Which part.
+    /// Part of the vehicle.
     pub part: Part,
-    /// Whom to listen to; `None` for anyone.
+    /// Accepted system id; `None` for any.
     pub system_id: Option<u8>,
-    /// Which part of that vehicle; `None` for any.
+    /// Accepted component id; `None` for any.
     pub component_id: Option<u8>,
-    /// From validity to receive time.
+    /// Delay from a reading's time of validity to its receipt.
     pub latency: DurNs,
 }
 
-/// A part of the vehicle that the autopilot speaks of.
+/// A part of the vehicle reported by the autopilot.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Part {
     /// Attitude, turn rate, specific force.
     Imu {
-        /// Where rates and forces come from; `None` for the rates of ATTITUDE, and no forces.
+        /// Source of rates and forces; `None` for the rates of ATTITUDE, without forces.
         message: Option<ImuMessage>,
     },
-    /// Pressure of the water.
+    /// Water pressure.
     Pressure {
-        /// Which barometer.
+        /// Barometer, by message.
         message: PressureMessage,
-        /// Quantum of the sensor behind it, Pa.
+        /// Resolution of the sensor behind it, Pa.
         resolution_pa: f64,
     },
     /// A distance.
     Distance(DistancePart),
 }
 
-/// Which distance, and how it is to be understood.
+/// Selection and decoding settings of a distance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DistancePart {
-    /// Number of MAV_SENSOR_ORIENTATION; `None` for any.
+    /// MAV_SENSOR_ORIENTATION number; `None` for any.
     pub orientation: Option<u8>,
-    /// Number of the sensor; `None` for any.
+    /// Sensor id; `None` for any.
     pub sensor_id: Option<u8>,
-    /// Confidence, 0 to 1, of a distance whose quality isn't known.
+    /// Confidence, 0 to 1, of a distance of unknown quality.
     pub unknown_confidence: f64,
-    /// Speed of sound that the sensor is set to, m/s.
+    /// Speed of sound setting of the sensor, m/s.
     pub sound_speed_mps: f64,
 }
 
-/// Bytes to readings.
+/// Decodes bytes into readings.
 #[derive(Debug, Clone)]
 pub struct MavlinkDecoder {
     codec: MavlinkCodec,
@@ -90,7 +90,7 @@ struct State {
 
 stateful!(State { state: boot, passed_over, withheld; fixed: meaning; });
 
-/// The autopilot's clock of 32 bits of milliseconds, unwrapped.
+/// The autopilot's 32-bit millisecond clock, unwrapped.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 struct BootClock {
     last_ms: Option<u32>,
@@ -98,7 +98,7 @@ struct BootClock {
 }
 
 impl BootClock {
-    /// Takes a time. One that seems a little earlier is: messages may be sent out of their order.
+    /// Processes a timestamp. Small backward steps are real, not wraps: messages may be sent out of order.
     fn note(&mut self, time_ms: u32) {
         self.since_boot_ms = match self.last_ms {
             None => i64::from(time_ms),
@@ -109,18 +109,18 @@ impl BootClock {
 }
 
 impl MavlinkDecoder {
-    /// A decoder that has seen nothing yet.
+    /// New decoder.
     pub fn new(meaning: Meaning) -> Self {
         let state = State { meaning, boot: BootClock::default(), passed_over: 0, withheld: 0 };
         Self { codec: MavlinkCodec::default(), clock: LineClock::new(SILENCE), state }
     }
 
-    /// Good frames that are not of the part.
+    /// Number of good frames not of this part.
     pub fn passed_over(&self) -> u64 {
         self.state.passed_over
     }
 
-    /// The autopilot's own time of the part's last message, from when it began.
+    /// Autopilot timestamp of the part's last message, since boot.
     pub fn since_boot(&self) -> Option<DurNs> {
         self.state.boot.last_ms.map(|_| DurNs::from_millis(self.state.boot.since_boot_ms))
     }
@@ -140,7 +140,7 @@ impl Decoder for MavlinkDecoder {
         self.codec.counts()
     }
 
-    /// Values that can't be: angles beyond a turn, numbers that are none, a pressure below zero, limits that contradict.
+    /// Invalid values: angles beyond their range, non-finite numbers, pressure not above zero, contradictory limits.
     fn withheld(&self) -> u64 {
         self.state.withheld
     }
@@ -189,7 +189,7 @@ impl State {
     }
 }
 
-/// Turned about z, then y, then x of the turned axes is about fixed x, then y, then z: what [`Rot`] takes.
+/// Intrinsic z-y-x rotation equals extrinsic x-y-z, which [`Rot`] takes.
 fn attitude(attitude: &ATTITUDE_DATA) -> Option<Reading> {
     let [roll, pitch, yaw] = to_ours([attitude.roll, attitude.pitch, attitude.yaw].map(f64::from));
     let within = |angle: f64, most: f64| angle.abs() <= most + ANGLE_TOLERANCE_RAD;
@@ -221,7 +221,7 @@ impl DistancePart {
             && self.sensor_id.is_none_or(|id| id == distance.sensor_id)
     }
 
-    /// What the sensor calls invalid, or says to be beyond what it can measure, is no echo.
+    /// A distance marked invalid, or outside the sensor's limits, gives a ping without an echo.
     fn echo(&self, distance: &Distance) -> Option<Reading> {
         if distance.least_cm >= distance.most_cm || distance.quality_percent > 100 {
             return None;

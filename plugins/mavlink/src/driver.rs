@@ -1,4 +1,4 @@
-//! The host's side of a telemetry link: it listens for its part, and says that it is there.
+//! Host side of a telemetry link: receives its part's messages and sends heartbeats.
 
 use headrace_sensor::device::Decoder as _;
 use headrace_sensor::driver::{Carrier, Cutter, DeviceHealth, Driver, Wire};
@@ -11,21 +11,21 @@ use crate::decoder::{MavlinkDecoder, Meaning};
 use crate::dialect::{HEARTBEAT_DATA, MavAutopilot, MavComponent, MavModeFlag, MavState, MavType};
 use crate::frame::{Frames, MAX_FRAME_BYTES, encode};
 
-/// What may carry telemetry.
+/// Supported carriers.
 pub const CARRIERS: [Carrier; 3] = [Carrier::Udp, Carrier::Tcp, Carrier::Serial];
 
-/// A frame's bytes follow one another: the longest takes 50 ms at 57,600 baud.
+/// Maximum gap within a frame: the longest takes 50 ms at 57,600 baud.
 const SILENCE: DurNs = DurNs::from_millis(100);
-/// Routers send only to those who speak. Source: MAVLink, heartbeat protocol, once a second.
+/// Routers send only to active systems. Source: MAVLink, heartbeat protocol, once a second.
 const HEARTBEAT_PERIOD: DurNs = DurNs::from_millis(1_000);
-/// We are a part of the vehicle.
+/// The host is an onboard computer of the vehicle.
 const COMPONENT_ID: u8 = MavComponent::MAV_COMP_ID_ONBOARD_COMPUTER as u8;
 const SYSTEM_ID: u8 = 1;
 
-/// A part's driver. Messages of other parts aren't handed on: where several share a line, each is recorded once.
+/// Driver of a part. Other parts' messages aren't delivered: on a shared line each message is recorded once.
 pub struct MavlinkDriver {
     cutter: Cutter<Frames, MAX_FRAME_BYTES>,
-    /// Tells the part's messages from others.
+    /// Separates the part's messages from others.
     decoder: MavlinkDecoder,
     own_frames: u64,
     next_at: MonoNs,
@@ -34,7 +34,7 @@ pub struct MavlinkDriver {
 }
 
 impl MavlinkDriver {
-    /// For a part of the vehicle.
+    /// Driver of a part of the vehicle.
     pub fn new(meaning: Meaning) -> Self {
         Self {
             cutter: Cutter::new(Frames, SILENCE),

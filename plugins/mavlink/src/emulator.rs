@@ -1,4 +1,4 @@
-//! The autopilot's side of the line: at a fixed rate, the messages of one part.
+//! Autopilot side of the line: the messages of one part, at a fixed rate.
 
 use headrace_sensor::device::{Direction, Emulator, EmulatorSetup, LineSink};
 use headrace_sensor::geometry::math;
@@ -11,29 +11,29 @@ use crate::decoder::{DistancePart, Meaning, Part};
 use crate::dialect::ATTITUDE_DATA;
 use crate::message::{Distance, HECTOPASCAL, Imu, MILLI_G_MPS2, MILLIRADPS, Message, Pressure, to_ours};
 
-/// Limits that an emulated distance sensor tells, cm: about those of a Ping1D.
+/// Limits of an emulated distance sensor, cm: about those of a Ping1D.
 const LEAST_CM: u16 = 30;
 const MOST_CM: u16 = 5000;
-/// Qualities that it gives where it hears something, and where it doesn't.
+/// Qualities with and without an echo.
 const QUALITY_HEARD_PERCENT: u8 = 100;
 const QUALITY_INVALID_PERCENT: u8 = 1;
 /// Ten degrees Celsius.
 const TEMPERATURE_CDEGC: i16 = 1000;
 
-/// An ideal autopilot: no noise and no delay of its own, but whole units of the wire.
+/// Ideal autopilot: no noise and no added delay, but whole wire units.
 #[derive(Debug, Clone)]
 pub struct AutopilotEmulator {
     meaning: Meaning,
     rate_hz: f64,
     start: MonoNs,
-    /// Metres as the distance sensor reckons them for a metre of the site's.
+    /// Metres measured by the distance sensor per true metre at the site.
     device_per_site: f64,
     begun: u64,
     sequence: u8,
 }
 
 impl AutopilotEmulator {
-    /// An autopilot that is switched on, and first speaks, when `setup` says.
+    /// An autopilot that is switched on, and first sends, at the setup's start.
     pub fn new(meaning: Meaning, rate_hz: f64, setup: &EmulatorSetup) -> Self {
         let device_per_site = match meaning.part {
             Part::Distance(part) => part.sound_speed_mps / setup.site.sound_speed_mps,
@@ -84,7 +84,7 @@ impl Emulator<Inertia> for AutopilotEmulator {
         let rates_radps = to_ours(motion.rate_radps.0.into());
         let [rollspeed, pitchspeed, yawspeed] = rates_radps.map(single);
         let time_boot_ms = self.since_boot_ms(motion.at);
-        // What wasn't measured is no number, and no message tells it.
+        // Values that weren't measured aren't finite, and aren't sent.
         let is_known = |values: &[f64]| values.iter().all(|value| value.is_finite());
         if !is_known(&rates_radps) {
             return;
@@ -146,7 +146,7 @@ impl Emulator<Sounding> for AutopilotEmulator {
     }
 }
 
-/// The nearest that the wire can say.
+/// Nearest value in the wire's range.
 fn counts(value: f64) -> i16 {
     let counts = math::round_to_i64(value);
     i16::try_from(counts).unwrap_or(if counts < 0 { i16::MIN } else { i16::MAX })

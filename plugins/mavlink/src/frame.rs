@@ -1,14 +1,13 @@
-//! Frames of both versions of MAVLink.
+//! Frames of both MAVLink versions.
 //!
 //! ```text
 //!   FE length sequence system component id                     payload CRC16              first version
 //!   FD length incompatible compatible sequence system component id id id payload CRC16 [signature 13]
 //! ```
-//! Definitions, checksum and packing are the mavlink crate's. Its reader isn't used: it doesn't tell where a frame began,
-//! which its receive time depends on, counts nothing, and takes frames of the first version of any length.
-//! The second version leaves zeros at a payload's end unsent. A signature's truth isn't checked: who may send on the
-//! vehicle's own network is the network's affair. A frame that is cut off in its signature therefore takes the bytes that
-//! follow for the rest of it.
+//! Definitions, checksum and packing come from the mavlink crate. Its reader isn't used: it doesn't report the start of a
+//! frame, needed for the receive time, has no counters, and accepts version 1 frames of any length.
+//! Version 2 truncates trailing zeros of a payload. Signatures aren't verified: access to the vehicle's own network is the
+//! network's responsibility. A frame cut off in its signature therefore takes the following bytes for the rest of it.
 //! Source: MAVLink guide, "Packet Serialization" and "Message Signing".
 
 use headrace_sensor::codec::{Bytes, Framed, Framing, Verdict};
@@ -20,26 +19,26 @@ use mavlink::{
 
 use crate::dialect::{self, MavMessage};
 
-/// The longest frame: header, payload, checksum, signature.
+/// Maximum frame length: header, payload, checksum, signature.
 pub const MAX_FRAME_BYTES: usize = V2_HEADER_BYTES + MAX_PAYLOAD_LEN + CHECKSUM_SIZE + v2::SIGNATURE_SIZE;
 
 const V1_HEADER_BYTES: usize = STX_SIZE + v1::HEADER_SIZE;
 const V2_HEADER_BYTES: usize = STX_SIZE + v2::MIN_HEADER_SIZE;
 
-/// A frame whose checksum is right.
+/// A frame with a correct checksum.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Frame {
-    /// Its version.
+    /// Protocol version.
     pub version: MavlinkVersion,
-    /// Who sends it, and its number.
+    /// Sender and sequence number.
     pub header: MavHeader,
-    /// Which message it is; up to 24 bits, 8 in the first version.
+    /// Message id; up to 24 bits, 8 in version 1.
     pub message_id: u32,
-    /// The message's fields, as far as they are sent.
+    /// Message fields, as far as they were sent.
     pub payload: Bytes<MAX_PAYLOAD_LEN>,
 }
 
-/// What a header announces.
+/// Fields of a frame header.
 #[derive(Debug, Clone, Copy)]
 struct Header {
     version: MavlinkVersion,
@@ -50,7 +49,7 @@ struct Header {
 }
 
 impl Header {
-    /// The header that `front` begins with. `None` where it isn't whole.
+    /// The header at the front of `front`; `None` if incomplete.
     fn of(front: &[u8]) -> Option<Self> {
         let (version, payload_bytes, signed, [sequence, system_id, component_id], message_id) = match *front {
             [MAV_STX, len, n, system, component, id, ..] => {
@@ -67,7 +66,7 @@ impl Header {
         Some(Self { version, payload_bytes: usize::from(payload_bytes), signed, sender, message_id })
     }
 
-    /// Where the payload begins.
+    /// Offset of the payload.
     fn header_bytes(&self) -> usize {
         match self.version {
             MavlinkVersion::V1 => V1_HEADER_BYTES,
@@ -75,7 +74,7 @@ impl Header {
         }
     }
 
-    /// Where the payload ends.
+    /// End of the payload.
     fn summed_bytes(&self) -> usize {
         self.header_bytes() + self.payload_bytes
     }
@@ -84,7 +83,7 @@ impl Header {
         self.summed_bytes() + CHECKSUM_SIZE + if self.signed { v2::SIGNATURE_SIZE } else { 0 }
     }
 
-    /// Whether its message can be checked; in the first version that takes the one length that the message has.
+    /// True if the message's checksum can be checked; version 1 also requires the message's exact length.
     fn is_known(&self) -> bool {
         match self.version {
             MavlinkVersion::V1 => v1_payload_bytes(self.message_id) == Some(self.payload_bytes),
@@ -93,32 +92,32 @@ impl Header {
     }
 }
 
-/// Length of a message's payload in the first version: of all its fields but extensions.
+/// Payload length of a message in version 1: all fields except extensions.
 fn v1_payload_bytes(message_id: u32) -> Option<usize> {
     let message = MavMessage::default_message_from_id(message_id)?;
     Some(message.ser(MavlinkVersion::V1, &mut [0; MAX_PAYLOAD_LEN]))
 }
 
-/// A message as a frame of the second version.
+/// Encodes a message as a version 2 frame.
 pub fn encode(header: MavHeader, message: &impl MessageData) -> MAVLinkV2MessageRaw {
     let mut frame = MAVLinkV2MessageRaw::new();
     frame.serialize_message_data(header, message);
     frame
 }
 
-/// Length of the frame that `front` begins with, as its header announces it; `None` where there is no whole header.
+/// Length of the frame at the front of `front` by its header; `None` if the header is incomplete.
 pub(crate) fn announced_bytes(front: &[u8]) -> Option<usize> {
     Header::of(front).map(|header| header.whole_bytes())
 }
 
-/// How frames stand in a stream of bytes.
+/// Framing in a byte stream.
 ///
-/// A frame whose message isn't known, and one with an incompatible feature other than a signature, are no start: they
-/// can't be told from noise, and their bytes are skipped.
+/// A frame with an unknown message, or with an incompatibility flag other than signing, can't be told from noise, and its
+/// bytes are skipped.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Frames;
 
-/// Frames out of a stream of bytes.
+/// Decodes frames from a byte stream.
 pub type MavlinkCodec = Framed<Frames, MAX_FRAME_BYTES>;
 
 impl Framing for Frames {
@@ -154,7 +153,7 @@ impl Framing for Frames {
     }
 }
 
-/// Messages that tell a place on Earth, a machine's own number, or what people wrote; none of them is read here.
+/// Messages with geographic position, hardware identity or free text; none of them is decoded here.
 #[expect(deprecated, reason = "older autopilots send superseded messages")]
 const IDENTITY: [u32; 16] = [
     dialect::GPS_RAW_INT_DATA::ID,
@@ -175,8 +174,7 @@ const IDENTITY: [u32; 16] = [
     dialect::OPEN_DRONE_ID_BASIC_ID_DATA::ID,
 ];
 
-/// The frames of a packet that holds whole ones alone, without those of [`IDENTITY`]; `None` where it holds something else, or
-/// none of them.
+/// Writes a packet of whole frames without those of [`IDENTITY`]; `None` if the packet holds anything else, or none of those.
 pub(crate) fn without_identity(packet: &[u8], shorter: &mut Vec<u8>) -> Option<()> {
     let mut rest = packet;
     while !rest.is_empty() {
@@ -214,7 +212,7 @@ mod tests {
         bytes
     }
 
-    /// With the feature of signatures, and a signature of the given bytes.
+    /// Adds the signing flag and a signature of the given bytes.
     fn signed(frame: &[u8], signature: [u8; v2::SIGNATURE_SIZE]) -> Vec<u8> {
         let message = Frames.read(frame).unwrap().message_id;
         let (front, _) = frame.split_at(frame.len() - CHECKSUM_SIZE);
@@ -224,7 +222,7 @@ mod tests {
         [&bytes[..], &sum.to_le_bytes(), &signature].concat()
     }
 
-    /// RAW_IMU of the first version, all fields zero but the first.
+    /// RAW_IMU of version 1, all fields zero but the first.
     fn first_version() -> Frame {
         let mut payload = [0; 26];
         payload[0] = 0xFD;
@@ -310,7 +308,7 @@ mod tests {
         assert_eq!(decode_all(&mut MavlinkCodec::default(), &encoded(&frame)), []);
     }
 
-    /// Without signatures: nothing tells a signature that was cut off from the frame that follows.
+    /// Without signatures: a truncated signature can't be told from the following frame.
     fn any_frame() -> impl Strategy<Value = Frame> {
         let ids = proptest::sample::select(vec![0_u32, 26, 27, 29, 30, 116, 132, 137, 143, 253, 11_032]);
         let payload = proptest::collection::vec(any::<u8>(), 255);

@@ -1,9 +1,9 @@
-//! MAVLink from a vehicle whose autopilot owns the sensors: its frames to attitude, rates and forces, pressure, distances,
-//! and back.
+//! MAVLink from a vehicle whose autopilot owns the sensors: decodes and encodes attitude, rates and forces, pressure and
+//! distances.
 //!
-//! [`frame`] tells frames from noise, [`message`] reads those of use, [`decoder`] makes readings for the loop, [`emulator`] is
-//! the autopilot's side for simulations, [`plugin`] reads the vehicle file and [`tlog`] the files that ground stations
-//! write. Definitions of messages are the mavlink crate's.
+//! [`frame`] separates frames from noise, [`message`] reads the supported messages, [`decoder`] makes readings for the loop,
+//! [`emulator`] is the autopilot side for simulations, [`plugin`] reads the vehicle file and [`tlog`] the log files of ground
+//! stations. Message definitions come from the mavlink crate.
 
 #![cfg_attr(not(test), warn(clippy::indexing_slicing))]
 
@@ -16,7 +16,7 @@ pub mod plugin;
 pub mod tlog;
 
 pub use mavlink::MavHeader;
-/// The messages that ArduPilot speaks: its own and all that it includes.
+/// ArduPilot's dialect: its own messages and all included ones.
 pub use mavlink::dialects::ardupilotmega as dialect;
 pub use plugin::Kind;
 

@@ -1,6 +1,6 @@
-//! The messages that are of use, in the wire's own units and axes: x forward, y right, z down, and north, east, down.
+//! Supported messages, in wire units and axes: x forward, y right, z down, and north, east, down.
 //!
-//! [`to_ours`] turns vectors into our axes (x forward, y left, z up) and angles into ours; both are their own inverse.
+//! [`to_ours`] converts vectors and angles to our axes (x forward, y left, z up); it is its own inverse.
 //! Source: MAVLink common message set (common.xml): ATTITUDE, RAW_IMU, SCALED_IMU to SCALED_IMU3, SCALED_PRESSURE to
 //! SCALED_PRESSURE3, DISTANCE_SENSOR.
 
@@ -23,7 +23,7 @@ pub const HECTOPASCAL: f64 = 100.0;
 /// One message.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Message {
-    /// Attitude and turn rate as the autopilot estimates them.
+    /// Attitude and turn rate estimated by the autopilot.
     Attitude(ATTITUDE_DATA),
     /// Rates and forces of one inertial unit.
     Imu(Imu),
@@ -36,24 +36,24 @@ pub enum Message {
 /// RAW_IMU and SCALED_IMU to SCALED_IMU3.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Imu {
-    /// Which message.
+    /// Message type.
     pub message: ImuMessage,
-    /// Since the autopilot began, or since 1970; scaled ones tell it in milliseconds.
+    /// Time since boot, or since 1970; SCALED_IMU messages send it in milliseconds.
     pub time_us: u64,
-    /// Acceleration less gravity.
+    /// Specific force, milli-g.
     pub force_mg: [i16; 3],
-    /// Turn rate.
+    /// Turn rate, mrad/s.
     pub rate_mradps: [i16; 3],
-    /// Which unit it is; only RAW_IMU of the second version tells more than 0.
+    /// Unit number; above 0 only in RAW_IMU of version 2.
     pub unit: u8,
 }
 
 /// SCALED_PRESSURE to SCALED_PRESSURE3.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pressure {
-    /// Which message.
+    /// Message type.
     pub message: PressureMessage,
-    /// Since the autopilot began.
+    /// Time since boot.
     pub time_boot_ms: u32,
     /// Absolute pressure.
     pub absolute_hpa: f32,
@@ -64,23 +64,23 @@ pub struct Pressure {
 /// DISTANCE_SENSOR.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Distance {
-    /// Since the autopilot began.
+    /// Time since boot.
     pub time_boot_ms: u32,
-    /// The least that the sensor can measure.
+    /// Minimum measurable distance.
     pub least_cm: u16,
-    /// The most that the sensor can measure.
+    /// Maximum measurable distance.
     pub most_cm: u16,
-    /// What it measures.
+    /// Measured distance.
     pub distance_cm: u16,
-    /// Number of the sensor.
+    /// Sensor id.
     pub sensor_id: u8,
-    /// Where it looks, as a number of MAV_SENSOR_ORIENTATION.
+    /// Viewing direction, as a MAV_SENSOR_ORIENTATION number.
     pub orientation: u8,
-    /// Quality in per cent, of which 1 means invalid; 0 where it isn't known.
+    /// Quality in per cent; 1 = invalid, 0 = unknown.
     pub quality_percent: u8,
 }
 
-/// The messages that tell rates and forces.
+/// Messages with rates and forces.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ImuMessage {
     /// RAW_IMU.
@@ -93,7 +93,7 @@ pub enum ImuMessage {
     Scaled3,
 }
 
-/// The messages that tell pressures.
+/// Messages with pressures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PressureMessage {
     /// SCALED_PRESSURE.
@@ -104,13 +104,13 @@ pub enum PressureMessage {
     Third,
 }
 
-/// A vector, or roll, pitch and yaw, in the wire's axes in ours, or the other way.
+/// Converts a vector, or roll, pitch and yaw, from the wire's axes to ours, or back.
 pub fn to_ours([x, y, z]: [f64; 3]) -> [f64; 3] {
     [x, -y, -z]
 }
 
 impl Message {
-    /// What a frame says; `None` for other messages.
+    /// Decodes a frame; `None` for unsupported messages.
     pub fn of(frame: &Frame) -> Option<Self> {
         match frame.message_id {
             ATTITUDE_DATA::ID => read::<ATTITUDE_DATA, _>(frame).map(Self::Attitude),
@@ -126,7 +126,7 @@ impl Message {
         }
     }
 
-    /// The message as a frame of the second version. Fields that nobody here reads are zero.
+    /// Encodes the message as a version 2 frame. Fields not decoded here are zero.
     pub fn to_frame(&self, header: MavHeader) -> MAVLinkV2MessageRaw {
         match self {
             Self::Attitude(attitude) => encode(header, attitude),
@@ -146,12 +146,12 @@ impl Message {
     }
 }
 
-/// A frame's fields; zero where they aren't sent.
+/// Fields of a frame; fields not sent are zero.
 fn read<D: MessageData, T: From<D>>(frame: &Frame) -> Option<T> {
     D::deser(frame.version, frame.payload.as_slice()).ok().map(T::from)
 }
 
-/// The IMU messages have the same fields, but for their times and RAW_IMU's number.
+/// The IMU messages share their fields, except for times and RAW_IMU's unit number.
 macro_rules! imu_messages {
     ($($data:ident: $message:ident, $time:ident: $time_type:ty = $unit_us:literal us $(, $unit:ident)?;)*) => {$(
         impl From<$data> for Imu {
@@ -184,7 +184,7 @@ imu_messages! {
     SCALED_IMU3_DATA: Scaled3, time_boot_ms: u32 = 1000 us;
 }
 
-/// The pressure messages have the same fields.
+/// The pressure messages share their fields.
 macro_rules! pressure_messages {
     ($($data:ident: $message:ident;)*) => {$(
         impl From<$data> for Pressure {
@@ -213,12 +213,12 @@ pressure_messages! {
     SCALED_PRESSURE3_DATA: Third;
 }
 
-/// Places of a distance's type and orientation in its payload.
+/// Payload offsets of a distance's type and orientation.
 const TYPE_AT: usize = 10;
 const ORIENTATION_AT: usize = 12;
 
-/// The crate refuses types and orientations that its definitions lack. A sensor's type isn't of interest here, and its
-/// orientation is a number in the vehicle file, so that neither is taken for an enumeration.
+/// The crate rejects types and orientations missing from its definitions. The sensor type isn't used here and the orientation
+/// is a plain number in the vehicle file, so neither is parsed as an enumeration.
 impl MessageData for Distance {
     type Message = MavMessage;
 
@@ -239,7 +239,7 @@ impl MessageData for Distance {
             signal_quality: self.quality_percent,
             ..DISTANCE_SENSOR_DATA::DEFAULT
         };
-        // The unknown variance after it is not zero, so that the orientation is always sent.
+        // The following field, the unknown variance, isn't zero, so the orientation is never truncated.
         let len = data.ser(version, payload);
         if let Some(orientation) = payload.get_mut(ORIENTATION_AT) {
             *orientation = self.orientation;

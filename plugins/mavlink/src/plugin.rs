@@ -1,4 +1,4 @@
-//! The vehicle file's part of an autopilot's part, and its place in the loop.
+//! A MAVLink part's table in the vehicle file, and its registration with the loop.
 
 use headrace_sensor::SensorConfig;
 use headrace_sensor::config::{ConfigError, Section};
@@ -16,13 +16,13 @@ use crate::message::{ImuMessage, PressureMessage};
 /// Name in vehicle files.
 pub const NAME: &str = "mavlink";
 
-/// Some seconds of all that an autopilot says.
+/// Room for several seconds of an autopilot's full output.
 const RING_BYTES: usize = 1 << 17;
 
-/// Step of the pressures that ArduSub gives for a Bar30.
+/// Resolution of ArduSub's pressures for a Bar30, Pa.
 const USUAL_RESOLUTION_PA: f64 = 10.0;
 
-/// Parts that an autopilot speaks of, as a kind of device.
+/// The MAVLink device kind: parts reported by an autopilot.
 #[derive(Debug, Clone, Copy)]
 pub struct Kind;
 

@@ -1,4 +1,4 @@
-//! From a vehicle file's table to readings, by way of the emulated autopilot.
+//! From a vehicle file's table to readings, through the emulated autopilot.
 
 use headrace_sensor::SensorConfig;
 use headrace_sensor::codec::CodecCounts;
@@ -74,7 +74,7 @@ fn decode_message(decoder: &mut MavlinkDecoder, message: &Message) -> Vec<Readin
     readings.into_iter().map(|decoded| decoded.reading).collect()
 }
 
-/// What the emulated part says of measurements that `feel` fills in.
+/// Readings of the emulated part for measurements filled in by `feel`.
 fn emulated<M: Measurement>(
     emulator: &mut dyn Emulator<M>,
     decoder: &mut MavlinkDecoder,
@@ -107,7 +107,7 @@ fn setup() -> EmulatorSetup {
     }
 }
 
-/// A vehicle that yaws to the left, nose down and heeling; it doesn't accelerate.
+/// A vehicle yawing to the left, nose down and heeling, without acceleration.
 fn felt(inertia: Inertia) -> Inertia {
     let t = inertia.at.since(START).as_secs_f64();
     let attitude: Rot<Level, Sensor> = Rot::from_roll_pitch_yaw(0.1, 0.3, 0.5 + 0.2 * t);
@@ -132,7 +132,7 @@ fn attitude_rates_and_forces_come_back() {
         let mut decoder = decoder(part);
         let readings = emulated(emulator.as_mut(), &mut decoder, 50, felt);
         assert_eq!(readings.len(), 50 * each);
-        // Two quanta of rate and force, and single precision of angles.
+        // Tolerances: two quanta of rate and force, and single precision of angles.
         for decoded in &readings {
             let truth = felt(Inertia::due(decoded.valid_at, DurNs::ZERO));
             match decoded.reading {
@@ -192,7 +192,7 @@ fn distances_come_back_and_none_where_nothing_is_heard() {
         other => panic!("{other:?}"),
     };
     let ranges: Vec<_> = readings.iter().map(echo).collect();
-    // 2.345 m of the site's water are 2.426 m with the speed of sound that the sensor is set to.
+    // 2.345 m in the site's water is 2.426 m at the sensor's speed of sound setting.
     assert_eq!(
         ranges,
         [(Some(2.43), 1.0, 1500.0), (None, 0.0, 1500.0), (None, 0.0, 1500.0), (None, 0.0, 1500.0)]
@@ -215,7 +215,7 @@ fn axes_that_point_down_and_right_are_turned() {
     let Reading::Attitude(attitude) = readings[0] else { panic!() };
     let (roll, pitch, yaw) = attitude.roll_pitch_yaw();
     assert!((roll - 0.1).abs() < 1e-7 && (pitch + 0.2).abs() < 1e-7 && (yaw + 0.3).abs() < 1e-7);
-    // Nose up there is nose up here: the body's x axis rises.
+    // Nose up on the wire is nose up in our axes: the body's x axis rises.
     let nose = attitude * Vec3::new(1.0, 0.0, 0.0);
     assert!((nose.z() - 0.198_669).abs() < 1e-6, "{nose:?}");
     assert_eq!(readings[1], Reading::AngularRate(Vec3::new(1.0, -2.0, -3.0)));
@@ -308,7 +308,7 @@ fn wrong_keys_are_named() {
 
 #[test]
 fn places_and_machine_numbers_go_and_readings_stay() {
-    // GLOBAL_POSITION_INT of both versions, the second one signed.
+    // GLOBAL_POSITION_INT of both versions, version 2 signed.
     let first = [&[0xFE, 28, 0, 1, 1, 33][..], &[7; 28], &[0, 0]].concat();
     let second = [&[0xFD, 20, 1, 0, 0, 1, 1, 33, 0, 0][..], &[7; 20], &[0, 0], &[9; 13]].concat();
     let packet = [&first, RECORDED_ATTITUDE, &second, RECORDED_PRESSURE].concat();

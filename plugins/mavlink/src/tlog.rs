@@ -1,4 +1,4 @@
-//! Telemetry logs of ground stations (`.tlog`): before each frame, when it came.
+//! Telemetry logs of ground stations (`.tlog`): each frame preceded by its timestamp.
 //!
 //! Source: MAVLink developer guide, "Telemetry logs": eight bytes, big-endian, microseconds since 1970.
 
@@ -6,46 +6,46 @@ use crate::frame::announced_bytes;
 
 const STAMP_BYTES: usize = 8;
 
-/// The frames of a log, in order, whatever their checksums. Ends after the first error.
+/// Iterates over the frames of a log without checking checksums. Ends after the first error.
 #[derive(Debug, Clone)]
 pub struct Tlog<'a> {
     bytes: &'a [u8],
     offset: usize,
 }
 
-/// A frame and when it was written down.
+/// A frame with its log timestamp.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Logged<'a> {
     /// UTC, microseconds since 1970.
     pub utc_us: u64,
-    /// The frame's bytes.
+    /// Bytes of the frame.
     pub frame: &'a [u8],
 }
 
-/// What is wrong with a log.
+/// Error in a telemetry log.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TlogError {
     /// The file ends within an entry.
     #[error("reading a telemetry log: the entry at byte {offset} is cut off")]
     Short {
-        /// Where the entry begins.
+        /// Offset of the entry.
         offset: usize,
     },
-    /// No frame where one has to be.
+    /// No frame at the expected offset.
     #[error(
         "reading a telemetry log: the entry at byte {offset} has 0x{got:02X} for a frame's start; 0xFE and 0xFD are allowed"
     )]
     Start {
-        /// Where the entry begins.
+        /// Offset of the entry.
         offset: usize,
-        /// What stands there.
+        /// Byte found.
         got: u8,
     },
 }
 
 impl<'a> Tlog<'a> {
-    /// The log that `bytes` are.
+    /// Reads a log from `bytes`.
     pub fn new(bytes: &'a [u8]) -> Self {
         Self { bytes, offset: 0 }
     }

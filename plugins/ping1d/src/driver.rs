@@ -1,5 +1,5 @@
-//! The host's side of an echosounder's line: settings first, each acknowledged, then a distance each interval, asked for or
-//! sent by the device of its own accord.
+//! Host side of an echosounder's line: settings first, each acknowledged, then a distance each interval, requested or sent
+//! continuously.
 
 use std::collections::VecDeque;
 
@@ -9,39 +9,39 @@ use headrace_sensor::geometry::time::{DurNs, MonoNs};
 use crate::codec::{Addressed, DeviceInformation, Frame, Frames, MAX_FRAME_BYTES, Message, id};
 use crate::settings::{Polling, Settings};
 
-/// What may carry an echosounder's bytes.
+/// Supported carriers.
 pub const CARRIERS: [Carrier; 3] = [Carrier::Serial, Carrier::Udp, Carrier::Tcp];
 
-/// A frame's bytes follow one another on the line.
+/// Maximum gap within a frame.
 const SILENCE: DurNs = DurNs::from_millis(50);
-/// How long an answer to a setting or a question may take. Source: Ping protocol, 50 ms; a bridge adds to it.
+/// Timeout of the answer to a setting or request. Source: Ping protocol, 50 ms; a bridge adds to it.
 const ANSWER_TIME: DurNs = DurNs::from_millis(150);
-/// What a ping may take beyond the interval.
+/// Allowance for a ping beyond the interval.
 const PING_TIME: DurNs = DurNs::from_millis(250);
-/// How often a setting is said that isn't acknowledged, before the next one's turn.
+/// Attempts to send a setting before moving on to the next.
 const TRIES: u32 = 4;
-/// How often the speed of sound is asked for: other clients of a bridge can change it.
+/// Interval of checking the speed of sound: other clients of a bridge can change it.
 const LOOK_PERIOD: DurNs = DurNs::from_millis(10_000);
 
 const ECHOSOUNDER: u8 = 1;
 
-/// What the last message was for.
+/// Purpose of the message in flight.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Asked {
-    /// A setting, or a question about the device, by the id of the message.
+    /// A setting or a device query, by message id.
     Setting(u16),
-    /// A distance.
+    /// A distance request.
     Distance,
 }
 
-/// An echosounder's driver.
+/// Driver of an echosounder.
 pub struct PingDriver {
     settings: Settings,
     cutter: Cutter<Frames, MAX_FRAME_BYTES>,
-    /// Messages that come before the next distance.
+    /// Messages to send before the next distance request.
     to_say: VecDeque<(Asked, Vec<u8>)>,
     asked: Option<(Asked, MonoNs)>,
-    /// The setting in flight, and how often it may still be said.
+    /// The setting in flight, and its remaining retries.
     again: Option<(Vec<u8>, u32)>,
     next_at: MonoNs,
     look_at: MonoNs,
@@ -50,7 +50,7 @@ pub struct PingDriver {
 }
 
 impl PingDriver {
-    /// For a device with these settings.
+    /// New driver with these settings.
     pub fn new(settings: Settings) -> Self {
         Self {
             settings,
@@ -65,7 +65,7 @@ impl PingDriver {
         }
     }
 
-    /// What a device is told and asked when its line has been opened.
+    /// Queues the settings and queries sent when the line opens.
     fn greet(&mut self) {
         let settings = self.settings;
         let interval_ms = u16::try_from(settings.interval.0 / 1_000_000).unwrap_or(u16::MAX);
@@ -93,13 +93,13 @@ impl PingDriver {
         self.to_say.extend(self.encoded(message).map(|bytes| (Asked::Setting(about), bytes)));
     }
 
-    /// A message to the device; what a host says is far shorter than the longest frame.
+    /// Encodes a message to the device; host messages are far shorter than the longest frame.
     fn encoded(&self, message: &Message) -> Option<Vec<u8>> {
         let addressed = Addressed { source: 0, destination: self.settings.device_id, message: *message };
         addressed.encode().ok().map(|bytes| bytes.as_slice().to_vec())
     }
 
-    /// Says what is to be said, or asks for a distance that is due.
+    /// Sends the next queued message, or a distance request that is due.
     fn next(&mut self, now: MonoNs, wire: &mut dyn Wire) {
         if now >= self.look_at {
             self.look_at = now + LOOK_PERIOD;
@@ -119,7 +119,7 @@ impl PingDriver {
         }
     }
 
-    /// Nothing has answered in time. A setting is said again: a device that hasn't heard it measures otherwise.
+    /// Handles a timeout. Settings are retried: a device that missed one would measure differently.
     fn give_up(&mut self, asked: Asked, now: MonoNs, wire: &mut dyn Wire) {
         self.asked = None;
         let Some((bytes, tries)) = self.again.take().filter(|(_, tries)| *tries > 0) else { return };
@@ -128,7 +128,7 @@ impl PingDriver {
         self.again = Some((bytes, tries - 1));
     }
 
-    /// A message of the device, or of what was taken for it.
+    /// Handles a message from the device.
     fn answered(&mut self, frame: &Frame<'_>) {
         let awaited = self.asked;
         let answers = |asked: Asked| awaited.is_some_and(|(awaited, _)| awaited == asked);
@@ -161,7 +161,7 @@ impl PingDriver {
         }
     }
 
-    /// How long the answer to what was asked may take.
+    /// Answer timeout.
     fn timeout(&self, asked: Asked) -> DurNs {
         match asked {
             Asked::Setting(_) => ANSWER_TIME,
@@ -208,7 +208,7 @@ impl Driver for PingDriver {
         for frame in frames.iter().filter_map(|bytes| Frame::parse(bytes)) {
             self.answered(&frame);
         }
-        // The next setting needn't wait for a thread to be woken.
+        // Send the next setting at once, without waiting for a wake-up.
         if self.asked.is_none() && !self.to_say.is_empty() {
             self.next(received, wire);
         }

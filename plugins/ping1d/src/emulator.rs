@@ -1,4 +1,4 @@
-//! An emulated echosounder, and the emulated or real host that asks it for distances.
+//! An emulated echosounder, polled by an emulated or real host.
 
 use std::collections::VecDeque;
 
@@ -14,16 +14,16 @@ use crate::codec::{
 };
 use crate::settings::Settings;
 
-/// Where an emulated device listens: up to the practical limit of a `Ping1D`.
+/// Listening range of an emulated device: up to the practical limit of a `Ping1D`.
 const SCAN: ScanRange = ScanRange { start_mm: 0, length_mm: 30_000 };
 
-/// A frame's bytes follow one another on the line.
+/// Maximum gap within a frame.
 const SILENCE: DurNs = DurNs::from_millis(50);
 
-/// Everyone on the line is meant.
+/// Broadcast device id.
 const EVERYONE: u8 = 255;
 
-/// What an emulated device says that it is.
+/// Identity of an emulated device.
 const DEVICE: DeviceInformation = DeviceInformation {
     device_type: 1,
     revision: 1,
@@ -34,37 +34,37 @@ const DEVICE: DeviceInformation = DeviceInformation {
 };
 const PROTOCOL: ProtocolVersion = ProtocolVersion { major: 1, minor: 0, patch: 0, reserved: 0 };
 
-/// Constant in an emulated ping.
+/// Pulse length of an emulated ping, us.
 const PULSE_US: u16 = 60;
 
-/// Strengths of an emulated echo's points, and the one where the wall is.
+/// Number of points of an emulated echo, and the strength at the wall.
 const POINTS: usize = 200;
 const ECHO: u8 = 255;
 
-/// Host and device on one line, or the device alone, on a real host's.
+/// Host and device on one line, or the device alone for a real host.
 #[derive(Debug, Clone)]
 pub struct PingEmulator {
     settings: Settings,
     latency: DurNs,
-    /// The water's, m/s.
+    /// Speed of sound in the water, m/s.
     site_mps: f64,
-    /// What the device computes with, mm/s; a host can set it.
+    /// Speed of sound setting of the device, mm/s; a host can change it.
     device_mmps: u32,
     interval: DurNs,
     codec: PingCodec,
     heard_at: MonoNs,
     pings: u32,
-    /// When it next pings without being asked by a real host: polled by an emulated one, or continuously.
+    /// Time of the next ping not requested by a real host: polled by the emulated host, or continuous.
     ping_at: Option<MonoNs>,
-    /// Pings that a real host has asked for and that haven't begun.
+    /// Pings requested by a real host, not yet started.
     waiting: Vec<Sounding>,
-    /// The ids of the messages that tell them.
+    /// Message ids of their answers.
     asked: VecDeque<u16>,
     polled: bool,
 }
 
 impl PingEmulator {
-    /// A device that is asked as soon as it is switched on, or when a real host does.
+    /// A device that is polled from power-on by the emulated host, or on request by a real one.
     pub fn new(settings: Settings, latency: DurNs, setup: &EmulatorSetup) -> Self {
         Self {
             settings,
@@ -82,7 +82,7 @@ impl PingEmulator {
         }
     }
 
-    /// What the device says at once to what isn't a question for a distance.
+    /// Handles a message; returns the immediate answer, or `None` for a distance request.
     fn answer_to(&mut self, at: MonoNs, message: &Message) -> Option<Message> {
         match *message {
             Message::GeneralRequest(about @ (id::DISTANCE | id::DISTANCE_SIMPLE | id::PROFILE)) => {
@@ -113,7 +113,7 @@ impl PingEmulator {
         Some(Message::Ack(message.id()))
     }
 
-    /// The message of this id that tells a ping.
+    /// Encodes a ping as a message of this id.
     fn telling(&mut self, about: u16, distance_mm: Option<u32>) -> Message {
         self.pings = self.pings.wrapping_add(1);
         let distance = Distance {
@@ -134,7 +134,7 @@ impl PingEmulator {
         }
     }
 
-    /// Distance in mm that the device computes with the speed of sound it is set to.
+    /// Distance in mm, computed with the device's speed of sound setting.
     fn distance_mm(&self, range_m: Option<f64>) -> Option<u32> {
         let mm = range_m? * f64::from(self.device_mmps) / self.site_mps;
         let mm = u32::try_from(math::round_to_i64(mm)).ok()?;
@@ -149,7 +149,7 @@ impl PingEmulator {
     }
 }
 
-/// An echo of one point.
+/// An echo with a single non-zero point.
 fn strengths(distance_mm: Option<u32>) -> Bytes<MAX_STRENGTHS> {
     let mut strengths = [0; POINTS];
     let point = distance_mm.map(|mm| u64::from(mm) * POINTS as u64 / u64::from(SCAN.length_mm));
@@ -173,7 +173,7 @@ impl Emulator<Sounding> for PingEmulator {
 
     fn hear(&mut self, at: MonoNs, bytes: &[u8], line: LineSink<'_>) {
         let mut heard = Vec::new();
-        // A frame that lost bytes on its way must not swallow those after it.
+        // A truncated frame must not swallow the following ones.
         if at.since(self.heard_at) > SILENCE {
             self.codec.flush(&mut |value| heard.push(value));
         }
@@ -192,7 +192,7 @@ impl Emulator<Sounding> for PingEmulator {
         if self.polled {
             let message = Message::GeneralRequest(about);
             let question = Addressed { source: 0, destination: self.settings.device_id, message };
-            // A request is far shorter than the longest frame.
+            // Requests are far shorter than the longest frame.
             if let Ok(bytes) = question.encode() {
                 line(Direction::Sent, sounding.at, bytes.as_slice());
             }

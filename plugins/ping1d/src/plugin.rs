@@ -1,4 +1,4 @@
-//! Registration of an echosounder with the loop, and its messages as readings.
+//! Registration of an echosounder with the loop, and conversion of its messages to readings.
 
 use headrace_sensor::SensorConfig;
 use headrace_sensor::codec::{Codec as _, CodecCounts, Framing as _, LineClock};
@@ -17,17 +17,17 @@ use crate::emulator::PingEmulator;
 use crate::probe::PingProbe;
 use crate::settings::Settings;
 
-/// The kind's name in vehicle files and logs.
+/// Name in vehicle files and logs.
 const NAME: &str = "ping1d";
 
 /// Room for several of the longest frames.
 const RING_BYTES: usize = 1 << 16;
 
-/// A frame's bytes follow one another on the line; after such a pause no more belong to the one begun. Below the usual
-/// interval, so that a false start can hold back one reading at most.
+/// Maximum gap within a frame, after which an unfinished one is dropped. Below the usual interval, so that a false start
+/// can hold back one reading at most.
 const SILENCE: DurNs = DurNs::from_millis(50);
 
-/// The kind of device that vehicle files call `ping1d`.
+/// The Ping echosounder device kind.
 #[derive(Debug, Clone, Copy)]
 pub struct Kind;
 
@@ -71,7 +71,7 @@ impl Device for Ping1d {
         Emulated::Echosounder(Box::new(PingEmulator::new(self.settings, self.sensor.latency, setup)))
     }
 
-    /// A profile says the same as a distance, but for its strengths.
+    /// Replaces a profile by a distance message, without the echo strengths.
     fn without(&self, what: Needless, packet: &[u8], shorter: &mut Vec<u8>) -> bool {
         shorter.clear();
         what == Needless::Echoes && without_strengths(packet, shorter).is_some()
@@ -86,18 +86,18 @@ impl Device for Ping1d {
     }
 }
 
-/// A packet that is one profile as the distance that it tells; `None` where it is something else.
+/// Writes a packet that is one profile as a distance message; `None` for other packets.
 fn without_strengths(packet: &[u8], shorter: &mut Vec<u8>) -> Option<()> {
     let whole = Frames.read(packet)?;
     let Message::Profile(profile) = whole.message else { return None };
-    // What our encoding wouldn't give back isn't ours to change.
+    // Packets that don't re-encode identically are left unchanged.
     (whole.encode().ok()?.as_slice() == packet).then_some(())?;
     let distance = Addressed { message: Message::Distance(profile.distance), ..whole };
     shorter.extend_from_slice(distance.encode().ok()?.as_slice());
     Some(())
 }
 
-/// Messages to readings. Distances that another client has asked for are taken as well.
+/// Converts messages to readings, including distances requested by other clients.
 #[derive(Debug, Clone)]
 pub struct PingDecoder {
     codec: PingCodec,
@@ -110,7 +110,7 @@ pub struct PingDecoder {
 stateful!(PingDecoder { state: codec, clock, withheld; fixed: settings, latency; });
 
 impl PingDecoder {
-    /// For a device with these settings.
+    /// New decoder with these settings.
     pub fn new(settings: Settings, latency: DurNs) -> Self {
         let (codec, clock) = (PingCodec::default(), LineClock::new(SILENCE));
         Self { codec, clock, settings, latency, withheld: 0 }
@@ -123,7 +123,7 @@ impl Decoder for PingDecoder {
         clock.push(codec, packet.received, packet.bytes, |received, frame| {
             let Some(frame) = Frame::parse(frame) else { return };
             let Some((distance_mm, confidence_percent)) = distance(&frame) else { return };
-            // Nothing above 100 per cent is defined.
+            // Values above 100 per cent are undefined.
             if frame.source != settings.device_id || confidence_percent > 100 {
                 *withheld += 1;
                 return;
@@ -142,13 +142,13 @@ impl Decoder for PingDecoder {
         self.codec.counts()
     }
 
-    /// Distances of other devices, or with a confidence that isn't defined.
+    /// Distances withheld: other device ids, or undefined confidence.
     fn withheld(&self) -> u64 {
         self.withheld
     }
 }
 
-/// Distance in mm and confidence in per cent, where a frame tells them.
+/// Distance in mm and confidence in per cent of a distance, simple distance or profile frame.
 fn distance(frame: &Frame<'_>) -> Option<(u32, u16)> {
     let simple = DistanceSimple::of(frame).map(|it| (it.distance_mm, u16::from(it.confidence_percent)));
     simple.or_else(|| Distance::of(frame).map(|it| (it.distance_mm, it.confidence_percent)))

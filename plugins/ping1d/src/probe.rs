@@ -1,14 +1,14 @@
-//! Whether a Ping device is on a line, and which: it is asked for its version and what it is, whatever its id.
+//! Probe for a Ping device: requests version and identity from any device id.
 
 use headrace_sensor::codec::Codec as _;
 use headrace_sensor::driver::Probe;
 
 use crate::codec::{Addressed, DeviceInformation, Message, PingCodec, ProtocolVersion, id};
 
-/// Everyone on the line is meant. Source: Ping protocol, device ids.
+/// Broadcast device id. Source: Ping protocol, device ids.
 const EVERYONE: u8 = 255;
 
-/// Asks everyone what they are, and takes the first that says so.
+/// Requests the identity by broadcast and takes the first answer.
 #[derive(Debug, Clone, Default)]
 pub struct PingProbe {
     codec: PingCodec,
@@ -17,7 +17,7 @@ pub struct PingProbe {
 }
 
 impl Probe for PingProbe {
-    /// The version first, so that it is known when the device says what it is.
+    /// The version comes first, so that it is known when the identity arrives.
     fn questions(&self) -> Vec<Vec<u8>> {
         let asked = [id::PROTOCOL_VERSION, id::DEVICE_INFORMATION].into_iter().filter_map(|about| {
             let message = Message::GeneralRequest(about);

@@ -7,10 +7,10 @@ use headrace_sensor::geometry::time::DurNs;
 
 use crate::codec::ScanRange;
 
-/// Who says when to ping.
+/// Trigger of pings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Polling {
-    /// The host asks for each distance.
+    /// The host requests each distance.
     Asked,
     /// The device sends profiles at its interval.
     Continuous,
@@ -19,31 +19,31 @@ pub enum Polling {
 /// An echosounder's settings, checked.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
-    /// Readings of less confidence (0 to 1) are not used.
+    /// Minimum confidence (0 to 1) of readings used by navigation.
     pub min_confidence: f64,
     /// Time between two pings.
     pub interval: DurNs,
-    /// Speed of sound that the device is set to, m/s.
+    /// Speed of sound setting of the device, m/s.
     pub sound_speed_mps: f64,
     /// The device's id on its line.
     pub device_id: u8,
-    /// Who says when to ping.
+    /// Trigger of pings.
     pub polling: Polling,
-    /// Where the device is to listen; `None` leaves range and gain to it.
+    /// Listening range; `None` leaves range and gain to the device.
     pub scan: Option<ScanRange>,
-    /// Index of the gain, 0 to 6; `None` leaves it as it is.
+    /// Gain index, 0 to 6; `None` leaves it unchanged.
     pub gain: Option<u8>,
 }
 
 impl Settings {
-    /// Reads an echosounder's own keys.
+    /// Reads an echosounder's keys.
     ///
     /// Errors: a key that isn't allowed, or a latency that isn't below the interval.
     pub fn read(sensor: &SensorConfig, own: &Section<'_>) -> Result<Self, ConfigError> {
         let device_id = own.integer("device_id", 1..=254)?.and_then(|id| u8::try_from(id).ok());
         let settings = Self {
             min_confidence: own.number("min_confidence", 0.0..=1.0)?.unwrap_or(0.5),
-            // The protocol's interval is 16 bits of whole milliseconds.
+            // The protocol's interval is 16 bits in whole milliseconds.
             interval: DurNs::from_millis(own.integer("interval_ms", 10..=65_535)?.unwrap_or(66)),
             sound_speed_mps: own.number("sound_speed_mps", 1000.0..=2000.0)?.unwrap_or(1500.0),
             device_id: device_id.unwrap_or(1),
@@ -63,7 +63,7 @@ impl Settings {
         Ok(settings)
     }
 
-    /// The speed of sound as the wire has it, mm/s.
+    /// Speed of sound in wire units, mm/s.
     pub fn sound_speed_mmps(&self) -> u32 {
         u32::try_from(math::round_to_i64(self.sound_speed_mps * 1000.0)).unwrap_or(0)
     }
@@ -76,7 +76,7 @@ pub(crate) mod tests {
 
     use super::*;
 
-    /// An echosounder that looks ahead, without latency.
+    /// A forward-looking echosounder without latency.
     pub(crate) fn sensor() -> SensorConfig {
         SensorConfig {
             id: "left".to_owned(),

@@ -1,11 +1,11 @@
-//! The one clock by which everything that comes in is stamped.
+//! Host clock for timestamping all input.
 
 use std::time::{Duration, SystemTime};
 
 use headrace_geometry::time::{DurNs, MonoNs, UtcNs};
 use rustix::time::{ClockId, clock_gettime};
 
-/// Now, on the host's monotonic clock: it counts from the machine's start and is never set.
+/// Current time on the host's monotonic clock, which counts from boot and is never set.
 pub fn now() -> MonoNs {
     let time = clock_gettime(ClockId::Monotonic);
     let seconds = u64::try_from(time.tv_sec).unwrap_or(0);
@@ -13,9 +13,9 @@ pub fn now() -> MonoNs {
     MonoNs(seconds.saturating_mul(1_000_000_000).saturating_add(rest))
 }
 
-/// A moment that the kernel has stamped with the time of day, on the monotonic clock.
+/// Converts a kernel wall-clock timestamp to the monotonic clock.
 ///
-/// It is as long ago on either clock; one that would lie ahead, since the time of day was set, is taken as now.
+/// Keeps the timestamp's age; a timestamp in the future (the wall clock was set back) becomes the current time.
 pub fn of_wall(stamped: SystemTime) -> MonoNs {
     let now = now();
     let ago = wall().duration_since(stamped).unwrap_or(Duration::ZERO);
@@ -30,14 +30,14 @@ fn wall() -> SystemTime {
     SystemTime::now()
 }
 
-/// The same moment on the monotonic clock and in UTC.
+/// Current time on the monotonic clock and in UTC.
 pub fn clock_anchor() -> (MonoNs, UtcNs) {
     let (mono, wall) = (now(), wall());
     let since = wall.duration_since(SystemTime::UNIX_EPOCH).unwrap_or(Duration::ZERO);
     (mono, UtcNs(i64::try_from(since.as_nanos()).unwrap_or(0)))
 }
 
-/// A wait as the system takes it.
+/// `wait` as a `Duration`; zero if negative.
 pub(crate) fn duration(wait: DurNs) -> Duration {
     Duration::from_nanos(u64::try_from(wait.0).unwrap_or(0))
 }
@@ -52,7 +52,7 @@ mod tests {
         let second = now();
         assert!(second.0 >= first.0 && first.0 > 0);
         let over = of_wall(stamped);
-        // Between the two looks at the clocks the thread may have been put aside, however shortly.
+        // The thread may have been preempted between the two clock reads.
         assert!(over.since(first).0 > -1_000_000_000 && over.since(now()).0 <= 0);
         assert!(of_wall(wall() + Duration::from_mins(1)).since(now()).0 <= 0);
     }

@@ -1,5 +1,4 @@
-//! The device's end of a line, for rehearsals: pseudoterminals, TCP, UDP, the kernel's CAN and HID, as the host would open
-//! them.
+//! Device end of a line for rehearsals: pseudoterminals, TCP, UDP and the kernel's CAN and HID, opened by the host as usual.
 
 use std::fs::File;
 use std::io::{self, Read as _, Write as _};
@@ -16,13 +15,13 @@ use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 use crate::lines::READ_BYTES;
 use crate::uhid::{self, Identity, VirtualDevice};
 
-/// Rate that a rehearsed serial port is opened at.
+/// Baud rate of an emulated serial port.
 const BAUD: u32 = 115_200;
 
-/// The device's end of a line.
+/// Device end of a line.
 pub struct EmulatedPort {
     end: End,
-    /// How the host opens the other end.
+    /// Address at which the host opens the other end.
     connect: Connect,
 }
 
@@ -41,19 +40,19 @@ enum End {
     #[cfg(target_os = "linux")]
     Can {
         interface: String,
-        /// None while there is no such interface.
+        /// `None` while the interface doesn't exist.
         socket: Option<socketcan::CanSocket>,
     },
     Hid(VirtualDevice<File>),
 }
 
-/// The most hosts that a rehearsed bridge answers.
+/// Maximum number of hosts served by an emulated UDP bridge.
 const MAX_PEERS: usize = 8;
 
 impl EmulatedPort {
-    /// An end on a carrier; `at` is the address on which the network's ends listen.
+    /// Opens a device end on `carrier`; network ends listen on address `at`.
     ///
-    /// Errors: the system has no such port to give, or refuses it.
+    /// Errors: the system can't provide such a port, or refuses it.
     pub fn new(carrier: Carrier, at: IpAddr) -> io::Result<Self> {
         match carrier {
             Carrier::Serial => pty(),
@@ -68,9 +67,9 @@ impl EmulatedPort {
         }
     }
 
-    /// An end where hosts look for it already: a device of the network that was switched off and on again.
+    /// Reopens a network end at a known address: a network device that was power-cycled.
     ///
-    /// Errors: the address is another's; a carrier on which the system chooses the place.
+    /// Errors: the address is in use; a carrier whose address the system chooses.
     pub fn again(connect: &Connect) -> io::Result<Self> {
         match connect {
             Connect::Tcp { address } => tcp(address),
@@ -82,9 +81,9 @@ impl EmulatedPort {
         }
     }
 
-    /// A HID device of this identity, made by the kernel.
+    /// Creates a HID device of this identity through the kernel's uhid.
     ///
-    /// Errors: this kernel makes none, or not for this user.
+    /// Errors: the kernel lacks uhid, or this user may not open it.
     pub fn hid(identity: &UsbIdentity, descriptor: &[u8]) -> io::Result<Self> {
         let kernel = File::options().read(true).write(true).open(uhid::PATH)?;
         let serial = identity.serial.as_deref().unwrap_or_default();
@@ -96,9 +95,9 @@ impl EmulatedPort {
         Ok(Self { end: End::Hid(device), connect })
     }
 
-    /// A node on a CAN bus.
+    /// Opens a node on a CAN bus.
     ///
-    /// Errors: there is no such interface.
+    /// Errors: no such interface.
     #[cfg(target_os = "linux")]
     pub fn can(interface: &str) -> io::Result<Self> {
         let socket = Some(can_socket(interface)?);
@@ -107,17 +106,17 @@ impl EmulatedPort {
         Ok(Self { end: End::Can { interface, socket }, connect })
     }
 
-    /// How the host opens the other end.
+    /// Address at which the host opens the other end.
     pub fn connect(&self) -> &Connect {
         &self.connect
     }
 
-    /// Whether a host is at the other end, as far as that can be known.
+    /// True if a host is connected, as far as can be detected.
     pub fn is_called(&self) -> bool {
         match &self.end {
             End::Pty { master } => {
                 let mut polled = [PollFd::new(master, PollFlags::IN)];
-                // A terminal that nobody has open hangs up.
+                // A pseudoterminal hangs up while no host has it open.
                 poll(&mut polled, Some(&Timespec { tv_sec: 0, tv_nsec: 0 })).is_ok()
                     && polled.iter().all(|end| !end.revents().contains(PollFlags::HUP))
             }
@@ -129,9 +128,9 @@ impl EmulatedPort {
         }
     }
 
-    /// What has come from the host, if anything has; an empty message is a knock. Never waits.
+    /// Next message from the host, if any; an empty message is a keep-alive. Never blocks.
     ///
-    /// Errors: the end itself is broken; a host that has gone is none.
+    /// Errors: the end itself has failed; a disconnected host is no error.
     pub fn read(&mut self) -> io::Result<Option<Vec<u8>>> {
         let mut buffer = [0; READ_BYTES];
         let read = match &mut self.end {
@@ -159,7 +158,7 @@ impl EmulatedPort {
             }),
             #[cfg(target_os = "linux")]
             End::Can { .. } => return Ok(None),
-            // The kernel says who opens the device and the like.
+            // Kernel events only, such as open and close.
             End::Hid(_) => return Ok(None),
         };
         match read {
@@ -169,9 +168,9 @@ impl EmulatedPort {
         }
     }
 
-    /// Puts a message of the device on the line. Where no host is, or it doesn't read, it is lost.
+    /// Sends a device message. It is lost if no host is connected or reading.
     ///
-    /// Errors: the end itself is broken.
+    /// Errors: the end itself has failed.
     pub fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
         let written = match &mut self.end {
             End::Pty { master } => master.write_all(bytes),
@@ -204,20 +203,20 @@ impl EmulatedPort {
     }
 }
 
-/// Waits until something has come to one of the ends, or `wait_ns` nanoseconds have passed.
+/// Waits until one of the ends has input, or `wait_ns` nanoseconds have passed.
 pub fn wait_for_any<'a>(stands: impl IntoIterator<Item = &'a EmulatedPort>, wait_ns: u32) {
-    // A terminal that nobody has open would never let it wait.
+    // A pseudoterminal without a host reports a hang-up at once, so that poll would never block.
     let open = stands.into_iter().filter(|stand| !matches!(stand.end, End::Pty { .. }) || stand.is_called());
     let fds: Vec<BorrowedFd<'_>> = open.flat_map(EmulatedPort::fds).collect();
     let mut polled: Vec<PollFd<'_>> = fds.iter().map(|fd| PollFd::new(fd, PollFlags::IN)).collect();
     let wait = Timespec { tv_sec: 0, tv_nsec: i64::from(wait_ns.min(999_999_999)) };
-    // Interrupted, it has waited less; that does no harm.
+    // An interrupted wait is shorter, which does no harm.
     poll(&mut polled, Some(&wait)).unwrap_or_default();
 }
 
-/// The other end has been closed.
+/// True if the other end has been closed.
 fn is_gone(error: &io::Error) -> bool {
-    /// Source: Linux, EIO: what a terminal's master gives while nobody has it open.
+    /// Source: Linux, EIO: returned by a pseudoterminal master while no host has it open.
     const EIO: i32 = 5;
     use io::ErrorKind as E;
     error.raw_os_error() == Some(EIO)
@@ -232,7 +231,7 @@ fn pty() -> io::Result<EmulatedPort> {
     grantpt(&master)?;
     unlockpt(&master)?;
     let path = ptsname(&master, Vec::new())?.to_string_lossy().into_owned();
-    // Bytes as they are, and no echo, from before the host opens it.
+    // Raw mode without echo, set before the host opens it.
     let mut settings = tcgetattr(&master)?;
     settings.make_raw();
     tcsetattr(&master, OptionalActions::Now, &settings)?;
@@ -264,7 +263,7 @@ fn can_socket(interface: &str) -> io::Result<socketcan::CanSocket> {
     Ok(socket)
 }
 
-/// Puts a frame on a bus; while the interface is down, or not there, it is lost. One that comes back is opened anew.
+/// Sends a frame; it is lost while the interface is down or absent. An interface that reappears is reopened.
 #[cfg(target_os = "linux")]
 fn write_can(interface: &str, socket: &mut Option<socketcan::CanSocket>, bytes: &[u8]) -> io::Result<()> {
     /// No such device or address, no such device, network is down, no buffer space. Source: Linux, errno.

@@ -1,4 +1,4 @@
-//! System errors of ports as troubles: what is wrong, and the command that fixes it.
+//! Maps system errors of ports to causes, with the command that fixes each.
 
 use std::io;
 
@@ -6,7 +6,7 @@ use crate::discover::remedy_for;
 use crate::fix_hint;
 use crate::open_error::{OpenError, OpenErrorKind};
 
-/// Probing the device at `what` has failed with `error`.
+/// Cause of `error` while probing the device at `what`.
 pub(crate) fn probing(what: &str, error: &io::Error) -> OpenError {
     let OpenError { kind, remedy, .. } = opening(what, error);
     let why = match kind {
@@ -16,7 +16,7 @@ pub(crate) fn probing(what: &str, error: &io::Error) -> OpenError {
     OpenError { kind, why, remedy }
 }
 
-/// Opening `what` has failed with `error`.
+/// Cause of `error` while opening `what`.
 pub(crate) fn opening(what: &str, error: &io::Error) -> OpenError {
     use io::ErrorKind as E;
     let why = |words: &str| format!("opening {what}: {words}");
@@ -36,7 +36,7 @@ pub(crate) fn opening(what: &str, error: &io::Error) -> OpenError {
     }
 }
 
-/// Opening a CAN interface has failed with `error`.
+/// Cause of `error` while opening a CAN interface.
 pub(crate) fn opening_can(interface: &str, error: &io::Error) -> OpenError {
     /// No such device; network is down; address family not supported. Source: Linux, errno.
     const ENODEV: i32 = 19;
@@ -48,7 +48,7 @@ pub(crate) fn opening_can(interface: &str, error: &io::Error) -> OpenError {
     }
 }
 
-/// Why an open line has failed.
+/// Reason for the failure of an open line.
 pub(crate) fn losing(error: &io::Error) -> String {
     /// Input/output error; no such device or address; no such device. Source: Linux, errno.
     const UNPLUGGED: [i32; 3] = [5, 6, 19];
@@ -59,7 +59,7 @@ pub(crate) fn losing(error: &io::Error) -> String {
     match error.kind() {
         E::ConnectionRefused => "nobody listens there".to_owned(),
         E::ConnectionReset | E::ConnectionAborted => "the device has closed the connection".to_owned(),
-        // The serial library's own has neither a number nor words.
+        // The serial library's own `BrokenPipe` has neither an errno nor a message.
         E::BrokenPipe if error.raw_os_error().is_some() => "the device has closed the connection".to_owned(),
         E::BrokenPipe if error.get_ref().is_none() => "the port is gone".to_owned(),
         E::TimedOut | E::WouldBlock => "it doesn't take what is sent to it".to_owned(),

@@ -1,5 +1,4 @@
-//! What is plugged in: serial ports, HID devices, CAN interfaces and I2C buses, as the system's files tell, without opening
-//! any of them.
+//! Attached serial ports, HID devices, CAN interfaces and I2C buses, listed from the system's files without opening any.
 
 pub(crate) mod can;
 mod found;
@@ -17,7 +16,7 @@ pub use rights::Rights;
 
 pub(crate) use rights::remedy_for;
 
-/// All that is plugged in, by carrier and then by name.
+/// All attached devices, ordered by carrier and then by name.
 pub fn discover(machine: &Machine) -> Vec<Found> {
     let mut all = serial::found(machine);
     all.extend(hid::found(machine));

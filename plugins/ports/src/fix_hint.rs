@@ -1,19 +1,19 @@
-//! The lines that mend what keeps a port from being used; `run` and `devices` say the same.
+//! Commands that fix port problems; shared by `run` and `devices`.
 
-/// Bits a second that a CAN interface is set up with where nothing else is known, as in `deploy/systemd/can@.service`.
+/// Default CAN bit rate, bit/s, as in `deploy/systemd/can@.service`.
 const CAN_BITRATE: u32 = 250_000;
 
-/// The device's group may open it, and the user isn't in it.
+/// The device's group has access, and the user isn't in it.
 pub(crate) fn join(group: &str) -> String {
     format!("sudo usermod -aG {group} $USER, and log in again")
 }
 
-/// The user has been put into the group since this session was begun.
+/// The user was added to the group after this session began.
 pub(crate) fn log_in_again(group: &str) -> String {
     format!("log in again: this user has been put into the group {group} since")
 }
 
-/// The device's group may not open it, or is root's.
+/// The device's group has no access, or is root's.
 pub(crate) fn rule(path: &str) -> String {
     if path.starts_with("/dev/hidraw") {
         "install deploy/udev/70-headrace.rules, with the ids of this device in it, and sudo udevadm trigger"
@@ -25,7 +25,7 @@ pub(crate) fn rule(path: &str) -> String {
     }
 }
 
-/// A CAN interface is down; those without hardware have no bit rate.
+/// A CAN interface is down; interfaces without hardware have no bit rate.
 pub(crate) fn set_up(interface: &str, has_bitrate: bool) -> String {
     if has_bitrate {
         format!("sudo ip link set {interface} up type can bitrate {CAN_BITRATE}, with the rate of the bus")
@@ -34,12 +34,12 @@ pub(crate) fn set_up(interface: &str, has_bitrate: bool) -> String {
     }
 }
 
-/// A CAN interface is up, but has left the bus.
+/// A CAN interface is up but bus-off.
 pub(crate) fn back_on_bus(interface: &str) -> String {
     format!("see to bit rate, wiring and termination: ip -details link show {interface}")
 }
 
-/// There is no such CAN interface.
+/// No such CAN interface.
 pub(crate) fn no_interface(interface: &str) -> String {
     if interface.starts_with("vcan") {
         format!("sudo modprobe vcan; sudo ip link add {interface} type vcan; {}", set_up(interface, false))
@@ -48,15 +48,15 @@ pub(crate) fn no_interface(interface: &str) -> String {
     }
 }
 
-/// The kernel has no raw CAN sockets.
+/// The kernel lacks raw CAN sockets.
 pub(crate) const CAN_RAW: &str = "sudo modprobe can-raw";
 
-/// I2C buses have no device files.
+/// I2C buses lack device files.
 pub(crate) const I2C_DEV: &str =
     "sudo modprobe i2c-dev; to have it at each start: echo i2c-dev | sudo tee /etc/modules-load.d/i2c.conf";
 
-/// Nobody answers at an address.
+/// No answer from an address.
 pub(crate) const NOBODY_ANSWERS: &str = "see that it is switched on, that its port is right, and that this computer is in its network: ip address";
 
-/// Nobody listens at a port of an address.
+/// Connection refused: no server at the port.
 pub(crate) const NOBODY_LISTENS: &str = "is the device switched on, and the port's number right?";

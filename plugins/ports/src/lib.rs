@@ -1,7 +1,7 @@
-//! What the drivers of all devices share: the clock, lines of every carrier, and the life of a line: opened, read with stamps,
-//! lost, and opened again. Also what is plugged in, what keeps us from it, and what answers there.
+//! I/O shared by all device drivers: clock, lines of every carrier, and the thread that opens, reads, timestamps and
+//! reopens a line. Also device discovery, diagnosis and probing.
 //!
-//! The drivers themselves are in the devices' crates and do no I/O; see [`headrace_sensor::driver`].
+//! The drivers themselves are in the device crates and do no I/O; see [`headrace_sensor::driver`].
 
 mod clock;
 mod device_end;

@@ -1,4 +1,4 @@
-//! The thread of one line: opens it, serves its drivers, loses it, and opens it again, for ever.
+//! Thread of one line: opens it, serves its drivers and reopens it after a failure, indefinitely.
 
 use std::collections::VecDeque;
 use std::io;
@@ -18,31 +18,31 @@ use crate::diagnosis;
 use crate::lines::{self, Line, READ_BYTES};
 use crate::status::{Board, LineHistory, Phase, Status};
 
-/// The least and the longest wait before a line is tried again; what is plugged into this machine costs little to try.
+/// Reconnect backoff: initial and maximum pause; shorter for local ports, which are cheap to retry.
 const FIRST_PAUSE: DurNs = DurNs::from_millis(250);
 const LONGEST_PAUSE: DurNs = DurNs::from_millis(4_000);
 const LONGEST_LOCAL_PAUSE: DurNs = DurNs::from_millis(1_000);
-/// The longest that a thread waits before it looks whether to end.
+/// Maximum wait between checks of the stop flag.
 const LOOK: Duration = Duration::from_millis(50);
-/// How often the devices' standing is looked at.
+/// Period of device health checks.
 const STANDING_PERIOD: DurNs = DurNs::from_millis(500);
-/// A device that has run so long starts the pauses anew when it is lost.
+/// Uptime after which a disconnect resets the reconnect backoff.
 const LONG_ENOUGH: DurNs = DurNs::from_millis(2_000);
-/// How often a silent line is knocked at.
+/// Keep-alive interval on an idle connection.
 const KNOCK_PERIOD: DurNs = DurNs::from_millis(1_000);
 
-/// Takes what is sent to a device: the sensor's number, when, the bytes.
+/// Sink for messages sent to devices: sensor index, time, bytes.
 pub type SentSink = Arc<dyn Fn(usize, MonoNs, &[u8]) + Send + Sync>;
 
 /// A sensor on a line.
 pub(crate) struct Attached {
-    /// Its number, in the order of the vehicle file.
+    /// Sensor index, in the order of the vehicle file.
     pub source: usize,
     pub port: Port,
     pub driver: Box<dyn Driver>,
 }
 
-/// What all threads have.
+/// State shared by all threads.
 #[derive(Clone)]
 pub(crate) struct Common {
     pub stopping: Arc<AtomicBool>,
@@ -51,34 +51,34 @@ pub(crate) struct Common {
     pub sent: Option<SentSink>,
 }
 
-/// A line and those who use it.
+/// A line and the devices on it.
 pub(crate) struct LineThread {
     connect: Result<Connect, ConnectError>,
     devices: Vec<AttachedState>,
     common: Common,
 }
 
-/// A sensor with what is known of it.
+/// A sensor with its connection state.
 struct AttachedState {
     attached: Attached,
     history: LineHistory,
     status: Option<(Phase, String)>,
-    /// Good frames so far, those of them that had come when the line was opened, and when there were last more bytes.
+    /// Good frames so far, their number when the line was opened, and the times of the last bytes and last good frame.
     frames: u64,
     frames_before: u64,
     last_bytes: MonoNs,
     last_frame: MonoNs,
 }
 
-/// How serving a line ended that hasn't failed.
+/// Reason for the end of service without a failure.
 enum Served {
-    /// We are to end.
+    /// Stop was requested.
     ToTheEnd,
-    /// All on it have been silent for too long: it is opened anew.
+    /// All devices exceeded their silence timeout: the line is reopened.
     InSilence,
 }
 
-/// What drivers want of the line, noted while they are called.
+/// I/O requested by a driver during a callback.
 enum IoRequest {
     Send(Vec<u8>),
     Exchange { write: Vec<u8>, settle: DurNs, read_bytes: usize },
@@ -127,7 +127,7 @@ impl LineThread {
         Self { connect, devices: attached.into_iter().map(device).collect(), common }
     }
 
-    /// Runs until it is told to end; gives what each sensor's line has been through.
+    /// Runs until stopped; returns each sensor's line history.
     pub(crate) fn run(mut self) -> Vec<(usize, LineHistory)> {
         let sensors: Vec<usize> = self.devices.iter().map(|device| device.attached.source).collect();
         let address = self.connect.as_ref().map_or_else(|error| error.text.clone(), Connect::to_string);
@@ -135,7 +135,7 @@ impl LineThread {
         let mut pause = FIRST_PAUSE;
         while !self.stopping() {
             match self.connect.clone() {
-                // What can't be understood won't be later.
+                // A `connect` that doesn't parse stays invalid.
                 Err(error) => {
                     self.say_all(Phase::Closed, &error.to_string());
                     self.wait(LONGEST_PAUSE);
@@ -159,7 +159,7 @@ impl LineThread {
                         }
                         match ended {
                             Ok(Served::ToTheEnd) => (),
-                            // What is to be said of that has been said, and holds until it speaks again.
+                            // The silent status already shown stays until the device answers.
                             Ok(Served::InSilence) => {
                                 tracing::info!("no data, reopening the port");
                                 self.count_lost();
@@ -203,7 +203,7 @@ impl LineThread {
         self.say_all(Phase::Closed, &format!("lost {connect}: {why}; it is tried again"));
     }
 
-    /// Has what the drivers hold delivered.
+    /// Delivers the bytes that the drivers still hold.
     fn closed(&mut self) {
         for AttachedState { attached: Attached { driver, port, .. }, history, .. } in &mut self.devices {
             driver.closed(&mut Ends { port, history, requests: &mut VecDeque::new() });
@@ -217,7 +217,7 @@ impl LineThread {
         }
     }
 
-    /// Serves an open line until it fails, all on it have been silent for too long, or the end.
+    /// Serves an open line until it fails, all devices on it are silent, or stop is requested.
     fn serve(&mut self, line: &mut dyn Line, opened: MonoNs) -> io::Result<Served> {
         for device in &mut self.devices {
             device.history.opened += 1;
@@ -254,7 +254,7 @@ impl LineThread {
         Ok(Served::ToTheEnd)
     }
 
-    /// How long to wait for bytes before a driver wants to be woken.
+    /// Maximum wait for bytes, bounded by the next driver deadline.
     fn wait_for(&self, now: MonoNs) -> Duration {
         let due = self.devices.iter().filter_map(|device| device.attached.driver.due()).min();
         due.map_or(LOOK, |due| clock::duration(due.since(now)).min(LOOK))
@@ -271,8 +271,8 @@ impl LineThread {
         Ok(())
     }
 
-    /// Wakes those who are due, unless another on the line awaits an answer. Of several who await one, as when a line has
-    /// just been opened, the first gives up first: else each would wait for the others for ever.
+    /// Wakes drivers that are due, unless another on the line awaits an answer. Of several that await one (e.g. just after
+    /// opening), the first times out first; else each would wait for the others indefinitely.
     fn wake(&mut self, line: &mut dyn Line) -> io::Result<()> {
         for number in 0..self.devices.len() {
             let now = clock::now();
@@ -289,7 +289,7 @@ impl LineThread {
         Ok(())
     }
 
-    /// Calls a driver, and does what it requests; a transaction's answer may lead to more requests.
+    /// Runs a driver callback and executes the I/O it requested; a transaction's answer may cause more requests.
     fn drive(
         &mut self,
         line: &mut dyn Line,
@@ -325,12 +325,12 @@ impl LineThread {
         }
     }
 
-    /// Looks at how the devices are doing; what the line complains of goes before what is thought of them.
+    /// Updates the devices' statuses; the line's own complaint overrides them.
     fn look(&mut self, complaint: Option<&str>, now: MonoNs) {
         for device in &mut self.devices {
             let judged = device.judge(now);
             if complaint.is_some() {
-                // The device can't help it.
+                // The fault is the line's: restart the device's silence timeout.
                 (device.last_bytes, device.last_frame) = (now, now);
             }
             let (phase, words) = complaint.map_or(judged, |words| (Phase::Closed, words.to_owned()));
@@ -352,13 +352,13 @@ impl AttachedState {
         now.since(self.last_bytes) > self.attached.driver.silence_timeout()
     }
 
-    /// How the device is doing, and why.
+    /// Health of the device, with the reason.
     fn judge(&mut self, now: MonoNs) -> (Phase, String) {
         let silence_timeout = self.attached.driver.silence_timeout();
         let DeviceHealth { good_frames, identity, complaint } = self.attached.driver.health();
         if good_frames != self.frames {
             self.frames = good_frames;
-            // Not now: a device is as long silent as no frame has come.
+            // Not `now`: the silence counts from the last bytes.
             self.last_frame = self.last_bytes;
         }
         if let Some(complaint) = complaint {
@@ -369,7 +369,7 @@ impl AttachedState {
             if good_frames > self.frames_before {
                 return (Phase::Running, identity.unwrap_or_default());
             }
-            // A device whose line is opened again since it is silent stays said to be.
+            // A device that stays silent over a reopened line keeps its silent status.
             let silent = self.status.clone().filter(|(phase, _)| *phase == Phase::Silent);
             let words = "the line is open, and no frame has come yet";
             return silent.unwrap_or_else(|| (Phase::Silent, words.to_owned()));
@@ -383,7 +383,7 @@ impl AttachedState {
         }
     }
 
-    /// Puts a status on the board when it is another than the last.
+    /// Posts a status to the board if it has changed.
     fn say(&mut self, board: &Board, since: MonoNs, phase: Phase, words: &str) {
         if self.status.as_ref().is_some_and(|(last, said)| *last == phase && said == words) {
             return;

@@ -1,4 +1,4 @@
-//! Why a line can't be opened, and what would mend it.
+//! Causes why a line can't be opened, with fixes.
 
 use std::fmt;
 
@@ -6,29 +6,29 @@ use headrace_sensor::connect::ConnectError;
 
 use crate::fix_hint;
 
-/// What kind of trouble.
+/// Kind of open error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum OpenErrorKind {
-    /// It isn't there.
+    /// The port doesn't exist.
     Absent,
-    /// It is there and we may not open it.
+    /// The port exists but access is denied.
     Denied,
-    /// Another program has it.
+    /// Another program uses the port.
     Busy,
-    /// There are several, and it isn't said which.
+    /// Several devices match.
     Ambiguous,
-    /// Something else.
+    /// Any other cause.
     Other,
 }
 
-/// Why a line can't be opened.
+/// Cause why a line can't be opened.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct OpenError {
-    /// What kind.
+    /// Kind of error.
     pub kind: OpenErrorKind,
-    /// In words.
+    /// Cause, as text.
     pub why: String,
-    /// The line or the command that mends it, where there is one.
+    /// Command that fixes it, if any.
     pub remedy: Option<String>,
 }
 
@@ -44,30 +44,30 @@ impl OpenError {
         Self { kind, why, remedy: remedy.map(str::to_owned) }
     }
 
-    /// There is no such device file or host.
+    /// No such device file or host.
     pub(crate) fn not_there(what: &str) -> Self {
         let why = format!("opening {what}: it isn't there");
         Self::new(OpenErrorKind::Absent, why, Some("plug it in, or see headrace devices"))
     }
 
-    /// The rights to a device file don't suffice.
+    /// Access to a device file is denied.
     pub(crate) fn denied(path: &str, remedy: &str) -> Self {
         Self::new(OpenErrorKind::Denied, format!("opening {path}: this user may not open it"), Some(remedy))
     }
 
-    /// There is no such CAN interface.
+    /// No such CAN interface.
     pub(crate) fn no_interface(interface: &str) -> Self {
         let why = format!("opening {interface}: there is no such CAN interface");
         Self::new(OpenErrorKind::Absent, why, Some(&fix_hint::no_interface(interface)))
     }
 
-    /// The kernel has no sockets for CAN.
+    /// The kernel lacks CAN sockets.
     pub(crate) fn no_can(interface: &str) -> Self {
         let why = format!("opening {interface}: this kernel has no CAN sockets");
         Self::new(OpenErrorKind::Absent, why, Some(fix_hint::CAN_RAW))
     }
 
-    /// A `connect` that can't be used, as it stands in a vehicle file.
+    /// A `connect` of a vehicle file that doesn't parse.
     pub fn unusable(error: &ConnectError) -> Self {
         let ConnectError { text, problem, allowed } = error;
         Self::new(OpenErrorKind::Other, format!("connect = {text:?}: {problem}"), Some(allowed))

@@ -1,4 +1,4 @@
-//! Asking what is on a line.
+//! Identifies the device on a line.
 
 use std::io;
 use std::time::Duration;
@@ -12,24 +12,23 @@ use crate::diagnosis;
 use crate::lines::{self, Line, READ_BYTES};
 use crate::open_error::OpenError;
 
-/// How long the answer to a question may take.
+/// Timeout of an answer.
 const ANSWER_TIME: DurNs = DurNs::from_millis(400);
 
-/// What came of asking.
+/// Result of a probe.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Answer {
-    /// What a device says that it is.
+    /// Identity reported by a device.
     Is(String),
-    /// So many bytes came that none of the probes understood.
+    /// Number of bytes received that no probe understood.
     Unknown(u64),
-    /// Nothing came.
+    /// No bytes received.
     Silence,
 }
 
-/// Opens a line and asks on it, one kind of device after the other, until one has said what it is. A question without an
-/// answer takes 0.4 s.
+/// Opens a line and asks each kind of device in turn until one identifies itself. A question without an answer costs 0.4 s.
 ///
-/// Errors: the line can't be opened, or breaks; with what would mend it.
+/// Errors: the line can't be opened, or fails; with the fix.
 pub fn probe(connect: &Connect, probes: &mut [Box<dyn Probe>]) -> Result<Answer, OpenError> {
     let _span = tracing::info_span!("probe", address = %connect).entered();
     tracing::info!(kinds = probes.len(), "probing");
@@ -68,5 +67,5 @@ fn ask(line: &mut dyn Line, probe: &mut dyn Probe, bytes: &mut u64) -> io::Resul
     Ok(None)
 }
 
-/// The shortest wait that isn't none.
+/// Shortest wait above zero.
 const SHORTEST: Duration = Duration::from_millis(1);

@@ -1,4 +1,4 @@
-//! How a device's line is doing, for people.
+//! Status of a device's line, for display.
 
 use std::fmt;
 use std::sync::Arc;
@@ -7,23 +7,23 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use crossbeam::queue::ArrayQueue;
 use headrace_geometry::time::MonoNs;
 
-/// How it is doing.
+/// Phase of a device's line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Phase {
-    /// Its line isn't open.
+    /// The line isn't open.
     Closed,
-    /// The line is open, and nothing has come for longer than the device should be silent.
+    /// The line is open, and the silence timeout has passed.
     Silent,
-    /// Bytes come, and none of them make sense.
+    /// Bytes arrive, but no valid frame.
     Babbling,
-    /// It says something that isn't right: another device, refused settings.
+    /// Wrong device, or settings refused.
     Wrong,
-    /// All is well.
+    /// Good frames arrive.
     Running,
 }
 
 impl Phase {
-    /// A word for it.
+    /// Name of the phase.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Closed => "closed",
@@ -35,16 +35,16 @@ impl Phase {
     }
 }
 
-/// How a device is doing from a moment on.
+/// Status of a device from a given time on.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Status {
-    /// The sensor's number, in the order of the vehicle file.
+    /// Sensor index, in the order of the vehicle file.
     pub source: usize,
-    /// Since when.
+    /// Start time of the status.
     pub since: MonoNs,
-    /// How.
+    /// Phase.
     pub phase: Phase,
-    /// Why, and what would mend it; what the device says that it is while it runs.
+    /// Reason and fix; the device's identity while it runs.
     pub words: String,
 }
 
@@ -55,20 +55,20 @@ impl fmt::Display for Status {
     }
 }
 
-/// What a line has been through during a dive.
+/// History of a line during a dive.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct LineHistory {
-    /// How often it was opened.
+    /// Times the line was opened.
     pub opened: u64,
-    /// How often it was lost, or given up for silence.
+    /// Times the line was lost, or reopened for silence.
     pub lost: u64,
     /// Packets for which the loop's ring had no room.
     pub dropped: u64,
-    /// The last status, in words.
+    /// Last status, as text.
     pub last: String,
 }
 
-/// A bounded board for statuses. When nobody reads it the oldest are dropped, and counted.
+/// Bounded queue of statuses. When it is full the oldest are dropped and counted.
 #[derive(Clone)]
 pub struct Board {
     shared: Arc<Shared>,
@@ -80,7 +80,7 @@ struct Shared {
 }
 
 impl Board {
-    /// With room for so many statuses.
+    /// Creates a board for `capacity` statuses.
     pub fn new(capacity: usize) -> Self {
         let statuses = ArrayQueue::new(capacity.max(1));
         Self { shared: Arc::new(Shared { statuses, dropped: AtomicU64::new(0) }) }
@@ -92,12 +92,12 @@ impl Board {
         }
     }
 
-    /// The oldest status that hasn't been taken.
+    /// Takes the oldest status.
     pub fn next(&self) -> Option<Status> {
         self.shared.statuses.pop()
     }
 
-    /// How many were dropped because nobody took them.
+    /// Number of statuses dropped unread.
     pub fn dropped(&self) -> u64 {
         self.shared.dropped.load(Ordering::Relaxed)
     }

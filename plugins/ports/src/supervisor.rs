@@ -1,4 +1,4 @@
-//! The threads of all lines, and the loop that lives on them.
+//! Supervisor of all line threads, and the loop they feed.
 
 use std::convert::Infallible;
 use std::io;
@@ -19,28 +19,28 @@ use crate::clock;
 use crate::line_thread::{Attached, Common, LineThread, SentSink};
 use crate::status::{Board, LineHistory, Status};
 
-/// Statuses that may wait for whoever shows them.
+/// Capacity of the status board.
 const BOARD: usize = 256;
-/// How long the loop sleeps when nothing comes.
+/// Loop period without input.
 const PERIOD: Duration = Duration::from_millis(20);
-/// How long an outlet is given that is behind.
+/// Pause while a slow output holds packets back.
 const BEHIND: Duration = Duration::from_millis(1);
 
-/// A sensor that is to be served.
+/// A sensor to be served.
 pub struct Connection {
-    /// Its number, in the order of the vehicle file.
+    /// Sensor index, in the order of the vehicle file.
     pub source: usize,
-    /// Where it is, or why that can't be told.
+    /// Address, or the reason why it doesn't parse.
     pub connect: Result<Connect, ConnectError>,
-    /// Its ring's writing end.
+    /// Writing end of its ring.
     pub port: Port,
-    /// The host's side of its line.
+    /// Host-side driver.
     pub driver: Box<dyn Driver>,
 }
 
-/// Threads that serve lines, one each. Sensors whose `connect` is the same share one.
+/// Runs one thread per line. Sensors with the same `connect` share a line.
 pub struct Supervisor {
-    /// How many sensors the vehicle has, as far as they are served.
+    /// Number of sensors, up to the highest index served.
     sensors: usize,
     threads: Vec<JoinHandle<Vec<(usize, LineHistory)>>>,
     stopping: Arc<AtomicBool>,
@@ -49,7 +49,7 @@ pub struct Supervisor {
 }
 
 impl Supervisor {
-    /// Starts them. `sent` takes what is sent to the devices.
+    /// Starts the threads. `sent` receives all messages sent to devices.
     ///
     /// Errors: a thread can't be started.
     pub fn start(connections: Vec<Connection>, sent: Option<SentSink>) -> io::Result<Self> {
@@ -68,7 +68,7 @@ impl Supervisor {
         Ok(supervisor)
     }
 
-    /// The oldest change of a device's status that hasn't been taken.
+    /// Takes the oldest unread status change.
     pub fn next_status(&self) -> Option<Status> {
         self.board.next()
     }
@@ -78,11 +78,10 @@ impl Supervisor {
         let Ok(()) = feed::drive(dive, &mut LiveFeed { supervisor: self, ended }, after_tick);
     }
 
-    /// Ends all threads and works off what they have left in the rings; gives what each sensor's line has been through, in
-    /// the order of the sensors.
+    /// Stops all threads and drains the rings; returns each sensor's line history, in the order of the sensors.
     pub fn stop(mut self, dive: &mut Loop, after_tick: &mut dyn FnMut(&Loop)) -> Vec<LineHistory> {
         self.stopping.store(true, Ordering::Relaxed);
-        // A thread that has panicked has said so itself; the others' histories stay their own.
+        // A panicked thread has already reported itself; the other histories are kept.
         let ended_early =
             LineHistory { last: "its thread has ended early".to_owned(), ..LineHistory::default() };
         let mut all = vec![ended_early; self.sensors];
@@ -130,14 +129,14 @@ impl Drop for Supervisor {
     }
 }
 
-/// A line: its thread's name, where it is, those on it.
+/// A line: thread name, address, devices on it.
 type LineOf = (String, Result<Connect, ConnectError>, Vec<Attached>);
 
 fn lines(connections: Vec<Connection>) -> Vec<LineOf> {
     let mut lines: Vec<LineOf> = Vec::new();
     for Connection { source, connect, port, driver } in connections {
         let attached = Attached { source, port, driver };
-        // A connect that can't be understood is no line that could be shared.
+        // A `connect` that doesn't parse can't be shared.
         match lines.iter_mut().find(|line| line.1.is_ok() && line.1 == connect) {
             Some(line) => line.2.push(attached),
             None => lines.push((format!("line {source}"), connect, vec![attached])),

@@ -1,25 +1,24 @@
-//! The device's side of the kernel's `/dev/uhid`: a HID device made by a program, for rehearsals and tests.
+//! Device side of the kernel's `/dev/uhid`: a HID device made by a program, for rehearsals and tests.
 //!
-//! Whoever opens `/dev/uhid` (root, as a rule) and writes these events there makes the kernel believe that a device was
-//! plugged in; it gets its own `/dev/hidrawN`. Layout: `struct uhid_event` of Linux' `<linux/uhid.h>`, packed, native byte
-//! order:
+//! A process that opens `/dev/uhid` (normally root) and writes these events makes the kernel plug in a virtual device, which
+//! gets its own `/dev/hidrawN`. Layout: `struct uhid_event` of Linux' `<linux/uhid.h>`, packed, native byte order:
 //! ```text
 //!   CREATE2   0 type u32 = 11, 4 name[128], 132 phys[64], 196 serial ("uniq")[64], 260 descriptor's size u16, 262 bus u16,
 //!             264 vendor u32, 268 product u32, 272 version u32, 276 country u32, 280 descriptor, at most 4096
 //!   INPUT2    0 type u32 = 12, 4 size u16, 6 report
 //!   DESTROY   0 type u32 = 1
 //! ```
-//! The kernel takes an event that ends early for one with zeros behind, so no event is longer than what it says.
+//! The kernel zero-fills a short event, so events are written without their trailing zeros.
 
 use std::io::Write;
 
-/// Where Linux takes the events.
+/// Path of the uhid device.
 pub const PATH: &str = "/dev/uhid";
 
-/// The longest report descriptor that the kernel takes.
+/// Maximum length of a report descriptor in the kernel.
 pub const MAX_DESCRIPTOR_BYTES: usize = 4096;
 
-/// The longest report that the kernel takes.
+/// Maximum length of a report in the kernel.
 pub const MAX_INPUT_BYTES: usize = 4096;
 
 const DESTROY: u32 = 1;
@@ -30,12 +29,12 @@ const NAME_BYTES: usize = 128;
 const PHYS_BYTES: usize = 64;
 const SERIAL_BYTES: usize = 64;
 
-/// What a device says of itself when it is plugged in.
+/// Identity of a virtual device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Identity<'a> {
-    /// Product's name, up to 127 bytes.
+    /// Product name, up to 127 bytes.
     pub name: &'a str,
-    /// Serial number, up to 63 bytes; what tells devices of one make apart.
+    /// Serial number, up to 63 bytes; distinguishes devices of one model.
     pub serial: &'a str,
     /// USB vendor id.
     pub vendor_id: u16,
@@ -45,43 +44,43 @@ pub struct Identity<'a> {
     pub descriptor: &'a [u8],
 }
 
-/// Why a device could not be made, heard or taken away.
+/// Reason why a device could not be created, written or removed.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum UhidError {
-    /// Something doesn't fit into the kernel's event.
+    /// A field doesn't fit the kernel's event.
     #[error("{what} has {bytes} bytes; allowed: {least} to {most}")]
     Size {
-        /// What was to be told.
+        /// Name of the field.
         what: &'static str,
         /// Its length.
         bytes: usize,
-        /// The least that fits.
+        /// Minimum length.
         least: usize,
-        /// The most that fits.
+        /// Maximum length.
         most: usize,
     },
     /// The kernel refused an event.
     #[error("uhid: {event}: {source}")]
     Refused {
-        /// Which event.
+        /// Name of the event.
         event: &'static str,
-        /// Its answer.
+        /// The kernel's error.
         source: std::io::Error,
     },
-    /// Only part of an event was taken, which the kernel never does.
+    /// The kernel took only part of an event, which it never does.
     #[error("uhid: {event}: {taken} of {bytes} bytes were taken")]
     Cut {
-        /// Which event.
+        /// Name of the event.
         event: &'static str,
         /// Bytes taken.
         taken: usize,
-        /// The event's bytes.
+        /// Length of the event.
         bytes: usize,
     },
 }
 
-/// A plugged-in device. It is there until [`VirtualDevice::unplug`], or until `W` is closed.
+/// A virtual device, present until [`VirtualDevice::unplug`] or until `W` is closed.
 #[derive(Debug)]
 pub struct VirtualDevice<W> {
     kernel: W,
@@ -95,12 +94,12 @@ impl<W: Write> VirtualDevice<W> {
         Ok(Self { kernel })
     }
 
-    /// Sends an input report, its id first where the descriptor has ids; 1 to 4096 bytes.
+    /// Sends an input report of 1 to 4096 bytes, its id first if the descriptor has ids.
     pub fn report(&mut self, report: &[u8]) -> Result<(), UhidError> {
         send(&mut self.kernel, "input report", &input(report)?)
     }
 
-    /// Takes the device away and gives back what it was written to, fit for another.
+    /// Removes the device and returns its writer for reuse.
     pub fn unplug(mut self) -> Result<W, UhidError> {
         send(&mut self.kernel, "destroy the device", &DESTROY.to_ne_bytes())?;
         Ok(self.kernel)
@@ -116,7 +115,7 @@ fn create(identity: &Identity<'_>) -> Result<Vec<u8>, UhidError> {
     push_text(&mut event, "a serial number", identity.serial, SERIAL_BYTES)?;
     event.extend(size.to_ne_bytes());
     event.extend(BUS_USB.to_ne_bytes());
-    // Version and country: none.
+    // Version and country: zero.
     for word in [u32::from(identity.vendor_id), u32::from(identity.product_id), 0, 0] {
         event.extend(word.to_ne_bytes());
     }
@@ -138,7 +137,7 @@ fn size(what: &'static str, bytes: &[u8], least: usize, most: usize) -> Result<u
     told.ok_or(UhidError::Size { what, bytes: bytes.len(), least, most })
 }
 
-/// Adds a text in a field of `field` bytes, the last of which stays zero.
+/// Appends a text in a field of `field` bytes, the last of which stays zero.
 fn push_text(event: &mut Vec<u8>, what: &'static str, text: &str, field: usize) -> Result<(), UhidError> {
     size(what, text.as_bytes(), 0, field - 1)?;
     event.extend(text.as_bytes());
@@ -157,7 +156,7 @@ fn send(kernel: &mut impl Write, name: &'static str, event: &[u8]) -> Result<(),
 #[cfg(test)]
 mod tests {
     use super::*;
-    /// A vendor's device with reports of two bytes.
+    /// A vendor-defined device with reports of two bytes.
     const DESCRIPTOR: [u8; 21] = [
         0x06, 0x00, 0xFF, 0x09, 0x01, 0xA1, 0x01, 0x09, 0x02, 0x15, 0x00, 0x26, 0xFF, 0x00, 0x75, 0x08, 0x95,
         0x02, 0x81, 0x02, 0xC0,
@@ -171,7 +170,7 @@ mod tests {
         descriptor: &DESCRIPTOR,
     };
 
-    /// A kernel that keeps each write by itself, and takes at most so many bytes of one.
+    /// A kernel that records each write and takes at most a given number of bytes of each.
     #[derive(Debug)]
     struct Events {
         taken: Vec<Vec<u8>>,

@@ -1,4 +1,4 @@
-//! Reports and lines to readings of cable length.
+//! Decodes reports and lines into readings of cable length.
 
 use headrace_sensor::codec::{Codec as _, CodecCounts, Framing as _, LineClock};
 use headrace_sensor::device::Decoder;
@@ -11,29 +11,29 @@ use crate::line::{LineCodec, Lines};
 use crate::report::{LayoutError, Report, ReportCodec, ReportLayout};
 use crate::tracker::{CountTracker, Counting, TrackerHealth};
 
-/// A line's characters follow one another; after such a pause no more belong to the one begun.
+/// Maximum gap within a line, after which an unfinished one is dropped.
 const SILENCE: DurNs = DurNs::from_millis(100);
 
 const MILLISECOND: DurNs = DurNs::from_millis(1);
 
-/// How a HID counter is to be understood.
+/// Decoding settings of a HID counter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Counter {
-    /// Where things stand in its reports.
+    /// Report layout.
     pub layout: ReportLayout,
-    /// Whether the auxiliary value is the device's time in milliseconds.
+    /// True if the auxiliary value is the device time in milliseconds.
     pub auxiliary_is_ms: bool,
-    /// Whether it counts from its zero or from report to report.
+    /// Absolute or incremental count.
     pub counting: Counting,
-    /// Counts for a metre of cable; below zero where the count falls as cable is paid out.
+    /// Counts per metre of cable; negative if the count falls as cable is paid out.
     pub counts_per_metre: f64,
-    /// The fastest that the winch can be, m/s.
+    /// Maximum winch speed, m/s.
     pub max_speed_mps: f64,
-    /// From validity to receive time.
+    /// Delay from a reading's time of validity to its receipt.
     pub latency: DurNs,
 }
 
-/// Reports to readings.
+/// Decodes reports into readings.
 #[derive(Debug, Clone)]
 pub struct HidDecoder {
     codec: ReportCodec,
@@ -45,7 +45,7 @@ pub struct HidDecoder {
 
 stateful!(HidDecoder { state: codec, tracker, clock, status; fixed: counter; });
 
-/// Lines to readings.
+/// Decodes lines into readings.
 #[derive(Debug, Clone)]
 pub struct LineDecoder {
     codec: LineCodec,
@@ -57,9 +57,9 @@ pub struct LineDecoder {
 stateful!(LineDecoder { state: codec, clock; fixed: metres_per_unit, latency; });
 
 impl HidDecoder {
-    /// A decoder that has seen no report yet.
+    /// New decoder.
     ///
-    /// Errors: the layout can't be.
+    /// Errors: an invalid layout.
     pub fn new(counter: Counter) -> Result<Self, LayoutError> {
         counter.layout.check()?;
         let max_counts_per_s = counter.max_speed_mps * counter.counts_per_metre.abs();
@@ -72,12 +72,12 @@ impl HidDecoder {
         })
     }
 
-    /// Reports rejected and lost, and whether the length's zero is still sure.
+    /// Numbers of rejected and lost reports, and whether the counter must be re-zeroed.
     pub fn health(&self) -> TrackerHealth {
         self.tracker.health()
     }
 
-    /// The last report's status byte, where the layout has one; its meaning is the device's own.
+    /// Status byte of the last report, if the layout has one; its meaning is device-specific.
     pub fn status(&self) -> Option<u8> {
         self.status
     }
@@ -120,7 +120,7 @@ impl Decoder for HidDecoder {
 }
 
 impl LineDecoder {
-    /// A decoder of lines whose payout is in units of `metres_per_unit`.
+    /// Decoder of lines with payout in units of `metres_per_unit`.
     pub fn new(metres_per_unit: f64, latency: DurNs) -> Self {
         Self { codec: LineCodec::default(), clock: LineClock::new(SILENCE), metres_per_unit, latency }
     }

@@ -1,4 +1,4 @@
-//! The host's side of a counter's line: it listens.
+//! Host side of a counter's line: it only listens.
 
 use headrace_sensor::driver::{Carrier, Listener, MessageListener};
 use headrace_sensor::geometry::time::DurNs;
@@ -6,16 +6,16 @@ use headrace_sensor::geometry::time::DurNs;
 use crate::line::{Lines, MAX_LINE_BYTES};
 use crate::report::ReportLayout;
 
-/// What may carry reports.
+/// Supported carriers of reports.
 pub const REPORT_CARRIERS: [Carrier; 2] = [Carrier::Hid, Carrier::Udp];
-/// What may carry lines.
+/// Supported carriers of lines.
 pub const LINE_CARRIERS: [Carrier; 3] = [Carrier::Serial, Carrier::Tcp, Carrier::Udp];
 
 const PATIENCE: DurNs = DurNs::from_millis(5_000);
-/// A line's characters follow one another.
+/// Maximum gap within a line.
 const SILENCE: DurNs = DurNs::from_millis(100);
 
-/// The driver of a HID counter.
+/// Driver of a HID counter.
 pub fn reports(layout: ReportLayout) -> MessageListener {
     let judge = move |report: &[u8]| {
         let (len, wanted) = (report.len(), layout.report_bytes);
@@ -30,7 +30,7 @@ pub fn reports(layout: ReportLayout) -> MessageListener {
     MessageListener::new(Box::new(judge), PATIENCE)
 }
 
-/// The driver of a counter that sends lines.
+/// Driver of a counter that sends lines.
 pub fn lines() -> Listener<Lines, MAX_LINE_BYTES> {
     Listener::new(Lines, SILENCE, PATIENCE)
 }

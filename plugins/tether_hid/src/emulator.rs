@@ -1,4 +1,4 @@
-//! The counter's side of the line: a report, or a text line, at a fixed rate.
+//! Counter side of the line: a report, or a text line, at a fixed rate.
 
 use headrace_sensor::device::{Direction, Emulator, LineSink};
 use headrace_sensor::geometry::math;
@@ -10,26 +10,26 @@ use crate::line::{Decimal, LineReading};
 use crate::report::Report;
 use crate::tracker::Counting;
 
-/// Status that an emulated counter gives: all well.
+/// Status of an emulated counter: valid.
 const STATUS_WELL: u8 = 1;
 
-/// Places that an emulated line gives: millimetres.
+/// Decimal places of an emulated line: millimetres.
 const LINE_PLACES: u8 = 3;
 
-/// When an emulated counter reports, and what it measures.
+/// Emulation settings.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reeling {
-    /// Chainage of the vehicle where the counter reads zero, m.
+    /// Chainage at which the counter reads zero, m.
     pub zero_at_m: f64,
-    /// Metres of chainage for a metre of cable.
+    /// Metres of chainage per metre of cable.
     pub scale: f64,
-    /// Reports a second.
+    /// Report rate, Hz.
     pub rate_hz: f64,
-    /// From validity to receive time.
+    /// Delay from a reading's time of validity to its receipt.
     pub latency: DurNs,
 }
 
-/// An ideal HID counter: no noise and no delay of its own, but whole counts.
+/// Ideal HID counter: no noise and no added delay, but whole counts.
 #[derive(Debug, Clone)]
 pub struct HidEmulator {
     reeling: Reeling,
@@ -40,7 +40,7 @@ pub struct HidEmulator {
     told_counts: i64,
 }
 
-/// An ideal LCI-90: no noise and no delay of its own, but whole millimetres.
+/// Ideal LCI-90: no noise and no added delay, but whole millimetres.
 #[derive(Debug, Clone)]
 pub struct LineEmulator {
     reeling: Reeling,
@@ -51,12 +51,12 @@ pub struct LineEmulator {
 }
 
 impl Reeling {
-    /// From the start to a report on the counter's own clock.
+    /// Time from the start to a report on the counter's clock.
     fn elapsed(&self, report: u64) -> DurNs {
         DurNs::from_secs_f64(report as f64 / self.rate_hz)
     }
 
-    /// Adds the reports before `until`, from `begun` on.
+    /// Appends the reports before `until`, starting at number `begun`.
     fn begin(&self, start: MonoNs, begun: &mut u64, until: MonoNs, due: &mut Vec<Payout>) {
         while start + self.elapsed(*begun) < until {
             due.push(Payout::due(start + self.elapsed(*begun)));
@@ -76,7 +76,7 @@ impl HidEmulator {
         Self { reeling, counter, start, begun: 0, told: 0, told_counts: 0 }
     }
 
-    /// What the next report says of `counts`; a change too large for the report is told over several.
+    /// Count of the next report; in delta mode a change too large for the report is spread over several.
     fn count(&mut self, counts: i64) -> i64 {
         let layout = &self.counter.layout;
         match self.counter.counting {

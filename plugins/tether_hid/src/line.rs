@@ -4,25 +4,25 @@
 //!   RD,TTTTTTTT,SSSSSSSS,PPPPPPPP,CCCC<CR><LF>                              LCI-90, protocol 1
 //!   NNRD,yyyy-mm-ddThh:mm:ss.mmm,TTTTTTTT,SSSSSSSS,PPPPPPPP,CCCC<CR><LF>    LCI-90i, winch NN
 //! ```
-//! Numbers have eight characters, filled with zeros, with `-` in front and a decimal point anywhere. CCCC is the sum,
-//! in decimal, of the codes of all characters before it. Anything may stand before a line.
+//! Numbers have eight characters, zero-padded, with an optional leading `-` and a decimal point anywhere. CCCC is the decimal
+//! sum of the codes of all preceding characters. Any bytes may precede a line.
 //! Source: LCI-90 Operator Manual, p. 48; a recorded LCI-90i line whose sum confirms the order of the fields.
 
 use headrace_sensor::codec::{Framed, Framing, Verdict};
 use headrace_sensor::geometry::math;
 
-/// Shapes of the two lines: 9 stands for a digit, # for a character of a number, all else for itself.
+/// Templates of the two lines: 9 is a digit, # a character of a number, all else literal.
 const PLAIN: &[u8] = b"RD,########,########,########,9999\r\n";
 const STAMPED: &[u8] = b"99RD,9999-99-99T99:99:99.999,########,########,########,9999\r\n";
-/// The longest line.
+/// Maximum line length.
 pub const MAX_LINE_BYTES: usize = STAMPED.len();
 
-/// From where on a shape has told itself from chance: behind `RD,`.
+/// Template offset behind `RD,`, from which a match is unlikely to be chance.
 const PLAIN_MARKER: usize = 3;
 const STAMPED_MARKER: usize = 5;
 
 const NUMBER_CHARS: usize = 8;
-/// Length of the sum, CR and LF.
+/// Length of checksum, CR and LF.
 const TAIL_BYTES: usize = 6;
 const POWERS_OF_TEN: [i32; 8] = [1, 10, 100, 1000, 10_000, 100_000, 1_000_000, 10_000_000];
 
@@ -33,27 +33,27 @@ pub struct Decimal {
     places: u8,
 }
 
-/// When a winch says that it measured. Digits as sent, checked against no calendar: our time is the receive time.
+/// Measurement time of a winch. Digits as sent, without a calendar check: readings use the receive time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Stamp {
-    /// Number of the winch, 0 to 99.
+    /// Winch number, 0 to 99.
     pub winch: u8,
     /// Year, 0 to 9999.
     pub year: u16,
     /// Month, day, hour, minute, second; 0 to 99 each.
     pub month_to_second: [u8; 5],
-    /// 0 to 999.
+    /// Millisecond, 0 to 999.
     pub millisecond: u16,
 }
 
-/// One line. Units are those the monitor is set to.
+/// One line, in the units configured in the monitor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LineReading {
     /// Winch and time, in LCI-90i lines.
     pub stamp: Option<Stamp>,
-    /// Tension of the cable.
+    /// Cable tension.
     pub tension: Decimal,
-    /// Speed of the cable.
+    /// Cable speed.
     pub speed: Decimal,
     /// Cable paid out.
     pub payout: Decimal,
@@ -63,7 +63,7 @@ impl Decimal {
     /// Zero.
     pub const ZERO: Self = Self { mantissa: 0, places: 0 };
 
-    /// `mantissa` / 10^`places`, or `None` where it doesn't fit eight characters.
+    /// `mantissa` / 10^`places`; `None` if it doesn't fit eight characters.
     pub fn new(mantissa: i32, places: u8) -> Option<Self> {
         let signs = usize::from(mantissa < 0) + usize::from(places > 0);
         let digits = NUMBER_CHARS - signs;
@@ -73,7 +73,7 @@ impl Decimal {
         fits.then_some(Self { mantissa, places })
     }
 
-    /// The number nearest to `value` with as many places as fit, `most_places` at most; zero for what can't be said.
+    /// Number nearest to `value` with as many places as fit, at most `most_places`; zero if it can't be represented.
     pub fn nearest(value: f64, most_places: u8) -> Self {
         let with = |places: u8| {
             let scale = f64::from(*POWERS_OF_TEN.get(usize::from(places))?);
@@ -82,12 +82,12 @@ impl Decimal {
         (0..=most_places).rev().find_map(with).unwrap_or(Self::ZERO)
     }
 
-    /// Its value.
+    /// Value as a float.
     pub fn value(self) -> f64 {
         f64::from(self.mantissa) * self.quantum()
     }
 
-    /// The value of its last place.
+    /// Value of the last place.
     pub fn quantum(self) -> f64 {
         1.0 / POWERS_OF_TEN.get(usize::from(self.places)).copied().map_or(1.0, f64::from)
     }
@@ -131,7 +131,7 @@ impl Decimal {
 }
 
 impl LineReading {
-    /// The whole line with its sum, CR and LF.
+    /// Encodes the line with checksum, CR and LF.
     pub fn encode(&self) -> Vec<u8> {
         let mut line = Vec::with_capacity(MAX_LINE_BYTES);
         if let Some(stamp) = &self.stamp {
@@ -155,7 +155,7 @@ impl LineReading {
         line
     }
 
-    /// Reads a whole line whose shape is right; `None` for a wrong sum or number.
+    /// Decodes a line that matches its template; `None` for a wrong checksum or number.
     fn decode(line: &[u8]) -> Option<Self> {
         let (summed, tail) = line.split_at_checked(line.len().checked_sub(TAIL_BYTES)?)?;
         if integer(tail.get(..4)?)? != sum(summed) {
@@ -192,11 +192,11 @@ fn sum(chars: &[u8]) -> u32 {
     chars.iter().map(|char| u32::from(*char)).sum()
 }
 
-/// How lines stand in a stream of characters.
+/// Framing of lines in a character stream.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Lines;
 
-/// Bytes of a serial line to readings.
+/// Decodes a serial line's bytes into readings.
 pub type LineCodec = Framed<Lines, MAX_LINE_BYTES>;
 
 impl Framing for Lines {

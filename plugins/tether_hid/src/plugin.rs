@@ -1,4 +1,4 @@
-//! The vehicle file's part of a cable counter, and its place in the loop.
+//! A cable counter's table in the vehicle file, and its registration with the loop.
 
 use headrace_sensor::SensorConfig;
 use headrace_sensor::config::{ConfigError, Section};
@@ -16,12 +16,12 @@ use crate::tracker::Counting;
 /// Name in vehicle files.
 pub const NAME: &str = "tether_hid";
 
-/// A minute of reports at the usual rate.
+/// Room for a minute of reports at the usual rate.
 const RING_BYTES: usize = 1 << 17;
 
 const METRES_PER_FOOT: f64 = 0.3048;
 
-/// Cable counters as a kind of device.
+/// The cable counter device kind.
 #[derive(Debug, Clone, Copy)]
 pub struct Kind;
 
@@ -33,7 +33,7 @@ pub struct CableCounter {
     wire: Wire,
 }
 
-/// What the counter speaks.
+/// Wire format of the counter.
 #[derive(Debug, Clone)]
 enum Wire {
     Hid { decoder: Box<HidDecoder>, counter: Counter },
@@ -115,8 +115,8 @@ fn hid(reeling: &Reeling, own: &Section<'_>) -> Result<Wire, ConfigError> {
     Ok(Wire::Hid { decoder: Box::new(decoder), counter })
 }
 
-/// The reference layout, as far as the keys don't say otherwise. Only a device that has all of it has its sequence,
-/// status and auxiliary value, too.
+/// The reference layout, overridden by the keys. Sequence, status and auxiliary value default to the reference only if the
+/// rest of the layout is the reference's.
 fn report_layout(own: &Section<'_>) -> Result<ReportLayout, ConfigError> {
     let reference = ReportLayout::REFERENCE;
     let byte = |key, least, usual: usize| -> Result<usize, ConfigError> {
@@ -134,7 +134,7 @@ fn report_layout(own: &Section<'_>) -> Result<ReportLayout, ConfigError> {
     };
     let endians = [("little", Endian::Little), ("big", Endian::Big)];
     let mut layout = ReportLayout {
-        // HID reserves id 0 for devices that use none.
+        // HID reserves id 0 for devices without report ids.
         report_id: if id == Some(0) { None } else { id.or(reference.report_id) },
         report_bytes: byte("report_bytes", 1, reference.report_bytes)?,
         offset: byte("offset", 0, reference.offset)?,

@@ -1,6 +1,6 @@
-//! HID reports whose layout the vehicle file gives: no cable counter with a published report is known.
+//! HID reports with the layout given in the vehicle file: no cable counter with a published report is known.
 //!
-//! The reference layout is this project's own, for emulated counters:
+//! The reference layout is defined by this project, for emulated counters:
 //! ```text
 //!   byte   0    1         2       3 .. 6             7 .. 10
 //!          id   sequence  status  count, i32 little  auxiliary, i32 little
@@ -8,7 +8,7 @@
 
 use headrace_sensor::codec::{Framed, Framing, Verdict};
 
-/// The longest report: an id and what a full-speed interrupt transfer carries.
+/// Maximum report length: an id and the payload of a full-speed interrupt transfer.
 pub const MAX_REPORT_BYTES: usize = 65;
 
 /// Report descriptor of the reference layout: vendor page 0xFF00, usage 1, report id 1, 80 bits of input.
@@ -23,7 +23,7 @@ pub const REFERENCE_DESCRIPTOR: [u8; 59] = [
     0x81, 0x02, 0xC0, // end of collection
 ];
 
-/// How many bits a counter has before it wraps.
+/// Bits of a counter before it wraps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Width {
     /// One byte.
@@ -34,7 +34,7 @@ pub enum Width {
     Bits32,
 }
 
-/// Order of a counter's bytes.
+/// Byte order of a counter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Endian {
     /// Least significant first.
@@ -43,77 +43,77 @@ pub enum Endian {
     Big,
 }
 
-/// Where things stand in a report. Offsets count from the report's first byte, which is the id where there is one.
+/// Layout of a report. Offsets count from the report's first byte, which is the id if there is one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ReportLayout {
-    /// The report's id, or `None` for a device that uses none.
+    /// Report id; `None` for a device without ids.
     pub report_id: Option<u8>,
     /// Length of the whole report, id included; 1 to 65.
     pub report_bytes: usize,
-    /// Where the count begins.
+    /// Offset of the count.
     pub offset: usize,
-    /// Its width.
+    /// Width of the count.
     pub width: Width,
-    /// Whether it is two's complement.
+    /// True for two's complement.
     pub signed: bool,
-    /// Order of its bytes.
+    /// Byte order of the count.
     pub endian: Endian,
-    /// Where a byte stands that grows by one with each report.
+    /// Offset of a sequence byte, incremented with each report.
     pub sequence_offset: Option<usize>,
-    /// Where a status byte stands. Its meaning is the device's own.
+    /// Offset of a status byte; its meaning is device-specific.
     pub status_offset: Option<usize>,
-    /// Where an i32, little-endian, of the device's own meaning stands.
+    /// Offset of a device-specific little-endian i32.
     pub auxiliary_offset: Option<usize>,
 }
 
 /// One report.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Report {
-    /// Sequence number, where the layout has one.
+    /// Sequence number, if the layout has one.
     pub sequence: Option<u8>,
-    /// Status, where the layout has one.
+    /// Status, if the layout has one.
     pub status: Option<u8>,
-    /// The count as the device gives it, within what the layout's width and sign can say.
+    /// Raw count, within the layout's width and sign.
     pub count: i64,
-    /// Auxiliary value, where the layout has one.
+    /// Auxiliary value, if the layout has one.
     pub auxiliary: Option<i32>,
 }
 
-/// Why a layout can't be.
+/// Reason why a layout is invalid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LayoutError {
-    /// No report has that length.
+    /// Invalid report length.
     #[error("laying out a report of {0} bytes; allowed are 1 to {MAX_REPORT_BYTES}")]
     Length(usize),
-    /// A field reaches over the end.
+    /// A field extends beyond the end.
     #[error("laying out {what} at offset {offset}, {bytes} bytes: the report has {report_bytes}")]
     Outside {
-        /// Which field.
+        /// Name of the field.
         what: &'static str,
-        /// Where it begins.
+        /// Offset of the field.
         offset: usize,
-        /// How long it is.
+        /// Length of the field.
         bytes: usize,
-        /// How long the report is.
+        /// Length of the report.
         report_bytes: usize,
     },
-    /// Two fields share a byte.
+    /// Two fields overlap.
     #[error("laying out {what} at offset {offset}, {bytes} bytes: it overlaps {other}")]
     Overlap {
-        /// Which field.
+        /// Name of the field.
         what: &'static str,
-        /// Where it begins.
+        /// Offset of the field.
         offset: usize,
-        /// How long it is.
+        /// Length of the field.
         bytes: usize,
-        /// The field it runs into.
+        /// Name of the overlapped field.
         other: &'static str,
     },
 }
 
 impl Width {
-    /// 8, 16 or 32.
+    /// Number of bits: 8, 16 or 32.
     pub fn bits(self) -> u32 {
         match self {
             Self::Bits8 => 8,
@@ -126,21 +126,21 @@ impl Width {
         self.bits() as usize / 8
     }
 
-    /// `count` brought into what the width can say, as a counter that wraps does.
+    /// `count` wrapped to the width.
     pub fn wrapped(self, count: i64, signed: bool) -> i64 {
         let modulus = 1_i64 << self.bits();
         let above = count.rem_euclid(modulus);
         if signed && above >= modulus / 2 { above - modulus } else { above }
     }
 
-    /// From `before` to `after` the short way round.
+    /// Wrapped difference from `before` to `after`, the short way round.
     pub fn difference(self, before: i64, after: i64) -> i64 {
         self.wrapped(after.wrapping_sub(before), true)
     }
 }
 
 impl ReportLayout {
-    /// The layout of [`REFERENCE_DESCRIPTOR`].
+    /// Layout of [`REFERENCE_DESCRIPTOR`].
     pub const REFERENCE: Self = Self {
         report_id: Some(1),
         report_bytes: 11,
@@ -153,7 +153,7 @@ impl ReportLayout {
         auxiliary_offset: Some(7),
     };
 
-    /// A descriptor of a vendor's device whose one report is as long as this layout's, and has its id.
+    /// Descriptor of a vendor-defined device with one report of this layout's length and id.
     ///
     /// Source: USB HID 1.11, 6.2.2: usage page, usage, collection, id, usage, limits, size, count, input, end.
     pub fn descriptor(&self) -> Vec<u8> {
@@ -169,9 +169,9 @@ impl ReportLayout {
         descriptor
     }
 
-    /// Checks that every field lies within the report and none on another.
+    /// Checks that every field lies within the report and that none overlap.
     ///
-    /// Errors: a length that no report has, a field outside, an overlap.
+    /// Errors: an invalid report length, a field outside, an overlap.
     pub fn check(&self) -> Result<(), LayoutError> {
         let report_bytes = self.report_bytes;
         if !(1..=MAX_REPORT_BYTES).contains(&report_bytes) {
@@ -198,7 +198,7 @@ impl ReportLayout {
         Ok(())
     }
 
-    /// Reads a whole report; `None` where the length or the id is another.
+    /// Decodes a whole report; `None` if length or id differ.
     pub fn decode(&self, bytes: &[u8]) -> Option<Report> {
         if bytes.len() != self.report_bytes || self.report_id.is_some_and(|id| bytes.first() != Some(&id)) {
             return None;
@@ -213,7 +213,7 @@ impl ReportLayout {
         })
     }
 
-    /// Writes a whole report; what the layout has no place for is left out, what `report` hasn't is zero.
+    /// Encodes a whole report; fields without a place in the layout are omitted, missing values are zero.
     pub fn encode(&self, report: &Report) -> Vec<u8> {
         let mut bytes = vec![0; self.report_bytes];
         let mut put = |offset: usize, value: &[u8]| {
@@ -253,7 +253,7 @@ impl ReportLayout {
     }
 }
 
-/// What stands before a report in a `uhid_event` that connections it to the kernel: `UHID_INPUT2` and the report's length.
+/// Header of a `uhid_event` that passes a report to the kernel: `UHID_INPUT2` and the report's length.
 ///
 /// Source: linux/uhid.h, `struct uhid_input2_req`, native byte order.
 pub fn uhid_input2_header(report_bytes: u16) -> [u8; 6] {
@@ -263,7 +263,7 @@ pub fn uhid_input2_header(report_bytes: u16) -> [u8; 6] {
     [t0, t1, t2, t3, n0, n1]
 }
 
-/// Bytes to reports. A report with another id is left out to its end, whatever it holds.
+/// Decodes bytes into reports. A report with another id is skipped entirely.
 pub type ReportCodec = Framed<ReportLayout, MAX_REPORT_BYTES>;
 
 impl Framing for ReportLayout {
@@ -374,7 +374,7 @@ mod tests {
         assert_eq!(codec.counts(), CodecCounts { good_frames: 0, bad_frames: 1, skipped_bytes: 12 });
     }
 
-    /// Two bytes, big-endian, unsigned, no id: as unlike the reference as the keys allow.
+    /// Two bytes, big-endian, unsigned, no id: as different from the reference as the keys allow.
     const PLAIN: ReportLayout = ReportLayout {
         report_id: None,
         report_bytes: 5,

@@ -1,12 +1,12 @@
-//! From a counter that wraps, jumps and starts anew to metres of cable.
+//! Tracks a counter that wraps, jumps and restarts as a continuous count of cable paid out.
 //!
-//! - A counter wraps: the change is taken the short way round.
-//! - A change faster than the winch can be is rejected and counted. Rejected reports are held against each other: when
-//!   [`PERSIST`] in a row agree, it is the counter that has moved and not the report that was garbled.
-//!   - If the first of them was near zero, the device has been plugged in again and counts from zero: the length goes on
-//!     from where it was. After a silence, too, a way back to zero must not be longer than the winch goes in a second.
-//!   - Otherwise the counter's new word is taken as it is.
-//! - Either way, and whenever counts may have been lost, the length is no longer sure: re-zero needed, from then on.
+//! - A counter wraps: changes are taken the short way round.
+//! - A change faster than the winch is rejected and counted. Rejected reports are compared with each other: when
+//! [`PERSIST`] in a row agree, the counter has moved and the reports weren't corrupt.
+//!   - If the first of them was near zero, the device was plugged in again and counts from zero: the length continues from
+//!     its last value. After a silence, too, a step back to zero is accepted directly only if the winch covers it in a second.
+//!   - Otherwise the counter's new value is accepted.
+//! - In both cases, and whenever counts may have been lost, the length is no longer certain: `re_zero_needed` is set and stays.
 
 use headrace_sensor::geometry::time::MonoNs;
 use headrace_sensor::stateful;
@@ -14,37 +14,36 @@ use serde::{Deserialize, Serialize};
 
 use crate::report::{Report, Width};
 
-/// Reports in a row that must agree with each other before a jump is believed.
+/// Consecutive consistent reports required to accept a jump.
 pub const PERSIST: u32 = 5;
 
-/// Reports that waited in the kernel's ring arrive together, so that the time between two may be nearly nothing: the
-/// winch is given this much more.
+/// Slack for reports queued in the kernel, which arrive together with hardly any time between them, s.
 const SLACK_S: f64 = 0.1;
 
-/// A device that is plugged in again has counted from zero for no longer than this when its first report comes.
+/// Maximum counting time of a replugged device before its first report, s.
 const FRESH_S: f64 = 1.0;
 
-/// What a report's count means.
+/// Meaning of a report's count.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Counting {
-    /// The count since the device's zero, wrapping.
+    /// Count since the device's zero, wrapping.
     Absolute,
-    /// The change since the report before.
+    /// Change since the previous report.
     Delta,
 }
 
-/// How the tracker stands. Counts only grow, and the mark stays once it is set.
+/// Health of the tracker. Counters only grow, and the flag stays set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct TrackerHealth {
     /// Reports rejected as faster than the winch.
     pub rejected: u64,
     /// Reports missing from the sequence.
     pub lost: u64,
-    /// Whether counts may be missing, so that the length's zero is no longer sure.
+    /// True if counts may have been lost, so that the length's zero is uncertain.
     pub re_zero_needed: bool,
 }
 
-/// A counter's follower.
+/// Tracks a counter.
 #[derive(Debug, Clone)]
 pub struct CountTracker {
     counting: Counting,
@@ -59,14 +58,14 @@ pub struct CountTracker {
 
 stateful!(CountTracker { state: accepted, jumped, sequence, total, health; fixed: counting, width, max_counts_per_s; });
 
-/// A count and when it came.
+/// A count with its receive time.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 struct Seen {
     count: i64,
     at: MonoNs,
 }
 
-/// Rejected reports that agree with each other.
+/// Consecutive rejected reports that agree with each other.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 struct Jump {
     from_zero: bool,
@@ -75,7 +74,7 @@ struct Jump {
 }
 
 impl CountTracker {
-    /// `max_counts_per_s` is the fastest that the winch, or the vehicle, can be.
+    /// `max_counts_per_s` is the maximum speed of the winch or the vehicle.
     pub fn new(counting: Counting, width: Width, max_counts_per_s: f64) -> Self {
         Self {
             counting,
@@ -89,17 +88,17 @@ impl CountTracker {
         }
     }
 
-    /// How it stands.
+    /// Health of the tracker.
     pub fn health(&self) -> TrackerHealth {
         self.health
     }
 
-    /// Takes a report received at `at`; gives the counts since zero, or `None` where the report isn't believed.
+    /// Processes a report received at `at`; returns the counts since zero, or `None` if the report is rejected.
     pub fn take(&mut self, at: MonoNs, report: &Report) -> Option<i64> {
         let repeated = self.note_sequence(report.sequence);
         let now = Seen { count: report.count, at };
         match self.counting {
-            // To add a change twice would be wrong; to see a count twice is harmless.
+            // Adding a change twice would be wrong; seeing a count twice is harmless.
             Counting::Delta if repeated => None,
             Counting::Delta => self.take_delta(now),
             Counting::Absolute => self.take_absolute(now),
@@ -148,13 +147,13 @@ impl CountTracker {
             self.jumped = Some(Jump { from_zero, last: now, agreeing: 1 });
             return None;
         }
-        // In so long a silence the counter may have gone round, and nobody can say how often.
+        // During a long silence the counter may have wrapped any number of times.
         let half = (1_u64 << self.width.bits()) as f64 / 2.0;
         self.health.re_zero_needed |= self.max_counts_per_s * now.at.since(before.at).as_secs_f64() >= half;
         self.accept(now, change)
     }
 
-    /// One more report agrees with those rejected.
+    /// Handles another report that agrees with the rejected ones.
     fn agree(&mut self, before: Seen, jump: Jump, now: Seen) -> Option<i64> {
         let agreeing = jump.agreeing + 1;
         if agreeing < PERSIST {
@@ -175,12 +174,12 @@ impl CountTracker {
         Some(self.total)
     }
 
-    /// Whether the winch can have moved by `change` counts between two moments.
+    /// True if the winch can have moved by `change` counts between two times.
     fn reaches(&self, from: MonoNs, to: MonoNs, change: i64) -> bool {
         self.within(to.since(from).as_secs_f64().max(0.0), change)
     }
 
-    /// Whether the winch can have moved by `change` counts in `elapsed_s`. One count is rounding.
+    /// True if the winch can have moved by `change` counts in `elapsed_s`. One count is allowed for rounding.
     fn within(&self, elapsed_s: f64, change: i64) -> bool {
         (change as f64).abs() <= self.max_counts_per_s * (elapsed_s + SLACK_S) + 1.0
     }

@@ -1,4 +1,4 @@
-//! Logs of `candump -l` and `candump -L`: a frame a line, `(1436509052.249713) can0 044#2A366C2B`.
+//! Logs of `candump -l` and `candump -L`: one frame per line, `(1436509052.249713) can0 044#2A366C2B`.
 //!
 //! Source: can-utils, the log file format that its `lib.h` describes.
 
@@ -40,7 +40,7 @@ impl Format for Candump {
                 out.extend(entry);
                 Step::Took(used)
             }
-            // Without its newline it may have been cut anywhere.
+            // A line without its newline may be truncated anywhere.
             Err(_) if newline.is_none() => Step::More,
             Err(why) => Step::Lost(used, why),
         }
@@ -49,7 +49,7 @@ impl Format for Candump {
 
 const NO_LINE: &str = "no line of candump";
 
-/// The frame of a line; none of one that this machine sent itself.
+/// The frame of a line; `None` for a frame that the logging machine sent itself.
 fn entry(line: &[u8]) -> Result<Option<Entry>, &'static str> {
     let line = str::from_utf8(line).map_err(|_| NO_LINE)?;
     let mut fields = line.split_ascii_whitespace();
@@ -88,7 +88,7 @@ fn can_frame(text: &str) -> Result<[u8; FRAME_BYTES], &'static str> {
     let id = match id_text.len() {
         3 if number <= STANDARD_IDS => number,
         8 if number <= EXTENDED_IDS => number | EXTENDED,
-        // The controller's own errors keep their flag.
+        // The controller's error frames keep their flag.
         8 if number >> 29 == 1 => number,
         _ => return Err(NO_LINE),
     };
@@ -105,7 +105,7 @@ fn can_frame(text: &str) -> Result<[u8; FRAME_BYTES], &'static str> {
     Ok(frame)
 }
 
-/// Pairs of digits, perhaps with points between them; `_E` behind eight is the raw length, which has no meaning here.
+/// Pairs of digits, optionally separated by points; `_E` after eight pairs is the raw length, which is ignored.
 fn data_bytes(text: &str, data: &mut [u8; 8]) -> Result<u8, &'static str> {
     let text = text.split_once('_').map_or(text, |(data, _)| data);
     let digits: Vec<u8> = text.bytes().filter(|byte| *byte != b'.').collect();

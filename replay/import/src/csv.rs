@@ -1,5 +1,5 @@
-//! Tables of values (CSV), a row a moment: each sensor's own emulator puts them into the bytes that it would have sent, so that
-//! its ordinary decoder reads them.
+//! Tables of values (CSV), one timestamp per row: each sensor's emulator encodes them as the bytes that the sensor would have
+//! sent, so that its ordinary decoder reads them.
 
 use headrace_config::{ConfigError, Section};
 use headrace_geometry::frames::Rot;
@@ -11,11 +11,11 @@ use headrace_vehicle::VehicleConfig;
 use crate::emulated::{EmulatedSensor, Value};
 use crate::{Clock, Entry, Format, Step};
 
-/// Values that a sensor takes at most.
+/// Most values per sensor.
 const SLOTS: usize = 9;
 const LONGEST_LINE: usize = 1 << 16;
 
-/// A quantity: its name, its place among the sensor's values, and the units it may be given in, with their size in ours.
+/// A quantity: its name, its index among the sensor's values, and the allowed units with their size in ours.
 type Quantity = (&'static str, usize, &'static [(&'static str, f64)]);
 
 const ANGLE: &[(&str, f64)] = &[("rad", 1.0), ("deg", PI / 180.0)];
@@ -26,7 +26,7 @@ const SPEED: &[(&str, f64)] = &[("m/s", 1.0)];
 pub(super) const PRESSURE: &[(&str, f64)] =
     &[("Pa", 1.0), ("hPa", 100.0), ("mbar", 100.0), ("kPa", 1000.0), ("bar", 1e5)];
 
-/// Which quantities a sensor takes; all are needed.
+/// Quantities of a sensor; all are required.
 fn quantities(sense: Sense) -> &'static [Quantity] {
     match sense {
         Sense::Head => &[("angle", 0, ANGLE), ("range", 1, LENGTH)],
@@ -48,7 +48,7 @@ fn quantities(sense: Sense) -> &'static [Quantity] {
     }
 }
 
-/// A table whose header is known; its streams are the sensors' ids.
+/// A table with a known header; its streams are the sensors' ids.
 pub struct Csv {
     separator: char,
     time: (usize, u128),
@@ -57,7 +57,7 @@ pub struct Csv {
     header_passed: bool,
 }
 
-/// A sensor and the columns that are its own.
+/// A sensor and its columns.
 struct Target {
     sensor: EmulatedSensor,
     /// For each value, the column and the size of its unit.
@@ -65,10 +65,10 @@ struct Target {
 }
 
 impl Csv {
-    /// By a mapping, for sensors of a vehicle, and the table's first line.
+    /// From a mapping, the sensors of a vehicle, and the table's first line.
     ///
-    /// Errors: a key with a value that isn't allowed, a sensor or a column that isn't there, a sensor some of whose quantities
-    /// are missing.
+    /// Errors: a key with an invalid value, an unknown sensor or column, a sensor with some of its quantities
+    /// missing.
     pub fn new(mapping: Section<'_>, vehicle: &VehicleConfig, header: &str) -> Result<Self, ConfigError> {
         let separators = [(",", ','), (";", ';'), ("\t", '\t')];
         let separator = mapping.choice("separator", &separators)?.unwrap_or(',');
@@ -166,9 +166,9 @@ impl Target {
         Ok(())
     }
 
-    /// Puts a row's values into bytes. Where all cells are empty the sensor said nothing.
+    /// Encodes a row's values. A row with all cells empty gives no bytes.
     ///
-    /// Errors: in words, rows with cells that can't be told.
+    /// Errors: as text, for cells that can't be parsed or encoded.
     fn tell(&mut self, stamp_ns: u64, cells: &[&str], out: &mut Vec<Entry>) -> Result<(), &'static str> {
         let text = |place: &Option<(usize, f64)>| {
             place.map(|(column, _)| cells.get(column).copied().unwrap_or_default()).unwrap_or_default()
@@ -194,7 +194,7 @@ impl Target {
     }
 }
 
-/// `None` where a value is missing. A head that has an angle and no range has heard nothing.
+/// `None` where a value is missing. A head with an angle and no range had no echo.
 fn value(sense: Sense, values: [Option<f64>; SLOTS], no_range: bool) -> Option<Value> {
     let [a, b, c, d, e, f, g, h, i] = values;
     Some(match sense {
@@ -207,7 +207,7 @@ fn value(sense: Sense, values: [Option<f64>; SLOTS], no_range: bool) -> Option<V
     })
 }
 
-/// A decimal number of units, exactly, cut off at the nanosecond.
+/// A decimal number of units as nanoseconds, exact and truncated.
 fn nanoseconds(text: &str, unit_ns: u128) -> Option<u64> {
     let (whole, fraction) = text.split_once('.').unwrap_or((text, ""));
     if whole.is_empty() || !whole.bytes().chain(fraction.bytes()).all(|byte| byte.is_ascii_digit()) {
@@ -217,7 +217,7 @@ fn nanoseconds(text: &str, unit_ns: u128) -> Option<u64> {
     let scale = 10_u128.checked_pow(u32::try_from(fraction.len()).ok()?)?;
     let part = if fraction.is_empty() { 0 } else { fraction.parse::<u128>().ok()? };
     let ns = whole.parse::<u128>().ok()?.checked_mul(unit_ns)?.checked_add(part * unit_ns / scale)?;
-    // Room is left for what devices add to it.
+    // Leaves headroom for times added by devices.
     u64::try_from(ns).ok().filter(|ns| *ns < 1 << 62)
 }
 

@@ -1,9 +1,9 @@
-//! What a file looks like by its first bytes.
+//! Recognises kinds of files by their first bytes.
 
-/// Bytes that are enough to tell.
+/// Bytes sufficient for recognition.
 pub const ENOUGH_BYTES: usize = 64;
 
-/// What a file looks like, in words; `None` for what isn't known.
+/// Probable kind of the file, as text; `None` if unknown.
 pub fn looks_like(front: &[u8]) -> Option<&'static str> {
     const MAGICS: [(&[u8], &str); 16] = [
         (

@@ -1,4 +1,4 @@
-//! A sensor of a vehicle file as its emulator, which makes the bytes that the sensor would have sent of foreign values.
+//! A vehicle file's sensor as an emulator, which encodes foreign values as the bytes that the sensor would have sent.
 
 use headrace_config::{ConfigError, Section};
 use headrace_geometry::frames::{Rot, Sensor, Vec3};
@@ -9,32 +9,32 @@ use headrace_sensor::measurement::{GroundVelocity, Inertia, Payout, Pressure, So
 use headrace_sensor::reading::Level;
 use headrace_vehicle::VehicleConfig;
 
-/// What an inertial sample says of its own period, which foreign values don't.
+/// Sample period reported by inertial samples; foreign values have none.
 const PERIOD: DurNs = DurNs(10_000_000);
 
-/// What a sensor is told.
+/// A value for an emulator.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Value {
-    /// A beam of a head: its angle, and its range where something was heard.
+    /// A beam of a head: angle, and range if there was an echo.
     Beam(f64, Option<f64>),
-    /// A range of an echosounder, where something was heard.
+    /// An echosounder's range, if there was an echo.
     Range(Option<f64>),
     /// Absolute pressure, Pa.
     Pressure(f64),
-    /// Attitude, turn rate, rad/s, specific force, m/s^2. NaN where they weren't measured.
+    /// Attitude, turn rate, rad/s, specific force, m/s^2. NaN where not measured.
     Inertia(Rot<Level, Sensor>, [f64; 3], [f64; 3]),
     /// Velocity over ground, m/s.
     Velocity([f64; 3]),
-    /// Chainage that the cable reaches, m.
+    /// Chainage by paid-out cable length, m.
     Payout(f64),
 }
 
 impl Value {
-    /// Whether there can be such a value, far beyond what there is in tunnels: wires wrap and clamp what is larger, and make
-    /// something plausible of it.
+    /// Whether the value is possible, with limits far beyond those of tunnels: wire formats wrap or clamp larger values into
+    /// plausible ones.
     fn is_possible(&self) -> bool {
         let within = |values: &[f64], most: f64| values.iter().all(|value| value.abs() <= most);
-        // What wasn't measured is no number.
+        // Values not measured are NaN.
         let known =
             |values: &[f64; 3], most: f64| values.iter().all(|value| value.is_nan() || value.abs() <= most);
         match self {
@@ -52,13 +52,13 @@ impl Value {
 pub(super) struct EmulatedSensor {
     pub(super) id: String,
     pub(super) sense: Sense,
-    /// For a head, the ranges that it can tell, metres at the site's speed of sound.
+    /// For a head, its measurable ranges, metres at the site's speed of sound.
     pub(super) reach_m: Option<[f64; 2]>,
     emulated: Emulated,
 }
 
 impl EmulatedSensor {
-    /// By the id that a mapping's table gives under `sensor`.
+    /// By the id given under `sensor` in a mapping's table.
     ///
     /// Errors: the vehicle file has no such sensor.
     pub(super) fn named(
@@ -95,8 +95,8 @@ impl EmulatedSensor {
         Self { id: id.to_owned(), sense: device.sense(), reach_m, emulated: device.emulator(&setup) }
     }
 
-    /// Gives the bytes that it would have sent, each with its receive time. `false` where it has none for such a value, or the value
-    /// can't be.
+    /// Emits the bytes that the sensor would have sent, each with its receive time. `false` if it can't encode the value, or the
+    /// value is impossible.
     pub(super) fn tell(&mut self, at: MonoNs, value: &Value, sink: &mut dyn FnMut(MonoNs, &[u8])) -> bool {
         if !value.is_possible() {
             return false;

@@ -1,46 +1,46 @@
-//! What stands in a foreign log.
+//! Entries of a foreign log.
 
-/// What a file says was on a line.
+/// Bytes that a file recorded on a line.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Entry {
-    /// When, in nanoseconds of the file's own clock.
+    /// Timestamp, nanoseconds of the file's clock.
     pub stamp_ns: u64,
-    /// Which line, by the name that the format gives it: a CAN interface, for instance.
+    /// The line, by the name that the format gives it: a CAN interface, for instance.
     pub stream: String,
     /// The bytes as the device sent them.
     pub bytes: Vec<u8>,
 }
 
-/// What stands at the front of the rest of a file.
+/// Result of parsing the front of the remaining file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Step {
-    /// Entries, or what carries none, in so many bytes.
+    /// This many bytes parsed; they gave entries or carry none.
     Took(usize),
-    /// So many bytes that are lost, and why.
+    /// This many bytes lost, and why.
     Lost(usize, &'static str),
-    /// Not known without more bytes; at the file's end, an entry that is cut off.
+    /// More bytes are needed; at the end of the file, a truncated entry.
     More,
-    /// What stands at the front has more entries: none of its bytes is done with.
+    /// The front has further entries: none of its bytes is consumed yet.
     Held,
 }
 
-/// What a format says at the end besides its bytes, in words.
+/// A format's report at the end, as text.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Told {
-    /// What was lost.
+    /// Losses.
     pub losses: Vec<String>,
-    /// What is no loss, and should be known all the same.
+    /// Remarks that aren't losses.
     pub remarks: Vec<String>,
 }
 
-/// What a format's times count from.
+/// Epoch of a format's timestamps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Clock {
     /// 1970, UTC.
     Utc,
     /// 1970, in the unknown time zone of the machine that wrote the file.
     Local,
-    /// Something of its own.
+    /// An epoch of the format's own.
     Own,
 }
 

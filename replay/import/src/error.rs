@@ -6,29 +6,29 @@ use headrace_replay::log::LogError;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ImportError {
-    /// The medium failed.
+    /// An I/O error.
     #[error("reading {name} at byte {offset}: {source}")]
     Read {
         /// The file.
         name: String,
-        /// Where.
+        /// Offset, bytes.
         offset: u64,
-        /// Why.
+        /// Cause.
         source: std::io::Error,
     },
-    /// Nothing in it that could be imported.
+    /// Nothing importable in the file.
     #[error("importing {name}: there is no {what} in its {bytes} bytes{why}")]
     Nothing {
         /// The file.
         name: String,
-        /// What was looked for.
+        /// Kind of entries searched for.
         what: &'static str,
         /// Length of the file.
         bytes: u64,
-        /// What was found in place, or empty.
+        /// The content found instead, or empty.
         why: String,
     },
-    /// No bag that is known.
+    /// Not a known kind of bag.
     #[error("importing {name}: a ROS bag begins with \"#ROSBAG V2.0\", this file with {found:?}")]
     NoBag {
         /// The file.
@@ -42,7 +42,7 @@ pub enum ImportError {
         /// The file.
         name: String,
     },
-    /// The log can't be written, or the recording not be read.
+    /// The log can't be written, or the recording not read.
     #[error(transparent)]
     Log(#[from] LogError),
 }

@@ -1,14 +1,14 @@
-//! How a kind of file is cut.
+//! How a kind of file is split into entries.
 
 use crate::entry::{Clock, Entry, Step, Told};
 use crate::order::WINDOW_NS;
 
-/// Bytes of the file that are held at most: more than the longest entry of any format.
+/// Most bytes of the file held in memory: more than the longest entry of any format.
 const MOST_HELD: usize = 1 << 20;
 
-/// How a kind of file is cut into entries. Sans-I/O: it gets the front of what is left of the file.
+/// Splits a kind of file into entries. Sans-I/O: it gets the front of the remaining file.
 pub trait Format {
-    /// What its times count from, as far as has been read.
+    /// Epoch of its timestamps, as far as known from the bytes read.
     fn clock(&self) -> Clock;
 
     /// Longest entry, bytes.
@@ -16,17 +16,17 @@ pub trait Format {
         MOST_HELD
     }
 
-    /// How long before the latest entry one may be that comes later, ns.
+    /// Greatest delay of an entry after a later-stamped one, ns.
     fn reach_ns(&self) -> u64 {
         WINDOW_NS
     }
 
-    /// What it has to say at the end.
+    /// Its report at the end.
     fn told(&self) -> Told {
         Told::default()
     }
 
-    /// What stands at the front; `out` gets the entries. `end` says that nothing follows.
+    /// Parses the front; entries go to `out`. `end` means that nothing follows.
     fn step(&mut self, front: &[u8], end: bool, out: &mut Vec<Entry>) -> Step;
 }
 

@@ -1,4 +1,4 @@
-//! Files of Imagenex' own software.
+//! Files of Imagenex's own software.
 
 use crate::{Clock, Entry, Format, Step};
 use headrace_geometry::time::DurNs;
@@ -8,7 +8,7 @@ use headrace_imagenex881::logfile::{LogFile, LogFileError};
 #[derive(Debug, Clone, Copy, Default)]
 pub struct ImagenexFormat;
 
-/// The line of all returns.
+/// The line with all returns.
 pub const STREAM: &str = "imagenex";
 
 const DAY_NS: u64 = 86_400_000_000_000;
@@ -38,7 +38,7 @@ impl Format for ImagenexFormat {
     }
 }
 
-/// Nanoseconds from 1970 on to a day, month and year, and a time of that day.
+/// Nanoseconds since 1970 of a day, month and year, and a time of that day.
 fn stamp_ns((day, month, year): (u8, u8, u16), time: DurNs) -> Option<u64> {
     const LENGTHS: [u64; 12] = [31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31];
     let leap = |year: u16| year.is_multiple_of(4) && (!year.is_multiple_of(100) || year.is_multiple_of(400));

@@ -1,4 +1,4 @@
-//! An import: entries in order of time, moved to the log's clock and handed to the sensors that would have heard them.
+//! An import: entries in time order, moved to the log's clock and routed to the sensors that would have received them.
 
 use std::io::{Read, Write};
 
@@ -13,40 +13,40 @@ use crate::losses::Losses;
 use crate::order::Order;
 use crate::taker::Taker;
 
-/// Log time of a file's first entry, as that of a simulation.
+/// Log time of a file's first entry, the same as in a simulation.
 pub const BEGIN: MonoNs = MonoNs(1_000_000_000);
 
-/// Times that go on by more than this were not of one recording, or somebody set the clock.
+/// A greater gap between timestamps means several recordings, or that the clock was set.
 const LONGEST_GAP: DurNs = DurNs(3_600_000_000_000);
 
-/// A file that is being imported.
+/// A file being imported.
 pub struct Import<S> {
     pub(crate) input: S,
     pub(crate) order: Order,
-    /// The stamp that becomes [`BEGIN`].
+    /// The timestamp that becomes [`BEGIN`].
     first_ns: u64,
     clock: Clock,
 }
 
-/// What has come of an import.
+/// Outcome of an import.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Imported {
     /// Entries of the file.
     pub entries: u64,
-    /// Entries that no sensor takes: other parts, other lines.
+    /// Entries for none of the sensors: other parts, other lines.
     pub passed_over: u64,
     /// Messages written, for each source of the log.
     pub messages: Vec<u64>,
     /// Log time of the last message.
     pub last: MonoNs,
-    /// What was lost, in words.
+    /// Losses, as text.
     pub losses: Vec<String>,
-    /// What is no loss, and should be known all the same.
+    /// Remarks that aren't losses.
     pub remarks: Vec<String>,
 }
 
 impl<R: Read> Import<Input<R>> {
-    /// Reads as far as it takes to know when the file begins. `what` is what its entries are called.
+    /// Reads until the start time of the file is known. `what` is the name of its entries.
     ///
     /// Errors: the file can't be read, or has no entry.
     pub fn open(
@@ -60,7 +60,7 @@ impl<R: Read> Import<Input<R>> {
 }
 
 impl<S: Source> Import<S> {
-    /// Reads as far as it takes to know when the recording begins. `what` is what its entries are called.
+    /// Reads until the start time of the recording is known. `what` is the name of its entries.
     ///
     /// Errors: it can't be read, or has no entry.
     pub fn of(mut input: S, what: &'static str) -> Result<Self, ImportError> {
@@ -79,7 +79,7 @@ impl<S: Source> Import<S> {
         Ok(Self { input, order, first_ns, clock })
     }
 
-    /// What the log's metadata say of its clock: where it comes from and, where that is known, what time of day it was.
+    /// The log's clock metadata: origin of the clock and, where known, the time of day.
     pub fn clock_metadata(&self) -> Vec<(String, String)> {
         let mut all = vec![("import_clock".to_owned(), self.clock.as_str().to_owned())];
         if self.clock == Clock::Utc {
@@ -91,9 +91,9 @@ impl<S: Source> Import<S> {
         all
     }
 
-    /// Writes all that the sensors would have heard. `beside` learns how many entries there have been.
+    /// Writes everything the sensors would have received. `beside` is given the number of entries so far.
     ///
-    /// Errors: the file can't be read on, or the log not be written.
+    /// Errors: reading the file or writing the log fails.
     pub fn write<W: Write>(
         mut self,
         log: &mut LogWriter<W>,

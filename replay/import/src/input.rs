@@ -1,4 +1,4 @@
-//! Where entries come from.
+//! Sources of entries.
 
 use std::io::Read;
 
@@ -8,41 +8,41 @@ use crate::format::Format;
 use crate::losses::Losses;
 use crate::order::Order;
 
-/// Bytes that are read at a time.
+/// Read size, bytes.
 pub(crate) const READ_BYTES: usize = 1 << 16;
 
-/// Where entries come from: a file that a [`Format`] cuts, or one that another reader reads.
+/// A source of entries: a file split by a [`Format`], or one with a reader of its own.
 pub trait Source {
-    /// The file.
+    /// File name.
     fn name(&self) -> &str;
 
-    /// Puts the next entries in order. `false` at the end.
+    /// Adds the next entries to `order`. `false` at the end.
     ///
-    /// Errors: the file can't be read on.
+    /// Errors: reading the file fails.
     fn more(&mut self, order: &mut Order) -> Result<bool, ImportError>;
 
-    /// What its times count from, as far as has been read.
+    /// Epoch of its timestamps, as far as known from the bytes read.
     fn clock(&self) -> Clock;
 
-    /// How long before the latest entry one may be that comes later, ns.
+    /// Greatest delay of an entry after a later-stamped one, ns.
     fn reach_ns(&self) -> u64;
 
-    /// Bytes that have been read.
+    /// Bytes read.
     fn bytes(&self) -> u64;
 
-    /// What was lost so far, and what else should be known.
+    /// Losses and remarks so far.
     fn told(&self) -> Told;
 }
 
-/// A file and the format that cuts it.
+/// A file and the format that splits it.
 pub struct Input<R, F = Box<dyn Format>> {
     name: String,
     reader: R,
     pub(crate) format: F,
     pub(crate) held: Vec<u8>,
-    /// Of what is held, how much is done with.
+    /// Bytes of the buffer already consumed.
     done: usize,
-    /// Place in the file of the first byte that is held.
+    /// File offset of the buffer's first byte.
     offset: u64,
     end: bool,
     found: Vec<Entry>,
@@ -106,7 +106,7 @@ impl<R: Read, F: Format> Source for Input<R, F> {
 }
 
 impl<R: Read, F: Format> Input<R, F> {
-    /// A file that nothing has been read of.
+    /// A file, not yet read.
     pub fn new(name: &str, reader: R, format: F) -> Self {
         Self {
             name: name.to_owned(),

@@ -1,4 +1,4 @@
-//! The kinds of foreign logs that are known.
+//! The known kinds of foreign logs.
 
 use std::path::Path;
 

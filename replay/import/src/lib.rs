@@ -1,9 +1,9 @@
-//! Foreign logs become ours: a file is cut into entries, these are put in order of time and handed to the sensors that
-//! would have heard them.
+//! Imports foreign logs: a file is split into entries, which are put in time order and routed to the sensors that
+//! would have received them.
 //!
-//! A [`Format`] knows how a kind of file is cut, without I/O; [`FileKind`] names those that are known. [`Import`] reads,
-//! keeps what it holds bounded, moves the file's own times to a clock that begins at [`BEGIN`], and counts what is lost.
-//! A [`Taker`] is a sensor of the vehicle file; [`routing`] says which one listens to what.
+//! A [`Format`] splits one kind of file, without I/O; [`FileKind`] lists the known kinds. [`Import`] reads
+//! with bounded memory, moves the file's times to a clock that begins at [`BEGIN`], and counts losses.
+//! A [`Taker`] is a sensor of the vehicle file; [`routing`] assigns lines to sensors.
 
 #![cfg_attr(not(test), warn(clippy::indexing_slicing))]
 

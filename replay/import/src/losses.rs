@@ -1,18 +1,18 @@
-//! What an import lost, by kind, with counts and the first place.
+//! Losses of an import by kind, with counts and first positions.
 
 use std::collections::BTreeMap;
 
 use headrace_geometry::time::MonoNs;
 
-/// What was lost so far.
+/// Losses so far.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Losses {
     kinds: BTreeMap<&'static str, Kind>,
-    /// Where the last loss ended, and of which kind it was: a byte that follows directly is passed over in the same search.
+    /// End and kind of the last loss: a byte that follows directly belongs to the same loss.
     last: Option<(u64, &'static str)>,
     cut_off: Option<(u64, usize)>,
     late: u64,
-    /// Gaps, and the first of them: how long, and when.
+    /// Number of gaps, and length and time of the first.
     gaps: Option<(u64, u64, MonoNs)>,
 }
 
@@ -24,7 +24,7 @@ struct Kind {
 }
 
 impl Losses {
-    /// Bytes at a place of the file.
+    /// Bytes lost at an offset in the file.
     pub(super) fn lost(&mut self, at: u64, bytes: usize, why: &'static str) {
         let kind = self.kinds.entry(why).or_insert(Kind { places: 0, bytes: 0, first: at });
         kind.places += u64::from(bytes > 1 || self.last != Some((at, why)));
@@ -37,18 +37,18 @@ impl Losses {
         self.cut_off = Some((at, bytes));
     }
 
-    /// Entries that came later than order can be made of.
+    /// Entries dropped because they came too late to be put in order.
     pub(super) fn late(&mut self, count: u64) {
         self.late = count;
     }
 
-    /// The file's clock goes on by hours from one entry to the next.
+    /// A gap of hours between two timestamps of the file.
     pub(super) fn gap(&mut self, gap_ns: u64, at: MonoNs) {
         let (count, first_ns, first_at) = self.gaps.unwrap_or((0, gap_ns, at));
         self.gaps = Some((count + 1, first_ns, first_at));
     }
 
-    /// All of it in words.
+    /// All losses, as text.
     pub(super) fn words(&self) -> Vec<String> {
         let mut all: Vec<String> = self
             .kinds

@@ -1,18 +1,18 @@
-//! Order of time, within what can be held.
+//! Time order with bounded memory.
 
 use std::collections::BTreeMap;
 
 use crate::Entry;
 
-/// Entries within this of the latest one are held back: what comes after them may be older.
+/// Entries within this of the latest one are held back, since older ones may follow.
 pub(super) const WINDOW_NS: u64 = 2_000_000_000;
-/// However close together, no more are held than this.
+/// Most entries held, however close together.
 const MOST_ENTRIES: usize = 1 << 15;
 const MOST_BYTES: usize = 1 << 24;
-/// And where they have to be held for longer than usual.
+/// The same for formats with longer delays.
 const MOST_REACHING: usize = 1 << 18;
 
-/// Gives entries in order of their stamps, those with the same one as they came.
+/// Returns entries in order of their timestamps, those with equal ones in order of arrival.
 #[derive(Debug)]
 pub struct Order {
     window_ns: u64,
@@ -31,13 +31,13 @@ impl Default for Order {
 }
 
 impl Order {
-    /// For entries that may come so much later than they are.
+    /// For entries that may be delayed by up to `window_ns`.
     pub(super) fn reaching(window_ns: u64) -> Self {
         let most_entries = if window_ns > WINDOW_NS { MOST_REACHING } else { MOST_ENTRIES };
         Self { window_ns, most_entries, held: BTreeMap::new(), bytes: 0, count: 0, given_ns: 0, late: 0 }
     }
 
-    /// Takes an entry, unless a later one has been given already.
+    /// Adds an entry, unless a later one has already been returned.
     pub(super) fn push(&mut self, entry: Entry) {
         if entry.stamp_ns < self.given_ns {
             self.late += 1;
@@ -48,7 +48,7 @@ impl Order {
         self.held.insert((entry.stamp_ns, self.count), entry);
     }
 
-    /// Whether an entry has to be given before another is taken.
+    /// Whether an entry must be taken out before another is added.
     pub(super) fn is_full(&self) -> bool {
         let ends = self.held.first_key_value().zip(self.held.last_key_value());
         let spans = ends.is_some_and(|((first, _), (last, _))| last.0 - first.0 > self.window_ns);
@@ -66,7 +66,7 @@ impl Order {
         self.held.first_key_value().map(|((stamp_ns, _), _)| *stamp_ns)
     }
 
-    /// Entries that were left out since they came too late.
+    /// Entries dropped because they came too late.
     pub(super) fn late(&self) -> u64 {
         self.late
     }

@@ -1,4 +1,4 @@
-//! Logs of Ping Viewer: after a preface, for each message the time of day and the message.
+//! Logs of Ping Viewer: after a preface, each message is preceded by its time of day.
 //!
 //! Source: Ping Viewer, docs, "Binary log file structure": big-endian; a text is its length in bytes, u32, and UTF-16.
 
@@ -13,19 +13,19 @@ pub struct PingFormat {
     last_of_day_ns: u64,
 }
 
-/// The line of all messages.
+/// The line with all messages.
 pub const STREAM: &str = "ping";
 
-/// Texts before the two numbers that end the preface, the version of four bytes after the first of them.
+/// Texts before the two numbers that end the preface; the four-byte version follows the first text.
 const TEXTS: usize = 5;
 const TITLE: &str = "PingViewer sensor log file";
 const DAY_NS: u64 = 86_400_000_000_000;
-/// A time that is earlier by this is of the next day; by less, it came out of order.
+/// A time earlier by more than this is of the next day; by less, it is out of order.
 const MIDNIGHT_NS: u64 = DAY_NS / 2;
 /// Longer than any text or message of such a log.
 const MOST_BYTES: usize = 1 << 16;
 
-/// Why no field can be read.
+/// Why a field can't be read.
 enum Stop {
     More,
     Bad,
@@ -42,7 +42,7 @@ impl Format for PingFormat {
         match done {
             Ok(()) => Step::Took(front.len() - rest.len()),
             Err(Stop::More) => Step::More,
-            // Records have no mark to find the next one by.
+            // Records have no sync mark to find the next one by.
             Err(Stop::Bad) if self.begun => Step::Lost(front.len(), "no time and message where one must be"),
             Err(Stop::Bad) => Step::Lost(front.len(), "no preface of Ping Viewer"),
         }
@@ -84,7 +84,7 @@ fn number(rest: &mut &[u8]) -> Result<u32, Stop> {
 }
 
 fn sized<'a>(rest: &mut &'a [u8]) -> Result<&'a [u8], Stop> {
-    // Qt's mark of a text that isn't there.
+    // Qt's marker of a null string.
     let len = match number(rest)? {
         u32::MAX => 0,
         len => usize::try_from(len).map_err(|_| Stop::Bad)?,
@@ -103,7 +103,7 @@ fn text(rest: &mut &[u8]) -> Result<String, Stop> {
     String::from_utf16(&units).ok().filter(|_| odd.is_empty()).ok_or(Stop::Bad)
 }
 
-/// `hh:mm:ss.zzz`, perhaps with a zero behind it.
+/// `hh:mm:ss.zzz`, optionally followed by a zero.
 fn time_of_day_ns(text: &str) -> Option<u64> {
     let text = text.trim_end_matches('\0');
     let (clock, milliseconds) = text.split_once('.')?;

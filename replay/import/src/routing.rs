@@ -1,4 +1,4 @@
-//! Which sensor listens to which line of a foreign log.
+//! Assigns lines of a foreign log to sensors.
 
 use headrace_geometry::time::MonoNs;
 use headrace_replay::log::SourceInfo;
@@ -8,7 +8,7 @@ use headrace_vehicle::VehicleConfig;
 use crate::kind::FileKind;
 use crate::taker::Taker;
 
-/// Why the lines of a file can't be routed to sensors. Texts name the options of `headrace import`.
+/// Why the lines of a file can't be routed to sensors. Messages name the options of `headrace import`.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RoutingError {
@@ -17,28 +17,28 @@ pub enum RoutingError {
     NoSuchSensor {
         /// Its name.
         id: String,
-        /// Those that there are.
+        /// The existing ones.
         allowed: String,
     },
-    /// No sensor of the vehicle file would have heard such a file.
+    /// No sensor of the vehicle file could have received such a file's data.
     #[error("the vehicle file has no sensor {which} to take it; --source ID={line} names one")]
     NoTaker {
-        /// Which sensors would have.
+        /// Sensors that could.
         which: String,
-        /// How a line is named.
+        /// Form of a line's name.
         line: &'static str,
     },
-    /// Several sensors could be the one device that the file is of.
+    /// Several sensors could be the file's only device.
     #[error("the file is of one device, and {several} are of plugin {plugin}; --source ID={line} says which")]
     SeveralTakers {
         /// Their names.
         several: String,
         /// Their plugin.
         plugin: &'static str,
-        /// How the line is named.
+        /// Form of the line's name.
         line: &'static str,
     },
-    /// Values become bytes of a vehicle's sensors, and there is no vehicle file.
+    /// A file of values needs a vehicle file, whose sensors encode them, and there is none.
     #[error("{format} wants --vehicle VEHICLE.toml, whose sensors' bytes its values become")]
     NoVehicle {
         /// The kind of file.
@@ -47,23 +47,23 @@ pub enum RoutingError {
     /// Neither a vehicle file nor an option names a sensor.
     #[error("which sensors are the messages of? --vehicle VEHICLE.toml says so, or --source ID={line}")]
     NoSensor {
-        /// How a line is named.
+        /// Form of a line's name.
         line: &'static str,
     },
-    /// Lines are named for a file of values.
+    /// Lines are named, but the file has values.
     #[error("--source isn't for {format}; a mapping file names the sensors")]
     NoLines {
         /// The kind of file.
         format: &'static str,
     },
-    /// A line is named that the file doesn't have.
+    /// A line that the file doesn't have.
     #[error("--source {id}={line}: such a file has one line, {only}")]
     NoSuchLine {
         /// The sensor.
         id: String,
         /// The line.
         line: String,
-        /// The one that it has.
+        /// The line that it has.
         only: &'static str,
     },
     /// A sensor is named twice.
@@ -74,8 +74,8 @@ pub enum RoutingError {
     },
 }
 
-/// The sensors that listen: by the vehicle file, or those of `explicit`, pairs of a sensor's id and its line, which override
-/// the vehicle file's.
+/// The sensors that receive lines: those of the vehicle file, or of `explicit`, pairs of a sensor's id and its line, which
+/// override the vehicle file's.
 ///
 /// Errors: see [`RoutingError`].
 pub fn takers(
@@ -99,7 +99,7 @@ pub fn takers(
         let is_of_kind = kind == FileKind::Candump || config.plugin == kind.plugin();
         let usual = kind.usual_line(&config.connect).filter(|_| is_of_kind);
         let Some(stream) = own.or(usual.filter(|_| explicit.is_empty())) else { continue };
-        // All of a telemetry link is on one line; the driver of a part knows its own.
+        // All of a telemetry link is on one line; each device's driver picks out its own messages.
         let setup = DriverSetup { begun: MonoNs(0), head: None };
         let has_driver = kind == FileKind::Tlog && config.plugin == kind.plugin();
         takers.push(Taker { source, stream, driver: has_driver.then(|| device.driver(&setup)) });

@@ -1,19 +1,19 @@
-//! A sensor of the vehicle file, as it listens to a foreign log.
+//! A sensor of the vehicle file as a receiver of a foreign log.
 
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::driver::{Driver, Wire};
 
-/// Takes what its sensor would have heard.
+/// Receives the data of one sensor.
 pub struct Taker {
     /// Number of the log's source.
     pub source: u16,
-    /// The line that it listens to.
+    /// The line that it receives.
     pub stream: String,
-    /// Picks its own from a line that several share; without one, all is its own.
+    /// Picks the sensor's data from a shared line; without one, all of the line is the sensor's.
     pub driver: Option<Box<dyn Driver>>,
 }
 
-/// Keeps what a driver hands on; what it would send has nowhere to go.
+/// Collects the packets that a driver delivers; output to the device is discarded.
 struct Heard(Vec<(MonoNs, Vec<u8>)>);
 
 impl Wire for Heard {
@@ -27,12 +27,12 @@ impl Wire for Heard {
 }
 
 impl Taker {
-    /// Whether it listens to a line.
+    /// Whether it receives that line.
     pub(super) fn listens_to(&self, stream: &str) -> bool {
         self.stream == stream
     }
 
-    /// What of an entry is its own.
+    /// The sensor's packets from an entry.
     pub(super) fn take(&mut self, at: MonoNs, bytes: &[u8]) -> Vec<(MonoNs, Vec<u8>)> {
         let mut heard = Heard(Vec::new());
         match &mut self.driver {

@@ -8,17 +8,17 @@ use headrace_sensor::codec::{Framing as _, Verdict};
 /// The format; its one stream is [`STREAM`].
 #[derive(Debug, Default)]
 pub struct TlogFormat {
-    /// Whether the place of the next entry isn't known.
+    /// Whether the position of the next entry is unknown.
     astray: bool,
     last_us: u64,
 }
 
-/// The line of all frames.
+/// The line with all frames.
 pub const STREAM: &str = "mavlink";
 
-/// Where an entry is looked for, its time is within a day of the last one's.
+/// When resynchronising, an entry's time must be within a day of the last one's.
 const DAY_US: u64 = 86_400_000_000;
-/// Times beyond 2106 aren't any, µs.
+/// Times beyond 2106 are invalid, µs.
 const LATEST_US: u64 = 4_294_967_296_000_000;
 
 impl Format for TlogFormat {
@@ -28,7 +28,7 @@ impl Format for TlogFormat {
 
     fn step(&mut self, front: &[u8], _: bool, out: &mut Vec<Entry>) -> Step {
         let logged = match Tlog::new(front).next() {
-            // Astray, what seems to be cut off is likely no entry at all; but only the file's end can tell.
+            // Out of sync, an apparently truncated entry is probably not one, but only the end of the file can tell.
             None | Some(Err(TlogError::Short { .. })) => return Step::More,
             Some(Err(_)) => return self.lost(),
             Some(Ok(logged)) => logged,

@@ -1,6 +1,7 @@
 //! Logs whose messages are stamped by several clocks, e.g. time since boot and UNIX time.
 //!
-//! Such timestamps have no common order. Messages of the clock with the most messages are played; the others are dropped and reported.
+//! Such timestamps have no common order. The messages of the clock with the most messages are played; the others are
+//! dropped and reported.
 
 use std::path::PathBuf;
 

@@ -26,9 +26,9 @@ pub enum PlaybackCommand {
     Step(u32),
     /// Sets the speed: seconds of the dive per second of wall time, or `None` for as fast as possible.
     Speed(Option<f64>),
-    /// Jumps to a time of the log's clock, forwards or back; playing or paused as before.
+    /// Jumps to a time on the log's clock, forwards or back; stays playing or paused.
     Seek(MonoNs),
-    /// Jumps by a time, back where it is negative.
+    /// Jumps by a duration, back if negative.
     Skip(DurNs),
     /// Ends playback at the current tick.
     End,
@@ -57,7 +57,7 @@ pub trait PlaybackObserver {
     /// After a tick on the way of a jump: its notices aren't shown.
     fn after_skipped_tick(&mut self, dive: &Loop);
 
-    /// Paused, arrived after a jump, or `ended` at the end of the log; `at` is the end of the last tick.
+    /// Called when paused, after a jump, or with `ended` at the end of the log; `at` is the end of the last tick.
     fn stopped(&mut self, dive: &Loop, at: MonoNs, ended: bool);
 }
 
@@ -90,7 +90,7 @@ impl<'a> Playback<'a> {
     /// Playback of a log from its beginning; the player is connected with the loop. A snapshot goes into the store
     /// whenever its interval of work has passed since the last one, so that no jump takes much longer than that.
     ///
-    /// Errors: the log can't be read, or the first snapshot not be taken.
+    /// Errors: the log can't be read, or the first snapshot not taken.
     pub fn new(
         dive: &'a mut Loop,
         player: &'a mut Player,
@@ -133,7 +133,7 @@ impl<'a> Playback<'a> {
             let due = self.driver.due(self.player)?;
             let command = match due {
                 None => {
-                    // Steps left over at the end aren't made up for after a jump back.
+                    // Steps left over at the end are discarded, also for a jump back.
                     if let Mode::Stepping(_) = self.mode {
                         self.mode = Mode::Paused;
                     }
@@ -153,7 +153,7 @@ impl<'a> Playback<'a> {
         }
     }
 
-    /// Waits until a tick is due, or while paused; gives the command that comes before.
+    /// Waits until a tick is due, or while paused; returns a command that arrives before.
     fn wait(&mut self, until: MonoNs, commands: &Receiver<PlaybackCommand>) -> Option<PlaybackCommand> {
         match self.mode {
             Mode::Paused => {
@@ -218,7 +218,7 @@ impl<'a> Playback<'a> {
         Ok(())
     }
 
-    /// Restores the snapshot of a time that the store gave.
+    /// Restores a snapshot at a time returned by the store.
     fn restore(&mut self, at: MonoNs) -> Result<(), PlaybackError> {
         let Some(snapshot) = self.store.load(at) else { return Ok(()) };
         let mut restorer = Restorer::new(&snapshot);

@@ -1,4 +1,4 @@
-//! A recorded dive as a feed.
+//! A recorded dive as a source of packets.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -13,7 +13,7 @@ use crate::clocks::{self, Clock};
 use crate::drive::{Coming, PacketSource};
 use crate::log::{DiveLog, DivePlace, LogError, LogInfo, Loss, MessageKind, PartFile};
 
-/// Plays the sources' messages of a log.
+/// Plays the source messages of a log.
 pub struct Player {
     reader: DiveLog,
     /// For each source of the log, the loop's source of that name.
@@ -23,20 +23,20 @@ pub struct Player {
     bytes: Vec<u8>,
     order: u64,
     played: u64,
-    /// Messages that no sensor of the vehicle file takes, by the source's name.
+    /// Messages of sources that the vehicle file doesn't have, by the source's name.
     unmatched: BTreeMap<String, u64>,
     too_long: u64,
-    /// The clock that most messages are stamped by.
+    /// The clock of most messages, where the log has several.
     clock: Option<Clock>,
-    /// Messages stamped by another, by the source's name: how many, and the first one's time.
+    /// Messages stamped by another clock, by the source's name: count and first timestamp.
     astray: BTreeMap<String, (u64, MonoNs)>,
 }
 
-/// A player's position in its log, to continue from.
+/// A player's position in its log, to resume from.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PlayerPlace {
     log: DivePlace,
-    /// The message that was looked at and not sent yet: receive time, source, bytes.
+    /// The message read but not sent yet: receive time, source, bytes.
     next: Option<(MonoNs, u16, Vec<u8>)>,
     order: u64,
     played: u64,
@@ -67,7 +67,7 @@ impl Player {
         })
     }
 
-    /// What the log says about itself.
+    /// The log's header.
     pub fn info(&self) -> &LogInfo {
         self.reader.header()
     }
@@ -94,7 +94,7 @@ impl Player {
         }
     }
 
-    /// Continues from a position of this player or another one of the same log and vehicle. What was lost is counted as if
+    /// Continues from a position of this or another player of the same log and vehicle. Losses are counted as if
     /// the log had been played straight through.
     ///
     /// Errors: the log can't be read there.
@@ -110,17 +110,17 @@ impl Player {
         Ok(())
     }
 
-    /// The files that it is read from, in their order.
+    /// The files of the log, in order.
     pub fn files(&self) -> &[PartFile] {
         self.reader.files()
     }
 
-    /// Messages handed over so far.
+    /// Messages sent so far.
     pub fn played(&self) -> u64 {
         self.played
     }
 
-    /// What was lost or left out so far, in words.
+    /// Losses and omissions so far, as text.
     pub fn losses(&self) -> Vec<String> {
         let mut all: Vec<String> = self.reader.losses().iter().map(Loss::to_string).collect();
         for (id, count) in &self.unmatched {
@@ -145,7 +145,7 @@ impl Player {
         all
     }
 
-    /// What was odd so far and what was done about it, in words; nothing was lost by it.
+    /// Oddities found so far and how they were handled, as text; nothing was lost by them.
     pub fn notes(&self) -> Vec<String> {
         let note = |(topic, ids): (String, Vec<u16>)| {
             let ids: Vec<String> = ids.iter().map(u16::to_string).collect();
@@ -154,7 +154,7 @@ impl Player {
         self.reader.doubles().into_iter().map(note).collect()
     }
 
-    /// Reads on to the next message of a source that the loop has.
+    /// Advances to the next message of a source that the loop has.
     fn read(&mut self) -> Result<Option<Coming>, LogError> {
         while let Some(message) = self.reader.next()? {
             let MessageKind::Raw { source } = message.kind else { continue };
@@ -191,7 +191,7 @@ impl PacketSource for Player {
 
     fn send(&mut self, port: &mut Port) -> Result<(), RingError> {
         let Some(coming) = self.next else { return Ok(()) };
-        // Our own logs stand in the order in which the loop consumed them, others' in that of their times.
+        // Our own logs are in the order of consumption by the loop, others' in time order.
         let order = if self.reader.has_ticks() { self.order } else { NO_ORDER };
         port.send_in_order(coming.at, order, &self.bytes)?;
         self.order += 1;
@@ -201,7 +201,7 @@ impl PacketSource for Player {
     }
 }
 
-/// A moment as people read it in messages: seconds on the log's clock.
+/// A time formatted for messages: seconds on the log's clock.
 pub fn seconds(at: MonoNs) -> String {
     format!("{:.3} s", at.as_secs_f64())
 }

@@ -14,20 +14,20 @@ use crate::log::{RecorderPort, ResultChannel};
 use crate::results::{HEAD_WORDS, STREAMS};
 use crate::view;
 
-/// What the recorder's queue must have free for the largest tick: packets, their headers, and their order.
+/// Free bytes that the recorder's queue needs for the largest tick: packets, their headers, and their order.
 const LARGEST_TICK_BYTES: usize = MAX_TICK_BYTES + MAX_TICK_PACKETS * 64 + 4096;
 
-/// Room for a tick's results of one stream; more are recorded in part.
+/// Buffer for a tick's results of one stream, bytes; beyond it they are recorded in part.
 const MAX_RESULT_BYTES: usize = 1 << 19;
 
 /// Size of the recorder's queue, bytes.
 pub const QUEUE_BYTES: usize = 4 * LARGEST_TICK_BYTES;
 
-/// The stream that has something for each echo.
+/// The stream with a record per echo.
 const ECHOES: &str = "pings";
-/// How a stream's messages are written: see [`crate::results`].
+/// Message encoding of a stream: see [`crate::results`].
 const ENCODING: &str = "headrace-trail";
-/// The channels of a loop's results: the streams, then those of a view.
+/// The channels of a loop's results: the streams, then those of the viewers.
 pub fn result_channels() -> Vec<ResultChannel> {
     let channel = |name: &&str| ResultChannel {
         topic: format!("{RESULT_PREFIX}{name}"),
@@ -42,14 +42,14 @@ pub fn result_channels() -> Vec<ResultChannel> {
 
 /// Records every packet that the loop consumes, in the order of consumption, every tick, and every result.
 ///
-/// When the queue can't take another largest tick the loop takes nothing in until it can: recorded input is never
-/// dropped. When the recorder's thread has failed the dive goes on without it; its handle tells.
+/// When the queue has no room for another largest tick the loop consumes nothing until it has: recorded input is never
+/// dropped. If the recorder's thread has failed the dive goes on unrecorded; its handle returns the error.
 pub struct RecorderOutlet {
     port: Cell<Option<RecorderPort>>,
 }
 
 impl RecorderOutlet {
-    /// For the loop's end of a recorder with a queue of [`QUEUE_BYTES`]. The outlet can be added to one loop.
+    /// With the loop's end of a recorder, whose queue has [`QUEUE_BYTES`]. The outlet can be added to one loop.
     pub fn new(port: RecorderPort) -> Self {
         Self { port: Cell::new(Some(port)) }
     }
@@ -59,9 +59,9 @@ impl RecorderOutlet {
 struct Recording {
     port: RecorderPort,
     order: Vec<u16>,
-    /// A stream's message.
+    /// Buffer for a stream's message.
     message: Vec<u8>,
-    /// Records of each stream before the tick.
+    /// Records of each stream up to the previous tick.
     records: [u64; STREAMS.len()],
 }
 
@@ -95,7 +95,7 @@ fn record(
     }
     order.clear();
     for (source, packet) in inbox.iter() {
-        // The allowance has left room for all of this.
+        // The allowance has reserved room for all of this.
         if port.raw(source.0, packet.received, packet.received, packet.bytes).is_ok() {
             order.push(source.0);
         }
@@ -107,7 +107,7 @@ fn record(
     for (channel, ((_, trail), before)) in (0..).zip(streams) {
         if !trail.words().is_empty() {
             let whole = fill(message, time.index, *before, trail.words());
-            // What there is no room for is missing from the record, which numbers what it has; the input goes first.
+            // Results that don't fit are omitted, which their record numbers show; the input has priority.
             if port.result(channel, time.now, message).is_err() || !whole {
                 port.miss_results();
             }
@@ -117,7 +117,7 @@ fn record(
     inbox.allowance_bytes = if port.vacant_bytes() >= LARGEST_TICK_BYTES { MAX_TICK_BYTES } else { 0 };
 }
 
-/// Puts a stream's words into a message, without allocating; `false` when it hasn't room for all.
+/// Writes a stream's words into a message, without allocating; `false` if they don't all fit.
 fn fill(message: &mut Vec<u8>, tick: u64, before: u64, words: &[u64]) -> bool {
     message.clear();
     let room = message.capacity() / 8 - HEAD_WORDS;

@@ -1,5 +1,5 @@
-//! The streams of results in a log. A message holds the tick's index, the number of the records before it, and the words
-//! of [`headrace_monitor::trail`], all u64, little-endian.
+//! The streams of results in a log. A message consists of the tick's index, the number of records before it, and the words
+//! of [`headrace_monitor::result_stream`], all u64, little-endian.
 
 use crate::log::format::RESULT_PREFIX;
 
@@ -8,7 +8,7 @@ pub(crate) const STREAMS: [&str; 4] = ["poses", "pings", "judgements", "advice"]
 /// Words before a message's records.
 pub(crate) const HEAD_WORDS: usize = 2;
 
-/// The stream of results that a topic is of.
+/// The stream of results with that topic.
 pub(crate) fn stream_of(topic: &str) -> Option<usize> {
     let name = topic.strip_prefix(RESULT_PREFIX)?;
     STREAMS.iter().position(|stream| *stream == name)

@@ -1,4 +1,4 @@
-//! A simulated dive as a feed.
+//! A simulated dive as a source of packets.
 
 use headrace_monitor::ring::{Port, RingError};
 use headrace_sensor::device::Direction;
@@ -8,13 +8,13 @@ use headrace_simulator::Simulation;
 use crate::drive::{Coming, PacketSource};
 use crate::log::LogError;
 
-/// A simulated dive as a feed; what is sent to the devices is left out.
+/// A simulated dive as a source of packets; bytes sent to the devices are omitted.
 pub struct SimulationFeed {
     simulation: Simulation,
 }
 
 impl SimulationFeed {
-    /// From the dive's first message on.
+    /// Starts at the dive's first message.
     pub fn new(simulation: Simulation) -> Self {
         Self { simulation }
     }

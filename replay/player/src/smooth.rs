@@ -1,6 +1,6 @@
-//! The filter's steps on disk while a dive is replayed, and back from the last to the first.
+//! Stores the filter's steps on disk during a replay, and smooths them from last to first.
 //!
-//! They are too many for memory: a file without a name holds them, and is gone with the process.
+//! They are too many for memory: an unlinked file holds them and disappears with the process.
 
 use std::fs::{File, OpenOptions};
 use std::io::{BufWriter, Read, Seek, SeekFrom, Write};
@@ -12,11 +12,11 @@ use headrace_fusion::smooth::journal::JournalReader;
 use headrace_fusion::smooth::step::{Placed, WORDS, Words};
 use headrace_fusion::smooth::track::Track;
 
-/// Bytes of a record.
+/// Bytes per record.
 const RECORD: usize = 8 * WORDS;
-/// Records that are read at once.
+/// Records per read.
 const BLOCK: u64 = 256;
-/// Names that are tried for the file.
+/// File names to try.
 const NAMES: u32 = 1000;
 
 /// Why a dive could not be smoothed.
@@ -28,20 +28,20 @@ pub enum SmoothError {
     File {
         /// Its folder.
         folder: PathBuf,
-        /// How long it was.
+        /// Its length, bytes.
         bytes: u64,
-        /// What the system said.
+        /// Cause.
         source: std::io::Error,
     },
-    /// What was read isn't what was written.
+    /// A record read back isn't the one written.
     #[error("reading the filter's steps back: record {record} is damaged")]
     Damaged {
-        /// Which, from zero.
+        /// Record number, from zero.
         record: u64,
     },
 }
 
-/// Steps of a dive that is being replayed.
+/// Filter steps of a replay in progress.
 pub struct Steps {
     journal: JournalReader,
     folder: PathBuf,
@@ -51,9 +51,9 @@ pub struct Steps {
 }
 
 impl Steps {
-    /// Of a filter's journal. The file is in the system's folder for such.
+    /// For a filter's journal. The file is in the system's temporary folder.
     ///
-    /// Errors: it can't be made.
+    /// Errors: it can't be created.
     pub fn new(journal: JournalReader) -> Result<Self, SmoothError> {
         let folder = std::env::temp_dir();
         match nameless(&folder) {
@@ -65,7 +65,7 @@ impl Steps {
         }
     }
 
-    /// Takes what the filter has left since it was last asked; to be called after every tick.
+    /// Takes the steps since the last call; to be called after every tick.
     pub fn take(&mut self) {
         while let Some(words) = self.journal.next() {
             if self.failed.is_some() {
@@ -78,17 +78,17 @@ impl Steps {
         }
     }
 
-    /// How many there are.
+    /// Number of records.
     pub fn records(&self) -> u64 {
         self.records
     }
 
-    /// Bytes that they take.
+    /// Size of the records, bytes.
     pub fn bytes(&self) -> u64 {
         self.records * RECORD as u64
     }
 
-    /// Smooths: from the last step to the first, with the settings that the filter had.
+    /// Smooths from the last step to the first, with the filter's settings.
     ///
     /// Errors: the file couldn't be written, or can't be read.
     pub fn smooth(mut self, settings: Settings) -> Result<Track, SmoothError> {
@@ -118,7 +118,7 @@ impl Steps {
     }
 }
 
-/// A new file in a folder, to which no name leads any more.
+/// A new file in a folder, unlinked.
 fn nameless(folder: &std::path::Path) -> std::io::Result<File> {
     let mut last = std::io::Error::other("no name is free");
     for number in 0..NAMES {

@@ -1,4 +1,4 @@
-//! What a live dive published, held against a replay of it, record by record and bit for bit.
+//! Compares a live dive's published results with a replay of it, record by record and bit for bit.
 
 use std::collections::VecDeque;
 use std::path::PathBuf;
@@ -9,7 +9,7 @@ use headrace_monitor::run::Loop;
 use crate::log::{DiveLog, LogError, MessageKind};
 use crate::results::{STREAMS, read_results, stream_of};
 
-/// Where a replay first parts from the dive.
+/// The first difference between a replay and the dive.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Difference {
     /// The live dive's tick that published it.
@@ -18,11 +18,11 @@ pub struct Difference {
     pub stream: &'static str,
     /// Number of the record in its stream, from zero.
     pub record: u64,
-    /// What differs.
+    /// The difference.
     pub what: What,
 }
 
-/// What differs between two records.
+/// Difference between two records.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum What {
     /// A field of a record.
@@ -33,7 +33,7 @@ pub enum What {
         source: Option<u64>,
         /// The field.
         field: &'static str,
-        /// What it is.
+        /// The field's type.
         word: WordKind,
         /// Its bits in the live dive.
         live: u64,
@@ -53,17 +53,17 @@ pub enum What {
     Added,
 }
 
-/// Compares while a replay goes on.
+/// Compares during a replay.
 pub struct Verifier {
     reader: DiveLog,
     streams: [Stream; STREAMS.len()],
-    /// The tick of the results read last.
+    /// Tick of the results read last.
     last_tick: u64,
     has_results: bool,
     at_end: bool,
 }
 
-/// A stream of the live dive.
+/// A stream of the live dive's results.
 #[derive(Default)]
 struct Stream {
     waiting: VecDeque<Batch>,
@@ -74,7 +74,7 @@ struct Stream {
     difference: Option<Difference>,
 }
 
-/// A tick's records that have been read.
+/// A tick's records as read from the log.
 struct Batch {
     tick: u64,
     /// Number of the record that begins at `at`.
@@ -90,13 +90,13 @@ impl Batch {
 }
 
 impl Stream {
-    /// The live record with the replay's next number, when the front of what waits has it.
+    /// The live record with the replay's next number, if it is at the front of the queue.
     fn front(&self) -> Option<(u64, Record<'_>)> {
         let batch = self.waiting.front().filter(|batch| batch.next == self.next)?;
         first_record(batch.rest()).map(|(record, _)| (batch.tick, record))
     }
 
-    /// Goes on to the next record.
+    /// Advances to the next record.
     fn step(&mut self) {
         self.next += 1;
         if let Some(batch) = self.waiting.front_mut()
@@ -120,21 +120,21 @@ impl Stream {
     }
 }
 
-/// How a comparison came out.
+/// Result of a comparison.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Verified {
-    /// Records that are the same.
+    /// Identical records.
     pub same: u64,
-    /// Records of the dive that its log doesn't have.
+    /// Records of the dive missing from its log.
     pub unrecorded: u64,
     /// The first difference of each stream that has one, the earliest tick first.
     pub differences: Vec<Difference>,
-    /// Whether the log has results to compare with.
+    /// Whether the log contains results to compare with.
     pub has_results: bool,
 }
 
 impl Verifier {
-    /// For a log; reads it beside the replay, with as much of it in memory as the two are apart.
+    /// For a log; reads it along with the replay, and holds in memory only the records between the two positions.
     ///
     /// Errors: the log can't be read.
     pub fn open(log: &[PathBuf]) -> Result<Self, LogError> {
@@ -142,9 +142,9 @@ impl Verifier {
         Ok(Self { reader: DiveLog::open(log)?, streams, last_tick: 0, has_results: false, at_end: false })
     }
 
-    /// Compares what the replay's last tick gave.
+    /// Compares the results of the replay's last tick.
     ///
-    /// Errors: the log can't be read on.
+    /// Errors: reading the log fails.
     pub fn after_tick(&mut self, dive: &Loop) -> Result<(), LogError> {
         let digests = dive.digests();
         for (number, (name, trail)) in digests.streams().into_iter().enumerate() {
@@ -157,9 +157,9 @@ impl Verifier {
         Ok(())
     }
 
-    /// The replay has ended.
+    /// Completes the comparison at the end of the replay.
     ///
-    /// Errors: the log can't be read on.
+    /// Errors: reading the log fails.
     pub fn finish(mut self) -> Result<Verified, LogError> {
         while self.read()? {}
         for (stream, name) in self.streams.iter_mut().zip(STREAMS) {
@@ -172,7 +172,7 @@ impl Verifier {
         let unrecorded = self.streams.iter().map(|stream| stream.unrecorded).sum();
         let mut differences: Vec<Difference> =
             self.streams.into_iter().filter_map(|stream| stream.difference).collect();
-        // A log that has none at all isn't one of a live dive.
+        // A log without any results isn't one of a live dive.
         differences.retain(|_| self.has_results);
         differences.sort_by_key(|difference| difference.tick);
         Ok(Verified { same, unrecorded, differences, has_results: self.has_results })
@@ -181,7 +181,7 @@ impl Verifier {
     /// Compares a record of the replay with the live dive's of the same number.
     fn compare(&mut self, number: usize, name: &'static str, record: Record<'_>) -> Result<(), LogError> {
         while self.streams.get(number).is_some_and(|stream| stream.waiting.is_empty()) && self.read()? {}
-        // A log that was cut off ends before its dive did.
+        // A truncated log ends before its dive did.
         let cut_off = self.reader.has_losses();
         let Some(stream) = self.streams.get_mut(number).filter(|stream| stream.difference.is_none()) else {
             return Ok(());
@@ -200,7 +200,7 @@ impl Verifier {
         Ok(())
     }
 
-    /// Reads on to the next results; false at the end.
+    /// Advances to the next results; false at the end.
     fn read(&mut self) -> Result<bool, LogError> {
         while !self.at_end {
             let Some(message) = self.reader.next()? else {
@@ -222,7 +222,7 @@ impl Verifier {
     }
 }
 
-/// What differs between a record of the live dive and the replay's.
+/// Difference between a record of the live dive and the replay's.
 fn difference(live: Record<'_>, replayed: Record<'_>) -> Option<What> {
     let (Some(kind), true) =
         (live.kind, live.kind == replayed.kind && live.words.len() == replayed.words.len())

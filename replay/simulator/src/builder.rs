@@ -1,4 +1,4 @@
-//! What a simulation is assembled with: effects add systems, components and random streams here, and nowhere else.
+//! Assembly of a simulation: effects add systems, components and random streams here, and nowhere else.
 
 use bevy_ecs::entity::Entity;
 use bevy_ecs::prelude::{Component, IntoScheduleConfigs, SystemSet, World};
@@ -13,40 +13,40 @@ use crate::random::Stream;
 use crate::sensing::Scenery;
 use crate::stages::Stage;
 
-/// What an effect has added, for people.
+/// What an effect has added, for display.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Added {
     /// Its name in scenes.
     pub effect: &'static str,
     /// Its systems, each with its stage.
     pub systems: Vec<(Stage, String)>,
-    /// Systems that every simulation has, but this one not, because the effect does their work.
+    /// Base systems that it replaces.
     pub replaces: Vec<&'static str>,
     /// Its components, each with the sensors that have it.
     pub components: Vec<(String, Vec<String>)>,
-    /// Sources that it draws random numbers for.
+    /// Sources for which it draws random numbers.
     pub streams: Vec<String>,
-    /// What it does to the vehicle's trajectory, before the dive begins.
+    /// Its change to the vehicle's trajectory before the dive begins, as text.
     pub trajectory: Option<String>,
 }
 
-/// A place in the chain of systems.
+/// Position in the chain of systems.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, SystemSet)]
 struct Slot(usize);
 
 type Configs = ScheduleConfigs<ScheduleSystem>;
 
-/// What heads are told to do, while it can still be changed.
+/// The heads' programs, before the heads are switched on.
 pub struct Programs<'a> {
     pub(crate) facts: &'a mut Facts,
     pub(crate) seed: u64,
     pub(crate) effect: &'static str,
-    /// Sources that random numbers were drawn for, each with its effect.
+    /// Sources for which random numbers were drawn, each with its effect.
     pub(crate) drawn: &'a mut Vec<(&'static str, String)>,
 }
 
 impl Programs<'_> {
-    /// The random numbers of the effect for a sensor.
+    /// Random stream of the effect for a sensor.
     pub fn stream(&mut self, source: usize) -> Stream {
         let id = self.facts.sensors.get(source).map_or_else(String::new, |sensor| sensor.id.clone());
         let stream = Stream::new(self.seed, self.effect, &id);
@@ -62,14 +62,14 @@ impl Programs<'_> {
     }
 }
 
-/// A simulation that is being assembled.
+/// A simulation being assembled.
 pub struct Builder<'a> {
     world: &'a mut World,
     facts: &'a Facts,
     seed: u64,
     entities: &'a [Entity],
     systems: Vec<(Stage, Option<u16>, Configs)>,
-    /// Which effect is being built; none for the base.
+    /// Effect being built; `None` for the base.
     current: Option<usize>,
     added: Vec<Added>,
     base_systems: Vec<(Stage, String)>,
@@ -89,18 +89,18 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// What the scene has.
+    /// Facts of the scene.
     pub fn facts(&self) -> &'a Facts {
         self.facts
     }
 
-    /// The random numbers of the effect that is being built for a sensor.
+    /// Random stream of the current effect for a sensor.
     pub fn stream(&mut self, source: usize) -> Stream {
         let id = self.facts.sensors.get(source).map_or("", |sensor| sensor.id.as_str());
         self.stream_for(id)
     }
 
-    /// The random numbers of the effect that is being built for something that isn't a sensor.
+    /// Random stream of the current effect for a source that isn't a sensor.
     pub fn stream_for(&mut self, what: &str) -> Stream {
         let seed = self.seed;
         let effect = self.now().map_or("", |now| {
@@ -110,7 +110,7 @@ impl<'a> Builder<'a> {
         Stream::new(seed, effect, what)
     }
 
-    /// Random numbers that the effect has drawn before it was built.
+    /// Records sources for which the effect drew random numbers before it was built.
     pub(crate) fn has_drawn(&mut self, sources: impl Iterator<Item = String>) {
         if let Some(now) = self.now() {
             now.streams.extend(sources);
@@ -145,7 +145,7 @@ impl<'a> Builder<'a> {
         self.systems.push((stage, effect, system.into_configs()));
     }
 
-    /// The scene's tunnel and the vehicle's trajectory, for effects that change them; `what` says how.
+    /// The scene's tunnel and the vehicle's trajectory, for effects that change them; `what` describes the change.
     pub fn scenery(&mut self, what: String) -> Option<bevy_ecs::change_detection::Mut<'_, Scenery>> {
         if let Some(now) = self.now() {
             now.trajectory = Some(what);
@@ -153,30 +153,30 @@ impl<'a> Builder<'a> {
         self.world.get_resource_mut::<Scenery>()
     }
 
-    /// How long the dive takes, s, with what effects so far have made of the trajectory.
+    /// Duration of the dive, s, on the trajectory as changed by the effects so far.
     pub fn duration_s(&self) -> f64 {
         self.world.get_resource::<Scenery>().map_or(0.0, |scenery| scenery.trajectory.duration_s())
     }
 
-    /// Takes the place of a base system, which isn't to be added then.
+    /// Replaces a base system, which then isn't added.
     pub fn replace(&mut self, base: &'static str) {
         if let Some(now) = self.now() {
             now.replaces.push(base);
         }
     }
 
-    /// Whether an effect takes the place of a base system.
+    /// Whether an effect replaces a base system.
     pub(crate) fn replaced(&self, base: &str) -> bool {
         self.added.iter().any(|added| added.replaces.contains(&base))
     }
 
-    /// What follows is of this effect.
+    /// Makes `effect` the current one.
     pub(crate) fn effect(&mut self, effect: &'static str) {
         self.current = Some(self.added.len());
         self.added.push(Added { effect, ..Added::default() });
     }
 
-    /// What follows every simulation has.
+    /// Ends the effects: later additions belong to the base.
     pub(crate) fn base(&mut self) {
         self.current = None;
     }
@@ -185,8 +185,8 @@ impl<'a> Builder<'a> {
         self.current.and_then(|index| self.added.get_mut(index))
     }
 
-    /// The schedule: all systems in one chain, by stage, base systems first; with `noting`, after each one a look at
-    /// what it has changed.
+    /// The schedule: all systems in one chain, by stage, base systems first; with `noting`, each is followed by a system
+    /// that records its changes.
     pub(crate) fn schedule(self, noting: bool) -> (Schedule, Vec<Added>, Vec<(Stage, String)>) {
         let mut schedule = Schedule::default();
         schedule.set_executor(bevy_ecs::schedule::SingleThreadedExecutor::new());
@@ -210,7 +210,7 @@ impl<'a> Builder<'a> {
     }
 }
 
-/// The last two parts of a type's path; of what it is for, the last one.
+/// The last two segments of a type's path, and the last one of its type parameter.
 fn short_name(name: &str) -> String {
     let last = |path: &str, count: usize| {
         let parts: Vec<&str> = path.rsplit("::").take(count).collect();

@@ -1,38 +1,37 @@
-//! The clock of a simulated dive, and clocks of devices that are off.
+//! The clock of a simulated dive, and devices' clocks that drift.
 
 use bevy_ecs::prelude::Component;
 use headrace_geometry::math;
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Simulated dives begin at this moment of their clock.
+/// Start time of simulated dives.
 pub const START: MonoNs = MonoNs(1_000_000_000);
 
-/// Parts of a rate: a clock's drift is kept as a whole number of them, so that no sum depends on rounding.
+/// Resolution of a rate: drift is a whole number of these parts, so that no sum depends on rounding.
 const PARTS: i128 = 1_000_000_000_000;
 
-/// A clock that is right at the start and gains or loses evenly.
+/// A clock that is right at the start and drifts at a constant rate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Component)]
 pub(crate) struct Clock {
-    /// By how much what it takes for a span is longer than that, of [`PARTS`].
+    /// Excess of true time over shown time, in 1 / [`PARTS`] of shown time.
     longer: i128,
 }
 
 impl Clock {
-    /// A clock whose seconds are longer than true ones by `ppm` millionths: a device with it samples late. Up to 10^5
-    /// either way.
+    /// A clock whose seconds are `ppm` millionths longer than true ones, so that its device samples late. Range: +/-10^5.
     pub(crate) fn slow_by_ppm(ppm: f64) -> Self {
         let per_ppm = (PARTS / 1_000_000) as f64;
         Self { longer: i128::from(math::round_to_i64(ppm.clamp(-1e5, 1e5) * per_ppm)) }
     }
 
-    /// When it truly is what the clock shows as `shown`.
+    /// True time at which the clock shows `shown`.
     pub(crate) fn truly(&self, shown: MonoNs) -> MonoNs {
         let span = i128::from(shown.since(START).0);
         let true_span = span + (span * self.longer).div_euclid(PARTS);
         START + DurNs(i64::try_from(true_span).unwrap_or(i64::MAX))
     }
 
-    /// The first moment shown by the clock that is truly `at` or later.
+    /// First time shown by the clock whose true time is `at` or later.
     pub(crate) fn shows(&self, at: MonoNs) -> MonoNs {
         let true_span = i128::from(at.since(START).0);
         let near = (true_span * PARTS).div_euclid(PARTS + self.longer);

@@ -1,15 +1,15 @@
-//! Why a scene can't be simulated.
+//! Errors that prevent a simulation.
 
 use headrace_config::ConfigError;
 
-/// What is wrong with a scene.
+/// An error in a scene.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SceneError {
     /// A key of the scene or of its vehicle file.
     #[error(transparent)]
     Config(#[from] ConfigError),
-    /// The trajectory leads through something.
+    /// The trajectory leads through an obstacle.
     #[error(
         "simulating the trajectory: after {after_s:.1} s, at chainage {chainage_m:.2} m, y {y_m:.2} m, z {z_m:.2} m, it leads \
          through {what}"
@@ -17,21 +17,21 @@ pub enum SceneError {
     Blocked {
         /// Seconds after the start.
         after_s: f64,
-        /// Where: chainage, left, up, m.
+        /// Chainage, m.
         chainage_m: f64,
-        /// Left of the axis.
+        /// Left of the axis, m.
         y_m: f64,
-        /// Above the floor.
+        /// Above the floor, m.
         z_m: f64,
-        /// What is there.
+        /// The obstacle.
         what: String,
     },
-    /// An effect that contradicts the rest.
+    /// An effect that contradicts the scene.
     #[error("simulating {effect}: it {problem}")]
     Effect {
         /// Its name.
         effect: &'static str,
-        /// What is wrong.
+        /// The contradiction, as text.
         problem: String,
     },
 }

@@ -1,4 +1,4 @@
-//! What a scene says of its vehicle and tunnel, as far as effects go by it.
+//! Facts of a scene's vehicle and tunnel that effects depend on.
 
 use headrace_sampling::head::{HeadProgram, HeadSpec};
 use headrace_sampling::occlusion::Obstacle;
@@ -7,20 +7,20 @@ use headrace_vehicle::VehicleConfig;
 
 use crate::trajectory::Ground;
 
-/// What effects are checked against.
+/// Facts that effects are checked against.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Facts {
     /// The sensors, in the order of the vehicle file.
     pub sensors: Vec<SensorFacts>,
-    /// Parts of the vehicle that may stand in a head's way.
+    /// Parts of the vehicle that may occlude a head.
     pub hull: Vec<Obstacle>,
     /// Whether a current would carry the vehicle.
     pub ground: Ground,
     /// Length of the tunnel, m.
     pub length_m: f64,
-    /// The speed of sound that the vehicle file gives, m/s.
+    /// The vehicle file's speed of sound, m/s.
     pub sound_speed_mps: f64,
-    /// How long the trajectory takes, without what effects make of it, s.
+    /// Duration of the trajectory before effects change it, s.
     pub duration_s: f64,
 }
 
@@ -29,16 +29,16 @@ pub struct Facts {
 pub struct SensorFacts {
     /// Its id.
     pub id: String,
-    /// What it senses.
+    /// Its sense.
     pub sense: Sense,
-    /// A head's particulars.
+    /// Specification of a head.
     pub head: Option<HeadSpec>,
-    /// What a head does.
+    /// Program of a head.
     pub program: Option<HeadProgram>,
 }
 
 impl Facts {
-    /// Those of a vehicle whose trajectory takes `duration_s`.
+    /// Facts of a vehicle whose trajectory takes `duration_s`.
     pub(crate) fn new(
         vehicle: &VehicleConfig,
         programs: &[HeadProgram],

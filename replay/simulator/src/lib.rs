@@ -1,6 +1,6 @@
 //! The simulator: a scene becomes the bytes that its devices would send.
 //!
-//! Only what a scene names is simulated. Without effects a device is ideal but for the quanta of its own wire format.
+//! Only the effects that a scene names are simulated. Without effects a device is ideal but for its wire format's resolution.
 
 mod builder;
 mod clock;

@@ -1,4 +1,4 @@
-//! What an ideal inertial unit feels, from the true pose.
+//! Ideal inertial measurements from the true pose.
 
 use headrace_geometry::frames::{Mount, Point3, Rot, Sensor, Tunnel, Vec3};
 use headrace_geometry::math;
@@ -10,9 +10,9 @@ use crate::sensing::Scenery;
 
 /// The sample at `at` of a unit that samples every `period`.
 ///
-/// Rate and acceleration are means over the period, as a unit that integrates between samples has them: summed up, they
-/// give the whole change of attitude and velocity, even over a jerk that no sample falls on. At constant attitude and
-/// velocity they are zero to rounding.
+/// Rate and acceleration are means over the period, as in a unit that integrates between samples: summed up, they give the
+/// whole change of attitude and velocity, even over a jerk between samples. At constant attitude and velocity they are
+/// zero to rounding.
 pub(crate) fn motion(truth: &Scenery, mount: &Mount, at: MonoNs, period: DurNs) -> Inertia {
     let level = Rot::<Level, Tunnel>::from_roll_pitch_yaw(0.0, 0.0, truth.site.axis_yaw_rad);
     let attitude = |at| level * truth.pose(at).attitude * mount.rotation;
@@ -28,10 +28,10 @@ pub(crate) fn motion(truth: &Scenery, mount: &Mount, at: MonoNs, period: DurNs) 
     Inertia { at, period, attitude: now, rate_radps, force_mps2 }
 }
 
-/// Half of the time over which a velocity log's velocity is a mean.
+/// Half the averaging time of a velocity log.
 const HALF_PING: DurNs = DurNs::from_millis(5);
 
-/// The velocity of the sensor's own place at `at`, m/s.
+/// Velocity of the sensor's mounting point at `at`, m/s.
 pub(crate) fn velocity(truth: &Scenery, mount: &Mount, at: MonoNs) -> Vec3<Sensor> {
     let (early, late) = (at - HALF_PING, at + HALF_PING);
     let place = |at| truth.pose(at).place(mount.position);
@@ -40,7 +40,7 @@ pub(crate) fn velocity(truth: &Scenery, mount: &Mount, at: MonoNs) -> Vec3<Senso
     attitude.inverse() * (place(late) - place(early)).scaled(1.0 / elapsed_s)
 }
 
-/// The turn rate that takes one attitude to the other in `elapsed`.
+/// Turn rate from one attitude to the other over `elapsed`.
 fn rate(before: Rot<Level, Sensor>, after: Rot<Level, Sensor>, elapsed: DurNs) -> Vec3<Sensor> {
     let [w, x, y, z] = (before.inverse() * after).wxyz();
     let axis = Vec3::new(x, y, z).scaled(if w < 0.0 { -1.0 } else { 1.0 });
@@ -48,7 +48,7 @@ fn rate(before: Rot<Level, Sensor>, after: Rot<Level, Sensor>, elapsed: DurNs) -
     if elapsed_s <= 0.0 {
         return Vec3::zero();
     }
-    // The angle over its half sine tends to two.
+    // The angle over the sine of its half tends to two.
     let angle_per_sine = if sine > 1e-9 { 2.0 * math::atan2(sine, w.abs()) / sine } else { 2.0 };
     axis.scaled(angle_per_sine / elapsed_s)
 }

@@ -1,12 +1,12 @@
-//! What each effect did to each measurement: seen by comparing, so that effects needn't tell. Only a simulation that is
-//! asked for its truth has it.
+//! Changes of each measurement by each effect, found by comparison, so that effects needn't report them. Only present in a
+//! simulation with ground truth.
 
 use bevy_ecs::prelude::{Component, Query, ResMut, Resource};
 use headrace_sensor::measurement::{GroundVelocity, Inertia, Measurement, Payout, Pressure, Sounding};
 
 use crate::sensing::{Line, Samples, Source};
 
-/// The most figures of a measurement.
+/// Most figures of a measurement.
 const FIGURES: usize = 10;
 
 /// The figures of a measurement, by name.
@@ -14,7 +14,7 @@ pub(crate) trait Figures: Measurement {
     /// Their names, with units.
     const NAMES: &'static [&'static str];
 
-    /// Their values, not a number where there is none.
+    /// Their values, NaN where there is none.
     fn figures(&self) -> [f64; FIGURES];
 }
 
@@ -88,13 +88,13 @@ pub(crate) struct Note {
     pub source: u16,
     /// The measurement, counted within the slice.
     pub sample: usize,
-    /// The effect, by its place among those that the scene names.
+    /// The effect, by its index among those of the scene.
     pub effect: u16,
-    /// What was changed.
+    /// Figure that was changed.
     pub what: &'static str,
-    /// From which value, not a number where there was none.
+    /// Value before, NaN if there was none.
     pub from: f64,
-    /// To which value.
+    /// Value after.
     pub to: f64,
 }
 
@@ -116,7 +116,7 @@ impl<M: Measurement> Default for Before<M> {
     }
 }
 
-/// The effect whose system has just run; `None` for a base system, whose changes are the measuring itself.
+/// The effect whose system has just run; `None` for a base system, whose changes are the measurement itself.
 #[derive(Debug, Clone, Copy)]
 struct After(Option<u16>);
 
@@ -124,7 +124,7 @@ type Noted<'a, M> = (&'a Source, &'a Samples<M>, &'a mut Before<M>);
 
 type AllNoted<'w, 's, M> = Query<'w, 's, Noted<'static, M>>;
 
-/// A system that notes what has changed since it last ran.
+/// Records the changes since it last ran.
 #[expect(clippy::type_complexity, reason = "a system's signature is what it needs")]
 pub(crate) fn note(
     effect: Option<u16>,

@@ -1,4 +1,4 @@
-//! Messages of all lines in one order: (time, source, place on the line).
+//! Messages of all lines in one order: (time, source, index on the line).
 
 use headrace_geometry::time::MonoNs;
 use headrace_sensor::device::Direction;
@@ -8,11 +8,11 @@ use crate::sensing::Line;
 /// Bytes on the line of one source.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Message<'a> {
-    /// When they crossed the line.
+    /// Time at which they crossed the line.
     pub at: MonoNs,
     /// The source, in the order of the vehicle file.
     pub source: u16,
-    /// Which way they went.
+    /// Direction.
     pub direction: Direction,
     /// The bytes.
     pub bytes: &'a [u8],
@@ -20,21 +20,20 @@ pub struct Message<'a> {
 
 const NEVER: MonoNs = MonoNs(u64::MAX);
 
-/// Messages that wait for those of other lines before them: merged as they are asked for, their bytes where the devices
-/// put them.
+/// Messages waiting for earlier ones of other lines: merged on demand, with their bytes left in the devices' buffers.
 #[derive(Debug, Default)]
 pub(crate) struct Outbox {
-    /// One for each source, in its order.
+    /// One for each source, in order.
     lanes: Vec<Lane>,
     /// When the next message of each lane is due; `NEVER` where none waits.
     due: Vec<MonoNs>,
-    /// What crosses its line before this may go.
+    /// Time before which messages are released.
     until: MonoNs,
-    /// The lane with the next message that may go.
+    /// The lane with the next released message.
     front: Option<usize>,
 }
 
-/// What waits on one line.
+/// Messages waiting on one line.
 #[derive(Debug, Default)]
 struct Lane {
     /// In order of time.
@@ -43,20 +42,20 @@ struct Lane {
 }
 
 impl Lane {
-    /// When its next message is due.
+    /// Time at which its next message is due.
     fn due(&self) -> MonoNs {
         self.line.messages.get(self.next).map_or(NEVER, |message| message.at)
     }
 
-    /// Takes a slice's messages in exchange for room. What still waits, which is little, moves in before them.
+    /// Swaps in a slice's messages. Those still waiting, which are few, are put before them.
     fn take(&mut self, line: &mut Line) {
         std::mem::swap(&mut self.line, line);
         self.line.put_first(line, self.next);
         self.next = 0;
         line.clear();
-        // A message without bytes is none.
+        // Drops messages without bytes.
         self.line.messages.retain(|message| message.bytes.0 < message.bytes.1);
-        // An answer may come after the next question.
+        // A reply may come after the next request.
         if !self.line.messages.is_sorted_by_key(|message| message.at) {
             self.line.messages.sort_by_key(|message| message.at);
         }
@@ -64,7 +63,7 @@ impl Lane {
 }
 
 impl Outbox {
-    /// An outbox for so many sources.
+    /// An outbox for this many sources.
     pub(crate) fn new(sources: usize) -> Self {
         let lanes = (0..sources).map(|_| Lane::default()).collect();
         Self { lanes, due: vec![NEVER; sources], ..Self::default() }
@@ -75,7 +74,7 @@ impl Outbox {
         self.front.is_some()
     }
 
-    /// The next message that nothing can come before any more.
+    /// The next message, once no earlier one can follow.
     pub(crate) fn next(&mut self) -> Option<Message<'_>> {
         let front = self.front?;
         let lane = self.lanes.get_mut(front)?;
@@ -86,7 +85,7 @@ impl Outbox {
         self.message(front, sent)
     }
 
-    /// What [`Outbox::next`] would give.
+    /// The message that [`Outbox::next`] would give.
     pub(crate) fn peek(&self) -> Option<Message<'_>> {
         let front = self.front?;
         self.message(front, self.lanes.get(front)?.next)
@@ -99,27 +98,27 @@ impl Outbox {
         Some(Message { at: message.at, source, direction: message.direction, bytes: line.bytes_of(message) })
     }
 
-    /// Takes what a slice has put on a source's line, and leaves the line empty.
+    /// Takes a slice's messages of a source's line, and leaves the line empty.
     pub(crate) fn take(&mut self, source: usize, line: &mut Line) {
         if let Some(lane) = self.lanes.get_mut(source) {
             lane.take(line);
         }
     }
 
-    /// Releases what crossed its line before `until`.
+    /// Releases messages that crossed their line before `until`.
     pub(crate) fn release(&mut self, until: MonoNs) {
         self.until = until;
         self.look();
     }
 
-    /// Releases everything; false when it had done so before, and there is nothing more to come.
+    /// Releases everything; false if that was already done, and no messages remain.
     pub(crate) fn finish(&mut self) -> bool {
         let more = self.until < NEVER;
         self.release(NEVER);
         more
     }
 
-    /// Passes over what is released.
+    /// Skips the released messages.
     pub(crate) fn skip(&mut self) {
         let until = self.until;
         for lane in &mut self.lanes {
@@ -128,7 +127,7 @@ impl Outbox {
         self.look();
     }
 
-    /// Looks when each lane is due.
+    /// Updates the time at which each lane is due.
     fn look(&mut self) {
         for (due, lane) in self.due.iter_mut().zip(&self.lanes) {
             *due = lane.due();
@@ -156,7 +155,7 @@ mod tests {
         line
     }
 
-    /// Time, source and byte of what may go.
+    /// Time, source and byte of the released messages.
     fn going(outbox: &mut Outbox) -> Vec<(u64, u16, u8)> {
         let mut gone = Vec::new();
         while outbox.has_next() {

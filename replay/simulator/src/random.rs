@@ -1,5 +1,5 @@
-//! Random numbers by counting: each effect draws for each source and step from a place of its own, so that naming one
-//! effect, or adding a sensor, changes nothing that another draws.
+//! Counter-based random numbers: each effect draws for each source and step at its own counter, so that naming an effect,
+//! or adding a sensor, changes no other effect's draws.
 //!
 //! Source: Salmon et al., "Parallel Random Numbers: As Easy as 1, 2, 3", SC 2011 (Philox4x32-10); Wichura, "Algorithm
 //! AS 241", Applied Statistics 37, 1988 (normal quantiles).
@@ -17,7 +17,7 @@ pub struct Stream {
     key: [u32; 2],
 }
 
-/// The random numbers of one step: two of them to a block.
+/// The random numbers of one step: two per block.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Draw {
     words: [u32; 4],
@@ -40,7 +40,7 @@ impl Stream {
         Self { key: [word(0), word(4)] }
     }
 
-    /// The first block of `step`.
+    /// First block of `step`.
     pub fn at(self, step: u64) -> Draw {
         self.block(step, 0)
     }
@@ -84,7 +84,7 @@ fn philox(mut counter: [u32; 4], mut key: [u32; 2]) -> [u32; 4] {
     counter
 }
 
-/// The x below which a standard normal number falls with probability `p`, for 0 < p < 1; good to 1e-15 of it.
+/// The quantile x of the standard normal distribution for probability `p`, 0 < p < 1; relative error 1e-15.
 pub(crate) fn normal_quantile(p: f64) -> f64 {
     let q = p - 0.5;
     if q.abs() <= 0.425 {
@@ -99,7 +99,7 @@ pub(crate) fn normal_quantile(p: f64) -> f64 {
 
 type Rational = [[f64; 8]; 2];
 
-/// The quotient of two polynomials, coefficients from the highest power.
+/// Quotient of two polynomials, coefficients from the highest power.
 fn ratio(r: f64, [above, below]: &Rational) -> f64 {
     let polynomial = |coefficients: &[f64; 8]| coefficients.iter().fold(0.0, |sum, c| sum * r + c);
     polynomial(above) / polynomial(below)

@@ -1,4 +1,4 @@
-//! `SCENE.toml`: a vehicle file, a tunnel as it truly is, a trajectory, and the effects to simulate.
+//! `SCENE.toml`: a vehicle file, the true tunnel, a trajectory, and the effects to simulate.
 
 use headrace_config as config;
 use headrace_config::Document;
@@ -14,17 +14,17 @@ use crate::facts::Facts;
 use crate::files::FileLoader;
 use crate::trajectory::{self, Trajectory};
 
-/// A scene, checked.
+/// A parsed and checked scene.
 pub struct Scene {
-    /// What people call it.
+    /// Its display name.
     pub name: String,
     /// Text of its vehicle file, which goes into the log.
     pub vehicle_text: String,
     /// The vehicle.
     pub vehicle: VehicleConfig,
-    /// What its heads do, in the order of the vehicle file.
+    /// Programs of its heads, in the order of the vehicle file.
     pub programs: Vec<HeadProgram>,
-    /// Where the random numbers begin.
+    /// Seed of the random numbers.
     pub seed: u64,
     pub(crate) environment: Environment,
     pub(crate) trajectory: Trajectory,
@@ -33,11 +33,10 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// Parses and checks a scene. `load` gives the content of a file that the scene or its vehicle file names; `seed`
-    /// outweighs the scene's own.
+    /// Parses and checks a scene. `load` loads files that the scene or its vehicle file names; `seed` overrides the scene's.
     ///
-    /// Errors: the first key that is missing, unknown or out of range; a trajectory that leaves the tunnel; an effect
-    /// without anything to act on.
+    /// Errors: the first key that is missing, unknown or out of range; a trajectory that leaves the tunnel; an effect that
+    /// applies to nothing.
     pub fn parse(
         document: Document<'_>,
         kinds: &[&dyn DeviceKind],
@@ -71,7 +70,7 @@ impl Scene {
         Ok(Self { name, vehicle_text, vehicle, programs, seed, environment, trajectory, facts, effects })
     }
 
-    /// What its effects are checked against.
+    /// Facts that its effects are checked against.
     pub fn facts(&self) -> &Facts {
         &self.facts
     }

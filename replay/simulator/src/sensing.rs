@@ -1,6 +1,6 @@
-//! What a simulation keeps: an entity for each sensor, and what all of them share.
+//! State of a simulation: an entity for each sensor, and shared resources.
 //!
-//! A simulation goes slice by slice; within one, each system works through all measurements of its kind at once.
+//! A simulation runs slice by slice; within one, each system processes all measurements of its kind at once.
 
 use bevy_ecs::prelude::{Component, Resource};
 use headrace_geometry::frames::{Mount, Point3, Pose, Rot, Tunnel, Vec3};
@@ -16,10 +16,10 @@ use crate::environment::{Environment, Hit, What};
 use crate::error::SceneError;
 use crate::trajectory::Trajectory;
 
-/// Time between two places at which the trajectory is checked, s.
+/// Interval at which the trajectory is checked, s.
 const CHECK_S: f64 = 0.5;
 
-/// The stretch of time that is being simulated.
+/// The time span being simulated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Resource)]
 pub(crate) struct Slice {
     /// Its beginning.
@@ -31,21 +31,21 @@ pub(crate) struct Slice {
 /// The tunnel, the vehicle's trajectory through it, the water.
 #[derive(Debug, Resource)]
 pub struct Scenery {
-    /// What is round the vehicle.
+    /// Surroundings of the vehicle.
     pub environment: Environment,
     /// Its trajectory.
     pub trajectory: Trajectory,
-    /// Water and levels, as they truly are.
+    /// True water properties and levels.
     pub site: Site,
-    /// When the vehicle sets out from where it stands; without it, it is under way as the dive begins.
+    /// Time at which the vehicle starts moving; if `None`, it moves from the dive's start.
     pub sets_out: Option<MonoNs>,
 }
 
-/// A sensor by its place in the vehicle file.
+/// Index of a sensor in the vehicle file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Component)]
 pub(crate) struct Source(pub u16);
 
-/// How it sits on the vehicle.
+/// Mount on the vehicle.
 #[derive(Debug, Clone, Copy, PartialEq, Component)]
 pub(crate) struct Mounted(pub Mount);
 
@@ -64,32 +64,32 @@ pub(crate) struct Echosounder;
 /// The slice's measurements, in order of time.
 #[derive(Debug, Clone, Component)]
 pub(crate) struct Samples<M: Measurement> {
-    /// Number of the first, counted through the dive: the step by which effects draw.
+    /// Number of the first one, counted through the dive: the step for effects' random draws.
     pub first: u64,
     /// The measurements.
     pub list: Vec<M>,
 }
 
-/// Where the slice's soundings go, one for one with the samples.
+/// Rays of the slice's soundings, one per sample.
 #[derive(Debug, Clone, Default, Component)]
 pub(crate) struct Rays(pub Vec<Ray>);
 
-/// A beam's middle.
+/// Axis of a beam.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Ray {
-    /// Where the sonar is.
+    /// Position of the sonar.
     pub origin: Point3<Tunnel>,
-    /// Where it looks, a unit vector.
+    /// Direction, a unit vector.
     pub direction: Vec3<Tunnel>,
-    /// What its ray meets; `None` where that is nothing within reach.
+    /// Hit of the ray; `None` if nothing is within reach.
     pub hit: Option<Hit>,
 }
 
-/// The farthest that a sonar hears at its setting, m of water, and a little beyond.
+/// The sonar's range at its setting, m of water, with a margin.
 #[derive(Debug, Clone, Copy, PartialEq, Component)]
 pub(crate) struct Reach(pub f64);
 
-/// What the slice puts on a line.
+/// Messages of the slice on a line.
 #[derive(Debug, Clone, Default, Component)]
 pub(crate) struct Line {
     /// The messages, in the order in which the device sent them.
@@ -103,11 +103,11 @@ pub(crate) struct Line {
 pub(crate) struct LineMessage {
     /// When its first byte crosses the line.
     pub at: MonoNs,
-    /// Which way.
+    /// Direction.
     pub direction: Direction,
-    /// Where its bytes begin and end in the line's.
+    /// Begin and end of its bytes in the line's.
     pub bytes: (usize, usize),
-    /// The sample that it tells, counted within the slice.
+    /// The sample that it reports, counted within the slice.
     pub sample: usize,
 }
 
@@ -118,7 +118,7 @@ impl<M: Measurement> Default for Samples<M> {
 }
 
 impl<M: Measurement> Samples<M> {
-    /// The measurements with their steps.
+    /// The measurements with their step numbers.
     pub(crate) fn steps(&mut self) -> impl Iterator<Item = (u64, &mut M)> {
         (self.first..).zip(&mut self.list)
     }
@@ -139,20 +139,20 @@ impl Scenery {
         Pose { position: axis.place(place.chainage_m, place.across_m), attitude }
     }
 
-    /// The chainage that the vehicle has truly come to, m.
+    /// True chainage of the vehicle, m.
     pub fn chainage_m(&self, at: MonoNs) -> f64 {
         self.trajectory.place(self.under_way_s(at)).chainage_m
     }
 
-    /// How long it has been under way, s.
+    /// Time since the vehicle started moving, s.
     fn under_way_s(&self, at: MonoNs) -> f64 {
         self.sets_out
             .map_or_else(|| at.since(START).as_secs_f64(), |out| at.since(out).as_secs_f64().max(0.0))
     }
 
-    /// Checks that the trajectory leads through water alone.
+    /// Checks that the trajectory stays in water.
     ///
-    /// Errors: the first place where it doesn't.
+    /// Errors: the first point where it doesn't.
     pub(crate) fn check(&self) -> Result<(), SceneError> {
         let steps = math::floor_to_i64(self.trajectory.duration_s() / CHECK_S) + 1;
         let at = |step: i64| (step as f64 * CHECK_S).min(self.trajectory.duration_s());
@@ -188,7 +188,7 @@ impl Line {
         self.bytes.get(from..to).unwrap_or_default()
     }
 
-    /// Puts another line's messages, from its `first` on, before its own.
+    /// Inserts another line's messages, from its `first` on, before its own.
     pub(crate) fn put_first(&mut self, other: &Self, first: usize) {
         let bytes = &mut self.bytes;
         let moved = other.messages.iter().skip(first).map(|message| {
@@ -199,7 +199,7 @@ impl Line {
         drop(self.messages.splice(0..0, moved));
     }
 
-    /// Forgets the slice's messages.
+    /// Clears the slice's messages.
     pub(crate) fn clear(&mut self) {
         self.messages.clear();
         self.bytes.clear();

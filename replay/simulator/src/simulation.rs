@@ -1,6 +1,6 @@
-//! A dive that is being simulated: an ECS world with an entity for each sensor, base systems that ask, aim, look, feel
-//! and tell, and between them the systems of the effects that the scene names. Its schedule runs once for each slice of
-//! the dive.
+//! A simulated dive: an ECS world with an entity for each sensor, base systems for the stages from polling the devices to
+//! encoding their messages, and between them the systems of the scene's effects. Its schedule runs once per slice of the
+//! dive.
 
 use bevy_ecs::entity::Entity;
 use bevy_ecs::prelude::World;
@@ -23,28 +23,28 @@ use crate::sensing::{
 use crate::stages::{self, AIM_HELD, Held, Stage};
 use crate::truth::{self, TruthRow};
 
-/// Length of a slice: long enough that a schedule's cost is nothing beside its measurements.
+/// Length of a slice: long enough that the schedule's overhead is negligible.
 const SLICE: DurNs = DurNs(1_000_000_000);
-/// A sonar is asked for walls this much beyond its reach, for effects that bring them nearer.
+/// Walls are computed up to this multiple of a sonar's reach, for effects that bring them nearer.
 const REACH_SHARE: f64 = 1.25;
 /// Reach of an echosounder, m.
 const ECHOSOUNDER_REACH_M: f64 = 100.0;
 
-/// A moment that doesn't come.
+/// A time that never comes.
 const NEVER: MonoNs = MonoNs(u64::MAX);
 
-/// Who asks the devices for measurements.
+/// Source of the requests to the devices.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Asker {
     /// Emulated hosts.
     Itself,
-    /// The same, and the truth is kept.
+    /// Emulated hosts, with the ground truth kept.
     Noted,
-    /// Real ones.
+    /// Real hosts.
     Hosts,
 }
 
-/// A dive that is being simulated: messages in the order of (time, source, sequence).
+/// A simulated dive: messages in the order of (time, source, sequence).
 pub struct Simulation {
     world: World,
     schedule: Schedule,
@@ -58,15 +58,15 @@ pub struct Simulation {
 }
 
 impl Simulation {
-    /// Puts the scene's devices into its tunnel. Heads follow the scene's programs.
+    /// Sets up the scene's devices in its tunnel. Heads follow the scene's programs.
     ///
     /// Errors: effects that contradict each other or the scene; a trajectory through a wall.
     pub fn new(scene: &Scene) -> Result<Self, SceneError> {
         Self::assemble(scene, Asker::Itself)
     }
 
-    /// A simulation whose devices do what hosts ask of them through [`Simulation::hear`], while time goes on as
-    /// [`Simulation::go_on`] is told. The vehicle stands until [`Simulation::set_out`].
+    /// A simulation whose devices serve hosts through [`Simulation::hear`], and whose time is advanced by
+    /// [`Simulation::go_on`]. The vehicle stands until [`Simulation::set_out`].
     ///
     /// Errors: as for [`Simulation::new`].
     pub fn for_hosts(scene: &Scene) -> Result<Self, SceneError> {
@@ -75,7 +75,7 @@ impl Simulation {
         Ok(simulation)
     }
 
-    /// A simulation that keeps its truth for [`Simulation::take_truth`].
+    /// A simulation that keeps its ground truth for [`Simulation::take_truth`].
     ///
     /// Errors: as for [`Simulation::new`].
     pub fn with_truth(scene: &Scene) -> Result<Self, SceneError> {
@@ -119,32 +119,32 @@ impl Simulation {
         Ok(Self { world, schedule, entities, end, slice: SLICE, outbox, added, base, truth })
     }
 
-    /// When the dive ends.
+    /// End of the dive.
     pub fn end(&self) -> MonoNs {
         self.end
     }
 
-    /// How long it takes, s.
+    /// Duration of the dive, s.
     pub fn duration_s(&self) -> f64 {
         self.scenery().map_or(0.0, |scenery| scenery.trajectory.duration_s())
     }
 
-    /// Where the vehicle truly is.
+    /// True pose of the vehicle.
     pub fn pose(&self, at: MonoNs) -> Option<Pose> {
         self.world.get_resource::<Scenery>().map(|scenery| scenery.pose(at))
     }
 
-    /// What is round the vehicle, and its trajectory.
+    /// The vehicle's surroundings and trajectory.
     pub fn scenery(&self) -> Option<&Scenery> {
         self.world.get_resource::<Scenery>()
     }
 
-    /// What each effect of the scene has added.
+    /// Systems, components and streams that each effect of the scene has added.
     pub fn added(&self) -> &[Added] {
         &self.added
     }
 
-    /// The systems that this simulation would have without effects, less those that effects replace.
+    /// The base systems, except those that effects replace.
     pub fn base_systems(&self) -> &[(Stage, String)] {
         &self.base
     }
@@ -154,12 +154,12 @@ impl Simulation {
         self.come().then(|| self.outbox.next()).flatten()
     }
 
-    /// The next message, which stays the next one.
+    /// The next message, without removing it.
     pub fn peek_message(&mut self) -> Option<Message<'_>> {
         self.come().then(|| self.outbox.peek()).flatten()
     }
 
-    /// Simulates on until a message can be given; false at the end of the dive.
+    /// Simulates until a message is available; false at the end of the dive.
     fn come(&mut self) -> bool {
         while !self.outbox.has_next() {
             if !self.next_slice() {
@@ -169,20 +169,20 @@ impl Simulation {
         true
     }
 
-    /// The truth of all measurements since the last call; none without [`Simulation::with_truth`].
+    /// Ground truth of all measurements since the last call; empty without [`Simulation::with_truth`].
     pub fn take_truth(&mut self) -> Vec<TruthRow> {
         self.truth.as_mut().map(std::mem::take).unwrap_or_default()
     }
 
-    /// Simulates on for a second of the dive and forgets the messages, for those who want the truth alone; false at the end.
+    /// Simulates a second of the dive and discards the messages, for use of the ground truth alone; false at the end.
     pub fn advance(&mut self) -> bool {
         let more = self.next_slice();
         self.outbox.skip();
         more
     }
 
-    /// Bytes that a host has sent to a device, by its number in the vehicle file, at `at`, which must not be before what
-    /// has been simulated.
+    /// Passes on bytes that a host has sent to a device, by its number in the vehicle file, at `at`, which must not be before
+    /// the time simulated so far.
     pub fn hear(&mut self, source: usize, at: MonoNs, bytes: &[u8]) {
         let Some(entity) = self.entities.get(source).copied() else { return };
         hear::<Sounding>(&mut self.world, entity, at, bytes);
@@ -192,7 +192,7 @@ impl Simulation {
         hear::<GroundVelocity>(&mut self.world, entity, at, bytes);
     }
 
-    /// The vehicle sets out at `at`; the dive ends when its trajectory does.
+    /// Starts the vehicle's movement at `at`; the dive ends with the trajectory.
     pub fn set_out(&mut self, at: MonoNs) {
         if let Some(mut scenery) = self.world.get_resource_mut::<Scenery>() {
             scenery.sets_out = Some(at);
@@ -201,7 +201,7 @@ impl Simulation {
         }
     }
 
-    /// Simulates on to `until`, for hosts; [`Simulation::next_message`] has what crossed the lines before it.
+    /// Simulates to `until`, for hosts; [`Simulation::next_message`] then gives the messages that crossed the lines before it.
     pub fn go_on(&mut self, until: MonoNs) {
         let Some(slice) = self.world.get_resource::<Slice>() else { return };
         if until > slice.until {
@@ -209,15 +209,15 @@ impl Simulation {
         }
     }
 
-    /// The next message that has crossed its line, without simulating on for one.
+    /// The next message that has crossed its line, without simulating further.
     pub fn waiting_message(&mut self) -> Option<Message<'_>> {
         self.outbox.has_next().then(|| self.outbox.next()).flatten()
     }
 
-    /// Simulates the next slice; false when there is none.
+    /// Simulates the next slice; false at the end.
     fn next_slice(&mut self) -> bool {
         let Some(slice) = self.world.get_resource::<Slice>() else { return false };
-        // A measurement at the very end is still made.
+        // A measurement at the very end is included.
         let last = self.end + DurNs(1);
         if slice.until >= last {
             return self.outbox.finish();
@@ -247,12 +247,12 @@ impl Simulation {
 
 #[cfg(test)]
 impl Simulation {
-    /// The same in slices of another length, of which nothing may depend.
+    /// The same in slices of another length, which must not change anything.
     pub(crate) fn in_slices(self, slice: DurNs) -> Self {
         Self { slice, ..self }
     }
 
-    /// Takes the other sensors from the vehicle.
+    /// Removes the other sensors from the vehicle.
     fn keep_only(&mut self, source: usize) {
         for (other, entity) in self.entities.iter().enumerate() {
             if other != source {
@@ -261,7 +261,7 @@ impl Simulation {
         }
     }
 
-    /// All that a sensor measures to the end of the dive, without the others.
+    /// All measurements of a sensor to the end of the dive, without the other sensors.
     pub(crate) fn measurements_of<M: Measurement>(mut self, source: usize) -> Vec<M> {
         self.keep_only(source);
         let mut all: Vec<M> = Vec::new();
@@ -275,7 +275,7 @@ impl Simulation {
     }
 }
 
-/// Lets a device that measures `M` hear a host; what it answers at once is on its line.
+/// Passes bytes from a host to a device that measures `M`; an immediate reply goes on its line.
 fn hear<M: Measurement>(world: &mut World, entity: Entity, at: MonoNs, bytes: &[u8]) {
     let mut entity = world.entity_mut(entity);
     let Ok((mut device, mut line)) = entity.get_components_mut::<(&mut Device<M>, &mut Line)>() else {
@@ -284,7 +284,7 @@ fn hear<M: Measurement>(world: &mut World, entity: Entity, at: MonoNs, bytes: &[
     device.0.hear(at, bytes, &mut |direction, at, bytes| line.send(at, direction, bytes, 0));
 }
 
-/// The scene's facts with what effects make of the heads' programs, and what they have drawn for it.
+/// The scene's facts with the heads' programs as changed by effects, and the effects' draws for that.
 fn programmed(scene: &Scene) -> (Facts, Vec<(&'static str, String)>) {
     let (mut facts, mut drawn) = (scene.facts.clone(), Vec::new());
     for (kind, effect) in &scene.effects.0 {
@@ -337,7 +337,7 @@ fn spawn_device<M: Measurement>(world: &mut World, entity: Entity, device: Devic
     }
 }
 
-/// Systems for the senses that the vehicle has, but for those whose work an effect does.
+/// Adds systems for the vehicle's senses, except those that effects replace.
 fn add_base_systems(sim: &mut Builder<'_>) {
     let has = |sense: Sense| sim.facts().sensors.iter().any(|sensor| sensor.sense == sense);
     let [head, echosounder, depth, inertial, velocity, tether] =

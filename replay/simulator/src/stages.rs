@@ -1,4 +1,4 @@
-//! What every simulation does: ask the devices, aim, look, feel, tell. Effects come between.
+//! Stages of every simulation, from polling the devices to encoding their messages, and the base systems in them.
 
 #![allow(clippy::needless_pass_by_value, reason = "bevy hands systems their arguments by value")]
 
@@ -11,35 +11,35 @@ use crate::clock::Clock;
 use crate::motion::{motion, velocity};
 use crate::sensing::{Device, Echosounder, Head, Line, Mounted, Ray, Rays, Reach, Samples, Scenery, Slice};
 
-/// Name of the system [`aim_held`], for effects that take its place.
+/// Name of the system [`aim_held`], for effects that replace it.
 pub(crate) const AIM_HELD: &str = "aim_held";
-/// Angles by which a turn may miss being whole, radians.
+/// Tolerance of a whole turn, radians.
 const SAME_ANGLE_RAD: f64 = 1e-9;
 
-/// The order in which a slice is worked through. Within a stage, base systems come first, then effects in the order of
+/// Order of processing in a slice. Within a stage, base systems come first, then effects in the order of
 /// [`crate::effects::KINDS`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Stage {
-    /// The devices say what they measure, and when.
+    /// Devices give the times and kinds of their measurements.
     Begin,
     /// Heads turn: effects on angles.
     Turn,
-    /// Where each sonar is and looks.
+    /// Position and direction of each sonar.
     Aim,
-    /// What each beam meets.
+    /// Hit of each beam.
     Look,
-    /// What is made of it: effects on ranges.
+    /// Range of each ping: effects on ranges.
     Hear,
-    /// Pressure, motion and cable, and the effects on them.
+    /// Pressure, motion and cable, with their effects.
     Feel,
-    /// Devices put it into bytes.
+    /// Devices encode their measurements.
     Tell,
     /// Effects on the lines.
     Line,
 }
 
 impl Stage {
-    /// Its name for people.
+    /// Its display name.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Begin => "begin",
@@ -54,7 +54,7 @@ impl Stage {
     }
 }
 
-/// For a head whose turn is seen as one picture: where that was taken, and how far the head has turned since.
+/// For a head whose turn is one picture: the pose of that picture, and the head's rotation since.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Component)]
 pub(crate) struct Held {
     pose: Option<Pose>,
@@ -66,7 +66,7 @@ pub(crate) struct Held {
 impl Held {
     /// Whether a new turn, or sweep, begins with a ping at this angle.
     fn begins(&mut self, angle_rad: f64) -> bool {
-        // The first ping has come from nowhere.
+        // The first ping has no step.
         let came_rad = if self.pose.is_some() { angle_rad - self.last_rad } else { 0.0 };
         let step_rad = math::wrap_signed(came_rad, TAU);
         self.turned_rad += step_rad.abs();
@@ -82,8 +82,8 @@ impl Held {
 
 type Beginning<'a, M> = (&'a mut Device<M>, &'a mut Samples<M>, Option<&'a Clock>);
 
-/// Asks the devices for the slice's measurements. One with a clock of its own is asked up to what that shows as the
-/// slice ends; its effect then says when the measurements truly are.
+/// Polls the devices for the slice's measurements. A device with a drifting clock is polled up to that clock's time at the
+/// slice's end; the drift effect then sets the true times.
 pub(crate) fn begin<M: Measurement>(slice: Res<'_, Slice>, mut devices: Query<'_, '_, Beginning<'_, M>>) {
     for (mut device, mut samples, clock) in &mut devices {
         let samples = &mut *samples;
@@ -94,7 +94,7 @@ pub(crate) fn begin<M: Measurement>(slice: Res<'_, Slice>, mut devices: Query<'_
     }
 }
 
-/// The ray of a head at a sensor's angle.
+/// The ray of a head at an angle.
 pub(crate) fn head_ray(pose: &Pose, mount: &Mount, angle_rad: f64) -> Ray {
     let direction = pose.attitude * (mount.rotation * head_direction(angle_rad));
     Ray { origin: pose.place(mount.position), direction, hit: None }
@@ -102,7 +102,7 @@ pub(crate) fn head_ray(pose: &Pose, mount: &Mount, angle_rad: f64) -> Ray {
 
 type Aimed<'a, Kind> = (&'a Samples<Sounding>, &'a Mounted, &'a mut Rays, Kind);
 
-/// Heads look from where the vehicle was when their turn began: one picture a turn.
+/// Heads look from the vehicle's pose at the beginning of their turn: one picture per turn.
 pub(crate) fn aim_held(
     scenery: Res<'_, Scenery>,
     mut heads: Query<'_, '_, Aimed<'_, &mut Held>, With<Head>>,
@@ -120,7 +120,7 @@ pub(crate) fn aim_held(
     }
 }
 
-/// Heads look from where the vehicle is at each ping.
+/// Heads look from the vehicle's pose at each ping.
 pub(crate) fn aim_moving(
     scenery: Res<'_, Scenery>,
     mut heads: Query<'_, '_, (&Samples<Sounding>, &Mounted, &mut Rays), With<Head>>,
@@ -133,7 +133,7 @@ pub(crate) fn aim_moving(
     }
 }
 
-/// Echosounders look along their own x from where the vehicle is.
+/// Echosounders look along their own x from the vehicle's pose.
 pub(crate) fn aim_echosounders(
     scenery: Res<'_, Scenery>,
     mut sounders: Query<'_, '_, (&Samples<Sounding>, &Mounted, &mut Rays), With<Echosounder>>,
@@ -150,11 +150,11 @@ pub(crate) fn aim_echosounders(
 
 type Looking<'a> = (&'a mut Samples<Sounding>, &'a mut Rays, &'a Reach);
 
-/// Beams whose rays aren't cast by the base system: an effect does it.
+/// Beams whose rays an effect casts instead of the base system.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Component)]
 pub(crate) struct OwnBeam;
 
-/// Each beam is a ray, and what it meets first is heard.
+/// Each beam is a ray; the range is that of its first hit.
 pub(crate) fn look(scenery: Res<'_, Scenery>, mut sonars: Query<'_, '_, Looking<'_>, Without<OwnBeam>>) {
     for (mut samples, mut rays, reach) in &mut sonars {
         for (sounding, ray) in samples.list.iter_mut().zip(&mut rays.0) {
@@ -164,7 +164,7 @@ pub(crate) fn look(scenery: Res<'_, Scenery>, mut sonars: Query<'_, '_, Looking<
     }
 }
 
-/// Depth sensors feel the water's pressure.
+/// Depth sensors measure the water's pressure.
 pub(crate) fn feel_pressure(
     scenery: Res<'_, Scenery>,
     mut sensors: Query<'_, '_, (&mut Samples<Pressure>, &Mounted)>,
@@ -178,7 +178,7 @@ pub(crate) fn feel_pressure(
     }
 }
 
-/// Inertial units feel the vehicle's motion.
+/// Inertial units measure the vehicle's motion.
 pub(crate) fn feel_motion(
     scenery: Res<'_, Scenery>,
     mut units: Query<'_, '_, (&mut Samples<Inertia>, &Mounted)>,
@@ -190,7 +190,7 @@ pub(crate) fn feel_motion(
     }
 }
 
-/// Velocity logs feel their own velocity.
+/// Velocity logs measure the velocity at their mount.
 pub(crate) fn feel_velocity(
     scenery: Res<'_, Scenery>,
     mut logs: Query<'_, '_, (&mut Samples<GroundVelocity>, &Mounted)>,
@@ -202,7 +202,7 @@ pub(crate) fn feel_velocity(
     }
 }
 
-/// The cable reaches as far as the vehicle has come.
+/// The cable's length is the vehicle's chainage.
 pub(crate) fn feel_cable(scenery: Res<'_, Scenery>, mut counters: Query<'_, '_, &mut Samples<Payout>>) {
     for mut samples in &mut counters {
         for payout in &mut samples.list {
@@ -211,7 +211,7 @@ pub(crate) fn feel_cable(scenery: Res<'_, Scenery>, mut counters: Query<'_, '_, 
     }
 }
 
-/// Devices put what they measured on their lines.
+/// Devices encode their measurements onto their lines.
 pub(crate) fn tell<M: Measurement>(mut devices: Query<'_, '_, (&mut Device<M>, &Samples<M>, &mut Line)>) {
     for (mut device, samples, mut line) in &mut devices {
         for (number, measured) in samples.list.iter().enumerate() {

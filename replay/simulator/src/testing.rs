@@ -1,4 +1,4 @@
-//! Dives for tests: a vehicle and a scene in a few words, with the real devices.
+//! Dives for tests: a short description of vehicle and scene, with the real devices.
 
 use std::fmt::Write as _;
 
@@ -16,7 +16,7 @@ pub(crate) const KINDS: [&dyn DeviceKind; 5] = [
     &headrace_tether_hid::Kind,
 ];
 
-/// A vehicle in a tunnel, which goes forward for `seconds` at a speed, with the effects of a scene.
+/// A vehicle that moves forward in a tunnel for `seconds` at a constant speed, with the effects of a scene.
 #[derive(Debug, Clone)]
 pub(crate) struct Dive {
     /// Keys of `[tunnel]`.
@@ -30,7 +30,7 @@ pub(crate) struct Dive {
     pub(crate) seconds: f64,
     pub(crate) speed_mps: f64,
     pub(crate) seed: u64,
-    /// Length of a slice; `None` for the usual one.
+    /// Length of a slice; `None` for the default.
     pub(crate) slice: Option<DurNs>,
 }
 
@@ -43,7 +43,7 @@ pub(crate) struct Said {
     pub(crate) bytes: Vec<u8>,
 }
 
-/// What a dive gave.
+/// Result of a dive.
 #[derive(Debug, Clone)]
 pub(crate) struct Dived {
     /// By time, then source.
@@ -57,7 +57,7 @@ impl Dive {
         Self::with_heads(&[[0.0; 3]])
     }
 
-    /// Heads `sonar_0` and on at these places, all facing forward.
+    /// Heads `sonar_0` and on at these positions, all facing forward.
     pub(crate) fn with_heads(places: &[[f64; 3]]) -> Self {
         let ids = ["sonar_0", "sonar_1", "sonar_2", "sonar_3"];
         let head = |(place, id): (&[f64; 3], &'static str)| {
@@ -81,7 +81,7 @@ impl Dive {
         Self { sensors: vec![sounder], ..Self::with_head() }
     }
 
-    /// The scene with these effects, in the text of a scene file.
+    /// The scene with these effects, parsed from the text of a scene file.
     pub(crate) fn scene(&self, effects: &str) -> Result<Scene, SceneError> {
         let mut vehicle =
             format!("target_m = 0.5\n[tunnel]\n{}\nlength_m = 5000\n{}\n", self.tunnel, self.vehicle);
@@ -109,7 +109,7 @@ impl Dive {
         })
     }
 
-    /// Dives with these effects.
+    /// Runs the dive with these effects.
     pub(crate) fn dive(&self, effects: &str) -> Dived {
         let mut simulation = self.simulation(effects).unwrap_or_else(|why| panic!("{why}"));
         let mut messages = Vec::new();
@@ -122,7 +122,7 @@ impl Dive {
         Dived { rows, messages }
     }
 
-    /// What is said about a scene that is refused.
+    /// Error text of a refused scene.
     pub(crate) fn refusal(&self, effects: &str) -> String {
         match self.simulation(effects) {
             Ok(_) => panic!("{effects} was taken"),
@@ -130,7 +130,7 @@ impl Dive {
         }
     }
 
-    /// That a scene gives the same whatever the length of its slices.
+    /// Asserts that a scene gives the same result for any length of slice.
     pub(crate) fn assert_slices_dont_matter(&self, effects: &str) {
         let usual = self.dive(effects);
         assert!(!usual.rows.is_empty());
@@ -139,7 +139,7 @@ impl Dive {
             assert!(usual.messages == other.messages, "slices of {slice_ms} ms: {effects}");
             assert_eq!(usual.rows.len(), other.rows.len(), "slices of {slice_ms} ms: {effects}");
             for (a, b) in usual.rows.iter().zip(&other.rows) {
-                // As text, in which one that is no number equals another.
+                // As text, in which NaN equals NaN.
                 assert_eq!(format!("{a:?}"), format!("{b:?}"), "slices of {slice_ms} ms: {effects}");
             }
         }
@@ -160,7 +160,7 @@ impl Dived {
     }
 }
 
-/// That a share of `of` trials fell as often as its probability says, within five standard deviations.
+/// Asserts that a share of `of` trials is within five standard deviations of its probability.
 pub(crate) fn assert_share(count: usize, of: usize, probability: f64) {
     let deviation = headrace_geometry::math::sqrt(probability * (1.0 - probability) / of as f64);
     let share = count as f64 / of as f64;

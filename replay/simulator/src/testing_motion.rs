@@ -1,4 +1,4 @@
-//! A bench for effects: a vehicle with one device or two of each kind, dived along short ways.
+//! A bench for effects: a vehicle with one or two devices of each kind, on short trajectories.
 
 use headrace_config::Document;
 use headrace_geometry::time::{DurNs, MonoNs};
@@ -59,29 +59,29 @@ connect = "hid:1209:0001"
 counts_per_metre = 2000
 "#;
 
-/// There, and a little way back: 35 s.
+/// Forwards, and a little way back: 35 s.
 pub(crate) const LEGS: &str = "start_m = 2.0\n[[trajectory.legs]]\ndistance_m = 6\nspeed_mps = 0.2\n\
                                [[trajectory.legs]]\ndistance_m = 1\nspeed_mps = -0.2\n";
-/// On and on: 640 s.
+/// A long leg: 640 s.
 pub(crate) const LONG: &str = "start_m = 2.0\n[[trajectory.legs]]\ndistance_m = 64\nspeed_mps = 0.1\n";
 /// A pilot to 40 m.
 pub(crate) const PILOT: &str = "kind = \"pilot\"\nto_m = 40\nspeed_mps = 0.4\nstops_per_hour = 60\n\
                                 backs_per_hour = 60\nback_m = [0.5, 2]\nstop_s = [5, 10]\n";
-/// A way that is given over ground.
+/// A trajectory given over ground.
 pub(crate) const WAYPOINTS: &str = "kind = \"waypoints\"\n[[trajectory.waypoints]]\nchainage_m = 2\n\
                                     [[trajectory.waypoints]]\nchainage_m = 6\nspeed_mps = 0.2\n";
 
-/// What crossed a line: when, which way, what.
+/// A message on a line: time, direction, bytes.
 pub(crate) type OnLine = (MonoNs, Direction, Vec<u8>);
 
-/// A scene to be dived with any effects.
+/// A scene for any effects.
 pub(crate) struct Bench {
     layout: &'static str,
     scene: String,
 }
 
 impl Bench {
-    /// Heads that turn on, for 35 s.
+    /// Heads that turn continuously, for 35 s.
     pub(crate) fn turning(effects: &str) -> Self {
         Self::on(LEGS, effects)
     }
@@ -91,12 +91,12 @@ impl Bench {
         Self { layout: "sector_offset", ..Self::on(LEGS, effects) }
     }
 
-    /// Heads that turn on, for 640 s.
+    /// Heads that turn continuously, for 640 s.
     pub(crate) fn long(effects: &str) -> Self {
         Self::on(LONG, effects)
     }
 
-    /// Heads that turn on, on this way.
+    /// Heads that turn continuously, on this trajectory.
     pub(crate) fn on(trajectory: &str, effects: &str) -> Self {
         let scene = format!("vehicle = \"vehicle.toml\"\nseed = 11\n[trajectory]\n{trajectory}\n{effects}\n");
         Self { layout: "phase_shift", scene }
@@ -111,7 +111,7 @@ impl Bench {
         self.parse().and_then(|scene| Simulation::new(&scene)).unwrap()
     }
 
-    /// Why it can't be dived; empty where it can.
+    /// Error text if the dive is refused; empty if it isn't.
     pub(crate) fn refusal(&self) -> String {
         let simulated = self.parse().and_then(|scene| Simulation::new(&scene));
         simulated.err().map(|why| why.to_string()).unwrap_or_default()
@@ -126,13 +126,13 @@ impl Bench {
         u16::try_from(self.parse().unwrap().facts.sensors.len()).unwrap()
     }
 
-    /// All that a sensor measured, without the others.
+    /// All measurements of a sensor, without the others.
     pub(crate) fn run<M: Measurement>(&self, sensor: &str) -> Vec<M> {
         let scene = self.parse().unwrap();
         Simulation::new(&scene).unwrap().measurements_of(self.source(sensor))
     }
 
-    /// All that crossed the lines.
+    /// All messages on the lines.
     pub(crate) fn messages(&self) -> Vec<(MonoNs, u16, Direction, Vec<u8>)> {
         self.messages_in(DurNs(1_000_000_000))
     }
@@ -146,19 +146,19 @@ impl Bench {
         all
     }
 
-    /// What crossed one line.
+    /// Messages on one line.
     pub(crate) fn line(&self, source: u16) -> Vec<OnLine> {
         let all = self.messages().into_iter().filter(|message| message.1 == source);
         all.map(|(at, _, direction, bytes)| (at, direction, bytes)).collect()
     }
 }
 
-/// Why the short dive can't be made with these effects.
+/// Error text if the short dive with these effects is refused.
 pub(crate) fn refusal(effects: &str) -> String {
     Bench::turning(effects).refusal()
 }
 
-/// That the lines carry the same, bit for bit, however long slices are.
+/// Asserts that the lines' bytes are identical for any length of slices.
 pub(crate) fn same_in_any_slices(bench: &Bench) {
     let usual = bench.messages();
     assert!(usual.len() > 1000 && usual.windows(2).all(|w| w[0].0 <= w[1].0));

@@ -1,4 +1,4 @@
-//! What was true: for each measurement the vehicle's pose, the place on the wall, and what effects did to it.
+//! Ground truth: for each measurement the vehicle's pose, the point on the wall, and the effects' changes.
 
 use bevy_ecs::entity::Entity;
 use bevy_ecs::prelude::World;
@@ -14,46 +14,46 @@ use crate::sensing::{Echosounder, Rays, Samples, Scenery, Source};
 /// One measurement.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TruthRow {
-    /// When it was made.
+    /// Time of the measurement.
     pub at: MonoNs,
     /// The sensor, in the order of the vehicle file.
     pub source: u16,
-    /// What it senses.
+    /// Its sense.
     pub sense: Sense,
     /// Number of the measurement among this sensor's.
     pub number: u64,
-    /// Where the vehicle was.
+    /// Pose of the vehicle.
     pub pose: Pose,
     /// The vehicle's chainage, m.
     pub chainage_m: f64,
-    /// For a sonar, what its ping met.
+    /// For a sonar, its ping.
     pub sounding: Option<SoundingTruth>,
-    /// What effects did, in the order in which they did it.
+    /// Changes by effects, in order.
     pub causes: Vec<Cause>,
 }
 
-/// A ping as it truly was, and what was measured.
+/// A ping as it truly was, and its measurement.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SoundingTruth {
     /// The measurement.
     pub measured: Sounding,
-    /// Where the sonar was.
+    /// Position of the sonar.
     pub origin: Point3<Tunnel>,
-    /// Where its beam's middle looked, a unit vector.
+    /// Direction of its beam's axis, a unit vector.
     pub direction: Vec3<Tunnel>,
-    /// What the beam's middle met, with the arc length there, m.
+    /// Hit of the beam's axis, with the arc length there, m.
     pub wall: Option<(Hit, f64)>,
 }
 
 impl TruthRow {
-    /// For a sonar, what its beam's middle met, with the arc length there, m.
+    /// For a sonar, the hit of its beam's axis, with the arc length there, m.
     pub fn wall(&self) -> Option<(Hit, f64)> {
         self.sounding.and_then(|sounding| sounding.wall)
     }
 }
 
 impl SoundingTruth {
-    /// The place that the measured range means, were all else known.
+    /// The point of the measured range on the true beam axis.
     pub fn measured_point(&self) -> Option<Point3<Tunnel>> {
         self.measured.range_m.map(|range_m| self.origin + self.direction.scaled(range_m))
     }
@@ -62,13 +62,13 @@ impl SoundingTruth {
 /// A change that an effect has made.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cause {
-    /// The effect, by its place among those that the scene names.
+    /// The effect, by its index among those of the scene.
     pub effect: u16,
-    /// What was changed, with its unit.
+    /// Figure that was changed, with its unit.
     pub what: &'static str,
-    /// From which value, not a number where there was none.
+    /// Value before, NaN if there was none.
     pub from: f64,
-    /// To which value.
+    /// Value after.
     pub to: f64,
 }
 

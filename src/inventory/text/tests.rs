@@ -1,4 +1,4 @@
-//! Text and JSON for a machine that is made of files.
+//! Text and JSON for a machine simulated by files.
 
 use std::fs;
 use std::os::unix::fs::{MetadataExt as _, PermissionsExt as _, symlink};
@@ -12,7 +12,7 @@ use serde_json::json;
 
 use super::*;
 
-/// A machine's files in a folder of ours, which goes with it; all belong to root and dialout there.
+/// A simulated machine's files in a temporary folder, removed on drop; all belong to root and dialout there.
 struct Tree(PathBuf);
 
 impl Drop for Tree {

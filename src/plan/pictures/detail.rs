@@ -1,4 +1,4 @@
-//! A piece of the pattern to scale, about the emptiest place.
+//! A piece of the pattern to scale, about its largest gap.
 
 use headrace_pictures::canvas::{Canvas, NORMAL, SMALL, Side};
 use headrace_pictures::chart::{Axis, Chart, short};
@@ -12,25 +12,25 @@ use super::laid::Laid;
 /// The inside of the circle.
 pub(super) const CIRCLE: Colour = Colour(255, 240, 190);
 const FRAME: Frame = Frame { left: 676.0, top: 92.0, right: 886.0, bottom: 302.0 };
-/// Where the words below it begin, pixels.
+/// Position of the caption, pixels.
 const WORDS: Px = [634.0, 348.0];
 /// Samples closer together than this are shown by one marker, pixels.
 const APART_PX: f64 = 4.0;
-/// More samples than this are too many to tell apart.
+/// With more samples than this, single ones can't be distinguished.
 const MOST: usize = 450;
-/// Half of its width as a share of T.
+/// Half the width of the detail as a multiple of T.
 const HALF: f64 = 1.5;
 
 struct Detail<'c> {
     chart: Chart<'c>,
     laid: &'c Laid,
     centre: [f64; 2],
-    /// Where x is counted from, m.
+    /// Origin of x, m.
     from_m: f64,
     half_m: f64,
 }
 
-/// Draws it.
+/// Draws the detail.
 pub(super) fn draw(canvas: &Canvas, laid: &Laid, centre: [f64; 2], from_m: f64, t_m: f64) {
     let half_m = HALF * t_m;
     let [x_m, arc_m] = [centre[0] - from_m, centre[1]];
@@ -42,7 +42,7 @@ pub(super) fn draw(canvas: &Canvas, laid: &Laid, centre: [f64; 2], from_m: f64, 
     chart.ellipse(chart.px([x_m, arc_m]), [radius_px; 2], CIRCLE, &outline);
     let detail = Detail { chart, laid, centre, from_m, half_m };
     let samples = detail.samples();
-    // Too many to tell apart: the lines of what is sampled say it all.
+    // Too many samples to distinguish: only the heads' tracks are drawn.
     let dense = samples.len() > MOST;
     detail.lines(dense);
     for (head, place) in samples.iter().filter(|_| !dense) {
@@ -61,7 +61,7 @@ fn words(canvas: &Canvas, t_m: f64) {
 }
 
 impl Detail<'_> {
-    /// The heads' ways: as they are, and as they come from either side of the seam.
+    /// The heads' tracks, and their images across the seam on either side.
     fn lines(&self, dense: bool) {
         for pass in self.laid.passes().into_iter().filter(|pass| !(dense && pass.hidden)) {
             let thin = Look { width_px: 0.8, dash: &[], ..look::of_several(pass.head) };
@@ -73,7 +73,7 @@ impl Detail<'_> {
         }
     }
 
-    /// Samples that aren't hidden, by head, on the sheet.
+    /// Samples that aren't hidden, by head, in sheet coordinates.
     fn samples(&self) -> Vec<(usize, Px)> {
         let mut places: Vec<(usize, Px)> = Vec::new();
         for (sample, at) in self.laid.near(self.centre, [self.half_m; 2]) {

@@ -12,14 +12,14 @@ use super::Shown;
 use super::modes::{self, Mode};
 
 const FRAME: Frame = Frame { left: 66.0, top: 92.0, right: 752.0, bottom: 482.0 };
-/// By how much a speed exceeds the one before it on a curve.
+/// Ratio of successive speeds on a curve.
 const FASTER: f64 = 1.02;
-/// Places at which the mode that takes least time is looked up.
+/// Points at which the fastest mode is looked up.
 const LEAST: u32 = 300;
-/// What lies under the mode that takes least time.
+/// Band under the mode that takes least time.
 const BAND: Look = Look { colour: Colour(222, 222, 222), width_px: 9.0, ..look::T };
 
-/// What is looked for: a T, with the hours that every mode takes for it.
+/// The T to look up, with the hours that every mode takes for it.
 struct Sought {
     t_m: f64,
     /// By mode.
@@ -45,7 +45,7 @@ pub(crate) fn hours(shown: &Shown<'_>) -> Result<String, SamplingError> {
     Ok(canvas.into_svg())
 }
 
-/// All that is drawn where some mode gives a T.
+/// Draws everything, if some mode gives a T.
 fn curves(
     chart: &Chart<'_>,
     shown: &Shown<'_>,
@@ -66,20 +66,20 @@ fn curves(
     Ok(())
 }
 
-/// The target, or else the T that the speed asked about gives.
+/// The target, or else the T at the requested speed.
 fn sought(shown: &Shown<'_>, modes: &[Mode]) -> Result<Sought, SamplingError> {
     let length_m = shown.planner.inspection().length_m;
     let t_m = match shown.question.target_m {
         Some(target_m) => target_m,
         None => shown.planner.t_max_m(shown.mode, shown.asked_mps().unwrap_or(shown.speed_mps))?,
     };
-    // An axis of no meaning, for words in place of curves.
+    // A dummy axis, for text in place of curves.
     let t_m = if t_m.is_finite() { t_m } else { 1.0 };
     let hours = |mode: &Mode| Some(length_m / shown.planner.v_max_mps(mode.number, t_m).ok()? / 3600.0);
     Ok(Sought { t_m, hours: modes.iter().map(hours).collect() })
 }
 
-/// The right and the upper end.
+/// Ends of the x and y axes.
 fn ends(shown: &Shown<'_>, modes: &[Mode], sought: &Sought) -> Result<[f64; 2], SamplingError> {
     let length_m = shown.planner.inspection().length_m;
     let all = || sought.hours.iter().flatten().copied();
@@ -89,7 +89,7 @@ fn ends(shown: &Shown<'_>, modes: &[Mode], sought: &Sought) -> Result<[f64; 2], 
     if most_h > 0.0 {
         return Ok([2.2 * sought.t_m, (1.15 * most_h).min(4.0 * least_h).max(1.3 * asked_h)]);
     }
-    // No mode meets it: as far as the modes reach at the speed that is shown.
+    // No mode meets it: the largest T of any mode at the speed shown.
     let mut reached_m = 0.0_f64;
     for mode in modes.iter().filter(|mode| !mode.blind) {
         reached_m = reached_m.max(shown.planner.t_max_m(mode.number, shown.speed_mps)?);
@@ -97,7 +97,7 @@ fn ends(shown: &Shown<'_>, modes: &[Mode], sought: &Sought) -> Result<[f64; 2], 
     Ok([(1.3 * reached_m).max(2.2 * sought.t_m), (3.0 * shown_h).max(1.3 * asked_h)])
 }
 
-/// What the band is.
+/// Legend of the band.
 fn legend(chart: &Chart<'_>) {
     let [x, y] = [FRAME.right - 10.0, FRAME.top + 12.0];
     chart.canvas.line(&[[x - 40.0, y], [x, y]], &BAND);
@@ -105,7 +105,7 @@ fn legend(chart: &Chart<'_>) {
 }
 
 fn curve(shown: &Shown<'_>, mode: &Mode, [most_m, most_h]: [f64; 2]) -> Result<Vec<[f64; 2]>, SamplingError> {
-    /// Enough for a speed to grow a thousandfold.
+    /// Points of a curve: enough for a speed to grow a thousandfold.
     const POINTS: u32 = 400;
     let length_m = shown.planner.inspection().length_m;
     let mut v_mps = length_m / (1.02 * most_h * 3600.0);
@@ -121,7 +121,7 @@ fn curve(shown: &Shown<'_>, mode: &Mode, [most_m, most_h]: [f64; 2]) -> Result<V
     Ok(points)
 }
 
-/// The least hours of any mode at every T.
+/// Least hours of any mode for each T.
 fn least(shown: &Shown<'_>, modes: &[Mode], most_m: f64) -> Vec<[f64; 2]> {
     let length_m = shown.planner.inspection().length_m;
     let point = |k: u32| {
@@ -133,7 +133,7 @@ fn least(shown: &Shown<'_>, modes: &[Mode], most_m: f64) -> Vec<[f64; 2]> {
     (1..=LEAST).filter_map(point).collect()
 }
 
-/// Target, or the T that is found, upright; the time asked about across, with its label.
+/// The target, or the T found, as a vertical line; the requested time as a horizontal one, with its label.
 fn asked(chart: &Chart<'_>, shown: &Shown<'_>, sought: &Sought) -> Option<Label> {
     chart.upright(sought.t_m, &look::TARGET);
     if let Some(asked_mps) = shown.asked_mps() {
@@ -163,7 +163,7 @@ fn label(chart: &Chart<'_>, mode: &Mode, end: Option<[f64; 2]>, hours: Option<f6
     Label { place, lines: vec![words], look: mode.look, bold: true }
 }
 
-/// Markers where curves meet the target; the one that takes least time filled, with its hours and speed.
+/// Markers where curves meet the target; that of the fastest mode filled, with its hours and speed.
 fn marks(chart: &Chart<'_>, shown: &Shown<'_>, modes: &[Mode], sought: &Sought) {
     let Sought { t_m, hours } = sought;
     let found = modes.iter().filter_map(|mode| Some((mode, (*hours.get(mode.number)?)?)));

@@ -1,4 +1,4 @@
-//! The pattern that heads lay on the wall, and the part of it in which all of them have passed.
+//! The sampling pattern on the wall, and the range of chainage that all heads have passed.
 
 use headrace_geometry::math;
 use headrace_pictures::polyline;
@@ -7,24 +7,24 @@ use headrace_sampling::plan::PatternSample;
 
 use super::Shown;
 
-/// The most samples that are computed for a picture.
+/// Most samples computed for a chart.
 const MOST_SAMPLES: f64 = 400_000.0;
 
-/// A pattern.
+/// A sampling pattern.
 pub(super) struct Laid {
     pub(super) samples: Vec<PatternSample>,
     pub(super) heads: usize,
     pub(super) perimeter_m: f64,
-    /// Way gone in a turn, m.
+    /// Travel per turn, m.
     pub(super) pitch_m: f64,
-    /// T at this speed, m; `None` where a strip is seen by no head.
+    /// T at this speed, m; `None` if a strip is seen by no head.
     pub(super) t_m: Option<f64>,
-    /// Where all heads have passed, m.
+    /// Start of the chainage that all heads have passed, m.
     pub(super) from_m: f64,
     pub(super) to_m: f64,
 }
 
-/// A piece of a head's way over the wall; drawn as one line.
+/// A piece of a head's track on the wall; drawn as one line.
 pub(super) struct Pass {
     pub(super) head: usize,
     pub(super) hidden: bool,
@@ -32,7 +32,7 @@ pub(super) struct Pass {
     pub(super) points: Vec<[f64; 2]>,
 }
 
-/// Lays enough turns for the picture and its detail.
+/// Computes enough turns for the chart and its detail.
 pub(super) fn lay(shown: &Shown<'_>) -> Result<Laid, SamplingError> {
     let planner = shown.planner;
     let specs = planner.specs(shown.mode);
@@ -41,7 +41,7 @@ pub(super) fn lay(shown: &Shown<'_>) -> Result<Laid, SamplingError> {
     let t_m = Some(planner.t_max_m(shown.mode, shown.speed_mps)?).filter(|t_m| t_m.is_finite());
     let places = || specs.iter().map(|spec| spec.mount.position.x());
     let apart_m = places().fold(f64::NEG_INFINITY, f64::max) - places().fold(f64::INFINITY, f64::min);
-    // A turn in which to look for the emptiest place, and the detail about it.
+    // A turn in which to search for the largest gap, and the detail about it.
     let wanted_m = (turns_shown(specs.len()) * pitch_m).max(pitch_m + 3.2 * t_m.unwrap_or(0.0));
     let steps = turn.map_or(1.0, |turn| f64::from(turn.steps())) * specs.len().max(1) as f64;
     let turns = ((wanted_m + apart_m.max(0.0)) / pitch_m + 1.0).min(MOST_SAMPLES / steps).max(2.0);
@@ -51,7 +51,7 @@ pub(super) fn lay(shown: &Shown<'_>) -> Result<Laid, SamplingError> {
     Ok(Laid { samples, heads: specs.len(), perimeter_m, pitch_m, t_m, from_m, to_m })
 }
 
-/// How many turns are shown: fewer of more heads.
+/// Number of turns shown: fewer with more heads.
 pub(super) fn turns_shown(heads: usize) -> f64 {
     match heads {
         0 | 1 => 3.0,
@@ -61,7 +61,7 @@ pub(super) fn turns_shown(heads: usize) -> f64 {
     }
 }
 
-/// From where the last head has begun to where the first head ends; all of it if that is hardly anything.
+/// From the last head's start to the first head's end; the whole pattern if that is less than a turn.
 fn all_passed_m(samples: &[PatternSample], heads: usize, pitch_m: f64) -> [f64; 2] {
     let of = |head: usize| samples.iter().filter(move |sample| sample.head == head).map(|sample| sample.x_m);
     let firsts = (0..heads).map(|head| of(head).fold(f64::INFINITY, f64::min));
@@ -75,7 +75,7 @@ fn all_passed_m(samples: &[PatternSample], heads: usize, pitch_m: f64) -> [f64; 
 }
 
 impl Laid {
-    /// The heads' ways, broken where they turn round, cross the seam, or begin or cease to be hidden.
+    /// The heads' tracks, split where they turn round, cross the seam, or begin or cease to be hidden.
     pub(super) fn passes(&self) -> Vec<Pass> {
         let mut passes: Vec<Pass> = Vec::new();
         for pair in self.samples.windows(2) {
@@ -83,7 +83,7 @@ impl Laid {
             if here.new_sweep || here.head != before.head {
                 continue;
             }
-            // A step to or from a hidden sample is one over wall that isn't sampled.
+            // A step to or from a hidden sample passes over wall that isn't sampled.
             let hidden = here.hidden || before.hidden;
             let (from, to) = ([before.x_m, before.arc_m], [here.x_m, here.arc_m]);
             for [begin, end] in polyline::over_seam(self.perimeter_m, from, to) {
@@ -102,7 +102,7 @@ impl Laid {
         passes
     }
 
-    /// Samples not hidden near a place, their arc length on this side of the seam; within `half_m` either way.
+    /// Samples near a point within `half_m` either way, with their arc length on this side of the seam.
     pub(super) fn near(&self, centre: [f64; 2], half_m: [f64; 2]) -> Vec<(&PatternSample, [f64; 2])> {
         let place = |sample: &PatternSample| {
             let across_m = math::wrap_signed(sample.arc_m - centre[1], self.perimeter_m);
@@ -114,13 +114,13 @@ impl Laid {
         placed.filter(|(_, at)| near(at)).collect()
     }
 
-    /// The middle of the largest circle without samples about an arc length, within a turn's way: where spacing is at
-    /// its worst; and its diameter, m. `None` where T is none.
+    /// Centre and diameter, m, of the largest circle without samples about an arc length, within a turn's travel: the largest
+    /// gap. `None` without T.
     pub(super) fn emptiest(&self, arc_m: f64) -> Option<([f64; 2], f64)> {
-        /// Places tried along and around.
+        /// Grid points along and around.
         const TRIED: [u32; 2] = [120, 40];
         let t_m = self.t_m?;
-        // Away from the ends, where samples are missing that would come.
+        // Away from the ends, where later samples are missing.
         let room_m = (self.to_m - self.from_m - self.pitch_m).max(0.0) / 2.0;
         let begin_m = self.from_m + room_m;
         let middle = [begin_m + self.pitch_m / 2.0, arc_m];

@@ -1,4 +1,4 @@
-//! The four pictures of a plan, as SVG text: spacing around the wall, the pattern on it, and what speed gives.
+//! The four charts of a plan, as SVG text: spacing around the wall, the pattern on it, T against speed, hours against T.
 
 mod detail;
 mod hours;
@@ -16,26 +16,26 @@ pub(crate) use pattern::pattern;
 pub(crate) use perimeter::perimeter;
 pub(crate) use speeds::speeds;
 
-/// What is shown.
+/// Content of the charts.
 pub(crate) struct Shown<'a> {
     pub(crate) planner: &'a Planner,
-    /// The mode that perimeter and pattern show.
+    /// The mode shown by perimeter and pattern.
     pub(crate) mode: usize,
     /// The speed at which they show it, m/s.
     pub(crate) speed_mps: f64,
     pub(crate) question: Question,
-    /// Tunnel, heads and layout in words.
+    /// Tunnel, heads and layout as text.
     pub(crate) title: String,
 }
 
 impl Shown<'_> {
-    /// The speed asked about: as such, or by the time there is.
+    /// The requested speed, given directly or as a time.
     fn asked_mps(&self) -> Option<f64> {
         let needed = |time_s: f64| self.planner.inspection().length_m / time_s;
         self.question.speed_mps.or(self.question.time_s.map(needed))
     }
 
-    /// Tunnel, heads, layout, and what is asked.
+    /// Tunnel, heads, layout, and the request.
     fn subtitle(&self) -> String {
         let Question { target_m, speed_mps, time_s } = self.question;
         let words = [

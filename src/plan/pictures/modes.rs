@@ -1,4 +1,4 @@
-//! What speeds and hours have in common: the modes, by name and with what they reach.
+//! Modes with names and results, shared by the charts of speeds and hours.
 
 use headrace_pictures::look::{self, Look};
 use headrace_sampling::SamplingError;
@@ -6,7 +6,7 @@ use headrace_sampling::plan::Planner;
 
 use super::Shown;
 
-/// A mode as the pictures show it.
+/// A mode as shown in the charts.
 #[derive(Debug, Clone)]
 pub(super) struct Mode {
     pub(super) number: usize,
@@ -14,7 +14,7 @@ pub(super) struct Mode {
     pub(super) look: Look,
     /// The largest speed that meets the target, m/s.
     pub(super) v_max_mps: Option<f64>,
-    /// No speed gives any T: a strip is seen by no head.
+    /// No T at any speed: a strip is seen by no head.
     pub(super) blind: bool,
 }
 
@@ -40,18 +40,18 @@ pub(super) fn name(planner: &Planner, mode: usize) -> String {
     planner.modes().get(mode).map(|planned| planned.mode.name.to_uppercase()).unwrap_or_default()
 }
 
-/// The mode and speed that are shown.
+/// The mode and speed shown, as text.
 pub(super) fn at_speed(shown: &Shown<'_>) -> String {
     format!("{} at {} m/s", name(shown.planner, shown.mode), speed(shown.speed_mps))
 }
 
-/// A speed as it is printed: whole millimetres a second, rounded down, so that what is printed meets the target, too.
+/// A speed as printed: whole millimetres per second, rounded down, so that the printed speed meets the target, too.
 pub(super) fn speed(speed_mps: f64) -> String {
     let down = (speed_mps * 1000.0 + 1e-6).floor() / 1000.0;
     if down > 0.0 { format!("{down:.3}") } else { format!("{speed_mps:.5}") }
 }
 
-/// Hours as they are printed.
+/// Hours as printed.
 pub(super) fn hours(hours: f64) -> String {
     match hours {
         few if few < 1.0 => format!("{few:.2}"),
@@ -66,7 +66,7 @@ pub(super) fn fastest(modes: &[Mode]) -> Option<&Mode> {
     met.max_by(|a, b| a.v_max_mps.unwrap_or(0.0).total_cmp(&b.v_max_mps.unwrap_or(0.0)))
 }
 
-/// What is said of modes in which a strip is seen by no head.
+/// Text on modes in which a strip is seen by no head.
 pub(super) fn blind_words(modes: &[Mode]) -> Vec<String> {
     let blind: Vec<&str> = modes.iter().filter(|mode| mode.blind).map(|mode| mode.name.as_str()).collect();
     match blind.len() {

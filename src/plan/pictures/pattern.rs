@@ -15,12 +15,12 @@ use super::modes;
 use super::wall;
 
 const FRAME: Frame = Frame { left: 66.0, top: 92.0, right: 548.0, bottom: 482.0 };
-/// Where the legend begins, pixels.
+/// Position of the legend, pixels.
 const LEGEND: Px = [634.0, 412.0];
-/// Places around the wall at which spacing is compared.
+/// Points around the wall at which spacing is compared.
 const PLACES: usize = 360;
 
-/// The samples of some turns on the unrolled wall, with the circle that none of its like escapes.
+/// The samples of some turns on the unrolled wall, with a circle of diameter T at the largest gap.
 pub(crate) fn pattern(shown: &Shown<'_>) -> Result<String, SamplingError> {
     let laid = laid::lay(shown)?;
     let places = shown.planner.perimeter(shown.mode, shown.speed_mps, PLACES)?;
@@ -53,7 +53,7 @@ fn chart<'c>(canvas: &'c Canvas, laid: &Laid, length_m: f64) -> Chart<'c> {
     Chart::new(canvas, FRAME, &x, &y)
 }
 
-/// The circle of diameter T: flat, as the axes have different scales; cut off where it is larger than the picture.
+/// The circle of diameter T: an ellipse, as the axes differ in scale; clipped to the chart.
 fn circle(chart: &Chart<'_>, centre: [f64; 2], t_m: f64) {
     let (middle, corner) = (chart.px(centre), chart.px([centre[0] + t_m / 2.0, centre[1] + t_m / 2.0]));
     chart.ellipse(middle, [corner[0] - middle[0], middle[1] - corner[1]], CIRCLE, &look::T);
@@ -61,10 +61,10 @@ fn circle(chart: &Chart<'_>, centre: [f64; 2], t_m: f64) {
     chart.canvas.text([14.0, 546.0], note, Side::Right, SMALL);
 }
 
-/// A head's pieces of line, on the sheet.
+/// Pieces of a head's track, in sheet coordinates.
 type Ways = Vec<(usize, Vec<Px>)>;
 
-/// Draws the heads' ways; gives those that aren't hidden.
+/// Draws the heads' tracks; returns those that aren't hidden.
 fn passes(chart: &Chart<'_>, laid: &Laid, from_m: f64) -> Ways {
     let mut ways = Vec::new();
     for pass in laid.passes() {
@@ -76,9 +76,9 @@ fn passes(chart: &Chart<'_>, laid: &Laid, from_m: f64) -> Ways {
     ways
 }
 
-/// The heads' numbers: where their ways reach the top, or else on the longest piece.
+/// The heads' numbers: where their tracks reach the top, or else on the longest piece.
 fn numbers(chart: &Chart<'_>, heads: usize, ways: &Ways) {
-    /// Numbers closer together than this cover each other, pixels.
+    /// Numbers closer together than this overlap, pixels.
     const APART_PX: f64 = 9.0;
     let mut taken: Vec<(usize, f64)> = Vec::new();
     for (head, piece) in ways {
@@ -98,7 +98,7 @@ fn numbers(chart: &Chart<'_>, heads: usize, ways: &Ways) {
     }
 }
 
-/// How a head's way looks here: thinner than a curve.
+/// Style of a head's track: thinner than a curve.
 fn way(head: usize) -> Look {
     Look { width_px: 1.5, ..look::of_several(head) }
 }

@@ -15,24 +15,24 @@ use super::modes;
 use super::wall::{self, Thin};
 
 const FRAME: Frame = Frame { left: 66.0, top: 72.0, right: 724.0, bottom: 444.0 };
-/// Places around the wall at which spacing is computed.
+/// Points around the wall at which spacing is computed.
 const PLACES: usize = 720;
 const FEWER: Colour = Colour(236, 241, 246);
 const UNSEEN: Colour = Colour(214, 214, 214);
 const BAND: Colour = Colour(205, 226, 240);
 
-/// What is known of the wall.
+/// Spacing around the wall.
 struct Around {
     places: Vec<WallPlace>,
-    /// Where T is largest.
+    /// The point of largest T.
     worst: Option<WallPlace>,
-    /// The T that the plan counts with, m.
+    /// The plan's T, m.
     counted_m: Option<f64>,
     /// The middle of the widest strip that no head sees, m.
     unseen_m: Option<f64>,
 }
 
-/// Spacing along the perimeter: T_y, T_x, T of both, the target, and who sees what.
+/// Spacing along the perimeter: T_y, T_x, the combined T, the target, and the strips that not all heads see.
 pub(crate) fn perimeter(shown: &Shown<'_>) -> Result<String, SamplingError> {
     let places = shown.planner.perimeter(shown.mode, shown.speed_mps, PLACES)?;
     let around = Around {
@@ -70,7 +70,7 @@ impl Around {
         self.places.iter().filter_map(|place| place.t_m).fold(0.0, f64::max)
     }
 
-    /// What a strip that no head sees is counted as, with its place, unless it would dwarf all else.
+    /// Position of the widest strip that no head sees, and its T, unless that would dwarf everything else.
     fn across_m(&self) -> Option<[f64; 2]> {
         let t_m = self.counted_m.filter(|t_m| *t_m > self.most_m() && *t_m < 3.0 * self.most_m())?;
         Some([self.unseen_m?, t_m])
@@ -88,7 +88,7 @@ fn across(chart: &Chart<'_>, around: &Around) {
     chart.canvas.text_on_white([x, place[1] + 16.0], &format!("{} m across", short(point[1])), side, NORMAL);
 }
 
-/// What the plan counts with where that isn't what is seen here; else empty.
+/// Text on the plan's T where it differs from the largest one shown; else empty.
 fn note(shown: &Shown<'_>, around: &Around) -> String {
     let (Some(counted_m), Some(here_m)) = (around.counted_m, around.worst.and_then(|place| place.t_m)) else {
         return String::new();
@@ -107,7 +107,7 @@ fn note(shown: &Shown<'_>, around: &Around) -> String {
     format!("The plan counts with T = {} m: {why}{allowed}.", short(counted_m))
 }
 
-/// What is allowed for, in words.
+/// Text on the tolerances allowed for.
 fn allowed(shown: &Shown<'_>) -> String {
     let inspection = shown.planner.inspection();
     let drift = (inspection.drift_m > 0.0).then(|| format!("{} m of drift", inspection.drift_m));
@@ -121,7 +121,7 @@ fn allowed(shown: &Shown<'_>) -> String {
 fn chart<'c>(canvas: &'c Canvas, shown: &Shown<'_>, around: &Around) -> Chart<'c> {
     let most_m = [Some(around.most_m()), around.across_m().map(|[_, t_m]| t_m), shown.question.target_m];
     let most_m = most_m.into_iter().flatten().fold(0.0, f64::max);
-    // Words about who sees what stand above the curves.
+    // The captions stand above the curves.
     let top_m = if most_m > 0.0 { 1.25 * most_m } else { 1.0 };
     let perimeter_m = shown.planner.inspection().profile.perimeter_m();
     let x = Axis::new(
@@ -147,11 +147,11 @@ fn shade(chart: &Chart<'_>, stretch: &Thin) {
     }
 }
 
-/// A second row of labels: hours of a clock.
+/// A second row of labels: positions as hours of a clock.
 fn clocks(chart: &Chart<'_>, hours: &[Hour]) {
     let y = chart.frame.bottom + 34.0;
     let mut taken: Vec<[f64; 2]> = Vec::new();
-    // Floor, walls and crown first; what is between them where there is room.
+    // Floor, walls and crown first; those between where there is room.
     let (named, between): (Vec<&Hour>, Vec<&Hour>) = hours.iter().partition(|hour| !hour.place.is_empty());
     for hour in named.into_iter().chain(between) {
         let x = chart.px([hour.arc_m, 0.0])[0];
@@ -165,7 +165,7 @@ fn clocks(chart: &Chart<'_>, hours: &[Hour]) {
     }
 }
 
-/// Who sees the thin stretches, above them.
+/// Captions above the thin stretches: the heads that see them.
 fn captions(chart: &Chart<'_>, stretches: &[Thin]) {
     let mut last: Option<(f64, [String; 2])> = None;
     for stretch in stretches {
@@ -249,7 +249,7 @@ fn line(chart: &Chart<'_>, places: &[WallPlace], of: impl Fn(&WallPlace) -> Opti
     }
 }
 
-/// Neighbouring places that have a value.
+/// Runs of neighbouring points that have a value.
 fn runs<V>(places: &[WallPlace], of: impl Fn(&WallPlace) -> Option<V>) -> Vec<Vec<(f64, V)>> {
     let mut runs = vec![Vec::new()];
     for place in places {

@@ -14,7 +14,7 @@ const FRAME: Frame = Frame { left: 66.0, top: 92.0, right: 708.0, bottom: 482.0 
 /// Speeds at which T is computed.
 const SPEEDS: u32 = 400;
 
-/// T of every mode against speed, with the target and the speed asked about.
+/// T of every mode against speed, with the target and the requested speed.
 pub(crate) fn speeds(shown: &Shown<'_>) -> Result<String, SamplingError> {
     let modes = modes::all(shown)?;
     let most_mps = most_mps(shown, &modes);
@@ -43,7 +43,7 @@ pub(crate) fn speeds(shown: &Shown<'_>) -> Result<String, SamplingError> {
     Ok(canvas.into_svg())
 }
 
-/// The right end of the axis, m/s.
+/// Right end of the speed axis, m/s.
 fn most_mps(shown: &Shown<'_>, modes: &[Mode]) -> f64 {
     let fastest = modes.iter().filter_map(|mode| mode.v_max_mps).map(|v_mps| 1.5 * v_mps);
     let asked = shown
@@ -53,7 +53,7 @@ fn most_mps(shown: &Shown<'_>, modes: &[Mode]) -> f64 {
     if most > 0.0 { most } else { 2.0 * shown.speed_mps }
 }
 
-/// The upper end, m.
+/// Upper end of the T axis, m.
 fn most_m(shown: &Shown<'_>, curves: &[(&Mode, Vec<[f64; 2]>)]) -> f64 {
     let at_rest = curves.iter().filter_map(|(_, points)| points.first()).map(|[_, t_m]| *t_m);
     let at_rest_m = at_rest.fold(f64::INFINITY, f64::min);
@@ -61,7 +61,7 @@ fn most_m(shown: &Shown<'_>, curves: &[(&Mode, Vec<[f64; 2]>)]) -> f64 {
     let asked_m = here.zip(shown.asked_mps()).and_then(|((_, points), asked_mps)| {
         points.iter().find(|[v_mps, _]| *v_mps >= asked_mps).map(|[_, t_m]| 1.25 * t_m)
     });
-    // Without a target the other modes are what there is to compare with.
+    // Without a target, the axis is widened to compare the other modes.
     let wide = if shown.question.target_m.is_none() { 4.0 } else { 1.0 };
     let target_m = shown.question.target_m.map(|target_m| 2.6 * target_m);
     let least_m = if at_rest_m.is_finite() { 1.5 * at_rest_m } else { 0.0 };
@@ -77,14 +77,14 @@ fn highest_m(curves: &[(&Mode, Vec<[f64; 2]>)]) -> f64 {
 
 fn curve(shown: &Shown<'_>, mode: &Mode, most_mps: f64) -> Result<Vec<[f64; 2]>, SamplingError> {
     let point = |k: u32| {
-        // Not at rest, where there is no T, but hardly moving.
+        // T is undefined at rest, so the curves begin at a very low speed.
         let v_mps = most_mps * f64::from(k).max(0.01) / f64::from(SPEEDS);
         Ok([v_mps, shown.planner.t_max_m(mode.number, v_mps)?])
     };
     (0..=SPEEDS).map(point).collect()
 }
 
-/// The speed asked about as a line; gives where and what it is.
+/// The requested speed as a line; returns its x position and label.
 fn asked(chart: &Chart<'_>, shown: &Shown<'_>) -> Option<(f64, String)> {
     let asked_mps = shown.asked_mps()?;
     chart.upright(asked_mps, &look::ASKED);
@@ -97,7 +97,7 @@ fn asked(chart: &Chart<'_>, shown: &Shown<'_>) -> Option<(f64, String)> {
     Some((chart.px([asked_mps, 0.0])[0], format!("{why}{} m/s", modes::speed(asked_mps))))
 }
 
-/// Where curves leave the frame, and what is said there.
+/// Labels where curves leave the frame.
 #[derive(Default)]
 struct Ends {
     right: Vec<Label>,
@@ -114,7 +114,7 @@ impl Ends {
             (Some(_), None) => Some("never".to_owned()),
         };
         let Some(end) = end else {
-            // All of it is above the frame.
+            // The whole curve is above the frame.
             let corner = [chart.frame.left, chart.frame.top];
             self.above.push(label(corner, mode, format!("{}: above", mode.name)));
             return;

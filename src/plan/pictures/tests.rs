@@ -1,4 +1,4 @@
-//! Every picture of every kind of plan: well-formed, the same each time, and says what it shows.
+//! Every chart of every kind of plan: well-formed, reproducible, and with the right content.
 
 use clap::Parser;
 use headrace_geometry::frames::Vec3;
@@ -16,7 +16,7 @@ const TARGET: Question = Question { target_m: Some(0.5), speed_mps: None, time_s
 const SPEED: Question = Question { target_m: None, speed_mps: Some(0.1), time_s: None };
 /// VITA 2 with four heads in phase shift: two side by side in front, two aft.
 const VITA_2: &str = "--vehicle deploy/vehicles/vita2-4.toml";
-/// The same heads in sectors: where they are apart, a strip is seen by none.
+/// The same heads in sectors: with their distances along the hull, a strip is seen by none.
 const SECTORS: &str = "--vehicle deploy/vehicles/vita2-4.toml --layout sector_offset";
 const ONE: &str = "--tunnel ceran --length 7000";
 
@@ -25,14 +25,14 @@ type Picture = fn(&Shown<'_>) -> Result<String, SamplingError>;
 const PICTURES: [(&str, Picture); 4] =
     [("perimeter", perimeter), ("pattern", pattern), ("speeds", speeds), ("hours", hours)];
 
-/// What these arguments of `headrace plan` describe.
+/// The inspection described by these arguments of `headrace plan`.
 fn inspection(arguments: &str) -> Inspection {
     let cli = Cli::try_parse_from(["headrace", "plan"].into_iter().chain(arguments.split(' '))).unwrap();
     let Command::Plan(plan) = cli.command else { panic!("{arguments}") };
     Case::of(&plan).unwrap().inspection
 }
 
-/// A vehicle whose own parts stand before its head: to the left, or all around.
+/// A vehicle whose own parts occlude its head: to the left, or all around.
 fn walled_in(all_around: bool) -> Inspection {
     let plate = |[x, y, z]: [f64; 3], most: [f64; 3]| Obstacle::Box {
         least: Vec3::new(x, y, z),
@@ -48,7 +48,7 @@ fn walled_in(all_around: bool) -> Inspection {
     Inspection { hull, ..inspection(ONE) }
 }
 
-/// A picture of a plan, checked for what holds of every picture.
+/// A chart of a plan, with the checks that apply to all charts.
 fn draw(inspection: Inspection, mode: usize, speed_mps: f64, question: Question, name: &str) -> String {
     let planner = Planner::new(inspection).unwrap();
     let title = "ceran, <4> heads & phase shift".to_owned();
@@ -119,8 +119,8 @@ fn pattern_shows_every_head_the_circle_and_what_is_hidden() {
     silent(&draw(inspection(ONE), FAST, 0.058, TARGET, "pattern"), &["head 1", "hidden by"]);
 }
 
-/// What the circle says, against the samples of the pattern: none as large is empty, and none is emptier than where
-/// it is drawn.
+/// The circle drawn, against the samples of the pattern: no circle of diameter T is empty, and no gap is larger than the
+/// one drawn.
 #[test]
 fn verif_no_circle_of_diameter_t_is_empty() {
     let plans = [
@@ -201,7 +201,7 @@ fn without_a_target_hours_are_for_the_t_that_the_speed_gives() {
 
 #[test]
 fn modes_that_never_meet_the_target_are_drawn_and_said_so() {
-    // Its step alone takes FASTEST beyond this at the corners.
+    // At the corners FASTEST exceeds this by its step alone.
     let coarse = Question { target_m: Some(0.4), ..TARGET };
     for name in ["speeds", "hours"] {
         let svg = draw(inspection(VITA_2), FAST, 0.08, coarse, name);

@@ -1,12 +1,12 @@
-//! Where spacing is at its worst, and the strips that not all heads see.
+//! The point of largest spacing, and the strips that not all heads see.
 
 use headrace_geometry::math;
 use headrace_sampling::plan::{Planner, WallPlace};
 use headrace_sampling::strips::Strips;
 
-/// The place where T is largest; of those as good as equal the one nearest to the left wall.
+/// The point of largest T; among nearly equal ones the one nearest to the left wall.
 pub(super) fn worst(planner: &Planner, places: &[WallPlace]) -> Option<WallPlace> {
-    /// Steps that begin at a strip's edge make T there a little larger than within.
+    /// Steps from a strip's edge make T there slightly larger than within.
     const EQUAL: f64 = 0.995;
     let profile = &planner.inspection().profile;
     let [y_m, z_m] = profile.reference();
@@ -17,18 +17,18 @@ pub(super) fn worst(planner: &Planner, places: &[WallPlace]) -> Option<WallPlace
     worst.min_by(|a, b| off_m(a).total_cmp(&off_m(b))).copied()
 }
 
-/// A stretch of the perimeter that fewer heads see than could.
+/// A stretch of the perimeter seen by fewer heads than the best-covered one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Thin {
     pub(super) from_m: f64,
     pub(super) to_m: f64,
-    /// Heads that see it, and the most that see any place.
+    /// Number of heads that see it; `of` is the largest number at any point.
     pub(super) heads: usize,
     pub(super) of: usize,
 }
 
 impl Thin {
-    /// Two short lines.
+    /// Caption of two short lines.
     pub(super) fn words(&self) -> [String; 2] {
         match self.heads {
             0 => ["no head".to_owned(), "sees it".to_owned()],
@@ -37,7 +37,7 @@ impl Thin {
     }
 }
 
-/// The thin stretches with the vehicle where it should be, those across the seam in two.
+/// The thin stretches at the nominal position of the vehicle; one across the seam is split.
 pub(super) fn thin(planner: &Planner) -> Vec<Thin> {
     let perimeter_m = planner.inspection().profile.perimeter_m();
     let strips = planner.nominal_strips().map(Strips::as_slice).unwrap_or_default();

@@ -6,9 +6,8 @@ use headrace_geometry::math;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::device::SensorInfo;
 use headrace_sensor::reading::SonarReturn;
+use headrace_sensor::sampling::head::SILENT_AFTER;
 
-/// A source that hasn't been heard for so long is off.
-const SILENT: DurNs = DurNs(3_000_000_000);
 /// Share of a new rate of turning in the mean.
 const RATE_SHARE: f64 = 0.05;
 
@@ -110,6 +109,7 @@ impl Turning {
     /// Its turns in a second; `None` when it doesn't turn.
     pub fn turns_per_s(&self, now: MonoNs) -> Option<f64> {
         let (last, _) = self.last?;
-        (now.since(last).0.abs() <= SILENT.0 && self.rate_radps > 0.0).then(|| self.rate_radps / math::TAU)
+        (now.since(last).0.abs() <= SILENT_AFTER.0 && self.rate_radps > 0.0)
+            .then(|| self.rate_radps / math::TAU)
     }
 }

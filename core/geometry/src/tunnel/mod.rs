@@ -1,4 +1,4 @@
-//! The tunnel: design profiles with exact ray casting, and the unrolled wall.
+//! Tunnel design profiles with exact ray casting, and the unrolled wall.
 
 mod profile;
 pub mod shapes;

@@ -6,23 +6,23 @@ mod nearest;
 
 pub use nearest::Nearest;
 
-/// A place in the cross-section: y left, z up, metres.
+/// A point in the cross-section: y left, z up, metres.
 pub type Yz = [f64; 2];
 
-/// Points closer together than this are one, m.
+/// Points closer together than this are the same, m.
 const SAME_POINT_M: f64 = 1e-9;
-/// Share of a turn by which a hit may lie beyond an arc's end, so that neighbours leave no crack between them.
+/// Angle by which a hit may lie beyond an arc's end, rad, so that neighbours leave no gap between them.
 const ARC_SLACK_RAD: f64 = 1e-12;
-/// A direction whose cosine against an arc's middle is off that of the ends by more than this is surely within the arc, or
-/// surely not: far more than the slack and rounding together.
+/// Margin beyond which a hit is clearly within or clearly outside an arc: difference between its cosine about the arc's
+/// middle and that of the ends; far larger than the slack and rounding together.
 const CLEAR: f64 = 1e-9;
 
-/// One piece of a profile, as given; pieces follow each other counter-clockwise with y to the right and z up.
+/// One piece of a profile, as given; pieces run counter-clockwise with y to the right and z up.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Piece {
     /// A straight line to this point.
     LineTo(Yz),
-    /// An arc about `centre` through `sweep_rad` > 0 (growing polar angle, so that it bulges outwards).
+    /// An arc about `centre` through `sweep_rad` > 0 (polar angle grows, so that it bulges outwards).
     Arc {
         /// Centre of its circle.
         centre: Yz,
@@ -31,7 +31,7 @@ pub enum Piece {
     },
 }
 
-/// A design profile. Arc length sigma grows from the floor's centre via the left wall, in [0, perimeter).
+/// A design profile. Arc length grows from the floor's centre via the left wall, in [0, perimeter).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Profile {
     elements: Vec<Element>,
@@ -39,20 +39,20 @@ pub struct Profile {
     reference: Yz,
 }
 
-/// Where a ray meets the wall.
+/// Intersection of a ray with the wall.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WallHit {
     /// Ray parameter; the distance in metres when the direction has length one.
     pub range_m: f64,
-    /// Arc length of the place.
+    /// Arc length of the point, m.
     pub arc_m: f64,
-    /// The place.
+    /// The point.
     pub point: Yz,
-    /// Unit normal there, inwards.
+    /// Unit normal there, pointing inwards.
     pub normal: Yz,
 }
 
-/// Why a profile is refused.
+/// Why a profile is rejected.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ProfileError {
@@ -62,7 +62,7 @@ pub enum ProfileError {
         /// Distinct points.
         count: usize,
     },
-    /// A coordinate isn't a finite number, or is beyond a kilometre.
+    /// A coordinate isn't finite, or exceeds 1000 m.
     #[error("vertex {vertex} has a coordinate that is no number within 1000 m")]
     NotFinite {
         /// Index of the vertex, from zero.
@@ -79,10 +79,10 @@ pub enum ProfileError {
         /// The reference point.
         reference: Yz,
     },
-    /// The curve winds about its reference point more than once, or not at all.
+    /// The curve doesn't wind about its reference point exactly once.
     #[error("the profile winds {turns} times about ({y}, {z}); it must do so once", y = .reference[0], z = .reference[1])]
     Winding {
-        /// Turns counted.
+        /// Number of turns.
         turns: i64,
         /// The reference point.
         reference: Yz,
@@ -114,7 +114,7 @@ enum Shape {
 
 impl Profile {
     /// A closed curve that begins at `start`, the floor's centre, and runs counter-clockwise (y right, z up) through
-    /// `pieces` back to it. `reference` is the point from which every place of the wall is seen.
+    /// `pieces` back to it. All of the wall must be visible from `reference`.
     ///
     /// Errors: see [`ProfileError`].
     /// Allocates: startup only.
@@ -151,10 +151,10 @@ impl Profile {
         Ok(profile)
     }
 
-    /// A polygon through `points`, counter-clockwise with y to the right and z up or the other way round; sigma begins
-    /// where the polygon crosses y = 0 lowest. `reference` defaults to the polygon's centroid.
+    /// A polygon through `points`, in either sense of rotation; arc length begins at the lowest crossing of y = 0.
+    /// `reference` defaults to the polygon's centroid.
     ///
-    /// Errors: see [`ProfileError`]; also when the polygon nowhere crosses y = 0.
+    /// Errors: see [`ProfileError`]; also when the polygon never crosses y = 0.
     /// Allocates: startup only.
     pub fn polygon(points: &[Yz], reference: Option<Yz>) -> Result<Self, ProfileError> {
         if let Some(vertex) = points.iter().position(|p| !p.iter().all(|c| c.abs() <= 1000.0)) {
@@ -181,7 +181,7 @@ impl Profile {
         self.perimeter_m
     }
 
-    /// The point from which every place of the wall is seen.
+    /// The point from which all of the wall is visible.
     pub fn reference(&self) -> Yz {
         self.reference
     }
@@ -195,10 +195,10 @@ impl Profile {
         self.hit(self.reference, direction).is_some_and(|hit| hit.range_m >= 1.0)
     }
 
-    /// Where the ray from `origin` along `direction` (any length but zero) first leaves the profile.
+    /// First exit from the profile of the ray from `origin` along `direction` (any non-zero length).
     ///
-    /// From a point inside there is always such a place: where rounding lets a ray slip between two elements, the
-    /// vertex between them is taken. From outside: `None`.
+    /// From inside there is always one: where rounding lets a ray slip between two elements, their common vertex is
+    /// used. From outside: `None`.
     pub fn cast(&self, origin: Yz, direction: Yz) -> Option<WallHit> {
         if !self.contains(origin) {
             return None;
@@ -206,27 +206,27 @@ impl Profile {
         self.hit(origin, direction)
     }
 
-    /// [`Profile::cast`] for many rays from one point, which the caller knows to be inside.
+    /// [`Profile::cast`] without its test of `origin`, for many rays from one point known to be inside.
     pub fn cast_from_inside(&self, origin: Yz, direction: Yz) -> Option<WallHit> {
         self.hit(origin, direction)
     }
 
-    /// Arc length of the wall as seen from the reference point through `point`: the chart in which spacing is measured
-    /// when the wall isn't where the design says. Zero for the reference point itself.
+    /// Arc length of the wall seen from the reference point in the direction of `point`: the coordinate for spacing
+    /// when the wall differs from the design. Zero for the reference point itself.
     pub fn arc_of(&self, point: Yz) -> f64 {
         let direction = sub(point, self.reference);
         self.hit(self.reference, direction).map_or(0.0, |hit| hit.arc_m)
     }
 
-    /// The place of the wall at arc length `arc_m`, taken modulo the perimeter.
+    /// Wall point at arc length `arc_m`, taken modulo the perimeter.
     pub fn point_at(&self, arc_m: f64) -> Yz {
         let arc = math::wrap(arc_m, self.perimeter_m);
         let index = self.elements.partition_point(|element| element.arc_m <= arc).saturating_sub(1);
         self.elements.get(index).map_or(self.reference, |element| element.point_at(arc - element.arc_m))
     }
 
-    /// Place of an arc length on a clock seen looking along the tunnel from the reference point, to the nearest half hour:
-    /// 6 is the floor's centre, 9 the left wall, 12 the crown.
+    /// Clock position of an arc length, seen from the reference point looking along the tunnel, to the nearest half
+    /// hour: 6 is the floor's centre, 9 the left wall, 12 the crown.
     pub fn clock(&self, arc_m: f64) -> String {
         let place = sub(self.point_at(arc_m), self.reference);
         // Head angle: 0 down, growing to the left.
@@ -237,7 +237,7 @@ impl Profile {
         format!("{hour}:{}", if half_hours % 2 == 0 { "00" } else { "30" })
     }
 
-    /// The largest distance from `origin` to a vertex or arc end of the wall, at least as far as any wall is, m.
+    /// Upper bound of the distance from `origin` to the wall, m.
     pub fn farthest_m(&self, origin: Yz) -> f64 {
         let reach = |element: &Element| match element.shape {
             Shape::Line => norm(sub(element.start, origin)),
@@ -246,7 +246,7 @@ impl Profile {
         self.elements.iter().map(reach).fold(0.0, f64::max)
     }
 
-    /// Arc lengths at which one element ends and the next begins.
+    /// Arc lengths of the element boundaries, m.
     #[cfg(test)]
     pub(crate) fn corners_m(&self) -> Vec<f64> {
         self.elements.iter().map(|element| element.arc_m).collect()
@@ -276,7 +276,7 @@ impl Profile {
         })
     }
 
-    /// For a ray that slipped between two elements: the vertex ahead that is nearest to it.
+    /// For a ray that slipped between two elements: the vertex ahead that is nearest to the ray.
     fn nearest_vertex(&self, origin: Yz, direction: Yz) -> Option<(f64, usize)> {
         let length2 = dot(direction, direction);
         let ahead = |(index, element): (usize, &Element)| {
@@ -304,13 +304,13 @@ impl Profile {
 }
 
 impl Element {
-    /// Ray parameter at which the ray leaves the profile through this element.
+    /// Ray parameter where the ray leaves the profile through this element.
     fn crossing(&self, origin: Yz, direction: Yz) -> Option<f64> {
         let (start, end) = (sub(self.start, origin), sub(self.end, origin));
         match self.shape {
             Shape::Line => {
-                // Leaving means passing with the start to the right and the end to the left. The half-open test uses
-                // the same product for the vertex that two elements share, so that exactly one of them is hit.
+                // A ray leaves with the start on its right and the end on its left. The half-open test uses the same
+                // product for the vertex shared by two elements, so that exactly one of them is hit.
                 let (right, left) = (cross(direction, start), cross(direction, end));
                 if !(right <= 0.0 && left > 0.0) {
                     return None;
@@ -351,7 +351,7 @@ impl Element {
             Shape::Arc { centre, radius_m, from_rad, sweep_rad, .. } => {
                 let from_centre = sub(point, centre);
                 let turned = math::wrap(math::atan2(from_centre[1], from_centre[0]) - from_rad, TAU);
-                // Beyond the end is a hair before the start.
+                // Just past the end means slightly before the start.
                 let turned = if turned > sweep_rad + ARC_SLACK_RAD { 0.0 } else { turned };
                 radius_m * turned
             }
@@ -384,7 +384,7 @@ impl Element {
         [-outwards[0] / length, -outwards[1] / length]
     }
 
-    /// Angle that this element spans about `reference`, or `None` where it doesn't run forwards all the way.
+    /// Angle that this element spans about `reference`, or `None` where it runs backwards anywhere.
     fn angle_about(&self, reference: Yz) -> Option<f64> {
         let (start, end) = (sub(self.start, reference), sub(self.end, reference));
         match self.shape {
@@ -393,7 +393,7 @@ impl Element {
                 (angle > 0.0).then_some(angle)
             }
             Shape::Arc { centre, radius_m, from_rad, sweep_rad, .. } => {
-                // On the arc, forwards means (centre - reference) . e(theta) + radius > 0; checked finely.
+                // On the arc, forwards means (centre - reference) . e(theta) + radius > 0; checked at 256 steps.
                 let shift = sub(centre, reference);
                 let steps = 256;
                 let mut angle = 0.0;
@@ -434,7 +434,7 @@ fn build(start: Yz, piece: Piece) -> Element {
     }
 }
 
-/// The points without those that repeat their predecessor (the first follows the last).
+/// The points without repeats of their predecessor (the first follows the last).
 fn distinct(points: &[Yz]) -> Vec<Yz> {
     let mut ring: Vec<Yz> = Vec::with_capacity(points.len());
     for point in points {
@@ -469,7 +469,7 @@ fn area_and_centroid(ring: &[Yz]) -> (f64, Yz) {
     (area2 / 2.0, centroid)
 }
 
-/// The lowest crossing of y = 0: the edge (index of its first point) and the place.
+/// The lowest crossing of y = 0: index of the edge's first point, and the crossing.
 fn floor_centre(ring: &[Yz]) -> Option<(usize, Yz)> {
     let crossing = |(index, (a, b)): (usize, (&Yz, &Yz))| {
         if (a[0] <= 0.0) == (b[0] <= 0.0) {

@@ -1,4 +1,4 @@
-//! Profiles by their dimensions: rectangle, circle, arch, trimmed circle, and the paper's tunnel.
+//! Profiles from their dimensions: rectangle, circle, arch, trimmed circle, and the paper's tunnel.
 
 use super::profile::{Piece, Profile, ProfileError};
 use crate::math::{self, PI, TAU};
@@ -7,30 +7,30 @@ use crate::math::{self, PI, TAU};
 const CERAN_BASE_M: f64 = 10.4;
 /// Radius of the Ceran tunnel's trimmed circle, m (the paper's §7.3).
 const CERAN_RADIUS_M: f64 = 6.05;
-/// Perimeter on the plant's blueprint, m (the paper's §9.2), which the dimensions above don't give (35.90 m).
+/// Perimeter on the plant's blueprint, m (the paper's §9.2); the dimensions above give 35.90 m instead.
 const CERAN_BLUEPRINT_PERIMETER_M: f64 = 34.17;
 
-/// A rectangle, its reference point in the middle.
+/// A rectangle, with its reference point at the centre.
 ///
-/// Errors: dimensions that make no profile.
+/// Errors: dimensions that give no valid profile.
 pub fn rectangle(width_m: f64, height_m: f64) -> Result<Profile, ProfileError> {
     let half = width_m / 2.0;
     let corners = [[half, 0.0], [half, height_m], [-half, height_m], [-half, 0.0]];
     Profile::new([0.0, 0.0], &corners.map(Piece::LineTo), [0.0, height_m / 2.0])
 }
 
-/// A circle, its reference point in the middle.
+/// A circle, with its reference point at the centre.
 ///
-/// Errors: dimensions that make no profile.
+/// Errors: dimensions that give no valid profile.
 pub fn circle(radius_m: f64) -> Result<Profile, ProfileError> {
     let centre = [0.0, radius_m];
     Profile::new([0.0, 0.0], &[Piece::Arc { centre, sweep_rad: TAU }], centre)
 }
 
-/// The paper's Fig. 2: upright walls under an arc of radius `arch_radius_m` >= width / 2; `height_m` is that of the
-/// crown. The reference point is half way up.
+/// The paper's Fig. 2: vertical walls under an arc of radius `arch_radius_m` >= width / 2; `height_m` is the height of
+/// the crown. The reference point is at half height.
 ///
-/// Errors: dimensions that make no profile.
+/// Errors: dimensions that give no valid profile.
 pub fn arch(width_m: f64, height_m: f64, arch_radius_m: f64) -> Result<Profile, ProfileError> {
     let half = width_m / 2.0;
     let centre = [0.0, height_m - arch_radius_m];
@@ -46,9 +46,9 @@ pub fn arch(width_m: f64, height_m: f64, arch_radius_m: f64) -> Result<Profile, 
 }
 
 /// A circle with its lower part cut off by a flat floor of width `base_m`; the reference point is the circle's centre,
-/// which is above the floor.
+/// above the floor.
 ///
-/// Errors: dimensions that make no profile.
+/// Errors: dimensions that give no valid profile.
 pub fn trimmed_circle(radius_m: f64, base_m: f64) -> Result<Profile, ProfileError> {
     let half = base_m / 2.0;
     let centre_m = math::sqrt(radius_m * radius_m - half * half);
@@ -65,7 +65,7 @@ pub fn ceran() -> Result<Profile, ProfileError> {
     trimmed_circle(CERAN_RADIUS_M, CERAN_BASE_M)
 }
 
-/// The same shape, scaled to the perimeter of the blueprint, 34.17 m.
+/// The shape of [`ceran`], scaled to the perimeter of the blueprint, 34.17 m.
 ///
 /// Errors: none that can occur.
 pub fn ceran_blueprint() -> Result<Profile, ProfileError> {

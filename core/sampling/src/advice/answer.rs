@@ -1,21 +1,21 @@
-//! What is advised.
+//! The advice and its parts.
 
 use serde::{Deserialize, Serialize};
 
 use super::MAX_MODES;
 
-/// Bytes of the longest mode name.
+/// Maximum length of a mode name, bytes.
 const MODE_NAME_BYTES: usize = 15;
 
-/// Why the advice is what it is.
+/// The limiting factor of the advice.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Reason {
-    /// The distance between passes decides: slower helps.
+    /// The distance between passes limits: slower helps.
     HelixPitch,
-    /// The distance between neighbours of one turn, a strip that no head sees, or the swing of the beams is as large as
-    /// the target: slower won't help, another mode or place, or a steadier vehicle would.
+    /// The distance between neighbours of one turn, a strip that no head sees, or the swing of the beams reaches the
+    /// target: slower doesn't help; another mode or position, or a steadier vehicle would.
     AngularStep,
-    /// Without a position and heading nothing can be said.
+    /// Without position and heading, no advice is possible.
     NoHeadingOrFix,
     /// No head gives returns.
     NoReturns,
@@ -25,7 +25,7 @@ impl Reason {
     /// All of them.
     pub const ALL: [Self; 4] = [Self::HelixPitch, Self::AngularStep, Self::NoHeadingOrFix, Self::NoReturns];
 
-    /// The word used in reports and logs.
+    /// Name used in reports and logs.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::HelixPitch => "helix_pitch",
@@ -35,7 +35,7 @@ impl Reason {
         }
     }
 
-    /// How much it restricts: a graver one is larger.
+    /// Severity: a graver reason has a larger number.
     pub(super) fn gravity(self) -> u8 {
         match self {
             Self::HelixPitch => 0,
@@ -46,7 +46,7 @@ impl Reason {
     }
 }
 
-/// The name of a mode, as advice that is saved and restored has it.
+/// Name of a mode, in a fixed-size form for advice that is saved and restored.
 #[derive(Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ModeName {
     len: u8,
@@ -54,7 +54,7 @@ pub struct ModeName {
 }
 
 impl ModeName {
-    /// Of a name; what goes beyond 15 bytes is cut.
+    /// From a name, truncated to 15 bytes.
     pub fn new(name: &str) -> Self {
         let mut bytes = [0; MODE_NAME_BYTES];
         let len = name.floor_char_boundary(MODE_NAME_BYTES);
@@ -74,7 +74,7 @@ impl core::fmt::Debug for ModeName {
     }
 }
 
-/// What would help where slower doesn't.
+/// Remedy where slower doesn't help.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Remedy {
     /// Another mode.
@@ -86,7 +86,7 @@ pub enum Remedy {
 }
 
 impl Remedy {
-    /// Its number in what is published; 0 is none.
+    /// Its number in published data; 0 stands for no remedy.
     pub fn number(self) -> u64 {
         match self {
             Self::Hysteresis => 1,
@@ -95,13 +95,13 @@ impl Remedy {
         }
     }
 
-    /// The one with that number, and the name of a mode where it is one; `None` for none.
+    /// The remedy with that number, with the name of the mode for [`Remedy::Mode`]; `None` for any other number.
     pub fn of(number: u64, mode: &str) -> Option<Self> {
         let all = [Self::Hysteresis, Self::Centre, Self::Mode(ModeName::new(mode))];
         all.into_iter().find(|remedy| remedy.number() == number)
     }
 
-    /// The word used in reports: `centre`, `steady`, or the mode's name.
+    /// Name used in reports: `centre`, `steady`, or the mode's name.
     pub fn as_str(&self) -> &str {
         match self {
             Self::Mode(name) => name.as_str(),
@@ -111,31 +111,31 @@ impl Remedy {
     }
 }
 
-/// What all heads could do in one of their modes.
+/// What all heads would allow in one of their modes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Alternative {
     /// The mode.
     pub mode: ModeName,
-    /// The largest speed at which it meets the target with the heads started in phase for it, m/s; zero where none is.
+    /// The largest speed at which the target is met with the heads started in phase, m/s; zero if there is none.
     pub v_max_mps: f64,
 }
 
-/// What is left of a dive.
+/// Remaining length and time of a dive.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Left {
     /// Length of tunnel in the direction of travel, m.
     pub length_m: f64,
-    /// Time, seconds, where it is known.
+    /// Time, seconds, if known.
     pub time_s: Option<f64>,
 }
 
 impl Left {
-    /// Hours that the length takes at a speed; `None` at zero speed.
+    /// Hours needed for the length at a speed; `None` at zero speed.
     pub fn hours_at(&self, speed_mps: f64) -> Option<f64> {
         (speed_mps > 0.0).then(|| self.length_m / speed_mps / 3600.0)
     }
 
-    /// Whether the time is enough at a speed; `None` where it isn't known.
+    /// Whether the time suffices at a speed; `None` if it isn't known.
     pub fn suffices_at(&self, speed_mps: f64) -> Option<bool> {
         let time_s = self.time_s?;
         Some(self.hours_at(speed_mps).is_some_and(|hours| hours * 3600.0 <= time_s))
@@ -145,32 +145,32 @@ impl Left {
 /// The advice.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Advice {
-    /// The largest speed at which the target is met, m/s; zero where none is.
+    /// The largest speed at which the target is met, m/s; zero if there is none.
     pub v_max_mps: f64,
-    /// What decides.
+    /// The limiting factor.
     pub reason: Reason,
-    /// T_max predicted at the present speed, m; `None` where nothing can be said or nothing bounds it.
+    /// T_max predicted at the present speed, m; `None` where it can't be predicted or is unbounded.
     pub predicted_t_m: Option<f64>,
     /// At the present speed the present turn will exceed the target; false where nothing can be predicted.
     pub will_exceed: bool,
     /// The longest time between two passes over a place that all heads see, seconds.
     pub pass_gap_s: f64,
-    /// What that time would be if the heads' passes were spread evenly, seconds.
+    /// That time with the heads' passes evenly spread, seconds.
     pub even_pass_gap_s: f64,
     /// The largest distance between neighbours of one turn, m.
     pub t_y_m: f64,
     /// Time between two pings, seconds; the longest of any head.
     pub ping_period_s: f64,
-    /// By how much the head farthest out of its phase is, radians of its turn; `None` in sectors, or with one head.
+    /// Phase error of the head farthest out of phase, radians of its turn; `None` in sectors, or with one head.
     pub phase_error_rad: Option<f64>,
-    /// What is left of the tunnel and of the time.
+    /// Remaining tunnel and time.
     pub left: Left,
-    /// Where slower doesn't help because no head sees a strip of the wall: its width and the arc length of its middle,
-    /// m.
+    /// Where slower doesn't help because no head sees a strip of the wall: the strip's width and the arc length of its
+    /// middle, m.
     pub unseen_m: Option<[f64; 2]>,
-    /// What would help where slower doesn't.
+    /// Remedy where slower doesn't help.
     pub remedy: Option<Remedy>,
-    /// The modes that all heads have.
+    /// Alternatives in the modes that all heads have.
     pub alternatives: [Option<Alternative>; MAX_MODES],
 }
 

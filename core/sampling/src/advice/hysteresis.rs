@@ -1,22 +1,22 @@
-//! Advice that can be read: it doesn't go to and fro from beat to beat.
+//! Hysteresis of the displayed advice, so that it doesn't chatter.
 
 use super::SPEED_MARGIN;
 use super::answer::{Advice, Reason};
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_snapshot::stateful;
 
-/// What restricts less is shown once nothing has restricted more for so long.
+/// Less restrictive advice is shown once nothing more restrictive has come for this long.
 const HOLD: DurNs = DurNs(1_000_000_000);
-/// Pieces of advice remembered: those of that time, at five a second.
+/// Number of advice updates kept: those within `HOLD` at 5 Hz.
 const HELD: usize = 6;
-/// A turn is forecast to exceed the target when T is predicted above it by this share: half of what is kept back for the
-/// error of the speed, so that a vehicle at the advised speed isn't told to and fro.
+/// A turn is forecast to exceed the target when the predicted T is above it by this share: half of the speed margin, so
+/// that the forecast doesn't chatter at the advised speed.
 const BEYOND: f64 = SPEED_MARGIN / 2.0;
 
-/// Shows of the advice of the last second what restricts most: the gravest reason, and of helix pitches the least speed.
+/// Shows the most restrictive advice of the last second: the gravest reason and, within it, the lowest speed.
 ///
-/// So what is graver shows at once, and what is less so when it has held for a second. Until there has been a speed, or
-/// a reason against any, all is shown as it comes.
+/// More restrictive advice shows at once, less restrictive advice after it has held for a second. Until there has been
+/// a speed, or a reason against any, advice is shown unfiltered.
 #[derive(Debug, Clone)]
 pub struct Hysteresis {
     target_m: f64,
@@ -34,7 +34,7 @@ impl Hysteresis {
         Self { target_m, held: [None; HELD], next: 0, begun: false, will_exceed: false }
     }
 
-    /// Takes in what is advised at a moment of data time, and gives what to show.
+    /// Takes the advice at a timestamp of data time and returns the advice to show.
     ///
     /// Allocates: never.
     pub fn show(&mut self, at: MonoNs, advice: Advice) -> Advice {
@@ -67,7 +67,7 @@ impl Hysteresis {
     }
 }
 
-/// T is predicted above a limit, or is known to be above the target where nothing bounds it.
+/// Whether the predicted T exceeds a limit; without a prediction, the advice's own forecast.
 fn exceeds(advice: &Advice, limit_m: f64) -> bool {
     advice.predicted_t_m.map_or(advice.will_exceed, |t_m| t_m > limit_m)
 }
@@ -149,7 +149,7 @@ mod tests {
     fn what_is_exceeded_is_said_at_once_and_taken_back_once_the_target_is_met() {
         let at = |t_m: f64| advice(Reason::HelixPitch, 0.2, t_m);
         let given = [
-            // Above the target by less than the speed is known.
+            // Above the target by less than `BEYOND`.
             vec![at(0.502); 3],
             vec![at(0.503)],
             vec![at(0.5005); 10],

@@ -1,4 +1,4 @@
-//! How a head sees the wall from where the vehicle is.
+//! Cached ring of each head, recast when the vehicle has moved.
 
 use crate::error::SamplingError;
 use crate::head::{HeadMode, HeadSpec};
@@ -9,28 +9,28 @@ use headrace_geometry::frames::Pose;
 use headrace_geometry::tunnel::Profile;
 use headrace_snapshot::stateful;
 
-/// Soundings of a head's ring: the finest steps of the heads that there are (0.3 degrees).
+/// Soundings per ring: the finest step of the supported heads (0.3 degrees).
 pub(super) const RING: u32 = 1200;
-/// By what share the speed may change while a vehicle moves, before the beams of its heads are cast anew.
+/// Relative change of the speed that is tolerated before the rings are recast.
 const SHARE: f64 = 0.002;
-/// The least and the most that it may move across the tunnel meanwhile, m: what the target leaves may be next to nothing;
-/// and what is hidden moves along with the vehicle.
+/// Limits of the movement across the tunnel before a recast, m: the lower, since the target may leave next to nothing;
+/// the upper, since hidden strips move along with the vehicle.
 const STILL_M: [f64; 2] = [0.004, 0.1];
-/// And turn for each metre of that, as a quaternion's component (half an angle, rad).
+/// Tolerated rotation per metre of that, as a quaternion's component (half an angle, rad).
 const TURN_PER_M: f64 = 0.2;
 
-/// How far the vehicle may move across the tunnel, m, before the beams of its heads are cast anew, where steps of `t_y_m` on
-/// a wall `range_m` away bound the speed v for a target T, and the beams' swing w takes `swing_share` = w / v of it.
+/// How far the vehicle may move across the tunnel, m, before rings are recast, where steps of `t_y_m` on a wall
+/// `range_m` away bound the speed v for a target T, with the beams' swing w at `swing_share` = w / v.
 ///
-/// Of v + w ~ T_x = sqrt(T^2 - T_y^2) a change dT_y takes (T_y / T_x)^2 dT_y / T_y, and a step changes with its range, twice
-/// as much where the wall falls away.
+/// A change dT_y changes v + w ~ T_x = sqrt(T^2 - T_y^2) by the share (T_y / T_x)^2 dT_y / T_y. A step changes with its
+/// range, twice as much where the wall falls away.
 pub(super) fn still_m(target_m: f64, t_y_m: f64, range_m: f64, swing_share: f64) -> f64 {
     let around2 = t_y_m * t_y_m;
     let along2 = (target_m * target_m - around2).max(0.0);
     (SHARE * range_m / (2.0 * around2 / along2 * (1.0 + swing_share))).clamp(STILL_M[0], STILL_M[1])
 }
 
-/// A head, and its ring as last cast.
+/// A head with its cached ring.
 #[derive(Debug, Clone)]
 pub(super) struct AdvisedHead {
     pub(super) spec: HeadSpec,
@@ -45,7 +45,7 @@ pub(super) struct AdvisedHead {
 stateful!(AdvisedHead { state: ring, cast_at; fixed: spec, modes, hidden, sector; });
 
 impl AdvisedHead {
-    /// Whether the vehicle is where its ring was cast, within `still_m` and [`TURN_PER_M`] of that.
+    /// Whether the vehicle is within `still_m`, and [`TURN_PER_M`] of that, of the pose at which the ring was cast.
     pub(super) fn is_near(&self, pose: &Pose, still_m: f64) -> bool {
         let Some(cast_at) = &self.cast_at else { return false };
         let near = |a: &[f64], b: &[f64], by: f64| a.iter().zip(b).all(|(a, b)| (a - b).abs() <= by);
@@ -54,7 +54,7 @@ impl AdvisedHead {
             && near(&cast_at.attitude.wxyz(), &pose.attitude.wxyz(), still_m * TURN_PER_M)
     }
 
-    /// Casts the head's ring anew; a head that can't look from there keeps what it saw last.
+    /// Recasts the head's ring. On an error `cast_at` is `None`, and the caller keeps the last view.
     pub(super) fn cast(&mut self, profile: &Profile, pose: &Pose) -> Result<(), SamplingError> {
         self.cast_at = None;
         let standing = Standing::new(profile, pose, &self.spec.mount)?;
@@ -63,7 +63,7 @@ impl AdvisedHead {
         Ok(())
     }
 
-    /// Where on the wall its sector is, and what it doesn't see.
+    /// Updates the view: the wall within its sector, and what is hidden or out of reach.
     pub(super) fn look(&self, profile: &Profile, pose: &Pose, sound_speed_mps: f64, view: &mut View) {
         view.hidden.clear();
         let Ok(standing) = Standing::new(profile, pose, &self.spec.mount) else { return };

@@ -1,6 +1,6 @@
-//! Speeds that meet a target, where they come in stretches.
+//! Search for speeds that meet a target, which may form several intervals.
 
-/// The end of the stretch of speeds about `from_mps`, which meets the target, upwards to `bound_mps`.
+/// Upper end, up to `bound_mps`, of the interval of speeds that meet the target and include `from_mps`.
 pub(super) fn upwards_mps(from_mps: f64, bound_mps: f64, meets: impl Fn(f64) -> bool) -> f64 {
     const STEP: f64 = 1.02;
     let mut good = from_mps;
@@ -14,7 +14,8 @@ pub(super) fn upwards_mps(from_mps: f64, bound_mps: f64, meets: impl Fn(f64) -> 
     good
 }
 
-/// The largest speed up to `bound_mps` that meets the target, as far as trying from above finds it; else zero.
+/// The largest speed up to `bound_mps` that meets the target, found by stepping down from the bound; zero if none is
+/// found.
 pub(super) fn downwards_mps(bound_mps: f64, meets: impl Fn(f64) -> bool) -> f64 {
     const TRIED: u32 = 256;
     let at = |k: u32| bound_mps * (1.0 - f64::from(k) / f64::from(TRIED));
@@ -25,8 +26,8 @@ pub(super) fn downwards_mps(bound_mps: f64, meets: impl Fn(f64) -> bool) -> f64 
     }
 }
 
-/// A share less than `fastest_mps`, which meets the target; where the stretch of speeds that do is so narrow that this is
-/// out of it, the middle of the stretch.
+/// `fastest_mps`, which meets the target, reduced by `share`; where that leaves the interval of speeds that meet the
+/// target, the middle of the interval.
 pub(super) fn kept_back_mps(fastest_mps: f64, share: f64, meets: impl Fn(f64) -> bool) -> f64 {
     let less_mps = fastest_mps * (1.0 - share);
     if fastest_mps <= 0.0 || meets(less_mps) {
@@ -35,7 +36,7 @@ pub(super) fn kept_back_mps(fastest_mps: f64, share: f64, meets: impl Fn(f64) ->
     f64::midpoint(edge_mps(fastest_mps, less_mps, meets), fastest_mps)
 }
 
-/// Where speeds cease to meet the target, between one that does and one that doesn't.
+/// Edge of the interval, by bisection between a speed that meets the target and one that doesn't.
 fn edge_mps(mut good: f64, mut bad: f64, meets: impl Fn(f64) -> bool) -> f64 {
     for _ in 0..30 {
         let middle = f64::midpoint(good, bad);

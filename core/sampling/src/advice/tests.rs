@@ -96,12 +96,12 @@ fn the_largest_speed_is_one_at_which_the_phases_of_heads_apart_hold() {
     let v_max = advice.v_max_mps / (1.0 - SPEED_MARGIN);
     assert!((t_at(v_max) - 1.0).abs() < 1e-6, "{v_max}: {}", t_at(v_max));
     assert!(t_at(1.02 * v_max) > 1.0);
-    // Evenly spread at every speed, they could go faster.
+    // Evenly phased at every speed, they could go faster.
     let even = spacing::speed_for_target_mps(1.0, advice.t_y_m, 4.0, advice.ping_period_s).unwrap();
     assert!(v_max < 0.99 * even, "{v_max} and {even}");
     let faster = Case::new(&[0.0, 0.0], &[0.8, 0.0], 0.5, 1.0).advice();
     assert!(advice.phase_error_rad.unwrap().abs() < 1e-9 && faster.phase_error_rad.unwrap().abs() > 0.5);
-    // Too fast, it is told of a speed that will do.
+    // Above that speed, the advice is one that meets the target.
     let passes = Phasing::of(&case.situation).at(faster.v_max_mps);
     let t_m = |v: f64| spacing::t_max_m(v * passes.gap_s(passes.heads()).unwrap(), v * 0.02, faster.t_y_m);
     assert!(faster.v_max_mps > 0.1 && t_m(faster.v_max_mps) <= 1.0);
@@ -109,7 +109,7 @@ fn the_largest_speed_is_one_at_which_the_phases_of_heads_apart_hold() {
 
 #[test]
 fn a_speed_that_meets_the_target_is_not_called_too_fast() {
-    // Heads 1.1 m apart meet 0.5 m in narrow stretches of speed only; the vehicle goes in one of them.
+    // Heads 1.1 m apart meet 0.5 m in narrow intervals of speed only; the vehicle's speed is in one of them.
     let phase_deg = |v: f64| 180.0 - 360.0 * 1.1 / (v * 8.0);
     for v in [0.06, 0.085, 0.1, 0.105] {
         let case = Case::new(&[0.0, phase_deg(v)], &[0.0, -1.1], v, 0.5);
@@ -177,11 +177,11 @@ fn alternatives_give_speed_hours_and_whether_they_suffice() {
     let names: Vec<_> = advice.alternatives.iter().flatten().map(|other| other.mode.as_str()).collect();
     assert_eq!(names, ["slow", "fast", "fastest"]);
     let [slow, fast, _] = [0, 1, 2].map(|k| advice.alternatives[k].unwrap());
-    // The present mode, in phase: what is advised anyway.
+    // The present mode, in phase: equal to the advice.
     assert!((fast.v_max_mps - advice.v_max_mps).abs() < 1e-9);
     assert!((slow.v_max_mps - 1.0 / 10.818 * 0.99).abs() < 1e-3);
     assert!((advice.left.hours_at(fast.v_max_mps).unwrap() - 900.0 / fast.v_max_mps / 3600.0).abs() < 1e-12);
-    // 900 m in 3,000 s take 0.3 m/s.
+    // 900 m in 3,000 s need 0.3 m/s.
     let suffices = |v_mps| advice.left.suffices_at(v_mps).unwrap();
     assert!(!suffices(0.299) && suffices(0.301) && !suffices(slow.v_max_mps));
 }
@@ -219,7 +219,7 @@ fn heads_that_hide_the_wall_from_each_other_slow_the_vehicle_down() {
     let mut advisor = case.advisor();
     let hidden = advisor.advise(&case.situation, Swing::default(), None);
     assert!((hidden.pass_gap_s - 2.0).abs() < 0.15, "{hidden:?}");
-    // Both heads on one side look at the other wall past a neighbour: half of the passes are missing there.
+    // Both heads on one side have the other wall hidden by a neighbour: half of the passes are missing there.
     let parallax_s = advisor.parallax_rad / TAU * 8.0;
     assert!((0.1..0.15).contains(&parallax_s), "{parallax_s}");
     // The hidden strips lie where steps are short.
@@ -248,7 +248,7 @@ fn old_rings_are_cast_one_a_call_and_the_same_in_the_end() {
     assert!((advisor.advise(&then, Swing::default(), None).t_y_m - fresh).abs() < 1e-12);
 }
 
-/// Heads beside each other, so that each hides some of the wall from the next.
+/// Heads side by side, each hiding some of the wall from the next.
 fn hiding_each_other() -> Case {
     let mut case = Case::new(&[0.0, 90.0, 180.0, 270.0], &[0.0; 4], 0.125, 0.5);
     let places = [[0.5, 0.15, 0.0], [0.5, -0.15, 0.0], [-0.5, 0.15, 0.0], [-0.5, -0.15, 0.0]];
@@ -262,8 +262,8 @@ fn hiding_each_other() -> Case {
     case
 }
 
-/// The largest share by which the speed of an advisor that remembers is off that of one that looks anew, on a way to and fro
-/// and round about, at 1.5 cm/s and half a degree a second; and how many rings it has cast in 600 pieces of advice.
+/// The largest relative error in speed of an advisor that caches rings, against one that recasts each time, on a track
+/// to and fro and round about, at 1.5 cm/s and half a degree per second; and the number of rings cast in 600 updates.
 fn off_by(case: &Case, swing: Swing) -> (f64, usize) {
     let [y_m, z_m] = case.profile.reference();
     let mut advisor = case.advisor();
@@ -295,7 +295,7 @@ fn what_an_advisor_remembers_hardly_changes_its_advice() {
         ("hiding each other", hiding_each_other(), still, 0.002, 0..100),
         ("a wide target", Case::new(&[0.0], &[0.0], 0.1, 1.0), still, 0.002, 0..30),
         ("swinging", around(), swing, 0.006, 0..250),
-        // Steps are nearly as long as the target: each centimetre counts, so it looks more often.
+        // Steps are nearly as long as the target: each centimetre counts, so rings are recast more often.
         ("a target hard to meet", Case::new(&[0.0, 180.0], &[0.0; 2], 0.1, 0.3), still, 0.02, 250..600),
     ] {
         let (off, cast) = off_by(&case, swing);
@@ -310,12 +310,12 @@ fn the_swing_of_the_vehicle_slows_it_down_and_a_steady_heading_helps() {
     let still = advise(Swing::default());
     let swing = Swing { rate_radps: 0.01, most_rad: 1.0 };
     let swung = advise(swing);
-    // What the beams sweep comes off the speed, as far as they reach.
+    // The speed is reduced by the sweep of the beams at their range.
     let lost_mps = (still.v_max_mps - swung.v_max_mps) / (1.0 - SPEED_MARGIN);
     assert!((0.05..0.07).contains(&lost_mps), "{lost_mps}");
     assert!(swung.predicted_t_m > still.predicted_t_m && swung.reason == Reason::HelixPitch);
     assert!(swung.alternatives[1].unwrap().v_max_mps < still.alternatives[1].unwrap().v_max_mps);
-    // To and fro by little, it costs no more than that, however fast.
+    // A swing of small extent costs no more than that, however fast.
     let little = advise(Swing { rate_radps: 0.05, most_rad: 0.01 });
     assert!(little.v_max_mps > swung.v_max_mps, "{little:?}");
     let wild = advise(Swing { rate_radps: 0.2, most_rad: 1.0 });
@@ -334,7 +334,7 @@ fn a_swing_goes_on_while_heads_apart_follow_each_other() {
         assert!((advice.pass_gap_s - 4.0).abs() < 1e-9, "{advice:?}");
         advice.predicted_t_m.unwrap()
     };
-    // 0.8 m at 0.2 m/s take as long as from pass to pass.
+    // At 0.2 m/s, 0.8 m take as long as the time between passes.
     let swept_m = 0.01 * 4.0 * 6.05;
     assert!((t_m(&apart) - t_m(&together) - swept_m).abs() < 0.02, "{} {}", t_m(&apart), t_m(&together));
 }

@@ -133,13 +133,13 @@ fn few_pings_a_turn_leave_most_of_the_wall_between_them() {
     let ring = Ring::cast(&standing(&profile), 0.0, 1200).unwrap();
     let perimeter_m = profile.perimeter_m();
     assert!((ring.largest_step_m(1200) - perimeter_m).abs() < 1e-9);
-    // Two a turn: whichever way one looks, one side is at least half of it.
+    // Two per turn: in either direction round, one of the steps is at least half of the perimeter.
     assert!(ring.largest_step_m(600) >= perimeter_m / 2.0 - 1e-9);
     // Seen from close to the left wall, a third of a turn spans more than half of the perimeter.
     let near = Standing::new(&profile, &pose(&profile, 9.9, 0.0, 0.0), &mount()).unwrap();
     let ring = Ring::cast(&near, 0.0, 1200).unwrap();
     assert!(ring.largest_step_m(400) > 0.8 * perimeter_m, "{}", ring.largest_step_m(400));
-    // All steps of a turn together go once round.
+    // The steps of a turn add up to one perimeter.
     for stride in [1, 8, 400] {
         let around: f64 = ring.steps_m(stride).step_by(stride).sum();
         assert!((around - perimeter_m).abs() < 1e-9);
@@ -147,7 +147,7 @@ fn few_pings_a_turn_leave_most_of_the_wall_between_them() {
 }
 
 proptest! {
-    /// Eq. 10: wherever the head is and whatever the profile, the mean chord of a turn is at most perimeter by pings.
+    /// Eq. 10: for any head position and profile, the mean chord of a turn is at most perimeter / pings.
     #[test]
     fn verif_the_mean_step_is_bounded_by_the_perimeter(
         radii in prop::collection::vec(0.5..6.0f64, 5..40),

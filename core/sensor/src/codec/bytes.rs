@@ -11,9 +11,9 @@ pub struct Bytes<const N: usize> {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("storing {len} bytes; the most allowed is {max}")]
 pub struct TooLong {
-    /// Their length.
+    /// Total length needed.
     pub len: usize,
-    /// The most that fits.
+    /// Capacity.
     pub max: usize,
 }
 
@@ -44,7 +44,7 @@ impl<const N: usize> Bytes<N> {
         Ok(())
     }
 
-    /// What is held.
+    /// The bytes held.
     pub fn as_slice(&self) -> &[u8] {
         self.bytes.get(..self.len).unwrap_or_default()
     }

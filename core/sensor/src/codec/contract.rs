@@ -1,4 +1,4 @@
-//! The contract that every codec passes, as a macro that makes tests of it.
+//! The contract of every codec, as a macro that generates its tests.
 //!
 //! Enable the feature `contract` in a plugin's dev-dependencies and call [`codec_contract!`](crate::codec_contract)
 //! once per codec.
@@ -7,14 +7,14 @@ use proptest::test_runner::{Config, RngSeed};
 
 use super::Codec;
 
-/// Where the contract's random values begin. Any number would do.
+/// Seed of the contract's random values; arbitrary.
 const SEED: u64 = 881;
 
-/// How the contract's tests are run: with the same values each time.
+/// Proptest configuration of the contract's tests: the same values on every run.
 ///
-/// By chance alone garbage passes a weak checksum now and then, and a test that meets it fails though nothing is wrong.
-/// With one seed it never does, or always, and then a failure needs no file to be repeated. Other values are tried by
-/// setting `PROPTEST_RNG_SEED`.
+/// By chance garbage passes a weak checksum now and then, and a test that meets it fails though nothing is wrong.
+/// With a fixed seed this happens never or always, and a failure is reproducible without a regression file. Set
+/// `PROPTEST_RNG_SEED` to try other values.
 pub fn config() -> Config {
     let from_environment = Config::default();
     let rng_seed = match from_environment.rng_seed {
@@ -58,15 +58,15 @@ pub fn decode_after_garbage<C: Codec>(codec: &mut C, garbage: &[u8], frame: &[u8
     values
 }
 
-/// Makes a module of tests that hold a codec to its contract.
+/// Generates a module of tests that check a codec against its contract.
 ///
-/// `codec` is an expression that makes a fresh one, `values` a proptest strategy of all values that can be encoded,
+/// `codec` is an expression that creates a new codec, `values` a proptest strategy of all values that can be encoded,
 /// `encode` a function from `&Value` to its bytes, and `frames` one or more good frames as the device sends them.
-/// On a byte stream a frame can only be told from garbage by what the protocol offers. Where the last bytes of the
-/// garbage and the first of the frame together make a valid frame, no decoder can know better; the macro's garbage is
-/// random, so that the chance of it is the protocol's own. The values are drawn from one fixed seed (see
+/// On a byte stream only the protocol's framing distinguishes a frame from garbage. Where the last bytes of the
+/// garbage and the first of the frame together form a valid frame, no decoder can do better; the macro's garbage is
+/// random, so the probability of that is the protocol's. The values are drawn from one fixed seed (see
 /// [`contract::config`](crate::codec::contract::config)), so that this chance is taken once, when a test or a strategy
-/// is changed, and not at each run.
+/// is changed, and not on each run.
 #[macro_export]
 macro_rules! codec_contract {
     ($module:ident, codec: $codec:expr, values: $values:expr, encode: $encode:expr, frames: $frames:expr $(,)?) => {

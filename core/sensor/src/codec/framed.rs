@@ -3,21 +3,21 @@
 use super::{Codec, CodecCounts};
 use headrace_snapshot::{Restorer, Saver, SnapshotError, Stateful};
 
-/// What a candidate at the front of what is held turned out to be.
+/// Verdict on a frame candidate at the front of the held bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
     /// No frame begins here.
     NotAStart,
-    /// A frame may begin here, and needs at least this many bytes in all before more can be said.
+    /// A frame may begin here; at least this many bytes in total are needed to decide.
     Need(usize),
-    /// A whole frame of this many bytes.
+    /// A complete frame of this many bytes.
     Frame(usize),
-    /// A start marker was followed by something that is no frame.
+    /// A start marker not followed by a valid frame.
     Bad,
 }
 
 impl Verdict {
-    /// On a candidate of `len` bytes that `is_good` tells from a broken one once all of it is there.
+    /// Verdict on a candidate of `len` bytes; `is_good` checks it once it is complete.
     pub fn on(front: &[u8], len: usize, is_good: impl FnOnce(&[u8]) -> bool) -> Self {
         match front.get(..len) {
             None => Self::Need(len),
@@ -27,7 +27,7 @@ impl Verdict {
     }
 }
 
-/// How the frames of one protocol look; [`Framed`] makes a codec of it.
+/// Frame format of one protocol; [`Framed`] turns it into a codec.
 pub trait Framing: Copy {
     /// See [`Codec::Value`].
     type Value: Clone + PartialEq + core::fmt::Debug;
@@ -35,26 +35,26 @@ pub trait Framing: Copy {
     /// See [`Codec::WHOLE_MESSAGES`].
     const WHOLE_MESSAGES: bool = false;
 
-    /// What `front`, one byte or more, begins with. A function of these bytes alone.
+    /// Verdict on the start of `front`, which has at least one byte. Depends on these bytes alone.
     fn judge(&self, front: &[u8]) -> Verdict;
 
-    /// What a frame says that [`Framing::judge`] found good; `None` for nothing of use.
+    /// Value of a frame accepted by [`Framing::judge`]; `None` if it carries nothing of use.
     fn read(&self, frame: &[u8]) -> Option<Self::Value>;
 }
 
-/// The codec of a [`Framing`]: holds an incomplete frame between pushes and finds frames in whatever comes.
+/// Codec of a [`Framing`]: holds an incomplete frame between pushes and finds frames in arbitrary input.
 ///
-/// `N` is the longest frame; a candidate that wants more is bad.
-/// On a byte stream the scan goes on from the second byte of a failed candidate, so that a frame hidden in a false one
-/// is found; a byte that begins none is skipped without counting a bad frame. A whole message with anything else than
-/// frames in it is one bad frame from there to its end: what looks like a frame further on is none.
+/// `N` is the maximum frame length; a candidate that needs more is bad.
+/// On a byte stream, scanning resumes at the second byte of a failed candidate, so that a frame inside a false one is
+/// found; a byte that starts no frame is skipped without counting a bad frame. In a whole message, anything other than
+/// frames makes the rest of the message one bad frame; apparent frames in that rest are ignored.
 /// Allocates: never.
 #[derive(Debug, Clone)]
 pub struct Framed<F, const N: usize> {
     framing: F,
     held: [u8; N],
     len: usize,
-    /// The message that is coming in has turned out bad.
+    /// The current message has turned out bad; the rest of it is skipped.
     astray: bool,
     counts: CodecCounts,
 }
@@ -72,7 +72,7 @@ impl<F, const N: usize> Framed<F, N> {
     }
 }
 
-/// What is held of a frame begun, and the counts.
+/// The incomplete frame and the counters.
 impl<F, const N: usize> Stateful for Framed<F, N> {
     fn save(&self, to: &mut Saver) {
         to.value(&(self.astray, self.counts));
@@ -92,8 +92,8 @@ impl<F, const N: usize> Stateful for Framed<F, N> {
 }
 
 impl<F: Framing, const N: usize> Framed<F, N> {
-    /// Like [`Codec::push`], but connections out each frame's bytes, and how far back they begin: the number of bytes from
-    /// the frame's first to the last that has come.
+    /// Like [`Codec::push`], but passes each frame's bytes to `take`, with the number of bytes from the frame's first to the
+    /// last received.
     pub fn push_frames(&mut self, mut bytes: &[u8], mut take: impl FnMut(&[u8], usize)) {
         while !bytes.is_empty() && !self.astray {
             let (now, later) = bytes.split_at(bytes.len().min(N - self.len));
@@ -107,7 +107,7 @@ impl<F: Framing, const N: usize> Framed<F, N> {
         self.counts.skipped_bytes += bytes.len() as u64;
     }
 
-    /// Like [`Codec::flush`], but connections out frames as [`Framed::push_frames`] does.
+    /// Like [`Codec::flush`], but passes frames to `take` as [`Framed::push_frames`] does.
     pub fn flush_frames(&mut self, mut take: impl FnMut(&[u8], usize)) {
         self.scan(0, true, &mut take);
         self.astray = false;
@@ -220,7 +220,7 @@ pub(super) mod tests {
         let mut codec = Framed::<Marked<false>, 8>::default();
         let mut behind = Vec::new();
         codec.push_frames(&[0, 0xA5, 5, 0xA5], |_, back| behind.push(back));
-        // The false start is held with the first byte of a frame, and more comes than there is room for.
+        // The false start is held along with the first byte of a frame, and the next push exceeds the buffer.
         codec.push_frames(&[1, 7, 0x5A, 0, 0, 0xA5, 0, 0x5A, 0], |_, back| behind.push(back));
         assert_eq!(behind, [10, 4]);
     }

@@ -1,4 +1,4 @@
-//! When the frames of a byte stream came.
+//! Receive times of the frames in a byte stream.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,20 +6,20 @@ use super::{Codec as _, Framed, Framing};
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_snapshot::stateful;
 
-/// Packets of which a [`LineClock`] keeps account: a kilobyte from a port that connections over 32 bytes at a time.
+/// Packets tracked by a [`LineClock`]: a kilobyte from a port that delivers 32 bytes at a time.
 const MAX_PARTS: usize = 32;
 
-/// Gives each frame of a byte stream the receive time of the packet that brought its first byte, whatever was held
-/// before it, and ends a frame begun when the line falls silent.
+/// Stamps each frame of a byte stream with the receive time of the packet that brought its first byte, even if earlier
+/// bytes are still held, and flushes an incomplete frame after a silence.
 ///
-/// Of a frame in more packets than it keeps account of, those at the end are told as one; a frame that begins among
-/// them, because the first was a false one, is given too early a time.
+/// Beyond `MAX_PARTS` packets the last ones are merged into one: a frame that begins among them, after a false start, is
+/// stamped too early.
 /// Allocates: never.
 #[derive(Debug, Clone)]
 pub struct LineClock {
     silence: DurNs,
     last: MonoNs,
-    /// The packets that brought what is held, oldest first.
+    /// Packets that brought the held bytes, oldest first.
     parts: [Part; MAX_PARTS],
     len: usize,
 }
@@ -33,13 +33,12 @@ struct Part {
 stateful!(LineClock { state: last, len; slots: parts; fixed: silence; });
 
 impl LineClock {
-    /// For a line on which a frame's bytes follow one another: after a pause of more than `silence` between two packets
-    /// no more belong to the one begun.
+    /// `silence` is the inter-frame timeout: a longer gap between two packets ends the frame in progress.
     pub fn new(silence: DurNs) -> Self {
         Self { silence, last: MonoNs(0), parts: [Part::default(); MAX_PARTS], len: 0 }
     }
 
-    /// Pushes a packet's bytes into `codec`; `take` receives each whole frame and when it came.
+    /// Pushes a packet's bytes into `codec`; `take` gets each complete frame and its receive time.
     pub fn push<F: Framing, const N: usize>(
         &mut self,
         codec: &mut Framed<F, N>,
@@ -70,7 +69,7 @@ impl LineClock {
         }
     }
 
-    /// When the byte came that stands `behind` bytes before the end, itself counted.
+    /// Receive time of the byte `behind` bytes before the end, itself included.
     fn received(&self, behind: usize) -> MonoNs {
         let mut after = 0;
         let holds = |part: &&Part| {
@@ -80,7 +79,7 @@ impl LineClock {
         self.parts().iter().rev().find(holds).map_or(self.last, |part| part.received)
     }
 
-    /// Forgets what is before the last `held` bytes.
+    /// Drops packets before the last `held` bytes.
     fn keep(&mut self, held: usize) {
         let mut after = 0;
         let needed = self.parts().iter().rev().take_while(|part| {
@@ -99,7 +98,7 @@ mod tests {
     use super::super::framed::tests::Marked;
     use super::*;
 
-    /// Receive times that `packets`, one a millisecond, give to their frames.
+    /// Receive times of the frames in `packets`, sent one per millisecond.
     fn times(clock: &mut LineClock, packets: &[&[u8]]) -> Vec<u64> {
         let mut codec = Framed::<Marked<false>, 8>::default();
         let mut times = Vec::new();

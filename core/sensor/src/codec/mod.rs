@@ -1,7 +1,7 @@
-//! The seam between a device's bytes and its values: codecs without I/O, and the contract that each of them passes.
+//! Codecs between a device's bytes and its values, without I/O, and the contract that each of them is tested against.
 //!
-//! A codec is a pure state machine. It is fed bytes in whatever pieces a port delivers and connections out values; it reads
-//! no clock, opens nothing, and holds no more than one frame's worth of bytes. Ports are another layer.
+//! A codec is a pure state machine. It takes bytes in whatever pieces a port delivers and emits values; it reads no clock,
+//! does no I/O, and holds no more than one frame's worth of bytes. Ports are another layer.
 
 mod bytes;
 #[cfg(feature = "contract")]
@@ -14,12 +14,12 @@ pub use framed::{Framed, Framing, Verdict};
 pub use line_clock::LineClock;
 use serde::{Deserialize, Serialize};
 
-/// What a codec has seen so far. Every byte pushed is in exactly one of: a good frame, `skipped_bytes`, or still held.
+/// Counters of a codec. Every byte pushed is in exactly one of: a good frame, `skipped_bytes`, or still held.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct CodecCounts {
-    /// Frames that were whole and valid.
+    /// Complete, valid frames.
     pub good_frames: u64,
-    /// Candidate frames that a start marker announced and that failed: checksum, terminator, length or range.
+    /// Candidates with a start marker that failed: checksum, terminator, length or range.
     pub bad_frames: u64,
     /// Bytes that belong to no good frame.
     pub skipped_bytes: u64,
@@ -27,33 +27,33 @@ pub struct CodecCounts {
 
 /// Bytes to values and back, sans-I/O.
 ///
-/// Contract, checked by the module `contract` for each implementation: any bytes whatever never panic; the same bytes split
-/// anywhere give the same values; garbage before a good frame doesn't lose it; encode then decode is the identity;
-/// what is held between pushes is bounded by [`Codec::MAX_FRAME_BYTES`].
+/// Contract, checked by the module `contract` for each implementation: no input panics; the same bytes split anywhere give
+/// the same values; garbage before a good frame doesn't lose it; encode then decode is the identity; the bytes held
+/// between pushes are bounded by [`Codec::MAX_FRAME_BYTES`].
 pub trait Codec {
-    /// One frame's meaning, in the wire's own units.
+    /// Value of one frame, in the protocol's units.
     type Value: Clone + PartialEq + core::fmt::Debug;
 
-    /// The longest frame that is accepted; also the bound on what is held between two pushes.
+    /// Maximum frame length; also the bound on the bytes held between two pushes.
     const MAX_FRAME_BYTES: usize;
 
     /// Whether the transport itself delivers whole messages (CAN frames, HID reports, I2C transactions). Garbage is
-    /// then a message of its own and the port calls [`Codec::flush`] after each; on a byte stream garbage may stand
-    /// directly before a frame.
+    /// then a separate message and the port calls [`Codec::flush`] after each; on a byte stream garbage may directly precede
+    /// a frame.
     const WHOLE_MESSAGES: bool;
 
-    /// Takes bytes as they came and calls `sink` for each value that they complete, in order.
+    /// Takes received bytes and calls `sink` for each value completed, in order.
     ///
     /// Allocates: never.
     fn push(&mut self, bytes: &[u8], sink: &mut dyn FnMut(Self::Value));
 
-    /// Says that the line has been silent longer than a frame may pause, or that a message has ended: a frame begun is
-    /// given up, and what it swallowed is looked through again.
+    /// Signals a silence longer than the pause allowed within a frame, or the end of a message: an incomplete frame is given
+    /// up and its bytes are rescanned.
     fn flush(&mut self, sink: &mut dyn FnMut(Self::Value));
 
-    /// What has been seen so far.
+    /// Counters so far.
     fn counts(&self) -> CodecCounts;
 
-    /// Bytes held for a frame that isn't complete.
+    /// Bytes held for an incomplete frame.
     fn held_bytes(&self) -> usize;
 }

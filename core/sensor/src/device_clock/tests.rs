@@ -1,4 +1,4 @@
-//! Clocks of known drift under delays that only add.
+//! Clocks of known drift under non-negative delays.
 
 use proptest::prelude::*;
 
@@ -15,7 +15,7 @@ impl Random {
         (self.0 >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// Exponential: what a queue adds.
+    /// Exponential queueing delay.
     fn queue_ns(&mut self, mean_ns: f64) -> f64 {
         -mean_ns * math::ln(1.0 - self.next())
     }
@@ -36,7 +36,7 @@ impl Device {
         DeviceClock::new(self.bits, DurNs(self.tick))
     }
 
-    /// Its stamp at `true_ns` of our time.
+    /// Its stamp at host time `true_ns`.
     #[expect(clippy::cast_possible_truncation, reason = "positive and below 2^63")]
     fn ticks(&self, true_ns: f64) -> u64 {
         let elapsed = (true_ns * (1.0 + self.ppm / 1e6) / self.tick as f64) as u64;
@@ -91,7 +91,7 @@ fn drifts_are_found_within_what_is_said_of_them() {
         assert_eq!((report.restarts, report.jumps), (0, 0), "seed {seed}");
         let error = (drift.ppm - ppm) / drift.sd_ppm;
         assert!(error.abs() < 5.0, "seed {seed}: {drift:?} of {ppm}");
-        // The uncertainty is no excuse: within a minute or two drifts are known to some ppm, later to fractions.
+        // The sd itself must be small: a few ppm within a minute or two, fractions later.
         assert!(drift.sd_ppm < 300.0 / seconds, "seed {seed}, {seconds} s: {drift:?}");
         within_two += u32::from(error.abs() < 2.0);
         squares += error * error;
@@ -103,7 +103,7 @@ fn drifts_are_found_within_what_is_said_of_them() {
 
 #[test]
 fn ten_hours_are_exact_to_the_tick() {
-    // 71.6 minutes a round: eight rounds and a half.
+    // It wraps every 71.6 minutes: eight and a half times.
     let device = Device { period_ns: 1e8, ..sbg(20.0) };
     let mut clock = device.clock();
     let total = device.send(&mut clock, &mut Random(3), 0.0, 36_000.0);
@@ -146,7 +146,7 @@ fn a_restart_begins_an_epoch_and_the_drift_is_kept() {
     let mut random = Random(4);
     device.send(&mut clock, &mut random, 0.0, 900.0);
     let before = clock.report();
-    // Off for eight seconds: its ticks are those of 908 s less than before.
+    // Off for eight seconds, then its ticks restart from zero, 908 s after the first start.
     let mut last = DurNs::ZERO;
     for i in 0..300_u64 {
         last = clock.take(i * 100, MonoNs((5 + 908) * S + i * S / 100));
@@ -159,7 +159,7 @@ fn a_restart_begins_an_epoch_and_the_drift_is_kept() {
 
 #[test]
 fn a_restart_that_looks_like_a_delay_is_found_out() {
-    // It ran for 5 s, was off for 6 s, and is heard again when it has run for 6 s: a clock 7 s behind, that hasn't fallen.
+    // Its clock reads 4.9 s at 4.9 s and, after a restart, 6 s at 13 s: 7 s behind, without having gone back.
     let mut clock = DeviceClock::new(32, DurNs(1000));
     let mut take = |device_ms: u64, ours_ms: u64| clock.take(device_ms * 1000, MonoNs(ours_ms * 1_000_000));
     for i in 0..50 {
@@ -175,7 +175,7 @@ fn a_restart_that_looks_like_a_delay_is_found_out() {
 
 #[test]
 fn a_jump_ahead_of_an_hour_begins_an_epoch() {
-    // A clock that goes round in 71.6 minutes can't tell an hour ahead from 11.6 minutes behind: that is a restart.
+    // With a clock that wraps every 71.6 minutes, an hour ahead is the same as 11.6 minutes behind: a restart.
     for (device, epochs) in [(xsens(30.0), (0, 1)), (sbg(30.0), (1, 0))] {
         let mut clock = device.clock();
         let mut random = Random(5);
@@ -226,7 +226,7 @@ fn a_start_within_a_stall_is_forgiven() {
 
 #[test]
 fn ticks_of_another_length_show() {
-    // Ticks of 100 us taken for 1 us are slow, the other way round fast.
+    // Ticks of 100 us interpreted as 1 us make a slow clock, the reverse a fast one.
     for (real, taken) in [(100_000, 1000), (1000, 100_000)] {
         let device = Device { tick: real, ..xsens(0.0) };
         let mut clock = DeviceClock::new(32, DurNs(taken));
@@ -238,7 +238,7 @@ fn ticks_of_another_length_show() {
 
 #[test]
 fn a_counter_of_groups_is_unwrapped() {
-    // A sample every 10 ms, counted in 16 bits: a round in 655 s.
+    // A sample every 10 ms, counted in 16 bits: it wraps every 655 s.
     let mut clock = DeviceClock::new(16, DurNs(10_000_000));
     let mut last = DurNs::ZERO;
     for i in 0..200_000_u64 {
@@ -261,7 +261,7 @@ fn little_is_said_of_little() {
 }
 
 proptest! {
-    /// Whatever comes: no panic, time never goes back within an epoch, and each epoch is counted.
+    /// For any input: no panic, time never goes back within an epoch, and each epoch is counted.
     #[test]
     fn anything_is_endured(
         bits in 0_u32..80,

@@ -1,43 +1,43 @@
-//! A row of bytes cut into the device's frames, so that each message of a log is one, stamped with its first byte.
+//! Cuts a byte stream into the device's frames, so that each log message is one frame, stamped with its first byte.
 
 use std::collections::VecDeque;
 
 use crate::codec::{Codec as _, CodecCounts, Framed, Framing};
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Cuts what a port delivers, in whatever pieces, into frames; what stands between them is handed on too.
+/// Cuts a byte stream, received in arbitrary pieces, into frames; bytes between frames are passed on too.
 ///
-/// Nothing is left out and nothing is put in another order: whoever gets the pieces gets the same bytes.
+/// No byte is dropped or reordered: the pieces concatenate to the input.
 #[derive(Debug, Clone)]
 pub struct Cutter<F, const N: usize> {
     codec: Framed<F, N>,
     silence: DurNs,
     last: MonoNs,
-    /// What hasn't been handed on.
+    /// Bytes not passed on yet.
     pending: Vec<u8>,
-    /// Receive time of the bytes pending and how many came with it, oldest first.
+    /// Receive times of the pending bytes and the byte count of each, oldest first.
     parts: VecDeque<(MonoNs, usize)>,
 }
 
-/// A piece of what came.
+/// A piece of the input.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Piece<'a> {
-    /// When its first byte came.
+    /// Receive time of its first byte.
     pub received: MonoNs,
     /// Its bytes.
     pub bytes: &'a [u8],
-    /// Whether it is a frame; else it is what stood before one.
+    /// Whether it is a frame; otherwise it is the bytes before one.
     pub is_frame: bool,
 }
 
 impl<F: Framing, const N: usize> Cutter<F, N> {
-    /// For a line on which a frame's bytes follow one another: after more than `silence` no more belong to the one begun.
+    /// `silence` is the inter-frame timeout: a longer gap ends the frame in progress.
     pub fn new(framing: F, silence: DurNs) -> Self {
         let (pending, parts) = (Vec::with_capacity(2 * N), VecDeque::new());
         Self { codec: Framed::new(framing), silence, last: MonoNs(0), pending, parts }
     }
 
-    /// Takes bytes as they came; `take` gets the pieces that they complete.
+    /// Takes received bytes; `take` gets the pieces completed by them.
     pub fn push(&mut self, received: MonoNs, bytes: &[u8], take: &mut dyn FnMut(Piece<'_>)) {
         if received.since(self.last) > self.silence {
             self.flush(take);
@@ -53,25 +53,25 @@ impl<F: Framing, const N: usize> Cutter<F, N> {
         self.hand_on(&found, take);
     }
 
-    /// Gives up a frame that was begun: the line has been silent, or was closed.
+    /// Gives up an incomplete frame: the line has been silent, or was closed.
     pub fn flush(&mut self, take: &mut dyn FnMut(Piece<'_>)) {
         let mut found = Vec::new();
         self.codec.flush_frames(|frame, behind| found.push((behind, frame.len())));
         self.hand_on(&found, take);
     }
 
-    /// When a frame that has begun would be given up, if one has.
+    /// Deadline of the incomplete frame, if there is one.
     pub fn gives_up(&self) -> Option<MonoNs> {
         (!self.pending.is_empty()).then(|| self.last + self.silence + DurNs(1))
     }
 
-    /// What has been seen so far.
+    /// Counters so far.
     pub fn counts(&self) -> CodecCounts {
         self.codec.counts()
     }
 
-    /// Hands on all that is pending but what the codec holds; `found` has for each frame how far from the end it begins, and
-    /// its length.
+    /// Passes on all pending bytes except those held by the codec; `found` has, for each frame, the distance of its start
+    /// from the end, and its length.
     fn hand_on(&mut self, found: &[(usize, usize)], take: &mut dyn FnMut(Piece<'_>)) {
         let total = self.pending.len();
         let mut handed = 0;
@@ -85,7 +85,7 @@ impl<F: Framing, const N: usize> Cutter<F, N> {
         self.give(self.pending.len().saturating_sub(held), false, take);
     }
 
-    /// Hands on the first `count` bytes.
+    /// Passes on the first `count` bytes.
     fn give(&mut self, count: usize, is_frame: bool, take: &mut dyn FnMut(Piece<'_>)) {
         let count = count.min(self.pending.len());
         if count == 0 {
@@ -178,7 +178,7 @@ mod tests {
     }
 
     proptest! {
-        /// However bytes come, all of them are handed on, in order, no later than they came, and the frames are the codec's.
+        /// However the input is split, all bytes are passed on in order, with non-decreasing times, and the frames are the codec's.
         #[test]
         fn nothing_is_lost_or_changed(
             bytes in proptest::collection::vec(prop_oneof![Just(0xA5u8), Just(0x5A), 0u8..7], 0..200),

@@ -1,18 +1,17 @@
-//! Drivers of devices that talk without being asked.
+//! Drivers of devices that transmit unsolicited.
 
 use super::{Cutter, DeviceHealth, Driver, Wire};
 use crate::codec::Framing;
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Listens to a row of bytes, and connections on everything, frame by frame.
+/// Listens to a byte stream and delivers all of it, frame by frame.
 pub struct Listener<F, const N: usize> {
     cutter: Cutter<F, N>,
     silence_timeout: DurNs,
 }
 
 impl<F: Framing, const N: usize> Listener<F, N> {
-    /// For frames whose bytes follow one another without more than `silence` between them, of a device that says
-    /// something at least every `silence_timeout`.
+    /// `silence` is the inter-frame timeout; `silence_timeout` is the longest time between messages of a healthy device.
     pub fn new(framing: F, silence: DurNs, silence_timeout: DurNs) -> Self {
         Self { cutter: Cutter::new(framing, silence), silence_timeout }
     }
@@ -46,10 +45,10 @@ impl<F: Framing + Send, const N: usize> Driver for Listener<F, N> {
     }
 }
 
-/// Says what is wrong with a message, if anything is.
+/// Describes the fault of a message, if it has one.
 pub type Judge = Box<dyn Fn(&[u8]) -> Option<String> + Send>;
 
-/// Listens to whole messages, and connections on each.
+/// Listens to whole messages and delivers each.
 pub struct MessageListener {
     judge: Judge,
     silence_timeout: DurNs,
@@ -58,7 +57,7 @@ pub struct MessageListener {
 }
 
 impl MessageListener {
-    /// For a device that says something at least every `silence_timeout`; `judge` tells messages that are none of its own.
+    /// `judge` rejects foreign messages; `silence_timeout` is the longest time between messages of a healthy device.
     pub fn new(judge: Judge, silence_timeout: DurNs) -> Self {
         Self { judge, silence_timeout, good_frames: 0, complaint: None }
     }

@@ -1,4 +1,4 @@
-//! The switch data command: 27 bytes with which the host sets the head and asks for one ping.
+//! The switch data command: 27 bytes that carry the head's settings and request one ping.
 //!
 //! Source: Imagenex 881A serial interface, switch data command.
 
@@ -12,16 +12,16 @@ pub const COMMAND_BYTES: usize = 27;
 pub const RANGES_M: [u8; 13] = [1, 2, 3, 4, 5, 10, 20, 30, 40, 50, 60, 80, 100];
 
 const HEADER: [u8; 2] = [0xFE, 0x44];
-/// Ends a command and may stand nowhere else in it.
+/// Terminates a command and must not occur elsewhere in it.
 const TERMINATOR: u8 = 0xFD;
 /// Transmit (bit 0), send data (bit 1), slave (bit 6).
 const SLAVE: u8 = 0x43;
 const REVERSE: u8 = 0x40;
-/// 115200 baud towards the host; other codes aren't known.
+/// Reply rate code of 115200 baud; other codes aren't known.
 const UP_BAUD: u8 = 0x06;
 const STEP_CODES: [u8; 6] = [0, 1, 2, 3, 4, 8];
 
-/// How finely the echo is divided.
+/// Number of echo points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Points {
     /// 250 points nominally, of which 8-bit returns (`IMX`) carry 252.
@@ -30,74 +30,74 @@ pub enum Points {
     P500,
 }
 
-/// The settings that one command carries, in physical units. Encoding rounds each to the nearest code.
+/// Settings of one command, in physical units. Encoding rounds each to the nearest code.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Command {
-    /// Which head on the line is meant; 0x10 as delivered. Not 0xFD.
+    /// Address of the head on the line; 0x10 by default. Not 0xFD.
     pub head_id: u8,
     /// Range setting, m: one of [`RANGES_M`].
     pub range_m: u8,
-    /// Reverses the direction of stepping, once.
+    /// Reverses the stepping direction, once.
     pub reverse: bool,
     /// Gain at the start of the ping, 0 to 40 dB.
     pub start_gain_db: f64,
     /// Slope of the time-varied gain: 10, 20, 30 or 40 dB per decade of range.
     pub logf_db: f64,
-    /// Absorption that the gain makes up for, 0 to 2.55 dB/m but not 2.53.
+    /// Absorption compensated by the gain, 0 to 2.55 dB/m but not 2.53.
     pub absorption_dbpm: f64,
     /// Centre of the sector in the head's own angles, -180 to 180 degrees in steps of 3.
     pub train_deg: f64,
-    /// Width of the sector, 0 to 360 degrees in steps of 3; 360 turns on for ever.
+    /// Width of the sector, 0 to 360 degrees in steps of 3; 360 rotates continuously.
     pub sector_deg: f64,
-    /// Angle to the next ping: 0, 0.3, 0.6, 0.9, 1.2 or 2.4 degrees.
+    /// Step to the next ping: 0, 0.3, 0.6, 0.9, 1.2 or 2.4 degrees.
     pub step_deg: f64,
     /// Pulse length, 0 to 2550 microseconds in steps of 10, but not 2530.
     pub pulse_us: f64,
-    /// Echoes nearer than this are no profile point, 0 to 25 m in steps of 0.1.
+    /// Minimum range of the profile point, 0 to 25 m in steps of 0.1.
     pub min_range_m: f64,
-    /// How finely the echo is divided.
+    /// Number of echo points.
     pub points: Points,
     /// Depth of an echo point: 4, 8 or 16 bits.
     pub data_bits: u8,
-    /// Asks for the profile point alone (`IPX`).
+    /// Requests the profile point only (`IPX`).
     pub profile: bool,
-    /// Asks the head to find its zero.
+    /// Makes the head calibrate its zero.
     pub calibrate: bool,
-    /// Pause before the head answers, 0 to 510 ms in steps of 2, but not 506.
+    /// Delay before the head answers, 0 to 510 ms in steps of 2, but not 506.
     pub switch_delay_ms: f64,
     /// Acoustic frequency, 280 to 1100 kHz in steps of 5.
     pub frequency_khz: f64,
 }
 
-/// Why settings can't be sent, or why bytes are no command.
+/// Reason why settings can't be encoded, or bytes can't be decoded.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CommandError {
-    /// A setting outside what the head has codes for.
+    /// A setting outside the head's range.
     #[error("switch command: {field} of {value} {unit}; allowed is {least} to {most} {unit}")]
     Outside {
-        /// Which.
+        /// Name of the setting.
         field: &'static str,
-        /// The setting.
+        /// Value.
         value: f64,
         /// Its unit.
         unit: &'static str,
-        /// Least setting.
+        /// Minimum.
         least: f64,
-        /// Greatest setting.
+        /// Maximum.
         most: f64,
     },
-    /// A setting that isn't one of a few.
+    /// A setting that isn't one of the allowed values.
     #[error("switch command: {field} of {value}; allowed are {allowed}")]
     NotListed {
-        /// Which.
+        /// Name of the setting.
         field: &'static str,
-        /// The setting.
+        /// Value.
         value: f64,
-        /// All that are allowed.
+        /// Allowed values.
         allowed: &'static str,
     },
-    /// A setting whose code would end the command early.
+    /// A setting whose code would terminate the command early.
     #[error(
         "switch command: byte {index} would be 0xFD, which may stand only at the end; choose a setting beside it"
     )]
@@ -105,21 +105,20 @@ pub enum CommandError {
         /// Index in the command.
         index: usize,
     },
-    /// A byte that is the same in every command.
+    /// Wrong value of a constant byte.
     #[error("switch command: byte {index} is {got:#04X}; allowed is {wanted:#04X}")]
     Fixed {
         /// Index in the command.
         index: usize,
-        /// What is there.
+        /// Actual value.
         got: u8,
-        /// What must be there.
+        /// Required value.
         wanted: u8,
     },
 }
 
-/// A setting that a byte holds linearly: value = zero + code * num / den.
-///
-/// A fraction, because a product with 0.3 or 0.01 is off by an ulp for some codes.
+/// Linear scale of a byte: value = zero + code * num / den.
+/// || A fraction, because a product with 0.3 or 0.01 is off by an ulp for some codes.
 struct Scale {
     field: &'static str,
     unit: &'static str,
@@ -139,7 +138,7 @@ impl Scale {
         self.zero + f64::from(code) * self.num / self.den
     }
 
-    /// The nearest code.
+    /// Nearest code of a value.
     fn code(&self, value: f64) -> Result<u8, CommandError> {
         let code = math::round_to_i64((value - self.zero) * self.den / self.num);
         match u8::try_from(code) {
@@ -154,7 +153,7 @@ impl Scale {
         }
     }
 
-    /// The value of a code that came.
+    /// Value of a received code, range-checked.
     fn checked(&self, code: u8) -> Result<f64, CommandError> {
         self.code(self.value(code)).map(|_| self.value(code))
     }
@@ -172,9 +171,9 @@ const DELAY: Scale = Scale::new("switch delay", "ms", (2.0, 1.0), 255);
 const FREQUENCY: Scale = Scale { zero: 175.0, least: 21, ..Scale::new("frequency", "kHz", (5.0, 1.0), 185) };
 
 impl Command {
-    /// The command as bytes.
+    /// Encodes the command.
     ///
-    /// Errors: a setting that the head has no code for, or whose code is 0xFD.
+    /// Errors: a setting without a code, or with code 0xFD.
     pub fn encode(&self) -> Result<[u8; COMMAND_BYTES], CommandError> {
         let [fe, d] = HEADER;
         let bytes = [
@@ -212,9 +211,9 @@ impl Command {
         }
     }
 
-    /// The settings in a command's bytes. What isn't understood is refused: reserved bytes that aren't zero too.
+    /// Decodes a command. Anything not understood is an error, including non-zero reserved bytes.
     ///
-    /// Errors: a fixed byte that is another, or a code without a meaning.
+    /// Errors: a wrong constant byte, or an undefined code.
     pub fn decode(bytes: &[u8; COMMAND_BYTES]) -> Result<Self, CommandError> {
         if let Some(index) = bytes.iter().take(COMMAND_BYTES - 1).position(|byte| *byte == TERMINATOR) {
             return Err(CommandError::EarlyTerminator { index });
@@ -275,18 +274,18 @@ impl Command {
         })
     }
 
-    /// The step in counts of 0.3 degrees.
+    /// Step in counts of 0.3 degrees.
     pub fn step_counts(&self) -> i32 {
         STEP.code(self.step_deg).map_or(0, i32::from)
     }
 }
 
-/// The step of `counts` counts of 0.3 degrees, in degrees.
+/// Step of `counts` counts of 0.3 degrees, in degrees.
 pub(crate) fn step_deg(counts: u8) -> f64 {
     STEP.value(counts)
 }
 
-/// The largest step that a head knows of at most `counts` counts.
+/// Largest step supported by the head that is at most `counts` counts.
 pub(crate) fn step_at_most(counts: i32) -> u8 {
     STEP_CODES.into_iter().rfind(|code| i32::from(*code) <= counts).unwrap_or(0)
 }
@@ -326,11 +325,11 @@ fn decode_switch(field: &'static str, code: u8) -> Result<bool, CommandError> {
     }
 }
 
-/// How commands stand in the stream from host to head.
+/// Framing of commands in the stream from host to head.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Commands;
 
-/// Commands out of the stream from host to head.
+/// Decodes commands from the stream from host to head.
 pub type CommandCodec = Framed<Commands, COMMAND_BYTES>;
 
 impl Framing for Commands {

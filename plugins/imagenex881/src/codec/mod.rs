@@ -1,4 +1,4 @@
-//! The 881 family's wire: 27-byte switch commands to the head, returns of 13 to 513 bytes from it.
+//! Wire format of the 881 family: 27-byte switch commands to the head, returns of 13 to 513 bytes from it.
 
 mod command;
 mod returns;
@@ -10,11 +10,11 @@ pub use returns::{
     Status, Tag,
 };
 
-/// Counts of 0.3 degrees in a whole turn of a head.
+/// Counts of 0.3 degrees in a full turn of a head.
 pub const COUNTS_PER_TURN: i32 = 1200;
 
-/// The count that a head reports at 0 degrees. Source: Imagenex 881A serial interface, head position.
+/// Position count at 0 degrees. Source: Imagenex 881A serial interface, head position.
 pub const ZERO_COUNT: i32 = 600;
 
-/// Speed of sound by which the family computes every range. Source: Imagenex 881A serial interface, profile range.
+/// Speed of sound used by the family for every range. Source: Imagenex 881A serial interface, profile range.
 pub const SOUND_SPEED_MPS: f64 = 1500.0;

@@ -1,46 +1,46 @@
-//! Returns: 12 bytes of header, the echo, and 0xFC. The family's heads and its 852 sounder share them.
+//! Returns: 12 bytes of header, the echo, and 0xFC. Shared by the 881 heads and the 852 sounder.
 //!
 //! Source: Imagenex 881A serial interface, return data; Imagenex 852 serial interface specification 1.04.
 
 use headrace_sensor::codec::{Bytes, Framed, Framing, Verdict};
 
-/// The longest echo.
+/// Maximum echo length.
 pub const MAX_ECHO_BYTES: usize = MAX_ECHO as usize;
 
-/// The longest return.
+/// Maximum return length.
 pub const MAX_RETURN_BYTES: usize = HEADER_BYTES + MAX_ECHO_BYTES + 1;
 
-/// The greatest head position of an 881: +180 degrees.
+/// Maximum head position of an 881: +180 degrees.
 pub const MAX_POSITION: u16 = 1200;
 
 const MAX_ECHO: u16 = 500;
 const HEADER_BYTES: usize = 12;
 const TERMINATOR: u8 = 0xFC;
 const CLOCKWISE: u8 = 0x40;
-/// Range settings from this one up count in centimetres.
+/// Smallest range setting with counts of 1 cm.
 const COARSE_FROM_M: u8 = 5;
 
-/// What a return says it is.
+/// Type of a return.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Tag {
     /// Echo at the 25-point setting.
     Imx,
     /// Echo at the 50-point setting.
     Igx,
-    /// Profile point alone.
+    /// GS model, with attitude sensors.
     Ipx,
-    /// A model with attitude sensors (GS).
+    /// GS model, with attitude sensors.
     Ina,
-    /// A model with attitude sensors (GS).
+    /// GS model, with attitude sensors.
     Inb,
-    /// A model with attitude sensors (GS).
+    /// GS model, with attitude sensors.
     Inc,
 }
 
 impl Tag {
     const ALL: [Self; 6] = [Self::Imx, Self::Igx, Self::Ipx, Self::Ina, Self::Inb, Self::Inc];
 
-    /// Its letters on the wire.
+    /// Three letters on the wire.
     pub const fn letters(self) -> [u8; 3] {
         match self {
             Self::Imx => *b"IMX",
@@ -52,7 +52,7 @@ impl Tag {
         }
     }
 
-    /// Whether a GS model sent it. Those put more fields behind the common header, known from one source only.
+    /// True for GS models. Those add fields behind the common header, known from one source only.
     pub const fn is_gs(self) -> bool {
         matches!(self, Self::Ina | Self::Inb | Self::Inc)
     }
@@ -62,17 +62,17 @@ impl Tag {
     }
 }
 
-/// Which of the family's devices a return is from; position and profile range differ.
+/// Device model of a return; the formats of position and profile range differ.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Model {
-    /// A turning head: positions 0 to 1200; 2 or 10 mm a count.
+    /// A rotating head: positions 0 to 1200; 2 or 10 mm per count.
     Head881,
-    /// The 852 echosounder: positions to 13 bits without a meaning; always 10 mm a count.
+    /// The 852 echosounder: 13-bit positions without a meaning; always 10 mm per count.
     Sounder852,
 }
 
 impl Model {
-    /// The model that head ids as delivered tell: 0x11 to 0x15 are the sounder's.
+    /// Model by default head id: 0x11 to 0x15 are sounders.
     pub const fn of_head_id(head_id: u8) -> Self {
         if matches!(head_id, 0x11..=0x15) { Self::Sounder852 } else { Self::Head881 }
     }
@@ -83,25 +83,25 @@ impl Model {
 pub struct Status(pub u8);
 
 impl Status {
-    /// Whether the head took the settings of the command that it answers.
+    /// True if the head accepted the settings of the command.
     pub const fn accepted(self) -> bool {
         self.0 & 0x40 != 0
     }
 
-    /// Whether the head lost characters of the command.
+    /// True if the head lost characters of the command.
     pub const fn overrun(self) -> bool {
         self.0 & 0x80 != 0
     }
 }
 
-/// The header of a return, in the wire's own units.
+/// Header of a return, in wire units.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Header {
-    /// What kind of return.
+    /// Type of the return.
     pub tag: Tag,
-    /// The head that sent it.
+    /// Id of the sending head.
     pub head_id: u8,
-    /// Its state.
+    /// Status of the head.
     pub status: Status,
     /// Head position in counts of 0.3 degrees, 600 at 0 degrees; at most 1200 on an 881, 13 bits elsewhere.
     pub position: u16,
@@ -109,7 +109,7 @@ pub struct Header {
     pub clockwise: bool,
     /// Range setting, m.
     pub range_m: u8,
-    /// Profile range in counts of [`Header::count_mm`], 14 bits; 0 where nothing was above the threshold.
+    /// Profile range in counts of [`Header::count_mm`], 14 bits; 0 if no echo was above the threshold.
     pub profile_counts: u16,
 }
 
@@ -118,24 +118,24 @@ pub struct Header {
 pub struct Return {
     /// The header.
     pub header: Header,
-    /// Echo strengths, packed by the number of data bits that the command asked for. None in [`Tag::Ipx`].
+    /// Echo strengths, packed by the command's number of data bits. Empty in [`Tag::Ipx`].
     pub echo: Bytes<MAX_ECHO_BYTES>,
 }
 
-/// Why bytes are no return, or a value can't be one.
+/// Reason why bytes are no return, or a value is invalid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ReturnError {
-    /// Another tag.
+    /// Unknown tag.
     #[error("return: tag {got:02X?}; allowed are IMX, IGX, IPX, INA, INB, INC")]
     Tag {
-        /// The three bytes.
+        /// The three bytes received.
         got: [u8; 3],
     },
-    /// Fewer bytes than a return has.
+    /// Too few bytes.
     #[error("return: {got} bytes; needed are {needed}")]
     Short {
-        /// Bytes there.
+        /// Bytes present.
         got: usize,
         /// Bytes needed.
         needed: usize,
@@ -146,29 +146,29 @@ pub enum ReturnError {
         /// Bytes 5, 6 and 8 to 11.
         got: [u8; 6],
     },
-    /// A field beyond its bits or its meaning.
+    /// A field above its maximum.
     #[error("return: {field} {got}; the most allowed is {max}")]
     TooGreat {
-        /// Which.
+        /// Name of the field.
         field: &'static str,
         /// The value.
         got: u16,
-        /// Its limit.
+        /// Maximum.
         max: u16,
     },
-    /// Something else where 0xFC must be.
+    /// Wrong terminator; it must be 0xFC.
     #[error("return: ends in {got:#04X}; allowed is 0xFC")]
     Terminator {
-        /// The byte.
+        /// Byte received.
         got: u8,
     },
 }
 
 impl Header {
-    /// The header at the front of `bytes`, and the length of the echo that follows it.
+    /// Decodes the header at the front of `bytes`; returns it with the length of the following echo.
     ///
-    /// `model` overrides what the head id tells.
-    /// Errors: too short, another tag, bit 7 set in a packed field, or a position or length beyond its limit.
+    /// `model` overrides the model of the head id.
+    /// Errors: too short, unknown tag, bit 7 set in a packed field, or a position or length above its maximum.
     pub fn decode(bytes: &[u8], model: Option<Model>) -> Result<(Self, usize), ReturnError> {
         let short = ReturnError::Short { got: bytes.len(), needed: HEADER_BYTES };
         let &[t0, t1, t2, head_id, status, p0, p1, range_m, r0, r1, n0, n1] =
@@ -193,7 +193,7 @@ impl Header {
         Ok((header, usize::from(echo)))
     }
 
-    /// Size of a count of the profile range, mm.
+    /// Size of a profile range count, mm.
     ///
     /// Source: Imagenex 881A serial interface, profile range; for the 852 its own specification.
     pub const fn count_mm(&self, model: Model) -> u32 {
@@ -203,7 +203,7 @@ impl Header {
         }
     }
 
-    /// Profile range in mm at 1500 m/s; `None` where nothing was above the threshold.
+    /// Profile range in mm at 1500 m/s; `None` if no echo was above the threshold.
     pub fn profile_mm(&self, model: Model) -> Option<u32> {
         (self.profile_counts != 0).then(|| u32::from(self.profile_counts) * self.count_mm(model))
     }
@@ -230,9 +230,9 @@ impl Header {
 }
 
 impl Return {
-    /// The return as bytes.
+    /// Encodes the return.
     ///
-    /// Errors: a position, profile range or echo length beyond its limit.
+    /// Errors: a position, profile range or echo length above its maximum.
     pub fn encode(&self) -> Result<Bytes<MAX_RETURN_BYTES>, ReturnError> {
         self.header.check(None)?;
         let echo = self.echo.as_slice();
@@ -246,9 +246,9 @@ impl Return {
         Ok(bytes)
     }
 
-    /// The return at the front of `bytes`.
+    /// Decodes the return at the front of `bytes`.
     ///
-    /// Errors: as for [`Header::decode`], bytes missing, or another end than 0xFC.
+    /// Errors: as for [`Header::decode`], missing bytes, or a terminator other than 0xFC.
     pub fn decode(bytes: &[u8], model: Option<Model>) -> Result<Self, ReturnError> {
         let (header, echo_len) = Header::decode(bytes, model)?;
         let needed = HEADER_BYTES + echo_len + 1;
@@ -267,7 +267,7 @@ fn unpack(low: u8, high: u8) -> u16 {
     (u16::from(high & 0x7F) << 7) | u16::from(low & 0x7F)
 }
 
-/// Seven bits a byte, so that no byte of it has bit 7 set.
+/// Packs seven bits per byte, so that bit 7 stays clear.
 fn pack(value: u16) -> [u8; 2] {
     [(value & 0x7F) as u8, ((value >> 7) & 0x7F) as u8]
 }
@@ -276,14 +276,14 @@ fn at_most(field: &'static str, got: u16, max: u16) -> Result<(), ReturnError> {
     if got > max { Err(ReturnError::TooGreat { field, got, max }) } else { Ok(()) }
 }
 
-/// How returns stand in the stream from head to host.
+/// Framing of returns in the stream from head to host.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Returns {
-    /// For a line whose device is known, whatever its head id; `None` goes by head id.
+    /// Model for a line with a known device, overriding the head id; `None` goes by head id.
     pub model: Option<Model>,
 }
 
-/// Returns out of the stream from head to host.
+/// Decodes returns from the stream from head to host.
 pub type ReturnCodec = Framed<Returns, MAX_RETURN_BYTES>;
 
 impl Framing for Returns {

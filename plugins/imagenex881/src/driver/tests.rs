@@ -1,4 +1,4 @@
-//! The driver against an emulated head, on a line that may lose, break, double and hold back bytes; no port, no clock.
+//! The driver against an emulated head, on a line that loses, corrupts, duplicates and delays messages; no port, no clock.
 
 use headrace_sensor::device::{Direction, Emulator as _, EmulatorSetup};
 use headrace_sensor::geometry::math::{PI, TAU};
@@ -12,20 +12,20 @@ use crate::settings::tests::settings;
 use crate::stepping::Head;
 
 const BEGUN: MonoNs = MonoNs(2_000_000_000);
-/// A pause that doesn't end.
+/// An infinite pause.
 const STALLS: DurNs = DurNs(i64::MAX);
 const LATENCY: DurNs = DurNs(9_000_000);
 
-/// What a line does to the messages on it.
+/// Faults of the line.
 #[derive(Default)]
 struct Faults {
-    /// Commands that don't arrive, and answers, by number.
+    /// Numbers of lost commands, and of lost answers.
     lost_commands: Vec<usize>,
     lost_answers: Vec<usize>,
-    /// Answers with a flipped byte.
+    /// Numbers of answers with a flipped byte.
     broken_answers: Vec<usize>,
     doubled_answers: Vec<usize>,
-    /// Answers that come in two pieces, so much time apart.
+    /// Answers that arrive in two parts, with the pause between them.
     halved_answers: Vec<(usize, DurNs)>,
 }
 
@@ -39,9 +39,9 @@ struct Rig {
     sent: Vec<MonoNs>,
     outbox: Vec<Vec<u8>>,
     answers: usize,
-    /// The last answer comes twice.
+    /// True if the last answer is duplicated.
     doubled: bool,
-    /// Delivered returns at the settings of the dive: when they were measured, position.
+    /// Delivered returns at the dive's settings: ping time, position.
     pings: Vec<(MonoNs, u16)>,
     delivered: Vec<u8>,
 }
@@ -73,7 +73,7 @@ impl Wire for Ends<'_> {
 }
 
 impl Rig {
-    /// A head that stands at `stands_rad` when the driver comes.
+    /// A rig whose head stands at `stands_rad` at the start.
     fn new(text: &str, program: HeadProgram, stands_rad: f64, faults: Faults) -> Self {
         let settings = settings(text).unwrap();
         let now = BEGUN;
@@ -107,7 +107,7 @@ impl Rig {
         }
     }
 
-    /// Takes a command to the head, and its answer onto the line.
+    /// Delivers a command to the head, and its answer to the line.
     fn carry(&mut self, command: &[u8]) {
         let number = self.sent.len();
         self.sent.push(self.now);
@@ -137,7 +137,7 @@ impl Rig {
                 Some((_, pause)) => {
                     let (first, second) = bytes.split_at(5);
                     self.line.push((at, first.to_vec()));
-                    // A head that stalls in the middle says no more.
+                    // A head that stalls in mid-answer sends no more.
                     self.line.extend((*pause < STALLS).then(|| (at + *pause, second.to_vec())));
                 }
                 None => self.line.push((at, bytes.clone())),
@@ -171,7 +171,7 @@ impl Rig {
         }
     }
 
-    /// From one ping to the next, from `from` on, there is a step at most; with what was `lost`, two.
+    /// Asserts at most one step between consecutive pings after `from`, or two at the `lost` ones.
     fn assert_gapless(&self, from: MonoNs, lost: usize) {
         let step = i32::from(self.driver.settings.step_counts);
         let after: Vec<i32> = self.pings.iter().filter(|p| p.0 >= from).map(|p| i32::from(p.1)).collect();
@@ -182,7 +182,7 @@ impl Rig {
         assert!(wide.len() <= lost && wide.iter().all(|moved| moved.abs() <= 2 * step), "{wide:?}");
     }
 
-    /// From `from` on each ping is where and when the program has it.
+    /// Asserts that after `from` each ping has the program's position and time.
     fn assert_on_time(&self, from: MonoNs) {
         let timetable = &self.driver.timetable;
         let late = DurNs(1_000_000);
@@ -262,7 +262,7 @@ fn after_a_fault_no_place_is_left_out_and_the_phase_comes_back() {
     }
 }
 
-/// One answer in fifty is lost: the head falls behind each time, catches up, and leaves nothing out but those pings.
+/// With one answer in fifty lost, the head falls behind, catches up, and misses only the pings of the lost answers.
 #[test]
 fn a_line_that_loses_much_costs_no_more_than_it_loses() {
     let lost: Vec<usize> = (1..60).map(|n| 50 * n).collect();

@@ -1,4 +1,4 @@
-//! Every worked example of the makers' sets, and the codec's contract for each set.
+//! Worked examples of all makers' sets, and the codec contract for each set.
 
 use headrace_sensor::codec::{Codec as _, CodecCounts};
 
@@ -9,7 +9,7 @@ use crate::sets::scaled;
 const XSENS: MessageSet = MessageSet::Xsens(xsens::Ids { base: None });
 const J1939: MessageSet = MessageSet::J1939(j1939::Network { source_address: None });
 
-/// A frame as `candump -l` writes it: identifier, `#`, data.
+/// Parses a frame in `candump -l` notation: identifier, `#`, data.
 fn frame(text: &str) -> CanFrame {
     let (id, data) = text.split_once('#').unwrap();
     let bits = u32::from_str_radix(id, 16).unwrap();
@@ -22,7 +22,7 @@ fn frame(text: &str) -> CanFrame {
     CanFrame::of_kind(FrameKind::Data(id), &data).unwrap()
 }
 
-/// The message of a frame, which must come back when it is written.
+/// Decodes a frame and asserts that it re-encodes identically.
 fn message(set: MessageSet, text: &str) -> Message {
     let message = set.decode(&frame(text)).unwrap().unwrap();
     assert_eq!(set.encode(&message), Some(frame(text)), "{text}");
@@ -173,7 +173,7 @@ fn nothing_is_read_of_other_frames_and_wrong_lengths_are_bad() {
 
 #[test]
 fn a_frame_with_more_than_eight_bytes_is_left_out_to_its_end() {
-    // A CAN FD frame of 72 bytes, whose data would read as more frames.
+    // A CAN FD frame of 72 bytes, whose data would parse as further frames.
     let mut bytes = [0; 72];
     bytes[0] = 0x34;
     bytes[4] = 12;

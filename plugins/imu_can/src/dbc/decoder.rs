@@ -1,4 +1,4 @@
-//! Frames to readings by a mapping.
+//! Decodes frames into readings by a mapping.
 
 use headrace_sensor::codec::{Codec as _, CodecCounts, Framed, Framing, Verdict};
 use headrace_sensor::device::Decoder;
@@ -13,24 +13,23 @@ use super::mapping::{Attitude, Axes, Condition, Mapping, Part, Stamp};
 use crate::codec::can_frame;
 use crate::frame::{CanFrame, CanId, FRAME_BYTES, FrameKind};
 
-/// A mapping has 15 signals at most: 3 of rate, 3 of force, 4 of attitude, 4 states and a time.
+/// Maximum number of signals in a mapping: 3 of rate, 3 of force, 4 of attitude, 4 states and a time.
 const MOST_FRAMES: usize = 15;
 
-/// Parts of one vector that come in several frames belong to one sample if they come within this time: frames of a sample
-/// are sent one behind the other, and the next sample is farther off.
+/// Maximum time between the frames of one sample: a unit sends them back to back, and the next sample later.
 const SAME_SAMPLE: DurNs = DurNs::from_millis(5);
 
-/// Which frames are listened to, and how long each is.
+/// Identifiers and lengths of the mapping's frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Listened {
     frames: [Option<(CanId, u8)>; MOST_FRAMES],
 }
 
-/// Bytes to frames that are listened to. Other devices' frames, remote and error frames are good frames of which nothing is
-/// read; a frame of another length than the DBC says is a bad one.
+/// Decodes bytes into the mapping's frames. Other devices' frames, remote and error frames are good frames without a value; a
+/// frame whose length differs from the DBC's is bad.
 pub type DbcCodec = Framed<Listened, FRAME_BYTES>;
 
-/// Bytes to readings.
+/// Decodes bytes into readings.
 #[derive(Debug, Clone)]
 pub struct DbcDecoder {
     listened: Listened,
@@ -60,7 +59,7 @@ struct State {
 
 stateful!(State { state: all_well, attitude_well, rate_well, force_well, clock, withheld; each: rate, force, quaternion, euler; fixed: axes, latency, stamp; });
 
-/// A vector whose parts come in one frame or in several.
+/// A vector with its components in one or several frames.
 #[derive(Debug, Clone, Copy)]
 struct Vector<const N: usize> {
     parts: [Part; N],
@@ -70,11 +69,11 @@ struct Vector<const N: usize> {
 stateful!(Vector<3> { slots: came; fixed: parts; });
 stateful!(Vector<4> { slots: came; fixed: parts; });
 
-/// Parts of several samples came together.
+/// Components of different samples were combined.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Mixed;
 
-/// Whether the unit says that all is well; believed until it says otherwise.
+/// Validity reported by the unit; assumed valid until reported otherwise.
 #[derive(Debug, Clone, Copy)]
 struct Well {
     condition: Option<Condition>,
@@ -84,7 +83,7 @@ struct Well {
 stateful!(Well { state: now; fixed: condition; });
 
 impl Listened {
-    /// The frames of a mapping's signals.
+    /// Frames of a mapping's signals.
     pub fn new(mapping: &Mapping) -> Self {
         let mut frames = [None; MOST_FRAMES];
         for place in mapping.places() {
@@ -125,7 +124,7 @@ impl Framing for Listened {
 }
 
 impl DbcDecoder {
-    /// A decoder that has seen nothing yet.
+    /// New decoder.
     pub fn new(mapping: &Mapping) -> Self {
         let (quaternion, euler) = match mapping.attitude {
             Some(Attitude::Quaternion(parts)) => (Some(Vector::new(parts)), None),
@@ -152,7 +151,7 @@ impl DbcDecoder {
         Self { listened, codec: DbcCodec::new(listened), state, passed_over: 0 }
     }
 
-    /// Good frames that are not listened to.
+    /// Number of good frames outside the mapping.
     pub fn passed_over(&self) -> u64 {
         self.passed_over
     }
@@ -172,8 +171,7 @@ impl Decoder for DbcDecoder {
         self.codec.counts()
     }
 
-    /// Values left out because the unit says that they are no good, or because they aren't numbers, and vectors of which
-    /// a part is missing.
+    /// Values withheld as marked invalid by the unit or not finite, and vectors with a component missing.
     fn withheld(&self) -> u64 {
         self.state.withheld
     }
@@ -234,9 +232,9 @@ impl<const N: usize> Vector<N> {
         Self { parts, came: [None; N] }
     }
 
-    /// Takes what of it is in this frame, and gives its values in our units once no part is missing.
+    /// Stores the components in this frame; returns the vector in SI units once it is complete.
     ///
-    /// Errors: the parts are of several samples; the older ones are given up.
+    /// Errors: the components are from different samples; the older ones are dropped.
     fn take(
         &mut self,
         id: CanId,

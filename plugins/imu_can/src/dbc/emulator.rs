@@ -1,4 +1,4 @@
-//! The unit's side of the bus: at a fixed rate, the frames of one sample as the DBC lays them out.
+//! Unit side of the bus: the DBC's frames of one sample, at a fixed rate.
 
 use headrace_sensor::device::{Direction, Emulator, LineSink};
 use headrace_sensor::geometry::time::{DurNs, MonoNs};
@@ -9,7 +9,7 @@ use super::layout::DATA_BYTES;
 use super::mapping::{Attitude, Condition, Mapping, Part};
 use crate::frame::{CanFrame, CanId, Payload};
 
-/// An ideal unit: no noise, no bias and no delay of its own, but what its signals can say.
+/// Ideal unit: no noise, bias or added delay, but the quantization of its signals.
 #[derive(Debug, Clone)]
 pub struct DbcEmulator {
     mapping: Mapping,
@@ -20,7 +20,7 @@ pub struct DbcEmulator {
     told: u64,
 }
 
-/// A frame of a sample: its identifier, its length, and which of its signals are there.
+/// A frame of a sample: identifier, length and multiplexer value.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Frame {
     id: CanId,
@@ -42,18 +42,18 @@ impl DbcEmulator {
                 frames.push(frame);
             }
         }
-        // Where some signals of a message hang on a switch, the others are in each of its frames.
+        // In a multiplexed message, every frame also carries the unmultiplexed signals.
         let switched: Vec<CanId> = frames.iter().filter(|f| f.switch.is_some()).map(|f| f.id).collect();
         frames.retain(|frame| frame.switch.is_some() || !switched.contains(&frame.id));
         Self { mapping, frames, rate_hz, start, begun: 0, told: 0 }
     }
 
-    /// From the start to a sample on the unit's own clock.
+    /// Time from the start to a sample on the unit's clock.
     fn elapsed(&self, sample: u64) -> DurNs {
         DurNs::from_secs_f64(sample as f64 / self.rate_hz)
     }
 
-    /// Each signal with the value that it has.
+    /// Values of all signals.
     fn values(&self, motion: &Inertia) -> Vec<(Place, f64)> {
         let axes = self.mapping.axes;
         let mut values = Vec::new();
@@ -76,7 +76,7 @@ impl DbcEmulator {
         values
     }
 
-    /// `None` where it would tell what wasn't measured: what is no number.
+    /// Encodes a frame; `None` if one of its values wasn't measured (not finite).
     fn frame(&self, frame: Frame, values: &[(Place, f64)], elapsed: DurNs) -> Option<CanFrame> {
         let there = |place: &Place| {
             place.id == frame.id && place.switch.is_none_or(|(_, on)| Some(on) == frame.switch)

@@ -1,5 +1,4 @@
-//! A DBC text, and the signals that are looked up in it. This is done when a vehicle file is read; nothing of it is in the
-//! loop.
+//! A DBC text and lookup of its signals. Used while reading a vehicle file, never in the loop.
 
 use std::collections::BTreeMap;
 
@@ -8,181 +7,181 @@ use can_dbc::{ByteOrder, Dbc, MessageId, MultiplexIndicator, SignalExtendedValue
 use super::layout::{Bits, DATA_BYTES, Layout, Order};
 use crate::frame::CanId;
 
-/// A text is refused above this: IMUs' files have some kilobytes, whole vehicles' some hundreds.
+/// Maximum text size: files of IMUs have some kilobytes, of whole vehicles some hundreds.
 const MOST_BYTES: usize = 4 << 20;
 
-/// So many names are listed in an error.
+/// Maximum number of names listed in an error.
 const MOST_NAMES: usize = 40;
 
 const MOST_STANDARD: u32 = 0x7FF;
 const EXTENDED: u64 = 1 << 31;
 
-/// What is wrong with a DBC text, or with what is wanted of it.
+/// Error in a DBC text, or in a signal requested from it.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum DbcError {
-    /// It isn't DBC.
+    /// Not a DBC text.
     #[error("reading the DBC: {problem}")]
     Parse {
         /// Line, counted from one.
         line: usize,
-        /// What stands there.
+        /// Offending text.
         problem: String,
     },
-    /// It is too long to be one.
+    /// Text too long.
     #[error("reading the DBC: {0} bytes; at most {MOST_BYTES} are read")]
     Long(usize),
     /// No such signal.
     #[error("looking for the signal {wanted:?}: the DBC has none of that name; it has {has}")]
     NoSignal {
-        /// What was looked for.
+        /// Name requested.
         wanted: String,
-        /// The names that there are.
+        /// Names available.
         has: String,
     },
     /// Several messages have a signal of that name.
     #[error("looking for the signal {wanted:?}: it is in several messages; name one of {among}")]
     Ambiguous {
-        /// What was looked for.
+        /// Name requested.
         wanted: String,
-        /// Names with which it is found.
+        /// Unambiguous names.
         among: String,
     },
-    /// It reaches over the end of its frame.
+    /// The signal extends beyond the end of its frame.
     #[error(
         "laying out the signal {signal:?}: bits {start}|{size}@{order} reach over the end of its frame of {frame_bytes} \
          bytes (1 to 64 bits within a classic frame's 8 bytes are allowed)"
     )]
     Wide {
-        /// Which one.
+        /// Name of the signal.
         signal: String,
         /// Its start bit.
         start: u64,
         /// Its size in bits.
         size: u64,
-        /// 1 Intel, 0 Motorola.
+        /// Byte order: 1 Intel, 0 Motorola.
         order: u8,
         /// Length of its message.
         frame_bytes: u64,
     },
-    /// A float of another length than 32 or 64 bits.
+    /// A float of a length other than 32 or 64 bits.
     #[error(
         "laying out the signal {signal:?}: a float of {size} bits; allowed are 32 for SIG_VALTYPE_ 1 and 64 for 2"
     )]
     Float {
-        /// Which one.
+        /// Name of the signal.
         signal: String,
         /// Its size in bits.
         size: u64,
     },
-    /// A factor that leaves nothing of a value.
+    /// Factor zero, or factor or offset not finite.
     #[error(
         "reading the signal {signal:?}: factor {factor}, offset {offset}; allowed are finite ones, the factor not zero"
     )]
     Scale {
-        /// Which one.
+        /// Name of the signal.
         signal: String,
         /// Its factor, as text.
         factor: String,
         /// Its offset, as text.
         offset: String,
     },
-    /// An identifier that no frame has.
+    /// Invalid identifier.
     #[error(
         "reading the message {message:?}: identifier {id}; standard ones reach to 2047, extended ones have bit 31 set"
     )]
     Id {
-        /// Which message.
+        /// Name of the message.
         message: String,
         /// Its identifier as written.
         id: u64,
     },
-    /// A switch that hangs on another switch, or none or several in a message.
+    /// Nested multiplexing, or not exactly one multiplexer in the message.
     #[error(
         "reading the signal {signal:?}: it is multiplexed in a way that isn't read; one switch a message is, with single \
          values"
     )]
     Multiplexed {
-        /// Which one.
+        /// Name of the signal.
         signal: String,
     },
 }
 
-/// A signal that was looked up.
+/// A signal found in the DBC.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Signal {
-    /// Its name, with its message's.
+    /// Name, as `Message.Signal`.
     pub name: String,
-    /// The unit as written.
+    /// Unit as written.
     pub unit: String,
-    /// Where it is in which frames.
+    /// Location of the signal.
     pub place: Place,
 }
 
-/// Which frames a signal is in, and how it becomes a number.
+/// Location of a signal in frames, and its conversion to a number.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Place {
-    /// The frames that have it.
+    /// Identifier of its frames.
     pub id: CanId,
     /// Length of their data.
     pub frame_bytes: u8,
-    /// Where it stands.
+    /// Position in the data.
     pub layout: Layout,
-    /// What its bits are.
+    /// Number format.
     pub bits: Bits,
     /// Value = bits x factor + offset, in the signal's unit.
     pub factor: f64,
     /// See `factor`.
     pub offset: f64,
-    /// It is there only where these bits have this value.
+    /// Multiplexing: the signal is present only if these bits have this value.
     pub switch: Option<(Layout, u64)>,
 }
 
 impl Place {
-    /// The signal's bits in this frame's data, which is filled up to eight bytes; `None` where it is not in it.
+    /// Raw bits of the signal in this frame's data, zero-padded to eight bytes; `None` if the frame doesn't hold it.
     pub fn raw(&self, id: CanId, data: [u8; DATA_BYTES]) -> Option<u64> {
         let there = self.switch.is_none_or(|(switch, value)| switch.extract(data) == value);
         (self.id == id && there).then(|| self.layout.extract(data))
     }
 
-    /// The signal's value in its own unit.
+    /// Value of the signal in its own unit.
     pub fn value(&self, id: CanId, data: [u8; DATA_BYTES]) -> Option<f64> {
         let raw = self.raw(id, data)?;
         Some(self.bits.value(raw, self.layout.bits()) * self.factor + self.offset)
     }
 
-    /// Puts the bits that come nearest to `value` into a frame's data.
+    /// Writes the raw value nearest to `value` into a frame's data.
     pub fn put(&self, data: [u8; DATA_BYTES], value: f64) -> [u8; DATA_BYTES] {
         let raw = self.bits.raw((value - self.offset) / self.factor, self.layout.bits());
         self.layout.insert(data, raw)
     }
 }
 
-/// A DBC text that was read.
+/// A parsed DBC text.
 #[derive(Debug)]
 pub struct DbcFile {
     dbc: Dbc,
-    /// Identifiers as written, by message: the parser keeps only 16 bits of standard ones.
+    /// Identifiers as written, by message: the parser truncates standard ones to 16 bits.
     wide_ids: BTreeMap<String, u64>,
 }
 
 impl DbcFile {
-    /// Reads a text.
+    /// Parses a text.
     ///
-    /// Errors: one that isn't DBC, with its line; one that is too long.
+    /// Errors: not a DBC text, with its line; text too long.
     pub fn parse(text: &str) -> Result<Self, DbcError> {
         if text.len() > MOST_BYTES {
             return Err(DbcError::Long(text.len()));
         }
-        // Without the mark that some editors set, and with an end of line at the end, which the grammar wants.
+        // Strips a byte-order mark and appends the final newline that the grammar requires.
         let text = format!("{}\n", text.trim_start_matches('\u{FEFF}'));
         let dbc = Dbc::try_from(text.as_str()).map_err(|error| named(&text, &error))?;
         Ok(Self { dbc, wide_ids: wide_ids(&text) })
     }
 
-    /// The signal that is called `wanted`: its name, or its message's and its own with a dot between.
+    /// Looks up a signal by its name, or as `Message.Signal`.
     ///
-    /// Errors: no such signal, or several; one that can't be taken out of a classic frame.
+    /// Errors: no such signal, or several; one that can't be extracted from a classic frame.
     pub fn signal(&self, wanted: &str) -> Result<Signal, DbcError> {
         let all =
             || self.dbc.messages.iter().flat_map(|message| message.signals.iter().map(move |s| (message, s)));
@@ -290,7 +289,7 @@ fn layout(message: &can_dbc::Message, signal: &can_dbc::Signal) -> Result<Layout
     })
 }
 
-/// Messages whose identifier is no extended one and has more than 16 bits.
+/// Messages with a non-extended identifier of more than 16 bits.
 fn wide_ids(text: &str) -> BTreeMap<String, u64> {
     let message = |line: &str| {
         let (id, rest) =
@@ -302,15 +301,15 @@ fn wide_ids(text: &str) -> BTreeMap<String, u64> {
     text.lines().filter_map(message).collect()
 }
 
-/// The parser's words for people: the line, and what stands there.
+/// Converts a parser error to a readable one with the line and the offending text.
 fn named(text: &str, error: &can_dbc::DbcError) -> DbcError {
     let words = error.to_string();
     let line = if matches!(error, can_dbc::DbcError::Pest(_)) {
-        // ` --> 3:1` is the only way to the line that doesn't need the parser's own parser by name.
+        // ` --> 3:1` is the only source of the line that doesn't require naming the parser's own grammar types.
         let at = words.split_once("--> ").and_then(|(_, at)| at.split(':').next());
         at.and_then(|line| line.trim().parse().ok()).unwrap_or(1)
     } else {
-        // The others name the text that they are about.
+        // The other errors name the offending text.
         let value = words.split('\'').nth(1).or_else(|| words.rsplit(' ').next());
         let holds = |line: &str| value.is_some_and(|value| !value.is_empty() && line.contains(value));
         text.lines().position(holds).map_or(1, |line| line + 1)

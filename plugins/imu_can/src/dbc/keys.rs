@@ -1,4 +1,4 @@
-//! The keys of a vehicle file that say what a DBC's signals are.
+//! Keys of a vehicle file that map a DBC's signals.
 
 use headrace_sensor::config::{ConfigError, NamedFile, Section};
 use headrace_sensor::geometry::time::DurNs;
@@ -6,10 +6,9 @@ use headrace_sensor::geometry::time::DurNs;
 use super::file::{DbcError, DbcFile, Signal};
 use super::mapping::{Attitude, Axes, Condition, Conditions, Kind, Mapping, Part, Stamp};
 
-/// Reads `axes` and `signals` of a sensor's table whose key `dbc` names `file`.
+/// Reads `axes` and `signals` of a sensor's table with `dbc = file`.
 ///
-/// Errors: a DBC that doesn't read (with its line), a signal that it hasn't, a unit that isn't known, a key that isn't
-/// allowed; no reading at all.
+/// Errors: an invalid DBC (with its line), an unknown signal, unit or key, or no reading mapped.
 pub fn mapping(file: &NamedFile, own: &Section<'_>, latency: DurNs) -> Result<Mapping, ConfigError> {
     let dbc = DbcFile::parse(&file.text).map_err(|error| in_file(file, own, error))?;
     let axes = own.choice("axes", &[("flu", Axes::Flu), ("frd", Axes::Frd)])?.unwrap_or(Axes::Flu);
@@ -46,7 +45,7 @@ fn in_file(file: &NamedFile, own: &Section<'_>, error: DbcError) -> ConfigError 
     }
 }
 
-/// The table `signals` and where its names are looked up.
+/// The table `signals` with the DBC for its names.
 struct Signals<'s, 'a> {
     dbc: &'s DbcFile,
     section: &'s Section<'a>,

@@ -1,14 +1,14 @@
-//! Where a signal stands in a frame's data, and what its bits mean.
+//! Position of a signal in a frame's data, and conversion of its bits.
 //!
-//! Bits are numbered as DBC files do: bit b is bit b mod 8 (0 the least significant) of byte b / 8. An Intel signal begins
-//! with its least significant bit and goes on upwards; a Motorola signal begins with its most significant bit, goes down
-//! to bit 0 of its byte and on with bit 7 of the next one.
+//! Bits are numbered as in DBC files: bit b is bit b mod 8 (0 the least significant) of byte b / 8. An Intel signal starts
+//! at its least significant bit and goes up; a Motorola signal starts at its most significant bit, goes down to bit 0 of
+//! its byte and continues at bit 7 of the next one.
 //! Source: Vector, DBC file format 1.0; the sawtooth numbering of Motorola signals.
 
 /// Data bytes of a classic frame.
 pub const DATA_BYTES: usize = 8;
 
-/// Order of a signal's bytes.
+/// Byte order of a signal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Order {
     /// Least significant byte first (`@1`).
@@ -17,10 +17,10 @@ pub enum Order {
     Motorola,
 }
 
-/// What a signal's bits are.
+/// Number format of a signal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Bits {
-    /// A whole number from 0.
+    /// Unsigned integer.
     Unsigned,
     /// Two's complement.
     Signed,
@@ -30,23 +30,22 @@ pub enum Bits {
     Float64,
 }
 
-/// A signal's place: 1 to 64 bits within eight bytes.
+/// Position of a signal: 1 to 64 bits within eight bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Layout {
-    /// How far the least significant bit is from that of the eight bytes, read as one number in the signal's order.
+    /// Shift of the least significant bit, with the eight bytes read as one number in the signal's byte order.
     shift: u32,
     bits: u32,
     order: Order,
 }
 
 impl Layout {
-    /// A signal of `size` bits from bit `start`; `None` where it reaches over the end of `data_bytes`, has no bits, or more
-    /// than 64.
+    /// A signal of `size` bits from bit `start`; `None` if it extends beyond `data_bytes`, or has no bits or more than 64.
     pub fn new(start: u64, size: u64, order: Order, data_bytes: usize) -> Option<Self> {
         let all = 8 * u32::try_from(data_bytes.min(DATA_BYTES)).ok()?;
         let start = u32::try_from(start).ok().filter(|start| *start < all)?;
         let bits = u32::try_from(size).ok().filter(|bits| (1..=all).contains(bits))?;
-        // How many bits come before the first, in the order in which the signal goes.
+        // Number of bits before the first, in the signal's bit order.
         let before = match order {
             Order::Intel => start,
             Order::Motorola => start - start % 8 + (7 - start % 8),
@@ -61,12 +60,12 @@ impl Layout {
         Some(Self { shift, bits, order })
     }
 
-    /// How many bits it has.
+    /// Number of bits.
     pub fn bits(self) -> u32 {
         self.bits
     }
 
-    /// The signal's bits, from bit 0 up. Allocates: never.
+    /// Raw bits of the signal, from bit 0 up. Allocates: never.
     pub fn extract(self, data: [u8; DATA_BYTES]) -> u64 {
         let all = match self.order {
             Order::Intel => u64::from_le_bytes(data),
@@ -75,7 +74,7 @@ impl Layout {
         (all >> self.shift) & self.mask()
     }
 
-    /// Puts the signal's bits into the data; bits beyond its own are left out.
+    /// Writes the signal's bits into the data; excess bits of `raw` are ignored.
     pub fn insert(self, data: [u8; DATA_BYTES], raw: u64) -> [u8; DATA_BYTES] {
         let put = |all: u64| all & !(self.mask() << self.shift) | (raw & self.mask()) << self.shift;
         match self.order {
@@ -90,7 +89,7 @@ impl Layout {
 }
 
 impl Bits {
-    /// What the lowest `bits` bits of `raw` say. A number of more than 53 bits is rounded to the nearest double.
+    /// Value of the lowest `bits` bits of `raw`. Integers of more than 53 bits are rounded to the nearest double.
     pub fn value(self, raw: u64, bits: u32) -> f64 {
         let unused = 64 - bits.clamp(1, 64);
         match self {
@@ -101,7 +100,7 @@ impl Bits {
         }
     }
 
-    /// The bits that say what is nearest to `value`.
+    /// Raw bits of the representable value nearest to `value`.
     #[expect(
         clippy::cast_possible_truncation,
         reason = "a double beyond what the signal can say saturates, which is what is wanted"
@@ -121,7 +120,7 @@ impl Bits {
 }
 
 fn libm_round(value: f64) -> f64 {
-    // Beyond 2^53 every double is whole; up to there the integer holds it.
+    // Above 2^53 every double is an integer; below, an i64 holds the rounded value.
     if value.abs() < 9e15 { headrace_sensor::geometry::math::round_to_i64(value) as f64 } else { value }
 }
 
@@ -131,7 +130,7 @@ mod tests {
 
     use super::*;
 
-    /// The signal's bits one by one, most significant first, as the DBC format numbers them.
+    /// The signal's bit numbers, most significant first, in DBC numbering.
     fn walk(start: u64, size: u64, order: Order) -> Vec<u64> {
         let mut bits: Vec<u64> = match order {
             Order::Intel => (start..start + size).rev().collect(),
@@ -213,7 +212,7 @@ mod tests {
         assert_eq!(Bits::Signed.raw(f64::NAN, 8), 0);
     }
 
-    /// The reminder of every DBC text: `7|16@0` are bytes 0 and 1, `39|16@0` bytes 4 and 5, most significant first.
+    /// Standard reminder on the DBC format: `7|16@0` is bytes 0 and 1, `39|16@0` bytes 4 and 5, most significant first.
     #[test]
     fn motorola_start_bits_name_the_most_significant() {
         let data = [1, 2, 3, 4, 5, 6, 7, 8];

@@ -1,4 +1,4 @@
-//! What a unit's signals are, ready for the loop.
+//! Mapping of a unit's signals to readings, as used by the loop.
 
 use headrace_sensor::geometry::time::DurNs;
 
@@ -8,27 +8,27 @@ use super::layout::Bits;
 /// Standard gravity, m/s^2 (CGPM 1901).
 const G_MPS2: f64 = 9.806_65;
 
-/// Which way the unit's axes point.
+/// Axis convention of the unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Axes {
-    /// x forward, y left, z up; attitudes against a frame whose z is up.
+    /// x forward, y left, z up; attitude relative to a z-up frame.
     Flu,
-    /// x forward, y right, z down; attitudes against north, east, down.
+    /// x forward, y right, z down; attitude relative to north, east, down.
     Frd,
 }
 
-/// What turns a signal's unit into ours.
+/// Unit of a signal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Unit {
-    /// As it is: radians, rad/s, m/s^2, parts of a quaternion.
+    /// SI: rad, rad/s, m/s^2, quaternion components.
     Si,
-    /// Degrees, degrees a second.
+    /// Degrees, or degrees per second.
     Degrees,
-    /// Standard gravity.
+    /// Standard gravity, g.
     Gravities,
 }
 
-/// What kind of quantity a signal is one of.
+/// Quantity of a signal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
     /// Turn rate.
@@ -37,94 +37,94 @@ pub enum Kind {
     Force,
     /// Angle.
     Angle,
-    /// Part of a quaternion.
+    /// Quaternion component.
     Share,
 }
 
-/// A unit that isn't known, or a signal that can't be what it is wanted for.
+/// A signal that can't be used as requested.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MappingError {
-    /// Not a unit of that quantity.
+    /// Unit that doesn't fit the quantity.
     #[error("taking {signal:?} for a {quantity}: its unit is {unit:?}; allowed are {allowed}")]
     Unit {
-        /// Which signal.
+        /// Name of the signal.
         signal: String,
-        /// What it was to be.
+        /// Quantity expected.
         quantity: &'static str,
-        /// Its unit in the DBC.
+        /// Unit in the DBC.
         unit: String,
-        /// What would do.
+        /// Allowed units.
         allowed: String,
     },
-    /// A time whose steps can't be counted.
+    /// Sample time whose tick can't be used.
     #[error(
         "taking {signal:?} for the sample time: a step of {factor} {unit:?}; allowed are whole numbers without an offset, \
          in ns, us, ms or s, a step being 1 ns to 15 minutes and whole nanoseconds"
     )]
     Time {
-        /// Which signal.
+        /// Name of the signal.
         signal: String,
-        /// Its factor, as text.
+        /// Factor, as text.
         factor: String,
-        /// Its unit in the DBC.
+        /// Unit in the DBC.
         unit: String,
     },
-    /// Bits that the signal hasn't.
+    /// Mask or value with bits beyond the signal.
     #[error(
         "taking {signal:?} for a state: it has {bits} bits, and the mask is {mask:#X}, the value {value:#X}"
     )]
     Mask {
-        /// Which signal.
+        /// Name of the signal.
         signal: String,
-        /// How many bits it has.
+        /// Number of bits of the signal.
         bits: u32,
-        /// The bits that are looked at.
+        /// Bits checked.
         mask: u64,
-        /// What they should be.
+        /// Required value.
         value: u64,
     },
 }
 
-/// A signal as a part of a reading.
+/// A signal as a component of a reading.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Part {
-    /// Where it is.
+    /// Location in the frames.
     pub place: Place,
-    /// Its unit.
+    /// Unit of the signal.
     pub unit: Unit,
 }
 
-/// How attitude is sent.
+/// Attitude representation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Attitude {
-    /// w, x, y, z: sensor to level.
+    /// w, x, y, z: sensor to level frame.
     Quaternion([Part; 4]),
-    /// Roll, pitch, yaw: about x, then y, then z, the axes fixed.
+    /// Roll, pitch, yaw: about fixed x, then y, then z.
     Euler([Part; 3]),
 }
 
-/// Readings are withheld unless the signal's bits under `mask` are `value`.
+/// Condition of validity: readings are withheld unless the signal's bits under `mask` equal `value`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Condition {
-    /// Where the state is.
+    /// Location of the state.
     pub place: Place,
-    /// Which bits count.
+    /// Bits checked.
     pub mask: u64,
-    /// What they are where all is well.
+    /// Value if valid.
     pub value: u64,
 }
 
-/// The unit's own time.
+/// Timestamp of the unit's clock.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stamp {
-    /// Where it is.
+    /// Location in the frames.
     pub place: Place,
-    /// How long a step is.
+    /// Length of a tick.
     pub tick: DurNs,
 }
 
-/// States on which readings depend.
+/// Conditions of validity of the readings.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Conditions {
     /// For all readings.
@@ -137,10 +137,10 @@ pub struct Conditions {
     pub force: Option<Condition>,
 }
 
-/// What a unit's signals are.
+/// Mapping of a unit's signals.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mapping {
-    /// Which way its axes point.
+    /// Axis convention.
     pub axes: Axes,
     /// Turn rate about x, y, z.
     pub rate: Option<[Part; 3]>,
@@ -148,16 +148,16 @@ pub struct Mapping {
     pub force: Option<[Part; 3]>,
     /// Orientation.
     pub attitude: Option<Attitude>,
-    /// When which of them count.
+    /// Conditions of validity.
     pub conditions: Conditions,
-    /// The unit's own time.
+    /// Timestamp of the unit's clock.
     pub sample_time: Option<Stamp>,
-    /// From validity to receive time.
+    /// Delay from a reading's time of validity to its receipt.
     pub latency: DurNs,
 }
 
 impl Axes {
-    /// A vector in the unit's axes in ours, or the other way.
+    /// Converts a vector from the unit's axes to ours, or back.
     pub fn turned(self, [x, y, z]: [f64; 3]) -> [f64; 3] {
         match self {
             Self::Flu => [x, y, z],
@@ -165,7 +165,7 @@ impl Axes {
         }
     }
 
-    /// A quaternion w, x, y, z between the unit's frames as one between ours, or the other way.
+    /// Converts a quaternion w, x, y, z from the unit's frames to ours, or back.
     pub fn rotation_turned(self, [w, x, y, z]: [f64; 4]) -> [f64; 4] {
         let [x, y, z] = self.turned([x, y, z]);
         [w, x, y, z]
@@ -173,7 +173,7 @@ impl Axes {
 }
 
 impl Unit {
-    /// A value of this unit in ours.
+    /// Converts a value from this unit to SI.
     pub fn to_si(self, value: f64) -> f64 {
         match self {
             Self::Si => value,
@@ -182,7 +182,7 @@ impl Unit {
         }
     }
 
-    /// A value of ours in this unit.
+    /// Converts a value from SI to this unit.
     pub fn of_si(self, value: f64) -> f64 {
         match self {
             Self::Si => value,
@@ -202,7 +202,7 @@ impl Kind {
         }
     }
 
-    /// The units that it may have, as DBC files write them; letters' case and blanks don't count.
+    /// Allowed units as written in DBC files; case and spaces are ignored.
     fn units(self) -> &'static [(&'static str, Unit)] {
         match self {
             Self::Rate => &[
@@ -233,9 +233,9 @@ impl Kind {
 }
 
 impl Part {
-    /// A signal that is to be of this kind.
+    /// Uses a signal as a component of this quantity.
     ///
-    /// Errors: a unit that such a quantity hasn't.
+    /// Errors: a unit that doesn't fit the quantity.
     pub fn of(signal: &Signal, kind: Kind) -> Result<Self, MappingError> {
         let written = without_blanks(&signal.unit);
         let unit = kind.units().iter().find(|(name, _)| *name == written).map(|(_, unit)| *unit);
@@ -250,9 +250,9 @@ impl Part {
 }
 
 impl Condition {
-    /// A state; without `value` all bits of the mask are to be set.
+    /// Uses a signal as a state; without `value` all bits of the mask must be set.
     ///
-    /// Errors: bits that the signal hasn't, a value outside of the mask, a float.
+    /// Errors: bits beyond the signal, a value outside the mask, a float.
     pub fn of(signal: &Signal, mask: u64, value: Option<u64>) -> Result<Self, MappingError> {
         let value = value.unwrap_or(mask);
         let bits = signal.place.layout.bits();
@@ -265,9 +265,9 @@ impl Condition {
 }
 
 impl Stamp {
-    /// The unit's own time: a count of ticks, each the signal's factor in its unit.
+    /// Uses a signal as timestamp: a count of ticks, each the signal's factor in its unit.
     ///
-    /// Errors: a unit that is no time, a step that isn't whole nanoseconds, a float, an offset.
+    /// Errors: a unit that is no time, a tick that isn't whole nanoseconds, a float, an offset.
     pub fn of(signal: &Signal) -> Result<Self, MappingError> {
         const UNITS_NS: [(&str, f64); 6] =
             [("s", 1e9), ("sec", 1e9), ("ms", 1e6), ("us", 1e3), ("µs", 1e3), ("ns", 1.0)];
@@ -277,7 +277,7 @@ impl Stamp {
         let unit_ns = UNITS_NS.iter().find(|(name, _)| *name == written).map(|(_, ns)| *ns);
         let tick_ns = unit_ns.map_or(0.0, |unit_ns| place.factor * unit_ns);
         let tick = DurNs::from_secs_f64(tick_ns / 1e9);
-        // Factors are decimal fractions: their product with a power of ten is whole to rounding.
+        // Factors are decimal fractions: their product with a power of ten is an integer up to rounding.
         let is_whole = (tick.0 as f64 - tick_ns).abs() <= 1e-9 * tick_ns;
         let counts = matches!(place.bits, Bits::Unsigned | Bits::Signed) && place.offset.abs() == 0.0;
         if !counts || !is_whole || !(1.0..=LONGEST_NS).contains(&tick_ns) {
@@ -292,7 +292,7 @@ impl Stamp {
 }
 
 impl Mapping {
-    /// All places that are looked at.
+    /// Locations of all mapped signals.
     pub fn places(&self) -> impl Iterator<Item = Place> + '_ {
         let conditions =
             [self.conditions.all, self.conditions.attitude, self.conditions.rate, self.conditions.force];

@@ -1,7 +1,7 @@
-//! Units that aren't known by name, by a DBC file and a table that says which signals are what.
+//! Units without a preset, described by a DBC file and a table that maps its signals.
 //!
-//! [`mod@file`] reads the text, [`layout`] takes signals out of frames, [`mapping`] says what each of them is, [`keys`] reads
-//! that from a vehicle file; [`decoder`] is the loop's and [`emulator`] the device's side.
+//! [`mod@file`] parses the text, [`layout`] extracts signals from frames, [`mapping`] assigns them to readings and [`keys`]
+//! reads that from a vehicle file; [`decoder`] is the loop's side and [`emulator`] the device's.
 
 pub mod decoder;
 pub mod emulator;

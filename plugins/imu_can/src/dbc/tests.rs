@@ -1,4 +1,4 @@
-//! DBC texts beside the presets, worked examples, errors by name, and texts that are none.
+//! DBC mappings compared with the presets, worked examples, named errors, and invalid texts.
 
 use std::sync::LazyLock;
 
@@ -47,7 +47,7 @@ rate_valid = { signal = "ImuStatus", mask = 0x2E1 }
 sample_time = "ImuTime"
 "#;
 
-/// What else stands in files of whole vehicles.
+/// Further content of DBC files of whole vehicles.
 const RICH: &str = "VERSION \"1\"\n\nNS_ :\n\tNS_DESC_\n\tCM_\n\tBA_DEF_\n\nBS_:\n\nBU_: U H\n\
 VAL_TABLE_ OnOff 1 \"on\" 0 \"off\" ;\n\n\
 BO_ 2147483748 A: 8 U\n SG_ Rate : 7|16@0- (0.01,-1) [-10|10] \"deg/s\" Vector__XXX\n\
@@ -90,13 +90,13 @@ fn decoded(decoder: &mut dyn Decoder, received: MonoNs, bytes: &[u8]) -> Vec<Dec
     readings
 }
 
-/// Frames of the maker's set, of random content and now and then of another length, and others.
+/// Frames of the maker's set with random content, sometimes of a wrong length, and foreign frames.
 fn frames(ids: &'static [(u16, usize)]) -> impl Strategy<Value = Vec<Vec<u8>>> {
     let own = (0..ids.len(), any::<[u8; 8]>(), 0_u8..16, 0_usize..9).prop_map(|(which, data, odd, other)| {
         let (id, bytes) = ids[which];
         frame(id, &data[..if odd == 0 { other } else { bytes }]).to_vec()
     });
-    // What is often zero in real frames, so that states change and quaternions vanish.
+    // Sparse data: often zero, as in real frames, so that states change and quaternions vanish.
     let sparse = (0..ids.len(), any::<[u8; 8]>(), any::<u8>()).prop_map(|(which, data, keep)| {
         let (id, bytes) = ids[which];
         let mut data = data;
@@ -115,7 +115,7 @@ const XSENS_EULER: [(u16, usize); 5] = [(0x22, 6), (0x11, 4), (0x05, 4), (0x32, 
 const SBG_QUATERNION: [(u16, usize); 4] = [(0x120, 8), (0x121, 6), (0x122, 6), (0x131, 8)];
 const SBG_EULER: [(u16, usize); 4] = [(0x120, 8), (0x121, 6), (0x122, 6), (0x132, 6)];
 
-/// The same readings, bit for bit, the same withheld, the same clock.
+/// Asserts equal readings (bit for bit), withheld counts and clocks.
 fn same(mapping: &Mapping, set: MessageSet, packets: &[Vec<u8>], heard: &[(u16, usize)]) -> usize {
     let (mut ours, mut presets) = (DbcDecoder::new(mapping), preset(set));
     let mut readings = 0;
@@ -131,7 +131,7 @@ fn same(mapping: &Mapping, set: MessageSet, packets: &[Vec<u8>], heard: &[(u16, 
     if heard.is_empty() {
         assert_eq!(ours.counts(), presets.counts());
     } else {
-        // Frames that the DBC's mapping doesn't name aren't checked for their length.
+        // Frames outside the DBC's mapping aren't checked for length.
         assert!(ours.counts().bad_frames <= presets.counts().bad_frames);
     }
     readings
@@ -167,7 +167,7 @@ proptest! {
         same(by_euler, *set, &angles, &[]);
     }
 
-    /// Texts cut anywhere, with bytes changed anywhere, and any text whatever: an error or a reading, never a panic.
+    /// Truncated texts, texts with changed bytes, and arbitrary texts: an error or a result, never a panic.
     #[test]
     fn any_text_is_endured(
         cut in 0_usize..4000, changes in proptest::collection::vec((0_usize..4000, any::<char>()), 0..4),
@@ -190,7 +190,7 @@ proptest! {
         }
     }
 
-    /// Numbers in their places that no file should have.
+    /// Out-of-range numbers in the numeric fields.
     #[test]
     fn any_numbers_are_endured(
         id: u64, bytes: u64, start: u64, size: u64, order in 0_u8..2, factor in any::<f64>(), mux in 0_u64..5,
@@ -242,7 +242,7 @@ fn clipped_axes_withhold_their_vector() {
     }
 }
 
-/// Worked examples of frames in other makers' layouts: MM5.10 with offsets, in three frames, and J1939's slope of 24 bits.
+/// Worked examples in other makers' layouts: MM5.10 with offsets, in three frames, and J1939's slope of 24 bits.
 const OTHERS: &str = "VERSION \"\"\nBU_: U H\n\
 BO_ 112 TX1: 8 U\n SG_ YawRate : 0|16@1+ (0.005,-163.84) [0|0] \"deg/s\" H\n SG_ AY : 32|16@1+ (0.000127465,-4.1768) [0|0] \"g\" H\n\
 BO_ 128 TX2: 8 U\n SG_ RollRate : 0|16@1+ (0.005,-163.84) [0|0] \"°/s\" H\n SG_ AX : 32|16@1+ (0.000127465,-4.1768) [0|0] \"g\" H\n\
@@ -269,7 +269,7 @@ fn a_vector_in_several_frames_is_told_when_all_of_one_sample_is_there() {
     let Reading::SpecificForce(force) = got[0].reading else { panic!() };
     assert!([force.x(), force.y(), force.z()].iter().all(|mps2| (mps2 - 0.5 * 9.806_65).abs() < 1e-3));
     assert_eq!(got[0].valid_at, MonoNs(9_000_000));
-    // A frame is lost: what is there isn't joined with the next sample, and the one after that is whole.
+    // After a lost frame the remaining parts aren't joined with the next sample, and the sample after that is complete.
     assert_eq!((send(0x80, 10).len(), send(0x70, 1).len()), (0, 0));
     assert_eq!((send(0x80, 10).len(), send(0x70, 1).len(), send(0x576, 1).len()), (0, 0, 1));
     assert_eq!(decoder.withheld(), 0);
@@ -297,7 +297,7 @@ fn worked_examples_of_other_makers() {
     assert_eq!(dbc.signal("Pitch").unwrap().place.id, CanId::Extended(0x0CF0_2980));
     near(value("F32", [0xC0, 0x20, 0, 0, 0, 0, 0, 0]), -2.5);
     near(value("F64", (-0.1_f64).to_le_bytes()), -0.1);
-    // Page 1 has the one, page 0 the other.
+    // Page 1 has one signal, page 0 the other.
     let page = |page| [0, 0, 0, 0, page, 0xFF, 0xFE, 0];
     assert_eq!((value("Low", page(0)), value("High", page(0))), (Some(-1.0), None));
     assert_eq!((value("Low", page(1)), value("High", page(1))), (None, Some(-1.0)));

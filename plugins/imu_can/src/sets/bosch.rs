@@ -1,4 +1,4 @@
-//! Bosch MM5.10 as on the bus of the ABS M5 kit: little-endian, unsigned, a turn rate and an acceleration a frame.
+//! Bosch MM5.10 as on the bus of the ABS M5 kit: little-endian, unsigned, one turn rate and one acceleration per frame.
 //!
 //! The unit has no turn rate about its pitch axis.
 //! Source: Bosch Motorsport, ABS M5 Kit manual, p. 40 to 42.
@@ -10,12 +10,12 @@ const YAW: u16 = 0x70;
 const ROLL: u16 = 0x80;
 const VERTICAL: u16 = 0x576;
 
-/// Shortest frame that holds both values.
+/// Minimum frame length with both values.
 const NEEDED_BYTES: usize = 6;
 
-/// Step of the turn rates, degrees a second; they are counted from -163.84.
+/// Step of the turn rates, degrees per second; zero counts are -163.84.
 pub const RATE_QUANTUM_DEGPS: f64 = 0.005;
-/// Step of the accelerations, standard gravities; they are counted from -4.1768.
+/// Step of the accelerations, g; zero counts are -4.1768.
 pub const ACCELERATION_QUANTUM_G: f64 = 0.000_127_465;
 const RATE_OFFSET_DEGPS: f64 = -163.84;
 const ACCELERATION_OFFSET_G: f64 = -4.1768;
@@ -43,29 +43,29 @@ pub enum Message {
 }
 
 impl RawRate {
-    /// Degrees a second.
+    /// Turn rate, degrees per second.
     pub fn degps(self) -> f64 {
         f64::from(self.0) * RATE_QUANTUM_DEGPS + RATE_OFFSET_DEGPS
     }
 
-    /// The nearest to a turn rate in degrees a second.
+    /// Raw value nearest to a turn rate in degrees per second.
     pub fn nearest(degps: f64) -> Self {
         Self(raw(degps, RATE_QUANTUM_DEGPS, RATE_OFFSET_DEGPS))
     }
 }
 
 impl RawAcceleration {
-    /// Standard gravities.
+    /// Acceleration, g.
     pub fn g(self) -> f64 {
         f64::from(self.0) * ACCELERATION_QUANTUM_G + ACCELERATION_OFFSET_G
     }
 
-    /// Metres per second squared.
+    /// Acceleration, m/s^2.
     pub fn mps2(self) -> f64 {
         self.g() * STANDARD_GRAVITY_MPS2
     }
 
-    /// The nearest to an acceleration in m/s^2.
+    /// Raw value nearest to an acceleration in m/s^2.
     pub fn nearest(mps2: f64) -> Self {
         Self(raw(mps2 / STANDARD_GRAVITY_MPS2, ACCELERATION_QUANTUM_G, ACCELERATION_OFFSET_G))
     }
@@ -76,9 +76,9 @@ fn raw(value: f64, quantum: f64, offset: f64) -> u16 {
     u16::try_from(raw.clamp(0, i64::from(u16::MAX))).unwrap_or_default()
 }
 
-/// Reads a frame; `None` where it is not of this set.
+/// Decodes a frame; `None` if it isn't of this set.
 ///
-/// Errors: less than six bytes.
+/// Errors: fewer than six bytes.
 pub fn decode(frame: &CanFrame) -> Result<Option<Message>, MessageError> {
     let Some(id @ CanId::Standard(code @ (YAW | ROLL | VERTICAL))) = data_id(frame) else { return Ok(None) };
     let data = frame.data();
@@ -94,7 +94,7 @@ pub fn decode(frame: &CanFrame) -> Result<Option<Message>, MessageError> {
     }))
 }
 
-/// Writes a message; bytes of no known meaning are zero.
+/// Encodes a message; undefined bytes are zero.
 pub fn encode(message: &Message) -> CanFrame {
     let (id, rate, acceleration) = match *message {
         Message::Yaw(rate, acceleration) => (YAW, rate.0, acceleration),

@@ -1,7 +1,7 @@
 //! SAE J1939 slope, angular rate and acceleration: 29-bit identifiers, little-endian, unsigned with an offset.
 //!
 //! Identifier = priority << 26 | parameter group << 8 | source address. A value whose highest byte is 0xFE (error) or
-//! 0xFF (not available) says nothing.
+//! 0xFF (not available) carries no measurement.
 //! Source: SAE J1939-71, parameter groups 61481, 61482, 61485; figures of merit and latency as Axiomatic UMAX0608XX and
 //! Honeywell TARS document them.
 
@@ -11,25 +11,25 @@ use crate::frame::{CanFrame, CanId, Payload};
 const SLOPE_2: u32 = 61_481;
 const ANGULAR_RATE: u32 = 61_482;
 const ACCELERATION: u32 = 61_485;
-/// All three are sent with this priority by default.
+/// Default priority of all three groups.
 const PRIORITY: u32 = 3;
-/// Sender of encoded frames where the set listens to any.
+/// Source address of encoded frames if the set accepts any.
 const ANY_SENDER: u8 = 0x80;
 
-/// Step of the angles, degrees; they are counted from -250.
+/// Step of the angles, degrees; zero counts are -250.
 pub const SLOPE_QUANTUM_DEG: f64 = 1.0 / 32_768.0;
-/// Step of the turn rates, degrees a second; they are counted from -250.
+/// Step of the turn rates, degrees per second; zero counts are -250.
 pub const RATE_QUANTUM_DEGPS: f64 = 1.0 / 128.0;
-/// Step of the accelerations, m/s^2; they are counted from -320.
+/// Step of the accelerations, m/s^2; zero counts are -320.
 pub const ACCELERATION_QUANTUM_MPS2: f64 = 0.01;
 const ANGLE_OFFSET_DEG: f64 = -250.0;
 const ACCELERATION_OFFSET_MPS2: f64 = -320.0;
 const LATENCY_QUANTUM_MS: f64 = 0.5;
 
-/// Whom to listen to.
+/// Filter by sender.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Network {
-    /// Source address of the unit, or `None` where it is the only one that sends these groups.
+    /// Source address of the unit; `None` if it is the only sender of these groups.
     pub source_address: Option<u8>,
 }
 
@@ -42,18 +42,18 @@ pub struct Slope {
     pub roll: u32,
     /// From bit 0, two bits each: pitch compensation, pitch figure of merit, roll compensation, roll figure of merit.
     pub figures: u8,
-    /// Age of the values when sent, in half milliseconds.
+    /// Age of the values on sending, in half milliseconds.
     pub latency: u8,
 }
 
-/// Three values on axes whose order is the maker's.
+/// Three values, in the maker's axis order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Triple {
-    /// The values in the order of the wire.
+    /// Values in wire order.
     pub raw: [u16; 3],
     /// Figures of merit, two bits each from bit 0: 0 good, 1 degraded, 2 error, 3 not available.
     pub figures: u8,
-    /// Age of the values when sent, in half milliseconds.
+    /// Age of the values on sending, in half milliseconds.
     pub latency: u8,
 }
 
@@ -69,34 +69,34 @@ pub enum Message {
 }
 
 impl Slope {
-    /// Pitch in degrees, where the unit gives it.
+    /// Pitch in degrees, if available.
     pub fn pitch_deg(&self) -> Option<f64> {
         slope_deg(self.pitch)
     }
 
-    /// Roll in degrees, where the unit gives it.
+    /// Roll in degrees, if available.
     pub fn roll_deg(&self) -> Option<f64> {
         slope_deg(self.roll)
     }
 }
 
 impl Triple {
-    /// Turn rates in degrees a second, in the order of the wire; `None` where one of them says nothing.
+    /// Turn rates in degrees per second, in wire order; `None` if one of them is unavailable.
     pub fn rates_degps(&self) -> Option<[f64; 3]> {
         self.values(RATE_QUANTUM_DEGPS, ANGLE_OFFSET_DEG)
     }
 
-    /// Accelerations in m/s^2, in the order of the wire; `None` where one of them says nothing.
+    /// Accelerations in m/s^2, in wire order; `None` if one of them is unavailable.
     pub fn accelerations_mps2(&self) -> Option<[f64; 3]> {
         self.values(ACCELERATION_QUANTUM_MPS2, ACCELERATION_OFFSET_MPS2)
     }
 
-    /// Whether a figure of merit says error.
+    /// True if a figure of merit is "error".
     pub fn has_error(&self) -> bool {
         [0, 2, 4].iter().any(|shift| self.figures >> shift & 0b11 == 0b10)
     }
 
-    /// Age of the values when sent, in milliseconds, where the unit gives it.
+    /// Age of the values on sending, in milliseconds, if available.
     pub fn latency_ms(&self) -> Option<f64> {
         is_value(self.latency).then(|| f64::from(self.latency) * LATENCY_QUANTUM_MS)
     }
@@ -108,7 +108,7 @@ impl Triple {
 }
 
 impl Network {
-    /// Reads a frame; `None` where it is not of this set or from another sender.
+    /// Decodes a frame; `None` if it isn't of this set, or is from another sender.
     ///
     /// Errors: a length other than eight.
     pub fn decode(self, frame: &CanFrame) -> Result<Option<Message>, MessageError> {
@@ -133,7 +133,7 @@ impl Network {
         }))
     }
 
-    /// Writes a message.
+    /// Encodes a message.
     pub fn encode(self, message: &Message) -> CanFrame {
         let (group, payload) = match message {
             Message::Slope(slope) => {
@@ -164,17 +164,17 @@ fn is_value(highest_byte: u8) -> bool {
     highest_byte < 0xFE
 }
 
-/// Turn rate in degrees a second as on the wire.
+/// Raw turn rate from degrees per second.
 pub(crate) fn rate_raw(degps: f64) -> u16 {
     raw(degps, RATE_QUANTUM_DEGPS, ANGLE_OFFSET_DEG)
 }
 
-/// Acceleration in m/s^2 as on the wire.
+/// Raw acceleration from m/s^2.
 pub(crate) fn acceleration_raw(mps2: f64) -> u16 {
     raw(mps2, ACCELERATION_QUANTUM_MPS2, ACCELERATION_OFFSET_MPS2)
 }
 
-/// An angle in degrees as on the wire.
+/// Raw angle from degrees.
 pub(crate) fn slope_raw(deg: f64) -> u32 {
     let raw = headrace_sensor::geometry::math::round_to_i64((deg - ANGLE_OFFSET_DEG) / SLOPE_QUANTUM_DEG);
     u32::try_from(raw.clamp(0, 0xFD_FFFF)).unwrap_or_default()

@@ -1,4 +1,4 @@
-//! What makers say in CAN frames. Values keep the wire's integers; their quanta are constants beside them.
+//! Makers' message sets. Values keep the wire's integers; their quanta are constants beside them.
 
 pub mod bosch;
 pub mod j1939;
@@ -7,24 +7,24 @@ pub mod xsens;
 
 use crate::frame::{CanFrame, CanId, FrameKind};
 
-/// A frame with a known identifier and a length that it can't have.
+/// A frame with a known identifier but a wrong length.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("reading a message of {len} bytes: {id:?} needs {needed}")]
 pub struct MessageError {
-    /// The frame's identifier.
+    /// Identifier of the frame.
     pub id: CanId,
-    /// Its length.
+    /// Length of the frame.
     pub len: usize,
-    /// The length that it should have.
+    /// Required length.
     pub needed: usize,
 }
 
-/// The integers in physical units.
+/// Scales integers to physical units.
 pub fn scaled<const N: usize>(raw: [i16; N], quantum: f64) -> [f64; N] {
     raw.map(|raw| f64::from(raw) * quantum)
 }
 
-/// The identifier of a data frame; remote and error frames carry no measurement.
+/// Identifier of a data frame; remote and error frames carry no measurement.
 fn data_id(frame: &CanFrame) -> Option<CanId> {
     match frame.kind() {
         FrameKind::Data(id) => Some(id),
@@ -37,7 +37,7 @@ fn exactly<const N: usize>(id: CanId, data: &[u8]) -> Result<[u8; N], MessageErr
     data.try_into().map_err(|_| MessageError { id, len: data.len(), needed: N })
 }
 
-/// Words of two bytes each, in order; words for which there are no bytes are zero.
+/// Consecutive two-byte words; missing words are zero.
 fn words<const N: usize>(data: &[u8], word: impl Fn([u8; 2]) -> i16) -> [i16; N] {
     let (pairs, _) = data.as_chunks::<2>();
     let mut words = [0; N];

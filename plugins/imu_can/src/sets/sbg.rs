@@ -1,7 +1,7 @@
-//! SBG Systems Ellipse and HPINS: little-endian, identifiers as delivered (all outputs are off by default).
+//! SBG Systems Ellipse and HPINS: little-endian, default identifiers (all outputs are off by default).
 //!
-//! The device's axes are x forward, y right, z down, and its earth frame is north, east, down: two of three axes point
-//! the other way than ours. [`to_ours`] turns vectors and [`rotation_to_ours`] rotations; both are their own inverse.
+//! Device axes are x forward, y right, z down, and the earth frame is north, east, down: y and z have the opposite sign of
+//! ours. [`to_ours`] converts vectors and [`rotation_to_ours`] rotations; both are their own inverse.
 //! Source: SBG Systems, sbgECom CAN protocol and sbgCan.dbc; bits of the status in its firmware reference.
 
 use super::{MessageError, data_id, exactly, words};
@@ -11,44 +11,44 @@ use crate::frame::{CanFrame, CanId, Payload};
 pub const ACCELERATION_QUANTUM_MPS2: f64 = 1e-2;
 /// Turn rate, rad/s.
 pub const RATE_QUANTUM_RADPS: f64 = 1e-3;
-/// One step of a quaternion's component.
+/// Quaternion component.
 pub const QUATERNION_QUANTUM: f64 = 1.0 / 32_767.0;
 /// Euler angles and their accuracies, radians.
 pub const EULER_QUANTUM_RAD: f64 = 1e-4;
 /// Temperature, degrees Celsius.
 pub const TEMPERATURE_QUANTUM_DEGC: f64 = 1e-2;
 
-/// The unit answers, its accelerometers have passed their tests and are within their range.
+/// Status bits of valid specific force: the unit responds; accelerometers passed their tests and are within range.
 const FORCE_WELL: u16 = 0x11D;
-/// The same of its gyros.
+/// Status bits of valid turn rate: the same for the gyros.
 const RATE_WELL: u16 = 0x2E1;
-/// A status of which all bits that are known say that all is well.
+/// Status with all known bits set to valid.
 pub const ALL_WELL: ImuStatus = ImuStatus(0x3FF);
 
-/// State of the inertial unit as bits.
+/// Status bits of the inertial unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ImuStatus(pub u16);
 
 impl ImuStatus {
-    /// Whether specific force is fit for use.
+    /// True if specific force is valid.
     pub fn force_is_well(self) -> bool {
         self.0 & FORCE_WELL == FORCE_WELL
     }
 
-    /// Whether turn rate is fit for use.
+    /// True if turn rate is valid.
     pub fn rate_is_well(self) -> bool {
         self.0 & RATE_WELL == RATE_WELL
     }
 }
 
-/// One message, in the device's own axes.
+/// One message, in the device's axes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Message {
-    /// Heads a sample of the inertial unit.
+    /// Header of an inertial sample.
     ImuInfo {
-        /// Time since switched on, microseconds.
+        /// Time since power-on, microseconds.
         time_us: u32,
-        /// State.
+        /// Status bits.
         status: ImuStatus,
         /// Temperature.
         temperature: i16,
@@ -57,7 +57,7 @@ pub enum Message {
     Acceleration([i16; 3]),
     /// Turn rate.
     Rate([i16; 3]),
-    /// Heads a solution of the filter: time since switched on, microseconds.
+    /// Header of a filter solution: time since power-on, microseconds.
     EkfTime(u32),
     /// Sensor to north, east, down; w x y z.
     Quaternion([i16; 4]),
@@ -67,19 +67,19 @@ pub enum Message {
     Accuracy([u16; 3]),
 }
 
-/// A vector in the device's axes in ours, or the other way.
+/// Converts a vector from device axes to ours, or back.
 pub fn to_ours([x, y, z]: [f64; 3]) -> [f64; 3] {
     [x, -y, -z]
 }
 
-/// A quaternion w x y z between the device's frames as one between ours, or the other way.
+/// Converts a quaternion w x y z from the device's frames to ours, or back.
 pub fn rotation_to_ours([w, x, y, z]: [f64; 4]) -> [f64; 4] {
     [w, x, -y, -z]
 }
 
-/// Reads a frame; `None` where it is not of this set.
+/// Decodes a frame; `None` if it isn't of this set.
 ///
-/// Errors: a length that the message can't have.
+/// Errors: a wrong length of the message.
 pub fn decode(frame: &CanFrame) -> Result<Option<Message>, MessageError> {
     let Some(id @ CanId::Standard(code)) = data_id(frame) else { return Ok(None) };
     let data = frame.data();
@@ -103,7 +103,7 @@ pub fn decode(frame: &CanFrame) -> Result<Option<Message>, MessageError> {
     }))
 }
 
-/// Writes a message.
+/// Encodes a message.
 pub fn encode(message: &Message) -> CanFrame {
     let bytes = |bytes: &[u8]| Payload::default().with(bytes);
     let (id, payload) = match *message {

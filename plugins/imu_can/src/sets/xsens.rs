@@ -1,13 +1,13 @@
-//! Xsens (Movella) MTi-600, Sirius and Avior: big-endian, one quantity a frame.
+//! Xsens (Movella) MTi-600, Sirius and Avior: big-endian, one quantity per frame.
 //!
-//! Each output's identifier can be set in the device; the defaults are 11-bit codes, and a 29-bit base with the same
-//! code in its lowest byte is in use, too.
-//! Source: Xsens MT CAN protocol (MT1604P), with byte order as all known readers have it.
+//! Each output's identifier is configurable in the device; the defaults are 11-bit codes, and a 29-bit base with the same
+//! code in its lowest byte is in use as well.
+//! Source: Xsens MT CAN protocol (MT1604P); byte order as in all known readers.
 
 use super::{MessageError, data_id, exactly, words};
 use crate::frame::{CanFrame, CanId, Payload};
 
-/// One step of a quaternion's component.
+/// Quaternion component.
 pub const QUATERNION_QUANTUM: f64 = 1.0 / 32_767.0;
 /// Euler angles, degrees.
 pub const EULER_QUANTUM_DEG: f64 = 1.0 / 128.0;
@@ -15,21 +15,21 @@ pub const EULER_QUANTUM_DEG: f64 = 1.0 / 128.0;
 pub const RATE_QUANTUM_RADPS: f64 = 1.0 / 512.0;
 /// Acceleration, m/s^2.
 pub const ACCELERATION_QUANTUM_MPS2: f64 = 1.0 / 256.0;
-/// Magnetic field, in units of the earth's.
+/// Magnetic field, in units of the earth's field.
 pub const MAGNETIC_QUANTUM: f64 = 1.0 / 1024.0;
 /// Temperature, degrees Celsius.
 pub const TEMPERATURE_QUANTUM_DEGC: f64 = 1.0 / 256.0;
 /// Air pressure, Pa.
 pub const PRESSURE_QUANTUM_PA: f64 = 1.0 / 32_768.0;
 
-/// Which identifiers the device uses.
+/// Identifiers used by the device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Ids {
     /// Base of 29-bit identifiers whose lowest byte is the code; `None` for the default 11-bit codes.
     pub base: Option<u32>,
 }
 
-/// A change of velocity over one sample.
+/// Velocity increment over one sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct DeltaV {
     /// x, y, z in 2^-`exponent` m/s.
@@ -38,53 +38,53 @@ pub struct DeltaV {
     pub exponent: u8,
 }
 
-/// UTC as the device has it.
+/// UTC according to the device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Utc {
-    /// Year less 2000, month, day, hour, minute, second.
+    /// Year minus 2000, month, day, hour, minute, second.
     pub year_to_second: [u8; 6],
     /// Tenths of milliseconds.
     pub tenths_ms: u16,
 }
 
-/// The device's state as bits.
+/// Status bits of the device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct StatusWord(pub u32);
 
 /// One message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Message {
-    /// 1 = messages were dropped in the device.
+    /// 1 = the device dropped messages.
     Error(u8),
-    /// Time of the sample, in ticks whose length is configuration (100 us by most sources).
+    /// Sample timestamp, in ticks of configurable length (100 us by most sources).
     SampleTime(u32),
-    /// Number of the sample, wrapping.
+    /// Sample number, wrapping.
     GroupCounter(u16),
     /// UTC of the sample.
     Utc(Utc),
-    /// State.
+    /// Status bits.
     StatusWord(StatusWord),
-    /// Sensor to local earth frame (z up), w x y z.
+    /// Sensor to local earth frame (z up); w x y z.
     Quaternion([i16; 4]),
     /// Roll, pitch, yaw.
     EulerAngles([i16; 3]),
-    /// Change of velocity over one sample.
+    /// Velocity increment over one sample.
     DeltaV(DeltaV),
     /// Turn rate.
     RateOfTurn([i16; 3]),
-    /// Change of orientation over one sample, w x y z.
+    /// Orientation increment over one sample; w x y z.
     DeltaQ([i16; 4]),
     /// Specific force.
     Acceleration([i16; 3]),
-    /// Acceleration in the local earth frame, gravity taken off.
+    /// Acceleration in the local earth frame, without gravity.
     FreeAcceleration([i16; 3]),
     /// Magnetic field.
     MagneticField([i16; 3]),
     /// Temperature.
     Temperature(i16),
-    /// Air pressure within the housing.
+    /// Air pressure inside the housing.
     BaroPressure(u32),
-    /// Specific force at high rate. Sources swap this code with the next.
+    /// Specific force at high rate. Some sources swap this code with the next.
     AccelerationHr([i16; 3]),
     /// Turn rate at high rate. See [`Message::AccelerationHr`].
     RateOfTurnHr([i16; 3]),
@@ -97,24 +97,24 @@ pub enum Message {
 }
 
 impl StatusWord {
-    /// Whether the orientation can be relied on.
+    /// True if the orientation is valid.
     pub fn orientation_valid(self) -> bool {
         self.0 & 0b10 != 0
     }
 
-    /// Whether an accelerometer is beyond its range.
+    /// True if an accelerometer is out of range.
     pub fn acceleration_clipped(self) -> bool {
         self.0 & 0x700 != 0
     }
 
-    /// Whether a gyro is beyond its range.
+    /// True if a gyro is out of range.
     pub fn rate_clipped(self) -> bool {
         self.0 & 0x3800 != 0
     }
 }
 
 impl DeltaV {
-    /// x, y, z in m/s.
+    /// Velocity increment x, y, z in m/s.
     pub fn mps(&self) -> [f64; 3] {
         let halvings = 1_u64 << self.exponent.min(63);
         self.mantissas.map(|mantissa| f64::from(mantissa) / halvings as f64)
@@ -137,9 +137,9 @@ impl Ids {
         }
     }
 
-    /// Reads a frame; `None` where it is not of this set.
+    /// Decodes a frame; `None` if it isn't of this set.
     ///
-    /// Errors: a length that the message can't have.
+    /// Errors: a wrong length of the message.
     pub fn decode(self, frame: &CanFrame) -> Result<Option<Message>, MessageError> {
         let Some(id) = data_id(frame) else { return Ok(None) };
         let data = frame.data();
@@ -184,7 +184,7 @@ impl Ids {
         }))
     }
 
-    /// Writes a message.
+    /// Encodes a message.
     pub fn encode(self, message: &Message) -> CanFrame {
         let bytes = |bytes: &[u8]| Payload::default().with(bytes);
         let (code, payload) = match *message {

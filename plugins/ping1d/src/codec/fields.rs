@@ -1,18 +1,18 @@
-//! Little-endian fields of a payload: read with a check, written with a bound.
+//! Little-endian payload fields: checked reads, bounded writes.
 
 use headrace_sensor::codec::{Bytes, TooLong};
 
 use super::MAX_PAYLOAD_BYTES;
 
-/// A payload as it is put together.
+/// A payload under construction.
 pub(super) type Payload = Bytes<MAX_PAYLOAD_BYTES>;
 
-/// A field, or several in a row, of fixed length.
+/// One or several consecutive fields of fixed length.
 pub(super) trait Field: Sized {
-    /// Bytes that it takes.
+    /// Length in bytes.
     const LEN: usize;
 
-    /// Takes it off the front of `from`; `None` when the bytes aren't there.
+    /// Reads it off the front of `from`; `None` if bytes are missing.
     fn read(from: &mut &[u8]) -> Option<Self>;
 
     /// Appends it.
@@ -39,7 +39,7 @@ macro_rules! integers {
 
 integers!(u8, u16, u32);
 
-/// Anything but 0 is true.
+/// Any value but 0 is true.
 impl Field for bool {
     const LEN: usize = 1;
 
@@ -52,7 +52,7 @@ impl Field for bool {
     }
 }
 
-/// A struct whose fields stand in a row on the wire.
+/// Defines a struct whose fields are consecutive on the wire.
 macro_rules! record {
     ($(#[$meta:meta])* $name:ident { $($(#[$field_meta:meta])* $field:ident: $type:ty,)* }) => {
         $(#[$meta])*

@@ -4,17 +4,17 @@
 
 use headrace_sensor::codec::{Bytes, TooLong, Verdict};
 
-/// The longest frame that is taken. The protocol itself allows 65 545 bytes, but no echosounder comes near this.
+/// Maximum frame length accepted. The protocol allows 65 545 bytes, but no echosounder comes near this.
 pub const MAX_FRAME_BYTES: usize = 4096;
 
-/// The longest payload that is taken.
+/// Maximum payload length accepted.
 pub const MAX_PAYLOAD_BYTES: usize = MAX_FRAME_BYTES - HEADER_BYTES - CHECKSUM_BYTES;
 
 const HEADER_BYTES: usize = 8;
 const CHECKSUM_BYTES: usize = 2;
 const START: [u8; 2] = *b"BR";
 
-/// A frame whose payload stands elsewhere.
+/// A frame with a borrowed payload.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Frame<'a> {
     /// Message id.
@@ -28,7 +28,7 @@ pub struct Frame<'a> {
 }
 
 impl<'a> Frame<'a> {
-    /// The frame that `bytes` begin with, if they do and its checksum is right.
+    /// Parses the frame at the front of `bytes`; `None` unless complete with a correct checksum.
     pub fn parse(bytes: &'a [u8]) -> Option<Self> {
         let (header, rest) = bytes.split_first_chunk::<HEADER_BYTES>()?;
         let [b, r, n0, n1, i0, i1, source, destination] = *header;
@@ -55,18 +55,18 @@ impl<'a> Frame<'a> {
     }
 }
 
-/// Whether `front` is, or may become, a frame; its checksum is checked, its payload isn't.
+/// Judges whether `front` is, or may become, a frame; checks the checksum but not the payload.
 pub(super) fn judge(front: &[u8]) -> Verdict {
     if front.iter().zip(START).any(|(byte, wanted)| *byte != wanted) {
         return Verdict::NotAStart;
     }
     let Some((_, payload, _)) = announced(front) else { return Verdict::Need(HEADER_BYTES) };
     let whole = HEADER_BYTES + payload + CHECKSUM_BYTES;
-    // The codec takes one for bad that is longer than it has room for.
+    // The codec rejects frames longer than its buffer.
     Verdict::on(front, whole, |frame| Frame::parse(frame).is_some())
 }
 
-/// Message id and payload length that a header announces, and what is there of the payload.
+/// Message id and payload length from the header, and the part of the payload present.
 pub(super) fn announced(front: &[u8]) -> Option<(u16, usize, &[u8])> {
     let (&[_, _, n0, n1, i0, i1, _, _], rest) = front.split_first_chunk::<HEADER_BYTES>()?;
     let len = usize::from(u16::from_le_bytes([n0, n1]));

@@ -1,4 +1,4 @@
-//! What frames say: the messages that a `Ping1D` or Ping2 and its host exchange.
+//! Messages exchanged between a `Ping1D` or Ping2 and its host.
 //!
 //! Source: Ping protocol, common and ping1d messages.
 
@@ -8,7 +8,7 @@ use super::fields::{Field, Payload, record};
 use super::{Frame, MAX_PAYLOAD_BYTES};
 
 record! {
-    /// What a device is.
+    /// Identity of a device.
     DeviceInformation {
         /// 1: Ping echosounder; 2: Ping360.
         device_type: u8,
@@ -26,7 +26,7 @@ record! {
 }
 
 record! {
-    /// Version of the protocol that a device speaks.
+    /// Protocol version of a device.
     ProtocolVersion {
         /// Major.
         major: u8,
@@ -40,57 +40,57 @@ record! {
 }
 
 record! {
-    /// Where a device listens.
+    /// Listening range of a device.
     ScanRange {
         /// Nearest distance, mm.
         start_mm: u32,
-        /// From there on, mm; at least 1000.
+        /// Length from there, mm; at least 1000.
         length_mm: u32,
     }
 }
 
 record! {
-    /// An older summary of a device's state.
+    /// Legacy status summary.
     GeneralInfo {
         /// Firmware, major.
         firmware_major: u16,
         /// Firmware, minor.
         firmware_minor: u16,
-        /// Supply, mV.
+        /// Supply voltage, mV.
         voltage_mv: u16,
-        /// Least time between pings, ms.
+        /// Minimum time between pings, ms.
         ping_interval_ms: u16,
-        /// Index of the gain, 0 to 6.
+        /// Gain index, 0 to 6.
         gain: u8,
-        /// Whether the device chooses range and gain.
+        /// True if the device chooses range and gain.
         auto: bool,
     }
 }
 
 record! {
-    /// Distance to the target, and how sure of it the device is.
+    /// Distance to the target, with the device's confidence.
     DistanceSimple {
-        /// At the speed of sound that the device is set to, mm.
+        /// Distance at the device's speed of sound setting, mm.
         distance_mm: u32,
-        /// 0 to 100.
+        /// Confidence, 0 to 100 %.
         confidence_percent: u8,
     }
 }
 
 record! {
-    /// Distance to the target with the ping that gave it.
+    /// Distance to the target, with its ping's parameters.
     Distance {
-        /// At the speed of sound that the device is set to, mm.
+        /// Distance at the device's speed of sound setting, mm.
         distance_mm: u32,
-        /// 0 to 100.
+        /// Confidence, 0 to 100 %.
         confidence_percent: u16,
-        /// Length of the pulse, us.
+        /// Pulse length, us.
         pulse_us: u16,
         /// Pings since the device was switched on.
         ping_number: u32,
-        /// Where the device listened.
+        /// Listening range.
         scan: ScanRange,
-        /// Index of the gain, 0 to 6.
+        /// Gain index, 0 to 6.
         gain: u32,
     }
 }
@@ -100,22 +100,22 @@ record! {
 pub struct Profile {
     /// The ping.
     pub distance: Distance,
-    /// Strengths, evenly spread over the scan; as many as a payload leaves room for.
+    /// Echo strengths, evenly spaced over the scan; at most as many as fit a payload.
     pub strengths: Bytes<MAX_STRENGTHS>,
 }
 
-/// Length of a profile before its strengths: the ping, and their number.
+/// Length of a profile before its strengths: distance fields and count.
 const PROFILE_HEADER: usize = Distance::LEN + u16::LEN;
 
-/// The most strengths that a payload has room for.
+/// Maximum number of strengths in a payload.
 pub const MAX_STRENGTHS: usize = MAX_PAYLOAD_BYTES - PROFILE_HEADER;
 
-/// Text as a device sends it: any bytes, with or without a zero at its end.
+/// Text as sent: any bytes, with or without a terminating zero.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub struct Text(pub Bytes<MAX_PAYLOAD_BYTES>);
 
 impl Text {
-    /// What can be read of it: up to the first zero, or the first byte that isn't UTF-8.
+    /// Readable part: up to the first zero or the first byte that isn't UTF-8.
     pub fn as_str(&self) -> &str {
         let bytes = self.0.as_slice().split(|byte| *byte == 0).next().unwrap_or_default();
         bytes.utf8_chunks().next().map_or("", |chunk| chunk.valid())
@@ -128,11 +128,11 @@ impl core::fmt::Debug for Text {
     }
 }
 
-/// Why a message can't be sent, or why a frame is none.
+/// Reason why a message can't be sent, or a frame can't be decoded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MessageError {
-    /// A payload that its message doesn't have.
+    /// Payload length that doesn't fit its message.
     #[error("ping message {id}: payload of {len} bytes doesn't fit it")]
     Length {
         /// Message id.
@@ -140,15 +140,15 @@ pub enum MessageError {
         /// Length of the payload.
         len: usize,
     },
-    /// A profile whose count of strengths lies.
+    /// Count of strengths that doesn't match the payload length.
     #[error("ping profile: {announced} strengths are announced and {present} are there")]
     Count {
-        /// By the count.
+        /// Count according to the profile.
         announced: u16,
-        /// By the payload's length.
+        /// Count according to the payload length.
         present: usize,
     },
-    /// An id under which no unknown message may be sent.
+    /// An id that may not be sent as an unknown message.
     #[error(
         "ping message {id}: can't be sent as unknown; it has a meaning of its own, or starts the bootloader"
     )]
@@ -156,12 +156,12 @@ pub enum MessageError {
         /// Message id.
         id: u16,
     },
-    /// A payload beyond the cap.
+    /// Payload above the maximum length.
     #[error("ping message: {0}")]
     TooLong(#[from] TooLong),
 }
 
-/// The enum, the ids, and both directions of the messages of fixed length, from one table.
+/// Defines the enum, the ids, and encoding and decoding of fixed-length messages, from one table.
 macro_rules! messages {
     ($($(#[$meta:meta])* $name:ident($type:ty) = $constant:ident $id:literal,)*) => {
         /// Message ids.
@@ -169,30 +169,30 @@ macro_rules! messages {
             $($(#[$meta])* pub const $constant: u16 = $id;)*
             /// Refusal of a message.
             pub const NACK: u16 = 2;
-            /// Text for people.
+            /// Human-readable text.
             pub const ASCII_TEXT: u16 = 3;
-            /// Makes the device wait for new firmware. Never sent.
+            /// Switches the device to its bootloader. Never sent.
             pub const GOTO_BOOTLOADER: u16 = 1100;
             /// A ping with its echo.
             pub const PROFILE: u16 = 1300;
         }
 
-        /// A message. Numbers are in the wire's own units.
+        /// A message, in wire units.
         #[derive(Debug, Clone, Copy, PartialEq, Eq)]
         pub enum Message {
             $($(#[$meta])* $name($type),)*
-            /// Refusal of the message of that id.
+            /// Refusal of the message with this id.
             Nack {
-                /// Id of the message that was refused.
+                /// Id of the refused message.
                 nacked_id: u16,
-                /// Why.
+                /// Reason.
                 text: Text,
             },
-            /// Text for people.
+            /// Human-readable text.
             AsciiText(Text),
             /// A ping with its echo.
             Profile(Profile),
-            /// A message of another id, kept as it came.
+            /// A message of unknown id, kept as received.
             Other {
                 /// Message id.
                 id: u16,
@@ -202,7 +202,7 @@ macro_rules! messages {
         }
 
         impl Message {
-            /// Its id.
+            /// Message id.
             pub fn id(&self) -> u16 {
                 match self {
                     $(Self::$name(_) => $id,)*
@@ -240,7 +240,7 @@ macro_rules! messages {
             }
         }
 
-        /// Payload length of the messages that have but one.
+        /// Payload length of a fixed-length message.
         fn fixed_len(id: u16) -> Option<usize> {
             match id {
                 $($id => Some(<$type as Field>::LEN),)*
@@ -251,66 +251,66 @@ macro_rules! messages {
 }
 
 messages! {
-    /// Receipt of the message of that id.
+    /// Acknowledges the message with this id.
     Ack(u16) = ACK 1,
-    /// What the device is.
+    /// Identity of the device.
     DeviceInformation(DeviceInformation) = DEVICE_INFORMATION 4,
-    /// Version of the protocol that the device speaks.
+    /// Protocol version of the device.
     ProtocolVersion(ProtocolVersion) = PROTOCOL_VERSION 5,
-    /// Asks for the message of that id.
+    /// Requests the message with this id.
     GeneralRequest(u16) = GENERAL_REQUEST 6,
-    /// Gives the device an id, as any kind of device takes it.
+    /// Sets the device id, for any kind of device.
     SetAnyDeviceId(u8) = SET_ANY_DEVICE_ID 100,
-    /// Gives the echosounder an id.
+    /// Sets the echosounder's device id.
     SetDeviceId(u8) = SET_DEVICE_ID 1000,
-    /// Sets where to listen.
+    /// Sets the listening range.
     SetRange(ScanRange) = SET_RANGE 1001,
     /// Sets the speed of sound, mm/s.
     SetSpeedOfSound(u32) = SET_SPEED_OF_SOUND 1002,
-    /// Lets the device choose range and gain, or not.
+    /// Enables or disables the device's choice of range and gain.
     SetModeAuto(bool) = SET_MODE_AUTO 1003,
-    /// Sets the least time between pings, ms.
+    /// Sets the minimum time between pings, ms.
     SetPingInterval(u16) = SET_PING_INTERVAL 1004,
-    /// Sets the gain by its index, 0 to 6.
+    /// Sets the gain index, 0 to 6.
     SetGain(u8) = SET_GAIN 1005,
-    /// Switches pinging on or off.
+    /// Enables or disables pinging.
     SetPingEnable(bool) = SET_PING_ENABLE 1006,
-    /// Supply, mV.
+    /// Supply voltage, mV.
     Voltage5(u16) = VOLTAGE_5 1202,
-    /// Speed of sound that the device computes with, mm/s.
+    /// Speed of sound setting, mm/s.
     SpeedOfSound(u32) = SPEED_OF_SOUND 1203,
-    /// Where the device listens.
+    /// Listening range.
     Range(ScanRange) = RANGE 1204,
-    /// Whether the device chooses range and gain.
+    /// True if the device chooses range and gain.
     ModeAuto(bool) = MODE_AUTO 1205,
-    /// Least time between pings, ms.
+    /// Minimum time between pings, ms.
     PingInterval(u16) = PING_INTERVAL 1206,
-    /// Index of the gain, 0 to 6.
+    /// Gain index, 0 to 6.
     Gain(u32) = GAIN 1207,
-    /// Length of the pulse, us.
+    /// Pulse length, us.
     TransmitDuration(u16) = TRANSMIT_DURATION 1208,
-    /// An older summary of the device's state.
+    /// Legacy status summary.
     GeneralInfo(GeneralInfo) = GENERAL_INFO 1210,
     /// Distance and confidence.
     DistanceSimple(DistanceSimple) = DISTANCE_SIMPLE 1211,
-    /// Distance with the ping that gave it.
+    /// Distance with its ping's parameters.
     Distance(Distance) = DISTANCE 1212,
-    /// Temperature of the processor, 0.01 degrees Celsius.
+    /// Processor temperature, 0.01 degrees Celsius.
     ProcessorTemperature(u16) = PROCESSOR_TEMPERATURE 1213,
-    /// Temperature of the board, 0.01 degrees Celsius.
+    /// Board temperature, 0.01 degrees Celsius.
     PcbTemperature(u16) = PCB_TEMPERATURE 1214,
-    /// Whether the device pings.
+    /// True if pinging is enabled.
     PingEnabled(bool) = PING_ENABLED 1215,
-    /// Asks for the message of that id again and again.
+    /// Starts continuous output of the message with this id.
     ContinuousStart(u16) = CONTINUOUS_START 1400,
-    /// Ends that.
+    /// Stops it.
     ContinuousStop(u16) = CONTINUOUS_STOP 1401,
 }
 
 impl Message {
-    /// What a frame says. Unknown ids are kept as [`Message::Other`].
+    /// Decodes a frame. Unknown ids are kept as [`Message::Other`].
     ///
-    /// Errors: a payload that the id's message doesn't have.
+    /// Errors: a payload that doesn't fit its message.
     pub fn decode(frame: &Frame<'_>) -> Result<Self, MessageError> {
         let Frame { id, payload, .. } = *frame;
         let length = MessageError::Length { id, len: payload.len() };
@@ -330,9 +330,9 @@ impl Message {
         }
     }
 
-    /// Its payload.
+    /// Encoded payload.
     ///
-    /// Errors: too long, or an [`Message::Other`] whose id isn't free for that.
+    /// Errors: too long, or an [`Message::Other`] whose id may not be sent as unknown.
     pub fn payload(&self) -> Result<Bytes<MAX_PAYLOAD_BYTES>, MessageError> {
         let mut payload = Payload::default();
         self.write(&mut payload)?;
@@ -341,7 +341,7 @@ impl Message {
 }
 
 impl Distance {
-    /// The ping that a distance or profile message tells of.
+    /// The ping of a distance or profile frame.
     pub fn of(frame: &Frame<'_>) -> Option<Self> {
         let mut payload = frame.payload;
         matches!(frame.id, id::DISTANCE | id::PROFILE).then(|| Self::read(&mut payload)).flatten()
@@ -349,7 +349,7 @@ impl Distance {
 }
 
 impl DistanceSimple {
-    /// What a message of simple distance tells.
+    /// The distance of a simple distance frame.
     pub fn of(frame: &Frame<'_>) -> Option<Self> {
         let mut payload = frame.payload;
         (frame.id == id::DISTANCE_SIMPLE).then(|| Self::read(&mut payload)).flatten()
@@ -381,7 +381,7 @@ fn is_known(id: u16) -> bool {
     matches!(id, id::NACK | id::ASCII_TEXT | id::PROFILE) || fixed_len(id).is_some()
 }
 
-/// Whether a message of that id may have a payload of that length, which begins with what is there of it.
+/// True if a message of that id may have this payload length, given the payload bytes present so far.
 pub(super) fn may_be(id: u16, len: usize, there: &[u8]) -> bool {
     match id {
         id::NACK => len >= u16::LEN,

@@ -1,4 +1,4 @@
-//! The Ping protocol: frames with a weak checksum, and the messages that an echosounder and its host exchange.
+//! The Ping protocol: frames with a weak checksum, and the messages between echosounder and host.
 
 mod fields;
 mod frame;
@@ -19,12 +19,12 @@ pub struct Addressed {
     pub source: u8,
     /// Device id of the receiver; 0 is the host, 255 everyone.
     pub destination: u8,
-    /// What is said.
+    /// Message.
     pub message: Message,
 }
 
 impl Addressed {
-    /// The message as a frame.
+    /// Encodes the message as a frame.
     ///
     /// Errors: a payload beyond [`MAX_PAYLOAD_BYTES`], or an id that may not be sent as [`Message::Other`].
     pub fn encode(&self) -> Result<Bytes<MAX_FRAME_BYTES>, MessageError> {
@@ -39,15 +39,14 @@ impl Addressed {
     }
 }
 
-/// How frames stand in a stream of bytes, either way.
-///
-/// A frame of a known id but with another length than its message has is no frame, as soon as that can be seen: a length
-/// that lies then swallows nothing. Only texts and unknown messages have no length to check.
+/// Framing of messages in a byte stream, in either direction.
+/// || A frame of a known id with a length that doesn't fit its message is rejected as early as possible, so that a false length
+/// swallows no further frames. Only texts and unknown messages have no length to check.
 /// Source: Ping protocol, packet format.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Frames;
 
-/// Messages out of a stream of bytes, either way.
+/// Decodes messages from a byte stream, in either direction.
 pub type PingCodec = Framed<Frames, MAX_FRAME_BYTES>;
 
 impl Framing for Frames {

@@ -22,7 +22,7 @@ fn ping() -> Distance {
     }
 }
 
-/// The worked frames of the protocol's description: bytes, sender, message.
+/// Worked frames of the protocol description: bytes, sender, message.
 fn examples() -> Vec<(Vec<u8>, u8, Message)> {
     let near = Distance {
         distance_mm: 1500,

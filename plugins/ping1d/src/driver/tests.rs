@@ -1,4 +1,4 @@
-//! The driver against an emulated device, on a line that may lose messages; no port, no clock.
+//! The driver against an emulated device on a lossy line; no port, no clock.
 
 use headrace_sensor::device::{Emulator as _, EmulatorSetup};
 use headrace_sensor::geometry::site::Site;
@@ -18,9 +18,9 @@ struct Rig {
     line: Vec<(MonoNs, Vec<u8>)>,
     sent: Vec<Message>,
     heard: Vec<(MonoNs, Message)>,
-    /// Every message of this number from the host is lost; 0 loses none.
+    /// Every n-th message from the host is lost; 0 loses none.
     loses: usize,
-    /// The one message from the host that is lost besides, by its number.
+    /// One additional lost message from the host, by number.
     loses_only: Option<usize>,
 }
 
@@ -72,7 +72,7 @@ impl Rig {
         }
     }
 
-    /// Lets the device ping, with the wall at 4 m.
+    /// Triggers a ping, with the wall at 4 m.
     fn ping(&mut self) {
         let mut due = Vec::new();
         self.device.begin(self.now + DurNs(1), &mut due);

@@ -6,7 +6,7 @@ use super::*;
 use crate::plugin::PingDecoder;
 use crate::settings::tests::settings;
 
-/// Sent times and readings with their times, all in ms, where the wall is at `range_m` after so many seconds.
+/// Send times and readings with their times, all in ms; `range_m` gives the wall's distance after a number of seconds.
 fn run(
     text: &str,
     range_m: impl Fn(f64) -> Option<f64>,

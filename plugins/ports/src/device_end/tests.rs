@@ -1,4 +1,4 @@
-//! Both ends of real ports: what goes in at one comes out at the other.
+//! Round trips through both ends of real ports.
 
 use std::net::Ipv4Addr;
 use std::time::Duration;

@@ -8,9 +8,9 @@ use crate::fix_hint;
 use crate::open_error::{OpenError, OpenErrorKind};
 
 const CLASS: &str = "/sys/class/net";
-/// The kind of network that an interface is of. Source: Linux, `ARPHRD_CAN`.
+/// Hardware type of CAN interfaces. Source: Linux, `ARPHRD_CAN`.
 const CAN: &str = "280";
-/// The bit of an interface's flags that says that it is up. Source: Linux, `IFF_UP`.
+/// Interface flag "up". Source: Linux, `IFF_UP`.
 const UP: u32 = 1;
 
 pub(super) fn found(machine: &Machine) -> Vec<Found> {
@@ -22,24 +22,24 @@ fn is_can(machine: &Machine, name: &str) -> bool {
     machine.text(&format!("{CLASS}/{name}/type")).as_deref() == Some(CAN)
 }
 
-/// Whether this machine has a network interface of that name that is up.
+/// True if this machine has a network interface of that name that is up.
 pub fn is_interface_up(name: &str) -> bool {
     is_up(&Machine::ours(), name) == Some(true)
 }
 
-/// Whether it is up, where its flags can be read.
+/// True if the interface is up; `None` if its flags can't be read.
 fn is_up(machine: &Machine, name: &str) -> Option<bool> {
     let flags = machine.text(&format!("{CLASS}/{name}/flags"))?;
     let flags = u32::from_str_radix(flags.trim_start_matches("0x"), 16).ok()?;
     Some(flags & UP != 0)
 }
 
-/// Whether there is an adapter behind it, which has a bit rate.
+/// True if the interface has a hardware adapter, and so a bit rate.
 fn has_hardware(machine: &Machine, name: &str) -> bool {
     machine.exists(&format!("{CLASS}/{name}/device"))
 }
 
-/// What keeps an interface from being used: it isn't there, or it is down.
+/// Error if the interface is down; `None` if it is up or its flags can't be read.
 pub(crate) fn down(machine: &Machine, name: &str) -> Option<OpenError> {
     if is_up(machine, name)? {
         return None;
@@ -49,7 +49,7 @@ pub(crate) fn down(machine: &Machine, name: &str) -> Option<OpenError> {
     Some(OpenError::new(OpenErrorKind::Other, why, Some(&mends)))
 }
 
-/// What keeps an interface from being used, or would.
+/// Problems that keep the interface from being used.
 pub(super) fn troubles(machine: &Machine, name: &str) -> Vec<OpenError> {
     if !is_can(machine, name) {
         return vec![OpenError::no_interface(name)];

@@ -1,25 +1,25 @@
-//! A device as the system's files describe it.
+//! A device as described by the system's files.
 
 use headrace_sensor::driver::Carrier;
 
 use super::rights::Rights;
 use crate::open_error::OpenError;
 
-/// Something that a sensor may be connected to.
+/// A port or interface that a sensor may be connected to.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Found {
-    /// How bytes get to it.
+    /// Carrier of its bytes.
     pub carrier: Carrier,
-    /// The device file or the network interface, as the system calls it now.
+    /// Current name of the device file or network interface.
     pub name: String,
-    /// What it says it is.
+    /// Self-description, such as the product name.
     pub says: Option<String>,
-    /// The value of `connect` by which a vehicle file names it; of a bus, with a word in place of the device's address.
+    /// Value of `connect` for the vehicle file; for a bus, with a placeholder for the device's address.
     pub connect: Option<String>,
-    /// More about it: what, and its value.
+    /// Further properties, as (name, value).
     pub details: Vec<(&'static str, String)>,
-    /// Who may open it; an interface of the network needs no rights.
+    /// Access rights; `None` for a network interface, which needs none.
     pub rights: Option<Rights>,
-    /// What keeps us from using it, each with what mends it.
+    /// Problems that keep it from being used, each with its fix.
     pub troubles: Vec<OpenError>,
 }

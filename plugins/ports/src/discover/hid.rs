@@ -8,7 +8,7 @@ use headrace_sensor::driver::Carrier;
 use super::{Found, Machine, Rights};
 
 const CLASS: &str = "/sys/class/hidraw";
-/// The first item of report descriptors, which says the usage page in one byte or two. Source: HID 1.11, 6.2.2.7.
+/// First item of a report descriptor: usage page of one or two bytes. Source: HID 1.11, 6.2.2.7.
 const PAGE_1: u8 = 0x05;
 const PAGE_2: u8 = 0x06;
 
@@ -16,13 +16,13 @@ pub(super) fn found(machine: &Machine) -> Vec<Found> {
     machine.names(CLASS).into_iter().filter_map(|name| describe(machine, &name)).collect()
 }
 
-/// The identities of all devices, and where they are.
+/// Identities of all devices, with their paths.
 pub(super) fn identities(machine: &Machine) -> Vec<(String, UsbIdentity)> {
     let names = machine.names(CLASS).into_iter();
     names.filter_map(|name| Some((format!("/dev/{name}"), identity(machine, &name)?.0))).collect()
 }
 
-/// Who the device is, and its name.
+/// Identity and product name of a device.
 fn identity(machine: &Machine, name: &str) -> Option<(UsbIdentity, Option<String>)> {
     let event = machine.text(&format!("{CLASS}/{name}/device/uevent"))?;
     let value = |key: &str| {

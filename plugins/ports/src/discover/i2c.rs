@@ -8,7 +8,7 @@ use crate::open_error::{OpenError, OpenErrorKind};
 
 const DEVICES: &str = "/sys/bus/i2c/devices";
 
-/// Buses; the folder holds the devices on them as well, under other names.
+/// Lists buses; the folder also holds the devices on them, under other names.
 pub(super) fn found(machine: &Machine) -> Vec<Found> {
     let names = machine.names(DEVICES).into_iter();
     let buses = names.filter(|name| name.strip_prefix("i2c-").is_some_and(|n| n.parse::<u32>().is_ok()));
@@ -29,7 +29,7 @@ fn describe(machine: &Machine, name: &str) -> Found {
     }
 }
 
-/// What keeps a bus from being used.
+/// Problem that keeps a bus from being used.
 pub(super) fn trouble(machine: &Machine, path: &str) -> Option<OpenError> {
     if let Some(rights) = Rights::of(machine, path) {
         return rights.trouble(path);

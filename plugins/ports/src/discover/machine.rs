@@ -1,25 +1,25 @@
-//! The system's files, ours or a copy of another's.
+//! The system's files, of this machine or a copy of another's.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use rustix::fs::{Access, access};
 
-/// Whose right to open things is asked for.
+/// User whose access rights are checked.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum User {
-    /// Whoever runs this program. The kernel itself is asked, so that access lists count.
+    /// The user running this program. Checked by the kernel, so that access lists count.
     Ourselves,
-    /// Another one, by the modes of the files alone.
+    /// Another user, checked by file modes only.
     Other {
-        /// Number of the user.
+        /// User id.
         uid: u32,
-        /// Numbers of all the user's groups.
+        /// All group ids of the user.
         gids: Vec<u32>,
     },
 }
 
-/// A system whose `/dev`, `/sys`, `/proc`, `/etc` and `/lib` are looked at.
+/// A machine of which `/dev`, `/sys`, `/proc`, `/etc` and `/lib` are read.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Machine {
     root: PathBuf,
@@ -27,17 +27,17 @@ pub struct Machine {
 }
 
 impl Machine {
-    /// This one, for whoever runs this program.
+    /// This machine, for the user running this program.
     pub fn ours() -> Self {
         Self { root: PathBuf::from("/"), user: User::Ourselves }
     }
 
-    /// One whose folders are below `root`.
+    /// A machine whose folders are below `root`.
     pub fn below(root: &Path, user: User) -> Self {
         Self { root: root.to_owned(), user }
     }
 
-    /// Where a file of it is that it calls `absolute`.
+    /// Path on this host of the machine's file `absolute`.
     pub(super) fn path(&self, absolute: &str) -> PathBuf {
         self.root.join(absolute.trim_start_matches('/'))
     }
@@ -46,12 +46,12 @@ impl Machine {
         self.path(absolute).exists()
     }
 
-    /// The text of a file, without spaces around it; `None` where it is empty or can't be read.
+    /// Trimmed text of a file; `None` if it is empty or can't be read.
     pub(super) fn text(&self, absolute: &str) -> Option<String> {
         text(&self.path(absolute))
     }
 
-    /// The names in a folder, `ttyUSB2` before `ttyUSB10`.
+    /// Names in a folder in numeric order: `ttyUSB2` before `ttyUSB10`.
     pub(super) fn names(&self, folder: &str) -> Vec<String> {
         let entries = fs::read_dir(self.path(folder)).into_iter().flatten().flatten();
         let mut names: Vec<String> =
@@ -64,7 +64,7 @@ impl Machine {
         names
     }
 
-    /// The user's number and those of the groups.
+    /// User id and group ids.
     pub(super) fn ids(&self) -> (u32, Vec<u32>) {
         match &self.user {
             User::Other { uid, gids } => (*uid, gids.clone()),
@@ -77,20 +77,20 @@ impl Machine {
         }
     }
 
-    /// Whether the kernel says that the file may be read and written, where it is to be asked.
+    /// Kernel's answer whether the file can be read and written; `None` for another user.
     pub(super) fn asked_kernel(&self, absolute: &str) -> Option<bool> {
         (self.user == User::Ourselves)
             .then(|| access(self.path(absolute), Access::READ_OK | Access::WRITE_OK).is_ok())
     }
 
-    /// The name that `/etc/group` or `/etc/passwd` has for a number; both have it third.
+    /// Name of an id in `/etc/group` or `/etc/passwd`; both have the id as the third field.
     pub(super) fn name_of(&self, file: &str, number: u32) -> Option<String> {
         let all = self.text(file)?;
         let line = all.lines().find(|line| line.split(':').nth(2) == Some(number.to_string().as_str()))?;
         line.split(':').next().map(str::to_owned)
     }
 
-    /// Whether `/etc/group` lists the user in a group, wherever this session was begun.
+    /// True if `/etc/group` lists the user in the group, even if this session predates it.
     pub(super) fn is_listed(&self, group: &str) -> bool {
         let listed = || {
             let user = self.name_of("/etc/passwd", self.ids().0)?;
@@ -101,13 +101,13 @@ impl Machine {
         listed().unwrap_or(false)
     }
 
-    /// Whether the kernel has a protocol of this name registered, be it by a module or built in.
+    /// True if the kernel has registered a protocol of this name, from a module or built in.
     pub(super) fn has_protocol(&self, name: &str) -> bool {
         let all = self.text("/proc/net/protocols").unwrap_or_default();
         all.lines().any(|line| line.split_whitespace().next() == Some(name))
     }
 
-    /// Whether the kernel has a module, or could load it; `name` with underscores.
+    /// True if the kernel has the module loaded, built in or available; `name` with underscores.
     pub(super) fn has_module(&self, name: &str) -> bool {
         let is_it = |path: &str| {
             let file = path.trim_end_matches(':').rsplit('/').next().unwrap_or_default();
@@ -125,7 +125,7 @@ impl Machine {
     }
 }
 
-/// The text of a file, without spaces around it; `None` where it is empty or can't be read.
+/// Trimmed text of a file; `None` if it is empty or can't be read.
 pub(super) fn text(path: &Path) -> Option<String> {
     let bytes = fs::read(path).ok()?;
     Some(String::from_utf8_lossy(&bytes).trim().to_owned()).filter(|text| !text.is_empty())

@@ -1,22 +1,22 @@
-//! Whether what a `connect` names is there and may be opened.
+//! Checks whether the target of a `connect` exists and can be opened.
 
 use headrace_sensor::connect::{Connect, SerialPort, UsbIdentity};
 
 use super::{Machine, Rights, can, hid, i2c, serial};
 use crate::open_error::OpenError;
 
-/// What is known of what a `connect` names.
+/// Presence of the target of a `connect`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Presence {
-    /// It is there, and may be opened, under this name.
+    /// It exists and can be opened, under this name.
     There(String),
-    /// An address on the network: only asking can tell.
+    /// A network address: can only be checked by connecting.
     Elsewhere,
 }
 
-/// Whether what `connect` names is there and may be opened. Nothing is opened for it.
+/// Checks whether the target of `connect` exists and can be opened, without opening it.
 ///
-/// Errors: it isn't there, it is there more than once, or it may not be opened; with what mends it.
+/// Errors: it is absent, ambiguous or not accessible; with the fix.
 pub fn presence(machine: &Machine, connect: &Connect) -> Result<Presence, OpenError> {
     match connect {
         Connect::Serial { port: SerialPort::Path(path), .. } => file(machine, path),
@@ -40,7 +40,7 @@ pub fn presence(machine: &Machine, connect: &Connect) -> Result<Presence, OpenEr
     }
 }
 
-/// The path of the one device that fits.
+/// Path of the only matching device.
 fn one(what: &str, all: Vec<(String, UsbIdentity)>, wanted: &UsbIdentity) -> Result<String, OpenError> {
     let fitting = all.into_iter().filter(|(_, got)| serial::fits(got, wanted));
     let mut paths: Vec<String> = fitting.map(|(path, _)| path).collect();

@@ -1,4 +1,4 @@
-//! Who may open a device file, and what gives the right to it.
+//! Access rights of a device file, and the command that grants them.
 
 use std::fs;
 use std::os::unix::fs::MetadataExt as _;
@@ -7,25 +7,25 @@ use super::machine::Machine;
 use crate::fix_hint;
 use crate::open_error::OpenError;
 
-/// Who may open a device file.
+/// Access rights of a device file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Rights {
-    /// The owner's name, or number where it has none.
+    /// Owner's name, or id if it has none.
     pub owner: String,
-    /// The group's name, or number where it has none.
+    /// Group's name, or id if it has none.
     pub group: String,
-    /// Permissions: nine bits, as `chmod` takes them.
+    /// Permission bits (nine), as for `chmod`.
     pub mode: u32,
-    /// Whether the user may read and write it.
+    /// True if the user can read and write it.
     pub may_open: bool,
-    /// Whether the group may, and is one that people may be in.
+    /// True if the group has access and isn't root's.
     by_group: bool,
-    /// Whether the group lists the user, but this session was begun before it did.
+    /// True if the group lists the user, whether or not this session has it.
     listed: bool,
 }
 
 impl Rights {
-    /// Those to a device file; `None` where there is none.
+    /// Rights of a device file; `None` if it doesn't exist.
     pub(super) fn of(machine: &Machine, path: &str) -> Option<Self> {
         let file = fs::metadata(machine.path(path)).ok()?;
         let (uid, gids) = machine.ids();
@@ -38,7 +38,7 @@ impl Rights {
             mode
         };
         let group = machine.name_of("/etc/group", file.gid());
-        // Nobody is put into root's group for the sake of a port.
+        // Joining root's group is never advised.
         let by_group = mode >> 3 & 0o6 == 0o6 && group.as_deref().is_some_and(|group| group != "root");
         let group = group.unwrap_or_else(|| file.gid().to_string());
         let by_mode = uid == 0 || bits & 0o6 == 0o6;
@@ -52,7 +52,7 @@ impl Rights {
         })
     }
 
-    /// What is wrong with them, where something is.
+    /// Error if the user can't open the file.
     pub(super) fn trouble(&self, path: &str) -> Option<OpenError> {
         (!self.may_open).then(|| OpenError::denied(path, &self.remedy(path)))
     }
@@ -68,7 +68,7 @@ impl Rights {
     }
 }
 
-/// The line that gives whoever runs this program the right to a device file.
+/// Command that gives the current user access to a device file.
 pub(crate) fn remedy_for(path: &str) -> String {
     let rights = Rights::of(&Machine::ours(), path);
     rights.map_or_else(|| fix_hint::rule(path), |rights| rights.remedy(path))

@@ -11,12 +11,12 @@ use super::{Found, Machine, Rights};
 
 const CLASS: &str = "/sys/class/tty";
 const BY_ID: &str = "/dev/serial/by-id";
-/// What the kernel says of ports that firmware announces but nobody has found. Source: Linux, `PORT_UNKNOWN`.
+/// Port type of UARTs announced by firmware but not detected. Source: Linux, `PORT_UNKNOWN`.
 const NOBODY_THERE: &str = "0";
-/// How far above a tty its USB device may be: port, interface, device.
+/// Levels from a tty up to its USB device: port, interface, device.
 const MOST_UP: usize = 4;
 
-/// What a USB adapter says of itself.
+/// USB descriptors of an adapter.
 struct Usb {
     identity: UsbIdentity,
     says: Option<String>,
@@ -41,19 +41,19 @@ pub(super) fn found(machine: &Machine) -> Vec<Found> {
     described.collect()
 }
 
-/// Whether a device that says `got` is the one that a `connect` of `wanted` means.
+/// True if the identity `got` matches the identity `wanted` by a `connect`.
 pub(super) fn fits(got: &UsbIdentity, wanted: &UsbIdentity) -> bool {
     (got.vendor, got.product) == (wanted.vendor, wanted.product)
         && (wanted.serial.is_none() || wanted.serial == got.serial)
 }
 
-/// The identities of the USB adapters, and where their ports are.
+/// Identities of the USB adapters, with their port names.
 pub(super) fn adapters(machine: &Machine) -> Vec<(String, UsbIdentity)> {
     let names = machine.names(CLASS).into_iter().filter(|name| is_port(machine, name));
     names.filter_map(|name| Some((format!("/dev/{name}"), usb(machine, &name)?.identity))).collect()
 }
 
-/// A tty with hardware behind it; consoles and pseudoterminals have none.
+/// True for a tty with hardware; consoles and pseudoterminals have none.
 fn is_port(machine: &Machine, name: &str) -> bool {
     machine.exists(&format!("{CLASS}/{name}/device"))
         && machine.exists(&format!("/dev/{name}"))
@@ -84,7 +84,7 @@ fn describe(machine: &Machine, name: &str, usb: Option<&Usb>, unique: Option<Usb
     let baud = 115_200;
     let by_path = |path: &String| Connect::Serial { port: SerialPort::Path(path.clone()), baud };
     let by_usb = unique.map(|identity| Connect::Serial { port: SerialPort::Usb(identity), baud });
-    // A serial number may hold what a connect can't.
+    // A serial number may contain characters that `connect` can't express.
     let by_usb = by_usb.filter(|connect| Connect::parse(&connect.to_string()).as_ref() == Ok(connect));
     let connect = by_usb.unwrap_or_else(|| by_path(by_id.as_ref().unwrap_or(&path)));
     let mut details = Vec::new();
@@ -102,7 +102,7 @@ fn describe(machine: &Machine, name: &str, usb: Option<&Usb>, unique: Option<Usb
     }
 }
 
-/// The name that stays the same wherever the adapter is plugged in.
+/// Stable name, independent of the USB socket in use.
 fn by_id(machine: &Machine, name: &str) -> Option<String> {
     let links = machine.names(BY_ID).into_iter().map(|link| format!("{BY_ID}/{link}"));
     let mut links = links.filter(|link| {

@@ -1,4 +1,4 @@
-//! On trees of files like those of real machines, for users who may and who may not.
+//! Discovery on file trees like those of real machines, for users with and without access.
 
 use std::fs;
 use std::os::unix::fs::{MetadataExt as _, PermissionsExt as _, symlink};
@@ -9,7 +9,7 @@ use headrace_sensor::connect::Connect;
 use super::*;
 use crate::open_error::OpenErrorKind;
 
-/// Another machine's files in a folder of ours, which goes with it. All are ours, and our group is called dialout there.
+/// Another machine's files in a temporary folder. All belong to us, and our group is called dialout there.
 struct Tree(PathBuf);
 
 impl Drop for Tree {
@@ -94,7 +94,7 @@ impl Tree {
         self.path("/etc/group").metadata().unwrap().gid()
     }
 
-    /// By somebody who is neither owner nor in the group, nor root.
+    /// Seen by a user who is neither owner, in the group, nor root.
     fn seen_by_stranger(&self) -> Machine {
         self.seen_by(4009, &[4009])
     }
@@ -147,7 +147,7 @@ fn usb_ports_are_named_by_what_stays() {
 #[test]
 fn what_is_no_port_is_not_listed() {
     let tree = Tree::new("phantoms");
-    // A console without hardware, a port that nobody found, one that the firmware knows.
+    // A console without hardware, an undetected UART, a firmware port.
     tree.file("/sys/class/tty/tty1/uevent", "");
     for (name, kind) in [("ttyS0", "4\n"), ("ttyS1", "0\n")] {
         tree.file(&format!("/sys/class/tty/{name}/type"), kind);
@@ -166,7 +166,7 @@ fn who_may_not_open_is_told_what_gives_the_right() {
     let join = "sudo usermod -aG dialout $USER, and log in again";
     for (mode, machine, right) in [
         (0o660, tree.seen_by_stranger(), join),
-        // Ann is in the group by now, but this session isn't.
+        // Ann is in the group, but this session predates it.
         (
             0o660,
             tree.seen_by(4001, &[4001]),
@@ -233,7 +233,7 @@ fn can_interfaces_say_what_they_lack() {
     }
     tree.file("/proc/modules", "");
     assert!(said(&machine, "can:vcan0").contains("no CAN sockets; sudo modprobe can-raw"));
-    // Built in, or loaded when it is first used.
+    // Built in, or loaded on first use.
     tree.file("/proc/net/protocols", "protocol  size sockets\nCAN_RAW   1024  0\n");
     assert_eq!(said(&machine, "can:vcan0"), "There(\"vcan0\")");
     tree.file("/proc/net/protocols", "protocol  size sockets\n");
@@ -264,7 +264,7 @@ fn this_machine_can_be_looked_at() {
     for found in &found {
         assert!(!found.name.is_empty() && found.connect.is_some(), "{found:?}");
     }
-    // Whoever may open it by our account may do so.
+    // Files that the access rights allow must be accessible.
     for path in found.iter().filter(|found| found.rights.as_ref().is_some_and(|rights| rights.may_open)) {
         assert!(Path::new(&path.name).exists());
     }

@@ -1,4 +1,4 @@
-//! CAN interfaces, with the kernel's own stamps.
+//! CAN interfaces, with kernel timestamps.
 
 use std::io;
 use std::time::Duration;
@@ -15,14 +15,14 @@ use crate::diagnosis;
 use crate::discover::{self, Machine};
 use crate::open_error::OpenError;
 
-/// Length of a `can_frame`, and where its data begins.
+/// Length of a `can_frame`, and offset of its data.
 const FRAME_BYTES: usize = 16;
 const DATA_AT: usize = 8;
-/// The bits of the identifier's word that say that it has 29 bits. Source: Linux, `CAN_EFF_FLAG`.
+/// Identifier flag for 29 bits. Source: Linux, `CAN_EFF_FLAG`.
 const EXTENDED: u32 = 0x8000_0000;
 
-/// What a socket says once: its interface was set down, and it hears again when that is up; it is gone, and it never hears
-/// again. Source: Linux, errno.
+/// Errors that a socket reports once: interface down (the socket receives again when it is up), and interface gone (it never
+/// receives again). Source: Linux, errno.
 const ENETDOWN: i32 = 100;
 const ENODEV: i32 = 19;
 
@@ -30,7 +30,7 @@ struct Can {
     socket: CanSocket,
     timeout: ReadTimeout,
     interface: String,
-    /// The kernel has said that the interface is down, and nothing has come since.
+    /// The interface was reported down, and no frame has come since.
     is_down: bool,
 }
 
@@ -38,7 +38,7 @@ pub(super) fn open(interface: &str) -> Result<Box<dyn Line>, OpenError> {
     let opening = || {
         let socket = CanSocket::open(interface)?;
         socket.set_recv_timestamp(true)?;
-        // A bus that is off or breaks down says so in frames of its own.
+        // Bus-off and bus errors come as error frames.
         socket.set_error_filter_accept_all()?;
         Ok(socket)
     };
@@ -63,7 +63,7 @@ impl Line for Can {
             stamped = Some(clock::of_wall(stamp));
             FRAME_BYTES
         });
-        // The socket is kept, so that no frame is missed once the interface is up.
+        // The socket is kept, so that no frame is missed when the interface comes up.
         match read.as_ref().err().and_then(io::Error::raw_os_error) {
             Some(ENETDOWN) => {
                 self.is_down = true;
@@ -87,13 +87,13 @@ impl Line for Can {
     }
 }
 
-/// Puts a frame on a bus.
+/// Sends a frame on a bus.
 pub(crate) fn write(socket: &CanSocket, bytes: &[u8]) -> io::Result<()> {
     let refused = || io::Error::new(io::ErrorKind::InvalidInput, "no can_frame of 16 bytes");
     socket.write_frame(&frame(bytes).ok_or_else(refused)?)
 }
 
-/// A frame's bytes as the kernel lays them out: identifier and its flags, length, three spare bytes, data.
+/// Serializes a frame as the kernel's `can_frame`: identifier with flags, length, three padding bytes, data.
 fn bytes_of(frame: &CanFrame) -> [u8; FRAME_BYTES] {
     let mut bytes = [0; FRAME_BYTES];
     let data = frame.data();
@@ -107,7 +107,7 @@ fn bytes_of(frame: &CanFrame) -> [u8; FRAME_BYTES] {
     bytes
 }
 
-/// A frame of its bytes as the kernel lays them out.
+/// Parses a kernel `can_frame`.
 fn frame(bytes: &[u8]) -> Option<CanFrame> {
     let (word, rest) = bytes.split_first_chunk::<4>().filter(|_| bytes.len() == FRAME_BYTES)?;
     let word = u32::from_ne_bytes(*word);

@@ -36,7 +36,7 @@ fn is_it(device: &DeviceInfo, identity: &UsbIdentity) -> bool {
 fn io_error(error: &HidError) -> io::Error {
     match error {
         HidError::IoError { error } => io::Error::new(error.kind(), error.to_string()),
-        // What hidapi says of a device that has gone, and says of nothing else.
+        // hidapi's only mark of an unplugged device is this text.
         other if other.to_string().contains("disconnected") => {
             io::Error::new(io::ErrorKind::BrokenPipe, "it was unplugged")
         }

@@ -22,7 +22,7 @@ struct Bus<B> {
 pub(super) fn open(bus: &str, address: u8) -> Result<Box<dyn Line>, OpenError> {
     let opened =
         I2cdev::new(bus).map_err(|error| diagnosis::opening(bus, &io::Error::other(error.to_string())));
-    // The crate's error hides the kind; the file's own tells it.
+    // The crate's error hides the error kind; opening the file directly gives it.
     let opened = opened.map_err(|trouble| match std::fs::File::open(bus) {
         Err(error) => diagnosis::opening(bus, &error),
         Ok(_) => trouble,
@@ -31,7 +31,7 @@ pub(super) fn open(bus: &str, address: u8) -> Result<Box<dyn Line>, OpenError> {
 }
 
 impl<B: I2c> Line for Bus<B> {
-    /// A bus never speaks first.
+    /// A bus carries no unsolicited data.
     fn read(&mut self, wait: Duration, _: &mut [u8; READ_BYTES]) -> io::Result<Option<(MonoNs, usize)>> {
         thread::sleep(wait);
         Ok(None)
@@ -41,7 +41,7 @@ impl<B: I2c> Line for Bus<B> {
         self.bus.write(self.address, bytes).map_err(|error| failed(&error))
     }
 
-    /// Written and read apart: the sensor doesn't understand a repeated start.
+    /// Separate write and read: the sensor doesn't support a repeated start.
     fn exchange(
         &mut self,
         write: &[u8],
@@ -69,7 +69,7 @@ mod tests {
 
     use super::*;
 
-    /// A bus with a device that answers with what was written, once it has been.
+    /// A bus with a device that answers with the first byte of the last write.
     struct Echo(Vec<u8>);
 
     impl ErrorType for Echo {

@@ -1,23 +1,23 @@
-//! An open line, and what sockets and serial ports share in reading.
+//! An open line, and read helpers shared by sockets and serial ports.
 
 use std::io;
 use std::time::Duration;
 
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// The most bytes that one read gives.
+/// Maximum bytes of one read.
 pub(crate) const READ_BYTES: usize = 2048;
 
 /// An open line.
 pub(crate) trait Line {
-    /// Waits up to `wait` for bytes; gives when the first of them came, and how many. `None` when none came.
+    /// Waits up to `wait` for bytes; returns the first one's receive time and the count. `None` on timeout.
     fn read(&mut self, wait: Duration, into: &mut [u8; READ_BYTES]) -> io::Result<Option<(MonoNs, usize)>>;
 
-    /// Puts bytes on the line; on a carrier of messages they are one.
+    /// Sends bytes; on a message carrier they form one message.
     fn write(&mut self, bytes: &[u8]) -> io::Result<()>;
 
-    /// On a bus: writes, waits `settle`, reads, and gives the transaction, the bytes written and then those read, with the
-    /// moment at which the read began. `None` where the answer comes as a message.
+    /// On a bus: writes, waits `settle`, reads, and returns the transaction (bytes written, then bytes read) with the time at
+    /// which the read began. `None` if the answer comes as a message.
     fn exchange(
         &mut self,
         write: &[u8],
@@ -28,29 +28,29 @@ pub(crate) trait Line {
         Err(io::Error::new(io::ErrorKind::Unsupported, "only an I2C bus, or UDP in its place, exchanges"))
     }
 
-    /// Why nothing can come for now, with what would mend it, where the line itself knows.
+    /// Reason why no data can come at present, with its fix, if the line can detect one.
     fn complaint(&self) -> Option<String> {
         None
     }
 
-    /// Called about once a second while nothing has come, for carriers on which those who are silent are forgotten.
+    /// Keep-alive, called about once a second on an idle line, for carriers that forget silent clients.
     fn knock(&mut self) -> io::Result<()> {
         Ok(())
     }
 }
 
-/// A socket's read timeout, told to the system when it changes: most waits are as long as the last.
+/// A socket's read timeout, set only when it changes: most waits are as long as the last.
 #[derive(Default)]
 pub(super) struct ReadTimeout(Duration);
 
 impl ReadTimeout {
-    /// Has the next read wait so long.
+    /// Sets the timeout of the next read.
     pub(super) fn set(
         &mut self,
         wait: Duration,
         tell: impl FnOnce(Duration) -> io::Result<()>,
     ) -> io::Result<()> {
-        // One of zero would be none.
+        // A timeout of zero would mean none.
         let wait = wait.max(Duration::from_micros(1));
         if self.0 != wait {
             tell(wait)?;
@@ -60,7 +60,7 @@ impl ReadTimeout {
     }
 }
 
-/// What a read with a timeout gave; a timeout is no error.
+/// Result of a read with a timeout; a timeout gives `None`, not an error.
 pub(super) fn waited(read: io::Result<usize>) -> io::Result<Option<usize>> {
     match read {
         Ok(count) => Ok(Some(count)),

@@ -1,4 +1,4 @@
-//! Open lines to devices: one file a carrier.
+//! Open lines to devices: one file per carrier.
 
 #[cfg(target_os = "linux")]
 pub(crate) mod can;
@@ -16,9 +16,9 @@ use headrace_sensor::connect::Connect;
 use crate::open_error::OpenError;
 pub(crate) use line::{Line, READ_BYTES};
 
-/// Opens what a `connect` names.
+/// Opens the target of a `connect`.
 ///
-/// Errors: why it can't be opened, and what would mend it.
+/// Errors: the cause, with its fix.
 pub(crate) fn open(connect: &Connect) -> Result<Box<dyn Line>, OpenError> {
     match connect {
         Connect::Serial { port, baud } => serial::open(port, *baud),

@@ -12,15 +12,15 @@ use crate::clock;
 use crate::diagnosis;
 use crate::open_error::OpenError;
 
-/// Bits on the line for a byte: start, eight, stop.
+/// Bits per byte on the line: start, eight data, stop.
 const BITS_A_BYTE: i64 = 10;
-/// How long a write may wait for the line to take more.
+/// Write timeout.
 const WRITE_TIME: Duration = Duration::from_millis(500);
 
 struct Serial {
     port: TTYPort,
     byte_time: DurNs,
-    /// When the last read had taken all that there was.
+    /// Time at which the last read emptied the port.
     emptied: MonoNs,
 }
 
@@ -36,7 +36,7 @@ pub(super) fn open(port: &SerialPort, baud: u32) -> Result<Box<dyn Line>, OpenEr
     Ok(Box::new(Serial { port, byte_time, emptied: clock::now() }))
 }
 
-/// The path that a USB adapter's port has now.
+/// Current path of a USB adapter's port.
 fn path_of(identity: &UsbIdentity) -> Result<String, OpenError> {
     let what = format!("serial:usb:{identity}");
     let ports = serialport::available_ports().map_err(|error| diagnosis::opening(&what, &error.into()))?;
@@ -63,7 +63,7 @@ impl Line for Serial {
             return Err(io::Error::new(io::ErrorKind::BrokenPipe, "the port is gone"));
         }
         let now = clock::now();
-        // The bytes came one after the other, the first no earlier than the port was last found empty.
+        // Backdates the first byte by the line time of all bytes, but no earlier than the port was last found empty.
         let ago = DurNs(self.byte_time.0.saturating_mul(i64::try_from(count).unwrap_or(0)));
         let first = (now - ago).max(self.emptied).min(now);
         if count < into.len() {

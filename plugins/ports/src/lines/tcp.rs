@@ -1,4 +1,4 @@
-//! TCP connections that we open.
+//! Outgoing TCP connections.
 
 use std::io::{self, Read as _, Write as _};
 use std::net::{TcpStream, ToSocketAddrs as _};
@@ -30,7 +30,7 @@ fn connect(address: &str) -> io::Result<Tcp> {
     for address in address.to_socket_addrs()? {
         match TcpStream::connect_timeout(&address, CONNECT_TIME) {
             Ok(stream) => {
-                // A command is a few bytes that the head waits for.
+                // Commands are short, and the device waits for them.
                 stream.set_nodelay(true)?;
                 stream.set_write_timeout(Some(WRITE_TIME))?;
                 return Ok(Tcp { stream, timeout: ReadTimeout::default() });

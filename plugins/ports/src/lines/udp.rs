@@ -1,4 +1,4 @@
-//! UDP: to a bridge that answers those who have sent first, or from those who send to us.
+//! UDP: to a bridge that answers only clients that have sent first, or from senders to a local port.
 
 use std::io;
 use std::net::{SocketAddr, ToSocketAddrs as _, UdpSocket};
@@ -14,9 +14,9 @@ use crate::open_error::OpenError;
 struct Udp {
     socket: UdpSocket,
     timeout: ReadTimeout,
-    /// Where to: the bridge, or who sent last.
+    /// Destination: the bridge, or the last sender.
     peer: Option<SocketAddr>,
-    /// Whether we are the one who sends first.
+    /// True if the host sends first.
     calls: bool,
 }
 
@@ -26,7 +26,7 @@ pub(super) fn open(address: &str) -> Result<Box<dyn Line>, OpenError> {
         let peer = address.to_socket_addrs()?.next().ok_or_else(none)?;
         let own = if peer.is_ipv4() { "0.0.0.0:0" } else { "[::]:0" };
         let socket = UdpSocket::bind(own)?;
-        // Connected, so that only the bridge is heard and its absence is noticed.
+        // A connected socket receives from the bridge only, and reports its absence.
         socket.connect(peer)?;
         let mut line = Udp { socket, timeout: ReadTimeout::default(), peer: Some(peer), calls: true };
         line.knock()?;
@@ -58,12 +58,12 @@ impl Line for Udp {
         match self.peer {
             Some(_) if self.calls => self.socket.send(bytes).map(|_| ()),
             Some(peer) => self.socket.send_to(bytes, peer).map(|_| ()),
-            // Nobody has been heard yet whom it could be for.
+            // No sender yet, so no destination.
             None => Ok(()),
         }
     }
 
-    /// In place of a bus: a datagram of what is to be written and how much is to be read; the answer is the transaction.
+    /// Emulated bus: sends a datagram of the bytes to write and the read length; the answer is the transaction.
     fn exchange(
         &mut self,
         write: &[u8],

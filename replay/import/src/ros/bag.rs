@@ -1,7 +1,7 @@
 //! Bags of ROS 1.
 //!
-//! Source: ROS wiki, "Bags/Format/2.0". A record is a header of fields, each `name=value`, and data, both with their lengths before
-//! them; messages stand in chunks, definitions of their connections in chunks and once more at the end.
+//! Source: ROS wiki, "Bags/Format/2.0". A record is a header of fields, each `name=value`, and data, both prefixed by their
+//! lengths; messages are in chunks, connection definitions in chunks and again at the end.
 
 use std::collections::BTreeMap;
 use std::io::{Read, Seek, SeekFrom};
@@ -12,11 +12,11 @@ use crate::order::Order;
 use crate::{Clock, Entry, Format, ImportError, Input, Source as _, Step, Told};
 
 const MAGIC: &[u8] = b"#ROSBAG V2.0\n";
-/// More than names and numbers in a header take.
+/// More than the names and numbers of a header need, bytes.
 const MOST_HEADER: usize = 1 << 16;
-/// The part with the definitions, at the end of a bag, is read at once.
+/// Most bytes of the definitions at the end of a bag, which are read at once.
 const MOST_INDEX: u64 = 64 << 20;
-/// Times below this, in 2001, are no time of day.
+/// Times below this, in 2001, are not UTC.
 pub(super) const FIRST_UTC_NS: u64 = 1_000_000_000_000_000_000;
 
 const NO_RECORD: &str = "no record of a bag";
@@ -26,19 +26,19 @@ const NO_RECORD: &str = "no record of a bag";
 pub struct Bag {
     feeds: Feeds,
     begun: bool,
-    /// Whether the place of the next record isn't known.
+    /// Whether the position of the next record is unknown.
     astray: bool,
     connections: BTreeMap<u32, Topic>,
-    /// The chunk that is being read, and how far.
+    /// The chunk being read, and the position in it.
     chunk: Option<Chunk>,
     first_ns: Option<u64>,
-    /// What its header says of it.
+    /// Counts in the bag header.
     stated: Option<Stated>,
     chunks: u64,
     lost: BTreeMap<&'static str, u64>,
 }
 
-/// What a bag says of itself.
+/// Facts stated in a bag's header.
 #[derive(Debug, Clone, Copy)]
 struct Stated {
     index_at: u64,
@@ -46,31 +46,31 @@ struct Stated {
     chunks: u32,
 }
 
-/// A chunk that is unpacked, and what is to be said of it when it has been read.
+/// An unpacked chunk, and the loss to report after reading it.
 struct Chunk {
     bytes: Vec<u8>,
     at: usize,
     step: Step,
 }
 
-/// A record: its fields, its data, and the length of both.
+/// A record: its fields, its data, and their total length.
 struct Record<'a> {
     fields: Fields<'a>,
     data: &'a [u8],
     len: usize,
 }
 
-/// What a record was.
+/// Kind of a record.
 enum Accepted<'a> {
-    /// One that is done with.
+    /// A record without further content.
     Read,
-    /// A chunk, packed in this way.
+    /// A chunk with this compression.
     Chunk(&'a [u8]),
 }
 
-/// Why no record can be had.
+/// Why a record can't be read.
 enum Stop<'a> {
-    /// It isn't all there: its fields and what there is of its data, where the fields are.
+    /// It is incomplete: its fields and the available part of its data, if the fields are complete.
     More(Option<(Fields<'a>, &'a [u8])>),
     Bad,
 }
@@ -124,7 +124,7 @@ impl<'a> Fields<'a> {
     }
 }
 
-/// Bytes with their length before them, and what is behind.
+/// Length-prefixed bytes, and the rest.
 fn sized(bytes: &[u8]) -> Option<(&[u8], &[u8])> {
     let (len, rest) = bytes.split_first_chunk()?;
     rest.split_at_checked(usize::try_from(u32::from_le_bytes(*len)).ok()?)
@@ -136,11 +136,11 @@ fn record(front: &[u8]) -> Result<Record<'_>, Stop<'_>> {
         len.map(|len| usize::try_from(len).unwrap_or(usize::MAX))
     };
     let header_len = length(front).ok_or(Stop::More(None))?;
-    // The shortest has its kind: a length, `op=` and a byte.
+    // The shortest has only its kind: a length, `op=` and a byte.
     if !(8..=MOST_HEADER).contains(&header_len) {
         return Err(Stop::Bad);
     }
-    // Astray, lengths are made of anything; but no name begins with anything.
+    // Out of sync, lengths are arbitrary, but a field name begins with a lower-case letter.
     if front.get(8).is_some_and(|byte| !byte.is_ascii_lowercase()) {
         return Err(Stop::Bad);
     }
@@ -190,10 +190,10 @@ impl Format for Bag {
             Err(Stop::Bad) => Step::Lost(1, NO_RECORD),
             Err(Stop::More(None)) if was_astray => {
                 self.astray = true;
-                // What seems to be a long header astray is likely none, but only the file's end can tell.
+                // Out of sync, an apparently long header is probably not one, but only the end of the file can tell.
                 if end { Step::Lost(1, NO_RECORD) } else { Step::More }
             }
-            // A chunk that the file's end cuts holds messages all the same.
+            // A chunk truncated by the end of the file may contain messages.
             Err(Stop::More(Some((fields, data)))) if end && fields.u8(b"op") == Some(5) => {
                 match fields.get(b"compression") {
                     Some(packing) => self.open(fields, data, packing, front.len(), true),
@@ -223,12 +223,12 @@ impl Format for Bag {
 }
 
 impl Bag {
-    /// A bag whose messages go to these.
+    /// A bag whose messages go to `feeds`.
     pub fn new(feeds: Feeds) -> Self {
         Self { feeds, ..Self::default() }
     }
 
-    /// The topics of a bag: by the part of it that lists them, or else by all of it.
+    /// The topics of a bag: from its index, or else by a scan of the whole bag.
     ///
     /// Errors: the file can't be read, or is no bag.
     pub fn topics<R: Read + Seek>(name: &str, mut file: R) -> Result<Vec<Topic>, ImportError> {
@@ -292,14 +292,14 @@ impl Bag {
         })
     }
 
-    /// Takes a record. `None` for one that lacks what its kind must have.
+    /// Processes a record. `None` if it lacks a required field of its kind.
     fn accept<'a>(&mut self, fields: Fields<'a>, data: &[u8], out: &mut Vec<Entry>) -> Option<Accepted<'a>> {
         match fields.u8(b"op")? {
             2 => self.message(fields.u32(b"conn")?, fields.time_ns(b"time")?, data, out),
             3 => self.stated = Some(Self::bag_header(fields)?),
             5 => return Some(Accepted::Chunk(fields.get(b"compression")?)),
             7 => self.connection(fields.u32(b"conn")?, fields, Fields(data))?,
-            // Indexes say what stands elsewhere; later kinds may be passed over.
+            // Indexes hold no messages; unknown kinds may be ignored.
             _ => (),
         }
         Some(Accepted::Read)
@@ -343,13 +343,13 @@ impl Bag {
         Step::Held
     }
 
-    /// Takes a record of the chunk.
+    /// Processes a record of the chunk.
     fn read_on(&mut self, mut chunk: Chunk, out: &mut Vec<Entry>) -> Step {
         let rest = chunk.bytes.get(chunk.at..).unwrap_or_default();
         match record(rest) {
             _ if rest.is_empty() => return chunk.step,
             Ok(Record { fields, data, len }) => {
-                // A chunk holds no chunks.
+                // A chunk contains no chunks.
                 let taken = fields.u8(b"op") != Some(5) && self.accept(fields, data, out).is_some();
                 if !taken {
                     *self.lost.entry("records in chunks that can't be there").or_default() += 1;

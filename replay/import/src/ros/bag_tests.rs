@@ -1,4 +1,4 @@
-//! Bags of this file's own writing.
+//! Tests with bags written here.
 
 use std::io::Cursor;
 
@@ -38,7 +38,7 @@ fn chunk(records: &[Vec<u8>]) -> Vec<u8> {
     whole(5, &[("compression", b"none"), ("size", &size)], &bytes)
 }
 
-/// A bag that says to have so many chunks; its index is everything from the first connection outside chunks on.
+/// A bag whose header states the number of chunks; its index starts at the first connection outside chunks.
 fn bag(chunks: &[Vec<u8>], index: &[Vec<u8>]) -> Vec<u8> {
     let header = |at: usize| {
         let connections = u32::try_from(index.len()).unwrap().to_le_bytes();
@@ -51,7 +51,7 @@ fn bag(chunks: &[Vec<u8>], index: &[Vec<u8>]) -> Vec<u8> {
     [header(at), chunks.concat(), index.concat()].concat()
 }
 
-/// Entries that are nobody's, and what is said at the end.
+/// Entries that no sensor takes, and the final report.
 fn read(file: &[u8]) -> (usize, Vec<String>) {
     let mut input = Input::new("bag", Cursor::new(file.to_vec()), Bag::default());
     let (mut order, mut count) = (Order::default(), 0);
@@ -74,7 +74,7 @@ fn a_bag_is_read_and_its_topics_are_known_by_its_index() {
     let topics = Bag::topics("bag", Cursor::new(&file)).unwrap();
     assert_eq!(topics.iter().map(|topic| topic.name.as_str()).collect::<Vec<_>>(), ["/a"]);
     assert_eq!(topics[0].known, Ok(Type::Float64));
-    // Without the index all of it is looked at.
+    // Without the index the whole bag is scanned.
     let cut = &file[..file.len() - 10];
     assert_eq!(Bag::topics("bag", Cursor::new(cut)).unwrap(), topics);
     assert!(Import::of(Input::new("bag", Cursor::new(MAGIC), Bag::default()), "message").is_err());

@@ -1,17 +1,17 @@
-//! The stamps in messages beside the times at which they were recorded.
+//! Header timestamps of messages compared with the record times.
 
-/// Stamps later than the record by more than this are of another clock.
+/// Timestamps later than the record time by more than this are of another clock.
 const AHEAD_NS: i64 = 5_000_000;
-/// How late messages of a computer that is set by ours may come to be recorded.
+/// Greatest recording delay of messages from a computer whose clock is synchronised to ours.
 const LATE_NS: i64 = 1_000_000_000;
-/// How much that may vary.
+/// Greatest variation of that delay.
 const VARIES_NS: i64 = 500_000_000;
-/// From here on it isn't a clock that is wrong, but one that counts from somewhere else.
+/// From this offset on, the clock has another epoch rather than an error.
 const OTHER_BASE_NS: i64 = 3_600_000_000_000;
-/// A stamp that is off by more, where stamps are followed, makes a new beginning.
+/// A followed timestamp that is off by more than this restarts the offset.
 const ASTRAY_NS: i64 = 10_000_000_000;
 
-/// Which time a message's values are given.
+/// Source of the time of a message's values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) enum Base {
     /// When it was recorded.

@@ -1,4 +1,4 @@
-//! A topic and the sensor that its messages are of.
+//! A topic and the sensor that its messages belong to.
 
 use std::collections::BTreeMap;
 
@@ -12,11 +12,11 @@ use super::wire::Encoding;
 use crate::emulated::{EmulatedSensor, Value};
 use crate::{Entry, Told};
 
-/// What a mapping says of a topic besides its sensor.
+/// A mapping's settings for a topic, apart from its sensor.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Manner {
     pub(super) base: Base,
-    /// Of pressures and lengths: their unit's size in ours.
+    /// For pressures and lengths: size of their unit in ours.
     pub(super) unit: f64,
     pub(super) plane: Plane,
 }
@@ -35,19 +35,19 @@ pub(super) struct Feed {
     clocks: Clocks,
     taken: u64,
     frame_id: Option<Vec<u8>>,
-    /// Messages of another frame than the first.
+    /// Messages with another frame than the first.
     other_frames: u64,
     /// Sum of the specific force along z, m/s^2.
     upward_mps2: f64,
     /// Highest pressure, Pa.
     highest_pa: f64,
-    /// Messages that are lost, by why.
+    /// Lost messages by reason.
     lost: BTreeMap<&'static str, u64>,
-    /// What is no loss but worth saying.
+    /// Remarks that aren't losses.
     noted: BTreeMap<&'static str, u64>,
 }
 
-/// No pressure under water is lower than this, Pa: half an atmosphere.
+/// Lowest plausible pressure under water, Pa: half an atmosphere.
 const LEAST_PA: f64 = 50_000.0;
 
 impl Feed {
@@ -79,7 +79,7 @@ impl Feed {
         &self.sensor.id
     }
 
-    /// Takes a message.
+    /// Processes a message.
     pub(super) fn take(&mut self, encoding: Encoding, record_ns: u64, bytes: &[u8], out: &mut Vec<Entry>) {
         self.taken += 1;
         let taken = read(self.of, encoding, bytes).and_then(|read| self.values(&read, record_ns, out));
@@ -115,7 +115,7 @@ impl Feed {
         self.say((at_ns, stamped), &value, out)
     }
 
-    /// Parts that are missing are left out, where there is a part.
+    /// Missing parts are omitted, as long as there is at least one.
     fn inertia(
         &mut self,
         wxyz: Option<[f64; 4]>,
@@ -150,7 +150,7 @@ impl Feed {
         Ok(Value::Inertia(attitude, rate.unwrap_or(unknown), force.unwrap_or(unknown)))
     }
 
-    /// A message's beams. It is recorded when the last of them is known; its stamp is the time of the first.
+    /// A message's beams. It is recorded when the last of them is measured; its timestamp is that of the first.
     fn beams(&mut self, beams: &Beams, at: (u64, bool), out: &mut Vec<Entry>) -> Result<(), &'static str> {
         let told = beams.told(self.manner.plane)?;
         for (count, what) in [(told.nowhere, "points that are nowhere: nothing heard, no angle known")] {
@@ -185,7 +185,7 @@ impl Feed {
         if unsaid > 0 { Err("with beams that the sensor can't say") } else { Ok(()) }
     }
 
-    /// Puts a value into bytes. Values with a stamp of their own are received after the sensor's delays; those without when they
+    /// Encodes a value. Values with a timestamp are received after the sensor's delays; those without when they
     /// were recorded.
     fn say(
         &mut self,
@@ -201,7 +201,7 @@ impl Feed {
         if said { Ok(()) } else { Err("with values that the sensor can't say") }
     }
 
-    /// Says what became of it.
+    /// Reports losses and remarks.
     pub(super) fn tell(&self, topic: &str, told: &mut Told) {
         let counted = |counts: &BTreeMap<&'static str, u64>| -> Vec<String> {
             counts.iter().map(|(why, count)| format!("{topic}: {count} {}{why}", messages(why))).collect()
@@ -238,7 +238,7 @@ impl Feed {
     }
 }
 
-/// Reasons tell of messages, unless they begin with what else is counted.
+/// The unit that a reason counts: messages, unless it begins with another.
 fn messages(why: &str) -> &'static str {
     if why.starts_with("points") || why.starts_with("ranges") { "" } else { "messages " }
 }

@@ -1,4 +1,4 @@
-//! Which topic feeds which sensor: by a mapping, or where there is no choice.
+//! Assigns topics to sensors: by a mapping, or where the choice is unique.
 
 use headrace_config::{ConfigError, Section};
 use headrace_sensor::device::Sense;
@@ -16,10 +16,10 @@ use crate::emulated::EmulatedSensor;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum MatchError {
-    /// The mapping is wrong.
+    /// The mapping is invalid.
     #[error(transparent)]
     Mapping(#[from] ConfigError),
-    /// There are several ways.
+    /// Several assignments are possible.
     #[error(
         "which {sense} is which? topics {topics}, sensors {sensors}; --map MAPPING.toml says which topic is of which sensor"
     )]
@@ -31,10 +31,10 @@ pub enum MatchError {
         /// The sensors.
         sensors: String,
     },
-    /// There is none.
+    /// No assignment is possible.
     #[error("no topic is of a sensor of the vehicle file: topics {topics}; sensors {sensors}")]
     None {
-        /// The topics, their types, and what is wrong with them.
+        /// The topics, their types, and their problems.
         topics: String,
         /// The sensors and what they sense.
         sensors: String,
@@ -43,13 +43,13 @@ pub enum MatchError {
 
 const SENSES: [Sense; 5] = [Sense::Head, Sense::Echosounder, Sense::Depth, Sense::Inertial, Sense::Velocity];
 
-/// What of an error is shown of topics, which may be hundreds.
+/// Most topics listed in an error; a recording may have hundreds.
 const MOST_SHOWN: usize = 20;
 
 impl Feeds {
-    /// By what there is: a sensor and a topic of a fitting type are matched where each is the only one of its kind.
+    /// Without a mapping: a sensor and a topic of a fitting type are matched where each is the only one of its kind.
     ///
-    /// Errors: there are several of a kind, or none.
+    /// Errors: several of a kind, or none.
     pub fn matching(vehicle: &VehicleConfig, topics: &[Topic]) -> Result<Self, MatchError> {
         let mut feeds = Self::default();
         for sense in SENSES {
@@ -86,9 +86,9 @@ impl Feeds {
         Ok(feeds)
     }
 
-    /// By a mapping, and no other way.
+    /// By a mapping only.
     ///
-    /// Errors: a key with a value that isn't allowed, a sensor or a topic that isn't there or can't be of the other.
+    /// Errors: a key with an invalid value, an unknown sensor or topic, or a sensor and topic of different kinds.
     pub fn mapped(
         mapping: Section<'_>,
         vehicle: &VehicleConfig,

@@ -1,4 +1,4 @@
-//! Recordings of ROS 2 in MCAP; also those of ROS 1 that were turned into MCAP.
+//! Recordings of ROS 2 in MCAP; also those of ROS 1 converted to MCAP.
 //!
 //! Sources: MCAP format specification and its "well-known" profiles and encodings; the log reader has the rest.
 
@@ -12,7 +12,7 @@ use crate::{Clock, Entry, ImportError, Source};
 use headrace_replay::log::format::FORMAT_KEY;
 use headrace_replay::log::{ChannelInfo, LogReader};
 
-/// Messages that are read at a time.
+/// Messages per read.
 const AT_A_TIME: usize = 64;
 
 /// A recording in MCAP.
@@ -60,7 +60,7 @@ impl<R: Read + Seek> Mcap<R> {
         topics
     }
 
-    /// Sends its messages to these.
+    /// Routes its messages to `feeds`.
     #[must_use]
     pub fn feeding(self, feeds: Feeds) -> Self {
         Self { feeds, ..self }

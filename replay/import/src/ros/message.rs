@@ -1,4 +1,4 @@
-//! The messages that are known, and what of them a sensor says.
+//! The known messages, and the sensor values taken from them.
 //!
 //! Sources: the .msg files of ROS' common_interfaces (sensor_msgs, geometry_msgs, std_msgs), REP 103 (axes and units), REP 117 (ranges),
 //! REP 145 (inertial units).
@@ -18,7 +18,7 @@ pub enum Type {
     Range,
     /// Pressure.
     FluidPressure,
-    /// Ranges about an axis.
+    /// Ranges by angle about an axis.
     LaserScan,
     /// Points, by fields.
     PointCloud2,
@@ -26,7 +26,7 @@ pub enum Type {
     PointCloud,
     /// Velocity.
     Twist,
-    /// Velocity, with how far it is trusted.
+    /// Velocity with covariance.
     TwistWithCovariance,
     /// A number.
     Float32,
@@ -34,7 +34,7 @@ pub enum Type {
     Float64,
 }
 
-/// Types, their names and what ROS 1 makes of their definitions (MD5).
+/// Types, their names and the MD5 of their definitions in ROS 1.
 const TYPES: [(Type, &str, &str); 10] = [
     (Type::Imu, "sensor_msgs/Imu", "6a62c6daae103f4ff57a132d6f95cec2"),
     (Type::Range, "sensor_msgs/Range", "c005c34273dc426c67a020a87bc24148"),
@@ -59,12 +59,12 @@ impl Type {
         TYPES.iter().find(|(_, known, _)| *known == name).map(|(known, ..)| *known)
     }
 
-    /// Whether a ROS 1 definition is the one that is known here; `*` is said by who doesn't know it.
+    /// Whether a ROS 1 definition is the known one; `*` stands for an unknown definition.
     pub(super) fn is_defined_as(self, md5: &str) -> bool {
         md5 == "*" || TYPES.iter().any(|(known, _, known_md5)| *known == self && *known_md5 == md5)
     }
 
-    /// Which sensors it may be of.
+    /// Sensors that it may belong to.
     pub(super) fn sense(self) -> Sense {
         match self {
             Self::Imu => Sense::Inertial,
@@ -76,38 +76,38 @@ impl Type {
         }
     }
 
-    /// Whether it says what it is of: a bare number may be anything.
+    /// Whether it identifies its quantity: a bare number may be anything.
     pub(super) fn is_telling(self) -> bool {
         !matches!(self, Self::Float32 | Self::Float64)
     }
 }
 
-/// What a message says, in its own units and axes.
+/// A message's values, in its units and axes.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Values {
-    /// Parts that the sender says it doesn't have are `None`.
+    /// Parts that the sender declares as missing are `None`.
     Inertial {
         wxyz: Option<[f64; 4]>,
         rate_radps: Option<[f64; 3]>,
         force_mps2: Option<[f64; 3]>,
     },
-    /// `None` where nothing was heard.
+    /// `None` without an echo.
     Range(Option<f64>),
-    /// A pressure, or a length of cable: in what the mapping says, or else SI.
+    /// A pressure, or a length of cable: in the mapping's unit, by default SI.
     Scalar(f64),
     Velocity([f64; 3]),
     Beams(Beams),
 }
 
-/// A message: its stamp and frame where it has them, and what it says.
+/// A message: its timestamp and frame where it has them, and its values.
 pub(super) struct Read<'a> {
     pub(super) header: Option<Header<'a>>,
     pub(super) values: Values,
 }
 
-/// Reads a message.
+/// Parses a message.
 ///
-/// Errors: in words, why it is none of its type.
+/// Errors: as text, why it isn't of its type.
 pub(super) fn read(of: Type, encoding: Encoding, bytes: &[u8]) -> Result<Read<'_>, &'static str> {
     let mut wire = Wire::new(bytes, encoding).ok_or("in another encapsulation than plain CDR")?;
     let read =
@@ -146,7 +146,7 @@ fn fields<'a>(of: Type, wire: &mut Wire<'a>) -> Option<Result<Read<'a>, &'static
     Some(Ok(Read { header, values }))
 }
 
-/// A covariance that begins with -1 says that there is no such value.
+/// A covariance that begins with -1 marks a missing value.
 fn inertial(wire: &mut Wire<'_>) -> Option<Values> {
     let [x, y, z, w] = wire.doubles()?;
     let told = |covariance: [f64; 9]| covariance.first().is_none_or(|first| !is_minus_one(*first));
@@ -156,7 +156,7 @@ fn inertial(wire: &mut Wire<'_>) -> Option<Values> {
     let force: [f64; 3] = wire.doubles()?;
     let force_mps2 = told(wire.doubles()?).then_some(force);
     let whole = |values: &[f64]| values.iter().all(|value| value.is_finite());
-    // All zeros is what a sender leaves that never heard of an orientation.
+    // All zeros is the default of a sender without an orientation.
     let wxyz = wxyz.filter(|wxyz| whole(wxyz) && wxyz.iter().any(|part| part.abs() > 0.0));
     Some(Values::Inertial {
         wxyz,
@@ -172,7 +172,7 @@ fn is_minus_one(value: f64) -> bool {
 fn range(wire: &mut Wire<'_>) -> Option<Values> {
     let _radiation = wire.u8()?;
     let [_field_of_view, least, most, range] = wire.singles()?;
-    // The variance, which newer definitions have behind it.
+    // The variance, which newer definitions append.
     if !wire.is_done() {
         wire.f32()?;
     }

@@ -1,7 +1,7 @@
 //! Recordings of ROS: messages of known types become the bytes that sensors of the vehicle file would have sent.
 //!
-//! [`bag`] reads bags of ROS 1, [`mcap`] those of ROS 2. Both hand messages to [`Feeds`], which knows by a mapping, or by there being no
-//! choice, whose they are.
+//! [`bag`] reads bags of ROS 1, [`mcap`] those of ROS 2. Both pass messages to [`Feeds`], which assigns topics to sensors by
+//! a mapping, or where the choice is unique.
 
 pub mod bag;
 mod clocks;
@@ -30,32 +30,32 @@ use feed::Feed;
 pub struct Topic {
     /// Its name.
     pub name: String,
-    /// The name of its messages' type.
+    /// Name of its message type.
     pub type_name: String,
-    /// The type, where it is known and can be read; else why not.
+    /// The type, if known and readable; else why not.
     pub known: Result<Type, String>,
 }
 
-/// Who gets the messages of which topic.
+/// Assigns topics to sensors.
 #[derive(Default)]
 pub struct Feeds {
     by_topic: BTreeMap<String, Feed>,
-    /// What was matched without being said, in words.
+    /// Automatic matches, as text.
     matched: Vec<String>,
 }
 
 impl Feeds {
-    /// What was matched without being said, in words.
+    /// Automatic matches, as text.
     pub fn matched(&self) -> &[String] {
         &self.matched
     }
 
-    /// How long before a message its values may have been: the beams of a head's turn come together.
+    /// Greatest age of values at their message, ns: the beams of a head's whole turn come in one message.
     pub(super) fn reach_ns(&self) -> u64 {
         if self.by_topic.values().any(Feed::is_of_head) { 40_000_000_000 } else { WINDOW_NS }
     }
 
-    /// Takes a message. Those of other topics, and of types that aren't the topic's, are nobody's.
+    /// Processes a message. Those of other topics, or of another type than their topic's, belong to no sensor.
     pub(super) fn take(
         &mut self,
         topic: &Topic,
@@ -67,7 +67,7 @@ impl Feeds {
         let feed = self.by_topic.get_mut(&topic.name);
         match feed.filter(|feed| topic.known.as_ref().is_ok_and(|known| feed.is_of(*known))) {
             Some(feed) => feed.take(encoding, record_ns, bytes, out),
-            // Counted as passed over.
+            // Counted as not taken by any sensor.
             None => out.push(Entry { stamp_ns: record_ns, stream: String::new(), bytes: Vec::new() }),
         }
     }

@@ -1,4 +1,4 @@
-//! Scans and clouds of points of a profiling head, as beams: an angle, a range and a time each.
+//! Scans and point clouds of a profiling head as beams: angle, range and time.
 //!
 //! A scan turns about its own z, counted from x towards y. The head's x is that axis, its 0 (down, -z) the scan's x, its y the
 //! scan's y. A cloud's points are in the head's own frame, its beam in the plane of y and z, unless the mapping says `xy`.
@@ -8,11 +8,11 @@ use headrace_geometry::math;
 use super::ranges::heard;
 use super::wire::Wire;
 
-/// More than any head makes of a turn.
+/// More than the beams of any head's turn.
 const MOST_BEAMS: usize = 1 << 16;
-/// Longest time that a message may tell of.
+/// Longest time offset within a message, s.
 const LONGEST_S: f64 = 120.0;
-/// How far a point may be from the beam's plane, as a share of its range.
+/// Greatest distance of a point from the beam's plane, as a share of its range.
 const OFF_PLANE: f64 = 0.1;
 
 /// One beam.
@@ -20,43 +20,43 @@ const OFF_PLANE: f64 = 0.1;
 pub(super) struct Beam {
     /// As [`headrace_sensor::reading::SonarReturn::angle_rad`].
     pub(super) angle_rad: f64,
-    /// `None` where nothing was heard.
+    /// `None` without an echo.
     pub(super) range_m: Option<f64>,
-    /// After the message's stamp.
+    /// Time after the message's timestamp.
     pub(super) after_s: f64,
 }
 
-/// A plane that a beam turns in.
+/// Plane of rotation of a beam.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Plane {
     /// The head's own axes.
     Yz,
-    /// Those of a laser scanner.
+    /// The axes of a laser scanner.
     Xy,
 }
 
-/// What a message has of beams.
+/// Beams in a message.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Beams {
     /// With angles of their own, which may be anything.
     Turned(Vec<Beam>),
-    /// Points, and how long after the stamp.
+    /// Points, with time after the timestamp, s.
     Points(Vec<([f64; 3], f64)>),
 }
 
-/// Beams that can be told, and what speaks against others.
+/// Valid beams, and counts of the others.
 #[derive(Debug, Default)]
 pub(super) struct Told {
     /// In order of time.
     pub(super) beams: Vec<Beam>,
-    /// Points that aren't in the plane.
+    /// Points outside the plane.
     pub(super) off_plane: u64,
-    /// Points of no number, or at the origin: nothing heard, nobody knows where.
+    /// Points that are NaN or at the origin: no echo, direction unknown.
     pub(super) nowhere: u64,
 }
 
 impl Beams {
-    /// Errors: in words, why they are no head's.
+    /// Errors: as text, why they can't be a head's.
     pub(super) fn told(&self, plane: Plane) -> Result<Told, &'static str> {
         let mut told = Told::default();
         match self {
@@ -101,14 +101,14 @@ impl Told {
     }
 }
 
-/// sensor_msgs/LaserScan behind its header.
+/// sensor_msgs/LaserScan after its header.
 pub(super) fn scan(wire: &mut Wire<'_>) -> Option<Beams> {
     let [first, _last, step, each_s, _scan_s, least, most] = wire.singles()?;
     let ranges = wire.single_sequence()?;
     let _strengths = wire.single_sequence()?;
     let beam = |(number, range): (u32, &f32)| {
         let number = f64::from(number);
-        // A scan of one beam may have no step.
+        // The step of a scan with one beam may be zero.
         let turned = |each: f64| if number > 0.0 { number * each } else { 0.0 };
         Beam {
             angle_rad: first + turned(step),
@@ -119,7 +119,7 @@ pub(super) fn scan(wire: &mut Wire<'_>) -> Option<Beams> {
     Some(Beams::Turned((0..).zip(&ranges).map(beam).collect()))
 }
 
-/// sensor_msgs/PointCloud behind its header.
+/// sensor_msgs/PointCloud after its header.
 pub(super) fn points(wire: &mut Wire<'_>) -> Option<Beams> {
     let count = wire.count(12)?;
     let points = (0..count).map(|_| Some((wire.singles()?, 0.0))).collect::<Option<Vec<_>>>()?;
@@ -129,7 +129,7 @@ pub(super) fn points(wire: &mut Wire<'_>) -> Option<Beams> {
     Some(Beams::Points(points))
 }
 
-/// How a number stands in a point of sensor_msgs/PointCloud2.
+/// Encoding of a number in a point of sensor_msgs/PointCloud2.
 #[derive(Debug, Clone, Copy)]
 enum Number {
     U32,
@@ -144,14 +144,14 @@ struct Field {
     number: Number,
 }
 
-/// What a field of time counts.
+/// Unit and epoch of a time field.
 #[derive(Debug, Clone, Copy)]
 enum Time {
-    /// Nanoseconds after the stamp.
+    /// Nanoseconds after the timestamp.
     After,
-    /// Seconds after the stamp.
+    /// Seconds after the timestamp.
     AfterSeconds,
-    /// Seconds of the stamp's clock.
+    /// Seconds on the timestamp's clock.
     Seconds,
 }
 
@@ -175,7 +175,7 @@ impl Field {
     }
 }
 
-/// The fields that are needed of those that a cloud has.
+/// The fields used, of those in a cloud.
 #[derive(Debug, Default)]
 struct Layout {
     place: [Option<Field>; 3],
@@ -183,7 +183,7 @@ struct Layout {
 }
 
 impl Layout {
-    /// Drivers of Ouster (`t`), Velodyne (`time`) and Hesai (`timestamp`) name a point's time so.
+    /// Drivers of Ouster (`t`), Velodyne (`time`) and Hesai (`timestamp`) use these names for a point's time.
     fn add(&mut self, name: &[u8], offset: usize, datatype: u8) {
         let number = match datatype {
             6 => Number::U32,
@@ -218,7 +218,7 @@ impl Layout {
     }
 }
 
-/// sensor_msgs/PointCloud2 behind its header.
+/// sensor_msgs/PointCloud2 after its header.
 pub(super) fn cloud(wire: &mut Wire<'_>, stamp_ns: u64) -> Option<Result<Beams, &'static str>> {
     let (height, width) = (usize::try_from(wire.u32()?).ok()?, usize::try_from(wire.u32()?).ok()?);
     let mut layout = Layout::default();
@@ -268,7 +268,7 @@ mod tests {
             let beam = told.beams[0];
             assert!((beam.angle_rad - angle_rad).abs() < 1e-12, "{angle_rad}: {beam:?}");
             assert!((beam.range_m.unwrap() - 3.0).abs() < 1e-12);
-            // As a scanner whose x is the head's 0 and whose y is the head's y sees it.
+            // As seen by a scanner whose x is the head's 0 and whose y is the head's y.
             let told = Beams::Points(vec![([-at.z(), at.y(), at.x()], 0.0)]).told(Plane::Xy).unwrap();
             assert!((told.beams[0].angle_rad - angle_rad).abs() < 1e-12);
         }

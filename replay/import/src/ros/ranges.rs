@@ -1,7 +1,7 @@
-//! What a range says.
+//! Interpretation of ranges.
 
-/// A range by REP 117: infinite where nothing was in reach or something was too near, NaN where nothing was measured; beyond its
-/// limits it means nothing, where these mean something.
+/// A range by REP 117: infinite if nothing was in range or a target was too near, NaN if not measured; beyond its
+/// limits it is invalid, provided the limits are valid.
 pub(super) fn heard(range_m: f64, least_m: f64, most_m: f64) -> Option<f64> {
     let limited = most_m > 0.0 && least_m <= most_m;
     let within = !limited || (least_m..=most_m).contains(&range_m);

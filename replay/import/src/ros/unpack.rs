@@ -1,8 +1,8 @@
-//! Chunks of bags, unpacked within bounds.
+//! Unpacks chunks of bags, with a size limit.
 
 use std::io::Read;
 
-/// What a chunk may hold when unpacked; a recorder makes one of less than a megabyte and one message.
+/// Largest unpacked size of a chunk, bytes; a recorder makes chunks of less than a megabyte plus one message.
 pub(super) const MOST_UNPACKED: usize = 64 << 20;
 
 /// An unpacked chunk.
@@ -10,13 +10,13 @@ pub(super) const MOST_UNPACKED: usize = 64 << 20;
 pub(super) enum Unpacked {
     /// All of it.
     Whole(Vec<u8>),
-    /// What there is of one that the file's end cuts.
+    /// The available part of one truncated by the end of the file.
     Cut(Vec<u8>),
-    /// Nothing, and why.
+    /// Nothing, with the reason.
     Bad(&'static str),
 }
 
-/// Unpacks a chunk that says how it is packed and how long it is. `cut` says that the file ends within it.
+/// Unpacks a chunk with the stated compression and size. `cut` means that the file ends within it.
 ///
 /// Source: ROS wiki, "Bags/Format/2.0": none, bz2, and lz4 as roslz4 writes it, in frames of LZ4.
 pub(super) fn unpack(packing: &[u8], packed: &[u8], size: u32, cut: bool) -> Unpacked {
@@ -36,7 +36,7 @@ pub(super) fn unpack(packing: &[u8], packed: &[u8], size: u32, cut: bool) -> Unp
 
 fn read(reader: impl Read, size: usize, cut: bool) -> Unpacked {
     let mut unpacked = Vec::new();
-    // One byte more shows that it is longer.
+    // One byte more shows that it is longer than stated.
     let result = reader.take(size as u64 + 1).read_to_end(&mut unpacked);
     judged(if result.is_ok() { Ok(unpacked) } else { Err(unpacked) }, size, cut)
 }

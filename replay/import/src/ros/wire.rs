@@ -1,9 +1,9 @@
-//! The two serialisations of ROS, read from bytes that may be anything.
+//! The two serialisations of ROS, parsed from untrusted bytes.
 //!
-//! Sources: ROS wiki, "Message serialization" (ROS 1: little-endian, packed); OMG DDS-XTypes 1.3, 7.4.3, plain CDR (ROS 2: numbers
-//! aligned to their own size from behind four bytes that say the byte order).
+//! Sources: ROS wiki, "Message serialization" (ROS 1: little-endian, packed); OMG DDS-XTypes 1.3, 7.4.3, plain CDR (ROS 2:
+//! numbers aligned to their size, counted after four bytes with the byte order).
 
-/// How messages are put into bytes.
+/// Serialisation of messages.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Encoding {
     /// ROS 1.
@@ -12,10 +12,10 @@ pub enum Encoding {
     Cdr,
 }
 
-/// Bytes behind a message's last field that padding may be.
+/// Most padding bytes after a message's last field.
 const MOST_PADDING: usize = 7;
 
-/// What is left of a message.
+/// The rest of a message.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Wire<'a> {
     bytes: &'a [u8],
@@ -24,10 +24,10 @@ pub(super) struct Wire<'a> {
     big_endian: bool,
 }
 
-/// What every stamped message begins with.
+/// The header of a stamped message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Header<'a> {
-    /// Nanoseconds of whatever clock the sender had.
+    /// Timestamp, nanoseconds on the sender's clock, whatever its epoch.
     pub(super) stamp_ns: u64,
     pub(super) frame_id: &'a [u8],
 }
@@ -42,7 +42,7 @@ macro_rules! numbers {
 }
 
 impl<'a> Wire<'a> {
-    /// `None` where the bytes begin with another encapsulation than plain CDR's.
+    /// `None` if the encapsulation isn't plain CDR.
     pub(super) fn new(message: &'a [u8], encoding: Encoding) -> Option<Self> {
         let (bytes, big_endian) = match (encoding, message) {
             (Encoding::Ros1, bytes) => (bytes, false),
@@ -71,7 +71,7 @@ impl<'a> Wire<'a> {
         Some(all)
     }
 
-    /// The count before a sequence whose elements take at least `element_bytes`; `None` for more than there can be.
+    /// The count before a sequence whose elements take at least `element_bytes`; `None` if they can't fit.
     pub(super) fn count(&mut self, element_bytes: usize) -> Option<usize> {
         let count = usize::try_from(self.u32()?).ok()?;
         let most = (self.bytes.len() - self.at) / element_bytes.max(1);
@@ -83,13 +83,13 @@ impl<'a> Wire<'a> {
         (0..count).map(|_| self.f32()).collect()
     }
 
-    /// Bytes with their count before them.
+    /// Length-prefixed bytes.
     pub(super) fn bytes(&mut self) -> Option<&'a [u8]> {
         let count = self.count(1)?;
         self.take(count)
     }
 
-    /// A text's bytes, without the zero that CDR puts behind them.
+    /// A text's bytes, without CDR's terminating zero.
     pub(super) fn text(&mut self) -> Option<&'a [u8]> {
         let text = self.bytes()?;
         Some(match self.encoding {
@@ -107,7 +107,7 @@ impl<'a> Wire<'a> {
         Some(Header { stamp_ns, frame_id: self.text()? })
     }
 
-    /// Whether all has been read but padding, which ROS 1 hasn't.
+    /// Whether everything but padding has been read; ROS 1 has no padding.
     pub(super) fn is_done(&self) -> bool {
         let left = self.bytes.len() - self.at;
         left == 0 || self.encoding == Encoding::Cdr && left <= MOST_PADDING

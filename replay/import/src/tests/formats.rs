@@ -1,4 +1,4 @@
-//! The formats on bytes of their own making, and on any.
+//! The formats on constructed and on arbitrary bytes.
 
 use headrace_config::Document;
 use headrace_mavlink::MavHeader;
@@ -36,7 +36,7 @@ fn cut(format: &mut dyn Format, mut file: &[u8]) -> (Vec<Entry>, Vec<(usize, &'s
 }
 
 fn frame(sequence: u8) -> Vec<u8> {
-    // Its last field isn't zero, so that all 28 bytes are sent.
+    // Its last field isn't zero, so no trailing bytes are truncated and all 28 are sent.
     let attitude = ATTITUDE_DATA { yawspeed: 1.0, ..ATTITUDE_DATA::DEFAULT };
     let frame = Message::Attitude(attitude).to_frame(MavHeader { system_id: 1, component_id: 1, sequence });
     frame.raw_bytes().to_vec()
@@ -131,7 +131,7 @@ fn a_table_s_values_are_on_the_wire_in_the_wire_s_units() {
     let (entries, lost, left) = cut(&mut table, b"\"t\"; p\r\n20.5;-1.5005\r\n");
     assert_eq!((entries.len(), lost.len(), left), (1, 0, 0));
     assert_eq!((entries[0].stamp_ns, entries[0].stream.as_str()), (20_500_000, "d"));
-    // SCALED_PRESSURE2: time, then the absolute pressure in hPa, behind a header of ten bytes.
+    // SCALED_PRESSURE2: time, then the absolute pressure in hPa, after a header of ten bytes.
     assert_eq!(entries[0].bytes[14..18], 1500.5_f32.to_le_bytes());
 }
 

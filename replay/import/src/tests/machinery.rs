@@ -1,4 +1,4 @@
-//! The machinery on a format of its own, and candump on bytes of any kind.
+//! The import with a test format, and candump on arbitrary bytes.
 
 use std::io::Cursor;
 
@@ -42,7 +42,7 @@ fn taker(source: u16, stream: &str) -> Taker {
     Taker { source, stream: stream.to_owned(), driver: None }
 }
 
-/// What has come of it, and the messages: source, ms after the beginning, last byte.
+/// The outcome, and the messages: source, ms after the beginning, last byte.
 fn imported(file: &[u8]) -> (Imported, Vec<(u16, i64, u8)>) {
     let import = open(file, Box::new(Eights)).unwrap();
     let path = std::env::temp_dir().join(format!(

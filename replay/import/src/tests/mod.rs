@@ -1,4 +1,4 @@
-//! The machinery and the formats, each on files of its own making.
+//! The import and the formats, each on constructed files.
 
 mod formats;
 mod machinery;

@@ -5,11 +5,11 @@ use headrace_geometry::time::MonoNs;
 /// A derived message.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Made {
-    /// Number of its result channel; one that the log doesn't have is passed over.
+    /// Number of its result channel; ignored if the log has no such channel.
     pub channel: u16,
-    /// Its log time.
+    /// Log time.
     pub at: MonoNs,
-    /// Its content.
+    /// Content.
     pub bytes: Vec<u8>,
 }
 

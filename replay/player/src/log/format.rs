@@ -2,11 +2,11 @@
 //!
 //! | channel | message | log time | publish time |
 //! |---|---|---|---|
-//! | `/raw/<source id>` | bytes as received: one device frame, datagram, CAN frame, HID report or I2C transaction | receive time | time of validity, where the device gives one, else the receive time |
-//! | `/sent/<source id>` | bytes sent to the device | when | when |
-//! | `/loop/tick` | one tick of the loop, see [`Tick`] | the tick's moment | the same |
-//! | `/result/poses`, `/result/pings`, `/result/judgements`, `/result/advice` | what the loop published in a tick, word by word ([`headrace_monitor::trail`]): u64 tick, u64 number of the first record, records; for `verify`, never read by a replay | the tick's moment | the same |
-//! | `/result/view/...` | the same for people's viewers, in JSON: [`crate::view`] | the tick's moment | the same |
+//! | `/raw/<source id>` | bytes as received: one device frame, datagram, CAN frame, HID report or I2C transaction | receive time | time of validity, if the device gives one, else the receive time |
+//! | `/sent/<source id>` | bytes sent to the device | time of sending | the same |
+//! | `/loop/tick` | one tick of the loop, see [`Tick`] | the tick's time | the same |
+//! | `/result/poses`, `/result/pings`, `/result/judgements`, `/result/advice` | the loop's results of a tick as words ([`headrace_monitor::result_stream`]): u64 tick, u64 number of the first record, records; for `verify`, never read by a replay | the tick's time | the same |
+//! | `/result/view/...` | the same for viewers, in JSON: [`crate::view`] | the tick's time | the same |
 //!
 //! Times are nanoseconds of the host's monotonic clock. Every channel counts its messages from 0 (`sequence`).
 //! Channels of bytes have the message encoding `application/octet-stream` and no schema; their metadata has `plugin`,

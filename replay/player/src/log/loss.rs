@@ -91,11 +91,11 @@ pub enum LossKind {
 pub struct Loss {
     /// The damage.
     pub kind: LossKind,
-    /// Where it begins in the file.
+    /// Offset in the file, bytes.
     pub offset: u64,
-    /// How many bytes of the file it concerns.
+    /// Length in the file, bytes.
     pub bytes: u64,
-    /// Last receive time before it that is good, where there is one.
+    /// Last intact receive time before it, where there is one.
     pub from: Option<MonoNs>,
     /// First receive time after it, where there is one.
     pub to: Option<MonoNs>,
@@ -151,7 +151,7 @@ impl fmt::Display for LossKind {
 }
 
 impl LossKind {
-    /// Whether it lies in bytes of a file.
+    /// Whether it has a byte range in a file.
     fn has_place(&self) -> bool {
         match self {
             Self::InPart { kind, .. } => kind.has_place(),

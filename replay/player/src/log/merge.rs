@@ -1,4 +1,4 @@
-//! Messages of the pieces that are in memory, in order.
+//! Merges the messages of the pieces in memory into order.
 
 use core::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -31,7 +31,7 @@ impl Batch {
         self.next = 0;
     }
 
-    /// Adds a message's record; `false` when it is none.
+    /// Adds a message record; `false` if it doesn't parse.
     pub(super) fn push(&mut self, record: &[u8]) -> bool {
         let mut fields = Fields::new(record);
         let Some(head) = MessageHead::read(&mut fields) else { return false };
@@ -46,7 +46,7 @@ impl Batch {
     }
 }
 
-/// Order of messages: by time, rank and sequence where that is asked for, then as they stand in the file.
+/// Order of messages: by time, rank and sequence where requested, then by position in the file.
 type Key = (u64, u32, u32, usize, usize);
 
 /// The pieces in memory.
@@ -55,7 +55,7 @@ pub(super) struct Merge {
     by_time: bool,
     heads: BinaryHeap<Reverse<(Key, usize)>>,
     batches: Vec<Batch>,
-    /// Batches that are used up and may be filled again.
+    /// Used-up batches, for reuse.
     spare: Vec<usize>,
     memory: usize,
 }
@@ -65,7 +65,7 @@ impl Merge {
         Self { by_time, heads: BinaryHeap::new(), batches: Vec::new(), spare: Vec::new(), memory: 0 }
     }
 
-    /// Bytes that the pieces take.
+    /// Memory of the pieces, bytes.
     pub(super) fn memory(&self) -> usize {
         self.memory
     }
@@ -75,7 +75,7 @@ impl Merge {
         self.heads.peek().map(|Reverse(((time, ..), _))| *time)
     }
 
-    /// An empty batch to fill, with the memory of one that is used up.
+    /// An empty batch to fill, with the memory of a used-up one.
     pub(super) fn empty_batch(&mut self) -> Batch {
         let spare = self.spare.last().and_then(|slot| self.batches.get_mut(*slot));
         let mut batch = spare.map(core::mem::take).unwrap_or_default();
@@ -83,7 +83,7 @@ impl Merge {
         batch
     }
 
-    /// Adds the messages of the piece with number `span`, from the one at `next` on.
+    /// Adds the messages of piece `span`, starting with number `next`.
     pub(super) fn add(&mut self, span: usize, mut batch: Batch, next: usize) {
         if self.by_time {
             batch.entries.sort_by_key(|entry| (entry.head.log_time, entry.rank, entry.head.sequence));
@@ -103,7 +103,7 @@ impl Merge {
         }
     }
 
-    /// The pieces in memory, and how many messages of each have been taken.
+    /// The pieces in memory, with the number of messages taken from each.
     pub(super) fn open(&self) -> impl Iterator<Item = (usize, usize)> {
         self.heads.iter().map(|Reverse(((_, _, _, span, next), _))| (*span, *next))
     }
@@ -115,14 +115,14 @@ impl Merge {
         }
     }
 
-    /// Takes the next message. Its bytes stay until the next call of [`Merge::empty_batch`].
+    /// Takes the next message. Its bytes stay valid until the next call of [`Merge::empty_batch`].
     pub(super) fn pop(&mut self) -> Option<(Entry, usize)> {
         let mut head = self.heads.peek_mut()?;
         let Reverse(((_, _, _, span, _), slot)) = *head;
         let batch = self.batches.get_mut(slot)?;
         let entry = *batch.entries.get(batch.next)?;
         batch.next += 1;
-        // The next message of a batch is mostly the next of all: it stays at the top.
+        // The next message overall is usually from the same batch: it stays at the top.
         if let Some(key) = key(self.by_time, span, batch) {
             *head = Reverse((key, slot));
         } else {
@@ -132,7 +132,7 @@ impl Merge {
         Some((entry, slot))
     }
 
-    /// Bytes of a message that [`Merge::pop`] has given.
+    /// Bytes of a message returned by [`Merge::pop`].
     pub(super) fn bytes(&self, entry: &Entry, slot: usize) -> &[u8] {
         self.batches.get(slot).and_then(|batch| batch.bytes.get(entry.start..entry.end)).unwrap_or_default()
     }
@@ -143,7 +143,7 @@ impl Merge {
     }
 }
 
-/// Where the next message of a batch stands in the order.
+/// Sort key of a batch's next message.
 fn key(by_time: bool, span: usize, batch: &Batch) -> Option<Key> {
     let Entry { head, rank, .. } = batch.entries.get(batch.next)?;
     let (time, rank, sequence) = if by_time { (head.log_time, *rank, head.sequence) } else { (0, 0, 0) };

@@ -1,5 +1,5 @@
-//! The dive log: an MCAP file with the bytes of every device as they came, the order in which the loop took them, and
-//! what the loop made of them.
+//! The dive log: an MCAP file with the bytes of every device as received, the order in which the loop consumed them, and
+//! the loop's results.
 //!
 //! [`mod@format`] names channels and metadata and lays out `/loop/tick`. [`LogWriter`] writes a log, [`Recorder`] does so
 //! on a thread of its own behind a lock-free queue, and [`LogReader`] reads logs, ours and others', whole or damaged.
@@ -8,19 +8,19 @@
 //!
 //! | record | content |
 //! |---|---|
-//! | metadata `headrace` | [`format::FORMAT_KEY`] and what the caller gave: version, digest of the configuration, clock anchors |
-//! | metadata `headrace.part` | only where a recording has several parts: which this one is ([`PartHead`]) |
+//! | metadata `headrace` | [`format::FORMAT_KEY`] and the caller's entries: version, digest of the configuration, clock anchors |
+//! | metadata `headrace.part` | only where a recording has several parts: identity of this one ([`PartHead`]) |
 //! | attachments | `vehicle.toml` and the files that it names |
 //! | a chunk | definitions of all channels, nothing else |
-//! | metadata `headrace.channels` | the same definitions once more, so that a log survives the loss of that chunk |
-//! | metadata `headrace.losses` | only where something is missing: what, from when to when ([`format::LOSSES`]) |
+//! | metadata `headrace.channels` | the same definitions again, so that a log survives the loss of that chunk |
+//! | metadata `headrace.losses` | only where something is missing: description and time span ([`format::LOSSES`]) |
 //! | chunks | messages, each chunk at most half a second of a dive |
 //! | metadata `headrace.part.end` | only in a part: whether another follows ([`PartEnd`]) |
-//! | summary | what viewers need to find their way |
+//! | summary | indexes for viewers |
 //!
 //! [`DiveLog`] reads one log, or the parts of a recording as one.
 //!
-//! The file is only ever appended to: nothing that has been written is touched again, whatever the power does.
+//! The file is append-only: written bytes are never modified, so a power cut can't damage them.
 
 #![cfg_attr(not(test), warn(clippy::indexing_slicing))]
 

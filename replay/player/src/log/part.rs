@@ -1,9 +1,9 @@
-//! A part of a dive's recording: what a log says that is one of several.
+//! Metadata of a log that is one part of a dive's recording.
 //!
-//! Metadata `headrace.part`, before the first message: `dive`, `number` (from 1), and how far the parts before went: `messages`
+//! Metadata `headrace.part`, before the first message: `dive`, `number` (from 1), and the totals of the earlier parts: `messages`
 //! of all channels, `tick` (index of the last, or `-`), `sequence<topic>` (number of each channel's next message).
-//! Metadata `headrace.part.end`, after the last message: `messages` and `tick` again, with this part's, and `follows`: `yes`
-//! where the recording goes on in the next part, `no` where the dive ended.
+//! Metadata `headrace.part.end`, after the last message: `messages` and `tick` again, including this part, and `follows`: `yes`
+//! where the recording continues in the next part, `no` where the dive ended.
 
 use std::collections::BTreeMap;
 use std::ffi::OsStr;
@@ -13,9 +13,9 @@ use sha2::{Digest, Sha256};
 
 use super::format::hex;
 
-/// Name of the metadata record with which a part begins.
+/// Name of the metadata record at the start of a part.
 pub(super) const PART: &str = "headrace.part";
-/// Name of the metadata record with which a part ends.
+/// Name of the metadata record at the end of a part.
 pub(super) const PART_END: &str = "headrace.part.end";
 const DIVE_KEY: &str = "dive";
 const NUMBER_KEY: &str = "number";
@@ -23,52 +23,52 @@ const MESSAGES_KEY: &str = "messages";
 const TICK_KEY: &str = "tick";
 const FOLLOWS_KEY: &str = "follows";
 const SEQUENCE_PREFIX: &str = "sequence";
-/// Before the number in the name of a part's file.
+/// Precedes the part number in a part's file name.
 const NAME_MARK: &str = ".part";
-/// Digits of a dive's name.
+/// Digits of a dive's identifier.
 const DIVE_DIGITS: usize = 16;
 
-/// How far a recording has come.
+/// Totals of a recording up to some point.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Progress {
     /// Messages of all channels.
     pub messages: u64,
     /// Index of the last tick.
     pub tick: Option<u64>,
-    /// Number of the next message of each topic; left out where a part ends.
+    /// Next message number of each topic; omitted at the end of a part.
     pub sequences: BTreeMap<String, u32>,
 }
 
-/// What a part begins with.
+/// Metadata at the start of a part.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct PartHead {
-    /// Which recording it belongs to, see [`dive_name`].
+    /// Recording that it belongs to, see [`dive_name`].
     pub dive: String,
-    /// Which part it is, from 1.
+    /// Part number, from 1.
     pub number: u32,
-    /// How far the parts before it went.
+    /// Totals of the earlier parts.
     pub before: Progress,
 }
 
-/// What a part ends with.
+/// Metadata at the end of a part.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PartEnd {
-    /// How far the recording has come with it.
+    /// Totals including this part.
     pub after: Progress,
-    /// Whether the recording goes on in the next part.
+    /// Whether another part follows.
     pub follows: bool,
 }
 
-/// What a log says of the recording that it is a part of.
+/// Position of a log in its recording.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Part {
-    /// Its beginning.
+    /// Start record.
     pub head: PartHead,
-    /// Its end; `None` where the log was cut off before.
+    /// End record; `None` where the log was cut off before it.
     pub end: Option<PartEnd>,
 }
 
-/// A name for a recording that no other has: a digest of what its caller knows of the moment.
+/// A unique identifier of a recording: a digest of the numbers given, such as start times.
 pub fn dive_name(moment: &[u64]) -> String {
     let mut hasher = Sha256::new();
     for word in moment {
@@ -79,7 +79,7 @@ pub fn dive_name(moment: &[u64]) -> String {
     name
 }
 
-/// The file of a part: `dive.part002.mcap` for `dive.mcap`, so that a folder lists them in their order.
+/// File name of a part: `dive.part002.mcap` for `dive.mcap`, so that a folder lists parts in order.
 pub fn part_path(recording: &Path, number: u32) -> PathBuf {
     let text = |part: Option<&OsStr>| part.unwrap_or_default().to_string_lossy().into_owned();
     let (stem, extension) = (text(recording.file_stem()), text(recording.extension()));
@@ -87,7 +87,7 @@ pub fn part_path(recording: &Path, number: u32) -> PathBuf {
     recording.with_file_name(format!("{stem}{NAME_MARK}{number:03}{dot}{extension}"))
 }
 
-/// The recording and the number that a part's file is named by.
+/// Recording and part number from a part's file name.
 pub(super) fn named_part(path: &Path) -> Option<(PathBuf, u32)> {
     let extension = path.extension().map(|e| format!(".{}", e.to_string_lossy())).unwrap_or_default();
     let stem = path.file_stem()?.to_string_lossy().into_owned();
@@ -120,7 +120,7 @@ impl Progress {
         })
     }
 
-    /// Whether another says the same, topics aside.
+    /// Whether both have the same totals, apart from the topics' sequence numbers.
     pub(super) fn meets(&self, other: &Self) -> bool {
         (self.messages, self.tick) == (other.messages, other.tick)
     }
@@ -158,14 +158,14 @@ impl PartEnd {
 }
 
 impl Part {
-    /// Takes what a part says of itself out of a log's metadata.
+    /// Removes the part records from a log's metadata and parses them.
     pub(super) fn take(metadata: &mut BTreeMap<String, String>) -> Option<Self> {
         let (end, head) = (take_record(metadata, PART_END), take_record(metadata, PART));
         Some(Self { head: PartHead::read(&head)?, end: PartEnd::read(&end) })
     }
 }
 
-/// Takes out the entries of a record of that name.
+/// Removes the entries of the record `name`.
 fn take_record(metadata: &mut BTreeMap<String, String>, name: &str) -> BTreeMap<String, String> {
     let prefix = format!("{name}/");
     let (mut taken, mut kept) = (BTreeMap::new(), BTreeMap::new());

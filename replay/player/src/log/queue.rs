@@ -1,4 +1,4 @@
-//! The queue between the loop and the recorder's thread: its entries, and what both ends share besides.
+//! The queue between the loop and the recorder's thread: its entries, and the state shared by both ends.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64};
@@ -12,14 +12,14 @@ use ringbuf::wrap::Cons;
 use super::fields::Fields;
 use super::writer::Lane;
 
-/// Bytes before each entry in the queue: kind, a spare byte, number, length, log time, publish time.
+/// Header of each entry in the queue: kind, a spare byte, number, length, log time, publish time.
 pub(super) const ENTRY_HEAD_BYTES: usize = 24;
 
-/// What the ends of a recorder share besides the queue.
+/// State shared by the ends of a recorder, apart from the queue.
 pub(super) struct State {
     pub(super) stopping: AtomicBool,
     pub(super) failed: AtomicBool,
-    /// What the ports' threads have sent to the devices: it doesn't pass the loop.
+    /// Bytes that the port threads sent to the devices, which don't pass through the loop.
     pub(super) sent: ArrayQueue<SentMessage>,
     pub(super) sent_dropped: AtomicU64,
     pub(super) results_missing: AtomicU64,
@@ -32,7 +32,7 @@ pub(super) struct SentMessage {
     pub(super) bytes: Vec<u8>,
 }
 
-/// What stands before a message of `len` bytes in the queue.
+/// Header of a message of `len` bytes in the queue.
 pub(super) fn entry_head(
     lane: Lane,
     log_time: MonoNs,

@@ -1,4 +1,4 @@
-//! Reading logs: ours and others', whole or damaged, a piece at a time.
+//! Reads logs, ours and others', intact or damaged, one piece at a time.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -20,26 +20,26 @@ use super::part::Part;
 use super::scan::{Piece, Span, date_losses, scan};
 use super::{LogError, Loss, LossKind, SourceInfo};
 
-/// The most bytes of overlapping pieces that are held to bring their messages into order.
+/// Most bytes of overlapping pieces held in memory to merge their messages.
 const MAX_HELD_BYTES: usize = 256 << 20;
 
-/// What a log says about itself.
+/// A log's header.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct LogInfo {
-    /// Text of the vehicle file, where the log has one that is text.
+    /// Text of the vehicle file, where the log has one that is valid text.
     pub vehicle_toml: Option<String>,
     /// The other attachments: name and content.
     pub attachments: Vec<(String, Vec<u8>)>,
     /// Metadata: of our own record by key, of others as `<name of the record>/<key>`.
     pub metadata: BTreeMap<String, String>,
-    /// The sources; a source's place is its number in [`MessageKind`]. Numbered by the channels' metadata where these
-    /// number all of them (as in our logs), else by the names of `/raw/...` in their order, then `/sent/...`.
+    /// The sources; a source's index is its number in [`MessageKind`]. Numbered by the channels' metadata where these
+    /// number all of them (as in our logs), else by the names of `/raw/...` in order, then `/sent/...`.
     pub sources: Vec<SourceInfo>,
-    /// Which part of a recording it is, where that has several.
+    /// Part of a recording, where that has several.
     pub part: Option<Part>,
 }
 
-/// What a message is.
+/// Kind of message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MessageKind<'a> {
     /// Bytes from a source.
@@ -54,7 +54,7 @@ pub enum MessageKind<'a> {
     },
     /// A tick of the loop, see [`super::format::Tick`].
     Tick,
-    /// What a loop made of it.
+    /// A result of the loop.
     Result {
         /// Its topic.
         topic: &'a str,
@@ -66,13 +66,13 @@ pub enum MessageKind<'a> {
 /// A message of a log.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LogMessage<'a> {
-    /// What it is.
+    /// Kind.
     pub kind: MessageKind<'a>,
     /// Number of its channel.
     pub channel: u16,
-    /// When it was received, or made.
+    /// Time of receipt, or of creation.
     pub log_time: MonoNs,
-    /// For when it is valid.
+    /// Time of validity.
     pub publish_time: MonoNs,
     /// Its number in its channel.
     pub sequence: u32,
@@ -80,56 +80,56 @@ pub struct LogMessage<'a> {
     pub data: &'a [u8],
 }
 
-/// A position in a log, to continue reading from.
+/// A position in a log, to resume reading from.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct LogPlace {
-    /// Pieces that have been read.
+    /// Pieces read so far.
     read: usize,
     /// Those of them with messages left: number, and messages taken.
     open: Vec<(usize, usize)>,
-    /// Times of pieces already read, where the heads of their chunks said otherwise.
+    /// Times of pieces already read, where their chunk headers were wrong.
     corrected: Vec<(usize, (u64, u64))>,
     latest: u64,
     late: u64,
     losses: Vec<Loss>,
 }
 
-/// A channel of a log, as it says.
+/// A channel of a log, from its definition.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ChannelInfo<'a> {
     /// Its number.
     pub id: u16,
     /// Its topic.
     pub topic: &'a str,
-    /// How its messages are put into bytes; empty where that isn't said.
+    /// Message encoding; empty where not given.
     pub encoding: &'a str,
-    /// Name of its messages' schema, where it has one that is in the log.
+    /// Name of its schema, where the log contains one.
     pub schema: Option<&'a str>,
 }
 
 /// Reads a log.
 ///
-/// Opening walks over the file once, without unpacking it: so the order of messages doesn't depend on a summary being
-/// there. A log with a `/loop/tick` channel is then read as it stands in the file. Others' logs are brought into the
+/// Opening scans the whole file once, without unpacking it, so the order of messages doesn't depend on the presence of a
+/// summary. A log with a `/loop/tick` channel is then read in file order. Others' logs are brought into the
 /// order of (log time, source, sequence): a piece (a chunk, or about a megabyte of messages outside chunks) is held
-/// from the moment when its earliest message may be next, and pieces that overlap are merged. That is exact as long as
-/// what overlaps fits into 256 MiB and chunks don't lie about their times; messages for which it wasn't are counted in
+/// from when its earliest message may be next, and overlapping pieces are merged. That is exact as long as
+/// overlapping pieces fit into 256 MiB and chunk headers have correct times; messages out of order are counted in
 /// [`LogReader::late`].
 ///
-/// Damage is no error: what reads is delivered, and [`LogReader::losses`] says what is missing.
+/// Damage is not an error: readable messages are delivered, and [`LogReader::losses`] lists what is missing.
 pub struct LogReader<R = File> {
     file: LogFile<R>,
     info: LogInfo,
     channels: Channels,
     schemas: BTreeMap<u16, String>,
     losses: Losses,
-    /// Pieces in the order of the file.
+    /// Pieces in file order.
     spans: Vec<Span>,
-    /// What the heads of chunks said of their times, by piece, where their messages had others.
+    /// Times from chunk headers, by piece, where the messages had others.
     stated: BTreeMap<usize, (u64, u64)>,
-    /// Numbers of the pieces in the order in which they are read.
+    /// Piece numbers in reading order.
     plan: Vec<u32>,
-    /// How many of the plan have been read.
+    /// Number of pieces of the plan read so far.
     read: usize,
     merge: Merge,
     by_time: bool,
@@ -149,7 +149,7 @@ impl LogReader<File> {
 }
 
 impl<R: Read + Seek> LogReader<R> {
-    /// Reads a log from anything; `name` is for messages to people.
+    /// Reads a log from any input; `name` is used in messages.
     ///
     /// Errors: as for [`LogReader::open`].
     pub fn new(input: R, name: String) -> Result<Self, LogError> {
@@ -189,17 +189,17 @@ impl<R: Read + Seek> LogReader<R> {
         })
     }
 
-    /// What the log says about itself.
+    /// The log's header.
     pub fn header(&self) -> &LogInfo {
         &self.info
     }
 
-    /// Whether the log has the ticks of the loop that wrote it.
+    /// Whether the log contains the ticks of the loop that wrote it.
     pub fn has_ticks(&self) -> bool {
         self.channels.has_ticks()
     }
 
-    /// The channels that are known before messages are read.
+    /// The channels known before messages are read.
     pub fn channels(&self) -> impl Iterator<Item = ChannelInfo<'_>> {
         self.channels.all().map(|definition| {
             let (schema, encoding) =
@@ -209,40 +209,40 @@ impl<R: Read + Seek> LogReader<R> {
         })
     }
 
-    /// Log times between which its messages lie, as the heads of its chunks say.
+    /// First and last log time, from the chunk headers.
     pub(super) fn times(&self) -> Option<(MonoNs, MonoNs)> {
         let dated = self.spans.iter().filter(|span| span.is_dated());
         let times = dated.map(|span| (MonoNs(span.from), MonoNs(span.to)));
         times.reduce(|all, one| (all.0.min(one.0), all.1.max(one.1)))
     }
 
-    /// Topics of the results, in the order of their channels' numbers: all whose channels have been read.
+    /// Result topics of all channels read so far, in the order of channel numbers.
     pub(super) fn result_topics(&self) -> Vec<String> {
         self.channels.result_topics()
     }
 
-    /// Topics that several channels have, with the channels' numbers.
+    /// Topics with several channels, with the channel numbers.
     pub(super) fn doubles(&self) -> Vec<(String, Vec<u16>)> {
         self.channels.doubles()
     }
 
-    /// The sources: all whose channels have been read.
+    /// The sources of all channels read so far.
     pub(super) fn sources(&self) -> &[SourceInfo] {
         self.channels.sources()
     }
 
-    /// What has been found damaged. Damage to the framing is known from the start, that within chunks when they have
-    /// been read; the list is complete when [`LogReader::next`] has given `None`.
+    /// Damage found so far. Damage to the framing is known from the start, damage within chunks once they have
+    /// been read; the list is complete when [`LogReader::next`] has returned `None`.
     pub fn losses(&self) -> &[Loss] {
         self.losses.list()
     }
 
-    /// Messages that were delivered after one with a later log time, in a log without ticks.
+    /// Messages delivered after one with a later log time, in a log without ticks.
     pub fn late(&self) -> u64 {
         self.late
     }
 
-    /// Reads on to the next message; `false` at the end.
+    /// Advances to the next message; `false` at the end.
     pub(super) fn has_next(&mut self) -> Result<bool, LogError> {
         while self.must_read() {
             self.read_piece()?;
@@ -256,7 +256,7 @@ impl<R: Read + Seek> LogReader<R> {
 
     /// The next message, or `None` at the end.
     ///
-    /// Errors: the medium fails; damage is no error.
+    /// Errors: an I/O error; damage is not an error.
     #[expect(
         clippy::should_implement_trait,
         reason = "messages borrow from the reader, which no Iterator allows"
@@ -314,13 +314,13 @@ impl<R: Read + Seek> LogReader<R> {
         }
     }
 
-    /// Continues from a position of this reader or another one of the same file: messages, their order and losses are those
-    /// of a log read straight through, whatever has been read in the meantime.
+    /// Continues from a position of this or another reader of the same file: messages, their order and losses are the same
+    /// as when the log is read straight through, whatever has been read in between.
     ///
-    /// Errors: the medium fails.
+    /// Errors: an I/O error.
     pub fn go_to(&mut self, place: &LogPlace) -> Result<(), LogError> {
         self.merge.clear();
-        // The times of pieces decide the order of reading and date the losses.
+        // The times of pieces determine the reading order and the times of losses.
         for (number, stated) in core::mem::take(&mut self.stated) {
             self.correct(number, stated);
         }
@@ -332,13 +332,13 @@ impl<R: Read + Seek> LogReader<R> {
             self.read_span(*number, *next)?;
         }
         (self.read, self.latest, self.late) = (place.read, place.latest, place.late);
-        // Damage behind the position is found again when it is read.
+        // Damage after the position is found again when it is read.
         self.losses = Losses::of(place.losses.clone());
         self.finished = false;
         Ok(())
     }
 
-    /// Sets the times of a piece, and notes what its head said of them.
+    /// Sets the times of a piece, and records those of its header.
     fn correct(&mut self, number: usize, times: (u64, u64)) {
         let Some(span) = self.spans.get_mut(number).filter(|span| (span.from, span.to) != times) else {
             return;
@@ -353,7 +353,7 @@ impl<R: Read + Seek> LogReader<R> {
         self.read_span(number, 0)
     }
 
-    /// Reads a piece, of which so many messages have been taken.
+    /// Reads a piece, of which `next` messages have already been taken.
     fn read_span(&mut self, number: usize, next: usize) -> Result<(), LogError> {
         let mut batch = self.merge.empty_batch();
         let mut found = Vec::new();
@@ -362,7 +362,7 @@ impl<R: Read + Seek> LogReader<R> {
         match &chunk {
             Some(place) => read_chunk(&mut self.file, place, &mut batch, &mut self.channels, &mut found)?,
             None if span.piece == Piece::Run => read_run(&mut self.file, &span, &mut batch)?,
-            // The file has changed since it was walked over.
+            // The file has changed since the scan.
             None => found.push(LossKind::Contents),
         }
         place_entries(&mut batch, &self.channels, &mut found);
@@ -390,9 +390,9 @@ impl<R: Read + Seek> LogReader<R> {
         });
     }
 
-    /// Messages outside chunks have no checksum but that over the whole log: at the end of one that seems whole it is
-    /// the last question. It is of no use where there are chunks: the `mcap` crate's own writer gets it wrong when it
-    /// is told to leave out the chunks' checksums.
+    /// Messages outside chunks are covered only by the checksum over the whole log, which is checked at the end of a log that
+    /// seems intact. It is not checked where there are chunks: the `mcap` crate's own writer gets it wrong when the chunks'
+    /// checksums are disabled.
     fn finish(&mut self) -> Result<(), LogError> {
         if self.finished {
             return Ok(());
@@ -429,7 +429,7 @@ fn read_chunk<R: Read + Seek>(
     channels: &mut Channels,
     found: &mut Vec<LossKind>,
 ) -> Result<(), LogError> {
-    // Definitions count only when the chunk's checksum has been found right.
+    // Definitions count only once the chunk's checksum has been verified.
     let (mut definitions, mut sound) = (Vec::new(), true);
     let unpacked = unpack(file, place, |opcode, body| match opcode {
         op::MESSAGE => sound &= batch.push(body),
@@ -468,7 +468,7 @@ fn read_run<R: Read + Seek>(file: &mut LogFile<R>, span: &Span, batch: &mut Batc
     Ok(())
 }
 
-/// Gives the messages their ranks, and takes out those of channels that nobody knows.
+/// Sets the ranks of messages, and removes those of unknown channels.
 fn place_entries(batch: &mut Batch, channels: &Channels, found: &mut Vec<LossKind>) {
     let mut unknown: BTreeMap<u16, u64> = BTreeMap::new();
     batch.entries.retain_mut(|entry| {

@@ -1,6 +1,6 @@
-//! The recorder: a [`LogWriter`] on a thread of its own, behind a lock-free queue.
+//! The recorder: a [`LogWriter`] on its own thread, behind a lock-free queue.
 //!
-//! The loop must neither wait for a disk nor lose a byte. It asks [`RecorderPort::vacant_bytes`] before it takes in
+//! The loop must neither wait for a disk nor lose a byte. It checks [`RecorderPort::vacant_bytes`] before it consumes
 //! more, and leaves packets in their ports' rings while the queue is full.
 
 use std::fs::{File, OpenOptions};
@@ -26,11 +26,11 @@ use super::space::Space;
 use super::worker::{Beside, Echoes, Worker};
 use super::writer::{Lane, LogHeader, LogWriter, Summary};
 
-/// A queue is never smaller than that: the longest packet of a port, and a tick that names many.
+/// Minimum queue size: fits the longest packet of a port, and a tick with many packets.
 const MIN_QUEUE_BYTES: usize = 64 * 1024;
-/// Messages to devices that may wait: some seconds of eight heads.
+/// Capacity for messages to devices: some seconds of eight heads.
 const SENT_MESSAGES: usize = 2048;
-/// An entry that the queue has no room for; nothing of it was written.
+/// An entry didn't fit in the queue; nothing of it was written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("the recorder's queue has room for {free} bytes and an entry needs {needed}")]
 pub struct Full {
@@ -43,29 +43,29 @@ pub struct Full {
 /// Starts recorders.
 pub struct Recorder;
 
-/// The loop's end. Its methods neither block, nor allocate, nor call the system.
+/// The loop's end. Its methods don't block, allocate or make system calls.
 pub struct RecorderPort {
-    /// Without a cached index, so that the port can be a resource of the loop's world, which wants `Sync`.
+    /// Without a cached index, so that the port is `Sync` and can be a resource of the loop's world.
     ring: Prod<Arc<HeapRb<u8>>>,
     state: Arc<State>,
     result_channels: usize,
 }
 
-/// The end for those who start and finish the recorder. Dropped without [`RecorderHandle::finish`] it still completes
-/// the file, but nobody hears of errors.
+/// Handle to stop the recorder. If dropped without [`RecorderHandle::finish`] it still completes the file, but errors
+/// are discarded.
 pub struct RecorderHandle {
     thread: Option<JoinHandle<Result<Summary, LogError>>>,
     state: Arc<State>,
 }
 
-/// Takes what is sent to devices into the log, from any thread. When the queue is full the oldest is dropped, and counted.
+/// Logs bytes sent to devices, from any thread. When the queue is full the oldest message is dropped and counted.
 #[derive(Clone)]
 pub struct SentPort {
     state: Arc<State>,
 }
 
 impl SentPort {
-    /// Bytes sent to `source`. Never blocks.
+    /// Logs bytes sent to `source`. Never blocks.
     pub fn sent(&self, source: u16, at: MonoNs, bytes: &[u8]) {
         let message = SentMessage { source, at, bytes: bytes.to_vec() };
         if self.state.sent.force_push(message).is_some() {
@@ -73,7 +73,7 @@ impl SentPort {
         }
     }
 
-    /// How many messages were dropped.
+    /// Number of messages dropped.
     pub fn dropped(&self) -> u64 {
         self.state.sent_dropped.load(Ordering::Relaxed)
     }
@@ -81,9 +81,9 @@ impl SentPort {
 
 impl Recorder {
     /// Starts a recorder that writes to `writer`, with a queue of `queue_bytes`. The header is written before this
-    /// returns. Where flushing `writer` doesn't bring the bytes to the medium, a power cut costs more than a second.
+    /// returns. If flushing `writer` doesn't sync to the medium, a power cut loses more than a second.
     ///
-    /// Errors: the header could not be written, or the thread not be started.
+    /// Errors: the header could not be written, or the thread not started.
     pub fn start<W: Write + Send + 'static>(
         writer: W,
         header: &LogHeader,
@@ -92,7 +92,7 @@ impl Recorder {
         Self::start_within(Space::endless(), writer, header, queue_bytes, None)
     }
 
-    /// The same where room may end.
+    /// The same with limited disk space.
     pub(super) fn start_within<W: Write + Send + 'static>(
         space: Space,
         writer: W,
@@ -103,7 +103,7 @@ impl Recorder {
         Self::begin(space, (LogWriter::new(writer, header)?, None), header, queue_bytes, derived)
     }
 
-    /// Starts the thread of a log that has been begun, perhaps in parts.
+    /// Starts the thread of a log whose header is written, perhaps in parts.
     fn begin<W: Write + Send + 'static>(
         space: Space,
         (mut log, parts): (LogWriter<W>, Option<Parts<W>>),
@@ -136,10 +136,10 @@ impl Recorder {
         Ok((port, RecorderHandle { thread, state }))
     }
 
-    /// Starts a recorder that writes to a new file, which is brought to the medium at each flush. It warns when the disk fills,
-    /// and then leaves out echoes before anything else: [`Summary::left_out`].
+    /// Starts a recorder that writes to a new file, synced at each flush. It warns when the disk fills, and then drops
+    /// echoes before anything else: [`Summary::left_out`].
     ///
-    /// Errors: as for [`Recorder::start`]; the file exists (a dive is never overwritten) or can't be made.
+    /// Errors: as for [`Recorder::start`]; the file exists (a dive is never overwritten) or can't be created.
     pub fn create(
         path: &Path,
         header: &LogHeader,
@@ -153,7 +153,7 @@ impl Recorder {
 
     /// The same in parts, each a log of its own; `path` names the recording, and [`part_path`] its parts.
     ///
-    /// Errors: as for [`Recorder::create`]; also where a file is there that would be taken for a part of this recording.
+    /// Errors: as for [`Recorder::create`]; also if a file exists that would be taken for a part of this recording.
     pub fn create_in_parts(
         path: &Path,
         header: &LogHeader,
@@ -178,7 +178,7 @@ impl Recorder {
     }
 }
 
-/// A new file for a log.
+/// Creates a new file for a log.
 fn new_file(path: &Path) -> Result<SyncedFile, LogError> {
     let failed = |source| LogError::Create { path: path.to_owned(), source };
     let file = OpenOptions::new().write(true).create_new(true).open(path).map_err(failed)?;
@@ -187,13 +187,13 @@ fn new_file(path: &Path) -> Result<SyncedFile, LogError> {
     Ok(SyncedFile(BufWriter::new(file)))
 }
 
-/// Makes the entry of a new file in its folder survive a power cut. Other systems than Unix don't open folders.
+/// Makes a new file's directory entry survive a power cut. Only on Unix: other systems don't open folders.
 fn sync_folder_of(path: &Path) -> std::io::Result<()> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
     if cfg!(unix) { File::open(folder.unwrap_or(Path::new(".")))?.sync_all() } else { Ok(()) }
 }
 
-/// A file whose flush reaches the medium.
+/// A file whose flush syncs to the medium.
 struct SyncedFile(BufWriter<File>);
 
 impl SyncedFile {
@@ -228,31 +228,31 @@ impl RecorderPort {
         self.push(Lane::Sent(source), at, at, bytes)
     }
 
-    /// A tick, and the numbers of the sources in the order in which it consumed their packets.
+    /// A tick, and the numbers of the sources in the order of consumption of their packets.
     ///
     /// Errors: no room; nothing was written.
     pub fn tick(&mut self, index: u64, now: MonoNs, order: &[u16]) -> Result<(), Full> {
         let len = TICK_HEAD_BYTES.saturating_add(order.len().saturating_mul(2));
         self.begin(Lane::Tick, now, now, len)?;
-        // `begin` has found room for the whole entry, whose length is a u32; so the count is one too.
+        // `begin` has reserved room for the whole entry, whose length is a u32, so the count fits as well.
         self.ring.push_slice(&tick_head(index, now, u32::try_from(order.len()).unwrap_or(u32::MAX)));
         self.ring.push_iter(order_bytes(order));
         Ok(())
     }
 
-    /// A message of the result with that number.
+    /// A message of result channel `channel`.
     ///
     /// Errors: no room; nothing was written.
     pub fn result(&mut self, channel: u16, time: MonoNs, bytes: &[u8]) -> Result<(), Full> {
         self.push(Lane::Result(channel), time, time, bytes)
     }
 
-    /// Counts a tick of whose results there was no room for all.
+    /// Counts a tick whose results didn't all fit.
     pub fn miss_results(&mut self) {
         self.state.results_missing.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// How many channels for results the log has.
+    /// Number of result channels in the log.
     pub fn result_channels(&self) -> usize {
         self.result_channels
     }
@@ -262,22 +262,22 @@ impl RecorderPort {
         self.ring.vacant_len()
     }
 
-    /// Bytes of the queue when it is empty: an entry that needs more never fits.
+    /// Capacity of the queue, bytes; a larger entry never fits.
     pub fn capacity_bytes(&self) -> usize {
         self.ring.capacity().get()
     }
 
-    /// Bytes that an entry takes in the queue for a message of `len` bytes.
+    /// Bytes in the queue of an entry with a message of `len` bytes.
     pub const fn entry_bytes(len: usize) -> usize {
         ENTRY_HEAD_BYTES.saturating_add(len)
     }
 
-    /// Bytes that the entry of a tick takes which consumed `packets`.
+    /// Bytes in the queue of the entry of a tick that consumed `packets`.
     pub const fn tick_entry_bytes(packets: usize) -> usize {
         Self::entry_bytes(TICK_HEAD_BYTES.saturating_add(packets.saturating_mul(2)))
     }
 
-    /// Whether the recorder has failed. It then discards what it is given, so that the dive can go on.
+    /// Whether the recorder has failed. It then discards its input, so that the dive can go on.
     pub fn failed(&self) -> bool {
         self.state.failed.load(Ordering::Acquire)
     }
@@ -288,8 +288,8 @@ impl RecorderPort {
         Ok(())
     }
 
-    /// Finds room for an entry whose message has `len` bytes, and writes its head. The thread takes an entry only when
-    /// all of it is there.
+    /// Reserves room for an entry with a message of `len` bytes, and writes its header. The thread takes an entry only once
+    /// it is complete.
     fn begin(&mut self, lane: Lane, log_time: MonoNs, publish_time: MonoNs, len: usize) -> Result<(), Full> {
         let (free, needed) = (self.vacant_bytes(), Self::entry_bytes(len));
         let len = u32::try_from(len).ok().filter(|_| needed <= free).ok_or(Full { free, needed })?;
@@ -299,19 +299,19 @@ impl RecorderPort {
 }
 
 impl RecorderHandle {
-    /// Whether the recorder has failed; [`RecorderHandle::finish`] says why.
+    /// Whether the recorder has failed; [`RecorderHandle::finish`] returns the cause.
     pub fn failed(&self) -> bool {
         self.state.failed.load(Ordering::Acquire)
     }
 
-    /// An end for what is sent to the devices.
+    /// A port for bytes sent to the devices.
     pub fn sent_port(&self) -> SentPort {
         SentPort { state: Arc::clone(&self.state) }
     }
 
-    /// Writes what is in the queue and the summary, and ends the thread.
+    /// Writes the rest of the queue and the summary, and ends the thread.
     ///
-    /// Errors: whatever went wrong on the thread since its start.
+    /// Errors: any error on the thread since its start.
     pub fn finish(mut self) -> Result<Summary, LogError> {
         self.stop().unwrap_or(Err(LogError::Panicked))
     }

@@ -1,4 +1,4 @@
-//! Rewriting what reads of a damaged log into an orderly one.
+//! Rewrites the readable content of a damaged log as an intact log.
 
 use std::collections::BTreeMap;
 use std::io::{Read, Seek, Write};
@@ -12,25 +12,26 @@ use super::{
     SourceInfo,
 };
 
-/// Key in the metadata of a recovered log: which one it was made from.
+/// Metadata key of a recovered log: the log it was made from.
 pub const RECOVERED_FROM: &str = "recovered_from";
 
-/// What came of a recovery.
+/// Outcome of a recovery.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Recovered {
     /// Messages written.
     pub messages: u64,
-    /// Log times of the first and the last of them, in the order of the log.
+    /// Log times of the first and last of them, in log order.
     pub span: Option<(MonoNs, MonoNs)>,
-    /// What is missing, as the recovered log says it, too.
+    /// Losses, as also stated in the recovered log.
     pub losses: Vec<Loss>,
 }
 
-/// Writes what reads of a log to `output`, in the same order: attachments, metadata, messages of devices, ticks and results. It
-/// replays to the same digest, and states what is missing. Parts of a recording become one log; a part alone stays one. `open` opens the log, twice: first it is read to find all damage.
-/// `known` are the result channels whose schemas this program has; `from` is what the new log says it was made from.
+/// Writes the readable content of a log to `output`, in the same order: attachments, metadata, messages of devices, ticks and
+/// results. It replays to the same digest, and states its losses. Parts of a recording become one log; a single part
+/// remains a part. `open` opens the log; it is called twice, first to find all damage.
+/// `known` are the result channels whose schemas this program has; `from` is the name of the source log.
 ///
-/// Errors: the log can't be read at all, or the output not be written.
+/// Errors: the log can't be read, or the output not written.
 pub fn recover<R: Read + Seek, W: Write>(
     open: &mut dyn FnMut() -> Result<DiveLog<R>, LogError>,
     output: W,
@@ -60,9 +61,9 @@ pub fn recover<R: Read + Seek, W: Write>(
     Ok(done)
 }
 
-/// What is known of a log when it has been read to its end.
+/// Facts about a log read to its end.
 pub(super) struct Found {
-    /// What a dive log has no channel for included.
+    /// Includes content without a channel in dive logs.
     pub(super) losses: Vec<Loss>,
     pub(super) topics: Vec<String>,
     pub(super) sources: Vec<SourceInfo>,
@@ -116,7 +117,7 @@ pub(super) fn header<R: Read + Seek>(
     }
 }
 
-/// The channel of the new log that a message goes to; `None` for what a dive log has none for.
+/// The channel of the new log for a message; `None` if a dive log has none for it.
 pub(super) fn lane(message: &LogMessage<'_>, results: &BTreeMap<&str, u16>) -> Option<Lane> {
     match message.kind {
         MessageKind::Raw { source } => Some(Lane::Raw(source)),

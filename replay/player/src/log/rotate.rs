@@ -1,7 +1,7 @@
-//! A recording in parts: when one ends, and how the next begins. All of it on the recorder's thread.
+//! Rotation of a recording in parts, on the recorder's thread.
 //!
-//! Parts end between ticks, so that each holds whole ones. The next part is there, with its header on the medium, before the
-//! last is ended: a disk that takes no new file costs the rotation and not the recording.
+//! Parts end between ticks, so that each contains whole ticks. The next part is created, with its header synced, before the
+//! previous is ended: if the disk refuses a new file, only the rotation fails and the recording goes on.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -15,45 +15,45 @@ use super::writer::{Lane, LogHeader, LogWriter, PartSummary, Summary};
 /// When a part of a recording ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Every {
-    /// Once its file has so many bytes; the second in which it gets them is still in it.
+    /// Once its file has that many bytes; the second in which it reaches them is still in it.
     Bytes(u64),
-    /// Once its messages span so much of the dive's time.
+    /// Once its messages span that much of the dive's time.
     Span(DurNs),
 }
 
-/// How a recording is cut into parts.
+/// How a recording is split into parts.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Rotation {
     /// When a part ends.
     pub every: Every,
-    /// A name that no other recording has, see [`super::dive_name`].
+    /// Unique identifier of the recording, see [`super::dive_name`].
     pub dive: String,
 }
 
-/// Makes the file of the part with that number.
+/// Creates the file of the part with that number.
 pub(super) type OpenPart<W> = Box<dyn FnMut(u32) -> Result<(PathBuf, W), LogError> + Send>;
 
 /// The parts of a recording.
 pub(super) struct Parts<W: Write> {
     every: Every,
-    /// What every part begins with; `part` is the present one's.
+    /// Header of every part; `part` is the current one's.
     header: LogHeader,
     open: OpenPart<W>,
     path: PathBuf,
-    /// Log time of the part's first message, or of the last attempt to end it.
+    /// Log time of the part's first message, or of the last failed rotation.
     began: Option<MonoNs>,
-    /// Its bytes from which on it is to be ended.
+    /// File size from which the part is due to end, bytes.
     ends_at: u64,
-    /// Whether packets of a tick have been written whose tick hasn't.
+    /// Whether packets have been written whose tick hasn't.
     within_tick: bool,
-    /// Of the parts that have ended.
+    /// Totals of the ended parts.
     sum: Summary,
 }
 
 impl<W: Write> Parts<W> {
     /// Begins the first part.
     ///
-    /// Errors: its file can't be made or written.
+    /// Errors: its file can't be created or written.
     pub(super) fn begin(
         rotation: &Rotation,
         header: &LogHeader,
@@ -72,7 +72,7 @@ impl<W: Write> Parts<W> {
         Ok((Self { every, header, open, path, began, ends_at, within_tick, sum }, log))
     }
 
-    /// Whether the part is to end before a message.
+    /// Whether the part should end before a message.
     pub(super) fn is_due(&mut self, lane: Lane, at: MonoNs, log: &LogWriter<W>) -> bool {
         let between = match lane {
             Lane::Raw(_) => !core::mem::replace(&mut self.within_tick, true),
@@ -90,9 +90,9 @@ impl<W: Write> Parts<W> {
             }
     }
 
-    /// Begins the next part, of which `at` is the first message's time, and ends the last.
+    /// Begins the next part, whose first message has time `at`, and ends the last.
     ///
-    /// Errors: the last can't be ended. That the next can't be begun is no error: the last then goes on, and it is said.
+    /// Errors: the last can't be ended. If the next can't be begun, the last goes on with a warning; that is not an error.
     pub(super) fn rotate(&mut self, at: MonoNs, log: &mut LogWriter<W>) -> Result<(), LogError> {
         self.began = Some(at);
         let begun = self.next(log);
@@ -116,7 +116,7 @@ impl<W: Write> Parts<W> {
         end(last, last_path, true, &mut self.sum)
     }
 
-    /// The next part, begun.
+    /// Creates the next part and writes its header.
     fn next(&mut self, log: &mut LogWriter<W>) -> Result<(PathBuf, LogHeader, LogWriter<W>), LogError> {
         let part = self.header.part.as_ref();
         let part = PartHead {
@@ -128,13 +128,13 @@ impl<W: Write> Parts<W> {
         let header = LogHeader { part: Some(part), ..self.header.clone() };
         let begun = LogWriter::new(writer, &header).and_then(|mut next| next.flush().map(|()| next));
         if begun.is_err() {
-            // A beginning without a header is no part.
+            // A file without a header is no part.
             std::fs::remove_file(&path).ok();
         }
         Ok((path, header, begun?))
     }
 
-    /// Ends the last part, and gives what has been written in all of them.
+    /// Ends the last part, and returns the totals of all parts.
     ///
     /// Errors: the writer's.
     pub(super) fn finish(mut self, log: LogWriter<W>) -> Result<Summary, LogError> {
@@ -143,7 +143,7 @@ impl<W: Write> Parts<W> {
     }
 }
 
-/// Ends a part, and adds it to what has been written.
+/// Ends a part, and adds it to the totals.
 fn end<W: Write>(
     mut log: LogWriter<W>,
     path: PathBuf,
@@ -161,7 +161,7 @@ fn end<W: Write>(
     Ok(())
 }
 
-/// A file that is there already and would be taken for this recording, or for a part of it.
+/// An existing file that would be taken for this recording or a part of it.
 pub(super) fn in_the_way(recording: &Path) -> std::io::Result<Option<PathBuf>> {
     if recording.exists() {
         return Ok(Some(recording.to_owned()));
@@ -169,7 +169,7 @@ pub(super) fn in_the_way(recording: &Path) -> std::io::Result<Option<PathBuf>> {
     parts_of(recording).map(|parts| parts.into_iter().next())
 }
 
-/// The files beside a recording's name that are named as its parts, in their order.
+/// The files next to a recording that are named as its parts, in order.
 pub(super) fn parts_of(recording: &Path) -> std::io::Result<Vec<PathBuf>> {
     let folder = recording.parent().filter(|folder| !folder.as_os_str().is_empty());
     let mut parts = Vec::new();

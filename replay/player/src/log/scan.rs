@@ -1,5 +1,5 @@
-//! A walk over a whole log before it is read: where its chunks are and when, its channels, attachments and metadata,
-//! and what of it is damaged. Data of chunks is skipped, so that the walk is short.
+//! Scans a whole log before it is read: positions and times of chunks, channels, attachments, metadata, and damage.
+//! Chunk data is skipped, so the scan is quick.
 
 use std::collections::BTreeMap;
 use std::io::{Read, Seek};
@@ -17,23 +17,23 @@ use super::loss::Losses;
 use super::search::find_records;
 use super::{LogError, Loss, LossKind};
 
-/// Messages outside chunks are read in pieces of about this size.
+/// Messages outside chunks are read in pieces of about this size, bytes.
 const RUN_BYTES: u64 = 1 << 20;
-/// Definitions and metadata longer than that aren't read.
+/// Definitions and metadata longer than this aren't read, bytes.
 const MAX_WHOLE_BYTES: u64 = 16 << 20;
-/// All attachments together.
+/// Limit of all attachments together, bytes.
 const MAX_ATTACHMENT_BYTES: u64 = 64 << 20;
 
-/// A piece of the log that is read at once.
+/// A unit of reading.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Piece {
-    /// Its head is read again when its turn comes: a long dive has a hundred thousand, of half a second each.
+    /// Its header is read again when needed: a long dive has a hundred thousand chunks of half a second each.
     Chunk,
-    /// Messages, and records of other kinds between them, that stand in the file as they are.
+    /// Messages outside chunks, with records of other kinds between them.
     Run,
 }
 
-/// A piece and its place, in the file and in time.
+/// A piece with its byte range and time span.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Span {
     pub(super) at: u64,
@@ -43,7 +43,7 @@ pub(super) struct Span {
     pub(super) piece: Piece,
 }
 
-/// What the walk has found.
+/// Result of the scan.
 #[derive(Default)]
 pub(super) struct Scan {
     pub(super) spans: Vec<Span>,
@@ -57,30 +57,30 @@ pub(super) struct Scan {
     summary: BTreeMap<u16, Definition>,
     summary_channels: Option<u32>,
     data_end: Option<core::ops::Range<u64>>,
-    /// Whether it is a log of ours, which has no messages outside chunks.
+    /// Whether it is one of our logs, which have no messages outside chunks.
     ours: bool,
-    /// Whether it repeats its channels.
+    /// Whether it has the record that repeats its channels.
     has_list: bool,
-    /// Attachments that a log of ours says it has.
+    /// Attachments listed by a log of ours.
     announced: Vec<String>,
-    /// What it says itself to be missing from it.
+    /// Losses stated by the log itself.
     stated: Vec<Loss>,
-    /// The last record if that was the footer, and where the summary begins, as it says.
+    /// The last record if that was the footer, and the start of the summary according to it.
     footer: Option<(core::ops::Range<u64>, u64)>,
-    /// Whether the next message may join the last run.
+    /// Whether the next message may be appended to the last run.
     run_open: bool,
     attachment_bytes: u64,
 }
 
-/// Walks over a log.
+/// Scans a log.
 ///
-/// Errors: not MCAP, of a later format, or the medium fails.
+/// Errors: not MCAP, of a later format, or an I/O error.
 pub(super) fn scan<R: Read + Seek>(file: &mut LogFile<R>) -> Result<(Scan, Channels), LogError> {
     let mut scan = Scan::default();
     let magic_len = mcap::MAGIC.len() as u64;
     let first = file.bytes_at(0, magic_len)?;
     if first != mcap::MAGIC {
-        // A log whose very first bytes are damaged still has its header behind them.
+        // A log whose first bytes are damaged still has its header record after them.
         if !matches!(look(file, magic_len)?, Found::Record(Frame { item: Item::Header { .. }, .. })) {
             return Err(not_mcap(file, &first));
         }
@@ -110,7 +110,7 @@ impl Scan {
     fn walk<R: Read + Seek>(&mut self, file: &mut LogFile<R>, start: u64) -> Result<(), LogError> {
         let (mut at, mut found) = (start, look(file, start)?);
         loop {
-            // Where to go on after damage.
+            // Where to continue after damage.
             let resumed = match found {
                 Found::Closing => {
                     let end = at + mcap::MAGIC.len() as u64;
@@ -155,7 +155,7 @@ impl Scan {
     }
 
     fn accept<R: Read + Seek>(&mut self, file: &mut LogFile<R>, frame: &Frame) -> Result<(), LogError> {
-        // Nothing comes behind a footer: it was a record of another kind.
+        // Nothing follows a footer: that one was a damaged record of another kind.
         if let Some((footer, _)) = self.footer.take() {
             self.lose(LossKind::Framing, footer);
         }
@@ -253,7 +253,7 @@ impl Scan {
             return Ok(());
         }
         let body = file.bytes_at(frame.body, place.head_len + place.data_len + 4)?;
-        // The crate's parser checks the checksum. It wants a record whose lengths fit, which the framing has seen to.
+        // The crate's parser checks the checksum. It requires consistent lengths, which the framing has verified.
         match mcap::parse_record(mcap::records::op::ATTACHMENT, &body) {
             Ok(mcap::records::Record::Attachment { data, .. }) => {
                 self.attachments.push((place.name.clone(), data.into_owned()));
@@ -263,8 +263,8 @@ impl Scan {
         Ok(())
     }
 
-    /// Whole records that are missing leave no gap. A part that reaches the end takes the closing records along, and without any
-    /// other the summary begins elsewhere than the footer says.
+    /// Missing whole records leave no gap. If the end of the file is lost, so are the closing records; if records are lost
+    /// elsewhere, the summary doesn't begin where the footer says.
     fn check_closing(&mut self, at: u64) {
         let (Some((_, summary)), Some(data_end)) = (self.footer.take(), self.data_end.clone()) else {
             self.lose(LossKind::Truncated, at..at);
@@ -283,8 +283,8 @@ impl Scan {
         Err(LogError::TooNew { name: file.name().to_owned(), found: found.clone(), known: FORMAT_VERSION })
     }
 
-    /// Takes the channels of the summary, if it is sound, before all others: a tool that has copied a log of ours may
-    /// have numbered them anew. Gives whether these are all.
+    /// Takes the channels of an intact summary in preference to all others: a tool that copied a log of ours may have
+    /// renumbered them. Returns whether these are all.
     fn take_summary<R: Read + Seek>(&mut self, file: &mut LogFile<R>) -> Result<bool, LogError> {
         let Some(data_end) = self.data_end.as_ref().map(|record| record.start) else { return Ok(false) };
         if self.summary.is_empty() || !summary_holds(file, data_end)? {
@@ -295,14 +295,14 @@ impl Scan {
         Ok(all)
     }
 
-    /// Whether a channel has a schema that hasn't been seen.
+    /// Whether a channel's schema hasn't been found yet.
     fn lacks_schemas(&self) -> bool {
         let numbers = self.definitions.values().filter_map(|definition| definition.form.as_ref());
         numbers.map(|(schema, _)| *schema).any(|schema| schema > 0 && !self.schemas.contains_key(&schema))
     }
 
-    /// The long way to the channels, for logs of other writers that were cut off. What stands in a sound chunk is
-    /// believed before what stands outside.
+    /// Reads all chunks for channel definitions, for truncated logs of other writers. Definitions in intact chunks take
+    /// precedence over those outside.
     fn look_into_chunks<R: Read + Seek>(&mut self, file: &mut LogFile<R>) -> Result<(), LogError> {
         for span in &self.spans {
             let Some(place) = span.chunk(file)? else { continue };
@@ -326,7 +326,7 @@ impl Scan {
         Ok(())
     }
 
-    /// Says which parts of a log of ours are missing, where nothing else has been found to be.
+    /// Reports expected records missing from a log of ours, if no other loss has been found.
     fn miss_parts(&mut self) {
         if !self.ours || !self.losses.list().is_empty() {
             return;
@@ -352,14 +352,14 @@ impl Scan {
     }
 }
 
-/// Says between which messages losses lie, by the pieces around them. Heads of chunks may lie about their times; once all pieces
-/// are `read`, their times are those of what they gave.
+/// Sets the time spans of losses from the pieces around them. Chunk headers may have wrong times; once all pieces
+/// are `read`, the times are those of their messages.
 pub(super) fn date_losses(losses: &mut Losses, spans: &[Span], read: bool) {
     for loss in losses.list_mut().iter_mut().filter(|loss| !matches!(loss.kind, LossKind::Stated(_))) {
         let next = spans.partition_point(|span| span.at < loss.offset);
         let end = loss.offset.saturating_add(loss.bytes.max(1));
         let after = spans.iter().skip(next).find(|span| span.at >= end && span.is_dated());
-        // A chunk that the file's end cuts may have given messages nevertheless: the loss begins after them.
+        // A chunk cut by the end of the file may have delivered messages nevertheless: the loss begins after them.
         let cut = usize::from(read && loss.kind == LossKind::Truncated);
         let cut = spans.get(next..).and_then(|rest| rest.get(..cut)).unwrap_or_default();
         let before = spans.iter().take(next).chain(cut).rev().find(|span| span.is_dated());
@@ -367,8 +367,8 @@ pub(super) fn date_losses(losses: &mut Losses, spans: &[Span], read: bool) {
     }
 }
 
-/// A record whose own length nothing confirms is believed when what follows is a record too. Where the file's end cuts
-/// what follows, the length is a lie if there are records within it.
+/// Whether a record's length is trusted: if confirmed by its fields, or if another record follows. Where the file's end cuts
+/// the following record, the length is wrong if there are records within it.
 fn is_believed<R: Read + Seek>(file: &mut LogFile<R>, frame: &Frame, next: &Found) -> Result<bool, LogError> {
     let followed = !matches!(next, Found::Nothing);
     Ok(match next {
@@ -381,7 +381,7 @@ fn is_believed<R: Read + Seek>(file: &mut LogFile<R>, frame: &Frame, next: &Foun
 }
 
 impl Span {
-    /// The chunk that it is, as its head says; `None` for a run.
+    /// The chunk, from its header; `None` for a run.
     pub(super) fn chunk<R: Read + Seek>(
         &self,
         file: &mut LogFile<R>,
@@ -396,13 +396,13 @@ impl Span {
         })
     }
 
-    /// Whether its times mean anything: a chunk without messages has none.
+    /// Whether its times are valid: a chunk without messages has none.
     pub(super) fn is_dated(&self) -> bool {
         (self.from, self.to) != (0, 0)
     }
 }
 
-/// The whole of a record, unless it is too long to be read.
+/// A whole record, unless it is too long to be read.
 fn whole_body<R: Read + Seek>(file: &mut LogFile<R>, frame: &Frame) -> Result<Option<Vec<u8>>, LogError> {
     let len = frame.end - frame.body;
     if len > MAX_WHOLE_BYTES { Ok(None) } else { file.bytes_at(frame.body, len).map(Some) }

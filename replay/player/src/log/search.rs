@@ -1,4 +1,4 @@
-//! The search for records after damage: byte by byte, until there is a place from which records follow each other.
+//! Searches for records after damage, byte by byte, until several records follow each other.
 
 use std::io::{Read, Seek};
 
@@ -7,15 +7,15 @@ use mcap::records::op;
 use super::LogError;
 use super::framing::{Found, Item, LogFile, look};
 
-/// Records that must follow each other for a place to count as found again.
+/// Records that must follow each other to accept a position.
 const CHAIN: usize = 3;
-/// Bytes that are read at once.
+/// Read size, bytes.
 const SEARCH_BYTES: usize = 64 * 1024;
 
-/// The first place within `from..until` from which records follow each other.
+/// The first position within `from..until` from which records follow each other.
 ///
-/// A byte before a record may make another of it, with a length that by chance ends where a record begins; so one that
-/// nothing confirms is taken only if there are no records within it.
+/// A byte before a record may look like another record, with a length that by chance ends at a record boundary; so one with
+/// an unconfirmed length is accepted only if there are no records within it.
 pub(super) fn find_records<R: Read + Seek>(
     file: &mut LogFile<R>,
     from: u64,
@@ -29,7 +29,7 @@ pub(super) fn find_records<R: Read + Seek>(
     Ok(first.map(|chain| chain.at))
 }
 
-/// The first of some records that follow each other.
+/// The first of several records that follow each other.
 struct Chain {
     at: u64,
     end: u64,
@@ -53,7 +53,7 @@ fn find_chain<R: Read + Seek>(
                 return Ok(Some(chain));
             }
         }
-        // Windows that would cross the block's end are looked at in the next one.
+        // Windows that cross the block's end are checked with the next block.
         let whole_windows = got.saturating_sub(mcap::MAGIC.len() - 1);
         if whole_windows == 0 {
             break;
@@ -63,7 +63,7 @@ fn find_chain<R: Read + Seek>(
     Ok(None)
 }
 
-/// A quick look that sorts out nearly every place: a known opcode and a length below 2^32, or the closing bytes.
+/// Quick check that rejects nearly every position: a known opcode and a length below 2^32, or the closing bytes.
 fn may_begin(head: &[u8]) -> bool {
     match head {
         [1..=op::DATA_END, _, _, _, _, 0, 0, 0] => true,

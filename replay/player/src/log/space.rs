@@ -1,36 +1,37 @@
-//! The room that is left on the disk of a recording, and what is left out when it gets scarce.
+//! Free disk space during a recording, and which messages are dropped when it runs low.
 //!
-//! A dive outlives its disk: what is small and can't be had again (readings of position, ticks, judgements, advice) is kept to the
-//! last byte; echoes, by far the most of a log, go first. Which packets are echoes is told by their source and their length: the
-//! header says which sources are sonars, since the recorder knows no device. Heads that send ranges alone have short packets, which are kept: such a dive still replays to its digest.
+//! The dive should outlast the disk: small irreplaceable data (readings of position, ticks, judgements, advice) is kept to the
+//! last byte; echoes, by far the largest share of a log, go first. Echoes are recognised by source and length: the log
+//! header lists the sonars, since the recorder doesn't decode devices. Packets of heads that send only ranges are short and
+//! kept: such a dive still replays to its digest.
 
 use std::fs::File;
 use std::time::{Duration, Instant};
 
 use headrace_geometry::time::MonoNs;
 
-/// Below so many free bytes a person is warned: some hours of a dive.
+/// Free bytes below which the user is warned: some hours of a dive.
 const WARN_BELOW_BYTES: u64 = 1 << 30;
-/// Below so many free bytes echoes are left out: what is kept has room for days in them.
+/// Free bytes below which echoes are dropped: enough for days of the remaining messages.
 const SPARE_BELOW_BYTES: u64 = 128 << 20;
-/// Longer packets of sonars are echoes; ranges alone are shorter.
+/// Longer packets of sonars are echoes, bytes; packets with only ranges are shorter.
 pub(super) const LONGEST_KEPT_BYTES: usize = 128;
-/// How often the system is asked.
+/// Interval of free space queries.
 const ASK_EVERY: Duration = Duration::from_secs(2);
 
-/// What a recorder has left out since its disk was nearly full.
+/// Messages that a recorder has dropped because its disk was nearly full.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct LeftOut {
-    /// Echoes, results that follow them one by one, and what viewers are shown.
+    /// Echoes, results per echo, and viewer messages.
     pub messages: u64,
     /// Their bytes.
     pub bytes: u64,
-    /// Log times of the first and the last.
+    /// Log times of the first and last.
     pub span: Option<(MonoNs, MonoNs)>,
 }
 
 impl LeftOut {
-    /// In words, without the times.
+    /// As text, without the times.
     pub fn words(&self) -> String {
         let Self { messages, bytes, .. } = self;
         format!(
@@ -39,30 +40,30 @@ impl LeftOut {
     }
 }
 
-/// Watches the room.
+/// Monitors the free space.
 pub(super) struct Space {
     ask: Box<dyn FnMut() -> Option<u64> + Send>,
     asked: Option<Instant>,
     warned: bool,
     sparing: bool,
-    /// Free bytes, as last told.
+    /// Free bytes at the last query.
     free: u64,
     left_out: LeftOut,
 }
 
 impl Space {
-    /// With a way to ask how many bytes are free; `None` where nobody can tell.
+    /// With a query of the free bytes, which returns `None` if unknown.
     pub(super) fn new(ask: impl FnMut() -> Option<u64> + Send + 'static) -> Self {
         let ask = Box::new(ask);
         Self { ask, asked: None, warned: false, sparing: false, free: u64::MAX, left_out: LeftOut::default() }
     }
 
-    /// Room without an end.
+    /// Unlimited space.
     pub(super) fn endless() -> Self {
         Self::new(|| None)
     }
 
-    /// What the disk of a file has free for those who aren't root.
+    /// Free space of a file's disk, for users other than root.
     pub(super) fn of(file: File) -> Self {
         Self::new(move || {
             let disk = rustix::fs::fstatvfs(&file).ok()?;
@@ -70,7 +71,7 @@ impl Space {
         })
     }
 
-    /// Asks, when it is time to.
+    /// Queries the free space when due.
     pub(super) fn look(&mut self, now: Instant) {
         if self.asked.is_some_and(|asked| now.duration_since(asked) < ASK_EVERY) {
             return;
@@ -82,7 +83,7 @@ impl Space {
         }
         self.free = free;
         let free_mb = free / 1_000_000;
-        // Once echoes are left out they stay so until there is much more room.
+        // Hysteresis: once dropped, echoes stay so until there is much more room.
         let sparing = free < SPARE_BELOW_BYTES || (self.sparing && free < WARN_BELOW_BYTES);
         if sparing && !self.sparing {
             tracing::warn!(
@@ -100,12 +101,12 @@ impl Space {
         self.sparing = sparing;
     }
 
-    /// Whether echoes are to be left out.
+    /// Whether echoes are to be dropped.
     pub(super) fn is_scarce(&self) -> bool {
         self.sparing
     }
 
-    /// Counts a message that is left out. Gives what the log is to say at the first.
+    /// Counts a dropped message. Returns the statement for the log at the first.
     pub(super) fn leave_out(&mut self, at: MonoNs, bytes: usize) -> Option<String> {
         let first = self.left_out.span.map(|span| span.0);
         self.left_out.span = Some((first.unwrap_or(at), at));
@@ -117,7 +118,7 @@ impl Space {
             .then(|| format!("the recorder leaves echo returns out: the disk had {free} bytes free"))
     }
 
-    /// What was left out in all.
+    /// All messages dropped so far.
     pub(super) fn left_out(&self) -> LeftOut {
         self.left_out
     }

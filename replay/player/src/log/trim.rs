@@ -1,4 +1,4 @@
-//! A log with less in it: cut to spans of time, without echoes, without what tells whose it is.
+//! A reduced log: cut to spans of time, without echoes, or anonymised.
 
 use std::collections::BTreeMap;
 use std::io::{Read, Seek, Write};
@@ -9,51 +9,51 @@ use super::recover::{header, lane, look_through, words};
 use super::writer::Lane;
 use super::{DiveLog, LogError, LogHeader, LogInfo, LogMessage, LogWriter, ResultChannel};
 
-/// Key in the metadata of a trimmed log: what was done to it.
+/// Metadata key of a trimmed log: what was done to it.
 pub const TRIMMED: &str = "trimmed";
 
-/// Changes a message of a source: puts other bytes in the place of its own, and gives whether it did. No bytes leave it out.
+/// Changes a source message: may write replacement bytes, and returns whether it did. Empty bytes drop the message.
 pub type Change<'a> = &'a mut dyn FnMut(u16, &[u8], &mut Vec<u8>) -> bool;
 
-/// What is kept of a log, and how it is changed.
+/// Content to keep of a log, and how it is changed.
 pub struct Trim<'a> {
-    /// Log times that are kept, each from and to, neither of them overlapping, in their order; empty keeps all.
+    /// Log time spans to keep, each from and to, not overlapping, in order; empty keeps all.
     pub spans: Vec<(MonoNs, MonoNs)>,
-    /// What was done, in words, for the log's metadata.
+    /// Description of the changes, for the log's metadata.
     pub words: String,
-    /// Changes what the log begins with.
+    /// Changes the log's header.
     pub header: &'a dyn Fn(&LogInfo, LogHeader) -> LogHeader,
-    /// Changes what the sources have sent.
+    /// Changes source messages.
     pub change: Change<'a>,
 }
 
-/// What came of it.
+/// Outcome of trimming.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Trimmed {
     /// Messages written.
     pub messages: u64,
     /// Messages outside the spans.
     pub cut: u64,
-    /// Messages of results left out: a part of a dive isn't judged as the whole was.
+    /// Result messages dropped: a part of a dive isn't judged like the whole.
     pub results: u64,
-    /// Messages of sources that were changed.
+    /// Source messages that were changed.
     pub changed: u64,
-    /// Messages of sources of which nothing was left.
+    /// Source messages that became empty.
     pub emptied: u64,
-    /// Bytes of sources' messages before.
+    /// Bytes of source messages before.
     pub bytes_before: u64,
     /// And after.
     pub bytes_after: u64,
-    /// What the log had lost before.
+    /// Losses of the original log.
     pub losses: u64,
-    /// Log times of the first and the last message written, in the order of the log.
+    /// Log times of the first and last message written, in log order.
     pub span: Option<(MonoNs, MonoNs)>,
 }
 
-/// Writes what is to be kept of a log to `output`, in the same order. The new log says itself what was cut out, as a loss with its
-/// time span. `open` opens the log, twice; `known` are the result channels whose schemas this program has.
+/// Writes the kept content of a log to `output`, in the same order. The new log states the cut spans as losses.
+/// `open` opens the log; it is called twice. `known` are the result channels whose schemas this program has.
 ///
-/// Errors: the log can't be read at all, or the output not be written.
+/// Errors: the log can't be read, or the output not written.
 pub fn trim<R: Read + Seek, W: Write>(
     open: &mut dyn FnMut() -> Result<DiveLog<R>, LogError>,
     output: W,
@@ -88,7 +88,7 @@ pub fn trim<R: Read + Seek, W: Write>(
     Ok(cutter.done)
 }
 
-/// Says what isn't there any more of a log whose messages lie between two times.
+/// States the cuts in a log whose messages lie between two times.
 fn state_cuts<W: Write>(
     spans: &[(MonoNs, MonoNs)],
     times: Option<(MonoNs, MonoNs)>,
@@ -109,12 +109,12 @@ fn state_cuts<W: Write>(
     Ok(())
 }
 
-/// Writes message after message.
+/// Writes one message after another.
 struct Cutter<'a, W: Write> {
     numbers: BTreeMap<&'a str, u16>,
     log: LogWriter<W>,
     done: Trimmed,
-    /// Sources whose packets were kept since the last tick, in their order.
+    /// Sources of the packets kept since the last tick, in order.
     order: Vec<u16>,
     /// Whether all were kept.
     whole: bool,
@@ -155,7 +155,7 @@ impl<W: Write> Cutter<'_, W> {
         written
     }
 
-    /// A tick names the packets that it consumed: those that were kept.
+    /// Writes a tick with only the kept ones of its packets.
     fn tick(&mut self, message: &LogMessage<'_>) -> Result<(), LogError> {
         let order = core::mem::take(&mut self.order);
         let whole = core::mem::replace(&mut self.whole, true);

@@ -12,24 +12,24 @@ use super::rotate::Parts;
 use super::space::{LONGEST_KEPT_BYTES, Space};
 use super::writer::{Lane, LogHeader, LogWriter, Summary};
 
-/// How long the thread sleeps when the queue is empty. The loop can't wake it: that would be a system call.
+/// Sleep of the thread when the queue is empty. The loop can't wake it: that would be a system call.
 const NAP: Duration = Duration::from_millis(2);
-/// How often a chunk is closed and brought to the medium. Half of the second that a power cut may cost, since closing
-/// and syncing take their time too.
+/// Interval at which a chunk is closed and synced. Half of the second that a power cut may cost, since closing
+/// and syncing take time too.
 const FLUSH_PERIOD: Duration = Duration::from_millis(500);
-/// Entries between two looks at the clock.
+/// Entries between two clock readings.
 const BATCH: usize = 256;
 
-/// What the thread does.
+/// State of the thread.
 pub(super) struct Worker<'a, W: Write> {
     /// `None` once it has failed.
     log: Option<LogWriter<W>>,
     error: Option<LogError>,
     discarded: u64,
     flushed: Instant,
-    /// Whether something was written since.
+    /// Whether anything was written since the last flush.
     open: bool,
-    /// Where the recording is one in parts.
+    /// Parts, where the recording has several.
     parts: Option<Parts<W>>,
     space: Space,
     echoes: Echoes,
@@ -37,7 +37,7 @@ pub(super) struct Worker<'a, W: Write> {
     state: &'a State,
 }
 
-/// A derived, and room for what it makes.
+/// Derived channels, and a buffer for their messages.
 pub(super) struct Beside {
     derived: Option<Box<dyn DerivedChannels>>,
     made: Vec<Made>,
@@ -49,10 +49,10 @@ impl Beside {
     }
 }
 
-/// Which messages are left out when the disk fills.
+/// Messages dropped when the disk fills.
 pub(super) struct Echoes {
     sonars: Vec<u16>,
-    /// Which results follow echo by echo.
+    /// Which results are one per echo.
     results: Vec<bool>,
 }
 
@@ -95,7 +95,7 @@ impl<'a, W: Write> Worker<'a, W> {
     pub(super) fn run(mut self, mut queue: Queue) -> Result<Summary, LogError> {
         loop {
             self.space.look(wall_clock());
-            // Read before the queue is looked at: what was pushed before the flag was set is then taken.
+            // Read before the queue is checked, so that entries pushed before the flag was set are taken.
             let stopping = self.state.stopping.load(Ordering::Acquire);
             let taken =
                 (0..BATCH).map_while(|_| queue.take().map(|entry| self.write_all(&entry, &queue.message)));
@@ -110,7 +110,7 @@ impl<'a, W: Write> Worker<'a, W> {
         }
     }
 
-    /// Writes an entry and what the derived makes of it.
+    /// Writes an entry and the messages derived from it.
     fn write_all(&mut self, entry: &Entry, message: &[u8]) {
         self.write(entry, message);
         if let Lane::Result(number) = entry.lane {
@@ -119,7 +119,7 @@ impl<'a, W: Write> Worker<'a, W> {
     }
 
     fn write_made(&mut self, make: impl FnOnce(&mut dyn DerivedChannels, &mut Vec<Made>)) {
-        // Of a dive that goes on unrecorded nothing is to be made.
+        // Nothing is derived while a dive is not being recorded.
         let Some(derived) = self.beside.derived.as_mut().filter(|_| self.log.is_some()) else { return };
         let mut made = core::mem::take(&mut self.beside.made);
         make(derived.as_mut(), &mut made);
@@ -152,7 +152,7 @@ impl<'a, W: Write> Worker<'a, W> {
         self.parts = Some(parts);
     }
 
-    /// Writes what has been sent to the devices; gives the number of messages.
+    /// Writes the bytes sent to the devices; returns the number of messages.
     fn write_sent(&mut self) -> usize {
         let state = self.state;
         let mut written = 0;

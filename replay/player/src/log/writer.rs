@@ -1,4 +1,4 @@
-//! Writing a log, on whatever thread calls: the one place where messages become records.
+//! Writes a log, on the caller's thread: the only place that turns messages into records.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -19,32 +19,32 @@ use super::format::{
 use super::part::{PART, PART_END, PartEnd, PartHead, Progress};
 use super::{LeftOut, LogError};
 
-/// A chunk is closed when it holds more than this, whatever the clock says.
+/// Bytes above which a chunk is closed, whatever its time span.
 const CHUNK_BYTES: u64 = 1 << 20;
-/// A chunk is closed once its messages span so much of the dive's own time.
+/// Time span of messages, in dive time, at which a chunk is closed.
 const CHUNK_SPAN: DurNs = DurNs(500_000_000);
-/// What the summary has of a chunk, and of each of its channels besides. Source: MCAP format specification, "Chunk Index".
+/// Bytes of the summary per chunk, and per channel in each. Source: MCAP format specification, "Chunk Index".
 const CHUNK_INDEX_BYTES: u64 = 80;
 const CHUNK_INDEX_CHANNEL_BYTES: u64 = 10;
 
-/// What a log begins with.
+/// A log's header.
 #[derive(Debug, Clone, Default)]
 pub struct LogHeader {
     /// Text of the vehicle file; empty where there is none.
     pub vehicle_toml: String,
-    /// Files that the vehicle file names: name and content.
+    /// Files named by the vehicle file: name and content.
     pub attachments: Vec<(String, Vec<u8>)>,
     /// Version, digest of the configuration, clock anchors and the like.
     pub metadata: BTreeMap<String, String>,
-    /// The sources; a source's place is its number in the messages.
+    /// The sources; a source's index is its number in the messages.
     pub sources: Vec<SourceInfo>,
-    /// Whether a loop will say when it ticked. A simulation has none, and its log no channel of ticks.
+    /// Whether ticks will be written. A simulation has none, and its log no channel of ticks.
     pub ticks: bool,
-    /// The results; a result's place is its number in the messages.
+    /// The results; a result's index is its number in the messages.
     pub results: Vec<ResultChannel>,
-    /// Numbers of the sources that are sonars: their long packets are echoes, which are left out when a disk fills.
+    /// Numbers of the sources that are sonars: their long packets are echoes, dropped first when a disk fills.
     pub sonars: Vec<u16>,
-    /// Where it is one part of several. Its channels count on from there.
+    /// Part metadata, for one part of several. Its channels continue the numbering.
     pub part: Option<PartHead>,
 }
 
@@ -53,9 +53,9 @@ pub struct LogHeader {
 pub struct SourceInfo {
     /// Name, also of its channels.
     pub id: String,
-    /// Kind of device; empty where a log doesn't say.
+    /// Kind of device; empty where unknown.
     pub plugin: String,
-    /// Where it was connected; empty where a log doesn't say.
+    /// Connection of the device; empty where unknown.
     pub connect: String,
 }
 
@@ -66,40 +66,40 @@ pub struct ResultChannel {
     pub topic: String,
     /// Name of its schema, for instance `foxglove.PoseInFrame`.
     pub schema_name: String,
-    /// How the schema is written, for instance `jsonschema`.
+    /// Schema encoding, for instance `jsonschema`.
     pub schema_encoding: String,
     /// The schema.
     pub schema: String,
-    /// How its messages are written, for instance `json`.
+    /// Message encoding, for instance `json`.
     pub message_encoding: String,
-    /// Whether it is left out with the echoes when the disk fills: it has something for each of them, or isn't needed for a replay.
+    /// Whether it is dropped with the echoes when the disk fills: it has a record per echo, or isn't needed for a replay.
     pub follows_echoes: bool,
 }
 
-/// What has been written.
+/// Totals of a written log.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Summary {
     /// Messages of all channels.
     pub messages: u64,
-    /// Bytes of these messages, before compression and without any framing.
+    /// Bytes of these messages, uncompressed and without framing.
     pub message_bytes: u64,
-    /// Chunks, the one with the channels' definitions included.
+    /// Chunks, including the one with the channel definitions.
     pub chunks: u32,
     /// Bytes of the file.
     pub bytes: u64,
     /// Messages from the sources.
     pub raw_messages: u64,
-    /// What a recorder has left out because its disk was nearly full.
+    /// Messages dropped because the disk was nearly full.
     pub left_out: LeftOut,
-    /// Messages to devices that a recorder had no room for.
+    /// Messages to devices that didn't fit in the recorder's queue.
     pub sent_dropped: u64,
-    /// Ticks of which a recorder had no room for all the results.
+    /// Ticks whose results didn't all fit in the recorder's queue.
     pub results_missing: u64,
-    /// The files of a recording in parts, in their order.
+    /// The files of a recording in parts, in order.
     pub parts: Vec<PartSummary>,
 }
 
-/// A part of a recording that has been written.
+/// A written part of a recording.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PartSummary {
     /// Its file.
@@ -108,7 +108,7 @@ pub struct PartSummary {
     pub raw_messages: u64,
 }
 
-/// A channel by what it carries.
+/// A channel by its content.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Lane {
     Raw(u16),
@@ -117,20 +117,20 @@ pub(super) enum Lane {
     Result(u16),
 }
 
-/// A channel in the file and the number of its next message.
+/// A channel of the file and its next message number.
 #[derive(Debug, Clone, Copy)]
 struct Channel {
     id: u16,
     sequence: u32,
 }
 
-/// Writes a log. The writer under it is appended to and never sought, so that what is written stays as it is.
+/// Writes a log. The underlying writer is append-only and never sought, so that written bytes stay unchanged.
 ///
-/// Chunks are compressed with zstd at its lowest level: a dive is written where nobody waits for it, at some hundred
-/// kB/s, of which even a small computer packs a thousandfold; so the smaller file wins over lz4's speed.
+/// Chunks are compressed with zstd at its lowest level: nothing waits for the writing of a dive, at some hundred
+/// kB/s, and even a small computer compresses a thousand times faster; so the smaller file wins over lz4's speed.
 pub struct LogWriter<W: Write> {
     writer: mcap::Writer<NoSeek<Counted<W>>>,
-    /// Bytes that have left for the medium.
+    /// Bytes passed to the medium.
     bytes: Arc<AtomicU64>,
     raw: Vec<Channel>,
     sent: Vec<Channel>,
@@ -142,18 +142,18 @@ pub struct LogWriter<W: Write> {
     raw_messages: u64,
     chunks: u64,
     last_tick: Option<u64>,
-    /// How far earlier parts went.
+    /// Totals of earlier parts.
     before: Progress,
     /// Losses stated.
     losses: u64,
-    /// Time of the first message of the chunk that is open.
+    /// Time of the first message of the open chunk.
     chunk_began: Option<MonoNs>,
 }
 
 impl LogWriter<BufWriter<File>> {
-    /// Starts a log in a file, and overwrites what was there.
+    /// Starts a log in a file, overwriting an existing one.
     ///
-    /// Errors: the file can't be made or written to, or the header isn't allowed (see [`LogWriter::new`]).
+    /// Errors: the file can't be created or written, or the header isn't allowed (see [`LogWriter::new`]).
     pub fn create(path: &Path, header: &LogHeader) -> Result<Self, LogError> {
         let file = File::create(path).map_err(|source| LogError::Create { path: path.to_owned(), source })?;
         Self::new(BufWriter::new(file), header)
@@ -161,14 +161,14 @@ impl LogWriter<BufWriter<File>> {
 }
 
 impl<W: Write> LogWriter<W> {
-    /// Starts a log and writes all that comes before the first message.
+    /// Starts a log and writes everything before the first message.
     ///
-    /// Errors: the writer's, a result's topic outside `/result/`, or more channels than MCAP counts.
+    /// Errors: the writer's, a result topic outside `/result/`, or more channels than MCAP allows.
     pub fn new(writer: W, header: &LogHeader) -> Result<Self, LogError> {
         if let Some(result) = header.results.iter().find(|result| !result.topic.starts_with(RESULT_PREFIX)) {
             return Err(LogError::Topic { topic: result.topic.clone() });
         }
-        // Threads would compress in pieces that depend on the machine, and the log of a simulation is a function of
+        // With threads the output would depend on the machine, but the log of a simulation must be a function of
         // its scene. Without seeking a chunk is written at once when it is closed.
         let options = mcap::WriteOptions::new()
             .profile("headrace")
@@ -220,7 +220,7 @@ impl<W: Write> LogWriter<W> {
         Ok(log)
     }
 
-    /// Numbers messages from where earlier parts ended.
+    /// Continues the message numbers of earlier parts.
     fn count_on(&mut self, header: &LogHeader) {
         let before = core::mem::take(&mut self.before);
         for (topic, channel) in self.channels(header) {
@@ -240,21 +240,21 @@ impl<W: Write> LogWriter<W> {
         all
     }
 
-    /// How far the recording has come, earlier parts included. `header` is the one that it was begun with.
+    /// Totals of the recording, including earlier parts. `header` is the one that it was begun with.
     pub(super) fn progress(&mut self, header: &LogHeader) -> Progress {
         let sequences = self.channels(header).into_iter().map(|(topic, channel)| (topic, channel.sequence));
         let sequences = sequences.collect();
         Progress { messages: self.before.messages + self.messages, tick: self.last_tick, sequences }
     }
 
-    /// Bytes of the file, should it be ended now: about, since the last chunk isn't packed yet.
+    /// Approximate file size if it were ended now, bytes: the last chunk isn't compressed yet.
     pub(super) fn bytes(&self) -> u64 {
         let channels = self.raw.len() + self.sent.len() + self.results.len() + 1;
         let index = CHUNK_INDEX_BYTES + CHUNK_INDEX_CHANNEL_BYTES * channels as u64;
         self.bytes.load(Ordering::Relaxed) + index * self.chunks
     }
 
-    /// Says how far the recording has come with this part, and whether another follows. Closes the chunk.
+    /// Writes the totals including this part, and whether another follows. Closes the chunk.
     ///
     /// Errors: the writer's.
     pub(super) fn end_part(&mut self, follows: bool) -> Result<(), LogError> {
@@ -266,9 +266,9 @@ impl<W: Write> LogWriter<W> {
         self.writer.write_metadata(&record).map_err(LogError::writing("the end of a part"))
     }
 
-    /// Bytes that `source` sent, received at `received` and valid for `valid`.
+    /// Bytes from `source`, received at `received` and valid at `valid`.
     ///
-    /// Errors: the writer's, or a source that the header doesn't have.
+    /// Errors: the writer's, or a source not in the header.
     pub fn raw(
         &mut self,
         source: u16,
@@ -281,14 +281,14 @@ impl<W: Write> LogWriter<W> {
 
     /// Bytes sent to `source`.
     ///
-    /// Errors: the writer's, or a source that the header doesn't have.
+    /// Errors: the writer's, or a source not in the header.
     pub fn sent(&mut self, source: u16, at: MonoNs, bytes: &[u8]) -> Result<(), LogError> {
         self.message(Lane::Sent(source), at, at, bytes)
     }
 
-    /// A tick of the loop, and the numbers of the sources in the order in which it consumed their packets.
+    /// A tick of the loop, and the numbers of the sources in the order of consumption of their packets.
     ///
-    /// Errors: the writer's, or the header said that there are no ticks.
+    /// Errors: the writer's, or the header has no ticks.
     pub fn tick(&mut self, index: u64, now: MonoNs, order: &[u16]) -> Result<(), LogError> {
         let packets =
             u32::try_from(order.len()).map_err(|_| LogError::TickTooLong { packets: order.len() })?;
@@ -301,9 +301,9 @@ impl<W: Write> LogWriter<W> {
         written
     }
 
-    /// A message of the result with that number.
+    /// A message of result channel `channel`.
     ///
-    /// Errors: the writer's, or a result that the header doesn't have.
+    /// Errors: the writer's, or a result not in the header.
     pub fn result(&mut self, channel: u16, time: MonoNs, bytes: &[u8]) -> Result<(), LogError> {
         self.message(Lane::Result(channel), time, time, bytes)
     }
@@ -330,7 +330,7 @@ impl<W: Write> LogWriter<W> {
             publish_time: publish_time.0,
         };
         channel.sequence = channel.sequence.wrapping_add(1);
-        // However fast a dive is written, damage to one chunk costs no more of it than this.
+        // Limits the loss from damage to one chunk, however fast the dive is written.
         let began = *self.chunk_began.get_or_insert(log_time);
         if log_time.since(began).0 >= CHUNK_SPAN.0 {
             self.writer.flush().map_err(LogError::writing("a chunk"))?;
@@ -348,7 +348,7 @@ impl<W: Write> LogWriter<W> {
         Ok(())
     }
 
-    /// Says that something is missing from the log, after `from` and before `to` where that is known. Closes the chunk.
+    /// States a loss in the log, after `from` and before `to` where known. Closes the chunk.
     ///
     /// Errors: the writer's.
     pub fn lost(&mut self, from: Option<MonoNs>, to: Option<MonoNs>, words: &str) -> Result<(), LogError> {
@@ -359,7 +359,7 @@ impl<W: Write> LogWriter<W> {
         self.flush()
     }
 
-    /// Closes the chunk and flushes the writer: everything until now survives whatever comes.
+    /// Closes the chunk and flushes the writer: everything written so far survives a crash.
     ///
     /// Errors: the writer's.
     pub fn flush(&mut self) -> Result<(), LogError> {
@@ -367,7 +367,7 @@ impl<W: Write> LogWriter<W> {
         self.writer.flush().map_err(LogError::writing("a chunk"))
     }
 
-    /// Writes the summary, flushes, and gives the writer back.
+    /// Writes the summary, flushes, and returns the writer.
     ///
     /// Errors: the writer's.
     pub fn finish(mut self) -> Result<(W, Summary), LogError> {
@@ -401,7 +401,7 @@ fn write_metadata<W: Write>(
     Ok(())
 }
 
-/// A writer and how many bytes it has taken.
+/// A writer with a count of its bytes.
 struct Counted<W> {
     writer: W,
     bytes: Arc<AtomicU64>,
@@ -435,7 +435,7 @@ fn attach<W: Write>(
     writer.attach(&attachment).map_err(LogError::writing("an attachment"))
 }
 
-/// Adds channels and notes them for the record that repeats them.
+/// Adds channels and collects them for the record that repeats them.
 struct ChannelList<'a, W: Write> {
     writer: &'a mut mcap::Writer<NoSeek<Counted<W>>>,
     list: BTreeMap<String, String>,

@@ -24,7 +24,7 @@ pub struct SnapshotStore {
 }
 
 impl SnapshotStore {
-    /// An empty store for at most `max_bytes` of snapshots, wanted whenever `interval` of work has been done since the last.
+    /// An empty store for at most `max_bytes` of snapshots, due whenever `interval` of work has been done since the last.
     ///
     /// The first snapshot is held whatever its size.
     pub fn new(max_bytes: usize, interval: Duration) -> Self {
@@ -64,12 +64,12 @@ impl SnapshotStore {
         self.used_bytes += references;
     }
 
-    /// The bytes of a snapshot at a time that [`SnapshotStore::latest`] gave.
+    /// The bytes of a snapshot at a time returned by [`SnapshotStore::latest`].
     pub fn load(&self, at: MonoNs) -> Option<Vec<u8>> {
         self.snapshots.get(&at).map(|blocks| blocks.concat())
     }
 
-    /// Memory of those blocks that aren't held yet.
+    /// Memory of the blocks not stored yet.
     fn growth(&self, blocks: &BTreeSet<&[u8]>) -> usize {
         blocks.iter().filter(|block| !self.blocks.contains(**block)).map(|block| block_bytes(block)).sum()
     }
@@ -84,7 +84,7 @@ impl SnapshotStore {
         held
     }
 
-    /// Drops every other snapshot but the first, and the blocks that no other has.
+    /// Drops every other snapshot but the first, and the blocks no longer used.
     fn thin(&mut self) {
         let mut is_kept = false;
         self.snapshots.retain(|_, _| {
@@ -99,7 +99,7 @@ impl SnapshotStore {
     }
 }
 
-/// Memory of a block: its bytes, its two reference counts, its place in the set.
+/// Memory of a block: its bytes, its two reference counts, its set entry.
 fn block_bytes(block: &[u8]) -> usize {
     block.len() + 2 * size_of::<usize>() + size_of::<Arc<[u8]>>()
 }
@@ -110,7 +110,7 @@ mod tests {
 
     const INTERVAL: Duration = Duration::from_millis(300);
 
-    /// Bytes that compare with no others'.
+    /// Incompressible bytes, different for each seed.
     fn noise(len: usize, seed: u64) -> Vec<u8> {
         let mut state = seed;
         let mut next = || {
@@ -134,7 +134,7 @@ mod tests {
         for at in times {
             assert_eq!(store.load(MonoNs(at)).unwrap(), snapshot(at));
         }
-        // Each time that it was full there was room for half as many again.
+        // Each time the store was full, half as much room was left again.
         assert!(store.interval() > 4 * INTERVAL);
         assert_eq!(store.load(MonoNs(1)), None);
     }

@@ -1,4 +1,4 @@
-//! What was judged: each section as it is, the stretches that are missed now, and what the pilot was told of them.
+//! Coverage judgements for viewers: each section's verdict, the stretches currently missed, and alerts to the pilot.
 
 use std::collections::BTreeMap;
 
@@ -9,9 +9,9 @@ use headrace_monitor::pilot_text::{CauseFigures, Missed as MissedText, cause_tex
 use super::messages::{Level, Log, Missed, Section, Stretch, rounded};
 use super::site::Site;
 
-/// The list of missed stretches is shown so often, where it has changed.
+/// Interval at which the list of missed stretches is shown, if changed.
 const EVERY: DurNs = DurNs(2_000_000_000);
-/// And tells no more than these, the last along the tunnel: a dive that misses everything still has a small log.
+/// Most stretches listed, the last along the tunnel: a dive that misses everything still has a small log.
 const MOST_STRETCHES: usize = 40;
 
 /// A judgement of a section, as published.
@@ -28,26 +28,26 @@ pub(super) struct Judged {
     pub(super) cause: Option<CauseFigures>,
 }
 
-/// What has been judged so far.
+/// Judgements so far.
 #[derive(Debug, Default)]
 pub(super) struct Sections {
     /// Flagged sections with the cause and the hole.
     flagged: BTreeMap<i64, (Cause, f64)>,
     /// First and last section of each run.
     runs: BTreeMap<u64, (i64, i64)>,
-    /// Runs that have changed; the section that changed them is told next.
+    /// Changed runs; the pilot is alerted with the next judgement, which is of the section that changed them.
     changed_runs: Vec<(u64, u64)>,
     shown: Option<MonoNs>,
     changed: bool,
 }
 
 impl Sections {
-    /// A run has changed.
+    /// Records the change of a run.
     pub(super) fn run(&mut self, id: u64, change: u64) {
         self.changed_runs.push((id, change));
     }
 
-    /// A section was judged. Gives it, and what the pilot is told, the speed that is advised being known.
+    /// Takes a section's judgement. Returns the section as shown, and the alerts to the pilot; `v_max_mps` is the advised speed.
     pub(super) fn judge(&mut self, judged: &Judged, site: &Site, v_max_mps: f64) -> (Section, Vec<Log>) {
         let index = judged.section;
         let flagged = match judged.change {
@@ -68,13 +68,13 @@ impl Sections {
         (shown(judged, flagged, site), said)
     }
 
-    /// What the pilot is told of a run that a section has changed.
+    /// Alert to the pilot about a run changed by a section.
     fn say(&mut self, id: u64, change: u64, judged: &Judged, site: &Site, v_max_mps: f64) -> Option<Log> {
         let index = judged.section;
         let span = self.runs.entry(id).or_insert((index, index));
         if change == RunChange::Cleared as u64 {
             let (from, to) = self.runs.remove(&id)?;
-            // What has only turned out to have another cause is told as that.
+            // If only the cause has changed, the alert gives the new cause.
             let open = self.flagged.range(from..=to).next().is_some();
             let words = cleared_text(from as f64 * site.section_m, (to + 1) as f64 * site.section_m);
             return (!open).then(|| Log::new(judged.at, Level::Info, words));
@@ -93,12 +93,12 @@ impl Sections {
         })
     }
 
-    /// It is time to show what has changed.
+    /// Makes the next update due at once.
     pub(super) fn hurry(&mut self) {
         self.shown = None;
     }
 
-    /// The missed stretches, when they have changed and it is time to.
+    /// The missed stretches, if changed and due.
     pub(super) fn show(&mut self, at: MonoNs, site: &Site) -> Option<Missed> {
         let waits = self.shown.is_some_and(|shown| (0..EVERY.0).contains(&at.since(shown).0));
         (self.changed && !waits).then(|| {
@@ -108,7 +108,7 @@ impl Sections {
         })
     }
 
-    /// Neighbouring flagged sections with one cause, along the tunnel.
+    /// Adjacent flagged sections with the same cause, along the tunnel.
     fn stretches(&self, site: &Site) -> Vec<Stretch> {
         let mut stretches: Vec<Stretch> = Vec::new();
         let mut last = None;

@@ -1,11 +1,11 @@
-//! Messages as viewers read them: JSON with the keys of Foxglove's schemas, and of our own.
+//! Messages for viewers: JSON with the keys of Foxglove's schemas, and of our own.
 //!
-//! Numbers are rounded to what a viewer can show, so that their text is short.
+//! Numbers are rounded to display precision, to keep the text short.
 
 use headrace_geometry::time::MonoNs;
 use serde::Serialize;
 
-/// A time as Foxglove's schemas have it. Ours is the host's monotonic clock, as everywhere in a log.
+/// A time in Foxglove's format. Ours is the host's monotonic clock, as everywhere in a log.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub(super) struct Time {
     sec: u64,
@@ -18,7 +18,7 @@ impl From<MonoNs> for Time {
     }
 }
 
-/// A place or displacement, m.
+/// A position or displacement, m.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub(super) struct Xyz {
     x: f64,
@@ -27,7 +27,7 @@ pub(super) struct Xyz {
 }
 
 impl Xyz {
-    /// To a tenth of a millimetre.
+    /// Rounded to a tenth of a millimetre.
     pub(super) fn new([x, y, z]: [f64; 3]) -> Self {
         Self { x: rounded(x, 1e4), y: rounded(y, 1e4), z: rounded(z, 1e4) }
     }
@@ -43,10 +43,10 @@ pub(super) struct Turn {
 }
 
 impl Turn {
-    /// Frames that coincide.
+    /// Identity: the frames coincide.
     pub(super) const NONE: Self = Self { x: 0.0, y: 0.0, z: 0.0, w: 1.0 };
 
-    /// To a microradian; a unit quaternion to as much.
+    /// Rounded to a microradian.
     pub(super) fn of_wxyz(wxyz: [f64; 4]) -> Self {
         let [w, x, y, z] = wxyz.map(|part| rounded(part, 1e6));
         Self { x, y, z, w }
@@ -90,12 +90,12 @@ pub(super) struct Field {
 }
 
 impl Field {
-    /// An unsigned byte.
+    /// A u8.
     pub(super) const fn byte(name: &'static str, offset: u32) -> Self {
         Self { name, offset, kind: 1 }
     }
 
-    /// A float of four bytes, little-endian.
+    /// An f32, little-endian.
     pub(super) const fn float(name: &'static str, offset: u32) -> Self {
         Self { name, offset, kind: 7 }
     }
@@ -130,7 +130,7 @@ pub(super) struct Grid {
     pub(super) data: String,
 }
 
-/// How grave a line of the log is, by number of Foxglove's `LogLevel`.
+/// Severity of a log line, by number of Foxglove's `LogLevel`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Level {
     Info = 2,
@@ -154,7 +154,7 @@ impl Log {
     }
 }
 
-/// The vehicle, as plots show it. What isn't known is left out: viewers' readers of schemas have no null.
+/// The vehicle, for plots. Unknown values are omitted: viewers' schema parsers don't support null.
 #[derive(Debug, Serialize)]
 pub(super) struct Vehicle {
     pub(super) timestamp: Time,
@@ -196,7 +196,7 @@ pub(super) struct Section {
     pub(super) hole_clock: String,
     pub(super) target_m: f64,
     pub(super) flagged: bool,
-    /// Empty unless it is flagged or fails.
+    /// Empty unless the section is flagged or fails.
     pub(super) cause: &'static str,
     pub(super) words: String,
 }
@@ -227,7 +227,7 @@ pub(super) struct Advice {
     pub(super) words: String,
 }
 
-/// Rounded to whole parts of a unit; JSON has no other numbers than finite ones, and what is none shows as zero.
+/// Rounded to 1 / `parts`; JSON has only finite numbers, so others become zero.
 pub(super) fn rounded(value: f64, parts: f64) -> f64 {
     if value.is_finite() { (value * parts).round() / parts + 0.0 } else { 0.0 }
 }

@@ -1,21 +1,21 @@
-//! A dive for people's viewers: what the loop publishes word by word ([`headrace_monitor::trail`]) as messages that
-//! Foxglove and Lichtblick know, under Foxglove's schemas and some of our own.
+//! A dive for viewers: converts the loop's results ([`headrace_monitor::result_stream`]) to messages that
+//! Foxglove and Lichtblick display, under Foxglove's schemas and some of our own.
 //!
-//! | topic below `/result/view/` | schema | what, how often |
+//! | topic below `/result/view/` | schema | content, rate |
 //! |---|---|---|
 //! | `transforms` | `foxglove.FrameTransforms` | `tunnel` to `vehicle` and to `wall`, at each beat (5 Hz) |
 //! | `pose` | `foxglove.PoseInFrame` | the vehicle, at each beat |
 //! | `vehicle` | `headrace.Vehicle` | the same for plots, with speed and standard deviations |
-//! | `points` | `foxglove.PointCloud` | samples of half a second, with the number of the head |
+//! | `points` | `foxglove.PointCloud` | samples of half a second, with the head number |
 //! | `wall` | `foxglove.Grid` | the unrolled wall within 8 m of the vehicle, every 2 s |
 //! | `sections` | `headrace.Section` | each section as it is judged |
-//! | `missed` | `headrace.Missed` | the stretches that are flagged, every 2 s where they change |
+//! | `missed` | `headrace.Missed` | the flagged stretches, every 2 s if changed |
 //! | `advice` | `headrace.Advice` | the advice when it changes, and every second |
-//! | `alerts` | `foxglove.Log` | what the pilot is told |
+//! | `alerts` | `foxglove.Log` | alerts to the pilot |
 //!
-//! Frame `tunnel` is ours ([`headrace_geometry::frames`]): z is up, as viewers have it, so that none has to be turned. `wall`
-//! lies flat beside it: x is chainage, y the arc length. It is made on the recorder's thread ([`DerivedChannels`]); the loop has no
-//! part in it, and nothing here is read back by a replay.
+//! Frame `tunnel` is ours ([`headrace_geometry::frames`]): z is up, the viewers' convention, so nothing needs rotating.
+//! `wall` lies flat beside it: x is chainage, y the arc length. The messages are made on the recorder's thread
+//! ([`DerivedChannels`]), not in the loop, and a replay reads none of them.
 
 mod judged;
 mod messages;
@@ -53,14 +53,14 @@ use crate::results::{STREAMS, read_results};
 pub use schemas::channels;
 pub use site::Site;
 
-/// The wall is shown so far beside the tunnel, m.
+/// Distance at which the wall is shown beside the tunnel, m.
 const BESIDE_M: f64 = 1.0;
-/// Advice that doesn't change is told so often.
+/// Interval at which unchanged advice is repeated.
 const ADVICE_EVERY: DurNs = DurNs(1_000_000_000);
-/// Speeds nearer than this are the same advice, m/s.
+/// Speeds nearer than this count as the same advice, m/s.
 const SAME_MPS: f64 = 0.005;
 
-/// Makes messages for viewers of what the loop publishes.
+/// Makes viewer messages from the loop's results.
 #[derive(Debug)]
 pub struct View {
     site: Site,
@@ -68,14 +68,14 @@ pub struct View {
     points: Points,
     wall: Wall,
     sections: Sections,
-    /// Chainage and speed at the last beat with a position.
+    /// Chainage and speed at the last known position.
     last: Option<(f64, f64)>,
     v_max_mps: f64,
     told: Option<Told>,
     at: MonoNs,
 }
 
-/// The advice that was told last.
+/// The advice shown last.
 #[derive(Debug)]
 struct Told {
     at: MonoNs,
@@ -85,7 +85,7 @@ struct Told {
 }
 
 impl View {
-    /// For a dive of which nothing has been published yet.
+    /// For a dive without results so far.
     pub fn new(site: Site) -> Self {
         let steps = 64;
         let arcs = (0..steps).map(|step| f64::from(step) / f64::from(steps) * site.profile.perimeter_m());
@@ -174,7 +174,7 @@ impl View {
         Some(())
     }
 
-    /// What is shown from time to time.
+    /// Periodic messages.
     fn beat(&mut self, at: MonoNs, made: &mut Outbox<'_>) {
         self.at = at;
         made.push_some(Topic::Points, self.points.close_before(at).as_ref());
@@ -267,7 +267,7 @@ impl View {
     }
 }
 
-/// Something is wrong with the dive as a whole.
+/// An alert about the dive as a whole.
 fn alert(words: &mut Words<'_>, made: &mut Outbox<'_>) -> Option<()> {
     let at = MonoNs(words.integer()?);
     let kind = words.one_of(&AlertKind::ALL, |kind| kind as u64)?;
@@ -286,7 +286,7 @@ impl DerivedChannels for View {
         let mut rest = words.as_slice();
         while let Some((record, after)) = first_record(rest) {
             rest = after;
-            // A record that isn't as this version has it has nothing to show.
+            // A record in another version's format isn't shown.
             let _ = self.record(record, &mut made);
         }
         self.at = at;
@@ -296,7 +296,7 @@ impl DerivedChannels for View {
         let at = self.at;
         let mut made = Outbox { at, made };
         made.push_some(Topic::Points, self.points.close().as_ref());
-        // Whatever was shown last, the end is shown.
+        // The final state is always shown.
         self.wall.hurry();
         self.sections.hurry();
         if let Some((x_m, _)) = self.last {
@@ -306,9 +306,9 @@ impl DerivedChannels for View {
     }
 }
 
-/// Where messages go.
+/// Output of messages.
 struct Outbox<'a> {
-    /// Their log time: that of the results that they are made of, so that times in a log don't go back.
+    /// Their log time: that of the results they are made from, so that log times don't go back.
     at: MonoNs,
     made: &'a mut Vec<Made>,
 }
@@ -327,7 +327,7 @@ impl Outbox<'_> {
     }
 }
 
-/// Words of a record, taken one after the other.
+/// A record's words, read in order.
 struct Words<'a>(&'a [u64]);
 
 impl Words<'_> {
@@ -347,7 +347,7 @@ impl Words<'_> {
         Some(first.map(f64::from_bits))
     }
 
-    /// The one of some kinds that has the next word's number.
+    /// The one of `all` whose number is the next word.
     fn one_of<T: Copy>(&mut self, all: &[T], number: impl Fn(T) -> u64) -> Option<T> {
         let word = self.integer()?;
         all.iter().copied().find(|kind| number(*kind) == word)

@@ -1,37 +1,37 @@
-//! Samples as clouds of points, half a second of them in one.
+//! Samples as point clouds of half a second each.
 
 use headrace_geometry::time::{DurNs, MonoNs};
 
 use super::messages::{Field, PointCloud, Pose, Turn, Xyz, base64, rounded};
 use super::site::TUNNEL;
 
-/// A cloud holds samples of so long a time.
+/// Time span of a cloud.
 const SPAN: DurNs = DurNs(500_000_000);
-/// And no more than these.
+/// Most points of a cloud.
 const MOST_POINTS: usize = 4096;
-/// A point: three floats. The head's number is in the first byte of x, whose least bits these are; they were zeros, and a
-/// viewer that takes them for part of x is off by some micrometres. A stride that is no multiple of three would
+/// Bytes per point: three floats. The head number is stored in the least significant byte of x, which was zero; a
+/// viewer that takes it for part of x is off by some micrometres. A stride that is no multiple of three would
 /// compress a seventh worse in base64.
 const STRIDE: usize = 12;
 const FIELDS: [Field; 4] =
     [Field::float("x", 0), Field::float("y", 4), Field::float("z", 8), Field::byte("head", 0)];
-/// Places are rounded to this part of a metre, 4 mm: finer than samples are known. The lower half of a float's bits are then
-/// zeros, which take little room in the log.
+/// Coordinates are rounded to 1 / this, m (4 mm): finer than the samples' accuracy. The lower half of a float's bits are then
+/// zeros, which compress well.
 const PARTS_PER_M: f64 = 256.0;
-/// Farther from the origin of its cloud than this, m, a point has fewer zeros, and isn't shown.
+/// Points farther than this from their cloud's origin, m, would have fewer zero bits and aren't shown.
 const FARTHEST_M: f64 = 128.0;
 
-/// Points that are gathered.
+/// Points of the current cloud.
 #[derive(Debug, Default)]
 pub(super) struct Points {
     began: Option<MonoNs>,
-    /// Chainage that points are told from, m: floats of seven kilometres would be coarse.
+    /// Chainage of the cloud's origin, m: a float is too coarse for seven kilometres.
     origin_m: f64,
     data: Vec<u8>,
 }
 
 impl Points {
-    /// Takes a sample of a head in, received at a moment. Gives the cloud that was full, or too old for it.
+    /// Adds a head's sample, received at `at`. Returns the previous cloud if it was full or too old for the sample.
     pub(super) fn add(&mut self, at: MonoNs, head: u8, [x_m, y_m, z_m]: [f64; 3]) -> Option<PointCloud> {
         let full = if self.data.len() >= MOST_POINTS * STRIDE { self.close() } else { self.close_before(at) };
         if self.began.is_none() {
@@ -46,13 +46,13 @@ impl Points {
         full
     }
 
-    /// Gives the cloud when it is too old for a moment, or the clock was set back.
+    /// Returns the cloud if it is too old at `at`, or the clock was set back.
     pub(super) fn close_before(&mut self, at: MonoNs) -> Option<PointCloud> {
         let age = at.since(self.began?).0;
         if (0..SPAN.0).contains(&age) { None } else { self.close() }
     }
 
-    /// Gives what has been gathered.
+    /// Returns the current cloud.
     pub(super) fn close(&mut self) -> Option<PointCloud> {
         let began = self.began.take()?;
         let data = base64(&self.data);

@@ -1,8 +1,8 @@
 //! The channels of a view and their schemas.
 //!
 //! Names and keys of `foxglove.*` are those of Foxglove's published JSON Schemas (docs.foxglove.dev, "Message schemas").
-//! Only what viewers' readers of schemas take is used: `type` is one word, nothing refers to anything, nothing is null. Of
-//! enumerations the type is said beside their names, which some readers want and others pass over.
+//! Only features that viewers' schema parsers support are used: `type` is one word, no references, no null. Enumerations
+//! give their type beside the names, which some parsers require and others ignore.
 
 use serde_json::{Value, json};
 
@@ -10,7 +10,7 @@ use super::topic::Topic;
 use crate::log::ResultChannel;
 use crate::log::format::VIEW_PREFIX;
 
-/// The channels of a view, in the order of their numbers after those of the streams of results.
+/// The channels of a view, numbered after the streams of results.
 pub fn channels() -> Vec<ResultChannel> {
     let channel = |topic: &Topic| {
         let (name, schema_name, schema) = schema_of(*topic);
@@ -20,7 +20,7 @@ pub fn channels() -> Vec<ResultChannel> {
             schema_encoding: "jsonschema".to_owned(),
             schema: titled(schema_name, schema).to_string(),
             message_encoding: "json".to_owned(),
-            // All of it can be made again from the rest of the log: it goes first.
+            // All of it can be recomputed from the rest of the log, so it is dropped first.
             follows_echoes: true,
         }
     };

@@ -1,13 +1,13 @@
-//! The place that is shown, and its frames.
+//! The site shown, and its frames.
 
 use headrace_geometry::tunnel::Profile;
 
-/// The frames' names.
+/// Frame names.
 pub(super) const TUNNEL: &str = "tunnel";
 pub(super) const VEHICLE: &str = "vehicle";
 pub(super) const WALL: &str = "wall";
 
-/// What a view has to know of the dive's place.
+/// Facts about the site that a view needs.
 #[derive(Debug, Clone)]
 pub struct Site {
     /// Design profile.

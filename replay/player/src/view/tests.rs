@@ -20,7 +20,7 @@ fn record(kind: RecordKind, words: &[u64]) -> Vec<u64> {
     [&[(words.len() as u64) << 8 | kind as u64], words].concat()
 }
 
-/// What is made of some records of a stream, by the topic's name.
+/// Messages made from some records of a stream, by topic name.
 fn taken(view: &mut View, stream: &str, at: u64, records: &[Vec<u64>]) -> BTreeMap<String, Vec<Value>> {
     let words = [&[0, 0], records.concat().as_slice()].concat();
     let message: Vec<u8> = words.into_iter().flat_map(u64::to_le_bytes).collect();
@@ -165,7 +165,7 @@ fn advice_is_told_when_it_changes_and_every_second() {
     assert_eq!((&made["alerts"][0]["level"], &made["advice"][0]["speed_mps"]), (&3.into(), &0.2.into()));
 }
 
-/// Viewers' readers of JSON schemas know `type` as one word, and no references.
+/// Viewers' JSON schema parsers support only one word for `type`, and no references.
 #[test]
 fn schemas_use_what_viewers_read() {
     fn look(schema: &Value, place: &str) {

@@ -1,4 +1,4 @@
-//! What is shown, by topic.
+//! Topics for viewers.
 
 /// The topics, in the order of their channels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

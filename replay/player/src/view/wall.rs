@@ -9,13 +9,13 @@ use headrace_geometry::time::{DurNs, MonoNs};
 use super::messages::{Field, Grid, Pose, Turn, Xy, Xyz, base64, rounded};
 use super::site::{Site, WALL};
 
-/// A cell along the perimeter is about so high, m.
+/// Approximate height of a cell along the perimeter, m.
 const CELL_M: f64 = 0.25;
-/// What is shown reaches so far ahead and astern of the vehicle, m.
+/// Distance shown ahead and astern of the vehicle, m.
 const REACH_M: f64 = 8.0;
-/// Sections beyond the ends of the tunnel that are kept, m: heads may sit there, and nothing else.
+/// Length of the sections kept beyond either end of the tunnel, m: heads may be there.
 const BEYOND_M: f64 = 25.0;
-/// It is shown so often, where it has changed.
+/// Interval at which the wall is shown, if changed.
 const EVERY: DurNs = DurNs(2_000_000_000);
 const FIELDS: [Field; 6] = [
     Field::byte("red", 0),
@@ -25,10 +25,10 @@ const FIELDS: [Field; 6] = [
     Field::byte("samples", 4),
     Field::byte("verdict", 5),
 ];
-/// More samples of a cell than this are shown as this: a picture of the counts would take most of the room.
+/// Cap on the sample count shown per cell: exact counts would dominate the message size.
 const MOST_SAMPLES: u8 = 3;
 
-/// Samples and verdicts by place; as long as the tunnel, and no longer than it was passed.
+/// Samples and verdicts per cell; allocated only for the part of the tunnel passed.
 #[derive(Debug)]
 pub(super) struct Wall {
     cells: usize,
@@ -62,7 +62,7 @@ impl Wall {
         }
     }
 
-    /// A sample fell there.
+    /// Counts a sample.
     pub(super) fn sample(&mut self, x_m: f64, arc_m: f64) {
         let row = usize::try_from(math::floor_to_i64(arc_m / self.cell_m)).unwrap_or(0).min(self.cells - 1);
         let column = self.column(math::floor_to_i64(x_m / self.section_m));
@@ -74,7 +74,7 @@ impl Wall {
         }
     }
 
-    /// A section was judged.
+    /// Takes a section's verdict.
     pub(super) fn judge(&mut self, section: i64, verdict: Verdict) {
         if let Some(column) = self.column(section)
             && column.verdict != verdict
@@ -90,12 +90,12 @@ impl Wall {
         self.indices.contains(&index).then(|| self.columns.entry(index).or_insert_with(new))
     }
 
-    /// It is time to show what has changed.
+    /// Makes the next update due at once.
     pub(super) fn hurry(&mut self) {
         self.shown = None;
     }
 
-    /// The wall round a chainage, when it has changed and it is time to.
+    /// The wall around a chainage, if changed and due.
     pub(super) fn show(&mut self, at: MonoNs, x_m: f64) -> Option<Grid> {
         let waits = self.shown.is_some_and(|shown| (0..EVERY.0).contains(&at.since(shown).0));
         (self.changed && !waits).then(|| {
@@ -129,8 +129,8 @@ impl Wall {
     }
 }
 
-/// Colour, samples and verdict of a cell. What nobody has seen is transparent, and a cell of a judged section that has no
-/// sample is dark: so are holes.
+/// Colour, samples and verdict of a cell. Unseen cells are transparent, and cells of a judged section without a
+/// sample are dark: holes show as dark.
 fn cell(column: Option<&Column>, row: usize) -> [u8; FIELDS.len()] {
     let Some(column) = column else { return [0; FIELDS.len()] };
     let samples = column.samples.get(row).copied().unwrap_or(0);

@@ -1,4 +1,4 @@
-//! A beam is a cone, and its range comes from all the wall within it.
+//! A beam is a cone; its range is formed from all the wall within it.
 
 mod bins;
 
@@ -19,21 +19,21 @@ use crate::sensing::{Ray, Rays, Reach, Samples, Scenery};
 use crate::stages::{OwnBeam, Stage};
 use bins::Bins;
 
-/// A beam is a cone, and its range comes from all the wall within it: the nearest of it, its mean, or where the paper's
-/// interpolation takes the surface to be.
+/// A beam is a cone; its range is formed from all the wall within it: the nearest point, the mean, or the surface by the
+/// paper's interpolation.
 ///
-/// Keys: `rays` to a beam, from 1 to 64 (16; 64 where `form` is bilinear); the cone's full width `width_deg`, from 0.1
-/// to 60, or the frequency `frequency_khz` that a head has it for, from 600 to 1000 (a head's own width; 30 for an
-/// echosounder); `form` first, mean or bilinear (first); `bin_m`, width of a bin of range for bilinear, from 0.001 to
-/// 1 m (a 500th of a head's range setting, in this water; 0.15 for an echosounder).
-/// Source: Jorge et al. 2021, §6 and §9.2; for an echosounder the field of view that BlueOS gives to a Ping1D, 0.52 rad,
-/// and the 200 points of its profile over 30 m.
+/// Keys: `rays` per beam, from 1 to 64 (16; 64 where `form` is bilinear); the cone's full width `width_deg`, from 0.1
+/// to 60, or the head's frequency `frequency_khz` from which it follows, from 600 to 1000 (a head's own width; 30 for an
+/// echosounder); `form` first, mean or bilinear (first); `bin_m`, range bin width for bilinear, from 0.001 to 1 m (a
+/// 500th of a head's range setting, in this water; 0.15 for an echosounder).
+/// Source: Jorge et al. 2021, §6 and §9.2; for an echosounder the field of view of a Ping1D in BlueOS, 0.52 rad, and the
+/// 200 points of its profile over 30 m.
 pub(super) struct Kind;
 
-/// Angle from each of a sunflower's rays to the next, radians: a turn by the golden section. Source: Vogel, "A better
-/// way to construct the sunflower head", Mathematical Biosciences 44, 1979.
+/// Angle between successive rays of a sunflower pattern, radians: the golden angle. Source: Vogel, "A better way to
+/// construct the sunflower head", Mathematical Biosciences 44, 1979.
 const GOLDEN_RAD: f64 = 2.399_963_229_728_653;
-/// Strength at the beam's edge against that in its middle: its width is that between points of half power.
+/// Strength at the beam's edge relative to its axis: the width is between half-power points.
 const EDGE: f64 = 0.5;
 /// Width of an echosounder's beam, degrees.
 const ECHOSOUNDER_DEG: f64 = 30.0;
@@ -55,13 +55,13 @@ const FORMS: [(&str, Form); 3] = [("first", Form::First), ("mean", Form::Mean), 
 struct Parameters {
     rays: usize,
     width_deg: Option<f64>,
-    /// Of heads.
+    /// Heads only.
     frequency_khz: Option<f64>,
     form: Form,
     bin_m: Option<f64>,
 }
 
-/// The rays of a cone about a beam's middle.
+/// The rays of a cone about a beam's axis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cone {
     rays: Vec<ConeRay>,
@@ -69,9 +69,9 @@ pub struct Cone {
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct ConeRay {
-    /// Parts along the beam's middle, along the tunnel, and across both.
+    /// Components along the beam's axis, along the tunnel, and across both.
     parts: [f64; 3],
-    /// Strength against the middle's.
+    /// Strength relative to the axis.
     strength: f64,
 }
 
@@ -80,13 +80,13 @@ struct BeamCone {
     cone: Cone,
     form: Form,
     bins: Bins,
-    /// Of the ping at work.
+    /// Hits of the current ping.
     hits: Vec<Option<Hit>>,
 }
 
 impl Cone {
-    /// A cone `width_rad` wide of so many rays: the middle one, then a sunflower's, evenly over its disc; the last two
-    /// are at its edges in the plane of turning, where an oblique wall is nearest and farthest.
+    /// A cone `width_rad` wide with this many rays: the axis first, then a sunflower pattern, evenly over its disc; the last
+    /// two are at its edges in the plane of turning, where an oblique wall is nearest and farthest.
     pub fn new(width_rad: f64, rays: usize) -> Self {
         let last = rays.max(2) - 1;
         let ray = |number: usize| {
@@ -104,13 +104,13 @@ impl Cone {
         Self { rays: (0..rays.max(1)).map(ray).collect() }
     }
 
-    /// Its rays: parts along the beam's middle, along the tunnel, and across both; the middle one first, the edges in
-    /// the plane of turning last.
+    /// Its rays: components along the beam's axis, along the tunnel, and across both; the axis first, the edges in the plane
+    /// of turning last.
     pub fn parts(&self) -> impl Iterator<Item = [f64; 3]> {
         self.rays.iter().map(|ray| ray.parts)
     }
 
-    /// What each of the cone's rays meets within `far_m`, the middle one first.
+    /// Hits of the cone's rays within `far_m`, the axis first.
     pub(crate) fn hits<'a>(
         &'a self,
         environment: &'a Environment,
@@ -192,7 +192,7 @@ impl BeamCone {
         }
     }
 
-    /// The range of a ping whose rays are cast.
+    /// Range of a ping from its rays' hits.
     fn range_m(&mut self, ray: &Ray) -> Option<f64> {
         match self.form {
             Form::First => self.hits.iter().flatten().map(|hit| hit.range_m).min_by(f64::total_cmp),
@@ -201,8 +201,8 @@ impl BeamCone {
         }
     }
 
-    /// The paper's surface: each ray's echo, as strong as the beam is there and as the wall is square to it, is shared
-    /// between the two bins of range next to it, and the surface is where the sum is strongest.
+    /// The paper's surface: each ray's echo, weighted by beam strength and incidence, is shared between the two nearest range
+    /// bins; the surface is where the sum is strongest.
     fn surface_m(&mut self, ray: &Ray) -> Option<f64> {
         for (hit, part) in self.hits.iter().zip(&self.cone.rays) {
             if let Some(hit) = hit {
@@ -229,7 +229,7 @@ fn look_in_cones(scenery: Res<'_, Scenery>, mut sonars: Query<'_, '_, Looking<'_
         for (sounding, ray) in samples.list.iter_mut().zip(&mut rays.0) {
             beam.hits.clear();
             beam.hits.extend(beam.cone.hits(&scenery.environment, ray, reach.0));
-            // The truth is where the beam's middle meets the wall.
+            // The ground truth is where the beam's axis meets the wall.
             ray.hit = beam.hits.first().copied().flatten();
             sounding.range_m = beam.range_m(ray);
         }

@@ -1,9 +1,9 @@
-//! Heads that don't make every step that they are told to make.
+//! Heads that miss some of the steps commanded.
 
 use headrace_geometry::math::{self, TAU};
 use headrace_sensor::measurement::Sounding;
 
-/// How far a head is off its commands. Hosts command steps, not angles, so that a step that isn't made is never made up.
+/// Offset of a head from its commands. Hosts command steps, not angles, so a missed step is never made up.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Behind {
     commanded_rad: Option<f64>,
@@ -11,8 +11,8 @@ pub(super) struct Behind {
 }
 
 impl Behind {
-    /// The next ping, which a head that has made its step there, or hasn't, gives from `sounding`'s angle; `told` says
-    /// whether the head knows.
+    /// Applies the head's offset to the next ping; `made` is false if the step to it was missed, `told` true if the reported
+    /// angle includes the offset.
     pub(super) fn step(&mut self, sounding: &mut Sounding, made: bool, told: bool) {
         let commanded_rad = sounding.angle_rad;
         let step_rad =

@@ -1,4 +1,4 @@
-//! Bytes are changed, lost and made up on a line.
+//! Bit errors, lost bytes and inserted bytes on a line.
 
 use bevy_ecs::prelude::{Component, Query};
 use headrace_config::{ConfigError, Section};
@@ -16,10 +16,10 @@ use crate::random::Stream;
 use crate::sensing::Line;
 use crate::stages::Stage;
 
-/// Of the bytes from a device, each by itself, some are changed by a bit, some lost, and before some another comes in.
+/// Independently for each byte from a device: a bit is flipped, the byte is lost, or another byte is inserted before it.
 ///
-/// `flipped_per_million`, `dropped_per_million` and `inserted_per_million` say how many; all are zero by default. A
-/// message that loses all its bytes never comes. Bytes to devices are left alone.
+/// `flipped_per_million`, `dropped_per_million` and `inserted_per_million` are the rates; all zero by default. A message
+/// that loses all its bytes doesn't arrive. Bytes to devices are unchanged.
 pub(super) struct Kind;
 
 #[derive(Debug, Clone, Copy)]
@@ -29,11 +29,11 @@ struct Parameters {
     inserted: f64,
 }
 
-/// The bytes at which something happens, each with the same chance: drawn by the gaps between them.
+/// Affected bytes, all with the same probability: drawn by the gaps between them.
 struct Hits {
     stream: Stream,
     kind: u64,
-    /// Logarithm of the chance that a byte isn't hit; zero where none is.
+    /// Logarithm of the probability that a byte isn't affected; zero if none is.
     ln_missed: f64,
     count: u64,
     next: u64,
@@ -44,7 +44,7 @@ struct ByteErrors {
     flipped: Hits,
     dropped: Hits,
     inserted: Hits,
-    /// Bytes that have been on the line.
+    /// Bytes on the line so far.
     seen: u64,
     rest: Line,
 }
@@ -99,7 +99,7 @@ impl Hits {
         hits
     }
 
-    /// Bytes that are missed before the next hit: geometrically distributed.
+    /// Unaffected bytes before the next affected one: geometrically distributed.
     fn gap(&self) -> u64 {
         if self.ln_missed == 0.0 {
             return u64::MAX;
@@ -108,7 +108,7 @@ impl Hits {
         math::floor_to_i64(math::ln(u) / self.ln_missed).unsigned_abs()
     }
 
-    /// Whether this byte is hit, and then a number between 0 and 1; bytes are asked for in their order.
+    /// A number between 0 and 1 if this byte is affected; call in order of bytes.
     fn hit(&mut self, byte: u64) -> Option<f64> {
         if byte < self.next {
             return None;
@@ -131,7 +131,7 @@ impl ByteErrors {
         }
     }
 
-    /// Messages keep their places, also those that lose all bytes: whoever takes them from the line leaves these out.
+    /// Messages keep their indices, also those that lose all bytes: the outbox drops them.
     fn damage(&mut self, line: &mut Line) {
         let mut rest = std::mem::take(&mut self.rest);
         rest.clear();
@@ -165,7 +165,7 @@ impl ByteErrors {
     }
 }
 
-/// One of the whole numbers below `count`.
+/// An integer in [0, `count`) from `which` in (0, 1).
 fn below(count: f64, which: f64) -> u8 {
     u8::try_from(math::floor_to_i64(count * which)).unwrap_or_default()
 }

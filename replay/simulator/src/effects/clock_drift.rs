@@ -1,4 +1,4 @@
-//! Devices' clocks go wrong.
+//! Devices' clocks drift.
 
 use bevy_ecs::prelude::Query;
 use headrace_config::{ConfigError, Section};
@@ -14,11 +14,11 @@ use crate::facts::Facts;
 use crate::sensing::Samples;
 use crate::stages::Stage;
 
-/// The clock of a device that samples by itself gains or loses evenly: it samples at other times than it believes, and
-/// stamps what it believes.
+/// The clock of a device that samples on its own schedule drifts at a constant rate: it samples at the wrong times, and
+/// stamps the times that its clock shows.
 ///
-/// With `ppm` above zero, or drawn normally with a standard deviation of `sd_ppm`, its seconds are so many millionths
-/// longer than true ones, and it samples late. Heads and echosounders ping when the host asks, so that they are refused.
+/// Its seconds are `ppm` millionths longer than true ones (or drawn normally with standard deviation `sd_ppm`); positive
+/// values sample late. Refused for heads and echosounders, which ping when the host asks.
 pub(super) struct Kind;
 
 #[derive(Debug, Clone, Copy)]

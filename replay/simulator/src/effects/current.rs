@@ -1,4 +1,4 @@
-//! Water that flows along the tunnel.
+//! A current along the tunnel.
 
 use headrace_config::{ConfigError, Section};
 use headrace_geometry::math;
@@ -12,19 +12,19 @@ use crate::random::Stream;
 use crate::trajectory::{Ground, Knots, Trajectory};
 
 const NAME: &str = "current";
-/// Steps of a gust's time at which its speed is drawn anew.
+/// Steps per correlation time of a gust's speed.
 const STEPS: f64 = 8.0;
-/// A current may carry the vehicle this far out of the tunnel, m: as far as a trajectory may lead.
+/// Largest distance to which a current may carry the vehicle out of the tunnel, m: the same as for a trajectory.
 const OUTSIDE_M: f64 = 20.0;
-/// Time between two places at which that is looked at, s.
+/// Interval at which the trajectory is checked against [`OUTSIDE_M`], s.
 const LOOK_S: f64 = 5.0;
 
-/// The water flows along the tunnel and carries a vehicle that holds its speed through it: legs and a pilot's course take
-/// another time to the same end.
+/// The water flows along the tunnel and carries a vehicle that holds its speed through water: legs and a pilot's course
+/// end at the same place, after another duration.
 ///
-/// `speed_mps` is positive towards growing chainage. `gust_sd_mps` lets it vary besides, as a Gauss-Markov process whose
-/// correlation falls to 1/e within `gust_s` (60 by default); what a gust has carried the vehicle, it stays carried.
-/// A trajectory that is given over ground isn't changed by any current, so that it is refused.
+/// `speed_mps` is positive towards growing chainage. `gust_sd_mps` adds a Gauss-Markov variation whose correlation falls
+/// to 1/e within `gust_s` (60 by default); the displacement by gusts isn't corrected.
+/// A trajectory given over ground is independent of currents, so combining the two is refused.
 /// Source: Jorge et al. 2021, §9.1 (0.10 m/s through a leak, against the vehicle or with it).
 pub(super) struct Kind;
 
@@ -79,7 +79,7 @@ impl Effect for Current {
 }
 
 impl Current {
-    /// How far gusts have carried the vehicle since the start.
+    /// Displacement of the vehicle by gusts since the start.
     fn carried(&self, stream: Stream, duration_s: f64) -> Knots {
         let [start_m, ..] = self.carried_from(0.0, stream, duration_s).at(0.0);
         self.carried_from(-start_m, stream, duration_s)
@@ -148,8 +148,8 @@ mod tests {
         }
     }
 
-    /// The speed of a gust, its correlation after `gust_s`, and how far gusts carry: for times t well above T the variance
-    /// of the way is 2 sd^2 T t.
+    /// The speed of a gust, its correlation after `gust_s`, and the displacement: for times t well above T its variance is
+    /// 2 sd^2 T t.
     #[test]
     fn gusts_are_as_strong_and_as_long_as_wanted() {
         let current = Current { speed_mps: 0.0, gust_sd_mps: 0.05, gust_s: 20.0, length_m: 1e6 };
@@ -170,11 +170,11 @@ mod tests {
             ways += way_m * way_m / f64::from(runs);
         }
         let sd_mps = math::sqrt(speeds / count);
-        // Splines take a little off the quickest changes.
+        // Splines smooth the quickest changes a little.
         assert!((0.046..0.051).contains(&sd_mps), "{sd_mps}");
         let correlation = lagged / speeds;
         assert!((correlation - math::exp(-1.0)).abs() < 0.04, "{correlation}");
-        // The drawn speeds hold for a step, so that the sum is that of the discrete process.
+        // The drawn speeds hold for a step, so the sum is that of the discrete process.
         let kept = math::exp(-1.0 / STEPS);
         let wanted = 0.05 * 0.05 * seconds * (20.0 / STEPS) * (1.0 + kept) / (1.0 - kept);
         assert!((ways / wanted - 1.0).abs() < 5.0 * math::sqrt(2.0 / f64::from(runs)), "{ways} {wanted}");

@@ -1,4 +1,4 @@
-//! Depth comes in steps.
+//! Quantisation of depth.
 
 use bevy_ecs::prelude::{Component, Query, Res};
 use headrace_config::{ConfigError, Section};
@@ -14,10 +14,10 @@ use crate::facts::Facts;
 use crate::sensing::{Samples, Scenery};
 use crate::stages::Stage;
 
-/// A depth sensor tells depth in steps, the nearest one to the true depth below the surface.
+/// A depth sensor reports the depth below the surface rounded to the nearest step.
 ///
-/// `quantum_m` is the step in metres of the site's water, 0.031 by default: what one of 32,768 counts of 100 bar is.
-/// The device's own counts come after it.
+/// `quantum_m` is the step in metres of the site's water, 0.031 by default: one of 32,768 counts of 100 bar. The device's
+/// wire format adds its own quantisation.
 pub(super) struct Kind;
 
 #[derive(Debug, Clone, Copy)]

@@ -1,4 +1,4 @@
-//! What every effect is.
+//! Interface of the effects.
 
 use headrace_config::{ConfigError, Section};
 
@@ -11,18 +11,18 @@ pub trait EffectKind: Sync {
     /// Its name: `[effects.NAME]`.
     fn name(&self) -> &'static str;
 
-    /// What it does, in a line.
+    /// Summary of the effect, one line.
     fn summary(&self) -> &'static str;
 
-    /// Reads its tables; more than one where `[[effects.NAME]]` treats sensors differently.
+    /// Reads its tables; several where `[[effects.NAME]]` differs by sensor.
     ///
-    /// Errors: a key that is missing, unknown or out of range; sensors that aren't there.
+    /// Errors: a key that is missing, unknown or out of range; sensors that don't exist.
     fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError>;
 }
 
 /// An effect with its parameters.
 pub trait Effect: Send + Sync {
-    /// Changes what heads are told to do, before they are switched on.
+    /// Changes the heads' programs, before the heads are switched on.
     fn begin(&self, programs: &mut Programs<'_>) {
         let _ = programs;
     }

@@ -1,9 +1,9 @@
-//! Directions about a beam, and what happens to sound at a wall.
+//! Directions about a beam, and reflection at a wall.
 
 use headrace_geometry::frames::{Tunnel, Vec3};
 use headrace_geometry::math;
 
-/// A beam counts as along the tunnel where its direction's share along it is more than this.
+/// A beam counts as along the tunnel if the component of its direction along it exceeds this.
 const ALONG: f64 = 0.9;
 
 /// Scalar product.
@@ -11,9 +11,9 @@ pub(super) fn dot(a: Vec3<Tunnel>, b: Vec3<Tunnel>) -> f64 {
     a.0.dot(&b.0)
 }
 
-/// Two unit vectors square to a beam's unit vector and to each other: the first as far along the tunnel as may be, the
+/// Two unit vectors perpendicular to a beam's and to each other: the first as nearly along the tunnel as possible, the
 /// second across it, in the plane in which a head turns whose axis is along the tunnel. For a beam along the tunnel the
-/// first is as far up as may be.
+/// first is as nearly upwards as possible.
 pub(super) fn square_to(direction: Vec3<Tunnel>) -> [Vec3<Tunnel>; 2] {
     let along = direction.x().abs() > ALONG;
     let towards = if along { Vec3::new(0.0, 0.0, 1.0) } else { Vec3::new(1.0, 0.0, 0.0) };
@@ -23,19 +23,19 @@ pub(super) fn square_to(direction: Vec3<Tunnel>) -> [Vec3<Tunnel>; 2] {
     [first, Vec3::new(second.x, second.y, second.z)]
 }
 
-/// How squarely a beam meets a wall: the cosine of its incidence, from 0 along the wall to 1 square to it.
+/// Cosine of the incidence of a beam on a wall: 0 along the wall, 1 perpendicular to it.
 ///
 /// `normal` is a unit vector towards the water.
 pub(super) fn squareness(direction: Vec3<Tunnel>, normal: Vec3<Tunnel>) -> f64 {
     (-dot(direction, normal)).clamp(0.0, 1.0)
 }
 
-/// Where a smooth wall sends a beam on.
+/// Direction of a beam after specular reflection.
 pub(super) fn mirrored(direction: Vec3<Tunnel>, normal: Vec3<Tunnel>) -> Vec3<Tunnel> {
     direction + normal.scaled(-2.0 * dot(direction, normal))
 }
 
-/// Angle between two vectors, radians, in [0, pi]; they may have any length but zero.
+/// Angle between two vectors of any length but zero, radians, in [0, pi].
 pub(super) fn between_rad(a: Vec3<Tunnel>, b: Vec3<Tunnel>) -> f64 {
     math::atan2(a.0.cross(&b.0).norm(), dot(a, b))
 }

@@ -1,4 +1,4 @@
-//! Heads that stand still for a while.
+//! Heads that stall for a while.
 
 use bevy_ecs::prelude::{Component, Query};
 use headrace_config::{ConfigError, Section};
@@ -18,14 +18,14 @@ use crate::random::Stream;
 use crate::sensing::Samples;
 use crate::stages::Stage;
 
-/// Time between two moments at which a stall may begin.
+/// Interval of the times at which a stall may begin.
 const STEP: DurNs = DurNs(100_000_000);
 
-/// Now and then a head stands still and pings on where it is; afterwards it goes on from there, so that it stays behind.
+/// Now and then a head stalls and keeps pinging at its angle; afterwards it continues from there, so the offset remains.
 ///
-/// Stalls begin `per_hour` times an hour, at any tenth of a second alike, and last evenly between `seconds = [least,
-/// most]`, by default 2 to 20; one that begins during another may make that longer. With `told`, the default, the head
-/// reports where it stands; without, where it should be.
+/// Stalls begin `per_hour` times an hour, with equal probability at any tenth of a second, and last `seconds = [least,
+/// most]`, drawn evenly, by default 2 to 20; one that begins during another may extend it. With `told`, the default, the
+/// head reports its true angle; without, the commanded one.
 pub(super) struct Kind;
 
 #[derive(Debug, Clone, Copy)]
@@ -42,7 +42,7 @@ struct HeadStalls {
     behind: Behind,
 }
 
-/// When stalls are.
+/// Times of stalls.
 struct Stalls {
     stream: Stream,
     chance: f64,
@@ -88,7 +88,7 @@ impl Stalls {
         Self { stream, chance, seconds: parameters.seconds, next_step: 0, until: START }
     }
 
-    /// Whether the head stands still; moments are asked for in their order.
+    /// Whether the head stalls; call in order of time.
     fn at(&mut self, at: MonoNs) -> bool {
         let step = at.since(START).0.max(0).unsigned_abs() / STEP.0.unsigned_abs();
         while self.next_step <= step {

@@ -20,16 +20,16 @@ use crate::random::Stream;
 use crate::sensing::Samples;
 use crate::stages::Stage;
 
-/// Step of the draws for parts that stay: no sample's.
+/// Step of the draws for constant parts; no sample has this number.
 const CONSTANT: u64 = u64::MAX;
 
-/// Biases of an inertial unit that wander, and such as stay, on each axis by itself.
+/// Varying and constant biases of an inertial unit, independent for each axis.
 ///
 /// `gyro_degps` and `accel_mps2` are the standard deviations of first-order Gauss-Markov processes whose correlation
-/// falls to 1/e within `tau_s` (300 by default); they are as likely large at the first sample as later.
-/// `gyro_constant_degps` and `accel_constant_mps2` are standard deviations of what stays through the dive.
-/// `attitude_drift_deg_per_hour` turns the unit's own attitude about the vertical, evenly, positive to the left: what
-/// its filter makes of its biases isn't simulated otherwise. All are zero by default.
+/// falls to 1/e within `tau_s` (300 by default); they are stationary from the first sample.
+/// `gyro_constant_degps` and `accel_constant_mps2` are standard deviations of parts constant through the dive.
+/// `attitude_drift_deg_per_hour` turns the unit's own attitude about the vertical at a constant rate, positive to the
+/// left: the effect of biases on the unit's own filter isn't simulated otherwise. All are zero by default.
 /// Source: Brown and Hwang, Introduction to Random Signals and Applied Kalman Filtering, 4th ed., §4.4 (exact steps).
 pub(super) struct Kind;
 
@@ -48,10 +48,10 @@ struct ImuBias {
     parameters: Parameters,
     stream: Stream,
     constant: [f64; 6],
-    /// In standard deviations: rates, then forces.
+    /// In standard deviations: turn rates, then forces.
     wandering: [f64; 6],
     before: Option<MonoNs>,
-    /// What is kept over so long, and how much comes anew: samples come at one rate, mostly.
+    /// Sample interval, correlation over it, and weight of the new draw; kept, as most samples come at one rate.
     kept: (DurNs, f64, f64),
 }
 
@@ -192,7 +192,7 @@ mod tests {
         [a, b, c, d, e, f]
     }
 
-    /// Over seeds: the variance at the first sample and much later, and the correlation exp(-t / tau) between them.
+    /// Over many seeds: the variance at the first sample and much later, and the correlation exp(-t / tau) between them.
     #[test]
     fn biases_are_stationary_and_forget_over_tau() {
         let (runs, steps, tau_s) = (4000, 50, 2.0);

@@ -22,11 +22,11 @@ const RATE: u64 = 0;
 const FORCE: u64 = 2;
 const ATTITUDE: u64 = 4;
 
-/// White noise of an inertial unit, on each axis by itself.
+/// White noise of an inertial unit, independent for each axis.
 ///
-/// `gyro_degps_rthz` and `accel_mps2_rthz` are densities: a sample scatters by the density times the root of the unit's
-/// rate, so that a sum over t seconds scatters by density times the root of t. `attitude_deg` turns each attitude by
-/// so much, standard deviation, about each axis of the unit. All are zero by default.
+/// `gyro_degps_rthz` and `accel_mps2_rthz` are densities: the sd of a sample is density times the root of the unit's rate,
+/// so that of an integral over t seconds is density times the root of t. `attitude_deg` is the sd of the rotation of each
+/// attitude about each axis of the unit. All are zero by default.
 /// Source: IEEE Std 952-1997, C.1 (angle random walk); a MEMS unit's data sheet has 0.007 deg/s/sqrt(Hz).
 pub(super) struct Kind;
 

@@ -25,25 +25,25 @@ use crate::stages::Stage;
 use pings::{Ping, Pings};
 
 /// Heads that share a frequency hear each other: a head takes the first sound after its own ping for its echo. Another
-/// head's ping comes by way of the place where its beam meets the wall, or straight, where its beam points at this
-/// head's body. Is it there at c (t_other - t_own + way / c) / 2 before the own echo, and not nearer than the head's least
-/// range, then this is the range that is told.
+/// head's ping arrives by reflection where its beam meets the wall, or directly, where its beam points at this head's
+/// body. If its apparent range, (c (t_other - t_own) + path) / 2, is less than that of the own echo and at least the
+/// head's least range, it is reported instead.
 ///
-/// It is heard always where it comes from within this head's beam, and else, through side lobes, with a chance. A wall
-/// is within the beam up to half the beam's width and a margin from its middle; the other head, up to half the width
+/// It is always heard if it arrives within this head's beam; otherwise, through side lobes, with a probability. A wall
+/// point is within the beam up to half the beam's width and a margin from its axis; the other head, up to half the width
 /// and its body's.
 ///
-/// Keys: `sensors`, those that share a frequency, two or more (all heads); a table for each frequency; `share`, the
-/// chance through side lobes, from 0 to 1 (0); `margin_deg`, from 0 to 45 (half the other's beam, as the patch is lit
-/// as wide as that).
+/// Keys: `sensors`, those that share a frequency, two or more (all heads), one table per frequency; `share`, the
+/// probability through side lobes, from 0 to 1 (0); `margin_deg`, from 0 to 45 (half the other's beam, as the patch is
+/// insonified that widely).
 ///
-/// Heads whose bodies share a place are idealised ones, which don't hear each other. A ping that begins while another
-/// head listens already is taken to come when and where the last two before say, for a simulation doesn't know it yet;
-/// this is wrong for a ping or two where a head turns round.
+/// Heads whose bodies overlap are idealised ones and don't hear each other. Pings of another head that begin while a head
+/// is already listening aren't simulated yet: they are extrapolated from the last two before, which is wrong for a ping or
+/// two where a head turns round.
 /// Source: Jorge et al. 2021, §10; core's sampling/interference.rs, which plans with the same two ways.
 pub(super) struct Kind;
 
-/// Heads are nearer to each other than this, m: vehicle files place them within 20 m of the body's origin in x, y and z.
+/// Upper bound of the distance between heads, m: vehicle files place them within 20 m of the body's origin in x, y and z.
 const APART_M: f64 = 70.0;
 
 #[derive(Debug, Clone, Copy)]
@@ -54,7 +54,7 @@ struct Parameters {
     margin_rad: Option<f64>,
 }
 
-/// A head that hears others, and that others hear.
+/// A head in a group that shares a frequency.
 #[derive(Component)]
 struct Hears {
     parameters: Parameters,
@@ -104,7 +104,7 @@ impl Effect for PerSensor<Parameters> {
     }
 }
 
-/// Adds the slice's pings to those that may still be heard.
+/// Adds the slice's pings and drops those that can no longer be heard.
 fn remember(
     slice: Res<'_, Slice>,
     scenery: Res<'_, Scenery>,
@@ -152,7 +152,7 @@ fn listen(
     }
 }
 
-/// A head after a ping of its own.
+/// A head listening after its own ping.
 struct Ear<'a> {
     scenery: &'a Scenery,
     hears: &'a Hears,
@@ -160,9 +160,9 @@ struct Ear<'a> {
     ray: &'a Ray,
     stopped: bool,
     step: u64,
-    /// The ranges between which a sound would be taken for the echo.
+    /// Ranges between which a sound would be taken for the echo.
     within_m: [f64; 2],
-    /// Whether one has been.
+    /// Whether one has been heard.
     heard: bool,
 }
 
@@ -185,7 +185,7 @@ impl Ear<'_> {
         }
     }
 
-    /// A ping that comes by way of the wall.
+    /// A ping that arrives by reflection at the wall.
     fn by_the_wall(&mut self, other: u64, sounds: &Hears, ping: &Ping, later_m: f64) {
         let Some(wall) = ping.wall else { return };
         let range_m = (later_m + (wall - ping.origin).norm() + (wall - self.ray.origin).norm()) / 2.0;
@@ -200,7 +200,7 @@ impl Ear<'_> {
         }
     }
 
-    /// A ping that comes straight from a head whose beam points here.
+    /// A ping that arrives directly from a head whose beam points at this one.
     fn straight(&mut self, other: u64, sounds: &Hears, ping: &Ping, later_m: f64) {
         let way_m = (ping.origin - self.ray.origin).norm();
         let range_m = f64::midpoint(later_m, way_m);
@@ -219,7 +219,7 @@ impl Ear<'_> {
         }
     }
 
-    /// Whether a sound at this range would come before all others, and not too early.
+    /// Whether a sound at this range would precede all others, and isn't below the least range.
     fn comes_first(&self, range_m: f64) -> bool {
         range_m >= self.within_m[0] && range_m < self.within_m[1]
     }
@@ -228,16 +228,16 @@ impl Ear<'_> {
         (self.within_m[1], self.heard) = (range_m, true);
     }
 
-    /// Angle of a place from the beam's middle, radians.
+    /// Angle of a point from the beam's axis, radians.
     fn off_rad(&self, place: Point3<Tunnel>) -> f64 {
         between_rad(self.ray.direction, place - self.ray.origin)
     }
 }
 
 impl Hears {
-    /// The longest way from this head to a wall that sends something back, m.
+    /// Upper bound of the distance at which a wall still returns this head's sound, m.
     fn rings_m(&self) -> f64 {
-        // In any water: half as much again is more than the speed of sound differs by.
+        // A factor of 1.5 exceeds any difference in the speed of sound.
         self.spec.range_m[1] * 1.5
     }
 }

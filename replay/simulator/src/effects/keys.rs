@@ -1,10 +1,10 @@
-//! Keys that several effects have.
+//! Keys shared by several effects.
 
 use std::ops::RangeInclusive;
 
 use headrace_config::{ConfigError, Section};
 
-/// The table of an effect that is for the vehicle or the tunnel, not for sensors one by one.
+/// The table of an effect on the vehicle or the tunnel, rather than on single sensors.
 ///
 /// Errors: more than one.
 pub(super) fn only_one(tables: Vec<Section<'_>>) -> Result<Vec<Section<'_>>, ConfigError> {
@@ -41,7 +41,7 @@ pub(super) fn or_zero(
     Ok(table.number(key, allowed)?.unwrap_or(0.0))
 }
 
-/// That an effect does something.
+/// Checks that an effect does something.
 ///
 /// Errors: all of these keys are zero or absent.
 pub(super) fn some_not_zero(table: &Section<'_>, values: &[(&'static str, f64)]) -> Result<(), ConfigError> {

@@ -20,10 +20,10 @@ use crate::stages::Stage;
 pub(super) const SENSES: [Sense; 6] =
     [Sense::Head, Sense::Echosounder, Sense::Depth, Sense::Inertial, Sense::Velocity, Sense::Tether];
 
-/// Messages from a device come late, over what the vehicle file says of its latency; none overtakes another on its line.
+/// Messages from a device come late, in addition to the latency in the vehicle file; none overtakes another on its line.
 ///
-/// All come `latency_ms` later, and each of them besides by an exponentially distributed time whose mean is `jitter_ms`.
-/// A message that would overtake the one before comes with it. Messages to devices aren't late.
+/// All are delayed by `latency_ms` and, each by itself, by an exponentially distributed time of mean `jitter_ms`. A
+/// message that would overtake the one before arrives with it. Messages to devices aren't delayed.
 pub(super) struct Kind;
 
 #[derive(Debug, Clone, Copy)]
@@ -127,7 +127,7 @@ mod tests {
         }
     }
 
-    /// Far apart, so that none is held up by the one before: mean and variance of the exponential distribution.
+    /// Far apart, so that none is delayed by the one before: mean and variance of the exponential distribution.
     #[test]
     fn jitter_is_exponential() {
         let parameters = Parameters { latency_s: 0.0, jitter_s: 0.003 };

@@ -1,4 +1,4 @@
-//! Steel in the lining pulls compasses.
+//! Steel in the lining disturbs compasses.
 
 use bevy_ecs::prelude::{Component, Query, Res};
 use headrace_config::{ConfigError, Section};
@@ -18,15 +18,15 @@ use crate::random::Stream;
 use crate::sensing::{Samples, Scenery};
 use crate::stages::Stage;
 
-/// Length of a stretch of tunnel in which a place may be, m.
+/// Length of a stretch of tunnel that may contain a random disturbance, m.
 const CELL_M: f64 = 1.0;
 
-/// Near steel, the attitude of an inertial unit is turned about the vertical: smoothly, as a raised cosine along the
-/// chainage of the vehicle, most in the place's middle.
+/// Near steel, the attitude of an inertial unit is turned about the vertical by a raised cosine of the vehicle's chainage,
+/// largest in the middle of the disturbance.
 ///
-/// `places` are tables of `chainage_m` (the middle), `length_m` and `deg`, positive to the left. `per_100m` adds places
-/// at random, `length_m` long (5 by default), each pulling evenly by up to `up_to_deg` (10 by default) either way. They
-/// are the tunnel's: all units feel the same, and those that overlap add.
+/// `places` are tables of `chainage_m` (the middle), `length_m` and `deg`, positive to the left. `per_100m` adds places at
+/// random, `length_m` long (5 by default), with an angle drawn evenly up to `up_to_deg` (10 by default) either way. They
+/// belong to the tunnel: all units see the same, and overlapping ones add.
 pub(super) struct Kind;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -46,7 +46,7 @@ struct Disturbance {
     tunnel_m: f64,
 }
 
-/// Places by their middle.
+/// Disturbances in order of their middle.
 #[derive(Clone, Component)]
 struct Steel {
     places: Vec<Place>,

@@ -1,4 +1,4 @@
-//! Some pings come back with nothing.
+//! Some pings get no return.
 
 use bevy_ecs::prelude::{Component, Query};
 use headrace_config::{ConfigError, Section};
@@ -17,18 +17,18 @@ use crate::random::Stream;
 use crate::sensing::{Ray, Rays, Samples};
 use crate::stages::Stage;
 
-/// Some pings come back with nothing: a share of them anywhere, singly or in runs; those that meet the wall at a grazing
-/// angle, which send little back; those whose echo comes from afar. The three are independent of each other.
+/// Some pings get no return: a share of them anywhere, singly or in runs; those at grazing incidence, which return little
+/// sound; those whose echo comes from far away. The three are independent of each other.
 ///
 /// Keys: `share` of all pings, from 0 to 0.95 (0), and the mean length of their runs, `mean_run` pings, from
-/// share / (1 - share), or 1 if that is more, to 10,000 (1 / (1 - share): each on its own); `grazing_from_deg` and
-/// `grazing_to_deg`, incidence beyond which some, and from which all, are lost, from 0, square to the wall, to 90;
+/// share / (1 - share), or 1 if that is more, to 10,000 (1 / (1 - share): independent pings); `grazing_from_deg` and
+/// `grazing_to_deg`, incidence beyond which some, and from which all, are lost, from 0, perpendicular to the wall, to 90;
 /// `far_from_m` and `far_to_m`, the same for the range, from 0 to 200 m. Between the two of a pair the share grows
-/// linearly; both are the same for a sharp edge. At least one of the three has to be there.
+/// linearly; equal values give a sharp edge. At least one of the three is required.
 /// Source: runs after Gilbert, "Capacity of a burst-noise channel", Bell System Technical Journal 39, 1960.
 pub(super) struct Kind;
 
-/// The most pings of a mean run.
+/// Largest mean run, pings.
 const LONGEST_RUN: f64 = 10_000.0;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,17 +38,17 @@ struct Parameters {
     far: Option<Ramp>,
 }
 
-/// Pings lost in runs: a chain of two states.
+/// Pings lost in runs: a Markov chain of two states.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Runs {
     share: f64,
-    /// Chance that a ping is lost after one that isn't.
+    /// Probability that a ping is lost after one that isn't.
     begin: f64,
-    /// Chance that a ping is lost after one that is.
+    /// Probability that a ping is lost after one that is.
     go_on: f64,
 }
 
-/// Nothing up to `from`, all from `to`.
+/// Share lost: 0 up to `from`, 1 from `to`, linear between.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Ramp {
     from: f64,
@@ -59,7 +59,7 @@ struct Ramp {
 struct MissingReturns {
     parameters: Parameters,
     stream: Stream,
-    /// Whether the last ping was of a run, once there has been one.
+    /// Whether the last ping was lost in a run; `None` before the first.
     in_run: Option<bool>,
 }
 
@@ -69,7 +69,7 @@ impl Runs {
         Self { share, begin: share / (mean * (1.0 - share)), go_on: 1.0 - 1.0 / mean }
     }
 
-    /// The next ping of the chain, given the last one's state; the first has the share itself.
+    /// State of the next ping, given the last one's; the first is lost with the probability of the share.
     fn next(&self, before: Option<bool>, chance: f64) -> bool {
         let lost = match before {
             None => self.share,
@@ -157,14 +157,14 @@ impl Effect for PerSensor<Parameters> {
 }
 
 impl MissingReturns {
-    /// Whether the ping of a step comes back with nothing. To be asked for each step, in order.
+    /// Whether the ping of a step gets no return. Call for each step, in order.
     fn loses(&mut self, step: u64, ray: &Ray, range_m: Option<f64>, stopped: bool) -> bool {
         let [first, second] = self.stream.at(step).uniform();
         let in_run = self.parameters.runs.is_some_and(|runs| runs.next(self.in_run, first));
         self.in_run = Some(in_run);
         let share =
             |ramp: Option<Ramp>, at: Option<f64>| ramp.zip(at).map_or(0.0, |(ramp, at)| ramp.share(at));
-        // At what angle an obstacle of the vehicle is met isn't known.
+        // The incidence on an obstacle of the vehicle isn't known.
         let hit = ray.hit.filter(|_| self.parameters.grazing.is_some() && !stopped);
         let incidence_deg = hit.map(|hit| math::acos(squareness(ray.direction, hit.normal)).to_degrees());
         let stays = (1.0 - share(self.parameters.grazing, incidence_deg))

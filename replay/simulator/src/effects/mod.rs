@@ -1,5 +1,5 @@
-//! The effects that a scene may name: one file each, each a plugin of its own. One that isn't named adds no system, no
-//! component and no random number.
+//! The effects that a scene may name: one file each, each its own plugin. One that isn't named adds no system, no component
+//! and no random number.
 
 #![allow(clippy::needless_pass_by_value, reason = "bevy hands systems their arguments by value")]
 
@@ -48,20 +48,20 @@ pub use targets::PerSensor;
 
 /// All effects. Within a stage, systems run in this order, whatever the order of the scene.
 pub const KINDS: [&dyn EffectKind; 28] = [
-    // How heads turn, and from where they look.
+    // Turning of heads, and the pose from which they look.
     &start_phase_error::Kind,
     &sector_end_slowing::Kind,
     &skipped_steps::Kind,
     &head_stalls::Kind,
     &motion_within_turn::Kind,
-    // What a beam meets.
+    // Wall and obstacles that a beam meets.
     &beam_cone::Kind,
     &occlusion::Kind,
-    // The sound's paths.
+    // Sound paths.
     &multipath::Kind,
     &side_lobes::Kind,
     &interference::Kind,
-    // What a sonar makes of it.
+    // Processing in the sonar.
     &missing_returns::Kind,
     &outliers::Kind,
     &sound_speed_error::Kind,

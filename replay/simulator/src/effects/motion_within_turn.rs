@@ -1,4 +1,4 @@
-//! Heads look from where the vehicle is at each ping.
+//! Heads look from the vehicle's pose at each ping.
 
 use headrace_config::{ConfigError, Section};
 use headrace_sensor::device::Sense;
@@ -10,8 +10,8 @@ use crate::error::SceneError;
 use crate::facts::Facts;
 use crate::stages::{AIM_HELD, Stage, aim_moving};
 
-/// Heads look from where the vehicle is at each ping. Without it, a turn is one picture, taken where the vehicle was as
-/// the turn began, as simulators do that take a scan at once.
+/// Heads look from the vehicle's pose at each ping. Without it, a turn is one picture, taken from the pose at the turn's
+/// beginning, as in simulators that take a scan at once.
 pub(super) struct Kind;
 
 struct Moving;

@@ -17,17 +17,17 @@ use crate::random::Stream;
 use crate::sensing::{Ray, Rays, Reach, Samples, Scenery};
 use crate::stages::Stage;
 
-/// Some echoes come by way of two walls: the first mirrors the beam, the second sends it straight back to the sonar. The
-/// range is half of that way, (r1 + r12 + r2) / 2. It is taken where the direct echo is too weak, all the more at
-/// grazing incidence: the direct echo's strength goes with the cosine of incidence.
+/// Some echoes come by way of two walls: the first reflects the beam specularly, the second returns it directly to the
+/// sonar. The range is half of that path, (r1 + r12 + r2) / 2. It replaces the direct echo more often towards grazing
+/// incidence: the direct echo's strength goes with the cosine of incidence.
 ///
-/// Keys: the share of the returns where the beam is square to the wall, `square_share` (0), and where it is along the
-/// wall, `share` (0.1), both from 0 to 1; between, it goes with 1 less the cosine of incidence. The echo stays the
-/// direct one where the way round meets no wall within reach, or the second wall isn't seen by the sonar.
+/// Keys: the share of the returns where the beam is perpendicular to the wall, `square_share` (0), and where it is along
+/// the wall, `share` (0.1), both from 0 to 1; between, it goes with 1 less the cosine of incidence. The echo stays the
+/// direct one where the path meets no second wall within reach, or the sonar doesn't see that wall.
 /// Source: geometry of mirrors; the law of the direct echo is Lambert's.
 pub(super) struct Kind;
 
-/// Rays off a wall begin this much before it, m.
+/// Reflected rays begin this far off the wall, m.
 const OFF_WALL_M: f64 = 1e-6;
 
 #[derive(Debug, Clone, Copy)]
@@ -75,8 +75,7 @@ impl Effect for PerSensor<Parameters> {
     }
 }
 
-/// The range by way of two walls of a beam that has met the first one, m; `None` where there is no such way within
-/// `far_m`.
+/// The range by way of two walls of a beam that has met the first one, m; `None` if there is no such path within `far_m`.
 fn double_bounce_m(environment: &Environment, ray: &Ray, far_m: f64) -> Option<f64> {
     let first = ray.hit?;
     let from = first.point + first.normal.scaled(OFF_WALL_M);
@@ -122,7 +121,7 @@ mod tests {
         Ray { origin, direction, hit: environment.cast(origin, direction, 100.0) }
     }
 
-    /// Unfolded at the walls that are met, a mirrored beam is straight, through the rooms next door.
+    /// Unfolded at the walls it meets, a reflected beam is straight, through mirrored rooms.
     #[test]
     fn verif_in_a_rectangle_the_way_is_that_to_an_image() {
         let (half_width_m, height_m, [y, z]) = (3.0, 5.0, [0.7, 2.1]);
@@ -131,7 +130,7 @@ mod tests {
             let angle_rad = (f64::from(k) + 0.37) * math::TAU / 720.0;
             let ray = cast(&room, [y, z], angle_rad);
             let [dy, dz] = [ray.direction.y(), ray.direction.z()];
-            // Along the unfolded beam, when it crosses walls across and along.
+            // Along the unfolded beam: crossings of the side walls, and of floor and ceiling.
             let to_side = if dy > 0.0 { (half_width_m - y) / dy } else { (-half_width_m - y) / dy };
             let to_flat = if dz > 0.0 { (height_m - z) / dz } else { -z / dz };
             let mut crossings =

@@ -1,4 +1,4 @@
-//! Parts of the vehicle stand in the beams' way.
+//! Parts of the vehicle occlude beams.
 
 use bevy_ecs::prelude::{Component, Query};
 use headrace_config::{ConfigError, Section};
@@ -15,15 +15,15 @@ use crate::facts::Facts;
 use crate::sensing::{Echosounder, Mounted, Samples};
 use crate::stages::Stage;
 
-/// Parts of the vehicle stand in the beams' way: the other heads' bodies, the hull's boxes and the tether give an echo in
-/// place of the wall behind them. A sonar doesn't hear what is nearer than its least range: nothing comes back then.
+/// Parts of the vehicle occlude beams: the other heads' bodies, the hull's boxes and the tether return an echo in place of
+/// the wall behind them. Nearer than the sonar's least range there is no return.
 ///
-/// Keys: whether `heads` (true), `hull` (true) and `tether` (false) stand there; of the tether, a straight piece:
-/// `tether_from_m`, where it begins in the body's frame (needed); `tether_towards`, which way it goes ([-1, 0, 0]: aft);
+/// Keys: whether `heads` (true), `hull` (true) and `tether` (false) occlude; of the tether, a straight piece:
+/// `tether_from_m`, its start in the body's frame (needed); `tether_towards`, its direction ([-1, 0, 0]: aft);
 /// `tether_length_m`, from 0.1 to 500 (20); `tether_radius_m`, from 0.001 to 0.1 (0.006).
 ///
-/// The beam's middle decides: a wide one is hidden for as long, not longer and weaker. A head is not hidden by what it
-/// is in, so that idealised heads in one place hide nothing from each other.
+/// Only the beam's axis is tested: a wide beam is hidden for as long, not longer and more weakly. A head isn't hidden by a
+/// body that it is inside, so that idealised heads in one place don't hide anything from each other.
 /// Source: core's sampling/occlusion.rs, which plans with the same bodies.
 pub(super) struct Kind;
 
@@ -39,12 +39,12 @@ struct Occlusion {
     obstacles: Vec<Obstacle>,
 }
 
-/// Which of the slice's beams never get to the wall; for the effects after this one.
+/// Which of the slice's beams are stopped before the wall, for later effects.
 #[derive(Debug, Clone, Default, Component)]
 pub(super) struct Stopped(Vec<bool>);
 
 impl Stopped {
-    /// Whether a sample's beam is stopped; none is for a sonar without this effect.
+    /// Whether a sample's beam is stopped; false for a sonar without this effect.
     pub(super) fn has(stopped: Option<&Self>, sample: usize) -> bool {
         stopped.and_then(|stopped| stopped.0.get(sample)).copied().unwrap_or(false)
     }
@@ -109,7 +109,7 @@ impl Effect for PerSensor<Parameters> {
 }
 
 impl Parameters {
-    /// What may stand in the way of a sonar.
+    /// Obstacles that may occlude a sonar.
     fn obstacles(&self, source: usize, facts: &Facts) -> Vec<Obstacle> {
         let others = facts.sensors.iter().enumerate().filter(|(other, _)| self.heads && *other != source);
         let bodies = others.filter_map(|(_, sensor)| sensor.head.as_ref().map(Obstacle::of_head));
@@ -119,7 +119,7 @@ impl Parameters {
 }
 
 impl Occlusion {
-    /// How far the first obstacle on a beam is, m.
+    /// Range of the first obstacle on a beam, m.
     fn range_m(&self, mount: &Mount, direction: Vec3<Body>) -> Option<f64> {
         let entered =
             self.obstacles.iter().filter_map(|obstacle| obstacle.enters_m(mount.position, direction));

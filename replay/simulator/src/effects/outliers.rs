@@ -1,4 +1,4 @@
-//! Some returns have nothing to do with the wall.
+//! Some returns are unrelated to the wall.
 
 use bevy_ecs::prelude::{Component, Query};
 use headrace_config::{ConfigError, Section};
@@ -14,13 +14,12 @@ use crate::random::Stream;
 use crate::sensing::Samples;
 use crate::stages::Stage;
 
-/// Some returns have nothing to do with the wall: their range falls anywhere, evenly. Echosounders in a tunnel give
-/// such ones between echoes of all kinds.
+/// Some returns are unrelated to the wall: their range is uniformly distributed. Echosounders in a tunnel give such
+/// outliers between echoes of all kinds.
 ///
 /// Keys: their `share` of the returns, from 0 (excluded) to 1 (0.08); the nearest range `near_m` (0.3) and the farthest
 /// `far_m` (a head's range setting in this water; 30 for an echosounder), from 0 to 200 m.
-/// Source: the share is that of the logs of VITA 1 as the project's scene vita1-field has it; 30 m is a Ping1D's usual
-/// scan.
+/// Source: the share is that of the logs of VITA 1, as in the project's scene vita1-field; 30 m is a Ping1D's usual scan.
 pub(super) struct Kind;
 
 /// The farthest range of an echosounder, m.

@@ -1,4 +1,4 @@
-//! The vehicle wanders about its trajectory.
+//! The vehicle drifts about its trajectory.
 
 use headrace_config::{ConfigError, Section};
 
@@ -9,11 +9,11 @@ use crate::error::SceneError;
 use crate::facts::Facts;
 use crate::trajectory::{Offsets, wandering};
 
-/// The vehicle wanders left and right, up and down, and turns, as a pilot lets it: within the reaches given, smoothly,
-/// each for itself.
+/// The vehicle drifts left and right, up and down, and turns, as under a pilot: within the reaches given, smoothly, each
+/// independently.
 ///
 /// Reaches: `across_m`, `up_m`, `roll_deg`, `pitch_deg`, `yaw_deg`; standard deviations are 0.4 of them. `period_s` (30
-/// by default) is the time over which it wanders: control points of a cubic B-spline are half of it apart.
+/// by default) is the period of the drift: control points of a cubic B-spline are half of it apart.
 /// Source: Jorge et al. 2021, §8.1 (the pilot can drift 1.5 m vertically and horizontally, the heading 15 degrees).
 pub(super) struct Kind;
 

@@ -1,4 +1,4 @@
-//! Ranges scatter about the true one.
+//! Noise of ranges.
 
 use bevy_ecs::prelude::{Component, Query};
 use headrace_config::{ConfigError, Section};
@@ -14,7 +14,7 @@ use crate::random::Stream;
 use crate::sensing::Samples;
 use crate::stages::Stage;
 
-/// Ranges scatter about the true one: normally, by a length and by a share of the range.
+/// Ranges have normally distributed noise with a constant part and a part proportional to the range.
 pub(super) struct Kind;
 
 #[derive(Debug, Clone, Copy)]
@@ -68,7 +68,7 @@ fn scatter(mut sonars: Query<'_, '_, (&mut Samples<Sounding>, &RangeNoise)>) {
         for (step, sounding) in samples.steps() {
             if let Some(range_m) = &mut sounding.range_m {
                 let [by, _] = noise.stream.at(step).normal();
-                // A range is never below nothing.
+                // A range is never negative.
                 *range_m = (*range_m + by * (sd_m + sd_share * *range_m)).max(0.0);
             }
         }

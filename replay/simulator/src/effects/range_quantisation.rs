@@ -1,4 +1,4 @@
-//! Ranges come in steps.
+//! Quantisation of ranges.
 
 use bevy_ecs::prelude::{Component, Query, Res};
 use headrace_config::{ConfigError, Section};
@@ -15,11 +15,11 @@ use crate::facts::Facts;
 use crate::sensing::{Head, Samples, Scenery};
 use crate::stages::Stage;
 
-/// Ranges come in steps, as they are read off an echo of so many points: to the nearest step.
+/// Ranges are rounded to steps, as read off an echo of a limited number of points.
 ///
-/// Keys, at most one of them: `quantum_m`, the step in metres as the device reckons them (a head at 1500 m/s; an
+/// Keys, at most one of them: `quantum_m`, the step in metres as the device computes them (a head at 1500 m/s; an
 /// echosounder in metres of water), from 0.0005 to 1; `points` over a head's range setting, from 50 to 10,000 (500).
-/// Steps are of the device's own metres because it counts time; its wire has a step of its own besides.
+/// Steps are of the device's own metres because it measures time; its wire format adds a step of its own.
 /// Source: Jorge et al. 2021, §6 (eta) and §9.2 (500 points over 10 m: 0.02 m).
 pub(super) struct Kind;
 

@@ -1,4 +1,4 @@
-//! Heads turn round softly at the ends of their sectors.
+//! Heads slow down at the ends of their sectors.
 
 use bevy_ecs::prelude::{Component, Query};
 use headrace_config::{ConfigError, Section};
@@ -16,11 +16,11 @@ use crate::facts::Facts;
 use crate::sensing::Samples;
 use crate::stages::Stage;
 
-/// A head in a sector follows its commands with a lag of the first order, so that it slows down at the ends and steps
-/// are short there: the paper's false minima. It reports where it truly is. Heads that turn on for ever are left alone.
+/// A head in a sector follows its commands with a first-order lag, so that it slows down at the ends and steps are short
+/// there: the paper's false minima. It reports its true angle. Heads that turn continuously are unchanged.
 ///
-/// `lag_ms` is the time constant, 100 by default. Between two pings the command counts as growing evenly; the lag is
-/// then exact. It begins at rest.
+/// `lag_ms` is the time constant, 100 by default. Between two pings the command is taken to change linearly, for which the
+/// lag is exact. It begins at rest.
 /// Source: Jorge et al. 2021, §8.1 (sensors "decreasing speed due to the control system of the head").
 pub(super) struct Kind;
 
@@ -33,7 +33,7 @@ struct Parameters {
 struct SectorEndSlowing {
     lag_s: f64,
     commanded: Option<(MonoNs, f64)>,
-    /// How far the head is behind its command.
+    /// Lag of the head behind its command.
     behind_rad: f64,
 }
 
@@ -111,7 +111,7 @@ mod tests {
     const KEYS: &str = "[effects.sector_end_slowing]\nlag_ms = 150\n";
     const LAG_S: f64 = 0.15;
 
-    /// For a command that grows evenly from rest: c(t) = w t, y = w (t - T + T exp(-t / T)).
+    /// For a command that grows linearly from rest: c(t) = w t, y = w (t - T + T exp(-t / T)).
     #[test]
     fn the_lag_has_its_closed_form() {
         let (plain, slowed) = (pings(""), pings(KEYS));
@@ -127,7 +127,7 @@ mod tests {
         }
     }
 
-    /// After a reversal long after the last, the head goes on by w (2 exp(-t / T) - 1): it turns round T ln 2 later.
+    /// Long after the previous reversal, the head moves by w (2 exp(-t / T) - 1) after one: it turns round T ln 2 later.
     #[test]
     fn steps_are_short_where_the_head_turns_round_and_whole_between() {
         let (plain, slowed) = (pings(""), pings(KEYS));

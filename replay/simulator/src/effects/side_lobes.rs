@@ -1,4 +1,4 @@
-//! Sound goes out, and is heard, beside the beam.
+//! Echoes through side lobes.
 
 use bevy_ecs::prelude::{Component, Query, Res};
 use headrace_config::{ConfigError, Section};
@@ -19,17 +19,16 @@ use crate::random::Stream;
 use crate::sensing::{Ray, Rays, Reach, Samples, Scenery};
 use crate::stages::Stage;
 
-/// Sound goes out, and is heard, beside the beam: where one of four side lobes, either side in the plane of turning and
-/// either side across it, meets the wall nearer and more squarely than the beam, the nearest such lobe's range is taken
-/// with some chance.
+/// Echoes through side lobes: where one of four side lobes, two in the plane of turning and two across it, meets the wall
+/// nearer and more perpendicularly than the beam, the nearest such lobe's range is reported with some probability.
 ///
-/// Keys: their `angle_deg` from the beam's middle, from 0.1 to 80 (1.59 times the beam's width); the chance `share`, from
-/// 0 (excluded) to 1 (0.05).
-/// Source: the first side lobe of a round piston, ka sin x = 5.136 against 1.616 at half power (Urick, "Principles of
-/// underwater sound", ch. 3); it is 17.6 dB below the beam, so that it counts where the wall sends the beam itself away.
+/// Keys: their `angle_deg` from the beam's axis, from 0.1 to 80 (1.59 times the beam's width); the probability `share`,
+/// from 0 (excluded) to 1 (0.05).
+/// Source: the first side lobe of a circular piston, ka sin x = 5.136 against 1.616 at half power (Urick, "Principles of
+/// underwater sound", ch. 3); it is 17.6 dB below the beam, so it matters where the wall reflects the beam itself away.
 pub(super) struct Kind;
 
-/// From the beam's middle to the first side lobe, in full widths of the beam.
+/// Angle from the beam's axis to the first side lobe, in full widths of the beam.
 const LOBE_WIDTHS: f64 = 5.136 / 1.616 / 2.0;
 /// Full width of an echosounder's beam, degrees; see the beam_cone effect.
 const ECHOSOUNDER_DEG: f64 = 30.0;
@@ -82,7 +81,7 @@ impl Effect for PerSensor<Parameters> {
     }
 }
 
-/// The range of the nearest lobe that meets a wall nearer than `near_m` and more squarely than the beam's middle, m.
+/// Range of the nearest lobe that meets a wall nearer than `near_m` and more perpendicularly than the beam's axis, m.
 fn lobe_m(environment: &Environment, ray: &Ray, angle_rad: f64, near_m: f64) -> Option<f64> {
     let least = ray.hit.map_or(0.0, |hit| squareness(ray.direction, hit.normal));
     let (sine, cosine) = math::sin_cos(angle_rad);
@@ -130,7 +129,7 @@ mod tests {
             // On the floor, which is met within 50 degrees of the perpendicular; lobes, then, within 42.
             let off_rad = math::wrap_signed(angle_rad, math::TAU).abs();
             if off_rad.to_degrees() < 42.0 {
-                // A lobe nearer the perpendicular than the beam is nearer and more square.
+                // A lobe nearer the perpendicular than the beam has the shorter range and the smaller incidence.
                 let inner_rad = (off_rad - lobe_rad).abs();
                 let expected_m = if inner_rad < off_rad { 2.5 / math::cos(inner_rad) } else { was_m };
                 assert!((range_m - expected_m).abs() < 1e-9, "{}", off_rad.to_degrees());

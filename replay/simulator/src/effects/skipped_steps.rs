@@ -1,4 +1,4 @@
-//! Steps that a head is told to make, but doesn't.
+//! Heads miss some of the steps commanded.
 
 use bevy_ecs::prelude::{Component, Query};
 use headrace_config::{ConfigError, Section};
@@ -16,11 +16,10 @@ use crate::random::Stream;
 use crate::sensing::Samples;
 use crate::stages::Stage;
 
-/// Now and then a head doesn't make the step that it is told to make, and from then on is behind by it: hosts command
-/// steps, not angles.
+/// Now and then a head misses a commanded step, and is behind by it from then on: hosts command steps, not angles.
 ///
-/// `per_thousand` steps aren't made, each by itself. With `told` the head knows and reports where it is; without, as is
-/// the default, it reports where it should be.
+/// `per_thousand` steps are missed, each independently. With `told` the head reports its true angle; without, as is the
+/// default, the commanded one.
 pub(super) struct Kind;
 
 #[derive(Debug, Clone, Copy)]

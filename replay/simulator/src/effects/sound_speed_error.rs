@@ -1,4 +1,4 @@
-//! Sound is faster or slower in the water than those believe who set the vehicle up.
+//! The true speed of sound differs from the vehicle file's.
 
 use bevy_ecs::prelude::{Component, Query};
 use headrace_config::{ConfigError, Section};
@@ -13,17 +13,17 @@ use crate::facts::Facts;
 use crate::sensing::Samples;
 use crate::stages::Stage;
 
-/// Sound is faster or slower in the water than the vehicle file says: an echo comes earlier or later, and is taken for a
-/// range that is shorter or longer by the same share. Range is told with the file's speed, so it becomes file / true.
+/// The true speed of sound differs from the vehicle file's: echoes come earlier or later, and reported ranges, which are
+/// computed with the file's speed, are scaled by file / true.
 ///
-/// Keys, one of them: `true_mps`, the true speed, from 1300 to 1700 m/s; `share`, by how much of itself it is above the
-/// file's, from -0.1 to 0.1.
+/// Keys, one of them: `true_mps`, the true speed, from 1300 to 1700 m/s; `share`, its relative excess over the file's,
+/// from -0.1 to 0.1.
 /// Source: metrics.md, "Errors and uncertainty".
 pub(super) struct Kind;
 
 #[derive(Debug, Clone, Copy)]
 struct Parameters {
-    /// Range told by range gone.
+    /// Reported range over true range.
     scale: f64,
 }
 

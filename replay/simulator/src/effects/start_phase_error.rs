@@ -1,4 +1,4 @@
-//! Heads begin off their planned phase.
+//! Heads start off their planned phase.
 
 use headrace_config::{ConfigError, Section};
 use headrace_geometry::math::{self, TAU};
@@ -13,12 +13,12 @@ use crate::error::SceneError;
 use crate::facts::Facts;
 use crate::random::Stream;
 
-/// Each head begins elsewhere than its program says, and knows: it reports where it is. A head that turns on begins at
-/// another angle; one in a sector begins elsewhere on its way there and back, so that it keeps its sector.
+/// Each head starts off its program's phase, and reports its true angle. A head that turns continuously starts at another
+/// angle; one in a sector starts elsewhere in its sweep, so that it keeps its sector.
 ///
-/// `max_deg` draws the angle evenly within so much either way; `sd_deg` draws it normally; `offsets_deg` gives the
-/// angles, one for each head that the table is for, in its order. Without any of them, `max_deg` is 180. In a sector the
-/// angle is a share of the whole way: 360 degrees are once there and back.
+/// `max_deg` draws the angle evenly within this much either way; `sd_deg` draws it normally; `offsets_deg` gives the
+/// angles, one for each head of the table, in order. Without any of them, `max_deg` is 180. In a sector the angle is a
+/// fraction of the sweep: 360 degrees are once there and back.
 /// Source: Jorge et al. 2021, §8.2 (Figure 12, without alignment).
 pub(super) struct Kind;
 
@@ -86,13 +86,13 @@ impl Effect for PerSensor<Offset> {
     }
 }
 
-/// A program that begins `off_rad` further on; of a sector, that share of a whole turn on its way there and back.
+/// A program shifted by `off_rad`; in a sector, by that fraction of a whole turn of its sweep there and back.
 fn begun_off(program: HeadProgram, off_rad: f64) -> HeadProgram {
     let Some((least_rad, size_rad)) = program.sector else {
         return HeadProgram { start_rad: program.start_rad + off_rad, ..program };
     };
     let above_rad = program.start_rad - least_rad;
-    // Along the way: up to `size_rad` upwards, and then back.
+    // Position in the sweep: up to `size_rad` upwards, and then back.
     let along_rad = if program.growing { above_rad } else { 2.0 * size_rad - above_rad };
     let along_rad = math::wrap(along_rad + off_rad / TAU * 2.0 * size_rad, 2.0 * size_rad);
     let growing = along_rad < size_rad;
@@ -117,7 +117,7 @@ mod tests {
                 (Bench::turning("").run::<Sounding>(head), Bench::turning(&keys).run::<Sounding>(head));
             assert_eq!(plain.len(), off.len());
             for (plain, off) in plain.iter().zip(&off) {
-                // Heads know steps of 0.3 degrees.
+                // Heads have steps of 0.3 degrees.
                 let by_rad = off.angle_rad - plain.angle_rad - off_deg.to_radians();
                 assert!(math::wrap_signed(by_rad, TAU).abs() < f64::to_radians(0.150_1));
                 assert_eq!(off.angle_rad.to_bits(), off.reported_rad.to_bits());
@@ -133,7 +133,7 @@ mod tests {
             assert_eq!(sector, program.sector);
             (math::round_to_i64(start_rad * 1e9) as f64 / 1e9, growing)
         };
-        // The way there and back is 4 rad long.
+        // The sweep there and back is 4 rad long.
         assert_eq!([begun(0.0), begun(90.0), begun(270.0)], [(1.0, true), (2.0, true), (2.0, false)]);
         assert_eq!([begun(-90.0), begun(180.0), begun(360.0)], [(2.0, false), (3.0, false), (1.0, true)]);
         let back = HeadProgram { start_rad: 3.0, growing: false, ..program };

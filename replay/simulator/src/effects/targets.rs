@@ -1,19 +1,19 @@
-//! Which sensors an effect is for.
+//! Selection of the sensors that an effect applies to.
 
 use headrace_config::{ConfigError, Section};
 use headrace_sensor::device::Sense;
 
 use crate::facts::Facts;
 
-/// Parameters of an effect, each with the sensor that they are for.
+/// Parameters of an effect, each with the number of its sensor.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PerSensor<P>(pub Vec<(usize, P)>);
 
 impl<P: Clone> PerSensor<P> {
-    /// Reads tables whose key `sensors` names the sensors that each is for: all of these senses where it is absent.
-    /// `read` reads the effect's own keys.
+    /// Reads tables whose key `sensors` names the sensors that each applies to: all of these senses if it is absent. `read`
+    /// reads the effect's own keys.
     ///
-    /// Errors: no such sensor in the vehicle; a sensor that is named twice, or that doesn't sense so; unknown keys.
+    /// Errors: no such sensor in the vehicle; a sensor that is named twice, or that has another sense; unknown keys.
     pub fn read(
         tables: Vec<Section<'_>>,
         facts: &Facts,
@@ -39,7 +39,7 @@ impl<P: Clone> PerSensor<P> {
     }
 }
 
-/// The sensors that a table is for, by number.
+/// Numbers of the sensors that a table applies to.
 ///
 /// Errors: see [`PerSensor::read`].
 pub(super) fn targets(

@@ -1,4 +1,4 @@
-//! Effects together, and what they cost.
+//! Effects combined, and their cost.
 
 mod motion;
 mod sonar;

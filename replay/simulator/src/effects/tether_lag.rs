@@ -14,12 +14,12 @@ use crate::facts::Facts;
 use crate::sensing::Samples;
 use crate::stages::Stage;
 
-/// The tender lets out and takes in cable in bursts: the counter stands until the vehicle is so far ahead or behind that
-/// someone winds, and then catches up.
+/// The tender pays out and recovers cable in bursts: the counter stands until the vehicle is a threshold ahead or behind,
+/// and then catches up.
 ///
-/// While it stands, the count stays. Once vehicle and cable are `hold_m` apart (0.5 by default), the drum winds at
-/// `speed_mps` (0.5 by default) until they agree. A drum slower than the vehicle never catches up. Like slack, the
-/// difference counts from its value as the counter was set to zero, so that it is of either sign.
+/// Once vehicle and cable are `hold_m` apart (0.5 by default), the drum winds at `speed_mps` (0.5 by default) until they
+/// agree; until then the count stays. A drum slower than the vehicle never catches up. Like slack, the difference is
+/// relative to its value when the counter was zeroed, so it has either sign.
 pub(super) struct Kind;
 
 #[derive(Debug, Clone, Copy)]
@@ -31,14 +31,14 @@ struct Parameters {
 #[derive(Component)]
 struct TetherLag {
     parameters: Parameters,
-    /// When it last counted, and what.
+    /// Time and value of the last count.
     counted: Option<(MonoNs, f64)>,
     winding: bool,
 }
 
 impl EffectKind for Kind {
     fn name(&self) -> &'static str {
-        // Scenes and random streams know it by this name.
+        // Key in scenes and name of the random stream.
         "late_winding"
     }
 
@@ -103,7 +103,7 @@ mod tests {
         TetherLag { parameters, counted: None, winding: false }
     }
 
-    /// At a steady v, a stand of h / v is followed by a burst of h / (w - v): the mean lag is half of h.
+    /// At a steady v, a standstill of h / v is followed by a burst of h / (w - v): the mean lag is half of h.
     #[test]
     fn on_a_steady_way_the_count_is_a_saw() {
         let (mut winding, period_s) = (winding(), 0.01);

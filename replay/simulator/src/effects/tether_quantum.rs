@@ -1,4 +1,4 @@
-//! The cable counter counts in steps.
+//! Quantisation of the cable counter.
 
 use bevy_ecs::prelude::{Component, Query};
 use headrace_config::{ConfigError, Section};
@@ -14,9 +14,9 @@ use crate::facts::Facts;
 use crate::sensing::Samples;
 use crate::stages::Stage;
 
-/// The cable counter gives the nearest of equal steps, counted from chainage zero.
+/// The cable counter is rounded to equal steps, counted from chainage zero.
 ///
-/// `quantum_m` is the step, 0.01 by default. The device's own counts come after it.
+/// `quantum_m` is the step, 0.01 by default. The device's wire format adds its own quantisation.
 pub(super) struct Kind;
 
 #[derive(Debug, Clone, Copy)]

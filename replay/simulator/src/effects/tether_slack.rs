@@ -1,4 +1,4 @@
-//! The cable hangs slack, now more, now less.
+//! Varying slack of the cable.
 
 use bevy_ecs::prelude::{Component, Query};
 use headrace_config::{ConfigError, Section};
@@ -15,11 +15,11 @@ use crate::sensing::Samples;
 use crate::stages::Stage;
 use crate::trajectory::{Knots, wandering};
 
-/// More or less cable is out than the vehicle has come: its slack wanders smoothly.
+/// The length of cable out differs from the vehicle's travel: its slack varies smoothly.
 ///
-/// Slack counts from its mean, which setting the counter to zero takes out, so that it is of either sign though no cable
-/// is shorter than the way. `reach_m` (0.15 by default) is the most either way; the standard deviation is 0.4 of it.
-/// `period_s` (30 by default) is the time over which it wanders: control points of a cubic B-spline are half of it apart.
+/// Slack is relative to its mean, which zeroing the counter removes, so it has either sign though no cable is shorter than
+/// the distance. `reach_m` (0.15 by default) is the largest value either way; the standard deviation is 0.4 of it.
+/// `period_s` (30 by default) is the period of the variation: control points of a cubic B-spline are half of it apart.
 pub(super) struct Kind;
 
 #[derive(Debug, Clone, Copy)]
@@ -80,7 +80,7 @@ mod tests {
     use super::*;
     use crate::testing_motion::{Bench, LONG, refusal, same_in_any_slices};
 
-    /// The correlation of a cubic B-spline with independent control points falls to nothing over four of them.
+    /// The correlation of a cubic B-spline with independent control points falls to zero over four of them.
     #[test]
     fn slack_has_its_reach_spread_and_time() {
         let keys = "[effects.tether_slack]\nperiod_s = 1\n";

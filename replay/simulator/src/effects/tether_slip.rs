@@ -15,13 +15,13 @@ use crate::random::Stream;
 use crate::sensing::{Samples, Scenery};
 use crate::stages::Stage;
 
-/// Length of the stretches of way in each of which the cable may slip once, m.
+/// Length of the stretches of travel in each of which the cable may slip once, m.
 const STRETCH_M: f64 = 1.0;
 
-/// Now and then cable slips over the counter's wheel: the count gains or loses a length for ever.
+/// Now and then cable slips over the counter's wheel: the count changes permanently by a length.
 ///
-/// It slips `per_100m` times in a hundred metres of way, gone there or back, by `size_m = [least, most]` (evenly drawn,
-/// 0.05 to 0.3 by default), either way alike. The way is the vehicle's, summed up from count to count.
+/// It slips `per_100m` times in a hundred metres of travel, forwards or back, by `size_m = [least, most]` (evenly drawn,
+/// 0.05 to 0.3 by default), with either sign. Travel is the vehicle's, summed from count to count.
 pub(super) struct Kind;
 
 #[derive(Debug, Clone, Copy)]
@@ -37,7 +37,7 @@ struct TetherSlip {
     at_m: Option<f64>,
     gone_m: f64,
     next_stretch: u64,
-    /// A slip in the last stretch that was looked at: after which way, by how much.
+    /// Pending slip in the last stretch drawn: travel at which it happens, and its size, m.
     waiting: Option<(f64, f64)>,
     slipped_m: f64,
 }
@@ -86,7 +86,7 @@ impl TetherSlip {
         Self { parameters, stream, at_m: None, gone_m: 0.0, next_stretch: 0, waiting: None, slipped_m: 0.0 }
     }
 
-    /// By how much the count is off once the vehicle has come to a chainage.
+    /// Error of the count once the vehicle has reached a chainage.
     fn come_to(&mut self, chainage_m: f64) -> f64 {
         self.gone_m += self.at_m.map_or(0.0, |before_m| (chainage_m - before_m).abs());
         self.at_m = Some(chainage_m);

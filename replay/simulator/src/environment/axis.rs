@@ -1,20 +1,20 @@
-//! The tunnel's axis in plan: straight pieces and arcs, one after the other.
+//! The tunnel's axis in plan view: straight pieces and arcs in sequence.
 //!
 //! Chainage is the arc length along the axis. The axis is smooth, bends no tighter than [`Axis::parse`] allows and turns by
-//! no more than half a turn between any two places. Hence it comes nowhere near itself, each place of the tunnel has one
-//! nearest place of the axis, and along a straight line through the tunnel chainage only grows or only falls.
+//! no more than half a turn between any two points. Hence it never approaches itself, each point of the tunnel has one
+//! nearest point of the axis, and along a straight line through the tunnel chainage is monotonic.
 
 use headrace_config::{ConfigError, Section};
 use headrace_geometry::frames::{Point3, Tunnel};
 use headrace_geometry::math::{self, PI};
 use headrace_geometry::tunnel::Yz;
 
-/// Radius of a bend, in half-widths of the tunnel, at least.
+/// Least radius of a bend, in half-widths of the tunnel.
 pub(super) const LEAST_RADIUS_HALF_WIDTHS: f64 = 2.0;
-/// The most by which headings may differ.
+/// Largest difference between two headings.
 const LARGEST_TURN_RAD: f64 = PI * (1.0 + 1e-12);
 
-/// The tunnel's axis, level at z = 0; before chainage 0 and past the last piece it goes on straight.
+/// The tunnel's axis, level at z = 0; before chainage 0 and past the last piece it continues straight.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Axis {
     /// Without gaps, from -infinity to +infinity of chainage.
@@ -28,21 +28,21 @@ pub(super) struct Piece {
     pub(super) from_m: f64,
     /// Chainage at which it ends.
     pub(super) to_m: f64,
-    /// Chainage of `at`: where a straight piece begins or ends, the middle of an arc.
+    /// Chainage of `at`: an end of a straight piece, the middle of an arc.
     anchor_m: f64,
     at: Yz,
     heading_rad: f64,
     tangent: Yz,
-    /// Zero for a straight piece, positive to the left, 1/m.
+    /// Curvature, 1/m: zero for a straight piece, positive to the left.
     curvature_pm: f64,
 }
 
-/// The plane across the axis at one of its places.
+/// The plane across the axis at one of its points.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Station {
-    /// The place of the axis.
+    /// The point of the axis.
     pub(super) at: Yz,
-    /// The axis's direction there, of length one.
+    /// The axis's direction there, a unit vector.
     pub(super) tangent: Yz,
 }
 
@@ -53,7 +53,7 @@ impl Axis {
         Self { pieces: vec![Piece { from_m: f64::NEG_INFINITY, ..piece }] }
     }
 
-    /// Reads the `[[tunnel.axis]]` tables for a tunnel that reaches `half_width_m` to the sides.
+    /// Reads the `[[tunnel.axis]]` tables for a tunnel that extends `half_width_m` to the sides.
     ///
     /// Errors: a key missing, unknown or out of range; a bend that is too tight, or that makes the axis turn back.
     pub(super) fn parse(sections: Vec<Section<'_>>, half_width_m: f64) -> Result<Self, ConfigError> {
@@ -74,7 +74,7 @@ impl Axis {
         Ok(axis)
     }
 
-    /// Ends the axis's last piece with another piece, after which it goes on straight.
+    /// Ends the axis's last piece with another piece, after which the axis continues straight.
     fn append(&mut self, length_m: f64, curvature_pm: f64) {
         let Some(last) = self.pieces.pop() else { return };
         let (at, heading_rad) = (last.at, last.heading_rad);
@@ -95,19 +95,19 @@ impl Axis {
         self.pieces.len() == 1 || self.pieces.iter().all(|piece| piece.curvature_pm == 0.0)
     }
 
-    /// The place `[y, z]` (y left, z up, m) of the cross-section at `chainage_m`.
+    /// The point `[y, z]` (y left, z up, m) of the cross-section at `chainage_m`.
     pub fn place(&self, chainage_m: f64, [y, z]: Yz) -> Point3<Tunnel> {
         let Station { at, tangent } = self.station(chainage_m);
         Point3::new(at[0] - y * tangent[1], at[1] + y * tangent[0], z)
     }
 
-    /// Yaw of the axis at `chainage_m` against x, radians, positive to the left.
+    /// Yaw of the axis at `chainage_m` relative to x, radians, positive to the left.
     pub fn heading_rad(&self, chainage_m: f64) -> f64 {
         let (_, piece) = self.piece_at(chainage_m);
         piece.heading_rad + piece.curvature_pm * (chainage_m - piece.anchor_m)
     }
 
-    /// Chainage, y and z of a place, m, by the nearest place of the axis.
+    /// Chainage, y and z of a point, m, relative to the nearest point of the axis.
     pub fn chart(&self, point: Point3<Tunnel>) -> [f64; 3] {
         let (_, chainage_m, y) = self.locate([point.x(), point.y()]);
         [chainage_m, y, point.z()]
@@ -122,7 +122,7 @@ impl Axis {
                 continue;
             }
             let (chainage_m, y) = piece.chart(plan);
-            // Off the piece's end, the way to the end counts; neighbours then decide, so that none is left over.
+            // Off the piece's end, the distance to the end counts, so that a neighbour holds the point and none is left over.
             let missed = (piece.from_m - chainage_m).max(chainage_m - piece.to_m).max(0.0);
             let distance = y.abs() + missed;
             if distance < least {
@@ -145,12 +145,12 @@ impl Axis {
         (number, &self.pieces[number])
     }
 
-    /// The axis's place and direction at `chainage_m`.
+    /// The axis's point and direction at `chainage_m`.
     pub(super) fn station(&self, chainage_m: f64) -> Station {
         self.piece_at(chainage_m).1.station(chainage_m)
     }
 
-    /// Curvature of the tightest bend, without sign, 1/m.
+    /// Absolute curvature of the tightest bend, 1/m.
     pub(super) fn largest_curvature_pm(&self) -> f64 {
         self.pieces.iter().map(|piece| piece.curvature_pm.abs()).fold(0.0, f64::max)
     }
@@ -170,7 +170,7 @@ impl Piece {
         if curvature_pm == 0.0 {
             return start;
         }
-        // Angles about an arc's centre are taken from its middle: up to a quarter turn either way, far from where they wrap.
+        // Angles about an arc's centre are relative to its middle: up to a quarter turn either way, far from where they wrap.
         let anchor_m = from_m + length_m / 2.0;
         let heading_rad = heading_rad + curvature_pm * length_m / 2.0;
         let Station { at, tangent } = start.station(anchor_m);
@@ -182,7 +182,7 @@ impl Piece {
         self.curvature_pm
     }
 
-    /// Place and direction at `chainage_m`, also beyond the ends.
+    /// Point and direction at `chainage_m`, also beyond the ends.
     pub(super) fn station(&self, chainage_m: f64) -> Station {
         let along_m = chainage_m - self.anchor_m;
         let [tx, ty] = self.tangent;
@@ -194,7 +194,7 @@ impl Piece {
         }
         let turned_rad = along_m * self.curvature_pm;
         let (sin, cos) = math::sin_cos(turned_rad);
-        // 1 - cos by the half angle: a wide bend would lose its digits otherwise.
+        // 1 - cos from the half angle: a wide bend would lose digits otherwise.
         let half = math::sin(turned_rad / 2.0);
         let (ahead, left) = (sin / self.curvature_pm, 2.0 * half * half / self.curvature_pm);
         Station {

@@ -13,7 +13,7 @@ use super::widths::floor_m;
 
 /// Sizes of a boulder, m.
 const SIZE_M: core::ops::RangeInclusive<f64> = 0.01..=20.0;
-/// Share of a boulder's thickness that is below the wall, unless given.
+/// Share of a boulder's thickness that is below the wall, by default.
 const SUNK: f64 = 0.3;
 /// Scattered boulders are at least this share of their length wide and thick.
 const FLATTEST: f64 = 0.5;
@@ -24,17 +24,17 @@ struct Boulder {
     arc_m: f64,
     /// Full diameters: along the tunnel, along the wall, across it, m.
     size_m: [f64; 3],
-    /// Turned about the wall's normal.
+    /// Rotation about the wall's normal.
     yaw_rad: f64,
     sunk: f64,
 }
 
-/// Numbers that look random and follow from a seed: SplitMix64.
+/// Pseudo-random numbers from a seed: SplitMix64.
 ///
 /// Source: Steele, Lea, Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014.
 struct Scatter(u64);
 
-/// What many boulders have in common.
+/// Common parameters of many boulders.
 struct Field {
     from_m: f64,
     to_m: f64,
@@ -64,7 +64,7 @@ pub(super) fn one(
     Ok(boulder.placed(ground, feature))
 }
 
-/// Reads a floor full of boulders.
+/// Reads a field of boulders on the floor.
 ///
 /// Errors: a key missing or out of range.
 pub(super) fn many(
@@ -121,7 +121,7 @@ impl Boulder {
         let (wall, [ny, nz]) = ground.tube.wall_place(self.chainage_m, self.arc_m);
         let above_m = half[2] * (1.0 - 2.0 * self.sunk);
         let section = ground.frame(self.chainage_m, [wall[0] + above_m * ny, wall[1] + above_m * nz]);
-        // Across the wall, along it, and along the tunnel, before it is turned.
+        // Across the wall, along it, and along the tunnel, before rotation.
         let normal = section.outwards([0.0, ny, nz]);
         let (sin, cos) = math::sin_cos(self.yaw_rad);
         let length = section.outwards([cos, -sin * nz, sin * ny]);
@@ -139,7 +139,7 @@ impl Field {
         (0..self.count).map(|_| self.boulder(&mut scatter).placed(ground, feature)).collect()
     }
 
-    /// The next boulder: sizes are as many in each octave; width and thickness are at least half the length.
+    /// The next boulder: sizes are uniform per octave; width and thickness are at least half the length.
     fn boulder(&self, scatter: &mut Scatter) -> Boulder {
         let chainage_m = scatter.between(self.from_m, self.to_m);
         let arc_m = scatter.between(-self.width_m / 2.0, self.width_m / 2.0);
@@ -175,7 +175,7 @@ impl Scatter {
     }
 }
 
-/// `base` to the power of `exponent` in [0, 1), by square roots: exact rounding makes it the same everywhere.
+/// `base` to the power of `exponent` in [0, 1), by square roots, whose exact rounding makes it equal on all machines.
 fn power(base: f64, exponent: f64) -> f64 {
     let (mut result, mut root, mut rest) = (1.0, base, exponent);
     for _ in 0..53 {

@@ -1,4 +1,4 @@
-//! Where the wall isn't on the profile: displaced towards the reference point, or away from it.
+//! Wall displaced from the profile, towards the reference point or away from it.
 
 use headrace_geometry::math::{self, PI};
 
@@ -8,7 +8,7 @@ use headrace_geometry::math::{self, PI};
 /// the section star-shaped.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Bulge {
-    /// The feature that it belongs to.
+    /// The feature it belongs to.
     pub(super) feature: u16,
     /// Chainage of its middle, m.
     pub(super) chainage_m: f64,
@@ -33,7 +33,7 @@ impl Bulge {
         self.chainage_m + self.half_length_m
     }
 
-    /// Displacement of the wall at a place of the unrolled profile of this perimeter, inwards positive, m.
+    /// Displacement of the wall at a point of the unrolled profile of this perimeter, inwards positive, m.
     pub(super) fn displacement_m(&self, chainage_m: f64, arc_m: f64, perimeter_m: f64) -> f64 {
         let along = (chainage_m - self.chainage_m) / self.half_length_m;
         if along.abs() >= 1.0 {
@@ -61,7 +61,7 @@ impl Bulge {
         self.off_middle_m(arc_m, perimeter_m) < self.half_width_m + margin_m
     }
 
-    /// Whether the two share a place.
+    /// Whether the two overlap.
     pub(super) fn overlaps(&self, other: &Self, perimeter_m: f64) -> bool {
         self.begin_m() < other.end_m()
             && other.begin_m() < self.end_m()

@@ -1,12 +1,12 @@
-//! What a ray meets on a wall.
+//! The wall where a ray meets it.
 
 use super::vector::V3;
 
-/// A place of the wall and what it is.
+/// The wall at a point.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Face {
     /// Unit normal, towards the water.
     pub(super) normal: V3,
-    /// The feature that has displaced the wall there.
+    /// The feature that displaced the wall there.
     pub(super) feature: Option<u16>,
 }

@@ -10,7 +10,7 @@ use super::shapes::{Hollow, Solid};
 use super::tube::Tube;
 use super::{boulders, openings};
 
-/// All that isn't wall.
+/// Features other than displaced wall.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Features {
     pub(super) names: Vec<String>,
@@ -18,10 +18,10 @@ pub(super) struct Features {
     pub(super) hollows: Vec<Placed<Hollow>>,
 }
 
-/// Reads what isn't wall from the tables, whose wall [`super::heaps`] and [`super::meshes`] have read, and checks that no
-/// key is left over. `bodies` are those that are meshes.
+/// Reads features other than displaced wall from the tables, whose wall [`super::heaps`] and [`super::meshes`] have read,
+/// and checks that no key is left over. `bodies` are those that are meshes.
 ///
-/// Errors: the first key that is missing, unknown or out of range, or what it describes can't be.
+/// Errors: the first key that is missing, unknown or out of range, or an impossible feature.
 pub(super) fn parse(
     tables: Vec<Section<'_>>,
     heaps: &[Heap],
@@ -61,7 +61,7 @@ pub(super) fn parse(
     Ok(features)
 }
 
-/// The hollow, if the wall that it opens from is the tube's.
+/// The hollow, if it opens from the tube's wall and not from a mesh.
 fn opening(
     ground: Ground<'_>,
     table: &Section<'_>,

@@ -1,11 +1,11 @@
-//! Right-angled frames in the tunnel's.
+//! Cartesian frames within the tunnel's.
 
 use headrace_geometry::tunnel::Yz;
 
 use super::axis::Station;
 use super::vector::{Ray, V3, along, dot, sub};
 
-/// A place and three directions at right angles, of length one.
+/// An origin and three orthogonal unit vectors.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Frame {
     /// Its origin.
@@ -15,24 +15,24 @@ pub(super) struct Frame {
 }
 
 impl Frame {
-    /// The axis's frame at one of its places: along the tunnel, left, up; the origin at place (y, z) of the section.
+    /// The axis's frame at one of its points: along the tunnel, left, up; the origin at point (y, z) of the section.
     pub(super) fn across(station: Station, [y, z]: Yz) -> Self {
         let ([tx, ty], [ax, ay]) = (station.tangent, station.at);
         Self { origin: [ax - y * ty, ay + y * tx, z], axes: [[tx, ty, 0.0], [-ty, tx, 0.0], [0.0, 0.0, 1.0]] }
     }
 
-    /// A place of the tunnel's frame in this one.
+    /// Transforms a point from the tunnel's frame into this one.
     pub(super) fn local(&self, point: V3) -> V3 {
         let from = sub(point, self.origin);
         self.axes.map(|axis| dot(from, axis))
     }
 
-    /// A ray of the tunnel's frame in this one.
+    /// Transforms a ray from the tunnel's frame into this one.
     pub(super) fn local_ray(&self, ray: &Ray) -> Ray {
         Ray { origin: self.local(ray.origin), direction: self.axes.map(|axis| dot(ray.direction, axis)) }
     }
 
-    /// A direction of this frame in the tunnel's.
+    /// Transforms a direction from this frame into the tunnel's.
     pub(super) fn outwards(&self, local: V3) -> V3 {
         let sum = along([0.0; 3], local[0], self.axes[0]);
         along(along(sum, local[1], self.axes[1]), local[2], self.axes[2])

@@ -10,7 +10,7 @@ use super::keys::{self, Kind};
 use super::placing::Site;
 use super::widths::floor_m;
 
-/// Displacements may come this near to the reference point, as a share of the wall's distance from it.
+/// Closest approach of a displacement to the reference point, as a share of the wall's distance from it.
 const DEEPEST_SHARE: f64 = 0.8;
 /// A patch is at least as long and as wide as it is deep: its wall is nowhere steeper than 57.5 degrees.
 const DEEPEST_ASPECT: f64 = 1.0;
@@ -18,10 +18,10 @@ const DEEPEST_ASPECT: f64 = 1.0;
 const LOOSENING: f64 = 1.5;
 /// Length of a fall's heap over that of its cavity.
 const SPREADING: f64 = 1.5;
-/// Places at which the wall's distance is taken along a patch.
+/// Points along a patch at which the wall's distance is evaluated.
 const PLACES: u32 = 64;
 
-/// Where a heap's pieces lie.
+/// Area of a heap's pieces.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Heap {
     /// The feature.
@@ -34,9 +34,9 @@ pub(super) struct Heap {
     pub(super) width_m: f64,
 }
 
-/// Reads what displaces the wall from the tables of features; other keys and features are left alone.
+/// Reads displacements of the wall from the tables of features; ignores other keys and features.
 ///
-/// Errors: the first key that is missing or out of range, or a wall that can't be.
+/// Errors: the first key that is missing or out of range, or an impossible wall.
 pub(super) fn parse(tables: &[Section<'_>], site: &Site<'_>) -> Result<(Vec<Bulge>, Vec<Heap>), ConfigError> {
     let (mut bulges, mut heaps) = (Vec::new(), Vec::new());
     for (number, table) in tables.iter().enumerate() {
@@ -88,7 +88,7 @@ fn parse_debris(table: &Section<'_>, site: &Site<'_>, feature: u16) -> Result<(B
     Ok((heap.bulge(height_m), heap))
 }
 
-/// The cavity, and the heap below it that its rock makes.
+/// The cavity, and the heap of its rock below it.
 fn parse_fall(
     table: &Section<'_>,
     site: &Site<'_>,
@@ -100,7 +100,7 @@ fn parse_fall(
     }
     let length_m = SPREADING * 2.0 * cavity.half_length_m;
     let heap = Heap { feature, chainage_m: cavity.chainage_m, length_m, width_m: floor_m(site.profile) };
-    // Cavity and heap have one shape, so that their volumes are as the products of their three extents.
+    // Cavity and heap have the same shape, so their volumes are proportional to the products of their three extents.
     let volume = cavity.depth_m * cavity.half_length_m * cavity.half_width_m * 4.0;
     let usual_m = LOOSENING * volume / (heap.length_m * heap.width_m);
     let height_m = table.number("heap_height_m", 0.01..=50.0)?.unwrap_or(usual_m);
@@ -121,7 +121,7 @@ impl Heap {
     }
 }
 
-/// Takes in a bulge if the wall can have it beside those before.
+/// Adds a bulge if the wall allows it beside the earlier ones.
 fn add(
     bulges: &mut Vec<Bulge>,
     bulge: Bulge,
@@ -166,7 +166,7 @@ fn add(
     Ok(())
 }
 
-/// The least distance of the reference point from the wall of a patch, m.
+/// Least distance from the reference point to the wall of a patch, m.
 fn nearest_wall_m(bulge: &Bulge, site: &Site<'_>) -> f64 {
     let [ry, rz] = site.profile.reference();
     let distance_m = |k: u32| {

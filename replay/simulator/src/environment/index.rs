@@ -1,25 +1,25 @@
-//! What is near a stretch of chainage, found without looking at the rest.
+//! Index of objects by chainage.
 
 use headrace_geometry::math;
 
-/// Things by the metres of chainage that they reach into.
+/// Objects by the buckets of chainage that they extend into.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Index {
     first_m: f64,
     bucket_m: f64,
-    /// Where the list of each bucket begins; one more than there are buckets, or empty.
+    /// Start of each bucket's list, and the end of the last one; or empty.
     starts: Vec<usize>,
-    /// Numbers of things, bucket by bucket. A thing that reaches into several is in each.
+    /// Numbers of objects, bucket by bucket. An object in several buckets is listed in each.
     numbers: Vec<u32>,
 }
 
 /// Length of a bucket, m: about the span of a boulder, and several times that of a profiler's ray.
 const BUCKET_M: f64 = 1.0;
-/// Buckets at most; a longer tunnel has longer ones.
+/// Most buckets; a longer tunnel has longer ones.
 const MOST_BUCKETS: f64 = 65_536.0;
 
 impl Index {
-    /// Thing k reaches from `spans[k].0` to `spans[k].1` of chainage, m.
+    /// Indexes objects; number k extends from `spans[k].0` to `spans[k].1` of chainage, m.
     ///
     /// Allocates: startup only.
     pub(super) fn new(spans: &[(f64, f64)]) -> Self {
@@ -45,7 +45,7 @@ impl Index {
         index
     }
 
-    /// Numbers of all things that reach into `[from_m, to_m]`, some of them more than once, and perhaps of a few beside it.
+    /// Numbers of all objects that extend into `[from_m, to_m]`, some of them repeated, and possibly of a few near it.
     pub(super) fn near(&self, from_m: f64, to_m: f64) -> &[u32] {
         let Some(count) = self.starts.len().checked_sub(1) else { return &[] };
         if to_m < self.first_m {

@@ -1,8 +1,8 @@
-//! What a table of `[[tunnel.features]]` is of, and keys that several kinds have.
+//! Kinds of `[[tunnel.features]]` tables, and keys that several kinds share.
 
 use headrace_config::{ConfigError, Section};
 
-/// What a feature is.
+/// Kind of a feature.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Kind {
     Boulder,
@@ -28,7 +28,7 @@ const KINDS: [(&str, Kind); 9] = [
     ("side_tunnel", Kind::SideTunnel),
 ];
 
-/// What a table's feature is.
+/// Kind of a table's feature.
 ///
 /// Errors: the key is missing or another word.
 pub(super) fn kind(table: &Section<'_>) -> Result<Kind, ConfigError> {
@@ -54,7 +54,7 @@ pub(super) fn chainage_m(table: &Section<'_>, length_m: f64) -> Result<f64, Conf
     table.required("chainage_m", table.number("chainage_m", 0.0..=length_m)?)
 }
 
-/// A length that a feature must have.
+/// A required length of a feature.
 ///
 /// Errors: missing or outside `allowed`.
 pub(super) fn length_m(
@@ -65,7 +65,7 @@ pub(super) fn length_m(
     table.required(key, table.number(key, allowed)?)
 }
 
-/// `chainage_m` and the extent `key` along the tunnel of a feature that must lie in the tunnel with all its length.
+/// `chainage_m` and the extent `key` along the tunnel of a feature that must lie entirely within the tunnel.
 ///
 /// Errors: missing, out of range, or it reaches out of the tunnel.
 pub(super) fn extent_m(

@@ -7,7 +7,7 @@ use super::frame::Frame;
 use super::vector::{Ray, V3};
 use crate::mesh::Mesh;
 
-/// What is within a wall's end plane to rounding is taken as so far into the wall, m: in the plane itself the mesh is open.
+/// Points this close to a wall's end plane are moved this far into the wall, m: in the plane itself the mesh is open.
 const INTO_M: f64 = 1e-7;
 
 /// A closed mesh in the water.
@@ -30,7 +30,7 @@ pub(super) struct MeshWall {
 }
 
 impl MeshBody {
-    /// Where the ray first meets it: the distance, 0 when it begins inside, and the outward normal.
+    /// Where the ray first meets it: the range, 0 if it begins inside, and the outward normal.
     pub(super) fn meet(&self, ray: &Ray) -> Option<(f64, V3)> {
         let local = self.frame.local_ray(ray);
         let hit = self.mesh.cast(local.origin, local.direction, f64::MAX)?;
@@ -55,15 +55,15 @@ impl MeshWall {
         (self.from_m, self.to_m)
     }
 
-    /// Whether a place between its end planes, or in one of them, is in the tunnel.
+    /// Whether a point between its end planes, or in one of them, is in the tunnel.
     pub(super) fn holds(&self, point: V3) -> bool {
         self.mesh.contains(self.between_ends(self.frame.local(point)))
     }
 
-    /// From `t_m` along the ray, in the tunnel: where it meets the mesh before `until_m`, at which it passes an end.
+    /// Where the ray meets the mesh beyond `t_m`, in the tunnel, and before `until_m`, at which it passes an end.
     pub(super) fn leave(&self, ray: &Ray, t_m: f64, until_m: f64) -> Option<(f64, Face)> {
         let local = self.frame.local_ray(ray);
-        // From a place that the mesh surrounds, from which nothing leads but through the ends.
+        // From a point enclosed by the mesh, which a ray leaves only through the ends.
         let from = self.between_ends(local.at(t_m));
         let hit = self.mesh.cast(from, local.direction, until_m - t_m)?;
         let face = Face { normal: self.frame.outwards(hit.normal), feature: Some(self.feature) };

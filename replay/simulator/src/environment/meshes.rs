@@ -1,6 +1,6 @@
 //! Meshes in a scene: bodies in the water, and stretches of wall in place of the tube's.
 //!
-//! A mesh's own axes are those of the tunnel where its origin lies: x along it, y left, z up, metres.
+//! A mesh's axes are those of the tunnel at its origin: x along it, y left, z up, metres.
 
 use std::sync::Arc;
 
@@ -17,23 +17,23 @@ use super::shapes::Solid;
 use crate::files::FileLoader;
 use crate::mesh::{self, Mesh, Role};
 
-/// Where a mesh's origin may lie, m: it may have been surveyed from far away.
+/// Allowed chainage of a mesh's origin, m: the survey's origin may be far away.
 const CHAINAGE_M: core::ops::RangeInclusive<f64> = -1.0e5..=1.0e5;
-/// The same across the tunnel, m.
+/// Allowed position of the origin across the tunnel, m.
 const ACROSS_M: core::ops::RangeInclusive<f64> = -1000.0..=1000.0;
-/// A wall is at least as long, m.
+/// Least length of a wall, m.
 const SHORTEST_M: f64 = 0.01;
 
-/// Where a table puts its mesh's origin.
+/// Position of a mesh's origin.
 struct Place {
     chainage_m: f64,
     across_m: Yz,
 }
 
-/// Reads the meshes among the tables of features: walls and bodies. Other features are left alone.
+/// Reads the meshes among the tables of features: walls and bodies. Ignores other features.
 ///
-/// Errors: the first key that is missing or out of range, a file that is no mesh, or a mesh that can't be where it is.
-/// Allocates: startup only, what [`Mesh::new`] does.
+/// Errors: the first key that is missing or out of range, a file that is no mesh, or a mesh in an impossible position.
+/// Allocates: startup only, as [`Mesh::new`].
 pub(super) fn parse(
     tables: &[Section<'_>],
     site: &Site<'_>,
@@ -82,7 +82,7 @@ fn parse_body(
         let why = format!("reaches out of the tunnel, which goes from 0 to {} m", site.length_m);
         return Err(misplaced(table, (from_m, to_m), &why));
     }
-    // In a bend, what is aside of the axis may be anywhere ahead or behind.
+    // In a bend, a point off the axis may be anywhere ahead or behind.
     let reach_m = corners.iter().map(|(x, y)| math::hypot(*x, *y)).fold(0.0, f64::max);
     let reach_m = if site.axis.is_straight() { [back_m, ahead_m] } else { [-reach_m, reach_m] };
     let span_m = span_m(site.axis, chainage_m, reach_m);
@@ -106,7 +106,7 @@ fn parse_wall(
         let problem = format!("has {:.3} m of wall along x; at least {SHORTEST_M} m", to_m - from_m);
         return Err(table.invalid("file", &problem));
     }
-    // Its origin may lie where the axis has turned: x goes on straight.
+    // Its origin may lie where the axis has turned: x continues straight.
     let (_, piece) = site.axis.piece_at(f64::midpoint(from_m, to_m));
     let frame = Frame::across(piece.station(chainage_m), across_m);
     Ok(MeshWall { feature, from_m, to_m, x_m, frame, mesh: Arc::new(mesh) })
@@ -129,7 +129,7 @@ fn check(
     if site.axis.pieces().iter().any(|piece| bend(piece.from_m, piece.to_m, piece.curvature_pm())) {
         return refuse("meets a bend of the axis; a mesh can be the wall of a straight stretch only");
     }
-    // Farther aside, a place's nearest place of the axis could be in the bend.
+    // Farther off the axis, a point's nearest axis point could be in the bend.
     let (low, high) = wall.mesh.bounds();
     let (_, piece) = site.axis.piece_at(wall.from_m);
     let left_m = piece.left_of([wall.frame.origin[0], wall.frame.origin[1]]);
@@ -182,7 +182,7 @@ fn read(table: &Section<'_>, role: Role, load: FileLoader<'_>) -> Result<Mesh, C
     Mesh::new(triangles, role).map_err(|error| refuse(&error.to_string()))
 }
 
-/// An error about where a mesh is.
+/// An error about a mesh's position.
 fn misplaced(table: &Section<'_>, (from_m, to_m): (f64, f64), why: &str) -> ConfigError {
     let key = if table.keys().contains(&"chainage_m") { "chainage_m" } else { "file" };
     table.invalid(key, &format!("the mesh, from {from_m:.3} to {to_m:.3} m, {why}"))

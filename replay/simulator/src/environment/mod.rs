@@ -1,10 +1,10 @@
-//! The environment of a simulated vehicle: the tunnel as built, and what lies in it and opens from it.
+//! The environment of a simulated vehicle: the tunnel as built, with its contents and openings.
 //!
 //! The tunnel's frame is Cartesian with its origin at the portal: x along the axis where that is straight, y left, z up.
 //! Where the axis bends, chainage and x differ; see [`Axis`].
 //!
-//! Water is (tube or hollows) without solids. A ray from the water goes to the tube's wall, on through the hollows that
-//! open there, and stops at the first solid before. Nothing here draws random numbers but boulders, from a seed.
+//! Water is (tube or hollows) without solids. A ray from the water extends to the tube's wall, on through hollows that open
+//! there, and stops at the first solid. Only boulders draw random numbers, from a seed.
 
 mod axis;
 mod boulders;
@@ -55,18 +55,18 @@ use vector::{Ray, V3};
 
 /// Rays are followed no farther than this, m.
 const FARTHEST_M: f64 = 1.0e5;
-/// Water on from the end of the last hollow must go farther than this, m.
+/// Least advance of a ray beyond the end of the last hollow, m.
 const PROGRESS_M: f64 = 1e-9;
-/// Hollows and stretches of tube that a ray may go through.
+/// Most hollows and stretches of tube that a ray passes.
 const MOST_PASSAGES: usize = 1_000;
 
 /// The environment of a scene.
 #[derive(Debug, Clone)]
 pub struct Environment {
-    /// What the vehicle believes, in whose chart places of the wall are told.
+    /// The vehicle file's profile, to whose chart points of the wall are referred.
     design: Profile,
     tube: Tube,
-    /// Straight, as designed, and empty: then the profile alone says it all.
+    /// Straight, as designed, and empty: the profile alone suffices.
     plain: bool,
     solids: Vec<Placed<Solid>>,
     hollows: Vec<Placed<Hollow>>,
@@ -75,20 +75,20 @@ pub struct Environment {
     names: Vec<String>,
 }
 
-/// Where a ray ends.
+/// End of a ray.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hit {
-    /// Distance, m.
+    /// Range, m.
     pub range_m: f64,
-    /// The place.
+    /// Position.
     pub point: Point3<Tunnel>,
     /// Unit normal there, towards the water.
     pub normal: Vec3<Tunnel>,
-    /// What is there.
+    /// Object hit.
     pub what: What,
 }
 
-/// What a ray meets.
+/// Object that a ray meets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum What {
     /// The tunnel's wall.
@@ -97,10 +97,10 @@ pub enum What {
     Feature(u16),
 }
 
-/// What stops a ray, before its normal is worked out.
+/// What stops a ray, before its normal is computed.
 #[derive(Debug, Clone, Copy)]
 enum Stop {
-    /// The tunnel's, and what it is there when that is known already.
+    /// The tunnel's wall, with its face if already computed.
     Wall(Option<Face>),
     Hollow {
         normal: V3,
@@ -112,29 +112,28 @@ enum Stop {
     },
 }
 
-/// How far a ray has water.
+/// Extent of water along a ray.
 #[derive(Debug, Clone, Copy)]
 struct Reach {
     t_m: f64,
-    /// What is there; none when it is still water.
+    /// What stops the ray; `None` if it is still in water.
     stop: Option<Stop>,
-    /// The chainages that it has passed, m.
+    /// Range of chainage passed, m.
     from_m: f64,
     to_m: f64,
 }
 
 impl Environment {
-    /// A straight tunnel of the design profile, and nothing in it.
+    /// A straight, empty tunnel of the design profile.
     pub fn straight(profile: Profile) -> Self {
         let tube = Tube::new(Axis::straight(), profile.clone(), Scales::default(), Vec::new(), Vec::new());
         Self::new(profile, tube, true, Features::default())
     }
 
-    /// Reads a scene's `[tunnel]` table, all of whose keys may be left out. `design` is the vehicle file's profile, and
-    /// `length_m` the tunnel's length. `text` gives the text of a file that the table names, `load` the content of one that
-    /// needn't be text.
+    /// Reads a scene's `[tunnel]` table, all of whose keys are optional. `design` is the vehicle file's profile, and `length_m`
+    /// the tunnel's length. `text` loads text files that the table names, `load` other files.
     ///
-    /// Errors: the first key that is missing, unknown or out of range, or what it describes can't be.
+    /// Errors: the first key that is missing, unknown or out of range, or an impossible environment.
     /// Allocates: startup only.
     pub fn parse(
         section: Option<Section<'_>>,
@@ -170,10 +169,10 @@ impl Environment {
         Self { design, tube, plain, solids, hollows, solids_by_chainage, hollows_by_chainage, names }
     }
 
-    /// What the ray from `origin` along the unit vector `direction` meets within `far_m`; `None` where there is nothing,
-    /// or when the origin isn't in the water.
+    /// What the ray from `origin` along the unit vector `direction` meets within `far_m`; `None` if it meets nothing, or the
+    /// origin isn't in the water.
     ///
-    /// A ray that grazes what is displaced or bent may cross up to 0.1 mm of it unnoticed; elsewhere it is exact.
+    /// A ray that grazes a displaced or bent wall may cross up to 0.1 mm of it unnoticed; elsewhere it is exact.
     /// Allocates: no.
     #[inline]
     pub fn cast(&self, origin: Point3<Tunnel>, direction: Vec3<Tunnel>, far_m: f64) -> Option<Hit> {
@@ -211,7 +210,7 @@ impl Environment {
         Some(Hit { range_m: reach.t_m, point: to_point(point), normal: to_vec(normal), what })
     }
 
-    /// The distance of [`Environment::cast`] alone, m, for less.
+    /// Range of [`Environment::cast`] alone, m, at lower cost.
     ///
     /// Allocates: no.
     pub fn range_m(&self, origin: Point3<Tunnel>, direction: Vec3<Tunnel>, far_m: f64) -> Option<f64> {
@@ -230,7 +229,7 @@ impl Environment {
         open && self.solid_around(at).is_none()
     }
 
-    /// What stands between two places; when `from` isn't in the water itself, a hit at no distance.
+    /// First obstruction between two points; a hit at zero range if `from` isn't in the water.
     pub fn first_obstruction(&self, from: Point3<Tunnel>, to: Point3<Tunnel>) -> Option<Hit> {
         let between = to - from;
         let length_m = between.norm();
@@ -249,7 +248,7 @@ impl Environment {
         self.tube.axis()
     }
 
-    /// Arc length of a place on the unrolled wall of the design profile, m: the ray from its reference point, in the axis's
+    /// Arc length of a point on the unrolled wall of the design profile, m: by the ray from its reference point, in the axis's
     /// chart.
     ///
     /// Source: metrics.md, "The unrolled wall".
@@ -263,12 +262,12 @@ impl Environment {
         &self.names
     }
 
-    /// Name of a feature; empty for a number that isn't one's.
+    /// Name of a feature; empty for an unknown number.
     pub fn feature_name(&self, index: u16) -> &str {
         self.names.get(usize::from(index)).map_or("", String::as_str)
     }
 
-    /// How far the ray has water, at most to `far_m`, and what is there; `None` from outside the water.
+    /// Extent of water along the ray, at most to `far_m`, and what stops it; `None` from outside the water.
     fn reach(&self, ray: &Ray, far_m: f64) -> Option<Reach> {
         let far_m = far_m.min(FARTHEST_M);
         let mut reach = match self.tube.leave(ray, 0.0, far_m) {
@@ -289,7 +288,7 @@ impl Environment {
                 reach.stop = Some(Stop::Solid { normal, feature: solid.feature });
             }
         }
-        // Met at once: the ray begins inside.
+        // Met at range zero: the ray begins inside.
         let in_solid = reach.t_m <= 0.0 && matches!(reach.stop, Some(Stop::Solid { .. }));
         (!in_solid).then_some(reach)
     }
@@ -297,11 +296,11 @@ impl Environment {
     fn start_in_hollow(&self, ray: &Ray) -> Option<Reach> {
         let around = |hollow: &&Placed<Hollow>| hollow.shape.contains(ray.origin);
         let hollow = self.hollows.iter().find(around)?;
-        // The wall behind it is no wall, since the loop that goes on from here finds the hollow first.
+        // The wall here is provisional: the caller's search for hollows finds this one first.
         Some(Reach { t_m: 0.0, stop: Some(Stop::Wall(None)), from_m: hollow.span_m.0, to_m: hollow.span_m.1 })
     }
 
-    /// From where the tube ends, through the hollows there, and through what tube they lead back to.
+    /// Continues from the end of the tube through the hollows there, and through tube that they lead back to.
     fn go_on_through_hollows(&self, ray: &Ray, far_m: f64, reach: &mut Reach) {
         for _ in 0..MOST_PASSAGES {
             let before_m = reach.t_m;
@@ -314,7 +313,7 @@ impl Environment {
             if reach.stop.is_none() {
                 return;
             }
-            // A hollow may end on the wall itself: the tube begins a hair farther on.
+            // A hollow may end on the wall itself: the tube begins `SKIN_M` farther on.
             if let Some(passage) = self.tube.leave(ray, reach.t_m + SKIN_M, far_m)
                 && passage.t_m > reach.t_m + PROGRESS_M
             {
@@ -330,10 +329,10 @@ impl Environment {
         }
     }
 
-    /// Of the hollows at the ray's end, the one that leads farthest on: to where, the normal there, and which.
+    /// The hollow at the ray's end that extends farthest: range of its end, the normal there, and the hollow.
     fn longest_hollow(&self, ray: &Ray, reach: &Reach) -> Option<(f64, V3, &Placed<Hollow>)> {
         let on_wall = matches!(reach.stop, Some(Stop::Wall(_))) && reach.t_m > 0.0;
-        // The index knows hollows by where they open into the tunnel; deeper in the rock, each may meet any other.
+        // The index lists hollows by where they open into the tunnel; deeper in the rock, each may meet any other.
         let (near, all) = if on_wall {
             (self.hollows_by_chainage.near(reach.from_m, reach.to_m), &[][..])
         } else {
@@ -348,7 +347,7 @@ impl Environment {
             .max_by(|a, b| a.0.total_cmp(&b.0))
     }
 
-    /// The feature whose solid holds a place.
+    /// The feature whose solid contains a point.
     fn solid_around(&self, point: V3) -> Option<u16> {
         let [chainage_m, ..] = self.axis().chart(to_point(point));
         let near = self.solids_by_chainage.near(chainage_m, chainage_m).iter();

@@ -1,9 +1,9 @@
-//! In place of `mesh_parts.rs` in a build without the feature `mesh`.
+//! Replaces `mesh_parts.rs` in a build without the feature `mesh`.
 
 use super::face::Face;
 use super::vector::{Ray, V3};
 
-/// A wall of triangles, which can't be.
+/// A wall of triangles; uninhabited in this build.
 #[derive(Debug, Clone)]
 pub(super) enum MeshWall {}
 

@@ -1,4 +1,4 @@
-//! In place of `meshes.rs` in a build without the feature `mesh`: there are none, and a scene that has one is refused.
+//! Replaces `meshes.rs` in a build without the feature `mesh`: scenes with meshes are refused.
 
 use headrace_config::{ConfigError, Section};
 
@@ -11,7 +11,7 @@ use crate::files::FileLoader;
 
 /// Refuses a mesh.
 ///
-/// Errors: there is one, or a table has no kind.
+/// Errors: a table is a mesh, or has no kind.
 pub(super) fn parse(
     tables: &[Section<'_>],
     _site: &Site<'_>,

@@ -11,11 +11,11 @@ use super::widths::flat_floor_m;
 
 /// Share of its slot's width that a bulkhead fills.
 const BULKHEAD_SHARE: f64 = 0.6;
-/// A side tunnel's direction, against the perpendicular, at most.
+/// Largest angle of a side tunnel from the perpendicular.
 const SLANT_DEG: f64 = 60.0;
-/// How far from a rock trap's upper edges the floor is felt for, m.
+/// Distance from a rock trap's upper edges at which the floor is probed, m.
 const INSIDE_M: f64 = 1e-6;
-/// A hollow is looked at in lengths of this, m.
+/// Step at which a hollow is sampled along its length, m.
 const STEP_M: f64 = 0.5;
 
 /// Reads a ditch across the floor: an upright box.
@@ -48,7 +48,7 @@ pub(super) fn rock_trap(
     Ok(Placed { shape: Hollow::Block(frame, half), feature, span_m })
 }
 
-/// Height of the floor at a rock trap's edges, the higher one, m.
+/// Height of the floor at a rock trap's edges, the larger of both, m.
 fn edge_m(ground: Ground<'_>, chainage_m: f64, half_width_m: f64) -> Option<f64> {
     let [_, from_m] = ground.tube.scaled(chainage_m, ground.tube.profile().reference());
     let height_m = |y: f64| {
@@ -126,7 +126,7 @@ fn mouth_span_m(
     span_m
 }
 
-/// Reads a gate: a slot all round, and the bulkhead in it when it is closed.
+/// Reads a gate: a slot all round, and its bulkhead if it is closed.
 ///
 /// Errors: a key missing or out of range.
 pub(super) fn gate(
@@ -140,7 +140,7 @@ pub(super) fn gate(
     let profile = ground.tube.profile();
     let reference = ground.tube.scaled(chainage_m, profile.reference());
     let scale = ground.tube.scale(chainage_m);
-    // The depth is that at the sides, on the level of the reference point.
+    // The depth is that at the sides, at the height of the reference point.
     let to_side_m = ground.tube.section_range_m(chainage_m, reference, [1.0, 0.0]).unwrap_or(depth_m);
     let enlarged = scale * (1.0 + depth_m / to_side_m);
     let ring = Ring {
@@ -151,7 +151,7 @@ pub(super) fn gate(
         scale: enlarged,
     };
     let span_m = ground.span_m(chainage_m, width_m / 2.0);
-    // As large as the slot or larger: what is in the rock meets no ray.
+    // As large as the slot or larger: the part in the rock meets no ray.
     let reach_m = enlarged * profile.farthest_m(profile.reference());
     let bulkhead = closed.then(|| Placed {
         shape: Solid::Block(

@@ -1,7 +1,7 @@
 //! Bodies in the water and hollows in the rock.
 //!
-//! A body offers where a ray first meets it, a hollow how far a ray that is inside it goes. A shape of another kind is a
-//! variant more of [`Solid`] or [`Hollow`].
+//! A body gives where a ray first meets it, a hollow how far a ray that is inside it goes. Another kind of shape is another
+//! variant of [`Solid`] or [`Hollow`].
 
 use headrace_geometry::math;
 use headrace_geometry::tunnel::{Profile, Yz};
@@ -11,11 +11,11 @@ use super::frame::Frame;
 use super::mesh_parts::MeshBody;
 use super::vector::{Ray, V3, along, dot, unit};
 
-/// By how much a ray's place may miss a hollow and still go on in it, m. A hollow's face may lie on the wall itself, as a
-/// ditch's upper one does on a flat floor; rounding must leave no skin between.
+/// Distance by which a ray's point may miss a hollow and still continue in it, m. A hollow's face may lie on the wall
+/// itself, as a ditch's upper one does on a flat floor; rounding must leave no skin between.
 pub(super) const SKIN_M: f64 = 1e-6;
 
-/// What stops a ray.
+/// A solid that stops a ray.
 #[derive(Debug, Clone)]
 pub(super) enum Solid {
     /// An ellipsoid with these half diameters along the frame's axes, m.
@@ -27,7 +27,7 @@ pub(super) enum Solid {
     Mesh(MeshBody),
 }
 
-/// What a ray passes beyond the tunnel's wall.
+/// A hollow that a ray passes beyond the tunnel's wall.
 #[derive(Debug, Clone)]
 pub(super) enum Hollow {
     /// A box with these half lengths along the frame's axes, m.
@@ -45,9 +45,9 @@ pub(super) struct Ring {
     pub(super) half_width_m: f64,
     /// The profile before scaling.
     pub(super) profile: Profile,
-    /// The place (y, z) that lies at the profile's reference point.
+    /// The point (y, z) that lies at the profile's reference point.
     pub(super) reference: Yz,
-    /// Scale about that place.
+    /// Scale about that point.
     pub(super) scale: f64,
 }
 
@@ -58,7 +58,7 @@ struct Chord {
 }
 
 impl Solid {
-    /// Where the ray first meets it: the distance, 0 when it begins inside, and the outward normal.
+    /// Where the ray first meets it: the range, 0 if it begins inside, and the outward normal.
     pub(super) fn meet(&self, ray: &Ray) -> Option<(f64, V3)> {
         let chord = match self {
             Self::Ellipsoid(frame, half) => ellipsoid_chord(frame, *half, ray)?,
@@ -86,7 +86,7 @@ impl Solid {
 }
 
 impl Hollow {
-    /// From `t_m` along the ray, which must be inside: where the ray leaves, and the normal towards the water there.
+    /// End of the ray's passage from `t_m`, which must be inside, and the normal towards the water there.
     pub(super) fn leave(&self, ray: &Ray, t_m: f64) -> Option<(f64, V3)> {
         match self {
             Self::Block(frame, half) => {
@@ -119,7 +119,7 @@ impl Ring {
 
     fn leave(&self, ray: &Ray, t_m: f64) -> Option<(f64, V3)> {
         let ray = self.frame.local_ray(ray);
-        // A hair ahead: on its own wall, rounding decides whether a place is inside.
+        // A little ahead: on its own wall, rounding decides whether a point is inside.
         let t_m = t_m + SKIN_M;
         let at = ray.at(t_m);
         if !self.holds(at) {
@@ -170,8 +170,8 @@ fn block_chord(frame: &Frame, half: V3, ray: &Ray) -> Option<Chord> {
 
 fn ellipsoid_chord(frame: &Frame, half: V3, ray: &Ray) -> Option<Chord> {
     let local = frame.local_ray(ray);
-    // In units of the half diameters it is a sphere of radius one. The half chord follows from the ray's least distance
-    // to the centre, which loses no digits where b * b - a * c would.
+    // In units of the half diameters it is a unit sphere. The half chord follows from the ray's least distance to the
+    // centre, which loses no digits where b * b - a * c would.
     let origin = [local.origin[0] / half[0], local.origin[1] / half[1], local.origin[2] / half[2]];
     let slope = [local.direction[0] / half[0], local.direction[1] / half[1], local.direction[2] / half[2]];
     let a = dot(slope, slope);

@@ -1,19 +1,19 @@
-//! How the profile's size changes along the tunnel.
+//! Scale of the profile along the tunnel.
 
 use headrace_config::{ConfigError, Section};
 
-/// The wall may move by as much as this along the ray from the floor's centre, for each metre of chainage.
+/// Largest change of the wall's distance from the floor's centre per metre of chainage.
 const STEEPEST: f64 = 1.0;
 
 /// Scale of the profile by chainage: linear between stations, constant outside; 1 without stations.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Scales {
-    /// Chainage, m, and scale, by growing chainage.
+    /// Chainage, m, and scale, in order of chainage.
     stations: Vec<(f64, f64)>,
 }
 
 impl Scales {
-    /// Reads the `[[tunnel.stations]]` tables. `farthest_m` is the wall's largest distance from the floor's centre.
+    /// Reads the `[[tunnel.stations]]` tables. `farthest_m` is the wall's largest distance from the floor's centre, m.
     ///
     /// Errors: a key missing, unknown or out of range; stations out of order, or too steep a change between two.
     pub(super) fn parse(
@@ -62,7 +62,7 @@ impl Scales {
         }
     }
 
-    /// Change of scale for each metre between two chainages with no station between them, 1/m.
+    /// Change of scale per metre between two chainages with no station between them, 1/m.
     pub(super) fn slope_pm(&self, from_m: f64, to_m: f64) -> f64 {
         if from_m.is_finite() && to_m.is_finite() {
             (self.at(to_m) - self.at(from_m)) / (to_m - from_m)

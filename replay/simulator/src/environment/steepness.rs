@@ -1,16 +1,16 @@
-//! How fast the gauge of a place can change: the bound by which rays are followed.
+//! Bound on the gauge's slope, which sets the steps along rays.
 
 use headrace_geometry::math::{self, TAU};
 use headrace_geometry::tunnel::Profile;
 
 use super::bulge::Bulge;
 
-/// Directions in which a profile is looked at.
+/// Directions in which a profile is sampled.
 const DIRECTIONS: u32 = 2_000;
-/// What the places between those directions may add.
+/// Allowance for the directions between.
 const MARGIN: f64 = 1.05;
-/// Places of a bend's inside move this much faster in chainage than the place itself, at most: bends are no tighter than
-/// twice the tunnel's reach.
+/// Ratio of chainage speed on a bend's inside to the speed of the point, at most: bends are no tighter than twice the
+/// tunnel's reach.
 const INSIDE_OF_BEND: f64 = 2.0;
 
 /// The wall of a profile as seen from its reference point.
@@ -18,7 +18,7 @@ const INSIDE_OF_BEND: f64 = 2.0;
 pub(super) struct Steepness {
     views: Vec<View>,
     perimeter_m: f64,
-    /// The largest distance of wall from the floor's centre, m.
+    /// The largest distance of the wall from the floor's centre, m.
     farthest_m: f64,
 }
 
@@ -33,7 +33,7 @@ struct View {
 }
 
 impl Steepness {
-    /// Looks at a profile.
+    /// Samples a profile.
     ///
     /// Allocates: startup only.
     pub(super) fn new(profile: &Profile) -> Self {
@@ -51,11 +51,11 @@ impl Steepness {
         }
     }
 
-    /// A bound on the slope of the gauge where it is at most 1, 1/m.
+    /// An upper bound on the slope of the gauge where the gauge is at most 1, 1/m.
     ///
-    /// With the wall at R(phi) from the reference point, displaced by D(chainage, sigma), the gauge is rho / (R - D). In
-    /// the section its slope is sqrt(1 + (R' - D')^2 / (R - D)^2) / (R - D). Along the tunnel D's own slope adds to it, and the
-    /// change of scale, which moves places by their distance from the floor's centre.
+    /// With the wall at R(phi) from the reference point, displaced by D(chainage, arc), the gauge is rho / (R - D). In the
+    /// section its slope is sqrt(1 + (R' - D')^2 / (R - D)^2) / (R - D). Along the tunnel D's own slope adds to it, as does the
+    /// change of scale, which moves points in proportion to their distance from the floor's centre.
     pub(super) fn gauge_slope_pm(
         &self,
         bulges: &[Bulge],
@@ -73,7 +73,7 @@ impl Steepness {
 
     /// Slopes within the section and along the tunnel.
     fn at(&self, view: &View, bulges: &[Bulge], scale: f64, scale_slope_pm: f64) -> (f64, f64) {
-        // The way along the wall to the next direction but one.
+        // Distance along the wall to the next direction but one.
         let margin_m = 2.0 * TAU / f64::from(DIRECTIONS) * view.radius_m * view.radius_m / view.tangent_m;
         let (mut inwards_m, mut outwards_m, mut along, mut across) = (0.0, 0.0, 0.0, 0.0);
         for bulge in bulges.iter().filter(|b| b.covers(view.arc_m, self.perimeter_m, margin_m)) {

@@ -1,4 +1,4 @@
-//! Scenes as text, numbers that look random, and the tests by what they are about.
+//! Scenes as text and pseudo-random numbers for the tests below, one file per subject.
 
 use headrace_config::Document;
 use headrace_geometry::frames::{Point3, Vec3};

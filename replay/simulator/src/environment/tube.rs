@@ -1,13 +1,13 @@
-//! The tunnel's wall: a profile that follows the axis, changes its size and is displaced in places.
+//! The tunnel's wall: a profile that follows the axis, changes its scale and is displaced in places.
 //!
-//! The gauge of a place is its distance from the reference point over the wall's in the same direction: below 1 in the
-//! tunnel, 1 on the wall. Where axis and size don't change and nothing is displaced, the wall is found in closed form.
-//! Elsewhere the gauge is followed along the ray in steps of (1 - gauge) over a bound on its slope, which can't pass the
-//! wall however thin what juts out of it; only the last steps are made at least [`LEAST_STEP_M`] long, so that a ray
-//! may cross rock unnoticed over less than that.
+//! The gauge of a point is its distance from the reference point over the wall's in the same direction: below 1 in the
+//! tunnel, 1 on the wall. Where axis and scale are constant and nothing is displaced, the wall has a closed form.
+//! Elsewhere a ray advances in steps of (1 - gauge) over a bound on the gauge's slope, which can't pass the wall however
+//! thin a protrusion; only the last steps are at least [`LEAST_STEP_M`] long, so that a ray may cross rock unnoticed over
+//! less than that.
 //!
-//! Where a mesh is the wall, it has a stretch to itself. The planes across its ends are wall, too, where water on one side
-//! meets rock on the other, so that nothing gets out where profile and mesh don't fit.
+//! A mesh that is the wall has a stretch to itself. The planes across its ends are wall, too, where water on one side meets
+//! rock on the other, so that a ray can't escape where profile and mesh don't fit.
 
 use headrace_geometry::math;
 use headrace_geometry::tunnel::{Profile, Yz};
@@ -23,11 +23,11 @@ use super::widths::half_width_m;
 
 /// The least step along a ray, m.
 const LEAST_STEP_M: f64 = 1e-4;
-/// To this the place where a ray meets the wall is found, m.
+/// Accuracy of the point where a ray meets the wall, m.
 const ROOT_M: f64 = 1e-11;
-/// A displacement of the wall from which on it is called the feature's, m.
+/// Displacement beyond which the wall is attributed to the feature, m.
 const FEATURE_M: f64 = 1e-3;
-/// Half the distance over which a displaced wall's normal is taken, m.
+/// Half the distance over which a displaced wall's normal is differenced, m.
 const NORMAL_STEP_M: f64 = 1e-5;
 
 /// The wall along the whole tunnel.
@@ -39,23 +39,23 @@ pub(super) struct Tube {
     floor: Yz,
     scales: Scales,
     bulges: Vec<Bulge>,
-    /// None of which overlaps a bend, another scale, a bulge or another mesh.
+    /// None overlaps a bend, a change of scale, a bulge or another mesh.
     meshes: Vec<MeshWall>,
     /// Without gaps, from -infinity to +infinity of chainage.
     stretches: Vec<Stretch>,
 }
 
-/// A length of tunnel in one piece of the axis, over which the scale is linear and the displacements are the same.
+/// A length of tunnel within one piece of the axis, over which the scale is linear and the set of displacements the same.
 #[derive(Debug, Clone)]
 struct Stretch {
     from_m: f64,
     piece: Piece,
     /// The planes across its ends; none at infinity.
     ends: [Option<Station>; 2],
-    /// Scale at its begin, or all along where the slope is zero.
+    /// Scale at its beginning, constant where the slope is zero.
     scale: f64,
     scale_slope_pm: f64,
-    /// Numbers of the bulges that reach into it.
+    /// Numbers of the bulges that extend into it.
     bulges: Vec<usize>,
     /// Number of the mesh that is the wall here.
     mesh: Option<usize>,
@@ -63,21 +63,21 @@ struct Stretch {
     step_m: f64,
 }
 
-/// How far a ray goes in the tube.
+/// A ray's passage through the tube.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Passage {
-    /// Where it leaves, m along the ray; or as far as was asked.
+    /// Where it leaves, m along the ray; or the limit given.
     pub(super) t_m: f64,
-    /// Whether there is wall.
+    /// Whether it ends at wall.
     pub(super) wall: bool,
-    /// What that is, where it takes no more to know.
+    /// The wall there, if it is known without further computation.
     pub(super) face: Option<Face>,
-    /// Chainage where it begins and ends, m.
+    /// Chainage of the beginning and the end, m.
     pub(super) chainages_m: [f64; 2],
 }
 
 impl Tube {
-    /// The wall of `profile` along `axis`, but for where it is one of the meshes.
+    /// The wall of `profile` along `axis`, except where a mesh is the wall.
     ///
     /// Allocates: startup only.
     pub(super) fn new(
@@ -91,7 +91,7 @@ impl Tube {
         let mut breaks: Vec<f64> = axis.pieces().iter().map(|piece| piece.from_m).collect();
         breaks.extend(scales.breaks());
         breaks.extend(bulges.iter().flat_map(|bulge| [bulge.begin_m(), bulge.end_m()]));
-        // A mesh's stretch is one, though straight pieces of the axis may meet in it.
+        // A mesh has a single stretch, even where straight pieces of the axis meet in it.
         let spans: Vec<(f64, f64)> = meshes.iter().map(MeshWall::span_m).collect();
         breaks.retain(|at_m| !spans.iter().any(|(from_m, to_m)| from_m < at_m && at_m < to_m));
         breaks.extend(spans.iter().flat_map(|(from_m, to_m)| [*from_m, *to_m]));
@@ -154,7 +154,7 @@ impl Tube {
         &self.profile
     }
 
-    /// How far the tube reaches to the sides of its axis, m.
+    /// Extent of the tube to the sides of its axis, m.
     pub(super) fn reach_m(&self) -> f64 {
         let outwards_m = self.bulges.iter().map(|bulge| -bulge.depth_m).fold(0.0, f64::max);
         half_width_m(&self.profile) * self.scales.largest() + outwards_m
@@ -165,15 +165,15 @@ impl Tube {
         self.scales.at(chainage_m)
     }
 
-    /// A place of the unscaled profile where it is at `chainage_m`.
+    /// Scales a point of the unscaled profile to `chainage_m`.
     pub(super) fn scaled(&self, chainage_m: f64, unscaled: Yz) -> Yz {
         let scale = self.scale(chainage_m);
         let [fy, fz] = self.floor;
         [fy + (unscaled[0] - fy) * scale, fz + (unscaled[1] - fz) * scale]
     }
 
-    /// Place (y, z) of the wall at `chainage_m` and `arc_m` of the unscaled profile, displacements included; and the
-    /// profile's normal there, inwards.
+    /// Point (y, z) of the wall at `chainage_m` and `arc_m` of the unscaled profile, displacements included; and the profile's
+    /// normal there, inwards.
     pub(super) fn wall_place(&self, chainage_m: f64, arc_m: f64) -> (Yz, Yz) {
         let reference = self.profile.reference();
         let [wy, wz] = self.profile.point_at(arc_m);
@@ -188,7 +188,7 @@ impl Tube {
         (self.scaled(chainage_m, place), normal)
     }
 
-    /// Distance along the unit vector `direction` (y, z) from a place of the section at `chainage_m` to the profile's wall,
+    /// Range along the unit vector `direction` (y, z) from a point of the section at `chainage_m` to the profile's wall,
     /// without displacements; `None` from outside.
     pub(super) fn section_range_m(&self, chainage_m: f64, from: Yz, direction: Yz) -> Option<f64> {
         let scale = self.scale(chainage_m);
@@ -202,7 +202,7 @@ impl Tube {
         self.stretches.get(number).is_some_and(|stretch| self.holds(stretch, point))
     }
 
-    /// How far the ray goes from `t_m` before it leaves the tube, at most to `far_m`; `None` when it isn't in there.
+    /// How far the ray goes from `t_m` before it leaves the tube, at most to `far_m`; `None` if it isn't inside.
     pub(super) fn leave(&self, ray: &Ray, t_m: f64, far_m: f64) -> Option<Passage> {
         let start = ray.at(t_m);
         let (mut number, start_m) = self.locate(start);
@@ -210,7 +210,7 @@ impl Tube {
         if !self.holds(first, start) {
             return None;
         }
-        // Along a straight line chainage only grows or only falls, which is known where it begins.
+        // Along a straight line chainage is monotonic, so the direction at the beginning holds for all of it.
         let [tx, ty] = first.piece.station(start_m).tangent;
         let forwards = ray.direction[0] * tx + ray.direction[1] * ty >= 0.0;
         let mut t_m = t_m;
@@ -232,7 +232,7 @@ impl Tube {
         None
     }
 
-    /// What the wall is at a place on it.
+    /// The wall's face at a point on it.
     pub(super) fn face(&self, point: V3) -> Face {
         let (number, chainage_m) = self.locate(point);
         let wall = Face { normal: [0.0; 3], feature: None };
@@ -251,7 +251,7 @@ impl Tube {
         }
     }
 
-    /// Stretch and chainage of a place.
+    /// Stretch and chainage of a point.
     fn locate(&self, point: V3) -> (usize, f64) {
         let (_, chainage_m, _) = self.axis.locate([point[0], point[1]]);
         let after = self.stretches.partition_point(|stretch| stretch.from_m <= chainage_m);
@@ -273,7 +273,7 @@ impl Tube {
         stretch.mesh.and_then(|number| self.meshes.get(number))
     }
 
-    /// Where the ray leaves the tube between `t_m` and `until_m`, all within the stretch, and a mesh's face there.
+    /// Where the ray leaves the tube between `t_m` and `until_m`, all within the stretch; with the face if a mesh is the wall.
     fn leave_stretch(
         &self,
         stretch: &Stretch,
@@ -292,8 +292,8 @@ impl Tube {
         left.map(|t_m| (t_m, None))
     }
 
-    /// The wall that the plane between two stretches is where the ray comes to it, `t_m` along: at a mesh's end, where
-    /// beyond is no water.
+    /// The face of the plane between two stretches where the ray reaches it, at `t_m`; `None` if there is water beyond. Only
+    /// a mesh's end can be wall.
     fn end_wall(&self, from: &Stretch, to: usize, ray: &Ray, t_m: f64) -> Option<Face> {
         let to = self.stretches.get(to)?;
         let mesh = self.mesh_of(to).or(self.mesh_of(from))?;
@@ -320,7 +320,7 @@ impl Tube {
         );
         match hit {
             Some(hit) => Some(t_m + hit.range_m),
-            // Only a place on the wall itself has none ahead, but for rays along the axis.
+            // Only a point on the wall itself, or a ray along the axis, has no wall ahead.
             None => (self.gauge(stretch, at) > 1.0 - 1e-9).then_some(t_m),
         }
     }
@@ -364,7 +364,7 @@ impl Tube {
         distance_m * scale / (distance_m * hit.range_m * scale - inwards_m)
     }
 
-    /// The profile's wall beyond an unscaled place, seen from the reference point; its distance from there, m.
+    /// The profile's wall beyond an unscaled point, seen from the reference point; and its distance from there, m.
     fn outwards(&self, unscaled: Yz) -> Option<(headrace_geometry::tunnel::WallHit, f64)> {
         let [ry, rz] = self.profile.reference();
         let out = [unscaled[0] - ry, unscaled[1] - rz];
@@ -374,7 +374,7 @@ impl Tube {
 
     #[expect(clippy::float_cmp, reason = "any other scale, however near, is one")]
     fn unscaled(&self, section: Yz, scale: f64) -> Yz {
-        // Without this the floor's place could cost a bit, and the plain case must equal the profile's own.
+        // Without this the floor's position could cost a bit, and the plain case must equal the profile's own.
         if scale == 1.0 {
             return section;
         }
@@ -382,7 +382,7 @@ impl Tube {
         [fy + (section[0] - fy) / scale, fz + (section[1] - fz) / scale]
     }
 
-    /// The direction in which the gauge falls, of length one.
+    /// The direction in which the gauge falls, a unit vector.
     fn falling(&self, stretch: &Stretch, point: V3) -> V3 {
         let mut fall = [0.0; 3];
         for (k, fall) in fall.iter_mut().enumerate() {
@@ -406,7 +406,7 @@ impl Tube {
 }
 
 impl Stretch {
-    /// Whether sections of it are all the same.
+    /// Whether all its sections are equal.
     fn is_constant(&self) -> bool {
         self.scale_slope_pm == 0.0 && self.bulges.is_empty()
     }
@@ -427,7 +427,7 @@ impl Stretch {
         self.piece.chart([point[0], point[1]]).0
     }
 
-    /// Where the ray passes the plane across the end that it goes to, m; infinity when it never does.
+    /// Where the ray passes the plane across the end ahead, m; infinity if it never does.
     fn end_m(&self, ray: &Ray, forwards: bool) -> f64 {
         let Some(end) = self.ends[usize::from(forwards)] else { return f64::INFINITY };
         let [tx, ty] = end.tangent;
@@ -439,7 +439,7 @@ impl Stretch {
     }
 }
 
-/// Where a function crosses zero between a place where it is negative and one where it isn't, by the Illinois method.
+/// Root of a function between a point where it is negative and one where it isn't, by the Illinois method.
 fn root(mut below: (f64, f64), mut above: (f64, f64), f: impl Fn(f64) -> f64) -> f64 {
     let mut kept = 0;
     for _ in 0..100 {
@@ -448,7 +448,7 @@ fn root(mut below: (f64, f64), mut above: (f64, f64), f: impl Fn(f64) -> f64) ->
         }
         let t = below.0 - below.1 * (above.0 - below.0) / (above.1 - below.1);
         let value = f(t);
-        // The end that stays a second time counts half, or the bracket would shrink from one side only.
+        // An end kept twice counts half; otherwise the bracket would shrink from one side only.
         if value < 0.0 {
             below = (t, value);
             if kept == 1 {

@@ -1,21 +1,21 @@
-//! Rays and the few operations on places that casting them takes.
+//! Rays, and the vector operations for casting them.
 
 use headrace_geometry::math;
 
-/// A place or direction in the tunnel's frame, m.
+/// A position or direction in the tunnel's frame, m.
 pub(super) type V3 = [f64; 3];
 
 /// A ray in the tunnel's frame; its parameter t is metres when the direction has length one.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Ray {
-    /// Where it begins.
+    /// Its origin.
     pub(super) origin: V3,
-    /// Where it goes, of length one.
+    /// Its direction, a unit vector.
     pub(super) direction: V3,
 }
 
 impl Ray {
-    /// The place `t_m` along the ray.
+    /// The point `t_m` along the ray.
     pub(super) fn at(&self, t_m: f64) -> V3 {
         along(self.origin, t_m, self.direction)
     }
@@ -36,7 +36,7 @@ pub(super) fn dot(a: V3, b: V3) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// The same direction with length one; zero stays zero.
+/// The unit vector of the same direction; zero stays zero.
 pub(super) fn unit(a: V3) -> V3 {
     let length = math::sqrt(dot(a, a));
     if length > 0.0 { a.map(|c| c / length) } else { a }

@@ -1,24 +1,24 @@
-//! How wide a profile is.
+//! Width of a profile.
 
 use headrace_geometry::tunnel::Profile;
 
-/// Places at which a profile's extent is taken.
+/// Points at which a profile's extent is evaluated.
 const PLACES: u32 = 2_000;
-/// What the places between may add to a half-width.
+/// Allowance for the points between, as a factor of a half-width.
 const WIDTH_MARGIN: f64 = 1.001;
-/// A floor is flat as far as it rises by less than this, m.
+/// A floor counts as flat where it rises by less than this, m.
 const FLAT_M: f64 = 1e-3;
 /// The largest distance of the wall from the axis, to either side, m.
 pub(super) fn half_width_m(profile: &Profile) -> f64 {
     WIDTH_MARGIN * places(profile).map(|[y, _]| y.abs()).fold(0.0, f64::max)
 }
 
-/// Width of the floor, m: a quarter of the perimeter where it isn't flat.
+/// Width of the floor, m: a quarter of the perimeter if it isn't flat.
 pub(super) fn floor_m(profile: &Profile) -> f64 {
     flat_floor_m(profile).unwrap_or(profile.perimeter_m() / 4.0)
 }
 
-/// The width of a flat floor that is about as far to the left of its centre as to the right, m; `None` where it is curved.
+/// Width of a flat floor that extends about equally to either side of its centre, m; `None` if it is curved.
 pub(super) fn flat_floor_m(profile: &Profile) -> Option<f64> {
     let floor_m = profile.point_at(0.0)[1];
     let flat = |place: &[f64; 2]| place[1] < floor_m + FLAT_M;

@@ -1,4 +1,4 @@
-//! Makes a surface of triangles: welds coinciding vertices and sees that the surface is closed where it must be.
+//! Builds a surface of triangles: welds coinciding vertices and checks that it is closed where it must be.
 
 use std::collections::BTreeMap;
 
@@ -7,7 +7,7 @@ use headrace_geometry::math;
 use super::error::MeshError;
 use super::ply::Triangles;
 
-/// What a mesh stands for.
+/// Role of a mesh in a scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
     /// The tunnel's wall over the mesh's own extent along x; open there at both ends, and closed elsewhere.
@@ -16,13 +16,13 @@ pub enum Role {
     Body,
 }
 
-/// Coordinates beyond this are a mistake of units or of origin, metres.
+/// Largest allowed coordinate, metres; beyond it, units or origin are wrong.
 const FAR_M: f64 = 100_000.0;
-/// Vertices nearer than this share of the mesh's diagonal are one.
+/// Vertices closer than this share of the mesh's diagonal are welded.
 const WELD: f64 = 1e-9;
 /// A wall's opening lies within this share of its length from an end, or within [`END_M`].
 const END: f64 = 0.02;
-/// See [`END`]; more than a quarter of the length it never is, so that the ends stay apart. Metres.
+/// As [`END`], in metres; at most a quarter of the length, so that the ends stay apart.
 const END_M: f64 = 0.5;
 
 /// A surface that has been checked.
@@ -30,15 +30,15 @@ const END_M: f64 = 0.5;
 pub(super) struct Surface {
     pub(super) vertices: Vec<[f64; 3]>,
     pub(super) faces: Vec<[u32; 3]>,
-    /// The number that each face had when given.
+    /// Number of each face in the input.
     pub(super) given: Vec<u32>,
-    /// What closes each opening of a wall.
+    /// Caps that close a wall's openings.
     pub(super) caps: Vec<Cap>,
     pub(super) low: [f64; 3],
     pub(super) high: [f64; 3],
 }
 
-/// Triangles that close an opening, and the box around them.
+/// Triangles that close an opening, and their bounding box.
 #[derive(Debug, Clone)]
 pub(super) struct Cap {
     pub(super) triangles: Vec<[[f64; 3]; 3]>,
@@ -46,7 +46,7 @@ pub(super) struct Cap {
     pub(super) high: [f64; 3],
 }
 
-/// An opening: edges that only one face has, connected with one another.
+/// An opening: connected edges that belong to only one face.
 struct Hole {
     edges: Vec<[u32; 2]>,
     low_x: f64,
@@ -54,7 +54,7 @@ struct Hole {
 }
 
 impl Surface {
-    /// Welds and checks; triangles with two corners in one place are left out.
+    /// Welds and checks; drops triangles with two corners in one place.
     pub(super) fn new(triangles: Triangles, role: Role) -> Result<Self, MeshError> {
         let Triangles { mut vertices, faces } = triangles;
         numbers(&vertices, &faces)?;
@@ -87,18 +87,18 @@ impl Surface {
         Ok(Self { vertices, faces: kept, given, caps, low, high })
     }
 
-    /// The places of a face's corners.
+    /// Positions of a face's corners.
     pub(super) fn corners(&self, face: [u32; 3]) -> [[f64; 3]; 3] {
         face.map(|corner| self.vertices[corner as usize])
     }
 
-    /// The places of the corners of the face of this number.
+    /// Positions of the corners of a face, by its number.
     pub(super) fn triangle(&self, number: u32) -> [[f64; 3]; 3] {
         self.corners(self.faces[number as usize])
     }
 }
 
-/// Sees that all numbers can be worked with.
+/// Checks counts, corner numbers and coordinates.
 fn numbers(vertices: &[[f64; 3]], faces: &[[u32; 3]]) -> Result<(), MeshError> {
     for (what, given) in [("vertices", vertices.len()), ("faces", faces.len())] {
         if u32::try_from(given).is_err() {
@@ -118,7 +118,7 @@ fn numbers(vertices: &[[f64; 3]], faces: &[[u32; 3]]) -> Result<(), MeshError> {
     Ok(())
 }
 
-/// The box around all corners of faces; vertices that no face uses don't count.
+/// Bounding box of the corners of faces; vertices that no face uses don't count.
 fn bounds(vertices: &[[f64; 3]], faces: &[[u32; 3]]) -> ([f64; 3], [f64; 3]) {
     let mut low = [f64::INFINITY; 3];
     let mut high = [f64::NEG_INFINITY; 3];
@@ -131,16 +131,16 @@ fn bounds(vertices: &[[f64; 3]], faces: &[[u32; 3]]) -> ([f64; 3], [f64; 3]) {
     (low, high)
 }
 
-/// Length of the box's diagonal.
+/// Length of a box's diagonal.
 pub(super) fn diagonal(low: [f64; 3], high: [f64; 3]) -> f64 {
     let [x, y, z] = [0, 1, 2].map(|k| high[k] - low[k]);
     math::sqrt(x * x + y * y + z * z)
 }
 
-/// For each vertex the first that is as near as counts as the same place.
+/// For each vertex, the first one within welding distance.
 fn weld(vertices: &[[f64; 3]], low: [f64; 3], diagonal: f64) -> Vec<u32> {
     let near = (WELD * diagonal).max(f64::MIN_POSITIVE);
-    // Cells of several times that width: most vertices look into one only, and none holds very many places.
+    // Cells of several times that width: most vertices look into one only, and none holds many vertices.
     let cell = 8.0 * near;
     let mut cells: BTreeMap<[i64; 3], Vec<u32>> = BTreeMap::new();
     let mut welded = Vec::with_capacity(vertices.len());
@@ -165,7 +165,7 @@ fn weld(vertices: &[[f64; 3]], low: [f64; 3], diagonal: f64) -> Vec<u32> {
     welded
 }
 
-/// The edges that only one face has.
+/// Edges that belong to only one face.
 fn open_edges(vertices: &[[f64; 3]], faces: &[[u32; 3]]) -> Result<Vec<[u32; 2]>, MeshError> {
     let mut edges: Vec<[u32; 2]> = Vec::with_capacity(faces.len() * 3);
     for &[a, b, c] in faces {
@@ -220,7 +220,7 @@ fn holes(vertices: &[[f64; 3]], open: &[[u32; 2]]) -> Vec<Hole> {
     holes.into_values().collect()
 }
 
-/// An error if there is any hole among these.
+/// Returns an error if there is any hole.
 fn refuse(vertices: &[[f64; 3]], holes: &[&Hole]) -> Result<(), MeshError> {
     // The first of the largest.
     let Some(largest) = holes.iter().rev().max_by_key(|hole| hole.edges.len()) else {
@@ -230,7 +230,7 @@ fn refuse(vertices: &[[f64; 3]], holes: &[&Hole]) -> Result<(), MeshError> {
     Err(MeshError::Hole { holes: holes.len(), edges: largest.edges.len(), at })
 }
 
-/// Sees that a wall has openings at both ends, and no others.
+/// Checks that a wall has openings at both ends, and no others.
 fn ends(vertices: &[[f64; 3]], holes: &[Hole], low_x: f64, high_x: f64) -> Result<(), MeshError> {
     let length = high_x - low_x;
     let within_m = (END * length).max(END_M).min(length / 4.0);
@@ -247,8 +247,8 @@ fn ends(vertices: &[[f64; 3]], holes: &[Hole], low_x: f64, high_x: f64) -> Resul
     Ok(())
 }
 
-/// Closes a hole by triangles from the mean of its edges' ends to each edge. Whatever its shape, each of its edges then
-/// has two faces, and what is inside is defined.
+/// Closes a hole by triangles from the centroid of its edges' ends to each edge. Whatever its shape, each of its edges
+/// then has two faces, and the inside is defined.
 fn cap(vertices: &[[f64; 3]], hole: &Hole) -> Cap {
     let mut middle = [0.0; 3];
     for &corner in hole.edges.as_flattened() {
@@ -259,7 +259,7 @@ fn cap(vertices: &[[f64; 3]], hole: &Hole) -> Cap {
     let middle = middle.map(|sum| sum / (2 * hole.edges.len()) as f64);
     let triangle = |&[a, b]: &[u32; 2]| [vertices[a as usize], vertices[b as usize], middle];
     let triangles: Vec<_> = hole.edges.iter().map(triangle).collect();
-    // The middle is within what the edges reach.
+    // The centroid is within the edges' bounding box.
     let (mut low, mut high) = (middle, middle);
     for corner in triangles.as_flattened() {
         for k in 0..3 {

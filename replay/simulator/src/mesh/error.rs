@@ -1,4 +1,4 @@
-//! What can be wrong with a mesh or with its file, and where.
+//! Errors in a mesh or its file, with their location.
 
 use core::fmt;
 
@@ -18,22 +18,22 @@ pub enum MeshError {
     /// More than 32 bits can number.
     #[error("the mesh has {given} {what}; at most {} can be numbered", u32::MAX)]
     TooMany {
-        /// Of what.
+        /// Kind of element.
         what: &'static str,
         /// How many.
         given: usize,
     },
-    /// A triangle has a corner that isn't there.
+    /// A triangle refers to a vertex that doesn't exist.
     #[error("face {face} has vertex {vertex} as a corner, of {vertices} vertices (both counted from 0)")]
     NoSuchVertex {
         /// Number of the face.
         face: usize,
         /// The corner.
         vertex: u32,
-        /// How many there are.
+        /// Number of vertices.
         vertices: usize,
     },
-    /// A vertex isn't anywhere near.
+    /// A vertex with coordinates that aren't finite or too large.
     #[error("vertex {vertex} (counted from 0) is at {}; coordinates must be finite and within 100 km of 0", At(*at))]
     FarVertex {
         /// Number of the vertex.
@@ -54,7 +54,7 @@ pub enum MeshError {
     /// A body isn't closed, or a wall is open elsewhere than at its ends.
     #[error("the mesh has {holes} hole(s) where it must be closed; the largest has {edges} edges, one of them at {}", At(*at))]
     Hole {
-        /// How many there are, open ends of a wall not counted.
+        /// Number of holes, except a wall's open ends.
         holes: usize,
         /// Edges around the largest.
         edges: usize,
@@ -68,7 +68,7 @@ pub enum MeshError {
     ClosedEnd {
         /// Where the mesh ends, metres.
         x_m: f64,
-        /// How far from there all vertices of an opening may lie, metres.
+        /// Distance from there within which all vertices of an opening must lie, metres.
         within_m: f64,
     },
 }

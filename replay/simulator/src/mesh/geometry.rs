@@ -1,19 +1,19 @@
 //! A ray against a box and a triangle, without gaps between triangles.
 //!
 //! Source: S. Woop, C. Benthin, I. Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013. The side of the ray on
-//! which an edge passes is a difference of two products. Rounding keeps their order and swapping the ends changes the
-//! sign alone, so that the two triangles of an edge agree, or both find zero, which counts as inside: nothing passes
+//! which an edge passes is the sign of a difference of two products. Rounding keeps their order and swapping the ends
+//! changes only the sign, so the two triangles of an edge agree, or both find zero, which counts as inside: no ray passes
 //! between them.
 
 use headrace_geometry::math;
 
-/// Where the order of two rounded products leaves the place in a triangle open: seen edge-on, or a needle. A few
-/// thousand units in the last place.
+/// Threshold below which the position in a triangle is lost in rounding (seen edge-on, or a needle). A few thousand units in
+/// the last place.
 const THIN: f64 = 1e-12;
-/// Widens the interval of a box by more than its own rounding.
+/// Widens the interval of a box by more than its rounding error.
 const WIDER: f64 = 1.0 + 1e-15;
 
-/// What a triangle does to a ray that must not be in pass_error.
+/// Unambiguous result of a ray against a triangle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Crossing {
     Beside,
@@ -27,23 +27,23 @@ pub(super) enum Crossing {
 pub(super) struct Ray {
     origin: [f64; 3],
     inverse: [f64; 3],
-    /// The axes in an order that puts the one last to which the ray is nearest.
+    /// The axes, ordered so that the one nearest to the ray's direction is last.
     axes: [usize; 3],
-    /// What to take from the first two coordinates for each unit of the last to turn the ray into that axis; and the
+    /// Shear that turns the ray into the last axis: subtracted from the first two coordinates per unit of the last; and the
     /// scale of the last.
     shear: [f64; 3],
     far: f64,
 }
 
-/// Doubled areas of the parts into which the ray's place divides a triangle, seen along the ray.
+/// Doubled areas of the parts into which the ray's point divides a triangle, seen along the ray.
 struct Parts {
     corners: [[f64; 3]; 3],
     areas: [f64; 3],
 }
 
 impl Ray {
-    /// From an origin and a direction of any length, up to `far` times that length. A direction that isn't finite, or is
-    /// zero, meets nothing.
+    /// From an origin and a direction of any length, up to `far` times that length. A direction that is zero or not finite
+    /// meets nothing.
     pub(super) fn new(origin: [f64; 3], direction: [f64; 3], far: f64) -> Self {
         let [x, y, z] = direction.map(f64::abs);
         let axes = if z >= x && z >= y {
@@ -58,9 +58,9 @@ impl Ray {
         Self { origin, inverse: direction.map(|d| 1.0 / d), axes, shear, far }
     }
 
-    /// A lower bound of the range at which the ray may be in a box; infinite if it misses it.
+    /// Lower bound of the range at which the ray enters a box; infinite if it misses it.
     ///
-    /// Comparisons are written so that what isn't a number, from zero times infinity, bounds nothing.
+    /// Comparisons are written so that NaN, from zero times infinity, bounds nothing.
     pub(super) fn enters(&self, low: [f64; 3], high: [f64; 3]) -> f64 {
         let mut near = 0.0;
         let mut far = self.far;
@@ -75,7 +75,7 @@ impl Ray {
                 far = last;
             }
         }
-        // The bound is below any hit in the box, even at 0, so that a second hit at the same range is looked at.
+        // The bound is below any hit in the box, even at 0, so that a second hit at the same range is tested.
         if near <= far * WIDER { near / WIDER / WIDER - f64::MIN_POSITIVE } else { f64::INFINITY }
     }
 
@@ -101,7 +101,7 @@ impl Ray {
         (range >= 0.0 && range <= self.far).then_some(range)
     }
 
-    /// Whether the ray goes through a triangle's inside.
+    /// Whether the ray crosses a triangle's interior.
     pub(super) fn crosses(&self, triangle: [[f64; 3]; 3]) -> Crossing {
         let parts = self.parts(triangle);
         let [u, v, w] = parts.areas;
@@ -121,7 +121,7 @@ impl Ray {
 }
 
 impl Parts {
-    /// How far along the last axis the ray's place in the triangle lies.
+    /// Depth along the last axis at which the ray meets the triangle's plane.
     fn depth(&self) -> Option<f64> {
         let [u, v, w] = self.areas;
         let [a, b, c] = self.corners;
@@ -135,7 +135,7 @@ impl Parts {
         if whole.abs() > THIN * wide * deep {
             return Some((u * a[2] + v * b[2] + w * c[2]) / whole);
         }
-        // The parts are rounding errors. The triangle is nearly a line, so that its longest side tells the place.
+        // The areas are rounding errors. The triangle is nearly a line, so its longest side gives the position.
         let side = |p: [f64; 3], q: [f64; 3]| {
             let (x, y) = (q[0] - p[0], q[1] - p[1]);
             let square = x * x + y * y;
@@ -153,8 +153,8 @@ impl Parts {
     }
 }
 
-/// The unit normal of a triangle on the side from which a ray of this direction comes; that of a triangle without area
-/// faces the ray.
+/// The unit normal of a triangle on the side that a ray of this direction comes from; that of a triangle without area faces
+/// the ray.
 pub(super) fn normal_against(triangle: [[f64; 3]; 3], direction: [f64; 3]) -> [f64; 3] {
     let [a, b, c] = triangle;
     let normal = cross(minus(b, a), minus(c, a));

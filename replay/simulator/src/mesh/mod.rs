@@ -1,7 +1,7 @@
 //! Triangle meshes for the simulator, from PLY files: a stretch of a tunnel's wall, or a body in the water.
 //!
-//! A mesh is checked when it is made, so that a ray from within can't leave through a gap between triangles. Which way
-//! round triangles are given doesn't matter.
+//! A mesh is checked when it is made, so that a ray from inside can't leave through a gap between triangles. The winding of
+//! the triangles doesn't matter.
 
 mod check;
 mod error;
@@ -28,12 +28,12 @@ pub use check::Role;
 pub use error::MeshError;
 pub use ply::{Triangles, read};
 
-/// Share of the mesh's size by which boxes in the tree are wider than what they hold: more than rounding moves a
-/// triangle that is seen from up to a thousand times that far.
+/// Margin of the tree's boxes around their contents, as a share of the mesh's size: more than the rounding error of a
+/// triangle seen from up to a thousand times that distance.
 const SLACK: f64 = 1e-12;
 
-/// Directions in which to look for the way out, along no axis or plane that meshes are likely to have; mostly across
-/// the tunnel, where that is short.
+/// Directions of the rays that test for inside, along no axis or plane that meshes are likely to have; mostly across the
+/// tunnel, where it is short.
 const WAYS_OUT: [[f64; 3]; 6] = [
     [0.137, 0.811, 0.573],
     [-0.219, -0.547, 0.829],
@@ -50,11 +50,11 @@ pub struct MeshHit {
     pub range_m: f64,
     /// Unit normal of the face, on the side from which the ray comes.
     pub normal: [f64; 3],
-    /// Number of the face among those given; the smallest if the ray meets several in one place.
+    /// Number of the face in the input; the smallest if the ray meets several at one point.
     pub face: u32,
 }
 
-/// A checked surface of triangles, ready for rays. Its frame is that of the triangles given, metres.
+/// A checked surface of triangles, ready for rays. Its frame is that of the input, metres.
 #[derive(Debug, Clone)]
 pub struct Mesh {
     surface: Surface,
@@ -62,14 +62,14 @@ pub struct Mesh {
 }
 
 impl Mesh {
-    /// Checks triangles and builds the tree that rays are cast through.
+    /// Checks triangles and builds the tree for casting rays.
     ///
-    /// Vertices within 1e-9 of the mesh's size of one another become one, and triangles with two corners in one place
-    /// are left out. Openings of a wall lie within 2 % of its length or 0.5 m of an end, whichever is more, but no more
-    /// than a quarter of the length.
-    /// Errors: coordinates out of range, corners that aren't there, no face, an edge of more than two faces, a hole in
-    /// a body or in a wall between its ends, a wall with a closed end.
-    /// Allocates: about 190 bytes a face, and twice that while building; the same tree on any machine.
+    /// Vertices within 1e-9 of the mesh's size of one another are welded, and triangles with two corners in one place are
+    /// dropped. Openings of a wall lie within 2 % of its length or 0.5 m of an end, whichever is more, but no more than a
+    /// quarter of the length.
+    /// Errors: coordinates out of range, corners that don't exist, no face, an edge of more than two faces, a hole in a body or
+    /// in a wall between its ends, a wall with a closed end.
+    /// Allocates: about 190 bytes per face, and twice that while building; the tree is the same on any machine.
     pub fn new(triangles: Triangles, role: Role) -> Result<Self, MeshError> {
         let mut surface = Surface::new(triangles, role)?;
         let largest = surface.low.iter().chain(&surface.high).fold(0.0_f64, |most, c| most.max(c.abs()));
@@ -87,13 +87,13 @@ impl Mesh {
         Ok(Self { surface, tree })
     }
 
-    /// The nearest place where a ray meets the mesh, from either side, no further than `far_m`.
+    /// The nearest point where a ray meets the mesh, from either side, no farther than `far_m`.
     ///
-    /// An origin on the surface itself is met at range 0. `direction_unit` has length 1. `None` also where a number
-    /// isn't finite, but for `far_m`.
+    /// An origin on the surface itself is hit at range 0. `direction_unit` has length 1. `None` also if a number other than
+    /// `far_m` isn't finite.
     pub fn cast(&self, origin: [f64; 3], direction_unit: [f64; 3], far_m: f64) -> Option<MeshHit> {
         let ray = Ray::new(origin, direction_unit, far_m);
-        // Kept beside the tree's own best, which of equal ranges takes the one it comes to first.
+        // Kept beside the tree's own best, which among equal ranges takes the first one visited.
         let best: Cell<Option<(f64, u32)>> = Cell::new(None);
         self.tree.find_best(
             f64::MAX,
@@ -111,14 +111,14 @@ impl Mesh {
         Some(MeshHit { range_m, normal, face: self.surface.given[leaf as usize] })
     }
 
-    /// Whether a place is in the solid, or within the wall and between its ends, which count as closed by the triangles
-    /// from the middle of each opening to its edges. Of parts that overlap, what lies in two is outside.
+    /// Whether a point is in the solid, or within the wall and between its ends, which count as closed by the triangles from
+    /// the centroid of each opening to its edges. Where parts overlap, points in two of them are outside.
     ///
-    /// Counts how often a ray goes through the surface: odd is inside. A ray that touches an edge is replaced by
-    /// another; a place from which all do is on the surface, and inside.
+    /// Counts the ray's crossings of the surface: odd is inside. A ray that touches an edge is replaced by another; a point
+    /// from which all do is on the surface, and inside.
     pub fn contains(&self, point: [f64; 3]) -> bool {
         let (low, high) = self.bounds();
-        // Written so that what isn't a number is outside.
+        // Written so that NaN is outside.
         if !(0..3).all(|k| point[k] >= low[k] && point[k] <= high[k]) {
             return false;
         }
@@ -128,7 +128,7 @@ impl Mesh {
             .unwrap_or(true)
     }
 
-    /// Whether a ray goes through the closed surface an odd number of times; `None` if it touches an edge.
+    /// Whether a ray crosses the closed surface an odd number of times; `None` if it touches an edge.
     fn is_crossed_oddly(&self, ray: &Ray) -> Option<bool> {
         let leaves = self.tree.leaves(|node| enters(ray, node) < f64::MAX);
         let met = leaves.map(|leaf| self.surface.triangle(leaf));
@@ -145,13 +145,13 @@ impl Mesh {
         Some(is_odd)
     }
 
-    /// The corners of the box around the mesh with the least and the greatest coordinates, metres.
+    /// Corners of the bounding box, least and greatest coordinates, metres.
     pub fn bounds(&self) -> ([f64; 3], [f64; 3]) {
         (self.surface.low, self.surface.high)
     }
 
-    /// The least and the greatest x between which the mesh is closed all round, metres: a wall's openings lie beyond, or
-    /// in the planes there.
+    /// The least and the greatest x between which the mesh is closed all round, metres: a wall's openings lie beyond, or in
+    /// the planes there.
     pub fn closed_m(&self) -> (f64, f64) {
         let (low, high) = (self.surface.low[0], self.surface.high[0]);
         let middle = f64::midpoint(low, high);

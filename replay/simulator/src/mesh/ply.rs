@@ -13,28 +13,28 @@ const CORNERS: [&str; 2] = ["vertex_indices", "vertex_index"];
 /// Errors quote a line of the file, which may be of any length.
 const MAX_ERROR_CHARS: usize = 300;
 
-/// Triangles as a file has them.
+/// Triangles as in the file.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Triangles {
-    /// Corners, in the file's own units, which are taken as metres.
+    /// Corners, in the file's units, taken as metres.
     pub vertices: Vec<[f64; 3]>,
-    /// Numbers of each triangle's corners, either way round.
+    /// Numbers of each triangle's corners, with either winding.
     pub faces: Vec<[u32; 3]>,
 }
 
 /// The triangles of a PLY file; polygons become fans about their first corner. Other elements and properties than the
 /// vertices' x, y, z and the faces' corners are ignored.
 ///
-/// Errors: [`MeshError::File`], with the line where the parser knows it. Corners and coordinates are checked by
+/// Errors: [`MeshError::File`], with the line where the parser gives it. Corners and coordinates are checked by
 /// [`super::Mesh::new`].
-/// Allocates: in proportion to `bytes`, whatever counts they claim.
+/// Allocates: in proportion to `bytes`, whatever counts the header claims.
 pub fn read(bytes: &[u8]) -> Result<Triangles, MeshError> {
     let mut reader = Reader::new(bytes);
     let mut header = Parser::<Ignored>::new().read_header(&mut reader).map_err(|error| unreadable(&error))?;
     check(&header)?;
     widen_text(&mut header);
     let mut triangles = Triangles::default();
-    // Elements without properties take no bytes, however many a file claims.
+    // Elements without properties take no bytes, whatever count the header claims.
     for element in header.elements.values().filter(|element| !element.properties.is_empty()) {
         match element.name.as_str() {
             "vertex" => {
@@ -90,7 +90,7 @@ fn check(header: &Header) -> Result<(), MeshError> {
     Ok(())
 }
 
-/// Has coordinates in text read as doubles: it may have more digits than the type that the header states.
+/// Makes the parser read coordinates in text as doubles: they may have more digits than the header's type.
 fn widen_text(header: &mut Header) {
     let Some(vertex) = header.elements.get_mut("vertex").filter(|_| header.encoding == Encoding::Ascii)
     else {

@@ -1,4 +1,4 @@
-//! Rays, insides and checks of meshes made here.
+//! Rays, inside tests and checks of generated meshes.
 
 use std::collections::BTreeMap;
 
@@ -6,7 +6,7 @@ use headrace_geometry::math;
 
 use super::*;
 
-/// Numbers that look random; the same in every run.
+/// Pseudo-random numbers; the same in every run.
 struct Random(u64);
 
 impl Random {
@@ -49,7 +49,7 @@ fn cross(p: [f64; 3], q: [f64; 3]) -> [f64; 3] {
     [0, 1, 2].map(|k| p[(k + 1) % 3] * q[(k + 2) % 3] - p[(k + 2) % 3] * q[(k + 1) % 3])
 }
 
-/// Unit vector and distance from one place to another.
+/// Unit vector and distance from one point to another.
 fn toward(from: [f64; 3], to: [f64; 3]) -> ([f64; 3], f64) {
     let d = sum(to, from, -1.0);
     let length = math::sqrt(dot(d, d));
@@ -69,7 +69,7 @@ pub(super) fn cuboid(half: [f64; 3]) -> Triangles {
     Triangles { vertices: (0..8).map(corner).collect(), faces }
 }
 
-/// An icosahedron, each face split in four `levels` times, its vertices put at the radius told for their direction.
+/// An icosahedron, each face split in four `levels` times, with the given radius for each vertex.
 pub(super) fn icosphere(levels: usize, mut radius_m: impl FnMut() -> f64) -> Triangles {
     let g = f64::midpoint(1.0, math::sqrt(5.0));
     let mut vertices: Vec<[f64; 3]> = Vec::new();
@@ -115,7 +115,7 @@ pub(super) fn icosphere(levels: usize, mut radius_m: impl FnMut() -> f64) -> Tri
     Triangles { vertices, faces }
 }
 
-/// A tube about x with its ends open; each vertex has the radius that is told for it.
+/// A tube about x with its ends open, with the given radius for each vertex.
 pub(super) fn tube(rings: u32, around: u32, length_m: f64, mut radius_m: impl FnMut() -> f64) -> Triangles {
     let mut triangles = Triangles::default();
     for i in 0..=rings {
@@ -144,8 +144,8 @@ fn rough_tube() -> Triangles {
     tube(60, 48, 40.0, || 5.0 + random.signed())
 }
 
-/// Range of the nearest hit by Moller and Trumbore's way, over all triangles, infinite if there is none; `None` for what
-/// passes within a billionth of an edge, where the two ways may differ.
+/// Range of the nearest hit by the Moller-Trumbore method, over all triangles, infinite if there is none; `None` for rays
+/// that pass within a billionth of an edge, where the two methods may differ.
 fn brute(t: &Triangles, origin: [f64; 3], direction: [f64; 3]) -> Option<f64> {
     let mut nearest = f64::INFINITY;
     for face in &t.faces {
@@ -246,7 +246,7 @@ fn no_ray_from_a_tubes_axis_slips_through_its_wall() {
     let triangles = rough_tube();
     let mesh = Mesh::new(triangles.clone(), Role::Wall).unwrap();
     for &target in &triangles.vertices {
-        // Straight across, so that two components of the direction, or one, are zero or nearly so.
+        // Straight across, so that one or two components of the direction are zero or nearly so.
         let origin = [target[0], 0.0, 0.0];
         let (direction, distance) = toward(origin, target);
         let hit = mesh.cast(origin, direction, 100.0).unwrap();
@@ -256,7 +256,7 @@ fn no_ray_from_a_tubes_axis_slips_through_its_wall() {
 
 #[test]
 fn needles_between_triangles_neither_leak_nor_mislead() {
-    // A corner of the box's upper face is split off by points on its edge, so that needles without area join them.
+    // A corner of the box's upper face is split off by points on its edge, so that triangles without area join them.
     let mut t = cuboid([1.0, 1.0, 1.0]);
     let old =
         t.faces.iter().position(|face| face.contains(&4) && face.contains(&5) && face.contains(&7)).unwrap();

@@ -1,4 +1,4 @@
-//! What is refused, what is mended, and what it is told as; how fast large meshes are.
+//! Refused meshes, repaired meshes, error messages, and the speed on large meshes.
 
 use super::tests::{cuboid, icosphere, tube};
 use super::*;

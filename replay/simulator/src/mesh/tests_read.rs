@@ -1,4 +1,4 @@
-//! PLY files written and read back; what is refused, and with which words.
+//! PLY files written and read back; refused files and their error messages.
 
 use proptest::prelude::*;
 
@@ -11,7 +11,7 @@ fn sample() -> Triangles {
     icosphere(1, || 2.0)
 }
 
-/// A PLY file with more in it than is needed.
+/// A PLY file with more content than needed.
 fn ply(t: &Triangles, encoding: &str) -> Vec<u8> {
     let header = format!(
         "ply\nformat {encoding} 1.0\ncomment by hand\nobj_info no\nelement camera 2\nproperty short id\nproperty list uchar \
@@ -131,7 +131,7 @@ fn faults_are_told_with_what_is_wrong() {
     );
     let words = refused(good.replace("3 0 1 2", "3 0 1 3").as_bytes());
     assert_eq!(words, "face 0 has vertex 3 as a corner, of 3 vertices (both counted from 0)");
-    // A line of any length isn't repeated.
+    // An error doesn't quote lines of any length.
     let words = refused(good.replace("1 0 0", &"x".repeat(100_000)).as_bytes());
     assert!(words.len() < 400, "{words}");
 }
@@ -173,13 +173,13 @@ fn counts_that_lie_take_no_memory() {
     long_list.extend([0xFF; 4]);
     let words = refused(&long_list);
     assert!(words.contains("end of file") && words.contains("'face'"), "{words}");
-    // A file's end in a text.
+    // A truncated file in text encoding.
     let text = file(u64::MAX, "uint").replace("binary_little_endian", "ascii");
     assert!(refused(text.as_bytes()).contains("end of file"));
 }
 
 proptest! {
-    /// Whatever the bytes, nothing panics; what is read makes a mesh or an error.
+    /// No bytes cause a panic; they give a mesh or an error.
     #[test]
     fn any_bytes_are_let_pass_or_refused(bytes in proptest::collection::vec(any::<u8>(), 0..300), start in 0..3_usize) {
         let starts = ["", "ply\nformat ascii 1.0\n", "ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float "];

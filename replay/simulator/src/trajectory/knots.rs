@@ -1,4 +1,4 @@
-//! Smooth motion through knots at equal times: uniform cubic B-splines, whose acceleration has no jumps.
+//! Smooth motion through equidistant knots: uniform cubic B-splines, whose acceleration has no jumps.
 
 use headrace_geometry::math;
 
@@ -9,7 +9,7 @@ pub type Offsets = [f64; 6];
 
 /// Control points of a spline, `spacing_s` apart; the first belongs to one spacing before the start.
 ///
-/// The curve stays within the hull of four neighbouring points, so that it never goes beyond what they allow.
+/// The curve stays within the hull of four neighbouring points, so it never exceeds their range.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Knots {
     spacing_s: f64,
@@ -23,7 +23,7 @@ impl Knots {
         Self { spacing_s, points: (-1..=last).map(&mut point).collect() }
     }
 
-    /// Where it is `after_s` seconds after the start; before the first and after the last knot it goes on straight.
+    /// Offsets `after_s` seconds after the start; before the first and after the last knot it continues straight.
     pub fn at(&self, after_s: f64) -> Offsets {
         let inside = (self.points.len() as f64 - 3.0) * self.spacing_s;
         let within_s = after_s.clamp(0.0, inside.max(0.0));
@@ -76,7 +76,7 @@ impl Knots {
     }
 }
 
-/// A wandering about zero within `reach` either way that changes over `period_s`: control points half a period apart,
+/// A random variation about zero within `reach` either way, of period `period_s`: control points half a period apart,
 /// drawn evenly. Its standard deviation is 0.4 of the reach.
 pub fn wandering(stream: Stream, duration_s: f64, period_s: f64, reach: Offsets) -> Knots {
     Knots::new(duration_s, period_s / 2.0, |k| {

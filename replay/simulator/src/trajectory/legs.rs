@@ -1,16 +1,16 @@
-//! Stretches gone at one speed each.
+//! Legs at constant speed.
 
 use super::place::Place;
 
-/// The slowest that a leg may be gone, m/s.
+/// Lowest speed of a leg, m/s.
 const SLOWEST_MPS: f64 = 1e-3;
 
-/// A stretch gone at one speed.
+/// A leg at constant speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Leg {
-    /// How far, m, positive.
+    /// Distance, m, positive.
     pub distance_m: f64,
-    /// How fast over ground, m/s; negative goes back.
+    /// Speed over ground, m/s; negative is backwards.
     pub speed_mps: f64,
 }
 
@@ -20,12 +20,12 @@ impl Leg {
     }
 }
 
-/// Legs one after the other, along the axis, level, at one place of the cross-section.
+/// Legs in sequence, along the axis, level, at one position in the cross-section.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Legs {
     across_m: [f64; 2],
     legs: Vec<Leg>,
-    /// When each begins, s, and at which chainage, m.
+    /// Time, s, and chainage, m, at the beginning of each.
     begins: Vec<(f64, f64)>,
     start_m: f64,
 }

@@ -1,4 +1,4 @@
-//! The vehicle's trajectory through the tunnel: where it is at any moment, in the axis's own terms.
+//! The vehicle's trajectory through the tunnel: its position at any time, relative to the axis.
 
 mod knots;
 mod legs;
@@ -32,7 +32,7 @@ enum Base {
 }
 
 impl Trajectory {
-    /// Legs at one speed each from `start_m`, level, at one place of the cross-section.
+    /// Legs at constant speed from `start_m`, level, at one position in the cross-section.
     pub fn of_legs(start_m: f64, across_m: [f64; 2], legs: Vec<Leg>) -> Self {
         let legs = Legs::new(start_m, across_m, legs);
         Self { duration_s: legs.duration_s(), base: Base::Legs(legs), sways: Vec::new() }
@@ -43,17 +43,17 @@ impl Trajectory {
         Self { base: Base::Knots(knots), sways: Vec::new(), duration_s }
     }
 
-    /// As a pilot goes.
+    /// A pilot's trajectory.
     fn piloted(piloted: Piloted) -> Self {
         Self { duration_s: piloted.duration_s(), base: Base::Piloted(Box::new(piloted)), sways: Vec::new() }
     }
 
-    /// Time from its start to its end, seconds.
+    /// Duration, s.
     pub fn duration_s(&self) -> f64 {
         self.duration_s
     }
 
-    /// Where the vehicle is `after_s` seconds after the start. Before it, and after the end, it goes on as it did.
+    /// Position `after_s` seconds after the start. Before it, and after the end, the motion continues.
     pub fn place(&self, after_s: f64) -> Place {
         let mut place = match &self.base {
             Base::Legs(legs) => legs.place(after_s),
@@ -66,15 +66,15 @@ impl Trajectory {
         place
     }
 
-    /// Adds a motion of its own to it. It is for the duration that the trajectory has by then.
+    /// Adds a further motion, over the current duration.
     pub fn sway(&mut self, knots: Knots) {
         self.sways.push(knots);
     }
 
-    /// Lets a current of `speed_mps`, positive towards growing chainage, carry a vehicle that goes through the water. It
-    /// goes to the same end, in another time.
+    /// Lets a current of `speed_mps`, positive towards growing chainage, carry a vehicle that moves through the water. It
+    /// reaches the same end, after another duration.
     ///
-    /// Errors: in words, the leg that couldn't be gone against it; a trajectory that is given over ground.
+    /// Errors, as text: a leg that makes no way against the current; a trajectory given over ground.
     pub fn carry(&mut self, speed_mps: f64) -> Result<(), String> {
         match &mut self.base {
             Base::Legs(legs) => {

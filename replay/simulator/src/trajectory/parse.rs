@@ -11,7 +11,7 @@ use super::waypoints::{self, Waypoint};
 use super::{Ground, Leg, Trajectory, recorded};
 use crate::random::Stream;
 
-/// A dive may begin and end as much as 20 m outside the tunnel.
+/// A dive may begin and end up to 20 m outside the tunnel.
 const OUTSIDE_M: f64 = 20.0;
 const CHAINAGE_M: RangeInclusive<f64> = -OUTSIDE_M..=1.0e6;
 const ACROSS_M: RangeInclusive<f64> = -200.0..=200.0;
@@ -19,7 +19,7 @@ const SPEED_MPS: RangeInclusive<f64> = 0.001..=5.0;
 const DEGREES: RangeInclusive<f64> = -80.0..=80.0;
 const REACH_M: RangeInclusive<f64> = 0.0..=100.0;
 const REACH_DEG: RangeInclusive<f64> = 0.0..=80.0;
-/// Name under which trajectories draw their random numbers.
+/// Name of the trajectories' random streams.
 const NAME: &str = "trajectory";
 
 #[derive(Debug, Clone, Copy)]
@@ -37,7 +37,7 @@ const KINDS: [(&str, Kind); 4] = [
     ("recorded", Kind::Recorded),
 ];
 
-/// Reads a trajectory in a tunnel of this design; gives what its speeds are measured by, too.
+/// Reads a trajectory in a tunnel of this design; also returns the reference of its speeds.
 ///
 /// Errors: a key that is missing, unknown or out of range; a trajectory that leaves the tunnel at its ends.
 pub(crate) fn parse(

@@ -1,4 +1,4 @@
-//! A pilot at the joystick: goes, stops, goes back to look again, and wanders all the while.
+//! A pilot's trajectory: moving, stopping, going back to look again, and drifting all the while.
 
 use headrace_geometry::math;
 
@@ -8,33 +8,33 @@ use crate::random::Stream;
 
 /// Time between two decisions, s.
 const STEP_S: f64 = 0.5;
-/// How fast the vehicle follows the stick, s.
+/// Time constant of the vehicle's response to the stick, s.
 const RESPONSE_S: f64 = 2.0;
-/// A dive that takes so many times as long as without stops never ends.
+/// A dive of more than this multiple of its duration without stops is taken as endless.
 const MOST_TIMES_AS_LONG: f64 = 50.0;
 
-/// How a pilot goes.
+/// Parameters of a pilot.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Pilot {
-    /// From and to which chainage, m.
+    /// Chainage of start and end, m.
     pub(super) from_m: f64,
     pub(super) to_m: f64,
-    /// Place in the cross-section about which it wanders: y, z, m.
+    /// Position in the cross-section about which it drifts: y, z, m.
     pub(super) across_m: [f64; 2],
-    /// Speed while going, m/s.
+    /// Speed while moving, m/s.
     pub(super) speed_mps: f64,
-    /// Stops and goings back, each so many an hour.
+    /// Stops and reversals per hour, each.
     pub(super) stops_per_hour: f64,
     pub(super) backs_per_hour: f64,
-    /// The shortest and longest stop, s, and distance gone back, m.
+    /// The shortest and longest stop, s, and distance back, m.
     pub(super) stop_s: [f64; 2],
     pub(super) back_m: [f64; 2],
-    /// How far it wanders left, up; rolls, pitches, yaws; m and radians; over which time, s.
+    /// Reach of the drift left, up, m; roll, pitch, yaw, radians; and its period, s.
     pub(super) reach: Offsets,
     pub(super) period_s: f64,
 }
 
-/// A trajectory as a pilot steers it, and the pilot, who takes another one in a current.
+/// A pilot's trajectory with the pilot, who takes a different one in a current.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Piloted {
     pilot: Pilot,
@@ -55,7 +55,7 @@ enum Doing {
 impl Pilot {
     /// The chainage at each step, and once before the first.
     ///
-    /// Errors: in words, a trajectory that has no end.
+    /// Errors, as text: a trajectory that never ends.
     fn chainages_m(&self, stick: Stream, current_mps: f64) -> Result<Vec<f64>, String> {
         let towards = (self.to_m - self.from_m).signum();
         let plain_s = (self.to_m - self.from_m).abs() / self.speed_mps;
@@ -111,7 +111,7 @@ impl Pilot {
 impl Piloted {
     /// A pilot's trajectory in still water.
     ///
-    /// Errors: in words, a trajectory that has no end.
+    /// Errors, as text: a trajectory that never ends.
     pub(super) fn new(pilot: Pilot, stick: Stream, wander: Stream) -> Result<Self, String> {
         let nowhere = Knots::new(0.0, STEP_S, |_| [0.0; 6]);
         let (along, beside) = (nowhere.clone(), nowhere);
@@ -130,7 +130,7 @@ impl Piloted {
         place
     }
 
-    /// The same pilot in a current.
+    /// Recomputes the trajectory for a current.
     pub(super) fn carry(&mut self, current_mps: f64) -> Result<(), String> {
         self.go(current_mps).map_err(|why| format!("carries the vehicle off: it {why}"))
     }

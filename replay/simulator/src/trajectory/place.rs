@@ -1,24 +1,24 @@
-//! Places along the tunnel, in the axis's own terms.
+//! Positions along the tunnel, relative to the axis.
 
 use super::knots::Offsets;
 
-/// Where the vehicle is, relative to the axis.
+/// Pose of the vehicle relative to the axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Place {
     /// Chainage, m.
     pub chainage_m: f64,
-    /// Place in the cross-section: y left, z up from the floor's centre, m.
+    /// Position in the cross-section: y left, z up from the floor's centre, m.
     pub across_m: [f64; 2],
-    /// Roll, pitch and yaw against the axis, radians.
+    /// Roll, pitch and yaw relative to the axis, radians.
     pub turned_rad: [f64; 3],
 }
 
-/// What a trajectory's speeds are measured by.
+/// Reference of a trajectory's speeds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ground {
     /// The vehicle holds its speed through the water: a current carries it.
     Water,
-    /// The trajectory is given over ground: a current changes nothing of it.
+    /// The trajectory is given over ground: a current doesn't change it.
     Tunnel,
 }
 

@@ -1,22 +1,22 @@
-//! A recorded trajectory: a line for each moment.
+//! A recorded trajectory: one line per timestamp.
 
 use headrace_geometry::math;
 
 use super::knots::{Knots, Offsets};
 use super::waypoints::through;
 
-/// Time between two knots, s; what was recorded is smoothed over four of them.
+/// Interval of the knots, s; the recording is smoothed over four of them.
 const SPACING_S: f64 = 0.1;
-/// The most seconds that a recorded trajectory may take: two days.
+/// Longest recorded trajectory, s: two days.
 const MAX_S: f64 = 172_800.0;
 
-/// A place with its time, s.
+/// A pose with its time, s.
 type Timed = (f64, Offsets);
 
-/// Reads lines `t_s,chainage_m,y_m,z_m[,roll_deg,pitch_deg,yaw_deg]`; gives the places, times from the first. Lines that
-/// begin with #, and the first of the others where that is text, are passed over; times grow. Angles go the short way.
+/// Reads lines `t_s,chainage_m,y_m,z_m[,roll_deg,pitch_deg,yaw_deg]`; returns the poses, with times from the first. Skips
+/// lines that begin with #, and the first other line if it is text; times must increase. Angles are unwrapped.
 ///
-/// Errors: in words, with the line.
+/// Errors, as text, with the line.
 pub(super) fn parse(text: &str) -> Result<Vec<Timed>, String> {
     let mut begun = false;
     let mut timed: Vec<Timed> = Vec::new();
@@ -54,13 +54,13 @@ pub(super) fn parse(text: &str) -> Result<Vec<Timed>, String> {
     Ok(timed)
 }
 
-/// The knots of a trajectory through recorded places, and how long it takes, s.
+/// Knots of a trajectory through recorded poses, and its duration, s.
 pub(super) fn knots(timed: &[Timed]) -> (Knots, f64) {
     let duration_s = timed.last().map_or(0.0, |(last_s, _)| *last_s);
     (through(timed, SPACING_S, duration_s), duration_s)
 }
 
-/// Brings angles to within half a turn of those before: 179 degrees and -179 are near each other.
+/// Unwraps angles to within half a turn of the previous ones: 179 degrees and -179 are near each other.
 fn turn_short([.., roll, pitch, yaw]: &Offsets, [.., new_roll, new_pitch, new_yaw]: &mut Offsets) {
     for (before, angle) in [(roll, new_roll), (pitch, new_pitch), (yaw, new_yaw)] {
         *angle = before + math::wrap_signed(*angle - before, math::TAU);

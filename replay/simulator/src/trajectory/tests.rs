@@ -5,7 +5,7 @@ use headrace_vehicle::TunnelConfig;
 use super::*;
 use crate::random::Stream;
 
-/// A way in a tunnel of 200 m.
+/// A trajectory in a tunnel of 200 m.
 fn parsed(trajectory: &str, seed: u64) -> Result<(Trajectory, Ground), String> {
     recorded(trajectory, seed, "")
 }
@@ -45,7 +45,7 @@ fn legs_follow_each_other_without_a_jump() {
     assert!(steps.windows(2).all(|w| (w[1].chainage_m - w[0].chainage_m).abs() < 0.005 + 1e-9));
 }
 
-/// Corners are rounded over two seconds, so that a way begins and ends a sixth of half a second's way inside.
+/// Corners are rounded over two seconds, so that a trajectory begins and ends a sixth of half a second's travel inside.
 #[test]
 fn waypoints_are_gone_through_at_their_speeds() {
     let trajectory = trajectory(
@@ -88,7 +88,7 @@ fn a_pilot_comes_to_the_end_within_bounds_there_and_back() {
                 back += usize::from(gone_m < -0.02);
             }
             for Place { chainage_m, across_m: [y, z], turned_rad: [roll, pitch, yaw] } in &steps {
-                // A pilot who goes back stops where the way began.
+                // A pilot who goes back stops at the start.
                 let inside = (from_m.min(to_m) - 1.0..=from_m.max(to_m) + 1.0).contains(chainage_m);
                 assert!(inside && y.abs() <= 0.5 && (z - 5.0).abs() <= 0.3, "{seed}: {chainage_m} {y} {z}");
                 assert!(yaw.to_degrees().abs() <= 8.0 && roll.abs() + pitch.abs() == 0.0);
@@ -100,7 +100,7 @@ fn a_pilot_comes_to_the_end_within_bounds_there_and_back() {
     }
 }
 
-/// What is gone back is as long as drawn, to the nearest step.
+/// The distance gone back is as drawn, to the nearest step.
 #[test]
 fn a_pilot_goes_back_as_far_as_wanted() {
     let keys = "kind = \"pilot\"\nto_m = 190\nspeed_mps = 1\nstops_per_hour = 0\nbacks_per_hour = 30\n\
@@ -199,7 +199,7 @@ fn a_spline_stays_within_the_hull_of_its_points() {
     }
 }
 
-/// Position, speed and acceleration have no jump at a knot; beyond the ends it goes on straight.
+/// Position, speed and acceleration have no jump at a knot; beyond the ends the curve continues straight.
 #[test]
 fn a_spline_is_smooth_to_its_acceleration() {
     let (knots, _) = random_knots(3);

@@ -1,24 +1,24 @@
-//! From waypoint to waypoint, at one speed on each stretch.
+//! Waypoints, with one speed for each stretch between them.
 
 use headrace_geometry::math;
 
 use super::knots::{Knots, Offsets};
 
-/// Time between two knots, s: corners are rounded over four of them.
+/// Interval of the knots, s: corners are rounded over four of them.
 pub(super) const SPACING_S: f64 = 0.5;
 
-/// A place to go through.
+/// A waypoint.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Waypoint {
-    /// Where, and how turned.
+    /// Position and attitude.
     pub(super) at: Offsets,
-    /// How fast to go there from the one before, m/s.
+    /// Speed from the previous waypoint, m/s.
     pub(super) speed_mps: f64,
-    /// How long to stay, s.
+    /// Duration of the stop, s.
     pub(super) stay_s: f64,
 }
 
-/// The knots of a trajectory through waypoints, and how long it takes, s.
+/// Knots of a trajectory through waypoints, and its duration, s.
 pub(super) fn knots(waypoints: &[Waypoint]) -> (Knots, f64) {
     let mut timed: Vec<(f64, Offsets)> = Vec::new();
     let mut at_s = 0.0;
@@ -35,7 +35,7 @@ pub(super) fn knots(waypoints: &[Waypoint]) -> (Knots, f64) {
     (through(&timed, SPACING_S, at_s), at_s)
 }
 
-/// Knots on the straight lines between places with their times, s, which grow or repeat.
+/// Knots on the straight lines between poses with their times, s, which increase or repeat.
 pub(super) fn through(timed: &[(f64, Offsets)], spacing_s: f64, duration_s: f64) -> Knots {
     Knots::new(duration_s, spacing_s, |k| {
         let at_s = k as f64 * spacing_s;

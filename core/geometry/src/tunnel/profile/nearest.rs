@@ -1,22 +1,22 @@
-//! The place of a profile that is nearest to a point.
+//! Point of a profile nearest to a given point.
 
 use super::{ARC_SLACK_RAD, Element, Profile, Shape, Yz, dot, norm, sub};
 use crate::math::{self, TAU};
 
-/// The place of the wall nearest to a point.
+/// Point of the wall nearest to a given point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Nearest {
-    /// Distance to it, m, never negative.
+    /// Distance to the wall, m, never negative.
     pub distance_m: f64,
-    /// Its arc length, m.
+    /// Arc length of the nearest point, m.
     pub arc_m: f64,
-    /// The place.
+    /// The nearest point.
     pub point: Yz,
 }
 
 impl Profile {
-    /// The place of the wall nearest to `point`, from inside or outside; exact for lines and arcs. Of places equally
-    /// near, the one that comes first along sigma.
+    /// Point of the wall nearest to `point`, from inside or outside; exact for lines and arcs. Of equally near points,
+    /// the first in order of arc length.
     ///
     /// Allocates: no.
     pub fn nearest(&self, point: Yz) -> Nearest {
@@ -62,7 +62,7 @@ mod tests {
     use super::*;
     use crate::tunnel::shapes;
 
-    /// The smallest distance to places 0.5 mm apart: never below the true one, and above it by less than 0.25 mm.
+    /// Smallest distance to wall points 0.5 mm apart: never below the true one, and above it by less than 0.25 mm.
     fn by_places(profile: &Profile, point: Yz) -> f64 {
         let places = math::round_to_i64(profile.perimeter_m() / 5e-4);
         (0..places).map(|k| norm(sub(point, profile.point_at(k as f64 * 5e-4)))).fold(f64::INFINITY, f64::min)

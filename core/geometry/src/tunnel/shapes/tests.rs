@@ -22,7 +22,7 @@ fn all() -> Vec<(&'static str, Profile)> {
     ]
 }
 
-/// Figures of the paper's tunnel as errata.md works them out.
+/// Dimensions of the paper's tunnel as derived in errata.md.
 #[test]
 fn val_ceran_has_the_errata_s_dimensions() {
     let ceran = ceran().unwrap();
@@ -49,7 +49,7 @@ fn arc_length_begins_at_the_floor_s_centre_and_grows_with_the_head_angle() {
     }
 }
 
-/// A dense polyline of the same curve knows nothing of arcs: its ranges approach ours from inside.
+/// A dense polyline of the same curve is inscribed in its arcs: its ranges approach ours from inside.
 #[test]
 fn verif_ranges_agree_with_a_dense_polyline() {
     for (name, profile) in all() {
@@ -167,7 +167,7 @@ fn repeated_and_collinear_points_and_slivers_change_nothing() {
 }
 
 proptest! {
-    /// The wall's place at any arc length is seen from the reference point at that same arc length.
+    /// The wall point at any arc length has that same arc length when seen from the reference point.
     #[test]
     fn point_at_and_sigma_of_are_inverse(which in 0usize..7, share in 0.0f64..1.0) {
         let (name, profile) = all().swap_remove(which);

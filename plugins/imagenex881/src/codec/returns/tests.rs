@@ -105,10 +105,9 @@ fn an_echo_that_looks_like_a_return_is_an_echo() {
     assert_eq!(got, [value]);
 }
 
-/// Values without 0xFC but at the end, with echoes that differ by less than a header in length, and no positions that
-/// are such a length when they stand in its place: else the front of one return and the whole of the next can make a
-/// false one that no decoder could tell from a true one.
-/// `an_echo_of_any_bytes_comes_back` has the other values.
+/// Returns with 0xFC only at the end, echo lengths that differ by less than a header, and no positions that read as such a
+/// length in its place: otherwise the front of one return and the whole of the next could form a false one that no decoder
+/// can detect. `an_echo_of_any_bytes_comes_back` covers the other values.
 fn returns(tags: &[Tag], lengths: core::ops::RangeInclusive<usize>) -> impl Strategy<Value = Return> + use<> {
     let tags = proptest::sample::select(tags.to_vec());
     let echo = (proptest::collection::vec(0u8..0xFC, MAX_ECHO_BYTES), lengths);

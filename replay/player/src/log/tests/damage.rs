@@ -1,4 +1,4 @@
-//! Damaged logs: nothing panics, all that is whole is delivered, and what is missing is said.
+//! Damaged logs: no panic, all intact messages are delivered, and losses are reported.
 
 use std::collections::BTreeSet;
 
@@ -12,7 +12,7 @@ use super::*;
 const PER_CHUNK: usize = 6;
 const CHUNKS: usize = 6;
 
-/// A log whose chunk `n` (from 0) has the log times `100 n + 1` to `100 n + 6`; with the places of the chunks.
+/// A log whose chunk `n` (from 0) has the log times `100 n + 1` to `100 n + 6`, and the positions of its chunks.
 fn log() -> (Vec<u8>, Vec<Seen>, Vec<usize>) {
     let mut log = LogWriter::new(Vec::new(), &header(true)).unwrap();
     for chunk in 0..CHUNKS as u64 {
@@ -40,7 +40,7 @@ fn without_chunk(seen: &[Seen], chunk: usize) -> Vec<Seen> {
 
 fn is_subsequence(part: &[Seen], whole: &[Seen]) -> bool {
     let mut rest = whole.iter();
-    // Which channel a message is of may be lost too, when all copies of the definitions are damaged.
+    // The channel of a message may be unknown too, when all copies of the definitions are damaged.
     part.iter().all(|message| {
         rest.any(|other| {
             (other.1, other.2, other.3, &other.4) == (message.1, message.2, message.3, &message.4)
@@ -63,7 +63,7 @@ fn a_log_cut_anywhere_gives_what_was_before_the_cut() {
     }
 }
 
-/// A log as large dives have it: long packets, results, chunks of some kilobytes.
+/// A log like that of a long dive: long packets, results, chunks of some kilobytes.
 fn long_log() -> (Vec<u8>, Vec<Seen>) {
     let mut log = LogWriter::new(Vec::new(), &header(true)).unwrap();
     for tick in 0..400_u64 {
@@ -115,7 +115,7 @@ fn thousands_of_random_changes_never_lose_anything_silently() {
     let places: Vec<u64> = words.chunks(6).map(word).collect();
     for (number, place) in places.iter().enumerate() {
         let mut changed = bytes.clone();
-        // One bit, a byte, or a block as a medium loses it; every fourth log is cut off besides.
+        // One bit, a byte, or a block as a medium loses it; every fourth log is also truncated.
         let at = usize::try_from(place % bytes.len() as u64).unwrap();
         match number % 3 {
             0 => changed[at] ^= 1 << ((place >> 40) & 7),
@@ -164,7 +164,7 @@ fn a_record_length_that_lies_costs_at_most_its_chunk() {
         let mut bytes = bytes.clone();
         bytes[places[2] + 1..places[2] + 9].copy_from_slice(&lie.to_le_bytes());
         let (got, _) = read(&bytes);
-        // The chunk says its length a second time, after which a record follows: nothing is lost.
+        // The chunk implies its length a second time, and a record follows: nothing is lost.
         assert!(got == seen, "length {lie}: {} messages", got.len());
         bytes[places[2] + 9 + 36..places[2] + 9 + 44].copy_from_slice(&(lie ^ 3).to_le_bytes());
         let (got, losses) = read(&bytes);
@@ -284,7 +284,7 @@ fn missing_are_covered(got: &[Seen], seen: &[Seen], losses: &[Loss]) {
     }
 }
 
-/// Damage is either without effect or reported, and never makes up a message.
+/// Damage either has no effect or is reported, and never produces a spurious message.
 fn check_changed(bytes: Vec<u8>, seen: &[Seen], info: &LogInfo) {
     match LogReader::new(Cursor::new(bytes), "changed".to_owned()) {
         Ok(mut reader) => {

@@ -1,4 +1,4 @@
-//! Logs by other writers, with whatever options these have.
+//! Logs by other writers, with their various options.
 
 use std::collections::BTreeSet;
 use std::process::Command;
@@ -23,7 +23,7 @@ fn messages() -> Vec<(usize, u64, u32)> {
     messages
 }
 
-/// What a reader has to make of these: by time, then raw by name, then the others by topic, then sequence.
+/// The order expected of a reader: by time, then raw by name, then the others by topic, then sequence.
 fn wanted() -> Vec<(String, u64, u32)> {
     let kinds = [("raw 1", 1), ("other", 3), ("raw 0", 0), ("sent 0", 2)];
     let mut wanted: Vec<_> =
@@ -59,7 +59,7 @@ fn check(bytes: &[u8], what: &str) -> Vec<Loss> {
     reader.losses().to_vec()
 }
 
-/// Each way to write, by name.
+/// Each set of write options, by name.
 fn all_options() -> Vec<(String, WriteOptions)> {
     let mut all = Vec::new();
     for (name, compression) in
@@ -90,7 +90,7 @@ fn every_way_to_write_is_read_in_the_same_order() {
 fn logs_that_were_never_finished_are_read() {
     for (name, options) in all_options() {
         let bytes = write(options);
-        // Without its end: the data end record is the first of those that close a log.
+        // Without the closing records, of which the data end record is the first.
         let end = places(&bytes, op::DATA_END)[0];
         let losses = check(&bytes[..end], &name);
         assert_eq!((losses.len(), &losses[0].kind), (1, &LossKind::Truncated), "{name}");
@@ -182,7 +182,7 @@ fn a_message_length_that_lies_costs_that_message_and_perhaps_the_one_before() {
         let mut bytes = bytes.clone();
         bytes[at + 1..at + 9].copy_from_slice(&u64::to_le_bytes(lie));
         let (seen, losses) = read(&bytes);
-        // Where nothing looks like a record, the length of the message before may as well be wrong.
+        // Where nothing looks like a record, the length of the previous message may as well be wrong.
         let lost = if (22..1000).contains(&lie) { 1 } else { 2 };
         assert_eq!(seen.len(), 400 - lost, "length {lie}");
         assert_eq!((losses.len(), &losses[0].kind), (1, &LossKind::Framing), "length {lie}: {losses:?}");
@@ -227,7 +227,7 @@ fn regress_whole_records_that_are_missing_are_noticed() {
         let (_, losses) = read(&without(part));
         assert!(matches!(losses[..], [Loss { kind: LossKind::Truncated, .. }]), "{losses:?}");
     }
-    // Without a summary nothing says where it would be.
+    // Without a summary its position is unknown.
     assert_eq!(read(&write(options().emit_summary_records(false))).1, []);
 }
 
@@ -259,7 +259,7 @@ fn chunks_that_lie_about_their_times_give_late_messages() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(200))]
 
-    /// Without checksums changes may go unnoticed, and another record become a message by its opcode; but nothing
+    /// Without checksums changes may go unnoticed, and another record may become a message by its opcode; but nothing
     /// panics, and nothing is read twice.
     #[test]
     fn changed_logs_are_read_to_an_end(

@@ -21,7 +21,7 @@ fn source(id: &str, plugin: &str, connect: &str) -> SourceInfo {
     SourceInfo { id: id.to_owned(), plugin: plugin.to_owned(), connect: connect.to_owned() }
 }
 
-/// A header with three sources, whose order isn't that of their names, and one result.
+/// A header with three sources not in the order of their names, and one result.
 fn header(ticks: bool) -> LogHeader {
     LogHeader {
         vehicle_toml: "target = 0.05 # Wasserschloß\n".to_owned(),
@@ -49,7 +49,7 @@ fn open(bytes: &[u8]) -> LogReader<Cursor<Vec<u8>>> {
     LogReader::new(Cursor::new(bytes.to_vec()), "test".to_owned()).unwrap()
 }
 
-/// All messages that a reader gives.
+/// All messages of a reader.
 fn read_all(reader: &mut LogReader<Cursor<Vec<u8>>>) -> Vec<Seen> {
     let mut seen = Vec::new();
     while let Some(message) = reader.next().unwrap() {
@@ -80,16 +80,16 @@ fn noise(seed: u64, len: usize) -> Vec<u8> {
     words.flat_map(|word| word.to_be_bytes().into_iter().take(3)).take(len).collect()
 }
 
-/// Place of the record after that at `at`.
+/// Position of the record after the one at `at`.
 fn record_after(bytes: &[u8], at: usize) -> usize {
     let len = u64::from_le_bytes(bytes[at + 1..at + 9].try_into().unwrap());
     at + 9 + usize::try_from(len).unwrap()
 }
 
-/// Places of the records with that opcode, in a log or a part of one.
+/// Positions of the records with that opcode, in a log or a part of one.
 fn places(bytes: &[u8], opcode: u8) -> Vec<usize> {
     let (mut at, mut places) = (8, Vec::new());
-    // What is left at the end is the closing magic bytes, or less than a record.
+    // The rest at the end is the closing magic bytes, or less than a record.
     while at + 9 <= bytes.len() - 8 {
         places.extend((bytes[at] == opcode).then_some(at));
         at = record_after(bytes, at);

@@ -1,4 +1,4 @@
-//! A recording in parts reads as one log; what is missing or foreign is named.
+//! A recording in parts reads as one log; missing and foreign parts are named.
 
 use std::path::{Path, PathBuf};
 
@@ -7,7 +7,7 @@ use headrace_geometry::time::DurNs;
 use super::super::{DiveLog, Every, LogError, LogWriter, Recorder, Rotation, files_of, part_path, recover};
 use super::*;
 
-/// A folder that goes away with the test.
+/// A folder that is removed with the test.
 struct Folder(PathBuf);
 
 impl Folder {
@@ -88,7 +88,7 @@ fn parts_hold_what_one_file_does() {
         let paths: Vec<PathBuf> = summary.parts.iter().map(|part| part.path.clone()).collect();
         assert_eq!(paths, (1..=parts).map(|number| folder.part(number)).collect::<Vec<_>>(), "{name}");
         assert_eq!(folder.files(), paths);
-        // By the recording's own name, and in any order.
+        // By the recording's name, and in any order.
         assert_eq!(files_of(&[folder.0.join("dive.mcap")]).unwrap(), paths);
         let backwards: Vec<PathBuf> = paths.iter().rev().cloned().collect();
         for files in [&paths, &backwards] {
@@ -105,7 +105,7 @@ fn parts_hold_what_one_file_does() {
             assert!(ended.iter().all(|path| (bytes..bytes + 10_000).contains(&len(path))));
         }
         for path in &paths {
-            // Each has everything that a log has, and no tick is divided.
+            // Each is a complete log, and no tick is split.
             let (seen, losses) = read(&std::fs::read(path).unwrap());
             assert_eq!((seen[0].0.as_str(), losses), ("raw 0", vec![]));
             let info = LogReader::open(path).unwrap();
@@ -139,7 +139,7 @@ fn a_part_that_is_missing_or_not_the_one_recorded_is_named() {
     );
     assert_eq!(said(&[4]), ["parts 1 to 3 of the recording are missing (before 31.000 s)"]);
 
-    // Another log in its place, which calls itself the same part.
+    // Another log in its place, with the same part number.
     let other = Folder::new("unlike");
     let mut header = LogReader::open(&files[1]).unwrap().header().clone();
     let part = header.part.take().unwrap();
@@ -171,7 +171,7 @@ fn parts_of_two_recordings_and_one_twice_are_refused() {
     let single = other.0.join("single.mcap");
     record(&single, None);
     assert!(matches!(open(&[one.part(1), single]), LogError::NotAPart { .. }));
-    // Nor does a recording go over another's parts.
+    // Nor does a recording overwrite another's parts.
     let again = Recorder::create_in_parts(&one.0.join("dive.mcap"), &header(true), &rotation(every), 0, None);
     assert!(matches!(again.err().unwrap(), LogError::Create { path, .. } if path == one.part(1)));
 }
@@ -181,7 +181,7 @@ fn damaged_parts_cost_what_is_damaged_and_become_one_log_again() {
     let folder = Folder::new("damaged");
     record(&folder.0.join("dive.mcap"), Some(&rotation(Every::Span(DurNs::from_millis(10_000)))));
     let whole = all(&mut DiveLog::open(&folder.files()).unwrap());
-    // As a power cut leaves the last ones: one isn't ended, and the next has no byte yet.
+    // Last parts after a power cut: one isn't ended, and the next is still empty.
     let third = std::fs::read(folder.part(3)).unwrap();
     std::fs::write(folder.part(3), &third[..third.len() * 2 / 3]).unwrap();
     std::fs::write(folder.part(4), []).unwrap();
@@ -205,7 +205,7 @@ fn damaged_parts_cost_what_is_damaged_and_become_one_log_again() {
 #[test]
 fn a_part_that_cannot_be_made_costs_the_rotation_alone() {
     let folder = Folder::new("refused");
-    // Where the second part is to be there is a folder, made once the recording has begun.
+    // A folder, created after the start of the recording, blocks the path of the second part.
     let (mut port, handle) = Recorder::create_in_parts(
         &folder.0.join("dive.mcap"),
         &header(true),

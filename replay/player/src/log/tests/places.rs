@@ -1,4 +1,4 @@
-//! Reading on from an earlier position of a damaged log gives the messages and losses of a log read straight through.
+//! Resuming from an earlier position of a damaged log gives the messages and losses of a log read straight through.
 
 use mcap::WriteOptions;
 use mcap::records::{MessageHeader, op};
@@ -25,7 +25,7 @@ fn by_ticks() -> Vec<u8> {
     log.finish().unwrap().0
 }
 
-/// Somebody else's log, whose chunks overlap in time.
+/// A log of another writer, whose chunks overlap in time.
 fn by_times() -> Vec<u8> {
     let mut writer =
         WriteOptions::new().chunk_size(Some(300)).compression(None).create(Cursor::new(Vec::new())).unwrap();
@@ -40,7 +40,7 @@ fn by_times() -> Vec<u8> {
     writer.into_inner().into_inner()
 }
 
-/// Where records of chunks begin, and their first fields: times, lengths, checksum.
+/// Positions of chunk records, and their first fields: times, lengths, checksum.
 fn heads(bytes: &[u8]) -> Vec<usize> {
     places(bytes, op::CHUNK).into_iter().flat_map(|at| at..at + 45).collect()
 }
@@ -56,7 +56,7 @@ fn damaged(mut bytes: Vec<u8>, changes: &[(bool, prop::sample::Index, u8)]) -> V
 
 type Reader = LogReader<Cursor<Vec<u8>>>;
 
-/// So many messages, or all that are left.
+/// `count` messages, or all that are left.
 fn take(reader: &mut Reader, count: usize) -> Vec<(u64, Vec<u8>)> {
     let mut seen = Vec::new();
     while seen.len() < count
@@ -67,8 +67,8 @@ fn take(reader: &mut Reader, count: usize) -> Vec<(u64, Vec<u8>)> {
     seen
 }
 
-/// Reads on from the position after `first` messages, by a reader that has read `further` ones since and by one that hasn't
-/// read any.
+/// Resumes from the position after `first` messages, with a reader that has read `further` ones since and with a new
+/// one.
 fn check(bytes: &[u8], first: usize, further: usize) -> Result<(), TestCaseError> {
     let mut straight = open(bytes);
     let all = take(&mut straight, usize::MAX);
@@ -101,7 +101,7 @@ proptest! {
     }
 }
 
-/// Two chunks side by side, the first of which lies about its times and is damaged: they date each other's loss.
+/// Two adjacent chunks, the first with wrong times and damaged: the time span of each loss depends on the other chunk.
 #[test]
 fn times_of_damaged_chunks_are_as_they_were() {
     for (whole, changed) in [(by_ticks(), 2), (by_times(), 4)] {

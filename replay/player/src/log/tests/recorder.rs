@@ -1,4 +1,4 @@
-//! The recorder's thread, its queue, and what becomes of errors.
+//! The recorder's thread, its queue, and its handling of errors.
 
 use std::io::Write;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -9,7 +9,7 @@ use super::super::space::Space;
 use super::super::{DerivedChannels, LogError, LossKind, Made, Recorder, RecorderPort};
 use super::*;
 
-/// A medium that takes its time, and says when something has been flushed to it.
+/// A slow medium that reports when something has been flushed to it.
 struct SlowMedium {
     bytes: Vec<u8>,
     nap: Duration,
@@ -25,7 +25,7 @@ impl Write for SlowMedium {
     }
 
     fn flush(&mut self) -> std::io::Result<()> {
-        // Nobody may be listening any more.
+        // The receiver may be gone.
         self.done.try_send(self.bytes.clone()).ok();
         Ok(())
     }
@@ -106,7 +106,7 @@ fn a_dropped_handle_completes_the_file() {
     assert_eq!((seen.len(), losses), (1, vec![]));
 }
 
-/// A medium with room for so many bytes.
+/// A medium with limited room.
 struct SmallMedium(Arc<AtomicUsize>);
 
 impl Write for SmallMedium {
@@ -182,12 +182,12 @@ fn a_disk_that_fills_keeps_what_is_small_and_says_what_it_left_out() {
         ..ResultChannel::default()
     });
     let space = Space::new(|| Some(5_000_000));
-    // A velocity log's lines are as long as echoes, and are none.
+    // A velocity log's lines are as long as echoes, but aren't echoes.
     header.sonars = vec![0];
     let (mut port, handle) = Recorder::start_within(space, medium, &header, 0, None).unwrap();
     for tick in 1..=100_u64 {
         let at = MonoNs(tick * 1_000_000_000);
-        // The queue holds all of this.
+        // All of this fits in the queue.
         port.raw(0, at, at, &noise(tick, 265)).unwrap();
         port.raw(2, at, at, &noise(tick, 140)).unwrap();
         port.tick(tick, at, &[0, 2]).unwrap();
@@ -219,7 +219,7 @@ fn what_there_was_no_room_for_is_counted() {
     let (medium, _flushed) = slow(0);
     let (mut port, handle) = Recorder::start(medium, &header(true), 0).unwrap();
     let sent = handle.sent_port();
-    // Faster than any thread empties it: 2,048 of them have room.
+    // Faster than any thread empties it: the queue holds 2,048.
     for number in 0..1_000_000_u64 {
         sent.sent(1, MonoNs(number), b"poll");
         if sent.dropped() > 0 {
@@ -233,7 +233,7 @@ fn what_there_was_no_room_for_is_counted() {
     assert_eq!((summary.sent_dropped, summary.results_missing), (dropped, 1));
 }
 
-/// Makes a message of each result but those of the last channel, for channels that are there and one that isn't.
+/// Derives a message from each result except the last channel's, for existing channels and for one that doesn't exist.
 struct Echoing;
 
 impl DerivedChannels for Echoing {

@@ -1,4 +1,4 @@
-//! A recovered log: all that reads, in order, and what is missing in its own words.
+//! A recovered log: all readable messages in order, and the stated losses.
 
 use mcap::records::op;
 
@@ -30,7 +30,7 @@ fn log(ticks: bool) -> Vec<u8> {
     log.finish().unwrap().0
 }
 
-/// Messages without their numbers, which begin anew.
+/// Messages without their numbers, which restart.
 fn unnumbered(seen: Vec<Seen>) -> Vec<Seen> {
     seen.into_iter().map(|message| (message.0, message.1, message.2, 0, message.4)).collect()
 }
@@ -72,7 +72,7 @@ fn a_damaged_log_is_recovered_with_its_losses() {
         "{text:?}"
     );
     assert!(text.iter().all(|text| !text.starts_with("byte ")), "{text:?}");
-    // Recovered again, it says the same.
+    // Recovering again gives the same.
     let (again, done) = recovered(&output);
     assert_eq!(done.losses.iter().map(ToString::to_string).collect::<Vec<_>>(), text);
     assert_eq!(read(&again).0, read(&output).0);

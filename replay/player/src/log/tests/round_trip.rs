@@ -1,4 +1,4 @@
-//! What was written is read.
+//! Written messages are read back.
 
 use std::io::Write;
 
@@ -6,7 +6,7 @@ use super::super::format::{Tick, seal};
 use super::super::{LogError, LogReader, LogWriter, file_digest};
 use super::*;
 
-/// Ticks that consume packets out of the order of their times, with results and sent bytes between.
+/// Ticks that consume packets out of time order, with results and sent bytes between.
 fn write<W: Write>(log: &mut LogWriter<W>, rounds: u32) -> Vec<Seen> {
     let mut written = Vec::new();
     for number in 0..rounds {

@@ -4,17 +4,17 @@ use headrace_geometry::math;
 
 /// Strengths over bins of equal width, centred on its multiples.
 ///
-/// This is how we read "we use bilinear interpolation of range values of the 881L sensor to determine where the tunnel
-/// surface is": the head's picture is a grid of angle and range; an echo between grid points belongs to those next to it
-/// in proportion to its distance from them, in angle (the beam's strength, which falls off linearly from its middle) as
-/// in range; and the surface is on the ridge of the picture. Where the beam is oblique to the wall its echo is long,
-/// and the ridge wide and low, as the paper found next to the corners.
+/// This is our reading of "we use bilinear interpolation of range values of the 881L sensor to determine where the tunnel
+/// surface is": the head's picture is a grid of angle and range; an echo between grid points is shared linearly
+/// among its neighbours, in angle (beam strength, which falls off linearly from the axis) as in range; and the surface
+/// is the ridge of the picture. Where the beam is oblique to the wall its echo is long, and the ridge wide and low, as
+/// the paper found next to the corners.
 /// Source: Jorge et al. 2021, §9.2.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Bins {
     width_m: f64,
     strengths: Vec<f64>,
-    /// The first bin with an echo in it, and the one after the last.
+    /// First bin with an echo, and one past the last.
     filled: (usize, usize),
 }
 
@@ -24,7 +24,7 @@ impl Bins {
         Self { width_m, strengths: Vec::new(), filled: (usize::MAX, 0) }
     }
 
-    /// Adds an echo: shared linearly between the two bins next to `range_m`.
+    /// Adds an echo, shared linearly between the two bins nearest to `range_m`.
     pub(super) fn add(&mut self, range_m: f64, strength: f64) {
         let at = range_m / self.width_m;
         let Ok(below) = usize::try_from(math::floor_to_i64(at)) else { return };
@@ -38,8 +38,8 @@ impl Bins {
         self.filled = (self.filled.0.min(below), self.filled.1.max(below + 2));
     }
 
-    /// Where the echo is strongest, m: the centroid of the strongest bin and its two neighbours, the nearest where some
-    /// are equal. Empties the bins; `None` where they are.
+    /// Range of the strongest echo, m: centroid of the strongest bin (the nearest of equal ones) and its two neighbours.
+    /// Empties the bins; `None` if they are empty.
     pub(super) fn take_surface_m(&mut self) -> Option<f64> {
         let (from, to) = std::mem::replace(&mut self.filled, (usize::MAX, 0));
         let filled = self.strengths.get_mut(from..to)?;

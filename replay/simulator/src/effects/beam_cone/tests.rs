@@ -56,7 +56,7 @@ fn the_mean_is_that_over_the_cone_s_disc() {
         let ranges_m = cone.hits(&tunnel, &ray, 100.0).flatten().map(|hit| hit.range_m);
         mean(ranges_m).unwrap()
     };
-    // Rays even in the square of their angle x from the middle: the mean of h / cos x.
+    // Rays even in the square of their angle x from the axis: the mean of h / cos x.
     let count = 10_000;
     let ring = |k: i32| 3.0 / math::cos(half_rad * math::sqrt((f64::from(k) + 0.5) / f64::from(count)));
     let whole_m = (0..count).map(ring).sum::<f64>() / f64::from(count);

@@ -1,4 +1,4 @@
-//! A head's pings as others hear them.
+//! A head's pings as heard by others.
 
 use headrace_geometry::frames::{Point3, Tunnel, Vec3};
 use headrace_geometry::math;
@@ -8,19 +8,19 @@ use crate::effects::geometry::{between_rad, dot};
 use crate::environment::Environment;
 use crate::sensing::Ray;
 
-/// Directions nearer than this are the same, radians.
+/// Directions that differ by less than this are equal, radians.
 const SAME_RAD: f64 = 1e-9;
-/// The most pings that are foreseen.
+/// Most pings that are extrapolated.
 const MOST_FORESEEN: u32 = 16;
 
-/// A ping: when, from where, which way, and the place of the wall that it meets.
+/// A ping: time, origin, direction, and the point where it meets the wall.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Ping {
     pub(super) at: MonoNs,
     pub(super) origin: Point3<Tunnel>,
     pub(super) direction: Vec3<Tunnel>,
     pub(super) wall: Option<Point3<Tunnel>>,
-    /// Whether it is only foreseen, and its wall not known yet.
+    /// Whether it is extrapolated, with `wall` not computed yet.
     foreseen: bool,
 }
 
@@ -29,13 +29,13 @@ pub(super) struct Ping {
 pub(super) struct Pings(Vec<Ping>);
 
 impl Ping {
-    /// A ping along a ray; one that is stopped by the vehicle itself gets to no wall.
+    /// A ping along a ray; one stopped by the vehicle itself reaches no wall.
     pub(super) fn new(at: MonoNs, ray: &Ray, stopped: bool) -> Self {
         let wall = ray.hit.filter(|_| !stopped).map(|hit| hit.point);
         Self { at, origin: ray.origin, direction: ray.direction, wall, foreseen: false }
     }
 
-    /// The same with its wall.
+    /// Computes the wall point of an extrapolated ping.
     pub(super) fn seen(self, environment: &Environment, far_m: f64) -> Self {
         if !self.foreseen {
             return self;
@@ -44,8 +44,7 @@ impl Ping {
         Self { wall, foreseen: false, ..self }
     }
 
-    /// The `count`-th ping after this one, which came after `before`, if all goes on so: as much later each, and turned
-    /// by as much in the same plane.
+    /// Extrapolates to the `count`-th ping after this one, with the same interval and rotation as from `before` to this one.
     fn foreseen(&self, before: &Self, count: u32) -> Self {
         let period = self.at.since(before.at);
         let step_rad = between_rad(before.direction, self.direction);
@@ -64,7 +63,7 @@ impl Ping {
 }
 
 impl Pings {
-    /// Forgets pings that can't be heard any more `rings_s` before `from`; the last two stay, to foresee others by.
+    /// Drops pings more than `rings_s` before `from`; the last two stay for extrapolation.
     pub(super) fn forget(&mut self, from: MonoNs, rings_s: f64) {
         let old = |ping: &Ping| from.since(ping.at).as_secs_f64() > rings_s;
         let gone = self.0.partition_point(old).min(self.0.len().saturating_sub(2));
@@ -76,8 +75,8 @@ impl Pings {
         self.0.push(ping);
     }
 
-    /// Those from `earliest_s` to `latest_s` after a moment: up to it as they were, later ones as those before it say, so
-    /// that it doesn't matter which of them have been made.
+    /// Pings from `earliest_s` to `latest_s` after `at`: up to `at` as simulated, later ones extrapolated, so that the result
+    /// doesn't depend on how far the simulation has run.
     pub(super) fn around(
         &self,
         at: MonoNs,
@@ -124,7 +123,7 @@ mod tests {
             assert_eq!(foreseen.at, made.at);
             assert!((foreseen.direction + -made.direction).norm() < 1e-12);
         }
-        // The same whatever has been made since.
+        // The same result without the pings after `at`.
         let short = Pings(pings.0[..51].to_vec());
         assert!(short.around(at, -0.05, 0.05).eq(pings.around(at, -0.05, 0.05)));
     }

@@ -8,7 +8,7 @@ use crate::testing::Dive;
 
 const SOUND_MPS: f64 = 1500.0;
 
-/// Two heads at one side each of a box of a vehicle, in the same water as they reckon by.
+/// Two heads, one at each side of a box-shaped vehicle; the true speed of sound is that of the vehicle file.
 fn pair() -> Dive {
     let mut dive = Dive::with_heads(&[[0.0, 0.4, 0.0], [0.0, -0.4, 0.0]]);
     dive.vehicle = "[water]\nsound_speed_mps = 1500\n[heads]\nlayout = \"phase_shift\"";
@@ -69,7 +69,7 @@ fn the_way_by_the_wall_and_the_straight_way_take_their_time() {
         ear.hear(1, &sounds);
         ear.heard.then_some(ear.within_m[1])
     };
-    // Both look at the middle of the floor, 0.4 m beside either: the same way for both, heard at once if sent earlier.
+    // Both look at the middle of the floor, 0.4 m beside either: the same path length for both, heard at once if sent earlier.
     let inwards = math::atan2(0.4, 2.5);
     let way_m = 2.0 * math::hypot(0.4, 2.5);
     assert_eq!(heard(-inwards, inwards, 0.0), None);
@@ -79,7 +79,7 @@ fn the_way_by_the_wall_and_the_straight_way_take_their_time() {
     }
     // Earlier than that, it comes before the own ping, or within its least range.
     assert_eq!(heard(-inwards, inwards, -3.4), None);
-    // Another place of the wall isn't within the beam.
+    // Another point of the wall isn't within the beam.
     assert_eq!(heard(-inwards, inwards + 0.1, -1.0), None);
     // Face to face: 0.8 m apart, heard 0.4 m away if both ping at once.
     let (right, left) = (1.5 * math::PI, math::FRAC_PI_2);
@@ -105,7 +105,7 @@ fn heads_that_ping_together_hear_each_other_when_they_face() {
         let faces =
             off(angle_rad, 1.5 * math::PI) <= half_rad && off(others[number], math::FRAC_PI_2) <= half_rad;
         if faces {
-            // The heads' pictures may be a ping's way apart.
+            // The heads' pictures may differ by the motion between two pings.
             assert!((range_m.unwrap() - 0.4).abs() < 1e-4, "{range_m:?}");
             heard += 1;
         } else {

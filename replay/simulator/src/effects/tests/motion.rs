@@ -50,7 +50,7 @@ fn row(at: u64, values: &[f64]) -> [f64; 9] {
     row
 }
 
-/// An effect on one sensor draws the same whether effects on others are named or not, and so do sensors without any.
+/// Draws of an effect on one sensor don't depend on effects on others, nor do measurements of sensors without any.
 #[test]
 fn naming_an_effect_changes_nothing_for_other_sensors() {
     for (sensor, alone) in ALONE.iter().filter(|(sensor, _)| !sensor.is_empty()) {

@@ -1,4 +1,4 @@
-//! Effects together, and what they cost.
+//! Effects combined, and their cost.
 
 use crate::testing::{Dive, Dived};
 use crate::truth::TruthRow;
@@ -21,7 +21,7 @@ fn pair() -> Dive {
     Dive::with_heads(&[[0.0, 0.4, 0.0], [0.0, -0.4, 0.0]])
 }
 
-/// How an effect, by its place among those of a scene, changed each measurement.
+/// Changes of each measurement by an effect, given by its index among those of a scene.
 fn changes(dived: &Dived, effect: u16) -> Vec<Option<(f64, f64)>> {
     let of = |row: &TruthRow| {
         let cause = row.causes.iter().find(|cause| cause.effect == effect)?;
@@ -42,7 +42,7 @@ fn naming_an_effect_changes_no_other_s_draws() {
     for effects in [EFFECTS[0], EFFECTS[2], EFFECTS[3], EFFECTS[4]] {
         assert!(alone == outliers(effects, 1), "{effects}");
     }
-    // Named in the other order, they still run in their own.
+    // Named in the other order, they still run in the fixed order.
     let (a, b) = (EFFECTS[8], EFFECTS[7]);
     assert_eq!(dive.dive(&format!("{a}{b}")).messages, dive.dive(&format!("{b}{a}")).messages);
 }
@@ -54,7 +54,7 @@ fn another_head_changes_no_draw_of_the_first() {
         let ranges_m = dive.dive(&effects).ranges_m(0);
         ranges_m.into_iter().map(|range_m| range_m.map(f64::to_bits)).collect::<Vec<_>>()
     };
-    // Without a speed that phases are set for, the first head's program is the same.
+    // Without a speed for the phases, the first head's program is the same.
     let one = Dive::with_heads(&[[0.0, 0.4, 0.0]]);
     assert_eq!(bits(&one), bits(&pair()));
 }

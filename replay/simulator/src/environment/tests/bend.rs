@@ -1,4 +1,4 @@
-//! The axis: places, headings and the way back.
+//! The axis: points, headings and the inverse.
 
 use super::*;
 

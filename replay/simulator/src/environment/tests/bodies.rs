@@ -1,4 +1,4 @@
-//! Features: against another account of them, against closed forms, and the index against all of them.
+//! Features: against an independent model of them, against closed forms, and the index against a full search.
 
 use super::oracle::{Oracle, Shape, ellipsoid, upright};
 use super::*;

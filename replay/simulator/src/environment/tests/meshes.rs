@@ -6,14 +6,14 @@ use super::*;
 
 const RADIUS_M: f64 = 3.0;
 const SIDES: u32 = 240;
-/// By how much a side of the polygon lies within its circle, for each metre of radius.
+/// Sagitta of the polygon's sides within its circle, per metre of radius.
 const SAGITTA: f64 = 8.6e-5;
 
 fn circle() -> Profile {
     shapes::circle(RADIUS_M).unwrap()
 }
 
-/// A prism about the circle's axis as PLY, from x = 0 to `length_m` in `rings`; without the faces told by number.
+/// A prism about the circle's axis as PLY, from x = 0 to `length_m` in `rings`; omits the faces of the given numbers.
 fn tube(radius_m: f64, length_m: f64, rings: u32, without: &[u32]) -> String {
     let (mut vertices, mut faces, mut count) = (String::new(), String::new(), 0);
     for ring in 0..=rings {
@@ -64,12 +64,12 @@ fn wall(file: &str) -> Environment {
     with(&table("file = \"t.ply\"\nrole = \"wall\"\nchainage_m = 40"), &[("t.ply", file)]).unwrap()
 }
 
-/// As [`super::cast`], to where it ends however far.
+/// As [`super::cast`], to its end at any distance.
 fn cast(environment: &Environment, origin: V3, direction: V3) -> Option<Hit> {
     environment.cast(to_point(origin), to_vec(direction), FARTHEST_M)
 }
 
-/// Range to the circle of this radius about the tunnel's middle, from within.
+/// Range to the circle of this radius about the tunnel's axis, from inside.
 fn to_circle(radius_m: f64, origin: V3, direction: V3) -> f64 {
     let [_, dy, dz] = direction;
     let (y, z) = (origin[1], origin[2] - RADIUS_M);
@@ -132,7 +132,7 @@ fn a_mesh_of_the_profile_gives_the_ranges_of_the_profile() {
 fn no_ray_gets_out_where_mesh_and_profile_do_not_fit() {
     for (radius_m, seed) in [(4.0, 61), (2.0, 62)] {
         let environment = wall(&tube(radius_m, 10.0, 2, &[]));
-        // Between the polygon's inner circle and its outer one a place may be either.
+        // Between the polygon's inner circle and its outer one a point may be either.
         let is_within = |p: V3, share: f64| {
             let radius_m = if (40.0..=50.0).contains(&p[0]) { radius_m * share } else { RADIUS_M };
             math::hypot(p[1], p[2] - RADIUS_M) < radius_m
@@ -219,7 +219,7 @@ fn a_box_of_triangles_is_a_box() {
     let hit = cast(&straight, [17.0, 0.4, 1.4], [1.0, 0.0, 0.0]).unwrap();
     assert!((hit.range_m - 2.5).abs() < 1e-12 && (hit.normal.x() + 1.0).abs() < 1e-12, "{hit:?}");
     assert_eq!((hit.what, straight.feature_name(0)), (What::Feature(0), "car"));
-    // From inside there is nothing to see.
+    // From inside a body nothing is hit.
     assert!(cast(&straight, [20.1, 0.5, 1.5], [1.0, 0.0, 0.0]).is_none());
     assert!(!straight.is_water(to_point([20.4, 0.5, 1.5])));
     assert!(straight.is_water(to_point([20.6, 0.5, 1.5])));

@@ -1,13 +1,13 @@
-//! Another account of the same environment: whether a place is water, and rays by small steps.
+//! An independent model of the same environment: a test of points for water, and rays by small steps.
 
 use super::*;
 
 /// Steps along a ray, m.
 const STEP_M: f64 = 2e-3;
-/// How far rays are followed, m.
+/// Length over which rays are followed, m.
 pub(super) const FAR_M: f64 = 20.0;
 
-/// A profile whose wall is known in closed form.
+/// A profile whose wall has a closed form.
 #[derive(Clone, Copy)]
 pub(super) enum Shape {
     Circle(f64),
@@ -15,7 +15,7 @@ pub(super) enum Shape {
     Trimmed(f64, f64),
 }
 
-/// A place in the tunnel's frame and in the axis's chart.
+/// Test of a point, given in the tunnel's frame and in the axis's chart.
 pub(super) type Test = Box<dyn Fn(V3, V3) -> bool>;
 
 pub(super) struct Oracle {
@@ -23,7 +23,7 @@ pub(super) struct Oracle {
     /// Length and signed curvature of the axis's pieces.
     pub(super) axis: Vec<(f64, f64)>,
     pub(super) stations: Vec<(f64, f64)>,
-    /// Chainage, length, sigma, width, depth.
+    /// Chainage, length, arc length, width, depth.
     pub(super) bulges: Vec<[f64; 5]>,
     pub(super) hollows: Vec<Test>,
     pub(super) solids: Vec<Test>,
@@ -98,7 +98,7 @@ impl Oracle {
         }
     }
 
-    /// Place and heading of the axis, piece after piece.
+    /// Point and heading of the axis, piece after piece.
     pub(super) fn station(&self, s: f64) -> ([f64; 2], f64) {
         let (mut at, mut heading, mut rest) = ([0.0, 0.0], 0.0, s);
         for (length, curvature) in &self.axis {
@@ -106,7 +106,7 @@ impl Oracle {
                 break;
             }
             let part = rest.min(*length);
-            // The chord of an arc: as long as its sine says, half way turned.
+            // The chord of an arc: its length by the half angle's sine, its direction half turned.
             let half = curvature * part / 2.0;
             let chord = if half == 0.0 { part } else { 2.0 * math::sin(half) / curvature };
             at[0] += chord * math::cos(heading + half);
@@ -138,7 +138,7 @@ impl Oracle {
         [s, (p[1] - at[1]) * math::cos(heading) - (p[0] - at[0]) * math::sin(heading), p[2]]
     }
 
-    /// Chart of a place that may be anywhere.
+    /// Chart of any point, without a guess.
     pub(super) fn search(&self, p: V3) -> V3 {
         let distance = |s: &f64| {
             let (at, _) = self.station(*s);
@@ -181,7 +181,7 @@ impl Oracle {
             && !self.solids.iter().any(|test| test(p, chart))
     }
 
-    /// First place along the ray that isn't water, from `from` on by steps.
+    /// First point along the ray that isn't water, from `from` on by steps.
     pub(super) fn range(&self, ray: &Ray, from: f64, far: f64, step: f64) -> Option<f64> {
         let mut chart = self.search(ray.at(from));
         let mut t = from;
@@ -189,7 +189,7 @@ impl Oracle {
             let next = t + step;
             let p = ray.at(next);
             chart = self.chart(p, chart[0]);
-            // Far off the axis, the nearest place of it may jump.
+            // Far off the axis, the nearest axis point may jump.
             if chart[1].abs() > 8.0 && !self.axis.is_empty() {
                 chart = self.search(p);
             }
@@ -207,10 +207,10 @@ impl Oracle {
         None
     }
 
-    /// Holds thousands of rays against this; gives how many met the features, by number.
+    /// Compares thousands of rays with this model; returns the number that met each feature.
     ///
-    /// Two exceptions: steps of 2 mm may miss what a ray grazes, and then smaller ones must find it; and a graze of less than
-    /// the least step of the environment may be missed there.
+    /// Two exceptions: steps of 2 mm may miss an object that a ray grazes, which smaller steps must then find; and a graze
+    /// shorter than the environment's least step may be missed there.
     pub(super) fn compare(
         &self,
         environment: &Environment,
@@ -281,7 +281,7 @@ impl Oracle {
     }
 }
 
-/// An upright box about a place of a straight tunnel.
+/// An upright box about a point of a straight tunnel.
 pub(super) fn upright(least: V3, most: V3) -> Test {
     Box::new(move |p, _| (0..3).all(|k| (least[k]..=most[k]).contains(&p[k])))
 }

@@ -1,4 +1,4 @@
-//! What is refused, and that the error says where.
+//! Refused scenes, and the location given in the error.
 
 use super::*;
 

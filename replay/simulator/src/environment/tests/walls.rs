@@ -1,4 +1,4 @@
-//! The wall: as designed, of another size, displaced, in bends, and all of it together.
+//! The wall: as designed, scaled, displaced, in bends, and all combined.
 
 use super::oracle::{Oracle, Shape};
 use super::*;
