@@ -1,9 +1,10 @@
-//! Covering and holes beside others, on the same samples in the same process, and the memory that samples take. Prints
-//! Markdown.
+//! Covering samples and finding holes, compared with other methods on the same samples in the same process, and the memory
+//! that samples take. Prints Markdown.
 //!
-//! `cargo bench -p headrace_benches --bench coverage` takes about a minute; `-- FAST` runs one mode alone, `-- memory` no mode. Absolute times drift on shared machines; the ratios hold.
-//! kiddo's tree and the hash map answer for places alone: a grid of them gives D to some centimetres, where ours and
-//! the triangulation are exact. kiddo before version 6 panicked where more than 32 samples share a coordinate; ideal
+//! `cargo bench -p headrace_benches --bench coverage` takes about a minute; `-- FAST` runs one mode alone, `-- memory` no
+//! mode. Absolute times drift on shared machines; the ratios hold.
+//! kiddo's tree and the hash map answer only for given points: on a grid of them D is accurate to some centimetres, where
+//! ours and the triangulation are exact. kiddo before version 6 panicked if more than 32 samples share a coordinate; ideal
 //! heads lay no more than a few.
 
 #![expect(clippy::disallowed_methods, reason = "a benchmark reads the clock")]
@@ -26,7 +27,7 @@ const ROUNDS: usize = 5;
 const SECTION_M: f64 = 0.25;
 const SECTIONS: usize = 40;
 const LENGTH_M: f64 = 24.0;
-/// Places of a section at which kiddo and the hash map are asked, m apart.
+/// Spacing of the points of a section at which kiddo and the hash map are queried, m.
 const GRID_M: f64 = 0.05;
 
 fn main() {
@@ -55,7 +56,7 @@ fn main() {
     memory();
 }
 
-/// Samples of ideal heads together at the circle's centre, in the order in which they fall.
+/// Samples of ideal heads, all at the circle's centre, in order of time.
 fn helix(steps: u32, turn_s: f64, heads: u32) -> Vec<WallSample> {
     let profile = shapes::ceran().unwrap();
     let per_ping_m = SPEED_MPS * turn_s / f64::from(steps);
@@ -127,7 +128,7 @@ fn covering(what: &str, samples: &[WallSample]) {
     );
 }
 
-/// Each way to the holes of all sections; times are a sample of those sections.
+/// The holes of all sections by each method; times are per sample in those sections.
 fn holes(what: &str, samples: &[WallSample]) {
     let store = covered(samples);
     let sections = || (0..SECTIONS).map(|k| 7.0 + SECTION_M * k as f64);
@@ -142,12 +143,12 @@ fn holes(what: &str, samples: &[WallSample]) {
     let (to_a_centimetre, _) =
         best(|| sections().map(|x| tolerant.largest(&store, x, x + SECTION_M).most_m).sum::<f64>());
     row(&what, per_sample(ours), "ours, to 1 cm", per_sample(to_a_centimetre));
-    // The others are told how far they need to look.
+    // The other methods are given their search radius.
     let reach_m = exact.iter().copied().fold(0.0, f64::max) / 2.0 + 0.05;
     let around = |x: f64| {
         let window = (x - reach_m)..(x + SECTION_M + reach_m);
         let near = samples.iter().filter(move |s| window.contains(&s.x_m));
-        // Images beyond the seam.
+        // Images across the seam.
         near.flat_map(move |s| [-perimeter_m(), 0.0, perimeter_m()].map(|turn| [s.x_m, s.arc_m + turn]))
             .filter(move |s| s[1] > -reach_m - 0.1 && s[1] < perimeter_m() + reach_m + 0.1)
             .collect::<Vec<_>>()
@@ -176,7 +177,7 @@ fn holes(what: &str, samples: &[WallSample]) {
     );
 }
 
-/// Corners of the Voronoi diagram in a section, and where its edges cross the section's ends.
+/// Largest hole by the corners of the Voronoi diagram in a section, and the crossings of its edges with the section's ends.
 fn by_triangulation(from_m: f64, near: &[[f64; 2]]) -> f64 {
     let points = near.iter().map(|[x, sigma]| Point2::new(*x, *sigma)).collect();
     let triangulation = DelaunayTriangulation::<Point2<f64>>::bulk_load(points).unwrap();
@@ -205,7 +206,7 @@ fn by_triangulation(from_m: f64, near: &[[f64; 2]]) -> f64 {
     2.0 * math::sqrt(largest2)
 }
 
-/// Places of a section, on a grid.
+/// Points of a section, on a grid.
 fn places(from_m: f64) -> impl Iterator<Item = [f64; 2]> {
     let columns = math::floor_to_i64(perimeter_m() / GRID_M);
     let rows = math::round_to_i64(SECTION_M / GRID_M);
@@ -230,7 +231,7 @@ fn by_hash_map(from_m: f64, near: &[[f64; 2]]) -> f64 {
         let [row, column] = cell_of(&place);
         let mut best2 = f64::INFINITY;
         for ring in 0_i64.. {
-            // What lies in a ring of cells is no nearer than the rings within it are wide.
+            // Cells of a ring are no nearer than the width of the rings within it.
             let inner_m = (ring - 1) as f64 * CELL_M;
             if ring > 0 && inner_m > 0.0 && inner_m * inner_m > best2 {
                 break;
@@ -250,7 +251,7 @@ fn by_hash_map(from_m: f64, near: &[[f64; 2]]) -> f64 {
     2.0 * math::sqrt(places(from_m).map(nearest2).fold(0.0, f64::max))
 }
 
-/// Bytes that the system has mapped for this process.
+/// Resident memory of this process, bytes.
 fn resident() -> f64 {
     let pages = std::fs::read_to_string("/proc/self/statm").unwrap_or_default();
     pages.split(' ').nth(1).and_then(|pages| pages.parse::<f64>().ok()).unwrap_or(f64::NAN) * 4096.0

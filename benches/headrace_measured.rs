@@ -1,4 +1,4 @@
-//! The program whose replays are measured: this package's own build of it.
+//! The program whose replays are timed: this package's own build of it.
 
 use std::process::ExitCode;
 

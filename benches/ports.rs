@@ -1,9 +1,10 @@
-//! How long bytes take from the device's end of a port to the loop's ring, and what serving ports costs, each figure beside
+//! Delay of bytes from the device's end of a port to the loop's ring, and the cost of serving ports, each figure compared with
 //! a bare read loop on another port of the same kind in the same run. Prints Markdown.
 //!
-//! `cargo bench -p headrace_benches --bench ports` takes about two minutes; `-- 20` measures for twenty seconds a part, `-- latency` and `-- cpu`
-//! are its parts. The devices are emulated at their own rates by a thread of this process. On CAN (vcan0, up) and HID
-//! (`/dev/uhid`) only where they are there: in `tests/vm`, for one. Absolute times drift on shared machines, tails most.
+//! `cargo bench -p headrace_benches --bench ports` takes about two minutes; `-- 20` measures for twenty seconds a part,
+//! `-- latency` and `-- cpu` are its parts. The devices are emulated at their own rates by a thread of this process. CAN
+//! (vcan0, up) and HID (`/dev/uhid`) are measured only where available: in `tests/vm`, for one. Absolute times drift on
+//! shared machines, tails most.
 
 #![expect(clippy::unwrap_used, reason = "a benchmark stops at what it can't do")]
 #![expect(clippy::panic, reason = "the same")]
@@ -28,11 +29,11 @@ use headrace_simulator::{START, Scene, Simulation};
 use headrace_tests::scenes;
 
 const LOCAL: IpAddr = IpAddr::V4(Ipv4Addr::LOCALHOST);
-/// Until all lines are open and the heads have found their places.
+/// Time for all lines to open and the heads to reach their angles.
 const WARMING: DurNs = DurNs::from_millis(10_000);
-/// How long each part is measured unless said otherwise, s.
+/// Default duration of each part, s.
 const MEASURED_S: u64 = 60;
-/// How long the devices wait for a host at most.
+/// Longest wait of the devices for a host, ns.
 const WAIT_NS: u32 = 1_000_000;
 
 const WAY: &str = "[trajectory]\n[[trajectory.legs]]\ndistance_m = 60\nspeed_mps = 0.1\n";
@@ -40,7 +41,7 @@ const WAY: &str = "[trajectory]\n[[trajectory.legs]]\ndistance_m = 60\nspeed_mps
 const TUNNEL: &str = "name = \"ports\"\ntarget_m = 1\n[tunnel]\nprofile = \"circle\"\nradius_m = 3\nlength_m = 100\n\
     [water]\nsound_speed_mps = 1447\n[heads]\nplanned_speed_mps = 0.1\n";
 
-/// What is measured: in words, on what, and its keys in a vehicle file.
+/// Measured ports: name, carrier, and keys in a vehicle file.
 const LINES: [(&str, Carrier, &str); 10] = [
     ("881, returns of 13 bytes", Carrier::Serial, "plugin = \"imagenex881\"\nmode = \"fast\"\nrange_m = 10"),
     (
@@ -94,14 +95,14 @@ fn commit() -> String {
     answer("git", &["-C", env!("CARGO_MANIFEST_DIR"), "describe", "--always", "--dirty"])
 }
 
-/// What a program says, where there is such a program.
+/// Output of a program, or a note if there is none.
 fn answer(program: &str, arguments: &[&str]) -> String {
     let output = Command::new(program).args(arguments).output();
     let said = output.map(|output| String::from_utf8_lossy(&output.stdout).trim().to_owned());
     said.ok().filter(|said| !said.is_empty()).unwrap_or_else(|| format!("unknown ({program} doesn't say)"))
 }
 
-/// What was sent and when, on its way to whoever receives it, and how long it took.
+/// Messages under way with their times of sending, and the delays measured.
 #[derive(Clone, Default)]
 struct Course {
     sent: Arc<SegQueue<(MonoNs, Vec<u8>)>>,
@@ -119,7 +120,7 @@ impl Finish {
         Self { course: course.clone(), waiting: VecDeque::new() }
     }
 
-    /// A message of the device has come; what was sent before it has been lost.
+    /// Records the delay of a received message; those sent before it count as lost.
     fn note(&mut self, at: MonoNs, bytes: &[u8]) {
         self.look();
         if let Some(position) = self.waiting.iter().position(|(_, message)| message == bytes) {
@@ -133,7 +134,7 @@ impl Finish {
         self.waiting.extend(std::iter::from_fn(|| self.course.sent.pop()));
     }
 
-    /// How long the message is that comes next.
+    /// Length of the next message.
     fn next_len(&mut self) -> Option<usize> {
         self.look();
         self.waiting.front().map(|(_, message)| message.len())
@@ -202,7 +203,7 @@ impl Driver for Timed {
     }
 }
 
-/// The yardstick: reads as it comes, and takes the time.
+/// The yardstick: reads data as it arrives, and records the delay.
 fn bare(connect: &Connect, finish: Finish) {
     match connect {
         Connect::Serial { port: SerialPort::Path(path), .. } => {
@@ -243,7 +244,7 @@ fn bare_reads(mut finish: Finish, mut read: impl FnMut(&mut [u8]) -> usize) {
     loop {
         let count = read(&mut buffer);
         let at = now();
-        // The device's end is closed when all is measured.
+        // The device's end is closed at the end of the measurement.
         if count == 0 {
             return;
         }
@@ -255,7 +256,7 @@ fn bare_reads(mut finish: Finish, mut read: impl FnMut(&mut [u8]) -> usize) {
     }
 }
 
-/// The ends of one sensor's two ports: the driver's and the yardstick's; on a bus both hear the same one.
+/// The ends of one sensor's two ports: the driver's and the yardstick's; on a bus both receive from the same one.
 struct Ends {
     ours: EmulatedPort,
     twin: Option<EmulatedPort>,
@@ -283,7 +284,7 @@ impl Ends {
         self.twin.as_ref().map_or_else(|| self.ours.connect().clone(), |twin| twin.connect().clone())
     }
 
-    /// Puts a message on both, in turns ours first.
+    /// Writes a message to both, alternating which is first.
     fn write(&mut self, bytes: &[u8], ours_first: bool) {
         let [ours, twin] = &self.courses;
         let write = |stand: &mut EmulatedPort, courses: &[&Course]| {
@@ -310,11 +311,11 @@ impl Ends {
     }
 }
 
-/// What a part has measured.
+/// Results of a part.
 struct Measured {
-    /// For each sensor ours and the yardstick's.
+    /// For each sensor the driver's delays and the yardstick's.
     delays: Vec<[Vec<DurNs>; 2]>,
-    /// Seconds of a core, by the beginnings of threads' names.
+    /// CPU time, s, of the threads, by name prefix.
     ports_s: f64,
     loop_s: f64,
     bare_s: f64,
@@ -322,7 +323,7 @@ struct Measured {
     took_s: f64,
 }
 
-/// Serves the sensors of a scene on these ends, and measures for so long.
+/// Serves the sensors of a scene on these ends, and measures for this duration.
 fn rehearse(scene: &Scene, ends: Vec<Ends>, measured: Duration) -> Measured {
     let vehicle = &scene.vehicle;
     let mut app = App::new(vehicle.mission());
@@ -380,7 +381,7 @@ fn named<T: Send + 'static>(name: &str, work: impl FnOnce() -> T + Send + 'stati
     thread::Builder::new().name(name.to_owned()).spawn(work).unwrap()
 }
 
-/// Seconds for which threads of this process have run whose names begin so. Source: Linux, /proc/PID/task/TID/schedstat.
+/// CPU time, s, of this process's threads with this name prefix. Source: Linux, /proc/PID/task/TID/schedstat.
 fn run_s(beginning: &str) -> f64 {
     let Ok(tasks) = std::fs::read_dir("/proc/self/task") else { return f64::NAN };
     let of = |task: std::fs::DirEntry| {
@@ -391,7 +392,7 @@ fn run_s(beginning: &str) -> f64 {
     tasks.flatten().map(of).sum()
 }
 
-/// The devices: what hosts ask of them goes to the simulation, what they say goes to both ends.
+/// The devices: requests from hosts go to the simulation, its messages to both ends.
 fn emulate(mut simulation: Simulation, mut ends: Vec<Ends>, ending: &AtomicBool) {
     let origin = now();
     let mut is_ours_first = false;

@@ -1,8 +1,8 @@
-//! A long dive replayed by the binary, beside reading its log with `mcap` alone. Prints Markdown.
+//! A long dive replayed by the binary, compared with reading its log with `mcap` alone. Prints Markdown.
 //!
-//! `cargo bench -p headrace_benches --bench replay` takes the first kilometre of `deploy/scenes/seven-kilometres.toml`, about a minute;
-//! `cargo bench -p headrace_benches --bench replay -- 7` all of it. The log goes to the system's folder for temporary files, 145 MB a kilometre,
-//! and is removed again.
+//! `cargo bench -p headrace_benches --bench replay` takes the first kilometre of `deploy/scenes/seven-kilometres.toml`,
+//! about a minute; `cargo bench -p headrace_benches --bench replay -- 7` all of it. The log goes to the system's folder for
+//! temporary files, 145 MB per kilometre, and is removed at the end.
 
 #![expect(clippy::disallowed_methods, reason = "a benchmark reads the clock")]
 #![expect(clippy::unwrap_used, reason = "a benchmark stops at what it can't do")]
@@ -84,14 +84,14 @@ fn replayed(log: &Path, report: &Path) -> Replayed {
     Replayed { took: started.elapsed(), own_mib, file_mib }
 }
 
-/// A figure of a process from the system, MiB; zero where there is none.
+/// A memory figure of a process from the system, MiB; zero if unavailable.
 fn mib_of(child: &Child, key: &str) -> f64 {
     let status = std::fs::read_to_string(format!("/proc/{}/status", child.id())).unwrap_or_default();
     let words = status.lines().find_map(|line| line.strip_prefix(key)).unwrap_or("0");
     words.trim().trim_end_matches(" kB").parse::<f64>().unwrap_or(0.0) / 1024.0
 }
 
-/// Messages, bytes of the file, and the time to read it through with the `mcap` crate.
+/// Messages, file size in bytes, and the time to read the file with the `mcap` crate.
 fn bare_read(log: &Path) -> (u64, u64, Duration) {
     let started = Instant::now();
     let mut file = std::fs::File::open(log).unwrap();

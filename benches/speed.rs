@@ -1,6 +1,7 @@
-//! How fast the loop is, each figure beside a yardstick measured in the same run. Prints Markdown.
+//! Speed of the loop, each figure compared with a yardstick measured in the same run. Prints Markdown.
 //!
-//! `cargo bench -p headrace_benches` runs it on one core for about a minute. Absolute times drift on shared machines; the ratios hold.
+//! `cargo bench -p headrace_benches` runs it on one core for about a minute. Absolute times drift on shared machines; the
+//! ratios hold.
 
 #![expect(clippy::disallowed_methods, reason = "a benchmark reads the clock")]
 #![expect(clippy::disallowed_types, reason = "std's hash map is a yardstick here")]
@@ -109,14 +110,14 @@ fn armed(scene: &Scene, decoding: bool) -> Loop {
     app.arm(vehicle.navigation()).unwrap()
 }
 
-/// A message of a simulation, to be fed.
+/// A message of a simulation, to be fed to the loop.
 struct Kept {
     at: MonoNs,
     source: u16,
     bytes: Vec<u8>,
 }
 
-/// Feeds all messages tick by tick; gives the time of each tick with the filling of its rings.
+/// Feeds all messages tick by tick; returns the duration of each tick including the filling of its rings.
 fn run(dive: &mut Loop, messages: &[Kept]) -> Vec<Duration> {
     let mut ports: Vec<_> = (0..dive.sources().len()).map(|source| dive.take_port(source).unwrap()).collect();
     let mut ticks = Vec::new();
@@ -198,7 +199,7 @@ fn idle_tick() {
     let mut world = World::new();
     let mut schedule = Schedule::default();
     schedule.set_executor(SingleThreadedExecutor::new());
-    // As many as the loop has, chained.
+    // As many systems as the loop has, chained.
     schedule.add_systems((|| nothing(), || nothing(), || nothing(), || nothing(), || nothing()).chain());
     let bare = best(|| {
         let started = Instant::now();
@@ -215,7 +216,7 @@ fn idle_tick() {
     );
 }
 
-/// Samples of ideal heads together at the circle's centre, in the order in which they fall.
+/// Samples of ideal heads, all at the circle's centre, in order of time.
 fn helix(steps: u32, turn_s: f64, heads: u32, length_m: f64) -> Vec<(f64, f64, usize)> {
     let profile = shapes::ceran().unwrap();
     let per_ping_m = SPEED_MPS * turn_s / f64::from(steps);
@@ -241,7 +242,7 @@ fn store(length_m: f64, capacity: usize) -> SampleStore {
     })
 }
 
-/// Keeps all samples as the cover stage does: the nearest pass, the sample, the sections it touches.
+/// Stores all samples as the cover stage does: the nearest pass, the sample, the sections it touches.
 fn cover(samples: &[(f64, f64, usize)], length_m: f64) -> Coverage {
     let mut coverage = Coverage {
         store: store(length_m, samples.len()),

@@ -1,5 +1,5 @@
-//! What people's viewers cost: the view of a recorded demonstration beside everything else that the recorder's thread does for
-//! that dive, and the bytes that it adds to the log. Prints Markdown.
+//! Cost of the viewers' data: building the view of a recorded demonstration, compared with all other work of the recorder's
+//! thread for that dive, and the bytes that it adds to the log. Prints Markdown.
 
 #![expect(clippy::disallowed_methods, reason = "a benchmark reads the clock")]
 #![expect(clippy::unwrap_used, reason = "a benchmark stops at what it can't do")]
@@ -15,10 +15,10 @@ use headrace_replay::record::result_channels;
 use headrace_replay::view::{Site, View};
 
 const HEADRACE: &str = env!("CARGO_BIN_EXE_headrace_measured");
-/// Of several passes the fastest counts.
+/// Number of passes, of which the fastest counts.
 const PASSES: u32 = 5;
 
-/// A message as it comes out of the recorder's queue.
+/// A message from the recorder's queue.
 struct Entry {
     lane: Lane,
     at: MonoNs,
@@ -76,7 +76,7 @@ fn fastest(mut work: impl FnMut() -> u64) -> (Duration, u64) {
     least
 }
 
-/// The log's messages but those for viewers.
+/// The log's messages, except those for viewers.
 fn read(log: &Path) -> (LogHeader, Vec<Entry>) {
     let mut reader = LogReader::open(log).unwrap();
     let info = reader.header();
@@ -125,14 +125,14 @@ fn viewed(entries: &[Entry]) -> Vec<Made> {
     made
 }
 
-/// Bytes of the dive's log.
+/// Size of the dive's log, bytes.
 fn written(header: &LogHeader, entries: &[Entry], with_view: bool) -> u64 {
     let mut log = LogWriter::new(std::io::sink(), header).unwrap();
     let (mut view, mut made) = (view(), Vec::new());
     for entry in entries {
         match entry.lane {
             Lane::Raw(source) => log.raw(source, entry.at, entry.at, &entry.data).unwrap(),
-            // The order of a tick is as the message has it.
+            // The order of a tick is that of the message.
             Lane::Tick => {
                 let tick = headrace_replay::log::format::Tick::decode(&entry.data).unwrap();
                 log.tick(tick.index, tick.now, &tick.order().collect::<Vec<_>>()).unwrap();

@@ -336,7 +336,7 @@ impl Dive {
     }
 }
 
-/// What is missing in a recording that ended normally, as text.
+/// Data missing in a recording that ended normally, as text.
 fn unrecorded(written: &Summary) -> Vec<String> {
     let mut losses: Vec<String> =
         Some(written.left_out).filter(|left| left.messages > 0).map(left_out).into_iter().collect();
@@ -349,7 +349,7 @@ fn unrecorded(written: &Summary) -> Vec<String> {
     losses
 }
 
-/// What the recorder left out, and when.
+/// Data that the recorder dropped, with times.
 fn left_out(left: LeftOut) -> String {
     let span = left.span.map(|(from, to)| format!(", {} to {}", seconds(from), seconds(to)));
     format!("{}{}", left.words(), span.unwrap_or_default())

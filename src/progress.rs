@@ -80,7 +80,7 @@ impl Progress {
 impl Drop for Progress {
     fn drop(&mut self) {
         if self.shown.is_some() && transient::take() {
-            // A terminal that has gone away needs no clearing.
+            // A closed terminal needs no clearing.
             std::io::stderr().write_all(transient::CLEAR).ok();
         }
     }

@@ -4,7 +4,7 @@ use headrace_monitor::pilot_text::{action_text, cause_text, station};
 use headrace_monitor::report::{ChangeReport, JudgedReport, SmoothingReport};
 use headrace_monitor::report::{Report, RunReport};
 
-/// The summary.
+/// The summary text.
 pub(crate) fn summary(report: &Report) -> String {
     let mut text = String::new();
     let mut line = |words: String| {
@@ -73,7 +73,7 @@ pub(crate) fn summary(report: &Report) -> String {
     text
 }
 
-/// The stretches that are still missed along the tunnel, a line each, with what to do about them on the way home.
+/// The stretches still missed along the tunnel, a line each, with the action for each on the way home.
 fn missed(report: &Report) -> Vec<String> {
     let open = report.runs.iter().filter(|run| run.cleared_s.is_none());
     let mut open: Vec<_> = open.collect();
@@ -94,7 +94,7 @@ fn missed(report: &Report) -> Vec<String> {
     open.iter().map(line).collect()
 }
 
-/// What smoothing changed: metres by verdict, and a line per run of neighbouring sections with the same change.
+/// Changes by smoothing: metres by verdict, and a line per run of neighbouring sections with the same change.
 fn smoothing(report: &SmoothingReport) -> Vec<String> {
     let was = &report.before;
     let mut lines = vec![format!(
@@ -123,7 +123,7 @@ fn smoothing(report: &SmoothingReport) -> Vec<String> {
     lines
 }
 
-/// Whether a change continues the run that ends at `end_m`; then the run's end moves to its end.
+/// Whether a change continues the run that ends at `end_m`; if so, moves the run's end.
 fn follows(first: &ChangeReport, next: &ChangeReport, end_m: &mut f64) -> bool {
     let verdicts = |change: &ChangeReport| [change.before, change.after].map(verdict_text);
     let goes_on = (next.start_m - *end_m).abs() < 1e-6 && verdicts(first) == verdicts(next);

@@ -1,5 +1,5 @@
-//! Whether the terminal's last line is a transient one, without a line end: progress, or the dive's state. Log messages, from
-//! any thread, clear it first.
+//! Flag for a transient last line of the terminal, one without a line end: progress, or the dive's state. Log messages,
+//! from any thread, clear it first.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -13,7 +13,7 @@ pub(crate) fn shown() {
     SHOWN.store(true, Ordering::Relaxed);
 }
 
-/// Whether a transient line is shown; it is taken as cleared from now on.
+/// Whether a transient line is shown; resets the flag.
 pub(crate) fn take() -> bool {
     SHOWN.swap(false, Ordering::Relaxed)
 }

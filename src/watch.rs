@@ -16,7 +16,7 @@ use crate::transient;
 
 /// Interval of state lines where they can't be overwritten, in the dive's time.
 const LINE_EVERY: DurNs = DurNs(10_000_000_000);
-/// Interval where they can.
+/// Interval of state lines that are overwritten, in the dive's time.
 const REFRESH_EVERY: DurNs = DurNs(1_000_000_000);
 
 /// Shows a dive on stdout, unless quiet.
@@ -27,7 +27,7 @@ pub(crate) struct Watch {
     status_open: bool,
     /// The run that was flagged last, until its end is shown.
     run: Option<RunId>,
-    /// The latest advised speed, m/s; zero for none.
+    /// The latest advised speed, m/s; zero if none.
     v_max_mps: f64,
 }
 
@@ -44,12 +44,12 @@ impl Watch {
         }
     }
 
-    /// Shows nothing.
+    /// Shows no output.
     pub(crate) fn quiet() -> Self {
         Self { quiet: true, ..Self::loud() }
     }
 
-    /// Shows nothing when the output is JSON, which is for programs.
+    /// Shows no output if it is JSON.
     pub(crate) fn unless(json: bool) -> Self {
         if json { Self::quiet() } else { Self::loud() }
     }
@@ -84,7 +84,7 @@ impl Watch {
         }
     }
 
-    /// A replay has paused, jumped or ended at `time` after its beginning.
+    /// Shows that a replay has paused, jumped or ended at `time` after its beginning.
     pub(crate) fn stopped(&mut self, dive: &Loop, time: DurNs, ended: bool) {
         (self.shown, self.run) = (None, None);
         if !self.quiet {
@@ -137,7 +137,7 @@ impl Watch {
 
     /// Shows the end of the run flagged last at a neighbouring section that doesn't fail.
     fn section(&mut self, section: i64, sections: &Sections) {
-        // An open section may still become part of the run.
+        // An open section may still join the run.
         let other = |section: &Section| !section.is_flagged() && section.verdict != Verdict::Open;
         let ends = sections.get(section).is_some_and(other);
         let run = self.run.and_then(|id| sections.runs().get(id));
@@ -156,7 +156,7 @@ impl Watch {
                 self.flag(run, dive);
             }
             RunChange::Cleared => {
-                // Sections that now have another cause are in another run, which is shown.
+                // Sections whose cause has changed belong to another run, which is shown.
                 if !(run.from..run.to).filter_map(|index| sections.get(index)).any(Section::is_flagged) {
                     let (from_m, to_m) = (sections.bounds_m(run.from).0, sections.bounds_m(run.to - 1).1);
                     self.line(&cleared_text(from_m, to_m));
@@ -201,7 +201,7 @@ impl Watch {
 
     fn close_status(&mut self) {
         if self.status_open {
-            // A log message has cleared it already.
+            // A log message has already cleared it.
             if transient::take() {
                 say("");
             }

@@ -1,4 +1,4 @@
-//! A scene without effects beside the shortest program by hand that says the same.
+//! A scene without effects, compared with the shortest equivalent hand-written program.
 
 use std::hint::black_box;
 
@@ -13,12 +13,12 @@ use headrace_tests::scenes;
 
 use crate::{SPEED_MPS, best, text, timed};
 
-/// Many, for a figure that is the difference of two that are nearly the same.
+/// Many rounds, as the figure is the small difference of two times.
 const ROUNDS: usize = 40;
 const LENGTH_M: f64 = 80.0;
 const SECOND: DurNs = DurNs(1_000_000_000);
 
-/// What a dive says: how many messages, and a sum in which the order, times and bytes of all matter.
+/// Digest of a dive: the number of messages, and a sum that depends on their order, times and bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 struct Said {
     messages: u32,
@@ -35,7 +35,7 @@ impl Said {
     }
 }
 
-/// Prints what the schedule adds; heads and nothing else.
+/// Prints the schedule's overhead, with heads alone.
 pub(crate) fn bare() {
     let text = text(LENGTH_M, "phase_shift", "");
     let scene = scenes::scene_from(&text, &|name| scenes::vehicle_file(name).map(heads_alone));
@@ -65,7 +65,7 @@ pub(crate) fn bare() {
     println!("| over what is by hand, percent | {:+.1} |", 100.0 * (whole_s / hand_s - 1.0));
 }
 
-/// A vehicle file's heads alone, which come first in it.
+/// A vehicle file reduced to its heads, which come first in it.
 fn heads_alone(mut vehicle: Vec<u8>) -> Vec<u8> {
     let next = b"[[sensors]]\nid = \"ping_left\"";
     let heads = vehicle.windows(next.len()).position(|window| window == next);
@@ -73,7 +73,7 @@ fn heads_alone(mut vehicle: Vec<u8>) -> Vec<u8> {
     vehicle
 }
 
-/// Simulates and takes the messages.
+/// Simulates the dive and consumes its messages.
 fn dive(mut simulation: Simulation) -> Said {
     let mut said = Said::default();
     while let Some(message) = simulation.next_message() {
@@ -84,13 +84,13 @@ fn dive(mut simulation: Simulation) -> Said {
 
 type Head = Box<dyn Emulator<Sounding>>;
 
-/// Heads in a straight tunnel, second by second, without systems, components or anything that an effect could take hold of.
+/// Heads in a straight tunnel, second by second, without systems, components or extension points for effects.
 struct ByHand<'a> {
     profile: &'a Profile,
     heads: Vec<(Head, Mount)>,
     end: MonoNs,
     due: Vec<Sounding>,
-    /// Time, source, and place of the bytes.
+    /// Time, source, and begin and end of the bytes.
     waiting: Vec<(MonoNs, usize, usize, usize)>,
     bytes: Vec<u8>,
 }
@@ -114,7 +114,7 @@ impl<'a> ByHand<'a> {
         }
     }
 
-    /// Casts every ray and says it.
+    /// Casts every ray and sends its message.
     fn dive(&mut self) -> Said {
         let mut said = Said::default();
         let mut until = START;
@@ -136,7 +136,7 @@ impl<'a> ByHand<'a> {
         said
     }
 
-    /// Sends what is before `until`, in order.
+    /// Sends the messages before `until`, in order.
     fn send(&mut self, until: MonoNs, said: &mut Said) {
         self.waiting.sort();
         let sent = self.waiting.partition_point(|(at, ..)| *at < until);
@@ -154,7 +154,7 @@ impl<'a> ByHand<'a> {
     }
 }
 
-/// What a head measures until then.
+/// Measurements of a head until `until`.
 fn measure(head: &mut Head, mount: &Mount, profile: &Profile, until: MonoNs, due: &mut Vec<Sounding>) {
     let [y_m, z_m] = profile.reference();
     let level = Rot::<Tunnel, Body>::identity();

@@ -1,8 +1,8 @@
-//! What each effect of the simulator costs, and what leaving it out would cost in truth. Prints Markdown.
+//! Cost of each effect of the simulator, and the change in the results from leaving it out. Prints Markdown.
 //!
-//! `cargo bench -p headrace_benches --bench effects` runs all; `-- bare`, `-- cost`, `-- fidelity`, `-- seven` one part alone, and in a build
-//! with `--features mesh` `-- mesh`.
-//! Times are the least of several rounds, taken in turns; the machine should have nothing else to do.
+//! `cargo bench -p headrace_benches --bench effects` runs all; `-- bare`, `-- cost`, `-- fidelity`, `-- seven` one part
+//! alone, and in a build with `--features mesh` `-- mesh`.
+//! Times are the least of several rounds, taken in turns, on an otherwise idle machine.
 
 #![expect(clippy::disallowed_methods, reason = "a benchmark reads the clock")]
 #![expect(clippy::unwrap_used, clippy::panic, reason = "a benchmark stops at what it can't do")]
@@ -20,7 +20,7 @@ const ROUNDS: usize = 15;
 
 const SPEED_MPS: f64 = 0.11;
 
-/// Every effect with some parameters; heads turn in sectors, so that their ends can be slowed.
+/// Every effect with some parameters; heads turn in sectors, so that `sector_end_slowing` applies.
 const EFFECTS: [(&str, &str); 28] = [
     ("start_phase_error", "max_deg = 20"),
     ("sector_end_slowing", "lag_ms = 60"),
@@ -87,20 +87,20 @@ fn named(effects: &[(&str, &str)]) -> String {
     tables.concat()
 }
 
-/// What some work gives, and the seconds that it takes.
+/// Result of some work, and its duration, s.
 fn timed<T>(work: impl FnOnce() -> T) -> (T, f64) {
     let began = Instant::now();
     let given = work();
     (given, began.elapsed().as_secs_f64())
 }
 
-/// Seconds to simulate a scene.
+/// Time to simulate a scene, s.
 fn simulate(scene: &Scene) -> f64 {
     let mut simulation = Simulation::new(scene).unwrap_or_else(|why| panic!("{why}"));
     timed(|| while simulation.advance() {}).1
 }
 
-/// Least times of several works, each round doing all of them.
+/// Least times of several pieces of work, each round doing all of them.
 fn best<const N: usize>(rounds: usize, mut works: [&mut dyn FnMut() -> f64; N]) -> [f64; N] {
     let mut least = [f64::INFINITY; N];
     for _ in 0..rounds {
@@ -111,7 +111,7 @@ fn best<const N: usize>(rounds: usize, mut works: [&mut dyn FnMut() -> f64; N]) 
     least
 }
 
-/// What each effect costs, alone and among all the others.
+/// Cost of each effect, alone and among all the others.
 fn cost() {
     const LENGTH_M: f64 = 12.0;
     let returns = 4.0 * 50.0 * LENGTH_M / SPEED_MPS;
@@ -130,7 +130,7 @@ fn cost() {
                 simulate(&all)
             }],
         );
-        // A current changes how long the dive takes.
+        // A current changes the dive's duration.
         let scale = |scene: &Scene| {
             Simulation::new(scene).map_or(1.0, |simulation| LENGTH_M / SPEED_MPS / simulation.duration_s())
         };
@@ -152,7 +152,7 @@ struct Figures {
     fail_m: f64,
 }
 
-/// What the loop makes of a scene.
+/// The loop's figures for a scene.
 fn dive(scene: &Scene) -> Figures {
     let report = serde_json::to_value(scenes::report(scene)).unwrap();
     let summary =
@@ -167,7 +167,7 @@ fn dive(scene: &Scene) -> Figures {
     }
 }
 
-/// What leaving each effect out does to the loop's figures, heads turning in sectors and on.
+/// Effect on the loop's figures of leaving out each effect, with heads in sectors and turning continuously.
 fn fidelity() {
     const LENGTH_M: f64 = 40.0;
     for (layout, title) in [("phase_shift", "phase shift"), ("sector_offset", "sector offset")] {
@@ -196,7 +196,7 @@ fn fidelity() {
     }
 }
 
-/// The whole tunnel with everything.
+/// The whole tunnel with all effects.
 fn seven_kilometres() {
     let all = scene(6990.0, "sector_offset", &named(&EFFECTS));
     let duration_s = Simulation::new(&all).unwrap().duration_s();

@@ -1,4 +1,4 @@
-//! A wall of a million triangles beside the profile that it follows.
+//! A wall of a million triangles, compared with the profile that it follows.
 
 use headrace_geometry::tunnel::Profile;
 use headrace_simulator::Simulation;
@@ -50,7 +50,7 @@ fn rough(profile: &Profile) -> Vec<u8> {
     bytes
 }
 
-/// Prints how fast dives along both are.
+/// Prints the speed of dives along both.
 pub(crate) fn mesh() {
     let scene = |effects: &str, tunnel: &str, rock: &[u8]| {
         let text = format!(

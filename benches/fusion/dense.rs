@@ -1,4 +1,4 @@
-//! The yardsticks: filters that keep the covariance itself, a dense matrix.
+//! Yardsticks: filters with the covariance as a dense matrix.
 
 use std::hint::black_box;
 
@@ -12,7 +12,7 @@ use nalgebra_of_peers as peers;
 
 use crate::dive::Dive;
 
-/// Which errors are measured: those of the attitude.
+/// Indices of the measured errors: the attitude's.
 const MEASURED: [usize; 3] = [6, 7, 8];
 const NOISE: f64 = 1e-3;
 const INNOVATION: f64 = 1e-3;
@@ -21,14 +21,14 @@ const INNOVATION: f64 = 1e-3;
 pub(crate) fn factors<const N: usize>() -> Factors<N> {
     let mut factors = Factors::independent([0.01; N]);
     for k in 0..N {
-        // Any direction that isn't along another.
+        // Directions that aren't parallel to each other.
         let a = core::array::from_fn(|i| ((3 * i + 5 * k + i * k) % 11) as f64 / 11.0 - 0.4);
         factors.add(0.001, a, N);
     }
     factors
 }
 
-/// Element (i, j) of an epoch's transition matrix, of which fewer states have a corner.
+/// Element (i, j) of an epoch's transition matrix, of which filters with fewer states use a corner.
 fn transition() -> [[f64; ERRORS]; ERRORS] {
     let transition = Dive::under_way().leg().transition(&Settings::default());
     let columns: [[f64; ERRORS]; ERRORS] = core::array::from_fn(|j| {
@@ -39,7 +39,7 @@ fn transition() -> [[f64; ERRORS]; ERRORS] {
     core::array::from_fn(|i| core::array::from_fn(|j| columns[j][i]))
 }
 
-/// Written out with nalgebra's matrices of fixed size, the update in Joseph's form.
+/// Hand-written with nalgebra's matrices of fixed size, the update in Joseph's form.
 #[derive(Clone)]
 pub(crate) struct Dense<const N: usize> {
     x: SVector<f64, N>,

@@ -1,4 +1,4 @@
-//! A vehicle at rest in the middle of a tunnel: every sensor shows what it should, so that nothing is gated.
+//! A vehicle at rest in the middle of a tunnel: all sensors have ideal readings, so that nothing is gated.
 
 use headrace_fusion::filter::clones::ErrorClones;
 use headrace_fusion::filter::eskf::{Context, Eskf};
@@ -18,11 +18,11 @@ use headrace_sensor::reading::MAX_SOURCES;
 use headrace_sensor::reading::{EchoRange, Reading, TetherLength, WaterPressure};
 
 pub(crate) const GRAVITY_MPS2: f64 = 9.806_65;
-/// Between two inertial samples, s.
+/// Interval of inertial samples, s.
 pub(crate) const SAMPLE_S: f64 = 0.01;
 const SAMPLE: DurNs = DurNs(10_000_000);
 const SAMPLES: usize = 10;
-/// Two minutes fill the clones.
+/// Two minutes of epochs, which fill the clones.
 const EPOCHS_BEFORE: usize = 1300;
 /// The echosounders look left, right and up.
 const YAWS_AND_PITCHES: [(f64, f64); 3] =
@@ -41,7 +41,7 @@ pub(crate) struct Dive {
 }
 
 impl Dive {
-    /// After some minutes.
+    /// A dive after some minutes.
     pub(crate) fn under_way() -> Self {
         let mut dive = Self::begin();
         for _ in 0..EPOCHS_BEFORE {
@@ -85,7 +85,7 @@ impl Dive {
         Self { context, window: Window::default(), sources, running, readings }
     }
 
-    /// Ten inertial samples, and eight measured numbers in six readings.
+    /// One epoch: ten inertial samples, and eight measured numbers in six readings.
     pub(crate) fn epoch(&mut self) {
         let began = self.running.at;
         let mut at = began;
@@ -103,7 +103,7 @@ impl Dive {
         self.window.forget(at);
     }
 
-    /// All readings must have been used, or the figures say nothing.
+    /// All readings must have been used; otherwise the figures are meaningless.
     fn check(&self) {
         assert!(self.running.is_sound());
         for source in self.sources.iter().flatten() {
@@ -125,12 +125,12 @@ impl Dive {
         self.running.factors
     }
 
-    /// The clones, and when its last clone may have been made.
+    /// The clones, and the time of the last epoch, which bounds that of the last clone.
     pub(crate) fn clones(&self) -> (ErrorClones, MonoNs) {
         (self.running.clones.clone(), self.running.at)
     }
 
-    /// What an epoch propagates.
+    /// The motion over an epoch.
     pub(crate) fn leg(&self) -> Leg {
         let (mut state, mut leg) = (self.running.state, Leg::default());
         for _ in 0..SAMPLES {

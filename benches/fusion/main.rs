@@ -1,8 +1,8 @@
-//! How fast the navigation filter's parts are, each beside a dense filter of as many states in the same run. Prints
+//! Speed of the navigation filter's parts, each compared with a dense filter of as many states in the same run. Prints
 //! Markdown.
 //!
-//! `cargo bench -p headrace_benches --bench fusion` runs it on one core in some seconds. Rounds are taken in turns and the best of each
-//! counts: absolute times drift on shared machines; the ratios hold.
+//! `cargo bench -p headrace_benches --bench fusion` runs it on one core in some seconds. Rounds are taken in turns and the
+//! best of each counts: absolute times drift on shared machines; the ratios hold.
 
 #![expect(clippy::disallowed_methods, reason = "a benchmark reads the clock")]
 #![expect(clippy::unwrap_used, reason = "a benchmark stops at what it can't do")]
@@ -26,9 +26,9 @@ use dense::{Dense, Published};
 use dive::{Dive, GRAVITY_MPS2, SAMPLE_S};
 
 const ROUNDS: usize = 200;
-/// A round lasts long against the clock's own time, and short against what else a shared machine does.
+/// Runs per round: long against the clock's resolution, and short against disturbances on a shared machine.
 const RUNS: u32 = 500;
-/// What is measured begins anew so often: neither runs off after many times of the same.
+/// Runs before restarting from the initial state, so that repetition doesn't make the state diverge.
 const RUNS_FROM_ONE_START: u32 = 20;
 const BETWEEN_CLONES: DurNs = DurNs(2_000_000_000);
 
@@ -58,10 +58,10 @@ fn cpu() -> String {
     model.trim_start_matches(['\t', ' ', ':']).to_owned()
 }
 
-/// Something to be measured: does its work so many times.
+/// Work to be timed: repeats itself this many times.
 type Work<'a> = &'a mut dyn FnMut(u32);
 
-/// The best time of each for one run, ns.
+/// Best time of each for one run, ns.
 fn in_turns<const K: usize>(mut works: [Work<'_>; K]) -> [f64; K] {
     let mut best = [f64::INFINITY; K];
     for _ in 0..ROUNDS {
@@ -74,7 +74,7 @@ fn in_turns<const K: usize>(mut works: [Work<'_>; K]) -> [f64; K] {
     best
 }
 
-/// Runs `step` on a copy of `start`, which is made anew now and then.
+/// Runs `step` on a copy of `start`, which is replaced now and then.
 fn from_a_start<T: Clone>(start: &T, runs: u32, mut step: impl FnMut(&mut T)) {
     for _ in 0..runs / RUNS_FROM_ONE_START {
         let mut value = start.clone();
@@ -89,7 +89,7 @@ fn row(what: &str, ns: f64, yardstick: &str, yardstick_ns: f64) {
     println!("| {what} | {ns:.0} ns | {yardstick}: {yardstick_ns:.0} ns | {:.2} |", ns / yardstick_ns);
 }
 
-/// From the epoch before to this one, without measurements.
+/// Prediction from the previous epoch to this one, without measurements.
 fn predict() {
     let dive = Dive::under_way();
     let settings = Settings::default();
@@ -116,7 +116,7 @@ fn predict() {
     row(what, ours, "`kfilter`, 20 states", kfilter);
 }
 
-/// Three rows of an attitude, as factors of `N` states take them.
+/// Three rows of an attitude, for factors of `N` states.
 fn attitude_rows<const N: usize>() -> [([f64; N], f64, f64); 3] {
     let dive = Dive::under_way();
     let rows = measure::attitude(&dive.state(), dive.state().attitude, 0.03, 0.02);
@@ -135,7 +135,7 @@ fn three_rows<const N: usize>(factors: &mut Factors<N>, rows: &[([f64; N], f64, 
     black_box(errors);
 }
 
-/// Three measured numbers, and what they change in the estimate and its covariance.
+/// Update by three measured numbers, of the estimate and its covariance.
 fn update() {
     let (rows20, rows18, rows15) = (attitude_rows::<20>(), attitude_rows::<18>(), attitude_rows::<15>());
     let (factors20, factors18, factors15) =
@@ -157,7 +157,7 @@ fn update() {
     row("3-row update, 20 states", ours20, "`kfilter`, 20 states, not Joseph's form", kfilter);
 }
 
-/// An inertial sample of a vehicle that turns.
+/// An inertial sample of a turning vehicle.
 fn sample() {
     let state = Dive::under_way().state();
     let (rate, force) = ([0.02, -0.01, 0.03], [0.3, 0.2, 9.8]);
@@ -184,7 +184,7 @@ fn sample() {
     );
 }
 
-/// An epoch with all that the filter does in it.
+/// A complete epoch of the filter.
 fn epoch() {
     let mut dive = Dive::under_way();
     let ((mut clones, mut at), factors) = (dive.clones(), dive.factors());

@@ -11,11 +11,11 @@ use crate::{ExperimentError, Progress};
 
 /// Share by which T_x may differ from the paper's experiment.
 const T_X_SHARE: f64 = 0.02;
-/// Share by which the means of T_y and T may.
+/// The same for the means of T_y and T.
 const MEAN_SHARE: f64 = 0.03;
 /// Length of a run, m: as in the paper.
 const LENGTH_M: f64 = 130.0;
-/// What the paper's simulator did besides: a sonar that scatters by a centimetre, a pilot who wanders.
+/// Effects of the paper's simulator: a sonar with 1 cm range noise, a pilot who drifts.
 const EFFECTS: &str = "range_noise = { sd_m = 0.01, sensors = [SONARS] }\n\
                        pilot_drift = { across_m = 0.5, up_m = 0.5, yaw_deg = 5 }\n";
 
@@ -24,9 +24,9 @@ const EFFECTS: &str = "range_noise = { sd_m = 0.01, sensors = [SONARS] }\n\
 pub struct RunRow {
     /// The mode.
     pub mode: &'static str,
-    /// How many heads.
+    /// Number of heads.
     pub heads: u8,
-    /// How they share the work.
+    /// Whether they share the turn in sectors.
     pub sectors: bool,
     /// T_x, m.
     pub t_x: Pair,
@@ -34,9 +34,9 @@ pub struct RunRow {
     pub t_y: [Pair; 4],
     /// T: mean, least, largest, m; Table 5 leaves out one head.
     pub t: Option<[Pair; 3]>,
-    /// The speed that the paper's T_x is that of, m/s.
+    /// The speed at which the paper's T_x was obtained, m/s.
     pub paper_speed_mps: f64,
-    /// Which of T_x, mean T_y and mean T miss what was to be reached, and why.
+    /// Which of T_x, mean T_y and mean T miss their targets, and why.
     pub misses: Vec<String>,
 }
 
@@ -54,7 +54,7 @@ impl Pair {
         Self { paper: paper.value(), ours }
     }
 
-    /// The share by which ours is larger.
+    /// Relative difference, positive where ours is larger.
     pub fn difference(&self) -> f64 {
         self.ours / self.paper - 1.0
     }
@@ -67,11 +67,11 @@ impl Pair {
 /// A Wilcoxon signed-rank test over the runs with several heads.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SignedRankRow {
-    /// What is compared.
+    /// The compared quantity.
     pub what: &'static str,
     /// Phase shift or sector offset.
     pub sectors: bool,
-    /// Two-sided p of predicted against the paper's experiments; none where all differences are zero.
+    /// Two-sided p of predicted against the paper's experiments; `None` if all differences are zero.
     pub p_paper: Option<f64>,
     /// Two-sided p of predicted against our experiments.
     pub p_ours: Option<f64>,
@@ -79,7 +79,7 @@ pub struct SignedRankRow {
 
 /// All runs of Tables 3 and 4.
 ///
-/// Errors: none with the vehicles that are built in.
+/// Errors: none with the built-in vehicles.
 pub(crate) fn runs(progress: Progress<'_>) -> Result<Vec<RunRow>, ExperimentError> {
     let mut rows = Vec::new();
     for run in measured()? {
@@ -140,7 +140,7 @@ fn row(run: &Measured, layout: HeadLayout, paper: &Spacings, ours: &Spacing, tur
     row
 }
 
-/// What misses, and why.
+/// The misses, with reasons.
 fn misses(row: &RunRow, seconds: f64) -> Vec<String> {
     let mut misses = Vec::new();
     let percent = |pair: &Pair| 100.0 * pair.difference();
@@ -169,7 +169,7 @@ fn misses(row: &RunRow, seconds: f64) -> Vec<String> {
 
 /// The paper's tests of §8.1: predicted values against experiments, over all modes and two to four heads.
 ///
-/// Errors: none with the numbers that are built in.
+/// Errors: none with the built-in numbers.
 pub(crate) fn signed_ranks(rows: &[RunRow]) -> Result<Vec<SignedRankRow>, PaperError> {
     let predicted = tables()?;
     let mut tests = Vec::new();

@@ -1,4 +1,4 @@
-//! §8.3: what heads side by side hide from each other.
+//! §8.3: occlusion between adjacent heads.
 
 use headrace_geometry::math::{self, TAU};
 use headrace_sampling::layout::HeadLayout;
@@ -10,35 +10,35 @@ use crate::{ExperimentError, Progress};
 
 /// Length of a run, m.
 const LENGTH_M: f64 = 130.0;
-/// Places of the wall looked at round the perimeter.
+/// Lines evaluated around the perimeter.
 const LINES: usize = 720;
 
-/// What a layout of heads that hide each other comes to.
+/// Effect of a layout with heads that occlude each other.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct HiddenRow {
-    /// How many heads.
+    /// Number of heads.
     pub heads: u8,
-    /// Phase between heads side by side, degrees.
+    /// Phase between adjacent heads, degrees.
     pub side_by_side_deg: f64,
     /// Angle that a head loses to its neighbour, degrees.
     pub angle_deg: f64,
-    /// Wall that it doesn't see, m.
+    /// Wall occluded from it, m.
     pub gap_m: f64,
-    /// T_x / s where nothing is hidden, m.
+    /// T_x / s without occlusion, m.
     pub t_x_m: f64,
     /// The largest distance between passes anywhere, as a multiple of it.
     pub times: f64,
-    /// The same for the places in the middle of what is hidden, mean of each place's largest.
+    /// The same for lines in the middle of the shadow, mean of each line's largest.
     pub times_in_shadow: f64,
 }
 
-/// Three heads; four with neighbours a quarter turn apart (on either wall the forward and the aft head that are hidden
+/// Three heads; four with neighbours a quarter turn apart (on either wall the occluded forward and aft heads
 /// follow each other at half a turn, or at a quarter); four with neighbours half a turn apart.
 const ARRANGEMENTS: [(u8, &str); 4] = [(3, ""), (4, ""), (4, "[0, 0, -90, 90]"), (4, "[0, 90, 90, 0]")];
 
 /// All arrangements, MEDIUM as in Figure 13.
 ///
-/// Errors: none with the vehicles that are built in.
+/// Errors: none with the built-in vehicles.
 pub(crate) fn rows(progress: Progress<'_>) -> Result<Vec<HiddenRow>, ExperimentError> {
     let mut rows = Vec::new();
     for (heads, offsets) in ARRANGEMENTS {
@@ -84,7 +84,7 @@ fn row(heads: u8, dive: &Dive) -> HiddenRow {
     }
 }
 
-/// The largest run of angles of a head at which it meets its neighbour, and of wall behind it.
+/// The largest run of angles at which a head hits its neighbour, and the length of wall behind it.
 fn shadow(samples: &[Sample], dive: &Dive) -> (f64, f64) {
     let (mut angle_rad, mut gap_m) = (0.0_f64, 0.0_f64);
     let mut began: Option<&Sample> = None;
@@ -92,7 +92,7 @@ fn shadow(samples: &[Sample], dive: &Dive) -> (f64, f64) {
     for sample in samples {
         if sample.of_wall {
             if let (Some(from), Some(before)) = (began, last) {
-                // Edges fall between two pings; the step beyond each is half hidden.
+                // Edges fall between two pings; the step beyond each is half occluded.
                 let turned = math::wrap_signed(before.angle_rad - from.angle_rad, TAU).abs() + dive.step_rad;
                 angle_rad = angle_rad.max(turned);
                 let around = math::wrap_signed(before.arc_m - from.arc_m, dive.profile.perimeter_m());
@@ -107,7 +107,7 @@ fn shadow(samples: &[Sample], dive: &Dive) -> (f64, f64) {
     (angle_rad, gap_m)
 }
 
-/// Phase between the last two heads, which are side by side, in (0, pi].
+/// Phase between the last two heads, which are adjacent, in (0, pi].
 fn side_by_side_rad(dive: &Dive) -> f64 {
     let firsts: Vec<f64> =
         dive.heads.iter().rev().take(2).filter_map(|samples| samples.first()).map(|s| s.angle_rad).collect();

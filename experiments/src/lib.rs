@@ -1,5 +1,5 @@
-//! The paper's tables computed anew (`paper`), and its §8 and §9 repeated: simulated dives, their spacings (Tables 3 to
-//! 5), what heads hide from each other, and what that needs beyond a dive: surfaces through samples and their distance
+//! Recomputes the paper's tables (`paper`), and repeats its §8 and §9: simulated dives, their spacings (Tables 3 to
+//! 5), occlusion between heads, and analyses beyond a dive: surfaces through samples and their distance
 //! from the wall (§8.2, 8.3), the perimeter as a wide beam sees it (§9.2), and the Wilcoxon signed-rank test (§8.1).
 //!
 //! Deterministic: one thread, no clock, no randomness, no hash containers; mathematics through `headrace_geometry::math`.
@@ -33,40 +33,40 @@ pub use meshes::MeshRow;
 pub use report::{Experiments, Finding, run};
 pub use stationary::Perimeter;
 
-/// Is told what is being done.
+/// Receives status messages.
 pub type Progress<'a> = &'a dyn Fn(&str);
 
 /// Why an experiment can't be run.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ExperimentError {
-    /// A scene that is none.
+    /// An invalid scene.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// The paper's numbers.
+    /// Invalid numbers of the paper.
     #[error(transparent)]
     Paper(#[from] PaperError),
-    /// A profile that is none.
+    /// An invalid profile.
     #[error(transparent)]
     Profile(#[from] ProfileError),
-    /// Samples without a Poisson surface.
+    /// No Poisson surface through the samples.
     #[error("a surface through the samples: {0}")]
     Surface(#[from] surface::poisson::PoissonError),
-    /// Samples without a Delaunay triangulation.
+    /// No Delaunay triangulation of the samples.
     #[error("interpolating between the samples: {0}")]
     Chart(#[from] surface::chart::ChartError),
-    /// An argument of a formula.
+    /// An invalid argument of a formula.
     #[error(transparent)]
     Sampling(#[from] SamplingError),
     /// A Poisson surface without a triangle.
     #[error("the surface through the samples has no triangle")]
     NoSurface,
-    /// A stationary turn without a closed line.
+    /// A stationary turn without a closed contour.
     #[error("the perimeter from echoes: {0}")]
     Perimeter(#[from] perimeter::PerimeterError),
 }
 
-/// A whole number as an index; one below zero is zero.
+/// A whole number as an index; negative ones become zero.
 fn index(k: i64) -> usize {
     usize::try_from(k).unwrap_or(0)
 }

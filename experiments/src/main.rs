@@ -38,7 +38,7 @@ enum Command {
     },
 }
 
-/// Why a command could not do what it was asked.
+/// Why a command failed.
 #[derive(Debug, thiserror::Error)]
 enum Failure {
     #[error(transparent)]
@@ -96,7 +96,7 @@ fn put(text: &str) -> Result<(), Failure> {
     written.map_err(|source| Failure::Write { path: "standard output".into(), source })
 }
 
-/// Shows what is being done as a line that the next one overwrites, where a person may be looking.
+/// Shows the status on a line that the next one overwrites, if on a terminal.
 fn progress(what: &str) {
     if std::io::stderr().is_terminal() {
         eprint!("\r\x1b[K{what}");

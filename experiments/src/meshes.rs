@@ -13,29 +13,29 @@ use crate::{ExperimentError, Progress};
 
 /// Length of a run, m: as in the paper.
 pub(crate) const LENGTH_M: f64 = 130.0;
-/// The surface is compared away from its ends.
+/// The part of the surface compared, away from its ends.
 const INNER: Stretch = Stretch { from_m: 20.0, to_m: 120.0, step_m: 0.1 };
 /// The paper's simulator's noise.
 const EFFECTS: &str = "range_noise = { sd_m = 0.01, sensors = [SONARS] }\n";
-/// How often an unaligned dive is repeated, with other phases each time.
+/// Repetitions of an unaligned dive, each with other phases.
 const SEEDS: u64 = 5;
 
 /// A configuration of §8.2 or §8.3.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MeshRow {
-    /// How many heads.
+    /// Number of heads.
     pub heads: u8,
     /// Their mode.
     pub mode: &'static str,
-    /// Sector offset in place of phase shift.
+    /// Sector offset instead of phase shift.
     pub sectors: bool,
-    /// In phase.
+    /// Phases aligned.
     pub aligned: bool,
-    /// The paper's mean distance and standard deviation, m; none where it gives none.
+    /// The paper's mean distance and standard deviation, m; `None` where not given.
     pub paper_m: Option<[f64; 2]>,
-    /// From the wall to the screened Poisson surface of depth 8: mean, standard deviation, m; mean over the seeds.
+    /// From the wall to the screened Poisson surface of depth 8: mean, standard deviation, m; averaged over the seeds.
     pub poisson_m: [f64; 2],
-    /// From the wall to the plain interpolation in (x, sigma), m.
+    /// From the wall to the plain interpolation in (x, arc length), m.
     pub plain_m: [f64; 2],
     /// The mean distance of each seed, m.
     pub seeds_m: Vec<f64>,
@@ -44,7 +44,7 @@ pub struct MeshRow {
 /// Heads, mode, sectors, aligned, and the paper's mean and standard deviation.
 type Configuration = (u8, &'static str, bool, bool, Option<[f64; 2]>);
 
-/// The configurations that the paper has, and its distances: heads, mode, sectors, aligned, mean and sd.
+/// The paper's configurations and distances: heads, mode, sectors, aligned, mean and sd.
 ///
 /// Source: errata, row "§8.2": the paper's text names one of the unaligned pairs twice.
 const PAPER: [Configuration; 10] = [
@@ -62,7 +62,7 @@ const PAPER: [Configuration; 10] = [
 
 /// All of them.
 ///
-/// Errors: a surface that can't be made; none with the vehicles that are built in.
+/// Errors: no surface can be made; none with the built-in vehicles.
 pub(crate) fn rows(progress: Progress<'_>) -> Result<Vec<MeshRow>, ExperimentError> {
     let mut rows = Vec::new();
     for (heads, mode, sectors, aligned, paper_m) in PAPER {
@@ -95,7 +95,7 @@ pub(crate) fn rows(progress: Progress<'_>) -> Result<Vec<MeshRow>, ExperimentErr
 
 /// The dive of a configuration: heads, mode, sectors, aligned.
 ///
-/// Unaligned heads begin anywhere in their turn, or on the way there and back in their sector.
+/// Unaligned heads begin at a random angle of their turn or sweep.
 pub(crate) fn setting(
     (heads, mode, sectors, aligned): (u8, &'static str, bool, bool),
     length_m: f64,
@@ -107,19 +107,19 @@ pub(crate) fn setting(
     Setting { heads, mode, layout, aligned, occlusion: heads > 2, length_m, effects, seed }
 }
 
-/// Places where the wall was measured to be.
+/// Measured positions of the wall.
 pub(crate) fn cloud(dive: &Dive) -> Vec<Xyz> {
     let samples = dive.heads.iter().flatten().filter(|sample| sample.of_wall);
     samples.map(|sample| [sample.at.x(), sample.at.y(), sample.at.z()]).collect()
 }
 
-/// The surface as the paper made it, and the side of a bin for an index of its triangles, m.
+/// The surface as the paper made it, and the bin size for an index of its triangles, m.
 pub(crate) fn poisson(dive: &Dive, cloud: &[Xyz]) -> Result<(Mesh, f64), ExperimentError> {
     let surface = Surface::through(&normals::towards_axis(&dive.profile, cloud), &Settings::of_paper())?;
     Ok((surface.mesh(), surface.cell_m() / 2.0))
 }
 
-/// From the wall to the Poisson surface and to the plain interpolation.
+/// Distances from the wall to the Poisson surface and to the plain interpolation.
 fn distances(dive: &Dive) -> Result<[Spread; 2], ExperimentError> {
     let cloud = cloud(dive);
     let (mesh, bin_m) = poisson(dive, &cloud)?;

@@ -1,4 +1,4 @@
-//! The paper's experiments as a whole, and whether its findings hold.
+//! All of the paper's experiments, and whether its findings hold.
 
 use serde::Serialize;
 
@@ -9,7 +9,7 @@ use crate::runs::SPEED_MPS;
 use crate::stationary::{self, Perimeter};
 use crate::{ExperimentError, Progress};
 
-/// Ours beside the paper's.
+/// Our results beside the paper's.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Experiments {
     /// Speed of the runs, m/s.
@@ -24,24 +24,24 @@ pub struct Experiments {
     pub hidden: Vec<HiddenRow>,
     /// §9.2.
     pub perimeter: Perimeter,
-    /// What the paper found, and whether it holds.
+    /// The paper's findings, and whether they hold.
     pub findings: Vec<Finding>,
 }
 
 /// A finding of the paper.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Finding {
-    /// What the paper says.
+    /// The paper's statement.
     pub says: &'static str,
-    /// Whether our runs say so, too.
+    /// Whether our runs confirm it.
     pub holds: bool,
-    /// Ours.
+    /// Our result.
     pub evidence: String,
 }
 
-/// Runs all of them. `progress` is told what is being done.
+/// Runs all of them. `progress` gets status messages.
 ///
-/// Errors: none with the vehicles that are built in.
+/// Errors: none with the built-in vehicles.
 pub fn run(progress: Progress<'_>) -> Result<Experiments, ExperimentError> {
     let runs = compared::runs(progress)?;
     let signed_ranks = compared::signed_ranks(&runs)?;
@@ -96,7 +96,7 @@ fn findings(meshes: &[MeshRow], hidden: &[HiddenRow]) -> Vec<Finding> {
     findings
 }
 
-/// §8.3: how far apart passes are where neighbours hide the wall.
+/// §8.3: distance between passes where neighbours occlude the wall.
 fn of_hidden(row: &HiddenRow) -> Finding {
     let twice = (1.9..2.15).contains(&row.times_in_shadow);
     let (says, holds) = match (row.heads, row.side_by_side_deg > 135.0) {

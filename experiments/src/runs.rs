@@ -1,5 +1,5 @@
-//! Simulated dives for the experiments: a vehicle as the paper has it, a straight stretch, and the effects that the
-//! paper's own simulation had.
+//! Simulated dives for the experiments: the paper's vehicle, a straight stretch, and the effects of the
+//! paper's own simulation.
 
 use headrace_config::Document;
 use headrace_geometry::frames::{Point3, Tunnel};
@@ -11,41 +11,41 @@ use headrace_simulator::{Scene, SceneError, Simulation};
 /// The speed that the paper states, m/s (§7.2).
 pub(crate) const SPEED_MPS: f64 = 0.197;
 
-/// What a dive is simulated with.
+/// Settings of a simulated dive.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Setting {
-    /// How many heads: one is VITA 1, more are VITA 2.
+    /// Number of heads: one is VITA 1, more are VITA 2.
     pub heads: u8,
     /// Their mode.
     pub mode: &'static str,
-    /// How they share the work.
+    /// Their layout.
     pub layout: HeadLayout,
-    /// Whether heads apart along the hull are put in phase for the dive's speed.
+    /// Whether heads at different positions along the hull are phased for the dive's speed.
     pub aligned: bool,
-    /// Whether neighbours hide the wall from each other.
+    /// Whether neighbours occlude the wall from each other.
     pub occlusion: bool,
-    /// Metres that the vehicle goes.
+    /// Distance travelled, m.
     pub length_m: f64,
     /// Further lines of the scene's effects; SONARS stands for the ids of the heads.
     pub effects: String,
-    /// Where random numbers begin.
+    /// Random seed.
     pub seed: u64,
 }
 
 /// A ping of a head.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Sample {
-    /// Which head.
+    /// Head number.
     pub head: u16,
     /// Its angle in the sensor's frame, radians.
     pub angle_rad: f64,
-    /// Where the head was.
+    /// Position of the head.
     pub from: Point3<Tunnel>,
-    /// Where the wall was measured to be.
+    /// Measured position of the wall.
     pub at: Point3<Tunnel>,
-    /// Arc length of the place that was truly met, m.
+    /// Arc length of the true hit, m.
     pub arc_m: f64,
-    /// What was measured is the wall, and no part of the vehicle.
+    /// Whether the hit is on the wall, not on the vehicle.
     pub of_wall: bool,
 }
 
@@ -53,7 +53,7 @@ pub(crate) struct Sample {
 pub(crate) struct Dive {
     /// The tunnel's profile.
     pub profile: Profile,
-    /// All pings of all heads in order of time that heard something, by head.
+    /// All pings with an echo, in time order, by head.
     pub heads: Vec<Vec<Sample>>,
     /// Angle between pings, radians.
     pub step_rad: f64,
@@ -61,7 +61,7 @@ pub(crate) struct Dive {
     pub ping_period_s: f64,
 }
 
-/// The kinds of devices that the vehicle files name.
+/// The kinds of devices in the vehicle files.
 const KINDS: [&dyn DeviceKind; 5] = [
     &headrace_imagenex881::Kind,
     &headrace_ping1d::Kind,
@@ -85,7 +85,7 @@ fn vehicle(name: &str) -> Result<Vec<u8>, String> {
 impl Setting {
     /// Simulates the dive.
     ///
-    /// Errors: a scene that can't be read; none for 1 to 4 heads and a mode and effects that exist.
+    /// Errors: the scene can't be read; none for 1 to 4 heads and existing modes and effects.
     pub(crate) fn dive(&self) -> Result<Dive, SceneError> {
         let text = scene_text(self);
         let scene = Scene::parse(Document::new("experiment", &text), &KINDS, &vehicle, Some(self.seed))?;
@@ -129,7 +129,7 @@ fn scene_text(setting: &Setting) -> String {
     };
     let layout =
         HeadLayout::NAMES.iter().find(|(_, layout)| *layout == setting.layout).map_or("", |(name, _)| name);
-    // A planned speed of zero leaves the heads' places along the hull out of their phases.
+    // A planned speed of zero leaves the heads' positions along the hull out of their phases.
     let planned_mps = if setting.aligned { SPEED_MPS } else { 0.0 };
     let layout = if setting.heads == 1 { String::new() } else { format!("heads.layout = \"{layout}\"\n") };
     let occlusion = if setting.occlusion { "occlusion = {}\n" } else { "" };

@@ -1,4 +1,4 @@
-//! The paper's spacings, measured on simulated samples: T_y from ping to ping, T_x from pass to pass, T of both.
+//! The paper's spacings, measured on simulated samples: T_y from ping to ping, T_x from pass to pass, T combined.
 
 use headrace_geometry::math::{self, TAU};
 use headrace_sampling::layout::HeadLayout;
@@ -7,16 +7,16 @@ use serde::Serialize;
 use crate::Spread;
 use crate::runs::{Dive, Sample};
 
-/// Lines along the wall at which passes are counted.
+/// Lines along the wall on which passes are counted.
 const LINES: usize = 72;
-/// Angles by which a step may miss the usual one, as a share of it.
+/// Tolerance of a step's angle, as a share of the usual step.
 const STEP_SHARE: f64 = 0.25;
 
-/// What the paper's Tables 3 to 5 say of a run.
+/// The quantities of the paper's Tables 3 to 5 for a run.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub(crate) struct Spacing {
-    /// Along the tunnel, from pass to pass: what each line of the wall has in the mean; for sectors, what lines at their
-    /// ends have, which is twice the mean.
+    /// Along the tunnel, from pass to pass: mean over the lines along the wall; for sectors, on lines at the sector
+    /// ends, which is twice the mean.
     pub t_x_m: f64,
     /// Across it, from ping to ping in the cross-section.
     pub t_y: Spread,
@@ -24,7 +24,7 @@ pub(crate) struct Spacing {
     pub t_m: [f64; 3],
 }
 
-/// Measures a dive.
+/// Measures the spacings of a dive.
 pub(crate) fn spacing(dive: &Dive, layout: HeadLayout) -> Spacing {
     let t_y = Spread::of(dive.heads.iter().flat_map(|samples| steps_m(samples, dive.step_rad)));
     let t_x_m = match layout {
@@ -41,7 +41,7 @@ fn turned_rad(a: &Sample, b: &Sample) -> f64 {
     math::wrap_signed(b.angle_rad - a.angle_rad, TAU)
 }
 
-/// Distances in the cross-section between pings that follow each other in a sweep.
+/// Distances in the cross-section between consecutive pings of a sweep.
 fn steps_m(samples: &[Sample], step_rad: f64) -> impl Iterator<Item = f64> {
     samples.windows(2).filter_map(move |pair| {
         let [a, b] = pair else { return None };
@@ -51,10 +51,10 @@ fn steps_m(samples: &[Sample], step_rad: f64) -> impl Iterator<Item = f64> {
     })
 }
 
-/// For each line along the wall, the chainages at which a head has passed it, growing.
+/// For each line along the wall, the chainages at which a head passed it, ascending.
 pub(crate) fn passes(dive: &Dive, count: usize) -> Vec<Vec<f64>> {
     let perimeter_m = dive.profile.perimeter_m();
-    // Where only some of the heads have come, or still come, passes are farther apart.
+    // Where only some of the heads have arrived, or are still to arrive, passes are farther apart.
     let ends = |pick: fn(&[Sample]) -> Option<&Sample>| {
         dive.heads.iter().filter_map(move |samples| pick(samples)).map(|s| s.at.x())
     };
@@ -70,7 +70,7 @@ pub(crate) fn passes(dive: &Dive, count: usize) -> Vec<Vec<f64>> {
     (0..count).map(line).collect()
 }
 
-/// The chainages at which a head has passed a line along the wall, in order of time.
+/// The chainages at which a head passed a line along the wall, in time order.
 pub(crate) fn passes_of(dive: &Dive, samples: &[Sample], arc_m: f64) -> impl Iterator<Item = f64> {
     let (perimeter_m, step_rad) = (dive.profile.perimeter_m(), dive.step_rad);
     samples.windows(2).filter_map(move |pair| {
@@ -91,7 +91,7 @@ pub(crate) fn gaps_m(passes: &[f64]) -> impl Iterator<Item = f64> {
     })
 }
 
-/// Chainage gained between a head's turnings at the same end of its sector.
+/// Advance in chainage between a head's turning points at the same end of its sector.
 fn turning_gaps_m(samples: &[Sample]) -> Vec<f64> {
     let mut ends: [Vec<f64>; 2] = [Vec::new(), Vec::new()];
     for triple in samples.windows(3) {

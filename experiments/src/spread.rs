@@ -3,10 +3,10 @@
 use headrace_geometry::math;
 use serde::Serialize;
 
-/// How unsigned lengths are spread, m; all zero of none.
+/// Statistics of unsigned lengths, m; all zero if there are none.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub(crate) struct Spread {
-    /// How many.
+    /// Count.
     pub count: usize,
     /// Mean, m.
     pub mean_m: f64,
@@ -19,7 +19,7 @@ pub(crate) struct Spread {
 }
 
 impl Spread {
-    /// Of the absolute values of `lengths_m`, summed in the order given; those that are no number are left out.
+    /// Of the absolute values of `lengths_m`, summed in the order given; non-finite ones are ignored.
     pub(crate) fn of(lengths_m: impl IntoIterator<Item = f64>) -> Self {
         let (mut mean, mut squares) = (0.0, 0.0);
         let mut spread = Self { min_m: f64::INFINITY, ..Self::default() };

@@ -1,4 +1,4 @@
-//! §9.2: the perimeter of the cross-section from a turn of a vehicle that stands still, seen with a beam of some width.
+//! §9.2: the perimeter of the cross-section from a turn of a stationary vehicle, measured with a beam of finite width.
 
 use headrace_geometry::math::{self, PI, TAU};
 use headrace_geometry::tunnel::shapes;
@@ -13,17 +13,17 @@ const BEAM_DEG: f64 = 1.4;
 const RAYS: i32 = 61;
 /// Pings of a turn in SLOW.
 const PINGS: i32 = 1200;
-/// What the paper measured, m.
+/// The paper's measurement, m.
 const PAPER_M: f64 = 33.09;
 
-/// The perimeter by several ways, m.
+/// The perimeter by several methods, m.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Perimeter {
     /// The blueprint's.
     pub nominal_m: f64,
     /// The paper's measurement.
     pub paper_m: f64,
-    /// The paper's way: skeleton of the echo image, each step of it counted as 1 or sqrt 2 pixels.
+    /// The paper's method: skeleton of the echo image, each step of it counted as 1 or sqrt 2 pixels.
     pub skeleton_m: f64,
     /// The same skeleton, measured without the staircase's excess.
     pub skeleton_smooth_m: f64,
@@ -35,9 +35,9 @@ pub struct Perimeter {
     pub rays_m: f64,
 }
 
-/// Measures it on the blueprint's profile.
+/// Computes it on the blueprint's profile.
 ///
-/// Errors: none that can occur.
+/// Errors: none in practice.
 pub(crate) fn perimeter() -> Result<Perimeter, ExperimentError> {
     let profile = shapes::ceran_blueprint()?;
     let centre = profile.reference();
@@ -45,7 +45,7 @@ pub(crate) fn perimeter() -> Result<Perimeter, ExperimentError> {
         let (sin, cos) = math::sin_cos(angle_rad);
         profile.cast_from_inside(centre, [sin, -cos]).map_or(0.0, |hit| hit.range_m)
     };
-    // Rays evenly over the beam's disc; those ahead and astern go farther to the same wall.
+    // Rays evenly over the beam's disc; those tilted ahead and astern have longer ranges to the same wall.
     let golden_rad = PI * (3.0 - math::sqrt(5.0));
     let cone = |angle_rad: f64| -> Vec<f64> {
         let ray = |number: i32| {

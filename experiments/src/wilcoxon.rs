@@ -1,37 +1,37 @@
-//! The Wilcoxon signed-rank test for pairs.
+//! The paired Wilcoxon signed-rank test.
 //!
-//! Differences are ranked by size, ties sharing the mean of their ranks; W+ is the sum of the ranks of those above zero.
-//! Differences of zero are left out before ranking (Wilcoxon) or ranked and then left out (Pratt); Pratt's way keeps what
-//! they say about the sizes of the others. Without ties and zeros, and for up to 50 pairs, p is exact; else it is that
-//! of a normal distribution with the mean and variance that W+ has given the ranks.
+//! Differences are ranked by size, ties sharing their mean rank; W+ is the sum of the ranks of positive differences.
+//! Zero differences are dropped before ranking (Wilcoxon) or ranked and then dropped (Pratt); Pratt's method preserves
+//! the effect of zeros on the other ranks. Without ties and zeros, and for up to 50 pairs, p is exact; otherwise it is that
+//! of a normal distribution with the mean and variance of W+ given the ranks.
 //!
-//! Source: Wilcoxon 1945; Pratt 1959. The paper's §8.1 doesn't say which way with zeros.
+//! Source: Wilcoxon 1945; Pratt 1959. The paper's §8.1 doesn't give its treatment of zeros.
 
 use headrace_geometry::math;
 
 /// Most pairs for which the exact distribution is taken.
 pub(crate) const EXACT_MAX: usize = 50;
 
-/// What becomes of differences of zero.
+/// Treatment of zero differences.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) enum Zeros {
-    /// Left out before ranking.
+    /// Dropped before ranking.
     #[default]
     Wilcoxon,
-    /// Ranked, then left out.
+    /// Ranked, then dropped.
     Pratt,
 }
 
-/// How the test is made.
+/// Options of the test.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct Options {
-    /// What becomes of zeros.
+    /// Treatment of zeros.
     pub zeros: Zeros,
-    /// Whether the normal approximation moves W+ by a half towards its mean.
+    /// Continuity correction: whether the normal approximation moves W+ by a half towards its mean.
     pub continuity: bool,
 }
 
-/// Where p comes from.
+/// Distribution used for p.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Method {
     /// The distribution of W+ over all signs.
@@ -43,34 +43,34 @@ pub(crate) enum Method {
 /// The test's outcome. The p values are under the hypothesis that differences are symmetric about zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct SignedRank {
-    /// Sum of the ranks of differences above zero.
+    /// Sum of the ranks of positive differences.
     pub w_plus: f64,
-    /// Sum of the ranks of differences below zero.
+    /// Sum of the ranks of negative differences.
     pub w_minus: f64,
-    /// Differences that weren't zero.
+    /// Number of non-zero differences.
     pub used: usize,
-    /// Differences of zero.
+    /// Number of zero differences.
     pub zeros: usize,
     /// Probability of a W+ at least as far from its mean, on either side.
     pub p_two_sided: f64,
-    /// Probability of a W+ at least as large: small where differences tend to lie above zero.
+    /// Probability of a W+ at least as large: small where differences tend to be positive.
     pub p_greater: f64,
     /// Probability of a W+ at most as large.
     pub p_less: f64,
-    /// Where these come from.
+    /// Distribution used.
     pub method: Method,
 }
 
-/// Why there is no test.
+/// Why the test can't be made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub(crate) enum WilcoxonError {
     /// Two lists differ in length.
     #[error("pairs need lists of one length; these have {left} and {right}")]
     Lengths {
-        /// Values of the first.
+        /// Length of the first.
         left: usize,
-        /// Values of the second.
+        /// Length of the second.
         right: usize,
     },
     /// A difference isn't a finite number.
@@ -79,12 +79,12 @@ pub(crate) enum WilcoxonError {
         /// Its index, from zero.
         index: usize,
     },
-    /// Every difference is zero, or there is none.
+    /// All differences are zero, or there are none.
     #[error("every difference is zero: there is nothing to rank")]
     NoDifference,
 }
 
-/// Of `left` minus `right`, pair by pair.
+/// For the pairwise differences `left` minus `right`.
 ///
 /// Errors: see [`WilcoxonError`].
 pub(crate) fn of_pairs(left: &[f64], right: &[f64], options: Options) -> Result<SignedRank, WilcoxonError> {
@@ -95,7 +95,7 @@ pub(crate) fn of_pairs(left: &[f64], right: &[f64], options: Options) -> Result<
     of_differences(&differences, options)
 }
 
-/// Of differences. Those equal in size but for rounding aren't ties: round them first where they are meant to be.
+/// For differences. Sizes that are equal but for rounding aren't ties: round them first if they should be.
 ///
 /// Errors: see [`WilcoxonError`].
 pub(crate) fn of_differences(differences: &[f64], options: Options) -> Result<SignedRank, WilcoxonError> {
@@ -128,7 +128,7 @@ pub(crate) fn of_differences(differences: &[f64], options: Options) -> Result<Si
     Ok(SignedRank { w_plus, w_minus, used, zeros, p_two_sided, p_greater, p_less, method })
 }
 
-/// Ranks from one of values sorted by size; equal sizes share their mean rank.
+/// Ranks, from one, of values sorted by size; equal sizes share their mean rank.
 fn ranks_of(sorted: &[f64]) -> Vec<f64> {
     let mut ranks = Vec::with_capacity(sorted.len());
     for tie in sorted.chunk_by(|a, b| a.abs() >= b.abs()) {
@@ -151,7 +151,7 @@ fn exact(n: usize, w_plus: f64) -> [f64; 3] {
     [(2.0 * less.min(greater)).min(1.0), greater, less]
 }
 
-/// How many choices of signs give each W+ from 0 to n (n + 1) / 2. Exact: 2^50 is below 2^53.
+/// Number of sign choices for each W+ from 0 to n (n + 1) / 2. Exact: 2^50 is below 2^53.
 fn sign_choices(n: usize) -> Vec<f64> {
     let mut counts = vec![0.0; n * (n + 1) / 2 + 1];
     counts[0] = 1.0;
@@ -163,7 +163,7 @@ fn sign_choices(n: usize) -> Vec<f64> {
     counts
 }
 
-/// As [`exact`], by the normal distribution; W+ is a sum of ranks, each there or not with even odds.
+/// As [`exact`], by the normal distribution; W+ is a sum of ranks, each included with even odds.
 fn normal(ranks: impl Iterator<Item = f64>, w_plus: f64, continuity: bool) -> [f64; 3] {
     let (sum, squares) = ranks.fold((0.0, 0.0), |(sum, squares), rank| (sum + rank, squares + rank * rank));
     let (off, sd) = (w_plus - sum / 2.0, math::sqrt(squares / 4.0));

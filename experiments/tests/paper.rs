@@ -1,4 +1,4 @@
-//! `headrace_experiments tables`: the paper's Tables 1 to 5 beside ours, in words and as JSON.
+//! `headrace_experiments tables`: the paper's Tables 1 to 5 beside ours, as text and as JSON.
 
 #![allow(
     clippy::unwrap_used,
@@ -14,7 +14,7 @@ fn answer(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_headrace_experiments")).args(arguments).output().unwrap()
 }
 
-/// What the command answers; it must succeed.
+/// Output of the command; it must succeed.
 fn shown(further: &[&str]) -> String {
     let Output { status, stdout, stderr } = answer(&[&["tables"], further].concat());
     assert_eq!((status.code(), stderr.as_slice()), (Some(0), &[][..]));
@@ -39,7 +39,7 @@ fn cells(path: &str, value: &Value, found: &mut Vec<(String, Value)>) {
     }
 }
 
-/// What is said of tables, by number; 0 is what is said before the first.
+/// The text on the given tables; 0 is the text before the first.
 fn said(tables: &[usize]) -> String {
     let shown = shown(&[]);
     let parts: Vec<&str> = shown.split("\n\n").collect();

@@ -1,4 +1,4 @@
-//! The sheet that a figure is drawn on, in pixels from its upper left corner.
+//! The sheet of a figure, in pixels from its upper left corner.
 
 use std::cell::RefCell;
 
@@ -12,21 +12,21 @@ use super::polyline::{self, Px};
 
 /// Usual width and height of a sheet, pixels.
 pub const SIZE_PX: [u32; 2] = [900, 560];
-/// Mean width of a letter of the usual fonts, plain and bold, as a share of their size; rather too wide.
+/// Mean width of a letter of the usual fonts, plain and bold, as a share of their size; a slight overestimate.
 const LETTER: [f64; 2] = [0.56, 0.65];
 
-/// Where a text stands with respect to its place.
+/// Horizontal alignment of a text at its position.
 #[derive(Debug, Clone, Copy)]
 pub enum Side {
-    /// It begins there.
+    /// Begins there.
     Right,
-    /// It ends there.
+    /// Ends there.
     Left,
-    /// It is centred there.
+    /// Centred there.
     Middle,
 }
 
-/// How a text is written.
+/// Style of a text.
 #[derive(Debug, Clone, Copy)]
 pub struct Letters {
     /// Height of the letters, pixels.
@@ -39,18 +39,18 @@ pub struct Letters {
     pub upright: bool,
 }
 
-/// Labels and names of axes.
+/// Labels and axis names.
 pub const NORMAL: Letters = Letters { size_px: 13.0, colour: BLACK, bold: false, upright: false };
-/// Numbers of axes and notes.
+/// Axis numbers and notes.
 pub const SMALL: Letters = Letters { size_px: 12.0, colour: DIM, bold: false, upright: false };
 /// Headings and results.
 pub const BOLD: Letters = Letters { bold: true, ..NORMAL };
 const TITLE: Letters = Letters { size_px: 18.0, bold: true, ..NORMAL };
 
-/// A sheet and what has been drawn on it so far; later drawings cover earlier ones.
+/// A sheet with the drawings so far; later ones cover earlier ones.
 pub struct Canvas(RefCell<Document>);
 
-/// About how wide a text will be, pixels.
+/// Approximate width of a text, pixels.
 pub fn width_px(text: &str, letters: Letters) -> f64 {
     letter_px(letters) * text.chars().count() as f64
 }
@@ -67,7 +67,7 @@ fn fitting(text: &str, room_px: f64, letters: Letters) -> String {
     text.chars().take(usize::try_from(most).unwrap_or(0)).chain(['…']).collect()
 }
 
-/// A tenth of a pixel is as fine as anybody sees.
+/// Rounded to a tenth of a pixel, finer than visible.
 fn number(px: f64) -> String {
     let text = format!("{:.1}", px + 0.0);
     let text = text.strip_suffix(".0").unwrap_or(&text);
@@ -84,12 +84,12 @@ fn hex(Colour(red, green, blue): Colour) -> String {
 }
 
 impl Canvas {
-    /// A white sheet of [`SIZE_PX`] with two lines of title; the second is cut off where it is too long.
+    /// A white sheet of [`SIZE_PX`] with two title lines; the second is truncated if too long.
     pub fn new(title: &str, subtitle: &str) -> Self {
         Self::of_size(SIZE_PX, title, subtitle)
     }
 
-    /// The same of another width and height, pixels.
+    /// The same with a given width and height, pixels.
     pub fn of_size([width, height]: [u32; 2], title: &str, subtitle: &str) -> Self {
         let document = Document::new()
             .set("width", width)
@@ -113,14 +113,14 @@ impl Canvas {
         self.0.borrow_mut().append(node);
     }
 
-    /// A line of text, centred on its place from top to bottom.
+    /// A line of text, vertically centred on its position.
     pub fn text(&self, [x, y]: Px, text: &str, side: Side, letters: Letters) {
         let anchor = match side {
             Side::Right => "start",
             Side::Left => "end",
             Side::Middle => "middle",
         };
-        // Not every viewer centres letters by itself: their middle is about a third of their size above the line.
+        // Not every viewer supports vertical centring: the middle of letters is about a third of their size above the baseline.
         let mut node = element::Text::new(text)
             .set("x", number(x))
             .set("y", number(y + 0.35 * letters.size_px))
@@ -136,7 +136,7 @@ impl Canvas {
         self.put(node);
     }
 
-    /// The same on a white ground, for places that lines cross.
+    /// The same on a white background, for positions crossed by lines.
     pub fn text_on_white(&self, place: Px, text: &str, side: Side, letters: Letters) {
         let width = width_px(text, letters);
         let left = match side {
@@ -160,7 +160,7 @@ impl Canvas {
         self.put(node);
     }
 
-    /// Round dots of one look, as one element.
+    /// Round dots of one colour, as one element.
     pub fn dots(&self, places: &[Px], across_px: f64, colour: Colour) {
         let dot = |[x, y]: &Px| format!("M{} {}h0", number(*x), number(*y));
         let node = element::Path::new()
@@ -181,12 +181,12 @@ impl Canvas {
         let node = element::Path::new()
             .set("d", areas.iter().map(area).collect::<String>())
             .set("fill", hex(colour))
-            // Neighbours would show the sheet between them.
+            // Anti-aliasing would show the sheet between neighbours.
             .set("shape-rendering", "crispEdges");
         self.put(node);
     }
 
-    /// A line with an arrow's head at either end.
+    /// A line with an arrowhead at either end.
     pub fn span(&self, from: Px, to: Px, look: &Look) {
         self.line(&[from, to], look);
         let [dx, dy] = [to[0] - from[0], to[1] - from[1]];
@@ -205,7 +205,7 @@ impl Canvas {
         self.put(element::Polygon::new().set("points", points(corners)).set("fill", hex(colour)));
     }
 
-    /// A line through these places as a look has it.
+    /// A line through these positions, in the given look.
     pub fn line(&self, places: &[Px], look: &Look) {
         let mut node = element::Polyline::new()
             .set("points", points(&polyline::thinned(places)))
@@ -219,7 +219,7 @@ impl Canvas {
         self.put(node);
     }
 
-    /// A marker, filled or with a white inside.
+    /// A marker, filled or with a white interior.
     pub fn marker(&self, place: Px, look: &Look, size_px: f64, filled: bool) {
         let inside = if filled { look.colour } else { WHITE };
         let outline = Look { width_px: 1.4, dash: &[], ..*look };

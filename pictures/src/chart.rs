@@ -1,4 +1,4 @@
-//! A chart: a frame with two axes, and the way from metres to pixels.
+//! A chart: a frame with two axes, and the mapping from metres to pixels.
 
 use headrace_geometry::math;
 
@@ -8,11 +8,11 @@ use super::look::{AXIS, GRID, Look};
 use super::polyline::Frame;
 use super::polyline::Px;
 
-/// Length of the mark at a number, pixels.
+/// Length of a tick mark, pixels.
 const TICK_PX: f64 = 4.0;
 const NUMBER: Letters = Letters { colour: BLACK, ..SMALL };
 
-/// What an axis shows.
+/// An axis: name, range and ticks.
 #[derive(Debug, Clone)]
 #[must_use]
 pub struct Axis {
@@ -21,30 +21,30 @@ pub struct Axis {
     ticks: Vec<f64>,
     digits: usize,
     name: String,
-    /// How far its name is from it, pixels.
+    /// Distance of its name from it, pixels.
     name_px: f64,
     numbered: bool,
 }
 
 impl Axis {
-    /// An axis with at most so many ticks.
+    /// An axis with at most `most_ticks` ticks.
     pub fn new(name: &str, from: f64, to: f64, most_ticks: u32) -> Self {
         let (ticks, digits) = ticks(from, to, most_ticks);
         Self { from, to, ticks, digits, name: name.to_owned(), name_px: 36.0, numbered: true }
     }
 
-    /// With its name so far off, pixels.
+    /// With its name at a given distance, pixels.
     pub fn with_name_at(self, name_px: f64) -> Self {
         Self { name_px, ..self }
     }
 
-    /// Without name and numbers, where the chart beside it has them.
+    /// Without name and numbers, where the adjacent chart has them.
     pub fn bare(self) -> Self {
         Self { name: String::new(), numbered: false, ..self }
     }
 }
 
-/// Round numbers within a range, and the digits that they take after the point.
+/// Round numbers within a range, and the decimals that they need.
 fn ticks(from: f64, to: f64, most: u32) -> (Vec<f64>, usize) {
     const DECADES: [(f64, usize); 10] = [
         (1e-4, 4),
@@ -68,7 +68,7 @@ fn ticks(from: f64, to: f64, most: u32) -> (Vec<f64>, usize) {
     ((0..=most).map(tick).filter(|tick| *tick <= to + 1e-9 * step).collect(), digits)
 }
 
-/// A number with about three figures.
+/// A number with about three significant digits.
 pub fn short(value: f64) -> String {
     match value.abs() {
         size if size < 0.0995 => format!("{value:.3}"),
@@ -80,9 +80,9 @@ pub fn short(value: f64) -> String {
 
 /// A chart on a canvas.
 pub struct Chart<'c> {
-    /// What it is drawn on.
+    /// The canvas.
     pub canvas: &'c Canvas,
-    /// Where on the sheet its axes meet and end.
+    /// Position of the axes on the sheet.
     pub frame: Frame,
     x: [f64; 2],
     y: [f64; 2],
@@ -127,14 +127,14 @@ impl<'c> Chart<'c> {
         chart
     }
 
-    /// Where a point is on the sheet.
+    /// Position of a point on the sheet.
     pub fn px(&self, [x, y]: [f64; 2]) -> Px {
         let share = |value: f64, [from, to]: [f64; 2]| (value - from) / (to - from);
         let Frame { left, top, right, bottom } = self.frame;
         [left + share(x, self.x) * (right - left), bottom - share(y, self.y) * (bottom - top)]
     }
 
-    /// The line through these points, as far as it is within the frame; gives its pieces on the sheet.
+    /// The line through these points, clipped to the frame; returns its pieces on the sheet.
     pub fn line(&self, points: &[[f64; 2]], look: &Look) -> Vec<Vec<Px>> {
         let places: Vec<Px> = points.iter().map(|point| self.px(*point)).collect();
         let pieces = self.frame.cut(&places);
@@ -144,19 +144,19 @@ impl<'c> Chart<'c> {
         pieces
     }
 
-    /// A line from the left to the right.
+    /// A horizontal line.
     pub fn across(&self, y: f64, look: &Look) {
         self.line(&[[self.x[0], y], [self.x[1], y]], look);
     }
 
-    /// A line from the bottom to the top.
+    /// A vertical line.
     pub fn upright(&self, x: f64, look: &Look) {
         self.line(&[[x, self.y[0]], [x, self.y[1]]], look);
     }
 
-    /// An ellipse about a place on the sheet, as far as it is within the frame.
+    /// An ellipse about a position on the sheet, clipped to the frame.
     pub fn ellipse(&self, centre: Px, radii: Px, ground: Colour, look: &Look) {
-        /// Corners of the polygon that stands for it.
+        /// Corners of the approximating polygon.
         const CORNERS: u32 = 72;
         let Frame { left, top, right, bottom } = self.frame;
         let corner = |k: u32| {
@@ -172,7 +172,7 @@ impl<'c> Chart<'c> {
         }
     }
 
-    /// Words in place of what can't be drawn, in the middle of the frame.
+    /// Text in the middle of the frame, in place of a curve that can't be drawn.
     pub fn instead(&self, lines: &[String]) {
         let Frame { left, top, right, bottom } = self.frame;
         let first = f64::midpoint(top, bottom) - 10.0 * (lines.len() as f64 - 1.0);

@@ -1,4 +1,4 @@
-//! Places of the wall as people call them.
+//! Positions on the wall as clock hours.
 
 use headrace_geometry::math;
 use headrace_geometry::tunnel::Profile;
@@ -7,19 +7,19 @@ use super::canvas::{NORMAL, Side};
 use super::chart::Chart;
 use super::look::AXIS;
 
-/// A place of the perimeter with the hour it has on a clock.
+/// A position on the perimeter with its clock hour.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Hour {
     /// Arc length, m.
     pub arc_m: f64,
     /// The hour alone.
     pub clock: String,
-    /// What is there; empty between floor, walls and crown.
+    /// Name of the place; empty between floor, walls and crown.
     pub place: &'static str,
 }
 
 impl Hour {
-    /// The hour, and what is there.
+    /// The hour, and the name of the place.
     pub fn words(&self) -> String {
         format!("{} {}", self.clock, self.place).trim_end().to_owned()
     }
@@ -42,7 +42,7 @@ pub fn hours(profile: &Profile) -> Vec<Hour> {
     let hour = |(k, (clock, place)): (u32, (&str, &'static str))| {
         let (sine, cosine) = math::sin_cos(math::TAU * f64::from(k) / 8.0);
         let arc_m = match k {
-            // The seam itself may come out on either side of it.
+            // The seam itself may be rounded to either side.
             0 => 0.0,
             8 => profile.perimeter_m(),
             _ => profile.arc_of([y_m + sine, z_m - cosine]),
@@ -52,7 +52,7 @@ pub fn hours(profile: &Profile) -> Vec<Hour> {
     (0..).zip(NAMES).map(hour).collect()
 }
 
-/// Hours to the right of a chart that has arc lengths upwards.
+/// Hours to the right of a chart with arc length as its y axis.
 pub fn at_right(chart: &Chart<'_>, profile: &Profile) {
     for hour in hours(profile) {
         let y = chart.px([0.0, hour.arc_m])[1];

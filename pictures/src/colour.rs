@@ -8,7 +8,7 @@ pub struct Colour(pub u8, pub u8, pub u8);
 pub const BLACK: Colour = Colour(0, 0, 0);
 /// Small text, axes, targets.
 pub const DIM: Colour = Colour(85, 85, 85);
-/// Leaders from labels, what is hidden.
+/// Label leaders, hidden parts.
 pub const PALE: Colour = Colour(150, 150, 150);
 /// The paper.
 pub const WHITE: Colour = Colour(255, 255, 255);

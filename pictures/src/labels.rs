@@ -7,17 +7,17 @@ use super::polyline::Px;
 
 /// Height of a line of text, pixels.
 const LINE_PX: f64 = 16.0;
-/// Between a frame and its labels, pixels.
+/// Gap between a frame and its labels, pixels.
 const APART_PX: f64 = 12.0;
 
-/// What stands at the end of a curve.
+/// The label at the end of a curve.
 #[derive(Debug, Clone)]
 pub struct Label {
     /// The end.
     pub place: Px,
-    /// Its words, line by line.
+    /// Its text, line by line.
     pub lines: Vec<String>,
-    /// That of the curve, for its colour.
+    /// Look of the curve, for the label's colour.
     pub look: Look,
     /// Bold rather than plain.
     pub bold: bool,
@@ -34,7 +34,7 @@ impl Label {
     }
 }
 
-/// Draws labels to the right of a frame, each as near to its place as its neighbours let it.
+/// Draws labels to the right of a frame, each as near to its curve's end as its neighbours allow.
 pub fn at_right(canvas: &Canvas, frame: &Frame, labels: &[Label]) {
     let mut labels: Vec<&Label> = labels.iter().collect();
     labels.sort_by(|a, b| a.place[1].total_cmp(&b.place[1]));
@@ -49,7 +49,7 @@ pub fn at_right(canvas: &Canvas, frame: &Frame, labels: &[Label]) {
     }
 }
 
-/// Draws labels of one line above a frame.
+/// Draws one-line labels above a frame.
 pub fn above(canvas: &Canvas, frame: &Frame, labels: &[Label]) {
     let mut labels: Vec<&Label> = labels.iter().collect();
     labels.sort_by(|a, b| a.place[0].total_cmp(&b.place[0]));
@@ -63,7 +63,7 @@ pub fn above(canvas: &Canvas, frame: &Frame, labels: &[Label]) {
     }
 }
 
-/// Middles of intervals as near to the places wanted, in order, as their lengths allow, within bounds if they fit.
+/// Middles of intervals as near to the wanted positions, in order, as their lengths allow, within bounds if they fit.
 fn moved_apart(wanted: &[(f64, f64)], from: f64, to: f64) -> Vec<f64> {
     let mut middles: Vec<f64> = Vec::with_capacity(wanted.len());
     let mut free = from;

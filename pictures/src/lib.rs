@@ -1,6 +1,6 @@
-//! What figures are drawn with: a sheet, charts, looks of lines and markers, labels; as SVG text.
+//! Drawing of figures: sheet, charts, looks of lines and markers, labels; as SVG text.
 //!
-//! Drawn for white paper: every line has a dash pattern and a label of its own besides its colour. The same input gives
+//! Drawn for white paper: every line has its own dash pattern and label as well as its colour. The same input gives
 //! the same bytes.
 
 pub mod canvas;

@@ -1,19 +1,19 @@
-//! How lines and markers look: never by colour alone.
+//! Looks of lines and markers, never distinguished by colour alone.
 
 use super::colour::{BLACK, Colour, DIM, PALE};
 
-/// The colours of Okabe and Ito, which most colour-blind people tell apart, without those too pale for lines.
+/// The palette of Okabe and Ito, which most colour-blind people can distinguish, without the colours too pale for lines.
 const BLUE: Colour = Colour(0, 114, 178);
 const VERMILION: Colour = Colour(213, 94, 0);
 const GREEN: Colour = Colour(0, 158, 115);
 const PURPLE: Colour = Colour(170, 51, 119);
 
-/// What marks a point.
+/// Shape that marks a point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Marker {
     /// Drawn as a circle; has no corners.
     Circle,
-    /// Sides upright and level.
+    /// Sides vertical and horizontal.
     Square,
     /// Tip up.
     Triangle,
@@ -36,16 +36,16 @@ impl Marker {
     }
 }
 
-/// How a line and the markers on it look.
+/// Look of a line and its markers.
 #[derive(Debug, Clone, Copy)]
 pub struct Look {
-    /// Of line, markers and labels.
+    /// Colour of line, markers and labels.
     pub colour: Colour,
     /// Width of the line, pixels.
     pub width_px: f64,
     /// Lengths of dash, gap, dash, ..., pixels; empty for a solid line.
     pub dash: &'static [f64],
-    /// What marks its points.
+    /// Marker of its points.
     pub marker: Marker,
 }
 
@@ -53,7 +53,7 @@ const fn look(colour: Colour, dash: &'static [f64], marker: Marker) -> Look {
     Look { colour, width_px: 2.0, dash, marker }
 }
 
-/// For what there are several of: modes, heads.
+/// Looks for series of several curves: modes, heads.
 const SEVERAL: [Look; 8] = [
     look(BLUE, &[], Marker::Circle),
     look(VERMILION, &[9.0, 4.0], Marker::Square),
@@ -65,12 +65,12 @@ const SEVERAL: [Look; 8] = [
     look(GREEN, &[5.0, 7.0], Marker::Diamond),
 ];
 
-/// The look of one of several.
+/// The look of curve `number` of several.
 pub fn of_several(number: usize) -> Look {
     SEVERAL.get(number % SEVERAL.len()).copied().unwrap_or(T)
 }
 
-/// T, and what stands for it.
+/// T, and curves that represent it.
 pub const T: Look = look(BLACK, &[], Marker::Circle);
 /// T_x: between passes.
 pub const T_X: Look = look(BLUE, &[10.0, 4.0], Marker::Square);
@@ -78,13 +78,13 @@ pub const T_X: Look = look(BLUE, &[10.0, 4.0], Marker::Square);
 pub const T_Y: Look = look(VERMILION, &[3.0, 3.0], Marker::Triangle);
 /// The target.
 pub const TARGET: Look = Look { width_px: 1.6, ..look(DIM, &[6.0, 5.0], Marker::Circle) };
-/// What was asked about.
+/// The queried value.
 pub const ASKED: Look = Look { width_px: 1.4, ..look(DIM, &[2.0, 4.0], Marker::Circle) };
-/// What the vehicle hides.
+/// Parts occluded by the vehicle.
 pub const HIDDEN: Look = Look { width_px: 1.2, ..look(PALE, &[1.5, 3.5], Marker::Circle) };
-/// Lines across a chart at its numbers.
+/// Grid lines.
 pub const GRID: Look = Look { width_px: 0.8, ..look(Colour(228, 228, 228), &[], Marker::Circle) };
 /// The axes.
 pub const AXIS: Look = Look { width_px: 1.0, ..look(DIM, &[], Marker::Circle) };
-/// From a label to what it is of.
+/// From a label to its item.
 pub const LEADER: Look = Look { width_px: 0.8, ..look(PALE, &[], Marker::Circle) };

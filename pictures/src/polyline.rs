@@ -1,11 +1,11 @@
-//! Lines through points: cut off at a frame, and thinned.
+//! Polylines: clipped to a frame, and simplified.
 
 use headrace_geometry::math;
 
-/// A place on the sheet: to the right and down, pixels.
+/// A position on the sheet: right and down, pixels.
 pub type Px = [f64; 2];
 
-/// How far a thinned line may be from the one it stands for, pixels.
+/// Greatest deviation of a simplified line, pixels.
 const THINNED_PX: f64 = 0.1;
 
 /// A rectangle on the sheet, pixels from its left and upper edges.
@@ -22,7 +22,7 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// The pieces of a line that lie within.
+    /// The pieces of a line within the frame.
     pub fn cut(&self, line: &[Px]) -> Vec<Vec<Px>> {
         let mut pieces: Vec<Vec<Px>> = Vec::new();
         for pair in line.windows(2) {
@@ -36,7 +36,7 @@ impl Frame {
         pieces
     }
 
-    /// The part of a segment that lies within. Source: Liang and Barsky 1984.
+    /// The part of a segment within the frame. Source: Liang and Barsky 1984.
     fn cut_segment(&self, from: Px, to: Px) -> Option<[Px; 2]> {
         let [dx, dy] = [to[0] - from[0], to[1] - from[1]];
         let (mut first, mut last) = (0.0_f64, 1.0_f64);
@@ -56,20 +56,20 @@ impl Frame {
             }
         }
         let along = |share: f64| [from[0] + share * dx, from[1] + share * dy];
-        // An end that stays is kept to the bit, so that pieces can be joined.
+        // An unclipped end is kept to the bit, so that pieces can be joined.
         let begin = if first > 0.0 { along(first) } else { from };
         let end = if last < 1.0 { along(last) } else { to };
         (first <= last).then_some([begin, end])
     }
 
-    /// Whether a place lies within.
+    /// Whether a position is within the frame.
     pub fn has(&self, place: Px) -> bool {
         (self.left..=self.right).contains(&place[0]) && (self.top..=self.bottom).contains(&place[1])
     }
 }
 
-/// A step over a wall that is unrolled at its seam, from (x, arc length) to (x, arc length), m: as one segment, or as two
-/// that end and begin at the seam where that is the shorter way.
+/// A step over a wall that is unrolled at its seam, from (x, arc length) to (x, arc length), m: as one segment, or, where
+/// the way over the seam is shorter, as two that meet there.
 pub fn over_seam(perimeter_m: f64, from: [f64; 2], to: [f64; 2]) -> Vec<[[f64; 2]; 2]> {
     let around_m = math::wrap_signed(to[1] - from[1], perimeter_m);
     if (to[1] - from[1] - around_m).abs() < 1e-9 {
@@ -81,7 +81,7 @@ pub fn over_seam(perimeter_m: f64, from: [f64; 2], to: [f64; 2]) -> Vec<[[f64; 2
     vec![[from, [x_m, leaving_m]], [[x_m, entering_m], to]]
 }
 
-/// The line without the points that it hardly needs. Source: Douglas and Peucker 1973.
+/// Simplified line. Source: Douglas and Peucker 1973.
 pub fn thinned(line: &[Px]) -> Vec<Px> {
     let mut keep = vec![false; line.len()];
     if let Some(end) = keep.first_mut() {
@@ -102,7 +102,7 @@ pub fn thinned(line: &[Px]) -> Vec<Px> {
     line.iter().zip(keep).filter(|(_, kept)| *kept).map(|(point, _)| *point).collect()
 }
 
-/// The point between two that is farthest from the chord, if it is too far to be left out.
+/// The point between two others that is farthest from their chord, if beyond the tolerance.
 fn farthest(line: &[Px], first: usize, last: usize) -> Option<usize> {
     let (from, to) = (*line.get(first)?, *line.get(last)?);
     let between = line.iter().enumerate().take(last).skip(first + 1);

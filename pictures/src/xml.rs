@@ -2,7 +2,7 @@
 
 /// Whether tags are closed in order, attributes quoted, and all else escaped.
 ///
-/// Errors: what is wrong first, in words.
+/// Errors: the first fault, as text.
 pub fn well_formed(svg: &str) -> Result<(), String> {
     let mut open: Vec<&str> = Vec::new();
     let mut rest = svg;

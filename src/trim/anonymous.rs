@@ -11,7 +11,7 @@ use crate::devices::KINDS;
 use crate::failure::Failure;
 use crate::files;
 
-/// Metadata keys that are kept: they identify nobody.
+/// Metadata keys that are kept, as they don't identify anyone.
 const KEPT_KEYS: [&str; 4] = [FORMAT_KEY, "version", "import_format", TRIMMED];
 /// Log times later than this, the beginning of the year 2000, are UTC, not those of a monotonic clock.
 const UTC_FROM_NS: u64 = 946_684_800_000_000_000;
@@ -26,7 +26,7 @@ pub(crate) struct Anonymous {
 }
 
 impl Anonymous {
-    /// For a log and its vehicle.
+    /// Anonymises the header of a log and its vehicle file.
     ///
     /// Errors: the anonymised vehicle file can't be parsed, which would be a bug.
     pub(crate) fn of(log: &DiveLog, vehicle: &VehicleConfig) -> Result<Self, Failure> {
@@ -90,9 +90,9 @@ fn ending(name: &str) -> &str {
     name.rfind('.').and_then(|dot| name.get(dot..)).unwrap_or_default()
 }
 
-/// A `connect` of the same carrier without identifying parts; `number` keeps them apart.
+/// A `connect` of the same carrier without identifying parts; `number` keeps several distinct.
 fn connect(text: &str, number: usize) -> String {
-    // Addresses for documents, RFC 5737.
+    // Documentation addresses, RFC 5737.
     let host = |address: &str| {
         let port = address.rsplit_once(':').map_or("", |(_, port)| port);
         format!("192.0.2.{}:{port}", number % 250 + 1)
@@ -138,7 +138,7 @@ fn anonymised(text: &str, names: &[(String, String)]) -> String {
     lines.fold(String::new(), |all, line| all + line + "\n")
 }
 
-/// Bytes of the TOML string that `text` begins with, its quotes included.
+/// Length of the TOML string that `text` begins with, in bytes, including its quotes.
 fn string_len(text: &str, quote: char) -> usize {
     let long: String = [quote; 3].iter().collect();
     let end = if text.starts_with(&long) { long.as_str() } else { text.get(..1).unwrap_or_default() };

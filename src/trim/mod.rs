@@ -26,7 +26,7 @@ use crate::vehicle_file;
 use crate::watch::Watch;
 use anonymous::Anonymous;
 
-/// Tick length of the replay that finds when the vehicle was where.
+/// Tick length of the replay that finds the vehicle's chainage over time.
 const TICK: DurNs = DurNs::from_millis(20);
 /// Gaps outside the range of chainage, or without a fix, that are not cut out.
 const BRIDGED: DurNs = DurNs::from_millis(2000);
@@ -62,7 +62,7 @@ fn vehicle(args: &Trim, files: &[PathBuf], info: &LogInfo) -> Result<Option<Vehi
     Ok(Some(vehicle))
 }
 
-/// The spans of log time that are kept; empty where all are.
+/// Spans of log time to keep; empty to keep all.
 fn spans(
     args: &Trim,
     files: &[PathBuf],

@@ -1,29 +1,29 @@
-//! What to do about a failed stretch.
+//! Recommended action for a failed stretch.
 
 use serde::{Serialize, Serializer};
 
 use super::cause::Cause;
 
-/// What must be other than it was when a stretch is passed again.
+/// Change to make when a failed stretch is passed again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Action {
     /// Slower.
     Slower,
-    /// A finer mode: slower won't help.
+    /// A mode with a finer angular step: lower speed does not help.
     FinerMode,
     /// A longer range setting.
     LongerRange,
-    /// The other way round or rolled, so that the vehicle hides another part of the wall.
+    /// Opposite heading or rolled, so that the vehicle occludes another part of the wall.
     OtherSide,
-    /// In the middle and steady.
+    /// Centred in the tunnel and steady.
     Middle,
-    /// The heads put in phase.
+    /// Heads in phase.
     InPhase,
-    /// The head that stood mended, or slower without it.
+    /// The stalled head repaired, or slower without it.
     Head,
-    /// The position found again.
+    /// With the position fix restored.
     Position,
-    /// Nothing but once more, from end to end.
+    /// No change: pass again, from end to end.
     Again,
 }
 
@@ -41,7 +41,7 @@ impl Action {
         Self::Again,
     ];
 
-    /// What helps against a cause.
+    /// The action against a cause.
     pub fn of(cause: Cause) -> Self {
         match cause {
             Cause::TooFast => Self::Slower,

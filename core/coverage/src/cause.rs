@@ -1,7 +1,7 @@
-//! Why a section failed, from what was measured while it was passed.
+//! Cause of a failed section, from the statistics of its passage.
 //!
-//! A cause is what, taken away, would have let the section pass: each is tried on the figures of the passage. What gave no
-//! sample counts where it was aimed into the hole itself. `docs/coverage.md` has the order and its reasons.
+//! A cause is a factor whose removal would have let the section pass: each is tested on the figures of the passage. Lost
+//! pings count only if aimed into the hole itself. `docs/coverage.md` has the order and its reasons.
 
 use serde::{Deserialize, Serialize};
 
@@ -10,27 +10,27 @@ use super::passage::{Loss, Passage, lost_within};
 use crate::Reach;
 use headrace_sampling::spacing;
 
-/// The one cause that a fail is put down to. Source: metrics.md, "Sections and verdicts".
+/// Cause assigned to a fail. Source: metrics.md, "Sections and verdicts".
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Cause {
     /// The distance between passes was too large at the speed driven.
     TooFast,
-    /// The angle between pings alone leaves such holes; slower won't help.
+    /// The angular step alone leaves such holes; lower speed does not help.
     AngularStep,
-    /// Returns that should have come did not.
+    /// No returns although the wall was within range.
     MissingReturns,
     /// The wall was farther than the heads' range setting.
     OutOfRange,
-    /// The vehicle itself stood in the beams' way.
+    /// The vehicle occluded the beams.
     Occluded,
-    /// The vehicle was out of the middle, or turned so that its beams swung along the tunnel.
+    /// The vehicle was off-centre, or turned so that its beams swung along the tunnel.
     OffAxis,
     /// The heads' passes were unevenly spread; evenly spread they would have met the target.
     Phase,
-    /// A head stood still.
+    /// A head was stalled.
     HeadStalled,
-    /// Returns came but could not be placed.
+    /// Returns came without a valid position.
     PositionLost,
     /// The hole reaches beyond the stretch that was passed.
     NotPassed,
@@ -76,8 +76,8 @@ impl Cause {
     }
 }
 
-/// The figures behind a cause: means over the pings made within the section that was driven worst, of those that the hole
-/// touches; shares and counts over all of these.
+/// Figures behind a cause: means over the pings of the worst-driven section that the hole touches; shares and counts
+/// over all sections that it touches.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Evidence {
     /// The cause.
@@ -90,19 +90,19 @@ pub struct Evidence {
     pub pass_gap_s: f64,
     /// Time between passes had they been spread evenly, seconds.
     pub even_pass_gap_s: f64,
-    /// The same, had all heads turned, seconds.
+    /// The same if all heads had been turning, seconds.
     pub all_pass_gap_s: f64,
     /// Share of pings without a return, beyond range or not.
     pub missing_share: f64,
-    /// Share of pings that the vehicle itself stopped.
+    /// Share of pings occluded by the vehicle.
     pub occluded_share: f64,
-    /// Share of pings of a head that stood still.
+    /// Share of pings of a stalled head.
     pub standing_share: f64,
-    /// Parts of the hole's wall, a 64th of the perimeter in a section each, at which pings were aimed in vain.
+    /// Bins of the hole's wall (a 64th of the perimeter by one section) into which pings were lost, summed over reasons.
     pub lost_in_hole: u32,
-    /// Largest distance between neighbours of one turn that geometry gives, m.
+    /// Largest step along the perimeter between neighbouring samples of one turn, m.
     pub t_y_m: f64,
-    /// The same from the middle of the tunnel, level, m.
+    /// The same predicted for a level vehicle in the middle of the tunnel, m.
     pub middle_t_y_m: f64,
     /// How far the beams swung along the tunnel between two passes, m.
     pub swing_m: f64,
@@ -113,7 +113,7 @@ pub struct Evidence {
 pub struct Case<'a> {
     /// The hole.
     pub hole: &'a Hole,
-    /// The stretch that every head had swept by then.
+    /// Stretch that every live head had swept by then.
     pub swept_by_all: Option<Reach>,
     /// Target T, m.
     pub target_m: f64,
@@ -121,13 +121,13 @@ pub struct Case<'a> {
     pub perimeter_m: f64,
 }
 
-/// Names the cause of a hole from the sections that it touches, each with the chainages at which it begins and ends.
+/// Determines the cause of a hole from the sections that it touches, each with its start and end chainage.
 pub fn explain<'a>(
     case: &Case<'_>,
     sections: &(impl Iterator<Item = ((f64, f64), &'a Passage)> + Clone),
 ) -> Evidence {
     let Case { hole, swept_by_all, target_m, perimeter_m } = *case;
-    // What makes it a fail is an empty circle of the target's size; the hole may still shrink from ahead.
+    // An empty circle of the target's size suffices for a fail; the hole may still shrink from ahead.
     let radius_m = hole.diameter_m.min(target_m) / 2.0;
     let lost = lost_within(hole, radius_m, perimeter_m, sections.clone());
     let seen = Seen::over(sections.clone().map(|(_, passage)| passage));
@@ -141,8 +141,8 @@ pub fn explain<'a>(
         .is_some_and(|swept| hole.x_m - radius_m >= swept.from_m && hole.x_m + radius_m <= swept.to_m);
     let lost_in_hole = lost.iter().sum();
     let whole = passed && hole.bounded;
-    // A hole that is much larger than driving makes it has another cause, unless driving alone is bad enough: what was lost
-    // has then only made it larger.
+    // A hole much larger than the driving explains has another cause, unless the driving alone misses the target
+    // clearly: lost pings have then only enlarged the hole.
     let explained =
         worst.t_m() * EXPLAINED > hole.diameter_m || worst.t_m() > BAD_ENOUGH * target_m && lost_in_hole > 0;
     let driving_explains = worst.t_m() > target_m && explained;
@@ -157,7 +157,7 @@ pub fn explain<'a>(
     } else if seen.head_stood() {
         Cause::HeadStalled
     } else {
-        // Everything came, and none of it was aimed into the hole: samples lie where navigation has jumped.
+        // No ping was lost, yet no sample fell into the hole: navigation has jumped.
         Cause::PositionLost
     };
     let even_v_max =
@@ -197,13 +197,13 @@ struct Seen {
     unseen: bool,
 }
 
-/// Heads that stand still for a smaller share of the pings don't matter.
+/// Minimum share of pings of a stalled head for it to matter.
 const STANDING_SHARE: f64 = 0.02;
-/// A hole may be larger than T as driven by this factor: figures are means over a section.
+/// Factor by which a hole may exceed T as driven: figures are means over a section.
 const EXPLAINED: f64 = 1.5;
-/// Beyond so many times the target, driving would have failed without anything else.
+/// Multiple of the target beyond which the driving alone would have failed.
 const BAD_ENOUGH: f64 = 1.1;
-/// What leaves more of T than this when it is taken away isn't the cause.
+/// A factor is a cause only if its removal reduces T below this share.
 const HELPS: f64 = 0.99;
 
 impl Seen {
@@ -226,13 +226,13 @@ impl Seen {
         self.share(self.standing) > STANDING_SHARE
     }
 
-    /// Whether the vehicle's place was not known while most of what isn't there should have come.
+    /// Whether the position was unknown while most of the missing samples were due.
     fn is_unseen(&self, lost_in_hole: u32) -> bool {
         self.unseen || self.unplaced > self.missing.max(lost_in_hole)
     }
 }
 
-/// How a section was driven: means over its pings.
+/// Driving statistics of a section: means over its pings.
 #[derive(Debug, Clone, Copy, Default)]
 struct Driven {
     speed_mps: f64,
@@ -261,7 +261,7 @@ impl Driven {
         }
     }
 
-    /// T_max as it was driven. Source: Eq. 16, the swing added to the distance between passes.
+    /// T_max as driven, m. Source: Eq. 16, the swing added to the distance between passes.
     fn t_m(&self) -> f64 {
         spacing::t_max_m(
             self.speed_mps * self.gap_s + self.swing_m,
@@ -278,13 +278,13 @@ impl Driven {
         Self { gap_s: self.even_gap_s.min(self.gap_s), ..*self }
     }
 
-    /// Where all turn already, nothing changes: their phases are another matter.
+    /// No change if all heads are turning already: phase is tested separately.
     fn all_turning(&self) -> Self {
         let gap_s = if self.all_gap_s < HELPS * self.even_gap_s { self.all_gap_s } else { self.gap_s };
         Self { gap_s: gap_s.min(self.gap_s), ..*self }
     }
 
-    /// The cause without which the target would have been met; where several are needed, the one that costs most.
+    /// The cause whose removal alone meets the target; if several must go, the one with the largest effect.
     fn likeliest(&self, seen: &Seen, target_m: f64) -> Cause {
         if self.middle_t_y_m >= target_m {
             return Cause::AngularStep;

@@ -1,28 +1,28 @@
-//! How far the wall is from where the design says, section by section.
+//! Deviation of the wall from the design profile, per section.
 
 use serde::{Deserialize, Serialize};
 
 use headrace_geometry::tunnel::{Profile, Yz};
 
-/// What the samples of a section say of its wall against the design profile. Beyond the design is positive.
+/// Deviation of a section's samples from the design profile; outward is positive.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Deviation {
     samples: u32,
-    /// Samples farther from the design than the wall can be.
+    /// Samples that deviate by more than the contradiction limit.
     contradicting: u32,
     sum_m: f64,
-    /// Farthest inside the design, m, at most zero.
+    /// Largest inward deviation, m, at most zero.
     inmost_m: f64,
-    /// Farthest beyond it, m, at least zero.
+    /// Largest outward deviation, m, at least zero.
     outmost_m: f64,
-    /// Areas between neighbouring samples of a sweep as seen from the reference point, and the same of the design, m2.
+    /// Area swept from the reference point between neighbouring samples of a sweep, and the same of the design, m2.
     swept_m2: f64,
     design_m2: f64,
 }
 
 impl Deviation {
-    /// Takes in a sample at `point`, which the design has at arc length `arc_m`; `before` is the sample from which the
-    /// same head has come here in a single step, with its arc length. Gives how far it is beyond the design, m.
+    /// Adds a sample at `point` with arc length `arc_m`; `before` is the same head's sample a single step earlier, with
+    /// its arc length. Returns the outward deviation, m.
     ///
     /// Source: the distance along the ray from the profile's reference point, as arc length is measured.
     pub fn add(
@@ -47,23 +47,22 @@ impl Deviation {
         off_m
     }
 
-    /// Mean of the samples, m; `None` without any.
+    /// Mean deviation, m; `None` without samples.
     pub fn mean_m(&self) -> Option<f64> {
         (self.samples > 0).then(|| self.sum_m / f64::from(self.samples))
     }
 
-    /// The farthest inside and the farthest beyond the design, m; `None` without samples.
+    /// Largest inward and outward deviation, m; `None` without samples.
     pub fn extremes_m(&self) -> Option<[f64; 2]> {
         (self.samples > 0).then_some([self.inmost_m, self.outmost_m])
     }
 
-    /// Area of the cross-section over that of the design, where sweeps have gone; `None` without any.
+    /// Cross-section area over that of the design, where swept; `None` without sweeps.
     pub fn area_ratio(&self) -> Option<f64> {
         (self.design_m2 > 0.0).then(|| self.swept_m2 / self.design_m2)
     }
 
-    /// Whether most samples are farther off than the wall can be: the profile isn't that of this tunnel, or the position
-    /// is wrong. The median of their distances is then over the limit.
+    /// True if most samples, and so their median, exceed the contradiction limit: wrong profile or wrong position.
     pub fn contradicts(&self) -> bool {
         2 * self.contradicting > self.samples
     }
@@ -73,7 +72,7 @@ fn distance_m(a: Yz, b: Yz) -> f64 {
     headrace_geometry::math::hypot(b[0] - a[0], b[1] - a[1])
 }
 
-/// Area of the triangle of a point and two others, m2, without its sign.
+/// Unsigned area of the triangle of three points, m2.
 fn triangle_m2([y, z]: Yz, a: Yz, b: Yz) -> f64 {
     ((a[0] - y) * (b[1] - z) - (a[1] - z) * (b[0] - y)).abs() / 2.0
 }
@@ -84,7 +83,7 @@ mod tests {
     use headrace_geometry::math::{self, TAU};
     use headrace_geometry::tunnel::shapes;
 
-    /// A turn of samples on a circle of radius `true_m` about the reference point of one of 3 m.
+    /// One turn of samples at radius `true_m` about the reference point of a circle of 3 m radius.
     fn turned(true_m: f64, samples: u32) -> Deviation {
         let profile = shapes::circle(3.0).unwrap();
         let [y, z] = profile.reference();

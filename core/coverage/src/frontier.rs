@@ -1,4 +1,4 @@
-//! Where samples may still land: what decides when a section is open and when it is judged.
+//! Where samples may still land: decides when a section is open and when it is judged.
 
 use core::ops::Range;
 
@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use headrace_geometry::time::MonoNs;
 use headrace_sampling::head::SILENT_AFTER;
 
-/// The stretch of tunnel on which a head lands samples now.
+/// Stretch of tunnel on which a head currently lands samples.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Reach {
     /// Least chainage, m.
@@ -16,30 +16,30 @@ pub struct Reach {
     pub to_m: f64,
 }
 
-/// Where one head lands samples: the latest stretch, and all that it has swept.
+/// Reach of one head: the current stretch, and all chainages swept so far.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct HeadReach {
-    /// When the head was last heard, with or without a fix.
+    /// Receive time of the head's last ping, with or without a fix.
     heard: MonoNs,
-    /// The stretch at its last ping with a fix.
+    /// Reach at its last ping with a fix.
     latest: Reach,
-    /// Every chainage that its reach has covered.
+    /// Chainages that its reach has covered.
     swept: Reach,
 }
 
 impl HeadReach {
-    /// The reach after a ping at `now` with a fix, `before` being that of the pings until then.
+    /// Reach after a ping with a fix at `now`; `before` is the reach before that ping.
     pub fn after(before: Option<Self>, now: MonoNs, reach: Reach) -> Self {
         let swept = before.map_or(reach, |before| before.swept.with(reach));
         Self { heard: now, latest: reach, swept }
     }
 
-    /// Notes a ping without a fix: the head is alive, and waited for where it was last.
+    /// Records a ping without a fix: the head is alive, its reach stays where it was at the last fix.
     pub fn heard(&mut self, now: MonoNs) {
         self.heard = now;
     }
 
-    /// Where it landed samples when its place was last known.
+    /// Reach at the last ping with a fix.
     pub fn latest(&self) -> Reach {
         self.latest
     }
@@ -49,33 +49,33 @@ impl HeadReach {
     }
 }
 
-/// Follows the reach of all heads along the tunnel. Each head's own is kept with the head and handed in.
+/// Tracks the reach of all heads along the tunnel. The reach of each head is stored with the head and passed in.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct Frontier {
-    /// Every chainage that any head's reach has covered.
+    /// Chainages that any head's reach has covered.
     swept: Option<Reach>,
-    /// Sections, by index, that samples may still change.
+    /// Index range of the sections within the reach of the live heads plus a margin.
     zone: Option<Range<i64>>,
-    /// When sections last came into it or left it.
+    /// Time of its last change.
     zone_moved: Option<MonoNs>,
-    /// When a head first pinged where somebody knew.
+    /// Time of the first ping with a fix.
     begun: Option<MonoNs>,
     course: Option<Course>,
 }
 
-/// Which way the vehicle goes.
+/// Direction of travel along the tunnel.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 struct Course {
-    /// The farthest that it has come on this course, m: the middle of what its heads reach.
+    /// Farthest chainage on this course, m: the middle of the heads' combined reach.
     farthest_m: f64,
     astern: bool,
 }
 
-/// A vehicle that has gone back by less than this still goes the way it went, m: yaw and slack look the same.
+/// Hysteresis for a reversal of the course, m: yaw and tether slack look like a smaller one.
 const TURNED_M: f64 = 0.25;
 
 impl Course {
-    /// On to where the middle of the reach is now.
+    /// Updates the course with the middle of the current reach.
     fn to(self, middle_m: f64) -> Self {
         let ahead_m = if self.astern { self.farthest_m - middle_m } else { middle_m - self.farthest_m };
         match ahead_m {
@@ -86,34 +86,34 @@ impl Course {
     }
 }
 
-/// Where samples have landed and may still land, as of one time.
+/// Where samples have landed and may still land at a given time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outlook {
     /// The time.
     pub at: MonoNs,
-    /// Every chainage that has been within reach of a head.
+    /// Chainages that have been within reach of any head.
     pub swept: Option<Reach>,
-    /// The stretch that every head that is alive has covered, or `None` where there is none.
+    /// Stretch covered by every live head; `None` if empty.
     pub swept_by_all: Option<Reach>,
-    /// Where samples may land without turning back.
+    /// Where samples may still land without the vehicle turning back.
     pub to_come: Option<Reach>,
-    /// Sections that samples may still change, once none has come or gone for some time: the vehicle stands, or nearly.
+    /// The zone of sections in reach, once unchanged for longer than [`SILENT_AFTER`]: the vehicle is (nearly) stationary.
     pub still_zone: Option<Range<i64>>,
 }
 
-/// What a head's return has changed.
+/// Change of the frontier by one ping.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Moved {
-    /// Sections that lie behind now and did not before.
+    /// Sections newly behind the zone.
     pub left_behind: Range<i64>,
-    /// Sections that lie ahead now and did not before: the vehicle goes back.
+    /// Sections newly ahead of the zone: the vehicle is backing up.
     pub left_ahead: Range<i64>,
-    /// Where samples may land without turning back.
+    /// Where samples may still land without the vehicle turning back.
     pub to_come: Option<Reach>,
 }
 
 impl Frontier {
-    /// Every chainage that has been within reach of a head.
+    /// Chainages that have been within reach of any head.
     pub fn swept(&self) -> Option<Reach> {
         self.swept
     }
@@ -131,13 +131,13 @@ impl Frontier {
         }
     }
 
-    /// Not before it is known which heads are alive.
+    /// `None` within [`SILENT_AFTER`] of the first ping: it isn't known yet which heads are alive.
     fn still_zone(&self, now: MonoNs) -> Option<Range<i64>> {
         let over = |since: Option<MonoNs>| since.is_some_and(|since| now.since(since).0 > SILENT_AFTER.0);
         self.zone.clone().filter(|_| over(self.begun) && over(self.zone_moved))
     }
 
-    /// Where samples may land without turning back: from here on, all that lies ahead.
+    /// Where samples may still land without the vehicle turning back: the current reach and everything ahead.
     fn to_come(&self, heads: impl Iterator<Item = HeadReach>, now: MonoNs) -> Option<Reach> {
         let reach = reach(heads, now)?;
         Some(match self.course {
@@ -146,8 +146,8 @@ impl Frontier {
         })
     }
 
-    /// A head has pinged at `now` where its reach is `pinged`; `heads` are all, that one included. A section is out of the
-    /// way when it is farther than `margin_m` from the reach of every head that is alive.
+    /// Updates the frontier for a ping at `now` with reach `pinged`; `heads` are the reaches of all heads, that one
+    /// included. A section leaves the zone when it is farther than `margin_m` from the reach of every live head.
     pub fn advance(
         &mut self,
         pinged: Reach,
@@ -178,13 +178,13 @@ impl Frontier {
     }
 }
 
-/// Where the heads that are alive land samples now.
+/// Combined reach of the live heads.
 fn reach(heads: impl Iterator<Item = HeadReach>, now: MonoNs) -> Option<Reach> {
     heads.filter(|head| head.is_alive(now)).map(|head| head.latest).reduce(Reach::with)
 }
 
 impl Moved {
-    /// Whether no section has been left, or no head is alive.
+    /// True if no section left the zone, or no head is alive.
     pub fn is_nothing(&self) -> bool {
         self.left_behind.is_empty() && self.left_ahead.is_empty() || self.to_come.is_none()
     }
@@ -201,7 +201,7 @@ impl Reach {
     }
 }
 
-/// How far a chainage is from where samples may still land, m; infinite where none may.
+/// Distance of a chainage from where samples may still land, m; infinite if none may.
 pub fn clear_of(to_come: Option<Reach>, x_m: f64) -> f64 {
     to_come.map_or(f64::INFINITY, |reach| (reach.from_m - x_m).max(x_m - reach.to_m).max(0.0))
 }

@@ -1,12 +1,11 @@
 //! The largest hole of a section: the largest empty circle on the unrolled wall with its centre in the section.
 //!
-//! Let f(c) be the distance from a place c to the nearest sample. D = 2 max f over the section (metrics.md). The section
-//! is laid out in tiles. A tile is divided among a few samples, each share a convex polygon on which the distance to its
-//! own sample is largest at a corner; the farthest corner is a bound for the tile, since further samples only bring f
-//! down. Whatever sample is nearest to that corner either proves the bound or gets a share itself, and lowers it. Tiles
-//! whose bound can't beat the best place found are dropped, so that only the worst places are ever divided finely. What
-//! the clipping gives is exact but for rounding; nothing depends on a triangulation, so that lattices, lines and repeated
-//! samples need no care.
+//! Let f(c) be the distance from a point c to the nearest sample. D = 2 max f over the section (metrics.md), found by
+//! branch and bound over tiles. A tile is divided among a few samples; each share is a convex polygon on which the
+//! distance to its sample is largest at a corner. The farthest corner bounds the tile, since further samples only lower
+//! f. The sample nearest to that corner either proves the bound, or gets a share and lowers it. Tiles whose bound can't
+//! beat the best point found are dropped, so that only the worst areas are divided finely. Clipping is exact but for
+//! rounding. There is no triangulation, so lattices, lines and duplicate samples need no special handling.
 
 use serde::{Deserialize, Serialize};
 
@@ -20,40 +19,40 @@ mod certain;
 mod division;
 mod window;
 
-/// A place is looked for no farther than this from its nearest sample, m; beyond, the wall counts as not passed.
+/// Maximum search radius, m: wall farther than this from any sample counts as not passed.
 pub const FARTHEST_M: f64 = 12.0;
-/// Half diagonal below which a tile isn't halved: its bound is within 2e-10 m of the truth.
+/// Half diagonal below which a tile isn't halved, m: its bound is within 2e-10 m of the exact value.
 const NO_FINER_M: f64 = 1e-10;
-/// A corner this much farther than its nearest sample is as good as proven, m: rounding.
+/// Rounding tolerance for accepting a corner's bound as proven, m.
 const PROVEN_M: f64 = 1e-11;
 
 /// The largest empty circle with its centre in a section.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Hole {
-    /// Diameter of the largest empty circle that was found among the samples kept, m.
+    /// Diameter of the largest empty circle found among the samples kept, m.
     pub diameter_m: f64,
-    /// D is no less than this, m: `diameter_m`, less what samples that aren't kept could have taken from it.
+    /// Lower bound of D, m: `diameter_m` less the possible effect of thinned and moved samples.
     pub least_m: f64,
-    /// D is no more than this, m; infinite when not `bounded`.
+    /// Upper bound of D, m; infinite when not `bounded`.
     pub most_m: f64,
     /// Chainage of its centre, m.
     pub x_m: f64,
     /// Arc length of its centre, m.
     pub arc_m: f64,
-    /// Whether there are samples around it. When not, the hole is at least `diameter_m` large.
+    /// Whether there are samples around it. If not, D is at least `diameter_m`.
     pub bounded: bool,
 }
 
 #[derive(Debug, Clone, Copy)]
 struct Tile {
-    /// Middle, from the section's beginning, m.
+    /// Centre, from the start of the section, m.
     x_m: f64,
     arc_m: f64,
     half_x_m: f64,
     half_arc_m: f64,
-    /// The sample nearest to the middle, from there, m.
+    /// Sample nearest to the centre, relative to it, m.
     owner: (f64, f64),
-    /// No place in the tile is farther than this from its nearest sample.
+    /// Upper bound of f in the tile, m.
     bound_m: f64,
 }
 
@@ -62,11 +61,11 @@ struct Best {
     distance_m: f64,
     x_m: f64,
     arc_m: f64,
-    /// The largest bound of what was dropped.
+    /// Largest bound of the dropped tiles, m.
     dropped_m: f64,
 }
 
-/// No sample is within reach of a place.
+/// A point without a sample within the search radius.
 #[derive(Debug, Clone, Copy)]
 struct Beyond {
     x_m: f64,
@@ -74,7 +73,7 @@ struct Beyond {
 }
 
 impl Tile {
-    /// Distance from the middle to a corner.
+    /// Half diagonal, m.
     fn half_m(&self) -> f64 {
         math::sqrt(self.half_x_m * self.half_x_m + self.half_arc_m * self.half_arc_m)
     }
@@ -92,13 +91,13 @@ impl Tile {
         })
     }
 
-    /// A sample's place from the middle: the same to the bit, whichever place it was found from.
+    /// Sample position relative to the centre: bit-identical whichever point it was found from.
     fn relative(&self, found: &Nearest, perimeter_m: f64) -> (f64, f64) {
         (found.x_m - self.x_m, (found.arc_m - self.arc_m) + found.turns * perimeter_m)
     }
 }
 
-/// Covers a section with about square tiles.
+/// Covers a section with roughly square tiles.
 fn first_tiles(perimeter_m: f64, length_m: f64) -> impl Iterator<Item = Tile> {
     let half_x_m = length_m / 2.0;
     let count = math::floor_to_i64(perimeter_m / length_m).clamp(1, 8192) + 1;
@@ -113,11 +112,11 @@ fn first_tiles(perimeter_m: f64, length_m: f64) -> impl Iterator<Item = Tile> {
     })
 }
 
-/// Finds the largest hole of a stretch of wall; keeps its working memory from one search to the next.
+/// Finds the largest hole of a stretch of wall; reuses its working memory between searches.
 #[derive(Debug)]
 pub struct HoleFinder {
     tolerance_m: f64,
-    /// Radius of the last hole, m: the next is likely alike.
+    /// Radius of the last hole, m: first guess for the next.
     last_m: f64,
     window: Window,
     tiles: Vec<Tile>,
@@ -165,16 +164,18 @@ impl HoleFinder {
         }
     }
 
-    /// The farthest place from all samples, provided that none is farther than the window shows.
+    /// The point farthest from all samples.
+    ///
+    /// Errors: a point has no sample within `reach_m`.
     fn search(&mut self, length_m: f64, reach_m: f64) -> Result<Best, Beyond> {
         let mut best = Best { distance_m: 0.0, x_m: 0.0, arc_m: 0.0, dropped_m: 0.0 };
         self.tiles.clear();
-        // A good first guess spares most of the work: every tile's middle is looked at before any is divided, and the
-        // most promising is divided first.
+        // A good first guess saves most of the work: every tile's centre is evaluated before any tile is divided, and
+        // the tile with the largest bound is divided first.
         let mut within_m = reach_m;
         for tile in first_tiles(self.window.perimeter_m(), length_m) {
             let tile = looked_at(&self.window, tile, within_m.min(reach_m), &mut best)?;
-            // f changes by no more than one moves.
+            // f is 1-Lipschitz.
             within_m = math::hypot(tile.owner.0, tile.owner.1) + 2.0 * tile.half_arc_m + 1e-6;
             self.tiles.push(tile);
         }
@@ -191,8 +192,7 @@ impl HoleFinder {
         Ok(best)
     }
 
-    /// Divides a tile as far as needed to see that it can't beat the best place, which may be in it. False when it is too
-    /// large for that.
+    /// Divides a tile until it can't beat the best point, which may lie in it. False if the tile must be halved first.
     fn is_settled(&mut self, tile: &Tile, reach_m: f64, best: &mut Best) -> Result<bool, Beyond> {
         let enough = |best: &Best| best.distance_m + self.tolerance_m / 2.0;
         if tile.bound_m <= enough(best) || tile.half_m() < NO_FINER_M {
@@ -212,7 +212,7 @@ impl HoleFinder {
                 if bound_m > reach_m {
                     return Err(Beyond { x_m, arc_m });
                 }
-                // Its own sample is nearest, but for rounding.
+                // The share's owner is nearest, but for rounding.
                 best.take(bound_m, x_m, arc_m);
                 return Ok(true);
             };
@@ -234,7 +234,7 @@ impl HoleFinder {
         let from_m = self.window.chainage_m(-radius_m);
         let fidelity = store.fidelity(from_m, self.window.chainage_m(length_m + radius_m));
         let diameter_m = 2.0 * best.distance_m;
-        // What there was no room to look at could only have made it smaller.
+        // Samples for which the window had no room could only have made it smaller.
         let least_m = diameter_m - 2.0 * (fidelity.thinned_m + fidelity.moved_m);
         Hole {
             diameter_m,
@@ -255,7 +255,7 @@ impl Best {
     }
 }
 
-/// The tile with its owner and a bound by it; its middle may be the best place so far.
+/// Evaluates a tile's centre: sets its owner and bound, and updates the best point.
 fn looked_at(window: &Window, tile: Tile, within_m: f64, best: &mut Best) -> Result<Tile, Beyond> {
     let beyond = Beyond { x_m: tile.x_m, arc_m: tile.arc_m };
     let found = window.nearest(tile.x_m, tile.arc_m, within_m).ok_or(beyond)?;
@@ -266,7 +266,7 @@ fn looked_at(window: &Window, tile: Tile, within_m: f64, best: &mut Best) -> Res
     Ok(Tile { owner, bound_m, ..tile })
 }
 
-/// Cells that suit a search this far.
+/// Cell size for a search radius, m.
 fn cell_m(reach_m: f64) -> f64 {
     (reach_m / 3.0).clamp(0.05, 0.5)
 }

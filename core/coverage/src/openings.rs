@@ -1,24 +1,24 @@
-//! Declared openings of the wall, side tunnels and gates: what has no wall can't be covered. They are left out of holes,
-//! and listed; never passed silently.
+//! Declared openings of the wall, such as side tunnels and gates. They are excluded from holes and listed in the
+//! report; never passed silently.
 
 use super::store::{SampleStore, StoreError, WallSample};
 use headrace_geometry::math;
 use headrace_geometry::tunnel::Profile;
 
-/// A stretch of wall that isn't there.
+/// A declared opening of the wall.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Opening {
-    /// What people call it.
+    /// Display name.
     pub name: String,
     /// Chainage at which it begins, m.
     pub from_m: f64,
     /// Chainage at which it ends, m.
     pub to_m: f64,
-    /// Arc length at which it begins, and how far it goes on, m; `None` for all round.
+    /// Arc length at which it begins, and its length along the perimeter, m; `None` for the whole perimeter.
     pub arc_m: Option<(f64, f64)>,
 }
 
-/// Places of an opening are no farther apart than this, m, or a tenth of the target.
+/// Maximum spacing of the samples that fill an opening, m; a tenth of the target if that is less.
 const SPACING_M: f64 = 0.05;
 
 impl Opening {
@@ -27,21 +27,21 @@ impl Opening {
         self.arc_m.map_or((0.0, perimeter_m), |(from_m, length_m)| (from_m, length_m.min(perimeter_m)))
     }
 
-    /// How many places stand for it at a spacing.
+    /// Intervals along the tunnel and the perimeter at a spacing.
     fn counts(&self, perimeter_m: f64, spacing_m: f64) -> (i64, i64) {
         let over = |length_m: f64| (-math::floor_to_i64(-length_m / spacing_m)).max(1);
         (over(self.to_m - self.from_m), over(self.arc(perimeter_m).1))
     }
 
-    /// How many places stand for it.
+    /// Number of samples that fill it.
     pub fn places(&self, perimeter_m: f64, target_m: f64) -> i64 {
         let (along, around) = self.counts(perimeter_m, spacing_m(target_m));
         (along + 1) * (around + 1)
     }
 
-    /// Fills it with places, so that no circle without a sample reaches farther into it than half their spacing.
+    /// Fills it with samples, so that no hole extends farther into it than half their spacing.
     ///
-    /// Errors: there is no room, or it lies outside of what the store covers.
+    /// Errors: the store is full, or the opening lies outside its extent.
     pub fn fill(&self, store: &mut SampleStore, target_m: f64) -> Result<(), StoreError> {
         let perimeter_m = store.perimeter_m();
         let (along, around) = self.counts(perimeter_m, spacing_m(target_m));
@@ -56,7 +56,7 @@ impl Opening {
         Ok(())
     }
 
-    /// The share of a section's wall that it takes, 0 to 1.
+    /// Share of a section's wall that it covers, 0 to 1.
     pub fn share_of(&self, from_m: f64, to_m: f64, profile: &Profile) -> f64 {
         let along_m = (to_m.min(self.to_m) - from_m.max(self.from_m)).max(0.0);
         let perimeter_m = profile.perimeter_m();
@@ -79,7 +79,7 @@ mod tests {
         Opening { name: "gate".to_owned(), from_m: 4.0, to_m: 6.0, arc_m: Some((17.0, 4.0)) }
     }
 
-    /// A wall sampled every half metre, but for the opening.
+    /// A wall sampled every half metre except in the opening.
     fn store(profile: &Profile, with_opening: bool) -> SampleStore {
         let layout = StoreLayout {
             perimeter_m: profile.perimeter_m(),

@@ -1,4 +1,4 @@
-//! How a section was passed: what its pings say, for the cause of a fail.
+//! Ping statistics of a section's passage: evidence for the cause of a fail.
 
 use serde::{Deserialize, Serialize};
 
@@ -9,55 +9,55 @@ use headrace_geometry::frames::Vec3;
 use headrace_geometry::math;
 use headrace_geometry::tunnel::Profile;
 
-/// What the pings made within a section say of how it was passed.
+/// Statistics of the pings made within a section.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Passage {
-    /// All pings, whatever came of them.
+    /// All pings, whatever their outcome.
     pub pings: u32,
-    /// Pings made where the vehicle's place was known.
+    /// Pings with a fix.
     pub placed: u32,
-    /// Pings without a return where the wall was within range, or its place not known.
+    /// Pings without a return where the wall was within range, or without a fix.
     pub missing: u32,
     /// Pings without a return where the wall was farther than the range setting.
     pub out_of_range: u32,
-    /// Pings that the vehicle itself stopped.
+    /// Pings occluded by the vehicle.
     pub occluded: u32,
-    /// Returns that could not be placed.
+    /// Returns without a fix.
     pub unplaced: u32,
-    /// Pings of a head that stood still.
+    /// Pings of a stalled head.
     pub standing: u32,
-    /// The vehicle went through while nobody knew where it was.
+    /// A head went through during a navigation outage.
     pub unseen: bool,
-    /// Where on this section's wall pings of it and of others would have fallen that gave no sample.
+    /// Where on this section's wall lost pings were aimed, whichever section they were made in.
     pub lost: Lost,
     /// Sum of the speeds at the pings, m/s.
     pub speed_sum_mps: f64,
     /// Sum of the times between passes, seconds.
     pub pass_gap_sum_s: f64,
-    /// Sum of what those times would have been, spread evenly, seconds.
+    /// The same with the passes evenly spread, seconds.
     pub even_gap_sum_s: f64,
-    /// The same, had all heads turned, seconds.
+    /// The same if all heads had been turning, seconds.
     pub all_gap_sum_s: f64,
     /// Sum of how far the beams swung along the tunnel between two passes, m.
     pub swing_sum_m: f64,
     /// Sum of the times between pings, seconds.
     pub ping_period_sum_s: f64,
-    /// The largest T_y that geometry predicted, m.
+    /// Largest step along the perimeter between neighbouring samples of a sweep, m.
     pub t_y_m: f64,
-    /// What it would have been from the middle of the tunnel, level, m.
+    /// The same predicted for a level vehicle in the middle of the tunnel, m.
     pub middle_t_y_m: f64,
-    /// How far one pass may be off against another.
+    /// Relative error between passes.
     pub pass_error: PassError,
 }
 
-/// Why a ping that was aimed at a place of the wall gave no sample there.
+/// Reason a ping gave no sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Loss {
     /// No return, though the wall was within range.
     Missing,
     /// The wall was farther than the range setting.
     OutOfRange,
-    /// The vehicle itself stood in the way.
+    /// Occluded by the vehicle.
     Occluded,
 }
 
@@ -66,27 +66,27 @@ impl Loss {
     pub const ALL: [Self; 3] = [Self::Missing, Self::OutOfRange, Self::Occluded];
 }
 
-/// Parts of the perimeter that are told apart.
+/// Bins around the perimeter.
 const PARTS: f64 = 64.0;
 
-/// Where round the wall of a section pings gave no sample: one bit for each of 64 parts of the perimeter, by reason.
+/// Lost pings around a section's wall: one bit for each of 64 bins of the perimeter, by reason.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Lost([u64; Loss::ALL.len()]);
 
 impl Lost {
-    /// Notes that a ping was lost at `arc_m`, in [0, perimeter).
+    /// Records a ping lost at `arc_m`, in [0, perimeter).
     pub fn note(&mut self, loss: Loss, arc_m: f64, perimeter_m: f64) {
         if let Some(bits) = self.0.get_mut(loss as usize) {
             *bits |= 1 << part(arc_m, perimeter_m);
         }
     }
 
-    /// How many parts within `within_m` of an arc length have lost pings, by reason.
+    /// Number of bins within `within_m` of an arc length that have lost pings, by reason.
     pub fn near(&self, arc_m: f64, within_m: f64, perimeter_m: f64) -> [u32; Loss::ALL.len()] {
         let near = (0..64_u32).fold(0_u64, |near, k| {
             let middle_m = (f64::from(k) + 0.5) * perimeter_m / PARTS;
             let off_m = math::wrap_signed(middle_m - arc_m, perimeter_m).abs();
-            // A part counts when its nearer edge is in reach.
+            // A bin counts if its nearer edge is within range.
             near | (u64::from(off_m - perimeter_m / (2.0 * PARTS) < within_m) << k)
         });
         self.0.map(|bits| (bits & near).count_ones())
@@ -97,8 +97,8 @@ fn part(arc_m: f64, perimeter_m: f64) -> u32 {
     u32::try_from(math::floor_to_i64(arc_m / perimeter_m * PARTS).clamp(0, 63)).unwrap_or(0)
 }
 
-/// Pings lost within an empty circle, by reason, over the sections that it touches: each with the chainages at which it
-/// begins and ends.
+/// Number of bins with lost pings within an empty circle, by reason, over the sections that it touches, each with its
+/// start and end chainage.
 pub fn lost_within<'a>(
     hole: &Hole,
     radius_m: f64,
@@ -118,21 +118,21 @@ pub fn lost_within<'a>(
     sum
 }
 
-/// The largest hole of a section is looked for where errors have made it large: so much more is it off than the distance of
-/// two passes at one place. Measured over the field dives of `tests/tests/navigation/fusion.rs`.
+/// Ratio of the error of a section's largest hole to that of the distance between two passes at one point: the maximum
+/// favours holes that errors have enlarged. Measured over the field dives of `tests/tests/navigation/fusion.rs`.
 const LARGEST_OF_MANY: f64 = 1.2;
 
-/// How far the samples of a pass may be off along the tunnel against those of the pass before.
+/// Error along the tunnel of a pass's samples relative to those of the pass before.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct PassError {
-    /// The errors that move them.
+    /// Covariance of the relative errors that move them.
     pub relative: Relative,
-    /// Where the vehicle was in the cross-section, m.
+    /// Vehicle position in the cross-section, [y, z], m.
     pub from_m: [f64; 2],
 }
 
 impl PassError {
-    /// Of a fix.
+    /// From a fix.
     pub fn of(fix: &Fix) -> Self {
         Self { relative: fix.relative, from_m: [fix.pose.position.y(), fix.pose.position.z()] }
     }
@@ -151,7 +151,7 @@ impl PassError {
         (0..PLACES).map(|k| self.sd_m(place(k))).fold(0.0, f64::max)
     }
 
-    /// Standard deviation of the diameter of a hole there on the wall, m: one edge of it is a pass, the other edge the next.
+    /// Standard deviation of the diameter of a hole at a point on the wall, m: its edges are consecutive passes.
     pub fn sd_m(&self, wall_m: [f64; 2]) -> f64 {
         LARGEST_OF_MANY
             * self.relative.sd_m(Vec3::new(0.0, wall_m[0] - self.from_m[0], wall_m[1] - self.from_m[1]))

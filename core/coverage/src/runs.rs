@@ -1,4 +1,4 @@
-//! Runs: neighbouring failed sections with one cause, told as one event with a number that stays.
+//! Runs: neighbouring failed sections with one cause, reported as one event with a stable number.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,10 +7,10 @@ use super::hole::Hole;
 use headrace_geometry::time::MonoNs;
 use headrace_snapshot::stateful;
 
-/// Failed sections of one cause belong together when they are no farther apart than this, m.
+/// Maximum gap between neighbouring failed sections of one run, m.
 const JOIN_M: f64 = 0.5;
 
-/// Number of a run; it is never given again.
+/// Number of a run; never reused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct RunId(pub u32);
 
@@ -25,15 +25,15 @@ pub struct Run {
     pub to: i64,
     /// How many of them fail.
     pub failed: u32,
-    /// The section with the largest hole, and the hole; the last one before it was cleared.
+    /// Section with the largest hole, and that hole; once cleared, the last one before that.
     pub worst: (i64, Hole),
-    /// When the first of its flags was raised.
+    /// Time of its first flag.
     pub raised: MonoNs,
-    /// When it last changed.
+    /// Time of its last change.
     pub changed: MonoNs,
-    /// Nothing of it fails any more, since then.
+    /// Time since which none of its sections fails.
     pub cleared: Option<MonoNs>,
-    /// It has become part of another.
+    /// Merged into another run.
     pub merged_into: Option<RunId>,
 }
 
@@ -44,16 +44,16 @@ impl Run {
     }
 }
 
-/// What has become of a run.
+/// Kind of change of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RunChange {
-    /// It is new.
+    /// New run.
     Raised,
-    /// Its ends, its worst place or its extent have changed.
+    /// Its ends, worst hole or extent have changed.
     Changed,
-    /// Nothing of it fails any more, by a later pass or because its cause has turned out to be another.
+    /// None of its sections fails any more: filled by a later pass, or reassigned to another cause.
     Cleared,
-    /// It has become part of another.
+    /// Merged into another run.
     Merged,
 }
 
@@ -63,24 +63,24 @@ pub struct Runs {
     first: i64,
     join: i64,
     runs: Vec<Run>,
-    /// By section: its run, one more than its number, or zero.
+    /// Per section: the number of its run plus one, or zero.
     member: Vec<u32>,
 }
 
 stateful!(Runs { lists: runs; slots: member; fixed: first, join; });
 
-/// What runs need besides to take in what is said of a section.
+/// Context for updating runs.
 pub struct Telling<'a> {
-    /// The moment.
+    /// Timestamp.
     pub at: MonoNs,
     /// The hole of any section.
     pub hole: &'a dyn Fn(i64) -> Option<Hole>,
-    /// Hears of every run that changes.
+    /// Called for every run that changes.
     pub tell: &'a mut dyn FnMut(RunId, RunChange),
 }
 
 impl Runs {
-    /// None yet, over `count` sections of `section_m` from index `first` on.
+    /// No runs yet, for `count` sections of length `section_m` from index `first`.
     ///
     /// Allocates: startup only; all that it will ever use.
     pub fn new(first: i64, count: usize, section_m: f64) -> Self {
@@ -88,7 +88,7 @@ impl Runs {
         Self { first, join, runs: Vec::with_capacity(count), member: vec![0; count] }
     }
 
-    /// All that ever were, by number.
+    /// All runs so far, by number.
     pub fn all(&self) -> &[Run] {
         &self.runs
     }
@@ -103,7 +103,7 @@ impl Runs {
         self.member.get(self.slot(section)?).copied()?.checked_sub(1).map(RunId)
     }
 
-    /// Takes in what is now said of a section: that it fails for a cause, or, with `None`, that it doesn't.
+    /// Updates the state of a section: it fails for a cause, or doesn't fail (`None`).
     ///
     /// Allocates: never.
     pub fn set(&mut self, section: i64, cause: Option<Cause>, telling: &mut Telling<'_>) {
@@ -122,7 +122,7 @@ impl Runs {
         }
     }
 
-    /// A section that fails joins the runs of its cause near by, which become one, or begins a run.
+    /// Adds a failed section to the nearby runs of its cause, merging them, or starts a run.
     fn join(&mut self, section: i64, cause: Cause, telling: &mut Telling<'_>) {
         let near = |side: i64| {
             let run = |step: i64| self.of(section + side * step);
@@ -147,7 +147,7 @@ impl Runs {
         (telling.tell)(kept, RunChange::Changed);
     }
 
-    /// A section leaves its run, which shrinks, falls in two, or is cleared.
+    /// Removes a section from its run, which shrinks, splits or is cleared.
     fn leave(&mut self, section: i64, id: RunId, telling: &mut Telling<'_>) {
         self.take_out(section);
         let Some(run) = self.get(id).copied() else { return };
@@ -173,7 +173,7 @@ impl Runs {
 
     fn begin(&mut self, section: i64, cause: Cause, telling: &Telling<'_>) -> Option<RunId> {
         if self.runs.len() == self.runs.capacity() {
-            // There have been more than sections: this one is still flagged, but in no run.
+            // More runs than sections so far: this section is still flagged, but in no run.
             return None;
         }
         let id = RunId(u32::try_from(self.runs.len()).ok()?);
@@ -210,7 +210,7 @@ impl Runs {
         }
     }
 
-    /// Counts in a section that has just come in.
+    /// Updates a run for a section just added.
     fn add(&mut self, id: RunId, section: i64, telling: &Telling<'_>) {
         let hole = (telling.hole)(section);
         if let Some(run) = self.runs.get_mut(id.0 as usize) {
@@ -220,7 +220,7 @@ impl Runs {
         }
     }
 
-    /// Looks at a section of the run whose hole has changed.
+    /// Updates a run for a section whose hole has changed.
     fn measure_again(&mut self, id: RunId, section: i64, telling: &Telling<'_>) {
         let (Some(run), Some(hole)) = (self.runs.get_mut(id.0 as usize), (telling.hole)(section)) else {
             return;
@@ -233,7 +233,7 @@ impl Runs {
         }
     }
 
-    /// Counts a run's sections anew, and looks for its ends and its worst place.
+    /// Recomputes a run's section count, ends and worst hole.
     fn measure(&mut self, id: RunId, telling: &Telling<'_>) {
         let Some(run) = self.get(id).copied() else { return };
         let members = || (run.from..run.to).filter(|index| self.of(*index) == Some(id));
@@ -268,7 +268,7 @@ impl Runs {
     }
 }
 
-/// The place with the larger hole; of equal ones the first.
+/// The section with the larger hole; of equal ones the first.
 fn larger(a: (i64, Hole), b: (i64, Hole)) -> (i64, Hole) {
     if b.1.diameter_m > a.1.diameter_m { b } else { a }
 }

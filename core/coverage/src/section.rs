@@ -9,17 +9,17 @@ use super::passage::Passage;
 use headrace_geometry::math;
 use headrace_geometry::time::MonoNs;
 
-/// What is said of a section. Source: metrics.md, "Sections and verdicts".
+/// Coverage verdict of a section. Source: metrics.md, "Sections and verdicts".
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum Verdict {
-    /// Samples may still come without turning back.
+    /// Undecided: samples may still land without the vehicle turning back.
     #[default]
     Open,
     /// D + 2 sigma_D <= T.
     Pass,
     /// D - 2 sigma_D > T.
     Fail,
-    /// Neither can be said for sure.
+    /// Neither holds within the error of D.
     CannotSay,
 }
 
@@ -41,7 +41,7 @@ impl Verdict {
 /// Count, mean, deviation and extremes of a quantity.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Spread {
-    /// Values.
+    /// Number of values.
     pub count: u32,
     /// The smallest.
     pub min: f64,
@@ -59,14 +59,14 @@ impl Default for Spread {
 }
 
 impl Spread {
-    /// Takes a value in.
+    /// Adds a value.
     pub fn add(&mut self, value: f64) {
         self.merge(&Self { count: 1, min: value, max: value, mean: value, scatter: 0.0 });
     }
 
-    /// Takes in all that another has seen.
+    /// Merges another spread.
     ///
-    /// Source: Chan, Golub, LeVeque 1983: sums of squares about the mean keep the digits that plain ones lose.
+    /// Source: Chan, Golub, LeVeque 1983: sums of squares about the mean avoid the cancellation of plain ones.
     pub fn merge(&mut self, other: &Self) {
         if other.count == 0 {
             return;
@@ -91,7 +91,7 @@ impl Spread {
     }
 }
 
-/// What judging a section has changed.
+/// Change made by judging a section.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Judgement {
     /// The verdict or the hole has a new value.
@@ -111,7 +111,7 @@ pub struct Section {
     pub hole: Option<Hole>,
     /// Standard deviation of the hole's diameter, m.
     pub hole_sd_m: f64,
-    /// Whether no later sample on the way forward can change the verdict, nor the hole of a fail.
+    /// No further sample on the present course can change the verdict, nor the hole of a fail.
     pub settled: bool,
     /// When the fail was flagged.
     pub flagged: Option<MonoNs>,
@@ -119,7 +119,7 @@ pub struct Section {
     pub cleared: Option<MonoNs>,
     /// Why it failed.
     pub evidence: Option<Evidence>,
-    /// How it was passed.
+    /// Ping statistics of its passage.
     pub passage: Passage,
     /// T_x of its samples, m.
     pub t_x_m: Spread,
@@ -129,17 +129,17 @@ pub struct Section {
     pub t_m: Spread,
     /// Samples on its wall.
     pub samples: u32,
-    /// How far its wall is from the design.
+    /// Deviation of its wall from the design profile.
     pub deviation: Deviation,
     /// Share of its wall that is a declared opening.
     pub masked_share: f64,
-    /// Samples have come within the target of it since it was last judged.
+    /// Samples have landed within T of it since it was last judged.
     pub(super) stale: bool,
 }
 
-/// Fewer samples than this don't contradict a profile.
+/// Minimum samples for a section to contradict the profile.
 const FEW: u32 = 20;
-/// More of a section than this is an opening: there is no wall to speak of.
+/// Masked share above which a section counts as having no wall.
 const ALL_MASKED: f64 = 0.999;
 
 impl Section {
@@ -153,12 +153,12 @@ impl Section {
         self.samples >= FEW && self.deviation.contradicts()
     }
 
-    /// Whether a small hole says nothing: the profile is wrong, or there is no wall.
+    /// Whether a small hole is no evidence of coverage: the profile is wrong, or there is no wall.
     pub(super) fn is_doubtful(&self) -> bool {
         self.contradicts() || self.masked_share > ALL_MASKED
     }
 
-    /// Raises or clears its flag as its verdict demands.
+    /// Raises or clears its flag according to its verdict.
     pub(super) fn flag(&mut self, at: MonoNs) -> Judgement {
         match self.verdict {
             Verdict::Fail if !self.is_flagged() => {

@@ -14,38 +14,38 @@ use headrace_geometry::time::MonoNs;
 use headrace_geometry::tunnel::Profile;
 use headrace_snapshot::stateful;
 
-/// Asks for a section to be judged as of a moment.
+/// Request to judge a section as of a given time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Request {
     /// Index of the section, from chainage zero.
     pub section: i64,
-    /// The moment.
+    /// Timestamp.
     pub at: MonoNs,
-    /// The stretch that every head had swept by then.
+    /// Stretch that every live head had swept by then.
     pub swept_by_all: Option<Reach>,
-    /// Where samples may land without the vehicle turning back.
+    /// Where samples may still land without the vehicle turning back.
     pub to_come: Option<Reach>,
-    /// It is known to fail already: an empty circle, not its largest, is out of the way.
+    /// Known to fail already: a large enough empty circle, not necessarily the largest, can get no more samples.
     pub fails: bool,
 }
 
 impl Request {
-    /// Asks for sections as of one time.
+    /// Builds requests as of the outlook's time.
     fn at(outlook: &Outlook) -> impl Fn(i64) -> Self + use<> {
         let Outlook { at, swept_by_all, to_come, .. } = *outlook;
         move |section| Self { section, at, swept_by_all, to_come, fails: false }
     }
 }
 
-/// What judging looks at, and who hears of the runs that it changes.
+/// Inputs of judging, and the callback for changed runs.
 pub struct Judging<'a> {
     /// The samples.
     pub store: &'a SampleStore,
-    /// The search, with its memory.
+    /// Hole search with its working memory.
     pub finder: &'a mut HoleFinder,
     /// The design profile.
     pub profile: &'a Profile,
-    /// Hears of every run that changes.
+    /// Called for every run that changes.
     pub tell: &'a mut dyn FnMut(RunId, RunChange),
 }
 
@@ -78,7 +78,7 @@ impl Sections {
         &self.runs
     }
 
-    /// Leaves a declared opening out of the sections that it lies in.
+    /// Masks a declared opening in the sections that it overlaps.
     pub fn mask(&mut self, opening: &Opening, profile: &Profile) {
         for index in self.index_of(opening.from_m)..=self.index_of(opening.to_m) {
             let (from_m, to_m) = self.bounds_m(index);
@@ -89,7 +89,7 @@ impl Sections {
         }
     }
 
-    /// How many sections there are.
+    /// Number of sections.
     pub fn len(&self) -> usize {
         self.sections.len()
     }
@@ -109,7 +109,7 @@ impl Sections {
         self.target_m
     }
 
-    /// How far from a sample it may change a verdict of pass or fail, m.
+    /// Maximum distance at which a sample may change a pass or fail, m.
     pub fn margin_m(&self, relative_sd_m: f64) -> f64 {
         self.target_m / 2.0 + relative_sd_m
     }
@@ -129,12 +129,12 @@ impl Sections {
         self.sections.get(usize::try_from(index - self.first).ok()?)
     }
 
-    /// The same, to be changed.
+    /// Mutable access to a section by its index.
     pub fn get_mut(&mut self, index: i64) -> Option<&mut Section> {
         self.sections.get_mut(usize::try_from(index - self.first).ok()?)
     }
 
-    /// Notes that a sample fell at `x_m`: every section within the target of it is open to judgement again.
+    /// Records a sample at `x_m`: every section within T of it is due for judging again.
     pub fn touch(&mut self, x_m: f64) {
         let (from, to) = (self.index_of(x_m - self.target_m), self.index_of(x_m + self.target_m));
         for index in from..=to {
@@ -144,8 +144,8 @@ impl Sections {
         }
     }
 
-    /// Calls `ask` for every section that is to be judged after the heads have moved: those that were left, and those whose
-    /// hole may be out of the way now.
+    /// Calls `ask` for every section due for judging after the heads have moved: those that left the zone, and those whose
+    /// hole may no longer get samples.
     ///
     /// Allocates: never.
     pub fn due(&mut self, moved: &Moved, outlook: &Outlook, ask: &mut impl FnMut(Request)) {
@@ -179,9 +179,9 @@ impl Sections {
         }
     }
 
-    /// Calls `ask` for sections between those that are left and those that aren't reached yet: that fail for certain, though
-    /// their hole isn't out of the way, and flagged ones that have got samples since they were judged. Without it, nothing
-    /// would be said of them while the vehicle stands.
+    /// Calls `ask` for sections of the still zone: those certain to fail although their hole may still get samples, and
+    /// flagged ones with samples since they were judged. Otherwise they would get no verdict while the vehicle is
+    /// stationary.
     ///
     /// Allocates: never.
     pub fn look_around(
@@ -208,7 +208,7 @@ impl Sections {
         }
     }
 
-    /// Whether an empty circle of a section, too large for the target, lies where no sample will come any more.
+    /// Whether a section has an empty circle, too large for the target, where no more samples will land.
     fn fails_already(
         &self,
         index: i64,
@@ -224,7 +224,7 @@ impl Sections {
         clear_m > radius_m && finder.has_circle(store, bounds_m, to_come, radius_m)
     }
 
-    /// Measures a section's hole and says what it means.
+    /// Measures a section's hole and updates its verdict, flag and run.
     ///
     /// Allocates: never.
     pub fn judge(&mut self, request: &Request, judging: &mut Judging<'_>) -> Option<Judgement> {
@@ -241,7 +241,7 @@ impl Sections {
             Verdict::Open | Verdict::CannotSay if request.fails => Verdict::Fail,
             verdict => verdict,
         };
-        // Of a hole no larger than the target, nothing can come nearer than its own edge.
+        // More samples leave a pass a pass; those outside a hole's radius leave the hole as it is.
         section.settled = section.verdict == Verdict::Pass || clear_m >= hole.diameter_m / 2.0;
         if section.verdict == Verdict::Fail {
             let evidence = self.explain(&hole, request.swept_by_all, judging.profile.perimeter_m());
@@ -252,7 +252,7 @@ impl Sections {
         Some(judgement)
     }
 
-    /// Puts a flagged section into its run, and one whose flag was cleared out of it.
+    /// Adds a flagged section to its run; removes one whose flag was cleared.
     fn tell_runs(&mut self, request: &Request, judging: &mut Judging<'_>) {
         let Self { sections, runs, first, .. } = self;
         let get = |index: i64| sections.get(usize::try_from(index - *first).ok()?);
@@ -273,7 +273,7 @@ impl Sections {
         explain(&Case { hole, swept_by_all, target_m: self.target_m, perimeter_m }, &passages)
     }
 
-    /// Calls `ask` for every section that was passed and isn't settled, at the end of a dive.
+    /// Calls `ask` for every passed section that isn't settled, at the end of a dive.
     pub fn unsettled(
         &mut self,
         outlook: &Outlook,
@@ -285,7 +285,7 @@ impl Sections {
         let ask_for = Request::at(outlook);
         for index in self.passed(outlook.swept) {
             let Some(section) = self.get_mut(index) else { continue };
-            // The hole of a fail may have been narrowed from farther away than a pass depends on.
+            // Samples farther away than a pass depends on may have narrowed the hole of a fail.
             if section.stale || !section.settled || section.verdict != Verdict::Pass {
                 section.stale = false;
                 let fails = self.fails_already(index, outlook.to_come, store, finder, profile);
@@ -294,7 +294,7 @@ impl Sections {
         }
     }
 
-    /// Indexes of the sections that a swept stretch touches and the table holds.
+    /// Index range of the sections in the table that a swept stretch touches.
     pub fn passed(&self, swept: Option<Reach>) -> Range<i64> {
         let Some(reach) = swept else { return 0..0 };
         let end = self.first + i64::try_from(self.sections.len()).unwrap_or(i64::MAX);
@@ -302,10 +302,9 @@ impl Sections {
     }
 }
 
-/// What is said of a hole whose centre is `clear_m` from where samples may still land. `pass` when D + 2 sigma <= T: more
-/// samples won't make it larger. `fail` when D - 2 sigma > T for whatever D will be: samples come no nearer than `clear_m`.
-/// In between `open` while D may change, then `cannot_say`. A verdict holds for both bounds of D. Wall without samples
-/// around it fails.
+/// Verdict on a hole whose centre is `clear_m` from where samples may still land. `pass` if D + 2 sd <= T: more samples
+/// won't enlarge it. `fail` if D - 2 sd > T for any final D: samples come no nearer than `clear_m`. Otherwise `open`
+/// while D may change, then `cannot_say`. A verdict holds for both bounds of D. Wall without samples around it fails.
 pub(super) fn verdict(hole: &Hole, sd_m: f64, target_m: f64, clear_m: f64) -> Verdict {
     let is_left = 2.0 * clear_m >= hole.diameter_m;
     if hole.bounded && hole.most_m + 2.0 * sd_m <= target_m {

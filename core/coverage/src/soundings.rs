@@ -1,14 +1,14 @@
-//! How many samples fell on each node of a square grid, as surveyors' specifications want it.
+//! Sounding density: samples per node of a square grid, as survey specifications require.
 //!
-//! A grid says nothing of what lies between its nodes: a helix can pass it and leave strips wider than the target. It
-//! stands beside the hole, never for it. Source: metrics.md, "Sections and verdicts".
+//! A grid does not detect gaps: a helix can satisfy it and leave strips wider than the target. It complements the hole,
+//! never replaces it. Source: metrics.md, "Sections and verdicts".
 
 use headrace_geometry::math;
 use headrace_snapshot::stateful;
 
-/// Samples that a node should have at least.
+/// Minimum samples per node.
 pub const ENOUGH: u16 = 5;
-/// Edge of a node unless another is wanted, m.
+/// Default node edge, m.
 pub const NODE_M: f64 = 0.5;
 
 /// Extent and resolution of [`Soundings`].
@@ -16,11 +16,11 @@ pub const NODE_M: f64 = 0.5;
 pub struct GridLayout {
     /// Perimeter of the profile, m.
     pub perimeter_m: f64,
-    /// First chainage, m; rows begin at whole nodes from chainage zero.
+    /// First chainage, m; rows are aligned to chainage zero.
     pub from_m: f64,
     /// Last chainage, m.
     pub to_m: f64,
-    /// Edge of a node along the tunnel, m; round the perimeter nodes are as near to it as a whole number allows.
+    /// Node edge along the tunnel, m; around the perimeter it is adjusted to a whole number of nodes.
     pub node_m: f64,
 }
 
@@ -35,23 +35,23 @@ pub struct Soundings {
 
 stateful!(Soundings { slots: counts; fixed: layout, first_row, columns; });
 
-/// What the nodes of a stretch have.
+/// Node counts of a stretch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct GridSummary {
-    /// Nodes whose middle lies in the stretch.
+    /// Nodes centred in the stretch.
     pub nodes: u32,
     /// Those with at least [`ENOUGH`] samples.
     pub enough: u32,
-    /// Those without any: holidays, to a surveyor.
+    /// Those without any (holidays).
     pub empty: u32,
 }
 
 /// A node of the grid.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GridNode {
-    /// Chainage of its middle, m.
+    /// Chainage of its centre, m.
     pub x_m: f64,
-    /// Arc length of its middle, m.
+    /// Arc length of its centre, m.
     pub arc_m: f64,
     /// Samples on it, at most 65,535.
     pub count: u16,
@@ -65,9 +65,9 @@ impl GridSummary {
 }
 
 impl Soundings {
-    /// A grid without samples.
+    /// An empty grid.
     ///
-    /// Allocates: startup only, two bytes a node, which the system maps when a sample falls near.
+    /// Allocates: startup only, two bytes per node; the OS maps a page on its first sample.
     pub fn new(layout: GridLayout) -> Self {
         let first_row = math::floor_to_i64(layout.from_m / layout.node_m);
         let rows = (math::floor_to_i64(layout.to_m / layout.node_m) - first_row).max(0) + 1;
@@ -81,7 +81,7 @@ impl Soundings {
         [self.layout.node_m, self.layout.perimeter_m / self.columns as f64]
     }
 
-    /// Counts a sample; gives false when it lies outside, or is no number.
+    /// Counts a sample; false if it lies outside or isn't finite.
     ///
     /// Allocates: never.
     pub fn add(&mut self, x_m: f64, arc_m: f64) -> bool {
@@ -98,12 +98,12 @@ impl Soundings {
         usize::try_from(row * self.columns + math::floor_to_i64(into).min(self.columns - 1)).ok()
     }
 
-    /// The nodes whose middle has a chainage in [`from_m`, `to_m`), row by row.
+    /// Nodes centred in chainages [`from_m`, `to_m`), row by row.
     ///
     /// Allocates: never.
     pub fn nodes_between(&self, from_m: f64, to_m: f64) -> impl Iterator<Item = GridNode> {
         let [along_m, around_m] = self.node_m();
-        // The first row whose middle is not before a chainage.
+        // The first row centred at or after a chainage.
         let row = |x_m: f64| -math::floor_to_i64(0.5 - x_m / along_m) - self.first_row;
         let last = i64::try_from(self.counts.len()).unwrap_or(0) / self.columns;
         (row(from_m).max(0)..row(to_m).min(last)).flat_map(move |row| {
@@ -118,7 +118,7 @@ impl Soundings {
         })
     }
 
-    /// What the nodes have whose middle has a chainage in [`from_m`, `to_m`).
+    /// Summary of the nodes centred in chainages [`from_m`, `to_m`).
     ///
     /// Allocates: never.
     pub fn summary(&self, from_m: f64, to_m: f64) -> GridSummary {
@@ -131,7 +131,7 @@ impl Soundings {
         summary
     }
 
-    /// The nodes without a sample in [`from_m`, `to_m`).
+    /// Nodes without a sample centred in chainages [`from_m`, `to_m`).
     ///
     /// Allocates: never.
     pub fn empty_between(&self, from_m: f64, to_m: f64) -> impl Iterator<Item = GridNode> {
@@ -183,7 +183,7 @@ mod tests {
             prop_assert_eq!(soundings.empty_between(from_m, from_m + length_m).count(), summary.empty as usize);
         }
 
-        /// Stretches that follow each other have each node once.
+        /// Consecutive stretches contain each node exactly once.
         #[test]
         fn sections_share_the_nodes_out(section_m in 0.1f64..3.0) {
             let soundings = soundings(&[]);
@@ -196,7 +196,7 @@ mod tests {
 
     #[test]
     fn a_helix_passes_the_grid_and_misses_a_strip() {
-        // Two passes at the edges of each node's row: every node has ten, and 0.4 m between them nobody has seen.
+        // Two passes at the edges of each node's row: every node has ten samples, yet 0.4 m between them are unseen.
         let passes = (0..20).flat_map(|k| [0.05, 0.45].map(|x_m| f64::from(k) * 0.5 + x_m));
         let samples: Vec<_> =
             passes.flat_map(|x_m| (0..73).map(move |i| (x_m, f64::from(i) * 0.1))).collect();

@@ -1,4 +1,4 @@
-//! What the same samples say of other targets and other lengths of section.
+//! Verdicts of the same samples for other targets and section lengths.
 
 use super::frontier::{Outlook, Reach, clear_of};
 use super::hole::{Hole, HoleFinder};
@@ -12,13 +12,13 @@ use headrace_geometry::tunnel::Profile;
 /// Metres of tunnel by verdict.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Metres {
-    /// That pass.
+    /// Metres that pass.
     pub pass_m: f64,
-    /// That fail.
+    /// Metres that fail.
     pub fail_m: f64,
-    /// Of which nothing can be said for sure.
+    /// Metres undecided within the error of D.
     pub cannot_say_m: f64,
-    /// That going on may still fill.
+    /// Metres still open: more samples may land.
     pub open_m: f64,
 }
 
@@ -34,7 +34,7 @@ impl Metres {
     }
 }
 
-/// A section's hole, whatever the target.
+/// A section's hole, independent of the target.
 #[derive(Debug, Clone, Copy)]
 struct Measured {
     hole: Hole,
@@ -44,8 +44,8 @@ struct Measured {
 }
 
 impl Sections {
-    /// Metres by verdict for each of some targets, in sections of another length; with the same length, of the holes as they
-    /// were measured last, which don't depend on the target once a dive has ended.
+    /// Metres by verdict for each target, for a given section length. The present length reuses the holes as last
+    /// measured, which don't depend on the target once a dive has ended.
     pub fn what_if(
         &self,
         section_m: f64,
@@ -86,7 +86,7 @@ impl Sections {
             let hole = finder.largest(store, from_m, to_m);
             let mut pass_error = PassError::default();
             let mut doubtful = false;
-            // A hair inside, so that a common border is no overlap.
+            // Slightly inside, so that a common border is no overlap.
             for old in self.index_of(from_m + 1e-9)..=self.index_of(to_m - 1e-9) {
                 if let Some(section) = self.get(old) {
                     pass_error.add(&section.passage.pass_error);

@@ -1,7 +1,7 @@
-//! Navigation without a filter, after the paper's §9.2: attitude from the IMU, chainage from the tether, the place in
-//! the cross-section from the echosounders' ranges to the design profile, depth where they are silent.
+//! Navigation without a filter, after the paper's §9.2: attitude from the IMU, chainage from the tether, position in
+//! the cross-section from the echosounders' ranges to the design profile, height from depth where they are silent.
 //!
-//! Good for data without much noise, and the yardstick for a filter.
+//! Good for low-noise data, and the baseline for the filter.
 
 use super::relative::Relative;
 use super::section::{Echo, settle};
@@ -16,16 +16,16 @@ use headrace_sensor::reading::MAX_SOURCES;
 use headrace_sensor::reading::{EchoRange, Level, Reading, TetherLength};
 use headrace_snapshot::stateful;
 
-/// Ranges older than this don't take part in finding the place in the section.
+/// Maximum age of ranges used for the position in the section.
 const ECHO_AGE: DurNs = DurNs(500_000_000);
-/// An attitude or a place older than this is no fix.
+/// Maximum age of an attitude, a chainage or a position used in a fix.
 const STALE: DurNs = DurNs(2_000_000_000);
-/// Tether readings over which the speed is taken: those of the last second, at most so many.
+/// The speed is taken over the tether readings of the last second, at most so many.
 const SPEED_WINDOW: DurNs = DurNs(1_000_000_000);
 const SPEED_READINGS: usize = 64;
-/// Weight of an echo against the prior place, as standard deviations, m.
+/// Standard deviation of an echo's range, m.
 const ECHO_SIGMA_M: f64 = 0.01;
-/// Across and up.
+/// Standard deviation of the prior position, across and up, m.
 const PRIOR_SD_M: [f64; 2] = [10.0, 1.0];
 
 /// See the module's description.
@@ -36,7 +36,7 @@ pub struct DirectNavigation {
     tether: TetherTrack,
     echoes: [Option<(MonoNs, Echo)>; MAX_SOURCES],
     place: Option<(MonoNs, [f64; 2])>,
-    /// Height by pressure, and by how much the echoes have shown it to be off, m.
+    /// Height by pressure, and its offset as measured by the echoes, m.
     height_m: Option<f64>,
     height_offset_m: f64,
 }
@@ -54,7 +54,7 @@ struct TetherTrack {
 stateful!(TetherTrack { state: count, resolution_m; slots: readings; });
 
 impl DirectNavigation {
-    /// Nothing is known yet.
+    /// Without readings yet.
     pub fn new(profile: Profile, site: Site) -> Self {
         Self {
             profile,
@@ -82,7 +82,7 @@ impl DirectNavigation {
         self.find_place(at);
     }
 
-    /// Moves the place in the section to where the recent ranges agree best with the profile.
+    /// Updates the position in the section to the best fit of the recent ranges to the profile.
     fn find_place(&mut self, now: MonoNs) {
         let Some((_, attitude)) = self.attitude else { return };
         let [reference_y, reference_z] = self.profile.reference();
@@ -102,7 +102,7 @@ impl DirectNavigation {
         let up = self.attitude.map_or(mount.position.z(), |(_, attitude)| (attitude * mount.position).z());
         let height_m = self.site.surface_above_floor_m - self.site.depth_m(pressure_pa) - up;
         self.height_m = Some(height_m);
-        // Where the echoes say nothing of height, depth alone moves the place.
+        // Without recent echoes, depth alone updates the height.
         let silent = self.echoes.iter().flatten().all(|(echoed, _)| at.since(*echoed).0.abs() > ECHO_AGE.0);
         if let (true, Some((_, place))) = (silent, &mut self.place) {
             place[1] = height_m + self.height_offset_m;
@@ -257,7 +257,7 @@ mod tests {
             })
         };
         let depth = SensorInfo { kind: SensorKind::Depth, ..imu };
-        // The sensor is 0.4 m off; the echoes say 3.0 m.
+        // The sensor is 0.4 m off; the echoes measure 3.0 m.
         nav.update(1, &depth, at_once(MonoNs(0)), &pressure(3.4));
         let down = SensorInfo {
             mount: Mount {

@@ -1,4 +1,4 @@
-//! A navigation fix, why there may be none, and the times of a reading.
+//! A navigation fix, the reason for a missing one, and the timestamps of a reading.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,25 +6,25 @@ use crate::relative::Relative;
 use headrace_geometry::frames::Pose;
 use headrace_geometry::time::MonoNs;
 
-/// Where the vehicle is at a moment.
+/// Pose of the vehicle at one time.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Fix {
     /// Position and attitude.
     pub pose: Pose,
     /// Speed along the tunnel, m/s, positive inwards.
     pub speed_mps: f64,
-    /// Its errors against those when the heads last passed here.
+    /// Error covariance relative to the heads' previous pass of this place.
     pub relative: Relative,
 }
 
-/// What a fix lacks.
+/// Missing part of a fix.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum NoFix {
     /// No recent attitude.
     Heading,
-    /// No recent measure of the way along the tunnel.
+    /// No recent measurement of the chainage.
     Chainage,
-    /// No recent measure of the place in the cross-section.
+    /// No recent measurement of the position in the cross-section.
     Section,
 }
 
@@ -42,11 +42,11 @@ impl NoFix {
     }
 }
 
-/// When a reading came, and when it was valid.
+/// Receive time and time of validity of a reading.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Times {
-    /// When its first byte came.
+    /// Receive time of its first byte.
     pub received: MonoNs,
-    /// The moment that it speaks of.
+    /// Time of validity.
     pub valid: MonoNs,
 }

@@ -1,4 +1,4 @@
-//! Where the vehicle is: the seam behind which navigation stands, and the ways of navigating.
+//! Navigation of the vehicle: the common interface and its implementations.
 
 #![cfg_attr(not(test), warn(clippy::cast_possible_truncation))]
 #![cfg_attr(test, allow(clippy::cast_possible_truncation))]
@@ -19,29 +19,29 @@ use headrace_snapshot::Stateful;
 
 pub use self::fix::{Fix, NoFix, Times};
 
-/// A way of navigating. Readings come in the order in which they were received; a fix is as of the readings so far. Its
-/// state is all that a fix depends on, so that a snapshot can take it up again.
+/// A navigation method. Readings arrive in order of receive time; a fix uses the readings so far. Its state is all that
+/// a fix depends on, so that it can be resumed from a snapshot.
 pub trait Navigation: Stateful + Send + Sync {
     /// Takes a reading. `source` is the same for all readings of one sensor.
     ///
     /// Allocates: never.
     fn update(&mut self, source: usize, sensor: &SensorInfo, times: Times, reading: &Reading);
 
-    /// No reading will come any more.
+    /// Called after the last reading.
     fn end(&mut self) {}
 
-    /// How well a source agrees with the others; `None` where that isn't known.
+    /// Innovation statistics of a source; `None` where there are none.
     fn consistency(&self, _source: usize) -> Option<Consistency> {
         None
     }
 
-    /// How far off the estimate may be; `None` where that isn't known.
+    /// Standard deviations of the estimate; `None` where they aren't known.
     fn pose_sd(&self) -> Option<PoseSd> {
         None
     }
 
-    /// Where the vehicle is at `at`, which may be a little before or after the last reading.
+    /// Fix at `at`, which may be a little before or after the last reading.
     ///
-    /// Errors: what is missing.
+    /// Errors: the missing part.
     fn fix(&self, at: MonoNs) -> Result<Fix, NoFix>;
 }

@@ -1,11 +1,11 @@
-//! How well two moments are known against each other.
+//! Relative error covariance between two epochs.
 
 use serde::{Deserialize, Serialize};
 
 use headrace_geometry::frames::{Tunnel, Vec3};
 use headrace_geometry::math;
 
-/// Covariance of the errors that move a sample along the tunnel, of one moment against another: chainage, pitch, yaw.
+/// Relative covariance of the errors that move a sample along the tunnel, one time against another: chainage, pitch, yaw.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Relative([[f64; 3]; 3]);
 
@@ -15,12 +15,12 @@ impl Relative {
         Self(covariance)
     }
 
-    /// Nothing but an error of chainage of this standard deviation, m.
+    /// An error of chainage alone, of this standard deviation, m.
     pub fn along(sd_m: f64) -> Self {
         Self([[sd_m * sd_m, 0.0, 0.0], [0.0; 3], [0.0; 3]])
     }
 
-    /// Standard deviation of the chainage of a place at `arm` from the vehicle, m.
+    /// Standard deviation of the chainage of a point at `arm` from the vehicle, m.
     pub fn sd_m(&self, arm: Vec3<Tunnel>) -> f64 {
         let weights = [1.0, arm.z(), -arm.y()];
         let rows = self.0.iter().zip(weights);
@@ -29,7 +29,7 @@ impl Relative {
         math::sqrt(sum.max(0.0))
     }
 
-    /// The same, told of another place of the vehicle that is `arm` from this one.
+    /// The same for another reference point of the vehicle, at `arm` from this one.
     #[must_use]
     pub fn moved(&self, arm: Vec3<Tunnel>) -> Self {
         let sheared = |[x, pitch, yaw]: [f64; 3]| [x + arm.z() * pitch - arm.y() * yaw, pitch, yaw];
@@ -39,7 +39,7 @@ impl Relative {
         Self(columns)
     }
 
-    /// The sum of shares of two.
+    /// Weighted sum of two covariances.
     #[must_use]
     pub fn weighted(&self, share: f64, other: &Self, other_share: f64) -> Self {
         let mut sum = [[0.0; 3]; 3];

@@ -1,36 +1,36 @@
-//! The place in the cross-section where echosounders' ranges agree best with the design profile.
+//! Position in the cross-section that best fits the echosounders' ranges to the design profile.
 
 use serde::{Deserialize, Serialize};
 
 use headrace_geometry::frames::{Body, Mount, Rot, Sensor, Tunnel, Vec3};
 use headrace_geometry::tunnel::Profile;
 
-/// Beams that graze the wall more than this don't take part.
+/// Minimum cosine of the incidence; beams that graze the wall more aren't used.
 const LEAST_COSINE: f64 = 0.1;
-/// A beam that leans so far up or down says something of the height.
+/// Minimum change of range with height, m/m, of a beam that determines the height.
 const STEEP: f64 = 0.7;
 const ROUNDS: usize = 3;
 
 /// A range to the wall, along the x of its sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Echo {
-    /// How the sonar sits.
+    /// Mount of the sonar.
     pub mount: Mount,
     /// Range at the site's speed of sound, m.
     pub range_m: f64,
 }
 
-/// A place in the section, and whether the echoes had a say in its height.
+/// A position in the section, and whether the echoes determine its height.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Place {
     /// y and z, m.
     pub at_m: [f64; 2],
-    /// Whether its height is that of the echoes.
+    /// Whether the echoes determine its height.
     pub is_height_seen: bool,
 }
 
-/// Gauss-Newton from `start` on sum((measured - predicted)^2 / sd^2) with a prior (place and standard deviations),
-/// d range / d place = -n / (n . beam). Stays where it came to when a step would leave the section.
+/// Gauss-Newton from `start` on sum((measured - predicted)^2 / sd^2) with a prior (position and standard deviations),
+/// d range / d position = -n / (n . beam). Stops where a step would leave the section.
 pub fn settle(
     profile: &Profile,
     attitude: Rot<Tunnel, Body>,

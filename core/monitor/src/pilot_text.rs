@@ -86,7 +86,7 @@ pub fn action_text(action: Action, start_m: f64, at_most_mps: f64) -> String {
 /// What would help where slower doesn't.
 fn remedy_text(remedy: Option<Remedy>) -> String {
     match remedy {
-        Some(Remedy::Hysteresis) => "hold the heading, the beams swing".to_owned(),
+        Some(Remedy::HoldHeading) => "hold the heading, the beams swing".to_owned(),
         Some(Remedy::Centre) => "go to the middle of the tunnel".to_owned(),
         Some(Remedy::Mode(mode)) => format!("set the heads to {}", mode.as_str().to_uppercase()),
         None => "no mode meets the target here".to_owned(),
@@ -189,7 +189,7 @@ pub fn advice_text(advice: &AdviceFigures, profile: &Profile) -> String {
         Reason::AngularStep => {
             let remedy = remedy_text(advice.remedy);
             match (advice.remedy, advice.unseen_m) {
-                (Some(Remedy::Hysteresis), _) => format!("slower won't help: {remedy}"),
+                (Some(Remedy::HoldHeading), _) => format!("slower won't help: {remedy}"),
                 (_, Some([width_m, arc_m])) => {
                     let clock = profile.clock(arc_m);
                     format!("slower won't help: no head sees {width_m:.2} m of the wall at {clock}; {remedy}")

@@ -406,7 +406,7 @@ impl Advisor {
         let target_m = self.task.target_m;
         let steady = Going { ping_period_s: going.ping_period_s, ..Going::default() };
         if going.swing_mps > 0.0 && self.now.bound_for_target(0, passes, target_m, &steady).is_ok() {
-            return Some(Remedy::Hysteresis);
+            return Some(Remedy::HoldHeading);
         }
         let stride = situation.heads.iter().flatten().map(|motion| Ring::stride(motion.step_rad, RING)).max();
         let same = |mode: &HeadMode| Some(Ring::stride(mode.turn.step_rad(), RING)) == stride;

@@ -1,8 +1,8 @@
-//! What sampling theory refuses, each with its reason.
+//! Errors of sampling theory, each with its reason.
 
 use super::head_set::MAX_HEADS;
 
-/// Why no number can be given.
+/// Why no result can be given.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SamplingError {
@@ -22,7 +22,7 @@ pub enum SamplingError {
         /// Its value.
         value: f64,
     },
-    /// A step that leaves a rest of the turn.
+    /// A step that doesn't divide a turn.
     #[error("a step of {step_deg} degrees doesn't divide a turn: 360 degrees are {steps} of them")]
     StepDoesNotDivide {
         /// The step, degrees.
@@ -44,10 +44,10 @@ pub enum SamplingError {
         /// Head angle, degrees.
         angle_deg: f64,
     },
-    /// A head whose plane lies along the tunnel.
+    /// A head whose scan plane lies along the tunnel.
     #[error("a head's axis stands across the tunnel: its beams run along it")]
     HeadAskew,
-    /// A head that would be in the rock.
+    /// A head outside the tunnel's profile.
     #[error("a head at y = {y_m:.3} m, z = {z_m:.3} m is outside the tunnel's profile")]
     HeadOutside {
         /// Left of the axis, m.
@@ -58,19 +58,19 @@ pub enum SamplingError {
     /// Sectors for fewer than two heads.
     #[error("sector offset divides a turn among heads: it needs at least 2, not {heads}")]
     SectorNeedsHeads {
-        /// Heads there are.
+        /// Number of heads.
         heads: usize,
     },
-    /// No head, or more than the tables hold.
+    /// No head, or more than [`MAX_HEADS`].
     #[error("{heads} heads; from 1 to {MAX_HEADS} are possible")]
     HeadCount {
-        /// Heads there are.
+        /// Number of heads.
         heads: usize,
     },
-    /// Heads that can't all be set to one mode.
+    /// Heads without a common mode.
     #[error("the heads have no mode in common, or none at all")]
     NoCommonMode,
-    /// A plan without a question.
+    /// A plan without a target, speed or time.
     #[error("nothing is asked: give a target, a speed or a time")]
     NothingAsked,
     /// Heads apart along the hull can't be phased for a vehicle that stands still.
@@ -95,7 +95,7 @@ pub enum SamplingError {
         /// Its middle, arc length in m.
         arc_m: f64,
     },
-    /// The vehicle heads too far askew, or swings about too fast.
+    /// The vehicle's heading is too far off the axis, or it swings too fast.
     #[error(
         "a target of {target_m} m is met at no speed: so askew, or swinging so fast, passes are farther apart"
     )]
@@ -103,7 +103,7 @@ pub enum SamplingError {
         /// The target, m.
         target_m: f64,
     },
-    /// The distance between neighbours of one turn is as large as the target.
+    /// Neighbours of one turn are as far apart as the target.
     #[error(
         "a target of {target_m} m is met at no speed: neighbours of one turn are {t_y_m:.3} m apart, whatever the speed"
     )]

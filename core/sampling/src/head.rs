@@ -1,4 +1,4 @@
-//! A profiling head as sampling theory sees it: how it turns, how it sits, what it is told to do.
+//! A profiling head in the terms of sampling theory: rotation, mounting and program.
 
 use super::error::{SamplingError, positive};
 pub use super::head_set::{HeadSet, MAX_HEADS};
@@ -6,15 +6,15 @@ use headrace_geometry::frames::{Body, Mount, Rot, Sensor, head_direction};
 use headrace_geometry::math::{self, TAU};
 use headrace_geometry::time::DurNs;
 
-/// A head that has given no return for so long is silent: it is neither waited for nor counted in the advice.
+/// A head without a return for this long is silent: it is neither waited for nor counted in the advice.
 pub const SILENT_AFTER: DurNs = DurNs(2_000_000_000);
 
-/// By how many steps a turn may miss being a whole number of them: steps come from decimal degrees.
+/// Tolerance on a whole number of steps per turn: steps come from decimal degrees.
 const WHOLE_STEPS: f64 = 1e-6;
-/// The most steps of a turn.
+/// Maximum number of steps per turn.
 const MAX_STEPS: f64 = 100_000.0;
 
-/// How a head turns: equal steps, a ping at each, a whole number of them to a turn.
+/// Rotation of a head: equal steps, a ping at each, a whole number of steps per turn.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Turn {
     step_rad: f64,
@@ -66,19 +66,19 @@ impl Turn {
     }
 }
 
-/// Where the period of a mode comes from.
+/// Source of a mode's period.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Basis {
-    /// Measured on this head at this range setting, as the vehicle file says.
+    /// Measured on this head at this range setting, from the vehicle file.
     Measured,
-    /// The maker's table, at the range setting that it is for.
+    /// The manufacturer's table, at its range setting.
     Table,
     /// Carried over from another range setting.
     Estimated,
 }
 
 impl Basis {
-    /// The word used in tables.
+    /// Name used in tables.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Measured => "measured",
@@ -88,40 +88,40 @@ impl Basis {
     }
 }
 
-/// A way of turning that a head can be set to, at its range setting.
+/// A rotation mode of a head, at its range setting.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HeadMode {
     /// Its name in vehicle files.
     pub name: &'static str,
     /// Step and period.
     pub turn: Turn,
-    /// Where the period comes from.
+    /// Source of the period.
     pub basis: Basis,
 }
 
-/// The body of a head, a cylinder about its axis: what may stand in its neighbours' way.
+/// The body of a head, a cylinder about its axis, which may occlude neighbouring heads.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HeadBody {
     /// Radius, m; zero for a head without a body.
     pub radius_m: f64,
-    /// How far it reaches ahead of the beam along the sensor's +x, m.
+    /// Extent ahead of the beam along the sensor's +x, m.
     pub ahead_m: f64,
-    /// How far it reaches behind the beam, m.
+    /// Extent behind the beam, m.
     pub behind_m: f64,
 }
 
-/// What a schedule of heads needs to know of one head.
+/// Properties of a head needed for its schedule.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HeadSpec {
-    /// How it sits on the vehicle.
+    /// Mounting on the vehicle.
     pub mount: Mount,
     /// Angle between two pings, radians.
     pub step_rad: f64,
     /// Time between two pings, seconds.
     pub ping_period_s: f64,
-    /// The nearest and the farthest that it hears at its setting, m, as it reckons ranges.
+    /// Smallest and largest range at its setting, m, as computed with `sound_speed_mps`.
     pub range_m: [f64; 2],
-    /// The speed of sound by which it reckons them, m/s.
+    /// Speed of sound with which the head computes ranges, m/s.
     pub sound_speed_mps: f64,
     /// zeta: full width of its beam, radians.
     pub beam_rad: f64,
@@ -130,35 +130,35 @@ pub struct HeadSpec {
 }
 
 impl HeadSpec {
-    /// The nearest and the farthest wall that it hears in water with this speed of sound, m.
+    /// Smallest and largest range to a wall that it detects in water with this speed of sound, m.
     pub fn reach_m(&self, sound_speed_mps: f64) -> [f64; 2] {
         self.range_m.map(|range_m| range_m * sound_speed_mps / self.sound_speed_mps)
     }
 }
 
-/// What a head does during a dive: where it begins and between which angles it turns. Angles in the sensor's frame.
+/// Program of a head for a dive: start angle, direction and sector. Angles in the sensor frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HeadProgram {
     /// Angle of the first ping, radians.
     pub start_rad: f64,
-    /// Whether the first step goes towards growing angles.
+    /// Whether the first step is towards growing angles.
     pub growing: bool,
-    /// The sector to go back and forth in as (least angle, size), radians; `None` turns on for ever.
+    /// Sector to sweep back and forth in (least angle, size), radians; `None` for continuous rotation.
     pub sector: Option<(f64, f64)>,
 }
 
-/// What has been measured of one head that is turning.
+/// Measured motion of a head that is turning.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HeadMotion {
-    /// How it sits on the vehicle.
+    /// Mounting on the vehicle.
     pub mount: Mount,
-    /// Its angle now, in the sensor's frame, radians.
+    /// Current angle, in the sensor frame, radians.
     pub angle_rad: f64,
-    /// Angle turned per second, positive where the angle grows.
+    /// Rate of rotation, rad/s, positive where the angle grows.
     pub rate_radps: f64,
     /// Angle between two pings, radians, positive.
     pub step_rad: f64,
-    /// Size of the sector between its last turning points; `None` while it turns on.
+    /// Size of the sector between its last turning points, radians; `None` for continuous rotation.
     pub sector_rad: Option<f64>,
 }
 
@@ -174,7 +174,7 @@ impl HeadMotion {
     }
 }
 
-/// Whether a head's axis points aft, so that its angles grow the other way round in the body's frame.
+/// Whether a head's axis points aft, so that its angles grow in the opposite sense in the body frame.
 pub fn faces_aft(rotation: Rot<Body, Sensor>) -> bool {
     (rotation * head_direction(math::FRAC_PI_2)).y() < 0.0
 }

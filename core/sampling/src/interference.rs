@@ -1,4 +1,4 @@
-//! How long heads that share the water can hear each other: face to face, or on the same patch of wall.
+//! Interference of heads: how long they can hear each other, face to face or on the same patch of wall.
 
 use super::error::SamplingError;
 use super::head::HeadSpec;
@@ -9,22 +9,22 @@ use headrace_geometry::math;
 use headrace_geometry::time::DurNs;
 use headrace_geometry::tunnel::Profile;
 
-/// Of two heads, the time in each turn or sweep in which one can hear the other's ping.
+/// Time per turn or sweep in which two heads can hear each other's pings.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Exposure {
     /// The two heads by number.
     pub heads: (usize, usize),
-    /// Both beams point at the other's body, seconds a turn.
+    /// Each beam points at the other head's body, seconds per turn.
     pub facing_s: f64,
-    /// Both beams meet the wall within each other's footprint, seconds a turn.
+    /// The beams' footprints on the wall overlap, seconds per turn.
     pub same_patch_s: f64,
-    /// The turn, or sweep there and back, seconds.
+    /// Period of the turn, or of the sweep there and back, seconds.
     pub of_s: f64,
 }
 
-/// Exposure of each pair of heads that follow a schedule, the vehicle at `pose`; pairs without any are left out.
+/// Exposure of each pair of heads that follow a schedule, with the vehicle at `pose`; pairs without any are left out.
 ///
-/// Heads whose bodies share a place are idealised ones, and have none.
+/// Heads at one position are idealised ones, and have none.
 /// Errors: a head outside the profile, or a beam along the tunnel.
 pub fn exposures(
     heads: &[HeadSpec],

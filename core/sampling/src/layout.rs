@@ -1,20 +1,20 @@
-//! How several heads share the work: phase shift and sector offset (the paper's §5).
+//! Layouts of several heads: phase shift and sector offset (the paper's §5).
 
 use super::error::{SamplingError, not_negative, positive};
 use super::head::{HeadProgram, HeadSpec, MAX_HEADS, faces_aft};
 use headrace_geometry::math::{self, TAU};
 
-/// How the heads of a vehicle share the work.
+/// Layout of the heads of a vehicle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum HeadLayout {
-    /// All turn on for ever, 2 pi / s apart where they pass the same place.
+    /// All rotate continuously, 2 pi / s apart where they pass the same place.
     PhaseShift,
-    /// Each goes back and forth in its own sector of 2 pi / s.
+    /// Each sweeps back and forth in a sector of 2 pi / s.
     SectorOffset,
 }
 
 impl HeadLayout {
-    /// The layouts by the names that files and command lines use.
+    /// The layouts by their names in files and on command lines.
     pub const NAMES: [(&'static str, Self); 2] =
         [("phase_shift", Self::PhaseShift), ("sector_offset", Self::SectorOffset)];
 
@@ -26,7 +26,7 @@ impl HeadLayout {
         }
     }
 
-    /// Whether so many heads can be laid out like this.
+    /// Checks that this number of heads can have this layout.
     ///
     /// Errors: no head, more than [`MAX_HEADS`], or sectors for fewer than two.
     pub fn check(self, heads: usize) -> Result<(), SamplingError> {
@@ -39,11 +39,11 @@ impl HeadLayout {
     }
 }
 
-/// Angle that a head turns while the vehicle goes `x_m`, radians, not reduced to a turn.
+/// Angle that a head turns while the vehicle travels `x_m`, radians, not wrapped to a turn.
 ///
 /// `rate_radps` is the head's angular velocity omega, of either sign; `speed_mps` > 0.
-/// Errors: a distance or rate that isn't finite; a speed that isn't above zero, where x / v has no bound: unless the
-/// distance is zero.
+/// Errors: a distance, rate or speed that isn't finite; a negative speed; a speed of zero, where x / v has no bound,
+/// unless the distance is zero.
 /// Source: Jorge et al. 2021, Eq. 19 (alpha_k = omega x / v).
 pub fn turned_over_rad(rate_radps: f64, x_m: f64, speed_mps: f64) -> Result<f64, SamplingError> {
     not_negative("the rate of turn in rad/s, without its sign", rate_radps.abs())?;
@@ -53,8 +53,8 @@ pub fn turned_over_rad(rate_radps: f64, x_m: f64, speed_mps: f64) -> Result<f64,
     turned.is_finite().then_some(turned).ok_or(SamplingError::NoPhaseAtRest { apart_m: x_m, speed_mps })
 }
 
-/// gamma: angle at which a head `x_m` behind the foremost starts, so that its phase is `phase_rad` where it passes the
-/// same place; in [0, 2 pi). Good to some 1e-16 of the angle turned meanwhile.
+/// gamma: start angle of a head `x_m` behind the foremost, such that its phase is `phase_rad` where it passes the same
+/// place; in [0, 2 pi). Accurate to about 1e-16 of the angle turned meanwhile.
 ///
 /// Errors: as for [`turned_over_rad`].
 /// Source: Jorge et al. 2021, Eq. 20 (gamma = phi(k) - omega x / v).
@@ -62,7 +62,7 @@ pub fn start_rad(phase_rad: f64, rate_radps: f64, x_m: f64, speed_mps: f64) -> R
     Ok(math::wrap(phase_rad - turned_over_rad(rate_radps, x_m, speed_mps)?, TAU))
 }
 
-/// gamma of a head that faces the other way, whose own angles grow against the first's; in [0, 2 pi).
+/// gamma of a head that faces the other way, whose angles grow opposite to the first's; in [0, 2 pi).
 ///
 /// Errors: as for [`turned_over_rad`].
 /// Source: Jorge et al. 2021, Eq. 21 (gamma = 2 pi - (phi(k) - omega x / v)).
@@ -75,41 +75,41 @@ pub fn start_reversed_rad(
     Ok(math::wrap(TAU - start_rad(phase_rad, rate_radps, x_m, speed_mps)?, TAU))
 }
 
-/// Angles closer together than this are one, radians.
+/// Angles closer together than this are equal, radians.
 const ROUNDING_RAD: f64 = 1e-9;
 
-/// Steps that it takes to go so far, the last one being shorter where they don't divide it.
+/// Number of steps to cover `far_rad`, the last one being shorter where they don't divide it.
 pub(super) fn steps_over(far_rad: f64, step_rad: f64) -> i64 {
     -math::floor_to_i64(-(far_rad / step_rad - 1e-6))
 }
 
-/// Where a head is in its back and forth, and which way it goes. Angles in its own frame.
+/// Position of a head in its sweep, and its direction. Angles in the sensor frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InSector {
-    /// Its angle, radians, in [0, 2 pi).
+    /// Head angle, radians, in [0, 2 pi).
     pub angle_rad: f64,
-    /// Whether its angle grows.
+    /// Whether the angle is growing.
     pub growing: bool,
 }
 
 /// A head's share of a turn divided among several.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sector {
-    /// Which sector, from zero at the floor.
+    /// Sector number, from zero at the floor.
     pub number: usize,
-    /// How many there are.
+    /// Number of sectors.
     pub of: usize,
-    /// How far the head is behind the first, m.
+    /// Distance of the head behind the first, m.
     pub behind_m: f64,
-    /// Whether it faces the other way than the first.
+    /// Whether it faces opposite to the first.
     pub reversed: bool,
 }
 
-/// The angle of a head when the first, in sector 0, is at `lead`, so that both are at the same point of their back and
-/// forth where they pass the same place.
+/// The angle of a head when the first, in sector 0, is at `lead`, such that both are at the same point of their sweep
+/// where they pass the same place.
 ///
-/// `turn_s` is the time of a whole turn T; a sector's back and forth takes 2 T / s. `speed_mps` of zero stands for a
-/// delay of zero: heads moving in step, at right angles for four of them, wherever they sit along the hull.
+/// `turn_s` is the turn period T; a sector's sweep there and back takes 2 T / s. `speed_mps` of zero stands for a delay
+/// of zero: heads move in step, at right angles for four of them, regardless of their positions along the hull.
 /// Errors: fewer than two sectors, a number that isn't one of them, a lead outside sector 0, a time that isn't above
 /// zero, a speed below zero.
 /// Source: Jorge et al. 2021, Algorithm 1, with one name for the sector's size and 2 T / s for its period.
@@ -134,7 +134,7 @@ pub fn in_step(
         "what is left of the first head's sector in radians",
         size_rad - lead.angle_rad + ROUNDING_RAD,
     )?;
-    // Back and forth unfolded: 0 to 1 on the way out, 1 to 2 on the way back.
+    // Sweep unfolded: 0 to 1 on the way out, 1 to 2 on the way back.
     let share = (lead.angle_rad / size_rad).min(1.0);
     let lead_legs = if lead.growing { share } else { 2.0 - share };
     let legs = math::wrap(lead_legs - delay_s / sweep_s, 2.0);
@@ -145,10 +145,10 @@ pub fn in_step(
     Ok(InSector { angle_rad: math::wrap(angle_rad, TAU), growing: growing != sector.reversed })
 }
 
-/// Which sector each head takes: they look outwards, away from their neighbours.
+/// Sector of each head, chosen so that heads look outwards, away from their neighbours.
 ///
-/// The sum over the heads of offset across the hull times direction of the sector's middle is as large as it can be;
-/// where that doesn't decide, head k takes sector k.
+/// Maximizes the sum over the heads of offset across the hull times direction of the sector's middle; of equal
+/// assignments, that with head k in sector k comes first.
 pub fn sectors(heads: &[HeadSpec]) -> Vec<usize> {
     let count = heads.len().min(MAX_HEADS);
     let share = TAU / count.max(1) as f64;
@@ -163,7 +163,7 @@ pub fn sectors(heads: &[HeadSpec]) -> Vec<usize> {
     best.1
 }
 
-/// Tries the sectors that are left for the next head, in order, so that the first of equals wins.
+/// Tries the remaining sectors for the next head, in order, so that the first of equals wins.
 fn assign(gains: &[Vec<f64>], so_far: f64, taken: &mut Vec<usize>, best: &mut (f64, Vec<usize>)) {
     /// Gains closer together than this are equal, m.
     const SAME_M: f64 = 1e-9;
@@ -184,11 +184,11 @@ fn assign(gains: &[Vec<f64>], so_far: f64, taken: &mut Vec<usize>, best: &mut (f
 
 /// Programs for the heads of a vehicle, in the order given, such that at `speed_mps` their passes interleave evenly.
 ///
-/// Head k of s starts at the body-frame angle gamma_k = 2 pi k / s - omega x_k / v, where x_k is how far it sits behind
+/// Head k of s starts at the body-frame angle gamma_k = 2 pi k / s - omega x_k / v, where x_k is its distance behind
 /// the foremost head (Eq. 20); a head that faces aft turns the other way, so that its start is mirrored (Eq. 21). In
-/// sectors, the foremost is at its sector's beginning when the others are where Algorithm 1 has them.
-/// At zero speed the offsets along the hull have no meaning and are left out.
-/// Errors: a number of heads that the layout can't have; a speed or a head's times out of range.
+/// sectors, the foremost head is at the start of its sector when the others are where Algorithm 1 has them.
+/// At zero speed the offsets along the hull have no meaning and are ignored.
+/// Errors: a number of heads that the layout doesn't allow; a speed, step or ping period out of range.
 /// Source: Jorge et al. 2021, Eq. 19 to 21, §5.2 and Algorithm 1.
 pub fn programs(
     heads: &[HeadSpec],
@@ -216,7 +216,7 @@ pub fn programs(
     }
 }
 
-/// All heads turn through the body's angles in one sense: one that faces aft must then step downwards in its own.
+/// All heads turn in one sense in the body frame: one that faces aft must then step downwards in its sensor frame.
 fn phase_shift(
     head: &HeadSpec,
     phase_rad: f64,
@@ -235,13 +235,14 @@ fn phase_shift(
 fn sector_offset(head: &HeadSpec, sector: &Sector, speed_mps: f64) -> Result<HeadProgram, SamplingError> {
     let size_rad = TAU / sector.of as f64;
     let step_rad = positive("the step in radians", head.step_rad)?;
-    // A sweep takes whole pings: where steps don't divide the sector, as long as for a turn that they do divide.
+    // A sweep takes a whole number of pings: where steps don't divide the sector, the turn period is rounded up to
+    // match.
     let turn_s = head.ping_period_s * steps_over(size_rad, step_rad) as f64 * sector.of as f64;
     let least_rad = size_rad * sector.number as f64;
     let least_rad = if sector.reversed { math::wrap(TAU - least_rad - size_rad, TAU) } else { least_rad };
     let begin = InSector { angle_rad: 0.0, growing: true };
     let start = in_step(begin, sector, turn_s, speed_mps)?;
-    // Either end may have been taken for the other side of a whole turn.
+    // Either end may have been wrapped by a whole turn.
     let along_rad = math::wrap(start.angle_rad - least_rad + ROUNDING_RAD, TAU) - ROUNDING_RAD;
     Ok(HeadProgram {
         start_rad: least_rad + along_rad,
@@ -250,23 +251,23 @@ fn sector_offset(head: &HeadSpec, sector: &Sector, speed_mps: f64) -> Result<Hea
     })
 }
 
-/// How distance along the hull, speed and turn must fit for heads at whole s-ths of a turn from each other to
-/// interleave: the angles at which they disturb each other least.
+/// Spacing rule: distance along the hull, speed and turn period for which heads at multiples of 1/s turn from each
+/// other interleave, the angles at which they interfere least.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HullRule {
-    /// q: how many s-ths of a turn the vehicle takes to go the distance, nearest to what it is.
+    /// q: s-ths of a turn in which the vehicle travels the distance, to the nearest.
     pub q: u32,
-    /// The speed that would fit, m/s: s x / (q T).
+    /// The speed that fits the rule, m/s: s x / (q T).
     pub speed_mps: f64,
-    /// The distance that would fit, m: q v T / s.
+    /// The distance that fits the rule, m: q v T / s.
     pub apart_m: f64,
-    /// The time of a turn that would fit, seconds: s x / (q v).
+    /// The turn period that fits the rule, seconds: s x / (q v).
     pub turn_s: f64,
 }
 
 /// The spacing rule for a head `apart_m` behind the first, of `heads` in phase shift.
 ///
-/// Errors: an argument that isn't above zero, or a number of heads that can't be.
+/// Errors: an argument that isn't above zero, or an invalid number of heads.
 /// Source: Jorge et al. 2021, §5.1 (x = q v T; T = s x / (q v), which is the same rule for s-ths of a turn).
 pub fn hull_rule(apart_m: f64, heads: usize, speed_mps: f64, turn_s: f64) -> Result<HullRule, SamplingError> {
     HeadLayout::PhaseShift.check(heads)?;
@@ -283,11 +284,12 @@ pub fn hull_rule(apart_m: f64, heads: usize, speed_mps: f64, turn_s: f64) -> Res
     })
 }
 
-/// The two distances that alternate along the tunnel where a head sweeps its sector, m, the smaller first.
+/// The two alternating distances between passes along the tunnel in a head's sector, m, the smaller first.
 ///
-/// `pitch_m` is T_x of one head turning on (v T), `heads` their number s, `share` the place in the sector from 0 to 1.
+/// `pitch_m` is T_x of one continuously rotating head (v T), `heads` their number s, `share` the position in the sector
+/// from 0 to 1.
 /// Their sum is 2 T_x / s everywhere; in the middle they are equal, at the ends one is zero.
-/// Errors: fewer than two heads, a pitch below zero, a share beyond 0 to 1.
+/// Errors: fewer than two heads, a pitch below zero, a share outside 0 to 1.
 /// Source: Jorge et al. 2021, §5.2 (T_x1 + T_x2 = 2 T_x / s).
 pub fn alternating_m(pitch_m: f64, heads: usize, share: f64) -> Result<[f64; 2], SamplingError> {
     HeadLayout::SectorOffset.check(heads)?;
@@ -297,7 +299,7 @@ pub fn alternating_m(pitch_m: f64, heads: usize, share: f64) -> Result<[f64; 2],
     Ok(divided_m(2.0 * pitch_m / heads as f64, share))
 }
 
-/// The way that a sweep there and back takes, `both_m`, divided by a place in the sector: the smaller part first.
+/// Distance travelled in a sweep there and back, `both_m`, divided at a position in the sector: the smaller part first.
 pub(super) fn divided_m(both_m: f64, share: f64) -> [f64; 2] {
     let nearer = share.min(1.0 - share);
     [both_m * nearer, both_m * (1.0 - nearer)]

@@ -1,16 +1,16 @@
-//! What stands in a beam's way on the vehicle itself: neighbouring heads and the hull.
+//! Occlusion of a head's beam by the vehicle: neighbouring heads and the hull.
 
 use super::head::{HeadSpec, MAX_HEADS};
 use headrace_geometry::frames::{Body, Mount, Vec3, head_direction};
 use headrace_geometry::math::{self, TAU};
 
-/// Angles are searched at this spacing; what hides less of a turn may be missed, radians (0.05 degrees).
+/// Angular spacing of the search, radians (0.05 degrees); narrower obstructions may be missed.
 const SEARCH_STEP_RAD: f64 = TAU / 7200.0;
 
 /// A solid part of the vehicle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Obstacle {
-    /// A box along the body's axes, by its least and its largest corner, m.
+    /// A box along the body's axes, m.
     Box {
         /// The corner with the least coordinates.
         least: Vec3<Body>,
@@ -19,9 +19,9 @@ pub enum Obstacle {
     },
     /// A capped cylinder.
     Cylinder {
-        /// Middle of its first end.
+        /// Centre of its first end.
         from: Vec3<Body>,
-        /// Way to the middle of its other end, m.
+        /// Vector to the centre of its other end, m.
         along: Vec3<Body>,
         /// Its radius, m.
         radius_m: f64,
@@ -38,7 +38,7 @@ pub struct AngleRange {
 }
 
 impl AngleRange {
-    /// Whether an angle is in it, its ends included.
+    /// Whether it contains an angle, its ends included.
     pub fn has(&self, angle_rad: f64) -> bool {
         math::wrap(angle_rad - self.from_rad, TAU) <= self.size_rad
     }
@@ -60,7 +60,7 @@ impl Obstacle {
         }
     }
 
-    /// Whether a place is within a box; cylinders are heads, which may share a place.
+    /// Whether a point is inside a box; cylinders are heads, which may share a position.
     pub fn holds(&self, place: Vec3<Body>) -> bool {
         match self {
             Self::Box { least, most } => {
@@ -71,13 +71,14 @@ impl Obstacle {
         }
     }
 
-    /// Whether a ray from outside meets it; one from inside never does, so that a head isn't hidden by what holds it.
+    /// Whether a ray from outside meets it; a ray from inside doesn't, so that a head isn't hidden by an obstacle
+    /// around it.
     pub fn stops(&self, from: Vec3<Body>, direction: Vec3<Body>) -> bool {
         self.enters_m(from, direction).is_some()
     }
 
     /// Where a ray from outside meets it, in lengths of `direction`: metres along a unit vector. `None` for a ray that
-    /// misses it, or that begins inside.
+    /// misses it or begins inside.
     pub fn enters_m(&self, from: Vec3<Body>, direction: Vec3<Body>) -> Option<f64> {
         match self {
             Self::Box { least, most } => box_entered(*least, *most, from, direction),
@@ -120,7 +121,7 @@ fn cylinder_entered(
     let (offset, direction) = ((from + -base).0, direction.0);
     let (height, climb) = (offset.dot(&axis), direction.dot(&axis));
     let (across, drift) = (offset - axis * height, direction - axis * climb);
-    // Where the ray is within the endless cylinder, then where it is between the ends.
+    // Interval of the ray inside the infinite cylinder, then between its ends.
     let (a, b) = (drift.dot(&drift), across.dot(&drift));
     let c = across.dot(&across) - radius_m * radius_m;
     let (mut enter, mut leave) = (f64::NEG_INFINITY, f64::INFINITY);
@@ -148,7 +149,7 @@ fn cylinder_entered(
 
 /// The angles at which obstacles hide the wall from a head, in order of angle; edges are good to 1e-12 rad.
 ///
-/// The beam is taken as a ray; a beam of some width is weakened for half its width more on either side.
+/// The beam is taken as a ray; a real beam is weakened for another half of its width on either side.
 pub fn hidden_angles(mount: &Mount, obstacles: &[Obstacle]) -> Vec<AngleRange> {
     let hidden = |angle_rad: f64| {
         let direction = mount.rotation * head_direction(angle_rad);
@@ -179,7 +180,7 @@ pub fn hidden_angles(mount: &Mount, obstacles: &[Obstacle]) -> Vec<AngleRange> {
     found
 }
 
-/// Where between two angles the beam begins or ceases to be hidden.
+/// Angle between two others at which the beam becomes or ceases to be hidden, by bisection.
 fn edge_rad(hidden: &impl Fn(f64) -> bool, from_rad: f64, to_rad: f64) -> f64 {
     let (mut low, mut high) = (from_rad, to_rad);
     let at_low = hidden(low);
@@ -196,8 +197,7 @@ fn edge_rad(hidden: &impl Fn(f64) -> bool, from_rad: f64, to_rad: f64) -> f64 {
 
 /// For each head, the angles that the other heads' bodies and the hull hide.
 ///
-/// A neighbour whose axis runs through the head itself is no obstacle to it: such heads are idealised ones that share
-/// a place.
+/// A neighbour whose axis runs through the head is no obstacle to it: such heads are idealised ones at one position.
 pub fn hidden_by_vehicle(heads: &[HeadSpec], hull: &[Obstacle]) -> Vec<Vec<AngleRange>> {
     heads
         .iter()

@@ -1,4 +1,4 @@
-//! When the heads of a vehicle pass a place of the wall, and the longest time between two passes.
+//! Times at which a vehicle's heads pass a place of the wall, and the longest time between two passes.
 
 use super::error::SamplingError;
 use super::head::{HeadMotion, HeadSet, MAX_HEADS, faces_aft};
@@ -7,28 +7,28 @@ use headrace_geometry::frames::{Mount, Pose, Rot, Tunnel, Vec3};
 use headrace_geometry::math::{self, TAU};
 use headrace_geometry::tunnel::{Profile, Yz};
 
-/// Slower than this, a vehicle stands still, m/s: its heads' offsets along the hull have no phase.
+/// Below this speed a vehicle is at rest, m/s: its heads' offsets along the hull have no phase.
 const AT_REST_MPS: f64 = 1e-3;
-/// Turns that differ by a larger share run out of step while one looks.
+/// Relative difference of turn periods above which heads run out of step.
 const SAME_TURN: f64 = 0.02;
-/// A head's plane that stands more askew than this (the cosine of the angle between its axis and the tunnel's) meets
-/// the wall nowhere near the vehicle.
+/// Cosine of the angle between a head's axis and the tunnel's below which its scan plane meets the wall nowhere near
+/// the vehicle.
 const ASKEW: f64 = 0.1;
 
-/// Everything that is measured of a vehicle and its heads at a moment.
+/// Measured state of a vehicle and its heads at one epoch.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Situation {
-    /// Where the vehicle is; `None` without a fix.
+    /// Pose of the vehicle; `None` without a fix.
     pub pose: Option<Pose>,
-    /// Speed along the tunnel, m/s; below zero on the way back.
+    /// Speed along the tunnel, m/s; negative on the way back.
     pub speed_mps: f64,
-    /// Standard deviation of the distance between two passes, at most round the wall, m.
+    /// Standard deviation of the distance between two passes, the largest round the wall, m.
     pub pass_error_m: f64,
-    /// How the heads share the work, as the vehicle file says.
+    /// Layout of the heads, from the vehicle file.
     pub layout: HeadLayout,
-    /// How many heads the vehicle has.
+    /// Number of heads of the vehicle.
     pub configured: usize,
-    /// The heads that are turning and ping, by number.
+    /// The heads that turn and ping, by number.
     pub heads: [Option<HeadMotion>; MAX_HEADS],
 }
 
@@ -36,27 +36,27 @@ pub struct Situation {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Passes {
     heads: HeadSet,
-    /// Time of a turn of each head, seconds.
+    /// Turn period of each head, seconds.
     turns_s: [f64; MAX_HEADS],
     pattern: Pattern,
-    /// By how much heads beside each other can miss the times that their angles say, seconds.
+    /// Largest parallax of heads side by side, as an error of their pass times, seconds.
     parallax_s: f64,
-    /// At no speed to speak of, phases along the tunnel mean nothing.
+    /// Too slow for phases along the tunnel to have a meaning.
     at_rest: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Pattern {
-    /// All turn on, alike: by head, where in a turn's advance its passes fall, in [0, 1).
+    /// All rotate continuously, in one sense and at one rate: by head, phase of its passes in a turn's advance,
+    /// in [0, 1).
     Turning([f64; MAX_HEADS]),
-    /// Each goes back and forth; the time of the longest sweep there and back, seconds.
+    /// Each sweeps back and forth; the longest period of a sweep there and back, seconds.
     Sectors(f64),
-    /// They turn against each other, or out of step: they meet a place at uneven times, and one of them can be counted
-    /// on.
+    /// Opposite senses, or out of step: passes come at uneven times, and only one head can be relied on.
     Loose,
 }
 
-/// How the heads are phased now: what their passes are at any speed follows from it.
+/// Measured phasing of the heads, from which the passes at any speed follow.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Phasing {
     heads: HeadSet,
@@ -66,7 +66,7 @@ pub struct Phasing {
 }
 
 impl Phasing {
-    /// From what is measured. Without a fix, the vehicle is taken to lie along the tunnel.
+    /// From the measured situation. Without a fix, the vehicle is assumed to lie along the tunnel.
     pub fn of(situation: &Situation) -> Self {
         let motions = &situation.heads;
         let present = motions.iter().enumerate().filter(|(_, motion)| motion.is_some());
@@ -93,19 +93,19 @@ impl Phasing {
         }
     }
 
-    /// How far apart the heads that follow each other over a place meet the wall, along the tunnel, m: zero for those
-    /// that have a sector, or the work, for themselves.
+    /// Largest distance along the tunnel between the planes in which the heads meet the wall, m; zero for heads that
+    /// aren't phased with each other.
     pub fn apart_m(&self) -> f64 {
         let Pattern::Turning(_) = self.pattern else { return 0.0 };
         let ahead_m = || self.heads.iter().filter_map(|head| self.ahead_m.get(head)).copied();
         (ahead_m().fold(f64::MIN, f64::max) - ahead_m().fold(f64::MAX, f64::min)).max(0.0)
     }
 
-    /// The passes, were the vehicle to go at `speed_mps`.
+    /// The passes at a speed of `speed_mps`.
     ///
-    /// Heads that turn on: head k passes the vertical at the times t_k + i T, and as it sits x_k ahead of the vehicle's
-    /// origin, on the wall at chainages x_k + v (t_k + i T). Divided by v T these are phases on a circle.
-    /// Heads in sectors: a place near a sector's end waits for a sweep there and back, twice the time of one.
+    /// Continuous rotation: head k passes the vertical at the times t_k + i T; as it sits x_k ahead of the vehicle's
+    /// origin, it meets the wall at chainages x_k + v (t_k + i T). Divided by v T, these are phases on a circle.
+    /// Sectors: a place near a sector's end waits for a whole sweep there and back.
     /// Source: Jorge et al. 2021, §5.1 and §5.2.
     pub fn at(&self, speed_mps: f64) -> Passes {
         let Self { heads, turns_s, mut pattern, ahead_m } = *self;
@@ -121,7 +121,7 @@ impl Phasing {
     }
 }
 
-/// When, as a share of a turn, each head next passes the vertical; `None` when they turn against each other or at
+/// Time until each head next passes the vertical, as a share of a turn; `None` for heads with opposite senses or
 /// different rates.
 fn phases(motions: &[Option<HeadMotion>; MAX_HEADS]) -> Option<[f64; MAX_HEADS]> {
     let turning = || motions.iter().flatten();
@@ -130,7 +130,7 @@ fn phases(motions: &[Option<HeadMotion>; MAX_HEADS]) -> Option<[f64; MAX_HEADS]>
     if longest_s - shortest_s > SAME_TURN * shortest_s {
         return None;
     }
-    // Seen in a mirror, heads that all turn the other way turn this way.
+    // Mirrored, heads that all turn in the opposite sense turn in this one.
     let mirror = if turning().all(|motion| body_rate(motion) < 0.0) { -1.0 } else { 1.0 };
     let mut phases = [0.0; MAX_HEADS];
     for (motion, phase) in motions.iter().zip(&mut phases) {
@@ -143,17 +143,17 @@ fn phases(motions: &[Option<HeadMotion>; MAX_HEADS]) -> Option<[f64; MAX_HEADS]>
     Some(phases)
 }
 
-/// How far ahead of the vehicle's origin a head meets the wall, measured along the tunnel, m: the same at every place
-/// of the wall but for what all heads with parallel axes share. `None` for a head whose plane lies along the tunnel.
+/// How far ahead of the vehicle's origin a head meets the wall, along the tunnel, m: the same all round the wall,
+/// except for a part common to all heads with parallel axes. `None` for a head whose scan plane lies along the tunnel.
 ///
-/// Its samples lie in the plane through the head across its axis n: x n_x + y n_y + z n_z = (head) n.
+/// Its samples lie in the plane through the head normal to its axis n: x n_x + y n_y + z n_z = (head) n.
 pub fn ahead_m(attitude: &Rot<Tunnel, headrace_geometry::frames::Body>, mount: &Mount) -> Option<f64> {
     let axis = *attitude * (mount.rotation * Vec3::new(1.0, 0.0, 0.0));
     let offset = *attitude * mount.position;
     (axis.x().abs() > ASKEW).then(|| offset.0.dot(&axis.0) / axis.x())
 }
 
-/// By how much the angles at which heads beside each other look at one place of the wall differ, at most, radians.
+/// Largest difference of the angles at which heads side by side see one place of the wall, radians.
 pub fn parallax_rad(profile: &Profile, heads: &[Yz]) -> f64 {
     const PLACES: u32 = 72;
     let angle = |head: &Yz, place: Yz| math::atan2(place[0] - head[0], head[1] - place[1]);
@@ -173,17 +173,17 @@ pub fn parallax_rad(profile: &Profile, heads: &[Yz]) -> f64 {
 }
 
 impl Passes {
-    /// These passes of heads beside each other, whose angles at one place differ by up to `parallax_rad`.
+    /// These passes for heads side by side, whose angles at one place differ by up to `parallax_rad`.
     #[must_use]
     pub fn beside(self, parallax_rad: f64) -> Self {
         let turn_s = self.turns_s.into_iter().fold(0.0, f64::max);
         Self { parallax_s: parallax_rad / TAU * turn_s, ..self }
     }
 
-    /// These heads turning on, evenly spread in the order of their numbers: what a schedule for this speed gives where
-    /// their turns take the same time. Where they don't, heads run out of step, and no phase can be counted on.
+    /// Continuously rotating heads, evenly phased in order of their numbers: the result of a schedule for this speed if
+    /// their turn periods are equal. If not, heads run out of step, and no phase can be relied on.
     ///
-    /// `turn_s` gives the time of a head's turn.
+    /// `turn_s` gives the turn period of a head, seconds.
     /// Errors: no head.
     pub fn evenly_phased(heads: HeadSet, turn_s: impl Fn(usize) -> f64) -> Result<Self, SamplingError> {
         const IN_STEP: f64 = 1e-6;
@@ -199,7 +199,7 @@ impl Passes {
         Ok(Self { heads, turns_s, pattern, parallax_s: 0.0, at_rest: false })
     }
 
-    /// Heads in sectors whose sweep there and back takes `sweep_s`.
+    /// Heads in sectors with a sweep period (there and back) of `sweep_s`, seconds.
     ///
     /// Errors: no head.
     pub fn in_sectors(heads: HeadSet, sweep_s: f64) -> Result<Self, SamplingError> {
@@ -237,7 +237,7 @@ impl Passes {
         })
     }
 
-    /// What [`Passes::gap_s`] of all heads would be if they were evenly phased, seconds; zero without a head.
+    /// [`Passes::gap_s`] of all heads if they were evenly phased, seconds; zero without a head.
     pub fn even_gap_s(&self) -> f64 {
         let turn_s = self.turns_s.into_iter().fold(0.0, f64::max);
         match self.pattern {
@@ -246,10 +246,10 @@ impl Passes {
         }
     }
 
-    /// By how much each head is out of its phase against the first that turns, radians of its turn, in [-pi, pi).
+    /// Phase error of each head relative to the first that turns, radians of its turn, in [-pi, pi).
     ///
-    /// Positive: it passes a place later, farther ahead, than the schedule for `scheduled` heads has it. `None` for a
-    /// head that isn't there, for heads that don't all turn on, and at rest.
+    /// Positive: it passes a place later, farther ahead, than in the schedule for `scheduled` heads. `None` for an
+    /// absent head, for heads that aren't phased with each other, and at rest.
     /// Source: Jorge et al. 2021, §5.1 (phi(k) = 2 pi k / s).
     pub fn phase_errors_rad(&self, scheduled: usize) -> [Option<f64>; MAX_HEADS] {
         let mut errors = [None; MAX_HEADS];
@@ -266,13 +266,12 @@ impl Passes {
     }
 }
 
-/// Where in a turn's advance the passes of head `head` of `heads` belong: a head that is ahead in angle passes a place
-/// earlier.
+/// Scheduled phase of head `head` of `heads` in a turn's advance: a head that is ahead in angle passes a place earlier.
 fn scheduled_phase(head: usize, heads: usize) -> f64 {
     -(head as f64) / heads.max(1) as f64
 }
 
-/// The largest gap between neighbours on a circle of circumference 1; sorts them.
+/// The largest gap between neighbours on a circle of circumference 1; sorts the phases.
 fn largest_gap(phases: &mut [f64]) -> f64 {
     phases.sort_unstable_by(f64::total_cmp);
     let wrapped = phases.first().zip(phases.last()).map_or(1.0, |(first, last)| first + 1.0 - last);
@@ -283,7 +282,7 @@ fn largest_gap(phases: &mut [f64]) -> f64 {
     between.fold(wrapped, f64::max)
 }
 
-/// 1 where the head's own angles are the body's, -1 where they grow the other way.
+/// 1 where the head's angles grow in the body's sense, -1 where they grow in the opposite sense.
 fn body_sign(motion: &HeadMotion) -> f64 {
     if faces_aft(motion.mount.rotation) { -1.0 } else { 1.0 }
 }
@@ -334,7 +333,7 @@ mod tests {
         assert!(errors[..4].iter().all(|error| error.unwrap().abs() < 1e-9) && errors[4].is_none());
         let planned = Passes::evenly_phased(HeadSet::first(4), |_| 8.0).unwrap();
         assert!((all(&planned) - 2.0).abs() < 1e-12);
-        // Beside each other, they look at a place at angles that differ by up to 9 degrees: a fortieth of a turn.
+        // Side by side, they see a place at angles that differ by up to 9 degrees: a fortieth of a turn.
         assert!((all(&planned.beside(TAU / 40.0)) - 2.2).abs() < 1e-12);
         assert!((planned.beside(TAU / 40.0).gap_s(HeadSet::first(1)).unwrap() - 8.0).abs() < 1e-12);
     }
@@ -366,10 +365,10 @@ mod tests {
         let out = Phasing::of(&back).at(0.2);
         let turned = Rot::from_roll_pitch_yaw(0.0, 0.0, math::PI);
         back.pose = Some(Pose { position: headrace_geometry::frames::Point3::zero(), attitude: turned });
-        // Going back nose first is going out nose first, seen from the other end; tail first either way is not.
+        // Returning nose first mirrors going out nose first; tail first doesn't.
         assert!((all(&Phasing::of(&back).at(-0.2)) - all(&out)).abs() < 1e-9);
         assert!((all(&Phasing::of(&back).at(0.2)) - all(&out)).abs() > 0.1);
-        // Askew, heads are farther apart along the tunnel; with their planes along it, nothing can be counted on.
+        // Askew, heads are farther apart along the tunnel; with their planes along it, there is no phase.
         let askew = |yaw: f64| Rot::from_roll_pitch_yaw(0.0, 0.0, yaw);
         let mount = Mount { position: Vec3::new(1.0, 0.0, 0.0), rotation: Rot::identity() };
         assert!((ahead_m(&askew(0.5), &mount).unwrap() - 1.0 / math::cos(0.5)).abs() < 1e-12);
@@ -420,7 +419,7 @@ mod tests {
             head.sector_rad = Some(f64::to_radians(0.9));
         }
         assert!((all(&Phasing::of(&jerked).at(0.2)) - 4.0).abs() < 1e-9);
-        // In sectors, what isn't measured yet is half of a turn for two heads, there and back.
+        // In sectors, a sector that isn't measured yet is half a turn for two heads, there and back.
         let mut sectors = situation(&[0.0, 180.0], &[0.0, 0.0]);
         sectors.layout = HeadLayout::SectorOffset;
         assert!((all(&Phasing::of(&sectors).at(0.2)) - 8.0).abs() < 1e-9);
@@ -442,7 +441,7 @@ mod tests {
         let wide = headrace_geometry::tunnel::shapes::circle(6.0).unwrap();
         let narrow = headrace_geometry::tunnel::shapes::circle(1.0).unwrap();
         let of = |profile: &Profile, z: f64| parallax_rad(profile, &[[0.15, z], [-0.15, z]]);
-        // Seen from the far side, 0.3 m at 6 m.
+        // Seen from 6 m, the heads are 0.3 m apart.
         assert!((of(&wide, 6.0) - 0.05).abs() < 1e-3 && of(&narrow, 1.0) > 0.29);
         assert!(parallax_rad(&wide, &[[0.1, 6.0]]) <= 0.0 && parallax_rad(&wide, &[]) <= 0.0);
     }

@@ -1,4 +1,4 @@
-//! The day before: what heads, modes, layout and speed give in a tunnel, before there is anything to measure.
+//! Planning before a dive: the result of heads, modes, layout and speed in a tunnel, without measurements.
 
 mod answer;
 mod briefing;
@@ -20,55 +20,55 @@ pub use answer::{Answer, Question, Spacing};
 pub use briefing::{Briefing, Heard, Hidden, HullAdvice, Start, ThinStrip};
 pub use wall::{PatternSample, WallPlace};
 
-/// Soundings of a ring: 0.1 degrees apart, so that a step is looked at from many starts.
+/// Soundings per ring: 0.1 degrees apart, so that a step is evaluated from many start angles.
 const RING: u32 = 3600;
 
-/// A tunnel, a vehicle and what to allow for.
+/// A tunnel, a vehicle and the tolerances to plan for.
 #[derive(Debug, Clone)]
 pub struct Inspection {
     /// Design profile.
     pub profile: Profile,
     /// Length to inspect, m.
     pub length_m: f64,
-    /// Where in the cross-section the vehicle is to go.
+    /// Nominal position of the vehicle in the cross-section.
     pub place: Yz,
     /// Its heads with the modes of each; all heads are set to the same one.
     pub heads: Vec<(HeadSpec, Vec<HeadMode>)>,
-    /// Parts of the vehicle that may stand in a head's way.
+    /// Parts of the vehicle that may occlude a head.
     pub hull: Vec<Obstacle>,
-    /// How the heads share the work.
+    /// Layout of the heads.
     pub layout: HeadLayout,
-    /// How far the pilot may drift, up, down and sideways, m.
+    /// Tolerated drift of the vehicle, up, down and sideways, m.
     pub drift_m: f64,
-    /// How far from the tunnel's axis it may head, steadily, radians.
+    /// Tolerated steady heading off the tunnel's axis, radians.
     pub yaw_rad: f64,
-    /// How fast it may turn about, rad/s: between two passes, beams swing along the wall.
+    /// Tolerated yaw rate, rad/s: beams swing along the wall between two passes.
     pub yaw_rate_radps: f64,
     /// Speed of sound in the tunnel's water, m/s.
     pub sound_speed_mps: f64,
 }
 
-/// A vehicle at one of the places and headings that are allowed for.
+/// A vehicle at one of the tolerated positions and headings.
 #[derive(Debug, Clone)]
 struct Stance {
     strips: Strips,
     farthest_m: f64,
     parallax_rad: f64,
-    /// By how much heads apart are out of the places along the tunnel that their schedule is for, m.
+    /// Spread of the heads' displacements along the tunnel from their scheduled positions, m.
     shift_m: f64,
-    /// How far apart they are along the tunnel, m.
+    /// Distance between the heads along the tunnel, m.
     apart_m: f64,
 }
 
-/// One way in which all heads can be set.
+/// A mode that all heads can be set to.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlannedMode {
-    /// The mode, of the first head: step and name are those of all.
+    /// The mode of the first head; its name and step are those of all heads.
     pub mode: HeadMode,
-    /// Smallest, mean and largest distance between neighbours of one turn, the vehicle where it should be and at rest;
-    /// straight through the water, of any head, m. Source: the general case of Eq. 5, 6 and 10.
+    /// Smallest, mean and largest straight-line distance between neighbours of one turn, of any head, with the vehicle
+    /// at its nominal pose and at rest, m. Source: the general case of Eq. 5, 6 and 10.
     pub chords_m: [f64; 3],
-    /// The largest distance between neighbours of one turn on the unrolled wall, anywhere the vehicle may be, m.
+    /// The largest distance between neighbours of one turn on the unrolled wall, at any tolerated pose, m.
     pub t_y2_m: f64,
     passes: Passes,
     ping_period_s: f64,
@@ -84,10 +84,10 @@ pub struct Planner {
 }
 
 impl Planner {
-    /// Looks at the wall from everywhere that the vehicle may be.
+    /// Evaluates the wall from all tolerated poses.
     ///
-    /// Errors: a layout that so many heads can't have; a length, drift or yaw out of range; a head that would be
-    /// outside the profile somewhere, or a beam along the tunnel; heads that have no mode in common.
+    /// Errors: a layout that this number of heads can't have; a length, drift or yaw out of range; a head outside the
+    /// profile at some pose, or a beam along the tunnel; heads without a common mode.
     pub fn new(inspection: Inspection) -> Result<Self, SamplingError> {
         inspection.layout.check(inspection.heads.len())?;
         positive("the length in metres", inspection.length_m)?;
@@ -119,7 +119,7 @@ impl Planner {
         Ok(Self { inspection, hidden, stances, modes })
     }
 
-    /// What is planned.
+    /// The inspection that is planned.
     pub fn inspection(&self) -> &Inspection {
         &self.inspection
     }
@@ -129,8 +129,8 @@ impl Planner {
         &self.modes
     }
 
-    /// T_max at a speed with the heads phased for it, m: the largest anywhere that the vehicle may be, the strips that
-    /// it hides from some of its heads included; infinite where a strip is seen by none.
+    /// T_max at a speed with the heads phased for it, m: the largest over all tolerated poses, including the strips
+    /// that the vehicle hides from some of its heads; infinite where a strip is seen by no head.
     ///
     /// Errors: a speed that isn't above zero.
     /// Source: Jorge et al. 2021, Eq. 16.
@@ -184,8 +184,8 @@ impl Planner {
         })
     }
 
-    /// Time between passes over a place that all heads see, and the longest over any that some head sees, seconds, the
-    /// vehicle where it should be.
+    /// Longest time between passes over a place that all heads see, and over any place that some head sees, seconds, at
+    /// the nominal pose.
     pub fn gaps_s(&self, mode: usize) -> Option<(f64, f64)> {
         let planned = self.modes.get(mode)?;
         let gap_s = |seen_by| planned.passes.gap_s(seen_by);
@@ -194,19 +194,19 @@ impl Planner {
         Some((gap_s(planned.passes.heads())?, longest))
     }
 
-    /// The strips of the wall with the vehicle where it should be.
+    /// The strips of the wall at the nominal pose.
     pub fn nominal_strips(&self) -> Option<&Strips> {
         self.stances.first().map(|stance| &stance.strips)
     }
 
-    /// The longest range from any head to the wall: where the vehicle should be, and anywhere it may be, m.
+    /// The longest range from any head to the wall: at the nominal pose, and at any tolerated pose, m.
     pub fn farthest_m(&self) -> (f64, f64) {
         let far = || self.stances.iter().map(|stance| stance.farthest_m);
         (far().next().unwrap_or(0.0), far().fold(0.0, f64::max))
     }
 
-    /// Length of the first head's footprint on the wall in the plane in which it turns, the shortest and the longest of
-    /// a turn, m, the vehicle where it should be.
+    /// Length of the first head's footprint on the wall in its scan plane, the shortest and the longest of a turn, m,
+    /// at the nominal pose.
     ///
     /// Errors: as for [`Standing::footprint`].
     /// Source: Jorge et al. 2021, Fig. 15.
@@ -223,23 +223,23 @@ impl Planner {
         Ok(found)
     }
 
-    /// The farthest wall that every head hears, m.
+    /// The farthest wall within the reach of every head, m.
     pub fn reach_m(&self) -> f64 {
         let reach = |(spec, _): &(HeadSpec, Vec<HeadMode>)| spec.reach_m(self.inspection.sound_speed_mps)[1];
         self.inspection.heads.iter().map(reach).fold(f64::INFINITY, f64::min)
     }
 
-    /// For each head the angles hidden from it, in its own frame.
+    /// Angles hidden from each head, in its sensor frame.
     pub fn hidden(&self) -> &[Vec<AngleRange>] {
         &self.hidden
     }
 
-    /// The vehicle where it should be, at chainage 0.
+    /// The nominal pose, at chainage 0.
     pub fn nominal_pose(&self) -> Pose {
         pose(&self.inspection, [0.0, 0.0], 0.0)
     }
 
-    /// The heads as they are in a mode.
+    /// The heads as set in a mode.
     pub fn specs(&self, mode: usize) -> Vec<HeadSpec> {
         let name = self.modes.get(mode).map(|planned| planned.mode.name);
         let of_head = |(spec, modes): &(HeadSpec, Vec<HeadMode>)| {
@@ -249,7 +249,7 @@ impl Planner {
         self.inspection.heads.iter().filter_map(of_head).collect()
     }
 
-    /// What the heads are told to do in a mode at a speed.
+    /// Schedule of the heads in a mode at a speed.
     ///
     /// Errors: as for [`Schedule::new`].
     pub fn schedule(&self, mode: usize, speed_mps: f64) -> Result<Schedule, SamplingError> {
@@ -263,13 +263,13 @@ impl PlannedMode {
         self.ping_period_s
     }
 
-    /// When the heads pass.
+    /// Passes of the heads.
     pub fn passes(&self) -> &Passes {
         &self.passes
     }
 }
 
-/// Of two reasons, a strip that no head sees before a step, and the larger.
+/// The graver of two errors: an unseen strip before a step, any other error before both; of one kind, the larger.
 fn worse(known: Option<SamplingError>, other: SamplingError) -> Option<SamplingError> {
     let weight = |why: &SamplingError| match why {
         SamplingError::UnseenStrip { width_m, .. } => (1, *width_m),
@@ -288,7 +288,7 @@ fn common_modes(heads: &[(HeadSpec, Vec<HeadMode>)]) -> Vec<Vec<HeadMode>> {
     first.iter().filter_map(|mode| of_all(mode.name)).collect()
 }
 
-/// The place where the vehicle should be, then those where it may be.
+/// The nominal pose, then the other tolerated ones.
 fn poses(inspection: &Inspection) -> Vec<Pose> {
     let sides = |most: f64| if most > 0.0 { vec![0.0, -most, most] } else { vec![0.0] };
     let mut poses = Vec::new();
@@ -362,12 +362,12 @@ fn stance(
     })
 }
 
-/// The largest less the least.
+/// The largest value less the smallest.
 fn spread(values: impl Iterator<Item = f64> + Clone) -> f64 {
     (values.clone().fold(f64::MIN, f64::max) - values.fold(f64::MAX, f64::min)).max(0.0)
 }
 
-/// What each head sees of the wall.
+/// The parts of the wall that each head sees.
 fn views(
     inspection: &Inspection,
     specs: &[HeadSpec],
@@ -375,7 +375,7 @@ fn views(
     pose: &Pose,
     rings: &[Ring],
 ) -> Result<Vec<View>, SamplingError> {
-    /// Room for stretches of wall out of reach: every other sounding.
+    /// Capacity for stretches of wall out of reach: every other sounding.
     const OUT_OF_REACH: usize = RING as usize / 2;
     let programs = layout::programs(specs, inspection.layout, 0.0)?;
     let mut views = Vec::with_capacity(specs.len());

@@ -1,4 +1,4 @@
-//! The wall around a vehicle as strips, each seen by the same heads, and the spacing that comes of it.
+//! The wall around a vehicle as strips, each seen by the same heads, and the spacing on them.
 
 use serde::{Deserialize, Serialize};
 
@@ -11,20 +11,20 @@ use super::spacing;
 use headrace_geometry::math;
 use headrace_snapshot::stateful;
 
-/// Strips narrower than this are rounding, m.
+/// Strips narrower than this are rounding errors, m.
 const NO_WIDTH_M: f64 = 1e-9;
 
 /// An interval of the perimeter.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Arc {
-    /// Arc length at which it begins, m.
+    /// Arc length of its start, m.
     pub from_m: f64,
-    /// Its length towards growing arc length, m.
+    /// Its length in the direction of growing arc length, m.
     pub length_m: f64,
 }
 
 impl Arc {
-    /// What a range of a head's angles covers of the wall.
+    /// The part of the wall covered by a range of head angles.
     ///
     /// Errors: as for [`Standing::sounding`].
     pub fn of(standing: &Standing<'_>, angles: &AngleRange) -> Result<Self, SamplingError> {
@@ -38,7 +38,7 @@ impl Arc {
             math::wrap(arc_m(angles.middle_rad())? - first, perimeter_m),
             math::wrap(last - first, perimeter_m),
         );
-        // A head that faces aft sweeps the wall the other way.
+        // A head that faces aft sweeps the wall in the other direction.
         Ok(if middle <= whole {
             Self { from_m: first, length_m: whole }
         } else {
@@ -46,7 +46,7 @@ impl Arc {
         })
     }
 
-    /// From this one on to the end of the next, the way that a head turns.
+    /// From the start of this arc to the end of the next, in the head's direction of rotation.
     fn on_to(&self, next: &Self, forward: bool, perimeter_m: f64) -> Self {
         let (first, last) = if forward { (self, next) } else { (next, self) };
         let length_m = math::wrap(last.from_m + last.length_m - first.from_m, perimeter_m);
@@ -58,22 +58,22 @@ impl Arc {
     }
 }
 
-/// What one head sees of the wall.
+/// The parts of the wall that one head sees.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct View {
-    /// Its sector; `None` for all around.
+    /// Its sector; `None` for the whole perimeter.
     pub sector: Option<Arc>,
-    /// What is hidden from it, by the vehicle or by distance.
+    /// Arcs hidden from it, by the vehicle or out of its reach.
     pub hidden: Vec<Arc>,
 }
 
 stateful!(View { state: sector; lists: hidden; });
 
 impl View {
-    /// Hides what a ring meets nearer or farther than the head hears. Where there is no room for more stretches, the last
-    /// is made longer, over what is heard between: rather too much is hidden than too little.
+    /// Hides the parts of a ring nearer or farther than the head's reach. Without capacity for another arc, the last is
+    /// extended over the visible part between: hiding too much is the safe side.
     ///
-    /// Allocates: not when there is room for one.
+    /// Allocates: not with capacity for one arc.
     pub fn hide_out_of_reach(&mut self, ring: &Ring, reach_m: [f64; 2]) {
         let [least_m, most_m] = reach_m;
         let heard = |range_m: f64| (least_m..=most_m).contains(&range_m);
@@ -110,56 +110,56 @@ impl View {
 /// A strip of the wall along the tunnel.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Strip {
-    /// Where on the perimeter.
+    /// Its arc on the perimeter.
     pub arc: Arc,
     /// The heads that see it.
     pub seen_by: HeadSet,
-    /// Something hides it, or part of it, from a head: pings stop up to a step before its edge. Where it is only beyond
-    /// a sector, they stop at it.
+    /// All or part of it is hidden from a head: pings stop up to a step before its edge. Where it is only outside a
+    /// sector, they stop at its edge.
     pub hidden: bool,
 }
 
-/// How the vehicle goes.
+/// Vehicle motion for the prediction of spacing.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Going {
     /// Time between two pings, the longest of any head, seconds.
     pub ping_period_s: f64,
-    /// By how much the beams' swing may carry them along the wall, besides the vehicle's speed, m/s.
+    /// Largest speed of the beams along the wall due to swing, in addition to the vehicle's speed, m/s.
     pub swing_mps: f64,
-    /// By how much passes are out of their places at any speed, m.
+    /// Displacement of passes from their places at any speed, m.
     pub shift_m: f64,
-    /// How far apart heads are along the hull, m: while the vehicle goes so far, the swing goes on.
+    /// Distance between heads along the hull, m: the swing acts while the vehicle covers it.
     pub apart_m: f64,
-    /// The most that the swing comes to however long it goes on, m; `None` where that isn't known.
+    /// Limit of the swing's displacement over any time, m; `None` if unknown.
     pub swing_most_m: Option<f64>,
 }
 
-/// The largest speed for a target, m/s, and how far apart neighbours are around the wall where it is the largest, m.
+/// The largest speed for a target, and T_y where it limits that speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bound {
     /// The speed, m/s; infinite where nothing bounds it.
     pub speed_mps: f64,
-    /// T_y there, m.
+    /// T_y of the limiting strip, m.
     pub t_y_m: f64,
 }
 
-/// The strips of a wall, in order of arc length, neighbours seen by different heads; one strip where all see all. With
-/// the largest steps on each, for each of some settings of the heads.
+/// Strips of the wall, in order of arc length, neighbours seen by different heads; one strip where all heads see all.
+/// Holds the largest steps on each strip for each of several settings of the heads.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Strips {
     strips: Vec<Strip>,
     edges_m: Vec<f64>,
     perimeter_m: f64,
-    /// By setting and strip: the largest step of the heads that see it, m, and of all of them.
+    /// By setting and strip: the largest step of the heads that see it, and of all heads, m.
     steps_m: Vec<[f64; 2]>,
-    /// The strip of each sounding of the ring looked at, and how far it is to its end, nearly, m.
+    /// Strip of each sounding of the current ring, and the approximate distance to the strip's end, m.
     strip_of: Vec<(usize, f64)>,
 }
 
 stateful!(Strips { state: perimeter_m; lists: strips, edges_m, steps_m, strip_of; });
 
 impl Strips {
-    /// Without strips, but with room for those that so many arcs make, in so many settings.
+    /// Without strips, with capacity for those of `arcs` arcs in `settings` settings.
     pub fn with_room(arcs: usize, settings: usize, soundings: u32) -> Self {
         let strips = 2 * arcs + 1;
         Self {
@@ -171,9 +171,9 @@ impl Strips {
         }
     }
 
-    /// The strips that these views make, without steps.
+    /// Builds the strips of these views, without steps.
     ///
-    /// Allocates: not when there is room for their sectors and hidden arcs.
+    /// Allocates: not with capacity for their sectors and hidden arcs.
     pub fn rebuild(&mut self, perimeter_m: f64, views: &[View]) {
         self.perimeter_m = perimeter_m;
         self.steps_m.clear();
@@ -205,7 +205,7 @@ impl Strips {
         self.join_at_the_seam();
     }
 
-    /// The last strip goes on over the seam where the first is like it.
+    /// Joins the last strip and the first across the seam where they are alike.
     fn join_at_the_seam(&mut self) {
         let alike = |a: &Strip, b: &Strip| a.seen_by == b.seen_by && a.hidden == b.hidden;
         let first = self.strips.first().copied();
@@ -218,10 +218,10 @@ impl Strips {
         }
     }
 
-    /// Measures the largest steps on each strip in `settings` settings of the heads: `stride` says how many soundings of
-    /// its ring a head's step passes over in a setting, `None` for a head that isn't there.
+    /// Measures the largest steps on each strip in `settings` settings of the heads: `stride` gives the ring stride of
+    /// a head's step by setting and head, `None` for a head that is absent.
     ///
-    /// Allocates: not when there is room for the settings.
+    /// Allocates: not with capacity for the settings.
     pub fn measure<'a>(
         &mut self,
         settings: usize,
@@ -277,7 +277,7 @@ impl Strips {
         self.strips.get(number_at(&self.strips, arc_m, self.perimeter_m))
     }
 
-    /// The largest step of heads on what they see, in a setting, m.
+    /// The largest step of any head on the strips that it sees, in a setting, m.
     pub fn largest_step_m(&self, setting: usize) -> f64 {
         let count = self.strips.len();
         let of_setting = self.steps_m.iter().skip(setting * count).take(count);
@@ -286,14 +286,14 @@ impl Strips {
 
     /// T_max predicted at a speed, m: the largest of any strip; infinite where a wide strip is seen by no head.
     ///
-    /// On a strip that some heads don't see, passes are farther apart; but the strip is no wider than it is, so that its
-    /// width bounds the distance between samples on its sides, too.
+    /// On a strip that some heads don't see, passes are farther apart; but the strip's width also bounds the distance
+    /// between the samples on either side of it.
     /// Source: Jorge et al. 2021, Eq. 16.
     pub fn t_max_m(&self, setting: usize, passes: &Passes, speed_mps: f64, going: &Going) -> f64 {
         self.ts_m(setting, passes, speed_mps, going).fold(0.0, f64::max)
     }
 
-    /// Whether [`Strips::t_max_m`] is within a target: of most speeds that aren't the first strips tell.
+    /// Whether [`Strips::t_max_m`] is within a target; stops at the first strip that isn't.
     pub fn meets(
         &self,
         setting: usize,
@@ -319,10 +319,10 @@ impl Strips {
         })
     }
 
-    /// The largest speed at which [`Strips::t_max_m`] meets a target, the passes being what they are at any speed, and what
-    /// makes it so.
+    /// The largest speed at which [`Strips::t_max_m`] meets a target, for passes that are the same at any speed, and
+    /// its limiting T_y.
     ///
-    /// Errors: a strip on which neighbouring samples are as far apart as the target at any speed.
+    /// Errors: a strip on which no speed meets the target.
     pub fn bound_for_target(
         &self,
         setting: usize,
@@ -356,7 +356,7 @@ impl Strips {
         Ok(slowest)
     }
 
-    /// For each strip what bounds T within it, where any head sees it, and across it, where not all do.
+    /// For each strip, the limits of T within it, where any head sees it, and across it, where not all do.
     fn limits(
         &self,
         setting: usize,
@@ -377,7 +377,7 @@ impl Strips {
         })
     }
 
-    /// Distance between samples on both sides of the strips about strip `k` that aren't `full`, m.
+    /// Distance between the samples on either side of the strips around strip `k` that aren't `full`, m.
     fn across_m(&self, setting: usize, k: usize, full: &impl Fn(&Strip) -> bool) -> f64 {
         let count = self.strips.len();
         let thin = |number: usize| {
@@ -392,15 +392,15 @@ impl Strips {
             hidden |= strip.hidden;
             step_m = step_m.max(self.steps_m.get(setting * count + number).map_or(0.0, |steps| steps[1]));
         }
-        // Pings end at a sector's edge, but up to a step before what is hidden.
+        // Pings end at a sector's edge, but up to a step before a hidden arc.
         width_m.min(self.perimeter_m) + if hidden { 2.0 * step_m } else { 0.0 }
     }
 }
 
-/// Sets of heads whose gaps are remembered; strips hidden from one or two heads make hardly more.
+/// Number of head sets with cached gaps; strips hidden from one or two heads rarely make more.
 const SETS: usize = 8;
 
-/// The gaps of passes by the heads that see a strip: many strips are seen by the same.
+/// Cached pass gaps by set of heads: many strips are seen by the same heads.
 #[derive(Clone, Copy)]
 struct Gaps<'a> {
     passes: &'a Passes,
@@ -432,17 +432,17 @@ impl<'a> Gaps<'a> {
     }
 }
 
-/// Where a step begins, and which way it goes.
+/// Start and direction of a step.
 struct Reached {
     head: usize,
     arc_m: f64,
     strip: usize,
     forward: bool,
-    /// It surely ends in the strip in which it begins.
+    /// Whether it certainly ends in the strip in which it begins.
     is_within: bool,
 }
 
-/// Notes a step on every strip that it touches or passes over, however narrow.
+/// Records a step on every strip that it touches or crosses, however narrow.
 fn note_step(
     strips: &[Strip],
     steps_m: &mut [[f64; 2]],
@@ -487,7 +487,7 @@ fn note_on(strip: &Strip, steps_m: &mut [f64; 2], head: usize, step_m: f64) {
     steps_m[1] = steps_m[1].max(step_m);
 }
 
-/// Passes this far apart in time, and neighbours this far apart around the wall.
+/// Limit of T: time between passes, and distance between neighbours around the wall.
 #[derive(Debug, Clone, Copy)]
 struct Limit {
     gap_s: f64,
@@ -505,8 +505,9 @@ impl Limit {
         spacing::t_max_m(t_x_m, over_ground_mps * going.ping_period_s, self.t_y_m)
     }
 
-    /// The largest speed that solves T = hypot((v + w) t + shift + w a / v, T_y), t being gap and ping period, w the
-    /// swing, a how far heads are apart; or the same with the most that the swing comes to between passes.
+    /// The largest speed that solves T = hypot((v + w) t + shift + w a / v, T_y), with t the sum of gap and ping
+    /// period, w the swing speed, and a the distance between heads; or, if faster, the same with the swing's limit
+    /// between passes.
     fn speed_mps(&self, target_m: f64, going: &Going) -> Option<f64> {
         let along_m = spacing::along_m(target_m, self.t_y_m)?;
         let bounded = going.swing_most_m.and_then(|most_m| self.bounded_mps(along_m, most_m, going));
@@ -541,7 +542,7 @@ fn strip(views: &[View], arc: Arc, perimeter_m: f64) -> Strip {
     }
 }
 
-/// The same as [`number_at`], where a guess is mostly right: soundings follow each other round the wall.
+/// As [`number_at`], with a guess that is mostly right: soundings follow each other round the wall.
 fn number_near(strips: &[Strip], arc_m: f64, perimeter_m: f64, guess: usize) -> usize {
     let first_m = strips.first().map_or(0.0, |strip| strip.arc.from_m);
     let from_first_m = math::wrap(arc_m - first_m, perimeter_m);

@@ -1,28 +1,28 @@
-//! How a vehicle swings about: yaw and pitch sweep its beams along the tunnel between two passes over a place.
+//! Vehicle swing: yaw and pitch sweep the beams along the tunnel between two passes over a place.
 
 use headrace_geometry::frames::{Tunnel, Vec3};
 use headrace_geometry::math;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_snapshot::stateful;
 
-/// Beats that are remembered: at five a second the time looked back on, and a turn of a head in its slowest mode before.
+/// Number of headings kept: at 5 Hz, `WINDOW` plus a turn of a head in its slowest mode.
 const BEATS: usize = 320;
-/// How far back a swing counts: a vehicle that swings to and fro within a minute shows all its swing in half of it.
+/// How far back a swing counts: a swing with a period of up to a minute shows its full extent in half of it.
 const WINDOW: DurNs = DurNs(30_000_000_000);
-/// Turning by less than this between two passes isn't told from the wandering of navigation, radians; by twice as much it
-/// counts in full.
+/// Rotation between two passes below this is attributed to navigation errors, radians; from twice this it counts in
+/// full.
 const DEAD_RAD: f64 = 0.0075;
 
-/// How a vehicle swings.
+/// Swing of a vehicle.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Swing {
-    /// By how much it turns between two passes, a second, at most, rad/s.
+    /// Largest rotation between two passes, per second, rad/s.
     pub rate_radps: f64,
-    /// By how much it turns however long one waits, at most, radians.
+    /// Largest rotation over any time, radians.
     pub most_rad: f64,
 }
 
-/// Which way a vehicle looked at the last beats.
+/// Recent directions of the vehicle's x axis.
 #[derive(Debug, Clone)]
 pub struct Looks {
     looks: Vec<(MonoNs, Vec3<Tunnel>)>,
@@ -32,14 +32,14 @@ pub struct Looks {
 stateful!(Looks { state: count; lists: looks; });
 
 impl Default for Looks {
-    /// Allocates: all that it will ever use.
+    /// Allocates: the full capacity.
     fn default() -> Self {
         Self { looks: Vec::with_capacity(BEATS), count: 0 }
     }
 }
 
 impl Looks {
-    /// Remembers which way the vehicle looks, its own x axis in the tunnel's frame.
+    /// Stores a direction of the vehicle's x axis, in the tunnel frame.
     ///
     /// Allocates: never.
     pub fn keep(&mut self, at: MonoNs, look: Vec3<Tunnel>) {
@@ -51,16 +51,16 @@ impl Looks {
         self.count += 1;
     }
 
-    /// How far it has turned from a look to any of those since a time, at most, radians.
+    /// Largest rotation from `look` to any direction stored since a time, radians.
     pub fn turned_since(&self, look: Vec3<Tunnel>, since: MonoNs) -> f64 {
         let recent = self.newest_first().take_while(|(then, _)| *then >= since);
         recent.map(|(_, then)| (look + -*then).norm()).fold(0.0, f64::max)
     }
 
-    /// How the vehicle has swung within the last half minute up to `now`, passes being `gap_s` apart: the most in that
-    /// time, so that it stays while the vehicle swings to and fro.
+    /// Swing within the last half minute up to `now`, for passes `gap_s` apart: the largest in that time, so that it
+    /// holds while the vehicle swings to and fro.
     ///
-    /// What navigation's own wandering may be is left out, and comes in without a step.
+    /// Rotation within the navigation errors is excluded, with a continuous transition.
     /// Allocates: never.
     pub fn swing(&self, now: MonoNs, gap_s: f64) -> Swing {
         if !(gap_s > 0.0 && gap_s.is_finite()) {
@@ -72,11 +72,11 @@ impl Looks {
         let mut turned_rad = 0.0_f64;
         let mut earlier = self.newest_first().peekable();
         for (at, look) in recent() {
-            // Both go back in time: the pass before is never later than that of the look before.
+            // Both go back in time, so that `earlier` never has to be rewound.
             while earlier.peek().is_some_and(|(then, _)| at.since(*then).0 < gap.0) {
                 earlier.next();
             }
-            // Of a gap that reaches back beyond what is known, what is known counts.
+            // Where the gap reaches back beyond the history, the oldest direction is used.
             let before = earlier.peek().map(|(_, before)| *before).or(oldest);
             turned_rad = turned_rad.max(before.map_or(0.0, |before| (*look + -before).norm()));
         }
@@ -101,7 +101,7 @@ mod tests {
 
     const BEAT: i64 = 200_000_000;
 
-    /// Looks of a vehicle whose yaw and pitch are these, radians, at times in seconds.
+    /// Directions of a vehicle with this yaw and pitch, radians, as functions of time in seconds.
     fn looks(seconds: f64, yaw_pitch: impl Fn(f64) -> [f64; 2]) -> (Looks, MonoNs) {
         let mut looks = Looks::default();
         let mut at = MonoNs(7 * BEAT as u64);
@@ -164,7 +164,7 @@ mod tests {
     fn pitch_counts_as_yaw_does_and_of_a_long_gap_what_is_known() {
         let (looks, now) = looks(10.0, |t| [0.0, 0.1 * math::sin(TAU * t / 20.0)]);
         assert!(looks.swing(now, 2.0).rate_radps > 0.02);
-        // From the oldest look that is known to the one farthest from it.
+        // From the oldest stored direction to the one farthest from it.
         let turned_rad = looks.swing(now, 60.0).rate_radps * 60.0;
         assert!((turned_rad - 0.09).abs() < 0.01, "{turned_rad}");
         assert_eq!(looks.swing(now, f64::NAN), Swing::default());

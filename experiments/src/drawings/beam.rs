@@ -1,4 +1,4 @@
-//! Figure 15: how much wall a beam covers.
+//! Figure 15: wall covered by a beam.
 
 use headrace_geometry::math;
 use headrace_pictures::canvas::{BOLD, Canvas, NORMAL, SMALL, Side};

@@ -9,9 +9,9 @@ mod walls;
 
 use crate::{ExperimentError, Progress, figures};
 
-/// The pictures by file name, as SVG. `progress` is told what is being done.
+/// The pictures by file name, as SVG. `progress` gets status messages.
 ///
-/// Errors: none with the vehicles that are built in.
+/// Errors: none with the built-in vehicles.
 pub fn all(progress: Progress<'_>) -> Result<Vec<(&'static str, String)>, ExperimentError> {
     let phases = figures::walls(&figures::PHASES, progress)?;
     let at_gaps = figures::walls(&figures::AT_GAPS, progress)?;

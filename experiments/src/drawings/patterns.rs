@@ -12,12 +12,12 @@ use crate::figures::{PhaseShift, Place, Sectors, Way};
 
 const SIZE_PX: [u32; 2] = [900, 640];
 const FRAME: Frame = Frame { left: 66.0, top: 78.0, right: 806.0, bottom: 540.0 };
-/// Where the legend begins, pixels from the top.
+/// Top of the legend, pixels.
 const LEGEND_PX: f64 = 600.0;
-/// Every so manieth sample is marked, in Figures 6 and 8: more would cover each other.
+/// One in this many samples is marked, in Figures 6 and 8: more would overlap.
 const MARKED: [usize; 2] = [5, 20];
 
-/// Lines that measure: what they look like.
+/// Look of dimension lines.
 const MEASURE: Look = Look { colour: BLACK, width_px: 1.6, dash: &[], marker: Marker::Circle };
 const LONG: Look = Look { colour: Colour(0, 114, 178), ..MEASURE };
 const SHORT: Look = Look { colour: Colour(213, 94, 0), ..MEASURE };
@@ -42,7 +42,7 @@ fn heads(chart: &Chart<'_>, ways: &[Way], samples: &[Place], marked: usize) {
     }
 }
 
-/// Heads from the left, two to a row of the legend's height; gives where the next entry may begin.
+/// Heads from the left, two per row of the legend; returns the position of the next entry.
 fn legend(canvas: &Canvas, heads: u16) -> f64 {
     let mut x = FRAME.left;
     for head in 0..heads {
@@ -55,13 +55,13 @@ fn legend(canvas: &Canvas, heads: u16) -> f64 {
     x
 }
 
-/// What the last line says.
+/// Text of the last line.
 fn note(canvas: &Canvas, marked: usize, more: &str) {
     let words = format!("One in {marked} samples is marked. {more}");
     canvas.text([14.0, 626.0], &words, Side::Right, SMALL);
 }
 
-/// A length measured along the tunnel, its words on white above or below it.
+/// A length dimensioned along the tunnel, its text on white above or below it.
 fn measured(chart: &Chart<'_>, [from_m, to_m]: [f64; 2], arc_m: f64, look: &Look, words: (&str, f64)) {
     let (from, to) = (chart.px([from_m, arc_m]), chart.px([to_m, arc_m]));
     chart.canvas.span(from, to, look);
@@ -73,7 +73,7 @@ fn measured(chart: &Chart<'_>, [from_m, to_m]: [f64; 2], arc_m: f64, look: &Look
     chart.canvas.text_on_white([middle, from[1] + below_px], words, Side::Middle, letters);
 }
 
-/// Ends of a measured length that is off its line.
+/// Extension lines of a dimension drawn off its line.
 fn ends(chart: &Chart<'_>, at: [f64; 2], arc_m: f64, to_px: f64) {
     for x_m in at {
         let [x, y]: Px = chart.px([x_m, arc_m]);
@@ -103,7 +103,7 @@ pub(super) fn phase_shift(figure: &PhaseShift) -> String {
     });
     let own: Vec<f64> = figure.at_crown.iter().filter(|(head, _)| *head == 0).map(|(_, x_m)| *x_m).collect();
     if let [from_m, to_m, ..] = own.as_slice() {
-        /// Pixels that T_x is measured below the crown.
+        /// Offset of the T_x dimension below the crown, pixels.
         const BELOW_PX: f64 = 58.0;
         let at = [*from_m, *to_m];
         ends(&chart, at, figure.crown_m, BELOW_PX);
@@ -157,7 +157,7 @@ pub(super) fn sectors(figure: &Sectors) -> String {
         measured(&chart, [*from_m, *to_m], figure.line_m, look, (&words, -13.0));
     }
     if let [from_m, _, to_m, ..] = figure.at_line.as_slice() {
-        /// Pixels that the sum is measured below the line.
+        /// Offset of the sum's dimension below the line, pixels.
         const BELOW_PX: f64 = 30.0;
         let at = [*from_m, *to_m];
         ends(&chart, at, figure.line_m, BELOW_PX);

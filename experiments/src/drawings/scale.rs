@@ -1,12 +1,12 @@
-//! A scale of colours, from pale to dark: a larger value is darker in print and for the colour-blind, too.
+//! A colour scale from pale to dark: a larger value is darker in greyscale print and for the colour-blind, too.
 
 use headrace_geometry::math;
 use headrace_pictures::canvas::{Canvas, NORMAL, SMALL, Side};
 use headrace_pictures::colour::Colour;
 use headrace_pictures::polyline::Px;
 
-/// Evenly spaced. Source: Nuñez, Anderton, Renslow, "Optimizing colormaps with consideration for color vision
-/// deficiency", 2018 (cividis), from its end.
+/// Evenly spaced, from the pale end. Source: Nuñez, Anderton, Renslow, "Optimizing colormaps with consideration for color
+/// vision deficiency", 2018 (cividis).
 const STOPS: [[u8; 3]; 9] = [
     [254, 232, 56],
     [228, 206, 83],
@@ -18,7 +18,7 @@ const STOPS: [[u8; 3]; 9] = [
     [40, 63, 109],
     [0, 34, 78],
 ];
-/// How many colours there are.
+/// Number of colours.
 pub(super) const LEVELS: usize = 16;
 
 /// The colour of a level, from 0 to one below [`LEVELS`].
@@ -35,13 +35,13 @@ pub(super) fn colour(level: usize) -> Colour {
     Colour(part(|[red, _, _]| red), part(|[_, green, _]| green), part(|[_, _, blue]| blue))
 }
 
-/// The level of a value on a scale from zero to `most`; beyond it the last.
+/// The level of a value on a scale from zero to `most`; clamped above.
 pub(super) fn level(value: f64, most: f64) -> usize {
     let level = math::floor_to_i64(value / most * LEVELS as f64).max(0);
     usize::try_from(level).unwrap_or(0).min(LEVELS - 1)
 }
 
-/// A strip of all colours with numbers from zero to `most` below it and words above.
+/// A strip of all colours with numbers from zero to `most` below it and text above.
 pub(super) fn legend(canvas: &Canvas, [left, top]: Px, [width, height]: Px, words: &str, most: f64) {
     canvas.text([left, top - 11.0], words, Side::Right, NORMAL);
     let step_px = width / LEVELS as f64;

@@ -1,4 +1,4 @@
-//! Figures 12 and 13: samples on the unrolled wall, and how far the surface through them is from it.
+//! Figures 12 and 13: samples on the unrolled wall, and the distance of the surface through them.
 
 use headrace_geometry::math;
 use headrace_pictures::canvas::{BOLD, Canvas, Letters, SMALL, Side, width_px};
@@ -15,14 +15,14 @@ use crate::figures::{Panel, Walls};
 const SIZE_PX: [u32; 2] = [900, 900];
 const LEFT_PX: f64 = 66.0;
 const RIGHT_PX: f64 = 802.0;
-/// Between panels, pixels.
+/// Gap between panels, pixels.
 const APART_PX: f64 = 20.0;
-/// From top to bottom of samples, and of surfaces, pixels.
+/// Height of the panels of samples and of surfaces, pixels.
 const SAMPLES_PX: [f64; 2] = [136.0, 446.0];
 const SURFACES_PX: [f64; 2] = [514.0, 790.0];
-/// The most dots of a panel.
+/// Most dots in a panel.
 const MOST_DOTS: usize = 3000;
-/// Strips on which passes are far apart, and without any.
+/// Strips with widely spaced passes or none.
 const WIDE: Colour = Colour(255, 244, 200);
 const UNSEEN: Colour = Colour(245, 170, 90);
 const GAP: Look = Look { colour: Colour(213, 94, 0), width_px: 1.8, dash: &[], marker: Marker::Circle };
@@ -76,7 +76,7 @@ fn titles(canvas: &Canvas, panel: &Panel, left: f64) {
     }
 }
 
-/// T_x where it is largest.
+/// Text on the largest T_x.
 fn gap_words(panel: &Panel) -> String {
     let Some(gap) = panel.widest else { return "no two passes".to_owned() };
     let length_m = gap.length_m();
@@ -106,12 +106,12 @@ fn samples(chart: &Chart<'_>, panel: &Panel, length_m: f64) {
     }
 }
 
-/// One in so many samples is drawn.
+/// One in this many samples is drawn.
 fn thinned(panel: &Panel) -> usize {
     panel.samples.len().div_ceil(MOST_DOTS).max(1)
 }
 
-/// Cells by colour, those above each other joined where they have the same.
+/// Cells by colour; vertically adjacent cells of one colour are joined.
 fn surface(chart: &Chart<'_>, panel: &Panel, figure: &Walls) {
     let [along, round] = panel.cells.map(|cells| usize::try_from(cells).unwrap_or(1).max(1));
     let size_m = [figure.length_m / along as f64, figure.profile.perimeter_m() / round as f64];
@@ -122,7 +122,7 @@ fn surface(chart: &Chart<'_>, panel: &Panel, figure: &Walls) {
         let mut from = 0;
         for run in levels.chunk_by(|a, b| a == b) {
             let to = from + run.len();
-            // On whole pixels, so that no sheet shows between neighbours.
+            // On whole pixels, so that no gap shows between neighbours.
             let corner = |i: usize, k: usize| {
                 chart.px([i as f64 * size_m[0], k as f64 * size_m[1]]).map(|px| math::round_to_i64(px) as f64)
             };

@@ -1,4 +1,4 @@
-//! Figure 15: how much of a flat wall a beam covers.
+//! Figure 15: flat wall covered by a beam.
 
 use headrace_geometry::math;
 use headrace_geometry::tunnel::{Profile, shapes};
@@ -13,21 +13,21 @@ const BEAMS_DEG: [f64; 2] = [1.4, 2.4];
 const RANGE_M: f64 = 10.0;
 /// Points of a curve.
 const POINTS: u32 = 60;
-/// Rays of a simulated beam: as many as a scene may have.
+/// Rays of a simulated beam: the most a scene allows.
 const RAYS: usize = 64;
-/// Every so manieth point of a curve is simulated, too.
+/// One in this many points of a curve is also simulated.
 const SIMULATED: u32 = 6;
 
 /// Figure 15.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Footprints {
-    /// Square to a wall, by the range to it, m.
+    /// Perpendicular to a wall, by the range to it, m.
     pub by_range: Vec<Footprint>,
     /// On the floor, by the angle from straight down, degrees.
     pub by_angle: Vec<Footprint>,
-    /// How high the head is above that floor, m.
+    /// Height of the head above that floor, m.
     pub height_m: f64,
-    /// Where that floor's corner is, degrees from straight down.
+    /// Direction of that floor's corner, degrees from straight down.
     pub corner_deg: f64,
     /// The largest range, m.
     pub range_m: f64,
@@ -40,13 +40,13 @@ pub(crate) struct Footprint {
     pub beam_deg: f64,
     /// Range or angle, and the footprint by the formula, m.
     pub points: Vec<[f64; 2]>,
-    /// Range or angle, and how far apart the simulated beam's rays meet the wall, m.
+    /// Range or angle, and the extent of the simulated rays' hits on the wall, m.
     pub simulated: Vec<[f64; 2]>,
 }
 
 /// Computes them for the blueprint's tunnel.
 ///
-/// Errors: none that can occur.
+/// Errors: none in practice.
 pub(crate) fn footprints() -> Result<Footprints, ExperimentError> {
     let profile = shapes::ceran_blueprint()?;
     let [_, height_m] = profile.reference();
@@ -79,7 +79,7 @@ pub(crate) fn footprints() -> Result<Footprints, ExperimentError> {
     Ok(Footprints { by_range, by_angle, height_m, corner_deg, range_m: RANGE_M })
 }
 
-/// Half the width of a flat floor, by halving.
+/// Half the width of a flat floor, by bisection.
 fn floor_half_m(profile: &Profile) -> f64 {
     let (mut floor_m, mut wall_m) = (0.0, profile.perimeter_m() / 2.0);
     for _ in 0..60 {
@@ -90,12 +90,12 @@ fn floor_half_m(profile: &Profile) -> f64 {
     profile.point_at(floor_m)[0].abs()
 }
 
-/// From the nearest to the farthest place at which a simulated beam's rays meet a flat wall, in the plane of turning, m.
+/// Extent of a simulated beam's hits on a flat wall, in the plane of rotation, m.
 fn met_m(distance_m: f64, angle_rad: f64, beam_rad: f64) -> f64 {
     let (sine, cosine) = math::sin_cos(angle_rad);
     let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
     for [middle, _, across] in Cone::new(beam_rad, RAYS).parts() {
-        // Down and aside of the beam's middle turned by the angle.
+        // Down and sideways: the beam's axis rotated by the angle.
         let (down, aside) = (middle * cosine - across * sine, middle * sine + across * cosine);
         let at = distance_m * aside / down;
         (least, most) = (least.min(at), most.max(at));

@@ -1,4 +1,4 @@
-//! What pictures like the paper's Figures 6, 8, 12, 13 and 15 show, without their drawing.
+//! Data of pictures like the paper's Figures 6, 8, 12, 13 and 15, without the drawing.
 
 mod beam;
 mod patterns;
@@ -15,7 +15,7 @@ pub(crate) use walls::{AT_GAPS, PHASES, Panel, Walls, walls};
 /// A sample on the unrolled wall.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Place {
-    /// Which head's.
+    /// Head number.
     pub head: u16,
     /// Way along the tunnel from where the picture begins, m.
     pub x_m: f64,
@@ -23,12 +23,12 @@ pub(crate) struct Place {
     pub arc_m: f64,
 }
 
-/// A piece of a head's way over the unrolled wall that doesn't cross its seam.
+/// A piece of a head's track over the unrolled wall that doesn't cross its seam.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Way {
-    /// Which head's.
+    /// Head number.
     pub head: u16,
-    /// Way along the tunnel from where the picture begins, and arc length, m.
+    /// Distance along the tunnel from the picture's start, and arc length, m.
     pub points: Vec<[f64; 2]>,
 }
 
@@ -44,13 +44,13 @@ impl Window {
         (0.0..=self.length_m).contains(&(x_m - self.from_m))
     }
 
-    /// The wall's samples within, in each head's order.
+    /// The wall's samples within, in time order per head.
     fn places(&self, dive: &Dive) -> Vec<Place> {
         let within = dive.heads.iter().flatten().filter(|s| s.of_wall && self.has(s.at.x()));
         within.map(|s| Place { head: s.head, x_m: s.at.x() - self.from_m, arc_m: s.arc_m }).collect()
     }
 
-    /// The heads' ways within and a step beyond.
+    /// The heads' tracks within and one step beyond.
     fn ways(&self, dive: &Dive) -> Vec<Way> {
         let mut ways = Vec::new();
         for samples in &dive.heads {
@@ -68,11 +68,11 @@ impl Window {
     }
 }
 
-/// Adds a step to the way that it continues, if it does; one over the seam as two that end and begin there.
+/// Adds a step to the track that it continues, if any; a step over the seam as two that meet there.
 fn add_step(ways: &mut Vec<Way>, head: u16, perimeter_m: f64, from: [f64; 2], to: [f64; 2]) {
     for [begin, end] in polyline::over_seam(perimeter_m, from, to) {
         match ways.last_mut() {
-            // A step that ends on the seam goes no way beyond it.
+            // A step that ends on the seam has no part beyond it.
             _ if (begin[0] - end[0]).abs() + (begin[1] - end[1]).abs() <= 0.0 => (),
             Some(way) if way.head == head && way.points.last() == Some(&begin) => way.points.push(end),
             _ => ways.push(Way { head, points: vec![begin, end] }),

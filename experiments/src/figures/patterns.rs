@@ -1,4 +1,4 @@
-//! Figures 6 and 8: what heads in phase shift and in sector offset lay on the wall.
+//! Figures 6 and 8: sampling patterns of heads in phase shift and in sector offset.
 
 use headrace_geometry::math::{self, TAU};
 use headrace_geometry::tunnel::Profile;
@@ -9,13 +9,13 @@ use crate::ExperimentError;
 use crate::runs::{Dive, SPEED_MPS, Setting};
 use crate::spacing::passes_of;
 
-/// Way before the picture, so that every head has passed where it begins, m.
+/// Run-up before the picture, so that every head has passed its start, m.
 const BEFORE_M: f64 = 4.0;
-/// Where dives begin, m.
+/// Start of the dives, m.
 const START_M: f64 = 5.0;
-/// Where in a sector the two distances are shown, as a share of it.
+/// Position in a sector at which the two distances are shown, as a share of it.
 const SHARE: f64 = 0.8;
-/// The faster head is drawn by points so far apart, degrees.
+/// Angle between the drawn points of the faster head, degrees.
 const FASTER_STEP_DEG: u32 = 2;
 
 /// Figure 6: heads in phase shift over two turns.
@@ -23,25 +23,25 @@ const FASTER_STEP_DEG: u32 = 2;
 pub(crate) struct PhaseShift {
     /// The tunnel's profile.
     pub profile: Profile,
-    /// How many heads.
+    /// Number of heads.
     pub heads: u16,
     /// Their mode.
     pub mode: &'static str,
     /// Speed, m/s.
     pub speed_mps: f64,
-    /// T_x of a single one of them, m.
+    /// T_x of a single head, m.
     pub t_x_m: f64,
     /// The picture's length, m.
     pub length_m: f64,
     /// Their samples.
     pub samples: Vec<Place>,
-    /// Their ways.
+    /// Their tracks.
     pub ways: Vec<Way>,
-    /// The way of one head that turns as many times as fast as there are heads.
+    /// Track of one head that turns faster by a factor of the number of heads.
     pub faster: Vec<Way>,
     /// Arc length of the crown, m.
     pub crown_m: f64,
-    /// Which heads pass the crown where, growing, m.
+    /// Heads and the positions at which they pass the crown, ascending, m.
     pub at_crown: Vec<(u16, f64)>,
 }
 
@@ -54,23 +54,23 @@ pub(crate) struct Sectors {
     pub mode: &'static str,
     /// Speed, m/s.
     pub speed_mps: f64,
-    /// T_x of one of them turning on, over their number, m.
+    /// T_x of one continuously turning head, divided by the number of heads, m.
     pub t_x_m: f64,
     /// The picture's length, m.
     pub length_m: f64,
     /// Their samples.
     pub samples: Vec<Place>,
-    /// Their ways.
+    /// Their tracks.
     pub ways: Vec<Way>,
     /// A line nearer to an end of head 0's sector, m.
     pub line_m: f64,
-    /// Where head 0 passes it, m.
+    /// Positions at which head 0 passes it, m.
     pub at_line: Vec<f64>,
     /// The two distances there by the paper's formula, the shorter first, m.
     pub alternating_m: [f64; 2],
     /// The middle of head 0's sector, m.
     pub middle_m: f64,
-    /// Where head 0 passes it, m.
+    /// Positions at which head 0 passes it, m.
     pub at_middle: Vec<f64>,
 }
 
@@ -85,7 +85,7 @@ fn pitch_m(dive: &Dive) -> f64 {
 
 /// Simulates four heads, FASTEST.
 ///
-/// Errors: none with the vehicles that are built in.
+/// Errors: none with the built-in vehicles.
 pub(crate) fn phase_shift() -> Result<PhaseShift, ExperimentError> {
     const HEADS: u8 = 4;
     const MODE: &str = "FASTEST";
@@ -122,7 +122,7 @@ fn above(profile: &Profile) -> f64 {
     profile.arc_of([y_m, z_m + 1.0])
 }
 
-/// The way of a head that begins at the floor's centre and gains so much in a turn, the way round that the heads turn.
+/// Track of a head that begins at the floor's centre and advances `gain_m` per turn, in the heads' sense of rotation.
 fn faster(dive: &Dive, gain_m: f64, length_m: f64) -> Vec<Way> {
     let perimeter_m = dive.profile.perimeter_m();
     let around_m = dive.heads.first().and_then(|samples| match samples.as_slice() {
@@ -135,7 +135,7 @@ fn faster(dive: &Dive, gain_m: f64, length_m: f64) -> Vec<Way> {
         let turned_rad = f64::from(number * FASTER_STEP_DEG).to_radians();
         let (sine, cosine) = math::sin_cos(if growing { turned_rad } else { -turned_rad });
         let arc_m = match number * FASTER_STEP_DEG % 360 {
-            // The seam itself may come out on either side of it.
+            // The seam itself may be rounded to either side.
             0 => 0.0,
             _ => dive.profile.arc_of([y_m + sine, z_m - cosine]),
         };
@@ -154,7 +154,7 @@ fn faster(dive: &Dive, gain_m: f64, length_m: f64) -> Vec<Way> {
 
 /// Simulates two heads, MEDIUM.
 ///
-/// Errors: none with the vehicles that are built in.
+/// Errors: none with the built-in vehicles.
 pub(crate) fn sectors() -> Result<Sectors, ExperimentError> {
     const HEADS: u8 = 2;
     const MODE: &str = "MEDIUM";
@@ -162,7 +162,7 @@ pub(crate) fn sectors() -> Result<Sectors, ExperimentError> {
     let t_x_m = pitch_m(&dive) / f64::from(HEADS);
     let first = dive.heads.first().map(Vec::as_slice).unwrap_or_default();
     let [y_m, z_m] = dive.profile.reference();
-    // Head 0 sweeps half a turn from the floor's centre, to the side that most of its samples are on.
+    // Head 0 sweeps half a turn from the floor's centre, to the side with most of its samples.
     let half_m = dive.profile.perimeter_m() / 2.0;
     let left = first.iter().filter(|sample| sample.arc_m < half_m).count() * 2 > first.len();
     let at_share = |share: f64| {

@@ -13,7 +13,7 @@ fn a_way_over_the_seam_is_two() {
     assert!(ways.iter().all(|way| way.head == 3));
 }
 
-/// The simulator's cone and the paper's formula, each computed without the other.
+/// The simulator's cone against the paper's formula, computed independently.
 #[test]
 fn verif_simulated_beams_cover_what_the_formula_says() {
     let figure = footprints().unwrap();

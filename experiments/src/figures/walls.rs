@@ -1,4 +1,4 @@
-//! Figures 12 and 13: samples on a stretch of wall, and how far the Poisson surface is from it.
+//! Figures 12 and 13: samples on a stretch of wall, and its distance from the Poisson surface.
 
 use headrace_geometry::math::{self, TAU};
 use headrace_geometry::tunnel::Profile;
@@ -13,15 +13,15 @@ use crate::{ExperimentError, Progress};
 
 /// Length of the stretch shown, m.
 const SHOWN_M: f64 = 12.0;
-/// Where dives begin, m.
+/// Start of the dives, m.
 const START_M: f64 = 5.0;
-/// Cells along the stretch and round the wall.
+/// Cells along the stretch and around the wall.
 const CELLS: [u32; 2] = [40, 100];
-/// Lines along the wall at which passes are looked for.
+/// Lines along the wall on which passes are counted.
 const LINES: u32 = 360;
-/// A line with gaps so many times those of most lines is in a shadow.
+/// A line with gaps this many times the usual is in a shadow.
 const IN_SHADOW: f64 = 1.5;
-/// Cells that the scale of distances takes in: those at a floor's corners, which any such surface rounds off, have more.
+/// Share of cells within the distance scale: those at a floor's corners, which any such surface rounds off, exceed it.
 const SCALE_SHARE: f64 = 0.93;
 
 /// Heads, mode, sectors, aligned.
@@ -30,7 +30,7 @@ type Configuration = (u8, &'static str, bool, bool);
 /// Figure 12: two heads with and without their phases aligned.
 pub(crate) const PHASES: [Configuration; 4] =
     [(2, "slow", false, false), (2, "slow", false, true), (2, "slow", true, false), (2, "slow", true, true)];
-/// Figure 13: heads that hide the wall from each other.
+/// Figure 13: heads that occlude the wall from each other.
 pub(crate) const AT_GAPS: [Configuration; 4] = [
     (3, "medium", false, true),
     (4, "medium", false, true),
@@ -38,7 +38,7 @@ pub(crate) const AT_GAPS: [Configuration; 4] = [
     (4, "medium", true, true),
 ];
 
-/// Panels side by side, of one stretch.
+/// Panels side by side, all of one stretch.
 #[derive(Debug, Clone)]
 pub(crate) struct Walls {
     /// The tunnel's profile.
@@ -51,36 +51,36 @@ pub(crate) struct Walls {
     pub length_m: f64,
     /// The panels.
     pub panels: Vec<Panel>,
-    /// The distance that the scale of colours ends at, m: all but a few cells are below.
+    /// Upper end of the colour scale, m: all but a few cells are below.
     pub most_m: f64,
 }
 
 /// A configuration's stretch of wall.
 #[derive(Debug, Clone)]
 pub(crate) struct Panel {
-    /// How many heads.
+    /// Number of heads.
     pub heads: u8,
     /// Their mode.
     pub mode: &'static str,
-    /// Sector offset in place of phase shift.
+    /// Sector offset instead of phase shift.
     pub sectors: bool,
-    /// In phase.
+    /// Phases aligned.
     pub aligned: bool,
-    /// T_x of a single head, over the number of heads, m.
+    /// T_x of a single head, divided by the number of heads, m.
     pub t_x_m: f64,
-    /// The samples, in each head's order.
+    /// The samples, in time order per head.
     pub samples: Vec<Place>,
-    /// Cells along the stretch and round the wall.
+    /// Cells along the stretch and around the wall.
     pub cells: [u32; 2],
-    /// Unsigned distance of each cell's middle from the surface, m; those along the stretch outermost.
+    /// Unsigned distance of each cell's centre from the surface, m; index along the stretch outermost.
     pub distances_m: Vec<f64>,
     /// Their mean, m.
     pub mean_m: f64,
-    /// The largest distance along the tunnel between passes, where heads pass at all.
+    /// The largest distance along the tunnel between passes, on lines with passes.
     pub widest: Option<Gap>,
-    /// Strips of wall on which passes are more than 1.5 T_x / s apart somewhere, from and to, m.
+    /// Strips of wall with passes more than 1.5 T_x / s apart somewhere, from and to, m.
     pub wide_m: Vec<[f64; 2]>,
-    /// Strips of wall that no head passes, from and to, m.
+    /// Strips of wall without passes, from and to, m.
     pub unseen_m: Vec<[f64; 2]>,
 }
 
@@ -89,20 +89,20 @@ pub(crate) struct Panel {
 pub(crate) struct Gap {
     /// The line's arc length, m.
     pub arc_m: f64,
-    /// Where it begins and ends, from where the picture begins, m.
+    /// Its begin and end, from the picture's start, m.
     pub x_m: [f64; 2],
 }
 
 impl Gap {
-    /// How long it is, m.
+    /// Its length, m.
     pub(crate) fn length_m(&self) -> f64 {
         self.x_m[1] - self.x_m[0]
     }
 }
 
-/// Simulates dives as the meshes' and looks at a stretch in their middle.
+/// Simulates dives as for the meshes and evaluates a stretch in their middle.
 ///
-/// Errors: a surface that can't be made; none with the vehicles that are built in.
+/// Errors: no surface can be made; none with the built-in vehicles.
 pub(crate) fn walls(
     configurations: &[Configuration],
     progress: Progress<'_>,
@@ -119,7 +119,7 @@ pub(crate) fn walls(
     let last = math::floor_to_i64(SCALE_SHARE * all.len() as f64);
     let most_m = all.get(crate::index(last)).copied().unwrap_or_default();
     let profile = headrace_geometry::tunnel::shapes::ceran_blueprint()?;
-    // A round number of centimetres.
+    // Rounded up to whole centimetres.
     let most_m = (most_m * 100.0).ceil().max(1.0) / 100.0;
     Ok(Walls { profile, speed_mps: SPEED_MPS, dive_m: LENGTH_M, length_m: SHOWN_M, panels, most_m })
 }
@@ -167,7 +167,7 @@ fn distances(dive: &Dive, window: Window) -> Result<Vec<f64>, ExperimentError> {
     Ok(cells.map(distance_m).collect())
 }
 
-/// A line along the wall with the passes over it within the stretch.
+/// A line along the wall with its passes within the stretch.
 struct Line {
     arc_m: f64,
     passes_m: Vec<f64>,
@@ -196,7 +196,7 @@ fn lines(dive: &Dive, window: Window) -> Vec<Line> {
     (0..LINES).map(line).collect()
 }
 
-/// The largest gap; of the lines beside it that are in the same shadow, that of the middle one.
+/// The largest gap; of adjacent lines in the same shadow, that of the middle one.
 fn widest(lines: &[Line]) -> Option<Gap> {
     let mut lengths: Vec<f64> = lines.iter().filter_map(Line::widest).map(|gap| gap.length_m()).collect();
     lengths.sort_by(f64::total_cmp);
@@ -206,12 +206,12 @@ fn widest(lines: &[Line]) -> Option<Gap> {
     let (number, worst) = lines.iter().enumerate().max_by(|a, b| length_m(a.1).total_cmp(&length_m(b.1)))?;
     let before = lines.iter().take(number).rev().take_while(shadowed).count();
     let after = lines.iter().skip(number + 1).take_while(shadowed).count();
-    // As much of the shadow to either side.
+    // The middle of the shadow.
     let middle = (2 * number + after).saturating_sub(before) / 2;
     lines.get(middle).unwrap_or(worst).widest()
 }
 
-/// Runs of lines of a kind, from and to, m.
+/// Runs of lines for which `kind` holds, from and to, m.
 fn strips(lines: &[Line], perimeter_m: f64, kind: impl Fn(&Line) -> bool) -> Vec<[f64; 2]> {
     let apart_m = perimeter_m / f64::from(LINES);
     let mut strips: Vec<[f64; 2]> = Vec::new();

@@ -1,4 +1,4 @@
-//! Tables 3 and 4, the columns called baseline: what the paper's equations predict.
+//! Tables 3 and 4, columns "baseline": predictions by the paper's equations.
 
 use headrace_sampling::head::Turn;
 use headrace_sampling::layout::HeadLayout;
@@ -24,7 +24,7 @@ impl Baselines {
         Ok(Self { modes, rigs })
     }
 
-    /// The mode of a name.
+    /// The mode with that name.
     pub(super) fn mode(&self, name: &'static str) -> Result<Mode, PaperError> {
         self.modes.iter().find(|mode| mode.name == name).copied().ok_or(PaperError::Mode { name })
     }

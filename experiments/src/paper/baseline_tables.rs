@@ -43,7 +43,7 @@ pub struct SeveralHeadsRow {
     pub t_y_max_m: Cell,
 }
 
-/// A printed number beside ours at the speed that the paper states and at the one that it was computed for.
+/// A printed number beside ours at the paper's stated speed and at the speed it was computed for.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct AtBothSpeeds {
     /// At [`STATED_SPEED_MPS`].

@@ -1,32 +1,32 @@
-//! What the tables are made of.
+//! Elements of the tables.
 
 use serde::Serialize;
 
 use super::printed::{Digits, Printed, difference_percent};
 
-/// A printed number and ours, both in the unit that the field's name says.
+/// A printed number and ours, both in the unit of the field's name.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Cell {
     /// As the paper has it.
     pub printed: Printed,
-    /// What we get.
+    /// Our value.
     pub ours: f64,
-    /// By how much ours exceeds the printed number, percent of it; `None` for a printed zero.
+    /// Difference of ours from the printed number, percent of it; `None` for a printed zero.
     pub difference_percent: Option<f64>,
-    /// How the printed digits come from ours.
+    /// Whether rounding or truncating ours gives the printed digits.
     pub digits: Digits,
-    /// The note that it refers to.
+    /// Mark of the note that it refers to.
     pub note: Option<char>,
 }
 
-/// Something to know about a table.
+/// A note on a table.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Note {
-    /// By what cells refer to it.
+    /// Mark used in cells.
     pub mark: char,
-    /// Whose it is.
+    /// Kind.
     pub kind: NoteKind,
-    /// In words.
+    /// Text.
     pub text: String,
 }
 
@@ -36,9 +36,9 @@ pub struct Note {
 pub enum NoteKind {
     /// The paper contradicts itself or its own equations.
     Erratum,
-    /// The same, seen only when the tables were recomputed.
+    /// The same, found only when the tables were recomputed.
     NewErratum,
-    /// How the printed numbers came about, or why ours are others.
+    /// Origin of the printed numbers, or the reason why ours differ.
     Finding,
 }
 
@@ -47,11 +47,11 @@ pub enum NoteKind {
 pub struct Table<Row> {
     /// Its number in the paper.
     pub number: u8,
-    /// What it shows.
+    /// Title.
     pub title: &'static str,
     /// Its rows, in the paper's order.
     pub rows: Vec<Row>,
-    /// What is to be said of it.
+    /// Its notes.
     pub notes: Vec<Note>,
 }
 
@@ -65,13 +65,13 @@ impl Cell {
         Self { note: Some(mark), ..self }
     }
 
-    /// Refers to a note where the printed digits come of ours in neither way.
+    /// Refers to a note if neither rounding nor truncating ours gives the printed digits.
     pub(super) fn noted_unless_equal(self, mark: char) -> Self {
         if self.digits == Digits::Neither { self.noted(mark) } else { self }
     }
 
-    /// Refers to a note where the printed digits aren't ours rounded: where other numbers of its kind differ, truncation
-    /// would explain this one by chance.
+    /// Refers to a note if rounding ours doesn't give the printed digits: where related numbers differ, truncation
+    /// would match this one by chance.
     pub(super) fn noted_unless_rounded(self, mark: char) -> Self {
         if self.digits.rounded() { self } else { self.noted(mark) }
     }

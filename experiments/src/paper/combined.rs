@@ -1,4 +1,4 @@
-//! Table 5: T, the distances along and across put together.
+//! Table 5: T, the combined distance along and across.
 
 use headrace_sampling::layout::HeadLayout;
 use headrace_sampling::spacing::t_max_m;
@@ -33,7 +33,7 @@ pub struct Combined {
     pub t_max_m: CombinedCell,
 }
 
-/// A printed T beside two of ours, which leave out the way gone between two pings, as the paper does.
+/// A printed T beside two of ours, which ignore the vehicle's advance between two pings, as the paper does.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct CombinedCell {
     /// From the T_x and T_y that Table 4 prints as experimental.

@@ -1,4 +1,4 @@
-//! The baseline across the tunnel: T_y of a head that stands still where drift and mounting put it at worst.
+//! The baseline across the tunnel: T_y of a stationary head at the worst drift and mounting offset.
 
 use headrace_geometry::frames::{Body, Mount, Point3, Pose, Rot, Tunnel, Vec3};
 use headrace_geometry::math::PI;
@@ -9,15 +9,15 @@ use headrace_sampling::section;
 use super::PaperError;
 use super::modes::Mode;
 
-/// How far the vehicle may be off the middle, up, down and sideways, m (§8.1).
+/// Greatest offset of the vehicle from the centre, up, down and sideways, m (§8.1).
 const DRIFT_M: f64 = 1.5;
-/// How far it may be turned from the tunnel's direction, degrees (§8.1).
+/// Greatest yaw relative to the tunnel's direction, degrees (§8.1).
 const YAW_DEG: f64 = 15.0;
-/// Soundings of a turn, a hundredth of a degree apart: every step of Table 2 is a whole number of them, and the last one
+/// Soundings per turn, a hundredth of a degree apart: every step of Table 2 is a whole number of them, and the last one
 /// before a corner is found to 0.2 % of its length.
 const SOUNDINGS: u32 = 36_000;
 
-/// Where the heads sit on the vehicle (§8).
+/// Mounting positions of the heads on the vehicle (§8).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Rig {
     /// One head, 0.15 m below the vehicle's middle.
@@ -45,7 +45,7 @@ impl Rig {
         }
     }
 
-    /// Offsets of its heads from the vehicle's middle, left and up, m.
+    /// Offsets of its heads from the vehicle's centre, left and up, m.
     fn offsets_m(self) -> &'static [[f64; 2]] {
         match self {
             Self::Vita1 => &[[0.0, -0.15]],
@@ -55,7 +55,7 @@ impl Rig {
     }
 }
 
-/// T_y of a rig in each of the modes, in the tunnel that the tables are for.
+/// T_y of a rig in each of the modes, in the tables' tunnel.
 pub(super) fn across(rig: Rig, modes: &[Mode]) -> Result<Vec<Across>, PaperError> {
     let profile = shapes::ceran_blueprint()?;
     let floor_m = floor_m(&profile, rig)?;
@@ -70,22 +70,21 @@ pub(super) fn across(rig: Rig, modes: &[Mode]) -> Result<Vec<Across>, PaperError
     modes.iter().zip(largest_m).map(of_mode).collect()
 }
 
-/// The nearest that a head of the rig comes to the floor, m.
+/// Least distance of the rig's heads from the floor, m.
 pub(super) fn floor_m(profile: &Profile, rig: Rig) -> Result<f64, PaperError> {
     let lowest_m = rig.offsets_m().iter().map(|[_, up_m]| *up_m).fold(0.0, f64::min);
     Ok(height_m(profile)? / 2.0 - DRIFT_M + lowest_m)
 }
 
-/// From the floor to the crown, m.
+/// Height of the tunnel from floor to crown, m.
 pub(super) fn height_m(profile: &Profile) -> Result<f64, PaperError> {
     let [y_m, z_m] = profile.reference();
     Ok(z_m + standing(profile, y_m, z_m, 0.0)?.sounding(PI)?.range_m())
 }
 
-/// The largest distance between neighbouring samples in each mode, straight through the water, wherever in the turn the
-/// pings fall.
+/// The largest chord between neighbouring samples in each mode, for any phase of the pings within the turn.
 ///
-/// The worst of the places and headings that the paper allows: it adds up drift and mounting, whatever the heading.
+/// The worst over the positions and headings that the paper allows: drift and mounting offset add up, whatever the heading.
 fn largest_chords_m(profile: &Profile, rig: Rig, modes: &[Mode]) -> Result<Vec<f64>, PaperError> {
     let middle_m = height_m(profile)? / 2.0;
     let mut largest_m = vec![0.0; modes.len()];
@@ -103,7 +102,7 @@ fn largest_chords_m(profile: &Profile, rig: Rig, modes: &[Mode]) -> Result<Vec<f
     Ok(largest_m)
 }
 
-/// None, or all, of the drift left, up and in heading.
+/// Zero or maximal drift left, up and in heading, in all combinations.
 fn extremes() -> impl Iterator<Item = [f64; 3]> {
     const ENDS: [f64; 3] = [-1.0, 0.0, 1.0];
     ENDS.into_iter().flat_map(|y| ENDS.into_iter().flat_map(move |z| ENDS.map(|yaw| [y, z, yaw])))

@@ -1,4 +1,4 @@
-//! What the printed baselines tell of the tunnel, the speed and the places that they were computed for.
+//! Tunnel, speed and head positions inferred from the printed baselines.
 
 use headrace_geometry::math;
 use headrace_geometry::tunnel::shapes;
@@ -9,16 +9,16 @@ use super::drift::{Rig, floor_m, height_m};
 use super::printed::{Digits, Interval, Line, lines};
 use super::{FITTING_SPEED_MPS, PaperError, STATED_SPEED_MPS};
 
-/// Where a head is against the corner of floor and wall.
+/// Position of a head relative to the corner of floor and wall.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Place {
-    /// Above the floor, m.
+    /// Height above the floor, m.
     pub(super) floor_m: f64,
-    /// Sideways of the corner, m.
+    /// Horizontal distance from the corner, m.
     pub(super) aside_m: f64,
 }
 
-/// The place from which Eq. 5 and 6 give a rig's printed T_ymin and T_ymax. Found by search; the tests hold it to every
+/// The position from which Eq. 5 and 6 give a rig's printed T_ymin and T_ymax. Found by search; the tests check every
 /// printed digit that isn't an erratum.
 pub(super) fn fitting_place(rig: Rig) -> Place {
     match rig {
@@ -33,7 +33,7 @@ pub(super) fn is_copied(mode: &str, heads: u8) -> bool {
     mode == "FAST" && heads >= 3
 }
 
-/// What a printed T_y is computed from, of those rows that are no errata.
+/// Intervals of an input that give the printed T_y of those rows that aren't errata.
 fn of_rows(
     rows: impl IntoIterator<Item = Line>,
     wanted: impl Fn(&str, u8) -> bool,
@@ -48,7 +48,7 @@ fn of_rows(
     Ok(Interval::common(intervals))
 }
 
-/// Perimeters of which all printed means of Tables 3 and 4 are n-ths, m: where all are rounded, and where some may be
+/// Perimeters that give all printed means of Tables 3 and 4 when divided by n, m: with all rounded, and with some possibly
 /// truncated.
 pub(super) fn perimeters_m(baselines: &Baselines) -> Result<[Interval; 2], PaperError> {
     let perimeter = |from: fn(&super::Printed) -> Interval| {
@@ -64,7 +64,7 @@ pub(super) fn perimeters_m(baselines: &Baselines) -> Result<[Interval; 2], Paper
     Ok([perimeter(super::Printed::rounded_from)?, perimeter(super::Printed::read_from)?])
 }
 
-/// Speeds that give all printed T_x of Table 3 (FAST's apart), and all T_x / s and 2 T_x / s of Table 4, m/s.
+/// Speeds that give all printed T_x of Table 3 (except FAST's), and all T_x / s and 2 T_x / s of Table 4, m/s.
 pub(super) fn speeds_mps(baselines: &Baselines) -> Result<[Interval; 2], PaperError> {
     let speed = |line: &Line, column, passes: f64| {
         let period_s = baselines.of(line)?.0.turn.period_s();
@@ -83,7 +83,7 @@ pub(super) fn speeds_mps(baselines: &Baselines) -> Result<[Interval; 2], PaperEr
     Ok([one_head, several])
 }
 
-/// Distances to the floor from which Eq. 5 gives a rig's printed minima, m, of the modes wanted.
+/// Distances to the floor from which Eq. 5 gives a rig's printed minima, m, for the selected modes.
 pub(super) fn floors_m(
     baselines: &Baselines,
     rig: Rig,
@@ -99,7 +99,7 @@ pub(super) fn floors_m(
     )
 }
 
-/// The step along a flat floor that ends in the corner, m: Eq. 6 with m theta there.
+/// The step along a flat floor that ends in the corner, m: Eq. 6 with m theta at the corner.
 pub(super) fn corner_step_m(place: Place, step_rad: f64) -> f64 {
     let corner = math::atan2(place.aside_m, place.floor_m);
     place.floor_m * (math::tan(corner) - math::tan(corner - step_rad))
@@ -134,7 +134,7 @@ pub(super) fn means<'a>(
     Ok(Note::new(mark, NoteKind::Finding, text))
 }
 
-/// Which speed Table 4 is for.
+/// The speed of Table 4.
 pub(super) fn speed(mark: char, baselines: &Baselines) -> Result<Note, PaperError> {
     let [one_head, several] = speeds_mps(baselines)?;
     let text = format!(

@@ -3,16 +3,16 @@
 use super::PaperError;
 use super::printed::{Line, Printed, lines};
 
-/// What the paper measured in a simulated run.
+/// The paper's measurements in a simulated run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Measured {
     /// The mode's name, in capitals.
     pub mode: &'static str,
-    /// How many heads.
+    /// Number of heads.
     pub heads: u8,
-    /// In phase shift, or turning on alone.
+    /// In phase shift, or one continuously turning head.
     pub phase_shift: Spacings,
-    /// In sector offset; none for one head.
+    /// In sector offset; `None` for one head.
     pub sector_offset: Option<Spacings>,
 }
 
@@ -23,13 +23,13 @@ pub struct Spacings {
     pub t_x_m: Printed,
     /// T_y: mean, standard deviation, least, largest.
     pub t_y_m: [Printed; 4],
-    /// T: mean, least, largest; Table 5, which leaves out one head.
+    /// T: mean, least, largest; from Table 5, which has no rows for one head.
     pub t_m: Option<[Printed; 3]>,
 }
 
 /// The runs of Table 3, then those of Tables 4 and 5.
 ///
-/// Errors: none with the numbers that are built in.
+/// Errors: none with the built-in numbers.
 pub fn measured() -> Result<Vec<Measured>, PaperError> {
     let mut runs = Vec::new();
     for line in lines(3) {

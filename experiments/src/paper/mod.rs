@@ -1,4 +1,4 @@
-//! The paper's Tables 1 to 5 computed anew: each printed number, ours beside it, and where the fault is the paper's.
+//! The paper's Tables 1 to 5 recomputed: each printed number, ours beside it, and a note where the error is the paper's.
 //!
 //! Source: Jorge et al., "Analytical Approach to Sampling Estimation of Underwater Tunnels Using Mechanical Profiling
 //! Sonars", Sensors 2021, 21, 1900 (CC BY 4.0). Its numbers are in the `*.csv` files here, as printed.
@@ -28,14 +28,14 @@ pub use printed::{Digits, Interval, Printed};
 pub const SOURCE: &str = "Jorge et al., Sensors 2021, 21, 1900 (CC BY 4.0)";
 /// The speed of the paper's experiments, m/s (§7.2).
 pub const STATED_SPEED_MPS: f64 = 0.197;
-/// The speed that Table 4's baseline was computed for, m/s: the only one to a tenth of a millimetre a second that gives
+/// The speed that Table 4's baseline was computed for, m/s: the only one to a tenth of a millimetre per second that gives
 /// its printed digits.
 pub const FITTING_SPEED_MPS: f64 = 0.196;
 
 /// Tables 1 to 5.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Tables {
-    /// Where the printed numbers are from.
+    /// Source of the printed numbers.
     pub source: &'static str,
     /// The speed that the paper states, m/s.
     pub stated_speed_mps: f64,
@@ -43,9 +43,9 @@ pub struct Tables {
     pub fitting_speed_mps: f64,
     /// Speeds that give all printed T_x of Table 4's baseline, m/s.
     pub consistent_speed_mps: Interval,
-    /// The perimeter that our means are for, m.
+    /// The perimeter used for our means, m.
     pub perimeter_m: f64,
-    /// Perimeters that give all printed means of Tables 3 and 4, rounded, m; copied rows apart.
+    /// Perimeters that give all printed means of Tables 3 and 4 with rounding, m; except copied rows.
     pub consistent_perimeter_m: Interval,
     /// Overlap of beams.
     pub table_1: Table<OverlapRow>,
@@ -59,11 +59,11 @@ pub struct Tables {
     pub table_5: Table<CombinedRow>,
 }
 
-/// Why the tables can't be computed: a slip in the built-in numbers.
+/// Why the tables can't be computed: an error in the built-in numbers.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PaperError {
-    /// A column is missing or no number.
+    /// A column is missing or not a number.
     #[error("table {table}, line {line}: {column} is missing or no number of up to 6 decimals")]
     Printed {
         /// Number of the table.
@@ -79,17 +79,17 @@ pub enum PaperError {
         /// Its name.
         name: &'static str,
     },
-    /// A number that sampling theory refuses.
+    /// A number outside the sampling formulas' domain.
     #[error(transparent)]
     Sampling(#[from] SamplingError),
-    /// A tunnel that is none.
+    /// An invalid tunnel profile.
     #[error(transparent)]
     Profile(#[from] ProfileError),
 }
 
 /// All five tables.
 ///
-/// Errors: none with the numbers that are built in.
+/// Errors: none with the built-in numbers.
 pub fn tables() -> Result<Tables, PaperError> {
     let baselines = baseline::Baselines::new()?;
     let [_, consistent_speed_mps] = findings::speeds_mps(&baselines)?;

@@ -13,7 +13,7 @@ const BEAM_600_KHZ_DEG: f64 = 2.4;
 /// Full width of the beam at 1 MHz, degrees (§6).
 const BEAM_1_MHZ_DEG: f64 = 1.4;
 
-/// A row of Table 1: how far beams overlap.
+/// A row of Table 1: overlap of beams.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct OverlapRow {
     /// theta, degrees.
@@ -33,9 +33,9 @@ pub struct ModeRow {
     pub step_deg: Printed,
     /// T, seconds, as printed.
     pub period_s: Printed,
-    /// n, samples to a turn.
+    /// n, samples per turn.
     pub samples_per_turn: Cell,
-    /// f_s, samples a second.
+    /// f_s, samples per second.
     pub ping_rate_hz: Cell,
 }
 

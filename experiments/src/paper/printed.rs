@@ -1,4 +1,4 @@
-//! Numbers as the paper prints them, and what they leave open.
+//! Numbers as the paper prints them, and the intervals they allow.
 
 use core::fmt;
 
@@ -7,19 +7,19 @@ use serde::{Serialize, Serializer};
 
 use super::PaperError;
 
-/// Ours may be off by this share of a printed number's last digit: 0.196 x 8 / 2 is a hair off 0.784.
+/// Tolerance of ours, as a share of a printed number's last digit: 0.196 x 8 / 2 is just off 0.784.
 const ROUNDING: f64 = 1e-6;
 /// More decimals than any table has.
 const MOST_DECIMALS: usize = 6;
 
-/// A number with the digits that it is printed with.
+/// A number with its printed digits.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Printed {
     value: f64,
     decimals: usize,
 }
 
-/// How a printed number's digits come from ours.
+/// How a printed number's digits follow from ours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Digits {
@@ -33,17 +33,17 @@ pub enum Digits {
     Neither,
 }
 
-/// What a quantity may be for a printed number to come of it.
+/// Values of a quantity that are consistent with a printed number.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Interval {
-    /// The least.
+    /// Lower bound.
     pub low: f64,
-    /// What it must stay below.
+    /// Upper bound, excluded.
     pub high: f64,
 }
 
 impl Digits {
-    /// Whether the printed digits are ours rounded.
+    /// Whether rounding ours gives the printed digits.
     pub fn rounded(self) -> bool {
         matches!(self, Self::Both | Self::Rounded)
     }
@@ -61,7 +61,7 @@ impl Printed {
         self.value
     }
 
-    /// How its digits come from `ours`.
+    /// How its digits follow from `ours`.
     pub fn digits_of(&self, ours: f64) -> Digits {
         let beyond = (ours - self.value) / self.last_digit();
         let rounded = beyond.abs() <= 0.5 + ROUNDING;
@@ -74,13 +74,13 @@ impl Printed {
         }
     }
 
-    /// What it may have been rounded from.
+    /// Values that round to it.
     pub fn rounded_from(&self) -> Interval {
         let half = self.last_digit() / 2.0;
         Interval { low: self.value - half, high: self.value + half }
     }
 
-    /// What it may have been rounded or truncated from.
+    /// Values that round or truncate to it.
     pub fn read_from(&self) -> Interval {
         let digit = self.last_digit();
         Interval { low: self.value - digit / 2.0, high: self.value + digit }
@@ -106,12 +106,12 @@ impl Serialize for Printed {
 impl Interval {
     const ALL: Self = Self { low: f64::NEG_INFINITY, high: f64::INFINITY };
 
-    /// Each end by a factor above zero.
+    /// Both ends times a positive factor.
     pub(super) fn scaled(self, factor: f64) -> Self {
         Self { low: self.low * factor, high: self.high * factor }
     }
 
-    /// What all of them have in common; low is not below high where that is nothing.
+    /// Intersection; empty if low is not below high.
     pub(super) fn common(intervals: impl IntoIterator<Item = Self>) -> Self {
         intervals.into_iter().fold(Self::ALL, |common, one| Self {
             low: common.low.max(one.low),
@@ -125,7 +125,7 @@ impl Interval {
     }
 }
 
-/// The share by which ours exceeds a printed number, percent; `None` for a printed zero.
+/// Difference of ours from a printed number, percent of it; `None` for a printed zero.
 pub(super) fn difference_percent(ours: f64, printed: Printed) -> Option<f64> {
     // Beyond 12 digits a difference is rounding, and would show as -0.00.
     let percent = (ours / printed.value - 1.0) * 100.0;
@@ -141,7 +141,7 @@ pub(super) struct Line {
 }
 
 impl Line {
-    /// What stands in a column.
+    /// Text in a column.
     pub(super) fn text(&self, column: &'static str) -> Result<&'static str, PaperError> {
         let cell = self.cells.iter().find(|(name, _)| *name == column).map(|(_, text)| *text);
         cell.ok_or_else(|| self.wrong(column))

@@ -10,13 +10,13 @@ fn tables() -> Tables {
     super::tables().unwrap()
 }
 
-/// Cells whose digits are neither ours rounded nor ours truncated, by name.
+/// Cells whose digits follow from ours neither by rounding nor by truncation, by name.
 fn apart<'a>(cells: impl IntoIterator<Item = (String, &'a Cell)>) -> Vec<String> {
     let cells = cells.into_iter();
     cells.filter(|(_, cell)| cell.digits == Digits::Neither).map(|(name, _)| name).collect()
 }
 
-/// Cells that only truncation explains.
+/// Cells explained only by truncation.
 fn truncated<'a>(cells: impl IntoIterator<Item = &'a Cell>) -> Vec<f64> {
     let cells = cells.into_iter().filter(|cell| cell.digits == Digits::Truncated);
     cells.map(|cell| cell.printed.value()).collect()
@@ -29,7 +29,7 @@ fn digits_come_from_rounding_or_truncation() {
     assert_eq!(digits("2.67", 2.4 / 0.9), Digits::Rounded);
     assert_eq!(digits("2.33", 1.4 / 0.6), Digits::Both);
     assert_eq!(digits("8", 8.0), Digits::Both);
-    // A hair below what it is on paper.
+    // Just below its exact value.
     assert_eq!(digits("0.784", 0.784 - 1e-12), Digits::Both);
     assert_eq!(digits("0.784", 0.785 - 1e-12), Digits::Neither);
     assert_eq!(digits("0.784", 0.783_499), Digits::Neither);
@@ -48,7 +48,7 @@ fn val_table_1_to_the_digit() {
         |row: &OverlapRow| [row.overlap_600_khz, row.overlap_1_mhz].map(|cell| cell.printed.value());
     assert_eq!(table.rows.iter().map(printed).collect::<Vec<_>>(), expected);
     let cells = || table.rows.iter().flat_map(|row| [&row.overlap_600_khz, &row.overlap_1_mhz]);
-    // 0 is 0.58 cut to an integer at best: an erratum all the same.
+    // 0 is at best 0.58 truncated to an integer: an erratum all the same.
     assert_eq!(truncated(cells()), [1.55, 1.16, 0.0]);
     assert_eq!(apart(cells().map(|cell| (cell.printed.to_string(), cell))), [""; 0]);
     let none = table.rows[4].overlap_1_mhz;
@@ -91,7 +91,7 @@ fn val_the_means_and_their_perimeter() {
     assert_eq!(apart(one), ["SLOW", "FAST", "FASTER", "FASTEST"]);
     let Interval { low, high } = tables.consistent_perimeter_m;
     assert!((low - 34.425).abs() < 1e-9 && (high - 34.5).abs() < 1e-9, "{low} to {high}");
-    // Whichever perimeter of the interval: all means but the copied rows' come out to the digit.
+    // For any perimeter of the interval, all means but those of copied rows match to the digit.
     for perimeter_m in [low + 1e-6, high - 1e-6] {
         for line in lines(3).into_iter().chain(lines(4)) {
             let (mode, heads) = (line.text("mode").unwrap(), line.heads().unwrap());
@@ -104,7 +104,7 @@ fn val_the_means_and_their_perimeter() {
     }
 }
 
-/// The notes' places of the heads give each printed extreme through Eq. 5 and 6, errata apart.
+/// The head positions in the notes give each printed extreme by Eq. 5 and 6, except errata.
 #[test]
 fn val_the_extremes_from_the_fitting_places() {
     let mut misses = Vec::new();
@@ -136,11 +136,11 @@ fn val_the_extremes_from_the_fitting_places() {
     );
 }
 
-/// The worst of the rays cast is Eq. 6 with its last step in the farther corner, which yaw takes farther off.
+/// The worst chord by ray casting is Eq. 6 with its last step in the farther corner, whose distance yaw increases.
 #[test]
 fn verif_the_largest_step_is_at_the_corner() {
     let table = tables().table_3;
-    // The height of the blueprint's middle less 1.65 m; half its base and 1.5 m, seen 15 degrees askew.
+    // The blueprint's mid-height less 1.65 m; half its base plus 1.5 m, seen at 15 degrees yaw.
     let aside_m = 6.449_655 / math::cos(15_f64.to_radians());
     let place = Place { floor_m: 2.701_094, aside_m };
     for (row, step_deg) in table.rows.iter().zip([0.3_f64, 0.6, 0.9, 1.2, 2.4]) {

@@ -8,9 +8,9 @@ use super::image::Image;
 /// A closed line of pixels round the head.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Chain {
-    /// Steps to a pixel beside, above or below.
+    /// Steps to a pixel sharing a side.
     pub straight: usize,
-    /// Steps to a pixel over a corner.
+    /// Steps to a pixel sharing only a corner.
     pub diagonal: usize,
     /// Changes of direction from one step to the next.
     pub corners: usize,
@@ -21,7 +21,7 @@ pub(crate) struct Chain {
     pub corrected_m: f64,
 }
 
-/// Walks a line each of whose pixels has two neighbours.
+/// Traces a line each of whose pixels has two neighbours.
 ///
 /// Errors: pixels with other than two neighbours, or a line in several pieces.
 pub(super) fn trace(ring: &Image, pixel_m: f64) -> Result<Chain, PerimeterError> {
@@ -48,7 +48,7 @@ pub(super) fn trace(ring: &Image, pixel_m: f64) -> Result<Chain, PerimeterError>
     })
 }
 
-/// Directions from pixel to pixel until the first is met again; even ones are straight.
+/// Directions from pixel to pixel until back at the first; even ones are straight.
 fn walk(ring: &Image, first: usize) -> Vec<usize> {
     let (mut directions, mut at, mut before) = (Vec::new(), first, None);
     loop {

@@ -1,4 +1,4 @@
-//! Echoes of a turn: strength over angle and range.
+//! Echoes of a turn: strength by angle and range.
 
 use headrace_geometry::math::{self, TAU};
 
@@ -13,7 +13,7 @@ pub(super) struct Echoes {
 }
 
 impl Echoes {
-    /// Of pings with any echo within range. Each ping's strongest bin is one.
+    /// From pings with any echo within range. Each ping's strongest bin is one.
     pub(super) fn of(pings: &[Ping], settings: &Settings) -> Result<Self, PerimeterError> {
         let mut lines: Vec<(f64, Vec<f64>)> = pings
             .iter()
@@ -57,10 +57,10 @@ impl Echoes {
     }
 }
 
-/// One ping's bins: each ray lays an echo of the pulse's length about its range, of equal area. `None` without any.
+/// One ping's bins: each ray adds an echo of the pulse's length centred on its range, of equal area. `None` without any.
 fn line(ranges_m: &[f64], settings: &Settings) -> Option<Vec<f64>> {
     let bin_m = settings.range_max_m / settings.bins as f64;
-    // An echo shorter than a bin would fall into one or two of them by chance.
+    // An echo shorter than a bin would fall into one or two of them depending on its position.
     let half = settings.pulse_m.max(bin_m) / 2.0;
     let mut bins = vec![0.0; settings.bins];
     for range_m in ranges_m.iter().filter(|r| r.is_finite() && **r >= 0.0 && **r < settings.range_max_m) {

@@ -1,10 +1,10 @@
-//! Why there is no perimeter.
+//! Why a perimeter can't be computed.
 
-/// Why there is no perimeter.
+/// Why a perimeter can't be computed.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PerimeterError {
-    /// A perimeter needs pings all round.
+    /// Too few angles with an echo around the turn.
     #[error("a perimeter needs echoes at 3 angles at least; there are {count}")]
     TooFewPings {
         /// Angles with an echo.
@@ -15,15 +15,15 @@ pub enum PerimeterError {
     Setting {
         /// The setting's name.
         setting: &'static str,
-        /// What it is.
+        /// Its value.
         value: f64,
-        /// What it may be.
+        /// Allowed values.
         wanted: &'static str,
     },
-    /// The skeleton doesn't close round the head; a longer pulse or more growing would.
+    /// The skeleton doesn't close around the head; a longer pulse or more dilation would close it.
     #[error("the wall's skeleton does not close round the head")]
     NotClosed,
-    /// The skeleton has a fork that pruning and thinning left.
+    /// The skeleton has a fork left by pruning and thinning.
     #[error("the wall's skeleton forks at {forks} pixels")]
     Forked {
         /// Pixels with other than two neighbours.

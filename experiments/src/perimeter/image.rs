@@ -1,4 +1,4 @@
-//! A black and white image of a cross-section, the head in its middle.
+//! A binary image of a cross-section, with the head in its centre.
 
 use headrace_geometry::math::{self, TAU};
 
@@ -13,12 +13,12 @@ pub(super) struct Image {
 }
 
 impl Image {
-    /// An image without anything set.
+    /// An image with no pixel set.
     pub(super) fn empty(side: usize) -> Self {
         Self { side, set: vec![false; side * side] }
     }
 
-    /// Pixels whose middle has an echo of at least the threshold. Columns run to the left, rows up.
+    /// Sets pixels whose centre has an echo of at least the threshold. Columns run to the left, rows up.
     pub(super) fn of(echoes: &Echoes, settings: &Settings) -> Self {
         let half = math::floor_to_i64(settings.range_max_m / settings.pixel_m) + 2 + settings.grow_px as i64;
         let mut image = Self::empty(crate::index(2 * half + 1));
@@ -37,13 +37,13 @@ impl Image {
         image
     }
 
-    /// The eight neighbours of a pixel that isn't on the border, from the one above round and round.
+    /// The eight neighbours of a pixel that isn't on the border, in circular order from the one above.
     pub(super) fn round(&self, pixel: usize) -> [usize; 8] {
         let (p, s) = (pixel, self.side);
         [p + s, p + s + 1, p + 1, p - s + 1, p - s, p - s - 1, p - 1, p + s - 1]
     }
 
-    /// How many neighbours are set.
+    /// Number of neighbours set.
     pub(super) fn neighbours(&self, pixel: usize) -> usize {
         self.round(pixel).into_iter().filter(|k| self.set[*k]).count()
     }
@@ -53,7 +53,7 @@ impl Image {
         (0..self.set.len()).filter(|k| self.set[*k]).collect()
     }
 
-    /// Sets all pixels within `by` of a set one. The image keeps its border.
+    /// Dilates: sets all pixels within `by` of a set one. The border stays clear.
     pub(super) fn grow(&mut self, by: usize) {
         if by == 0 {
             return;
@@ -75,8 +75,8 @@ impl Image {
         }
     }
 
-    /// The set pixels that bound the area round the middle, or `None` where that area reaches the border. Of several
-    /// pieces (specks within the area are bounded too), the largest.
+    /// The set pixels that bound the area around the centre, or `None` if that area reaches the border. Of several
+    /// components (specks within the area are bounded too), the largest.
     pub(super) fn round_the_middle(&self) -> Option<Self> {
         let middle = self.side / 2 * self.side + self.side / 2;
         let mut seen = vec![false; self.set.len()];
@@ -106,7 +106,7 @@ impl Image {
         row == 0 || column == 0 || row == self.side - 1 || column == self.side - 1
     }
 
-    /// The largest piece connected by sides or corners; of equal ones the first.
+    /// The largest 8-connected component; of equal ones the first.
     fn largest_piece(&self) -> Option<Self> {
         let mut left = self.clone();
         let mut largest: Vec<usize> = Vec::new();
@@ -123,7 +123,7 @@ impl Image {
         (!largest.is_empty()).then_some(image)
     }
 
-    /// Clears and gives what is connected with a pixel.
+    /// Clears and returns the component of a pixel.
     fn take_piece(&mut self, from: usize) -> Vec<usize> {
         let (mut piece, mut stack) = (Vec::new(), vec![from]);
         while let Some(pixel) = stack.pop() {

@@ -1,5 +1,5 @@
-//! Perimeter of a cross-section from one turn of a head that stands still (§9.2): through the ranges, and the paper's
-//! way by an image of the echoes and its skeleton.
+//! Perimeter of a cross-section from one turn of a stationary head (§9.2): by polygons through the ranges, and by the
+//! paper's method, the skeleton of an echo image.
 
 mod chain;
 mod echo;
@@ -18,10 +18,10 @@ use chain::trace;
 use echo::Echoes;
 use image::Image;
 
-/// Length of the closed polygon through places given by (angle in radians, range in metres), in the order of their
-/// angles. Of places at one angle, the order given counts.
+/// Length of the closed polygon through points given by (angle in radians, range in metres), in the order of their
+/// angles. Points at the same angle keep their given order.
 ///
-/// Errors: fewer than three places that are numbers.
+/// Errors: fewer than three finite points.
 pub(crate) fn polygon_m(places: &[(f64, f64)]) -> Result<f64, PerimeterError> {
     let good = |(angle, range): &&(f64, f64)| angle.is_finite() && range.is_finite();
     let mut sorted: Vec<(f64, f64)> =
@@ -39,13 +39,13 @@ pub(crate) fn polygon_m(places: &[(f64, f64)]) -> Result<f64, PerimeterError> {
     Ok(sides.map(|(a, b)| math::hypot(b[0] - a[0], b[1] - a[1])).sum())
 }
 
-/// Each ping's angle and least range: what a head reports that takes the first echo. Pings without echo are left out.
+/// Each ping's angle and least range, as reported by a head that takes the first echo. Pings without echo are omitted.
 pub(crate) fn least_ranges(pings: &[Ping]) -> Vec<(f64, f64)> {
     let least = |p: &Ping| p.ranges_m.iter().copied().filter(|r| r.is_finite()).fold(f64::INFINITY, f64::min);
     pings.iter().map(|p| (p.angle_rad, least(p))).filter(|(_, range)| range.is_finite()).collect()
 }
 
-/// Each ping's angle and mean range. Pings without echo are left out.
+/// Each ping's angle and mean range. Pings without echo are omitted.
 pub(crate) fn mean_ranges(pings: &[Ping]) -> Vec<(f64, f64)> {
     let mean = |p: &Ping| {
         let known = p.ranges_m.iter().filter(|r| r.is_finite());
@@ -54,7 +54,7 @@ pub(crate) fn mean_ranges(pings: &[Ping]) -> Vec<(f64, f64)> {
     pings.iter().map(|p| (p.angle_rad, mean(p))).filter(|(_, range)| range.is_finite()).collect()
 }
 
-/// Length of the skeleton of the wall's image: echoes interpolated bilinearly over angle and range, cut at a threshold,
+/// Length of the skeleton of the wall's image: echoes interpolated bilinearly over angle and range, thresholded,
 /// thinned, pruned.
 ///
 /// Errors: see [`PerimeterError`].

@@ -3,7 +3,7 @@ use headrace_geometry::tunnel::{Profile, Yz, shapes};
 
 use super::*;
 
-/// A turn of 1200 pings from a place, each a fan of rays.
+/// A turn of 1200 pings from a position, each a fan of rays.
 fn turn(profile: &Profile, from: Yz, beam_deg: f64, rays: u32) -> Vec<Ping> {
     let ping = |k: u32| {
         let angle_rad = f64::from(k) * TAU / 1200.0;

@@ -2,7 +2,7 @@
 
 use super::image::Image;
 
-/// Takes pixels off both sides of every line until it is about one pixel thick, its middle kept.
+/// Removes pixels from both sides of every line until it is about one pixel thick, keeping its middle.
 ///
 /// Source: Zhang, Suen, "A fast parallel algorithm for thinning digital patterns", 1984.
 pub(super) fn zhang_suen(image: &mut Image) {
@@ -32,13 +32,13 @@ fn removable(image: &Image, pixel: usize, first_half: bool) -> bool {
     (2..=6).contains(&set) && rises(ring) == 1 && open
 }
 
-/// How often the ring of neighbours goes from clear to set.
+/// Number of transitions from clear to set around the ring of neighbours.
 fn rises(ring: [bool; 8]) -> usize {
     (0..8).filter(|k| !ring[*k] && ring[(k + 1) % 8]).count()
 }
 
-/// Prunes, and thins to single lines, until neither finds anything: a spur's end may be two pixels that hold each other,
-/// and where a spur was may be a corner filled in.
+/// Prunes, and thins to single lines, until neither changes anything: a spur's end may be two pixels that keep each other,
+/// and a removed spur may leave a filled corner.
 pub(super) fn clean(image: &mut Image) {
     loop {
         let before = image.pixels().len();
@@ -50,8 +50,8 @@ pub(super) fn clean(image: &mut Image) {
     }
 }
 
-/// Takes off pixels one by one that no connection needs and that aren't ends, so that lines have no steps with a corner
-/// filled in and no pixel has more neighbours than the line's shape asks for.
+/// Removes one by one pixels that no connection needs and that aren't ends, so that lines have no filled corners
+/// and no pixel has more neighbours than the line's shape requires.
 fn to_single(image: &mut Image) {
     loop {
         let mut changed = false;
@@ -67,16 +67,16 @@ fn to_single(image: &mut Image) {
     }
 }
 
-/// Whether the neighbours of a pixel on an edge stay connected without it.
+/// Whether the neighbours of an edge pixel stay connected without it.
 fn needless(image: &Image, pixel: usize) -> bool {
     let ring = image.round(pixel).map(|k| image.set[k]);
-    // Yokoi's number for eight neighbours: pieces of clear sides, where a set corner parts them.
+    // Yokoi's connectivity number for eight neighbours: runs of clear sides, separated by set corners.
     let pieces: usize =
         [0, 2, 4, 6].into_iter().filter(|k| !ring[*k] && (ring[k + 1] || ring[(k + 2) % 8])).count();
     pieces == 1
 }
 
-/// Takes off ends until there are none: what is left are closed lines and what lies between them.
+/// Removes ends until there are none: closed lines and the lines between them remain.
 fn prune(image: &mut Image) {
     let mut stack = image.pixels();
     while let Some(pixel) = stack.pop() {
@@ -138,7 +138,7 @@ mod tests {
             "...........",
         ]);
         clean(&mut image);
-        // One closed line about row 5, column 4, at most a pixel aside where the spur was.
+        // One closed line about row 5, column 4, at most a pixel off where the spur was.
         let pixels = image.pixels();
         assert!((6..=8).contains(&pixels.len()), "{pixels:?}");
         assert!(pixels.iter().all(|k| image.neighbours(*k) == 2), "{pixels:?}");

@@ -1,7 +1,7 @@
-//! Quadratic B-splines on a line of cells: their values, and the banded matrices of their integrals.
+//! Quadratic B-splines on a row of cells: their values, and the banded matrices of their integrals.
 //!
-//! n cells carry n + 2 functions; the function i lives on the cells i - 2 to i. Lengths are in cells. Matrices are summed
-//! over the cells there are, so that the boundary condition is the natural one (no flux).
+//! n cells have n + 2 functions; function i has its support on cells i - 2 to i. Lengths are in cells. Integrals cover
+//! only the existing cells, so that the boundary condition is the natural one (no flux).
 
 /// Integral of N_a N_b over a cell.
 const MASS: [[f64; 3]; 3] = [
@@ -22,12 +22,12 @@ const SLOPE: [[f64; 3]; 3] = [
     [1.0 / 24.0, 1.0 / 3.0, 1.0 / 8.0],
 ];
 
-/// Values at `t` in [0, 1] of a cell of its three functions.
+/// Values of a cell's three functions at `t` in [0, 1].
 pub(super) fn values(t: f64) -> [f64; 3] {
     [(1.0 - t) * (1.0 - t) / 2.0, 0.5 + t - t * t, t * t / 2.0]
 }
 
-/// A matrix with two diagonals on either side; row i holds the columns i - 2 to i + 2.
+/// A matrix with two diagonals on either side of the main one; row i holds the columns i - 2 to i + 2.
 pub(super) struct Band {
     rows: Vec<[f64; 5]>,
 }

@@ -16,20 +16,20 @@ const TINY_M: f64 = 1e-100;
 pub(crate) struct Deviation {
     /// Chainage, m.
     pub x_m: f64,
-    /// Arc length of the design's place seen from the reference point through the sample, m.
+    /// Arc length of the design wall on the ray from the reference point through the sample, m.
     pub arc_m: f64,
-    /// How much farther than the design it is from the reference point, m.
+    /// Distance beyond the design wall on that ray, m.
     pub deviation_m: f64,
 }
 
 impl Deviation {
-    /// Of a place in the tunnel.
+    /// From a position in the tunnel.
     pub(crate) fn of(profile: &Profile, place: Xyz) -> Self {
         let centre = profile.reference();
         let direction = [place[1] - centre[0], place[2] - centre[1]];
         let length_m = math::hypot(direction[0], direction[1]);
         let hit = profile.cast_from_inside(centre, direction);
-        // The range is in lengths of the direction.
+        // The range is in units of the direction's length.
         let (arc_m, wall_m) = hit.map_or((0.0, 0.0), |hit| (hit.arc_m, hit.range_m * length_m));
         Self { x_m: place[0], arc_m, deviation_m: length_m - wall_m }
     }
@@ -62,19 +62,19 @@ pub(crate) struct Chart {
     perimeter_m: f64,
 }
 
-/// How an interpolated wall differs from the true one.
+/// Differences of an interpolated wall from the true one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct ChartSpread {
     /// Unsigned differences along the ray from the reference point.
     pub spread: Spread,
-    /// Places outside the samples' hull, which have no value.
+    /// Positions outside the samples' hull, which have no value.
     pub uncovered: usize,
 }
 
 impl Chart {
-    /// Of two samples at one place the later counts.
+    /// Of two samples at one position the later is used.
     ///
-    /// Errors: a coordinate that is no number, or is beyond 1e60.
+    /// Errors: a coordinate that isn't finite, or is beyond 1e60.
     pub(crate) fn new(perimeter_m: f64, samples: &[Deviation]) -> Result<Self, ChartError> {
         let vertices = samples.iter().flat_map(|s| images(perimeter_m, s)).collect();
         let triangles = DelaunayTriangulation::bulk_load(vertices);
@@ -82,13 +82,13 @@ impl Chart {
         Ok(Self { triangles, perimeter_m })
     }
 
-    /// The wall's deviation at (x, sigma), m; `None` outside the samples' hull.
+    /// The wall's deviation at (x, arc length), m; `None` outside the samples' hull.
     pub(crate) fn deviation_m(&self, x_m: f64, arc_m: f64) -> Option<f64> {
         let at = Point2::new(plain(x_m), plain(math::wrap(arc_m, self.perimeter_m)));
         self.triangles.barycentric().interpolate(|vertex| vertex.data().deviation_m, at)
     }
 
-    /// Differences from the true deviations, `reference`(x, sigma) in metres, over a stretch.
+    /// Differences from the true deviations, `reference`(x, arc length) in metres, over a stretch.
     pub(crate) fn compare(&self, stretch: &Stretch, reference: impl Fn(f64, f64) -> f64) -> ChartSpread {
         let mut uncovered = 0;
         let differences = stretch.places(self.perimeter_m).filter_map(|(x, sigma)| {
@@ -101,7 +101,7 @@ impl Chart {
     }
 }
 
-/// The sample, and its image on the other side of the seam: half a turn of wall beyond each, which no gap outreaches
+/// The sample, and its image on the other side of the seam: half a perimeter beyond each side, more than any gap
 /// that a triangle could bridge.
 fn images(perimeter_m: f64, sample: &Deviation) -> [Vertex; 2] {
     let sigma = math::wrap(sample.arc_m, perimeter_m);

@@ -1,31 +1,31 @@
-//! The zero surface of a field on a grid, by marching tetrahedra: six a cell, all round its long diagonal, so that
+//! The zero surface of a field on a grid, by marching tetrahedra: six per cell, all sharing its long diagonal, so that
 //! neighbours share faces and no case is ambiguous.
 
 use super::grid::Grid;
 use super::mesh::Mesh;
 use super::{Xyz, along, dot, sub};
 
-/// Corners of a cell are numbered by bits: 1 along x, 2 along y, 4 along z. Each tetrahedron is a way from 0 to 7.
+/// Corners of a cell are numbered by bits: 1 along x, 2 along y, 4 along z. Each tetrahedron is a path from 0 to 7.
 const TETRAHEDRA: [[usize; 4]; 6] =
     [[0, 1, 3, 7], [0, 1, 5, 7], [0, 2, 3, 7], [0, 2, 6, 7], [0, 4, 5, 7], [0, 4, 6, 7]];
-/// Edges that begin at a corner: to each other corner of the cell above it.
+/// Edges that begin at a node: to each other corner of the cell whose least corner it is.
 const EDGES: usize = 7;
 const NONE: u32 = u32::MAX;
-/// Steps of the search along an edge; each at least halves it.
+/// Most steps of the search along an edge; each at least halves the interval.
 const STEPS: usize = 24;
-/// Share of an edge to which its crossing is found.
+/// Tolerance of an edge crossing, as a share of the edge.
 const CLOSE_ENOUGH: f64 = 1e-6;
 
 struct Extraction<'a, F> {
     grid: &'a Grid,
     value: F,
     corners: Vec<f64>,
-    /// Vertex on each edge, if there is one yet.
+    /// Vertex on each edge, if created.
     on_edge: Vec<u32>,
     mesh: Mesh,
 }
 
-/// Where `value` is zero within the grid's box. Triangles face where it is above zero.
+/// The zero surface of `value` within the grid's box. Triangles face the positive side.
 pub(super) fn mesh(grid: &Grid, value: impl Fn(Xyz) -> f64) -> Mesh {
     let count: usize = grid.cells.iter().map(|n| n + 1).product();
     let mut extraction = Extraction {
@@ -86,7 +86,7 @@ impl<F: Fn(Xyz) -> f64> Extraction<'_, F> {
         }
     }
 
-    /// Adds a triangle so that it faces the side that `up` leads to.
+    /// Adds a triangle facing the direction `up`.
     fn triangle(&mut self, [a, b, c]: [u32; 3], up: Xyz) {
         let at = |k: u32| self.mesh.vertices[k as usize];
         let (u, v) = (sub(at(b), at(a)), sub(at(c), at(a)));
@@ -94,7 +94,7 @@ impl<F: Fn(Xyz) -> f64> Extraction<'_, F> {
         self.mesh.triangles.push(if dot(normal, up) >= 0.0 { [a, b, c] } else { [a, c, b] });
     }
 
-    /// The vertex on the edge from one corner of a cell to one beyond it.
+    /// The vertex on the edge between two corners of a cell.
     fn vertex(&mut self, first: usize, from: usize, to: usize) -> u32 {
         let corner = first + self.step(from);
         let slot = corner * EDGES + (to - from) - 1;
@@ -107,7 +107,7 @@ impl<F: Fn(Xyz) -> f64> Extraction<'_, F> {
         self.on_edge[slot]
     }
 
-    /// By false position, with halving where that is slow.
+    /// By false position, with bisection where that converges slowly.
     fn crossing(&self, from: usize, to: usize) -> Xyz {
         let (start, way) = (self.place(from), sub(self.place(to), self.place(from)));
         let (mut low, mut high) = ((0.0, self.corners[from]), (1.0, self.corners[to]));

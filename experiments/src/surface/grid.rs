@@ -1,4 +1,4 @@
-//! A box of cubic cells with a quadratic B-spline field on it.
+//! A box of cubic cells with a quadratic B-spline field.
 
 use headrace_geometry::math;
 
@@ -15,7 +15,7 @@ pub(super) struct Grid {
     pub(super) cells: [usize; 3],
 }
 
-/// Index of the first of the 27 functions at a place, and their values along each axis.
+/// Index of the first of the 27 functions at a position, and their values along each axis.
 pub(super) struct Local {
     first: usize,
     along: [[f64; 3]; 3],
@@ -32,12 +32,12 @@ impl Grid {
         self.nodes().iter().product()
     }
 
-    /// The box in cells twice as large; a cell more where their number is odd.
+    /// The box with cells twice as large, one more where their number is odd.
     pub(super) fn coarser(&self) -> Self {
         Self { origin: self.origin, cell_m: self.cell_m * 2.0, cells: self.cells.map(|n| n.div_ceil(2)) }
     }
 
-    /// The functions at a place; one outside the box takes the nearest cell's, continued.
+    /// The functions at a position; outside the box those of the nearest cell, extrapolated.
     pub(super) fn local(&self, place: Xyz) -> Local {
         let mut along = [[0.0; 3]; 3];
         let mut cell = [0_usize; 3];
@@ -52,12 +52,12 @@ impl Grid {
         Local { first: (cell[0] * ny + cell[1]) * nz + cell[2], along }
     }
 
-    /// The field with these coefficients at a place.
+    /// The field with these coefficients at a position.
     pub(super) fn value(&self, field: &[f64], place: Xyz) -> f64 {
         self.gather(&self.local(place), field)
     }
 
-    /// The sum of the coefficients, weighted with the functions' values.
+    /// Sum of the coefficients, weighted with the functions' values.
     pub(super) fn gather(&self, local: &Local, field: &[f64]) -> f64 {
         let [_, ny, nz] = self.nodes();
         let mut sum = 0.0;
@@ -84,13 +84,13 @@ impl Grid {
         }
     }
 
-    /// Adds `amount` times the squares of the functions' values: the diagonal of scattering what was gathered.
+    /// Adds `amount` times the squares of the functions' values: the diagonal of scatter times gather.
     pub(super) fn scatter_squares(&self, local: &Local, amount: f64, field: &mut [f64]) {
         let squares = local.along.map(|line| line.map(|w| w * w));
         self.scatter(&Local { first: local.first, along: squares }, amount, field);
     }
 
-    /// The field of the coarser grid, on this one, exactly: a quadratic B-spline is the sum of four of half its width
+    /// The coarser grid's field represented exactly on this one: a quadratic B-spline is the sum of four of half its width
     /// with the weights 1, 3, 3, 1 over 4.
     pub(super) fn refined(&self, coarse: &Grid, field: &[f64]) -> Vec<f64> {
         let (from, to) = (coarse.nodes(), self.nodes());

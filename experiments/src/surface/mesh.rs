@@ -7,20 +7,20 @@ use super::{Xyz, dot, norm, sub};
 /// A surface made of triangles.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Mesh {
-    /// Corners, m.
+    /// Vertices, m.
     pub vertices: Vec<Xyz>,
-    /// Three indices each.
+    /// Three vertex indices each.
     pub triangles: Vec<[u32; 3]>,
 }
 
-/// Triangles sorted into cubic bins, for the nearest one.
+/// Triangles sorted into cubic bins, for nearest-triangle queries.
 #[derive(Debug, Clone)]
 pub(crate) struct MeshIndex<'a> {
     mesh: &'a Mesh,
     origin: Xyz,
     bin_m: f64,
     bins: [i64; 3],
-    /// Where each bin's triangles begin in `members`; one more at the end.
+    /// Start of each bin's triangles in `members`; one more at the end.
     starts: Vec<usize>,
     members: Vec<u32>,
 }
@@ -29,8 +29,8 @@ pub(crate) struct MeshIndex<'a> {
 const BINS_MAX: f64 = 4e6;
 
 impl MeshIndex<'_> {
-    /// `bin_m` is the side of a bin, m: about that of a triangle. It is made larger where there would be too many.
-    /// `None` for a mesh without triangles, with an index beyond its vertices or a corner that is no number.
+    /// `bin_m` is the side of a bin, m: about that of a triangle. It is enlarged if there would be too many bins.
+    /// `None` for a mesh without triangles, with an invalid vertex index or a vertex that isn't finite.
     pub(crate) fn new(mesh: &Mesh, bin_m: f64) -> Option<MeshIndex<'_>> {
         let known = |t: &[u32; 3]| t.iter().all(|k| (*k as usize) < mesh.vertices.len());
         let finite = |p: &Xyz| p.iter().all(|c| c.is_finite());
@@ -52,7 +52,7 @@ impl MeshIndex<'_> {
         Some(index)
     }
 
-    /// Counts the triangles of each bin, then puts them in.
+    /// Counts the triangles of each bin, then inserts them.
     fn sort(&mut self) {
         let count = crate::index(self.bins.iter().product());
         let mut starts = vec![0_usize; count + 1];
@@ -70,7 +70,7 @@ impl MeshIndex<'_> {
         self.members = members;
     }
 
-    /// Calls with each bin that a triangle's box touches.
+    /// Calls `call` with each bin that a triangle's bounding box touches.
     fn each(&self, mut call: impl FnMut(usize, u32)) {
         for (triangle, number) in self.mesh.triangles.iter().zip(0_u32..) {
             let (least, most) = bounds(&triangle.map(|k| self.mesh.vertices[k as usize]));
@@ -96,7 +96,7 @@ impl MeshIndex<'_> {
         within.then(|| crate::index((bin[0] * self.bins[1] + bin[1]) * self.bins[2] + bin[2]))
     }
 
-    /// Distance from a place to the mesh, m. The place must be within about a million bins of it.
+    /// Distance from a position to the mesh, m. The position must be within about a million bins of it.
     pub(crate) fn distance_m(&self, place: Xyz) -> f64 {
         let centre = self.bin(place);
         let outside = centre.iter().zip(&self.bins).map(|(c, n)| (-c).max(c - (n - 1)).max(0));
@@ -104,7 +104,7 @@ impl MeshIndex<'_> {
         let last = centre.iter().zip(&self.bins).map(|(c, n)| (n - 1 - c).max(*c)).max().unwrap_or(0);
         let mut best = f64::INFINITY;
         for shell in first..=last {
-            // Whatever lies in this shell is at least so far away.
+            // Everything in this shell is at least this far away.
             if best <= (shell - 1) as f64 * self.bin_m {
                 break;
             }
@@ -116,14 +116,14 @@ impl MeshIndex<'_> {
         best
     }
 
-    /// Calls with the triangles of the bins whose largest difference from `centre` is `shell`.
+    /// Calls `call` with the triangles of the bins whose largest offset from `centre` is `shell`.
     fn shell(&self, centre: [i64; 3], shell: i64, mut call: impl FnMut(u32)) {
         let reach =
             |axis: usize| (centre[axis] - shell).max(0)..=(centre[axis] + shell).min(self.bins[axis] - 1);
         for i in reach(0) {
             for j in reach(1) {
                 let on_side = (i - centre[0]).abs() == shell || (j - centre[1]).abs() == shell;
-                // Inside the shell only its two ends along z belong to it.
+                // Inside the shell's sides only its two ends along z belong to it.
                 let step = if on_side || shell == 0 { 1 } else { 2 * shell };
                 let from = if on_side { *reach(2).start() } else { centre[2] - shell };
                 let mut k = from;
@@ -149,13 +149,13 @@ fn bounds(places: &[Xyz]) -> (Xyz, Xyz) {
     (least, most)
 }
 
-/// The place of a triangle nearest to `place`: the foot on its plane where that is inside, else on an edge.
+/// The point of a triangle nearest to `place`: the foot on its plane where that is inside, else on an edge.
 fn nearest_of(place: Xyz, [a, b, c]: [Xyz; 3]) -> Xyz {
     let (u, v, w) = (sub(b, a), sub(c, a), sub(place, a));
     let (uu, uv, vv, uw, vw) = (dot(u, u), dot(u, v), dot(v, v), dot(u, w), dot(v, w));
     let determinant = uu * vv - uv * uv;
     let (s, t) = ((vv * uw - uv * vw) / determinant, (uu * vw - uv * uw) / determinant);
-    // A triangle without area has no foot: the comparison fails for what is no number.
+    // A triangle without area has no foot: the comparison fails for NaN.
     if s >= 0.0 && t >= 0.0 && s + t <= 1.0 {
         return [0, 1, 2].map(|k| a[k] + s * u[k] + t * v[k]);
     }
@@ -189,7 +189,7 @@ mod tests {
             mesh.vertices.push(super::super::along(base, at(k + 2000, 0.5), 1.0));
             mesh.triangles.push([first, first + 1, first + 2]);
         }
-        // A line, a point and one long sliver.
+        // Degenerate: a line, a point and one long sliver.
         mesh.triangles.push([0, 1, 1]);
         mesh.triangles.push([5, 5, 5]);
         mesh.triangles.push([0, 400, 401]);

@@ -1,7 +1,7 @@
-//! Surfaces through scattered samples of a tunnel's wall, and how far they are from the wall.
+//! Surfaces through scattered samples of a tunnel's wall, and their distance from the wall.
 //!
-//! `poisson` closes a surface round the samples as the paper did; `chart` interpolates deviations on the unrolled wall;
-//! `wall` measures how far the wall is from a surface.
+//! `poisson` closes a surface around the samples as the paper did; `chart` interpolates deviations on the unrolled wall;
+//! `wall` measures the distance of the wall from a surface.
 
 mod band;
 pub(crate) mod chart;
@@ -15,13 +15,13 @@ pub(crate) mod wall;
 
 pub(crate) use mesh::{Mesh, MeshIndex};
 
-/// A place in the tunnel's frame: x chainage, y left, z up, metres.
+/// A position in the tunnel frame: x chainage, y left, z up, metres.
 pub(crate) type Xyz = [f64; 3];
 
 /// A sample of the wall.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Sample {
-    /// Where the wall was hit.
+    /// Position of the hit.
     pub place: Xyz,
     /// Unit normal there, towards the water.
     pub normal: Xyz,

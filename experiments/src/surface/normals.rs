@@ -1,11 +1,11 @@
-//! Normals of samples, for surfaces that need them.
+//! Estimated normals of samples.
 
 use headrace_geometry::math;
 use headrace_geometry::tunnel::Profile;
 
 use super::{Sample, Xyz};
 
-/// Towards the line along the tunnel through the profile's reference point: what is known without a design. On a flat
+/// Normals towards the line along the tunnel through the profile's reference point, which needs no design. On a flat
 /// floor off the centre it is off by up to the angle at which the floor is seen.
 pub(crate) fn towards_axis(profile: &Profile, places: &[Xyz]) -> Vec<Sample> {
     let [y, z] = profile.reference();

@@ -1,12 +1,12 @@
 //! Screened Poisson reconstruction on a regular grid.
 //!
-//! The samples' normals, spread by B-splines and weighted with the wall that each stands for, are a vector field V. The
+//! The samples' normals, spread by B-splines and weighted with the wall area that each represents, are a vector field V. The
 //! field chi that minimises the integral of |grad chi - V|^2 plus `point_weight` times (area / samples) times the sum of
-//! chi^2 at the samples jumps from below to above at the wall; the surface is where it takes its mean over the samples.
+//! chi^2 at the samples jumps from negative to positive at the wall; the surface is the level set of its mean at the samples.
 //!
-//! It differs from the tool that the paper used in one thing: the cells of `depth` fill a box round the samples, where
+//! It differs from the paper's tool in one respect: cells of size `depth` fill a box around the samples, where
 //! an octree has coarser ones away from samples. A tunnel is so slim that the whole box is small. The published crate
-//! `poisson_reconstruction` 0.4 was tried first: it computes the products of basis functions anew for every pair of
+//! `poisson_reconstruction` 0.4 was tried first: it recomputes the products of basis functions for every pair of
 //! functions and every sample, and needs 75 s for 20,000 samples of a sphere at depth 5, with a mean error of half a cell.
 //!
 //! Source: Kazhdan, Hoppe, "Screened Poisson surface reconstruction", 2013; the paper's §8.2.
@@ -20,36 +20,36 @@ use super::{Sample, Xyz, extract};
 
 /// Most functions of a grid: about 1.5 GB.
 const NODES_MAX: usize = 16_000_000;
-/// Cells of the grid on which density is measured are this many times larger (2 levels, as in Kazhdan's program).
+/// Cells of the density grid are larger by this factor (2 levels, as in Kazhdan's program).
 const DENSITY_CELLS: usize = 4;
-/// What spreading and reading with quadratic B-splines leaves of a density across a wall, averaged over its places in a
-/// cell: the integral of the spline's square.
+/// Factor by which spreading and reading with quadratic B-splines reduces a density across a wall, averaged over its
+/// position in a cell: the integral of the spline's square.
 const ACROSS: f64 = 11.0 / 20.0;
-/// Levels below the finest on which a first solution is sought, and on which normals of sparse samples are spread.
+/// Levels below the finest on which a first solution is computed, and on which normals of sparse samples are spread.
 const COARSER_LEVELS: usize = 4;
 
-/// What to reconstruct with.
+/// Settings of the reconstruction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub(crate) struct Settings {
     /// A cell is `scale` times the largest extent of the samples over 2^depth; 2 to 12.
     pub depth: u32,
-    /// How much it counts that the surface passes through the samples; 0 to 1000.
+    /// Weight of passing through the samples; 0 to 1000.
     pub point_weight: f64,
     /// Normals are spread in cells large enough to hold about this many samples; above 0.
     pub samples_per_node: f64,
     /// The cube of 2^depth cells over the largest extent of the samples; at least 1.
     pub scale: f64,
-    /// Cells round the samples; at least 2.
+    /// Margin around the samples, cells; at least 2.
     pub margin_cells: usize,
-    /// Residual over right-hand side at which the solver stops.
+    /// Relative residual at which the solver stops.
     pub tolerance: f64,
     /// Most steps of the solver.
     pub steps_max: usize,
 }
 
 impl Settings {
-    /// The paper's: depth 8, one sample a node, point weight 5 (§8.2); the cube 1.1 times the samples, as its tool has it.
+    /// The paper's: depth 8, one sample per node, point weight 5 (§8.2); the cube 1.1 times the samples, as in its tool.
     pub(crate) fn of_paper() -> Self {
         Self {
             depth: 8,
@@ -63,17 +63,17 @@ impl Settings {
     }
 }
 
-/// Why there is no surface.
+/// Why a surface can't be made.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PoissonError {
-    /// A surface needs samples that span a volume.
+    /// The samples don't span a volume.
     #[error("a surface needs at least 4 samples with some extent; there are {count}")]
     TooFewSamples {
         /// Samples given.
         count: usize,
     },
-    /// A place or normal isn't a finite number.
+    /// A position or normal isn't finite.
     #[error("sample {index} has a place or normal that is no number")]
     NotFinite {
         /// Its index, from zero.
@@ -84,9 +84,9 @@ pub enum PoissonError {
     Setting {
         /// The setting's name.
         setting: &'static str,
-        /// What it is.
+        /// Its value.
         value: f64,
-        /// What it may be.
+        /// Allowed values.
         wanted: &'static str,
     },
     /// The grid would be too large.
@@ -95,12 +95,12 @@ pub enum PoissonError {
         /// Nodes wanted.
         nodes: f64,
     },
-    /// The solver took all its steps and is still short of its tolerance.
+    /// The solver hasn't converged within its step limit.
     #[error("after {steps} steps the residual is still {residual:e} of the right-hand side")]
     NotSolved {
         /// Steps taken on the finest grid.
         steps: usize,
-        /// Length of the residual over that of the right-hand side.
+        /// Relative residual.
         residual: f64,
     },
 }
@@ -113,18 +113,18 @@ pub(crate) struct Surface {
     level: f64,
 }
 
-/// Samples with what they stand for.
+/// Samples with the wall area they represent.
 struct Cloud<'a> {
     samples: &'a [Sample],
-    /// Wall that each stands for, m^2.
+    /// Wall area of each sample, m^2.
     areas_m2: Vec<f64>,
-    /// Levels above the finest at which each one's normal is spread.
+    /// Levels above the finest at which each normal is spread.
     coarser: Vec<usize>,
     area_m2: f64,
 }
 
 impl Surface {
-    /// Through samples of a wall with unit normals towards the water.
+    /// Through wall samples with unit normals towards the water.
     ///
     /// Errors: see [`PoissonError`].
     pub(crate) fn through(samples: &[Sample], settings: &Settings) -> Result<Self, PoissonError> {
@@ -132,7 +132,7 @@ impl Surface {
         let grid = grid_round(samples, settings)?;
         let cloud = Cloud::measure(samples, &grid, settings.samples_per_node);
         let (field, Solved { steps, residual }) = solve(&grid, &cloud, settings, COARSER_LEVELS);
-        // The solver stops at the tolerance to rounding.
+        // The solver reaches the tolerance up to rounding.
         if residual > settings.tolerance * (1.0 + 1e-9) {
             return Err(PoissonError::NotSolved { steps, residual });
         }
@@ -141,7 +141,7 @@ impl Surface {
         Ok(Self { grid, field, level: sum / cloud.area_m2 })
     }
 
-    /// Above zero towards the water, below behind the wall; the step across the wall is about one.
+    /// Positive towards the water, negative behind the wall; the step across the wall is about one.
     pub(crate) fn value(&self, place: Xyz) -> f64 {
         self.grid.value(&self.field, place) - self.level
     }
@@ -151,7 +151,7 @@ impl Surface {
         self.grid.cell_m
     }
 
-    /// The surface as triangles with their corners on it, on the grid's cells.
+    /// The surface as triangles on the grid's cells.
     pub(crate) fn mesh(&self) -> Mesh {
         extract::mesh(&self.grid, |place| self.value(place))
     }
@@ -191,7 +191,7 @@ fn grid_round(samples: &[Sample], settings: &Settings) -> Result<Grid, PoissonEr
     }
     let cell_m = settings.scale * largest / f64::from(1_u32 << settings.depth);
     let margin = settings.margin_cells as f64;
-    // Whole cells, shared out so that the samples lie in the middle.
+    // Whole cells, with the samples centred.
     let cells = extents.map(|extent| (extent / cell_m).ceil() + 2.0 * margin);
     let nodes: f64 = cells.iter().map(|n| n + 2.0).product();
     if nodes > NODES_MAX as f64 {
@@ -202,7 +202,7 @@ fn grid_round(samples: &[Sample], settings: &Settings) -> Result<Grid, PoissonEr
 }
 
 impl<'a> Cloud<'a> {
-    /// A sample among k in a patch of wall stands for a k-th of it; the patches are those of a grid of larger cells.
+    /// A sample among k in a patch of wall represents a k-th of it; the patches are those of a grid of larger cells.
     fn measure(samples: &'a [Sample], grid: &Grid, samples_per_node: f64) -> Self {
         let patches = Grid {
             origin: grid.origin,
@@ -223,12 +223,12 @@ impl<'a> Cloud<'a> {
         Self { samples, areas_m2, coarser, area_m2 }
     }
 
-    /// Coefficients of V on a grid `level` levels above the finest, of the samples that are spread there or above;
-    /// `finest` is the level solved on, below which none is spread.
+    /// Coefficients of V on a grid `level` levels above the finest, from the samples spread there or above;
+    /// `finest` is the level being solved, below which none is spread.
     fn normals(&self, grid: &Grid, level: usize, finest: usize) -> [Vec<f64>; 3] {
         let mut field = if level < COARSER_LEVELS && self.coarser.iter().any(|c| *c > level) {
             let coarse = grid.coarser();
-            // A slope per cell is half as large in cells half as large.
+            // A slope per cell is halved in cells half as large.
             self.normals(&coarse, level + 1, finest).map(|values| {
                 let halved: Vec<f64> = values.iter().map(|v| v / 2.0).collect();
                 grid.refined(&coarse, &halved)
@@ -249,12 +249,12 @@ impl<'a> Cloud<'a> {
     }
 }
 
-/// Levels above a grid with `per_cell` samples a cell at which a cell has at least `wanted`.
+/// Levels above a grid with `per_cell` samples per cell at which a cell has at least `wanted`.
 fn levels_up(per_cell: f64, wanted: f64) -> usize {
     (0..COARSER_LEVELS).take_while(|level| per_cell * f64::from(1_u32 << (2 * level)) < wanted).count()
 }
 
-/// Coefficients of the field, and how well they solve the equation. Coarser grids give a first solution.
+/// Coefficients of the field, and the solver's outcome. Coarser grids give a first solution.
 fn solve(grid: &Grid, cloud: &Cloud<'_>, settings: &Settings, coarser: usize) -> (Vec<f64>, Solved) {
     let level = COARSER_LEVELS - coarser;
     let mut field = if coarser > 0 && grid.cells.iter().all(|n| *n >= 8) {

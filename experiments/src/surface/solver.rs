@@ -15,7 +15,7 @@ pub(super) struct Screened<'a> {
     diagonal: Vec<f64>,
 }
 
-/// Lists that every application of the left-hand side needs.
+/// Buffers for applying the left-hand side.
 struct Scratch {
     mass_z: Vec<f64>,
     stiffness_z: Vec<f64>,
@@ -23,12 +23,12 @@ struct Scratch {
     stiffness_yz: Vec<f64>,
 }
 
-/// How a solution came about.
+/// Outcome of a solution.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Solved {
     /// Steps taken.
     pub(super) steps: usize,
-    /// Length of the residual over that of the right-hand side.
+    /// Relative residual.
     pub(super) residual: f64,
 }
 

@@ -6,21 +6,21 @@ use headrace_geometry::tunnel::Profile;
 use super::{MeshIndex, Xyz};
 use crate::Spread;
 
-/// A stretch of wall, looked at on a lattice of places.
+/// A stretch of wall, evaluated on a lattice of positions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Stretch {
-    /// Where it begins along the tunnel, m.
+    /// Start along the tunnel, m.
     pub from_m: f64,
-    /// Where it ends, m.
+    /// End, m.
     pub to_m: f64,
-    /// Distance between places along the tunnel and round it, m; above 0. The paper doesn't say its own; 0.1 is fine
-    /// against a beam's step, 0.2 gives the same figures four times as fast.
+    /// Lattice spacing along the tunnel and around it, m; above 0. The paper doesn't give its own; 0.1 is fine
+    /// compared with a beam's step, 0.2 gives the same figures four times as fast.
     pub step_m: f64,
 }
 
 impl Stretch {
-    /// Chainages and arc lengths of its places, x outermost: whole steps from `from_m`, and as many round the wall as
-    /// divide it evenly.
+    /// Chainages and arc lengths of its positions, x outermost: whole steps from `from_m`, and around the wall the number that
+    /// divides it evenly.
     pub(crate) fn places(&self, perimeter_m: f64) -> impl Iterator<Item = (f64, f64)> + use<> {
         let Self { from_m, to_m, step_m } = *self;
         let along = math::floor_to_i64((to_m - from_m) / step_m + 1e-9).max(-1);
@@ -31,7 +31,7 @@ impl Stretch {
     }
 }
 
-/// The place at a chainage and arc length of a wall that stands off its design by `deviation_m` along the ray from the
+/// The position at a chainage and arc length on a wall with deviation `deviation_m` from its design along the ray from the
 /// reference point, outwards positive.
 pub(crate) fn place(profile: &Profile, x_m: f64, arc_m: f64, deviation_m: f64) -> Xyz {
     let (centre, wall) = (profile.reference(), profile.point_at(arc_m));
@@ -40,8 +40,8 @@ pub(crate) fn place(profile: &Profile, x_m: f64, arc_m: f64, deviation_m: f64) -
     [x_m, centre[0] + scale * out[0], centre[1] + scale * out[1]]
 }
 
-/// Unsigned distances from places of the true wall to a surface: what of the wall was missed. `reference` gives the
-/// wall's deviation from the design at (x, sigma), m.
+/// Unsigned distances from positions on the true wall to a surface. `reference` gives the
+/// wall's deviation from the design at (x, arc length), m.
 pub(crate) fn from_wall(
     profile: &Profile,
     surface: &MeshIndex<'_>,
@@ -59,7 +59,7 @@ mod tests {
     use super::super::Mesh;
     use super::*;
 
-    /// The design's own tube, shifted outwards by `off_m` along rays.
+    /// The design's tube, offset outwards by `off_m` along rays.
     fn tube(profile: &Profile, off_m: f64) -> Mesh {
         let (rings, round) = (41_u32, 720_u32);
         let at = |i: u32, k: u32| {

@@ -50,7 +50,7 @@ fn val_critical_values_are_the_published_ones() {
 
 #[test]
 fn val_ten_pairs_with_eight() {
-    // 1 to 10 with the ranks 3 and 5 above zero.
+    // 1 to 10 with the ranks 3 and 5 positive.
     let differences: Vec<f64> =
         (1..=10).map(|k| if k == 3 || k == 5 { f64::from(k) } else { -f64::from(k) }).collect();
     let test = of_differences(&differences, Options::default()).unwrap();
@@ -59,7 +59,7 @@ fn val_ten_pairs_with_eight() {
     assert!((test.p_less - 25.0 / 1024.0).abs() < 1e-15);
 }
 
-/// W+ of all choices of signs, ties and zeros as they are.
+/// W+ of all sign choices, with the given ties and zeros.
 fn all_choices(ranks: &[f64]) -> Vec<f64> {
     (0..1_u32 << ranks.len())
         .map(|signs| ranks.iter().enumerate().filter(|(k, _)| signs >> k & 1 == 1).map(|(_, r)| r).sum())

@@ -30,10 +30,10 @@ pub fn words(tables: &Tables) -> String {
     text
 }
 
-/// The lines above a block of rows, and how a row of it looks.
+/// The header lines of a block of rows, and the format of a row.
 type Block<'a, Row> = (String, &'a dyn Fn(&Row) -> String);
 
-/// Adds a table: its title, its rows as often as there are blocks of columns, its notes.
+/// Adds a table: title, rows once per block of columns, notes.
 fn show<Row>(text: &mut String, table: &Table<Row>, blocks: &[Block<'_, Row>]) {
     let mut line = |words: &str| {
         text.push_str(words.trim_end());
@@ -51,7 +51,7 @@ fn show<Row>(text: &mut String, table: &Table<Row>, blocks: &[Block<'_, Row>]) {
     }
 }
 
-/// A note in lines that fit.
+/// A note wrapped to the line length.
 fn wrapped(note: &Note) -> Vec<String> {
     let mut lines = vec![format!("  {}  {}:", note.mark, note.kind.as_str())];
     for word in note.text.split(' ') {
@@ -71,7 +71,7 @@ fn titles(before: &str, groups: &[&str], width: usize) -> String {
     groups.iter().fold(before.to_owned(), |line, group| format!("{line}  {group:<0$}", width - 2))
 }
 
-/// The heads of a cell's columns, for each of `count` groups, below their titles and after `before`.
+/// Column headings of a cell, for each of `count` groups, below their titles and after `before`.
 fn heads(before: &str, group: &str, count: usize) -> String {
     format!("{before}{}", group.repeat(count))
 }
@@ -163,12 +163,12 @@ fn cell(cell: &Cell, decimals: usize) -> String {
     format!("{:>7}{}", cell.printed, ours(cell, decimals))
 }
 
-/// Ours, the difference, and a sign.
+/// Our value, the difference, and a mark.
 fn ours(cell: &Cell, decimals: usize) -> String {
     format!("{:>8.decimals$}{:>7} {}", cell.ours, percent(cell), sign(cell))
 }
 
-/// The difference with three digits or so.
+/// The difference with about three digits.
 fn percent(cell: &Cell) -> String {
     match cell.difference_percent {
         None => "-".to_owned(),
@@ -178,7 +178,7 @@ fn percent(cell: &Cell) -> String {
     }
 }
 
-/// The note that a cell refers to, or else how its printed digits come from ours.
+/// The mark of the note that a cell refers to, or else of how its printed digits follow from ours.
 fn sign(cell: &Cell) -> char {
     cell.note.unwrap_or(match cell.digits {
         Digits::Both => '=',

@@ -2,7 +2,7 @@
 //!
 //! - A counter wraps: changes are taken the short way round.
 //! - A change faster than the winch is rejected and counted. Rejected reports are compared with each other: when
-//! [`PERSIST`] in a row agree, the counter has moved and the reports weren't corrupt.
+//!   [`PERSIST`] in a row agree, the counter has moved and the reports weren't corrupt.
 //!   - If the first of them was near zero, the device was plugged in again and counts from zero: the length continues from
 //!     its last value. After a silence, too, a step back to zero is accepted directly only if the winch covers it in a second.
 //!   - Otherwise the counter's new value is accepted.

@@ -1,4 +1,4 @@
-//! The readings of a part of a log, as the loop's decoders give them.
+//! The readings of a part of a log, as decoded by the loop.
 
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::messages::Event;
@@ -8,17 +8,17 @@ use headrace_replay::drive::{Coming, DriveError, Pace, PacketSource, drive};
 use headrace_replay::log::LogError;
 use headrace_sensor::device::SensorInfo;
 
-/// So much of a log is held in memory, s.
+/// Longest part of a log held in memory, s.
 const MOST_S: f64 = 1200.0;
 
-/// Which readings are wanted, in seconds from the log's first message.
+/// Time window of the readings, in seconds from the log's first message.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Window {
-    /// From here on.
+    /// Start.
     pub from_s: f64,
-    /// Up to here; without it, as much as can be held.
+    /// End; without it, the longest window that can be held.
     pub to_s: Option<f64>,
-    /// When the vehicle was at the surface, from and to.
+    /// Time of the vehicle at the surface, from and to.
     pub at_surface_s: Option<[f64; 2]>,
 }
 
@@ -34,7 +34,7 @@ pub enum CollectError {
         /// Its end, s.
         to_s: f64,
     },
-    /// The window is longer than can be held.
+    /// The window is too long to be held.
     #[error(
         "calibrating from {from_s} to {to_s} s: that is more than can be looked at; the most is {MOST_S} s"
     )]
@@ -57,20 +57,20 @@ pub enum CollectError {
 pub struct Collected {
     /// Time of the log's first message.
     pub first: MonoNs,
-    /// Beginning of the part that was asked for.
+    /// Start of the requested part.
     pub from: MonoNs,
     /// Its end.
     pub to: MonoNs,
-    /// When the vehicle was at the surface, from and to.
+    /// Time of the vehicle at the surface, from and to.
     pub at_surface: Option<[MonoNs; 2]>,
-    /// The sensors as the vehicle file has them, by source.
+    /// The sensors of the vehicle file, by source.
     pub sensors: Vec<SensorInfo>,
     /// Readings of that part and of the time at the surface, in order.
     pub events: Vec<Event>,
 }
 
 impl Collected {
-    /// The readings of the part that was asked for.
+    /// The readings of the requested part.
     pub fn within(&self) -> impl Iterator<Item = &Event> {
         self.events.iter().filter(|event| event.received >= self.from && event.received < self.to)
     }
@@ -81,7 +81,7 @@ impl Collected {
     }
 }
 
-/// A feed that ends early.
+/// A feed truncated at `end`.
 struct Until<'a> {
     feed: &'a mut dyn PacketSource,
     end: MonoNs,
@@ -97,10 +97,10 @@ impl PacketSource for Until<'_> {
     }
 }
 
-/// Runs a log through the loop, up to the last moment that is wanted, and keeps the readings that are. `progress` hears how
-/// many there are.
+/// Runs a log through the loop up to the end of the window, and keeps the readings within. `progress` is given the number
+/// kept so far.
 ///
-/// What comes before the window is run as well: decoders go by it.
+/// What comes before the window is run as well: the decoders' state depends on it.
 ///
 /// Errors: see [`CollectError`].
 pub fn collect(

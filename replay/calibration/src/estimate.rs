@@ -1,9 +1,9 @@
-//! What was found, or why nothing was.
+//! Estimates, and the reasons for missing ones.
 
-/// A number that was found, in the unit of what it is of.
+/// An estimated number, in the unit of its quantity.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate {
-    /// The number.
+    /// The value.
     pub value: f64,
     /// Its standard deviation.
     pub sd: f64,
@@ -16,14 +16,14 @@ impl Estimate {
     }
 }
 
-/// Why something can't be told from this log.
+/// Reason why a quantity can't be estimated from this log.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Untold {
-    /// No readings of a kind that is needed.
+    /// No readings of a required kind.
     #[error("there are no readings of {what}")]
     Missing {
-        /// Of what.
+        /// The kind.
         what: &'static str,
     },
     /// The vehicle never stood still for long enough.
@@ -32,25 +32,25 @@ pub enum Untold {
          {least_s} s"
     )]
     Moved {
-        /// What showed it.
+        /// The quantity that moved.
         what: &'static str,
-        /// By how much it went.
+        /// Its range of motion.
         span: f64,
-        /// The unit of that.
+        /// Its unit.
         unit: &'static str,
-        /// What counts as still.
+        /// Largest range that counts as still.
         limit: f64,
-        /// How long it had to stand still, s.
+        /// Required duration at rest, s.
         least_s: usize,
     },
-    /// A head has looked at too little of the wall.
+    /// A head has covered too little of the wall.
     #[error(
         "no full turn: the head has seen only {seen_deg:.0} degrees of wall, and {least_deg:.0} are needed"
     )]
     LittleWall {
-        /// What it has seen, degrees.
+        /// Sector covered, degrees.
         seen_deg: f64,
-        /// What is needed, degrees.
+        /// Sector required, degrees.
         least_deg: f64,
     },
     /// Turning the head about its axis changes nothing.
@@ -59,16 +59,16 @@ pub enum Untold {
          known to {sd_deg:.1} degrees"
     )]
     Round {
-        /// Standard deviation that is left, degrees.
+        /// Remaining standard deviation, degrees.
         sd_deg: f64,
     },
-    /// One head alone is where the vehicle is.
+    /// The offset of a single head can't be separated from the vehicle's position.
     #[error("with one head, where it sits can't be told from where the vehicle is")]
     OneHead,
-    /// Another unknown looks the same.
+    /// Another unknown has the same effect.
     #[error("it looks like another place or heading of the vehicle: it would be known to {sd_m:.3} m")]
     LikePlace {
-        /// Standard deviation that is left, m.
+        /// Remaining standard deviation, m.
         sd_m: f64,
     },
     /// A mirrored head would fit as well.
@@ -77,80 +77,80 @@ pub enum Untold {
          symmetric; stand well to one side of the middle, within hearing of the echosounders"
     )]
     Mirror {
-        /// By how much the other way fits worse, in squared standard deviations.
+        /// Cost difference of the other way, in squared standard deviations.
         margin: f64,
-        /// What is clear.
+        /// Difference required.
         needed: f64,
     },
-    /// The wall isn't the profile.
+    /// The wall doesn't match the profile.
     #[error(
         "the returns contradict the profile: half of them are more than {median_m:.2} m off, and {most_m} is allowed"
     )]
     Contradicted {
-        /// Median of the residuals without sign, m.
+        /// Median of the absolute residuals, m.
         median_m: f64,
-        /// The most that is allowed, m.
+        /// Largest median allowed, m.
         most_m: f64,
     },
-    /// Pressure wasn't that of one level.
+    /// The pressure varied too much for one level.
     #[error(
         "the vehicle wasn't at the surface all the time: the pressure went by {span_pa:.0} Pa, and {most_pa} is allowed"
     )]
     NotAtSurface {
-        /// By how much it went, Pa.
+        /// Its variation, Pa.
         span_pa: f64,
-        /// What is allowed, Pa.
+        /// Largest variation allowed, Pa.
         most_pa: f64,
     },
-    /// Pressure was that of depth.
+    /// The pressure was that under water.
     #[error(
         "the depth sensor was under water: the pressure was {mean_pa:.0} Pa, and air has {least_pa} to {most_pa}"
     )]
     UnderWater {
         /// The pressure, Pa.
         mean_pa: f64,
-        /// What air has at least, Pa.
+        /// Lowest air pressure, Pa.
         least_pa: f64,
-        /// What it has at most, Pa.
+        /// Highest air pressure, Pa.
         most_pa: f64,
     },
-    /// Nobody has said where the vehicle was.
+    /// The vehicle's chainage wasn't given.
     #[error("nobody has said where the vehicle stood: --chainage METRES does, the portal is 0")]
     NoChainage,
-    /// Nobody has said when it was at the surface.
+    /// The time at the surface wasn't given.
     #[error("nobody has said when the vehicle was at the surface: --at-surface FROM..TO does")]
     NoSurface,
-    /// Shifting a source's times changes nothing.
+    /// Shifting a source's timestamps changes nothing.
     #[error("the vehicle hardly turned or moved for it: it would be known to {sd_ms:.0} ms")]
     Flat {
-        /// Standard deviation that is left, ms.
+        /// Remaining standard deviation, ms.
         sd_ms: f64,
     },
-    /// The likelihood has no maximum within reach.
+    /// The likelihood has no maximum within the search range.
     #[error("no offset within {reach_ms:.0} ms of the file's is best")]
     NoBest {
-        /// How far was looked, ms.
+        /// Search range to either side, ms.
         reach_ms: f64,
     },
-    /// The filter isn't where the vehicle is.
+    /// The filter disagrees with the measurements.
     #[error(
         "the filter leaves out {gated:.0} % of all measurements, and {most:.0} % are allowed: mounts, beams or the profile \
          of the vehicle file are off, or the vehicle turned too wildly"
     )]
     Disagrees {
-        /// Share that it leaves out, %.
+        /// Share of measurements it gates, %.
         gated: f64,
-        /// What is allowed, %.
+        /// Largest share allowed, %.
         most: f64,
     },
-    /// The filter never ran.
+    /// The filter never had an estimate.
     #[error(
         "the filter couldn't follow the vehicle: an inertial unit's attitude and ranges to the wall are needed"
     )]
     NoFilter,
 }
 
-/// The middle one of some numbers, which it sorts; `None` without any.
+/// Median of some numbers, which it sorts (the upper one of an even count); `None` without any.
 pub(crate) fn median(values: &mut [f64]) -> Option<f64> {
     values.sort_unstable_by(f64::total_cmp);
     values.get(values.len() / 2).copied()

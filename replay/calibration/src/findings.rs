@@ -1,4 +1,4 @@
-//! Everything that a log tells of a vehicle file.
+//! All estimates for a vehicle file from a log.
 
 use headrace_fusion::filter::settings::Settings;
 use headrace_monitor::messages::Event;
@@ -13,24 +13,24 @@ use crate::still::longest;
 use crate::timing::{Lag, lags};
 use crate::zero::{self, Zero};
 
-/// What each estimator found, or why it can't.
+/// Result of each estimator, or the reason why there is none.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Findings {
-    /// How the heads sit.
+    /// Mounts of the heads.
     pub heads: Result<Heads, Untold>,
     /// Pressure at the surface, Pa.
     pub surface: Result<Zero, Untold>,
-    /// The water's surface above the floor, m.
+    /// Height of the water's surface above the floor, m.
     pub level: Result<Zero, Untold>,
-    /// Chainage at which each cable counter reads zero, m, with what the file says.
+    /// Chainage at which each cable counter reads zero, m, with the file's value.
     pub tethers: Result<Vec<(Zero, f64)>, Untold>,
     /// Time offsets.
     pub lags: Result<Vec<Lag>, Untold>,
 }
 
 impl Findings {
-    /// Runs all estimators on what was collected of a log. `chainage_m` is where the vehicle truly stood still; `progress`
-    /// hears of each long step.
+    /// Runs all estimators on the collected part of a log. `chainage_m` is the true chainage at which the vehicle stood still;
+    /// `progress` is given the name of each long step.
     pub fn of(
         vehicle: &VehicleConfig,
         collected: &Collected,
@@ -69,7 +69,7 @@ impl Findings {
             };
             Ok(zeros.into_iter().map(|zero| (zero, filed_m(&zero))).collect())
         });
-        // Times are compared with heads as they are found to sit.
+        // Time offsets are estimated with the mounts found for the heads.
         let sensors = sitting(&collected.sensors, heads.as_ref().ok());
         let sitting = Material { sensors: &sensors, ..in_time };
         let latencies: Vec<_> = vehicle.sensor_configs.iter().map(|sensor| sensor.latency).collect();
@@ -82,7 +82,7 @@ impl Findings {
     }
 }
 
-/// The sensors as heads are found to sit.
+/// The sensors, with the mounts found for the heads.
 fn sitting(sensors: &[SensorInfo], heads: Option<&Heads>) -> Vec<SensorInfo> {
     let mut sensors = sensors.to_vec();
     for head in heads.iter().flat_map(|heads| &heads.heads) {

@@ -1,7 +1,7 @@
-//! Robust least squares of the vehicle's place and of how its heads sit, against the design profile.
+//! Robust least squares fit of the vehicle's position and the mounts of its heads to the design profile.
 //!
-//! Gauss-Newton, each round a recursive fit: [`Factors`] start with what is known beforehand and take one return after the
-//! other, so that what returns can't tell stays at the vehicle file's, with its own uncertainty.
+//! Gauss-Newton, each round a recursive fit: [`Factors`] start with the prior and take one return after the other, so that
+//! unknowns not determined by the returns keep the vehicle file's value and uncertainty.
 
 use crate::estimate::median;
 use crate::scan::{EchoScan, HeadScan, Return};
@@ -13,83 +13,83 @@ use headrace_geometry::frames::{Body, Mount, Point3, Rot, Sensor, Tunnel, Vec3, 
 use headrace_geometry::math;
 use headrace_geometry::tunnel::Profile;
 
-/// Unknowns that all heads share: the vehicle's y and z, m; the rotation vector that takes the inertial unit's attitude to
-/// the true one, radians; the share by which ranges are too long.
+/// Unknowns common to all heads: the vehicle's y and z, m; the rotation vector from the inertial unit's attitude to
+/// the true one, radians; the ratio by which ranges are too long.
 pub const COMMON: usize = 6;
-/// Unknowns of each head: its angle about its own axis, radians; how far left and up of the file's place it sits, m.
+/// Unknowns of each head: its angle about its axis, radians; its offsets left and up from the file's position, m.
 pub const OWN: usize = 3;
 
-/// The vehicle may be anywhere in the section.
+/// Prior of the vehicle's position: anywhere in the section.
 const PLACE_SD_M: f64 = 10.0;
-/// What a unit at rest is off by in roll and pitch. Source: data sheets of MEMS units, static accuracy 0.2 degrees.
+/// Roll and pitch errors of a unit at rest. Source: data sheets of MEMS units, static accuracy 0.2 degrees.
 const TILT_SD_RAD: f64 = 0.2 * DEGREE;
-/// Share by which a speed of sound from tables is off: 1 degree of water temperature.
+/// Relative error of a speed of sound from tables: 1 degree of water temperature.
 const SCALE_SD: f64 = 0.003;
-/// How far off a vehicle file's mounts are: a tape measure on a round hull, and a head's bracket.
+/// Errors of a vehicle file's mounts: a tape measure on a round hull, and a head's bracket.
 pub const ANGLE_SD_RAD: f64 = 10.0 * DEGREE;
 /// See [`ANGLE_SD_RAD`].
 pub const OFFSET_SD_M: f64 = 0.05;
 const DEGREE: f64 = core::f64::consts::PI / 180.0;
 
-/// Returns are never taken for better than this, m: walls are rough.
+/// Least standard deviation assumed for returns, m: walls are rough.
 const LEAST_SCALE_M: f64 = 0.01;
-/// Residuals beyond these many scales count less, and not at all. Source: the usual constants of Huber and Tukey.
+/// Residuals beyond these many scales are downweighted, or rejected. Source: the usual constants of Huber and Tukey.
 const HUBER: f64 = 1.5;
 const TUKEY: f64 = 4.685;
 /// Rounds before Tukey's weights: they need a good start.
 const HUBER_ROUNDS: usize = 3;
-/// What one piece of wall may cost at most, and one that a beam grazes or misses, in squared standard deviations.
+/// Largest cost of one piece of wall, and the cost of a grazed or missed one, in squared standard deviations.
 const MOST_COST: f64 = 9.0;
 const MISSED_COST: f64 = 4.5;
-/// The same of an echosounder: there are few, and they tell the sides apart.
+/// Largest cost of an echosounder: there are few, and they distinguish the sides.
 const MOST_ECHO_COST: f64 = 100.0;
-/// No step turns a head by more, radians.
+/// Largest rotation of a head in one step, radians.
 const MOST_STEP_RAD: f64 = 0.2;
 
-/// What is to be fitted.
+/// Input of a fit.
 #[derive(Debug, Clone, Copy)]
 pub struct Problem<'a> {
-    /// The design.
+    /// Design profile.
     pub profile: &'a Profile,
-    /// How far sonars are trusted.
+    /// Noise settings of the sonars.
     pub settings: &'a Settings,
     /// The heads, at most as many as there are unknowns for.
     pub heads: &'a [HeadScan],
     /// Echosounders.
     pub echoes: &'a [EchoScan],
-    /// How the vehicle hung while these were heard.
+    /// Attitude of the vehicle at that time.
     pub attitude: Rot<Tunnel, Body>,
-    /// For each head, whether it turns the other way round than the file says.
+    /// For each head, whether it turns the opposite way to the file.
     pub mirrored: &'a [bool],
-    /// Every so many returns are looked at.
+    /// Every `stride`-th return is used.
     pub stride: usize,
 }
 
-/// What came of it. Unknowns as [`COMMON`] and then, for each head, [`OWN`] say.
+/// Result of a fit. Unknowns are [`COMMON`] and then, for each head, [`OWN`].
 #[derive(Debug, Clone, Copy)]
 pub struct Fit<const N: usize> {
     /// The unknowns.
     pub x: [f64; N],
     /// Their covariance.
     pub factors: Factors<N>,
-    /// How badly returns, echoes and what is known beforehand agree, in squared standard deviations.
+    /// Misfit of returns, echoes and prior, in squared standard deviations.
     pub cost: f64,
     /// Robust standard deviation of the residuals, m.
     pub scale_m: f64,
 }
 
-/// A return against what it should be.
+/// Residual of a return.
 #[derive(Debug, Clone, Copy)]
 pub struct Residual<const N: usize> {
     /// Number of its head.
     pub head: usize,
-    /// Its share of its piece of wall.
+    /// Its weight within its piece of wall.
     pub share: f64,
-    /// Measured less expected, m; `None` where the beam grazes the wall or meets none.
+    /// Derivatives, and measured minus expected, m; `None` where the beam grazes or misses the wall.
     pub row: Option<([f64; N], f64)>,
 }
 
-/// The unknown number `i` of head `head`.
+/// Index of unknown `i` of head `head`.
 pub fn own(head: usize, i: usize) -> usize {
     COMMON + OWN * head + i
 }
@@ -104,10 +104,10 @@ fn add<const N: usize>(x: &mut [f64; N], i: usize, value: f64) {
     }
 }
 
-/// The mount of a head whose angle about its axis and whose place are off by these, and which perhaps turns the other way.
+/// The mount of a head with errors of the angle about its axis and of its position, perhaps turning the opposite way.
 pub fn moved(mount: &Mount, [angle_rad, left_m, up_m]: [f64; 3], is_mirrored: bool) -> Mount {
     let turned: Rot<Body, Sensor> = mount.rotation * about_x(angle_rad);
-    // Seen from the other side, angles grow the other way round.
+    // Seen from the other side, angles increase in the opposite sense.
     let yaw = if is_mirrored { math::PI } else { 0.0 };
     Mount {
         position: mount.position + Vec3::new(0.0, left_m, up_m),
@@ -120,7 +120,7 @@ fn about_x(angle_rad: f64) -> Rot<Sensor, Sensor> {
 }
 
 impl Problem<'_> {
-    /// Standard deviations of what is known beforehand.
+    /// Standard deviations of the prior.
     fn known<const N: usize>(&self) -> [f64; N] {
         let yaw = self.settings.heading.reach;
         let common = [PLACE_SD_M, PLACE_SD_M, TILT_SD_RAD, TILT_SD_RAD, yaw, SCALE_SD];
@@ -129,11 +129,11 @@ impl Problem<'_> {
         core::array::from_fn(|_| all.next().unwrap_or(1.0))
     }
 
-    /// Fits from `start`, in so many rounds.
+    /// Fits from `start`, in at most so many rounds.
     pub fn fit<const N: usize>(&self, start: [f64; N], rounds: usize) -> Fit<N> {
         let known = self.known::<N>();
         let mut prior = start;
-        // Only the place is known by where the fit starts; all else is as the file says.
+        // The prior of the position is the start; all else is as in the file.
         prior.iter_mut().skip(2).for_each(|slot| *slot = 0.0);
         let mut x = start;
         let mut factors = Factors::independent(known.map(|sd| sd * sd));
@@ -170,7 +170,7 @@ impl Problem<'_> {
         Fit { x, factors, cost, scale_m }
     }
 
-    /// Takes a step, less of it where it would turn a head too far or leave the tunnel.
+    /// Takes a step, shortened where it would turn a head too far or leave the tunnel.
     fn go<const N: usize>(&self, x: &mut [f64; N], step: &[f64; N]) {
         let turns = (0..self.heads.len()).map(|head| at(step, own(head, 0)).abs());
         let most_rad = turns.fold(0.0, f64::max);
@@ -186,7 +186,7 @@ impl Problem<'_> {
         }
     }
 
-    /// All returns against what they should be.
+    /// Residuals of all returns.
     pub fn residuals<const N: usize>(&self, x: &[f64; N]) -> Vec<Residual<N>> {
         let mut all = Vec::new();
         for (head, scan) in self.heads.iter().enumerate() {
@@ -220,7 +220,7 @@ impl Problem<'_> {
         let state = state(x, one.attitude);
         let (mut h, row) = self.common_row(x, &state, &beam, one.range_m, 1.0)?;
         let place = vec::<Tunnel>(&row.h, POSITION);
-        // The beam turns about the head's axis, and its origin stays.
+        // The beam rotates about the head's axis; its origin stays.
         let swing = vec::<Tunnel>(&row.h, ATTITUDE) + -(state.attitude * offset).cross(&place);
         let [axis, left, up] =
             [rotation * Vec3::new(1.0, 0.0, 0.0), Vec3::new(0.0, 1.0, 0.0), Vec3::new(0.0, 0.0, 1.0)];
@@ -230,7 +230,7 @@ impl Problem<'_> {
         Some((h, row.residual))
     }
 
-    /// A range as the filter sees it, by the unknowns that all sonars share.
+    /// The filter's range update, with derivatives by the unknowns common to all sonars.
     fn common_row<const N: usize>(
         &self,
         x: &[f64; N],
@@ -251,7 +251,7 @@ impl Problem<'_> {
         Some((h, row))
     }
 
-    /// Echosounders: derivatives, residual and variance, that of their own mounts included.
+    /// Echosounders: derivatives, residual and variance, mount errors included.
     fn echo_rows<const N: usize>(&self, x: &[f64; N]) -> Vec<([f64; N], f64, f64)> {
         let state = state(x, self.attitude);
         let row = |echo: &EchoScan| {
@@ -285,13 +285,13 @@ impl Problem<'_> {
     }
 }
 
-/// The vehicle by the unknowns, its body's origin in the place of the inertial unit.
+/// State of the vehicle by the unknowns, with the body's origin in place of the inertial unit.
 fn state<const N: usize>(x: &[f64; N], attitude: Rot<Tunnel, Body>) -> State {
     let turn = rotation(Vec3::<Tunnel>::new(at(x, 2), at(x, 3), at(x, 4)));
     State::at_rest(Point3::new(0.0, at(x, 0), at(x, 1)), turn * attitude)
 }
 
-/// Robust standard deviation of residuals, from the median of their sizes.
+/// Robust standard deviation of residuals, from the median of their magnitudes.
 fn scale<const N: usize>(residuals: &[Residual<N>]) -> f64 {
     let mut sizes: Vec<f64> =
         residuals.iter().filter_map(|residual| residual.row.map(|(_, off_m)| off_m.abs())).collect();

@@ -1,4 +1,4 @@
-//! How the heads sit, by turns of a vehicle that stands still in a tunnel whose profile is known.
+//! Mounts of the heads, from their turns while the vehicle stands still in a tunnel of known profile.
 
 use crate::estimate::{Estimate, Untold, median};
 use crate::fit::{ANGLE_SD_RAD, COMMON, Fit, OFFSET_SD_M, OWN, Problem, is_outlier, moved, own};
@@ -10,15 +10,15 @@ use headrace_geometry::frames::{Mount, Vec3};
 use headrace_geometry::math::{self, TAU};
 use headrace_sampling::head::MAX_HEADS;
 
-/// A head that has seen less of the wall isn't calibrated, degrees.
+/// Minimum sector of wall seen by a head to be calibrated, degrees.
 const LEAST_SEEN_DEG: f64 = 120.0;
-/// Half of the returns further off than this: the wall isn't the profile, m.
+/// Largest median residual; beyond it the wall doesn't match the profile, m.
 const MOST_MEDIAN_M: f64 = 0.15;
-/// What is left of the file's own uncertainty where returns have told something.
+/// Largest remaining share of the file's uncertainty for an unknown to count as estimated.
 const TOLD: f64 = 0.3;
-/// A sense of rotation is found when the other is so much worse, in squared standard deviations: once in 10,000 by chance.
+/// Cost difference for a clear sense of rotation, in squared standard deviations: once in 10,000 by chance.
 const CLEAR: f64 = 15.0;
-/// Where a head's angle is looked for: so many starts, rounds from each, every so many returns.
+/// Search of a head's angle: number of starts, rounds from each, and stride of the returns.
 const STARTS: usize = 24;
 const START_ROUNDS: usize = 2;
 const START_STRIDE: usize = 5;
@@ -29,46 +29,46 @@ const ROUNDS: usize = 12;
 pub struct Head {
     /// Its source.
     pub source: usize,
-    /// How it sits by the vehicle file.
+    /// Mount in the vehicle file.
     pub filed: Mount,
-    /// How it sits by what was found; where nothing was, by the file.
+    /// Estimated mount; where there is no estimate, that of the file.
     pub found: Mount,
-    /// How much of its turn it heard the wall, degrees.
+    /// Sector in which it heard the wall, degrees.
     pub seen_deg: f64,
-    /// Returns that were used.
+    /// Returns used.
     pub used: usize,
-    /// Returns that were outliers, or grazed the wall.
+    /// Returns rejected as outliers, or because they grazed the wall.
     pub rejected: usize,
-    /// Root mean square of the residuals of those that were used, m.
+    /// Root mean square residual of the returns used, m.
     pub rms_m: f64,
-    /// Angle about its own axis to be added to the file's, radians, in the sense in which it is found to turn.
+    /// Angle about its axis to be added to the file's, radians, in the estimated sense of rotation.
     pub angle_rad: Result<Estimate, Untold>,
-    /// How much farther left it sits than the file says, against the other heads, m.
+    /// Offset to the left of the file's position, relative to the other heads, m.
     pub left_m: Result<Estimate, Untold>,
-    /// How much farther up, m.
+    /// Offset upwards, likewise, m.
     pub up_m: Result<Estimate, Untold>,
-    /// Whether it turns the other way round (faces aft where the file says forward).
+    /// Whether it turns the opposite way (faces aft where the file has forward).
     pub is_mirrored: Result<bool, Untold>,
 }
 
-/// All heads, and where the vehicle stood.
+/// All heads, and the vehicle's position.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Heads {
-    /// When.
+    /// The time at rest.
     pub still: Still,
     /// y and z of the body's origin, m.
     pub place_m: [Estimate; 2],
-    /// Share by which ranges are longer than the profile asks for.
+    /// Relative excess of the ranges over those of the profile.
     pub scale: Estimate,
-    /// Median size of the residuals, m.
+    /// Median of the absolute residuals, m.
     pub median_m: f64,
     /// The heads, by source.
     pub heads: Vec<Head>,
 }
 
-/// Calibrates the heads by the longest stretch in which the vehicle stood still.
+/// Calibrates the heads from the longest time in which the vehicle stood still.
 ///
-/// Errors: there is no such stretch, or the wall isn't the profile.
+/// Errors: there is no such time, or the wall doesn't match the profile.
 pub fn heads(material: &Material<'_>) -> Result<Heads, Untold> {
     let still = longest(material)?;
     let scan = gather(material, &still)?;
@@ -90,7 +90,7 @@ pub fn heads(material: &Material<'_>) -> Result<Heads, Untold> {
     Ok(found)
 }
 
-/// A head of which too little is known.
+/// A head that has seen too little of the wall.
 fn unseen(head: &HeadScan) -> Head {
     let seen_deg = head.seen_rad().to_degrees();
     let why = Untold::LittleWall { seen_deg, least_deg: LEAST_SEEN_DEG };
@@ -158,7 +158,7 @@ fn solve<const N: usize>(material: &Material<'_>, scan: &Scan, still: Still) -> 
     Ok(Heads { still, place_m: [y, z], scale, median_m, heads })
 }
 
-/// Where the echosounders say that the vehicle is, or the middle of the section.
+/// Position of the vehicle by the echosounders, or the middle of the section.
 fn first_place(material: &Material<'_>, scan: &Scan) -> [f64; 2] {
     let start = material.profile.reference();
     let echoes = scan.echoes.iter().map(|echo| Echo { mount: echo.mount, range_m: echo.range_m });
@@ -184,10 +184,10 @@ fn problem<'a>(
     }
 }
 
-/// What one head alone says: its unknowns and the common ones.
+/// Fit of one head alone: its unknowns and the common ones.
 type Guess = Fit<{ COMMON + OWN }>;
 
-/// The best fit of one head alone, whatever its angle.
+/// Best fit of one head alone, over all angles.
 fn search(
     material: &Material<'_>,
     scan: &Scan,
@@ -209,7 +209,7 @@ fn search(
     problem(material, scan, heads, &mirrored, 1).fit(start, ROUNDS)
 }
 
-/// Fits all heads together, from what each alone has said.
+/// Fits all heads together, starting from the fit of each alone.
 fn joint<const N: usize>(
     material: &Material<'_>,
     scan: &Scan,
@@ -241,17 +241,17 @@ fn joint<const N: usize>(
     problem(material, scan, &scan.heads, mirrored, 1).fit(start, ROUNDS)
 }
 
-/// Which heads turn the other way round than the file says, and by how much all else fits worse.
+/// Heads that turn the opposite way to the file, and how much worse the alternatives fit.
 struct Senses {
     mirrored: Vec<bool>,
     margins: Vec<f64>,
 }
 
 impl Senses {
-    /// The senses that fit best, looked for one head at a time; the file's, where none is clearly better.
+    /// The senses that fit best, searched one head at a time; the file's, where none is clearly better.
     ///
-    /// A symmetric section with the vehicle on its other side looks the same when all heads turn the other way: that is
-    /// looked at, too.
+    /// A symmetric section with the vehicle on the other side looks the same when all heads turn the opposite way: that is
+    /// tried, too.
     fn choose<const N: usize>(material: &Material<'_>, scan: &Scan, guesses: &[[Guess; 2]]) -> Self {
         let count = scan.heads.len();
         let cost = |mirrored: &[bool]| joint::<N>(material, scan, guesses, mirrored).cost;
@@ -291,7 +291,7 @@ impl Senses {
     }
 }
 
-/// A sum of unknowns.
+/// A weighted sum of unknowns.
 fn estimate<const N: usize>(fit: &Fit<N>, parts: &[(usize, f64)]) -> Estimate {
     let mut h = [0.0; N];
     let mut value = 0.0;
@@ -312,7 +312,7 @@ fn angle<const N: usize>(fit: &Fit<N>, head: usize) -> Result<Estimate, Untold> 
     Ok(angle)
 }
 
-/// How far a head is from where the file has it, against the mean of all heads.
+/// Offset of a head from the file's position, relative to the mean of all heads.
 fn offset<const N: usize>(fit: &Fit<N>, head: usize, i: usize, count: usize) -> Result<Estimate, Untold> {
     if count < 2 {
         return Err(Untold::OneHead);
@@ -327,7 +327,7 @@ fn offset<const N: usize>(fit: &Fit<N>, head: usize, i: usize, count: usize) -> 
 }
 
 impl Heads {
-    /// Height of a place of the body above the tunnel's floor, m.
+    /// Height above the tunnel's floor of a point `up_m` from the body's origin, m.
     pub fn height_m(&self, up_m: Vec3<headrace_geometry::frames::Tunnel>) -> Estimate {
         let [_, z] = self.place_m;
         Estimate { value: z.value + up_m.z(), sd: z.sd }

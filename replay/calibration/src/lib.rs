@@ -1,7 +1,7 @@
-//! What a log tells of how sensors sit, where they count from and how late they are: values for the vehicle file.
+//! Calibration from a log: mounts, zeros and latencies of sensors, as values for the vehicle file.
 //!
-//! [`mod@collect`] runs a log through the loop and keeps its readings. Pure estimators go over these after the dive: they
-//! allocate, and aren't for the loop. Where a log can't tell something they say why. `docs/calibration.md` derives them.
+//! [`mod@collect`] runs a log through the loop and keeps its readings. Pure estimators process these after the dive: they
+//! allocate, and aren't for the loop. Where a log doesn't suffice they return the reason. Derivation: `docs/calibration.md`.
 
 #![cfg_attr(not(test), warn(clippy::cast_possible_truncation))]
 #![cfg_attr(test, allow(clippy::cast_possible_truncation))]

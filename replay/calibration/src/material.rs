@@ -1,4 +1,4 @@
-//! What there is to calibrate by.
+//! Input of the calibration.
 
 use headrace_fusion::filter::settings::Settings;
 use headrace_geometry::site::Site;
@@ -7,18 +7,18 @@ use headrace_geometry::tunnel::Profile;
 use headrace_monitor::messages::Event;
 use headrace_sensor::device::SensorInfo;
 
-/// Readings, and what the vehicle file says of where they come from.
+/// Readings, and the vehicle file's description of their sensors.
 #[derive(Debug, Clone, Copy)]
 pub struct Material<'a> {
-    /// The design.
+    /// Design profile.
     pub profile: &'a Profile,
-    /// The water and the place, as the vehicle file has them.
+    /// Water and location, from the vehicle file.
     pub site: Site,
-    /// How far sensors are trusted.
+    /// Noise settings of the sensors.
     pub settings: Settings,
-    /// The sensors as the vehicle file has them, by source.
+    /// The sensors of the vehicle file, by source.
     pub sensors: &'a [SensorInfo],
-    /// All readings, in the order in which the loop took them.
+    /// All readings, in the order in which the loop processed them.
     pub events: &'a [Event],
 }
 

@@ -1,4 +1,4 @@
-//! What was heard of the wall while the vehicle stood still.
+//! Ranges to the wall while the vehicle stood still.
 
 use std::collections::BTreeMap;
 
@@ -13,22 +13,22 @@ use headrace_monitor::messages::Event;
 use headrace_sensor::device::{SensorInfo, SensorKind};
 use headrace_sensor::reading::Reading;
 
-/// Returns nearer together than this see the same roughness of the wall: together they count as one.
+/// Returns within this angle see the same roughness of the wall: together they count as one.
 pub(super) const SAME_WALL_RAD: f64 = TAU / SECTORS as f64;
 const SECTORS: usize = 120;
-/// More returns than these of one piece of wall say nothing new.
+/// Most returns used of one piece of wall: more add no information.
 const MOST_OF_A_SECTOR: usize = 8;
 
 /// A return of a head.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Return {
-    /// Where the head said that it looked, in its own frame, radians.
+    /// Head angle reported, in its frame, radians.
     pub angle_rad: f64,
     /// Range at the site's speed of sound, m.
     pub range_m: f64,
-    /// How the vehicle hung then.
+    /// Attitude of the vehicle at that time.
     pub attitude: Rot<Tunnel, Body>,
-    /// Its share of what is known of its piece of wall.
+    /// Its weight within its piece of wall.
     pub share: f64,
 }
 
@@ -37,25 +37,25 @@ pub struct Return {
 pub struct HeadScan {
     /// The source.
     pub source: usize,
-    /// How it sits by the vehicle file.
+    /// Mount in the vehicle file.
     pub mount: Mount,
     /// Its returns.
     pub returns: Vec<Return>,
 }
 
-/// What an echosounder said.
+/// Range of an echosounder.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EchoScan {
-    /// How it sits by the vehicle file.
+    /// Mount in the vehicle file.
     pub mount: Mount,
-    /// The middle one of its ranges, at the site's speed of sound, m.
+    /// Median of its ranges, at the site's speed of sound, m.
     pub range_m: f64,
 }
 
 /// See the module's description.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scan {
-    /// How the vehicle hung in the middle of the time.
+    /// Attitude of the vehicle in the middle of the time at rest.
     pub attitude: Rot<Tunnel, Body>,
     /// The heads that heard the wall.
     pub heads: Vec<HeadScan>,
@@ -64,7 +64,7 @@ pub struct Scan {
 }
 
 impl HeadScan {
-    /// How much of the wall it has seen, radians of its own turn.
+    /// Sector of wall it has seen, radians of its turn.
     pub fn seen_rad(&self) -> f64 {
         let mut seen = [false; SECTORS];
         for one in &self.returns {
@@ -75,7 +75,7 @@ impl HeadScan {
         seen.iter().filter(|seen| **seen).count() as f64 * SAME_WALL_RAD
     }
 
-    /// Leaves out what says nothing new, and shares out what is left.
+    /// Drops redundant returns, and weights the rest.
     fn thin(&mut self) {
         let mut counts = [0_usize; SECTORS];
         for one in &self.returns {
@@ -109,7 +109,7 @@ fn sector(angle_rad: f64) -> usize {
     usize::try_from(sector).unwrap_or(0).min(SECTORS - 1)
 }
 
-/// Gathers what was heard during a stand.
+/// Gathers the ranges of a time at rest.
 ///
 /// Errors: no attitude, or no head that heard the wall.
 pub fn gather(material: &Material<'_>, still: &Still) -> Result<Scan, Untold> {
@@ -123,7 +123,7 @@ pub fn gather(material: &Material<'_>, still: &Still) -> Result<Scan, Untold> {
     Ok(Scan { attitude, heads, echoes: echoes(material, still) })
 }
 
-/// How the vehicle hung, by time.
+/// Attitudes of the vehicle, by time.
 fn attitudes(material: &Material<'_>, still: &Still) -> Vec<(MonoNs, Rot<Tunnel, Body>)> {
     let attitude = |(event, sensor): (&Event, &SensorInfo)| match (sensor.kind, event.reading) {
         (SensorKind::Imu, Reading::Attitude(level)) => {

@@ -1,4 +1,4 @@
-//! When the vehicle stood still: by its attitude, cable, depth and echosounders, second by second.
+//! Detects when the vehicle stood still: by its attitude, cable, depth and echosounders, second by second.
 
 use std::collections::BTreeMap;
 
@@ -11,13 +11,13 @@ use headrace_monitor::messages::Event;
 use headrace_sensor::device::{SensorInfo, SensorKind};
 use headrace_sensor::reading::{Level, Reading};
 
-/// Medians are taken over so long: noise and outliers aren't motion.
+/// Averaging time of the medians: noise and outliers aren't motion.
 const BIN: DurNs = DurNs(1_000_000_000);
-/// A shorter stand isn't one, and of a longer one the rest says nothing new, in bins.
+/// Minimum length of a time at rest, and the longest part used (the rest adds no information), in bins.
 const LEAST: usize = 3;
 const MOST: usize = 120;
 
-/// What shows that a vehicle moves.
+/// Quantity that shows motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Sign {
     Cable,
@@ -36,7 +36,7 @@ impl Sign {
         }
     }
 
-    /// How far it may go, and in which unit.
+    /// Largest range of it at rest, and its unit.
     fn limit(self) -> (f64, &'static str) {
         match self {
             Self::Cable => (0.05, "m"),
@@ -46,7 +46,7 @@ impl Sign {
     }
 }
 
-/// A stretch of a log in which the vehicle stood still and its heads heard the wall.
+/// A part of a log in which the vehicle stood still and its heads heard the wall.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Still {
     /// From this receive time,
@@ -55,16 +55,16 @@ pub struct Still {
     pub to: MonoNs,
 }
 
-/// What one source shows, by bin.
+/// Values of one source, by bin.
 type Raw = (Sign, Vec<Vec<f64>>);
 
-/// Medians of that.
+/// Medians of these.
 struct Channel {
     sign: Sign,
     by_bin: Vec<Option<f64>>,
 }
 
-/// The longest stretch in which the vehicle stood still, the first of those.
+/// The longest part in which the vehicle stood still, the first of those.
 ///
 /// Errors: no attitude, no returns, or it moved all the time.
 pub fn longest(material: &Material<'_>) -> Result<Still, Untold> {
@@ -106,7 +106,7 @@ fn bins_long(bins: usize) -> DurNs {
     DurNs(BIN.0.saturating_mul(i64::try_from(bins).unwrap_or(i64::MAX)))
 }
 
-/// For how many bins from this one on nothing moves and the wall is heard.
+/// Number of bins from this one on in which nothing moves and the wall is heard.
 fn length_from(from: usize, channels: &[Channel], heard: &[bool]) -> usize {
     let mut spans: Vec<Option<(f64, f64)>> = vec![None; channels.len()];
     let mut length = 0;
@@ -129,7 +129,7 @@ fn widened(span: Option<(f64, f64)>, value: f64) -> (f64, f64) {
     span.map_or((value, value), |(least, most)| (least.min(value), most.max(value)))
 }
 
-/// What moved most, as a share of what it may.
+/// The quantity that moved most, relative to its limit.
 fn moved(channels: &[Channel]) -> Untold {
     let mut worst = (Sign::Attitude, 0.0);
     for channel in channels {
@@ -179,7 +179,7 @@ fn channels(material: &Material<'_>, first: MonoNs, bins: usize) -> Vec<Channel>
     raw.into_values().map(channel).collect()
 }
 
-/// What a reading shows of motion: up to three numbers, the others not finite.
+/// Motion values of a reading: up to three numbers, the others not finite.
 fn shows(
     material: &Material<'_>,
     sensor: &SensorInfo,

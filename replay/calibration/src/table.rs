@@ -1,4 +1,4 @@
-//! What was found beside what the vehicle file says, and the lines to put into it.
+//! Estimates against the vehicle file's values, and the lines to change in it.
 
 use headrace_sampling::head::faces_aft;
 use headrace_vehicle::VehicleConfig;
@@ -13,54 +13,54 @@ use crate::zero::Zero;
 pub enum Value {
     /// A number.
     Number {
-        /// What the file says.
+        /// Value in the file.
         file: f64,
-        /// What was found.
+        /// Estimate.
         found: Estimate,
     },
     /// Which way a head faces.
     Facing {
-        /// What the file says.
+        /// Value in the file.
         file: &'static str,
-        /// What was found.
+        /// Estimate.
         found: &'static str,
     },
 }
 
-/// Something that was found.
+/// An estimated quantity.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Found {
     /// The sensor's id, or the file's table.
     pub of: String,
-    /// What of it.
+    /// The quantity.
     pub what: &'static str,
     /// Its unit; empty where it has none.
     pub unit: &'static str,
-    /// Decimals that it is shown with.
+    /// Decimals shown.
     pub decimals: usize,
-    /// The file's value and what was found.
+    /// The file's value and the estimate.
     pub value: Value,
 }
 
-/// Something that the log doesn't tell.
+/// A quantity that the log doesn't determine.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Open {
     /// The sensor's id, or the file's table.
     pub of: String,
-    /// What of it.
+    /// The quantity.
     pub what: &'static str,
-    /// Why.
+    /// The reason.
     pub why: Untold,
 }
 
 /// All findings against a vehicle file.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Table {
-    /// What was found.
+    /// Estimate.
     pub found: Vec<Found>,
-    /// What the log doesn't tell.
+    /// Quantities that the log doesn't determine.
     pub open: Vec<Open>,
-    /// Tables of the vehicle file with their lines.
+    /// Tables of the vehicle file with their new lines.
     pub lines: Vec<(String, Vec<String>)>,
 }
 
@@ -75,7 +75,7 @@ impl Found {
 }
 
 impl Table {
-    /// Compares what was found with what the file says.
+    /// Compares the estimates with the file's values.
     pub fn of(vehicle: &VehicleConfig, findings: &Findings) -> Self {
         let mut table = Self::default();
         table.water(vehicle, findings);
@@ -92,7 +92,7 @@ impl Table {
         self.open.push(Open { of: of.to_owned(), what, why });
     }
 
-    /// Notes a number, or why there is none; whether the file should be changed.
+    /// Adds a number, or the reason for its absence; returns whether the file should be changed.
     fn number(
         &mut self,
         of: &str,
@@ -171,7 +171,7 @@ impl Table {
         let left = self.number(&id, ("left", "m", 3), at.y(), head.left_m.map(from(at.y())));
         let up = self.number(&id, ("up", "m", 3), at.z(), head.up_m.map(from(at.z())));
         if left || up {
-            // What doesn't differ stays as it is written.
+            // Values that don't differ stay as written.
             let y_m = if left { head.found.position.y() } else { at.y() };
             let z_m = if up { head.found.position.z() } else { at.z() };
             self.line(&sensor(&id), format!("position_m = {}", triple([at.x(), y_m, z_m], 3)));
@@ -187,7 +187,7 @@ impl Table {
             let id = id(vehicle, zero.source);
             let found = zero.found;
             self.number(&id, ("chainage at zero", "m", 3), *file_m, Ok(found));
-            // A place that somebody has measured outweighs what the cable's slack leaves open.
+            // A surveyed position outweighs the uncertainty left by the cable's slack.
             self.line(&sensor(&id), format!("zero_at_m = {}", number(found.value, 3)));
         }
     }
@@ -203,7 +203,7 @@ impl Table {
             let file_ms = latency.map_or(0.0, |latency| latency.as_secs_f64() * 1e3);
             let found = lag.offset_s.map(|of| Estimate { value: file_ms + of.value * 1e3, sd: of.sd * 1e3 });
             self.number(&id, ("latency", "ms", 1), file_ms, found);
-            // Of many sources one is soon two standard deviations off by chance, and none is early.
+            // Of many sources one is soon two standard deviations off by chance; and a latency is positive.
             if let Ok(found) = found
                 && found.value > 0.0
                 && (found.value - file_ms).abs() > 3.0 * found.sd
@@ -222,7 +222,7 @@ fn sensor(id: &str) -> String {
     format!("sensors.{id}")
 }
 
-/// A number as people write it: no more decimals than it needs, and no zero below zero.
+/// A number with no more decimals than it needs, and no negative zero.
 fn number(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
     let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };

@@ -1,5 +1,5 @@
-//! How late each source is, by the likelihood of the whole log: the filter is run over it with the times of one source
-//! shifted, and the shift is sought at which all innovations together are likeliest.
+//! Latency of each source, by the likelihood of the whole log: the filter is run with the timestamps of one source
+//! shifted, to find the shift at which all innovations together are likeliest.
 
 use crate::estimate::{Estimate, Untold};
 use crate::material::Material;
@@ -10,24 +10,24 @@ use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::messages::Event;
 use headrace_sensor::device::SensorKind;
 
-/// How far offsets are looked for to either side, and in which steps, s.
+/// Search range of offsets to either side, and its step, s.
 const REACH_S: f64 = 0.2;
 const COARSE_S: f64 = 0.1;
-/// Steps about the best one, s: within two standard deviations, but for where the curve is as good as flat or rough.
+/// Steps around the best offset, s: within two standard deviations, except where the curve is nearly flat or rough.
 const FINE_S: core::ops::RangeInclusive<f64> = 0.01..=0.05;
-/// What a source has to say to be shifted before others are looked at: five standard deviations.
+/// Gain for a source to be shifted before the others are examined: five standard deviations.
 const CLEAR: f64 = 25.0;
-/// An offset that isn't known better isn't told, s.
+/// Largest standard deviation of an offset to be reported, s.
 const TOLD_S: f64 = 0.03;
-/// A latency isn't negative; by so much it may seem so, s.
+/// Tolerance for a latency that appears negative, s.
 const EARLY_S: f64 = 0.01;
-/// A filter that has to leave out more than this share of measurements isn't where the vehicle is.
+/// Largest share of gated measurements of a filter that follows the vehicle.
 const MOST_GATED: f64 = 0.2;
-/// Fewer readings of a source aren't looked at, and a longer log says it well enough by its beginning.
+/// Minimum readings of a source, and the longest part of a log used: its beginning suffices.
 const LEAST_READINGS: usize = 50;
 const MOST: DurNs = DurNs(600_000_000_000);
 
-/// How much later than the vehicle file says a source's values come.
+/// Delay of a source's values beyond the vehicle file's latency.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Lag {
     /// The source.
@@ -36,8 +36,8 @@ pub struct Lag {
     pub offset_s: Result<Estimate, Untold>,
 }
 
-/// The lag of each source that navigation uses. `latencies` are those of the vehicle file, by source, which the events' times
-/// of validity allow for; `progress` is told of each run of the filter.
+/// The lag of each source used by navigation. `latencies` are those of the vehicle file, by source, already included in
+/// the events' times of validity; `progress` is called before each run of the filter.
 ///
 /// Sources that are clearly late are corrected first, the clearest first: as long as one is wrong the others seem early. A
 /// source can't be early by more than its latency.
@@ -86,8 +86,8 @@ pub fn lags(
     Ok(lags)
 }
 
-/// No source is early. Where one seems to be by several of its standard deviations, something else than time is amiss (a beam
-/// that isn't as wide as is believed, a mount), and none of them is known so well.
+/// No source is early. Where one seems to be by several of its standard deviations, the cause isn't a time offset (but a
+/// beam narrower than assumed, or a mount), and the standard deviations of all are increased.
 fn own_up(lags: &mut [Lag], latencies: &[DurNs]) {
     let early = |lag: &Lag| {
         let latency_s = latencies.get(lag.source).map_or(0.0, |latency| latency.as_secs_f64());
@@ -99,23 +99,23 @@ fn own_up(lags: &mut [Lag], latencies: &[DurNs]) {
     }
 }
 
-/// A parabola of the likelihood by a source's shift, from where that is now.
+/// A parabola fitted to the likelihood over a source's shift, relative to its current one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Curve {
-    /// Where it is likeliest, s.
+    /// Likeliest shift, s.
     best_s: f64,
-    /// How well that is known, s.
+    /// Its standard deviation, s.
     sd_s: f64,
-    /// By how much it is likelier there, as [`headrace_fusion::filter::sources::Consistency::surprise`] counts.
+    /// Gain in likelihood there, as counted by [`headrace_fusion::filter::sources::Consistency::surprise`].
     gain: f64,
 }
 
-/// The filter over the log again and again.
+/// Repeated runs of the filter over the log.
 struct Runs<'a, 'b> {
     material: &'a Material<'a>,
     events: &'a [Event],
     shifts_s: Vec<f64>,
-    /// Share of measurements that the last run left out.
+    /// Share of measurements gated in the last run.
     gated: f64,
     progress: &'b mut dyn FnMut(),
 }
@@ -128,7 +128,7 @@ impl<'a, 'b> Runs<'a, 'b> {
         Self { material, events, shifts_s: vec![0.0; material.sensors.len()], gated: 0.0, progress }
     }
 
-    /// The sources that navigation uses, and that speak.
+    /// The sources used by navigation that have enough readings.
     fn sources(&self) -> Vec<usize> {
         let mut counts = vec![0_usize; self.material.sensors.len()];
         for event in self.events {
@@ -153,11 +153,11 @@ impl<'a, 'b> Runs<'a, 'b> {
         }
     }
 
-    /// Runs the filter; `None` where it never came to an estimate, or to one that is no number.
+    /// Runs the filter; `None` where it has no estimate at the end, or a likelihood that isn't finite.
     fn surprise(&mut self) -> Option<f64> {
         (self.progress)();
         let Material { profile, site, mut settings, sensors, .. } = *self.material;
-        // What is shifted back in time mustn't come too late for it.
+        // Readings shifted back in time mustn't be too late for the window.
         settings.window = settings.window + DurNs::from_secs_f64(REACH_S + COARSE_S);
         let mut filter = FilterNavigation::new(profile.clone(), site, settings);
         for event in self.events {
@@ -187,7 +187,7 @@ impl<'a, 'b> Runs<'a, 'b> {
         surprise
     }
 
-    /// The parabola through the best of a coarse grid and its neighbours.
+    /// The parabola through the best point of a coarse grid and its neighbours.
     fn coarse(&mut self, source: usize, base: f64) -> Option<Curve> {
         let mut points = vec![(0.0, base)];
         for by_s in [-COARSE_S, COARSE_S, -REACH_S, REACH_S] {
@@ -201,7 +201,7 @@ impl<'a, 'b> Runs<'a, 'b> {
         parabola(points.get(best - 1..=best + 1)?, base)
     }
 
-    /// A parabola through five points about the present shift.
+    /// A parabola fitted to five points around the current shift.
     fn fine(&mut self, source: usize, base: f64, sd_s: f64) -> Option<Curve> {
         let step_s = (2.0 * sd_s).clamp(*FINE_S.start(), *FINE_S.end());
         let mut points = vec![(0.0, base)];
@@ -233,10 +233,10 @@ impl<'a, 'b> Runs<'a, 'b> {
     }
 }
 
-/// The parabola that fits points best; `None` where it has no least value. Twice the logarithm of a likelihood falls by 1 in one
-/// standard deviation, so that its second derivative is 2 / sd^2.
+/// Least-squares parabola; `None` where it has no minimum. Twice the log-likelihood falls by 1 in one standard deviation,
+/// so that its second derivative is 2 / sd^2.
 fn parabola(points: &[(f64, f64)], base: f64) -> Option<Curve> {
-    // In steps of the farthest point, so that the sums are of one size.
+    // In units of the farthest point, so that the sums are of similar size.
     let unit = points.iter().map(|(x, _)| x.abs()).fold(0.0, f64::max);
     let mut m = nalgebra::Matrix3::<f64>::zeros();
     let mut v = nalgebra::Vector3::<f64>::zeros();

@@ -1,4 +1,4 @@
-//! Where depth sensors and cable counters count from.
+//! Zeros of depth sensors and cable counters.
 
 use crate::estimate::{Estimate, Untold, median};
 use crate::heads::Heads;
@@ -12,7 +12,7 @@ use headrace_geometry::time::MonoNs;
 use headrace_sensor::device::SensorKind;
 use headrace_sensor::reading::Reading;
 
-/// At the surface pressure goes by no more: 5 cm of water.
+/// Largest variation of pressure at the surface: 5 cm of water.
 const MOST_SPAN_PA: f64 = 500.0;
 
 /// A zero of one source.
@@ -20,16 +20,16 @@ const MOST_SPAN_PA: f64 = 500.0;
 pub struct Zero {
     /// The source.
     pub source: usize,
-    /// What was found.
+    /// The estimate.
     pub found: Estimate,
-    /// How many readings it is of.
+    /// Number of readings used.
     pub readings: usize,
 }
 
-/// Pressure at the surface, Pa, by the first depth sensor: its mean from `from` to before `to`. Its standard deviation is that
-/// of one reading, since waves and drift don't average out.
+/// Pressure at the surface, Pa, by the first depth sensor: its mean from `from` to before `to`. Its standard deviation is
+/// that of one reading, since waves and drift don't average out.
 ///
-/// Errors: no pressure, not that of one level, or not that of air.
+/// Errors: no pressure, one that varied too much, or one outside that of air.
 pub fn surface(material: &Material<'_>, from: MonoNs, to: MonoNs) -> Result<Zero, Untold> {
     let mut source = None;
     let mut quantum_pa = 0.0;
@@ -60,8 +60,8 @@ pub fn surface(material: &Material<'_>, from: MonoNs, to: MonoNs) -> Result<Zero
     Ok(Zero { source, found: Estimate { value: mean, sd }, readings: pressures.len() })
 }
 
-/// Height of the water's surface above the tunnel's floor, m, by the first depth sensor and the height at which the heads see
-/// the vehicle. `surface_pa` outweighs the file's pressure at the surface.
+/// Height of the water's surface above the tunnel's floor, m, by the first depth sensor and the vehicle's height by the
+/// heads. `surface_pa` overrides the file's pressure at the surface.
 ///
 /// Errors: no pressure, or no attitude.
 pub fn water_level(material: &Material<'_>, heads: &Heads, surface_pa: Option<f64>) -> Result<Zero, Untold> {
@@ -115,7 +115,7 @@ pub fn tethers(material: &Material<'_>, still: &Still, chainage_m: f64) -> Resul
         return Err(Untold::Missing { what: "a cable counter" });
     }
     let settings = &material.settings;
-    // Slack during the stand is one number, and doesn't average out.
+    // Slack is constant at rest, and doesn't average out.
     let sd_m = math::hypot(settings.tether_sd_m, settings.slack.reach);
     let zero = |(source, quantum_m, mut lengths): (usize, f64, Vec<f64>)| Zero {
         source,

@@ -13,7 +13,7 @@ use crate::random::Stream;
 use crate::sensing::Scenery;
 use crate::stages::Stage;
 
-/// What an effect has added, for display.
+/// Additions by an effect, for display.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Added {
     /// Its name in scenes.

@@ -25,7 +25,7 @@ const NEVER: MonoNs = MonoNs(u64::MAX);
 pub(crate) struct Outbox {
     /// One for each source, in order.
     lanes: Vec<Lane>,
-    /// When the next message of each lane is due; `NEVER` where none waits.
+    /// Time at which the next message of each lane is due; `NEVER` if none waits.
     due: Vec<MonoNs>,
     /// Time before which messages are released.
     until: MonoNs,

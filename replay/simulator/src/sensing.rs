@@ -101,7 +101,7 @@ pub(crate) struct Line {
 /// A message on a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct LineMessage {
-    /// When its first byte crosses the line.
+    /// Time at which its first byte crosses the line.
     pub at: MonoNs,
     /// Direction.
     pub direction: Direction,

@@ -2,7 +2,7 @@
 //! circle looked for that holds no sample.
 //!
 //! A circle that is found is no larger than the largest, so that none may exceed the promise; and the promise is no
-//! more than twice what is found, or it would cost the supervisor their time.
+//! more than twice what is found, or it would cost the crew their time.
 
 use headrace_geometry::frames::{Mount, Point3, Pose, Rot, Vec3};
 use headrace_geometry::math::{self, PI, TAU};

@@ -1,6 +1,6 @@
 use super::*;
 
-/// Four heads at FAST, 8 s a turn, all as it should be at 0.19 m/s for a target of 0.5 m.
+/// Four heads at FAST, 8 s per turn, nominal at 0.19 m/s for a target of 0.5 m.
 fn sound() -> Passage {
     let pings = 1000;
     let sum = |mean: f64| mean * f64::from(pings);
@@ -53,7 +53,7 @@ fn each_cause_alone_is_named() {
         (Cause::Occluded, lost(Loss::Occluded), 0.7),
         (Cause::PositionLost, with(&|p| p.unseen = true), 2.0),
         (Cause::PositionLost, with(&|p| p.unplaced = 500), 2.0),
-        // Nothing is wrong with the driving, nothing was lost: navigation has jumped.
+        // Driving is nominal and nothing was lost: navigation has jumped.
         (Cause::PositionLost, sound(), 2.0),
         (Cause::NotPassed, Passage::default(), 2.0),
     ] {

@@ -1,19 +1,19 @@
-//! Whether a fail is certain before its hole is: whether an empty circle lies wholly where no sample can come any more.
+//! Early fail, before the hole is final: an empty circle that lies wholly where no more samples can land.
 
 use super::{HoleFinder, Tile, cell_m, first_tiles};
 use crate::frontier::{Reach, clear_of};
 use crate::store::SampleStore;
 use headrace_geometry::math;
 
-/// Places are told apart to this, m; a circle that is only so much larger isn't certain yet.
+/// Search resolution, m: a circle larger than the radius by less than this may be missed.
 const FINE_M: f64 = 1e-3;
 
 impl HoleFinder {
-    /// Whether a circle of `radius_m` with its centre between two chainages holds no sample and lies outside of `reach`,
-    /// where samples may still land.
+    /// True if a circle of `radius_m` centred between two chainages holds no sample and lies outside `reach`, where
+    /// samples may still land.
     ///
-    /// The distance to the nearest sample or to the reach changes by no more than one moves: as for holes, tiles whose
-    /// bound is too small are dropped and the others halved.
+    /// The distance to the nearest sample or to the reach is 1-Lipschitz: as for holes, tiles whose bound is too small
+    /// are dropped and the others halved.
     /// Allocates: never, unless a section is over 4,000 cells large.
     pub fn has_circle(
         &mut self,
@@ -56,7 +56,7 @@ mod tests {
     const PERIMETER_M: f64 = 6.0;
 
     proptest! {
-        /// Against looking at every place of a fine grid.
+        /// Against brute force over a fine grid.
         #[test]
         fn a_circle_is_found_where_there_is_one_and_nowhere_else(
             samples in proptest::collection::vec((0.0f64..4.0, 0.0f64..PERIMETER_M), 0..40),
@@ -82,7 +82,7 @@ mod tests {
             }));
             let best = places.map(|(x, s)| clear(x, s)).fold(0.0, f64::max);
             let found = HoleFinder::default().has_circle(&store, (1.0, 1.25), reach, radius_m);
-            // The grid is 5 mm off a place at most in each direction, and the search a millimetre.
+            // Grid error at most 5 mm in each direction, search error 1 mm.
             prop_assert!(!found || best + 0.008 > radius_m, "found {radius_m}, there is {best}");
             prop_assert!(found || best <= radius_m + 0.002, "not found {radius_m}, there is {best}");
         }

@@ -1,17 +1,17 @@
-//! A tile divided among samples: each one's share is what lies nearer to it than to the others, a convex polygon on which
-//! the distance to it is largest at a corner.
+//! A tile divided into the Voronoi cells of its samples: each share is a convex polygon on which the distance to its
+//! sample is largest at a corner.
 
-/// The most samples among which a tile is divided; with more it is halved instead.
+/// Maximum samples that a tile is divided among; with more it is halved instead.
 pub(super) const MAX_OWNERS: usize = 24;
-/// The most corners of a share; with more the tile is halved, too.
+/// Maximum corners of a share; with more the tile is halved, too.
 const MAX_CORNERS: usize = 12;
 
 /// A share of a tile.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Share {
-    /// Where its sample is, from the tile's middle, m.
+    /// Its sample relative to the tile's centre, m.
     pub owner: (f64, f64),
-    /// Corners from the owner: there, differences of near places are exact.
+    /// Corners relative to the owner, where differences of nearby points are exact, m.
     corners: [(f64, f64); MAX_CORNERS],
     len: usize,
     /// Squared distance of the farthest corner from the owner; zero when nothing is left.
@@ -21,7 +21,7 @@ pub(super) struct Share {
 }
 
 impl Share {
-    /// The whole of a tile with these half edges, for one owner.
+    /// The whole tile with these half edges as the share of one owner.
     fn whole(owner: (f64, f64), (half_x, half_arc): (f64, f64)) -> Self {
         let (left, right) = (-owner.0 - half_x, -owner.0 + half_x);
         let (low, high) = (-owner.1 - half_arc, -owner.1 + half_arc);
@@ -33,7 +33,7 @@ impl Share {
         share
     }
 
-    /// Adds a corner; gives false when there are too many.
+    /// Adds a corner; false if there are too many.
     fn push(&mut self, corner: (f64, f64)) -> bool {
         let Some(place) = self.corners.get_mut(self.len) else { return false };
         *place = corner;
@@ -45,7 +45,7 @@ impl Share {
         true
     }
 
-    /// Keeps what is at least as near to the owner as to a rival; gives false when there are too many corners.
+    /// Clips to the half-plane nearer to the owner than to a rival; false if there are too many corners.
     fn clip(&mut self, rival: (f64, f64)) -> bool {
         let (nx, ny) = (rival.0 - self.owner.0, rival.1 - self.owner.1);
         let half = 0.5 * (nx * nx + ny * ny);
@@ -80,9 +80,9 @@ impl Share {
     }
 }
 
-/// A tile, divided among the samples that are known to matter so far.
+/// A tile divided among the samples found so far.
 ///
-/// More samples only make it lower: the farthest corner of any share is a bound for the whole tile.
+/// The farthest corner of any share bounds the whole tile; more samples only lower it.
 #[derive(Debug)]
 pub(super) struct Division {
     half_edges: (f64, f64),
@@ -96,7 +96,7 @@ impl Default for Division {
 }
 
 impl Division {
-    /// Begins with a tile and its first owner.
+    /// Starts with a tile and its first owner.
     pub(super) fn begin(&mut self, half_edges: (f64, f64), owner: (f64, f64)) {
         self.half_edges = half_edges;
         self.shares.clear();
@@ -108,7 +108,7 @@ impl Division {
         self.shares.iter().max_by(|a, b| a.farthest2.total_cmp(&b.farthest2))
     }
 
-    /// Gives a sample its share. False when it has one already or there is no room for it: the tile is too large.
+    /// Adds the share of a sample. False if it has one already or there is no room for it: the tile is too large.
     pub(super) fn add(&mut self, owner: (f64, f64)) -> bool {
         let same = |share: &Share| (share.owner.0 - owner.0).abs() + (share.owner.1 - owner.1).abs() <= 0.0;
         if self.shares.len() == MAX_OWNERS || self.shares.iter().any(same) {

@@ -17,7 +17,7 @@ fn largest(perimeter_m: f64, samples: &[(f64, f64)], from_m: f64, to_m: f64) -> 
     HoleFinder::default().largest(&store(perimeter_m, samples), from_m, to_m)
 }
 
-/// Distance from a place to the nearest sample, looking at all.
+/// Distance from a point to the nearest sample, by brute force.
 fn nearest_m(perimeter_m: f64, samples: &[(f64, f64)], place: (f64, f64)) -> f64 {
     let distance = |s: &(f64, f64)| {
         let around = (s.1 - place.1).abs() % perimeter_m;
@@ -26,8 +26,8 @@ fn nearest_m(perimeter_m: f64, samples: &[(f64, f64)], place: (f64, f64)) -> f64
     samples.iter().map(distance).fold(f64::INFINITY, f64::min)
 }
 
-/// Every place where f can be largest, by solving for it: circumcentres of three samples (or their images), and the
-/// places on the two edges that are equally far from two. Shares nothing with the search.
+/// D from all candidate maxima of f: circumcentres of three samples (or their images), and points on the two edges
+/// equidistant from two samples. Shares no code with the search.
 fn brute_force(perimeter_m: f64, samples: &[(f64, f64)], from_m: f64, to_m: f64) -> f64 {
     let images: Vec<(f64, f64)> =
         samples.iter().flat_map(|s| [-perimeter_m, 0.0, perimeter_m].map(|turn| (s.0, s.1 + turn))).collect();
@@ -72,7 +72,7 @@ proptest! {
         prop_assert!(hole.least_m <= hole.diameter_m && hole.most_m - hole.least_m < 1e-9, "{:?}", hole);
     }
 
-    /// The window's search against looking at all.
+    /// The window's search against brute force.
     #[test]
     fn the_nearest_is_the_nearest(
         samples in proptest::collection::vec((-3.0f64..4.0, 0.0f64..PERIMETER_M), 0..60),
@@ -95,8 +95,8 @@ proptest! {
         }
     }
 
-    /// D lies within the bounds that a tolerant search states, and no farther apart than it was told. A verdict from them
-    /// is the exact one, or none where T lies between them.
+    /// D lies within the bounds of a tolerant search, which are no farther apart than the tolerance. A verdict from them
+    /// is the exact one, or undecided where T lies between them.
     #[test]
     fn verif_bounds_of_a_tolerant_search_hold(
         samples in proptest::collection::vec((-2.0f64..3.0, 0.0f64..PERIMETER_M), 1..14),
@@ -115,7 +115,7 @@ proptest! {
         }
     }
 
-    /// The same of samples that were packed before: moved, and the bounds say by how much.
+    /// The same with packed samples: the bounds include their displacement.
     #[test]
     fn verif_bounds_after_packing_hold(
         samples in proptest::collection::vec((-2.0f64..3.0, 0.0f64..PERIMETER_M), 1..14),
@@ -133,13 +133,13 @@ proptest! {
         prop_assert!(width_m > 0.0 && width_m < 1e-4, "{:?}", hole);
     }
 
-    /// And of a cell so full that samples were left out.
+    /// The same with a cell so full that samples were thinned.
     #[test]
     fn verif_bounds_after_thinning_hold(
         crowd in proptest::collection::vec((0.0f64..0.4, 4.0f64..4.4), 200..500),
     ) {
         let mut samples: Vec<_> = crowd.into_iter().filter(|s| s.1 < 4.15 || s.1 > 4.25).collect();
-        // Elsewhere nothing is as far apart as the gap in the crowd.
+        // Elsewhere samples are closer together than the gap in the crowd.
         let fence = (-6..=14).flat_map(|i| (0..180).map(move |k| (f64::from(i) * 0.05, f64::from(k) * 0.05)));
         samples.extend(fence.filter(|s| !(4.0..4.4).contains(&s.1)));
         let thinned = store(PERIMETER_M, &samples);
@@ -159,7 +159,7 @@ proptest! {
         );
     }
 
-    /// A small pipe: holes wider than the wall goes round.
+    /// A small pipe: holes wider than its perimeter.
     #[test]
     fn verif_a_pipe_narrower_than_its_holes(
         samples in proptest::collection::vec((-2.0f64..3.0, 0.0f64..1.1), 1..10),
@@ -169,7 +169,7 @@ proptest! {
         prop_assert!((hole.diameter_m - expected).abs() < 1e-9, "{} and {}", hole.diameter_m, expected);
     }
 
-    /// On a lattice every place of interest is equally far from four samples.
+    /// On a lattice every local maximum is equidistant from four samples.
     #[test]
     fn verif_a_perfect_lattice(dx in 0.11f64..0.7, around in 6u32..24, shift in 0.0f64..1.0) {
         let darc = PERIMETER_M / f64::from(around);
@@ -180,12 +180,12 @@ proptest! {
             }
         }
         let expected = (dx * dx + darc * darc).sqrt();
-        // A section longer than the lattice's step holds a middle.
+        // A section longer than the lattice step contains the centre of a lattice cell.
         let hole = largest(PERIMETER_M, &samples, 0.0, dx * 1.01);
         prop_assert!((hole.diameter_m - expected).abs() < 1e-9, "{} and {}", hole.diameter_m, expected);
     }
 
-    /// Order of the samples, seam and start of the axis are arbitrary.
+    /// D does not depend on the order of the samples, the seam or the origin of the chainage.
     #[test]
     fn meta_shifted_mirrored_reversed(
         samples in proptest::collection::vec((-2.0f64..3.0, 0.0f64..PERIMETER_M), 1..30),
@@ -242,7 +242,7 @@ fn spacings_of_a_nanometre_and_of_metres_in_one_set() {
     assert!((hole.diameter_m - expected).abs() < 1e-7, "{hole:?} and {expected}");
 }
 
-/// Far along the tunnel the answer is the same to what a double holds there.
+/// Far along the tunnel D is the same, to double precision there.
 #[test]
 fn chainage_of_seven_and_of_a_thousand_kilometres() {
     let samples: Vec<_> =

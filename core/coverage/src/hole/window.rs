@@ -1,30 +1,30 @@
-//! The samples about a section, sorted into fine cells: what the search looks at.
+//! Samples around a section, sorted into fine cells for nearest-sample search.
 
 use crate::store::SampleStore;
 use headrace_geometry::math;
 
-/// Samples for which there is room.
+/// Capacity, samples.
 const ROOM: usize = 1 << 20;
-/// Cells for which there is room.
+/// Capacity, cells.
 const CELLS: usize = 1 << 20;
 
-/// A sample's place: chainage from the window's origin, and arc length, m.
+/// Sample position: chainage from the window's origin, and arc length, m.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 struct Spot {
     x_m: f64,
     arc_m: f64,
 }
 
-/// The nearest sample to a place.
+/// Nearest sample to a point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Nearest {
     /// Its chainage from the window's origin, m.
     pub x_m: f64,
     /// Its arc length, in [0, perimeter), m.
     pub arc_m: f64,
-    /// Turns to add to the arc length for the image that is nearest.
+    /// Whole turns to add to the arc length for the nearest image.
     pub turns: f64,
-    /// Distance on the unrolled wall, squared.
+    /// Squared distance on the unrolled wall, m2.
     pub distance2: f64,
 }
 
@@ -38,11 +38,11 @@ pub(super) struct Window {
     from_m: f64,
     cell_m: f64,
     column_m: f64,
-    /// One over the perimeter, a cell's length and its width: the same for sorting samples in and for finding them.
+    /// Reciprocals of perimeter, cell length and cell width, 1/m: the same for sorting and for lookup.
     per_m: [f64; 3],
     rows: usize,
     columns: usize,
-    /// Where each cell's samples begin; row by row, with one more at the end.
+    /// Start index of each cell's samples, row by row, with one more at the end.
     begins: Vec<u32>,
     spots: Vec<Spot>,
     unsorted: Vec<(u32, Spot)>,
@@ -70,7 +70,7 @@ impl Default for Window {
 }
 
 impl Window {
-    /// Takes in all samples between two chainages, in cells of about a wanted size. Chainages are from `origin_m` on.
+    /// Loads all samples between two chainages relative to `origin_m`, in cells of about `cell_m`.
     ///
     /// Allocates: never.
     pub(super) fn fill(
@@ -106,7 +106,7 @@ impl Window {
 
     fn lay_out(&mut self, perimeter_m: f64, origin_m: f64, (from_m, to_m): (f64, f64), cell_m: f64) {
         let cells = (to_m - from_m) * perimeter_m;
-        // Coarser cells where there would be more than there is room for.
+        // Coarser cells if they would exceed the capacity.
         let cell_m = cell_m.max(1.5 * math::sqrt(cells / CELLS as f64));
         (self.perimeter_m, self.origin_m, self.from_m, self.cell_m) = (perimeter_m, origin_m, from_m, cell_m);
         self.rows = whole((to_m - from_m) / cell_m) + 1;
@@ -117,8 +117,8 @@ impl Window {
         self.begins.resize(self.rows * self.columns + 2, 0);
     }
 
-    /// Sorts samples by cell. Counts stand two places on; sums over them are where each cell begins, and while samples
-    /// are put in place each becomes where the next one does.
+    /// Counting sort by cell. Counts are stored at cell + 2; their running sum at cell + 1 is the start of the cell, and
+    /// advances to the start of the next as its samples are placed.
     fn sort(&mut self) {
         let mut sum = 0;
         for begin in &mut self.begins {
@@ -136,7 +136,7 @@ impl Window {
         }
     }
 
-    /// Chainage from the window's origin to chainage along the tunnel, m.
+    /// Converts chainage from the window's origin to chainage along the tunnel, m.
     pub(super) fn chainage_m(&self, x_m: f64) -> f64 {
         self.origin_m + x_m
     }
@@ -146,14 +146,14 @@ impl Window {
         self.perimeter_m
     }
 
-    /// The nearest sample to a place, no farther than a distance; of equally near ones the first that is come by.
+    /// Nearest sample to a point within `within_m`; of equally near ones the first found.
     pub(super) fn nearest(&self, x_m: f64, arc_m: f64, within_m: f64) -> Option<Nearest> {
         let [per_turn, per_row, _] = self.per_m;
         let turn = libm::floor(arc_m * per_turn);
         let arc_m = arc_m - turn * self.perimeter_m;
         let mut best = Search { x_m, arc_m, limit2: within_m * within_m, found: None };
         let centre = whole((x_m - self.from_m) * per_row).min(self.rows - 1);
-        // Outwards from the place's own row: first both neighbours, then theirs.
+        // Outwards from the point's row, one row to either side at a time.
         self.look_in_row(centre, &mut best);
         for ring in 1..self.rows {
             let below = (centre >= ring).then(|| centre - ring);
@@ -171,12 +171,12 @@ impl Window {
         Some(Nearest { x_m: spot.x_m, arc_m: spot.arc_m, turns, distance2: best.limit2 })
     }
 
-    /// Looks at what a row has near a place; gives false when the whole row is too far away.
+    /// Searches a row near a point; false if the whole row is out of range.
     fn look_in_row(&self, row: usize, best: &mut Search) -> bool {
         let low = self.from_m + row as f64 * self.cell_m - best.x_m;
         let away = low.max(-(low + self.cell_m)).max(0.0);
         let width2 = best.limit2 - away * away;
-        // A hair more, since sums of rounded edges are rounded.
+        // Margin for rounding of the row's edges.
         if width2 < -1e-9 {
             return false;
         }
@@ -186,7 +186,7 @@ impl Window {
             self.look_all_round(first, best);
             return true;
         }
-        // A turn on, so that nothing is negative.
+        // Shifted by one turn, so that no column is negative.
         let on_m = best.arc_m + self.perimeter_m;
         let [_, _, per_column] = self.per_m;
         let (left, right) = (whole((on_m - width_m) * per_column), whole((on_m + width_m) * per_column));
@@ -202,13 +202,13 @@ impl Window {
         true
     }
 
-    /// The samples of some cells in a row.
+    /// Samples of a range of cells in a row.
     fn spots(&self, from: usize, to: usize) -> &[Spot] {
         let (Some(begin), Some(end)) = (self.begins.get(from), self.begins.get(to)) else { return &[] };
         self.spots.get(*begin as usize..*end as usize).unwrap_or_default()
     }
 
-    /// Looks at the samples of some cells in a row, so many turns on.
+    /// Searches a range of cells in a row, shifted by whole turns.
     fn look_at(&self, from: usize, to: usize, turns: f64, best: &mut Search) {
         let arc_m = best.arc_m - turns * self.perimeter_m;
         for spot in self.spots(from, to) {
@@ -217,7 +217,7 @@ impl Window {
         }
     }
 
-    /// Looks at all samples of a row, each the short way round.
+    /// Searches all samples of a row, each by its shorter way round the perimeter.
     fn look_all_round(&self, first: usize, best: &mut Search) {
         let half_m = self.perimeter_m / 2.0;
         for spot in self.spots(first, first + self.columns) {
@@ -235,7 +235,7 @@ impl Window {
     }
 }
 
-/// A search for the nearest.
+/// State of a nearest-sample search.
 struct Search {
     x_m: f64,
     arc_m: f64,
@@ -251,7 +251,7 @@ impl Search {
     }
 }
 
-/// The whole part of what isn't negative.
+/// Integer part of a non-negative number.
 #[expect(
     clippy::cast_possible_truncation,
     reason = "float to integer casts saturate, which is what is wanted"

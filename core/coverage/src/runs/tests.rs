@@ -4,7 +4,7 @@ use super::*;
 
 const COUNT: i64 = 60;
 
-/// Runs, and what is said of each section, by which they are checked.
+/// Runs, and the section states that they are checked against.
 struct Rig {
     runs: Runs,
     causes: Vec<Option<Cause>>,
@@ -42,7 +42,7 @@ impl Rig {
         runs.set(section, cause, &mut Telling { at: MonoNs(1), hole: &hole, tell: &mut tell });
     }
 
-    /// Every open run against the sections themselves.
+    /// Checks every open run against the sections.
     fn check(&self) {
         let cause = |index: i64| self.causes[usize::try_from(index + 5).unwrap()];
         let indexes = || -5..COUNT - 5;
@@ -64,7 +64,7 @@ impl Rig {
                 .map(|index| self.holes[usize::try_from(index + 5).unwrap()])
                 .fold(0.0, f64::max);
             assert!((run.worst.1.diameter_m - largest).abs() < 1e-12);
-            // No other run of the cause is near enough to be one with it.
+            // No other run of the cause is within joining distance.
             for other in last + 1..=(last + 3).min(COUNT - 6) {
                 let near = self.runs.of(other).map(|id| self.runs.get(id).unwrap());
                 assert!(near.is_none_or(|near| near.cause != run.cause), "run {number} and its neighbour");
@@ -109,7 +109,7 @@ fn a_run_filled_in_its_middle_falls_in_two_and_the_first_part_keeps_the_number()
 }
 
 proptest! {
-    /// Whatever is said in whatever order, runs are what the sections say.
+    /// Runs match the section states after any sequence of updates.
     #[test]
     fn runs_are_what_the_sections_say(
         said in proptest::collection::vec((-5..COUNT - 5, 0_u8..4, 0.1_f64..3.0), 1..300),
@@ -119,7 +119,7 @@ proptest! {
             let causes = [None, Some(Cause::TooFast), Some(Cause::TooFast), Some(Cause::Phase)];
             rig.say(section, causes[usize::from(cause)], diameter_m);
         }
-        // Numbers may be used up by so many changes; then sections are in no run.
+        // So many changes may exhaust the run numbers; then sections are in no run.
         if rig.runs.all().len() < usize::try_from(COUNT).unwrap() {
             rig.check();
         }

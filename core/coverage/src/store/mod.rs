@@ -1,9 +1,9 @@
-//! Samples on the unrolled wall, in bricks: some rows of square cells round the perimeter.
+//! Samples on the unrolled wall, in bricks of several rows of square cells around the perimeter.
 //!
-//! Bricks near the vehicle are open: samples as they came, listed by cell. Those farther away are packed to four bytes a
-//! sample and opened again when the vehicle comes back or a pass is looked for in them. A cell that is full of samples
-//! keeps only those that add something. Memory in use so grows with the wall that was seen, not with the time spent
-//! there. All of it is allocated before the loop is armed; the system maps a page only when something falls on it.
+//! Bricks near the vehicle are open: unpacked samples, listed by cell. Those farther away are packed to four bytes per
+//! sample and opened again when the vehicle comes back or a pass search needs them. Full cells are thinned. Memory in
+//! use therefore grows with the wall seen, not with the time spent there. All of it is allocated before the loop is
+//! armed; the OS maps a page on first use.
 
 mod open;
 mod packed;
@@ -18,15 +18,15 @@ use headrace_geometry::math;
 use headrace_sampling::head::MAX_HEADS;
 use headrace_snapshot::stateful;
 
-/// Bricks that are open at a time. At a metre each they reach farther than any search, to either side of where it is.
+/// Bricks open at a time. At a metre each they extend beyond any search radius to either side.
 const OPEN_BRICKS: usize = 64;
 /// Least length of a brick, m.
 const BRICK_M: f64 = 1.0;
-/// Rows of a brick at most: those of an open one have a bit each.
+/// Maximum rows per brick: an open brick has a bit for each in a `u32`.
 const MOST_ROWS: usize = 32;
-/// Samples for which there is room in open bricks.
+/// Sample capacity of the open bricks.
 const OPEN_SAMPLES: usize = 1 << 18;
-/// Words that a brick may leave unused in its last block, and those that name its heads.
+/// Overhead words per brick: unused ones in its last block, and head switches.
 const WORDS_PER_BRICK: usize = 48;
 
 /// A sample on the unrolled wall.
@@ -38,8 +38,8 @@ pub struct WallSample {
     pub arc_m: f64,
     /// Number of the head, below [`MAX_HEADS`].
     pub head: usize,
-    /// The way from the sample before, along the tunnel and along the perimeter, m, when the same head has come from
-    /// there in a single step of the same sweep.
+    /// Step from the same head's sample before, along the tunnel and along the perimeter, m, if it was a single step of
+    /// the same sweep.
     pub step_m: Option<[f64; 2]>,
 }
 
@@ -48,13 +48,13 @@ pub struct WallSample {
 pub struct StoreLayout {
     /// Perimeter of the profile, m.
     pub perimeter_m: f64,
-    /// First chainage of which samples are kept, m.
+    /// First chainage, m.
     pub from_m: f64,
     /// Last chainage, m.
     pub to_m: f64,
-    /// Wanted edge of a cell, m; half the target suits the searches.
+    /// Nominal edge of a cell, m; half the target suits the searches.
     pub cell_m: f64,
-    /// Samples for which there is room at least.
+    /// Minimum capacity, samples.
     pub capacity: u32,
 }
 
@@ -65,19 +65,19 @@ impl StoreLayout {
     }
 }
 
-/// What became of a sample.
+/// Outcome of inserting a sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kept {
-    /// It is kept.
+    /// Stored.
     Stored,
-    /// Its cell is full and has one close by; that one stands for it.
+    /// Dropped: its cell is full and has one close by that represents it.
     Thinned,
 }
 
 /// Why a sample was not kept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum StoreError {
-    /// Its chainage is outside the store's extent, or its coordinates are no numbers.
+    /// Its chainage is outside the store's extent, or its coordinates aren't finite.
     #[error("the sample lies outside the stretch of tunnel that the store covers")]
     Outside,
     /// The store is full.
@@ -85,36 +85,36 @@ pub enum StoreError {
     Full,
 }
 
-/// By how much the samples of a stretch may differ from those that came.
+/// Bounds on the difference between a stretch's stored samples and those inserted.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Fidelity {
-    /// A sample that isn't kept is no farther than this from one that is, m.
+    /// Maximum distance of a dropped sample from a kept one, m.
     pub thinned_m: f64,
-    /// No kept sample is farther than this from where it fell, m.
+    /// Maximum displacement of a kept sample, m.
     pub moved_m: f64,
 }
 
-/// What a store holds, and the memory that it has used.
+/// Contents and memory use of a store.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct StoreUse {
     /// Samples kept.
     pub kept: u64,
-    /// Samples that others stand for.
+    /// Samples dropped by thinning.
     pub thinned: u64,
-    /// Bytes that hold samples, or have held some: what the system has mapped.
+    /// Bytes in use now or before, i.e. mapped by the OS.
     pub bytes: usize,
 }
 
-/// Some rows of cells.
+/// A group of cell rows.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 struct Brick {
-    /// Its first block in the arena, or zero.
+    /// Link to its first block in the arena, or zero.
     first_block: u32,
     /// Its samples.
     count: u32,
-    /// One more than its slot when it is open, or zero.
+    /// Slot plus one if it is open, or zero.
     slot: u16,
-    /// How coarsely it was thinned at most.
+    /// Coarsest thinning tier applied.
     tier: u8,
     /// Whether it has been packed before.
     moved: bool,
@@ -159,7 +159,7 @@ impl SampleStore {
         let bricks = to_usize(rows).div_ceil(rows_per_brick);
         let capacity = layout.capacity as usize;
         let open_samples = OPEN_SAMPLES.min(capacity);
-        // Nearly all samples take one word; what is open has room for the worst.
+        // Nearly all samples take one word; open ones are budgeted at the maximum.
         let words = capacity
             + capacity / 8
             + MOST_WORDS * (open_samples + 1)
@@ -179,7 +179,7 @@ impl SampleStore {
         }
     }
 
-    /// Gives all samples and their memory back; nothing is stored any more, but how many others stood for is still known.
+    /// Frees all samples and their memory; nothing can be stored any more. The count of thinned samples remains.
     pub fn release(&mut self) {
         let layout = StoreLayout { to_m: self.layout.from_m, capacity: 0, ..self.layout };
         *self = Self { thinned: self.thinned, ..Self::new(layout) };
@@ -195,12 +195,12 @@ impl SampleStore {
         (self.layout.from_m, self.layout.to_m)
     }
 
-    /// Whether a place is within the stretch of which samples are kept, and its coordinates are numbers.
+    /// Whether a point is within the store's extent and finite.
     pub fn covers(&self, x_m: f64, arc_m: f64) -> bool {
         self.row(x_m).is_some() && arc_m.is_finite()
     }
 
-    /// What is held and used now.
+    /// Current contents and memory use.
     pub fn usage(&self) -> StoreUse {
         StoreUse {
             kept: self.kept,
@@ -211,7 +211,7 @@ impl SampleStore {
         }
     }
 
-    /// Keeps a sample, unless its cell is full and holds one close by.
+    /// Stores a sample, unless its cell is full and holds one close by.
     ///
     /// Errors: it lies outside, or the store is full.
     /// Allocates: never.
@@ -230,7 +230,7 @@ impl SampleStore {
             }
             return Ok(Kept::Thinned);
         }
-        // Whatever is open must find room when it is packed.
+        // All open samples must fit into the arena when packed.
         if self.arena.free_words() < MOST_WORDS * (self.open.used() + 1) + WORDS_PER_BRICK * OPEN_BRICKS {
             return Err(StoreError::Full);
         }
@@ -280,7 +280,7 @@ impl SampleStore {
         }
     }
 
-    /// How true the samples between two chainages are.
+    /// Fidelity of the samples between two chainages.
     pub fn fidelity(&self, from_m: f64, to_m: f64) -> Fidelity {
         let mut worst = Fidelity::default();
         for number in self.bricks_between(from_m, to_m) {
@@ -308,7 +308,7 @@ impl SampleStore {
         Lattice::new(from_m, self.layout.perimeter_m)
     }
 
-    /// The slot of a brick, which is opened if it is packed, or if it has no samples and one is `wanted`.
+    /// Slot of a brick; opens it if it is packed, or if it is empty and `wanted`.
     fn opened(&mut self, number: u32, wanted: bool) -> Option<usize> {
         let brick = *self.bricks.get(number as usize)?;
         if brick.slot > 0 || (brick.count == 0 && !wanted) {
@@ -349,7 +349,7 @@ impl SampleStore {
         }
     }
 
-    /// Packs bricks far from one until there is room for so many samples in it.
+    /// Packs the bricks farthest from `number` until there is room for `samples`.
     fn make_room(&mut self, number: u32, samples: usize) {
         while self.open.room() < samples && self.pack_farthest_from(number).is_some() {}
     }

@@ -1,11 +1,11 @@
-//! Samples near the vehicle, as they came, in lists by cell and by head.
+//! Unpacked samples near the vehicle, in linked lists by cell and by head.
 
 use serde::{Deserialize, Serialize};
 
 use headrace_sampling::head::MAX_HEADS;
 use headrace_snapshot::stateful;
 
-/// A place in one of the lists: one more than an index, or zero for none.
+/// List link: node index plus one, or zero for none.
 type Link = u32;
 
 /// A sample in the pool.
@@ -13,9 +13,9 @@ type Link = u32;
 pub(super) struct Node {
     /// Chainage, m.
     pub x_m: f64,
-    /// Arc length, in [0, perimeter).
+    /// Arc length, in [0, perimeter), m.
     pub arc_m: f64,
-    /// The single step that led here, along the tunnel and the perimeter, m; zero without one.
+    /// Single step from the sample before, along the tunnel and the perimeter, m; zero without one.
     pub step_m: [f64; 2],
     next_in_cell: Link,
     next_of_head: Link,
@@ -39,27 +39,27 @@ struct Cell {
     count: u32,
 }
 
-/// A head's samples of a brick, in the order in which they came.
+/// A head's samples of a brick, in order of arrival.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 struct Chain {
     first: Link,
     last: Link,
 }
 
-/// A fixed number of bricks with a common pool of samples.
+/// A fixed number of open bricks with a common sample pool.
 #[derive(Debug, Clone)]
 pub(super) struct OpenBricks {
     rows: usize,
     columns: usize,
     cells: Vec<Cell>,
-    /// For each column of a slot, a bit for each row that has samples there.
+    /// For each column of a slot, a bitmask of the rows that have samples.
     rows_seen: Vec<u32>,
     chains: Vec<[Chain; MAX_HEADS]>,
     /// The brick in each slot.
     bricks: Vec<Option<u32>>,
     nodes: Vec<Node>,
     most_nodes: usize,
-    /// Nodes given back, linked as in a cell.
+    /// Free list of nodes, linked as in a cell.
     free: Link,
     used: usize,
 }
@@ -83,7 +83,7 @@ impl OpenBricks {
         }
     }
 
-    /// Samples for which there is room still.
+    /// Free capacity, samples.
     pub(super) fn room(&self) -> usize {
         self.most_nodes - self.used
     }
@@ -93,7 +93,7 @@ impl OpenBricks {
         self.used
     }
 
-    /// Bytes that hold samples or have held some.
+    /// Bytes in use now or before.
     pub(super) fn touched_bytes(&self) -> usize {
         self.nodes.len() * size_of::<Node>() + self.cells.len() * size_of::<Cell>()
     }
@@ -109,14 +109,14 @@ impl OpenBricks {
         held.filter(|(_, held)| *held != brick).max_by_key(|(_, held)| held.abs_diff(brick))
     }
 
-    /// Puts a brick without samples into a slot.
+    /// Assigns a slot to a brick, without samples.
     pub(super) fn place(&mut self, slot: usize, brick: u32) {
         if let Some(held) = self.bricks.get_mut(slot) {
             *held = Some(brick);
         }
     }
 
-    /// Adds a sample of a head to a cell of a slot; gives false when there is no room.
+    /// Adds a sample of a head to a cell of a slot; false if there is no room.
     pub(super) fn add(
         &mut self,
         at: CellAt,
@@ -159,7 +159,7 @@ impl OpenBricks {
         (at.slot * self.rows + at.row) * self.columns + at.column
     }
 
-    /// A bit for each row of a slot that has samples in a column.
+    /// Bitmask of the rows of a slot that have samples in a column.
     pub(super) fn rows_seen(&self, slot: usize, column: usize) -> u32 {
         self.rows_seen.get(slot * self.columns + column).copied().unwrap_or(0)
     }

@@ -1,38 +1,38 @@
-//! Samples that the vehicle has left behind, four bytes each.
+//! Packed samples away from the vehicle, four bytes each.
 //!
-//! The samples of a brick lie in a chain of blocks, head by head in the order in which they came, so that most are one
-//! word: how far from the one before, in quanta of 2^-17 m. Quanta count from chainage and arc length zero of the brick:
-//! one lattice for all samples, on which a step ends exactly where the next begins, and on which a sample that was taken
-//! out comes back to its place.
+//! The samples of a brick lie in a chain of blocks, head by head in order of arrival, so that most take one word: the
+//! difference from the sample before, in quanta of 2^-17 m. Quanta count from chainage and arc length zero of the brick:
+//! one lattice for all samples, on which a step ends exactly where the next begins, and on which an unpacked sample is
+//! packed again without further loss.
 
 use headrace_geometry::math;
 use headrace_sampling::head::MAX_HEADS;
 use headrace_snapshot::{Restorer, Saver, SnapshotError, Stateful};
 
-/// Quanta in a metre.
+/// Quanta per metre.
 const QUANTA_PER_M: f64 = 131_072.0;
-/// How far a sample is moved at most by being packed, m: half a quantum along the tunnel, and one along the perimeter,
-/// whose last quantum is not whole.
+/// Maximum displacement of a sample by packing, m: half a quantum along the tunnel, and one along the perimeter, whose
+/// last quantum is partial.
 pub(super) const MOVED_M: f64 = 8.6e-6;
-/// Words of a block that hold samples; one more links to the next block.
+/// Sample words per block; one more word links to the next block.
 pub(super) const ROOM: usize = 31;
-/// The most words that a sample takes.
+/// Maximum words per sample.
 pub(super) const MOST_WORDS: usize = 5;
-/// Lower half of a word that isn't a difference.
+/// Lower half of an escape word: one that isn't a difference.
 const ESCAPE: u16 = 0x8000;
 const PLACE: u16 = 0;
 const STEPPED: u16 = 1;
-/// What follows is of the head with this number less this.
+/// Tags from this one on switch heads: `HEAD` plus the head's number.
 const HEAD: u16 = 2;
 
-/// A place on the lattice, quanta: along the tunnel from the brick's beginning, and along the perimeter.
+/// Lattice point, quanta: along the tunnel from the start of the brick, and along the perimeter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Spot {
     x: i64,
     arc: i64,
 }
 
-/// Where a brick's lattice lies.
+/// The lattice of a brick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Lattice {
     origin: i64,
@@ -40,20 +40,20 @@ pub(super) struct Lattice {
     last_arc: i64,
 }
 
-/// A sample on its way into the arena or out of it.
+/// A sample being packed or unpacked.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Packed {
     /// Chainage, m.
     pub x_m: f64,
     /// Arc length, m.
     pub arc_m: f64,
-    /// The single step that led here, along the tunnel and the perimeter, m; zero without one.
+    /// Single step from the sample before, along the tunnel and the perimeter, m; zero without one.
     pub step_m: [f64; 2],
 }
 
 impl Lattice {
     pub(super) fn new(from_m: f64, perimeter_m: f64) -> Self {
-        // The last whose middle is below the perimeter.
+        // The last quantum whose middle is below the perimeter.
         let last_arc = math::floor_to_i64(perimeter_m * QUANTA_PER_M - 0.5 - 1e-6).max(0);
         Self { origin: math::floor_to_i64(from_m * QUANTA_PER_M), perimeter_m, last_arc }
     }
@@ -71,7 +71,7 @@ impl Lattice {
     }
 }
 
-/// One word for a sample near the one before it, if it is one.
+/// Difference word for a sample close to the one before; `None` if it is too far.
 fn difference(from: Spot, to: Spot, stepped: bool) -> Option<u32> {
     let along = i16::try_from(to.x - from.x).ok().filter(|along| (-0x4000..0x4000).contains(along))?;
     let around = i16::try_from(to.arc - from.arc).ok().filter(|around| *around != i16::MIN)?;
@@ -83,12 +83,12 @@ fn escape(tag: u16) -> u32 {
     u32::from(tag) << 16 | u32::from(ESCAPE)
 }
 
-/// Blocks of words; those given back are used again.
+/// Blocks of words, with a free list.
 #[derive(Debug, Clone)]
 pub(super) struct Arena {
     blocks: Vec<[u32; ROOM + 1]>,
     most: usize,
-    /// One more than the index of a block that was given back, or zero.
+    /// First of the free blocks: index plus one, or zero.
     free: u32,
     used: usize,
 }
@@ -125,12 +125,12 @@ impl Arena {
         Self { blocks: Vec::with_capacity(most_blocks), most: most_blocks, free: 0, used: 0 }
     }
 
-    /// Words for which there is room still.
+    /// Free capacity, words.
     pub(super) fn free_words(&self) -> usize {
         (self.most - self.used) * ROOM
     }
 
-    /// Bytes that hold samples or have held some.
+    /// Bytes in use now or before.
     pub(super) fn touched_bytes(&self) -> usize {
         self.blocks.len() * size_of::<[u32; ROOM + 1]>()
     }
@@ -159,7 +159,7 @@ impl Arena {
         self.blocks.get_mut(link.checked_sub(1)? as usize)
     }
 
-    /// Gives a chain of blocks back.
+    /// Frees a chain of blocks.
     pub(super) fn release(&mut self, first: u32) {
         let mut link = first;
         let free = self.free;
@@ -195,19 +195,19 @@ impl<'a> Writer<'a> {
         Self { arena, lattice, first: 0, block: 0, at: ROOM, before: None }
     }
 
-    /// What follows is of this head.
+    /// Switches to a head; `None` if there is no room.
     pub(super) fn head(&mut self, head: usize) -> Option<()> {
         self.before = None;
         self.word(escape(HEAD + u16::try_from(head).ok()?))
     }
 
-    /// Gives `None` when there is no room.
+    /// Writes a sample; `None` if there is no room.
     pub(super) fn sample(&mut self, sample: Packed) -> Option<()> {
         let spot = self.lattice.spot(sample.x_m, sample.arc_m);
         let [along_m, around_m] = sample.step_m;
         let stepped = along_m.abs() + around_m.abs() > 0.0;
         let start_m = (sample.x_m - along_m, math::wrap(sample.arc_m - around_m, self.lattice.perimeter_m));
-        // Rounding apart, the step began at the sample before.
+        // But for rounding, the step began at the sample before.
         let follows = |before: &Packed| {
             (before.x_m - start_m.0).abs() < 1e-9 && (before.arc_m - start_m.1).abs() < 1e-9
         };
@@ -252,7 +252,7 @@ impl<'a> Writer<'a> {
     }
 }
 
-/// Reads a brick, sample by sample with the number of its head.
+/// Reads a brick: iterates over head number and sample.
 pub(super) struct Reader<'a> {
     arena: &'a Arena,
     lattice: Lattice,

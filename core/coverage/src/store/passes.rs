@@ -1,4 +1,4 @@
-//! The nearest pass: where a head came by before, at the same arc length.
+//! The nearest pass: the closest crossing of an arc length by a head.
 
 use core::ops::Range;
 
@@ -6,7 +6,7 @@ use super::SampleStore;
 use super::open::Node;
 use headrace_geometry::math;
 
-/// A place that passes are looked for at.
+/// Query point of a pass search.
 #[derive(Debug, Clone, Copy)]
 struct Place {
     x_m: f64,
@@ -26,24 +26,24 @@ impl Place {
             to_end += self.perimeter_m;
         }
         let to_start = to_end - around_m;
-        // The start belongs to the step before.
+        // The start point belongs to the step before.
         let crosses = (to_start < 0.0 && to_end >= 0.0) || (to_start > 0.0 && to_end <= 0.0);
         crosses.then(|| (end.x_m - along_m * (to_end / around_m) - self.x_m).abs())
     }
 }
 
-/// The brick that a search has come to on one side.
+/// The brick that a search has reached on one side.
 #[derive(Debug, Clone, Copy, Default)]
 struct Side {
     brick: Option<u32>,
     slot: usize,
-    /// A bit for each of its rows where there may be a pass.
+    /// Bitmask of its rows that may have a pass.
     rows: u32,
 }
 
 impl SampleStore {
-    /// Distance in chainage to the nearest pass over `arc_m`, no farther than `within_m`; to some micrometres where a
-    /// packed brick had to be opened for it.
+    /// Distance in chainage to the nearest pass over `arc_m` within `within_m`, m; accurate to some micrometres if a packed
+    /// brick had to be opened for it.
     ///
     /// A pass is a single step of a head from one sample to the next; where it crosses `arc_m` its chainage is
     /// interpolated. Source: metrics.md, T_x.
@@ -54,7 +54,7 @@ impl SampleStore {
         let centre = math::floor_to_i64((x_m - self.layout.from_m) / self.layout.cell_m);
         let into_row = (x_m - self.layout.from_m) - centre as f64 * self.layout.cell_m;
         let inner = into_row.min(self.layout.cell_m - into_row).max(0.0);
-        // A step ends at most its own length from where it crosses sigma.
+        // A step ends at most its length from where it crosses the arc length.
         let [along_m, around_m] = self.longest_step_m;
         let left = math::floor_to_i64((place.arc_m - around_m) / self.column_m);
         let right = math::floor_to_i64((place.arc_m + around_m) / self.column_m);
@@ -91,7 +91,7 @@ impl SampleStore {
         best
     }
 
-    /// Opens a brick, and sees in which of its rows there are samples in some columns.
+    /// Opens a brick and finds its rows that have samples in a range of columns.
     fn side(&mut self, brick: u32, columns: &Range<i64>) -> Side {
         let Some(slot) = self.opened(brick, false) else {
             return Side { brick: Some(brick), slot: 0, rows: 0 };
@@ -100,7 +100,7 @@ impl SampleStore {
         Side { brick: Some(brick), slot, rows: columns.clone().map(seen).fold(0, |all, rows| all | rows) }
     }
 
-    /// A column that may lie beyond the seam.
+    /// Wraps a column that may lie beyond the seam.
     fn wrapped(&self, column: i64) -> i64 {
         if (0..self.columns).contains(&column) { column } else { column.rem_euclid(self.columns) }
     }

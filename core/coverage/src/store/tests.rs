@@ -9,7 +9,7 @@ fn sample(x_m: f64, arc_m: f64) -> WallSample {
     WallSample { x_m, arc_m, head: 0, step_m: None }
 }
 
-/// Single steps of several heads from place to place, the first of each head without one.
+/// Samples of several heads in single steps from point to point; the first of each head has none.
 fn steps(places: &[(f64, f64)], heads: usize) -> Vec<WallSample> {
     let mut last = vec![None; heads];
     let mut all = Vec::new();
@@ -31,7 +31,7 @@ fn store(samples: &[WallSample]) -> SampleStore {
     store
 }
 
-/// Opens so many other bricks that none of the first 40 m stays open.
+/// Opens enough other bricks that none of the first 40 m stays open.
 fn pack_the_first_40_m(store: &mut SampleStore) {
     for k in 0..100 {
         store.insert(sample(210.0 - 1.2 * f64::from(k), 0.0)).unwrap();
@@ -39,7 +39,7 @@ fn pack_the_first_40_m(store: &mut SampleStore) {
     assert!(store.bricks.iter().take(30).all(|brick| brick.slot == 0), "all of them are packed");
 }
 
-/// What is kept of the first 40 m, in order.
+/// Samples kept of the first 40 m, sorted.
 fn kept(store: &SampleStore) -> Vec<(f64, f64)> {
     let mut kept = Vec::new();
     store.visit_between(-1.0, 40.0, |x_m, arc_m| kept.push((x_m, arc_m)));
@@ -48,7 +48,7 @@ fn kept(store: &SampleStore) -> Vec<(f64, f64)> {
     kept
 }
 
-/// Distances in chainage from a place to every crossing of its arc length, by walking along each step.
+/// Distances in chainage from a point to every crossing of its arc length, by interpolating each step.
 fn crossings(samples: &[WallSample], (x_m, arc_m): (f64, f64)) -> Vec<f64> {
     let mut found = Vec::new();
     for end in samples {
@@ -74,7 +74,7 @@ fn places(most: usize) -> impl Strategy<Value = Vec<(f64, f64)>> {
 }
 
 proptest! {
-    /// Against looking at every step.
+    /// Against brute force over every step.
     #[test]
     fn the_nearest_pass_is_the_nearest(
         places in places(60),
@@ -91,8 +91,8 @@ proptest! {
         }
     }
 
-    /// On the way home: from packed bricks, to what packing moves. Steps are as short as heads make them, so that how
-    /// far along a step the crossing is can't blow the error up.
+    /// Passes in packed bricks are found to the accuracy of packing. Steps are as short as those of real heads, so that
+    /// interpolation along a step doesn't amplify the error.
     #[test]
     fn passes_outlive_packing(
         starts in proptest::collection::vec((0.0f64..12.0, 0.0f64..PERIMETER_M, -0.06f64..0.06), 1..8),
@@ -106,7 +106,7 @@ proptest! {
                 samples.push(WallSample { x_m: x_m + 0.002 * f64::from(k), arc_m, head, step_m });
             }
         }
-        // Where another step's end decides, micrometres may choose the other pass.
+        // At the end of a step, micrometres may select another pass.
         prop_assume!(samples.iter().all(|s| (s.arc_m - place.1).abs() > 1e-4));
         prop_assume!(starts.iter().all(|(_, _, around_m)| around_m.abs() > 0.01));
         let expected = crossings(&samples, place).into_iter().filter(|d| *d <= 9.0).min_by(f64::total_cmp);
@@ -124,7 +124,7 @@ proptest! {
         }
     }
 
-    /// Whatever is packed, opened and packed again: each sample stays where it was, but for what is said.
+    /// Repeatedly packed and opened, each sample stays where it was within the stated displacement.
     #[test]
     fn samples_outlive_packing(places in places(200), heads in 1_usize..8, reversed: bool) {
         let mut samples = steps(&places, heads);
@@ -153,7 +153,7 @@ proptest! {
         prop_assert_eq!(kept(&store), once, "a second time nothing is moved");
     }
 
-    /// A sample that isn't kept has one within the distance that is said.
+    /// A dropped sample has a kept one within the stated distance.
     #[test]
     fn a_kept_one_stands_for_each_that_is_not(
         places in proptest::collection::vec((0.0f64..0.31, 1.0f64..1.31), 400..900),
@@ -205,7 +205,7 @@ fn what_is_outside_or_too_much_is_refused() {
     assert_eq!(store.insert(sample), Err(StoreError::Full));
 }
 
-/// What is refused is said so; what was kept stays.
+/// Refused samples are reported; kept ones stay.
 #[test]
 fn a_full_store_loses_nothing_that_it_kept() {
     let mut store = SampleStore::new(StoreLayout { capacity: 3_000, ..LAYOUT });
@@ -223,7 +223,7 @@ fn a_full_store_loses_nothing_that_it_kept() {
     assert_eq!(seen, stored);
 }
 
-/// Four heads at fifty pings a second, an hour on one spot, trembling by centimetres.
+/// Four heads at 50 pings per second for an hour on one spot, with centimetre jitter.
 #[test]
 fn a_parked_vehicle_fills_cells_and_no_more() {
     let mut store = SampleStore::new(LAYOUT);

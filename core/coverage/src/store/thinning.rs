@@ -1,24 +1,24 @@
-//! Which samples of a full cell need not be kept: those so close to a kept one that it can stand for them.
+//! Thinning of full cells: samples close enough to a kept one are dropped.
 //!
-//! Then a hole is no more than twice that distance smaller than it is found. The fuller a cell, the coarser it gets; the
-//! coarsest is a sixteenth of the cell, so that a cell holds some hundreds of samples at most.
+//! A hole is then overestimated by at most twice that distance. The fuller a cell, the coarser the thinning, down to a
+//! sixteenth of the cell, so that a cell holds some hundreds of samples at most.
 
 use super::open::{CellAt, OpenBricks};
 
-/// Samples that a cell keeps whatever they are; from so many on those closer than this share of a cell's edge to a kept
-/// one are left out.
+/// Thinning tiers: from this many samples in a cell on, those closer to a kept one than this share of the cell's edge
+/// are dropped.
 const TIERS: [(u32, f64); 4] = [(64, 1.0 / 128.0), (96, 1.0 / 64.0), (128, 1.0 / 32.0), (160, 1.0 / 16.0)];
 
-/// Samples at the end of a step are kept for so many longer.
+/// Extra samples in a cell before samples at the end of a step are thinned.
 const PASSES: u32 = 64;
 
-/// How close a sample that was left out is to a kept one, m, after thinning up to a tier; tier 0 is none.
+/// Maximum distance of a dropped sample from a kept one, m, after thinning up to a tier; tier 0 is none.
 pub(super) fn delta_m(tier: u8, edge_m: f64) -> f64 {
     let tier = usize::from(tier).checked_sub(1).and_then(|tier| TIERS.get(tier));
     tier.map_or(0.0, |(_, share)| share * edge_m)
 }
 
-/// The tier by which a sample need not be kept in its cell.
+/// Tier by which a sample may be dropped from its cell; `None` to keep it.
 pub(super) fn stands_for(
     open: &OpenBricks,
     at: CellAt,
@@ -26,7 +26,7 @@ pub(super) fn stands_for(
     step_m: Option<[f64; 2]>,
     edge_m: f64,
 ) -> Option<u8> {
-    // A step is a pass: it is left out later, and only where another the same way stands for it.
+    // A step is a pass: it is dropped later, and only if one close by in the same direction represents it.
     let around_m = step_m.map_or(0.0, |[_, around_m]| around_m);
     let count = open.count(at).saturating_sub(if step_m.is_some() { PASSES } else { 0 });
     let tier = TIERS.iter().take_while(|(from, _)| count >= *from).count();

@@ -1,4 +1,4 @@
-//! Whether sensors agree with the estimate at all: an estimate that is surely wrong gates everything that would mend it.
+//! Detects a divergent filter: a wrong estimate gates out every measurement that would correct it.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,11 +6,11 @@ use super::measure::ScalarUpdate;
 use super::state::{ATTITUDE, ERRORS, Errors, HEADING, POSITION, VELOCITY};
 use headrace_sensor::device::SensorKind;
 
-/// Measurements of a kind over which it is seen whether they agree at all.
+/// Averaging length, in measurements of a kind.
 const MEMORY: u32 = 40;
-/// When fewer than this share of them do, what they measure is lost, and sought anew.
+/// Minimum share of them within the gate; below it, what they measure is lost and reacquired.
 const LEAST_AGREEING: f64 = 0.35;
-/// How far off the estimate may be then: across the tunnel, along it, and its attitude; m, m/s, radians.
+/// Standard deviations added then: across the tunnel, along it, and of the attitude; m, m/s, radians.
 const LOST_M: f64 = 1.5;
 const LOST_MPS: f64 = 1.0;
 const LOST_WAY_M: f64 = 100.0;
@@ -18,7 +18,7 @@ const LOST_WAY_MPS: f64 = 10.0;
 const LOST_TILT_RAD: f64 = 0.1;
 const LOST_RAD: f64 = 1.0;
 
-/// Whether ranges agree with the wall, the cable with the way, and attitudes with the tilt.
+/// Whether ranges agree with the wall, the cable with the chainage, and attitudes with the tilt.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Agreement {
     wall: Memory,
@@ -26,7 +26,7 @@ pub struct Agreement {
     tilt: Memory,
 }
 
-/// Whether measurements of a kind have agreed of late.
+/// Share of recent measurements of a kind within the gate.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 struct Memory {
     seen: u32,
@@ -46,7 +46,7 @@ impl Memory {
         self.agreeing += share * (f64::from(u8::from(agrees)) - self.agreeing);
     }
 
-    /// Whether they don't agree; then it is seen anew.
+    /// Whether they disagree; if so, the average restarts.
     fn is_lost(&mut self) -> bool {
         let is_lost = self.seen == MEMORY && self.agreeing < LEAST_AGREEING;
         if is_lost {
@@ -57,28 +57,28 @@ impl Memory {
 }
 
 impl Agreement {
-    /// Notes whether a row of such a sensor passed its gate.
+    /// Notes whether a scalar update of such a sensor passed its gate.
     pub fn note(&mut self, kind: SensorKind, row: &ScalarUpdate, agrees: bool) {
         match kind {
             SensorKind::Head | SensorKind::Echosounder { .. } => self.wall.note(agrees),
             SensorKind::Tether { .. } => self.way.note(agrees),
-            // Tilt alone: a compass may be disturbed for long.
+            // Tilt alone: a compass may stay disturbed for long.
             SensorKind::Imu if row.h.get(HEADING) == Some(&0.0) => self.tilt.note(agrees),
             _ => {}
         }
     }
 
-    /// When a kind of measurement no longer agrees, what it measures is anywhere near, and so is what has moved it there: the
-    /// variances by which errors are larger than was believed. `None` while all agree.
+    /// Variances to add when a kind of measurement no longer agrees: to the part of the state that it measures, and to what
+    /// may have moved it. `None` while all agree.
     pub fn seek(&mut self) -> Option<Errors> {
         let [wall, way, tilt] = [&mut self.wall, &mut self.way, &mut self.tilt].map(Memory::is_lost);
         let lost = [
             (wall, POSITION + 1..POSITION + 3, LOST_M),
             (wall, VELOCITY + 1..VELOCITY + 3, LOST_MPS),
-            // Nothing about the way along the tunnel depends on where one believes to be: any distance will do.
+            // Nothing is linearized about the chainage: any distance will do.
             (way, POSITION..POSITION + 1, LOST_WAY_M),
             (way, VELOCITY..VELOCITY + 1, LOST_WAY_MPS),
-            // A tilt moves the estimate too, by its share of gravity.
+            // A tilt error moves the estimate too, through gravity.
             (wall || way, ATTITUDE..ATTITUDE + 2, LOST_TILT_RAD),
             (tilt, ATTITUDE..ATTITUDE + 3, LOST_RAD),
         ];

@@ -1,4 +1,4 @@
-//! The first estimate: what the sensors say within the first second, taken together.
+//! Alignment: the first estimate, from the readings of the first second.
 
 use serde::{Deserialize, Serialize};
 
@@ -19,12 +19,12 @@ use headrace_sensor::reading::MAX_SOURCES;
 use headrace_sensor::reading::Reading;
 use headrace_snapshot::stateful;
 
-/// How long sensors are listened to.
+/// Alignment time.
 pub const LISTENS: DurNs = DurNs(1_000_000_000);
-/// Echoes of one sounder of which the middle one is taken.
+/// Echoes per sounder for the median.
 const ECHOES: usize = 9;
-/// Standard deviations at the start: of the place in the section by echoes, and without them; of a chainage that nobody
-/// has told; of the yaw of a vehicle that has no compass and is set to look along the tunnel; of velocity; of tilt.
+/// Initial standard deviations: position in the section with echoes, and without; chainage without a cable reading; yaw
+/// of a vehicle without a compass, assumed to look along the tunnel; velocity; tilt.
 const PLACE_SD_M: f64 = 0.3;
 const PLACE_UNSEEN_SD_M: f64 = 2.0;
 const CHAINAGE_UNTOLD_SD_M: f64 = 10.0;
@@ -32,11 +32,11 @@ const YAW_UNTOLD_SD_RAD: f64 = 0.2;
 const VELOCITY_SD_MPS: f64 = 0.5;
 const TILT_SD_RAD: f64 = 0.05;
 
-/// What has been heard so far.
+/// Readings collected so far.
 #[derive(Debug, Clone)]
 pub struct Listening {
     since: Option<MonoNs>,
-    /// Chainage of an estimate before, and its standard deviation, m.
+    /// Chainage of the previous estimate, and its standard deviation, m.
     before: Option<(f64, f64)>,
     hears_wall: bool,
     attitude: Option<Rot<Tunnel, Body>>,
@@ -48,12 +48,12 @@ pub struct Listening {
 
 stateful!(Listening { state: since, before, hears_wall, attitude, force, told, height_m; slots: echoes; });
 
-/// What a cable said.
+/// A cable reading.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 struct Told {
     at: MonoNs,
     chainage_m: f64,
-    /// From where the cable's scale counts, m.
+    /// Distance from the origin of the cable's scale, m.
     way_m: f64,
     sd_m: f64,
 }
@@ -122,22 +122,22 @@ impl Listening {
             _ => {}
         }
         if self.before.is_some() && self.hears_wall && !heard_wall {
-            // The others may speak again only now, too.
+            // The other sensors may have returned only now, too.
             self.since = Some(at);
         }
     }
 
-    /// After an estimate that was lost: its chainage, m, and how far off that may be.
+    /// After the loss of an estimate: its chainage and standard deviation, m.
     pub fn after(before: Option<(f64, f64)>) -> Self {
         Self { before, ..Self::default() }
     }
 
-    /// The chainage of an estimate that was lost, m, and how far off that may be.
+    /// Chainage of the lost estimate and its standard deviation, m.
     pub fn before(&self) -> Option<(f64, f64)> {
         self.before
     }
 
-    /// What is missing yet.
+    /// The part still missing.
     pub fn lacks(&self) -> NoFix {
         if self.attitude.is_none() && self.force.is_none() {
             NoFix::Heading
@@ -148,14 +148,14 @@ impl Listening {
         }
     }
 
-    /// When the first reading was valid.
+    /// Start of the alignment, a time of validity.
     pub fn since(&self) -> Option<MonoNs> {
         self.since
     }
 
-    /// The first estimate as of `at`, once sensors have been listened to for long enough.
+    /// The first estimate at `at`, once the alignment has lasted long enough.
     pub fn settle(&self, at: MonoNs, context: &Context) -> Option<(State, Factors<ERRORS>)> {
-        // An estimate that was lost is not begun anew before it could be any better.
+        // After a loss, wait for an echo of the wall: before it a new estimate can't be any better.
         if at.since(self.since?).0 < LISTENS.0 || (self.before.is_some() && !self.hears_wall) {
             return None;
         }
@@ -179,8 +179,8 @@ impl Listening {
         Some((state, self.factors(at, &context.settings, place_sd_m)))
     }
 
-    /// A chainage and a yaw that were read are off by what is wrong with the cable and the compass, so that reading these
-    /// again says nothing new; and the slack goes with its rate.
+    /// Chainage and yaw errors are correlated with the errors of cable and compass, so that reading these again adds no
+    /// information; and slack is correlated with its rate.
     fn factors(&self, at: MonoNs, settings: &Settings, [y_sd_m, z_sd_m]: [f64; 2]) -> Factors<ERRORS> {
         let mut sds = [0.0; ERRORS];
         let untold_sd_m = self.before.map_or(0.0, |(_, sd_m)| sd_m).max(CHAINAGE_UNTOLD_SD_M);
@@ -201,7 +201,7 @@ impl Listening {
             }
         }
         let ones = [
-            // What doesn't go with the rate.
+            // The part that isn't correlated with the rate.
             (SLACK, settings.slack.reach / core::f64::consts::SQRT_2),
             (SLACK_RATE, settings.slack.drive()),
             (SCALE, settings.scale_sd),
@@ -251,7 +251,7 @@ impl Heard {
     }
 }
 
-/// The attitude of a body at rest that looks along the tunnel, by which way is up.
+/// Attitude of a body at rest that looks along the tunnel, from the direction of gravity.
 fn level(force: Vec3<Body>) -> Rot<Tunnel, Body> {
     let roll = math::atan2(force.y(), force.z());
     let pitch = math::atan2(-force.x(), math::hypot(force.y(), force.z()));
@@ -267,8 +267,8 @@ mod tests {
     use headrace_geometry::tunnel::shapes;
     use headrace_sensor::reading::{Level, TetherLength};
 
-    /// What a cable and a compass have said is not said anew by their next readings: the chainage and the yaw stay as
-    /// uncertain as the slack, the scale and the deviation are.
+    /// Repeated readings of cable and compass add no information: chainage and yaw stay as uncertain as slack, scale and
+    /// deviation.
     #[test]
     fn readings_that_made_the_first_estimate_do_not_count_twice() {
         let context = Context {

@@ -1,9 +1,9 @@
-//! How well two moments are known against each other: the error of a displacement between them, which is what counts when
-//! two passes of a head are compared, and is less than the errors of either place.
+//! Relative error covariance between two epochs (stochastic cloning): the error of the displacement between them, which
+//! matters when two passes of a head are compared, and is less than the errors of either position.
 //!
-//! A sample stays where it was placed; its error is that of the estimate then, and isn't corrected later. So each clone
-//! keeps the covariance of the errors at its time, and how they have become those of the next clone: through the
-//! filter's own propagation and corrections. Derivation: `docs/fusion.md`, "Relative uncertainty".
+//! A sample stays where it was georeferenced; its error is that of the estimate then, and isn't corrected later. So each
+//! clone keeps the covariance of the errors at its time, and their transition from the clone before, through the
+//! filter's propagation and corrections. Derivation: `docs/fusion.md`, "Relative uncertainty".
 
 use serde::{Deserialize, Serialize};
 
@@ -16,9 +16,9 @@ use headrace_snapshot::stateful;
 
 /// Time between two clones.
 pub const STEP: DurNs = DurNs(2_000_000_000);
-/// Clones that are kept: over four turns of a head in its slowest mode (4 x 28 s).
+/// Clones kept: over four turns of a head in its slowest mode (4 x 28 s).
 pub const CLONES: usize = 60;
-/// Errors that move a sample along the tunnel: of chainage, pitch and yaw.
+/// Errors that move a sample along the tunnel: chainage, pitch and yaw.
 pub const MOVING: [usize; 3] = [POSITION, ATTITUDE + 1, ATTITUDE + 2];
 
 type Square = [Errors; ERRORS];
@@ -26,21 +26,21 @@ type Square = [Errors; ERRORS];
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 struct Moment {
     at: MonoNs,
-    /// Rows of the covariance then.
+    /// Rows of the covariance at that time.
     rows: [Errors; 3],
-    /// By columns: how errors at the clone before have become those then.
+    /// By columns: transition of errors from the clone before.
     since_last: Square,
-    /// Against the newest clone.
+    /// Relative to the newest clone.
     relative: Relative,
 }
 
 /// See the module's description.
 #[derive(Debug, Clone)]
 pub struct ErrorClones {
-    /// A ring.
+    /// Ring buffer.
     clones: Vec<Moment>,
     count: usize,
-    /// By columns: how errors at the newest clone have become those now.
+    /// By columns: transition of errors from the newest clone until now.
     since: Square,
 }
 
@@ -53,20 +53,20 @@ impl Default for ErrorClones {
 }
 
 impl ErrorClones {
-    /// Forgets everything.
+    /// Removes all clones.
     pub fn clear(&mut self) {
         self.clones.clear();
         (self.count, self.since) = (0, identity());
     }
 
-    /// Errors move on.
+    /// Propagates the errors.
     pub fn carry(&mut self, transition: &Transition) {
         for column in &mut self.since {
             transition.apply(column);
         }
     }
 
-    /// Errors are corrected by a measurement.
+    /// Applies the correction by a measurement to the errors.
     pub fn measure(&mut self, h: &Errors, gain: &Gain<ERRORS>) {
         for column in &mut self.since {
             let seen: f64 = column.iter().zip(h).map(|(c, h)| c * h).sum();
@@ -76,7 +76,7 @@ impl ErrorClones {
         }
     }
 
-    /// Notes the errors of this moment when the last clone is old enough.
+    /// Adds a clone when the last one is old enough.
     pub fn note(&mut self, at: MonoNs, factors: &Factors<ERRORS>) {
         if self.newest().is_some_and(|newest| at.since(newest.at).0 < STEP.0) {
             return;
@@ -93,11 +93,11 @@ impl ErrorClones {
         self.compare();
     }
 
-    /// Errors of now against those `lag` ago, or as long ago as is known; `None` before there are two moments.
+    /// Covariance at the newest clone relative to `lag` before, extrapolated beyond the oldest; `None` before there are two.
     pub fn relative(&self, lag: DurNs) -> Option<Relative> {
         let newest = self.newest()?;
         let kept = self.clones.len();
-        // Over no time, nothing has changed.
+        // Zero over no time.
         let (mut newer_s, mut newer) = (0.0, Relative::default());
         let wanted_s = lag.as_secs_f64();
         for back in 1..kept {
@@ -109,11 +109,11 @@ impl ErrorClones {
             }
             (newer_s, newer) = (age_s, clone.relative);
         }
-        // Beyond, as if what is known went on growing as evenly.
+        // Beyond the oldest clone, extrapolated linearly in time.
         (kept > 1).then(|| newer.weighted(wanted_s / newer_s, &newer, 0.0))
     }
 
-    /// Against the newest clone, each older one: from it backwards, carrying along how its errors depend on older ones.
+    /// Compares each older clone with the newest: backwards, carrying along the dependence of its errors on older ones.
     fn compare(&mut self) {
         let Some(now) = self.newest().copied() else { return };
         let mut depends = MOVING.map(|i| core::array::from_fn(|j| if i == j { 1.0 } else { 0.0 }));
@@ -136,7 +136,7 @@ impl ErrorClones {
     }
 }
 
-/// Covariance of the difference of errors, where those now depend on those then as told.
+/// Covariance of the difference of errors, where `depends` maps the errors then to those now.
 fn against(now: &[Errors; 3], then: &[Errors; 3], depends: &[Errors; 3]) -> Relative {
     let cross: [[f64; 3]; 3] = depends.map(|row| then.map(|column| sum(&row, &column)));
     let mut relative = [[0.0; 3]; 3];
@@ -157,7 +157,7 @@ fn sum(a: &Errors, b: &Errors) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// A row times a matrix that is given by columns.
+/// A row times a matrix given by columns.
 fn product(row: &Errors, columns: &Square) -> Errors {
     columns.map(|column| sum(row, &column))
 }

@@ -1,4 +1,4 @@
-//! The filter at work: an epoch is a leg of propagation, and the measurements of its time.
+//! The error-state Kalman filter: an epoch is a leg of propagation, followed by the measurements of its time.
 
 use core::ops::Range;
 
@@ -25,61 +25,61 @@ use headrace_sensor::reading::{Level, Reading};
 use headrace_snapshot::stateful;
 use serde::{Deserialize, Serialize};
 
-/// Room for the moments of an epoch at which an inertial unit spoke.
+/// Room for the inertial sample times of an epoch.
 const KNOTS: usize = 256;
-/// A vehicle that rests moves by so much, m/s: the sea's, or the deck's.
+/// Velocity at rest, standard deviation, m/s: motion of the sea, or of the deck.
 const REST_SD_MPS: f64 = 0.02;
-/// And turns by so much in the mean of a second, rad/s.
+/// Mean turn rate over a second at rest, standard deviation, rad/s.
 const REST_SD_RADPS: f64 = 1e-3;
-/// It doesn't rest when that is more unlikely than once in ten thousand times.
+/// Gate of the rest hypothesis, exceeded once in ten thousand times.
 const REST_GATE: f64 = 15.1;
-/// A wall is as good as flat over so little, m, unless ranges are better still.
+/// Standard deviation of a range below which a wall counts as flat, m, unless ranges are more precise still.
 const NEAR_M: f64 = 0.03;
-/// How fast a vehicle is, m/s, when nobody knows.
+/// Prior standard deviation of the vehicle's speed, m/s.
 const SPEED_SD_MPS: f64 = 0.5;
-/// How far off an estimate beyond the wall may be, m.
+/// Standard deviation added to an estimate beyond the wall, m.
 const BEYOND_M: f64 = 1.5;
 
-/// Most steps of an epoch: its leg, and two at which errors may turn out larger than was believed; and an end.
+/// Maximum steps of an epoch: its leg, two widenings of the covariance, and an end.
 const STEPS: usize = 4;
-/// Samples are placed while the place in the section and the yaw are known so well, m and radians.
+/// Maximum standard deviations of position in the section and yaw for georeferencing, m and radians.
 const PLACE_LIMIT_M: f64 = 0.5;
 const YAW_LIMIT_RAD: f64 = 0.25;
-/// The same of chainage, against that when the heads last passed, and against the cable's length.
+/// The same for chainage, relative to the heads' previous pass, and to the cable's length.
 const ALONG_LIMIT_M: f64 = 1.0;
 
-/// What doesn't change during a dive.
+/// Parameters of a dive.
 #[derive(Debug, Clone)]
 pub struct Context {
-    /// The design.
+    /// Design profile.
     pub profile: Profile,
-    /// The water and the place.
+    /// Water and location.
     pub site: Site,
-    /// How far sensors are trusted.
+    /// Noise settings of the sensors.
     pub settings: Settings,
-    /// Where the inertial unit is on the vehicle.
+    /// Position of the inertial unit on the vehicle.
     pub unit_at: Vec3<Body>,
 }
 
 stateful!(Context { state: unit_at; fixed: profile, site, settings; });
 
-/// The estimate at a moment, and how far it may be off.
+/// The estimate at one time, and its covariance.
 #[derive(Debug, Clone)]
 pub struct Eskf {
-    /// The moment: all that was valid before has been fused.
+    /// Time of the estimate: all readings valid before have been fused.
     pub at: MonoNs,
-    /// The estimate then.
+    /// The estimated state.
     pub state: State,
     /// The covariance of its errors.
     pub factors: Factors<ERRORS>,
-    /// Errors against those before.
+    /// Clones for relative covariances.
     pub clones: ErrorClones,
-    /// When the way along the tunnel was last sought anew.
+    /// When the chainage was last reacquired.
     pub way_sought: Option<MonoNs>,
-    /// The estimate through the last epoch, before its measurements.
+    /// The estimates through the last epoch, before its measurements.
     knots: Vec<(MonoNs, State)>,
     agreement: Agreement,
-    /// What led from estimate to estimate in the last epoch, for smoothing; nothing unless it is kept.
+    /// Steps of the last epoch, for smoothing; empty unless they are kept.
     pub steps: Vec<Step>,
     keeps_steps: bool,
 }
@@ -87,7 +87,7 @@ pub struct Eskf {
 stateful!(Eskf { state: at, state, factors, clones, way_sought, agreement; lists: knots; fixed: steps, keeps_steps; });
 
 impl Default for Eskf {
-    /// Room for what an estimate needs, before there is one.
+    /// Allocated buffers without an estimate.
     fn default() -> Self {
         Self {
             at: MonoNs(0),
@@ -104,9 +104,9 @@ impl Default for Eskf {
 }
 
 impl Eskf {
-    /// Keeps from now on in `steps` what smoothing needs of an epoch. Whoever wants them takes them out after each.
+    /// From now on keeps in `steps` the data of an epoch for smoothing. The caller drains them after each epoch.
     ///
-    /// Allocates: their room.
+    /// Allocates: their buffer.
     pub fn keep_steps(&mut self) {
         self.steps.reserve_exact(STEPS);
         self.keeps_steps = true;
@@ -120,7 +120,7 @@ impl Eskf {
         self.way_sought = None;
     }
 
-    /// Goes on to a later moment, and fuses what the window has up to it.
+    /// Advances to a later time, and fuses the window's readings up to it.
     pub fn advance(
         &mut self,
         to: MonoNs,
@@ -165,13 +165,13 @@ impl Eskf {
         }
     }
 
-    /// Adds to the errors' variances: the estimate stays, and is less sure.
+    /// Adds to the error variances; the estimate stays.
     fn widen(&mut self, variances: &Errors) {
         self.keep(self.at, &Move::Widened(*variances), self.state);
         self.factors.widen(variances);
     }
 
-    /// Keeps a step that begins with the present estimate.
+    /// Records a step that begins with the current estimate.
     fn keep(&mut self, to: MonoNs, by: &Move, predicted: State) {
         if self.keeps_steps && self.steps.len() < STEPS {
             let (at, state, factors) = (self.at, self.state, self.factors);
@@ -179,12 +179,12 @@ impl Eskf {
         }
     }
 
-    /// Keeps that the estimate goes no further than this.
+    /// Records that the estimate ends here.
     pub fn keep_end(&mut self) {
         self.keep(self.at, &Move::End, self.state);
     }
 
-    /// Fuses that the vehicle doesn't move, unless that is too unlikely; and that a mean turn rate is its bias.
+    /// Fuses zero velocity (ZUPT), unless that is too unlikely, and a mean turn rate as the gyro bias.
     pub fn rest(&mut self, mean_radps: Option<Vec3<Body>>) {
         let rows = measure::rest(&self.state, REST_SD_MPS);
         let unlikely = |row: &ScalarUpdate| {
@@ -201,7 +201,7 @@ impl Eskf {
         self.state.correct(&errors);
     }
 
-    /// Whether the estimate is made of numbers.
+    /// True if state and covariance are finite and no variance is negative.
     pub fn is_sound(&self) -> bool {
         self.state.is_sound() && self.factors.is_sound()
     }
@@ -222,7 +222,7 @@ impl Eskf {
         (state, leg)
     }
 
-    /// The estimate at a moment of the last epoch, before its measurements.
+    /// The estimate at a time within the last epoch, before its measurements.
     fn state_at(&self, at: MonoNs) -> State {
         let next = self.knots.partition_point(|(knot, _)| *knot < at);
         let (before, after) = (self.knots.get(next.saturating_sub(1)), self.knots.get(next));
@@ -236,7 +236,7 @@ impl Eskf {
         before.between(after, share)
     }
 
-    /// Takes a row whose residual is against the estimate corrected by the errors that were known.
+    /// Fuses an update whose residual refers to the estimate corrected by the `known` errors.
     fn fuse(
         &mut self,
         row: &ScalarUpdate,
@@ -258,10 +258,10 @@ impl Eskf {
         }
     }
 
-    /// Variance of what a row leaves out, by its second derivatives. It matters only while the place or the attitude is
-    /// hardly known.
+    /// Variance of the second-order terms neglected by an update. It matters only while position or attitude is hardly
+    /// known.
     ///
-    /// Of a normal error e, f'' e^2 / 2 has a square of mean 3/4 (f'' sigma^2)^2.
+    /// For a normal error e, f'' e^2 / 2 has a mean square of 3/4 (f'' sd^2)^2.
     fn left_out(&self, [by_place, by_turn, by_both]: [f64; 3]) -> f64 {
         let sum = |axes: Range<usize>| axes.map(|i| self.factors.variance(i)).sum::<f64>();
         let (place, turn) = (sum(POSITION + 1..POSITION + 3), sum(ATTITUDE..ATTITUDE + 3));
@@ -269,8 +269,8 @@ impl Eskf {
         0.75 * bent * bent
     }
 
-    /// A row as noisy as what it measures is bent: looked at from a standard deviation to either side. `None` where there is
-    /// nothing to be seen from there.
+    /// Inflates R by the measurement's curvature, evaluated at +/-1 sd (sigma-point check). `None` if there is no measurement
+    /// from there.
     fn straight(
         &self,
         mut row: ScalarUpdate,
@@ -294,7 +294,7 @@ impl Eskf {
         Some(row)
     }
 
-    /// The vehicle is in the tunnel: an estimate beyond the wall, from where no beam could be told, is drawn back.
+    /// Pulls an estimate beyond the wall back into the tunnel: no beam could be predicted from there.
     fn stay_inside(&mut self, profile: &Profile) {
         let place = [self.state.position.y(), self.state.position.z()];
         if profile.contains(place) {
@@ -316,12 +316,12 @@ impl Eskf {
         self.state.correct(&errors);
     }
 
-    /// How far off the estimate may be.
+    /// Standard deviations of the estimate.
     pub fn pose_sd(&self) -> PoseSd {
         PoseSd::of(&self.state, &self.factors)
     }
 
-    /// Vehicles are no faster than a little, whatever an accelerometer without anything beside it makes of gravity.
+    /// Bounds the speed by its prior, against unaided accelerometers that integrate gravity.
     fn bound_speed(&mut self) {
         let mut errors = [0.0; ERRORS];
         for (axis, row) in measure::rest(&self.state, SPEED_SD_MPS).iter().enumerate() {
@@ -342,7 +342,7 @@ impl Eskf {
     }
 }
 
-/// What a row would have measured of the errors that have been found since those that were known.
+/// Part of an update's innovation due to the errors found since `known`.
 fn since(row: &ScalarUpdate, known: &Errors, errors: &Errors) -> f64 {
     row.h.iter().zip(errors.iter().zip(known)).map(|(h, (error, known))| h * (error - known)).sum()
 }
@@ -350,9 +350,9 @@ fn since(row: &ScalarUpdate, known: &Errors, errors: &Errors) -> f64 {
 /// Standard deviations of an estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PoseSd {
-    /// Of the chainage, its cable's scale left out, m.
+    /// Of the chainage, excluding the cable's scale, m.
     pub along_m: f64,
-    /// Of the place in the section, in the worse direction, m.
+    /// Of the position in the section, in the worse direction, m.
     pub place_m: f64,
     /// Of roll or pitch, radians.
     pub tilt_rad: f64,
@@ -378,9 +378,9 @@ impl PoseSd {
         }
     }
 
-    /// Whether samples may be placed by such an estimate, with errors against those a pass before.
+    /// Whether this estimate and relative covariance are good enough to georeference samples.
     ///
-    /// Errors: what is too uncertain.
+    /// Errors: the part that is too uncertain.
     pub fn standing(&self, relative: Relative) -> Result<Relative, NoFix> {
         if self.yaw_rad > YAW_LIMIT_RAD {
             Err(NoFix::Heading)
@@ -401,7 +401,7 @@ fn earlier(errors: &Errors, by_s: f64) -> Errors {
     then
 }
 
-/// What a reading measures; nothing where it can't be said.
+/// Scalar updates of a reading; none where it can't be predicted.
 fn rows(
     state: &State,
     context: &Context,
@@ -457,12 +457,12 @@ fn rows(
     }
 }
 
-/// An attitude of a unit against its own level, in the tunnel.
+/// Attitude of a unit relative to its level frame, turned into the tunnel frame.
 pub fn in_tunnel(site: &Site, level: Rot<Level, Sensor>) -> Rot<Tunnel, Sensor> {
     Rot::<Tunnel, Level>::from_roll_pitch_yaw(0.0, 0.0, -site.axis_yaw_rad) * level
 }
 
-/// A noise with that of rounding to a quantum.
+/// Standard deviation of noise and rounding to a quantum.
 pub fn with_quantum(sd: f64, quantum: f64) -> f64 {
     math::hypot(sd, quantum / math::sqrt(12.0))
 }

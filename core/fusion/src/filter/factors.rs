@@ -1,7 +1,7 @@
 //! A covariance kept as its factors: P = U D U^T, U unit upper triangular, D diagonal.
 //!
-//! Updates touch D by products and quotients of what is positive alone, so that P can't lose its symmetry or its
-//! sign however ill the scales are; an update by the covariance itself does, Joseph's form included, when a precise
+//! Updates change D by products and quotients of positive numbers alone, so that P stays symmetric and non-negative
+//! however badly it is scaled; updates of the covariance itself fail, Joseph's form included, when a precise
 //! measurement follows a long drift (see the tests).
 //!
 //! Source: Bierman, Factorization Methods for Discrete Sequential Estimation, 1977: V.3 (measurement), III.4
@@ -17,20 +17,20 @@ pub struct Factors<const N: usize> {
     d: [f64; N],
 }
 
-/// What a measurement of one row does.
+/// Result of a scalar measurement.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Gain<const N: usize> {
-    /// Change of each error for a unit of innovation.
+    /// Kalman gain: change of each error per unit of innovation.
     pub k: [f64; N],
     /// Variance of the innovation.
     pub variance: f64,
 }
 
-/// Noise that is to be added to one error or two.
+/// Process noise of one error or two.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Noise {
     variance: f64,
-    /// Which errors, and their weights; the first is the later one.
+    /// Indices of the errors and their weights; the first has the higher index.
     weights: [(usize, f64); 2],
 }
 
@@ -96,8 +96,8 @@ impl<const N: usize> Factors<N> {
         along
     }
 
-    /// e^T P^-1 e: how unlikely these errors are, chi-square with `N` degrees of freedom. Infinite where P says that an
-    /// error is known exactly, and it isn't zero.
+    /// e^T P^-1 e: squared Mahalanobis distance, chi-square with `N` degrees of freedom. Infinite where an error of zero
+    /// variance isn't zero.
     pub fn distance(&self, errors: &[f64; N]) -> f64 {
         let mut rest = *errors;
         let mut sum = 0.0;
@@ -113,7 +113,7 @@ impl<const N: usize> Factors<N> {
         sum
     }
 
-    /// P^-1 e, by back substitution. What P says is known exactly counts as nothing.
+    /// P^-1 e, by back substitution. Components of zero variance count as nothing.
     pub fn solve(&self, errors: &[f64; N]) -> [f64; N] {
         let mut rest = *errors;
         for (j, column) in self.u.iter().enumerate().rev() {
@@ -176,7 +176,7 @@ impl<const N: usize> Factors<N> {
         columns.flat_map(|(j, (column, d))| column.iter().take(j).copied().chain([*d]))
     }
 
-    /// Factors of such numbers; `None` when there are too few.
+    /// Factors from such numbers; `None` when there are too few.
     pub fn of_numbers(numbers: &mut impl Iterator<Item = f64>) -> Option<Self> {
         let mut factors = Self::independent([0.0; N]);
         for (j, (column, d)) in factors.u.iter_mut().zip(&mut factors.d).enumerate() {
@@ -187,7 +187,7 @@ impl<const N: usize> Factors<N> {
         Some(factors)
     }
 
-    /// Takes a measurement of the errors weighted by `h`, with noise of a variance that is positive.
+    /// Fuses a measurement of the errors weighted by `h`, with noise of a positive variance.
     ///
     /// Source: Bierman 1977, V.3.
     pub fn measure(&mut self, h: &[f64; N], noise: f64) -> Gain<N> {
@@ -212,7 +212,7 @@ impl<const N: usize> Factors<N> {
         Gain { k: k.map(|k| k / variance), variance }
     }
 
-    /// Adds noise of a variance to the errors, weighted by `a`, of which those from `len` on are zero.
+    /// Adds noise of a variance to the errors, weighted by `a`, whose entries from `len` on are zero.
     pub fn add(&mut self, mut variance: f64, mut a: [f64; N], len: usize) {
         for (j, (column, d)) in self.u.iter_mut().zip(&mut self.d).enumerate().take(len).rev() {
             enter(j, column, d, &mut variance, &mut a);
@@ -231,11 +231,11 @@ impl<const N: usize> Factors<N> {
         }
     }
 
-    /// Adds noises, the first first.
+    /// Adds noises in order.
     ///
-    /// They take turns column by column. That gives the same bits as one after the other, as none needs more of those
-    /// before it than the column it is at; and while one waits for its quotient, on which its next column depends, the
-    /// processor is at the others.
+    /// They take turns column by column. The result is bit-identical to adding one after the other, as each depends on those
+    /// before it only through the current column; and while one waits for its quotient, on which its next column depends,
+    /// the processor works on the others.
     pub fn add_all<const M: usize>(&mut self, noises: [Noise; M]) {
         let mut variances = noises.map(|noise| noise.variance);
         let lens = noises.map(|noise| noise.weights[0].0 + 1);
@@ -252,15 +252,15 @@ impl<const N: usize> Factors<N> {
         }
     }
 
-    /// Replaces the errors e by F e, where F is unit upper triangular: `transform` works on one vector of errors, of which
-    /// those from a number on are zero.
+    /// Replaces the errors e by F e, where F is unit upper triangular: `transform` works on one vector of errors, whose
+    /// entries from the given index on are zero.
     pub fn shear(&mut self, transform: impl Fn(&mut [f64; N], usize)) {
         for (j, column) in self.u.iter_mut().enumerate() {
             transform(column, j + 1);
         }
     }
 
-    /// Multiplies one error by a factor, which isn't zero.
+    /// Multiplies one error by a non-zero factor.
     pub fn scale(&mut self, i: usize, factor: f64) {
         if let Some(column) = self.u.get_mut(i) {
             for u in column.iter_mut().take(i) {
@@ -290,7 +290,7 @@ impl Noise {
         Self { variance, weights: [(i, 1.0); 2] }
     }
 
-    /// Noise of a variance in an error, and by a share in one before it.
+    /// Noise of a variance in an error, coupled by `share` into one of lower index.
     pub fn of_two(i: usize, (before, share): (usize, f64), variance: f64) -> Self {
         Self { variance, weights: [(i, 1.0), (before, share)] }
     }
@@ -304,8 +304,8 @@ impl Noise {
     }
 }
 
-/// Enters noise into column `j` of the factors, once it has entered those after it; what is left of its variance and its
-/// weights is for those before.
+/// Enters noise into column `j` of the factors, after the columns above it; the remaining variance and weights apply to
+/// the columns below.
 ///
 /// Source: Agee and Turner 1972, in Bierman 1977, III.4.
 fn enter<const N: usize>(j: usize, column: &mut [f64; N], d: &mut f64, variance: &mut f64, a: &mut [f64; N]) {
@@ -345,7 +345,7 @@ fn dot<const N: usize>(a: &[f64; N], b: &[f64; N], len: usize) -> f64 {
 mod tests {
     use super::*;
 
-    /// The same as it stands in the book, one noise at a time.
+    /// The textbook form, one noise at a time.
     fn add_alone(factors: &mut Factors<7>, noise: &Noise) {
         let (mut c, mut a) = (noise.variance, [0.0; 7]);
         noise.put(&mut a);

@@ -1,4 +1,4 @@
-//! From moment to moment: what gyros and accelerometers make of the estimate and of its errors.
+//! Inertial propagation of the estimate and of its errors.
 //!
 //! Derivation: `docs/fusion.md`, "Propagation".
 
@@ -14,34 +14,34 @@ use super::state::{
 use headrace_geometry::frames::{Body, Vec3};
 use headrace_geometry::math;
 
-/// What an inertial unit felt in the mean over some time, turned into the body's frame.
+/// Mean of an inertial unit's samples over an interval, in the body's frame.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Felt {
-    /// Turn rate, rad/s; `None` where no gyro speaks: the attitude then stays, and its error grows fast.
+    /// Turn rate, rad/s; `None` without gyro data: the attitude then stays, and its error grows fast.
     pub rate_radps: Option<Vec3<Body>>,
-    /// Specific force, m/s^2; `None` where no accelerometer speaks: the velocity then stays, and its error grows fast.
+    /// Specific force, m/s^2; `None` without accelerometer data: the velocity then stays, and its error grows fast.
     pub force_mps2: Option<Vec3<Body>>,
 }
 
-/// How many numbers a leg is made of.
+/// Number of values of a leg.
 pub const LEG_NUMBERS: usize = 1 + 5 * 9 + 2 * 3 + 2;
 
-/// What has been propagated since the errors were last moved on.
+/// Propagation accumulated since the errors were last propagated.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Leg {
     dt_s: f64,
-    /// Integral of the rotation while gyros speak.
+    /// Integral of the rotation while there is gyro data.
     turned: Matrix3<f64>,
-    /// The same while accelerometers speak, and the integral of that.
+    /// The same while there is accelerometer data, and its integral.
     pushed: Matrix3<f64>,
     pushed_twice: Matrix3<f64>,
-    /// Velocity and way by specific force, without gravity.
+    /// Velocity and displacement by specific force, without gravity.
     velocity: Vector3<f64>,
     way: Vector3<f64>,
-    /// What a gyro's bias does to velocity and way by tilting the force.
+    /// Effect of a gyro bias on velocity and displacement, by tilting the force.
     tilting: Matrix3<f64>,
     tilting_twice: Matrix3<f64>,
-    /// Time without gyros, and without accelerometers.
+    /// Time without gyro data, and without accelerometer data, s.
     blind_s: [f64; 2],
 }
 
@@ -62,14 +62,14 @@ impl Default for Leg {
 }
 
 impl State {
-    /// Moves the estimate on by what was felt over `dt_s`, and notes in `leg` what that does to its errors.
+    /// Propagates the estimate over `dt_s`, and accumulates the effect on its errors in `leg`.
     pub fn go_on(&mut self, felt: &Felt, dt_s: f64, gravity_mps2: f64, leg: &mut Leg) {
         let (turn, force) = self.move_on(felt, dt_s, gravity_mps2);
         leg.add(dt_s, turn, force, felt.rate_radps.is_some());
     }
 
-    /// Moves the estimate on by what was felt over `dt_s`; gives its attitude in the middle of that, and the specific force
-    /// in the tunnel's frame.
+    /// Propagates the estimate over `dt_s`; returns its attitude in the middle of that, and the specific force in the
+    /// tunnel's frame.
     pub fn move_on(
         &mut self,
         felt: &Felt,
@@ -112,7 +112,7 @@ impl Leg {
         *without_force += if force.is_some() { 0.0 } else { dt_s };
     }
 
-    /// Two equal lags in a row, driven by white noise.
+    /// Process noise of the slack: two equal lags in series, driven by white noise.
     fn slack_noises(&self, settings: &Settings) -> [Noise; 2] {
         let slack = settings.slack;
         let lags = self.dt_s / slack.time_s;
@@ -130,7 +130,7 @@ impl Leg {
         ]
     }
 
-    /// Its numbers, for a record.
+    /// Its values, for a record.
     pub fn numbers(&self) -> impl Iterator<Item = f64> + '_ {
         let squares = [&self.turned, &self.pushed, &self.pushed_twice, &self.tilting, &self.tilting_twice];
         let squares = squares.into_iter().flat_map(|matrix| matrix.iter().copied());
@@ -138,7 +138,7 @@ impl Leg {
         [self.dt_s].into_iter().chain(squares).chain(ways).chain(self.blind_s)
     }
 
-    /// The leg of such numbers; `None` when there are too few.
+    /// The leg from such values; `None` when there are too few.
     pub fn of_numbers(numbers: &mut impl Iterator<Item = f64>) -> Option<Self> {
         let mut leg = Self { dt_s: numbers.next()?, ..Self::default() };
         let squares = [
@@ -156,12 +156,12 @@ impl Leg {
         Some(leg)
     }
 
-    /// Its length, s.
+    /// Its duration, s.
     pub fn dt_s(&self) -> f64 {
         self.dt_s
     }
 
-    /// How errors at its beginning show at its end.
+    /// Transition of errors from its beginning to its end.
     pub fn transition(&self, settings: &Settings) -> Transition {
         let fading = |time_s: f64| math::exp(-self.dt_s / time_s).max(LEAST_FADING);
         Transition {
@@ -187,7 +187,7 @@ impl Leg {
         }
     }
 
-    /// Adds what can't be known of the way: noise of the sensors, and wandering of what is wrong with them.
+    /// Adds the process noise: noise of the inertial sensors, and drift of the sensor errors.
     pub fn disturb(&self, settings: &Settings, transition: &Transition, factors: &mut Factors<ERRORS>) {
         let [blind_rate_s, blind_force_s] = self.blind_s;
         let variance = |density: f64, blind_density: f64, blind_s: f64| {
@@ -197,7 +197,7 @@ impl Leg {
         let rate = variance(settings.rate_noise, settings.blind_rate_noise, blind_rate_s);
         for k in 0..3 {
             factors.add_all([
-                // White force over the leg: velocity and way vary together, and the way by a twelfth on its own.
+                // White force noise over the leg: displacement correlated with velocity, plus an independent dt^2 / 12.
                 Noise::of_two(VELOCITY + k, (POSITION + k, self.dt_s / 2.0), force),
                 Noise::of_one(POSITION + k, force * self.dt_s * self.dt_s / 12.0),
                 Noise::of_one(ATTITUDE + k, rate),
@@ -206,7 +206,7 @@ impl Leg {
         factors.add_all(self.wandering(settings, transition));
     }
 
-    /// How what is wrong with the sensors wanders.
+    /// Process noise of the sensor errors.
     fn wandering(&self, settings: &Settings, transition: &Transition) -> [Noise; 11] {
         let fading = |i: usize, wander: Wander| {
             let left = transition.left_of(i);
@@ -232,10 +232,10 @@ impl Leg {
     }
 }
 
-/// Beyond this little of an error is left to matter; to have none left would divide by zero.
+/// Least decay factor: below it an error hardly matters, and zero would lead to a division by zero.
 const LEAST_FADING: f64 = 1e-3;
 
-/// How errors at a moment show at a later one: e' = F e.
+/// Transition of errors between two times: e' = F e.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Transition {
     dt_s: f64,
@@ -246,12 +246,12 @@ pub struct Transition {
     way_pushed: Matrix3<f64>,
     velocity_turned: Matrix3<f64>,
     way_turned: Matrix3<f64>,
-    /// Errors that fade by themselves, and what is left of them.
+    /// Errors that decay, and their factors.
     fading: [(usize, f64); 9],
 }
 
 impl Transition {
-    /// Moves the factors on.
+    /// Propagates the factors.
     pub fn carry(&self, factors: &mut Factors<ERRORS>) {
         factors.shear(|column, len| self.shear(column, len));
         for (i, fading) in self.fading {
@@ -259,7 +259,7 @@ impl Transition {
         }
     }
 
-    /// Moves on what is wrong with the sensors: left to itself, it fades towards nothing.
+    /// Propagates the estimated sensor errors, which decay towards zero.
     pub fn fade(&self, state: &mut State) {
         state.force_bias_mps2 = state.force_bias_mps2.scaled(self.left_of(FORCE_BIAS));
         state.rate_bias_radps = state.rate_bias_radps.scaled(self.left_of(RATE_BIAS));
@@ -268,12 +268,12 @@ impl Transition {
         state.heading_offset_rad *= self.left_of(HEADING);
     }
 
-    /// What is left of an error by itself.
+    /// Decay factor of an error; 1 if it doesn't decay.
     fn left_of(&self, error: usize) -> f64 {
         self.fading.iter().find(|(i, _)| *i == error).map_or(1.0, |(_, left)| *left)
     }
 
-    /// Moves errors on.
+    /// Propagates errors.
     pub fn apply(&self, errors: &mut Errors) {
         self.shear(errors, ERRORS);
         for (i, fading) in self.fading {
@@ -283,7 +283,7 @@ impl Transition {
         }
     }
 
-    /// What doesn't fade; errors from `len` on are zero.
+    /// The part without decay; errors from `len` on are zero.
     fn shear(&self, e: &mut Errors, len: usize) {
         if len <= VELOCITY {
             return;

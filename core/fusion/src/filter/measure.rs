@@ -1,4 +1,4 @@
-//! Measurement models: what a sensor should show by the estimate, and how each error would change that.
+//! Measurement models: the value expected by the estimate, and its derivative with respect to each error.
 //!
 //! Derivation: `docs/fusion.md`, "Measurements".
 
@@ -10,30 +10,30 @@ use headrace_geometry::frames::{Body, Rot, Sensor, Tunnel, Vec3};
 use headrace_geometry::math;
 use headrace_geometry::tunnel::Profile;
 
-/// One number that was measured.
+/// A scalar measurement.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ScalarUpdate {
-    /// Change of what should be measured for a unit of each error.
+    /// Change of the expected value per unit of each error.
     pub h: Errors,
-    /// Measured less expected.
+    /// Measured minus expected.
     pub residual: f64,
     /// Variance of the measurement itself.
     pub noise: f64,
-    /// For a range, how the beam leans along the tunnel.
+    /// For a range, the beam's inclination along the tunnel.
     pub lean: Option<Lean>,
-    /// Second derivatives of what should be measured: by the place, 1/m; by a turn, m; by both. The row leaves them out.
+    /// Second derivatives of the expected value, neglected by the update: by position, 1/m; by rotation, m; by both.
     pub bends: [f64; 3],
 }
 
-/// How a beam leans along the tunnel. It makes the range longer whichever way it leans: a filter that isn't sure which way
-/// would take its first guess for proven.
+/// Inclination of a beam along the tunnel. It lengthens the range in either direction: a filter that isn't sure of the
+/// direction would take its first guess for proven.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Lean {
     /// Component of the beam along the tunnel.
     pub along: f64,
-    /// Its change for a unit of each error.
+    /// Its change per unit of each error.
     pub by: Errors,
-    /// Change of the range for a unit of `along`, for each unit of it, m.
+    /// Change of the range per unit of `along`, divided by `along`, m.
     pub slope_m: f64,
 }
 
@@ -42,7 +42,7 @@ impl ScalarUpdate {
         Self { h: [0.0; ERRORS], residual, noise, lean: None, bends: [0.0; 3] }
     }
 
-    /// One error itself.
+    /// A direct measurement of one error.
     pub fn of(error: usize, residual: f64, noise: f64) -> Self {
         Self::new(residual, noise).with_one(error, 1.0)
     }
@@ -59,8 +59,8 @@ impl ScalarUpdate {
         self
     }
 
-    /// The same row, without what it says of the beam's lean where that isn't known: `sd_of` gives the standard deviation of
-    /// a sum of errors.
+    /// The same update, without its dependence on the beam's inclination where the direction of that is uncertain: `sd_of`
+    /// gives the standard deviation of a weighted sum of errors.
     #[must_use]
     pub fn unless_sure(mut self, sd_of: impl Fn(&Errors) -> f64) -> Self {
         let Some(lean) = self.lean else { return self };
@@ -75,7 +75,7 @@ impl ScalarUpdate {
         self
     }
 
-    /// The same row for errors at a moment `later_s` after the measurement.
+    /// The same update for the errors `later_s` after the measurement.
     #[must_use]
     pub fn seen_later(mut self, later_s: f64) -> Self {
         for k in 0..3 {
@@ -88,27 +88,27 @@ impl ScalarUpdate {
     }
 }
 
-/// Beams that graze the wall more than this say little of where they start, and much of the wall's roughness.
+/// Minimum cosine of the incidence: beams that graze the wall more measure its roughness rather than the position.
 const LEAST_COSINE: f64 = 0.5;
-/// A wall nearer than this is not taken to bend more, m.
+/// Minimum distance of the wall assumed for its curvature, m.
 const LEAST_HEIGHT_M: f64 = 0.5;
-/// A lean is known when it is so many standard deviations from none.
+/// An inclination is certain when it is so many standard deviations from zero.
 const SURE: f64 = 3.0;
 
 /// A sonar's beam.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Beam {
-    /// From the inertial unit, in the body's frame.
+    /// Position relative to the inertial unit, in the body's frame.
     pub offset: Vec3<Body>,
-    /// Where its middle looks.
+    /// Direction of its axis.
     pub along: Vec3<Body>,
-    /// Angle from its middle within which the wall answers first where it is nearest, radians.
+    /// Angle from its axis within which the nearest part of the wall echoes first, radians.
     pub first_rad: f64,
-    /// Angle within which it may answer so, or not: nobody knows of this sonar, radians.
+    /// Half beam width within which the first-echo model is uncertain, radians.
     pub unsure_rad: f64,
 }
 
-/// Range of the first answer of the design wall. `None` where the beam meets no wall, or grazes it.
+/// Range of the first echo of the design wall. `None` where the beam misses the wall, or grazes it.
 pub fn range(state: &State, profile: &Profile, beam: &Beam, range_m: f64, sd_m: f64) -> Option<ScalarUpdate> {
     let arm = state.attitude * beam.offset;
     let origin = state.position + arm;
@@ -119,7 +119,7 @@ pub fn range(state: &State, profile: &Profile, beam: &Beam, range_m: f64, sd_m: 
     if cosine < LEAST_COSINE {
         return None;
     }
-    // The wall is a plane at `height_m`; the ray of the cone that is nearest to its normal answers first.
+    // The wall is a plane at `height_m`; the ray of the cone that is nearest to its normal echoes first.
     let height_m = hit.range_m * cosine;
     let incidence = math::acos(cosine);
     let nearest = (incidence - beam.first_rad).max(0.0);
@@ -128,14 +128,14 @@ pub fn range(state: &State, profile: &Profile, beam: &Beam, range_m: f64, sd_m: 
     // d expected / d incidence, and d incidence = turn . (along x normal) / sin(incidence).
     let slope = if nearest > 0.0 { expected_m * sin / cos / math::sin(incidence) } else { 0.0 };
     let turning = arm.cross(&normal).scaled(1.0 / cos) + along.cross(&normal).scaled(slope);
-    // It may be anything down to the nearest of the wider cone: of what is spread evenly over that, the mean square.
+    // The range may be as short as that of the wider cone's nearest ray: mean square of a uniform distribution.
     let soonest_m = height_m / math::cos((incidence - beam.unsure_rad).max(0.0));
     let unsure_m = (expected_m - soonest_m).max(0.0) / math::sqrt(3.0);
     let mut row = ScalarUpdate::new(range_m - expected_m, sd_m * sd_m + unsure_m * unsure_m);
     let mut by = [0.0; ERRORS];
     put(&mut by, ATTITUDE, Vec3::<Tunnel>::new(0.0, along.z(), -along.y()));
     let across = 1.0 - along.x() * along.x();
-    // The wall as if it bent like a circle about the sonar; and of height / cos(incidence).
+    // Curvature of a circular wall around the sonar, and of height / cos(incidence).
     let secant = 1.0 / cosine;
     let by_turn = expected_m * (2.0 * secant * secant - 1.0);
     let tangent = math::sqrt((secant * secant - 1.0).max(0.0));
@@ -154,7 +154,7 @@ pub fn height(state: &State, offset: Vec3<Body>, height_m: f64, sd_m: f64) -> Sc
         .with_one(DEPTH, 1.0)
 }
 
-/// Chainage that the cable shows, whose end is at `offset` from the inertial unit; its scale counts from `from_m`.
+/// Chainage shown by the cable, whose end is at `offset` from the inertial unit; its scale counts from `from_m`.
 pub fn chainage(state: &State, offset: Vec3<Body>, from_m: f64, chainage_m: f64, sd_m: f64) -> ScalarUpdate {
     let arm = state.attitude * offset;
     let way_m = state.position.x() + arm.x() - from_m;
@@ -167,9 +167,9 @@ pub fn chainage(state: &State, offset: Vec3<Body>, from_m: f64, chainage_m: f64,
         .with_one(SCALE, way_m)
 }
 
-/// Attitude as a unit's own computer has it, about the tunnel's x, y and z. About z it is a compass, with its deviation.
+/// Attitude computed by a unit, about the tunnel's x, y and z. About z it is a compass, with its deviation.
 ///
-/// Smooth at any attitude, a pitch of 90 degrees included: it compares rotations, and no angles.
+/// Smooth at any attitude, a pitch of 90 degrees included: it compares rotations, not angles.
 pub fn attitude(
     state: &State,
     measured: Rot<Tunnel, Body>,
@@ -187,7 +187,7 @@ pub fn attitude(
     ]
 }
 
-/// Velocity over ground in the frame of a sensor at `offset`, m/s, with the turn rate of the body.
+/// Velocity over ground in the frame of a sensor at `offset`, m/s; `rate_radps` is the turn rate of the body.
 pub fn velocity(
     state: &State,
     (offset, mounted): (Vec3<Body>, Rot<Body, Sensor>),
@@ -208,7 +208,7 @@ pub fn velocity(
     })
 }
 
-/// Of a unit that doesn't turn, the mean rate is its bias, rad/s.
+/// Gyro bias of a unit that doesn't turn: its mean rate, rad/s.
 pub fn no_turn(state: &State, mean_radps: Vec3<Body>, sd_radps: f64) -> [ScalarUpdate; 3] {
     let off = mean_radps + -state.rate_bias_radps;
     let off = [off.x(), off.y(), off.z()];
@@ -217,7 +217,7 @@ pub fn no_turn(state: &State, mean_radps: Vec3<Body>, sd_radps: f64) -> [ScalarU
     })
 }
 
-/// Rest: no velocity.
+/// Zero-velocity update (ZUPT).
 pub fn rest(state: &State, sd_mps: f64) -> [ScalarUpdate; 3] {
     let moved = [state.velocity_mps.x(), state.velocity_mps.y(), state.velocity_mps.z()];
     core::array::from_fn(|k| {

@@ -1,7 +1,7 @@
-//! Navigation by an error-state Kalman filter: inertial propagation, corrected by everything that the other sensors say.
+//! Navigation by an error-state Kalman filter: inertial propagation, corrected by all other sensors.
 //!
-//! Readings wait in a window until all of their time have come, and are fused at their own time, epoch by epoch; a fix is
-//! the estimate of the last epoch, carried on by what the inertial unit has felt since. `docs/fusion.md` derives it.
+//! Readings wait in a window until all of their time have come, and are fused at their time of validity, epoch by epoch; a
+//! fix is the estimate of the last epoch, propagated by the inertial samples since. Derivation: `docs/fusion.md`.
 
 pub mod agreement;
 pub mod align;
@@ -41,32 +41,32 @@ use headrace_snapshot::stateful;
 
 /// Length of an epoch; epochs begin at its multiples.
 pub(super) const EPOCH: DurNs = DurNs(100_000_000);
-/// A fix is given so long after the last epoch at most, beyond the window.
+/// Longest extrapolation of a fix beyond the last inertial sample.
 pub(super) const CARRIES: DurNs = DurNs(2_000_000_000);
-/// A clock that goes back by more than this has been set, and a reading doesn't speak of a time so far ahead.
+/// A clock that goes back by more than this has been set; readings stamped further in the future are rejected.
 pub(super) const CLOCK_JUMP: DurNs = DurNs(10_000_000_000);
-/// Attitudes, cables and depths are used so often: their errors last longer.
+/// Update periods of attitudes, cables and depths: their errors are correlated over longer times.
 const ATTITUDE_PERIOD: DurNs = DurNs(100_000_000);
 const TETHER_PERIOD: DurNs = DurNs(100_000_000);
 const DEPTH_PERIOD: DurNs = DurNs(500_000_000);
-/// An estimate that is farther off is begun anew: rays and attitudes aren't straight enough to lead it back.
+/// Standard deviations beyond which the estimate is restarted: linearized updates wouldn't converge.
 const LOST_PLACE_M: f64 = 3.0;
 const LOST_TILT_RAD: f64 = 0.2;
-/// So is one after nothing at all was heard for so long.
+/// Silence of all sensors after which the estimate is restarted.
 const SILENCE: DurNs = DurNs(5_000_000_000);
-/// No vehicle turns so fast, or feels so much: a saturated unit, or one that has lost its senses.
+/// Plausible limits of inertial samples; beyond them the unit is saturated or faulty.
 const MOST_RATE_RADPS: f64 = 10.0;
 const MOST_FORCE_MPS2: f64 = 50.0;
 /// Room for the estimates after the last epoch.
 const AHEAD: usize = 512;
-/// Of several heads, only some of the neighbouring passes are those of heads apart along the hull, and holes between these
-/// grow by less than they are parted. With this share of the time apart, D is within two of its standard deviations 93 %
-/// of the time over the dives of `tests/tests/navigation/fusion.rs` with four heads; over dives like them with none of it 80 %, with all of
-/// it 99 %.
+/// Share of the time between heads apart along the hull that counts towards the time between passes: only some
+/// neighbouring passes are by heads apart, and holidays between these grow by less than the heads' separation. With this
+/// share, D is within two of its standard deviations 93 % of the time over the dives of
+/// `tests/tests/navigation/fusion.rs` with four heads; over dives like them, 80 % with none of it and 99 % with all.
 const APART_SHARE: f64 = 0.4;
-/// Slower than this, m/s, a vehicle stands still.
+/// Speed below which a vehicle counts as standing still, m/s.
 const SLOW_MPS: f64 = 0.01;
-/// The time between two passes of heads when none is known to turn, and the longest between heads apart along the hull.
+/// Time between two head passes when no head is known to turn, and the longest between heads apart along the hull.
 const USUAL_GAP: DurNs = DurNs(20_000_000_000);
 
 /// See the module's description.
@@ -74,7 +74,7 @@ pub struct FilterNavigation {
     context: Context,
     window: Window,
     sources: [Option<Source>; MAX_SOURCES],
-    /// The inertial unit whose rates and forces are followed: the first that was heard. Its place is that of the estimate.
+    /// The inertial unit used for propagation: the first one heard. The estimate refers to its position.
     unit: Option<usize>,
     listening: Listening,
     stillness: Stillness,
@@ -82,12 +82,12 @@ pub struct FilterNavigation {
     is_running: bool,
     /// Epochs begin at this time, and at multiples of their length after it.
     epoch_zero: MonoNs,
-    /// The latest time at which anything came.
+    /// Latest receive time.
     received: MonoNs,
-    /// The estimate of the last epoch, carried on.
+    /// The estimate of the last epoch, propagated onwards.
     ahead: Vec<(MonoNs, State)>,
     standing: Result<Relative, NoFix>,
-    /// How often the estimate had to be begun anew: it was lost, no number any more, or the clock went back.
+    /// Number of restarts of the estimate: it was lost, not finite, or the clock went back.
     restarts: u64,
     journal: Option<Journal>,
 }
@@ -95,7 +95,7 @@ pub struct FilterNavigation {
 stateful!(FilterNavigation { state: context, window, unit, listening, stillness, running, is_running, epoch_zero, received, standing, restarts; lists: ahead; slots: sources; fixed: journal; });
 
 impl FilterNavigation {
-    /// Nothing is known yet.
+    /// Without readings yet.
     pub fn new(profile: Profile, site: Site, settings: Settings) -> Self {
         Self {
             context: Context { profile, site, settings, unit_at: Vec3::zero() },
@@ -120,12 +120,12 @@ impl FilterNavigation {
         self.is_running.then_some(&self.running)
     }
 
-    /// How often the estimate had to be begun anew.
+    /// Number of restarts of the estimate.
     pub fn restarts(&self) -> u64 {
         self.restarts
     }
 
-    /// Leaves from now on a record of what each epoch did, for smoothing.
+    /// From now on records the steps of each epoch, for smoothing.
     #[must_use]
     pub fn with_journal(mut self, journal: Journal) -> Self {
         self.running.keep_steps();
@@ -133,7 +133,7 @@ impl FilterNavigation {
         self
     }
 
-    /// Fuses every epoch that ended at or before a moment.
+    /// Fuses every epoch that ended at or before `until`.
     fn close_epochs(&mut self, until: MonoNs) {
         let last = self.epoch_before(until);
         if !self.is_running || self.running.at >= last {
@@ -141,7 +141,7 @@ impl FilterNavigation {
         }
         while self.running.at < last {
             let due = self.epoch_before(self.running.at + EPOCH);
-            // Over a time in which nothing was heard, one leg will do.
+            // An interval without readings is a single leg.
             let heard =
                 self.window.next_heard(self.running.at).map_or(last, |heard| self.epoch_before(heard));
             let to = due.max(heard).min(last);
@@ -175,7 +175,7 @@ impl FilterNavigation {
         }
     }
 
-    /// Writes that the estimate has come to its end.
+    /// Records the end of the estimate.
     fn write_end(&mut self) {
         if self.is_running && self.journal.is_some() {
             self.running.keep_end();
@@ -204,15 +204,15 @@ impl FilterNavigation {
         self.carry_ahead();
     }
 
-    /// Whether the cable was given up and believed anew since the heads last passed here: it has slipped, and nobody knows
-    /// where what was placed before lies against what is placed now.
+    /// Whether the chainage was reacquired since the heads last passed here: the cable has slipped, and the offset between
+    /// samples georeferenced before and now is unknown.
     fn has_jumped(&self) -> bool {
         let longest = self.between_passes(1.0);
         self.running.way_sought.is_some_and(|then| self.running.at.since(then).0 <= longest.0)
     }
 
-    /// Listens for a new first estimate: the last one is too far off to be corrected step by step. What has been placed
-    /// stays; the chainage is kept until the cable is heard.
+    /// Starts a new alignment: the last estimate is too far off to be corrected step by step. Georeferenced samples stay;
+    /// the chainage is kept until the cable is heard.
     fn begin_anew(&mut self, along_m: f64) {
         self.write_end();
         let x_m = self.running.state.position.x();
@@ -226,7 +226,7 @@ impl FilterNavigation {
         self.restarts += 1;
     }
 
-    /// The estimate at each moment since the last epoch at which the inertial unit has spoken.
+    /// Propagates the estimate to each inertial sample since the last epoch.
     fn carry_ahead(&mut self) {
         let (mut now, mut state) = (self.running.at, self.running.state);
         self.ahead.clear();
@@ -239,13 +239,13 @@ impl FilterNavigation {
         }
     }
 
-    /// Time over which errors part neighbouring passes over a place.
+    /// Time over which errors accumulate between neighbouring passes of a place.
     fn pass_gap(&self) -> DurNs {
         self.between_passes(APART_SHARE)
     }
 
-    /// Time between two passes of heads evenly spread, and a share of that in which the rearmost head comes to where the
-    /// foremost was.
+    /// Time between two passes of evenly spread heads, plus a share of the time until the rearmost head reaches the position
+    /// of the foremost.
     fn between_passes(&self, apart_share: f64) -> DurNs {
         let (mut passes_per_s, mut ahead_m, mut astern_m) = (0.0, f64::NEG_INFINITY, f64::INFINITY);
         for source in self.sources.iter().flatten() {
@@ -262,7 +262,7 @@ impl FilterNavigation {
         DurNs::from_secs_f64(1.0 / passes_per_s + apart_share * apart_s)
     }
 
-    /// Puts a reading where it will be fused, unless the ones before it say as much.
+    /// Puts a reading into the window, unless recent ones make it redundant.
     fn take(&mut self, number: usize, at: MonoNs, reading: &Reading) {
         let step_rad = self.context.settings.return_step_rad;
         let Some(Some(source)) = self.sources.get_mut(number) else { return };
@@ -314,7 +314,7 @@ impl FilterNavigation {
 impl Navigation for FilterNavigation {
     fn update(&mut self, number: usize, sensor: &SensorInfo, times: Times, reading: &Reading) {
         if self.received.since(times.received) > CLOCK_JUMP {
-            // Or the one before was stamped wrongly. Waiting until the time comes again would be no better.
+            // Or the timestamp before was wrong. Waiting until the clock catches up would be no better.
             let along_m = self.running.pose_sd().along_m;
             self.begin_anew(along_m);
             self.window.clear();
@@ -336,7 +336,7 @@ impl Navigation for FilterNavigation {
                 self.unit = Some(number);
                 self.context.unit_at = sensor.mount.position;
             }
-            // Nothing from before what is listened to will ever be fused.
+            // Readings from before the alignment are never fused.
             let old = self.received - LISTENS;
             self.window.drop_until(old);
             self.window.forget(old);

@@ -1,22 +1,22 @@
-//! How far each sensor is trusted. Defaults suit a small vehicle with a MEMS unit; a vehicle file's `[navigation]` table
-//! changes them.
+//! Noise settings of the sensors. Defaults suit a small vehicle with a MEMS unit; a vehicle file's `[navigation]` table
+//! overrides them.
 
 use headrace_geometry::time::DurNs;
 use headrace_sensor::device::SensorKind;
 
-/// In radians.
+/// One degree in radians.
 const DEGREE: f64 = core::f64::consts::PI / 180.0;
-/// Something that wanders about zero: a Gauss-Markov process.
+/// A Gauss-Markov process about zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Wander {
-    /// Standard deviation, in the units of what wanders.
+    /// Standard deviation, in the unit of the process.
     pub reach: f64,
-    /// Time over which it forgets itself, s.
+    /// Correlation time, s.
     pub time_s: f64,
 }
 
 impl Wander {
-    /// Standard deviation of what drives a process of two equal lags in a row, whose own is `reach`: it wanders smoothly.
+    /// Standard deviation of the driving rate of a smooth process (two equal lags in series) of standard deviation `reach`.
     pub fn drive(&self) -> f64 {
         core::f64::consts::SQRT_2 * self.reach / self.time_s
     }
@@ -29,7 +29,7 @@ pub struct Settings {
     pub rate_noise: f64,
     /// White noise of the accelerometers, m/s^2/sqrt(Hz).
     pub force_noise: f64,
-    /// The same where no gyro, or no accelerometer, speaks: how a vehicle turns and speeds up by itself.
+    /// The same without gyro, or accelerometer, data: the vehicle's own turning and acceleration.
     pub blind_rate_noise: f64,
     /// See `blind_rate_noise`.
     pub blind_force_noise: f64,
@@ -37,17 +37,17 @@ pub struct Settings {
     pub rate_bias: Wander,
     /// Bias of the accelerometers, m/s^2.
     pub force_bias: Wander,
-    /// A tether counter's noise beside its quantum, m.
+    /// Noise of a tether counter, its quantum excluded, m.
     pub tether_sd_m: f64,
-    /// Slack of the cable, m, which wanders smoothly: two lags in a row.
+    /// Slack of the cable, m, a smooth process: two lags in series.
     pub slack: Wander,
-    /// Scale of the cable at the start, a share, and how it wanders, a share per root of a second.
+    /// Initial scale error of the cable, a ratio, and its random walk, per root of a second.
     pub scale_sd: f64,
     /// See `scale_sd`.
     pub scale_noise: f64,
-    /// A depth sensor's noise beside its quantum, m.
+    /// Noise of a depth sensor, its quantum excluded, m.
     pub depth_sd_m: f64,
-    /// Its offset at the start, m, and how that wanders, m per root of a second: water level, density, surface pressure.
+    /// Its initial offset, m, and its random walk, m per root of a second: water level, density, surface pressure.
     pub depth_offset_sd_m: f64,
     /// See `depth_offset_sd_m`.
     pub depth_noise: f64,
@@ -55,25 +55,25 @@ pub struct Settings {
     pub heading_sd_rad: f64,
     /// A compass's deviation, radians.
     pub heading: Wander,
-    /// Noise of an attitude about level axes, radians, where gyros and accelerometers speak for themselves.
+    /// Noise of an attitude about level axes, radians, with gyro and accelerometer data.
     pub tilt_sd_rad: f64,
-    /// Noise of an attitude where they don't.
+    /// The same without these, radians.
     pub attitude_sd_rad: f64,
-    /// Noise of an echosounder, m, the wall's own roughness included.
+    /// Noise of an echosounder, m, wall roughness included.
     pub echo_sd_m: f64,
-    /// Full width of its beam, radians: within it nobody knows which part of the wall answers.
+    /// Full width of its beam, radians: which part of the wall within it echoes is uncertain.
     pub echo_beam_rad: f64,
-    /// Noise of a head's return, m, the wall's own roughness included.
+    /// Noise of a head's return, m, wall roughness included.
     pub return_sd_m: f64,
-    /// Full width of its beam, radians: the nearest part of the wall answers.
+    /// Full width of its beam, radians: the nearest part of the wall echoes first.
     pub return_beam_rad: f64,
-    /// Angle between two returns of a head that are used, radians: nearer ones see the same roughness.
+    /// Angle between the returns of a head that are used, radians: nearer ones see the same roughness.
     pub return_step_rad: f64,
     /// Noise of a velocity over ground, m/s.
     pub velocity_sd_mps: f64,
-    /// A measurement is left out when its innovation squared is more than this many times its variance.
+    /// Gate: a measurement is rejected when its innovation squared exceeds its variance by this factor.
     pub gate: f64,
-    /// Readings older than this when they come are too late.
+    /// Readings older than this on arrival are too late.
     pub window: DurNs,
 }
 
@@ -113,7 +113,7 @@ impl Default for Settings {
 const GATE_999: f64 = 10.828;
 
 impl Settings {
-    /// Variance of a measurement of a kind of sensor by itself, in its unit: the measure of what innovations have.
+    /// Measurement variance of a kind of sensor, in its unit squared: the reference for innovation variances.
     pub fn usual_variance(&self, kind: SensorKind) -> f64 {
         let sd = match kind {
             SensorKind::Head => self.return_sd_m,

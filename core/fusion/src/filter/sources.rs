@@ -1,4 +1,4 @@
-//! What the filter keeps of each source: how it sits, what it said last, and how well it agrees.
+//! The filter's record of each source: mount, last use, and innovation statistics.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,25 +8,25 @@ use headrace_sensor::device::SensorInfo;
 use headrace_sensor::reading::SonarReturn;
 use headrace_sensor::sampling::head::SILENT_AFTER;
 
-/// Share of a new rate of turning in the mean.
+/// Weight of a new turn rate in the running mean.
 const RATE_SHARE: f64 = 0.05;
 
-/// How a source's innovations are spread: a filter that is right has a mean NIS of 1.
+/// Innovation statistics of a source: a consistent filter has a mean NIS of 1.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Consistency {
-    /// Measurements that were used.
+    /// Measurements used.
     pub used: u64,
-    /// Measurements that were too unlikely to be used.
+    /// Measurements rejected by the gate.
     pub gated: u64,
-    /// Readings that came after their time.
+    /// Readings that arrived too late to be fused.
     pub late: u64,
-    /// Readings that weren't numbers, or for which there was no room.
+    /// Readings that were implausible, or for which there was no room.
     pub dropped: u64,
-    /// Sum of the normalised innovations squared (NIS) of those that were used.
+    /// Sum of the normalised innovations squared (NIS) of the measurements used.
     pub nis_sum: f64,
-    /// Minus twice the logarithm of the likelihood of all innovations, up to a constant for each measurement: a sum of NIS,
-    /// at the gate where they are beyond it, less 1, and of the logarithm of their variance against the usual one. Between two
-    /// ways of reading the same log, the one with less of it is likelier.
+    /// Minus twice the log-likelihood of all innovations, up to a constant for each measurement: sum of NIS (clamped at the
+    /// gate) less 1, and of the logarithm of the innovation variance over the usual one. Between two ways of reading the same
+    /// log, the lower one is likelier.
     pub surprise: f64,
 }
 
@@ -42,7 +42,7 @@ impl Consistency {
         }
     }
 
-    /// Mean NIS of the measurements that were used; `None` without any.
+    /// Mean NIS of the measurements used; `None` without any.
     pub fn nis(&self) -> Option<f64> {
         (self.used > 0).then(|| self.nis_sum / self.used as f64)
     }
@@ -51,17 +51,17 @@ impl Consistency {
 /// See the module's description.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Source {
-    /// How it sits, and what it is.
+    /// Mount and kind.
     pub sensor: SensorInfo,
-    /// How well it agrees.
+    /// Innovation statistics.
     pub consistency: Consistency,
     /// When a reading of it was last put into the window.
     pub taken: Option<MonoNs>,
-    /// For a head, how it turns.
+    /// For a head, its rotation.
     pub turning: Turning,
 }
 
-/// How a head turns, as far as navigation cares.
+/// Rotation of a head.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Turning {
     last: Option<(MonoNs, f64)>,
@@ -70,12 +70,12 @@ pub struct Turning {
 }
 
 impl Source {
-    /// A source that hasn't said anything.
+    /// A source without readings yet.
     pub fn new(sensor: SensorInfo) -> Self {
         Self { sensor, consistency: Consistency::default(), taken: None, turning: Turning::default() }
     }
 
-    /// Whether `period` has gone since its last reading in the window; then this one is the last.
+    /// Whether `period` has passed since its last reading in the window; if so, this one becomes the last.
     pub fn is_due(&mut self, at: MonoNs, period: DurNs) -> bool {
         let due = self.taken.is_none_or(|taken| at.since(taken).0.abs() >= period.0);
         if due {
@@ -86,7 +86,7 @@ impl Source {
 }
 
 impl Turning {
-    /// Notes a ping; whether it looks elsewhere than the last one that was used by `step_rad` or more.
+    /// Notes a ping; whether it has a range and looks at least `step_rad` away from the last one used.
     pub fn ping(&mut self, at: MonoNs, sonar: &SonarReturn, step_rad: f64) -> bool {
         if let Some((before, angle_rad)) = self.last {
             let dt_s = at.since(before).as_secs_f64();
@@ -106,7 +106,7 @@ impl Turning {
         elsewhere && sonar.range_m.is_some()
     }
 
-    /// Its turns in a second; `None` when it doesn't turn.
+    /// Turns per second; `None` when it doesn't turn.
     pub fn turns_per_s(&self, now: MonoNs) -> Option<f64> {
         let (last, _) = self.last?;
         (now.since(last).0.abs() <= SILENT_AFTER.0 && self.rate_radps > 0.0)

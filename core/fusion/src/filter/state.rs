@@ -1,4 +1,4 @@
-//! What the filter estimates, and the errors by which it differs from the truth.
+//! The filter's state vector and error state.
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
@@ -6,9 +6,9 @@ use serde::{Deserialize, Serialize};
 use headrace_geometry::frames::{Body, Point3, Rot, Tunnel, Vec3};
 use headrace_geometry::math;
 
-/// How many errors there are.
+/// Number of errors.
 pub const ERRORS: usize = 20;
-/// Of the inertial unit's position, m, in the tunnel's frame.
+/// Index of the error of the inertial unit's position, m, in the tunnel's frame.
 pub const POSITION: usize = 0;
 /// Of its velocity, m/s, in the tunnel's frame.
 pub const VELOCITY: usize = 3;
@@ -20,16 +20,16 @@ pub const FORCE_BIAS: usize = 9;
 pub const RATE_BIAS: usize = 12;
 /// Of the cable's slack, m.
 pub const SLACK: usize = 15;
-/// Of how fast the slack grows by itself, m/s.
+/// Of the rate of the slack, m/s.
 pub const SLACK_RATE: usize = 16;
-/// Of the cable's scale, a share.
+/// Of the cable's scale, a ratio.
 pub const SCALE: usize = 17;
 /// Of the depth sensor's offset, m of height.
 pub const DEPTH: usize = 18;
 /// Of the compass's deviation, radians.
 pub const HEADING: usize = 19;
 
-/// How many numbers a state is made of.
+/// Number of values of a state.
 pub const STATE_NUMBERS: usize = ERRORS + 1;
 
 /// One number for each error. Errors that drive others come after them: see `docs/fusion.md`.
@@ -38,30 +38,30 @@ pub type Errors = [f64; ERRORS];
 /// The estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct State {
-    /// Where the inertial unit is.
+    /// Position of the inertial unit.
     pub position: Point3<Tunnel>,
-    /// How fast it moves, m/s.
+    /// Its velocity, m/s.
     pub velocity_mps: Vec3<Tunnel>,
     /// Body to tunnel.
     pub attitude: Rot<Tunnel, Body>,
-    /// What the accelerometers show too much, m/s^2.
+    /// Accelerometer bias, m/s^2, to be subtracted.
     pub force_bias_mps2: Vec3<Body>,
-    /// What the gyros show too much, rad/s.
+    /// Gyro bias, rad/s, to be subtracted.
     pub rate_bias_radps: Vec3<Body>,
-    /// Chainage that the cable shows too much, m.
+    /// Slack of the cable, m: positive where it shows too much chainage.
     pub slack_m: f64,
-    /// What drives the slack, m/s: it fades as the slack does.
+    /// Driving rate of the slack, m/s: it decays as the slack does.
     pub slack_rate_mps: f64,
-    /// Share of the way by which the cable shows too much.
+    /// Scale error of the cable, a ratio: positive where it shows too much.
     pub scale: f64,
-    /// Height that the depth sensor shows too much, m.
+    /// Offset of the depth sensor, m: positive where it shows too much height.
     pub depth_offset_m: f64,
-    /// Angle by which the compass shows too much, radians, positive to the left.
+    /// Deviation of the compass, radians, positive to the left.
     pub heading_offset_rad: f64,
 }
 
 impl State {
-    /// At rest at a place, nothing known of what is wrong with the sensors.
+    /// At rest, with zero sensor errors.
     pub fn at_rest(position: Point3<Tunnel>, attitude: Rot<Tunnel, Body>) -> Self {
         Self {
             position,
@@ -77,7 +77,7 @@ impl State {
         }
     }
 
-    /// Corrects the estimate by errors that have been estimated.
+    /// Applies estimated errors to the estimate.
     pub fn correct(&mut self, errors: &Errors) {
         self.position = self.position + vec(errors, POSITION);
         self.velocity_mps = self.velocity_mps + vec(errors, VELOCITY);
@@ -116,7 +116,7 @@ impl State {
         errors
     }
 
-    /// The estimate between this and another, at a share of the way; what is wrong with the sensors is the other's.
+    /// The estimate interpolated by `share` towards another; the sensor errors are the other's.
     #[must_use]
     pub fn between(&self, other: &Self, share: f64) -> Self {
         let turn = rotation_vector(other.attitude * self.attitude.inverse());
@@ -128,7 +128,7 @@ impl State {
         }
     }
 
-    /// Its numbers, in the order of the errors; the attitude as a quaternion.
+    /// Its values, in the order of the errors; the attitude as a quaternion.
     pub fn numbers(&self) -> [f64; STATE_NUMBERS] {
         let [px, py, pz] = self.position.0.into();
         let [vx, vy, vz] = self.velocity_mps.0.into();
@@ -141,7 +141,7 @@ impl State {
         [px, py, pz, vx, vy, vz, w, x, y, z, fx, fy, fz, rx, ry, rz, s, r, scale, depth, heading]
     }
 
-    /// The estimate of such numbers; `None` when the attitude is none.
+    /// The estimate from such values; `None` when the quaternion is invalid.
     pub fn of_numbers(numbers: [f64; STATE_NUMBERS]) -> Option<Self> {
         let [px, py, pz, vx, vy, vz, w, x, y, z, fx, fy, fz, rx, ry, rz, s, r, scale, depth, heading] =
             numbers;
@@ -172,13 +172,13 @@ impl State {
     }
 }
 
-/// Three errors from a place on.
+/// Three errors from index `from` on.
 pub fn vec<F>(errors: &Errors, from: usize) -> Vec3<F> {
     let [x, y, z] = [0, 1, 2].map(|k| errors.get(from + k).copied().unwrap_or(0.0));
     Vec3::new(x, y, z)
 }
 
-/// Sets three errors from a place on.
+/// Sets three errors from index `from` on.
 pub fn put<F: Copy>(errors: &mut Errors, from: usize, value: Vec3<F>) {
     for (slot, value) in errors.iter_mut().skip(from).zip(value.0.iter()) {
         *slot = *value;

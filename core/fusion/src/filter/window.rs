@@ -1,4 +1,4 @@
-//! Readings that wait until all of their time have come: each is fused at its own time, in whatever order they came.
+//! Reordering window: readings wait until all of their time have come, and are fused in order of validity.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,27 +8,27 @@ use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::reading::Reading;
 use headrace_snapshot::stateful;
 
-/// Room for readings that wait; four heads, four sounders and the rest have a tenth of it in a window.
+/// Room for waiting readings; four heads, four sounders and the rest have a tenth of it in a window.
 const MOST: usize = 1024;
 /// Room for samples of inertial units.
 const MOST_FELT: usize = 1024;
-/// An inertial sample speaks for so much time at most.
+/// Longest interval for which an inertial sample is valid.
 const SPEAKS_FOR: DurNs = DurNs(100_000_000);
-/// Two samples nearer than this are parts of one.
+/// Samples nearer than this are merged.
 const SAME: DurNs = DurNs(500_000);
 
-/// A reading that waits.
+/// A waiting reading.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub struct Waiting {
-    /// When it is valid.
+    /// Time of validity.
     pub at: MonoNs,
     /// Its source.
     pub source: usize,
-    /// What was read.
+    /// The reading.
     pub reading: Reading,
 }
 
-/// Readings in order of time, those of one time in the order in which they came.
+/// Readings in order of validity; those of the same time in order of arrival.
 #[derive(Debug, Clone)]
 pub struct Window {
     waiting: Vec<Waiting>,
@@ -44,7 +44,7 @@ impl Default for Window {
 }
 
 impl Window {
-    /// Puts a reading in its place; false when there is no room.
+    /// Inserts a reading in order; false when there is no room.
     pub fn take(&mut self, reading: Waiting) -> bool {
         if self.waiting.len() == MOST {
             return false;
@@ -76,8 +76,8 @@ impl Window {
         self.felt.get_mut(place).map(|(_, felt)| felt)
     }
 
-    /// What was felt from `from` on, and until when that holds, `until` at the latest: the mean of a sample is that of the
-    /// time before it.
+    /// Inertial data from `from` on, and the end of its validity, `until` at the latest: a sample is the mean over the time
+    /// before it.
     pub fn felt(&self, from: MonoNs, until: MonoNs) -> (Felt, MonoNs) {
         let next = self.felt.partition_point(|(at, _)| *at <= from);
         let speaking = |number: Option<usize>| {
@@ -92,7 +92,7 @@ impl Window {
                 return (Felt { rate_radps: None, force_mps2: None }, later.clamp(from + DurNs(1), until));
             }
         };
-        // A unit that sends its rates and its forces by turns: the nearest of each.
+        // For a unit that sends rates and forces alternately: the nearest of each.
         let near = |pick: fn(&Felt) -> Option<Vec3<Body>>| {
             pick(&sample).or_else(|| {
                 let around = [Some(next + 1), next.checked_sub(1), next.checked_sub(2)];
@@ -104,36 +104,36 @@ impl Window {
         (felt, at.max(from + DurNs(1)).min(until))
     }
 
-    /// The first reading valid at or before a moment, which leaves the window.
+    /// Removes the first reading valid at or before `until`.
     pub fn pop(&mut self, until: MonoNs) -> Option<Waiting> {
         let first = self.waiting.first()?;
         (first.at <= until).then(|| self.waiting.remove(0))
     }
 
-    /// When the next reading of any kind after `at` is valid.
+    /// Time of validity of the next reading of any kind after `at`.
     pub fn next_heard(&self, at: MonoNs) -> Option<MonoNs> {
         let waiting = self.waiting.first().map(|waiting| waiting.at);
         waiting.into_iter().chain(self.next_felt(at)).min()
     }
 
-    /// When an inertial unit next spoke after `at`.
+    /// Time of the next inertial sample after `at`.
     pub fn next_felt(&self, at: MonoNs) -> Option<MonoNs> {
         self.felt.get(self.felt.partition_point(|(felt, _)| *felt <= at)).map(|(at, _)| *at)
     }
 
-    /// Forgets everything.
+    /// Removes everything.
     pub fn clear(&mut self) {
         self.waiting.clear();
         self.felt.clear();
     }
 
-    /// Forgets readings valid at or before a moment.
+    /// Removes readings valid at or before `at`.
     pub fn drop_until(&mut self, at: MonoNs) {
         let old = self.waiting.partition_point(|waiting| waiting.at <= at);
         self.waiting.drain(..old);
     }
 
-    /// Forgets samples of inertial units that no time after `at` needs.
+    /// Removes inertial samples not needed for any time after `at`.
     pub fn forget(&mut self, at: MonoNs) {
         let old = self.felt.partition_point(|(other, _)| *other + SPEAKS_FOR < at);
         self.felt.drain(..old.saturating_sub(2));

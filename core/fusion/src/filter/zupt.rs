@@ -1,4 +1,4 @@
-//! Whether the vehicle rests: on deck, or on the ground. It is then known not to move, and the gyros' bias shows.
+//! Zero-velocity (ZUPT) detector: a vehicle at rest on deck or on the ground. Its gyros then show their bias.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,10 +7,10 @@ use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::device::SensorKind;
 use headrace_sensor::reading::Reading;
 
-/// Means are taken over so long; a vehicle that floats never holds them for `MEANS` of them.
+/// Averaging window; a floating vehicle never stays steady for `MEANS` windows.
 const MEAN_OVER: DurNs = DurNs(1_000_000_000);
 const MEANS: u32 = 5;
-/// Means of turn rate and specific force that differ by more are those of motion: rad/s and m/s^2.
+/// Largest difference between means of turn rate and specific force at rest, rad/s and m/s^2.
 const SAME_RATE: f64 = 1e-3;
 const SAME_FORCE: f64 = 0.02;
 
@@ -23,7 +23,7 @@ pub struct Stillness {
     cable_still: bool,
 }
 
-/// Means over one time after another, against the first of those that are alike.
+/// Means of successive windows, compared with the first of a steady run.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 struct Means {
     since: Option<MonoNs>,
@@ -31,7 +31,7 @@ struct Means {
     count: f64,
     first: Option<[f64; 3]>,
     alike: u32,
-    /// The latest, until it is taken.
+    /// The latest mean, until it is taken.
     latest: Option<[f64; 3]>,
 }
 
@@ -55,7 +55,7 @@ impl Means {
 }
 
 impl Stillness {
-    /// Takes what a sensor says of motion.
+    /// Takes a reading.
     pub fn take(&mut self, at: MonoNs, kind: SensorKind, reading: &Reading) {
         match (kind, reading) {
             (SensorKind::Imu, Reading::AngularRate(rate)) => {
@@ -76,12 +76,12 @@ impl Stillness {
         }
     }
 
-    /// Whether gyros and accelerometers have said the same for long, and the cable hasn't moved.
+    /// Whether gyros and accelerometers have been steady for long, and the cable hasn't moved.
     pub fn is_still(&self) -> bool {
         self.rate.alike >= MEANS && self.force.alike >= MEANS && self.cable_still
     }
 
-    /// The mean turn rate of the last second, rad/s, once.
+    /// Mean turn rate of the last window, rad/s; returned once.
     pub fn take_mean_rate(&mut self) -> Option<Vec3<Sensor>> {
         self.rate.latest.take().map(|[x, y, z]| Vec3::new(x, y, z))
     }
@@ -93,7 +93,7 @@ mod tests {
     use headrace_geometry::math;
     use headrace_sensor::reading::TetherLength;
 
-    /// Whether it is still at the end of twenty seconds with this turn rate and way.
+    /// Whether it is at rest after twenty seconds with this turn rate and cable length.
     fn still(rate: impl Fn(f64) -> f64, way_m: impl Fn(f64) -> f64) -> bool {
         let mut stillness = Stillness::default();
         for k in 0..2000_u32 {

@@ -1,4 +1,4 @@
-//! From the dive's end to its beginning: each estimate of the filter is corrected by what was learnt after it.
+//! Backward pass over a dive: each estimate of the filter is corrected by the measurements after it.
 
 use super::relative_backward::Later;
 use super::rts_step::Gain;
@@ -14,27 +14,27 @@ use headrace_geometry::time::MonoNs;
 /// A smoothed estimate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate {
-    /// Its moment.
+    /// Its time.
     pub at: MonoNs,
-    /// What it is.
+    /// The smoothed state.
     pub state: State,
     /// The covariance of its errors.
     pub factors: Factors<ERRORS>,
 }
 
-/// Takes the filter's steps from the last to the first, and makes a track of them.
+/// Processes the filter's steps from the last to the first, and builds a track from them.
 pub struct Backward {
     settings: Settings,
     now: Option<(u32, Estimate)>,
     later: Later,
-    /// The last first, as are their points.
+    /// In reverse order, as are their points.
     pieces: Vec<Piece>,
     points: Vec<Point>,
     relatives: Vec<(MonoNs, Relative)>,
 }
 
 impl Backward {
-    /// With the settings that the filter had.
+    /// With the settings of the filter.
     pub fn new(settings: Settings) -> Self {
         Self {
             settings,
@@ -46,7 +46,7 @@ impl Backward {
         }
     }
 
-    /// Takes a step, that before the one taken last.
+    /// Takes the step before the one taken last.
     ///
     /// Allocates: its point of the track.
     pub fn take(&mut self, placed: &Placed) {
@@ -54,7 +54,7 @@ impl Backward {
         let after = self.now.filter(|(piece, _)| *piece == placed.piece).map(|(_, after)| after);
         let smoothed = after.and_then(|after| self.smooth(step, &after));
         let now = smoothed.unwrap_or_else(|| {
-            // Nothing later is known of it: it is as the filter left it.
+            // No later information: the filter's estimate stands.
             self.end_piece();
             self.pieces.push(Piece::begin(placed, self.points.len(), self.relatives.len()));
             Estimate { at: step.at, state: step.state, factors: step.factors }
@@ -70,7 +70,7 @@ impl Backward {
         self.now = Some((placed.piece, now));
     }
 
-    /// The estimate that was smoothed last, the earliest so far.
+    /// The estimate smoothed last, the earliest in time so far.
     pub fn now(&self) -> Option<&Estimate> {
         self.now.as_ref().map(|(_, now)| now)
     }
@@ -81,7 +81,7 @@ impl Backward {
         Track::of_reversed(self.pieces, self.points, self.relatives)
     }
 
-    /// The step's beginning, of the smoothed estimate at its end; `None` where numbers fail.
+    /// Smoothed estimate at the step's beginning, from that at its end; `None` if it isn't finite.
     fn smooth(&mut self, step: &Step, after: &Estimate) -> Option<Estimate> {
         if matches!(step.by, Move::End) {
             return None;

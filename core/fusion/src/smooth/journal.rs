@@ -1,4 +1,4 @@
-//! The way out for the filter's steps: a bounded queue, emptied between ticks by whoever keeps them.
+//! Output queue of the filter's steps: bounded, and drained between ticks by the recorder.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -9,14 +9,14 @@ use super::step::{Placed, Step, Words};
 use headrace_geometry::frames::{Body, Vec3};
 use headrace_geometry::time::DurNs;
 
-/// The end at which steps go in.
+/// Writing end of the queue.
 pub struct Journal {
     queue: Arc<Shared>,
     piece: u32,
     clock: u32,
 }
 
-/// The end at which their records come out, in order.
+/// Reading end of the queue; records come out in order.
 #[derive(Clone)]
 pub struct JournalReader {
     queue: Arc<Shared>,
@@ -28,7 +28,7 @@ struct Shared {
 }
 
 impl Journal {
-    /// A queue with room for so many records, and the end at which they come out.
+    /// A queue with room for `capacity` records, and its reading end.
     ///
     /// Allocates: all of it.
     pub fn new(capacity: usize) -> (Self, JournalReader) {
@@ -37,7 +37,7 @@ impl Journal {
         (Self { queue: Arc::clone(&queue), piece: 0, clock: 0 }, JournalReader { queue })
     }
 
-    /// A new first estimate: what follows has nothing to do with what was before.
+    /// Begins a new piece at a new first estimate, unrelated to what was before.
     pub fn begin(&mut self) {
         self.piece = self.piece.saturating_add(1);
     }
@@ -47,7 +47,7 @@ impl Journal {
         self.clock = self.clock.saturating_add(1);
     }
 
-    /// Writes a step. One that isn't sound, or finds no room, cuts the track there: no later one can correct those before.
+    /// Writes a step. One that isn't sound, or finds the queue full, breaks the track: no later one can correct those before.
     ///
     /// Allocates: never.
     pub fn write(&mut self, step: &Step, unit_at: Vec3<Body>, gap: DurNs) {
@@ -64,12 +64,12 @@ impl Journal {
 }
 
 impl JournalReader {
-    /// The oldest record that is waiting.
+    /// The oldest record waiting.
     pub fn next(&self) -> Option<Words> {
         self.queue.records.pop()
     }
 
-    /// How many found no room.
+    /// Number of records dropped because the queue was full.
     pub fn dropped(&self) -> u64 {
         self.queue.dropped.load(Ordering::Relaxed)
     }

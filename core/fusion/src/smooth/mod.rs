@@ -1,7 +1,7 @@
-//! Smoothing over a whole dive: what was learnt later corrects the estimates before.
+//! Smoothing over a whole dive: later measurements correct earlier estimates.
 //!
-//! While the filter runs it leaves a record of each step ([`step`], [`journal`]). Afterwards [`backward`] takes them the
-//! other way round and makes a [`track`] of them, by which the dive is replayed once more. Derivation: `docs/fusion.md`,
+//! The filter records each step as it runs ([`step`], [`journal`]). Afterwards [`backward`] processes the steps in reverse
+//! order and builds a [`track`], along which the dive is replayed once more. Derivation: `docs/fusion.md`,
 //! "Smoothing".
 
 pub mod backward;

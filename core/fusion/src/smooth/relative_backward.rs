@@ -1,5 +1,5 @@
-//! How well two smoothed moments are known against each other: later moments wait, on the way back, for those a pass of the
-//! heads before them.
+//! Relative error covariance between two smoothed epochs: on the backward pass, each later one waits for the epoch one
+//! head pass before it.
 
 use super::rts_step::Gain;
 use crate::filter::clones::{CLONES, MOVING, STEP};
@@ -8,45 +8,45 @@ use crate::filter::state::{ERRORS, Errors};
 use crate::relative::Relative;
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Nothing ties a moment to passes before it, however long before: the cable has slipped in between.
+/// Gap of an epoch that no earlier pass can be related to: the cable has slipped in between.
 pub const UNTIED: DurNs = DurNs(i64::MAX);
-/// How far off it may be then, m.
+/// Standard deviation of the chainage then, m.
 const UNTIED_M: f64 = 1e3;
 
-/// A moment that waits.
+/// A waiting epoch.
 #[derive(Debug, Clone, Copy)]
 struct Moment {
-    /// Which of all.
+    /// Its index in the results.
     number: usize,
     at: MonoNs,
-    /// How long before it the heads last passed.
+    /// Time since the heads' previous pass.
     gap: DurNs,
-    /// Rows of its covariance that move a sample.
+    /// Rows of its covariance for the errors that move a sample.
     own: [Errors; 3],
-    /// Covariances of all errors now with those of it.
+    /// Covariances of all errors at the current epoch with those of this one.
     with: [Errors; 3],
-    /// Its errors against those now, and how long ago that is, s.
+    /// Time from the current epoch to this one, s, and the relative covariance between them.
     age_s: f64,
     relative: Relative,
 }
 
-/// Moments that wait, the latest first.
+/// Waiting epochs, the latest first.
 #[derive(Debug, Clone, Default)]
 pub struct Later {
     waiting: Vec<Moment>,
     newest: Option<MonoNs>,
 }
 
-/// The errors of a moment against those a pass before.
+/// Index of an epoch, and its covariance relative to the pass before.
 pub type Answer = (usize, Relative);
 
 impl Later {
-    /// Whether a moment is far enough from the last one that was noted.
+    /// Whether an epoch is far enough from the last one noted.
     pub fn is_due(&self, at: MonoNs) -> bool {
         self.newest.is_none_or(|newest| newest.since(at).0 >= STEP.0)
     }
 
-    /// Notes a moment, which is to wait for the one `gap` before it; the answer of one that can't wait any longer.
+    /// Adds an epoch that waits for the one `gap` before it; returns the answer of one that has to make room.
     pub fn note(
         &mut self,
         number: usize,
@@ -62,7 +62,7 @@ impl Later {
         first
     }
 
-    /// Goes back to an earlier moment; answers of those that have waited for it.
+    /// Goes back to an earlier epoch, and answers those that waited for it.
     pub fn back(
         &mut self,
         at: MonoNs,
@@ -85,7 +85,7 @@ impl Later {
         });
     }
 
-    /// The piece has come to its beginning: answers of all that wait.
+    /// Beginning of the piece: answers all that wait.
     pub fn end(&mut self, answer: impl FnMut(Answer)) {
         self.waiting.drain(..).map(|moment| moment.answer()).for_each(answer);
         self.newest = None;
@@ -93,7 +93,7 @@ impl Later {
 }
 
 impl Moment {
-    /// As if what is known went on growing as evenly.
+    /// Extrapolates the covariance linearly in time.
     fn answer(&self) -> Answer {
         if self.gap == UNTIED {
             return (self.number, Relative::along(UNTIED_M));
@@ -103,7 +103,7 @@ impl Moment {
     }
 }
 
-/// Covariance of the difference of errors: those of a moment, those before it, and the latter with those of the moment.
+/// Covariance of the difference of errors: `own` of an epoch, `before` of an earlier one, `with` their cross-covariance.
 fn against(own: &[Errors; 3], before: &[Errors; 3], with: &[Errors; 3]) -> Relative {
     let of = |rows: &[Errors; 3], row: usize, error: usize| {
         rows.get(row).and_then(|row| row.get(error)).copied().unwrap_or(0.0)

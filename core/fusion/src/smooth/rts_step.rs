@@ -1,20 +1,20 @@
-//! A step of the smoother of Rauch, Tung and Striebel, on factors: neither a covariance's sign nor its symmetry can be lost.
+//! A step of the Rauch-Tung-Striebel smoother on factors: the covariance stays symmetric and non-negative.
 //!
 //! Source: H. E. Rauch, F. Tung, C. T. Striebel, Maximum likelihood estimates of linear dynamic systems, AIAA J. 3, 1965.
 
 use crate::filter::factors::Factors;
 
-/// How errors at a step's beginning follow from those at its end, once these are known better.
+/// Smoother gain: maps corrections at a step's end to its beginning.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Gain<const N: usize> {
     /// Rows of C = P F^T (F P F^T + Q)^-1.
     rows: [[f64; N]; N],
-    /// Rows of I - C F: what the end says nothing of.
+    /// Rows of I - C F: the part not determined by the end.
     rest: [[f64; N]; N],
 }
 
 impl<const N: usize> Gain<N> {
-    /// Of a covariance at the step's beginning, what the step does to errors, and the covariance at its end before the
+    /// From the covariance at the step's beginning, the step's error transition, and the covariance at its end before the
     /// measurements there.
     pub fn new(before: &Factors<N>, carry: impl Fn(&mut [f64; N]), predicted: &Factors<N>) -> Self {
         let unit: [[f64; N]; N] =
@@ -37,13 +37,13 @@ impl<const N: usize> Gain<N> {
         Self { rows, rest }
     }
 
-    /// Errors at the beginning, of those at the end.
+    /// Errors at the beginning from those at the end.
     pub fn back(&self, errors: &[f64; N]) -> [f64; N] {
         self.rows.map(|row| sum(&row, errors))
     }
 
-    /// The smoothed covariance at the beginning, of that of the filter there and the smoothed one S at the end with the
-    /// step's noise Q added to it: `(I - C F) P (I - C F)^T + C (S + Q) C^T`, which is P + C (S - F P F^T - Q) C^T.
+    /// Smoothed covariance at the beginning, from the filter's P there and the smoothed S at the end with the step's noise Q
+    /// added: `(I - C F) P (I - C F)^T + C (S + Q) C^T`, which is P + C (S - F P F^T - Q) C^T.
     pub fn smoothed(&self, before: &Factors<N>, end_and_noise: &Factors<N>) -> Factors<N> {
         Factors::of_sum([(before, &self.rest), (end_and_noise, &self.rows)])
     }

@@ -1,4 +1,4 @@
-//! What leads from one estimate of the filter to the next, and its record.
+//! A step between two estimates of the filter, and its record.
 
 use crate::filter::factors::Factors;
 use crate::filter::inertial::{LEG_NUMBERS, Leg};
@@ -9,74 +9,74 @@ use headrace_geometry::time::{DurNs, MonoNs};
 
 /// Numbers of a covariance's factors.
 const FACTOR_NUMBERS: usize = ERRORS * (ERRORS + 1) / 2;
-/// Words of a record that aren't the numbers of a step: the two times, the kind of move, piece, clock and gap.
+/// Header words of a record: the two times, the kind of move, piece, clock and gap.
 const HEADER: usize = 6;
 /// Words of a record.
 pub const WORDS: usize = HEADER + 3 + 2 * STATE_NUMBERS + FACTOR_NUMBERS + LEG_NUMBERS;
 
-/// A record: integers as they are, numbers as their bits. A small part of it is empty where a step needs less.
+/// A record: integers as they are, floats as their bits. Its tail is unused where a step needs less.
 pub type Words = [u64; WORDS];
 
-/// What happens between two estimates beside measurements.
+/// Change between two estimates other than by measurements.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[expect(clippy::large_enum_variant, reason = "most are legs, and few are kept at a time")]
 pub enum Move {
-    /// The vehicle goes on.
+    /// Propagation over a leg.
     Leg(Leg),
-    /// It is seen that the errors' variances are larger by so much than was believed.
+    /// Variances added to the errors', found to be too small.
     Widened(Errors),
-    /// Nothing: this was the last estimate of its piece.
+    /// None: this was the last estimate of its piece.
     End,
 }
 
-/// A step from an estimate, measurements included, to the one before the next measurements.
+/// A step from an estimate, measurements included, to the prediction before the next measurements.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Step {
-    /// When it begins.
+    /// Start time.
     pub at: MonoNs,
-    /// When it ends.
+    /// End time.
     pub to: MonoNs,
     /// The estimate at its beginning.
     pub state: State,
     /// The covariance of its errors.
     pub factors: Factors<ERRORS>,
-    /// What happens.
+    /// The change.
     pub by: Move,
     /// The estimate at its end, before the measurements there.
     pub predicted: State,
 }
 
-/// A step and its place in the dive.
+/// A step with its context in the dive.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Placed {
     /// The step.
     pub step: Step,
-    /// Where the inertial unit, whose place the estimate is, sits on the vehicle, m.
+    /// Position on the vehicle of the inertial unit, to which the estimate refers, m.
     pub unit_at: Vec3<Body>,
-    /// Time between two passes of heads over a place.
+    /// Time between two head passes of a place.
     pub gap: DurNs,
-    /// Number of the piece, of steps that follow upon each other.
+    /// Number of the piece, a run of contiguous steps.
     pub piece: u32,
-    /// How often the clock had been set back.
+    /// Number of times the clock had been set back.
     pub clock: u32,
 }
 
 impl Step {
-    /// Whether all its numbers can be reckoned with.
+    /// Whether all its numbers are finite and no variance is negative.
     pub fn is_sound(&self) -> bool {
         self.state.is_sound() && self.predicted.is_sound() && self.factors.is_sound()
     }
 }
 
 impl Move {
-    /// How errors at the beginning show at the end.
+    /// Propagates errors from the beginning to the end.
     pub fn carry(&self, settings: &Settings, errors: &mut Errors) {
         if let Self::Leg(leg) = self {
             leg.transition(settings).apply(errors);
         }
     }
 
-    /// Adds to the covariance at the end what can't be known of the way.
+    /// Adds the process noise to the covariance at the end.
     pub fn disturb(&self, settings: &Settings, factors: &mut Factors<ERRORS>) {
         match self {
             Self::Leg(leg) => leg.disturb(settings, &leg.transition(settings), factors),
@@ -85,7 +85,7 @@ impl Move {
         }
     }
 
-    /// The covariance before the measurements at the end: the same bits as the filter's own.
+    /// Covariance before the measurements at the end, bit-identical to the filter's.
     pub fn predict(&self, settings: &Settings, factors: &Factors<ERRORS>) -> Factors<ERRORS> {
         let mut predicted = *factors;
         if let Self::Leg(leg) = self {
@@ -128,7 +128,7 @@ impl Placed {
         words
     }
 
-    /// What a record says; `None` of one that isn't whole.
+    /// Parses a record; `None` if it is malformed.
     pub fn of_words(words: &Words) -> Option<Self> {
         let (header, numbers) = words.split_first_chunk::<HEADER>()?;
         let [at, to, kind, piece, clock, gap] = *header;

@@ -1,4 +1,4 @@
-//! The smoother against an independent oracle: all errors of all times at once, by their normal equations.
+//! The smoother against an independent oracle: batch least squares over all errors of all times, by normal equations.
 
 use nalgebra::{SMatrix, SVector};
 
@@ -11,13 +11,13 @@ use crate::filter::state::{ERRORS, State};
 use headrace_geometry::frames::{Point3, Rot, Vec3};
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Place, speed, and what a sensor shows too much.
+/// Position, speed, sensor bias.
 const N: usize = 3;
 const TIMES: usize = 12;
 const ALL: usize = N * TIMES;
 const START: [f64; N] = [4.0, 0.25, 0.09];
 const WHITE: [f64; N] = [0.0, 0.01, 1e-4];
-/// At this time the place turns out to be anywhere near.
+/// Time and variance of a jump in position.
 const JUMP: (usize, f64) = (7, 30.0);
 const FADING: f64 = 0.9;
 const NOISE: f64 = 0.04;
@@ -32,7 +32,7 @@ fn white(time: usize) -> [f64; N] {
     [place + if time == JUMP.0 { JUMP.1 } else { 1e-3 }, speed, bias]
 }
 
-/// What is measured: the place with the bias now and then, the speed at times.
+/// Measurements by turns: position with bias, speed, position, none.
 fn measured(time: usize) -> Option<([f64; N], f64)> {
     let value = f64::from(u32::try_from((time * 37) % 11).unwrap()) / 4.0;
     match time % 4 {
@@ -45,11 +45,11 @@ fn measured(time: usize) -> Option<([f64; N], f64)> {
 
 struct Known {
     means: [[f64; N]; TIMES],
-    /// Of all errors of all times with each other.
+    /// Joint covariance of all errors of all times.
     covariance: SMatrix<f64, ALL, ALL>,
 }
 
-/// Information of the start, of each step and of each measurement, added up and turned over.
+/// Information of the start, the steps and the measurements, summed and inverted.
 fn all_at_once() -> Known {
     let mut information = SMatrix::<f64, ALL, ALL>::zeros();
     let mut vector = SVector::<f64, ALL>::zeros();
@@ -127,7 +127,7 @@ fn forwards() -> Vec<Filtered> {
         .collect()
 }
 
-/// Means, covariances, and covariances of any two times are those of all at once.
+/// Means, covariances, and cross-covariances of any two times equal those of the batch solution.
 #[test]
 fn val_smoothing_is_least_squares_over_all_times() {
     let known = all_at_once();
@@ -137,7 +137,7 @@ fn val_smoothing_is_least_squares_over_all_times() {
     };
     let last = filtered.last().unwrap();
     let (mut mean, mut factors) = (last.mean, last.factors);
-    // Covariances of each later time's errors, column by column, with those now.
+    // Cross-covariances of each later time's errors with the current ones, by columns.
     let unit = |m: usize| core::array::from_fn(|i| if i == m { 1.0 } else { 0.0 });
     let mut later = vec![(TIMES - 1, core::array::from_fn::<[f64; N], N, _>(|m| factors.along(&unit(m))))];
     for time in (0..TIMES - 1).rev() {
@@ -164,7 +164,7 @@ fn val_smoothing_is_least_squares_over_all_times() {
     }
 }
 
-/// What is known to the last digit after the step, from much less, and where nothing disturbs: no variance gets negative,
+/// Near-exact measurements after the step on a poor prior, with and without process noise: no variance becomes negative,
 /// and none grows.
 #[test]
 fn verif_no_variance_loses_its_sign() {

@@ -1,4 +1,4 @@
-//! Where the vehicle was, as is known after the dive, and navigation along it.
+//! The vehicle's smoothed trajectory, and navigation along it.
 
 use core::ops::Range;
 
@@ -16,7 +16,7 @@ use headrace_sensor::reading::MAX_SOURCES;
 use headrace_sensor::reading::Reading;
 use headrace_snapshot::stateful;
 
-/// The inertial unit at a moment.
+/// State of the inertial unit at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Point {
     at: MonoNs,
@@ -25,7 +25,7 @@ pub(super) struct Point {
     sd: PoseSd,
 }
 
-/// A stretch of time without a break.
+/// A contiguous span of the track.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Piece {
     clock: u32,
@@ -50,7 +50,7 @@ impl Point {
 }
 
 impl Piece {
-    /// Begins, from behind, where there are so many points and relatives.
+    /// Begins at these counts of points and relatives, in reverse order.
     pub(super) fn begin(placed: &Placed, points: usize, relatives: usize) -> Self {
         Self {
             clock: placed.clock,
@@ -66,7 +66,7 @@ impl Piece {
 }
 
 impl Track {
-    /// Of pieces, points and relatives from the last to the first.
+    /// From pieces, points and relatives in reverse order.
     pub(super) fn of_reversed(
         mut pieces: Vec<Piece>,
         mut points: Vec<Point>,
@@ -83,31 +83,31 @@ impl Track {
         Self { pieces, points, relatives }
     }
 
-    /// How many pieces it has: one more than it has breaks.
+    /// Number of pieces: one more than of breaks.
     pub fn pieces(&self) -> usize {
         self.pieces.len()
     }
 
-    /// How many moments it is known at.
+    /// Number of points.
     pub fn len(&self) -> usize {
         self.points.len()
     }
 
-    /// Whether nothing is known of it.
+    /// Whether it has no points.
     pub fn is_empty(&self) -> bool {
         self.points.is_empty()
     }
 
-    /// Where the vehicle was at a moment of a clock that had been set back so often.
+    /// Fix at time `at` of the clock after it had been set back `clock` times.
     ///
-    /// Errors: what isn't known well enough there.
+    /// Errors: the part that isn't known well enough there.
     pub fn fix(&self, clock: u32, at: MonoNs) -> Result<Fix, NoFix> {
         let begun = |piece: &&Piece| {
             piece.clock == clock && self.points_of(piece).first().is_some_and(|first| first.at <= at)
         };
         let piece = self.pieces.iter().rev().find(begun).ok_or(NoFix::Heading)?;
         let points = self.points_of(piece);
-        // Beyond the last point, on along the last leg.
+        // Beyond the last point, the last leg is extrapolated.
         let next = points.partition_point(|point| point.at <= at).min(points.len().saturating_sub(1));
         let (before, after) = (points.get(next.saturating_sub(1)), points.get(next));
         let (before, after) = before.zip(after).ok_or(NoFix::Heading)?;
@@ -130,7 +130,7 @@ impl Track {
         self.points.get(piece.points.clone()).unwrap_or_default()
     }
 
-    /// Errors against those when the heads last passed, between moments in proportion.
+    /// Covariance relative to the heads' previous pass, interpolated linearly in time.
     fn relative(&self, piece: &Piece, at: MonoNs) -> Relative {
         let known = self.relatives.get(piece.relatives.clone()).unwrap_or_default();
         let next = known.partition_point(|(moment, _)| *moment <= at);
@@ -144,7 +144,7 @@ impl Track {
     }
 }
 
-/// The pose at a share of the way from one to another, or beyond.
+/// The pose interpolated by `share` from one to another, or extrapolated.
 fn between(from: &Pose, to: &Pose, share: f64) -> Pose {
     let turn = rotation_vector(to.attitude * from.attitude.inverse());
     Pose {
@@ -153,7 +153,7 @@ fn between(from: &Pose, to: &Pose, share: f64) -> Pose {
     }
 }
 
-/// Navigation along a track, whatever the sensors say.
+/// Navigation along a track, independent of the readings.
 pub struct TrackNavigation {
     track: Track,
     consistency: [Option<Consistency>; MAX_SOURCES],
@@ -164,7 +164,7 @@ pub struct TrackNavigation {
 stateful!(TrackNavigation { state: clock, received; slots: consistency; fixed: track; });
 
 impl TrackNavigation {
-    /// Along a track that a filter made, which had found its sources to agree so well.
+    /// Along a track made by a filter, with the innovation statistics of its sources.
     pub fn new(track: Track, consistency: [Option<Consistency>; MAX_SOURCES]) -> Self {
         Self { track, consistency, clock: 0, received: MonoNs(0) }
     }
@@ -172,7 +172,7 @@ impl TrackNavigation {
 
 impl Navigation for TrackNavigation {
     fn update(&mut self, _: usize, _: &SensorInfo, times: Times, _: &Reading) {
-        // As the filter counts it.
+        // Counted as in the filter.
         if self.received.since(times.received) > CLOCK_JUMP {
             self.clock = self.clock.saturating_add(1);
             self.received = times.received;
@@ -185,7 +185,7 @@ impl Navigation for TrackNavigation {
     }
 
     fn fix(&self, at: MonoNs) -> Result<Fix, NoFix> {
-        // The first ping after the clock was set back is asked for before it is known to have been.
+        // The fix of the first ping after the clock was set back is requested before the reset is known.
         if self.received.since(at) > CLOCK_JUMP {
             return Err(NoFix::Heading);
         }

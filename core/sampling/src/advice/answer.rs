@@ -82,14 +82,14 @@ pub enum Remedy {
     /// The middle of the tunnel, level and straight.
     Centre,
     /// A steady heading.
-    Hysteresis,
+    HoldHeading,
 }
 
 impl Remedy {
     /// Its number in published data; 0 stands for no remedy.
     pub fn number(self) -> u64 {
         match self {
-            Self::Hysteresis => 1,
+            Self::HoldHeading => 1,
             Self::Centre => 2,
             Self::Mode(_) => 3,
         }
@@ -97,7 +97,7 @@ impl Remedy {
 
     /// The remedy with that number, with the name of the mode for [`Remedy::Mode`]; `None` for any other number.
     pub fn of(number: u64, mode: &str) -> Option<Self> {
-        let all = [Self::Hysteresis, Self::Centre, Self::Mode(ModeName::new(mode))];
+        let all = [Self::HoldHeading, Self::Centre, Self::Mode(ModeName::new(mode))];
         all.into_iter().find(|remedy| remedy.number() == number)
     }
 
@@ -106,7 +106,7 @@ impl Remedy {
         match self {
             Self::Mode(name) => name.as_str(),
             Self::Centre => "centre",
-            Self::Hysteresis => "steady",
+            Self::HoldHeading => "steady",
         }
     }
 }

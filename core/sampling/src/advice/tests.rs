@@ -101,7 +101,7 @@ fn the_largest_speed_is_one_at_which_the_phases_of_heads_apart_hold() {
     assert!(v_max < 0.99 * even, "{v_max} and {even}");
     let faster = Case::new(&[0.0, 0.0], &[0.8, 0.0], 0.5, 1.0).advice();
     assert!(advice.phase_error_rad.unwrap().abs() < 1e-9 && faster.phase_error_rad.unwrap().abs() > 0.5);
-    // Above that speed, the advice is one that meets the target.
+    // At too high a speed, the advice is a speed that meets the target.
     let passes = Phasing::of(&case.situation).at(faster.v_max_mps);
     let t_m = |v: f64| spacing::t_max_m(v * passes.gap_s(passes.heads()).unwrap(), v * 0.02, faster.t_y_m);
     assert!(faster.v_max_mps > 0.1 && t_m(faster.v_max_mps) <= 1.0);
@@ -320,7 +320,7 @@ fn the_swing_of_the_vehicle_slows_it_down_and_a_steady_heading_helps() {
     assert!(little.v_max_mps > swung.v_max_mps, "{little:?}");
     let wild = advise(Swing { rate_radps: 0.2, most_rad: 1.0 });
     assert_eq!((wild.v_max_mps, wild.reason), (0.0, Reason::AngularStep));
-    assert_eq!(wild.remedy, Some(Remedy::Hysteresis));
+    assert_eq!(wild.remedy, Some(Remedy::HoldHeading));
     assert!(wild.will_exceed && !still.will_exceed);
 }
 

@@ -1,4 +1,4 @@
-//! What an engineer asks of a plan, and the answer for each mode.
+//! Questions to a plan, and the answer for each mode.
 
 use serde::Serialize;
 
@@ -7,8 +7,8 @@ use crate::error::{SamplingError, positive};
 use crate::section;
 use crate::spacing::Spiral;
 
-/// What is asked. A target asks for the speed, a speed or a time for the target that they allow; both ask whether one
-/// meets the other.
+/// A planning question. A target asks for the speed; a speed or a time asks for the target that it allows; both
+/// together ask whether they are compatible.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Question {
     /// Target T, m.
@@ -30,62 +30,62 @@ pub struct Answer {
     pub steps_per_turn: u32,
     /// T: time of a turn, seconds.
     pub turn_s: f64,
-    /// Where that time comes from: `measured`, `table` or `estimated`.
+    /// Source of that time: `measured`, `table` or `estimated`.
     pub turn_basis: &'static str,
     /// epsilon: overlap of neighbouring beams; below 1, none. Eq. 22.
     pub overlap: f64,
-    /// T_y at rest and where the vehicle should be, straight from sample to sample: smallest, m. Eq. 5 or 7.
+    /// T_y at rest and at the nominal pose, straight-line distance between samples: smallest, m. Eq. 5 or 7.
     pub t_y_min_rest_m: f64,
     /// The same: mean, m. Eq. 10.
     pub t_y_mean_rest_m: f64,
     /// The same: largest, m. Eq. 6.
     pub t_y_max_rest_m: f64,
-    /// T_yp: what the mean is at most, m. Eq. 10.
+    /// T_yp: upper bound of the mean, m. Eq. 10.
     pub t_yp_m: f64,
-    /// T_y2: the largest distance between neighbours of one turn on the wall, anywhere the vehicle may be, m.
+    /// T_y2: the largest distance between neighbours of one turn on the wall, at any tolerated pose, m.
     pub t_y2_m: f64,
     /// The largest speed that meets the target, m/s.
     pub v_max_mps: Option<f64>,
     /// Hours at that speed for the whole length.
     pub needed_h: Option<f64>,
-    /// Why no speed does: `angular_step`, `unseen_strip` or `off_axis`.
+    /// Why no speed meets the target: `angular_step`, `unseen_strip` or `off_axis`.
     pub reason: Option<&'static str>,
-    /// The same in words.
+    /// The same as a message.
     pub refused: Option<String>,
-    /// The speed for which the rest is: the one asked about, or else `v_max_mps`, m/s.
+    /// Speed of the figures below: the one asked about, or else `v_max_mps`, m/s.
     pub speed_mps: Option<f64>,
-    /// What it gives.
+    /// Spacing at that speed.
     pub spacing: Option<Spacing>,
     /// Whether the target is met at the speed asked about.
     pub meets_target: Option<bool>,
-    /// Whether the time asked about is enough at `v_max_mps`.
+    /// Whether the time asked about suffices at `v_max_mps`.
     pub suffices: Option<bool>,
-    /// Whether it is the best choice of the modes.
+    /// Whether it is the best of the modes.
     pub best: bool,
 }
 
 /// Distances between samples at a speed, m.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Spacing {
-    /// d: way gone between two pings. Eq. 11.
+    /// d: distance travelled between two pings. Eq. 11.
     pub advance_m: f64,
-    /// v T: way gone in a turn. Eq. 12.
+    /// v T: distance travelled in a turn. Eq. 12.
     pub pitch_m: f64,
     /// T_x where all heads see the wall.
     pub t_x_m: f64,
-    /// T_x where the fewest do.
+    /// T_x on the strip with the longest gap between passes.
     pub t_x_hidden_m: f64,
-    /// T_ymin, the way gone included. Eq. 14.
+    /// T_ymin, including the advance. Eq. 14.
     pub t_y_min_m: f64,
-    /// Mean T_y, the way gone included.
+    /// Mean T_y, including the advance.
     pub t_y_mean_m: f64,
-    /// T_ymax, the way gone included. Eq. 13.
+    /// T_ymax, including the advance. Eq. 13.
     pub t_y_max_m: f64,
     /// T_min. Eq. 18.
     pub t_min_m: f64,
     /// T_mean. Eq. 17.
     pub t_mean_m: f64,
-    /// T_max anywhere the vehicle may be, hidden strips included. Eq. 16. `None` where a strip is seen by no head.
+    /// T_max at any tolerated pose, including hidden strips. Eq. 16. `None` where a strip is seen by no head.
     pub t_max_m: Option<f64>,
     /// The smallest feature that is sure to be hit once.
     pub hit_once_m: Option<f64>,
@@ -96,8 +96,8 @@ pub struct Spacing {
 impl Planner {
     /// The answers for all modes, or for the one named.
     ///
-    /// Errors: nothing asked; a target, speed or time that isn't above zero. A target that a mode can't meet is an
-    /// answer.
+    /// Errors: no target, speed or time; one that isn't above zero. A target that a mode can't meet is an answer, not
+    /// an error.
     pub fn answers(&self, question: &Question, only: Option<&str>) -> Result<Vec<Answer>, SamplingError> {
         let Question { target_m, speed_mps, time_s } = *question;
         let length_m = self.inspection().length_m;
@@ -196,7 +196,7 @@ struct Asked {
     needed_mps: Option<f64>,
 }
 
-/// Best is the mode that is fastest for the target, or finest at the speed asked about.
+/// Marks the best mode: the fastest for the target, or the finest at the speed asked about.
 fn mark_best(answers: &mut [Answer], asked: &Asked) {
     let t_max = |answer: &Answer| answer.spacing.and_then(|spacing| spacing.t_max_m);
     let best = if asked.asked_mps.is_some() {

@@ -1,4 +1,4 @@
-//! What the crew has to know besides the figures of a mode: what the vehicle hides, how heads start, who disturbs whom.
+//! Briefing of the crew beyond the figures of a mode: hidden angles, starts of the heads, and interference.
 
 use serde::Serialize;
 
@@ -17,13 +17,13 @@ pub struct Briefing {
     pub mode: &'static str,
     /// The speed, m/s.
     pub speed_mps: f64,
-    /// What is hidden from each head.
+    /// Angles hidden from each head.
     pub hidden: Vec<Hidden>,
-    /// Strips of the wall that not all heads see, or, in sectors, none does.
+    /// Strips of the wall with fewer passes than the rest, or with none.
     pub strips: Vec<ThinStrip>,
-    /// How each head starts.
+    /// Start of each head.
     pub starts: Vec<Start>,
-    /// For heads apart along the hull, what would make them start at equal angles.
+    /// For heads apart along the hull, the spacing rule for starts at equal angles.
     pub hull_rules: Vec<HullAdvice>,
     /// Pairs of heads that can hear each other.
     pub exposures: Vec<Heard>,
@@ -34,39 +34,39 @@ pub struct Briefing {
 pub struct Hidden {
     /// The head.
     pub head: usize,
-    /// Its middle, degrees in the head's own frame.
+    /// Its middle, degrees in the sensor frame.
     pub middle_deg: f64,
     /// Its size, degrees.
     pub size_deg: f64,
-    /// What it hides of the wall, m.
+    /// Length of wall that it hides, m.
     pub wall_m: f64,
-    /// Where the middle of that is, o'clock seen looking along the tunnel.
+    /// Clock position of the middle of that, seen looking along the tunnel.
     pub clock: String,
 }
 
 /// A strip of the wall with fewer passes than the rest.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ThinStrip {
-    /// Where it begins, arc length in m.
+    /// Arc length of its start, m.
     pub from_m: f64,
     /// Its width, m.
     pub width_m: f64,
-    /// Where its middle is, o'clock.
+    /// Clock position of its middle.
     pub clock: String,
     /// The heads that see it.
     pub seen_by: Vec<usize>,
-    /// T_x there over T_x where all see; `None` where none does.
+    /// Ratio of T_x there to the smallest T_x of any strip; `None` where no head sees it.
     pub t_x_factor: Option<f64>,
 }
 
-/// What a head is told to do.
+/// Start of a head's program.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Start {
     /// The head.
     pub head: usize,
-    /// Angle of its first ping, degrees in its own frame.
+    /// Angle of its first ping, degrees in the sensor frame.
     pub angle_deg: f64,
-    /// Whether its angles grow from there.
+    /// Whether its angle grows from there.
     pub growing: bool,
     /// Its sector: least angle and size, degrees.
     pub sector_deg: Option<[f64; 2]>,
@@ -77,13 +77,13 @@ pub struct Start {
 pub struct HullAdvice {
     /// The head.
     pub head: usize,
-    /// How far it is behind the foremost, m.
+    /// Distance behind the foremost head, m.
     pub behind_m: f64,
-    /// s-ths of a turn in which the vehicle goes that far, to the nearest.
+    /// s-ths of a turn in which the vehicle travels that far, to the nearest.
     pub q: u32,
-    /// The speed that would fit, m/s.
+    /// The speed that fits the rule, m/s.
     pub speed_mps: f64,
-    /// The distance that would fit, m.
+    /// The distance that fits the rule, m.
     pub apart_m: f64,
 }
 
@@ -94,14 +94,14 @@ pub struct Heard {
     pub heads: [usize; 2],
     /// Face to face, seconds of each turn or sweep.
     pub facing_s: f64,
-    /// On the same patch of wall, seconds of each.
+    /// On the same patch of wall, seconds of each turn or sweep.
     pub same_patch_s: f64,
-    /// The turn or sweep, seconds.
+    /// Period of the turn or sweep, seconds.
     pub of_s: f64,
 }
 
 impl Planner {
-    /// The briefing for a mode at a speed, the vehicle where it should be.
+    /// The briefing for a mode at a speed, at the nominal pose.
     ///
     /// Errors: a speed that isn't above zero.
     pub fn briefing(&self, mode: usize, speed_mps: f64) -> Result<Briefing, SamplingError> {

@@ -113,7 +113,7 @@ fn side_walls_that_neighbours_hide_get_half_of_the_passes() {
     for strip in hidden {
         assert!(strip.seen_by.len() == 2 && (strip.arc.length_m - 1.7).abs() < 0.1, "{strip:?}");
     }
-    // Steps are short on the side walls; the corners, seen by all, don't come to as much.
+    // Steps are short on the side walls; the corners, seen by all, give less.
     let t_m = planner.t_max_m(fast, 0.1).unwrap();
     assert!((0.41..0.43).contains(&t_m), "{t_m}");
 }
@@ -124,7 +124,7 @@ fn in_sectors_heads_look_outwards_and_leave_their_distance_at_floor_and_crown() 
     assert!(planner.hidden().iter().all(|ranges| ranges.len() == 1));
     let strips = planner.nominal_strips().unwrap().as_slice();
     let unseen: Vec<_> = strips.iter().filter(|strip| strip.seen_by.is_empty()).collect();
-    // Nothing is hidden in the sectors that they take; but between 0.3 m apart they see neither floor nor crown.
+    // The sectors are free of occlusion; but heads 0.3 m apart see neither floor nor crown between them.
     assert_eq!(unseen.len(), 2, "{strips:?}");
     assert!(unseen.iter().all(|strip| (strip.arc.length_m - 0.3).abs() < 0.01));
     let answers = planner.answers(&speed(0.4), None).unwrap();
@@ -186,7 +186,7 @@ fn what_cannot_be_planned_is_named() {
     for bad in [0.0, -1.0, f64::NAN] {
         assert!(planner.answers(&speed(bad), None).is_err() && planner.t_max_m(0, bad).is_err());
     }
-    // A target that a mode can't meet is an answer.
+    // A target that a mode can't meet is an answer, not an error.
     let answers = planner.answers(&speed(0.1), None).unwrap();
     assert!(answers[0].v_max_mps.is_some() && answers[4].reason == Some("angular_step"));
 }
@@ -199,7 +199,7 @@ fn drift_and_yaw_only_make_it_worse() {
     for mode in 0..MODES.len() {
         assert!(drifting.modes()[mode].t_y2_m > 1.5 * still.modes()[mode].t_y2_m);
         assert!(drifting.v_max_mps(mode, 3.0).unwrap() < still.v_max_mps(mode, 3.0).unwrap());
-        // What the vehicle does where it should be stays the same.
+        // Values at the nominal pose are unchanged.
         let same = drifting.modes()[mode].chords_m.iter().zip(still.modes()[mode].chords_m);
         assert!(same.into_iter().all(|(a, b)| (a - b).abs() < 1e-12));
     }

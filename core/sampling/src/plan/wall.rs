@@ -1,4 +1,4 @@
-//! What a plan leaves on the wall, place by place.
+//! Planned spacing and sample pattern on the wall, place by place.
 
 use super::Planner;
 use crate::error::{SamplingError, positive};
@@ -9,7 +9,7 @@ use crate::spacing;
 use headrace_geometry::math;
 use headrace_geometry::time::DurNs;
 
-/// Spacing at a place of the perimeter, the vehicle where it should be.
+/// Spacing at a place of the perimeter, at the nominal pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WallPlace {
     /// Its arc length, m.
@@ -18,7 +18,7 @@ pub struct WallPlace {
     pub t_y_m: f64,
     /// Distance between passes, m, the smaller and the larger where two alternate; `None` where no head sees it.
     pub t_x_m: Option<[f64; 2]>,
-    /// T of both, m.
+    /// T from both, m.
     pub t_m: Option<f64>,
 }
 
@@ -27,18 +27,18 @@ pub struct WallPlace {
 pub struct PatternSample {
     /// Number of the head.
     pub head: usize,
-    /// Chainage, m, zero where the vehicle's origin is at the start.
+    /// Chainage, m, relative to the vehicle's origin at the start.
     pub x_m: f64,
     /// Arc length, m.
     pub arc_m: f64,
-    /// The vehicle stands in its way.
+    /// Hidden by the vehicle.
     pub hidden: bool,
-    /// The first of a head, or after a turning point.
+    /// First sample of a head, or the first after a turning point.
     pub new_sweep: bool,
 }
 
 impl Planner {
-    /// Spacing around the perimeter in a mode at a speed, at so many equal places.
+    /// Spacing around the perimeter in a mode at a speed, at `places` equidistant places.
     ///
     /// Errors: a speed that isn't above zero; as for [`Standing::sounding`].
     pub fn perimeter(
@@ -65,7 +65,7 @@ impl Planner {
             let share = around.share.get(k).copied().flatten();
             let t_x_m = gap_s.map(|gap_s| {
                 let longest_m = speed_mps * gap_s;
-                // In a sector two distances alternate, of which this is the sum.
+                // In a sector two distances alternate; `longest_m` is their sum.
                 share.map_or([longest_m; 2], |share| layout::divided_m(longest_m, share))
             });
             let t_y_m = around.t_y_m.get(k).copied().unwrap_or(0.0);
@@ -75,7 +75,7 @@ impl Planner {
         Ok((0..places).map(place).collect())
     }
 
-    /// The samples of some turns in a mode at a speed, head by head, each in order of time.
+    /// The samples of a number of turns in a mode at a speed, head by head, each in order of time.
     ///
     /// Errors: a speed or number of turns that isn't above zero; as for [`Standing::sounding`].
     pub fn pattern(
@@ -113,11 +113,11 @@ impl Planner {
     }
 }
 
-/// Equal places around the perimeter, filled head by head.
+/// Equidistant places around the perimeter, filled head by head.
 struct Around {
     perimeter_m: f64,
     t_y_m: Vec<f64>,
-    /// Where in its head's sector a place is, from 0 to 1.
+    /// Position of a place in its head's sector, from 0 to 1.
     share: Vec<Option<f64>>,
 }
 
@@ -130,7 +130,7 @@ impl Around {
         self.perimeter_m * (place as f64 + 0.5) / self.t_y_m.len() as f64
     }
 
-    /// The step of a head that passes over each place that it sees.
+    /// Records a head's step at each place that it passes over and sees.
     fn add(
         &mut self,
         planner: &Planner,

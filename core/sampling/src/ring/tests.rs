@@ -133,7 +133,7 @@ fn few_pings_a_turn_leave_most_of_the_wall_between_them() {
     let ring = Ring::cast(&standing(&profile), 0.0, 1200).unwrap();
     let perimeter_m = profile.perimeter_m();
     assert!((ring.largest_step_m(1200) - perimeter_m).abs() < 1e-9);
-    // Two per turn: in either direction round, one of the steps is at least half of the perimeter.
+    // Two per turn: one of the two steps is at least half of the perimeter.
     assert!(ring.largest_step_m(600) >= perimeter_m / 2.0 - 1e-9);
     // Seen from close to the left wall, a third of a turn spans more than half of the perimeter.
     let near = Standing::new(&profile, &pose(&profile, 9.9, 0.0, 0.0), &mount()).unwrap();

@@ -8,7 +8,7 @@ const PING_S: f64 = 0.02;
 const GOING: Going =
     Going { ping_period_s: PING_S, swing_mps: 0.0, shift_m: 0.0, apart_m: 0.0, swing_most_m: None };
 
-/// A pipe of 30 m around, on whose axis every step is as long as the other.
+/// A pipe 30 m around; on its axis all steps are equally long.
 fn pipe() -> Profile {
     shapes::circle(30.0 / math::TAU).unwrap()
 }
@@ -86,7 +86,7 @@ fn a_narrow_hidden_strip_counts_as_a_long_step_if_that_is_better() {
     // Pings may end a step before it on either side.
     let v = speed(&some, &turning(2), 0.8).unwrap();
     assert!((v - closed(0.8, 0.5, 4.0)).abs() < 1e-9);
-    // Narrower than the spacing of the ring's soundings, it is noticed all the same.
+    // Narrower than the spacing of the ring's soundings, it still counts.
     let sliver = strips(&[all_around(&[arc(7.0013, 1e-4)])]);
     let v = speed(&sliver, &turning(1), 0.8).unwrap();
     assert!((v - closed(0.8, 0.4001, 8.0)).abs() < 1e-9, "{v}: {sliver:?}");
@@ -125,7 +125,7 @@ fn sectors_that_leave_a_place_out_are_noticed_and_pinged_up_to_their_ends() {
 
 #[test]
 fn steps_count_where_they_are() {
-    // A rectangle's steps are long in its corners; a strip in the middle of the floor has none of these.
+    // A rectangle's steps are long in its corners; a strip in the middle of the floor has none of them.
     let profile = shapes::rectangle(8.0, 4.0).unwrap();
     let ring = ring(&profile);
     let mut some = Strips::default();
@@ -145,7 +145,7 @@ fn what_swings_or_is_shifted_makes_passes_farther_apart() {
     assert!(v < speed(&one, &turning(1), 0.5).unwrap() - 0.01);
     let worse = Going { swing_mps: 0.1, ..rough };
     assert!(one.bound_for_target(0, &turning(1), 0.5, &worse).is_err());
-    // A swing that comes to an end leaves room for speed.
+    // A bounded swing leaves room for speed.
     let to_and_fro = Going { swing_most_m: Some(0.1), ..worse };
     let v = one.bound_for_target(0, &turning(1), 0.5, &to_and_fro).unwrap().speed_mps;
     assert!((one.t_max_m(0, &turning(1), v, &to_and_fro) - 0.5).abs() < 1e-12);
@@ -186,7 +186,7 @@ fn a_strip_over_the_seam_is_one() {
 
 #[test]
 fn without_room_more_is_hidden_and_not_less() {
-    // Slots all around, out of reach, and two views with too little room for them.
+    // Slots all around, out of reach, and two views with too little capacity for them.
     let points: Vec<[f64; 2]> = (0..240)
         .map(|k| {
             let (sine, cosine) = math::sin_cos(math::TAU * (f64::from(k) + 0.3) / 240.0);

@@ -178,7 +178,7 @@ mod tests {
     }
 
     proptest! {
-        /// However the input is split, all bytes are passed on in order, with non-decreasing times, and the frames are the codec's.
+        /// However the input is split, all bytes are passed on in order, times never decrease, and the frames are the codec's.
         #[test]
         fn nothing_is_lost_or_changed(
             bytes in proptest::collection::vec(prop_oneof![Just(0xA5u8), Just(0x5A), 0u8..7], 0..200),

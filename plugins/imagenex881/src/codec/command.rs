@@ -118,7 +118,8 @@ pub enum CommandError {
 }
 
 /// Linear scale of a byte: value = zero + code * num / den.
-/// || A fraction, because a product with 0.3 or 0.01 is off by an ulp for some codes.
+///
+/// A fraction, because a product with 0.3 or 0.01 is off by an ulp for some codes.
 struct Scale {
     field: &'static str,
     unit: &'static str,

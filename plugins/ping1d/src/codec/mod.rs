@@ -40,7 +40,8 @@ impl Addressed {
 }
 
 /// Framing of messages in a byte stream, in either direction.
-/// || A frame of a known id with a length that doesn't fit its message is rejected as early as possible, so that a false length
+///
+/// A frame of a known id with a length that doesn't fit its message is rejected as early as possible, so that a false length
 /// swallows no further frames. Only texts and unknown messages have no length to check.
 /// Source: Ping protocol, packet format.
 #[derive(Debug, Clone, Copy, Default)]

@@ -1,4 +1,4 @@
-//! What is found, against what was put in.
+//! Estimates against the simulated errors.
 
 use super::super::heads::{Heads, heads};
 use super::super::scan::gather;
@@ -27,7 +27,7 @@ fn wrong(seed: u64) -> [Wrong; 2] {
     ]
 }
 
-/// Angles, places against each other, and senses of rotation, within three of the stated standard deviations; and these
+/// Angles, relative positions and senses of rotation are within three of the stated standard deviations; and these
 /// are as small as a survey needs.
 #[test]
 fn verif_offsets_that_were_put_in_are_found() {
@@ -66,7 +66,7 @@ fn verif_offsets_that_were_put_in_are_found() {
     println!("worst error {:.2} sigma, widest sigma {:.2} of what a survey needs", worst.0, worst.1);
 }
 
-/// The mount that is offered looks where the head looks.
+/// The estimated mount points where the head does.
 #[test]
 fn the_mount_that_is_found_looks_where_the_head_does() {
     let (_, profile) = profiles().into_iter().next().unwrap();
@@ -83,7 +83,7 @@ fn the_mount_that_is_found_looks_where_the_head_does() {
 #[test]
 fn a_mirrored_world_gives_mirrored_offsets() {
     for (name, profile) in profiles() {
-        // Without noise, which a mirror doesn't mirror.
+        // Without noise, which isn't mirrored.
         let wrong =
             [Wrong { angle_deg: 3.0, left_m: 0.02, up_m: 0.01, is_mirrored: false }, Wrong::default()];
         let stand = Stand { noise_m: 0.0, ..Stand::new(profile, &wrong, 5) };
@@ -109,7 +109,7 @@ fn upside_down_heads_are_found_by_the_echosounders() {
     }
 }
 
-/// The cable counter, the surface and the water level: exact but for their quanta and the height that heads see.
+/// The zeros of the cable counter, the surface and the water level: exact but for quantization and the height by the heads.
 #[test]
 fn zeros_are_exact() {
     let mut stand = Stand { noise_m: 0.0, ..Stand::new(shapes::ceran().unwrap(), &[Wrong::default(); 2], 1) };
@@ -129,7 +129,7 @@ fn zeros_are_exact() {
         let heads = heads(material).unwrap();
         let level = zero::water_level(material, &heads, None).unwrap();
         assert!((level.found.value - stand.site.surface_above_floor_m).abs() < 0.01, "{level:?}");
-        // A surface 1000 Pa lower is one 10 cm farther up.
+        // A surface pressure 1000 Pa lower puts the surface 10 cm higher.
         let pa = stand.site.surface_pressure_pa - 1000.0;
         let higher = zero::water_level(material, &heads, Some(pa)).unwrap();
         assert!((higher.found.value - level.found.value - 0.102).abs() < 1e-3);
@@ -140,7 +140,7 @@ fn zeros_are_exact() {
     });
 }
 
-/// More turns see the same roughness: what they say is shared out, and no piece of wall counts for more than one.
+/// More turns see the same roughness: their weights are shared, and no piece of wall counts for more than one.
 #[test]
 fn a_piece_of_wall_counts_once() {
     let stand = Stand { seconds: 100, ..Stand::new(shapes::ceran().unwrap(), &[Wrong::default()], 1) };

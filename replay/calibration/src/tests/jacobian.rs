@@ -9,8 +9,8 @@ use headrace_fusion::filter::settings::Settings;
 const N: usize = COMMON + 2 * OWN;
 const STEP: f64 = 1e-6;
 
-/// Of a narrow beam rows are exact but at a wall's edges, where a ray of a difference may be on the other side. Turns are
-/// taken for small: derivatives by them hold at none.
+/// With a narrow beam rows are exact except at a wall's edges, where a ray of a difference may be on the other side.
+/// Derivatives by rotations hold at zero rotation, as these are taken for small.
 #[test]
 fn verif_every_derivative() {
     for (name, profile) in profiles() {
@@ -49,7 +49,7 @@ fn verif_every_derivative() {
                         edges += 1;
                         continue;
                     }
-                    // Of the scale a row has the expected range in place of the measured one, which is as much at the end.
+                    // For the scale a row has the expected range in place of the measured one, which is the same at convergence.
                     let expected = if i == 5 { (h[5] + off) / (1.0 + x[5]) } else { h[i] };
                     assert!(
                         (difference - expected).abs() < 1e-4,

@@ -1,4 +1,4 @@
-//! Vehicles that stand in tunnels, heads that sit otherwise than their file says, and what is found.
+//! Simulated vehicles at rest in tunnels, with heads mounted otherwise than in their file, and the estimates.
 
 mod found;
 mod jacobian;

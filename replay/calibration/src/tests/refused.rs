@@ -1,4 +1,4 @@
-//! What can't be told, and why.
+//! Quantities that can't be estimated, and the reasons.
 
 use super::super::Untold;
 use super::super::heads::heads;
@@ -37,7 +37,7 @@ fn a_head_that_sees_little_wall_is_refused() {
     assert!(why.starts_with("no full turn: the head has seen only 9"), "{why}");
 }
 
-/// The section and the returns are symmetric: without echosounders, or in the middle, nobody can tell.
+/// The section and the returns are symmetric: without echosounders, or in the middle, the sides can't be distinguished.
 #[test]
 fn in_a_symmetric_section_the_sense_of_rotation_needs_to_know_the_side() {
     let wrong = [Wrong::default(); 2];
@@ -46,7 +46,7 @@ fn in_a_symmetric_section_the_sense_of_rotation_needs_to_know_the_side() {
     {
         for (name, profile) in profiles() {
             let stand = Stand::new(profile, &wrong, 4);
-            // One head alone: two beside each other tell by themselves.
+            // One head alone: two side by side would suffice without echosounders.
             let stand = Stand { at, has_echoes, wrong: vec![Wrong::default()], ..stand };
             let found = stand.ask(|material| heads(material).unwrap());
             let of = found.heads[0].is_mirrored;

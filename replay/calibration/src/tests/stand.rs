@@ -1,4 +1,4 @@
-//! A vehicle that stands in a tunnel, and what its sensors say: made by rays of the profile alone.
+//! A simulated vehicle at rest in a tunnel, and its sensors' readings, from rays of the profile alone.
 
 use super::super::Material;
 use headrace_fusion::filter::settings::Settings;
@@ -20,7 +20,7 @@ const ECHOES: usize = 3;
 pub(super) const HEADS: usize = 7;
 const DEVICE_MPS: f64 = 1500.0;
 
-/// How a head truly sits, against its file: degrees about its axis, m to the left and up, and whether it is mirrored.
+/// True mount of a head against its file: degrees about its axis, m to the left and up, and whether it is mirrored.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Wrong {
     pub(super) angle_deg: f64,
@@ -40,7 +40,7 @@ pub(super) struct Stand {
     pub(super) turned_deg: [f64; 3],
     pub(super) speed_mps: f64,
     pub(super) seconds: u32,
-    /// Of heads, degrees: how far they turn.
+    /// Sector of the heads, degrees.
     pub(super) sector_deg: f64,
     pub(super) noise_m: f64,
     pub(super) outliers: f64,
@@ -62,7 +62,7 @@ impl Stand {
         Self {
             profile,
             site: Site { axis_yaw_rad: 0.7, ..Site::default() },
-            // Narrow beams, so that a ray is what they see.
+            // Narrow beams, equivalent to a ray.
             settings: Settings { return_beam_rad: 1e-6, echo_beam_rad: 1e-6, ..Settings::default() },
             wrong: wrong.to_vec(),
             at: [0.6, 2.3],
@@ -91,7 +91,7 @@ impl Stand {
             4 => (at(0.1, -0.2, 0.0, 0.0, -FRAC_PI_2), echo),
             5 => (at(0.1, 0.0, -0.1, FRAC_PI_2, 0.0), echo),
             6 => (at(0.1, 0.0, 0.1, -FRAC_PI_2, 0.0), echo),
-            // Close together, so that the vehicle's heading can't hide where they sit.
+            // Close together, so that the vehicle's heading can't hide their offsets.
             head => (at(0.4, 0.3 * (head - HEADS) as f64, 0.0, 0.0, 0.0), SensorKind::Head),
         };
         SensorInfo { mount, kind }
@@ -101,7 +101,7 @@ impl Stand {
         (0..HEADS + self.wrong.len()).map(Self::filed).collect()
     }
 
-    /// Hands its readings to `estimate`.
+    /// Passes its readings to `estimate`.
     pub(super) fn ask<T>(&self, estimate: impl FnOnce(&Material<'_>) -> T) -> T {
         let (sensors, events) = (self.sensors(), self.events());
         let Self { profile, site, settings, .. } = self;
@@ -111,7 +111,7 @@ impl Stand {
     }
 
     fn uniform(&self, k: u64, salt: u64) -> f64 {
-        // A counter that is stirred (splitmix64).
+        // A hashed counter (splitmix64).
         let mut z = (self.seed << 40) ^ (salt << 32) ^ k;
         for _ in 0..2 {
             z = z.wrapping_add(0x9E37_79B9_7F4A_7C15);
@@ -197,7 +197,7 @@ impl Stand {
     }
 }
 
-/// The same in a mirror: left is right.
+/// The mirror image: left is right.
 pub(super) fn mirrored(stand: &Stand) -> Stand {
     let [roll, pitch, yaw] = stand.turned_deg;
     let wrong = stand.wrong.iter().map(|wrong| Wrong {
@@ -214,7 +214,7 @@ pub(super) fn mirrored(stand: &Stand) -> Stand {
     }
 }
 
-/// An angle as a number from -180 to 180 degrees.
+/// An angle wrapped to -180 to 180 degrees.
 pub(super) fn short_deg(rad: f64) -> f64 {
     math::wrap_signed(rad, TAU).to_degrees()
 }

@@ -46,7 +46,7 @@ struct Stated {
     chunks: u32,
 }
 
-/// An unpacked chunk, and the loss to report after reading it.
+/// An unpacked chunk, and the step to return after reading it.
 struct Chunk {
     bytes: Vec<u8>,
     at: usize,

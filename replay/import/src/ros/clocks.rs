@@ -21,18 +21,18 @@ pub(super) enum Base {
     Header,
 }
 
-/// The stamps of one topic.
+/// Timestamp statistics of one topic.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Clocks {
     base: Base,
     messages: u64,
-    /// Messages whose stamp is zero.
+    /// Messages with a zero timestamp.
     unstamped: u64,
-    /// Least and largest record time less the stamp.
+    /// Least and greatest record time minus timestamp.
     lag_ns: Option<(i64, i64)>,
     before_ns: u64,
     backwards: u64,
-    /// What is added to stamps that are followed, since they are of another base.
+    /// Offset added to followed timestamps of another epoch.
     moved_ns: Option<i64>,
     anew: u64,
 }
@@ -42,7 +42,7 @@ impl Clocks {
         Self { base, ..Self::default() }
     }
 
-    /// The time of a message's values, and whether the stamp gave it.
+    /// The time of a message's values, and whether it is from the timestamp.
     pub(super) fn time(&mut self, record_ns: u64, stamp_ns: Option<u64>) -> (u64, bool) {
         self.messages += 1;
         let Some(stamp_ns) = stamp_ns.filter(|stamp_ns| *stamp_ns > 0) else {
@@ -67,7 +67,7 @@ impl Clocks {
         (stamp_ns.saturating_add_signed(near), true)
     }
 
-    /// What people should know of it.
+    /// Findings for the user, as text.
     pub(super) fn words(&self) -> Vec<String> {
         let mut all = Vec::new();
         if self.messages == 0 {

@@ -1,7 +1,7 @@
 //! The known messages, and the sensor values taken from them.
 //!
-//! Sources: the .msg files of ROS' common_interfaces (sensor_msgs, geometry_msgs, std_msgs), REP 103 (axes and units), REP 117 (ranges),
-//! REP 145 (inertial units).
+//! Sources: the .msg files of ROS' common_interfaces (sensor_msgs, geometry_msgs, std_msgs), REP 103 (axes and units),
+//! REP 117 (ranges), REP 145 (inertial units).
 
 use headrace_sensor::device::Sense;
 

@@ -38,7 +38,7 @@ pub(super) enum Plane {
 /// Beams in a message.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Beams {
-    /// With angles of their own, which may be anything.
+    /// With given angles, not yet checked.
     Turned(Vec<Beam>),
     /// Points, with time after the timestamp, s.
     Points(Vec<([f64; 3], f64)>),

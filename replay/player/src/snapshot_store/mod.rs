@@ -134,7 +134,7 @@ mod tests {
         for at in times {
             assert_eq!(store.load(MonoNs(at)).unwrap(), snapshot(at));
         }
-        // Each time the store was full, half as much room was left again.
+        // Each thinning made room for half as many snapshots again.
         assert!(store.interval() > 4 * INTERVAL);
         assert_eq!(store.load(MonoNs(1)), None);
     }

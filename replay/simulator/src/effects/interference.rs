@@ -40,7 +40,7 @@ use pings::{Ping, Pings};
 /// Heads whose bodies overlap are idealised ones and don't hear each other. Pings of another head that begin while a head
 /// is already listening aren't simulated yet: they are extrapolated from the last two before, which is wrong for a ping or
 /// two where a head turns round.
-/// Source: Jorge et al. 2021, §10; core's sampling/interference.rs, which plans with the same two ways.
+/// Source: Jorge et al. 2021, §10; core/sampling/src/interference.rs, which plans with the same two paths.
 pub(super) struct Kind;
 
 /// Upper bound of the distance between heads, m: vehicle files place them within 20 m of the body's origin in x, y and z.

@@ -24,7 +24,7 @@ use crate::stages::Stage;
 ///
 /// Only the beam's axis is tested: a wide beam is hidden for as long, not longer and more weakly. A head isn't hidden by a
 /// body that it is inside, so that idealised heads in one place don't hide anything from each other.
-/// Source: core's sampling/occlusion.rs, which plans with the same bodies.
+/// Source: core/sampling/src/occlusion.rs, which plans with the same bodies.
 pub(super) struct Kind;
 
 #[derive(Debug, Clone)]
@@ -39,7 +39,7 @@ struct Occlusion {
     obstacles: Vec<Obstacle>,
 }
 
-/// Which of the slice's beams are stopped before the wall, for later effects.
+/// For each of the slice's beams, whether it is stopped before the wall; for later effects.
 #[derive(Debug, Clone, Default, Component)]
 pub(super) struct Stopped(Vec<bool>);
 

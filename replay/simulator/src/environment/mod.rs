@@ -97,7 +97,7 @@ pub enum What {
     Feature(u16),
 }
 
-/// What stops a ray, before its normal is computed.
+/// Obstacle that stops a ray, before its normal is computed.
 #[derive(Debug, Clone, Copy)]
 enum Stop {
     /// The tunnel's wall, with its face if already computed.
@@ -116,7 +116,7 @@ enum Stop {
 #[derive(Debug, Clone, Copy)]
 struct Reach {
     t_m: f64,
-    /// What stops the ray; `None` if it is still in water.
+    /// Obstacle that stops the ray; `None` if it is still in water.
     stop: Option<Stop>,
     /// Range of chainage passed, m.
     from_m: f64,
@@ -169,7 +169,7 @@ impl Environment {
         Self { design, tube, plain, solids, hollows, solids_by_chainage, hollows_by_chainage, names }
     }
 
-    /// What the ray from `origin` along the unit vector `direction` meets within `far_m`; `None` if it meets nothing, or the
+    /// Hit of the ray from `origin` along the unit vector `direction` within `far_m`; `None` if it meets nothing, or the
     /// origin isn't in the water.
     ///
     /// A ray that grazes a displaced or bent wall may cross up to 0.1 mm of it unnoticed; elsewhere it is exact.

@@ -20,7 +20,7 @@ pub enum MeshError {
     TooMany {
         /// Kind of element.
         what: &'static str,
-        /// How many.
+        /// Their number.
         given: usize,
     },
     /// A triangle refers to a vertex that doesn't exist.
@@ -33,7 +33,7 @@ pub enum MeshError {
         /// Number of vertices.
         vertices: usize,
     },
-    /// A vertex with coordinates that aren't finite or too large.
+    /// A vertex whose coordinates aren't finite or are too large.
     #[error("vertex {vertex} (counted from 0) is at {}; coordinates must be finite and within 100 km of 0", At(*at))]
     FarVertex {
         /// Number of the vertex.

@@ -13,7 +13,7 @@ const THIN: f64 = 1e-12;
 /// Widens the interval of a box by more than its rounding error.
 const WIDER: f64 = 1.0 + 1e-15;
 
-/// Unambiguous result of a ray against a triangle.
+/// Result of the crossing test of a ray and a triangle, with ambiguous cases kept apart.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Crossing {
     Beside,
