@@ -174,6 +174,13 @@ pub(super) fn layout(text: &str) -> Result<HeadLayout, String> {
     known.map(|(_, layout)| *layout).ok_or_else(|| "expected phase_shift or sector_offset".to_owned())
 }
 
+/// A kind of foreign log by its name.
+pub(crate) fn file_kind() -> impl TypedValueParser<Value = FileKind> {
+    let value = |kind: FileKind| PossibleValue::new(kind.name()).help(kind.summary());
+    PossibleValuesParser::new(FileKind::ALL.map(value))
+        .try_map(|name| FileKind::named(&name).ok_or("is no kind of foreign log"))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -195,11 +202,4 @@ mod tests {
             assert!(time(text).is_err(), "{text}");
         }
     }
-}
-
-/// A kind of foreign log by its name.
-pub(crate) fn file_kind() -> impl TypedValueParser<Value = FileKind> {
-    let value = |kind: FileKind| PossibleValue::new(kind.name()).help(kind.summary());
-    PossibleValuesParser::new(FileKind::ALL.map(value))
-        .try_map(|name| FileKind::named(&name).ok_or("is no kind of foreign log"))
 }
