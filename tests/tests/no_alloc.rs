@@ -6,7 +6,7 @@
 #![expect(clippy::unwrap_used, reason = "a test stops at what it can't do")]
 #![expect(
     unsafe_code,
-    reason = "a global allocator is an unsafe trait; this one counts and connections on to the system's"
+    reason = "a global allocator is an unsafe trait; this one counts and hands on to the system's"
 )]
 
 use std::alloc::{GlobalAlloc, Layout, System};

@@ -24,7 +24,7 @@ const STALE: DurNs = DurNs(2_000_000_000);
 const SPEED_WINDOW: DurNs = DurNs(1_000_000_000);
 const SPEED_READINGS: usize = 64;
 /// Standard deviation of an echo's range, m.
-const ECHO_SIGMA_M: f64 = 0.01;
+const ECHO_SD_M: f64 = 0.01;
 /// Standard deviation of the prior position, across and up, m.
 const PRIOR_SD_M: [f64; 2] = [10.0, 1.0];
 
@@ -91,7 +91,7 @@ impl DirectNavigation {
         let start = self.place.map_or([reference_y, reference_z], |(_, place)| place);
         let recent = self.echoes.iter().flatten().filter(|(at, _)| now.since(*at).0.abs() <= ECHO_AGE.0);
         let echoes = recent.map(|(_, echo)| *echo);
-        let place = settle(&self.profile, attitude, start, (prior, PRIOR_SD_M), ECHO_SIGMA_M, &echoes);
+        let place = settle(&self.profile, attitude, start, (prior, PRIOR_SD_M), ECHO_SD_M, &echoes);
         self.place = Some((now, place.at_m));
         if let (true, Some(height_m)) = (place.is_height_seen, self.height_m) {
             self.height_offset_m = place.at_m[1] - height_m;

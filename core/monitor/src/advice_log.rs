@@ -1,4 +1,4 @@
-//! The advice over time.
+//! Advice history.
 
 use bevy_ecs::prelude::Resource;
 use serde::{Deserialize, Serialize};
@@ -7,13 +7,13 @@ use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sampling::advice::Advice;
 use headrace_snapshot::stateful;
 
-/// Advice is given at every multiple of this in data time.
+/// Period of the advice, in data time.
 pub const ADVICE_PERIOD: DurNs = DurNs(200_000_000);
 
-/// One entry of the advice's history.
+/// One entry of the advice history.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct AdviceEntry {
-    /// The moment, in data time.
+    /// Timestamp, in data time.
     pub at: MonoNs,
     /// Chainage then, m; `None` without a fix.
     pub chainage_m: Option<f64>,
@@ -23,17 +23,17 @@ pub struct AdviceEntry {
     pub advice: Advice,
 }
 
-/// The advice over time, kept whenever it has changed enough to matter, or ten seconds have gone.
+/// Advice history: an entry whenever the advice has changed significantly, or after ten seconds.
 ///
-/// When it is full every other entry is dropped, and from then on entries are at least twice as far apart in time as they
-/// had to be before: a longer dive is told more coarsely, from its beginning to its end.
+/// When it is full, every other entry is dropped and the minimum time between entries is doubled: a longer dive is
+/// logged more coarsely, from its beginning to its end.
 #[derive(Debug, Clone, Resource)]
 pub struct AdviceLog {
     /// The entries, in order.
     pub entries: Vec<AdviceEntry>,
-    /// Entries for which there was no room.
+    /// Entries dropped for lack of room.
     pub dropped: u64,
-    /// Least time between two entries.
+    /// Minimum time between two entries.
     apart: DurNs,
 }
 
@@ -93,7 +93,7 @@ mod tests {
     use headrace_sampling::passes::Situation;
     use headrace_sampling::swing::Swing;
 
-    /// Advice that changes at every beat of ten hours is told from beginning to end in the room that there is.
+    /// Advice that changes at every beat for ten hours is logged from beginning to end within the capacity.
     #[test]
     fn the_advice_s_history_does_not_grow_with_hours() {
         let profile = shapes::circle(3.0).unwrap();

@@ -1,16 +1,16 @@
-//! What is wrong with the dive as a whole: said once, then counted.
+//! Alerts about the dive as a whole: raised once, then counted.
 
 use bevy_ecs::prelude::Resource;
 use serde::{Deserialize, Serialize};
 
 use headrace_geometry::time::MonoNs;
 
-/// What is wrong.
+/// Kind of alert.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum AlertKind {
-    /// Samples fall before the portal or behind the end of the tunnel.
+    /// Samples fall beyond either end of the tunnel.
     OutsideTunnel,
-    /// Most samples of a section are farther from the design profile than the wall can be.
+    /// Most samples of a section deviate from the design profile by more than the contradiction limit.
     ProfileContradicted,
 }
 
@@ -27,27 +27,27 @@ impl AlertKind {
     }
 }
 
-/// Something wrong, since when, and how often.
+/// An alert with its first occurrence and count.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Alert {
-    /// What.
+    /// Kind.
     pub kind: AlertKind,
-    /// When it was first seen.
+    /// Time of its first occurrence.
     pub since: MonoNs,
-    /// How often: samples outside, or sections judged that contradict the profile.
+    /// Occurrences: samples outside, or judgements of sections that contradict the profile.
     pub count: u64,
-    /// Chainage at which it was first seen, m.
+    /// Chainage of its first occurrence, m.
     pub x_m: f64,
-    /// How far off at worst, m: beyond the end, or from the design profile in the mean of a section.
+    /// Largest deviation, m: beyond the end, or a section's mean from the design profile.
     pub worst_m: f64,
 }
 
-/// All that is wrong.
+/// All alerts.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Resource, Serialize, Deserialize)]
 pub struct Alerts([Option<Alert>; AlertKind::ALL.len()]);
 
 impl Alerts {
-    /// Notes that something is wrong at a chainage, by so much; whether it is the first time.
+    /// Records an alert at a chainage with its deviation, m; true on its first occurrence.
     pub fn note(&mut self, kind: AlertKind, at: MonoNs, x_m: f64, off_m: f64) -> bool {
         let Some(slot) = self.0.get_mut(kind as usize) else { return false };
         let is_first = slot.is_none();
@@ -59,12 +59,12 @@ impl Alerts {
         is_first
     }
 
-    /// What is wrong of a kind.
+    /// The alert of a kind.
     pub fn get(&self, kind: AlertKind) -> Option<&Alert> {
         self.0.get(kind as usize)?.as_ref()
     }
 
-    /// All that is wrong.
+    /// All alerts.
     pub fn iter(&self) -> impl Iterator<Item = &Alert> {
         self.0.iter().flatten()
     }

@@ -1,4 +1,4 @@
-//! The loop while it is put together: sources, sensors, plugins.
+//! Builder of the loop: sources, sensors, plugins.
 
 use bevy_ecs::component::Mutable;
 use bevy_ecs::entity::Entity;
@@ -29,11 +29,11 @@ pub struct SourceSpec {
     pub connect: String,
     /// Bytes to readings.
     pub decoder: Box<dyn Decoder>,
-    /// Bytes that the ring before the loop holds.
+    /// Capacity of the ring before the loop, bytes.
     pub ring_bytes: usize,
 }
 
-/// A source without its decoder: what reports and logs say of it.
+/// A source without its decoder, as listed in reports and logs.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SourceInfo {
     /// Name.
@@ -48,11 +48,11 @@ pub struct SourceInfo {
 pub trait Plugin {
     /// Registers sources, components, systems in a named stage, outlets.
     ///
-    /// Errors: what the plugin needs isn't there, or is there twice.
+    /// Errors: a requirement of the plugin is missing or duplicated.
     fn build(&self, app: &mut App) -> Result<(), PluginError>;
 }
 
-/// The loop while it is put together. [`App::arm`] turns it into one that runs.
+/// Builder of the loop. [`App::arm`] makes it ready to run.
 pub struct App {
     pub(super) mission: Mission,
     pub(super) world: World,
@@ -84,7 +84,7 @@ impl App {
 
     /// Adds a plugin.
     ///
-    /// Errors: what the plugin needs isn't there, or is there twice.
+    /// Errors: a requirement of the plugin is missing or duplicated.
     pub fn add_plugin(&mut self, plugin: &(impl Plugin + ?Sized)) -> Result<&mut Self, PluginError> {
         plugin.build(self)?;
         Ok(self)
@@ -113,7 +113,7 @@ impl App {
         Ok(source)
     }
 
-    /// Adds a sensor: its source, and an entity with its mount and what it is.
+    /// Adds a sensor: its source, and an entity with its mount and kind.
     ///
     /// Errors: as for [`App::add_source`].
     pub fn add_device(&mut self, device: &dyn Device) -> Result<SourceId, PluginError> {
@@ -140,7 +140,7 @@ impl App {
         self.world.insert_resource(resource);
     }
 
-    /// Adds a resource of which results depend: snapshots have it as the part of this name.
+    /// Adds a resource that results depend on: snapshots store it as the part of this name.
     pub fn insert_state(
         &mut self,
         name: &'static str,
@@ -150,14 +150,14 @@ impl App {
         self.world.insert_resource(resource);
     }
 
-    /// Keeps the words of all results, tick by tick, for those who record or compare them.
+    /// Keeps the words of all results, tick by tick, for recording or comparison.
     pub fn keep_results(&mut self) {
         let mut digests = Digests::default();
         digests.keep();
         self.world.insert_resource(digests);
     }
 
-    /// Adds systems to a stage. Two of one stage that touch the same data must be ordered by whoever adds them.
+    /// Adds systems to a stage. Systems of one stage that share data must be ordered by the caller.
     pub fn add_systems<M>(&mut self, stage: Stage, systems: impl IntoScheduleConfigs<ScheduleSystem, M>) {
         self.schedule.add_systems(systems.in_set(stage));
     }

@@ -1,4 +1,4 @@
-//! Arming: all that a loop will ever need is allocated here.
+//! Arming: allocates all memory of a loop.
 
 use bevy_ecs::entity::Entity;
 use bevy_ecs::world::World;
@@ -24,23 +24,23 @@ use headrace_sensor::device::SensorKind;
 use headrace_sensor::reading::SourceId;
 use headrace_vehicle::Mission;
 
-/// Room for the readings of one tick: the shortest frame of any device has over ten bytes.
+/// Capacity for the readings of one tick: the shortest frame of any device has over ten bytes.
 const MAX_TICK_READINGS: usize = MAX_TICK_BYTES / 8;
 
-/// Room beyond both ends of the tunnel for heads that sit ahead of or behind the vehicle's origin, m.
+/// Margin beyond both ends of the tunnel for heads mounted ahead of or behind the vehicle's origin, m.
 const ROOM_BEYOND_M: f64 = 25.0;
-/// Samples for which there is room, for a metre of tunnel and at most. Four heads at 0.2 m/s lay 1,000 a metre.
+/// Sample capacity per metre of tunnel, and its limits. Four heads at 0.2 m/s give 1,000 per metre.
 const SAMPLES_PER_M: f64 = 4_000.0;
 const MIN_SAMPLES: f64 = 4_000_000.0;
 const MAX_SAMPLES: f64 = 40_000_000.0;
 
-/// A section that is judged may change its run and two others, and raise an alert.
+/// Notices per judged section: it may change its run and two others, and raise an alert.
 const NOTICES_EACH: usize = 5;
 
 impl App {
-    /// Allocates all that the loop will ever need and makes it ready to run. From here on no tick allocates or locks.
+    /// Allocates all memory of the loop and makes it ready to run. From here on no tick allocates or locks.
     ///
-    /// Errors: more heads than the loop's tables hold, or systems whose order matters but isn't stated.
+    /// Errors: too many heads, a missing source, an invalid opening, or an ambiguous order of systems.
     pub fn arm(mut self, navigation: Box<dyn Navigation>) -> Result<Loop, PluginError> {
         let mission = &self.mission;
         let specs = number_heads(&mut self.world, &self.entities)?;
@@ -114,7 +114,7 @@ impl App {
 
     fn insert_messages(&mut self) {
         let world = &mut self.world;
-        // A jump along the tunnel may ask for every section at once.
+        // A jump along the tunnel may request every section at once.
         let most = world.resource::<Coverage>().sections.len() + MAX_TICK_PACKETS;
         world.insert_resource(Inbox::default());
         world.insert_resource(Events(Vec::with_capacity(MAX_TICK_READINGS)));
@@ -125,7 +125,7 @@ impl App {
     }
 }
 
-/// Numbers the heads in the order of sources; gives what each is.
+/// Numbers the heads in the order of sources; returns their specifications and modes.
 fn number_heads(
     world: &mut World,
     sensors: &[Entity],
@@ -146,7 +146,7 @@ fn number_heads(
     Ok(specs)
 }
 
-/// The source that tells the speed of sound.
+/// The source that supplies the speed of sound.
 fn sound_source(mission: &Mission, sources: &[SourceInfo]) -> Result<Option<SourceId>, PluginError> {
     let Some(id) = &mission.sound_speed_from else { return Ok(None) };
     let place =

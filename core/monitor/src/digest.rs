@@ -1,11 +1,11 @@
-//! A digest of results, the same wherever they are computed.
+//! A digest of results, identical on all platforms.
 
 use serde::{Deserialize, Serialize};
 use xxhash_rust::xxh64::xxh64;
 
-/// Hashes numbers by their bits, little-endian, each with what came before as the seed.
+/// Hashes numbers by their bits, little-endian, each seeded with the hash so far.
 ///
-/// Not a cryptographic digest: it tells a dive computed otherwise, not a forged one.
+/// Not a cryptographic digest: it detects a dive computed differently, not a forged one.
 #[derive(Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Digest(u64);
 
@@ -16,18 +16,18 @@ impl core::fmt::Debug for Digest {
 }
 
 impl Digest {
-    /// Takes a whole number in.
+    /// Adds an integer.
     pub fn integer(&mut self, value: u64) -> &mut Self {
         self.0 = xxh64(&value.to_le_bytes(), self.0);
         self
     }
 
-    /// Takes a number in, bit for bit; all zeros alike.
+    /// Adds a number bit by bit; -0 counts as +0.
     pub fn number(&mut self, value: f64) -> &mut Self {
         self.integer((value + 0.0).to_bits())
     }
 
-    /// The digest of all so far.
+    /// The digest so far.
     pub fn value(&self) -> u64 {
         self.0
     }

@@ -1,8 +1,8 @@
 //! The dive's entities: the vehicle, and each of its sensors, heads among them.
 //!
-//! The vehicle has [`Navigator`], [`VehicleState`] and how it is driven. Every sensor has [`Mounted`], [`SensorDecoder`] and
-//! [`SensorHealth`]; a head has besides [`Head`], [`HeadSpecification`], [`MeasuredMotion`], [`HeadSweep`],
-//! [`HeadFrontier`] and [`HiddenAngles`].
+//! The vehicle has [`Navigator`], [`VehicleState`] and its motion statistics. Every sensor has [`Mounted`],
+//! [`SensorDecoder`] and [`SensorHealth`]; a head also has [`Head`], [`HeadSpecification`], [`MeasuredMotion`],
+//! [`HeadSweep`], [`HeadFrontier`] and [`HiddenAngles`].
 
 use bevy_ecs::prelude::Component;
 use serde::{Deserialize, Serialize};
@@ -22,7 +22,7 @@ use headrace_snapshot::{Restorer, Saver, SnapshotError, Stateful};
 /// The vehicle's estimator: readings to fixes.
 #[derive(Component)]
 pub struct Navigator {
-    /// The way of navigating.
+    /// Navigation method.
     pub navigation: Box<dyn Navigation>,
     /// The next multiple of the advice period; `None` before the first packet.
     pub next_beat: Option<MonoNs>,
@@ -41,14 +41,14 @@ impl Stateful for Navigator {
     }
 }
 
-/// Where the vehicle was at the last beat, and how well that is known.
+/// Fix of the vehicle at the last beat, and its standard deviations.
 #[derive(Debug, Clone, Copy, PartialEq, Component, Serialize, Deserialize)]
 pub struct VehicleState {
     /// The beat; `None` before the first.
     pub at: Option<MonoNs>,
-    /// Pose and speed, or what a fix lacks: the vehicle's health.
+    /// Pose and speed, or the reason there is no fix.
     pub fix: Result<Fix, NoFix>,
-    /// Standard deviations of the pose, from its covariance; `None` where the way of navigating doesn't know them.
+    /// Standard deviations of the pose, from its covariance; `None` if the navigation method provides none.
     pub sd: Option<PoseSd>,
 }
 
@@ -58,7 +58,7 @@ impl Default for VehicleState {
     }
 }
 
-/// Which source a sensor's readings come from, how it sits on the vehicle, and what it is.
+/// Source, mount and kind of a sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Component)]
 pub struct Mounted {
     /// The source.
@@ -67,7 +67,7 @@ pub struct Mounted {
     pub info: SensorInfo,
 }
 
-/// Bytes of a sensor to its readings.
+/// Decoder of a sensor's bytes to readings.
 #[derive(Component)]
 pub struct SensorDecoder(pub Box<dyn Decoder>);
 
@@ -81,14 +81,14 @@ impl Stateful for SensorDecoder {
     }
 }
 
-/// What has come from a sensor, and when.
+/// Traffic statistics of a sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Component, Serialize, Deserialize)]
 pub struct SensorHealth {
-    /// Packets.
+    /// Packets received.
     pub packets: u64,
-    /// Their bytes.
+    /// Bytes received.
     pub bytes: u64,
-    /// Readings that they gave.
+    /// Readings decoded.
     pub readings: u64,
     /// First and last receive time.
     pub span: Option<(MonoNs, MonoNs)>,
@@ -97,7 +97,7 @@ pub struct SensorHealth {
 }
 
 impl SensorHealth {
-    /// Counts a packet and the readings that it gave.
+    /// Counts a packet and its readings.
     pub(super) fn count(&mut self, received: MonoNs, bytes: usize, readings: usize) {
         self.packets += 1;
         self.bytes += bytes as u64;
@@ -126,24 +126,24 @@ pub struct Head(pub usize);
 /// A profiling head, as configured.
 #[derive(Debug, Clone, PartialEq, Component)]
 pub struct HeadSpecification {
-    /// How it sits and turns.
+    /// Mount and scan parameters.
     pub spec: HeadSpec,
-    /// The modes that it could be set to instead.
+    /// Modes that it can be set to.
     pub modes: Vec<HeadMode>,
 }
 
-/// The angles that the vehicle hides from a head, in the head's own frame.
+/// Angles of a head occluded by the vehicle, in the head's frame.
 #[derive(Debug, Clone, PartialEq, Default, Component)]
 pub struct HiddenAngles(pub Vec<AngleRange>);
 
 impl HiddenAngles {
-    /// Whether the vehicle stands in the beam at this angle of the head.
+    /// Whether the vehicle occludes the beam at this angle of the head.
     pub fn hides(&self, angle_rad: f64) -> bool {
         self.0.iter().any(|range| range.has(angle_rad))
     }
 }
 
-/// What is remembered of a head's sweep.
+/// Sweep state of a head.
 #[derive(Debug, Clone, Copy, Default, Component, Serialize, Deserialize)]
 pub struct HeadSweep {
     /// The last valid sample in the present sweep.

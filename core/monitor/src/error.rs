@@ -1,4 +1,4 @@
-//! Why a loop can't be put together.
+//! Errors of building a loop.
 
 /// Why a plugin could not be added.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -10,7 +10,7 @@ pub enum PluginError {
         /// The id.
         id: String,
     },
-    /// A source that is asked for and not there.
+    /// A required source is missing.
     #[error("arming the loop: water.sound_speed_from = {id:?}: there is no such source")]
     MissingSource {
         /// The id.
@@ -43,7 +43,7 @@ pub enum PluginError {
     /// The schedule of systems can't be built.
     #[error("arming the loop: {why}")]
     Schedule {
-        /// What the scheduler says.
+        /// The scheduler's error.
         why: String,
     },
 }

@@ -1,28 +1,28 @@
-//! Driving an armed loop: one way for ports, logs and the simulator, which differ only in their [`Feed`].
+//! Runs an armed loop, the same way for ports, logs and the simulator, which differ only in their [`Feed`].
 
 use super::run::Loop;
 use headrace_geometry::time::MonoNs;
 
-/// What fills the rings of a loop: ports, a log, or a simulation.
+/// Packet source that fills the rings of a loop: ports, a log, or a simulation.
 pub trait Feed {
-    /// Why it can't go on.
+    /// Error that ends the feed.
     type Error;
 
-    /// Waits for the next tick, fills the rings for it, and gives the end of its time; `None` at the end. A full ring is
-    /// relieved by [`work_off`].
+    /// Waits for the next tick, fills the rings for it, and returns the end of its time; `None` at the end of the feed. A
+    /// full ring is drained by [`work_off`].
     ///
-    /// Errors: the feed can't go on; what has been fed until then has been worked off.
+    /// Errors: the feed can't continue; packets fed until then have been processed.
     fn fill(
         &mut self,
         dive: &mut Loop,
         after_tick: &mut dyn FnMut(&Loop),
     ) -> Result<Option<MonoNs>, Self::Error>;
 
-    /// Lets some time pass, for an outlet that is behind.
+    /// Waits briefly, so that an outlet that is behind can catch up.
     fn pause(&mut self);
 }
 
-/// Runs the loop until the feed ends; `after_tick` sees it after every tick.
+/// Runs the loop until the feed ends; `after_tick` is called with it after every tick.
 ///
 /// Errors: those of the feed.
 pub fn drive<F: Feed>(
@@ -36,7 +36,7 @@ pub fn drive<F: Feed>(
     Ok(())
 }
 
-/// Ticks until nothing waits in the rings, at least once. An outlet that is behind holds packets back; `pause` gives it time.
+/// Ticks until the rings are empty, at least once. An outlet that is behind holds packets back; `pause` gives it time.
 pub fn work_off(dive: &mut Loop, now: MonoNs, after_tick: &mut dyn FnMut(&Loop), pause: &mut dyn FnMut()) {
     loop {
         let consumed = dive.tick(now);

@@ -1,4 +1,4 @@
-//! How a head turns, measured from its returns.
+//! Motion of a head, measured from its returns.
 
 use bevy_ecs::prelude::Component;
 use serde::{Deserialize, Serialize};
@@ -8,45 +8,45 @@ use headrace_geometry::time::{DurNs, MonoNs};
 
 /// Angles closer together than this are equal, radians: well under the finest head's step (0.3 degrees).
 const SAME_ANGLE_RAD: f64 = 1e-6;
-/// The turn rate is measured over at least this angle, radians, once there has been so much.
+/// Minimum angle over which the turn rate is measured, radians, once the head has turned that far.
 const RATE_SPAN_RAD: f64 = TAU / 2.0;
-/// A step this many times as long as the usual one passed over something.
+/// Ratio to the usual step from which a step isn't a single one: pings were skipped.
 const LONG_STEP: f64 = 1.5;
 
-/// After standing still or being silent for so long, the turn rate is measured anew.
+/// Standstill or silence after which the measurement of the turn rate restarts.
 const STANDING: DurNs = DurNs(1_000_000_000);
 
-/// What a ping says of its place in the head's motion.
+/// A ping classified within the head's motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Turned {
-    /// The head has come here from the ping before in one step.
+    /// The head has moved a single step since the ping before.
     pub single_step: bool,
-    /// The head has turned round, or its motion isn't known: a new sweep begins.
+    /// The head has reversed, or its motion isn't known: a new sweep begins.
     pub new_sweep: bool,
-    /// The head has stood still for longer than it ever does between two pings.
+    /// The head is stalled: at the same angle for longer than any normal ping interval.
     pub standing: bool,
 }
 
-/// The motion of one head as measured: state of the loop.
+/// Measured motion of one head; part of the loop's state.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Component, Serialize, Deserialize)]
 pub struct MeasuredMotion {
     last: Option<(MonoNs, f64)>,
     /// Signed angle of the last step, radians.
     last_step_rad: f64,
-    /// Angle turned through since the last turning point or start, radians, without sign.
+    /// Unsigned angle turned through since the last turning point or start, radians.
     since_turning_rad: f64,
-    /// Size of the last whole sweep between two turning points.
+    /// Size of the last whole sweep between two turning points, radians.
     sector_rad: Option<f64>,
     /// Whether the present sweep began at a turning point.
     from_turning_point: bool,
-    /// All the angle ever turned through, and the moments from which the rate is measured.
+    /// Total unsigned angle turned through, radians, and the epochs from which the rate is measured.
     turned_rad: f64,
     anchors: [Option<(MonoNs, f64)>; 2],
     step_rad: Option<f64>,
 }
 
 impl MeasuredMotion {
-    /// When and where the head last pinged.
+    /// Time and angle, radians, of the last ping at a new angle.
     pub fn last(&self) -> Option<(MonoNs, f64)> {
         self.last
     }
@@ -56,7 +56,7 @@ impl MeasuredMotion {
         self.step_rad
     }
 
-    /// Turn rate with its sign, rad/s; `None` until it has turned a little.
+    /// Signed turn rate, rad/s; `None` until it has turned four steps.
     pub fn rate_radps(&self) -> Option<f64> {
         let (now, _) = self.last?;
         let (then, turned_then) = self.anchors.iter().flatten().next()?;
@@ -66,12 +66,12 @@ impl MeasuredMotion {
         (enough && span_s > 0.0).then(|| turned / span_s * self.last_step_rad.signum())
     }
 
-    /// Size of the sector, radians, once it has turned round twice; forgotten when it turns on.
+    /// Size of the sector, radians, once the head has reversed twice; `None` again once it turns beyond a full circle.
     pub fn sector_rad(&self) -> Option<f64> {
         self.sector_rad
     }
 
-    /// Takes a ping at `angle_rad` into account.
+    /// Updates the motion with a ping at `angle_rad`.
     pub fn ping(&mut self, at: MonoNs, angle_rad: f64) -> Turned {
         let Some((last, before)) = self.last else {
             self.last = Some((at, angle_rad));
@@ -81,7 +81,7 @@ impl MeasuredMotion {
         let step = math::wrap_signed(angle_rad - before, TAU);
         let size = step.abs();
         if size < SAME_ANGLE_RAD {
-            // A head that stands still has not turned: `last` grows old, and the rate stays what it was.
+            // The head has not turned: `last` and the rate stay as they were.
             let standing = at.since(last).as_secs_f64() > self.stands_after_s();
             return Turned { single_step: false, new_sweep: false, standing };
         }
@@ -111,7 +111,7 @@ impl MeasuredMotion {
         Turned { single_step, new_sweep: reversed, standing: false }
     }
 
-    /// How long the same angle is no standing still yet, seconds: four pings.
+    /// Time at the same angle after which a head counts as stalled, seconds: four ping periods.
     fn stands_after_s(&self) -> f64 {
         let ping_period_s = self.step_rad.zip(self.rate_radps()).map(|(step, rate)| step / rate.abs());
         ping_period_s.map_or(STANDING.as_secs_f64(), |period_s| 4.0 * period_s)

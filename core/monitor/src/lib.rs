@@ -1,6 +1,6 @@
-//! The loop: what is known of a dive as entities and resources, the stages that a tick runs, and what outlets are told.
+//! The loop: the state of a dive as entities and resources, the stages of a tick, and the results for outlets.
 //!
-//! [`App`] is put together from a vehicle's devices and from plugins; armed, it is a [`run::Loop`] that turns packets into
+//! [`App`] is built from a vehicle's devices and from plugins; armed, it is a [`run::Loop`] that turns packets into
 //! positions, samples, verdicts and advice. Pure: no I/O, no thread, no clock; time comes in with the packets.
 
 #![cfg_attr(not(test), warn(clippy::cast_possible_truncation))]

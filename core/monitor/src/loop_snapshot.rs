@@ -1,4 +1,4 @@
-//! The loop's state as a whole: what a snapshot has, part by part.
+//! The loop's state as a whole: the parts of a snapshot.
 
 use core::any::TypeId;
 
@@ -16,7 +16,7 @@ use super::resources::{Coverage, Digests, Finder, Tally, TickTime, VehicleEntiti
 use super::stages::{Advisor, Driving, SoundSpeed};
 use headrace_snapshot::{Restorer, Saver, SnapshotError, Stateful};
 
-/// A part of the state: its name, the resource or component that it is, and how it is saved and restored.
+/// A part of the state: its name, resource or component type, and save and restore functions.
 struct Part {
     kind: TypeId,
     name: &'static str,
@@ -24,12 +24,12 @@ struct Part {
     restore: fn(&mut World, &mut Restorer<'_>) -> Result<(), SnapshotError>,
 }
 
-/// The parts, in the order in which snapshots have them.
+/// The parts, in snapshot order.
 #[derive(Resource)]
 pub(super) struct StateParts(Vec<Part>);
 
 impl StateParts {
-    /// Those of the loop itself.
+    /// The parts of the loop itself.
     pub(super) fn of_the_loop() -> Self {
         let mut parts = Self(Vec::new());
         parts.add_component::<Navigator>("navigation");
@@ -52,7 +52,7 @@ impl StateParts {
         parts
     }
 
-    /// Adds the resource that a plugin brings.
+    /// Adds a plugin's resource.
     pub(super) fn add_of<T: Resource<Mutability = Mutable> + Stateful>(
         &mut self,
         name: &'static str,
@@ -61,7 +61,7 @@ impl StateParts {
         self.add::<T>(name);
     }
 
-    /// Adds a resource; one that is there already is there once.
+    /// Adds a resource, unless already added.
     fn add<T: Resource<Mutability = Mutable> + Stateful>(&mut self, name: &'static str) {
         self.add_part(Part {
             kind: TypeId::of::<T>(),
@@ -133,7 +133,7 @@ mod tests {
     use headrace_vehicle::Mission;
     use serde::{Deserialize, Serialize};
 
-    /// Understands nothing.
+    /// A decoder that gives no readings.
     #[derive(Serialize, Deserialize)]
     struct Silent;
 
@@ -145,8 +145,8 @@ mod tests {
         }
     }
 
-    /// A resource or component that is new must be sorted: a part of the state; or made when the loop is armed, to stay as
-    /// it is or to begin anew with every tick.
+    /// A new resource or component must be listed: as a part of the state; or as made at arming, and constant or reset at
+    /// every tick.
     #[test]
     fn every_resource_and_component_is_saved_or_known_to_be_no_state() {
         let profile = shapes::circle(3.0).unwrap();

@@ -1,4 +1,4 @@
-//! From the sources' rings to one total order of packets.
+//! Merges the sources' rings into one total order of packets.
 
 use bevy_ecs::prelude::Resource;
 
@@ -6,9 +6,9 @@ use super::ring::{PacketHeader, PortReader};
 use headrace_geometry::time::MonoNs;
 use headrace_sensor::reading::{MAX_SOURCES, Packet, SourceId};
 
-/// The most packets that one tick takes; what comes beyond is taken by the next.
+/// Maximum packets per tick; the rest waits for the next.
 pub const MAX_TICK_PACKETS: usize = 4096;
-/// The most bytes that one tick takes.
+/// Maximum bytes per tick.
 pub const MAX_TICK_BYTES: usize = 256 * 1024;
 
 /// The packets of this tick, in the order in which they are consumed.
@@ -16,9 +16,9 @@ pub const MAX_TICK_BYTES: usize = 256 * 1024;
 pub struct Inbox {
     packets: Vec<Received>,
     bytes: Vec<u8>,
-    /// What waits first in each source's ring.
+    /// Header of the next packet in each source's ring.
     heads: Vec<Option<PacketHeader>>,
-    /// Bytes that the next tick may take: an outlet that must not lose any lowers it while it is behind.
+    /// Bytes that the next tick may take: a lossless outlet lowers it while it is behind.
     pub allowance_bytes: usize,
 }
 
@@ -50,19 +50,19 @@ impl Inbox {
         })
     }
 
-    /// How many there are.
+    /// Number of packets.
     pub fn len(&self) -> usize {
         self.packets.len()
     }
 
-    /// Whether nothing has come.
+    /// Whether there are none.
     pub fn is_empty(&self) -> bool {
         self.packets.is_empty()
     }
 
-    /// Takes what has come, least (recorded order, receive time, source, sequence) first.
+    /// Takes the waiting packets, least (recorded order, receive time, source, sequence) first.
     ///
-    /// Within one source packets stay as they came, whatever their stamps say. Allocates: never.
+    /// Packets of one source stay in order of arrival, whatever their timestamps. Allocates: never.
     pub(super) fn fill(&mut self, readers: &mut [PortReader]) {
         self.packets.clear();
         self.bytes.clear();
@@ -114,7 +114,7 @@ mod tests {
     }
 
     proptest! {
-        /// However a stream is cut into ticks at moments of its own time, the order is the same.
+        /// The order doesn't depend on the receive times at which a stream is cut into ticks.
         #[test]
         fn order_does_not_depend_on_the_ticks(
             packets in proptest::collection::vec((0u64..200, 0u16..4), 1..80),

@@ -1,8 +1,7 @@
-//! What flows from stage to stage within a tick.
+//! Messages between the stages of a tick.
 //!
-//! Each stage reads the lists that earlier stages have filled for this tick and works through them in order, looking
-//! at nothing that lies later in them. A result therefore depends on the packets before it alone, and not on where
-//! the stream was cut into ticks.
+//! Each stage processes the lists that earlier stages have filled for this tick in order, without looking ahead. A result
+//! therefore depends only on the packets before it, not on where the stream was cut into ticks.
 
 use bevy_ecs::prelude::Resource;
 
@@ -18,11 +17,11 @@ use headrace_sensor::reading::{Reading, SourceId};
 /// A reading with its source and times.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Event {
-    /// Where it came from.
+    /// Source.
     pub source: SourceId,
-    /// When its packet was received.
+    /// Receive time of its packet.
     pub received: MonoNs,
-    /// When it was valid.
+    /// Time of validity.
     pub valid_at: MonoNs,
     /// The value.
     pub reading: Reading,
@@ -32,21 +31,21 @@ pub struct Event {
 #[derive(Debug, Resource)]
 pub struct Events(pub Vec<Event>);
 
-/// A moment at which the way on is looked at: a multiple of [`ADVICE_PERIOD`], or a sonar ping.
+/// An epoch with its fix: a multiple of [`ADVICE_PERIOD`](super::advice_log::ADVICE_PERIOD), or a sonar ping.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Positioned {
     /// The event of this index is a sonar ping; the fix is for its time of validity.
     Ping {
         /// Index into [`Events`].
         event: usize,
-        /// Where the vehicle was.
+        /// Fix at the ping, or the reason there is none.
         fix: Result<Fix, NoFix>,
     },
     /// A multiple of the advice period has passed.
     Beat {
-        /// The multiple.
+        /// Its timestamp.
         at: MonoNs,
-        /// Where the vehicle is.
+        /// Fix at the beat, or the reason there is none.
         fix: Result<Fix, NoFix>,
     },
 }
@@ -55,23 +54,23 @@ pub enum Positioned {
 #[derive(Debug, Resource)]
 pub struct PositionedList(pub Vec<Positioned>);
 
-/// What became of a ping.
+/// Outcome of a ping.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Outcome {
     /// A sample on the wall.
     Sample {
-        /// Where the beam ended.
+        /// End point of the beam.
         point: Point3<Tunnel>,
         /// Its arc length, m.
         arc_m: f64,
     },
-    /// No return from where one should have come, for a reason; nobody knows where that was without a fix.
+    /// No sample, with the reason and the point aimed at; `None` without a fix or a wall in that direction.
     Lost(Loss, Option<Aim>),
-    /// A return that could not be placed.
+    /// A return without a fix, with the reason.
     Unplaced(NoFix),
 }
 
-/// Where a beam meets the wall by design.
+/// Point at which a beam meets the design profile.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Aim {
     /// Chainage, m.
@@ -80,30 +79,30 @@ pub struct Aim {
     pub arc_m: f64,
 }
 
-/// A ping with its place.
+/// A georeferenced ping.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlacedPing {
     /// Number of the head, from zero.
     pub head: usize,
-    /// When the packet was received.
+    /// Receive time of the packet.
     pub received: MonoNs,
-    /// When the ping was valid.
+    /// Time of validity of the ping.
     pub valid_at: MonoNs,
-    /// The vehicle then; `None` without a fix.
+    /// Fix at that time.
     pub fix: Option<Fix>,
     /// Chainages on which the head lands samples at this attitude; `None` without a fix.
     pub reach: Option<Reach>,
-    /// The head has come here from its last ping in one step.
+    /// The head has moved a single step since its last ping.
     pub single_step: bool,
     /// A new sweep has begun.
     pub new_sweep: bool,
-    /// The head stands still.
+    /// The head is stalled.
     pub standing: bool,
-    /// What became of it.
+    /// Outcome.
     pub outcome: Outcome,
 }
 
-/// An item of the list that [`super::stage::Stage::Georeference`] hands on.
+/// An item of the output of [`super::stage::Stage::Georeference`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[expect(clippy::large_enum_variant, reason = "a list that is filled once and read once a tick")]
 pub enum Placed {
@@ -117,7 +116,7 @@ pub enum Placed {
 #[derive(Debug, Resource)]
 pub struct PlacedList(pub Vec<Placed>);
 
-/// Sections to be judged after a ping, in order; room that is used again and again.
+/// Sections to be judged after a ping, in order; a reused buffer.
 #[derive(Debug, Resource)]
 pub struct Requests(pub Vec<Request>);
 
@@ -129,23 +128,23 @@ pub enum Notice {
     Section {
         /// Index of the section.
         section: i64,
-        /// The moment, in data time.
+        /// Timestamp, in data time.
         at: MonoNs,
-        /// What has changed.
+        /// Kind of change.
         change: Judgement,
     },
     /// A run of flagged sections has changed.
     Run {
         /// Its number.
         id: RunId,
-        /// The moment, in data time.
+        /// Timestamp, in data time.
         at: MonoNs,
-        /// What has changed.
+        /// Kind of change.
         change: RunChange,
     },
-    /// Something is wrong that wasn't before.
+    /// First occurrence of an alert.
     Alert(AlertKind),
-    /// How fast one may go.
+    /// Speed advice.
     Advice(AdviceEntry),
 }
 

@@ -1,4 +1,4 @@
-//! A way out of the loop for results: a bounded queue that another thread empties.
+//! Outlet for results: a bounded queue that another thread drains.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -11,12 +11,12 @@ use super::error::PluginError;
 use super::messages::{Notice, Notices};
 use super::stage::Stage;
 
-/// Copies every notice into a queue. When nobody empties it the oldest notices are dropped, and counted.
+/// Copies every notice into a queue. On overflow the oldest notices are dropped and counted.
 pub struct NoticeOutlet {
     queue: Arc<Shared>,
 }
 
-/// The end at which notices come out.
+/// Receiving end of a [`NoticeOutlet`].
 #[derive(Clone)]
 pub struct NoticeReceiver {
     queue: Arc<Shared>,
@@ -31,7 +31,7 @@ struct Shared {
 struct Outlet(Arc<Shared>);
 
 impl NoticeOutlet {
-    /// A queue for `capacity` notices, and the end at which they come out.
+    /// A queue for `capacity` notices, and its receiving end.
     pub fn new(capacity: usize) -> (Self, NoticeReceiver) {
         let queue =
             Arc::new(Shared { notices: ArrayQueue::new(capacity.max(1)), dropped: AtomicU64::new(0) });
@@ -62,7 +62,7 @@ impl NoticeReceiver {
         self.queue.notices.pop()
     }
 
-    /// How many were dropped because nobody took them.
+    /// Number of notices dropped by overflow.
     pub fn dropped(&self) -> u64 {
         self.queue.dropped.load(Ordering::Relaxed)
     }

@@ -1,5 +1,5 @@
-//! Texts for the pilot, with figures and units: the one table of causes, remedies and advice in words. The terminal, the log for
-//! viewers and the summary of a report use it; the words in JSON are the enums' `as_str`.
+//! Texts for the pilot, with figures and units: the only table of causes, remedies and advice in plain text. The
+//! terminal, the log for viewers and the summary of a report use it; the words in JSON are the enums' `as_str`.
 
 use super::advice_log::AdviceEntry;
 use super::alerts::AlertKind;
@@ -16,16 +16,16 @@ pub fn station(chainage_m: f64) -> String {
     format!("{sign}{kilometres:.0}+{metres:06.2}")
 }
 
-/// The figures of a cause's evidence that its text states.
+/// Figures of a cause's evidence used in its text.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CauseFigures {
     /// The cause.
     pub cause: Cause,
     /// Speed along the tunnel, m/s.
     pub speed_mps: f64,
-    /// Largest distance between neighbours of one turn, m.
+    /// Largest step along the perimeter between neighbouring samples of one turn, m.
     pub t_y_m: f64,
-    /// The same from the middle of the tunnel, m.
+    /// The same predicted from the middle of the tunnel, m.
     pub middle_t_y_m: f64,
     /// Share of pings without a return.
     pub missing_share: f64,
@@ -40,7 +40,7 @@ impl From<&Evidence> for CauseFigures {
     }
 }
 
-/// A cause, with its figures.
+/// Text of a cause, with its figures.
 pub fn cause_text(figures: &CauseFigures) -> String {
     match figures.cause {
         Cause::TooFast => format!("too fast ({:.2} m/s)", figures.speed_mps),
@@ -59,8 +59,8 @@ pub fn cause_text(figures: &CauseFigures) -> String {
     }
 }
 
-/// What to do about a missed stretch that begins at `start_m`, m, and at which speed, m/s; zero where no speed is known to
-/// meet the target.
+/// Text of the action for a missed stretch that begins at `start_m`, m, with the maximum speed, m/s; zero if no speed is
+/// known to meet the target.
 pub fn action_text(action: Action, start_m: f64, at_most_mps: f64) -> String {
     let start = station(start_m);
     let text = match action {
@@ -83,7 +83,7 @@ pub fn action_text(action: Action, start_m: f64, at_most_mps: f64) -> String {
     }
 }
 
-/// What would help where slower doesn't.
+/// Remedy if lower speed does not help.
 fn remedy_text(remedy: Option<Remedy>) -> String {
     match remedy {
         Some(Remedy::HoldHeading) => "hold the heading, the beams swing".to_owned(),
@@ -98,17 +98,17 @@ fn remedy_text(remedy: Option<Remedy>) -> String {
 pub struct Missed {
     /// Where it begins, m.
     pub start_m: f64,
-    /// Why.
+    /// Cause with its figures.
     pub figures: CauseFigures,
     /// Arc length of its largest hole, m.
     pub hole_arc_m: f64,
     /// Target T, m.
     pub target_m: f64,
-    /// The speed that is advised now, m/s; zero where none is.
+    /// Speed advised now, m/s; zero if none.
     pub v_max_mps: f64,
 }
 
-/// A flag: where, why, and what to do.
+/// Text of a flag: location, cause and action.
 pub fn flag_text(missed: &Missed, profile: &Profile) -> String {
     let Missed { start_m, figures, hole_arc_m, target_m, v_max_mps } = missed;
     format!(
@@ -120,12 +120,12 @@ pub fn flag_text(missed: &Missed, profile: &Profile) -> String {
     )
 }
 
-/// A stretch that was passed again and is no longer flagged.
+/// Text of a stretch that was passed again and is no longer flagged.
 pub fn cleared_text(from_m: f64, to_m: f64) -> String {
     format!("cleared  ch {} to {}", station(from_m), station(to_m))
 }
 
-/// An alert at a chainage, m, with how far off something is, m.
+/// Text of an alert at a chainage, m, with the deviation, m.
 pub fn alert_text(kind: AlertKind, x_m: f64, off_m: f64) -> String {
     let x = station(x_m);
     match kind {
@@ -138,24 +138,24 @@ pub fn alert_text(kind: AlertKind, x_m: f64, off_m: f64) -> String {
     }
 }
 
-/// The figures of advice that its text states.
+/// Figures of advice used in its text.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AdviceFigures {
     /// Speed now, m/s.
     pub speed_mps: f64,
     /// The largest speed at which the target is met, m/s; zero where none is.
     pub v_max_mps: f64,
-    /// What decides.
+    /// Limiting factor.
     pub reason: Reason,
     /// The present turn will exceed the target.
     pub will_exceed: bool,
-    /// How far the heads are out of phase, radians.
+    /// Phase error of the heads, radians.
     pub phase_error_rad: f64,
-    /// Largest distance between neighbours of one turn, m.
+    /// Largest step along the perimeter between neighbouring samples of one turn, m.
     pub t_y_m: f64,
     /// A strip that no head sees: its width and the arc length of its middle, m.
     pub unseen_m: Option<[f64; 2]>,
-    /// What would help where slower doesn't.
+    /// Remedy if lower speed does not help.
     pub remedy: Option<Remedy>,
 }
 
@@ -175,7 +175,7 @@ impl From<&AdviceEntry> for AdviceFigures {
     }
 }
 
-/// Advice, with its figures.
+/// Text of advice, with its figures.
 pub fn advice_text(advice: &AdviceFigures, profile: &Profile) -> String {
     match advice.reason {
         Reason::HelixPitch if advice.will_exceed && advice.speed_mps.abs() > advice.v_max_mps => {

@@ -1,4 +1,4 @@
-//! The dive's state that belongs to no one sensor: the tunnel, the target, what is known of the wall, and counts.
+//! State of the dive not tied to one sensor: the tunnel, the target, the coverage of the wall, and counts.
 
 use bevy_ecs::entity::Entity;
 use bevy_ecs::prelude::Resource;
@@ -26,12 +26,12 @@ pub struct TunnelDesign {
     pub contradiction_m: f64,
 }
 
-/// What is to be reached.
+/// Coverage target.
 #[derive(Debug, Clone, Copy, Resource)]
 pub struct Target {
     /// Target T, m.
     pub target_m: f64,
-    /// How the heads share the work.
+    /// Arrangement of the heads: phase shift or sector offset.
     pub layout: HeadLayout,
 }
 
@@ -60,7 +60,7 @@ impl VehicleEntities {
     }
 }
 
-/// What is known of the wall.
+/// Coverage of the wall.
 #[derive(Debug, Resource)]
 pub struct Coverage {
     /// Samples.
@@ -89,7 +89,7 @@ impl Stateful for Finder {
     }
 }
 
-/// The streams of results with their digests; together, the dive's.
+/// The result streams with their digests, which together give the dive's.
 #[derive(Debug, Default, Resource)]
 pub struct Digests {
     /// Poses at the beats.
@@ -105,7 +105,7 @@ pub struct Digests {
 stateful!(Digests { state: poses, pings, judgements, advice; });
 
 impl Digests {
-    /// The streams by name, in the order in which a log has them.
+    /// The streams by name, in log order.
     pub fn streams(&self) -> [(&'static str, &ResultStream); 4] {
         [
             ("poses", &self.poses),
@@ -140,21 +140,21 @@ pub struct Tally {
     pub span: Option<(MonoNs, MonoNs)>,
     /// Samples on the wall.
     pub samples: u64,
-    /// Pings without a return, the wall within range or its distance not known.
+    /// Pings without a return where the wall was within range, or without a fix.
     pub missing: u64,
     /// Pings without a return where the wall was out of range.
     pub out_of_range: u64,
-    /// Pings that the vehicle itself stopped.
+    /// Pings occluded by the vehicle.
     pub occluded: u64,
     /// Returns without a fix.
     pub unplaced: u64,
-    /// Samples outside the stretch that is kept.
+    /// Samples outside the store's extent.
     pub outside: u64,
-    /// Samples for which there was no room.
+    /// Samples not stored for lack of room.
     pub not_stored: u64,
 }
 
-/// The tick that runs.
+/// The current tick.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Resource, Serialize, Deserialize)]
 pub struct TickTime {
     /// Its number, from zero.

@@ -1,20 +1,20 @@
-//! Results as they are published: hashed, and kept word by word for those who record or compare them.
+//! Published results: hashed, and kept word by word for recording or comparison.
 //!
-//! A stream is a row of records. A record is a head and then its words: whole numbers, or the bits of numbers. The head has
-//! the record's kind in its lowest byte and the number of its words above it. What is hashed are the words.
+//! A stream is a sequence of records. A record is a header and then its words: integers, or the bits of floating-point
+//! numbers. The header has the record's kind in its lowest byte and the number of words above it. Only words are hashed.
 
 use super::digest::Digest;
 use headrace_snapshot::stateful;
 
-/// Words of a stream that one tick has room for; what goes beyond is counted as lost to the record, not to the digest.
+/// Capacity of a stream per tick, words; those beyond are hashed, but not kept, and counted as lost.
 const MAX_TICK_WORDS: usize = 1 << 16;
 
-/// What a record tells.
+/// Kind of a record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RecordKind {
-    /// A ping that has become a sample.
+    /// A ping with a sample.
     Sample = 1,
-    /// A ping that has become none.
+    /// A ping without a sample.
     NoSample = 2,
     /// A section that was judged.
     Section = 3,
@@ -22,20 +22,20 @@ pub enum RecordKind {
     Run = 4,
     /// Advice.
     Advice = 5,
-    /// Where the vehicle is.
+    /// Pose of the vehicle.
     Pose = 6,
-    /// Nobody knows where the vehicle is.
+    /// No fix.
     NoPose = 7,
-    /// Something is wrong with the dive as a whole.
+    /// An alert about the dive as a whole.
     Alert = 8,
 }
 
-/// What a word of a record is.
+/// Type of a record's word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum WordKind {
-    /// A whole number.
+    /// An integer.
     Integer,
-    /// The bits of a number.
+    /// The bits of an `f64`.
     Number,
 }
 
@@ -56,7 +56,7 @@ impl RecordKind {
         Self::ALL.into_iter().find(|kind| *kind as u8 == number)
     }
 
-    /// What such a record is called.
+    /// Name of the kind.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Sample => "sample",
@@ -70,7 +70,7 @@ impl RecordKind {
         }
     }
 
-    /// The name of its word at `place`, and what it is.
+    /// Name and type of its word at `place`.
     pub fn field(self, place: usize) -> (&'static str, WordKind) {
         use WordKind::{Integer, Number};
         let fields: &[(&str, WordKind)] = match self {
@@ -96,7 +96,7 @@ impl RecordKind {
                 ("cause", Integer),
                 ("hole_x_m", Number),
                 ("hole_arc_m", Number),
-                // Where there is a cause.
+                // Only with a cause.
                 ("speed_mps", Number),
                 ("t_y_m", Number),
                 ("middle_t_y_m", Number),
@@ -127,7 +127,7 @@ impl RecordKind {
                 ("j", Number),
                 ("k", Number),
                 ("speed_mps", Number),
-                // Where navigation knows them.
+                // Only if navigation provides them.
                 ("along_sd_m", Number),
                 ("place_sd_m", Number),
                 ("tilt_sd_rad", Number),
@@ -136,7 +136,7 @@ impl RecordKind {
             Self::NoPose => &[("at_ns", Integer), ("reason", Integer)],
             Self::Alert => &[("at_ns", Integer), ("kind", Integer), ("x_m", Number), ("off_m", Number)],
         };
-        // Advice goes on with the speeds that other modes would allow.
+        // Advice continues with the speeds that other modes would allow.
         let beyond = if self == Self::Advice { "alternative_v_max_mps" } else { "beyond the last field" };
         fields.get(place).copied().unwrap_or((beyond, Number))
     }
@@ -147,7 +147,7 @@ impl RecordKind {
 pub struct ResultStream {
     digest: Digest,
     words: Vec<u64>,
-    /// Room for words of a tick; none while nobody keeps them.
+    /// Capacity per tick, words; zero unless words are kept.
     room: usize,
     head: usize,
     records: u64,
@@ -157,7 +157,7 @@ pub struct ResultStream {
 stateful!(ResultStream { state: digest, records, lost; fixed: words, room, head; });
 
 impl ResultStream {
-    /// Keeps the words of each tick from now on. Allocates: all that it will need.
+    /// Keeps the words of each tick from now on. Allocates: all that it will ever use.
     pub fn keep(&mut self) {
         self.room = MAX_TICK_WORDS;
         self.words.reserve_exact(self.room);
@@ -171,26 +171,26 @@ impl ResultStream {
         self
     }
 
-    /// Takes a whole number in.
+    /// Adds an integer.
     pub(super) fn integer(&mut self, value: u64) -> &mut Self {
         self.digest.integer(value);
         self.word(value);
         self
     }
 
-    /// Takes a number in, bit for bit; all zeros alike.
+    /// Adds a number bit by bit; -0 counts as +0.
     pub(super) fn number(&mut self, value: f64) -> &mut Self {
         self.digest.number(value);
         self.word((value + 0.0).to_bits());
         self
     }
 
-    /// The digest of all so far.
+    /// The digest so far.
     pub fn value(&self) -> u64 {
         self.digest.value()
     }
 
-    /// The words of the last tick, heads included.
+    /// The words of the last tick, headers included.
     pub fn words(&self) -> &[u64] {
         &self.words
     }
@@ -200,12 +200,12 @@ impl ResultStream {
         self.records
     }
 
-    /// Words for which a tick had no room.
+    /// Words not kept because they exceeded a tick's capacity.
     pub fn lost(&self) -> u64 {
         self.lost
     }
 
-    /// Takes a short text in: its first 16 bytes, as two whole numbers.
+    /// Adds a short text: its first 16 bytes, as two integers.
     pub(super) fn text(&mut self, text: &str) -> &mut Self {
         let mut bytes = [0; 16];
         bytes.iter_mut().zip(text.bytes()).for_each(|(byte, of)| *byte = of);
@@ -216,7 +216,7 @@ impl ResultStream {
         self
     }
 
-    /// Forgets the words of the last tick.
+    /// Clears the words of the last tick.
     pub(super) fn next_tick(&mut self) {
         self.words.clear();
     }
@@ -243,7 +243,7 @@ impl ResultStream {
 /// A record of a stream.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Record<'a> {
-    /// What it tells; `None` for a kind that this version doesn't know.
+    /// Its kind; `None` if unknown to this version.
     pub kind: Option<RecordKind>,
     /// Its words.
     pub words: &'a [u64],
@@ -256,7 +256,7 @@ pub fn text_of(words: [u64; 2]) -> String {
     String::from_utf8_lossy(&text).into_owned()
 }
 
-/// The first of a row of records, and the row after it. `None` at the end, or where a record isn't whole.
+/// The first of a sequence of records, and the rest. `None` at the end, or if a record is incomplete.
 pub fn first_record(words: &[u64]) -> Option<(Record<'_>, &[u64])> {
     let (head, rest) = words.split_first()?;
     let [kind, ..] = head.to_le_bytes();
@@ -301,7 +301,7 @@ mod tests {
         }
     }
 
-    /// Keeping changes no digest, nor does the lack of room.
+    /// Neither keeping words nor running out of room changes a digest.
     #[test]
     fn the_digest_is_of_the_words_alone() {
         let mut plain = ResultStream::default();

@@ -1,17 +1,17 @@
-//! The way from a port's thread to the loop: a bounded ring of packets, one writer, one reader, no lock.
+//! Bounded lock-free ring of packets from a port's thread to the loop: one writer, one reader.
 
 use ringbuf::traits::{Consumer as _, Observer as _, Producer as _, Split as _};
 use ringbuf::{HeapCons, HeapProd, HeapRb};
 
 use headrace_geometry::time::MonoNs;
 
-/// Bytes of the header that stands before each packet in the ring: receive time, order, length.
+/// Size of each packet's header, bytes: receive time, order, length.
 const HEADER_BYTES: usize = 20;
 
-/// The longest packet that a ring takes.
+/// Maximum packet length, bytes.
 pub const MAX_PACKET_BYTES: usize = 4096;
 
-/// Order of consumption where a log has recorded it; live packets have none.
+/// Order of live packets; replayed ones have the order of consumption recorded in the log.
 pub const NO_ORDER: u64 = u64::MAX;
 
 /// A packet that did not fit.
@@ -26,7 +26,7 @@ pub enum RingError {
         /// Bytes needed, header included.
         needed: usize,
     },
-    /// No ring takes a packet of that length.
+    /// The packet is longer than [`MAX_PACKET_BYTES`].
     #[error("packet of {len} bytes; the longest allowed is {MAX_PACKET_BYTES}")]
     TooLong {
         /// Its length.
@@ -44,7 +44,7 @@ pub(super) struct PortReader {
     ring: HeapCons<u8>,
 }
 
-/// What stands before a packet.
+/// Header of a packet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct PacketHeader {
     pub(super) received: MonoNs,
@@ -66,7 +66,7 @@ impl Port {
         self.send_in_order(received, NO_ORDER, bytes)
     }
 
-    /// Like [`Port::send`], with the packet's recorded place in the order of consumption.
+    /// Like [`Port::send`], with the packet's recorded order of consumption.
     ///
     /// Errors: as for [`Port::send`].
     pub fn send_in_order(&mut self, received: MonoNs, order: u64, bytes: &[u8]) -> Result<(), RingError> {
@@ -83,7 +83,7 @@ impl Port {
         time.copy_from_slice(&received.0.to_le_bytes());
         place.copy_from_slice(&order.to_le_bytes());
         length.copy_from_slice(&len.to_le_bytes());
-        // The reader takes a packet only when all of it is there, so that two writes need no further care.
+        // The reader waits for the whole packet, so two writes need no synchronisation.
         self.ring.push_slice(&header);
         self.ring.push_slice(bytes);
         Ok(())
@@ -112,12 +112,12 @@ impl PortReader {
         whole.then_some(PacketHeader { received: MonoNs(word(0)), order: word(8), len })
     }
 
-    /// Drops what waits.
+    /// Discards waiting packets.
     pub(super) fn clear(&mut self) {
         self.ring.clear();
     }
 
-    /// Takes the packet that [`PortReader::peek`] has shown into `into`, whose length must be the packet's.
+    /// Reads the packet shown by [`PortReader::peek`] into `into`, whose length must be the packet's.
     pub(super) fn take(&mut self, into: &mut [u8]) {
         self.ring.skip(HEADER_BYTES);
         self.ring.pop_slice(into);

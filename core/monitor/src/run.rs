@@ -26,7 +26,7 @@ use headrace_sensor::device_clock::ClockReport;
 use headrace_snapshot::{Restorer, Saver, SnapshotError};
 use headrace_vehicle::Mission;
 
-/// Sections judged at the end of a dive before their notices are heard.
+/// Sections judged per batch at the end of a dive, before their notices are delivered.
 const FINISHED_AT_ONCE: usize = 256;
 
 /// A loop that runs. All memory is allocated; a tick takes no lock, makes no system call and formats nothing.
@@ -42,7 +42,7 @@ pub struct Loop {
 }
 
 impl Loop {
-    /// From an app whose world has all that the stages need.
+    /// From an app whose world has everything that the stages need.
     pub(super) fn new(app: App) -> Self {
         let App { mission, world, schedule, sources, ports, readers, .. } = app;
         let ports = ports.into_iter().map(Some).collect();
@@ -53,15 +53,15 @@ impl Loop {
         armed
     }
 
-    /// Takes what has come and works it off. Gives the number of packets consumed.
+    /// Processes the waiting packets. Returns the number of packets consumed.
     ///
-    /// `now` is the end of the tick's time, for the record; no result depends on it.
+    /// `now` is the end of the tick's time, only recorded; no result depends on it.
     /// Allocates: never.
     pub fn tick(&mut self, now: MonoNs) -> usize {
         if let Some(mut time) = self.world.get_resource_mut::<TickTime>() {
             *time = TickTime { index: self.ticks, now };
         }
-        // What the end of a dive has judged is still to be published.
+        // Judgements at the end of a dive are still to be published.
         if !self.finished {
             self.world.resource_mut::<Digests>().next_tick();
         }
@@ -103,19 +103,19 @@ impl Loop {
         self.world.get_resource::<T>()
     }
 
-    /// Where the vehicle was at the last beat, and how well that is known.
+    /// Fix of the vehicle at the last beat, and its standard deviations.
     pub fn vehicle(&self) -> &VehicleState {
         self.of_vehicle()
     }
 
-    /// Where the vehicle is at `at`, which may be a little before or after the last reading.
+    /// Fix at `at`, which may be a little before or after the last reading.
     ///
-    /// Errors: what is missing.
+    /// Errors: the reason there is no fix.
     pub fn fix(&self, at: MonoNs) -> Result<Fix, NoFix> {
         self.of_vehicle::<Navigator>().navigation.fix(at)
     }
 
-    /// How well a source agrees with the others; `None` where that isn't known.
+    /// Innovation statistics of a source; `None` if there are none.
     pub fn consistency(&self, source: usize) -> Option<Consistency> {
         self.of_vehicle::<Navigator>().navigation.consistency(source)
     }
@@ -130,7 +130,7 @@ impl Loop {
         &self.world.resource::<Notices>().0
     }
 
-    /// What is known of the wall.
+    /// Coverage of the wall.
     pub fn coverage(&self) -> &Coverage {
         self.world.resource()
     }
@@ -140,32 +140,32 @@ impl Loop {
         self.world.resource()
     }
 
-    /// What is wrong with the dive as a whole.
+    /// Alerts about the dive as a whole.
     pub fn alerts(&self) -> &Alerts {
         self.world.resource()
     }
 
-    /// The advice over time.
+    /// Advice history.
     pub fn advice_log(&self) -> &AdviceLog {
         self.world.resource()
     }
 
-    /// The streams of results with their digests.
+    /// The result streams with their digests.
     pub fn digests(&self) -> &Digests {
         self.world.resource()
     }
 
-    /// The least and the greatest speed of sound by which ranges were computed, m/s.
+    /// Minimum and maximum speed of sound used for ranges, m/s.
     pub fn sound_speeds_mps(&self) -> [f64; 2] {
         self.world.resource::<SoundSpeed>().span_mps()
     }
 
-    /// How each sensor sits and what it is, in the order of sources.
+    /// Mount and kind of each sensor, in the order of sources.
     pub fn sensors(&self) -> Vec<SensorInfo> {
         self.of_sensors::<Mounted>().map(|mounted| mounted.info).collect()
     }
 
-    /// What has come from each sensor, in the order of sources.
+    /// Traffic statistics of each sensor, in the order of sources.
     pub fn health(&self) -> impl Iterator<Item = &SensorHealth> {
         self.of_sensors()
     }
@@ -176,7 +176,7 @@ impl Loop {
         entities.by_source.iter().filter_map(|entity| self.world.get(*entity))
     }
 
-    /// A component that the vehicle has since the loop was armed.
+    /// A component of the vehicle, present from arming on.
     fn of_vehicle<T: Component>(&self) -> &T {
         let vehicle = self.world.entity(self.world.resource::<VehicleEntities>().vehicle);
         #[expect(clippy::expect_used, reason = "arming has put it there, and nothing takes it away")]
@@ -193,8 +193,8 @@ impl Loop {
         &mut self.world
     }
 
-    /// Judges what is still open: the dive has ended, and no sample will come. `hear` is given the notices of it, some
-    /// sections' at a time, and the loop as it is then: those of a long dive at once would take more than its samples.
+    /// Judges the unsettled sections: the dive has ended, and no sample will come. `hear` gets their notices in batches,
+    /// with the loop's state at that point: those of a long dive at once would take more memory than its samples.
     pub fn finish(&mut self, hear: &mut dyn FnMut(&Notice, &Self)) {
         let vehicle = self.world.resource::<VehicleEntities>().vehicle;
         if let Some(mut navigator) = self.world.get_mut::<Navigator>(vehicle) {
@@ -215,7 +215,7 @@ impl Loop {
         }
     }
 
-    /// The sections that are to be judged at the end, which of them are known to fail, and what they have in common.
+    /// The sections to be judged at the end, each with whether it is known to fail, and the fields their requests share.
     fn open_requests(&mut self) -> (Vec<(i64, bool)>, Option<Request>) {
         let outlook = self.outlook();
         let profile = &self.mission.profile;
@@ -255,10 +255,10 @@ impl Loop {
         });
     }
 
-    /// The state after the last tick, from which a loop of the same vehicle goes on to the same results. Packets that wait
-    /// in the rings are no part of it, nor is what plugins keep for themselves.
+    /// Snapshot of the state after the last tick; a loop of the same vehicle restored from it gives the same results.
+    /// Excludes packets waiting in the rings and plugins' private state.
     ///
-    /// Errors: something can't be written.
+    /// Errors: a part can't be serialised.
     pub fn save(&self) -> Result<Vec<u8>, SnapshotError> {
         let mut to = Saver::default();
         to.part("ticks");
@@ -267,9 +267,9 @@ impl Loop {
         to.finish()
     }
 
-    /// Goes on from a state that a loop of the same vehicle and program has saved. What waits in the rings is dropped.
+    /// Restores a snapshot saved by a loop of the same vehicle and program. Packets waiting in the rings are dropped.
     ///
-    /// Errors: the bytes are another's. The loop must not be used then.
+    /// Errors: the snapshot doesn't fit this loop, which must not be used afterwards.
     pub fn restore(&mut self, snapshot: &[u8]) -> Result<(), SnapshotError> {
         let mut from = Restorer::new(snapshot);
         from.part("ticks")?;
@@ -279,7 +279,7 @@ impl Loop {
         if from.is_empty() { Ok(()) } else { Err(from.unfit("there is more of it".to_owned())) }
     }
 
-    /// Gives the samples' memory back: after the end of a dive a report needs the sections alone.
+    /// Frees the samples' memory: after the end of a dive a report needs only the sections.
     pub fn release_samples(&mut self) {
         self.world.resource_mut::<Coverage>().store.release();
     }
@@ -289,7 +289,7 @@ impl Loop {
         self.readers.iter().any(|reader| reader.peek().is_some())
     }
 
-    /// What each source's codec has seen, in the order of the sources.
+    /// Codec counts of each source, in the order of the sources.
     pub fn decoder_counts(&self) -> Vec<CodecCounts> {
         self.of_sensors::<SensorDecoder>().map(|decoder| decoder.0.counts()).collect()
     }
@@ -299,12 +299,12 @@ impl Loop {
         self.of_sensors::<SensorDecoder>().map(|decoder| decoder.0.withheld()).collect()
     }
 
-    /// How each source's own clock goes, in the order of the sources.
+    /// Device clock statistics of each source, in the order of the sources.
     pub fn decoder_clocks(&self) -> Vec<Option<ClockReport>> {
         self.of_sensors::<SensorDecoder>().map(|decoder| decoder.0.clock()).collect()
     }
 
-    /// Digest of all results so far: poses, places, judgements and advice.
+    /// Digest of all results so far: poses, pings, judgements and advice.
     pub fn digest(&self) -> u64 {
         let digests = self.world.resource::<Digests>();
         let mut all = Digest::default();

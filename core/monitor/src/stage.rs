@@ -13,18 +13,17 @@ pub enum Stage {
     Navigate,
     /// Returns to points on the wall.
     Georeference,
-    /// Places to samples, passes and sections; each section that is out of reach to its verdict, there and then.
+    /// Georeferenced pings to samples, passes and sections; judges sections as soon as they are due.
     Cover,
-    /// For plugins that look at verdicts before there is advice.
+    /// For plugins that read the verdicts before the advice.
     Judge,
-    /// How fast one may go.
+    /// Speed advice.
     Advise,
     /// Results to the outlets.
     Publish,
 }
 
-/// An empty schedule of the chained stages: one thread, and two systems whose order matters but isn't stated are an
-/// error.
+/// An empty schedule of the chained stages: single-threaded; an ambiguous order of systems is an error.
 pub(super) fn schedule() -> Schedule {
     let mut schedule = Schedule::default();
     schedule.set_executor(SingleThreadedExecutor::new());

@@ -1,4 +1,4 @@
-//! What a dive's samples say of other targets and lengths of section.
+//! Verdicts of a dive's samples for other targets and section lengths.
 
 use bevy_ecs::world::Mut;
 use serde::Serialize;
@@ -15,16 +15,16 @@ pub struct WhatIfReport {
     pub section_m: f64,
     /// Metres of sections that would pass.
     pub pass_m: f64,
-    /// That would fail.
+    /// Metres that would fail.
     pub fail_m: f64,
-    /// Of which nothing could be said for sure.
+    /// Metres undecided within the error of the hole.
     pub cannot_say_m: f64,
-    /// That would still be open.
+    /// Metres that would still be open.
     pub open_m: f64,
 }
 
 impl Loop {
-    /// What its samples say of every target in sections of every length, once the dive has ended.
+    /// Verdicts of its samples for every target and section length, once the dive has ended.
     pub fn what_if(&mut self, targets_m: &[f64], sections_m: &[f64]) -> Vec<WhatIfReport> {
         let outlook = self.outlook();
         let profile = self.mission().profile.clone();

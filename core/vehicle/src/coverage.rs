@@ -1,4 +1,4 @@
-//! `[coverage]` and `[[openings]]` of a vehicle file: how the wall is judged, and where it has none.
+//! `[coverage]` and `[[openings]]` of a vehicle file: judging parameters and declared openings of the wall.
 
 use headrace_config::{ConfigError, Section};
 use headrace_coverage::openings::Opening;
@@ -6,16 +6,16 @@ use headrace_coverage::soundings::NODE_M;
 use headrace_geometry::math::{self, TAU};
 use headrace_geometry::tunnel::Profile;
 
-/// How the wall is judged.
+/// Judging parameters of the wall.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CoverageConfig {
-    /// How far the bounds of a hole may be apart, m; zero where it is measured exactly.
+    /// Maximum width of a hole's bounds, m; zero for the exact search.
     pub hole_tolerance_m: f64,
-    /// Samples farther than this from the design profile contradict it, m; where most do, nothing passes.
+    /// Deviation from the design profile beyond which a sample contradicts it, m; sections where most do can't pass.
     pub contradiction_m: f64,
-    /// Edge of a node of the grid on which soundings are counted, m.
+    /// Node edge of the sounding grid, m.
     pub node_m: f64,
-    /// Where there is no wall to cover.
+    /// Declared openings of the wall.
     pub openings: Vec<Opening>,
 }
 
@@ -25,7 +25,7 @@ impl Default for CoverageConfig {
     }
 }
 
-/// The most places that stand for openings.
+/// Maximum number of samples that fill openings.
 const MAX_PLACES: i64 = 1_000_000;
 
 impl CoverageConfig {
@@ -85,7 +85,7 @@ fn parse_opening(section: Section<'_>, profile: &Profile) -> Result<Opening, Con
     Ok(Opening { name, from_m, to_m, arc_m })
 }
 
-/// Arc length at an hour of a clock seen looking along the tunnel from the reference point: 6 is the floor, 9 the left wall.
+/// Arc length at a clock hour seen along the tunnel from the reference point, m: 6 is the floor, 9 the left wall.
 fn arc_at_hour_m(profile: &Profile, hour: f64) -> f64 {
     let angle = (hour - 6.0) / 12.0 * TAU;
     let direction = [math::sin(angle), -math::cos(angle)];

@@ -1,4 +1,4 @@
-//! `VEHICLE.toml`: the vehicle, its sensors, the tunnel, the target, and how it is judged and navigated.
+//! `VEHICLE.toml`: the vehicle, its sensors, the tunnel, the target, judging and navigation.
 
 #![cfg_attr(not(test), warn(clippy::cast_possible_truncation))]
 #![cfg_attr(test, allow(clippy::cast_possible_truncation))]

@@ -1,4 +1,4 @@
-//! What a dive is for: the tunnel, the target, and how they are judged.
+//! Mission of a dive: the tunnel, the target and the judging parameters.
 
 use headrace_geometry::site::Site;
 use headrace_geometry::time::DurNs;
@@ -8,14 +8,14 @@ use headrace_sampling::occlusion::Obstacle;
 
 use crate::coverage::CoverageConfig;
 
-/// The tunnel and the target that a loop works for.
+/// Mission parameters of a loop.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mission {
     /// Design profile.
     pub profile: Profile,
     /// Water, gravity, levels.
     pub site: Site,
-    /// The depth sensor whose temperature tells the speed of sound, in place of the site's.
+    /// Depth sensor whose temperature gives the speed of sound, in place of the site's.
     pub sound_speed_from: Option<String>,
     /// Target T, m.
     pub target_m: f64,
@@ -23,19 +23,18 @@ pub struct Mission {
     pub section_m: f64,
     /// Length of the tunnel, m; samples beyond are counted, not kept.
     pub length_m: f64,
-    /// How the heads share the work.
+    /// Arrangement of the heads: phase shift or sector offset.
     pub layout: HeadLayout,
-    /// Parts of the vehicle that may stand in a head's way, besides the other heads.
+    /// Parts of the vehicle that may occlude a head, other than the other heads.
     pub hull: Vec<Obstacle>,
-    /// How the wall is judged, and where there is none.
+    /// Judging parameters and openings of the wall.
     pub coverage: CoverageConfig,
-    /// How long the dive may take from its first packet; `None` when nobody has said.
+    /// Time limit of the dive from its first packet; `None` if not set.
     pub dive_time: Option<DurNs>,
 }
 
 impl Mission {
-    /// A tunnel 100 m long with sections of 0.25 m, at a usual site; phase shift, no hull, exact holes, no end of the
-    /// dive.
+    /// A tunnel 100 m long with sections of 0.25 m, at the default site; phase shift, no hull, exact holes, no time limit.
     pub fn new(profile: Profile, target_m: f64) -> Self {
         Self {
             profile,

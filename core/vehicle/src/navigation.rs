@@ -1,4 +1,4 @@
-//! `[navigation]` of a vehicle file: which way it navigates, and how far each sensor is trusted.
+//! `[navigation]` of a vehicle file: navigation method and noise settings.
 
 use core::ops::RangeInclusive;
 
@@ -10,26 +10,26 @@ use headrace_fusion::filter::settings::Settings;
 use headrace_geometry::site::Site;
 use headrace_geometry::tunnel::Profile;
 
-/// In radians.
+/// One degree, radians.
 const DEGREE: f64 = core::f64::consts::PI / 180.0;
-/// What a noise may be: zero would make the filter believe one sensor against all others.
+/// Valid ranges of noise settings: zero would make the filter trust one sensor over all others.
 const DEGREES: RangeInclusive<f64> = 1e-4..=90.0;
 const METRES: RangeInclusive<f64> = 1e-4..=100.0;
 const SMALL: RangeInclusive<f64> = 1e-9..=10.0;
 const SECONDS: RangeInclusive<f64> = 0.1..=1e6;
 
-/// Which way a vehicle navigates: the `[navigation]` table of its file.
+/// Navigation method of a vehicle: the `[navigation]` table of its file.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[expect(clippy::large_enum_variant, reason = "there is one of it")]
 pub enum NavigationConfig {
-    /// By the filter.
+    /// With the filter.
     Filter(Settings),
-    /// Without one.
+    /// Without a filter.
     Direct,
 }
 
 impl NavigationConfig {
-    /// Reads the table; without one, a filter with the usual settings.
+    /// Reads the table; without one, a filter with default settings.
     ///
     /// Errors: the first key that is unknown or out of range.
     pub fn parse(section: Option<Section<'_>>) -> Result<Self, ConfigError> {
@@ -40,7 +40,7 @@ impl NavigationConfig {
         Ok(if by_filter { Self::Filter(settings) } else { Self::Direct })
     }
 
-    /// Navigation that knows nothing yet.
+    /// Navigation in its initial state.
     pub fn begin(&self, profile: &Profile, site: Site) -> Box<dyn Navigation> {
         match self {
             Self::Filter(settings) => Box::new(FilterNavigation::new(profile.clone(), site, *settings)),
@@ -49,7 +49,7 @@ impl NavigationConfig {
     }
 }
 
-/// Reads a vehicle file's `[navigation]` table; what it leaves out is as usual.
+/// Reads a vehicle file's `[navigation]` table; missing keys keep their defaults.
 ///
 /// Errors: the first key whose value is out of range.
 fn settings(section: &Section<'_>) -> Result<Settings, ConfigError> {

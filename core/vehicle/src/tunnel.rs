@@ -7,7 +7,7 @@ use headrace_geometry::tunnel::{Profile, Yz, shapes};
 /// The `[tunnel]` table.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TunnelConfig {
-    /// What the profile is called in the file.
+    /// Name of the profile in the file.
     pub name: String,
     /// Design profile of the cross-section.
     pub profile: Profile,
@@ -94,7 +94,7 @@ fn parse(section: &Section<'_>, load: Loader<'_>) -> Result<(String, Profile), C
     Ok((name, profile))
 }
 
-/// Reads a polyline: a line `y_m,z_m` a vertex; a first line of other text and lines that begin with # are passed over.
+/// Reads a polyline: one line `y_m,z_m` per vertex; a first line of other text and lines starting with # are skipped.
 fn parse_points(text: &str) -> Result<Vec<Yz>, String> {
     let mut points = Vec::new();
     for (number, line) in text.lines().enumerate() {

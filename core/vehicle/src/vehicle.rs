@@ -19,9 +19,9 @@ use headrace_sampling::occlusion::Obstacle;
 use headrace_sensor::SensorConfig;
 use headrace_sensor::device::{Device, DeviceKind, Sense};
 
-/// A whole vehicle file, checked.
+/// A validated vehicle file.
 pub struct VehicleConfig {
-    /// What people call the vehicle.
+    /// Vehicle name.
     pub name: String,
     /// Target T: the largest hole that passes, m.
     pub target_m: f64,
@@ -29,27 +29,27 @@ pub struct VehicleConfig {
     pub section_m: f64,
     /// Water, gravity, levels.
     pub site: Site,
-    /// The depth sensor whose temperature tells the speed of sound, in place of the site's.
+    /// Depth sensor whose temperature gives the speed of sound, in place of the site's.
     pub sound_speed_from: Option<String>,
     /// The tunnel.
     pub tunnel: TunnelConfig,
-    /// How the heads share the work.
+    /// Arrangement of the heads: phase shift or sector offset.
     pub layout: HeadLayout,
-    /// The speed for which the heads' phases are set, m/s; zero sets them without regard to their places along the hull.
+    /// Speed that the heads' phases are planned for, m/s; zero ignores their positions along the hull.
     pub planned_speed_mps: f64,
-    /// Parts of the vehicle that may stand in a head's way.
+    /// Parts of the vehicle that may occlude a head.
     pub hull: Vec<Obstacle>,
-    /// How the wall is judged.
+    /// Judging parameters and openings of the wall.
     pub coverage: CoverageConfig,
-    /// How it navigates.
+    /// Navigation method and settings.
     pub navigation: NavigationConfig,
-    /// How long the dive may take.
+    /// Time limit of the dive.
     pub dive_time: Option<DurNs>,
     /// The sensors, in the order of the file, which is the order of their sources.
     pub sensors: Vec<Box<dyn Device>>,
     /// The common part of each sensor's table, in the same order.
     pub sensor_configs: Vec<SensorConfig>,
-    /// Files that this one names, with their text: what a log needs to be replayed without them.
+    /// Files that this one refers to, with their text, so that a log can be replayed without them.
     pub attachments: Vec<(String, String)>,
 }
 
@@ -59,11 +59,11 @@ pub type WaterConfig = Site;
 const SENSOR_DISTANCE_M: core::ops::RangeInclusive<f64> = -20.0..=20.0;
 const DEGREES: core::ops::RangeInclusive<f64> = -360.0..=360.0;
 
-/// Bounds on what is allocated before a dive: some hundred megabytes of sections, and of cells of the wall.
+/// Bounds on startup allocation: some hundred megabytes each for sections and wall cells.
 const MAX_SECTIONS: f64 = 400_000.0;
 const MAX_CELLS: f64 = 2e8;
 
-/// Cells of the wall that the sample store will have.
+/// Number of wall cells that the sample store will have.
 fn wall_cells(tunnel: &TunnelConfig, target_m: f64) -> f64 {
     let cell_m = StoreLayout::cell_for_target_m(target_m);
     tunnel.length_m * tunnel.profile.perimeter_m() / (cell_m * cell_m)
@@ -84,7 +84,7 @@ impl VehicleConfig {
         Ok(vehicle)
     }
 
-    /// Like [`VehicleConfig::parse`], from a table that may hold other keys besides.
+    /// Like [`VehicleConfig::parse`], from a table that may hold other keys as well.
     ///
     /// Errors: as for [`VehicleConfig::parse`].
     pub fn from_section(
@@ -158,7 +158,7 @@ impl VehicleConfig {
 }
 
 impl VehicleConfig {
-    /// What a loop works for with this vehicle.
+    /// Mission parameters of this vehicle.
     pub fn mission(&self) -> Mission {
         Mission {
             profile: self.tunnel.profile.clone(),
@@ -179,9 +179,9 @@ impl VehicleConfig {
         self.navigation.begin(&self.tunnel.profile, self.site)
     }
 
-    /// What the heads do, in the order of the file; none without heads.
+    /// Scan programs of the heads, in the order of the file; empty without heads.
     ///
-    /// Errors: heads that no program fits.
+    /// Errors: no program fits the heads.
     pub fn programs(&self) -> Result<Vec<HeadProgram>, SamplingError> {
         let heads = self.heads();
         if heads.is_empty() {
@@ -229,7 +229,7 @@ fn parse_hull(section: Section<'_>) -> Result<Obstacle, ConfigError> {
     Ok(Obstacle::Box { least: point(least), most: point(most) })
 }
 
-/// That the sensor that is to tell the speed of sound is there, and feels the water.
+/// Checks that the sensor that supplies the speed of sound exists and is a depth sensor.
 fn check_sound(
     root: &Section<'_>,
     told_by: Option<&str>,
@@ -246,7 +246,7 @@ fn check_sound(
     Err(root.invalid("water", &problem))
 }
 
-/// That there are no more heads than tables hold, and that none is inside a box of the hull, which it would see through.
+/// Checks that there aren't too many heads, and that none is inside a hull box, which could not occlude it.
 fn check_heads(
     root: &Section<'_>,
     sensors: &[Box<dyn Device>],

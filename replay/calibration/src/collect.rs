@@ -81,7 +81,7 @@ impl Collected {
     }
 }
 
-/// A feed truncated at `end`.
+/// A packet source truncated at `end`.
 struct Until<'a> {
     feed: &'a mut dyn PacketSource,
     end: MonoNs,

@@ -33,7 +33,7 @@ pub struct Head {
     pub filed: Mount,
     /// Estimated mount; where there is no estimate, that of the file.
     pub found: Mount,
-    /// Sector in which it heard the wall, degrees.
+    /// Sector in which it received returns, degrees.
     pub seen_deg: f64,
     /// Returns used.
     pub used: usize,

@@ -53,10 +53,10 @@ pub struct Open {
     pub why: Untold,
 }
 
-/// All findings against a vehicle file.
+/// All estimates against a vehicle file.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Table {
-    /// Estimate.
+    /// Estimated quantities.
     pub found: Vec<Found>,
     /// Quantities that the log doesn't determine.
     pub open: Vec<Open>,

@@ -12,7 +12,7 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
 #![expect(
     unsafe_code,
-    reason = "a global allocator is an unsafe trait; this one counts and connections on to the system's"
+    reason = "a global allocator is an unsafe trait; this one counts and hands on to the system's"
 )]
 
 mod corpus;

@@ -23,7 +23,7 @@ pub type Words = [u64; WORDS];
 pub enum Move {
     /// Propagation over a leg.
     Leg(Leg),
-    /// Variances added to the errors', found to be too small.
+    /// Variances added to those of the errors, which had been too small.
     Widened(Errors),
     /// None: this was the last estimate of its piece.
     End,

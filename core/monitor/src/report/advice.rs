@@ -5,7 +5,7 @@ use serde::Serialize;
 use crate::advice_log::AdviceEntry;
 use headrace_sampling::advice::{Alternative, Left};
 
-/// Advice at a moment.
+/// Advice at one time.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AdviceReport {
     /// Seconds on the log's clock.
@@ -22,28 +22,28 @@ pub struct AdviceReport {
     pub predicted_t_m: Option<f64>,
     /// At the present speed the present turn will exceed the target.
     pub will_exceed: bool,
-    /// By how much the head farthest out of its phase is, degrees of its turn.
+    /// Largest phase error of a head, degrees of its turn.
     pub phase_error_deg: Option<f64>,
-    /// Hours at `v_max_mps` for what is left of the tunnel.
+    /// Hours at `v_max_mps` for the rest of the tunnel.
     pub needed_h: Option<f64>,
-    /// Whether the time that is left is enough.
+    /// Whether the remaining time is enough.
     pub suffices: Option<bool>,
-    /// What would help where slower doesn't: `centre`, `steady`, or a mode.
+    /// Remedy if lower speed does not help: `centre`, `steady`, or a mode.
     pub remedy: Option<String>,
-    /// What the heads could do in each of their modes.
+    /// Speeds possible in each mode of the heads.
     pub alternatives: Vec<AlternativeReport>,
 }
 
-/// What the heads could do in one of their modes.
+/// Speed possible in one mode of the heads.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AlternativeReport {
     /// The mode.
     pub mode: String,
     /// Largest speed that meets the target, m/s.
     pub v_max_mps: f64,
-    /// Hours at that speed for what is left of the tunnel.
+    /// Hours at that speed for the rest of the tunnel.
     pub needed_h: Option<f64>,
-    /// Whether the time that is left is enough.
+    /// Whether the remaining time is enough.
     pub suffices: Option<bool>,
 }
 

@@ -1,5 +1,4 @@
-//! The report: what a dive has shown, as plain values with units in their names. Its JSON is versioned; docs/ has the
-//! schema.
+//! Report of a dive: plain values with units in their names. Its JSON is versioned; docs/ has the schema.
 
 use serde::Serialize;
 
@@ -29,13 +28,13 @@ pub use spread::SpreadReport;
 use spread::spread_report;
 pub use survey::{HolidayReport, NodeRowReport, SurveyReport};
 
-/// Version of the report's form.
+/// Version of the report schema.
 pub const REPORT_VERSION: u32 = 3;
 
 /// A whole report. Field names are the contract.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Report {
-    /// Version of this form.
+    /// Version of this schema.
     pub report_version: u32,
     /// The log, where the dive was read from or written to one.
     pub log: Option<LogReport>,
@@ -51,25 +50,25 @@ pub struct Report {
     pub summary: SummaryReport,
     /// Every section passed, in the order of chainage.
     pub sections: Vec<SectionReport>,
-    /// Neighbouring flagged sections of one cause, by the number that each has had since its first flag.
+    /// Neighbouring flagged sections of one cause, by their stable number.
     pub runs: Vec<RunReport>,
-    /// What to pass again on the way home, from the far end to the portal.
+    /// Stretches to pass again on the way home, from the far end to the portal.
     pub way_home: Vec<ReturnReport>,
-    /// Samples by node of a square grid, as surveyors' specifications are written.
+    /// Samples by node of a square grid, as in survey specifications.
     pub survey: SurveyReport,
-    /// Metres by verdict for the targets and lengths of section that were asked for besides.
+    /// Metres by verdict for the additional targets and section lengths requested.
     pub what_if: Vec<WhatIfReport>,
-    /// Declared openings of the wall, which no verdict speaks of.
+    /// Declared openings of the wall, excluded from verdicts.
     pub openings: Vec<OpeningReport>,
-    /// What was wrong with the dive as a whole.
+    /// Alerts about the dive as a whole.
     pub alerts: Vec<AlertReport>,
-    /// The advice over time.
+    /// Advice history.
     pub advice: Vec<AdviceReport>,
-    /// Advice left out for want of room.
+    /// Advice entries dropped for lack of room.
     pub advice_dropped: u64,
-    /// What each source has sent.
+    /// Traffic of each source.
     pub sources: Vec<SourceReport>,
-    /// What smoothing has changed; `None` where nothing was smoothed.
+    /// Changes by smoothing; `None` without smoothing.
     pub smoothing: Option<SmoothingReport>,
 }
 
@@ -78,15 +77,15 @@ pub struct Report {
 pub struct LogReport {
     /// Its path as given.
     pub path: String,
-    /// Its SHA-256, hexadecimal; of parts, that of their bytes one after the other.
+    /// Its SHA-256, hexadecimal; for a recording in parts, of the parts' concatenated bytes.
     pub sha256: String,
     /// Messages of sources.
     pub messages: u64,
-    /// What was lost, in words, each with its time span.
+    /// Losses in plain text, each with its time span.
     pub losses: Vec<String>,
-    /// What was odd and what was done about it, in words; nothing was lost by it.
+    /// Irregularities and how they were handled, in plain text; no data were lost by them.
     pub notes: Vec<String>,
-    /// Its files in their order, where it is a recording in parts.
+    /// Its files in order, for a recording in parts.
     pub parts: Vec<PartReport>,
 }
 
@@ -108,23 +107,23 @@ pub struct DiveReport {
     pub duration_s: f64,
     /// First packet on the log's clock, seconds.
     pub start_s: f64,
-    /// Least chainage that any head's reach covered, m.
+    /// Minimum chainage that any head's reach covered, m.
     pub from_m: Option<f64>,
-    /// Greatest, m.
+    /// Maximum, m.
     pub to_m: Option<f64>,
     /// Between them, m.
     pub distance_m: f64,
-    /// Whether any ping of a profiling head came; without, there is no coverage to speak of.
+    /// Whether any profiling head pinged; if not, there is no coverage.
     pub sonar: bool,
-    /// The least speed of sound by which ranges were reckoned, m/s.
+    /// Minimum speed of sound used for ranges, m/s.
     pub sound_speed_least_mps: f64,
-    /// The greatest, m/s.
+    /// Maximum, m/s.
     pub sound_speed_most_mps: f64,
     /// Samples on the wall.
     pub samples_valid: u64,
-    /// Of these, samples that others stand for, since their surroundings are full.
+    /// Of these, samples dropped by thinning of full cells.
     pub samples_thinned: u64,
-    /// Pings that gave none, by reason.
+    /// Pings without a sample, by reason.
     pub samples_rejected: RejectedReport,
 }
 
@@ -135,13 +134,13 @@ pub struct RejectedReport {
     pub missing: u64,
     /// No return, the wall out of range.
     pub out_of_range: u64,
-    /// Stopped by the vehicle itself.
+    /// Occluded by the vehicle.
     pub occluded: u64,
     /// A return without a fix.
     pub no_fix: u64,
     /// Beyond the ends of the tunnel.
     pub outside: u64,
-    /// No room.
+    /// The sample store was full.
     pub not_stored: u64,
 }
 
@@ -150,11 +149,11 @@ pub struct RejectedReport {
 pub struct SummaryReport {
     /// Metres of sections that passed.
     pub pass_m: f64,
-    /// That failed.
+    /// Metres that failed.
     pub fail_m: f64,
-    /// Of which nothing can be said for sure.
+    /// Metres undecided within the error of the hole.
     pub cannot_say_m: f64,
-    /// That are still open.
+    /// Metres still open.
     pub open_m: f64,
     /// Fails that were flagged, and flags that a later pass cleared.
     pub flags_raised: u32,
@@ -173,35 +172,35 @@ pub struct SummaryReport {
 /// A declared opening of the wall.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct OpeningReport {
-    /// What people call it.
+    /// Display name.
     pub name: String,
     /// Where it begins, m.
     pub from_m: f64,
     /// Where it ends, m.
     pub to_m: f64,
-    /// Arc length at which it begins, m; `None` for all round.
+    /// Arc length at which it begins, m; `None` for the whole perimeter.
     pub arc_from_m: Option<f64>,
-    /// Its length along the perimeter, m; `None` for all round.
+    /// Its length along the perimeter, m; `None` for the whole perimeter.
     pub arc_length_m: Option<f64>,
 }
 
-/// Something that was wrong with the dive as a whole.
+/// An alert about the dive as a whole.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AlertReport {
     /// `outside_tunnel` or `profile_contradicted`.
     pub kind: &'static str,
-    /// When it was first seen, seconds on the log's clock.
+    /// Time of its first occurrence, seconds on the log's clock.
     pub since_s: f64,
-    /// How often: samples, or judgements of sections.
+    /// Occurrences: samples, or judgements of sections.
     pub count: u64,
-    /// Chainage at which it was first seen, m.
+    /// Chainage of its first occurrence, m.
     pub x_m: f64,
-    /// How far off at worst, m: beyond the end of the tunnel, or a section's mean from the design profile.
+    /// Largest deviation, m: beyond the end of the tunnel, or a section's mean from the design profile.
     pub worst_m: f64,
 }
 
 impl Report {
-    /// The report of what a loop has seen so far.
+    /// Report of a loop's results so far.
     pub fn of(dive: &Loop) -> Self {
         let (coverage, tally, log) = (dive.coverage(), dive.tally(), dive.advice_log());
         let sections = &coverage.sections;
@@ -231,7 +230,7 @@ impl Report {
         }
     }
 
-    /// Whether anything that was received has been lost on the way to the results.
+    /// Whether any received data were lost before the results.
     pub fn lost_data(&self) -> bool {
         let rejected = &self.dive.samples_rejected;
         let dropped =

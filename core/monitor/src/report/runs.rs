@@ -11,7 +11,7 @@ use headrace_geometry::tunnel::Profile;
 /// Neighbouring flagged sections with one cause.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RunReport {
-    /// Its number, which stays.
+    /// Its stable number.
     pub id: u32,
     /// Its cause.
     pub cause: Cause,
@@ -32,9 +32,9 @@ pub struct RunReport {
     pub hole_clock: String,
     /// When its first flag was raised, seconds on the log's clock.
     pub raised_s: f64,
-    /// When nothing of it failed any more.
+    /// Time since which none of its sections fails, seconds on the log's clock.
     pub cleared_s: Option<f64>,
-    /// The run that it has become part of.
+    /// The run that it was merged into.
     pub merged_into: Option<u32>,
 }
 
@@ -43,13 +43,13 @@ pub struct RunReport {
 pub struct ReturnReport {
     /// The run that it is for.
     pub run: u32,
-    /// Where it ends, farther in, m.
+    /// Chainage of its far end, m.
     pub from_m: f64,
-    /// Where it begins, m.
+    /// Chainage of its near end, m.
     pub to_m: f64,
-    /// What must be other than it was.
+    /// Change to make.
     pub action: Action,
-    /// At most so fast, m/s; zero where no speed would do as the heads were.
+    /// Maximum speed, m/s; zero if no speed meets the target with the heads as they were.
     pub at_most_mps: f64,
     /// Seconds at that speed.
     pub takes_s: Option<f64>,
@@ -79,17 +79,17 @@ pub(super) fn run_reports(sections: &Sections, profile: &Profile) -> Vec<RunRepo
         .collect()
 }
 
-/// Figures of the run's cause: those of its worst section, or of another where that one's cause is a different one by now.
+/// Figures of the run's cause: those of its worst section, or of another if the cause of that one has changed.
 fn figures(sections: &Sections, run: &Run) -> Option<CauseFigures> {
     let evidence = |index: i64| sections.get(index)?.evidence.filter(|evidence| evidence.cause == run.cause);
     let evidence = evidence(run.worst.0).or_else(|| (run.from..run.to).find_map(evidence))?;
     Some((&evidence).into())
 }
 
-/// How near a run advice counts for it, m.
+/// Distance from a run within which advice applies to it, m.
 const NEAR_M: f64 = 1.0;
 
-/// What still fails, from the far end to the portal.
+/// Open runs, from the far end to the portal.
 pub(super) fn way_home(sections: &Sections, log: &AdviceLog) -> Vec<ReturnReport> {
     let runs: &Runs = sections.runs();
     let open = (0..).map(RunId).zip(runs.all()).filter(|(_, run)| run.is_open());
@@ -104,7 +104,7 @@ fn stop(sections: &Sections, log: &AdviceLog, id: RunId, run: &Run) -> ReturnRep
         entry.chainage_m.is_some_and(|x_m| (to_m - NEAR_M..from_m + NEAR_M).contains(&x_m))
     };
     let advised = log.entries.iter().filter(near).map(|entry| entry.advice.v_max_mps);
-    // Where nothing could be advised, as if the heads that turned had been evenly spread.
+    // Without advice: the maximum speed with the turning heads evenly spread.
     let evidence = |index: i64| sections.get(index).filter(|section| section.is_flagged())?.evidence;
     let evenly = (run.from..run.to).filter_map(evidence).map(|evidence| evidence.even_v_max_mps);
     let at_most_mps = advised.filter(|mps| *mps > 0.0).reduce(f64::min).or_else(|| evenly.reduce(f64::min));

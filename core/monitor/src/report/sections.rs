@@ -16,17 +16,17 @@ pub struct SectionReport {
     pub end_m: f64,
     /// Diameter of its largest hole, m; `None` where it wasn't measured.
     pub hole_m: Option<f64>,
-    /// The hole is no smaller than this, m: samples that aren't kept may have parted it.
+    /// Lower bound of the hole, m: thinned samples may have divided it.
     pub hole_least_m: Option<f64>,
-    /// No larger, m; `None` where nothing bounds it.
+    /// Upper bound of the hole, m; `None` if unbounded.
     pub hole_most_m: Option<f64>,
-    /// False where the hole is at least that large, for want of samples around it.
+    /// False if there are no samples around it: the hole is then at least `hole_m`.
     pub hole_bounded: bool,
     /// Standard deviation of the hole, m.
     pub hole_sd_m: f64,
     /// Chainage of the hole's centre, m.
     pub hole_x_m: Option<f64>,
-    /// Where it is on the perimeter, m from the floor's centre via the left wall.
+    /// Arc length of the hole's centre, m from the floor's centre via the left wall.
     pub hole_arc_m: Option<f64>,
     /// The same as a clock seen along the tunnel: 6 is the floor's centre, 9 the left wall.
     pub hole_clock: Option<String>,
@@ -38,15 +38,15 @@ pub struct SectionReport {
     pub t: SpreadReport,
     /// Samples on it.
     pub samples: u32,
-    /// Samples a square metre of wall.
+    /// Samples per square metre of wall.
     pub density_perm2: f64,
-    /// How far its wall is from the design profile; `None` without samples.
+    /// Deviation of its wall from the design profile; `None` without samples.
     pub deviation: Option<DeviationReport>,
     /// Share of its wall that is a declared opening.
     pub masked_share: f64,
     /// `pass`, `fail`, `cannot_say` or `open`.
     pub verdict: &'static str,
-    /// Why it failed, as long as it does.
+    /// Cause, while the verdict is `fail`.
     pub cause: Option<Evidence>,
     /// When it was flagged, seconds on the log's clock.
     pub flagged_s: Option<f64>,
@@ -59,13 +59,13 @@ pub struct SectionReport {
 pub struct DeviationReport {
     /// Mean, m.
     pub mean_m: f64,
-    /// Farthest inside the design, m.
+    /// Largest inward deviation, m, at most zero.
     pub inmost_m: f64,
-    /// Farthest beyond it, m.
+    /// Largest outward deviation, m, at least zero.
     pub outmost_m: f64,
-    /// Area of the cross-section over the design's; `None` where no sweep has gone.
+    /// Cross-section area over that of the design; `None` without sweeps.
     pub area_ratio: Option<f64>,
-    /// Whether most samples are farther off than the wall can be.
+    /// Whether most samples exceed the contradiction limit.
     pub contradicts: bool,
 }
 

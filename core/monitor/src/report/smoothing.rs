@@ -1,21 +1,21 @@
-//! What smoothing changed: plain values.
+//! Changes by smoothing: plain values.
 
 use serde::Serialize;
 
-/// A dive's verdicts by the filter alone against those of the same dive smoothed.
+/// Verdicts of a dive by the filter alone, against those of the smoothed dive.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SmoothingReport {
     /// Digest of the results by the filter alone.
     pub filter_digest: String,
     /// Estimates that were smoothed.
     pub estimates: u64,
-    /// Pieces without a break of which the track is made.
+    /// Contiguous pieces of the trajectory.
     pub pieces: u64,
     /// Metres by verdict by the filter alone.
     pub before: MetresReport,
     /// The same smoothed.
     pub after: MetresReport,
-    /// Sections whose verdict is another, in the order of chainage.
+    /// Sections whose verdict has changed, in the order of chainage.
     pub changed: Vec<ChangeReport>,
 }
 
@@ -24,28 +24,28 @@ pub struct SmoothingReport {
 pub struct MetresReport {
     /// Metres of sections that passed.
     pub pass_m: f64,
-    /// That failed.
+    /// Metres that failed.
     pub fail_m: f64,
-    /// Of which nothing can be said for sure.
+    /// Metres undecided within the error of the hole.
     pub cannot_say_m: f64,
-    /// That are still open.
+    /// Metres still open.
     pub open_m: f64,
 }
 
-/// A section whose verdict is another than it was.
+/// A section whose verdict has changed.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ChangeReport {
     /// Where it begins, m.
     pub start_m: f64,
     /// Where it ends, m.
     pub end_m: f64,
-    /// By the filter alone; `None` where no head had passed by its account.
+    /// By the filter alone; `None` if no head passed the section on its trajectory.
     pub before: Option<JudgedReport>,
-    /// Smoothed; `None` where no head has passed.
+    /// Smoothed; `None` if no head passed the section on the smoothed trajectory.
     pub after: Option<JudgedReport>,
 }
 
-/// A verdict and the hole that it rests on.
+/// A verdict and its hole.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct JudgedReport {
     /// `pass`, `fail`, `cannot_say` or `open`.

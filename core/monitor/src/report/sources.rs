@@ -5,7 +5,7 @@ use serde::Serialize;
 use crate::run::Loop;
 use headrace_sensor::device_clock::ClockReport;
 
-/// What a source has sent.
+/// Traffic of a source.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SourceReport {
     /// Its name.
@@ -20,49 +20,49 @@ pub struct SourceReport {
     pub bad_frames: u64,
     /// Bytes that belong to no good frame.
     pub skipped_bytes: u64,
-    /// Readings taken from them.
+    /// Readings decoded from them.
     pub readings: u64,
     /// Readings understood but not used: a bad status, another range setting, no calibration, a jump.
     pub withheld: u64,
     /// Longest silence between two packets, seconds.
     pub longest_gap_s: f64,
-    /// Packets a second.
+    /// Packets per second.
     pub rate_hz: f64,
-    /// How its own clock goes; `None` where it sends no time.
+    /// Device clock statistics; `None` if it sends no timestamps.
     pub device_clock: Option<DeviceClockReport>,
-    /// How well it agreed with the others in navigation; `None` without a filter, and for what it doesn't use.
+    /// Innovation statistics in navigation; `None` without a filter, or if the filter doesn't use it.
     pub navigation: Option<NavigationReport>,
-    /// What its line has been through; `None` where bytes didn't come from a port.
+    /// Connection statistics; `None` if its bytes didn't come from a port.
     pub line: Option<LineReport>,
 }
 
-/// What a sensor's line has been through.
+/// Connection statistics of a sensor.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct LineReport {
-    /// How often it was opened.
+    /// Times it was opened.
     pub opened: u64,
-    /// How often it was lost, or given up for silence.
+    /// Times it was lost, or closed after a silence timeout.
     pub lost: u64,
-    /// Packets that came and for which there was no room.
+    /// Packets dropped for lack of room.
     pub dropped_packets: u64,
-    /// How it was at the end, in words.
+    /// Final status, in plain text.
     pub status: String,
 }
 
-/// How a source's own clock goes beside ours. Readings are valid by the receive time, whatever it says.
+/// A source's device clock against ours. Informative: readings are timed by the receive time.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DeviceClockReport {
-    /// Stamps that came.
+    /// Timestamps received.
     pub stamps: u64,
-    /// How often it began anew or fell behind.
+    /// Times it restarted or fell behind.
     pub restarts: u64,
-    /// How often it ran ahead.
+    /// Times it jumped ahead.
     pub jumps: u64,
-    /// Time on its clock from which its drift is known, seconds.
+    /// Time on its clock over which the drift is estimated, seconds.
     pub span_s: f64,
-    /// How fast it runs, parts per million; above zero it gains on ours. `None` before there is enough to tell.
+    /// Drift, parts per million; positive if it gains on ours. `None` until there are enough data.
     pub drift_ppm: Option<f64>,
-    /// Standard deviation of it, parts per million.
+    /// Standard deviation of the drift, parts per million.
     pub drift_sd_ppm: Option<f64>,
 }
 
@@ -79,18 +79,18 @@ impl From<ClockReport> for DeviceClockReport {
     }
 }
 
-/// How a source's measurements fared in navigation.
+/// Innovation statistics of a source in navigation.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NavigationReport {
-    /// Measured numbers that were used.
+    /// Scalar measurements used.
     pub used: u64,
-    /// Measured numbers that were too unlikely to be used.
+    /// Scalar measurements rejected by the gate.
     pub gated: u64,
-    /// Readings that came after their time.
+    /// Readings that came too late.
     pub late: u64,
-    /// Readings that weren't possible numbers, or for which there was no room.
+    /// Readings with impossible values, or dropped for lack of room.
     pub dropped: u64,
-    /// Mean of their innovations squared, over the variances expected: about 1 where all is trusted as it deserves.
+    /// Mean normalised innovation squared (NIS): about 1 if the noise settings are right.
     pub nis: Option<f64>,
 }
 

@@ -1,4 +1,4 @@
-//! How a quantity is spread over a dive or a section.
+//! Distribution of a quantity over a dive or a section.
 
 use serde::Serialize;
 
@@ -7,7 +7,7 @@ use headrace_coverage::Spread;
 /// Count, mean, deviation and extremes; `None` where there is no value.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct SpreadReport {
-    /// Values.
+    /// Number of values.
     pub count: u32,
     /// Smallest, m.
     pub min_m: Option<f64>,

@@ -13,7 +13,7 @@ pub struct SurveyReport {
     pub node_m: f64,
     /// The same round the perimeter, m.
     pub around_m: f64,
-    /// Samples that a node should have.
+    /// Minimum samples per node.
     pub enough: u16,
     /// Nodes passed.
     pub nodes: u32,
@@ -21,9 +21,9 @@ pub struct SurveyReport {
     pub enough_share: Option<f64>,
     /// Nodes without a sample.
     pub empty: u32,
-    /// ScalarUpdate by row along the tunnel.
+    /// Node counts by row along the tunnel.
     pub rows: Vec<NodeRowReport>,
-    /// The first of the empty ones, in the order of chainage.
+    /// The first empty nodes, in the order of chainage.
     pub holidays: Vec<HolidayReport>,
 }
 
@@ -43,15 +43,15 @@ pub struct NodeRowReport {
 /// A node without a sample.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct HolidayReport {
-    /// Chainage of its middle, m.
+    /// Chainage of its centre, m.
     pub x_m: f64,
-    /// Arc length of its middle, m.
+    /// Arc length of its centre, m.
     pub arc_m: f64,
     /// The same on a clock.
     pub clock: String,
 }
 
-/// Empty nodes that are listed; their number is always told.
+/// Maximum number of empty nodes listed; `empty` counts them all.
 const LISTED: usize = 1000;
 
 pub(super) fn survey(coverage: &Coverage, profile: &Profile) -> SurveyReport {

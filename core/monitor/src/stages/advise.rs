@@ -1,4 +1,4 @@
-//! How fast one may go.
+//! Speed advice.
 
 use bevy_ecs::prelude::{Res, ResMut, Resource};
 
@@ -13,7 +13,7 @@ use headrace_sampling::passes::{Phasing, Situation};
 use headrace_sampling::swing::{Looks, Swing};
 use headrace_snapshot::stateful;
 
-/// What gives the advice, and how long the dive may take from its first packet.
+/// The advisor, and the time limit of the dive from its first packet.
 #[derive(Debug, Clone, Resource)]
 pub(crate) struct Advisor {
     pub(crate) advisor: advice::Advisor,
@@ -30,7 +30,7 @@ impl Advisor {
         Self { advisor, dive_time, looks: Looks::default(), hysteresis: Hysteresis::new(target_m) }
     }
 
-    /// What to show at a beat, `begun` being when the first packet came.
+    /// Advice to show at a beat; `begun` is the receive time of the first packet.
     fn advise(&mut self, at: MonoNs, situation: &Situation, begun: Option<MonoNs>) -> Advice {
         let left = self.dive_time.zip(begun).map(|(time, begun)| (time - at.since(begun)).as_secs_f64());
         let advice = self.advisor.advise(situation, swing(&mut self.looks, at, situation), left);
@@ -38,7 +38,7 @@ impl Advisor {
     }
 }
 
-/// How the vehicle swings between two passes.
+/// Swing of the vehicle between two passes.
 fn swing(looks: &mut Looks, at: MonoNs, situation: &Situation) -> Swing {
     if let Some(pose) = situation.pose {
         looks.keep(at, pose.attitude * Vec3::new(1.0, 0.0, 0.0));

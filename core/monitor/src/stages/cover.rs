@@ -1,6 +1,6 @@
-//! Places to samples, passes and sections, and sections to verdicts.
+//! Georeferenced pings to samples, passes and sections, and sections to verdicts.
 //!
-//! Both in one pass over the pings: which sections are judged, and on what evidence, depends on the verdicts before.
+//! Both in one pass over the pings: which sections are judged, and on which evidence, depends on earlier verdicts.
 
 use bevy_ecs::prelude::{Query, Res, ResMut, Single};
 
@@ -18,7 +18,7 @@ use headrace_geometry::math;
 use headrace_geometry::time::DurNs;
 use headrace_sampling::spacing;
 
-/// How often sections are looked at that are neither left nor ahead.
+/// Interval between checks of the sections of a still zone.
 const LOOK_AROUND: DurNs = DurNs(1_000_000_000);
 
 #[expect(clippy::too_many_arguments, reason = "a system's arguments are what it reads and writes")]
@@ -92,7 +92,7 @@ fn count(tally: &mut Tally, outcome: &Outcome) {
     }
 }
 
-/// Adds a ping to the passage of the section that its head is in, and what it lost to that of the section it was aimed at.
+/// Adds a ping to the passage of the section that its head is in, and a lost ping to that of the section it was aimed at.
 fn note_passage(
     coverage: &mut Coverage,
     sweep: &mut HeadSweep,
@@ -134,7 +134,7 @@ fn note_passage(
     passage.pass_error.add(&PassError::of(&fix));
 }
 
-/// Sections that a head went through while nobody knew where.
+/// Marks the sections that a head went through during a navigation outage.
 fn note_unseen(coverage: &mut Coverage, sweep: &mut HeadSweep, frontier: &HeadFrontier, ping: &PlacedPing) {
     let Some(reach) = ping.reach else {
         sweep.unseen = true;
@@ -153,7 +153,7 @@ fn note_unseen(coverage: &mut Coverage, sweep: &mut HeadSweep, frontier: &HeadFr
     }
 }
 
-/// Asks for the sections that are neither left nor ahead, of which something is certain already.
+/// Requests judging of sections of a still zone that certainly fail, or are flagged and have new samples.
 fn look_around(
     coverage: &mut Coverage,
     finder: &mut Finder,
@@ -166,7 +166,7 @@ fn look_around(
     sections.look_around(outlook, store, &mut finder.0, &tunnel.profile, &mut ask);
 }
 
-/// Chainage of a sample before the portal or behind the tunnel's end, and by how much, m.
+/// Chainage of a sample beyond either end of the tunnel, and by how much, m.
 fn beyond_end_m(ping: &PlacedPing, length_m: f64) -> Option<(f64, f64)> {
     let Outcome::Sample { point, .. } = ping.outcome else { return None };
     let x_m = point.x();
@@ -174,7 +174,7 @@ fn beyond_end_m(ping: &PlacedPing, length_m: f64) -> Option<(f64, f64)> {
     (beyond_m > 0.0).then_some((x_m, beyond_m))
 }
 
-/// Keeps a sample and adds its spacings to its section.
+/// Stores a sample and adds its spacings to its section.
 fn note_sample(
     coverage: &mut Coverage,
     sweep: &mut HeadSweep,
@@ -229,7 +229,7 @@ fn note_sample(
     Ok(())
 }
 
-/// Moves the head's own reach on.
+/// Updates the head's reach.
 fn note_reach(frontier: &mut HeadFrontier, ping: &PlacedPing) {
     match (ping.fix, ping.reach) {
         (Some(_), Some(reach)) => frontier.0 = Some(HeadReach::after(frontier.0, ping.received, reach)),
@@ -241,7 +241,7 @@ fn note_reach(frontier: &mut HeadFrontier, ping: &PlacedPing) {
     }
 }
 
-/// Moves the frontier on, and asks for the sections that are out of the way now.
+/// Updates the frontier, and requests judging of the sections now due.
 fn note_frontier(
     coverage: &mut Coverage,
     heads: impl Iterator<Item = HeadReach> + Clone,

@@ -1,4 +1,4 @@
-//! How the vehicle is driven and its heads turn, beat by beat: what a section's passage remembers of its pings.
+//! Motion statistics of the vehicle and its heads per beat, stored with each section's passage.
 
 use bevy_ecs::prelude::Component;
 use serde::{Deserialize, Serialize};
@@ -12,29 +12,29 @@ use headrace_sampling::passes::{Phasing, Situation};
 use headrace_sampling::swing::Looks;
 use headrace_snapshot::stateful;
 
-/// The longest time between neighbouring passes that is looked back over, seconds.
+/// Maximum look-back over the time between neighbouring passes, seconds.
 const LONGEST_S: f64 = 50.0;
-/// Slower than this, m/s, a vehicle stands still.
+/// Speed below which the vehicle counts as stationary, m/s.
 const SLOW_MPS: f64 = 0.01;
 
-/// How the vehicle was driven at the last beat.
+/// Motion statistics at the last beat.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Driven {
     /// The longest time between two passes, seconds.
     pub(super) gap_s: f64,
-    /// The same, the heads evenly spread.
+    /// The same with the heads evenly spread, seconds.
     pub(super) even_gap_s: f64,
-    /// The same, all heads that the vehicle has turning.
+    /// The same with all configured heads turning and evenly spread, seconds.
     pub(super) all_gap_s: f64,
     /// Time between two pings, seconds.
     pub(super) ping_period_s: f64,
     /// How far the beams have swung along the tunnel since the neighbouring passes, where they reach farthest, m.
     pub(super) swing_m: f64,
-    /// The largest step along the wall from the middle of the tunnel, m.
+    /// Largest step along the wall predicted from the middle of the tunnel, m.
     pub(super) middle_t_y_m: f64,
 }
 
-/// The last beat, and which way the vehicle looked at those before.
+/// Motion statistics of the last beat, and the forward axis at earlier ones.
 #[derive(Debug, Clone, Default, Component)]
 pub(crate) struct Driving {
     pub(super) now: Driven,
@@ -48,7 +48,7 @@ pub(crate) struct Driving {
 stateful!(Driving { state: now, stride, turned, looks; });
 
 impl Driving {
-    /// Takes in a beat.
+    /// Updates the statistics for a beat.
     ///
     /// Allocates: never.
     pub(super) fn note(&mut self, at: MonoNs, situation: &Situation, profile: &Profile, advisor: &Advisor) {

@@ -17,7 +17,7 @@ use headrace_sampling::head::{HeadMotion, MAX_HEADS, SILENT_AFTER};
 use headrace_sampling::passes::Situation;
 use headrace_sensor::reading::{Reading, SonarReturn};
 
-/// A head: its number, how it sits, how it turns, and what the vehicle hides from it.
+/// A head: number, mount, measured motion and occluded angles.
 type Heads<'w, 's> =
     Query<'w, 's, (&'static Head, &'static Mounted, &'static mut MeasuredMotion, &'static HiddenAngles)>;
 
@@ -63,8 +63,7 @@ pub(super) fn georeference(
     }
 }
 
-/// What comes back from nearer than this share of the way to the wall, where the vehicle itself stands in the way, is the
-/// vehicle.
+/// At occluded angles, returns from nearer than this share of the range to the wall are from the vehicle.
 const VEHICLE_SHARE: f64 = 0.5;
 
 fn outcome(
@@ -105,7 +104,7 @@ fn outcome(
     Outcome::Lost(loss, aim)
 }
 
-/// A head lands its samples in the plane across its axis; tilted against the tunnel, the plane spans some chainage.
+/// Reach of a head: its samples lie in the plane across its axis; when tilted, that plane spans some chainage.
 fn reach(pose: &Pose, mount: &Mount, tunnel: &TunnelDesign) -> Reach {
     let origin = pose.place(mount.position);
     let axis = pose.attitude * (mount.rotation * Vec3::new(1.0, 0.0, 0.0));
@@ -130,7 +129,7 @@ fn situation(
             continue;
         };
         if at.since(last).0.abs() <= SILENT_AFTER.0 {
-            // Heads ping at their own times; their angles are compared at one.
+            // Heads ping at different times; their angles are extrapolated to a common epoch.
             let angle_rad = angle_rad + rate_radps * at.since(last).as_secs_f64();
             let (mount, sector_rad) = (mounted.info.mount, track.sector_rad());
             *slot = Some(HeadMotion { mount, angle_rad, rate_radps, step_rad, sector_rad });

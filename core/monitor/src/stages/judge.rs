@@ -1,4 +1,4 @@
-//! A section to its verdict, its flag and its run.
+//! Judges a section: verdict, flag and run.
 
 use crate::alerts::{AlertKind, Alerts};
 use crate::messages::{Notice, Notices};
@@ -8,7 +8,7 @@ use headrace_coverage::{Judging, Request, RunChange, RunId};
 use headrace_geometry::time::MonoNs;
 use headrace_geometry::tunnel::Profile;
 
-/// What judging changes besides the sections.
+/// Search state and outputs of judging, apart from the sections.
 pub(crate) struct Results<'a> {
     pub(crate) finder: &'a mut Finder,
     pub(crate) notices: &'a mut Notices,
@@ -16,7 +16,7 @@ pub(crate) struct Results<'a> {
     pub(crate) alerts: &'a mut Alerts,
 }
 
-/// Judges one section and says what has changed.
+/// Judges one section and publishes the changes.
 pub(crate) fn judge_one(
     request: &Request,
     profile: &Profile,
@@ -64,7 +64,7 @@ pub(crate) fn judge_one(
     }
 }
 
-/// Publishes that something is wrong at a chainage, by so much.
+/// Adds an alert to the digest, with its chainage and deviation, m.
 pub(crate) fn digest_alert(digests: &mut Digests, kind: AlertKind, at: MonoNs, at_off_m: (f64, f64)) {
     let alert = digests.judgements.record(RecordKind::Alert).integer(at.0).integer(kind as u64);
     alert.number(at_off_m.0).number(at_off_m.1);

@@ -23,7 +23,7 @@ pub(super) fn navigate(
     let (mut navigator, mut state) = vehicle.into_inner();
     let navigator = &mut *navigator;
     for (index, event) in events.0.iter().enumerate() {
-        // Time may stand still or go back; a beat is passed once. After a gap only the last beat counts.
+        // Time may stall or go back; each beat is emitted once. After a gap only the last beat is.
         if let Some(at) = beat_before(&mut navigator.next_beat, event.received) {
             let fix = navigator.navigation.fix(at);
             *state = VehicleState { at: Some(at), fix, sd: navigator.navigation.pose_sd() };
@@ -41,7 +41,7 @@ pub(super) fn navigate(
     }
 }
 
-/// The last beat at or before `now` that hasn't been given yet.
+/// The last beat at or before `now`, unless already emitted.
 fn beat_before(next: &mut Option<MonoNs>, now: MonoNs) -> Option<MonoNs> {
     let period = ADVICE_PERIOD.0.unsigned_abs();
     let last = MonoNs(now.0 - now.0 % period);

@@ -1,4 +1,4 @@
-//! The water's speed of sound while one dives in it, by a depth sensor's temperature; what sonars say is corrected for it.
+//! Speed of sound during the dive, from a depth sensor's temperature; sonar readings are corrected for it.
 
 use bevy_ecs::prelude::Resource;
 
@@ -7,38 +7,38 @@ use headrace_geometry::time::MonoNs;
 use headrace_sensor::reading::{Decoded, Reading, SourceId};
 use headrace_snapshot::stateful;
 
-/// Temperatures that water has, degrees Celsius; a sensor that says others is out of order, or out of the water.
+/// Plausible water temperatures, degrees Celsius; outside, the sensor is faulty or out of the water.
 const WATER_DEGC: core::ops::RangeInclusive<f64> = 0.0..=40.0;
-/// How slowly the water's temperature is taken to change, s: what is faster is the sensor's noise.
+/// Low-pass time constant, s: faster changes are sensor noise.
 const SLOWNESS_S: f64 = 60.0;
 
-/// The speed of sound that holds now.
+/// The current speed of sound.
 #[derive(Debug, Clone, Resource)]
 pub(crate) struct SoundSpeed {
-    /// The depth sensor that tells it; without, the site's holds.
+    /// Depth sensor that supplies it; `None` for the site's.
     source: Option<SourceId>,
     site_mps: f64,
     now_mps: f64,
     heard: Option<MonoNs>,
-    /// The least and the greatest so far.
+    /// Minimum and maximum so far.
     span_mps: [f64; 2],
 }
 
 stateful!(SoundSpeed { state: now_mps, heard, span_mps; fixed: source, site_mps; });
 
 impl SoundSpeed {
-    /// The site's speed, until `source` tells another.
+    /// The site's speed, until `source` supplies another.
     pub(crate) fn new(site_mps: f64, source: Option<SourceId>) -> Self {
         Self { source, site_mps, now_mps: site_mps, heard: None, span_mps: [site_mps; 2] }
     }
 
-    /// The least and the greatest by which ranges were reckoned, m/s.
+    /// Minimum and maximum speed used for ranges, m/s.
     pub(crate) fn span_mps(&self) -> [f64; 2] {
         self.span_mps
     }
 
-    /// Heeds what a depth sensor says, and corrects what a sonar does: consumers reckon with the site's speed, so that the
-    /// speed a device is said to reckon with makes up for the difference.
+    /// Updates the speed from a depth sensor, and corrects sonar readings: consumers rescale ranges to the site's speed,
+    /// so the speed stated by the device is scaled by site over current speed.
     pub(super) fn pass(&mut self, source: SourceId, decoded: &mut Decoded) {
         match &mut decoded.reading {
             Reading::Pressure(water)
@@ -70,7 +70,7 @@ impl SoundSpeed {
     }
 
     fn corrected(&self, device_mps: f64) -> f64 {
-        // Without a sensor to tell it, not a bit is changed.
+        // Without a measurement the reading stays bit-identical.
         if self.heard.is_none() { device_mps } else { device_mps * (self.site_mps / self.now_mps) }
     }
 }
@@ -89,7 +89,7 @@ mod tests {
         Decoded { valid_at: MonoNs(0) + DurNs::from_secs_f64(at_s), reading: Reading::Pressure(water) }
     }
 
-    /// What becomes of 4 m that a device has reckoned with 1500 m/s.
+    /// Corrected range of 4 m computed by a device with 1500 m/s.
     fn metres(sound: &mut SoundSpeed, site: &Site) -> f64 {
         let echo = EchoRange { range_m: Some(4.0), confidence: 1.0, sound_speed_mps: 1500.0 };
         let mut decoded = Decoded { valid_at: MonoNs(0), reading: Reading::Echo(echo) };
@@ -103,7 +103,7 @@ mod tests {
         let site = Site::default();
         let mut sound = SoundSpeed::new(site.sound_speed_mps, Some(DEPTH));
         assert!((metres(&mut sound, &site) - 4.0 * 1447.0 / 1500.0).abs() < 1e-12);
-        // Another sensor's, and what no water has, are not heeded.
+        // Other sensors and implausible temperatures are ignored.
         sound.pass(SourceId(2), &mut depth(1.0, 20.0));
         sound.pass(DEPTH, &mut depth(1.0, 85.0));
         assert!((metres(&mut sound, &site) - 4.0 * 1447.0 / 1500.0).abs() < 1e-12);

@@ -57,7 +57,7 @@ pub struct MessageListener {
 }
 
 impl MessageListener {
-    /// `judge` rejects foreign messages; `silence_timeout` is the longest time between messages of a healthy device.
+    /// `judge` identifies foreign messages; `silence_timeout` is the longest time between messages of a healthy device.
     pub fn new(judge: Judge, silence_timeout: DurNs) -> Self {
         Self { judge, silence_timeout, good_frames: 0, complaint: None }
     }

@@ -1,4 +1,4 @@
-//! Sensors that fail: frozen, saturated, jumping, silent, disturbed, or saying what is no number.
+//! Sensor faults: frozen, saturated, jumping, silent, disturbed, or not finite.
 
 use super::rig::{
     DEPTH, ECHOES, Event, HEADS, IMU, OTHER, Rig, TETHER, VELOCITY_LOG, Way, at, cruise, rest, seconds,
@@ -14,7 +14,7 @@ const RANGES: [usize; 6] = [3, 4, 5, 6, 7, 8];
 /// When faults begin.
 const FAULT_S: f64 = 20.0;
 
-/// What sources say for some time after faults begin, and how they say it.
+/// Replaces readings of some sources for a time after the faults begin.
 fn say_otherwise(
     events: &mut [Event],
     sources: &[usize],
@@ -29,7 +29,7 @@ fn say_otherwise(
     }
 }
 
-/// A source repeats what it said last before.
+/// A source repeats its last reading.
 fn freeze(events: &mut [Event], source: usize, for_s: f64) {
     let before = events.to_vec();
     let last = |like: &Reading| {
@@ -40,7 +40,7 @@ fn freeze(events: &mut [Event], source: usize, for_s: f64) {
     say_otherwise(events, &[source], for_s, |reading, _| last(reading));
 }
 
-/// Hears without a check what nobody could tell from a vehicle that moves so, and checks that all is right after it.
+/// Runs the fault unchecked, as it is indistinguishable from such motion, and checks that all is right after it.
 fn recovers(rig: &Rig, events: &[Event], wrong_until_s: f64) {
     let mut nav = rig.navigation();
     let parts = [0.0, FAULT_S, wrong_until_s, f64::INFINITY];
@@ -62,7 +62,7 @@ fn recovers(rig: &Rig, events: &[Event], wrong_until_s: f64) {
 
 #[test]
 fn a_long_silence_is_survived_and_nothing_is_invented() {
-    /// Who, of which vehicle, for how long, and whether there is no fix at the end.
+    /// Name, trajectory, silent sources, duration, and whether there is no fix at the end.
     type Silence = (&'static str, Way, &'static [usize], f64, bool);
     let near_wall: Way = |t| Pose {
         position: Point3::new(3.0 + 0.1 * t, 5.2, 3.0),
@@ -111,7 +111,7 @@ fn uncertainty_grows_while_nothing_is_heard() {
         before = running.factors;
     }
     assert!(matches!(nav.fix(at(FAULT_S + 14.5)), Err(NoFix::Chainage | NoFix::Section | NoFix::Heading)));
-    // Nor does the estimate go anywhere that it wasn't going.
+    // Nor does the estimate drift off.
     assert!((nav.running().unwrap().state.position - rig.unit(0.0)).norm() < 1.0);
 }
 
@@ -239,7 +239,7 @@ fn ranged(reading: &Reading, share: f64) -> Reading {
 
 #[test]
 fn a_jump_that_a_vehicle_could_make_is_got_over() {
-    // A knock, or a unit that lies: no single sensor could tell, and until the others have put it right the fix is wrong.
+    // A knock, or a faulty unit: no single sensor shows it, and until the others have corrected it the fix is wrong.
     let forces = [(5.0, 0.2), (5.0, 1.0), (1.0, 5.0), (0.2, 20.0)].map(|jump| (jump, false));
     let rates = [(5.0, 0.02), (5.0, 0.2), (1.0, 1.0), (0.1, 5.0), (0.01, 20.0)].map(|jump| (jump, true));
     for ((by, for_s), is_rate) in forces.into_iter().chain(rates) {
@@ -258,7 +258,7 @@ fn a_jump_that_a_vehicle_could_make_is_got_over() {
 
 #[test]
 fn a_frozen_sensor_is_got_over() {
-    // The depth and one head are outvoted at once. An echosounder drags the place off by centimetres before its range is
+    // The depth and one head are outvoted at once. An echosounder drags the position off by centimetres before its range is
     // too unlikely.
     for (source, wrong_s) in [(DEPTH, 0.0), (HEADS, 0.0), (ECHOES, 35.0), (ECHOES + 2, 35.0), (IMU, 75.0)] {
         let rig = Rig::new(cruise, 1);

@@ -1,5 +1,5 @@
-//! Time, order, attitude and scale at their worst. What comes of each is a fix that is right by its own sd, or what it
-//! lacks by name.
+//! Extremes of time, order, attitude and scale. The outcome of each is a fix that is right by its own sd, or the named
+//! missing part.
 
 use super::super::factors::Factors;
 use super::super::inertial::{Felt, Leg};
@@ -16,7 +16,7 @@ use headrace_sensor::reading::Reading;
 
 const HOUR: DurNs = DurNs(3_600_000_000_000);
 
-/// The estimate and its covariance, a second after the last reading was valid: the window has passed over all.
+/// The estimate and its covariance a second after the last reading was valid, when the window is empty.
 fn outcome(rig: &Rig, events: &[Event]) -> (State, Factors<ERRORS>) {
     let mut nav = rig.navigation();
     let last = events.iter().map(|event| event.valid).max().unwrap();
@@ -108,7 +108,7 @@ fn a_leg_of_any_length_adds_what_it_should() {
             }
             assert!(state.is_sound() && factors.is_sound(), "{dt_s} s: {state:?}");
             for i in 0..ERRORS {
-                // Errors of the pose never shrink by waiting; those that fade do.
+                // Errors of the pose never shrink by waiting; those that decay do.
                 let least = if i < 9 { 1e-4 * (1.0 - 1e-12) } else { 0.0 };
                 assert!(factors.variance(i) > least, "{dt_s} s, error {i}: {}", factors.variance(i));
             }
@@ -125,7 +125,7 @@ fn a_sample_told_twice_counts_once() {
     let rig = Rig::new(cruise, 1);
     let events = rig.events(0.0, 20.0);
     let right = outcome(&rig, &events);
-    // At the same time; a nanosecond later; and with a time that has gone back.
+    // At the same time; a nanosecond later; and with a timestamp that has gone back.
     for (later, delay) in [(0, 0), (1, 1), (0, 90_000_000)] {
         let mut again = events.clone();
         let inertial = events.iter().filter(|event| !matches!(event.reading, Reading::Attitude(_)));
@@ -178,7 +178,7 @@ fn readings_of_one_time_may_come_in_any_order() {
         mixed.sort_by_key(|event| event.received);
         assert_eq!(outcome(&rig, &mixed), right, "shift {shift}");
     }
-    // And a beat in between, however often, changes nothing.
+    // Any number of readings of an unused source in between changes nothing.
     let mut beaten = events.clone();
     beaten.extend((1..9000).map(|k| {
         let t = at(f64::from(k) / 300.0);
@@ -223,7 +223,7 @@ fn any_attitude_is_as_good_as_another() {
             let rig = Rig::new(way, seed);
             let mut nav = rig.navigation();
             let tally = rig.run(&mut nav, &rig.events(0.0, 70.0));
-            // Where no echosounder looks up or down, the first estimate doesn't know its height.
+            // Where no echosounder looks up or down, the first estimate has no height.
             assert!(tally.lacking <= 2, "{name}: {tally:?}");
         }
     }
@@ -275,7 +275,7 @@ fn a_fix_of_a_moment_ago_is_turned_back_too() {
 #[test]
 fn the_receive_time_may_do_anything() {
     let rig = Rig::new(rest, 2);
-    // Stands still for a second at a time; then goes back by as much with each.
+    // The clock stands still for a second at a time; then goes back by as much with each.
     for (stamp, back) in [(1_000_000_000_u64, false), (100_000_000, true)] {
         let mut events = rig.events(0.0, 40.0);
         for event in &mut events {
@@ -287,7 +287,7 @@ fn the_receive_time_may_do_anything() {
         let tally = rig.run(&mut nav, &events);
         assert!(tally.fixes > 30, "{tally:?}");
     }
-    // An hour is left out.
+    // An hour is skipped.
     let mut events = rig.events(0.0, 90.0);
     for event in events.iter_mut().filter(|event| seconds(event.valid) > 30.0) {
         (event.valid, event.received) = (event.valid + HOUR, event.received + HOUR);
@@ -296,7 +296,7 @@ fn the_receive_time_may_do_anything() {
     let tally = rig.run(&mut nav, &events);
     assert_eq!(nav.restarts(), 1, "{tally:?}");
     assert!(nav.fix(at(90.0) + HOUR).is_ok(), "{:?}", nav.fix(at(90.0) + HOUR));
-    // One reading is stamped an hour on, and again one that claims to be valid then; the rest goes on as before.
+    // One reading is stamped an hour ahead, and again one whose time of validity is then; the rest goes on as before.
     let mut events = rig.events(0.0, 60.0);
     let middle = events.len() / 2;
     events[middle].received = events[middle].received + HOUR;
@@ -306,7 +306,7 @@ fn the_receive_time_may_do_anything() {
     for event in &events {
         Rig::hear(&mut nav, event);
     }
-    // Once for the silence that an hour's jump looks like, and once when the clock comes back.
+    // Once for the apparent silence of an hour's jump, and once when the clock comes back.
     assert_eq!(nav.restarts(), 2);
     assert_eq!(nav.consistency(source).unwrap().dropped, 1);
     assert!(nav.fix(at(60.0)).is_ok());

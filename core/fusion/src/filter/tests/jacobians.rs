@@ -1,4 +1,4 @@
-//! verif_: the rows of the measurements and the transition are the derivatives of what they stand for.
+//! verif_: the rows of the measurements and the transition are the derivatives of their models.
 //!
 //! Central differences of the nonlinear functions, through `State::correct` and `State::go_on`, at states drawn at random:
 //! attitudes all over the sphere, sensors anywhere on the vehicle, biases and offsets of any sign.
@@ -16,10 +16,10 @@ use headrace_geometry::tunnel::{Profile, shapes};
 
 const STATES: u64 = 300;
 const GRAVITY_MPS2: f64 = 9.81;
-/// Step of the differences. What they leave out is of the order of its square (1e-8 for numbers near one), and rounding
+/// Step of the differences. Their truncation error is of the order of its square (1e-8 for numbers near one), and rounding
 /// of the order of 1e-16 / 1e-4 times the numbers themselves, which reach some hundreds of metres: 1e-10.
 const STEP: f64 = 1e-4;
-/// Both of these with room to spare; a wrong sign or a missing term is wrong by a hundredth at least.
+/// Both of these with a margin; a wrong sign or a missing term is wrong by a hundredth at least.
 const TOLERANCE: f64 = 1e-6;
 
 /// Knuth's MMIX generator: the upper half of its state, as a share of one.
@@ -48,7 +48,7 @@ impl Draws {
         Vec3::new(self.within(reach), self.within(reach), self.within(reach))
     }
 
-    /// Near to normal: variance 1.
+    /// Nearly normal: variance 1.
     pub(super) fn normal(&mut self) -> f64 {
         (0..12).map(|_| self.within(0.5)).sum()
     }
@@ -92,7 +92,7 @@ fn moved(state: &State, error: usize, by: f64) -> State {
     state
 }
 
-/// What a row says against the differences of its residual: the expected is the measured less the residual.
+/// A row against the differences of its residual: the expected value is the measured minus the residual.
 fn check_row(
     what: &str,
     state: &State,
@@ -112,13 +112,13 @@ fn check_row(
     true
 }
 
-/// The walls of a rectangle are the planes for which the row is derived; a beam whose differences cross a corner is left
-/// out, as its wall isn't one.
+/// The walls of a rectangle are the planes assumed by the row; a beam whose differences cross a corner is left
+/// out, as its wall isn't a plane.
 #[test]
 fn verif_a_beam_on_flat_walls() {
     let profile = shapes::rectangle(7.0, 8.0).unwrap();
     let mut draws = Draws::new(1);
-    // A sounder's edge, a head's cone, and one so wide that the nearest of the wall answers.
+    // A sounder's edge, a head's cone, and one so wide that the nearest part of the wall echoes.
     for first_rad in [0.0, 0.012, 0.4] {
         let checked =
             (0..STATES).filter(|_| check_beam(&mut draws, &profile, first_rad, |_| TOLERANCE)).count();
@@ -126,10 +126,10 @@ fn verif_a_beam_on_flat_walls() {
     }
 }
 
-/// A cone's expected range is the least of its rays', and what is unsure reaches to the least of the wider cone.
+/// A cone's expected range is the least of its rays', and the uncertain range reaches to the least of the wider cone.
 #[test]
 fn verif_the_nearest_ray_of_a_cone() {
-    // Rays by rings and round each: the least of a grid is too long by the square of half a mesh, 5e-3 rad, at most.
+    // Rays by rings and around each: the minimum over a grid is too long by the square of half a mesh, 5e-3 rad, at most.
     const RINGS: u32 = 200;
     let profile = shapes::rectangle(60.0, 60.0).unwrap();
     let mut draws = Draws::new(11);
@@ -161,9 +161,9 @@ fn verif_the_nearest_ray_of_a_cone() {
     }
 }
 
-/// Without a cone the row is exact on any wall. With one, the plane that touches the wall where the middle of the beam
-/// meets it turns as that place moves, by 1 / radius for a metre: the row leaves out range x sin(first) / cos^2 of it, and
-/// the place moves by at most 1 m / cosine for a metre or `range` / cosine for a radian. So small is the neglect.
+/// Without a cone the row is exact on any wall. With one, the plane tangent to the wall where the beam's axis meets it
+/// turns as that point moves, by 1 / radius per metre: the row neglects range x sin(first) / cos^2 of it, and the point
+/// moves by at most 1 m / cosine per metre, or `range` / cosine per radian. The error is bounded by that.
 #[test]
 fn verif_a_beam_on_round_walls() {
     const RADIUS_M: f64 = 4.0;
@@ -182,12 +182,12 @@ fn check_beam(draws: &mut Draws, profile: &Profile, first_rad: f64, tolerance: i
     let state = draws.state();
     let along = draws.mounted() * Vec3::new(1.0, 0.0, 0.0);
     let beam = Beam { offset: draws.vector(0.5), along, first_rad, unsure_rad: 0.0 };
-    // The row's own expectation, from a range of nothing.
+    // The row's expected value, from a range of zero.
     let Some(row) = measure::range(&state, profile, &beam, 0.0, 0.1) else { return false };
     let origin = state.position + state.attitude * beam.offset;
     let looks = state.attitude * along;
     let hit = profile.cast([origin.y(), origin.z()], [looks.y(), looks.z()]).unwrap();
-    // Where the cone just ceases to hold the normal, the slope has a kink.
+    // Where the cone just ceases to contain the normal, the slope has a kink.
     let incidence = math::acos(-(hit.normal[0] * looks.y() + hit.normal[1] * looks.z()));
     let edge = [origin.y() + looks.y() * hit.range_m, origin.z() + looks.z() * hit.range_m];
     let corner = (edge[0].abs() - 3.5).abs() < CORNER_M
@@ -215,7 +215,7 @@ fn verif_height_and_chainage() {
     }
 }
 
-/// The rows of an attitude hold where measured and estimated agree, which is where a filter that works is: off by an angle,
+/// The rows of an attitude hold where measured and estimated agree, as in a converged filter: off by an angle,
 /// they are wrong by half of it. So the measured is within 1e-7 of the estimate, deviation included.
 #[test]
 fn verif_attitude() {
@@ -231,7 +231,7 @@ fn verif_attitude() {
     }
 }
 
-/// A compass that deviates turns what it measures about the tunnel's z: then nothing is left over.
+/// A compass deviation turns the measured attitude about the tunnel's z: then the residual is zero.
 #[test]
 fn verif_a_deviating_compass_is_expected() {
     let mut draws = Draws::new(5);
@@ -244,7 +244,7 @@ fn verif_a_deviating_compass_is_expected() {
     }
 }
 
-/// The turn rate is given, so that the bias of the gyros is no error of the row: see "What is left out" in
+/// The turn rate is given, so that the gyro bias is no error of the row: see "What is left out" in
 /// `docs/fusion.md`.
 #[test]
 fn verif_velocity_and_rest() {
@@ -262,7 +262,7 @@ fn verif_velocity_and_rest() {
     }
 }
 
-/// A point fixed to a turning body moves as it should: the lever arm's velocity by differences of the point's place.
+/// Velocity of a point fixed to a turning body: that of the lever arm, by differences of the point's position.
 #[test]
 fn verif_velocity_of_a_sensor_on_an_arm() {
     let mut draws = Draws::new(7);
@@ -282,7 +282,7 @@ fn verif_velocity_of_a_sensor_on_an_arm() {
     }
 }
 
-/// Over a tenth of a second the place then is the place now less the way: exact for what moves evenly.
+/// A tenth of a second before, the position is that of now less the displacement: exact for constant velocity.
 #[test]
 fn verif_a_row_seen_later() {
     const LATER_S: f64 = 0.07;
@@ -297,7 +297,7 @@ fn verif_a_row_seen_later() {
     }
 }
 
-/// An epoch of ten samples; `None` for what isn't felt.
+/// An epoch of ten samples; `None` for missing data.
 fn go_on(start: &State, felt: &[Felt]) -> (State, Transition) {
     let (mut state, mut leg) = (*start, Leg::default());
     for felt in felt {
@@ -308,9 +308,9 @@ fn go_on(start: &State, felt: &[Felt]) -> (State, Transition) {
     (state, transition)
 }
 
-/// The transition holds the rotation of a sample's middle for all of it: wrong by up to a quarter of the angle turned in a
-/// sample, 0.01 rad, and that in the terms of a bias alone, of which the largest is 0.1 s of turning, or 0.05 s^2 of force:
-/// 0.1 x 0.0025. What a wrong factor or a term left out makes is larger for each but the way that a gyro's bias makes by
+/// The transition uses the rotation of a sample's middle for all of it: wrong by up to a quarter of the angle turned in a
+/// sample, 0.01 rad, and only in the terms of a bias, of which the largest is 0.1 s of turning, or 0.05 s^2 of force:
+/// 0.1 x 0.0025. A wrong factor or a missing term is larger for each but the displacement by a gyro bias through
 /// tilting, 10 m/s^2 x 0.1^3 / 6: so each block is compared with its own size.
 #[test]
 fn verif_the_transition() {
@@ -321,7 +321,7 @@ fn verif_the_transition() {
     for round in 0..STATES {
         let start = draws.state();
         let (rate, force) = (draws.vector(0.6), draws.vector(3.0) + Vec3::new(0.0, 0.0, 9.0));
-        // Some rounds without one or the other, for a part of the epoch or for all of it.
+        // Some rounds lack one or the other, for a part of the epoch or for all of it.
         let blind = |k: u64, part: u64| round % 4 == part && k >= round % 3 * 4;
         let felt: Vec<_> = (0..10)
             .map(|k| Felt {
@@ -359,7 +359,7 @@ fn verif_the_transition() {
     }
 }
 
-/// Factors moved on by the transition are those of F P F^T.
+/// Factors propagated by the transition are those of F P F^T.
 #[test]
 fn verif_the_transition_carries_factors() {
     use crate::filter::factors::Factors;

@@ -1,4 +1,4 @@
-//! The filter against numbers of 100 digits, against textbook forms, and on cases that break filters.
+//! The filter against oracles of 100 digits, against textbook forms, and on hard cases.
 
 mod faults;
 mod hard_cases;

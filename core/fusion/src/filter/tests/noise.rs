@@ -1,4 +1,4 @@
-//! verif_: what an epoch adds to the covariance is what the processes do that it stands for.
+//! verif_: the process noise of an epoch is that of the modelled processes.
 
 use super::jacobians::Draws;
 use crate::filter::factors::Factors;
@@ -11,7 +11,7 @@ use crate::filter::state::{
 use headrace_geometry::frames::Vec3;
 use headrace_geometry::math;
 
-/// A leg of a vehicle that lies still, and what it adds to nothing.
+/// A leg of a vehicle at rest, and the covariance it adds to zero.
 fn leg(settings: &Settings, dt_s: f64, felt: Felt) -> (Transition, Factors<ERRORS>) {
     let mut state = Draws::new(1).state();
     let mut leg = Leg::default();
@@ -30,7 +30,7 @@ fn near(what: &str, is: f64, should: f64, share: f64) {
     assert!((is - should).abs() <= share * should.abs() + 1e-18, "{what}: {is}, not {should}");
 }
 
-/// Two lags in a row, s' = -s / T + r, r' = -r / T + w, in steps of 1e-5 T: Euler's error is of that order.
+/// Two lags in series, s' = -s / T + r, r' = -r / T + w, in steps of 1e-5 T: Euler's error is of that order.
 #[test]
 fn verif_slack_against_an_integral() {
     let settings = Settings { slack: Wander { reach: 0.06, time_s: 10.0 }, ..Settings::default() };
@@ -48,7 +48,7 @@ fn verif_slack_against_an_integral() {
                 rr - 2.0 * rr * step + density * dt_s,
             );
         }
-        // The first steps count for more where there are few.
+        // The first steps weigh more where there are few.
         let share = 1e-4 + 3.0 * step / lags;
         near("slack", factors.variance(SLACK), ss, share);
         near("both", factors.covariance(SLACK, SLACK_RATE), sr, share);
@@ -56,12 +56,12 @@ fn verif_slack_against_an_integral() {
     }
 }
 
-/// Left to itself for long, the slack has its reach, and its autocorrelation is (1 + x) e^-x at x lags.
+/// In the steady state the slack has its reach, and its autocorrelation is (1 + x) e^-x at x lags.
 #[test]
 fn verif_slack_settles_at_its_reach() {
     let settings = Settings { slack: Wander { reach: 0.3, time_s: 7.0 }, ..Settings::default() };
     let mut factors = Factors::independent([0.0; ERRORS]);
-    // Epochs of uneven length: what settles mustn't depend on them.
+    // Epochs of uneven length: the steady state mustn't depend on them.
     for k in 0..3000 {
         let (transition, noise) = leg(&settings, 0.03 + 0.02 * f64::from(k % 5), still());
         transition.carry(&mut factors);
@@ -87,10 +87,10 @@ fn add_slack(factors: &mut Factors<ERRORS>, noise: &Factors<ERRORS>) {
 }
 
 /// White force and white turn rate by Monte Carlo through `State::go_on`: 4000 epochs of ten samples. The spread of a
-/// variance from n draws is sqrt(2 / n) = 2.2 %, so that 9 % is four of them. Way and velocity share what they do.
+/// variance from n draws is sqrt(2 / n) = 2.2 %, so that 9 % is four of them. Displacement and velocity are correlated.
 ///
-/// A turn rate's noise also tilts the force, which the epoch leaves out: a level unit, seen from its own x alone, where
-/// gravity doesn't reach to first order when it is tilted about x.
+/// Turn rate noise also tilts the force, which the epoch neglects: a level unit, seen from its own x alone, where
+/// gravity has no first-order effect when it is tilted about x.
 #[test]
 fn verif_white_noise_by_draws() {
     const DRAWS: u32 = 4000;
@@ -125,7 +125,7 @@ fn verif_white_noise_by_draws() {
     }
 }
 
-/// Without gyros and accelerometers the blind noises count, over the time in which there are none.
+/// Without gyro and accelerometer data the blind noises count, over the time without.
 #[test]
 fn verif_blind_noise() {
     let settings = Settings { blind_rate_noise: 0.03, blind_force_noise: 0.5, ..Settings::default() };
@@ -137,7 +137,7 @@ fn verif_blind_noise() {
     }
 }
 
-/// What fades by itself keeps its reach when the epoch's noise makes up for it; what walks grows with time.
+/// A decaying error keeps its reach when the epoch's noise makes up for it; a random walk grows with time.
 #[test]
 fn verif_wandering() {
     let settings = Settings::default();
@@ -159,7 +159,7 @@ fn verif_wandering() {
     }
     near("scale", factors.variance(SCALE), settings.scale_noise * settings.scale_noise * 25e3, 1e-9);
     near("depth", factors.variance(DEPTH), settings.depth_noise * settings.depth_noise * 25e3, 1e-9);
-    // After one of its times, an e-th is left.
+    // After one time constant, 1/e is left.
     let (transition, _) = leg(&settings, settings.heading.time_s, still());
     let mut column = [1.0; ERRORS];
     transition.apply(&mut column);

@@ -1,14 +1,14 @@
 //! The factors against values of 100 digits: `tests/oracles/fusion.py` made `fusion.csv` with mpmath.
 //!
-//! Inputs are doubles taken as exact, so that each tolerance is what rounding within the computation may do. Elements of a
-//! covariance are held against sqrt(P_ii P_jj), the scale that errors of these two have.
+//! Inputs are doubles taken as exact, so that each tolerance bounds the rounding within the computation. Elements of a
+//! covariance are compared relative to sqrt(P_ii P_jj), the scale of these two errors.
 
 use super::super::factors::{Factors, Gain};
 use headrace_geometry::math;
 
 const LINES: &str = include_str!("../../../../../tests/oracles/fusion.csv");
 
-/// A covariance that can be taken through the steps of the file.
+/// A covariance to be taken through the steps of the file.
 trait Covariance<const N: usize> {
     fn start(variances: [f64; N]) -> Self;
     fn element(&self, i: usize, j: usize) -> f64;
@@ -56,7 +56,7 @@ impl<const N: usize> Covariance<N> for Factors<N> {
     }
 }
 
-/// The covariance itself, whole, with the update of the textbooks; `JOSEPH`: with the one that keeps its sign, they say.
+/// The full covariance, with the textbook update; `JOSEPH`: with the Joseph form, said to keep its sign.
 #[derive(Clone, Copy)]
 struct Whole<const N: usize, const JOSEPH: bool>([[f64; N]; N]);
 
@@ -122,7 +122,7 @@ impl<const N: usize, const JOSEPH: bool> Covariance<N> for Whole<N, JOSEPH> {
     }
 }
 
-/// How far off a covariance was at its worst, in its own scale.
+/// Largest error of a covariance, in its own scale.
 #[derive(Debug, Default, Clone, Copy)]
 struct Worst {
     covariance: f64,
@@ -131,7 +131,7 @@ struct Worst {
     is_sign_lost: bool,
 }
 
-/// NaN is as far off as can be.
+/// NaN counts as the largest error.
 fn note(worst: &mut f64, off: f64) {
     *worst = if off.is_nan() { f64::INFINITY } else { worst.max(off) };
 }
@@ -169,7 +169,7 @@ fn follow<const N: usize, C: Covariance<N>>(case: &str) -> Worst {
             "scale" => p.scale(fields[3].parse().unwrap(), numbers[1]),
             "gain" => {
                 note(&mut worst.gain, (gain.variance / numbers[0] - 1.0).abs());
-                // Against the largest, as gains of one measurement act together.
+                // Relative to the largest, as gains of one measurement act together.
                 let size = numbers[1..].iter().fold(0.0, |size: f64, k| size.max(k.abs()));
                 for (k, right) in gain.k.iter().zip(&numbers[1..]) {
                     note(&mut worst.gain, (k - right).abs() / size);
@@ -212,7 +212,7 @@ fn all(case: &str, n: usize) -> [Worst; 3] {
     if n == 4 { of::<4>(case) } else { of::<6>(case) }
 }
 
-/// How far the factors may be off in a case: about ten times what they are. Doubles alone allow some units in the last
+/// Tolerance of the factors in a case: about ten times their error. Doubles alone allow some units in the last
 /// place times the ratio of the largest standard deviation to the smallest in any direction, 1e12 after ten hours.
 const CASES: [(&str, usize, f64); 13] = [
     ("mild", 4, 1e-14),
@@ -229,7 +229,7 @@ const CASES: [(&str, usize, f64); 13] = [
     ("swinging", 4, 1e-9),
     ("swinging", 6, 1e-5),
 ];
-/// An update by the whole covariance fails a case when it is so many times further off than the factors may be.
+/// An update by the full covariance fails a case when its error is so many times the tolerance of the factors.
 const FAILS: f64 = 30.0;
 
 #[test]
@@ -252,7 +252,7 @@ fn the_covariance_itself_fails_where_its_factors_do_not() {
             assert!(fails(plain), "{case} {n}: {plain:?}");
             assert!(fails(joseph), "{case} {n}: {joseph:?}");
         }
-        // Neither is a straw man: with nothing hard about a case both are right.
+        // Neither is a straw man: in an easy case both are right.
         if case == "mild" {
             assert!(plain.covariance.max(joseph.covariance) < 1e-13, "{plain:?} {joseph:?}");
         }

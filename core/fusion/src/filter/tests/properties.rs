@@ -1,4 +1,4 @@
-//! What must hold of the filter's parts, whatever they are given.
+//! Properties of the filter's parts that hold for any input.
 
 use proptest::prelude::*;
 
@@ -26,7 +26,7 @@ fn reading(number: f64) -> Reading {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// Whatever comes into the window leaves it once, in order of time, those of one time as they came.
+    /// Every reading in the window leaves it once, in order of validity, those of the same time in order of arrival.
     #[test]
     fn readings_leave_the_window_in_order(times in proptest::collection::vec(0_u64..50, 1..200), cut in 0_u64..50) {
         let mut window = Window::default();
@@ -48,7 +48,7 @@ proptest! {
         prop_assert_eq!(left, right);
     }
 
-    /// What was felt covers any time without a gap; a sample speaks of the time before it, for a tenth of a second at most.
+    /// Inertial data covers any time without a gap; a sample is valid for the time before it, a tenth of a second at most.
     #[test]
     fn what_was_felt_covers_all_time(
         samples in proptest::collection::vec((1_u64..3000, any::<bool>()), 0..60),
@@ -84,14 +84,14 @@ proptest! {
                 prop_assert!(!is_blind || next > now.0 + 100 * MS, "a sample isn't heard");
             }
         }
-        // To forget what is old changes nothing of what comes after.
+        // Removing old samples changes nothing of what comes after.
         let old = MonoNs(forgotten.min(from) * MS);
         let mut younger = window.clone();
         younger.forget(old);
         prop_assert_eq!(pieces(&younger), whole);
     }
 
-    /// Echoes of a place in the section lead back to it from half a metre off; nonsense leads nowhere outside.
+    /// Echoes of a position in the section lead back to it from half a metre off; nonsense leads nowhere outside.
     #[test]
     fn echoes_lead_to_their_place(
         (y, z) in (-2.5_f64..2.5, 1.5_f64..6.0),
@@ -120,7 +120,7 @@ proptest! {
         prop_assert!(profile.contains(place.at_m), "{place:?}");
     }
 
-    /// Of a source that speaks too often, what is used is apart by its period, and no more than that.
+    /// Of a source that sends too often, the readings used are apart by its period, and no more than that.
     #[test]
     fn a_source_is_used_once_a_period(steps in proptest::collection::vec(0_u64..80, 1..200)) {
         let period = DurNs::from_millis(100);
@@ -137,7 +137,7 @@ proptest! {
         prop_assert!(used.windows(2).all(|pair| pair[1].since(pair[0]) >= period));
     }
 
-    /// A head's turns are counted either way round and over its seam; pings are used a step apart, if they answer.
+    /// A head's turns are counted in either direction and over the wrap; pings with a range are used a step apart.
     #[test]
     fn a_head_is_used_once_a_step(step_deg in 0.3_f64..5.0, clockwise in any::<bool>(), start in -10.0_f64..10.0) {
         let step_rad = step_deg.to_radians() * if clockwise { 1.0 } else { -1.0 };
@@ -194,7 +194,7 @@ fn unit(i: usize) -> Errors {
     core::array::from_fn(|j| f64::from(u8::from(i == j)))
 }
 
-/// F of a leg, whole.
+/// F of a leg, as a full matrix.
 fn whole(transition: &Transition) -> Square {
     transposed(&core::array::from_fn(|j| {
         let mut column = unit(j);
@@ -203,10 +203,10 @@ fn whole(transition: &Transition) -> Square {
     }))
 }
 
-/// The textbook's way: the errors of each clone are further errors beside those of now, which no measurement corrects.
+/// The textbook form: the errors of each clone augment those of now, and no measurement corrects them.
 struct Augmented {
     now: Square,
-    /// Covariance of the errors then, and of those now with them.
+    /// Covariance of the errors then, and cross-covariance of those now with them.
     clones: Vec<(Square, Square)>,
 }
 
@@ -229,7 +229,7 @@ impl Augmented {
         }
     }
 
-    /// Standard deviation of the difference of chainage at `arm`, of now against a clone so many back.
+    /// Standard deviation of the difference of chainage at `arm`, of now against the clone `back` before the newest.
     fn arc_m(&self, back: usize, arm: Vec3<Tunnel>) -> f64 {
         let (then, cross) = &self.clones[self.clones.len() - 1 - back];
         let weights = [(POSITION, 1.0), (ATTITUDE + 1, arm.z()), (ATTITUDE + 2, -arm.y())];
@@ -245,7 +245,7 @@ impl Augmented {
 
 #[test]
 fn the_trail_knows_what_an_augmented_filter_knows() {
-    // Several legs between clones; and so many clones that the ring goes round.
+    // Several legs between clones; and so many clones that the ring wraps.
     for (legs, leg_s, times) in [(8, 0.25, 12), (1, 2.0, 70)] {
         let settings = Settings::default();
         let rig = Rig::new(super::rig::cruise, 5);

@@ -1,4 +1,4 @@
-//! A vehicle whose way is known, and what its sensors would say, for tests that drive the filter by hand.
+//! A vehicle of known trajectory and its sensors' readings, for tests that drive the filter by hand.
 
 use super::super::FilterNavigation;
 use super::super::settings::Settings;
@@ -20,16 +20,16 @@ pub(super) const ECHOES: usize = 3;
 /// The first of two: one looks ahead, one back.
 pub(super) const HEADS: usize = 7;
 pub(super) const VELOCITY_LOG: usize = 9;
-/// A source that says nothing of use.
+/// A source unused by navigation.
 pub(super) const OTHER: usize = 10;
 
-/// When the rig's time is 0 s.
+/// Timestamp of the rig's time 0 s.
 const ORIGIN: MonoNs = MonoNs(5_000_000_000_000);
 const DEVICE_MPS: f64 = 1500.0;
-/// Errors of the filter may be so many of its own sd.
-const MOST_SIGMAS: f64 = 4.0;
+/// Largest error of the filter, in its own sd.
+const MOST_SDS: f64 = 4.0;
 
-/// A reading on its way.
+/// A reading in transit.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Event {
     pub(super) received: MonoNs,
@@ -38,7 +38,7 @@ pub(super) struct Event {
     pub(super) reading: Reading,
 }
 
-/// Where the vehicle is at a moment, s.
+/// Trajectory: pose of the vehicle by time, s.
 pub(super) type Way = fn(f64) -> Pose;
 
 /// See the module's description.
@@ -47,7 +47,7 @@ pub(super) struct Rig {
     pub(super) site: Site,
     pub(super) settings: Settings,
     pub(super) way: Way,
-    /// Noise of the sensors as a share of what the settings say.
+    /// Noise of the sensors relative to the settings.
     pub(super) noise: f64,
     /// Time between samples of the inertial unit, s.
     pub(super) imu_s: f64,
@@ -81,7 +81,7 @@ pub(super) fn rest(_: f64) -> Pose {
 
 impl Rig {
     pub(super) fn new(way: Way, seed: u64) -> Self {
-        // Narrow beams, so that a ray is what they see.
+        // Narrow beams, equivalent to a ray.
         let settings = Settings { return_beam_rad: 1e-6, echo_beam_rad: 1e-6, ..Settings::default() };
         let site = Site { axis_yaw_rad: 0.7, ..Site::default() };
         Self { profile: shapes::ceran().unwrap(), site, settings, way, noise: 1.0, imu_s: 0.02, seed }
@@ -114,7 +114,7 @@ impl Rig {
         SensorInfo { mount, kind }
     }
 
-    /// What all sensors but the velocity log say in a time, each as it is valid.
+    /// Readings of all sensors except the velocity log over a time, in order of validity.
     pub(super) fn events(&self, from_s: f64, to_s: f64) -> Vec<Event> {
         let mut events = Vec::new();
         let mut every = |period_s: f64, phase_s: f64, source: usize, what: &dyn Fn(f64) -> Reading| {
@@ -145,7 +145,7 @@ impl Rig {
         nav.update(event.source, &Self::sensor(event.source), times, &event.reading);
     }
 
-    /// Lets the filter hear all, and checks it at each.
+    /// Feeds all readings to the filter, and checks it after each.
     pub(super) fn run(&self, nav: &mut FilterNavigation, events: &[Event]) -> Tally {
         let mut tally = Tally::default();
         for event in events {
@@ -155,8 +155,8 @@ impl Rig {
         tally
     }
 
-    /// Holds the filter to what must be so at any time: numbers that are finite, variances above zero, and a fix that is
-    /// right by its own sd or none. Once an epoch, since nothing else changes between.
+    /// Checks the invariants of the filter: finite numbers, variances above zero, and a fix that is right by its own sd or
+    /// none. Once an epoch, since nothing else changes between.
     pub(super) fn check(&self, nav: &FilterNavigation, now: MonoNs, tally: &mut Tally) {
         let Some(running) = nav.running() else {
             assert!(nav.fix(now).is_err());
@@ -211,18 +211,14 @@ impl Rig {
             for (what, (off, sigma)) in [("place", place), ("turn", turn)] {
                 let share = off.abs() / sigma;
                 tally.sd = tally.sd.max(share);
-                assert!(
-                    share <= MOST_SIGMAS,
-                    "{what} {k} at {} s is off by {off}, sigma {sigma}",
-                    seconds(now)
-                );
+                assert!(share <= MOST_SDS, "{what} {k} at {} s is off by {off}, sigma {sigma}", seconds(now));
             }
         }
         assert!(fix.speed_mps.is_finite() && fix.relative.sd_m(Vec3::new(0.0, 3.0, 3.0)).is_finite());
     }
 
     pub(super) fn noisy(&self, t: f64, salt: u64, sd: f64) -> f64 {
-        // Twelve uniform numbers, by a counter that is stirred (splitmix64).
+        // Twelve uniform numbers, by a hashed counter (splitmix64).
         let mut state = self.seed ^ at(t).0.wrapping_mul(31) ^ (salt << 50);
         let sum: f64 = (0..12)
             .map(|_| {
@@ -240,7 +236,7 @@ impl Rig {
         Vec3::new(self.noisy(t, salt, sd), self.noisy(t, salt + 1, sd), self.noisy(t, salt + 2, sd))
     }
 
-    /// The inertial unit's place.
+    /// Position of the inertial unit.
     pub(super) fn unit(&self, t: f64) -> Point3<Tunnel> {
         (self.way)(t).place(Self::sensor(IMU).mount.position)
     }
@@ -250,7 +246,7 @@ impl Rig {
         (self.unit(t + H_S) - self.unit(t - H_S)).scaled(0.5 / H_S)
     }
 
-    /// Mean turn rate of the time before.
+    /// Mean turn rate over the sample period before.
     pub(super) fn rate(&self, t: f64) -> Reading {
         let (then, now) = ((self.way)(t - self.imu_s).attitude, (self.way)(t).attitude);
         let turn: Vec3<Body> = rotation_vector(then.inverse() * now).scaled(1.0 / self.imu_s);
@@ -258,7 +254,7 @@ impl Rig {
         Reading::AngularRate(Self::sensor(IMU).mount.rotation.inverse() * turn + noise)
     }
 
-    /// Mean specific force of the time before.
+    /// Mean specific force over the sample period before.
     pub(super) fn force(&self, t: f64) -> Reading {
         let then = t - self.imu_s;
         let gain = (self.velocity_at(t) + -self.velocity_at(then)).scaled(1.0 / self.imu_s);
@@ -270,12 +266,12 @@ impl Rig {
         Reading::SpecificForce(Self::sensor(IMU).mount.rotation.inverse() * in_body + noise)
     }
 
-    /// What the unit's own computer makes of it.
+    /// Attitude computed by the unit.
     pub(super) fn attitude(&self, t: f64) -> Reading {
         Reading::Attitude(self.level(t, 0.0))
     }
 
-    /// The same, its compass being off.
+    /// The same, with a compass deviation.
     pub(super) fn level(&self, t: f64, off_rad: f64) -> Rot<Level, Sensor> {
         let noise = Vec3::new(
             self.noisy(t, 30, self.settings.tilt_sd_rad / 2.0),
@@ -334,14 +330,14 @@ impl Rig {
     }
 }
 
-/// What was seen while the filter was checked.
+/// Results of the checks.
 #[derive(Debug, Default, Clone, Copy)]
 pub(super) struct Tally {
     checked: Option<MonoNs>,
     /// Epochs with a fix, and without.
     pub(super) fixes: u32,
     pub(super) lacking: u32,
-    /// What the last of them lacked.
+    /// Missing part in the last of them.
     pub(super) lacks: Option<NoFix>,
     /// The largest error, in sd.
     pub(super) sd: f64,
