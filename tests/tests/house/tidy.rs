@@ -130,7 +130,9 @@ fn the_core_does_no_io_and_takes_no_lock() {
 
 #[test]
 fn no_file_is_long() {
-    for folder in ["src", "core", "plugins", "replay", "pictures", "experiments", "tests", "benches"] {
+    let folders =
+        ["src", "core", "plugins", "replay", "pictures", "experiments", "tests", "benches", "examples"];
+    for folder in folders {
         for (path, text) in sources(&root().join(folder)) {
             let lines = text.lines().count();
             assert!(lines <= LONGEST_FILE, "{}: {lines} lines; the most is {LONGEST_FILE}", path.display());

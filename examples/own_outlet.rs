@@ -1,0 +1,116 @@
+//! An outlet of one's own: a plugin whose system puts flagged sections into a bounded queue, which another thread prints.
+//!
+//! Run: `cargo run --example own_outlet [LOG.mcap]`; without a log, a golden one that goes too fast.
+
+use std::error::Error;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::thread;
+use std::time::Duration;
+
+use bevy_ecs::prelude::{Res, Resource};
+use crossbeam::queue::ArrayQueue;
+use headrace::devices::KINDS;
+use headrace_config::Document;
+use headrace_coverage::{Cause, Judgement};
+use headrace_geometry::time::MonoNs;
+use headrace_monitor::messages::{Notice, Notices};
+use headrace_monitor::pilot_text::station;
+use headrace_monitor::resources::Coverage;
+use headrace_monitor::stage::Stage;
+use headrace_monitor::{App, Plugin, PluginError};
+use headrace_replay::drive::{Pace, drive};
+use headrace_replay::player::Player;
+use headrace_vehicle::VehicleConfig;
+
+const GOLDEN: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/golden/too-fast.mcap");
+const CAPACITY: usize = 256;
+
+/// What the thread is told of a flagged section.
+struct Flag {
+    at: MonoNs,
+    from_m: f64,
+    hole_m: f64,
+    cause: Option<Cause>,
+}
+
+/// The queue between the loop and the thread.
+struct Queue {
+    flags: ArrayQueue<Flag>,
+    dropped: AtomicU64,
+    ended: AtomicBool,
+}
+
+#[derive(Clone, Resource)]
+struct FlagOutlet(Arc<Queue>);
+
+impl Plugin for FlagOutlet {
+    fn build(&self, app: &mut App) -> Result<(), PluginError> {
+        app.insert_resource(self.clone());
+        app.add_systems(Stage::Publish, publish);
+        Ok(())
+    }
+}
+
+/// Runs at the end of each tick. The loop never waits: what finds no room is dropped and counted.
+#[expect(clippy::needless_pass_by_value, reason = "bevy hands systems their arguments by value")]
+fn publish(notices: Res<'_, Notices>, coverage: Res<'_, Coverage>, outlet: Res<'_, FlagOutlet>) {
+    let sections = &coverage.sections;
+    for notice in &notices.0 {
+        let Notice::Section { section: index, at, change: Judgement::Raised } = *notice else { continue };
+        let Some(section) = sections.get(index) else { continue };
+        let flag = Flag {
+            at,
+            from_m: sections.bounds_m(index).0,
+            hole_m: section.hole.map_or(f64::INFINITY, |hole| hole.diameter_m),
+            cause: section.evidence.map(|evidence| evidence.cause),
+        };
+        if outlet.0.flags.push(flag).is_err() {
+            outlet.0.dropped.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+}
+
+/// Prints flags until the dive has ended and the queue is empty.
+fn print(queue: &Queue) {
+    loop {
+        // Asked first: what is pushed before the end is then surely seen.
+        let ended = queue.ended.load(Ordering::Acquire);
+        while let Some(Flag { at, from_m, hole_m, cause }) = queue.flags.pop() {
+            let cause = cause.map_or("unknown", Cause::as_str);
+            println!("{:7.2} s  ch {}  hole {hole_m:.2} m  {cause}", at.as_secs_f64(), station(from_m));
+        }
+        if ended {
+            return;
+        }
+        thread::sleep(Duration::from_millis(10));
+    }
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let log = std::env::args_os().nth(1).map_or_else(|| PathBuf::from(GOLDEN), PathBuf::from);
+    let mut player = Player::open(&[log])?;
+    let text = player.info().vehicle_toml.clone().ok_or("no vehicle file is attached to this log")?;
+    let no_files = |_: &str| Err("is not read by this example".to_owned());
+    let vehicle = VehicleConfig::parse(Document::new("vehicle.toml", &text), &KINDS, &no_files)?;
+
+    let (flags, dropped, ended) = (ArrayQueue::new(CAPACITY), AtomicU64::new(0), AtomicBool::new(false));
+    let queue = Arc::new(Queue { flags, dropped, ended });
+    let mut app = App::new(vehicle.mission());
+    for sensor in &vehicle.sensors {
+        app.add_device(sensor.as_ref())?;
+    }
+    app.add_plugin(&FlagOutlet(Arc::clone(&queue)))?;
+    let mut dive = app.arm(vehicle.navigation())?;
+    player.connect(dive.sources());
+
+    thread::scope(|scope| {
+        scope.spawn(|| print(&queue));
+        let driven = drive(&mut dive, &mut player, Pace::default(), &mut |_| ());
+        queue.ended.store(true, Ordering::Release);
+        driven
+    })?;
+    println!("{} ticks, {} flags dropped", dive.ticks(), queue.dropped.load(Ordering::Relaxed));
+    Ok(())
+}
