@@ -1,6 +1,17 @@
-//! Typed access to hand-written TOML files; errors name file, line, key, value and the allowed values.
+//! TOML files that people write: typed access whose errors name file, line, key, value and what is allowed.
 //!
-//! File I/O is left to the caller.
+//! The caller reads the file itself. Keys that nobody asked for are an error at [`Section::finish`].
+//!
+//! ```
+//! use headrace_config::Document;
+//!
+//! let root = Document::new("sensor.toml", "id = \"depth\"\nrate_hz = 500\n").root()?;
+//! assert_eq!(root.text("id")?.as_deref(), Some("depth"));
+//! assert_eq!(root.boolean("vented")?, None);
+//! let error = root.number("rate_hz", 0.1..=100.0).unwrap_err();
+//! assert_eq!(error.to_string(), "sensor.toml:2: rate_hz = 500: must be a number from 0.1 to 100");
+//! # Ok::<(), headrace_config::ConfigError>(())
+//! ```
 
 #![cfg_attr(not(test), warn(clippy::cast_possible_truncation))]
 #![cfg_attr(test, allow(clippy::cast_possible_truncation))]

@@ -1,4 +1,23 @@
 //! Coverage: samples on the unrolled wall, the holes between them, and the verdict on each section.
+//!
+//! [`SampleStore`] keeps samples, [`HoleFinder`] finds the largest empty circle of a section, [`Sections`] turns holes
+//! into verdicts and flags, [`cause`] names why a section failed, [`Runs`] joins flagged sections.
+//!
+//! ```
+//! use headrace_coverage::{HoleFinder, SampleStore, StoreLayout, WallSample};
+//!
+//! // Samples every 0.5 m along and around a wall of 10 m perimeter.
+//! let layout = StoreLayout { perimeter_m: 10.0, from_m: 0.0, to_m: 5.0, cell_m: 0.25, capacity: 1000 };
+//! let mut store = SampleStore::new(layout);
+//! for number in 0..200 {
+//!     let (x_m, arc_m) = (0.5 * f64::from(number / 20), 0.5 * f64::from(number % 20));
+//!     store.insert(WallSample { x_m, arc_m, head: 0, step_m: None })?;
+//! }
+//! // The largest empty circle between them has the diagonal for its diameter.
+//! let hole = HoleFinder::default().largest(&store, 1.0, 1.5);
+//! assert!(hole.bounded && (hole.diameter_m - 0.5 * 2.0_f64.sqrt()).abs() < 1e-6);
+//! # Ok::<(), headrace_coverage::StoreError>(())
+//! ```
 
 #![cfg_attr(not(test), warn(clippy::cast_possible_truncation))]
 #![cfg_attr(test, allow(clippy::cast_possible_truncation))]

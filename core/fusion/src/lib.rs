@@ -1,4 +1,25 @@
-//! Navigation of the vehicle: the common interface and its implementations.
+//! Navigation: the vehicle's position and attitude from its sensors' readings.
+//!
+//! [`Navigation`] is the interface that the loop knows. [`filter`] is the error-state Kalman filter over all sensors,
+//! [`direct`] a plain reference without uncertainty, [`smooth`] the smoother after the dive.
+//!
+//! ```
+//! use headrace_fusion::direct::DirectNavigation;
+//! use headrace_fusion::{Navigation as _, NoFix, Times};
+//! use headrace_geometry::{frames::Rot, site::Site, time::MonoNs, tunnel::shapes};
+//! use headrace_sensor::device::{SensorInfo, SensorKind};
+//! use headrace_sensor::reading::Reading;
+//!
+//! let mut navigation = DirectNavigation::new(shapes::circle(3.0)?, Site::default());
+//! let now = MonoNs(1_000_000_000);
+//! assert_eq!(navigation.fix(now).unwrap_err(), NoFix::Heading);
+//! let times = Times { received: now, valid: now };
+//! let imu = SensorInfo { kind: SensorKind::Imu, ..SensorInfo::other() };
+//! navigation.update(0, &imu, times, &Reading::Attitude(Rot::identity()));
+//! // Attitude is known now; the next thing missing is the chainage.
+//! assert_eq!(navigation.fix(now).unwrap_err(), NoFix::Chainage);
+//! # Ok::<(), headrace_geometry::tunnel::ProfileError>(())
+//! ```
 
 #![cfg_attr(not(test), warn(clippy::cast_possible_truncation))]
 #![cfg_attr(test, allow(clippy::cast_possible_truncation))]

@@ -1,6 +1,20 @@
-//! Units, integer time, frames, mathematics, site constants and tunnel profiles, shared by all other crates.
+//! Units, integer time, frames, mathematics, the site and tunnel profiles: the base of every other crate.
 //!
-//! Pure: no I/O, no threads, no clock, no randomness. Transcendental functions come from [`math`] alone.
+//! Vectors carry their frame as a type, and a tunnel's wall is addressed by chainage and arc length. Pure: no I/O, no
+//! threads, no clock, no randomness. Transcendental functions come from [`math`] alone.
+//!
+//! ```
+//! use headrace_geometry::tunnel::shapes;
+//!
+//! // A ray to the left from the middle of a tunnel of 3 m radius (y left, z up, from the floor's centre).
+//! let tunnel = shapes::circle(3.0)?;
+//! let hit = tunnel.cast([0.0, 3.0], [1.0, 0.0]).unwrap();
+//! assert!((hit.range_m - 3.0).abs() < 1e-12);
+//! // Arc length grows from the floor's centre by way of the left wall.
+//! assert!((hit.arc_m - tunnel.perimeter_m() / 4.0).abs() < 1e-12);
+//! assert_eq!(tunnel.clock(hit.arc_m), "9:00");
+//! # Ok::<(), headrace_geometry::tunnel::ProfileError>(())
+//! ```
 
 #![cfg_attr(not(test), warn(clippy::cast_possible_truncation))]
 #![cfg_attr(test, allow(clippy::cast_possible_truncation))]

@@ -1,7 +1,24 @@
-//! The loop: the state of a dive as entities and resources, the stages of a tick, and the results for outlets.
+//! The loop: the state of a dive as entities and resources, the stages that a tick runs, and what outlets are told.
 //!
-//! [`App`] is built from a vehicle's devices and from plugins; armed, it is a [`run::Loop`] that turns packets into
+//! [`App`] is assembled from a vehicle's devices and from plugins; armed, it is a [`run::Loop`] that turns packets into
 //! positions, samples, verdicts and advice. Pure: no I/O, no thread, no clock; time comes in with the packets.
+//!
+//! ```
+//! use headrace_fusion::direct::DirectNavigation;
+//! use headrace_geometry::{time::MonoNs, tunnel::shapes};
+//! use headrace_monitor::App;
+//! use headrace_vehicle::Mission;
+//!
+//! let mission = Mission::new(shapes::circle(3.0)?, 0.5);
+//! let navigation = DirectNavigation::new(mission.profile.clone(), mission.site);
+//! // `App::add_device` adds sensors here, `App::add_plugin` outlets and systems of one's own.
+//! let mut dive = App::new(mission).arm(Box::new(navigation))?;
+//! let consumed_packets = dive.tick(MonoNs(20_000_000));
+//! assert_eq!((consumed_packets, dive.ticks()), (0, 1));
+//! // 100 m of tunnel in sections of 0.25 m.
+//! assert_eq!(dive.coverage().sections.len(), 400);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 #![cfg_attr(not(test), warn(clippy::cast_possible_truncation))]
 #![cfg_attr(test, allow(clippy::cast_possible_truncation))]

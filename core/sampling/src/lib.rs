@@ -1,8 +1,22 @@
-//! Sampling theory: spacing of samples on the wall, layouts of several heads, and the largest speed for a target.
+//! Sampling theory: the spacing of samples on the wall, layouts of several heads, and how fast the vehicle may go.
 //!
-//! `section` and `spacing` hold the paper's closed forms; `ring` is the general case. `layout` and `schedule` define
-//! how several heads turn, `passes` gives the times between their passes, `swing` the effect of the vehicle's rotation.
-//! `advice` combines them for the pilot, `plan` for the engineer.
+//! [`section`] and [`spacing`] have the paper's closed forms, [`ring`] the general case by ray casting. [`layout`] and
+//! [`schedule`] say how several heads turn, [`passes`] how often they pass a place, [`swing`] what the vehicle's own
+//! turning adds. [`advice`] combines them for the pilot during the dive, [`plan`] for the engineer before it.
+//!
+//! ```
+//! use headrace_sampling::head::Turn;
+//! use headrace_sampling::section::t_y2_m;
+//! use headrace_sampling::spacing::{Spiral, speed_for_target_mps};
+//!
+//! // Four heads in phase shift, steps of 0.9 degrees, 8 s a turn; a flat floor 3 m below, seen up to 45 degrees.
+//! let turn = Turn::new(0.9_f64.to_radians(), 8.0)?;
+//! let t_y_m = t_y2_m(3.0, turn.step_rad(), 50)?;
+//! let v_mps = speed_for_target_mps(0.5, t_y_m, turn.period_s() / 4.0, turn.ping_period_s()).unwrap();
+//! let spiral = Spiral::new(v_mps, turn, 4.0)?;
+//! assert!((spiral.t_max_m(t_y_m) - 0.5).abs() < 1e-12);
+//! # Ok::<(), headrace_sampling::SamplingError>(())
+//! ```
 
 #![cfg_attr(not(test), warn(clippy::cast_possible_truncation))]
 #![cfg_attr(test, allow(clippy::cast_possible_truncation))]

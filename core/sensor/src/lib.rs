@@ -1,8 +1,29 @@
-//! Interface between the device crates and the rest of the program.
+//! What a device's crate needs, and all that the rest of the program knows about a device.
 //!
-//! A device is three separate things: a codec and decoder (bytes to [`reading::Reading`]s, pure), a driver (the host's side
-//! of its line, sans-I/O) and an emulator (the device's side, for simulations). A device's crate depends on this crate
-//! alone; the lower ones are re-exported.
+//! A device has three separate parts: a codec and decoder (bytes to [`reading::Reading`]s, pure), a driver (the host's
+//! side of its line, without I/O) and an emulator (the device's side, for simulations). A device's crate depends on
+//! this crate alone; the lower ones are re-exported. A codec is a [`codec::Framing`] in [`codec::Framed`]:
+//!
+//! ```
+//! use headrace_sensor::codec::{Codec as _, Framed, Framing, Verdict};
+//!
+//! #[derive(Clone, Copy, Default)]
+//! struct Counts; // Frames of three bytes: a marker, then a number, low byte first.
+//! impl Framing for Counts {
+//!     type Value = u16;
+//!     fn judge(&self, front: &[u8]) -> Verdict {
+//!         if front[0] == 0xA5 { Verdict::on(front, 3, |_| true) } else { Verdict::NotAStart }
+//!     }
+//!     fn read(&self, frame: &[u8]) -> Option<u16> {
+//!         Some(u16::from_le_bytes([frame[1], frame[2]]))
+//!     }
+//! }
+//! let (mut codec, mut values) = (Framed::<Counts, 3>::default(), Vec::new());
+//! for packet in [&[0x00, 0xA5, 0x34][..], &[0x12]] {
+//!     codec.push(packet, &mut |value| values.push(value));
+//! }
+//! assert_eq!((&values[..], codec.counts().skipped_bytes), (&[0x1234][..], 1));
+//! ```
 
 #![cfg_attr(not(test), warn(clippy::cast_possible_truncation))]
 #![cfg_attr(test, allow(clippy::cast_possible_truncation))]

@@ -1,10 +1,29 @@
-//! Binary state snapshots: saved at a tick, restored into a loop of the same vehicle and the same program.
+//! State as bytes: saved after a tick, and restored into a loop of the same vehicle and the same program.
 //!
-//! Plain values (numbers, enums, small records) are serialized by serde. Types that own preallocated buffers, or
-//! settings that aren't state, are restored in place: [`stateful!`](crate::stateful) lists all their fields by kind, so
-//! that a new field can't be forgotten.
+//! Values (numbers, enums, small records) are written by serde. Types that own preallocated memory, or settings that
+//! aren't state, are restored in place: [`stateful!`](crate::stateful) sorts every field of such a type by what it is,
+//! so that a new field can't be forgotten.
 //!
-//! Only the program version that wrote a snapshot can read it.
+//! ```
+//! use headrace_snapshot::{Restorer, Saver, Stateful as _, stateful};
+//!
+//! struct Counter {
+//!     name: &'static str,
+//!     count: u64,
+//! }
+//! stateful!(Counter { state: count; fixed: name; });
+//!
+//! let mut saver = Saver::default();
+//! Counter { name: "first", count: 3 }.save(&mut saver);
+//! let bytes = saver.finish()?;
+//!
+//! let mut other = Counter { name: "second", count: 0 };
+//! other.restore(&mut Restorer::new(&bytes))?;
+//! assert_eq!((other.name, other.count), ("second", 3));
+//! # Ok::<(), headrace_snapshot::SnapshotError>(())
+//! ```
+//!
+//! Snapshots are for the program that wrote them: no version reads another's.
 
 #![cfg_attr(not(test), warn(clippy::cast_possible_truncation))]
 #![cfg_attr(test, allow(clippy::cast_possible_truncation))]
