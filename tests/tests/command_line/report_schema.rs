@@ -67,7 +67,7 @@ fn a_report_that_is_wrong_is_found_out() {
     assert_eq!(wrong("/log", Value::Null), 0);
     assert_eq!(wrong("/target_m", "0.5".into()), 1);
     assert_eq!(wrong("/target_m", (-0.5).into()), 1);
-    assert_eq!(wrong("/report_version", 3.into()), 1);
+    assert_eq!(wrong("/report_version", 2.into()), 1);
     assert_eq!(wrong("/log/messages", 0.5.into()), 1);
     assert_eq!(wrong("/sections/0/verdict", "perhaps".into()), 1);
     assert_eq!(wrong("/sections/0/start_m", Value::Null), 1);

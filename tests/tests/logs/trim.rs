@@ -94,7 +94,7 @@ fn a_cut_says_that_it_is_one_and_judges_its_inside_as_the_whole() {
     }
     let answer = folder.headrace(&["trim", "live.mcap", "-o", "none.mcap", "--chainage", "60..70"]);
     assert_eq!(answer.code, Some(2), "{}", answer.stdout);
-    assert!(answer.stderr.contains("wasn't between 60 and 70 m"), "{}", answer.stderr);
+    assert!(answer.stderr.contains("was never between 60 and 70 m"), "{}", answer.stderr);
     assert!(!folder.path("none.mcap").exists());
 }
 

@@ -49,7 +49,7 @@ fn hits(holes: &[(f64, f64)], seed: u64, times: std::ops::Range<f64>) -> Vec<usi
         let arc_m = perimeter_m * numbers.next();
         writeln!(
             features,
-            "[[tunnel.features]]\nkind = \"boulder\"\nchainage_m = {chainage_m}\nsigma_m = {arc_m}\nsize_m = {size_m}\nsunk = 0.5"
+            "[[tunnel.features]]\nkind = \"boulder\"\nchainage_m = {chainage_m}\narc_m = {arc_m}\nsize_m = {size_m}\nsunk = 0.5"
         )
         .unwrap();
     }

@@ -30,7 +30,7 @@ fn a_boulder_is_an_ellipsoid_that_is_sunk_into_the_floor() {
 #[test]
 fn a_boulder_on_a_round_wall_leans_with_it() {
     let quarter = 3.0 * math::FRAC_PI_2;
-    let text = feature("boulder", &format!("chainage_m = 10\nsize_m = 1\nsunk = 0\nsigma_m = {quarter}"));
+    let text = feature("boulder", &format!("chainage_m = 10\nsize_m = 1\nsunk = 0\narc_m = {quarter}"));
     let environment = parse(&text, &shapes::circle(3.0).unwrap());
     let hit = cast(&environment, [10.0, 0.0, 3.0], [0.0, 1.0, 0.0]).unwrap();
     assert!((hit.range_m - 2.0).abs() < 1e-12 && hit.what == What::Feature(0), "{hit:?}");
@@ -154,7 +154,7 @@ fn everything_in_a_bend() {
         + &feature("rock_trap", "chainage_m = 19\nlength_m = 2\ndepth_m = 1\nwidth_m = 4")
         + &feature("gate", "chainage_m = 23\nslot_width_m = 0.6\nslot_depth_m = 0.3")
         + &feature("boulders", "from_m = 10\nto_m = 27\ncount = 60\nsize_m = [0.2, 1.5]\nseed = 3")
-        + &feature("bulge", "chainage_m = 17\nlength_m = 3\nsigma_m = 6\nwidth_m = 3\ndepth_m = 0.8");
+        + &feature("bulge", "chainage_m = 17\nlength_m = 3\narc_m = 6\nwidth_m = 3\ndepth_m = 0.8");
     let environment = parse(&text, &shape.profile());
     let mut oracle = Oracle::new(shape);
     oracle.axis = vec![(10.0, 0.0), (14.0 * 70.0_f64.to_radians(), 1.0 / 14.0)];

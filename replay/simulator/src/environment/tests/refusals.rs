@@ -96,7 +96,7 @@ fn features_that_cannot_be() {
 fn walls_that_cannot_be() {
     let bulge = |depth: f64, width: f64| {
         format!(
-            "kind = \"bulge\"\nchainage_m = 9\nlength_m = 8\nwidth_m = {width}\nsigma_m = 0\ndepth_m = {depth}\n"
+            "kind = \"bulge\"\nchainage_m = 9\nlength_m = 8\nwidth_m = {width}\narc_m = 0\ndepth_m = {depth}\n"
         )
     };
     feature(&bulge(2.6, 4.0), "features[0].depth_m = 2.6", "too near");

@@ -56,7 +56,7 @@ fn stations_change_the_size() {
 
 fn bulge(b: &[f64; 5]) -> String {
     format!(
-        "[[tunnel.features]]\nkind = \"bulge\"\nchainage_m = {}\nlength_m = {}\nsigma_m = {}\nwidth_m = {}\ndepth_m = {}\n",
+        "[[tunnel.features]]\nkind = \"bulge\"\nchainage_m = {}\nlength_m = {}\narc_m = {}\nwidth_m = {}\ndepth_m = {}\n",
         b[0], b[1], b[2], b[3], b[4]
     )
 }
