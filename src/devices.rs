@@ -4,11 +4,11 @@ use headrace_sensor::device::DeviceKind;
 
 /// Every kind of device that a vehicle file may name.
 pub const KINDS: [&dyn DeviceKind; 7] = [
-    &headrace_imagenex881::Kind,
-    &headrace_ping1d::Kind,
-    &headrace_bar100::Kind,
-    &headrace_imu_can::Kind,
-    &headrace_tether_hid::Kind,
-    &headrace_mavlink::Kind,
-    &headrace_a50::Kind,
+    &headrace_imagenex881::Imagenex881Kind,
+    &headrace_ping1d::Ping1dKind,
+    &headrace_bar100::Bar100Kind,
+    &headrace_imu_can::ImuCanKind,
+    &headrace_tether_hid::TetherHidKind,
+    &headrace_mavlink::MavlinkKind,
+    &headrace_a50::A50Kind,
 ];

@@ -63,11 +63,11 @@ pub(crate) struct Dive {
 
 /// The kinds of devices in the vehicle files.
 const KINDS: [&dyn DeviceKind; 5] = [
-    &headrace_imagenex881::Kind,
-    &headrace_ping1d::Kind,
-    &headrace_bar100::Kind,
-    &headrace_imu_can::Kind,
-    &headrace_tether_hid::Kind,
+    &headrace_imagenex881::Imagenex881Kind,
+    &headrace_ping1d::Ping1dKind,
+    &headrace_bar100::Bar100Kind,
+    &headrace_imu_can::ImuCanKind,
+    &headrace_tether_hid::TetherHidKind,
 ];
 
 /// The shipped vehicle files by name.

@@ -11,7 +11,7 @@ pub mod emulator;
 pub mod plugin;
 pub mod report;
 
-pub use plugin::Kind;
+pub use plugin::A50Kind;
 
 #[cfg(test)]
 mod tests;

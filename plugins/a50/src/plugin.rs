@@ -17,7 +17,7 @@ const RING_BYTES: usize = 1 << 17;
 
 /// The A50 device kind.
 #[derive(Debug, Clone, Copy)]
-pub struct Kind;
+pub struct A50Kind;
 
 /// A configured A50.
 #[derive(Debug, Clone)]
@@ -27,7 +27,7 @@ pub struct A50 {
     emulated: Simulated,
 }
 
-impl DeviceKind for Kind {
+impl DeviceKind for A50Kind {
     fn name(&self) -> &'static str {
         NAME
     }

@@ -11,7 +11,7 @@ use headrace_sensor::geometry::time::{DurNs, MonoNs};
 use headrace_sensor::measurement::GroundVelocity;
 use headrace_sensor::reading::{Decoded, Packet, Reading};
 
-use crate::Kind;
+use crate::A50Kind;
 use crate::decoder::{A50Decoder, Meaning, Withheld};
 use crate::report::tests::EXAMPLE;
 use crate::report::{Against, Velocity};
@@ -28,7 +28,7 @@ fn configured(own: &str) -> Result<Box<dyn Device>, String> {
         latency: LATENCY,
     };
     let root = Document::new("v.toml", own).root().unwrap();
-    let device = Kind.configure(&sensor, &root).map_err(|error| error.to_string())?;
+    let device = A50Kind.configure(&sensor, &root).map_err(|error| error.to_string())?;
     root.finish().map_err(|error| error.to_string())?;
     assert_eq!(device.specification().sensor, sensor);
     Ok(device)

@@ -13,7 +13,7 @@ pub mod driver;
 pub mod emulator;
 pub mod plugin;
 
-pub use plugin::Kind;
+pub use plugin::Bar100Kind;
 
 #[cfg(test)]
 mod tests;

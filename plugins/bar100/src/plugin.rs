@@ -21,7 +21,7 @@ const PART_LIMITS_BAR: (f64, f64) = (0.0, 100.0);
 
 /// The Bar100 device kind.
 #[derive(Debug, Clone, Copy)]
-pub struct Kind;
+pub struct Bar100Kind;
 
 /// A configured Bar100.
 #[derive(Debug, Clone)]
@@ -31,7 +31,7 @@ pub struct Bar100 {
     emulated: Simulated,
 }
 
-impl DeviceKind for Kind {
+impl DeviceKind for Bar100Kind {
     fn name(&self) -> &'static str {
         NAME
     }

@@ -11,7 +11,7 @@ use headrace_sensor::geometry::time::{DurNs, MonoNs};
 use headrace_sensor::measurement::Pressure;
 use headrace_sensor::reading::{Decoded, Packet, Reading, WaterPressure};
 
-use crate::Kind;
+use crate::Bar100Kind;
 use crate::calibration::{Overrides, STANDARD_ATMOSPHERE_BAR};
 use crate::decoder::{Bar100Decoder, Meaning};
 
@@ -27,7 +27,7 @@ fn sensor() -> SensorConfig {
 
 fn configured(own: &str) -> Result<Box<dyn Device>, String> {
     let root = Document::new("v.toml", own).root().unwrap();
-    let device = Kind.configure(&sensor(), &root).map_err(|error| error.to_string())?;
+    let device = Bar100Kind.configure(&sensor(), &root).map_err(|error| error.to_string())?;
     root.finish().map_err(|error| error.to_string())?;
     Ok(device)
 }

@@ -15,4 +15,4 @@ pub mod program;
 pub mod settings;
 pub mod stepping;
 
-pub use plugin::Kind;
+pub use plugin::Imagenex881Kind;

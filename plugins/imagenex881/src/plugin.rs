@@ -30,9 +30,9 @@ const SILENCE: DurNs = DurNs::from_millis(100);
 
 /// The Imagenex 881 device kind.
 #[derive(Debug, Clone, Copy)]
-pub struct Kind;
+pub struct Imagenex881Kind;
 
-impl DeviceKind for Kind {
+impl DeviceKind for Imagenex881Kind {
     fn name(&self) -> &'static str {
         NAME
     }

@@ -27,7 +27,7 @@ pub enum CanId {
     Extended(u32),
 }
 
-/// Kind of a frame.
+/// ImuCanKind of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FrameKind {
     /// Data from a device.
@@ -127,7 +127,7 @@ impl CanFrame {
         Ok(Self { kind, len, data })
     }
 
-    /// Kind of the frame.
+    /// ImuCanKind of the frame.
     pub fn kind(&self) -> FrameKind {
         self.kind
     }

@@ -15,7 +15,7 @@ pub mod frame;
 pub mod plugin;
 pub mod sets;
 
-pub use plugin::Kind;
+pub use plugin::ImuCanKind;
 
 #[cfg(test)]
 mod tests;

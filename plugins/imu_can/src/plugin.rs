@@ -28,7 +28,7 @@ const USUAL_TICK_US: i64 = 100;
 
 /// The device kind of inertial units on CAN.
 #[derive(Debug, Clone, Copy)]
-pub struct Kind;
+pub struct ImuCanKind;
 
 /// A configured inertial unit.
 #[derive(Debug, Clone)]
@@ -53,7 +53,7 @@ enum Preset {
     Bosch,
 }
 
-impl DeviceKind for Kind {
+impl DeviceKind for ImuCanKind {
     fn name(&self) -> &'static str {
         NAME
     }

@@ -10,7 +10,7 @@ use headrace_sensor::geometry::time::{DurNs, MonoNs};
 use headrace_sensor::measurement::Inertia;
 use headrace_sensor::reading::{Decoded, Level, Packet, Reading};
 
-use crate::Kind;
+use crate::ImuCanKind;
 use crate::codec::{Message, MessageSet};
 use crate::decoder::{AxisOrder, ImuDecoder, Meaning};
 use crate::sets::{bosch, j1939, sbg, xsens};
@@ -67,7 +67,7 @@ fn sensor() -> SensorConfig {
 
 fn configured(own: &str) -> Result<Box<dyn Device>, String> {
     let root = Document::new("v.toml", own).root().unwrap();
-    let device = Kind.configure(&sensor(), &root).map_err(|error| error.to_string())?;
+    let device = ImuCanKind.configure(&sensor(), &root).map_err(|error| error.to_string())?;
     root.finish().map_err(|error| error.to_string())?;
     assert_eq!(device.specification().sensor, sensor());
     Ok(device)

@@ -18,7 +18,7 @@ pub mod tlog;
 pub use mavlink::MavHeader;
 /// ArduPilot's dialect: its own messages and all included ones.
 pub use mavlink::dialects::ardupilotmega as dialect;
-pub use plugin::Kind;
+pub use plugin::MavlinkKind;
 
 #[cfg(test)]
 mod tests;

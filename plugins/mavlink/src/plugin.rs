@@ -24,7 +24,7 @@ const USUAL_RESOLUTION_PA: f64 = 10.0;
 
 /// The MAVLink device kind: parts reported by an autopilot.
 #[derive(Debug, Clone, Copy)]
-pub struct Kind;
+pub struct MavlinkKind;
 
 /// A configured part.
 #[derive(Debug, Clone)]
@@ -42,7 +42,7 @@ enum PartName {
     Distance,
 }
 
-impl DeviceKind for Kind {
+impl DeviceKind for MavlinkKind {
     fn name(&self) -> &'static str {
         NAME
     }

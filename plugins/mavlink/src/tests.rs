@@ -17,7 +17,7 @@ use crate::decoder::{DistancePart, MavlinkDecoder, Meaning, Part};
 use crate::dialect::ATTITUDE_DATA;
 use crate::frame::without_identity;
 use crate::message::{Distance, ImuMessage, Message, Pressure as Told, PressureMessage};
-use crate::{Kind, MavHeader};
+use crate::{MavHeader, MavlinkKind};
 
 /// ATTITUDE, RAW_IMU and SCALED_PRESSURE2 of an ArduSub, from a telemetry log.
 pub(crate) const RECORDED_ATTITUDE: &[u8] = &[
@@ -47,7 +47,7 @@ fn configured(own: &str) -> Result<Box<dyn Device>, String> {
         latency: LATENCY,
     };
     let root = Document::new("v.toml", own).root().unwrap();
-    let device = Kind.configure(&sensor, &root).map_err(|error| error.to_string())?;
+    let device = MavlinkKind.configure(&sensor, &root).map_err(|error| error.to_string())?;
     root.finish().map_err(|error| error.to_string())?;
     assert_eq!(device.specification().sensor, sensor);
     Ok(device)

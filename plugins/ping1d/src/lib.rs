@@ -11,4 +11,4 @@ pub mod plugin;
 pub mod probe;
 pub mod settings;
 
-pub use plugin::Kind;
+pub use plugin::Ping1dKind;

@@ -29,9 +29,9 @@ const SILENCE: DurNs = DurNs::from_millis(50);
 
 /// The Ping echosounder device kind.
 #[derive(Debug, Clone, Copy)]
-pub struct Kind;
+pub struct Ping1dKind;
 
-impl DeviceKind for Kind {
+impl DeviceKind for Ping1dKind {
     fn name(&self) -> &'static str {
         NAME
     }

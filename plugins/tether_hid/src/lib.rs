@@ -14,7 +14,7 @@ pub mod plugin;
 pub mod report;
 pub mod tracker;
 
-pub use plugin::Kind;
+pub use plugin::TetherHidKind;
 
 #[cfg(test)]
 mod tests;

@@ -23,7 +23,7 @@ const METRES_PER_FOOT: f64 = 0.3048;
 
 /// The cable counter device kind.
 #[derive(Debug, Clone, Copy)]
-pub struct Kind;
+pub struct TetherHidKind;
 
 /// A configured cable counter.
 #[derive(Debug, Clone)]
@@ -46,7 +46,7 @@ enum WireKind {
     Line,
 }
 
-impl DeviceKind for Kind {
+impl DeviceKind for TetherHidKind {
     fn name(&self) -> &'static str {
         NAME
     }

@@ -9,7 +9,7 @@ use headrace_sensor::geometry::time::{DurNs, MonoNs};
 use headrace_sensor::measurement::Payout;
 use headrace_sensor::reading::{Decoded, Packet, Reading, TetherLength};
 
-use crate::Kind;
+use crate::TetherHidKind;
 use crate::decoder::{Counter, HidDecoder, LineDecoder};
 use crate::report::{Endian, Report, ReportLayout, Width};
 use crate::tracker::Counting;
@@ -28,7 +28,7 @@ fn configured(own: &str) -> Result<Box<dyn Device>, String> {
         latency: DurNs::from_millis(4),
     };
     let root = Document::new("v.toml", own).root().unwrap();
-    let device = Kind.configure(&sensor, &root).map_err(|error| error.to_string())?;
+    let device = TetherHidKind.configure(&sensor, &root).map_err(|error| error.to_string())?;
     root.finish().map_err(|error| error.to_string())?;
     assert_eq!(device.specification().sensor, sensor);
     Ok(device)

@@ -114,10 +114,10 @@ impl FileKind {
     /// The plugin of the sensors whose bytes such files have; empty where they have values.
     pub(crate) fn plugin(self) -> &'static str {
         match self {
-            Self::Tlog => headrace_mavlink::Kind.name(),
-            Self::Candump => headrace_imu_can::Kind.name(),
-            Self::Imagenex => headrace_imagenex881::Kind.name(),
-            Self::Ping => headrace_ping1d::Kind.name(),
+            Self::Tlog => headrace_mavlink::MavlinkKind.name(),
+            Self::Candump => headrace_imu_can::ImuCanKind.name(),
+            Self::Imagenex => headrace_imagenex881::Imagenex881Kind.name(),
+            Self::Ping => headrace_ping1d::Ping1dKind.name(),
             Self::Csv | Self::Rosbag | Self::Mcap => "",
         }
     }

@@ -9,11 +9,11 @@ use headrace_sensor::device::{DeviceKind, Direction};
 use crate::{Scene, SceneError, Simulation, TruthRow};
 
 pub(crate) const KINDS: [&dyn DeviceKind; 5] = [
-    &headrace_imagenex881::Kind,
-    &headrace_ping1d::Kind,
-    &headrace_bar100::Kind,
-    &headrace_imu_can::Kind,
-    &headrace_tether_hid::Kind,
+    &headrace_imagenex881::Imagenex881Kind,
+    &headrace_ping1d::Ping1dKind,
+    &headrace_bar100::Bar100Kind,
+    &headrace_imu_can::ImuCanKind,
+    &headrace_tether_hid::TetherHidKind,
 ];
 
 /// A vehicle that moves forward in a tunnel for `seconds` at a constant speed, with the effects of a scene.

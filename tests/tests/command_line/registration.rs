@@ -31,8 +31,12 @@ fn device(kind: &dyn DeviceKind, connect: &str, keys: &str) -> Box<dyn Device> {
 #[test]
 fn a_sensor_joins_a_loop_once() {
     for device in [
-        device(&headrace_imagenex881::Kind, "tcp:10.0.0.5:4040", "mode = \"fastest\"\nrange_m = 5\n"),
-        device(&headrace_ping1d::Kind, "udp:10.0.0.6:9090", ""),
+        device(
+            &headrace_imagenex881::Imagenex881Kind,
+            "tcp:10.0.0.5:4040",
+            "mode = \"fastest\"\nrange_m = 5\n",
+        ),
+        device(&headrace_ping1d::Ping1dKind, "udp:10.0.0.6:9090", ""),
     ] {
         let mut app = app();
         assert!(app.add_device(device.as_ref()).is_ok());
@@ -44,7 +48,7 @@ fn a_sensor_joins_a_loop_once() {
 #[test]
 fn the_report_tells_what_was_withheld() {
     let mut app = app();
-    app.add_device(device(&headrace_bar100::Kind, "i2c:/dev/i2c-1:0x40", "").as_ref()).unwrap();
+    app.add_device(device(&headrace_bar100::Bar100Kind, "i2c:/dev/i2c-1:0x40", "").as_ref()).unwrap();
     let navigation = DirectNavigation::new(shapes::circle(2.5).unwrap(), Site::default());
     let mut armed = app.arm(Box::new(navigation)).unwrap();
     let mut port = armed.take_port(0).unwrap();

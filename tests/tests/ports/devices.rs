@@ -15,7 +15,7 @@ use headrace_sensor::driver::{Carrier, Probe};
 use headrace_vehicle::VehicleConfig;
 use serde_json::Value;
 
-const KINDS: [&dyn DeviceKind; 2] = [&headrace_imagenex881::Kind, &headrace_ping1d::Kind];
+const KINDS: [&dyn DeviceKind; 2] = [&headrace_imagenex881::Imagenex881Kind, &headrace_ping1d::Ping1dKind];
 const LOCAL: IpAddr = IpAddr::V4(Ipv4Addr::LOCALHOST);
 const HEAD: &str = "plugin = \"imagenex881\"\nmode = \"slow\"\nrange_m = 10\nhead_id = 0x12";
 const PING: &str = "plugin = \"ping1d\"\ndevice_id = 7";

@@ -16,7 +16,7 @@ use super::decoder::DbcDecoder;
 use super::file::{DbcError, DbcFile};
 use super::keys;
 use super::mapping::Mapping;
-use crate::Kind;
+use crate::ImuCanKind;
 use crate::codec::MessageSet;
 use crate::decoder::{AxisOrder, ImuDecoder, Meaning};
 use crate::frame::{CanFrame, CanId, FrameKind};
@@ -404,7 +404,7 @@ fn configured(own: &str) -> Result<Box<dyn Device>, String> {
         latency: LATENCY,
     };
     let root = Document::new("v.toml", own).root().unwrap().with_files(&load);
-    let device = Kind.configure(&sensor, &root).map_err(|error| error.to_string())?;
+    let device = ImuCanKind.configure(&sensor, &root).map_err(|error| error.to_string())?;
     root.finish().map_err(|error| error.to_string())?;
     assert_eq!(device.specification().sensor, sensor);
     Ok(device)

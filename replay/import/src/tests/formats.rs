@@ -14,7 +14,8 @@ use crate::ping::PingFormat;
 use crate::tlog::TlogFormat;
 use crate::{Entry, Format, Step};
 
-const KINDS: [&dyn DeviceKind; 3] = [&headrace_bar100::Kind, &headrace_mavlink::Kind, &headrace_ping1d::Kind];
+const KINDS: [&dyn DeviceKind; 3] =
+    [&headrace_bar100::Bar100Kind, &headrace_mavlink::MavlinkKind, &headrace_ping1d::Ping1dKind];
 
 /// Entries, bytes lost by reason, and bytes left at the end.
 fn cut(format: &mut dyn Format, mut file: &[u8]) -> (Vec<Entry>, Vec<(usize, &'static str)>, usize) {

@@ -13,7 +13,7 @@ const OTHER_RANK: u32 = 1 << 16;
 
 /// What a channel carries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(super) enum ChannelKind {
     Raw(u16),
     Sent(u16),
     Tick,
@@ -25,7 +25,7 @@ pub(super) enum Kind {
 #[derive(Debug, Clone)]
 pub(super) struct Channel {
     pub(super) definition: Definition,
-    pub(super) kind: Kind,
+    pub(super) kind: ChannelKind,
     /// Place among messages of the same time: raw by source, then the others by topic.
     pub(super) rank: u32,
 }
@@ -63,15 +63,17 @@ impl Channels {
             return known.definition == definition;
         }
         let kind = match definition.topic.as_str() {
-            TICK_TOPIC => Kind::Tick,
-            topic if topic.starts_with(RESULT_PREFIX) => Kind::Result,
+            TICK_TOPIC => ChannelKind::Tick,
+            topic if topic.starts_with(RESULT_PREFIX) => ChannelKind::Result,
             topic => match source_id(topic).map(str::to_owned) {
-                Some(id) if topic.starts_with(RAW_PREFIX) => Kind::Raw(self.source(id, &definition.metadata)),
-                Some(id) => Kind::Sent(self.source(id, &definition.metadata)),
-                None => Kind::Other,
+                Some(id) if topic.starts_with(RAW_PREFIX) => {
+                    ChannelKind::Raw(self.source(id, &definition.metadata))
+                }
+                Some(id) => ChannelKind::Sent(self.source(id, &definition.metadata)),
+                None => ChannelKind::Other,
             },
         };
-        let rank = if let Kind::Raw(source) = kind {
+        let rank = if let ChannelKind::Raw(source) = kind {
             source.into()
         } else {
             self.others += 1;
@@ -94,11 +96,11 @@ impl Channels {
     }
 
     pub(super) fn has_ticks(&self) -> bool {
-        self.by_id.values().any(|channel| channel.kind == Kind::Tick)
+        self.by_id.values().any(|channel| channel.kind == ChannelKind::Tick)
     }
 
     pub(super) fn result_topics(&self) -> Vec<String> {
-        let results = self.by_id.values().filter(|channel| channel.kind == Kind::Result);
+        let results = self.by_id.values().filter(|channel| channel.kind == ChannelKind::Result);
         results.map(|channel| channel.definition.topic.clone()).collect()
     }
 
@@ -174,10 +176,10 @@ mod tests {
     fn sources_are_numbered_by_name() {
         let channels = channels(&[("/sent/a", None), ("/raw/z", None), ("/raw/b", None), ("/imu", None)]);
         assert_eq!(ids(&channels), ["b", "z", "a"]);
-        assert_eq!(channels.get(1).unwrap().kind, Kind::Raw(1));
-        assert_eq!(channels.get(0).unwrap().kind, Kind::Sent(2));
+        assert_eq!(channels.get(1).unwrap().kind, ChannelKind::Raw(1));
+        assert_eq!(channels.get(0).unwrap().kind, ChannelKind::Sent(2));
         assert!(channels.get(0).unwrap().rank > channels.get(1).unwrap().rank);
-        assert_eq!(channels.get(3).unwrap().kind, Kind::Other);
+        assert_eq!(channels.get(3).unwrap().kind, ChannelKind::Other);
     }
 
     #[test]

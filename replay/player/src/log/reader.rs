@@ -9,7 +9,7 @@ use headrace_geometry::time::MonoNs;
 use mcap::records::op;
 use serde::{Deserialize, Serialize};
 
-use super::channels::{Channels, Kind};
+use super::channels::{ChannelKind, Channels};
 use super::chunk::{Unpacked, data_section_holds, unpack};
 use super::fields::Fields;
 use super::format::VEHICLE_FILE;
@@ -39,7 +39,7 @@ pub struct LogInfo {
     pub part: Option<Part>,
 }
 
-/// Kind of message.
+/// ChannelKind of message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MessageKind<'a> {
     /// Bytes from a source.
@@ -66,7 +66,7 @@ pub enum MessageKind<'a> {
 /// A message of a log.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LogMessage<'a> {
-    /// Kind.
+    /// ChannelKind.
     pub kind: MessageKind<'a>,
     /// Number of its channel.
     pub channel: u16,
@@ -273,11 +273,11 @@ impl<R: Read + Seek> LogReader<R> {
         let kind = match self.channels.get(entry.head.channel) {
             None => MessageKind::Other,
             Some(channel) => match channel.kind {
-                Kind::Raw(source) => MessageKind::Raw { source },
-                Kind::Sent(source) => MessageKind::Sent { source },
-                Kind::Tick => MessageKind::Tick,
-                Kind::Result => MessageKind::Result { topic: &channel.definition.topic },
-                Kind::Other => MessageKind::Other,
+                ChannelKind::Raw(source) => MessageKind::Raw { source },
+                ChannelKind::Sent(source) => MessageKind::Sent { source },
+                ChannelKind::Tick => MessageKind::Tick,
+                ChannelKind::Result => MessageKind::Result { topic: &channel.definition.topic },
+                ChannelKind::Other => MessageKind::Other,
             },
         };
         Ok(Some(LogMessage {

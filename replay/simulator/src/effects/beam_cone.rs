@@ -28,7 +28,7 @@ use bins::Bins;
 /// 500th of a head's range setting, in this water; 0.15 for an echosounder).
 /// Source: Jorge et al. 2021, §6 and §9.2; for an echosounder the field of view of a Ping1D in BlueOS, 0.52 rad, and the
 /// 200 points of its profile over 30 m.
-pub(super) struct Kind;
+pub(super) struct BeamConeKind;
 
 /// Angle between successive rays of a sunflower pattern, radians: the golden angle. Source: Vogel, "A better way to
 /// construct the sunflower head", Mathematical Biosciences 44, 1979.
@@ -125,7 +125,7 @@ impl Cone {
     }
 }
 
-impl EffectKind for Kind {
+impl EffectKind for BeamConeKind {
     fn name(&self) -> &'static str {
         "beam_cone"
     }

@@ -20,7 +20,7 @@ use crate::stages::Stage;
 ///
 /// `flipped_per_million`, `dropped_per_million` and `inserted_per_million` are the rates; all zero by default. A message
 /// that loses all its bytes doesn't arrive. Bytes to devices are unchanged.
-pub(super) struct Kind;
+pub(super) struct ByteErrorsKind;
 
 #[derive(Debug, Clone, Copy)]
 struct Parameters {
@@ -49,7 +49,7 @@ struct ByteErrors {
     rest: Line,
 }
 
-impl EffectKind for Kind {
+impl EffectKind for ByteErrorsKind {
     fn name(&self) -> &'static str {
         "byte_errors"
     }

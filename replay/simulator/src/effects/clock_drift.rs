@@ -19,7 +19,7 @@ use crate::stages::Stage;
 ///
 /// Its seconds are `ppm` millionths longer than true ones (or drawn normally with standard deviation `sd_ppm`); positive
 /// values sample late. Refused for heads and echosounders, which ping when the host asks.
-pub(super) struct Kind;
+pub(super) struct ClockDriftKind;
 
 #[derive(Debug, Clone, Copy)]
 enum Drift {
@@ -27,7 +27,7 @@ enum Drift {
     Drawn { sd_ppm: f64 },
 }
 
-impl EffectKind for Kind {
+impl EffectKind for ClockDriftKind {
     fn name(&self) -> &'static str {
         "clock_drift"
     }

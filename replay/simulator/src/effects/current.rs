@@ -26,7 +26,7 @@ const LOOK_S: f64 = 5.0;
 /// to 1/e within `gust_s` (60 by default); the displacement by gusts isn't corrected.
 /// A trajectory given over ground is independent of currents, so combining the two is refused.
 /// Source: Jorge et al. 2021, §9.1 (0.10 m/s through a leak, against the vehicle or with it).
-pub(super) struct Kind;
+pub(super) struct CurrentKind;
 
 #[derive(Debug, Clone, Copy)]
 struct Current {
@@ -36,7 +36,7 @@ struct Current {
     length_m: f64,
 }
 
-impl EffectKind for Kind {
+impl EffectKind for CurrentKind {
     fn name(&self) -> &'static str {
         NAME
     }

@@ -18,7 +18,7 @@ use crate::stages::Stage;
 ///
 /// `quantum_m` is the step in metres of the site's water, 0.031 by default: one of 32,768 counts of 100 bar. The device's
 /// wire format adds its own quantisation.
-pub(super) struct Kind;
+pub(super) struct DepthStepsKind;
 
 #[derive(Debug, Clone, Copy)]
 struct Parameters {
@@ -30,7 +30,7 @@ struct DepthSteps {
     quantum_m: f64,
 }
 
-impl EffectKind for Kind {
+impl EffectKind for DepthStepsKind {
     fn name(&self) -> &'static str {
         "depth_steps"
     }

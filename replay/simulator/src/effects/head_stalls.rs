@@ -26,7 +26,7 @@ const STEP: DurNs = DurNs(100_000_000);
 /// Stalls begin `per_hour` times an hour, with equal probability at any tenth of a second, and last `seconds = [least,
 /// most]`, drawn evenly, by default 2 to 20; one that begins during another may extend it. With `told`, the default, the
 /// head reports its true angle; without, the commanded one.
-pub(super) struct Kind;
+pub(super) struct HeadStallsKind;
 
 #[derive(Debug, Clone, Copy)]
 struct Parameters {
@@ -51,7 +51,7 @@ struct Stalls {
     until: MonoNs,
 }
 
-impl EffectKind for Kind {
+impl EffectKind for HeadStallsKind {
     fn name(&self) -> &'static str {
         "head_stalls"
     }

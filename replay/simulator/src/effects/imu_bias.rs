@@ -31,7 +31,7 @@ const CONSTANT: u64 = u64::MAX;
 /// `attitude_drift_deg_per_hour` turns the unit's own attitude about the vertical at a constant rate, positive to the
 /// left: the effect of biases on the unit's own filter isn't simulated otherwise. All are zero by default.
 /// Source: Brown and Hwang, Introduction to Random Signals and Applied Kalman Filtering, 4th ed., §4.4 (exact steps).
-pub(super) struct Kind;
+pub(super) struct ImuBiasKind;
 
 #[derive(Debug, Clone, Copy)]
 struct Parameters {
@@ -55,7 +55,7 @@ struct ImuBias {
     kept: (DurNs, f64, f64),
 }
 
-impl EffectKind for Kind {
+impl EffectKind for ImuBiasKind {
     fn name(&self) -> &'static str {
         "imu_bias"
     }

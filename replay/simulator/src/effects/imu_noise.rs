@@ -28,7 +28,7 @@ const ATTITUDE: u64 = 4;
 /// so that of an integral over t seconds is density times the root of t. `attitude_deg` is the sd of the rotation of each
 /// attitude about each axis of the unit. All are zero by default.
 /// Source: IEEE Std 952-1997, C.1 (angle random walk); a MEMS unit's data sheet has 0.007 deg/s/sqrt(Hz).
-pub(super) struct Kind;
+pub(super) struct ImuNoiseKind;
 
 #[derive(Debug, Clone, Copy)]
 struct Parameters {
@@ -43,7 +43,7 @@ struct ImuNoise {
     stream: Stream,
 }
 
-impl EffectKind for Kind {
+impl EffectKind for ImuNoiseKind {
     fn name(&self) -> &'static str {
         "imu_noise"
     }

@@ -41,7 +41,7 @@ use pings::{Ping, Pings};
 /// is already listening aren't simulated yet: they are extrapolated from the last two before, which is wrong for a ping or
 /// two where a head turns round.
 /// Source: Jorge et al. 2021, §10; core/sampling/src/interference.rs, which plans with the same two paths.
-pub(super) struct Kind;
+pub(super) struct InterferenceKind;
 
 /// Upper bound of the distance between heads, m: vehicle files place them within 20 m of the body's origin in x, y and z.
 const APART_M: f64 = 70.0;
@@ -63,7 +63,7 @@ struct Hears {
     pings: Pings,
 }
 
-impl EffectKind for Kind {
+impl EffectKind for InterferenceKind {
     fn name(&self) -> &'static str {
         "interference"
     }

@@ -24,7 +24,7 @@ pub(super) const SENSES: [Sense; 6] =
 ///
 /// All are delayed by `latency_ms` and, each by itself, by an exponentially distributed time of mean `jitter_ms`. A
 /// message that would overtake the one before arrives with it. Messages to devices aren't delayed.
-pub(super) struct Kind;
+pub(super) struct LineDelayKind;
 
 #[derive(Debug, Clone, Copy)]
 struct Parameters {
@@ -40,7 +40,7 @@ struct LineDelay {
     last: MonoNs,
 }
 
-impl EffectKind for Kind {
+impl EffectKind for LineDelayKind {
     fn name(&self) -> &'static str {
         "line_delay"
     }

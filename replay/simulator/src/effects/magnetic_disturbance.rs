@@ -27,7 +27,7 @@ const CELL_M: f64 = 1.0;
 /// `places` are tables of `chainage_m` (the middle), `length_m` and `deg`, positive to the left. `per_100m` adds places at
 /// random, `length_m` long (5 by default), with an angle drawn evenly up to `up_to_deg` (10 by default) either way. They
 /// belong to the tunnel: all units see the same, and overlapping ones add.
-pub(super) struct Kind;
+pub(super) struct MagneticDisturbanceKind;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Place {
@@ -53,7 +53,7 @@ struct Steel {
     longest_m: f64,
 }
 
-impl EffectKind for Kind {
+impl EffectKind for MagneticDisturbanceKind {
     fn name(&self) -> &'static str {
         "magnetic_disturbance"
     }

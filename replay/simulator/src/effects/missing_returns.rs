@@ -26,7 +26,7 @@ use crate::stages::Stage;
 /// `far_from_m` and `far_to_m`, the same for the range, from 0 to 200 m. Between the two of a pair the share grows
 /// linearly; equal values give a sharp edge. At least one of the three is required.
 /// Source: runs after Gilbert, "Capacity of a burst-noise channel", Bell System Technical Journal 39, 1960.
-pub(super) struct Kind;
+pub(super) struct MissingReturnsKind;
 
 /// Largest mean run, pings.
 const LONGEST_RUN: f64 = 10_000.0;
@@ -89,7 +89,7 @@ impl Ramp {
     }
 }
 
-impl EffectKind for Kind {
+impl EffectKind for MissingReturnsKind {
     fn name(&self) -> &'static str {
         "missing_returns"
     }

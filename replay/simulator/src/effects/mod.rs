@@ -49,41 +49,41 @@ pub use targets::PerSensor;
 /// All effects. Within a stage, systems run in this order, whatever the order of the scene.
 pub const KINDS: [&dyn EffectKind; 28] = [
     // Turning of heads, and the pose from which they look.
-    &start_phase_error::Kind,
-    &sector_end_slowing::Kind,
-    &skipped_steps::Kind,
-    &head_stalls::Kind,
-    &motion_within_turn::Kind,
+    &start_phase_error::StartPhaseErrorKind,
+    &sector_end_slowing::SectorEndSlowingKind,
+    &skipped_steps::SkippedStepsKind,
+    &head_stalls::HeadStallsKind,
+    &motion_within_turn::MotionWithinTurnKind,
     // Wall and obstacles that a beam meets.
-    &beam_cone::Kind,
-    &occlusion::Kind,
+    &beam_cone::BeamConeKind,
+    &occlusion::OcclusionKind,
     // Sound paths.
-    &multipath::Kind,
-    &side_lobes::Kind,
-    &interference::Kind,
+    &multipath::MultipathKind,
+    &side_lobes::SideLobesKind,
+    &interference::InterferenceKind,
     // Processing in the sonar.
-    &missing_returns::Kind,
-    &outliers::Kind,
-    &sound_speed_error::Kind,
-    &range_noise::Kind,
-    &range_quantisation::Kind,
+    &missing_returns::MissingReturnsKind,
+    &outliers::OutliersKind,
+    &sound_speed_error::SoundSpeedErrorKind,
+    &range_noise::RangeNoiseKind,
+    &range_quantisation::RangeQuantisationKind,
     // The vehicle's trajectory.
-    &current::Kind,
-    &pilot_drift::Kind,
+    &current::CurrentKind,
+    &pilot_drift::PilotDriftKind,
     // Depth and motion.
-    &depth_steps::Kind,
-    &imu_noise::Kind,
-    &imu_bias::Kind,
-    &magnetic_disturbance::Kind,
+    &depth_steps::DepthStepsKind,
+    &imu_noise::ImuNoiseKind,
+    &imu_bias::ImuBiasKind,
+    &magnetic_disturbance::MagneticDisturbanceKind,
     // The cable.
-    &tether_slack::Kind,
-    &tether_slip::Kind,
-    &tether_lag::Kind,
-    &tether_quantum::Kind,
+    &tether_slack::TetherSlackKind,
+    &tether_slip::TetherSlipKind,
+    &tether_lag::TetherLagKind,
+    &tether_quantum::TetherQuantumKind,
     // Clocks and lines.
-    &clock_drift::Kind,
-    &line_delay::Kind,
-    &byte_errors::Kind,
+    &clock_drift::ClockDriftKind,
+    &line_delay::LineDelayKind,
+    &byte_errors::ByteErrorsKind,
 ];
 
 /// The effects that a scene names, in the order of [`KINDS`].

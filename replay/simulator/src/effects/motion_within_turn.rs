@@ -12,11 +12,11 @@ use crate::stages::{AIM_HELD, Stage, aim_moving};
 
 /// Heads look from the vehicle's pose at each ping. Without it, a turn is one picture, taken from the pose at the turn's
 /// beginning, as in simulators that take a scan at once.
-pub(super) struct Kind;
+pub(super) struct MotionWithinTurnKind;
 
 struct Moving;
 
-impl EffectKind for Kind {
+impl EffectKind for MotionWithinTurnKind {
     fn name(&self) -> &'static str {
         "motion_within_turn"
     }

@@ -25,7 +25,7 @@ use crate::stages::Stage;
 /// the wall, `share` (0.1), both from 0 to 1; between, it goes with 1 less the cosine of incidence. The echo stays the
 /// direct one where the path meets no second wall within reach, or the sonar doesn't see that wall.
 /// Source: geometry of mirrors; the law of the direct echo is Lambert's.
-pub(super) struct Kind;
+pub(super) struct MultipathKind;
 
 /// Reflected rays begin this far off the wall, m.
 const OFF_WALL_M: f64 = 1e-6;
@@ -42,7 +42,7 @@ struct Multipath {
     stream: Stream,
 }
 
-impl EffectKind for Kind {
+impl EffectKind for MultipathKind {
     fn name(&self) -> &'static str {
         "multipath"
     }

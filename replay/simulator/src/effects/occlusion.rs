@@ -25,7 +25,7 @@ use crate::stages::Stage;
 /// Only the beam's axis is tested: a wide beam is hidden for as long, not longer and more weakly. A head isn't hidden by a
 /// body that it is inside, so that idealised heads in one place don't hide anything from each other.
 /// Source: core/sampling/src/occlusion.rs, which plans with the same bodies.
-pub(super) struct Kind;
+pub(super) struct OcclusionKind;
 
 #[derive(Debug, Clone)]
 struct Parameters {
@@ -50,7 +50,7 @@ impl Stopped {
     }
 }
 
-impl EffectKind for Kind {
+impl EffectKind for OcclusionKind {
     fn name(&self) -> &'static str {
         "occlusion"
     }

@@ -20,7 +20,7 @@ use crate::stages::Stage;
 /// Keys: their `share` of the returns, from 0 (excluded) to 1 (0.08); the nearest range `near_m` (0.3) and the farthest
 /// `far_m` (a head's range setting in this water; 30 for an echosounder), from 0 to 200 m.
 /// Source: the share is that of the logs of VITA 1, as in the project's scene vita1-field; 30 m is a Ping1D's usual scan.
-pub(super) struct Kind;
+pub(super) struct OutliersKind;
 
 /// The farthest range of an echosounder, m.
 const ECHOSOUNDER_FAR_M: f64 = 30.0;
@@ -39,7 +39,7 @@ struct Outliers {
     stream: Stream,
 }
 
-impl EffectKind for Kind {
+impl EffectKind for OutliersKind {
     fn name(&self) -> &'static str {
         "outliers"
     }
@@ -74,7 +74,7 @@ impl Effect for PerSensor<Parameters> {
             let far_m = far_m.unwrap_or(usual_m);
             if far_m <= *near_m {
                 let problem = format!("has near_m = {near_m}, beyond the farthest range of {far_m} m");
-                return Err(SceneError::Effect { effect: Kind.name(), problem });
+                return Err(SceneError::Effect { effect: OutliersKind.name(), problem });
             }
             let stream = sim.stream(*source);
             sim.insert(*source, Outliers { share: *share, between_m: [*near_m, far_m], stream });

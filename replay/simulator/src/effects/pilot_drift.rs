@@ -15,7 +15,7 @@ use crate::trajectory::{Offsets, wandering};
 /// Reaches: `across_m`, `up_m`, `roll_deg`, `pitch_deg`, `yaw_deg`; standard deviations are 0.4 of them. `period_s` (30
 /// by default) is the period of the drift: control points of a cubic B-spline are half of it apart.
 /// Source: Jorge et al. 2021, §8.1 (the pilot can drift 1.5 m vertically and horizontally, the heading 15 degrees).
-pub(super) struct Kind;
+pub(super) struct PilotDriftKind;
 
 #[derive(Debug, Clone, Copy)]
 struct Drift {
@@ -23,7 +23,7 @@ struct Drift {
     period_s: f64,
 }
 
-impl EffectKind for Kind {
+impl EffectKind for PilotDriftKind {
     fn name(&self) -> &'static str {
         "pilot_drift"
     }

@@ -15,7 +15,7 @@ use crate::sensing::Samples;
 use crate::stages::Stage;
 
 /// Ranges have normally distributed noise with a constant part and a part proportional to the range.
-pub(super) struct Kind;
+pub(super) struct RangeNoiseKind;
 
 #[derive(Debug, Clone, Copy)]
 struct Parameters {
@@ -29,7 +29,7 @@ struct RangeNoise {
     stream: Stream,
 }
 
-impl EffectKind for Kind {
+impl EffectKind for RangeNoiseKind {
     fn name(&self) -> &'static str {
         "range_noise"
     }

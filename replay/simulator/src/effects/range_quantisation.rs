@@ -21,7 +21,7 @@ use crate::stages::Stage;
 /// echosounder in metres of water), from 0.0005 to 1; `points` over a head's range setting, from 50 to 10,000 (500).
 /// Steps are of the device's own metres because it measures time; its wire format adds a step of its own.
 /// Source: Jorge et al. 2021, §6 (eta) and §9.2 (500 points over 10 m: 0.02 m).
-pub(super) struct Kind;
+pub(super) struct RangeQuantisationKind;
 
 #[derive(Debug, Clone, Copy)]
 enum Step {
@@ -32,7 +32,7 @@ enum Step {
 #[derive(Component)]
 struct RangeQuantisation(Step);
 
-impl EffectKind for Kind {
+impl EffectKind for RangeQuantisationKind {
     fn name(&self) -> &'static str {
         "range_quantisation"
     }

@@ -22,7 +22,7 @@ use crate::stages::Stage;
 /// `lag_ms` is the time constant, 100 by default. Between two pings the command is taken to change linearly, for which the
 /// lag is exact. It begins at rest.
 /// Source: Jorge et al. 2021, §8.1 (sensors "decreasing speed due to the control system of the head").
-pub(super) struct Kind;
+pub(super) struct SectorEndSlowingKind;
 
 #[derive(Debug, Clone, Copy)]
 struct Parameters {
@@ -37,7 +37,7 @@ struct SectorEndSlowing {
     behind_rad: f64,
 }
 
-impl EffectKind for Kind {
+impl EffectKind for SectorEndSlowingKind {
     fn name(&self) -> &'static str {
         "sector_end_slowing"
     }

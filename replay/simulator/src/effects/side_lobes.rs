@@ -26,7 +26,7 @@ use crate::stages::Stage;
 /// from 0 (excluded) to 1 (0.05).
 /// Source: the first side lobe of a circular piston, ka sin x = 5.136 against 1.616 at half power (Urick, "Principles of
 /// underwater sound", ch. 3); it is 17.6 dB below the beam, so it matters where the wall reflects the beam itself away.
-pub(super) struct Kind;
+pub(super) struct SideLobesKind;
 
 /// Angle from the beam's axis to the first side lobe, in full widths of the beam.
 const LOBE_WIDTHS: f64 = 5.136 / 1.616 / 2.0;
@@ -46,7 +46,7 @@ struct SideLobes {
     stream: Stream,
 }
 
-impl EffectKind for Kind {
+impl EffectKind for SideLobesKind {
     fn name(&self) -> &'static str {
         "side_lobes"
     }

@@ -20,7 +20,7 @@ use crate::stages::Stage;
 ///
 /// `per_thousand` steps are missed, each independently. With `told` the head reports its true angle; without, as is the
 /// default, the commanded one.
-pub(super) struct Kind;
+pub(super) struct SkippedStepsKind;
 
 #[derive(Debug, Clone, Copy)]
 struct Parameters {
@@ -35,7 +35,7 @@ struct SkippedSteps {
     behind: Behind,
 }
 
-impl EffectKind for Kind {
+impl EffectKind for SkippedStepsKind {
     fn name(&self) -> &'static str {
         "skipped_steps"
     }

@@ -19,7 +19,7 @@ use crate::stages::Stage;
 /// Keys, one of them: `true_mps`, the true speed, from 1300 to 1700 m/s; `share`, its relative excess over the file's,
 /// from -0.1 to 0.1.
 /// Source: metrics.md, "Errors and uncertainty".
-pub(super) struct Kind;
+pub(super) struct SoundSpeedErrorKind;
 
 #[derive(Debug, Clone, Copy)]
 struct Parameters {
@@ -30,7 +30,7 @@ struct Parameters {
 #[derive(Component)]
 struct SoundSpeedError(Parameters);
 
-impl EffectKind for Kind {
+impl EffectKind for SoundSpeedErrorKind {
     fn name(&self) -> &'static str {
         "sound_speed_error"
     }

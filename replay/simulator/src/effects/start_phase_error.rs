@@ -20,7 +20,7 @@ use crate::random::Stream;
 /// angles, one for each head of the table, in order. Without any of them, `max_deg` is 180. In a sector the angle is a
 /// fraction of the sweep: 360 degrees are once there and back.
 /// Source: Jorge et al. 2021, §8.2 (Figure 12, without alignment).
-pub(super) struct Kind;
+pub(super) struct StartPhaseErrorKind;
 
 #[derive(Debug, Clone, PartialEq)]
 enum Offset {
@@ -29,7 +29,7 @@ enum Offset {
     Given(Vec<(usize, f64)>),
 }
 
-impl EffectKind for Kind {
+impl EffectKind for StartPhaseErrorKind {
     fn name(&self) -> &'static str {
         "start_phase_error"
     }

@@ -20,7 +20,7 @@ use crate::stages::Stage;
 /// Once vehicle and cable are `hold_m` apart (0.5 by default), the drum winds at `speed_mps` (0.5 by default) until they
 /// agree; until then the count stays. A drum slower than the vehicle never catches up. Like slack, the difference is
 /// relative to its value when the counter was zeroed, so it has either sign.
-pub(super) struct Kind;
+pub(super) struct TetherLagKind;
 
 #[derive(Debug, Clone, Copy)]
 struct Parameters {
@@ -36,7 +36,7 @@ struct TetherLag {
     winding: bool,
 }
 
-impl EffectKind for Kind {
+impl EffectKind for TetherLagKind {
     fn name(&self) -> &'static str {
         // Key in scenes and name of the random stream.
         "late_winding"

@@ -17,7 +17,7 @@ use crate::stages::Stage;
 /// The cable counter is rounded to equal steps, counted from chainage zero.
 ///
 /// `quantum_m` is the step, 0.01 by default. The device's wire format adds its own quantisation.
-pub(super) struct Kind;
+pub(super) struct TetherQuantumKind;
 
 #[derive(Debug, Clone, Copy)]
 struct Parameters {
@@ -29,7 +29,7 @@ struct TetherQuantum {
     quantum_m: f64,
 }
 
-impl EffectKind for Kind {
+impl EffectKind for TetherQuantumKind {
     fn name(&self) -> &'static str {
         "tether_quantum"
     }

@@ -20,7 +20,7 @@ use crate::trajectory::{Knots, wandering};
 /// Slack is relative to its mean, which zeroing the counter removes, so it has either sign though no cable is shorter than
 /// the distance. `reach_m` (0.15 by default) is the largest value either way; the standard deviation is 0.4 of it.
 /// `period_s` (30 by default) is the period of the variation: control points of a cubic B-spline are half of it apart.
-pub(super) struct Kind;
+pub(super) struct TetherSlackKind;
 
 #[derive(Debug, Clone, Copy)]
 struct Parameters {
@@ -33,7 +33,7 @@ struct TetherSlack {
     slack: Knots,
 }
 
-impl EffectKind for Kind {
+impl EffectKind for TetherSlackKind {
     fn name(&self) -> &'static str {
         "tether_slack"
     }

@@ -22,7 +22,7 @@ const STRETCH_M: f64 = 1.0;
 ///
 /// It slips `per_100m` times in a hundred metres of travel, forwards or back, by `size_m = [least, most]` (evenly drawn,
 /// 0.05 to 0.3 by default), with either sign. Travel is the vehicle's, summed from count to count.
-pub(super) struct Kind;
+pub(super) struct TetherSlipKind;
 
 #[derive(Debug, Clone, Copy)]
 struct Parameters {
@@ -42,7 +42,7 @@ struct TetherSlip {
     slipped_m: f64,
 }
 
-impl EffectKind for Kind {
+impl EffectKind for TetherSlipKind {
     fn name(&self) -> &'static str {
         "tether_slip"
     }

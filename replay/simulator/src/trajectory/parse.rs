@@ -23,18 +23,18 @@ const REACH_DEG: RangeInclusive<f64> = 0.0..=80.0;
 const NAME: &str = "trajectory";
 
 #[derive(Debug, Clone, Copy)]
-enum Kind {
+enum TrajectoryKind {
     Legs,
     Waypoints,
     Pilot,
     Recorded,
 }
 
-const KINDS: [(&str, Kind); 4] = [
-    ("legs", Kind::Legs),
-    ("waypoints", Kind::Waypoints),
-    ("pilot", Kind::Pilot),
-    ("recorded", Kind::Recorded),
+const KINDS: [(&str, TrajectoryKind); 4] = [
+    ("legs", TrajectoryKind::Legs),
+    ("waypoints", TrajectoryKind::Waypoints),
+    ("pilot", TrajectoryKind::Pilot),
+    ("recorded", TrajectoryKind::Recorded),
 ];
 
 /// Reads a trajectory in a tunnel of this design; also returns the reference of its speeds.
@@ -46,13 +46,13 @@ pub(crate) fn parse(
     seed: u64,
     load: Loader<'_>,
 ) -> Result<(Trajectory, Ground), ConfigError> {
-    let kind = section.choice("kind", &KINDS)?.unwrap_or(Kind::Legs);
+    let kind = section.choice("kind", &KINDS)?.unwrap_or(TrajectoryKind::Legs);
     let tunnel = Tunnel { design, length_m };
     let parsed = match kind {
-        Kind::Legs => (legs(&section, tunnel)?, Ground::Water),
-        Kind::Waypoints => (waypoints(&section, tunnel)?, Ground::Tunnel),
-        Kind::Pilot => (pilot(&section, tunnel, seed)?, Ground::Water),
-        Kind::Recorded => (recorded(&section, tunnel, load)?, Ground::Tunnel),
+        TrajectoryKind::Legs => (legs(&section, tunnel)?, Ground::Water),
+        TrajectoryKind::Waypoints => (waypoints(&section, tunnel)?, Ground::Tunnel),
+        TrajectoryKind::Pilot => (pilot(&section, tunnel, seed)?, Ground::Water),
+        TrajectoryKind::Recorded => (recorded(&section, tunnel, load)?, Ground::Tunnel),
     };
     section.finish()?;
     Ok(parsed)
