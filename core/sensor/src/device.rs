@@ -75,6 +75,30 @@ pub enum SensorKind {
     Other,
 }
 
+/// Noise of an inertial unit by its maker's data sheet.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct InertialNoise {
+    /// White noise of the gyros, quantisation included, rad/s/sqrt(Hz).
+    pub rate_noise: f64,
+    /// Bias of the gyros, rad/s.
+    pub rate_bias: BiasSpec,
+    /// White noise of the accelerometers, quantisation included, m/s^2/sqrt(Hz).
+    pub force_noise: f64,
+    /// Bias of the accelerometers, m/s^2.
+    pub force_bias: BiasSpec,
+}
+
+/// Bias of an inertial sensor, in its unit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BiasSpec {
+    /// Standard deviation at power-on, constant from then on.
+    pub turn_on: f64,
+    /// Standard deviation of its wandering while it runs.
+    pub in_run: f64,
+    /// Correlation time of the wandering, s.
+    pub time_s: f64,
+}
+
 /// One kind of device, by its name in vehicle files: `plugin = "imagenex881"`.
 pub trait DeviceKind: Sync {
     /// The name in vehicle files and in the logs' channel metadata.
@@ -126,6 +150,11 @@ pub trait Device: Send + Sync {
 
     /// The device's side of the wire, for simulations.
     fn emulator(&self, setup: &EmulatorSetup) -> Emulated;
+
+    /// For an inertial unit whose noise is known, that noise: navigation goes by it unless the vehicle file says otherwise.
+    fn inertial_noise(&self) -> Option<InertialNoise> {
+        None
+    }
 
     /// For a HID device, the report descriptor that a rehearsal registers with the kernel.
     fn report_descriptor(&self) -> Option<Vec<u8>> {

@@ -9,6 +9,7 @@ use headrace_fusion::filter::FilterNavigation;
 use headrace_fusion::filter::settings::Settings;
 use headrace_geometry::site::Site;
 use headrace_geometry::tunnel::Profile;
+use headrace_sensor::device::InertialNoise;
 
 /// One degree, radians.
 const DEGREE: f64 = core::f64::consts::PI / 180.0;
@@ -16,7 +17,7 @@ const DEGREE: f64 = core::f64::consts::PI / 180.0;
 const DEGREES: RangeInclusive<f64> = 1e-4..=90.0;
 const METRES: RangeInclusive<f64> = 1e-4..=100.0;
 const SMALL: RangeInclusive<f64> = 1e-9..=10.0;
-const SECONDS: RangeInclusive<f64> = 0.1..=1e6;
+const SECONDS: RangeInclusive<f64> = 0.1..=1e9;
 
 /// Navigation method of a vehicle: the `[navigation]` table of its file.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,13 +30,16 @@ pub enum NavigationConfig {
 }
 
 impl NavigationConfig {
-    /// Reads the table; without one, a filter with default settings.
+    /// Reads the table; without one, a filter. What the table doesn't say is the inertial unit's `noise` where that is known,
+    /// and a default otherwise.
     ///
     /// Errors: the first key that is unknown or out of range.
-    pub fn parse(section: Option<Section<'_>>) -> Result<Self, ConfigError> {
-        let Some(section) = section else { return Ok(Self::Filter(Settings::default())) };
+    pub fn parse(section: Option<Section<'_>>, noise: Option<InertialNoise>) -> Result<Self, ConfigError> {
+        let usual = Settings::default();
+        let usual = noise.map_or(usual, |noise| usual.with_inertial(&noise));
+        let Some(section) = section else { return Ok(Self::Filter(usual)) };
         let by_filter = section.choice("way", &[("filter", true), ("direct", false)])?.unwrap_or(true);
-        let settings = settings(&section)?;
+        let settings = settings(&section, usual)?;
         section.finish()?;
         Ok(if by_filter { Self::Filter(settings) } else { Self::Direct })
     }
@@ -49,11 +53,11 @@ impl NavigationConfig {
     }
 }
 
-/// Reads a vehicle file's `[navigation]` table; missing keys keep their defaults.
+/// Reads a vehicle file's `[navigation]` table; missing keys keep what is `usual`.
 ///
 /// Errors: the first key whose value is out of range.
-fn settings(section: &Section<'_>) -> Result<Settings, ConfigError> {
-    let mut settings = Settings::default();
+fn settings(section: &Section<'_>, usual: Settings) -> Result<Settings, ConfigError> {
+    let mut settings = usual;
     let keys: [(&'static str, RangeInclusive<f64>, f64, &mut f64); 10] = [
         ("gyro_bias_degps", DEGREES, DEGREE, &mut settings.rate_bias.reach),
         ("gyro_bias_time_s", SECONDS, 1.0, &mut settings.rate_bias.time_s),

@@ -115,7 +115,6 @@ impl VehicleConfig {
             Some(water) => parse_water(water, axis_yaw_rad)?,
             None => (Site { axis_yaw_rad, ..Site::default() }, None),
         };
-        let navigation = NavigationConfig::parse(root.section("navigation")?)?;
         let coverage = CoverageConfig::from_root(root, &tunnel.profile, target_m)?;
         let dive_time = root.number("dive_hours", 0.01..=1000.0)?;
         let hull = root.sections("hull")?.into_iter().map(parse_hull).collect::<Result<Vec<_>, _>>()?;
@@ -131,6 +130,8 @@ impl VehicleConfig {
                 root.invalid("sensors", "has no sensor; at least one table headed [[sensors]] is needed")
             );
         }
+        let noise = sensors.iter().find_map(|sensor| sensor.inertial_noise());
+        let navigation = NavigationConfig::parse(root.section("navigation")?, noise)?;
         let (layout, planned_speed_mps) = match root.section("heads")? {
             Some(section) => parse_heads(section, &sensors)?,
             None => (HeadLayout::PhaseShift, 0.0),

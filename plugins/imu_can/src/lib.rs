@@ -12,6 +12,7 @@ pub mod decoder;
 pub mod driver;
 pub mod emulator;
 pub mod frame;
+mod noise;
 pub mod plugin;
 pub mod sets;
 

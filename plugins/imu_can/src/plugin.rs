@@ -3,7 +3,7 @@
 use headrace_sensor::SensorConfig;
 use headrace_sensor::config::{ConfigError, Section};
 use headrace_sensor::device::{
-    Decoder, Device, DeviceKind, Emulated, EmulatorSetup, Sense, SensorKind, SensorSpec,
+    Decoder, Device, DeviceKind, Emulated, EmulatorSetup, InertialNoise, Sense, SensorKind, SensorSpec,
 };
 use headrace_sensor::driver::{Carrier, Driver, DriverSetup};
 use headrace_sensor::geometry::time::DurNs;
@@ -16,6 +16,7 @@ use crate::dbc::mapping::Mapping;
 use crate::decoder::{AxisOrder, ImuDecoder, Meaning};
 use crate::driver;
 use crate::emulator::ImuEmulator;
+use crate::noise;
 use crate::sets::{j1939, xsens};
 
 /// Name in vehicle files.
@@ -121,6 +122,13 @@ impl Device for CanImu {
             Known::Dbc(mapping) => Box::new(DbcDecoder::new(mapping)),
         };
         SensorSpec { sensor: self.sensor.clone(), kind: SensorKind::Imu, decoder, ring_bytes: RING_BYTES }
+    }
+
+    fn inertial_noise(&self) -> Option<InertialNoise> {
+        match &self.known {
+            Known::Preset(meaning) => noise::of(&meaning.set),
+            Known::Dbc(_) => None,
+        }
     }
 
     fn sense(&self) -> Sense {

@@ -1,9 +1,11 @@
 //! Detects a divergent filter: a wrong estimate gates out every measurement that would correct it.
 
+use core::ops::Range;
+
 use serde::{Deserialize, Serialize};
 
 use super::measure::ScalarUpdate;
-use super::state::{ATTITUDE, ERRORS, Errors, HEADING, POSITION, VELOCITY};
+use super::state::{ATTITUDE, Errors, HEADING, POSITION, VELOCITY};
 use headrace_sensor::device::SensorKind;
 
 /// Averaging length, in measurements of a kind.
@@ -18,11 +20,10 @@ const LOST_WAY_MPS: f64 = 10.0;
 const LOST_TILT_RAD: f64 = 0.1;
 const LOST_RAD: f64 = 1.0;
 
-/// Whether ranges agree with the wall, the cable with the chainage, and attitudes with the tilt.
+/// Whether ranges agree with the wall, and attitudes with the tilt. `cable.rs` has the cable.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Agreement {
     wall: Memory,
-    way: Memory,
     tilt: Memory,
 }
 
@@ -61,33 +62,37 @@ impl Agreement {
     pub fn note(&mut self, kind: SensorKind, row: &ScalarUpdate, agrees: bool) {
         match kind {
             SensorKind::Head | SensorKind::Echosounder { .. } => self.wall.note(agrees),
-            SensorKind::Tether { .. } => self.way.note(agrees),
             // Tilt alone: a compass may stay disturbed for long.
             SensorKind::Imu if row.h.get(HEADING) == Some(&0.0) => self.tilt.note(agrees),
             _ => {}
         }
     }
 
-    /// Variances to add when a kind of measurement no longer agrees: to the part of the state that it measures, and to what
-    /// may have moved it. `None` while all agree.
-    pub fn seek(&mut self) -> Option<Errors> {
-        let [wall, way, tilt] = [&mut self.wall, &mut self.way, &mut self.tilt].map(Memory::is_lost);
-        let lost = [
-            (wall, POSITION + 1..POSITION + 3, LOST_M),
-            (wall, VELOCITY + 1..VELOCITY + 3, LOST_MPS),
-            // Nothing is linearized about the chainage: any distance will do.
-            (way, POSITION..POSITION + 1, LOST_WAY_M),
-            (way, VELOCITY..VELOCITY + 1, LOST_WAY_MPS),
+    /// Adds variances where a kind of measurement no longer agrees: to the part of the state that it measures, and to what
+    /// may have moved it.
+    pub fn seek(&mut self, variances: &mut Errors) {
+        let [wall, tilt] = [&mut self.wall, &mut self.tilt].map(Memory::is_lost);
+        if wall {
+            add(variances, POSITION + 1..POSITION + 3, LOST_M);
+            add(variances, VELOCITY + 1..VELOCITY + 3, LOST_MPS);
             // A tilt error moves the estimate too, through gravity.
-            (wall || way, ATTITUDE..ATTITUDE + 2, LOST_TILT_RAD),
-            (tilt, ATTITUDE..ATTITUDE + 3, LOST_RAD),
-        ];
-        let mut variances = [0.0; ERRORS];
-        for (_, errors, reach) in lost.into_iter().filter(|(is_lost, ..)| *is_lost) {
-            for slot in variances.iter_mut().take(errors.end).skip(errors.start) {
-                *slot += reach * reach;
-            }
+            add(variances, ATTITUDE..ATTITUDE + 2, LOST_TILT_RAD);
         }
-        (wall || way || tilt).then_some(variances)
+        if tilt {
+            add(variances, ATTITUDE..ATTITUDE + 3, LOST_RAD);
+        }
+    }
+}
+
+/// Adds variances where the chainage is lost. Nothing is linearized about it: any distance will do.
+pub fn seek_way(variances: &mut Errors) {
+    add(variances, POSITION..POSITION + 1, LOST_WAY_M);
+    add(variances, VELOCITY..VELOCITY + 1, LOST_WAY_MPS);
+    add(variances, ATTITUDE..ATTITUDE + 2, LOST_TILT_RAD);
+}
+
+fn add(variances: &mut Errors, errors: Range<usize>, sd: f64) {
+    for slot in variances.iter_mut().take(errors.end).skip(errors.start) {
+        *slot += sd * sd;
     }
 }

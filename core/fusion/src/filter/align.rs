@@ -6,8 +6,8 @@ use super::eskf::{Context, in_tunnel, with_quantum};
 use super::factors::Factors;
 use super::settings::Settings;
 use super::state::{
-    ATTITUDE, DEPTH, ERRORS, FORCE_BIAS, HEADING, POSITION, RATE_BIAS, SCALE, SLACK, SLACK_RATE, State,
-    VELOCITY,
+    ATTITUDE, CREEP, DEPTH, ERRORS, FORCE_BIAS, HEADING, POSITION, RATE_BIAS, SCALE, SLACK, SLACK_RATE,
+    State, VELOCITY,
 };
 use crate::NoFix;
 use crate::section::{Echo, settle};
@@ -204,6 +204,8 @@ impl Listening {
             // The part that isn't correlated with the rate.
             (SLACK, settings.slack.reach / core::f64::consts::SQRT_2),
             (SLACK_RATE, settings.slack.drive()),
+            // What was wrong on the way to here; from here on the scale makes more of it.
+            (CREEP, settings.scale_sd * self.told.map_or(0.0, |told| told.way_m.abs())),
             (SCALE, settings.scale_sd),
             (DEPTH, settings.depth_offset_sd_m),
             (HEADING, settings.heading.reach),
@@ -215,10 +217,10 @@ impl Listening {
         }
         let mut factors = Factors::independent(sds.map(|sd| sd * sd));
         factors.shear(|e, _| {
-            let [slack, rate, scale, heading] =
-                [SLACK, SLACK_RATE, SCALE, HEADING].map(|i| e.get(i).copied().unwrap_or(0.0));
+            let [slack, rate, creep, heading] =
+                [SLACK, SLACK_RATE, CREEP, HEADING].map(|i| e.get(i).copied().unwrap_or(0.0));
             let slack = slack + rate * settings.slack.time_s / 2.0;
-            let shown = self.told.map_or(0.0, |told| slack + scale * told.way_m);
+            let shown = self.told.map_or(0.0, |_| slack + creep);
             let deviates = if self.attitude.is_some() { heading } else { 0.0 };
             for (i, change) in [(POSITION, -shown), (ATTITUDE + 2, -deviates)] {
                 if let Some(slot) = e.get_mut(i) {
@@ -295,7 +297,7 @@ mod tests {
         assert!((factors.variance(SLACK) / (slack.reach * slack.reach) - 1.0).abs() < 1e-12);
         assert!((both * slack.time_s / (slack.reach * slack.reach) - 1.0).abs() < 1e-12);
         for _ in 0..50 {
-            let row = measure::chainage(&state, Vec3::zero(), 20.0, 120.0, tether_sd_m);
+            let row = measure::chainage(&state, Vec3::zero(), 120.0, tether_sd_m);
             factors.measure(&row.h, row.noise);
             for row in measure::attitude(&state, state.attitude, 0.03, 0.01) {
                 factors.measure(&row.h, row.noise);

@@ -2,14 +2,18 @@
 
 use core::ops::Range;
 
-use super::agreement::Agreement;
+use super::agreement::{self, Agreement};
+use super::cable::{self, Cable, Slip, Use};
 use super::clones::ErrorClones;
 use super::factors::Factors;
 use super::inertial::Leg;
 use super::measure::{self, Beam, ScalarUpdate};
 use super::settings::Settings;
 use super::sources::Source;
-use super::state::{ATTITUDE, ERRORS, Errors, POSITION, SCALE, State, VELOCITY, put, vec};
+use super::state::{
+    ATTITUDE, CREEP, ERRORS, Errors, FORCE_BIAS, POSITION, RATE_BIAS, State, VELOCITY, add_variance, put, vec,
+};
+use super::unrest::Unrest;
 use super::window::{Waiting, Window};
 use crate::NoFix;
 use crate::relative::Relative;
@@ -20,7 +24,6 @@ use headrace_geometry::site::Site;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_geometry::tunnel::Profile;
 use headrace_sensor::device::SensorKind;
-use headrace_sensor::reading::MAX_SOURCES;
 use headrace_sensor::reading::{Level, Reading};
 use headrace_snapshot::stateful;
 use serde::{Deserialize, Serialize};
@@ -39,6 +42,9 @@ const NEAR_M: f64 = 0.03;
 const SPEED_SD_MPS: f64 = 0.5;
 /// Standard deviation added to an estimate beyond the wall, m.
 const BEYOND_M: f64 = 1.5;
+
+/// Length of an epoch, s.
+const EPOCH_S: f64 = 0.1;
 
 /// Maximum steps of an epoch: its leg, two widenings of the covariance, and an end.
 const STEPS: usize = 4;
@@ -79,12 +85,17 @@ pub struct Eskf {
     /// The estimates through the last epoch, before its measurements.
     knots: Vec<(MonoNs, State)>,
     agreement: Agreement,
+    /// Whether the cable counter is believed.
+    pub cable: Cable,
+    unrest: Unrest,
+    /// Variances to add at the end of the epoch.
+    doubts: Errors,
     /// Steps of the last epoch, for smoothing; empty unless they are kept.
     pub steps: Vec<Step>,
     keeps_steps: bool,
 }
 
-stateful!(Eskf { state: at, state, factors, clones, way_sought, agreement; lists: knots; fixed: steps, keeps_steps; });
+stateful!(Eskf { state: at, state, factors, clones, way_sought, agreement, cable, unrest, doubts; lists: knots; fixed: steps, keeps_steps; });
 
 impl Default for Eskf {
     /// Allocated buffers without an estimate.
@@ -97,6 +108,9 @@ impl Default for Eskf {
             way_sought: None,
             knots: Vec::with_capacity(KNOTS),
             agreement: Agreement::default(),
+            cable: Cable::default(),
+            unrest: Unrest::default(),
+            doubts: [0.0; ERRORS],
             steps: Vec::new(),
             keeps_steps: false,
         }
@@ -117,6 +131,8 @@ impl Eskf {
         (self.at, self.state, self.factors) = (at, state, factors);
         self.clones.clear();
         self.agreement = Agreement::default();
+        self.cable = Cable::default();
+        self.doubts = [0.0; ERRORS];
         self.way_sought = None;
     }
 
@@ -126,9 +142,10 @@ impl Eskf {
         to: MonoNs,
         context: &Context,
         window: &mut Window,
-        sources: &mut [Option<Source>; MAX_SOURCES],
+        sources: &mut [Option<Source>],
     ) {
         let (mut nominal, leg) = self.propagate(to, context, window);
+        let leg = leg.with_unrest(self.unrest.factors());
         let transition = leg.transition(&context.settings);
         transition.fade(&mut nominal);
         self.keep(to, &Move::Leg(leg), nominal);
@@ -148,7 +165,8 @@ impl Eskf {
                     rows(state, context, source, &waiting, window).get(number).copied().flatten()
                 };
                 if let Some(row) = row.and_then(|row| self.straight(row, &then, again)) {
-                    self.fuse(&row.seen_later(later_s), &context.settings, source, (&known, &mut errors));
+                    let row = row.seen_later(later_s);
+                    self.fuse(&row, (&waiting, number), &context.settings, source, (&known, &mut errors));
                 }
             }
         }
@@ -157,12 +175,41 @@ impl Eskf {
         self.bound_speed();
         self.stay_inside(&context.profile);
         self.clones.note(to, &self.factors);
-        if let Some(variances) = self.agreement.seek() {
-            if variances.get(POSITION).is_some_and(|along| *along > 0.0) {
-                self.way_sought = Some(to);
-            }
-            self.widen(&variances);
+        self.unrest.pass(leg.dt_s(), &context.settings);
+        self.note_jolt(window.jolted(to));
+        self.agreement.seek(&mut self.doubts);
+        let doubts = core::mem::replace(&mut self.doubts, [0.0; ERRORS]);
+        if doubts.iter().any(|variance| *variance > 0.0) {
+            self.widen(&doubts);
         }
+    }
+
+    /// A force beyond what is plausible may have been true: the speed that it carried is then missing.
+    fn note_jolt(&mut self, speed_mps: f64) {
+        let variance = speed_mps * speed_mps;
+        let way = variance * EPOCH_S * EPOCH_S;
+        for k in 0..3 {
+            add_variance(&mut self.doubts, VELOCITY + k, variance);
+            add_variance(&mut self.doubts, POSITION + k, way);
+        }
+    }
+
+    /// Judges a cable reading; whether it is to be fused. What it has lost becomes creep.
+    fn trusts(&mut self, reading: &cable::Reading) -> bool {
+        match self.cable.take(reading) {
+            Use::Fuse => return true,
+            Use::Withhold => {}
+            Use::Slipped(Slip { lost_m, doubted_m }) => {
+                add_variance(&mut self.doubts, CREEP, lost_m * lost_m);
+                add_variance(&mut self.doubts, POSITION, doubted_m * doubted_m);
+            }
+            Use::Seek(lacking_m) => {
+                self.way_sought = Some(reading.at);
+                add_variance(&mut self.doubts, CREEP, lacking_m * lacking_m);
+                agreement::seek_way(&mut self.doubts);
+            }
+        }
+        false
     }
 
     /// Adds to the error variances; the estimate stays.
@@ -240,21 +287,42 @@ impl Eskf {
     fn fuse(
         &mut self,
         row: &ScalarUpdate,
+        (waiting, number): (&Waiting, usize),
         settings: &Settings,
         source: &mut Source,
         (known, errors): (&Errors, &mut Errors),
     ) {
         let mut row = row.unless_sure(|by| math::sqrt(self.factors.variance_along(by)));
         row.noise += self.left_out(row.bends);
-        let innovation = row.residual - since(&row, known, errors);
-        let variance = self.factors.variance_along(&row.h) + row.noise;
-        let nis = innovation * innovation / variance;
-        let agrees = nis <= settings.gate;
         let kind = source.sensor.kind;
-        self.agreement.note(kind, &row, agrees);
+        row.noise *= source.noise_level.factor(kind, number);
+        let innovation = row.residual - since(&row, known, errors);
+        let along = self.factors.along(&row.h);
+        let of_estimate = row.h.iter().zip(&along).map(|(h, along)| h * along).sum::<f64>();
+        let variance = of_estimate + row.noise;
+        let nis = innovation * innovation / variance;
+        let mut agrees = nis <= settings.gate;
         source.consistency.count(nis, settings.gate, variance, settings.usual_variance(kind));
+        let part = |from: usize| [0, 1, 2].map(|k| along.get(from + k).copied().unwrap_or(0.0));
+        self.unrest.note(
+            [part(RATE_BIAS), part(FORCE_BIAS)],
+            variance,
+            source.noise_level.relative(nis.min(settings.gate)),
+        );
+        if let (SensorKind::Tether { zero_at_m, scale }, Reading::TetherLength(length)) =
+            (kind, &waiting.reading)
+        {
+            let shown_m = zero_at_m + scale * length.length_m;
+            let (at, sd_m) = (waiting.at, math::sqrt(variance));
+            agrees = self.trusts(&cable::Reading { at, shown_m, off_m: innovation, sd_m, agrees });
+        } else {
+            self.agreement.note(kind, &row, agrees);
+        }
         if agrees {
+            source.noise_level.note(kind, number, innovation, variance);
             self.correct(&row, known, errors);
+        } else {
+            source.noise_level.skip(number);
         }
     }
 
@@ -318,7 +386,7 @@ impl Eskf {
 
     /// Standard deviations of the estimate.
     pub fn pose_sd(&self) -> PoseSd {
-        PoseSd::of(&self.state, &self.factors)
+        PoseSd::of(&self.factors)
     }
 
     /// Bounds the speed by its prior, against unaided accelerometers that integrate gravity.
@@ -362,10 +430,10 @@ pub struct PoseSd {
 
 impl PoseSd {
     /// Those of an estimate and the covariance of its errors.
-    pub fn of(state: &State, factors: &Factors<ERRORS>) -> Self {
+    pub fn of(factors: &Factors<ERRORS>) -> Self {
         let of = |i: usize| math::sqrt(factors.variance(i));
         let mut along = [0.0; ERRORS];
-        for (i, share) in [(POSITION, 1.0), (SCALE, state.position.x())] {
+        for (i, share) in [(POSITION, 1.0), (CREEP, 1.0)] {
             if let Some(slot) = along.get_mut(i) {
                 *slot = share;
             }
@@ -438,7 +506,7 @@ fn rows(
         (SensorKind::Tether { zero_at_m, scale }, Reading::TetherLength(length)) => {
             let sd_m = with_quantum(settings.tether_sd_m, length.resolution_m * scale.abs());
             let chainage_m = zero_at_m + scale * length.length_m;
-            one(Some(measure::chainage(state, -*unit_at, zero_at_m, chainage_m, sd_m)))
+            one(Some(measure::chainage(state, -*unit_at, chainage_m, sd_m)))
         }
         (SensorKind::Imu, Reading::Attitude(level)) => {
             let measured = in_tunnel(site, level) * mount.rotation.inverse();

@@ -285,6 +285,12 @@ impl<const N: usize> Factors<N> {
 }
 
 impl Noise {
+    /// The same, its variance multiplied by a factor.
+    #[must_use]
+    pub fn scaled(self, factor: f64) -> Self {
+        Self { variance: self.variance * factor, ..self }
+    }
+
     /// Noise of a variance in one error.
     pub fn of_one(i: usize, variance: f64) -> Self {
         Self { variance, weights: [(i, 1.0); 2] }

@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 use super::factors::{Factors, Noise};
 use super::settings::{Settings, Wander};
 use super::state::{
-    ATTITUDE, DEPTH, ERRORS, Errors, FORCE_BIAS, HEADING, POSITION, RATE_BIAS, SCALE, SLACK, SLACK_RATE,
-    State, VELOCITY, cross, matrix, rotation,
+    ATTITUDE, CREEP, DEPTH, ERRORS, Errors, FORCE_BIAS, HEADING, POSITION, RATE_BIAS, SCALE, SLACK,
+    SLACK_RATE, State, VELOCITY, cross, matrix, rotation,
 };
 use headrace_geometry::frames::{Body, Vec3};
 use headrace_geometry::math;
@@ -24,7 +24,7 @@ pub struct Felt {
 }
 
 /// Number of values of a leg.
-pub const LEG_NUMBERS: usize = 1 + 5 * 9 + 2 * 3 + 2;
+pub const LEG_NUMBERS: usize = 1 + 5 * 9 + 2 * 3 + 2 + 2 + 2;
 
 /// Propagation accumulated since the errors were last propagated.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -43,6 +43,10 @@ pub struct Leg {
     tilting_twice: Matrix3<f64>,
     /// Time without gyro data, and without accelerometer data, s.
     blind_s: [f64; 2],
+    /// Way along the tunnel, m, and the cable's scale error on it: what creeps.
+    creeping: [f64; 2],
+    /// Factors of the process noise of gyro and accelerometer biases.
+    unrest: [f64; 2],
 }
 
 impl Default for Leg {
@@ -57,6 +61,8 @@ impl Default for Leg {
             tilting: Matrix3::zeros(),
             tilting_twice: Matrix3::zeros(),
             blind_s: [0.0; 2],
+            creeping: [0.0; 2],
+            unrest: [1.0; 2],
         }
     }
 }
@@ -64,7 +70,9 @@ impl Default for Leg {
 impl State {
     /// Propagates the estimate over `dt_s`, and accumulates the effect on its errors in `leg`.
     pub fn go_on(&mut self, felt: &Felt, dt_s: f64, gravity_mps2: f64, leg: &mut Leg) {
+        let from_m = self.position.x();
         let (turn, force) = self.move_on(felt, dt_s, gravity_mps2);
+        leg.creeping = [leg.creeping[0] + self.position.x() - from_m, self.scale];
         leg.add(dt_s, turn, force, felt.rate_radps.is_some());
     }
 
@@ -82,7 +90,9 @@ impl State {
         let force = felt.force_mps2.map(|force| turn * (force + -self.force_bias_mps2).0);
         let lift = Vector3::new(0.0, 0.0, -gravity_mps2);
         let gain = Vec3::of(force.map_or_else(Vector3::zeros, |force| (force + lift) * dt_s));
-        self.position = self.position + (self.velocity_mps + gain.scaled(0.5)).scaled(dt_s);
+        let way = (self.velocity_mps + gain.scaled(0.5)).scaled(dt_s);
+        self.position = self.position + way;
+        self.creep_m += self.scale * way.x();
         self.velocity_mps = self.velocity_mps + gain;
         self.attitude = half.map_or(self.attitude, |half| middle * half);
         (turn, force)
@@ -135,7 +145,8 @@ impl Leg {
         let squares = [&self.turned, &self.pushed, &self.pushed_twice, &self.tilting, &self.tilting_twice];
         let squares = squares.into_iter().flat_map(|matrix| matrix.iter().copied());
         let ways = [&self.velocity, &self.way].into_iter().flat_map(|way| way.iter().copied());
-        [self.dt_s].into_iter().chain(squares).chain(ways).chain(self.blind_s)
+        let rest = self.blind_s.into_iter().chain(self.creeping).chain(self.unrest);
+        [self.dt_s].into_iter().chain(squares).chain(ways).chain(rest)
     }
 
     /// The leg from such values; `None` when there are too few.
@@ -150,10 +161,17 @@ impl Leg {
         ];
         let squares = squares.into_iter().flat_map(|matrix| matrix.iter_mut());
         let ways = [&mut leg.velocity, &mut leg.way].into_iter().flat_map(|way| way.iter_mut());
-        for slot in squares.chain(ways).chain(&mut leg.blind_s) {
+        let rest = leg.blind_s.iter_mut().chain(&mut leg.creeping).chain(&mut leg.unrest);
+        for slot in squares.chain(ways).chain(rest) {
             *slot = numbers.next()?;
         }
         Some(leg)
+    }
+
+    /// The same with these factors of the process noise of gyro and accelerometer biases.
+    #[must_use]
+    pub fn with_unrest(self, unrest: [f64; 2]) -> Self {
+        Self { unrest, ..self }
     }
 
     /// Its duration, s.
@@ -173,6 +191,7 @@ impl Leg {
             way_pushed: -self.pushed_twice,
             velocity_turned: self.tilting,
             way_turned: self.tilting_twice,
+            creeping: self.creeping,
             fading: [
                 (FORCE_BIAS, fading(settings.force_bias.time_s)),
                 (FORCE_BIAS + 1, fading(settings.force_bias.time_s)),
@@ -212,8 +231,9 @@ impl Leg {
             let left = transition.left_of(i);
             Noise::of_one(i, wander.reach * wander.reach * (1.0 - left * left))
         };
-        let force = |k: usize| fading(FORCE_BIAS + k, settings.force_bias);
-        let rate = |k: usize| fading(RATE_BIAS + k, settings.rate_bias);
+        let [rate_unrest, force_unrest] = self.unrest;
+        let force = |k: usize| fading(FORCE_BIAS + k, settings.force_bias).scaled(force_unrest);
+        let rate = |k: usize| fading(RATE_BIAS + k, settings.rate_bias).scaled(rate_unrest);
         let white = |i: usize, noise: f64| Noise::of_one(i, noise * noise * self.dt_s);
         let [slack, slack_alone] = self.slack_noises(settings);
         [
@@ -246,6 +266,8 @@ pub struct Transition {
     way_pushed: Matrix3<f64>,
     velocity_turned: Matrix3<f64>,
     way_turned: Matrix3<f64>,
+    /// Way along the tunnel, m, and the cable's scale error on it.
+    creeping: [f64; 2],
     /// Errors that decay, and their factors.
     fading: [(usize, f64); 9],
 }
@@ -302,6 +324,11 @@ impl Transition {
             way += self.way_pushed * force + self.way_turned * rate;
             velocity += self.velocity_pushed * force + self.velocity_turned * rate;
             turn += self.turned * rate;
+        }
+        let [along_m, scale] = self.creeping;
+        let creep = along_m * e.get(SCALE).copied().unwrap_or(0.0) + scale * way.x;
+        if let Some(slot) = e.get_mut(CREEP) {
+            *slot += creep;
         }
         if let Some([slack, rate]) =
             e.get_mut(SLACK..=SLACK_RATE).and_then(|pair| <&mut [f64; 2]>::try_from(pair).ok())

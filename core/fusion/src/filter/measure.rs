@@ -3,7 +3,7 @@
 //! Derivation: `docs/fusion.md`, "Measurements".
 
 use super::state::{
-    ATTITUDE, DEPTH, ERRORS, Errors, HEADING, POSITION, RATE_BIAS, SCALE, SLACK, State, VELOCITY, put,
+    ATTITUDE, CREEP, DEPTH, ERRORS, Errors, HEADING, POSITION, RATE_BIAS, SLACK, State, VELOCITY, put,
     rotation_vector,
 };
 use headrace_geometry::frames::{Body, Rot, Sensor, Tunnel, Vec3};
@@ -154,17 +154,15 @@ pub fn height(state: &State, offset: Vec3<Body>, height_m: f64, sd_m: f64) -> Sc
         .with_one(DEPTH, 1.0)
 }
 
-/// Chainage shown by the cable, whose end is at `offset` from the inertial unit; its scale counts from `from_m`.
-pub fn chainage(state: &State, offset: Vec3<Body>, from_m: f64, chainage_m: f64, sd_m: f64) -> ScalarUpdate {
+/// Chainage shown by the cable, whose end is at `offset` from the inertial unit.
+pub fn chainage(state: &State, offset: Vec3<Body>, chainage_m: f64, sd_m: f64) -> ScalarUpdate {
     let arm = state.attitude * offset;
-    let way_m = state.position.x() + arm.x() - from_m;
-    let expected_m = from_m + way_m * (1.0 + state.scale) + state.slack_m;
-    let share = 1.0 + state.scale;
+    let expected_m = state.position.x() + arm.x() + state.creep_m + state.slack_m;
     ScalarUpdate::new(chainage_m - expected_m, sd_m * sd_m)
-        .with(POSITION, Vec3::<Tunnel>::new(share, 0.0, 0.0))
-        .with(ATTITUDE, Vec3::<Tunnel>::new(0.0, arm.z() * share, -arm.y() * share))
+        .with(POSITION, Vec3::<Tunnel>::new(1.0, 0.0, 0.0))
+        .with(ATTITUDE, Vec3::<Tunnel>::new(0.0, arm.z(), -arm.y()))
+        .with_one(CREEP, 1.0)
         .with_one(SLACK, 1.0)
-        .with_one(SCALE, way_m)
 }
 
 /// Attitude computed by a unit, about the tunnel's x, y and z. About z it is a compass, with its deviation.

@@ -5,14 +5,17 @@
 
 pub mod agreement;
 pub mod align;
+pub mod cable;
 pub mod clones;
 pub mod eskf;
 pub mod factors;
 pub mod inertial;
 pub mod measure;
+pub mod noise_level;
 pub mod settings;
 pub mod sources;
 pub mod state;
+pub mod unrest;
 pub mod window;
 pub mod zupt;
 
@@ -73,7 +76,7 @@ const USUAL_GAP: DurNs = DurNs(20_000_000_000);
 pub struct FilterNavigation {
     context: Context,
     window: Window,
-    sources: [Option<Source>; MAX_SOURCES],
+    sources: Vec<Option<Source>>,
     /// The inertial unit used for propagation: the first one heard. The estimate refers to its position.
     unit: Option<usize>,
     listening: Listening,
@@ -101,7 +104,7 @@ impl FilterNavigation {
             context: Context { profile, site, settings, unit_at: Vec3::zero() },
             unit: None,
             window: Window::default(),
-            sources: [None; MAX_SOURCES],
+            sources: vec![None; MAX_SOURCES],
             listening: Listening::default(),
             stillness: Stillness::default(),
             running: Eskf::default(),
@@ -118,6 +121,11 @@ impl FilterNavigation {
     /// The estimate and its covariance; `None` before the first.
     pub fn running(&self) -> Option<&Eskf> {
         self.is_running.then_some(&self.running)
+    }
+
+    /// When the cable's readings left what was expected, once that has lasted for a second; `None` while they are believed.
+    pub fn cable_doubted_since(&self) -> Option<MonoNs> {
+        self.running().and_then(|running| running.cable.doubted_since(running.at))
     }
 
     /// Number of restarts of the estimate.
@@ -287,6 +295,7 @@ impl FilterNavigation {
             }
             (SensorKind::Imu, Reading::SpecificForce(force)) if force.norm() > MOST_FORCE_MPS2 => {
                 source.consistency.dropped += 1;
+                self.window.take_jolt(at, force.norm());
                 false
             }
             (SensorKind::Imu, Reading::AngularRate(rate)) => {

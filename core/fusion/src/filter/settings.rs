@@ -1,8 +1,9 @@
 //! Noise settings of the sensors. Defaults suit a small vehicle with a MEMS unit; a vehicle file's `[navigation]` table
 //! overrides them.
 
+use headrace_geometry::math;
 use headrace_geometry::time::DurNs;
-use headrace_sensor::device::SensorKind;
+use headrace_sensor::device::{BiasSpec, InertialNoise, SensorKind};
 
 /// One degree in radians.
 const DEGREE: f64 = core::f64::consts::PI / 180.0;
@@ -16,6 +17,13 @@ pub struct Wander {
 }
 
 impl Wander {
+    /// The process of a bias with a constant part and a wandering one: its variance is that of both together, and it wanders
+    /// as fast as the wandering part does.
+    pub fn of_bias(bias: &BiasSpec) -> Self {
+        let variance = bias.turn_on * bias.turn_on + bias.in_run * bias.in_run;
+        Self { reach: math::sqrt(variance), time_s: bias.time_s * variance / (bias.in_run * bias.in_run) }
+    }
+
     /// Standard deviation of the driving rate of a smooth process (two equal lags in series) of standard deviation `reach`.
     pub fn drive(&self) -> f64 {
         core::f64::consts::SQRT_2 * self.reach / self.time_s
@@ -113,6 +121,18 @@ impl Default for Settings {
 const GATE_999: f64 = 10.828;
 
 impl Settings {
+    /// The same, with an inertial unit's own noise.
+    #[must_use]
+    pub fn with_inertial(self, noise: &InertialNoise) -> Self {
+        Self {
+            rate_noise: noise.rate_noise,
+            force_noise: noise.force_noise,
+            rate_bias: Wander::of_bias(&noise.rate_bias),
+            force_bias: Wander::of_bias(&noise.force_bias),
+            ..self
+        }
+    }
+
     /// Measurement variance of a kind of sensor, in its unit squared: the reference for innovation variances.
     pub fn usual_variance(&self, kind: SensorKind) -> f64 {
         let sd = match kind {

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::noise_level::NoiseLevel;
 use headrace_geometry::math;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::device::SensorInfo;
@@ -59,6 +60,8 @@ pub struct Source {
     pub taken: Option<MonoNs>,
     /// For a head, its rotation.
     pub turning: Turning,
+    /// Level of its noise.
+    pub noise_level: NoiseLevel,
 }
 
 /// Rotation of a head.
@@ -72,7 +75,13 @@ pub struct Turning {
 impl Source {
     /// A source without readings yet.
     pub fn new(sensor: SensorInfo) -> Self {
-        Self { sensor, consistency: Consistency::default(), taken: None, turning: Turning::default() }
+        Self {
+            sensor,
+            consistency: Consistency::default(),
+            taken: None,
+            turning: Turning::default(),
+            noise_level: NoiseLevel::default(),
+        }
     }
 
     /// Whether `period` has passed since its last reading in the window; if so, this one becomes the last.

@@ -7,27 +7,29 @@ use headrace_geometry::frames::{Body, Point3, Rot, Tunnel, Vec3};
 use headrace_geometry::math;
 
 /// Number of errors.
-pub const ERRORS: usize = 20;
+pub const ERRORS: usize = 21;
 /// Index of the error of the inertial unit's position, m, in the tunnel's frame.
 pub const POSITION: usize = 0;
+/// Of the cable's creep, m.
+pub const CREEP: usize = 3;
 /// Of its velocity, m/s, in the tunnel's frame.
-pub const VELOCITY: usize = 3;
+pub const VELOCITY: usize = 4;
 /// Of the attitude: the rotation vector in the tunnel's frame that takes the estimate to the truth, radians.
-pub const ATTITUDE: usize = 6;
+pub const ATTITUDE: usize = 7;
 /// Of the accelerometers' bias, m/s^2, in the body's frame.
-pub const FORCE_BIAS: usize = 9;
+pub const FORCE_BIAS: usize = 10;
 /// Of the gyros' bias, rad/s, in the body's frame.
-pub const RATE_BIAS: usize = 12;
+pub const RATE_BIAS: usize = 13;
 /// Of the cable's slack, m.
-pub const SLACK: usize = 15;
+pub const SLACK: usize = 16;
 /// Of the rate of the slack, m/s.
-pub const SLACK_RATE: usize = 16;
+pub const SLACK_RATE: usize = 17;
 /// Of the cable's scale, a ratio.
-pub const SCALE: usize = 17;
+pub const SCALE: usize = 18;
 /// Of the depth sensor's offset, m of height.
-pub const DEPTH: usize = 18;
+pub const DEPTH: usize = 19;
 /// Of the compass's deviation, radians.
-pub const HEADING: usize = 19;
+pub const HEADING: usize = 20;
 
 /// Number of values of a state.
 pub const STATE_NUMBERS: usize = ERRORS + 1;
@@ -52,7 +54,9 @@ pub struct State {
     pub slack_m: f64,
     /// Driving rate of the slack, m/s: it decays as the slack does.
     pub slack_rate_mps: f64,
-    /// Scale error of the cable, a ratio: positive where it shows too much.
+    /// Creep of the cable, m: chainage shown too large by all scale errors and slips so far.
+    pub creep_m: f64,
+    /// Scale error of the cable here and now, a ratio: positive where it shows too much.
     pub scale: f64,
     /// Offset of the depth sensor, m: positive where it shows too much height.
     pub depth_offset_m: f64,
@@ -71,6 +75,7 @@ impl State {
             rate_bias_radps: Vec3::zero(),
             slack_m: 0.0,
             slack_rate_mps: 0.0,
+            creep_m: 0.0,
             scale: 0.0,
             depth_offset_m: 0.0,
             heading_offset_rad: 0.0,
@@ -84,8 +89,9 @@ impl State {
         self.attitude = rotation(vec(errors, ATTITUDE)) * self.attitude;
         self.force_bias_mps2 = self.force_bias_mps2 + vec(errors, FORCE_BIAS);
         self.rate_bias_radps = self.rate_bias_radps + vec(errors, RATE_BIAS);
-        let [slack_m, slack_rate_mps, scale, depth_m, heading_rad] =
-            [SLACK, SLACK_RATE, SCALE, DEPTH, HEADING].map(|i| errors.get(i).copied().unwrap_or(0.0));
+        let [creep_m, slack_m, slack_rate_mps, scale, depth_m, heading_rad] =
+            [CREEP, SLACK, SLACK_RATE, SCALE, DEPTH, HEADING].map(|i| errors.get(i).copied().unwrap_or(0.0));
+        self.creep_m += creep_m;
         self.slack_m += slack_m;
         self.slack_rate_mps += slack_rate_mps;
         self.scale += scale;
@@ -104,6 +110,7 @@ impl State {
         let scalars = [
             (SLACK, truth.slack_m - self.slack_m),
             (SLACK_RATE, truth.slack_rate_mps - self.slack_rate_mps),
+            (CREEP, truth.creep_m - self.creep_m),
             (SCALE, truth.scale - self.scale),
             (DEPTH, truth.depth_offset_m - self.depth_offset_m),
             (HEADING, truth.heading_offset_rad - self.heading_offset_rad),
@@ -138,12 +145,13 @@ impl State {
         let (slack, heading) = ([self.slack_m, self.slack_rate_mps], self.heading_offset_rad);
         let (scale, depth) = (self.scale, self.depth_offset_m);
         let [s, r] = slack;
-        [px, py, pz, vx, vy, vz, w, x, y, z, fx, fy, fz, rx, ry, rz, s, r, scale, depth, heading]
+        let creep = self.creep_m;
+        [px, py, pz, creep, vx, vy, vz, w, x, y, z, fx, fy, fz, rx, ry, rz, s, r, scale, depth, heading]
     }
 
     /// The estimate from such values; `None` when the quaternion is invalid.
     pub fn of_numbers(numbers: [f64; STATE_NUMBERS]) -> Option<Self> {
-        let [px, py, pz, vx, vy, vz, w, x, y, z, fx, fy, fz, rx, ry, rz, s, r, scale, depth, heading] =
+        let [px, py, pz, creep, vx, vy, vz, w, x, y, z, fx, fy, fz, rx, ry, rz, s, r, scale, depth, heading] =
             numbers;
         Some(Self {
             position: Point3::new(px, py, pz),
@@ -153,6 +161,7 @@ impl State {
             rate_bias_radps: Vec3::new(rx, ry, rz),
             slack_m: s,
             slack_rate_mps: r,
+            creep_m: creep,
             scale,
             depth_offset_m: depth,
             heading_offset_rad: heading,
@@ -161,14 +170,14 @@ impl State {
 
     /// Whether every number is finite.
     pub fn is_sound(&self) -> bool {
-        let scalars =
-            [self.slack_m, self.slack_rate_mps, self.scale, self.depth_offset_m, self.heading_offset_rad];
+        let cable = [self.creep_m, self.slack_m, self.slack_rate_mps, self.scale];
+        let offsets = [self.depth_offset_m, self.heading_offset_rad];
         self.position.is_finite()
             && self.velocity_mps.is_finite()
             && self.attitude.wxyz().iter().all(|c| c.is_finite())
             && self.force_bias_mps2.is_finite()
             && self.rate_bias_radps.is_finite()
-            && scalars.iter().all(|c| c.is_finite())
+            && cable.iter().chain(&offsets).all(|c| c.is_finite())
     }
 }
 
@@ -182,6 +191,13 @@ pub fn vec<F>(errors: &Errors, from: usize) -> Vec3<F> {
 pub fn put<F: Copy>(errors: &mut Errors, from: usize, value: Vec3<F>) {
     for (slot, value) in errors.iter_mut().skip(from).zip(value.0.iter()) {
         *slot = *value;
+    }
+}
+
+/// Adds to one of several variances.
+pub fn add_variance(variances: &mut Errors, i: usize, variance: f64) {
+    if let Some(slot) = variances.get_mut(i) {
+        *slot += variance;
     }
 }
 

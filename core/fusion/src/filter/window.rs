@@ -33,13 +33,15 @@ pub struct Waiting {
 pub struct Window {
     waiting: Vec<Waiting>,
     felt: Vec<(MonoNs, Felt)>,
+    /// The last implausible force that may have been true, and the speed that it would have carried, m/s.
+    jolt: Option<(MonoNs, f64)>,
 }
 
-stateful!(Window { lists: waiting, felt; });
+stateful!(Window { state: jolt; lists: waiting, felt; });
 
 impl Default for Window {
     fn default() -> Self {
-        Self { waiting: Vec::with_capacity(MOST), felt: Vec::with_capacity(MOST_FELT) }
+        Self { waiting: Vec::with_capacity(MOST), felt: Vec::with_capacity(MOST_FELT), jolt: None }
     }
 }
 
@@ -62,6 +64,24 @@ impl Window {
     /// Notes a specific force; false when there is no room.
     pub fn take_force(&mut self, at: MonoNs, force_mps2: Vec3<Body>) -> bool {
         self.felt_at(at).map(|felt| felt.force_mps2 = Some(force_mps2)).is_some()
+    }
+
+    /// Notes a force that isn't used, m/s^2: the speed that it may have carried over the time since the sample before.
+    pub fn take_jolt(&mut self, at: MonoNs, force_mps2: f64) {
+        let before = self.felt.iter().rev().map(|(felt, _)| *felt).find(|felt| *felt < at);
+        let lasted = before.map_or(SPEAKS_FOR, |before| at.since(before).min(SPEAKS_FOR));
+        let carried_mps = self.jolt.map_or(0.0, |(_, speed_mps)| speed_mps);
+        self.jolt = Some((at, carried_mps + force_mps2 * lasted.as_secs_f64()));
+    }
+
+    /// Speed that implausible forces up to a time may have carried, m/s; returned once.
+    pub fn jolted(&mut self, until: MonoNs) -> f64 {
+        self.jolt.take_if(|(at, _)| *at <= until).map_or(0.0, |(_, speed_mps)| speed_mps)
+    }
+
+    /// Speed that implausible forces may have carried, m/s, and since when, of those that aren't fused yet.
+    pub fn jolt(&self) -> Option<(MonoNs, f64)> {
+        self.jolt
     }
 
     fn felt_at(&mut self, at: MonoNs) -> Option<&mut Felt> {
@@ -125,6 +145,7 @@ impl Window {
     pub fn clear(&mut self) {
         self.waiting.clear();
         self.felt.clear();
+        self.jolt = None;
     }
 
     /// Removes readings valid at or before `at`.

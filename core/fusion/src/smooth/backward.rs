@@ -66,7 +66,7 @@ impl Backward {
                 answer(&mut self.relatives, number, relative);
             }
         }
-        self.points.push(Point::of(now.at, &now.state, &PoseSd::of(&now.state, &now.factors)));
+        self.points.push(Point::of(now.at, &now.state, &PoseSd::of(&now.factors)));
         self.now = Some((placed.piece, now));
     }
 

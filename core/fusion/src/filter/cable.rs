@@ -1,0 +1,174 @@
+//! Whether the cable counter is believed.
+//!
+//! A counter sticks, slips or runs free where the vehicle goes on. Its readings then leave what the inertial unit expects;
+//! they are withheld, and the inertial unit alone carries the chainage, less surely by the second. Derivation:
+//! `docs/fusion.md`, "A cable that isn't believed".
+
+use serde::{Deserialize, Serialize};
+
+use headrace_geometry::time::{DurNs, MonoNs};
+
+/// Time beyond the gate, and standard deviations, after which a counter isn't believed.
+const DOUBTED_AFTER: DurNs = DurNs(500_000_000);
+const DOUBTED_SDS: f64 = 6.0;
+/// Time over which a disagreement, or an agreement, counts.
+const NOTICED_AFTER: DurNs = DurNs(1_000_000_000);
+const RETURNED_AFTER: DurNs = DurNs(500_000_000);
+/// Standard deviation of the innovation up to which a reading that agrees again says that nothing was lost, m.
+const SURE_M: f64 = 0.3;
+/// Share of the vehicle's way meanwhile, and length, that such a reading may lack.
+const MISSING_SHARE: f64 = 0.1;
+const MISSING_M: f64 = 0.02;
+/// A counter that runs as the vehicle does: within a tenth of its way and this, over so long and so far. Without moving, over
+/// the longer time.
+const SAME_SHARE: f64 = 0.1;
+const SAME_M: f64 = 0.01;
+/// Further share of its way by which the vehicle's may differ where that is uncertain.
+const UNSURE_SHARE: f64 = 0.3;
+const RUNS_FOR: DurNs = DurNs(1_000_000_000);
+const RUNS_M: f64 = 0.05;
+const STANDS_FOR: DurNs = DurNs(5_000_000_000);
+/// Standard deviation of the innovation beyond which inertial data no longer judge the counter, m, and how far it must run
+/// then to be alive.
+const BLIND_M: f64 = 1.0;
+const ALIVE_M: f64 = 0.1;
+/// Share of the way made in doubt that may be the inertial unit's fault, as a standard deviation.
+const DOUBTED_SHARE: f64 = 0.5;
+
+/// A reading against the estimate.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Reading {
+    /// Time of validity.
+    pub at: MonoNs,
+    /// Chainage shown, m.
+    pub shown_m: f64,
+    /// Shown less expected, m.
+    pub off_m: f64,
+    /// Standard deviation of that, m.
+    pub sd_m: f64,
+    /// Whether it is within the gate.
+    pub agrees: bool,
+}
+
+/// What a counter has lost or gained.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Slip {
+    /// Shown less expected, m.
+    pub lost_m: f64,
+    /// Standard deviation of the part that may be the inertial unit's fault, m.
+    pub doubted_m: f64,
+}
+
+impl Reading {
+    fn expected_m(&self) -> f64 {
+        self.shown_m - self.off_m
+    }
+}
+
+/// What to do with a reading.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Use {
+    /// Fuse it.
+    Fuse,
+    /// Don't.
+    Withhold,
+    /// The counter runs truly again.
+    Slipped(Slip),
+    /// The chainage is lost, and the counter runs: begin anew with what it shows, which may lack this much, m.
+    Seek(f64),
+}
+
+/// See the module's description.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Cable {
+    /// The first of successive readings beyond the gate.
+    left: Option<Reading>,
+    doubt: Option<Doubt>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+struct Doubt {
+    /// The first reading that was withheld.
+    first: Reading,
+    /// The reading from which the counter runs as the vehicle does.
+    same_from: Reading,
+    /// When readings began to agree again.
+    agreeing_from: Option<MonoNs>,
+    /// What it showed when inertial data could no longer judge it, m.
+    blind_from_m: Option<f64>,
+}
+
+impl Cable {
+    /// When the readings left what was expected, once that has lasted.
+    pub fn doubted_since(&self, now: MonoNs) -> Option<MonoNs> {
+        self.doubt.map(|doubt| doubt.first.at).filter(|since| now.since(*since).0 >= NOTICED_AFTER.0)
+    }
+
+    /// Takes a reading.
+    pub fn take(&mut self, reading: &Reading) -> Use {
+        if let Some(doubt) = &mut self.doubt {
+            let used = doubt.take(reading);
+            if used != Use::Withhold {
+                *self = Self::default();
+            }
+            return used;
+        }
+        if reading.agrees {
+            self.left = None;
+            return Use::Fuse;
+        }
+        // Slack that is larger than usual leaves the gate for a while, too.
+        let first = *self.left.get_or_insert(*reading);
+        let is_long = reading.at.since(first.at).0 >= DOUBTED_AFTER.0;
+        if is_long && reading.off_m.abs() > DOUBTED_SDS * reading.sd_m {
+            let doubt = Doubt { first, same_from: *reading, agreeing_from: None, blind_from_m: None };
+            self.doubt = Some(doubt);
+        }
+        Use::Withhold
+    }
+}
+
+impl Doubt {
+    fn take(&mut self, reading: &Reading) -> Use {
+        let for_at_least = |since: MonoNs, time: DurNs| reading.at.since(since).0 >= time.0;
+        if reading.sd_m > BLIND_M {
+            let from_m = *self.blind_from_m.get_or_insert(reading.shown_m);
+            let is_alive = (reading.shown_m - from_m).abs() >= ALIVE_M;
+            return if is_alive { Use::Seek(self.way_m(reading)) } else { Use::Withhold };
+        }
+        if reading.agrees && reading.sd_m <= SURE_M && self.has_caught_up(reading) {
+            let from = *self.agreeing_from.get_or_insert(reading.at);
+            if for_at_least(from, RETURNED_AFTER) {
+                return Use::Fuse;
+            }
+        } else {
+            self.agreeing_from = None;
+        }
+        let moved_m = (reading.shown_m - self.same_from.shown_m).abs();
+        let unsure_m = reading.sd_m.min(UNSURE_SHARE * moved_m);
+        let same_m = SAME_M + SAME_SHARE * moved_m + unsure_m;
+        if (reading.off_m - self.same_from.off_m).abs() > same_m {
+            self.same_from = *reading;
+            return Use::Withhold;
+        }
+        let runs = moved_m >= RUNS_M && for_at_least(self.same_from.at, RUNS_FOR);
+        if runs || for_at_least(self.same_from.at, STANDS_FOR) {
+            let doubted_m = DOUBTED_SHARE * self.way_m(reading).min(reading.off_m.abs());
+            return Use::Slipped(Slip { lost_m: reading.off_m, doubted_m });
+        }
+        Use::Withhold
+    }
+
+    /// Way since it was doubted, the longer by the counter and by the estimate, m.
+    fn way_m(&self, reading: &Reading) -> f64 {
+        let expected_m = (reading.expected_m() - self.first.expected_m()).abs();
+        expected_m.max((reading.shown_m - self.first.shown_m).abs())
+    }
+
+    /// Whether it shows most of the way that the vehicle has made meanwhile. The gate alone would let a counter in that still
+    /// stands, once the estimate is unsure enough.
+    fn has_caught_up(&self, reading: &Reading) -> bool {
+        let way_m = (reading.expected_m() - self.first.expected_m()).abs();
+        reading.off_m.abs() <= MISSING_SHARE * way_m + MISSING_M
+    }
+}

@@ -1,0 +1,85 @@
+//! How much more the biases of an inertial unit wander than is declared, learnt from the corrections that they get.
+//!
+//! A measurement corrects a bias by its gain times the innovation, whose mean square is the gain squared times the innovation's
+//! variance. Where corrections are larger than that, the bias moves more than the filter believes. Derivation:
+//! `docs/fusion.md`, "Noise that is learnt".
+
+use serde::{Deserialize, Serialize};
+
+use super::settings::{Settings, Wander};
+use headrace_geometry::math;
+
+/// Averaging time of the ratio, s.
+const MEMORY_S: f64 = 10.0;
+/// Mean ratio above which the noise is raised, and how fast: by this power of the ratio in a second.
+const TOO_LARGE: f64 = 1.1;
+const RAISES_PER_S: f64 = 2.0;
+/// Time over which a raised noise falls back, s.
+const FALLS_OVER_S: f64 = 20.0;
+/// Factor at first: a unit is taken to be restless until it has shown otherwise.
+const AT_FIRST: f64 = 1e4;
+/// Wandering of the worst unit allowed for, per root of a second: 0.3 degrees/s and 50 mm/s^2 in 300 s.
+const MOST_RATE: f64 = 4.3e-4;
+const MOST_FORCE: f64 = 4.1e-3;
+
+/// See the module's description: gyros, accelerometers.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Unrest([Ratio; 2]);
+
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+struct Ratio {
+    /// Sums of squared corrections, and of what they should be, fading.
+    corrected: f64,
+    expected: f64,
+    factor: f64,
+}
+
+impl Default for Unrest {
+    fn default() -> Self {
+        Self([Ratio { corrected: 0.0, expected: 0.0, factor: AT_FIRST }; 2])
+    }
+}
+
+/// Largest factor for a process: what makes it as restless as the worst unit.
+fn most(wander: Wander, worst: f64) -> f64 {
+    let density = 2.0 * wander.reach * wander.reach / wander.time_s;
+    (worst * worst / density).max(1.0)
+}
+
+impl Unrest {
+    /// Notes a correction: the biases' covariances with the innovation, gyros' and accelerometers', the innovation's variance,
+    /// and its normalised square.
+    pub fn note(&mut self, covariances: [[f64; 3]; 2], variance: f64, nis: f64) {
+        for (ratio, covariances) in self.0.iter_mut().zip(covariances) {
+            // (P h / s)^2 s, summed over the axes.
+            let expected = covariances.iter().map(|c| c * c).sum::<f64>() / variance;
+            ratio.expected += expected;
+            ratio.corrected += expected * nis;
+        }
+    }
+
+    /// Adapts the factors after an epoch of `dt_s`.
+    pub fn pass(&mut self, dt_s: f64, settings: &Settings) {
+        let limits = [most(settings.rate_bias, MOST_RATE), most(settings.force_bias, MOST_FORCE)];
+        for (ratio, most) in self.0.iter_mut().zip(limits) {
+            let mean = if ratio.expected > 0.0 { ratio.corrected / ratio.expected } else { 1.0 };
+            if mean > TOO_LARGE {
+                ratio.factor *= math::exp(RAISES_PER_S * dt_s * math::ln(mean));
+            } else {
+                ratio.factor *= math::exp(-dt_s / FALLS_OVER_S);
+            }
+            ratio.factor = ratio.factor.clamp(1.0, most);
+            let left = math::exp(-dt_s / MEMORY_S);
+            ratio.corrected *= left;
+            ratio.expected *= left;
+        }
+    }
+
+    /// Factors of the process noise of gyro and accelerometer biases, at least 1.
+    pub fn factors(&self) -> [f64; 2] {
+        if std::env::var("NOU").is_ok() {
+            return [1.0; 2];
+        }
+        self.0.map(|ratio| ratio.factor)
+    }
+}
