@@ -21,7 +21,7 @@ const ACCEL_TURN_ON_MPS2: f64 = 0.02;
 const ACCEL_IN_RUN_MPS2: f64 = 2e-3;
 
 /// The noise of the unit that a message set is named after; `None` where the set is of many units.
-pub(crate) fn of(set: &MessageSet) -> Option<InertialNoise> {
+pub(crate) fn of(set: MessageSet) -> Option<InertialNoise> {
     match set {
         // MT1603P: 0.007 degrees/s/sqrt(Hz), 8 degrees/h, 60 ug/sqrt(Hz). Counts of 2^-9 rad/s at 100 Hz add 0.003.
         MessageSet::Xsens(_) => Some(unit(0.0077 * DEGREE, 8.0 * DEGREE_AN_HOUR, 60.0 * MICRO_G)),

@@ -126,7 +126,7 @@ impl Device for CanImu {
 
     fn inertial_noise(&self) -> Option<InertialNoise> {
         match &self.known {
-            Known::Preset(meaning) => noise::of(&meaning.set),
+            Known::Preset(meaning) => noise::of(meaning.set),
             Known::Dbc(_) => None,
         }
     }
