@@ -14,6 +14,7 @@ pub mod garbling;
 pub mod instrumented;
 pub mod json_schema;
 mod log_files;
+pub mod outline;
 pub mod random;
 pub mod random_dives;
 #[cfg(unix)]
@@ -22,6 +23,7 @@ pub mod scenes;
 mod short_dive;
 pub mod spacings;
 pub mod tracking;
+pub mod truth;
 pub mod wall;
 
 use std::path::Path;
