@@ -7,6 +7,7 @@ pub mod advised;
 #[cfg(unix)]
 pub mod faulty;
 pub mod field;
+pub mod field_table;
 pub mod flags;
 mod folder;
 #[cfg(unix)]
