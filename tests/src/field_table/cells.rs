@@ -6,6 +6,7 @@ use headrace_sensor::device::Sense;
 use headrace_simulator::Scene;
 use headrace_vehicle::VehicleConfig;
 
+use super::breaking::Breakage;
 use crate::random_dives::Draw;
 use crate::scenes;
 
@@ -96,16 +97,16 @@ pub type Place = (&'static str, f64);
 pub const PLACES: [Place; 3] = [("portal", 3.0), ("3000", 3000.0), ("6900", 6900.0)];
 
 /// How fast a vehicle goes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Driven {
     /// As planned: the vehicle file's speed, but no more than the plan's for mode and target.
     Planned,
-    /// A fifth faster than the plan's speed for mode and target, phases as before.
-    Faster,
+    /// So many times the plan's speed for mode and target, phases as planned.
+    Times(f64),
 }
 
 /// Both with their names.
-pub const DRIVEN: [(&str, Driven); 2] = [("planned", Driven::Planned), ("faster", Driven::Faster)];
+pub const DRIVEN: [(&str, Driven); 2] = [("planned", Driven::Planned), ("faster", Driven::Times(1.2))];
 
 /// A cell of the table.
 #[derive(Debug, Clone, Copy)]
@@ -144,7 +145,7 @@ impl Cell {
         let plain = parse(&self.text(seed, length_m, 0.1, ""), &told, seed);
         let [planned_mps, speed_mps] = self.speeds_mps(&plain.vehicle);
         let told = told.replace("PLANNED", &format!("{planned_mps:.4}"));
-        let effects = self.effects(&plain, seed);
+        let effects = self.effects(&plain, seed, length_m / speed_mps);
         let truly = self.truly(&told, &plain, seed);
         let text = self.text(seed, length_m, speed_mps, &effects);
         CellDive { scene: parse(&text, &truly, seed), believed: parse(&text, &told, seed) }
@@ -194,7 +195,7 @@ impl Cell {
         let planned_mps = file_mps.unwrap_or(most_mps).min(most_mps);
         match self.driven {
             Driven::Planned => [planned_mps, planned_mps],
-            Driven::Faster => [planned_mps, 1.2 * most_mps],
+            Driven::Times(times) => [planned_mps, times * most_mps],
         }
     }
 
@@ -226,7 +227,7 @@ impl Cell {
         if self.vehicle.name == "pipe" { 0.3 * most_m } else { most_m }
     }
 
-    fn effects(&self, plain: &Scene, seed: u64) -> String {
+    fn effects(&self, plain: &Scene, seed: u64, duration_s: f64) -> String {
         let heads = of_sense(plain, Sense::Head);
         let occlusion = "occlusion = {}\n";
         if self.condition == Condition::Clean {
@@ -245,7 +246,7 @@ impl Cell {
         format!(
             "{occlusion}{DATA_SHEET_SENSORS}{bias}{tables}{}{}",
             self.murk(&heads),
-            self.wrong(plain, seed)
+            self.wrong(plain, seed, duration_s)
         )
     }
 
@@ -263,7 +264,7 @@ impl Cell {
     }
 
     /// The one thing that is wrong or breaks.
-    fn wrong(&self, plain: &Scene, seed: u64) -> String {
+    fn wrong(&self, plain: &Scene, seed: u64, duration_s: f64) -> String {
         let mut draw = Draw::new(seed);
         match self.condition {
             Condition::WrongSound => "[effects.sound_speed_error]\nshare = 0.04\n".to_owned(),
@@ -272,6 +273,7 @@ impl Cell {
                 let late = quoted(&of_sense(plain, sense));
                 format!("[effects.line_delay]\nlatency_ms = 300\nsensors = {late}\n")
             }
+            Condition::Broken => Breakage::of(seed, plain, duration_s).effect(),
             _ => String::new(),
         }
     }

@@ -41,6 +41,8 @@ pub struct Figures {
     pub inner_m: f64,
     /// Of them, passed, failed, can't say, open.
     pub verdicts_m: [f64; 4],
+    /// Of them, D_true is within the target.
+    pub passable_m: f64,
     /// Of each inner section with a bounded hole: D less D_true and sigma, m.
     pub errors: Vec<[f64; 2]>,
     /// For each kind of source, measurements used and the sum of their normalised innovations squared.
@@ -64,7 +66,7 @@ impl Figures {
             from_m >= dive.truth.way_m[0] + end_m && to_m <= dive.truth.way_m[1] - end_m
         };
         for section in dive.sections.iter().filter(inner) {
-            self.weigh(section);
+            self.weigh(section, target_m);
         }
         self.innovate(dive, scene);
         self.tell(dive);
@@ -82,9 +84,12 @@ impl Figures {
         self.failed_under += is(failed && share < 0.9);
     }
 
-    fn weigh(&mut self, section: &JudgedSection) {
+    fn weigh(&mut self, section: &JudgedSection, target_m: f64) {
         let length_m = section.report.end_m - section.report.start_m;
         self.inner_m += length_m;
+        if section.true_hole_m <= target_m {
+            self.passable_m += length_m;
+        }
         let place = ["pass", "fail", "cannot_say", "open"].iter().position(|v| *v == section.report.verdict);
         if let Some(metres) = place.and_then(|place| self.verdicts_m.get_mut(place)) {
             *metres += length_m;
@@ -132,6 +137,11 @@ impl Figures {
     /// Share of the inner metres with a verdict, by its number: passed, failed, can't say, open.
     pub fn share(&self, verdict: usize) -> f64 {
         self.verdicts_m[verdict] / self.inner_m
+    }
+
+    /// Share of the inner metres with D_true within the target.
+    pub fn passable(&self) -> f64 {
+        self.passable_m / self.inner_m
     }
 
     /// Root mean square of the errors over their sigmas.

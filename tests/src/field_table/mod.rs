@@ -1,5 +1,6 @@
 //! The table of field dives: vehicles in conditions at places, each dive judged against its truth.
 
+pub mod breaking;
 mod cells;
 mod figures;
 

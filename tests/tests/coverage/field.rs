@@ -33,7 +33,7 @@ fn val_what_passes_is_within_the_target() {
     let vehicle = VEHICLES.into_iter().find(|vehicle| vehicle.name == "vita2-4").unwrap();
     for condition in [Condition::Clean, Condition::DataSheet, Condition::Lively] {
         for start_m in [16.0, 6900.0] {
-            for driven in [Driven::Planned, Driven::Faster] {
+            for driven in [Driven::Planned, Driven::Times(1.2)] {
                 let cell = Cell { vehicle, condition, start_m, driven };
                 let figures = field_table::figures(&cell, [1], 15.0);
                 let name = format!("{condition:?} {start_m} {driven:?}");
