@@ -1,8 +1,6 @@
 //! What the figures of a cell must be.
 
-use headrace_tests::field_table::{Condition, Driven, Figures, KINDS_OF_SOURCES};
-
-use crate::table::NamedCell;
+use headrace_tests::field_table::{Cell, Condition, Driven, Figures, KINDS_OF_SOURCES};
 
 /// Few false fails, as a share of the sections with D_true below 0.9 T, few that can't be said, and as many passed as could,
 /// as shares of the metres.
@@ -28,8 +26,8 @@ pub(crate) struct Missed {
 }
 
 impl Missed {
-    pub(crate) fn of(cell: &NamedCell, figures: &Figures) -> Self {
-        let bounds = match cell.cell.condition {
+    pub(crate) fn of(cell: &Cell, figures: &Figures) -> Self {
+        let bounds = match cell.condition {
             Condition::Clean | Condition::DataSheet => {
                 Some(Bounds { false_fails: 0.0, cannot_say: 0.02, passed: 0.97 })
             }
@@ -38,7 +36,7 @@ impl Missed {
             }
             _ => None,
         };
-        let planned = cell.cell.driven == Driven::Planned;
+        let planned = cell.driven == Driven::Planned;
         let ratios = if bounds.is_some() { 0.7..=1.3 } else { 0.0..=1.5 };
         let judged = !figures.errors.is_empty();
         let nis = |kind| bounds.is_some() && figures.nis(kind).is_some_and(|nis| !(0.7..=1.4).contains(&nis));

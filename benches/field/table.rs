@@ -96,14 +96,26 @@ pub(crate) fn print(cells: &[NamedCell], figures: &[Figures], arguments: &Argume
         ];
         println!("| {} |", row.join(" | "));
     }
+    plans(cells);
     println!("\n{with_misses} of {} cells miss a goal", cells.len());
+}
+
+/// Planned speeds over those of Eq. 16.
+fn plans(cells: &[NamedCell]) {
+    println!("\n| vehicle | plan over Eq. 16 (>= 0.95) |\n|---|---|");
+    for vehicle in VEHICLES {
+        if let Some(cell) = cells.iter().find(|cell| cell.cell.vehicle.name == vehicle.name) {
+            let share = cell.cell.plan_share();
+            println!("| {} | {} |", vehicle.name, marked(format!("{share:.2}"), share < 0.95));
+        }
+    }
 }
 
 fn judged<'a>(
     cells: &'a [NamedCell],
     figures: &'a [Figures],
 ) -> impl Iterator<Item = (&'a NamedCell, &'a Figures, Missed)> {
-    cells.iter().zip(figures).map(|(cell, figures)| (cell, figures, Missed::of(cell, figures)))
+    cells.iter().zip(figures).map(|(cell, figures)| (cell, figures, Missed::of(&cell.cell, figures)))
 }
 
 fn marked(text: String, missed: bool) -> String {

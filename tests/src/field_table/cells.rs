@@ -25,16 +25,19 @@ pub struct Vehicle {
     pub layout: &'static str,
     /// Metres of a dive, unless told otherwise: more where passes are far apart.
     pub length_m: f64,
+    /// The largest speed at which Eq. 16 keeps the target with what the vehicle hides, and no other margin, m/s. A number, so
+    /// that speeds beyond it stay the same when plans change.
+    pub edge_mps: f64,
 }
 
 /// The vehicles.
 pub const VEHICLES: [Vehicle; 6] = [
-    vehicle("vita1", "vita1.toml", "slow", 5.0, "phase_shift", 45.0),
-    vehicle("vita2-2", "vita2-2.toml", "fast", 0.5, "phase_shift", 15.0),
-    vehicle("vita2-3", "vita2-3.toml", "fast", 0.5, "phase_shift", 15.0),
-    vehicle("vita2-4", "vita2-4.toml", "fast", 0.5, "phase_shift", 15.0),
-    vehicle("vita2-4-sectors", "vita2-4.toml", "fast", 0.5, "sector_offset", 15.0),
-    vehicle("pipe", "pipe.toml", "fast", 0.5, "phase_shift", 10.0),
+    vehicle("vita1", "vita1.toml", "slow", 5.0, "phase_shift", 45.0, 0.231),
+    vehicle("vita2-2", "vita2-2.toml", "fast", 0.5, "phase_shift", 15.0, 0.115),
+    vehicle("vita2-3", "vita2-3.toml", "fast", 0.5, "phase_shift", 15.0, 0.089),
+    vehicle("vita2-4", "vita2-4.toml", "fast", 0.5, "phase_shift", 15.0, 0.118),
+    vehicle("vita2-4-sectors", "vita2-4.toml", "fast", 0.5, "sector_offset", 15.0, 0.099),
+    vehicle("pipe", "pipe.toml", "fast", 0.5, "phase_shift", 10.0, 0.116),
 ];
 
 const fn vehicle(
@@ -44,8 +47,9 @@ const fn vehicle(
     target_m: f64,
     layout: &'static str,
     length_m: f64,
+    edge_mps: f64,
 ) -> Vehicle {
-    Vehicle { name, file, mode, target_m, layout, length_m }
+    Vehicle { name, file, mode, target_m, layout, length_m, edge_mps }
 }
 
 /// What is the matter with a dive.
@@ -99,9 +103,9 @@ pub const PLACES: [Place; 3] = [("portal", 3.0), ("3000", 3000.0), ("6900", 6900
 /// How fast a vehicle goes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Driven {
-    /// As planned: the vehicle file's speed, but no more than the plan's for mode and target.
+    /// As planned: the vehicle file's speed, but no more than what `plan` says for mode and target.
     Planned,
-    /// So many times the plan's speed for mode and target, phases as planned.
+    /// So many times the largest speed of Eq. 16, phases as planned.
     Times(f64),
 }
 
@@ -141,14 +145,30 @@ const POOR_BIAS: &str = "imu_bias = { gyro_degps = 0.2, accel_mps2 = 0.02, tau_s
 impl Cell {
     /// The dive of a seed over so many metres.
     pub fn dive(&self, seed: u64, length_m: f64) -> CellDive {
-        let told = self.told();
-        let plain = parse(&self.text(seed, length_m, 0.1, ""), &told, seed);
+        let plain = self.plain(seed, length_m);
         let [planned_mps, speed_mps] = self.speeds_mps(&plain.vehicle);
-        let told = told.replace("PLANNED", &format!("{planned_mps:.4}"));
+        let told = self.told().replace("PLANNED", &format!("{planned_mps:.4}"));
         let effects = self.effects(&plain, seed, length_m / speed_mps);
         let truly = self.truly(&told, &plain, seed);
         let text = self.text(seed, length_m, speed_mps, &effects);
         CellDive { scene: parse(&text, &truly, seed), believed: parse(&text, &told, seed) }
+    }
+
+    /// The speed that `plan` says over that of Eq. 16.
+    pub fn plan_share(&self) -> f64 {
+        plan_mps(&self.plain(1, 1.0).vehicle, self.vehicle.mode) / self.vehicle.edge_mps
+    }
+
+    /// What breaks in the dive of a seed over so many metres.
+    pub fn broken(&self, seed: u64, length_m: f64) -> Breakage {
+        let plain = self.plain(seed, length_m);
+        let [_, speed_mps] = self.speeds_mps(&plain.vehicle);
+        Breakage::of(seed, &plain, length_m / speed_mps)
+    }
+
+    /// Without effects, at some speed.
+    fn plain(&self, seed: u64, length_m: f64) -> Scene {
+        parse(&self.text(seed, length_m, 0.1, ""), &self.told(), seed)
     }
 
     /// The vehicle file that headrace is told; the planned speed is yet to be filled in.
@@ -195,7 +215,7 @@ impl Cell {
         let planned_mps = file_mps.unwrap_or(most_mps).min(most_mps);
         match self.driven {
             Driven::Planned => [planned_mps, planned_mps],
-            Driven::Times(times) => [planned_mps, times * most_mps],
+            Driven::Times(times) => [planned_mps, times * self.vehicle.edge_mps],
         }
     }
 

@@ -2,6 +2,7 @@
 //! `cargo bench -p headrace_benches --bench field` makes the whole table.
 
 use headrace_tests::field_table::{self, Cell, Condition, Driven, Figures, KINDS_OF_SOURCES, VEHICLES};
+use headrace_tests::truth;
 
 fn print(name: &str, figures: &Figures) {
     let nis = (0..KINDS_OF_SOURCES.len()).map(|kind| figures.nis(kind).map_or(f64::NAN, |nis| nis));
@@ -49,4 +50,33 @@ fn val_what_passes_is_within_the_target() {
             }
         }
     }
+}
+
+/// What would pass all sees each section that mustn't, and what would fail all each that mustn't.
+#[test]
+fn figures_see_false_verdicts() {
+    let vehicle = VEHICLES.into_iter().find(|vehicle| vehicle.name == "vita2-4").unwrap();
+    let cell = Cell { vehicle, condition: Condition::Clean, start_m: 16.0, driven: Driven::Times(1.0) };
+    let dive = cell.dive(1, 8.0);
+    let mut judged = truth::dive_believing(&dive.scene, &dive.believed.vehicle);
+    let mut all = |verdict| {
+        for section in &mut judged.sections {
+            section.report.verdict = verdict;
+        }
+        let mut figures = Figures::default();
+        figures.add(&judged, &dive.scene);
+        figures
+    };
+    let passed = all("pass");
+    assert!(passed.over > 5 && passed.passed_over == passed.over, "{passed:?}");
+    // The ends, where there is a neighbour on one side alone.
+    assert!((1..=passed.over).contains(&passed.passed_far), "{passed:?}");
+    assert_eq!((passed.failed_under, passed.share(0)), (0, 1.0));
+    let failed = all("fail");
+    assert!(failed.failed_under == failed.under && failed.passed_over == 0, "{failed:?}");
+    let told_m = failed.way_m[1];
+    judged.sections.remove(judged.sections.len() / 2);
+    let mut less = Figures::default();
+    less.add(&judged, &dive.scene);
+    assert!((told_m - less.way_m[1] - judged.report.section_m).abs() < 1e-9, "{told_m} {less:?}");
 }

@@ -5,6 +5,7 @@
 mod bad;
 mod causes;
 mod dives;
+mod faults;
 mod field;
 mod flags;
 mod memory;

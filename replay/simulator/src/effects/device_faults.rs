@@ -1,10 +1,11 @@
 //! Devices that break.
 
 mod line;
+mod span;
 mod values;
 
 use headrace_config::{ConfigError, Section};
-use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_geometry::time::DurNs;
 use headrace_sensor::device::Sense;
 use headrace_sensor::measurement::{GroundVelocity, Inertia, Payout, Pressure, Sounding};
 
@@ -17,6 +18,7 @@ use crate::error::SceneError;
 use crate::facts::Facts;
 use crate::stages::Stage;
 use line::BrokenLine;
+use span::Span;
 use values::{Jumped, Stuck};
 
 /// A device breaks: `kind` says how, `from_s` from when (seconds of the dive, 0), `for_s` for how long (to the end). After
@@ -43,19 +45,6 @@ enum Fault {
 struct Parameters {
     fault: Fault,
     span: Span,
-}
-
-/// A span of time, its end excluded.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Span {
-    from: MonoNs,
-    to: MonoNs,
-}
-
-impl Span {
-    fn holds(&self, at: MonoNs) -> bool {
-        (self.from..self.to).contains(&at)
-    }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -4,7 +4,7 @@ use bevy_ecs::prelude::{Component, Query};
 use headrace_geometry::math;
 use headrace_sensor::device::Direction;
 
-use super::Span;
+use super::span::Span;
 use crate::random::Stream;
 use crate::sensing::Line;
 

@@ -4,7 +4,7 @@ use bevy_ecs::prelude::{Component, Query, Res};
 use headrace_geometry::frames::Rot;
 use headrace_sensor::measurement::{GroundVelocity, Inertia, Measurement, Payout, Pressure, Sounding};
 
-use super::Span;
+use super::span::Span;
 use crate::sensing::{Echosounder, Samples, Scenery};
 
 /// Goes on saying its last value.
