@@ -21,7 +21,7 @@ const ROUNDS: usize = 15;
 const SPEED_MPS: f64 = 0.11;
 
 /// Every effect with some parameters; heads turn in sectors, so that `sector_end_slowing` applies.
-const EFFECTS: [(&str, &str); 28] = [
+const EFFECTS: [(&str, &str); 29] = [
     ("start_phase_error", "max_deg = 20"),
     ("sector_end_slowing", "lag_ms = 60"),
     ("skipped_steps", "per_thousand = 0.2"),
@@ -47,6 +47,7 @@ const EFFECTS: [(&str, &str); 28] = [
     ("tether_slip", "per_100m = 1"),
     ("late_winding", "hold_m = 0.2"),
     ("tether_quantum", ""),
+    ("device_faults", "kind = \"stick\"\nfrom_s = 5\nfor_s = 5\nsensors = [\"ping_left\"]"),
     ("clock_drift", "sd_ppm = 20"),
     ("line_delay", "jitter_ms = 2"),
     ("byte_errors", "flipped_per_million = 20"),

@@ -7,6 +7,7 @@ pub mod advised;
 #[cfg(unix)]
 pub mod faulty;
 pub mod field;
+pub mod field_table;
 pub mod flags;
 mod folder;
 #[cfg(unix)]
@@ -14,6 +15,7 @@ pub mod garbling;
 pub mod instrumented;
 pub mod json_schema;
 mod log_files;
+pub mod outline;
 pub mod random;
 pub mod random_dives;
 #[cfg(unix)]
@@ -22,6 +24,7 @@ pub mod scenes;
 mod short_dive;
 pub mod spacings;
 pub mod tracking;
+pub mod truth;
 pub mod wall;
 
 use std::path::Path;

@@ -5,7 +5,10 @@
 mod bad;
 mod causes;
 mod dives;
+mod faults;
+mod field;
 mod flags;
 mod memory;
 mod metamorphic;
 mod oracle;
+mod truth;

@@ -14,6 +14,7 @@ mod byte_errors;
 mod clock_drift;
 mod current;
 mod depth_steps;
+mod device_faults;
 mod head_stalls;
 mod imu_bias;
 mod imu_noise;
@@ -47,7 +48,7 @@ pub use effect::{Effect, EffectKind};
 pub use targets::PerSensor;
 
 /// All effects. Within a stage, systems run in this order, whatever the order of the scene.
-pub const KINDS: [&dyn EffectKind; 28] = [
+pub const KINDS: [&dyn EffectKind; 29] = [
     // Turning of heads, and the pose from which they look.
     &start_phase_error::StartPhaseErrorKind,
     &sector_end_slowing::SectorEndSlowingKind,
@@ -80,6 +81,8 @@ pub const KINDS: [&dyn EffectKind; 28] = [
     &tether_slip::TetherSlipKind,
     &tether_lag::TetherLagKind,
     &tether_quantum::TetherQuantumKind,
+    // Devices that break.
+    &device_faults::DeviceFaultsKind,
     // Clocks and lines.
     &clock_drift::ClockDriftKind,
     &line_delay::LineDelayKind,

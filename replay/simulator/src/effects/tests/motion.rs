@@ -3,7 +3,7 @@ use headrace_sensor::measurement::{Inertia, Payout, Pressure, Sounding};
 use crate::testing_motion::{Bench, same_in_any_slices};
 
 /// Every effect on motion, angles, clocks and lines, with the sensor whose measurements it changes.
-const ALONE: [(&str, &str); 17] = [
+const ALONE: [(&str, &str); 18] = [
     ("head_a", "[effects.start_phase_error]\n"),
     ("head_a", "[effects.sector_end_slowing]\n"),
     ("head_a", "[effects.skipped_steps]\nper_thousand = 20\n"),
@@ -18,6 +18,7 @@ const ALONE: [(&str, &str); 17] = [
     ("tether", "[effects.tether_slip]\nper_100m = 50\n"),
     ("tether", "[effects.late_winding]\n"),
     ("tether", "[effects.tether_quantum]\n"),
+    ("depth", "[effects.device_faults]\nkind = \"stick\"\nfrom_s = 5\nfor_s = 10\n"),
     ("imu", "[effects.clock_drift]\nppm = 50\n"),
     ("", "[effects.line_delay]\nlatency_ms = 5\njitter_ms = 2\n"),
     ("", "[effects.byte_errors]\nflipped_per_million = 100\ndropped_per_million = 100\n"),

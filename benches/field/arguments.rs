@@ -1,0 +1,75 @@
+//! Arguments of the bench.
+
+use std::path::PathBuf;
+
+use headrace_tests::field_table::PLACES;
+
+/// Dives of a cell, all and of `--quick`.
+const SEEDS: [u64; 2] = [10, 1];
+/// `--quick` leaves out every second place and most vehicles.
+const QUICK_VEHICLES: [&str; 2] = ["vita1", "vita2-4"];
+
+/// What to run.
+pub(crate) struct Arguments {
+    /// A tenth of everything.
+    pub(crate) quick: bool,
+    /// Parts of a cell's name; an asterisk is any.
+    pub(crate) cell: Vec<String>,
+    /// Dives of each cell.
+    pub(crate) seeds: u64,
+    /// The first seed.
+    pub(crate) from_seed: u64,
+    /// Metres of each dive, where not each vehicle's own.
+    pub(crate) metres: Option<f64>,
+    /// File of the figures.
+    pub(crate) json: PathBuf,
+}
+
+impl Arguments {
+    pub(crate) fn of(words: impl Iterator<Item = String>) -> Self {
+        // cargo adds --bench.
+        let mut words = words.filter(|word| word != "--bench");
+        let mut seeds = None;
+        let json = headrace_tests::root().join("target/field.json");
+        let mut all = Self { quick: false, cell: Vec::new(), seeds: 0, from_seed: 1, metres: None, json };
+        while let Some(word) = words.next() {
+            if word == "--quick" {
+                all.quick = true;
+                continue;
+            }
+            let value = words.next().unwrap_or_else(|| panic!("{word} needs a value"));
+            let number =
+                || value.parse().unwrap_or_else(|_| panic!("{word} {value}: must be a whole number"));
+            match word.as_str() {
+                "--cell" => all.cell = value.split('/').map(str::to_owned).collect(),
+                "--seeds" => seeds = Some(number()),
+                "--from-seed" => all.from_seed = number(),
+                "--metres" => {
+                    let metres =
+                        value.parse().unwrap_or_else(|_| panic!("--metres {value}: must be a number"));
+                    all.metres = Some(metres);
+                }
+                "--json" => all.json = PathBuf::from(value),
+                _ => panic!("{word}: known are --quick, --cell, --seeds, --from-seed, --metres, --json"),
+            }
+        }
+        all.seeds = seeds.unwrap_or(SEEDS[usize::from(all.quick)]);
+        all
+    }
+
+    /// Whether to run a cell of this name.
+    pub(crate) fn wants(&self, name: &[&str]) -> bool {
+        let named = |(part, wanted): (&&str, &String)| wanted == "*" || wanted == part;
+        let skipped = self.quick && self.cell.is_empty() && {
+            name.first().is_some_and(|vehicle| !QUICK_VEHICLES.contains(vehicle))
+                || name.get(2) == Some(&"3000")
+        };
+        !skipped && name.iter().zip(&self.cell).all(named)
+    }
+
+    /// The place that a cell's name asks for, where it is none of the table's.
+    pub(crate) fn own_place_m(&self) -> Option<(&str, f64)> {
+        let place = self.cell.get(2).filter(|place| PLACES.iter().all(|(known, _)| known != place))?;
+        Some((place, place.parse().ok()?))
+    }
+}

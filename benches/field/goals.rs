@@ -1,0 +1,72 @@
+//! What the figures of a cell must be.
+
+use headrace_tests::field_table::{Cell, Condition, Driven, Figures, KINDS_OF_SOURCES};
+
+/// Few false fails, as a share of the sections with D_true below 0.9 T, few that can't be said, and as many passed as could,
+/// as shares of the metres.
+struct Bounds {
+    false_fails: f64,
+    cannot_say: f64,
+    passed: f64,
+}
+
+/// The goals that a cell misses.
+#[derive(Debug, Clone, Copy, Default)]
+#[expect(clippy::struct_excessive_bools, reason = "one for each goal")]
+pub(crate) struct Missed {
+    pub(crate) passed_over: bool,
+    pub(crate) passed_far: bool,
+    pub(crate) failed_under: bool,
+    pub(crate) cannot_say: bool,
+    pub(crate) passed: bool,
+    pub(crate) ratio: bool,
+    pub(crate) within: bool,
+    pub(crate) nis: [bool; KINDS_OF_SOURCES.len()],
+    pub(crate) told: bool,
+}
+
+impl Missed {
+    pub(crate) fn of(cell: &Cell, figures: &Figures) -> Self {
+        let bounds = match cell.condition {
+            Condition::Clean | Condition::DataSheet => {
+                Some(Bounds { false_fails: 0.0, cannot_say: 0.02, passed: 0.97 })
+            }
+            Condition::Poor | Condition::Murk | Condition::Lively => {
+                Some(Bounds { false_fails: 0.005, cannot_say: 0.08, passed: 0.88 })
+            }
+            _ => None,
+        };
+        let planned = cell.driven == Driven::Planned;
+        let ratios = if bounds.is_some() { 0.7..=1.3 } else { 0.0..=1.5 };
+        let judged = !figures.errors.is_empty();
+        let nis = |kind| bounds.is_some() && figures.nis(kind).is_some_and(|nis| !(0.7..=1.4).contains(&nis));
+        Self {
+            passed_over: figures.false_passes() > 0.025,
+            passed_far: figures.passed_far > 0,
+            failed_under: bounds.as_ref().is_some_and(|bounds| figures.false_fails() > bounds.false_fails),
+            cannot_say: bounds.as_ref().is_some_and(|bounds| planned && figures.share(2) > bounds.cannot_say),
+            passed: bounds
+                .as_ref()
+                .is_some_and(|bounds| planned && figures.share(0) < bounds.passed * figures.passable()),
+            ratio: judged && !ratios.contains(&figures.ratio_rms()),
+            within: judged && bounds.is_some() && !(0.93..=0.98).contains(&figures.within(2.0)),
+            nis: core::array::from_fn(nis),
+            told: figures.way_m[1] < figures.way_m[0] - 1e-6,
+        }
+    }
+
+    /// How many.
+    pub(crate) fn count(&self) -> usize {
+        let single = [
+            self.passed_over,
+            self.passed_far,
+            self.failed_under,
+            self.cannot_say,
+            self.passed,
+            self.ratio,
+            self.within,
+            self.told,
+        ];
+        single.iter().chain(&self.nis).filter(|missed| **missed).count()
+    }
+}

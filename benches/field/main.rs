@@ -1,0 +1,54 @@
+//! The table of field dives: verdicts and sigmas of simulated dives against their truth, by vehicle, condition, place and
+//! speed. Prints Markdown, and writes the same figures as JSON.
+//!
+//! `cargo bench -p headrace_benches --bench field` runs all cells in some ten minutes on two cores; `-- --quick` with a
+//! tenth of the dives. `--cell VEHICLE/CONDITION/PLACE/SPEED` runs those cells alone (any part may be `*`, parts at the end may be left
+//! out, a place may be any chainage), `--seeds N` so many dives each, `--from-seed N` begins with another,
+//! `--metres N` makes each so long, `--json FILE` says where to write (target/field.json).
+//! D_true is from `headrace_tests::truth`, which has nothing of the program's coverage. The figures are the report's.
+
+#![expect(clippy::unwrap_used, clippy::panic, reason = "a benchmark stops at what it can't do")]
+
+mod arguments;
+mod goals;
+mod table;
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use headrace_tests::field_table::{self, Figures};
+
+use arguments::Arguments;
+use table::NamedCell;
+
+fn main() {
+    let arguments = Arguments::of(std::env::args().skip(1));
+    let cells = table::cells(&arguments);
+    assert!(!cells.is_empty(), "--cell names none: vehicles, conditions, places and speeds are in the table");
+    let figures = run(&cells, &arguments);
+    table::print(&cells, &figures, &arguments);
+    table::write_json(&cells, &figures, &arguments);
+}
+
+/// Figures of all cells, on all cores.
+fn run(cells: &[NamedCell], arguments: &Arguments) -> Vec<Figures> {
+    let next = AtomicUsize::new(0);
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let work = || {
+        let mut done = Vec::new();
+        loop {
+            let number = next.fetch_add(1, Ordering::Relaxed);
+            let Some(NamedCell { cell, .. }) = cells.get(number) else { return done };
+            let seeds = arguments.from_seed..arguments.from_seed + arguments.seeds;
+            let length_m = arguments.metres.unwrap_or(cell.vehicle.length_m);
+            done.push((number, field_table::figures(cell, seeds, length_m)));
+            eprint!("\r{} of {} cells", number + 1, cells.len());
+        }
+    };
+    let mut all: Vec<(usize, Figures)> = std::thread::scope(|scope| {
+        let threads: Vec<_> = (0..cores).map(|_| scope.spawn(work)).collect();
+        threads.into_iter().flat_map(|thread| thread.join().unwrap()).collect()
+    });
+    eprintln!();
+    all.sort_by_key(|(number, _)| *number);
+    all.into_iter().map(|(_, figures)| figures).collect()
+}

@@ -1,0 +1,148 @@
+//! Cells, and their figures as Markdown and JSON.
+
+use headrace_tests::field_table::{
+    CONDITIONS, Cell, Condition, DRIVEN, Figures, KINDS_OF_SOURCES, PLACES, VEHICLES, Vehicle,
+};
+use serde_json::json;
+
+use crate::arguments::Arguments;
+use crate::goals::Missed;
+
+/// The pipe has 400 m.
+const PIPE_SHARE: f64 = 0.05;
+
+/// A cell with its name.
+pub(crate) struct NamedCell {
+    /// Vehicle, condition, place, speed.
+    pub(crate) name: [String; 4],
+    pub(crate) cell: Cell,
+}
+
+/// The cells that are wanted.
+pub(crate) fn cells(arguments: &Arguments) -> Vec<NamedCell> {
+    let mut cells = Vec::new();
+    for vehicle in VEHICLES {
+        for (condition_name, condition) in CONDITIONS {
+            for (place, start_m) in PLACES.into_iter().chain(arguments.own_place_m()) {
+                for (speed, driven) in DRIVEN {
+                    let name = [vehicle.name, condition_name, place, speed];
+                    if arguments.wants(&name) && has(&vehicle, condition, arguments, place) {
+                        let far = vehicle.name == "pipe" && start_m > 400.0;
+                        let start_m = if far { PIPE_SHARE * start_m } else { start_m };
+                        let cell = Cell { vehicle, condition, start_m, driven };
+                        cells.push(NamedCell { name: name.map(str::to_owned), cell });
+                    }
+                }
+            }
+        }
+    }
+    cells
+}
+
+/// Whether the table has a cell: what is wrong or breaks is tried at one place, unless asked for.
+fn has(vehicle: &Vehicle, condition: Condition, arguments: &Arguments, place: &str) -> bool {
+    let graded =
+        [Condition::Clean, Condition::DataSheet, Condition::Poor, Condition::Murk, Condition::Lively];
+    let (common, asked) = (graded.contains(&condition), !arguments.cell.is_empty());
+    common || asked || (place == "6900" && ["vita1", "vita2-4"].contains(&vehicle.name))
+}
+
+const LEGEND: &str = "\
+Over: sections with D_true > T; passed: of those, passed; far: passed with D_true > 1.1 T; failed under: failed with D_true < 0.9 T,
+of those with it. These count all sections. The following leave out the ends of dives, 2 m and the target: passable is
+the share of metres with D_true <= T, pass, fail, can't say and open are shares of metres; D is the rms error of D and sd the median of its sigma, m; ratio
+is the rms of the errors over their sigmas, within the share within two. NIS is the mean by kind of source. Told: metres of the way with a
+section, of the way. `!` marks what misses the goal; passes are held to the passable metres, as the speed is the plan's and not the live
+advice's. Wrong and broken cells have no goals but those for false passes, the ratio and told metres.
+
+Not simulated: returns lost on single stretches (murk is everywhere), noise of depth, scaled gyros; pilots who follow the advice.
+Conditions wrong-* each have one wrong setting; broken has one device that breaks, by the seed.
+";
+
+/// Prints the table.
+pub(crate) fn print(cells: &[NamedCell], figures: &[Figures], arguments: &Arguments) {
+    println!("{} dives a cell\n\n{LEGEND}", arguments.seeds);
+    println!(
+        "| vehicle | condition | place | speed | over | passed | far | failed under | passable | pass | fail | can't say | open | \
+         D | sd | ratio | within | NIS {} | told |",
+        KINDS_OF_SOURCES.map(|(name, _)| name).join(" / ")
+    );
+    println!("|{}", "---|".repeat(19));
+    let mut with_misses = 0;
+    for (NamedCell { name, .. }, figures, missed) in judged(cells, figures) {
+        with_misses += usize::from(missed.count() > 0);
+        let nis: Vec<String> = (0..KINDS_OF_SOURCES.len())
+            .map(|kind| {
+                figures.nis(kind).map_or("-".to_owned(), |nis| marked(format!("{nis:.2}"), missed.nis[kind]))
+            })
+            .collect();
+        let row = [
+            name.join(" | "),
+            figures.over.to_string(),
+            marked(figures.passed_over.to_string(), missed.passed_over),
+            marked(figures.passed_far.to_string(), missed.passed_far),
+            marked(format!("{}/{}", figures.failed_under, figures.under), missed.failed_under),
+            format!("{:.2}", figures.passable()),
+            marked(format!("{:.2}", figures.share(0)), missed.passed),
+            format!("{:.2}", figures.share(1)),
+            marked(format!("{:.2}", figures.share(2)), missed.cannot_say),
+            format!("{:.2}", figures.share(3)),
+            format!("{:.3}", figures.error_m()),
+            format!("{:.3}", figures.sd_m()),
+            marked(format!("{:.2}", figures.ratio_rms()), missed.ratio),
+            marked(format!("{:.2}", figures.within(2.0)), missed.within),
+            nis.join(" / "),
+            marked(format!("{:.2}/{:.2}", figures.way_m[1], figures.way_m[0]), missed.told),
+        ];
+        println!("| {} |", row.join(" | "));
+    }
+    plans(cells);
+    println!("\n{with_misses} of {} cells miss a goal", cells.len());
+}
+
+/// Planned speeds over those of Eq. 16.
+fn plans(cells: &[NamedCell]) {
+    println!("\n| vehicle | plan over Eq. 16 (>= 0.95) |\n|---|---|");
+    for vehicle in VEHICLES {
+        if let Some(cell) = cells.iter().find(|cell| cell.cell.vehicle.name == vehicle.name) {
+            let share = cell.cell.plan_share();
+            println!("| {} | {} |", vehicle.name, marked(format!("{share:.2}"), share < 0.95));
+        }
+    }
+}
+
+fn judged<'a>(
+    cells: &'a [NamedCell],
+    figures: &'a [Figures],
+) -> impl Iterator<Item = (&'a NamedCell, &'a Figures, Missed)> {
+    cells.iter().zip(figures).map(|(cell, figures)| (cell, figures, Missed::of(&cell.cell, figures)))
+}
+
+fn marked(text: String, missed: bool) -> String {
+    if missed { text + "!" } else { text }
+}
+
+/// Writes the figures.
+pub(crate) fn write_json(cells: &[NamedCell], figures: &[Figures], arguments: &Arguments) {
+    let cells: Vec<_> = judged(cells, figures)
+        .map(|(NamedCell { name, cell }, figures, missed)| {
+            let nis = KINDS_OF_SOURCES.iter().enumerate();
+            let nis = nis.filter_map(|(kind, (name, _))| Some(((*name).to_owned(), figures.nis(kind)?.into())));
+            json!({
+                "vehicle": name[0], "condition": name[1], "place": name[2], "speed": name[3], "start_m": cell.start_m,
+                "target_m": cell.vehicle.target_m, "dives": figures.dives, "sections": figures.sections,
+                "over": figures.over, "passed_over": figures.passed_over, "passed_far": figures.passed_far,
+                "under": figures.under, "failed_under": figures.failed_under,
+                "inner_m": figures.inner_m, "passable_m": figures.passable_m,
+                "pass_m": figures.verdicts_m[0], "fail_m": figures.verdicts_m[1],
+                "cannot_say_m": figures.verdicts_m[2], "open_m": figures.verdicts_m[3],
+                "error_rms_m": figures.error_m(), "sd_median_m": figures.sd_m(), "ratio_rms": figures.ratio_rms(),
+                "within_two": figures.within(2.0), "nis": nis.collect::<serde_json::Map<_, _>>(),
+                "way_m": figures.way_m[0], "told_m": figures.way_m[1], "goals_missed": missed.count(),
+            })
+        })
+        .collect();
+    let all = json!({ "field_version": 1, "seeds": arguments.seeds, "from_seed": arguments.from_seed, "cells": cells });
+    std::fs::write(&arguments.json, serde_json::to_string_pretty(&all).unwrap()).unwrap();
+    println!("figures {}", arguments.json.display());
+}

@@ -1,0 +1,53 @@
+//! What broken devices put on their lines.
+
+use bevy_ecs::prelude::{Component, Query};
+use headrace_geometry::math;
+use headrace_sensor::device::Direction;
+
+use super::span::Span;
+use crate::random::Stream;
+use crate::sensing::Line;
+
+/// Says nothing, or random bytes.
+#[derive(Component)]
+pub(super) struct BrokenLine {
+    span: Span,
+    /// Of the random bytes.
+    stream: Option<Stream>,
+    /// Bytes said so far that were random.
+    said: u64,
+}
+
+impl BrokenLine {
+    pub(super) fn silent(span: Span) -> Self {
+        Self { span, stream: None, said: 0 }
+    }
+
+    pub(super) fn babbling(span: Span, stream: Stream) -> Self {
+        Self { span, stream: Some(stream), said: 0 }
+    }
+
+    fn break_line(&mut self, line: &mut Line) {
+        let Line { messages, bytes } = line;
+        let received = messages.iter_mut().filter(|message| message.direction == Direction::Received);
+        for message in received.filter(|message| self.span.holds(message.at)) {
+            let (from, to) = message.bytes;
+            let Some(stream) = self.stream else {
+                // The outbox drops messages without bytes; the others keep their indices.
+                message.bytes = (from, from);
+                continue;
+            };
+            for byte in bytes.get_mut(from..to).unwrap_or_default() {
+                let [u, _] = stream.at(self.said).uniform();
+                *byte = u8::try_from(math::floor_to_i64(256.0 * u)).unwrap_or_default();
+                self.said += 1;
+            }
+        }
+    }
+}
+
+pub(super) fn break_lines(mut lines: Query<'_, '_, (&mut Line, &mut BrokenLine)>) {
+    for (mut line, mut broken) in &mut lines {
+        broken.break_line(&mut line);
+    }
+}

@@ -1,0 +1,72 @@
+//! One device that breaks, from a number.
+
+use headrace_geometry::math;
+use headrace_sensor::device::Sense;
+use headrace_simulator::Scene;
+
+use crate::random_dives::Draw;
+
+/// Ways to break.
+pub const FAULTS: [&str; 5] = ["stick", "jump", "die", "return", "babble"];
+/// Senses whose devices break.
+pub const SENSES: [Sense; 5] =
+    [Sense::Head, Sense::Echosounder, Sense::Depth, Sense::Inertial, Sense::Tether];
+
+/// A device and its fault.
+#[derive(Debug, Clone)]
+pub struct Breakage {
+    /// What the device senses.
+    pub sense: Sense,
+    /// Its name.
+    pub sensor: String,
+    /// One of [`FAULTS`]; what dies returns only as `return`.
+    pub fault: &'static str,
+    /// When, seconds of the dive.
+    pub from_s: f64,
+    /// For how long, seconds; to the end of the dive without.
+    pub for_s: Option<f64>,
+    /// By how much it jumps: m, of a head and an inertial unit degrees.
+    pub size: f64,
+}
+
+impl Breakage {
+    /// The fault of a seed in a dive of this duration: all senses and faults in turns, the rest drawn.
+    pub fn of(seed: u64, plain: &Scene, duration_s: f64) -> Self {
+        let mut draw = Draw::new(seed ^ 0xb4ea_4a6e);
+        let turn = usize::try_from(seed).unwrap();
+        let sense = SENSES[turn % SENSES.len()];
+        let fault = FAULTS[turn / SENSES.len() % FAULTS.len()];
+        let fitting: Vec<&str> = {
+            let sensors = plain.facts().sensors.iter();
+            sensors.filter(|sensor| sensor.sense == sense).map(|sensor| sensor.id.as_str()).collect()
+        };
+        let from_s = duration_s * draw.between(0.2, 0.7);
+        let length_s = math::exp(draw.between(0.0, math::ln(60.0)));
+        let lasts = fault == "die" || draw.below(4) == 0;
+        // From what nobody would notice to what everybody must.
+        let [least, most] = match sense {
+            Sense::Head | Sense::Inertial => [1.0, 40.0],
+            _ => [0.05, 5.0],
+        };
+        let size = math::exp(draw.between(math::ln(least), math::ln(most)));
+        Self {
+            sense,
+            sensor: fitting[draw.below(fitting.len())].to_owned(),
+            fault,
+            from_s,
+            for_s: (fault == "return" || !lasts).then_some(length_s),
+            size: if draw.below(2) == 0 { size } else { -size },
+        }
+    }
+
+    /// The effect that makes it.
+    pub fn effect(&self) -> String {
+        let kind = if self.fault == "return" { "die" } else { self.fault };
+        let size = if kind == "jump" { format!("size = {:.3}\n", self.size) } else { String::new() };
+        let length = self.for_s.map(|for_s| format!("for_s = {for_s:.3}\n")).unwrap_or_default();
+        format!(
+            "[effects.device_faults]\nsensors = [{:?}]\nkind = {kind:?}\nfrom_s = {:.3}\n{length}{size}",
+            self.sensor, self.from_s
+        )
+    }
+}

@@ -1,0 +1,21 @@
+//! The table of field dives: vehicles in conditions at places, each dive judged against its truth.
+
+pub mod breaking;
+mod cells;
+mod figures;
+
+pub use cells::{CONDITIONS, Cell, Condition, DRIVEN, Driven, PLACES, Place, VEHICLES, Vehicle};
+pub use figures::{Figures, KINDS_OF_SOURCES};
+
+use crate::truth;
+
+/// Figures of the dives of a cell with these seeds, each over so many metres.
+pub fn figures(cell: &Cell, seeds: impl IntoIterator<Item = u64>, length_m: f64) -> Figures {
+    let mut figures = Figures::default();
+    for seed in seeds {
+        let dive = cell.dive(seed, length_m);
+        let judged = truth::dive_believing(&dive.scene, &dive.believed.vehicle);
+        figures.add(&judged, &dive.scene);
+    }
+    figures
+}

@@ -1,0 +1,57 @@
+//! Arc lengths of a profile by its outline alone: many points of the curve, and the ray that passes between two of them.
+//! It shares no ray casting with the program.
+
+use headrace_geometry::math::{self, TAU};
+use headrace_geometry::tunnel::{Profile, Yz};
+
+/// Points of the outline: chords are then within a tenth of a millimetre of the arcs of any tunnel.
+const POINTS: u32 = 20_000;
+
+/// A profile's outline about its reference point, by angle.
+pub struct Outline {
+    reference: Yz,
+    perimeter_m: f64,
+    /// Angle of the first point.
+    from_rad: f64,
+    /// Angle beyond the first point, place and arc length; angles grow.
+    points: Vec<(f64, Yz, f64)>,
+}
+
+impl Outline {
+    /// The outline of a profile.
+    pub fn of(profile: &Profile) -> Self {
+        let (reference, perimeter_m) = (profile.reference(), profile.perimeter_m());
+        let angle = |at: Yz| math::atan2(at[1] - reference[1], at[0] - reference[0]);
+        let from_rad = angle(profile.point_at(0.0));
+        let mut points: Vec<(f64, Yz, f64)> = Vec::new();
+        for k in 0..POINTS {
+            let arc_m = perimeter_m * f64::from(k) / f64::from(POINTS);
+            let at = profile.point_at(arc_m);
+            let turned = if k == 0 { 0.0 } else { math::wrap(angle(at) - from_rad, TAU) };
+            points.push((turned, at, arc_m));
+        }
+        points.push((TAU, profile.point_at(0.0), perimeter_m));
+        Self { reference, perimeter_m, from_rad, points }
+    }
+
+    /// Length of the curve, m.
+    pub fn perimeter_m(&self) -> f64 {
+        self.perimeter_m
+    }
+
+    /// Arc length at which the ray from the reference point through this one crosses the outline, m.
+    pub fn arc_m(&self, at: Yz) -> f64 {
+        let towards = [at[0] - self.reference[0], at[1] - self.reference[1]];
+        let turned = math::wrap(math::atan2(towards[1], towards[0]) - self.from_rad, TAU);
+        let after =
+            self.points.partition_point(|(angle, ..)| *angle <= turned).clamp(1, self.points.len() - 1);
+        let (_, a, arc_a_m) = self.points[after - 1];
+        let (_, b, arc_b_m) = self.points[after];
+        // How far either end of the chord lies beside the ray: the crossing divides it in that ratio.
+        let beside =
+            |p: Yz| towards[0] * (p[1] - self.reference[1]) - towards[1] * (p[0] - self.reference[0]);
+        let (left, right) = (beside(a), beside(b));
+        let share = if left - right == 0.0 { 0.0 } else { (left / (left - right)).clamp(0.0, 1.0) };
+        math::wrap(arc_a_m + share * (arc_b_m - arc_a_m), self.perimeter_m)
+    }
+}

@@ -1,0 +1,83 @@
+//! Two hundred dives in each of which one device breaks: whatever it says then, no section passes that is truly far over
+//! the target. Seeds go through all senses and faults; time, length and size are drawn.
+
+use std::collections::BTreeMap;
+
+use headrace_tests::field_table::breaking::Breakage;
+use headrace_tests::field_table::{self, Cell, Condition, Driven, Figures, VEHICLES};
+use headrace_tests::random_dives::Draw;
+
+const SEEDS: u64 = 200;
+const LENGTH_M: f64 = 7.0;
+
+/// Dives that pass a section with D_true over 1.1 T, today: a head whose range sticks still fills holes. There must be
+/// none; until then no more.
+const KNOWN_FAR: usize = 1;
+/// Most that may pass, of those with D_true over T.
+const MOST_OVER: f64 = 0.025;
+
+/// From well within the target to well beyond it, near the portal and far from it.
+fn cell(seed: u64) -> Cell {
+    let vehicle = VEHICLES.into_iter().find(|vehicle| vehicle.name == "vita2-4").unwrap();
+    let mut draw = Draw::new(seed);
+    let start_m = draw.one_of(&[16.0, 6900.0]);
+    Cell { vehicle, condition: Condition::Broken, start_m, driven: Driven::Times(draw.between(0.7, 1.3)) }
+}
+
+fn dives(seeds: impl Iterator<Item = u64>) -> Vec<(u64, Figures)> {
+    seeds.map(|seed| (seed, field_table::figures(&cell(seed), [seed], LENGTH_M))).collect()
+}
+
+#[test]
+fn val_whatever_breaks_nothing_far_over_the_target_passes() {
+    let mut all: Vec<(u64, Figures)> = std::thread::scope(|scope| {
+        let halves = [0, 1].map(|odd| scope.spawn(move || dives((odd..SEEDS).step_by(2))));
+        halves.into_iter().flat_map(|half| half.join().unwrap()).collect()
+    });
+    all.sort_by_key(|(seed, _)| *seed);
+
+    let mut groups: BTreeMap<(&str, &str), Vec<&Figures>> = BTreeMap::new();
+    let mut far = Vec::new();
+    for (seed, figures) in &all {
+        let broken: Breakage = cell(*seed).broken(*seed, LENGTH_M);
+        groups.entry((broken.sense.as_str(), broken.fault)).or_default().push(figures);
+        if figures.passed_over > 0 {
+            println!(
+                "seed {seed}: {} of {} passed, {} far: {broken:?}",
+                figures.passed_over, figures.over, figures.passed_far
+            );
+        }
+        if figures.passed_far > 0 {
+            far.push(*seed);
+        }
+    }
+    println!(
+        "| device | fault | dives | over T | passed of them | far over | pass | cannot say | ratio |\n|{}",
+        "---|".repeat(9)
+    );
+    for ((sense, fault), group) in groups {
+        let sum = |of: &dyn Fn(&Figures) -> f64| group.iter().map(|figures| of(figures)).sum::<f64>();
+        let share =
+            |verdict: usize| sum(&|figures| figures.verdicts_m[verdict]) / sum(&|figures| figures.inner_m);
+        let ratio = group
+            .iter()
+            .map(|figures| figures.ratio_rms())
+            .filter(|ratio| ratio.is_finite())
+            .fold(0.0, f64::max);
+        println!(
+            "| {sense} | {fault} | {} | {} | {} | {} | {:.2} | {:.2} | {ratio:.2} |",
+            group.len(),
+            sum(&|figures| f64::from(figures.over)),
+            sum(&|figures| f64::from(figures.passed_over)),
+            sum(&|figures| f64::from(figures.passed_far)),
+            share(0),
+            share(2),
+        );
+    }
+    let total = |of: fn(&Figures) -> u32| all.iter().map(|(_, figures)| f64::from(of(figures))).sum::<f64>();
+    let (over, passed_over) = (total(|figures| figures.over), total(|figures| figures.passed_over));
+    println!("{passed_over} of {over} over the target passed; far over it in {} dives: {far:?}", far.len());
+    assert!(over > 1000.0, "{over}");
+    assert!(far.len() <= KNOWN_FAR, "{far:?}");
+    assert!(passed_over <= MOST_OVER * over, "{passed_over} of {over}");
+}

@@ -1,0 +1,82 @@
+//! A tenth of the table of field dives: what must never be, in cells that take little time.
+//! `cargo bench -p headrace_benches --bench field` makes the whole table.
+
+use headrace_tests::field_table::{self, Cell, Condition, Driven, Figures, KINDS_OF_SOURCES, VEHICLES};
+use headrace_tests::truth;
+
+fn print(name: &str, figures: &Figures) {
+    let nis = (0..KINDS_OF_SOURCES.len()).map(|kind| figures.nis(kind).map_or(f64::NAN, |nis| nis));
+    println!(
+        "| {name} | {} over, {} passed, {} far | {}/{} failed under 0.9 T | pass {:.2} fail {:.2} cannot say {:.2} open {:.2} | \
+         err {:.3} sd {:.3} rms {:.2} within {:.2} | NIS {:.2?} | told {:.2} of {:.2} |",
+        figures.over,
+        figures.passed_over,
+        figures.passed_far,
+        figures.failed_under,
+        figures.under,
+        figures.share(0),
+        figures.share(1),
+        figures.share(2),
+        figures.share(3),
+        figures.error_m(),
+        figures.sd_m(),
+        figures.ratio_rms(),
+        figures.within(2.0),
+        nis.collect::<Vec<_>>(),
+        figures.way_m[1],
+        figures.way_m[0],
+    );
+}
+
+/// None passes that is far over the target, and of those over it at most one in forty.
+#[test]
+fn val_what_passes_is_within_the_target() {
+    let vehicle = VEHICLES.into_iter().find(|vehicle| vehicle.name == "vita2-4").unwrap();
+    for condition in [Condition::Clean, Condition::DataSheet, Condition::Lively] {
+        for start_m in [16.0, 6900.0] {
+            for driven in [Driven::Planned, Driven::Times(1.2)] {
+                let cell = Cell { vehicle, condition, start_m, driven };
+                let figures = field_table::figures(&cell, [1], 15.0);
+                let name = format!("{condition:?} {start_m} {driven:?}");
+                print(&name, &figures);
+                assert!(figures.over > 0 && figures.inner_m > 5.0, "{name}: {figures:?}");
+                assert_eq!(figures.passed_far, 0, "{name}");
+                assert!(
+                    figures.false_passes() <= 0.025,
+                    "{name}: {} of {}",
+                    figures.passed_over,
+                    figures.over
+                );
+            }
+        }
+    }
+}
+
+/// What would pass all sees each section that mustn't, and what would fail all each that mustn't.
+#[test]
+fn figures_see_false_verdicts() {
+    let vehicle = VEHICLES.into_iter().find(|vehicle| vehicle.name == "vita2-4").unwrap();
+    let cell = Cell { vehicle, condition: Condition::Clean, start_m: 16.0, driven: Driven::Times(1.0) };
+    let dive = cell.dive(1, 8.0);
+    let mut judged = truth::dive_believing(&dive.scene, &dive.believed.vehicle);
+    let mut all = |verdict| {
+        for section in &mut judged.sections {
+            section.report.verdict = verdict;
+        }
+        let mut figures = Figures::default();
+        figures.add(&judged, &dive.scene);
+        figures
+    };
+    let passed = all("pass");
+    assert!(passed.over > 5 && passed.passed_over == passed.over, "{passed:?}");
+    // The ends, where there is a neighbour on one side alone.
+    assert!((1..=passed.over).contains(&passed.passed_far), "{passed:?}");
+    assert_eq!((passed.failed_under, passed.share(0)), (0, 1.0));
+    let failed = all("fail");
+    assert!(failed.failed_under == failed.under && failed.passed_over == 0, "{failed:?}");
+    let told_m = failed.way_m[1];
+    judged.sections.remove(judged.sections.len() / 2);
+    let mut less = Figures::default();
+    less.add(&judged, &dive.scene);
+    assert!((told_m - less.way_m[1] - judged.report.section_m).abs() < 1e-9, "{told_m} {less:?}");
+}
