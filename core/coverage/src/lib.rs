@@ -43,7 +43,7 @@ pub use hole::{Hole, HoleFinder};
 pub use passage::{Loss, PassError, Passage};
 pub use runs::{Run, RunChange, RunId, Runs};
 pub use section::{Judgement, Section, Spread, Verdict};
-pub use sections::{Judging, Request, Sections};
+pub use sections::{CONFIDENCE_SD, Judging, Request, Sections};
 pub use soundings::{GridLayout, GridNode, GridSummary, Soundings};
 pub use store::{Fidelity, Kept, SampleStore, StoreError, StoreLayout, StoreUse, WallSample};
 pub use what_if::Metres;

@@ -29,6 +29,9 @@ pub struct Request {
     pub fails: bool,
 }
 
+/// Standard deviations of D between hole and target for a verdict of pass or fail, unless configured.
+pub const CONFIDENCE_SD: f64 = 2.0;
+
 impl Request {
     /// Builds requests as of the outlook's time.
     fn at(outlook: &Outlook) -> impl Fn(i64) -> Self + use<> {
@@ -54,12 +57,14 @@ pub struct Judging<'a> {
 pub struct Sections {
     section_m: f64,
     target_m: f64,
+    /// Standard deviations of D that a verdict of pass or fail keeps clear of the target.
+    confidence_sd: f64,
     first: i64,
     sections: Vec<Section>,
     runs: Runs,
 }
 
-stateful!(Sections { state: runs; slots: sections; fixed: section_m, target_m, first; });
+stateful!(Sections { state: runs; slots: sections; fixed: section_m, target_m, confidence_sd, first; });
 
 impl Sections {
     /// Sections of `section_m` over [`from_m`, `to_m`].
@@ -70,7 +75,14 @@ impl Sections {
         let end = -math::floor_to_i64(-to_m / section_m);
         let count = usize::try_from(end - first).unwrap_or(0);
         let runs = Runs::new(first, count, section_m);
-        Self { section_m, target_m, first, sections: vec![Section::default(); count], runs }
+        let sections = vec![Section::default(); count];
+        Self { section_m, target_m, confidence_sd: CONFIDENCE_SD, first, sections, runs }
+    }
+
+    /// Judges with this many standard deviations of D between hole and target, [`CONFIDENCE_SD`] unless set.
+    #[must_use]
+    pub fn with_confidence_sd(self, confidence_sd: f64) -> Self {
+        Self { confidence_sd, ..self }
     }
 
     /// The runs of flagged sections.
@@ -109,9 +121,14 @@ impl Sections {
         self.target_m
     }
 
+    /// Standard deviations of D that a verdict of pass or fail keeps clear of the target.
+    pub fn confidence_sd(&self) -> f64 {
+        self.confidence_sd
+    }
+
     /// Maximum distance at which a sample may change a pass or fail, m.
     pub fn margin_m(&self, relative_sd_m: f64) -> f64 {
-        self.target_m / 2.0 + relative_sd_m
+        self.target_m / 2.0 + self.confidence_sd / 2.0 * relative_sd_m
     }
 
     /// Index of the section at a chainage.
@@ -166,12 +183,13 @@ impl Sections {
         let ahead = moved.left_ahead.start..moved.left_ahead.start + far;
         for range in [behind, ahead] {
             for index in clamp(range, &passed) {
-                let target_m = self.target_m;
+                let (target_m, confidence_sd) = (self.target_m, self.confidence_sd);
                 let Some(section) = self.get_mut(index).filter(|section| !section.settled) else { continue };
                 let Some(hole) = section.hole else { continue };
                 let clear_m = clear_of(moved.to_come, hole.x_m);
                 let left_m = hole.least_m.min(2.0 * clear_m);
-                let fails = section.verdict == Verdict::Open && left_m - 2.0 * section.hole_sd_m > target_m;
+                let fails =
+                    section.verdict == Verdict::Open && left_m - confidence_sd * section.hole_sd_m > target_m;
                 if fails || clear_m >= hole.diameter_m / 2.0 {
                     ask(ask_for(index));
                 }
@@ -219,7 +237,7 @@ impl Sections {
     ) -> bool {
         let Some(section) = self.get(index) else { return false };
         let bounds_m = self.bounds_m(index);
-        let radius_m = self.target_m / 2.0 + section.passage.pass_error.worst_m(profile);
+        let radius_m = self.margin_m(section.passage.pass_error.worst_m(profile));
         let clear_m = clear_of(to_come, bounds_m.0).max(clear_of(to_come, bounds_m.1));
         clear_m > radius_m && finder.has_circle(store, bounds_m, to_come, radius_m)
     }
@@ -229,14 +247,14 @@ impl Sections {
     /// Allocates: never.
     pub fn judge(&mut self, request: &Request, judging: &mut Judging<'_>) -> Option<Judgement> {
         let (from_m, to_m) = self.bounds_m(request.section);
-        let target_m = self.target_m;
+        let (target_m, confidence_sd) = (self.target_m, self.confidence_sd);
         let section = self.get_mut(request.section)?;
         let hole = judging.finder.largest(judging.store, from_m, to_m);
         let sd_m = section.passage.pass_error.sd_m(judging.profile.point_at(hole.arc_m));
         let clear_m = clear_of(request.to_come, hole.x_m);
         section.hole = Some(hole);
         section.hole_sd_m = sd_m;
-        section.verdict = match verdict(&hole, sd_m, target_m, clear_m) {
+        section.verdict = match verdict(&hole, confidence_sd * sd_m, target_m, clear_m) {
             Verdict::Pass if section.is_doubtful() => Verdict::CannotSay,
             Verdict::Open | Verdict::CannotSay if request.fails => Verdict::Fail,
             verdict => verdict,
@@ -302,14 +320,15 @@ impl Sections {
     }
 }
 
-/// Verdict on a hole whose centre is `clear_m` from where samples may still land. `pass` if D + 2 sd <= T: more samples
-/// won't enlarge it. `fail` if D - 2 sd > T for any final D: samples come no nearer than `clear_m`. Otherwise `open`
-/// while D may change, then `cannot_say`. A verdict holds for both bounds of D. Wall without samples around it fails.
-pub(super) fn verdict(hole: &Hole, sd_m: f64, target_m: f64, clear_m: f64) -> Verdict {
+/// Verdict on a hole whose centre is `clear_m` from where samples may still land; `error_m` is k sd of its diameter, k being
+/// the confidence. `pass` if D + k sd <= T: more samples won't enlarge it. `fail` if D - k sd > T for any final D: samples
+/// come no nearer than `clear_m`. Otherwise `open` while D may change, then `cannot_say`. A verdict holds for both bounds of
+/// D. Wall without samples around it fails.
+pub(super) fn verdict(hole: &Hole, error_m: f64, target_m: f64, clear_m: f64) -> Verdict {
     let is_left = 2.0 * clear_m >= hole.diameter_m;
-    if hole.bounded && hole.most_m + 2.0 * sd_m <= target_m {
+    if hole.bounded && hole.most_m + error_m <= target_m {
         Verdict::Pass
-    } else if hole.least_m.min(2.0 * clear_m) - 2.0 * sd_m > target_m || !hole.bounded && is_left {
+    } else if hole.least_m.min(2.0 * clear_m) - error_m > target_m || !hole.bounded && is_left {
         Verdict::Fail
     } else if is_left {
         Verdict::CannotSay
@@ -340,26 +359,36 @@ mod tests {
     }
 
     #[test]
-    fn the_verdict_needs_two_standard_deviations() {
-        for (diameter_m, expected) in [
-            (0.79, Verdict::Pass),
-            (0.81, Verdict::CannotSay),
-            (1.19, Verdict::CannotSay),
-            (1.21, Verdict::Fail),
+    fn the_verdict_needs_as_many_standard_deviations_as_asked() {
+        for (confidence_sd, diameter_m, expected) in [
+            (1.0, 0.89, Verdict::Pass),
+            (1.0, 0.91, Verdict::CannotSay),
+            (1.0, 1.11, Verdict::Fail),
+            (2.0, 0.79, Verdict::Pass),
+            (2.0, 0.81, Verdict::CannotSay),
+            (2.0, 1.19, Verdict::CannotSay),
+            (2.0, 1.21, Verdict::Fail),
+            (3.0, 0.69, Verdict::Pass),
+            (3.0, 1.29, Verdict::CannotSay),
+            (3.0, 1.31, Verdict::Fail),
         ] {
-            assert_eq!(verdict(&hole(diameter_m), 0.1, 1.0, BEHIND), expected, "{diameter_m}");
+            assert_eq!(
+                verdict(&hole(diameter_m), confidence_sd * 0.1, 1.0, BEHIND),
+                expected,
+                "{diameter_m}"
+            );
         }
         assert_eq!(verdict(&hole(1.0), 0.0, 1.0, BEHIND), Verdict::Pass, "as large as the target passes");
     }
 
     #[test]
     fn what_samples_may_still_fill_is_open_until_enough_of_it_is_out_of_their_reach() {
-        let at = |clear_m: f64| verdict(&hole(2.0), 0.1, 1.0, clear_m);
+        let at = |clear_m: f64| verdict(&hole(2.0), 0.2, 1.0, clear_m);
         assert_eq!(
             [0.0, 0.59, 0.61, 1.0].map(at),
             [Verdict::Open, Verdict::Open, Verdict::Fail, Verdict::Fail]
         );
-        let unsure = |clear_m: f64| verdict(&hole(1.1), 0.1, 1.0, clear_m);
+        let unsure = |clear_m: f64| verdict(&hole(1.1), 0.2, 1.0, clear_m);
         assert_eq!([0.5, 0.56].map(unsure), [Verdict::Open, Verdict::CannotSay]);
     }
 

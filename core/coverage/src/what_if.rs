@@ -59,7 +59,10 @@ impl Sections {
         } else {
             self.measured(outlook.swept)
         };
-        targets_m.iter().map(|target_m| metres(&measured, section_m, *target_m, outlook.to_come)).collect()
+        targets_m
+            .iter()
+            .map(|target_m| self.metres_of(&measured, section_m, *target_m, outlook.to_come))
+            .collect()
     }
 
     fn measured(&self, swept: Option<Reach>) -> Vec<Measured> {
@@ -97,14 +100,21 @@ impl Sections {
         };
         indexes.map(section).collect()
     }
-}
 
-fn metres(measured: &[Measured], section_m: f64, target_m: f64, to_come: Option<Reach>) -> Metres {
-    let mut metres = Metres::default();
-    for Measured { hole, sd_m, doubtful } in measured {
-        let said = verdict(hole, *sd_m, target_m, clear_of(to_come, hole.x_m));
-        let said = if said == Verdict::Pass && *doubtful { Verdict::CannotSay } else { said };
-        metres.add(said, section_m);
+    fn metres_of(
+        &self,
+        measured: &[Measured],
+        section_m: f64,
+        target_m: f64,
+        to_come: Option<Reach>,
+    ) -> Metres {
+        let mut metres = Metres::default();
+        for Measured { hole, sd_m, doubtful } in measured {
+            let error_m = self.confidence_sd() * sd_m;
+            let said = verdict(hole, error_m, target_m, clear_of(to_come, hole.x_m));
+            let said = if said == Verdict::Pass && *doubtful { Verdict::CannotSay } else { said };
+            metres.add(said, section_m);
+        }
+        metres
     }
-    metres
 }

@@ -1,6 +1,7 @@
 //! `[coverage]` and `[[openings]]` of a vehicle file: judging parameters and declared openings of the wall.
 
 use headrace_config::{ConfigError, Section};
+use headrace_coverage::CONFIDENCE_SD;
 use headrace_coverage::openings::Opening;
 use headrace_coverage::soundings::NODE_M;
 use headrace_geometry::math::{self, TAU};
@@ -15,13 +16,21 @@ pub struct CoverageConfig {
     pub contradiction_m: f64,
     /// Node edge of the sounding grid, m.
     pub node_m: f64,
+    /// Standard deviations of D between hole and target for a verdict of pass or fail: 1, 2 or 3.
+    pub confidence_sd: f64,
     /// Declared openings of the wall.
     pub openings: Vec<Opening>,
 }
 
 impl Default for CoverageConfig {
     fn default() -> Self {
-        Self { hole_tolerance_m: 0.0, contradiction_m: 0.5, node_m: NODE_M, openings: Vec::new() }
+        Self {
+            hole_tolerance_m: 0.0,
+            contradiction_m: 0.5,
+            node_m: NODE_M,
+            confidence_sd: CONFIDENCE_SD,
+            openings: Vec::new(),
+        }
     }
 }
 
@@ -38,6 +47,9 @@ impl CoverageConfig {
             config.contradiction_m =
                 section.number("contradiction_m", 0.05..=100.0)?.unwrap_or(config.contradiction_m);
             config.node_m = section.number("node_m", 0.05..=10.0)?.unwrap_or(config.node_m);
+            if let Some(confidence) = section.integer("confidence", 1..=3)? {
+                config.confidence_sd = confidence as f64;
+            }
             config.hole_tolerance_m = parse_tolerance_m(&section, target_m)?;
             section.finish()?;
         }
