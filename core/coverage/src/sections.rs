@@ -9,6 +9,7 @@ use super::openings::Opening;
 use super::runs::{RunChange, RunId, Runs, Telling};
 use super::section::{Judgement, Section, Verdict};
 use super::store::SampleStore;
+use super::what_if::Metres;
 use headrace_geometry::math;
 use headrace_geometry::time::MonoNs;
 use headrace_geometry::tunnel::Profile;
@@ -60,11 +61,13 @@ pub struct Sections {
     /// Standard deviations of D that a verdict of pass or fail keeps clear of the target.
     confidence_sd: f64,
     first: i64,
+    /// Judged sections by verdict, in the order of [`Verdict::ALL`].
+    judged: [u32; Verdict::ALL.len()],
     sections: Vec<Section>,
     runs: Runs,
 }
 
-stateful!(Sections { state: runs; slots: sections; fixed: section_m, target_m, confidence_sd, first; });
+stateful!(Sections { state: runs, judged; slots: sections; fixed: section_m, target_m, confidence_sd, first; });
 
 impl Sections {
     /// Sections of `section_m` over [`from_m`, `to_m`].
@@ -76,7 +79,7 @@ impl Sections {
         let count = usize::try_from(end - first).unwrap_or(0);
         let runs = Runs::new(first, count, section_m);
         let sections = vec![Section::default(); count];
-        Self { section_m, target_m, confidence_sd: CONFIDENCE_SD, first, sections, runs }
+        Self { section_m, target_m, confidence_sd: CONFIDENCE_SD, first, judged: [0; 4], sections, runs }
     }
 
     /// Judges with this many standard deviations of D between hole and target, [`CONFIDENCE_SD`] unless set.
@@ -161,15 +164,15 @@ impl Sections {
         }
     }
 
-    /// Calls `ask` for every section due for judging after the heads have moved: those that left the zone, and those whose
-    /// hole may no longer get samples.
+    /// Calls `ask` for every section of the way due for judging after the heads have moved: those that left the zone or
+    /// never were in it, and those whose hole may no longer get samples.
     ///
     /// Allocates: never.
     pub fn due(&mut self, moved: &Moved, outlook: &Outlook, ask: &mut impl FnMut(Request)) {
-        let passed = self.passed(outlook.swept);
+        let way = self.sections_of(outlook.way);
         let ask_for = Request::at(outlook);
         for range in [&moved.left_behind, &moved.left_ahead] {
-            for index in clamp(range.clone(), &passed) {
+            for index in clamp(range.clone(), &way) {
                 let Some(section) = self.get_mut(index) else { continue };
                 if section.stale || section.hole.is_none() {
                     section.stale = false;
@@ -182,10 +185,19 @@ impl Sections {
         let behind = moved.left_behind.end - far..moved.left_behind.end;
         let ahead = moved.left_ahead.start..moved.left_ahead.start + far;
         for range in [behind, ahead] {
-            for index in clamp(range, &passed) {
+            for index in clamp(range, &way) {
                 let (target_m, confidence_sd) = (self.target_m, self.confidence_sd);
+                let bounds_m = self.bounds_m(index);
                 let Some(section) = self.get_mut(index).filter(|section| !section.settled) else { continue };
-                let Some(hole) = section.hole else { continue };
+                let Some(hole) = section.hole else {
+                    // Of the way, but never in reach of a head: beside the heads, or where the vehicle set out.
+                    let (from_m, to_m) = bounds_m;
+                    let clear = clear_of(moved.to_come, from_m).min(clear_of(moved.to_come, to_m)) > 0.0;
+                    if clear && !moved.has_left(index) {
+                        ask(ask_for(index));
+                    }
+                    continue;
+                };
                 let clear_m = clear_of(moved.to_come, hole.x_m);
                 let left_m = hole.least_m.min(2.0 * clear_m);
                 let fails =
@@ -212,7 +224,7 @@ impl Sections {
     ) {
         let Some(zone) = outlook.still_zone.clone() else { return };
         let ask_for = Request::at(outlook);
-        for index in clamp(zone, &self.passed(outlook.swept)) {
+        for index in clamp(zone, &self.sections_of(outlook.way)) {
             let Some(section) = self.get_mut(index) else { continue };
             if section.is_flagged() {
                 if core::mem::take(&mut section.stale) {
@@ -252,6 +264,7 @@ impl Sections {
         let hole = judging.finder.largest(judging.store, from_m, to_m);
         let sd_m = section.passage.pass_error.sd_m(judging.profile.point_at(hole.arc_m));
         let clear_m = clear_of(request.to_come, hole.x_m);
+        let before = section.hole.map(|_| section.verdict);
         section.hole = Some(hole);
         section.hole_sd_m = sd_m;
         section.verdict = match verdict(&hole, confidence_sd * sd_m, target_m, clear_m) {
@@ -265,9 +278,35 @@ impl Sections {
             let evidence = self.explain(&hole, request.swept_by_all, judging.profile.perimeter_m());
             self.get_mut(request.section)?.evidence = Some(evidence);
         }
-        let judgement = self.get_mut(request.section)?.flag(request.at);
+        let section = self.get_mut(request.section)?;
+        let (judgement, now) = (section.flag(request.at), section.verdict);
+        self.count(before, now);
         self.tell_runs(request, judging);
         Some(judgement)
+    }
+
+    /// Counts a section that has been judged, by the verdict before and now.
+    fn count(&mut self, before: Option<Verdict>, now: Verdict) {
+        if let Some(count) = before.and_then(|before| self.judged.get_mut(before as usize)) {
+            *count -= 1;
+        }
+        if let Some(count) = self.judged.get_mut(now as usize) {
+            *count += 1;
+        }
+    }
+
+    /// Metres of the way by verdict; together they are the sections of the way.
+    pub fn metres(&self, way: Option<Reach>) -> Metres {
+        let mut metres = Metres::default();
+        let (mut all, section_m) = (self.sections_of(way).count(), self.section_m);
+        for (verdict, count) in Verdict::ALL.into_iter().zip(self.judged) {
+            if verdict != Verdict::Open {
+                metres.add(verdict, f64::from(count) * section_m);
+                all = all.saturating_sub(count as usize);
+            }
+        }
+        metres.add(Verdict::Open, all as f64 * section_m);
+        metres
     }
 
     /// Adds a flagged section to its run; removes one whose flag was cleared.
@@ -291,7 +330,7 @@ impl Sections {
         explain(&Case { hole, swept_by_all, target_m: self.target_m, perimeter_m }, &passages)
     }
 
-    /// Calls `ask` for every passed section that isn't settled, at the end of a dive.
+    /// Calls `ask` for every section of the way that isn't settled, at the end of a dive.
     pub fn unsettled(
         &mut self,
         outlook: &Outlook,
@@ -301,7 +340,7 @@ impl Sections {
         ask: &mut impl FnMut(Request),
     ) {
         let ask_for = Request::at(outlook);
-        for index in self.passed(outlook.swept) {
+        for index in self.sections_of(outlook.way) {
             let Some(section) = self.get_mut(index) else { continue };
             // Samples farther away than a pass depends on may have narrowed the hole of a fail.
             if section.stale || !section.settled || section.verdict != Verdict::Pass {
@@ -312,9 +351,9 @@ impl Sections {
         }
     }
 
-    /// Index range of the sections in the table that a swept stretch touches.
-    pub fn passed(&self, swept: Option<Reach>) -> Range<i64> {
-        let Some(reach) = swept else { return 0..0 };
+    /// Index range of the sections in the table that a stretch, such as the way, touches.
+    pub fn sections_of(&self, stretch: Option<Reach>) -> Range<i64> {
+        let Some(reach) = stretch else { return 0..0 };
         let end = self.first + i64::try_from(self.sections.len()).unwrap_or(i64::MAX);
         clamp(self.index_of(reach.from_m)..self.index_of(reach.to_m) + 1, &(self.first..end))
     }

@@ -55,9 +55,9 @@ impl Sections {
         profile: &Profile,
     ) -> Vec<Metres> {
         let measured = if (section_m - self.section_m()).abs() > 0.0 {
-            self.measured_anew(section_m, outlook.swept, store, finder, profile)
+            self.measured_anew(section_m, outlook.way, store, finder, profile)
         } else {
-            self.measured(outlook.swept)
+            self.measured(outlook.way)
         };
         targets_m
             .iter()
@@ -65,24 +65,24 @@ impl Sections {
             .collect()
     }
 
-    fn measured(&self, swept: Option<Reach>) -> Vec<Measured> {
+    fn measured(&self, way: Option<Reach>) -> Vec<Measured> {
         let section = |index: i64| {
             let section = self.get(index)?;
             Some(Measured { hole: section.hole?, sd_m: section.hole_sd_m, doubtful: section.is_doubtful() })
         };
-        self.passed(swept).filter_map(section).collect()
+        self.sections_of(way).filter_map(section).collect()
     }
 
     fn measured_anew(
         &self,
         section_m: f64,
-        swept: Option<Reach>,
+        way: Option<Reach>,
         store: &SampleStore,
         finder: &mut HoleFinder,
         profile: &Profile,
     ) -> Vec<Measured> {
-        let passed = self.passed(swept);
-        let (first_m, end_m) = (self.bounds_m(passed.start).0, self.bounds_m(passed.end).0);
+        let sections = self.sections_of(way);
+        let (first_m, end_m) = (self.bounds_m(sections.start).0, self.bounds_m(sections.end).0);
         let indexes = math::floor_to_i64(first_m / section_m)..-math::floor_to_i64(-end_m / section_m);
         let section = |index: i64| {
             let (from_m, to_m) = (index as f64 * section_m, (index + 1) as f64 * section_m);

@@ -205,7 +205,7 @@ impl Report {
         let (coverage, tally, log) = (dive.coverage(), dive.tally(), dive.advice_log());
         let sections = &coverage.sections;
         let passed =
-            || sections.passed(coverage.frontier.swept()).filter_map(|k| Some((k, sections.get(k)?)));
+            || sections.sections_of(coverage.frontier.way()).filter_map(|k| Some((k, sections.get(k)?)));
         Self {
             report_version: REPORT_VERSION,
             log: None,
