@@ -14,6 +14,7 @@ mod byte_errors;
 mod clock_drift;
 mod current;
 mod depth_steps;
+mod device_silence;
 mod head_stalls;
 mod imu_bias;
 mod imu_noise;
@@ -47,7 +48,7 @@ pub use effect::{Effect, EffectKind};
 pub use targets::PerSensor;
 
 /// All effects. Within a stage, systems run in this order, whatever the order of the scene.
-pub const KINDS: [&dyn EffectKind; 28] = [
+pub const KINDS: [&dyn EffectKind; 29] = [
     // Turning of heads, and the pose from which they look.
     &start_phase_error::StartPhaseErrorKind,
     &sector_end_slowing::SectorEndSlowingKind,
@@ -84,6 +85,7 @@ pub const KINDS: [&dyn EffectKind; 28] = [
     &clock_drift::ClockDriftKind,
     &line_delay::LineDelayKind,
     &byte_errors::ByteErrorsKind,
+    &device_silence::DeviceSilenceKind,
 ];
 
 /// The effects that a scene names, in the order of [`KINDS`].

@@ -3,7 +3,7 @@ use headrace_sensor::measurement::{Inertia, Payout, Pressure, Sounding};
 use crate::testing_motion::{Bench, same_in_any_slices};
 
 /// Every effect on motion, angles, clocks and lines, with the sensor whose measurements it changes.
-const ALONE: [(&str, &str); 17] = [
+const ALONE: [(&str, &str); 18] = [
     ("head_a", "[effects.start_phase_error]\n"),
     ("head_a", "[effects.sector_end_slowing]\n"),
     ("head_a", "[effects.skipped_steps]\nper_thousand = 20\n"),
@@ -21,6 +21,7 @@ const ALONE: [(&str, &str); 17] = [
     ("imu", "[effects.clock_drift]\nppm = 50\n"),
     ("", "[effects.line_delay]\nlatency_ms = 5\njitter_ms = 2\n"),
     ("", "[effects.byte_errors]\nflipped_per_million = 100\ndropped_per_million = 100\n"),
+    ("", "[effects.device_silence]\nfrom_s = 0.5\nto_s = 1\n"),
 ];
 
 fn measured(effects: &str, sensor: &str) -> Vec<[f64; 9]> {
