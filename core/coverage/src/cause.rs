@@ -123,6 +123,8 @@ pub struct Case<'a> {
     pub hole: &'a Hole,
     /// Stretch that every live head had swept by then.
     pub swept_by_all: Option<Reach>,
+    /// No head was alive then.
+    pub none_alive: bool,
     /// Target T, m.
     pub target_m: f64,
     /// Perimeter of the profile, m.
@@ -134,7 +136,7 @@ pub fn explain<'a>(
     case: &Case<'_>,
     sections: &(impl Iterator<Item = ((f64, f64), &'a Passage)> + Clone),
 ) -> Evidence {
-    let Case { hole, swept_by_all, target_m, perimeter_m } = *case;
+    let Case { hole, swept_by_all, none_alive, target_m, perimeter_m } = *case;
     // An empty circle of the target's size suffices for a fail; the hole may still shrink from ahead.
     let radius_m = hole.diameter_m.min(target_m) / 2.0;
     let lost = lost_within(hole, radius_m, perimeter_m, sections.clone());
@@ -159,7 +161,8 @@ pub fn explain<'a>(
     } else if seen.is_unseen(lost_in_hole) && !driving_explains {
         Cause::PositionLost
     } else if seen.pings == 0 || (!whole && lost_in_hole == 0) {
-        Cause::NotPassed
+        // What a live head hasn't swept isn't passed; where none was alive, the silence is the cause.
+        if none_alive && !seen.silent.is_empty() { Cause::HeadSilent } else { Cause::NotPassed }
     } else if driving_explains {
         worst.likeliest(&seen, target_m)
     } else if let Some(loss) = most_lost(lost) {

@@ -119,6 +119,8 @@ pub struct Outlook {
     pub way: Option<Reach>,
     /// Stretch covered by every awaited head that has pinged; `None` if empty.
     pub swept_by_all: Option<Reach>,
+    /// No head is alive.
+    pub none_alive: bool,
     /// Where samples may still land without the vehicle turning back.
     pub to_come: Option<Reach>,
     /// The zone of sections in reach, once unchanged for longer than [`SILENT_AFTER`]: the vehicle is (nearly) stationary.
@@ -157,6 +159,7 @@ impl Frontier {
             at,
             way: self.way,
             swept_by_all: swept.reduce(common).filter(|all| all.from_m <= all.to_m),
+            none_alive: !heads.clone().any(|head| head.is_alive(at)),
             to_come: self.to_come(heads, at),
             still_zone: self.still_zone(at),
         }

@@ -22,8 +22,10 @@ pub struct Request {
     pub section: i64,
     /// Timestamp.
     pub at: MonoNs,
-    /// Stretch that every live head had swept by then.
+    /// Stretch that every awaited head had swept by then.
     pub swept_by_all: Option<Reach>,
+    /// No head was alive then.
+    pub none_alive: bool,
     /// Where samples may still land without the vehicle turning back.
     pub to_come: Option<Reach>,
     /// Known to fail already: a large enough empty circle, not necessarily the largest, can get no more samples.
@@ -36,8 +38,8 @@ pub const CONFIDENCE_SD: f64 = 2.0;
 impl Request {
     /// Builds requests as of the outlook's time.
     fn at(outlook: &Outlook) -> impl Fn(i64) -> Self + use<> {
-        let Outlook { at, swept_by_all, to_come, .. } = *outlook;
-        move |section| Self { section, at, swept_by_all, to_come, fails: false }
+        let Outlook { at, swept_by_all, none_alive, to_come, .. } = *outlook;
+        move |section| Self { section, at, swept_by_all, none_alive, to_come, fails: false }
     }
 }
 
@@ -275,7 +277,7 @@ impl Sections {
         // More samples leave a pass a pass; those outside a hole's radius leave the hole as it is.
         section.settled = section.verdict == Verdict::Pass || clear_m >= hole.diameter_m / 2.0;
         if section.verdict == Verdict::Fail {
-            let evidence = self.explain(&hole, request.swept_by_all, judging.profile.perimeter_m());
+            let evidence = self.explain(&hole, request, judging.profile.perimeter_m());
             self.get_mut(request.section)?.evidence = Some(evidence);
         }
         let section = self.get_mut(request.section)?;
@@ -323,11 +325,12 @@ impl Sections {
     }
 
     /// The cause of a hole, from the passages of the sections that it touches.
-    fn explain(&self, hole: &Hole, swept_by_all: Option<Reach>, perimeter_m: f64) -> Evidence {
+    fn explain(&self, hole: &Hole, request: &Request, perimeter_m: f64) -> Evidence {
         let radius_m = hole.diameter_m / 2.0;
         let touched = self.index_of(hole.x_m - radius_m)..self.index_of(hole.x_m + radius_m) + 1;
         let passages = touched.filter_map(|index| Some((self.bounds_m(index), &self.get(index)?.passage)));
-        explain(&Case { hole, swept_by_all, target_m: self.target_m, perimeter_m }, &passages)
+        let Request { swept_by_all, none_alive, .. } = *request;
+        explain(&Case { hole, swept_by_all, none_alive, target_m: self.target_m, perimeter_m }, &passages)
     }
 
     /// Calls `ask` for every section of the way that isn't settled, at the end of a dive.
