@@ -107,7 +107,7 @@ fn heads_that_come_back_are_waited_for_and_the_stretch_between_fails() {
 fn while_some_heads_are_alive_they_alone_are_waited_for() {
     let report = steady(6.0, &silence(r#""sonar_1", "sonar_2", "sonar_3""#, "from_s = 0"));
     accounted_for("three of four", &report);
-    let inner: Vec<_> = report.sections.iter().filter(|s| s.start_m >= 4.5 && s.end_m <= 8.0).collect();
+    let inner: Vec<_> = report.sections.iter().filter(|s| s.start_m >= 5.25 && s.end_m <= 8.5).collect();
     assert!(inner.len() > 10);
     for section in inner {
         let evidence = section.cause.unwrap();
