@@ -1,6 +1,7 @@
 //! Every metre of the way is accounted for: each section in which the vehicle or its heads have been has a verdict, or is
 //! open, whether a head looked there or not; and a dive without a position says so first.
 
+use headrace_geometry::time::DurNs;
 use headrace_monitor::report::{Report, SectionReport};
 use headrace_tests::random_dives::{Draw, Kind, seeded};
 use headrace_tests::{Folder, SCENE, VEHICLE as SHORT, instrumented};
@@ -101,6 +102,18 @@ fn heads_that_come_back_are_waited_for_and_the_stretch_between_fails() {
         let calm = section.verdict != "fail" && section.flagged_s.is_none();
         assert!(calm, "{}: {} at {:?}", section.start_m, section.verdict, section.flagged_s);
     }
+}
+
+#[test]
+fn where_ticks_end_makes_no_difference_to_dead_heads() {
+    let silence = silence(ALL, "from_s = 8, to_s = 14");
+    let scene = format!(
+        "vehicle = \"vehicle.toml\"\n[trajectory]\nstart_m = 3\n[[trajectory.legs]]\ndistance_m = 4\n\
+         speed_mps = 0.2\n[effects]\n{silence}"
+    );
+    let digest =
+        |tick_ms| instrumented::dive_in_ticks(VEHICLE, &scene, DurNs::from_millis(tick_ms)).report.digest;
+    assert_eq!([digest(1), digest(333)], [digest(20), digest(20)]);
 }
 
 #[test]
