@@ -4,6 +4,7 @@
 
 mod bad;
 mod causes;
+mod confidence;
 mod dives;
 mod flags;
 mod memory;
