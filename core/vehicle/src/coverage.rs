@@ -103,3 +103,29 @@ fn arc_at_hour_m(profile: &Profile, hour: f64) -> f64 {
     let direction = [math::sin(angle), -math::cos(angle)];
     profile.cast(profile.reference(), direction).map_or(0.0, |wall| wall.arc_m)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use headrace_config::Document;
+    use headrace_geometry::tunnel::shapes;
+
+    fn parsed(text: &str) -> Result<CoverageConfig, ConfigError> {
+        let root = Document::new("vehicle.toml", text).root().unwrap();
+        CoverageConfig::from_root(&root, &shapes::circle(3.0).unwrap(), 0.5)
+    }
+
+    #[test]
+    fn the_confidence_is_one_two_or_three_standard_deviations() {
+        let confidence_sd = |text: &str| parsed(text).unwrap().confidence_sd;
+        let whole = |value: f64| headrace_geometry::math::round_to_i64(value);
+        assert_eq!(whole(confidence_sd("")), 2);
+        for k in 1..=3 {
+            assert_eq!(whole(confidence_sd(&format!("[coverage]\nconfidence = {k}\n"))), k);
+        }
+        for wrong in ["0", "4", "2.5", "\"high\""] {
+            let why = parsed(&format!("[coverage]\nconfidence = {wrong}\n")).unwrap_err().to_string();
+            assert!(why.contains("must be a whole number from 1 to 3"), "{wrong}: {why}");
+        }
+    }
+}
