@@ -58,7 +58,7 @@ pub(crate) fn finish(report: &Report, output: &Output) -> Result<u8, Failure> {
 pub(crate) fn exit_code(report: &Report) -> u8 {
     if report.lost_data() {
         failure::DATA_LOST
-    } else if report.dive.sonar {
+    } else if report.not_inspected.is_none() {
         failure::OK
     } else {
         failure::FAILED

@@ -1,8 +1,11 @@
 //! Summary of a report as text.
 
+use headrace_coverage::Cause;
 use headrace_monitor::pilot_text::{action_text, cause_text, station};
 use headrace_monitor::report::{ChangeReport, JudgedReport, SmoothingReport};
-use headrace_monitor::report::{Report, RunReport};
+use headrace_monitor::report::{NotInspectedReport, Report, RunReport};
+
+use crate::output::append;
 
 /// The summary text.
 pub(crate) fn summary(report: &Report) -> String {
@@ -12,18 +15,20 @@ pub(crate) fn summary(report: &Report) -> String {
         text.push('\n');
     };
     let dive = &report.dive;
-    if let (true, Some(from_m), Some(to_m)) = (dive.sonar, dive.from_m, dive.to_m) {
+    if let Some(why) = &report.not_inspected {
+        line(not_inspected_text(why));
+    }
+    if let (Some(from_m), Some(to_m)) = (report.way.from_m, report.way.to_m) {
         line(format!(
-            "ch {} to {}: {:.1} m in {:.0} s, {} samples, target {} m",
+            "ch {} to {}: {:.2} m in {:.0} s, {} samples, target {} m, confidence {} sd",
             station(from_m),
             station(to_m),
-            dive.distance_m,
+            report.way.length_m,
             dive.duration_s,
             dive.samples_valid,
-            report.target_m
+            report.target_m,
+            report.confidence_sd
         ));
-    }
-    if dive.sonar {
         let sum = &report.summary;
         line(format!(
             "  passed {:.2} m   failed {:.2} m   can't say {:.2} m   open {:.2} m",
@@ -45,8 +50,6 @@ pub(crate) fn summary(report: &Report) -> String {
             metres(sum.t_x.mean_m),
             metres(sum.t_y.max_m)
         ));
-    } else {
-        line("NO COVERAGE: no profiling sonar returns in this dive; nothing was inspected".to_owned());
     }
     for change in report.smoothing.iter().flat_map(smoothing) {
         line(change);
@@ -73,13 +76,39 @@ pub(crate) fn summary(report: &Report) -> String {
     text
 }
 
+/// Why a dive is no inspection.
+fn not_inspected_text(why: &NotInspectedReport) -> String {
+    let lacking = why
+        .lacking
+        .map_or_else(|| "position".to_owned(), |lacking| lacking.trim_start_matches("no_").replace('_', " "));
+    let text = match why.reason {
+        "no_sonar" => {
+            return "NO COVERAGE: no profiling sonar returns in this dive; nothing was inspected".to_owned();
+        }
+        "no_position" => {
+            format!("NOTHING WAS JUDGED: the vehicle never had a position, there was no {lacking}")
+        }
+        _ => format!(
+            "NO INSPECTION: {:.0} % of the pings had no position, mostly for want of a {lacking}",
+            why.without_position_share * 100.0
+        ),
+    };
+    match why.silent_sources.as_slice() {
+        [] => text,
+        silent => format!("{text}; nothing came from {}", silent.join(", ")),
+    }
+}
+
 /// The stretches still missed along the tunnel, a line each, with the action for each on the way home.
 fn missed(report: &Report) -> Vec<String> {
     let open = report.runs.iter().filter(|run| run.cleared_s.is_none());
     let mut open: Vec<_> = open.collect();
     open.sort_by(|a, b| a.start_m.total_cmp(&b.start_m));
     let line = |run: &&RunReport| {
-        let cause = run.figures.as_ref().map_or_else(|| run.cause.as_str().to_owned(), cause_text);
+        let mut cause = run.figures.as_ref().map_or_else(|| run.cause.as_str().to_owned(), cause_text);
+        if run.cause == Cause::HeadSilent && !run.silent_sources.is_empty() {
+            append(&mut cause, format_args!(" ({})", run.silent_sources.join(", ")));
+        }
         let back = report.way_home.iter().find(|back| back.run == run.id);
         let action =
             back.map(|back| format!("; {}", action_text(back.action, run.start_m, back.at_most_mps)));

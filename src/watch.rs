@@ -16,6 +16,8 @@ use crate::transient;
 
 /// Interval of state lines where they can't be overwritten, in the dive's time.
 const LINE_EVERY: DurNs = DurNs(10_000_000_000);
+/// Interval of lines with the way and its metres by verdict, in the dive's time.
+const WAY_EVERY: DurNs = DurNs(60_000_000_000);
 /// Interval of state lines that are overwritten, in the dive's time.
 const REFRESH_EVERY: DurNs = DurNs(1_000_000_000);
 
@@ -24,6 +26,7 @@ pub(crate) struct Watch {
     quiet: bool,
     terminal: bool,
     shown: Option<MonoNs>,
+    way_shown: Option<MonoNs>,
     status_open: bool,
     /// The run that was flagged last, until its end is shown.
     run: Option<RunId>,
@@ -38,6 +41,7 @@ impl Watch {
             quiet: false,
             terminal: std::io::stdout().is_terminal(),
             shown: None,
+            way_shown: None,
             status_open: false,
             run: None,
             v_max_mps: 0.0,
@@ -65,7 +69,10 @@ impl Watch {
             return;
         }
         match notice {
-            Notice::Advice(entry) => self.status(entry, dive.mission()),
+            Notice::Advice(entry) => {
+                self.way(entry.at, dive);
+                self.status(entry, dive.mission());
+            }
             Notice::Section { section, .. } => self.section(*section, sections(dive)),
             Notice::Run { id, change, .. } => self.run(*id, *change, dive),
             Notice::Alert(kind) => {
@@ -86,7 +93,7 @@ impl Watch {
 
     /// Shows that a replay has paused, jumped or ended at `time` after its beginning.
     pub(crate) fn stopped(&mut self, dive: &Loop, time: DurNs, ended: bool) {
-        (self.shown, self.run) = (None, None);
+        (self.shown, self.way_shown, self.run) = (None, None, None);
         if !self.quiet {
             let seconds = time.as_secs_f64();
             let (h, min, s) = (seconds / 3600.0, seconds / 60.0 % 60.0, seconds % 60.0);
@@ -133,6 +140,29 @@ impl Watch {
         } else {
             say(&line);
         }
+    }
+
+    /// Shows the way so far and its metres by verdict.
+    fn way(&mut self, at: MonoNs, dive: &Loop) {
+        // Counted from the first beat, as there is nothing to show then.
+        let since = *self.way_shown.get_or_insert(at);
+        let (sections, way) = (sections(dive), dive.coverage().frontier.way());
+        let range = sections.sections_of(way);
+        if at.since(since).0.abs() < WAY_EVERY.0 || range.is_empty() {
+            return;
+        }
+        self.way_shown = Some(at);
+        let metres = sections.metres(way);
+        let (from_m, to_m) = (sections.bounds_m(range.start).0, sections.bounds_m(range.end).0);
+        self.line(&format!(
+            "WAY      ch {} to {}: passed {:.2} m   failed {:.2} m   can't say {:.2} m   open {:.2} m",
+            station(from_m),
+            station(to_m),
+            metres.pass_m,
+            metres.fail_m,
+            metres.cannot_say_m,
+            metres.open_m
+        ));
     }
 
     /// Shows the end of the run flagged last at a neighbouring section that doesn't fail.

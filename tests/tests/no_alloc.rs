@@ -73,12 +73,14 @@ fn allocations(work: impl FnOnce()) -> u64 {
     COUNTED.with(|counted| counted.replace(None)).unwrap()
 }
 
-/// Forth, too fast for a stretch, back over it, and forth again, so that flags are raised and cleared.
+/// Forth, too fast for a stretch, back over it, and forth again, so that flags are raised and cleared; all heads silent for
+/// a while.
 const SCENE: &str = "vehicle = \"vita2-4.toml\"\n[trajectory]\n
 [[trajectory.legs]]\ndistance_m = 120\nspeed_mps = 0.197\n
 [[trajectory.legs]]\ndistance_m = 40\nspeed_mps = 0.4\n
 [[trajectory.legs]]\ndistance_m = 60\nspeed_mps = -0.2\n
-[[trajectory.legs]]\ndistance_m = 200\nspeed_mps = 0.35\n";
+[[trajectory.legs]]\ndistance_m = 200\nspeed_mps = 0.35\n
+[[effects.device_faults]]\nkind = \"die\"\nsensors = [\"sonar_0\", \"sonar_1\", \"sonar_2\", \"sonar_3\"]\nfrom_s = 820\nfor_s = 40\n";
 
 #[test]
 fn a_million_packets_without_one_allocation() {

@@ -21,6 +21,8 @@ pub enum Action {
     InPhase,
     /// The stalled head repaired, or slower without it.
     Head,
+    /// The silent heads pinging again.
+    HeadBack,
     /// With the position fix restored.
     Position,
     /// No change: pass again, from end to end.
@@ -29,7 +31,7 @@ pub enum Action {
 
 impl Action {
     /// All of them.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Slower,
         Self::FinerMode,
         Self::LongerRange,
@@ -37,6 +39,7 @@ impl Action {
         Self::Middle,
         Self::InPhase,
         Self::Head,
+        Self::HeadBack,
         Self::Position,
         Self::Again,
     ];
@@ -51,6 +54,7 @@ impl Action {
             Cause::OffAxis => Self::Middle,
             Cause::Phase => Self::InPhase,
             Cause::HeadStalled => Self::Head,
+            Cause::HeadSilent => Self::HeadBack,
             Cause::PositionLost => Self::Position,
             Cause::MissingReturns | Cause::NotPassed => Self::Again,
         }
@@ -66,6 +70,7 @@ impl Action {
             Self::Middle => "middle",
             Self::InPhase => "in_phase",
             Self::Head => "head",
+            Self::HeadBack => "head_back",
             Self::Position => "position",
             Self::Again => "again",
         }

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::hole::Hole;
 use super::passage::{Loss, Passage, lost_within};
 use crate::Reach;
+use headrace_sampling::head::HeadSet;
 use headrace_sampling::spacing;
 
 /// Cause assigned to a fail. Source: metrics.md, "Sections and verdicts".
@@ -30,6 +31,8 @@ pub enum Cause {
     Phase,
     /// A head was stalled.
     HeadStalled,
+    /// A head went by without a ping.
+    HeadSilent,
     /// Returns came without a valid position.
     PositionLost,
     /// The hole reaches beyond the stretch that was passed.
@@ -38,7 +41,7 @@ pub enum Cause {
 
 impl Cause {
     /// All of them.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::TooFast,
         Self::AngularStep,
         Self::MissingReturns,
@@ -47,6 +50,7 @@ impl Cause {
         Self::OffAxis,
         Self::Phase,
         Self::HeadStalled,
+        Self::HeadSilent,
         Self::PositionLost,
         Self::NotPassed,
     ];
@@ -62,6 +66,7 @@ impl Cause {
             Self::OffAxis => "off_axis",
             Self::Phase => "phase",
             Self::HeadStalled => "head_stalled",
+            Self::HeadSilent => "head_silent",
             Self::PositionLost => "position_lost",
             Self::NotPassed => "not_passed",
         }
@@ -106,6 +111,9 @@ pub struct Evidence {
     pub middle_t_y_m: f64,
     /// How far the beams swung along the tunnel between two passes, m.
     pub swing_m: f64,
+    /// Heads that went by without a ping, by number.
+    #[serde(with = "head_numbers")]
+    pub silent_heads: HeadSet,
 }
 
 /// A failed hole and its surroundings.
@@ -115,6 +123,8 @@ pub struct Case<'a> {
     pub hole: &'a Hole,
     /// Stretch that every live head had swept by then.
     pub swept_by_all: Option<Reach>,
+    /// No head was alive then.
+    pub none_alive: bool,
     /// Target T, m.
     pub target_m: f64,
     /// Perimeter of the profile, m.
@@ -126,7 +136,7 @@ pub fn explain<'a>(
     case: &Case<'_>,
     sections: &(impl Iterator<Item = ((f64, f64), &'a Passage)> + Clone),
 ) -> Evidence {
-    let Case { hole, swept_by_all, target_m, perimeter_m } = *case;
+    let Case { hole, swept_by_all, none_alive, target_m, perimeter_m } = *case;
     // An empty circle of the target's size suffices for a fail; the hole may still shrink from ahead.
     let radius_m = hole.diameter_m.min(target_m) / 2.0;
     let lost = lost_within(hole, radius_m, perimeter_m, sections.clone());
@@ -146,16 +156,21 @@ pub fn explain<'a>(
     let explained =
         worst.t_m() * EXPLAINED > hole.diameter_m || worst.t_m() > BAD_ENOUGH * target_m && lost_in_hole > 0;
     let driving_explains = worst.t_m() > target_m && explained;
-    let cause = if seen.is_unseen(lost_in_hole) && !driving_explains {
+    let cause = if seen.dark {
+        Cause::HeadSilent
+    } else if seen.is_unseen(lost_in_hole) && !driving_explains {
         Cause::PositionLost
     } else if seen.pings == 0 || (!whole && lost_in_hole == 0) {
-        Cause::NotPassed
+        // What a live head hasn't swept isn't passed; where none was alive, the silence is the cause.
+        if none_alive && !seen.silent.is_empty() { Cause::HeadSilent } else { Cause::NotPassed }
     } else if driving_explains {
         worst.likeliest(&seen, target_m)
     } else if let Some(loss) = most_lost(lost) {
         Cause::of_loss(loss)
     } else if seen.head_stood() {
         Cause::HeadStalled
+    } else if !seen.silent.is_empty() {
+        Cause::HeadSilent
     } else {
         // No ping was lost, yet no sample fell into the hole: navigation has jumped.
         Cause::PositionLost
@@ -176,6 +191,7 @@ pub fn explain<'a>(
         t_y_m: worst.t_y_m,
         middle_t_y_m: worst.middle_t_y_m,
         swing_m: worst.swing_m,
+        silent_heads: seen.silent,
     }
 }
 
@@ -195,6 +211,9 @@ struct Seen {
     unplaced: u32,
     standing: u32,
     unseen: bool,
+    silent: HeadSet,
+    /// No head pinged in one of the sections, and some were silent there.
+    dark: bool,
 }
 
 /// Minimum share of pings of a stalled head for it to matter.
@@ -215,6 +234,8 @@ impl Seen {
             unplaced: sum.unplaced.saturating_add(passage.unplaced),
             standing: sum.standing.saturating_add(passage.standing),
             unseen: sum.unseen || passage.unseen,
+            silent: sum.silent.union(passage.silent),
+            dark: sum.dark || passage.pings == 0 && !passage.silent.is_empty(),
         })
     }
 
@@ -289,7 +310,11 @@ impl Driven {
         if self.middle_t_y_m >= target_m {
             return Cause::AngularStep;
         }
-        let absent = if seen.head_stood() { Cause::HeadStalled } else { Cause::MissingReturns };
+        let absent = match seen {
+            seen if seen.head_stood() => Cause::HeadStalled,
+            seen if !seen.silent.is_empty() => Cause::HeadSilent,
+            _ => Cause::MissingReturns,
+        };
         let without =
             [(absent, self.all_turning()), (Cause::Phase, self.in_phase()), (Cause::OffAxis, self.on_axis())];
         let helps = |then: &Self| then.t_m() < HELPS * self.t_m();
@@ -303,5 +328,6 @@ impl Driven {
     }
 }
 
+mod head_numbers;
 #[cfg(test)]
 mod tests;

@@ -4,6 +4,7 @@ use core::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
+use headrace_geometry::math;
 use headrace_geometry::time::MonoNs;
 use headrace_sampling::head::SILENT_AFTER;
 
@@ -19,47 +20,64 @@ pub struct Reach {
 /// Reach of one head: the current stretch, and all chainages swept so far.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct HeadReach {
-    /// Receive time of the head's last ping, with or without a fix.
-    heard: MonoNs,
-    /// Reach at its last ping with a fix.
+    /// Receive time of the head's last ping, with or without a fix; `None` before the first.
+    heard: Option<MonoNs>,
+    /// Reach at its last ping with a fix; of a silent head, where it would be at the last beat with a fix.
     latest: Reach,
-    /// Chainages that its reach has covered.
-    swept: Reach,
+    /// Chainages that its reach has covered; `None` before its first ping with a fix.
+    swept: Option<Reach>,
 }
 
 impl HeadReach {
     /// Reach after a ping with a fix at `now`; `before` is the reach before that ping.
     pub fn after(before: Option<Self>, now: MonoNs, reach: Reach) -> Self {
-        let swept = before.map_or(reach, |before| before.swept.with(reach));
-        Self { heard: now, latest: reach, swept }
+        let swept = before.and_then(|before| before.swept).map_or(reach, |swept| swept.with(reach));
+        Self { heard: Some(now), latest: reach, swept: Some(swept) }
+    }
+
+    /// Reach of a silent head that would be at `reach` if it pinged.
+    pub fn silent_at(before: Option<Self>, reach: Reach) -> Self {
+        before.map_or(Self { heard: None, latest: reach, swept: None }, |before| Self {
+            latest: reach,
+            ..before
+        })
     }
 
     /// Records a ping without a fix: the head is alive, its reach stays where it was at the last fix.
     pub fn heard(&mut self, now: MonoNs) {
-        self.heard = now;
+        self.heard = Some(now);
     }
 
-    /// Reach at the last ping with a fix.
+    /// Where the head was last known to be.
     pub fn latest(&self) -> Reach {
         self.latest
     }
 
     fn is_alive(&self, now: MonoNs) -> bool {
-        now.since(self.heard).0.abs() <= SILENT_AFTER.0
+        self.heard.is_some_and(|heard| is_within_silence(heard, now))
     }
 }
 
-/// Tracks the reach of all heads along the tunnel. The reach of each head is stored with the head and passed in.
+fn is_within_silence(since: MonoNs, now: MonoNs) -> bool {
+    now.since(since).0.abs() <= SILENT_AFTER.0
+}
+
+/// Tracks the reach of all heads along the tunnel, and the way. The reach of each head is stored with the head and passed
+/// in.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct Frontier {
     /// Chainages that any head's reach has covered.
     swept: Option<Reach>,
-    /// Index range of the sections within the reach of the live heads plus a margin.
+    /// Chainages at which the vehicle and its heads, pinging or not, have been, and those swept.
+    way: Option<Reach>,
+    /// Index range of the sections within the reach of the awaited heads plus a margin.
     zone: Option<Range<i64>>,
     /// Time of its last change.
     zone_moved: Option<MonoNs>,
-    /// Time of the first ping with a fix.
-    begun: Option<MonoNs>,
+    /// Time of the last ping of any head.
+    heard: Option<MonoNs>,
+    /// Time of the first ping, and of each that ended a silence of all heads; before it, of the first beat.
+    woken: Option<MonoNs>,
     course: Option<Course>,
 }
 
@@ -69,18 +87,24 @@ struct Course {
     /// Farthest chainage on this course, m: the middle of the heads' combined reach.
     farthest_m: f64,
     astern: bool,
+    /// Number of heads in that reach.
+    heads: usize,
 }
 
 /// Hysteresis for a reversal of the course, m: yaw and tether slack look like a smaller one.
 const TURNED_M: f64 = 0.25;
 
 impl Course {
-    /// Updates the course with the middle of the current reach.
-    fn to(self, middle_m: f64) -> Self {
+    /// Updates the course with the middle of the current reach of so many heads. Other heads have another middle, which
+    /// says nothing of the direction.
+    fn to(self, middle_m: f64, heads: usize) -> Self {
+        if heads != self.heads {
+            return Self { farthest_m: middle_m, heads, ..self };
+        }
         let ahead_m = if self.astern { self.farthest_m - middle_m } else { middle_m - self.farthest_m };
         match ahead_m {
             ahead_m if ahead_m > 0.0 => Self { farthest_m: middle_m, ..self },
-            ahead_m if ahead_m < -TURNED_M => Self { farthest_m: middle_m, astern: !self.astern },
+            ahead_m if ahead_m < -TURNED_M => Self { farthest_m: middle_m, astern: !self.astern, ..self },
             _ => self,
         }
     }
@@ -91,23 +115,27 @@ impl Course {
 pub struct Outlook {
     /// The time.
     pub at: MonoNs,
-    /// Chainages that have been within reach of any head.
-    pub swept: Option<Reach>,
-    /// Stretch covered by every live head; `None` if empty.
+    /// The way: chainages at which the vehicle and its heads, pinging or not, have been.
+    pub way: Option<Reach>,
+    /// Stretch covered by every awaited head that has pinged; `None` if empty.
     pub swept_by_all: Option<Reach>,
+    /// No head is alive.
+    pub none_alive: bool,
     /// Where samples may still land without the vehicle turning back.
     pub to_come: Option<Reach>,
     /// The zone of sections in reach, once unchanged for longer than [`SILENT_AFTER`]: the vehicle is (nearly) stationary.
     pub still_zone: Option<Range<i64>>,
 }
 
-/// Change of the frontier by one ping.
+/// Change of the frontier by one ping or beat.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Moved {
     /// Sections newly behind the zone.
     pub left_behind: Range<i64>,
     /// Sections newly ahead of the zone: the vehicle is backing up.
     pub left_ahead: Range<i64>,
+    /// The way has grown by at least a section, perhaps outside the zone.
+    pub way_grown: bool,
     /// Where samples may still land without the vehicle turning back.
     pub to_come: Option<Reach>,
 }
@@ -118,14 +146,20 @@ impl Frontier {
         self.swept
     }
 
+    /// The way: chainages at which the vehicle and its heads, pinging or not, have been.
+    pub fn way(&self) -> Option<Reach> {
+        self.way
+    }
+
     /// The outlook at `at`, given all heads' reaches.
     pub fn outlook(&self, heads: impl Iterator<Item = HeadReach> + Clone, at: MonoNs) -> Outlook {
         let common = |a: Reach, b: Reach| Reach { from_m: a.from_m.max(b.from_m), to_m: a.to_m.min(b.to_m) };
-        let alive = heads.clone().filter(|head| head.is_alive(at));
+        let swept = self.awaited(heads.clone(), at).filter_map(|head| head.swept);
         Outlook {
             at,
-            swept: self.swept,
-            swept_by_all: alive.map(|head| head.swept).reduce(common).filter(|all| all.from_m <= all.to_m),
+            way: self.way,
+            swept_by_all: swept.reduce(common).filter(|all| all.from_m <= all.to_m),
+            none_alive: !heads.clone().any(|head| head.is_alive(at)),
             to_come: self.to_come(heads, at),
             still_zone: self.still_zone(at),
         }
@@ -134,20 +168,58 @@ impl Frontier {
     /// `None` within [`SILENT_AFTER`] of the first ping: it isn't known yet which heads are alive.
     fn still_zone(&self, now: MonoNs) -> Option<Range<i64>> {
         let over = |since: Option<MonoNs>| since.is_some_and(|since| now.since(since).0 > SILENT_AFTER.0);
-        self.zone.clone().filter(|_| over(self.begun) && over(self.zone_moved))
+        self.zone.clone().filter(|_| over(self.woken) && over(self.zone_moved))
+    }
+
+    /// Whether a head has been silent for so long that it isn't waited for while others ping.
+    pub fn is_silent(&self, head: Option<&HeadReach>, now: MonoNs) -> bool {
+        match head.and_then(|head| head.heard) {
+            Some(heard) => !is_within_silence(heard, now),
+            None => !self.is_waking(now),
+        }
+    }
+
+    /// Whether it isn't known yet which heads are alive: [`SILENT_AFTER`] after the first ping, or after one that ended a
+    /// silence of all.
+    fn is_waking(&self, now: MonoNs) -> bool {
+        self.woken.is_none_or(|woken| is_within_silence(woken, now))
+    }
+
+    /// The heads whose samples decide what may still come: the live ones, and all where none is alive, or while it isn't
+    /// known yet which are.
+    fn awaited(
+        &self,
+        heads: impl Iterator<Item = HeadReach> + Clone,
+        now: MonoNs,
+    ) -> impl Iterator<Item = HeadReach> + Clone {
+        let all = self.is_waking(now) || !heads.clone().any(|head| head.is_alive(now));
+        heads.filter(move |head| all || head.is_alive(now))
+    }
+
+    /// Combined reach of the awaited heads.
+    fn reach(&self, heads: impl Iterator<Item = HeadReach> + Clone, now: MonoNs) -> Option<Reach> {
+        self.awaited(heads, now).map(|head| head.latest).reduce(Reach::with)
     }
 
     /// Where samples may still land without the vehicle turning back: the current reach and everything ahead.
-    fn to_come(&self, heads: impl Iterator<Item = HeadReach>, now: MonoNs) -> Option<Reach> {
-        let reach = reach(heads, now)?;
+    fn to_come(&self, heads: impl Iterator<Item = HeadReach> + Clone, now: MonoNs) -> Option<Reach> {
+        let reach = self.reach(heads, now)?;
         Some(match self.course {
             Some(Course { astern: true, .. }) => Reach { from_m: f64::NEG_INFINITY, ..reach },
             _ => Reach { to_m: f64::INFINITY, ..reach },
         })
     }
 
+    /// Records a ping of any head at `now`, with or without a fix.
+    pub fn hear(&mut self, now: MonoNs) {
+        if !self.heard.is_some_and(|heard| is_within_silence(heard, now)) {
+            self.woken = Some(now);
+        }
+        self.heard = Some(now);
+    }
+
     /// Updates the frontier for a ping at `now` with reach `pinged`; `heads` are the reaches of all heads, that one
-    /// included. A section leaves the zone when it is farther than `margin_m` from the reach of every live head.
+    /// included. A section leaves the zone when it is farther than `margin_m` from the reach of every awaited head.
     pub fn advance(
         &mut self,
         pinged: Reach,
@@ -156,16 +228,56 @@ impl Frontier {
         section_m: f64,
         margin_m: f64,
     ) -> Moved {
+        self.hear(now);
         self.swept = Some(self.swept.map_or(pinged, |swept| swept.with(pinged)));
-        let Some(all) = reach(heads.clone(), now) else { return Moved::default() };
+        self.way = Some(self.way.map_or(pinged, |way| way.with(pinged)));
+        self.move_zone(heads, now, section_m, margin_m)
+    }
+
+    /// Updates the frontier for a beat at `now` at which vehicle and heads, pinging or not, span `span`; `heads` are the
+    /// reaches of all heads, silent ones where they would be. While a head is alive pings alone move the zone.
+    pub fn beat(
+        &mut self,
+        span: Reach,
+        heads: impl Iterator<Item = HeadReach> + Clone,
+        now: MonoNs,
+        section_m: f64,
+        margin_m: f64,
+    ) -> Moved {
+        self.woken = self.woken.or(Some(now));
+        let index = |x_m: f64| math::floor_to_i64(x_m / section_m);
+        let way = self.way.map_or(span, |way| way.with(span));
+        let sections = |way: Reach| (index(way.from_m), index(way.to_m));
+        let way_grown = self.way.map(sections) != Some(sections(way));
+        self.way = Some(way);
+        let moved = match self.zone.clone() {
+            Some(zone) if heads.clone().any(|head| head.is_alive(now)) => Moved {
+                left_behind: zone.start..zone.start,
+                left_ahead: zone.end..zone.end,
+                way_grown: false,
+                to_come: self.to_come(heads, now),
+            },
+            _ => self.move_zone(heads, now, section_m, margin_m),
+        };
+        Moved { way_grown, ..moved }
+    }
+
+    fn move_zone(
+        &mut self,
+        heads: impl Iterator<Item = HeadReach> + Clone,
+        now: MonoNs,
+        section_m: f64,
+        margin_m: f64,
+    ) -> Moved {
+        let Some(all) = self.reach(heads.clone(), now) else { return Moved::default() };
         let middle_m = all.middle_m();
-        let course = self.course.unwrap_or(Course { farthest_m: middle_m, astern: false });
-        self.course = Some(course.to(middle_m));
+        let count = self.awaited(heads.clone(), now).count();
+        let course = self.course.unwrap_or(Course { farthest_m: middle_m, astern: false, heads: count });
+        self.course = Some(course.to(middle_m, count));
         // Section k = [kL, (k+1)L) is behind when (k+1)L + margin <= from, ahead when kL - margin >= to.
-        let first = headrace_geometry::math::floor_to_i64((all.from_m - margin_m) / section_m);
-        let end = -headrace_geometry::math::floor_to_i64(-(all.to_m + margin_m) / section_m);
+        let first = math::floor_to_i64((all.from_m - margin_m) / section_m);
+        let end = -math::floor_to_i64(-(all.to_m + margin_m) / section_m);
         let zone = first..end;
-        self.begun = self.begun.or(Some(now));
         if self.zone.as_ref() != Some(&zone) {
             self.zone_moved = Some(now);
         }
@@ -173,20 +285,22 @@ impl Frontier {
         Moved {
             left_behind: before.start..zone.start,
             left_ahead: zone.end..before.end,
+            way_grown: false,
             to_come: self.to_come(heads, now),
         }
     }
 }
 
-/// Combined reach of the live heads.
-fn reach(heads: impl Iterator<Item = HeadReach>, now: MonoNs) -> Option<Reach> {
-    heads.filter(|head| head.is_alive(now)).map(|head| head.latest).reduce(Reach::with)
-}
-
 impl Moved {
-    /// True if no section left the zone, or no head is alive.
+    /// Whether a section has just left the zone.
+    pub(super) fn has_left(&self, section: i64) -> bool {
+        self.left_behind.contains(&section) || self.left_ahead.contains(&section)
+    }
+
+    /// True if no section left the zone or joined the way, or no head's place is known.
     pub fn is_nothing(&self) -> bool {
-        self.left_behind.is_empty() && self.left_ahead.is_empty() || self.to_come.is_none()
+        let stayed = self.left_behind.is_empty() && self.left_ahead.is_empty() && !self.way_grown;
+        stayed || self.to_come.is_none()
     }
 }
 
@@ -196,7 +310,9 @@ impl Reach {
         f64::midpoint(self.from_m, self.to_m)
     }
 
-    fn with(self, other: Self) -> Self {
+    /// The stretch that covers both.
+    #[must_use]
+    pub fn with(self, other: Self) -> Self {
         Self { from_m: self.from_m.min(other.from_m), to_m: self.to_m.max(other.to_m) }
     }
 }
@@ -260,7 +376,8 @@ mod tests {
         assert_eq!([1.0, 1.8, 2.5].map(|x_m| clear(&frontier, x_m) > 0.5), [true, false, false]);
         frontier.advance(0, MonoNs(0), 1.7, 0.25, 0.25);
         assert_eq!([1.0, 1.7, 2.5].map(|x_m| clear(&frontier, x_m) > 0.5), [false, false, true]);
-        assert!(clear_of(frontier.to_come(MonoNs(3_000_000_000)), 1.7) > 1e9, "nobody is alive");
+        let silent = clear_of(frontier.to_come(MonoNs(3_000_000_000)), 2.5);
+        assert!(silent > 0.5, "where nobody is alive all are waited for, where they were last");
     }
 
     #[test]
@@ -268,7 +385,74 @@ mod tests {
         let mut frontier = Fixture::default();
         frontier.advance(1, MonoNs(0), 0.0, 0.25, 0.0);
         frontier.advance(0, MonoNs(0), 1.0, 0.25, 0.0);
+        frontier.advance(0, MonoNs(1_000_000_000), 1.0, 0.25, 0.0);
         let moved = frontier.advance(0, MonoNs(2_000_000_001), 1.0, 0.25, 0.0);
         assert_eq!(moved.left_behind, 0..4);
+    }
+
+    impl Fixture {
+        /// A beat at `now`, seconds, with the heads, alive or not, half a metre before and behind the vehicle.
+        fn beat(&mut self, now_s: u64, x_m: f64) -> Moved {
+            let now = MonoNs(now_s * 1_000_000_000);
+            let places = [x_m + 0.5, x_m - 0.5].map(|x_m| Reach { from_m: x_m, to_m: x_m });
+            for (head, place) in self.heads.iter_mut().zip(places) {
+                if self.frontier.is_silent(head.as_ref(), now) {
+                    *head = Some(HeadReach::silent_at(*head, place));
+                }
+            }
+            let Self { frontier, heads } = self;
+            frontier.beat(places[0].with(places[1]), heads.iter().flatten().copied(), now, 0.25, 0.25)
+        }
+
+        fn ping(&mut self, head: usize, now_s: u64, x_m: f64) -> Moved {
+            self.advance(head, MonoNs(now_s * 1_000_000_000), x_m, 0.25, 0.25)
+        }
+    }
+
+    #[test]
+    fn while_a_head_is_alive_beats_extend_the_way_and_nothing_else() {
+        let mut frontier = Fixture::default();
+        frontier.ping(0, 10, 3.5);
+        frontier.ping(1, 10, 2.5);
+        frontier.ping(0, 12, 3.5);
+        frontier.ping(0, 13, 3.5);
+        let to_come = frontier.to_come(MonoNs(13_000_000_000));
+        let moved = frontier.beat(13, 5.0);
+        assert_eq!((moved.left_behind.is_empty(), moved.left_ahead.is_empty()), (true, true));
+        assert_eq!((moved.to_come, frontier.to_come(MonoNs(13_000_000_000))), (to_come, to_come));
+        assert_eq!(
+            to_come,
+            Some(Reach { from_m: 3.5, to_m: f64::INFINITY }),
+            "head 1 has been silent for 3 s"
+        );
+        assert_eq!(frontier.frontier.way(), Some(Reach { from_m: 2.5, to_m: 5.5 }));
+        assert!(moved.way_grown && !moved.is_nothing());
+        assert!(frontier.beat(13, 5.1).is_nothing(), "still in the same section");
+    }
+
+    #[test]
+    fn where_no_head_is_alive_sections_are_left_as_the_vehicle_leaves_them() {
+        let mut frontier = Fixture::default();
+        frontier.ping(0, 0, 3.5);
+        frontier.ping(1, 0, 2.5);
+        assert!(frontier.beat(1, 3.5).left_behind.is_empty(), "it isn't known yet that they are silent");
+        // The rear head would be at 6: [5.5, 5.75) is behind it by a quarter of a metre.
+        assert_eq!(frontier.beat(3, 6.5).left_behind, 9..23);
+        let to_come = frontier.to_come(MonoNs(3_000_000_000));
+        assert_eq!(to_come, Some(Reach { from_m: 6.0, to_m: f64::INFINITY }));
+        assert_eq!(frontier.beat(4, 5.5).left_ahead, 25..29, "going back it leaves what lies ahead");
+    }
+
+    #[test]
+    fn heads_that_come_back_one_after_the_other_are_all_waited_for() {
+        let mut frontier = Fixture::default();
+        frontier.beat(0, 3.0);
+        frontier.beat(5, 4.0);
+        let moved = frontier.ping(0, 6, 4.5);
+        assert_eq!((moved.left_behind.is_empty(), moved.left_ahead.is_empty()), (true, true), "{moved:?}");
+        frontier.ping(0, 7, 4.5);
+        frontier.ping(0, 8, 4.5);
+        let moved = frontier.ping(0, 9, 4.5);
+        assert_eq!(moved.left_behind, 13..17, "the other one stays silent, and isn't waited for any more");
     }
 }

@@ -8,6 +8,7 @@ use headrace_fusion::relative::Relative;
 use headrace_geometry::frames::Vec3;
 use headrace_geometry::math;
 use headrace_geometry::tunnel::Profile;
+use headrace_sampling::head::HeadSet;
 
 /// Statistics of the pings made within a section.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
@@ -28,6 +29,8 @@ pub struct Passage {
     pub standing: u32,
     /// A head went through during a navigation outage.
     pub unseen: bool,
+    /// Heads that went through without a ping.
+    pub silent: HeadSet,
     /// Where on this section's wall lost pings were aimed, whichever section they were made in.
     pub lost: Lost,
     /// Sum of the speeds at the pings, m/s.

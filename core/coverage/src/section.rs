@@ -15,9 +15,9 @@ pub enum Verdict {
     /// Undecided: samples may still land without the vehicle turning back.
     #[default]
     Open,
-    /// D + 2 sigma_D <= T.
+    /// D + k sd <= T, k being the confidence.
     Pass,
-    /// D - 2 sigma_D > T.
+    /// D - k sd > T.
     Fail,
     /// Neither holds within the error of D.
     CannotSay,

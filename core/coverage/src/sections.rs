@@ -5,6 +5,7 @@ use core::ops::Range;
 use super::cause::{Case, Evidence, explain};
 use super::frontier::{Moved, Outlook, Reach, clear_of};
 use super::hole::{FARTHEST_M, Hole, HoleFinder};
+use super::metres::Metres;
 use super::openings::Opening;
 use super::runs::{RunChange, RunId, Runs, Telling};
 use super::section::{Judgement, Section, Verdict};
@@ -21,19 +22,24 @@ pub struct Request {
     pub section: i64,
     /// Timestamp.
     pub at: MonoNs,
-    /// Stretch that every live head had swept by then.
+    /// Stretch that every awaited head had swept by then.
     pub swept_by_all: Option<Reach>,
+    /// No head was alive then.
+    pub none_alive: bool,
     /// Where samples may still land without the vehicle turning back.
     pub to_come: Option<Reach>,
     /// Known to fail already: a large enough empty circle, not necessarily the largest, can get no more samples.
     pub fails: bool,
 }
 
+/// Standard deviations of D between hole and target for a verdict of pass or fail, unless configured.
+pub const CONFIDENCE_SD: f64 = 2.0;
+
 impl Request {
     /// Builds requests as of the outlook's time.
     fn at(outlook: &Outlook) -> impl Fn(i64) -> Self + use<> {
-        let Outlook { at, swept_by_all, to_come, .. } = *outlook;
-        move |section| Self { section, at, swept_by_all, to_come, fails: false }
+        let Outlook { at, swept_by_all, none_alive, to_come, .. } = *outlook;
+        move |section| Self { section, at, swept_by_all, none_alive, to_come, fails: false }
     }
 }
 
@@ -54,12 +60,16 @@ pub struct Judging<'a> {
 pub struct Sections {
     section_m: f64,
     target_m: f64,
+    /// Standard deviations of D that a verdict of pass or fail keeps clear of the target.
+    confidence_sd: f64,
     first: i64,
+    /// Judged sections by verdict, in the order of [`Verdict::ALL`].
+    judged: [u32; Verdict::ALL.len()],
     sections: Vec<Section>,
     runs: Runs,
 }
 
-stateful!(Sections { state: runs; slots: sections; fixed: section_m, target_m, first; });
+stateful!(Sections { state: runs, judged; slots: sections; fixed: section_m, target_m, confidence_sd, first; });
 
 impl Sections {
     /// Sections of `section_m` over [`from_m`, `to_m`].
@@ -70,7 +80,14 @@ impl Sections {
         let end = -math::floor_to_i64(-to_m / section_m);
         let count = usize::try_from(end - first).unwrap_or(0);
         let runs = Runs::new(first, count, section_m);
-        Self { section_m, target_m, first, sections: vec![Section::default(); count], runs }
+        let sections = vec![Section::default(); count];
+        Self { section_m, target_m, confidence_sd: CONFIDENCE_SD, first, judged: [0; 4], sections, runs }
+    }
+
+    /// Judges with this many standard deviations of D between hole and target, [`CONFIDENCE_SD`] unless set.
+    #[must_use]
+    pub fn with_confidence_sd(self, confidence_sd: f64) -> Self {
+        Self { confidence_sd, ..self }
     }
 
     /// The runs of flagged sections.
@@ -109,9 +126,14 @@ impl Sections {
         self.target_m
     }
 
+    /// Standard deviations of D that a verdict of pass or fail keeps clear of the target.
+    pub fn confidence_sd(&self) -> f64 {
+        self.confidence_sd
+    }
+
     /// Maximum distance at which a sample may change a pass or fail, m.
     pub fn margin_m(&self, relative_sd_m: f64) -> f64 {
-        self.target_m / 2.0 + relative_sd_m
+        self.target_m / 2.0 + self.confidence_sd / 2.0 * relative_sd_m
     }
 
     /// Index of the section at a chainage.
@@ -144,15 +166,15 @@ impl Sections {
         }
     }
 
-    /// Calls `ask` for every section due for judging after the heads have moved: those that left the zone, and those whose
-    /// hole may no longer get samples.
+    /// Calls `ask` for every section of the way due for judging after the heads have moved: those that left the zone or
+    /// never were in it, and those whose hole may no longer get samples.
     ///
     /// Allocates: never.
     pub fn due(&mut self, moved: &Moved, outlook: &Outlook, ask: &mut impl FnMut(Request)) {
-        let passed = self.passed(outlook.swept);
+        let way = self.sections_of(outlook.way);
         let ask_for = Request::at(outlook);
         for range in [&moved.left_behind, &moved.left_ahead] {
-            for index in clamp(range.clone(), &passed) {
+            for index in clamp(range.clone(), &way) {
                 let Some(section) = self.get_mut(index) else { continue };
                 if section.stale || section.hole.is_none() {
                     section.stale = false;
@@ -165,13 +187,23 @@ impl Sections {
         let behind = moved.left_behind.end - far..moved.left_behind.end;
         let ahead = moved.left_ahead.start..moved.left_ahead.start + far;
         for range in [behind, ahead] {
-            for index in clamp(range, &passed) {
-                let target_m = self.target_m;
+            for index in clamp(range, &way) {
+                let (target_m, confidence_sd) = (self.target_m, self.confidence_sd);
+                let bounds_m = self.bounds_m(index);
                 let Some(section) = self.get_mut(index).filter(|section| !section.settled) else { continue };
-                let Some(hole) = section.hole else { continue };
+                let Some(hole) = section.hole else {
+                    // Of the way, but never in reach of a head: beside the heads, or where the vehicle set out.
+                    let (from_m, to_m) = bounds_m;
+                    let clear = clear_of(moved.to_come, from_m).min(clear_of(moved.to_come, to_m)) > 0.0;
+                    if clear && !moved.has_left(index) {
+                        ask(ask_for(index));
+                    }
+                    continue;
+                };
                 let clear_m = clear_of(moved.to_come, hole.x_m);
                 let left_m = hole.least_m.min(2.0 * clear_m);
-                let fails = section.verdict == Verdict::Open && left_m - 2.0 * section.hole_sd_m > target_m;
+                let fails =
+                    section.verdict == Verdict::Open && left_m - confidence_sd * section.hole_sd_m > target_m;
                 if fails || clear_m >= hole.diameter_m / 2.0 {
                     ask(ask_for(index));
                 }
@@ -194,7 +226,7 @@ impl Sections {
     ) {
         let Some(zone) = outlook.still_zone.clone() else { return };
         let ask_for = Request::at(outlook);
-        for index in clamp(zone, &self.passed(outlook.swept)) {
+        for index in clamp(zone, &self.sections_of(outlook.way)) {
             let Some(section) = self.get_mut(index) else { continue };
             if section.is_flagged() {
                 if core::mem::take(&mut section.stale) {
@@ -219,7 +251,7 @@ impl Sections {
     ) -> bool {
         let Some(section) = self.get(index) else { return false };
         let bounds_m = self.bounds_m(index);
-        let radius_m = self.target_m / 2.0 + section.passage.pass_error.worst_m(profile);
+        let radius_m = self.margin_m(section.passage.pass_error.worst_m(profile));
         let clear_m = clear_of(to_come, bounds_m.0).max(clear_of(to_come, bounds_m.1));
         clear_m > radius_m && finder.has_circle(store, bounds_m, to_come, radius_m)
     }
@@ -229,14 +261,15 @@ impl Sections {
     /// Allocates: never.
     pub fn judge(&mut self, request: &Request, judging: &mut Judging<'_>) -> Option<Judgement> {
         let (from_m, to_m) = self.bounds_m(request.section);
-        let target_m = self.target_m;
+        let (target_m, confidence_sd) = (self.target_m, self.confidence_sd);
         let section = self.get_mut(request.section)?;
         let hole = judging.finder.largest(judging.store, from_m, to_m);
         let sd_m = section.passage.pass_error.sd_m(judging.profile.point_at(hole.arc_m));
         let clear_m = clear_of(request.to_come, hole.x_m);
+        let before = section.hole.map(|_| section.verdict);
         section.hole = Some(hole);
         section.hole_sd_m = sd_m;
-        section.verdict = match verdict(&hole, sd_m, target_m, clear_m) {
+        section.verdict = match verdict(&hole, confidence_sd * sd_m, target_m, clear_m) {
             Verdict::Pass if section.is_doubtful() => Verdict::CannotSay,
             Verdict::Open | Verdict::CannotSay if request.fails => Verdict::Fail,
             verdict => verdict,
@@ -244,12 +277,38 @@ impl Sections {
         // More samples leave a pass a pass; those outside a hole's radius leave the hole as it is.
         section.settled = section.verdict == Verdict::Pass || clear_m >= hole.diameter_m / 2.0;
         if section.verdict == Verdict::Fail {
-            let evidence = self.explain(&hole, request.swept_by_all, judging.profile.perimeter_m());
+            let evidence = self.explain(&hole, request, judging.profile.perimeter_m());
             self.get_mut(request.section)?.evidence = Some(evidence);
         }
-        let judgement = self.get_mut(request.section)?.flag(request.at);
+        let section = self.get_mut(request.section)?;
+        let (judgement, now) = (section.flag(request.at), section.verdict);
+        self.count(before, now);
         self.tell_runs(request, judging);
         Some(judgement)
+    }
+
+    /// Counts a section that has been judged, by the verdict before and now.
+    fn count(&mut self, before: Option<Verdict>, now: Verdict) {
+        if let Some(count) = before.and_then(|before| self.judged.get_mut(before as usize)) {
+            *count -= 1;
+        }
+        if let Some(count) = self.judged.get_mut(now as usize) {
+            *count += 1;
+        }
+    }
+
+    /// Metres of the way by verdict; together they are the sections of the way.
+    pub fn metres(&self, way: Option<Reach>) -> Metres {
+        let mut metres = Metres::default();
+        let (mut all, section_m) = (self.sections_of(way).count(), self.section_m);
+        for (verdict, count) in Verdict::ALL.into_iter().zip(self.judged) {
+            if verdict != Verdict::Open {
+                metres.add(verdict, f64::from(count) * section_m);
+                all = all.saturating_sub(count as usize);
+            }
+        }
+        metres.add(Verdict::Open, all as f64 * section_m);
+        metres
     }
 
     /// Adds a flagged section to its run; removes one whose flag was cleared.
@@ -266,14 +325,15 @@ impl Sections {
     }
 
     /// The cause of a hole, from the passages of the sections that it touches.
-    fn explain(&self, hole: &Hole, swept_by_all: Option<Reach>, perimeter_m: f64) -> Evidence {
+    fn explain(&self, hole: &Hole, request: &Request, perimeter_m: f64) -> Evidence {
         let radius_m = hole.diameter_m / 2.0;
         let touched = self.index_of(hole.x_m - radius_m)..self.index_of(hole.x_m + radius_m) + 1;
         let passages = touched.filter_map(|index| Some((self.bounds_m(index), &self.get(index)?.passage)));
-        explain(&Case { hole, swept_by_all, target_m: self.target_m, perimeter_m }, &passages)
+        let Request { swept_by_all, none_alive, .. } = *request;
+        explain(&Case { hole, swept_by_all, none_alive, target_m: self.target_m, perimeter_m }, &passages)
     }
 
-    /// Calls `ask` for every passed section that isn't settled, at the end of a dive.
+    /// Calls `ask` for every section of the way that isn't settled, at the end of a dive.
     pub fn unsettled(
         &mut self,
         outlook: &Outlook,
@@ -283,7 +343,7 @@ impl Sections {
         ask: &mut impl FnMut(Request),
     ) {
         let ask_for = Request::at(outlook);
-        for index in self.passed(outlook.swept) {
+        for index in self.sections_of(outlook.way) {
             let Some(section) = self.get_mut(index) else { continue };
             // Samples farther away than a pass depends on may have narrowed the hole of a fail.
             if section.stale || !section.settled || section.verdict != Verdict::Pass {
@@ -294,22 +354,23 @@ impl Sections {
         }
     }
 
-    /// Index range of the sections in the table that a swept stretch touches.
-    pub fn passed(&self, swept: Option<Reach>) -> Range<i64> {
-        let Some(reach) = swept else { return 0..0 };
+    /// Index range of the sections in the table that a stretch, such as the way, touches.
+    pub fn sections_of(&self, stretch: Option<Reach>) -> Range<i64> {
+        let Some(reach) = stretch else { return 0..0 };
         let end = self.first + i64::try_from(self.sections.len()).unwrap_or(i64::MAX);
         clamp(self.index_of(reach.from_m)..self.index_of(reach.to_m) + 1, &(self.first..end))
     }
 }
 
-/// Verdict on a hole whose centre is `clear_m` from where samples may still land. `pass` if D + 2 sd <= T: more samples
-/// won't enlarge it. `fail` if D - 2 sd > T for any final D: samples come no nearer than `clear_m`. Otherwise `open`
-/// while D may change, then `cannot_say`. A verdict holds for both bounds of D. Wall without samples around it fails.
-pub(super) fn verdict(hole: &Hole, sd_m: f64, target_m: f64, clear_m: f64) -> Verdict {
+/// Verdict on a hole whose centre is `clear_m` from where samples may still land; `error_m` is k sd of its diameter, k being
+/// the confidence. `pass` if D + k sd <= T: more samples won't enlarge it. `fail` if D - k sd > T for any final D: samples
+/// come no nearer than `clear_m`. Otherwise `open` while D may change, then `cannot_say`. A verdict holds for both bounds of
+/// D. Wall without samples around it fails.
+pub(super) fn verdict(hole: &Hole, error_m: f64, target_m: f64, clear_m: f64) -> Verdict {
     let is_left = 2.0 * clear_m >= hole.diameter_m;
-    if hole.bounded && hole.most_m + 2.0 * sd_m <= target_m {
+    if hole.bounded && hole.most_m + error_m <= target_m {
         Verdict::Pass
-    } else if hole.least_m.min(2.0 * clear_m) - 2.0 * sd_m > target_m || !hole.bounded && is_left {
+    } else if hole.least_m.min(2.0 * clear_m) - error_m > target_m || !hole.bounded && is_left {
         Verdict::Fail
     } else if is_left {
         Verdict::CannotSay
@@ -340,26 +401,36 @@ mod tests {
     }
 
     #[test]
-    fn the_verdict_needs_two_standard_deviations() {
-        for (diameter_m, expected) in [
-            (0.79, Verdict::Pass),
-            (0.81, Verdict::CannotSay),
-            (1.19, Verdict::CannotSay),
-            (1.21, Verdict::Fail),
+    fn the_verdict_needs_as_many_standard_deviations_as_asked() {
+        for (confidence_sd, diameter_m, expected) in [
+            (1.0, 0.89, Verdict::Pass),
+            (1.0, 0.91, Verdict::CannotSay),
+            (1.0, 1.11, Verdict::Fail),
+            (2.0, 0.79, Verdict::Pass),
+            (2.0, 0.81, Verdict::CannotSay),
+            (2.0, 1.19, Verdict::CannotSay),
+            (2.0, 1.21, Verdict::Fail),
+            (3.0, 0.69, Verdict::Pass),
+            (3.0, 1.29, Verdict::CannotSay),
+            (3.0, 1.31, Verdict::Fail),
         ] {
-            assert_eq!(verdict(&hole(diameter_m), 0.1, 1.0, BEHIND), expected, "{diameter_m}");
+            assert_eq!(
+                verdict(&hole(diameter_m), confidence_sd * 0.1, 1.0, BEHIND),
+                expected,
+                "{diameter_m}"
+            );
         }
         assert_eq!(verdict(&hole(1.0), 0.0, 1.0, BEHIND), Verdict::Pass, "as large as the target passes");
     }
 
     #[test]
     fn what_samples_may_still_fill_is_open_until_enough_of_it_is_out_of_their_reach() {
-        let at = |clear_m: f64| verdict(&hole(2.0), 0.1, 1.0, clear_m);
+        let at = |clear_m: f64| verdict(&hole(2.0), 0.2, 1.0, clear_m);
         assert_eq!(
             [0.0, 0.59, 0.61, 1.0].map(at),
             [Verdict::Open, Verdict::Open, Verdict::Fail, Verdict::Fail]
         );
-        let unsure = |clear_m: f64| verdict(&hole(1.1), 0.1, 1.0, clear_m);
+        let unsure = |clear_m: f64| verdict(&hole(1.1), 0.2, 1.0, clear_m);
         assert_eq!([0.5, 0.56].map(unsure), [Verdict::Open, Verdict::CannotSay]);
     }
 

@@ -2,37 +2,13 @@
 
 use super::frontier::{Outlook, Reach, clear_of};
 use super::hole::{Hole, HoleFinder};
+use super::metres::Metres;
 use super::passage::PassError;
 use super::section::Verdict;
 use super::sections::{Sections, verdict};
 use super::store::SampleStore;
 use headrace_geometry::math;
 use headrace_geometry::tunnel::Profile;
-
-/// Metres of tunnel by verdict.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Metres {
-    /// Metres that pass.
-    pub pass_m: f64,
-    /// Metres that fail.
-    pub fail_m: f64,
-    /// Metres undecided within the error of D.
-    pub cannot_say_m: f64,
-    /// Metres still open: more samples may land.
-    pub open_m: f64,
-}
-
-impl Metres {
-    /// Counts in a section.
-    pub fn add(&mut self, verdict: Verdict, section_m: f64) {
-        *match verdict {
-            Verdict::Pass => &mut self.pass_m,
-            Verdict::Fail => &mut self.fail_m,
-            Verdict::CannotSay => &mut self.cannot_say_m,
-            Verdict::Open => &mut self.open_m,
-        } += section_m;
-    }
-}
 
 /// A section's hole, independent of the target.
 #[derive(Debug, Clone, Copy)]
@@ -55,31 +31,34 @@ impl Sections {
         profile: &Profile,
     ) -> Vec<Metres> {
         let measured = if (section_m - self.section_m()).abs() > 0.0 {
-            self.measured_anew(section_m, outlook.swept, store, finder, profile)
+            self.measured_anew(section_m, outlook.way, store, finder, profile)
         } else {
-            self.measured(outlook.swept)
+            self.measured(outlook.way)
         };
-        targets_m.iter().map(|target_m| metres(&measured, section_m, *target_m, outlook.to_come)).collect()
+        targets_m
+            .iter()
+            .map(|target_m| self.metres_of(&measured, section_m, *target_m, outlook.to_come))
+            .collect()
     }
 
-    fn measured(&self, swept: Option<Reach>) -> Vec<Measured> {
+    fn measured(&self, way: Option<Reach>) -> Vec<Measured> {
         let section = |index: i64| {
             let section = self.get(index)?;
             Some(Measured { hole: section.hole?, sd_m: section.hole_sd_m, doubtful: section.is_doubtful() })
         };
-        self.passed(swept).filter_map(section).collect()
+        self.sections_of(way).filter_map(section).collect()
     }
 
     fn measured_anew(
         &self,
         section_m: f64,
-        swept: Option<Reach>,
+        way: Option<Reach>,
         store: &SampleStore,
         finder: &mut HoleFinder,
         profile: &Profile,
     ) -> Vec<Measured> {
-        let passed = self.passed(swept);
-        let (first_m, end_m) = (self.bounds_m(passed.start).0, self.bounds_m(passed.end).0);
+        let sections = self.sections_of(way);
+        let (first_m, end_m) = (self.bounds_m(sections.start).0, self.bounds_m(sections.end).0);
         let indexes = math::floor_to_i64(first_m / section_m)..-math::floor_to_i64(-end_m / section_m);
         let section = |index: i64| {
             let (from_m, to_m) = (index as f64 * section_m, (index + 1) as f64 * section_m);
@@ -97,14 +76,21 @@ impl Sections {
         };
         indexes.map(section).collect()
     }
-}
 
-fn metres(measured: &[Measured], section_m: f64, target_m: f64, to_come: Option<Reach>) -> Metres {
-    let mut metres = Metres::default();
-    for Measured { hole, sd_m, doubtful } in measured {
-        let said = verdict(hole, *sd_m, target_m, clear_of(to_come, hole.x_m));
-        let said = if said == Verdict::Pass && *doubtful { Verdict::CannotSay } else { said };
-        metres.add(said, section_m);
+    fn metres_of(
+        &self,
+        measured: &[Measured],
+        section_m: f64,
+        target_m: f64,
+        to_come: Option<Reach>,
+    ) -> Metres {
+        let mut metres = Metres::default();
+        for Measured { hole, sd_m, doubtful } in measured {
+            let error_m = self.confidence_sd() * sd_m;
+            let said = verdict(hole, error_m, target_m, clear_of(to_come, hole.x_m));
+            let said = if said == Verdict::Pass && *doubtful { Verdict::CannotSay } else { said };
+            metres.add(said, section_m);
+        }
+        metres
     }
-    metres
 }

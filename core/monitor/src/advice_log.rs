@@ -97,8 +97,13 @@ mod tests {
     #[test]
     fn the_advice_s_history_does_not_grow_with_hours() {
         let profile = shapes::circle(3.0).unwrap();
-        let task =
-            Task { target_m: 0.5, length_m: 100.0, layout: HeadLayout::PhaseShift, sound_speed_mps: 1447.0 };
+        let task = Task {
+            target_m: 0.5,
+            confidence_sd: 2.0,
+            length_m: 100.0,
+            layout: HeadLayout::PhaseShift,
+            sound_speed_mps: 1447.0,
+        };
         let nowhere = Situation {
             pose: None,
             speed_mps: 0.0,

@@ -46,6 +46,7 @@ impl App {
         let specs = number_heads(&mut self.world, &self.entities)?;
         let task = Task {
             target_m: mission.target_m,
+            confidence_sd: mission.coverage.confidence_sd,
             length_m: mission.length_m,
             layout: mission.layout,
             sound_speed_mps: mission.site.sound_speed_mps,
@@ -166,7 +167,8 @@ fn coverage(mission: &Mission) -> Result<Coverage, PluginError> {
         cell_m: StoreLayout::cell_for_target_m(mission.target_m),
         capacity: u32::try_from(samples).unwrap_or(u32::MAX),
     });
-    let mut sections = Sections::new(mission.section_m, mission.target_m, 0.0, mission.length_m);
+    let mut sections = Sections::new(mission.section_m, mission.target_m, 0.0, mission.length_m)
+        .with_confidence_sd(mission.coverage.confidence_sd);
     for opening in &mission.coverage.openings {
         let name = || opening.name.clone();
         opening

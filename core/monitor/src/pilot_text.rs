@@ -6,6 +6,7 @@ use super::alerts::AlertKind;
 use headrace_coverage::{Action, Cause, Evidence};
 use headrace_geometry::tunnel::Profile;
 use headrace_sampling::advice::{Reason, Remedy};
+use headrace_sampling::head::HeadSet;
 
 /// Chainage as engineers write it, kilometres, then metres with two decimals: 1+240.50 for 1240.5 m.
 pub fn station(chainage_m: f64) -> String {
@@ -31,12 +32,15 @@ pub struct CauseFigures {
     pub missing_share: f64,
     /// How far the beams swung along the tunnel between two passes, m.
     pub swing_m: f64,
+    /// Heads that went by without a ping.
+    pub silent_heads: HeadSet,
 }
 
 impl From<&Evidence> for CauseFigures {
     fn from(evidence: &Evidence) -> Self {
-        let Evidence { cause, speed_mps, t_y_m, middle_t_y_m, missing_share, swing_m, .. } = *evidence;
-        Self { cause, speed_mps, t_y_m, middle_t_y_m, missing_share, swing_m }
+        let Evidence { cause, speed_mps, t_y_m, middle_t_y_m, missing_share, swing_m, silent_heads, .. } =
+            *evidence;
+        Self { cause, speed_mps, t_y_m, middle_t_y_m, missing_share, swing_m, silent_heads }
     }
 }
 
@@ -53,9 +57,20 @@ pub fn cause_text(figures: &CauseFigures) -> String {
         }
         Cause::OffAxis => format!("off the middle (steps of {:.2} m along the wall)", figures.t_y_m),
         Cause::HeadStalled => "a head stood still".to_owned(),
+        Cause::HeadSilent => silent_text(figures.silent_heads),
         Cause::Phase => format!("heads out of phase ({:.2} m/s)", figures.speed_mps),
         Cause::PositionLost => "position lost".to_owned(),
         Cause::NotPassed => "not passed on both sides".to_owned(),
+    }
+}
+
+/// Text of the heads that were silent, counted from 1 in the order of the vehicle file.
+fn silent_text(heads: HeadSet) -> String {
+    let numbers: Vec<String> = heads.iter().map(|head| (head + 1).to_string()).collect();
+    match numbers.as_slice() {
+        [] => "heads silent".to_owned(),
+        [only] => format!("head {only} silent"),
+        [others @ .., last] => format!("heads {} and {last} silent", others.join(", ")),
     }
 }
 
@@ -73,6 +88,7 @@ pub fn action_text(action: Action, start_m: f64, at_most_mps: f64) -> String {
         Action::Middle => format!("go back to {start}, then in the middle and steady,"),
         Action::InPhase => format!("go back to {start}, then with the heads in phase,"),
         Action::Head => format!("go back to {start}, then with that head repaired or without it,"),
+        Action::HeadBack => format!("get what is silent back, then go back to {start},"),
         Action::Position => format!("pass {start} again once the position is back,"),
         Action::Again => "pass it again from end to end,".to_owned(),
     };
@@ -220,6 +236,16 @@ mod tests {
             assert_eq!(station(chainage_m), text);
         }
     }
+
+    #[test]
+    fn silent_heads_are_named_as_people_count() {
+        let text =
+            |heads: &[usize]| silent_text(heads.iter().fold(HeadSet::default(), |set, head| set.with(*head)));
+        assert_eq!(text(&[1]), "head 2 silent");
+        assert_eq!(text(&[0, 1, 3]), "heads 1, 2 and 4 silent");
+        assert_eq!(text(&[]), "heads silent");
+    }
+
     #[test]
     fn every_action_says_what_to_do_and_a_speed_where_it_holds() {
         let at = |action, at_most_mps| action_text(action, 1240.5, at_most_mps);

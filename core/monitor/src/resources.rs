@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::result_stream::ResultStream;
 use headrace_coverage::{Frontier, HoleFinder, SampleStore, Sections, Soundings};
+use headrace_fusion::NoFix;
 use headrace_geometry::site::Site;
 use headrace_geometry::time::MonoNs;
 use headrace_geometry::tunnel::Profile;
@@ -148,6 +149,10 @@ pub struct Tally {
     pub occluded: u64,
     /// Returns without a fix.
     pub unplaced: u64,
+    /// Of these, by reason, in the order of [`NoFix::ALL`].
+    pub lacking: [u64; NoFix::ALL.len()],
+    /// Pings without a fix, with or without a return.
+    pub without_fix: u64,
     /// Samples outside the store's extent.
     pub outside: u64,
     /// Samples not stored for lack of room.

@@ -102,6 +102,7 @@ impl RecordKind {
                 ("middle_t_y_m", Number),
                 ("missing_share", Number),
                 ("swing_m", Number),
+                ("silent_heads", Integer),
             ],
             Self::Run => &[("id", Integer), ("change", Integer)],
             Self::Advice => &[

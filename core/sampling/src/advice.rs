@@ -49,6 +49,8 @@ struct Fastest {
 pub struct Task {
     /// Target T, m.
     pub target_m: f64,
+    /// Standard deviations of a hole that a verdict of pass keeps below the target.
+    pub confidence_sd: f64,
     /// Length of the tunnel, m.
     pub length_m: f64,
     /// Layout of the heads.
@@ -213,7 +215,7 @@ impl Advisor {
             swing_most_m: Some(swing.most_rad * farthest_m),
         };
         // Keeps a margin for errors of position; where no speed leaves one, the target itself is used.
-        let sure_m = self.task.target_m - margin_m(situation.pass_error_m, self.task.target_m);
+        let sure_m = self.task.target_m - self.margin_m(situation.pass_error_m);
         let fastest = self
             .fastest_mps(situation, &passes, &going, sure_m)
             .or_else(|_| self.fastest_mps(situation, &passes, &going, self.task.target_m));
@@ -421,14 +423,15 @@ impl Advisor {
         let best = self.alternatives.iter().flatten().max_by(|a, b| a.v_max_mps.total_cmp(&b.v_max_mps));
         best.filter(|best| best.v_max_mps > 0.0).map(|best| Remedy::Mode(best.mode))
     }
-}
 
-/// Part of the target reserved for errors of position, m: two standard deviations, as for a verdict of pass; at most a
-/// fifth of the target, since no speed makes up for a lost position.
-fn margin_m(pass_error_m: f64, target_m: f64) -> f64 {
-    /// Error that needs no margin, m: about what a navigation without error estimates reports.
-    const NOTHING_M: f64 = 0.002;
-    (2.0 * (pass_error_m - NOTHING_M).max(0.0)).min(target_m / 5.0)
+    /// Part of the target reserved for errors of position, m: as many standard deviations as for a verdict of pass; at most
+    /// a fifth of the target, since no speed makes up for a lost position.
+    fn margin_m(&self, pass_error_m: f64) -> f64 {
+        /// Error that needs no margin, m: about what a navigation without error estimates reports.
+        const NOTHING_M: f64 = 0.002;
+        let Task { target_m, confidence_sd, .. } = self.task;
+        (confidence_sd * (pass_error_m - NOTHING_M).max(0.0)).min(target_m / 5.0)
+    }
 }
 
 #[cfg(test)]

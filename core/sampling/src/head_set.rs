@@ -27,6 +27,22 @@ impl HeadSet {
         Self(self.0 & !Self::bit(head))
     }
 
+    /// The heads of either set.
+    #[must_use]
+    pub fn union(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+
+    /// The set as a number: bit k for head k.
+    pub fn bits(self) -> u8 {
+        self.0
+    }
+
+    /// The set of these bits.
+    pub fn from_bits(bits: u8) -> Self {
+        Self(bits)
+    }
+
     /// Whether the set contains a head.
     pub fn has(self, head: usize) -> bool {
         self.0 & Self::bit(head) != 0
@@ -60,6 +76,8 @@ mod tests {
     fn a_set_of_heads_counts_and_lists_them() {
         let set = HeadSet::first(4).without(1).with(7).with(99);
         assert_eq!(set.iter().collect::<Vec<_>>(), [0, 2, 3, 7]);
+        assert_eq!(HeadSet::from_bits(set.bits()), set);
+        assert_eq!(set.without(7).union(HeadSet::default().with(1)), HeadSet::first(4));
         assert_eq!((set.len(), set.is_empty(), HeadSet::default().is_empty()), (4, false, true));
     }
 }

@@ -1,6 +1,7 @@
 //! `[coverage]` and `[[openings]]` of a vehicle file: judging parameters and declared openings of the wall.
 
 use headrace_config::{ConfigError, Section};
+use headrace_coverage::CONFIDENCE_SD;
 use headrace_coverage::openings::Opening;
 use headrace_coverage::soundings::NODE_M;
 use headrace_geometry::math::{self, TAU};
@@ -15,13 +16,21 @@ pub struct CoverageConfig {
     pub contradiction_m: f64,
     /// Node edge of the sounding grid, m.
     pub node_m: f64,
+    /// Standard deviations of D between hole and target for a verdict of pass or fail: 1, 2 or 3.
+    pub confidence_sd: f64,
     /// Declared openings of the wall.
     pub openings: Vec<Opening>,
 }
 
 impl Default for CoverageConfig {
     fn default() -> Self {
-        Self { hole_tolerance_m: 0.0, contradiction_m: 0.5, node_m: NODE_M, openings: Vec::new() }
+        Self {
+            hole_tolerance_m: 0.0,
+            contradiction_m: 0.5,
+            node_m: NODE_M,
+            confidence_sd: CONFIDENCE_SD,
+            openings: Vec::new(),
+        }
     }
 }
 
@@ -38,6 +47,9 @@ impl CoverageConfig {
             config.contradiction_m =
                 section.number("contradiction_m", 0.05..=100.0)?.unwrap_or(config.contradiction_m);
             config.node_m = section.number("node_m", 0.05..=10.0)?.unwrap_or(config.node_m);
+            if let Some(confidence) = section.integer("confidence", 1..=3)? {
+                config.confidence_sd = confidence as f64;
+            }
             config.hole_tolerance_m = parse_tolerance_m(&section, target_m)?;
             section.finish()?;
         }
@@ -90,4 +102,30 @@ fn arc_at_hour_m(profile: &Profile, hour: f64) -> f64 {
     let angle = (hour - 6.0) / 12.0 * TAU;
     let direction = [math::sin(angle), -math::cos(angle)];
     profile.cast(profile.reference(), direction).map_or(0.0, |wall| wall.arc_m)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use headrace_config::Document;
+    use headrace_geometry::tunnel::shapes;
+
+    fn parsed(text: &str) -> Result<CoverageConfig, ConfigError> {
+        let root = Document::new("vehicle.toml", text).root().unwrap();
+        CoverageConfig::from_root(&root, &shapes::circle(3.0).unwrap(), 0.5)
+    }
+
+    #[test]
+    fn the_confidence_is_one_two_or_three_standard_deviations() {
+        let confidence_sd = |text: &str| parsed(text).unwrap().confidence_sd;
+        let whole = |value: f64| headrace_geometry::math::round_to_i64(value);
+        assert_eq!(whole(confidence_sd("")), 2);
+        for k in 1..=3 {
+            assert_eq!(whole(confidence_sd(&format!("[coverage]\nconfidence = {k}\n"))), k);
+        }
+        for wrong in ["0", "4", "2.5", "\"high\""] {
+            let why = parsed(&format!("[coverage]\nconfidence = {wrong}\n")).unwrap_err().to_string();
+            assert!(why.contains("must be a whole number from 1 to 3"), "{wrong}: {why}");
+        }
+    }
 }

@@ -24,7 +24,7 @@ struct Case {
     effects: &'static str,
 }
 
-const CASES: [Case; 11] = [
+const CASES: [Case; 12] = [
     Case {
         cause: "too_fast",
         what: "a stretch too fast",
@@ -89,6 +89,14 @@ const CASES: [Case; 11] = [
         changes: "",
         way: STEADY,
         effects: "[effects.head_stalls]\nper_hour = 200\nseconds = [6, 15]\n",
+    },
+    Case {
+        cause: "head_silent",
+        what: "heads that send nothing for 25 s",
+        changes: "",
+        way: STEADY,
+        effects: "[[effects.device_faults]]\nkind = \"die\"\n\
+            sensors = [\"sonar_0\", \"sonar_1\", \"sonar_2\", \"sonar_3\"]\nfrom_s = 20\nfor_s = 25\n",
     },
     Case {
         cause: "position_lost",

@@ -4,6 +4,7 @@
 
 mod bad;
 mod causes;
+mod confidence;
 mod dives;
 mod faults;
 mod field;
@@ -12,3 +13,4 @@ mod memory;
 mod metamorphic;
 mod oracle;
 mod truth;
+mod way;

@@ -1,4 +1,5 @@
 use super::*;
+use headrace_sampling::head::HeadSet;
 
 /// Four heads at FAST, 8 s per turn, nominal at 0.19 m/s for a target of 0.5 m.
 fn sound() -> Passage {
@@ -22,7 +23,7 @@ fn cause_of(passage: &Passage, diameter_m: f64) -> Cause {
     let hole =
         Hole { diameter_m, least_m: diameter_m, most_m: diameter_m, x_m: 10.1, arc_m: 3.0, bounded: true };
     let swept_by_all = Some(Reach { from_m: 0.0, to_m: 20.0 });
-    let case = Case { hole: &hole, swept_by_all, target_m: 0.5, perimeter_m: 18.0 };
+    let case = Case { hole: &hole, swept_by_all, none_alive: false, target_m: 0.5, perimeter_m: 18.0 };
     explain(&case, &core::iter::once(((10.0, 10.25), passage))).cause
 }
 
@@ -56,6 +57,7 @@ fn each_cause_alone_is_named() {
         // Driving is nominal and nothing was lost: navigation has jumped.
         (Cause::PositionLost, sound(), 2.0),
         (Cause::NotPassed, Passage::default(), 2.0),
+        (Cause::HeadSilent, Passage { silent: HeadSet::first(4), ..Passage::default() }, 2.0),
     ] {
         assert_eq!(cause_of(&passage, diameter_m), cause, "{passage:?}");
     }
@@ -68,8 +70,28 @@ fn a_head_that_stands_is_told_from_one_that_is_silent() {
     one_of_four.pass_gap_sum_s = 4.0 * 1000.0;
     one_of_four.even_gap_sum_s = 8.0 / 3.0 * 1000.0;
     assert_eq!(cause_of(&one_of_four, 0.7), Cause::MissingReturns);
+    one_of_four.silent = HeadSet::default().with(2);
+    assert_eq!(cause_of(&one_of_four, 0.7), Cause::HeadSilent);
     one_of_four.standing = 250;
     assert_eq!(cause_of(&one_of_four, 0.7), Cause::HeadStalled);
+}
+
+#[test]
+fn a_stretch_where_no_head_pinged_is_dark_whatever_is_beside_it() {
+    let silent = HeadSet::default().with(0).with(3);
+    let dark = Passage { silent, ..Passage::default() };
+    let mut beside = sound();
+    beside.speed_sum_mps = 0.35 * 1000.0;
+    beside.lost.note(Loss::Missing, 3.1, 18.0);
+    let hole = Hole { diameter_m: 0.7, least_m: 0.7, most_m: 0.7, x_m: 10.3, arc_m: 3.0, bounded: true };
+    let swept_by_all = Some(Reach { from_m: 0.0, to_m: 20.0 });
+    let case = Case { hole: &hole, swept_by_all, none_alive: false, target_m: 0.5, perimeter_m: 18.0 };
+    let sections = [((10.0, 10.25), &beside), ((10.25, 10.5), &dark)].into_iter();
+    let evidence = explain(&case, &sections);
+    assert_eq!((evidence.cause, evidence.silent_heads), (Cause::HeadSilent, silent));
+    assert_eq!(serde_json::to_value(evidence).unwrap()["silent_heads"], serde_json::json!([0, 3]));
+    // Beside it a head that was silent for a moment only is no cause of speed.
+    assert_eq!(cause_of(&Passage { silent, ..beside }, 0.7), Cause::TooFast);
 }
 
 #[test]

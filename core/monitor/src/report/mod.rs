@@ -11,6 +11,7 @@ use headrace_coverage::{Section, Spread, Verdict};
 use headrace_geometry::time::MonoNs;
 
 mod advice;
+mod inspected;
 mod runs;
 mod sections;
 mod smoothing;
@@ -20,6 +21,7 @@ mod spread;
 mod survey;
 
 pub use advice::{AdviceReport, AlternativeReport};
+pub use inspected::{NotInspectedReport, WayReport};
 pub use runs::{ReturnReport, RunReport};
 pub use sections::{DeviationReport, SectionReport};
 pub use smoothing::{ChangeReport, JudgedReport, MetresReport, SmoothingReport};
@@ -36,6 +38,8 @@ pub const REPORT_VERSION: u32 = 3;
 pub struct Report {
     /// Version of this schema.
     pub report_version: u32,
+    /// Why the dive is no inspection; `None` where it is one.
+    pub not_inspected: Option<NotInspectedReport>,
     /// The log, where the dive was read from or written to one.
     pub log: Option<LogReport>,
     /// Digest of all results, 16 hexadecimal digits.
@@ -44,11 +48,15 @@ pub struct Report {
     pub target_m: f64,
     /// Length of a section, m.
     pub section_m: f64,
+    /// Standard deviations of the hole that a verdict of pass or fail keeps clear of the target.
+    pub confidence_sd: u32,
+    /// The way: the metres that the verdicts are of.
+    pub way: WayReport,
     /// The dive as a whole.
     pub dive: DiveReport,
     /// Metres by verdict, and the spacings over all sections.
     pub summary: SummaryReport,
-    /// Every section passed, in the order of chainage.
+    /// Every section of the way, in the order of chainage.
     pub sections: Vec<SectionReport>,
     /// Neighbouring flagged sections of one cause, by their stable number.
     pub runs: Vec<RunReport>,
@@ -204,20 +212,23 @@ impl Report {
     pub fn of(dive: &Loop) -> Self {
         let (coverage, tally, log) = (dive.coverage(), dive.tally(), dive.advice_log());
         let sections = &coverage.sections;
-        let passed =
-            || sections.passed(coverage.frontier.swept()).filter_map(|k| Some((k, sections.get(k)?)));
+        let of_the_way =
+            || sections.sections_of(coverage.frontier.way()).filter_map(|k| Some((k, sections.get(k)?)));
         Self {
             report_version: REPORT_VERSION,
+            not_inspected: inspected::not_inspected(dive),
             log: None,
             digest: format!("{:016x}", dive.digest()),
             target_m: sections.target_m(),
             section_m: sections.section_m(),
+            confidence_sd: confidence(sections.confidence_sd()),
+            way: inspected::way_report(coverage),
             dive: dive_report(coverage, tally, dive.sound_speeds_mps()),
-            summary: summarise(sections.section_m(), passed().map(|(_, section)| section)),
-            sections: passed()
+            summary: summarise(sections.section_m(), of_the_way().map(|(_, section)| section)),
+            sections: of_the_way()
                 .map(|(k, section)| sections::section_report(sections, k, section, dive))
                 .collect(),
-            runs: runs::run_reports(sections, &dive.mission().profile),
+            runs: runs::run_reports(dive),
             way_home: runs::way_home(sections, log),
             survey: survey::survey(coverage, &dive.mission().profile),
             what_if: Vec::new(),
@@ -239,6 +250,11 @@ impl Report {
     }
 }
 
+/// The confidence as the whole number that it is configured as.
+fn confidence(confidence_sd: f64) -> u32 {
+    u32::try_from(headrace_geometry::math::round_to_i64(confidence_sd)).unwrap_or(0)
+}
+
 fn dive_report(coverage: &Coverage, tally: &Tally, sound_mps: [f64; 2]) -> DiveReport {
     let [sound_speed_least_mps, sound_speed_most_mps] = sound_mps;
     let swept = coverage.frontier.swept();
@@ -249,7 +265,7 @@ fn dive_report(coverage: &Coverage, tally: &Tally, sound_mps: [f64; 2]) -> DiveR
         from_m: swept.map(|reach| reach.from_m),
         to_m: swept.map(|reach| reach.to_m),
         distance_m: swept.map_or(0.0, |reach| reach.to_m - reach.from_m),
-        sonar: tally.samples + tally.missing + tally.out_of_range + tally.occluded + tally.unplaced > 0,
+        sonar: inspected::pings(tally) > 0,
         sound_speed_least_mps,
         sound_speed_most_mps,
         samples_valid: tally.samples - tally.outside - tally.not_stored,

@@ -3,10 +3,12 @@
 use serde::Serialize;
 
 use crate::advice_log::{AdviceEntry, AdviceLog};
+use crate::app::SourceInfo;
 use crate::pilot_text::CauseFigures;
+use crate::run::Loop;
 use headrace_coverage::{Action, Cause, Run, RunId, Runs, Sections};
 use headrace_geometry::time::MonoNs;
-use headrace_geometry::tunnel::Profile;
+use headrace_sensor::device::{SensorInfo, SensorKind};
 
 /// Neighbouring flagged sections with one cause.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -18,6 +20,8 @@ pub struct RunReport {
     /// The cause's figures, for its text; those of the section with the largest hole.
     #[serde(skip)]
     pub figures: Option<CauseFigures>,
+    /// Heads that were silent in its section with the largest hole, by the ids of their sources.
+    pub silent_sources: Vec<String>,
     /// Where it begins, m.
     pub start_m: f64,
     /// Where it ends, m.
@@ -55,16 +59,21 @@ pub struct ReturnReport {
     pub takes_s: Option<f64>,
 }
 
-pub(super) fn run_reports(sections: &Sections, profile: &Profile) -> Vec<RunReport> {
+pub(super) fn run_reports(dive: &Loop) -> Vec<RunReport> {
+    let (sections, profile) = (&dive.coverage().sections, &dive.mission().profile);
+    let heads = head_ids(dive);
     let bounds = |run: &Run| (sections.bounds_m(run.from).0, sections.bounds_m(run.to - 1).1);
     (0..)
         .zip(sections.runs().all())
         .map(|(id, run)| {
             let ((start_m, end_m), (_, hole)) = (bounds(run), run.worst);
+            let figures = figures(sections, run);
+            let silent = figures.iter().flat_map(|figures| figures.silent_heads.iter());
             RunReport {
                 id,
                 cause: run.cause,
-                figures: figures(sections, run),
+                figures,
+                silent_sources: silent.filter_map(|head| heads.get(head).cloned()).collect(),
                 start_m,
                 end_m,
                 failed_m: f64::from(run.failed) * sections.section_m(),
@@ -77,6 +86,12 @@ pub(super) fn run_reports(sections: &Sections, profile: &Profile) -> Vec<RunRepo
             }
         })
         .collect()
+}
+
+/// Ids of the heads' sources, by number of the head.
+fn head_ids(dive: &Loop) -> Vec<String> {
+    let is_head = |(_, sensor): &(&SourceInfo, SensorInfo)| sensor.kind == SensorKind::Head;
+    dive.sources().iter().zip(dive.sensors()).filter(is_head).map(|(source, _)| source.id.clone()).collect()
 }
 
 /// Figures of the run's cause: those of its worst section, or of another if the cause of that one has changed.

@@ -57,8 +57,8 @@ const LISTED: usize = 1000;
 pub(super) fn survey(coverage: &Coverage, profile: &Profile) -> SurveyReport {
     let Coverage { soundings, sections, frontier, .. } = coverage;
     let [node_m, around_m] = soundings.node_m();
-    let passed = sections.passed(frontier.swept());
-    let (from_m, to_m) = (sections.bounds_m(passed.start).0, sections.bounds_m(passed.end).0);
+    let way = sections.sections_of(frontier.way());
+    let (from_m, to_m) = (sections.bounds_m(way.start).0, sections.bounds_m(way.end).0);
     let all = soundings.summary(from_m, to_m);
     let mut rows: Vec<NodeRowReport> = Vec::new();
     for node in soundings.nodes_between(from_m, to_m) {

@@ -2,11 +2,12 @@
 //!
 //! Both in one pass over the pings: which sections are judged, and on which evidence, depends on earlier verdicts.
 
-use bevy_ecs::prelude::{Query, Res, ResMut, Single};
+use bevy_ecs::prelude::{Res, ResMut, Single};
 
 use super::advise::Advisor;
 use super::driving::{Driven, Driving};
 use super::judge::{Results, digest_alert, judge_one};
+use super::way::{Heads, note_beat};
 use crate::alerts::{AlertKind, Alerts};
 use crate::entities::{HeadFrontier, HeadSweep, LastSample};
 use crate::messages::{Notice, Notices, Outcome, Placed, PlacedList, PlacedPing, Requests};
@@ -26,7 +27,7 @@ pub(super) fn cover(
     placed: Res<'_, PlacedList>,
     tunnel: Res<'_, TunnelDesign>,
     entities: Res<'_, VehicleEntities>,
-    mut heads: Query<'_, '_, (&mut HeadSweep, &mut HeadFrontier)>,
+    mut heads: Heads<'_, '_>,
     mut driving: Single<'_, '_, &mut Driving>,
     mut coverage: ResMut<'_, Coverage>,
     advisor: Res<'_, Advisor>,
@@ -42,16 +43,18 @@ pub(super) fn cover(
         match item {
             Placed::Situation(at, situation) => {
                 driving.note(*at, situation, &tunnel.profile, &advisor.advisor);
+                note_beat(&mut coverage, &mut heads, &tunnel, (*at, situation), &mut requests);
                 if at.0 % LOOK_AROUND.0.unsigned_abs() == 0 {
-                    let reaches = heads.iter().filter_map(|(_, frontier)| frontier.0);
+                    let reaches = heads.iter().filter_map(|(.., frontier)| frontier.0);
                     let outlook = coverage.frontier.outlook(reaches, *at);
                     look_around(&mut coverage, &mut finder, &tunnel, &outlook, &mut requests);
                 }
             }
             Placed::Ping(ping) => {
-                count(&mut tally, &ping.outcome);
+                count(&mut tally, ping);
+                coverage.frontier.hear(ping.received);
                 let head = entities.of_head(ping.head).and_then(|entity| heads.get_mut(entity).ok());
-                let Some((mut sweep, mut frontier)) = head else { continue };
+                let Some((_, _, mut sweep, mut frontier)) = head else { continue };
                 note_passage(&mut coverage, &mut sweep, &frontier, &driving.now, ping);
                 if let Some(beyond_m) = beyond_end_m(ping, tunnel.length_m)
                     && alerts.note(AlertKind::OutsideTunnel, ping.received, beyond_m.0, beyond_m.1)
@@ -66,7 +69,7 @@ pub(super) fn cover(
                     }
                 }
                 note_reach(&mut frontier, ping);
-                let reaches = heads.iter().filter_map(|(_, frontier)| frontier.0);
+                let reaches = heads.iter().filter_map(|(.., frontier)| frontier.0);
                 note_frontier(&mut coverage, reaches, ping, &mut requests);
             }
         }
@@ -82,13 +85,19 @@ pub(super) fn cover(
     }
 }
 
-fn count(tally: &mut Tally, outcome: &Outcome) {
-    match outcome {
+fn count(tally: &mut Tally, ping: &PlacedPing) {
+    tally.without_fix += u64::from(ping.fix.is_none());
+    match ping.outcome {
         Outcome::Sample { .. } => tally.samples += 1,
         Outcome::Lost(Loss::Missing, _) => tally.missing += 1,
         Outcome::Lost(Loss::OutOfRange, _) => tally.out_of_range += 1,
         Outcome::Lost(Loss::Occluded, _) => tally.occluded += 1,
-        Outcome::Unplaced(_) => tally.unplaced += 1,
+        Outcome::Unplaced(lacking) => {
+            tally.unplaced += 1;
+            if let Some(count) = tally.lacking.get_mut(lacking as usize) {
+                *count += 1;
+            }
+        }
     }
 }
 

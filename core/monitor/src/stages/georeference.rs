@@ -105,7 +105,7 @@ fn outcome(
 }
 
 /// Reach of a head: its samples lie in the plane across its axis; when tilted, that plane spans some chainage.
-fn reach(pose: &Pose, mount: &Mount, tunnel: &TunnelDesign) -> Reach {
+pub(super) fn reach(pose: &Pose, mount: &Mount, tunnel: &TunnelDesign) -> Reach {
     let origin = pose.place(mount.position);
     let axis = pose.attitude * (mount.rotation * Vec3::new(1.0, 0.0, 0.0));
     let across = math::hypot(axis.y(), axis.z()).min(0.99);

@@ -52,7 +52,8 @@ pub(crate) fn judge_one(
             .number(evidence.t_y_m)
             .number(evidence.middle_t_y_m)
             .number(evidence.missing_share)
-            .number(evidence.swing_m);
+            .number(evidence.swing_m)
+            .integer(u64::from(evidence.silent_heads.bits()));
     }
     if section.contradicts() {
         let off_m = section.deviation.mean_m().unwrap_or(0.0);

@@ -10,6 +10,7 @@ mod georeference;
 mod judge;
 mod navigate;
 mod sound_speed;
+mod way;
 
 use bevy_ecs::schedule::{IntoScheduleConfigs, Schedule};
 

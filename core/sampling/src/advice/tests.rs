@@ -61,6 +61,7 @@ impl Case {
         let heads: Vec<_> = self.specs.iter().map(|spec| (*spec, modes())).collect();
         let task = Task {
             target_m: self.target_m,
+            confidence_sd: 2.0,
             length_m: LENGTH_M,
             layout: self.situation.layout,
             sound_speed_mps: 1500.0,

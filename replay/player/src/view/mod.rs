@@ -36,6 +36,7 @@ use headrace_monitor::alerts::AlertKind;
 use headrace_monitor::pilot_text::{AdviceFigures, CauseFigures, advice_text, alert_text};
 use headrace_monitor::result_stream::{Record, RecordKind, first_record, text_of};
 use headrace_sampling::advice::{Reason, Remedy};
+use headrace_sampling::head::HeadSet;
 use serde::Serialize;
 
 use self::judged::{Judged, Sections};
@@ -203,8 +204,10 @@ impl View {
         let cause = words.one_of(&Cause::ALL, |cause| cause as u64);
         let [hole_x_m, hole_arc_m] = words.numbers()?;
         let figures = words.numbers().zip(cause);
+        let silent = words.integer().and_then(|bits| u8::try_from(bits).ok()).map(HeadSet::from_bits);
         let cause = figures.map(|([speed_mps, t_y_m, middle_t_y_m, missing_share, swing_m], cause)| {
-            CauseFigures { cause, speed_mps, t_y_m, middle_t_y_m, missing_share, swing_m }
+            let silent_heads = silent.unwrap_or_default();
+            CauseFigures { cause, speed_mps, t_y_m, middle_t_y_m, missing_share, swing_m, silent_heads }
         });
         let judged = Judged { at, section, change, verdict, hole_m, hole_sd_m, hole_x_m, hole_arc_m, cause };
         self.wall.judge(section, verdict);

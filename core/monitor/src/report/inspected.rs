@@ -1,0 +1,70 @@
+//! Whether a dive is an inspection at all, and the way that its verdicts are of.
+
+use serde::Serialize;
+
+use crate::resources::{Coverage, Tally};
+use crate::run::Loop;
+use headrace_fusion::NoFix;
+
+/// Share of a dive's pings without a position above which its verdicts are no inspection.
+const MOST: f64 = 0.5;
+
+/// The way: whole sections of tunnel in which the vehicle or its heads, pinging or not, have been.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct WayReport {
+    /// Where its first section begins, m; `None` without a position.
+    pub from_m: Option<f64>,
+    /// Where its last section ends, m.
+    pub to_m: Option<f64>,
+    /// Between them, m: the sum of the metres by verdict.
+    pub length_m: f64,
+}
+
+/// Why a dive is no inspection.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct NotInspectedReport {
+    /// `no_sonar`, `no_position` or `mostly_no_position`.
+    pub reason: &'static str,
+    /// What most returns without a position lacked: `no_heading`, `no_chainage` or `no_place_in_section`.
+    pub lacking: Option<&'static str>,
+    /// Share of pings without a position.
+    pub without_position_share: f64,
+    /// Sources that never gave a reading.
+    pub silent_sources: Vec<String>,
+}
+
+pub(super) fn way_report(coverage: &Coverage) -> WayReport {
+    let sections = &coverage.sections;
+    let way = sections.sections_of(coverage.frontier.way());
+    if way.is_empty() {
+        return WayReport { from_m: None, to_m: None, length_m: 0.0 };
+    }
+    let (from_m, to_m) = (sections.bounds_m(way.start).0, sections.bounds_m(way.end).0);
+    WayReport { from_m: Some(from_m), to_m: Some(to_m), length_m: to_m - from_m }
+}
+
+pub(super) fn not_inspected(dive: &Loop) -> Option<NotInspectedReport> {
+    let tally = dive.tally();
+    let pings = pings(tally);
+    let share = if pings > 0 { tally.without_fix as f64 / pings as f64 } else { 0.0 };
+    let reason = match share {
+        _ if pings == 0 => "no_sonar",
+        share if share >= 1.0 => "no_position",
+        share if share > MOST => "mostly_no_position",
+        _ => return None,
+    };
+    let most = NoFix::ALL.into_iter().zip(tally.lacking).filter(|(_, count)| *count > 0);
+    let most = most.max_by_key(|(_, count)| *count).map(|(lacking, _)| lacking.as_str());
+    let silent = dive.sources().iter().zip(dive.health()).filter(|(_, health)| health.readings == 0);
+    Some(NotInspectedReport {
+        reason,
+        lacking: most,
+        without_position_share: share,
+        silent_sources: silent.map(|(source, _)| source.id.clone()).collect(),
+    })
+}
+
+/// Pings of profiling heads, whatever their outcome.
+pub(super) fn pings(tally: &Tally) -> u64 {
+    tally.samples + tally.missing + tally.out_of_range + tally.occluded + tally.unplaced
+}

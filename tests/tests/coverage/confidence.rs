@@ -1,0 +1,44 @@
+//! The confidence of verdicts: one dive judged with one, two and three standard deviations between hole and target.
+
+use headrace_monitor::report::{Report, SectionReport};
+use headrace_tests::instrumented;
+
+/// Ever faster, so that holes grow from well below the target to beyond it.
+const SCENE: &str = "seed = 5\nvehicle = \"vehicle.toml\"\n[trajectory]\nstart_m = 3\n\
+    [[trajectory.legs]]\ndistance_m = 4\nspeed_mps = 0.13\n[[trajectory.legs]]\ndistance_m = 4\nspeed_mps = 0.16\n\
+    [[trajectory.legs]]\ndistance_m = 4\nspeed_mps = 0.19\n[[trajectory.legs]]\ndistance_m = 4\nspeed_mps = 0.25\n\
+    [effects]\nmotion_within_turn = {}\nrange_noise = { sd_m = 0.01 }\n";
+
+fn judged(confidence: u32) -> Report {
+    let vehicle = include_str!("../../../deploy/vehicles/vita2-4.toml");
+    let vehicle = vehicle.replace("[heads]", &format!("[coverage]\nconfidence = {confidence}\n\n[heads]"));
+    instrumented::dive(&vehicle, SCENE).report
+}
+
+/// Its verdict, by the hole, its bounds and standard deviation as reported.
+fn keeps_clear(report: &Report, section: &SectionReport) -> bool {
+    let error_m = f64::from(report.confidence_sd) * section.hole_sd_m;
+    let passes = section.hole_most_m.is_some_and(|most_m| most_m + error_m <= report.target_m);
+    let fails = section.hole_least_m.is_some_and(|least_m| least_m - error_m > report.target_m);
+    match section.verdict {
+        "pass" => passes,
+        "fail" => fails,
+        "cannot_say" => !passes && !fails,
+        _ => true,
+    }
+}
+
+#[test]
+fn a_verdict_keeps_as_many_standard_deviations_clear_of_the_target_as_the_vehicle_file_says() {
+    let reports = [1, 2, 3].map(judged);
+    for (confidence, report) in (1..).zip(&reports) {
+        assert_eq!(report.confidence_sd, confidence);
+        for section in &report.sections {
+            assert!(keeps_clear(report, section), "{confidence}: {section:?}");
+        }
+    }
+    let metres = reports.each_ref().map(|report| (report.summary.pass_m, report.summary.fail_m));
+    let unsure = reports.each_ref().map(|report| report.summary.cannot_say_m);
+    assert!(metres.is_sorted_by(|a, b| a.0 >= b.0 && a.1 >= b.1), "{metres:?}");
+    assert!(unsure[0] < unsure[1] && unsure[1] < unsure[2], "{unsure:?}");
+}

@@ -1,0 +1,240 @@
+//! Every metre of the way is accounted for: each section in which the vehicle or its heads have been has a verdict, or is
+//! open, whether a head looked there or not; and a dive without a position says so first.
+
+use headrace_geometry::time::DurNs;
+use headrace_monitor::report::{Report, SectionReport};
+use headrace_tests::random_dives::{Draw, Kind, seeded};
+use headrace_tests::{Folder, SCENE, VEHICLE as SHORT, instrumented};
+
+use crate::dives::DIVES;
+
+const VEHICLE: &str = include_str!("../../../deploy/vehicles/vita2-4.toml");
+/// VITA 2's heads ahead of and behind its origin, m.
+const HEAD_M: f64 = 0.551;
+const START_M: f64 = 3.0;
+const SPEED_MPS: f64 = 0.11;
+
+/// A steady way at the speed that the heads are programmed for, with these effects.
+fn steady(distance_m: f64, effects: &str) -> Report {
+    let scene = format!(
+        "seed = 3\nvehicle = \"vehicle.toml\"\n[trajectory]\nstart_m = {START_M}\n[[trajectory.legs]]\n\
+         distance_m = {distance_m}\nspeed_mps = {SPEED_MPS}\n[effects]\nmotion_within_turn = {{}}\n{effects}"
+    );
+    instrumented::dive(VEHICLE, &scene).report
+}
+
+fn silence(sensors: &str, span: &str) -> String {
+    format!("[[effects.device_faults]]\nkind = \"die\"\nsensors = [{sensors}]\n{span}\n")
+}
+
+const ALL: &str = r#""sonar_0", "sonar_1", "sonar_2", "sonar_3""#;
+
+/// The sums by verdict are the way, and the sections reported are those of the way, one after the other.
+#[track_caller]
+fn accounted_for(what: &str, report: &Report) {
+    let sum = &report.summary;
+    let all_m = sum.pass_m + sum.fail_m + sum.cannot_say_m + sum.open_m;
+    assert!((all_m - report.way.length_m).abs() < 1e-9, "{what}: {all_m} m of {:?}", report.way);
+    let ends = (report.sections.first().map(|s| s.start_m), report.sections.last().map(|s| s.end_m));
+    assert_eq!(ends, (report.way.from_m, report.way.to_m), "{what}");
+    assert!(
+        report.sections.windows(2).all(|pair| pair[0].end_m.to_bits() == pair[1].start_m.to_bits()),
+        "{what}"
+    );
+    let judged = |section: &SectionReport| section.hole_m.is_some() || section.verdict == "open";
+    assert!(report.sections.iter().all(judged), "{what}");
+}
+
+/// When the plane `behind_m` behind the vehicle has left a section by half the target, seconds after the start.
+fn left_s(section: &SectionReport, behind_m: f64) -> f64 {
+    (section.end_m + 0.25 + behind_m - START_M) / SPEED_MPS
+}
+
+/// How long after that the section was flagged, seconds.
+fn late_s(report: &Report, section: &SectionReport, behind_m: f64) -> f64 {
+    section.flagged_s.unwrap() - report.dive.start_s - left_s(section, behind_m)
+}
+
+#[test]
+fn where_all_heads_are_dead_the_way_fails_as_the_vehicle_leaves_it() {
+    // Dead at 5.2 m, the rear heads then at 4.65 m.
+    let report = steady(9.0, &silence(ALL, "from_s = 20"));
+    accounted_for("dead", &report);
+    assert!(report.way.to_m.unwrap() > START_M + 9.0, "{:?}", report.way);
+    let dark: Vec<_> =
+        report.sections.iter().filter(|s| s.start_m >= 6.0 && s.end_m <= 12.0 - HEAD_M - 0.5).collect();
+    assert!(dark.len() > 16);
+    for section in dark {
+        let evidence = section.cause.unwrap();
+        assert_eq!(
+            (section.verdict, evidence.cause.as_str()),
+            ("fail", "head_silent"),
+            "{}",
+            section.start_m
+        );
+        assert_eq!(evidence.silent_heads.iter().collect::<Vec<_>>(), [0, 1, 2, 3]);
+        let late_s = late_s(&report, section, HEAD_M);
+        // A beat, and what position errors add to half the target.
+        assert!((-0.1..2.5).contains(&late_s), "{}: {late_s} s late", section.start_m);
+    }
+    let home = report.way_home.iter().map(|back| back.from_m).fold(0.0, f64::max);
+    assert!(home > 10.5, "the way home goes to where the vehicle went: {home}");
+    let run = report.runs.iter().find(|run| run.cause.as_str() == "head_silent").unwrap();
+    assert_eq!(run.silent_sources, ["sonar_0", "sonar_1", "sonar_2", "sonar_3"]);
+    let last = report.sections.last().unwrap();
+    assert_eq!(last.verdict, "open", "what lies ahead may still be seen when a head comes back");
+}
+
+#[test]
+fn heads_that_come_back_are_waited_for_and_the_stretch_between_fails() {
+    // Dead from 5.75 m to 8.5 m.
+    let report = steady(9.0, &silence(ALL, "from_s = 25\nfor_s = 25"));
+    accounted_for("dead and back", &report);
+    let between = |from_m: f64, to_m: f64| {
+        let within = move |s: &&SectionReport| s.start_m >= from_m && s.end_m <= to_m;
+        report.sections.iter().filter(within).collect::<Vec<_>>()
+    };
+    for section in between(6.5, 7.75) {
+        let cause = section.cause.map(|evidence| evidence.cause.as_str());
+        assert_eq!((section.verdict, cause), ("fail", Some("head_silent")), "{}", section.start_m);
+    }
+    for section in between(4.25, 5.0).into_iter().chain(between(9.5, 11.0)) {
+        let calm = section.verdict != "fail" && section.flagged_s.is_none();
+        assert!(calm, "{}: {} at {:?}", section.start_m, section.verdict, section.flagged_s);
+    }
+}
+
+#[test]
+fn where_ticks_end_makes_no_difference_to_dead_heads() {
+    let silence = silence(ALL, "from_s = 8\nfor_s = 6");
+    let scene = format!(
+        "vehicle = \"vehicle.toml\"\n[trajectory]\nstart_m = 3\n[[trajectory.legs]]\ndistance_m = 4\n\
+         speed_mps = 0.2\n[effects]\n{silence}"
+    );
+    let digest =
+        |tick_ms| instrumented::dive_in_ticks(VEHICLE, &scene, DurNs::from_millis(tick_ms)).report.digest;
+    assert_eq!([digest(1), digest(333)], [digest(20), digest(20)]);
+}
+
+#[test]
+fn while_some_heads_are_alive_they_alone_are_waited_for() {
+    let report = steady(6.0, &silence(r#""sonar_1", "sonar_2", "sonar_3""#, "from_s = 0"));
+    accounted_for("three of four", &report);
+    let inner: Vec<_> = report.sections.iter().filter(|s| s.start_m >= 5.25 && s.end_m <= 8.5).collect();
+    assert!(inner.len() > 10);
+    for section in inner {
+        let evidence = section.cause.unwrap();
+        assert_eq!(
+            (section.verdict, evidence.cause.as_str()),
+            ("fail", "head_silent"),
+            "{}",
+            section.start_m
+        );
+        assert_eq!(evidence.silent_heads.iter().collect::<Vec<_>>(), [1, 2, 3]);
+        // The head in front leaves it ten seconds before those aft would.
+        let late_s = late_s(&report, section, -HEAD_M);
+        assert!(late_s < 4.0, "{}: {late_s} s late", section.start_m);
+    }
+    // One of four, at a speed that suits three.
+    let silent = silence("\"sonar_1\"", "from_s = 10");
+    let (one, none) = (steady(6.0, &silent), steady(6.0, ""));
+    accounted_for("one of four", &one);
+    for report in [&one, &none] {
+        let judged = report.sections.iter().filter(|s| s.end_m <= 7.5);
+        assert!(judged.clone().count() > 18 && judged.clone().all(|s| s.verdict != "open"));
+    }
+}
+
+#[test]
+fn the_sums_are_the_way_on_dives_of_all_kinds() {
+    for (seeded, dive) in DIVES.iter().take(40) {
+        accounted_for(&format!("seed {} ({:?})", seeded.seed, seeded.kind), &dive.report);
+    }
+}
+
+#[test]
+fn wherever_heads_fall_silent_what_is_left_unseen_fails_at_once_and_the_sums_are_the_way() {
+    let mut dark = 0;
+    for seed in (0..48).filter(|seed| seeded(*seed).kind != Kind::Reversing) {
+        let dive = seeded(seed);
+        let heads = dive.vehicle.matches("id = \"sonar_").count();
+        let ids: Vec<_> = (0..heads).map(|head| format!("\"sonar_{head}\"")).collect();
+        let from_s = Draw::new(1000 + seed).between(2.0, 6.0);
+        let scene = dive.scene + &silence(&ids.join(", "), &format!("from_s = {from_s}"));
+        let dive = instrumented::dive(&dive.vehicle, &scene);
+        let report = &dive.report;
+        let what = format!("seed {seed}");
+        accounted_for(&what, report);
+        let Some(to_m) = report.way.to_m else { continue };
+        // Heads are at most 0.6 m from the vehicle, either way; sections are left by half the target.
+        let (target_m, section_m) = (report.target_m, report.section_m);
+        let seen_m = dive.samples().map(|sample| sample.place[0]).fold(f64::NEG_INFINITY, f64::max);
+        let far = |s: &&SectionReport| s.start_m > seen_m + target_m;
+        let left = |s: &&SectionReport| s.end_m < to_m - 1.2 - target_m / 2.0 - 2.0 * section_m - 0.1;
+        for section in report.sections.iter().filter(far).filter(left) {
+            let cause = section.cause.map(|evidence| evidence.cause.as_str());
+            assert_eq!(
+                (section.verdict, cause),
+                ("fail", Some("head_silent")),
+                "{what}: {}",
+                section.start_m
+            );
+            let end_s = report.dive.start_s + report.dive.duration_s;
+            assert!(section.flagged_s.unwrap() < end_s - 1e-6, "{what}: {} only at the end", section.start_m);
+            dark += 1;
+        }
+    }
+    assert!(dark > 20, "{dark} sections");
+}
+
+#[test]
+fn a_stretch_without_a_position_is_of_the_way_and_fails_when_left() {
+    // The filter gives up some seconds after the cable falls silent.
+    let report = steady(12.0, &silence("\"tether\"", "from_s = 25\nfor_s = 50"));
+    accounted_for("outage", &report);
+    let lost =
+        |s: &&SectionReport| s.cause.is_some_and(|evidence| evidence.cause.as_str() == "position_lost");
+    let lost: Vec<_> = report.sections.iter().filter(lost).collect();
+    assert!(lost.len() >= 4, "{} sections", lost.len());
+    assert!(report.not_inspected.is_none(), "most of the dive had a position");
+}
+
+#[test]
+fn without_a_position_nothing_is_judged_and_that_is_said_first() {
+    for (sensor, lacking, words) in [("tether", "no_chainage", "chainage"), ("imu", "no_heading", "heading")]
+    {
+        let folder = Folder::new();
+        folder.write("vehicle.toml", SHORT);
+        let silence = format!("[effects]\n{}", silence(&format!("\"{sensor}\""), "from_s = 0"));
+        folder.write("scene.toml", SCENE.to_owned() + &silence);
+        folder.simulate("scene.toml", "dive.mcap");
+        let answer = folder.headrace(&["replay", "dive.mcap"]);
+        assert_eq!(answer.code, Some(1), "{}", answer.stdout);
+        let loud = answer.stdout.lines().find(|line| !line.starts_with("no position")).unwrap();
+        let wanted = format!("NOTHING WAS JUDGED: the vehicle never had a position, there was no {words}");
+        assert_eq!(loud, format!("{wanted}; nothing came from {sensor}"), "{}", answer.stdout);
+        let (code, report) = folder.replay("dive.mcap", &[]);
+        let why = &report["not_inspected"];
+        assert_eq!(
+            (code, &why["reason"], &why["lacking"]),
+            (Some(1), &"no_position".into(), &lacking.into())
+        );
+        assert_eq!(why["silent_sources"], serde_json::json!([sensor]));
+        assert_eq!(report["way"]["length_m"], 0.0);
+    }
+}
+
+#[test]
+fn a_dive_that_mostly_had_no_position_is_no_inspection() {
+    let folder = Folder::new();
+    folder.write("vehicle.toml", SHORT);
+    let silence = format!("[effects]\n{}", silence("\"tether\"", "from_s = 2"));
+    folder.write("scene.toml", SCENE.to_owned() + &silence);
+    folder.simulate("scene.toml", "dive.mcap");
+    let (code, report) = folder.replay("dive.mcap", &[]);
+    assert_eq!(code, Some(1), "{}", report["not_inspected"]);
+    assert_eq!(report["not_inspected"]["reason"], "mostly_no_position");
+    assert!(report["way"]["length_m"].as_f64().unwrap() > 0.0);
+    let answer = folder.headrace(&["replay", "dive.mcap"]);
+    assert!(answer.stdout.contains("NO INSPECTION: "), "{}", answer.stdout);
+}
