@@ -158,6 +158,7 @@ impl<'a, 'b> Runs<'a, 'b> {
         (self.progress)();
         let Material { profile, site, mut settings, sensors, .. } = *self.material;
         // Readings shifted back in time mustn't be too late for the window.
+        settings.learns = false;
         settings.window = settings.window + DurNs::from_secs_f64(REACH_S + COARSE_S);
         let mut filter = FilterNavigation::new(profile.clone(), site, settings);
         for event in self.events {

@@ -295,7 +295,9 @@ impl Eskf {
         let mut row = row.unless_sure(|by| math::sqrt(self.factors.variance_along(by)));
         row.noise += self.left_out(row.bends);
         let kind = source.sensor.kind;
-        row.noise *= source.noise_level.factor(kind, number);
+        if settings.learns {
+            row.noise *= source.noise_level.factor(kind, number);
+        }
         let innovation = row.residual - since(&row, known, errors);
         let along = self.factors.along(&row.h);
         let of_estimate = row.h.iter().zip(&along).map(|(h, along)| h * along).sum::<f64>();

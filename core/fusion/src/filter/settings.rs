@@ -83,6 +83,8 @@ pub struct Settings {
     pub gate: f64,
     /// Readings older than this on arrival are too late.
     pub window: DurNs,
+    /// Whether the level of the sources' noise is learnt. Likelihoods can only be compared without.
+    pub learns: bool,
 }
 
 impl Default for Settings {
@@ -113,6 +115,7 @@ impl Default for Settings {
             velocity_sd_mps: 0.02,
             gate: GATE_999,
             window: DurNs::from_millis(200),
+            learns: true,
         }
     }
 }
