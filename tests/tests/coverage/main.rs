@@ -9,3 +9,4 @@ mod flags;
 mod memory;
 mod metamorphic;
 mod oracle;
+mod wall_samples;

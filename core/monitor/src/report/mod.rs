@@ -142,6 +142,8 @@ pub struct RejectedReport {
     pub outside: u64,
     /// The sample store was full.
     pub not_stored: u64,
+    /// Returns that weren't taken for wall.
+    pub doubtful_returns: u64,
 }
 
 /// Metres by verdict, and spacings.
@@ -187,16 +189,19 @@ pub struct OpeningReport {
 /// An alert about the dive as a whole.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AlertReport {
-    /// `outside_tunnel` or `profile_contradicted`.
+    /// `outside_tunnel`, `profile_contradicted`, `head_scattered`, `head_constant` or `head_outvoted`.
     pub kind: &'static str,
     /// Time of its first occurrence, seconds on the log's clock.
     pub since_s: f64,
-    /// Occurrences: samples, or judgements of sections.
+    /// Occurrences: samples, judgements of sections, or times that a head was distrusted.
     pub count: u64,
     /// Chainage of its first occurrence, m.
     pub x_m: f64,
-    /// Largest deviation, m: beyond the end of the tunnel, or a section's mean from the design profile.
+    /// Largest deviation, m: beyond the end of the tunnel, or a section's mean from the design profile. Of a head: mean
+    /// between successive returns, constant range, or mean deviation from the design.
     pub worst_m: f64,
+    /// The head that isn't believed, by its id.
+    pub head: Option<String>,
 }
 
 impl Report {
@@ -222,7 +227,7 @@ impl Report {
             survey: survey::survey(coverage, &dive.mission().profile),
             what_if: Vec::new(),
             openings: dive.mission().coverage.openings.iter().map(opening_report).collect(),
-            alerts: dive.alerts().iter().map(alert_report).collect(),
+            alerts: dive.alerts().iter().map(|alert| alert_report(alert, dive)).collect(),
             advice: log.entries.iter().map(advice::advice_report).collect(),
             advice_dropped: log.dropped,
             sources: sources::source_reports(dive),
@@ -249,7 +254,7 @@ fn dive_report(coverage: &Coverage, tally: &Tally, sound_mps: [f64; 2]) -> DiveR
         from_m: swept.map(|reach| reach.from_m),
         to_m: swept.map(|reach| reach.to_m),
         distance_m: swept.map_or(0.0, |reach| reach.to_m - reach.from_m),
-        sonar: tally.samples + tally.missing + tally.out_of_range + tally.occluded + tally.unplaced > 0,
+        sonar: tally.samples + tally.doubtful + tally.missing + tally.out_of_range + tally.occluded + tally.unplaced > 0,
         sound_speed_least_mps,
         sound_speed_most_mps,
         samples_valid: tally.samples - tally.outside - tally.not_stored,
@@ -261,6 +266,7 @@ fn dive_report(coverage: &Coverage, tally: &Tally, sound_mps: [f64; 2]) -> DiveR
             no_fix: tally.unplaced,
             outside: tally.outside,
             not_stored: tally.not_stored,
+            doubtful_returns: tally.doubtful,
         },
     }
 }
@@ -313,12 +319,14 @@ fn opening_report(opening: &Opening) -> OpeningReport {
     }
 }
 
-fn alert_report(alert: &Alert) -> AlertReport {
+fn alert_report(alert: &Alert, dive: &Loop) -> AlertReport {
+    let head = alert.source.and_then(|source| dive.sources().get(source.index()));
     AlertReport {
         kind: alert.kind.as_str(),
         since_s: alert.since.as_secs_f64(),
         count: alert.count,
         x_m: alert.x_m,
         worst_m: alert.worst_m,
+        head: head.map(|source| source.id.clone()),
     }
 }

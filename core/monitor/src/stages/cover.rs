@@ -6,10 +6,11 @@ use bevy_ecs::prelude::{Query, Res, ResMut, Single};
 
 use super::advise::Advisor;
 use super::driving::{Driven, Driving};
-use super::judge::{Results, digest_alert, judge_one};
-use crate::alerts::{AlertKind, Alerts};
+use super::judge::{Results, judge_one};
+use super::walls::{self, Sorting};
+use crate::alerts::Alerts;
 use crate::entities::{HeadFrontier, HeadSweep, LastSample};
-use crate::messages::{Notice, Notices, Outcome, Placed, PlacedList, PlacedPing, Requests};
+use crate::messages::{Notices, Outcome, Placed, PlacedList, PlacedPing, Requests};
 use crate::resources::{Coverage, Digests, Finder, Tally, TunnelDesign, VehicleEntities};
 use headrace_coverage::hole::FARTHEST_M;
 use headrace_coverage::{HeadReach, Loss, Outlook, PassError, StoreError, WallSample};
@@ -53,19 +54,21 @@ pub(super) fn cover(
                 let head = entities.of_head(ping.head).and_then(|entity| heads.get_mut(entity).ok());
                 let Some((mut sweep, mut frontier)) = head else { continue };
                 note_passage(&mut coverage, &mut sweep, &frontier, &driving.now, ping);
-                if let Some(beyond_m) = beyond_end_m(ping, tunnel.length_m)
-                    && alerts.note(AlertKind::OutsideTunnel, ping.received, beyond_m.0, beyond_m.1)
-                {
-                    notices.0.push(Notice::Alert(AlertKind::OutsideTunnel));
-                    digest_alert(&mut digests, AlertKind::OutsideTunnel, ping.received, beyond_m);
-                }
-                if let Err(error) = note_sample(&mut coverage, &mut sweep, &tunnel, ping) {
-                    match error {
-                        StoreError::Outside => tally.outside += 1,
-                        StoreError::Full => tally.not_stored += 1,
-                    }
-                }
+                let mut sorting = Sorting {
+                    coverage: &mut coverage,
+                    tunnel: &tunnel,
+                    tally: &mut tally,
+                    notices: &mut notices,
+                    digests: &mut digests,
+                    alerts: &mut alerts,
+                };
+                let suspected_m = walls::note_ping(&mut sorting, &mut sweep, ping);
                 note_reach(&mut frontier, ping);
+                if let Some(between_m) = suspected_m {
+                    let reaches = heads.iter().filter_map(|(_, frontier)| frontier.0);
+                    let outlook = coverage.frontier.outlook(reaches, ping.received);
+                    walls::suspect(&mut coverage, between_m, &outlook, &mut requests);
+                }
                 let reaches = heads.iter().filter_map(|(_, frontier)| frontier.0);
                 note_frontier(&mut coverage, reaches, ping, &mut requests);
             }
@@ -84,7 +87,8 @@ pub(super) fn cover(
 
 fn count(tally: &mut Tally, outcome: &Outcome) {
     match outcome {
-        Outcome::Sample { .. } => tally.samples += 1,
+        // Counted when it is known what the return is.
+        Outcome::Sample { .. } => {}
         Outcome::Lost(Loss::Missing, _) => tally.missing += 1,
         Outcome::Lost(Loss::OutOfRange, _) => tally.out_of_range += 1,
         Outcome::Lost(Loss::Occluded, _) => tally.occluded += 1,
@@ -166,16 +170,8 @@ fn look_around(
     sections.look_around(outlook, store, &mut finder.0, &tunnel.profile, &mut ask);
 }
 
-/// Chainage of a sample beyond either end of the tunnel, and by how much, m.
-fn beyond_end_m(ping: &PlacedPing, length_m: f64) -> Option<(f64, f64)> {
-    let Outcome::Sample { point, .. } = ping.outcome else { return None };
-    let x_m = point.x();
-    let beyond_m = (-x_m).max(x_m - length_m);
-    (beyond_m > 0.0).then_some((x_m, beyond_m))
-}
-
 /// Stores a sample and adds its spacings to its section.
-fn note_sample(
+pub(super) fn note_sample(
     coverage: &mut Coverage,
     sweep: &mut HeadSweep,
     tunnel: &TunnelDesign,

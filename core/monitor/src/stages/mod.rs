@@ -10,6 +10,7 @@ mod georeference;
 mod judge;
 mod navigate;
 mod sound_speed;
+mod walls;
 
 use bevy_ecs::schedule::{IntoScheduleConfigs, Schedule};
 

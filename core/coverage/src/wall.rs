@@ -1,0 +1,151 @@
+//! Which returns are taken for wall: those where the design says, and those that others agree with.
+//!
+//! A return within the tolerance of the design is wall. Another one needs a neighbour along the turn, or an earlier pass
+//! nearby, that found the wall as far off the design. What nobody agrees with is *doubtful*: a fish, a bubble, an echo by
+//! way of two walls. It waits for the head's next return before it is called so, since a boulder begins with one return.
+
+use serde::{Deserialize, Serialize};
+
+use super::relief::Relief;
+use super::trust::{Beam, Distrust, HeadTrust};
+use headrace_geometry::math;
+
+/// Limits of what is taken for wall, m. They scale with the cross-section.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WallLimits {
+    /// Returns no farther than this off the design, or off others that agree with them, are wall.
+    pub tolerance_m: f64,
+    /// Returns farther than this off the design contradict it.
+    pub contradiction_m: f64,
+    /// Perimeter of the design profile.
+    pub perimeter_m: f64,
+    /// Radius of a circle of this perimeter.
+    pub radius_m: f64,
+    /// Target T: how far along the tunnel an earlier pass counts.
+    pub target_m: f64,
+}
+
+/// Share of the equivalent radius: the roughness of blasted rock, a tenth of a tunnel's radius.
+const TOLERANCE_SHARE: f64 = 0.1;
+/// The least tolerance, m: resolution and noise of profiling sonars, three times.
+const LEAST_TOLERANCE_M: f64 = 0.03;
+
+impl WallLimits {
+    /// Limits for a profile of this perimeter.
+    pub fn new(perimeter_m: f64, contradiction_m: f64, target_m: f64) -> Self {
+        let radius_m = perimeter_m / math::TAU;
+        let tolerance_m = (TOLERANCE_SHARE * radius_m).max(LEAST_TOLERANCE_M).min(contradiction_m);
+        Self { tolerance_m, contradiction_m, perimeter_m, radius_m, target_m }
+    }
+
+    /// Whether the design itself vouches for a return.
+    pub fn is_design(&self, placed: &PlacedReturn) -> bool {
+        placed.off_m.abs() <= self.tolerance_m
+    }
+
+    /// Whether two returns of neighbouring beams are of one wall.
+    pub(super) fn agree(&self, a: &PlacedReturn, b: &PlacedReturn) -> bool {
+        let apart_m = self.apart_m(a, b);
+        let slope_m = (SLOPE * apart_m).min(MOST_SLOPE * self.tolerance_m);
+        apart_m <= NEAR_SHARE * self.radius_m && (a.off_m - b.off_m).abs() <= self.tolerance_m + slope_m
+    }
+
+    /// Distance between the rays of two returns along the wall, at the farther one, m.
+    fn apart_m(&self, a: &PlacedReturn, b: &PlacedReturn) -> f64 {
+        let outward = 1.0 + a.off_m.max(b.off_m).max(0.0) / self.radius_m;
+        let around_m = math::wrap_signed(a.arc_m - b.arc_m, self.perimeter_m) * outward;
+        math::hypot(a.x_m - b.x_m, around_m)
+    }
+}
+
+/// Steepness of rock that two neighbouring beams may meet, beyond the tolerance: 63 degrees.
+const SLOPE: f64 = 2.0;
+/// What steepness may add at most, tolerances.
+const MOST_SLOPE: f64 = 2.0;
+/// Neighbours are no farther apart than this share of the radius.
+const NEAR_SHARE: f64 = 0.4;
+
+/// A return placed on the unrolled wall.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct PlacedReturn {
+    /// Chainage, m.
+    pub x_m: f64,
+    /// Arc length, m.
+    pub arc_m: f64,
+    /// Outward deviation from the design along the ray from the profile's reference point, m.
+    pub off_m: f64,
+}
+
+/// What a return is taken for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Taken {
+    /// Wall.
+    Wall,
+    /// Not settled: wall, or something in the water.
+    Doubtful,
+    /// The head's next return decides.
+    Waits,
+}
+
+/// What a return has decided.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sorted {
+    /// What the return that waited for this one is taken for; `None` if none did.
+    pub waiting: Option<Taken>,
+    /// What this one is taken for.
+    pub this: Taken,
+    /// The head isn't believed any more: why, and the chainages of its late returns, m.
+    pub distrusted: Option<(Distrust, [f64; 2])>,
+}
+
+/// A head's last returns, and whether it is believed.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct HeadWall {
+    /// The last return and the one before.
+    last: [Option<PlacedReturn>; 2],
+    /// The last one waits.
+    waits: bool,
+    trust: HeadTrust,
+}
+
+impl HeadWall {
+    /// Why the head isn't believed; `None` if it is.
+    pub fn distrusted(&self) -> Option<Distrust> {
+        self.trust.distrusted()
+    }
+
+    /// Sorts the head's next return, and the one that waited for it. `beam` says how it was had.
+    ///
+    /// Allocates: never.
+    pub fn sort(
+        &mut self,
+        head: usize,
+        placed: PlacedReturn,
+        beam: &Beam<'_>,
+        limits: &WallLimits,
+        relief: &mut Relief,
+    ) -> Sorted {
+        let before = self.last;
+        let [last, last_but_one] = before.map(|other| other.is_some_and(|other| limits.agree(&placed, &other)));
+        let is_design = limits.is_design(&placed);
+        let is_wall = is_design || last || last_but_one || relief.supports(&placed, limits);
+        let waiting = core::mem::take(&mut self.waits).then_some(if last { Taken::Wall } else { Taken::Doubtful });
+        self.last = [Some(placed), before[0]];
+        relief.vote(head, &placed, limits);
+        let both_design = is_design && before[0].is_some_and(|other| limits.is_design(&other));
+        let doubtful = u32::from(waiting == Some(Taken::Doubtful));
+        let jump_m = before[0].filter(|_| !last && !both_design).map(|other| placed.off_m - other.off_m);
+        let distrusted = self.trust.note(&placed, beam, jump_m, doubtful, limits, relief.ballot(head));
+        relief.believe(head, self.distrusted().is_none());
+        if self.distrusted().is_some() {
+            return Sorted { waiting: waiting.map(|_| Taken::Doubtful), this: Taken::Doubtful, distrusted };
+        }
+        if let (Some(Taken::Wall), Some(other)) = (waiting, before[0]) {
+            relief.remember(&other, true, limits);
+        }
+        relief.remember(&placed, is_wall, limits);
+        self.waits = !is_wall;
+        let this = if is_wall { Taken::Wall } else { Taken::Waits };
+        Sorted { waiting, this, distrusted }
+    }
+}
