@@ -135,7 +135,8 @@ impl Relief {
             return;
         }
         *seen |= me;
-        let Cell { as_designed: agreeing, contradicting, .. } = *cell;
+        let Cell { as_designed: agreeing, contradicting, off, .. } = *cell;
+        let off = off.map_or(*placed, |(off, _)| off);
         let others_agree = agreeing & !me & !distrusted != 0;
         if !as_designed {
             if others_agree && agreeing & me == 0 {
@@ -153,7 +154,7 @@ impl Relief {
             if agreeing & bit(other) != 0 {
                 self.count(other, None);
             } else if contradicting & bit(other) != 0 {
-                self.count(other, Some(placed));
+                self.count(other, Some(&off));
             }
         }
     }

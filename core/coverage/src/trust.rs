@@ -11,7 +11,7 @@ use headrace_geometry::math;
 pub enum Distrust {
     /// Most of its successive returns disagree: by how far in the mean.
     Scattered(f64),
-    /// Its range doesn't change through most of a turn, though the design's does by much: the range.
+    /// Its range doesn't change through a turn, though that to the design does by much: the range.
     Constant(f64),
     /// It contradicts the design where other heads agree with it: its mean deviation there.
     Outvoted(f64),
@@ -40,6 +40,10 @@ struct HalfTurn {
     turned_rad: f64,
     /// Chainages of the returns, m.
     between_m: Option<[f64; 2]>,
+    /// Returns within runs of one range, their least and most range, and the same of the design there, m.
+    unchanged: u32,
+    unchanged_m: Option<[f64; 2]>,
+    design_m: Option<[f64; 2]>,
 }
 
 impl HalfTurn {
@@ -51,6 +55,9 @@ impl HalfTurn {
             jump_sum_m: self.jump_sum_m + other.jump_sum_m,
             turned_rad: self.turned_rad + other.turned_rad,
             between_m: joined(self.between_m, other.between_m),
+            unchanged: self.unchanged + other.unchanged,
+            unchanged_m: joined(self.unchanged_m, other.unchanged_m),
+            design_m: joined(self.design_m, other.design_m),
         }
     }
 
@@ -58,7 +65,15 @@ impl HalfTurn {
         self.turned_rad >= math::TAU / 2.0 && self.returns >= FEW
     }
 
-    /// Whether at least one return in `parts` disagrees with its neighbours.
+    /// Whether more than one return in `parts` is of one range, though the design varies by much where they are.
+    fn is_constant(&self, parts: u32, limits: &WallLimits) -> bool {
+        let span_m = |of: Option<[f64; 2]>| of.map_or(0.0, |[least_m, most_m]| most_m - least_m);
+        parts * self.unchanged > self.returns
+            && span_m(self.unchanged_m) < CONSTANT * limits.tolerance_m
+            && span_m(self.design_m) > VARIES * limits.tolerance_m
+    }
+
+    /// Whether more than one return in `parts` disagrees with its neighbours.
     fn has_one_in(&self, parts: u32) -> bool {
         parts * self.jumps.max(self.doubtful) > self.returns
     }
@@ -68,12 +83,12 @@ impl HalfTurn {
 const FEW: u32 = 20;
 /// A range counts as unchanged within this share of the tolerance: some quanta of a profiling sonar.
 const UNCHANGED: f64 = 0.2;
-/// An unchanged range contradicts the design where that varies by this many tolerances.
+/// Runs of unchanged range are of one range within this share of the tolerance.
+const CONSTANT: f64 = 0.6;
+/// One range contradicts the design where that varies by this many tolerances.
 const VARIES: f64 = 2.0;
-/// Angle through which an unchanged range must last, rad: three quarters of a turn.
-const MOST_OF_A_TURN_RAD: f64 = 0.75 * math::TAU;
-/// Returns of an unchanged range before the design is looked at.
-const SOME: u32 = 16;
+/// Returns in a row that make a run of unchanged range: neighbours on a wall differ less.
+const RUN: u32 = 8;
 
 fn joined(a: Option<[f64; 2]>, b: Option<[f64; 2]>) -> Option<[f64; 2]> {
     match (a, b) {
@@ -88,31 +103,19 @@ struct Unchanged {
     returns: u32,
     /// Least and most range, m.
     range_m: [f64; 2],
-    /// The same of the design, and the angle turned since that was looked at.
-    design_m: Option<[f64; 2]>,
-    turned_rad: f64,
 }
 
 impl Unchanged {
-    /// Adds a return; true if the range has lasted too long.
-    fn add(&mut self, beam: &Beam<'_>, turned_rad: f64, limits: &WallLimits) -> bool {
+    /// Adds a return; true if it is within a run of one range.
+    fn add(&mut self, range_m: f64, limits: &WallLimits) -> bool {
         let [least_m, most_m] = self.range_m;
-        let range_m = [least_m.min(beam.range_m), most_m.max(beam.range_m)];
-        if self.returns == 0 || range_m[1] - range_m[0] > UNCHANGED * limits.tolerance_m {
-            *self = Self { returns: 1, range_m: [beam.range_m; 2], ..Self::default() };
-            return false;
+        let span_m = [least_m.min(range_m), most_m.max(range_m)];
+        if self.returns == 0 || span_m[1] - span_m[0] > UNCHANGED * limits.tolerance_m {
+            *self = Self { returns: 1, range_m: [range_m; 2] };
+        } else {
+            *self = Self { returns: self.returns.saturating_add(1), range_m: span_m };
         }
-        (self.returns, self.range_m) = (self.returns + 1, range_m);
-        if self.returns < SOME {
-            return false;
-        }
-        let design_m = (beam.design_range_m)().map(|range_m| [range_m; 2]);
-        if self.design_m.is_some() {
-            self.turned_rad += turned_rad;
-        }
-        self.design_m = joined(self.design_m, design_m);
-        let varies = self.design_m.is_some_and(|[a, b]| b - a > VARIES * limits.tolerance_m);
-        varies && self.turned_rad > MOST_OF_A_TURN_RAD
+        self.returns >= RUN
     }
 }
 
@@ -148,7 +151,8 @@ impl HeadTrust {
         }
         let before = self.angle_rad.replace(beam.angle_rad).unwrap_or(beam.angle_rad);
         let turned_rad = math::wrap_signed(beam.angle_rad - before, math::TAU).abs();
-        let constant = self.unchanged.add(beam, turned_rad, limits);
+        let unchanged = self.unchanged.add(beam.range_m, limits);
+        let is_run = |range_m: f64| unchanged.then_some([range_m; 2]);
         let one = HalfTurn {
             returns: 1,
             doubtful,
@@ -156,6 +160,9 @@ impl HeadTrust {
             jump_sum_m: jump_m.unwrap_or(0.0).abs(),
             turned_rad,
             between_m: Some([placed.x_m; 2]),
+            unchanged: u32::from(unchanged),
+            unchanged_m: is_run(beam.range_m),
+            design_m: if unchanged { (beam.design_range_m)().and_then(is_run) } else { None },
         };
         self.halves[0] = self.halves[0].with(&one);
         let is_full = self.halves[0].is_full();
@@ -166,12 +173,12 @@ impl HeadTrust {
         }
         let whole = is_full && turn.turned_rad >= 0.9 * math::TAU;
         if self.distrusted.is_some() {
-            if whole && !turn.has_one_in(4) && !ballot.is_lost() && !constant {
+            if whole && !turn.has_one_in(4) && !ballot.is_lost() && !turn.is_constant(4, limits) {
                 self.distrusted = None;
             }
             return None;
         }
-        let (why, between_m) = if constant {
+        let (why, between_m) = if whole && turn.is_constant(2, limits) {
             (Distrust::Constant(beam.range_m), late_m)
         } else if whole && turn.has_one_in(2) {
             (Distrust::Scattered(turn.jump_sum_m / f64::from(turn.jumps.max(1))), late_m)
