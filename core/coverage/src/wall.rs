@@ -59,9 +59,9 @@ impl WallLimits {
 }
 
 /// Steepness of rock that two neighbouring beams may meet, beyond the tolerance: 63 degrees.
-const SLOPE: f64 = 2.0;
+const SLOPE: f64 = 1.0;
 /// What steepness may add at most, tolerances.
-const MOST_SLOPE: f64 = 2.0;
+const MOST_SLOPE: f64 = 1.0;
 /// Neighbours are no farther apart than this share of the radius.
 const NEAR_SHARE: f64 = 0.4;
 
