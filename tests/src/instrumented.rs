@@ -6,7 +6,7 @@ use headrace_geometry::math::TAU;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_geometry::tunnel::Profile;
 use headrace_monitor::App;
-use headrace_monitor::messages::{Placed, PlacedList};
+use headrace_monitor::messages::{Outcome, Placed, PlacedList};
 use headrace_monitor::report::Report;
 use headrace_monitor::resources::{Digests, VehicleEntities};
 use headrace_monitor::result_stream::{RecordKind, first_record};
@@ -73,7 +73,11 @@ impl Dive {
 }
 
 #[derive(Resource, Default)]
-struct Seen(Vec<Ping>);
+struct Seen {
+    pings: Vec<Ping>,
+    /// Where each one's return was placed: wall or doubtful, which the loop may say later.
+    placed: Vec<Option<[f64; 3]>>,
+}
 
 /// Copies what has been placed, and touches nothing.
 struct Watch;
@@ -98,7 +102,11 @@ fn watch(
 ) {
     for item in &placed.0 {
         let Placed::Ping(ping) = item else { continue };
-        seen.0.push(Ping {
+        seen.placed.push(match ping.outcome {
+            Outcome::Sample { point, .. } => Some([point.x(), point.y(), point.z()]),
+            Outcome::Lost(..) | Outcome::Unplaced(_) => None,
+        });
+        seen.pings.push(Ping {
             head: ping.head,
             received: ping.received,
             new_sweep: ping.new_sweep,
@@ -117,12 +125,14 @@ fn watch(
         }
         let [received, source, _, place @ ..] = record.words else { panic!("a ping's words") };
         let [x_m, y_m, z_m, arc_m] = [0, 1, 2, 3].map(|k| f64::from_bits(place[k]));
-        let sample = Some(Sample { place: [x_m, arc_m], point: [x_m, y_m, z_m] });
+        let point = [x_m, y_m, z_m];
+        let sample = Some(Sample { place: [x_m, arc_m], point });
         let head = entities.of_source(SourceId(u16::try_from(*source).unwrap()));
-        let of_it = |ping: &&mut Ping| {
-            entities.of_head(ping.head) == head && ping.received.0 == *received
+        let Seen { pings, placed } = &mut *seen;
+        let of_it = |(ping, placed): &(&mut Ping, &Option<[f64; 3]>)| {
+            entities.of_head(ping.head) == head && ping.received.0 == *received && **placed == Some(point)
         };
-        let ping = seen.0.iter_mut().rev().find(of_it).unwrap();
+        let (ping, _) = pings.iter_mut().zip(&*placed).rev().find(of_it).unwrap();
         *(if is_wall { &mut ping.sample } else { &mut ping.doubtful }) = sample;
     }
 }
@@ -167,7 +177,7 @@ fn watched(scene: &Scene, vehicle: &VehicleConfig, mission: Mission, pace: Pace)
     dive.finish(&mut |_, _| {});
     let heads = vehicle.heads();
     Dive {
-        pings: dive.resource::<Seen>().unwrap().0.clone(),
+        pings: dive.resource::<Seen>().unwrap().pings.clone(),
         report: Report::of(&dive),
         profile: dive.mission().profile.clone(),
         ranges_m: heads.iter().map(|head| head.reach_m(vehicle.site.sound_speed_mps)[1]).collect(),
