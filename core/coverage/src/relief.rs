@@ -9,7 +9,7 @@ use headrace_snapshot::stateful;
 
 /// Bins around the perimeter: about a step of a head.
 const BINS: i64 = 128;
-/// Bins along the tunnel that are remembered, each half a target long: 8 m at T = 0.5 m, more than heads are apart.
+/// Bins along the tunnel that are remembered, each half a reach long: 9 m in a tunnel of 6 m radius, more than heads are apart.
 const SLABS: i64 = 32;
 
 /// What was found in a bin.
@@ -95,7 +95,7 @@ fn bit(head: usize) -> u8 {
 }
 
 impl Relief {
-    /// Whether the wall was found as far off the design nearby: by a return that was wall within T along the tunnel, or by
+    /// Whether the wall was found as far off the design nearby: by a return that was wall within reach along the tunnel, or by
     /// a doubtful one at half the distances.
     pub(super) fn supports(&self, placed: &PlacedReturn, limits: &WallLimits) -> bool {
         let (slab, bin) = place(placed, limits);
@@ -103,7 +103,7 @@ impl Relief {
             (bin - 1..=bin + 1).any(|bin| {
                 let Some((other, is_wall)) = self.cell(slab, bin).and_then(|cell| cell.off) else { return false };
                 let share = if is_wall { 1.0 } else { 0.5 };
-                (other.x_m - placed.x_m).abs() <= share * limits.target_m
+                (other.x_m - placed.x_m).abs() <= share * limits.reach_m
                     && (other.off_m - placed.off_m).abs() <= share * limits.tolerance_m
             })
         })
@@ -130,6 +130,10 @@ impl Relief {
         }
         let (me, distrusted) = (bit(head), self.distrusted);
         let Some(cell) = self.cell_mut(slab, bin) else { return };
+        if as_designed && cell.off.is_some_and(|(_, is_wall)| !is_wall) {
+            // What was met once isn't there any more.
+            cell.off = None;
+        }
         let seen = if as_designed { &mut cell.as_designed } else { &mut cell.contradicting };
         if *seen & me != 0 {
             return;
@@ -191,7 +195,7 @@ impl Relief {
 
 /// Slab along the tunnel and bin around the perimeter.
 fn place(placed: &PlacedReturn, limits: &WallLimits) -> (i64, i64) {
-    let slab = math::floor_to_i64(2.0 * placed.x_m / limits.target_m);
+    let slab = math::floor_to_i64(2.0 * placed.x_m / limits.reach_m);
     (slab, math::floor_to_i64(placed.arc_m / limits.perimeter_m * BINS as f64))
 }
 

@@ -21,8 +21,8 @@ pub struct WallLimits {
     pub perimeter_m: f64,
     /// Radius of a circle of this perimeter.
     pub radius_m: f64,
-    /// Target T: how far along the tunnel an earlier pass counts.
-    pub target_m: f64,
+    /// How far along the tunnel an earlier pass counts. Not the target T: samples don't depend on what is asked of them.
+    pub reach_m: f64,
 }
 
 /// Share of the equivalent radius: the roughness of blasted rock, a tenth of a tunnel's radius.
@@ -30,12 +30,17 @@ const TOLERANCE_SHARE: f64 = 0.1;
 /// The least tolerance, m: resolution and noise of profiling sonars, three times.
 const LEAST_TOLERANCE_M: f64 = 0.03;
 
+/// Share of the equivalent radius, and the least, m: about the distance between passes.
+const REACH_SHARE: f64 = 0.1;
+const LEAST_REACH_M: f64 = 0.2;
+
 impl WallLimits {
     /// Limits for a profile of this perimeter.
-    pub fn new(perimeter_m: f64, contradiction_m: f64, target_m: f64) -> Self {
+    pub fn new(perimeter_m: f64, contradiction_m: f64) -> Self {
         let radius_m = perimeter_m / math::TAU;
         let tolerance_m = (TOLERANCE_SHARE * radius_m).max(LEAST_TOLERANCE_M).min(contradiction_m);
-        Self { tolerance_m, contradiction_m, perimeter_m, radius_m, target_m }
+        let reach_m = (REACH_SHARE * radius_m).max(LEAST_REACH_M);
+        Self { tolerance_m, contradiction_m, perimeter_m, radius_m, reach_m }
     }
 
     /// Whether the design itself vouches for a return.
@@ -58,7 +63,7 @@ impl WallLimits {
     }
 }
 
-/// Steepness of rock that two neighbouring beams may meet, beyond the tolerance: 63 degrees.
+/// Steepness of rock that two neighbouring beams may meet, beyond the tolerance: 45 degrees.
 const SLOPE: f64 = 1.0;
 /// What steepness may add at most, tolerances.
 const MOST_SLOPE: f64 = 1.0;
@@ -149,3 +154,6 @@ impl HeadWall {
         Sorted { waiting, this, distrusted }
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -109,11 +109,7 @@ impl App {
             site: mission.site,
             length_m: mission.length_m,
             contradiction_m: mission.coverage.contradiction_m,
-            limits: WallLimits::new(
-                mission.profile.perimeter_m(),
-                mission.coverage.contradiction_m,
-                mission.target_m,
-            ),
+            limits: WallLimits::new(mission.profile.perimeter_m(), mission.coverage.contradiction_m),
         });
         world.insert_resource(Target { target_m: mission.target_m, layout: mission.layout });
         Ok(())
