@@ -72,7 +72,10 @@ impl Watch {
                 if let Some(alert) = dive.alerts().get(*kind, *source) {
                     let head = source.and_then(|source| dive.sources().get(source.index()));
                     let head = head.map_or("", |source| source.id.as_str());
-                    self.line(&format!("ALERT    {}", alert_text(alert.kind, head, alert.x_m, alert.worst_m)));
+                    self.line(&format!(
+                        "ALERT    {}",
+                        alert_text(alert.kind, head, alert.x_m, alert.worst_m)
+                    ));
                 }
             }
         }

@@ -34,6 +34,7 @@ const EFFECTS: [(&str, &str); 28] = [
     ("interference", "share = 0.01"),
     ("missing_returns", "share = 0.05\nmean_run = 3"),
     ("outliers", "share = 0.02"),
+    ("stuck_range", "range_m = 0.55\nto_s = 20\nsensors = [\"sonar_0\"]"),
     ("sound_speed_error", "share = 0.005"),
     ("range_noise", "sd_m = 0.01"),
     ("range_quantisation", "points = 500\nsensors = [\"sonar_0\", \"sonar_1\", \"sonar_2\", \"sonar_3\"]"),

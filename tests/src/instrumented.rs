@@ -70,6 +70,11 @@ impl Dive {
     pub fn samples(&self) -> impl Iterator<Item = &Sample> {
         self.pings.iter().filter_map(|ping| ping.sample.as_ref())
     }
+
+    /// Where the samples of some heads lie: chainage and arc length, m.
+    pub fn samples_of(&self, is_one: impl Fn(usize) -> bool) -> impl Iterator<Item = [f64; 2]> {
+        self.pings.iter().filter(move |ping| is_one(ping.head)).filter_map(|ping| Some(ping.sample?.place))
+    }
 }
 
 #[derive(Resource, Default)]

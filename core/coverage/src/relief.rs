@@ -101,7 +101,9 @@ impl Relief {
         let (slab, bin) = place(placed, limits);
         (slab - 2..=slab + 2).any(|slab| {
             (bin - 1..=bin + 1).any(|bin| {
-                let Some((other, is_wall)) = self.cell(slab, bin).and_then(|cell| cell.off) else { return false };
+                let Some((other, is_wall)) = self.cell(slab, bin).and_then(|cell| cell.off) else {
+                    return false;
+                };
                 let share = if is_wall { 1.0 } else { 0.5 };
                 (other.x_m - placed.x_m).abs() <= share * limits.reach_m
                     && (other.off_m - placed.off_m).abs() <= share * limits.tolerance_m

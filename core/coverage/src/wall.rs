@@ -131,10 +131,12 @@ impl HeadWall {
         relief: &mut Relief,
     ) -> Sorted {
         let before = self.last;
-        let [last, last_but_one] = before.map(|other| other.is_some_and(|other| limits.agree(&placed, &other)));
+        let [last, last_but_one] =
+            before.map(|other| other.is_some_and(|other| limits.agree(&placed, &other)));
         let is_design = limits.is_design(&placed);
         let is_wall = is_design || last || last_but_one || relief.supports(&placed, limits);
-        let waiting = core::mem::take(&mut self.waits).then_some(if last { Taken::Wall } else { Taken::Doubtful });
+        let waiting =
+            core::mem::take(&mut self.waits).then_some(if last { Taken::Wall } else { Taken::Doubtful });
         self.last = [Some(placed), before[0]];
         relief.vote(head, &placed, limits);
         let both_design = is_design && before[0].is_some_and(|other| limits.is_design(&other));

@@ -21,7 +21,12 @@ pub struct CoverageConfig {
 
 impl Default for CoverageConfig {
     fn default() -> Self {
-        Self { hole_tolerance_m: 0.0, contradiction_m: MOST_CONTRADICTION_M, node_m: NODE_M, openings: Vec::new() }
+        Self {
+            hole_tolerance_m: 0.0,
+            contradiction_m: MOST_CONTRADICTION_M,
+            node_m: NODE_M,
+            openings: Vec::new(),
+        }
     }
 }
 

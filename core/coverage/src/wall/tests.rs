@@ -39,25 +39,22 @@ impl Turning {
         let radius_m = self.limits.radius_m;
         let mut counts = vec![Count::default(); self.heads.len()];
         for (turn, step) in (0..turns).flat_map(|turn| (0..STEPS).map(move |step| (turn, step))) {
-            for head in 0..self.heads.len() {
-                let angle = TAU * (f64::from(step) / f64::from(STEPS) + head as f64 / self.heads.len() as f64) % TAU;
-                let x_m = self.pass_m * self.heads.len() as f64
+            for (head, count) in counts.iter_mut().enumerate() {
+                let angle =
+                    TAU * (f64::from(step) / f64::from(STEPS) + head as f64 / self.heads.len() as f64) % TAU;
+                let x_m = self.pass_m
+                    * self.heads.len() as f64
                     * (f64::from(turn) + f64::from(step) / f64::from(STEPS));
                 let Some(range_m) = heard(head, x_m, angle, [turn, step]) else { continue };
                 let placed = PlacedReturn { x_m, arc_m: angle * radius_m, off_m: range_m - radius_m };
-                let beam = Beam {
-                    range_m,
-                    angle_rad: angle,
-                    standing: false,
-                    design_range_m: &|| Some(radius_m),
-                };
-                let sorted =
-                    self.heads[head].sort(head, placed, &beam, &self.limits, &mut self.relief);
+                let beam =
+                    Beam { range_m, angle_rad: angle, standing: false, design_range_m: &|| Some(radius_m) };
+                let sorted = self.heads[head].sort(head, placed, &beam, &self.limits, &mut self.relief);
                 for taken in sorted.waiting.into_iter().chain([sorted.this]) {
-                    counts[head].wall += usize::from(taken == Taken::Wall);
-                    counts[head].doubtful += usize::from(taken == Taken::Doubtful);
+                    count.wall += usize::from(taken == Taken::Wall);
+                    count.doubtful += usize::from(taken == Taken::Doubtful);
                 }
-                counts[head].named.extend(sorted.distrusted.map(|(why, _)| why));
+                count.named.extend(sorted.distrusted.map(|(why, _)| why));
             }
         }
         counts
@@ -86,9 +83,8 @@ fn smooth_and_rough_walls_and_wider_ones_are_wall_in_tunnels_of_any_size() {
         Turning::new(radius_m, 1).all_wall(10, |_, _| radius_m);
         Turning::new(radius_m, 1).all_wall(10, |_, _| 1.06 * radius_m);
         // Overbreak of a quarter of the radius, three lobes around and one along.
-        Turning::new(radius_m, 2).all_wall(10, |x_m, angle| {
-            radius_m * (1.12 + 0.12 * math::sin(3.0 * angle + x_m / radius_m))
-        });
+        Turning::new(radius_m, 2)
+            .all_wall(10, |x_m, angle| radius_m * (1.12 + 0.12 * math::sin(3.0 * angle + x_m / radius_m)));
         // As vehicles find it that take themselves to be in the middle.
         Turning::new(radius_m, 1).all_wall(10, |_, angle| radius_m * (1.0 + 0.15 * math::sin(angle)));
     }
@@ -151,7 +147,10 @@ fn second_echoes_and_near_ones_here_and_there_are_doubtful_and_the_head_is_belie
 fn a_head_that_says_anything_is_not_believed() {
     let mut turning = Turning::new(1.0, 1);
     let count = &turning.turn(10, |_, _, _, [turn, step]| Some(1.0 + 0.9 * noise(turn, step)))[0];
-    assert!(matches!(count.named[..], [Distrust::Scattered(jump_m)] if (0.3..0.9).contains(&jump_m)), "{count:?}");
+    assert!(
+        matches!(count.named[..], [Distrust::Scattered(jump_m)] if (0.3..0.9).contains(&jump_m)),
+        "{count:?}"
+    );
     assert!(5 * count.wall < count.doubtful, "{count:?}");
 }
 
@@ -163,7 +162,9 @@ fn a_head_that_sees_what_no_other_sees_is_not_believed_until_it_does() {
         let counts = turning.turn(6, frozen);
         for (head, count) in counts.iter().enumerate() {
             if head == wrong {
-                assert!(matches!(count.named[..], [Distrust::Outvoted(off_m)] if (off_m + 0.45).abs() < 1e-6));
+                assert!(
+                    matches!(count.named[..], [Distrust::Outvoted(off_m)] if (off_m + 0.45).abs() < 1e-6)
+                );
             } else {
                 assert_eq!((count.doubtful, &count.named[..]), (0, &[][..]));
             }

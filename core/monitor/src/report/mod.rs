@@ -254,7 +254,13 @@ fn dive_report(coverage: &Coverage, tally: &Tally, sound_mps: [f64; 2]) -> DiveR
         from_m: swept.map(|reach| reach.from_m),
         to_m: swept.map(|reach| reach.to_m),
         distance_m: swept.map_or(0.0, |reach| reach.to_m - reach.from_m),
-        sonar: tally.samples + tally.doubtful + tally.missing + tally.out_of_range + tally.occluded + tally.unplaced > 0,
+        sonar: tally.samples
+            + tally.doubtful
+            + tally.missing
+            + tally.out_of_range
+            + tally.occluded
+            + tally.unplaced
+            > 0,
         sound_speed_least_mps,
         sound_speed_most_mps,
         samples_valid: tally.samples - tally.outside - tally.not_stored,

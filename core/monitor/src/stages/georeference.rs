@@ -3,9 +3,7 @@
 use bevy_ecs::prelude::{Query, Res, ResMut};
 
 use crate::entities::{Head, HiddenAngles, MeasuredMotion, Mounted};
-use crate::messages::{
-    Aim, Events, Outcome, Placed, PlacedList, PlacedPing, Positioned, PositionedList,
-};
+use crate::messages::{Aim, Events, Outcome, Placed, PlacedList, PlacedPing, Positioned, PositionedList};
 use crate::resources::{Target, TunnelDesign, VehicleEntities};
 use headrace_coverage::{Loss, PassError, Reach};
 use headrace_fusion::{Fix, NoFix};
@@ -20,7 +18,6 @@ use headrace_sensor::reading::{Reading, SonarReturn};
 type Heads<'w, 's> =
     Query<'w, 's, (&'static Head, &'static Mounted, &'static mut MeasuredMotion, &'static HiddenAngles)>;
 
-#[expect(clippy::too_many_arguments, reason = "a system's arguments are what it reads and writes")]
 pub(super) fn georeference(
     events: Res<'_, Events>,
     positioned: Res<'_, PositionedList>,

@@ -20,6 +20,7 @@ pub(super) use advise::Advisor;
 pub(super) use driving::Driving;
 pub(super) use judge::{Results, judge_one};
 pub(super) use sound_speed::SoundSpeed;
+pub(super) use walls::end_returns;
 
 /// Adds the core's systems to their stages.
 pub(super) fn add(schedule: &mut Schedule) {

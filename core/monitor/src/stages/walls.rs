@@ -1,11 +1,15 @@
 //! Sorts returns: those taken for wall become samples, doubtful ones are counted and recorded.
 
+use bevy_ecs::prelude::{Query, Res, ResMut};
+use bevy_ecs::system::SystemState;
+use bevy_ecs::world::World;
+
 use super::cover::note_sample;
 use super::judge::digest_alert;
 use crate::alerts::{AlertKind, Alerts};
 use crate::entities::{HeadSweep, Waiting};
 use crate::messages::{Aim, Notice, Notices, Outcome, PlacedPing, Requests};
-use crate::resources::{Coverage, Digests, Tally, TunnelDesign};
+use crate::resources::{Coverage, Digests, Tally, TunnelDesign, VehicleEntities};
 use crate::result_stream::RecordKind;
 use headrace_coverage::deviation::off_m;
 use headrace_coverage::{Beam, Loss, Outlook, PlacedReturn, Request, StoreError, Taken};
@@ -35,8 +39,7 @@ pub(super) fn note_ping(
             waiting.broken = true;
             waiting.new_sweep |= ping.new_sweep;
         } else {
-            // Without a sample nothing can be refused.
-            let _ = note_sample(sorting.coverage, sweep, sorting.tunnel, ping);
+            store(sorting, sweep, ping);
         }
         return None;
     };
@@ -72,6 +75,42 @@ pub(super) fn note_ping(
         digest_alert(sorting.digests, kind, source, ping.received, (point.x(), figure_m));
     }
     Some(between_m)
+}
+
+/// What sorting reads and writes at the end of a dive.
+type End<'w, 's> = (
+    Query<'w, 's, &'static mut HeadSweep>,
+    ResMut<'w, Coverage>,
+    Res<'w, TunnelDesign>,
+    ResMut<'w, Tally>,
+    ResMut<'w, Notices>,
+    ResMut<'w, Digests>,
+    ResMut<'w, Alerts>,
+);
+
+/// Ends a dive: no return will come that says what the waiting ones are. Allocates: not within a tick.
+pub(crate) fn end_returns(world: &mut World) {
+    let heads = world.resource::<VehicleEntities>().heads.clone();
+    let mut state = SystemState::<End<'_, '_>>::new(world);
+    let Ok((mut sweeps, mut coverage, tunnel, mut tally, mut notices, mut digests, mut alerts)) =
+        state.get_mut(world)
+    else {
+        return;
+    };
+    let mut sorting = Sorting {
+        coverage: &mut coverage,
+        tunnel: &tunnel,
+        tally: &mut tally,
+        notices: &mut notices,
+        digests: &mut digests,
+        alerts: &mut alerts,
+    };
+    for head in heads {
+        let Ok(mut sweep) = sweeps.get_mut(head) else { continue };
+        if let Some(waiting) = sweep.waiting.take() {
+            settle(&mut sorting, &mut sweep, &waiting, false);
+        }
+    }
 }
 
 /// Marks the sections that hold samples of a head that isn't believed any more, and asks for those that have passed to be
@@ -117,11 +156,15 @@ fn wall(sorting: &mut Sorting<'_>, sweep: &mut HeadSweep, ping: &PlacedPing) {
         sorting.notices.0.push(Notice::Alert(AlertKind::OutsideTunnel, None));
         digest_alert(sorting.digests, AlertKind::OutsideTunnel, None, ping.received, beyond_m);
     }
-    if let Err(error) = note_sample(sorting.coverage, sweep, sorting.tunnel, ping) {
-        match error {
-            StoreError::Outside => sorting.tally.outside += 1,
-            StoreError::Full => sorting.tally.not_stored += 1,
-        }
+    store(sorting, sweep, ping);
+}
+
+/// Stores a sample, or breaks the sweep for want of one.
+fn store(sorting: &mut Sorting<'_>, sweep: &mut HeadSweep, ping: &PlacedPing) {
+    match note_sample(sorting.coverage, sweep, sorting.tunnel, ping) {
+        Ok(()) => {}
+        Err(StoreError::Outside) => sorting.tally.outside += 1,
+        Err(StoreError::Full) => sorting.tally.not_stored += 1,
     }
 }
 
@@ -132,8 +175,7 @@ fn doubtful(sorting: &mut Sorting<'_>, sweep: &mut HeadSweep, ping: &PlacedPing)
     let Outcome::Sample { point, .. } = ping.outcome else { return };
     let aim = ping.origin.and_then(|origin| aim(sorting.tunnel, &origin, &point));
     let lost = PlacedPing { outcome: Outcome::Lost(Loss::Missing, aim), ..*ping };
-    // Without a sample nothing can be refused.
-    let _ = note_sample(sorting.coverage, sweep, sorting.tunnel, &lost);
+    store(sorting, sweep, &lost);
     let Coverage { store, sections, .. } = &mut *sorting.coverage;
     if let Some(reach) = ping.reach
         && let Some(section) = sections.get_mut(sections.index_of(reach.middle_m()))
