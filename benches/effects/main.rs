@@ -21,7 +21,7 @@ const ROUNDS: usize = 15;
 const SPEED_MPS: f64 = 0.11;
 
 /// Every effect with some parameters; heads turn in sectors, so that `sector_end_slowing` applies.
-const EFFECTS: [(&str, &str); 28] = [
+const EFFECTS: [(&str, &str); 29] = [
     ("start_phase_error", "max_deg = 20"),
     ("sector_end_slowing", "lag_ms = 60"),
     ("skipped_steps", "per_thousand = 0.2"),
