@@ -37,6 +37,7 @@ pub mod soundings;
 pub mod store;
 pub mod trust;
 pub mod wall;
+pub mod wall_limits;
 pub mod what_if;
 
 pub use action::Action;
@@ -51,5 +52,6 @@ pub use sections::{Judging, Request, Sections};
 pub use soundings::{GridLayout, GridNode, GridSummary, Soundings};
 pub use store::{Fidelity, Kept, SampleStore, StoreError, StoreLayout, StoreUse, WallSample};
 pub use trust::{Beam, Distrust};
-pub use wall::{HeadWall, PlacedReturn, Sorted, Taken, WallLimits};
+pub use wall::{HeadWall, Sorted, Taken};
+pub use wall_limits::{PlacedReturn, WallLimits};
 pub use what_if::Metres;

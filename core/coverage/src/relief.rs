@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::wall::{PlacedReturn, WallLimits};
+use super::wall_limits::{PlacedReturn, WallLimits};
 use headrace_geometry::math;
 use headrace_sampling::head::MAX_HEADS;
 use headrace_snapshot::stateful;

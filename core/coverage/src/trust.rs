@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::relief::Ballot;
-use super::wall::{PlacedReturn, WallLimits};
+use super::wall_limits::{PlacedReturn, WallLimits};
 use headrace_geometry::math;
 
 /// Why a head isn't believed, with the figure that says so, m.

@@ -1,7 +1,7 @@
 //! Heads in a round tunnel whose wall is anything, and what of their returns is taken for wall.
 
 use super::*;
-use headrace_geometry::math::TAU;
+use headrace_geometry::math::{self, TAU};
 
 const STEPS: u32 = 150;
 
