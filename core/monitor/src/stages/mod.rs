@@ -9,6 +9,7 @@ mod driving;
 mod georeference;
 mod judge;
 mod navigate;
+mod samples;
 mod sound_speed;
 mod walls;
 

@@ -4,8 +4,8 @@ use bevy_ecs::prelude::{Query, Res, ResMut};
 use bevy_ecs::system::SystemState;
 use bevy_ecs::world::World;
 
-use super::cover::note_sample;
 use super::judge::digest_alert;
+use super::samples::note_sample;
 use crate::alerts::{AlertKind, Alerts};
 use crate::entities::{HeadSweep, Waiting};
 use crate::messages::{Aim, Notice, Notices, Outcome, PlacedPing, Requests};
