@@ -254,6 +254,7 @@ fn cover(samples: &[(f64, f64, usize)], length_m: f64) -> Coverage {
             to_m: length_m,
             node_m: 0.5,
         }),
+        relief: headrace_coverage::Relief::default(),
     };
     let mut last = [None; 8];
     for (x_m, arc_m, head) in samples {

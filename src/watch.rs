@@ -75,9 +75,14 @@ impl Watch {
             }
             Notice::Section { section, .. } => self.section(*section, sections(dive)),
             Notice::Run { id, change, .. } => self.run(*id, *change, dive),
-            Notice::Alert(kind) => {
-                if let Some(alert) = dive.alerts().get(*kind) {
-                    self.line(&format!("ALERT    {}", alert_text(alert.kind, alert.x_m, alert.worst_m)));
+            Notice::Alert(kind, source) => {
+                if let Some(alert) = dive.alerts().get(*kind, *source) {
+                    let head = source.and_then(|source| dive.sources().get(source.index()));
+                    let head = head.map_or("", |source| source.id.as_str());
+                    self.line(&format!(
+                        "ALERT    {}",
+                        alert_text(alert.kind, head, alert.x_m, alert.worst_m)
+                    ));
                 }
             }
         }

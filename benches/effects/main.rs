@@ -21,7 +21,7 @@ const ROUNDS: usize = 15;
 const SPEED_MPS: f64 = 0.11;
 
 /// Every effect with some parameters; heads turn in sectors, so that `sector_end_slowing` applies.
-const EFFECTS: [(&str, &str); 29] = [
+const EFFECTS: [(&str, &str); 30] = [
     ("start_phase_error", "max_deg = 20"),
     ("sector_end_slowing", "lag_ms = 60"),
     ("skipped_steps", "per_thousand = 0.2"),
@@ -34,6 +34,7 @@ const EFFECTS: [(&str, &str); 29] = [
     ("interference", "share = 0.01"),
     ("missing_returns", "share = 0.05\nmean_run = 3"),
     ("outliers", "share = 0.02"),
+    ("stuck_range", "range_m = 0.55\nto_s = 20\nsensors = [\"sonar_0\"]"),
     ("sound_speed_error", "share = 0.005"),
     ("range_noise", "sd_m = 0.01"),
     ("range_quantisation", "points = 500\nsensors = [\"sonar_0\", \"sonar_1\", \"sonar_2\", \"sonar_3\"]"),

@@ -8,10 +8,13 @@ use headrace_geometry::tunnel::Profile;
 use headrace_monitor::App;
 use headrace_monitor::messages::{Outcome, Placed, PlacedList};
 use headrace_monitor::report::Report;
+use headrace_monitor::resources::{Digests, VehicleEntities};
+use headrace_monitor::result_stream::{RecordKind, first_record};
 use headrace_monitor::stage::Stage;
 use headrace_monitor::{Plugin, PluginError};
 use headrace_replay::SimulationFeed;
 use headrace_replay::drive::{Pace, drive};
+use headrace_sensor::reading::SourceId;
 use headrace_simulator::{Scene, Simulation};
 use headrace_vehicle::Mission;
 use headrace_vehicle::VehicleConfig;
@@ -40,8 +43,10 @@ pub struct Ping {
     pub single_step: bool,
     /// The vehicle then, where it was known.
     pub pose: Option<Pose>,
-    /// Return on the wall, if there was one that could be placed.
+    /// Return that was taken for wall, if there was one that could be placed.
     pub sample: Option<Sample>,
+    /// Return that wasn't.
+    pub doubtful: Option<Sample>,
 }
 
 /// What a dive has shown, and what it was made from.
@@ -65,10 +70,19 @@ impl Dive {
     pub fn samples(&self) -> impl Iterator<Item = &Sample> {
         self.pings.iter().filter_map(|ping| ping.sample.as_ref())
     }
+
+    /// Where the samples of some heads lie: chainage and arc length, m.
+    pub fn samples_of(&self, is_one: impl Fn(usize) -> bool) -> impl Iterator<Item = [f64; 2]> {
+        self.pings.iter().filter(move |ping| is_one(ping.head)).filter_map(|ping| Some(ping.sample?.place))
+    }
 }
 
 #[derive(Resource, Default)]
-struct Seen(Vec<Ping>);
+struct Seen {
+    pings: Vec<Ping>,
+    /// Where each one's return was placed: wall or doubtful, which the loop may say later.
+    placed: Vec<Option<[f64; 3]>>,
+}
 
 /// Copies what has been placed, and touches nothing.
 struct Watch;
@@ -76,29 +90,55 @@ struct Watch;
 impl Plugin for Watch {
     fn build(&self, app: &mut App) -> Result<(), PluginError> {
         app.insert_resource(Seen::default());
+        let mut digests = Digests::default();
+        digests.keep();
+        app.insert_resource(digests);
         app.add_systems(Stage::Judge, watch);
         Ok(())
     }
 }
 
 #[expect(clippy::needless_pass_by_value, reason = "systems take their parameters by value")]
-fn watch(placed: Res<'_, PlacedList>, mut seen: ResMut<'_, Seen>) {
+fn watch(
+    placed: Res<'_, PlacedList>,
+    digests: Res<'_, Digests>,
+    entities: Res<'_, VehicleEntities>,
+    mut seen: ResMut<'_, Seen>,
+) {
     for item in &placed.0 {
         let Placed::Ping(ping) = item else { continue };
-        let sample = match ping.outcome {
-            Outcome::Sample { point, arc_m } => {
-                Some(Sample { place: [point.x(), arc_m], point: [point.x(), point.y(), point.z()] })
-            }
+        seen.placed.push(match ping.outcome {
+            Outcome::Sample { point, .. } => Some([point.x(), point.y(), point.z()]),
             Outcome::Lost(..) | Outcome::Unplaced(_) => None,
-        };
-        seen.0.push(Ping {
+        });
+        seen.pings.push(Ping {
             head: ping.head,
             received: ping.received,
             new_sweep: ping.new_sweep,
             single_step: ping.single_step,
             pose: ping.fix.map(|fix| fix.pose),
-            sample,
+            sample: None,
+            doubtful: None,
         });
+    }
+    let mut words = digests.pings.words();
+    while let Some((record, rest)) = first_record(words) {
+        words = rest;
+        let is_wall = record.kind == Some(RecordKind::Sample);
+        if !is_wall && record.kind != Some(RecordKind::Doubtful) {
+            continue;
+        }
+        let [received, source, _, place @ ..] = record.words else { panic!("a ping's words") };
+        let [x_m, y_m, z_m, arc_m] = [0, 1, 2, 3].map(|k| f64::from_bits(place[k]));
+        let point = [x_m, y_m, z_m];
+        let sample = Some(Sample { place: [x_m, arc_m], point });
+        let head = entities.of_source(SourceId(u16::try_from(*source).unwrap()));
+        let Seen { pings, placed } = &mut *seen;
+        let of_it = |(ping, placed): &(&mut Ping, &Option<[f64; 3]>)| {
+            entities.of_head(ping.head) == head && ping.received.0 == *received && **placed == Some(point)
+        };
+        let (ping, _) = pings.iter_mut().zip(&*placed).rev().find(of_it).unwrap();
+        *(if is_wall { &mut ping.sample } else { &mut ping.doubtful }) = sample;
     }
 }
 
@@ -142,7 +182,7 @@ fn watched(scene: &Scene, vehicle: &VehicleConfig, mission: Mission, pace: Pace)
     dive.finish(&mut |_, _| {});
     let heads = vehicle.heads();
     Dive {
-        pings: dive.resource::<Seen>().unwrap().0.clone(),
+        pings: dive.resource::<Seen>().unwrap().pings.clone(),
         report: Report::of(&dive),
         profile: dive.mission().profile.clone(),
         ranges_m: heads.iter().map(|head| head.reach_m(vehicle.site.sound_speed_mps)[1]).collect(),

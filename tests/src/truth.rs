@@ -28,7 +28,7 @@ use crate::outline::Outline;
 use crate::wall::{Place, Wall};
 
 /// Effects that put another sound, or none, in place of the wall's return, or spoil its bytes.
-pub const REPLACING: [&str; 8] = [
+pub const REPLACING: [&str; 9] = [
     "occlusion",
     "multipath",
     "side_lobes",
@@ -37,6 +37,7 @@ pub const REPLACING: [&str; 8] = [
     "outliers",
     "byte_errors",
     "device_faults",
+    "stuck_range",
 ];
 /// What those effects change of a return that is no longer the wall's.
 const REPLACED: [&str; 2] = ["range_m", "wrong_bytes"];

@@ -34,7 +34,7 @@ impl Deviation {
     ) -> f64 {
         let centre = profile.reference();
         let design = profile.point_at(arc_m);
-        let off_m = distance_m(centre, point) - distance_m(centre, design);
+        let off_m = off_m(profile, point, arc_m);
         self.samples += 1;
         self.contradicting += u32::from(off_m.abs() > contradiction_m);
         self.sum_m += off_m;
@@ -66,6 +66,12 @@ impl Deviation {
     pub fn contradicts(&self) -> bool {
         2 * self.contradicting > self.samples
     }
+}
+
+/// Outward deviation of a point with this arc length from the design, along the ray from the reference point, m.
+pub fn off_m(profile: &Profile, point: Yz, arc_m: f64) -> f64 {
+    let centre = profile.reference();
+    distance_m(centre, point) - distance_m(centre, profile.point_at(arc_m))
 }
 
 fn distance_m(a: Yz, b: Yz) -> f64 {

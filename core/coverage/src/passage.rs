@@ -54,7 +54,7 @@ pub struct Passage {
 }
 
 /// Reason a ping gave no sample.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Loss {
     /// No return, though the wall was within range.
     Missing,

@@ -135,12 +135,18 @@ pub struct Section {
     pub masked_share: f64,
     /// Samples have landed within T of it since it was last judged.
     pub(super) stale: bool,
+    /// Returns on its wall that weren't taken for wall.
+    pub doubtful: u32,
+    /// It holds samples of a head that wasn't believed soon after.
+    pub suspect: bool,
 }
 
 /// Minimum samples for a section to contradict the profile.
 const FEW: u32 = 20;
 /// Masked share above which a section counts as having no wall.
 const ALL_MASKED: f64 = 0.999;
+/// Cross-section area over the design's that no tunnel of this design has: a tenth of the radius is 0.8 to 1.2.
+const AREA_RATIO: core::ops::RangeInclusive<f64> = 0.6..=1.6;
 
 impl Section {
     /// Whether it has a flag that no later pass has cleared.
@@ -153,9 +159,25 @@ impl Section {
         self.samples >= FEW && self.deviation.contradicts()
     }
 
-    /// Whether a small hole is no evidence of coverage: the profile is wrong, or there is no wall.
+    /// Whether a small hole is no evidence of coverage: the profile is wrong, there is no wall, or what was taken for wall
+    /// may be none.
     pub(super) fn is_doubtful(&self) -> bool {
-        self.contradicts() || self.masked_share > ALL_MASKED
+        self.contradicts()
+            || self.masked_share > ALL_MASKED
+            || self.suspect
+            || self.doubtful > self.samples
+            || self.is_of_another_size()
+    }
+
+    /// Whether its cross-section can't be the design's.
+    fn is_of_another_size(&self) -> bool {
+        let ratio = self.deviation.area_ratio().filter(|_| self.samples >= FEW);
+        ratio.is_some_and(|ratio| !AREA_RATIO.contains(&ratio))
+    }
+
+    /// Marks that it holds samples of a head that isn't believed any more: it can't pass, and is due for judging.
+    pub fn suspect(&mut self) {
+        (self.suspect, self.stale, self.settled) = (true, true, false);
     }
 
     /// Raises or clears its flag according to its verdict.

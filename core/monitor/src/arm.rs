@@ -16,7 +16,9 @@ use super::messages::{Events, Notices, PlacedList, PositionedList, Requests};
 use super::resources::{Coverage, Digests, Finder, Tally, Target, TickTime, TunnelDesign, VehicleEntities};
 use super::run::Loop;
 use super::stages::{Advisor, Driving, SoundSpeed};
-use headrace_coverage::{Frontier, GridLayout, HoleFinder, SampleStore, Sections, Soundings, StoreLayout};
+use headrace_coverage::{
+    Frontier, GridLayout, HoleFinder, Relief, SampleStore, Sections, Soundings, StoreLayout, WallLimits,
+};
 use headrace_fusion::Navigation;
 use headrace_sampling::advice::{self, Task};
 use headrace_sampling::head::{HeadMode, HeadSpec, MAX_HEADS};
@@ -108,6 +110,7 @@ impl App {
             site: mission.site,
             length_m: mission.length_m,
             contradiction_m: mission.coverage.contradiction_m,
+            limits: WallLimits::new(mission.profile.perimeter_m(), mission.coverage.contradiction_m),
         });
         world.insert_resource(Target { target_m: mission.target_m, layout: mission.layout });
         Ok(())
@@ -182,5 +185,5 @@ fn coverage(mission: &Mission) -> Result<Coverage, PluginError> {
         to_m: mission.length_m,
         node_m: mission.coverage.node_m,
     });
-    Ok(Coverage { store, sections, frontier: Frontier::default(), soundings })
+    Ok(Coverage { store, sections, frontier: Frontier::default(), soundings, relief: Relief::default() })
 }

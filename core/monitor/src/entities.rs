@@ -8,7 +8,8 @@ use bevy_ecs::prelude::Component;
 use serde::{Deserialize, Serialize};
 
 pub use super::head_motion::MeasuredMotion;
-use headrace_coverage::HeadReach;
+use super::messages::PlacedPing;
+use headrace_coverage::{HeadReach, HeadWall};
 use headrace_fusion::filter::eskf::PoseSd;
 use headrace_fusion::{Fix, Navigation, NoFix};
 use headrace_geometry::frames::{Point3, Tunnel};
@@ -150,6 +151,20 @@ pub struct HeadSweep {
     pub(super) last: Option<LastSample>,
     /// The head pinged during a navigation outage, and not since the fix returned.
     pub(super) unseen: bool,
+    /// What its returns are taken for.
+    pub(super) wall: HeadWall,
+    /// Its last return, while its next one is to say what it is, and what has come since.
+    pub(super) waiting: Option<Waiting>,
+}
+
+/// A return that waits for the head's next one.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+pub(super) struct Waiting {
+    pub(super) ping: PlacedPing,
+    /// A ping since gave no return.
+    pub(super) broken: bool,
+    /// A new sweep has begun since.
+    pub(super) new_sweep: bool,
 }
 
 /// The last valid sample of a head in its present sweep.

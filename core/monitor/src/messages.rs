@@ -4,6 +4,7 @@
 //! therefore depends only on the packets before it, not on where the stream was cut into ticks.
 
 use bevy_ecs::prelude::Resource;
+use serde::{Deserialize, Serialize};
 
 use super::advice_log::AdviceEntry;
 use super::alerts::AlertKind;
@@ -55,9 +56,9 @@ pub enum Positioned {
 pub struct PositionedList(pub Vec<Positioned>);
 
 /// Outcome of a ping.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Outcome {
-    /// A sample on the wall.
+    /// A return that could be placed: a sample, if it is taken for wall.
     Sample {
         /// End point of the beam.
         point: Point3<Tunnel>,
@@ -71,7 +72,7 @@ pub enum Outcome {
 }
 
 /// Point at which a beam meets the design profile.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Aim {
     /// Chainage, m.
     pub x_m: f64,
@@ -80,7 +81,7 @@ pub struct Aim {
 }
 
 /// A georeferenced ping.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PlacedPing {
     /// Number of the head, from zero.
     pub head: usize,
@@ -100,6 +101,10 @@ pub struct PlacedPing {
     pub standing: bool,
     /// Outcome.
     pub outcome: Outcome,
+    /// Source of the packet.
+    pub source: SourceId,
+    /// Where the head was; `None` without a fix.
+    pub origin: Option<Point3<Tunnel>>,
 }
 
 /// An item of the output of [`super::stage::Stage::Georeference`].
@@ -142,8 +147,8 @@ pub enum Notice {
         /// Kind of change.
         change: RunChange,
     },
-    /// First occurrence of an alert.
-    Alert(AlertKind),
+    /// First occurrence of an alert; of a head's, for this head.
+    Alert(AlertKind, Option<SourceId>),
     /// Speed advice.
     Advice(AdviceEntry),
 }

@@ -141,8 +141,8 @@ pub fn cleared_text(from_m: f64, to_m: f64) -> String {
     format!("cleared  ch {} to {}", station(from_m), station(to_m))
 }
 
-/// Text of an alert at a chainage, m, with the deviation, m.
-pub fn alert_text(kind: AlertKind, x_m: f64, off_m: f64) -> String {
+/// Text of an alert at a chainage, m, with the deviation, m, and the head where it names one.
+pub fn alert_text(kind: AlertKind, head: &str, x_m: f64, off_m: f64) -> String {
     let x = station(x_m);
     match kind {
         AlertKind::OutsideTunnel => {
@@ -150,6 +150,16 @@ pub fn alert_text(kind: AlertKind, x_m: f64, off_m: f64) -> String {
         }
         AlertKind::ProfileContradicted => format!(
             "ch {x}  the wall is {off_m:+.2} m off the design profile: wrong profile or position; nothing passes"
+        ),
+        AlertKind::HeadScattered => format!(
+            "ch {x}  returns of {head} are {:.2} m off one another: noise; they don't count",
+            off_m.abs()
+        ),
+        AlertKind::HeadConstant => format!(
+            "ch {x}  {head} says {off_m:.2} m all round: its own frame or a bubble; its returns don't count"
+        ),
+        AlertKind::HeadOutvoted => format!(
+            "ch {x}  {head} sees a wall {off_m:+.2} m off the one that other heads see; its returns don't count"
         ),
     }
 }

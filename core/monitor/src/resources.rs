@@ -5,7 +5,7 @@ use bevy_ecs::prelude::Resource;
 use serde::{Deserialize, Serialize};
 
 use super::result_stream::ResultStream;
-use headrace_coverage::{Frontier, HoleFinder, SampleStore, Sections, Soundings};
+use headrace_coverage::{Frontier, HoleFinder, Relief, SampleStore, Sections, Soundings, WallLimits};
 use headrace_fusion::NoFix;
 use headrace_geometry::site::Site;
 use headrace_geometry::time::MonoNs;
@@ -25,6 +25,8 @@ pub struct TunnelDesign {
     pub length_m: f64,
     /// Samples farther than this from the design profile contradict it, m.
     pub contradiction_m: f64,
+    /// What is taken for wall.
+    pub limits: WallLimits,
 }
 
 /// Coverage target.
@@ -72,9 +74,11 @@ pub struct Coverage {
     pub frontier: Frontier,
     /// Samples by node of a square grid.
     pub soundings: Soundings,
+    /// Where the wall was found off the design near the vehicle.
+    pub relief: Relief,
 }
 
-stateful!(Coverage { state: store, sections, frontier, soundings; });
+stateful!(Coverage { state: store, sections, frontier, soundings, relief; });
 
 /// The search for holes with its working memory.
 #[derive(Debug, Default, Resource)]
@@ -157,6 +161,8 @@ pub struct Tally {
     pub outside: u64,
     /// Samples not stored for lack of room.
     pub not_stored: u64,
+    /// Returns not taken for wall.
+    pub doubtful: u64,
 }
 
 /// The current tick.

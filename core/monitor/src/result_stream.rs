@@ -28,6 +28,8 @@ pub enum RecordKind {
     NoPose = 7,
     /// An alert about the dive as a whole.
     Alert = 8,
+    /// A ping whose return wasn't taken for wall.
+    Doubtful = 9,
 }
 
 /// Type of a record's word.
@@ -40,7 +42,7 @@ pub enum WordKind {
 }
 
 impl RecordKind {
-    const ALL: [Self; 8] = [
+    const ALL: [Self; 9] = [
         Self::Sample,
         Self::NoSample,
         Self::Section,
@@ -49,6 +51,7 @@ impl RecordKind {
         Self::Pose,
         Self::NoPose,
         Self::Alert,
+        Self::Doubtful,
     ];
 
     /// The kind with this number.
@@ -67,6 +70,7 @@ impl RecordKind {
             Self::Pose => "pose",
             Self::NoPose => "lack of a pose",
             Self::Alert => "alert",
+            Self::Doubtful => "doubtful return",
         }
     }
 
@@ -74,7 +78,7 @@ impl RecordKind {
     pub fn field(self, place: usize) -> (&'static str, WordKind) {
         use WordKind::{Integer, Number};
         let fields: &[(&str, WordKind)] = match self {
-            Self::Sample => &[
+            Self::Sample | Self::Doubtful => &[
                 ("received_ns", Integer),
                 ("source", Integer),
                 ("outcome", Integer),
@@ -135,7 +139,14 @@ impl RecordKind {
                 ("yaw_sd_rad", Number),
             ],
             Self::NoPose => &[("at_ns", Integer), ("reason", Integer)],
-            Self::Alert => &[("at_ns", Integer), ("kind", Integer), ("x_m", Number), ("off_m", Number)],
+            Self::Alert => &[
+                ("at_ns", Integer),
+                ("kind", Integer),
+                ("x_m", Number),
+                ("off_m", Number),
+                // Only of a head.
+                ("source", Integer),
+            ],
         };
         // Advice continues with the speeds that other modes would allow.
         let beyond = if self == Self::Advice { "alternative_v_max_mps" } else { "beyond the last field" };

@@ -202,6 +202,7 @@ impl Loop {
         }
         self.world.resource_mut::<Digests>().next_tick();
         self.finished = true;
+        super::stages::end_returns(&mut self.world);
         let (open, common) = self.open_requests();
         let request =
             |(section, fails): &(i64, bool)| Some(Request { section: *section, fails: *fails, ..common? });

@@ -26,7 +26,7 @@ impl Default for CoverageConfig {
     fn default() -> Self {
         Self {
             hole_tolerance_m: 0.0,
-            contradiction_m: 0.5,
+            contradiction_m: MOST_CONTRADICTION_M,
             node_m: NODE_M,
             confidence_sd: CONFIDENCE_SD,
             openings: Vec::new(),
@@ -34,18 +34,28 @@ impl Default for CoverageConfig {
     }
 }
 
+/// Deviation that contradicts the profile: a share of the radius of a circle of its perimeter, and the most of it, m.
+const CONTRADICTION_SHARE: f64 = 0.2;
+const MOST_CONTRADICTION_M: f64 = 0.5;
 /// Maximum number of samples that fill openings.
 const MAX_PLACES: i64 = 1_000_000;
 
 impl CoverageConfig {
+    /// Deviation that contradicts a profile of this perimeter unless the file says otherwise, m: more than a lining or a
+    /// design that is 6 % out, less than another tunnel.
+    pub fn usual_contradiction_m(perimeter_m: f64) -> f64 {
+        (CONTRADICTION_SHARE * perimeter_m / TAU).min(MOST_CONTRADICTION_M)
+    }
+
     /// Reads both tables from the root of a vehicle file.
     ///
     /// Errors: the first key that is missing, unknown or out of range.
     pub fn from_root(root: &Section<'_>, profile: &Profile, target_m: f64) -> Result<Self, ConfigError> {
-        let mut config = Self::default();
+        let contradiction_m = Self::usual_contradiction_m(profile.perimeter_m());
+        let mut config = Self { contradiction_m, ..Self::default() };
         if let Some(section) = root.section("coverage")? {
             config.contradiction_m =
-                section.number("contradiction_m", 0.05..=100.0)?.unwrap_or(config.contradiction_m);
+                section.number("contradiction_m", 0.01..=100.0)?.unwrap_or(config.contradiction_m);
             config.node_m = section.number("node_m", 0.05..=10.0)?.unwrap_or(config.node_m);
             if let Some(confidence) = section.integer("confidence", 1..=3)? {
                 config.confidence_sd = confidence as f64;

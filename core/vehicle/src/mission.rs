@@ -36,6 +36,7 @@ pub struct Mission {
 impl Mission {
     /// A tunnel 100 m long with sections of 0.25 m, at the default site; phase shift, no hull, exact holes, no time limit.
     pub fn new(profile: Profile, target_m: f64) -> Self {
+        let contradiction_m = CoverageConfig::usual_contradiction_m(profile.perimeter_m());
         Self {
             profile,
             site: Site::default(),
@@ -45,7 +46,7 @@ impl Mission {
             length_m: 100.0,
             layout: HeadLayout::PhaseShift,
             hull: Vec::new(),
-            coverage: CoverageConfig::default(),
+            coverage: CoverageConfig { contradiction_m, ..CoverageConfig::default() },
             dive_time: None,
         }
     }

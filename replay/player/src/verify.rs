@@ -232,7 +232,7 @@ fn difference(live: Record<'_>, replayed: Record<'_>) -> Option<What> {
     };
     let place = live.words.iter().zip(replayed.words).position(|(live, replayed)| live != replayed)?;
     let (field, word) = kind.field(place);
-    let is_ping = matches!(kind, RecordKind::Sample | RecordKind::NoSample);
+    let is_ping = matches!(kind, RecordKind::Sample | RecordKind::NoSample | RecordKind::Doubtful);
     Some(What::Field {
         kind,
         source: live.words.get(1).copied().filter(|_| is_ping),

@@ -150,7 +150,7 @@ fn a_wrong_scene_is_refused_with_file_line_key_value_and_what_is_allowed() {
     unknown table
         headrace: scene.toml:4: weather: is not a key here; known are name, seed, vehicle, vehicle_changes, tunnel, trajectory, effects
     unknown effect
-        headrace: scene.toml:5: effects.fish: is not a key here; known are start_phase_error, sector_end_slowing, skipped_steps, head_stalls, motion_within_turn, beam_cone, occlusion, multipath, side_lobes, interference, missing_returns, outliers, sound_speed_error, range_noise, range_quantisation, current, pilot_drift, depth_steps, imu_noise, imu_bias, magnetic_disturbance, tether_slack, tether_slip, late_winding, tether_quantum, device_faults, clock_drift, line_delay, byte_errors
+        headrace: scene.toml:5: effects.fish: is not a key here; known are start_phase_error, sector_end_slowing, skipped_steps, head_stalls, motion_within_turn, beam_cone, occlusion, multipath, side_lobes, interference, missing_returns, outliers, stuck_range, sound_speed_error, range_noise, range_quantisation, current, pilot_drift, depth_steps, imu_noise, imu_bias, magnetic_disturbance, tether_slack, tether_slip, late_winding, tether_quantum, device_faults, clock_drift, line_delay, byte_errors
     text in place of a number
         headrace: scene.toml:5: trajectory.start_m = "portal": must be a number from -20 to 1000000
     no distance

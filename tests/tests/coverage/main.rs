@@ -13,4 +13,5 @@ mod memory;
 mod metamorphic;
 mod oracle;
 mod truth;
+mod wall_samples;
 mod way;

@@ -249,6 +249,7 @@ fn helix(radius_m: f64, count: u32, d_m: f64, pings: u32) -> Vec<Ping> {
             single_step: k > 0,
             new_sweep: k == 0,
             pose: None,
+            doubtful: None,
             sample: Some(Sample {
                 place: [x_m, angle * radius_m],
                 point: [x_m, radius_m * sin, -radius_m * cos],

@@ -150,6 +150,8 @@ pub struct RejectedReport {
     pub outside: u64,
     /// The sample store was full.
     pub not_stored: u64,
+    /// Returns that weren't taken for wall.
+    pub doubtful_returns: u64,
 }
 
 /// Metres by verdict, and spacings.
@@ -195,16 +197,19 @@ pub struct OpeningReport {
 /// An alert about the dive as a whole.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AlertReport {
-    /// `outside_tunnel` or `profile_contradicted`.
+    /// `outside_tunnel`, `profile_contradicted`, `head_scattered`, `head_constant` or `head_outvoted`.
     pub kind: &'static str,
     /// Time of its first occurrence, seconds on the log's clock.
     pub since_s: f64,
-    /// Occurrences: samples, or judgements of sections.
+    /// Occurrences: samples, judgements of sections, or times that a head was distrusted.
     pub count: u64,
     /// Chainage of its first occurrence, m.
     pub x_m: f64,
-    /// Largest deviation, m: beyond the end of the tunnel, or a section's mean from the design profile.
+    /// Largest deviation, m: beyond the end of the tunnel, or a section's mean from the design profile. Of a head: mean
+    /// between successive returns, constant range, or mean deviation from the design.
     pub worst_m: f64,
+    /// The head that isn't believed, by its id.
+    pub head: Option<String>,
 }
 
 impl Report {
@@ -233,7 +238,7 @@ impl Report {
             survey: survey::survey(coverage, &dive.mission().profile),
             what_if: Vec::new(),
             openings: dive.mission().coverage.openings.iter().map(opening_report).collect(),
-            alerts: dive.alerts().iter().map(alert_report).collect(),
+            alerts: dive.alerts().iter().map(|alert| alert_report(alert, dive)).collect(),
             advice: log.entries.iter().map(advice::advice_report).collect(),
             advice_dropped: log.dropped,
             sources: sources::source_reports(dive),
@@ -277,6 +282,7 @@ fn dive_report(coverage: &Coverage, tally: &Tally, sound_mps: [f64; 2]) -> DiveR
             no_fix: tally.unplaced,
             outside: tally.outside,
             not_stored: tally.not_stored,
+            doubtful_returns: tally.doubtful,
         },
     }
 }
@@ -329,12 +335,14 @@ fn opening_report(opening: &Opening) -> OpeningReport {
     }
 }
 
-fn alert_report(alert: &Alert) -> AlertReport {
+fn alert_report(alert: &Alert, dive: &Loop) -> AlertReport {
+    let head = alert.source.and_then(|source| dive.sources().get(source.index()));
     AlertReport {
         kind: alert.kind.as_str(),
         since_s: alert.since.as_secs_f64(),
         count: alert.count,
         x_m: alert.x_m,
         worst_m: alert.worst_m,
+        head: head.map(|source| source.id.clone()),
     }
 }

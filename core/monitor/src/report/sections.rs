@@ -52,6 +52,10 @@ pub struct SectionReport {
     pub flagged_s: Option<f64>,
     /// When a later pass cleared the flag.
     pub cleared_s: Option<f64>,
+    /// Returns on its wall that weren't taken for wall.
+    pub doubtful_returns: u32,
+    /// Whether it holds samples of a head that wasn't believed soon after; it can't pass.
+    pub suspect: bool,
 }
 
 /// A section's wall against the design profile, along the rays from the reference point; beyond the design is positive.
@@ -100,6 +104,8 @@ pub(super) fn section_report(
         cause: section.evidence.filter(|_| section.verdict == Verdict::Fail),
         flagged_s: section.flagged.map(MonoNs::as_secs_f64),
         cleared_s: section.cleared.map(MonoNs::as_secs_f64),
+        doubtful_returns: section.doubtful,
+        suspect: section.suspect,
     }
 }
 

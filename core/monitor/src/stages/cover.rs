@@ -6,18 +6,16 @@ use bevy_ecs::prelude::{Res, ResMut, Single};
 
 use super::advise::Advisor;
 use super::driving::{Driven, Driving};
-use super::judge::{Results, digest_alert, judge_one};
+use super::judge::{Results, judge_one};
+use super::walls::{self, Sorting};
 use super::way::{Heads, note_beat};
-use crate::alerts::{AlertKind, Alerts};
-use crate::entities::{HeadFrontier, HeadSweep, LastSample};
-use crate::messages::{Notice, Notices, Outcome, Placed, PlacedList, PlacedPing, Requests};
+use crate::alerts::Alerts;
+use crate::entities::{HeadFrontier, HeadSweep};
+use crate::messages::{Notices, Outcome, Placed, PlacedList, PlacedPing, Requests};
 use crate::resources::{Coverage, Digests, Finder, Tally, TunnelDesign, VehicleEntities};
-use headrace_coverage::hole::FARTHEST_M;
-use headrace_coverage::{HeadReach, Loss, Outlook, PassError, StoreError, WallSample};
-use headrace_geometry::frames::{Point3, Tunnel, Vec3};
-use headrace_geometry::math;
+use headrace_coverage::{HeadReach, Loss, Outlook, PassError};
+use headrace_geometry::frames::Vec3;
 use headrace_geometry::time::DurNs;
-use headrace_sampling::spacing;
 
 /// Interval between checks of the sections of a still zone.
 const LOOK_AROUND: DurNs = DurNs(1_000_000_000);
@@ -56,19 +54,21 @@ pub(super) fn cover(
                 let head = entities.of_head(ping.head).and_then(|entity| heads.get_mut(entity).ok());
                 let Some((_, _, mut sweep, mut frontier)) = head else { continue };
                 note_passage(&mut coverage, &mut sweep, &frontier, &driving.now, ping);
-                if let Some(beyond_m) = beyond_end_m(ping, tunnel.length_m)
-                    && alerts.note(AlertKind::OutsideTunnel, ping.received, beyond_m.0, beyond_m.1)
-                {
-                    notices.0.push(Notice::Alert(AlertKind::OutsideTunnel));
-                    digest_alert(&mut digests, AlertKind::OutsideTunnel, ping.received, beyond_m);
-                }
-                if let Err(error) = note_sample(&mut coverage, &mut sweep, &tunnel, ping) {
-                    match error {
-                        StoreError::Outside => tally.outside += 1,
-                        StoreError::Full => tally.not_stored += 1,
-                    }
-                }
+                let mut sorting = Sorting {
+                    coverage: &mut coverage,
+                    tunnel: &tunnel,
+                    tally: &mut tally,
+                    notices: &mut notices,
+                    digests: &mut digests,
+                    alerts: &mut alerts,
+                };
+                let suspected_m = walls::note_ping(&mut sorting, &mut sweep, ping);
                 note_reach(&mut frontier, ping);
+                if let Some(between_m) = suspected_m {
+                    let reaches = heads.iter().filter_map(|(.., frontier)| frontier.0);
+                    let outlook = coverage.frontier.outlook(reaches, ping.received);
+                    walls::suspect(&mut coverage, between_m, &outlook, &mut requests);
+                }
                 let reaches = heads.iter().filter_map(|(.., frontier)| frontier.0);
                 note_frontier(&mut coverage, reaches, ping, &mut requests);
             }
@@ -88,7 +88,8 @@ pub(super) fn cover(
 fn count(tally: &mut Tally, ping: &PlacedPing) {
     tally.without_fix += u64::from(ping.fix.is_none());
     match ping.outcome {
-        Outcome::Sample { .. } => tally.samples += 1,
+        // Counted when it is known what the return is.
+        Outcome::Sample { .. } => {}
         Outcome::Lost(Loss::Missing, _) => tally.missing += 1,
         Outcome::Lost(Loss::OutOfRange, _) => tally.out_of_range += 1,
         Outcome::Lost(Loss::Occluded, _) => tally.occluded += 1,
@@ -173,69 +174,6 @@ fn look_around(
     let Coverage { store, sections, .. } = coverage;
     let mut ask = |request| requests.0.push(request);
     sections.look_around(outlook, store, &mut finder.0, &tunnel.profile, &mut ask);
-}
-
-/// Chainage of a sample beyond either end of the tunnel, and by how much, m.
-fn beyond_end_m(ping: &PlacedPing, length_m: f64) -> Option<(f64, f64)> {
-    let Outcome::Sample { point, .. } = ping.outcome else { return None };
-    let x_m = point.x();
-    let beyond_m = (-x_m).max(x_m - length_m);
-    (beyond_m > 0.0).then_some((x_m, beyond_m))
-}
-
-/// Stores a sample and adds its spacings to its section.
-fn note_sample(
-    coverage: &mut Coverage,
-    sweep: &mut HeadSweep,
-    tunnel: &TunnelDesign,
-    ping: &PlacedPing,
-) -> Result<(), StoreError> {
-    let slot = &mut sweep.last;
-    if ping.new_sweep {
-        *slot = None;
-    }
-    let Outcome::Sample { point, arc_m } = ping.outcome else {
-        if let Some(last) = slot {
-            last.unbroken = false;
-        }
-        return Ok(());
-    };
-    if !coverage.store.covers(point.x(), arc_m) {
-        *slot = None;
-        return Err(StoreError::Outside);
-    }
-    let before = *slot;
-    let step_from = before.filter(|last| last.unbroken && ping.single_step);
-    let t_x_m = coverage.store.nearest_pass_m(point.x(), arc_m, FARTHEST_M);
-    let perimeter_m = coverage.store.perimeter_m();
-    let step_m = step_from
-        .map(|last| [point.x() - last.point.x(), math::wrap_signed(arc_m - last.arc_m, perimeter_m)]);
-    let kept = coverage.store.insert(WallSample { x_m: point.x(), arc_m, head: ping.head, step_m });
-    *slot = kept.ok().map(|_| LastSample { point, arc_m, unbroken: true });
-    kept?;
-    coverage.soundings.add(point.x(), arc_m);
-    coverage.sections.touch(point.x());
-    let index = coverage.sections.index_of(point.x());
-    let Some(section) = coverage.sections.get_mut(index) else { return Ok(()) };
-    section.samples += 1;
-    let yz = |point: &Point3<Tunnel>| [point.y(), point.z()];
-    let from = step_from.map(|last| (yz(&last.point), last.arc_m));
-    section.deviation.add(&tunnel.profile, (yz(&point), arc_m), from, tunnel.contradiction_m);
-    if let Some(t_x_m) = t_x_m {
-        section.t_x_m.add(t_x_m);
-    }
-    if let Some(last) = before {
-        let t_y_m = (point - last.point).norm();
-        section.t_y_m.add(t_y_m);
-        let advance_m = (point.x() - last.point.x()).abs();
-        if let Some(t_x_m) = t_x_m {
-            section.t_m.add(spacing::t_max_m(t_x_m, advance_m, t_y_m));
-        }
-    }
-    if let Some([_, around_m]) = step_m {
-        section.passage.t_y_m = section.passage.t_y_m.max(around_m.abs());
-    }
-    Ok(())
 }
 
 /// Updates the head's reach.

@@ -3,11 +3,8 @@
 use bevy_ecs::prelude::{Query, Res, ResMut};
 
 use crate::entities::{Head, HiddenAngles, MeasuredMotion, Mounted};
-use crate::messages::{
-    Aim, Event, Events, Outcome, Placed, PlacedList, PlacedPing, Positioned, PositionedList,
-};
-use crate::resources::{Digests, Target, TunnelDesign, VehicleEntities};
-use crate::result_stream::RecordKind;
+use crate::messages::{Aim, Events, Outcome, Placed, PlacedList, PlacedPing, Positioned, PositionedList};
+use crate::resources::{Target, TunnelDesign, VehicleEntities};
 use headrace_coverage::{Loss, PassError, Reach};
 use headrace_fusion::{Fix, NoFix};
 use headrace_geometry::frames::{Mount, Pose, Vec3, head_direction};
@@ -21,7 +18,6 @@ use headrace_sensor::reading::{Reading, SonarReturn};
 type Heads<'w, 's> =
     Query<'w, 's, (&'static Head, &'static Mounted, &'static mut MeasuredMotion, &'static HiddenAngles)>;
 
-#[expect(clippy::too_many_arguments, reason = "a system's arguments are what it reads and writes")]
 pub(super) fn georeference(
     events: Res<'_, Events>,
     positioned: Res<'_, PositionedList>,
@@ -30,7 +26,6 @@ pub(super) fn georeference(
     entities: Res<'_, VehicleEntities>,
     mut heads: Heads<'_, '_>,
     mut placed: ResMut<'_, PlacedList>,
-    mut digests: ResMut<'_, Digests>,
 ) {
     placed.0.clear();
     for item in &positioned.0 {
@@ -55,8 +50,9 @@ pub(super) fn georeference(
                     new_sweep: turned.new_sweep,
                     standing: turned.standing,
                     outcome: outcome(&sonar, fix, mount, hidden.hides(sonar.angle_rad), &tunnel),
+                    source: event.source,
+                    origin: fix.ok().map(|fix| fix.pose.place(mount.position)),
                 };
-                digest(&mut digests, event, &ping);
                 placed.0.push(Placed::Ping(ping));
             }
         }
@@ -142,25 +138,5 @@ fn situation(
         layout: target.layout,
         configured: heads.iter().len(),
         heads: motions,
-    }
-}
-
-fn digest(digests: &mut Digests, event: &Event, ping: &PlacedPing) {
-    let kind = if matches!(ping.outcome, Outcome::Sample { .. }) {
-        RecordKind::Sample
-    } else {
-        RecordKind::NoSample
-    };
-    let digest = digests.pings.record(kind).integer(event.received.0).integer(u64::from(event.source.0));
-    match ping.outcome {
-        Outcome::Sample { point, arc_m } => {
-            digest.integer(0).number(point.x()).number(point.y()).number(point.z()).number(arc_m);
-        }
-        Outcome::Lost(loss, _) => {
-            digest.integer(1).integer(loss as u64);
-        }
-        Outcome::Unplaced(lacking) => {
-            digest.integer(2).integer(lacking as u64);
-        }
     }
 }

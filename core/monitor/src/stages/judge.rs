@@ -7,6 +7,7 @@ use crate::result_stream::RecordKind;
 use headrace_coverage::{Judging, Request, RunChange, RunId};
 use headrace_geometry::time::MonoNs;
 use headrace_geometry::tunnel::Profile;
+use headrace_sensor::reading::SourceId;
 
 /// Search state and outputs of judging, apart from the sections.
 pub(crate) struct Results<'a> {
@@ -59,14 +60,23 @@ pub(crate) fn judge_one(
         let off_m = section.deviation.mean_m().unwrap_or(0.0);
         let x_m = sections.bounds_m(request.section).0;
         if alerts.note(AlertKind::ProfileContradicted, request.at, x_m, off_m) {
-            notices.0.push(Notice::Alert(AlertKind::ProfileContradicted));
-            digest_alert(digests, AlertKind::ProfileContradicted, request.at, (x_m, off_m));
+            notices.0.push(Notice::Alert(AlertKind::ProfileContradicted, None));
+            digest_alert(digests, AlertKind::ProfileContradicted, None, request.at, (x_m, off_m));
         }
     }
 }
 
-/// Adds an alert to the digest, with its chainage and deviation, m.
-pub(crate) fn digest_alert(digests: &mut Digests, kind: AlertKind, at: MonoNs, at_off_m: (f64, f64)) {
+/// Adds an alert to the digest, with its chainage and deviation, m, and the head where it names one.
+pub(crate) fn digest_alert(
+    digests: &mut Digests,
+    kind: AlertKind,
+    source: Option<SourceId>,
+    at: MonoNs,
+    at_off_m: (f64, f64),
+) {
     let alert = digests.judgements.record(RecordKind::Alert).integer(at.0).integer(kind as u64);
     alert.number(at_off_m.0).number(at_off_m.1);
+    if let Some(source) = source {
+        alert.integer(u64::from(source.0));
+    }
 }

@@ -9,7 +9,9 @@ mod driving;
 mod georeference;
 mod judge;
 mod navigate;
+mod samples;
 mod sound_speed;
+mod walls;
 mod way;
 
 use bevy_ecs::schedule::{IntoScheduleConfigs, Schedule};
@@ -20,6 +22,7 @@ pub(super) use advise::Advisor;
 pub(super) use driving::Driving;
 pub(super) use judge::{Results, judge_one};
 pub(super) use sound_speed::SoundSpeed;
+pub(super) use walls::end_returns;
 
 /// Adds the core's systems to their stages.
 pub(super) fn add(schedule: &mut Schedule) {

@@ -116,9 +116,10 @@ impl View {
                 self.sections.run(words.integer()?, words.integer()?);
                 Some(())
             }
-            RecordKind::Alert => alert(&mut words, made),
+            RecordKind::Alert => self.alert(&mut words, made),
             RecordKind::Advice => self.advice(&mut words, made),
-            RecordKind::NoSample => Some(()),
+            // Points are samples; doubtful returns are in the log's results.
+            RecordKind::NoSample | RecordKind::Doubtful => Some(()),
         }
     }
 
@@ -268,15 +269,17 @@ impl View {
         self.told = Some(Told { at, v_max_mps, reason, will_exceed });
         Some(())
     }
-}
 
-/// An alert about the dive as a whole.
-fn alert(words: &mut Words<'_>, made: &mut Outbox<'_>) -> Option<()> {
-    let at = MonoNs(words.integer()?);
-    let kind = words.one_of(&AlertKind::ALL, |kind| kind as u64)?;
-    let [x_m, off_m] = words.numbers()?;
-    made.push(Topic::Alerts, &Log::new(at, Level::Error, alert_text(kind, x_m, off_m)));
-    Some(())
+    /// An alert about the dive as a whole, or of a head.
+    fn alert(&self, words: &mut Words<'_>, made: &mut Outbox<'_>) -> Option<()> {
+        let at = MonoNs(words.integer()?);
+        let kind = words.one_of(&AlertKind::ALL, |kind| kind as u64)?;
+        let [x_m, off_m] = words.numbers()?;
+        let head = words.integer().and_then(|source| self.site.heads.iter().position(|head| *head == source));
+        let head = head.map_or_else(String::new, |head| format!("head {}", head + 1));
+        made.push(Topic::Alerts, &Log::new(at, Level::Error, alert_text(kind, &head, x_m, off_m)));
+        Some(())
+    }
 }
 
 impl DerivedChannels for View {

@@ -34,6 +34,7 @@ mod side_lobes;
 mod skipped_steps;
 mod sound_speed_error;
 mod start_phase_error;
+mod stuck_range;
 mod tether_lag;
 mod tether_quantum;
 mod tether_slack;
@@ -48,7 +49,7 @@ pub use effect::{Effect, EffectKind};
 pub use targets::PerSensor;
 
 /// All effects. Within a stage, systems run in this order, whatever the order of the scene.
-pub const KINDS: [&dyn EffectKind; 29] = [
+pub const KINDS: [&dyn EffectKind; 30] = [
     // Turning of heads, and the pose from which they look.
     &start_phase_error::StartPhaseErrorKind,
     &sector_end_slowing::SectorEndSlowingKind,
@@ -65,6 +66,7 @@ pub const KINDS: [&dyn EffectKind; 29] = [
     // Processing in the sonar.
     &missing_returns::MissingReturnsKind,
     &outliers::OutliersKind,
+    &stuck_range::StuckRangeKind,
     &sound_speed_error::SoundSpeedErrorKind,
     &range_noise::RangeNoiseKind,
     &range_quantisation::RangeQuantisationKind,

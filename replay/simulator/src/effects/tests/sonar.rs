@@ -4,7 +4,7 @@ use crate::testing::{Dive, Dived};
 use crate::truth::TruthRow;
 
 /// Each effect of the sonars with some keys.
-const EFFECTS: [&str; 10] = [
+const EFFECTS: [&str; 11] = [
     "[effects.beam_cone]\n",
     "[effects.occlusion]\n",
     "[effects.multipath]\nshare = 0.5\n",
@@ -15,6 +15,7 @@ const EFFECTS: [&str; 10] = [
     "[effects.sound_speed_error]\nshare = 0.02\n",
     "[effects.range_noise]\nsd_m = 0.02\n",
     "[effects.range_quantisation]\n",
+    "[effects.stuck_range]\nto_s = 2\n",
 ];
 
 fn pair() -> Dive {

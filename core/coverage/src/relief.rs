@@ -1,0 +1,206 @@
+//! Where the wall was found off the design lately, by any head, and which heads contradict the design where others don't.
+
+use serde::{Deserialize, Serialize};
+
+use super::wall_limits::{PlacedReturn, WallLimits};
+use headrace_geometry::math;
+use headrace_sampling::head::MAX_HEADS;
+use headrace_snapshot::stateful;
+
+/// Bins around the perimeter: about a step of a head.
+const BINS: i64 = 128;
+/// Bins along the tunnel that are remembered, each half a reach long: 9 m in a tunnel of 6 m radius, more than heads are apart.
+const SLABS: i64 = 32;
+
+/// What was found in a bin.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+struct Cell {
+    /// Number of the slab since chainage zero; bins of another one are stale.
+    slab: i64,
+    /// The latest return off the design, and whether it was wall.
+    off: Option<(PlacedReturn, bool)>,
+    /// Heads, a bit each, whose returns agree with the design here, and those whose returns contradict it.
+    as_designed: u8,
+    contradicting: u8,
+}
+
+/// Votes on a head, in bins that others have seen, too.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Ballot {
+    /// It agrees with the design as others do.
+    agreed: u32,
+    /// It contradicts the design where others agree with it.
+    outvoted: u32,
+    /// Sum of the deviations where it was outvoted, m, and their chainages.
+    off_sum_m: f64,
+    between_m: Option<[f64; 2]>,
+}
+
+/// About a turn of bins.
+const FULL_BALLOT: u32 = 128;
+
+impl Ballot {
+    fn add(&mut self, outvoted: Option<&PlacedReturn>) {
+        if self.agreed + self.outvoted >= 2 * FULL_BALLOT {
+            (self.agreed, self.outvoted) = (self.agreed / 2, self.outvoted / 2);
+            self.off_sum_m /= 2.0;
+            if !self.is_lost() {
+                self.between_m = None;
+            }
+        }
+        let Some(placed) = outvoted else {
+            self.agreed += 1;
+            return;
+        };
+        self.outvoted += 1;
+        self.off_sum_m += placed.off_m;
+        let [from_m, to_m] = self.between_m.unwrap_or([placed.x_m; 2]);
+        self.between_m = Some([from_m.min(placed.x_m), to_m.max(placed.x_m)]);
+    }
+
+    /// Whether most of about a turn's bins speak against the head: its mean deviation there, m, and their chainages.
+    pub(super) fn verdict(&self) -> Option<(f64, [f64; 2])> {
+        let lost = self.agreed + self.outvoted >= FULL_BALLOT && self.outvoted > self.agreed;
+        lost.then(|| Some((self.off_sum_m / f64::from(self.outvoted), self.between_m?))).flatten()
+    }
+
+    /// Whether a quarter of its bins or more speak against the head.
+    pub(super) fn is_lost(&self) -> bool {
+        4 * self.outvoted > self.agreed + self.outvoted
+    }
+}
+
+/// The relief of the wall near the vehicle.
+#[derive(Debug, Clone)]
+pub struct Relief {
+    cells: Vec<Cell>,
+    ballots: [Ballot; MAX_HEADS],
+    /// Heads that aren't believed, a bit each.
+    distrusted: u8,
+}
+
+stateful!(Relief { state: ballots, distrusted; slots: cells; });
+
+impl Default for Relief {
+    /// Nothing is known. Allocates: all that it will ever use.
+    fn default() -> Self {
+        let nowhere = Cell { slab: i64::MIN, ..Cell::default() };
+        let count = usize::try_from(BINS * SLABS).unwrap_or(0);
+        Self { cells: vec![nowhere; count], ballots: [Ballot::default(); MAX_HEADS], distrusted: 0 }
+    }
+}
+
+fn bit(head: usize) -> u8 {
+    1_u8.checked_shl(u32::try_from(head).unwrap_or(u32::MAX)).unwrap_or(0)
+}
+
+impl Relief {
+    /// Whether the wall was found as far off the design nearby: by a return that was wall within reach along the tunnel, or by
+    /// a doubtful one at half the distances.
+    pub(super) fn supports(&self, placed: &PlacedReturn, limits: &WallLimits) -> bool {
+        let (slab, bin) = place(placed, limits);
+        (slab - 2..=slab + 2).any(|slab| {
+            (bin - 1..=bin + 1).any(|bin| {
+                let Some((other, is_wall)) = self.cell(slab, bin).and_then(|cell| cell.off) else {
+                    return false;
+                };
+                let share = if is_wall { 1.0 } else { 0.5 };
+                (other.x_m - placed.x_m).abs() <= share * limits.reach_m
+                    && (other.off_m - placed.off_m).abs() <= share * limits.tolerance_m
+            })
+        })
+    }
+
+    /// Remembers a return off the design for later passes.
+    pub(super) fn remember(&mut self, placed: &PlacedReturn, is_wall: bool, limits: &WallLimits) {
+        if limits.is_design(placed) {
+            return;
+        }
+        let (slab, bin) = place(placed, limits);
+        if let Some(cell) = self.cell_mut(slab, bin) {
+            cell.off = Some((*placed, is_wall));
+        }
+    }
+
+    /// Counts what a head says of its bin, and what that says of other heads.
+    pub(super) fn vote(&mut self, head: usize, placed: &PlacedReturn, limits: &WallLimits) {
+        let (slab, bin) = place(placed, limits);
+        // Between the two nobody votes: noise would make heads disagree at the limit.
+        let as_designed = placed.off_m.abs() <= limits.contradiction_m / 2.0;
+        if !as_designed && placed.off_m.abs() <= limits.contradiction_m {
+            return;
+        }
+        let (me, distrusted) = (bit(head), self.distrusted);
+        let Some(cell) = self.cell_mut(slab, bin) else { return };
+        if as_designed && cell.off.is_some_and(|(_, is_wall)| !is_wall) {
+            // What was met once isn't there any more.
+            cell.off = None;
+        }
+        let seen = if as_designed { &mut cell.as_designed } else { &mut cell.contradicting };
+        if *seen & me != 0 {
+            return;
+        }
+        *seen |= me;
+        let Cell { as_designed: agreeing, contradicting, off, .. } = *cell;
+        let off = off.map_or(*placed, |(off, _)| off);
+        let others_agree = agreeing & !me & !distrusted != 0;
+        if !as_designed {
+            if others_agree && agreeing & me == 0 {
+                self.count(head, Some(placed));
+            }
+            return;
+        }
+        if others_agree {
+            self.count(head, None);
+        }
+        if distrusted & me != 0 {
+            return;
+        }
+        for other in (0..MAX_HEADS).filter(|other| *other != head) {
+            if agreeing & bit(other) != 0 {
+                self.count(other, None);
+            } else if contradicting & bit(other) != 0 {
+                self.count(other, Some(&off));
+            }
+        }
+    }
+
+    fn count(&mut self, head: usize, outvoted: Option<&PlacedReturn>) {
+        if let Some(ballot) = self.ballots.get_mut(head) {
+            ballot.add(outvoted);
+        }
+    }
+
+    /// Votes on a head.
+    pub(super) fn ballot(&self, head: usize) -> Ballot {
+        self.ballots.get(head).copied().unwrap_or_default()
+    }
+
+    /// Whether a head's votes count.
+    pub(super) fn believe(&mut self, head: usize, believed: bool) {
+        self.distrusted = if believed { self.distrusted & !bit(head) } else { self.distrusted | bit(head) };
+    }
+
+    fn cell(&self, slab: i64, bin: i64) -> Option<&Cell> {
+        self.cells.get(index(slab, bin)?).filter(|cell| cell.slab == slab)
+    }
+
+    /// The cell of a bin; emptied if it was of another slab.
+    fn cell_mut(&mut self, slab: i64, bin: i64) -> Option<&mut Cell> {
+        let cell = self.cells.get_mut(index(slab, bin)?)?;
+        if cell.slab != slab {
+            *cell = Cell { slab, ..Cell::default() };
+        }
+        Some(cell)
+    }
+}
+
+/// Slab along the tunnel and bin around the perimeter.
+fn place(placed: &PlacedReturn, limits: &WallLimits) -> (i64, i64) {
+    let slab = math::floor_to_i64(2.0 * placed.x_m / limits.reach_m);
+    (slab, math::floor_to_i64(placed.arc_m / limits.perimeter_m * BINS as f64))
+}
+
+fn index(slab: i64, bin: i64) -> Option<usize> {
+    usize::try_from(slab.rem_euclid(SLABS) * BINS + bin.rem_euclid(BINS)).ok()
+}

@@ -1,0 +1,192 @@
+//! Heads whose returns don't follow the walls: noise, a range that never changes, a wall that other heads don't see.
+
+use serde::{Deserialize, Serialize};
+
+use super::relief::Ballot;
+use super::wall_limits::{PlacedReturn, WallLimits};
+use headrace_geometry::math;
+
+/// Why a head isn't believed, with the figure that says so, m.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub enum Distrust {
+    /// Most of its successive returns disagree: by how far in the mean.
+    Scattered(f64),
+    /// Its range doesn't change through a turn, though that to the design does by much: the range.
+    Constant(f64),
+    /// It contradicts the design where other heads agree with it: its mean deviation there.
+    Outvoted(f64),
+}
+
+/// How a return was had.
+pub struct Beam<'a> {
+    /// Range, m.
+    pub range_m: f64,
+    /// Direction of the beam across the tunnel, rad.
+    pub angle_rad: f64,
+    /// The head stands still.
+    pub standing: bool,
+    /// Range to the design profile, m; `None` where the beam meets none.
+    pub design_range_m: &'a dyn Fn() -> Option<f64>,
+}
+
+/// Counts over half a turn.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+struct HalfTurn {
+    returns: u32,
+    doubtful: u32,
+    /// Returns that disagree with the one before, and the sum of how far, m.
+    jumps: u32,
+    jump_sum_m: f64,
+    turned_rad: f64,
+    /// Chainages of the returns, m.
+    between_m: Option<[f64; 2]>,
+    /// Returns within runs of one range, their least and most range, and the same of the design there, m.
+    unchanged: u32,
+    unchanged_m: Option<[f64; 2]>,
+    design_m: Option<[f64; 2]>,
+}
+
+impl HalfTurn {
+    fn with(&self, other: &Self) -> Self {
+        Self {
+            returns: self.returns + other.returns,
+            doubtful: self.doubtful + other.doubtful,
+            jumps: self.jumps + other.jumps,
+            jump_sum_m: self.jump_sum_m + other.jump_sum_m,
+            turned_rad: self.turned_rad + other.turned_rad,
+            between_m: joined(self.between_m, other.between_m),
+            unchanged: self.unchanged + other.unchanged,
+            unchanged_m: joined(self.unchanged_m, other.unchanged_m),
+            design_m: joined(self.design_m, other.design_m),
+        }
+    }
+
+    fn is_full(&self) -> bool {
+        self.turned_rad >= math::TAU / 2.0 && self.returns >= FEW
+    }
+
+    /// Whether more than one return in `parts` is of one range, though the design varies by much where they are.
+    fn is_constant(&self, parts: u32, limits: &WallLimits) -> bool {
+        let span_m = |of: Option<[f64; 2]>| of.map_or(0.0, |[least_m, most_m]| most_m - least_m);
+        parts * self.unchanged > self.returns
+            && span_m(self.unchanged_m) < CONSTANT * limits.tolerance_m
+            && span_m(self.design_m) > VARIES * limits.tolerance_m
+    }
+
+    /// Whether more than one return in `parts` disagrees with its neighbours.
+    fn has_one_in(&self, parts: u32) -> bool {
+        parts * self.jumps.max(self.doubtful) > self.returns
+    }
+}
+
+/// The least returns of half a turn.
+const FEW: u32 = 20;
+/// A range counts as unchanged within this share of the tolerance: some quanta of a profiling sonar.
+const UNCHANGED: f64 = 0.2;
+/// Runs of unchanged range are of one range within this share of the tolerance.
+const CONSTANT: f64 = 0.6;
+/// One range contradicts the design where that varies by this many tolerances.
+const VARIES: f64 = 2.0;
+/// Returns in a row that make a run of unchanged range: neighbours on a wall differ less.
+const RUN: u32 = 8;
+
+fn joined(a: Option<[f64; 2]>, b: Option<[f64; 2]>) -> Option<[f64; 2]> {
+    match (a, b) {
+        (Some([a, b]), Some([c, d])) => Some([a.min(c), b.max(d)]),
+        (one, other) => one.or(other),
+    }
+}
+
+/// Returns in a row of one range.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+struct Unchanged {
+    returns: u32,
+    /// Least and most range, m.
+    range_m: [f64; 2],
+}
+
+impl Unchanged {
+    /// Adds a return; true if it is within a run of one range.
+    fn add(&mut self, range_m: f64, limits: &WallLimits) -> bool {
+        let [least_m, most_m] = self.range_m;
+        let span_m = [least_m.min(range_m), most_m.max(range_m)];
+        if self.returns == 0 || span_m[1] - span_m[0] > UNCHANGED * limits.tolerance_m {
+            *self = Self { returns: 1, range_m: [range_m; 2] };
+        } else {
+            *self = Self { returns: self.returns.saturating_add(1), range_m: span_m };
+        }
+        self.returns >= RUN
+    }
+}
+
+/// Whether a head is believed.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub(super) struct HeadTrust {
+    /// The present half turn, and the two before.
+    halves: [HalfTurn; 3],
+    angle_rad: Option<f64>,
+    unchanged: Unchanged,
+    distrusted: Option<Distrust>,
+}
+
+impl HeadTrust {
+    pub(super) fn distrusted(&self) -> Option<Distrust> {
+        self.distrusted
+    }
+
+    /// Adds a return: by how far it disagrees with the one before, m, if it does, and the returns found doubtful by it.
+    /// Returns why the head isn't believed from now on, and the chainages of its late returns.
+    pub(super) fn note(
+        &mut self,
+        placed: &PlacedReturn,
+        beam: &Beam<'_>,
+        jump_m: Option<f64>,
+        doubtful: u32,
+        limits: &WallLimits,
+        ballot: Ballot,
+    ) -> Option<(Distrust, [f64; 2])> {
+        // A head that stands still looks at one place only, which may well be off the design.
+        if beam.standing {
+            return None;
+        }
+        let before = self.angle_rad.replace(beam.angle_rad).unwrap_or(beam.angle_rad);
+        let turned_rad = math::wrap_signed(beam.angle_rad - before, math::TAU).abs();
+        let unchanged = self.unchanged.add(beam.range_m, limits);
+        let is_run = |range_m: f64| unchanged.then_some([range_m; 2]);
+        let one = HalfTurn {
+            returns: 1,
+            doubtful,
+            jumps: u32::from(jump_m.is_some()),
+            jump_sum_m: jump_m.unwrap_or(0.0).abs(),
+            turned_rad,
+            between_m: Some([placed.x_m; 2]),
+            unchanged: u32::from(unchanged),
+            unchanged_m: is_run(beam.range_m),
+            design_m: if unchanged { (beam.design_range_m)().and_then(is_run) } else { None },
+        };
+        self.halves[0] = self.halves[0].with(&one);
+        let is_full = self.halves[0].is_full();
+        let turn = self.halves[0].with(&self.halves[1]);
+        let late_m = turn.with(&self.halves[2]).between_m.unwrap_or([placed.x_m; 2]);
+        if is_full {
+            self.halves = [HalfTurn::default(), self.halves[0], self.halves[1]];
+        }
+        let whole = is_full && turn.turned_rad >= 0.9 * math::TAU;
+        if self.distrusted.is_some() {
+            if whole && !turn.has_one_in(4) && !ballot.is_lost() && !turn.is_constant(4, limits) {
+                self.distrusted = None;
+            }
+            return None;
+        }
+        let (why, between_m) = if whole && turn.is_constant(2, limits) {
+            (Distrust::Constant(beam.range_m), late_m)
+        } else if whole && turn.has_one_in(2) {
+            (Distrust::Scattered(turn.jump_sum_m / f64::from(turn.jumps.max(1))), late_m)
+        } else {
+            let (off_m, between_m) = ballot.verdict()?;
+            (Distrust::Outvoted(off_m), joined(Some(late_m), Some(between_m))?)
+        };
+        self.distrusted = Some(why);
+        Some((why, between_m))
+    }
+}

@@ -1,0 +1,218 @@
+//! Heads in a round tunnel whose wall is anything, and what of their returns is taken for wall.
+
+use super::*;
+use headrace_geometry::math::{self, TAU};
+
+const STEPS: u32 = 150;
+
+/// Heads that turn in step, evenly spread, while the vehicle goes on.
+struct Turning {
+    limits: WallLimits,
+    relief: Relief,
+    heads: Vec<HeadWall>,
+    /// Way between two passes, m.
+    pass_m: f64,
+}
+
+/// How often returns of a head were taken for what.
+#[derive(Debug, Clone, Default, PartialEq)]
+struct Count {
+    wall: usize,
+    doubtful: usize,
+    named: Vec<Distrust>,
+}
+
+impl Turning {
+    fn new(radius_m: f64, heads: usize) -> Self {
+        let contradiction_m = (0.2 * radius_m).min(0.5);
+        Self {
+            limits: WallLimits::new(TAU * radius_m, contradiction_m),
+            relief: Relief::default(),
+            heads: vec![HeadWall::default(); heads],
+            pass_m: 0.04 * radius_m,
+        }
+    }
+
+    /// Turns; `heard` is the range from the middle that a head says at a chainage and an angle, and the turn's and the
+    /// step's number; none where it hears nothing.
+    fn turn(&mut self, turns: u32, heard: impl Fn(usize, f64, f64, [u32; 2]) -> Option<f64>) -> Vec<Count> {
+        let radius_m = self.limits.radius_m;
+        let mut counts = vec![Count::default(); self.heads.len()];
+        for (turn, step) in (0..turns).flat_map(|turn| (0..STEPS).map(move |step| (turn, step))) {
+            for (head, count) in counts.iter_mut().enumerate() {
+                let angle =
+                    TAU * (f64::from(step) / f64::from(STEPS) + head as f64 / self.heads.len() as f64) % TAU;
+                let x_m = self.pass_m
+                    * self.heads.len() as f64
+                    * (f64::from(turn) + f64::from(step) / f64::from(STEPS));
+                let Some(range_m) = heard(head, x_m, angle, [turn, step]) else { continue };
+                let placed = PlacedReturn { x_m, arc_m: angle * radius_m, off_m: range_m - radius_m };
+                let beam =
+                    Beam { range_m, angle_rad: angle, standing: false, design_range_m: &|| Some(radius_m) };
+                let sorted = self.heads[head].sort(head, placed, &beam, &self.limits, &mut self.relief);
+                for taken in sorted.waiting.into_iter().chain([sorted.this]) {
+                    count.wall += usize::from(taken == Taken::Wall);
+                    count.doubtful += usize::from(taken == Taken::Doubtful);
+                }
+                count.named.extend(sorted.distrusted.map(|(why, _)| why));
+            }
+        }
+        counts
+    }
+
+    /// One head, of which nothing is doubtful.
+    #[track_caller]
+    fn all_wall(mut self, turns: u32, wall_m: impl Fn(f64, f64) -> f64) {
+        for count in self.turn(turns, |_, x_m, angle, _| Some(wall_m(x_m, angle))) {
+            assert_eq!((count.doubtful, count.named), (0, vec![]));
+            assert!(count.wall + 1 >= (turns * STEPS) as usize, "{}", count.wall);
+        }
+    }
+}
+
+/// From -1 to 1, the same for the same numbers.
+fn noise(a: u32, b: u32) -> f64 {
+    let mixed = (u64::from(a) << 32 | u64::from(b)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    let mixed = (mixed ^ (mixed >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    (mixed >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+}
+
+#[test]
+fn smooth_and_rough_walls_and_wider_ones_are_wall_in_tunnels_of_any_size() {
+    for radius_m in [0.3, 1.0, 6.0] {
+        Turning::new(radius_m, 1).all_wall(10, |_, _| radius_m);
+        Turning::new(radius_m, 1).all_wall(10, |_, _| 1.06 * radius_m);
+        // Overbreak of a quarter of the radius, three lobes around and one along.
+        Turning::new(radius_m, 2)
+            .all_wall(10, |x_m, angle| radius_m * (1.12 + 0.12 * math::sin(3.0 * angle + x_m / radius_m)));
+        // As vehicles find it that take themselves to be in the middle.
+        Turning::new(radius_m, 1).all_wall(10, |_, angle| radius_m * (1.0 + 0.15 * math::sin(angle)));
+    }
+}
+
+#[test]
+fn boulders_and_niches_are_wall_to_their_edges() {
+    for (inward_m, half_width) in [(1.5, 0.1), (-2.0, 0.15), (3.0, 0.3)] {
+        // Three or more steps wide: its edges are one return each, both sides of them.
+        Turning::new(6.0, 1).all_wall(8, |x_m, angle| {
+            let within = (0.5..2.0).contains(&x_m) && (angle - 3.0).abs() < half_width;
+            if within { 6.0 - inward_m } else { 6.0 }
+        });
+    }
+}
+
+#[test]
+fn what_is_met_once_is_doubtful_and_wall_when_the_next_pass_meets_it_again() {
+    let mut turning = Turning::new(6.0, 1);
+    let fish = |_: usize, _: f64, _: f64, at: [u32; 2]| Some(if at == [2, 70] { 3.0 } else { 6.0 });
+    let count = &turning.turn(5, fish)[0];
+    assert_eq!((count.wall, count.doubtful), (5 * STEPS as usize - 1, 1));
+    let mut turning = Turning::new(6.0, 1);
+    let post = |_: usize, _: f64, _: f64, [turn, step]: [u32; 2]| {
+        Some(if step == 70 && turn >= 2 { 3.0 } else { 6.0 })
+    };
+    let count = &turning.turn(6, post)[0];
+    assert_eq!((count.wall, count.doubtful), (6 * STEPS as usize - 1, 1), "of four hits the first");
+}
+
+#[test]
+fn second_echoes_and_near_ones_here_and_there_are_doubtful_and_the_head_is_believed() {
+    for radius_m in [1.0, 6.0] {
+        let mut turning = Turning::new(radius_m, 2);
+        let murk = |head: usize, _: f64, _: f64, [turn, step]: [u32; 2]| {
+            let place = [turn + 1000 * u32::try_from(head).unwrap(), step];
+            let share = noise(place[0] + 7, place[1]);
+            // A share of 0.05 falls anywhere before the wall, one of 0.03 comes by way of two walls.
+            Some(match share {
+                ..-0.9 => radius_m * (0.4 + 0.4 * noise(place[0], place[1] + 500)),
+                0.94.. => 2.0 * radius_m * (1.0 + 0.2 * noise(place[0], place[1] + 900)),
+                _ => radius_m,
+            })
+        };
+        let mut strays = 0;
+        for (turn, step) in (0..20).flat_map(|turn| (0..STEPS).map(move |step| (turn, step))) {
+            for head in 0..2 {
+                let range_m = murk(head, 0.0, 0.0, [turn, step]).unwrap();
+                strays += usize::from((range_m - radius_m).abs() > turning.limits.tolerance_m);
+            }
+        }
+        let counts = turning.turn(20, murk);
+        assert!(counts.iter().all(|count| count.named.is_empty()), "{counts:?}");
+        let doubtful = counts.iter().map(|count| count.doubtful).sum::<usize>();
+        assert!(strays > 400 && doubtful <= strays && 10 * doubtful >= 9 * strays, "{doubtful} of {strays}");
+    }
+}
+
+#[test]
+fn a_head_that_says_anything_is_not_believed() {
+    let mut turning = Turning::new(1.0, 1);
+    let count = &turning.turn(10, |_, _, _, [turn, step]| Some(1.0 + 0.9 * noise(turn, step)))[0];
+    assert!(
+        matches!(count.named[..], [Distrust::Scattered(jump_m)] if (0.3..0.9).contains(&jump_m)),
+        "{count:?}"
+    );
+    assert!(5 * count.wall < count.doubtful, "{count:?}");
+}
+
+#[test]
+fn a_head_that_sees_what_no_other_sees_is_not_believed_until_it_does() {
+    for wrong in 0..3 {
+        let mut turning = Turning::new(1.0, 3);
+        let frozen = |head: usize, _: f64, _: f64, _: [u32; 2]| Some(if head == wrong { 0.55 } else { 1.0 });
+        let counts = turning.turn(6, frozen);
+        for (head, count) in counts.iter().enumerate() {
+            if head == wrong {
+                assert!(
+                    matches!(count.named[..], [Distrust::Outvoted(off_m)] if (off_m + 0.45).abs() < 1e-6)
+                );
+            } else {
+                assert_eq!((count.doubtful, &count.named[..]), (0, &[][..]));
+            }
+        }
+        let counts = turning.turn(6, frozen);
+        assert_eq!((counts[wrong].wall, counts[wrong].doubtful), (0, 6 * STEPS as usize));
+        // The chainage begins anew: as if the vehicle had gone back.
+        turning.turn(4, |_, _, _, _| Some(1.0));
+        let counts = turning.turn(4, |_, _, _, _| Some(1.0));
+        assert_eq!(counts[wrong].doubtful, 0, "it is believed again");
+    }
+}
+
+#[test]
+fn a_cave_that_all_heads_see_is_wall() {
+    Turning::new(1.0, 3).all_wall(12, |x_m, _| if (0.6..1.2).contains(&x_m) { 1.45 } else { 1.0 });
+}
+
+#[test]
+fn an_unchanging_range_is_the_wall_in_the_middle_of_a_pipe_and_a_fault_out_of_it() {
+    for (out_m, named) in [(0.0, 0), (0.02, 0), (0.2, 1)] {
+        let mut turning = Turning::new(1.0, 1);
+        let limits = turning.limits;
+        let mut names = 0;
+        for step in 0..5 * STEPS {
+            let angle = TAU * f64::from(step % STEPS) / f64::from(STEPS);
+            // From `out_m` left of the middle, a circle of a range of 0.95 m about the head.
+            let (sine, cosine) = math::sin_cos(angle);
+            let (y, z) = (out_m + 0.95 * sine, -0.95 * cosine);
+            let design_m = -out_m * sine + math::sqrt(1.0 - out_m * out_m * cosine * cosine);
+            let placed = PlacedReturn {
+                x_m: 0.001 * f64::from(step),
+                arc_m: math::wrap(math::atan2(y, -z), TAU),
+                off_m: math::hypot(y, z) - 1.0,
+            };
+            let beam =
+                Beam { range_m: 0.95, angle_rad: angle, standing: false, design_range_m: &|| Some(design_m) };
+            let sorted = turning.heads[0].sort(0, placed, &beam, &limits, &mut turning.relief);
+            names += usize::from(matches!(sorted.distrusted, Some((Distrust::Constant(_), _))));
+        }
+        assert_eq!(names, named, "{out_m}");
+    }
+}
+
+#[test]
+fn tolerances_scale_with_the_section() {
+    let of = |radius_m: f64| WallLimits::new(TAU * radius_m, (0.2 * radius_m).min(0.5));
+    assert!((of(1.0).tolerance_m - 0.1).abs() < 1e-12 && (of(1.0).contradiction_m - 0.2).abs() < 1e-12);
+    assert!((of(0.15).tolerance_m - 0.03).abs() < 1e-12, "no less than sonars are good for");
+    assert!((of(20.0).tolerance_m - 0.5).abs() < 1e-12, "no more than contradicts the design");
+}

@@ -1,0 +1,223 @@
+//! Sorts returns: those taken for wall become samples, doubtful ones are counted and recorded.
+
+use bevy_ecs::prelude::{Query, Res, ResMut};
+use bevy_ecs::system::SystemState;
+use bevy_ecs::world::World;
+
+use super::judge::digest_alert;
+use super::samples::note_sample;
+use crate::alerts::{AlertKind, Alerts};
+use crate::entities::{HeadSweep, Waiting};
+use crate::messages::{Aim, Notice, Notices, Outcome, PlacedPing, Requests};
+use crate::resources::{Coverage, Digests, Tally, TunnelDesign, VehicleEntities};
+use crate::result_stream::RecordKind;
+use headrace_coverage::deviation::off_m;
+use headrace_coverage::{Beam, Loss, Outlook, PlacedReturn, Request, StoreError, Taken};
+use headrace_geometry::frames::{Point3, Tunnel};
+use headrace_geometry::math;
+
+/// What sorting reads and writes, apart from the head.
+pub(super) struct Sorting<'a> {
+    pub(super) coverage: &'a mut Coverage,
+    pub(super) tunnel: &'a TunnelDesign,
+    pub(super) tally: &'a mut Tally,
+    pub(super) notices: &'a mut Notices,
+    pub(super) digests: &'a mut Digests,
+    pub(super) alerts: &'a mut Alerts,
+}
+
+/// Takes a ping: its return is sorted with the one that waited for it; one without a return breaks the sweep. Returns the
+/// chainages at which samples of a head that has just been distrusted lie, m.
+pub(super) fn note_ping(
+    sorting: &mut Sorting<'_>,
+    sweep: &mut HeadSweep,
+    ping: &PlacedPing,
+) -> Option<[f64; 2]> {
+    let (Outcome::Sample { point, arc_m }, Some(origin)) = (ping.outcome, ping.origin) else {
+        digest(sorting.digests, ping, RecordKind::NoSample);
+        if let Some(waiting) = &mut sweep.waiting {
+            waiting.broken = true;
+            waiting.new_sweep |= ping.new_sweep;
+        } else {
+            store(sorting, sweep, ping);
+        }
+        return None;
+    };
+    let profile = &sorting.tunnel.profile;
+    let (from, to) = ([origin.y(), origin.z()], [point.y(), point.z()]);
+    let beam = [to[0] - from[0], to[1] - from[1]];
+    let range_m = math::hypot(beam[0], beam[1]);
+    let placed = PlacedReturn { x_m: point.x(), arc_m, off_m: off_m(profile, to, arc_m) };
+    let had = Beam {
+        range_m,
+        angle_rad: math::atan2(beam[0], -beam[1]),
+        standing: ping.standing,
+        design_range_m: &|| {
+            let beam = (range_m > 0.0).then(|| beam.map(|of| of / range_m))?;
+            Some(profile.cast(from, beam)?.range_m)
+        },
+    };
+    let relief = &mut sorting.coverage.relief;
+    let sorted = sweep.wall.sort(ping.head, placed, &had, &sorting.tunnel.limits, relief);
+    if let Some(waiting) = sweep.waiting.take() {
+        settle(sorting, sweep, &waiting, sorted.waiting == Some(Taken::Wall));
+    }
+    match sorted.this {
+        Taken::Wall => wall(sorting, sweep, ping),
+        Taken::Doubtful => doubtful(sorting, sweep, ping),
+        Taken::Waits => sweep.waiting = Some(Waiting { ping: *ping, broken: false, new_sweep: false }),
+    }
+    let (why, between_m) = sorted.distrusted?;
+    let (kind, figure_m) = AlertKind::of_distrust(why);
+    let source = Some(ping.source);
+    if sorting.alerts.note_of(source, kind, ping.received, point.x(), figure_m) {
+        sorting.notices.0.push(Notice::Alert(kind, source));
+        digest_alert(sorting.digests, kind, source, ping.received, (point.x(), figure_m));
+    }
+    Some(between_m)
+}
+
+/// What sorting reads and writes at the end of a dive.
+type End<'w, 's> = (
+    Query<'w, 's, &'static mut HeadSweep>,
+    ResMut<'w, Coverage>,
+    Res<'w, TunnelDesign>,
+    ResMut<'w, Tally>,
+    ResMut<'w, Notices>,
+    ResMut<'w, Digests>,
+    ResMut<'w, Alerts>,
+);
+
+/// Ends a dive: no return will come that says what the waiting ones are. Allocates: not within a tick.
+pub(crate) fn end_returns(world: &mut World) {
+    let heads = world.resource::<VehicleEntities>().heads.clone();
+    let mut state = SystemState::<End<'_, '_>>::new(world);
+    let Ok((mut sweeps, mut coverage, tunnel, mut tally, mut notices, mut digests, mut alerts)) =
+        state.get_mut(world)
+    else {
+        return;
+    };
+    let mut sorting = Sorting {
+        coverage: &mut coverage,
+        tunnel: &tunnel,
+        tally: &mut tally,
+        notices: &mut notices,
+        digests: &mut digests,
+        alerts: &mut alerts,
+    };
+    for head in heads {
+        let Ok(mut sweep) = sweeps.get_mut(head) else { continue };
+        if let Some(waiting) = sweep.waiting.take() {
+            settle(&mut sorting, &mut sweep, &waiting, false);
+        }
+    }
+}
+
+/// Marks the sections that hold samples of a head that isn't believed any more, and asks for those that have passed to be
+/// judged again.
+pub(super) fn suspect(
+    coverage: &mut Coverage,
+    [from_m, to_m]: [f64; 2],
+    outlook: &Outlook,
+    requests: &mut Requests,
+) {
+    let sections = &mut coverage.sections;
+    for index in sections.index_of(from_m)..=sections.index_of(to_m) {
+        let Some(section) = sections.get_mut(index) else { continue };
+        section.suspect();
+        if section.hole.is_some() {
+            let Outlook { at, swept_by_all, none_alive, to_come, .. } = *outlook;
+            requests.0.push(Request { section: index, at, swept_by_all, none_alive, to_come, fails: false });
+        }
+    }
+}
+
+/// Takes the return that waited, and what has come since.
+fn settle(sorting: &mut Sorting<'_>, sweep: &mut HeadSweep, waiting: &Waiting, is_wall: bool) {
+    if is_wall {
+        wall(sorting, sweep, &waiting.ping);
+    } else {
+        doubtful(sorting, sweep, &waiting.ping);
+    }
+    if let Some(last) = &mut sweep.last {
+        last.unbroken &= !waiting.broken;
+    }
+    if waiting.new_sweep {
+        sweep.last = None;
+    }
+}
+
+fn wall(sorting: &mut Sorting<'_>, sweep: &mut HeadSweep, ping: &PlacedPing) {
+    sorting.tally.samples += 1;
+    digest(sorting.digests, ping, RecordKind::Sample);
+    if let Some(beyond_m) = beyond_end_m(ping, sorting.tunnel.length_m)
+        && sorting.alerts.note(AlertKind::OutsideTunnel, ping.received, beyond_m.0, beyond_m.1)
+    {
+        sorting.notices.0.push(Notice::Alert(AlertKind::OutsideTunnel, None));
+        digest_alert(sorting.digests, AlertKind::OutsideTunnel, None, ping.received, beyond_m);
+    }
+    store(sorting, sweep, ping);
+}
+
+/// Stores a sample, or breaks the sweep for want of one.
+fn store(sorting: &mut Sorting<'_>, sweep: &mut HeadSweep, ping: &PlacedPing) {
+    match note_sample(sorting.coverage, sweep, sorting.tunnel, ping) {
+        Ok(()) => {}
+        Err(StoreError::Outside) => sorting.tally.outside += 1,
+        Err(StoreError::Full) => sorting.tally.not_stored += 1,
+    }
+}
+
+/// Counts a doubtful return: for holes and causes it is a missing one, aimed where its beam meets the design.
+fn doubtful(sorting: &mut Sorting<'_>, sweep: &mut HeadSweep, ping: &PlacedPing) {
+    sorting.tally.doubtful += 1;
+    digest(sorting.digests, ping, RecordKind::Doubtful);
+    let Outcome::Sample { point, .. } = ping.outcome else { return };
+    let aim = ping.origin.and_then(|origin| aim(sorting.tunnel, &origin, &point));
+    let lost = PlacedPing { outcome: Outcome::Lost(Loss::Missing, aim), ..*ping };
+    store(sorting, sweep, &lost);
+    let Coverage { store, sections, .. } = &mut *sorting.coverage;
+    if let Some(reach) = ping.reach
+        && let Some(section) = sections.get_mut(sections.index_of(reach.middle_m()))
+    {
+        section.passage.missing += 1;
+    }
+    let Some(aim) = aim else { return };
+    if let Some(section) = sections.get_mut(sections.index_of(aim.x_m)) {
+        section.doubtful += 1;
+        section.passage.lost.note(Loss::Missing, aim.arc_m, store.perimeter_m());
+    }
+}
+
+/// Where a beam would have met the design profile.
+fn aim(tunnel: &TunnelDesign, origin: &Point3<Tunnel>, point: &Point3<Tunnel>) -> Option<Aim> {
+    let beam = *point - *origin;
+    let length_m = Some(beam.norm()).filter(|length_m| *length_m > 0.0)?;
+    let across = [beam.y() / length_m, beam.z() / length_m];
+    let wall = tunnel.profile.cast([origin.y(), origin.z()], across)?;
+    Some(Aim { x_m: origin.x() + wall.range_m * beam.x() / length_m, arc_m: wall.arc_m })
+}
+
+/// Chainage of a sample beyond either end of the tunnel, and by how much, m.
+fn beyond_end_m(ping: &PlacedPing, length_m: f64) -> Option<(f64, f64)> {
+    let Outcome::Sample { point, .. } = ping.outcome else { return None };
+    let x_m = point.x();
+    let beyond_m = (-x_m).max(x_m - length_m);
+    (beyond_m > 0.0).then_some((x_m, beyond_m))
+}
+
+fn digest(digests: &mut Digests, ping: &PlacedPing, kind: RecordKind) {
+    let digest = digests.pings.record(kind).integer(ping.received.0).integer(u64::from(ping.source.0));
+    match ping.outcome {
+        Outcome::Sample { point, arc_m } => {
+            let outcome = if kind == RecordKind::Sample { 0 } else { 3 };
+            digest.integer(outcome).number(point.x()).number(point.y()).number(point.z()).number(arc_m);
+        }
+        Outcome::Lost(loss, _) => {
+            digest.integer(1).integer(loss as u64);
+        }
+        Outcome::Unplaced(lacking) => {
+            digest.integer(2).integer(lacking as u64);
+        }
+    }
+}
