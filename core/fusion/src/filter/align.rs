@@ -6,8 +6,8 @@ use super::eskf::{Context, in_tunnel, with_quantum};
 use super::factors::Factors;
 use super::settings::Settings;
 use super::state::{
-    ATTITUDE, CREEP, DEPTH, ERRORS, FORCE_BIAS, HEADING, POSITION, RATE_BIAS, SCALE, SLACK, SLACK_RATE,
-    State, VELOCITY,
+    ATTITUDE, CREEP, DEPTH, ERRORS, FORCE_BIAS, HEADING, POSITION, RANGES, RATE_BIAS, SCALE, SLACK,
+    SLACK_RATE, State, VELOCITY,
 };
 use crate::NoFix;
 use crate::section::{Echo, settle};
@@ -209,6 +209,7 @@ impl Listening {
             (SCALE, settings.scale_sd),
             (DEPTH, settings.depth_offset_sd_m),
             (HEADING, settings.heading.reach),
+            (RANGES, settings.range_scale_sd),
         ];
         for (i, sd) in ones {
             if let Some(slot) = sds.get_mut(i) {

@@ -11,6 +11,12 @@ use headrace_geometry::time::{DurNs, MonoNs};
 /// Time beyond the gate, and standard deviations, after which a counter isn't believed.
 const DOUBTED_AFTER: DurNs = DurNs(500_000_000);
 const DOUBTED_SDS: f64 = 6.0;
+/// Time over which its rate is meaned, s; the least that counts, m/s, and how steady it must stay for the fault to be the
+/// inertial unit's: its rate, and its reading at the beginning.
+const RATE_MEMORY_S: f64 = 2.0;
+const RUNS_MPS: f64 = 0.03;
+const STEADY_SHARE: f64 = 0.25;
+const JUMPS_M: f64 = 0.05;
 /// Time over which a disagreement, or an agreement, counts.
 const NOTICED_AFTER: DurNs = DurNs(1_000_000_000);
 const RETURNED_AFTER: DurNs = DurNs(500_000_000);
@@ -74,6 +80,8 @@ pub enum Use {
     Withhold,
     /// The counter runs truly again.
     Slipped(Slip),
+    /// The counter runs on as before: it is the inertial unit that is wrong.
+    Unsteady,
     /// The chainage is lost, and the counter runs: begin anew with what it shows, which may lack this much, m.
     Seek(f64),
 }
@@ -81,6 +89,9 @@ pub enum Use {
 /// See the module's description.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Cable {
+    /// The last reading, and the rate at which it has been running, m/s.
+    last: Option<Reading>,
+    rate_mps: f64,
     /// The first of successive readings beyond the gate.
     left: Option<Reading>,
     doubt: Option<Doubt>,
@@ -90,6 +101,8 @@ pub struct Cable {
 struct Doubt {
     /// The first reading that was withheld.
     first: Reading,
+    /// The rate at which the counter had run before, m/s.
+    rate_mps: f64,
     /// The reading from which the counter runs as the vehicle does.
     same_from: Reading,
     /// When readings began to agree again.
@@ -114,6 +127,7 @@ impl Cable {
             return used;
         }
         if reading.agrees {
+            self.run(reading);
             self.left = None;
             return Use::Fuse;
         }
@@ -121,10 +135,44 @@ impl Cable {
         let first = *self.left.get_or_insert(*reading);
         let is_long = reading.at.since(first.at).0 >= DOUBTED_AFTER.0;
         if is_long && reading.off_m.abs() > DOUBTED_SDS * reading.sd_m {
-            let doubt = Doubt { first, same_from: *reading, agreeing_from: None, blind_from_m: None };
+            if self.runs_on(&first, reading) {
+                *self = Self::default();
+                return Use::Unsteady;
+            }
+            let rate_mps = self.rate_mps;
+            let doubt =
+                Doubt { first, rate_mps, same_from: *reading, agreeing_from: None, blind_from_m: None };
             self.doubt = Some(doubt);
         }
         Use::Withhold
+    }
+}
+
+impl Cable {
+    /// Notes the rate at which a counter runs that is believed.
+    fn run(&mut self, reading: &Reading) {
+        if let Some(last) = self.last {
+            let dt_s = reading.at.since(last.at).as_secs_f64();
+            if dt_s > 0.0 {
+                let share = (dt_s / RATE_MEMORY_S).min(1.0);
+                self.rate_mps += share * ((reading.shown_m - last.shown_m) / dt_s - self.rate_mps);
+            }
+        }
+        self.last = Some(*reading);
+    }
+
+    /// Whether it has run as before since the first reading beyond the gate. A counter that begins to stick, slip or run free
+    /// changes its rate.
+    fn runs_on(&self, first: &Reading, reading: &Reading) -> bool {
+        let dt_s = reading.at.since(first.at).as_secs_f64();
+        let rate_mps = (reading.shown_m - first.shown_m) / dt_s;
+        let jumped_m = self.last.map_or(0.0, |last| {
+            let between_s = first.at.since(last.at).as_secs_f64();
+            (first.shown_m - last.shown_m - self.rate_mps * between_s).abs()
+        });
+        self.rate_mps.abs() >= RUNS_MPS
+            && jumped_m <= JUMPS_M
+            && (rate_mps - self.rate_mps).abs() <= STEADY_SHARE * self.rate_mps.abs()
     }
 }
 
@@ -159,10 +207,11 @@ impl Doubt {
         Use::Withhold
     }
 
-    /// Way since it was doubted, the longer by the counter and by the estimate, m.
+    /// Way since it was doubted, the longest by the counter, by the estimate, and at the rate of before, m.
     fn way_m(&self, reading: &Reading) -> f64 {
         let expected_m = (reading.expected_m() - self.first.expected_m()).abs();
-        expected_m.max((reading.shown_m - self.first.shown_m).abs())
+        let at_rate_m = self.rate_mps.abs() * reading.at.since(self.first.at).as_secs_f64();
+        expected_m.max((reading.shown_m - self.first.shown_m).abs()).max(at_rate_m)
     }
 
     /// Whether it shows most of the way that the vehicle has made meanwhile. The gate alone would let a counter in that still

@@ -4,7 +4,7 @@ use core::ops::Range;
 
 use super::agreement::{self, Agreement};
 use super::cable::{self, Cable, Slip, Use};
-use super::clones::ErrorClones;
+use super::clones::{ErrorClones, MOVING};
 use super::factors::Factors;
 use super::inertial::Leg;
 use super::measure::{self, Beam, ScalarUpdate};
@@ -203,6 +203,7 @@ impl Eskf {
                 add_variance(&mut self.doubts, CREEP, lost_m * lost_m);
                 add_variance(&mut self.doubts, POSITION, doubted_m * doubted_m);
             }
+            Use::Unsteady => agreement::seek_speed(&mut self.doubts),
             Use::Seek(lacking_m) => {
                 self.way_sought = Some(reading.at);
                 add_variance(&mut self.doubts, CREEP, lacking_m * lacking_m);
@@ -384,6 +385,19 @@ impl Eskf {
             );
         }
         self.state.correct(&errors);
+    }
+
+    /// Covariance relative to an estimate as sure as this one that has nothing to do with it.
+    pub fn independent(&self) -> Relative {
+        let mut covariance =
+            self.factors.rows(MOVING).map(|row| MOVING.map(|i| 2.0 * row.get(i).copied().unwrap_or(0.0)));
+        let along_m = self.pose_sd().along_m;
+        // The cable's creep is common to both.
+        covariance[0] = [2.0 * along_m * along_m, 0.0, 0.0];
+        for row in covariance.iter_mut().skip(1) {
+            row[0] = 0.0;
+        }
+        Relative::new(covariance)
     }
 
     /// Standard deviations of the estimate.

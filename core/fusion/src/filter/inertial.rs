@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::factors::{Factors, Noise};
 use super::settings::{Settings, Wander};
 use super::state::{
-    ATTITUDE, CREEP, DEPTH, ERRORS, Errors, FORCE_BIAS, HEADING, POSITION, RATE_BIAS, SCALE, SLACK,
+    ATTITUDE, CREEP, DEPTH, ERRORS, Errors, FORCE_BIAS, HEADING, POSITION, RANGES, RATE_BIAS, SCALE, SLACK,
     SLACK_RATE, State, VELOCITY, cross, matrix, rotation,
 };
 use headrace_geometry::frames::{Body, Vec3};
@@ -226,7 +226,7 @@ impl Leg {
     }
 
     /// Process noise of the sensor errors.
-    fn wandering(&self, settings: &Settings, transition: &Transition) -> [Noise; 11] {
+    fn wandering(&self, settings: &Settings, transition: &Transition) -> [Noise; 12] {
         let fading = |i: usize, wander: Wander| {
             let left = transition.left_of(i);
             Noise::of_one(i, wander.reach * wander.reach * (1.0 - left * left))
@@ -248,6 +248,7 @@ impl Leg {
             fading(HEADING, settings.heading),
             white(SCALE, settings.scale_noise),
             white(DEPTH, settings.depth_noise),
+            white(RANGES, settings.range_scale_noise),
         ]
     }
 }

@@ -3,8 +3,8 @@
 //! Derivation: `docs/fusion.md`, "Measurements".
 
 use super::state::{
-    ATTITUDE, CREEP, DEPTH, ERRORS, Errors, HEADING, POSITION, RATE_BIAS, SLACK, State, VELOCITY, put,
-    rotation_vector,
+    ATTITUDE, CREEP, DEPTH, ERRORS, Errors, HEADING, POSITION, RANGES, RATE_BIAS, SLACK, State, VELOCITY,
+    put, rotation_vector,
 };
 use headrace_geometry::frames::{Body, Rot, Sensor, Tunnel, Vec3};
 use headrace_geometry::math;
@@ -124,12 +124,14 @@ pub fn range(state: &State, profile: &Profile, beam: &Beam, range_m: f64, sd_m: 
     let incidence = math::acos(cosine);
     let nearest = (incidence - beam.first_rad).max(0.0);
     let (sin, cos) = math::sin_cos(nearest);
-    let expected_m = height_m / cos;
+    let stretch = 1.0 + state.range_scale;
+    let designed_m = height_m / cos;
+    let expected_m = designed_m * stretch;
     // d expected / d incidence, and d incidence = turn . (along x normal) / sin(incidence).
     let slope = if nearest > 0.0 { expected_m * sin / cos / math::sin(incidence) } else { 0.0 };
-    let turning = arm.cross(&normal).scaled(1.0 / cos) + along.cross(&normal).scaled(slope);
+    let turning = arm.cross(&normal).scaled(stretch / cos) + along.cross(&normal).scaled(slope);
     // The range may be as short as that of the wider cone's nearest ray: mean square of a uniform distribution.
-    let soonest_m = height_m / math::cos((incidence - beam.unsure_rad).max(0.0));
+    let soonest_m = stretch * height_m / math::cos((incidence - beam.unsure_rad).max(0.0));
     let unsure_m = (expected_m - soonest_m).max(0.0) / math::sqrt(3.0);
     let mut row = ScalarUpdate::new(range_m - expected_m, sd_m * sd_m + unsure_m * unsure_m);
     let mut by = [0.0; ERRORS];
@@ -141,7 +143,8 @@ pub fn range(state: &State, profile: &Profile, beam: &Beam, range_m: f64, sd_m: 
     let tangent = math::sqrt((secant * secant - 1.0).max(0.0));
     row.bends = [secant / height_m.max(LEAST_HEIGHT_M), by_turn, secant * tangent];
     row.lean = Some(Lean { along: along.x(), by, slope_m: expected_m / across });
-    Some(row.with(POSITION, normal.scaled(1.0 / cos)).with(ATTITUDE, turning))
+    let row = row.with(POSITION, normal.scaled(stretch / cos)).with(ATTITUDE, turning);
+    Some(row.with_one(RANGES, designed_m))
 }
 
 /// Height of a pressure sensor at `offset` from the inertial unit, m above the tunnel's floor.

@@ -204,7 +204,8 @@ impl FilterNavigation {
         }
         let pass_gap = self.pass_gap();
         let relative = self.running.clones.relative(pass_gap);
-        let relative = relative.unwrap_or_else(|| Relative::along(0.0));
+        // At first nothing relates what is placed now to what was placed before.
+        let relative = relative.unwrap_or_else(|| self.running.independent());
         self.standing = match sd.standing(relative) {
             Ok(_) if self.has_jumped() => Err(NoFix::Chainage),
             standing => standing,

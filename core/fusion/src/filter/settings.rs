@@ -71,6 +71,10 @@ pub struct Settings {
     pub echo_sd_m: f64,
     /// Full width of its beam, radians: which part of the wall within it echoes is uncertain.
     pub echo_beam_rad: f64,
+    /// Initial scale error of all ranges against the design, a ratio, and its random walk, per root of a second.
+    pub range_scale_sd: f64,
+    /// See `range_scale_sd`.
+    pub range_scale_noise: f64,
     /// Noise of a head's return, m, wall roughness included.
     pub return_sd_m: f64,
     /// Full width of its beam, radians: the nearest part of the wall echoes first.
@@ -109,6 +113,8 @@ impl Default for Settings {
             attitude_sd_rad: 1.0 * DEGREE,
             echo_sd_m: 0.03,
             echo_beam_rad: 25.0 * DEGREE,
+            range_scale_sd: 0.03,
+            range_scale_noise: 1e-5,
             return_sd_m: 0.03,
             return_beam_rad: 1.4 * DEGREE,
             return_step_rad: 3.0 * DEGREE,

@@ -7,7 +7,7 @@ use headrace_geometry::frames::{Body, Point3, Rot, Tunnel, Vec3};
 use headrace_geometry::math;
 
 /// Number of errors.
-pub const ERRORS: usize = 21;
+pub const ERRORS: usize = 22;
 /// Index of the error of the inertial unit's position, m, in the tunnel's frame.
 pub const POSITION: usize = 0;
 /// Of the cable's creep, m.
@@ -30,6 +30,8 @@ pub const SCALE: usize = 18;
 pub const DEPTH: usize = 19;
 /// Of the compass's deviation, radians.
 pub const HEADING: usize = 20;
+/// Of the scale of all sonars' ranges, a ratio.
+pub const RANGES: usize = 21;
 
 /// Number of values of a state.
 pub const STATE_NUMBERS: usize = ERRORS + 1;
@@ -62,6 +64,8 @@ pub struct State {
     pub depth_offset_m: f64,
     /// Deviation of the compass, radians, positive to the left.
     pub heading_offset_rad: f64,
+    /// Share by which ranges are longer than the design and the speed of sound say: the wall is wider, or sound slower.
+    pub range_scale: f64,
 }
 
 impl State {
@@ -79,6 +83,7 @@ impl State {
             scale: 0.0,
             depth_offset_m: 0.0,
             heading_offset_rad: 0.0,
+            range_scale: 0.0,
         }
     }
 
@@ -89,8 +94,10 @@ impl State {
         self.attitude = rotation(vec(errors, ATTITUDE)) * self.attitude;
         self.force_bias_mps2 = self.force_bias_mps2 + vec(errors, FORCE_BIAS);
         self.rate_bias_radps = self.rate_bias_radps + vec(errors, RATE_BIAS);
-        let [creep_m, slack_m, slack_rate_mps, scale, depth_m, heading_rad] =
-            [CREEP, SLACK, SLACK_RATE, SCALE, DEPTH, HEADING].map(|i| errors.get(i).copied().unwrap_or(0.0));
+        let [creep_m, slack_m, slack_rate_mps, scale, depth_m, heading_rad, range_scale] =
+            [CREEP, SLACK, SLACK_RATE, SCALE, DEPTH, HEADING, RANGES]
+                .map(|i| errors.get(i).copied().unwrap_or(0.0));
+        self.range_scale += range_scale;
         self.creep_m += creep_m;
         self.slack_m += slack_m;
         self.slack_rate_mps += slack_rate_mps;
@@ -114,6 +121,7 @@ impl State {
             (SCALE, truth.scale - self.scale),
             (DEPTH, truth.depth_offset_m - self.depth_offset_m),
             (HEADING, truth.heading_offset_rad - self.heading_offset_rad),
+            (RANGES, truth.range_scale - self.range_scale),
         ];
         for (i, value) in scalars {
             if let Some(slot) = errors.get_mut(i) {
@@ -145,14 +153,40 @@ impl State {
         let (slack, heading) = ([self.slack_m, self.slack_rate_mps], self.heading_offset_rad);
         let (scale, depth) = (self.scale, self.depth_offset_m);
         let [s, r] = slack;
-        let creep = self.creep_m;
-        [px, py, pz, creep, vx, vy, vz, w, x, y, z, fx, fy, fz, rx, ry, rz, s, r, scale, depth, heading]
+        let (creep, ranges) = (self.creep_m, self.range_scale);
+        [
+            px, py, pz, creep, vx, vy, vz, w, x, y, z, fx, fy, fz, rx, ry, rz, s, r, scale, depth, heading,
+            ranges,
+        ]
     }
 
     /// The estimate from such values; `None` when the quaternion is invalid.
     pub fn of_numbers(numbers: [f64; STATE_NUMBERS]) -> Option<Self> {
-        let [px, py, pz, creep, vx, vy, vz, w, x, y, z, fx, fy, fz, rx, ry, rz, s, r, scale, depth, heading] =
-            numbers;
+        let [
+            px,
+            py,
+            pz,
+            creep,
+            vx,
+            vy,
+            vz,
+            w,
+            x,
+            y,
+            z,
+            fx,
+            fy,
+            fz,
+            rx,
+            ry,
+            rz,
+            s,
+            r,
+            scale,
+            depth,
+            heading,
+            ranges,
+        ] = numbers;
         Some(Self {
             position: Point3::new(px, py, pz),
             velocity_mps: Vec3::new(vx, vy, vz),
@@ -165,13 +199,14 @@ impl State {
             scale,
             depth_offset_m: depth,
             heading_offset_rad: heading,
+            range_scale: ranges,
         })
     }
 
     /// Whether every number is finite.
     pub fn is_sound(&self) -> bool {
         let cable = [self.creep_m, self.slack_m, self.slack_rate_mps, self.scale];
-        let offsets = [self.depth_offset_m, self.heading_offset_rad];
+        let offsets = [self.depth_offset_m, self.heading_offset_rad, self.range_scale];
         self.position.is_finite()
             && self.velocity_mps.is_finite()
             && self.attitude.wxyz().iter().all(|c| c.is_finite())

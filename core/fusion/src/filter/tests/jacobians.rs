@@ -7,7 +7,7 @@ use crate::filter::inertial::{Felt, Leg, Transition};
 use crate::filter::measure::{self, Beam, ScalarUpdate};
 use crate::filter::settings::Settings;
 use crate::filter::state::{
-    ATTITUDE, CREEP, DEPTH, ERRORS, Errors, FORCE_BIAS, HEADING, POSITION, RATE_BIAS, SCALE, SLACK,
+    ATTITUDE, CREEP, DEPTH, ERRORS, Errors, FORCE_BIAS, HEADING, POSITION, RANGES, RATE_BIAS, SCALE, SLACK,
     SLACK_RATE, State, VELOCITY, rotation,
 };
 use headrace_geometry::frames::{Body, Point3, Rot, Sensor, Tunnel, Vec3};
@@ -81,6 +81,7 @@ impl Draws {
             scale: self.within(0.05),
             depth_offset_m: self.within(1.0),
             heading_offset_rad: self.within(0.3),
+            range_scale: self.within(0.05),
         }
     }
 }
@@ -138,7 +139,7 @@ fn verif_the_nearest_ray_of_a_cone() {
         // Leaning sideways and along the tunnel, over a floor that is too wide for a cone to meet a wall.
         let lean = rotation(Vec3::new(draws.within(0.6), draws.within(0.6), 0.0)) * Rot::identity();
         let position = Point3::new(0.0, 0.0, 3.0);
-        let state = State { position, attitude: lean, ..draws.state() };
+        let state = State { position, attitude: lean, range_scale: 0.0, ..draws.state() };
         let along = Vec3::<Body>::new(0.0, 0.0, -1.0);
         let least_m = |half_rad: f64| {
             let around = (0..=RINGS).flat_map(|ring| (0..200).map(move |turn| (ring, turn)));
@@ -316,7 +317,7 @@ fn go_on(start: &State, felt: &[Felt]) -> (State, Transition) {
 #[test]
 fn verif_the_transition() {
     let blocks = [(POSITION, 3), (VELOCITY, 3), (ATTITUDE, 3), (FORCE_BIAS, 3), (RATE_BIAS, 3)];
-    let ones = [CREEP, SLACK, SLACK_RATE, SCALE, DEPTH, HEADING].map(|i| (i, 1));
+    let ones = [CREEP, SLACK, SLACK_RATE, SCALE, DEPTH, HEADING, RANGES].map(|i| (i, 1));
     let blocks: Vec<_> = blocks.into_iter().chain(ones).collect();
     let mut draws = Draws::new(9);
     for round in 0..STATES {
