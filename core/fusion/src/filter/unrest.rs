@@ -17,7 +17,7 @@ const RAISES_PER_S: f64 = 2.0;
 /// Time over which a raised noise falls back, s.
 const FALLS_OVER_S: f64 = 20.0;
 /// Factor at first: a unit is taken to be restless until it has shown otherwise.
-const AT_FIRST: f64 = 1e4;
+const AT_FIRST: f64 = 1e3;
 /// Wandering of the worst unit allowed for, per root of a second: 0.3 degrees/s and 50 mm/s^2 in 300 s.
 const MOST_RATE: f64 = 4.3e-4;
 const MOST_FORCE: f64 = 4.1e-3;
