@@ -17,6 +17,8 @@ const RATE_MEMORY_S: f64 = 2.0;
 const RUNS_MPS: f64 = 0.03;
 const STEADY_SHARE: f64 = 0.25;
 const JUMPS_M: f64 = 0.05;
+/// A counter that leaves again within this time isn't one that has slipped once.
+const AGAIN: DurNs = DurNs(120_000_000_000);
 /// Time over which a disagreement, or an agreement, counts.
 const NOTICED_AFTER: DurNs = DurNs(1_000_000_000);
 const RETURNED_AFTER: DurNs = DurNs(500_000_000);
@@ -82,6 +84,8 @@ pub enum Use {
     Slipped(Slip),
     /// The counter runs on as before: it is the inertial unit that is wrong.
     Unsteady,
+    /// The counter leaves time and again: the cable hangs loose, or is handled in bursts, by this much, m.
+    Loose(f64),
     /// The chainage is lost, and the counter runs: begin anew with what it shows, which may lack this much, m.
     Seek(f64),
 }
@@ -95,6 +99,17 @@ pub struct Cable {
     /// The first of successive readings beyond the gate.
     left: Option<Reading>,
     doubt: Option<Doubt>,
+    /// The last doubt.
+    before: Option<Over>,
+}
+
+/// A doubt that is over.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+struct Over {
+    at: MonoNs,
+    /// How far readings were off, and what the counter was found to have lost or gained, m.
+    most_m: f64,
+    lost_m: f64,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -109,6 +124,8 @@ struct Doubt {
     agreeing_from: Option<MonoNs>,
     /// What it showed when inertial data could no longer judge it, m.
     blind_from_m: Option<f64>,
+    /// How far readings have been off, m.
+    most_m: f64,
 }
 
 impl Cable {
@@ -122,7 +139,9 @@ impl Cable {
         if let Some(doubt) = &mut self.doubt {
             let used = doubt.take(reading);
             if used != Use::Withhold {
-                *self = Self::default();
+                let lost_m = if let Use::Slipped(slip) = used { slip.lost_m } else { 0.0 };
+                let before = Some(Over { at: reading.at, most_m: doubt.most_m, lost_m });
+                *self = Self { before, ..Self::default() };
             }
             return used;
         }
@@ -135,13 +154,20 @@ impl Cable {
         let first = *self.left.get_or_insert(*reading);
         let is_long = reading.at.since(first.at).0 >= DOUBTED_AFTER.0;
         if is_long && reading.off_m.abs() > DOUBTED_SDS * reading.sd_m {
+            let before = self.before;
+            if let Some(over) = before.filter(|over| over.is_followed_by(&first)) {
+                let most_m = over.most_m.max(reading.off_m.abs());
+                *self = Self { before: Some(Over { at: reading.at, ..over }), ..Self::default() };
+                return Use::Loose(most_m);
+            }
             if self.runs_on(&first, reading) {
-                *self = Self::default();
+                *self = Self { before, ..Self::default() };
                 return Use::Unsteady;
             }
             let rate_mps = self.rate_mps;
-            let doubt =
-                Doubt { first, rate_mps, same_from: *reading, agreeing_from: None, blind_from_m: None };
+            let most_m = reading.off_m.abs();
+            let (agreeing_from, blind_from_m) = (None, None);
+            let doubt = Doubt { first, rate_mps, same_from: *reading, agreeing_from, blind_from_m, most_m };
             self.doubt = Some(doubt);
         }
         Use::Withhold
@@ -176,8 +202,17 @@ impl Cable {
     }
 }
 
+impl Over {
+    /// Whether the counter leaves too soon after this, and doesn't just take back what it had lost or gained.
+    fn is_followed_by(&self, first: &Reading) -> bool {
+        let taken_back_m = (first.off_m + self.lost_m).abs();
+        first.at.since(self.at).0 < AGAIN.0 && taken_back_m > SAME_SHARE * self.lost_m.abs() + MISSING_M
+    }
+}
+
 impl Doubt {
     fn take(&mut self, reading: &Reading) -> Use {
+        self.most_m = self.most_m.max(reading.off_m.abs());
         let for_at_least = |since: MonoNs, time: DurNs| reading.at.since(since).0 >= time.0;
         if reading.sd_m > BLIND_M {
             let from_m = *self.blind_from_m.get_or_insert(reading.shown_m);

@@ -11,7 +11,8 @@ use super::measure::{self, Beam, ScalarUpdate};
 use super::settings::Settings;
 use super::sources::Source;
 use super::state::{
-    ATTITUDE, CREEP, ERRORS, Errors, FORCE_BIAS, POSITION, RATE_BIAS, State, VELOCITY, add_variance, put, vec,
+    ATTITUDE, CREEP, ERRORS, Errors, FORCE_BIAS, POSITION, RATE_BIAS, SLACK, State, VELOCITY, add_variance,
+    put, vec,
 };
 use super::unrest::Unrest;
 use super::window::{Waiting, Window};
@@ -43,6 +44,10 @@ const SPEED_SD_MPS: f64 = 0.5;
 /// Standard deviation added to an estimate beyond the wall, m.
 const BEYOND_M: f64 = 1.5;
 
+/// The loosest cable allowed for, m.
+const LOOSEST_M: f64 = 0.5;
+/// Time over which a loose cable is taken to tighten, s.
+const TIGHTENS_OVER_S: f64 = 100.0;
 /// Length of an epoch, s.
 const EPOCH_S: f64 = 0.1;
 
@@ -88,6 +93,8 @@ pub struct Eskf {
     /// Whether the cable counter is believed.
     pub cable: Cable,
     unrest: Unrest,
+    /// How loose the cable hangs beyond what is declared, a standard deviation, m.
+    loose_m: f64,
     /// Variances to add at the end of the epoch.
     doubts: Errors,
     /// Steps of the last epoch, for smoothing; empty unless they are kept.
@@ -95,7 +102,7 @@ pub struct Eskf {
     keeps_steps: bool,
 }
 
-stateful!(Eskf { state: at, state, factors, clones, way_sought, agreement, cable, unrest, doubts; lists: knots; fixed: steps, keeps_steps; });
+stateful!(Eskf { state: at, state, factors, clones, way_sought, agreement, cable, unrest, loose_m, doubts; lists: knots; fixed: steps, keeps_steps; });
 
 impl Default for Eskf {
     /// Allocated buffers without an estimate.
@@ -110,6 +117,7 @@ impl Default for Eskf {
             agreement: Agreement::default(),
             cable: Cable::default(),
             unrest: Unrest::default(),
+            loose_m: 0.0,
             doubts: [0.0; ERRORS],
             steps: Vec::new(),
             keeps_steps: false,
@@ -145,7 +153,11 @@ impl Eskf {
         sources: &mut [Option<Source>],
     ) {
         let (mut nominal, leg) = self.propagate(to, context, window);
-        let leg = leg.with_unrest(self.unrest.factors());
+        let declared_m = context.settings.slack.reach;
+        let looseness = 1.0 + self.loose_m * self.loose_m / (declared_m * declared_m);
+        let [rate, force] = self.unrest.factors();
+        let leg = leg.with_unrest([rate, force, looseness]);
+        self.loose_m *= math::exp(-leg.dt_s() / TIGHTENS_OVER_S);
         let transition = leg.transition(&context.settings);
         transition.fade(&mut nominal);
         self.keep(to, &Move::Leg(leg), nominal);
@@ -202,6 +214,12 @@ impl Eskf {
             Use::Slipped(Slip { lost_m, doubted_m }) => {
                 add_variance(&mut self.doubts, CREEP, lost_m * lost_m);
                 add_variance(&mut self.doubts, POSITION, doubted_m * doubted_m);
+            }
+            Use::Loose(by_m) => {
+                self.loose_m = self.loose_m.max(by_m.min(LOOSEST_M));
+                add_variance(&mut self.doubts, SLACK, self.loose_m * self.loose_m);
+                add_variance(&mut self.doubts, POSITION, by_m * by_m);
+                agreement::seek_speed(&mut self.doubts);
             }
             Use::Unsteady => agreement::seek_speed(&mut self.doubts),
             Use::Seek(lacking_m) => {

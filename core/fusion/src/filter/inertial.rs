@@ -24,7 +24,7 @@ pub struct Felt {
 }
 
 /// Number of values of a leg.
-pub const LEG_NUMBERS: usize = 1 + 5 * 9 + 2 * 3 + 2 + 2 + 2;
+pub const LEG_NUMBERS: usize = 1 + 5 * 9 + 2 * 3 + 2 + 2 + 3;
 
 /// Propagation accumulated since the errors were last propagated.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -45,8 +45,8 @@ pub struct Leg {
     blind_s: [f64; 2],
     /// Way along the tunnel, m, and the cable's scale error on it: what creeps.
     creeping: [f64; 2],
-    /// Factors of the process noise of gyro and accelerometer biases.
-    unrest: [f64; 2],
+    /// Factors of the process noise of gyro biases, accelerometer biases and slack.
+    unrest: [f64; 3],
 }
 
 impl Default for Leg {
@@ -62,7 +62,7 @@ impl Default for Leg {
             tilting_twice: Matrix3::zeros(),
             blind_s: [0.0; 2],
             creeping: [0.0; 2],
-            unrest: [1.0; 2],
+            unrest: [1.0; 3],
         }
     }
 }
@@ -168,9 +168,9 @@ impl Leg {
         Some(leg)
     }
 
-    /// The same with these factors of the process noise of gyro and accelerometer biases.
+    /// The same with these factors of the process noise of gyro biases, accelerometer biases and slack.
     #[must_use]
-    pub fn with_unrest(self, unrest: [f64; 2]) -> Self {
+    pub fn with_unrest(self, unrest: [f64; 3]) -> Self {
         Self { unrest, ..self }
     }
 
@@ -231,11 +231,11 @@ impl Leg {
             let left = transition.left_of(i);
             Noise::of_one(i, wander.reach * wander.reach * (1.0 - left * left))
         };
-        let [rate_unrest, force_unrest] = self.unrest;
+        let [rate_unrest, force_unrest, slack_unrest] = self.unrest;
         let force = |k: usize| fading(FORCE_BIAS + k, settings.force_bias).scaled(force_unrest);
         let rate = |k: usize| fading(RATE_BIAS + k, settings.rate_bias).scaled(rate_unrest);
         let white = |i: usize, noise: f64| Noise::of_one(i, noise * noise * self.dt_s);
-        let [slack, slack_alone] = self.slack_noises(settings);
+        let [slack, slack_alone] = self.slack_noises(settings).map(|noise| noise.scaled(slack_unrest));
         [
             slack,
             slack_alone,
