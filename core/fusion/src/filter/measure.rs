@@ -59,13 +59,13 @@ impl ScalarUpdate {
         self
     }
 
-    /// The same update, without its dependence on the beam's inclination where the direction of that is uncertain: `sd_of`
-    /// gives the standard deviation of a weighted sum of errors.
+    /// The same update, without its dependence on the beam's inclination where that isn't to be used or its direction is
+    /// uncertain: `sd_of` gives the standard deviation of a weighted sum of errors.
     #[must_use]
-    pub fn unless_sure(mut self, sd_of: impl Fn(&Errors) -> f64) -> Self {
+    pub fn unless_sure(mut self, is_used: bool, sd_of: impl Fn(&Errors) -> f64) -> Self {
         let Some(lean) = self.lean else { return self };
         let sd = sd_of(&lean.by);
-        if lean.along.abs() < SURE * sd {
+        if !is_used || lean.along.abs() < SURE * sd {
             for (h, by) in self.h.iter_mut().zip(&lean.by) {
                 *h -= lean.slope_m * lean.along * by;
             }

@@ -259,7 +259,7 @@ fn a_jump_that_a_vehicle_could_make_is_got_over() {
             Reading::AngularRate(rate) if is_rate => Reading::AngularRate(*rate + Vec3::new(by, by, by)),
             other => *other,
         });
-        recovers(&rig, &events, FAULT_S + for_s + 60.0);
+        recovers(&rig, &events, FAULT_S + for_s + 75.0);
     }
 }
 
