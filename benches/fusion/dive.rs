@@ -56,7 +56,7 @@ impl Dive {
         let [y_m, z_m] = profile.reference();
         let state = State::at_rest(Point3::new(10.0, y_m, z_m), Rot::identity());
         let site = Site::default();
-        let mut sources = [None; MAX_SOURCES];
+        let mut sources = vec![None; MAX_SOURCES];
         let mut readings = [(IMU, Reading::Attitude(Rot::identity())); SOUNDERS + 3];
         for (number, (yaw_rad, pitch_rad)) in YAWS_AND_PITCHES.into_iter().enumerate() {
             let rotation = Rot::from_roll_pitch_yaw(0.0, pitch_rad, yaw_rad);
