@@ -312,7 +312,7 @@ impl Eskf {
         (known, errors): (&Errors, &mut Errors),
     ) {
         let mut row =
-            row.unless_sure(source.noise_level.is_white(), |by| math::sqrt(self.factors.variance_along(by)));
+            row.unless_sure(source.noise_level.is_usual(), |by| math::sqrt(self.factors.variance_along(by)));
         row.noise += self.left_out(row.bends);
         let kind = source.sensor.kind;
         if settings.learns {
@@ -324,7 +324,6 @@ impl Eskf {
         let variance = of_estimate + row.noise;
         let nis = innovation * innovation / variance;
         let mut agrees = nis <= settings.gate;
-        source.noise_level.lean(innovation / math::sqrt(variance));
         source.consistency.count(nis, settings.gate, variance, settings.usual_variance(kind));
         let part = |from: usize| [0, 1, 2].map(|k| along.get(from + k).copied().unwrap_or(0.0));
         self.unrest.note(

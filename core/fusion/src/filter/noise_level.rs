@@ -15,11 +15,8 @@ const MOST: f64 = 9.0;
 /// Measurements of which the mean is taken, and the fewest that say anything.
 const MEMORY: u32 = 200;
 const FEW: u32 = 30;
-/// Weight of an innovation in the mean of the last few, the largest that counts, and the mean, three of its own standard
-/// deviations, from which they lean to one side; all in standard deviations.
-const LEANING_SHARE: f64 = 0.125;
-const MOST_SDS: f64 = 3.0;
-const LEANING: f64 = 0.8;
+/// Mean normalised square from which innovations are larger than noise explains.
+const UNUSUAL: f64 = 1.8;
 
 /// See the module's description.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -31,13 +28,11 @@ pub struct NoiseLevel {
     /// Running mean of the normalised squares of all innovations, and how many it has seen.
     nis: f64,
     seen: u32,
-    /// Running mean of the last few normalised innovations.
-    leaning: f64,
 }
 
 impl Default for NoiseLevel {
     fn default() -> Self {
-        Self { last: [None; 3], factor: 1.0, nis: 0.0, seen: 0, leaning: 0.0 }
+        Self { last: [None; 3], factor: 1.0, nis: 0.0, seen: 0 }
     }
 }
 
@@ -77,14 +72,9 @@ impl NoiseLevel {
         nis / usual
     }
 
-    /// Notes a normalised innovation, used or not.
-    pub fn lean(&mut self, innovation: f64) {
-        self.leaning += (innovation.clamp(-MOST_SDS, MOST_SDS) - self.leaning) * LEANING_SHARE;
-    }
-
-    /// Whether the last innovations were on either side. Of ranges they aren't where the wall isn't as designed.
-    pub fn is_white(&self) -> bool {
-        self.leaning.abs() < LEANING
+    /// Whether innovations are about as large as they should be. Of ranges they are larger where the wall isn't as designed.
+    pub fn is_usual(&self) -> bool {
+        self.nis < UNUSUAL
     }
 
     /// Notes that a measurement of this scalar wasn't used: the next difference would span it.

@@ -77,9 +77,6 @@ impl Unrest {
 
     /// Factors of the process noise of gyro and accelerometer biases, at least 1.
     pub fn factors(&self) -> [f64; 2] {
-        if std::env::var("NOU").is_ok() {
-            return [1.0; 2];
-        }
         self.0.map(|ratio| ratio.factor)
     }
 }
