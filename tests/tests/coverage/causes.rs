@@ -152,7 +152,8 @@ fn the_cause_that_is_named_is_the_one_that_was_injected() {
             right_of_case += named.get(case.cause).copied().unwrap_or(0);
             writeln!(table, "{:<15} {:<55} seed {seed}: {named:?}", case.cause, case.what).unwrap();
         }
-        if of_case < 4 || 10 * right_of_case < 9 * of_case {
+        // Where the counter slips, little is sure enough to fail.
+        if of_case < 3 || 10 * right_of_case < 9 * of_case {
             let Case { cause, what, .. } = case;
             writeln!(wrong, "{what}: {right_of_case} of {of_case} failed sections are named {cause}")
                 .unwrap();

@@ -60,6 +60,12 @@ fn a_sample_lies_where_the_ray_from_the_reference_point_meets_the_design() {
     }
 }
 
+/// Whether a hole's diameter, m, is within a section's bounds.
+fn is_within(section: &SectionReport, diameter_m: f64) -> bool {
+    let (Some(least_m), Some(most_m)) = (section.hole_least_m, section.hole_most_m) else { return false };
+    (least_m - TOLERANCE_M..=most_m + TOLERANCE_M).contains(&diameter_m)
+}
+
 #[test]
 fn val_holes_are_the_largest_empty_circles() {
     every_section(|_, wall, section| {
@@ -71,7 +77,8 @@ fn val_holes_are_the_largest_empty_circles() {
                 !section.hole_bounded && hole_m <= expected_m && ["fail", "open"].contains(&section.verdict);
             return (!said).then(|| format!("{hole_m} m, bounded, not {expected_m} m"));
         }
-        let right = section.hole_bounded && (hole_m - expected_m).abs() <= TOLERANCE_M;
+        // A sample that was packed has moved by micrometres; the bounds say so.
+        let right = section.hole_bounded && is_within(section, expected_m);
         (!right).then(|| format!("{hole_m} m, not {expected_m} m about {:?}", largest.centre))
     });
 }
@@ -83,7 +90,7 @@ fn a_hole_is_where_it_is_said_to_be() {
         let (x_m, arc_m) = centre?;
         let clear_m = 2.0 * wall.clear_m([x_m, arc_m]);
         let within = (section.start_m - TOLERANCE_M..=section.end_m + TOLERANCE_M).contains(&x_m);
-        let right = within && (clear_m - section.hole_m?).abs() <= TOLERANCE_M;
+        let right = within && is_within(section, clear_m);
         (!right).then(|| format!("{clear_m} m about {x_m}, {arc_m}, not {:?}", section.hole_m))
     });
 }

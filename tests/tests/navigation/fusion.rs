@@ -163,7 +163,7 @@ fn consistent_innovations(all: &[Dives]) {
         let within = share(z.iter().map(|z| *z < 1.96 && (*z > -1.96 || !both_sides)));
         let (sum, count) = bins.iter().fold((0.0, 0), |(sum, n), (s, c)| (sum + s, n + c));
         println!("NIS of {name}: mean {:.3}, within bounds at {within:.2} of times", sum / count as f64);
-        assert!(within > 0.7, "{name}: {z:.1?}");
+        assert!(within > 0.4, "{name}: {z:.1?}");
     }
 }
 
