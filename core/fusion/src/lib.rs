@@ -31,6 +31,7 @@ pub mod relative;
 pub mod section;
 pub mod smooth;
 
+use self::filter::cable::CableDoubt;
 use self::filter::eskf::PoseSd;
 use self::filter::sources::Consistency;
 use headrace_geometry::time::MonoNs;
@@ -58,6 +59,12 @@ pub trait Navigation: Stateful + Send + Sync {
 
     /// Standard deviations of the estimate; `None` where they aren't known.
     fn pose_sd(&self) -> Option<PoseSd> {
+        None
+    }
+
+    /// Whether the cable's counter isn't believed, once that has lasted for a second; `None` while it is, and where it isn't
+    /// judged.
+    fn cable_doubt(&self) -> Option<CableDoubt> {
         None
     }
 

@@ -12,17 +12,20 @@ pub enum AlertKind {
     OutsideTunnel,
     /// Most samples of a section deviate from the design profile by more than the contradiction limit.
     ProfileContradicted,
+    /// The cable's counter sticks, slips or runs free: its readings aren't used.
+    CableDoubted,
 }
 
 impl AlertKind {
     /// All of them.
-    pub const ALL: [Self; 2] = [Self::OutsideTunnel, Self::ProfileContradicted];
+    pub const ALL: [Self; 3] = [Self::OutsideTunnel, Self::ProfileContradicted, Self::CableDoubted];
 
     /// The word used in reports and logs.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::OutsideTunnel => "outside_tunnel",
             Self::ProfileContradicted => "profile_contradicted",
+            Self::CableDoubted => "cable_doubted",
         }
     }
 }
@@ -34,11 +37,15 @@ pub struct Alert {
     pub kind: AlertKind,
     /// Time of its first occurrence.
     pub since: MonoNs,
-    /// Occurrences: samples outside, or judgements of sections that contradict the profile.
+    /// Time at which its latest occurrence began.
+    pub latest: MonoNs,
+    /// Occurrences: samples outside, judgements of sections that contradict the profile, or times that the cable's counter
+    /// wasn't believed.
     pub count: u64,
     /// Chainage of its first occurrence, m.
     pub x_m: f64,
-    /// Largest deviation, m: beyond the end, or a section's mean from the design profile.
+    /// Largest deviation, m: beyond the end, or a section's mean from the design profile. Of the cable's counter, the longest
+    /// way on which it wasn't believed.
     pub worst_m: f64,
 }
 
@@ -51,12 +58,24 @@ impl Alerts {
     pub fn note(&mut self, kind: AlertKind, at: MonoNs, x_m: f64, off_m: f64) -> bool {
         let Some(slot) = self.0.get_mut(kind as usize) else { return false };
         let is_first = slot.is_none();
-        let alert = slot.get_or_insert(Alert { kind, since: at, count: 0, x_m, worst_m: off_m });
+        let alert = slot.get_or_insert(Alert { kind, since: at, latest: at, count: 0, x_m, worst_m: off_m });
         alert.count += 1;
+        alert.latest = at;
         if off_m.abs() > alert.worst_m.abs() {
             alert.worst_m = off_m;
         }
         is_first
+    }
+
+    /// Records an occurrence that lasts and began at `since`, and is counted once; true when the first one is recorded first.
+    pub fn note_lasting(&mut self, kind: AlertKind, since: MonoNs, x_m: f64, off_m: f64) -> bool {
+        match self.0.get_mut(kind as usize) {
+            Some(Some(alert)) if alert.latest == since => {
+                alert.worst_m = alert.worst_m.max(off_m);
+                false
+            }
+            _ => self.note(kind, since, x_m, off_m),
+        }
     }
 
     /// The alert of a kind.

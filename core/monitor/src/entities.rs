@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 pub use super::head_motion::MeasuredMotion;
 use headrace_coverage::HeadReach;
+use headrace_fusion::filter::cable::CableDoubt;
 use headrace_fusion::filter::eskf::PoseSd;
 use headrace_fusion::{Fix, Navigation, NoFix};
 use headrace_geometry::frames::{Point3, Tunnel};
@@ -50,11 +51,13 @@ pub struct VehicleState {
     pub fix: Result<Fix, NoFix>,
     /// Standard deviations of the pose, from its covariance; `None` if the navigation method provides none.
     pub sd: Option<PoseSd>,
+    /// The cable's counter while it isn't believed.
+    pub cable_doubt: Option<CableDoubt>,
 }
 
 impl Default for VehicleState {
     fn default() -> Self {
-        Self { at: None, fix: Err(NoFix::Heading), sd: None }
+        Self { at: None, fix: Err(NoFix::Heading), sd: None, cable_doubt: None }
     }
 }
 

@@ -8,6 +8,7 @@ use bevy_ecs::prelude::Resource;
 use super::advice_log::AdviceEntry;
 use super::alerts::AlertKind;
 use headrace_coverage::{Judgement, Loss, Reach, Request, RunChange, RunId};
+use headrace_fusion::filter::cable::CableDoubt;
 use headrace_fusion::{Fix, NoFix};
 use headrace_geometry::frames::{Point3, Tunnel};
 use headrace_geometry::time::MonoNs;
@@ -47,6 +48,8 @@ pub enum Positioned {
         at: MonoNs,
         /// Fix at the beat, or the reason there is none.
         fix: Result<Fix, NoFix>,
+        /// The cable's counter while it isn't believed.
+        cable_doubt: Option<CableDoubt>,
     },
 }
 
@@ -108,8 +111,8 @@ pub struct PlacedPing {
 pub enum Placed {
     /// A ping.
     Ping(PlacedPing),
-    /// The situation at a beat.
-    Situation(MonoNs, Situation),
+    /// The situation at a beat, and the cable's counter while it isn't believed.
+    Situation(MonoNs, Situation, Option<CableDoubt>),
 }
 
 /// Pings and situations of this tick, in order.

@@ -151,6 +151,9 @@ pub fn alert_text(kind: AlertKind, x_m: f64, off_m: f64) -> String {
         AlertKind::ProfileContradicted => format!(
             "ch {x}  the wall is {off_m:+.2} m off the design profile: wrong profile or position; nothing passes"
         ),
+        AlertKind::CableDoubted => format!(
+            "ch {x}  the cable's counter sticks or slips: position by the inertial unit alone; sections there wait"
+        ),
     }
 }
 

@@ -35,6 +35,17 @@ const ALIVE_M: f64 = 0.1;
 /// Share of the way made in doubt that may be the inertial unit's fault, as a standard deviation.
 const DOUBTED_SHARE: f64 = 0.5;
 
+/// A counter in doubt.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct CableDoubt {
+    /// When its readings left what was expected.
+    pub since: MonoNs,
+    /// Chainage expected then, m.
+    pub from_m: f64,
+    /// Way since, the longer by the counter and by the estimate, m.
+    pub way_m: f64,
+}
+
 /// A reading against the estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Reading {
@@ -96,12 +107,16 @@ struct Doubt {
     agreeing_from: Option<MonoNs>,
     /// What it showed when inertial data could no longer judge it, m.
     blind_from_m: Option<f64>,
+    /// The longest way since it was doubted, m.
+    longest_m: f64,
 }
 
 impl Cable {
-    /// When the readings left what was expected, once that has lasted.
-    pub fn doubted_since(&self, now: MonoNs) -> Option<MonoNs> {
-        self.doubt.map(|doubt| doubt.first.at).filter(|since| now.since(*since).0 >= NOTICED_AFTER.0)
+    /// The doubt, once it has lasted.
+    pub fn doubt(&self, now: MonoNs) -> Option<CableDoubt> {
+        let Doubt { first, longest_m, .. } = self.doubt?;
+        let has_lasted = now.since(first.at).0 >= NOTICED_AFTER.0;
+        has_lasted.then(|| CableDoubt { since: first.at, from_m: first.expected_m(), way_m: longest_m })
     }
 
     /// Takes a reading.
@@ -121,15 +136,22 @@ impl Cable {
         let first = *self.left.get_or_insert(*reading);
         let is_long = reading.at.since(first.at).0 >= DOUBTED_AFTER.0;
         if is_long && reading.off_m.abs() > DOUBTED_SDS * reading.sd_m {
-            let doubt = Doubt { first, same_from: *reading, agreeing_from: None, blind_from_m: None };
-            self.doubt = Some(doubt);
+            self.doubt = Some(Doubt::between(first, reading));
         }
         Use::Withhold
     }
 }
 
 impl Doubt {
+    /// From the first reading beyond the gate to this one.
+    fn between(first: Reading, reading: &Reading) -> Self {
+        let doubt =
+            Self { first, same_from: *reading, agreeing_from: None, blind_from_m: None, longest_m: 0.0 };
+        Self { longest_m: doubt.way_m(reading), ..doubt }
+    }
+
     fn take(&mut self, reading: &Reading) -> Use {
+        self.longest_m = self.longest_m.max(self.way_m(reading));
         let for_at_least = |since: MonoNs, time: DurNs| reading.at.since(since).0 >= time.0;
         if reading.sd_m > BLIND_M {
             let from_m = *self.blind_from_m.get_or_insert(reading.shown_m);

@@ -23,6 +23,7 @@ pub mod zupt;
 mod tests;
 
 use self::align::{LISTENS, Listening};
+use self::cable::CableDoubt;
 use self::eskf::{Context, Eskf, PoseSd};
 use self::settings::Settings;
 use self::sources::{Consistency, Source};
@@ -125,7 +126,7 @@ impl FilterNavigation {
 
     /// When the cable's readings left what was expected, once that has lasted for a second; `None` while they are believed.
     pub fn cable_doubted_since(&self) -> Option<MonoNs> {
-        self.running().and_then(|running| running.cable.doubted_since(running.at))
+        self.cable_doubt().map(|doubt| doubt.since)
     }
 
     /// Number of restarts of the estimate.
@@ -382,6 +383,10 @@ impl Navigation for FilterNavigation {
 
     fn pose_sd(&self) -> Option<PoseSd> {
         self.running().map(Eskf::pose_sd)
+    }
+
+    fn cable_doubt(&self) -> Option<CableDoubt> {
+        self.running().and_then(|running| running.cable.doubt(running.at))
     }
 
     fn fix(&self, at: MonoNs) -> Result<Fix, NoFix> {

@@ -195,15 +195,16 @@ pub struct OpeningReport {
 /// An alert about the dive as a whole.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AlertReport {
-    /// `outside_tunnel` or `profile_contradicted`.
+    /// `outside_tunnel`, `profile_contradicted` or `cable_doubted`.
     pub kind: &'static str,
     /// Time of its first occurrence, seconds on the log's clock.
     pub since_s: f64,
-    /// Occurrences: samples, or judgements of sections.
+    /// Occurrences: samples, judgements of sections, or times that the cable's counter wasn't believed.
     pub count: u64,
     /// Chainage of its first occurrence, m.
     pub x_m: f64,
-    /// Largest deviation, m: beyond the end of the tunnel, or a section's mean from the design profile.
+    /// Largest deviation, m: beyond the end of the tunnel, or a section's mean from the design profile. Of the cable's counter,
+    /// the longest way on which it wasn't believed.
     pub worst_m: f64,
 }
 

@@ -26,9 +26,10 @@ pub(super) fn navigate(
         // Time may stall or go back; each beat is emitted once. After a gap only the last beat is.
         if let Some(at) = beat_before(&mut navigator.next_beat, event.received) {
             let fix = navigator.navigation.fix(at);
-            *state = VehicleState { at: Some(at), fix, sd: navigator.navigation.pose_sd() };
+            let cable_doubt = navigator.navigation.cable_doubt();
+            *state = VehicleState { at: Some(at), fix, sd: navigator.navigation.pose_sd(), cable_doubt };
             digest(&mut digests.poses, at, &state);
-            list.0.push(Positioned::Beat { at, fix });
+            list.0.push(Positioned::Beat { at, fix, cable_doubt });
         }
         if matches!(event.reading, Reading::Sonar(_)) {
             let fix = navigator.navigation.fix(event.valid_at);
