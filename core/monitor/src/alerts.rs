@@ -3,6 +3,7 @@
 use bevy_ecs::prelude::Resource;
 use serde::{Deserialize, Serialize};
 
+use headrace_fusion::filter::suspicion::SettingDoubt;
 use headrace_geometry::time::MonoNs;
 
 /// Kind of alert.
@@ -14,11 +15,14 @@ pub enum AlertKind {
     ProfileContradicted,
     /// The cable's counter sticks, slips or runs free: its readings aren't used.
     CableDoubted,
+    /// Ranges contradict a setting of the vehicle file.
+    SettingDoubted,
 }
 
 impl AlertKind {
     /// All of them.
-    pub const ALL: [Self; 3] = [Self::OutsideTunnel, Self::ProfileContradicted, Self::CableDoubted];
+    pub const ALL: [Self; 4] =
+        [Self::OutsideTunnel, Self::ProfileContradicted, Self::CableDoubted, Self::SettingDoubted];
 
     /// The word used in reports and logs.
     pub fn as_str(self) -> &'static str {
@@ -26,6 +30,7 @@ impl AlertKind {
             Self::OutsideTunnel => "outside_tunnel",
             Self::ProfileContradicted => "profile_contradicted",
             Self::CableDoubted => "cable_doubted",
+            Self::SettingDoubted => "setting_doubted",
         }
     }
 }
@@ -47,6 +52,8 @@ pub struct Alert {
     /// Largest deviation, m: beyond the end, or a section's mean from the design profile. Of the cable's counter, the longest
     /// way on which it wasn't believed.
     pub worst_m: f64,
+    /// The setting in doubt, as last judged.
+    pub setting: Option<SettingDoubt>,
 }
 
 /// All alerts.
@@ -58,7 +65,15 @@ impl Alerts {
     pub fn note(&mut self, kind: AlertKind, at: MonoNs, x_m: f64, off_m: f64) -> bool {
         let Some(slot) = self.0.get_mut(kind as usize) else { return false };
         let is_first = slot.is_none();
-        let alert = slot.get_or_insert(Alert { kind, since: at, latest: at, count: 0, x_m, worst_m: off_m });
+        let alert = slot.get_or_insert(Alert {
+            kind,
+            since: at,
+            latest: at,
+            count: 0,
+            x_m,
+            worst_m: off_m,
+            setting: None,
+        });
         alert.count += 1;
         alert.latest = at;
         if off_m.abs() > alert.worst_m.abs() {
@@ -76,6 +91,20 @@ impl Alerts {
             }
             _ => self.note(kind, since, x_m, off_m),
         }
+    }
+
+    /// Records a setting in doubt, found at a chainage, m; counted where another one becomes the likeliest, and true then.
+    pub fn note_setting(&mut self, at: MonoNs, x_m: f64, doubt: &SettingDoubt) -> bool {
+        let kind = AlertKind::SettingDoubted;
+        let is_new =
+            self.get(kind).is_none_or(|alert| alert.setting.is_none_or(|known| !known.is_of_same(doubt)));
+        if is_new {
+            self.note(kind, at, x_m, 0.0);
+        }
+        if let Some(Some(alert)) = self.0.get_mut(kind as usize) {
+            alert.setting = Some(*doubt);
+        }
+        is_new
     }
 
     /// The alert of a kind.

@@ -13,5 +13,6 @@ mod flags;
 mod memory;
 mod metamorphic;
 mod oracle;
+mod settings;
 mod truth;
 mod way;

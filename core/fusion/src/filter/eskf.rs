@@ -13,6 +13,7 @@ use super::sources::Source;
 use super::state::{
     ATTITUDE, CREEP, ERRORS, Errors, FORCE_BIAS, POSITION, RATE_BIAS, State, VELOCITY, add_variance, put, vec,
 };
+use super::suspicion::Suspicions;
 use super::unrest::Unrest;
 use super::window::{Waiting, Window};
 use crate::NoFix;
@@ -88,6 +89,8 @@ pub struct Eskf {
     /// Whether the cable counter is believed.
     pub cable: Cable,
     unrest: Unrest,
+    /// Settings that the ranges contradict.
+    pub suspicions: Suspicions,
     /// Variances to add at the end of the epoch.
     doubts: Errors,
     /// Steps of the last epoch, for smoothing; empty unless they are kept.
@@ -95,7 +98,7 @@ pub struct Eskf {
     keeps_steps: bool,
 }
 
-stateful!(Eskf { state: at, state, factors, clones, way_sought, agreement, cable, unrest, doubts; lists: knots; fixed: steps, keeps_steps; });
+stateful!(Eskf { state: at, state, factors, clones, way_sought, agreement, cable, unrest, suspicions, doubts; lists: knots; fixed: steps, keeps_steps; });
 
 impl Default for Eskf {
     /// Allocated buffers without an estimate.
@@ -110,6 +113,7 @@ impl Default for Eskf {
             agreement: Agreement::default(),
             cable: Cable::default(),
             unrest: Unrest::default(),
+            suspicions: Suspicions::default(),
             doubts: [0.0; ERRORS],
             steps: Vec::new(),
             keeps_steps: false,
@@ -154,12 +158,13 @@ impl Eskf {
         self.clones.carry(&transition);
         let mut errors = [0.0; ERRORS];
         while let Some(waiting) = window.pop(to) {
-            let Some(Some(source)) = sources.get_mut(waiting.source) else { continue };
             // Each reading is compared with the best estimate so far: after a silence the first ones move it far.
             let known = errors;
             let later_s = to.since(waiting.at).as_secs_f64();
             let mut then = self.state_at(waiting.at);
             then.correct(&earlier(&known, later_s));
+            self.suspicions.hear(&then, context, sources, &waiting);
+            let Some(Some(source)) = sources.get_mut(waiting.source) else { continue };
             for (number, row) in rows(&then, context, source, &waiting, window).into_iter().enumerate() {
                 let again = |state: &State| {
                     rows(state, context, source, &waiting, window).get(number).copied().flatten()

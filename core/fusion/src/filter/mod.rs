@@ -15,6 +15,7 @@ pub mod noise_level;
 pub mod settings;
 pub mod sources;
 pub mod state;
+pub mod suspicion;
 pub mod unrest;
 pub mod window;
 pub mod zupt;
@@ -28,6 +29,7 @@ use self::eskf::{Context, Eskf, PoseSd};
 use self::settings::Settings;
 use self::sources::{Consistency, Source};
 use self::state::{State, rotation};
+use self::suspicion::SettingDoubt;
 use self::window::{Waiting, Window};
 use self::zupt::Stillness;
 use super::relative::Relative;
@@ -383,6 +385,10 @@ impl Navigation for FilterNavigation {
 
     fn pose_sd(&self) -> Option<PoseSd> {
         self.running().map(Eskf::pose_sd)
+    }
+
+    fn setting_doubt(&self) -> Option<SettingDoubt> {
+        self.running.suspicions.doubt()
     }
 
     fn cable_doubt(&self) -> Option<CableDoubt> {

@@ -8,6 +8,7 @@ use super::run::Loop;
 use super::what_if::WhatIfReport;
 use headrace_coverage::openings::Opening;
 use headrace_coverage::{Section, Spread, Verdict};
+use headrace_fusion::filter::suspicion::{Setting, SettingDoubt};
 use headrace_geometry::time::MonoNs;
 
 mod advice;
@@ -195,7 +196,7 @@ pub struct OpeningReport {
 /// An alert about the dive as a whole.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AlertReport {
-    /// `outside_tunnel`, `profile_contradicted` or `cable_doubted`.
+    /// `outside_tunnel`, `profile_contradicted`, `cable_doubted` or `setting_doubted`.
     pub kind: &'static str,
     /// Time of its first occurrence, seconds on the log's clock.
     pub since_s: f64,
@@ -204,8 +205,27 @@ pub struct AlertReport {
     /// Chainage of its first occurrence, m.
     pub x_m: f64,
     /// Largest deviation, m: beyond the end of the tunnel, or a section's mean from the design profile. Of the cable's counter,
-    /// the longest way on which it wasn't believed.
+    /// the longest way on which it wasn't believed. Of a setting, 0.
     pub worst_m: f64,
+    /// The setting in doubt; `None` for other alerts.
+    pub setting: Option<SettingReport>,
+}
+
+/// A setting that ranges contradict.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SettingReport {
+    /// `range_scale`, `head_turned`, `wrong_way_round` or `swapped`.
+    pub what: &'static str,
+    /// Name of the source; `None` where it is no single one's.
+    pub source: Option<String>,
+    /// Name of the source that it is swapped with.
+    pub other: Option<String>,
+    /// Share by which ranges are too long; `None` for other settings.
+    pub share: Option<f64>,
+    /// Angle by which the head is turned about its axis, degrees; `None` for other settings.
+    pub angle_deg: Option<f64>,
+    /// Standard deviations from right.
+    pub sure_sd: f64,
 }
 
 impl Report {
@@ -234,7 +254,7 @@ impl Report {
             survey: survey::survey(coverage, &dive.mission().profile),
             what_if: Vec::new(),
             openings: dive.mission().coverage.openings.iter().map(opening_report).collect(),
-            alerts: dive.alerts().iter().map(alert_report).collect(),
+            alerts: dive.alerts().iter().map(|alert| alert_report(alert, dive)).collect(),
             advice: log.entries.iter().map(advice::advice_report).collect(),
             advice_dropped: log.dropped,
             sources: sources::source_reports(dive),
@@ -330,12 +350,28 @@ fn opening_report(opening: &Opening) -> OpeningReport {
     }
 }
 
-fn alert_report(alert: &Alert) -> AlertReport {
+fn setting_report(doubt: &SettingDoubt, dive: &Loop) -> SettingReport {
+    let name = |source: u16| {
+        dive.sources().get(usize::from(source)).map_or_else(String::new, |info| info.id.clone())
+    };
+    let SettingDoubt { setting, source, sure_sd } = *doubt;
+    SettingReport {
+        what: setting.as_str(),
+        source: source.map(name),
+        other: setting.other().map(name),
+        share: matches!(setting, Setting::RangeScale(_)).then_some(setting.figure()),
+        angle_deg: matches!(setting, Setting::HeadTurned(_)).then_some(setting.figure().to_degrees()),
+        sure_sd,
+    }
+}
+
+fn alert_report(alert: &Alert, dive: &Loop) -> AlertReport {
     AlertReport {
         kind: alert.kind.as_str(),
         since_s: alert.since.as_secs_f64(),
         count: alert.count,
         x_m: alert.x_m,
         worst_m: alert.worst_m,
+        setting: alert.setting.as_ref().map(|doubt| setting_report(doubt, dive)),
     }
 }

@@ -5,6 +5,7 @@
 use bevy_ecs::prelude::{Res, ResMut, Single};
 
 use super::advise::Advisor;
+use super::doubt;
 use super::driving::{Driven, Driving};
 use super::judge::{Results, digest_alert, judge_one};
 use super::way::{Heads, note_beat};
@@ -14,7 +15,6 @@ use crate::messages::{Notice, Notices, Outcome, Placed, PlacedList, PlacedPing, 
 use crate::resources::{Coverage, Digests, Finder, Tally, TunnelDesign, VehicleEntities};
 use headrace_coverage::hole::FARTHEST_M;
 use headrace_coverage::{HeadReach, Loss, Outlook, PassError, StoreError, WallSample};
-use headrace_fusion::filter::cable::CableDoubt;
 use headrace_geometry::frames::{Point3, Tunnel, Vec3};
 use headrace_geometry::math;
 use headrace_geometry::time::DurNs;
@@ -42,13 +42,8 @@ pub(super) fn cover(
     notices.0.clear();
     for item in &placed.0 {
         match item {
-            Placed::Situation(at, situation, cable_doubt) => {
-                if let Some(CableDoubt { since, from_m, way_m }) = *cable_doubt
-                    && alerts.note_lasting(AlertKind::CableDoubted, since, from_m, way_m)
-                {
-                    notices.0.push(Notice::Alert(AlertKind::CableDoubted));
-                    digest_alert(&mut digests, AlertKind::CableDoubted, *at, (from_m, way_m));
-                }
+            Placed::Situation(at, situation, doubts) => {
+                doubt::note(*at, situation, doubts, (&mut alerts, &mut notices, &mut digests));
                 driving.note(*at, situation, &tunnel.profile, &advisor.advisor);
                 note_beat(&mut coverage, &mut heads, &tunnel, (*at, situation), &mut requests);
                 if at.0 % LOOK_AROUND.0.unsigned_abs() == 0 {

@@ -1,0 +1,524 @@
+//! Settings that the ranges contradict: one parameter each, fitted to what ranges lack of the design.
+//!
+//! By blocks of way: within a block the vehicle's place and roll may be off by what explains the ranges best; what is left is
+//! fitted. Blocks are as independent as the wall lets them be, and their scatter says how sure a figure is. Derivation:
+//! `docs/fusion.md`, "Settings in doubt".
+
+use serde::{Deserialize, Serialize};
+
+use super::eskf::{Context, with_quantum};
+use super::measure::{self, Beam, ScalarUpdate};
+use super::sources::Source;
+use super::state::{ATTITUDE, POSITION, State, vec};
+use super::window::Waiting;
+use headrace_geometry::frames::{Sensor, Tunnel, Vec3, head_direction};
+use headrace_geometry::math;
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_sensor::device::{SensorInfo, SensorKind};
+use headrace_sensor::reading::Reading;
+use headrace_snapshot::stateful;
+
+/// Shortest block, in time and in way; one in which the vehicle hardly moves is given up after the longest time.
+const BLOCK: DurNs = DurNs(20_000_000_000);
+const BLOCK_M: f64 = 3.0;
+const LONGEST: DurNs = DurNs(120_000_000_000);
+/// Fewest blocks and readings of a block.
+const FEWEST_BLOCKS: u32 = 8;
+const FEWEST_READINGS: u32 = 100;
+/// Standard deviations from which a figure is certain.
+const SURE: f64 = 6.0;
+/// Least figures that are told: a share of the range, and an angle.
+const LEAST_SCALE: f64 = 0.015;
+const LEAST_ROLL_RAD: f64 = 0.015;
+/// Residual from which a range weighs less, and beyond which it doesn't count, m.
+const FAR_M: f64 = 0.3;
+const BEYOND_M: f64 = 1.5;
+/// Standard deviations of place and roll within a block, m and radians.
+const PLACE_SD_M: f64 = 0.3;
+const ROLL_SD_RAD: f64 = 0.005;
+/// Sources with ranges that are followed, and alternatives of theirs.
+const FOLLOWED: usize = 12;
+const ALTERNATIVES: usize = FOLLOWED * FOLLOWED;
+/// One reading in so many is compared with its alternatives: each costs a ray.
+const COMPARED: u32 = 4;
+/// Mean square by which a source must miss, m^2, and the share of it that an alternative may leave.
+const MISSES_M2: f64 = 0.01;
+const LEAVES: f64 = 0.4;
+
+/// A setting that is likely wrong.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub enum Setting {
+    /// Ranges are too long by this share: the speed of sound is set too high, or the wall is that much narrower.
+    RangeScale(f64),
+    /// A head is turned about its axis from how it is said to sit, radians: to be added to its roll.
+    HeadTurned(f64),
+    /// A source looks the other way.
+    WrongWayRound,
+    /// Two sources are swapped: the other's number.
+    Swapped(u16),
+}
+
+/// A setting in doubt.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct SettingDoubt {
+    /// What is likely wrong.
+    pub setting: Setting,
+    /// Number of the source, for what is one source's.
+    pub source: Option<u16>,
+    /// Standard deviations from right.
+    pub sure_sd: f64,
+}
+
+impl Setting {
+    /// The word used in reports and logs.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::RangeScale(_) => "range_scale",
+            Self::HeadTurned(_) => "head_turned",
+            Self::WrongWayRound => "wrong_way_round",
+            Self::Swapped(_) => "swapped",
+        }
+    }
+
+    /// The share or the angle, radians; 0 where there is none.
+    pub fn figure(self) -> f64 {
+        match self {
+            Self::RangeScale(figure) | Self::HeadTurned(figure) => figure,
+            Self::WrongWayRound | Self::Swapped(_) => 0.0,
+        }
+    }
+
+    /// The other source, of two that are swapped.
+    pub fn other(self) -> Option<u16> {
+        match self {
+            Self::Swapped(other) => Some(other),
+            _ => None,
+        }
+    }
+}
+
+impl SettingDoubt {
+    /// Whether it is of the same setting, whatever the figure.
+    pub fn is_of_same(&self, other: &Self) -> bool {
+        self.source == other.source
+            && self.setting.as_str() == other.setting.as_str()
+            && self.setting.other() == other.setting.other()
+    }
+}
+
+/// A reading's range against the design.
+struct Look {
+    beam: Beam,
+    range_m: f64,
+    sd_m: f64,
+}
+
+/// Sums of one parameter within a block, beside those of place and roll.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+struct Line {
+    /// By place across and up, and by roll.
+    by_pose: [f64; 3],
+    squares: f64,
+    residuals: f64,
+}
+
+/// Sums of a block.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+struct Block {
+    begun: Option<(MonoNs, f64)>,
+    readings: u32,
+    /// Information on place and roll, lower triangle by rows, and its right side.
+    pose: [[f64; 3]; 3],
+    residuals: [f64; 3],
+    scale: Line,
+    turned: [Line; FOLLOWED],
+}
+
+/// Sums of one parameter over blocks, freed of place and roll.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+struct Fit {
+    blocks: u32,
+    weight: f64,
+    value: f64,
+    weights_2: f64,
+    both: f64,
+    values_2: f64,
+}
+
+/// How a source's ranges fit where it sits, and where another does; itself the other way round, if that is the same.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+struct Alternative {
+    source: u16,
+    other: u16,
+    /// Of the block, and of all blocks before: squares missed, those missed by the alternative, readings.
+    block: [f64; 3],
+    all: [f64; 3],
+    blocks: u32,
+    gains: f64,
+    gains_2: f64,
+}
+
+/// See the module's description.
+#[derive(Debug, Clone)]
+pub struct Suspicions {
+    block: Block,
+    followed: [Option<u16>; FOLLOWED],
+    scale: Fit,
+    turned: [Fit; FOLLOWED],
+    alternatives: Vec<Alternative>,
+    heard: u32,
+    doubt: Option<SettingDoubt>,
+}
+
+stateful!(Suspicions { state: block, followed, scale, turned, heard, doubt; lists: alternatives; });
+
+impl Default for Suspicions {
+    /// Allocated without readings.
+    fn default() -> Self {
+        Self {
+            block: Block::default(),
+            followed: [None; FOLLOWED],
+            scale: Fit::default(),
+            turned: [Fit::default(); FOLLOWED],
+            alternatives: Vec::with_capacity(ALTERNATIVES),
+            heard: 0,
+            doubt: None,
+        }
+    }
+}
+
+impl Suspicions {
+    /// The likeliest of the settings that are certainly wrong.
+    pub fn doubt(&self) -> Option<SettingDoubt> {
+        self.doubt
+    }
+
+    /// Takes a reading that isn't fused yet, with the estimate at its time.
+    ///
+    /// Allocates: never.
+    pub fn hear(&mut self, state: &State, context: &Context, sources: &[Option<Source>], waiting: &Waiting) {
+        let Some(info) = info(sources, waiting.source) else { return };
+        let Some(look) = look(info, context, &waiting.reading) else { return };
+        let Some(slot) = self.slot(waiting.source) else { return };
+        let x_m = state.position.x();
+        let (begun, from_m) = *self.block.begun.get_or_insert((waiting.at, x_m));
+        let (lasted, moved_m) = (waiting.at.since(begun).0, (x_m - from_m).abs());
+        if lasted >= BLOCK.0 && moved_m >= BLOCK_M {
+            self.close();
+        } else if !(0..LONGEST.0).contains(&lasted) {
+            self.give_up();
+        }
+        let Some(row) = expect(state, context, &look) else { return };
+        self.heard = self.heard.wrapping_add(1);
+        if self.heard % COMPARED == 0 {
+            self.compare(state, context, sources, waiting, row.residual);
+        }
+        if row.residual.abs() > BEYOND_M {
+            return;
+        }
+        let axis = state.attitude * (info.mount.rotation * Vec3::<Sensor>::new(1.0, 0.0, 0.0));
+        let place = vec::<Tunnel>(&row.h, POSITION);
+        let arm = state.attitude * look.beam.offset;
+        let turned = (vec::<Tunnel>(&row.h, ATTITUDE) + -arm.cross(&place)).dot(&axis);
+        let expected_m = look.range_m - row.residual;
+        let roll = row.h.get(ATTITUDE).copied().unwrap_or(0.0);
+        let by_pose = [place.y(), place.z(), roll];
+        let weight = (FAR_M / row.residual.abs().max(FAR_M)) / row.noise;
+        self.block.readings += 1;
+        for (k, (by, line)) in by_pose.iter().zip(&mut self.block.pose).enumerate() {
+            for (sum, other) in line.iter_mut().zip(&by_pose) {
+                *sum += weight * by * other;
+            }
+            if let Some(sum) = self.block.residuals.get_mut(k) {
+                *sum += weight * by * row.residual;
+            }
+        }
+        self.block.scale.add(by_pose, expected_m, row.residual, weight);
+        if let Some(line) = self.block.turned.get_mut(slot).filter(|_| info.kind == SensorKind::Head) {
+            line.add(by_pose, turned, row.residual, weight);
+        }
+    }
+
+    /// The place of a source among those that are followed.
+    fn slot(&mut self, source: usize) -> Option<usize> {
+        let source = u16::try_from(source).ok()?;
+        let place = self.followed.iter().position(|known| known.is_none_or(|known| known == source))?;
+        *self.followed.get_mut(place)? = Some(source);
+        Some(place)
+    }
+
+    /// Compares a reading with what the other sources of its kind would have read, and itself the other way round.
+    fn compare(
+        &mut self,
+        state: &State,
+        context: &Context,
+        sources: &[Option<Source>],
+        waiting: &Waiting,
+        missed_m: f64,
+    ) {
+        let Some(own) = info(sources, waiting.source) else { return };
+        for other in self.followed.iter().flatten() {
+            let Some(theirs) = info(sources, usize::from(*other)) else { continue };
+            let is_own = usize::from(*other) == waiting.source;
+            if core::mem::discriminant(&theirs.kind) != core::mem::discriminant(&own.kind) {
+                continue;
+            }
+            let Some(mut look) = look(&SensorInfo { mount: theirs.mount, ..*own }, context, &waiting.reading)
+            else {
+                continue;
+            };
+            if is_own {
+                look.beam.along =
+                    own.mount.rotation * (round() * (own.mount.rotation.inverse() * look.beam.along));
+            }
+            let Some(row) = expect(state, context, &look) else { continue };
+            let Ok(source) = u16::try_from(waiting.source) else { continue };
+            note(&mut self.alternatives, (source, *other), [missed_m, row.residual]);
+        }
+    }
+
+    fn give_up(&mut self) {
+        self.block = Block::default();
+        for alternative in &mut self.alternatives {
+            alternative.block = [0.0; 3];
+        }
+    }
+
+    /// Ends a block.
+    fn close(&mut self) {
+        if self.block.readings >= FEWEST_READINGS
+            && let Some(factor) = self.block.factor()
+        {
+            let block = &self.block;
+            self.scale.add(block.freed(&block.scale, &factor));
+            for (fit, line) in self.turned.iter_mut().zip(&block.turned) {
+                fit.add(block.freed(line, &factor));
+            }
+            for alternative in &mut self.alternatives {
+                alternative.close();
+            }
+            self.doubt = self.likeliest();
+            self.probe();
+        }
+        self.give_up();
+    }
+
+    fn probe(&self) {
+        let show =
+            |fit: &Fit| fit.estimate().map(|[x, sd]| (format!("{x:.4} +- {sd:.4}"), fit.explains() as i64));
+        let turned: Vec<_> = self.turned.iter().filter_map(show).collect();
+        println!("PROBE n {} scale {:?} turned {turned:?}", self.scale.blocks, show(&self.scale));
+        for a in &self.alternatives {
+            println!(
+                "  ALT {} as {}: {:.4} {:.4} certain {:?}",
+                a.source,
+                a.other,
+                a.all[0] / a.all[2],
+                a.all[1] / a.all[2],
+                a.certain()
+            );
+        }
+        println!("  DOUBT {:?}", self.doubt);
+    }
+
+    fn likeliest(&self) -> Option<SettingDoubt> {
+        let mut best: Option<(f64, SettingDoubt)> = None;
+        let mut propose = |explains: f64, doubt: SettingDoubt| {
+            if best.is_none_or(|(before, _)| explains > before) {
+                best = Some((explains, doubt));
+            }
+        };
+        if let Some((share, sure_sd)) = self.scale.certain(LEAST_SCALE) {
+            let setting = Setting::RangeScale(share);
+            propose(self.scale.explains(), SettingDoubt { setting, source: None, sure_sd });
+        }
+        for (source, fit) in self.followed.iter().zip(&self.turned) {
+            if let Some((by_rad, sure_sd)) = fit.certain(LEAST_ROLL_RAD) {
+                let setting = Setting::HeadTurned(by_rad);
+                propose(fit.explains(), SettingDoubt { setting, source: *source, sure_sd });
+            }
+        }
+        for own in &self.alternatives {
+            let Some(sure_sd) = own.certain() else { continue };
+            let source = Some(own.source);
+            if own.source == own.other {
+                propose(own.explains(), SettingDoubt { setting: Setting::WrongWayRound, source, sure_sd });
+                continue;
+            }
+            let other =
+                self.alternatives.iter().find(|other| (other.source, other.other) == (own.other, own.source));
+            let Some(other_sd) = other.and_then(Alternative::certain) else { continue };
+            let explains = own.explains() + other.map_or(0.0, Alternative::explains);
+            let setting = Setting::Swapped(own.other);
+            propose(explains, SettingDoubt { setting, source, sure_sd: sure_sd.min(other_sd) });
+        }
+        best.map(|(_, doubt)| doubt)
+    }
+}
+
+fn info(sources: &[Option<Source>], number: usize) -> Option<&SensorInfo> {
+    sources.get(number)?.as_ref().map(|source| &source.sensor)
+}
+
+/// Half a turn about a sensor's own vertical.
+fn round() -> headrace_geometry::frames::Rot<Sensor, Sensor> {
+    headrace_geometry::frames::Rot::from_roll_pitch_yaw(0.0, 0.0, math::PI)
+}
+
+/// What a reading of a source that sits so has measured; `None` without a range.
+fn look(info: &SensorInfo, context: &Context, reading: &Reading) -> Option<Look> {
+    let Context { site, settings, unit_at, .. } = context;
+    let (along, range_m, first_rad, unsure_rad, sd_m) = match (info.kind, reading) {
+        (SensorKind::Head, Reading::Sonar(sonar)) => (
+            head_direction(sonar.angle_rad),
+            site.rescaled_range_m(sonar.range_m?, sonar.sound_speed_mps),
+            settings.return_beam_rad / 2.0,
+            0.0,
+            with_quantum(settings.return_sd_m, sonar.resolution_m),
+        ),
+        (SensorKind::Echosounder { .. }, Reading::Echo(echo)) => (
+            Vec3::new(1.0, 0.0, 0.0),
+            site.rescaled_range_m(echo.range_m?, echo.sound_speed_mps),
+            0.0,
+            settings.echo_beam_rad / 2.0,
+            settings.echo_sd_m,
+        ),
+        _ => return None,
+    };
+    let offset = info.mount.position + -*unit_at;
+    let beam = Beam { offset, along: info.mount.rotation * along, first_rad, unsure_rad };
+    Some(Look { beam, range_m, sd_m })
+}
+
+fn expect(state: &State, context: &Context, look: &Look) -> Option<ScalarUpdate> {
+    measure::range(state, &context.profile, &look.beam, look.range_m, look.sd_m)
+}
+
+fn note(alternatives: &mut Vec<Alternative>, (source, other): (u16, u16), missed_m: [f64; 2]) {
+    let known = alternatives.iter().position(|known| (known.source, known.other) == (source, other));
+    let place = known.unwrap_or(alternatives.len());
+    if known.is_none() {
+        if alternatives.len() >= ALTERNATIVES {
+            return;
+        }
+        let (block, all) = ([0.0; 3], [0.0; 3]);
+        alternatives.push(Alternative { source, other, block, all, blocks: 0, gains: 0.0, gains_2: 0.0 });
+    }
+    let Some(alternative) = alternatives.get_mut(place) else { return };
+    let [own, theirs] = missed_m.map(|missed_m| missed_m.abs().min(BEYOND_M));
+    for (sum, part) in alternative.block.iter_mut().zip([own * own, theirs * theirs, 1.0]) {
+        *sum += part;
+    }
+}
+
+impl Line {
+    fn add(&mut self, by_pose: [f64; 3], by: f64, residual_m: f64, weight: f64) {
+        for (sum, part) in self.by_pose.iter_mut().zip(by_pose) {
+            *sum += weight * by * part;
+        }
+        self.squares += weight * by * by;
+        self.residuals += weight * by * residual_m;
+    }
+}
+
+impl Block {
+    /// The lower Cholesky factor of the information on place and roll, priors included.
+    fn factor(&self) -> Option<[[f64; 3]; 3]> {
+        let priors = [PLACE_SD_M, PLACE_SD_M, ROLL_SD_RAD].map(|sd| 1.0 / (sd * sd));
+        let [[a, ..], [b, c, _], [d, e, f]] = self.pose;
+        let [p, q, r] = priors;
+        let aa = math::sqrt(a + p);
+        let (ba, da) = (b / aa, d / aa);
+        let bb = math::sqrt((c + q - ba * ba).max(0.0));
+        let dc = (e - da * ba) / bb;
+        let dd = math::sqrt((f + r - da * da - dc * dc).max(0.0));
+        let factor = [[aa, 0.0, 0.0], [ba, bb, 0.0], [da, dc, dd]];
+        (aa > 0.0 && bb > 0.0 && dd > 0.0 && factor.iter().flatten().all(|x| x.is_finite())).then_some(factor)
+    }
+
+    /// Weight and weighted value of a parameter, freed of place and roll.
+    fn freed(&self, line: &Line, factor: &[[f64; 3]; 3]) -> [f64; 2] {
+        let (by, residuals) = (solved(factor, line.by_pose), solved(factor, self.residuals));
+        let dot = |a: &[f64; 3], b: &[f64; 3]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        [line.squares - dot(&by, &by), line.residuals - dot(&by, &residuals)]
+    }
+}
+
+/// Forward substitution.
+fn solved([[a, ..], [b, c, _], [d, e, f]]: &[[f64; 3]; 3], [x, y, z]: [f64; 3]) -> [f64; 3] {
+    let x = x / a;
+    let y = (y - b * x) / c;
+    [x, y, (z - d * x - e * y) / f]
+}
+
+impl Fit {
+    fn add(&mut self, [weight, value]: [f64; 2]) {
+        if weight <= 0.0 {
+            return;
+        }
+        self.blocks += 1;
+        self.weight += weight;
+        self.value += value;
+        self.weights_2 += weight * weight;
+        self.both += weight * value;
+        self.values_2 += value * value;
+    }
+
+    /// Estimate and standard deviation by the scatter of blocks.
+    fn estimate(&self) -> Option<[f64; 2]> {
+        if self.blocks < FEWEST_BLOCKS || self.weight <= 0.0 {
+            return None;
+        }
+        let estimate = self.value / self.weight;
+        let scatter = self.values_2 - 2.0 * estimate * self.both + estimate * estimate * self.weights_2;
+        let n = f64::from(self.blocks);
+        Some([estimate, math::sqrt((scatter * n / (n - 1.0)).max(0.0)) / self.weight])
+    }
+
+    /// The estimate where it is certainly beyond this, and its standard deviations from zero.
+    fn certain(&self, least: f64) -> Option<(f64, f64)> {
+        let [estimate, sd] = self.estimate()?;
+        let sure_sd = estimate.abs() / sd.max(f64::MIN_POSITIVE);
+        (estimate.abs() >= least && sure_sd >= SURE).then_some((estimate, sure_sd))
+    }
+
+    /// Sum of normalised squares that it explains.
+    fn explains(&self) -> f64 {
+        self.value * self.value / self.weight.max(f64::MIN_POSITIVE)
+    }
+}
+
+impl Alternative {
+    fn close(&mut self) {
+        let [own, theirs, readings] = self.block;
+        if readings <= 0.0 {
+            return;
+        }
+        for (sum, part) in self.all.iter_mut().zip(self.block) {
+            *sum += part;
+        }
+        let gain = (own - theirs) / readings;
+        self.blocks += 1;
+        self.gains += gain;
+        self.gains_2 += gain * gain;
+    }
+
+    /// Standard deviations by which the alternative fits better, where it certainly does.
+    fn certain(&self) -> Option<f64> {
+        let [own, theirs, readings] = self.all;
+        let n = f64::from(self.blocks);
+        if self.blocks < FEWEST_BLOCKS || own < MISSES_M2 * readings || theirs > LEAVES * own {
+            return None;
+        }
+        let mean = self.gains / n;
+        let sd = math::sqrt(((self.gains_2 / n - mean * mean) / (n - 1.0)).max(0.0));
+        let sure_sd = mean / sd.max(f64::MIN_POSITIVE);
+        (sure_sd >= SURE).then_some(sure_sd)
+    }
+
+    /// Sum of normalised squares that it explains, for a range of 3 cm.
+    fn explains(&self) -> f64 {
+        let [own, theirs, _] = self.all;
+        (own - theirs) * f64::from(COMPARED) / (0.03 * 0.03)
+    }
+}
