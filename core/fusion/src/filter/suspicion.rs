@@ -1,7 +1,7 @@
 //! Settings that the ranges contradict: one parameter each, fitted to what ranges lack of the design.
 //!
-//! By blocks of way: within a block the vehicle's place and roll may be off by what explains the ranges best; what is left is
-//! fitted. Blocks are as independent as the wall lets them be, and their scatter says how sure a figure is. Derivation:
+//! Within a spell of some seconds the vehicle's place and roll may be off by what explains the ranges best; what is left is
+//! fitted. Spells add up to blocks of way. Blocks are as independent as the wall lets them be, and their scatter says how sure a figure is. Derivation:
 //! `docs/fusion.md`, "Settings in doubt".
 
 use serde::{Deserialize, Serialize};
@@ -18,6 +18,8 @@ use headrace_sensor::device::{SensorInfo, SensorKind};
 use headrace_sensor::reading::Reading;
 use headrace_snapshot::stateful;
 
+/// Length of a spell: as long as a filter that is told wrong ranges stays about where it is.
+const SPELL: DurNs = DurNs(2_000_000_000);
 /// Shortest block, in time and in way; one in which the vehicle hardly moves is given up after the longest time.
 const BLOCK: DurNs = DurNs(20_000_000_000);
 const BLOCK_M: f64 = 3.0;
@@ -25,14 +27,16 @@ const LONGEST: DurNs = DurNs(120_000_000_000);
 /// Fewest blocks and readings of a block.
 const FEWEST_BLOCKS: u32 = 8;
 const FEWEST_READINGS: u32 = 100;
-/// Standard deviations from which a figure is certain.
+/// Standard deviations from which a figure is certain, and from which an alternative is: how much it gains varies with the
+/// vehicle's place.
 const SURE: f64 = 6.0;
+const SURE_GAIN: f64 = 3.0;
 /// Least figures that are told: a share of the range, and an angle.
 const LEAST_SCALE: f64 = 0.015;
-const LEAST_ROLL_RAD: f64 = 0.015;
+const LEAST_ROLL_RAD: f64 = 0.03;
 /// Residual from which a range weighs less, and beyond which it doesn't count, m.
-const FAR_M: f64 = 0.3;
-const BEYOND_M: f64 = 1.5;
+const FAR_M: f64 = 0.5;
+const BEYOND_M: f64 = 2.0;
 /// Standard deviations of place and roll within a block, m and radians.
 const PLACE_SD_M: f64 = 0.3;
 const ROLL_SD_RAD: f64 = 0.005;
@@ -41,6 +45,10 @@ const FOLLOWED: usize = 12;
 const ALTERNATIVES: usize = FOLLOWED * FOLLOWED;
 /// One reading in so many is compared with its alternatives: each costs a ray.
 const COMPARED: u32 = 4;
+/// What a comparison counts of a miss at most, m: a share of echoes is of something else.
+const MOST_MISSED_M: f64 = 0.5;
+/// Mean square by which an echosounder misses that doesn't fit at all, m^2: it draws the estimate off, and makes heads look turned.
+const ASTRAY_M2: f64 = 0.04;
 /// Mean square by which a source must miss, m^2, and the share of it that an alternative may leave.
 const MISSES_M2: f64 = 0.01;
 const LEAVES: f64 = 0.4;
@@ -122,11 +130,19 @@ struct Line {
     residuals: f64,
 }
 
-/// Sums of a block.
+/// Where and when a block began, its readings, and the sums of its spells, freed of place and roll.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 struct Block {
     begun: Option<(MonoNs, f64)>,
     readings: u32,
+    scale: [f64; 2],
+    turned: [[f64; 2]; FOLLOWED],
+}
+
+/// Sums of a spell.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+struct Spell {
+    begun: Option<MonoNs>,
     /// Information on place and roll, lower triangle by rows, and its right side.
     pose: [[f64; 3]; 3],
     residuals: [f64; 3],
@@ -150,6 +166,7 @@ struct Fit {
 struct Alternative {
     source: u16,
     other: u16,
+    is_echo: bool,
     /// Of the block, and of all blocks before: squares missed, those missed by the alternative, readings.
     block: [f64; 3],
     all: [f64; 3],
@@ -162,6 +179,7 @@ struct Alternative {
 #[derive(Debug, Clone)]
 pub struct Suspicions {
     block: Block,
+    spell: Spell,
     followed: [Option<u16>; FOLLOWED],
     scale: Fit,
     turned: [Fit; FOLLOWED],
@@ -170,13 +188,14 @@ pub struct Suspicions {
     doubt: Option<SettingDoubt>,
 }
 
-stateful!(Suspicions { state: block, followed, scale, turned, heard, doubt; lists: alternatives; });
+stateful!(Suspicions { state: block, spell, followed, scale, turned, heard, doubt; lists: alternatives; });
 
 impl Default for Suspicions {
     /// Allocated without readings.
     fn default() -> Self {
         Self {
             block: Block::default(),
+            spell: Spell::default(),
             followed: [None; FOLLOWED],
             scale: Fit::default(),
             turned: [Fit::default(); FOLLOWED],
@@ -201,6 +220,10 @@ impl Suspicions {
         let Some(look) = look(info, context, &waiting.reading) else { return };
         let Some(slot) = self.slot(waiting.source) else { return };
         let x_m = state.position.x();
+        let spell_begun = *self.spell.begun.get_or_insert(waiting.at);
+        if !(0..SPELL.0).contains(&waiting.at.since(spell_begun).0) {
+            self.end_spell();
+        }
         let (begun, from_m) = *self.block.begun.get_or_insert((waiting.at, x_m));
         let (lasted, moved_m) = (waiting.at.since(begun).0, (x_m - from_m).abs());
         if lasted >= BLOCK.0 && moved_m >= BLOCK_M {
@@ -223,18 +246,21 @@ impl Suspicions {
         let expected_m = look.range_m - row.residual;
         let roll = row.h.get(ATTITUDE).copied().unwrap_or(0.0);
         let by_pose = [place.y(), place.z(), roll];
-        let weight = (FAR_M / row.residual.abs().max(FAR_M)) / row.noise;
+        // What is known to be wrong makes nothing an outlier.
+        let scale = self.scale.estimate().map_or(0.0, |[scale, _]| scale);
+        let off_m = row.residual.abs().min((row.residual - scale * expected_m).abs());
+        let weight = (FAR_M / off_m.max(FAR_M)) / row.noise;
         self.block.readings += 1;
-        for (k, (by, line)) in by_pose.iter().zip(&mut self.block.pose).enumerate() {
+        for (k, (by, line)) in by_pose.iter().zip(&mut self.spell.pose).enumerate() {
             for (sum, other) in line.iter_mut().zip(&by_pose) {
                 *sum += weight * by * other;
             }
-            if let Some(sum) = self.block.residuals.get_mut(k) {
+            if let Some(sum) = self.spell.residuals.get_mut(k) {
                 *sum += weight * by * row.residual;
             }
         }
-        self.block.scale.add(by_pose, expected_m, row.residual, weight);
-        if let Some(line) = self.block.turned.get_mut(slot).filter(|_| info.kind == SensorKind::Head) {
+        self.spell.scale.add(by_pose, expected_m, row.residual, weight);
+        if let Some(line) = self.spell.turned.get_mut(slot).filter(|_| info.kind == SensorKind::Head) {
             line.add(by_pose, turned, row.residual, weight);
         }
     }
@@ -273,11 +299,27 @@ impl Suspicions {
             }
             let Some(row) = expect(state, context, &look) else { continue };
             let Ok(source) = u16::try_from(waiting.source) else { continue };
-            note(&mut self.alternatives, (source, *other), [missed_m, row.residual]);
+            let is_echo = own.kind != SensorKind::Head;
+            note(&mut self.alternatives, (source, *other, is_echo), [missed_m, row.residual]);
+        }
+    }
+
+    fn end_spell(&mut self) {
+        let spell = core::mem::take(&mut self.spell);
+        let Some(factor) = spell.factor() else { return };
+        let add = |sums: &mut [f64; 2], line: &Line| {
+            for (sum, part) in sums.iter_mut().zip(spell.freed(line, &factor)) {
+                *sum += part;
+            }
+        };
+        add(&mut self.block.scale, &spell.scale);
+        for (sums, line) in self.block.turned.iter_mut().zip(&spell.turned) {
+            add(sums, line);
         }
     }
 
     fn give_up(&mut self) {
+        self.spell = Spell::default();
         self.block = Block::default();
         for alternative in &mut self.alternatives {
             alternative.block = [0.0; 3];
@@ -286,39 +328,18 @@ impl Suspicions {
 
     /// Ends a block.
     fn close(&mut self) {
-        if self.block.readings >= FEWEST_READINGS
-            && let Some(factor) = self.block.factor()
-        {
-            let block = &self.block;
-            self.scale.add(block.freed(&block.scale, &factor));
-            for (fit, line) in self.turned.iter_mut().zip(&block.turned) {
-                fit.add(block.freed(line, &factor));
+        self.end_spell();
+        if self.block.readings >= FEWEST_READINGS {
+            self.scale.add(self.block.scale);
+            for (fit, sums) in self.turned.iter_mut().zip(self.block.turned) {
+                fit.add(sums);
             }
             for alternative in &mut self.alternatives {
                 alternative.close();
             }
             self.doubt = self.likeliest();
-            self.probe();
         }
         self.give_up();
-    }
-
-    fn probe(&self) {
-        let show =
-            |fit: &Fit| fit.estimate().map(|[x, sd]| (format!("{x:.4} +- {sd:.4}"), fit.explains() as i64));
-        let turned: Vec<_> = self.turned.iter().filter_map(show).collect();
-        println!("PROBE n {} scale {:?} turned {turned:?}", self.scale.blocks, show(&self.scale));
-        for a in &self.alternatives {
-            println!(
-                "  ALT {} as {}: {:.4} {:.4} certain {:?}",
-                a.source,
-                a.other,
-                a.all[0] / a.all[2],
-                a.all[1] / a.all[2],
-                a.certain()
-            );
-        }
-        println!("  DOUBT {:?}", self.doubt);
     }
 
     fn likeliest(&self) -> Option<SettingDoubt> {
@@ -332,25 +353,30 @@ impl Suspicions {
             let setting = Setting::RangeScale(share);
             propose(self.scale.explains(), SettingDoubt { setting, source: None, sure_sd });
         }
+        let is_astray = self.alternatives.iter().any(|of| of.is_echo && of.all[0] > ASTRAY_M2 * of.all[2]);
         for (source, fit) in self.followed.iter().zip(&self.turned) {
-            if let Some((by_rad, sure_sd)) = fit.certain(LEAST_ROLL_RAD) {
+            if let Some((by_rad, sure_sd)) = fit.certain(LEAST_ROLL_RAD).filter(|_| !is_astray) {
                 let setting = Setting::HeadTurned(by_rad);
                 propose(fit.explains(), SettingDoubt { setting, source: *source, sure_sd });
             }
         }
         for own in &self.alternatives {
-            let Some(sure_sd) = own.certain() else { continue };
             let source = Some(own.source);
             if own.source == own.other {
-                propose(own.explains(), SettingDoubt { setting: Setting::WrongWayRound, source, sure_sd });
+                if let Some(sure_sd) = own.certain(own.share_left()) {
+                    let setting = Setting::WrongWayRound;
+                    propose(own.explains(), SettingDoubt { setting, source, sure_sd });
+                }
                 continue;
             }
-            let other =
-                self.alternatives.iter().find(|other| (other.source, other.other) == (own.other, own.source));
-            let Some(other_sd) = other.and_then(Alternative::certain) else { continue };
-            let explains = own.explains() + other.map_or(0.0, Alternative::explains);
-            let setting = Setting::Swapped(own.other);
-            propose(explains, SettingDoubt { setting, source, sure_sd: sure_sd.min(other_sd) });
+            let is_return = |other: &&Alternative| (other.source, other.other) == (own.other, own.source);
+            let Some(other) = self.alternatives.iter().find(is_return) else { continue };
+            let left = (own.all[1] + other.all[1]) / (own.all[0] + other.all[0]).max(f64::MIN_POSITIVE);
+            let sure_sd = own.certain(left).zip(other.certain(left));
+            if let Some((own_sd, other_sd)) = sure_sd.filter(|_| own.source < own.other) {
+                let (setting, sure_sd) = (Setting::Swapped(own.other), own_sd.min(other_sd));
+                propose(own.explains() + other.explains(), SettingDoubt { setting, source, sure_sd });
+            }
         }
         best.map(|(_, doubt)| doubt)
     }
@@ -394,7 +420,7 @@ fn expect(state: &State, context: &Context, look: &Look) -> Option<ScalarUpdate>
     measure::range(state, &context.profile, &look.beam, look.range_m, look.sd_m)
 }
 
-fn note(alternatives: &mut Vec<Alternative>, (source, other): (u16, u16), missed_m: [f64; 2]) {
+fn note(alternatives: &mut Vec<Alternative>, (source, other, is_echo): (u16, u16, bool), missed_m: [f64; 2]) {
     let known = alternatives.iter().position(|known| (known.source, known.other) == (source, other));
     let place = known.unwrap_or(alternatives.len());
     if known.is_none() {
@@ -402,10 +428,19 @@ fn note(alternatives: &mut Vec<Alternative>, (source, other): (u16, u16), missed
             return;
         }
         let (block, all) = ([0.0; 3], [0.0; 3]);
-        alternatives.push(Alternative { source, other, block, all, blocks: 0, gains: 0.0, gains_2: 0.0 });
+        alternatives.push(Alternative {
+            source,
+            other,
+            is_echo,
+            block,
+            all,
+            blocks: 0,
+            gains: 0.0,
+            gains_2: 0.0,
+        });
     }
     let Some(alternative) = alternatives.get_mut(place) else { return };
-    let [own, theirs] = missed_m.map(|missed_m| missed_m.abs().min(BEYOND_M));
+    let [own, theirs] = missed_m.map(|missed_m| missed_m.abs().min(MOST_MISSED_M));
     for (sum, part) in alternative.block.iter_mut().zip([own * own, theirs * theirs, 1.0]) {
         *sum += part;
     }
@@ -421,7 +456,7 @@ impl Line {
     }
 }
 
-impl Block {
+impl Spell {
     /// The lower Cholesky factor of the information on place and roll, priors included.
     fn factor(&self) -> Option<[[f64; 3]; 3]> {
         let priors = [PLACE_SD_M, PLACE_SD_M, ROLL_SD_RAD].map(|sd| 1.0 / (sd * sd));
@@ -503,17 +538,24 @@ impl Alternative {
         self.gains_2 += gain * gain;
     }
 
-    /// Standard deviations by which the alternative fits better, where it certainly does.
-    fn certain(&self) -> Option<f64> {
-        let [own, theirs, readings] = self.all;
+    /// Share of its squares that the alternative leaves.
+    fn share_left(&self) -> f64 {
+        let [own, theirs, _] = self.all;
+        theirs / own.max(f64::MIN_POSITIVE)
+    }
+
+    /// Standard deviations by which the alternative fits better, where it certainly does and leaves little: of both, for two
+    /// sources that are swapped.
+    fn certain(&self, share_left: f64) -> Option<f64> {
+        let [own, _, readings] = self.all;
         let n = f64::from(self.blocks);
-        if self.blocks < FEWEST_BLOCKS || own < MISSES_M2 * readings || theirs > LEAVES * own {
+        if self.blocks < FEWEST_BLOCKS || own < MISSES_M2 * readings || share_left > LEAVES {
             return None;
         }
         let mean = self.gains / n;
         let sd = math::sqrt(((self.gains_2 / n - mean * mean) / (n - 1.0)).max(0.0));
         let sure_sd = mean / sd.max(f64::MIN_POSITIVE);
-        (sure_sd >= SURE).then_some(sure_sd)
+        (sure_sd >= SURE_GAIN).then_some(sure_sd)
     }
 
     /// Sum of normalised squares that it explains, for a range of 3 cm.
