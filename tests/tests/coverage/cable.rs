@@ -1,8 +1,6 @@
 //! A cable counter that sticks at speed: told at once, and nothing passes for it.
 
-use std::sync::{Arc, Mutex};
-
-use bevy_ecs::prelude::{Res, Resource};
+use bevy_ecs::prelude::{Res, ResMut, Resource, Single};
 use headrace_geometry::time::MonoNs;
 use headrace_monitor::alerts::{AlertKind, Alerts};
 use headrace_monitor::entities::VehicleState;
@@ -59,26 +57,23 @@ fn stuck(seed: u64, speeds_mps: [f64; 2]) -> Stuck {
 }
 
 /// The beat at which the loop first had the alert.
-#[derive(Resource, Clone, Default)]
-struct Told(Arc<Mutex<Option<MonoNs>>>);
+#[derive(Resource, Default)]
+struct Told(Option<MonoNs>);
 
-impl Plugin for Told {
+struct Watch;
+
+impl Plugin for Watch {
     fn build(&self, app: &mut App) -> Result<(), PluginError> {
-        app.insert_resource(self.clone());
+        app.insert_resource(Told::default());
         app.add_systems(Stage::Judge, watch);
         Ok(())
     }
 }
 
 #[expect(clippy::needless_pass_by_value, reason = "systems take their parameters by value")]
-fn watch(
-    alerts: Res<'_, Alerts>,
-    told: Res<'_, Told>,
-    vehicle: bevy_ecs::prelude::Single<'_, '_, &VehicleState>,
-) {
+fn watch(alerts: Res<'_, Alerts>, mut told: ResMut<'_, Told>, vehicle: Single<'_, '_, &VehicleState>) {
     if alerts.get(AlertKind::CableDoubted).is_some() {
-        let mut told = told.0.lock().unwrap();
-        *told = told.or(vehicle.at);
+        told.0 = told.0.or(vehicle.at);
     }
 }
 
@@ -89,13 +84,12 @@ fn told_after_s(stuck: &Stuck) -> Option<f64> {
     for sensor in &vehicle.sensors {
         app.add_device(sensor.as_ref()).unwrap();
     }
-    let told = Told::default();
-    app.add_plugin(&told).unwrap();
+    app.add_plugin(&Watch).unwrap();
     let mut dive = app.arm(vehicle.navigation()).unwrap();
     let simulation = Simulation::new(&stuck.scene).unwrap();
     drive(&mut dive, &mut SimulationFeed::new(simulation), Pace::default(), &mut |_| {}).unwrap();
     dive.finish(&mut |_, _| {});
-    let told = *told.0.lock().unwrap();
+    let told = dive.resource::<Told>().unwrap().0;
     let began = dive.tally().span.unwrap().0;
     told.map(|at| at.since(began).as_secs_f64() - stuck.from_s)
 }

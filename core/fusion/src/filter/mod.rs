@@ -8,6 +8,7 @@ pub mod align;
 pub mod cable;
 pub mod clones;
 pub mod eskf;
+mod evidence;
 pub mod factors;
 pub mod inertial;
 pub mod measure;

@@ -1,12 +1,13 @@
 //! Settings that the ranges contradict: one parameter each, fitted to what ranges lack of the design.
 //!
 //! Within a spell of some seconds the vehicle's place and roll may be off by what explains the ranges best; what is left is
-//! fitted. Spells add up to blocks of way. Blocks are as independent as the wall lets them be, and their scatter says how sure a figure is. Derivation:
-//! `docs/fusion.md`, "Settings in doubt".
+//! fitted. Spells add up to blocks of way. Blocks are as independent as the wall lets them be, and their scatter says how sure
+//! a figure is. Derivation: `docs/fusion.md`, "Settings in doubt".
 
 use serde::{Deserialize, Serialize};
 
 use super::eskf::{Context, with_quantum};
+use super::evidence::{Alternative, Fit, Line, Spell};
 use super::measure::{self, Beam, ScalarUpdate};
 use super::sources::Source;
 use super::state::{ATTITUDE, POSITION, State, vec};
@@ -24,39 +25,28 @@ const SPELL: DurNs = DurNs(2_000_000_000);
 const BLOCK: DurNs = DurNs(20_000_000_000);
 const BLOCK_M: f64 = 3.0;
 const LONGEST: DurNs = DurNs(120_000_000_000);
-/// Fewest blocks and readings of a block.
-const FEWEST_BLOCKS: u32 = 8;
+/// Fewest readings of a block.
 const FEWEST_READINGS: u32 = 100;
-/// Standard deviations from which a figure is certain, and from which an alternative is: how much it gains varies with the
-/// vehicle's place.
-const SURE: f64 = 6.0;
-const SURE_GAIN: f64 = 3.0;
 /// Least figures that are told: a share of the range, and an angle.
 const LEAST_SCALE: f64 = 0.015;
 const LEAST_ROLL_RAD: f64 = 0.03;
 /// Residual from which a range weighs less, and beyond which it doesn't count, m.
 const FAR_M: f64 = 0.5;
 const BEYOND_M: f64 = 2.0;
-/// Standard deviations of place and roll within a block, m and radians.
-const PLACE_SD_M: f64 = 0.3;
-const ROLL_SD_RAD: f64 = 0.005;
 /// Sources with ranges that are followed, and alternatives of theirs.
-const FOLLOWED: usize = 12;
+pub(super) const FOLLOWED: usize = 12;
 const ALTERNATIVES: usize = FOLLOWED * FOLLOWED;
 /// One reading in so many is compared with its alternatives: each costs a ray.
-const COMPARED: u32 = 4;
-/// What a comparison counts of a miss at most, m: a share of echoes is of something else.
-const MOST_MISSED_M: f64 = 0.5;
-/// Mean square by which an echosounder misses that doesn't fit at all, m^2: it draws the estimate off, and makes heads look turned.
+pub(super) const COMPARED: u32 = 4;
+/// Mean square by which an echosounder misses that doesn't fit at all, m^2: it draws the estimate off, and makes heads look
+/// turned.
 const ASTRAY_M2: f64 = 0.04;
-/// Mean square by which a source must miss, m^2, and the share of it that an alternative may leave.
-const MISSES_M2: f64 = 0.01;
-const LEAVES: f64 = 0.4;
 
 /// A setting that is likely wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Setting {
-    /// Ranges are too long by this share: the speed of sound is set too high, or the wall is that much narrower.
+    /// Ranges are too long by this share: the speed of sound is set too high, or the wall is that much wider than
+    /// drawn.
     RangeScale(f64),
     /// A head is turned about its axis from how it is said to sit, radians: to be added to its roll.
     HeadTurned(f64),
@@ -121,15 +111,6 @@ struct Look {
     sd_m: f64,
 }
 
-/// Sums of one parameter within a block, beside those of place and roll.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-struct Line {
-    /// By place across and up, and by roll.
-    by_pose: [f64; 3],
-    squares: f64,
-    residuals: f64,
-}
-
 /// Where and when a block began, its readings, and the sums of its spells, freed of place and roll.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 struct Block {
@@ -137,42 +118,6 @@ struct Block {
     readings: u32,
     scale: [f64; 2],
     turned: [[f64; 2]; FOLLOWED],
-}
-
-/// Sums of a spell.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-struct Spell {
-    begun: Option<MonoNs>,
-    /// Information on place and roll, lower triangle by rows, and its right side.
-    pose: [[f64; 3]; 3],
-    residuals: [f64; 3],
-    scale: Line,
-    turned: [Line; FOLLOWED],
-}
-
-/// Sums of one parameter over blocks, freed of place and roll.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-struct Fit {
-    blocks: u32,
-    weight: f64,
-    value: f64,
-    weights_2: f64,
-    both: f64,
-    values_2: f64,
-}
-
-/// How a source's ranges fit where it sits, and where another does; itself the other way round, if that is the same.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-struct Alternative {
-    source: u16,
-    other: u16,
-    is_echo: bool,
-    /// Of the block, and of all blocks before: squares missed, those missed by the alternative, readings.
-    block: [f64; 3],
-    all: [f64; 3],
-    blocks: u32,
-    gains: f64,
-    gains_2: f64,
 }
 
 /// See the module's description.
@@ -184,7 +129,8 @@ pub struct Suspicions {
     scale: Fit,
     turned: [Fit; FOLLOWED],
     alternatives: Vec<Alternative>,
-    heard: u32,
+    /// Readings of each source that is followed.
+    heard: [u32; FOLLOWED],
     doubt: Option<SettingDoubt>,
 }
 
@@ -200,7 +146,7 @@ impl Default for Suspicions {
             scale: Fit::default(),
             turned: [Fit::default(); FOLLOWED],
             alternatives: Vec::with_capacity(ALTERNATIVES),
-            heard: 0,
+            heard: [0; FOLLOWED],
             doubt: None,
         }
     }
@@ -232,9 +178,11 @@ impl Suspicions {
             self.give_up();
         }
         let Some(row) = expect(state, context, &look) else { return };
-        self.heard = self.heard.wrapping_add(1);
-        if self.heard % COMPARED == 0 {
-            self.compare(state, context, sources, waiting, row.residual);
+        if let Some(heard) = self.heard.get_mut(slot) {
+            *heard = heard.wrapping_add(1);
+            if heard.is_multiple_of(COMPARED) {
+                self.compare(state, context, sources, waiting, row.residual);
+            }
         }
         if row.residual.abs() > BEYOND_M {
             return;
@@ -427,140 +375,9 @@ fn note(alternatives: &mut Vec<Alternative>, (source, other, is_echo): (u16, u16
         if alternatives.len() >= ALTERNATIVES {
             return;
         }
-        let (block, all) = ([0.0; 3], [0.0; 3]);
-        alternatives.push(Alternative {
-            source,
-            other,
-            is_echo,
-            block,
-            all,
-            blocks: 0,
-            gains: 0.0,
-            gains_2: 0.0,
-        });
+        alternatives.push(Alternative { source, other, is_echo, ..Alternative::default() });
     }
-    let Some(alternative) = alternatives.get_mut(place) else { return };
-    let [own, theirs] = missed_m.map(|missed_m| missed_m.abs().min(MOST_MISSED_M));
-    for (sum, part) in alternative.block.iter_mut().zip([own * own, theirs * theirs, 1.0]) {
-        *sum += part;
-    }
-}
-
-impl Line {
-    fn add(&mut self, by_pose: [f64; 3], by: f64, residual_m: f64, weight: f64) {
-        for (sum, part) in self.by_pose.iter_mut().zip(by_pose) {
-            *sum += weight * by * part;
-        }
-        self.squares += weight * by * by;
-        self.residuals += weight * by * residual_m;
-    }
-}
-
-impl Spell {
-    /// The lower Cholesky factor of the information on place and roll, priors included.
-    fn factor(&self) -> Option<[[f64; 3]; 3]> {
-        let priors = [PLACE_SD_M, PLACE_SD_M, ROLL_SD_RAD].map(|sd| 1.0 / (sd * sd));
-        let [[a, ..], [b, c, _], [d, e, f]] = self.pose;
-        let [p, q, r] = priors;
-        let aa = math::sqrt(a + p);
-        let (ba, da) = (b / aa, d / aa);
-        let bb = math::sqrt((c + q - ba * ba).max(0.0));
-        let dc = (e - da * ba) / bb;
-        let dd = math::sqrt((f + r - da * da - dc * dc).max(0.0));
-        let factor = [[aa, 0.0, 0.0], [ba, bb, 0.0], [da, dc, dd]];
-        (aa > 0.0 && bb > 0.0 && dd > 0.0 && factor.iter().flatten().all(|x| x.is_finite())).then_some(factor)
-    }
-
-    /// Weight and weighted value of a parameter, freed of place and roll.
-    fn freed(&self, line: &Line, factor: &[[f64; 3]; 3]) -> [f64; 2] {
-        let (by, residuals) = (solved(factor, line.by_pose), solved(factor, self.residuals));
-        let dot = |a: &[f64; 3], b: &[f64; 3]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        [line.squares - dot(&by, &by), line.residuals - dot(&by, &residuals)]
-    }
-}
-
-/// Forward substitution.
-fn solved([[a, ..], [b, c, _], [d, e, f]]: &[[f64; 3]; 3], [x, y, z]: [f64; 3]) -> [f64; 3] {
-    let x = x / a;
-    let y = (y - b * x) / c;
-    [x, y, (z - d * x - e * y) / f]
-}
-
-impl Fit {
-    fn add(&mut self, [weight, value]: [f64; 2]) {
-        if weight <= 0.0 {
-            return;
-        }
-        self.blocks += 1;
-        self.weight += weight;
-        self.value += value;
-        self.weights_2 += weight * weight;
-        self.both += weight * value;
-        self.values_2 += value * value;
-    }
-
-    /// Estimate and standard deviation by the scatter of blocks.
-    fn estimate(&self) -> Option<[f64; 2]> {
-        if self.blocks < FEWEST_BLOCKS || self.weight <= 0.0 {
-            return None;
-        }
-        let estimate = self.value / self.weight;
-        let scatter = self.values_2 - 2.0 * estimate * self.both + estimate * estimate * self.weights_2;
-        let n = f64::from(self.blocks);
-        Some([estimate, math::sqrt((scatter * n / (n - 1.0)).max(0.0)) / self.weight])
-    }
-
-    /// The estimate where it is certainly beyond this, and its standard deviations from zero.
-    fn certain(&self, least: f64) -> Option<(f64, f64)> {
-        let [estimate, sd] = self.estimate()?;
-        let sure_sd = estimate.abs() / sd.max(f64::MIN_POSITIVE);
-        (estimate.abs() >= least && sure_sd >= SURE).then_some((estimate, sure_sd))
-    }
-
-    /// Sum of normalised squares that it explains.
-    fn explains(&self) -> f64 {
-        self.value * self.value / self.weight.max(f64::MIN_POSITIVE)
-    }
-}
-
-impl Alternative {
-    fn close(&mut self) {
-        let [own, theirs, readings] = self.block;
-        if readings <= 0.0 {
-            return;
-        }
-        for (sum, part) in self.all.iter_mut().zip(self.block) {
-            *sum += part;
-        }
-        let gain = (own - theirs) / readings;
-        self.blocks += 1;
-        self.gains += gain;
-        self.gains_2 += gain * gain;
-    }
-
-    /// Share of its squares that the alternative leaves.
-    fn share_left(&self) -> f64 {
-        let [own, theirs, _] = self.all;
-        theirs / own.max(f64::MIN_POSITIVE)
-    }
-
-    /// Standard deviations by which the alternative fits better, where it certainly does and leaves little: of both, for two
-    /// sources that are swapped.
-    fn certain(&self, share_left: f64) -> Option<f64> {
-        let [own, _, readings] = self.all;
-        let n = f64::from(self.blocks);
-        if self.blocks < FEWEST_BLOCKS || own < MISSES_M2 * readings || share_left > LEAVES {
-            return None;
-        }
-        let mean = self.gains / n;
-        let sd = math::sqrt(((self.gains_2 / n - mean * mean) / (n - 1.0)).max(0.0));
-        let sure_sd = mean / sd.max(f64::MIN_POSITIVE);
-        (sure_sd >= SURE_GAIN).then_some(sure_sd)
-    }
-
-    /// Sum of normalised squares that it explains, for a range of 3 cm.
-    fn explains(&self) -> f64 {
-        let [own, theirs, _] = self.all;
-        (own - theirs) * f64::from(COMPARED) / (0.03 * 0.03)
+    if let Some(alternative) = alternatives.get_mut(place) {
+        alternative.note(missed_m);
     }
 }
