@@ -7,13 +7,14 @@ use super::cable::{self, Cable, Slip, Use};
 use super::clones::ErrorClones;
 use super::factors::Factors;
 use super::inertial::Leg;
+pub use super::measure::with_quantum;
 use super::measure::{self, Beam, ScalarUpdate};
 use super::settings::Settings;
 use super::sources::Source;
 use super::state::{
     ATTITUDE, CREEP, ERRORS, Errors, FORCE_BIAS, POSITION, RATE_BIAS, State, VELOCITY, add_variance, put, vec,
 };
-use super::suspicion::Suspicions;
+use super::suspicion::{Design, Suspicions};
 use super::unrest::Unrest;
 use super::window::{Waiting, Window};
 use crate::NoFix;
@@ -66,6 +67,13 @@ pub struct Context {
     pub settings: Settings,
     /// Position of the inertial unit on the vehicle.
     pub unit_at: Vec3<Body>,
+}
+
+impl Context {
+    fn design(&self) -> Design<'_> {
+        let Self { profile, site, settings, unit_at } = self;
+        Design { profile, site, settings, unit_at: *unit_at }
+    }
 }
 
 stateful!(Context { state: unit_at; fixed: profile, site, settings; });
@@ -163,7 +171,7 @@ impl Eskf {
             let later_s = to.since(waiting.at).as_secs_f64();
             let mut then = self.state_at(waiting.at);
             then.correct(&earlier(&known, later_s));
-            self.suspicions.hear(&then, context, sources, &waiting);
+            self.suspicions.hear(&then, &context.design(), sources, &waiting);
             let Some(Some(source)) = sources.get_mut(waiting.source) else { continue };
             for (number, row) in rows(&then, context, source, &waiting, window).into_iter().enumerate() {
                 let again = |state: &State| {
@@ -533,9 +541,4 @@ fn rows(
 /// Attitude of a unit relative to its level frame, turned into the tunnel frame.
 pub fn in_tunnel(site: &Site, level: Rot<Level, Sensor>) -> Rot<Tunnel, Sensor> {
     Rot::<Tunnel, Level>::from_roll_pitch_yaw(0.0, 0.0, -site.axis_yaw_rad) * level
-}
-
-/// Standard deviation of noise and rounding to a quantum.
-pub fn with_quantum(sd: f64, quantum: f64) -> f64 {
-    math::hypot(sd, quantum / math::sqrt(12.0))
 }

@@ -2,10 +2,13 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::suspicion::{COMPARED, FOLLOWED};
 use headrace_geometry::math;
 use headrace_geometry::time::MonoNs;
 
+/// Sources with ranges that are followed.
+pub(super) const FOLLOWED: usize = 12;
+/// One reading in so many is compared with its alternatives: each costs a ray.
+pub(super) const COMPARED: u32 = 4;
 /// Fewest blocks that say how sure a figure is.
 const FEWEST_BLOCKS: u32 = 8;
 /// Standard deviations from which a figure is certain, and from which an alternative is: how much it gains varies with the

@@ -6,15 +6,17 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::eskf::{Context, with_quantum};
-use super::evidence::{Alternative, Fit, Line, Spell};
-use super::measure::{self, Beam, ScalarUpdate};
+use super::evidence::{Alternative, COMPARED, FOLLOWED, Fit, Line, Spell};
+use super::measure::{self, Beam, ScalarUpdate, with_quantum};
+use super::settings::Settings;
 use super::sources::Source;
 use super::state::{ATTITUDE, POSITION, State, vec};
 use super::window::Waiting;
-use headrace_geometry::frames::{Sensor, Tunnel, Vec3, head_direction};
+use headrace_geometry::frames::{Body, Rot, Sensor, Tunnel, Vec3, head_direction};
 use headrace_geometry::math;
+use headrace_geometry::site::Site;
 use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_geometry::tunnel::Profile;
 use headrace_sensor::device::{SensorInfo, SensorKind};
 use headrace_sensor::reading::Reading;
 use headrace_snapshot::stateful;
@@ -33,11 +35,8 @@ const LEAST_ROLL_RAD: f64 = 0.03;
 /// Residual from which a range weighs less, and beyond which it doesn't count, m.
 const FAR_M: f64 = 0.5;
 const BEYOND_M: f64 = 2.0;
-/// Sources with ranges that are followed, and alternatives of theirs.
-pub(super) const FOLLOWED: usize = 12;
+/// Alternatives of the sources that are followed.
 const ALTERNATIVES: usize = FOLLOWED * FOLLOWED;
-/// One reading in so many is compared with its alternatives: each costs a ray.
-pub(super) const COMPARED: u32 = 4;
 /// Mean square by which an echosounder misses that doesn't fit at all, m^2: it draws the estimate off, and makes heads look
 /// turned.
 const ASTRAY_M2: f64 = 0.04;
@@ -104,6 +103,19 @@ impl SettingDoubt {
     }
 }
 
+/// What ranges are compared with.
+#[derive(Debug, Clone, Copy)]
+pub struct Design<'a> {
+    /// Design profile.
+    pub profile: &'a Profile,
+    /// Water.
+    pub site: &'a Site,
+    /// Noise settings of the sensors.
+    pub settings: &'a Settings,
+    /// Position of the inertial unit on the vehicle.
+    pub unit_at: Vec3<Body>,
+}
+
 /// A reading's range against the design.
 struct Look {
     beam: Beam,
@@ -161,9 +173,15 @@ impl Suspicions {
     /// Takes a reading that isn't fused yet, with the estimate at its time.
     ///
     /// Allocates: never.
-    pub fn hear(&mut self, state: &State, context: &Context, sources: &[Option<Source>], waiting: &Waiting) {
+    pub fn hear(
+        &mut self,
+        state: &State,
+        design: &Design<'_>,
+        sources: &[Option<Source>],
+        waiting: &Waiting,
+    ) {
         let Some(info) = info(sources, waiting.source) else { return };
-        let Some(look) = look(info, context, &waiting.reading) else { return };
+        let Some(look) = look(info, design, &waiting.reading) else { return };
         let Some(slot) = self.slot(waiting.source) else { return };
         let x_m = state.position.x();
         let spell_begun = *self.spell.begun.get_or_insert(waiting.at);
@@ -177,11 +195,11 @@ impl Suspicions {
         } else if !(0..LONGEST.0).contains(&lasted) {
             self.give_up();
         }
-        let Some(row) = expect(state, context, &look) else { return };
+        let Some(row) = expect(state, design, &look) else { return };
         if let Some(heard) = self.heard.get_mut(slot) {
             *heard = heard.wrapping_add(1);
             if heard.is_multiple_of(COMPARED) {
-                self.compare(state, context, sources, waiting, row.residual);
+                self.compare(state, design, sources, waiting, row.residual);
             }
         }
         if row.residual.abs() > BEYOND_M {
@@ -225,7 +243,7 @@ impl Suspicions {
     fn compare(
         &mut self,
         state: &State,
-        context: &Context,
+        design: &Design<'_>,
         sources: &[Option<Source>],
         waiting: &Waiting,
         missed_m: f64,
@@ -237,7 +255,7 @@ impl Suspicions {
             if core::mem::discriminant(&theirs.kind) != core::mem::discriminant(&own.kind) {
                 continue;
             }
-            let Some(mut look) = look(&SensorInfo { mount: theirs.mount, ..*own }, context, &waiting.reading)
+            let Some(mut look) = look(&SensorInfo { mount: theirs.mount, ..*own }, design, &waiting.reading)
             else {
                 continue;
             };
@@ -245,7 +263,7 @@ impl Suspicions {
                 look.beam.along =
                     own.mount.rotation * (round() * (own.mount.rotation.inverse() * look.beam.along));
             }
-            let Some(row) = expect(state, context, &look) else { continue };
+            let Some(row) = expect(state, design, &look) else { continue };
             let Ok(source) = u16::try_from(waiting.source) else { continue };
             let is_echo = own.kind != SensorKind::Head;
             note(&mut self.alternatives, (source, *other, is_echo), [missed_m, row.residual]);
@@ -335,13 +353,13 @@ fn info(sources: &[Option<Source>], number: usize) -> Option<&SensorInfo> {
 }
 
 /// Half a turn about a sensor's own vertical.
-fn round() -> headrace_geometry::frames::Rot<Sensor, Sensor> {
-    headrace_geometry::frames::Rot::from_roll_pitch_yaw(0.0, 0.0, math::PI)
+fn round() -> Rot<Sensor, Sensor> {
+    Rot::from_roll_pitch_yaw(0.0, 0.0, math::PI)
 }
 
 /// What a reading of a source that sits so has measured; `None` without a range.
-fn look(info: &SensorInfo, context: &Context, reading: &Reading) -> Option<Look> {
-    let Context { site, settings, unit_at, .. } = context;
+fn look(info: &SensorInfo, design: &Design<'_>, reading: &Reading) -> Option<Look> {
+    let Design { site, settings, unit_at, .. } = design;
     let (along, range_m, first_rad, unsure_rad, sd_m) = match (info.kind, reading) {
         (SensorKind::Head, Reading::Sonar(sonar)) => (
             head_direction(sonar.angle_rad),
@@ -364,8 +382,8 @@ fn look(info: &SensorInfo, context: &Context, reading: &Reading) -> Option<Look>
     Some(Look { beam, range_m, sd_m })
 }
 
-fn expect(state: &State, context: &Context, look: &Look) -> Option<ScalarUpdate> {
-    measure::range(state, &context.profile, &look.beam, look.range_m, look.sd_m)
+fn expect(state: &State, design: &Design<'_>, look: &Look) -> Option<ScalarUpdate> {
+    measure::range(state, design.profile, &look.beam, look.range_m, look.sd_m)
 }
 
 fn note(alternatives: &mut Vec<Alternative>, (source, other, is_echo): (u16, u16, bool), missed_m: [f64; 2]) {
