@@ -107,7 +107,10 @@ fn a_scale_of_ranges_is_named_with_its_figure() {
             let doubt = doubted(&dive.scene, &dive.believed).unwrap();
             println!("{vehicle} {condition:?}: {doubt:?}");
             assert_eq!(doubt.what, "range_scale", "{vehicle}: {doubt:?}");
-            assert!((doubt.share.unwrap() / share - 1.0).abs() < 0.32, "{vehicle} {condition:?}: {doubt:?}");
+            assert!(
+                ((doubt.range_ratio.unwrap() - 1.0) / share - 1.0).abs() < 0.32,
+                "{vehicle} {condition:?}: {doubt:?}"
+            );
         }
     }
 }

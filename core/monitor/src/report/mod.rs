@@ -220,12 +220,12 @@ pub struct SettingReport {
     pub source: Option<String>,
     /// Name of the source that it is swapped with.
     pub other: Option<String>,
-    /// Share by which ranges are too long; `None` for other settings.
-    pub share: Option<f64>,
+    /// Ranges over those that the design has; `None` for other settings.
+    pub range_ratio: Option<f64>,
     /// Angle by which the head is turned about its axis, degrees; `None` for other settings.
     pub angle_deg: Option<f64>,
     /// Standard deviations from right.
-    pub sure_sd: f64,
+    pub sure_ratio: f64,
 }
 
 impl Report {
@@ -359,9 +359,9 @@ fn setting_report(doubt: &SettingDoubt, dive: &Loop) -> SettingReport {
         what: setting.as_str(),
         source: source.map(name),
         other: setting.other().map(name),
-        share: matches!(setting, Setting::RangeScale(_)).then_some(setting.figure()),
+        range_ratio: matches!(setting, Setting::RangeScale(_)).then_some(1.0 + setting.figure()),
         angle_deg: matches!(setting, Setting::HeadTurned(_)).then_some(setting.figure().to_degrees()),
-        sure_sd,
+        sure_ratio: sure_sd,
     }
 }
 
