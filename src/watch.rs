@@ -6,7 +6,9 @@ use headrace_coverage::{Run, RunChange, RunId, Section, Sections, Verdict};
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::advice_log::AdviceEntry;
 use headrace_monitor::messages::Notice;
-use headrace_monitor::pilot_text::{Missed, advice_text, alert_text, cleared_text, flag_text, station};
+use headrace_monitor::pilot_text::{
+    Missed, advice_text, alert_text, cleared_text, flag_text, setting_text, station,
+};
 use headrace_monitor::run::Loop;
 use headrace_ports::{Phase, Status};
 use headrace_vehicle::Mission;
@@ -77,12 +79,17 @@ impl Watch {
             Notice::Run { id, change, .. } => self.run(*id, *change, dive),
             Notice::Alert(kind, source) => {
                 if let Some(alert) = dive.alerts().get(*kind, *source) {
-                    let head = source.and_then(|source| dive.sources().get(source.index()));
-                    let head = head.map_or("", |source| source.id.as_str());
-                    self.line(&format!(
-                        "ALERT    {}",
-                        alert_text(alert.kind, head, alert.x_m, alert.worst_m)
-                    ));
+                    let name = |source: u16| {
+                        dive.sources()
+                            .get(usize::from(source))
+                            .map_or_else(String::new, |info| info.id.clone())
+                    };
+                    let head = source.map_or_else(String::new, |source| name(source.0));
+                    let text = match &alert.setting {
+                        Some(doubt) => setting_text(doubt, alert.x_m, &name),
+                        None => alert_text(alert.kind, &head, alert.x_m, alert.worst_m),
+                    };
+                    self.line(&format!("ALERT    {text}"));
                 }
             }
         }

@@ -31,8 +31,10 @@ pub mod relative;
 pub mod section;
 pub mod smooth;
 
+use self::filter::cable::CableDoubt;
 use self::filter::eskf::PoseSd;
 use self::filter::sources::Consistency;
+use self::filter::suspicion::SettingDoubt;
 use headrace_geometry::time::MonoNs;
 use headrace_sensor::device::SensorInfo;
 use headrace_sensor::reading::Reading;
@@ -58,6 +60,17 @@ pub trait Navigation: Stateful + Send + Sync {
 
     /// Standard deviations of the estimate; `None` where they aren't known.
     fn pose_sd(&self) -> Option<PoseSd> {
+        None
+    }
+
+    /// Whether the cable's counter isn't believed, once that has lasted for a second; `None` while it is, and where it isn't
+    /// judged.
+    fn cable_doubt(&self) -> Option<CableDoubt> {
+        None
+    }
+
+    /// The setting that ranges contradict, if one certainly is wrong; `None`, too, where settings aren't judged.
+    fn setting_doubt(&self) -> Option<SettingDoubt> {
         None
     }
 

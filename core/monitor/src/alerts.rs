@@ -4,6 +4,7 @@ use bevy_ecs::prelude::Resource;
 use serde::{Deserialize, Serialize};
 
 use headrace_coverage::Distrust;
+use headrace_fusion::filter::suspicion::SettingDoubt;
 use headrace_geometry::time::MonoNs;
 use headrace_sampling::head::MAX_HEADS;
 use headrace_sensor::reading::SourceId;
@@ -21,6 +22,10 @@ pub enum AlertKind {
     HeadConstant,
     /// A head contradicts the design where other heads agree with it.
     HeadOutvoted,
+    /// The cable's counter sticks, slips or runs free: its readings aren't used.
+    CableDoubted,
+    /// Ranges contradict a setting of the vehicle file.
+    SettingDoubted,
 }
 
 /// Kinds of alerts that name a head.
@@ -30,12 +35,14 @@ const ROOM: usize = AlertKind::ALL.len() - HEAD_KINDS + HEAD_KINDS * MAX_HEADS;
 
 impl AlertKind {
     /// All of them.
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 7] = [
         Self::OutsideTunnel,
         Self::ProfileContradicted,
         Self::HeadScattered,
         Self::HeadConstant,
         Self::HeadOutvoted,
+        Self::CableDoubted,
+        Self::SettingDoubted,
     ];
 
     /// The alert that a head isn't believed, and its figure, m.
@@ -55,6 +62,8 @@ impl AlertKind {
             Self::HeadScattered => "head_scattered",
             Self::HeadConstant => "head_constant",
             Self::HeadOutvoted => "head_outvoted",
+            Self::CableDoubted => "cable_doubted",
+            Self::SettingDoubted => "setting_doubted",
         }
     }
 }
@@ -66,15 +75,21 @@ pub struct Alert {
     pub kind: AlertKind,
     /// Time of its first occurrence.
     pub since: MonoNs,
-    /// Occurrences: samples outside, judgements of sections that contradict the profile, or times a head was distrusted.
+    /// Time at which its latest occurrence began.
+    pub latest: MonoNs,
+    /// Occurrences: samples outside, judgements of sections that contradict the profile, times a head was distrusted, or times
+    /// that the cable's counter wasn't believed.
     pub count: u64,
     /// Chainage of its first occurrence, m.
     pub x_m: f64,
     /// Largest deviation, m: beyond the end, or a section's mean from the design profile. Of a head, the mean between
-    /// successive returns, its constant range, or its mean deviation from the design.
+    /// successive returns, its constant range, or its mean deviation from the design. Of the cable's counter, the longest way
+    /// on which it wasn't believed.
     pub worst_m: f64,
     /// The head that isn't believed.
     pub source: Option<SourceId>,
+    /// The setting in doubt, as last judged.
+    pub setting: Option<SettingDoubt>,
 }
 
 /// All alerts.
@@ -99,17 +114,57 @@ impl Alerts {
         let is_it = |alert: &Alert| alert.kind == kind && alert.source == source;
         let Some(slot) = self.0.iter_mut().find(|slot| slot.as_ref().is_none_or(is_it)) else { return false };
         let is_first = slot.is_none();
-        let alert = slot.get_or_insert(Alert { kind, since: at, count: 0, x_m, worst_m: off_m, source });
+        let alert = slot.get_or_insert(Alert {
+            kind,
+            since: at,
+            latest: at,
+            count: 0,
+            x_m,
+            worst_m: off_m,
+            source,
+            setting: None,
+        });
         alert.count += 1;
+        alert.latest = at;
         if off_m.abs() > alert.worst_m.abs() {
             alert.worst_m = off_m;
         }
         is_first
     }
 
+    /// Records an occurrence that lasts and began at `since`, and is counted once; true when the first one is recorded first.
+    pub fn note_lasting(&mut self, kind: AlertKind, since: MonoNs, x_m: f64, off_m: f64) -> bool {
+        match self.get_mut(kind) {
+            Some(alert) if alert.latest == since => {
+                alert.worst_m = alert.worst_m.max(off_m);
+                false
+            }
+            _ => self.note(kind, since, x_m, off_m),
+        }
+    }
+
+    /// Records a setting in doubt, found at a chainage, m; counted where another one becomes the likeliest, and true then.
+    pub fn note_setting(&mut self, at: MonoNs, x_m: f64, doubt: &SettingDoubt) -> bool {
+        let kind = AlertKind::SettingDoubted;
+        let is_new = self
+            .get(kind, None)
+            .is_none_or(|alert| alert.setting.is_none_or(|known| !known.is_of_same(doubt)));
+        if is_new {
+            self.note(kind, at, x_m, 0.0);
+        }
+        if let Some(alert) = self.get_mut(kind) {
+            alert.setting = Some(*doubt);
+        }
+        is_new
+    }
+
     /// The alert of a kind, of a head where it names one.
     pub fn get(&self, kind: AlertKind, source: Option<SourceId>) -> Option<&Alert> {
         self.iter().find(|alert| alert.kind == kind && alert.source == source)
+    }
+
+    fn get_mut(&mut self, kind: AlertKind) -> Option<&mut Alert> {
+        self.0.iter_mut().flatten().find(|alert| alert.kind == kind && alert.source.is_none())
     }
 
     /// All alerts.

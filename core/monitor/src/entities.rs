@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 pub use super::head_motion::MeasuredMotion;
 use super::messages::PlacedPing;
 use headrace_coverage::{HeadReach, HeadWall};
+use headrace_fusion::filter::cable::CableDoubt;
 use headrace_fusion::filter::eskf::PoseSd;
 use headrace_fusion::{Fix, Navigation, NoFix};
 use headrace_geometry::frames::{Point3, Tunnel};
@@ -51,11 +52,13 @@ pub struct VehicleState {
     pub fix: Result<Fix, NoFix>,
     /// Standard deviations of the pose, from its covariance; `None` if the navigation method provides none.
     pub sd: Option<PoseSd>,
+    /// The cable's counter while it isn't believed.
+    pub cable_doubt: Option<CableDoubt>,
 }
 
 impl Default for VehicleState {
     fn default() -> Self {
-        Self { at: None, fix: Err(NoFix::Heading), sd: None }
+        Self { at: None, fix: Err(NoFix::Heading), sd: None, cable_doubt: None }
     }
 }
 

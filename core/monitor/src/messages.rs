@@ -9,6 +9,8 @@ use serde::{Deserialize, Serialize};
 use super::advice_log::AdviceEntry;
 use super::alerts::AlertKind;
 use headrace_coverage::{Judgement, Loss, Reach, Request, RunChange, RunId};
+use headrace_fusion::filter::cable::CableDoubt;
+use headrace_fusion::filter::suspicion::SettingDoubt;
 use headrace_fusion::{Fix, NoFix};
 use headrace_geometry::frames::{Point3, Tunnel};
 use headrace_geometry::time::MonoNs;
@@ -32,6 +34,15 @@ pub struct Event {
 #[derive(Debug, Resource)]
 pub struct Events(pub Vec<Event>);
 
+/// What navigation doubts at a beat.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Doubts {
+    /// The cable's counter while it isn't believed.
+    pub cable: Option<CableDoubt>,
+    /// The setting that is likely wrong.
+    pub setting: Option<SettingDoubt>,
+}
+
 /// An epoch with its fix: a multiple of [`ADVICE_PERIOD`](super::advice_log::ADVICE_PERIOD), or a sonar ping.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Positioned {
@@ -48,6 +59,8 @@ pub enum Positioned {
         at: MonoNs,
         /// Fix at the beat, or the reason there is none.
         fix: Result<Fix, NoFix>,
+        /// What navigation doubts.
+        doubts: Doubts,
     },
 }
 
@@ -113,8 +126,8 @@ pub struct PlacedPing {
 pub enum Placed {
     /// A ping.
     Ping(PlacedPing),
-    /// The situation at a beat.
-    Situation(MonoNs, Situation),
+    /// The situation at a beat, and what navigation doubts.
+    Situation(MonoNs, Situation, Doubts),
 }
 
 /// Pings and situations of this tick, in order.

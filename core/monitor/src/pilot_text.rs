@@ -4,6 +4,7 @@
 use super::advice_log::AdviceEntry;
 use super::alerts::AlertKind;
 use headrace_coverage::{Action, Cause, Evidence};
+use headrace_fusion::filter::suspicion::{Setting, SettingDoubt};
 use headrace_geometry::tunnel::Profile;
 use headrace_sampling::advice::{Reason, Remedy};
 use headrace_sampling::head::HeadSet;
@@ -161,7 +162,30 @@ pub fn alert_text(kind: AlertKind, head: &str, x_m: f64, off_m: f64) -> String {
         AlertKind::HeadOutvoted => format!(
             "ch {x}  {head} sees a wall {off_m:+.2} m off the one that other heads see; its returns don't count"
         ),
+        AlertKind::SettingDoubted => format!("ch {x}  ranges contradict a setting of the vehicle file"),
+        AlertKind::CableDoubted => format!(
+            "ch {x}  the cable's counter sticks or slips: position by the inertial unit alone; sections there wait"
+        ),
     }
+}
+
+/// Text of a setting in doubt, found at a chainage, m; `name` gives a source's.
+pub fn setting_text(doubt: &SettingDoubt, x_m: f64, name: &dyn Fn(u16) -> String) -> String {
+    let source = doubt.source.map(name).unwrap_or_default();
+    let what = match doubt.setting {
+        Setting::RangeScale(share) => format!(
+            "ranges {:.1} % too {}: is the speed of sound right, or the wall {}?",
+            share.abs() * 100.0,
+            if share > 0.0 { "long" } else { "short" },
+            if share > 0.0 { "wider" } else { "narrower" },
+        ),
+        Setting::HeadTurned(by_rad) => {
+            format!("{source} seems to be turned by {:+.1} degrees about its axis", by_rad.to_degrees())
+        }
+        Setting::WrongWayRound => format!("{source} seems to be the wrong way round"),
+        Setting::Swapped(other) => format!("{source} and {} seem to be swapped", name(other)),
+    };
+    format!("ch {}  {what}", station(x_m))
 }
 
 /// Figures of advice used in its text.

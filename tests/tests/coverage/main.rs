@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
 
 mod bad;
+mod cable;
 mod causes;
 mod confidence;
 mod dives;
@@ -12,6 +13,7 @@ mod flags;
 mod memory;
 mod metamorphic;
 mod oracle;
+mod settings;
 mod truth;
 mod wall_samples;
 mod way;

@@ -43,6 +43,17 @@ const ALIVE_M: f64 = 0.1;
 /// Share of the way made in doubt that may be the inertial unit's fault, as a standard deviation.
 const DOUBTED_SHARE: f64 = 0.5;
 
+/// A counter in doubt.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct CableDoubt {
+    /// When its readings left what was expected.
+    pub since: MonoNs,
+    /// Chainage expected then, m.
+    pub from_m: f64,
+    /// Way since, the longer by the counter and by the estimate, m.
+    pub way_m: f64,
+}
+
 /// A reading against the estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Reading {
@@ -124,14 +135,17 @@ struct Doubt {
     agreeing_from: Option<MonoNs>,
     /// What it showed when inertial data could no longer judge it, m.
     blind_from_m: Option<f64>,
-    /// How far readings have been off, m.
+    /// How far readings have been off, and the longest way since it was doubted, m.
     most_m: f64,
+    longest_m: f64,
 }
 
 impl Cable {
-    /// When the readings left what was expected, once that has lasted.
-    pub fn doubted_since(&self, now: MonoNs) -> Option<MonoNs> {
-        self.doubt.map(|doubt| doubt.first.at).filter(|since| now.since(*since).0 >= NOTICED_AFTER.0)
+    /// The doubt, once it has lasted.
+    pub fn doubt(&self, now: MonoNs) -> Option<CableDoubt> {
+        let Doubt { first, longest_m, .. } = self.doubt?;
+        let has_lasted = now.since(first.at).0 >= NOTICED_AFTER.0;
+        has_lasted.then(|| CableDoubt { since: first.at, from_m: first.expected_m(), way_m: longest_m })
     }
 
     /// Takes a reading.
@@ -164,11 +178,7 @@ impl Cable {
                 *self = Self { before, ..Self::default() };
                 return Use::Unsteady;
             }
-            let rate_mps = self.rate_mps;
-            let most_m = reading.off_m.abs();
-            let (agreeing_from, blind_from_m) = (None, None);
-            let doubt = Doubt { first, rate_mps, same_from: *reading, agreeing_from, blind_from_m, most_m };
-            self.doubt = Some(doubt);
+            self.doubt = Some(Doubt::between(first, reading, self.rate_mps));
         }
         Use::Withhold
     }
@@ -211,8 +221,23 @@ impl Over {
 }
 
 impl Doubt {
+    /// From the first reading beyond the gate to this one, of a counter that had run at this rate, m/s.
+    fn between(first: Reading, reading: &Reading, rate_mps: f64) -> Self {
+        let doubt = Self {
+            first,
+            rate_mps,
+            same_from: *reading,
+            agreeing_from: None,
+            blind_from_m: None,
+            most_m: reading.off_m.abs(),
+            longest_m: 0.0,
+        };
+        Self { longest_m: doubt.way_m(reading), ..doubt }
+    }
+
     fn take(&mut self, reading: &Reading) -> Use {
         self.most_m = self.most_m.max(reading.off_m.abs());
+        self.longest_m = self.longest_m.max(self.way_m(reading));
         let for_at_least = |since: MonoNs, time: DurNs| reading.at.since(since).0 >= time.0;
         if reading.sd_m > BLIND_M {
             let from_m = *self.blind_from_m.get_or_insert(reading.shown_m);

@@ -7,6 +7,7 @@ use super::cable::{self, Cable, Slip, Use};
 use super::clones::{ErrorClones, MOVING};
 use super::factors::Factors;
 use super::inertial::Leg;
+pub use super::measure::with_quantum;
 use super::measure::{self, Beam, ScalarUpdate};
 use super::settings::Settings;
 use super::sources::Source;
@@ -14,6 +15,7 @@ use super::state::{
     ATTITUDE, CREEP, ERRORS, Errors, FORCE_BIAS, POSITION, RATE_BIAS, SLACK, State, VELOCITY, add_variance,
     put, vec,
 };
+use super::suspicion::{Design, Suspicions};
 use super::unrest::Unrest;
 use super::window::{Waiting, Window};
 use crate::NoFix;
@@ -72,6 +74,13 @@ pub struct Context {
     pub unit_at: Vec3<Body>,
 }
 
+impl Context {
+    fn design(&self) -> Design<'_> {
+        let Self { profile, site, settings, unit_at } = self;
+        Design { profile, site, settings, unit_at: *unit_at }
+    }
+}
+
 stateful!(Context { state: unit_at; fixed: profile, site, settings; });
 
 /// The estimate at one time, and its covariance.
@@ -95,6 +104,8 @@ pub struct Eskf {
     unrest: Unrest,
     /// How loose the cable hangs beyond what is declared, a standard deviation, m.
     loose_m: f64,
+    /// Settings that the ranges contradict.
+    pub suspicions: Suspicions,
     /// Variances to add at the end of the epoch.
     doubts: Errors,
     /// Steps of the last epoch, for smoothing; empty unless they are kept.
@@ -102,7 +113,7 @@ pub struct Eskf {
     keeps_steps: bool,
 }
 
-stateful!(Eskf { state: at, state, factors, clones, way_sought, agreement, cable, unrest, loose_m, doubts; lists: knots; fixed: steps, keeps_steps; });
+stateful!(Eskf { state: at, state, factors, clones, way_sought, agreement, cable, unrest, loose_m, suspicions, doubts; lists: knots; fixed: steps, keeps_steps; });
 
 impl Default for Eskf {
     /// Allocated buffers without an estimate.
@@ -118,6 +129,7 @@ impl Default for Eskf {
             cable: Cable::default(),
             unrest: Unrest::default(),
             loose_m: 0.0,
+            suspicions: Suspicions::default(),
             doubts: [0.0; ERRORS],
             steps: Vec::new(),
             keeps_steps: false,
@@ -166,12 +178,13 @@ impl Eskf {
         self.clones.carry(&transition);
         let mut errors = [0.0; ERRORS];
         while let Some(waiting) = window.pop(to) {
-            let Some(Some(source)) = sources.get_mut(waiting.source) else { continue };
             // Each reading is compared with the best estimate so far: after a silence the first ones move it far.
             let known = errors;
             let later_s = to.since(waiting.at).as_secs_f64();
             let mut then = self.state_at(waiting.at);
             then.correct(&earlier(&known, later_s));
+            self.suspicions.hear(&then, &context.design(), sources, &waiting);
+            let Some(Some(source)) = sources.get_mut(waiting.source) else { continue };
             for (number, row) in rows(&then, context, source, &waiting, window).into_iter().enumerate() {
                 let again = |state: &State| {
                     rows(state, context, source, &waiting, window).get(number).copied().flatten()
@@ -563,9 +576,4 @@ fn rows(
 /// Attitude of a unit relative to its level frame, turned into the tunnel frame.
 pub fn in_tunnel(site: &Site, level: Rot<Level, Sensor>) -> Rot<Tunnel, Sensor> {
     Rot::<Tunnel, Level>::from_roll_pitch_yaw(0.0, 0.0, -site.axis_yaw_rad) * level
-}
-
-/// Standard deviation of noise and rounding to a quantum.
-pub fn with_quantum(sd: f64, quantum: f64) -> f64 {
-    math::hypot(sd, quantum / math::sqrt(12.0))
 }

@@ -225,3 +225,8 @@ pub fn rest(state: &State, sd_mps: f64) -> [ScalarUpdate; 3] {
         ScalarUpdate::new(-moved.get(k).copied().unwrap_or(0.0), sd_mps * sd_mps).with_one(VELOCITY + k, 1.0)
     })
 }
+
+/// Standard deviation of noise and rounding to a quantum.
+pub fn with_quantum(sd: f64, quantum: f64) -> f64 {
+    math::hypot(sd, quantum / math::sqrt(12.0))
+}

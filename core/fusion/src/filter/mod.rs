@@ -8,6 +8,7 @@ pub mod align;
 pub mod cable;
 pub mod clones;
 pub mod eskf;
+mod evidence;
 pub mod factors;
 pub mod inertial;
 pub mod measure;
@@ -15,6 +16,7 @@ pub mod noise_level;
 pub mod settings;
 pub mod sources;
 pub mod state;
+pub mod suspicion;
 pub mod unrest;
 pub mod window;
 pub mod zupt;
@@ -23,10 +25,12 @@ pub mod zupt;
 mod tests;
 
 use self::align::{LISTENS, Listening};
+use self::cable::CableDoubt;
 use self::eskf::{Context, Eskf, PoseSd};
 use self::settings::Settings;
 use self::sources::{Consistency, Source};
 use self::state::{State, rotation};
+use self::suspicion::SettingDoubt;
 use self::window::{Waiting, Window};
 use self::zupt::Stillness;
 use super::relative::Relative;
@@ -125,7 +129,7 @@ impl FilterNavigation {
 
     /// When the cable's readings left what was expected, once that has lasted for a second; `None` while they are believed.
     pub fn cable_doubted_since(&self) -> Option<MonoNs> {
-        self.running().and_then(|running| running.cable.doubted_since(running.at))
+        self.cable_doubt().map(|doubt| doubt.since)
     }
 
     /// Number of restarts of the estimate.
@@ -383,6 +387,14 @@ impl Navigation for FilterNavigation {
 
     fn pose_sd(&self) -> Option<PoseSd> {
         self.running().map(Eskf::pose_sd)
+    }
+
+    fn setting_doubt(&self) -> Option<SettingDoubt> {
+        self.running.suspicions.doubt()
+    }
+
+    fn cable_doubt(&self) -> Option<CableDoubt> {
+        self.running().and_then(|running| running.cable.doubt(running.at))
     }
 
     fn fix(&self, at: MonoNs) -> Result<Fix, NoFix> {

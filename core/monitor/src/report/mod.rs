@@ -8,6 +8,7 @@ use super::run::Loop;
 use super::what_if::WhatIfReport;
 use headrace_coverage::openings::Opening;
 use headrace_coverage::{Section, Spread, Verdict};
+use headrace_fusion::filter::suspicion::{Setting, SettingDoubt};
 use headrace_geometry::time::MonoNs;
 
 mod advice;
@@ -197,19 +198,40 @@ pub struct OpeningReport {
 /// An alert about the dive as a whole.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AlertReport {
-    /// `outside_tunnel`, `profile_contradicted`, `head_scattered`, `head_constant` or `head_outvoted`.
+    /// `outside_tunnel`, `profile_contradicted`, `head_scattered`, `head_constant`, `head_outvoted`, `cable_doubted` or
+    /// `setting_doubted`.
     pub kind: &'static str,
     /// Time of its first occurrence, seconds on the log's clock.
     pub since_s: f64,
-    /// Occurrences: samples, judgements of sections, or times that a head was distrusted.
+    /// Occurrences: samples, judgements of sections, or times that a head or the cable's counter wasn't believed.
     pub count: u64,
     /// Chainage of its first occurrence, m.
     pub x_m: f64,
     /// Largest deviation, m: beyond the end of the tunnel, or a section's mean from the design profile. Of a head: mean
-    /// between successive returns, constant range, or mean deviation from the design.
+    /// between successive returns, constant range, or mean deviation from the design. Of the cable's counter, the longest way on
+    /// which it wasn't believed. Of a setting, 0.
     pub worst_m: f64,
     /// The head that isn't believed, by its id.
     pub head: Option<String>,
+    /// The setting in doubt; `None` for other alerts.
+    pub setting: Option<SettingReport>,
+}
+
+/// A setting that ranges contradict.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SettingReport {
+    /// `range_scale`, `head_turned`, `wrong_way_round` or `swapped`.
+    pub what: &'static str,
+    /// Name of the source; `None` where it is no single one's.
+    pub source: Option<String>,
+    /// Name of the source that it is swapped with.
+    pub other: Option<String>,
+    /// Ranges over those that the design has; `None` for other settings.
+    pub range_ratio: Option<f64>,
+    /// Angle by which the head is turned about its axis, degrees; `None` for other settings.
+    pub angle_deg: Option<f64>,
+    /// Standard deviations from right.
+    pub sure_ratio: f64,
 }
 
 impl Report {
@@ -335,6 +357,21 @@ fn opening_report(opening: &Opening) -> OpeningReport {
     }
 }
 
+fn setting_report(doubt: &SettingDoubt, dive: &Loop) -> SettingReport {
+    let name = |source: u16| {
+        dive.sources().get(usize::from(source)).map_or_else(String::new, |info| info.id.clone())
+    };
+    let SettingDoubt { setting, source, sure_sd } = *doubt;
+    SettingReport {
+        what: setting.as_str(),
+        source: source.map(name),
+        other: setting.other().map(name),
+        range_ratio: matches!(setting, Setting::RangeScale(_)).then_some(1.0 + setting.figure()),
+        angle_deg: matches!(setting, Setting::HeadTurned(_)).then_some(setting.figure().to_degrees()),
+        sure_ratio: sure_sd,
+    }
+}
+
 fn alert_report(alert: &Alert, dive: &Loop) -> AlertReport {
     let head = alert.source.and_then(|source| dive.sources().get(source.index()));
     AlertReport {
@@ -344,5 +381,6 @@ fn alert_report(alert: &Alert, dive: &Loop) -> AlertReport {
         x_m: alert.x_m,
         worst_m: alert.worst_m,
         head: head.map(|source| source.id.clone()),
+        setting: alert.setting.as_ref().map(|doubt| setting_report(doubt, dive)),
     }
 }

@@ -75,7 +75,7 @@ pub(super) fn advise(
     mut digests: ResMut<'_, Digests>,
 ) {
     for item in &placed.0 {
-        let Placed::Situation(at, situation) = item else { continue };
+        let Placed::Situation(at, situation, _) = item else { continue };
         let begun = tally.span.map(|(first, _)| first);
         let advice = advisor.advise(*at, situation, begun);
         digest(&mut digests.advice, *at, &advice);

@@ -5,6 +5,7 @@
 use bevy_ecs::prelude::{Res, ResMut, Single};
 
 use super::advise::Advisor;
+use super::doubt;
 use super::driving::{Driven, Driving};
 use super::judge::{Results, judge_one};
 use super::walls::{self, Sorting};
@@ -39,7 +40,8 @@ pub(super) fn cover(
     notices.0.clear();
     for item in &placed.0 {
         match item {
-            Placed::Situation(at, situation) => {
+            Placed::Situation(at, situation, doubts) => {
+                doubt::note(*at, situation, doubts, (&mut alerts, &mut notices, &mut digests));
                 driving.note(*at, situation, &tunnel.profile, &advisor.advisor);
                 note_beat(&mut coverage, &mut heads, &tunnel, (*at, situation), &mut requests);
                 if at.0 % LOOK_AROUND.0.unsigned_abs() == 0 {

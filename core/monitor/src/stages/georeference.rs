@@ -30,8 +30,9 @@ pub(super) fn georeference(
     placed.0.clear();
     for item in &positioned.0 {
         match *item {
-            Positioned::Beat { at, fix } => {
-                placed.0.push(Placed::Situation(at, situation(at, fix, &tunnel, &target, &heads)));
+            Positioned::Beat { at, fix, doubts } => {
+                let situation = situation(at, fix, &tunnel, &target, &heads);
+                placed.0.push(Placed::Situation(at, situation, doubts));
             }
             Positioned::Ping { event, fix } => {
                 let Some(event) = events.0.get(event) else { continue };

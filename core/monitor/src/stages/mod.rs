@@ -5,6 +5,7 @@
 mod advise;
 mod cover;
 mod decode;
+mod doubt;
 mod driving;
 mod georeference;
 mod judge;

@@ -4,7 +4,7 @@ use bevy_ecs::prelude::{Query, Res, ResMut, Single};
 
 use crate::advice_log::ADVICE_PERIOD;
 use crate::entities::{Mounted, Navigator, VehicleState};
-use crate::messages::{Events, Positioned, PositionedList};
+use crate::messages::{Doubts, Events, Positioned, PositionedList};
 use crate::resources::{Digests, VehicleEntities};
 use crate::result_stream::{RecordKind, ResultStream};
 use headrace_fusion::Times;
@@ -26,9 +26,11 @@ pub(super) fn navigate(
         // Time may stall or go back; each beat is emitted once. After a gap only the last beat is.
         if let Some(at) = beat_before(&mut navigator.next_beat, event.received) {
             let fix = navigator.navigation.fix(at);
-            *state = VehicleState { at: Some(at), fix, sd: navigator.navigation.pose_sd() };
+            let navigation = &navigator.navigation;
+            let doubts = Doubts { cable: navigation.cable_doubt(), setting: navigation.setting_doubt() };
+            *state = VehicleState { at: Some(at), fix, sd: navigation.pose_sd(), cable_doubt: doubts.cable };
             digest(&mut digests.poses, at, &state);
-            list.0.push(Positioned::Beat { at, fix });
+            list.0.push(Positioned::Beat { at, fix, doubts });
         }
         if matches!(event.reading, Reading::Sonar(_)) {
             let fix = navigator.navigation.fix(event.valid_at);

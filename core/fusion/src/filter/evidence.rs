@@ -1,0 +1,197 @@
+//! Sums by which settings are judged: of one parameter, and of a source that may sit where another does.
+
+use serde::{Deserialize, Serialize};
+
+use headrace_geometry::math;
+use headrace_geometry::time::MonoNs;
+
+/// Sources with ranges that are followed.
+pub(super) const FOLLOWED: usize = 12;
+/// One reading in so many is compared with its alternatives: each costs a ray.
+pub(super) const COMPARED: u32 = 4;
+/// Fewest blocks that say how sure a figure is.
+const FEWEST_BLOCKS: u32 = 8;
+/// Standard deviations from which a figure is certain, and from which an alternative is: how much it gains varies with the
+/// vehicle's place.
+const SURE: f64 = 6.0;
+const SURE_GAIN: f64 = 3.0;
+/// Standard deviations of place and roll within a spell, m and radians.
+const PLACE_SD_M: f64 = 0.3;
+const ROLL_SD_RAD: f64 = 0.005;
+/// What a comparison counts of a miss at most, m: a share of echoes is of something else.
+const MOST_MISSED_M: f64 = 0.5;
+/// Mean square by which a source must miss, m^2, and the share of it that an alternative may leave.
+const MISSES_M2: f64 = 0.01;
+const LEAVES: f64 = 0.4;
+
+/// Sums of one parameter within a spell, beside those of place and roll.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub(super) struct Line {
+    /// By place across and up, and by roll.
+    pub(super) by_pose: [f64; 3],
+    pub(super) squares: f64,
+    pub(super) residuals: f64,
+}
+
+/// Sums of a spell.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub(super) struct Spell {
+    pub(super) begun: Option<MonoNs>,
+    /// Information on place and roll, lower triangle by rows, and its right side.
+    pub(super) pose: [[f64; 3]; 3],
+    pub(super) residuals: [f64; 3],
+    pub(super) scale: Line,
+    pub(super) turned: [Line; FOLLOWED],
+}
+
+/// Sums of one parameter over blocks, freed of place and roll.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub(super) struct Fit {
+    pub(super) blocks: u32,
+    weight: f64,
+    value: f64,
+    weights_2: f64,
+    both: f64,
+    values_2: f64,
+}
+
+/// How a source's ranges fit where it sits, and where another does; itself the other way round, if that is the same.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub(super) struct Alternative {
+    pub(super) source: u16,
+    pub(super) other: u16,
+    pub(super) is_echo: bool,
+    /// Of the block, and of all blocks before: squares missed, those missed by the alternative, readings.
+    pub(super) block: [f64; 3],
+    pub(super) all: [f64; 3],
+    pub(super) blocks: u32,
+    pub(super) gains: f64,
+    pub(super) gains_2: f64,
+}
+
+impl Line {
+    pub(super) fn add(&mut self, by_pose: [f64; 3], by: f64, residual_m: f64, weight: f64) {
+        for (sum, part) in self.by_pose.iter_mut().zip(by_pose) {
+            *sum += weight * by * part;
+        }
+        self.squares += weight * by * by;
+        self.residuals += weight * by * residual_m;
+    }
+}
+
+impl Spell {
+    /// The lower Cholesky factor of the information on place and roll, priors included.
+    pub(super) fn factor(&self) -> Option<[[f64; 3]; 3]> {
+        let priors = [PLACE_SD_M, PLACE_SD_M, ROLL_SD_RAD].map(|sd| 1.0 / (sd * sd));
+        let [[a, ..], [b, c, _], [d, e, f]] = self.pose;
+        let [p, q, r] = priors;
+        let aa = math::sqrt(a + p);
+        let (ba, da) = (b / aa, d / aa);
+        let bb = math::sqrt((c + q - ba * ba).max(0.0));
+        let dc = (e - da * ba) / bb;
+        let dd = math::sqrt((f + r - da * da - dc * dc).max(0.0));
+        let factor = [[aa, 0.0, 0.0], [ba, bb, 0.0], [da, dc, dd]];
+        (aa > 0.0 && bb > 0.0 && dd > 0.0 && factor.iter().flatten().all(|x| x.is_finite())).then_some(factor)
+    }
+
+    /// Weight and weighted value of a parameter, freed of place and roll.
+    pub(super) fn freed(&self, line: &Line, factor: &[[f64; 3]; 3]) -> [f64; 2] {
+        let (by, residuals) = (solved(factor, line.by_pose), solved(factor, self.residuals));
+        let dot = |a: &[f64; 3], b: &[f64; 3]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        [line.squares - dot(&by, &by), line.residuals - dot(&by, &residuals)]
+    }
+}
+
+/// Forward substitution.
+fn solved([[a, ..], [b, c, _], [d, e, f]]: &[[f64; 3]; 3], [x, y, z]: [f64; 3]) -> [f64; 3] {
+    let x = x / a;
+    let y = (y - b * x) / c;
+    [x, y, (z - d * x - e * y) / f]
+}
+
+impl Fit {
+    pub(super) fn add(&mut self, [weight, value]: [f64; 2]) {
+        if weight <= 0.0 {
+            return;
+        }
+        self.blocks += 1;
+        self.weight += weight;
+        self.value += value;
+        self.weights_2 += weight * weight;
+        self.both += weight * value;
+        self.values_2 += value * value;
+    }
+
+    /// Estimate and standard deviation by the scatter of blocks.
+    pub(super) fn estimate(&self) -> Option<[f64; 2]> {
+        if self.blocks < FEWEST_BLOCKS || self.weight <= 0.0 {
+            return None;
+        }
+        let estimate = self.value / self.weight;
+        let scatter = self.values_2 - 2.0 * estimate * self.both + estimate * estimate * self.weights_2;
+        let n = f64::from(self.blocks);
+        Some([estimate, math::sqrt((scatter * n / (n - 1.0)).max(0.0)) / self.weight])
+    }
+
+    /// The estimate where it is certainly beyond this, and its standard deviations from zero.
+    pub(super) fn certain(&self, least: f64) -> Option<(f64, f64)> {
+        let [estimate, sd] = self.estimate()?;
+        let sure_sd = estimate.abs() / sd.max(f64::MIN_POSITIVE);
+        (estimate.abs() >= least && sure_sd >= SURE).then_some((estimate, sure_sd))
+    }
+
+    /// Sum of normalised squares that it explains.
+    pub(super) fn explains(&self) -> f64 {
+        self.value * self.value / self.weight.max(f64::MIN_POSITIVE)
+    }
+}
+
+impl Alternative {
+    /// Adds a reading: missed where it sits, and where the other sits, m.
+    pub(super) fn note(&mut self, missed_m: [f64; 2]) {
+        let [own, theirs] = missed_m.map(|missed_m| missed_m.abs().min(MOST_MISSED_M));
+        for (sum, part) in self.block.iter_mut().zip([own * own, theirs * theirs, 1.0]) {
+            *sum += part;
+        }
+    }
+
+    pub(super) fn close(&mut self) {
+        let [own, theirs, readings] = self.block;
+        if readings <= 0.0 {
+            return;
+        }
+        for (sum, part) in self.all.iter_mut().zip(self.block) {
+            *sum += part;
+        }
+        let gain = (own - theirs) / readings;
+        self.blocks += 1;
+        self.gains += gain;
+        self.gains_2 += gain * gain;
+    }
+
+    /// Share of its squares that the alternative leaves.
+    pub(super) fn share_left(&self) -> f64 {
+        let [own, theirs, _] = self.all;
+        theirs / own.max(f64::MIN_POSITIVE)
+    }
+
+    /// Standard deviations by which the alternative fits better, where it certainly does and leaves little: of both, for two
+    /// sources that are swapped.
+    pub(super) fn certain(&self, share_left: f64) -> Option<f64> {
+        let [own, _, readings] = self.all;
+        let n = f64::from(self.blocks);
+        if self.blocks < FEWEST_BLOCKS || own < MISSES_M2 * readings || share_left > LEAVES {
+            return None;
+        }
+        let mean = self.gains / n;
+        let sd = math::sqrt(((self.gains_2 / n - mean * mean) / (n - 1.0)).max(0.0));
+        let sure_sd = mean / sd.max(f64::MIN_POSITIVE);
+        (sure_sd >= SURE_GAIN).then_some(sure_sd)
+    }
+
+    /// Sum of normalised squares that it explains, for a range of 3 cm.
+    pub(super) fn explains(&self) -> f64 {
+        let [own, theirs, _] = self.all;
+        (own - theirs) * f64::from(COMPARED) / (0.03 * 0.03)
+    }
+}

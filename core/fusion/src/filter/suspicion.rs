@@ -1,0 +1,401 @@
+//! Settings that the ranges contradict: one parameter each, fitted to what ranges lack of the design.
+//!
+//! Within a spell of some seconds the vehicle's place and roll may be off by what explains the ranges best; what is left is
+//! fitted. Spells add up to blocks of way. Blocks are as independent as the wall lets them be, and their scatter says how sure
+//! a figure is. Derivation: `docs/fusion.md`, "Settings in doubt".
+
+use serde::{Deserialize, Serialize};
+
+use super::evidence::{Alternative, COMPARED, FOLLOWED, Fit, Line, Spell};
+use super::measure::{self, Beam, ScalarUpdate, with_quantum};
+use super::settings::Settings;
+use super::sources::Source;
+use super::state::{ATTITUDE, POSITION, State, vec};
+use super::window::Waiting;
+use headrace_geometry::frames::{Body, Rot, Sensor, Tunnel, Vec3, head_direction};
+use headrace_geometry::math;
+use headrace_geometry::site::Site;
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_geometry::tunnel::Profile;
+use headrace_sensor::device::{SensorInfo, SensorKind};
+use headrace_sensor::reading::Reading;
+use headrace_snapshot::stateful;
+
+/// Length of a spell: as long as a filter that is told wrong ranges stays about where it is.
+const SPELL: DurNs = DurNs(2_000_000_000);
+/// Shortest block, in time and in way; one in which the vehicle hardly moves is given up after the longest time.
+const BLOCK: DurNs = DurNs(20_000_000_000);
+const BLOCK_M: f64 = 3.0;
+const LONGEST: DurNs = DurNs(120_000_000_000);
+/// Fewest readings of a block.
+const FEWEST_READINGS: u32 = 100;
+/// Least figures that are told: a share of the range, and an angle.
+const LEAST_SCALE: f64 = 0.015;
+const LEAST_ROLL_RAD: f64 = 0.03;
+/// Residual from which a range weighs less, and beyond which it doesn't count, m.
+const FAR_M: f64 = 0.5;
+const BEYOND_M: f64 = 2.0;
+/// Alternatives of the sources that are followed.
+const ALTERNATIVES: usize = FOLLOWED * FOLLOWED;
+/// Mean square by which an echosounder misses that doesn't fit at all, m^2: it draws the estimate off, and makes heads look
+/// turned.
+const ASTRAY_M2: f64 = 0.04;
+
+/// A setting that is likely wrong.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub enum Setting {
+    /// Ranges are too long by this share: the speed of sound is set too high, or the wall is that much wider than
+    /// drawn.
+    RangeScale(f64),
+    /// A head is turned about its axis from how it is said to sit, radians: to be added to its roll.
+    HeadTurned(f64),
+    /// A source looks the other way.
+    WrongWayRound,
+    /// Two sources are swapped: the other's number.
+    Swapped(u16),
+}
+
+/// A setting in doubt.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct SettingDoubt {
+    /// What is likely wrong.
+    pub setting: Setting,
+    /// Number of the source, for what is one source's.
+    pub source: Option<u16>,
+    /// Standard deviations from right.
+    pub sure_sd: f64,
+}
+
+impl Setting {
+    /// The word used in reports and logs.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::RangeScale(_) => "range_scale",
+            Self::HeadTurned(_) => "head_turned",
+            Self::WrongWayRound => "wrong_way_round",
+            Self::Swapped(_) => "swapped",
+        }
+    }
+
+    /// The share or the angle, radians; 0 where there is none.
+    pub fn figure(self) -> f64 {
+        match self {
+            Self::RangeScale(figure) | Self::HeadTurned(figure) => figure,
+            Self::WrongWayRound | Self::Swapped(_) => 0.0,
+        }
+    }
+
+    /// The other source, of two that are swapped.
+    pub fn other(self) -> Option<u16> {
+        match self {
+            Self::Swapped(other) => Some(other),
+            _ => None,
+        }
+    }
+}
+
+impl SettingDoubt {
+    /// Whether it is of the same setting, whatever the figure.
+    pub fn is_of_same(&self, other: &Self) -> bool {
+        self.source == other.source
+            && self.setting.as_str() == other.setting.as_str()
+            && self.setting.other() == other.setting.other()
+    }
+}
+
+/// What ranges are compared with.
+#[derive(Debug, Clone, Copy)]
+pub struct Design<'a> {
+    /// Design profile.
+    pub profile: &'a Profile,
+    /// Water.
+    pub site: &'a Site,
+    /// Noise settings of the sensors.
+    pub settings: &'a Settings,
+    /// Position of the inertial unit on the vehicle.
+    pub unit_at: Vec3<Body>,
+}
+
+/// A reading's range against the design.
+struct Look {
+    beam: Beam,
+    range_m: f64,
+    sd_m: f64,
+}
+
+/// Where and when a block began, its readings, and the sums of its spells, freed of place and roll.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+struct Block {
+    begun: Option<(MonoNs, f64)>,
+    readings: u32,
+    scale: [f64; 2],
+    turned: [[f64; 2]; FOLLOWED],
+}
+
+/// See the module's description.
+#[derive(Debug, Clone)]
+pub struct Suspicions {
+    block: Block,
+    spell: Spell,
+    followed: [Option<u16>; FOLLOWED],
+    scale: Fit,
+    turned: [Fit; FOLLOWED],
+    alternatives: Vec<Alternative>,
+    /// Readings of each source that is followed.
+    heard: [u32; FOLLOWED],
+    doubt: Option<SettingDoubt>,
+}
+
+stateful!(Suspicions { state: block, spell, followed, scale, turned, heard, doubt; lists: alternatives; });
+
+impl Default for Suspicions {
+    /// Allocated without readings.
+    fn default() -> Self {
+        Self {
+            block: Block::default(),
+            spell: Spell::default(),
+            followed: [None; FOLLOWED],
+            scale: Fit::default(),
+            turned: [Fit::default(); FOLLOWED],
+            alternatives: Vec::with_capacity(ALTERNATIVES),
+            heard: [0; FOLLOWED],
+            doubt: None,
+        }
+    }
+}
+
+impl Suspicions {
+    /// The likeliest of the settings that are certainly wrong.
+    pub fn doubt(&self) -> Option<SettingDoubt> {
+        self.doubt
+    }
+
+    /// Takes a reading that isn't fused yet, with the estimate at its time.
+    ///
+    /// Allocates: never.
+    pub fn hear(
+        &mut self,
+        state: &State,
+        design: &Design<'_>,
+        sources: &[Option<Source>],
+        waiting: &Waiting,
+    ) {
+        let Some(info) = info(sources, waiting.source) else { return };
+        let Some(look) = look(info, design, &waiting.reading) else { return };
+        let Some(slot) = self.slot(waiting.source) else { return };
+        let x_m = state.position.x();
+        let spell_begun = *self.spell.begun.get_or_insert(waiting.at);
+        if !(0..SPELL.0).contains(&waiting.at.since(spell_begun).0) {
+            self.end_spell();
+        }
+        let (begun, from_m) = *self.block.begun.get_or_insert((waiting.at, x_m));
+        let (lasted, moved_m) = (waiting.at.since(begun).0, (x_m - from_m).abs());
+        if lasted >= BLOCK.0 && moved_m >= BLOCK_M {
+            self.close();
+        } else if !(0..LONGEST.0).contains(&lasted) {
+            self.give_up();
+        }
+        let Some(row) = expect(state, design, &look) else { return };
+        if let Some(heard) = self.heard.get_mut(slot) {
+            *heard = heard.wrapping_add(1);
+            if heard.is_multiple_of(COMPARED) {
+                self.compare(state, design, sources, waiting, row.residual);
+            }
+        }
+        if row.residual.abs() > BEYOND_M {
+            return;
+        }
+        let axis = state.attitude * (info.mount.rotation * Vec3::<Sensor>::new(1.0, 0.0, 0.0));
+        let place = vec::<Tunnel>(&row.h, POSITION);
+        let arm = state.attitude * look.beam.offset;
+        let turned = (vec::<Tunnel>(&row.h, ATTITUDE) + -arm.cross(&place)).dot(&axis);
+        let expected_m = look.range_m - row.residual;
+        let roll = row.h.get(ATTITUDE).copied().unwrap_or(0.0);
+        let by_pose = [place.y(), place.z(), roll];
+        // What is known to be wrong makes nothing an outlier.
+        let scale = self.scale.estimate().map_or(0.0, |[scale, _]| scale);
+        let off_m = row.residual.abs().min((row.residual - scale * expected_m).abs());
+        let weight = (FAR_M / off_m.max(FAR_M)) / row.noise;
+        self.block.readings += 1;
+        for (k, (by, line)) in by_pose.iter().zip(&mut self.spell.pose).enumerate() {
+            for (sum, other) in line.iter_mut().zip(&by_pose) {
+                *sum += weight * by * other;
+            }
+            if let Some(sum) = self.spell.residuals.get_mut(k) {
+                *sum += weight * by * row.residual;
+            }
+        }
+        self.spell.scale.add(by_pose, expected_m, row.residual, weight);
+        if let Some(line) = self.spell.turned.get_mut(slot).filter(|_| info.kind == SensorKind::Head) {
+            line.add(by_pose, turned, row.residual, weight);
+        }
+    }
+
+    /// The place of a source among those that are followed.
+    fn slot(&mut self, source: usize) -> Option<usize> {
+        let source = u16::try_from(source).ok()?;
+        let place = self.followed.iter().position(|known| known.is_none_or(|known| known == source))?;
+        *self.followed.get_mut(place)? = Some(source);
+        Some(place)
+    }
+
+    /// Compares a reading with what the other sources of its kind would have read, and itself the other way round.
+    fn compare(
+        &mut self,
+        state: &State,
+        design: &Design<'_>,
+        sources: &[Option<Source>],
+        waiting: &Waiting,
+        missed_m: f64,
+    ) {
+        let Some(own) = info(sources, waiting.source) else { return };
+        for other in self.followed.iter().flatten() {
+            let Some(theirs) = info(sources, usize::from(*other)) else { continue };
+            let is_own = usize::from(*other) == waiting.source;
+            if core::mem::discriminant(&theirs.kind) != core::mem::discriminant(&own.kind) {
+                continue;
+            }
+            let Some(mut look) = look(&SensorInfo { mount: theirs.mount, ..*own }, design, &waiting.reading)
+            else {
+                continue;
+            };
+            if is_own {
+                look.beam.along =
+                    own.mount.rotation * (round() * (own.mount.rotation.inverse() * look.beam.along));
+            }
+            let Some(row) = expect(state, design, &look) else { continue };
+            let Ok(source) = u16::try_from(waiting.source) else { continue };
+            let is_echo = own.kind != SensorKind::Head;
+            note(&mut self.alternatives, (source, *other, is_echo), [missed_m, row.residual]);
+        }
+    }
+
+    fn end_spell(&mut self) {
+        let spell = core::mem::take(&mut self.spell);
+        let Some(factor) = spell.factor() else { return };
+        let add = |sums: &mut [f64; 2], line: &Line| {
+            for (sum, part) in sums.iter_mut().zip(spell.freed(line, &factor)) {
+                *sum += part;
+            }
+        };
+        add(&mut self.block.scale, &spell.scale);
+        for (sums, line) in self.block.turned.iter_mut().zip(&spell.turned) {
+            add(sums, line);
+        }
+    }
+
+    fn give_up(&mut self) {
+        self.spell = Spell::default();
+        self.block = Block::default();
+        for alternative in &mut self.alternatives {
+            alternative.block = [0.0; 3];
+        }
+    }
+
+    /// Ends a block.
+    fn close(&mut self) {
+        self.end_spell();
+        if self.block.readings >= FEWEST_READINGS {
+            self.scale.add(self.block.scale);
+            for (fit, sums) in self.turned.iter_mut().zip(self.block.turned) {
+                fit.add(sums);
+            }
+            for alternative in &mut self.alternatives {
+                alternative.close();
+            }
+            self.doubt = self.likeliest();
+        }
+        self.give_up();
+    }
+
+    fn likeliest(&self) -> Option<SettingDoubt> {
+        let mut best: Option<(f64, SettingDoubt)> = None;
+        let mut propose = |explains: f64, doubt: SettingDoubt| {
+            if best.is_none_or(|(before, _)| explains > before) {
+                best = Some((explains, doubt));
+            }
+        };
+        if let Some((share, sure_sd)) = self.scale.certain(LEAST_SCALE) {
+            let setting = Setting::RangeScale(share);
+            propose(self.scale.explains(), SettingDoubt { setting, source: None, sure_sd });
+        }
+        let is_astray = self.alternatives.iter().any(|of| of.is_echo && of.all[0] > ASTRAY_M2 * of.all[2]);
+        for (source, fit) in self.followed.iter().zip(&self.turned) {
+            if let Some((by_rad, sure_sd)) = fit.certain(LEAST_ROLL_RAD).filter(|_| !is_astray) {
+                let setting = Setting::HeadTurned(by_rad);
+                propose(fit.explains(), SettingDoubt { setting, source: *source, sure_sd });
+            }
+        }
+        for own in &self.alternatives {
+            let source = Some(own.source);
+            if own.source == own.other {
+                if let Some(sure_sd) = own.certain(own.share_left()) {
+                    let setting = Setting::WrongWayRound;
+                    propose(own.explains(), SettingDoubt { setting, source, sure_sd });
+                }
+                continue;
+            }
+            let is_return = |other: &&Alternative| (other.source, other.other) == (own.other, own.source);
+            let Some(other) = self.alternatives.iter().find(is_return) else { continue };
+            let left = (own.all[1] + other.all[1]) / (own.all[0] + other.all[0]).max(f64::MIN_POSITIVE);
+            let sure_sd = own.certain(left).zip(other.certain(left));
+            if let Some((own_sd, other_sd)) = sure_sd.filter(|_| own.source < own.other) {
+                let (setting, sure_sd) = (Setting::Swapped(own.other), own_sd.min(other_sd));
+                propose(own.explains() + other.explains(), SettingDoubt { setting, source, sure_sd });
+            }
+        }
+        best.map(|(_, doubt)| doubt)
+    }
+}
+
+fn info(sources: &[Option<Source>], number: usize) -> Option<&SensorInfo> {
+    sources.get(number)?.as_ref().map(|source| &source.sensor)
+}
+
+/// Half a turn about a sensor's own vertical.
+fn round() -> Rot<Sensor, Sensor> {
+    Rot::from_roll_pitch_yaw(0.0, 0.0, math::PI)
+}
+
+/// What a reading of a source that sits so has measured; `None` without a range.
+fn look(info: &SensorInfo, design: &Design<'_>, reading: &Reading) -> Option<Look> {
+    let Design { site, settings, unit_at, .. } = design;
+    let (along, range_m, first_rad, unsure_rad, sd_m) = match (info.kind, reading) {
+        (SensorKind::Head, Reading::Sonar(sonar)) => (
+            head_direction(sonar.angle_rad),
+            site.rescaled_range_m(sonar.range_m?, sonar.sound_speed_mps),
+            settings.return_beam_rad / 2.0,
+            0.0,
+            with_quantum(settings.return_sd_m, sonar.resolution_m),
+        ),
+        (SensorKind::Echosounder { .. }, Reading::Echo(echo)) => (
+            Vec3::new(1.0, 0.0, 0.0),
+            site.rescaled_range_m(echo.range_m?, echo.sound_speed_mps),
+            0.0,
+            settings.echo_beam_rad / 2.0,
+            settings.echo_sd_m,
+        ),
+        _ => return None,
+    };
+    let offset = info.mount.position + -*unit_at;
+    let beam = Beam { offset, along: info.mount.rotation * along, first_rad, unsure_rad };
+    Some(Look { beam, range_m, sd_m })
+}
+
+fn expect(state: &State, design: &Design<'_>, look: &Look) -> Option<ScalarUpdate> {
+    measure::range(state, design.profile, &look.beam, look.range_m, look.sd_m)
+}
+
+fn note(alternatives: &mut Vec<Alternative>, (source, other, is_echo): (u16, u16, bool), missed_m: [f64; 2]) {
+    let known = alternatives.iter().position(|known| (known.source, known.other) == (source, other));
+    let place = known.unwrap_or(alternatives.len());
+    if known.is_none() {
+        if alternatives.len() >= ALTERNATIVES {
+            return;
+        }
+        alternatives.push(Alternative { source, other, is_echo, ..Alternative::default() });
+    }
+    if let Some(alternative) = alternatives.get_mut(place) {
+        alternative.note(missed_m);
+    }
+}

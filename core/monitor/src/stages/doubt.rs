@@ -1,0 +1,33 @@
+//! What navigation doubts, as alerts.
+
+use super::judge::digest_alert;
+use crate::alerts::{AlertKind, Alerts};
+use crate::messages::{Doubts, Notice, Notices};
+use crate::resources::Digests;
+use headrace_fusion::filter::cable::CableDoubt;
+use headrace_geometry::time::MonoNs;
+use headrace_sampling::passes::Situation;
+
+/// Notes the doubts of a beat.
+pub(super) fn note(
+    at: MonoNs,
+    situation: &Situation,
+    doubts: &Doubts,
+    (alerts, notices, digests): (&mut Alerts, &mut Notices, &mut Digests),
+) {
+    let mut tell = |kind: AlertKind, x_m: f64, off_m: f64| {
+        notices.0.push(Notice::Alert(kind, None));
+        digest_alert(digests, kind, None, at, (x_m, off_m));
+    };
+    if let Some(CableDoubt { since, from_m, way_m }) = doubts.cable
+        && alerts.note_lasting(AlertKind::CableDoubted, since, from_m, way_m)
+    {
+        tell(AlertKind::CableDoubted, from_m, way_m);
+    }
+    let x_m = situation.pose.map(|pose| pose.position.x());
+    if let Some((doubt, x_m)) = doubts.setting.zip(x_m)
+        && alerts.note_setting(at, x_m, &doubt)
+    {
+        tell(AlertKind::SettingDoubted, x_m, doubt.setting.figure());
+    }
+}

@@ -1,0 +1,144 @@
+//! Settings that are wrong are named with their figure within a hundred metres, and right ones aren't.
+
+use headrace_monitor::report::SettingReport;
+use headrace_simulator::Scene;
+use headrace_tests::field_table::{Cell, Condition, Driven, VEHICLES};
+use headrace_tests::{scenes, truth};
+
+fn doubted(scene: &Scene, believed: &Scene) -> Option<SettingReport> {
+    let report = truth::dive_believing(scene, &believed.vehicle).report;
+    report.alerts.iter().find_map(|alert| alert.setting.clone())
+}
+
+/// A vehicle file in which a line of one sensor is another.
+fn changed(file: &str, sensor: &str, key: &str, value: &str) -> String {
+    let head = format!("id = {sensor:?}");
+    let at = file.find(&head).unwrap();
+    let end = file[at..].find("\n[").map_or(file.len(), |end| at + end);
+    let table = &file[at..end];
+    let kept: Vec<&str> = table.lines().filter(|line| !line.starts_with(key)).collect();
+    format!("{}{}\n{key} = {value}\n{}", &file[..at], kept.join("\n"), &file[end..])
+}
+
+fn sensor_line(file: &str, sensor: &str, key: &str) -> String {
+    let at = file.find(&format!("id = {sensor:?}")).unwrap();
+    let line = file[at..].lines().find(|line| line.starts_with(key)).unwrap();
+    line.split(" = ").nth(1).unwrap().split('#').next().unwrap().trim().to_owned()
+}
+
+fn file(name: &str) -> String {
+    String::from_utf8(headrace_tests::scenes::vehicle_file(name).unwrap()).unwrap()
+}
+
+const EFFECTS: &str = "motion_within_turn = {}\nocclusion = {}\ndepth_steps = {}\nrange_noise = { sd_m = 0.01 }\n\
+     imu_noise = { gyro_degps_rthz = 0.007, accel_mps2_rthz = 0.001, attitude_deg = 0.3 }\n\
+     imu_bias = { gyro_degps = 0.003, accel_mps2 = 0.002, tau_s = 300 }\n";
+
+/// A dive of 100 m by a pilot who wanders a little, of a vehicle as it is, headrace being told another file.
+fn told(truly: &str, told: &str, aside_m: f64, seed: u64) -> Option<SettingReport> {
+    let text = format!(
+        "seed = {seed}\nvehicle = \"vehicle.toml\"\n[trajectory]\nkind = \"pilot\"\nstart_m = 100\nto_m = 190\n\
+         speed_mps = 0.15\nwander_across_m = {aside_m}\nwander_up_m = {}\nwander_yaw_deg = 3\nwander_pitch_deg = 1\n\
+         wander_roll_deg = 1\n[effects]\n{EFFECTS}",
+        aside_m / 2.0
+    );
+    let parse =
+        |file: &str| headrace_tests::scenes::seeded(&text, &|_| Ok(file.as_bytes().to_vec()), Some(seed));
+    doubted(&parse(truly), &parse(told))
+}
+
+/// The vehicles, and a head of each.
+const OF_VEHICLES: [(&str, &str); 2] = [("vita1.toml", "sonar_0"), ("vita2-4.toml", "sonar_1")];
+const ASIDE_M: f64 = 0.5;
+
+#[test]
+fn a_head_turned_about_its_axis_is_named_with_its_angle() {
+    for (name, head) in OF_VEHICLES {
+        let right = file(name);
+        for by_deg in [3, -3] {
+            let turned = changed(&right, head, "angles_deg", &format!("[{by_deg}, 0, 0]"));
+            let doubt = told(&turned, &right, ASIDE_M, 1).unwrap();
+            println!("{name}: {doubt:?}");
+            assert_eq!((doubt.what, doubt.source.as_deref()), ("head_turned", Some(head)), "{name}");
+            let share = doubt.angle_deg.unwrap() / f64::from(by_deg);
+            assert!((share - 1.0).abs() < 0.3, "{name}: {doubt:?}");
+        }
+    }
+}
+
+#[test]
+fn a_head_the_wrong_way_round_is_named_where_the_vehicle_leaves_the_middle() {
+    for (name, head) in OF_VEHICLES {
+        let right = file(name);
+        let doubt = told(&changed(&right, head, "angles_deg", "[0, 0, 180]"), &right, ASIDE_M, 1).unwrap();
+        assert_eq!(
+            (doubt.what, doubt.source.as_deref()),
+            ("wrong_way_round", Some(head)),
+            "{name}: {doubt:?}"
+        );
+    }
+}
+
+#[test]
+fn heads_that_are_swapped_are_named() {
+    let right = file("vita2-4.toml");
+    let mut swapped = right.clone();
+    for key in ["position_m", "angles_deg"] {
+        let [one, other] = ["sonar_1", "sonar_3"].map(|head| sensor_line(&right, head, key));
+        swapped = changed(&changed(&swapped, "sonar_1", key, &other), "sonar_3", key, &one);
+    }
+    let doubt = told(&swapped, &right, ASIDE_M, 1).unwrap();
+    let SettingReport { what, source, other, .. } = &doubt;
+    let named = (*what, source.as_deref(), other.as_deref());
+    assert_eq!(named, ("swapped", Some("sonar_1"), Some("sonar_3")), "{doubt:?}");
+}
+
+fn cell(vehicle: &str, condition: Condition) -> Cell {
+    let vehicle = VEHICLES.into_iter().find(|known| known.name == vehicle).unwrap();
+    Cell { vehicle, condition, start_m: 100.0, driven: Driven::Planned }
+}
+
+/// Ranges by sound that is faster than told are too short; a wall that is wider is too far.
+#[test]
+fn a_scale_of_ranges_is_named_with_its_figure() {
+    for vehicle in ["vita1", "vita2-4"] {
+        for (condition, share) in [(Condition::WrongSound, 1.0 / 1.04 - 1.0), (Condition::WrongWall, 0.06)] {
+            let dive = cell(vehicle, condition).dive(1, 50.0);
+            let doubt = doubted(&dive.scene, &dive.believed).unwrap();
+            println!("{vehicle} {condition:?}: {doubt:?}");
+            assert_eq!(doubt.what, "range_scale", "{vehicle}: {doubt:?}");
+            assert!(
+                ((doubt.range_ratio.unwrap() - 1.0) / share - 1.0).abs() < 0.32,
+                "{vehicle} {condition:?}: {doubt:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn right_settings_are_not_doubted() {
+    for (name, _) in OF_VEHICLES {
+        let right = file(name);
+        assert_eq!(told(&right, &right, ASIDE_M, 1), None, "{name}");
+    }
+    let conditions =
+        [Condition::Clean, Condition::DataSheet, Condition::Poor, Condition::Murk, Condition::Lively];
+    for vehicle in ["vita1", "vita2-2", "vita2-4"] {
+        for condition in conditions {
+            let dive = cell(vehicle, condition).dive(3, 45.0);
+            assert_eq!(doubted(&dive.scene, &dive.believed), None, "{vehicle} {condition:?}");
+        }
+    }
+}
+
+#[test]
+fn walls_that_are_not_as_drawn_here_and_there_are_no_settings() {
+    for name in ["collapse", "boulders", "steel", "vita1-field"] {
+        let path = headrace_tests::root().join(format!("deploy/scenes/{name}.toml"));
+        let text = std::fs::read_to_string(path).unwrap().replace("../vehicles/", "");
+        let scene = scenes::scene(&text);
+        let doubt = doubted(&scene, &scene);
+        println!("{name}: {doubt:?}");
+        assert_eq!(doubt, None, "{name}");
+    }
+}
