@@ -266,7 +266,7 @@ fn cover(samples: &[(f64, f64, usize)], length_m: f64) -> Coverage {
         let sample = WallSample { x_m: *x_m, arc_m: *arc_m, head: *head, step_m };
         coverage.store.insert(sample).unwrap();
         coverage.soundings.add(*x_m, *arc_m);
-        coverage.sections.touch(*x_m);
+        coverage.sections.touch(*x_m, 0);
     }
     coverage
 }

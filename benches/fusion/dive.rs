@@ -35,7 +35,7 @@ const DEPTH: usize = TETHER + 1;
 pub(crate) struct Dive {
     context: Context,
     window: Window,
-    sources: [Option<Source>; MAX_SOURCES],
+    sources: Vec<Option<Source>>,
     running: Eskf,
     readings: [(usize, Reading); SOUNDERS + 3],
 }

@@ -139,6 +139,10 @@ pub struct Section {
     pub doubtful: u32,
     /// It holds samples of a head that wasn't believed soon after.
     pub suspect: bool,
+    /// Stretch of navigation of the first sample within T of it.
+    tie: Option<u32>,
+    /// Samples of several stretches of navigation lie within T of it, and it hadn't passed before.
+    pub mixed: bool,
 }
 
 /// Minimum samples for a section to contradict the profile.
@@ -159,12 +163,20 @@ impl Section {
         self.samples >= FEW && self.deviation.contradicts()
     }
 
+    /// Notes the stretch of navigation of a sample. Where samples of several lie side by side, nothing sure relates them, and
+    /// those of one may only seem to fill the holes of another.
+    pub(super) fn note_tie(&mut self, tie: u32) {
+        let first = *self.tie.get_or_insert(tie);
+        self.mixed |= first != tie && self.verdict != Verdict::Pass;
+    }
+
     /// Whether a small hole is no evidence of coverage: the profile is wrong, there is no wall, or what was taken for wall
     /// may be none.
     pub(super) fn is_doubtful(&self) -> bool {
         self.contradicts()
             || self.masked_share > ALL_MASKED
             || self.suspect
+            || self.mixed
             || self.doubtful > self.samples
             || self.is_of_another_size()
     }

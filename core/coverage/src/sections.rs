@@ -156,12 +156,13 @@ impl Sections {
         self.sections.get_mut(usize::try_from(index - self.first).ok()?)
     }
 
-    /// Records a sample at `x_m`: every section within T of it is due for judging again.
-    pub fn touch(&mut self, x_m: f64) {
+    /// Records a sample at `x_m` of a stretch of navigation: every section within T of it is due for judging again.
+    pub fn touch(&mut self, x_m: f64, tie: u32) {
         let (from, to) = (self.index_of(x_m - self.target_m), self.index_of(x_m + self.target_m));
         for index in from..=to {
             if let Some(section) = self.get_mut(index) {
                 section.stale = true;
+                section.note_tie(tie);
             }
         }
     }

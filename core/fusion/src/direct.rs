@@ -171,6 +171,7 @@ impl Navigation for DirectNavigation {
         Ok(Fix {
             pose: Pose { position: Point3::new(x_m, y_m, z_m), attitude },
             speed_mps,
+            tie: 0,
             // Two independent roundings to the counter's quantum.
             relative: Relative::along(self.tether.resolution_m * math::sqrt(2.0 / 12.0)),
         })

@@ -91,6 +91,8 @@ pub enum Use {
     Fuse,
     /// Don't.
     Withhold,
+    /// Don't from now on: the counter's rate has changed by so much, m/s, and readings just before may have misled the speed.
+    Left(f64),
     /// The counter runs truly again.
     Slipped(Slip),
     /// The counter runs on as before: it is the inertial unit that is wrong.
@@ -179,6 +181,8 @@ impl Cable {
                 return Use::Unsteady;
             }
             self.doubt = Some(Doubt::between(first, reading, self.rate_mps));
+            let now_mps = (reading.shown_m - first.shown_m) / reading.at.since(first.at).as_secs_f64();
+            return Use::Left((now_mps - self.rate_mps).abs());
         }
         Use::Withhold
     }

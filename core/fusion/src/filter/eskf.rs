@@ -46,6 +46,8 @@ const SPEED_SD_MPS: f64 = 0.5;
 /// Standard deviation added to an estimate beyond the wall, m.
 const BEYOND_M: f64 = 1.5;
 
+/// Share of the change of a counter's rate that may have got into the speed before the counter wasn't believed.
+const MISLED_SHARE: f64 = 0.3;
 /// The loosest cable allowed for, m.
 const LOOSEST_M: f64 = 0.5;
 /// Time over which a loose cable is taken to tighten, s.
@@ -96,6 +98,8 @@ pub struct Eskf {
     pub clones: ErrorClones,
     /// When the chainage was last reacquired.
     pub way_sought: Option<MonoNs>,
+    /// How often what was placed before has lost its relation to what is placed from then on.
+    pub ties: u32,
     /// The estimates through the last epoch, before its measurements.
     knots: Vec<(MonoNs, State)>,
     agreement: Agreement,
@@ -113,7 +117,7 @@ pub struct Eskf {
     keeps_steps: bool,
 }
 
-stateful!(Eskf { state: at, state, factors, clones, way_sought, agreement, cable, unrest, loose_m, suspicions, doubts; lists: knots; fixed: steps, keeps_steps; });
+stateful!(Eskf { state: at, state, factors, clones, way_sought, ties, agreement, cable, unrest, loose_m, suspicions, doubts; lists: knots; fixed: steps, keeps_steps; });
 
 impl Default for Eskf {
     /// Allocated buffers without an estimate.
@@ -124,6 +128,7 @@ impl Default for Eskf {
             factors: Factors::independent([0.0; ERRORS]),
             clones: ErrorClones::default(),
             way_sought: None,
+            ties: 0,
             knots: Vec::with_capacity(KNOTS),
             agreement: Agreement::default(),
             cable: Cable::default(),
@@ -154,6 +159,7 @@ impl Eskf {
         self.cable = Cable::default();
         self.doubts = [0.0; ERRORS];
         self.way_sought = None;
+        self.ties += 1;
     }
 
     /// Advances to a later time, and fuses the window's readings up to it.
@@ -220,25 +226,35 @@ impl Eskf {
     }
 
     /// Judges a cable reading; whether it is to be fused. What it has lost becomes creep.
-    fn trusts(&mut self, reading: &cable::Reading) -> bool {
+    fn trusts(&mut self, reading: &cable::Reading, errors: &mut Errors) -> bool {
         match self.cable.take(reading) {
             Use::Fuse => return true,
             Use::Withhold => {}
+            Use::Left(by_mps) => {
+                let misled_mps = MISLED_SHARE * by_mps.min(SPEED_SD_MPS);
+                add_variance(&mut self.doubts, VELOCITY, misled_mps * misled_mps);
+                self.ties += 1;
+            }
             Use::Slipped(Slip { lost_m, doubted_m }) => {
+                // The vehicle stays where it is, so that what is placed now fits what was placed in the doubt.
+                add_variance(errors, CREEP, lost_m);
                 add_variance(&mut self.doubts, CREEP, lost_m * lost_m);
                 add_variance(&mut self.doubts, POSITION, doubted_m * doubted_m);
+                self.ties += 1;
             }
             Use::Loose(by_m) => {
                 self.loose_m = self.loose_m.max(by_m.min(LOOSEST_M));
                 add_variance(&mut self.doubts, SLACK, self.loose_m * self.loose_m);
                 add_variance(&mut self.doubts, POSITION, by_m * by_m);
                 agreement::seek_speed(&mut self.doubts);
+                self.ties += 1;
             }
             Use::Unsteady => agreement::seek_speed(&mut self.doubts),
             Use::Seek(lacking_m) => {
                 self.way_sought = Some(reading.at);
                 add_variance(&mut self.doubts, CREEP, lacking_m * lacking_m);
                 agreement::seek_way(&mut self.doubts);
+                self.ties += 1;
             }
         }
         false
@@ -349,7 +365,7 @@ impl Eskf {
         {
             let shown_m = zero_at_m + scale * length.length_m;
             let (at, sd_m) = (waiting.at, math::sqrt(variance));
-            agrees = self.trusts(&cable::Reading { at, shown_m, off_m: innovation, sd_m, agrees });
+            agrees = self.trusts(&cable::Reading { at, shown_m, off_m: innovation, sd_m, agrees }, errors);
         } else {
             self.agreement.note(kind, &row, agrees);
         }

@@ -424,6 +424,7 @@ impl Navigation for FilterNavigation {
         }
         let arm = state.attitude * -self.context.unit_at;
         let pose = Pose { position: state.position + arm, attitude: state.attitude };
-        Ok(Fix { pose, speed_mps: state.velocity_mps.x(), relative: relative.moved(arm) })
+        let (speed_mps, tie) = (state.velocity_mps.x(), self.running.ties);
+        Ok(Fix { pose, speed_mps, relative: relative.moved(arm), tie })
     }
 }

@@ -123,7 +123,8 @@ impl Track {
         let arm = pose.attitude * -piece.unit_at;
         let speed_mps = before.speed_mps + (after.speed_mps - before.speed_mps) * share;
         let pose = Pose { position: pose.position + arm, attitude: pose.attitude };
-        Ok(Fix { pose, speed_mps, relative: relative.moved(arm) })
+        let tie = u32::try_from(piece.points.start).unwrap_or(u32::MAX);
+        Ok(Fix { pose, speed_mps, relative: relative.moved(arm), tie })
     }
 
     fn points_of(&self, piece: &Piece) -> &[Point] {

@@ -40,7 +40,7 @@ pub(super) fn note_sample(
     *slot = kept.ok().map(|_| LastSample { point, arc_m, unbroken: true });
     kept?;
     coverage.soundings.add(point.x(), arc_m);
-    coverage.sections.touch(point.x());
+    coverage.sections.touch(point.x(), ping.fix.map_or(0, |fix| fix.tie));
     let index = coverage.sections.index_of(point.x());
     let Some(section) = coverage.sections.get_mut(index) else { return Ok(()) };
     section.samples += 1;
