@@ -7,6 +7,7 @@ use super::frontier::{Moved, Outlook, Reach, clear_of};
 use super::hole::{FARTHEST_M, Hole, HoleFinder};
 use super::metres::Metres;
 use super::openings::Opening;
+use super::passage::PassError;
 use super::runs::{RunChange, RunId, Runs, Telling};
 use super::section::{Judgement, Section, Verdict};
 use super::store::SampleStore;
@@ -263,9 +264,11 @@ impl Sections {
     pub fn judge(&mut self, request: &Request, judging: &mut Judging<'_>) -> Option<Judgement> {
         let (from_m, to_m) = self.bounds_m(request.section);
         let (target_m, confidence_sd) = (self.target_m, self.confidence_sd);
-        let section = self.get_mut(request.section)?;
+        self.get(request.section)?;
         let hole = judging.finder.largest(judging.store, from_m, to_m);
-        let sd_m = section.passage.pass_error.sd_m(judging.profile.point_at(hole.arc_m));
+        let pass_error = self.pass_error(request.section, &hole);
+        let section = self.get_mut(request.section)?;
+        let sd_m = pass_error.sd_m(judging.profile.point_at(hole.arc_m));
         let clear_m = clear_of(request.to_come, hole.x_m);
         let before = section.hole.map(|_| section.verdict);
         section.hole = Some(hole);
@@ -310,6 +313,19 @@ impl Sections {
         }
         metres.add(Verdict::Open, all as f64 * section_m);
         metres
+    }
+
+    /// The error of a section's passes; of one in which no head pinged, the largest of those that its hole touches.
+    fn pass_error(&self, index: i64, hole: &Hole) -> PassError {
+        if let Some(section) = self.get(index).filter(|section| section.passage.placed > 0) {
+            return section.passage.pass_error;
+        }
+        let radius_m = hole.diameter_m / 2.0;
+        let touched = self.index_of(hole.x_m - radius_m)..=self.index_of(hole.x_m + radius_m);
+        touched.filter_map(|index| self.get(index)).fold(PassError::default(), |mut worst, section| {
+            worst.add(&section.passage.pass_error);
+            worst
+        })
     }
 
     /// Adds a flagged section to its run; removes one whose flag was cleared.
