@@ -251,9 +251,8 @@ impl Sections {
         finder: &mut HoleFinder,
         profile: &Profile,
     ) -> bool {
-        let Some(section) = self.get(index) else { return false };
         let bounds_m = self.bounds_m(index);
-        let radius_m = self.margin_m(section.passage.pass_error.worst_m(profile));
+        let radius_m = self.margin_m(self.pass_error(index).worst_m(profile));
         let clear_m = clear_of(to_come, bounds_m.0).max(clear_of(to_come, bounds_m.1));
         clear_m > radius_m && finder.has_circle(store, bounds_m, to_come, radius_m)
     }
@@ -266,7 +265,7 @@ impl Sections {
         let (target_m, confidence_sd) = (self.target_m, self.confidence_sd);
         self.get(request.section)?;
         let hole = judging.finder.largest(judging.store, from_m, to_m);
-        let pass_error = self.pass_error(request.section, &hole);
+        let pass_error = self.pass_error(request.section);
         let section = self.get_mut(request.section)?;
         let sd_m = pass_error.sd_m(judging.profile.point_at(hole.arc_m));
         let clear_m = clear_of(request.to_come, hole.x_m);
@@ -315,14 +314,14 @@ impl Sections {
         metres
     }
 
-    /// The error of a section's passes; of one in which no head pinged, the largest of those that its hole touches.
-    fn pass_error(&self, index: i64, hole: &Hole) -> PassError {
+    /// The error of a section's passes; of one in which no head pinged, the largest of those within T / 2.
+    fn pass_error(&self, index: i64) -> PassError {
         if let Some(section) = self.get(index).filter(|section| section.passage.placed > 0) {
             return section.passage.pass_error;
         }
-        let radius_m = hole.diameter_m / 2.0;
-        let touched = self.index_of(hole.x_m - radius_m)..=self.index_of(hole.x_m + radius_m);
-        touched.filter_map(|index| self.get(index)).fold(PassError::default(), |mut worst, section| {
+        let (from_m, to_m) = self.bounds_m(index);
+        let near = self.index_of(from_m - self.target_m / 2.0)..=self.index_of(to_m + self.target_m / 2.0);
+        near.filter_map(|index| self.get(index)).fold(PassError::default(), |mut worst, section| {
             worst.add(&section.passage.pass_error);
             worst
         })

@@ -108,7 +108,7 @@ fn a_scale_of_ranges_is_named_with_its_figure() {
             println!("{vehicle} {condition:?}: {doubt:?}");
             assert_eq!(doubt.what, "range_scale", "{vehicle}: {doubt:?}");
             assert!(
-                ((doubt.range_ratio.unwrap() - 1.0) / share - 1.0).abs() < 0.32,
+                ((doubt.range_ratio.unwrap() - 1.0) / share - 1.0).abs() < 0.05,
                 "{vehicle} {condition:?}: {doubt:?}"
             );
         }

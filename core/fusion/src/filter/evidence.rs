@@ -13,8 +13,8 @@ pub(super) const COMPARED: u32 = 4;
 const FEWEST_BLOCKS: u32 = 8;
 /// Standard deviations from which a figure is certain, and from which an alternative is: how much it gains varies with the
 /// vehicle's place.
-const SURE: f64 = 6.0;
-const SURE_GAIN: f64 = 3.0;
+pub(super) const SURE: f64 = 6.0;
+pub(super) const SURE_GAIN: f64 = 3.0;
 /// Standard deviations of place and roll within a spell, m and radians.
 const PLACE_SD_M: f64 = 0.3;
 const ROLL_SD_RAD: f64 = 0.005;
@@ -120,6 +120,11 @@ impl Fit {
         self.weights_2 += weight * weight;
         self.both += weight * value;
         self.values_2 += value * value;
+    }
+
+    /// Whether there have been blocks enough for anything to be said.
+    pub(super) fn is_settled(&self) -> bool {
+        self.blocks >= FEWEST_BLOCKS
     }
 
     /// Estimate and standard deviation by the scatter of blocks.

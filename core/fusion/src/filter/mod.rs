@@ -29,7 +29,7 @@ use self::cable::CableDoubt;
 use self::eskf::{Context, Eskf, PoseSd};
 use self::settings::Settings;
 use self::sources::{Consistency, Source};
-use self::state::{State, rotation};
+use self::state::{RANGES, State, rotation};
 use self::suspicion::SettingDoubt;
 use self::window::{Waiting, Window};
 use self::zupt::Stillness;
@@ -38,6 +38,7 @@ use super::smooth::journal::Journal;
 use super::smooth::relative_backward::UNTIED;
 use super::{Fix, Navigation, NoFix, Times};
 use headrace_geometry::frames::{Pose, Vec3};
+use headrace_geometry::math;
 use headrace_geometry::site::Site;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_geometry::tunnel::Profile;
@@ -390,7 +391,9 @@ impl Navigation for FilterNavigation {
     }
 
     fn setting_doubt(&self) -> Option<SettingDoubt> {
-        self.running.suspicions.doubt()
+        let running = self.running()?;
+        let scale_sd = math::sqrt(running.factors.variance(RANGES));
+        running.suspicions.doubt([running.state.range_scale, scale_sd])
     }
 
     fn cable_doubt(&self) -> Option<CableDoubt> {

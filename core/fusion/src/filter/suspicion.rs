@@ -6,7 +6,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::evidence::{Alternative, COMPARED, FOLLOWED, Fit, Line, Spell};
+use super::evidence::{Alternative, COMPARED, FOLLOWED, Fit, Line, SURE, Spell};
 use super::measure::{self, Beam, ScalarUpdate, with_quantum};
 use super::settings::Settings;
 use super::sources::Source;
@@ -165,9 +165,13 @@ impl Default for Suspicions {
 }
 
 impl Suspicions {
-    /// The likeliest of the settings that are certainly wrong.
-    pub fn doubt(&self) -> Option<SettingDoubt> {
-        self.doubt
+    /// The likeliest of the settings that are certainly wrong, with the estimate's scale of all ranges and its standard
+    /// deviation: what that explains is no residual any more.
+    pub fn doubt(&self, [share, sd]: [f64; 2]) -> Option<SettingDoubt> {
+        let sure_sd = share.abs() / sd.max(f64::MIN_POSITIVE);
+        let is_scaled = self.scale.is_settled() && share.abs() >= LEAST_SCALE && sure_sd >= SURE;
+        let setting = Setting::RangeScale(share);
+        self.doubt.or_else(|| is_scaled.then_some(SettingDoubt { setting, source: None, sure_sd }))
     }
 
     /// Takes a reading that isn't fused yet, with the estimate at its time.
