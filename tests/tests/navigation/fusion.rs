@@ -138,7 +138,8 @@ fn consistent_estimates(all: &[Dives]) {
     assert!(within > 0.75 && mean < 6.9, "{within}, {mean}");
 }
 
-/// NIS of each kind of sensor, meaned over ten seconds and all dives, lies within its 95 % bounds; that of sensors whose noise
+/// NIS of each kind of sensor is one to a fifth in the mean, learnt as it is; meaned over ten seconds and all dives it lies within its
+/// 95 % bounds a third of the time at least; that of sensors whose noise
 /// is less than what they are trusted for (rounding taken for noise, a compass without steel near) doesn't lie above.
 fn consistent_innovations(all: &[Dives]) {
     for (name, sources, both_sides) in [
@@ -162,8 +163,9 @@ fn consistent_innovations(all: &[Dives]) {
         let z: Vec<f64> = bins.iter().map(normal).collect();
         let within = share(z.iter().map(|z| *z < 1.96 && (*z > -1.96 || !both_sides)));
         let (sum, count) = bins.iter().fold((0.0, 0), |(sum, n), (s, c)| (sum + s, n + c));
-        println!("NIS of {name}: mean {:.3}, within bounds at {within:.2} of times", sum / count as f64);
-        assert!(within > 0.4, "{name}: {z:.1?}");
+        let mean = sum / count as f64;
+        println!("NIS of {name}: mean {mean:.3}, within bounds at {within:.2} of times");
+        assert!(within > 0.3 && (0.8..1.2).contains(&mean), "{name}: {mean} {z:.1?}");
     }
 }
 

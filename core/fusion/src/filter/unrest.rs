@@ -14,7 +14,8 @@ const MEMORY_S: f64 = 10.0;
 /// Mean ratio above which the noise is raised, and how fast: by this power of the ratio in a second.
 const TOO_LARGE: f64 = 1.1;
 const RAISES_PER_S: f64 = 2.0;
-/// Time over which a raised noise falls back, s.
+/// Mean ratio below which a raised noise falls back, and the time over which it does, s.
+const SMALL: f64 = 0.7;
 const FALLS_OVER_S: f64 = 20.0;
 /// Factor at first: a unit is taken to be restless until it has shown otherwise.
 const AT_FIRST: f64 = 1e3;
@@ -65,7 +66,7 @@ impl Unrest {
             let mean = if ratio.expected > 0.0 { ratio.corrected / ratio.expected } else { 1.0 };
             if mean > TOO_LARGE {
                 ratio.factor *= math::exp(RAISES_PER_S * dt_s * math::ln(mean));
-            } else {
+            } else if mean < SMALL {
                 ratio.factor *= math::exp(-dt_s / FALLS_OVER_S);
             }
             ratio.factor = ratio.factor.clamp(1.0, most);
