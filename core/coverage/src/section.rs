@@ -139,10 +139,17 @@ pub struct Section {
     pub doubtful: u32,
     /// It holds samples of a head that wasn't believed soon after.
     pub suspect: bool,
-    /// Stretch of navigation of the first sample within T of it.
-    tie: Option<u32>,
-    /// Samples of several stretches of navigation lie within T of it, and it hadn't passed before.
-    pub mixed: bool,
+    ties: Ties,
+}
+
+/// Stretches of navigation of the samples within T of a section.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+enum Ties {
+    #[default]
+    None,
+    One(u32),
+    /// Several, from before it had passed.
+    Several,
 }
 
 /// Minimum samples for a section to contradict the profile.
@@ -166,8 +173,11 @@ impl Section {
     /// Notes the stretch of navigation of a sample. Where samples of several lie side by side, nothing sure relates them, and
     /// those of one may only seem to fill the holes of another.
     pub(super) fn note_tie(&mut self, tie: u32) {
-        let first = *self.tie.get_or_insert(tie);
-        self.mixed |= first != tie && self.verdict != Verdict::Pass;
+        self.ties = match self.ties {
+            Ties::None => Ties::One(tie),
+            Ties::One(first) if first != tie && self.verdict != Verdict::Pass => Ties::Several,
+            ties => ties,
+        };
     }
 
     /// Whether a small hole is no evidence of coverage: the profile is wrong, there is no wall, or what was taken for wall
@@ -176,7 +186,7 @@ impl Section {
         self.contradicts()
             || self.masked_share > ALL_MASKED
             || self.suspect
-            || self.mixed
+            || self.ties == Ties::Several
             || self.doubtful > self.samples
             || self.is_of_another_size()
     }
