@@ -31,6 +31,9 @@ const CHAINAGE_UNTOLD_SD_M: f64 = 10.0;
 const YAW_UNTOLD_SD_RAD: f64 = 0.2;
 const VELOCITY_SD_MPS: f64 = 0.5;
 const TILT_SD_RAD: f64 = 0.05;
+/// Scale error of the cable from here on, a ratio: as good as none. Nothing but a velocity log could tell it from speed, and the
+/// least persistent error of the speed would make a scale of it, and of the scale a way of metres.
+const SCALE_SD: f64 = 1e-6;
 
 /// Readings collected so far.
 #[derive(Debug, Clone)]
@@ -206,7 +209,7 @@ impl Listening {
             (SLACK_RATE, settings.slack.drive()),
             // What was wrong on the way to here; from here on the scale makes more of it.
             (CREEP, settings.scale_sd * self.told.map_or(0.0, |told| told.way_m.abs())),
-            (SCALE, settings.scale_sd),
+            (SCALE, SCALE_SD),
             (DEPTH, settings.depth_offset_sd_m),
             (HEADING, settings.heading.reach),
             (RANGES, settings.range_scale_sd),

@@ -103,7 +103,7 @@ impl Default for Settings {
             tether_sd_m: 0.005,
             slack: Wander { reach: 0.06, time_s: 10.0 },
             scale_sd: 0.002,
-            scale_noise: 1e-5,
+            scale_noise: 1e-9,
             depth_sd_m: 0.02,
             depth_offset_sd_m: 0.5,
             depth_noise: 0.001,
