@@ -32,7 +32,7 @@ pub mod section;
 pub mod smooth;
 
 use self::filter::cable::CableDoubt;
-use self::filter::eskf::PoseSd;
+use self::filter::pose_sd::PoseSd;
 use self::filter::sources::Consistency;
 use self::filter::suspicion::SettingDoubt;
 use headrace_geometry::time::MonoNs;

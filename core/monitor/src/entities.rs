@@ -11,7 +11,7 @@ pub use super::head_motion::MeasuredMotion;
 use super::messages::PlacedPing;
 use headrace_coverage::{HeadReach, HeadWall};
 use headrace_fusion::filter::cable::CableDoubt;
-use headrace_fusion::filter::eskf::PoseSd;
+use headrace_fusion::filter::pose_sd::PoseSd;
 use headrace_fusion::{Fix, Navigation, NoFix};
 use headrace_geometry::frames::{Point3, Tunnel};
 use headrace_geometry::time::{DurNs, MonoNs};

@@ -56,7 +56,7 @@ pub struct CableDoubt {
 
 /// A reading against the estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Reading {
+pub struct CableReading {
     /// Time of validity.
     pub at: MonoNs,
     /// Chainage shown, m.
@@ -78,7 +78,7 @@ pub struct Slip {
     pub doubted_m: f64,
 }
 
-impl Reading {
+impl CableReading {
     fn expected_m(&self) -> f64 {
         self.shown_m - self.off_m
     }
@@ -107,10 +107,10 @@ pub enum Use {
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Cable {
     /// The last reading, and the rate at which it has been running, m/s.
-    last: Option<Reading>,
+    last: Option<CableReading>,
     rate_mps: f64,
     /// The first of successive readings beyond the gate.
-    left: Option<Reading>,
+    left: Option<CableReading>,
     doubt: Option<Doubt>,
     /// The last doubt.
     before: Option<Over>,
@@ -128,11 +128,11 @@ struct Over {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 struct Doubt {
     /// The first reading that was withheld.
-    first: Reading,
+    first: CableReading,
     /// The rate at which the counter had run before, m/s.
     rate_mps: f64,
     /// The reading from which the counter runs as the vehicle does.
-    same_from: Reading,
+    same_from: CableReading,
     /// When readings began to agree again.
     agreeing_from: Option<MonoNs>,
     /// What it showed when inertial data could no longer judge it, m.
@@ -151,7 +151,7 @@ impl Cable {
     }
 
     /// Takes a reading.
-    pub fn take(&mut self, reading: &Reading) -> Use {
+    pub fn take(&mut self, reading: &CableReading) -> Use {
         if let Some(doubt) = &mut self.doubt {
             let used = doubt.take(reading);
             if used != Use::Withhold {
@@ -190,7 +190,7 @@ impl Cable {
 
 impl Cable {
     /// Notes the rate at which a counter runs that is believed.
-    fn run(&mut self, reading: &Reading) {
+    fn run(&mut self, reading: &CableReading) {
         if let Some(last) = self.last {
             let dt_s = reading.at.since(last.at).as_secs_f64();
             if dt_s > 0.0 {
@@ -203,7 +203,7 @@ impl Cable {
 
     /// Whether it has run as before since the first reading beyond the gate. A counter that begins to stick, slip or run free
     /// changes its rate.
-    fn runs_on(&self, first: &Reading, reading: &Reading) -> bool {
+    fn runs_on(&self, first: &CableReading, reading: &CableReading) -> bool {
         let dt_s = reading.at.since(first.at).as_secs_f64();
         let rate_mps = (reading.shown_m - first.shown_m) / dt_s;
         let jumped_m = self.last.map_or(0.0, |last| {
@@ -218,7 +218,7 @@ impl Cable {
 
 impl Over {
     /// Whether the counter leaves too soon after this, and doesn't just take back what it had lost or gained.
-    fn is_followed_by(&self, first: &Reading) -> bool {
+    fn is_followed_by(&self, first: &CableReading) -> bool {
         let taken_back_m = (first.off_m + self.lost_m).abs();
         first.at.since(self.at).0 < AGAIN.0 && taken_back_m > SAME_SHARE * self.lost_m.abs() + MISSING_M
     }
@@ -226,7 +226,7 @@ impl Over {
 
 impl Doubt {
     /// From the first reading beyond the gate to this one, of a counter that had run at this rate, m/s.
-    fn between(first: Reading, reading: &Reading, rate_mps: f64) -> Self {
+    fn between(first: CableReading, reading: &CableReading, rate_mps: f64) -> Self {
         let doubt = Self {
             first,
             rate_mps,
@@ -239,7 +239,7 @@ impl Doubt {
         Self { longest_m: doubt.way_m(reading), ..doubt }
     }
 
-    fn take(&mut self, reading: &Reading) -> Use {
+    fn take(&mut self, reading: &CableReading) -> Use {
         self.most_m = self.most_m.max(reading.off_m.abs());
         self.longest_m = self.longest_m.max(self.way_m(reading));
         let for_at_least = |since: MonoNs, time: DurNs| reading.at.since(since).0 >= time.0;
@@ -272,7 +272,7 @@ impl Doubt {
     }
 
     /// Way since it was doubted, the longest by the counter, by the estimate, and at the rate of before, m.
-    fn way_m(&self, reading: &Reading) -> f64 {
+    fn way_m(&self, reading: &CableReading) -> f64 {
         let expected_m = (reading.expected_m() - self.first.expected_m()).abs();
         let at_rate_m = self.rate_mps.abs() * reading.at.since(self.first.at).as_secs_f64();
         expected_m.max((reading.shown_m - self.first.shown_m).abs()).max(at_rate_m)
@@ -280,7 +280,7 @@ impl Doubt {
 
     /// Whether it shows most of the way that the vehicle has made meanwhile. The gate alone would let a counter in that still
     /// stands, once the estimate is unsure enough.
-    fn has_caught_up(&self, reading: &Reading) -> bool {
+    fn has_caught_up(&self, reading: &CableReading) -> bool {
         let way_m = (reading.expected_m() - self.first.expected_m()).abs();
         reading.off_m.abs() <= MISSING_SHARE * way_m + MISSING_M
     }

@@ -3,22 +3,22 @@
 use core::ops::Range;
 
 use super::agreement::{self, Agreement};
-use super::cable::{self, Cable, Slip, Use};
+use super::cable::{Cable, CableReading, Slip, Use};
 use super::clones::{ErrorClones, MOVING};
 use super::factors::Factors;
 use super::inertial::Leg;
 pub use super::measure::with_quantum;
 use super::measure::{self, Beam, ScalarUpdate};
+use super::pose_sd::PoseSd;
 use super::settings::Settings;
 use super::sources::Source;
 use super::state::{
-    ATTITUDE, CREEP, ERRORS, Errors, FORCE_BIAS, POSITION, RATE_BIAS, SLACK, State, VELOCITY, add_variance,
-    put, vec,
+    ATTITUDE, CREEP, ERRORS, Errors, FORCE_BIAS, POSITION, RATE_BIAS, SLACK, State, VELOCITY, add_to, put,
+    vec,
 };
 use super::suspicion::{Design, Suspicions};
 use super::unrest::Unrest;
 use super::window::{Waiting, Window};
-use crate::NoFix;
 use crate::relative::Relative;
 use crate::smooth::step::{Move, Step};
 use headrace_geometry::frames::{Body, Point3, Rot, Sensor, Tunnel, Vec3, head_direction};
@@ -29,7 +29,6 @@ use headrace_geometry::tunnel::Profile;
 use headrace_sensor::device::SensorKind;
 use headrace_sensor::reading::{Level, Reading};
 use headrace_snapshot::stateful;
-use serde::{Deserialize, Serialize};
 
 /// Room for the inertial sample times of an epoch.
 const KNOTS: usize = 256;
@@ -57,12 +56,6 @@ const EPOCH_S: f64 = 0.1;
 
 /// Maximum steps of an epoch: its leg, two widenings of the covariance, and an end.
 const STEPS: usize = 4;
-/// Maximum standard deviations of position in the section and yaw for georeferencing, m and radians.
-const PLACE_LIMIT_M: f64 = 0.5;
-const YAW_LIMIT_RAD: f64 = 0.25;
-/// The same for chainage, relative to the heads' previous pass, and to the cable's length.
-const ALONG_LIMIT_M: f64 = 1.0;
-
 /// Parameters of a dive.
 #[derive(Debug, Clone)]
 pub struct Context {
@@ -220,39 +213,39 @@ impl Eskf {
         let variance = speed_mps * speed_mps;
         let way = variance * EPOCH_S * EPOCH_S;
         for k in 0..3 {
-            add_variance(&mut self.doubts, VELOCITY + k, variance);
-            add_variance(&mut self.doubts, POSITION + k, way);
+            add_to(&mut self.doubts, VELOCITY + k, variance);
+            add_to(&mut self.doubts, POSITION + k, way);
         }
     }
 
     /// Judges a cable reading; whether it is to be fused. What it has lost becomes creep.
-    fn trusts(&mut self, reading: &cable::Reading, errors: &mut Errors) -> bool {
+    fn trusts(&mut self, reading: &CableReading, errors: &mut Errors) -> bool {
         match self.cable.take(reading) {
             Use::Fuse => return true,
             Use::Withhold => {}
             Use::Left(by_mps) => {
                 let misled_mps = MISLED_SHARE * by_mps.min(SPEED_SD_MPS);
-                add_variance(&mut self.doubts, VELOCITY, misled_mps * misled_mps);
+                add_to(&mut self.doubts, VELOCITY, misled_mps * misled_mps);
                 self.ties += 1;
             }
             Use::Slipped(Slip { lost_m, doubted_m }) => {
                 // The vehicle stays where it is, so that what is placed now fits what was placed in the doubt.
-                add_variance(errors, CREEP, lost_m);
-                add_variance(&mut self.doubts, CREEP, lost_m * lost_m);
-                add_variance(&mut self.doubts, POSITION, doubted_m * doubted_m);
+                add_to(errors, CREEP, lost_m);
+                add_to(&mut self.doubts, CREEP, lost_m * lost_m);
+                add_to(&mut self.doubts, POSITION, doubted_m * doubted_m);
                 self.ties += 1;
             }
             Use::Loose(by_m) => {
                 self.loose_m = self.loose_m.max(by_m.min(LOOSEST_M));
-                add_variance(&mut self.doubts, SLACK, self.loose_m * self.loose_m);
-                add_variance(&mut self.doubts, POSITION, by_m * by_m);
+                add_to(&mut self.doubts, SLACK, self.loose_m * self.loose_m);
+                add_to(&mut self.doubts, POSITION, by_m * by_m);
                 agreement::seek_speed(&mut self.doubts);
                 self.ties += 1;
             }
             Use::Unsteady => agreement::seek_speed(&mut self.doubts),
             Use::Seek(lacking_m) => {
                 self.way_sought = Some(reading.at);
-                add_variance(&mut self.doubts, CREEP, lacking_m * lacking_m);
+                add_to(&mut self.doubts, CREEP, lacking_m * lacking_m);
                 agreement::seek_way(&mut self.doubts);
                 self.ties += 1;
             }
@@ -365,7 +358,7 @@ impl Eskf {
         {
             let shown_m = zero_at_m + scale * length.length_m;
             let (at, sd_m) = (waiting.at, math::sqrt(variance));
-            agrees = self.trusts(&cable::Reading { at, shown_m, off_m: innovation, sd_m, agrees }, errors);
+            agrees = self.trusts(&CableReading { at, shown_m, off_m: innovation, sd_m, agrees }, errors);
         } else {
             self.agreement.note(kind, &row, agrees);
         }
@@ -477,53 +470,6 @@ impl Eskf {
 /// Part of an update's innovation due to the errors found since `known`.
 fn since(row: &ScalarUpdate, known: &Errors, errors: &Errors) -> f64 {
     row.h.iter().zip(errors.iter().zip(known)).map(|(h, (error, known))| h * (error - known)).sum()
-}
-
-/// Standard deviations of an estimate.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct PoseSd {
-    /// Of the chainage, excluding the cable's scale, m.
-    pub along_m: f64,
-    /// Of the position in the section, in the worse direction, m.
-    pub place_m: f64,
-    /// Of roll or pitch, radians.
-    pub tilt_rad: f64,
-    /// Of yaw, radians.
-    pub yaw_rad: f64,
-}
-
-impl PoseSd {
-    /// Those of an estimate and the covariance of its errors.
-    pub fn of(factors: &Factors<ERRORS>) -> Self {
-        let of = |i: usize| math::sqrt(factors.variance(i));
-        let mut along = [0.0; ERRORS];
-        for (i, share) in [(POSITION, 1.0), (CREEP, 1.0)] {
-            if let Some(slot) = along.get_mut(i) {
-                *slot = share;
-            }
-        }
-        Self {
-            along_m: math::sqrt(factors.variance_along(&along)),
-            place_m: of(POSITION + 1).max(of(POSITION + 2)),
-            tilt_rad: of(ATTITUDE).max(of(ATTITUDE + 1)),
-            yaw_rad: of(ATTITUDE + 2),
-        }
-    }
-
-    /// Whether this estimate and relative covariance are good enough to georeference samples.
-    ///
-    /// Errors: the part that is too uncertain.
-    pub fn standing(&self, relative: Relative) -> Result<Relative, NoFix> {
-        if self.yaw_rad > YAW_LIMIT_RAD {
-            Err(NoFix::Heading)
-        } else if self.place_m > PLACE_LIMIT_M {
-            Err(NoFix::Section)
-        } else if relative.sd_m(Vec3::zero()) > ALONG_LIMIT_M || self.along_m > ALONG_LIMIT_M {
-            Err(NoFix::Chainage)
-        } else {
-            Ok(relative)
-        }
-    }
 }
 
 /// Errors as they were `by_s` before.

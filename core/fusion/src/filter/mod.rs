@@ -13,6 +13,7 @@ pub mod factors;
 pub mod inertial;
 pub mod measure;
 pub mod noise_level;
+pub mod pose_sd;
 pub mod settings;
 pub mod sources;
 pub mod state;
@@ -26,7 +27,8 @@ mod tests;
 
 use self::align::{LISTENS, Listening};
 use self::cable::CableDoubt;
-use self::eskf::{Context, Eskf, PoseSd};
+use self::eskf::{Context, Eskf};
+use self::pose_sd::PoseSd;
 use self::settings::Settings;
 use self::sources::{Consistency, Source};
 use self::state::{RANGES, State, rotation};

@@ -229,10 +229,10 @@ pub fn put<F: Copy>(errors: &mut Errors, from: usize, value: Vec3<F>) {
     }
 }
 
-/// Adds to one of several variances.
-pub fn add_variance(variances: &mut Errors, i: usize, variance: f64) {
-    if let Some(slot) = variances.get_mut(i) {
-        *slot += variance;
+/// Adds to one of the errors, or of their variances.
+pub fn add_to(errors: &mut Errors, i: usize, amount: f64) {
+    if let Some(slot) = errors.get_mut(i) {
+        *slot += amount;
     }
 }
 

@@ -3,7 +3,7 @@
 use core::ops::Range;
 
 use super::step::Placed;
-use crate::filter::eskf::PoseSd;
+use crate::filter::pose_sd::PoseSd;
 use crate::filter::sources::Consistency;
 use crate::filter::state::{State, rotation, rotation_vector};
 use crate::filter::{CARRIES, CLOCK_JUMP, EPOCH};
