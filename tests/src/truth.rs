@@ -17,10 +17,10 @@ use headrace_monitor::report::{Report, SectionReport};
 use headrace_monitor::ring::{Port, RingError};
 use headrace_monitor::stage::Stage;
 use headrace_monitor::{App, Plugin, PluginError};
+use headrace_replay::SimulationFeed;
 use headrace_replay::drive::{Coming, Pace, PacketSource, drive};
 use headrace_replay::log::LogError;
-use headrace_sensor::device::{Direction, Sense};
-use headrace_sensor::reading::SourceId;
+use headrace_sensor::device::Sense;
 use headrace_simulator::{Scene, SensorFacts, Simulation, TruthRow};
 use headrace_vehicle::VehicleConfig;
 
@@ -103,7 +103,7 @@ pub fn dive_believing(scene: &Scene, believed: &VehicleConfig) -> JudgedDive {
     drive(&mut dive, &mut feed, Pace::default(), &mut |_| {}).unwrap();
     dive.finish(&mut |_, _| {});
     let report = Report::of(&dive);
-    let shifts = dive.resource::<Seen>().unwrap().shifts(&feed.simulation);
+    let shifts = dive.resource::<Seen>().unwrap().shifts(&feed.feed.simulation);
     let truth = feed.truth();
     let sections = judge(&report, &truth, &shifts);
     JudgedDive { report, truth, sections }
@@ -129,7 +129,7 @@ impl Truth {
 
 /// A simulated dive as a source of packets, whose truth is kept.
 struct TruthFeed {
-    simulation: Simulation,
+    feed: SimulationFeed,
     outline: Outline,
     replacing: Vec<bool>,
     /// Least and largest range of each source, m; none of sensors that are no heads.
@@ -145,7 +145,7 @@ impl TruthFeed {
         let replacing = simulation.added().iter().map(|added| REPLACING.contains(&added.effect)).collect();
         let reach = |sensor: &SensorFacts| sensor.head.map(|head| head.reach_m(sound_mps));
         Self {
-            simulation,
+            feed: SimulationFeed::new(simulation),
             outline: Outline::of(&believed.tunnel.profile),
             replacing,
             reach_m: scene.facts().sensors.iter().map(reach).collect(),
@@ -156,7 +156,7 @@ impl TruthFeed {
 
     /// Takes what has become known.
     fn note(&mut self) {
-        for row in self.simulation.take_truth() {
+        for row in self.feed.simulation.take_truth() {
             self.way_m = [self.way_m[0].min(row.chainage_m), self.way_m[1].max(row.chainage_m)];
             self.samples.extend(self.sample(&row));
         }
@@ -173,7 +173,7 @@ impl TruthFeed {
         if replaced || !(near_m..=far_m).contains(&range_m) {
             return None;
         }
-        let [x_m, y_m, z_m] = self.simulation.scenery()?.environment.axis().chart(hit.point);
+        let [x_m, y_m, z_m] = self.feed.simulation.scenery()?.environment.axis().chart(hit.point);
         Some(TrueSample { at: row.at, source: row.source, place: [x_m, self.outline.arc_m([y_m, z_m])] })
     }
 
@@ -185,23 +185,13 @@ impl TruthFeed {
 
 impl PacketSource for TruthFeed {
     fn coming(&mut self) -> Result<Option<Coming>, LogError> {
-        while let Some(message) = self.simulation.peek_message() {
-            if message.direction == Direction::Received {
-                let (at, source, len) = (message.at, SourceId(message.source), message.bytes.len());
-                self.note();
-                return Ok(Some(Coming { at, source, len }));
-            }
-            self.simulation.next_message();
-        }
-        Ok(None)
+        let coming = self.feed.coming();
+        self.note();
+        coming
     }
 
     fn send(&mut self, port: &mut Port) -> Result<(), RingError> {
-        if let Some(message) = self.simulation.peek_message() {
-            port.send(message.at, message.bytes)?;
-            self.simulation.next_message();
-        }
-        Ok(())
+        self.feed.send(port)
     }
 }
 

@@ -10,7 +10,8 @@ use crate::log::LogError;
 
 /// A simulated dive as a source of packets; bytes sent to the devices are omitted.
 pub struct SimulationFeed {
-    simulation: Simulation,
+    /// The dive, as far as it has come.
+    pub simulation: Simulation,
 }
 
 impl SimulationFeed {

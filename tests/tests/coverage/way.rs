@@ -45,6 +45,15 @@ fn accounted_for(what: &str, report: &Report) {
     assert!(report.sections.iter().all(judged), "{what}");
 }
 
+/// A section fails because these heads were silent.
+#[track_caller]
+fn fails_by_silence(section: &SectionReport, heads: &[usize]) {
+    let evidence = section.cause.unwrap();
+    let named = (section.verdict, evidence.cause.as_str());
+    assert_eq!(named, ("fail", "head_silent"), "{}", section.start_m);
+    assert_eq!(evidence.silent_heads.iter().collect::<Vec<_>>(), heads);
+}
+
 /// When the plane `behind_m` behind the vehicle has left a section by half the target, seconds after the start.
 fn left_s(section: &SectionReport, behind_m: f64) -> f64 {
     (section.end_m + 0.25 + behind_m - START_M) / SPEED_MPS
@@ -65,14 +74,7 @@ fn where_all_heads_are_dead_the_way_fails_as_the_vehicle_leaves_it() {
         report.sections.iter().filter(|s| s.start_m >= 6.0 && s.end_m <= 12.0 - HEAD_M - 0.5).collect();
     assert!(dark.len() > 16);
     for section in dark {
-        let evidence = section.cause.unwrap();
-        assert_eq!(
-            (section.verdict, evidence.cause.as_str()),
-            ("fail", "head_silent"),
-            "{}",
-            section.start_m
-        );
-        assert_eq!(evidence.silent_heads.iter().collect::<Vec<_>>(), [0, 1, 2, 3]);
+        fails_by_silence(section, &[0, 1, 2, 3]);
         let late_s = late_s(&report, section, HEAD_M);
         // A beat, and what position errors add to half the target.
         assert!((-0.1..2.5).contains(&late_s), "{}: {late_s} s late", section.start_m);
@@ -123,14 +125,7 @@ fn while_some_heads_are_alive_they_alone_are_waited_for() {
     let inner: Vec<_> = report.sections.iter().filter(|s| s.start_m >= 5.25 && s.end_m <= 8.5).collect();
     assert!(inner.len() > 10);
     for section in inner {
-        let evidence = section.cause.unwrap();
-        assert_eq!(
-            (section.verdict, evidence.cause.as_str()),
-            ("fail", "head_silent"),
-            "{}",
-            section.start_m
-        );
-        assert_eq!(evidence.silent_heads.iter().collect::<Vec<_>>(), [1, 2, 3]);
+        fails_by_silence(section, &[1, 2, 3]);
         // The head in front leaves it ten seconds before those aft would.
         let late_s = late_s(&report, section, -HEAD_M);
         assert!(late_s < 4.0, "{}: {late_s} s late", section.start_m);
