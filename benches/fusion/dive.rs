@@ -1,7 +1,8 @@
 //! A vehicle at rest in the middle of a tunnel: all sensors have ideal readings, so that nothing is gated.
 
 use headrace_fusion::filter::clones::ErrorClones;
-use headrace_fusion::filter::eskf::{Context, Eskf};
+use headrace_fusion::filter::context::Context;
+use headrace_fusion::filter::eskf::Eskf;
 use headrace_fusion::filter::factors::Factors;
 use headrace_fusion::filter::inertial::{Felt, Leg};
 use headrace_fusion::filter::settings::Settings;

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use crate::estimate::{Untold, median};
 use crate::material::Material;
 use crate::still::Still;
-use headrace_fusion::filter::eskf::in_tunnel;
+use headrace_fusion::filter::updates::in_tunnel;
 use headrace_geometry::frames::{Body, Mount, Rot, Tunnel};
 use headrace_geometry::math::{self, TAU};
 use headrace_geometry::time::MonoNs;

@@ -2,13 +2,15 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::eskf::{Context, in_tunnel, with_quantum};
+use super::context::Context;
 use super::factors::Factors;
+use super::measure::with_quantum;
 use super::settings::Settings;
 use super::state::{
     ATTITUDE, CREEP, DEPTH, ERRORS, FORCE_BIAS, HEADING, POSITION, RANGES, RATE_BIAS, SCALE, SLACK,
     SLACK_RATE, State, VELOCITY,
 };
+use super::updates::in_tunnel;
 use crate::NoFix;
 use crate::section::{Echo, settle};
 use headrace_geometry::frames::{Body, Point3, Rot, Tunnel, Vec3};

@@ -5,29 +5,29 @@ use core::ops::Range;
 use super::agreement::{self, Agreement};
 use super::cable::{Cable, CableReading, Slip, Use};
 use super::clones::{ErrorClones, MOVING};
-use super::factors::Factors;
+use super::context::Context;
+use super::factors::{Factors, Gain};
 use super::inertial::Leg;
-pub use super::measure::with_quantum;
-use super::measure::{self, Beam, ScalarUpdate};
+use super::measure::{self, ScalarUpdate};
 use super::pose_sd::PoseSd;
 use super::settings::Settings;
 use super::sources::Source;
 use super::state::{
-    ATTITUDE, CREEP, ERRORS, Errors, FORCE_BIAS, POSITION, RATE_BIAS, SLACK, State, VELOCITY, add_to, put,
-    vec,
+    ATTITUDE, CREEP, ERRORS, Errors, FORCE_BIAS, HEADING, POSITION, RATE_BIAS, SLACK, State, VELOCITY,
+    add_to, put, vec,
 };
-use super::suspicion::{Design, Suspicions};
+use super::suspicion::Suspicions;
 use super::unrest::Unrest;
+use super::updates::rows;
 use super::window::{Waiting, Window};
 use crate::relative::Relative;
 use crate::smooth::step::{Move, Step};
-use headrace_geometry::frames::{Body, Point3, Rot, Sensor, Tunnel, Vec3, head_direction};
+use headrace_geometry::frames::{Body, Point3, Rot, Tunnel, Vec3};
 use headrace_geometry::math;
-use headrace_geometry::site::Site;
-use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_geometry::time::MonoNs;
 use headrace_geometry::tunnel::Profile;
 use headrace_sensor::device::SensorKind;
-use headrace_sensor::reading::{Level, Reading};
+use headrace_sensor::reading::Reading;
 use headrace_snapshot::stateful;
 
 /// Room for the inertial sample times of an epoch.
@@ -51,32 +51,14 @@ const MISLED_SHARE: f64 = 0.3;
 const LOOSEST_M: f64 = 0.5;
 /// Time over which a loose cable is taken to tighten, s.
 const TIGHTENS_OVER_S: f64 = 100.0;
+/// Share of a wall's ranges' correction of the attitude, and of what is learnt from it, that is made. What matters to coverage is
+/// the attitude of one pass relative to the next, which the gyros know better than walls, whose shape isn't the design's.
+const WALL_SHARE: f64 = 0.3;
 /// Length of an epoch, s.
 const EPOCH_S: f64 = 0.1;
 
 /// Maximum steps of an epoch: its leg, two widenings of the covariance, and an end.
 const STEPS: usize = 4;
-/// Parameters of a dive.
-#[derive(Debug, Clone)]
-pub struct Context {
-    /// Design profile.
-    pub profile: Profile,
-    /// Water and location.
-    pub site: Site,
-    /// Noise settings of the sensors.
-    pub settings: Settings,
-    /// Position of the inertial unit on the vehicle.
-    pub unit_at: Vec3<Body>,
-}
-
-impl Context {
-    fn design(&self) -> Design<'_> {
-        let Self { profile, site, settings, unit_at } = self;
-        Design { profile, site, settings, unit_at: *unit_at }
-    }
-}
-
-stateful!(Context { state: unit_at; fixed: profile, site, settings; });
 
 /// The estimate at one time, and its covariance.
 #[derive(Debug, Clone)]
@@ -348,11 +330,11 @@ impl Eskf {
         let mut agrees = nis <= settings.gate;
         source.consistency.count(nis, settings.gate, variance, settings.usual_variance(kind));
         let part = |from: usize| [0, 1, 2].map(|k| along.get(from + k).copied().unwrap_or(0.0));
-        self.unrest.note(
-            [part(RATE_BIAS), part(FORCE_BIAS)],
-            variance,
-            source.noise_level.relative(nis.min(settings.gate)),
-        );
+        let relative = source.noise_level.relative(nis.min(settings.gate));
+        // Rocks move the heads' ranges as restless gyros would.
+        if kind != SensorKind::Head {
+            self.unrest.note([part(RATE_BIAS), part(FORCE_BIAS)], variance, relative);
+        }
         if let (SensorKind::Tether { zero_at_m, scale }, Reading::TetherLength(length)) =
             (kind, &waiting.reading)
         {
@@ -364,7 +346,11 @@ impl Eskf {
         }
         if agrees {
             source.noise_level.note(kind, number, innovation, variance);
-            self.correct(&row, known, errors);
+            if matches!(kind, SensorKind::Head | SensorKind::Echosounder { .. }) {
+                self.correct_by_wall(&row, known, errors);
+            } else {
+                self.correct(&row, known, errors);
+            }
         } else {
             source.noise_level.skip(number);
         }
@@ -458,9 +444,30 @@ impl Eskf {
     }
 
     fn correct(&mut self, row: &ScalarUpdate, known: &Errors, errors: &mut Errors) {
-        let innovation = row.residual - since(row, known, errors);
         let gain = self.factors.measure(&row.h, row.noise);
-        self.clones.measure(&row.h, &gain);
+        self.apply(row, &gain, known, errors);
+    }
+
+    /// Corrects by a range of the wall, which takes part only in what it tells of the attitude.
+    ///
+    /// Source: Brink, Partial-Update Schmidt-Kalman Filter, 2017; the covariance is Joseph's for the smaller gain, which is
+    /// the best one's plus a dyad of the gain left out.
+    fn correct_by_wall(&mut self, row: &ScalarUpdate, known: &Errors, errors: &mut Errors) {
+        let mut gain = self.factors.measure(&row.h, row.noise);
+        let mut left_out = [0.0; ERRORS];
+        for i in (ATTITUDE..ATTITUDE + 3).chain(RATE_BIAS..RATE_BIAS + 3).chain([HEADING]) {
+            if let (Some(k), Some(left)) = (gain.k.get_mut(i), left_out.get_mut(i)) {
+                *left = (1.0 - WALL_SHARE) * *k;
+                *k *= WALL_SHARE;
+            }
+        }
+        self.factors.add(gain.variance, left_out, HEADING + 1);
+        self.apply(row, &gain, known, errors);
+    }
+
+    fn apply(&mut self, row: &ScalarUpdate, gain: &Gain<ERRORS>, known: &Errors, errors: &mut Errors) {
+        let innovation = row.residual - since(row, known, errors);
+        self.clones.measure(&row.h, gain);
         for (error, k) in errors.iter_mut().zip(&gain.k) {
             *error += k * innovation;
         }
@@ -477,65 +484,4 @@ fn earlier(errors: &Errors, by_s: f64) -> Errors {
     let mut then = *errors;
     put(&mut then, POSITION, vec::<Tunnel>(errors, POSITION) + vec::<Tunnel>(errors, VELOCITY).scaled(-by_s));
     then
-}
-
-/// Scalar updates of a reading; none where it can't be predicted.
-fn rows(
-    state: &State,
-    context: &Context,
-    source: &Source,
-    waiting: &Waiting,
-    window: &Window,
-) -> [Option<ScalarUpdate>; 3] {
-    let Context { profile, site, settings, unit_at } = context;
-    let mount = source.sensor.mount;
-    let offset = mount.position + -*unit_at;
-    let beam = |along: Vec3<Sensor>, first_rad: f64, unsure_rad: f64| {
-        let along = mount.rotation * along;
-        Beam { offset, along, first_rad, unsure_rad }
-    };
-    let one = |row: Option<ScalarUpdate>| [row, None, None];
-    match (source.sensor.kind, waiting.reading) {
-        (SensorKind::Echosounder { .. }, Reading::Echo(echo)) => one(echo.range_m.and_then(|range_m| {
-            let range_m = site.rescaled_range_m(range_m, echo.sound_speed_mps);
-            let beam = beam(Vec3::new(1.0, 0.0, 0.0), 0.0, settings.echo_beam_rad / 2.0);
-            measure::range(state, profile, &beam, range_m, settings.echo_sd_m)
-        })),
-        (SensorKind::Head, Reading::Sonar(sonar)) => one(sonar.range_m.and_then(|range_m| {
-            let range_m = site.rescaled_range_m(range_m, sonar.sound_speed_mps);
-            let beam = beam(head_direction(sonar.angle_rad), settings.return_beam_rad / 2.0, 0.0);
-            let sd_m = with_quantum(settings.return_sd_m, sonar.resolution_m);
-            measure::range(state, profile, &beam, range_m, sd_m)
-        })),
-        (SensorKind::Depth, Reading::Pressure(water)) => {
-            let height_m = site.surface_above_floor_m - site.depth_m(water.pressure_pa);
-            let quantum_m = site.depth_m(site.surface_pressure_pa + water.resolution_pa);
-            let sd_m = with_quantum(settings.depth_sd_m, quantum_m);
-            one(Some(measure::height(state, offset, height_m, sd_m)))
-        }
-        (SensorKind::Tether { zero_at_m, scale }, Reading::TetherLength(length)) => {
-            let sd_m = with_quantum(settings.tether_sd_m, length.resolution_m * scale.abs());
-            let chainage_m = zero_at_m + scale * length.length_m;
-            one(Some(measure::chainage(state, -*unit_at, chainage_m, sd_m)))
-        }
-        (SensorKind::Imu, Reading::Attitude(level)) => {
-            let measured = in_tunnel(site, level) * mount.rotation.inverse();
-            let (felt, _) = window.felt(waiting.at, waiting.at + DurNs(1));
-            let seeing = felt.rate_radps.is_some() && felt.force_mps2.is_some();
-            let tilt_sd = if seeing { settings.tilt_sd_rad } else { settings.attitude_sd_rad };
-            measure::attitude(state, measured, tilt_sd, settings.heading_sd_rad).map(Some)
-        }
-        (SensorKind::VelocityLog, Reading::VelocityOverGround(moved)) => {
-            let (felt, _) = window.felt(waiting.at, waiting.at + DurNs(1));
-            let rate = felt.rate_radps.map_or_else(Vec3::zero, |rate| rate + -state.rate_bias_radps);
-            let sensor = (offset, mount.rotation);
-            measure::velocity(state, sensor, rate, moved, settings.velocity_sd_mps).map(Some)
-        }
-        _ => [None; 3],
-    }
-}
-
-/// Attitude of a unit relative to its level frame, turned into the tunnel frame.
-pub fn in_tunnel(site: &Site, level: Rot<Level, Sensor>) -> Rot<Tunnel, Sensor> {
-    Rot::<Tunnel, Level>::from_roll_pitch_yaw(0.0, 0.0, -site.axis_yaw_rad) * level
 }

@@ -7,6 +7,7 @@ pub mod agreement;
 pub mod align;
 pub mod cable;
 pub mod clones;
+pub mod context;
 pub mod eskf;
 mod evidence;
 pub mod factors;
@@ -19,6 +20,7 @@ pub mod sources;
 pub mod state;
 pub mod suspicion;
 pub mod unrest;
+pub mod updates;
 pub mod window;
 pub mod zupt;
 
@@ -27,7 +29,8 @@ mod tests;
 
 use self::align::{LISTENS, Listening};
 use self::cable::CableDoubt;
-use self::eskf::{Context, Eskf};
+use self::context::Context;
+use self::eskf::Eskf;
 use self::pose_sd::PoseSd;
 use self::settings::Settings;
 use self::sources::{Consistency, Source};
