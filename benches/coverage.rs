@@ -70,7 +70,7 @@ fn helix(steps: u32, turn_s: f64, heads: u32) -> Vec<WallSample> {
             let around_m =
                 last[head].replace(arc_m).map(|from| math::wrap_signed(arc_m - from, perimeter_m()));
             let step_m = around_m.map(|around_m| [per_ping_m, around_m]);
-            samples.push(WallSample { x_m: ping as f64 * per_ping_m, arc_m, head, step_m });
+            samples.push(WallSample { x_m: ping as f64 * per_ping_m, arc_m, head, step_m, visit: 0 });
         }
     }
     samples
@@ -278,7 +278,7 @@ fn memory() {
                     [x_m - from_x_m, math::wrap_signed(arc_m - from_arc_m, perimeter_m)]
                 };
                 let step_m = last.replace((x_m, arc_m)).map(step);
-                store.insert(WallSample { x_m, arc_m, head, step_m }).unwrap();
+                store.insert(WallSample { x_m, arc_m, head, step_m, visit: 0 }).unwrap();
             }
         }
         let (samples, mapped) = (4 * pings, resident() - before);

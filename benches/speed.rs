@@ -14,7 +14,9 @@ use std::time::{Duration, Instant};
 use bevy_ecs::schedule::{IntoScheduleConfigs, Schedule, SingleThreadedExecutor};
 use bevy_ecs::world::World;
 use headrace_coverage::hole::FARTHEST_M;
-use headrace_coverage::{GridLayout, HoleFinder, SampleStore, Sections, Soundings, StoreLayout, WallSample};
+use headrace_coverage::{
+    GridLayout, HoleFinder, PassError, SampleStore, Sections, Soundings, StoreLayout, Visit, WallSample,
+};
 use headrace_geometry::math;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_geometry::tunnel::shapes;
@@ -257,16 +259,19 @@ fn cover(samples: &[(f64, f64, usize)], length_m: f64) -> Coverage {
         relief: headrace_coverage::Relief::default(),
     };
     let mut last = [None; 8];
+    let profile = shapes::ceran().unwrap();
+    let errors = [PassError::default(); 2];
+    let visit = Visit { number: 0, tie: 0, at: MonoNs(0), errors };
     for (x_m, arc_m, head) in samples {
         black_box(coverage.store.nearest_pass_m(*x_m, *arc_m, FARTHEST_M));
         let step_m = last[*head].map(|(from_x_m, from_arc_m): (f64, f64)| {
             [x_m - from_x_m, math::wrap_signed(arc_m - from_arc_m, coverage.store.perimeter_m())]
         });
         last[*head] = Some((*x_m, *arc_m));
-        let sample = WallSample { x_m: *x_m, arc_m: *arc_m, head: *head, step_m };
+        let sample = WallSample { x_m: *x_m, arc_m: *arc_m, head: *head, step_m, visit: 0 };
         coverage.store.insert(sample).unwrap();
         coverage.soundings.add(*x_m, *arc_m);
-        coverage.sections.touch(*x_m, 0);
+        coverage.sections.touch(*x_m, &visit, &profile);
     }
     coverage
 }

@@ -79,6 +79,8 @@ pub struct Frontier {
     /// Time of the first ping, and of each that ended a silence of all heads; before it, of the first beat.
     woken: Option<MonoNs>,
     course: Option<Course>,
+    /// How often the course has been reversed.
+    turns: u32,
 }
 
 /// Direction of travel along the tunnel.
@@ -149,6 +151,11 @@ impl Frontier {
     /// The way: chainages at which the vehicle and its heads, pinging or not, have been.
     pub fn way(&self) -> Option<Reach> {
         self.way
+    }
+
+    /// How often the vehicle has turned back so far.
+    pub fn turns(&self) -> u32 {
+        self.turns
     }
 
     /// The outlook at `at`, given all heads' reaches.
@@ -273,7 +280,9 @@ impl Frontier {
         let middle_m = all.middle_m();
         let count = self.awaited(heads.clone(), now).count();
         let course = self.course.unwrap_or(Course { farthest_m: middle_m, astern: false, heads: count });
-        self.course = Some(course.to(middle_m, count));
+        let course_now = course.to(middle_m, count);
+        self.turns += u32::from(course_now.astern != course.astern);
+        self.course = Some(course_now);
         // Section k = [kL, (k+1)L) is behind when (k+1)L + margin <= from, ahead when kL - margin >= to.
         let first = math::floor_to_i64((all.from_m - margin_m) / section_m);
         let end = -math::floor_to_i64(-(all.to_m + margin_m) / section_m);

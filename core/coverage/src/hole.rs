@@ -149,10 +149,19 @@ impl HoleFinder {
     ///
     /// Allocates: never, unless a section is over 4,000 cells large.
     pub fn largest(&mut self, store: &SampleStore, from_m: f64, to_m: f64) -> Hole {
+        self.largest_since(store, from_m, to_m, 0)
+    }
+
+    /// The same among the samples of the visits from `first_visit` on. Its `least_m` isn't a bound: full cells leave out
+    /// samples near those of earlier visits.
+    ///
+    /// Allocates: never, unless a section is over 4,000 cells large.
+    pub fn largest_since(&mut self, store: &SampleStore, from_m: f64, to_m: f64, first_visit: u32) -> Hole {
         let length_m = to_m - from_m;
         let mut reach_m = (1.25 * self.last_m + 0.1).min(FARTHEST_M);
         loop {
-            self.window.fill(store, from_m, (-reach_m, length_m + reach_m), cell_m(reach_m));
+            let stretch_m = (-reach_m, length_m + reach_m);
+            self.window.fill((store, first_visit), from_m, stretch_m, cell_m(reach_m));
             match self.search(length_m, reach_m) {
                 Ok(best) => {
                     self.last_m = best.distance_m;

@@ -11,7 +11,7 @@
 //! let mut store = SampleStore::new(layout);
 //! for number in 0..200 {
 //!     let (x_m, arc_m) = (0.5 * f64::from(number / 20), 0.5 * f64::from(number % 20));
-//!     store.insert(WallSample { x_m, arc_m, head: 0, step_m: None })?;
+//!     store.insert(WallSample { x_m, arc_m, head: 0, step_m: None, visit: 0 })?;
 //! }
 //! // The largest empty circle between them has the diagonal for its diameter.
 //! let hole = HoleFinder::default().largest(&store, 1.0, 1.5);
@@ -37,6 +37,7 @@ pub mod sections;
 pub mod soundings;
 pub mod store;
 pub mod trust;
+pub mod visits;
 pub mod wall;
 pub mod wall_limits;
 pub mod what_if;
@@ -54,5 +55,6 @@ pub use sections::{CONFIDENCE_SD, Judging, Request, Sections};
 pub use soundings::{GridLayout, GridNode, GridSummary, Soundings};
 pub use store::{Fidelity, Kept, SampleStore, StoreError, StoreLayout, StoreUse, WallSample};
 pub use trust::{Beam, Distrust};
+pub use visits::{Visit, Visits};
 pub use wall::{HeadWall, Sorted, Taken};
 pub use wall_limits::{PlacedReturn, WallLimits};

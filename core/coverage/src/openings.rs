@@ -50,7 +50,7 @@ impl Opening {
             let x_m = self.from_m + (self.to_m - self.from_m) * i as f64 / along as f64;
             for k in 0..=around {
                 let arc_m = math::wrap(first_m + length_m * k as f64 / around as f64, perimeter_m);
-                store.insert(WallSample { x_m, arc_m, head: 0, step_m: None })?;
+                store.insert(WallSample { x_m, arc_m, head: 0, step_m: None, visit: u32::MAX })?;
             }
         }
         Ok(())
@@ -96,7 +96,7 @@ mod tests {
                 if (4.0..=6.0).contains(&x_m) && around_m <= 4.0 {
                     continue;
                 }
-                store.insert(WallSample { x_m, arc_m, head: 0, step_m: None }).unwrap();
+                store.insert(WallSample { x_m, arc_m, head: 0, step_m: None, visit: u32::MAX }).unwrap();
             }
         }
         if with_opening {

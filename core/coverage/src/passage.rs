@@ -49,7 +49,7 @@ pub struct Passage {
     pub t_y_m: f64,
     /// The same predicted for a level vehicle in the middle of the tunnel, m.
     pub middle_t_y_m: f64,
-    /// Relative error between passes.
+    /// Relative error between passes, of the newest visit with a ping here.
     pub pass_error: PassError,
 }
 

@@ -5,9 +5,11 @@ use serde::{Deserialize, Serialize};
 use super::cause::Evidence;
 use super::deviation::Deviation;
 use super::hole::Hole;
-use super::passage::Passage;
+use super::passage::{PassError, Passage};
+use super::visits::{Visit, Visits};
 use headrace_geometry::math;
 use headrace_geometry::time::MonoNs;
+use headrace_geometry::tunnel::Profile;
 
 /// Coverage verdict of a section. Source: metrics.md, "Sections and verdicts".
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -139,17 +141,12 @@ pub struct Section {
     pub doubtful: u32,
     /// It holds samples of a head that wasn't believed soon after.
     pub suspect: bool,
-    ties: Ties,
-}
-
-/// Stretches of navigation of the samples within T of a section.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-enum Ties {
-    #[default]
-    None,
-    One(u32),
-    /// Several, from before it had passed.
-    Several,
+    /// Number of the newest visit when that became known.
+    suspected_in: u32,
+    /// Visits with samples within T of it.
+    pub(super) visits: Visits,
+    /// Number of the visit whose passes' error is in `passage`.
+    passed_in: u32,
 }
 
 /// Minimum samples for a section to contradict the profile.
@@ -170,23 +167,38 @@ impl Section {
         self.samples >= FEW && self.deviation.contradicts()
     }
 
-    /// Notes the stretch of navigation of a sample. Where samples of several lie side by side, nothing sure relates them, and
-    /// those of one may only seem to fill the holes of another.
-    pub(super) fn note_tie(&mut self, tie: u32) {
-        self.ties = match self.ties {
-            Ties::None => Ties::One(tie),
-            Ties::One(first) if first != tie && self.verdict != Verdict::Pass => Ties::Several,
-            ties => ties,
-        };
+    /// Notes a ping with a fix in the section: how far passes are off one another.
+    pub fn note_pass(&mut self, visit: &Visit, profile: &Profile) {
+        if self.passed_in != visit.number {
+            self.visits.note_earlier(self.passage.pass_error.worst_m(profile));
+            (self.passage.pass_error, self.passed_in) = (PassError::default(), visit.number);
+        }
+        let [pass, _] = visit.errors;
+        self.passage.pass_error.add(&pass);
     }
 
-    /// Whether a small hole is no evidence of coverage: the profile is wrong, there is no wall, or what was taken for wall
-    /// may be none.
+    /// Whether a small hole is no evidence of coverage: what was taken for wall may be none, or samples may not lie beside one
+    /// another.
     pub(super) fn is_doubtful(&self) -> bool {
+        self.has_doubtful_wall() || self.suspect || self.visits.are_unrelated()
+    }
+
+    /// Whether its newest visit is free of what makes those before doubtful.
+    pub(super) fn is_visited_anew(&self) -> bool {
+        let newest = self.visits.newest();
+        newest > self.visits.first() && !(self.suspect && newest <= self.suspected_in)
+    }
+
+    /// Dismisses the samples of all visits but the newest.
+    pub(super) fn keep_newest_visit(&mut self) {
+        self.visits.keep_newest();
+        self.suspect = false;
+    }
+
+    /// Whether the profile is wrong, there is no wall, or most of what was taken for wall may be none.
+    pub(super) fn has_doubtful_wall(&self) -> bool {
         self.contradicts()
             || self.masked_share > ALL_MASKED
-            || self.suspect
-            || self.ties == Ties::Several
             || self.doubtful > self.samples
             || self.is_of_another_size()
     }
@@ -200,6 +212,7 @@ impl Section {
     /// Marks that it holds samples of a head that isn't believed any more: it can't pass, and is due for judging.
     pub fn suspect(&mut self) {
         (self.suspect, self.stale, self.settled) = (true, true, false);
+        self.suspected_in = self.visits.newest();
     }
 
     /// Raises or clears its flag according to its verdict.

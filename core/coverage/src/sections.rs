@@ -11,6 +11,7 @@ use super::passage::PassError;
 use super::runs::{RunChange, RunId, Runs, Telling};
 use super::section::{Judgement, Section, Verdict};
 use super::store::SampleStore;
+use super::visits::Visit;
 use headrace_geometry::math;
 use headrace_geometry::time::MonoNs;
 use headrace_geometry::tunnel::Profile;
@@ -157,13 +158,13 @@ impl Sections {
         self.sections.get_mut(usize::try_from(index - self.first).ok()?)
     }
 
-    /// Records a sample at `x_m` of a stretch of navigation: every section within T of it is due for judging again.
-    pub fn touch(&mut self, x_m: f64, tie: u32) {
+    /// Records a sample at `x_m`: every section within T of it is due for judging again.
+    pub fn touch(&mut self, x_m: f64, visit: &Visit, profile: &Profile) {
         let (from, to) = (self.index_of(x_m - self.target_m), self.index_of(x_m + self.target_m));
         for index in from..=to {
             if let Some(section) = self.get_mut(index) {
                 section.stale = true;
-                section.note_tie(tie);
+                section.visits.note(visit, profile);
             }
         }
     }
@@ -263,20 +264,37 @@ impl Sections {
     pub fn judge(&mut self, request: &Request, judging: &mut Judging<'_>) -> Option<Judgement> {
         let (from_m, to_m) = self.bounds_m(request.section);
         let (target_m, confidence_sd) = (self.target_m, self.confidence_sd);
-        self.get(request.section)?;
-        let hole = judging.finder.largest(judging.store, from_m, to_m);
+        let section = self.get(request.section)?;
+        let visits = section.visits;
+        if section.verdict == Verdict::Pass && visits.are_several() && !section.is_doubtful() {
+            // What one visit has shown, a later one doesn't take back.
+            return None;
+        }
         let pass_error = self.pass_error(request.section);
-        let section = self.get_mut(request.section)?;
-        let sd_m = pass_error.sd_m(judging.profile.point_at(hole.arc_m));
+        let Judging { store, finder, profile, .. } = judging;
+        let pass_sd_m = |hole: &Hole| pass_error.sd_m(profile.point_at(hole.arc_m));
+        let mut hole = finder.largest_since(store, from_m, to_m, visits.first());
+        let mut sd_m = visits.sd_m(pass_sd_m(&hole));
         let clear_m = clear_of(request.to_come, hole.x_m);
+        let section = self.get_mut(request.section)?;
         let before = section.hole.map(|_| section.verdict);
-        section.hole = Some(hole);
-        section.hole_sd_m = sd_m;
         section.verdict = match verdict(&hole, confidence_sd * sd_m, target_m, clear_m) {
             Verdict::Pass if section.is_doubtful() => Verdict::CannotSay,
             Verdict::Open | Verdict::CannotSay if request.fails => Verdict::Fail,
             verdict => verdict,
         };
+        if section.verdict != Verdict::Pass && section.is_visited_anew() && !section.has_doubtful_wall() {
+            let newest = finder.largest_since(store, from_m, to_m, visits.newest());
+            let newest_sd_m = pass_sd_m(&newest);
+            if newest.bounded && newest.most_m + confidence_sd * newest_sd_m <= target_m {
+                (hole, sd_m) = (newest, newest_sd_m);
+                section.verdict = Verdict::Pass;
+                if section.is_doubtful() {
+                    section.keep_newest_visit();
+                }
+            }
+        }
+        (section.hole, section.hole_sd_m) = (Some(hole), sd_m);
         // More samples leave a pass a pass; those outside a hole's radius leave the hole as it is.
         section.settled = section.verdict == Verdict::Pass || clear_m >= hole.diameter_m / 2.0;
         if section.verdict == Verdict::Fail {

@@ -3,8 +3,7 @@
 use super::frontier::{Outlook, Reach, clear_of};
 use super::hole::{Hole, HoleFinder};
 use super::metres::Metres;
-use super::passage::PassError;
-use super::section::Verdict;
+use super::section::{Section, Verdict};
 use super::sections::{Sections, verdict};
 use super::store::SampleStore;
 use headrace_geometry::math;
@@ -62,17 +61,18 @@ impl Sections {
         let indexes = math::floor_to_i64(first_m / section_m)..-math::floor_to_i64(-end_m / section_m);
         let section = |index: i64| {
             let (from_m, to_m) = (index as f64 * section_m, (index + 1) as f64 * section_m);
-            let hole = finder.largest(store, from_m, to_m);
-            let mut pass_error = PassError::default();
-            let mut doubtful = false;
             // Slightly inside, so that a common border is no overlap.
-            for old in self.index_of(from_m + 1e-9)..=self.index_of(to_m - 1e-9) {
-                if let Some(section) = self.get(old) {
-                    pass_error.add(&section.passage.pass_error);
-                    doubtful |= section.is_doubtful();
-                }
+            let overlapped = self.index_of(from_m + 1e-9)..=self.index_of(to_m - 1e-9);
+            let overlapped = || overlapped.clone().filter_map(|old| self.get(old));
+            let first_visit = overlapped().map(|old| old.visits.first()).max().unwrap_or(0);
+            let hole = finder.largest_since(store, from_m, to_m, first_visit);
+            let wall_m = profile.point_at(hole.arc_m);
+            let sd_m = |old: &Section| old.visits.sd_m(old.passage.pass_error.sd_m(wall_m));
+            Measured {
+                hole,
+                sd_m: overlapped().map(sd_m).fold(0.0, f64::max),
+                doubtful: overlapped().any(Section::is_doubtful),
             }
-            Measured { hole, sd_m: pass_error.sd_m(profile.point_at(hole.arc_m)), doubtful }
         };
         indexes.map(section).collect()
     }

@@ -168,12 +168,14 @@ impl Navigation for DirectNavigation {
         let (_, [y_m, z_m]) = self.place.filter(|(since, _)| fresh(*since)).ok_or(NoFix::Section)?;
         let speed_mps = self.tether.speed_mps();
         let x_m = chainage_m + speed_mps * at.since(since).as_secs_f64();
+        // Two independent roundings to the counter's quantum.
+        let relative = Relative::along(self.tether.resolution_m * math::sqrt(2.0 / 12.0));
         Ok(Fix {
             pose: Pose { position: Point3::new(x_m, y_m, z_m), attitude },
             speed_mps,
             tie: 0,
-            // Two independent roundings to the counter's quantum.
-            relative: Relative::along(self.tether.resolution_m * math::sqrt(2.0 / 12.0)),
+            relative,
+            revisit: relative,
         })
     }
 }

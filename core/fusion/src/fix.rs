@@ -15,6 +15,8 @@ pub struct Fix {
     pub speed_mps: f64,
     /// Error covariance relative to the heads' previous pass of this place.
     pub relative: Relative,
+    /// Error covariance relative to a visit of this place long before, of the same stretch of navigation.
+    pub revisit: Relative,
     /// Number of the stretch of navigation. Nothing sure relates positions of different stretches.
     pub tie: u32,
 }

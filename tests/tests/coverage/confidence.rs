@@ -4,15 +4,22 @@ use headrace_monitor::report::{Report, SectionReport};
 use headrace_tests::instrumented;
 
 /// Ever faster, so that holes grow from well below the target to beyond it.
-const SCENE: &str = "seed = 5\nvehicle = \"vehicle.toml\"\n[trajectory]\nstart_m = 3\n\
-    [[trajectory.legs]]\ndistance_m = 4\nspeed_mps = 0.13\n[[trajectory.legs]]\ndistance_m = 4\nspeed_mps = 0.16\n\
-    [[trajectory.legs]]\ndistance_m = 4\nspeed_mps = 0.19\n[[trajectory.legs]]\ndistance_m = 4\nspeed_mps = 0.25\n\
-    [effects]\nmotion_within_turn = {}\nrange_noise = { sd_m = 0.01 }\n";
+fn scene() -> String {
+    let leg = |k: u32| {
+        let speed_mps = 0.12 + 0.012 * f64::from(k);
+        format!("[[trajectory.legs]]\ndistance_m = 1.5\nspeed_mps = {speed_mps:.3}\n")
+    };
+    let legs: String = (0..11).map(leg).collect();
+    format!(
+        "seed = 5\nvehicle = \"vehicle.toml\"\n[trajectory]\nstart_m = 3\n{legs}\
+         [effects]\nmotion_within_turn = {{}}\nrange_noise = {{ sd_m = 0.01 }}\n"
+    )
+}
 
 fn judged(confidence: u32) -> Report {
     let vehicle = include_str!("../../../deploy/vehicles/vita2-4.toml");
     let vehicle = vehicle.replace("[heads]", &format!("[coverage]\nconfidence = {confidence}\n\n[heads]"));
-    instrumented::dive(&vehicle, SCENE).report
+    instrumented::dive(&vehicle, &scene()).report
 }
 
 /// Its verdict, by the hole, its bounds and standard deviation as reported.

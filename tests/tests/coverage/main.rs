@@ -15,5 +15,6 @@ mod metamorphic;
 mod oracle;
 mod settings;
 mod truth;
+mod visits;
 mod wall_samples;
 mod way;

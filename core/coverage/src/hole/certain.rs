@@ -25,7 +25,7 @@ impl HoleFinder {
         let Self { window, tiles, .. } = self;
         let length_m = to_m - from_m;
         let around_m = radius_m + length_m;
-        window.fill(store, from_m, (-around_m, length_m + around_m), cell_m(radius_m));
+        window.fill((store, 0), from_m, (-around_m, length_m + around_m), cell_m(radius_m));
         tiles.clear();
         tiles.extend(first_tiles(store.perimeter_m(), length_m));
         while let Some(tile) = tiles.pop() {
@@ -67,7 +67,7 @@ mod tests {
                 StoreLayout { perimeter_m: PERIMETER_M, from_m: -2.0, to_m: 6.0, cell_m: 0.3, capacity: 1000 };
             let mut store = SampleStore::new(layout);
             for (x_m, arc_m) in &samples {
-                store.insert(WallSample { x_m: *x_m, arc_m: *arc_m, head: 0, step_m: None }).unwrap();
+                store.insert(WallSample { x_m: *x_m, arc_m: *arc_m, head: 0, step_m: None, visit: 0 }).unwrap();
             }
             let reach = Some(Reach { from_m: reach_m, to_m: 5.0 });
             let clear = |x_m: f64, arc_m: f64| {

@@ -8,7 +8,7 @@ fn store(perimeter_m: f64, samples: &[(f64, f64)]) -> SampleStore {
     let layout = StoreLayout { perimeter_m, from_m: -20.0, to_m: 40.0, cell_m: 0.4, capacity: 100_000 };
     let mut store = SampleStore::new(layout);
     for (x_m, arc_m) in samples {
-        store.insert(WallSample { x_m: *x_m, arc_m: *arc_m, head: 0, step_m: None }).unwrap();
+        store.insert(WallSample { x_m: *x_m, arc_m: *arc_m, head: 0, step_m: None, visit: 0 }).unwrap();
     }
     store
 }
@@ -81,7 +81,7 @@ proptest! {
         cell_m in 0.05f64..1.0,
     ) {
         let mut window = Window::default();
-        window.fill(&store(PERIMETER_M, &samples), 0.0, (-3.0, 4.0), cell_m);
+        window.fill((&store(PERIMETER_M, &samples), 0), 0.0, (-3.0, 4.0), cell_m);
         let expected = Some(nearest_m(PERIMETER_M, &samples, place)).filter(|d| *d <= within_m);
         let found = window.nearest(place.0, place.1, within_m);
         match (found, expected) {
@@ -124,7 +124,7 @@ proptest! {
         let mut store = SampleStore::new(layout);
         let far = (0..120).map(|k| (339.0 - 1.7 * f64::from(k), 0.0));
         for (x_m, arc_m) in samples.iter().copied().chain(far) {
-            store.insert(WallSample { x_m, arc_m, head: 0, step_m: None }).unwrap();
+            store.insert(WallSample { x_m, arc_m, head: 0, step_m: None, visit: 0 }).unwrap();
         }
         let expected = brute_force(PERIMETER_M, &samples, 0.0, 0.5);
         let hole = HoleFinder::default().largest(&store, 0.0, 0.5);
@@ -148,7 +148,7 @@ proptest! {
         let fine = StoreLayout { perimeter_m: PERIMETER_M, from_m: -1.0, to_m: 1.0, cell_m: 0.05, capacity: 100_000 };
         let mut all = SampleStore::new(fine);
         for (x_m, arc_m) in &samples {
-            let kept = all.insert(WallSample { x_m: *x_m, arc_m: *arc_m, head: 0, step_m: None });
+            let kept = all.insert(WallSample { x_m: *x_m, arc_m: *arc_m, head: 0, step_m: None, visit: 0 });
             prop_assume!(kept == Ok(Kept::Stored));
         }
         let exact = HoleFinder::default().largest(&all, 0.1, 0.3);
@@ -258,7 +258,9 @@ fn chainage_of_seven_and_of_a_thousand_kilometres() {
         };
         let mut store = SampleStore::new(layout);
         for (x_m, arc_m) in &samples {
-            store.insert(WallSample { x_m: x_m + chainage, arc_m: *arc_m, head: 0, step_m: None }).unwrap();
+            store
+                .insert(WallSample { x_m: x_m + chainage, arc_m: *arc_m, head: 0, step_m: None, visit: 0 })
+                .unwrap();
         }
         let hole = HoleFinder::default().largest(&store, chainage, chainage + 0.25);
         assert!((hole.diameter_m - near).abs() < error, "{chainage}: {hole:?} and {near}");
@@ -290,7 +292,7 @@ fn val_reference_holes_of_ideal_helices() {
                     let hit =
                         profile.cast(profile.reference(), [math::sin(angle), -math::cos(angle)]).unwrap();
                     let (x_m, arc_m, head) = (ping as f64 * per_ping_m, hit.arc_m, head as usize);
-                    store.insert(WallSample { x_m, arc_m, head, step_m: None }).unwrap();
+                    store.insert(WallSample { x_m, arc_m, head, step_m: None, visit: 0 }).unwrap();
                 }
             }
             let mut finder = HoleFinder::default();
@@ -299,4 +301,25 @@ fn val_reference_holes_of_ideal_helices() {
             assert!((d / expected - 1.0).abs() < 2e-3, "{mode} x {heads}: {d} and {expected}");
         }
     }
+}
+
+#[test]
+fn samples_of_earlier_visits_fill_no_hole_of_a_later_one() {
+    let grid = |off_m: f64| {
+        (0..60).flat_map(move |i| {
+            (0..20).map(move |k| (f64::from(i) * 0.1 + off_m, f64::from(k) * PERIMETER_M / 20.0))
+        })
+    };
+    let mut store = store(PERIMETER_M, &[]);
+    for (visit, off_m) in [(3, 0.0), (4, 0.05)] {
+        for (x_m, arc_m) in grid(off_m) {
+            store.insert(WallSample { x_m, arc_m, head: 0, step_m: None, visit }).unwrap();
+        }
+    }
+    let mut finder = HoleFinder::default();
+    let mut since = |visit: u32| finder.largest_since(&store, 2.0, 3.0, visit);
+    let [both, later, none] = [3, 4, 5].map(&mut since);
+    assert!(both.diameter_m < later.diameter_m, "{both:?} {later:?}");
+    assert!((later.diameter_m - f64::hypot(0.1, PERIMETER_M / 20.0)).abs() < 1e-9, "{later:?}");
+    assert!(!none.bounded);
 }

@@ -70,12 +70,12 @@ impl Default for Window {
 }
 
 impl Window {
-    /// Loads all samples between two chainages relative to `origin_m`, in cells of about `cell_m`.
+    /// Loads all samples of the visits from one on between two chainages relative to `origin_m`, in cells of about `cell_m`.
     ///
     /// Allocates: never.
     pub(super) fn fill(
         &mut self,
-        store: &SampleStore,
+        (store, first_visit): (&SampleStore, u32),
         origin_m: f64,
         (from_m, to_m): (f64, f64),
         cell_m: f64,
@@ -85,7 +85,10 @@ impl Window {
         self.overfull = false;
         let (rows, columns) = (self.rows as f64, self.columns - 1);
         let [_, per_row, per_column] = self.per_m;
-        store.visit_between(origin_m + from_m, origin_m + to_m, |x_m, arc_m| {
+        store.each_between(origin_m + from_m, origin_m + to_m, |x_m, arc_m, visit| {
+            if visit < first_visit {
+                return;
+            }
             let spot = Spot { x_m: x_m - origin_m, arc_m };
             let row = (spot.x_m - self.from_m) * per_row;
             if !(0.0..rows).contains(&row) {

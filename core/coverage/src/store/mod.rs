@@ -41,6 +41,8 @@ pub struct WallSample {
     /// Step from the same head's sample before, along the tunnel and along the perimeter, m, if it was a single step of
     /// the same sweep.
     pub step_m: Option<[f64; 2]>,
+    /// Number of the visit in which it was measured, from zero, never falling.
+    pub visit: u32,
 }
 
 /// Extent and resolution of a [`SampleStore`].
@@ -236,7 +238,8 @@ impl SampleStore {
         }
         self.make_room(number, 1);
         let step_m = sample.step_m.unwrap_or_default();
-        if !self.open.add(cell, sample.head, (sample.x_m, arc_m, step_m)) {
+        let packed = Packed { x_m: sample.x_m, arc_m, step_m, visit: sample.visit };
+        if !self.open.add(cell, sample.head, &packed) {
             return Err(StoreError::Full);
         }
         for (longest, step) in self.longest_step_m.iter_mut().zip(step_m) {
@@ -249,10 +252,11 @@ impl SampleStore {
         Ok(Kept::Stored)
     }
 
-    /// Calls `visit` with chainage and arc length of all samples between two chainages, m, and perhaps of some beyond.
+    /// Calls `take` with chainage and arc length, m, and the number of the visit of all samples between two chainages, m, and
+    /// perhaps of some beyond.
     ///
     /// Allocates: never.
-    pub fn visit_between(&self, from_m: f64, to_m: f64, mut visit: impl FnMut(f64, f64)) {
+    pub fn each_between(&self, from_m: f64, to_m: f64, mut take: impl FnMut(f64, f64, u32)) {
         for number in self.bricks_between(from_m, to_m) {
             let Some(brick) = self.bricks.get(number as usize).filter(|brick| brick.count > 0) else {
                 continue;
@@ -266,14 +270,14 @@ impl SampleStore {
                     for row in in_brick.start.max(first)..in_brick.end.min(last + 1) {
                         for column in 0..self.columns {
                             for node in self.open.in_cell(self.cell_at(slot, row, column)) {
-                                visit(node.x_m, node.arc_m);
+                                take(node.x_m, node.arc_m, node.visit);
                             }
                         }
                     }
                 }
                 None => {
                     for (_, sample) in self.packed_samples(number, brick) {
-                        visit(sample.x_m, sample.arc_m);
+                        take(sample.x_m, sample.arc_m, sample.visit);
                     }
                 }
             }
@@ -336,16 +340,16 @@ impl SampleStore {
         let layout = self.layout;
         let first_row = i64::from(number) << rows_shift;
         let reader = Reader::new(&self.arena, self.lattice(number), brick.first_block, brick.count);
-        for (head, Packed { x_m, arc_m, step_m }) in reader {
-            let row = math::floor_to_i64((x_m - layout.from_m) / layout.cell_m) - first_row;
+        for (head, sample) in reader {
+            let row = math::floor_to_i64((sample.x_m - layout.from_m) / layout.cell_m) - first_row;
             let row = row.clamp(0, (1 << rows_shift) - 1);
-            let column = math::floor_to_i64(arc_m / column_m).clamp(0, columns - 1);
+            let column = math::floor_to_i64(sample.arc_m / column_m).clamp(0, columns - 1);
             let at = CellAt {
                 slot,
                 row: usize::try_from(row).unwrap_or(0),
                 column: usize::try_from(column).unwrap_or(0),
             };
-            self.open.add(at, head, (x_m, arc_m, step_m));
+            self.open.add(at, head, &sample);
         }
     }
 
@@ -364,7 +368,7 @@ impl SampleStore {
                 writer.head(head)?;
             }
             for node in samples {
-                writer.sample(Packed { x_m: node.x_m, arc_m: node.arc_m, step_m: node.step_m })?;
+                writer.sample(node.sample())?;
             }
         }
         let first_block = writer.finish();

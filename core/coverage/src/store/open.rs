@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::packed::Packed;
 use headrace_sampling::head::MAX_HEADS;
 use headrace_snapshot::stateful;
 
@@ -17,8 +18,18 @@ pub(super) struct Node {
     pub arc_m: f64,
     /// Single step from the sample before, along the tunnel and the perimeter, m; zero without one.
     pub step_m: [f64; 2],
+    /// Number of the visit.
+    pub visit: u32,
     next_in_cell: Link,
     next_of_head: Link,
+}
+
+impl Node {
+    /// The sample itself.
+    pub(super) fn sample(&self) -> Packed {
+        let Self { x_m, arc_m, step_m, visit, .. } = *self;
+        Packed { x_m, arc_m, step_m, visit }
+    }
 }
 
 /// A cell of an open brick.
@@ -117,15 +128,11 @@ impl OpenBricks {
     }
 
     /// Adds a sample of a head to a cell of a slot; false if there is no room.
-    pub(super) fn add(
-        &mut self,
-        at: CellAt,
-        head: usize,
-        (x_m, arc_m, step_m): (f64, f64, [f64; 2]),
-    ) -> bool {
+    pub(super) fn add(&mut self, at: CellAt, head: usize, sample: &Packed) -> bool {
+        let Packed { x_m, arc_m, step_m, visit } = *sample;
         let index = self.index(at);
         let Some(list) = self.cells.get_mut(index) else { return false };
-        let node = Node { x_m, arc_m, step_m, next_in_cell: list.latest, next_of_head: 0 };
+        let node = Node { x_m, arc_m, step_m, visit, next_in_cell: list.latest, next_of_head: 0 };
         let link = self.free;
         let link =
             if let Some(unused) = link.checked_sub(1).and_then(|index| self.nodes.get_mut(index as usize)) {

@@ -17,11 +17,13 @@ pub(super) const MOVED_M: f64 = 8.6e-6;
 /// Sample words per block; one more word links to the next block.
 pub(super) const ROOM: usize = 31;
 /// Maximum words per sample.
-pub(super) const MOST_WORDS: usize = 5;
+pub(super) const MOST_WORDS: usize = 7;
 /// Lower half of an escape word: one that isn't a difference.
 const ESCAPE: u16 = 0x8000;
 const PLACE: u16 = 0;
 const STEPPED: u16 = 1;
+/// The next word is the number of the visit of the samples from here on.
+const VISIT: u16 = u16::MAX;
 /// Tags from this one on switch heads: `HEAD` plus the head's number.
 const HEAD: u16 = 2;
 
@@ -49,6 +51,8 @@ pub(super) struct Packed {
     pub arc_m: f64,
     /// Single step from the sample before, along the tunnel and the perimeter, m; zero without one.
     pub step_m: [f64; 2],
+    /// Number of the visit.
+    pub visit: u32,
 }
 
 impl Lattice {
@@ -188,11 +192,12 @@ pub(super) struct Writer<'a> {
     block: u32,
     at: usize,
     before: Option<(Spot, Packed)>,
+    visit: u32,
 }
 
 impl<'a> Writer<'a> {
     pub(super) fn new(arena: &'a mut Arena, lattice: Lattice) -> Self {
-        Self { arena, lattice, first: 0, block: 0, at: ROOM, before: None }
+        Self { arena, lattice, first: 0, block: 0, at: ROOM, before: None, visit: 0 }
     }
 
     /// Switches to a head; `None` if there is no room.
@@ -203,6 +208,11 @@ impl<'a> Writer<'a> {
 
     /// Writes a sample; `None` if there is no room.
     pub(super) fn sample(&mut self, sample: Packed) -> Option<()> {
+        if sample.visit != self.visit {
+            self.visit = sample.visit;
+            self.word(escape(VISIT))?;
+            self.word(sample.visit)?;
+        }
         let spot = self.lattice.spot(sample.x_m, sample.arc_m);
         let [along_m, around_m] = sample.step_m;
         let stepped = along_m.abs() + around_m.abs() > 0.0;
@@ -260,13 +270,14 @@ pub(super) struct Reader<'a> {
     at: usize,
     left: u32,
     head: usize,
+    visit: u32,
     before: Spot,
 }
 
 impl<'a> Reader<'a> {
     pub(super) fn new(arena: &'a Arena, lattice: Lattice, first: u32, samples: u32) -> Self {
         let block = first.checked_sub(1).and_then(|index| arena.blocks.get(index as usize));
-        Self { arena, lattice, block, at: 0, left: samples, head: 0, before: Spot { x: 0, arc: 0 } }
+        Self { arena, lattice, block, at: 0, left: samples, head: 0, visit: 0, before: Spot { x: 0, arc: 0 } }
     }
 
     fn word(&mut self) -> Option<u32> {
@@ -305,6 +316,7 @@ impl Iterator for Reader<'_> {
             match upper {
                 PLACE => break (self.spot()?, None),
                 STEPPED => break (self.spot()?, Some(self.spot()?)),
+                VISIT => self.visit = self.word()?,
                 head => self.head = usize::from(head - HEAD).min(MAX_HEADS - 1),
             }
         };
@@ -314,6 +326,6 @@ impl Iterator for Reader<'_> {
             let (from_x_m, from_arc_m) = self.lattice.place_m(start);
             [x_m - from_x_m, math::wrap_signed(arc_m - from_arc_m, self.lattice.perimeter_m)]
         });
-        Some((self.head, Packed { x_m, arc_m, step_m }))
+        Some((self.head, Packed { x_m, arc_m, step_m, visit: self.visit }))
     }
 }

@@ -6,7 +6,7 @@ const LAYOUT: StoreLayout =
     StoreLayout { perimeter_m: PERIMETER_M, from_m: -1.0, to_m: 212.0, cell_m: 0.3, capacity: 200_000 };
 
 fn sample(x_m: f64, arc_m: f64) -> WallSample {
-    WallSample { x_m, arc_m, head: 0, step_m: None }
+    WallSample { x_m, arc_m, head: 0, step_m: None, visit: 0 }
 }
 
 /// Samples of several heads in single steps from point to point; the first of each head has none.
@@ -18,7 +18,7 @@ fn steps(places: &[(f64, f64)], heads: usize) -> Vec<WallSample> {
         let step_m = last[head].replace((*x_m, *arc_m)).map(|(from_x_m, from_arc_m): (f64, f64)| {
             [x_m - from_x_m, math::wrap_signed(arc_m - from_arc_m, PERIMETER_M)]
         });
-        all.push(WallSample { x_m: *x_m, arc_m: *arc_m, head, step_m });
+        all.push(WallSample { x_m: *x_m, arc_m: *arc_m, head, step_m, visit: 0 });
     }
     all
 }
@@ -42,7 +42,7 @@ fn pack_the_first_40_m(store: &mut SampleStore) {
 /// Samples kept of the first 40 m, sorted.
 fn kept(store: &SampleStore) -> Vec<(f64, f64)> {
     let mut kept = Vec::new();
-    store.visit_between(-1.0, 40.0, |x_m, arc_m| kept.push((x_m, arc_m)));
+    store.each_between(-1.0, 40.0, |x_m, arc_m, _| kept.push((x_m, arc_m)));
     kept.retain(|place| place.0 < 40.0);
     kept.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
     kept
@@ -103,7 +103,7 @@ proptest! {
             for k in 0..80 {
                 let arc_m = math::wrap(arc_m + around_m * f64::from(k), PERIMETER_M);
                 let step_m = (k > 0).then_some([0.002, *around_m]);
-                samples.push(WallSample { x_m: x_m + 0.002 * f64::from(k), arc_m, head, step_m });
+                samples.push(WallSample { x_m: x_m + 0.002 * f64::from(k), arc_m, head, step_m, visit: 0 });
             }
         }
         // At the end of a step, micrometres may select another pass.
@@ -219,7 +219,7 @@ fn a_full_store_loses_nothing_that_it_kept() {
     }
     assert!((3_000..20_000).contains(&stored), "{stored}");
     let mut seen = 0;
-    store.visit_between(-1.0, 212.0, |_, _| seen += 1);
+    store.each_between(-1.0, 212.0, |_, _, _| seen += 1);
     assert_eq!(seen, stored);
 }
 
@@ -275,4 +275,27 @@ fn back_and_forth_a_hundred_times() {
     let now = kept(&store);
     let lost = then.iter().filter(|place| !now.iter().any(|other| apart(**place, *other) <= packed::MOVED_M));
     assert_eq!(lost.count(), 0, "samples stay where they were");
+}
+
+#[test]
+fn samples_keep_their_visits_when_packed() {
+    let mut store = SampleStore::new(LAYOUT);
+    let visited = |k: u32| WallSample {
+        head: k as usize % 3,
+        visit: [0, 0, 1, 7, 7, u32::MAX][k as usize / 3 % 6],
+        ..sample(5.0 + 0.01 * f64::from(k), 0.02 * f64::from(k))
+    };
+    for k in 0..90 {
+        store.insert(visited(k)).unwrap();
+    }
+    let visits = |store: &SampleStore| {
+        let mut visits = Vec::new();
+        store.each_between(4.0, 7.0, |x_m, _, visit| visits.push(((x_m * 100.0).round() as i64, visit)));
+        visits.sort_unstable();
+        visits
+    };
+    let before = visits(&store);
+    assert_eq!(before.len(), 90);
+    pack_the_first_40_m(&mut store);
+    assert_eq!(visits(&store), before);
 }

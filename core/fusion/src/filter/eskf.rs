@@ -4,7 +4,7 @@ use core::ops::Range;
 
 use super::agreement::{self, Agreement};
 use super::cable::{Cable, CableReading, Slip, Use};
-use super::clones::{ErrorClones, MOVING};
+use super::clones::ErrorClones;
 use super::context::Context;
 use super::factors::{Factors, Gain};
 use super::inertial::Leg;
@@ -20,7 +20,6 @@ use super::suspicion::Suspicions;
 use super::unrest::Unrest;
 use super::updates::rows;
 use super::window::{Waiting, Window};
-use crate::relative::Relative;
 use crate::smooth::step::{Move, Step};
 use headrace_geometry::frames::{Body, Point3, Rot, Tunnel, Vec3};
 use headrace_geometry::math;
@@ -412,19 +411,6 @@ impl Eskf {
             );
         }
         self.state.correct(&errors);
-    }
-
-    /// Covariance relative to an estimate as sure as this one that has nothing to do with it.
-    pub fn independent(&self) -> Relative {
-        let mut covariance =
-            self.factors.rows(MOVING).map(|row| MOVING.map(|i| 2.0 * row.get(i).copied().unwrap_or(0.0)));
-        let along_m = self.pose_sd().along_m;
-        // The cable's creep is common to both.
-        covariance[0] = [2.0 * along_m * along_m, 0.0, 0.0];
-        for row in covariance.iter_mut().skip(1) {
-            row[0] = 0.0;
-        }
-        Relative::new(covariance)
     }
 
     /// Standard deviations of the estimate.

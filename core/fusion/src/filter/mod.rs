@@ -100,12 +100,14 @@ pub struct FilterNavigation {
     /// The estimate of the last epoch, propagated onwards.
     ahead: Vec<(MonoNs, State)>,
     standing: Result<Relative, NoFix>,
+    /// Covariance relative to an estimate as sure as this one that has nothing to do with it.
+    revisit: Relative,
     /// Number of restarts of the estimate: it was lost, not finite, or the clock went back.
     restarts: u64,
     journal: Option<Journal>,
 }
 
-stateful!(FilterNavigation { state: context, window, unit, listening, stillness, running, is_running, epoch_zero, received, standing, restarts; lists: ahead; slots: sources; fixed: journal; });
+stateful!(FilterNavigation { state: context, window, unit, listening, stillness, running, is_running, epoch_zero, received, standing, revisit, restarts; lists: ahead; slots: sources; fixed: journal; });
 
 impl FilterNavigation {
     /// Without readings yet.
@@ -123,6 +125,7 @@ impl FilterNavigation {
             received: MonoNs(0),
             ahead: Vec::with_capacity(AHEAD),
             standing: Err(NoFix::Heading),
+            revisit: Relative::default(),
             restarts: 0,
             journal: None,
         }
@@ -215,7 +218,8 @@ impl FilterNavigation {
         let pass_gap = self.pass_gap();
         let relative = self.running.clones.relative(pass_gap);
         // At first nothing relates what is placed now to what was placed before.
-        let relative = relative.unwrap_or_else(|| self.running.independent());
+        self.revisit = sd.independent();
+        let relative = relative.unwrap_or(self.revisit);
         self.standing = match sd.standing(relative) {
             Ok(_) if self.has_jumped() => Err(NoFix::Chainage),
             standing => standing,
@@ -433,6 +437,7 @@ impl Navigation for FilterNavigation {
         let arm = state.attitude * -self.context.unit_at;
         let pose = Pose { position: state.position + arm, attitude: state.attitude };
         let (speed_mps, tie) = (state.velocity_mps.x(), self.running.ties);
-        Ok(Fix { pose, speed_mps, relative: relative.moved(arm), tie })
+        let [relative, revisit] = [relative, self.revisit].map(|of| of.moved(arm));
+        Ok(Fix { pose, speed_mps, relative, revisit, tie })
     }
 }

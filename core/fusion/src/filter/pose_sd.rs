@@ -46,6 +46,13 @@ impl PoseSd {
         }
     }
 
+    /// Covariance relative to an estimate as sure as this one that has nothing to do with it.
+    pub fn independent(&self) -> Relative {
+        let variance = |sd: f64| 2.0 * sd * sd;
+        let [along, tilt, yaw] = [self.along_m, self.tilt_rad, self.yaw_rad].map(variance);
+        Relative::new([[along, 0.0, 0.0], [0.0, tilt, 0.0], [0.0, 0.0, yaw]])
+    }
+
     /// Whether this estimate and relative covariance are good enough to georeference samples.
     ///
     /// Errors: the part that is too uncertain.

@@ -124,7 +124,8 @@ impl Track {
         let speed_mps = before.speed_mps + (after.speed_mps - before.speed_mps) * share;
         let pose = Pose { position: pose.position + arm, attitude: pose.attitude };
         let tie = u32::try_from(piece.points.start).unwrap_or(u32::MAX);
-        Ok(Fix { pose, speed_mps, relative: relative.moved(arm), tie })
+        let [relative, revisit] = [relative, before.sd.independent()].map(|of| of.moved(arm));
+        Ok(Fix { pose, speed_mps, relative, revisit, tie })
     }
 
     fn points_of(&self, piece: &Piece) -> &[Point] {

@@ -14,9 +14,10 @@ use crate::alerts::Alerts;
 use crate::entities::{HeadFrontier, HeadSweep};
 use crate::messages::{Notices, Outcome, Placed, PlacedList, PlacedPing, Requests};
 use crate::resources::{Coverage, Digests, Finder, Tally, TunnelDesign, VehicleEntities};
-use headrace_coverage::{HeadReach, Loss, Outlook, PassError};
+use headrace_coverage::{HeadReach, Loss, Outlook, Visit};
 use headrace_geometry::frames::Vec3;
 use headrace_geometry::time::DurNs;
+use headrace_geometry::tunnel::Profile;
 
 /// Interval between checks of the sections of a still zone.
 const LOOK_AROUND: DurNs = DurNs(1_000_000_000);
@@ -55,7 +56,8 @@ pub(super) fn cover(
                 coverage.frontier.hear(ping.received);
                 let head = entities.of_head(ping.head).and_then(|entity| heads.get_mut(entity).ok());
                 let Some((_, _, mut sweep, mut frontier)) = head else { continue };
-                note_passage(&mut coverage, &mut sweep, &frontier, &driving.now, ping);
+                let ping_there = (ping, &tunnel.profile);
+                note_passage(&mut coverage, &mut sweep, &frontier, &driving.now, ping_there);
                 let mut sorting = Sorting {
                     coverage: &mut coverage,
                     tunnel: &tunnel,
@@ -110,7 +112,7 @@ fn note_passage(
     sweep: &mut HeadSweep,
     frontier: &HeadFrontier,
     driven: &Driven,
-    ping: &PlacedPing,
+    (ping, profile): (&PlacedPing, &Profile),
 ) {
     note_unseen(coverage, sweep, frontier, ping);
     let perimeter_m = coverage.store.perimeter_m();
@@ -123,6 +125,7 @@ fn note_passage(
     // Without a fix, a ping counts where its head was last known to be.
     let Some(reach) = ping.reach.or_else(|| Some(frontier.0?.latest())) else { return };
     let index = coverage.sections.index_of(reach.middle_m());
+    let turns = coverage.frontier.turns();
     let Some(section) = coverage.sections.get_mut(index) else { return };
     let passage = &mut section.passage;
     passage.pings += 1;
@@ -143,7 +146,7 @@ fn note_passage(
     passage.ping_period_sum_s += driven.ping_period_s;
     passage.swing_sum_m += driven.swing_m;
     passage.middle_t_y_m = passage.middle_t_y_m.max(driven.middle_t_y_m);
-    passage.pass_error.add(&PassError::of(&fix));
+    section.note_pass(&Visit::of(&fix, ping.valid_at, turns), profile);
 }
 
 /// Marks the sections that a head went through during a navigation outage.

@@ -4,7 +4,7 @@ use crate::entities::{HeadSweep, LastSample};
 use crate::messages::{Outcome, PlacedPing};
 use crate::resources::{Coverage, TunnelDesign};
 use headrace_coverage::hole::FARTHEST_M;
-use headrace_coverage::{StoreError, WallSample};
+use headrace_coverage::{StoreError, Visit, WallSample};
 use headrace_geometry::frames::{Point3, Tunnel};
 use headrace_geometry::math;
 use headrace_sampling::spacing;
@@ -36,11 +36,17 @@ pub(super) fn note_sample(
     let perimeter_m = coverage.store.perimeter_m();
     let step_m = step_from
         .map(|last| [point.x() - last.point.x(), math::wrap_signed(arc_m - last.arc_m, perimeter_m)]);
-    let kept = coverage.store.insert(WallSample { x_m: point.x(), arc_m, head: ping.head, step_m });
+    let turns = coverage.frontier.turns();
+    let visit = ping.fix.map(|fix| Visit::of(&fix, ping.valid_at, turns));
+    let number = visit.map_or(0, |visit| visit.number);
+    let sample = WallSample { x_m: point.x(), arc_m, head: ping.head, step_m, visit: number };
+    let kept = coverage.store.insert(sample);
     *slot = kept.ok().map(|_| LastSample { point, arc_m, unbroken: true });
     kept?;
     coverage.soundings.add(point.x(), arc_m);
-    coverage.sections.touch(point.x(), ping.fix.map_or(0, |fix| fix.tie));
+    if let Some(visit) = visit {
+        coverage.sections.touch(point.x(), &visit, &tunnel.profile);
+    }
     let index = coverage.sections.index_of(point.x());
     let Some(section) = coverage.sections.get_mut(index) else { return Ok(()) };
     section.samples += 1;

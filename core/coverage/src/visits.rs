@@ -1,0 +1,109 @@
+//! Visits of a place: of samples of one visit it is known how far passes are off one another; those of different visits may be
+//! further apart.
+//!
+//! A visit ends where the vehicle turns back, and where navigation breaks off.
+
+use serde::{Deserialize, Serialize};
+
+use super::passage::PassError;
+use headrace_fusion::Fix;
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_geometry::tunnel::Profile;
+
+/// Age of a sample to which the error between passes applies, and from which on it is that of a visit long before.
+const SAME_PASS: DurNs = DurNs(20_000_000_000);
+const LONG_BEFORE: DurNs = DurNs(40_000_000_000);
+
+/// The visit that a sample is of.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Visit {
+    /// Number from zero, never falling.
+    pub number: u32,
+    /// Number of the stretch of navigation.
+    pub tie: u32,
+    /// Time of the sample.
+    pub at: MonoNs,
+    /// Error relative to the pass before, and relative to a visit long before.
+    pub errors: [PassError; 2],
+}
+
+impl Visit {
+    /// Of a fix at `at`, when the vehicle had turned back `turns` times.
+    pub fn of(fix: &Fix, at: MonoNs, turns: u32) -> Self {
+        let [pass, long_before] =
+            [fix.relative, fix.revisit].map(|relative| PassError { relative, ..PassError::of(fix) });
+        Self { number: turns.saturating_add(fix.tie), tie: fix.tie, at, errors: [pass, long_before] }
+    }
+
+    /// The largest standard deviation of a hole's diameter between samples of now and of then, m.
+    fn apart_sd_m(&self, then: MonoNs, profile: &Profile) -> f64 {
+        let over = (self.at.since(then) + DurNs(-SAME_PASS.0)).as_secs_f64();
+        let share = (over / (LONG_BEFORE.0 - SAME_PASS.0) as f64 * 1e9).clamp(0.0, 1.0);
+        let [pass, long_before] = self.errors;
+        let relative = pass.relative.weighted(1.0 - share, &long_before.relative, share);
+        PassError { relative, ..pass }.worst_m(profile)
+    }
+}
+
+/// The visits of a section: those with samples within T of it.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Visits {
+    /// Number of the newest, its stretch of navigation, and the time of its last sample; `None` before the first.
+    newest: Option<(u32, u32, MonoNs)>,
+    /// Number of the first whose samples count.
+    first: u32,
+    /// Several have samples that count.
+    several: bool,
+    /// Of several stretches of navigation.
+    unrelated: bool,
+    /// The largest standard deviation of a hole's diameter between samples of different visits, m.
+    apart_sd_m: f64,
+}
+
+impl Visits {
+    /// Notes a sample's visit.
+    pub(super) fn note(&mut self, visit: &Visit, profile: &Profile) {
+        if let Some((number, tie, last)) = self.newest.filter(|(number, ..)| *number != visit.number) {
+            self.several |= number >= self.first;
+            self.unrelated |= tie != visit.tie;
+            self.apart_sd_m = self.apart_sd_m.max(visit.apart_sd_m(last, profile));
+        }
+        self.newest = Some((visit.number, visit.tie, visit.at));
+    }
+
+    /// Notes the error between the passes of an earlier visit, a standard deviation of a hole's diameter, m.
+    pub(super) fn note_earlier(&mut self, sd_m: f64) {
+        self.apart_sd_m = self.apart_sd_m.max(sd_m);
+    }
+
+    /// Number of the newest visit.
+    pub(super) fn newest(&self) -> u32 {
+        self.newest.map_or(0, |(number, ..)| number)
+    }
+
+    /// Number of the first visit whose samples count.
+    pub(super) fn first(&self) -> u32 {
+        self.first
+    }
+
+    /// Whether samples of several visits count.
+    pub(super) fn are_several(&self) -> bool {
+        self.several
+    }
+
+    /// Whether nothing sure relates the samples of one to those of another, so that one may only seem to fill the holes of
+    /// another.
+    pub(super) fn are_unrelated(&self) -> bool {
+        self.unrelated
+    }
+
+    /// Leaves only the newest: it shows all of the section by itself.
+    pub(super) fn keep_newest(&mut self) {
+        (self.first, self.several, self.unrelated, self.apart_sd_m) = (self.newest(), false, false, 0.0);
+    }
+
+    /// Standard deviation of a hole among the samples of all visits, m, where that of the newest is `pass_sd_m`.
+    pub(super) fn sd_m(&self, pass_sd_m: f64) -> f64 {
+        if self.several { pass_sd_m.max(self.apart_sd_m) } else { pass_sd_m }
+    }
+}

@@ -1,0 +1,80 @@
+//! Places visited several times: what a later visit makes good, what it doesn't take back, and what two of them prove together.
+
+use headrace_tests::{scenes, truth};
+
+const SENSORS: &str = "imu_noise = { gyro_degps_rthz = 0.007, accel_mps2_rthz = 0.0006, attitude_deg = 0.2 }\n\
+    imu_bias = { gyro_degps = 0.003, accel_mps2 = 0.0003, tau_s = 300 }\nrange_noise = { sd_m = 0.01 }\n";
+
+/// A dive of `vita2-4` from 5 m on over these legs, m and m/s; backwards where negative.
+fn dive(seed: u64, legs: &[(f64, f64)], effects: &str) -> truth::JudgedDive {
+    let legs: String = legs
+        .iter()
+        .map(|(by_m, speed_mps)| {
+            format!("[[trajectory.legs]]\ndistance_m = {by_m}\nspeed_mps = {speed_mps}\n")
+        })
+        .collect();
+    truth::dive(&scenes::scene(&format!(
+        "seed = {seed}\nvehicle = \"vita2-4.toml\"\n[trajectory]\nstart_m = 5\n{legs}[effects]\nmotion_within_turn = {{}}\n\
+         {SENSORS}{effects}"
+    )))
+}
+
+/// Sections between two chainages with this verdict, by their start, mm.
+fn with_verdict(dive: &truth::JudgedDive, verdict: &str, [from_m, to_m]: [f64; 2]) -> Vec<i64> {
+    let within = dive.sections.iter().map(|section| &section.report);
+    let within = within.filter(|section| section.start_m >= from_m && section.end_m <= to_m);
+    within
+        .filter(|section| section.verdict == verdict)
+        .map(|section| (section.start_m * 1e3) as i64)
+        .collect()
+}
+
+fn far_over(dive: &truth::JudgedDive, target_m: f64) -> usize {
+    let passed = dive.sections.iter().filter(|section| section.report.verdict == "pass");
+    passed.filter(|section| section.true_hole_m > 1.1 * target_m).count()
+}
+
+/// The counter stands for 12 s while the vehicle goes on.
+const STUCK: &str =
+    "[[effects.device_faults]]\nsensors = [\"tether\"]\nkind = \"stick\"\nfrom_s = 60\nfor_s = 12\n";
+
+#[test]
+fn sections_with_samples_from_before_and_after_a_doubt_pass_once_a_visit_shows_them_whole() {
+    let out = dive(4, &[(12.0, 0.09)], STUCK);
+    let back = dive(4, &[(12.0, 0.09), (9.0, -0.09)], STUCK);
+    let where_m = [8.0, 13.0];
+    let unsure = with_verdict(&out, "cannot_say", where_m);
+    assert!(unsure.len() >= 2, "nothing was in doubt: {:?}", out.report.alerts);
+    let passed = with_verdict(&back, "pass", where_m);
+    let still: Vec<_> = unsure.iter().filter(|start| !passed.contains(start)).collect();
+    assert!(still.is_empty(), "of {unsure:?} still not passed: {still:?}");
+    assert_eq!(far_over(&back, 0.5), 0);
+}
+
+#[test]
+fn the_way_home_takes_no_pass_back() {
+    let out = dive(2, &[(12.0, 0.09)], "");
+    let home = dive(2, &[(12.0, 0.09), (12.0, -0.4)], "");
+    let where_m = [6.0, 15.0];
+    let [passed, after] = [&out, &home].map(|dive| with_verdict(dive, "pass", where_m));
+    assert!(passed.len() > 30, "{passed:?}");
+    let lost: Vec<_> = passed.iter().filter(|start| !after.contains(start)).collect();
+    assert!(lost.is_empty(), "{lost:?}");
+}
+
+/// Each of two visits is too fast, and the cable's slack is another on the way back.
+#[test]
+fn val_two_visits_prove_together_what_they_have_seen_and_no_more() {
+    let (mut over, mut far, mut passed) = (0, 0, 0);
+    for seed in 0..4 {
+        let dive =
+            dive(seed, &[(8.0, 0.16), (8.0, -0.17)], "tether_slack = { reach_m = 0.028, period_s = 40 }\n");
+        let under = dive.sections.iter().filter(|section| section.true_hole_m <= 0.5);
+        passed += under.filter(|section| section.report.verdict == "pass").count();
+        over += dive.sections.iter().filter(|section| section.true_hole_m > 0.5).count();
+        far += far_over(&dive, 0.5);
+    }
+    println!("{passed} pass, {far} of {over} far over the target");
+    assert_eq!(far, 0);
+    assert!(passed >= 20 && over >= 40, "{passed} {over}");
+}
