@@ -107,7 +107,7 @@ impl Navigation for Truth {
 
     fn fix(&self, at: MonoNs) -> Result<Fix, NoFix> {
         let pose = self.0.pose(at).ok_or(NoFix::Chainage)?;
-        Ok(Fix { pose, speed_mps: 0.0, relative: Relative::default(), tie: 0 })
+        Ok(Fix { pose, speed_mps: 0.0, relative: Relative::default(), revisit: Relative::default(), tie: 0 })
     }
 }
 

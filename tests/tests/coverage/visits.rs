@@ -13,10 +13,18 @@ fn dive(seed: u64, legs: &[(f64, f64)], effects: &str) -> truth::JudgedDive {
             format!("[[trajectory.legs]]\ndistance_m = {by_m}\nspeed_mps = {speed_mps}\n")
         })
         .collect();
-    truth::dive(&scenes::scene(&format!(
+    let text = format!(
         "seed = {seed}\nvehicle = \"vita2-4.toml\"\n[trajectory]\nstart_m = 5\n{legs}[effects]\nmotion_within_turn = {{}}\n\
          {SENSORS}{effects}"
-    )))
+    );
+    truth::dive(&scenes::seeded(&text, &vehicle, Some(seed)))
+}
+
+/// The vehicle's file; the cable's slack may wander by 6 cm in minutes: little from one pass to the next, much from one visit to
+/// another.
+fn vehicle(name: &str) -> Result<Vec<u8>, String> {
+    let file = String::from_utf8(scenes::vehicle_file(name)?).map_err(|error| error.to_string())?;
+    Ok(file.replace("slack_sd_m = 0.02", "slack_sd_m = 0.06\nslack_time_s = 60").into_bytes())
 }
 
 /// Sections between two chainages with this verdict, by their start, mm.
@@ -65,16 +73,19 @@ fn the_way_home_takes_no_pass_back() {
 /// Each of two visits is too fast, and the cable's slack is another on the way back.
 #[test]
 fn val_two_visits_prove_together_what_they_have_seen_and_no_more() {
-    let (mut over, mut far, mut passed) = (0, 0, 0);
-    for seed in 0..4 {
+    let (mut over, mut wrong, mut passed) = (0, 0, 0);
+    for seed in 0..10 {
         let dive =
-            dive(seed, &[(8.0, 0.16), (8.0, -0.17)], "tether_slack = { reach_m = 0.028, period_s = 40 }\n");
-        let under = dive.sections.iter().filter(|section| section.true_hole_m <= 0.5);
-        passed += under.filter(|section| section.report.verdict == "pass").count();
-        over += dive.sections.iter().filter(|section| section.true_hole_m > 0.5).count();
-        far += far_over(&dive, 0.5);
+            dive(seed, &[(8.0, 0.19), (8.0, -0.2)], "tether_slack = { reach_m = 0.15, period_s = 150 }\n");
+        assert_eq!(far_over(&dive, 0.5), 0);
+        let (all, pass) =
+            (&dive.sections, |section: &&truth::JudgedSection| section.report.verdict == "pass");
+        let is_over = |section: &&truth::JudgedSection| section.true_hole_m > 0.5;
+        over += all.iter().filter(is_over).count();
+        wrong += all.iter().filter(is_over).filter(pass).count();
+        passed += all.iter().filter(pass).count();
     }
-    println!("{passed} pass, {far} of {over} far over the target");
-    assert_eq!(far, 0);
-    assert!(passed >= 20 && over >= 40, "{passed} {over}");
+    println!("{passed} pass, {wrong} of {over} over the target");
+    assert!(passed >= 20 && over >= 200, "{passed} {over}");
+    assert!(wrong <= 1, "{wrong} of {over}");
 }
