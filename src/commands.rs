@@ -2,11 +2,11 @@
 
 use headrace_config::Document;
 use headrace_geometry::time::DurNs;
-use headrace_replay::SimulationFeed;
 use headrace_replay::drive::Pace;
 use headrace_replay::log::files_of;
 use headrace_replay::player::Player;
-use headrace_simulator::{Scene, Simulation};
+use headrace_replay::{SimulationFeed, simulation};
+use headrace_simulator::Scene;
 use headrace_vehicle::VehicleConfig;
 use serde_json::json;
 
@@ -37,7 +37,7 @@ pub(crate) fn demo(args: &Demo) -> Result<u8, Failure> {
     }
     let dive = assemble(&scene.vehicle, &scene.vehicle_text, Some(Recording::whole(&log, Clock::Theirs)))?;
     say(&format!("{}, target {} m: a simulated dive", scene.vehicle.name, scene.vehicle.target_m));
-    let mut feed = SimulationFeed::new(Simulation::new(&scene)?);
+    let mut feed = SimulationFeed::new(simulation(&scene, false)?);
     let pace = Pace { speed: args.speed.0, ..Pace::default() };
     let report = dive.run(&mut feed, pace, &mut Watch::loud())?;
     files::write_json(&report_file, &report)?;

@@ -26,6 +26,11 @@ pub(crate) fn emulate(args: &Emulate) -> Result<u8, Failure> {
     let (name, text) = (args.scene.display().to_string(), files::read(&args.scene)?);
     let load = files::bytes_beside(&args.scene);
     let scene = Scene::parse(Document::new(&name, &text), &KINDS, &load, args.seed)?;
+    if scene.is_advised() {
+        return Err(Failure::Usage(format!(
+            "emulate: {name} has a pilot who heeds advice, which hosts don't send; simulate it instead"
+        )));
+    }
     let stands = stands(&scene, args)?;
     let vehicle_file = args.out.join("vehicle.toml");
     write_vehicle(&scene, &stands, &args.out, &vehicle_file)?;

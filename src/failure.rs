@@ -7,6 +7,7 @@ use headrace_config::ConfigError;
 use headrace_import::ImportError;
 use headrace_import::routing::RoutingError;
 use headrace_monitor::PluginError;
+use headrace_replay::SimulationError;
 use headrace_replay::drive::DriveError;
 use headrace_replay::log::LogError;
 use headrace_replay::playback::PlaybackError;
@@ -36,6 +37,8 @@ pub(crate) enum Failure {
     Config(#[from] ConfigError),
     #[error(transparent)]
     Scene(#[from] SceneError),
+    #[error(transparent)]
+    Simulation(#[from] SimulationError),
     #[error(transparent)]
     Plugin(#[from] PluginError),
     #[error(transparent)]
@@ -70,6 +73,7 @@ impl Failure {
         match self {
             Self::Config(_)
             | Self::Scene(_)
+            | Self::Simulation(_)
             | Self::Usage(_)
             | Self::Plan(_)
             | Self::Read { .. }

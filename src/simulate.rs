@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use headrace_config::Document;
 use headrace_geometry::time::MonoNs;
 use headrace_replay::log::LogWriter;
+use headrace_replay::simulation;
 use headrace_sensor::device::Direction;
 use headrace_simulator::effects::KINDS as EFFECTS;
 use headrace_simulator::environment::What;
@@ -35,16 +36,15 @@ pub(crate) fn simulate(args: &Simulate) -> Result<u8, Failure> {
         let what = "simulate: needs -o LOG.mcap for the log, or --explain to list what would be simulated";
         return Err(Failure::Usage(what.to_owned()));
     };
-    let mut simulation =
-        if args.truth.is_some() { Simulation::with_truth(&scene)? } else { Simulation::new(&scene)? };
+    let mut simulation = simulation(&scene, args.truth.is_some())?;
     let mut truth = args.truth.as_deref().map(|path| Truth::create(path, &scene, &simulation)).transpose()?;
     let mut writer = LogWriter::create(output, &log_header(&scene.vehicle, &scene.vehicle_text, false))?;
     let _phase = Phase::start("simulate");
     let mut progress = Progress::start();
-    let duration_s = simulation.duration_s();
+    let (longest_s, at_most) = (simulation.duration_s(), if scene.is_advised() { "at most " } else { "" });
     while let Some(message) = simulation.next_message() {
         let after_s = message.at.since(START).as_secs_f64();
-        progress.at(|| format!("{after_s:.0} s of {duration_s:.0} s"));
+        progress.at(|| format!("{after_s:.0} s of {at_most}{longest_s:.0} s"));
         match message.direction {
             Direction::Received => writer.raw(message.source, message.at, message.at, message.bytes)?,
             Direction::Sent => writer.sent(message.source, message.at, message.bytes)?,
@@ -53,6 +53,8 @@ pub(crate) fn simulate(args: &Simulate) -> Result<u8, Failure> {
             truth.write(&scene, &simulation.take_truth())?;
         }
     }
+    // An advised pilot's dive is as long as he needs.
+    let duration_s = simulation.duration_s();
     let (_, written) = writer.finish()?;
     if let Some(truth) = &mut truth {
         truth.finish()?;

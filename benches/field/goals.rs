@@ -36,18 +36,21 @@ impl Missed {
             }
             _ => None,
         };
-        let planned = cell.driven == Driven::Planned;
+        let first_go = matches!(cell.driven, Driven::Planned | Driven::Advised);
         let ratios = if bounds.is_some() { 0.7..=1.3 } else { 0.0..=1.5 };
-        let judged = !figures.errors.is_empty();
+        // D of several visits is the best of them, D_true that of all together.
+        let judged = !figures.errors.is_empty() && cell.driven != Driven::Back;
         let nis = |kind| bounds.is_some() && figures.nis(kind).is_some_and(|nis| !(0.7..=1.4).contains(&nis));
         Self {
             passed_over: figures.false_passes() > 0.025,
             passed_far: figures.passed_far > 0,
             failed_under: bounds.as_ref().is_some_and(|bounds| figures.false_fails() > bounds.false_fails),
-            cannot_say: bounds.as_ref().is_some_and(|bounds| planned && figures.share(2) > bounds.cannot_say),
+            cannot_say: bounds
+                .as_ref()
+                .is_some_and(|bounds| first_go && figures.share(2) > bounds.cannot_say),
             passed: bounds
                 .as_ref()
-                .is_some_and(|bounds| planned && figures.share(0) < bounds.passed * figures.passable()),
+                .is_some_and(|bounds| first_go && figures.share(0) < bounds.passed * figures.passable()),
             ratio: judged && !ratios.contains(&figures.ratio_rms()),
             within: judged && bounds.is_some() && !(0.93..=0.98).contains(&figures.within(2.0)),
             nis: core::array::from_fn(nis),

@@ -52,10 +52,10 @@ Over: sections with D_true > T; passed: of those, passed; far: passed with D_tru
 of those with it. These count all sections. The following leave out the ends of dives, 2 m and the target: passable is
 the share of metres with D_true <= T, pass, fail, can't say and open are shares of metres; D is the rms error of D and sd the median of its sigma, m; ratio
 is the rms of the errors over their sigmas, within the share within two. NIS is the mean by kind of source. Told: metres of the way with a
-section, of the way. `!` marks what misses the goal; passes are held to the passable metres, as the speed is the plan's and not the live
-advice's. Wrong and broken cells have no goals but those for false passes, the ratio and told metres.
+section, of the way. `!` marks what misses the goal; passes are held to the passable metres. Advised: by a pilot
+who follows the live advice within 5 % and 3 s; back: by one who is in a hurry, then goes back for all that was missed. Wrong and broken cells have no goals but those for false passes, the ratio and told metres.
 
-Not simulated: returns lost on single stretches (murk is everywhere), noise of depth, scaled gyros; pilots who follow the advice.
+Not simulated: returns lost on single stretches (murk is everywhere), noise of depth, scaled gyros.
 Conditions wrong-* each have one wrong setting; broken has one device that breaks, by the seed.
 ";
 

@@ -17,7 +17,7 @@ use headrace_replay::SimulationFeed;
 use headrace_replay::drive::{Pace, drive};
 use headrace_sensor::device::SensorInfo;
 use headrace_sensor::reading::Reading;
-use headrace_simulator::{START, Scene, Simulation};
+use headrace_simulator::{START, Scene, Scenery, Simulation};
 use headrace_snapshot::{Restorer, Saver, SnapshotError, Stateful};
 use headrace_vehicle::NavigationConfig;
 
@@ -92,7 +92,7 @@ impl Transparent for FilterNavigation {
 }
 
 /// Navigation that knows the truth.
-struct Truth(Simulation);
+struct Truth(Scenery);
 
 impl Stateful for Truth {
     fn save(&self, _: &mut Saver) {}
@@ -106,8 +106,13 @@ impl Navigation for Truth {
     fn update(&mut self, _: usize, _: &SensorInfo, _: Times, _: &Reading) {}
 
     fn fix(&self, at: MonoNs) -> Result<Fix, NoFix> {
-        let pose = self.0.pose(at).ok_or(NoFix::Chainage)?;
-        Ok(Fix { pose, speed_mps: 0.0, relative: Relative::default(), revisit: Relative::default(), tie: 0 })
+        Ok(Fix {
+            pose: self.0.pose(at),
+            speed_mps: 0.0,
+            relative: Relative::default(),
+            revisit: Relative::default(),
+            tie: 0,
+        })
     }
 }
 
@@ -115,7 +120,8 @@ impl Transparent for Truth {}
 
 /// Dives a scene, the samples placed where they truly are.
 pub fn true_dive(scene: &Scene) -> Track {
-    dive(scene, Truth(Simulation::new(scene).unwrap()), Silence::default())
+    let simulation = Simulation::new(scene).unwrap();
+    dive(scene, Truth(simulation.scenery().unwrap().clone()), Silence::default())
 }
 
 struct Overheard<N> {

@@ -140,7 +140,8 @@ struct TruthFeed {
 
 impl TruthFeed {
     fn new(scene: &Scene, believed: &VehicleConfig) -> Self {
-        let simulation = Simulation::with_truth(scene).unwrap_or_else(|why| panic!("{why}"));
+        let simulation = headrace_replay::simulation_believing(scene, believed, true)
+            .unwrap_or_else(|why| panic!("{why}"));
         let sound_mps = scene.vehicle.site.sound_speed_mps;
         let replacing = simulation.added().iter().map(|added| REPLACING.contains(&added.effect)).collect();
         let reach = |sensor: &SensorFacts| sensor.head.map(|head| head.reach_m(sound_mps));

@@ -1,6 +1,7 @@
 //! headrace's dive logs: the recorder and the reader, the driver that feeds a loop from a log or a simulation, playback,
 //! and verification, smoothing and viewer output of a recorded dive.
 
+mod adviser;
 mod clocks;
 pub mod drive;
 pub mod log;
@@ -14,4 +15,5 @@ pub mod snapshot_store;
 pub mod verify;
 pub mod view;
 
+pub use adviser::{SimulationError, simulation, simulation_believing};
 pub use simulation_feed::SimulationFeed;

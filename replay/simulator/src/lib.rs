@@ -2,6 +2,7 @@
 //!
 //! Only the effects that a scene names are simulated. Without effects a device is ideal but for its wire format's resolution.
 
+mod adviser;
 mod builder;
 mod clock;
 pub mod effects;
@@ -23,9 +24,11 @@ mod stages;
 mod testing;
 #[cfg(test)]
 mod testing_motion;
+mod told;
 pub mod trajectory;
 mod truth;
 
+pub use adviser::Adviser;
 pub use builder::Added;
 pub use clock::START;
 pub use error::SceneError;
@@ -36,5 +39,6 @@ pub use scene::Scene;
 pub use sensing::Scenery;
 pub use simulation::Simulation;
 pub use stages::Stage;
+pub use told::Told;
 pub use trajectory::{Leg, Trajectory};
 pub use truth::{Cause, SoundingTruth, TruthRow};

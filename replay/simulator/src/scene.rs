@@ -70,6 +70,11 @@ impl Scene {
         Ok(Self { name, vehicle_text, vehicle, programs, seed, environment, trajectory, facts, effects })
     }
 
+    /// Whether the pilot hears a monitor's advice ([`crate::Simulation::advised_by`]).
+    pub fn is_advised(&self) -> bool {
+        self.trajectory.is_advised()
+    }
+
     /// Facts that its effects are checked against.
     pub fn facts(&self) -> &Facts {
         &self.facts

@@ -29,7 +29,7 @@ pub(crate) struct Slice {
 }
 
 /// The tunnel, the vehicle's trajectory through it, the water.
-#[derive(Debug, Resource)]
+#[derive(Debug, Clone, Resource)]
 pub struct Scenery {
     /// Surroundings of the vehicle.
     pub environment: Environment,

@@ -10,6 +10,7 @@ use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::device::{Emulated, EmulatorSetup, Sense};
 use headrace_sensor::measurement::{GroundVelocity, Inertia, Measurement, Payout, Pressure, Sounding};
 
+use crate::adviser::Adviser;
 use crate::builder::{Added, Builder, Programs};
 use crate::clock::START;
 use crate::error::SceneError;
@@ -55,6 +56,7 @@ pub struct Simulation {
     added: Vec<Added>,
     base: Vec<(Stage, String)>,
     truth: Option<Vec<TruthRow>>,
+    adviser: Option<Box<dyn Adviser>>,
 }
 
 impl Simulation {
@@ -116,7 +118,14 @@ impl Simulation {
         let end = START + DurNs::from_secs_f64(duration_s);
         let truth = noting.then(Vec::new);
         let outbox = Outbox::new(entities.len());
-        Ok(Self { world, schedule, entities, end, slice: SLICE, outbox, added, base, truth })
+        Ok(Self { world, schedule, entities, end, slice: SLICE, outbox, added, base, truth, adviser: None })
+    }
+
+    /// The same dive with a pilot who hears this adviser; of use where the trajectory is an advised pilot's
+    /// ([`Scene::is_advised`]), who otherwise hears nothing.
+    #[must_use]
+    pub fn advised_by(self, adviser: Box<dyn Adviser>) -> Self {
+        Self { adviser: Some(adviser), ..self }
     }
 
     /// End of the dive.
@@ -151,7 +160,14 @@ impl Simulation {
 
     /// The next message, or `None` at the end of the dive.
     pub fn next_message(&mut self) -> Option<Message<'_>> {
-        self.come().then(|| self.outbox.next()).flatten()
+        if !self.come() {
+            return None;
+        }
+        let message = self.outbox.next()?;
+        if let Some(adviser) = &mut self.adviser {
+            adviser.hear(&message);
+        }
+        Some(message)
     }
 
     /// The next message, without removing it.
@@ -216,6 +232,15 @@ impl Simulation {
 
     /// Simulates the next slice; false at the end.
     fn next_slice(&mut self) -> bool {
+        let Some(slice) = self.world.get_resource::<Slice>() else { return false };
+        let soon = slice.until + self.slice;
+        if let Some(mut scenery) =
+            self.world.get_resource_mut::<Scenery>().filter(|s| s.trajectory.is_advised())
+        {
+            let told = self.adviser.as_mut().map(|adviser| adviser.told()).unwrap_or_default();
+            scenery.trajectory.lead(told, soon.since(START).as_secs_f64());
+            self.end = START + DurNs::from_secs_f64(scenery.trajectory.duration_s());
+        }
         let Some(slice) = self.world.get_resource::<Slice>() else { return false };
         // A measurement at the very end is included.
         let last = self.end + DurNs(1);

@@ -107,10 +107,19 @@ pub enum Driven {
     Planned,
     /// So many times the largest speed of Eq. 16, phases as planned.
     Times(f64),
+    /// By a pilot who hears the live advice, follows it within 5 % and 3 s later, and never goes back.
+    Advised,
+    /// By one who is in a hurry all the way, 1.2 times the speed of Eq. 16, and then goes back for all that was missed.
+    Back,
 }
 
-/// Both with their names.
-pub const DRIVEN: [(&str, Driven); 2] = [("planned", Driven::Planned), ("faster", Driven::Times(1.2))];
+/// All with their names.
+pub const DRIVEN: [(&str, Driven); 4] = [
+    ("planned", Driven::Planned),
+    ("faster", Driven::Times(1.2)),
+    ("advised", Driven::Advised),
+    ("back", Driven::Back),
+];
 
 /// A cell of the table.
 #[derive(Debug, Clone, Copy)]
@@ -216,17 +225,34 @@ impl Cell {
         match self.driven {
             Driven::Planned => [planned_mps, planned_mps],
             Driven::Times(times) => [planned_mps, times * self.vehicle.edge_mps],
+            // The most that the pilot would drive.
+            Driven::Advised | Driven::Back => [planned_mps, 1.2 * self.vehicle.edge_mps],
         }
     }
 
     fn text(&self, seed: u64, length_m: f64, speed_mps: f64, effects: &str) -> String {
         let start_m = self.start_m;
-        let way = if self.condition == Condition::Lively {
+        let to_m = start_m + length_m;
+        let way = if matches!(self.driven, Driven::Advised | Driven::Back) {
+            let hurries = format!(
+                "[[trajectory.hurries]]\nfrom_m = {start_m}\nto_m = {to_m}\nspeed_mps = {speed_mps}\n"
+            );
+            let lively = self.condition == Condition::Lively;
+            let [aside_m, up_m] = [1.0, 0.5].map(|most_m| if lively { self.aside_m(most_m) } else { 0.0 });
+            let [yaw_deg, tilt_deg] = if lively { [10, 2] } else { [0, 0] };
+            format!(
+                "kind = \"advised\"\nstart_m = {start_m}\nto_m = {to_m}\nspeed_mps = {speed_mps}\n\
+                 goes_back = {}\nwander_across_m = {aside_m}\nwander_up_m = {up_m}\nwander_yaw_deg = {yaw_deg}\n\
+                 wander_pitch_deg = {tilt_deg}\nwander_roll_deg = {tilt_deg}\n{}",
+                self.driven == Driven::Back,
+                if self.driven == Driven::Back { &hurries } else { "" },
+            )
+        } else if self.condition == Condition::Lively {
             format!(
                 "kind = \"pilot\"\nstart_m = {start_m}\nto_m = {}\nspeed_mps = {speed_mps}\nstops_per_hour = 30\n\
                  stop_s = [5, 20]\nbacks_per_hour = 20\nback_m = [1, 3]\nwander_across_m = {}\nwander_up_m = {}\n\
                  wander_yaw_deg = 10\nwander_pitch_deg = 2\nwander_roll_deg = 2\n",
-                start_m + length_m,
+                to_m,
                 self.aside_m(1.0),
                 self.aside_m(0.5)
             )

@@ -23,6 +23,14 @@ impl Knots {
         Self { spacing_s, points: (-1..=last).map(&mut point).collect() }
     }
 
+    /// Sets a component of point number k, from -1.
+    pub(super) fn set(&mut self, k: i64, component: usize, value: f64) {
+        let point = usize::try_from(k + 1).ok().and_then(|index| self.points.get_mut(index));
+        if let Some(slot) = point.and_then(|point| point.get_mut(component)) {
+            *slot = value;
+        }
+    }
+
     /// Offsets `after_s` seconds after the start; before the first and after the last knot it continues straight.
     pub fn at(&self, after_s: f64) -> Offsets {
         let inside = (self.points.len() as f64 - 3.0) * self.spacing_s;

@@ -1,5 +1,6 @@
 //! The vehicle's trajectory through the tunnel: its position at any time, relative to the axis.
 
+mod advised;
 mod knots;
 mod legs;
 mod parse;
@@ -8,8 +9,11 @@ mod place;
 mod recorded;
 mod waypoints;
 
+use advised::Advised;
 use legs::Legs;
 use pilot::Piloted;
+
+use crate::told::Told;
 
 pub use knots::{Knots, Offsets, wandering};
 pub use legs::Leg;
@@ -29,6 +33,7 @@ enum Base {
     Legs(Legs),
     Knots(Knots),
     Piloted(Box<Piloted>),
+    Advised(Box<Advised>),
 }
 
 impl Trajectory {
@@ -48,7 +53,26 @@ impl Trajectory {
         Self { duration_s: piloted.duration_s(), base: Base::Piloted(Box::new(piloted)), sways: Vec::new() }
     }
 
-    /// Duration, s.
+    /// The trajectory of a pilot who hears advice.
+    fn advised(advised: Advised) -> Self {
+        Self { duration_s: advised.duration_s(), base: Base::Advised(Box::new(advised)), sways: Vec::new() }
+    }
+
+    /// Whether it depends on what the pilot is told.
+    pub fn is_advised(&self) -> bool {
+        matches!(self.base, Base::Advised(_))
+    }
+
+    /// Hears what the pilot is told, and decides the motion up to `until_s` seconds after the start. A trajectory that is given
+    /// stays as it is.
+    pub(crate) fn lead(&mut self, told: Vec<Told>, until_s: f64) {
+        if let Base::Advised(advised) = &mut self.base {
+            advised.lead(told, until_s);
+            self.duration_s = advised.duration_s();
+        }
+    }
+
+    /// Duration, s; of an advised pilot's, the longest, until he is through.
     pub fn duration_s(&self) -> f64 {
         self.duration_s
     }
@@ -59,6 +83,7 @@ impl Trajectory {
             Base::Legs(legs) => legs.place(after_s),
             Base::Knots(knots) => Place::from_offsets(knots.at(after_s)),
             Base::Piloted(piloted) => piloted.place(after_s),
+            Base::Advised(advised) => advised.place(after_s),
         };
         for sway in &self.sways {
             place.shift(&sway.at(after_s));
@@ -85,6 +110,7 @@ impl Trajectory {
                 piloted.carry(speed_mps)?;
                 self.duration_s = piloted.duration_s();
             }
+            Base::Advised(advised) => advised.carry(speed_mps),
             Base::Knots(_) => return Err("is of no effect: the trajectory is given over ground".to_owned()),
         }
         Ok(())

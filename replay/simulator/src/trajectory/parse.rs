@@ -6,6 +6,8 @@ use headrace_config::Loader;
 use headrace_config::{ConfigError, Section};
 use headrace_geometry::tunnel::Profile;
 
+use super::advised::{Advised, Heeding, Hurry};
+use super::knots::Offsets;
 use super::pilot::{Pilot, Piloted};
 use super::waypoints::{self, Waypoint};
 use super::{Ground, Leg, Trajectory, recorded};
@@ -27,13 +29,15 @@ enum TrajectoryKind {
     Legs,
     Waypoints,
     Pilot,
+    Advised,
     Recorded,
 }
 
-const KINDS: [(&str, TrajectoryKind); 4] = [
+const KINDS: [(&str, TrajectoryKind); 5] = [
     ("legs", TrajectoryKind::Legs),
     ("waypoints", TrajectoryKind::Waypoints),
     ("pilot", TrajectoryKind::Pilot),
+    ("advised", TrajectoryKind::Advised),
     ("recorded", TrajectoryKind::Recorded),
 ];
 
@@ -52,6 +56,7 @@ pub(crate) fn parse(
         TrajectoryKind::Legs => (legs(&section, tunnel)?, Ground::Water),
         TrajectoryKind::Waypoints => (waypoints(&section, tunnel)?, Ground::Tunnel),
         TrajectoryKind::Pilot => (pilot(&section, tunnel, seed)?, Ground::Water),
+        TrajectoryKind::Advised => (advised(&section, tunnel, seed)?, Ground::Water),
         TrajectoryKind::Recorded => (recorded(&section, tunnel, load)?, Ground::Tunnel),
     };
     section.finish()?;
@@ -149,7 +154,6 @@ fn pilot(section: &Section<'_>, tunnel: Tunnel<'_>, seed: u64) -> Result<Traject
     if (to_m - from_m).abs() < 0.1 {
         return Err(section.invalid("to_m", "must be at least 0.1 m from start_m"));
     }
-    let degrees = |key| or(key, REACH_DEG, 0.0).map(f64::to_radians);
     let pilot = Pilot {
         from_m,
         to_m,
@@ -159,19 +163,60 @@ fn pilot(section: &Section<'_>, tunnel: Tunnel<'_>, seed: u64) -> Result<Traject
         backs_per_hour: or("backs_per_hour", 0.0..=1000.0, 2.0)?,
         stop_s: pair("stop_s", 0.5..=3600.0, [5.0, 60.0])?,
         back_m: pair("back_m", 0.1..=1000.0, [0.5, 5.0])?,
-        reach: [
-            0.0,
-            or("wander_across_m", REACH_M, 0.5)?,
-            or("wander_up_m", REACH_M, 0.3)?,
-            degrees("wander_roll_deg")?,
-            degrees("wander_pitch_deg")?,
-            or("wander_yaw_deg", REACH_DEG, 5.0)?.to_radians(),
-        ],
+        reach: wander(section, [0.5, 0.3, 5.0])?,
         period_s: or("wander_s", 1.0..=3600.0, 30.0)?,
     };
     let [stick, wander] = ["stick", "wander"].map(|source| Stream::new(seed, NAME, source));
     let piloted = Piloted::new(pilot, stick, wander).map_err(|problem| section.invalid("to_m", &problem))?;
     Ok(Trajectory::piloted(piloted))
+}
+
+/// Reach of a pilot's drift: left and up, m; roll, pitch and yaw, radians. `usual` is left, up and yaw in degrees.
+fn wander(section: &Section<'_>, [left, up, yaw]: [f64; 3]) -> Result<Offsets, ConfigError> {
+    let or = |key, allowed, usual: f64| section.number(key, allowed).map(|value| value.unwrap_or(usual));
+    let degrees = |key, usual| or(key, REACH_DEG, usual).map(f64::to_radians);
+    Ok([
+        0.0,
+        or("wander_across_m", REACH_M, left)?,
+        or("wander_up_m", REACH_M, up)?,
+        degrees("wander_roll_deg", 0.0)?,
+        degrees("wander_pitch_deg", 0.0)?,
+        degrees("wander_yaw_deg", yaw)?,
+    ])
+}
+
+fn advised(section: &Section<'_>, tunnel: Tunnel<'_>, seed: u64) -> Result<Trajectory, ConfigError> {
+    let or = |key, allowed, usual: f64| section.number(key, allowed).map(|value| value.unwrap_or(usual));
+    let from_m = or("start_m", CHAINAGE_M, 0.0)?;
+    tunnel.check(section, "start_m", from_m)?;
+    let to_m = section.required("to_m", section.number("to_m", CHAINAGE_M)?)?;
+    tunnel.check(section, "to_m", to_m)?;
+    if to_m - from_m < 0.1 {
+        return Err(section.invalid("to_m", "must be at least 0.1 m further in than start_m"));
+    }
+    let mut hurries = Vec::new();
+    for hurry in section.sections("hurries")? {
+        let chainage = |key| hurry.required(key, hurry.number(key, CHAINAGE_M)?);
+        let speed_mps = hurry.required("speed_mps", hurry.number("speed_mps", SPEED_MPS)?)?;
+        hurries.push(Hurry { from_m: chainage("from_m")?, to_m: chainage("to_m")?, speed_mps });
+        hurry.finish()?;
+    }
+    let speed_mps = section.required("speed_mps", section.number("speed_mps", SPEED_MPS)?)?;
+    let pilot = Heeding {
+        from_m,
+        to_m,
+        across_m: tunnel.place(section)?,
+        speed_mps,
+        lag_s: or("lag_s", 3.0..=60.0, 3.0)?,
+        within: or("within", 0.0..=0.5, 0.05)?,
+        goes_back: section.boolean("goes_back")?.unwrap_or(true),
+        hurries,
+        at_most_s: or("at_most_s", 1.0..=1.0e6, 600.0 + 5.0 * (to_m - from_m) / speed_mps)?,
+        reach: wander(section, [0.0, 0.0, 0.0])?,
+        period_s: or("wander_s", 1.0..=3600.0, 30.0)?,
+    };
+    let [wander, hold] = ["wander", "hold"].map(|source| Stream::new(seed, NAME, source));
+    Ok(Trajectory::advised(Advised::new(pilot, wander, hold)))
 }
 
 fn recorded(section: &Section<'_>, tunnel: Tunnel<'_>, load: Loader<'_>) -> Result<Trajectory, ConfigError> {

@@ -1,0 +1,121 @@
+//! A loop as the adviser of a simulated pilot: the same one that the dive is then run through.
+
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_monitor::feed::work_off;
+use headrace_monitor::messages::Notice;
+use headrace_monitor::ring::Port;
+use headrace_monitor::run::Loop;
+use headrace_monitor::{App, PluginError};
+use headrace_sampling::advice::Reason;
+use headrace_sensor::device::Direction;
+use headrace_simulator::{Adviser, Message, Scene, SceneError, Simulation, Told};
+use headrace_vehicle::VehicleConfig;
+
+/// Length of a tick.
+const TICK: DurNs = DurNs(20_000_000);
+
+/// Why a scene can't be simulated.
+#[derive(Debug, thiserror::Error)]
+pub enum SimulationError {
+    /// The scene contradicts itself.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// The loop that advises the pilot can't be armed.
+    #[error("arming the loop that advises the scene's pilot: {0}")]
+    Adviser(#[from] PluginError),
+}
+
+/// A scene's simulation, with ground truth if `noting`. A pilot who heeds advice hears a loop of his own, armed by the scene's
+/// vehicle file.
+///
+/// Errors: see [`SimulationError`].
+pub fn simulation(scene: &Scene, noting: bool) -> Result<Simulation, SimulationError> {
+    simulation_believing(scene, &scene.vehicle, noting)
+}
+
+/// The same; the pilot's loop believes another vehicle file, whose sensors must send the same bytes.
+///
+/// Errors: see [`SimulationError`].
+pub fn simulation_believing(
+    scene: &Scene,
+    believed: &VehicleConfig,
+    noting: bool,
+) -> Result<Simulation, SimulationError> {
+    let simulation = if noting { Simulation::with_truth(scene)? } else { Simulation::new(scene)? };
+    if !scene.is_advised() {
+        return Ok(simulation);
+    }
+    Ok(simulation.advised_by(Box::new(LoopAdviser::new(believed)?)))
+}
+
+struct LoopAdviser {
+    dive: Loop,
+    /// None of a source whose port is in use elsewhere.
+    ports: Vec<Option<Port>>,
+    /// End of the present tick.
+    until: MonoNs,
+    told: Vec<Told>,
+}
+
+impl LoopAdviser {
+    fn new(vehicle: &VehicleConfig) -> Result<Self, PluginError> {
+        let mut app = App::new(vehicle.mission());
+        for sensor in &vehicle.sensors {
+            app.add_device(sensor.as_ref())?;
+        }
+        let mut dive = app.arm(vehicle.navigation())?;
+        let ports = (0..dive.sources().len()).map(|source| dive.take_port(source)).collect();
+        Ok(Self { dive, ports, until: MonoNs(0), told: Vec::new() })
+    }
+
+    fn tick(&mut self) {
+        let Self { dive, until, told, .. } = self;
+        work_off(dive, *until, &mut |dive| told.extend(told_by(dive)), &mut || {});
+    }
+}
+
+/// What a tick has told, if anything.
+fn told_by(dive: &Loop) -> Option<Told> {
+    let last = dive.notices().iter().rev().find_map(|notice| match notice {
+        Notice::Advice(entry) => Some(entry),
+        _ => None,
+    })?;
+    let sections = &dive.coverage().sections;
+    let open = sections.runs().all().iter().filter(|run| run.is_open());
+    let missed_m = open.map(|run| [sections.bounds_m(run.from).0, sections.bounds_m(run.to).0]).collect();
+    let known = matches!(last.advice.reason, Reason::HelixPitch | Reason::AngularStep);
+    Some(Told { at: last.at, v_max_mps: known.then_some(last.advice.v_max_mps), missed_m })
+}
+
+impl Adviser for LoopAdviser {
+    fn hear(&mut self, message: &Message<'_>) {
+        if message.direction != Direction::Received {
+            return;
+        }
+        if message.at >= self.until {
+            self.tick();
+            self.until = message.at + TICK;
+        }
+        let source = usize::from(message.source);
+        if self
+            .ports
+            .get(source)
+            .and_then(Option::as_ref)
+            .is_some_and(|port| !port.has_room(message.bytes.len()))
+        {
+            self.tick();
+        }
+        if let Some(Err(error)) = self
+            .ports
+            .get_mut(source)
+            .and_then(Option::as_mut)
+            .map(|port| port.send(message.at, message.bytes))
+        {
+            tracing::error!(%error, "a simulated packet didn't reach the pilot's adviser");
+        }
+    }
+
+    fn told(&mut self) -> Vec<Told> {
+        std::mem::take(&mut self.told)
+    }
+}

@@ -1,0 +1,209 @@
+//! The trajectory of a pilot who hears a monitor's advice: decided as the dive goes, a few seconds ahead of it.
+
+use headrace_geometry::math;
+use headrace_geometry::time::{DurNs, MonoNs};
+
+use super::knots::{Knots, Offsets, wandering};
+use super::place::Place;
+use crate::clock::START;
+use crate::random::Stream;
+use crate::told::Told;
+
+/// Time between two decisions, s.
+const STEP_S: f64 = 0.5;
+/// Time constant of the vehicle's response to the stick, s.
+const RESPONSE_S: f64 = 2.0;
+/// Knots that a place depends on beyond its time.
+const KNOTS_AHEAD: i64 = 3;
+/// Speed at which the pilot goes back, m/s.
+const BACK_MPS: f64 = 0.2;
+/// How far a missed stretch must lie behind before the pilot goes back for it, and from how far before it he passes it again, m.
+const BEHIND_M: f64 = 3.0;
+const RUN_UP_M: f64 = 2.5;
+/// A speed is held to a share that wanders over this time, s.
+const HOLD_S: f64 = 20.0;
+/// How long the pilot waits at the end for what may still be told, s.
+const WAITS_S: f64 = 10.0;
+
+/// A stretch on which the pilot is in a hurry and heeds no advice.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Hurry {
+    pub(super) from_m: f64,
+    pub(super) to_m: f64,
+    pub(super) speed_mps: f64,
+}
+
+/// Parameters of a pilot.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Heeding {
+    /// Chainage of start and end, m; the end lies further in.
+    pub(super) from_m: f64,
+    pub(super) to_m: f64,
+    /// Position in the cross-section about which it drifts: y, z, m.
+    pub(super) across_m: [f64; 2],
+    /// The largest speed driven, m/s.
+    pub(super) speed_mps: f64,
+    /// Delay between what is told and what is done, s, at least 3.
+    pub(super) lag_s: f64,
+    /// Largest error of the speed held, a share.
+    pub(super) within: f64,
+    /// Whether missed stretches are passed again.
+    pub(super) goes_back: bool,
+    pub(super) hurries: Vec<Hurry>,
+    /// The longest dive, s.
+    pub(super) at_most_s: f64,
+    /// Reach of the drift left, up, m; roll, pitch, yaw, radians; and its period, s.
+    pub(super) reach: Offsets,
+    pub(super) period_s: f64,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Doing {
+    Going,
+    Back { to_m: f64 },
+    Waiting { left_s: f64 },
+    Done,
+}
+
+/// The pilot and the motion decided so far.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Advised {
+    pilot: Heeding,
+    along: Knots,
+    beside: Knots,
+    hold: Knots,
+    current_mps: f64,
+    heard: Vec<Told>,
+    doing: Doing,
+    x_m: f64,
+    speed_mps: f64,
+    farthest_m: f64,
+    /// Stretches that have been passed again.
+    tried_m: Vec<[f64; 2]>,
+    /// Number of the next knot to decide.
+    next: i64,
+    ended_s: Option<f64>,
+}
+
+impl Advised {
+    pub(super) fn new(pilot: Heeding, wander: Stream, hold: Stream) -> Self {
+        let (from_m, [y, z]) = (pilot.from_m, pilot.across_m);
+        let plan = |k: i64| {
+            let x_m = (from_m + pilot.speed_mps * STEP_S * k.max(0) as f64).min(pilot.to_m);
+            [x_m, y, z, 0.0, 0.0, 0.0]
+        };
+        let along = Knots::new(pilot.at_most_s, STEP_S, plan);
+        let beside = wandering(wander, pilot.at_most_s, pilot.period_s, pilot.reach);
+        let hold = wandering(hold, pilot.at_most_s, HOLD_S, [pilot.within, 0.0, 0.0, 0.0, 0.0, 0.0]);
+        Self {
+            along,
+            beside,
+            hold,
+            current_mps: 0.0,
+            heard: Vec::new(),
+            doing: Doing::Going,
+            x_m: from_m,
+            speed_mps: 0.0,
+            farthest_m: from_m,
+            tried_m: Vec::new(),
+            next: -1,
+            ended_s: None,
+            pilot,
+        }
+    }
+
+    /// The longest that the dive may last, s; once the pilot is through, how long it has.
+    pub(super) fn duration_s(&self) -> f64 {
+        self.ended_s.unwrap_or(self.pilot.at_most_s)
+    }
+
+    pub(super) fn place(&self, after_s: f64) -> Place {
+        let mut place = Place::from_offsets(self.along.at(after_s));
+        place.shift(&self.beside.at(after_s));
+        place
+    }
+
+    /// Lets a current carry the vehicle.
+    pub(super) fn carry(&mut self, current_mps: f64) {
+        self.current_mps = current_mps;
+    }
+
+    /// Hears what is told, and decides the motion up to a time after the start, s.
+    pub(super) fn lead(&mut self, told: Vec<Told>, until_s: f64) {
+        self.heard.extend(told);
+        let last = math::floor_to_i64(until_s / STEP_S) + KNOTS_AHEAD;
+        while self.next <= last {
+            let at_s = self.next as f64 * STEP_S;
+            if at_s > 0.0 && self.ended_s.is_none() {
+                self.step(at_s);
+            }
+            self.along.set(self.next, 0, self.x_m);
+            self.next += 1;
+        }
+    }
+
+    fn step(&mut self, at_s: f64) {
+        let told = self.told_at(at_s);
+        let missed_m = told.as_ref().and_then(|told| self.to_go_back_for(told));
+        self.doing = self.decide(at_s, missed_m);
+        let wanted_mps = match self.doing {
+            Doing::Going => self.wanted_mps(at_s, told.as_ref()),
+            Doing::Back { .. } => -BACK_MPS,
+            Doing::Waiting { .. } | Doing::Done => 0.0,
+        };
+        self.speed_mps += (wanted_mps - self.speed_mps) * (STEP_S / RESPONSE_S);
+        self.x_m += (self.speed_mps + self.current_mps) * STEP_S;
+        self.farthest_m = self.farthest_m.max(self.x_m);
+    }
+
+    fn decide(&mut self, at_s: f64, missed_m: Option<[f64; 2]>) -> Doing {
+        let pilot = &self.pilot;
+        match (self.doing, missed_m) {
+            (Doing::Going | Doing::Waiting { .. }, Some([from_m, to_m])) => {
+                self.tried_m.push([from_m - 1.0, to_m + 1.0]);
+                Doing::Back { to_m: (from_m - RUN_UP_M).max(pilot.from_m) }
+            }
+            (Doing::Going, None) if self.x_m >= pilot.to_m => {
+                Doing::Waiting { left_s: pilot.lag_s + WAITS_S }
+            }
+            (Doing::Back { to_m }, _) if self.x_m <= to_m => Doing::Going,
+            (Doing::Waiting { left_s }, None) if left_s > 0.0 => Doing::Waiting { left_s: left_s - STEP_S },
+            (Doing::Waiting { .. }, None) => {
+                self.ended_s = Some(at_s);
+                Doing::Done
+            }
+            (doing, _) => doing,
+        }
+    }
+
+    /// The last that was told a lag before, if any.
+    fn told_at(&self, at_s: f64) -> Option<Told> {
+        let by = START + DurNs::from_secs_f64((at_s - self.pilot.lag_s).max(0.0));
+        let heard = |told: &&Told| told.at <= by && by > MonoNs(START.0);
+        self.heard.iter().rev().find(heard).cloned()
+    }
+
+    /// The farthest missed stretch that lies behind, all of it at the end of the way, and hasn't been tried yet.
+    fn to_go_back_for(&self, told: &Told) -> Option<[f64; 2]> {
+        let behind_m = if matches!(self.doing, Doing::Waiting { .. }) { 0.0 } else { BEHIND_M };
+        let missed = told.missed_m.iter().filter(|[from_m, to_m]| {
+            let tried = |[first_m, last_m]: &[f64; 2]| from_m < last_m && to_m > first_m;
+            *to_m < self.x_m - behind_m && !self.tried_m.iter().any(tried)
+        });
+        let missed = missed.copied().reduce(|a, b| if b[0] < a[0] { b } else { a });
+        missed.filter(|_| self.pilot.goes_back)
+    }
+
+    fn wanted_mps(&self, at_s: f64, told: Option<&Told>) -> f64 {
+        let pilot = &self.pilot;
+        let anew = self.x_m > self.farthest_m - 0.5;
+        let hurry = pilot.hurries.iter().find(|hurry| (hurry.from_m..hurry.to_m).contains(&self.x_m));
+        let [hold, ..] = self.hold.at(at_s);
+        if let Some(hurry) = hurry.filter(|_| anew) {
+            return hurry.speed_mps * (1.0 + hold);
+        }
+        // Where slower doesn't help, or nothing is known, the pilot goes on.
+        let v_max_mps = told.and_then(|told| told.v_max_mps).filter(|v_max_mps| *v_max_mps > 0.0);
+        v_max_mps.map_or(pilot.speed_mps, |v_max_mps| (v_max_mps * (1.0 + hold)).min(pilot.speed_mps))
+    }
+}
