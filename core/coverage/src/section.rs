@@ -6,13 +6,14 @@ use super::cause::Evidence;
 use super::deviation::Deviation;
 use super::hole::Hole;
 use super::passage::Passage;
+use super::unsure::Unsure;
 use headrace_geometry::math;
 use headrace_geometry::time::MonoNs;
 
 /// Coverage verdict of a section. Source: metrics.md, "Sections and verdicts".
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum Verdict {
-    /// Undecided: samples may still land without the vehicle turning back.
+    /// Undecided: samples may still land without the vehicle turning back, or not all heads have been there.
     #[default]
     Open,
     /// D + k sd <= T, k being the confidence.
@@ -103,6 +104,7 @@ pub enum Judgement {
 }
 
 /// One section.
+#[expect(clippy::struct_excessive_bools, reason = "they are independent of one another")]
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Section {
     /// The verdict so far.
@@ -113,6 +115,9 @@ pub struct Section {
     pub hole_sd_m: f64,
     /// No further sample on the present course can change the verdict, nor the hole of a fail.
     pub settled: bool,
+    /// Open, though no sample will change it without turning back: where the vehicle began, or turned back, not all heads have
+    /// been.
+    pub not_inspected: bool,
     /// When the fail was flagged.
     pub flagged: Option<MonoNs>,
     /// When a later pass filled the hole.
@@ -180,15 +185,26 @@ impl Section {
         };
     }
 
-    /// Whether a small hole is no evidence of coverage: the profile is wrong, there is no wall, or what was taken for wall
-    /// may be none.
-    pub(super) fn is_doubtful(&self) -> bool {
-        self.contradicts()
-            || self.masked_share > ALL_MASKED
-            || self.suspect
-            || self.ties == Ties::Several
-            || self.doubtful > self.samples
-            || self.is_of_another_size()
+    /// Why a small hole is no evidence of coverage; `None` where it is.
+    pub(super) fn doubt(&self) -> Option<Unsure> {
+        Some(match self {
+            _ if self.contradicts() => Unsure::ContradictedProfile,
+            _ if self.masked_share > ALL_MASKED => Unsure::NoWall,
+            _ if self.suspect => Unsure::DistrustedHead,
+            _ if self.ties == Ties::Several => Unsure::SeveralStretches,
+            _ if self.doubtful > self.samples => Unsure::DoubtfulReturns,
+            _ if self.is_of_another_size() => Unsure::OtherSize,
+            _ => return None,
+        })
+    }
+
+    /// Why neither a pass nor a fail can be told though nothing more will come; `None` elsewhere.
+    pub fn unsure(&self) -> Option<Unsure> {
+        match self.verdict {
+            Verdict::Open if self.not_inspected => Some(Unsure::NotInspected),
+            Verdict::CannotSay => Some(self.doubt().unwrap_or(Unsure::Position)),
+            _ => None,
+        }
     }
 
     /// Whether its cross-section can't be the design's.

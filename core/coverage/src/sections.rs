@@ -29,6 +29,8 @@ pub struct Request {
     pub none_alive: bool,
     /// Where samples may still land without the vehicle turning back.
     pub to_come: Option<Reach>,
+    /// Where not all heads have been, nor will be without the vehicle turning back.
+    pub not_passed: Option<Reach>,
     /// Known to fail already: a large enough empty circle, not necessarily the largest, can get no more samples.
     pub fails: bool,
 }
@@ -38,9 +40,9 @@ pub const CONFIDENCE_SD: f64 = 2.0;
 
 impl Request {
     /// Builds requests as of the outlook's time.
-    fn at(outlook: &Outlook) -> impl Fn(i64) -> Self + use<> {
-        let Outlook { at, swept_by_all, none_alive, to_come, .. } = *outlook;
-        move |section| Self { section, at, swept_by_all, none_alive, to_come, fails: false }
+    pub fn at(outlook: &Outlook) -> impl Fn(i64) -> Self + use<> {
+        let Outlook { at, swept_by_all, none_alive, to_come, not_passed, .. } = *outlook;
+        move |section| Self { section, at, swept_by_all, none_alive, to_come, not_passed, fails: false }
     }
 }
 
@@ -64,8 +66,8 @@ pub struct Sections {
     /// Standard deviations of D that a verdict of pass or fail keeps clear of the target.
     confidence_sd: f64,
     first: i64,
-    /// Judged sections by verdict, in the order of [`Verdict::ALL`].
-    judged: [u32; Verdict::ALL.len()],
+    /// Judged sections by verdict, in the order of [`Verdict::ALL`]; last, open ones that weren't inspected.
+    judged: [u32; Verdict::ALL.len() + 1],
     sections: Vec<Section>,
     runs: Runs,
 }
@@ -82,7 +84,7 @@ impl Sections {
         let count = usize::try_from(end - first).unwrap_or(0);
         let runs = Runs::new(first, count, section_m);
         let sections = vec![Section::default(); count];
-        Self { section_m, target_m, confidence_sd: CONFIDENCE_SD, first, judged: [0; 4], sections, runs }
+        Self { section_m, target_m, confidence_sd: CONFIDENCE_SD, first, judged: [0; 5], sections, runs }
     }
 
     /// Judges with this many standard deviations of D between hole and target, [`CONFIDENCE_SD`] unless set.
@@ -178,7 +180,7 @@ impl Sections {
         for range in [&moved.left_behind, &moved.left_ahead] {
             for index in clamp(range.clone(), &way) {
                 let Some(section) = self.get_mut(index) else { continue };
-                if section.stale || section.hole.is_none() {
+                if section.stale || section.hole.is_none() || section.not_inspected {
                     section.stale = false;
                     section.settled = false;
                     ask(ask_for(index));
@@ -236,25 +238,28 @@ impl Sections {
                 }
                 continue;
             }
-            if self.fails_already(index, outlook.to_come, store, finder, profile) {
+            if self.fails_already(index, outlook, store, finder, profile) {
                 ask(Request { fails: true, ..ask_for(index) });
             }
         }
     }
 
-    /// Whether a section has an empty circle, too large for the target, where no more samples will land.
+    /// Whether a section has an empty circle, too large for the target, where all heads have been and no more samples will
+    /// land.
     fn fails_already(
         &self,
         index: i64,
-        to_come: Option<Reach>,
+        outlook: &Outlook,
         store: &SampleStore,
         finder: &mut HoleFinder,
         profile: &Profile,
     ) -> bool {
         let bounds_m = self.bounds_m(index);
         let radius_m = self.margin_m(self.pass_error(index).worst_m(profile));
-        let clear_m = clear_of(to_come, bounds_m.0).max(clear_of(to_come, bounds_m.1));
-        clear_m > radius_m && finder.has_circle(store, bounds_m, to_come, radius_m)
+        let Outlook { to_come, not_passed, .. } = *outlook;
+        let clear_m = |reach| clear_of(reach, bounds_m.0).max(clear_of(reach, bounds_m.1));
+        clear_m(to_come).min(clear_m(not_passed)) > radius_m
+            && finder.has_circle(store, bounds_m, [to_come, not_passed], radius_m)
     }
 
     /// Measures a section's hole and updates its verdict, flag and run.
@@ -269,33 +274,52 @@ impl Sections {
         let section = self.get_mut(request.section)?;
         let sd_m = pass_error.sd_m(judging.profile.point_at(hole.arc_m));
         let clear_m = clear_of(request.to_come, hole.x_m);
-        let before = section.hole.map(|_| section.verdict);
+        let passed_m = clear_of(request.not_passed, hole.x_m);
+        let before = Self::counted(section);
+        let (error_m, had_a_flag) = (confidence_sd * sd_m, section.is_flagged());
         section.hole = Some(hole);
         section.hole_sd_m = sd_m;
-        section.verdict = match verdict(&hole, confidence_sd * sd_m, target_m, clear_m) {
-            Verdict::Pass if section.is_doubtful() => Verdict::CannotSay,
+        section.verdict = match verdict(&hole, error_m, target_m, clear_m.min(passed_m)) {
+            Verdict::Pass if section.doubt().is_some() => Verdict::CannotSay,
             Verdict::Open | Verdict::CannotSay if request.fails => Verdict::Fail,
             verdict => verdict,
         };
         // More samples leave a pass a pass; those outside a hole's radius leave the hole as it is.
         section.settled = section.verdict == Verdict::Pass || clear_m >= hole.diameter_m / 2.0;
+        section.not_inspected = section.verdict == Verdict::Open && section.settled;
+        if section.not_inspected {
+            // The largest hole reaches to where not all heads have been; another one may fail for itself.
+            let reaches = [request.to_come, request.not_passed];
+            let radius_m = f64::midpoint(target_m, error_m);
+            section.settled =
+                clear_of(request.to_come, from_m).min(clear_of(request.to_come, to_m)) >= radius_m;
+            if had_a_flag || judging.finder.has_circle(judging.store, (from_m, to_m), reaches, radius_m) {
+                (section.verdict, section.not_inspected) = (Verdict::Fail, false);
+            }
+        }
         if section.verdict == Verdict::Fail {
             let evidence = self.explain(&hole, request, judging.profile.perimeter_m());
             self.get_mut(request.section)?.evidence = Some(evidence);
         }
         let section = self.get_mut(request.section)?;
-        let (judgement, now) = (section.flag(request.at), section.verdict);
+        let (judgement, now) = (section.flag(request.at), Self::counted(section));
         self.count(before, now);
         self.tell_runs(request, judging);
         Some(judgement)
     }
 
-    /// Counts a section that has been judged, by the verdict before and now.
-    fn count(&mut self, before: Option<Verdict>, now: Verdict) {
-        if let Some(count) = before.and_then(|before| self.judged.get_mut(before as usize)) {
+    /// Where a section that has been judged is counted.
+    fn counted(section: &Section) -> Option<usize> {
+        section.hole?;
+        Some(if section.not_inspected { Verdict::ALL.len() } else { section.verdict as usize })
+    }
+
+    /// Counts a section that has been judged, by where it was counted before and is now.
+    fn count(&mut self, before: Option<usize>, now: Option<usize>) {
+        if let Some(count) = before.and_then(|before| self.judged.get_mut(before)) {
             *count -= 1;
         }
-        if let Some(count) = self.judged.get_mut(now as usize) {
+        if let Some(count) = now.and_then(|now| self.judged.get_mut(now)) {
             *count += 1;
         }
     }
@@ -311,6 +335,7 @@ impl Sections {
             }
         }
         metres.add(Verdict::Open, all as f64 * section_m);
+        metres.not_inspected_m = self.judged.last().map_or(0.0, |count| f64::from(*count) * section_m);
         metres
     }
 
@@ -364,7 +389,7 @@ impl Sections {
             // Samples farther away than a pass depends on may have narrowed the hole of a fail.
             if section.stale || !section.settled || section.verdict != Verdict::Pass {
                 section.stale = false;
-                let fails = self.fails_already(index, outlook.to_come, store, finder, profile);
+                let fails = self.fails_already(index, outlook, store, finder, profile);
                 ask(Request { fails, ..ask_for(index) });
             }
         }
