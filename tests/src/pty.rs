@@ -53,7 +53,7 @@ impl OnTerminal {
             if let Some(at) = written.find(text) {
                 return from + at + text.len();
             }
-            match self.pieces.recv_timeout(Duration::from_secs(60)) {
+            match self.pieces.recv_timeout(Duration::from_mins(1)) {
                 Ok(piece) => self.written.extend(piece),
                 Err(why) => panic!("{text:?} wasn't written ({why}): {written}"),
             }
@@ -62,7 +62,7 @@ impl OnTerminal {
 
     /// Waits for its end; returns all that it has written.
     pub fn all(mut self) -> String {
-        while let Ok(piece) = self.pieces.recv_timeout(Duration::from_secs(120)) {
+        while let Ok(piece) = self.pieces.recv_timeout(Duration::from_mins(2)) {
             self.written.extend(piece);
         }
         String::from_utf8_lossy(&self.written).into_owned()

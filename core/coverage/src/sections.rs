@@ -11,6 +11,7 @@ use super::passage::PassError;
 use super::runs::{RunChange, RunId, Runs, Telling};
 use super::section::{Judgement, Section, Verdict};
 use super::store::SampleStore;
+use super::unsure::Stretch;
 use headrace_geometry::math;
 use headrace_geometry::time::MonoNs;
 use headrace_geometry::tunnel::Profile;
@@ -31,8 +32,22 @@ pub struct Request {
     pub to_come: Option<Reach>,
     /// Where not all heads have been, nor will be without the vehicle turning back.
     pub not_passed: Option<Reach>,
+    /// The dive has ended: where all heads have been.
+    pub ended: Option<Ended>,
     /// Known to fail already: a large enough empty circle, not necessarily the largest, can get no more samples.
     pub fails: bool,
+}
+
+/// Where all heads had been when a dive ended; `None` if nowhere.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ended(pub Option<Reach>);
+
+impl Ended {
+    /// Whether a hole reaches to where not all heads had been.
+    fn is_beyond(self, hole: &Hole) -> bool {
+        let radius_m = hole.diameter_m / 2.0;
+        self.0.is_none_or(|all| hole.x_m - radius_m < all.from_m || hole.x_m + radius_m > all.to_m)
+    }
 }
 
 /// Standard deviations of D between hole and target for a verdict of pass or fail, unless configured.
@@ -42,7 +57,16 @@ impl Request {
     /// Builds requests as of the outlook's time.
     pub fn at(outlook: &Outlook) -> impl Fn(i64) -> Self + use<> {
         let Outlook { at, swept_by_all, none_alive, to_come, not_passed, .. } = *outlook;
-        move |section| Self { section, at, swept_by_all, none_alive, to_come, not_passed, fails: false }
+        move |section| Self {
+            section,
+            at,
+            swept_by_all,
+            none_alive,
+            to_come,
+            not_passed,
+            ended: None,
+            fails: false,
+        }
     }
 }
 
@@ -286,17 +310,21 @@ impl Sections {
         };
         // More samples leave a pass a pass; those outside a hole's radius leave the hole as it is.
         section.settled = section.verdict == Verdict::Pass || clear_m >= hole.diameter_m / 2.0;
-        section.not_inspected = section.verdict == Verdict::Open && section.settled;
+        let alone = verdict(&hole, error_m, target_m, clear_m);
+        section.not_inspected = section.verdict == Verdict::Open && alone != Verdict::Open;
         if section.not_inspected {
             // The largest hole reaches to where not all heads have been; another one may fail for itself.
             let reaches = [request.to_come, request.not_passed];
             let radius_m = f64::midpoint(target_m, error_m);
-            section.settled =
+            section.settled &=
                 clear_of(request.to_come, from_m).min(clear_of(request.to_come, to_m)) >= radius_m;
             if had_a_flag || judging.finder.has_circle(judging.store, (from_m, to_m), reaches, radius_m) {
                 (section.verdict, section.not_inspected) = (Verdict::Fail, false);
             }
         }
+        // Nothing will come any more.
+        section.not_inspected |=
+            section.verdict == Verdict::Open && request.ended.is_some_and(|ended| ended.is_beyond(&hole));
         if section.verdict == Verdict::Fail {
             let evidence = self.explain(&hole, request, judging.profile.perimeter_m());
             self.get_mut(request.section)?.evidence = Some(evidence);
@@ -390,7 +418,7 @@ impl Sections {
             if section.stale || !section.settled || section.verdict != Verdict::Pass {
                 section.stale = false;
                 let fails = self.fails_already(index, outlook, store, finder, profile);
-                ask(Request { fails, ..ask_for(index) });
+                ask(Request { fails, ended: Some(Ended(outlook.through)), ..ask_for(index) });
             }
         }
     }
@@ -400,6 +428,27 @@ impl Sections {
         let Some(reach) = stretch else { return 0..0 };
         let end = self.first + i64::try_from(self.sections.len()).unwrap_or(i64::MAX);
         clamp(self.index_of(reach.from_m)..self.index_of(reach.to_m) + 1, &(self.first..end))
+    }
+}
+
+impl Sections {
+    /// A section as a stretch of its own; `None` where it isn't unsure.
+    pub fn unsure(&self, index: i64) -> Option<Stretch> {
+        let section = self.get(index)?;
+        let hole_m = section.hole.map_or(0.0, |hole| hole.diameter_m);
+        let (from, to) = (index, index + 1);
+        Some(Stretch { why: section.unsure()?, from, to, sections: 1, hole_m: [hole_m, section.hole_sd_m] })
+    }
+
+    /// The unsure stretches of the way, in order. Allocates: for the end of a dive.
+    pub fn unsure_stretches(&self, way: Option<Reach>) -> Vec<Stretch> {
+        let mut all: Vec<Stretch> = Vec::new();
+        for stretch in self.sections_of(way).filter_map(|index| self.unsure(index)) {
+            if !all.last_mut().is_some_and(|last| last.join(&stretch, self.section_m())) {
+                all.push(stretch);
+            }
+        }
+        all
     }
 }
 

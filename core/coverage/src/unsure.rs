@@ -2,9 +2,6 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::frontier::Reach;
-use super::sections::Sections;
-
 /// Why a section has neither passed nor failed, though no more samples will come without turning back.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -90,23 +87,22 @@ impl Stretch {
     }
 }
 
-impl Sections {
-    /// A section as a stretch of its own; `None` where it isn't unsure.
-    pub fn unsure(&self, index: i64) -> Option<Stretch> {
-        let section = self.get(index)?;
-        let hole_m = section.hole.map_or(0.0, |hole| hole.diameter_m);
-        let (from, to) = (index, index + 1);
-        Some(Stretch { why: section.unsure()?, from, to, sections: 1, hole_m: [hole_m, section.hole_sd_m] })
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn one(why: Unsure, section: i64, hole_m: f64) -> Stretch {
+        Stretch { why, from: section, to: section + 1, sections: 1, hole_m: [hole_m, 0.1] }
     }
 
-    /// The unsure stretches of the way, in order. Allocates: for the end of a dive.
-    pub fn unsure_stretches(&self, way: Option<Reach>) -> Vec<Stretch> {
-        let mut all: Vec<Stretch> = Vec::new();
-        for stretch in self.sections_of(way).filter_map(|index| self.unsure(index)) {
-            if !all.last_mut().is_some_and(|last| last.join(&stretch, self.section_m())) {
-                all.push(stretch);
-            }
-        }
-        all
+    #[test]
+    fn neighbours_within_half_a_metre_are_one_stretch() {
+        let mut stretch = one(Unsure::Position, 10, 0.4);
+        assert!(stretch.join(&one(Unsure::Position, 11, 0.6), 0.25));
+        assert!(stretch.join(&one(Unsure::Position, 7, 0.5), 0.25), "two sections lie between");
+        assert!(!stretch.join(&one(Unsure::Position, 15, 0.5), 0.25), "three");
+        assert!(!stretch.join(&one(Unsure::DoubtfulReturns, 12, 0.5), 0.25), "another reason");
+        let all = Stretch { why: Unsure::Position, from: 7, to: 12, sections: 3, hole_m: [0.6, 0.1] };
+        assert_eq!(stretch, all);
     }
 }

@@ -13,6 +13,8 @@ use headrace_geometry::tunnel::Profile;
 pub struct PilotLine {
     /// Where: a stationing, or two.
     pub place: String,
+    /// How fast; empty where that isn't said.
+    pub speed: String,
     /// What, the most important part first; a narrow screen leaves the last parts out.
     pub what: Vec<String>,
     /// What to do; empty where there is nothing.
@@ -24,7 +26,12 @@ pub struct PilotLine {
 impl PilotLine {
     /// All of it in one line.
     pub fn text(&self) -> String {
-        let mut text = format!("{:<9}  {}", self.place, self.what.join("  "));
+        let mut text = format!("{:<9}  ", self.place);
+        if !self.speed.is_empty() {
+            text.push_str(&self.speed);
+            text.push_str("  ");
+        }
+        text.push_str(&self.what.join("  "));
         if !self.action.is_empty() {
             text.push_str("  -> ");
             text.push_str(&self.action);
@@ -61,12 +68,12 @@ impl PilotLine {
     pub fn cut(&self, columns: usize) -> String {
         let mut line = self.clone();
         let is_wide = |line: &Self| line.text().chars().count() > columns;
-        while is_wide(&line) && line.what.len() > 2 {
+        while is_wide(&line) && line.what.len() > 1 {
             line.what.pop();
         }
         // What holds is more than how fast it goes.
-        if is_wide(&line) && line.what.len() == 2 {
-            line.what.remove(0);
+        if is_wide(&line) {
+            line.speed.clear();
         }
         line.text().chars().take(columns).collect()
     }
@@ -91,11 +98,11 @@ pub fn status_line(state: &LiveState, profile: &Profile, name: &dyn Fn(usize) ->
         Condition::Good => (format!("ok up to {v_max}"), String::new()),
     };
     let is_old = matches!(condition, Condition::Old(_) | Condition::NoData);
-    let mut parts = Vec::new();
-    if let (Some(speed_mps), false) = (state.speed_mps, is_old) {
-        parts.push(format!("{speed_mps:.2} m/s"));
-    }
-    parts.push(what);
+    let speed = match state.speed_mps {
+        Some(speed_mps) if !is_old => format!("{speed_mps:.2} m/s"),
+        _ => String::new(),
+    };
+    let mut parts = vec![what];
     if !is_old {
         let silent: Vec<usize> = state.silent().collect();
         match silent.as_slice() {
@@ -108,7 +115,7 @@ pub fn status_line(state: &LiveState, profile: &Profile, name: &dyn Fn(usize) ->
     if state.metres.fail_m > 0.0 {
         parts.push(format!("missed {:.2} m", state.metres.fail_m));
     }
-    PilotLine { place, what: parts, action, lamp: Some(condition.lamp()) }
+    PilotLine { place, speed, what: parts, action, lamp: Some(condition.lamp()) }
 }
 
 fn waiting_text(state: &LiveState) -> &'static str {
@@ -183,6 +190,7 @@ pub fn metres_text(metres: &LiveMetres) -> String {
 pub fn told_line(told: &Told, profile: &Profile) -> PilotLine {
     let line = |place: String, what: String, action: String, lamp: Option<Lamp>| PilotLine {
         place,
+        speed: String::new(),
         what: vec![what],
         action,
         lamp,

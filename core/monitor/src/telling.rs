@@ -203,9 +203,10 @@ impl Teller {
 
     fn note_unsure(&mut self, section: i64, sections: &Sections, tell: &mut dyn FnMut(Told)) {
         let section_m = sections.section_m();
-        let settled = |section: &Section| section.settled;
-        let Some(here) = sections.unsure(section).filter(|_| sections.get(section).is_some_and(settled))
-        else {
+        // That at an end is told later, if it still is so.
+        let is_settled = sections.get(section).is_some_and(|section| section.settled);
+        let lasts = |here: &Stretch| is_settled || here.why == Unsure::NotInspected;
+        let Some(here) = sections.unsure(section).filter(lasts) else {
             let is_judged = sections.get(section).is_some_and(|section| section.verdict != Verdict::Open);
             let beside = |last: &Stretch| section == last.to || section == last.from - 1;
             if is_judged && self.unsure.as_ref().is_some_and(beside) {
