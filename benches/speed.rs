@@ -255,6 +255,7 @@ fn cover(samples: &[(f64, f64, usize)], length_m: f64) -> Coverage {
             node_m: 0.5,
         }),
         relief: headrace_coverage::Relief::default(),
+        unsure: None,
     };
     let mut last = [None; 8];
     for (x_m, arc_m, head) in samples {
