@@ -257,6 +257,7 @@ fn cover(samples: &[(f64, f64, usize)], length_m: f64) -> Coverage {
             node_m: 0.5,
         }),
         relief: headrace_coverage::Relief::default(),
+        unsure: None,
     };
     let mut last = [None; 8];
     let profile = shapes::ceran().unwrap();

@@ -12,6 +12,8 @@ use headrace_sampling::layout::HeadLayout;
 use headrace_sensor::connect::Connect;
 use tracing::level_filters::LevelFilter;
 
+use crate::watch::Show;
+
 pub(crate) use value_parsers::{Speed, speed, time};
 use value_parsers::{
     address, chainage, chainage_range, drift, file_kind, hours, layout, length, place, rotation, seconds,
@@ -67,14 +69,16 @@ pub(crate) enum Command {
     /// Run a dive on the vehicle's ports and record it, until interrupted (Ctrl-C).
     ///
     /// Missing sensors are retried indefinitely while the dive goes on with the others; --require ends the dive if a sensor
-    /// is missing. --source feeds the dive from a log instead of the ports.
+    /// is missing. --source feeds the dive from a log instead of the ports. The exit code is 0 whatever the verdicts: metres that
+    /// are missed, or of which nothing can be said, are in the summary and in the report.
     #[command(
         after_help = "Example:\n  headrace run vehicle.toml --record dive.mcap --require imu,sonar_0\n  headrace run vehicle.toml --record dive.mcap --rotate 1GiB\n  headrace run vehicle.toml --source dive.mcap --record again.mcap"
     )]
     Run(Run),
     /// Replay a recorded dive through the same processing as a live one.
     ///
-    /// With --smooth it is replayed twice: once with the filter, and once along the smoothed trajectory.
+    /// With --smooth it is replayed twice: once with the filter, and once along the smoothed trajectory. The exit code is 0
+    /// whatever the verdicts: metres that are missed, or of which nothing can be said, are in the summary and in the report.
     #[command(
         after_help = "Example:\n  headrace replay dive.mcap --target 0.6 --report report.json\n  headrace replay dive.mcap --target 0.3,0.6,1.0 --section 0.25,1\n  headrace replay dive.mcap --smooth --report certificate.json\n  headrace replay dive.part*.mcap\n  headrace replay dive.mcap --expect golden.json --bless"
     )]
@@ -488,6 +492,20 @@ pub(crate) struct Output {
     /// Print the report as JSON.
     #[arg(long)]
     pub(crate) json: bool,
+    /// Print a JSON object a line while the dive goes on: the state once a second, and what is told of it (docs/live-state.md).
+    #[arg(long, conflicts_with = "json")]
+    pub(crate) json_lines: bool,
+}
+
+impl Output {
+    /// How the dive is shown while it goes on.
+    pub(crate) fn show(&self) -> Show {
+        match self {
+            Self { json_lines: true, .. } => Show::JsonLines,
+            Self { json: true, .. } => Show::Nothing,
+            _ => Show::Lines,
+        }
+    }
 }
 
 const SPEED_HELP: &str = "Playback speed relative to real time, or max";

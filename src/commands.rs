@@ -20,10 +20,11 @@ use crate::live;
 use crate::output::{deliver, put, say};
 use crate::play::Playing;
 use crate::report_output::{exit_code, finish, note_losses};
+use crate::screen::Screen;
 use crate::smooth;
 use crate::summary::summary;
 use crate::vehicle_file;
-use crate::watch::Watch;
+use crate::watch::{Show, Watch};
 
 /// `headrace demo`.
 pub(crate) fn demo(args: &Demo) -> Result<u8, Failure> {
@@ -39,9 +40,9 @@ pub(crate) fn demo(args: &Demo) -> Result<u8, Failure> {
     say(&format!("{}, target {} m: a simulated dive", scene.vehicle.name, scene.vehicle.target_m));
     let mut feed = SimulationFeed::new(simulation(&scene, false)?);
     let pace = Pace { speed: args.speed.0, ..Pace::default() };
-    let report = dive.run(&mut feed, pace, &mut Watch::loud())?;
+    let report = dive.run(&mut feed, pace, &mut Watch::new(Show::Lines))?;
     files::write_json(&report_file, &report)?;
-    put(&format!("\n{}", summary(&report)));
+    put(&format!("\n{}", summary(&report, Screen::columns())));
     say(&format!("report {}\nlog    {}  (headrace replay)", report_file.display(), log.display()));
     Ok(exit_code(&report))
 }
@@ -61,7 +62,7 @@ pub(crate) fn run(args: &Run) -> Result<u8, Failure> {
     let dive = assemble(&vehicle, &text, recording)?;
     player.connect(dive.armed.sources());
     let pace = Pace { speed: args.speed.0, ..Pace::default() };
-    let mut report = dive.run(&mut player, pace, &mut Watch::unless(args.output.json))?;
+    let mut report = dive.run(&mut player, pace, &mut Watch::new(args.output.show()))?;
     note_losses(&mut report, log, &player)?;
     finish(&report, &args.output)
 }
@@ -81,7 +82,7 @@ pub(crate) fn replay(args: &Replay) -> Result<u8, Failure> {
     } else {
         let dive = assemble(&vehicle, &text, None)?.asking(what_if);
         player.connect(dive.armed.sources());
-        let mut watch = Watch::unless(args.output.json);
+        let mut watch = Watch::new(args.output.show());
         if args.from.is_some() || args.interactive {
             let playing = Playing { from: args.from, interactive: args.interactive, pace };
             playing.play(dive, &mut player, &mut watch)?

@@ -235,6 +235,7 @@ impl Dive {
             while let Some(notice) = notices.next() {
                 watch.notice(&notice, dive);
             }
+            watch.tick(dive);
             beside(dive);
         });
         drop(progress);
@@ -273,6 +274,7 @@ impl Dive {
             while let Some(notice) = notices.next() {
                 watch.notice(&notice, dive);
             }
+            watch.tick(dive);
             beside(&supervisor, watch);
         });
         let histories = supervisor.stop(&mut self.armed, &mut |_| ());

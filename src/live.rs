@@ -17,7 +17,9 @@ use crate::dive::{Clock, Dive, Recording, assemble};
 use crate::failure::Failure;
 use crate::output::say;
 use crate::report_output::finish;
-use crate::watch::Watch;
+use crate::screen::Screen;
+use crate::summary::broken;
+use crate::watch::{Show, Watch};
 
 /// Runs a dive on the vehicle's ports.
 pub(crate) fn run(args: &Run, text: &str, vehicle: &VehicleConfig) -> Result<u8, Failure> {
@@ -30,14 +32,18 @@ pub(crate) fn run(args: &Run, text: &str, vehicle: &VehicleConfig) -> Result<u8,
     let supervisor = supervisor(&mut dive, vehicle, begun)?;
     let interrupted = interrupts()?;
     let until = args.duration.map(|seconds| begun + DurNs::from_secs_f64(seconds));
-    let mut watch = Watch::unless(args.output.json);
-    if !watch.is_quiet() {
+    let mut watch = Watch::new(args.output.show()).live();
+    if args.output.show() == Show::Lines {
         let where_to = match (args.no_record, args.rotate) {
             (true, _) => "not recorded".to_owned(),
             (false, None) => format!("recorded to {}", log.display()),
             (false, Some(_)) => format!("recorded in parts, starting with {}", part_path(&log, 1).display()),
         };
-        say(&format!("{}, target {} m: {where_to}; Ctrl-C ends the dive", vehicle.name, vehicle.target_m));
+        let begun =
+            format!("{}, target {} m: {where_to}; Ctrl-C ends the dive", vehicle.name, vehicle.target_m);
+        for line in broken(&begun, Screen::columns()) {
+            say(&line);
+        }
     }
     let states = RefCell::new(SensorStates::new(
         vehicle,

@@ -69,6 +69,7 @@ impl PlaybackObserver for Screen<'_> {
         while let Some(notice) = self.notices.next() {
             self.watch.notice(&notice, dive);
         }
+        self.watch.tick(dive);
     }
 
     fn after_skipped_tick(&mut self, _: &Loop) {

@@ -5,11 +5,13 @@ use std::path::Path;
 use headrace_monitor::report::{LogReport, PartReport, Report};
 use headrace_replay::log::{file_digest, files_digest};
 use headrace_replay::player::Player;
+use serde_json::json;
 
 use crate::cli::Output;
 use crate::failure::{self, Failure};
 use crate::files;
-use crate::output::{deliver_json, put};
+use crate::output::{deliver, deliver_json, put};
+use crate::screen::Screen;
 use crate::summary::summary;
 
 /// Adds the replayed log and its losses to the report.
@@ -46,10 +48,14 @@ pub(crate) fn finish(report: &Report, output: &Output) -> Result<u8, Failure> {
     if let Some(path) = &output.report {
         files::write_json(path, report)?;
     }
-    if output.json {
+    if output.json_lines {
+        let end = json!({"type": "end", "digest": report.digest, "way": report.way, "summary": report.summary,
+            "not_inspected": report.not_inspected, "exit_code": exit_code(report)});
+        deliver(&end.to_string())?;
+    } else if output.json {
         deliver_json(report)?;
     } else {
-        put(&summary(report));
+        put(&summary(report, Screen::columns()));
     }
     Ok(exit_code(report))
 }

@@ -1,18 +1,23 @@
 //! Summary of a report as text.
 
-use headrace_coverage::Cause;
+use headrace_coverage::{Cause, Unsure};
+use headrace_monitor::live_state::LiveMetres;
+use headrace_monitor::live_text::{helps_text, metres_text, unsure_text};
 use headrace_monitor::pilot_text::{action_text, cause_text, station};
 use headrace_monitor::report::{ChangeReport, JudgedReport, SmoothingReport};
 use headrace_monitor::report::{NotInspectedReport, Report, RunReport};
+use headrace_monitor::telling::UnsureStretch;
 
 use crate::output::append;
 
-/// The summary text.
-pub(crate) fn summary(report: &Report) -> String {
+/// The summary text, in lines of at most so many columns, if that is said.
+pub(crate) fn summary(report: &Report, columns: Option<usize>) -> String {
     let mut text = String::new();
     let mut line = |words: String| {
-        text.push_str(&words);
-        text.push('\n');
+        for part in broken(&words, columns) {
+            text.push_str(&part);
+            text.push('\n');
+        }
     };
     let dive = &report.dive;
     if let Some(why) = &report.not_inspected {
@@ -20,7 +25,7 @@ pub(crate) fn summary(report: &Report) -> String {
     }
     if let (Some(from_m), Some(to_m)) = (report.way.from_m, report.way.to_m) {
         line(format!(
-            "ch {} to {}: {:.2} m in {:.0} s, {} samples, target {} m, confidence {} sd",
+            "{} to {}: {:.2} m in {:.0} s, {} samples, target {} m, confidence {} sd",
             station(from_m),
             station(to_m),
             report.way.length_m,
@@ -30,16 +35,20 @@ pub(crate) fn summary(report: &Report) -> String {
             report.confidence_sd
         ));
         let sum = &report.summary;
-        line(format!(
-            "  passed {:.2} m   failed {:.2} m   can't say {:.2} m   open {:.2} m",
-            sum.pass_m, sum.fail_m, sum.cannot_say_m, sum.open_m
-        ));
-        for run in missed(report) {
-            line(run);
+        let metres = LiveMetres {
+            pass_m: sum.pass_m,
+            fail_m: sum.fail_m,
+            cannot_say_m: sum.cannot_say_m,
+            open_m: sum.open_m - sum.not_inspected_m,
+            not_inspected_m: sum.not_inspected_m,
+        };
+        line(format!("  {}", metres_text(&metres)));
+        for stretch in stretches(report) {
+            line(stretch);
         }
         for other in &report.what_if {
             line(format!(
-                "  with target {} m in sections of {} m: passed {:.2} m   failed {:.2} m   can't say {:.2} m   open {:.2} m",
+                "  with target {} m in sections of {} m: passed {:.2} m   missed {:.2} m   can't say {:.2} m   open {:.2} m",
                 other.target_m, other.section_m, other.pass_m, other.fail_m, other.cannot_say_m, other.open_m
             ));
         }
@@ -99,35 +108,68 @@ fn not_inspected_text(why: &NotInspectedReport) -> String {
     }
 }
 
-/// The stretches still missed along the tunnel, a line each, with the action for each on the way home.
-fn missed(report: &Report) -> Vec<String> {
+/// The stretches that are missed or of which nothing can be said, along the tunnel, a line each: where, what, what to do.
+fn stretches(report: &Report) -> Vec<String> {
     let open = report.runs.iter().filter(|run| run.cleared_s.is_none());
-    let mut open: Vec<_> = open.collect();
-    open.sort_by(|a, b| a.start_m.total_cmp(&b.start_m));
-    let line = |run: &&RunReport| {
-        let mut cause = run.figures.as_ref().map_or_else(|| run.cause.as_str().to_owned(), cause_text);
-        if run.cause == Cause::HeadSilent && !run.silent_sources.is_empty() {
-            append(&mut cause, format_args!(" ({})", run.silent_sources.join(", ")));
-        }
-        let back = report.way_home.iter().find(|back| back.run == run.id);
-        let action =
-            back.map(|back| format!("; {}", action_text(back.action, run.start_m, back.at_most_mps)));
-        format!(
-            "  missed ch {} to {}: {cause}, holes up to {:.2} m{}",
-            station(run.start_m),
-            station(run.end_m),
-            run.hole_m,
-            action.unwrap_or_default()
-        )
+    let mut all: Vec<(f64, String)> = open.map(|run| (run.start_m, missed(run, report))).collect();
+    all.extend(report.unsure.iter().map(|stretch| (stretch.start_m, unsure(&stretch.stretch))));
+    all.sort_by(|a, b| a.0.total_cmp(&b.0));
+    all.into_iter().map(|(_, text)| text).collect()
+}
+
+fn missed(run: &RunReport, report: &Report) -> String {
+    let mut cause = run.figures.as_ref().map_or_else(|| run.cause.as_str().to_owned(), cause_text);
+    if run.cause == Cause::HeadSilent && !run.silent_sources.is_empty() {
+        append(&mut cause, format_args!(" ({})", run.silent_sources.join(", ")));
+    }
+    let back = report.way_home.iter().find(|back| back.run == run.id);
+    let action = back.map(|back| format!("  -> {}", action_text(back.action, run.start_m, back.at_most_mps)));
+    format!(
+        "  {} to {}  MISSED: {cause}, holes up to {:.2} m{}",
+        station(run.start_m),
+        station(run.end_m),
+        run.hole_m,
+        action.unwrap_or_default()
+    )
+}
+
+fn unsure(stretch: &UnsureStretch) -> String {
+    let what = if stretch.why == Unsure::NotInspected { "NOT INSPECTED" } else { "CAN'T SAY" };
+    let (from, to) = (station(stretch.from_m), station(stretch.to_m));
+    let helps = match helps_text(stretch.why) {
+        "" => String::new(),
+        helps => format!("  -> {helps}"),
     };
-    open.iter().map(line).collect()
+    format!("  {from} to {to}  {what}: {}{helps}", unsure_text(stretch))
+}
+
+/// A line broken to so many columns, if that is said; what is carried over is indented.
+pub(crate) fn broken(line: &str, columns: Option<usize>) -> Vec<String> {
+    let Some(columns) = columns.filter(|columns| line.chars().count() > *columns) else {
+        return vec![line.to_owned()];
+    };
+    let indent = line.len() - line.trim_start().len();
+    let mut lines = vec![" ".repeat(indent)];
+    for word in line.split(' ').skip(indent) {
+        let Some(last) = lines.last_mut() else { continue };
+        if last.chars().count() + 1 + word.chars().count() > columns && !last.trim().is_empty() {
+            last.truncate(last.trim_end().len());
+            lines.push(format!("{}{word}", " ".repeat(indent + 4)));
+        } else {
+            if !last.trim().is_empty() {
+                last.push(' ');
+            }
+            last.push_str(word);
+        }
+    }
+    lines
 }
 
 /// Changes by smoothing: metres by verdict, and a line per run of neighbouring sections with the same change.
 fn smoothing(report: &SmoothingReport) -> Vec<String> {
     let was = &report.before;
     let mut lines = vec![format!(
-        "  smoothed {} estimates; by the filter alone: passed {:.2} m   failed {:.2} m   can't say {:.2} m   open {:.2} m",
+        "  smoothed {} estimates; by the filter alone: passed {:.2} m   missed {:.2} m   can't say {:.2} m   open {:.2} m",
         report.estimates, was.pass_m, was.fail_m, was.cannot_say_m, was.open_m
     )];
     if report.changed.is_empty() {
@@ -140,7 +182,7 @@ fn smoothing(report: &SmoothingReport) -> Vec<String> {
         let (run, after) = rest.split_at(len);
         rest = after;
         lines.push(format!(
-            "  changed ch {} to {}: {} to {}, holes {} to {} m",
+            "  {} to {}  changed: {} to {}, holes {} to {} m",
             station(first.start_m),
             station(end_m),
             verdict_text(first.before),

@@ -1,257 +1,232 @@
-//! Terminal output during a dive: position, advised speed, and each missed stretch once.
+//! Output during a dive: the state, and each missed, unsure or cleared stretch once; as lines for people, or as JSON.
 
-use std::io::IsTerminal;
-
-use headrace_coverage::{Run, RunChange, RunId, Section, Sections, Verdict};
 use headrace_geometry::time::{DurNs, MonoNs};
-use headrace_monitor::advice_log::AdviceEntry;
+use headrace_monitor::live_state::{Condition, Lamp, LiveState};
+use headrace_monitor::live_text::{PilotLine, status_line, told_line};
 use headrace_monitor::messages::Notice;
-use headrace_monitor::pilot_text::{
-    Missed, advice_text, alert_text, cleared_text, flag_text, setting_text, station,
-};
 use headrace_monitor::run::Loop;
+use headrace_monitor::telling::{Teller, Told};
 use headrace_ports::{Phase, Status};
-use headrace_vehicle::Mission;
+use serde_json::{Value, json};
 
-use crate::output::{put, say};
-use crate::transient;
+use crate::printer::Printer;
+use crate::screen::Screen;
 
-/// Interval of state lines where they can't be overwritten, in the dive's time.
+/// Interval of state lines where they can't be overwritten.
 const LINE_EVERY: DurNs = DurNs(10_000_000_000);
-/// Interval of lines with the way and its metres by verdict, in the dive's time.
-const WAY_EVERY: DurNs = DurNs(60_000_000_000);
-/// Interval of state lines that are overwritten, in the dive's time.
+/// Interval of state lines that are overwritten, and of those in JSON.
 const REFRESH_EVERY: DurNs = DurNs(1_000_000_000);
+/// A lamp that changes is shown this long after the last state line at the earliest, where lines can't be overwritten.
+const CHANGE_EVERY: DurNs = DurNs(2_000_000_000);
 
-/// Shows a dive on stdout, unless quiet.
+/// How a dive is shown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Show {
+    /// Not at all.
+    Nothing,
+    /// As lines for people.
+    Lines,
+    /// As a JSON object a line.
+    JsonLines,
+}
+
+/// Shows a dive on stdout.
 pub(crate) struct Watch {
-    quiet: bool,
-    terminal: bool,
-    shown: Option<MonoNs>,
-    way_shown: Option<MonoNs>,
-    status_open: bool,
-    /// The run that was flagged last, until its end is shown.
-    run: Option<RunId>,
-    /// The latest advised speed, m/s; zero if none.
-    v_max_mps: f64,
+    show: Show,
+    screen: Screen,
+    printer: Option<Printer>,
+    teller: Teller,
+    /// When the state was shown last, and what it was.
+    shown: Option<(MonoNs, Condition)>,
 }
 
 impl Watch {
-    /// Shows the dive.
-    pub(crate) fn loud() -> Self {
+    /// Shows the dive in this way.
+    pub(crate) fn new(show: Show) -> Self {
         Self {
-            quiet: false,
-            terminal: std::io::stdout().is_terminal(),
+            show,
+            screen: Screen::of_stdout(),
+            printer: (show != Show::Nothing).then(|| Printer::start(false)),
+            teller: Teller::default(),
             shown: None,
-            way_shown: None,
-            status_open: false,
-            run: None,
-            v_max_mps: 0.0,
         }
     }
 
     /// Shows no output.
     pub(crate) fn quiet() -> Self {
-        Self { quiet: true, ..Self::loud() }
-    }
-
-    /// Shows no output if it is JSON.
-    pub(crate) fn unless(json: bool) -> Self {
-        if json { Self::quiet() } else { Self::loud() }
+        Self::new(Show::Nothing)
     }
 
     /// Whether nothing is shown.
     pub(crate) fn is_quiet(&self) -> bool {
-        self.quiet
+        self.show == Show::Nothing
+    }
+
+    /// A dive that can't wait: what the terminal has no room for is dropped.
+    pub(crate) fn live(mut self) -> Self {
+        if let Some(printer) = &mut self.printer {
+            printer.drop_rather_than_wait();
+        }
+        self
     }
 
     /// Shows a result of the loop.
     pub(crate) fn notice(&mut self, notice: &Notice, dive: &Loop) {
-        if self.quiet {
+        if self.is_quiet() {
             return;
         }
-        match notice {
-            Notice::Advice(entry) => {
-                self.way(entry.at, dive);
-                self.status(entry, dive.mission());
-            }
-            Notice::Section { section, .. } => self.section(*section, sections(dive)),
-            Notice::Run { id, change, .. } => self.run(*id, *change, dive),
-            Notice::Alert(kind, source) => {
-                if let Some(alert) = dive.alerts().get(*kind, *source) {
-                    let name = |source: u16| {
-                        dive.sources()
-                            .get(usize::from(source))
-                            .map_or_else(String::new, |info| info.id.clone())
-                    };
-                    let head = source.map_or_else(String::new, |source| name(source.0));
-                    let text = match &alert.setting {
-                        Some(doubt) => setting_text(doubt, alert.x_m, &name),
-                        None => alert_text(alert.kind, &head, alert.x_m, alert.worst_m),
-                    };
-                    self.line(&format!("ALERT    {text}"));
-                }
-            }
+        let at = match notice {
+            Notice::Section { at, .. } | Notice::Run { at, .. } => *at,
+            Notice::Advice(entry) => entry.at,
+            Notice::Alert(kind, source) => dive.alerts().get(*kind, *source).map_or(MonoNs(0), |a| a.since),
+        };
+        let mut told = Vec::new();
+        self.teller.hear(notice, dive, &mut |one| told.push(one));
+        self.tell(at, &told, dive);
+    }
+
+    /// Shows the state, after every tick: also where nothing has come.
+    pub(crate) fn tick(&mut self, dive: &Loop) {
+        if self.is_quiet() {
+            return;
+        }
+        let state = dive.live_state();
+        let mut told = Vec::new();
+        self.teller.tick(state, dive, &mut |one| told.push(one));
+        self.tell(state.now, &told, dive);
+        let condition = state.condition();
+        if self.is_due(state, condition) {
+            self.shown = Some((state.now, condition));
+            self.status(state, dive);
         }
     }
 
     /// Shows a change of a sensor's state.
     pub(crate) fn sensor(&mut self, id: &str, status: &Status) {
-        if !self.quiet {
-            let amber = (status.phase != Phase::Running).then_some("\x1b[33m");
-            self.coloured(&format!("SENSOR   {id:<12} {status}"), amber);
+        let phase = status.phase.as_str();
+        match self.show {
+            Show::Nothing => {}
+            Show::JsonLines => self.json(
+                status.since,
+                json!({"type": "sensor", "id": id, "phase": phase, "text": status.words}),
+            ),
+            Show::Lines => {
+                let lamp = (status.phase != Phase::Running).then_some(Lamp::Amber);
+                let what = vec![format!("{id} {status}")];
+                self.line(&PilotLine { place: "SENSOR".to_owned(), what, lamp, ..PilotLine::default() });
+            }
         }
     }
 
     /// Shows that a replay has paused, jumped or ended at `time` after its beginning.
     pub(crate) fn stopped(&mut self, dive: &Loop, time: DurNs, ended: bool) {
-        (self.shown, self.way_shown, self.run) = (None, None, None);
-        if !self.quiet {
-            let seconds = time.as_secs_f64();
-            let (h, min, s) = (seconds / 3600.0, seconds / 60.0 % 60.0, seconds % 60.0);
-            let end = if ended { "  (end)" } else { "" };
-            let tally = dive.tally();
-            self.line(&format!(
-                "AT       {}:{:02}:{s:06.3}{end}: tick {}, {} samples, digest {:016x}",
-                h.floor(),
-                min.floor(),
-                dive.ticks(),
-                tally.samples,
-                dive.digest()
-            ));
+        self.shown = None;
+        self.teller.forget();
+        let (tick, samples, digest) = (dive.ticks(), dive.tally().samples, format!("{:016x}", dive.digest()));
+        match self.show {
+            Show::Nothing => {}
+            Show::JsonLines => {
+                let stopped = json!({"type": "stopped", "time_s": time.as_secs_f64(), "ended": ended, "tick": tick,
+                    "samples": samples, "digest": digest});
+                self.json(dive.now(), stopped);
+            }
+            Show::Lines => {
+                let seconds = time.as_secs_f64();
+                let (h, min, s) = (seconds / 3600.0, seconds / 60.0 % 60.0, seconds % 60.0);
+                let end = if ended { "  (end)" } else { "" };
+                let (h, min) = (h.floor(), min.floor());
+                self.print(format!(
+                    "AT       {h}:{min:02}:{s:06.3}{end}: tick {tick}, {samples} samples, digest {digest}"
+                ));
+            }
         }
     }
 
     /// Ends the output of a dive.
     pub(crate) fn end(&mut self, dive: &Loop) {
-        self.close_run(sections(dive));
-        self.close_status();
-    }
-
-    fn status(&mut self, entry: &AdviceEntry, mission: &Mission) {
-        self.v_max_mps = entry.advice.v_max_mps;
-        let every = if self.terminal { REFRESH_EVERY } else { LINE_EVERY };
-        if self.shown.is_some_and(|shown| entry.at.since(shown).0 < every.0) {
-            return;
+        if !self.is_quiet() {
+            let mut told = Vec::new();
+            self.teller.end(&dive.coverage().sections, &mut |one| told.push(one));
+            self.tell(dive.now(), &told, dive);
         }
-        self.shown = Some(entry.at);
-        let place =
-            entry.chainage_m.map_or_else(|| "no position".to_owned(), |x| format!("ch {}", station(x)));
-        let line = format!(
-            "{place:<14} {:5.2} m/s   {}",
-            entry.speed_mps,
-            advice_text(&entry.into(), &mission.profile)
-        );
-        if self.terminal {
-            let advice = &entry.advice;
-            let wrong = advice.will_exceed || advice.predicted_t_m.is_none();
-            let colour = if wrong { "\x1b[33m" } else { "\x1b[32m" };
-            put(&format!("\r\x1b[K{colour}{line}\x1b[0m"));
-            transient::shown();
-            self.status_open = true;
-        } else {
-            say(&line);
+        if let Some(printer) = &mut self.printer {
+            printer.end();
         }
     }
 
-    /// Shows the way so far and its metres by verdict.
-    fn way(&mut self, at: MonoNs, dive: &Loop) {
-        // Counted from the first beat, as there is nothing to show then.
-        let since = *self.way_shown.get_or_insert(at);
-        let (sections, way) = (sections(dive), dive.coverage().frontier.way());
-        let range = sections.sections_of(way);
-        if at.since(since).0.abs() < WAY_EVERY.0 || range.is_empty() {
-            return;
-        }
-        self.way_shown = Some(at);
-        let metres = sections.metres(way);
-        let (from_m, to_m) = (sections.bounds_m(range.start).0, sections.bounds_m(range.end).0);
-        self.line(&format!(
-            "WAY      ch {} to {}: passed {:.2} m   failed {:.2} m   can't say {:.2} m   open {:.2} m",
-            station(from_m),
-            station(to_m),
-            metres.pass_m,
-            metres.fail_m,
-            metres.cannot_say_m,
-            metres.open_m
-        ));
-    }
-
-    /// Shows the end of the run flagged last at a neighbouring section that doesn't fail.
-    fn section(&mut self, section: i64, sections: &Sections) {
-        // An open section may still join the run.
-        let other = |section: &Section| !section.is_flagged() && section.verdict != Verdict::Open;
-        let ends = sections.get(section).is_some_and(other);
-        let run = self.run.and_then(|id| sections.runs().get(id));
-        if ends && run.is_some_and(|run| section == run.to || section == run.from - 1) {
-            self.close_run(sections);
-        }
-    }
-
-    fn run(&mut self, id: RunId, change: RunChange, dive: &Loop) {
-        let sections = sections(dive);
-        let Some(run) = sections.runs().get(id) else { return };
-        match change {
-            RunChange::Raised => {
-                self.close_run(sections);
-                self.run = Some(id);
-                self.flag(run, dive);
-            }
-            RunChange::Cleared => {
-                // Sections whose cause has changed belong to another run, which is shown.
-                if !(run.from..run.to).filter_map(|index| sections.get(index)).any(Section::is_flagged) {
-                    let (from_m, to_m) = (sections.bounds_m(run.from).0, sections.bounds_m(run.to - 1).1);
-                    self.line(&cleared_text(from_m, to_m));
-                }
-            }
-            RunChange::Changed | RunChange::Merged => {}
-        }
-    }
-
-    fn flag(&mut self, run: &Run, dive: &Loop) {
-        let sections = sections(dive);
-        let Some(evidence) = sections.get(run.worst.0).and_then(|section| section.evidence) else { return };
-        let missed = Missed {
-            start_m: sections.bounds_m(run.from).0,
-            figures: (&evidence).into(),
-            hole_arc_m: run.worst.1.arc_m,
-            target_m: sections.target_m(),
-            v_max_mps: self.v_max_mps,
+    fn is_due(&self, state: &LiveState, condition: Condition) -> bool {
+        let now = state.now;
+        let Some((shown, before)) = self.shown else {
+            return condition != Condition::NoData || !state.heard.iter().any(Option::is_some);
         };
-        self.line(&format!("FLAG     {}", flag_text(&missed, &dive.mission().profile)));
-    }
-
-    /// Shows the bounds of the run flagged last.
-    fn close_run(&mut self, sections: &Sections) {
-        let Some(run) = self.run.take().and_then(|id| sections.runs().get(id)) else { return };
-        let (from_m, to_m) = (sections.bounds_m(run.from).0, sections.bounds_m(run.to - 1).1);
-        self.line(&format!("   ...   ch {} to {}", station(from_m), station(to_m)));
-    }
-
-    fn line(&mut self, text: &str) {
-        let red = (text.starts_with("FLAG") || text.starts_with("ALERT")).then_some("\x1b[1;31m");
-        self.coloured(text, red);
-    }
-
-    fn coloured(&mut self, text: &str, colour: Option<&str>) {
-        self.close_status();
-        match colour.filter(|_| self.terminal) {
-            Some(colour) => say(&format!("{colour}{text}\x1b[0m")),
-            None => say(text),
+        let since = now.since(shown).0.abs();
+        if self.show == Show::JsonLines || self.screen.overwrites {
+            return since >= REFRESH_EVERY.0 || before.as_str() != condition.as_str();
         }
+        since >= LINE_EVERY.0 || before.lamp() != condition.lamp() && since >= CHANGE_EVERY.0
     }
 
-    fn close_status(&mut self) {
-        if self.status_open {
-            // A log message has already cleared it.
-            if transient::take() {
-                say("");
+    fn status(&mut self, state: &LiveState, dive: &Loop) {
+        let name =
+            |source: usize| dive.sources().get(source).map_or_else(String::new, |info| info.id.clone());
+        let line = status_line(state, &dive.mission().profile, &name);
+        if self.show == Show::JsonLines {
+            let section_m = dive.coverage().sections.section_m();
+            let mut value = match serde_json::to_value(state.json(dive.sources(), section_m)) {
+                Ok(value) => value,
+                Err(error) => json!({"error": error.to_string()}),
+            };
+            if let Some(object) = value.as_object_mut() {
+                object.insert("type".to_owned(), "state".into());
+                object.insert("text".to_owned(), line.text().into());
             }
-            self.status_open = false;
+            self.json(state.now, value);
+        } else if self.screen.overwrites {
+            let columns = Screen::columns().unwrap_or(usize::MAX);
+            let text = self.screen.coloured(&line.cut(columns), line.lamp);
+            if let Some(printer) = &mut self.printer {
+                printer.status(text);
+            }
+        } else {
+            self.print(line.text());
         }
     }
-}
 
-fn sections(dive: &Loop) -> &Sections {
-    &dive.coverage().sections
+    fn tell(&mut self, at: MonoNs, told: &[Told], dive: &Loop) {
+        for one in told {
+            let line = told_line(one, &dive.mission().profile);
+            if self.show == Show::Lines {
+                self.line(&line);
+                continue;
+            }
+            let mut value = match serde_json::to_value(one) {
+                Ok(value) => value,
+                Err(error) => json!({"error": error.to_string()}),
+            };
+            if let Some(object) = value.as_object_mut() {
+                object.insert("text".to_owned(), line.text().into());
+            }
+            self.json(at, value);
+        }
+    }
+
+    fn line(&mut self, line: &PilotLine) {
+        let lines = Screen::columns().map_or_else(|| vec![line.text()], |columns| line.broken(columns));
+        for text in lines {
+            self.print(self.screen.coloured(&text, line.lamp));
+        }
+    }
+
+    fn json(&mut self, at: MonoNs, mut value: Value) {
+        if let Some(object) = value.as_object_mut() {
+            object.insert("t_s".to_owned(), at.as_secs_f64().into());
+        }
+        self.print(value.to_string());
+    }
+
+    fn print(&mut self, text: String) {
+        if let Some(printer) = &mut self.printer {
+            printer.line(text);
+        }
+    }
 }

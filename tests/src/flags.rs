@@ -20,6 +20,9 @@ pub const EVERY: DurNs = DurNs(100_000_000);
 const RAYS: u32 = 48;
 /// Lines across a section on which its earliest fail is looked for.
 const LINES: u32 = 20;
+/// The program looks where all heads have been five times a second, and goes by the farthest wall for a tilted head's
+/// reach: its place is known to this, m.
+pub const NEAR_M: f64 = 0.12;
 /// Shorter ways back are wobbling.
 const WAY_BACK_M: f64 = 0.05;
 
@@ -30,6 +33,8 @@ pub struct Reached {
     pub at: MonoNs,
     /// The least chainage on which a head can lay a sample, m.
     pub rear_m: f64,
+    /// The greatest, m.
+    pub front_m: f64,
 }
 
 /// What was within reach during a dive.
@@ -40,14 +45,20 @@ pub fn reached(dive: &Dive) -> Vec<Reached> {
         // The last one too: it is where the dive ends.
         let due = due || index + 1 == dive.pings.len();
         if let Some(pose) = ping.pose.filter(|_| due) {
-            all.push(Reached { at: ping.received, rear_m: rear_m(dive, &pose) });
+            let [rear_m, front_m] = ends_m(dive, &pose);
+            all.push(Reached { at: ping.received, rear_m, front_m });
         }
     }
     all
 }
 
-fn rear_m(dive: &Dive, pose: &Pose) -> f64 {
-    let mut rear_m = f64::INFINITY;
+/// From where on all heads have been, wherever they were at first, m.
+pub fn all_passed_from_m(reached: &[Reached]) -> f64 {
+    reached.iter().map(|reached| reached.front_m).fold(f64::INFINITY, f64::min)
+}
+
+fn ends_m(dive: &Dive, pose: &Pose) -> [f64; 2] {
+    let [mut rear_m, mut front_m] = [f64::INFINITY, f64::NEG_INFINITY];
     for (mount, range_m) in dive.mounts.iter().zip(&dive.ranges_m) {
         let head = pose.place(mount.position);
         for ray in 0..RAYS {
@@ -57,16 +68,18 @@ fn rear_m(dive: &Dive, pose: &Pose) -> f64 {
             let chainage_m =
                 hit.filter(|hit| hit.range_m <= *range_m).map(|hit| head.x() + hit.range_m * direction.x());
             rear_m = rear_m.min(chainage_m.unwrap_or(f64::INFINITY));
+            front_m = front_m.max(chainage_m.unwrap_or(f64::NEG_INFINITY));
         }
     }
-    rear_m
+    [rear_m, front_m]
 }
 
-/// The least chainage in a section about which a circle of this radius is empty, as far as lines across it show.
-pub fn first_failing_m(wall: &Wall, [from_m, to_m]: [f64; 2], radius_m: f64) -> Option<f64> {
+/// The least chainage in a section about which a circle of this radius is empty, as far as lines across it show, and lies
+/// where all heads have been: from `passed_m` on.
+pub fn first_failing_m(wall: &Wall, [from_m, to_m]: [f64; 2], radius_m: f64, passed_m: f64) -> Option<f64> {
     let line = |k: u32| from_m + (to_m - from_m) * f64::from(k) / f64::from(LINES);
     let empty = |x_m: &f64| wall.largest_on(*x_m).is_some_and(|circle| circle.radius_m > radius_m);
-    (0..=LINES).map(line).find(empty)
+    (0..=LINES).map(line).filter(|x_m| x_m - radius_m >= passed_m).find(empty)
 }
 
 /// The first moment, among these, at which all that is in reach lies beyond a chainage.
@@ -162,7 +175,10 @@ impl Journey {
         let ends = [section.start_m, section.end_m];
         let radius_m = 0.5 * (target_m + sd * section.hole_sd_m);
         let due = |wall: &Wall, reached: &[Reached], early_m: f64| {
-            left_behind(reached, first_failing_m(wall, ends, radius_m)? + radius_m - early_m)
+            // What is early for a flag is late for its moment.
+            let near_m = if early_m > 0.0 { -NEAR_M } else { NEAR_M };
+            let passed_m = all_passed_from_m(&self.reached) + near_m;
+            left_behind(reached, first_failing_m(wall, ends, radius_m, passed_m)? + radius_m - early_m)
         };
         let on = if self.turned.is_some() { self.back.end } else { 0 };
         let first = |early_m: f64| {

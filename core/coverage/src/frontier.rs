@@ -70,6 +70,8 @@ pub struct Frontier {
     swept: Option<Reach>,
     /// Chainages at which the vehicle and its heads, pinging or not, have been, and those swept.
     way: Option<Reach>,
+    /// Where all heads, pinging or not, have been with the whole of their reach; empty (from beyond to) until they have.
+    through: Option<Reach>,
     /// Index range of the sections within the reach of the awaited heads plus a margin.
     zone: Option<Range<i64>>,
     /// Time of its last change.
@@ -125,6 +127,10 @@ pub struct Outlook {
     pub none_alive: bool,
     /// Where samples may still land without the vehicle turning back.
     pub to_come: Option<Reach>,
+    /// What lies behind where the vehicle began, or turned back: not all of its heads have been there, nor will be.
+    pub not_passed: Option<Reach>,
+    /// Where all heads, pinging or not, have been; `None` until they have.
+    pub through: Option<Reach>,
     /// The zone of sections in reach, once unchanged for longer than [`SILENT_AFTER`]: the vehicle is (nearly) stationary.
     pub still_zone: Option<Range<i64>>,
 }
@@ -168,6 +174,8 @@ impl Frontier {
             swept_by_all: swept.reduce(common).filter(|all| all.from_m <= all.to_m),
             none_alive: !heads.clone().any(|head| head.is_alive(at)),
             to_come: self.to_come(heads, at),
+            not_passed: self.not_passed(),
+            through: self.through(),
             still_zone: self.still_zone(at),
         }
     }
@@ -214,6 +222,26 @@ impl Frontier {
         Some(match self.course {
             Some(Course { astern: true, .. }) => Reach { from_m: f64::NEG_INFINITY, ..reach },
             _ => Reach { to_m: f64::INFINITY, ..reach },
+        })
+    }
+
+    /// Records the combined reach of all heads at a beat, pinging or not.
+    pub fn pass(&mut self, all: Reach) {
+        let through = self.through.unwrap_or(Reach { from_m: all.to_m, to_m: all.from_m });
+        self.through =
+            Some(Reach { from_m: through.from_m.min(all.to_m), to_m: through.to_m.max(all.from_m) });
+    }
+
+    /// Where all heads, pinging or not, have been; `None` until they have.
+    pub fn through(&self) -> Option<Reach> {
+        self.through.filter(|through| through.from_m <= through.to_m)
+    }
+
+    fn not_passed(&self) -> Option<Reach> {
+        let Reach { from_m, to_m } = self.through?;
+        Some(match self.course {
+            Some(Course { astern: true, .. }) => Reach { from_m: to_m, to_m: f64::INFINITY },
+            _ => Reach { from_m: f64::NEG_INFINITY, to_m: from_m },
         })
     }
 
@@ -450,6 +478,24 @@ mod tests {
         let to_come = frontier.to_come(MonoNs(3_000_000_000));
         assert_eq!(to_come, Some(Reach { from_m: 6.0, to_m: f64::INFINITY }));
         assert_eq!(frontier.beat(4, 5.5).left_ahead, 25..29, "going back it leaves what lies ahead");
+    }
+
+    #[test]
+    fn all_heads_have_been_from_where_the_foremost_began_to_where_the_rearmost_is() {
+        let mut frontier = Frontier::default();
+        let at = |x_m: f64| Reach { from_m: x_m - 0.5, to_m: x_m + 0.5 };
+        assert_eq!((frontier.through(), frontier.not_passed()), (None, None));
+        frontier.pass(at(3.0));
+        assert_eq!(frontier.through(), None, "they are a metre apart");
+        assert_eq!(frontier.not_passed(), Some(Reach { from_m: f64::NEG_INFINITY, to_m: 3.5 }));
+        for x_m in [4.0, 9.0, 8.5] {
+            frontier.pass(at(x_m));
+        }
+        assert_eq!(frontier.through(), Some(Reach { from_m: 3.5, to_m: 8.5 }));
+        frontier.course = Some(Course { farthest_m: 8.5, astern: true, heads: 2 });
+        assert_eq!(frontier.not_passed(), Some(Reach { from_m: 8.5, to_m: f64::INFINITY }));
+        frontier.pass(at(1.0));
+        assert_eq!(frontier.through(), Some(Reach { from_m: 1.5, to_m: 8.5 }));
     }
 
     #[test]

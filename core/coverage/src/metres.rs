@@ -11,8 +11,10 @@ pub struct Metres {
     pub fail_m: f64,
     /// Metres undecided within the error of D.
     pub cannot_say_m: f64,
-    /// Metres still open: more samples may land.
+    /// Metres still open.
     pub open_m: f64,
+    /// Of the open metres, those at the ends of the way that not all heads have passed: going on won't change them.
+    pub not_inspected_m: f64,
 }
 
 impl Metres {

@@ -6,6 +6,7 @@ use super::cause::Evidence;
 use super::deviation::Deviation;
 use super::hole::Hole;
 use super::passage::{PassError, Passage};
+use super::unsure::Unsure;
 use super::visits::{Visit, Visits};
 use headrace_geometry::math;
 use headrace_geometry::time::MonoNs;
@@ -14,7 +15,7 @@ use headrace_geometry::tunnel::Profile;
 /// Coverage verdict of a section. Source: metrics.md, "Sections and verdicts".
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum Verdict {
-    /// Undecided: samples may still land without the vehicle turning back.
+    /// Undecided: samples may still land without the vehicle turning back, or not all heads have been there.
     #[default]
     Open,
     /// D + k sd <= T, k being the confidence.
@@ -105,6 +106,7 @@ pub enum Judgement {
 }
 
 /// One section.
+#[expect(clippy::struct_excessive_bools, reason = "they are independent of one another")]
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Section {
     /// The verdict so far.
@@ -115,6 +117,9 @@ pub struct Section {
     pub hole_sd_m: f64,
     /// No further sample on the present course can change the verdict, nor the hole of a fail.
     pub settled: bool,
+    /// Open, though no sample will change it without turning back: where the vehicle began, or turned back, not all heads have
+    /// been.
+    pub not_inspected: bool,
     /// When the fail was flagged.
     pub flagged: Option<MonoNs>,
     /// When a later pass filled the hole.
@@ -177,12 +182,6 @@ impl Section {
         self.passage.pass_error.add(&pass);
     }
 
-    /// Whether a small hole is no evidence of coverage: what was taken for wall may be none, or samples may not lie beside one
-    /// another.
-    pub(super) fn is_doubtful(&self) -> bool {
-        self.has_doubtful_wall() || self.suspect || self.visits.are_unrelated()
-    }
-
     /// Whether its newest visit is free of what makes those before doubtful.
     pub(super) fn is_visited_anew(&self) -> bool {
         let newest = self.visits.newest();
@@ -195,12 +194,32 @@ impl Section {
         self.suspect = false;
     }
 
-    /// Whether the profile is wrong, there is no wall, or most of what was taken for wall may be none.
-    pub(super) fn has_doubtful_wall(&self) -> bool {
-        self.contradicts()
-            || self.masked_share > ALL_MASKED
-            || self.doubtful > self.samples
-            || self.is_of_another_size()
+    /// Why a small hole is no evidence of coverage: what was taken for wall may be none, or samples may not lie beside one
+    /// another; `None` where it is evidence.
+    pub(super) fn doubt(&self) -> Option<Unsure> {
+        let of_heads = self.suspect.then_some(Unsure::DistrustedHead);
+        let of_places = self.visits.are_unrelated().then_some(Unsure::SeveralStretches);
+        self.wall_doubt().or(of_heads).or(of_places)
+    }
+
+    /// Why most of what was taken for wall may be none.
+    pub(super) fn wall_doubt(&self) -> Option<Unsure> {
+        Some(match self {
+            _ if self.contradicts() => Unsure::ContradictedProfile,
+            _ if self.masked_share > ALL_MASKED => Unsure::NoWall,
+            _ if self.doubtful > self.samples => Unsure::DoubtfulReturns,
+            _ if self.is_of_another_size() => Unsure::OtherSize,
+            _ => return None,
+        })
+    }
+
+    /// Why neither a pass nor a fail can be told though nothing more will come; `None` elsewhere.
+    pub fn unsure(&self) -> Option<Unsure> {
+        match self.verdict {
+            Verdict::Open if self.not_inspected => Some(Unsure::NotInspected),
+            Verdict::CannotSay => Some(self.doubt().unwrap_or(Unsure::Position)),
+            _ => None,
+        }
     }
 
     /// Whether its cross-section can't be the design's.

@@ -11,6 +11,7 @@ use super::passage::PassError;
 use super::runs::{RunChange, RunId, Runs, Telling};
 use super::section::{Judgement, Section, Verdict};
 use super::store::SampleStore;
+use super::unsure::Stretch;
 use super::visits::Visit;
 use headrace_geometry::math;
 use headrace_geometry::time::MonoNs;
@@ -30,8 +31,24 @@ pub struct Request {
     pub none_alive: bool,
     /// Where samples may still land without the vehicle turning back.
     pub to_come: Option<Reach>,
+    /// Where not all heads have been, nor will be without the vehicle turning back.
+    pub not_passed: Option<Reach>,
+    /// The dive has ended: where all heads have been.
+    pub ended: Option<Ended>,
     /// Known to fail already: a large enough empty circle, not necessarily the largest, can get no more samples.
     pub fails: bool,
+}
+
+/// Where all heads had been when a dive ended; `None` if nowhere.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ended(pub Option<Reach>);
+
+impl Ended {
+    /// Whether a hole reaches to where not all heads had been.
+    fn is_beyond(self, hole: &Hole) -> bool {
+        let radius_m = hole.diameter_m / 2.0;
+        self.0.is_none_or(|all| hole.x_m - radius_m < all.from_m || hole.x_m + radius_m > all.to_m)
+    }
 }
 
 /// Standard deviations of D between hole and target for a verdict of pass or fail, unless configured.
@@ -39,10 +56,28 @@ pub const CONFIDENCE_SD: f64 = 2.0;
 
 impl Request {
     /// Builds requests as of the outlook's time.
-    fn at(outlook: &Outlook) -> impl Fn(i64) -> Self + use<> {
-        let Outlook { at, swept_by_all, none_alive, to_come, .. } = *outlook;
-        move |section| Self { section, at, swept_by_all, none_alive, to_come, fails: false }
+    pub fn at(outlook: &Outlook) -> impl Fn(i64) -> Self + use<> {
+        let Outlook { at, swept_by_all, none_alive, to_come, not_passed, .. } = *outlook;
+        move |section| Self {
+            section,
+            at,
+            swept_by_all,
+            none_alive,
+            to_come,
+            not_passed,
+            ended: None,
+            fails: false,
+        }
     }
+}
+
+/// A measured section.
+struct Measured {
+    hole: Hole,
+    /// Standard deviation of the hole's diameter, m.
+    sd_m: f64,
+    /// The newest visit alone shows that it passes.
+    by_newest: bool,
 }
 
 /// Inputs of judging, and the callback for changed runs.
@@ -65,8 +100,8 @@ pub struct Sections {
     /// Standard deviations of D that a verdict of pass or fail keeps clear of the target.
     confidence_sd: f64,
     first: i64,
-    /// Judged sections by verdict, in the order of [`Verdict::ALL`].
-    judged: [u32; Verdict::ALL.len()],
+    /// Judged sections by verdict, in the order of [`Verdict::ALL`]; last, open ones that weren't inspected.
+    judged: [u32; Verdict::ALL.len() + 1],
     sections: Vec<Section>,
     runs: Runs,
 }
@@ -83,7 +118,7 @@ impl Sections {
         let count = usize::try_from(end - first).unwrap_or(0);
         let runs = Runs::new(first, count, section_m);
         let sections = vec![Section::default(); count];
-        Self { section_m, target_m, confidence_sd: CONFIDENCE_SD, first, judged: [0; 4], sections, runs }
+        Self { section_m, target_m, confidence_sd: CONFIDENCE_SD, first, judged: [0; 5], sections, runs }
     }
 
     /// Judges with this many standard deviations of D between hole and target, [`CONFIDENCE_SD`] unless set.
@@ -179,7 +214,7 @@ impl Sections {
         for range in [&moved.left_behind, &moved.left_ahead] {
             for index in clamp(range.clone(), &way) {
                 let Some(section) = self.get_mut(index) else { continue };
-                if section.stale || section.hole.is_none() {
+                if section.stale || section.hole.is_none() || section.not_inspected {
                     section.stale = false;
                     section.settled = false;
                     ask(ask_for(index));
@@ -237,25 +272,28 @@ impl Sections {
                 }
                 continue;
             }
-            if self.fails_already(index, outlook.to_come, store, finder, profile) {
+            if self.fails_already(index, outlook, store, finder, profile) {
                 ask(Request { fails: true, ..ask_for(index) });
             }
         }
     }
 
-    /// Whether a section has an empty circle, too large for the target, where no more samples will land.
+    /// Whether a section has an empty circle, too large for the target, where all heads have been and no more samples will
+    /// land.
     fn fails_already(
         &self,
         index: i64,
-        to_come: Option<Reach>,
+        outlook: &Outlook,
         store: &SampleStore,
         finder: &mut HoleFinder,
         profile: &Profile,
     ) -> bool {
         let bounds_m = self.bounds_m(index);
         let radius_m = self.margin_m(self.pass_error(index).worst_m(profile));
-        let clear_m = clear_of(to_come, bounds_m.0).max(clear_of(to_come, bounds_m.1));
-        clear_m > radius_m && finder.has_circle(store, bounds_m, to_come, radius_m)
+        let Outlook { to_come, not_passed, .. } = *outlook;
+        let clear_m = |reach| clear_of(reach, bounds_m.0).max(clear_of(reach, bounds_m.1));
+        clear_m(to_come).min(clear_m(not_passed)) > radius_m
+            && finder.has_circle(store, bounds_m, [to_come, not_passed], radius_m)
     }
 
     /// Measures a section's hole and updates its verdict, flag and run.
@@ -265,55 +303,89 @@ impl Sections {
         let (from_m, to_m) = self.bounds_m(request.section);
         let (target_m, confidence_sd) = (self.target_m, self.confidence_sd);
         let section = self.get(request.section)?;
-        let visits = section.visits;
-        if section.verdict == Verdict::Pass && visits.are_several() && !section.is_doubtful() {
+        if section.verdict == Verdict::Pass && section.visits.are_several() && section.doubt().is_none() {
             // What one visit has shown, a later one doesn't take back.
             return None;
         }
-        let pass_error = self.pass_error(request.section);
-        let Judging { store, finder, profile, .. } = judging;
-        let pass_sd_m = |hole: &Hole| pass_error.sd_m(profile.point_at(hole.arc_m));
-        let mut hole = finder.largest_since(store, from_m, to_m, visits.first());
-        let mut sd_m = visits.sd_m(pass_sd_m(&hole));
+        let Measured { hole, sd_m, by_newest } = self.measure(request.section, judging)?;
         let clear_m = clear_of(request.to_come, hole.x_m);
+        let passed_m = clear_of(request.not_passed, hole.x_m);
         let section = self.get_mut(request.section)?;
-        let before = section.hole.map(|_| section.verdict);
-        section.verdict = match verdict(&hole, confidence_sd * sd_m, target_m, clear_m) {
-            Verdict::Pass if section.is_doubtful() => Verdict::CannotSay,
+        let before = Self::counted(section);
+        let (error_m, had_a_flag) = (confidence_sd * sd_m, section.is_flagged());
+        section.hole = Some(hole);
+        section.hole_sd_m = sd_m;
+        section.verdict = match verdict(&hole, error_m, target_m, clear_m.min(passed_m)) {
+            Verdict::Pass if section.doubt().is_some() => Verdict::CannotSay,
             Verdict::Open | Verdict::CannotSay if request.fails => Verdict::Fail,
             verdict => verdict,
         };
-        if section.verdict != Verdict::Pass && section.is_visited_anew() && !section.has_doubtful_wall() {
-            let newest = finder.largest_since(store, from_m, to_m, visits.newest());
-            let newest_sd_m = pass_sd_m(&newest);
-            if newest.bounded && newest.most_m + confidence_sd * newest_sd_m <= target_m {
-                (hole, sd_m) = (newest, newest_sd_m);
-                section.verdict = Verdict::Pass;
-                if section.is_doubtful() {
-                    section.keep_newest_visit();
-                }
-            }
+        if by_newest && section.verdict != Verdict::Pass {
+            section.verdict = Verdict::Pass;
+            section.keep_newest_visit();
         }
-        (section.hole, section.hole_sd_m) = (Some(hole), sd_m);
         // More samples leave a pass a pass; those outside a hole's radius leave the hole as it is.
         section.settled = section.verdict == Verdict::Pass || clear_m >= hole.diameter_m / 2.0;
+        let alone = verdict(&hole, error_m, target_m, clear_m);
+        section.not_inspected = section.verdict == Verdict::Open && alone != Verdict::Open;
+        if section.not_inspected {
+            // The largest hole reaches to where not all heads have been; another one may fail for itself.
+            let reaches = [request.to_come, request.not_passed];
+            let radius_m = f64::midpoint(target_m, error_m);
+            section.settled &=
+                clear_of(request.to_come, from_m).min(clear_of(request.to_come, to_m)) >= radius_m;
+            if had_a_flag || judging.finder.has_circle(judging.store, (from_m, to_m), reaches, radius_m) {
+                (section.verdict, section.not_inspected) = (Verdict::Fail, false);
+            }
+        }
+        // Nothing will come any more.
+        section.not_inspected |=
+            section.verdict == Verdict::Open && request.ended.is_some_and(|ended| ended.is_beyond(&hole));
         if section.verdict == Verdict::Fail {
             let evidence = self.explain(&hole, request, judging.profile.perimeter_m());
             self.get_mut(request.section)?.evidence = Some(evidence);
         }
         let section = self.get_mut(request.section)?;
-        let (judgement, now) = (section.flag(request.at), section.verdict);
+        let (judgement, now) = (section.flag(request.at), Self::counted(section));
         self.count(before, now);
         self.tell_runs(request, judging);
         Some(judgement)
     }
 
-    /// Counts a section that has been judged, by the verdict before and now.
-    fn count(&mut self, before: Option<Verdict>, now: Verdict) {
-        if let Some(count) = before.and_then(|before| self.judged.get_mut(before as usize)) {
+    /// Where a section that has been judged is counted.
+    fn counted(section: &Section) -> Option<usize> {
+        section.hole?;
+        Some(if section.not_inspected { Verdict::ALL.len() } else { section.verdict as usize })
+    }
+
+    /// The hole of a section that counts: that of all visits together, unless only the newest shows by itself that it passes.
+    fn measure(&self, index: i64, judging: &mut Judging<'_>) -> Option<Measured> {
+        let Judging { store, finder, profile, .. } = judging;
+        let ((from_m, to_m), pass_error) = (self.bounds_m(index), self.pass_error(index));
+        let section = self.get(index)?;
+        let pass_sd_m = |hole: &Hole| pass_error.sd_m(profile.point_at(hole.arc_m));
+        let passes = |hole: &Hole, sd_m: f64| {
+            verdict(hole, self.confidence_sd * sd_m, self.target_m, f64::INFINITY) == Verdict::Pass
+        };
+        let hole = finder.largest_since(store, from_m, to_m, section.visits.first());
+        let sd_m = section.visits.sd_m(pass_sd_m(&hole));
+        let is_shown = section.doubt().is_none() && passes(&hole, sd_m);
+        if !is_shown && section.is_visited_anew() && section.wall_doubt().is_none() {
+            let newest = finder.largest_since(store, from_m, to_m, section.visits.newest());
+            let newest_sd_m = pass_sd_m(&newest);
+            if passes(&newest, newest_sd_m) {
+                return Some(Measured { hole: newest, sd_m: newest_sd_m, by_newest: true });
+            }
+        }
+        Some(Measured { hole, sd_m, by_newest: false })
+    }
+
+    /// Counts a section that has been judged, by where it was counted before and is now.
+    fn count(&mut self, before: Option<usize>, now: Option<usize>) {
+        if let Some(count) = before.and_then(|before| self.judged.get_mut(before)) {
             *count -= 1;
         }
-        if let Some(count) = self.judged.get_mut(now as usize) {
+        if let Some(count) = now.and_then(|now| self.judged.get_mut(now)) {
             *count += 1;
         }
     }
@@ -329,6 +401,7 @@ impl Sections {
             }
         }
         metres.add(Verdict::Open, all as f64 * section_m);
+        metres.not_inspected_m = self.judged.last().map_or(0.0, |count| f64::from(*count) * section_m);
         metres
     }
 
@@ -382,8 +455,8 @@ impl Sections {
             // Samples farther away than a pass depends on may have narrowed the hole of a fail.
             if section.stale || !section.settled || section.verdict != Verdict::Pass {
                 section.stale = false;
-                let fails = self.fails_already(index, outlook.to_come, store, finder, profile);
-                ask(Request { fails, ..ask_for(index) });
+                let fails = self.fails_already(index, outlook, store, finder, profile);
+                ask(Request { fails, ended: Some(Ended(outlook.through)), ..ask_for(index) });
             }
         }
     }
@@ -393,6 +466,27 @@ impl Sections {
         let Some(reach) = stretch else { return 0..0 };
         let end = self.first + i64::try_from(self.sections.len()).unwrap_or(i64::MAX);
         clamp(self.index_of(reach.from_m)..self.index_of(reach.to_m) + 1, &(self.first..end))
+    }
+}
+
+impl Sections {
+    /// A section as a stretch of its own; `None` where it isn't unsure.
+    pub fn unsure(&self, index: i64) -> Option<Stretch> {
+        let section = self.get(index)?;
+        let hole_m = section.hole.map_or(0.0, |hole| hole.diameter_m);
+        let (from, to) = (index, index + 1);
+        Some(Stretch { why: section.unsure()?, from, to, sections: 1, hole_m: [hole_m, section.hole_sd_m] })
+    }
+
+    /// The unsure stretches of the way, in order. Allocates: for the end of a dive.
+    pub fn unsure_stretches(&self, way: Option<Reach>) -> Vec<Stretch> {
+        let mut all: Vec<Stretch> = Vec::new();
+        for stretch in self.sections_of(way).filter_map(|index| self.unsure(index)) {
+            if !all.last_mut().is_some_and(|last| last.join(&stretch, self.section_m())) {
+                all.push(stretch);
+            }
+        }
+        all
     }
 }
 

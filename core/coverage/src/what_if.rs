@@ -34,16 +34,17 @@ impl Sections {
         } else {
             self.measured(outlook.way)
         };
-        targets_m
-            .iter()
-            .map(|target_m| self.metres_of(&measured, section_m, *target_m, outlook.to_come))
-            .collect()
+        targets_m.iter().map(|target_m| self.metres_of(&measured, section_m, *target_m, outlook)).collect()
     }
 
     fn measured(&self, way: Option<Reach>) -> Vec<Measured> {
         let section = |index: i64| {
             let section = self.get(index)?;
-            Some(Measured { hole: section.hole?, sd_m: section.hole_sd_m, doubtful: section.is_doubtful() })
+            Some(Measured {
+                hole: section.hole?,
+                sd_m: section.hole_sd_m,
+                doubtful: section.doubt().is_some(),
+            })
         };
         self.sections_of(way).filter_map(section).collect()
     }
@@ -71,23 +72,18 @@ impl Sections {
             Measured {
                 hole,
                 sd_m: overlapped().map(sd_m).fold(0.0, f64::max),
-                doubtful: overlapped().any(Section::is_doubtful),
+                doubtful: overlapped().any(|old| old.doubt().is_some()),
             }
         };
         indexes.map(section).collect()
     }
 
-    fn metres_of(
-        &self,
-        measured: &[Measured],
-        section_m: f64,
-        target_m: f64,
-        to_come: Option<Reach>,
-    ) -> Metres {
+    fn metres_of(&self, measured: &[Measured], section_m: f64, target_m: f64, outlook: &Outlook) -> Metres {
         let mut metres = Metres::default();
         for Measured { hole, sd_m, doubtful } in measured {
             let error_m = self.confidence_sd() * sd_m;
-            let said = verdict(hole, error_m, target_m, clear_of(to_come, hole.x_m));
+            let clear_m = clear_of(outlook.to_come, hole.x_m).min(clear_of(outlook.not_passed, hole.x_m));
+            let said = verdict(hole, error_m, target_m, clear_m);
             let said = if said == Verdict::Pass && *doubtful { Verdict::CannotSay } else { said };
             metres.add(said, section_m);
         }

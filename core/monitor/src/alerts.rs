@@ -30,8 +30,8 @@ pub enum AlertKind {
 
 /// Kinds of alerts that name a head.
 const HEAD_KINDS: usize = 3;
-/// Room for alerts: one of each kind, or of each kind and head.
-const ROOM: usize = AlertKind::ALL.len() - HEAD_KINDS + HEAD_KINDS * MAX_HEADS;
+/// Most alerts: one of each kind, or of each kind and head.
+pub const MOST_ALERTS: usize = AlertKind::ALL.len() - HEAD_KINDS + HEAD_KINDS * MAX_HEADS;
 
 impl AlertKind {
     /// All of them.
@@ -94,7 +94,7 @@ pub struct Alert {
 
 /// All alerts.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Resource, Serialize, Deserialize)]
-pub struct Alerts([Option<Alert>; ROOM]);
+pub struct Alerts([Option<Alert>; MOST_ALERTS]);
 
 impl Alerts {
     /// Records an alert at a chainage with its deviation, m; true on its first occurrence.

@@ -11,8 +11,9 @@ use super::entities::{
     VehicleState,
 };
 use super::error::PluginError;
+use super::live_state::{LiveState, source_bits};
 use super::merge::{Inbox, MAX_TICK_BYTES, MAX_TICK_PACKETS};
-use super::messages::{Events, Notices, PlacedList, PositionedList, Requests};
+use super::messages::{Events, Notices, PlacedList, PositionedList, Requests, Standings};
 use super::resources::{Coverage, Digests, Finder, Tally, Target, TickTime, TunnelDesign, VehicleEntities};
 use super::run::Loop;
 use super::stages::{Advisor, Driving, SoundSpeed};
@@ -21,7 +22,7 @@ use headrace_coverage::{
 };
 use headrace_fusion::Navigation;
 use headrace_sampling::advice::{self, Task};
-use headrace_sampling::head::{HeadMode, HeadSpec, MAX_HEADS};
+use headrace_sampling::head::{HeadMode, HeadSet, HeadSpec, MAX_HEADS};
 use headrace_sensor::device::SensorKind;
 use headrace_sensor::reading::SourceId;
 use headrace_vehicle::Mission;
@@ -92,6 +93,8 @@ impl App {
         advisor: advice::Advisor,
     ) -> Result<(), PluginError> {
         let Self { mission, world, sources, .. } = self;
+        let source_of = |entity: &Entity| world.get::<Mounted>(*entity).map(|mounted| mounted.source);
+        let heads: Vec<SourceId> = entities.heads.iter().filter_map(source_of).collect();
         world.insert_resource(entities);
         let told_by = sound_source(mission, sources)?;
         world.insert_resource(SoundSpeed::new(mission.site.sound_speed_mps, told_by));
@@ -112,6 +115,10 @@ impl App {
             contradiction_m: mission.coverage.contradiction_m,
             limits: WallLimits::new(mission.profile.perimeter_m(), mission.coverage.contradiction_m),
         });
+        let heads = source_bits(heads.into_iter(), HeadSet::from_bits(u8::MAX));
+        let sources = u16::try_from(sources.len()).unwrap_or(0);
+        let confidence_sd = mission.coverage.confidence_sd;
+        world.insert_resource(LiveState::new(mission.target_m, confidence_sd, heads, sources));
         world.insert_resource(Target { target_m: mission.target_m, layout: mission.layout });
         Ok(())
     }
@@ -124,6 +131,7 @@ impl App {
         world.insert_resource(Events(Vec::with_capacity(MAX_TICK_READINGS)));
         world.insert_resource(PositionedList(Vec::with_capacity(2 * MAX_TICK_READINGS)));
         world.insert_resource(PlacedList(Vec::with_capacity(2 * MAX_TICK_READINGS)));
+        world.insert_resource(Standings(Vec::with_capacity(MAX_TICK_PACKETS)));
         world.insert_resource(Requests(Vec::with_capacity(most)));
         world.insert_resource(Notices(Vec::with_capacity(NOTICES_EACH * most + MAX_TICK_PACKETS)));
     }
@@ -185,5 +193,12 @@ fn coverage(mission: &Mission) -> Result<Coverage, PluginError> {
         to_m: mission.length_m,
         node_m: mission.coverage.node_m,
     });
-    Ok(Coverage { store, sections, frontier: Frontier::default(), soundings, relief: Relief::default() })
+    Ok(Coverage {
+        store,
+        sections,
+        frontier: Frontier::default(),
+        soundings,
+        relief: Relief::default(),
+        unsure: None,
+    })
 }

@@ -32,6 +32,8 @@ pub mod entities;
 mod error;
 pub mod feed;
 mod head_motion;
+pub mod live_state;
+pub mod live_text;
 mod loop_snapshot;
 pub mod merge;
 pub mod messages;
@@ -44,6 +46,7 @@ pub mod ring;
 pub mod run;
 pub mod stage;
 mod stages;
+pub mod telling;
 pub mod what_if;
 
 pub use app::{App, Plugin, SourceInfo, SourceSpec};

@@ -12,6 +12,7 @@ use super::alerts::Alerts;
 use super::entities::{
     HeadFrontier, HeadSweep, MeasuredMotion, Navigator, SensorDecoder, SensorHealth, VehicleState,
 };
+use super::live_state::LiveState;
 use super::resources::{Coverage, Digests, Finder, Tally, TickTime, VehicleEntities};
 use super::stages::{Advisor, Driving, SoundSpeed};
 use headrace_snapshot::{Restorer, Saver, SnapshotError, Stateful};
@@ -46,6 +47,7 @@ impl StateParts {
         parts.add::<Alerts>("alerts");
         parts.add::<Advisor>("advice");
         parts.add::<AdviceLog>("history of advice");
+        parts.add::<LiveState>("live state");
         parts.add::<Digests>("digests");
         parts.add::<Tally>("tally");
         parts.add::<TickTime>("time");
@@ -121,7 +123,7 @@ mod tests {
     use super::*;
     use crate::entities::{Head, HeadSpecification, HiddenAngles, Mounted};
     use crate::merge::Inbox;
-    use crate::messages::{Events, Notices, PlacedList, PositionedList, Requests};
+    use crate::messages::{Events, Notices, PlacedList, PositionedList, Requests, Standings};
     use crate::resources::{Target, TunnelDesign};
     use crate::{App, SourceSpec};
     use headrace_fusion::direct::DirectNavigation;
@@ -173,6 +175,7 @@ mod tests {
             TypeId::of::<PositionedList>(),
             TypeId::of::<PlacedList>(),
             TypeId::of::<Requests>(),
+            TypeId::of::<Standings>(),
             TypeId::of::<Notices>(),
             TypeId::of::<TunnelDesign>(),
             TypeId::of::<Target>(),

@@ -8,8 +8,10 @@ use serde::{Deserialize, Serialize};
 
 use super::advice_log::AdviceEntry;
 use super::alerts::AlertKind;
-use headrace_coverage::{Judgement, Loss, Reach, Request, RunChange, RunId};
+use super::live_state::{ActiveAlerts, LiveMetres};
+use headrace_coverage::{Judgement, Loss, Reach, Request, RunChange, RunId, Stretch};
 use headrace_fusion::filter::cable::CableDoubt;
+use headrace_fusion::filter::pose_sd::PoseSd;
 use headrace_fusion::filter::suspicion::SettingDoubt;
 use headrace_fusion::{Fix, NoFix};
 use headrace_geometry::frames::{Point3, Tunnel};
@@ -61,6 +63,10 @@ pub enum Positioned {
         fix: Result<Fix, NoFix>,
         /// What navigation doubts.
         doubts: Doubts,
+        /// Standard deviations of the pose then.
+        sd: Option<PoseSd>,
+        /// Index into [`Events`] of the event that it precedes.
+        before: usize,
     },
 }
 
@@ -133,6 +139,21 @@ pub enum Placed {
 /// Pings and situations of this tick, in order.
 #[derive(Debug, Resource)]
 pub struct PlacedList(pub Vec<Placed>);
+
+/// What has been judged, and the alerts that hold, at a beat.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Standing {
+    /// Metres of the way.
+    pub metres: LiveMetres,
+    /// The unsure stretch that was judged last.
+    pub unsure: Option<Stretch>,
+    /// Alerts that hold.
+    pub alerts: ActiveAlerts,
+}
+
+/// Standing at each beat of this tick, in order.
+#[derive(Debug, Resource)]
+pub struct Standings(pub Vec<Standing>);
 
 /// Sections to be judged after a ping, in order; a reused buffer.
 #[derive(Debug, Resource)]

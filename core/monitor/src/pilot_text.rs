@@ -6,7 +6,7 @@ use super::alerts::AlertKind;
 use headrace_coverage::{Action, Cause, Evidence};
 use headrace_fusion::filter::suspicion::{Setting, SettingDoubt};
 use headrace_geometry::tunnel::Profile;
-use headrace_sampling::advice::{Reason, Remedy};
+use headrace_sampling::advice::{Advice, Reason, Remedy};
 use headrace_sampling::head::HeadSet;
 
 /// Chainage as engineers write it, kilometres, then metres with two decimals: 1+240.50 for 1240.5 m.
@@ -211,9 +211,15 @@ pub struct AdviceFigures {
 
 impl From<&AdviceEntry> for AdviceFigures {
     fn from(entry: &AdviceEntry) -> Self {
-        let advice = &entry.advice;
+        Self::of(&entry.advice, entry.speed_mps)
+    }
+}
+
+impl AdviceFigures {
+    /// Those of advice at a speed, m/s.
+    pub fn of(advice: &Advice, speed_mps: f64) -> Self {
         Self {
-            speed_mps: entry.speed_mps,
+            speed_mps,
             v_max_mps: advice.v_max_mps,
             reason: advice.reason,
             will_exceed: advice.will_exceed,

@@ -5,7 +5,9 @@ use bevy_ecs::prelude::Resource;
 use serde::{Deserialize, Serialize};
 
 use super::result_stream::ResultStream;
-use headrace_coverage::{Frontier, HoleFinder, Relief, SampleStore, Sections, Soundings, WallLimits};
+use headrace_coverage::{
+    Frontier, HoleFinder, Relief, SampleStore, Sections, Soundings, Stretch, WallLimits,
+};
 use headrace_fusion::NoFix;
 use headrace_geometry::site::Site;
 use headrace_geometry::time::MonoNs;
@@ -76,9 +78,11 @@ pub struct Coverage {
     pub soundings: Soundings,
     /// Where the wall was found off the design near the vehicle.
     pub relief: Relief,
+    /// The unsure stretch that was judged last.
+    pub unsure: Option<Stretch>,
 }
 
-stateful!(Coverage { state: store, sections, frontier, soundings, relief; });
+stateful!(Coverage { state: store, sections, frontier, soundings, relief, unsure; });
 
 /// The search for holes with its working memory.
 #[derive(Debug, Default, Resource)]
@@ -105,18 +109,21 @@ pub struct Digests {
     pub judgements: ResultStream,
     /// Advice.
     pub advice: ResultStream,
+    /// The live state at the beats.
+    pub states: ResultStream,
 }
 
-stateful!(Digests { state: poses, pings, judgements, advice; });
+stateful!(Digests { state: poses, pings, judgements, advice, states; });
 
 impl Digests {
     /// The streams by name, in log order.
-    pub fn streams(&self) -> [(&'static str, &ResultStream); 4] {
+    pub fn streams(&self) -> [(&'static str, &ResultStream); 5] {
         [
             ("poses", &self.poses),
             ("pings", &self.pings),
             ("judgements", &self.judgements),
             ("advice", &self.advice),
+            ("states", &self.states),
         ]
     }
 
@@ -126,6 +133,7 @@ impl Digests {
         self.pings.keep();
         self.judgements.keep();
         self.advice.keep();
+        self.states.keep();
     }
 
     pub(super) fn next_tick(&mut self) {
@@ -133,6 +141,7 @@ impl Digests {
         self.pings.next_tick();
         self.judgements.next_tick();
         self.advice.next_tick();
+        self.states.next_tick();
     }
 }
 

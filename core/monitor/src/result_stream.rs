@@ -30,6 +30,8 @@ pub enum RecordKind {
     Alert = 8,
     /// A ping whose return wasn't taken for wall.
     Doubtful = 9,
+    /// The live state.
+    State = 10,
 }
 
 /// Type of a record's word.
@@ -42,7 +44,7 @@ pub enum WordKind {
 }
 
 impl RecordKind {
-    const ALL: [Self; 9] = [
+    const ALL: [Self; 10] = [
         Self::Sample,
         Self::NoSample,
         Self::Section,
@@ -52,6 +54,7 @@ impl RecordKind {
         Self::NoPose,
         Self::Alert,
         Self::Doubtful,
+        Self::State,
     ];
 
     /// The kind with this number.
@@ -71,6 +74,7 @@ impl RecordKind {
             Self::NoPose => "lack of a pose",
             Self::Alert => "alert",
             Self::Doubtful => "doubtful return",
+            Self::State => "live state",
         }
     }
 
@@ -138,6 +142,26 @@ impl RecordKind {
                 ("tilt_sd_rad", Number),
                 ("yaw_sd_rad", Number),
             ],
+            Self::State => &[
+                ("at_ns", Integer),
+                ("position", Integer),
+                ("chainage_m", Number),
+                ("pass_sd_m", Number),
+                ("speed_mps", Number),
+                ("v_max_mps", Number),
+                ("reason", Integer),
+                ("predicted_t_m", Number),
+                ("pass_m", Number),
+                ("fail_m", Number),
+                ("cannot_say_m", Number),
+                ("open_m", Number),
+                ("not_inspected_m", Number),
+                ("unsure", Integer),
+                ("unsure_from", Integer),
+                ("unsure_to", Integer),
+                ("alerts", Integer),
+                ("turning", Integer),
+            ],
             Self::NoPose => &[("at_ns", Integer), ("reason", Integer)],
             Self::Alert => &[
                 ("at_ns", Integer),
@@ -148,9 +172,13 @@ impl RecordKind {
                 ("source", Integer),
             ],
         };
-        // Advice continues with the speeds that other modes would allow.
-        let beyond = if self == Self::Advice { "alternative_v_max_mps" } else { "beyond the last field" };
-        fields.get(place).copied().unwrap_or((beyond, Number))
+        // Advice continues with the speeds that other modes would allow, the live state with each source's last reading.
+        let beyond = match self {
+            Self::Advice => ("alternative_v_max_mps", Number),
+            Self::State => ("heard_ns", Integer),
+            _ => ("beyond the last field", Number),
+        };
+        fields.get(place).copied().unwrap_or(beyond)
     }
 }
 

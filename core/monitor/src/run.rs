@@ -10,6 +10,7 @@ use super::alerts::Alerts;
 use super::app::{App, SourceInfo};
 use super::digest::Digest;
 use super::entities::{HeadFrontier, Mounted, Navigator, SensorDecoder, SensorHealth, VehicleState};
+use super::live_state::LiveState;
 use super::loop_snapshot;
 use super::merge::Inbox;
 use super::messages::{Event, Events, Notice, Notices};
@@ -142,6 +143,11 @@ impl Loop {
 
     /// Alerts about the dive as a whole.
     pub fn alerts(&self) -> &Alerts {
+        self.world.resource()
+    }
+
+    /// The live state, as of the last beat and published with the last tick.
+    pub fn live_state(&self) -> &LiveState {
         self.world.resource()
     }
 

@@ -4,7 +4,7 @@
 use crate::log::format::RESULT_PREFIX;
 
 /// The streams of results in a log; [`headrace_monitor::resources::Digests::streams`] has them in the same order.
-pub(crate) const STREAMS: [&str; 4] = ["poses", "pings", "judgements", "advice"];
+pub(crate) const STREAMS: [&str; 5] = ["poses", "pings", "judgements", "advice", "states"];
 /// Words before a message's records.
 pub(crate) const HEAD_WORDS: usize = 2;
 

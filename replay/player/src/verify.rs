@@ -72,6 +72,8 @@ struct Stream {
     same: u64,
     unrecorded: u64,
     difference: Option<Difference>,
+    /// The log has records of it.
+    has_results: bool,
 }
 
 /// A tick's records as read from the log.
@@ -168,6 +170,10 @@ impl Verifier {
                 stream.part(tick, name, What::Missing);
             }
         }
+        // Logs of before the live state was recorded have none.
+        if let Some(states) = self.streams.last_mut().filter(|states| !states.has_results) {
+            states.difference = None;
+        }
         let same = self.streams.iter().map(|stream| stream.same).sum();
         let unrecorded = self.streams.iter().map(|stream| stream.unrecorded).sum();
         let mut differences: Vec<Difference> =
@@ -213,6 +219,7 @@ impl Verifier {
                 continue;
             };
             self.has_results = true;
+            stream.has_results = true;
             self.last_tick = tick;
             stream.waiting.push_back(Batch { tick, next, words, at: 0 });
             stream.drop_empty();

@@ -7,4 +7,5 @@ mod logging;
 mod plan;
 mod registration;
 mod report_schema;
+mod screens;
 mod viewers;

@@ -114,7 +114,7 @@ fn legs(start_m: f64, place_m: [f64; 2]) -> String {
     let mut text = format!(
         "vehicle = \"vehicle.toml\"\n[effects]\nmotion_within_turn = {{}}\n[trajectory]\nstart_m = {start_m}\nplace_m = {place_m:?}\n"
     );
-    for (distance_m, speed_mps) in [(2.0, 0.1), (2.0, 0.35), (1.0, -0.2), (2.0, 0.15)] {
+    for (distance_m, speed_mps) in [(2.0, 0.1), (3.0, 0.35), (1.0, -0.2), (2.0, 0.15)] {
         writeln!(text, "[[trajectory.legs]]\ndistance_m = {distance_m}\nspeed_mps = {speed_mps}").unwrap();
     }
     text

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use headrace_geometry::math::{self, TAU};
 use headrace_geometry::time::MonoNs;
 use headrace_monitor::report::{SectionReport, SpreadReport};
-use headrace_tests::flags::{first_failing_m, reached};
+use headrace_tests::flags::{NEAR_M, all_passed_from_m, first_failing_m, reached};
 use headrace_tests::instrumented::{Dive, Ping, Sample};
 use headrace_tests::random_dives::Draw;
 use headrace_tests::spacings::{Spacing, spacings, spread};
@@ -102,21 +102,30 @@ fn val_verdicts_follow_from_hole_sigma_and_target() {
         let (hole_m, target_m, twice_m) =
             (2.0 * largest.radius_m, dive.report.target_m, 2.0 * section.hole_sd_m);
         // What going on forward could still fill is open.
-        let rear_m = reached(dive).last()?.rear_m;
+        let reached = reached(dive);
+        let (rear_m, passed_m) = (reached.last()?.rear_m, all_passed_from_m(&reached));
         let radius_m = f64::midpoint(target_m, twice_m);
-        let first_m = first_failing_m(wall, [section.start_m, section.end_m], radius_m);
+        let ends = [section.start_m, section.end_m];
+        let first_m = first_failing_m(wall, ends, radius_m, passed_m);
+        // Whether a circle lies just where all heads have been.
+        let late_m = first_failing_m(wall, ends, radius_m, passed_m + NEAR_M);
+        let is_near = late_m != first_failing_m(wall, ends, radius_m, passed_m - NEAR_M);
         // Where the first such circle is, is known to a twentieth of the section; the program goes by the largest deviation
         // round the wall, and by the farthest wall for the reach of a tilted head.
         let near_m = (section.end_m - section.start_m) / 20.0 + 2.0 * section.hole_sd_m + 0.03;
         let clear_m = first_m.map_or(f64::NEG_INFINITY, |first_m| rear_m - first_m - radius_m);
         let behind_m = rear_m - largest.centre[0] - largest.radius_m;
+        let from_end_m = largest.centre[0] - largest.radius_m - passed_m;
         let expected = match section.verdict {
             _ if hole_m + twice_m <= target_m => "pass",
             either @ ("fail" | "open") if clear_m.abs() <= near_m => either,
             either @ ("fail" | "cannot_say") if (hole_m - twice_m - target_m).abs() < 0.01 => either,
             either @ ("open" | "cannot_say") if behind_m.abs() <= near_m => either,
+            either @ ("open" | "cannot_say" | "fail") if from_end_m.abs() <= near_m || is_near => either,
+            // A flag stands until the hole is filled.
+            either @ "fail" if section.flagged_s.is_some() && section.cleared_s.is_none() => either,
             _ if clear_m > 0.0 => "fail",
-            _ if behind_m < 0.0 => "open",
+            _ if behind_m < 0.0 || from_end_m < 0.0 => "open",
             _ => "cannot_say",
         };
         (section.verdict != expected)

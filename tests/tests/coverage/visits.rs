@@ -7,12 +7,10 @@ const SENSORS: &str = "imu_noise = { gyro_degps_rthz = 0.007, accel_mps2_rthz = 
 
 /// A dive of `vita2-4` from 5 m on over these legs, m and m/s; backwards where negative.
 fn dive(seed: u64, legs: &[(f64, f64)], effects: &str) -> truth::JudgedDive {
-    let legs: String = legs
-        .iter()
-        .map(|(by_m, speed_mps)| {
-            format!("[[trajectory.legs]]\ndistance_m = {by_m}\nspeed_mps = {speed_mps}\n")
-        })
-        .collect();
+    let leg = |(by_m, speed_mps): &(f64, f64)| {
+        format!("[[trajectory.legs]]\ndistance_m = {by_m}\nspeed_mps = {speed_mps}\n")
+    };
+    let legs = legs.iter().map(leg).collect::<Vec<String>>().concat();
     let text = format!(
         "seed = {seed}\nvehicle = \"vita2-4.toml\"\n[trajectory]\nstart_m = 5\n{legs}[effects]\nmotion_within_turn = {{}}\n\
          {SENSORS}{effects}"
@@ -27,13 +25,13 @@ fn vehicle(name: &str) -> Result<Vec<u8>, String> {
     Ok(file.replace("slack_sd_m = 0.02", "slack_sd_m = 0.06\nslack_time_s = 60").into_bytes())
 }
 
-/// Sections between two chainages with this verdict, by their start, mm.
-fn with_verdict(dive: &truth::JudgedDive, verdict: &str, [from_m, to_m]: [f64; 2]) -> Vec<i64> {
+/// Sections between two chainages with this verdict, by their start, m.
+fn with_verdict(dive: &truth::JudgedDive, verdict: &str, [from_m, to_m]: [f64; 2]) -> Vec<String> {
     let within = dive.sections.iter().map(|section| &section.report);
     let within = within.filter(|section| section.start_m >= from_m && section.end_m <= to_m);
     within
         .filter(|section| section.verdict == verdict)
-        .map(|section| (section.start_m * 1e3) as i64)
+        .map(|section| format!("{:.2}", section.start_m))
         .collect()
 }
 

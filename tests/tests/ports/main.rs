@@ -2,6 +2,8 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
 
+#[cfg(unix)]
+mod dead_devices;
 mod devices;
 #[cfg(unix)]
 mod faults;

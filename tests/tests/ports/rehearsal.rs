@@ -9,7 +9,7 @@ use headrace_tests::Folder;
 use serde_json::Value;
 
 /// Four heads, two of them on serial lines, echosounders on both kinds of line, the rest on UDP.
-fn scene(distance_m: f64) -> String {
+pub(crate) fn scene(distance_m: f64) -> String {
     let vehicle = headrace_tests::root().join("deploy/vehicles/vita2-4.toml");
     format!(
         r#"name = "rehearsal"
@@ -42,7 +42,7 @@ motion_within_turn = {{}}
     )
 }
 
-fn headrace() -> Command {
+pub(crate) fn headrace() -> Command {
     let mut command = headrace_tests::program();
     command.stdin(Stdio::null());
     command
@@ -54,7 +54,7 @@ fn interrupt(child: &Child) {
 }
 
 /// A process that is ended with the test.
-struct Running(Child);
+pub(crate) struct Running(pub(crate) Child);
 
 impl Drop for Running {
     fn drop(&mut self) {

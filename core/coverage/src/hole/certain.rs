@@ -9,8 +9,8 @@ use headrace_geometry::math;
 const FINE_M: f64 = 1e-3;
 
 impl HoleFinder {
-    /// True if a circle of `radius_m` centred between two chainages holds no sample and lies outside `reach`, where
-    /// samples may still land.
+    /// True if a circle of `radius_m` centred between two chainages holds no sample and lies outside each of
+    /// `reaches`: where samples may still land, or where not all heads have been.
     ///
     /// The distance to the nearest sample or to the reach is 1-Lipschitz: as for holes, tiles whose bound is too small
     /// are dropped and the others halved.
@@ -19,7 +19,7 @@ impl HoleFinder {
         &mut self,
         store: &SampleStore,
         (from_m, to_m): (f64, f64),
-        reach: Option<Reach>,
+        reaches: [Option<Reach>; 2],
         radius_m: f64,
     ) -> bool {
         let Self { window, tiles, .. } = self;
@@ -30,7 +30,8 @@ impl HoleFinder {
         tiles.extend(first_tiles(store.perimeter_m(), length_m));
         while let Some(tile) = tiles.pop() {
             let half_m = tile.half_m();
-            let clear_m = clear_of(reach, from_m + tile.x_m);
+            let clear_m = reaches.map(|reach| clear_of(reach, from_m + tile.x_m));
+            let clear_m = clear_m[0].min(clear_m[1]);
             if clear_m + tile.half_x_m < radius_m {
                 continue;
             }
@@ -81,7 +82,7 @@ mod tests {
                 (1.0 + 0.01 * f64::from(i), 0.01 * f64::from(k))
             }));
             let best = places.map(|(x, s)| clear(x, s)).fold(0.0, f64::max);
-            let found = HoleFinder::default().has_circle(&store, (1.0, 1.25), reach, radius_m);
+            let found = HoleFinder::default().has_circle(&store, (1.0, 1.25), [reach, None], radius_m);
             // Grid error at most 5 mm in each direction, search error 1 mm.
             prop_assert!(!found || best + 0.008 > radius_m, "found {radius_m}, there is {best}");
             prop_assert!(found || best <= radius_m + 0.002, "not found {radius_m}, there is {best}");

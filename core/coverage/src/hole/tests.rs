@@ -320,6 +320,6 @@ fn samples_of_earlier_visits_fill_no_hole_of_a_later_one() {
     let mut since = |visit: u32| finder.largest_since(&store, 2.0, 3.0, visit);
     let [both, later, none] = [3, 4, 5].map(&mut since);
     assert!(both.diameter_m < later.diameter_m, "{both:?} {later:?}");
-    assert!((later.diameter_m - f64::hypot(0.1, PERIMETER_M / 20.0)).abs() < 1e-9, "{later:?}");
+    assert!((later.diameter_m - math::hypot(0.1, PERIMETER_M / 20.0)).abs() < 1e-9, "{later:?}");
     assert!(!none.bounded);
 }

@@ -20,6 +20,7 @@ pub mod smoothing_changes;
 mod sources;
 mod spread;
 mod survey;
+mod unsure;
 
 pub use advice::{AdviceReport, AlternativeReport};
 pub use inspected::{NotInspectedReport, WayReport};
@@ -30,6 +31,7 @@ pub use sources::{DeviceClockReport, LineReport, NavigationReport, SourceReport}
 pub use spread::SpreadReport;
 use spread::spread_report;
 pub use survey::{HolidayReport, NodeRowReport, SurveyReport};
+pub use unsure::UnsureReport;
 
 /// Version of the report schema.
 pub const REPORT_VERSION: u32 = 4;
@@ -61,6 +63,8 @@ pub struct Report {
     pub sections: Vec<SectionReport>,
     /// Neighbouring flagged sections of one cause, by their stable number.
     pub runs: Vec<RunReport>,
+    /// Stretches of which neither a pass nor a fail can be told, though nothing more will come, in the order of chainage.
+    pub unsure: Vec<UnsureReport>,
     /// Stretches to pass again on the way home, from the far end to the portal.
     pub way_home: Vec<ReturnReport>,
     /// Samples by node of a square grid, as in survey specifications.
@@ -166,6 +170,8 @@ pub struct SummaryReport {
     pub cannot_say_m: f64,
     /// Metres still open.
     pub open_m: f64,
+    /// Of the open metres, those where the way begins or turns back that not all heads have passed.
+    pub not_inspected_m: f64,
     /// Fails that were flagged, and flags that a later pass cleared.
     pub flags_raised: u32,
     /// See `flags_raised`.
@@ -256,6 +262,7 @@ impl Report {
                 .map(|(k, section)| sections::section_report(sections, k, section, dive))
                 .collect(),
             runs: runs::run_reports(dive),
+            unsure: unsure::unsure_reports(coverage),
             way_home: runs::way_home(sections, log),
             survey: survey::survey(coverage, &dive.mission().profile),
             what_if: Vec::new(),
@@ -312,7 +319,7 @@ fn dive_report(coverage: &Coverage, tally: &Tally, sound_mps: [f64; 2]) -> DiveR
 fn summarise<'a>(section_m: f64, sections: impl Iterator<Item = &'a Section>) -> SummaryReport {
     let (mut t_x, mut t_y, mut t, mut hole) =
         (Spread::default(), Spread::default(), Spread::default(), Spread::default());
-    let (mut counts, mut raised, mut cleared) = ([0_u32; 4], 0, 0);
+    let (mut counts, mut raised, mut cleared) = ([0_u32; 5], 0, 0);
     for section in sections {
         t_x.merge(&section.t_x_m);
         t_y.merge(&section.t_y_m);
@@ -329,15 +336,18 @@ fn summarise<'a>(section_m: f64, sections: impl Iterator<Item = &'a Section>) ->
         if let Some(count) = counts.get_mut(place) {
             *count += 1;
         }
+        counts[4] += u32::from(section.not_inspected);
         raised += u32::from(section.flagged.is_some());
         cleared += u32::from(section.cleared.is_some());
     }
-    let [pass_m, fail_m, cannot_say_m, open_m] = counts.map(|count| f64::from(count) * section_m);
+    let [pass_m, fail_m, cannot_say_m, open_m, not_inspected_m] =
+        counts.map(|count| f64::from(count) * section_m);
     SummaryReport {
         pass_m,
         fail_m,
         cannot_say_m,
         open_m,
+        not_inspected_m,
         flags_raised: raised,
         flags_cleared: cleared,
         t_x: spread_report(&t_x),

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::spread::{SpreadReport, spread_report};
 use crate::run::Loop;
-use headrace_coverage::{Evidence, Section, Sections, Verdict};
+use headrace_coverage::{Evidence, Section, Sections, Unsure, Verdict};
 use headrace_geometry::time::MonoNs;
 
 /// One section.
@@ -46,6 +46,10 @@ pub struct SectionReport {
     pub masked_share: f64,
     /// `pass`, `fail`, `cannot_say` or `open`.
     pub verdict: &'static str,
+    /// Open, and going on won't change it: where the way begins or turns back, not all heads have been.
+    pub not_inspected: bool,
+    /// Why it can't be said; `None` with other verdicts.
+    pub cannot_say: Option<&'static str>,
     /// Cause, while the verdict is `fail`.
     pub cause: Option<Evidence>,
     /// When it was flagged, seconds on the log's clock.
@@ -101,6 +105,8 @@ pub(super) fn section_report(
         deviation: deviation_report(section),
         masked_share: section.masked_share,
         verdict: section.verdict.as_str(),
+        not_inspected: section.not_inspected,
+        cannot_say: section.unsure().filter(|why| *why != Unsure::NotInspected).map(Unsure::as_str),
         cause: section.evidence.filter(|_| section.verdict == Verdict::Fail),
         flagged_s: section.flagged.map(MonoNs::as_secs_f64),
         cleared_s: section.cleared.map(MonoNs::as_secs_f64),

@@ -8,11 +8,12 @@ use super::advise::Advisor;
 use super::doubt;
 use super::driving::{Driven, Driving};
 use super::judge::{Results, judge_one};
+use super::live::standing;
 use super::walls::{self, Sorting};
 use super::way::{Heads, note_beat};
 use crate::alerts::Alerts;
 use crate::entities::{HeadFrontier, HeadSweep};
-use crate::messages::{Notices, Outcome, Placed, PlacedList, PlacedPing, Requests};
+use crate::messages::{Notices, Outcome, Placed, PlacedList, PlacedPing, Requests, Standings};
 use crate::resources::{Coverage, Digests, Finder, Tally, TunnelDesign, VehicleEntities};
 use headrace_coverage::{HeadReach, Loss, Outlook, Visit};
 use headrace_geometry::frames::Vec3;
@@ -37,8 +38,10 @@ pub(super) fn cover(
     mut notices: ResMut<'_, Notices>,
     mut digests: ResMut<'_, Digests>,
     mut alerts: ResMut<'_, Alerts>,
+    mut standings: ResMut<'_, Standings>,
 ) {
     notices.0.clear();
+    standings.0.clear();
     for item in &placed.0 {
         match item {
             Placed::Situation(at, situation, doubts) => {
@@ -85,6 +88,10 @@ pub(super) fn cover(
                 alerts: &mut alerts,
             };
             judge_one(&request, &tunnel.profile, &mut coverage, &mut results);
+        }
+        if let Placed::Situation(at, _, doubts) = item {
+            let sweeps = heads.iter().map(|(_, mounted, sweep, _)| (mounted.source, sweep));
+            standings.0.push(standing(*at, &coverage, &alerts, doubts, sweeps));
         }
     }
 }

@@ -30,7 +30,7 @@ pub(super) fn georeference(
     placed.0.clear();
     for item in &positioned.0 {
         match *item {
-            Positioned::Beat { at, fix, doubts } => {
+            Positioned::Beat { at, fix, doubts, .. } => {
                 let situation = situation(at, fix, &tunnel, &target, &heads);
                 placed.0.push(Placed::Situation(at, situation, doubts));
             }

@@ -24,7 +24,7 @@ pub(crate) fn judge_one(
     coverage: &mut Coverage,
     results: &mut Results<'_>,
 ) {
-    let Coverage { store, sections, .. } = coverage;
+    let Coverage { store, sections, unsure, .. } = coverage;
     let Results { finder, notices, digests, alerts } = results;
     let mut tell = |id: RunId, change: RunChange| {
         notices.0.push(Notice::Run { id, at: request.at, change });
@@ -33,6 +33,11 @@ pub(crate) fn judge_one(
     let mut judging = Judging { store, finder: &mut finder.0, profile, tell: &mut tell };
     let Some(change) = sections.judge(request, &mut judging) else { return };
     notices.0.push(Notice::Section { section: request.section, at: request.at, change });
+    if let Some(here) = sections.unsure(request.section)
+        && !unsure.as_mut().is_some_and(|last| last.join(&here, sections.section_m()))
+    {
+        *unsure = Some(here);
+    }
     let Some(section) = sections.get(request.section) else { return };
     digests
         .judgements

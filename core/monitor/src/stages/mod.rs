@@ -9,6 +9,7 @@ mod doubt;
 mod driving;
 mod georeference;
 mod judge;
+mod live;
 mod navigate;
 mod samples;
 mod sound_speed;
@@ -32,6 +33,6 @@ pub(super) fn add(schedule: &mut Schedule) {
         navigate::navigate.in_set(Stage::Navigate),
         georeference::georeference.in_set(Stage::Georeference),
         cover::cover.in_set(Stage::Cover),
-        advise::advise.in_set(Stage::Advise),
+        (advise::advise, live::live).chain().in_set(Stage::Advise),
     ));
 }

@@ -28,9 +28,10 @@ pub(super) fn navigate(
             let fix = navigator.navigation.fix(at);
             let navigation = &navigator.navigation;
             let doubts = Doubts { cable: navigation.cable_doubt(), setting: navigation.setting_doubt() };
-            *state = VehicleState { at: Some(at), fix, sd: navigation.pose_sd(), cable_doubt: doubts.cable };
+            let sd = navigation.pose_sd();
+            *state = VehicleState { at: Some(at), fix, sd, cable_doubt: doubts.cable };
             digest(&mut digests.poses, at, &state);
-            list.0.push(Positioned::Beat { at, fix, doubts });
+            list.0.push(Positioned::Beat { at, fix, doubts, sd, before: index });
         }
         if matches!(event.reading, Reading::Sonar(_)) {
             let fix = navigator.navigation.fix(event.valid_at);

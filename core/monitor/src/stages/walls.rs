@@ -126,8 +126,7 @@ pub(super) fn suspect(
         let Some(section) = sections.get_mut(index) else { continue };
         section.suspect();
         if section.hole.is_some() {
-            let Outlook { at, swept_by_all, none_alive, to_come, .. } = *outlook;
-            requests.0.push(Request { section: index, at, swept_by_all, none_alive, to_come, fails: false });
+            requests.0.push(Request::at(outlook)(index));
         }
     }
 }

@@ -23,9 +23,11 @@ pub(super) fn note_beat(
     requests: &mut Requests,
 ) {
     let Some(pose) = situation.pose.filter(|_| !heads.is_empty()) else { return };
+    let mut all: Option<Reach> = None;
     let mut span = Reach { from_m: pose.position.x(), to_m: pose.position.x() };
     for (head, mounted, _, mut frontier) in heads.iter_mut() {
         let here = reach(&pose, &mounted.info.mount, tunnel);
+        all = Some(all.map_or(here, |all| all.with(here)));
         span = span.with(Reach { from_m: here.middle_m(), to_m: here.middle_m() });
         if coverage.frontier.is_silent(frontier.0.as_ref(), at) {
             note_silence(coverage, head.0, frontier.0.map(|before| before.latest()), here);
@@ -34,6 +36,9 @@ pub(super) fn note_beat(
             // Not heard yet, and perhaps about to ping.
             frontier.0 = Some(HeadReach::silent_at(None, here));
         }
+    }
+    if let Some(all) = all {
+        coverage.frontier.pass(all);
     }
     let reaches = heads.iter().filter_map(|(.., frontier)| frontier.0);
     let Coverage { sections, frontier, .. } = coverage;

@@ -5,7 +5,7 @@
 //! | `/raw/<source id>` | bytes as received: one device frame, datagram, CAN frame, HID report or I2C transaction | receive time | time of validity, if the device gives one, else the receive time |
 //! | `/sent/<source id>` | bytes sent to the device | time of sending | the same |
 //! | `/loop/tick` | one tick of the loop, see [`Tick`] | the tick's time | the same |
-//! | `/result/poses`, `/result/pings`, `/result/judgements`, `/result/advice` | the loop's results of a tick as words ([`headrace_monitor::result_stream`]): u64 tick, u64 number of the first record, records; for `verify`, never read by a replay | the tick's time | the same |
+//! | `/result/poses`, `/result/pings`, `/result/judgements`, `/result/advice`, `/result/states` | the loop's results of a tick as words ([`headrace_monitor::result_stream`]): u64 tick, u64 number of the first record, records; for `verify`, never read by a replay | the tick's time | the same |
 //! | `/result/view/...` | the same for viewers, in JSON: [`crate::view`] | the tick's time | the same |
 //!
 //! Times are nanoseconds of the host's monotonic clock. Every channel counts its messages from 0 (`sequence`).

@@ -118,8 +118,8 @@ impl View {
             }
             RecordKind::Alert => self.alert(&mut words, made),
             RecordKind::Advice => self.advice(&mut words, made),
-            // Points are samples; doubtful returns are in the log's results.
-            RecordKind::NoSample | RecordKind::Doubtful => Some(()),
+            // Points are samples; doubtful returns and the live state are in the log's results.
+            RecordKind::NoSample | RecordKind::Doubtful | RecordKind::State => Some(()),
         }
     }
 

@@ -1,0 +1,253 @@
+//! The live state: what the dive is like now, as one structure by value. Made at every beat, published with every tick;
+//! the terminal and the lines of `--json-lines` show it. `docs/live-state.md` describes it.
+//!
+//! All of it is as of the last beat, in data time, and so the same in a replay; only [`LiveState::now`] is the tick's own.
+//! What it says grows old by itself: a loop whose ports are silent goes on ticking, and ages are taken against `now`.
+
+use bevy_ecs::prelude::Resource;
+use serde::{Deserialize, Serialize};
+
+use super::alerts::{AlertKind, MOST_ALERTS};
+use headrace_coverage::Stretch;
+use headrace_fusion::NoFix;
+use headrace_fusion::filter::pose_sd::PoseSd;
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_sampling::advice::{Advice, Reason};
+use headrace_sampling::head::HeadSet;
+use headrace_sensor::reading::{MAX_SOURCES, SourceId};
+use headrace_snapshot::stateful;
+
+mod condition;
+pub mod json;
+
+#[cfg(test)]
+pub(crate) use condition::test_state;
+pub use condition::{Condition, Lamp};
+
+/// Version of the live state and of its JSON.
+pub const LIVE_STATE_VERSION: u32 = 1;
+/// What is older is shown as old. Source: as long as a head may be silent.
+pub const OLD_AFTER: DurNs = DurNs(2_000_000_000);
+
+/// Why a position is doubtful, though there is one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PositionDoubt {
+    /// The cable's counter isn't believed.
+    Cable,
+    /// Passes are known against each other less well than the advice allows for.
+    Spread,
+}
+
+/// Whether there is a position.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub enum PositionState {
+    /// There is none, for want of this.
+    None(NoFix),
+    /// There is one, and what is placed by it is doubtful.
+    Doubtful(PositionDoubt),
+    /// There is one.
+    Ok,
+}
+
+impl PositionState {
+    /// The word used in JSON: `none`, `doubtful` or `ok`.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::None(_) => "none",
+            Self::Doubtful(_) => "doubtful",
+            Self::Ok => "ok",
+        }
+    }
+
+    /// Its number in published data.
+    pub(super) fn number(self) -> u64 {
+        match self {
+            Self::Ok => 0,
+            Self::Doubtful(doubt) => 1 + doubt as u64,
+            Self::None(lacking) => 3 + lacking as u64,
+        }
+    }
+}
+
+/// Metres of the way; together they are the way.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct LiveMetres {
+    /// Metres that pass.
+    pub pass_m: f64,
+    /// Metres that fail.
+    pub fail_m: f64,
+    /// Metres of which neither can be said.
+    pub cannot_say_m: f64,
+    /// Metres that going on may still fill.
+    pub open_m: f64,
+    /// Metres where the way begins or turns back that not all heads have passed.
+    pub not_inspected_m: f64,
+}
+
+impl LiveMetres {
+    /// The way, m.
+    pub fn way_m(&self) -> f64 {
+        self.pass_m + self.fail_m + self.cannot_say_m + self.open_m + self.not_inspected_m
+    }
+}
+
+/// An alert that holds now.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ActiveAlert {
+    /// Its kind.
+    pub kind: AlertKind,
+    /// The head that isn't believed.
+    pub source: Option<SourceId>,
+    /// When its present occurrence began.
+    pub since: MonoNs,
+}
+
+/// The alerts that hold now.
+pub type ActiveAlerts = [Option<ActiveAlert>; MOST_ALERTS];
+
+/// State of a sensor.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SensorState {
+    /// No reading so far.
+    Never,
+    /// No reading for longer than [`OLD_AFTER`].
+    Silent,
+    /// A head whose readings come from one angle.
+    Stalled,
+    /// A head that isn't believed.
+    Distrusted,
+    /// Readings come.
+    Ok,
+}
+
+/// The live state. Speeds m/s, lengths m.
+#[derive(Debug, Clone, Copy, PartialEq, Resource)]
+pub struct LiveState {
+    /// The end of the tick that published it: ages are taken against this.
+    pub now: MonoNs,
+    /// The beat that it is as of; `None` before the first.
+    pub at: Option<MonoNs>,
+    /// Whether there is a position.
+    pub position: PositionState,
+    /// Chainage; `None` without a position.
+    pub chainage_m: Option<f64>,
+    /// Standard deviations of the pose; `None` if the navigation method provides none.
+    pub sd: Option<PoseSd>,
+    /// Standard deviation of one pass against the next.
+    pub pass_sd_m: f64,
+    /// Speed along the tunnel, positive inwards; `None` without a position.
+    pub speed_mps: Option<f64>,
+    /// The advice; `None` before the first.
+    pub advice: Option<Advice>,
+    /// Target T.
+    pub target_m: f64,
+    /// Standard deviations of a hole that a pass keeps clear of the target.
+    pub confidence_sd: f64,
+    /// Metres of the way.
+    pub metres: LiveMetres,
+    /// The stretch of which nothing could be said that was judged last.
+    pub unsure: Option<Stretch>,
+    /// Alerts that hold.
+    pub alerts: ActiveAlerts,
+    /// Sources that are profiling heads, by number.
+    pub heads: u64,
+    /// Sources of the heads that turn.
+    pub turning: u64,
+    /// Number of sources.
+    pub sources: u16,
+    /// Receive time of each source's last reading.
+    pub heard: [Option<MonoNs>; MAX_SOURCES],
+}
+
+stateful!(LiveState {
+    state: now, at, position, chainage_m, sd, pass_sd_m, speed_mps, advice, metres, unsure, alerts, turning;
+    slots: heard;
+    fixed: target_m, confidence_sd, heads, sources;
+});
+
+impl LiveState {
+    /// Before the first beat.
+    pub(super) fn new(target_m: f64, confidence_sd: f64, heads: u64, sources: u16) -> Self {
+        Self {
+            now: MonoNs(0),
+            at: None,
+            position: PositionState::None(NoFix::Heading),
+            chainage_m: None,
+            sd: None,
+            pass_sd_m: 0.0,
+            speed_mps: None,
+            advice: None,
+            target_m,
+            confidence_sd,
+            metres: LiveMetres::default(),
+            unsure: None,
+            alerts: [None; MOST_ALERTS],
+            heads,
+            turning: 0,
+            sources,
+            heard: [None; MAX_SOURCES],
+        }
+    }
+
+    /// How old it is; `None` before the first beat.
+    pub fn age(&self) -> Option<DurNs> {
+        self.at.map(|at| DurNs(self.now.since(at).0.max(0)))
+    }
+
+    /// Whether it is shown as old.
+    pub fn is_old(&self) -> bool {
+        self.age().is_some_and(|age| age.0 > OLD_AFTER.0)
+    }
+
+    /// How long ago a source's last reading came; `None` if none has.
+    pub fn age_of(&self, source: usize) -> Option<DurNs> {
+        self.heard.get(source).copied().flatten().map(|heard| DurNs(self.now.since(heard).0.max(0)))
+    }
+
+    /// State of a sensor, by its source.
+    pub fn sensor(&self, source: usize) -> SensorState {
+        let bit = |set: u64| {
+            u32::try_from(source).is_ok_and(|source| set.checked_shr(source).unwrap_or(0) & 1 == 1)
+        };
+        let distrusted = |alert: &ActiveAlert| alert.source.is_some_and(|of| of.index() == source);
+        match self.age_of(source) {
+            None => SensorState::Never,
+            Some(age) if age.0 > OLD_AFTER.0 => SensorState::Silent,
+            Some(_) if self.alerts.iter().flatten().any(distrusted) => SensorState::Distrusted,
+            Some(_) if self.at.is_some() && bit(self.heads) && !bit(self.turning) => SensorState::Stalled,
+            Some(_) => SensorState::Ok,
+        }
+    }
+
+    /// Sensors that have spoken and are silent, or never have, in the order of sources.
+    pub fn silent(&self) -> impl Iterator<Item = usize> + '_ {
+        let is_silent =
+            |source: &usize| matches!(self.sensor(*source), SensorState::Never | SensorState::Silent);
+        (0..usize::from(self.sources)).filter(is_silent)
+    }
+
+    /// Whether a profiling head gives readings.
+    pub fn has_sonar(&self) -> bool {
+        let is_heard = |source: usize| self.age_of(source).is_some_and(|age| age.0 <= OLD_AFTER.0);
+        (0..usize::from(self.sources)).any(|source| self.heads >> source & 1 == 1 && is_heard(source))
+    }
+
+    /// The largest speed advised, m/s; `None` where none can be.
+    pub fn v_max_mps(&self) -> Option<f64> {
+        let advice = self.advice.as_ref().filter(|advice| advice.reason == Reason::HelixPitch)?;
+        Some(advice.v_max_mps).filter(|v_max_mps| *v_max_mps > 0.0)
+    }
+
+    /// Bits of the kinds of alerts that hold.
+    pub(super) fn alert_bits(&self) -> u64 {
+        self.alerts.iter().flatten().fold(0, |bits, alert| bits | 1 << alert.kind as u64)
+    }
+}
+
+/// Bits of the heads' sources, of those of the heads in a set, by number.
+pub(super) fn source_bits(sources: impl Iterator<Item = SourceId>, of: HeadSet) -> u64 {
+    let numbered = sources.enumerate().filter(|(head, _)| of.has(*head));
+    numbered.fold(0, |bits, (_, source)| bits | 1 << u64::from(source.0 % 64))
+}

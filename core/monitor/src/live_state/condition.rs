@@ -1,0 +1,120 @@
+//! What the pilot is to know first: one condition, and one lamp.
+
+use serde::Serialize;
+
+use super::{LiveState, PositionDoubt, PositionState};
+use headrace_fusion::NoFix;
+use headrace_geometry::time::DurNs;
+use headrace_sampling::advice::Reason;
+
+/// Share of v_max beyond which a speed is over it: that of the advice's margin and of the error of its measurement.
+const OVER: f64 = 1.02;
+/// Share beyond which it is too fast: what a pilot who follows the advice keeps.
+const TOO_FAST: f64 = 1.05;
+
+/// What holds now; where several do, the first of this list.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Condition {
+    /// Nothing has come from any sensor.
+    NoData,
+    /// Nothing has come for so long.
+    Old(DurNs),
+    /// There is no position, for want of this.
+    NoPosition(NoFix),
+    /// No profiling head gives readings.
+    NoSonar,
+    /// Slower won't help.
+    NoSpeed,
+    /// The speed is well over v_max.
+    TooFast,
+    /// At this speed the present turn misses the target, though the speed is within v_max.
+    TurnFails,
+    /// What is placed now can't be judged.
+    CannotSay(PositionDoubt),
+    /// The speed is a little over v_max.
+    Over,
+    /// The speed is within v_max.
+    Good,
+}
+
+/// Colour of a condition.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Lamp {
+    /// Go on.
+    Green,
+    /// Take care.
+    Amber,
+    /// Do something.
+    Red,
+}
+
+impl Condition {
+    /// The word used in JSON.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::NoData => "no_data",
+            Self::Old(_) => "old",
+            Self::NoPosition(_) => "no_position",
+            Self::NoSonar => "no_sonar",
+            Self::NoSpeed => "no_speed",
+            Self::TooFast => "too_fast",
+            Self::TurnFails => "turn_fails",
+            Self::CannotSay(_) => "cannot_say",
+            Self::Over => "over",
+            Self::Good => "good",
+        }
+    }
+
+    /// Its colour.
+    pub fn lamp(self) -> Lamp {
+        match self {
+            Self::Good => Lamp::Green,
+            Self::Over | Self::TurnFails | Self::CannotSay(_) | Self::NoData => Lamp::Amber,
+            Self::Old(_) | Self::NoPosition(_) | Self::NoSonar | Self::NoSpeed | Self::TooFast => Lamp::Red,
+        }
+    }
+}
+
+impl LiveState {
+    /// Whether the T forecast at the present speed is over the target, or unbounded.
+    fn turn_exceeds(&self) -> bool {
+        self.advice.and_then(|advice| advice.predicted_t_m).is_none_or(|t_m| t_m > self.target_m)
+    }
+
+    /// What holds now.
+    pub fn condition(&self) -> Condition {
+        let Some(age) = self.age() else { return Condition::NoData };
+        if self.is_old() {
+            return Condition::Old(age);
+        }
+        if let PositionState::None(lacking) = self.position {
+            return Condition::NoPosition(lacking);
+        }
+        let Some(advice) = self.advice.as_ref().filter(|_| self.has_sonar()) else {
+            return Condition::NoSonar;
+        };
+        let Some(v_max_mps) = self.v_max_mps() else {
+            return match advice.reason {
+                // Of a head that doesn't turn, or not long enough yet, nothing is known.
+                Reason::NoReturns => Condition::NoSonar,
+                Reason::NoHeadingOrFix => Condition::NoPosition(NoFix::Heading),
+                Reason::AngularStep | Reason::HelixPitch => Condition::NoSpeed,
+            };
+        };
+        let share = self.speed_mps.unwrap_or(0.0).abs() / v_max_mps;
+        match self.position {
+            _ if share > TOO_FAST => Condition::TooFast,
+            // The forecast is held for a second; the turn itself may have been mended.
+            _ if advice.will_exceed && self.turn_exceeds() && share <= OVER => Condition::TurnFails,
+            PositionState::Doubtful(doubt) => Condition::CannotSay(doubt),
+            _ if share > OVER => Condition::Over,
+            _ => Condition::Good,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;
+#[cfg(test)]
+pub(crate) use tests::state as test_state;

@@ -1,0 +1,118 @@
+use super::*;
+use crate::live_state::{LiveMetres, SensorState};
+use headrace_geometry::time::MonoNs;
+use headrace_geometry::tunnel::shapes;
+use headrace_sampling::advice::{Advice, Advisor, Task};
+use headrace_sampling::layout::HeadLayout;
+use headrace_sampling::passes::Situation;
+use headrace_sampling::swing::Swing;
+
+const fn at(seconds: u64) -> MonoNs {
+    MonoNs(seconds * 1_000_000_000)
+}
+
+/// Advice of a speed.
+fn advice(reason: Reason, v_max_mps: f64, t_m: f64) -> Advice {
+    let task = Task {
+        target_m: 0.5,
+        confidence_sd: 2.0,
+        length_m: 100.0,
+        layout: HeadLayout::PhaseShift,
+        sound_speed_mps: 1447.0,
+    };
+    let nowhere = Situation {
+        pose: None,
+        speed_mps: 0.0,
+        pass_error_m: 0.0,
+        layout: HeadLayout::PhaseShift,
+        configured: 0,
+        heads: [None; headrace_sampling::head::MAX_HEADS],
+    };
+    let profile = shapes::circle(3.0).unwrap();
+    let none = Advisor::new(&profile, task, &[], &[]).advise(&nowhere, Swing::default(), None);
+    Advice { reason, v_max_mps, predicted_t_m: Some(t_m), will_exceed: t_m > 0.5, ..none }
+}
+
+/// Two heads and another sensor, all heard at 10 s, at 0.07 m/s where 0.07 is allowed.
+pub(crate) fn state() -> LiveState {
+    let mut heard = LiveState::new(0.5, 2.0, 0b11, 3).heard;
+    heard[..3].fill(Some(at(10)));
+    LiveState {
+        now: at(10),
+        at: Some(at(10)),
+        position: PositionState::Ok,
+        chainage_m: Some(1240.5),
+        pass_sd_m: 0.02,
+        speed_mps: Some(0.07),
+        advice: Some(advice(Reason::HelixPitch, 0.07, 0.46)),
+        metres: LiveMetres { pass_m: 12.0, open_m: 1.5, ..LiveMetres::default() },
+        turning: 0b11,
+        heard,
+        ..LiveState::new(0.5, 2.0, 0b11, 3)
+    }
+}
+
+#[test]
+fn the_colour_follows_speed_against_what_is_allowed() {
+    let driven = |speed_mps| LiveState { speed_mps: Some(speed_mps), ..state() };
+    let shown = [0.05, 0.0713, 0.073, 0.11, -0.11].map(|mps| {
+        let condition = driven(mps).condition();
+        (condition.as_str(), condition.lamp())
+    });
+    assert_eq!(
+        shown,
+        [
+            ("good", Lamp::Green),
+            ("good", Lamp::Green),
+            ("over", Lamp::Amber),
+            ("too_fast", Lamp::Red),
+            ("too_fast", Lamp::Red)
+        ]
+    );
+}
+
+#[test]
+fn a_turn_that_misses_within_the_speed_allowed_is_told_only_while_it_does() {
+    let forecast = |t_m| Advice { will_exceed: true, ..advice(Reason::HelixPitch, 0.07, t_m) };
+    let told = |t_m| LiveState { advice: Some(forecast(t_m)), ..state() }.condition();
+    assert_eq!([told(0.6), told(0.4)], [Condition::TurnFails, Condition::Good]);
+}
+
+#[test]
+fn what_is_lacking_is_a_state_and_comes_before_what_is_doubtful() {
+    let doubtful = LiveState { position: PositionState::Doubtful(PositionDoubt::Cable), ..state() };
+    assert_eq!(doubtful.condition(), Condition::CannotSay(PositionDoubt::Cable));
+    assert_eq!(LiveState { speed_mps: Some(0.11), ..doubtful }.condition(), Condition::TooFast);
+    let coarse = LiveState { advice: Some(advice(Reason::AngularStep, 0.0, 0.9)), ..state() };
+    assert_eq!(coarse.condition(), Condition::NoSpeed);
+    let mut mute = doubtful;
+    mute.heard[..2].fill(Some(at(7)));
+    assert_eq!(mute.condition(), Condition::NoSonar);
+    let lost = LiveState { position: PositionState::None(NoFix::Chainage), ..mute };
+    assert_eq!(lost.condition(), Condition::NoPosition(NoFix::Chainage));
+    let old = LiveState { now: at(42), ..lost };
+    assert_eq!(old.condition(), Condition::Old(DurNs(32_000_000_000)));
+    assert_eq!(LiveState { at: None, ..old }.condition(), Condition::NoData);
+}
+
+#[test]
+fn it_grows_old_as_ticks_go_on_without_data() {
+    let after = |ms: u64| LiveState { now: MonoNs(at(10).0 + ms * 1_000_000), ..state() };
+    assert_eq!([after(2000), after(2001)].map(|state| state.is_old()), [false, true]);
+    assert_eq!(
+        [after(2000), after(2001)].map(|state| state.sensor(0)),
+        [SensorState::Ok, SensorState::Silent]
+    );
+    assert_eq!(after(30_000).age().map(DurNs::as_secs_f64), Some(30.0));
+    assert_eq!(LiveState { now: at(9), ..state() }.age(), Some(DurNs(0)), "a clock that was set back");
+}
+
+#[test]
+fn sensors_say_how_they_are() {
+    let mut state = state();
+    state.heard[2] = None;
+    state.turning = 0b01;
+    let all = [0, 1, 2].map(|source| state.sensor(source));
+    assert_eq!(all, [SensorState::Ok, SensorState::Stalled, SensorState::Never]);
+    assert_eq!(state.silent().collect::<Vec<_>>(), [2]);
+}

@@ -1,0 +1,224 @@
+//! The live state as JSON: plain values with units in their names, ages against the tick, old marked as old.
+//! `docs/live-state.schema.json` is its schema. Allocates: for outlets' threads, not for the loop's.
+
+use serde::Serialize;
+
+use super::{LIVE_STATE_VERSION, Lamp, LiveMetres, LiveState, PositionState, SensorState};
+use crate::app::SourceInfo;
+use crate::pilot_text::station;
+use headrace_geometry::time::{DurNs, MonoNs};
+
+/// The live state as JSON. Field names are the contract.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LiveStateJson {
+    /// Version of this schema.
+    pub version: u32,
+    /// When it was published, seconds on the log's clock.
+    pub now_s: f64,
+    /// The beat that it is as of; `None` before the first.
+    pub at_s: Option<f64>,
+    /// How old it is then, seconds.
+    pub age_s: Option<f64>,
+    /// Whether to show it as old.
+    pub old: bool,
+    /// What holds first, a word.
+    pub condition: &'static str,
+    /// Its colour.
+    pub lamp: Lamp,
+    /// The position.
+    pub position: PositionJson,
+    /// Speed along the tunnel, positive inwards, m/s; `None` without a position.
+    pub speed_mps: Option<f64>,
+    /// The largest speed at which the target is met, m/s; `None` where there is none.
+    pub v_max_mps: Option<f64>,
+    /// What limits the speed; `None` before the first advice.
+    pub reason: Option<&'static str>,
+    /// What is left, and what is kept back.
+    pub margins: MarginsJson,
+    /// Forecast of the present turn.
+    pub turn: Option<TurnJson>,
+    /// Every sensor, in the order of the vehicle file.
+    pub sensors: Vec<SensorJson>,
+    /// Metres of the way; together they are `way_m`.
+    pub metres: MetresJson,
+    /// The stretch of which nothing could be said that was judged last.
+    pub cannot_say: Option<StretchJson>,
+    /// Alerts that hold now.
+    pub alerts: Vec<AlertJson>,
+}
+
+/// A position.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PositionJson {
+    /// `ok`, `doubtful` or `none`.
+    pub state: &'static str,
+    /// Why it is doubtful (`cable`, `spread`), or what is lacking (`no_heading`, `no_chainage`, `no_place_in_section`).
+    pub why: Option<&'static str>,
+    /// Chainage, m.
+    pub chainage_m: Option<f64>,
+    /// The same as engineers write it.
+    pub station: Option<String>,
+    /// Standard deviations: chainage and place in the section, m.
+    pub chainage_sd_m: Option<f64>,
+    /// See `chainage_sd_m`.
+    pub place_sd_m: Option<f64>,
+    /// Standard deviation of yaw, degrees.
+    pub yaw_sd_deg: Option<f64>,
+    /// Standard deviation of one pass against the next, m; `None` without a position.
+    pub pass_sd_m: Option<f64>,
+}
+
+/// What is left to limits, and what is kept back.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct MarginsJson {
+    /// v_max less the speed, m/s; below zero is too fast.
+    pub speed_mps: Option<f64>,
+    /// Target less the T forecast for the present turn, m; below zero it fails.
+    pub turn_m: Option<f64>,
+    /// What position errors take of the target, m: the confidence times the standard deviation of one pass against the next.
+    pub position_m: Option<f64>,
+}
+
+/// Forecast of the present turn at the present speed.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct TurnJson {
+    /// Target T, m.
+    pub target_m: f64,
+    /// T predicted, m; `None` where it is unbounded.
+    pub predicted_t_m: Option<f64>,
+    /// Whether it will exceed the target.
+    pub will_exceed: bool,
+    /// Largest step along the wall, m.
+    pub t_y_m: f64,
+    /// Longest time between two passes, seconds.
+    pub pass_gap_s: f64,
+    /// Phase error of the heads, degrees.
+    pub phase_error_deg: Option<f64>,
+}
+
+/// A sensor.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SensorJson {
+    /// Its id.
+    pub id: String,
+    /// Its state.
+    pub state: SensorState,
+    /// How long ago its last reading came, seconds; `None` if none has.
+    pub age_s: Option<f64>,
+    /// Whether it is a profiling head.
+    pub is_head: bool,
+}
+
+/// Metres of the way.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct MetresJson {
+    /// By state.
+    #[serde(flatten)]
+    pub by_state: LiveMetres,
+    /// Their sum.
+    pub way_m: f64,
+}
+
+/// A stretch.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct StretchJson {
+    /// Why: `not_inspected`, `position`, `several_stretches`, `doubtful_returns`, `distrusted_head`, `contradicted_profile`,
+    /// `other_size` or `no_wall`.
+    pub why: &'static str,
+    /// Where it begins, m.
+    pub from_m: f64,
+    /// Where it ends, m.
+    pub to_m: f64,
+}
+
+/// An alert.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct AlertJson {
+    /// Its kind.
+    pub kind: &'static str,
+    /// The head that isn't believed, by its id.
+    pub head: Option<String>,
+    /// When it began, seconds on the log's clock.
+    pub since_s: f64,
+}
+
+impl LiveState {
+    /// As JSON. `section_m` is the length of a section.
+    pub fn json(&self, sources: &[SourceInfo], section_m: f64) -> LiveStateJson {
+        let condition = self.condition();
+        let advice = self.advice.as_ref();
+        let name = |source: usize| sources.get(source).map(|source| source.id.clone());
+        let less = |limit: Option<f64>, of: Option<f64>| limit.zip(of).map(|(limit, of)| limit - of);
+        let predicted_m = advice.and_then(|advice| advice.predicted_t_m);
+        let has_position = !matches!(self.position, PositionState::None(_));
+        let pass_sd_m = Some(self.pass_sd_m).filter(|_| has_position);
+        LiveStateJson {
+            version: LIVE_STATE_VERSION,
+            now_s: self.now.as_secs_f64(),
+            at_s: self.at.map(MonoNs::as_secs_f64),
+            age_s: self.age().map(DurNs::as_secs_f64),
+            old: self.is_old(),
+            condition: condition.as_str(),
+            lamp: condition.lamp(),
+            position: self.position_json(pass_sd_m),
+            speed_mps: self.speed_mps,
+            v_max_mps: self.v_max_mps(),
+            reason: advice.map(|advice| advice.reason.as_str()),
+            margins: MarginsJson {
+                speed_mps: less(self.v_max_mps(), self.speed_mps.map(f64::abs)),
+                turn_m: less(Some(self.target_m), predicted_m),
+                position_m: pass_sd_m.map(|sd_m| self.confidence_sd * sd_m),
+            },
+            turn: advice.map(|advice| TurnJson {
+                target_m: self.target_m,
+                predicted_t_m: predicted_m,
+                will_exceed: advice.will_exceed,
+                t_y_m: advice.t_y_m,
+                pass_gap_s: advice.pass_gap_s,
+                phase_error_deg: advice.phase_error_rad.map(f64::to_degrees),
+            }),
+            sensors: (0..usize::from(self.sources))
+                .map(|source| SensorJson {
+                    id: name(source).unwrap_or_default(),
+                    state: self.sensor(source),
+                    age_s: self.age_of(source).map(DurNs::as_secs_f64),
+                    is_head: self.heads >> source & 1 == 1,
+                })
+                .collect(),
+            metres: MetresJson { by_state: self.metres, way_m: self.metres.way_m() },
+            cannot_say: self.unsure.map(|stretch| StretchJson {
+                why: stretch.why.as_str(),
+                from_m: stretch.from as f64 * section_m,
+                to_m: stretch.to as f64 * section_m,
+            }),
+            alerts: self
+                .alerts
+                .iter()
+                .flatten()
+                .map(|alert| AlertJson {
+                    kind: alert.kind.as_str(),
+                    head: alert.source.and_then(|source| name(source.index())),
+                    since_s: alert.since.as_secs_f64(),
+                })
+                .collect(),
+        }
+    }
+
+    fn position_json(&self, pass_sd_m: Option<f64>) -> PositionJson {
+        PositionJson {
+            state: self.position.as_str(),
+            why: match self.position {
+                PositionState::Ok => None,
+                PositionState::Doubtful(super::PositionDoubt::Cable) => Some("cable"),
+                PositionState::Doubtful(super::PositionDoubt::Spread) => Some("spread"),
+                PositionState::None(lacking) => Some(lacking.as_str()),
+            },
+            chainage_m: self.chainage_m,
+            station: self.chainage_m.map(station),
+            chainage_sd_m: self.sd.map(|sd| sd.along_m),
+            place_sd_m: self.sd.map(|sd| sd.place_m),
+            yaw_sd_deg: self.sd.map(|sd| sd.yaw_rad.to_degrees()),
+            pass_sd_m,
+        }
+    }
+}

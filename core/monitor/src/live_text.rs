@@ -1,0 +1,275 @@
+//! Words for what is told live: the place first, then what, then what to do. Terminals break them to their width.
+
+use super::live_state::{Condition, Lamp, LiveMetres, LiveState, PositionDoubt};
+use super::pilot_text::{AdviceFigures, action_text, advice_text, cause_text, station};
+use super::telling::{Told, UnsureStretch};
+use headrace_coverage::{Action, Unsure};
+use headrace_fusion::NoFix;
+use headrace_geometry::time::DurNs;
+use headrace_geometry::tunnel::Profile;
+
+/// A line for the pilot.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct PilotLine {
+    /// Where: a stationing, or two.
+    pub place: String,
+    /// How fast; empty where that isn't said.
+    pub speed: String,
+    /// What, the most important part first; a narrow screen leaves the last parts out.
+    pub what: Vec<String>,
+    /// What to do; empty where there is nothing.
+    pub action: String,
+    /// Its colour; `None` where it has none.
+    pub lamp: Option<Lamp>,
+}
+
+impl PilotLine {
+    /// All of it in one line.
+    pub fn text(&self) -> String {
+        let mut text = format!("{:<9}  ", self.place);
+        if !self.speed.is_empty() {
+            text.push_str(&self.speed);
+            text.push_str("  ");
+        }
+        text.push_str(&self.what.join("  "));
+        if !self.action.is_empty() {
+            text.push_str("  -> ");
+            text.push_str(&self.action);
+        }
+        text
+    }
+
+    /// Broken into lines of at most `columns`, the later ones indented below the first one's words.
+    pub fn broken(&self, columns: usize) -> Vec<String> {
+        let whole = self.text();
+        if whole.chars().count() <= columns {
+            return vec![whole];
+        }
+        let mut lines = vec![format!("{:<9} ", self.place)];
+        let mut put = |word: &str, anew: bool| {
+            let Some(line) = lines.last_mut() else { return };
+            if anew || line.chars().count() + 1 + word.chars().count() > columns && !line.trim().is_empty() {
+                lines.push(format!("{:<10} {word}", ""));
+            } else {
+                line.push(' ');
+                line.push_str(word);
+            }
+        };
+        self.what.iter().flat_map(|part| part.split(' ')).for_each(|word| put(word, false));
+        if !self.action.is_empty() {
+            put("->", true);
+            self.action.split(' ').for_each(|word| put(word, false));
+        }
+        lines
+    }
+
+    /// As much of a status as fits into `columns`: the last parts are left out, then the speed, and what still doesn't fit is
+    /// cut off.
+    pub fn cut(&self, columns: usize) -> String {
+        let mut line = self.clone();
+        let is_wide = |line: &Self| line.text().chars().count() > columns;
+        while is_wide(&line) && line.what.len() > 1 {
+            line.what.pop();
+        }
+        // What holds is more than how fast it goes.
+        if is_wide(&line) {
+            line.speed.clear();
+        }
+        line.text().chars().take(columns).collect()
+    }
+}
+
+/// The status: where, how fast, what holds and what to do about it; then the turn's forecast, silent sensors, and failed
+/// metres. `name` gives a source's id.
+pub fn status_line(state: &LiveState, profile: &Profile, name: &dyn Fn(usize) -> String) -> PilotLine {
+    let condition = state.condition();
+    let place = state.chainage_m.map_or_else(|| "-+---.--".to_owned(), station);
+    let v_max = state.v_max_mps().map_or_else(String::new, |mps| format!("{mps:.2} m/s"));
+    let (what, action) = match condition {
+        Condition::NoData => (waiting_text(state).to_owned(), String::new()),
+        Condition::Old(age) => (format!("OLD {}: nothing from any sensor", age_text(age)), "stop".to_owned()),
+        Condition::NoPosition(lacking) => (no_position_text(lacking).to_owned(), "hold still".to_owned()),
+        Condition::NoSonar => ("NO SONAR: nothing is seen".to_owned(), "stop".to_owned()),
+        Condition::NoSpeed => (no_speed_text(state, profile), String::new()),
+        Condition::TooFast => ("TOO FAST".to_owned(), format!("at most {v_max}")),
+        Condition::TurnFails => (turn_fails_text(state), format!("go {v_max}")),
+        Condition::CannotSay(doubt) => (doubt_text(doubt, state), format!("at most {v_max}")),
+        Condition::Over => ("a little fast".to_owned(), format!("at most {v_max}")),
+        Condition::Good => (format!("ok up to {v_max}"), String::new()),
+    };
+    let is_old = matches!(condition, Condition::Old(_) | Condition::NoData);
+    let speed = match state.speed_mps {
+        Some(speed_mps) if !is_old => format!("{speed_mps:.2} m/s"),
+        _ => String::new(),
+    };
+    let mut parts = vec![what];
+    if !is_old {
+        let silent: Vec<usize> = state.silent().collect();
+        match silent.as_slice() {
+            [] => {}
+            [one] => parts.push(format!("{} silent", name(*one))),
+            some => parts.push(format!("{} of {} sensors silent", some.len(), state.sources)),
+        }
+        parts.extend(forecast_text(state).filter(|_| state.has_sonar() && state.speed_mps.is_some()));
+    }
+    if state.metres.fail_m > 0.0 {
+        parts.push(format!("missed {:.2} m", state.metres.fail_m));
+    }
+    PilotLine { place, speed, what: parts, action, lamp: Some(condition.lamp()) }
+}
+
+fn waiting_text(state: &LiveState) -> &'static str {
+    let is_heard = state.heard.iter().any(Option::is_some);
+    if is_heard { "STARTING" } else { "WAITING: nothing from any sensor yet" }
+}
+
+fn age_text(age: DurNs) -> String {
+    let seconds = age.as_secs_f64();
+    if seconds < 100.0 { format!("{seconds:.0} s") } else { format!("{:.0} min", seconds / 60.0) }
+}
+
+fn no_position_text(lacking: NoFix) -> &'static str {
+    match lacking {
+        NoFix::Heading => "NO POSITION: no heading",
+        NoFix::Chainage => "NO POSITION: no chainage",
+        NoFix::Section => "NO POSITION: no place across",
+    }
+}
+
+fn figures(state: &LiveState) -> Option<AdviceFigures> {
+    state.advice.as_ref().map(|advice| AdviceFigures::of(advice, state.speed_mps.unwrap_or(0.0)))
+}
+
+fn no_speed_text(state: &LiveState, profile: &Profile) -> String {
+    figures(state).map_or_else(String::new, |figures| advice_text(&figures, profile))
+}
+
+fn turn_fails_text(state: &LiveState) -> String {
+    let error_deg = state.advice.and_then(|advice| advice.phase_error_rad).unwrap_or(0.0).to_degrees().abs();
+    if error_deg >= 1.0 {
+        format!("THIS TURN MISSES: heads {error_deg:.0} degrees out of phase")
+    } else {
+        "THIS TURN MISSES".to_owned()
+    }
+}
+
+fn doubt_text(doubt: PositionDoubt, state: &LiveState) -> String {
+    match doubt {
+        PositionDoubt::Cable => "CAN'T SAY: cable doubted".to_owned(),
+        PositionDoubt::Spread => {
+            format!("CAN'T SAY: position ±{:.2} m", state.confidence_sd * state.pass_sd_m)
+        }
+    }
+}
+
+/// The T forecast for the present turn, against the target.
+fn forecast_text(state: &LiveState) -> Option<String> {
+    let advice = state.advice.as_ref().filter(|_| state.v_max_mps().is_some())?;
+    Some(match advice.predicted_t_m {
+        Some(t_m) => format!("turn {t_m:.2} of {} m", state.target_m),
+        None => "turn: unseen wall".to_owned(),
+    })
+}
+
+/// Metres of the way by state; nothing of what there is none.
+pub fn metres_text(metres: &LiveMetres) -> String {
+    let LiveMetres { pass_m, fail_m, cannot_say_m, open_m, not_inspected_m } = *metres;
+    let all = [
+        (fail_m, "missed"),
+        (cannot_say_m, "can't say"),
+        (open_m, "open"),
+        (not_inspected_m, "not inspected"),
+    ];
+    let others = all.into_iter().filter(|(metres_m, _)| *metres_m > 0.0);
+    let parts = others.map(|(metres_m, what)| format!("{what} {metres_m:.2} m"));
+    let passed = format!("passed {pass_m:.2} m");
+    core::iter::once(passed).chain(parts).collect::<Vec<_>>().join(", ")
+}
+
+/// Line of something to tell.
+pub fn told_line(told: &Told, profile: &Profile) -> PilotLine {
+    let line = |place: String, what: String, action: String, lamp: Option<Lamp>| PilotLine {
+        place,
+        speed: String::new(),
+        what: vec![what],
+        action,
+        lamp,
+    };
+    let to = |from_m: f64, to_m: f64| format!("{} to {}", station(from_m), station(to_m));
+    match told {
+        Told::Flag { from_m, missed, .. } => {
+            let action = action_text(Action::of(missed.figures.cause), *from_m, missed.v_max_mps);
+            let clock = profile.clock(missed.hole_arc_m);
+            let what = format!(
+                "MISSED: {}, holes over {} m at {clock}",
+                cause_text(&missed.figures),
+                missed.target_m
+            );
+            line(station(*from_m), what, action, Some(Lamp::Red))
+        }
+        Told::FlagEnds { from_m, to_m, .. } => {
+            line(station(*from_m), format!("missed until {}", station(*to_m)), String::new(), None)
+        }
+        Told::Cleared { from_m, to_m, .. } => line(
+            station(*from_m),
+            format!("CLEARED until {}", station(*to_m)),
+            String::new(),
+            Some(Lamp::Green),
+        ),
+        Told::CannotSay(stretch) => {
+            let what = format!("CAN'T SAY: {}", unsure_text(stretch));
+            line(station(stretch.from_m), what, helps_text(stretch.why).to_owned(), Some(Lamp::Amber))
+        }
+        Told::CannotSayEnds(stretch) => {
+            let what = format!("can't say until {}", station(stretch.to_m));
+            line(station(stretch.from_m), what, String::new(), None)
+        }
+        Told::NotInspected(stretch) => {
+            let what = format!("NOT INSPECTED: {}", unsure_text(stretch));
+            let place = to(stretch.from_m, stretch.to_m);
+            line(place, what, helps_text(stretch.why).to_owned(), Some(Lamp::Amber))
+        }
+        // Its text begins with the place.
+        Told::Alert { x_m, text, .. } => {
+            let place = station(*x_m);
+            let said = text.strip_prefix(&format!("ch {place}")).unwrap_or(text).trim_start();
+            line(place, format!("ALERT: {said}"), String::new(), Some(Lamp::Red))
+        }
+        Told::Way { from_m, to_m, metres } => {
+            line(to(*from_m, *to_m), format!("WAY: {}", metres_text(metres)), String::new(), None)
+        }
+    }
+}
+
+/// Why nothing can be said of a stretch, with its figures.
+pub fn unsure_text(stretch: &UnsureStretch) -> String {
+    match stretch.why {
+        Unsure::NotInspected => format!("{:.2} m not seen from both sides", stretch.metres_m),
+        Unsure::Position => {
+            format!("hole {:.2} m, give or take {:.2} m", stretch.hole_m, stretch.hole_error_m)
+        }
+        Unsure::SeveralStretches => "position lost or doubted between passes".to_owned(),
+        Unsure::DoubtfulReturns => "more doubtful returns than wall".to_owned(),
+        Unsure::DistrustedHead => "seen by a head that isn't believed".to_owned(),
+        Unsure::ContradictedProfile => "the wall isn't where the design says".to_owned(),
+        Unsure::OtherSize => "the cross-section isn't the design's".to_owned(),
+        Unsure::NoWall => "a declared opening, no wall".to_owned(),
+    }
+}
+
+/// What would help; empty where nothing does.
+pub fn helps_text(why: Unsure) -> &'static str {
+    match why {
+        Unsure::NotInspected => "pass it whole to inspect it",
+        Unsure::Position => "slower, or again with a surer position",
+        Unsure::SeveralStretches => "pass it again in one go",
+        Unsure::DoubtfulReturns => "pass it again in clear water",
+        Unsure::DistrustedHead => "pass it again without that head",
+        Unsure::ContradictedProfile => "check profile, sound speed and tether zero",
+        Unsure::OtherSize => "check profile and sound speed",
+        Unsure::NoWall => "",
+    }
+}
+
+#[cfg(test)]
+mod tests;

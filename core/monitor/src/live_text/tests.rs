@@ -1,0 +1,105 @@
+use super::*;
+use crate::live_state::{PositionState, test_state};
+use headrace_geometry::time::MonoNs;
+use headrace_geometry::tunnel::shapes;
+
+fn status(state: &LiveState) -> PilotLine {
+    let profile = shapes::circle(3.0).unwrap();
+    status_line(state, &profile, &|source| ["sonar_0", "sonar_1", "tether"][source].to_owned())
+}
+
+/// What there is to show, as states.
+fn states() -> Vec<LiveState> {
+    let good = test_state();
+    let speed = |mps: f64| {
+        let mut state = good;
+        state.speed_mps = Some(mps);
+        state
+    };
+    let mut one_silent = good;
+    one_silent.heard[1] = Some(MonoNs(0));
+    let mut mute = one_silent;
+    mute.heard[0] = None;
+    vec![
+        good,
+        speed(0.073),
+        LiveState { metres: LiveMetres { fail_m: 7.25, ..good.metres }, ..speed(0.11) },
+        one_silent,
+        mute,
+        LiveState { position: PositionState::Doubtful(PositionDoubt::Cable), ..good },
+        LiveState { position: PositionState::Doubtful(PositionDoubt::Spread), pass_sd_m: 0.15, ..good },
+        LiveState {
+            position: PositionState::None(NoFix::Section),
+            chainage_m: None,
+            speed_mps: None,
+            ..good
+        },
+        LiveState { now: MonoNs(42_000_000_000), ..good },
+        LiveState { now: MonoNs(400_000_000_000), ..good },
+        LiveState { at: None, chainage_m: None, heard: [None; 64], ..good },
+    ]
+}
+
+#[test]
+fn the_status_at_sixty_columns_and_whole() {
+    let lines = |columns: usize| states().iter().map(|state| status(state).cut(columns)).collect::<Vec<_>>();
+    let narrow = lines(60);
+    assert!(narrow.iter().all(|line| line.chars().count() <= 60));
+    for (line, state) in narrow.iter().zip(states()) {
+        let whole = status(&state);
+        assert!(line.contains(whole.what[0].as_str()) && line.ends_with(&whole.action), "{line}");
+    }
+    insta::assert_snapshot!(narrow.join("\n"));
+    insta::assert_snapshot!(lines(200).join("\n"));
+}
+
+fn stretch(why: Unsure) -> UnsureStretch {
+    UnsureStretch {
+        why,
+        from_m: 1240.5,
+        to_m: 1246.25,
+        metres_m: 5.75,
+        hole_m: 0.486,
+        hole_sd_m: 0.04,
+        hole_error_m: 0.08,
+    }
+}
+
+#[test]
+fn what_cannot_be_said_is_told_with_why_and_what_helps() {
+    let profile = shapes::circle(3.0).unwrap();
+    let mut text = String::new();
+    for why in Unsure::ALL {
+        let told = if why == Unsure::NotInspected {
+            Told::NotInspected(stretch(why))
+        } else {
+            Told::CannotSay(stretch(why))
+        };
+        let lines = told_line(&told, &profile).broken(60);
+        assert!(lines.iter().all(|line| line.chars().count() <= 60), "{lines:#?}");
+        text.push_str(&lines.join("\n"));
+        text.push('\n');
+    }
+    insta::assert_snapshot!(text);
+}
+
+#[test]
+fn a_line_is_broken_between_words_and_what_to_do_begins_anew() {
+    let line = PilotLine {
+        place: "0+014.25".to_owned(),
+        speed: String::new(),
+        what: vec!["MISSED: too fast (0.32 m/s), holes over 0.5 m at 8:00".to_owned()],
+        action: "go back to 0+014.25, then at most 0.09 m/s".to_owned(),
+        lamp: None,
+    };
+    insta::assert_snapshot!(line.broken(60).join("\n"), @r"
+    0+014.25   MISSED: too fast (0.32 m/s), holes over 0.5 m at
+               8:00
+               -> go back to 0+014.25, then at most 0.09 m/s
+    ");
+    assert_eq!(line.broken(200), [line.text()]);
+    let widths = |columns: usize| line.broken(columns).iter().map(|l| l.chars().count()).max().unwrap();
+    assert!((40..130).all(|columns| widths(columns) <= columns));
+    let words = |text: &str| text.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
+    assert_eq!(words(&line.broken(40).join(" ")), words(&line.text()), "nothing is lost");
+}

@@ -1,0 +1,45 @@
+//! Stretches of which neither a pass nor a fail can be told, in the report.
+
+use serde::Serialize;
+
+use crate::resources::Coverage;
+use crate::telling::UnsureStretch;
+
+/// Neighbouring sections of which neither a pass nor a fail can be told for one reason, though nothing more will come.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct UnsureReport {
+    /// `not_inspected`, `position`, `several_stretches`, `doubtful_returns`, `distrusted_head`, `contradicted_profile`,
+    /// `other_size` or `no_wall`.
+    pub why: &'static str,
+    /// Where it begins, m.
+    pub start_m: f64,
+    /// Where it ends, m.
+    pub end_m: f64,
+    /// Metres of it that are unsure.
+    pub unsure_m: f64,
+    /// Its largest hole, m.
+    pub hole_m: f64,
+    /// Standard deviation of that hole, m.
+    pub hole_sd_m: f64,
+    /// The stretch, for its text.
+    #[serde(skip)]
+    pub stretch: UnsureStretch,
+}
+
+pub(super) fn unsure_reports(coverage: &Coverage) -> Vec<UnsureReport> {
+    let sections = &coverage.sections;
+    let stretches = sections.unsure_stretches(coverage.frontier.way());
+    let report = |stretch: UnsureStretch| {
+        let UnsureStretch { why, from_m, to_m, metres_m, hole_m, hole_sd_m, .. } = stretch;
+        UnsureReport {
+            why: why.as_str(),
+            start_m: from_m,
+            end_m: to_m,
+            unsure_m: metres_m,
+            hole_m,
+            hole_sd_m,
+            stretch,
+        }
+    };
+    stretches.iter().map(|stretch| report(UnsureStretch::of(stretch, sections))).collect()
+}

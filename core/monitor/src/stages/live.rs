@@ -1,0 +1,184 @@
+//! The live state: what earlier stages have found, as of each beat.
+
+use bevy_ecs::prelude::{Query, Res, ResMut};
+
+use crate::alerts::{AlertKind, Alerts};
+use crate::entities::{HeadSweep, Mounted};
+use crate::live_state::{
+    ActiveAlert, ActiveAlerts, LiveMetres, LiveState, PositionDoubt, PositionState, source_bits,
+};
+use crate::messages::{
+    Doubts, Events, Notice, Notices, Placed, PlacedList, Positioned, PositionedList, Standing, Standings,
+};
+use crate::resources::{Coverage, Digests, TickTime, VehicleEntities};
+use crate::result_stream::{RecordKind, ResultStream};
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_sampling::head::HeadSet;
+use headrace_sampling::passes::Situation;
+use headrace_sensor::reading::SourceId;
+
+/// Share of the target that the advice keeps back for position errors at most.
+const SPREAD_SHARE: f64 = 0.2;
+/// How long an alert of single occurrences holds.
+const HOLDS: DurNs = DurNs(10_000_000_000);
+
+/// What has been judged, and the alerts that hold, at a beat.
+pub(super) fn standing<'a>(
+    at: MonoNs,
+    coverage: &Coverage,
+    alerts: &Alerts,
+    doubts: &Doubts,
+    heads: impl Iterator<Item = (SourceId, &'a HeadSweep)>,
+) -> Standing {
+    let metres = coverage.sections.metres(coverage.frontier.way());
+    Standing {
+        metres: LiveMetres {
+            pass_m: metres.pass_m,
+            fail_m: metres.fail_m,
+            cannot_say_m: metres.cannot_say_m,
+            open_m: metres.open_m - metres.not_inspected_m,
+            not_inspected_m: metres.not_inspected_m,
+        },
+        unsure: coverage.unsure,
+        alerts: active(at, alerts, doubts, heads),
+    }
+}
+
+fn active<'a>(
+    at: MonoNs,
+    alerts: &Alerts,
+    doubts: &Doubts,
+    heads: impl Iterator<Item = (SourceId, &'a HeadSweep)>,
+) -> ActiveAlerts {
+    let mut distrusted = HeadBits::default();
+    for (source, sweep) in heads {
+        if let Some(why) = sweep.wall.distrusted() {
+            distrusted.add(source, AlertKind::of_distrust(why).0);
+        }
+    }
+    let mut active = [None; crate::alerts::MOST_ALERTS];
+    let holds = alerts.iter().filter(|alert| match alert.kind {
+        AlertKind::CableDoubted => doubts.cable.is_some(),
+        AlertKind::SettingDoubted => doubts.setting.is_some(),
+        AlertKind::OutsideTunnel | AlertKind::ProfileContradicted => at.since(alert.latest).0 <= HOLDS.0,
+        kind @ (AlertKind::HeadScattered | AlertKind::HeadConstant | AlertKind::HeadOutvoted) => {
+            alert.source.is_some_and(|source| distrusted.has(source, kind))
+        }
+    });
+    for (slot, alert) in active.iter_mut().zip(holds) {
+        *slot = Some(ActiveAlert { kind: alert.kind, source: alert.source, since: alert.latest });
+    }
+    active
+}
+
+/// Why each source isn't believed: a set of sources by kind.
+#[derive(Default)]
+struct HeadBits([u64; AlertKind::ALL.len()]);
+
+impl HeadBits {
+    fn add(&mut self, source: SourceId, kind: AlertKind) {
+        if let Some(bits) = self.0.get_mut(kind as usize) {
+            *bits |= 1 << u64::from(source.0 % 64);
+        }
+    }
+
+    fn has(&self, source: SourceId, kind: AlertKind) -> bool {
+        self.0.get(kind as usize).is_some_and(|bits| bits >> u64::from(source.0 % 64) & 1 == 1)
+    }
+}
+
+#[expect(clippy::too_many_arguments, reason = "a system's arguments are what it reads and writes")]
+pub(super) fn live(
+    events: Res<'_, Events>,
+    positioned: Res<'_, PositionedList>,
+    placed: Res<'_, PlacedList>,
+    standings: Res<'_, Standings>,
+    notices: Res<'_, Notices>,
+    entities: Res<'_, VehicleEntities>,
+    sensors: Query<'_, '_, &Mounted>,
+    time: Res<'_, TickTime>,
+    mut state: ResMut<'_, LiveState>,
+    mut digests: ResMut<'_, Digests>,
+) {
+    let mut heard = 0;
+    let mut hear = |state: &mut LiveState, until: usize| {
+        for event in events.0.get(heard..until).unwrap_or_default() {
+            if let Some(slot) = state.heard.get_mut(event.source.index()) {
+                *slot = Some(event.received);
+            }
+        }
+        heard = until;
+    };
+    let situations = placed.0.iter().filter_map(|item| match item {
+        Placed::Situation(_, situation, _) => Some(situation),
+        Placed::Ping(_) => None,
+    });
+    let advice = notices.0.iter().filter_map(|notice| match notice {
+        Notice::Advice(entry) => Some(entry.advice),
+        _ => None,
+    });
+    let mut found = situations.zip(advice).zip(&standings.0);
+    for item in &positioned.0 {
+        let Positioned::Beat { at, doubts, sd, before, fix } = item else { continue };
+        let Some(((situation, advice), standing)) = found.next() else { continue };
+        hear(&mut state, *before);
+        let heads = entities.heads.iter().filter_map(|head| sensors.get(*head).ok());
+        let turning = (0..).zip(&situation.heads).filter(|(_, motion)| motion.is_some());
+        let turning = turning.fold(HeadSet::default(), |set, (head, _)| set.with(head));
+        let (target_m, confidence_sd) = (state.target_m, state.confidence_sd);
+        let reserved_m = confidence_sd * situation.pass_error_m;
+        *state = LiveState {
+            at: Some(*at),
+            position: match fix {
+                Err(lacking) => PositionState::None(*lacking),
+                Ok(_) if doubts.cable.is_some() => PositionState::Doubtful(PositionDoubt::Cable),
+                Ok(_) if reserved_m > SPREAD_SHARE * target_m => {
+                    PositionState::Doubtful(PositionDoubt::Spread)
+                }
+                Ok(_) => PositionState::Ok,
+            },
+            chainage_m: situation.pose.map(|pose| pose.position.x()),
+            sd: *sd,
+            pass_sd_m: situation.pass_error_m,
+            speed_mps: situation.pose.map(|_| situation.speed_mps),
+            advice: Some(advice),
+            metres: standing.metres,
+            unsure: standing.unsure,
+            alerts: standing.alerts,
+            turning: source_bits(heads.map(|head| head.source), turning),
+            ..*state
+        };
+        digest(&mut digests.states, *at, situation, &state);
+    }
+    hear(&mut state, events.0.len());
+    state.now = time.now;
+}
+
+fn digest(stream: &mut ResultStream, at: MonoNs, situation: &Situation, state: &LiveState) {
+    let LiveMetres { pass_m, fail_m, cannot_say_m, open_m, not_inspected_m } = state.metres;
+    let (why, from, to) = state.unsure.map_or((u64::MAX, 0, 0), |of| (of.why as u64, of.from, of.to));
+    let advice = state.advice.as_ref();
+    stream
+        .record(RecordKind::State)
+        .integer(at.0)
+        .integer(state.position.number())
+        .number(state.chainage_m.unwrap_or(0.0))
+        .number(situation.pass_error_m)
+        .number(situation.speed_mps)
+        .number(advice.map_or(0.0, |advice| advice.v_max_mps))
+        .integer(advice.map_or(u64::MAX, |advice| advice.reason as u64))
+        .number(advice.and_then(|advice| advice.predicted_t_m).unwrap_or(0.0))
+        .number(pass_m)
+        .number(fail_m)
+        .number(cannot_say_m)
+        .number(open_m)
+        .number(not_inspected_m)
+        .integer(why)
+        .integer(from.cast_unsigned())
+        .integer(to.cast_unsigned())
+        .integer(state.alert_bits())
+        .integer(state.turning);
+    for heard in state.heard.iter().take(state.sources.into()) {
+        stream.integer(heard.map_or(u64::MAX, |heard| heard.0));
+    }
+}

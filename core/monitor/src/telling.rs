@@ -1,0 +1,290 @@
+//! What is told of a dive as it happens: each situation once, neighbours as one stretch, with its end when that is known.
+//! The terminal's lines and those of `--json-lines` are made of it. Allocates: for outlets, not for a tick.
+
+use serde::Serialize;
+
+use super::live_state::{LiveMetres, LiveState};
+use super::messages::Notice;
+use super::pilot_text::{Missed, alert_text, setting_text};
+use super::run::Loop;
+use headrace_coverage::{Cause, Run, RunChange, RunId, Section, Sections, Stretch, Unsure, Verdict};
+use headrace_geometry::math::TAU;
+use headrace_geometry::time::{DurNs, MonoNs};
+
+/// Interval of the way and its metres by verdict, in data time.
+const WAY_EVERY: DurNs = DurNs(60_000_000_000);
+
+/// Something to tell. Field names are the contract of `--json-lines`; lengths in m.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(tag = "type", rename_all = "snake_case")]
+pub enum Told {
+    /// Sections were missed: where they begin.
+    Flag {
+        /// Number of the run.
+        run: u32,
+        /// Where it begins.
+        from_m: f64,
+        /// Why.
+        cause: Cause,
+        /// What its text needs.
+        #[serde(skip)]
+        missed: Missed,
+    },
+    /// The bounds of the run flagged last.
+    FlagEnds {
+        /// Number of the run.
+        run: u32,
+        /// Where it begins.
+        from_m: f64,
+        /// Where it ends.
+        to_m: f64,
+    },
+    /// A run was passed again and fails no more.
+    Cleared {
+        /// Number of the run.
+        run: u32,
+        /// Where it begins.
+        from_m: f64,
+        /// Where it ends.
+        to_m: f64,
+    },
+    /// Nothing can be said of a stretch, which goes on.
+    CannotSay(UnsureStretch),
+    /// The bounds of the stretch of which nothing could be said.
+    CannotSayEnds(UnsureStretch),
+    /// Not all heads have been here, where the way begins or turns back, and the vehicle is well beyond.
+    NotInspected(UnsureStretch),
+    /// An alert about the dive as a whole.
+    Alert {
+        /// Its kind.
+        kind: &'static str,
+        /// The head that isn't believed.
+        head: Option<String>,
+        /// Where.
+        x_m: f64,
+        /// Its text.
+        text: String,
+    },
+    /// The way so far.
+    Way {
+        /// Where it begins.
+        from_m: f64,
+        /// Where it ends.
+        to_m: f64,
+        /// Metres by state.
+        metres: LiveMetres,
+    },
+}
+
+/// A stretch of which neither a pass nor a fail can be told.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct UnsureStretch {
+    /// Why.
+    pub why: Unsure,
+    /// Where it begins, m.
+    pub from_m: f64,
+    /// Where it ends, m.
+    pub to_m: f64,
+    /// Its metres that are unsure.
+    pub metres_m: f64,
+    /// Its largest hole, m.
+    pub hole_m: f64,
+    /// Standard deviation of that hole, m.
+    pub hole_sd_m: f64,
+    /// By how much the hole may be larger or smaller: the confidence times its standard deviation, m.
+    pub hole_error_m: f64,
+}
+
+impl UnsureStretch {
+    /// From a stretch of sections.
+    pub fn of(stretch: &Stretch, sections: &Sections) -> Self {
+        let [hole_m, hole_sd_m] = stretch.hole_m;
+        Self {
+            why: stretch.why,
+            from_m: sections.bounds_m(stretch.from).0,
+            to_m: sections.bounds_m(stretch.to - 1).1,
+            metres_m: f64::from(stretch.sections) * sections.section_m(),
+            hole_m,
+            hole_sd_m,
+            hole_error_m: sections.confidence_sd() * hole_sd_m,
+        }
+    }
+}
+
+/// Makes what is told of the loop's notices.
+#[derive(Debug, Default)]
+pub struct Teller {
+    /// The run that was flagged last, until its end is told.
+    run: Option<RunId>,
+    /// The stretch that was told last, until its end is.
+    unsure: Option<Stretch>,
+    /// The stretches whose ends have been told.
+    told: Vec<Stretch>,
+    /// Sections at an end of the way, until the vehicle is well beyond.
+    at_ends: Option<Stretch>,
+    way_told: Option<MonoNs>,
+}
+
+impl Teller {
+    /// Forgets what goes on: playback has jumped.
+    pub fn forget(&mut self) {
+        *self = Self::default();
+    }
+
+    /// Takes a notice; `tell` gets what it means.
+    pub fn hear(&mut self, notice: &Notice, dive: &Loop, tell: &mut dyn FnMut(Told)) {
+        match notice {
+            Notice::Advice(_) => {}
+            Notice::Section { section, .. } => {
+                let sections = &dive.coverage().sections;
+                self.close_run_at(*section, sections, tell);
+                self.note_unsure(*section, sections, tell);
+            }
+            Notice::Run { id, change, .. } => self.run(*id, *change, dive, tell),
+            Notice::Alert(kind, source) => {
+                let Some(alert) = dive.alerts().get(*kind, *source) else { return };
+                let name = |source: u16| {
+                    dive.sources().get(usize::from(source)).map_or_else(String::new, |info| info.id.clone())
+                };
+                let head = source.map(|source| name(source.0));
+                let text = if let Some(doubt) = &alert.setting {
+                    setting_text(doubt, alert.x_m, &name)
+                } else {
+                    let head = head.clone().unwrap_or_default();
+                    alert_text(alert.kind, &head, alert.x_m, alert.worst_m)
+                };
+                tell(Told::Alert { kind: alert.kind.as_str(), head, x_m: alert.x_m, text });
+            }
+        }
+    }
+
+    /// Tells what is due by the live state, after every tick.
+    pub fn tick(&mut self, state: &LiveState, dive: &Loop, tell: &mut dyn FnMut(Told)) {
+        let Some(at) = state.at else { return };
+        let sections = &dive.coverage().sections;
+        // Counted from the first beat, as there is nothing to tell then.
+        let since = *self.way_told.get_or_insert(at);
+        if at.since(since).0.abs() >= WAY_EVERY.0 && state.metres.way_m() > 0.0 {
+            self.way_told = Some(at);
+            let range = sections.sections_of(dive.coverage().frontier.way());
+            let (from_m, to_m) = (sections.bounds_m(range.start).0, sections.bounds_m(range.end).0);
+            tell(Told::Way { from_m, to_m, metres: state.metres });
+        }
+        // That of a circle with the same perimeter.
+        let width_m = 2.0 * dive.mission().profile.perimeter_m() / TAU;
+        if let (Some(ends), Some(x_m)) = (self.at_ends, state.chainage_m) {
+            let off_m = (sections.bounds_m(ends.from).0 - x_m).max(x_m - sections.bounds_m(ends.to).0);
+            if off_m > width_m {
+                self.tell_ends(sections, tell);
+            }
+        }
+    }
+
+    /// Tells the ends of what goes on, at the end of a dive.
+    pub fn end(&mut self, sections: &Sections, tell: &mut dyn FnMut(Told)) {
+        self.close_run(sections, tell);
+        self.close_unsure(sections, tell);
+    }
+
+    fn tell_ends(&mut self, sections: &Sections, tell: &mut dyn FnMut(Told)) {
+        let Some(ends) = self.at_ends.take() else { return };
+        // Some may have been seen since.
+        let still = (ends.from..ends.to).filter_map(|index| sections.unsure(index));
+        let mut still = still.filter(|here| here.why == Unsure::NotInspected);
+        let Some(mut all) = still.next() else { return };
+        for here in still {
+            if !all.join(&here, sections.section_m()) {
+                break;
+            }
+        }
+        self.told.push(all);
+        tell(Told::NotInspected(UnsureStretch::of(&all, sections)));
+    }
+
+    fn note_unsure(&mut self, section: i64, sections: &Sections, tell: &mut dyn FnMut(Told)) {
+        let section_m = sections.section_m();
+        // That at an end is told later, if it still is so.
+        let is_settled = sections.get(section).is_some_and(|section| section.settled);
+        let lasts = |here: &Stretch| is_settled || here.why == Unsure::NotInspected;
+        let Some(here) = sections.unsure(section).filter(lasts) else {
+            let is_judged = sections.get(section).is_some_and(|section| section.verdict != Verdict::Open);
+            let beside = |last: &Stretch| section == last.to || section == last.from - 1;
+            if is_judged && self.unsure.as_ref().is_some_and(beside) {
+                self.close_unsure(sections, tell);
+            }
+            return;
+        };
+        let is_told = |told: &Stretch| told.why == here.why && (told.from..told.to).contains(&section);
+        if self.told.iter().any(is_told) {
+            return;
+        }
+        if here.why == Unsure::NotInspected {
+            if !self.at_ends.as_mut().is_some_and(|ends| ends.join(&here, section_m)) {
+                self.tell_ends(sections, tell);
+                self.at_ends = Some(here);
+            }
+        } else if !self.unsure.as_mut().is_some_and(|last| last.join(&here, section_m)) {
+            self.close_unsure(sections, tell);
+            self.unsure = Some(here);
+            tell(Told::CannotSay(UnsureStretch::of(&here, sections)));
+        }
+    }
+
+    fn close_unsure(&mut self, sections: &Sections, tell: &mut dyn FnMut(Told)) {
+        if let Some(stretch) = self.unsure.take() {
+            self.told.push(stretch);
+            tell(Told::CannotSayEnds(UnsureStretch::of(&stretch, sections)));
+        }
+    }
+
+    /// Tells the end of the run flagged last at a neighbouring section that doesn't fail.
+    fn close_run_at(&mut self, section: i64, sections: &Sections, tell: &mut dyn FnMut(Told)) {
+        // An open section may still join the run.
+        let other = |section: &Section| !section.is_flagged() && section.verdict != Verdict::Open;
+        let ends = sections.get(section).is_some_and(other);
+        let run = self.run.and_then(|id| sections.runs().get(id));
+        if ends && run.is_some_and(|run| section == run.to || section == run.from - 1) {
+            self.close_run(sections, tell);
+        }
+    }
+
+    fn close_run(&mut self, sections: &Sections, tell: &mut dyn FnMut(Told)) {
+        let Some(id) = self.run.take() else { return };
+        let Some(run) = sections.runs().get(id) else { return };
+        let (from_m, to_m) = bounds_m(run, sections);
+        tell(Told::FlagEnds { run: id.0, from_m, to_m });
+    }
+
+    fn run(&mut self, id: RunId, change: RunChange, dive: &Loop, tell: &mut dyn FnMut(Told)) {
+        let sections = &dive.coverage().sections;
+        let Some(run) = sections.runs().get(id) else { return };
+        let (from_m, to_m) = bounds_m(run, sections);
+        match change {
+            RunChange::Raised => {
+                self.close_run(sections, tell);
+                self.run = Some(id);
+                let evidence = sections.get(run.worst.0).and_then(|section| section.evidence);
+                let Some(evidence) = evidence else { return };
+                let missed = Missed {
+                    start_m: from_m,
+                    figures: (&evidence).into(),
+                    hole_arc_m: run.worst.1.arc_m,
+                    target_m: sections.target_m(),
+                    v_max_mps: dive.live_state().v_max_mps().unwrap_or(0.0),
+                };
+                tell(Told::Flag { run: id.0, from_m, cause: evidence.cause, missed });
+            }
+            RunChange::Cleared => {
+                // Sections whose cause has changed belong to another run, which is told.
+                if !(run.from..run.to).filter_map(|index| sections.get(index)).any(Section::is_flagged) {
+                    tell(Told::Cleared { run: id.0, from_m, to_m });
+                }
+            }
+            RunChange::Changed | RunChange::Merged => {}
+        }
+    }
+}
+
+fn bounds_m(run: &Run, sections: &Sections) -> (f64, f64) {
+    (sections.bounds_m(run.from).0, sections.bounds_m(run.to - 1).1)
+}

@@ -1,0 +1,105 @@
+//! Writes a dive's lines to stdout on a thread of its own: a terminal that doesn't read holds up no live dive.
+
+use std::thread::{self, JoinHandle};
+
+use crossbeam::channel::{Receiver, Sender, TrySendError, bounded};
+
+use crate::output::{put, say};
+use crate::transient;
+
+/// Lines that may wait. A dive has a line a second, and some for each stretch.
+const WAITING: usize = 1 << 10;
+
+enum Message {
+    Line(String),
+    /// A line that the next one overwrites.
+    Status(String),
+}
+
+/// Writes lines in order.
+pub(crate) struct Printer {
+    sender: Option<Sender<Message>>,
+    thread: Option<JoinHandle<()>>,
+    /// Drops what finds no room, instead of waiting for it.
+    lossy: bool,
+    dropped: u64,
+}
+
+impl Printer {
+    /// Starts the thread. A `lossy` printer never waits: what finds no room is dropped and counted.
+    pub(crate) fn start(lossy: bool) -> Self {
+        let (sender, messages) = bounded(WAITING);
+        // Without a thread everything is dropped, and said so at the end.
+        let thread = thread::Builder::new().name("terminal".to_owned()).spawn(move || print(&messages)).ok();
+        Self { sender: Some(sender), thread, lossy, dropped: 0 }
+    }
+
+    /// From now on nothing waits for the terminal.
+    pub(crate) fn drop_rather_than_wait(&mut self) {
+        self.lossy = true;
+    }
+
+    /// Writes a line.
+    pub(crate) fn line(&mut self, text: String) {
+        self.send(Message::Line(text));
+    }
+
+    /// Shows a line that the next one overwrites.
+    pub(crate) fn status(&mut self, text: String) {
+        self.send(Message::Status(text));
+    }
+
+    fn send(&mut self, message: Message) {
+        let Some(sender) = &self.sender else { return };
+        let full = if self.lossy {
+            matches!(sender.try_send(message), Err(TrySendError::Full(_)))
+        } else {
+            sender.send(message).is_err()
+        };
+        self.dropped += u64::from(full);
+    }
+
+    /// Waits until all has been written.
+    pub(crate) fn end(&mut self) {
+        drop(self.sender.take());
+        if let Some(thread) = self.thread.take()
+            && thread.join().is_err()
+        {
+            tracing::error!("the terminal's thread has ended early");
+        }
+        if self.dropped > 0 {
+            tracing::warn!(lines = self.dropped, "not shown: the terminal was behind");
+            self.dropped = 0;
+        }
+    }
+}
+
+impl Drop for Printer {
+    fn drop(&mut self) {
+        self.end();
+    }
+}
+
+fn print(messages: &Receiver<Message>) {
+    let mut has_status = false;
+    let close = |has_status: &mut bool| {
+        // A log message has already cleared it. What it said is no longer so.
+        if core::mem::take(has_status) && transient::take() {
+            put("\r\x1b[K");
+        }
+    };
+    for message in messages {
+        match message {
+            Message::Line(text) => {
+                close(&mut has_status);
+                say(&text);
+            }
+            Message::Status(text) => {
+                put(&format!("\r\x1b[K{text}"));
+                transient::shown();
+                has_status = true;
+            }
+        }
+    }
+    close(&mut has_status);
+}

@@ -1,0 +1,49 @@
+//! What stdout can show: whether lines may be overwritten and coloured, and how wide it is.
+
+use std::io::IsTerminal;
+
+use headrace_monitor::live_state::Lamp;
+
+/// Width of a terminal that doesn't say its own.
+const COLUMNS: usize = 80;
+/// Narrower ones are taken to be this wide.
+const LEAST_COLUMNS: usize = 40;
+
+/// What stdout can show.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Screen {
+    /// Lines can be overwritten.
+    pub(crate) overwrites: bool,
+    colours: bool,
+}
+
+impl Screen {
+    /// Of stdout: a terminal, unless `TERM` is `dumb`; in colour unless `NO_COLOR` is set.
+    pub(crate) fn of_stdout() -> Self {
+        let set = |name| std::env::var_os(name).filter(|value| !value.is_empty());
+        let overwrites = std::io::stdout().is_terminal() && set("TERM").is_none_or(|term| term != "dumb");
+        Self { overwrites, colours: overwrites && set("NO_COLOR").is_none() }
+    }
+
+    /// Columns that a line may fill, which may change; `None` where it may have any length: in a pipe or file. A full last
+    /// column would wrap on some terminals.
+    pub(crate) fn columns() -> Option<usize> {
+        let stdout = std::io::stdout();
+        if !stdout.is_terminal() {
+            return None;
+        }
+        let columns = rustix::termios::tcgetwinsize(&stdout).map_or(0, |size| usize::from(size.ws_col));
+        Some(if columns == 0 { COLUMNS } else { columns.max(LEAST_COLUMNS) } - 1)
+    }
+
+    /// A text in the colour of a lamp.
+    pub(crate) fn coloured(self, text: &str, lamp: Option<Lamp>) -> String {
+        let code = match lamp.filter(|_| self.colours) {
+            None => return text.to_owned(),
+            Some(Lamp::Green) => "32",
+            Some(Lamp::Amber) => "33",
+            Some(Lamp::Red) => "1;31",
+        };
+        format!("\x1b[{code}m{text}\x1b[0m")
+    }
+}

@@ -1,0 +1,100 @@
+//! A program on a pseudoterminal of some width, and what it wrote there.
+
+use std::fs::{File, OpenOptions};
+use std::io::Read;
+use std::process::{Child, Command};
+use std::sync::mpsc::{Receiver, sync_channel};
+use std::time::Duration;
+
+use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
+use rustix::termios::{Winsize, tcgetwinsize, tcsetwinsize};
+
+/// A program that runs on a pseudoterminal; ended with it.
+pub struct OnTerminal {
+    child: Child,
+    pieces: Receiver<Vec<u8>>,
+    written: Vec<u8>,
+}
+
+impl OnTerminal {
+    /// Starts a program on a terminal of so many columns.
+    pub fn start(mut command: Command, columns: u16) -> Self {
+        let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).unwrap();
+        grantpt(&master).unwrap();
+        unlockpt(&master).unwrap();
+        let name = ptsname(&master, Vec::new()).unwrap().into_string().unwrap();
+        let slave = OpenOptions::new().read(true).write(true).open(name).unwrap();
+        tcsetwinsize(&slave, Winsize { ws_row: 40, ws_col: columns, ws_xpixel: 0, ws_ypixel: 0 }).unwrap();
+        assert_eq!(tcgetwinsize(&slave).unwrap().ws_col, columns);
+        command.env("TERM", "xterm").env_remove("NO_COLOR");
+        command.stdin(slave.try_clone().unwrap()).stderr(slave.try_clone().unwrap()).stdout(slave);
+        let child = command.spawn().unwrap();
+        // Its own copies of the terminal's end.
+        drop(command);
+        let (sender, pieces) = sync_channel(1 << 10);
+        let mut master = File::from(master);
+        std::thread::spawn(move || {
+            let mut bytes = [0; 4096];
+            // The end of a terminal that nobody holds open is an error.
+            while let Ok(read) = master.read(&mut bytes) {
+                if read == 0 || sender.send(bytes[..read].to_vec()).is_err() {
+                    return;
+                }
+            }
+        });
+        Self { child, pieces, written: Vec::new() }
+    }
+
+    /// Waits until it has written a text since `from`, an index into all that it has written; returns the index after it.
+    /// Panics after a minute without.
+    pub fn wait_for(&mut self, text: &str, from: usize) -> usize {
+        loop {
+            let written = String::from_utf8_lossy(&self.written[from..]).into_owned();
+            if let Some(at) = written.find(text) {
+                return from + at + text.len();
+            }
+            match self.pieces.recv_timeout(Duration::from_mins(1)) {
+                Ok(piece) => self.written.extend(piece),
+                Err(why) => panic!("{text:?} wasn't written ({why}): {written}"),
+            }
+        }
+    }
+
+    /// Waits for its end; returns all that it has written.
+    pub fn all(mut self) -> String {
+        while let Ok(piece) = self.pieces.recv_timeout(Duration::from_mins(2)) {
+            self.written.extend(piece);
+        }
+        String::from_utf8_lossy(&self.written).into_owned()
+    }
+
+    /// All that it has written so far.
+    pub fn so_far(&self) -> String {
+        String::from_utf8_lossy(&self.written).into_owned()
+    }
+
+    /// Its process.
+    pub fn id(&self) -> u32 {
+        self.child.id()
+    }
+}
+
+impl Drop for OnTerminal {
+    fn drop(&mut self) {
+        drop(self.child.kill());
+        drop(self.child.wait());
+    }
+}
+
+/// The lines as shown: without colours, and of a line that was overwritten each version.
+pub fn shown_lines(written: &str) -> Vec<String> {
+    let mut plain = String::new();
+    let mut rest = written;
+    while let Some(at) = rest.find('\x1b') {
+        plain.push_str(&rest[..at]);
+        let end = rest[at..].find(|c: char| c.is_ascii_alphabetic()).map_or(rest.len(), |end| at + end + 1);
+        rest = &rest[end..];
+    }
+    plain.push_str(rest);
+    plain.split(['\n', '\r']).filter(|line| !line.is_empty()).map(str::to_owned).collect()
+}

@@ -1,0 +1,91 @@
+//! What a dive looks like on terminals of several widths, and to programs.
+
+use headrace_tests::Folder;
+use headrace_tests::pty::{OnTerminal, shown_lines};
+use serde_json::Value;
+
+/// Begun in the middle, too fast for a stretch, on and back; the heads die at the end.
+const SCENE: &str = "seed = 3\nvehicle = \"vita2-4.toml\"\n[vehicle_changes]\nheads.planned_speed_mps = 0.09\n[trajectory]\nstart_m = 3\n
+[[trajectory.legs]]\ndistance_m = 3\nspeed_mps = 0.09\n
+[[trajectory.legs]]\ndistance_m = 3\nspeed_mps = 0.4\n
+[[trajectory.legs]]\ndistance_m = 15\nspeed_mps = 0.09\n[effects]\n
+[[effects.device_faults]]\nkind = \"die\"\nsensors = [\"sonar_0\", \"sonar_1\", \"sonar_2\", \"sonar_3\"]\nfrom_s = 190\n";
+
+fn dive() -> Folder {
+    let folder = Folder::new();
+    folder.write("vita2-4.toml", include_str!("../../../deploy/vehicles/vita2-4.toml"));
+    folder.write("scene.toml", SCENE);
+    folder.simulate("scene.toml", "dive.mcap");
+    folder
+}
+
+fn on_terminal(folder: &Folder, columns: u16) -> String {
+    let mut command = headrace_tests::program();
+    command.arg("replay").arg(folder.path("dive.mcap")).args(["--speed", "max"]);
+    OnTerminal::start(command, columns).all()
+}
+
+#[test]
+fn no_line_wraps_at_sixty_columns_or_at_any_width() {
+    let folder = dive();
+    for columns in [60, 100, 200] {
+        let written = on_terminal(&folder, columns);
+        let lines = shown_lines(&written);
+        let wide: Vec<_> = lines.iter().filter(|line| line.chars().count() >= usize::from(columns)).collect();
+        assert!(wide.is_empty(), "{columns} columns: {wide:#?}");
+        for what in ["TOO FAST", "MISSED", "NOT INSPECTED", "NO SONAR", "ok up to"] {
+            assert!(lines.iter().any(|line| line.contains(what)), "{columns} columns, {what}: {lines:#?}");
+        }
+    }
+}
+
+#[test]
+fn a_status_is_red_while_the_vehicle_goes_too_fast_and_green_while_it_does_not() {
+    let written = on_terminal(&dive(), 100);
+    let statuses: Vec<&str> = written.split("\r\x1b[K").skip(1).collect();
+    let coloured = |code: &str, what: &str| {
+        let of: Vec<_> = statuses.iter().filter(|status| status.contains(what)).collect();
+        assert!(!of.is_empty() && of.iter().all(|status| status.starts_with(code)), "{what}: {of:#?}");
+    };
+    coloured("\x1b[1;31m", "TOO FAST");
+    coloured("\x1b[32m", "ok up to");
+    coloured("\x1b[1;31m", "NO SONAR");
+}
+
+#[test]
+fn in_a_pipe_there_are_neither_colours_nor_broken_lines() {
+    let folder = dive();
+    let answer = folder.headrace(&["replay", "dive.mcap"]);
+    assert!(!answer.stdout.contains(['\x1b', '\r']));
+    let missed = answer.stdout.lines().find(|line| line.contains("MISSED: too fast")).unwrap();
+    assert!(missed.contains(" -> go back to "), "{missed}");
+    insta::assert_snapshot!(answer.stdout.split("digest").next().unwrap());
+}
+
+#[test]
+fn json_lines_have_the_state_once_a_second_and_what_is_told_once() {
+    let folder = dive();
+    let answer = folder.headrace(&["replay", "dive.mcap", "--json-lines"]);
+    let lines: Vec<Value> = answer.stdout.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let schema: Value = serde_json::from_str(include_str!("../../../docs/live-state.schema.json")).unwrap();
+    for line in &lines {
+        let faults = headrace_tests::json_schema::faults(&schema, line);
+        assert!(faults.is_empty(), "{line:#}: {faults:#?}");
+    }
+    let of = |kind: &str| lines.iter().filter(|line| line["type"] == kind).collect::<Vec<_>>();
+    let (_, report) = folder.replay("dive.mcap", &[]);
+    let states = of("state");
+    let times: Vec<f64> = states.iter().map(|state| state["now_s"].as_f64().unwrap()).collect();
+    assert!(times.windows(2).all(|pair| pair[1] - pair[0] < 1.05), "{times:?}");
+    for state in &states {
+        let metres = &state["metres"];
+        let m = |key: &str| metres[key].as_f64().unwrap();
+        let sum = m("pass_m") + m("fail_m") + m("cannot_say_m") + m("open_m") + m("not_inspected_m");
+        assert!((sum - m("way_m")).abs() < 1e-9, "{metres}");
+    }
+    let runs = report["runs"].as_array().unwrap();
+    assert_eq!(of("flag").len(), runs.len(), "{runs:#?}");
+    assert!(of("not_inspected").len() == 1 && of("end").len() == 1);
+    assert_eq!(lines.last().unwrap()["type"], "end");
+    assert_eq!(lines.last().unwrap()["digest"], report["digest"]);
+}

@@ -1,0 +1,38 @@
+//! What the pilot sees when every device dies during a dive: the state grows old on the screen, though nothing comes.
+
+use std::io::{BufRead as _, BufReader};
+use std::process::Stdio;
+
+use headrace_tests::Folder;
+use headrace_tests::pty::{OnTerminal, shown_lines};
+
+use crate::rehearsal::{Running, headrace, scene};
+
+#[test]
+fn when_all_devices_die_the_state_grows_old_on_the_screen() {
+    let folder = Folder::new();
+    folder.write("scene.toml", scene(30.0));
+    let emulate = headrace()
+        .args(["emulate", "--stand", "0", "--out"])
+        .arg(folder.path("rehearsal"))
+        .arg(folder.path("scene.toml"))
+        .stdout(Stdio::piped())
+        .spawn();
+    let mut emulate = Running(emulate.unwrap());
+    let mut said = BufReader::new(emulate.0.stdout.take().unwrap()).lines().map(Result::unwrap);
+    let vehicle = said.find_map(|line| line.strip_prefix("vehicle ").map(str::to_owned)).unwrap();
+    let mut run = headrace_tests::program();
+    run.args(["run", &vehicle, "--no-record"]);
+    let mut run = OnTerminal::start(run, 60);
+    let before = run.wait_for(" m/s", 0);
+    emulate.0.kill().unwrap();
+    let old = run.wait_for("OLD ", before);
+    run.wait_for("OLD 6 s: nothing from any sensor", old);
+    let written = run.so_far();
+    let of_old: Vec<&str> = written.split("\r\x1b[K").filter(|status| status.contains("OLD ")).collect();
+    assert!(of_old.iter().all(|status| status.starts_with("\x1b[1;31m")), "in red: {of_old:#?}");
+    let last = written.split("\r\x1b[K").last().unwrap();
+    assert!(!last.contains("ok up to"), "{last}");
+    let wide: Vec<_> = shown_lines(&written).into_iter().filter(|line| line.chars().count() >= 60).collect();
+    assert!(wide.is_empty(), "{wide:#?}");
+}
