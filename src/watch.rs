@@ -1,7 +1,5 @@
 //! Terminal output during a dive: position, advised speed, and each missed stretch once.
 
-use std::io::IsTerminal;
-
 use headrace_coverage::{Run, RunChange, RunId, Section, Sections, Verdict};
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::advice_log::AdviceEntry;
@@ -14,6 +12,7 @@ use headrace_ports::{Phase, Status};
 use headrace_vehicle::Mission;
 
 use crate::output::{put, say};
+use crate::terminal::{self, Terminal};
 use crate::transient;
 
 /// Interval of state lines where they can't be overwritten, in the dive's time.
@@ -26,7 +25,7 @@ const REFRESH_EVERY: DurNs = DurNs(1_000_000_000);
 /// Shows a dive on stdout, unless quiet.
 pub(crate) struct Watch {
     quiet: bool,
-    terminal: bool,
+    terminal: Terminal,
     shown: Option<MonoNs>,
     way_shown: Option<MonoNs>,
     status_open: bool,
@@ -40,8 +39,8 @@ impl Watch {
     /// Shows the dive.
     pub(crate) fn loud() -> Self {
         Self {
-            quiet: false,
-            terminal: std::io::stdout().is_terminal(),
+            quiet: terminal::is_quiet(),
+            terminal: terminal::of(&std::io::stdout()),
             shown: None,
             way_shown: None,
             status_open: false,
@@ -130,7 +129,7 @@ impl Watch {
 
     fn status(&mut self, entry: &AdviceEntry, mission: &Mission) {
         self.v_max_mps = entry.advice.v_max_mps;
-        let every = if self.terminal { REFRESH_EVERY } else { LINE_EVERY };
+        let every = if self.terminal.overwrites { REFRESH_EVERY } else { LINE_EVERY };
         if self.shown.is_some_and(|shown| entry.at.since(shown).0 < every.0) {
             return;
         }
@@ -142,11 +141,12 @@ impl Watch {
             entry.speed_mps,
             advice_text(&entry.into(), &mission.profile)
         );
-        if self.terminal {
+        if self.terminal.overwrites {
             let advice = &entry.advice;
             let wrong = advice.will_exceed || advice.predicted_t_m.is_none();
             let colour = if wrong { "\x1b[33m" } else { "\x1b[32m" };
-            put(&format!("\r\x1b[K{colour}{line}\x1b[0m"));
+            let line = if self.terminal.colour { format!("{colour}{line}\x1b[0m") } else { line };
+            put(&format!("{}{line}", terminal::CLEAR));
             transient::shown();
             self.status_open = true;
         } else {
@@ -235,7 +235,7 @@ impl Watch {
 
     fn coloured(&mut self, text: &str, colour: Option<&str>) {
         self.close_status();
-        match colour.filter(|_| self.terminal) {
+        match colour.filter(|_| self.terminal.colour) {
             Some(colour) => say(&format!("{colour}{text}\x1b[0m")),
             None => say(text),
         }
