@@ -1,5 +1,6 @@
 //! The command line.
 
+mod habits;
 mod value_parsers;
 
 use std::path::PathBuf;
@@ -13,6 +14,7 @@ use headrace_sensor::connect::Connect;
 use tracing::level_filters::LevelFilter;
 
 use crate::watch::Show;
+pub(crate) use habits::{Completions, Man, Overwrite};
 
 pub(crate) use value_parsers::{Speed, speed, time};
 use value_parsers::{
@@ -22,7 +24,14 @@ use value_parsers::{
 
 /// Commands of `replay --interactive`.
 pub(crate) const COMMANDS: &str =
-    "pause, go, step [TICKS], seek TIME, ahead TIME, back TIME, speed N|max, end";
+    "pause, go, step [TICKS], seek TIME, ahead TIME, back TIME, speed N|max, end or quit";
+/// Its keys.
+pub(crate) const KEYS: &str =
+    "space pause or go, left and right 10 s, up and down 1 min, + - speed, . one tick, q leave";
+
+fn interactive_help() -> String {
+    format!("Keys in a terminal: {KEYS}; otherwise commands by lines on standard input: {COMMANDS}")
+}
 
 /// On-board coverage monitor for sonar inspection of flooded hydroelectric tunnels.
 #[derive(Debug, Parser)]
@@ -42,12 +51,17 @@ pub(crate) struct Verbosity {
     /// Log ports, files, phases and durations (-vv: everything); RUST_LOG=debug,headrace_ports=trace sets levels by crate.
     #[arg(short, long, action = ArgAction::Count, global = true)]
     verbose: u8,
-    /// Log errors only.
+    /// Show results and errors only: neither log messages nor progress, nor a dive while it goes on.
     #[arg(short, long, global = true, conflicts_with = "verbose")]
     quiet: bool,
 }
 
 impl Verbosity {
+    /// Whether only results and errors are shown.
+    pub(crate) fn is_quiet(&self) -> bool {
+        self.quiet
+    }
+
     /// The level of this program's crates; `None` where nothing is asked for.
     pub(crate) fn level(&self) -> Option<LevelFilter> {
         match (self.quiet, self.verbose) {
@@ -144,9 +158,21 @@ pub(crate) enum Command {
         after_help = "Example:\n  headrace devices\n  headrace devices --probe --address tcp:192.168.0.5:4040\n  headrace devices --vehicle vehicle.toml"
     )]
     Devices(Devices),
-    /// Check a vehicle file, and summarise it.
-    #[command(after_help = "Example:\n  headrace check deploy/vehicles/vita2-4.toml")]
+    /// Check a vehicle or scene file: all errors, warnings, and what a plan makes of it.
+    ///
+    /// Exit code 2 with errors; warnings are for people and change nothing.
+    #[command(
+        after_help = "Example:\n  headrace check deploy/vehicles/vita2-4.toml\n  headrace check deploy/scenes/demo.toml"
+    )]
     Check(Check),
+    /// Write a shell's completions of this command line to stdout.
+    #[command(
+        after_help = "Example:\n  headrace completions bash > ~/.local/share/bash-completion/completions/headrace\n  headrace completions zsh > \"${fpath[1]}/_headrace\""
+    )]
+    Completions(Completions),
+    /// Write manual pages: the program's to stdout, or all into a folder.
+    #[command(after_help = "Example:\n  headrace man | man -l -\n  headrace man ~/.local/share/man/man1")]
+    Man(Man),
 }
 
 #[derive(Debug, Args)]
@@ -156,6 +182,8 @@ pub(crate) struct Demo {
     pub(crate) out: PathBuf,
     #[arg(long, value_name = "max|Nx", default_value = "20x", value_parser = speed, help = SPEED_HELP)]
     pub(crate) speed: Speed,
+    #[command(flatten)]
+    pub(crate) overwrite: Overwrite,
 }
 
 #[derive(Debug, Args)]
@@ -209,6 +237,8 @@ pub(crate) struct Emulate {
     /// Time for which the devices keep sending after the end of the trajectory, seconds.
     #[arg(long, value_name = "SECONDS", default_value = "5", value_parser = seconds)]
     pub(crate) linger: f64,
+    #[command(flatten)]
+    pub(crate) overwrite: Overwrite,
 }
 
 #[derive(Debug, Args)]
@@ -228,15 +258,16 @@ pub(crate) struct Replay {
     /// Speed of sound in the water, m/s, overriding the vehicle file's.
     #[arg(long, value_name = "M/S", value_parser = sound_speed)]
     pub(crate) sound_speed: Option<f64>,
-    #[arg(long, value_name = "max|Nx", default_value = "max", value_parser = speed, help = SPEED_HELP)]
-    pub(crate) speed: Speed,
+    /// Playback speed relative to real time, or max; by default max, and 1x with keys in a terminal.
+    #[arg(long, value_name = "max|Nx", value_parser = speed)]
+    pub(crate) speed: Option<Speed>,
     /// Tick length, milliseconds; results don't depend on it.
     #[arg(long, value_name = "MS", default_value = "20", value_parser = clap::value_parser!(u32).range(1..=60_000))]
     pub(crate) tick_ms: u32,
     /// Start at this time of the dive (90s, 1h20min, 1:23:45); the part before is processed, too.
     #[arg(long, value_name = "TIME", value_parser = time, conflicts_with = "smooth")]
     pub(crate) from: Option<DurNs>,
-    #[arg(short, long, conflicts_with = "smooth", help = format!("Read playback commands from standard input: {COMMANDS}"))]
+    #[arg(short, long, conflicts_with = "smooth", help = interactive_help())]
     pub(crate) interactive: bool,
     /// Use the smoothed trajectory, and report what it changes.
     #[arg(long, conflicts_with = "speed")]
@@ -272,12 +303,14 @@ pub(crate) struct Recover {
     /// Log to recover, or the parts of a recording, which become one log; not modified.
     #[arg(required = true, value_name = "LOG")]
     pub(crate) logs: Vec<PathBuf>,
-    /// Log to write; must not exist.
+    /// Log to write.
     #[arg(short, long, value_name = "FIXED.mcap")]
     pub(crate) output: PathBuf,
     /// Print the summary as JSON.
     #[arg(long)]
     pub(crate) json: bool,
+    #[command(flatten)]
+    pub(crate) overwrite: Overwrite,
 }
 
 #[derive(Debug, Args)]
@@ -285,7 +318,7 @@ pub(crate) struct Trim {
     /// Log to trim, or the parts of a recording; not modified.
     #[arg(required = true, value_name = "LOG")]
     pub(crate) logs: Vec<PathBuf>,
-    /// Log to write; must not exist.
+    /// Log to write.
     #[arg(short, long, value_name = "TRIMMED.mcap")]
     pub(crate) output: PathBuf,
     /// Start time, from the log's first message: 90s, 10min, 1.5h.
@@ -309,6 +342,8 @@ pub(crate) struct Trim {
     /// Print the summary as JSON.
     #[arg(long)]
     pub(crate) json: bool,
+    #[command(flatten)]
+    pub(crate) overwrite: Overwrite,
 }
 
 #[derive(Debug, Args)]
@@ -331,6 +366,8 @@ pub(crate) struct Simulate {
     /// Print a summary as JSON.
     #[arg(long)]
     pub(crate) json: bool,
+    #[command(flatten)]
+    pub(crate) overwrite: Overwrite,
 }
 
 #[derive(Debug, Args)]
@@ -356,6 +393,8 @@ pub(crate) struct Import {
     /// Print a summary as JSON.
     #[arg(long)]
     pub(crate) json: bool,
+    #[command(flatten)]
+    pub(crate) overwrite: Overwrite,
 }
 
 const IMPORT_EXAMPLES: &str = "Example:
@@ -433,6 +472,8 @@ pub(crate) struct Plan {
     /// Output folder for SVG charts: perimeter, pattern, speeds and hours (explained in docs/plan).
     #[arg(long, value_name = "DIR")]
     pub(crate) svg: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) overwrite: Overwrite,
 }
 
 #[derive(Debug, Args)]
@@ -477,8 +518,8 @@ pub(crate) struct Devices {
 
 #[derive(Debug, Args)]
 pub(crate) struct Check {
-    /// Vehicle file.
-    pub(crate) vehicle: PathBuf,
+    /// Vehicle file, or scene file.
+    pub(crate) file: PathBuf,
     /// Print JSON.
     #[arg(long)]
     pub(crate) json: bool,
@@ -492,6 +533,8 @@ pub(crate) struct Output {
     /// Print the report as JSON.
     #[arg(long)]
     pub(crate) json: bool,
+    #[command(flatten)]
+    pub(crate) overwrite: Overwrite,
     /// Print a JSON object a line while the dive goes on: the state once a second, and what is told of it (docs/live-state.md).
     #[arg(long, conflicts_with = "json")]
     pub(crate) json_lines: bool,

@@ -1,4 +1,7 @@
-//! The commands `demo`, `run`, `replay` and `check`.
+//! The commands `demo`, `run` and `replay`.
+
+use std::path::PathBuf;
+use std::sync::atomic::Ordering;
 
 use headrace_config::Document;
 use headrace_geometry::time::DurNs;
@@ -8,17 +11,19 @@ use headrace_replay::player::Player;
 use headrace_replay::{SimulationFeed, simulation};
 use headrace_simulator::Scene;
 use headrace_vehicle::VehicleConfig;
-use serde_json::json;
 
-use crate::cli::{Check, Demo, Replay, Run};
+use crate::cli::{Demo, Output, Replay, Run, Speed};
 use crate::devices::KINDS;
 use crate::dive::{Clock, Recording, WhatIf, assemble};
 use crate::expect;
 use crate::failure::{self, Failure};
+use crate::feeds::Interruptible;
 use crate::files;
+use crate::interrupt;
 use crate::live;
-use crate::output::{deliver, put, say};
-use crate::play::Playing;
+use crate::output::{put, say};
+use crate::outputs::{self, Kind};
+use crate::play::{self, Playing};
 use crate::report_output::{exit_code, finish, note_losses};
 use crate::screen::Screen;
 use crate::smooth;
@@ -30,19 +35,26 @@ use crate::watch::{Show, Watch};
 pub(crate) fn demo(args: &Demo) -> Result<u8, Failure> {
     let (name, text) = files::DEMO_SCENE;
     let scene = Scene::parse(Document::new(name, text), &KINDS, &files::built_in, None)?;
-    std::fs::create_dir_all(&args.out).map_err(|source| Failure::Write { path: args.out.clone(), source })?;
+    outputs::folder(&args.out)?;
     let (log, report_file) = (args.out.join("dive.mcap"), args.out.join("report.json"));
-    // The recorder never overwrites a log; the last demonstration's may be removed.
-    if log.exists() {
-        std::fs::remove_file(&log).map_err(|source| Failure::Write { path: log.clone(), source })?;
+    outputs::claim(&log, Kind::Simulation, &args.overwrite)?;
+    outputs::claim(&report_file, Kind::Report, &args.overwrite)?;
+    // The recorder writes new logs only.
+    outputs::make_way(&log)?;
+    let interrupted = interrupt::flag()?;
+    let recording = Recording::simulated(&log, &scene.name);
+    let dive = assemble(&scene.vehicle, &scene.vehicle_text, Some(recording))?;
+    let mut watch = Watch::new(Show::Lines);
+    if !watch.is_quiet() {
+        say(&format!("{}, target {} m: a simulated dive", scene.vehicle.name, scene.vehicle.target_m));
     }
-    let dive = assemble(&scene.vehicle, &scene.vehicle_text, Some(Recording::whole(&log, Clock::Theirs)))?;
-    say(&format!("{}, target {} m: a simulated dive", scene.vehicle.name, scene.vehicle.target_m));
     let mut feed = SimulationFeed::new(simulation(&scene, false)?);
     let pace = Pace { speed: args.speed.0, ..Pace::default() };
-    let report = dive.run(&mut feed, pace, &mut Watch::new(Show::Lines))?;
+    let mut feed = Interruptible { feed: &mut feed, interrupted: &interrupted };
+    let report = dive.run(&mut feed, pace, &mut watch)?;
     files::write_json(&report_file, &report)?;
-    put(&format!("\n{}", summary(&report, Screen::columns())));
+    let ended = if interrupted.load(Ordering::Relaxed) { "interrupted: the dive so far\n" } else { "" };
+    put(&format!("\n{ended}{}", summary(&report, Screen::columns())));
     say(&format!("report {}\nlog    {}  (headrace replay)", report_file.display(), log.display()));
     Ok(exit_code(&report))
 }
@@ -50,10 +62,15 @@ pub(crate) fn demo(args: &Demo) -> Result<u8, Failure> {
 /// `headrace run`.
 pub(crate) fn run(args: &Run) -> Result<u8, Failure> {
     let (text, vehicle) = vehicle_file::read(&args.vehicle)?;
+    claim_report(&args.output, args.source.as_slice())?;
     let Some(log) = &args.source else { return live::run(args, &text, &vehicle) };
     let mut player = Player::open(&files_of(std::slice::from_ref(log))?)?;
+    if let Some(record) = &args.record {
+        live::make_room(record, args)?;
+    }
+    let rotate = args.rotate;
     let recording =
-        args.record.as_deref().map(|path| Recording { path, clock: Clock::Theirs, rotate: args.rotate });
+        args.record.as_deref().map(|path| Recording { path, clock: Clock::Theirs, rotate, scene: None });
     if let (None, Some(_)) = (&recording, args.rotate) {
         return Err(Failure::Usage(
             "run: --rotate needs a recording; with --source, add --record".to_owned(),
@@ -62,7 +79,9 @@ pub(crate) fn run(args: &Run) -> Result<u8, Failure> {
     let dive = assemble(&vehicle, &text, recording)?;
     player.connect(dive.armed.sources());
     let pace = Pace { speed: args.speed.0, ..Pace::default() };
-    let mut report = dive.run(&mut player, pace, &mut Watch::new(args.output.show()))?;
+    let interrupted = interrupt::flag()?;
+    let mut feed = Interruptible { feed: &mut player, interrupted: &interrupted };
+    let mut report = dive.run(&mut feed, pace, &mut Watch::new(args.output.show()))?;
     note_losses(&mut report, log, &player)?;
     finish(&report, &args.output)
 }
@@ -70,13 +89,20 @@ pub(crate) fn run(args: &Run) -> Result<u8, Failure> {
 /// `headrace replay`.
 pub(crate) fn replay(args: &Replay) -> Result<u8, Failure> {
     let (files, log) = (files_of(&args.logs)?, files::first_named(&args.logs));
+    claim_report(&args.output, &files)?;
+    if let Some(golden) = args.expect.as_deref().filter(|_| args.bless) {
+        outputs::is_no_input(golden, &files)?;
+        outputs::claim(golden, Kind::Report, &args.output.overwrite)?;
+    }
     let mut player = Player::open(&files)?;
     let (text, mut vehicle) = match &args.vehicle {
         Some(path) => vehicle_file::read(path),
         None => vehicle_file::attached(player.info(), &player.losses(), log),
     }?;
     let what_if = what_if(args, &mut vehicle);
-    let pace = Pace { tick: DurNs::from_millis(i64::from(args.tick_ms)), speed: args.speed.0 };
+    let usual = Speed(if args.interactive && play::has_keys() { Some(1.0) } else { None });
+    let pace =
+        Pace { tick: DurNs::from_millis(i64::from(args.tick_ms)), speed: args.speed.unwrap_or(usual).0 };
     let mut report = if args.smooth {
         smooth::smoothed(&files, &mut player, (&vehicle, &text), pace, what_if)?
     } else {
@@ -99,6 +125,13 @@ pub(crate) fn replay(args: &Replay) -> Result<u8, Failure> {
     }
 }
 
+/// Checks that the report can be written, and isn't one of the inputs.
+fn claim_report(output: &Output, inputs: &[PathBuf]) -> Result<(), Failure> {
+    let Some(report) = &output.report else { return Ok(()) };
+    outputs::is_no_input(report, inputs)?;
+    outputs::claim(report, Kind::Report, &output.overwrite)
+}
+
 /// Overrides the vehicle's settings by the options. Of several targets and section lengths the first is the dive's own; all are
 /// returned for evaluation as alternatives.
 fn what_if(args: &Replay, vehicle: &mut VehicleConfig) -> WhatIf {
@@ -110,45 +143,4 @@ fn what_if(args: &Replay, vehicle: &mut VehicleConfig) -> WhatIf {
     }
     let or = |asked: &[f64], own: f64| if asked.is_empty() { vec![own] } else { asked.to_vec() };
     WhatIf { targets_m: or(&args.target, vehicle.target_m), sections_m: or(&args.section, vehicle.section_m) }
-}
-
-/// `headrace check`.
-pub(crate) fn check(args: &Check) -> Result<u8, Failure> {
-    let (_, vehicle) = vehicle_file::read(&args.vehicle)?;
-    let sensors = vehicle.sensor_configs.iter();
-    if args.json {
-        let list: Vec<_> =
-            sensors.map(|s| json!({"id": s.id, "plugin": s.plugin, "connect": s.connect})).collect();
-        let shown = json!({
-            "vehicle": vehicle.name, "target_m": vehicle.target_m, "section_m": vehicle.section_m,
-            "tunnel": vehicle.tunnel.name, "perimeter_m": vehicle.tunnel.profile.perimeter_m(),
-            "length_m": vehicle.tunnel.length_m, "sensors": list,
-        });
-        deliver(&shown.to_string())?;
-    } else {
-        say(&format!("{}: target {} m, sections of {} m", vehicle.name, vehicle.target_m, vehicle.section_m));
-        say(&format!(
-            "tunnel {}: perimeter {:.2} m, length {} m",
-            vehicle.tunnel.name,
-            vehicle.tunnel.profile.perimeter_m(),
-            vehicle.tunnel.length_m
-        ));
-        for sensor in sensors {
-            say(&format!("  {:<12} {:<12} {}", sensor.id, sensor.plugin, sensor.connect));
-        }
-    }
-    let wrong =
-        live::connections(&vehicle).into_iter().filter_map(|(id, connect)| Some((id, connect.err()?)));
-    // A vehicle that is only simulated or replayed needs no ports.
-    let wrong: Vec<_> = wrong.filter(|(_, error)| !error.text.is_empty()).collect();
-    for (id, error) in &wrong {
-        eprintln!("headrace: sensor {id:?}: {error}");
-    }
-    if !wrong.is_empty() {
-        return Ok(failure::USAGE);
-    }
-    if !args.json {
-        say("no errors");
-    }
-    Ok(failure::OK)
 }

@@ -20,6 +20,8 @@ use headrace_sensor::device::Sense;
 use headrace_vehicle::VehicleConfig;
 
 use crate::failure::Failure;
+use crate::feeds;
+use crate::outputs::SIMULATED;
 use crate::phase::Phase;
 use crate::progress::Progress;
 use crate::report_output::parts;
@@ -44,12 +46,14 @@ pub(crate) struct Recording<'a> {
     pub(crate) clock: Clock,
     /// Size or duration of its parts; `None` for a single file.
     pub(crate) rotate: Option<Every>,
+    /// Name of the scene of which it is a simulation.
+    pub(crate) scene: Option<&'a str>,
 }
 
 impl<'a> Recording<'a> {
-    /// A single file.
-    pub(crate) fn whole(path: &'a Path, clock: Clock) -> Self {
-        Self { path, clock, rotate: None }
+    /// A simulated dive's log.
+    pub(crate) fn simulated(path: &'a Path, scene: &'a str) -> Self {
+        Self { path, clock: Clock::Theirs, rotate: None, scene: Some(scene) }
     }
 }
 
@@ -96,11 +100,12 @@ pub(crate) fn assemble_with(
     let (mut app, notices) = app(vehicle)?;
     let recorder = match record_to {
         None => None,
-        Some(Recording { path, clock, rotate }) => {
+        Some(Recording { path, clock, rotate, scene }) => {
             let mut header = log_header(vehicle, vehicle_text, true);
             if clock == Clock::Ours {
                 anchor(&mut header);
             }
+            header.metadata.extend(scene.map(|scene| (SIMULATED.to_owned(), scene.to_owned())));
             let view: Option<Box<dyn DerivedChannels>> = Some(Box::new(View::new(view_site(vehicle))));
             let (port, handle) = match rotate {
                 None => Recorder::create(path, &header, QUEUE_BYTES, view),
@@ -227,10 +232,11 @@ impl Dive {
         let notices = self.notices.clone();
         let phase = Phase::start("replay");
         let mut progress = Progress::start();
+        let span = feed.span();
         let driven = drive(&mut self.armed, feed, pace, &mut |dive| {
             if watch.is_quiet() {
-                let tally = dive.tally();
-                progress.at(|| format!("{} packets, {} samples", tally.packets, tally.samples));
+                let (tally, share) = (dive.tally(), feeds::share(span, dive.now()));
+                progress.at(|| (format!("{} packets, {} samples", tally.packets, tally.samples), share));
             }
             while let Some(notice) = notices.next() {
                 watch.notice(&notice, dive);

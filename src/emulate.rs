@@ -17,6 +17,7 @@ use crate::failure::{self, Failure};
 use crate::files;
 use crate::live::connections;
 use crate::output::say;
+use crate::outputs::{self, Kind, REHEARSAL};
 
 /// Longest wait for a host, ns; bounds the delay of a measurement.
 const WAIT_NS: u32 = 1_000_000;
@@ -31,8 +32,9 @@ pub(crate) fn emulate(args: &Emulate) -> Result<u8, Failure> {
             "emulate: {name} has a pilot who heeds advice, which hosts don't send; simulate it instead"
         )));
     }
-    let stands = stands(&scene, args)?;
     let vehicle_file = args.out.join("vehicle.toml");
+    claim(&scene, args, &vehicle_file)?;
+    let stands = stands(&scene, args)?;
     write_vehicle(&scene, &stands, &args.out, &vehicle_file)?;
     for (config, stand) in scene.vehicle.sensor_configs.iter().zip(&stands) {
         say(&format!("{:<12} {}", config.id, stand.connect()));
@@ -42,6 +44,23 @@ pub(crate) fn emulate(args: &Emulate) -> Result<u8, Failure> {
         Rehearsal { simulation: Simulation::for_hosts(&scene)?, stands, origin: headrace_ports::now() };
     rehearsal.run(args)?;
     Ok(failure::OK)
+}
+
+/// Checks that the vehicle file and the files that it refers to can be written.
+fn claim(scene: &Scene, args: &Emulate, vehicle_file: &Path) -> Result<(), Failure> {
+    outputs::folder(&args.out)?;
+    outputs::claim(vehicle_file, Kind::Rehearsal, &args.overwrite)?;
+    for (name, content) in &scene.vehicle.attachments {
+        let path = args.out.join(name);
+        if let Some(parent) = path.parent() {
+            outputs::folder(parent)?;
+        }
+        // The same file from an earlier rehearsal is no other one.
+        if !std::fs::read(&path).is_ok_and(|there| there == content.as_bytes()) {
+            outputs::claim(&path, Kind::Rehearsal, &args.overwrite)?;
+        }
+    }
+    Ok(())
 }
 
 /// A port for each sensor, of its `connect`'s carrier, or UDP if this machine lacks it.
@@ -68,21 +87,16 @@ fn stands(scene: &Scene, args: &Emulate) -> Result<Vec<EmulatedPort>, Failure> {
 
 /// Writes the vehicle file and the files that it refers to.
 fn write_vehicle(scene: &Scene, stands: &[EmulatedPort], folder: &Path, file: &Path) -> Result<(), Failure> {
-    let failed = |path: &Path, source| Failure::Write { path: path.to_owned(), source };
     let ids = scene.vehicle.sensor_configs.iter().map(|config| &config.id);
     let changed =
         ids.zip(stands).map(|(id, stand)| format!("sensors.{id}.connect = \"{}\"\n", stand.connect()));
     let changes: String = changed.collect();
     let section = Document::new("rehearsal", &changes).root()?;
     let text = config::changed(&with_connects(scene), &section)?;
-    std::fs::create_dir_all(folder).map_err(|source| failed(folder, source))?;
     for (name, content) in &scene.vehicle.attachments {
-        let path = folder.join(name);
-        if let Some(parent) = path.parent() {
-            std::fs::create_dir_all(parent).map_err(|source| failed(parent, source))?;
-        }
-        files::write(&path, content.as_bytes())?;
+        files::write(&folder.join(name), content.as_bytes())?;
     }
+    let text = format!("{REHEARSAL}{}\n{text}", scene.name.replace('\n', " "));
     files::write(file, text.as_bytes())
 }
 

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use headrace_calibration::collect::CollectError;
-use headrace_config::ConfigError;
+use headrace_config::{ConfigError, ConfigErrors};
 use headrace_import::ImportError;
 use headrace_import::routing::RoutingError;
 use headrace_monitor::PluginError;
@@ -33,8 +33,10 @@ pub(crate) enum Failure {
     Read { path: PathBuf, source: std::io::Error },
     #[error("writing {}: {source}", path.display())]
     Write { path: PathBuf, source: std::io::Error },
+    #[error("writing {}: {source}", path.display())]
+    Unwritable { path: PathBuf, source: std::io::Error },
     #[error(transparent)]
-    Config(#[from] ConfigError),
+    Config(#[from] ConfigErrors),
     #[error(transparent)]
     Scene(#[from] SceneError),
     #[error(transparent)]
@@ -67,6 +69,12 @@ pub(crate) enum Failure {
     Usage(String),
 }
 
+impl From<ConfigError> for Failure {
+    fn from(error: ConfigError) -> Self {
+        Self::Config(error.into())
+    }
+}
+
 impl Failure {
     /// Its exit code.
     pub(crate) fn exit_code(&self) -> u8 {
@@ -77,6 +85,7 @@ impl Failure {
             | Self::Usage(_)
             | Self::Plan(_)
             | Self::Read { .. }
+            | Self::Unwritable { .. }
             | Self::Routing(_)
             | Self::Collect(CollectError::Backwards { .. } | CollectError::TooLong { .. }) => USAGE,
             _ => FAILED,

@@ -24,6 +24,11 @@ pub(crate) fn read(path: &Path) -> Result<String, Failure> {
     std::fs::read_to_string(path).map_err(|source| Failure::Read { path: path.to_owned(), source })
 }
 
+/// Size of some files together, bytes; what can't be read counts nothing.
+pub(crate) fn bytes(files: &[PathBuf]) -> u64 {
+    files.iter().filter_map(|file| file.metadata().ok()).map(|metadata| metadata.len()).sum()
+}
+
 /// Writes a file.
 pub(crate) fn write(path: &Path, content: &[u8]) -> Result<(), Failure> {
     std::fs::write(path, content).map_err(|source| Failure::Write { path: path.to_owned(), source })

@@ -2,6 +2,7 @@
 //! crates; a binary of its own only calls [`main`].
 
 mod calibrate;
+mod check;
 mod cli;
 mod commands;
 pub mod devices;
@@ -9,12 +10,16 @@ mod dive;
 mod emulate;
 mod expect;
 mod failure;
+mod feeds;
 mod files;
 pub mod import;
+mod interrupt;
 mod inventory;
 mod live;
 mod logging;
+mod manual;
 mod output;
+mod outputs;
 mod phase;
 mod plan;
 mod play;
@@ -26,6 +31,7 @@ mod screen;
 mod simulate;
 mod smooth;
 mod summary;
+mod terminal;
 mod transient;
 mod trim;
 mod vehicle_file;
@@ -34,7 +40,7 @@ mod watch;
 
 use std::process::ExitCode;
 
-use clap::Parser;
+use clap::{ColorChoice, CommandFactory as _, FromArgMatches as _};
 
 use cli::{Cli, Command};
 
@@ -43,8 +49,9 @@ use cli::{Cli, Command};
 /// Returns the exit code: 0 success, 1 failed or differs, 2 wrong file or argument, 3 finished but data was lost, 4 the
 /// replay differs from the dive.
 pub fn main() -> ExitCode {
-    let cli = Cli::parse();
+    let cli = parse();
     logging::start(&cli.verbosity);
+    terminal::be_quiet(cli.verbosity.is_quiet());
     let result = match cli.command {
         Command::Demo(demo) => commands::demo(&demo),
         Command::Run(run) => commands::run(&run),
@@ -58,13 +65,24 @@ pub fn main() -> ExitCode {
         Command::Calibrate(args) => calibrate::calibrate(&args),
         Command::Emulate(args) => emulate::emulate(&args),
         Command::Devices(args) => inventory::devices(&args),
-        Command::Check(check) => commands::check(&check),
+        Command::Check(args) => check::check(&args),
+        Command::Completions(args) => manual::completions(&args),
+        Command::Man(args) => manual::man(&args),
     };
     match result {
         Ok(code) => ExitCode::from(code),
         Err(failure) => {
-            eprintln!("headrace: {failure}");
+            for line in failure.to_string().lines() {
+                eprintln!("headrace: {line}");
+            }
             ExitCode::from(failure.exit_code())
         }
     }
+}
+
+/// The command line, or the end of the program with help or an error.
+fn parse() -> Cli {
+    let colour = if terminal::allows_colour() { ColorChoice::Auto } else { ColorChoice::Never };
+    let matches = Cli::command().color(colour).get_matches();
+    Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit())
 }

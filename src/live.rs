@@ -1,9 +1,9 @@
 //! `headrace run` on real ports: connections, drivers, and the state of each sensor.
 
 use std::cell::RefCell;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_ports::{Connection, Phase, SentSink, Status, Supervisor};
@@ -15,7 +15,9 @@ use headrace_vehicle::VehicleConfig;
 use crate::cli::Run;
 use crate::dive::{Clock, Dive, Recording, assemble};
 use crate::failure::Failure;
+use crate::interrupt;
 use crate::output::say;
+use crate::outputs::{self, Kind};
 use crate::report_output::finish;
 use crate::screen::Screen;
 use crate::summary::broken;
@@ -25,12 +27,19 @@ use crate::watch::{Show, Watch};
 pub(crate) fn run(args: &Run, text: &str, vehicle: &VehicleConfig) -> Result<u8, Failure> {
     let required = required(args, vehicle)?;
     let log = args.record.clone().unwrap_or_else(new_log);
-    let recording =
-        (!args.no_record).then_some(Recording { path: &log, clock: Clock::Ours, rotate: args.rotate });
+    if !args.no_record {
+        make_room(&log, args)?;
+    }
+    let recording = (!args.no_record).then_some(Recording {
+        path: &log,
+        clock: Clock::Ours,
+        rotate: args.rotate,
+        scene: None,
+    });
     let mut dive = assemble(vehicle, text, recording)?;
     let begun = headrace_ports::now();
     let supervisor = supervisor(&mut dive, vehicle, begun)?;
-    let interrupted = interrupts()?;
+    let interrupted = interrupt::flag()?;
     let until = args.duration.map(|seconds| begun + DurNs::from_secs_f64(seconds));
     let mut watch = Watch::new(args.output.show()).live();
     if args.output.show() == Show::Lines {
@@ -67,6 +76,13 @@ pub(crate) fn run(args: &Run, text: &str, vehicle: &VehicleConfig) -> Result<u8,
         Some(why) => Err(Failure::Required(why)),
         None => Ok(code),
     }
+}
+
+/// Checks that a dive can be recorded to a file; with `--force` removes the one that is there.
+pub(crate) fn make_room(log: &Path, args: &Run) -> Result<(), Failure> {
+    let first = if args.rotate.is_some() { part_path(log, 1) } else { log.to_owned() };
+    outputs::claim(&first, Kind::Dive, &args.output.overwrite)?;
+    outputs::make_way(&first)
 }
 
 /// Each sensor's id and its connection, or why its `connect` is invalid.
@@ -125,18 +141,6 @@ fn supervisor(dive: &mut Dive, vehicle: &VehicleConfig, begun: MonoNs) -> Result
     });
     Supervisor::start(served, sent)
         .map_err(|source| Failure::System { what: "starting the port threads", source })
-}
-
-/// A flag set by SIGINT or SIGTERM; a second signal ends the program at once.
-fn interrupts() -> Result<Arc<AtomicBool>, Failure> {
-    use signal_hook::consts::{SIGINT, SIGTERM};
-    let failed = |source| Failure::System { what: "installing the signal handlers", source };
-    let flag = Arc::new(AtomicBool::new(false));
-    for signal in [SIGINT, SIGTERM] {
-        signal_hook::flag::register_conditional_shutdown(signal, 1, Arc::clone(&flag)).map_err(failed)?;
-        signal_hook::flag::register(signal, Arc::clone(&flag)).map_err(failed)?;
-    }
-    Ok(flag)
 }
 
 /// A default name for the log, from the time of day.

@@ -1,6 +1,6 @@
 //! Log messages: tracing's events on stderr, filtered by `-v`, `-q` and `RUST_LOG`.
 
-use std::io::{self, IsTerminal as _, Write};
+use std::io::{self, Write};
 
 use tracing::level_filters::LevelFilter;
 use tracing_subscriber::filter::Targets;
@@ -8,6 +8,7 @@ use tracing_subscriber::fmt;
 use tracing_subscriber::prelude::*;
 
 use crate::cli::Verbosity;
+use crate::terminal;
 use crate::transient;
 
 /// The variable that filters by crate or module.
@@ -18,9 +19,7 @@ const OURS: &str = "headrace";
 /// Starts writing log messages to stderr. A caller of this library that has its own subscriber keeps it.
 pub(crate) fn start(verbosity: &Verbosity) {
     let (filter, error) = filter(verbosity.level(), std::env::var(VARIABLE).ok().as_deref());
-    let colour =
-        io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
-    let layer = fmt::layer().with_ansi(colour).with_writer(|| Stderr);
+    let layer = fmt::layer().with_ansi(terminal::of(&io::stderr()).colour).with_writer(|| Stderr);
     if tracing_subscriber::registry().with(layer.with_filter(filter)).try_init().is_err() {
         return;
     }
@@ -60,8 +59,8 @@ struct Stderr;
 impl Write for Stderr {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         let mut stderr = io::stderr().lock();
-        let cleared = if stderr.is_terminal() && transient::take() {
-            stderr.write_all(transient::CLEAR)
+        let cleared = if terminal::of(&stderr).overwrites && transient::take() {
+            stderr.write_all(terminal::CLEAR.as_bytes())
         } else {
             Ok(())
         };

@@ -6,6 +6,8 @@ use std::io::{BufWriter, Write};
 use headrace_monitor::report::Report;
 
 use crate::failure::Failure;
+use crate::terminal;
+use crate::transient;
 
 /// Writes `text`. Errors are only logged: a closed pipe or a lost session doesn't end a dive.
 pub(crate) fn put(text: &str) {
@@ -20,6 +22,12 @@ pub(crate) fn say(text: &str) {
     put(&format!("{text}\n"));
 }
 
+/// Writes a line in place of a transient one, from any thread.
+pub(crate) fn aside(text: &str) {
+    let clear = if transient::take() { terminal::CLEAR } else { "" };
+    put(&format!("{clear}{text}\n"));
+}
+
 /// Writes output for another program, and a line end.
 ///
 /// Errors: stdout is closed or the write is short.
@@ -28,6 +36,17 @@ pub(crate) fn deliver(text: &str) -> Result<(), Failure> {
     stdout
         .write_all(text.as_bytes())
         .and_then(|()| stdout.write_all(b"\n"))
+        .and_then(|()| stdout.flush())
+        .map_err(|source| Failure::Write { path: "standard output".into(), source })
+}
+
+/// Writes output for another program as it is.
+///
+/// Errors: stdout is closed or the write is short.
+pub(crate) fn deliver_bytes(bytes: &[u8]) -> Result<(), Failure> {
+    let mut stdout = std::io::stdout().lock();
+    stdout
+        .write_all(bytes)
         .and_then(|()| stdout.flush())
         .map_err(|source| Failure::Write { path: "standard output".into(), source })
 }

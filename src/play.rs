@@ -1,6 +1,8 @@
-//! `replay --from` and `replay --interactive`: playback, with commands by lines on standard input.
+//! `replay --from` and `replay --interactive`: playback, with keys in a terminal, or commands by lines on standard input.
 
-use std::io::BufRead;
+mod keys;
+
+use std::io::{BufRead, IsTerminal as _};
 use std::time::Duration;
 
 use crossbeam::channel::{Sender, unbounded};
@@ -16,8 +18,11 @@ use headrace_replay::snapshot_store::SnapshotStore;
 use crate::cli::{COMMANDS, speed, time};
 use crate::dive::Dive;
 use crate::failure::Failure;
+use crate::interrupt;
+use crate::output::aside;
 use crate::phase::Phase;
 use crate::watch::Watch;
+use keys::Keyboard;
 
 /// Work between two snapshots: with the time to restore one, a jump takes well under a second.
 const SNAPSHOT_INTERVAL: Duration = Duration::from_millis(300);
@@ -39,7 +44,8 @@ impl Playing {
         let interval = if interactive { SNAPSHOT_INTERVAL } else { Duration::MAX };
         dive.play(watch, |armed, notices, watch| {
             let (sender, commands) = unbounded();
-            let mut screen = Screen { notices, watch, begun: MonoNs(0) };
+            let has_keys = interactive && has_keys();
+            let mut screen = Screen { notices, watch, begun: MonoNs(0), has_keys };
             let store = SnapshotStore::new(SNAPSHOT_BYTES, interval);
             let mut playback = Playback::new(armed, player, store, pace)?;
             screen.begun = playback.begun();
@@ -47,14 +53,34 @@ impl Playing {
                 let _phase = Phase::start("seek");
                 playback.seek(screen.begun + from, &mut screen)?;
             }
-            if interactive {
-                listen(sender, screen.begun);
-            } else {
-                drop(sender);
-            }
-            Ok(playback.play(&commands, &mut screen)?)
+            // Keys where they are typed, words from a pipe or a file.
+            let keyboard = match interactive {
+                true if has_keys => Some(keyboard(sender, pace)?),
+                true => {
+                    listen(sender, screen.begun);
+                    None
+                }
+                false => {
+                    drop(sender);
+                    None
+                }
+            };
+            let played = playback.play(&commands, &mut screen);
+            drop(keyboard);
+            Ok(played?)
         })
     }
+}
+
+/// Whether single keys are taken: standard input is a terminal.
+pub(crate) fn has_keys() -> bool {
+    std::io::stdin().is_terminal()
+}
+
+/// The keys of the terminal, until it is dropped.
+fn keyboard(to: Sender<PlaybackCommand>, pace: Pace) -> Result<Keyboard, Failure> {
+    let failed = |source| Failure::System { what: "reading keys from the terminal", source };
+    Keyboard::listen(to, pace.speed, interrupt::flag()?).map_err(failed)
 }
 
 /// Shows playback on the terminal.
@@ -62,6 +88,7 @@ struct Screen<'a> {
     notices: &'a NoticeReceiver,
     watch: &'a mut Watch,
     begun: MonoNs,
+    has_keys: bool,
 }
 
 impl PlaybackObserver for Screen<'_> {
@@ -78,6 +105,9 @@ impl PlaybackObserver for Screen<'_> {
 
     fn stopped(&mut self, dive: &Loop, at: MonoNs, ended: bool) {
         self.watch.stopped(dive, at.since(self.begun), ended);
+        if ended && self.has_keys {
+            aside("END      left and down go back, q leaves");
+        }
     }
 }
 
@@ -106,7 +136,7 @@ fn command(line: &str, begun: MonoNs) -> Result<PlaybackCommand, String> {
     let command = match (word, argument) {
         ("pause", None) => PlaybackCommand::Pause,
         ("go", None) => PlaybackCommand::Go,
-        ("end", None) => PlaybackCommand::End,
+        ("end" | "quit", None) => PlaybackCommand::End,
         ("step", None) => PlaybackCommand::Step(1),
         ("step", Some(ticks)) => PlaybackCommand::Step(ticks.parse().map_err(|_| unknown())?),
         ("speed", Some(text)) => PlaybackCommand::Speed(speed(text)?.0),
@@ -132,6 +162,6 @@ mod tests {
         for line in ["", "stop", "step -1", "seek", "pause 5", "go go", "step 1 2"] {
             assert!(command(line).is_err(), "{line:?}");
         }
-        insta::assert_snapshot!(command("stop").unwrap_err(), @r#""stop" isn't a command; expected one of: pause, go, step [TICKS], seek TIME, ahead TIME, back TIME, speed N|max, end"#);
+        insta::assert_snapshot!(command("stop").unwrap_err(), @r#""stop" isn't a command; expected one of: pause, go, step [TICKS], seek TIME, ahead TIME, back TIME, speed N|max, end or quit"#);
     }
 }

@@ -5,7 +5,7 @@ use std::thread::{self, JoinHandle};
 use crossbeam::channel::{Receiver, Sender, TrySendError, bounded};
 
 use crate::output::{put, say};
-use crate::transient;
+use crate::{terminal, transient};
 
 /// Lines that may wait. A dive has a line a second, and some for each stretch.
 const WAITING: usize = 1 << 10;
@@ -85,7 +85,7 @@ fn print(messages: &Receiver<Message>) {
     let close = |has_status: &mut bool| {
         // A log message has already cleared it. What it said is no longer so.
         if core::mem::take(has_status) && transient::take() {
-            put("\r\x1b[K");
+            put(terminal::CLEAR);
         }
     };
     for message in messages {
@@ -95,7 +95,7 @@ fn print(messages: &Receiver<Message>) {
                 say(&text);
             }
             Message::Status(text) => {
-                put(&format!("\r\x1b[K{text}"));
+                put(&format!("{}{text}", terminal::CLEAR));
                 transient::shown();
                 has_status = true;
             }

@@ -1,14 +1,17 @@
-//! Progress of a command on stderr, if that is a terminal and the command takes over a second.
+//! Progress of a command on stderr, with the time left, if that is a terminal and the command takes over two seconds.
 
-use std::io::{IsTerminal, Write};
+use std::io::{self, Write};
 use std::time::{Duration, Instant};
 
+use crate::terminal;
 use crate::transient;
 
-const AFTER: Duration = Duration::from_secs(1);
+const AFTER: Duration = Duration::from_secs(2);
 const EVERY: Duration = Duration::from_millis(200);
 /// Calls between two reads of the clock.
 const CALLS: u32 = 1000;
+/// Share of the work from which the time left is told.
+const TELLING: f64 = 0.01;
 
 /// Progress is logged at this interval at most.
 const LOG_EVERY: Duration = Duration::from_secs(5);
@@ -26,7 +29,7 @@ impl Progress {
     #[expect(clippy::disallowed_methods, reason = "progress is for people; no result depends on it")]
     pub(crate) fn start() -> Self {
         Self {
-            terminal: std::io::stderr().is_terminal(),
+            terminal: terminal::of(&io::stderr()).overwrites && !terminal::is_quiet(),
             started: Instant::now(),
             shown: None,
             logged: Duration::ZERO,
@@ -34,8 +37,8 @@ impl Progress {
         }
     }
 
-    /// Shows progress when an update is due; only then is `words` called.
-    pub(crate) fn at(&mut self, words: impl FnOnce() -> String) {
+    /// Shows progress when an update is due; only then is `state` called, for what is done in words and as a share.
+    pub(crate) fn at(&mut self, state: impl FnOnce() -> (String, Option<f64>)) {
         self.calls += 1;
         if !self.calls.is_multiple_of(CALLS) {
             return;
@@ -48,7 +51,10 @@ impl Progress {
         if !logs && !shows {
             return;
         }
-        let words = words();
+        let (mut words, share) = state();
+        if let Some(left_s) = share.and_then(|share| left_s(elapsed.as_secs_f64(), share)) {
+            words = format!("{words}, {} left", duration_text(left_s));
+        }
         if logs {
             self.logged = elapsed;
             tracing::debug!("{words}");
@@ -67,8 +73,8 @@ impl Progress {
     }
 
     fn show(&mut self, words: &str) {
-        let mut stderr = std::io::stderr().lock();
-        let written = stderr.write_all(transient::CLEAR).and_then(|()| stderr.write_all(words.as_bytes()));
+        let mut stderr = io::stderr().lock();
+        let written = write!(stderr, "{}{words}", terminal::CLEAR);
         if written.and_then(|()| stderr.flush()).is_err() {
             self.terminal = false;
         }
@@ -81,7 +87,67 @@ impl Drop for Progress {
     fn drop(&mut self) {
         if self.shown.is_some() && transient::take() {
             // A closed terminal needs no clearing.
-            std::io::stderr().write_all(transient::CLEAR).ok();
+            write!(io::stderr(), "{}", terminal::CLEAR).ok();
         }
+    }
+}
+
+/// Shows how much of a file of `of_bytes` has been written.
+pub(crate) struct Writing<W> {
+    to: W,
+    progress: Progress,
+    written: u64,
+    of_bytes: u64,
+}
+
+impl<W: Write> Writing<W> {
+    pub(crate) fn new(to: W, of_bytes: u64) -> Self {
+        Self { to, progress: Progress::start(), written: 0, of_bytes }
+    }
+}
+
+impl<W: Write> Write for Writing<W> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let count = self.to.write(bytes)?;
+        self.written += count as u64;
+        let (written, of_bytes) = (self.written, self.of_bytes);
+        self.progress.at(|| {
+            let mib = |bytes: u64| bytes >> 20;
+            let share = written as f64 / of_bytes as f64;
+            (format!("{} MiB of about {}", mib(written), mib(of_bytes)), Some(share))
+        });
+        Ok(count)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.to.flush()
+    }
+}
+
+/// Seconds left of work of which this share is done; `None` if it is too early to tell, or done.
+fn left_s(elapsed_s: f64, share: f64) -> Option<f64> {
+    (TELLING..1.0).contains(&share).then(|| elapsed_s * (1.0 - share) / share)
+}
+
+/// A duration to two figures or so.
+fn duration_text(seconds: f64) -> String {
+    let minutes = seconds / 60.0;
+    match seconds {
+        ..99.5 => format!("{} s", seconds.ceil()),
+        ..5970.0 => format!("{minutes:.0} min"),
+        _ => format!("{:.1} h", minutes / 60.0),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn time_left_is_that_of_the_rest_at_the_speed_so_far() {
+        assert_eq!(left_s(3.0, 0.25), Some(9.0));
+        assert_eq!((left_s(3.0, 0.0), left_s(3.0, 1.0), left_s(3.0, f64::NAN)), (None, None, None));
+        let texts = [0.2, 59.0, 99.0, 100.0, 3600.0, 7200.0].map(duration_text);
+        assert_eq!(texts, ["1 s", "59 s", "99 s", "2 min", "60 min", "2.0 h"]);
     }
 }

@@ -10,13 +10,19 @@ use serde_json::json;
 
 use crate::cli::Recover;
 use crate::failure::{self, Failure};
+use crate::files;
 use crate::output::{deliver, say};
+use crate::outputs::{self, Kind};
+use crate::progress::Writing;
 
 /// `headrace recover`.
 pub(crate) fn recover(args: &Recover) -> Result<u8, Failure> {
     // Fails before the output is created.
     let files = files_of(&args.logs)?;
     DiveLog::open(&files)?;
+    outputs::is_no_input(&args.output, &files)?;
+    outputs::claim(&args.output, Kind::Recovered, &args.overwrite)?;
+    outputs::make_way(&args.output)?;
     let recovered = write(&files, &args.output)?;
     tell(args, &recovered)?;
     Ok(if recovered.losses.is_empty() { failure::OK } else { failure::DATA_LOST })
@@ -27,9 +33,8 @@ fn write(files: &[PathBuf], output: &Path) -> Result<Recovered, Failure> {
     let failed = |source| Failure::Write { path: output.to_owned(), source };
     let names: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
     let from = format!("{} (sha256 {})", names.join(", "), files_digest(files)?);
-    // A log is never overwritten.
     let file = OpenOptions::new().write(true).create_new(true).open(output).map_err(failed)?;
-    let mut writer = BufWriter::new(&file);
+    let mut writer = BufWriter::new(Writing::new(&file, files::bytes(files)));
     let written = rewrite(&mut || DiveLog::open(files), &mut writer, &result_channels(), &from)
         .map_err(Failure::from)
         .and_then(|recovered| {

@@ -4,6 +4,8 @@ use std::io::IsTerminal;
 
 use headrace_monitor::live_state::Lamp;
 
+use crate::terminal::{self, Terminal};
+
 /// Width of a terminal that doesn't say its own.
 const COLUMNS: usize = 80;
 /// Narrower ones are taken to be this wide.
@@ -18,11 +20,10 @@ pub(crate) struct Screen {
 }
 
 impl Screen {
-    /// Of stdout: a terminal, unless `TERM` is `dumb`; in colour unless `NO_COLOR` is set.
+    /// Of stdout.
     pub(crate) fn of_stdout() -> Self {
-        let set = |name| std::env::var_os(name).filter(|value| !value.is_empty());
-        let overwrites = std::io::stdout().is_terminal() && set("TERM").is_none_or(|term| term != "dumb");
-        Self { overwrites, colours: overwrites && set("NO_COLOR").is_none() }
+        let Terminal { overwrites, colour } = terminal::of(&std::io::stdout());
+        Self { overwrites, colours: colour }
     }
 
     /// Columns that a line may fill, which may change; `None` where it may have any length: in a pipe or file. A full last

@@ -20,6 +20,7 @@ use crate::dive::log_header;
 use crate::failure::{self, Failure};
 use crate::files;
 use crate::output::{append, deliver, put, say};
+use crate::outputs::{self, Kind, SIMULATED, TRUTH};
 use crate::phase::Phase;
 use crate::progress::Progress;
 
@@ -36,15 +37,21 @@ pub(crate) fn simulate(args: &Simulate) -> Result<u8, Failure> {
         let what = "simulate: needs -o LOG.mcap for the log, or --explain to list what would be simulated";
         return Err(Failure::Usage(what.to_owned()));
     };
+    outputs::claim(output, Kind::Simulation, &args.overwrite)?;
+    if let Some(truth) = &args.truth {
+        outputs::claim(truth, Kind::Truth, &args.overwrite)?;
+    }
     let mut simulation = simulation(&scene, args.truth.is_some())?;
     let mut truth = args.truth.as_deref().map(|path| Truth::create(path, &scene, &simulation)).transpose()?;
-    let mut writer = LogWriter::create(output, &log_header(&scene.vehicle, &scene.vehicle_text, false))?;
+    let mut header = log_header(&scene.vehicle, &scene.vehicle_text, false);
+    header.metadata.insert(SIMULATED.to_owned(), scene.name.clone());
+    let mut writer = LogWriter::create(output, &header)?;
     let _phase = Phase::start("simulate");
     let mut progress = Progress::start();
     let (longest_s, at_most) = (simulation.duration_s(), if scene.is_advised() { "at most " } else { "" });
     while let Some(message) = simulation.next_message() {
         let after_s = message.at.since(START).as_secs_f64();
-        progress.at(|| format!("{after_s:.0} s of {at_most}{longest_s:.0} s"));
+        progress.at(|| (format!("{after_s:.0} s of {at_most}{longest_s:.0} s"), Some(after_s / longest_s)));
         match message.direction {
             Direction::Received => writer.raw(message.source, message.at, message.at, message.bytes)?,
             Direction::Sent => writer.sent(message.source, message.at, message.bytes)?,
@@ -173,7 +180,7 @@ impl Truth {
         let features =
             simulation.scenery().map(|scenery| scenery.environment.features().to_vec()).unwrap_or_default();
         let mut truth = Self { path: path.to_owned(), file, effects, features, rows: 0 };
-        truth.line(&format!("# {}, seed {}", scene.name.replace('\n', " "), scene.seed))?;
+        truth.line(&format!("{TRUTH}{}, seed {}", scene.name.replace('\n', " "), scene.seed))?;
         truth.line(COLUMNS)?;
         Ok(truth)
     }

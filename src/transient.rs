@@ -3,9 +3,6 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Goes to the beginning of the line and clears it.
-pub(crate) const CLEAR: &[u8] = b"\r\x1b[K";
-
 static SHOWN: AtomicBool = AtomicBool::new(false);
 
 /// A transient line was written.

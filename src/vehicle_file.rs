@@ -39,6 +39,12 @@ pub(crate) fn attached(
 
 fn parse(name: &str, text: &str, load: Loader<'_>) -> Result<VehicleConfig, Failure> {
     let vehicle = VehicleConfig::parse(Document::new(name, text), &KINDS, load)?;
+    log(name, &vehicle);
+    Ok(vehicle)
+}
+
+/// Logs that a vehicle file has been parsed.
+pub(crate) fn log(name: &str, vehicle: &VehicleConfig) {
     tracing::info!(
         file = name,
         vehicle = vehicle.name,
@@ -48,5 +54,4 @@ fn parse(name: &str, text: &str, load: Loader<'_>) -> Result<VehicleConfig, Fail
     for (number, sensor) in vehicle.sensor_configs.iter().enumerate() {
         tracing::debug!(number, id = sensor.id, plugin = sensor.plugin, connect = sensor.connect, "sensor");
     }
-    Ok(vehicle)
 }

@@ -11,6 +11,7 @@ use serde_json::{Value, json};
 
 use crate::printer::Printer;
 use crate::screen::Screen;
+use crate::terminal;
 
 /// Interval of state lines where they can't be overwritten.
 const LINE_EVERY: DurNs = DurNs(10_000_000_000);
@@ -41,8 +42,9 @@ pub(crate) struct Watch {
 }
 
 impl Watch {
-    /// Shows the dive in this way.
+    /// Shows the dive in this way; not at all with `-q`.
     pub(crate) fn new(show: Show) -> Self {
+        let show = if terminal::is_quiet() { Show::Nothing } else { show };
         Self {
             show,
             screen: Screen::of_stdout(),

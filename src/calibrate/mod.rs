@@ -2,15 +2,20 @@
 
 mod words;
 
+use std::cell::Cell;
+
 use headrace_calibration::collect::{Window, collect};
 use headrace_calibration::findings::Findings;
 use headrace_calibration::table::Table;
+use headrace_geometry::time::MonoNs;
+use headrace_replay::drive::PacketSource as _;
 use headrace_replay::log::files_of;
 use headrace_replay::player::Player;
 
 use crate::cli::Calibrate;
 use crate::dive::assemble;
 use crate::failure::{self, Failure};
+use crate::feeds::{Followed, share};
 use crate::output::{deliver, put};
 use crate::progress::Progress;
 use crate::vehicle_file;
@@ -26,8 +31,10 @@ pub(crate) fn calibrate(args: &Calibrate) -> Result<u8, Failure> {
     player.connect(dive.armed.sources());
     let window = Window { from_s: args.from, to_s: args.to, at_surface_s: args.at_surface };
     let mut progress = Progress::start();
-    let collected = collect(dive.armed, &mut player, &window, &mut |readings| {
-        progress.at(|| format!("{readings} readings"));
+    let (span, at) = (player.span(), Cell::new(MonoNs(0)));
+    let mut feed = Followed { feed: &mut player, at: &at };
+    let collected = collect(dive.armed, &mut feed, &window, &mut |readings| {
+        progress.at(|| (format!("{readings} readings"), share(span, at.get())));
     })?;
     drop(progress);
     let mut progress = Progress::start();

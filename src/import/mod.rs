@@ -2,9 +2,11 @@
 
 mod ros;
 
+use std::cell::Cell;
 use std::fs::File;
-use std::io::{BufRead as _, BufReader, Read};
+use std::io::{self, BufRead as _, BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
+use std::rc::Rc;
 
 use headrace_config::Document;
 use headrace_import::csv::Csv;
@@ -22,6 +24,7 @@ use crate::dive::log_header;
 use crate::failure::{self, Failure};
 use crate::files;
 use crate::output::{deliver, say};
+use crate::outputs::{self, IMPORTED, Kind};
 use crate::progress::Progress;
 use crate::vehicle_file;
 
@@ -43,17 +46,40 @@ pub(crate) fn import(args: &cli::Import) -> Result<u8, Failure> {
     if vehicle.is_none() {
         header.sources = routing::sources(kind, &args.source);
     }
-    same_file(&args.file, &args.output)?;
+    outputs::is_no_input(&args.output, std::slice::from_ref(&args.file))?;
+    outputs::claim(&args.output, Kind::Import, &args.overwrite)?;
     let name = args.file.display().to_string();
     let file = File::open(&args.file).map_err(|source| Failure::Read { path: args.file.clone(), source })?;
+    let read = Rc::new(Cell::new(0));
+    let file = Counted { file, read: Rc::clone(&read) };
     let vehicle = vehicle.as_ref().map(|(_, vehicle)| vehicle);
     if kind == FileKind::Mcap {
         let recording = Mcap::open(&name, file).map_err(|error| unusable(&args.file, error))?;
         let feeds = ros::feeds(args, vehicle, &recording.topics())?;
-        return write(args, kind, recording.feeding(feeds), header, &mut takers);
+        return write(args, kind, recording.feeding(feeds), header, &mut takers, &read);
     }
     let format = format(kind, args, vehicle)?;
-    write(args, kind, Input::new(&name, file, format), header, &mut takers)
+    write(args, kind, Input::new(&name, file, format), header, &mut takers, &read)
+}
+
+/// A file that counts the bytes read from it.
+struct Counted {
+    file: File,
+    read: Rc<Cell<u64>>,
+}
+
+impl Read for Counted {
+    fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
+        let count = self.file.read(into)?;
+        self.read.set(self.read.get() + count as u64);
+        Ok(count)
+    }
+}
+
+impl Seek for Counted {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        self.file.seek(to)
+    }
 }
 
 /// Writes the log of the messages that sensors receive.
@@ -63,17 +89,20 @@ fn write<S: Source>(
     input: S,
     mut header: LogHeader,
     takers: &mut [Taker],
+    read: &Cell<u64>,
 ) -> Result<u8, Failure> {
+    let of_bytes = files::bytes(std::slice::from_ref(&args.file));
     let import = Import::of(input, kind.entries()).map_err(|error| unusable(&args.file, error))?;
     header.metadata.extend(import.clock_metadata());
-    header.metadata.insert("import_format".to_owned(), kind.name().to_owned());
+    header.metadata.insert(IMPORTED.to_owned(), kind.name().to_owned());
     let file_name = args.file.file_name().map(|name| name.to_string_lossy().into_owned());
     header.metadata.insert("import_file".to_owned(), file_name.unwrap_or_default());
     let ids: Vec<String> = header.sources.iter().map(|source| source.id.clone()).collect();
     let mut log = LogWriter::create(&args.output, &header)?;
     let mut progress = Progress::start();
     let imported = import.write(&mut log, takers, &mut |entries| {
-        progress.at(|| format!("{entries} {}s", kind.entries()));
+        let share = read.get() as f64 / of_bytes as f64;
+        progress.at(|| (format!("{entries} {}s", kind.entries()), Some(share)));
     })?;
     log.finish()?;
     drop(progress);
@@ -105,8 +134,8 @@ fn format(
         return Err(Failure::Usage(what.to_owned()));
     };
     let (text, name) = (files::read(map)?, map.display().to_string());
-    let mapping = Document::new(&name, &text).root()?;
-    Ok(Box::new(Csv::new(mapping, vehicle, &first_line(&args.file)?)?))
+    let header = first_line(&args.file)?;
+    Ok(Box::new(Document::new(&name, &text).read(|mapping| Csv::new(mapping, vehicle, &header))?))
 }
 
 /// First line of a file, up to 64 KiB.
@@ -193,14 +222,4 @@ fn named(path: &Path, problem: &str) -> Failure {
     }
     let looks = detect::looks_like(&front).map(|words| format!("; it looks like this: {words}"));
     Failure::Usage(format!("{problem}{}", looks.unwrap_or_default()))
-}
-
-/// Refuses an output that would overwrite the input.
-fn same_file(from: &Path, to: &Path) -> Result<(), Failure> {
-    let both = from.canonicalize().ok().zip(to.canonicalize().ok());
-    if both.is_some_and(|(from, to)| from == to) {
-        let what = format!("importing {}: -o names the same file; it would be overwritten", from.display());
-        return Err(Failure::Usage(what));
-    }
-    Ok(())
 }

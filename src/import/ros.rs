@@ -28,7 +28,7 @@ pub(super) fn feeds(
     };
     let (text, name) = (files::read(map)?, map.display().to_string());
     let mapping = Document::new(&name, &text).root()?;
-    Feeds::mapped(mapping, vehicle, topics).map_err(|error| unmatched(args, error))
+    Feeds::mapped(&mapping, vehicle, topics).map_err(|error| unmatched(args, error))
 }
 
 fn unmatched(args: &cli::Import, error: MatchError) -> Failure {

@@ -134,7 +134,7 @@ fn tunnel(text: &str) -> Result<TunnelConfig, Failure> {
     let table: String = std::iter::once(begin).chain(parts.map(line)).collect();
     let load: Loader<'_> = &files::beside(Path::new(""));
     let root = Document::new("--tunnel", &table).root()?;
-    Ok(TunnelConfig::from_section(root, load)?)
+    Ok(TunnelConfig::from_section(&root, load)?)
 }
 
 /// The heads of a vehicle, at `range_m` if given.

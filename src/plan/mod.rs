@@ -16,12 +16,19 @@ use crate::cli::Plan;
 use crate::failure::{self, Failure};
 use crate::files;
 use crate::output::{deliver, put, say};
+use crate::outputs::{self, Kind, PICTURE};
 use case::Case;
 use findings::{Findings, printed_mps};
 use pictures::Shown;
 
 /// `headrace plan`.
 pub(crate) fn plan(args: &Plan) -> Result<u8, Failure> {
+    if let Some(folder) = &args.svg {
+        outputs::folder(folder)?;
+        for (name, _) in PICTURES {
+            outputs::claim(&folder.join(name), Kind::Picture, &args.overwrite)?;
+        }
+    }
     let findings = find(Case::of(args)?, args)?;
     if let Some(folder) = &args.svg {
         draw(&findings, folder)?;
@@ -87,11 +94,11 @@ fn draw(findings: &Findings, folder: &Path) -> Result<(), Failure> {
             "--svg: no mode meets the target at any speed; nothing to draw".to_owned(),
         ));
     };
-    std::fs::create_dir_all(folder).map_err(|source| Failure::Write { path: folder.to_owned(), source })?;
     let title = format!("{}, {}", findings.tunnel, table::heads(findings));
     let shown = Shown { planner: &findings.planner, mode, speed_mps, question: findings.question, title };
     for (name, picture) in PICTURES {
-        files::write(&folder.join(name), picture(&shown)?.as_bytes())?;
+        let picture = format!("{}\n{PICTURE}", picture(&shown)?.trim_end());
+        files::write(&folder.join(name), picture.as_bytes())?;
     }
     Ok(())
 }

@@ -22,6 +22,8 @@ use crate::dive::assemble_kept;
 use crate::failure::{self, Failure};
 use crate::files;
 use crate::output::{deliver, say};
+use crate::outputs::{self, Kind};
+use crate::progress::Writing;
 use crate::vehicle_file;
 use crate::watch::Watch;
 use anonymous::Anonymous;
@@ -34,6 +36,8 @@ const BRIDGED: DurNs = DurNs::from_millis(2000);
 /// `headrace trim`.
 pub(crate) fn trim(args: &Trim) -> Result<u8, Failure> {
     let files = files_of(&args.logs)?;
+    outputs::is_no_input(&args.output, &files)?;
+    outputs::claim(&args.output, Kind::Trimmed, &args.overwrite)?;
     let log = DiveLog::open(&files)?;
     let info = log.header().clone();
     let vehicle = vehicle(args, &files, &info)?;
@@ -178,9 +182,9 @@ fn write(
     };
     let mut work =
         Work { spans: spans.to_vec(), words: said.join("; "), header: &header, change: &mut change };
-    // A log is never overwritten.
+    outputs::make_way(&args.output)?;
     let file = OpenOptions::new().write(true).create_new(true).open(&args.output).map_err(failed)?;
-    let mut writer = BufWriter::new(&file);
+    let mut writer = BufWriter::new(Writing::new(&file, files::bytes(files)));
     let written = rewrite(&mut || DiveLog::open(files), &mut writer, &mut work, &result_channels())
         .map_err(Failure::from)
         .and_then(|trimmed| writer.flush().and_then(|()| file.sync_all()).map(|()| trimmed).map_err(failed));

@@ -23,6 +23,8 @@ pub mod random_dives;
 #[cfg(unix)]
 pub mod rig;
 pub mod scenes;
+#[cfg(unix)]
+pub mod screen;
 mod short_dive;
 pub mod spacings;
 pub mod tracking;

@@ -4,7 +4,9 @@ use core::ops::Range;
 
 use toml::de::{DeTable, DeValue};
 
-use super::reader::{ConfigError, Document, Section};
+use super::document::Document;
+use super::error::ConfigError;
+use super::reader::Section;
 
 /// Selects every table of an array that has the key.
 const ALL: &str = "all";

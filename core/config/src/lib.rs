@@ -1,6 +1,7 @@
 //! TOML files that people write: typed access whose errors name file, line, key, value and what is allowed.
 //!
-//! The caller reads the file itself. Keys that nobody asked for are an error at [`Section::finish`].
+//! The caller reads the file itself. Keys that nobody asked for are an error at [`Section::finish`]. [`Document::read`] finds all
+//! errors of a file in one pass, [`Document::root`] stops at the first.
 //!
 //! ```
 //! use headrace_config::Document;
@@ -17,7 +18,14 @@
 #![cfg_attr(test, allow(clippy::cast_possible_truncation))]
 
 mod changes;
+mod document;
+mod error;
+mod nearest;
 mod reader;
+#[cfg(test)]
+mod tests;
 
 pub use changes::changed;
-pub use reader::{ConfigError, Document, Loader, NamedFile, Section};
+pub use document::Document;
+pub use error::{ConfigError, ConfigErrors};
+pub use reader::{Loader, NamedFile, Section};

@@ -6,28 +6,9 @@ use core::ops::RangeInclusive;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// An error in a hand-written file.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{file}:{line}: {key}{}: {problem}", .value.as_ref().map(|v| format!(" = {v}")).unwrap_or_default())]
-pub struct ConfigError {
-    /// The file, as the caller named it.
-    pub file: String,
-    /// Line, counted from one.
-    pub line: usize,
-    /// Dotted path of the key.
-    pub key: String,
-    /// The value of the key, if present.
-    pub value: Option<String>,
-    /// The problem and the allowed values.
-    pub problem: String,
-}
-
-/// A text and its file name.
-#[derive(Debug, Clone, Copy)]
-pub struct Document<'a> {
-    file: &'a str,
-    text: &'a str,
-}
+use super::document::Document;
+use super::error::{ConfigError, ConfigErrors, Notes};
+use super::nearest::nearest;
 
 /// Reads a file referenced by another one (a polyline profile, a device's definitions), by the name given there.
 pub type Loader<'a> = &'a dyn Fn(&str) -> Result<String, String>;
@@ -63,46 +44,54 @@ pub struct Section<'a> {
     at: usize,
     asked: RefCell<Vec<&'static str>>,
     files: Files<'a>,
+    notes: Notes,
 }
 
 impl<'a> Document<'a> {
-    /// `file` is the name used in errors.
-    pub fn new(file: &'a str, text: &'a str) -> Self {
-        Self { file, text }
-    }
-
-    /// Parses the text to its root table.
+    /// Parses the text to its root table, whose readers fail at the first error.
     ///
     /// Errors: the text isn't TOML.
     pub fn root(self) -> Result<Section<'a>, ConfigError> {
-        let table = self.table()?;
-        let (path, asked) = (String::new(), RefCell::default());
-        Ok(Section { document: self, path, at: 0, table, asked, files: Files(None) })
+        Ok(Section::of_root(self, self.table()?, Notes::default()))
     }
 
-    /// The root table as parsed.
-    pub(super) fn table(self) -> Result<DeTable<'a>, ConfigError> {
-        match DeTable::parse(self.text) {
-            Ok(root) => Ok(root.into_inner()),
-            Err(error) => {
-                let at = error.span().map_or(0, |span| span.start);
-                Err(ConfigError {
-                    file: self.file.to_owned(),
-                    line: self.line(at),
-                    key: "TOML".to_owned(),
-                    value: None,
-                    problem: error.message().to_owned(),
-                })
-            }
+    /// Reads the whole text with `read`, and finds all of its errors: one that a reader of the table or of one below finds is
+    /// noted, and reading goes on as if the key were absent. Keys that weren't read are errors, too.
+    ///
+    /// Errors: all that were noted, and the one that `read` returned.
+    pub fn read<T>(
+        self,
+        read: impl FnOnce(&Section<'a>) -> Result<T, ConfigError>,
+    ) -> Result<T, ConfigErrors> {
+        let (table, broken) = DeTable::parse_recoverable(self.text);
+        // Of a line the first: the others follow from it.
+        let mut broken: Vec<ConfigError> = broken.iter().map(|error| self.broken(error)).collect();
+        broken.dedup_by_key(|error| error.line);
+        if let Some(errors) = ConfigErrors::of(broken) {
+            return Err(errors);
         }
-    }
-
-    fn line(&self, at: usize) -> usize {
-        self.text.bytes().take(at).filter(|byte| *byte == b'\n').count() + 1
+        let notes = Notes::collecting();
+        let root = Section::of_root(self, table.into_inner(), notes.clone());
+        let result = root.go_on(read(&root))?;
+        if result.is_some() {
+            root.finish()?;
+        }
+        match (result, ConfigErrors::of(notes.take())) {
+            (Some(result), None) => Ok(result),
+            (_, Some(errors)) => Err(errors),
+            // Not reached: an error was noted wherever there is no result.
+            (None, None) => Err(self.broken_as("couldn't be read", 0).into()),
+        }
     }
 }
 
 impl<'a> Section<'a> {
+    /// A document's root table.
+    fn of_root(document: Document<'a>, table: DeTable<'a>, notes: Notes) -> Self {
+        let (path, asked) = (String::new(), RefCell::default());
+        Self { document, path, at: 0, table, asked, files: Files(None), notes }
+    }
+
     /// Lets keys of this table and its subtables reference files, which `load` reads.
     #[must_use]
     pub fn with_files(self, load: Loader<'a>) -> Self {
@@ -116,8 +105,10 @@ impl<'a> Section<'a> {
         let Some(name) = self.text(key)? else { return Ok(None) };
         let Files(load) = self.files;
         let load = load.ok_or_else(|| self.invalid(key, "names a file, and files can't be read here"))?;
-        let text = load(&name).map_err(|problem| self.invalid(key, &problem))?;
-        Ok(Some(NamedFile { name, text }))
+        match load(&name) {
+            Ok(text) => Ok(Some(NamedFile { name, text })),
+            Err(problem) => self.wrong(key, self.table.get(key), problem),
+        }
     }
 
     /// A number within `allowed`, in the unit of the key's suffix.
@@ -130,11 +121,10 @@ impl<'a> Section<'a> {
     ) -> Result<Option<f64>, ConfigError> {
         let Some(value) = self.ask(key) else { return Ok(None) };
         let wanted = || format!("must be a number from {} to {}", allowed.start(), allowed.end());
-        let number = as_number(value.get_ref()).ok_or_else(|| self.error(key, Some(value), wanted()))?;
-        if !allowed.contains(&number) {
-            return Err(self.error(key, Some(value), wanted()));
+        match as_number(value.get_ref()) {
+            Some(number) if allowed.contains(&number) => Ok(Some(number)),
+            _ => self.wrong(key, Some(value), wanted()),
         }
-        Ok(Some(number))
     }
 
     /// A whole number within `allowed`; hexadecimal (0x...) is accepted too.
@@ -149,7 +139,7 @@ impl<'a> Section<'a> {
         let wanted = || format!("must be a whole number from {} to {}", allowed.start(), allowed.end());
         match as_integer(value.get_ref()) {
             Some(number) if allowed.contains(&number) => Ok(Some(number)),
-            _ => Err(self.error(key, Some(value), wanted())),
+            _ => self.wrong(key, Some(value), wanted()),
         }
     }
 
@@ -160,7 +150,7 @@ impl<'a> Section<'a> {
         let Some(value) = self.ask(key) else { return Ok(None) };
         match value.get_ref().as_str() {
             Some(text) => Ok(Some(text.to_owned())),
-            None => Err(self.error(key, Some(value), "must be a text in quotes".to_owned())),
+            None => self.wrong(key, Some(value), "must be a text in quotes".to_owned()),
         }
     }
 
@@ -171,7 +161,7 @@ impl<'a> Section<'a> {
         let Some(value) = self.ask(key) else { return Ok(None) };
         match value.get_ref().as_bool() {
             Some(boolean) => Ok(Some(boolean)),
-            None => Err(self.error(key, Some(value), "must be true or false".to_owned())),
+            None => self.wrong(key, Some(value), "must be true or false".to_owned()),
         }
     }
 
@@ -185,7 +175,9 @@ impl<'a> Section<'a> {
             return Ok(Some(*meaning));
         }
         let words: Vec<&str> = among.iter().map(|(word, _)| *word).collect();
-        Err(self.error(key, Some(value), format!("must be one of {}", words.join(", "))))
+        let meant = value.get_ref().as_str().and_then(|text| nearest(text, words.iter().copied()));
+        let meant = meant.map_or_else(String::new, |meant| format!("; did you mean {meant:?}?"));
+        self.wrong(key, Some(value), format!("must be one of {}{meant}", words.join(", ")))
     }
 
     /// Three numbers, each within `allowed`.
@@ -199,10 +191,9 @@ impl<'a> Section<'a> {
         let Some(value) = self.ask(key) else { return Ok(None) };
         let wanted =
             || format!("must be three numbers [a, b, c], each from {} to {}", allowed.start(), allowed.end());
-        let numbers = self.array_of_numbers(key, value, &allowed, &wanted)?;
-        match numbers.as_slice() {
-            [a, b, c] => Ok(Some([*a, *b, *c])),
-            _ => Err(self.error(key, Some(value), wanted())),
+        match array_of_numbers(value.get_ref(), &allowed).as_deref() {
+            Some([a, b, c]) => Ok(Some([*a, *b, *c])),
+            _ => self.wrong(key, Some(value), wanted()),
         }
     }
 
@@ -217,7 +208,27 @@ impl<'a> Section<'a> {
         let Some(value) = self.ask(key) else { return Ok(None) };
         let wanted =
             || format!("must be numbers [a, b, ...], each from {} to {}", allowed.start(), allowed.end());
-        self.array_of_numbers(key, value, &allowed, &wanted).map(Some)
+        match array_of_numbers(value.get_ref(), &allowed) {
+            Some(numbers) => Ok(Some(numbers)),
+            None => self.wrong(key, Some(value), wanted()),
+        }
+    }
+
+    /// A number, or an array of numbers, each within `allowed`; `wanted` says what is.
+    ///
+    /// Errors: anything else, or one of them outside.
+    pub fn number_or_numbers(
+        &self,
+        key: &'static str,
+        allowed: RangeInclusive<f64>,
+        wanted: &str,
+    ) -> Result<Option<Vec<f64>>, ConfigError> {
+        let Some(value) = self.ask(key) else { return Ok(None) };
+        let one = as_number(value.get_ref()).filter(|number| allowed.contains(number)).map(|one| vec![one]);
+        match one.or_else(|| array_of_numbers(value.get_ref(), &allowed)) {
+            Some(numbers) => Ok(Some(numbers)),
+            None => self.wrong(key, Some(value), wanted.to_owned()),
+        }
     }
 
     /// A table within this one.
@@ -227,7 +238,7 @@ impl<'a> Section<'a> {
         let Some(value) = self.ask(key) else { return Ok(None) };
         match value.get_ref() {
             DeValue::Table(table) => Ok(Some(self.child(key, table.clone(), value.span().start))),
-            _ => Err(self.error(key, Some(value), "must be a table".to_owned())),
+            _ => self.wrong(key, Some(value), "must be a table".to_owned()),
         }
     }
 
@@ -236,18 +247,18 @@ impl<'a> Section<'a> {
     /// Errors: the key holds something else.
     pub fn sections(&self, key: &'static str) -> Result<Vec<Section<'a>>, ConfigError> {
         let Some(value) = self.ask(key) else { return Ok(Vec::new()) };
-        let wrong = || self.error(key, Some(value), format!("must be tables, each headed [[{key}]]"));
-        let array = value.get_ref().as_array().ok_or_else(wrong)?;
-        array
-            .iter()
-            .enumerate()
-            .map(|(i, item)| match item.get_ref() {
-                DeValue::Table(table) => {
-                    Ok(self.child(&format!("{key}[{i}]"), table.clone(), item.span().start))
-                }
-                _ => Err(wrong()),
-            })
-            .collect()
+        let table = |(i, item): (usize, &Spanned<DeValue<'a>>)| match item.get_ref() {
+            DeValue::Table(table) => {
+                Some(self.child(&format!("{key}[{i}]"), table.clone(), item.span().start))
+            }
+            _ => None,
+        };
+        let items = value.get_ref().as_array().map(|array| array.iter().enumerate().map(table));
+        if let Some(tables) = items.and_then(Iterator::collect::<Option<Vec<_>>>) {
+            return Ok(tables);
+        }
+        let problem = format!("must be tables, each headed [[{key}]]");
+        Ok(self.wrong(key, Some(value), problem)?.unwrap_or_default())
     }
 
     /// One table, or the tables of an array of tables; none when the key is absent.
@@ -263,52 +274,149 @@ impl<'a> Section<'a> {
     /// Errors: the key holds something else.
     pub fn texts(&self, key: &'static str) -> Result<Option<Vec<String>>, ConfigError> {
         let Some(value) = self.ask(key) else { return Ok(None) };
-        let wrong = || self.error(key, Some(value), "must be texts [\"a\", \"b\", ...]".to_owned());
-        let array = value.get_ref().as_array().ok_or_else(wrong)?;
         let text = |item: &Spanned<DeValue<'a>>| item.get_ref().as_str().map(str::to_owned);
-        array.iter().map(|item| text(item).ok_or_else(wrong)).collect::<Result<Vec<_>, _>>().map(Some)
+        match value.get_ref().as_array().and_then(|array| array.iter().map(text).collect()) {
+            Some(texts) => Ok(Some(texts)),
+            None => self.wrong(key, Some(value), "must be texts [\"a\", \"b\", ...]".to_owned()),
+        }
     }
 
-    /// `value`, or an error that the key is missing.
+    /// `value`, or an error that the key is missing; a key nearly so called is named instead.
     ///
     /// Errors: `value` is `None`.
     pub fn required<T>(&self, key: &'static str, value: Option<T>) -> Result<T, ConfigError> {
-        value.ok_or_else(|| self.error(key, None, "is missing".to_owned()))
+        value.ok_or_else(|| self.missing(key))
+    }
+
+    fn missing(&self, key: &'static str) -> ConfigError {
+        let name = self.full(key);
+        let is_below = |error: &ConfigError| {
+            error.key.strip_prefix(&name).is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']))
+        };
+        // It is there, and wrong.
+        if let Some(wrong) = self.noted(|error| self.table.contains_key(key) && is_below(error)) {
+            return wrong;
+        }
+        let misnamed = self.misnamed(key);
+        misnamed.unwrap_or_else(|| self.told(self.error(key, None, "is missing".to_owned())))
+    }
+
+    /// An error about a key of this table that nobody has asked for and that is nearly called `key`, if there is one.
+    fn misnamed(&self, key: &str) -> Option<ConfigError> {
+        let asked = self.asked.borrow();
+        let mut others: Vec<_> =
+            self.table.keys().filter(|other| !asked.contains(&other.get_ref().as_ref())).collect();
+        others.sort_by_key(|other| other.span().start);
+        let found = nearest(key, others.iter().map(|other| other.get_ref().as_ref()))?;
+        let other = others.iter().find(|other| other.get_ref() == found)?;
+        Some(self.told(self.unknown(other, &[key])))
+    }
+
+    /// Reads a part of the file; `None` where that finds errors, which are noted, so that reading goes on.
+    ///
+    /// Errors: that of the part, if errors aren't collected.
+    pub fn part<T>(&self, read: impl FnOnce() -> Result<T, ConfigError>) -> Result<Option<T>, ConfigError> {
+        let before = self.notes.count();
+        let part = self.go_on(read())?;
+        Ok(part.filter(|_| self.notes.count() == before))
+    }
+
+    /// The result, or a note of its error.
+    fn go_on<T>(&self, result: Result<T, ConfigError>) -> Result<Option<T>, ConfigError> {
+        match result {
+            Ok(result) => Ok(Some(result)),
+            Err(error) if self.notes.are_kept() => {
+                self.notes.add(&error);
+                Ok(None)
+            }
+            Err(error) => Err(error),
+        }
     }
 
     /// Checks that every key of this table was read.
     ///
-    /// Errors: the first key that wasn't; the message lists the known ones.
-    pub fn finish(self) -> Result<(), ConfigError> {
+    /// Errors: the first key that wasn't; the message names the nearest of the known ones, or lists them.
+    pub fn finish(&self) -> Result<(), ConfigError> {
         let asked = self.asked.borrow();
-        let unknown = self.table.keys().filter(|key| !asked.contains(&key.get_ref().as_ref()));
-        match unknown.min_by_key(|key| key.span().start) {
-            None => Ok(()),
-            Some(key) => Err(ConfigError {
-                file: self.document.file.to_owned(),
-                line: self.document.line(key.span().start),
-                key: self.full(key.get_ref()),
-                value: None,
-                problem: format!("is not a key here; known are {}", asked.join(", ")),
-            }),
+        let mut unknown: Vec<_> =
+            self.table.keys().filter(|key| !asked.contains(&key.get_ref().as_ref())).collect();
+        unknown.sort_by_key(|key| key.span().start);
+        for key in unknown {
+            let name = self.full(key.get_ref());
+            // One that was found near a missing key has been told.
+            if self.noted(|error| error.key == name).is_none() {
+                self.go_on::<()>(Err(self.unknown(key, &asked)))?;
+            }
+        }
+        Ok(())
+    }
+
+    fn unknown(&self, key: &Spanned<std::borrow::Cow<'a, str>>, known: &[&str]) -> ConfigError {
+        let problem = match nearest(key.get_ref(), known.iter().copied()) {
+            Some(meant) => format!("is not a key here; did you mean {meant}?"),
+            None => format!("is not a key here; known are {}", known.join(", ")),
+        };
+        ConfigError {
+            file: self.document.file.to_owned(),
+            line: self.document.line(key.span().start),
+            key: self.full(key.get_ref()),
+            value: None,
+            problem,
         }
     }
 
-    /// An error about `key` in this table, for checks that only the caller can make.
+    /// An error about `key` in this table, for checks that only the caller can make. Where an error of the key has been noted,
+    /// or the key is absent from a table below the root and one of that table has, it is that one: this may only follow from it. A
+    /// key nearly so called is named instead of an absent one.
     pub fn invalid(&self, key: &str, problem: &str) -> ConfigError {
-        let value = self.table.get(key);
-        self.error(key, value, problem.to_owned())
+        let (name, value) = (self.full(key), self.table.get(key));
+        let is_below = value.is_none() && !self.path.is_empty();
+        let follows = self.noted(|error| error.key == name || (is_below && self.is_of(error)));
+        let misnamed = || if is_below { self.misnamed(key) } else { None };
+        follows.or_else(misnamed).unwrap_or_else(|| self.told(self.error(key, value, problem.to_owned())))
     }
 
-    /// An error about this table as a whole.
+    /// An error about this table as a whole; one of its keys', if one has been noted.
     pub fn invalid_itself(&self, problem: &str) -> ConfigError {
-        ConfigError {
+        let error = || ConfigError {
             file: self.document.file.to_owned(),
             line: self.document.line(self.at),
             key: self.path.clone(),
             value: None,
             problem: problem.to_owned(),
-        }
+        };
+        self.noted(|noted| self.is_of(noted)).unwrap_or_else(|| self.told(error()))
+    }
+
+    /// Whether an error is about a key of this table.
+    fn is_of(&self, error: &ConfigError) -> bool {
+        let key = if self.path.is_empty() {
+            Some(error.key.as_str())
+        } else {
+            error.key.strip_prefix(&self.path).and_then(|rest| rest.strip_prefix('.'))
+        };
+        key.is_some_and(|key| !key.contains(['.', '[']))
+    }
+
+    /// The first error of this file noted that is so.
+    fn noted(&self, is_so: impl Fn(&ConfigError) -> bool) -> Option<ConfigError> {
+        self.notes.find(|error| error.file == self.document.file && is_so(error))
+    }
+
+    /// Notes an error that goes to the caller.
+    fn told(&self, error: ConfigError) -> ConfigError {
+        self.notes.add(&error);
+        error
+    }
+
+    /// A value that is wrong: noted, and then as if it were absent.
+    fn wrong<T>(
+        &self,
+        key: &str,
+        value: Option<&Spanned<DeValue<'a>>>,
+        problem: String,
+    ) -> Result<Option<T>, ConfigError> {
+        self.go_on(Err(self.error(key, value, problem)))
     }
 
     /// File of this table, as the caller named it.
@@ -350,24 +458,10 @@ impl<'a> Section<'a> {
         self.table.get(key)
     }
 
-    fn array_of_numbers(
-        &self,
-        key: &str,
-        value: &Spanned<DeValue<'a>>,
-        allowed: &RangeInclusive<f64>,
-        wanted: &impl Fn() -> String,
-    ) -> Result<Vec<f64>, ConfigError> {
-        let wrong = || self.error(key, Some(value), wanted());
-        let array = value.get_ref().as_array().ok_or_else(wrong)?;
-        array
-            .iter()
-            .map(|item| as_number(item.get_ref()).filter(|n| allowed.contains(n)).ok_or_else(wrong))
-            .collect()
-    }
-
     fn child(&self, key: &str, table: DeTable<'a>, at: usize) -> Section<'a> {
         let (path, asked) = (self.full(key), RefCell::default());
-        Section { document: self.document, path, table, at, asked, files: self.files }
+        let notes = self.notes.clone();
+        Section { document: self.document, path, table, at, asked, files: self.files, notes }
     }
 
     fn full(&self, key: &str) -> String {
@@ -401,62 +495,7 @@ fn as_number(value: &DeValue<'_>) -> Option<f64> {
     number.is_finite().then_some(number)
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    const TEXT: &str = "target_m = 0.5\n[water]\nsound_speed_mps = 14470\nsalt = 1\n";
-
-    #[test]
-    fn an_error_names_file_line_key_value_and_what_is_allowed() {
-        let root = Document::new("v.toml", TEXT).root().unwrap();
-        assert_eq!(root.number("target_m", 0.0..=1.0).unwrap(), Some(0.5));
-        let water = root.section("water").unwrap().unwrap();
-        let error = water.number("sound_speed_mps", 1300.0..=1600.0).unwrap_err();
-        assert_eq!(
-            error.to_string(),
-            "v.toml:3: water.sound_speed_mps = 14470: must be a number from 1300 to 1600"
-        );
-        let error = water.finish().unwrap_err();
-        assert_eq!(error.to_string(), "v.toml:4: water.salt: is not a key here; known are sound_speed_mps");
-    }
-
-    #[test]
-    fn a_missing_key_and_a_broken_text_have_their_line() {
-        let root = Document::new("v.toml", "\n[water]\n").root().unwrap();
-        let water = root.section("water").unwrap().unwrap();
-        let error =
-            water.required("density_kgpm3", water.number("density_kgpm3", 0.0..=1.0).unwrap()).unwrap_err();
-        assert_eq!(error.to_string(), "v.toml:2: water.density_kgpm3: is missing");
-        assert_eq!(Document::new("v.toml", "a = 1\nb = \n").root().unwrap_err().line, 2);
-    }
-
-    #[test]
-    fn a_key_names_a_file() {
-        let files = |name: &str| match name {
-            "a.dbc" => Ok("text".to_owned()),
-            _ => Err("isn't there".to_owned()),
-        };
-        let text = "file = \"a.dbc\"\n[inner]\nfile = \"a.dbc\"\nother = \"b.dbc\"\n";
-        let root = Document::new("v.toml", text).root().unwrap();
-        let error = root.named_file("file").unwrap_err().to_string();
-        assert_eq!(error, "v.toml:1: file = \"a.dbc\": names a file, and files can't be read here");
-        let root = root.with_files(&files);
-        let expected = NamedFile { name: "a.dbc".to_owned(), text: "text".to_owned() };
-        let inner = root.section("inner").unwrap().unwrap();
-        assert_eq!(root.named_file("file").unwrap(), Some(expected.clone()));
-        assert_eq!(inner.named_file("file").unwrap(), Some(expected));
-        assert_eq!(root.named_file("none").unwrap(), None);
-        let error = inner.named_file("other").unwrap_err().to_string();
-        assert_eq!(error, "v.toml:4: inner.other = \"b.dbc\": isn't there");
-    }
-
-    #[test]
-    fn not_a_number_is_refused() {
-        let root = Document::new("v.toml", "a = nan\nb = inf\nc = \"1\"\nd = [1, 2]\n").root().unwrap();
-        for key in ["a", "b", "c"] {
-            assert!(root.number(key, f64::MIN..=f64::MAX).is_err(), "{key}");
-        }
-        assert!(root.triple("d", -1.0..=9.0).is_err());
-    }
+fn array_of_numbers(value: &DeValue<'_>, allowed: &RangeInclusive<f64>) -> Option<Vec<f64>> {
+    let number = |item: &Spanned<DeValue<'_>>| as_number(item.get_ref()).filter(|n| allowed.contains(n));
+    value.as_array()?.iter().map(number).collect()
 }

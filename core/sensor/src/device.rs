@@ -167,6 +167,17 @@ pub trait Device: Send + Sync {
         false
     }
 
+    /// What tells its bytes from those of others of its kind on one line; devices for which it is equal, or `None`, can't share
+    /// one.
+    fn line_address(&self) -> Option<String> {
+        None
+    }
+
+    /// Values of its keys that are allowed and seldom meant: each key with what its value does.
+    fn remarks(&self) -> Vec<(&'static str, String)> {
+        Vec::new()
+    }
+
     /// Supported carriers. UDP may replace any of them, one message per datagram.
     fn carriers(&self) -> &'static [Carrier];
 

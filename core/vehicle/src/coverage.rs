@@ -47,11 +47,17 @@ impl CoverageConfig {
         (CONTRADICTION_SHARE * perimeter_m / TAU).min(MOST_CONTRADICTION_M)
     }
 
-    /// Reads both tables from the root of a vehicle file.
+    /// Reads both tables from the root of a vehicle file. Without a profile or a target, which are wrong in the file then, the
+    /// tables are checked as far as that goes.
     ///
-    /// Errors: the first key that is missing, unknown or out of range.
-    pub fn from_root(root: &Section<'_>, profile: &Profile, target_m: f64) -> Result<Self, ConfigError> {
-        let contradiction_m = Self::usual_contradiction_m(profile.perimeter_m());
+    /// Errors: a key that is missing, unknown or out of range.
+    pub(super) fn of_root(
+        root: &Section<'_>,
+        profile: Option<&Profile>,
+        target_m: Option<f64>,
+    ) -> Result<Self, ConfigError> {
+        let perimeter_m = profile.map_or(TAU, Profile::perimeter_m);
+        let contradiction_m = Self::usual_contradiction_m(perimeter_m);
         let mut config = Self { contradiction_m, ..Self::default() };
         if let Some(section) = root.section("coverage")? {
             config.contradiction_m =
@@ -60,18 +66,17 @@ impl CoverageConfig {
             if let Some(confidence) = section.integer("confidence", 1..=3)? {
                 config.confidence_sd = confidence as f64;
             }
-            config.hole_tolerance_m = parse_tolerance_m(&section, target_m)?;
+            let tolerance_m = root.part(|| parse_tolerance_m(&section, target_m.unwrap_or(1.0)))?;
+            config.hole_tolerance_m = tolerance_m.unwrap_or_default();
             section.finish()?;
         }
         for section in root.sections("openings")? {
-            config.openings.push(parse_opening(section, profile)?);
+            config.openings.extend(root.part(|| parse_opening(&section, profile))?);
         }
-        let places = |opening: &Opening| opening.places(profile.perimeter_m(), target_m);
+        let places = |opening: &Opening| opening.places(perimeter_m, target_m.unwrap_or(f64::INFINITY));
         if config.openings.iter().map(places).sum::<i64>() > MAX_PLACES {
-            return Err(root.invalid(
-                "openings",
-                "take more than 2500 square metres together; leave them out of the tunnel",
-            ));
+            let problem = "take more than 2500 square metres together; leave them out of the tunnel";
+            root.part::<()>(|| Err(root.invalid("openings", problem)))?;
         }
         Ok(config)
     }
@@ -86,24 +91,25 @@ fn parse_tolerance_m(section: &Section<'_>, target_m: f64) -> Result<f64, Config
     Ok(if exact { 0.0 } else { tolerance_m.unwrap_or(target_m / 50.0) })
 }
 
-fn parse_opening(section: Section<'_>, profile: &Profile) -> Result<Opening, ConfigError> {
-    let name = section.required("name", section.text("name")?)?;
-    let from_m = section.required("from_m", section.number("from_m", 0.0..=1.0e5)?)?;
-    let to_m = section.required("to_m", section.number("to_m", 0.0..=1.0e5)?)?;
+fn parse_opening(section: &Section<'_>, profile: Option<&Profile>) -> Result<Opening, ConfigError> {
+    let name = section.required("name", section.text("name")?);
+    let from_m = section.required("from_m", section.number("from_m", 0.0..=1.0e5)?);
+    let to_m = section.required("to_m", section.number("to_m", 0.0..=1.0e5)?);
+    let clock = (section.number("clock_from", 0.0..=12.0)?, section.number("clock_to", 0.0..=12.0)?);
+    section.finish()?;
+    let (name, from_m, to_m) = (name?, from_m?, to_m?);
     if to_m <= from_m {
         return Err(section.invalid("to_m", "must be larger than from_m"));
     }
-    let clock = (section.number("clock_from", 0.0..=12.0)?, section.number("clock_to", 0.0..=12.0)?);
     let arc_m = match clock {
         (None, None) => None,
-        (Some(from), Some(to)) => {
+        (Some(from), Some(to)) => profile.map(|profile| {
             let (from_m, to_m) = (arc_at_hour_m(profile, from), arc_at_hour_m(profile, to));
-            Some((from_m, math::wrap(to_m - from_m, profile.perimeter_m())))
-        }
+            (from_m, math::wrap(to_m - from_m, profile.perimeter_m()))
+        }),
         (Some(_), None) => return Err(section.invalid("clock_from", "needs clock_to beside it")),
         (None, Some(_)) => return Err(section.invalid("clock_to", "needs clock_from beside it")),
     };
-    section.finish()?;
     Ok(Opening { name, from_m, to_m, arc_m })
 }
 
@@ -122,7 +128,7 @@ mod tests {
 
     fn parsed(text: &str) -> Result<CoverageConfig, ConfigError> {
         let root = Document::new("vehicle.toml", text).root().unwrap();
-        CoverageConfig::from_root(&root, &shapes::circle(3.0).unwrap(), 0.5)
+        CoverageConfig::of_root(&root, Some(&shapes::circle(3.0).unwrap()), Some(0.5))
     }
 
     #[test]

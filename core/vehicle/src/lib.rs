@@ -1,6 +1,6 @@
 //! `VEHICLE.toml`: the vehicle, its sensors, the tunnel, the target, and how the dive is judged and navigated.
 //!
-//! The kinds of device that a file may name are the caller's; `docs/vehicle-file.md` lists the keys.
+//! All errors of a file are found at once. The kinds of device that a file may name are the caller's; `docs/vehicle-file.md` lists the keys.
 //!
 //! ```
 //! use headrace_config::Document;
@@ -12,20 +12,23 @@
 //!     parsed.err().map(|error| error.to_string()).unwrap_or_default()
 //! };
 //! let text = "target_m = 50\n[tunnel]\nprofile = \"circle\"\nradius_m = 3\nlength_m = 100\n";
-//! assert_eq!(problem(text), "vehicle.toml:1: target_m = 50: must be a number from 0.01 to 20");
-//! assert!(problem(&text.replace("50", "0.5")).starts_with("vehicle.toml:1: sensors: has no sensor"));
+//! let both = "vehicle.toml:1: target_m = 50: must be a number from 0.01 to 20\nvehicle.toml:1: sensors: has no sensor";
+//! assert!(problem(text).starts_with(both));
 //! ```
 
 #![cfg_attr(not(test), warn(clippy::cast_possible_truncation))]
 #![cfg_attr(test, allow(clippy::cast_possible_truncation))]
 
 mod coverage;
+mod findings;
 mod mission;
 mod navigation;
+mod sensors;
 mod tunnel;
 mod vehicle;
 
 pub use coverage::CoverageConfig;
+pub use findings::{Finding, Grade};
 pub use mission::Mission;
 pub use navigation::NavigationConfig;
 pub use tunnel::TunnelConfig;

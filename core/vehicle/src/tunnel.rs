@@ -18,12 +18,14 @@ pub struct TunnelConfig {
 impl TunnelConfig {
     /// Reads a tunnel's table, without the keys that concern the site.
     ///
-    /// Errors: the first key that is missing, unknown or out of range.
-    pub fn from_section(section: Section<'_>, load: Loader<'_>) -> Result<Self, ConfigError> {
-        let (name, profile) = parse(&section, load)?;
+    /// Errors: a key that is missing, unknown or out of range, or dimensions that make no profile.
+    pub fn from_section(section: &Section<'_>, load: Loader<'_>) -> Result<Self, ConfigError> {
         let length_m = section.number("length_m", 0.1..=1.0e5)?.unwrap_or(10_000.0);
+        let shape = section.required("profile", section.choice("profile", &SHAPES)?)?;
+        let name = section.text("profile")?.unwrap_or_default();
+        let profile = parse(section, shape, load);
         section.finish()?;
-        Ok(Self { name, profile, length_m })
+        Ok(Self { name, profile: profile?, length_m })
     }
 }
 
@@ -50,21 +52,23 @@ const SHAPES: [(&str, Shape); 7] = [
 
 const DIMENSION_M: core::ops::RangeInclusive<f64> = 0.1..=200.0;
 
-/// Reads `profile` and its dimensions from a `[tunnel]` table; gives the profile's name too.
+/// Reads the dimensions of a profile from a `[tunnel]` table.
 ///
 /// Errors: a key missing or out of range, or dimensions that make no profile.
-fn parse(section: &Section<'_>, load: Loader<'_>) -> Result<(String, Profile), ConfigError> {
-    let kind = section.required("profile", section.choice("profile", &SHAPES)?)?;
-    let name = section.text("profile")?.unwrap_or_default();
+fn parse(section: &Section<'_>, shape: Shape, load: Loader<'_>) -> Result<Profile, ConfigError> {
     let dimension = |key| section.required(key, section.number(key, DIMENSION_M)?);
-    let profile = match kind {
+    let profile = match shape {
         Shape::Ceran => shapes::ceran(),
         Shape::CeranBlueprint => shapes::ceran_blueprint(),
-        Shape::Rectangle => shapes::rectangle(dimension("width_m")?, dimension("height_m")?),
+        Shape::Rectangle => {
+            let (width, height) = (dimension("width_m"), dimension("height_m"));
+            shapes::rectangle(width?, height?)
+        }
         Shape::Circle => shapes::circle(dimension("radius_m")?),
         Shape::Arch => {
-            let (width, height) = (dimension("width_m")?, dimension("height_m")?);
+            let (width, height) = (dimension("width_m"), dimension("height_m"));
             let radius = dimension("arch_radius_m")?;
+            let (width, height) = (width?, height?);
             if radius < width / 2.0 || radius - math::sqrt(radius * radius - width * width / 4.0) > height {
                 let problem = "must be at least width_m / 2, and the arc no higher than height_m";
                 return Err(section.invalid("arch_radius_m", problem));
@@ -72,7 +76,8 @@ fn parse(section: &Section<'_>, load: Loader<'_>) -> Result<(String, Profile), C
             shapes::arch(width, height, radius)
         }
         Shape::TrimmedCircle => {
-            let (radius, base) = (dimension("radius_m")?, dimension("base_m")?);
+            let (radius, base) = (dimension("radius_m"), dimension("base_m"));
+            let (radius, base) = (radius?, base?);
             if base >= 2.0 * radius {
                 return Err(section.invalid("base_m", "must be less than 2 radius_m"));
             }
@@ -90,8 +95,7 @@ fn parse(section: &Section<'_>, load: Loader<'_>) -> Result<(String, Profile), C
             Profile::polygon(&points, reference)
         }
     };
-    let profile = profile.map_err(|why| section.invalid("profile", &why.to_string()))?;
-    Ok((name, profile))
+    profile.map_err(|why| section.invalid("profile", &why.to_string()))
 }
 
 /// Reads a polyline: one line `y_m,z_m` per vertex; a first line of other text and lines starting with # are skipped.

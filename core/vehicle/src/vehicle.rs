@@ -5,11 +5,12 @@ use core::cell::RefCell;
 use crate::Mission;
 use crate::NavigationConfig;
 use crate::coverage::CoverageConfig;
+use crate::sensors::{self, DEGREES, SENSOR_DISTANCE_M, Sensors};
 use crate::tunnel::TunnelConfig;
-use headrace_config::{ConfigError, Document, Loader, Section};
+use headrace_config::{ConfigError, ConfigErrors, Document, Loader, Section};
 use headrace_coverage::StoreLayout;
 use headrace_fusion::Navigation;
-use headrace_geometry::frames::{Mount, Rot, Vec3};
+use headrace_geometry::frames::Vec3;
 use headrace_geometry::site::Site;
 use headrace_geometry::time::DurNs;
 use headrace_sampling::SamplingError;
@@ -56,8 +57,8 @@ pub struct VehicleConfig {
 /// The `[water]` table and levels; see [`Site`].
 pub type WaterConfig = Site;
 
-const SENSOR_DISTANCE_M: core::ops::RangeInclusive<f64> = -20.0..=20.0;
-const DEGREES: core::ops::RangeInclusive<f64> = -360.0..=360.0;
+/// Allowed targets, m.
+pub(super) const TARGET_M: core::ops::RangeInclusive<f64> = 0.01..=20.0;
 
 /// Bounds on startup allocation: some hundred megabytes each for sections and wall cells.
 const MAX_SECTIONS: f64 = 400_000.0;
@@ -72,31 +73,12 @@ fn wall_cells(tunnel: &TunnelConfig, target_m: f64) -> f64 {
 impl VehicleConfig {
     /// Parses and checks a vehicle file against the device kinds that this build has.
     ///
-    /// Errors: the first key that is missing, unknown or out of range, with its line.
+    /// Errors: every key that is missing, unknown or out of range, with its line.
     pub fn parse(
         document: Document<'_>,
         kinds: &[&dyn DeviceKind],
         load: Loader<'_>,
-    ) -> Result<Self, ConfigError> {
-        let root = document.root()?;
-        let vehicle = Self::from_section(&root, kinds, load)?;
-        root.finish()?;
-        Ok(vehicle)
-    }
-
-    /// Like [`VehicleConfig::parse`], from a table that may hold other keys as well.
-    ///
-    /// Errors: as for [`VehicleConfig::parse`].
-    pub fn from_section(
-        root: &Section<'_>,
-        kinds: &[&dyn DeviceKind],
-        load: Loader<'_>,
-    ) -> Result<Self, ConfigError> {
-        let name = root.text("name")?.unwrap_or_else(|| "unnamed vehicle".to_owned());
-        let target_m = root.required("target_m", root.number("target_m", 0.01..=20.0)?)?;
-        let section_m = root.number("section_m", 0.05..=10.0)?.unwrap_or(0.25);
-        let tunnel_section = root.required("tunnel", root.section("tunnel")?)?;
-        let axis_yaw_rad = tunnel_section.number("axis_yaw_deg", DEGREES)?.unwrap_or(0.0).to_radians();
+    ) -> Result<Self, ConfigErrors> {
         let attachments = RefCell::new(Vec::new());
         let load = |name: &str| {
             let text = load(name)?;
@@ -106,54 +88,71 @@ impl VehicleConfig {
             }
             Ok(text)
         };
-        let tunnel = TunnelConfig::from_section(tunnel_section, &load)?;
-        if tunnel.length_m / section_m > MAX_SECTIONS || wall_cells(&tunnel, target_m) > MAX_CELLS {
-            let problem = "is too fine for so long a tunnel; make tunnel.length_m smaller, or this and section_m larger";
-            return Err(root.invalid("target_m", problem));
-        }
-        let (site, sound_speed_from) = match root.section("water")? {
-            Some(water) => parse_water(water, axis_yaw_rad)?,
-            None => (Site { axis_yaw_rad, ..Site::default() }, None),
-        };
-        let coverage = CoverageConfig::from_root(root, &tunnel.profile, target_m)?;
+        let vehicle = document.read(|root| Self::from_root(root, kinds, &load))?;
+        Ok(Self { attachments: attachments.into_inner(), ..vehicle })
+    }
+
+    /// All but the attachments. What depends on a part that is wrong isn't checked.
+    fn from_root(
+        root: &Section<'_>,
+        kinds: &[&dyn DeviceKind],
+        load: Loader<'_>,
+    ) -> Result<Self, ConfigError> {
+        let name = root.text("name")?.unwrap_or_else(|| "unnamed vehicle".to_owned());
+        let target_m = root.number("target_m", TARGET_M)?;
+        let section_m = root.part(|| root.number("section_m", 0.05..=10.0))?.map(|m| m.unwrap_or(0.25));
         let dive_time = root.number("dive_hours", 0.01..=1000.0)?;
-        let hull = root.sections("hull")?.into_iter().map(parse_hull).collect::<Result<Vec<_>, _>>()?;
-        let mut sensors = Vec::new();
-        let mut sensor_configs: Vec<SensorConfig> = Vec::new();
-        for section in root.sections("sensors")? {
-            let (config, device) = parse_sensor(section.with_files(&load), &sensor_configs, kinds)?;
-            sensors.push(device);
-            sensor_configs.push(config);
+        let (tunnel, axis_yaw_rad) = parse_tunnel(root, load)?;
+        if let (Some(tunnel), Some(target_m), Some(section_m)) = (&tunnel, target_m, section_m) {
+            root.part(|| check_fineness(root, tunnel, target_m, section_m))?;
         }
-        if sensors.is_empty() {
-            return Err(
-                root.invalid("sensors", "has no sensor; at least one table headed [[sensors]] is needed")
-            );
-        }
-        let noise = sensors.iter().find_map(|sensor| sensor.inertial_noise());
-        let navigation = NavigationConfig::parse(root.section("navigation")?, noise)?;
-        let (layout, planned_speed_mps) = match root.section("heads")? {
-            Some(section) => parse_heads(section, &sensors)?,
-            None => (HeadLayout::PhaseShift, 0.0),
+        let water = match root.section("water")? {
+            Some(water) => root.part(|| parse_water(&water, axis_yaw_rad))?,
+            None => Some((Site { axis_yaw_rad, ..Site::default() }, None)),
         };
-        check_heads(root, &sensors, &hull)?;
-        check_sound(root, sound_speed_from.as_deref(), &sensors, &sensor_configs)?;
+        let coverage =
+            CoverageConfig::of_root(root, tunnel.as_ref().map(|tunnel| &tunnel.profile), target_m)?;
+        let mut hull = Vec::new();
+        for section in root.sections("hull")? {
+            hull.extend(root.part(|| parse_hull(&section))?);
+        }
+        let tables = root.sections("sensors")?.into_iter().map(|table| table.with_files(load)).collect();
+        let sensors = sensors::parse(root, tables, kinds)?;
+        let devices = sensors.as_ref().map(|sensors| sensors.devices.as_slice());
+        let noise =
+            devices.iter().flat_map(|devices| devices.iter()).find_map(|sensor| sensor.inertial_noise());
+        let navigation = root.section("navigation")?;
+        let navigation = root.part(|| NavigationConfig::parse(navigation, noise))?;
+        let heads = match root.section("heads")? {
+            Some(section) => root.part(|| parse_heads(&section, devices))?,
+            None => Some((HeadLayout::PhaseShift, 0.0)),
+        };
+        if let Some(sensors) = &sensors {
+            root.part(|| check_heads(root, &sensors.devices, &hull))?;
+            let sound_speed_from = water.as_ref().and_then(|(_, from)| from.as_deref());
+            root.part(|| check_sound(root, sound_speed_from, sensors))?;
+        }
+        root.finish()?;
+        let (target_m, tunnel) = (root.required("target_m", target_m), root.required("tunnel", tunnel));
+        let (site, sound_speed_from) = root.required("water", water)?;
+        let (layout, planned_speed_mps) = root.required("heads", heads)?;
+        let sensors = root.required("sensors", sensors)?;
         Ok(Self {
             name,
-            target_m,
-            section_m,
+            target_m: target_m?,
+            section_m: root.required("section_m", section_m)?,
             site,
             sound_speed_from,
-            tunnel,
+            tunnel: tunnel?,
             layout,
             planned_speed_mps,
             hull,
             coverage,
-            navigation,
+            navigation: root.required("navigation", navigation)?,
             dive_time: dive_time.map(|hours| DurNs::from_secs_f64(hours * 3600.0)),
-            sensors,
-            sensor_configs,
-            attachments: attachments.into_inner(),
+            sensors: sensors.devices,
+            sensor_configs: sensors.configs,
+            attachments: Vec::new(),
         })
     }
 }
@@ -197,7 +196,29 @@ impl VehicleConfig {
     }
 }
 
-fn parse_water(section: Section<'_>, axis_yaw_rad: f64) -> Result<(Site, Option<String>), ConfigError> {
+/// The tunnel, if it is there and right, and the yaw of its axis, radians.
+fn parse_tunnel(root: &Section<'_>, load: Loader<'_>) -> Result<(Option<TunnelConfig>, f64), ConfigError> {
+    let Some(section) = root.section("tunnel")? else { return Ok((None, 0.0)) };
+    let axis_yaw_rad = section.number("axis_yaw_deg", DEGREES)?.unwrap_or(0.0).to_radians();
+    Ok((root.part(|| TunnelConfig::from_section(&section, load))?, axis_yaw_rad))
+}
+
+/// Checks that the loop can allocate what it needs for sections and samples.
+fn check_fineness(
+    root: &Section<'_>,
+    tunnel: &TunnelConfig,
+    target_m: f64,
+    section_m: f64,
+) -> Result<(), ConfigError> {
+    if tunnel.length_m / section_m <= MAX_SECTIONS && wall_cells(tunnel, target_m) <= MAX_CELLS {
+        return Ok(());
+    }
+    let problem =
+        "is too fine for so long a tunnel; make tunnel.length_m smaller, or this and section_m larger";
+    Err(root.invalid("target_m", problem))
+}
+
+fn parse_water(section: &Section<'_>, axis_yaw_rad: f64) -> Result<(Site, Option<String>), ConfigError> {
     let usual = Site::default();
     let or = |value: Option<f64>, default| value.unwrap_or(default);
     let site = Site {
@@ -219,26 +240,22 @@ fn parse_water(section: Section<'_>, axis_yaw_rad: f64) -> Result<(Site, Option<
     Ok((site, sound_speed_from))
 }
 
-fn parse_hull(section: Section<'_>) -> Result<Obstacle, ConfigError> {
+fn parse_hull(section: &Section<'_>) -> Result<Obstacle, ConfigError> {
     let corner = |key: &'static str| section.required(key, section.triple(key, SENSOR_DISTANCE_M)?);
-    let (least, most) = (corner("least_m")?, corner("most_m")?);
+    let (least, most) = (corner("least_m"), corner("most_m"));
+    section.finish()?;
+    let (least, most) = (least?, most?);
     if least.iter().zip(&most).any(|(least, most)| least >= most) {
         return Err(section.invalid("most_m", "must be larger than least_m in each of x, y, z"));
     }
-    section.finish()?;
     let point = |[x, y, z]: [f64; 3]| Vec3::new(x, y, z);
     Ok(Obstacle::Box { least: point(least), most: point(most) })
 }
 
 /// Checks that the sensor that supplies the speed of sound exists and is a depth sensor.
-fn check_sound(
-    root: &Section<'_>,
-    told_by: Option<&str>,
-    sensors: &[Box<dyn Device>],
-    configs: &[SensorConfig],
-) -> Result<(), ConfigError> {
+fn check_sound(root: &Section<'_>, told_by: Option<&str>, sensors: &Sensors) -> Result<(), ConfigError> {
     let Some(id) = told_by else { return Ok(()) };
-    let told_by = configs.iter().zip(sensors).find(|(config, _)| config.id == id);
+    let told_by = sensors.configs.iter().zip(&sensors.devices).find(|(config, _)| config.id == id);
     if told_by.is_some_and(|(_, sensor)| sensor.sense() == Sense::Depth) {
         return Ok(());
     }
@@ -268,46 +285,17 @@ fn check_heads(
     Ok(())
 }
 
-fn parse_heads(section: Section<'_>, sensors: &[Box<dyn Device>]) -> Result<(HeadLayout, f64), ConfigError> {
+/// Layout and planned speed, m/s; `sensors` are known if all of them are right.
+fn parse_heads(
+    section: &Section<'_>,
+    sensors: Option<&[Box<dyn Device>]>,
+) -> Result<(HeadLayout, f64), ConfigError> {
     let layout = section.choice("layout", &HeadLayout::NAMES)?.unwrap_or(HeadLayout::PhaseShift);
-    if layout == HeadLayout::SectorOffset {
+    let speed = section.number("planned_speed_mps", 0.0..=5.0)?.unwrap_or(0.0);
+    section.finish()?;
+    if let (HeadLayout::SectorOffset, Some(sensors)) = (layout, sensors) {
         let heads = sensors.iter().filter(|sensor| sensor.head().is_some()).count();
         layout.check(heads).map_err(|why| section.invalid("layout", &why.to_string()))?;
     }
-    let speed = section.number("planned_speed_mps", 0.0..=5.0)?.unwrap_or(0.0);
-    section.finish()?;
     Ok((layout, speed))
-}
-
-fn parse_sensor(
-    section: Section<'_>,
-    before: &[SensorConfig],
-    kinds: &[&dyn DeviceKind],
-) -> Result<(SensorConfig, Box<dyn Device>), ConfigError> {
-    let id = section.required("id", section.text("id")?)?;
-    let simple = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
-    if id.is_empty() || id.len() > 32 || !id.chars().all(simple) {
-        return Err(section.invalid("id", "must be 1 to 32 letters, digits, _ or -"));
-    }
-    if before.iter().any(|other| other.id == id) {
-        return Err(section.invalid("id", "is the id of an earlier sensor; ids must differ"));
-    }
-    let choices: Vec<(&str, usize)> = kinds.iter().enumerate().map(|(i, kind)| (kind.name(), i)).collect();
-    let index = section.required("plugin", section.choice("plugin", &choices)?)?;
-    let position = section.triple("position_m", SENSOR_DISTANCE_M)?.unwrap_or_default();
-    let angles = section.triple("angles_deg", DEGREES)?.unwrap_or_default().map(f64::to_radians);
-    let config = SensorConfig {
-        id,
-        plugin: kinds.get(index).map(|kind| kind.name().to_owned()).unwrap_or_default(),
-        connect: section.text("connect")?.unwrap_or_default(),
-        mount: Mount {
-            position: Vec3::new(position[0], position[1], position[2]),
-            rotation: Rot::from_roll_pitch_yaw(angles[0], angles[1], angles[2]),
-        },
-        latency: DurNs::from_secs_f64(section.number("latency_ms", 0.0..=1000.0)?.unwrap_or(0.0) / 1000.0),
-    };
-    let kind = kinds.get(index).ok_or_else(|| section.invalid("plugin", "is not in this build"))?;
-    let device = kind.configure(&config, &section)?;
-    section.finish()?;
-    Ok((config, device))
 }

@@ -101,6 +101,10 @@ impl Device for Imagenex881 {
         what == Needless::Echoes && without_echoes(packet, shorter).is_some()
     }
 
+    fn line_address(&self) -> Option<String> {
+        Some(format!("head_id {}", self.settings.command.head_id))
+    }
+
     fn carriers(&self) -> &'static [Carrier] {
         &CARRIERS
     }

@@ -66,7 +66,9 @@ impl Settings {
     /// Errors: a key missing or not allowed, or a latency not below the ping period.
     pub fn read(sensor: &SensorConfig, own: &Section<'_>) -> Result<Self, ConfigError> {
         let choices = MODES.map(|mode| (mode.name, mode));
-        let mode = own.required("mode", own.choice("mode", &choices)?)?;
+        let known = own.required("mode", own.choice("mode", &choices)?);
+        // Without a mode the other keys are checked as in any.
+        let mode = *known.as_ref().unwrap_or(&MODES[0]);
         let command = command(mode, own)?;
         let measured = measured_turns(mode, command.range_m, own)?;
         let (turn, _) = turn_period(mode, command.range_m, &measured);
@@ -85,6 +87,7 @@ impl Settings {
             },
             measured,
         };
+        known?;
         if sensor.latency >= settings.ping_period {
             let most = settings.ping_period.as_secs_f64() * 1000.0;
             let problem =

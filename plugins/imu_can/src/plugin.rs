@@ -142,6 +142,13 @@ impl Device for CanImu {
         })
     }
 
+    fn line_address(&self) -> Option<String> {
+        Some(match &self.known {
+            Known::Preset(meaning) => format!("{:?}", meaning.set),
+            Known::Dbc(mapping) => format!("{:?}", Mapping { latency: DurNs::ZERO, ..**mapping }),
+        })
+    }
+
     fn carriers(&self) -> &'static [Carrier] {
         &driver::CARRIERS
     }

@@ -145,6 +145,16 @@ impl Device for Autopilot {
         what == Needless::Identity && without_identity(packet, shorter).is_some()
     }
 
+    fn line_address(&self) -> Option<String> {
+        let Meaning { part, system_id, component_id, .. } = self.meaning;
+        let part = match part {
+            Part::Imu { message } => format!("{message:?}"),
+            Part::Pressure { message, .. } => format!("{message:?}"),
+            Part::Distance(distance) => format!("{:?} {:?}", distance.orientation, distance.sensor_id),
+        };
+        Some(format!("{part} of {system_id:?} {component_id:?}, a {}", self.sense().as_str()))
+    }
+
     fn carriers(&self) -> &'static [Carrier] {
         &driver::CARRIERS
     }

@@ -77,6 +77,10 @@ impl Device for Ping1d {
         what == Needless::Echoes && without_strengths(packet, shorter).is_some()
     }
 
+    fn line_address(&self) -> Option<String> {
+        Some(format!("device_id {}", self.settings.device_id))
+    }
+
     fn carriers(&self) -> &'static [Carrier] {
         &CARRIERS
     }

@@ -87,12 +87,12 @@ fn hid(reeling: &Reeling, own: &Section<'_>) -> Result<Wire, ConfigError> {
     layout.auxiliary_offset = clock_offset.or(layout.auxiliary_offset);
     let countings = [("absolute", Counting::Absolute), ("delta", Counting::Delta)];
     let counting = own.choice("mode", &countings)?.unwrap_or(Counting::Absolute);
-    let counts_per_metre =
-        own.required("counts_per_metre", own.number("counts_per_metre", -1.0e6..=1.0e6)?)?;
+    let counts_per_metre = own.number("counts_per_metre", -1.0e6..=1.0e6)?;
+    let max_speed_mps = own.number("max_speed_mps", 0.1..=20.0)?.unwrap_or(3.0);
+    let counts_per_metre = own.required("counts_per_metre", counts_per_metre)?;
     if counts_per_metre.abs() < 0.1 {
         return Err(own.invalid("counts_per_metre", "must be at least 0.1 away from zero"));
     }
-    let max_speed_mps = own.number("max_speed_mps", 0.1..=20.0)?.unwrap_or(3.0);
     let between_reports = max_speed_mps * counts_per_metre.abs() / reeling.rate_hz;
     let half = (1_u64 << (layout.width.bits() - 1)) as f64;
     if between_reports >= half {
@@ -192,6 +192,21 @@ impl Device for CableCounter {
             Wire::Hid { counter, .. } => Some(counter.layout.descriptor()),
             Wire::Line { .. } => None,
         }
+    }
+
+    fn remarks(&self) -> Vec<(&'static str, String)> {
+        let mut remarks = Vec::new();
+        if let Wire::Hid { counter, .. } = &self.wire
+            && counter.counts_per_metre < 0.0
+        {
+            let what = "is negative: the count falls as cable is paid out; make it positive if it rises";
+            remarks.push(("counts_per_metre", what.to_owned()));
+        }
+        if self.reeling.scale < 0.0 {
+            let what = "is negative: chainage falls as cable is paid out; make it positive if it rises";
+            remarks.push(("scale", what.to_owned()));
+        }
+        remarks
     }
 
     fn carriers(&self) -> &'static [Carrier] {

@@ -69,13 +69,13 @@ impl Csv {
     ///
     /// Errors: a key with an invalid value, an unknown sensor or column, a sensor with some of its quantities
     /// missing.
-    pub fn new(mapping: Section<'_>, vehicle: &VehicleConfig, header: &str) -> Result<Self, ConfigError> {
+    pub fn new(mapping: &Section<'_>, vehicle: &VehicleConfig, header: &str) -> Result<Self, ConfigError> {
         let separators = [(",", ','), (";", ';'), ("\t", '\t')];
         let separator = mapping.choice("separator", &separators)?.unwrap_or(',');
         let names: Vec<&str> = header.trim().split(separator).map(cell).collect();
         let units = [("s", 1_000_000_000), ("ms", 1_000_000), ("us", 1000), ("ns", 1)];
         let unit_ns = mapping.choice("time_unit", &units)?.unwrap_or(1_000_000_000);
-        let time = (column(&mapping, "time_column", &names)?, unit_ns);
+        let time = (column(mapping, "time_column", &names)?, unit_ns);
         let clock = if mapping.boolean("utc")?.unwrap_or(false) { Clock::Utc } else { Clock::Own };
         let mut targets: Vec<Target> = Vec::new();
         for section in mapping.sections("columns")? {

@@ -28,6 +28,11 @@ pub trait PacketSource {
     /// Errors: reading the log fails.
     fn coming(&mut self) -> Result<Option<Coming>, LogError>;
 
+    /// The first and the last time of its packets, where these are known.
+    fn span(&self) -> Option<(MonoNs, MonoNs)> {
+        None
+    }
+
     /// Puts the next packet into its source's ring.
     ///
     /// Errors: it doesn't fit and stays the next packet.

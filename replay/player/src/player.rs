@@ -189,6 +189,10 @@ impl PacketSource for Player {
         Ok(self.next)
     }
 
+    fn span(&self) -> Option<(MonoNs, MonoNs)> {
+        self.reader.times()
+    }
+
     fn send(&mut self, port: &mut Port) -> Result<(), RingError> {
         let Some(coming) = self.next else { return Ok(()) };
         // Our own logs are in the order of consumption by the loop, others' in time order.

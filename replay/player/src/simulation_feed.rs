@@ -1,9 +1,10 @@
 //! A simulated dive as a source of packets.
 
+use headrace_geometry::time::MonoNs;
 use headrace_monitor::ring::{Port, RingError};
 use headrace_sensor::device::Direction;
 use headrace_sensor::reading::SourceId;
-use headrace_simulator::Simulation;
+use headrace_simulator::{START, Simulation};
 
 use crate::drive::{Coming, PacketSource};
 use crate::log::LogError;
@@ -31,6 +32,10 @@ impl PacketSource for SimulationFeed {
             self.simulation.next_message();
         }
         Ok(None)
+    }
+
+    fn span(&self) -> Option<(MonoNs, MonoNs)> {
+        Some((START, self.simulation.end()))
     }
 
     fn send(&mut self, port: &mut Port) -> Result<(), RingError> {

@@ -1,14 +1,14 @@
 //! Errors that prevent a simulation.
 
-use headrace_config::ConfigError;
+use headrace_config::ConfigErrors;
 
 /// An error in a scene.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SceneError {
-    /// A key of the scene or of its vehicle file.
+    /// Keys of the scene or of its vehicle file.
     #[error(transparent)]
-    Config(#[from] ConfigError),
+    Config(#[from] ConfigErrors),
     /// The trajectory leads through an obstacle.
     #[error(
         "simulating the trajectory: after {after_s:.1} s, at chainage {chainage_m:.2} m, y {y_m:.2} m, z {z_m:.2} m, it leads \

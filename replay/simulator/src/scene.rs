@@ -1,8 +1,7 @@
 //! `SCENE.toml`: a vehicle file, the true tunnel, a trajectory, and the effects to simulate.
 
 use headrace_config as config;
-use headrace_config::Document;
-use headrace_config::Loader;
+use headrace_config::{ConfigError, ConfigErrors, Document, Loader, Section};
 use headrace_sampling::head::HeadProgram;
 use headrace_sensor::device::DeviceKind;
 use headrace_vehicle::VehicleConfig;
@@ -12,7 +11,10 @@ use crate::environment::Environment;
 use crate::error::SceneError;
 use crate::facts::Facts;
 use crate::files::FileLoader;
-use crate::trajectory::{self, Trajectory};
+use crate::trajectory::{self, Ground, Trajectory};
+
+/// Longer than any dive, s.
+const LONGEST_S: f64 = 1e9;
 
 /// A parsed and checked scene.
 pub struct Scene {
@@ -35,38 +37,69 @@ pub struct Scene {
 impl Scene {
     /// Parses and checks a scene. `load` loads files that the scene or its vehicle file names; `seed` overrides the scene's.
     ///
-    /// Errors: the first key that is missing, unknown or out of range; a trajectory that leaves the tunnel; an effect that
-    /// applies to nothing.
+    /// Errors: every key that is missing, unknown or out of range, in the scene and in its vehicle file; a trajectory that leaves
+    /// the tunnel; an effect that applies to nothing.
     pub fn parse(
         document: Document<'_>,
         kinds: &[&dyn DeviceKind],
         load: FileLoader<'_>,
         seed: Option<u64>,
     ) -> Result<Self, SceneError> {
+        let mut of_vehicle = None;
+        let scene = document.read(|root| Self::from_root(root, kinds, load, seed, &mut of_vehicle));
+        match (scene, of_vehicle) {
+            (Err(errors), Some(others)) => Err(errors.and(others).into()),
+            (scene, _) => Ok(scene?),
+        }
+    }
+
+    /// Errors of the vehicle file go into `of_vehicle`.
+    fn from_root(
+        root: &Section<'_>,
+        kinds: &[&dyn DeviceKind],
+        load: FileLoader<'_>,
+        seed: Option<u64>,
+        of_vehicle: &mut Option<ConfigErrors>,
+    ) -> Result<Self, ConfigError> {
         let text = |name: &str| String::from_utf8(load(name)?).map_err(|_| "is no text".to_owned());
         let text: Loader<'_> = &text;
-        let root = document.root()?;
         let name = root.text("name")?.unwrap_or_else(|| "unnamed scene".to_owned());
         let own_seed = root.integer("seed", 0..=i64::MAX)?.and_then(|seed| u64::try_from(seed).ok());
         let seed = seed.or(own_seed).unwrap_or(1);
-        let file = root.required("vehicle", root.text("vehicle")?)?;
+        let file = root.text("vehicle")?;
+        let changes = root.section("vehicle_changes")?;
+        let (tunnel, trajectory) = (root.section("tunnel")?, root.section("trajectory")?);
+        let effects = root.section("effects")?;
+        root.finish()?;
+        let (file, trajectory) = (root.required("vehicle", file), root.required("trajectory", trajectory));
+        let file = file?;
         let mut vehicle_text = text(&file).map_err(|why| root.invalid("vehicle", &why))?;
-        if let Some(changes) = root.section("vehicle_changes")? {
+        if let Some(changes) = changes {
             vehicle_text = config::changed(&vehicle_text, &changes)?;
         }
-        let vehicle = VehicleConfig::parse(Document::new(&file, &vehicle_text), kinds, text)?;
+        let vehicle = VehicleConfig::parse(Document::new(&file, &vehicle_text), kinds, text);
+        let vehicle = vehicle.map_err(|errors| {
+            let problem = match errors.errors().len() {
+                1 => "has an error".to_owned(),
+                count => format!("has {count} errors"),
+            };
+            *of_vehicle = Some(errors);
+            root.invalid("vehicle", &problem)
+        })?;
         let programs = vehicle.programs().map_err(|why| {
             root.invalid("vehicle", &format!("describes heads that no program fits: {why}"))
         })?;
-        let tunnel = &vehicle.tunnel;
-        let environment =
-            Environment::parse(root.section("tunnel")?, &tunnel.profile, tunnel.length_m, text, load)?;
-        let section = root.required("trajectory", root.section("trajectory")?)?;
-        let (trajectory, ground) =
-            trajectory::parse(section, (&tunnel.profile, tunnel.length_m), seed, text)?;
-        let facts = Facts::new(&vehicle, &programs, ground, trajectory.duration_s());
-        let effects = effects::parse(root.section("effects")?, &facts)?;
-        root.finish()?;
+        let (design, length_m) = (&vehicle.tunnel.profile, vehicle.tunnel.length_m);
+        let environment = root.part(|| Environment::parse(tunnel, design, length_m, text, load))?;
+        let trajectory = root.part(|| trajectory::parse(&trajectory?, (design, length_m), seed, text))?;
+        // Effects of a scene whose trajectory is wrong are checked without it.
+        let known = trajectory.as_ref().map(|(trajectory, ground)| (*ground, trajectory.duration_s()));
+        let (ground, duration_s) = known.unwrap_or((Ground::Water, LONGEST_S));
+        let facts = Facts::new(&vehicle, &programs, ground, duration_s);
+        let effects = root.part(|| effects::parse(effects, &facts))?;
+        let (trajectory, _) = root.required("trajectory", trajectory)?;
+        let environment = root.required("tunnel", environment)?;
+        let effects = root.required("effects", effects)?;
         Ok(Self { name, vehicle_text, vehicle, programs, seed, environment, trajectory, facts, effects })
     }
 

@@ -72,13 +72,13 @@ fn a_wrong_vehicle_file_is_refused_with_file_line_key_value_and_what_is_allowed(
     table missing
         headrace: vehicle.toml:1: tunnel: is missing
     unknown key
-        headrace: vehicle.toml:3: colour: is not a key here; known are name, target_m, section_m, tunnel, water, coverage, openings, dive_hours, hull, sensors, navigation, heads
+        headrace: vehicle.toml:3: colour: is not a key here; known are name, target_m, section_m, dive_hours, tunnel, water, coverage, openings, hull, sensors, navigation, heads
     unknown key in a table
         headrace: vehicle.toml:11: water.salt: is not a key here; known are sound_speed_mps, density_kgpm3, gravity_mps2, surface_pressure_pa, surface_above_floor_m, sound_speed_from
     unknown key of a sensor
         headrace: vehicle.toml:62: sensors[8].colour: is not a key here; known are id, plugin, position_m, angles_deg, connect, latency_ms, kind, scale, zero_at_m, rate_hz, report_id, width_bits, report_bytes, offset, signed, endian, sequence_offset, status_offset, clock_ms_offset, mode, counts_per_metre, max_speed_mps
     unknown table
-        headrace: vehicle.toml:12: head: is not a key here; known are name, target_m, section_m, tunnel, water, coverage, openings, dive_hours, hull, sensors, navigation, heads
+        headrace: vehicle.toml:12: head: is not a key here; did you mean heads?
     text in place of a number
         headrace: vehicle.toml:2: target_m = "1.2": must be a number from 0.01 to 20
     number in place of a text
@@ -104,7 +104,7 @@ fn a_wrong_vehicle_file_is_refused_with_file_line_key_value_and_what_is_allowed(
     id with a space
         headrace: vehicle.toml:35: sensors[3].id = "ping right": must be 1 to 32 letters, digits, _ or -
     unknown plugin
-        headrace: vehicle.toml:51: sensors[6].plugin = "bar300": must be one of imagenex881, ping1d, bar100, imu_can, tether_hid, mavlink, a50
+        headrace: vehicle.toml:51: sensors[6].plugin = "bar300": must be one of imagenex881, ping1d, bar100, imu_can, tether_hid, mavlink, a50; did you mean "bar100"?
     unknown profile
         headrace: vehicle.toml:5: tunnel.profile = "egg": must be one of ceran, ceran-blueprint, rectangle, circle, arch, trimmed_circle, polyline
     unknown preset

@@ -3,8 +3,15 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
 
 mod bad_input;
+mod check;
+#[cfg(unix)]
+mod habits;
 mod logging;
+mod overwriting;
 mod plan;
+#[cfg(unix)]
+mod playback;
+mod readme;
 mod registration;
 mod report_schema;
 mod screens;

@@ -184,7 +184,6 @@ fn what_cannot_be_planned_is_refused_with_its_reason() {
         writeln!(said, "{}\n    {}", args.join(" "), answer.stderr.lines().next().unwrap()).unwrap();
     }
     insta::assert_snapshot!(said, @r#"
-
         headrace: plan: needs --tunnel or --vehicle
     --vehicle sectors.toml
         headrace: sectors.toml:2: heads.layout = "sector_offset": sector offset divides a turn among heads: it needs at least 2, not 1
@@ -199,7 +198,7 @@ fn what_cannot_be_planned_is_refused_with_its_reason() {
     --tunnel circle,radius_m=-3 --target 0.5
         headrace: --tunnel:2: radius_m = -3: must be a number from 0.1 to 200
     --tunnel circle,radius=3 --target 0.5
-        headrace: --tunnel:1: radius_m: is missing
+        headrace: --tunnel:2: radius: is not a key here; did you mean radius_m?
     --tunnel bow.csv --target 0.5
         headrace: --tunnel:1: profile = "polyline": the profile isn't star-shaped about (-1, 0): it runs backwards or crosses itself at vertex 0
     --tunnel ceran --target 0.5 --layout sector_offset

@@ -111,7 +111,7 @@ impl Surroundings {
             format!("{text}[[topics]]\ntopic = \"{topic}\"\nsensor = \"{sensor}\"\n{time}\n")
         });
         let mapping = Document::new("topics.toml", &text).root().unwrap();
-        Feeds::mapped(mapping, &self.vehicle, topics).unwrap_or_default()
+        Feeds::mapped(&mapping, &self.vehicle, topics).unwrap_or_default()
     }
 }
 
@@ -210,7 +210,7 @@ fn table(bytes: &[u8], around: &Surroundings) -> Option<Csv> {
     let line = bytes.split(|byte| *byte == b'\n').next().unwrap_or_default();
     let line = String::from_utf8_lossy(line);
     [values, heads].iter().find_map(|text| {
-        Csv::new(Document::new("map.toml", text).root().unwrap(), &around.vehicle, &line).ok()
+        Csv::new(&Document::new("map.toml", text).root().unwrap(), &around.vehicle, &line).ok()
     })
 }
 

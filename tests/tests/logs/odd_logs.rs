@@ -92,7 +92,7 @@ fn an_attached_vehicle_file_with_an_unknown_plugin_is_refused() {
     write_log(&folder.path("foreign.mcap"), WriteOptions::new(), Some(&vehicle), &raw_messages(&dive));
     let answer = folder.headrace(&["replay", "foreign.mcap"]);
     assert_eq!((answer.code, answer.stdout.as_str()), (Some(2), ""));
-    insta::assert_snapshot!(answer.stderr, @r#"headrace: foreign.mcap/vehicle.toml:51: sensors[6].plugin = "bar300": must be one of imagenex881, ping1d, bar100, imu_can, tether_hid, mavlink, a50"#);
+    insta::assert_snapshot!(answer.stderr, @r#"headrace: foreign.mcap/vehicle.toml:51: sensors[6].plugin = "bar300": must be one of imagenex881, ping1d, bar100, imu_can, tether_hid, mavlink, a50; did you mean "bar100"?"#);
     // Another vehicle file reads it, whatever its channels call their plugin.
     assert_eq!(replay(&folder, "foreign.mcap").code, Some(0));
 }

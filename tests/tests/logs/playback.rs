@@ -268,7 +268,7 @@ fn lines_on_standard_input_pause_step_and_seek() {
         stops[1..],
         ["0:00:12.000", "0:00:12.060", "0:00:07.060", "0:00:09.060", "0:00:20.020  (end)"]
     );
-    insta::assert_snapshot!(stderr, @r#"headrace: "stop" isn't a command; expected one of: pause, go, step [TICKS], seek TIME, ahead TIME, back TIME, speed N|max, end"#);
+    insta::assert_snapshot!(stderr, @r#"headrace: "stop" isn't a command; expected one of: pause, go, step [TICKS], seek TIME, ahead TIME, back TIME, speed N|max, end or quit"#);
     let whole = folder.replay("ticks.mcap", &[]).1;
     let digest = whole["digest"].as_str().unwrap();
     assert!(stdout.contains(&format!("digest {digest}")), "{stdout}");

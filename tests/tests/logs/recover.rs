@@ -55,10 +55,10 @@ fn nothing_is_overwritten_and_what_is_no_log_leaves_nothing() {
     let (code, told) = recover(&folder, "live.mcap", "fixed.mcap");
     assert_eq!((code, &told["losses"]), (Some(0), &Value::Array(Vec::new())), "{told}");
     assert_eq!(folder.digest("fixed.mcap", &[]), folder.digest("live.mcap", &[]));
-    for output in ["fixed.mcap", "live.mcap"] {
+    for (output, why) in [("dive.mcap", "exists"), ("live.mcap", "is read by this command")] {
         let answer = folder.headrace(&["recover", "live.mcap", "-o", output]);
-        assert_eq!(answer.code, Some(1), "{}", answer.stderr);
-        assert!(answer.stderr.contains(output) && answer.stderr.contains("exists"), "{}", answer.stderr);
+        assert_eq!(answer.code, Some(2), "{}", answer.stderr);
+        assert!(answer.stderr.contains(output) && answer.stderr.contains(why), "{}", answer.stderr);
     }
     let answer = folder.headrace(&["recover", "vehicle.toml", "-o", "none.mcap"]);
     assert_eq!(answer.code, Some(1));

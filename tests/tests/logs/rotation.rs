@@ -107,7 +107,7 @@ fn nothing_is_recorded_over_parts_and_dives_are_not_mixed() {
         record(&folder, &["--record", &log, "--rotate", "5s"]);
         let arguments = ["run", "vehicle.toml", "--source", "dive.mcap", "--speed", "max", "--record", &log];
         let answer = folder.headrace(&[&arguments[..], &["--rotate", "1h"]].concat());
-        assert!(answer.code == Some(1) && answer.stderr.contains("part001"), "{}", answer.stderr);
+        assert!(answer.code == Some(2) && answer.stderr.contains("part001"), "{}", answer.stderr);
     }
     let answer = folder.headrace(&["replay", "a.part001.mcap", "b.part002.mcap"]);
     assert_eq!(answer.code, Some(1), "{}", answer.stdout);

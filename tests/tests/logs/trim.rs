@@ -56,8 +56,8 @@ fn with_nothing_cut_it_is_the_same_dive_down_to_its_results() {
         let answer = folder.headrace(&["verify", name]);
         assert_eq!(answer.code, Some(0), "{name}: {}", answer.stdout);
     }
-    let answer = folder.headrace(&["trim", "live.mcap", "-o", "copy.mcap"]);
-    assert!(answer.code == Some(1) && answer.stderr.contains("exists"), "{}", answer.stderr);
+    let answer = folder.headrace(&["trim", "live.mcap", "-o", "dive.mcap"]);
+    assert!(answer.code == Some(2) && answer.stderr.contains("exists"), "{}", answer.stderr);
 }
 
 #[test]

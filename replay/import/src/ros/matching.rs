@@ -90,7 +90,7 @@ impl Feeds {
     ///
     /// Errors: a key with an invalid value, an unknown sensor or topic, or a sensor and topic of different kinds.
     pub fn mapped(
-        mapping: Section<'_>,
+        mapping: &Section<'_>,
         vehicle: &VehicleConfig,
         topics: &[Topic],
     ) -> Result<Self, MatchError> {

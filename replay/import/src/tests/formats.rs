@@ -128,7 +128,7 @@ fn a_table_s_values_are_on_the_wire_in_the_wire_s_units() {
     let none = |_: &str| Err("is none".to_owned());
     let vehicle = VehicleConfig::parse(Document::new("vehicle", vehicle), &KINDS, &none).unwrap();
     let mapping = Document::new("mapping", mapping).root().unwrap();
-    let mut table = Csv::new(mapping, &vehicle, "\"t\"; p\r\n").unwrap();
+    let mut table = Csv::new(&mapping, &vehicle, "\"t\"; p\r\n").unwrap();
     let (entries, lost, left) = cut(&mut table, b"\"t\"; p\r\n20.5;-1.5005\r\n");
     assert_eq!((entries.len(), lost.len(), left), (1, 0, 0));
     assert_eq!((entries[0].stamp_ns, entries[0].stream.as_str()), (20_500_000, "d"));
@@ -174,7 +174,7 @@ proptest! {
         let none = |_: &str| Err("is none".to_owned());
         let vehicle = VehicleConfig::parse(Document::new("vehicle", VEHICLE), &KINDS, &none).unwrap();
         let mapping = Document::new("mapping", MAPPING).root().unwrap();
-        let mut table = Csv::new(mapping, &vehicle, "t,p,r\n").unwrap();
+        let mut table = Csv::new(&mapping, &vehicle, "t,p,r\n").unwrap();
         let (entries, lost, left) = cut(&mut table, &[b"t,p,r\n", &bytes[..]].concat());
         let lines = bytes.split(|byte| *byte == b'\n').count();
         prop_assert!(left == 0 && lost.len() <= lines && entries.len() <= 20 + 2 * lines);

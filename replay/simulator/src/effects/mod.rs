@@ -103,7 +103,8 @@ pub(crate) fn parse(section: Option<Section<'_>>, facts: &Facts) -> Result<Named
     for kind in KINDS {
         let tables = section.tables(kind.name())?;
         if !tables.is_empty() {
-            named.push((kind, kind.read(tables, facts)?));
+            let effect = section.part(|| kind.read(tables, facts))?;
+            named.extend(effect.map(|effect| (kind, effect)));
         }
     }
     section.finish()?;

@@ -22,8 +22,13 @@ impl<P: Clone> PerSensor<P> {
     ) -> Result<Self, ConfigError> {
         let mut found: Vec<(usize, P)> = Vec::new();
         for table in tables {
-            let sensors = targets(&table, facts, senses)?;
-            let parameters = read(&table)?;
+            let read = table.part(|| {
+                let sensors = targets(&table, facts, senses);
+                let parameters = read(&table)?;
+                table.finish()?;
+                Ok((sensors?, parameters))
+            })?;
+            let Some((sensors, parameters)) = read else { continue };
             for source in sensors {
                 if found.iter().any(|(other, _)| *other == source) {
                     let id = facts.sensors.get(source).map_or("", |sensor| sensor.id.as_str());
@@ -32,7 +37,6 @@ impl<P: Clone> PerSensor<P> {
                 }
                 found.push((source, parameters.clone()));
             }
-            table.finish()?;
         }
         found.sort_by_key(|(source, _)| *source);
         Ok(Self(found))

@@ -191,22 +191,17 @@ fn power(base: f64, exponent: f64) -> f64 {
 
 /// `size_m`, one number or three.
 fn parse_size(table: &Section<'_>) -> Result<[f64; 3], ConfigError> {
-    if let Ok(Some(size_m)) = table.number("size_m", SIZE_M) {
-        return Ok([size_m; 3]);
-    }
-    let sizes = table.numbers("size_m", SIZE_M);
-    match table.required("size_m", sizes.map_err(|_| size_problem(table))?)?.as_slice() {
-        [along_m, across_m, thick_m] => Ok([*along_m, *across_m, *thick_m]),
-        _ => Err(size_problem(table)),
-    }
-}
-
-fn size_problem(table: &Section<'_>) -> ConfigError {
-    let (least, most) = (SIZE_M.start(), SIZE_M.end());
-    let problem = format!(
-        "must be a diameter from {least} to {most}, or three: along the tunnel, along the wall, across the wall"
+    let wanted = format!(
+        "must be a diameter from {} to {}, or three: along the tunnel, along the wall, across the wall",
+        SIZE_M.start(),
+        SIZE_M.end()
     );
-    table.invalid("size_m", &problem)
+    let sizes = table.number_or_numbers("size_m", SIZE_M, &wanted)?;
+    match table.required("size_m", sizes)?.as_slice() {
+        [size_m] => Ok([*size_m; 3]),
+        [along_m, across_m, thick_m] => Ok([*along_m, *across_m, *thick_m]),
+        _ => Err(table.invalid("size_m", &wanted)),
+    }
 }
 
 /// `size_m`, the least and the most.

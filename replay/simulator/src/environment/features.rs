@@ -21,7 +21,7 @@ pub(super) struct Features {
 /// Reads features other than displaced wall from the tables, whose wall [`super::heaps`] and [`super::meshes`] have read,
 /// and checks that no key is left over. `bodies` are those that are meshes.
 ///
-/// Errors: the first key that is missing, unknown or out of range, or an impossible feature.
+/// Errors: a key that is missing, unknown or out of range, or an impossible feature.
 pub(super) fn parse(
     tables: Vec<Section<'_>>,
     heaps: &[Heap],
@@ -32,33 +32,45 @@ pub(super) fn parse(
     let ground = Ground { tube, length_m };
     let mut features = Features { solids: bodies, ..Features::default() };
     for (number, table) in (0_u16..).zip(tables) {
-        let kind = keys::kind(&table)?;
-        features.names.push(keys::name(&table, number)?);
-        match kind {
-            Kind::Bulge | Kind::Mesh => {}
-            Kind::Boulder => features.solids.push(boulders::one(&table, ground, number)?),
-            Kind::Boulders => features.solids.extend(boulders::many(&table, ground, number)?),
-            Kind::Debris | Kind::Fall => {
-                let heap = heaps.iter().find(|heap| heap.feature == number);
-                features.solids.extend(boulders::pieces(&table, ground, heap)?);
-            }
-            Kind::RockTrap => {
-                let ditch = openings::rock_trap(&table, ground, number)?;
-                features.hollows.push(opening(ground, &table, ditch)?);
-            }
-            Kind::SideTunnel => {
-                let aside = openings::side_tunnel(&table, ground, number)?;
-                features.hollows.push(opening(ground, &table, aside)?);
-            }
-            Kind::Gate => {
-                let (slot, bulkhead) = openings::gate(&table, ground, number)?;
-                features.hollows.push(opening(ground, &table, slot)?);
-                features.solids.extend(bulkhead);
-            }
-        }
-        table.finish()?;
+        table.part(|| features.add(&table, number, ground, heaps))?;
     }
     Ok(features)
+}
+
+impl Features {
+    fn add(
+        &mut self,
+        table: &Section<'_>,
+        number: u16,
+        ground: Ground<'_>,
+        heaps: &[Heap],
+    ) -> Result<(), ConfigError> {
+        let kind = keys::kind(table)?;
+        self.names.push(keys::name(table, number)?);
+        match kind {
+            Kind::Bulge | Kind::Mesh => {}
+            Kind::Boulder => self.solids.push(boulders::one(table, ground, number)?),
+            Kind::Boulders => self.solids.extend(boulders::many(table, ground, number)?),
+            Kind::Debris | Kind::Fall => {
+                let heap = heaps.iter().find(|heap| heap.feature == number);
+                self.solids.extend(boulders::pieces(table, ground, heap)?);
+            }
+            Kind::RockTrap => {
+                let ditch = openings::rock_trap(table, ground, number)?;
+                self.hollows.push(opening(ground, table, ditch)?);
+            }
+            Kind::SideTunnel => {
+                let aside = openings::side_tunnel(table, ground, number)?;
+                self.hollows.push(opening(ground, table, aside)?);
+            }
+            Kind::Gate => {
+                let (slot, bulkhead) = openings::gate(table, ground, number)?;
+                self.hollows.push(opening(ground, table, slot)?);
+                self.solids.extend(bulkhead);
+            }
+        }
+        table.finish()
+    }
 }
 
 /// The hollow, if it opens from the tube's wall and not from a mesh.

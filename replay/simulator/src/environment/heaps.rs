@@ -42,21 +42,24 @@ pub(super) fn parse(tables: &[Section<'_>], site: &Site<'_>) -> Result<(Vec<Bulg
     for (number, table) in tables.iter().enumerate() {
         let feature = u16::try_from(number)
             .map_err(|_| table.invalid("kind", "is one feature too many; at most 65536"))?;
-        match keys::kind(table)? {
-            Kind::Bulge => add(&mut bulges, parse_bulge(table, site, feature)?, table, site)?,
-            Kind::Debris => {
-                let (bulge, heap) = parse_debris(table, site, feature)?;
-                add(&mut bulges, bulge, table, site)?;
-                heaps.push(heap);
+        table.part(|| {
+            match keys::kind(table)? {
+                Kind::Bulge => add(&mut bulges, parse_bulge(table, site, feature)?, table, site)?,
+                Kind::Debris => {
+                    let (bulge, heap) = parse_debris(table, site, feature)?;
+                    add(&mut bulges, bulge, table, site)?;
+                    heaps.push(heap);
+                }
+                Kind::Fall => {
+                    let (cavity, bulge, heap) = parse_fall(table, site, feature)?;
+                    add(&mut bulges, cavity, table, site)?;
+                    add(&mut bulges, bulge, table, site)?;
+                    heaps.push(heap);
+                }
+                _ => {}
             }
-            Kind::Fall => {
-                let (cavity, bulge, heap) = parse_fall(table, site, feature)?;
-                add(&mut bulges, cavity, table, site)?;
-                add(&mut bulges, bulge, table, site)?;
-                heaps.push(heap);
-            }
-            _ => {}
-        }
+            Ok(())
+        })?;
     }
     Ok((bulges, heaps))
 }

@@ -144,7 +144,7 @@ impl Environment {
     ) -> Result<Self, ConfigError> {
         let Some(section) = section else { return Ok(Self::straight(design.clone())) };
         let profile = match section.section("as_built")? {
-            Some(as_built) => parse_as_built(as_built, text)?,
+            Some(as_built) => parse_as_built(&as_built, text)?,
             None => design.clone(),
         };
         let farthest_m = profile.farthest_m(profile.point_at(0.0));
@@ -356,7 +356,7 @@ impl Environment {
     }
 }
 
-fn parse_as_built(section: Section<'_>, load: Loader<'_>) -> Result<Profile, ConfigError> {
+fn parse_as_built(section: &Section<'_>, load: Loader<'_>) -> Result<Profile, ConfigError> {
     if section.keys().contains(&"length_m") {
         return Err(section.invalid("length_m", "isn't wanted here; the vehicle file gives the length"));
     }

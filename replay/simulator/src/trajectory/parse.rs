@@ -45,7 +45,7 @@ const KINDS: [(&str, TrajectoryKind); 5] = [
 ///
 /// Errors: a key that is missing, unknown or out of range; a trajectory that leaves the tunnel at its ends.
 pub(crate) fn parse(
-    section: Section<'_>,
+    section: &Section<'_>,
     (design, length_m): (&Profile, f64),
     seed: u64,
     load: Loader<'_>,
@@ -53,11 +53,11 @@ pub(crate) fn parse(
     let kind = section.choice("kind", &KINDS)?.unwrap_or(TrajectoryKind::Legs);
     let tunnel = Tunnel { design, length_m };
     let parsed = match kind {
-        TrajectoryKind::Legs => (legs(&section, tunnel)?, Ground::Water),
-        TrajectoryKind::Waypoints => (waypoints(&section, tunnel)?, Ground::Tunnel),
-        TrajectoryKind::Pilot => (pilot(&section, tunnel, seed)?, Ground::Water),
-        TrajectoryKind::Advised => (advised(&section, tunnel, seed)?, Ground::Water),
-        TrajectoryKind::Recorded => (recorded(&section, tunnel, load)?, Ground::Tunnel),
+        TrajectoryKind::Legs => (legs(section, tunnel)?, Ground::Water),
+        TrajectoryKind::Waypoints => (waypoints(section, tunnel)?, Ground::Tunnel),
+        TrajectoryKind::Pilot => (pilot(section, tunnel, seed)?, Ground::Water),
+        TrajectoryKind::Advised => (advised(section, tunnel, seed)?, Ground::Water),
+        TrajectoryKind::Recorded => (recorded(section, tunnel, load)?, Ground::Tunnel),
     };
     section.finish()?;
     Ok(parsed)
@@ -97,18 +97,27 @@ fn legs(section: &Section<'_>, tunnel: Tunnel<'_>) -> Result<Trajectory, ConfigE
     let place_m = tunnel.place(section)?;
     let mut legs = Vec::new();
     let mut chainage_m = start_m;
-    for leg in section.sections("legs")? {
-        let distance_m = leg.required("distance_m", leg.number("distance_m", 0.01..=1.0e6)?)?;
-        let speed_mps = leg.required("speed_mps", leg.number("speed_mps", -5.0..=5.0)?)?;
-        if speed_mps.abs() < 1e-3 {
-            return Err(leg.invalid("speed_mps", "must be at least 0.001 either way, or the leg has no end"));
+    let tables = section.sections("legs")?;
+    for (number, leg) in tables.iter().enumerate() {
+        let parsed = leg.part(|| {
+            let distance_m = leg.required("distance_m", leg.number("distance_m", 0.01..=1.0e6)?);
+            let speed_mps = leg.required("speed_mps", leg.number("speed_mps", -5.0..=5.0)?);
+            leg.finish()?;
+            let problem = "must be at least 0.001 either way, or the leg has no end";
+            let speed_mps = speed_mps.and_then(|speed_mps| {
+                if speed_mps.abs() < 1e-3 { Err(leg.invalid("speed_mps", problem)) } else { Ok(speed_mps) }
+            });
+            Ok(Leg { distance_m: distance_m?, speed_mps: speed_mps? })
+        })?;
+        let Some(parsed) = parsed else { continue };
+        legs.push(parsed);
+        chainage_m += parsed.distance_m * parsed.speed_mps.signum();
+        // Where it leads is known if all legs before are right.
+        if legs.len() == number + 1 {
+            tunnel.check(leg, "distance_m", chainage_m)?;
         }
-        chainage_m += distance_m * speed_mps.signum();
-        tunnel.check(&leg, "distance_m", chainage_m)?;
-        leg.finish()?;
-        legs.push(Leg { distance_m, speed_mps });
     }
-    if legs.is_empty() {
+    if tables.is_empty() {
         let problem = "has no leg; at least one table headed [[trajectory.legs]] is needed";
         return Err(section.invalid("legs", problem));
     }

@@ -14,9 +14,9 @@ fn recorded(trajectory: &str, seed: u64, file: &str) -> Result<(Trajectory, Grou
     let text = format!("[tunnel]\nprofile = \"ceran\"\n[trajectory]\n{trajectory}");
     let root = Document::new("scene", &text).root().unwrap();
     let load = |_: &str| Ok(file.to_owned());
-    let tunnel = TunnelConfig::from_section(root.section("tunnel").unwrap().unwrap(), &load).unwrap();
+    let tunnel = TunnelConfig::from_section(&root.section("tunnel").unwrap().unwrap(), &load).unwrap();
     let section = root.section("trajectory").unwrap().unwrap();
-    parse(section, (&tunnel.profile, 200.0), seed, &load).map_err(|error| error.to_string())
+    parse(&section, (&tunnel.profile, 200.0), seed, &load).map_err(|error| error.to_string())
 }
 
 fn trajectory(keys: &str) -> Trajectory {

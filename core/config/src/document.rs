@@ -1,0 +1,62 @@
+//! A TOML text with its name: its root table, and the lines of its keys.
+
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+use super::error::ConfigError;
+
+/// A text and its file name.
+#[derive(Debug, Clone, Copy)]
+pub struct Document<'a> {
+    pub(super) file: &'a str,
+    pub(super) text: &'a str,
+}
+
+impl<'a> Document<'a> {
+    /// `file` is the name used in errors.
+    pub fn new(file: &'a str, text: &'a str) -> Self {
+        Self { file, text }
+    }
+
+    /// The root table as parsed.
+    pub(super) fn table(self) -> Result<DeTable<'a>, ConfigError> {
+        DeTable::parse(self.text).map(Spanned::into_inner).map_err(|error| self.broken(&error))
+    }
+
+    pub(super) fn broken(self, error: &toml::de::Error) -> ConfigError {
+        self.broken_as(error.message(), error.span().map_or(0, |span| span.start))
+    }
+
+    pub(super) fn broken_as(self, problem: &str, at: usize) -> ConfigError {
+        ConfigError {
+            file: self.file.to_owned(),
+            line: self.line(at),
+            key: "TOML".to_owned(),
+            value: None,
+            problem: problem.to_owned(),
+        }
+    }
+
+    /// Line of a key by its dotted path (`sensors[1].connect`), or of the table that it would be in; the first line if there
+    /// is neither.
+    pub fn line_of(self, path: &str) -> usize {
+        let Ok(root) = DeTable::parse(self.text) else { return 1 };
+        let (mut table, mut at) = (root.get_ref(), 0);
+        for name in path.split('.') {
+            let (key, number) = name.split_once('[').map_or((name, None), |(key, rest)| {
+                (key, rest.strip_suffix(']').and_then(|number| number.parse::<usize>().ok()))
+            });
+            let Some(value) = table.get(key) else { break };
+            let item = number.and_then(|number| value.get_ref().as_array()?.get(number));
+            let value = item.unwrap_or(value);
+            at = value.span().start;
+            let DeValue::Table(inner) = value.get_ref() else { break };
+            table = inner;
+        }
+        self.line(at)
+    }
+
+    pub(super) fn line(&self, at: usize) -> usize {
+        self.text.bytes().take(at).filter(|byte| *byte == b'\n').count() + 1
+    }
+}

@@ -1,0 +1,196 @@
+//! `headrace check`: all that is wrong with a vehicle or scene file, and what a plan makes of it.
+
+mod outlook;
+
+use headrace_config::{ConfigErrors, Document};
+use headrace_simulator::{Scene, SceneError, Simulation};
+use headrace_vehicle::{Finding, Grade, VehicleConfig};
+use serde_json::{Value, json};
+
+use crate::cli::Check;
+use crate::devices::KINDS;
+use crate::failure::{self, Failure};
+use crate::files;
+use crate::output::{deliver, put};
+use crate::vehicle_file;
+use outlook::Outlook;
+
+/// Something found, with its place.
+struct Found {
+    grade: Grade,
+    file: String,
+    line: usize,
+    key: String,
+    problem: String,
+}
+
+/// A file that could be read.
+struct Readable {
+    vehicle: VehicleConfig,
+    /// The scene and its duration, s, if it is one.
+    scene: Option<(String, f64)>,
+    outlook: Option<Outlook>,
+}
+
+/// `headrace check`.
+pub(crate) fn check(args: &Check) -> Result<u8, Failure> {
+    let (name, text) = (args.file.display().to_string(), files::read(&args.file)?);
+    let mut found = Vec::new();
+    let readable = if is_scene(&text) {
+        scene(args, (&name, &text), &mut found)?
+    } else {
+        let parsed = VehicleConfig::parse(Document::new(&name, &text), &KINDS, &files::beside(&args.file));
+        let vehicle = parsed.map_err(|errors| found.extend(all(&errors))).ok();
+        vehicle.map(|vehicle| Readable::new(vehicle, (&name, &text), &mut found))
+    };
+    if args.json {
+        deliver(&json(readable.as_ref(), &found).to_string())?;
+    }
+    for one in &found {
+        let grade = if one.grade == Grade::Warning { "warning: " } else { "" };
+        eprintln!("headrace: {grade}{}:{}: {}: {}", one.file, one.line, one.key, one.problem);
+    }
+    let count = |grade: Grade| found.iter().filter(|one| one.grade == grade).count();
+    if let Some(readable) = readable.as_ref().filter(|_| !args.json && count(Grade::Error) == 0) {
+        put(&readable.text());
+        put(&match count(Grade::Warning) {
+            0 => "no errors\n".to_owned(),
+            1 => "no errors, 1 warning\n".to_owned(),
+            warnings => format!("no errors, {warnings} warnings\n"),
+        });
+    }
+    Ok(if count(Grade::Error) > 0 { failure::USAGE } else { failure::OK })
+}
+
+/// Whether a text is a scene: it names a vehicle file or has a trajectory.
+fn is_scene(text: &str) -> bool {
+    let keys = |key: &&str| ["vehicle", "trajectory"].contains(key);
+    Document::new("", text).root().is_ok_and(|root| root.keys().iter().any(keys))
+}
+
+/// The scene's vehicle, if scene and vehicle can be read.
+fn scene(
+    args: &Check,
+    (name, text): (&str, &str),
+    found: &mut Vec<Found>,
+) -> Result<Option<Readable>, Failure> {
+    let document = Document::new(name, text);
+    let scene = match Scene::parse(document, &KINDS, &files::bytes_beside(&args.file), None) {
+        Ok(scene) => scene,
+        Err(SceneError::Config(errors)) => {
+            found.extend(all(&errors));
+            return Ok(None);
+        }
+        Err(error) => return Err(error.into()),
+    };
+    let duration_s = match Simulation::new(&scene) {
+        Ok(simulation) => simulation.duration_s(),
+        Err(error) => {
+            let (key, line) = ("trajectory".to_owned(), document.line_of("trajectory"));
+            let (file, problem) = (name.to_owned(), error.to_string());
+            found.push(Found { grade: Grade::Error, file, line, key, problem });
+            return Ok(None);
+        }
+    };
+    let vehicle_file = document.root()?.text("vehicle")?.unwrap_or_default();
+    let mut readable = Readable::new(scene.vehicle, (&vehicle_file, &scene.vehicle_text), found);
+    readable.scene = Some((scene.name, duration_s));
+    Ok(Some(readable))
+}
+
+fn all(errors: &ConfigErrors) -> Vec<Found> {
+    let found = |error: &headrace_config::ConfigError| Found {
+        grade: Grade::Error,
+        file: error.file.clone(),
+        line: error.line,
+        key: error.key.clone()
+            + &error.value.as_ref().map_or_else(String::new, |value| format!(" = {value}")),
+        problem: error.problem.clone(),
+    };
+    errors.errors().iter().map(found).collect()
+}
+
+impl Readable {
+    /// With the findings of a vehicle whose file has this name and text.
+    fn new(vehicle: VehicleConfig, (name, text): (&str, &str), found: &mut Vec<Found>) -> Self {
+        let outlook = match Outlook::of(&vehicle) {
+            Ok(outlook) => outlook,
+            Err(why) => {
+                let key = "heads".to_owned();
+                let problem = format!("can't be planned with: {why}");
+                let finding = Finding { grade: Grade::Error, key, problem };
+                found.push(placed(finding, name, text));
+                None
+            }
+        };
+        vehicle_file::log(name, &vehicle);
+        let mut findings = vehicle.findings();
+        // What a plan finds of a vehicle that can't work follows from that.
+        if findings.iter().all(|finding| finding.grade != Grade::Error) {
+            findings.extend(outlook.iter().flat_map(|outlook| outlook.findings(&vehicle)));
+        }
+        found.extend(findings.into_iter().map(|finding| placed(finding, name, text)));
+        found.sort_by_key(|one| (one.grade == Grade::Warning, one.line));
+        Self { vehicle, scene: None, outlook }
+    }
+
+    fn text(&self) -> String {
+        let vehicle = &self.vehicle;
+        let mut lines = Vec::new();
+        lines.extend(self.scene.as_ref().map(|(name, duration_s)| format!("{name}: {duration_s:.0} s")));
+        lines.push(format!(
+            "{}: target {} m, sections of {} m",
+            vehicle.name, vehicle.target_m, vehicle.section_m
+        ));
+        lines.push(format!(
+            "tunnel {}: perimeter {:.2} m, length {} m",
+            vehicle.tunnel.name,
+            vehicle.tunnel.profile.perimeter_m(),
+            vehicle.tunnel.length_m
+        ));
+        for sensor in &vehicle.sensor_configs {
+            let connect = if sensor.connect.is_empty() { "-" } else { &sensor.connect };
+            lines.push(format!("  {:<12} {:<12} {connect}", sensor.id, sensor.plugin));
+        }
+        match &self.outlook {
+            Some(outlook) => lines.extend(outlook.lines()),
+            None => lines.push("no profiling head: nothing to plan".to_owned()),
+        }
+        lines.join("\n") + "\n"
+    }
+}
+
+/// A finding with its line; its key with the value that is there.
+fn placed(finding: Finding, name: &str, text: &str) -> Found {
+    let Finding { grade, key, problem } = finding;
+    let line = Document::new(name, text).line_of(&key);
+    Found { grade, file: name.to_owned(), line, key, problem }
+}
+
+fn json(readable: Option<&Readable>, found: &[Found]) -> Value {
+    let of = |grade: Grade| -> Vec<Value> {
+        let one =
+            |one: &Found| json!({"file": one.file, "line": one.line, "key": one.key, "problem": one.problem});
+        found.iter().filter(|one| one.grade == grade).map(one).collect()
+    };
+    let mut shown = json!({"errors": of(Grade::Error), "warnings": of(Grade::Warning)});
+    if let (Some(readable), Some(shown)) = (readable, shown.as_object_mut()) {
+        let vehicle = &readable.vehicle;
+        let sensor =
+            |s: &headrace_sensor::SensorConfig| json!({"id": s.id, "plugin": s.plugin, "connect": s.connect});
+        let entries = [
+            ("vehicle", json!(vehicle.name)),
+            ("target_m", json!(vehicle.target_m)),
+            ("section_m", json!(vehicle.section_m)),
+            ("tunnel", json!(vehicle.tunnel.name)),
+            ("perimeter_m", json!(vehicle.tunnel.profile.perimeter_m())),
+            ("length_m", json!(vehicle.tunnel.length_m)),
+            ("sensors", vehicle.sensor_configs.iter().map(sensor).collect()),
+            ("scene", json!(readable.scene.as_ref().map(|(name, _)| name))),
+            ("duration_s", json!(readable.scene.as_ref().map(|(_, duration_s)| duration_s))),
+            ("plan", json!(readable.outlook.as_ref().map(Outlook::json))),
+        ];
+        shown.extend(entries.map(|(key, value)| (key.to_owned(), value)));
+    }
+    shown
+}

@@ -1,0 +1,60 @@
+//! Feeds of a dive that end early, and that tell how far they are.
+
+use std::cell::Cell;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use headrace_geometry::time::MonoNs;
+use headrace_monitor::ring::{Port, RingError};
+use headrace_replay::drive::{Coming, PacketSource};
+use headrace_replay::log::LogError;
+
+/// A feed that ends when the flag is set.
+pub(crate) struct Interruptible<'a> {
+    pub(crate) feed: &'a mut dyn PacketSource,
+    pub(crate) interrupted: &'a AtomicBool,
+}
+
+impl PacketSource for Interruptible<'_> {
+    fn coming(&mut self) -> Result<Option<Coming>, LogError> {
+        if self.interrupted.load(Ordering::Relaxed) { Ok(None) } else { self.feed.coming() }
+    }
+
+    fn send(&mut self, port: &mut Port) -> Result<(), RingError> {
+        self.feed.send(port)
+    }
+
+    fn span(&self) -> Option<(MonoNs, MonoNs)> {
+        self.feed.span()
+    }
+}
+
+/// A feed that tells the time of its next packet.
+pub(crate) struct Followed<'a> {
+    pub(crate) feed: &'a mut dyn PacketSource,
+    pub(crate) at: &'a Cell<MonoNs>,
+}
+
+impl PacketSource for Followed<'_> {
+    fn coming(&mut self) -> Result<Option<Coming>, LogError> {
+        let coming = self.feed.coming()?;
+        if let Some(coming) = coming {
+            self.at.set(coming.at);
+        }
+        Ok(coming)
+    }
+
+    fn send(&mut self, port: &mut Port) -> Result<(), RingError> {
+        self.feed.send(port)
+    }
+
+    fn span(&self) -> Option<(MonoNs, MonoNs)> {
+        self.feed.span()
+    }
+}
+
+/// How much of a span of time has passed, 0 to 1; `None` where there is none.
+pub(crate) fn share(span: Option<(MonoNs, MonoNs)>, at: MonoNs) -> Option<f64> {
+    let (from, to) = span?;
+    let whole_s = to.since(from).as_secs_f64();
+    (whole_s > 0.0).then(|| (at.since(from).as_secs_f64() / whole_s).clamp(0.0, 1.0))
+}

@@ -1,0 +1,141 @@
+//! Files that commands write: what they may write over, and whether they can be written, found out before the work.
+
+use std::fs::OpenOptions;
+use std::io::{ErrorKind, Read};
+use std::path::{Path, PathBuf};
+
+use headrace_replay::log::{DiveLog, RECOVERED_FROM, TRIMMED};
+
+use crate::cli::Overwrite;
+use crate::failure::Failure;
+
+/// Key of a log's metadata: the scene of which it is a simulation.
+pub(crate) const SIMULATED: &str = "simulated";
+/// Key of a log's metadata: the format that it was imported from.
+pub(crate) const IMPORTED: &str = "import_format";
+/// Begins the vehicle file of a rehearsal.
+pub(crate) const REHEARSAL: &str = "# Rehearsal by headrace emulate: ";
+/// Ends a picture of a plan.
+pub(crate) const PICTURE: &str = "<!-- headrace plan -->\n";
+/// Begins a manual page.
+pub(crate) const MANUAL: &str = ".\\\" Written by headrace man.\n";
+/// Begins a table of true values.
+pub(crate) const TRUTH: &str = "# true values: ";
+/// A key of each report.
+const REPORT: &str = "\"report_version\":";
+
+/// A kind of output. A file of the same kind is overwritten, any other only with `--force`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Kind {
+    Report,
+    /// A dive recorded live is never overwritten unasked.
+    Dive,
+    Simulation,
+    Import,
+    Trimmed,
+    Recovered,
+    Truth,
+    Rehearsal,
+    Picture,
+    Manual,
+}
+
+impl Kind {
+    /// Why another file isn't overwritten.
+    fn refusal(self) -> &'static str {
+        match self {
+            Self::Report => "isn't a report",
+            Self::Dive => "a recording replaces no file",
+            Self::Simulation => "isn't a simulated log",
+            Self::Import => "isn't an imported log",
+            Self::Trimmed => "isn't a trimmed log",
+            Self::Recovered => "isn't a recovered log",
+            Self::Truth => "isn't a table of true values",
+            Self::Rehearsal => "isn't a rehearsal's vehicle file",
+            Self::Picture => "isn't a plan's picture",
+            Self::Manual => "isn't a page of headrace's manual",
+        }
+    }
+
+    /// Whether a file is of this kind.
+    fn is(self, path: &Path) -> bool {
+        let logged = |key: &str| {
+            let log = DiveLog::open(&[path.to_owned()]);
+            log.is_ok_and(|log| log.header().metadata.contains_key(key))
+        };
+        match self {
+            Self::Dive => false,
+            Self::Simulation => logged(SIMULATED),
+            Self::Import => logged(IMPORTED),
+            Self::Trimmed => logged(TRIMMED),
+            Self::Recovered => logged(RECOVERED_FROM),
+            Self::Report => std::fs::read_to_string(path)
+                .is_ok_and(|text| text.trim_start().starts_with('{') && text.contains(REPORT)),
+            Self::Truth => begins(path, TRUTH),
+            Self::Rehearsal => begins(path, REHEARSAL),
+            Self::Manual => begins(path, MANUAL),
+            Self::Picture => std::fs::read_to_string(path).is_ok_and(|text| text.ends_with(PICTURE)),
+        }
+    }
+}
+
+/// The first bytes of a file, as text.
+fn begin(path: &Path) -> Option<String> {
+    let mut bytes = Vec::new();
+    std::fs::File::open(path).ok()?.take(4096).read_to_end(&mut bytes).ok()?;
+    Some(String::from_utf8_lossy(&bytes).into_owned())
+}
+
+fn begins(path: &Path, mark: &str) -> bool {
+    begin(path).is_some_and(|text| text.starts_with(mark))
+}
+
+/// Checks, before the work, that a file may and can be written. Nothing is changed.
+///
+/// Errors: a file is there that isn't of this kind, without `--force`; it can't be written or created.
+pub(crate) fn claim(path: &Path, kind: Kind, overwrite: &Overwrite) -> Result<(), Failure> {
+    let failed = |source| Failure::Unwritable { path: path.to_owned(), source };
+    if path.symlink_metadata().is_err() {
+        // Creating it is the only sure test.
+        OpenOptions::new().write(true).create_new(true).open(path).map_err(failed)?;
+        return std::fs::remove_file(path).map_err(failed);
+    }
+    if path.is_dir() {
+        return Err(failed(ErrorKind::IsADirectory.into()));
+    }
+    // Terminals, pipes and /dev/null have nothing to lose.
+    if path.is_file() && !overwrite.force && !kind.is(path) {
+        return Err(Failure::Usage(format!(
+            "writing {}: it exists, and {}; give another name, or overwrite it with --force",
+            path.display(),
+            kind.refusal()
+        )));
+    }
+    OpenOptions::new().write(true).open(path).map(|_| ()).map_err(failed)
+}
+
+/// Removes a file that may be overwritten, for what creates new files only.
+pub(crate) fn make_way(path: &Path) -> Result<(), Failure> {
+    match std::fs::remove_file(path) {
+        Err(source) if source.kind() != ErrorKind::NotFound => {
+            Err(Failure::Unwritable { path: path.to_owned(), source })
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Checks that an output isn't one of the inputs.
+///
+/// Errors: it is.
+pub(crate) fn is_no_input(output: &Path, inputs: &[PathBuf]) -> Result<(), Failure> {
+    let real = |path: &Path| path.canonicalize().ok();
+    match inputs.iter().find(|input| real(input).is_some() && real(input) == real(output)) {
+        Some(_) => Err(Failure::Usage(format!("writing {}: it is read by this command", output.display()))),
+        None => Ok(()),
+    }
+}
+
+/// Creates a folder for outputs.
+pub(crate) fn folder(path: &Path) -> Result<(), Failure> {
+    std::fs::create_dir_all(path).map_err(|source| Failure::Unwritable { path: path.to_owned(), source })
+}

@@ -1,0 +1,210 @@
+//! Single keys of a terminal as commands of playback.
+
+use std::io;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use crossbeam::channel::Sender;
+use headrace_geometry::time::DurNs;
+use headrace_replay::playback::PlaybackCommand;
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::termios::{LocalModes, OptionalActions, SpecialCodeIndex, Termios, tcgetattr, tcsetattr};
+
+use crate::cli::KEYS;
+use crate::output::aside;
+
+/// Jumps by the arrow keys.
+const STEP: DurNs = DurNs::from_millis(10_000);
+const FAR: DurNs = DurNs::from_millis(60_000);
+/// Speeds lie between these; beyond the fastest is as fast as possible.
+const SLOWEST: f64 = 0.125;
+const FASTEST: f64 = 1024.0;
+/// Longest wait for a key before the end of playback is noticed.
+const WAIT: Timespec = Timespec { tv_sec: 0, tv_nsec: 200_000_000 };
+
+/// A key of playback.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Key {
+    Space,
+    Left,
+    Right,
+    Up,
+    Down,
+    Faster,
+    Slower,
+    Tick,
+    Leave,
+    Help,
+}
+
+/// Standard input without lines and echo, until it is dropped.
+pub(super) struct Keyboard {
+    before: Termios,
+    ended: Arc<AtomicBool>,
+}
+
+impl Keyboard {
+    /// Takes the terminal's keys and sends their commands to `to` from a thread of its own. `speed` is that of playback.
+    ///
+    /// Errors: the terminal's settings can't be read or changed.
+    pub(super) fn listen(
+        to: Sender<PlaybackCommand>,
+        speed: Option<f64>,
+        terminated: Arc<AtomicBool>,
+    ) -> io::Result<Self> {
+        let before = tcgetattr(io::stdin())?;
+        let mut raw = before.clone();
+        // Ctrl-C is a key, too: the terminal is put back in order before the program ends.
+        raw.local_modes.remove(LocalModes::ICANON | LocalModes::ECHO | LocalModes::ISIG);
+        raw.special_codes[SpecialCodeIndex::VMIN] = 1;
+        raw.special_codes[SpecialCodeIndex::VTIME] = 0;
+        tcsetattr(io::stdin(), OptionalActions::Now, &raw)?;
+        aside(&format!("KEYS     {KEYS}"));
+        let ended = Arc::new(AtomicBool::new(false));
+        let keyboard = Self { before, ended: Arc::clone(&ended) };
+        let mut hand = Hand { speed, paused: false };
+        std::thread::spawn(move || {
+            let mut bytes = [0; 64];
+            while !ended.load(Ordering::Relaxed) {
+                let keys = match read(&mut bytes) {
+                    _ if terminated.load(Ordering::Relaxed) => vec![Key::Leave],
+                    Ok(count) => keys(bytes.get(..count).unwrap_or_default()),
+                    Err(_) => vec![Key::Leave],
+                };
+                for command in keys.into_iter().filter_map(|key| hand.command(key)) {
+                    if to.send(command).is_err() || command == PlaybackCommand::End {
+                        return;
+                    }
+                }
+            }
+        });
+        Ok(keyboard)
+    }
+}
+
+impl Drop for Keyboard {
+    fn drop(&mut self) {
+        self.ended.store(true, Ordering::Relaxed);
+        if let Err(error) = tcsetattr(io::stdin(), OptionalActions::Now, &self.before) {
+            tracing::warn!(%error, "the terminal's settings could not be restored");
+        }
+    }
+}
+
+/// Bytes typed; none after some time without.
+///
+/// Errors: standard input is closed.
+fn read(bytes: &mut [u8]) -> io::Result<usize> {
+    let stdin = io::stdin();
+    let mut typed = [PollFd::new(&stdin, PollFlags::IN)];
+    match poll(&mut typed, Some(&WAIT)) {
+        Ok(0) | Err(rustix::io::Errno::INTR) => return Ok(0),
+        other => other?,
+    };
+    match rustix::io::read(&stdin, bytes)? {
+        0 => Err(io::ErrorKind::UnexpectedEof.into()),
+        count => Ok(count),
+    }
+}
+
+/// Speed and state as the keys have left them.
+struct Hand {
+    speed: Option<f64>,
+    paused: bool,
+}
+
+impl Hand {
+    fn command(&mut self, key: Key) -> Option<PlaybackCommand> {
+        Some(match key {
+            Key::Space => {
+                self.paused = !self.paused;
+                if self.paused { PlaybackCommand::Pause } else { PlaybackCommand::Go }
+            }
+            Key::Left => PlaybackCommand::Skip(DurNs(-STEP.0)),
+            Key::Right => PlaybackCommand::Skip(STEP),
+            Key::Down => PlaybackCommand::Skip(DurNs(-FAR.0)),
+            Key::Up => PlaybackCommand::Skip(FAR),
+            Key::Faster => self.go_at(self.speed.map(|speed| speed * 2.0).filter(|speed| *speed <= FASTEST)),
+            Key::Slower => self.go_at(Some(self.speed.map_or(FASTEST, |speed| (speed / 2.0).max(SLOWEST)))),
+            Key::Tick => {
+                self.paused = true;
+                PlaybackCommand::Step(1)
+            }
+            Key::Leave => PlaybackCommand::End,
+            Key::Help => {
+                aside(&format!("KEYS     {KEYS}"));
+                return None;
+            }
+        })
+    }
+
+    fn go_at(&mut self, speed: Option<f64>) -> PlaybackCommand {
+        self.speed = speed;
+        aside(&speed.map_or_else(|| "SPEED    max".to_owned(), |speed| format!("SPEED    {speed}x")));
+        PlaybackCommand::Speed(speed)
+    }
+}
+
+/// The keys of some bytes; others are ignored. A terminal sends all bytes of a key at once.
+fn keys(mut bytes: &[u8]) -> Vec<Key> {
+    let arrows = [(b'A', Key::Up), (b'B', Key::Down), (b'C', Key::Right), (b'D', Key::Left)];
+    let mut keys = Vec::new();
+    while let [first, rest @ ..] = bytes {
+        bytes = rest;
+        match (first, rest) {
+            (0x1b, [b'[' | b'O', code, after @ ..]) => {
+                keys.extend(arrows.iter().find(|(arrow, _)| arrow == code).map(|(_, key)| *key));
+                bytes = after;
+            }
+            (b' ', _) => keys.push(Key::Space),
+            (b'+' | b'=', _) => keys.push(Key::Faster),
+            (b'-' | b'_', _) => keys.push(Key::Slower),
+            (b'.', _) => keys.push(Key::Tick),
+            // Ctrl-C and Ctrl-D leave as well.
+            (b'q' | b'Q' | 0x03 | 0x04, _) => keys.push(Key::Leave),
+            (b'?' | b'h', _) => keys.push(Key::Help),
+            _ => {}
+        }
+    }
+    keys
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bytes_are_keys() {
+        assert_eq!(
+            keys(b" \x1b[D\x1bOC\x1b[A\x1b[B+-.?"),
+            [
+                Key::Space,
+                Key::Left,
+                Key::Right,
+                Key::Up,
+                Key::Down,
+                Key::Faster,
+                Key::Slower,
+                Key::Tick,
+                Key::Help
+            ]
+        );
+        assert_eq!([keys(b"q"), keys(b"\x03"), keys(b"\x04")], [[Key::Leave]; 3]);
+        assert_eq!(keys(b"end\n\x1b\x1b[Z"), []);
+    }
+
+    #[test]
+    fn keys_are_commands() {
+        let mut hand = Hand { speed: None, paused: false };
+        let mut press = |key| hand.command(key).unwrap();
+        assert_eq!(press(Key::Space), PlaybackCommand::Pause);
+        assert_eq!(press(Key::Space), PlaybackCommand::Go);
+        assert_eq!(press(Key::Left), PlaybackCommand::Skip(DurNs(-10_000_000_000)));
+        assert_eq!(press(Key::Slower), PlaybackCommand::Speed(Some(1024.0)));
+        assert_eq!(press(Key::Slower), PlaybackCommand::Speed(Some(512.0)));
+        assert_eq!(press(Key::Faster), PlaybackCommand::Speed(Some(1024.0)));
+        assert_eq!(press(Key::Faster), PlaybackCommand::Speed(None));
+        assert_eq!(press(Key::Tick), PlaybackCommand::Step(1));
+        assert_eq!(press(Key::Space), PlaybackCommand::Go, "a tick pauses");
+    }
+}

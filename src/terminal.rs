@@ -1,0 +1,65 @@
+//! What the terminal behind an output can do. Nothing else reads `NO_COLOR` and `TERM`.
+
+use std::io::IsTerminal;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// What an output stream can show.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Terminal {
+    /// Colours: a terminal, and neither `NO_COLOR` nor `TERM=dumb`.
+    pub(crate) colour: bool,
+    /// Lines that overwrite themselves: a terminal other than `TERM=dumb`.
+    pub(crate) overwrites: bool,
+}
+
+/// Goes to the beginning of the line and clears it.
+pub(crate) const CLEAR: &str = "\r\x1b[K";
+
+static QUIET: AtomicBool = AtomicBool::new(false);
+
+/// What a stream can show.
+pub(crate) fn of(stream: &impl IsTerminal) -> Terminal {
+    let variable = |name: &str| std::env::var(name).ok();
+    able(stream.is_terminal(), variable("NO_COLOR").as_deref(), variable("TERM").as_deref())
+}
+
+/// Whether `NO_COLOR` and `TERM` allow colours, on any terminal.
+pub(crate) fn allows_colour() -> bool {
+    let variable = |name: &str| std::env::var(name).ok();
+    able(true, variable("NO_COLOR").as_deref(), variable("TERM").as_deref()).colour
+}
+
+/// An empty `NO_COLOR` doesn't count. Source: no-color.org.
+fn able(is_terminal: bool, no_color: Option<&str>, term: Option<&str>) -> Terminal {
+    let overwrites = is_terminal && term != Some("dumb");
+    Terminal { colour: overwrites && no_color.is_none_or(str::is_empty), overwrites }
+}
+
+/// With `-q` only results and errors are shown.
+pub(crate) fn be_quiet(quiet: bool) {
+    QUIET.store(quiet, Ordering::Relaxed);
+}
+
+/// Whether only results and errors are shown.
+pub(crate) fn is_quiet() -> bool {
+    QUIET.load(Ordering::Relaxed)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn colours_are_for_terminals_that_want_them() {
+        let shows = |is_terminal, no_color, term| {
+            let Terminal { colour, overwrites } = able(is_terminal, no_color, term);
+            (colour, overwrites)
+        };
+        assert_eq!(shows(true, None, Some("xterm")), (true, true));
+        assert_eq!(shows(true, None, None), (true, true));
+        assert_eq!(shows(true, Some(""), Some("xterm")), (true, true));
+        assert_eq!(shows(true, Some("1"), Some("xterm")), (false, true));
+        assert_eq!(shows(true, None, Some("dumb")), (false, false));
+        assert_eq!(shows(false, None, Some("xterm")), (false, false));
+    }
+}

@@ -1,0 +1,123 @@
+//! The program under test on a pseudoterminal, with somebody at the keys.
+
+use std::cell::RefCell;
+use std::fs::File;
+use std::io::{Read as _, Write as _};
+use std::os::fd::OwnedFd;
+use std::process::Child;
+use std::sync::mpsc::{Receiver, channel};
+use std::thread;
+use std::time::Duration;
+
+use rustix::fs::{Mode, OFlags};
+use rustix::process::{Pid, Signal, kill_process};
+use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
+use rustix::termios::{Winsize, tcsetwinsize};
+
+use crate::{Folder, program};
+
+/// Longest wait for what must come, in steps.
+const STEPS: u32 = 1200;
+const STEP: Duration = Duration::from_millis(100);
+
+/// A running program and its terminal of 24 lines.
+pub struct Screen {
+    child: Child,
+    keys: File,
+    coming: Receiver<Vec<u8>>,
+    seen: RefCell<Vec<u8>>,
+}
+
+impl Screen {
+    /// Runs the program in a folder on a terminal that is so wide, with these variables beside `TERM=xterm`.
+    pub fn run(folder: &Folder, arguments: &[&str], columns: u16, variables: &[(&str, &str)]) -> Self {
+        let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).unwrap();
+        grantpt(&master).unwrap();
+        unlockpt(&master).unwrap();
+        let path = ptsname(&master, Vec::new()).unwrap();
+        let end = || rustix::fs::open(&*path, OFlags::RDWR | OFlags::NOCTTY, Mode::empty()).unwrap();
+        tcsetwinsize(&master, Winsize { ws_row: 24, ws_col: columns, ws_xpixel: 0, ws_ypixel: 0 }).unwrap();
+        let mut command = program();
+        command.args(arguments).current_dir(folder.path("")).env_remove("NO_COLOR").env("TERM", "xterm");
+        command.envs(variables.iter().copied());
+        command.stdin(end()).stdout(end()).stderr(end());
+        let child = command.spawn().unwrap();
+        // Else the terminal would stay open when the program has ended.
+        drop(command);
+        let mut reading = clone(&master);
+        let (to, coming) = channel();
+        thread::spawn(move || {
+            let mut bytes = [0; 4096];
+            // A terminal that nobody has open any more is an error on Linux.
+            while let Ok(count @ 1..) = reading.read(&mut bytes) {
+                if to.send(bytes[..count].to_vec()).is_err() {
+                    return;
+                }
+            }
+        });
+        Self { child, keys: File::from(master), coming, seen: RefCell::default() }
+    }
+
+    /// All that was shown so far, with its escape sequences.
+    pub fn shown(&self) -> String {
+        let mut seen = self.seen.borrow_mut();
+        seen.extend(self.coming.try_iter().flatten());
+        String::from_utf8_lossy(&seen).into_owned()
+    }
+
+    /// Waits for a text; what was shown until then.
+    #[track_caller]
+    pub fn until(&self, text: &str) -> String {
+        for _ in 0..STEPS {
+            let shown = self.shown();
+            if shown.contains(text) {
+                return shown;
+            }
+            thread::sleep(STEP);
+        }
+        panic!("{text:?} doesn't come: {:?}", self.shown());
+    }
+
+    /// Presses keys.
+    pub fn press(&mut self, keys: &[u8]) {
+        self.keys.write_all(keys).unwrap();
+    }
+
+    /// Sends the program a signal.
+    pub fn signal(&self, signal: Signal) {
+        kill_process(Pid::from_child(&self.child), signal).unwrap();
+    }
+
+    /// Whether the terminal echoes and takes lines, as a shell leaves it.
+    pub fn is_in_order(&self) -> bool {
+        use rustix::termios::{LocalModes, tcgetattr};
+        let all = LocalModes::ICANON | LocalModes::ECHO | LocalModes::ISIG;
+        tcgetattr(&self.keys).unwrap().local_modes.contains(all)
+    }
+
+    /// Waits for the end of the program; its exit code, and all that was shown.
+    #[track_caller]
+    pub fn end(&mut self) -> (Option<i32>, String) {
+        for _ in 0..STEPS {
+            if let Some(status) = self.child.try_wait().unwrap() {
+                // What it wrote last may still be on the way.
+                thread::sleep(STEP);
+                return (status.code(), self.shown());
+            }
+            thread::sleep(STEP);
+        }
+        panic!("it doesn't end: {:?}", self.shown());
+    }
+}
+
+impl Drop for Screen {
+    fn drop(&mut self) {
+        // One that has ended can't be killed.
+        self.child.kill().ok();
+        self.child.wait().ok();
+    }
+}
+
+fn clone(master: &OwnedFd) -> File {
+    File::from(master.try_clone().unwrap())
+}

@@ -1,0 +1,109 @@
+//! What any program of its kind does: completions, manual pages, terminals without colour, quiet, and time left.
+
+use std::io::Write as _;
+use std::process::{Command, Stdio};
+
+use headrace_tests::screen::Screen;
+use headrace_tests::{Folder, root, skipped};
+
+/// The commands that help lists.
+fn commands(folder: &Folder) -> Vec<String> {
+    let help = folder.headrace(&["--help"]).stdout;
+    let (_, list) = help.split_once("Commands:\n").unwrap();
+    let names =
+        list.lines().take_while(|line| !line.is_empty()).filter_map(|line| line.split_whitespace().next());
+    names.filter(|name| *name != "help").map(str::to_owned).collect()
+}
+
+#[test]
+fn completions_know_all_commands_and_are_valid_scripts() {
+    let folder = Folder::new();
+    let commands = commands(&folder);
+    assert!(commands.len() > 12, "{commands:?}");
+    for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
+        let answer = folder.headrace(&["completions", shell]);
+        assert_eq!((answer.code, answer.stderr.as_str()), (Some(0), ""), "{shell}");
+        for command in &commands {
+            assert!(answer.stdout.contains(command.as_str()), "{shell}: {command}");
+        }
+        assert!(answer.stdout.contains("sound-speed"), "{shell}: options of commands");
+    }
+    let script = folder.headrace(&["completions", "bash"]).stdout;
+    // As readline would ask it.
+    let asked = "\nCOMP_WORDS=(headrace rep); COMP_CWORD=1; _headrace headrace rep headrace; echo \"${COMPREPLY[*]}\"\n";
+    let bash = Command::new("bash").arg("-s").stdin(Stdio::piped()).stdout(Stdio::piped()).spawn();
+    let Ok(mut bash) = bash else { return skipped("no bash") };
+    bash.stdin.take().unwrap().write_all((script + asked).as_bytes()).unwrap();
+    let answer = bash.wait_with_output().unwrap();
+    assert_eq!(String::from_utf8(answer.stdout).unwrap(), "replay\n");
+    assert_eq!(folder.headrace(&["completions", "cmd"]).code, Some(2));
+}
+
+#[test]
+fn every_command_has_a_manual_page() {
+    let folder = Folder::new();
+    let own = folder.headrace(&["man"]);
+    assert_eq!((own.code, own.stderr.as_str()), (Some(0), ""));
+    assert!(own.stdout.contains(".TH headrace 1"), "{}", own.stdout);
+    assert_eq!(folder.headrace(&["man", "pages"]).code, Some(0));
+    for command in commands(&folder) {
+        let page = String::from_utf8(folder.read(&format!("pages/headrace-{command}.1"))).unwrap();
+        assert!(page.contains(".SH SYNOPSIS") && page.contains(&command), "{page}");
+    }
+    // Again, but not over a page of somebody else's.
+    assert_eq!(folder.headrace(&["man", "pages"]).code, Some(0));
+    folder.write("pages/headrace.1", ".TH headrace 1\n");
+    assert_eq!(folder.headrace(&["man", "pages"]).code, Some(2));
+    assert_eq!(folder.headrace(&["man", "pages", "--force"]).code, Some(0));
+}
+
+#[test]
+fn colours_are_for_terminals_that_want_them() {
+    let folder = Folder::with_dive();
+    // Help, an error of the command line, log messages, and a dive with flags.
+    let outputs: [&[&str]; 4] = [
+        &["replay", "--help"],
+        &["replay", "--bad"],
+        &["replay", "dive.mcap", "--target", "0.3", "-v"],
+        &["check", "-v", "vehicle.toml"],
+    ];
+    for arguments in outputs {
+        let shown = |variables: &[(&str, &str)]| Screen::run(&folder, arguments, 100, variables).end().1;
+        assert!(shown(&[]).contains("\x1b["), "{arguments:?}: a terminal has colours");
+        assert!(shown(&[("NO_COLOR", "")]).contains("\x1b["), "{arguments:?}: empty is unset");
+        let plain = shown(&[("NO_COLOR", "1")]);
+        // Only the line that overwrites itself is left.
+        assert!(!plain.replace("\r\x1b[K", "").contains('\x1b'), "{arguments:?}: {plain:?}");
+        let dumb = shown(&[("TERM", "dumb")]);
+        assert!(!dumb.contains('\x1b'), "{arguments:?}: {dumb:?}");
+        assert!(!dumb.replace("\r\n", "\n").contains('\r'), "{arguments:?}: {dumb:?}");
+    }
+}
+
+#[test]
+fn quiet_leaves_results_and_errors() {
+    let folder = Folder::with_dive();
+    let loud = folder.headrace(&["replay", "dive.mcap", "--target", "0.3"]);
+    let quiet = folder.headrace(&["replay", "dive.mcap", "--target", "0.3", "-q"]);
+    assert!(loud.stdout.contains("FLAG"), "{}", loud.stdout);
+    assert!(!quiet.stdout.contains("FLAG") && !quiet.stdout.is_empty(), "{}", quiet.stdout);
+    assert!(loud.stdout.ends_with(&quiet.stdout), "the summary is the same");
+    let demo = folder.headrace(&["-q", "demo", "--speed", "max", "--out", "demo"]);
+    assert!(!demo.stdout.contains("may go") && demo.stdout.contains("report "), "{}", demo.stdout);
+    assert_eq!(folder.headrace(&["-q", "check", "none.toml"]).stderr.lines().count(), 1);
+}
+
+#[test]
+fn work_over_two_seconds_says_how_long_it_still_takes() {
+    let folder = Folder::new();
+    let scene = root().join("deploy/scenes/seven-kilometres.toml");
+    let simulate = ["simulate", scene.to_str().unwrap(), "-o", "long.mcap"];
+    let screen = Screen::run(&folder, &simulate, 100, &[]);
+    screen.until(" left");
+    drop(screen);
+    let mut quiet = Screen::run(&folder, &[&simulate[..], &["-q", "--force"]].concat(), 100, &[]);
+    std::thread::sleep(std::time::Duration::from_secs(3));
+    assert_eq!(quiet.shown(), "");
+    quiet.signal(rustix::process::Signal::TERM);
+    quiet.end();
+}
