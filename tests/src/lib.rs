@@ -16,6 +16,8 @@ pub mod instrumented;
 pub mod json_schema;
 mod log_files;
 pub mod outline;
+pub mod passable;
+pub mod planned;
 pub mod random;
 pub mod random_dives;
 #[cfg(unix)]

@@ -3,6 +3,7 @@
 //! Only the effects that a scene names are simulated. Without effects a device is ideal but for its wire format's resolution.
 
 mod builder;
+pub mod calm;
 mod clock;
 pub mod effects;
 pub mod environment;
