@@ -9,10 +9,12 @@ use headrace_geometry::site::Site;
 use headrace_geometry::time::DurNs;
 use headrace_sampling::head::{HeadMode, HeadSpec};
 use headrace_sampling::layout::HeadLayout;
+use headrace_sampling::margin::ExpectedErrors;
 use headrace_sampling::occlusion::Obstacle;
 use headrace_sampling::plan::{Inspection, Question};
 use headrace_sensor::SensorConfig;
 use headrace_sensor::device::Device;
+use headrace_simulator::calm;
 use headrace_vehicle::TunnelConfig;
 
 use crate::cli::Plan;
@@ -33,6 +35,8 @@ pub(super) struct Case {
     pub(super) tunnel: String,
     pub(super) range_m: f64,
     pub(super) question: Question,
+    /// Errors of position to expect; `None` without a vehicle file.
+    pub(super) errors: Option<ExpectedErrors>,
 }
 
 type Head = (HeadSpec, Vec<HeadMode>);
@@ -77,7 +81,10 @@ impl Case {
         let heads = ids.zip(heads_of(path, &vehicle.sensors, args.range)?).collect();
         let layout = args.layout.unwrap_or(vehicle.layout);
         let sound_speed_mps = vehicle.site.sound_speed_mps;
-        Ok(Self::new(
+        let name = path.file_name().map(|name| name.to_string_lossy()).unwrap_or_default();
+        let errors = calm::expected_errors(&vehicle, &name, &KINDS, &files::bytes_beside(path));
+        let errors = errors.map_err(|why| Failure::Usage(format!("plan: {why}")))?;
+        let case = Self::new(
             tunnel.unwrap_or(vehicle.tunnel),
             heads,
             vehicle.hull,
@@ -85,7 +92,8 @@ impl Case {
             sound_speed_mps,
             question,
             args,
-        ))
+        );
+        Ok(Self { errors, ..case })
     }
 
     fn new(
@@ -111,7 +119,7 @@ impl Case {
             yaw_rate_radps: args.yaw_rate.to_radians(),
             sound_speed_mps,
         };
-        Self { inspection, heads: ids, tunnel: tunnel.name, range_m, question }
+        Self { inspection, heads: ids, tunnel: tunnel.name, range_m, question, errors: None }
     }
 }
 

@@ -47,8 +47,8 @@ pub(crate) fn plan(args: &Plan) -> Result<u8, Failure> {
 }
 
 fn find(case: Case, args: &Plan) -> Result<Findings, Failure> {
-    let Case { inspection, heads, tunnel, range_m, question } = case;
-    let planner = Planner::new(inspection)?;
+    let Case { inspection, heads, tunnel, range_m, question, errors } = case;
+    let planner = Planner::new(inspection)?.with_errors(errors);
     let only = (args.mode != "all").then_some(args.mode.as_str());
     let answers = planner.answers(&question, only)?;
     if answers.is_empty() {

@@ -2,6 +2,7 @@
 
 use headrace_sampling::head::Basis;
 use headrace_sampling::layout::HeadLayout;
+use headrace_sampling::margin::{Margin, Margins};
 use headrace_sampling::plan::{Answer, Briefing, Heard, Spacing, ThinStrip};
 
 use super::findings::{Findings, printed_mps};
@@ -143,6 +144,7 @@ fn notes(findings: &Findings) -> Vec<String> {
     notes.extend(reasons.into_iter().map(|(why, modes)| format!("{}: {why}", modes.join(", "))));
     if let Some(best) = findings.answers.iter().find(|answer| answer.best) {
         notes.push(format!("* {}", best_words(best)));
+        notes.extend(best.margins.map(|margins| margin_words(best.mode, &margins)));
     }
     if findings.answers.iter().any(|answer| answer.turn_basis == Basis::Estimated.as_str()) {
         notes.push(
@@ -169,6 +171,29 @@ fn best_words(best: &Answer) -> String {
         }
         _ => format!("finest at this speed: {}{met}", best.mode),
     }
+}
+
+/// The price of each margin that costs anything.
+fn margin_words(mode: &str, margins: &Margins) -> String {
+    /// Less than the printed speeds show.
+    const NOTHING_MPS: f64 = 5e-4;
+    let mut words = vec![format!("{mode}: {:.3} m/s by geometry", margins.geometry_mps)];
+    let after = margins.speeds_mps().into_iter().skip(1);
+    for ((margin, price_mps), speed_mps) in margins.prices_mps().into_iter().zip(after) {
+        let why = match margin {
+            Margin::Hidden => "with what the vehicle hides".to_owned(),
+            Margin::Phase => "with heads side by side or askew".to_owned(),
+            Margin::Swing => "with yawing".to_owned(),
+            Margin::Position => {
+                format!("with the distance between passes known to {:.1} cm", 100.0 * margins.pass_error_m)
+            }
+            Margin::Geometry => continue,
+        };
+        if price_mps >= NOTHING_MPS {
+            words.push(format!("{speed_mps:.3} {why}"));
+        }
+    }
+    words.join(", ")
 }
 
 /// Occlusion by the vehicle, and strips of the wall with fewer passes.

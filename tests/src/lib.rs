@@ -16,6 +16,8 @@ pub mod instrumented;
 pub mod json_schema;
 mod log_files;
 pub mod outline;
+pub mod passable;
+pub mod planned;
 #[cfg(unix)]
 pub mod pty;
 pub mod random;

@@ -15,6 +15,7 @@ use headrace_geometry::time::MonoNs;
 use headrace_monitor::messages::{Outcome, Placed, PlacedList};
 use headrace_monitor::report::{Report, SectionReport};
 use headrace_monitor::ring::{Port, RingError};
+use headrace_monitor::run::Loop;
 use headrace_monitor::stage::Stage;
 use headrace_monitor::{App, Plugin, PluginError};
 use headrace_replay::SimulationFeed;
@@ -93,6 +94,11 @@ pub fn dive(scene: &Scene) -> JudgedDive {
 
 /// Dives a scene, the loop being told another vehicle file, whose sensors must send the same bytes.
 pub fn dive_believing(scene: &Scene, believed: &VehicleConfig) -> JudgedDive {
+    dive_noting(scene, believed, &mut |_| {})
+}
+
+/// The same; `note` sees the loop after each tick.
+pub fn dive_noting(scene: &Scene, believed: &VehicleConfig, note: &mut dyn FnMut(&Loop)) -> JudgedDive {
     let mut app = App::new(believed.mission());
     for sensor in &believed.sensors {
         app.add_device(sensor.as_ref()).unwrap();
@@ -100,7 +106,7 @@ pub fn dive_believing(scene: &Scene, believed: &VehicleConfig) -> JudgedDive {
     app.add_plugin(&Watch).unwrap();
     let mut dive = app.arm(believed.navigation()).unwrap();
     let mut feed = TruthFeed::new(scene, believed);
-    drive(&mut dive, &mut feed, Pace::default(), &mut |_| {}).unwrap();
+    drive(&mut dive, &mut feed, Pace::default(), &mut |dive: &Loop| note(dive)).unwrap();
     dive.finish(&mut |_, _| {});
     let report = Report::of(&dive);
     let shifts = dive.resource::<Seen>().unwrap().shifts(&feed.feed.simulation);

@@ -9,6 +9,7 @@ use super::hole::Hole;
 use super::passage::{Loss, Passage, lost_within};
 use crate::Reach;
 use headrace_sampling::head::HeadSet;
+use headrace_sampling::margin::position_margin_m;
 use headrace_sampling::spacing;
 
 /// Cause assigned to a fail. Source: metrics.md, "Sections and verdicts".
@@ -89,7 +90,8 @@ pub struct Evidence {
     pub cause: Cause,
     /// Speed along the tunnel, m/s.
     pub speed_mps: f64,
-    /// Largest speed that would have met the target with the heads evenly spread, m/s; zero where none.
+    /// Largest speed that would have met the target less the margin for errors of position, with the heads evenly spread, m/s;
+    /// zero where none.
     pub even_v_max_mps: f64,
     /// Time between passes, seconds.
     pub pass_gap_s: f64,
@@ -127,6 +129,8 @@ pub struct Case<'a> {
     pub none_alive: bool,
     /// Target T, m.
     pub target_m: f64,
+    /// Standard deviations of a hole that a verdict of pass keeps below it.
+    pub confidence_sd: f64,
     /// Perimeter of the profile, m.
     pub perimeter_m: f64,
 }
@@ -136,7 +140,7 @@ pub fn explain<'a>(
     case: &Case<'_>,
     sections: &(impl Iterator<Item = ((f64, f64), &'a Passage)> + Clone),
 ) -> Evidence {
-    let Case { hole, swept_by_all, none_alive, target_m, perimeter_m } = *case;
+    let Case { hole, swept_by_all, none_alive, target_m, confidence_sd, perimeter_m } = *case;
     // An empty circle of the target's size suffices for a fail; the hole may still shrink from ahead.
     let radius_m = hole.diameter_m.min(target_m) / 2.0;
     let lost = lost_within(hole, radius_m, perimeter_m, sections.clone());
@@ -175,8 +179,13 @@ pub fn explain<'a>(
         // No ping was lost, yet no sample fell into the hole: navigation has jumped.
         Cause::PositionLost
     };
-    let even_v_max =
-        spacing::speed_for_target_mps(target_m, worst.t_y_m, worst.even_gap_s, worst.ping_period_s);
+    let margin_m = position_margin_m(target_m, confidence_sd, worst.pass_error_m, worst.t_y_m);
+    let even_v_max = spacing::speed_for_target_mps(
+        target_m - margin_m,
+        worst.t_y_m,
+        worst.even_gap_s,
+        worst.ping_period_s,
+    );
     Evidence {
         cause,
         speed_mps: worst.speed_mps,
@@ -264,6 +273,8 @@ struct Driven {
     swing_m: f64,
     t_y_m: f64,
     middle_t_y_m: f64,
+    /// Standard deviation of a hole's size straight beside the vehicle, m.
+    pass_error_m: f64,
 }
 
 impl Driven {
@@ -279,6 +290,7 @@ impl Driven {
             swing_m: mean(passage.swing_sum_m),
             t_y_m,
             middle_t_y_m: passage.middle_t_y_m.min(t_y_m),
+            pass_error_m: passage.pass_error.sd_m(passage.pass_error.from_m),
         }
     }
 

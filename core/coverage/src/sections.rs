@@ -437,7 +437,8 @@ impl Sections {
         let touched = self.index_of(hole.x_m - radius_m)..self.index_of(hole.x_m + radius_m) + 1;
         let passages = touched.filter_map(|index| Some((self.bounds_m(index), &self.get(index)?.passage)));
         let Request { swept_by_all, none_alive, .. } = *request;
-        explain(&Case { hole, swept_by_all, none_alive, target_m: self.target_m, perimeter_m }, &passages)
+        let Self { target_m, confidence_sd, .. } = *self;
+        explain(&Case { hole, swept_by_all, none_alive, target_m, confidence_sd, perimeter_m }, &passages)
     }
 
     /// Calls `ask` for every section of the way that isn't settled, at the end of a dive.

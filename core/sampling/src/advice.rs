@@ -2,12 +2,14 @@
 
 mod answer;
 mod hysteresis;
+mod intervals;
 mod ring_cache;
 mod search;
 
 use super::error::SamplingError;
 use super::head::{HeadMode, HeadMotion, HeadSet, HeadSpec, MAX_HEADS};
 use super::layout::{self, HeadLayout};
+use super::margin::{self, APART_SHARE, Margins};
 use super::occlusion::{self, AngleRange, Obstacle};
 use super::passes::{self, Passes, Phasing, Situation};
 use super::ring::Ring;
@@ -17,9 +19,10 @@ use headrace_geometry::frames::{Point3, Pose, Rot};
 use headrace_geometry::math;
 use headrace_geometry::tunnel::Profile;
 use headrace_snapshot::stateful;
+use intervals::Driving;
 use ring_cache::{AdvisedHead, RING};
 
-pub use answer::{Advice, Alternative, Left, ModeName, Reason, Remedy};
+pub use answer::{Advice, Alternative, Anew, Left, ModeName, Reason, Remedy};
 pub use hysteresis::Hysteresis;
 
 /// Share of the speed held back for the error of its measurement.
@@ -81,14 +84,16 @@ pub struct Advisor {
     /// Advice updates until the alternatives are recomputed, and the current alternatives.
     until_alternatives: u32,
     alternatives: [Option<Alternative>; MAX_MODES],
+    anew: Option<Anew>,
+    margins: Option<Margins>,
     astern: bool,
-    /// The largest speed found last: kept as a start of the next search while it meets the target.
+    /// The largest speed found last.
     last_mps: Option<f64>,
     /// How far the vehicle may move before rings are recast, m.
     still_m: f64,
 }
 
-stateful!(Advisor { state: now, parallax_rad, next, until_alternatives, alternatives, astern, last_mps, still_m; slots: strides; each: heads, views; fixed: profile, task, modes, centred_m, middle; });
+stateful!(Advisor { state: now, parallax_rad, next, until_alternatives, alternatives, anew, margins, astern, last_mps, still_m; slots: strides; each: heads, views; fixed: profile, task, modes, centred_m, middle; });
 
 impl Advisor {
     /// For heads with their modes, and the parts of the hull that may occlude them.
@@ -134,6 +139,8 @@ impl Advisor {
             next: 0,
             until_alternatives: 0,
             alternatives: [None; MAX_MODES],
+            anew: None,
+            margins: None,
             astern: false,
             last_mps: None,
             still_m: 0.0,
@@ -187,8 +194,7 @@ impl Advisor {
     /// vehicle or out of reach, position, attitude and swing. `left_s` is the remaining time, if known.
     ///
     /// Heads apart along the hull keep their phases in some intervals of speed only: the result is the upper end of the
-    /// interval that contains the present speed, if that meets the target; else of the one that contains the last
-    /// result, else of any.
+    /// highest, whatever the present speed; see [`Advice::from_mps`] and [`Advice::nearest_mps`].
     /// Source: metrics.md, "Speed advice".
     /// Allocates: never.
     pub fn advise(&mut self, situation: &Situation, swing: Swing, left_s: Option<f64>) -> Advice {
@@ -212,21 +218,27 @@ impl Advisor {
             swing_mps: swing.rate_radps * farthest_m,
             shift_m: 0.0,
             apart_m: phasing.apart_m(),
+            // As of errors of position, a hole takes a share of what moves the passes of heads apart.
+            apart_swing_mps: APART_SHARE * swing.apart_rate_radps * farthest_m,
             swing_most_m: Some(swing.most_rad * farthest_m),
         };
-        // Keeps a margin for errors of position; where no speed leaves one, the target itself is used.
         let sure_m = self.task.target_m - self.margin_m(situation.pass_error_m);
-        let fastest = self
-            .fastest_mps(situation, &passes, &going, sure_m)
-            .or_else(|_| self.fastest_mps(situation, &passes, &going, self.task.target_m));
+        let fastest = self.fastest(&phasing, &passes, &going, sure_m, self.last_mps);
         let possible = fastest.as_ref().ok().filter(|fastest| fastest.speed_mps > 0.0);
         let advised_mps = possible.map(|fastest| fastest.advised_mps);
+        let [from_mps, nearest_mps] = possible.map_or([None; 2], |fastest| {
+            let driving = self.driving(&phasing, &passes, &going, sure_m);
+            let now_mps = Some(situation.speed_mps.abs()).filter(|now_mps| *now_mps > UNDER_WAY_MPS);
+            let nearest = now_mps.and_then(|now_mps| driving.nearest_mps(now_mps));
+            [Some(driving.lower_end_mps(fastest.advised_mps)), nearest]
+        });
         self.last_mps = possible.map(|fastest| fastest.speed_mps);
         self.still_m = self.still_m_for(&fastest, &going);
         let predicted_t_m = self.now.t_max_m(0, &passes, situation.speed_mps.abs(), &going);
         let x_m = pose.position.x();
         let left_m = if self.astern { x_m } else { self.task.length_m - x_m };
-        self.think_over(&passes, &going);
+        let pass_error_m = situation.pass_error_m;
+        self.think_over(&phasing, &passes, &going, pass_error_m);
         let unseen_m = match fastest {
             Err(SamplingError::UnseenStrip { width_m, arc_m, .. }) => Some([width_m, arc_m]),
             _ => None,
@@ -235,6 +247,8 @@ impl Advisor {
         let helps = advised_mps.is_some();
         Advice {
             v_max_mps: advised_mps.unwrap_or(0.0),
+            from_mps: from_mps.unwrap_or(0.0),
+            nearest_mps,
             reason: if helps { Reason::HelixPitch } else { Reason::AngularStep },
             predicted_t_m: predicted_t_m.is_finite().then_some(predicted_t_m),
             will_exceed: predicted_t_m > self.task.target_m,
@@ -249,6 +263,8 @@ impl Advisor {
             unseen_m,
             remedy: if helps { None } else { self.remedy(situation, &passes, &going, unseen_m.is_some()) },
             alternatives: self.alternatives,
+            anew: self.anew,
+            margins: self.margins,
         }
     }
 
@@ -304,36 +320,50 @@ impl Advisor {
         self.now.measure(1, rings, |_, head| self.strides.get(head).copied().flatten());
     }
 
+    /// What decides whether a speed meets a target with the phases measured now.
+    fn driving<'a>(
+        &'a self,
+        phasing: &'a Phasing,
+        passes: &Passes,
+        going: &'a Going,
+        target_m: f64,
+    ) -> Driving<'a> {
+        Driving {
+            strips: &self.now,
+            phasing,
+            going,
+            parallax_rad: self.parallax_rad,
+            astern: self.astern,
+            target_m,
+            bound_mps: target_m / (passes.even_gap_s() + going.ping_period_s),
+        }
+    }
+
     /// The largest speed at which the phases measured now meet a target, and the speed to advise.
     ///
-    /// Errors: no speed meets it.
-    fn fastest_mps(
+    /// Errors: no speed meets it, however the heads are phased.
+    fn fastest(
         &self,
-        situation: &Situation,
+        phasing: &Phasing,
         passes: &Passes,
         going: &Going,
         target_m: f64,
+        last_mps: Option<f64>,
     ) -> Result<Fastest, SamplingError> {
-        // Upper bound for any phasing of the heads.
-        let bound_mps = target_m / (passes.even_gap_s() + going.ping_period_s);
-        let t_y_m = self.now.bound_for_target(0, passes, target_m, going)?.t_y_m;
-        let heading = if self.astern { -1.0 } else { 1.0 };
-        let phasing = Phasing::of(situation);
-        let meets = |speed_mps: f64| {
-            let then = phasing.at(heading * speed_mps).beside(self.parallax_rad);
-            // No strip has more passes than all heads make: this test alone rules out most speeds.
-            let gap_s = then.gap_s(then.heads()).unwrap_or(f64::INFINITY);
-            speed_mps * gap_s <= target_m && self.now.meets(0, &then, speed_mps, target_m, going)
+        let bound = self.now.bound_for_target(0, passes, target_m, going);
+        let driving = self.driving(phasing, passes, going, target_m);
+        let t_y_m = match &bound {
+            Ok(bound) => bound.t_y_m,
+            // At another speed heads are phased otherwise, and the swing between them is less.
+            Err(SamplingError::OffAxis { .. }) => self.now.largest_step_m(0),
+            Err(why) => return Err(*why),
         };
-        let now_mps = Some(situation.speed_mps.abs()).filter(|now_mps| *now_mps > UNDER_WAY_MPS);
-        let known = now_mps.into_iter().chain(self.last_mps);
-        let from_mps = known.into_iter().find(|speed_mps| *speed_mps < bound_mps && meets(*speed_mps));
-        let speed_mps = match from_mps {
-            Some(from_mps) => search::upwards_mps(from_mps, bound_mps, meets),
-            None => search::downwards_mps(bound_mps, meets),
-        };
-        let advised_mps = search::kept_back_mps(speed_mps, SPEED_MARGIN, meets);
-        Ok(Fastest { speed_mps, advised_mps, t_y_m })
+        let speed_mps = driving.fastest_mps(last_mps);
+        if speed_mps <= 0.0 {
+            bound?;
+        }
+        let meets = |speed_mps: f64| driving.meets(speed_mps, 0.0);
+        Ok(Fastest { speed_mps, advised_mps: search::kept_back_mps(speed_mps, SPEED_MARGIN, meets), t_y_m })
     }
 
     /// How far the vehicle may move before rings are recast, m.
@@ -349,8 +379,8 @@ impl Advisor {
     }
 
     /// Computes the speed that each mode common to all heads would allow, with the heads that turn now started in
-    /// phase.
-    fn think_over(&mut self, passes: &Passes, going: &Going) {
+    /// phase, and what each margin costs.
+    fn think_over(&mut self, phasing: &Phasing, passes: &Passes, going: &Going, pass_error_m: f64) {
         if let Some(left) = self.until_alternatives.checked_sub(1) {
             self.until_alternatives = left;
             return;
@@ -359,12 +389,50 @@ impl Advisor {
         self.measure_modes();
         let names = self.heads.first().map(|head| head.modes.as_slice()).unwrap_or_default();
         let mut alternatives = [None; MAX_MODES];
+        let mut anew = None;
         for (number, (slot, mode)) in alternatives.iter_mut().zip(names).enumerate() {
-            let Some(v_mps) = self.mode_speed_mps(number, passes.heads(), going) else { continue };
-            *slot =
-                Some(Alternative { mode: ModeName::new(mode.name), v_max_mps: v_mps * (1.0 - SPEED_MARGIN) });
+            let Some(v_mps) = self.mode_speed_mps(number, passes.heads(), going, pass_error_m) else {
+                continue;
+            };
+            let v_max_mps = v_mps * (1.0 - SPEED_MARGIN);
+            *slot = Some(Alternative { mode: ModeName::new(mode.name), v_max_mps });
+            // The mode in which the heads are: all that would change is where they start.
+            if v_max_mps > 0.0 && phasing.apart_m() > 0.0 && self.is_now(mode, passes) {
+                anew = Some(Anew { planned_speed_mps: v_max_mps });
+            }
         }
-        self.alternatives = alternatives;
+        (self.alternatives, self.anew) = (alternatives, anew);
+        self.margins = Some(self.margins(phasing, passes, going, pass_error_m));
+    }
+
+    /// Whether the heads turn in a mode.
+    fn is_now(&self, mode: &HeadMode, passes: &Passes) -> bool {
+        const SAME: f64 = 0.02;
+        let stride = self.strides.iter().flatten().next().copied();
+        let period_s = mode.turn.period_s();
+        Some(Ring::stride(mode.turn.step_rad(), RING)) == stride
+            && (passes.turn_s() - period_s).abs() < SAME * period_s
+    }
+
+    /// The largest speeds with margins added one after the other.
+    fn margins(&self, phasing: &Phasing, passes: &Passes, going: &Going, pass_error_m: f64) -> Margins {
+        let target_m = self.task.target_m;
+        let steady = Going { ping_period_s: going.ping_period_s, ..Going::default() };
+        let even = passes.evened();
+        let hidden = self.now.bound_for_target(0, &even, target_m, &steady);
+        let fastest = |going: &Going, target_m: f64| {
+            self.fastest(phasing, passes, going, target_m, self.last_mps)
+                .map_or(0.0, |fastest| fastest.speed_mps)
+        };
+        let sure_m = target_m - self.margin_m(pass_error_m);
+        let speeds = [
+            self.now.bound_if_all_seen_mps(0, &even, target_m, &steady).unwrap_or(0.0),
+            hidden.map_or(0.0, |bound| bound.speed_mps),
+            fastest(&steady, target_m),
+            fastest(going, target_m),
+            fastest(going, sure_m),
+        ];
+        Margins::of(speeds.map(|speed_mps| speed_mps * (1.0 - SPEED_MARGIN)), pass_error_m)
     }
 
     fn measure_modes(&mut self) {
@@ -379,7 +447,7 @@ impl Advisor {
     }
 
     /// The largest speed in a mode, zero where none meets the target; `None` when a head lacks the mode.
-    fn mode_speed_mps(&self, number: usize, heads: HeadSet, going: &Going) -> Option<f64> {
+    fn mode_speed_mps(&self, number: usize, heads: HeadSet, going: &Going, pass_error_m: f64) -> Option<f64> {
         let name = self.heads.first()?.modes.get(number)?.name;
         let turn = |head: usize| self.heads.get(head)?.mode(name).map(|mode| mode.turn);
         let (mut longest_s, mut ping_period_s) = (0.0_f64, 0.0_f64);
@@ -398,7 +466,10 @@ impl Advisor {
         };
         let passes = passes.ok()?.beside(self.parallax_rad);
         let going = Going { ping_period_s, ..*going };
-        let bound = self.modes.bound_for_target(number, &passes, self.task.target_m, &going);
+        let Task { target_m, confidence_sd, .. } = self.task;
+        let t_y_m = self.modes.largest_step_m(number);
+        let sure_m = target_m - margin::position_margin_m(target_m, confidence_sd, pass_error_m, t_y_m);
+        let bound = self.modes.bound_for_target(number, &passes, sure_m, &going);
         Some(bound.map_or(0.0, |bound| bound.speed_mps))
     }
 
@@ -407,7 +478,9 @@ impl Advisor {
     fn remedy(&self, situation: &Situation, passes: &Passes, going: &Going, unseen: bool) -> Option<Remedy> {
         let target_m = self.task.target_m;
         let steady = Going { ping_period_s: going.ping_period_s, ..Going::default() };
-        if going.swing_mps > 0.0 && self.now.bound_for_target(0, passes, target_m, &steady).is_ok() {
+        if going.swing_mps.max(going.apart_swing_mps) > 0.0
+            && self.now.bound_for_target(0, passes, target_m, &steady).is_ok()
+        {
             return Some(Remedy::HoldHeading);
         }
         let stride = situation.heads.iter().flatten().map(|motion| Ring::stride(motion.step_rad, RING)).max();
@@ -424,13 +497,10 @@ impl Advisor {
         best.filter(|best| best.v_max_mps > 0.0).map(|best| Remedy::Mode(best.mode))
     }
 
-    /// Part of the target reserved for errors of position, m: as many standard deviations as for a verdict of pass; at most
-    /// a fifth of the target, since no speed makes up for a lost position.
+    /// Part of the target left to errors of position, m.
     fn margin_m(&self, pass_error_m: f64) -> f64 {
-        /// Error that needs no margin, m: about what a navigation without error estimates reports.
-        const NOTHING_M: f64 = 0.002;
         let Task { target_m, confidence_sd, .. } = self.task;
-        (confidence_sd * (pass_error_m - NOTHING_M).max(0.0)).min(target_m / 5.0)
+        margin::position_margin_m(target_m, confidence_sd, pass_error_m, self.now.largest_step_m(0))
     }
 }
 

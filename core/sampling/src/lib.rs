@@ -29,6 +29,7 @@ pub mod head;
 pub mod head_set;
 pub mod interference;
 pub mod layout;
+pub mod margin;
 pub mod occlusion;
 pub mod passes;
 pub mod plan;

@@ -237,6 +237,21 @@ impl Passes {
         })
     }
 
+    /// The longest turn period of a head, seconds.
+    pub fn turn_s(&self) -> f64 {
+        self.turns_s.into_iter().fold(0.0, f64::max)
+    }
+
+    /// The same heads evenly phased, and without parallax; heads in sectors, or out of step, as they are.
+    #[must_use]
+    pub fn evened(&self) -> Self {
+        let even = match self.pattern {
+            Pattern::Turning(_) => Self::evenly_phased(self.heads, |_| self.turn_s()).ok(),
+            Pattern::Sectors(_) | Pattern::Loose => None,
+        };
+        even.unwrap_or(Self { parallax_s: 0.0, ..*self })
+    }
+
     /// [`Passes::gap_s`] of all heads if they were evenly phased, seconds; zero without a head.
     pub fn even_gap_s(&self) -> f64 {
         let turn_s = self.turns_s.into_iter().fold(0.0, f64::max);

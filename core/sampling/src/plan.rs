@@ -7,6 +7,7 @@ mod wall;
 use super::error::{SamplingError, not_negative, positive};
 use super::head::{HeadMode, HeadSet, HeadSpec};
 use super::layout::{self, HeadLayout};
+use super::margin::{self, APART_SHARE, ExpectedErrors, Margins};
 use super::occlusion::{self, AngleRange, Obstacle};
 use super::passes::{self, Passes};
 use super::ring::{Ring, Standing};
@@ -22,6 +23,9 @@ pub use wall::{PatternSample, WallPlace};
 
 /// Soundings per ring: 0.1 degrees apart, so that a step is evaluated from many start angles.
 const RING: u32 = 3600;
+
+/// Steps down to the speed that leads to itself: each is a fraction of the one before.
+const FALLS: u32 = 12;
 
 /// A tunnel, a vehicle and the tolerances to plan for.
 #[derive(Debug, Clone)]
@@ -81,6 +85,7 @@ pub struct Planner {
     hidden: Vec<Vec<AngleRange>>,
     stances: Vec<Stance>,
     modes: Vec<PlannedMode>,
+    errors: Option<ExpectedErrors>,
 }
 
 impl Planner {
@@ -116,7 +121,13 @@ impl Planner {
                 stances.iter().map(|stance| stance.strips.largest_step_m(number)).fold(0.0, f64::max);
             modes.push(planned_mode(&inspection, of_heads, chords_m, t_y2_m)?);
         }
-        Ok(Self { inspection, hidden, stances, modes })
+        Ok(Self { inspection, hidden, stances, modes, errors: None })
+    }
+
+    /// The same, with a margin for errors of position.
+    #[must_use]
+    pub fn with_errors(self, errors: Option<ExpectedErrors>) -> Self {
+        Self { errors, ..self }
     }
 
     /// The inspection that is planned.
@@ -142,11 +153,66 @@ impl Planner {
         Ok(self.over_stances(mode, t_m).fold(0.0, f64::max))
     }
 
-    /// The largest speed at which T_max is the target, with the heads phased for it, m/s: the inverse of
-    /// [`Planner::t_max_m`].
+    /// The largest speed at which sections will pass, with the heads phased for it, m/s: at which T_max and the margin for
+    /// errors of position are the target.
     ///
     /// Errors: a target that isn't above zero, or that no speed meets.
     pub fn v_max_mps(&self, mode: usize, target_m: f64) -> Result<f64, SamplingError> {
+        let known_mps = self.known_v_max_mps(mode, target_m)?;
+        let Some(planned) = self.modes.get(mode) else { return Ok(known_mps) };
+        // The slower, the longer between heads apart along the hull, and the larger the margin: down from above, each
+        // speed leads to a lower one until it leads to itself.
+        let mut speed_mps = known_mps;
+        for _ in 0..FALLS {
+            let margin_m = self.margin_m(planned, target_m, speed_mps);
+            speed_mps = self.known_v_max_mps(mode, target_m - margin_m)?.min(speed_mps);
+        }
+        Ok(speed_mps)
+    }
+
+    /// Margin for errors of position in a mode at a speed, m.
+    fn margin_m(&self, planned: &PlannedMode, target_m: f64, speed_mps: f64) -> f64 {
+        let confidence_sd = self.errors.as_ref().map_or(0.0, |errors| errors.confidence_sd);
+        let pass_error_m = self.pass_error_m(planned, speed_mps);
+        margin::position_margin_m(target_m, confidence_sd, pass_error_m, planned.t_y2_m)
+    }
+
+    /// Standard deviation of a hole's size between two passes in a mode at a speed, m; zero where nothing is known of it.
+    fn pass_error_m(&self, planned: &PlannedMode, speed_mps: f64) -> f64 {
+        let Some(errors) = &self.errors else { return 0.0 };
+        let passes_per_s = self.inspection.heads.len() as f64 / planned.mode.turn.period_s();
+        let apart_m = self.stances.first().map_or(0.0, |stance| stance.apart_m);
+        errors.pass_error_m(margin::error_time_s(passes_per_s, apart_m, speed_mps, APART_SHARE))
+    }
+
+    /// The largest speeds in a mode for a target, margin by margin.
+    ///
+    /// Errors: as for [`Planner::v_max_mps`].
+    pub fn margins(&self, mode: usize, target_m: f64) -> Result<Margins, SamplingError> {
+        let planned = self.modes.get(mode).ok_or(SamplingError::NoCommonMode)?;
+        let steady = Going { ping_period_s: planned.ping_period_s, ..Going::default() };
+        let even = &planned.passes;
+        let mut slowest = [f64::INFINITY; 3];
+        for stance in &self.stances {
+            let phased = even.beside(stance.parallax_rad);
+            let shifted = Going { shift_m: stance.shift_m, ..steady };
+            let geometry = stance.strips.bound_if_all_seen_mps(mode, even, target_m, &steady);
+            let hidden = stance.strips.bound_for_target(mode, even, target_m, &steady)?.speed_mps;
+            let phase = stance.strips.bound_for_target(mode, &phased, target_m, &shifted)?.speed_mps;
+            for (slot, speed_mps) in slowest.iter_mut().zip([geometry.unwrap_or(0.0), hidden, phase]) {
+                *slot = slot.min(speed_mps);
+            }
+        }
+        let [geometry, hidden, phase] = slowest;
+        let (swing, position) = (self.known_v_max_mps(mode, target_m)?, self.v_max_mps(mode, target_m)?);
+        Ok(Margins::of([geometry, hidden, phase, swing, position], self.pass_error_m(planned, position)))
+    }
+
+    /// The largest speed at which T_max is the target, with the heads phased for it, m/s: the inverse of
+    /// [`Planner::t_max_m`], for a position that is known.
+    ///
+    /// Errors: a target that isn't above zero, or that no speed meets.
+    pub fn known_v_max_mps(&self, mode: usize, target_m: f64) -> Result<f64, SamplingError> {
         positive("the target in metres", target_m)?;
         let speed = |stance: &Stance, passes: &Passes, going: &Going| {
             stance.strips.bound_for_target(mode, passes, target_m, going).map(|bound| bound.speed_mps)
@@ -178,6 +244,7 @@ impl Planner {
                 swing_mps: self.inspection.yaw_rate_radps * stance.farthest_m,
                 shift_m: stance.shift_m,
                 apart_m: stance.apart_m,
+                apart_swing_mps: self.inspection.yaw_rate_radps * stance.farthest_m,
                 swing_most_m: None,
             };
             Some(of(stance, &planned.passes.beside(stance.parallax_rad), &going))

@@ -130,6 +130,8 @@ pub struct Going {
     pub shift_m: f64,
     /// Distance between heads along the hull, m: the swing acts while the vehicle covers it.
     pub apart_m: f64,
+    /// Largest speed of the beams along the wall due to swing, averaged over that time, m/s.
+    pub apart_swing_mps: f64,
     /// Limit of the swing's displacement over any time, m; `None` if unknown.
     pub swing_most_m: Option<f64>,
 }
@@ -303,6 +305,20 @@ impl Strips {
         going: &Going,
     ) -> bool {
         self.ts_m(setting, passes, speed_mps, going).all(|t_m| t_m <= target_m)
+    }
+
+    /// The largest speed for a target if every head saw all of the wall, m/s; `None` where none meets it.
+    pub fn bound_if_all_seen_mps(
+        &self,
+        setting: usize,
+        passes: &Passes,
+        target_m: f64,
+        going: &Going,
+    ) -> Option<f64> {
+        let count = self.strips.len();
+        let of_setting = self.steps_m.iter().skip(setting * count).take(count);
+        let t_y_m = of_setting.map(|steps| steps[1]).fold(0.0, f64::max);
+        Limit { gap_s: passes.gap_s(passes.heads())?, t_y_m }.speed_mps(target_m, going)
     }
 
     /// T predicted on each strip at a speed, m.
@@ -497,7 +513,7 @@ struct Limit {
 impl Limit {
     fn t_m(&self, speed_mps: f64, going: &Going) -> f64 {
         let over_ground_mps = speed_mps + going.swing_mps;
-        let lag_m2ps = going.swing_mps * going.apart_m;
+        let lag_m2ps = going.apart_swing_mps * going.apart_m;
         let lag_m = if lag_m2ps > 0.0 { lag_m2ps / speed_mps } else { 0.0 };
         let swung_m = over_ground_mps * self.gap_s + going.shift_m + lag_m;
         let at_most_m = going.swing_most_m.map(|most_m| speed_mps * self.gap_s + going.shift_m + most_m);
@@ -505,8 +521,8 @@ impl Limit {
         spacing::t_max_m(t_x_m, over_ground_mps * going.ping_period_s, self.t_y_m)
     }
 
-    /// The largest speed that solves T = hypot((v + w) t + shift + w a / v, T_y), with t the sum of gap and ping
-    /// period, w the swing speed, and a the distance between heads; or, if faster, the same with the swing's limit
+    /// The largest speed that solves T = hypot((v + w) t + shift + u a / v, T_y), with t the sum of gap and ping
+    /// period, w the swing speed, u that between heads, and a their distance; or, if faster, the same with the swing's limit
     /// between passes.
     fn speed_mps(&self, target_m: f64, going: &Going) -> Option<f64> {
         let along_m = spacing::along_m(target_m, self.t_y_m)?;
@@ -523,7 +539,7 @@ impl Limit {
     fn swung_mps(&self, along_m: f64, going: &Going) -> Option<f64> {
         let time_s = self.gap_s + going.ping_period_s;
         let for_speed_m = along_m - going.shift_m - going.swing_mps * time_s;
-        let rest = for_speed_m * for_speed_m - 4.0 * time_s * going.swing_mps * going.apart_m;
+        let rest = for_speed_m * for_speed_m - 4.0 * time_s * going.apart_swing_mps * going.apart_m;
         let possible = time_s > 0.0 && for_speed_m > 0.0 && rest >= 0.0;
         possible.then(|| (for_speed_m + math::sqrt(rest)) / (2.0 * time_s))
     }

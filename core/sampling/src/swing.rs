@@ -20,6 +20,8 @@ pub struct Swing {
     pub rate_radps: f64,
     /// Largest rotation over any time, radians.
     pub most_rad: f64,
+    /// Largest rotation until the rearmost head is where the foremost was, per second, rad/s.
+    pub apart_rate_radps: f64,
 }
 
 /// Recent directions of the vehicle's x axis.
@@ -57,41 +59,57 @@ impl Looks {
         recent.map(|(_, then)| (look + -*then).norm()).fold(0.0, f64::max)
     }
 
-    /// Swing within the last half minute up to `now`, for passes `gap_s` apart: the largest in that time, so that it
-    /// holds while the vehicle swings to and fro.
+    /// Swing within the last half minute up to `now`, for passes `gap_s` apart and heads that pass a place within `apart_s`: the
+    /// largest in that time, so that it holds while the vehicle swings to and fro.
     ///
     /// Rotation within the navigation errors is excluded, with a continuous transition.
     /// Allocates: never.
-    pub fn swing(&self, now: MonoNs, gap_s: f64) -> Swing {
-        if !(gap_s > 0.0 && gap_s.is_finite()) {
-            return Swing::default();
-        }
-        let gap = DurNs::from_secs_f64(gap_s.min(1e3));
-        let recent = || self.newest_first().take_while(|(at, _)| now.since(*at).0 <= WINDOW.0);
+    pub fn swing(&self, now: MonoNs, gap_s: f64, apart_s: f64) -> Swing {
+        let rate = |over_s: f64| {
+            let known = over_s > 0.0 && over_s.is_finite();
+            let turned_rad = if known { self.turned_over(now, over_s) } else { 0.0 };
+            (turned_rad, if known { counted(turned_rad) * turned_rad / over_s } else { 0.0 })
+        };
+        let ((turned_rad, rate_radps), (apart_rad, apart_rate_radps)) = (rate(gap_s), rate(apart_s));
+        let largest_rad = turned_rad.max(apart_rad);
+        let extent = |of: fn(&Vec3<Tunnel>) -> f64| {
+            let values = || self.recent(now).map(|(_, look)| of(look));
+            (values().fold(f64::MIN, f64::max) - values().fold(f64::MAX, f64::min)).max(0.0)
+        };
+        let most_rad = math::hypot(extent(Vec3::y), extent(Vec3::z)).max(largest_rad);
+        Swing { rate_radps, most_rad: counted(largest_rad) * most_rad, apart_rate_radps }
+    }
+
+    /// The largest rotation over a time within the last half minute, radians.
+    fn turned_over(&self, now: MonoNs, over_s: f64) -> f64 {
+        let over = DurNs::from_secs_f64(over_s.min(1e3));
         let oldest = self.newest_first().last().map(|(_, look)| *look);
         let mut turned_rad = 0.0_f64;
         let mut earlier = self.newest_first().peekable();
-        for (at, look) in recent() {
+        for (at, look) in self.recent(now) {
             // Both go back in time, so that `earlier` never has to be rewound.
-            while earlier.peek().is_some_and(|(then, _)| at.since(*then).0 < gap.0) {
+            while earlier.peek().is_some_and(|(then, _)| at.since(*then).0 < over.0) {
                 earlier.next();
             }
-            // Where the gap reaches back beyond the history, the oldest direction is used.
+            // Where the time reaches back beyond the history, the oldest direction is used.
             let before = earlier.peek().map(|(_, before)| *before).or(oldest);
             turned_rad = turned_rad.max(before.map_or(0.0, |before| (*look + -before).norm()));
         }
-        let counted = (2.0 - 2.0 * DEAD_RAD / turned_rad.max(DEAD_RAD)).min(1.0);
-        let extent = |of: fn(&Vec3<Tunnel>) -> f64| {
-            let values = || recent().map(|(_, look)| of(look));
-            (values().fold(f64::MIN, f64::max) - values().fold(f64::MAX, f64::min)).max(0.0)
-        };
-        let most_rad = math::hypot(extent(Vec3::y), extent(Vec3::z)).max(turned_rad);
-        Swing { rate_radps: counted * turned_rad / gap_s, most_rad: counted * most_rad }
+        turned_rad
+    }
+
+    fn recent(&self, now: MonoNs) -> impl Iterator<Item = &(MonoNs, Vec3<Tunnel>)> {
+        self.newest_first().take_while(move |(at, _)| now.since(*at).0 <= WINDOW.0)
     }
 
     fn newest_first(&self) -> impl Iterator<Item = &(MonoNs, Vec3<Tunnel>)> {
         (0..self.looks.len()).filter_map(|k| self.looks.get((self.count - 1 - k) % BEATS))
     }
+}
+
+/// The share of a rotation that isn't attributed to navigation errors.
+fn counted(turned_rad: f64) -> f64 {
+    (2.0 - 2.0 * DEAD_RAD / turned_rad.max(DEAD_RAD)).min(1.0)
 }
 
 #[cfg(test)]
@@ -118,7 +136,7 @@ mod tests {
         let swinging = |t: f64| [0.1 * math::sin(TAU * t / 20.0), 0.0];
         for seconds in [60.0, 63.0, 65.0, 68.4, 200.0] {
             let (looks, now) = looks(seconds, swinging);
-            let swing = looks.swing(now, 2.0);
+            let swing = looks.swing(now, 2.0, 0.0);
             // Between two passes a sine turns by 2 A sin(omega t / 2) at most.
             let expected = 0.2 * math::sin(TAU * 2.0 / 40.0) / 2.0;
             assert!((swing.rate_radps / expected - 1.0).abs() < 0.01, "{seconds}: {swing:?}, {expected}");
@@ -127,28 +145,39 @@ mod tests {
     }
 
     #[test]
+    fn between_heads_apart_along_the_hull_slow_swings_count() {
+        // From pass to pass within the dead band; over ten seconds, not.
+        let (looks, now) = looks(80.0, |t| [0.02 * math::sin(TAU * t / 50.0), 0.0]);
+        let swing = looks.swing(now, 2.0, 10.0);
+        let expected = 0.04 * math::sin(TAU * 10.0 / 100.0) / 10.0;
+        assert!(swing.rate_radps.abs() <= 0.0, "{swing:?}");
+        assert!((swing.apart_rate_radps / expected - 1.0).abs() < 0.02, "{swing:?}");
+        assert!(swing.most_rad > 0.03, "{swing:?}");
+    }
+
+    #[test]
     fn it_is_forgotten_half_a_minute_after_it_has_ended() {
         let ended = |t: f64| [if t < 50.0 { 0.1 * math::sin(TAU * t / 10.0) } else { 0.0 }, 0.0];
         let (now, still) = (looks(75.0, ended), looks(90.0, ended));
-        assert!(now.0.swing(now.1, 2.0).rate_radps > 0.02);
-        assert_eq!(still.0.swing(still.1, 2.0), Swing::default());
+        assert!(now.0.swing(now.1, 2.0, 0.0).rate_radps > 0.02);
+        assert_eq!(still.0.swing(still.1, 2.0, 0.0), Swing::default());
     }
 
     #[test]
     fn a_steady_heading_and_navigation_s_wandering_are_no_swing() {
-        assert_eq!(Looks::default().swing(MonoNs(0), 2.0), Swing::default());
+        assert_eq!(Looks::default().swing(MonoNs(0), 2.0, 0.0), Swing::default());
         let (askew, now) = looks(40.0, |_| [0.3, -0.1]);
-        assert_eq!(askew.swing(now, 8.0), Swing::default());
+        assert_eq!(askew.swing(now, 8.0, 0.0), Swing::default());
         let jitter = |t: f64| [2e-4 * math::sin(1e3 * t), 0.002 * math::sin(t / 9.0)];
         let (wandering, now) = looks(40.0, jitter);
-        assert_eq!(wandering.swing(now, 2.0), Swing::default());
+        assert_eq!(wandering.swing(now, 2.0, 0.0), Swing::default());
     }
 
     #[test]
     fn it_comes_in_without_a_step_and_counts_in_full() {
         let ramp = |rad: f64| {
             let (looks, now) = looks(40.0, move |t| [rad * math::sin(TAU * t / 4.0), 0.0]);
-            looks.swing(now, 2.0).rate_radps * 2.0
+            looks.swing(now, 2.0, 0.0).rate_radps * 2.0
         };
         let (mut before, mut largest) = (0.0, 0.0_f64);
         for k in 0..200 {
@@ -163,10 +192,10 @@ mod tests {
     #[test]
     fn pitch_counts_as_yaw_does_and_of_a_long_gap_what_is_known() {
         let (looks, now) = looks(10.0, |t| [0.0, 0.1 * math::sin(TAU * t / 20.0)]);
-        assert!(looks.swing(now, 2.0).rate_radps > 0.02);
+        assert!(looks.swing(now, 2.0, 0.0).rate_radps > 0.02);
         // From the oldest stored direction to the one farthest from it.
-        let turned_rad = looks.swing(now, 60.0).rate_radps * 60.0;
+        let turned_rad = looks.swing(now, 60.0, 0.0).rate_radps * 60.0;
         assert!((turned_rad - 0.09).abs() < 0.01, "{turned_rad}");
-        assert_eq!(looks.swing(now, f64::NAN), Swing::default());
+        assert_eq!(looks.swing(now, f64::NAN, 0.0), Swing::default());
     }
 }

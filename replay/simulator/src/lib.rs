@@ -4,6 +4,7 @@
 
 mod adviser;
 mod builder;
+pub mod calm;
 mod clock;
 pub mod effects;
 pub mod environment;

@@ -1,12 +1,11 @@
 //! What dives in each cell of the table: scenes, and the vehicle files that headrace is told.
 
-use headrace_geometry::math;
-use headrace_sampling::plan::{Inspection, Planner};
 use headrace_sensor::device::Sense;
 use headrace_simulator::Scene;
 use headrace_vehicle::VehicleConfig;
 
 use super::breaking::Breakage;
+use crate::planned::planned_mps;
 use crate::random_dives::Draw;
 use crate::scenes;
 
@@ -165,7 +164,7 @@ impl Cell {
 
     /// The speed that `plan` says over that of Eq. 16.
     pub fn plan_share(&self) -> f64 {
-        plan_mps(&self.plain(1, 1.0).vehicle, self.vehicle.mode) / self.vehicle.edge_mps
+        self.plan_mps(&self.plain(1, 1.0).vehicle) / self.vehicle.edge_mps
     }
 
     /// What breaks in the dive of a seed over so many metres.
@@ -216,7 +215,7 @@ impl Cell {
 
     /// Planned speed and speed driven, m/s.
     fn speeds_mps(&self, vehicle: &VehicleConfig) -> [f64; 2] {
-        let most_mps = plan_mps(vehicle, self.vehicle.mode);
+        let most_mps = self.plan_mps(vehicle);
         let file = scenes::vehicle_file(self.vehicle.file).unwrap();
         let file = String::from_utf8(file).unwrap();
         let file_mps = file.lines().find_map(|line| line.strip_prefix("planned_speed_mps = "));
@@ -228,6 +227,11 @@ impl Cell {
             // The most that the pilot would drive.
             Driven::Advised | Driven::Back => [planned_mps, 1.2 * self.vehicle.edge_mps],
         }
+    }
+
+    /// The plan's speed, m/s.
+    fn plan_mps(&self, vehicle: &VehicleConfig) -> f64 {
+        planned_mps(vehicle, &self.told().replace("PLANNED", "0.1"), self.vehicle.mode)
     }
 
     fn text(&self, seed: u64, length_m: f64, speed_mps: f64, effects: &str) -> String {
@@ -368,28 +372,4 @@ fn turned(file: &str, head: &str) -> String {
 fn parse(text: &str, vehicle: &str, seed: u64) -> Scene {
     let vehicle = vehicle.replace("PLANNED", "0.1");
     scenes::seeded(text, &|_| Ok(vehicle.clone().into_bytes()), Some(seed))
-}
-
-/// The plan's speed for a vehicle in a mode, in the middle of its tunnel, m/s.
-fn plan_mps(vehicle: &VehicleConfig, mode: &str) -> f64 {
-    let heads = vehicle.sensors.iter().filter_map(|sensor| {
-        let head = sensor.head()?;
-        Some((head, sensor.modes(None).unwrap()))
-    });
-    let planner = Planner::new(Inspection {
-        profile: vehicle.tunnel.profile.clone(),
-        length_m: vehicle.tunnel.length_m,
-        place: vehicle.tunnel.profile.reference(),
-        heads: heads.collect(),
-        hull: vehicle.hull.clone(),
-        layout: vehicle.layout,
-        drift_m: 0.0,
-        yaw_rad: 0.0,
-        yaw_rate_radps: 0.0,
-        sound_speed_mps: vehicle.site.sound_speed_mps,
-    })
-    .unwrap();
-    let number = planner.modes().iter().position(|planned| planned.mode.name == mode).unwrap();
-    // A plan is printed in millimetres a second.
-    math::floor_to_i64(planner.v_max_mps(number, vehicle.target_m).unwrap() * 1e3) as f64 * 1e-3
 }

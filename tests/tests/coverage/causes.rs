@@ -110,7 +110,7 @@ const CASES: [Case; 11] = [
 /// Causes named of the sections that fail, with how many.
 fn named(case: &Case, seed: u64) -> BTreeMap<&'static str, u32> {
     let vehicle = include_str!("../../../deploy/vehicles/vita2-4.toml")
-        .replace("planned_speed_mps = 0.11", "planned_speed_mps = 0.185");
+        .replace("planned_speed_mps = 0.10", "planned_speed_mps = 0.185");
     // A return that is missing where the vehicle is in the way is put down to that, whether it is simulated or not.
     let thin = "plugin = \"imagenex881\"\nbody_radius_m = 0.001";
     let vehicle = match case.cause {

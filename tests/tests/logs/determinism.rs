@@ -50,7 +50,7 @@ fn a_live_dive_and_the_replay_of_its_log_agree() {
 fn ticks_of_any_length_agree_where_sections_fail_settle_and_are_cleared() {
     let folder = Folder::new();
     let vehicle = include_str!("../../../deploy/vehicles/vita2-4.toml");
-    folder.write("vehicle.toml", vehicle.replace("planned_speed_mps = 0.11", "planned_speed_mps = 0.197"));
+    folder.write("vehicle.toml", vehicle.replace("planned_speed_mps = 0.10", "planned_speed_mps = 0.197"));
     let leg = |distance_m: f64, speed_mps: f64| {
         format!("[[trajectory.legs]]\ndistance_m = {distance_m}\nspeed_mps = {speed_mps}\n")
     };

@@ -12,7 +12,7 @@ fn without(way: &str, source: &str, from_s: f64, to_s: f64) -> Value {
     let folder = Folder::new();
     // The heads' bodies aren't simulated: nothing is hidden, and the paper's speed meets the target.
     let vehicle = include_str!("../../../deploy/vehicles/vita2-4.toml")
-        .replace("planned_speed_mps = 0.11", "planned_speed_mps = 0.197")
+        .replace("planned_speed_mps = 0.10", "planned_speed_mps = 0.197")
         .replace("[navigation]", &format!("[navigation]\nway = \"{way}\""));
     assert!(vehicle.contains(&format!("way = \"{way}\"")));
     folder.write("vehicle.toml", &vehicle);

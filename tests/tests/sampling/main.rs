@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
 
 mod advice;
+mod calm;
 mod ideal_table;
 mod interleave;
 mod oracle;

@@ -23,7 +23,14 @@ fn cause_of(passage: &Passage, diameter_m: f64) -> Cause {
     let hole =
         Hole { diameter_m, least_m: diameter_m, most_m: diameter_m, x_m: 10.1, arc_m: 3.0, bounded: true };
     let swept_by_all = Some(Reach { from_m: 0.0, to_m: 20.0 });
-    let case = Case { hole: &hole, swept_by_all, none_alive: false, target_m: 0.5, perimeter_m: 18.0 };
+    let case = Case {
+        hole: &hole,
+        swept_by_all,
+        none_alive: false,
+        target_m: 0.5,
+        confidence_sd: 2.0,
+        perimeter_m: 18.0,
+    };
     explain(&case, &core::iter::once(((10.0, 10.25), passage))).cause
 }
 
@@ -85,7 +92,14 @@ fn a_stretch_where_no_head_pinged_is_dark_whatever_is_beside_it() {
     beside.lost.note(Loss::Missing, 3.1, 18.0);
     let hole = Hole { diameter_m: 0.7, least_m: 0.7, most_m: 0.7, x_m: 10.3, arc_m: 3.0, bounded: true };
     let swept_by_all = Some(Reach { from_m: 0.0, to_m: 20.0 });
-    let case = Case { hole: &hole, swept_by_all, none_alive: false, target_m: 0.5, perimeter_m: 18.0 };
+    let case = Case {
+        hole: &hole,
+        swept_by_all,
+        none_alive: false,
+        target_m: 0.5,
+        confidence_sd: 2.0,
+        perimeter_m: 18.0,
+    };
     let sections = [((10.0, 10.25), &beside), ((10.25, 10.5), &dark)].into_iter();
     let evidence = explain(&case, &sections);
     assert_eq!((evidence.cause, evidence.silent_heads), (Cause::HeadSilent, silent));

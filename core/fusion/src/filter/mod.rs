@@ -42,11 +42,12 @@ use super::relative::Relative;
 use super::smooth::journal::Journal;
 use super::smooth::relative_backward::UNTIED;
 use super::{Fix, Navigation, NoFix, Times};
-use headrace_geometry::frames::{Pose, Vec3};
+use headrace_geometry::frames::{Body, Pose, Vec3};
 use headrace_geometry::math;
 use headrace_geometry::site::Site;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_geometry::tunnel::Profile;
+use headrace_sampling::margin::{APART_SHARE, error_time_s};
 use headrace_sensor::device::{SensorInfo, SensorKind};
 use headrace_sensor::reading::MAX_SOURCES;
 use headrace_sensor::reading::Reading;
@@ -72,14 +73,7 @@ const MOST_RATE_RADPS: f64 = 10.0;
 const MOST_FORCE_MPS2: f64 = 50.0;
 /// Room for the estimates after the last epoch.
 const AHEAD: usize = 512;
-/// Share of the time between heads apart along the hull that counts towards the time between passes: only some
-/// neighbouring passes are by heads apart, and holidays between these grow by less than the heads' separation. With this
-/// share, D is within two of its standard deviations 93 % of the time over the dives of
-/// `tests/tests/navigation/fusion.rs` with four heads; over dives like them, 80 % with none of it and 99 % with all.
-const APART_SHARE: f64 = 0.4;
-/// Speed below which a vehicle counts as standing still, m/s.
-const SLOW_MPS: f64 = 0.01;
-/// Time between two head passes when no head is known to turn, and the longest between heads apart along the hull.
+/// Time between two head passes when no head is known to turn.
 const USUAL_GAP: DurNs = DurNs(20_000_000_000);
 
 /// See the module's description.
@@ -139,6 +133,11 @@ impl FilterNavigation {
     /// When the cable's readings left what was expected, once that has lasted for a second; `None` while they are believed.
     pub fn cable_doubted_since(&self) -> Option<MonoNs> {
         self.cable_doubt().map(|doubt| doubt.since)
+    }
+
+    /// Position on the vehicle of the inertial unit, to which the estimate refers.
+    pub fn unit_at(&self) -> Vec3<Body> {
+        self.context.unit_at
     }
 
     /// Number of restarts of the estimate.
@@ -280,9 +279,8 @@ impl FilterNavigation {
         if passes_per_s <= 0.0 {
             return USUAL_GAP;
         }
-        let speed_mps = self.running.state.velocity_mps.x().abs();
-        let apart_s = ((ahead_m - astern_m) / speed_mps.max(SLOW_MPS)).min(USUAL_GAP.as_secs_f64());
-        DurNs::from_secs_f64(1.0 / passes_per_s + apart_share * apart_s)
+        let speed_mps = self.running.state.velocity_mps.x();
+        DurNs::from_secs_f64(error_time_s(passes_per_s, ahead_m - astern_m, speed_mps, apart_share))
     }
 
     /// Puts a reading into the window, unless recent ones make it redundant.

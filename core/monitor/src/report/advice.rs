@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use crate::advice_log::AdviceEntry;
 use headrace_sampling::advice::{Alternative, Left};
+use headrace_sampling::margin::Margins;
 
 /// Advice at one time.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -16,6 +17,10 @@ pub struct AdviceReport {
     pub speed_mps: f64,
     /// Largest speed that meets the target, m/s.
     pub v_max_mps: f64,
+    /// Slower than this, heads apart along the hull run out of phase, m/s; zero where slower always helps.
+    pub from_mps: f64,
+    /// The speed nearest to the present one that meets the target, m/s, where that doesn't.
+    pub nearest_mps: Option<f64>,
     /// Why.
     pub reason: &'static str,
     /// T predicted at the present speed, m.
@@ -32,6 +37,20 @@ pub struct AdviceReport {
     pub remedy: Option<String>,
     /// Speeds possible in each mode of the heads.
     pub alternatives: Vec<AlternativeReport>,
+    /// Speed for which to start the heads anew in their present mode, which meets the target then, m/s.
+    pub start_anew_for_mps: Option<f64>,
+    /// What each margin costs.
+    pub margins: Option<MarginsReport>,
+}
+
+/// The largest speeds with margins added one after the other.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct MarginsReport {
+    /// The speeds, m/s.
+    #[serde(flatten)]
+    pub margins: Margins,
+    /// The margin that costs most.
+    pub costliest: &'static str,
 }
 
 /// Speed possible in one mode of the heads.
@@ -54,6 +73,8 @@ pub(super) fn advice_report(entry: &AdviceEntry) -> AdviceReport {
         chainage_m: entry.chainage_m,
         speed_mps: entry.speed_mps,
         v_max_mps: entry.advice.v_max_mps,
+        from_mps: entry.advice.from_mps,
+        nearest_mps: entry.advice.nearest_mps,
         reason: entry.advice.reason.as_str(),
         predicted_t_m: entry.advice.predicted_t_m,
         will_exceed: entry.advice.will_exceed,
@@ -62,6 +83,11 @@ pub(super) fn advice_report(entry: &AdviceEntry) -> AdviceReport {
         suffices: left.suffices_at(entry.advice.v_max_mps),
         remedy: entry.advice.remedy.map(|remedy| remedy.as_str().to_owned()),
         alternatives: others.map(|other| alternative_report(other, &left)).collect(),
+        start_anew_for_mps: entry.advice.anew.map(|anew| anew.planned_speed_mps),
+        margins: entry
+            .advice
+            .margins
+            .map(|margins| MarginsReport { margins, costliest: margins.costliest().as_str() }),
     }
 }
 

@@ -13,6 +13,9 @@ use headrace_sampling::passes::{Phasing, Situation};
 use headrace_sampling::swing::{Looks, Swing};
 use headrace_snapshot::stateful;
 
+/// The least speed at which heads apart along the hull are taken to follow each other, m/s.
+const SLOWEST_MPS: f64 = 0.05;
+
 /// The advisor, and the time limit of the dive from its first packet.
 #[derive(Debug, Clone, Resource)]
 pub(crate) struct Advisor {
@@ -43,8 +46,10 @@ fn swing(looks: &mut Looks, at: MonoNs, situation: &Situation) -> Swing {
     if let Some(pose) = situation.pose {
         looks.keep(at, pose.attitude * Vec3::new(1.0, 0.0, 0.0));
     }
-    let passes = Phasing::of(situation).at(situation.speed_mps);
-    looks.swing(at, passes.gap_s(passes.heads()).unwrap_or(0.0))
+    let phasing = Phasing::of(situation);
+    let passes = phasing.at(situation.speed_mps);
+    let apart_s = phasing.apart_m() / situation.speed_mps.abs().max(SLOWEST_MPS);
+    looks.swing(at, passes.gap_s(passes.heads()).unwrap_or(0.0), apart_s)
 }
 
 fn digest(stream: &mut ResultStream, at: MonoNs, advice: &Advice) {

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::MAX_MODES;
+use crate::margin::Margins;
 
 /// Maximum length of a mode name, bytes.
 const MODE_NAME_BYTES: usize = 15;
@@ -120,6 +121,15 @@ pub struct Alternative {
     pub v_max_mps: f64,
 }
 
+/// Starting the heads anew in the mode in which they are, in phase for a speed.
+///
+/// The vehicle file's line for it: `planned_speed_mps` in `[heads]`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Anew {
+    /// The speed to start them for, which is the largest that meets the target then, m/s.
+    pub planned_speed_mps: f64,
+}
+
 /// Remaining length and time of a dive.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Left {
@@ -145,8 +155,13 @@ impl Left {
 /// The advice.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Advice {
-    /// The largest speed at which the target is met, m/s; zero if there is none.
+    /// The largest speed at which sections will pass, m/s; zero if there is none.
     pub v_max_mps: f64,
+    /// Slower than this, heads apart along the hull run out of phase, and the target isn't met, m/s; zero where all slower
+    /// speeds meet it.
+    pub from_mps: f64,
+    /// The speed nearest to the present one that meets the target, m/s; `None` where the present one does, or none is near.
+    pub nearest_mps: Option<f64>,
     /// The limiting factor.
     pub reason: Reason,
     /// T_max predicted at the present speed, m; `None` where it can't be predicted or is unbounded.
@@ -172,12 +187,18 @@ pub struct Advice {
     pub remedy: Option<Remedy>,
     /// Alternatives in the modes that all heads have.
     pub alternatives: [Option<Alternative>; MAX_MODES],
+    /// What starting the heads anew would give; `None` where their phases don't depend on the speed.
+    pub anew: Option<Anew>,
+    /// What each margin costs, every five seconds.
+    pub margins: Option<Margins>,
 }
 
 impl Advice {
     pub(super) fn nothing(reason: Reason) -> Self {
         Self {
             v_max_mps: 0.0,
+            from_mps: 0.0,
+            nearest_mps: None,
             reason,
             predicted_t_m: None,
             will_exceed: false,
@@ -190,6 +211,8 @@ impl Advice {
             unseen_m: None,
             remedy: None,
             alternatives: [None; MAX_MODES],
+            anew: None,
+            margins: None,
         }
     }
 }

@@ -7,6 +7,11 @@ use headrace_snapshot::stateful;
 
 /// Less restrictive advice is shown once nothing more restrictive has come for this long.
 const HOLD: DurNs = DurNs(1_000_000_000);
+/// A higher speed is shown once it has been higher for this long, and by this share: 3 mm/s at 0.1 m/s.
+const RISES_AFTER: DurNs = DurNs(10_000_000_000);
+const RISES_BY: f64 = 0.03;
+/// A lower speed is shown at once where it is lower by this share; less is within the margin held back.
+const FALLS_BY: f64 = SPEED_MARGIN;
 /// Number of advice updates kept: those within `HOLD` at 5 Hz.
 const HELD: usize = 6;
 /// A turn is forecast to exceed the target when the predicted T is above it by this share: half of the speed margin, so
@@ -15,8 +20,9 @@ const BEYOND: f64 = SPEED_MARGIN / 2.0;
 
 /// Shows the most restrictive advice of the last second: the gravest reason and, within it, the lowest speed.
 ///
-/// More restrictive advice shows at once, less restrictive advice after it has held for a second. Until there has been
-/// a speed, or a reason against any, advice is shown unfiltered.
+/// A graver reason shows at once, a lesser one after it has held for a second. A speed lower by a hundredth shows at once, one
+/// higher by three hundredths after ten seconds, and then the least of these; smaller changes don't show. Until there has
+/// been a speed, or a reason against any, advice is shown unfiltered.
 #[derive(Debug, Clone)]
 pub struct Hysteresis {
     target_m: f64,
@@ -24,14 +30,26 @@ pub struct Hysteresis {
     next: usize,
     begun: bool,
     will_exceed: bool,
+    /// The speed shown, m/s, with the time of the advice last taken.
+    shown: Option<(MonoNs, f64)>,
+    /// Since when all speeds have been higher than that one, and the least of them, m/s.
+    rising: Option<(MonoNs, f64)>,
 }
 
-stateful!(Hysteresis { state: held, next, begun, will_exceed; fixed: target_m; });
+stateful!(Hysteresis { state: held, next, begun, will_exceed, shown, rising; fixed: target_m; });
 
 impl Hysteresis {
     /// For a target T, m.
     pub fn new(target_m: f64) -> Self {
-        Self { target_m, held: [None; HELD], next: 0, begun: false, will_exceed: false }
+        Self {
+            target_m,
+            held: [None; HELD],
+            next: 0,
+            begun: false,
+            will_exceed: false,
+            shown: None,
+            rising: None,
+        }
     }
 
     /// Takes the advice at a timestamp of data time and returns the advice to show.
@@ -54,16 +72,37 @@ impl Hysteresis {
         let will_exceed = held().any(|held| exceeds(held, limit_m));
         let worst =
             held().fold(&advice, |worst, held| if restricts_more(held, worst) { held } else { worst });
-        let shown = Advice {
-            v_max_mps: worst.v_max_mps,
-            reason: worst.reason,
-            unseen_m: worst.unseen_m,
-            remedy: worst.remedy,
-            will_exceed,
-            ..advice
-        };
+        let (unseen_m, remedy, reason, worst_mps) =
+            (worst.unseen_m, worst.remedy, worst.reason, worst.v_max_mps);
+        let v_max_mps = self.steadied_mps(at, worst_mps, reason == Reason::HelixPitch);
+        let shown = Advice { v_max_mps, reason, will_exceed, unseen_m, remedy, ..advice };
         self.will_exceed = will_exceed;
         shown
+    }
+
+    /// The speed to show, m/s, for the lowest of the last second.
+    fn steadied_mps(&mut self, at: MonoNs, speed_mps: f64, is_speed: bool) -> f64 {
+        let before = self.shown.filter(|(then, _)| at.since(*then).0.abs() <= HOLD.0);
+        let Some((_, before_mps)) = before.filter(|_| is_speed) else {
+            (self.shown, self.rising) = (is_speed.then_some((at, speed_mps)), None);
+            return speed_mps;
+        };
+        let falls = speed_mps < before_mps * (1.0 - FALLS_BY);
+        self.rising = (speed_mps > before_mps * (1.0 + RISES_BY)).then(|| match self.rising {
+            Some((since, least_mps)) => (since, least_mps.min(speed_mps)),
+            None => (at, speed_mps),
+        });
+        let risen = self.rising.filter(|(since, _)| at.since(*since).0 >= RISES_AFTER.0);
+        let shown_mps = match risen {
+            _ if falls => speed_mps,
+            Some((_, least_mps)) => least_mps,
+            None => before_mps,
+        };
+        if risen.is_some() {
+            self.rising = None;
+        }
+        self.shown = Some((at, shown_mps));
+        shown_mps
     }
 }
 
@@ -129,12 +168,25 @@ mod tests {
     }
 
     #[test]
-    fn a_lower_speed_shows_at_once_and_a_higher_one_after_a_second() {
-        let given = [vec![speed(0.2); 10], vec![speed(0.1)], vec![speed(0.2); 10]].concat();
+    fn a_lower_speed_shows_at_once_and_a_higher_one_after_ten_seconds() {
+        let given = [vec![speed(0.2); 10], vec![speed(0.1)], vec![speed(0.2); 70]].concat();
         let speeds: Vec<f64> = shown(given).iter().map(|advice| advice.v_max_mps).collect();
         assert!((speeds[9] - 0.2).abs() < 1e-12);
-        assert_eq!(speeds[10..16], [0.1; 6]);
-        assert_eq!(speeds[16..], [0.2; 5]);
+        // The lowest of a second, and ten seconds of what is higher.
+        assert_eq!(speeds[10..66], [0.1; 56]);
+        assert_eq!(speeds[66..], [0.2; 15]);
+    }
+
+    #[test]
+    fn small_changes_do_not_show() {
+        let wavering = (0..300).map(|k| speed(0.1 + if k % 7 < 3 { 0.0009 } else { 0.0027 }));
+        let speeds: Vec<f64> = shown(wavering).iter().map(|advice| advice.v_max_mps).collect();
+        assert!(speeds[1..].iter().all(|speed_mps| (speed_mps - 0.1009).abs() < 1e-12));
+        // What sinks slowly is followed, never more than a hundredth above it.
+        let sinking: Vec<_> = (0..300).map(|k| speed(0.1 - 1e-4 * f64::from(k))).collect();
+        let shown = shown(sinking.iter().copied());
+        let over = |(shown, given): (&Advice, &Advice)| shown.v_max_mps > given.v_max_mps * 1.0102;
+        assert!(!shown.iter().zip(&sinking).any(over));
     }
 
     #[test]

@@ -1,17 +1,13 @@
 //! Search for speeds that meet a target, which may form several intervals.
 
-/// Upper end, up to `bound_mps`, of the interval of speeds that meet the target and include `from_mps`.
-pub(super) fn upwards_mps(from_mps: f64, bound_mps: f64, meets: impl Fn(f64) -> bool) -> f64 {
-    const STEP: f64 = 1.02;
-    let mut good = from_mps;
-    while good < bound_mps {
-        let next = (good * STEP).min(bound_mps);
-        if !meets(next) {
-            return edge_mps(good, next, meets);
-        }
-        good = next;
+/// The largest speed up to `bound_mps` that meets the target where all slower ones do; zero if there is none.
+pub(super) fn highest_mps(bound_mps: f64, meets: impl Fn(f64) -> bool) -> f64 {
+    const LEAST_SHARE: f64 = 1e-3;
+    if meets(bound_mps) {
+        return bound_mps;
     }
-    good
+    let least_mps = LEAST_SHARE * bound_mps;
+    if meets(least_mps) { edge_mps(least_mps, bound_mps, meets) } else { 0.0 }
 }
 
 /// The largest speed up to `bound_mps` that meets the target, found by stepping down from the bound; zero if none is
@@ -63,10 +59,10 @@ mod tests {
     }
 
     #[test]
-    fn stretches_are_found_from_within_and_from_above() {
+    fn the_highest_stretch_is_found() {
         let islands = |mps: f64| (0.05..=0.1).contains(&mps) || (0.13..=0.15).contains(&mps);
-        assert!((upwards_mps(0.06, 0.3, islands) - 0.1).abs() < 1e-9);
-        assert!((upwards_mps(0.14, 0.3, islands) - 0.15).abs() < 1e-9);
+        assert!((highest_mps(0.3, |mps| mps < 0.1) - 0.1).abs() < 1e-9);
+        assert!((highest_mps(0.3, |_| true) - 0.3).abs() <= 0.0 && highest_mps(0.3, |_| false) <= 0.0);
         assert!((downwards_mps(0.3, islands) - 0.15).abs() < 1e-9);
         assert!(downwards_mps(0.3, |_| false).abs() <= 0.0);
     }

@@ -290,7 +290,8 @@ fn off_by(case: &Case, swing: Swing) -> (f64, usize) {
 #[test]
 fn what_an_advisor_remembers_hardly_changes_its_advice() {
     let around = || Case::new(&[10.0, 100.0, 190.0, 280.0], &[0.0; 4], 0.2, 0.5);
-    let (still, swing) = (Swing::default(), Swing { rate_radps: 0.01, most_rad: 1.0 });
+    let (still, swing) =
+        (Swing::default(), Swing { rate_radps: 0.01, most_rad: 1.0, apart_rate_radps: 0.01 });
     for (name, case, swing, wanted, casts) in [
         ("four heads", around(), still, 0.005, 0..200),
         ("hiding each other", hiding_each_other(), still, 0.002, 0..100),
@@ -309,7 +310,7 @@ fn the_swing_of_the_vehicle_slows_it_down_and_a_steady_heading_helps() {
     let case = Case::new(&[0.0, 180.0], &[0.0, 0.0], 0.2, 1.0);
     let advise = |swing: Swing| case.advisor().advise(&case.situation, swing, None);
     let still = advise(Swing::default());
-    let swing = Swing { rate_radps: 0.01, most_rad: 1.0 };
+    let swing = Swing { rate_radps: 0.01, most_rad: 1.0, apart_rate_radps: 0.01 };
     let swung = advise(swing);
     // The speed is reduced by the sweep of the beams at their range.
     let lost_mps = (still.v_max_mps - swung.v_max_mps) / (1.0 - SPEED_MARGIN);
@@ -317,9 +318,9 @@ fn the_swing_of_the_vehicle_slows_it_down_and_a_steady_heading_helps() {
     assert!(swung.predicted_t_m > still.predicted_t_m && swung.reason == Reason::HelixPitch);
     assert!(swung.alternatives[1].unwrap().v_max_mps < still.alternatives[1].unwrap().v_max_mps);
     // A swing of small extent costs no more than that, however fast.
-    let little = advise(Swing { rate_radps: 0.05, most_rad: 0.01 });
+    let little = advise(Swing { rate_radps: 0.05, most_rad: 0.01, apart_rate_radps: 0.05 });
     assert!(little.v_max_mps > swung.v_max_mps, "{little:?}");
-    let wild = advise(Swing { rate_radps: 0.2, most_rad: 1.0 });
+    let wild = advise(Swing { rate_radps: 0.2, most_rad: 1.0, apart_rate_radps: 0.2 });
     assert_eq!((wild.v_max_mps, wild.reason), (0.0, Reason::AngularStep));
     assert_eq!(wild.remedy, Some(Remedy::HoldHeading));
     assert!(wild.will_exceed && !still.will_exceed);
@@ -329,7 +330,7 @@ fn the_swing_of_the_vehicle_slows_it_down_and_a_steady_heading_helps() {
 fn a_swing_goes_on_while_heads_apart_follow_each_other() {
     let together = Case::new(&[0.0, 180.0], &[0.0, 0.0], 0.2, 1.5);
     let apart = Case::new(&[0.0, 0.0], &[0.8, 0.0], 0.2, 1.5);
-    let swing = Swing { rate_radps: 0.01, most_rad: 1.0 };
+    let swing = Swing { rate_radps: 0.01, most_rad: 1.0, apart_rate_radps: 0.01 };
     let t_m = |case: &Case| {
         let advice = case.advisor().advise(&case.situation, swing, None);
         assert!((advice.pass_gap_s - 4.0).abs() < 1e-9, "{advice:?}");

@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::Planner;
 use crate::error::{SamplingError, positive};
+use crate::margin::Margins;
 use crate::section;
 use crate::spacing::Spiral;
 
@@ -46,6 +47,8 @@ pub struct Answer {
     pub t_y2_m: f64,
     /// The largest speed that meets the target, m/s.
     pub v_max_mps: Option<f64>,
+    /// The largest speeds with the margins added one after the other; the last is `v_max_mps`.
+    pub margins: Option<Margins>,
     /// Hours at that speed for the whole length.
     pub needed_h: Option<f64>,
     /// Why no speed meets the target: `angular_step`, `unseen_strip` or `off_axis`.
@@ -56,7 +59,9 @@ pub struct Answer {
     pub speed_mps: Option<f64>,
     /// Spacing at that speed.
     pub spacing: Option<Spacing>,
-    /// Whether the target is met at the speed asked about.
+    /// Part of the target left to errors of position at that speed, m; zero where nothing is known of them.
+    pub position_margin_m: f64,
+    /// Whether the target is met at the speed asked about, errors of position included.
     pub meets_target: Option<bool>,
     /// Whether the time asked about suffices at `v_max_mps`.
     pub suffices: Option<bool>,
@@ -134,7 +139,9 @@ impl Planner {
         let speed_mps = asked.asked_mps.or(v_max_mps);
         let spacing = speed_mps.map(|speed_mps| self.spacing(mode, speed_mps)).transpose()?;
         let t_max_m = spacing.and_then(|spacing| spacing.t_max_m);
-        let meets = |target_m: f64| t_max_m.is_some_and(|t_m| t_m <= target_m);
+        let margin_m =
+            |target_m: f64| speed_mps.map_or(0.0, |speed_mps| self.margin_m(planned, target_m, speed_mps));
+        let meets = |target_m: f64| t_max_m.is_some_and(|t_m| t_m + margin_m(target_m) <= target_m);
         Ok(Answer {
             mode: planned.mode.name,
             step_deg: turn.step_rad().to_degrees(),
@@ -148,6 +155,10 @@ impl Planner {
             t_yp_m: section::t_yp_m(self.inspection().profile.perimeter_m(), turn.steps())?,
             t_y2_m: planned.t_y2_m,
             v_max_mps,
+            margins: v_max_mps
+                .zip(asked.target_m)
+                .map(|(_, target_m)| self.margins(mode, target_m))
+                .transpose()?,
             needed_h: v_max_mps.map(|v_mps| self.inspection().length_m / v_mps / 3600.0),
             reason: refused.map(|why| match why {
                 SamplingError::UnseenStrip { .. } => "unseen_strip",
@@ -157,6 +168,7 @@ impl Planner {
             refused: refused.map(|why| why.to_string()),
             speed_mps,
             spacing,
+            position_margin_m: asked.target_m.map_or(0.0, margin_m),
             meets_target: asked.asked_mps.and(asked.target_m).map(meets),
             suffices: asked
                 .needed_mps

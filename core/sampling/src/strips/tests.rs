@@ -5,8 +5,14 @@ use headrace_geometry::tunnel::{Profile, shapes};
 const SOUNDINGS: u32 = 3600;
 const STEP: usize = 24;
 const PING_S: f64 = 0.02;
-const GOING: Going =
-    Going { ping_period_s: PING_S, swing_mps: 0.0, shift_m: 0.0, apart_m: 0.0, swing_most_m: None };
+const GOING: Going = Going {
+    ping_period_s: PING_S,
+    swing_mps: 0.0,
+    shift_m: 0.0,
+    apart_m: 0.0,
+    apart_swing_mps: 0.0,
+    swing_most_m: None,
+};
 
 /// A pipe 30 m around; on its axis all steps are equally long.
 fn pipe() -> Profile {
@@ -139,11 +145,11 @@ fn steps_count_where_they_are() {
 #[test]
 fn what_swings_or_is_shifted_makes_passes_farther_apart() {
     let one = strips(&[all_around(&[])]);
-    let rough = Going { swing_mps: 0.01, shift_m: 0.05, apart_m: 0.2, ..GOING };
+    let rough = Going { swing_mps: 0.01, apart_swing_mps: 0.01, shift_m: 0.05, apart_m: 0.2, ..GOING };
     let v = one.bound_for_target(0, &turning(1), 0.5, &rough).unwrap().speed_mps;
     assert!((one.t_max_m(0, &turning(1), v, &rough) - 0.5).abs() < 1e-12);
     assert!(v < speed(&one, &turning(1), 0.5).unwrap() - 0.01);
-    let worse = Going { swing_mps: 0.1, ..rough };
+    let worse = Going { swing_mps: 0.1, apart_swing_mps: 0.1, ..rough };
     assert!(one.bound_for_target(0, &turning(1), 0.5, &worse).is_err());
     // A bounded swing leaves room for speed.
     let to_and_fro = Going { swing_most_m: Some(0.1), ..worse };

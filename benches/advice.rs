@@ -1,0 +1,170 @@
+//! The advice against the largest speeds that truly pass, found by simulated dives. Prints Markdown.
+//!
+//! `cargo bench -p headrace_benches --bench advice` runs all; `-- truth`, `-- sweep` or `-- planned` one of them:
+//! - truth: `--dives N` (100) steady and swaying dives from `--from-seed N`: advice over the largest speed that passes;
+//! - sweep: four heads started for 0.1 m/s, driven at speeds 1 mm/s apart; and started for each of these;
+//! - planned: each shipped vehicle in each mode at 0.95 of the plan's speed.
+//!
+//! D_true is from `headrace_tests::truth`, which has nothing of the program's coverage.
+
+#![expect(clippy::unwrap_used, clippy::panic, reason = "a benchmark stops at what it can't do")]
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use headrace_tests::field_table::VEHICLES;
+use headrace_tests::passable::{Compared, Outcome, Outing};
+
+fn main() {
+    let mut words = std::env::args().skip(1).filter(|word| word != "--bench");
+    let (mut only, mut dives, mut from_seed) = (None, 100, 0);
+    while let Some(word) = words.next() {
+        let mut number = || words.next().and_then(|word| word.parse::<u64>().ok());
+        match word.as_str() {
+            "--dives" => dives = number().unwrap(),
+            "--from-seed" => from_seed = number().unwrap(),
+            "truth" | "sweep" | "planned" => only = Some(word),
+            _ => panic!("{word}: known are truth, sweep, planned, --dives N and --from-seed N"),
+        }
+    }
+    let wants = |part: &str| only.as_deref().is_none_or(|only| only == part);
+    if wants("truth") {
+        truth(from_seed..from_seed + dives);
+    }
+    if wants("sweep") {
+        sweep();
+    }
+    if wants("planned") {
+        planned();
+    }
+}
+
+/// Results of all, in their order, on all cores.
+fn all<T: Sync, R: Send>(of: &[T], run: impl Fn(&T) -> R + Sync) -> Vec<R> {
+    let next = AtomicUsize::new(0);
+    let work = || {
+        let mut done = Vec::new();
+        loop {
+            let number = next.fetch_add(1, Ordering::Relaxed);
+            let Some(item) = of.get(number) else { return done };
+            done.push((number, run(item)));
+            eprint!("\r{} of {}", number + 1, of.len());
+        }
+    };
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let mut results: Vec<(usize, R)> = std::thread::scope(|scope| {
+        let threads: Vec<_> = (0..cores).map(|_| scope.spawn(work)).collect();
+        threads.into_iter().flat_map(|thread| thread.join().unwrap()).collect()
+    });
+    eprintln!();
+    results.sort_by_key(|(number, _)| *number);
+    results.into_iter().map(|(_, result)| result).collect()
+}
+
+fn truth(seeds: std::ops::Range<u64>) {
+    println!(
+        "| seed | vehicle | mode | target | sways | plan | advised | true | advised / true | changes a minute |"
+    );
+    println!("|{}", "---|".repeat(10));
+    let outings: Vec<Outing> = seeds.map(Outing::drawn).collect();
+    let compared = all(&outings, Outing::compare);
+    for (outing, compared) in outings.iter().zip(&compared) {
+        println!(
+            "| {} | {} | {} | {:.2} | {} | {:.3} | {:.4} | {:.4} | {:.3} | {:.1} |",
+            outing.seed,
+            outing.vehicle.name,
+            outing.mode,
+            outing.target_m,
+            if outing.effects.is_empty() { "-" } else { outing.effects.trim() },
+            compared.plan_mps,
+            compared.advised_mps,
+            compared.true_mps.unwrap_or(f64::NAN),
+            compared.ratio(),
+            compared.planned.changes_a_minute()
+        );
+    }
+    for (what, sways) in [("steady", false), ("swaying", true)] {
+        let of: Vec<&Compared> = outings
+            .iter()
+            .zip(&compared)
+            .filter(|(outing, _)| outing.effects.is_empty() != sways)
+            .map(|(_, compared)| compared)
+            .collect();
+        let count = |is: &dyn Fn(f64) -> bool| of.iter().filter(|compared| is(compared.ratio())).count();
+        println!(
+            "\n{what}: {} dives, {} between 0.9 and 1.0, {} above, {} below",
+            of.len(),
+            count(&|ratio| (0.899..1.001).contains(&ratio)),
+            count(&|ratio| ratio >= 1.001),
+            count(&|ratio| ratio < 0.899)
+        );
+    }
+}
+
+fn sweep() {
+    println!(
+        "\n| driven | advised, started for 0.1 | from | nearest | passing | advised, started for driven | anew | passing | changes |"
+    );
+    println!("|{}", "---|".repeat(9));
+    let outing = Outing::steady(VEHICLES[3], 1);
+    let speeds: Vec<f64> = (60..=125).map(|mm| f64::from(mm) * 1e-3).collect();
+    let both = all(&speeds, |speed_mps| [outing.dive(0.1, *speed_mps), outing.dive(*speed_mps, *speed_mps)]);
+    for (speed_mps, [fixed, own]) in speeds.iter().zip(&both) {
+        let anew =
+            |of: &Outcome| of.median(|beat| beat.advice.anew.map_or(0.0, |anew| anew.planned_speed_mps));
+        println!(
+            "| {speed_mps:.3} | {:.4} | {:.4} | {:.4} | {:.2} | {:.4} | {:.4} | {:.2} | {:.1} |",
+            advised(fixed),
+            fixed.median(|beat| beat.advice.from_mps),
+            fixed.median(|beat| beat.advice.nearest_mps.unwrap_or(0.0)),
+            fixed.passing,
+            advised(own),
+            anew(own),
+            own.passing,
+            own.changes_a_minute()
+        );
+    }
+    for (what, which) in [("started for 0.1", 0), ("started for the speed driven", 1)] {
+        let jump = |pair: &[[Outcome; 2]]| {
+            let [a, b] = [advised(&pair[0][which]), advised(&pair[1][which])];
+            (a - b).abs() / a.max(b).max(1e-9)
+        };
+        let largest = both.windows(2).map(jump).fold(0.0, f64::max);
+        println!("\n{what}: largest jump {:.1} %", 100.0 * largest);
+    }
+}
+
+fn advised(outcome: &Outcome) -> f64 {
+    outcome.median(|beat| beat.advice.v_max_mps)
+}
+
+fn planned() {
+    println!("\n| vehicle | mode | plan | driven | passing | can't say | falsely | D_true / T | advised |");
+    println!("|{}", "---|".repeat(9));
+    let mut outings = Vec::new();
+    for vehicle in VEHICLES {
+        for mode in ["slow", "medium", "fast", "faster", "fastest"] {
+            outings.push(Outing { mode, ..Outing::steady(vehicle, 1) });
+        }
+    }
+    let results = all(&outings, |outing| {
+        let plan_mps = outing.plan_mps();
+        let speed_mps = outing.planned_share * plan_mps;
+        (plan_mps, speed_mps, (plan_mps > 0.0).then(|| outing.dive(speed_mps, speed_mps)))
+    });
+    for (outing, (plan_mps, speed_mps, outcome)) in outings.iter().zip(&results) {
+        let Some(outcome) = outcome else {
+            println!("| {} | {} | none | | | | | | |", outing.vehicle.name, outing.mode);
+            continue;
+        };
+        println!(
+            "| {} | {} | {plan_mps:.3} | {speed_mps:.4} | {:.3} | {:.3} | {} | {:.3} | {:.4} |",
+            outing.vehicle.name,
+            outing.mode,
+            outcome.passing,
+            outcome.unsure,
+            outcome.falsely,
+            outcome.true_share,
+            advised(outcome)
+        );
+    }
+}

@@ -1,0 +1,114 @@
+//! Intervals of speed that meet a target: heads apart along the hull keep their phases in some speeds only.
+//!
+//! The speed to name depends on what is measured of the heads and of the vehicle's pose, and not on how fast it goes now: it is
+//! the upper end of the highest interval. An interval that shrinks to nothing while heads run out of phase ends the
+//! continuity, since the next one may be far below; there, and back again, [`EASE`] is between.
+
+use super::search;
+use crate::passes::Phasing;
+use crate::strips::{Going, Strips};
+use headrace_geometry::math;
+
+/// Share of the target by which an interval that is followed may miss it, and a higher one must meet it: as a speed,
+/// 2 mm/s at 0.1 m/s.
+pub(super) const EASE: f64 = 0.02;
+/// Speeds nearer to each other than this share are of one interval.
+const NEAR: f64 = 0.05;
+/// Speeds tried on either side, and the share between them.
+const TRIED: i32 = 30;
+const TRIED_SHARE: f64 = 0.001;
+
+/// What decides whether a speed meets a target.
+pub(super) struct Driving<'a> {
+    pub(super) strips: &'a Strips,
+    pub(super) phasing: &'a Phasing,
+    pub(super) going: &'a Going,
+    pub(super) parallax_rad: f64,
+    pub(super) astern: bool,
+    pub(super) target_m: f64,
+    /// No speed above it meets the target, however the heads are phased, m/s.
+    pub(super) bound_mps: f64,
+}
+
+impl Driving<'_> {
+    /// Whether a speed meets the target, more or less a share of it.
+    pub(super) fn meets(&self, speed_mps: f64, more: f64) -> bool {
+        let target_m = self.target_m * (1.0 + more);
+        let signed_mps = if self.astern { -speed_mps } else { speed_mps };
+        let then = self.phasing.at(signed_mps).beside(self.parallax_rad);
+        // No strip has more passes than all heads make: this test alone rules out most speeds.
+        let gap_s = then.gap_s(then.heads()).unwrap_or(f64::INFINITY);
+        speed_mps * gap_s <= target_m && self.strips.meets(0, &then, speed_mps, target_m, self.going)
+    }
+
+    fn t_m(&self, speed_mps: f64) -> f64 {
+        let signed_mps = if self.astern { -speed_mps } else { speed_mps };
+        let then = self.phasing.at(signed_mps).beside(self.parallax_rad);
+        self.strips.t_max_m(0, &then, speed_mps, self.going)
+    }
+
+    /// The largest speed, m/s; zero where there is none. `last_mps` is the one found before.
+    pub(super) fn fastest_mps(&self, last_mps: Option<f64>) -> f64 {
+        let highest = |more: f64| {
+            let meets = |speed_mps: f64| self.meets(speed_mps, more);
+            if self.phasing.apart_m() > 0.0 {
+                search::downwards_mps(self.bound_mps, meets)
+            } else {
+                search::highest_mps(self.bound_mps, meets)
+            }
+        };
+        let top_mps = highest(0.0);
+        let Some(last_mps) = last_mps.filter(|_| self.phasing.apart_m() > 0.0) else { return top_mps };
+        if top_mps < last_mps * (1.0 - NEAR) {
+            return self.kept_mps(last_mps).unwrap_or(top_mps);
+        }
+        if top_mps > last_mps * (1.0 + NEAR) && highest(-EASE) <= last_mps * (1.0 + NEAR) {
+            let within =
+                search::downwards_mps(last_mps * (1.0 + NEAR), |speed_mps| self.meets(speed_mps, 0.0));
+            return if within < last_mps * (1.0 - NEAR) { top_mps } else { within };
+        }
+        top_mps
+    }
+
+    /// The best speed near one that met the target, where it misses it by little.
+    fn kept_mps(&self, last_mps: f64) -> Option<f64> {
+        let near = (-TRIED..=TRIED).map(|k| last_mps * (1.0 + TRIED_SHARE * f64::from(k)));
+        let best =
+            near.map(|speed_mps| (speed_mps, self.t_m(speed_mps))).min_by(|a, b| a.1.total_cmp(&b.1))?;
+        (best.1 <= self.target_m * (1.0 + EASE)).then_some(best.0)
+    }
+
+    /// The lower end of the interval up to a speed that meets the target, m/s; zero where all slower speeds do.
+    pub(super) fn lower_end_mps(&self, speed_mps: f64) -> f64 {
+        const STEP: f64 = 0.99;
+        /// Slower than this share of it, nobody wants to go.
+        const SLOWEST: f64 = 0.2;
+        if self.phasing.apart_m() <= 0.0 {
+            return 0.0;
+        }
+        let mut good = speed_mps;
+        while good > SLOWEST * speed_mps {
+            let next = good * STEP;
+            if !self.meets(next, 0.0) {
+                return good;
+            }
+            good = next;
+        }
+        0.0
+    }
+
+    /// The speed nearest to `speed_mps` that meets the target, m/s, within a factor of two; `None` where it does itself, or none
+    /// does.
+    pub(super) fn nearest_mps(&self, speed_mps: f64) -> Option<f64> {
+        const STEPS: i32 = 70;
+        const STEP: f64 = 0.01;
+        if self.meets(speed_mps, 0.0) {
+            return None;
+        }
+        (1..=STEPS).find_map(|k| {
+            let by = math::exp(STEP * f64::from(k));
+            let both = [speed_mps / by, speed_mps * by];
+            both.into_iter().find(|tried_mps| *tried_mps <= self.bound_mps && self.meets(*tried_mps, 0.0))
+        })
+    }
+}

@@ -1,0 +1,207 @@
+//! What position errors take from a target, and what each margin costs in speed.
+//!
+//! Plan, live advice and report use the same functions, so that a speed that is planned is the speed that is advised.
+//! Source: metrics.md, "v_max is one figure".
+
+use headrace_geometry::math;
+use serde::{Deserialize, Serialize};
+
+/// Standard deviation that needs no margin, m: about what a navigation without error estimates reports.
+const NOTHING_M: f64 = 0.002;
+/// The least share of the distance between passes that a margin leaves: no speed makes up for a lost position.
+const LEFT_SHARE: f64 = 0.6;
+/// The largest share of the target that a margin takes.
+const MOST_SHARE: f64 = 0.2;
+/// Share of the time between heads apart along the hull that counts towards the time between passes: only some
+/// neighbouring passes are by heads apart, and holidays between these grow by less than the heads' separation. With this
+/// share, D is within two of its standard deviations 93 % of the time over the dives of
+/// `tests/tests/navigation/fusion.rs` with four heads; over dives like them, 80 % with none of it and 99 % with all.
+pub const APART_SHARE: f64 = 0.4;
+/// Speed below which a vehicle counts as standing still, m/s.
+const SLOW_MPS: f64 = 0.01;
+/// The longest time between heads apart along the hull, seconds.
+const LONGEST_APART_S: f64 = 20.0;
+
+/// Time over which position errors accumulate between neighbouring passes of a place, seconds: that between two passes
+/// of evenly spread heads, plus a share of the time until the rearmost head is where the foremost was.
+///
+/// `passes_per_s` is the sum of the heads' turns a second, above zero; `apart_m` the length of hull between them.
+pub fn error_time_s(passes_per_s: f64, apart_m: f64, speed_mps: f64, apart_share: f64) -> f64 {
+    let apart_s = (apart_m / speed_mps.abs().max(SLOW_MPS)).min(LONGEST_APART_S);
+    1.0 / passes_per_s + apart_share * apart_s
+}
+
+/// Part of a target that is left to errors of position, m: as many standard deviations of a hole's size as a verdict of
+/// pass keeps (`confidence_sd`), where `pass_error_m` is the standard deviation and `t_y_m` the largest distance between
+/// neighbours of one turn. Continuous in all of them.
+///
+/// At most a fifth of the target, and what leaves three fifths of the distance between passes: beyond that, going slower
+/// costs more than it gains.
+pub fn position_margin_m(target_m: f64, confidence_sd: f64, pass_error_m: f64, t_y_m: f64) -> f64 {
+    let along_m2 = (target_m * target_m - t_y_m * t_y_m).max(0.0);
+    let least_m = math::sqrt(LEFT_SHARE * LEFT_SHARE * along_m2 + t_y_m * t_y_m);
+    let most_m = (target_m - least_m).clamp(0.0, MOST_SHARE * target_m);
+    (confidence_sd * (pass_error_m - NOTHING_M).max(0.0)).min(most_m)
+}
+
+/// Errors of position between two passes as expected before a dive.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ExpectedErrors {
+    /// Standard deviations of a hole that a verdict of pass keeps below the target.
+    pub confidence_sd: f64,
+    /// Time between two passes, seconds, growing, and the standard deviation of a hole's size after it, m.
+    pub by_time: Vec<[f64; 2]>,
+}
+
+impl ExpectedErrors {
+    /// The standard deviation after a time between passes, m: interpolated, and beyond the last in proportion to time.
+    pub fn pass_error_m(&self, time_s: f64) -> f64 {
+        let mut before = [0.0, 0.0];
+        for &after in &self.by_time {
+            if after[0] >= time_s {
+                let share = (time_s - before[0]) / (after[0] - before[0]).max(f64::MIN_POSITIVE);
+                return before[1] + share * (after[1] - before[1]);
+            }
+            before = after;
+        }
+        if before[0] > 0.0 { before[1] * time_s / before[0] } else { 0.0 }
+    }
+}
+
+/// A reason for going slower than the plain geometry allows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Margin {
+    /// None: the distance between turns.
+    Geometry,
+    /// Wall that the vehicle hides from some of its heads, or that is out of their reach.
+    Hidden,
+    /// Heads that aren't evenly phased, or side by side.
+    Phase,
+    /// Beams that swing along the wall.
+    Swing,
+    /// Position that is uncertain.
+    Position,
+}
+
+impl Margin {
+    /// All of them, in the order in which they are added.
+    pub const ALL: [Self; 5] = [Self::Geometry, Self::Hidden, Self::Phase, Self::Swing, Self::Position];
+
+    /// Name used in reports and logs.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Geometry => "geometry",
+            Self::Hidden => "hidden",
+            Self::Phase => "phase",
+            Self::Swing => "swing",
+            Self::Position => "position",
+        }
+    }
+}
+
+/// The largest speeds with the margins added one after the other, m/s; none is above the one before.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Margins {
+    /// Heads evenly phased and side by side nowhere, nothing hidden, no swing, a position that is known.
+    pub geometry_mps: f64,
+    /// With what the vehicle hides.
+    pub hidden_mps: f64,
+    /// With the heads' phases and places.
+    pub phase_mps: f64,
+    /// With the beams' swing.
+    pub swing_mps: f64,
+    /// With errors of position: the largest speed.
+    pub position_mps: f64,
+    /// Standard deviation of a hole's size between two passes that the last is for, m.
+    pub pass_error_m: f64,
+}
+
+impl Margins {
+    /// From speeds in the order of [`Margin::ALL`], m/s: each counts at most as the one before.
+    pub fn of(speeds_mps: [f64; 5], pass_error_m: f64) -> Self {
+        // From the last: a margin that seems to cost less than nothing costs nothing.
+        let mut most = 0.0_f64;
+        let mut speeds = speeds_mps;
+        for speed in speeds.iter_mut().rev() {
+            most = most.max(*speed);
+            *speed = most;
+        }
+        let [geometry_mps, hidden_mps, phase_mps, swing_mps, position_mps] = speeds;
+        Self { geometry_mps, hidden_mps, phase_mps, swing_mps, position_mps, pass_error_m }
+    }
+
+    /// The speeds in the order of [`Margin::ALL`], m/s.
+    pub fn speeds_mps(&self) -> [f64; 5] {
+        [self.geometry_mps, self.hidden_mps, self.phase_mps, self.swing_mps, self.position_mps]
+    }
+
+    /// What each margin takes from the one before, m/s, in the order of [`Margin::ALL`] from the second on.
+    pub fn prices_mps(&self) -> [(Margin, f64); 4] {
+        let [geometry, hidden, phase, swing, position] = self.speeds_mps();
+        [
+            (Margin::Hidden, geometry - hidden),
+            (Margin::Phase, hidden - phase),
+            (Margin::Swing, phase - swing),
+            (Margin::Position, swing - position),
+        ]
+    }
+
+    /// The margin that costs most; [`Margin::Geometry`] where none takes a twentieth of the speed.
+    pub fn costliest(&self) -> Margin {
+        const NOTABLE: f64 = 0.05;
+        let costly = self.prices_mps().into_iter().max_by(|a, b| a.1.total_cmp(&b.1));
+        costly
+            .filter(|(_, price_mps)| *price_mps > NOTABLE * self.geometry_mps)
+            .map_or(Margin::Geometry, |(margin, _)| margin)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_margin_is_so_many_sigmas_and_leaves_something_to_drive_with() {
+        let margin_m = |pass_error_m: f64, t_y_m: f64| position_margin_m(0.5, 2.0, pass_error_m, t_y_m);
+        assert!((margin_m(0.017, 0.1) - 0.03).abs() < 1e-12);
+        assert!(margin_m(0.002, 0.1).abs() <= 0.0 && margin_m(0.0, 0.1).abs() <= 0.0);
+        assert!((margin_m(1.0, 0.1) - 0.1).abs() < 1e-12, "a fifth of the target");
+        // Steps that nearly reach the target: three fifths of what is left along the tunnel stay.
+        let sure_m = 0.5 - margin_m(1.0, 0.48);
+        assert!((math::sqrt(sure_m * sure_m - 0.48 * 0.48) / 0.14 - 0.6).abs() < 1e-9);
+        assert!(margin_m(0.1, 0.5).abs() <= 0.0 && margin_m(0.1, 0.6).abs() <= 0.0);
+    }
+
+    #[test]
+    fn it_has_no_steps() {
+        let mut before = position_margin_m(0.5, 2.0, 0.0, 0.3);
+        for k in 1..=2000 {
+            let now = position_margin_m(0.5, 2.0, 1e-4 * f64::from(k), 0.3);
+            assert!((0.0..=2.1e-4).contains(&(now - before)), "{k}");
+            before = now;
+        }
+    }
+
+    #[test]
+    fn errors_grow_with_the_time_between_passes() {
+        let errors = ExpectedErrors { confidence_sd: 2.0, by_time: vec![[2.0, 0.006], [4.0, 0.01]] };
+        let all = [1.0, 2.0, 3.0, 4.0, 8.0].map(|time_s| errors.pass_error_m(time_s));
+        assert!(all.iter().zip([0.003, 0.006, 0.008, 0.01, 0.02]).all(|(a, b)| (a - b).abs() < 1e-12));
+        let unknown = ExpectedErrors { by_time: Vec::new(), ..errors };
+        assert!(unknown.pass_error_m(3.0).abs() <= 0.0);
+        assert!((error_time_s(0.5, 1.0, 0.1, 0.4) - 6.0).abs() < 1e-12);
+        assert!((error_time_s(0.5, 1.0, 0.0, 0.4) - 10.0).abs() < 1e-12, "at rest");
+    }
+
+    #[test]
+    fn prices_add_up_and_the_costliest_is_named() {
+        let margins = Margins::of([0.23, 0.118, 0.117, 0.118, 0.108], 0.02);
+        // Swing can't give back what phase took.
+        let expected = [0.23, 0.118, 0.118, 0.118, 0.108];
+        assert!(margins.speeds_mps().iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12));
+        let sum: f64 = margins.prices_mps().iter().map(|(_, price)| price).sum();
+        assert!((sum - (0.23 - 0.108)).abs() < 1e-12);
+        assert_eq!(margins.costliest(), Margin::Hidden);
+        assert_eq!(Margins::of([0.1; 5], 0.0).costliest(), Margin::Geometry);
+    }
+}

@@ -1,0 +1,93 @@
+//! Errors of position to expect in a calm dive, by a run of the filter itself.
+//!
+//! A vehicle goes straight through its tunnel, its devices ideal but for their wire formats. The filter's covariance doesn't
+//! depend on what they read, so that its errors between two passes are those that it says in any calm dive: of simulated
+//! dives by data sheet within a tenth (`tests/tests/sampling/calm.rs`).
+
+use headrace_config::Document;
+use headrace_coverage::PassError;
+use headrace_fusion::filter::FilterNavigation;
+use headrace_fusion::filter::settings::Settings;
+use headrace_fusion::{Navigation, Times};
+use headrace_geometry::frames::{Body, Rot, Tunnel};
+use headrace_geometry::time::DurNs;
+use headrace_sampling::margin::ExpectedErrors;
+use headrace_sensor::device::{DeviceKind, Direction, SensorInfo};
+use headrace_sensor::reading::Packet;
+use headrace_vehicle::{NavigationConfig, VehicleConfig};
+
+use crate::error::SceneError;
+use crate::files::FileLoader;
+use crate::scene::Scene;
+use crate::simulation::Simulation;
+
+/// Duration of the dive, s: by then the filter knows the biases of an inertial unit as well as it ever will but for some
+/// per cent.
+const CALM_S: f64 = 180.0;
+/// Its speed, m/s, and the largest share of the tunnel that it goes through.
+const CALM_MPS: f64 = 0.1;
+const MOST_SHARE: f64 = 0.5;
+/// Times between two passes that are looked at, s.
+const TIMES_S: u32 = 110;
+
+/// The errors to expect of a vehicle, whose file `load` gives by its `name`; `None` where navigation tells none.
+///
+/// Errors: a vehicle that can't be simulated.
+pub fn expected_errors(
+    vehicle: &VehicleConfig,
+    name: &str,
+    kinds: &[&dyn DeviceKind],
+    load: FileLoader<'_>,
+) -> Result<Option<ExpectedErrors>, SceneError> {
+    let NavigationConfig::Filter(settings) = vehicle.navigation else { return Ok(None) };
+    let length_m = vehicle.tunnel.length_m;
+    let distance_m = (CALM_MPS * CALM_S).min(MOST_SHARE * length_m);
+    let text = format!(
+        "vehicle = {name:?}\n[trajectory]\nstart_m = {}\n[[trajectory.legs]]\ndistance_m = {distance_m}\nspeed_mps = {}\n",
+        (length_m - distance_m) / 2.0,
+        distance_m / CALM_S
+    );
+    let scene = Scene::parse(Document::new("a calm dive", &text), kinds, load, None)?;
+    let navigation = navigated(&scene, Settings { learns: false, ..settings })?;
+    Ok(Some(ExpectedErrors {
+        confidence_sd: vehicle.coverage.confidence_sd,
+        by_time: by_time(&navigation, vehicle),
+    }))
+}
+
+/// The filter at the end of a scene.
+fn navigated(scene: &Scene, settings: Settings) -> Result<FilterNavigation, SceneError> {
+    let vehicle = &scene.vehicle;
+    let mut navigation = FilterNavigation::new(vehicle.tunnel.profile.clone(), vehicle.site, settings);
+    let sensors = vehicle.sensors.iter().map(|sensor| sensor.specification());
+    let mut sensors: Vec<_> = sensors
+        .map(|spec| (SensorInfo { mount: spec.sensor.mount, kind: spec.kind }, spec.decoder))
+        .collect();
+    let mut simulation = Simulation::new(scene)?;
+    while let Some(message) = simulation.next_message() {
+        let source = usize::from(message.source);
+        let Some((info, decoder)) = sensors.get_mut(source) else { continue };
+        if message.direction == Direction::Received {
+            let received = message.at;
+            decoder.decode(Packet { received, bytes: message.bytes }, &mut |decoded| {
+                let times = Times { received, valid: decoded.valid_at };
+                navigation.update(source, info, times, &decoded.reading);
+            });
+        }
+    }
+    Ok(navigation)
+}
+
+/// The largest standard deviation of a hole's size round the wall, by the time between two passes.
+fn by_time(navigation: &FilterNavigation, vehicle: &VehicleConfig) -> Vec<[f64; 2]> {
+    let Some(running) = navigation.running() else { return Vec::new() };
+    let profile = &vehicle.tunnel.profile;
+    let arm = Rot::<Tunnel, Body>::identity() * -navigation.unit_at();
+    let error = |time_s: u32| {
+        let time_s = f64::from(time_s);
+        let relative = running.clones.relative(DurNs::from_secs_f64(time_s))?.moved(arm);
+        let error = PassError { relative, from_m: profile.reference() };
+        Some([time_s, error.worst_m(profile)])
+    };
+    (1..=TIMES_S).map_while(error).collect()
+}
