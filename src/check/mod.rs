@@ -3,7 +3,7 @@
 mod outlook;
 
 use headrace_config::{ConfigErrors, Document};
-use headrace_simulator::{Scene, SceneError, Simulation};
+use headrace_simulator::{Scene, SceneError, Simulation, calm};
 use headrace_vehicle::{Finding, Grade, VehicleConfig};
 use serde_json::{Value, json};
 
@@ -113,7 +113,11 @@ fn all(errors: &ConfigErrors) -> Vec<Found> {
 impl Readable {
     /// With the findings of a vehicle whose file has this name and text.
     fn new(vehicle: VehicleConfig, (name, text): (&str, &str), found: &mut Vec<Found>) -> Self {
-        let outlook = match Outlook::of(&vehicle) {
+        let own = |_: &str| Ok(text.as_bytes().to_vec());
+        let errors = calm::expected_errors(&vehicle, "vehicle.toml", &KINDS, &own);
+        let outlook = errors.map_err(|why| why.to_string());
+        let outlook = outlook.and_then(|errors| Outlook::of(&vehicle, errors).map_err(|why| why.to_string()));
+        let outlook = match outlook {
             Ok(outlook) => outlook,
             Err(why) => {
                 let key = "heads".to_owned();

@@ -2,6 +2,7 @@
 
 use headrace_sampling::SamplingError;
 use headrace_sampling::head::HeadMode;
+use headrace_sampling::margin::ExpectedErrors;
 use headrace_sampling::plan::{Answer, Inspection, Planner, Question, ThinStrip};
 use headrace_vehicle::{Finding, Grade, VehicleConfig};
 use serde_json::{Value, json};
@@ -24,10 +25,13 @@ pub(super) struct Outlook {
 const SAME: f64 = 1e-6;
 
 impl Outlook {
-    /// For the vehicle's heads; `None` if it has none.
+    /// For the vehicle's heads and the errors between passes that its sensors leave; `None` if it has no heads.
     ///
     /// Errors: what the heads can't be planned for.
-    pub(super) fn of(vehicle: &VehicleConfig) -> Result<Option<Self>, SamplingError> {
+    pub(super) fn of(
+        vehicle: &VehicleConfig,
+        errors: Option<ExpectedErrors>,
+    ) -> Result<Option<Self>, SamplingError> {
         let sensors = vehicle.sensors.iter().zip(&vehicle.sensor_configs);
         let (mut heads, mut ids) = (Vec::new(), Vec::new());
         for (sensor, config) in sensors {
@@ -51,7 +55,8 @@ impl Outlook {
             yaw_rad: 0.0,
             yaw_rate_radps: 0.0,
             sound_speed_mps: vehicle.site.sound_speed_mps,
-        })?;
+        })?
+        .with_errors(errors);
         let question = Question { target_m: Some(vehicle.target_m), speed_mps: None, time_s: None };
         let answers = planner.answers(&question, None)?;
         let mode = planner.modes().iter().position(|planned| Some(planned.mode.name) == own);
@@ -77,9 +82,8 @@ impl Outlook {
         let planned_mps = vehicle.planned_speed_mps;
         let v_max_mps = self.own.as_ref().and_then(|own| own.v_max_mps);
         if let Some(v_max_mps) = v_max_mps.filter(|v_max_mps| planned_mps > *v_max_mps) {
-            let problem = format!(
-                "is {planned_mps}, faster than the target allows: at most {v_max_mps:.3} m/s by geometry"
-            );
+            let problem =
+                format!("is {planned_mps}, faster than the target allows: at most {v_max_mps:.3} m/s");
             found.push(warning("heads.planned_speed_mps", problem));
         }
         found

@@ -124,7 +124,7 @@ fn what_the_emulated_sensor_says_decodes_to_the_true_pressure() {
 #[test]
 fn wrong_keys_are_named() {
     let error = configured("p_mode = \"pax\"\n").err().unwrap();
-    assert_eq!(error, "v.toml:1: p_mode = \"pax\": must be one of pr, pa, paa");
+    assert_eq!(error, "v.toml:1: p_mode = \"pax\": must be one of pr, pa, paa; did you mean \"pa\"?");
     let error = configured("p_min_bar = 50\np_max_bar = 10\n").err().unwrap();
     assert!(error.starts_with("v.toml:2: p_max_bar = 10: ") && error.contains("50 to 10 bar"), "{error}");
     assert!(configured("rate = 20\n").err().unwrap().contains("is not a key here"));

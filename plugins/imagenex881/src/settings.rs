@@ -383,7 +383,7 @@ pub(crate) mod tests {
         assert_eq!(error("range_m = 10"), "v.toml:1: mode: is missing");
         assert_eq!(
             error("mode = \"FAST\""),
-            "v.toml:1: mode = \"FAST\": must be one of slow, medium, fast, faster, fastest"
+            "v.toml:1: mode = \"FAST\": must be one of slow, medium, fast, faster, fastest; did you mean \"fast\"?"
         );
         assert!(
             error("mode = \"fast\"\nrange_m = 7")

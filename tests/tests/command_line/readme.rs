@@ -13,9 +13,9 @@ const RENEW: &str = "HEADRACE_RENEW_README";
 /// the way. Nothing within is left out.
 fn excerpt(stdout: &str) -> String {
     let lines: Vec<&str> = stdout.lines().collect();
-    let first = lines.iter().position(|line| line.starts_with("FLAG")).unwrap() - 1;
-    let last = lines.iter().rposition(|line| line.starts_with("   ...   ")).unwrap() + 1;
-    let summary = lines.iter().position(|line| line.starts_with("ch ") && line.contains(" to ")).unwrap();
+    let first = lines.iter().position(|line| line.contains("MISSED: ")).unwrap() - 1;
+    let last = lines.iter().rposition(|line| line.contains("missed until ")).unwrap() + 1;
+    let summary = lines.iter().position(|line| line.contains(" samples, target ")).unwrap();
     let end = lines.iter().position(|line| line.starts_with("  largest hole")).unwrap();
     assert!(first < last && last < summary && summary < end, "{stdout}");
     let shown = |lines: &[&str]| -> String { format!("    {}\n", lines.join("\n    ")) };

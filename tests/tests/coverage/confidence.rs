@@ -6,7 +6,7 @@ use headrace_tests::instrumented;
 /// Ever faster, so that holes grow from well below the target to beyond it.
 fn scene() -> String {
     let leg = |k: u32| {
-        let speed_mps = 0.12 + 0.012 * f64::from(k);
+        let speed_mps = 0.11 + 0.004 * f64::from(k);
         format!("[[trajectory.legs]]\ndistance_m = 1.5\nspeed_mps = {speed_mps:.3}\n")
     };
     let legs: String = (0..11).map(leg).collect();

@@ -296,5 +296,9 @@ fn what_is_no_such_file_is_named_with_what_it_looks_like() {
     refused(&folder, &["bag.tlog", "-o", "out.mcap"], &["--source ID=mavlink"]);
     let unknown = ["bag.tlog", "--vehicle", "vehicle.toml", "--source", "imu=mavlink", "-o", "out.mcap"];
     refused(&folder, &unknown, &["allowed are attitude, depth, sonar_0"]);
-    refused(&folder, &["text.log", "--source", "imu=can0", "-o", "text.log"], &["would be overwritten"]);
+    refused(
+        &folder,
+        &["text.log", "--source", "imu=can0", "-o", "text.log"],
+        &["writing text.log", "is read by this command"],
+    );
 }
