@@ -221,10 +221,15 @@ fn replay_says_what_smoothing_changed() {
     let answer =
         folder.headrace(&["replay", "dive.mcap", "--smooth", "--target", "0.7", "--report", "r.json"]);
     assert_eq!(answer.code, Some(0), "{}", answer.stderr);
-    let about = |line: &&str| ["  smoothed", "  changed"].iter().any(|start| line.starts_with(start));
+    let about = |line: &&str| ["  smoothed", "  changed:"].iter().any(|words| line.contains(words));
     let said: Vec<&str> = answer.stdout.lines().filter(about).collect();
     insta::assert_snapshot!(said.join("\n"), @r"
-        smoothed 594 estimates; by the filter alone: passed 4.25 m   missed 2.50 m   can't say 4.25 m   open 1.50 m
+      smoothed 594 estimates; by the filter alone: passed 4.25 m   missed 2.50 m   can't say 4.25 m   open 1.50 m
+      0+002.75 to 0+003.00  changed: not passed to open, holes - to 1.778±0.013 m
+      0+003.50 to 0+003.75  changed: can't say to pass, holes 0.556±0.177 to 0.521±0.015 m
+      0+007.75 to 0+011.00  changed: can't say to pass, holes 0.596±0.233 to 0.475±0.026 m
+      0+011.75 to 0+012.00  changed: fail to can't say, holes 1.151±0.058 to 1.058±0.312 m
+      0+014.00 to 0+014.25  changed: fail to can't say, holes 0.916±0.014 to 0.713±0.013 m
     ");
     let report: serde_json::Value = serde_json::from_slice(&folder.read("r.json")).unwrap();
     let smoothing = &report["smoothing"];
