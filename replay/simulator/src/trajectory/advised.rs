@@ -45,7 +45,7 @@ pub(super) struct Heeding {
     pub(super) speed_mps: f64,
     /// Delay between what is told and what is done, s, at least 3.
     pub(super) lag_s: f64,
-    /// Largest error of the speed held, a share.
+    /// How far the speed held falls short of what is told, a share at most.
     pub(super) within: f64,
     /// Whether missed stretches are passed again.
     pub(super) goes_back: bool,
@@ -198,7 +198,8 @@ impl Advised {
         let pilot = &self.pilot;
         let anew = self.x_m > self.farthest_m - 0.5;
         let hurry = pilot.hurries.iter().find(|hurry| (hurry.from_m..hurry.to_m).contains(&self.x_m));
-        let [hold, ..] = self.hold.at(at_s);
+        let [swing, ..] = self.hold.at(at_s);
+        let hold = (swing - pilot.within) / 2.0;
         if let Some(hurry) = hurry.filter(|_| anew) {
             return hurry.speed_mps * (1.0 + hold);
         }
