@@ -1,0 +1,54 @@
+//! Causes told against true ones, over random dives with one or two injected causes: `cargo bench -p headrace_benches
+//! --bench causes [-- FROM TO [wrong]]`, by numbers of dives, 0 to 500 unless given; `wrong` lists the stretches told wrongly.
+
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a bench stops at what it can't do")]
+
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::Mutex;
+
+use headrace_tests::interventions::{Matrix, intervene, kinds};
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().skip(1).filter(|word| word != "--bench").collect();
+    let number = |k: usize| arguments.get(k).and_then(|word| word.parse::<u64>().ok());
+    let (from, to) = (number(0).unwrap_or(0), number(1).unwrap_or(500));
+    let wrong = arguments.iter().any(|word| word == "wrong");
+    let (next, dives) = (AtomicU64::new(from), Mutex::new(Vec::new()));
+    std::thread::scope(|scope| {
+        for _ in 0..2 {
+            scope.spawn(|| {
+                loop {
+                    let seed = next.fetch_add(1, Ordering::SeqCst);
+                    if seed >= to {
+                        return;
+                    }
+                    let dive = intervene(seed, &kinds(seed));
+                    dives.lock().unwrap().push((seed, dive));
+                }
+            });
+        }
+    });
+    let mut dives = dives.into_inner().unwrap();
+    dives.sort_by_key(|(seed, _)| *seed);
+    let mut matrix = Matrix::default();
+    for (seed, dive) in &dives {
+        matrix.add(dive);
+        for stretch in dive.stretches() {
+            let is_right = stretch.right.iter().any(|set| set == stretch.told());
+            if wrong && (!is_right || stretch.runs() > 1) {
+                let [first, last] = [stretch.sections.first().unwrap(), stretch.sections.last().unwrap()];
+                println!(
+                    "dive {seed}: {:.2} to {:.2}, T {:.3}, right {:?}, told {:?}, {} runs; {:?}",
+                    first.ends_m[0],
+                    last.ends_m[1],
+                    dive.drawn.target_m,
+                    stretch.right,
+                    stretch.told(),
+                    stretch.runs(),
+                    dive.drawn.injected
+                );
+            }
+        }
+    }
+    print!("{}", matrix.text());
+}
