@@ -1,5 +1,6 @@
 //! Causes told against true ones, over random dives with one or two injected causes: `cargo bench -p headrace_benches
-//! --bench causes [-- FROM TO [wrong]]`, by numbers of dives, 0 to 500 unless given; `wrong` lists the stretches told wrongly.
+//! --bench causes [-- FROM TO [wrong]]`, by numbers of dives, 0 to 500 unless given; `wrong` lists the stretches told
+//! wrongly, `sections` all sections.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a bench stops at what it can't do")]
 
@@ -13,6 +14,7 @@ fn main() {
     let number = |k: usize| arguments.get(k).and_then(|word| word.parse::<u64>().ok());
     let (from, to) = (number(0).unwrap_or(0), number(1).unwrap_or(500));
     let wrong = arguments.iter().any(|word| word == "wrong");
+    let sections = arguments.iter().any(|word| word == "sections");
     let (next, dives) = (AtomicU64::new(from), Mutex::new(Vec::new()));
     std::thread::scope(|scope| {
         for _ in 0..2 {
@@ -33,6 +35,25 @@ fn main() {
     let mut matrix = Matrix::default();
     for (seed, dive) in &dives {
         matrix.add(dive);
+        for section in dive.sections.iter().filter(|_| sections) {
+            let e = &section.evidence;
+            println!(
+                "{seed} {:.2} D {:.3} {:?} told {:?} run {:?}: v {:.3} gaps {:.2} {:.2} {:.2} steps {:.3} {:.3} swing {:.3} lost {}",
+                section.ends_m[0],
+                section.hole_m,
+                section.right,
+                section.told,
+                section.run,
+                e.speed_mps,
+                e.pass_gap_s,
+                e.even_pass_gap_s,
+                e.all_pass_gap_s,
+                e.t_y_m,
+                e.middle_t_y_m,
+                e.swing_m,
+                e.lost_in_hole,
+            );
+        }
         for stretch in dive.stretches() {
             let is_right = stretch.right.iter().any(|set| set == stretch.told());
             if wrong && (!is_right || stretch.runs() > 1) {

@@ -56,7 +56,7 @@ impl Action {
             Cause::HeadStalled => Self::Head,
             Cause::HeadSilent => Self::HeadBack,
             Cause::PositionLost => Self::Position,
-            Cause::MissingReturns | Cause::NotPassed => Self::Again,
+            Cause::MissingReturns | Cause::NotPassed | Cause::Unknown => Self::Again,
         }
     }
 

@@ -180,13 +180,18 @@ impl Section {
         };
     }
 
+    /// Whether nothing sure relates its samples to each other: they are of several stretches of navigation.
+    pub(super) fn is_torn(&self) -> bool {
+        self.ties == Ties::Several
+    }
+
     /// Whether a small hole is no evidence of coverage: the profile is wrong, there is no wall, or what was taken for wall
     /// may be none.
     pub(super) fn is_doubtful(&self) -> bool {
         self.contradicts()
             || self.masked_share > ALL_MASKED
             || self.suspect
-            || self.ties == Ties::Several
+            || self.is_torn()
             || self.doubtful > self.samples
             || self.is_of_another_size()
     }

@@ -17,7 +17,7 @@ use super::resources::{Coverage, Digests, Finder, Tally, Target, TickTime, Tunne
 use super::run::Loop;
 use super::stages::{Advisor, Driving, SoundSpeed};
 use headrace_coverage::{
-    Frontier, GridLayout, HoleFinder, Relief, SampleStore, Sections, Soundings, StoreLayout, WallLimits,
+    Frontier, GridLayout, HoleFinder, Lacks, Relief, SampleStore, Sections, Soundings, StoreLayout, WallLimits,
 };
 use headrace_fusion::Navigation;
 use headrace_sampling::advice::{self, Task};
@@ -112,7 +112,11 @@ impl App {
             contradiction_m: mission.coverage.contradiction_m,
             limits: WallLimits::new(mission.profile.perimeter_m(), mission.coverage.contradiction_m),
         });
-        world.insert_resource(Target { target_m: mission.target_m, layout: mission.layout });
+        world.insert_resource(Target {
+            target_m: mission.target_m,
+            layout: mission.layout,
+            planned_speed_mps: mission.planned_speed_mps,
+        });
         Ok(())
     }
 
@@ -185,5 +189,6 @@ fn coverage(mission: &Mission) -> Result<Coverage, PluginError> {
         to_m: mission.length_m,
         node_m: mission.coverage.node_m,
     });
-    Ok(Coverage { store, sections, frontier: Frontier::default(), soundings, relief: Relief::default() })
+    let (frontier, relief, lacks) = (Frontier::default(), Relief::default(), Lacks::default());
+    Ok(Coverage { store, sections, frontier, soundings, relief, lacks })
 }

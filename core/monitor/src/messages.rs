@@ -114,6 +114,14 @@ pub struct PlacedPing {
     pub standing: bool,
     /// Outcome.
     pub outcome: Outcome,
+    /// Angle of the head, in the sensor frame, radians.
+    pub angle_rad: f64,
+    /// The vehicle is in the way at this angle.
+    pub hidden: bool,
+    /// Or beside it.
+    pub beside_hidden: bool,
+    /// Longest range at the head's setting, m.
+    pub longest_m: f64,
     /// Source of the packet.
     pub source: SourceId,
     /// Where the head was; `None` without a fix.

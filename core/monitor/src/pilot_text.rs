@@ -3,7 +3,7 @@
 
 use super::advice_log::AdviceEntry;
 use super::alerts::AlertKind;
-use headrace_coverage::{Action, Cause, Evidence};
+use headrace_coverage::{Action, Cause, Causes, Evidence};
 use headrace_fusion::filter::suspicion::{Setting, SettingDoubt};
 use headrace_geometry::tunnel::Profile;
 use headrace_sampling::advice::{Reason, Remedy};
@@ -21,8 +21,8 @@ pub fn station(chainage_m: f64) -> String {
 /// Figures of a cause's evidence used in its text.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CauseFigures {
-    /// The cause.
-    pub cause: Cause,
+    /// The causes, which only together explain the fail.
+    pub causes: Causes,
     /// Speed along the tunnel, m/s.
     pub speed_mps: f64,
     /// Largest step along the perimeter between neighbouring samples of one turn, m.
@@ -39,15 +39,31 @@ pub struct CauseFigures {
 
 impl From<&Evidence> for CauseFigures {
     fn from(evidence: &Evidence) -> Self {
-        let Evidence { cause, speed_mps, t_y_m, middle_t_y_m, missing_share, swing_m, silent_heads, .. } =
+        let Evidence { causes, speed_mps, t_y_m, middle_t_y_m, missing_share, swing_m, silent_heads, .. } =
             *evidence;
-        Self { cause, speed_mps, t_y_m, middle_t_y_m, missing_share, swing_m, silent_heads }
+        Self { causes, speed_mps, t_y_m, middle_t_y_m, missing_share, swing_m, silent_heads }
     }
 }
 
-/// Text of a cause, with its figures.
+impl CauseFigures {
+    /// The main cause.
+    pub fn cause(&self) -> Cause {
+        self.causes.iter().next().unwrap_or(Cause::Unknown)
+    }
+}
+
+/// Most causes that a text names.
+const NAMED: usize = 2;
+
+/// Text of a fail's causes, with their figures; of several, the first two.
 pub fn cause_text(figures: &CauseFigures) -> String {
-    match figures.cause {
+    let texts: Vec<String> =
+        figures.causes.iter().take(NAMED).map(|cause| one_cause_text(cause, figures)).collect();
+    if texts.is_empty() { one_cause_text(Cause::Unknown, figures) } else { texts.join(" and ") }
+}
+
+fn one_cause_text(cause: Cause, figures: &CauseFigures) -> String {
+    match cause {
         Cause::TooFast => format!("too fast ({:.2} m/s)", figures.speed_mps),
         Cause::AngularStep => format!("steps of {:.2} m along the wall", figures.t_y_m),
         Cause::MissingReturns => format!("{:.0} % of returns missing", figures.missing_share * 100.0),
@@ -62,6 +78,7 @@ pub fn cause_text(figures: &CauseFigures) -> String {
         Cause::Phase => format!("heads out of phase ({:.2} m/s)", figures.speed_mps),
         Cause::PositionLost => "position lost".to_owned(),
         Cause::NotPassed => "not passed on both sides".to_owned(),
+        Cause::Unknown => "cause unknown".to_owned(),
     }
 }
 
@@ -133,7 +150,7 @@ pub fn flag_text(missed: &Missed, profile: &Profile) -> String {
         station(*start_m),
         cause_text(figures),
         profile.clock(*hole_arc_m),
-        action_text(Action::of(figures.cause), *start_m, *v_max_mps),
+        action_text(Action::of(figures.cause()), *start_m, *v_max_mps),
     )
 }
 

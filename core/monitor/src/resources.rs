@@ -5,7 +5,7 @@ use bevy_ecs::prelude::Resource;
 use serde::{Deserialize, Serialize};
 
 use super::result_stream::ResultStream;
-use headrace_coverage::{Frontier, HoleFinder, Relief, SampleStore, Sections, Soundings, WallLimits};
+use headrace_coverage::{Frontier, HoleFinder, Lacks, Relief, SampleStore, Sections, Soundings, WallLimits};
 use headrace_fusion::NoFix;
 use headrace_geometry::site::Site;
 use headrace_geometry::time::MonoNs;
@@ -36,6 +36,8 @@ pub struct Target {
     pub target_m: f64,
     /// Arrangement of the heads: phase shift or sector offset.
     pub layout: HeadLayout,
+    /// Speed for which the heads are put in phase, m/s; zero if none is planned.
+    pub planned_speed_mps: f64,
 }
 
 /// The vehicle's entity, that of each sensor by source, and that of each head by number.
@@ -76,9 +78,11 @@ pub struct Coverage {
     pub soundings: Soundings,
     /// Where the wall was found off the design near the vehicle.
     pub relief: Relief,
+    /// The latest samples that are lacking.
+    pub lacks: Lacks,
 }
 
-stateful!(Coverage { state: store, sections, frontier, soundings, relief; });
+stateful!(Coverage { state: store, sections, frontier, soundings, relief, lacks; });
 
 /// The search for holes with its working memory.
 #[derive(Debug, Default, Resource)]

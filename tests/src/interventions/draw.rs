@@ -150,14 +150,26 @@ fn heads(count: usize, side_by_side: bool) -> Vec<String> {
     (0..count).map(place).collect()
 }
 
-/// The eleven kinds, by number.
-pub const KINDS: usize = Cause::ALL.len();
+/// The eleven kinds that can be injected.
+pub const KINDS: [Cause; 11] = [
+    Cause::TooFast,
+    Cause::AngularStep,
+    Cause::MissingReturns,
+    Cause::OutOfRange,
+    Cause::Occluded,
+    Cause::OffAxis,
+    Cause::Phase,
+    Cause::HeadStalled,
+    Cause::HeadSilent,
+    Cause::PositionLost,
+    Cause::NotPassed,
+];
 
 impl Drawn {
-    /// The dive of a seed with these kinds of causes, by their numbers in [`Cause::ALL`].
+    /// The dive of a seed with these kinds of causes, by their numbers in [`KINDS`].
     pub fn of(seed: u64, kinds: &[usize]) -> Self {
         let mut draw = Draw::new(seed);
-        let causes: Vec<Cause> = kinds.iter().map(|kind| Cause::ALL[*kind]).collect();
+        let causes: Vec<Cause> = kinds.iter().map(|kind| KINDS[*kind]).collect();
         let has = |cause: Cause| causes.contains(&cause);
         let mut tunnel = tunnel(&mut draw);
         while has(Cause::OutOfRange) && tunnel.near_m > 2.4 && tunnel.range_m == 5 && tunnel.far_m < 2.6 {
@@ -259,7 +271,7 @@ impl Drawn {
                 let sensor = if self.way == "direct" { draw.one_of(&["tether", "imu"]) } else { "imu" };
                 Injected::PositionLost { sensor, over_m: self.over_m(draw, 4.0, 8.0) }
             }
-            Cause::NotPassed => Injected::NotPassed,
+            Cause::NotPassed | Cause::Unknown => Injected::NotPassed,
         }
     }
 

@@ -8,7 +8,7 @@
 mod draw;
 mod matrix;
 
-use headrace_coverage::Cause;
+use headrace_coverage::{Cause, Evidence};
 use headrace_monitor::report::{Report, SectionReport};
 
 use crate::scenes;
@@ -34,6 +34,10 @@ pub struct Judged {
     pub told: Vec<Cause>,
     /// Its run.
     pub run: Option<u32>,
+    /// Diameter of its hole, m.
+    pub hole_m: f64,
+    /// The figures behind what was told.
+    pub evidence: Evidence,
 }
 
 impl Judged {
@@ -120,14 +124,14 @@ pub fn intervene(seed: u64, kinds: &[usize]) -> Intervened {
         let runs = run_of(f64::midpoint(section.start_m, section.end_m));
         let of_cause = |id: &&u32| all.runs[**id as usize].cause == evidence.cause;
         let run = runs.iter().find(of_cause).or(runs.first()).copied();
-        sections.push(Judged { ends_m: [section.start_m, section.end_m], right, told, run });
+        sections.push(Judged { ends_m: [section.start_m, section.end_m], right, told, run, hole_m: section.hole_m.unwrap_or(0.0), evidence: *evidence });
     }
     Intervened { drawn, report: all, sections }
 }
 
 /// The causes told of a section, sorted.
-fn told(evidence: &headrace_coverage::Evidence) -> Vec<Cause> {
-    vec![evidence.cause]
+fn told(evidence: &Evidence) -> Vec<Cause> {
+    evidence.causes.iter().collect()
 }
 
 /// Which sets of causes are right; `None` where the section fails without any of them.
@@ -175,9 +179,9 @@ impl Intervened {
 pub fn kinds(seed: u64) -> Vec<usize> {
     let number = usize::try_from(seed).unwrap();
     if number % 2 == 0 {
-        return vec![number / 2 % KINDS];
+        return vec![number / 2 % KINDS.len()];
     }
     // All pairs in turn.
-    let pairs: Vec<[usize; 2]> = (0..KINDS).flat_map(|a| (a + 1..KINDS).map(move |b| [a, b])).collect();
+    let pairs: Vec<[usize; 2]> = (0..KINDS.len()).flat_map(|a| (a + 1..KINDS.len()).map(move |b| [a, b])).collect();
     pairs[number / 2 * 17 % pairs.len()].to_vec()
 }

@@ -9,6 +9,7 @@ mod doubt;
 mod driving;
 mod georeference;
 mod judge;
+mod lacking;
 mod navigate;
 mod samples;
 mod sound_speed;
