@@ -1,19 +1,20 @@
 //! Causes told against true ones, over random dives with one or two injected causes: `cargo bench -p headrace_benches
 //! --bench causes [-- FROM TO [wrong]]`, by numbers of dives, 0 to 500 unless given; `wrong` lists the stretches told
-//! wrongly, `sections` all sections.
+//! wrongly, `sections` all sections; `remedies` does what was told about each run, too.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a bench stops at what it can't do")]
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::Mutex;
 
-use headrace_tests::interventions::{Matrix, intervene, kinds};
+use headrace_tests::interventions::{Matrix, intervene, kinds, remedies};
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).filter(|word| word != "--bench").collect();
     let number = |k: usize| arguments.get(k).and_then(|word| word.parse::<u64>().ok());
     let (from, to) = (number(0).unwrap_or(0), number(1).unwrap_or(500));
     let wrong = arguments.iter().any(|word| word == "wrong");
+    let remedy = arguments.iter().any(|word| word == "remedies");
     let sections = arguments.iter().any(|word| word == "sections");
     let (next, dives) = (AtomicU64::new(from), Mutex::new(Vec::new()));
     std::thread::scope(|scope| {
@@ -25,15 +26,23 @@ fn main() {
                         return;
                     }
                     let dive = intervene(seed, &kinds(seed));
-                    dives.lock().unwrap().push((seed, dive));
+                    let done = if remedy { remedies(&dive) } else { Vec::new() };
+                    dives.lock().unwrap().push((seed, dive, done));
                 }
             });
         }
     });
     let mut dives = dives.into_inner().unwrap();
-    dives.sort_by_key(|(seed, _)| *seed);
+    dives.sort_by_key(|(seed, ..)| *seed);
     let mut matrix = Matrix::default();
-    for (seed, dive) in &dives {
+    let (mut runs, mut clear) = (0, 0);
+    for (seed, dive, done) in &dives {
+        for remedied in done {
+            (runs, clear) = (runs + 1, clear + u32::from(remedied.clears));
+            if wrong && !remedied.clears {
+                println!("dive {seed}: not cleared: {:?}; {:?}", remedied.told, dive.drawn.injected);
+            }
+        }
         matrix.add(dive);
         for section in dive.sections.iter().filter(|_| sections) {
             let e = &section.evidence;
@@ -72,4 +81,7 @@ fn main() {
         }
     }
     print!("{}", matrix.text());
+    if remedy {
+        println!("runs cleared by what was told to do: {clear} of {runs}");
+    }
 }

@@ -91,8 +91,9 @@ pub struct Evidence {
     pub causes: Causes,
     /// Speed along the tunnel, m/s.
     pub speed_mps: f64,
-    /// Largest speed that would have met the target with the heads evenly spread, m/s; zero where none.
-    pub even_v_max_mps: f64,
+    /// Largest speed that would have met the target in the middle, all heads turning as scheduled, m/s; the planned one
+    /// where that does; zero where none.
+    pub fits_mps: f64,
     /// Time between passes, seconds.
     pub pass_gap_s: f64,
     /// Time between passes had they been spread evenly, seconds.

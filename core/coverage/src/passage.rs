@@ -60,6 +60,9 @@ pub struct Drive {
     pub t_y_m: f64,
     /// The same from the middle of the tunnel.
     pub middle_t_y_m: f64,
+    /// Largest speed that meets the target from the middle, all heads turning as scheduled; the planned one where that does;
+    /// zero where none does, m/s.
+    pub fits_mps: f64,
     /// Heads go back and forth in sectors.
     pub is_in_sectors: bool,
 }

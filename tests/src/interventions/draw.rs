@@ -6,12 +6,46 @@ use std::fmt::Write as _;
 use headrace_coverage::Cause;
 use headrace_geometry::math;
 
-use crate::random_dives::{Draw, SENSORS};
+use crate::random_dives::Draw;
 
 /// Where dives begin, m.
 pub(super) const START_M: f64 = 3.0;
 /// How far a vehicle that doesn't turn back too early goes on, or one that does goes back, m.
 const ON_M: f64 = 4.5;
+
+/// What gives a position; none of it behind the hull.
+const SENSORS: &str = r#"[[sensors]]
+id = "left"
+plugin = "ping1d"
+position_m = [0, 0.3, 0]
+angles_deg = [0, 0, 90]
+[[sensors]]
+id = "right"
+plugin = "ping1d"
+position_m = [0, -0.3, 0]
+angles_deg = [0, 0, -90]
+[[sensors]]
+id = "up"
+plugin = "ping1d"
+position_m = [0, 0, 0.35]
+angles_deg = [0, -90, 0]
+[[sensors]]
+id = "down"
+plugin = "ping1d"
+position_m = [0, 0, -0.1]
+angles_deg = [0, 90, 0]
+[[sensors]]
+id = "depth"
+plugin = "bar100"
+[[sensors]]
+id = "imu"
+plugin = "imu_can"
+preset = "xsens_mti600"
+[[sensors]]
+id = "tether"
+plugin = "tether_hid"
+counts_per_metre = 2000
+"#;
 
 /// A cause as it is injected.
 #[expect(missing_docs, reason = "the variants say what their fields are")]
@@ -98,6 +132,10 @@ pub struct Drawn {
     /// Heads hide the wall from each other in truth, too, whatever is injected.
     in_each_others_way: bool,
     swaying: bool,
+    /// A stretch passed at most so fast, m/s.
+    at_most: Option<([f64; 2], f64)>,
+    /// A stretch passed again in the end, rolled so far, degrees.
+    again: Option<([f64; 2], f64)>,
 }
 
 /// A turn of each mode, seconds, and its step, degrees. Source: Jorge et al. 2021, Table 2.
@@ -200,12 +238,28 @@ impl Drawn {
             way: if draw.below(3) == 0 { "filter" } else { "direct" },
             in_each_others_way: !has(Cause::Occluded) && side_by_side && draw.below(2) == 0,
             swaying: draw.below(2) == 0,
+            at_most: None,
+            again: None,
         };
         for cause in causes {
             let injected = drawn.inject(cause, &mut draw);
             drawn.injected.push(injected);
         }
         drawn
+    }
+
+    /// The same dive without these causes, a stretch at most so fast (m/s), and perhaps passed again, rolled so far (degrees).
+    #[must_use]
+    pub fn changed(
+        &self,
+        without: &dyn Fn(&Injected) -> bool,
+        over_m: [f64; 2],
+        at_most_mps: f64,
+        again_deg: Option<f64>,
+    ) -> Self {
+        let injected = self.injected.iter().filter(|injected| !without(injected)).cloned().collect();
+        let at_most = (at_most_mps > 0.0).then_some((over_m, at_most_mps));
+        Self { injected, at_most, again: again_deg.map(|deg| (over_m, deg)), ..self.clone() }
     }
 
     fn over_m(&self, draw: &mut Draw, least_m: f64, most_m: f64) -> [f64; 2] {
@@ -316,7 +370,7 @@ impl Drawn {
             text.push_str("[effects.occlusion]\n");
         }
         for injected in self.present(is_in) {
-            effect(injected, &path, &mut text);
+            effect(injected, &path, self.heads.len(), &mut text);
         }
         text
     }
@@ -338,6 +392,8 @@ impl Drawn {
                 _ => {}
             }
         }
+        let limits = self.at_most.map_or([self.end_m; 2], |(over_m, _)| over_m);
+        ends.extend(limits.into_iter().filter(|x_m| (START_M..self.end_m).contains(x_m)));
         ends.sort_by(f64::total_cmp);
         ends.dedup_by(|b, a| *b - *a < 0.02);
         let mut points = Vec::new();
@@ -348,11 +404,17 @@ impl Drawn {
         let turns_back = self.present(is_in).any(|injected| *injected == Injected::NotPassed);
         let last_m = if turns_back { self.end_m - ON_M } else { self.end_m + ON_M };
         points.push(self.point(&|_| false, last_m, last_m));
+        if let Some(([from_m, to_m], roll_deg)) = self.again {
+            // Back, and forward again: the way back counts, too.
+            for x_m in [from_m.max(START_M), to_m.min(self.end_m + ON_M)] {
+                points.push(Point { roll_deg, ..self.point(&|_| false, x_m, from_m) });
+            }
+        }
         Path(points)
     }
 
     fn point(&self, is_in: &dyn Fn(usize) -> bool, x_m: f64, before_m: f64) -> Point {
-        let mut point = Point { x_m, place_m: self.tunnel.middle_m, yaw_deg: 0.0, speed_mps: self.speed_mps };
+        let mut point = Point { x_m, place_m: self.tunnel.middle_m, yaw_deg: 0.0, roll_deg: 0.0, speed_mps: self.speed_mps };
         for injected in self.present(is_in) {
             match injected {
                 Injected::TooFast { over_m, factor } if (over_m[0]..over_m[1]).contains(&before_m) => {
@@ -369,6 +431,11 @@ impl Drawn {
                 _ => {}
             }
         }
+        if let Some((over_m, at_most_mps)) = self.at_most
+            && (over_m[0]..over_m[1]).contains(&before_m)
+        {
+            point.speed_mps = point.speed_mps.min(at_most_mps);
+        }
         point
     }
 }
@@ -379,6 +446,7 @@ struct Point {
     x_m: f64,
     place_m: [f64; 2],
     yaw_deg: f64,
+    roll_deg: f64,
     speed_mps: f64,
 }
 
@@ -387,11 +455,11 @@ struct Path(Vec<Point>);
 impl Path {
     fn text(&self) -> String {
         let mut text = "[trajectory]\nkind = \"waypoints\"\n".to_owned();
-        for Point { x_m, place_m: [y_m, z_m], yaw_deg, speed_mps } in &self.0 {
+        for Point { x_m, place_m: [y_m, z_m], yaw_deg, roll_deg, speed_mps } in &self.0 {
             writeln!(
                 text,
                 "[[trajectory.waypoints]]\nchainage_m = {x_m:.4}\nplace_m = [{y_m:.3}, {z_m:.3}]\n\
-                 yaw_deg = {yaw_deg:.2}\nspeed_mps = {speed_mps:.4}"
+                 yaw_deg = {yaw_deg:.2}\nroll_deg = {roll_deg:.1}\nspeed_mps = {speed_mps:.4}"
             )
             .unwrap();
         }
@@ -417,7 +485,7 @@ impl Path {
 }
 
 /// The effect of an injected cause that is one.
-fn effect(injected: &Injected, path: &Path, text: &mut String) {
+fn effect(injected: &Injected, path: &Path, count: usize, text: &mut String) {
     let dies = |sensors: &str, over_m: [f64; 2]| {
         let [from_s, to_s] = over_m.map(|x_m| path.time_s(x_m));
         let for_s = to_s - from_s;
@@ -429,7 +497,10 @@ fn effect(injected: &Injected, path: &Path, text: &mut String) {
         heads.iter().map(|head| format!("\"sonar_{head}\"")).collect::<Vec<_>>().join(", ")
     };
     let effect = match injected {
-        Injected::MissingReturns { keys } => format!("[effects.missing_returns]\n{keys}"),
+        Injected::MissingReturns { keys } => {
+            let all: Vec<usize> = (0..count).collect();
+            format!("[effects.missing_returns]\nsensors = [{}]\n{keys}", sonars(&all))
+        }
         Injected::Occluded => "[effects.occlusion]\n".to_owned(),
         Injected::Phase { offsets_deg } => {
             format!("[effects.start_phase_error]\noffsets_deg = {offsets_deg:.1?}\n")

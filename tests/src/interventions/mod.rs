@@ -7,6 +7,7 @@
 
 mod draw;
 mod matrix;
+mod remedy;
 
 use headrace_coverage::{Cause, Evidence};
 use headrace_monitor::report::{Report, SectionReport};
@@ -14,6 +15,7 @@ use headrace_monitor::report::{Report, SectionReport};
 use crate::scenes;
 pub use draw::{Drawn, Injected, KINDS};
 pub use matrix::Matrix;
+pub use remedy::remedies;
 
 /// How far from the ends of the way sections are left out, m: there they fail whatever is injected.
 const END_M: f64 = 2.0;

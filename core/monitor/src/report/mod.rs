@@ -256,7 +256,7 @@ impl Report {
                 .map(|(k, section)| sections::section_report(sections, k, section, dive))
                 .collect(),
             runs: runs::run_reports(dive),
-            way_home: runs::way_home(sections, log),
+            way_home: runs::way_home(sections),
             survey: survey::survey(coverage, &dive.mission().profile),
             what_if: Vec::new(),
             openings: dive.mission().coverage.openings.iter().map(opening_report).collect(),

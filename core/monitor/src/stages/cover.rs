@@ -44,7 +44,8 @@ pub(super) fn cover(
                 doubt::note(*at, situation, doubts, (&mut alerts, &mut notices, &mut digests));
                 let driving = &mut **driving;
                 let healthy = driving.lacking.healthy(*at, situation, &heads, driving.stalled);
-                driving.note(*at, [situation, &healthy], &tunnel.profile, target.planned_speed_mps);
+                let plan = (target.planned_speed_mps, target.target_m);
+                driving.note(*at, [situation, &healthy], &tunnel.profile, plan);
                 lacking::note_beat(driving, &heads, (*at, situation), &tunnel.profile, &mut coverage);
                 note_beat(&mut coverage, &mut heads, &tunnel, (*at, situation), &mut requests);
                 if at.0 % LOOK_AROUND.0.unsigned_abs() == 0 {
@@ -56,6 +57,10 @@ pub(super) fn cover(
             Placed::Ping(ping) => {
                 count(&mut tally, ping);
                 coverage.frontier.hear(ping.received);
+                if let Some(fix) = &ping.fix {
+                    let now = (ping.valid_at, fix.pose);
+                    lacking::note_away(&mut driving, &heads, now, &tunnel.profile, &mut coverage);
+                }
                 let head = entities.of_head(ping.head).and_then(|entity| heads.get_mut(entity).ok());
                 let Some((.., mut sweep, mut frontier)) = head else { continue };
                 let driving = &mut **driving;

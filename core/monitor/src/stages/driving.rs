@@ -16,6 +16,11 @@ use headrace_snapshot::stateful;
 
 /// Maximum look-back over the time between neighbouring passes, seconds.
 const LONGEST_S: f64 = 50.0;
+/// Relative change of passes from which the speed that fits is found anew.
+const SAME_PASSES: f64 = 0.01;
+/// Speeds that are tried for it, each this share of the one before.
+const SLOWER: u32 = 80;
+const SLOWER_BY: f64 = 0.97;
 /// Beams round a place for which steps along the wall are found.
 const RAYS: u32 = 72;
 /// Steps along the wall are found anew after such a way across the tunnel, m.
@@ -32,17 +37,19 @@ pub(crate) struct Driving {
     /// The step of the heads, radians, and the place for which steps along the wall were last found, m.
     step_rad: f64,
     place_m: [f64; 2],
+    /// The passes for which the speed that fits was last found, seconds and metres.
+    fitted: [f64; 2],
     looks: Looks,
     /// Heads that have stood still, and haven't been in step with the others since.
     pub(super) stalled: HeadSet,
     pub(super) lacking: Lacking,
 }
 
-stateful!(Driving { state: now, step_rad, place_m, looks, stalled, lacking; });
+stateful!(Driving { state: now, step_rad, place_m, fitted, looks, stalled, lacking; });
 
 impl Driving {
     /// Updates the statistics for a beat, from the situation as it is and as it would be had no head been silent or stood
-    /// still; heads are in phase for `planned_mps`.
+    /// still; heads are in phase for `planned_mps`, the target is `target_m`.
     ///
     /// Allocates: never.
     pub(super) fn note(
@@ -50,9 +57,10 @@ impl Driving {
         at: MonoNs,
         [situation, healthy]: [&Situation; 2],
         profile: &Profile,
-        planned_mps: f64,
+        (planned_mps, target_m): (f64, f64),
     ) {
         self.note_gaps(at, [situation, healthy], planned_mps);
+        self.note_fit(healthy, target_m);
         let Some(pose) = situation.pose else {
             self.now.swing_m = 0.0;
             return;
@@ -66,6 +74,34 @@ impl Driving {
         let turned_rad = self.looks.turned_since(look, since);
         self.now.swing_m = turned_rad * profile.farthest_m(place_m);
         self.looks.keep(at, look);
+    }
+
+    /// Updates the speed that fits once the heads' passes have changed.
+    fn note_fit(&mut self, healthy: &Situation, target_m: f64) {
+        let now = &mut self.now;
+        let passes = [now.all_gap_s, now.middle_t_y_m];
+        if passes.iter().zip(self.fitted).all(|(now, then)| (now - then).abs() <= SAME_PASSES * now.abs()) {
+            return;
+        }
+        self.fitted = passes;
+        let squared = (target_m - now.middle_t_y_m) * (target_m + now.middle_t_y_m);
+        let along_m = math::sqrt(squared.max(0.0));
+        let scheduled = Phasing::of(healthy).as_scheduled(healthy.configured, now.planned_mps);
+        let fits = |mps: f64, share: f64| {
+            let passes = scheduled.at(mps);
+            let gap_s = passes.gap_s(passes.heads()).unwrap_or(f64::INFINITY);
+            mps * (gap_s + now.ping_period_s) <= share * along_m
+        };
+        let most_mps = along_m / (now.all_gap_s + now.ping_period_s).max(1e-9);
+        let mut slower = (0..SLOWER).scan(most_mps, |mps, _| {
+            *mps *= SLOWER_BY;
+            Some(*mps)
+        });
+        now.fits_mps = if now.planned_mps > 0.0 && fits(now.planned_mps, 1.0) {
+            now.planned_mps
+        } else {
+            slower.find(|mps| fits(*mps, 1.0)).unwrap_or(0.0)
+        };
     }
 
     /// Updates the largest steps along the wall once the vehicle or its heads' steps have changed enough.

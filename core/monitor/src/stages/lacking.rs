@@ -168,30 +168,12 @@ pub(super) fn note_beat(
     profile: &Profile,
     coverage: &mut Coverage,
 ) {
-    let now = driving.now;
     let stalled = driving.stalled;
-    let Lacking { heads: turning, pose: before, away, forgot } = &mut driving.lacking;
-    if let (Some(pose), Some((then, from))) = (situation.pose, *before) {
-        let way = Way { from: (then, from), to: (at, pose) };
-        let speed_mps = way.speed_mps();
-        if core::mem::take(forgot) {
-            let [from_m, to_m] = [&from, &pose].map(|pose| pose.position.x());
-            let sections = &mut coverage.sections;
-            for index in sections.index_of(from_m.min(to_m))..=sections.index_of(from_m.max(to_m)) {
-                if let Some(section) = sections.get_mut(index) {
-                    section.passage.unseen = true;
-                }
-            }
-        }
-        for ping in away.drain(..) {
-            let head = usize::from(ping.head);
-            let mount = heads.iter().find(|(number, ..)| number.0 == head).map(|(_, mounted, ..)| mounted.info.mount);
-            let (Some(mount), Some(turning)) = (mount, turning.get(head)) else { continue };
-            let hidden = |angle_rad| hides(heads, head, angle_rad);
-            let placing = Placing { mount: &mount, turning, profile, hidden: &hidden };
-            placing.lack(&way.at(ping.at), &ping, Drive { speed_mps, ..now }, coverage);
-        }
+    if let Some(pose) = situation.pose {
+        note_away(driving, heads, (at, pose), profile, coverage);
     }
+    let now = driving.now;
+    let Lacking { heads: turning, pose: before, away, forgot } = &mut driving.lacking;
     let speed_mps = situation.speed_mps;
     for (number, mounted, hidden, ..) in heads {
         let Some(head) = turning.get_mut(number.0) else { continue };
@@ -230,6 +212,41 @@ pub(super) fn note_beat(
     }
     if let Some(pose) = situation.pose {
         *before = Some((at, pose));
+    }
+}
+
+/// Notes pings without a fix once there is one again.
+///
+/// Allocates: never.
+pub(super) fn note_away(
+    driving: &mut Driving,
+    heads: &Heads<'_, '_>,
+    (at, pose): (MonoNs, Pose),
+    profile: &Profile,
+    coverage: &mut Coverage,
+) {
+    let now = driving.now;
+    let Lacking { heads: turning, pose: before, away, forgot } = &mut driving.lacking;
+    let Some((then, from)) = *before else { return };
+    let way = Way { from: (then, from), to: (at, pose) };
+    let speed_mps = way.speed_mps();
+    if core::mem::take(forgot) {
+        let [from_m, to_m] = [&from, &pose].map(|pose| pose.position.x());
+        let sections = &mut coverage.sections;
+        for index in sections.index_of(from_m.min(to_m))..=sections.index_of(from_m.max(to_m)) {
+            if let Some(section) = sections.get_mut(index) {
+                section.passage.unseen = true;
+            }
+        }
+    }
+    for ping in away.drain(..) {
+        let head = usize::from(ping.head);
+        let mut mounts = heads.iter().filter(|(number, ..)| number.0 == head);
+        let mount = mounts.next().map(|(_, mounted, ..)| mounted.info.mount);
+        let (Some(mount), Some(turning)) = (mount, turning.get(head)) else { continue };
+        let hidden = |angle_rad| hides(heads, head, angle_rad);
+        let placing = Placing { mount: &mount, turning, profile, hidden: &hidden };
+        placing.lack(&way.at(ping.at), &ping, Drive { speed_mps, ..now }, coverage);
     }
 }
 
