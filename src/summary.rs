@@ -1,7 +1,7 @@
 //! Summary of a report as text.
 
 use headrace_coverage::Cause;
-use headrace_monitor::pilot_text::{action_text, cause_text, station};
+use headrace_monitor::pilot_text::{actions_text, cause_text, station};
 use headrace_monitor::report::{ChangeReport, JudgedReport, SmoothingReport};
 use headrace_monitor::report::{NotInspectedReport, Report, RunReport};
 
@@ -111,7 +111,7 @@ fn missed(report: &Report) -> Vec<String> {
         }
         let back = report.way_home.iter().find(|back| back.run == run.id);
         let action =
-            back.map(|back| format!("; {}", action_text(back.action, run.start_m, back.at_most_mps)));
+            back.map(|back| format!("; {}", actions_text(&back.actions, run.start_m, back.at_most_mps)));
         format!(
             "  missed ch {} to {}: {cause}, holes up to {:.2} m{}",
             station(run.start_m),

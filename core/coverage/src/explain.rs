@@ -229,7 +229,8 @@ impl Trial<'_> {
         let otherwise = self.otherwise(removed);
         let reach_m = (target_m + bounds_m.1 - bounds_m.0) / otherwise.along;
         let put_back = lacks
-            .between(bounds_m.0 - reach_m, bounds_m.1 + reach_m)
+            // Those about to be mirrored, too.
+            .between(bounds_m.0 - 2.0 * reach_m, bounds_m.1 + 2.0 * reach_m)
             .filter(|lack| lack.why.is_within(removed))
             .map(|lack| [lack.x_m, lack.arc_m]);
         let radius_m = times * target_m / 2.0;
@@ -240,17 +241,17 @@ impl Trial<'_> {
     fn otherwise(&self, removed: Causes) -> Otherwise {
         let all = Some(Reach { from_m: f64::NEG_INFINITY, to_m: f64::INFINITY });
         let swept = self.case.swept_by_all;
-        let mut covered = [self.case.to_come, None, None, None];
+        let mut covered = [None; 3];
         if removed.has(Cause::NotPassed) {
             let before = swept.map_or(f64::INFINITY, |swept| swept.from_m);
             let beyond = swept.map_or(f64::NEG_INFINITY, |swept| swept.to_m);
-            covered[1] = Some(Reach { from_m: f64::NEG_INFINITY, to_m: before });
-            covered[2] = Some(Reach { from_m: beyond, to_m: f64::INFINITY });
+            covered[0] = Some(Reach { from_m: f64::NEG_INFINITY, to_m: before });
+            covered[1] = Some(Reach { from_m: beyond, to_m: f64::INFINITY });
         }
         if removed.has(Cause::PositionLost) && (self.case.is_torn || self.seen.unseen)
             || removed.has(Cause::HeadSilent) && is_dark(self.seen)
         {
-            covered[3] = all;
+            covered[2] = all;
         }
         let then = self.drive.without(removed, MARGIN * self.case.target_m);
         let ratio = |then: f64, was: f64| if was > 0.0 { (then / was).clamp(LEAST, 1.0) } else { 1.0 };
@@ -260,6 +261,7 @@ impl Trial<'_> {
             along: ratio(then.along_m(), self.drive.along_m().min(self.case.hole.diameter_m.max(then.along_m()))),
             around: ratio(then.t_y_m, self.drive.t_y_m) * finer,
             covered,
+            to_come: self.case.to_come,
         }
     }
 }

@@ -92,6 +92,29 @@ fn silent_text(heads: HeadSet) -> String {
     }
 }
 
+/// Text of the actions for a missed stretch, as of [`action_text`]; of several, the first two.
+pub fn actions_text(actions: &[Action], start_m: f64, at_most_mps: f64) -> String {
+    let Some((first, others)) = actions.split_first() else { return String::new() };
+    let text = action_text(*first, start_m, at_most_mps);
+    others.first().map_or(text.clone(), |second| format!("{text}; and {}", short_text(*second)))
+}
+
+/// Text of an action beside another one.
+fn short_text(action: Action) -> &'static str {
+    match action {
+        Action::Slower => "slower",
+        Action::FinerMode => "in a finer mode",
+        Action::LongerRange => "with a longer range",
+        Action::OtherSide => "rolled to either side",
+        Action::Middle => "in the middle and steady",
+        Action::InPhase => "with the heads in phase",
+        Action::Head => "with that head repaired",
+        Action::HeadBack => "with what is silent back",
+        Action::Position => "once the position is back",
+        Action::Again => "from end to end",
+    }
+}
+
 /// Text of the action for a missed stretch that begins at `start_m`, m, with the maximum speed, m/s; zero if no speed is
 /// known to meet the target.
 pub fn action_text(action: Action, start_m: f64, at_most_mps: f64) -> String {
@@ -102,7 +125,7 @@ pub fn action_text(action: Action, start_m: f64, at_most_mps: f64) -> String {
         Action::LongerRange => return "set a longer range".to_owned(),
         Action::Slower if at_most_mps > 0.0 => format!("go back to {start}, then"),
         Action::Slower => format!("go back to {start}"),
-        Action::OtherSide => format!("pass {start} again turned or rolled,"),
+        Action::OtherSide => format!("pass {start} again rolled to either side,"),
         Action::Middle => format!("go back to {start}, then in the middle and steady,"),
         Action::InPhase => format!("go back to {start}, then with the heads in phase,"),
         Action::Head => format!("go back to {start}, then with that head repaired or without it,"),
@@ -150,7 +173,7 @@ pub fn flag_text(missed: &Missed, profile: &Profile) -> String {
         station(*start_m),
         cause_text(figures),
         profile.clock(*hole_arc_m),
-        action_text(Action::of(figures.cause()), *start_m, *v_max_mps),
+        actions_text(&Action::against(figures.causes), *start_m, *v_max_mps),
     )
 }
 
@@ -313,5 +336,9 @@ mod tests {
             "go back to 1+240.50, then in the middle and steady, at most 0.25 m/s"
         );
         assert_eq!(at(Action::Again, 0.0), "pass it again from end to end");
+        assert_eq!(
+            actions_text(&[Action::Slower, Action::OtherSide, Action::Again], 1240.5, 0.25),
+            "go back to 1+240.50, then at most 0.25 m/s; and rolled to either side"
+        );
     }
 }

@@ -134,7 +134,7 @@ pub struct Drawn {
     swaying: bool,
     /// A stretch passed at most so fast, m/s.
     at_most: Option<([f64; 2], f64)>,
-    /// A stretch passed again in the end, rolled so far, degrees.
+    /// A stretch passed again in the end, rolled so far to one side on the way back, then to the other, degrees.
     again: Option<([f64; 2], f64)>,
 }
 
@@ -406,7 +406,11 @@ impl Drawn {
         points.push(self.point(&|_| false, last_m, last_m));
         if let Some(([from_m, to_m], roll_deg)) = self.again {
             // Back, and forward again: the way back counts, too.
-            for x_m in [from_m.max(START_M), to_m.min(self.end_m + ON_M)] {
+            let from_m = from_m.max(START_M);
+            let to_m = to_m.min(self.end_m + ON_M);
+            for (x_m, roll_deg) in
+                [(last_m - 0.2, -roll_deg), (from_m, -roll_deg), (from_m + 0.2, roll_deg), (to_m, roll_deg)]
+            {
                 points.push(Point { roll_deg, ..self.point(&|_| false, x_m, from_m) });
             }
         }

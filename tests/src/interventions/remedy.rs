@@ -8,7 +8,7 @@ use super::{Injected, Intervened, Judged, report};
 /// How much more than the stretch is passed otherwise, m: heads sit apart along the hull.
 const ROOM_M: f64 = 2.0;
 /// How far a vehicle is rolled that hides the wall from its heads, degrees.
-const ROLLED_DEG: f64 = 120.0;
+const ROLLED_DEG: f64 = 75.0;
 
 /// A run with what was told to do about it, and whether that clears it.
 #[derive(Debug, Clone)]

@@ -16,17 +16,25 @@ pub struct Otherwise {
     /// The same around the perimeter.
     pub around: f64,
     /// Stretches whose wall would have been covered.
-    pub covered: [Option<Reach>; 4],
+    pub covered: [Option<Reach>; 3],
+    /// Where samples may still land: the wall there is taken to become as it is on this side.
+    pub to_come: Option<Reach>,
 }
 
 impl Otherwise {
     /// Nothing.
-    pub const NOTHING: Self = Self { along: 1.0, around: 1.0, covered: [None; 4] };
+    pub const NOTHING: Self = Self { along: 1.0, around: 1.0, covered: [None; 3], to_come: None };
 
     /// How far a chainage would be from a stretch that would have been covered, m.
     fn clear_m(&self, x_m: f64) -> f64 {
         let off_m = |reach: &Reach| (reach.from_m - x_m).max(x_m - reach.to_m).max(0.0);
-        self.covered.iter().flatten().map(off_m).fold(f64::INFINITY, f64::min) * self.along
+        let covered_m = self.covered.iter().flatten().map(off_m).fold(f64::INFINITY, f64::min) * self.along;
+        self.to_come.as_ref().map(off_m).map_or(covered_m, |to_come_m| covered_m.min(to_come_m))
+    }
+
+    /// The end of where samples may still land at which the wall is mirrored, m.
+    fn mirror_m(&self) -> Option<f64> {
+        self.to_come.iter().flat_map(|reach| [reach.from_m, reach.to_m]).find(|x_m| x_m.is_finite())
     }
 }
 
@@ -49,8 +57,17 @@ impl HoleFinder {
         let perimeter_m = store.perimeter_m() * around;
         let reach_m = radius_m + length_m;
         window.begin(perimeter_m, from_m, (-reach_m, length_m + reach_m), cell_m(radius_m));
-        let mut take = |x_m: f64, arc_m: f64| window.push((x_m - from_m) * along, arc_m * around);
-        store.visit_between(from_m - reach_m / along, to_m + reach_m / along, &mut take);
+        let mirror_m = otherwise.mirror_m();
+        let mut take = |x_m: f64, arc_m: f64| {
+            window.push((x_m - from_m) * along, arc_m * around);
+            if let Some(mirror_m) = mirror_m {
+                window.push((2.0 * mirror_m - x_m - from_m) * along, arc_m * around);
+            }
+        };
+        let ends_m = [from_m - reach_m / along, to_m + reach_m / along];
+        let mirrored_m = mirror_m.map_or(ends_m, |mirror_m| ends_m.map(|x_m| 2.0 * mirror_m - x_m));
+        let [least_m, most_m] = [ends_m[0].min(mirrored_m[1]), ends_m[1].max(mirrored_m[0])];
+        store.visit_between(least_m, most_m, &mut take);
         for [x_m, arc_m] in more {
             take(x_m, arc_m);
         }
@@ -114,10 +131,23 @@ mod tests {
     }
 
     #[test]
+    fn where_samples_may_still_land_the_wall_becomes_as_it_is_before() {
+        // Drawn together to half, a circle reaches a metre ahead, where nothing has landed yet.
+        let ends = |i: u32, _| i <= 12;
+        let otherwise = Otherwise { along: 0.3, ..Otherwise::NOTHING };
+        let to_come = Some(Reach { from_m: 6.1, to_m: f64::INFINITY });
+        assert!(has(ends, 0.27, &otherwise, &[]));
+        assert!(!has(ends, 0.27, &Otherwise { to_come, ..otherwise }, &[]));
+        // A strip that nobody sees stays one.
+        let strip = |i: u32, k: u32| i <= 12 && k != 4;
+        assert!(has(strip, 0.4, &Otherwise { to_come, ..otherwise }, &[]));
+    }
+
+    #[test]
     fn a_stretch_that_would_have_been_covered_is_no_hole() {
         let behind = |i: u32, _| i <= 9;
         assert!(has(behind, 0.4, &Otherwise::NOTHING, &[]));
         let ahead = Some(Reach { from_m: 4.7, to_m: f64::INFINITY });
-        assert!(!has(behind, 0.4, &Otherwise { covered: [None, ahead, None, None], ..Otherwise::NOTHING }, &[]));
+        assert!(!has(behind, 0.4, &Otherwise { covered: [None, ahead, None], ..Otherwise::NOTHING }, &[]));
     }
 }

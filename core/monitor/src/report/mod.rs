@@ -32,7 +32,7 @@ use spread::spread_report;
 pub use survey::{HolidayReport, NodeRowReport, SurveyReport};
 
 /// Version of the report schema.
-pub const REPORT_VERSION: u32 = 4;
+pub const REPORT_VERSION: u32 = 5;
 
 /// A whole report. Field names are the contract.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -59,12 +59,12 @@ impl Driving {
         profile: &Profile,
         (planned_mps, target_m): (f64, f64),
     ) {
-        self.note_gaps(at, [situation, healthy], planned_mps);
-        self.note_fit(healthy, target_m);
         let Some(pose) = situation.pose else {
             self.now.swing_m = 0.0;
             return;
         };
+        self.note_gaps(at, [situation, healthy], planned_mps);
+        self.note_fit(healthy, target_m);
         let place_m = [pose.position.y(), pose.position.z()];
         self.note_steps(situation, place_m, profile);
         let look = pose.attitude * Vec3::new(1.0, 0.0, 0.0);
