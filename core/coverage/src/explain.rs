@@ -203,7 +203,9 @@ impl Trial<'_> {
         for size in 1..=present.len().min(MOST_NAMED) {
             for roughly in ROUGHLY {
                 for beside in self.case.beside {
-                    if beside.len() == size && beside.is_within(present) && self.passes_without(beside, roughly)
+                    if beside.len() == size
+                        && beside.is_within(present)
+                        && self.passes_without(beside, roughly)
                     {
                         return beside;
                     }
@@ -258,7 +260,10 @@ impl Trial<'_> {
         let finer = if removed.has(Cause::AngularStep) { FINER } else { 1.0 };
         Otherwise {
             // Figures of one moment don't explain more than the hole.
-            along: ratio(then.along_m(), self.drive.along_m().min(self.case.hole.diameter_m.max(then.along_m()))),
+            along: ratio(
+                then.along_m(),
+                self.drive.along_m().min(self.case.hole.diameter_m.max(then.along_m())),
+            ),
             around: ratio(then.t_y_m, self.drive.t_y_m) * finer,
             covered,
             to_come: self.case.to_come,

@@ -17,7 +17,8 @@ use super::resources::{Coverage, Digests, Finder, Tally, Target, TickTime, Tunne
 use super::run::Loop;
 use super::stages::{Advisor, Driving, SoundSpeed};
 use headrace_coverage::{
-    Frontier, GridLayout, HoleFinder, Lacks, Relief, SampleStore, Sections, Soundings, StoreLayout, WallLimits,
+    Frontier, GridLayout, HoleFinder, Lacks, Relief, SampleStore, Sections, Soundings, StoreLayout,
+    WallLimits,
 };
 use headrace_fusion::Navigation;
 use headrace_sampling::advice::{self, Task};

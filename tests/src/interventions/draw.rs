@@ -161,9 +161,7 @@ fn tunnel(draw: &mut Draw) -> Tunnel {
         }
         _ => {
             let [width_m, height_m] = [draw.between(3.5, 5.5), draw.between(3.0, 4.5)];
-            let keys = format!(
-                "profile = \"rectangle\"\nwidth_m = {width_m:.2}\nheight_m = {height_m:.2}"
-            );
+            let keys = format!("profile = \"rectangle\"\nwidth_m = {width_m:.2}\nheight_m = {height_m:.2}");
             Tunnel {
                 keys,
                 far_m: math::hypot(width_m, height_m) / 2.0,
@@ -364,7 +362,9 @@ impl Drawn {
              [effects.imu_noise]\ngyro_degps_rthz = 0.003\n",
         );
         if self.swaying {
-            text.push_str("[effects.pilot_drift]\nacross_m = 0.08\nup_m = 0.05\nyaw_deg = 0.7\nperiod_s = 25\n");
+            text.push_str(
+                "[effects.pilot_drift]\nacross_m = 0.08\nup_m = 0.05\nyaw_deg = 0.7\nperiod_s = 25\n",
+            );
         }
         if self.in_each_others_way {
             text.push_str("[effects.occlusion]\n");
@@ -418,7 +418,13 @@ impl Drawn {
     }
 
     fn point(&self, is_in: &dyn Fn(usize) -> bool, x_m: f64, before_m: f64) -> Point {
-        let mut point = Point { x_m, place_m: self.tunnel.middle_m, yaw_deg: 0.0, roll_deg: 0.0, speed_mps: self.speed_mps };
+        let mut point = Point {
+            x_m,
+            place_m: self.tunnel.middle_m,
+            yaw_deg: 0.0,
+            roll_deg: 0.0,
+            speed_mps: self.speed_mps,
+        };
         for injected in self.present(is_in) {
             match injected {
                 Injected::TooFast { over_m, factor } if (over_m[0]..over_m[1]).contains(&before_m) => {
@@ -497,9 +503,8 @@ fn effect(injected: &Injected, path: &Path, count: usize, text: &mut String) {
             "[[effects.device_faults]]\nkind = \"die\"\nsensors = [{sensors}]\nfrom_s = {from_s:.2}\nfor_s = {for_s:.2}\n"
         )
     };
-    let sonars = |heads: &[usize]| {
-        heads.iter().map(|head| format!("\"sonar_{head}\"")).collect::<Vec<_>>().join(", ")
-    };
+    let sonars =
+        |heads: &[usize]| heads.iter().map(|head| format!("\"sonar_{head}\"")).collect::<Vec<_>>().join(", ");
     let effect = match injected {
         Injected::MissingReturns { keys } => {
             let all: Vec<usize> = (0..count).collect();

@@ -107,7 +107,8 @@ impl Matrix {
             ("of these stretches whose true set is two", self.pairs),
             ("stretches of at most one run", self.one_run),
         ] {
-            writeln!(text, "{what}: {} of {} ({:.1} %)", count.right, count.all, 100.0 * count.share()).unwrap();
+            writeln!(text, "{what}: {} of {} ({:.1} %)", count.right, count.all, 100.0 * count.share())
+                .unwrap();
         }
         writeln!(text, "dives without a failed section: {}", self.idle).unwrap();
         text

@@ -71,7 +71,11 @@ impl Stretch<'_> {
     /// What was told of most of it.
     pub fn told(&self) -> &[Cause] {
         let count = |told: &[Cause]| self.sections.iter().filter(|section| section.told == told).count();
-        self.sections.iter().map(|section| section.told.as_slice()).max_by_key(|told| count(told)).unwrap_or(&[])
+        self.sections
+            .iter()
+            .map(|section| section.told.as_slice())
+            .max_by_key(|told| count(told))
+            .unwrap_or(&[])
     }
 
     /// How many runs it was told as.
@@ -95,8 +99,7 @@ pub fn intervene(seed: u64, kinds: &[usize]) -> Intervened {
     let mut drawn = Drawn::of(seed, kinds);
     let without_all = report(&drawn, &|_| false);
     let inner_m = [draw::START_M + END_M, drawn.end_m - 0.25];
-    let is_inner =
-        |section: &&SectionReport| section.start_m >= inner_m[0] && section.end_m <= inner_m[1];
+    let is_inner = |section: &&SectionReport| section.start_m >= inner_m[0] && section.end_m <= inner_m[1];
     let holes_m = without_all.sections.iter().filter(is_inner).filter_map(|section| section.hole_m);
     drawn.target_m = drawn.margin * holes_m.fold(0.0, f64::max);
     // Holes don't depend on the target, verdicts do.
@@ -118,7 +121,8 @@ pub fn intervene(seed: u64, kinds: &[usize]) -> Intervened {
             let same = report.sections.iter().find(|other| (other.start_m - section.start_m).abs() < 1e-6);
             same.and_then(|same| same.hole_m).is_some_and(|hole_m| hole_m <= drawn.target_m)
         };
-        let Some(right) = right(&drawn, &without.iter().map(passes).collect::<Vec<_>>(), passes(&without_all))
+        let Some(right) =
+            right(&drawn, &without.iter().map(passes).collect::<Vec<_>>(), passes(&without_all))
         else {
             continue;
         };
@@ -126,7 +130,14 @@ pub fn intervene(seed: u64, kinds: &[usize]) -> Intervened {
         let runs = run_of(f64::midpoint(section.start_m, section.end_m));
         let of_cause = |id: &&u32| all.runs[**id as usize].cause == evidence.cause;
         let run = runs.iter().find(of_cause).or(runs.first()).copied();
-        sections.push(Judged { ends_m: [section.start_m, section.end_m], right, told, run, hole_m: section.hole_m.unwrap_or(0.0), evidence: *evidence });
+        sections.push(Judged {
+            ends_m: [section.start_m, section.end_m],
+            right,
+            told,
+            run,
+            hole_m: section.hole_m.unwrap_or(0.0),
+            evidence: *evidence,
+        });
     }
     Intervened { drawn, report: all, sections }
 }
@@ -184,6 +195,7 @@ pub fn kinds(seed: u64) -> Vec<usize> {
         return vec![number / 2 % KINDS.len()];
     }
     // All pairs in turn.
-    let pairs: Vec<[usize; 2]> = (0..KINDS.len()).flat_map(|a| (a + 1..KINDS.len()).map(move |b| [a, b])).collect();
+    let pairs: Vec<[usize; 2]> =
+        (0..KINDS.len()).flat_map(|a| (a + 1..KINDS.len()).map(move |b| [a, b])).collect();
     pairs[number / 2 * 17 % pairs.len()].to_vec()
 }

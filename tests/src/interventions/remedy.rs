@@ -40,7 +40,9 @@ pub fn remedies(dive: &Intervened) -> Vec<Remedied> {
         dive.sections.iter().filter(|section| section.run == Some(told.run)).cloned().collect()
     };
     let runs = dive.report.way_home.iter().map(|told| (told, of_run(told)));
-    runs.filter(|(_, sections)| !sections.is_empty()).map(|(told, sections)| remedy(dive, told, &sections)).collect()
+    runs.filter(|(_, sections)| !sections.is_empty())
+        .map(|(told, sections)| remedy(dive, told, &sections))
+        .collect()
 }
 
 fn remedy(dive: &Intervened, told: &ReturnReport, sections: &[Judged]) -> Remedied {

@@ -9,7 +9,10 @@ fn what_is_told_of_a_fail_is_what_removed_lets_the_section_pass() {
     let mut matrix = Matrix::default();
     let threads = 2;
     let of_thread = |thread: u64| -> Vec<_> {
-        (0..DIVES).filter(|seed| seed % threads == thread).map(|seed| intervene(10 * seed + seed % 2, &kinds(10 * seed + seed % 2))).collect()
+        (0..DIVES)
+            .filter(|seed| seed % threads == thread)
+            .map(|seed| intervene(10 * seed + seed % 2, &kinds(10 * seed + seed % 2)))
+            .collect()
     };
     let dives = std::thread::scope(|scope| {
         let running: Vec<_> = (0..threads).map(|thread| scope.spawn(move || of_thread(thread))).collect();

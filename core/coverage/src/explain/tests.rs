@@ -55,12 +55,16 @@ impl Default for Wall {
 const BARE: Option<[[f64; 2]; 2]> = Some([[9.7, 10.5], [3.0, 4.5]]);
 
 fn named(wall: &Wall) -> Vec<Cause> {
-    let layout = StoreLayout { perimeter_m: PERIMETER_M, from_m: 0.0, to_m: 20.0, cell_m: 0.25, capacity: 40_000 };
+    let layout =
+        StoreLayout { perimeter_m: PERIMETER_M, from_m: 0.0, to_m: 20.0, cell_m: 0.25, capacity: 40_000 };
     let (mut store, mut lacks) = (SampleStore::new(layout), Lacks::default());
     let count = |length_m: f64, step_m: f64| math::floor_to_i64(length_m / step_m + 1e-9);
-    for i in 0..=count(wall.end_m - 6.0, wall.along_m) {
+    // The middle between two passes lies in the middle of the section.
+    let rows = count(4.0, wall.along_m);
+    let x_m = |i: i64| 10.125 + (i as f64 + 0.5) * wall.along_m;
+    for i in (-rows..=rows).filter(|i| x_m(*i) < wall.end_m) {
         for k in 0..count(PERIMETER_M, wall.around_m) {
-            let (x_m, arc_m) = (6.0 + i as f64 * wall.along_m, k as f64 * wall.around_m);
+            let (x_m, arc_m) = (x_m(i), k as f64 * wall.around_m);
             let is_bare = wall.bare.is_some_and(|[along, around]| {
                 (along[0]..along[1]).contains(&x_m) && (around[0]..around[1]).contains(&arc_m)
             });
@@ -94,7 +98,10 @@ fn named(wall: &Wall) -> Vec<Cause> {
 #[test]
 fn each_cause_alone_is_named() {
     for (cause, wall) in [
-        (Cause::TooFast, Wall { along_m: 0.7, drive: Drive { speed_mps: 0.35, ..sound() }, ..Wall::default() }),
+        (
+            Cause::TooFast,
+            Wall { along_m: 0.7, drive: Drive { speed_mps: 0.35, ..sound() }, ..Wall::default() },
+        ),
         (
             Cause::AngularStep,
             Wall {
@@ -106,7 +113,10 @@ fn each_cause_alone_is_named() {
         ),
         (Cause::OffAxis, Wall { around_m: 0.6, drive: Drive { t_y_m: 0.6, ..sound() }, ..Wall::default() }),
         (Cause::OffAxis, Wall { along_m: 0.78, drive: Drive { swing_m: 0.4, ..sound() }, ..Wall::default() }),
-        (Cause::Phase, Wall { along_m: 0.76, drive: Drive { healthy_gap_s: 4.0, ..sound() }, ..Wall::default() }),
+        (
+            Cause::Phase,
+            Wall { along_m: 0.76, drive: Drive { healthy_gap_s: 4.0, ..sound() }, ..Wall::default() },
+        ),
         (Cause::NotPassed, Wall { end_m: 10.1, ..Wall::default() }),
         (Cause::PositionLost, Wall { bare: BARE, is_torn: true, ..Wall::default() }),
         (Cause::Unknown, Wall { bare: BARE, ..Wall::default() }),
@@ -128,7 +138,7 @@ fn each_cause_alone_is_named() {
 #[test]
 fn of_two_that_are_needed_both_are_named_and_of_two_that_suffice_the_one_the_pilot_can_change() {
     let fast = Wall { along_m: 0.7, drive: Drive { speed_mps: 0.35, ..sound() }, ..Wall::default() };
-    let wide = Some([[9.0, 11.4], [3.0, 4.5]]);
+    let wide = Some([[8.6, 11.7], [3.0, 5.5]]);
     let why = Causes::of(Cause::MissingReturns);
     assert_eq!(named(&Wall { bare: wide, why, ..fast }), [Cause::TooFast, Cause::MissingReturns]);
     // What was lost here and there has only made it worse.

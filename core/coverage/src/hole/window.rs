@@ -81,7 +81,8 @@ impl Window {
         cell_m: f64,
     ) {
         self.begin(store.perimeter_m(), origin_m, (from_m, to_m), cell_m);
-        store.visit_between(origin_m + from_m, origin_m + to_m, |x_m, arc_m| self.push(x_m - origin_m, arc_m));
+        store
+            .visit_between(origin_m + from_m, origin_m + to_m, |x_m, arc_m| self.push(x_m - origin_m, arc_m));
         self.sort();
     }
 

@@ -96,7 +96,12 @@ mod tests {
     use crate::store::{StoreLayout, WallSample};
 
     /// Samples every 0.5 m along and around a wall of 10 m perimeter, but for those that `is_in` leaves out.
-    fn has(is_in: impl Fn(u32, u32) -> bool, radius_m: f64, otherwise: &Otherwise, more: &[[f64; 2]]) -> bool {
+    fn has(
+        is_in: impl Fn(u32, u32) -> bool,
+        radius_m: f64,
+        otherwise: &Otherwise,
+        more: &[[f64; 2]],
+    ) -> bool {
         let layout = StoreLayout { perimeter_m: 10.0, from_m: 0.0, to_m: 10.0, cell_m: 0.25, capacity: 1000 };
         let mut store = SampleStore::new(layout);
         for (i, k) in (0..20).flat_map(|i| (0..20).map(move |k| (i, k))).filter(|(i, k)| is_in(*i, *k)) {
@@ -132,14 +137,14 @@ mod tests {
 
     #[test]
     fn where_samples_may_still_land_the_wall_becomes_as_it_is_before() {
-        // Drawn together to half, a circle reaches a metre ahead, where nothing has landed yet.
-        let ends = |i: u32, _| i <= 12;
+        // Drawn together, a circle at the end reaches ahead, where nothing has landed yet.
+        let ends = |i: u32, _| i <= 10;
         let otherwise = Otherwise { along: 0.3, ..Otherwise::NOTHING };
-        let to_come = Some(Reach { from_m: 6.1, to_m: f64::INFINITY });
-        assert!(has(ends, 0.27, &otherwise, &[]));
-        assert!(!has(ends, 0.27, &Otherwise { to_come, ..otherwise }, &[]));
+        let to_come = Some(Reach { from_m: 5.25, to_m: f64::INFINITY });
+        assert!(has(ends, 0.275, &otherwise, &[]));
+        assert!(!has(ends, 0.275, &Otherwise { to_come, ..otherwise }, &[]));
         // A strip that nobody sees stays one.
-        let strip = |i: u32, k: u32| i <= 12 && k != 4;
+        let strip = |i: u32, k: u32| i <= 10 && k != 4;
         assert!(has(strip, 0.4, &Otherwise { to_come, ..otherwise }, &[]));
     }
 

@@ -6,8 +6,8 @@ use bevy_ecs::prelude::{Res, ResMut, Single};
 
 use super::doubt;
 use super::driving::Driving;
-use super::lacking;
 use super::judge::{Results, judge_one};
+use super::lacking;
 use super::walls::{self, Sorting};
 use super::way::{Heads, note_beat};
 use crate::alerts::Alerts;

@@ -54,7 +54,9 @@ pub(super) fn georeference(
                     outcome: outcome(&sonar, fix, mount, hides, &tunnel),
                     angle_rad: sonar.angle_rad,
                     hidden: hides,
-                    beside_hidden: [-BESIDE_RAD, BESIDE_RAD].iter().any(|by| hidden.hides(sonar.angle_rad + by)),
+                    beside_hidden: [-BESIDE_RAD, BESIDE_RAD]
+                        .iter()
+                        .any(|by| hidden.hides(sonar.angle_rad + by)),
                     longest_m: longest_m(&sonar, &tunnel),
                     source: event.source,
                     origin: fix.ok().map(|fix| fix.pose.place(mount.position)),

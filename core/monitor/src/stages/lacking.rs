@@ -86,7 +86,12 @@ stateful!(Lacking { state: heads, pose, forgot; lists: away; });
 impl Default for Lacking {
     /// Allocates: startup only; all that it will ever use.
     fn default() -> Self {
-        Self { heads: [Turning::default(); MAX_HEADS], pose: None, away: Vec::with_capacity(ROOM), forgot: false }
+        Self {
+            heads: [Turning::default(); MAX_HEADS],
+            pose: None,
+            away: Vec::with_capacity(ROOM),
+            forgot: false,
+        }
     }
 }
 
@@ -112,7 +117,8 @@ impl Lacking {
             match motion {
                 Some(motion) if !stalled.has(number.0) => {
                     let turns_on = motion.sector_rad.is_none();
-                    head.seen = turns_on.then_some((at, motion.angle_rad, motion.rate_radps, motion.step_rad));
+                    head.seen =
+                        turns_on.then_some((at, motion.angle_rad, motion.rate_radps, motion.step_rad));
                 }
                 _ => {
                     let Some((seen, angle_rad, rate_radps, step_rad)) = head.seen else { continue };
@@ -152,7 +158,10 @@ pub(super) fn note_ping(driving: &mut Driving, ping: &PlacedPing, lacks: &mut La
             let is_lost = !matches!(ping.outcome, Outcome::Unplaced(_));
             let why = Causes::of(Cause::PositionLost);
             let number = u8::try_from(ping.head).unwrap_or(u8::MAX);
-            *forgot |= !keep(away, Away { at: ping.valid_at, head: number, angle_rad: ping.angle_rad, why, is_lost });
+            *forgot |= !keep(
+                away,
+                Away { at: ping.valid_at, head: number, angle_rad: ping.angle_rad, why, is_lost },
+            );
         }
         Outcome::Lost(_, None) | Outcome::Unplaced(_) => {}
     }
@@ -181,7 +190,8 @@ pub(super) fn note_beat(
         let out_of_step = stalled.has(number.0);
         let late = |moved: &MonoNs| out_of_step || at.since(*moved).0 > LACKING_AFTER.0;
         let Some(moved) = head.moved.filter(late) else { continue };
-        let Some((seen, angle_rad, rate_radps, step_rad)) = head.seen.filter(|seen| seen.2.abs() > 0.0) else {
+        let Some((seen, angle_rad, rate_radps, step_rad)) = head.seen.filter(|seen| seen.2.abs() > 0.0)
+        else {
             continue;
         };
         let from = match head.noted {
