@@ -50,11 +50,13 @@ const WELL_OVER: f64 = 1.2;
 const OVER_PLAN: f64 = 1.15;
 /// Multiples of the target that what is left of the hole may reach, tried in turn before a larger set is: figures are those
 /// of one moment, holes have many.
-const ROUGHLY: [f64; 2] = [1.0, 1.1];
+const ROUGHLY: [f64; 2] = [1.0, 1.05];
 /// The same of the swing between passes: even a steady vehicle sways.
 const SWINGS: f64 = 0.85;
 /// Multiple of the target beyond which what is left of the hole says that something else is the matter.
 const AT_MOST: f64 = 1.3;
+/// Share of the target from which steps from the middle count.
+const COARSE: f64 = 0.75;
 /// Ratio of a finer mode's step to the present one.
 const FINER: f64 = 0.375;
 /// Largest set that is looked for.
@@ -168,7 +170,7 @@ fn present(case: &Case<'_>, seen: &Seen, perimeter_m: f64) -> Causes {
     add(case.is_torn || seen.unseen, Cause::PositionLost);
     add(is_dark(seen), Cause::HeadSilent);
     let coarse = drive.middle_t_y_m > 0.9 * target_m;
-    add(coarse, Cause::AngularStep);
+    add(drive.middle_t_y_m > COARSE * target_m, Cause::AngularStep);
     let as_planned = spacing::t_max_m(drive.planned_along_m(), drive.advance_m(), drive.middle_t_y_m);
     let over = if coarse { drive.planned_along_m() } else { as_planned } / target_m;
     add(over > WELL_OVER || over > 1.0 && drive.speed_mps > OVER_PLAN * drive.planned_mps, Cause::TooFast);

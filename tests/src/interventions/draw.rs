@@ -180,7 +180,7 @@ fn heads(count: usize, side_by_side: bool) -> Vec<String> {
             return format!("position_m = [{:.2}, 0, 0]\nangles_deg = [0, 0, 0]\n", 0.55 - 0.3 * head as f64);
         }
         let (x_m, yaw) = if head < 2 { (0.551, 0) } else { (-0.551, 180) };
-        let y_m = if head % 2 == 0 { 0.15 } else { -0.15 };
+        let y_m = if head.is_multiple_of(2) { 0.15 } else { -0.15 };
         format!("position_m = [{x_m}, {y_m}, 0]\nangles_deg = [0, 0, {yaw}]\n")
     };
     (0..count).map(place).collect()

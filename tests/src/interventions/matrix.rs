@@ -23,7 +23,7 @@ impl Count {
     }
 
     /// Share of right ones; 1 of nothing.
-    pub fn share(&self) -> f64 {
+    pub fn share(self) -> f64 {
         if self.all == 0 { 1.0 } else { f64::from(self.right) / f64::from(self.all) }
     }
 }

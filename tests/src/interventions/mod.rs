@@ -191,7 +191,7 @@ impl Intervened {
 /// The kinds injected into the dive of a number: one into every other dive, two into the others, all in turn.
 pub fn kinds(seed: u64) -> Vec<usize> {
     let number = usize::try_from(seed).unwrap();
-    if number % 2 == 0 {
+    if number.is_multiple_of(2) {
         return vec![number / 2 % KINDS.len()];
     }
     // All pairs in turn.

@@ -144,7 +144,8 @@ mod tests {
         assert!(has(ends, 0.275, &otherwise, &[]));
         assert!(!has(ends, 0.275, &Otherwise { to_come, ..otherwise }, &[]));
         // A strip that nobody sees stays one.
-        let strip = |i: u32, k: u32| i <= 10 && k != 4;
+        let strip = |i: u32, k: u32| i <= 11 && k != 4;
+        let to_come = Some(Reach { from_m: 6.0, to_m: f64::INFINITY });
         assert!(has(strip, 0.4, &Otherwise { to_come, ..otherwise }, &[]));
     }
 

@@ -3,7 +3,9 @@
 use bevy_ecs::prelude::{Query, Res, ResMut};
 
 use crate::entities::{Head, HiddenAngles, MeasuredMotion, Mounted};
-use crate::messages::{Aim, Events, Outcome, Placed, PlacedList, PlacedPing, Positioned, PositionedList};
+use crate::messages::{
+    Aim, Events, Hidden, Outcome, Placed, PlacedList, PlacedPing, Positioned, PositionedList,
+};
 use crate::resources::{Target, TunnelDesign, VehicleEntities};
 use headrace_coverage::{Loss, PassError, Reach};
 use headrace_fusion::{Fix, NoFix};
@@ -42,6 +44,7 @@ pub(super) fn georeference(
                 let turned = motion.ping(event.valid_at, sonar.angle_rad);
                 let mount = &mounted.info.mount;
                 let hides = hidden.hides(sonar.angle_rad);
+                let beside = [-BESIDE_RAD, BESIDE_RAD].iter().any(|by| hidden.hides(sonar.angle_rad + by));
                 let ping = PlacedPing {
                     head: head.0,
                     received: event.received,
@@ -53,10 +56,13 @@ pub(super) fn georeference(
                     standing: turned.standing,
                     outcome: outcome(&sonar, fix, mount, hides, &tunnel),
                     angle_rad: sonar.angle_rad,
-                    hidden: hides,
-                    beside_hidden: [-BESIDE_RAD, BESIDE_RAD]
-                        .iter()
-                        .any(|by| hidden.hides(sonar.angle_rad + by)),
+                    hidden: if hides {
+                        Hidden::Yes
+                    } else if beside {
+                        Hidden::Beside
+                    } else {
+                        Hidden::No
+                    },
                     longest_m: longest_m(&sonar, &tunnel),
                     source: event.source,
                     origin: fix.ok().map(|fix| fix.pose.place(mount.position)),

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::driving::Driving;
 use super::way::Heads;
-use crate::messages::{Aim, Outcome, PlacedPing};
+use crate::messages::{Aim, Hidden, Outcome, PlacedPing};
 use crate::resources::Coverage;
 use headrace_coverage::{Cause, Causes, Drive, Lack, Lacks, Loss};
 use headrace_geometry::frames::{Mount, Pose, Vec3, head_direction};
@@ -146,7 +146,7 @@ pub(super) fn note_ping(driving: &mut Driving, ping: &PlacedPing, lacks: &mut La
     }
     head.moved = Some(ping.valid_at);
     match ping.outcome {
-        Outcome::Sample { .. } => head.note_hidden(ping.hidden, false),
+        Outcome::Sample { .. } => head.note_hidden(ping.hidden == Hidden::Yes, false),
         Outcome::Lost(loss, Some(Aim { x_m, arc_m })) => {
             head.note_hidden(loss == Loss::Occluded, true);
             // Where the wall is heard at such angles all the same, what isn't is missing.

@@ -8,7 +8,7 @@ use super::judge::digest_alert;
 use super::samples::note_sample;
 use crate::alerts::{AlertKind, Alerts};
 use crate::entities::{HeadSweep, Waiting};
-use crate::messages::{Aim, Notice, Notices, Outcome, PlacedPing, Requests};
+use crate::messages::{Aim, Hidden, Notice, Notices, Outcome, PlacedPing, Requests};
 use crate::resources::{Coverage, Digests, Tally, TunnelDesign, VehicleEntities};
 use crate::result_stream::RecordKind;
 use headrace_coverage::deviation::off_m;
@@ -184,7 +184,7 @@ fn doubtful(sorting: &mut Sorting<'_>, sweep: &mut HeadSweep, ping: &PlacedPing)
     }
     let Some(Aim { x_m, arc_m }) = aim else { return };
     // What is heard beside the vehicle's outline, and isn't the wall, is the vehicle.
-    let cause = if ping.beside_hidden { Cause::Occluded } else { Cause::MissingReturns };
+    let cause = if ping.hidden == Hidden::No { Cause::MissingReturns } else { Cause::Occluded };
     lacks.add(Lack { x_m, arc_m, why: Causes::of(cause) });
     if let Some(section) = sections.get_mut(sections.index_of(x_m)) {
         section.doubtful += 1;
