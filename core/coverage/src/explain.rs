@@ -4,8 +4,9 @@
 //! are lacking for it are put back, or the wall is drawn together by as much as passes or steps would have been closer.
 //! `docs/coverage.md` has the order and its reasons.
 
-use super::cause::{Cause, Evidence};
+use super::cause::Cause;
 use super::causes::Causes;
+use super::evidence::Evidence;
 use super::frontier::Reach;
 use super::hole::{Hole, HoleFinder, Otherwise};
 use super::lacks::{Lack, Lacks};

@@ -26,6 +26,7 @@ pub mod action;
 pub mod cause;
 pub mod causes;
 pub mod deviation;
+pub mod evidence;
 pub mod explain;
 pub mod frontier;
 pub mod hole;
@@ -45,8 +46,9 @@ pub mod wall_limits;
 pub mod what_if;
 
 pub use action::Action;
-pub use cause::{Cause, Evidence};
+pub use cause::Cause;
 pub use causes::Causes;
+pub use evidence::Evidence;
 pub use frontier::{Frontier, HeadReach, Outlook, Reach};
 pub use hole::{Hole, HoleFinder};
 pub use lacks::{Lack, Lacks};

@@ -2,8 +2,8 @@
 
 use core::ops::Range;
 
-use super::cause::Evidence;
 use super::causes::Causes;
+use super::evidence::Evidence;
 use super::explain::{Case, explain};
 use super::frontier::{Moved, Outlook, Reach, clear_of};
 use super::hole::{FARTHEST_M, Hole, HoleFinder};

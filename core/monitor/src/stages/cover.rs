@@ -43,10 +43,17 @@ pub(super) fn cover(
             Placed::Situation(at, situation, doubts) => {
                 doubt::note(*at, situation, doubts, (&mut alerts, &mut notices, &mut digests));
                 let driving = &mut **driving;
-                let healthy = driving.lacking.healthy(*at, situation, &heads, driving.stalled);
+                let healthy = driving.lacking.healthy(*at, situation, &heads);
                 let plan = (target.planned_speed_mps, target.target_m);
                 driving.note(*at, [situation, &healthy], &tunnel.profile, plan);
-                lacking::note_beat(driving, &heads, (*at, situation), &tunnel.profile, &mut coverage);
+                lacking::note_beat(
+                    &mut driving.lacking,
+                    driving.now,
+                    &heads,
+                    (*at, situation),
+                    &tunnel.profile,
+                    &mut coverage,
+                );
                 note_beat(&mut coverage, &mut heads, &tunnel, (*at, situation), &mut requests);
                 if at.0 % LOOK_AROUND.0.unsigned_abs() == 0 {
                     let reaches = heads.iter().filter_map(|(.., frontier)| frontier.0);
@@ -59,12 +66,20 @@ pub(super) fn cover(
                 coverage.frontier.hear(ping.received);
                 if let Some(fix) = &ping.fix {
                     let now = (ping.valid_at, fix.pose);
-                    lacking::note_away(&mut driving, &heads, now, &tunnel.profile, &mut coverage);
+                    let driving = &mut **driving;
+                    lacking::note_away(
+                        &mut driving.lacking,
+                        driving.now,
+                        &heads,
+                        now,
+                        &tunnel.profile,
+                        &mut coverage,
+                    );
                 }
                 let head = entities.of_head(ping.head).and_then(|entity| heads.get_mut(entity).ok());
                 let Some((.., mut sweep, mut frontier)) = head else { continue };
                 let driving = &mut **driving;
-                lacking::note_ping(driving, ping, &mut coverage.lacks);
+                lacking::note_ping(&mut driving.lacking, ping, &mut coverage.lacks);
                 note_passage(&mut coverage, &frontier, &driving.now, ping);
                 let mut sorting = Sorting {
                     coverage: &mut coverage,

@@ -40,12 +40,10 @@ pub(crate) struct Driving {
     /// The passes for which the speed that fits was last found, seconds and metres.
     fitted: [f64; 2],
     looks: Looks,
-    /// Heads that have stood still, and haven't been in step with the others since.
-    pub(super) stalled: HeadSet,
     pub(super) lacking: Lacking,
 }
 
-stateful!(Driving { state: now, step_rad, place_m, fitted, looks, stalled, lacking; });
+stateful!(Driving { state: now, step_rad, place_m, fitted, looks, lacking; });
 
 impl Driving {
     /// Updates the statistics for a beat, from the situation as it is and as it would be had no head been silent or stood
@@ -137,7 +135,7 @@ impl Driving {
         let planned_gap_s = gap_s(&planned).min(healthy_gap_s);
         let all_turn = turning == situation.configured && self.lacking.all_turn(at);
         if all_turn && gap_s(&passes) <= IN_STEP * planned_gap_s {
-            self.stalled = HeadSet::default();
+            self.lacking.stalled = HeadSet::default();
         }
         let periods = healthy.heads.iter().flatten().map(HeadMotion::ping_period_s);
         self.now = Drive {

@@ -5,7 +5,6 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::driving::Driving;
 use super::way::Heads;
 use crate::messages::{Aim, Hidden, Outcome, PlacedPing};
 use crate::resources::Coverage;
@@ -79,9 +78,11 @@ pub(crate) struct Lacking {
     away: Vec<Away>,
     /// There was no room for some.
     forgot: bool,
+    /// Heads that have stood still, and haven't been in step with the others since.
+    pub(super) stalled: HeadSet,
 }
 
-stateful!(Lacking { state: heads, pose, forgot; lists: away; });
+stateful!(Lacking { state: heads, pose, forgot, stalled; lists: away; });
 
 impl Default for Lacking {
     /// Allocates: startup only; all that it will ever use.
@@ -91,6 +92,7 @@ impl Default for Lacking {
             pose: None,
             away: Vec::with_capacity(ROOM),
             forgot: false,
+            stalled: HeadSet::default(),
         }
     }
 }
@@ -103,13 +105,8 @@ impl Lacking {
     }
 
     /// The situation as it would be had no head been silent or stood still: such heads turn on as they last did.
-    pub(super) fn healthy(
-        &mut self,
-        at: MonoNs,
-        situation: &Situation,
-        heads: &Heads<'_, '_>,
-        stalled: HeadSet,
-    ) -> Situation {
+    pub(super) fn healthy(&mut self, at: MonoNs, situation: &Situation, heads: &Heads<'_, '_>) -> Situation {
+        let stalled = self.stalled;
         let mut healthy = *situation;
         for (number, mounted, ..) in heads {
             let slot = self.heads.get_mut(number.0).zip(healthy.heads.get_mut(number.0));
@@ -133,11 +130,11 @@ impl Lacking {
 }
 
 /// Notes a ping: a lack, if it was aimed at the wall in vain.
-pub(super) fn note_ping(driving: &mut Driving, ping: &PlacedPing, lacks: &mut Lacks) {
+pub(super) fn note_ping(lacking: &mut Lacking, ping: &PlacedPing, lacks: &mut Lacks) {
     if ping.standing {
-        driving.stalled = driving.stalled.with(ping.head);
+        lacking.stalled = lacking.stalled.with(ping.head);
     }
-    let Lacking { heads, away, forgot, .. } = &mut driving.lacking;
+    let Lacking { heads, away, forgot, .. } = lacking;
     let Some(head) = heads.get_mut(ping.head) else { return };
     head.pinged = Some(ping.valid_at);
     head.longest_m = ping.longest_m;
@@ -171,18 +168,18 @@ pub(super) fn note_ping(driving: &mut Driving, ping: &PlacedPing, lacks: &mut La
 ///
 /// Allocates: never.
 pub(super) fn note_beat(
-    driving: &mut Driving,
+    lacking: &mut Lacking,
+    now: Drive,
     heads: &Heads<'_, '_>,
     (at, situation): (MonoNs, &Situation),
     profile: &Profile,
     coverage: &mut Coverage,
 ) {
-    let stalled = driving.stalled;
+    let stalled = lacking.stalled;
     if let Some(pose) = situation.pose {
-        note_away(driving, heads, (at, pose), profile, coverage);
+        note_away(lacking, now, heads, (at, pose), profile, coverage);
     }
-    let now = driving.now;
-    let Lacking { heads: turning, pose: before, away, forgot } = &mut driving.lacking;
+    let Lacking { heads: turning, pose: before, away, forgot, .. } = lacking;
     let speed_mps = situation.speed_mps;
     for (number, mounted, hidden, ..) in heads {
         let Some(head) = turning.get_mut(number.0) else { continue };
@@ -229,14 +226,14 @@ pub(super) fn note_beat(
 ///
 /// Allocates: never.
 pub(super) fn note_away(
-    driving: &mut Driving,
+    lacking: &mut Lacking,
+    now: Drive,
     heads: &Heads<'_, '_>,
     (at, pose): (MonoNs, Pose),
     profile: &Profile,
     coverage: &mut Coverage,
 ) {
-    let now = driving.now;
-    let Lacking { heads: turning, pose: before, away, forgot } = &mut driving.lacking;
+    let Lacking { heads: turning, pose: before, away, forgot, .. } = lacking;
     let Some((then, from)) = *before else { return };
     let way = Way { from: (then, from), to: (at, pose) };
     let speed_mps = way.speed_mps();
