@@ -158,10 +158,7 @@ fn present(case: &Case<'_>, seen: &Seen, perimeter_m: f64) -> Causes {
     };
     let mut present = lacking.filter(near).fold(Causes::default(), |all, lack| all.union(lack.why));
     let drive = &seen.worst;
-    let is_passed = case.swept_by_all.is_some_and(|swept| {
-        let radius_m = hole.diameter_m.min(target_m) / 2.0;
-        hole.x_m - radius_m >= swept.from_m && hole.x_m + radius_m <= swept.to_m
-    });
+    let is_passed = is_passed(case);
     let mut add = |is_present: bool, cause: Cause| {
         if is_present {
             present = present.with(cause);
@@ -180,6 +177,13 @@ fn present(case: &Case<'_>, seen: &Seen, perimeter_m: f64) -> Causes {
     let aside = drive.middle_t_y_m < HELPS * drive.t_y_m;
     add(steady.along_m() < SWINGS * drive.along_m() || aside, Cause::OffAxis);
     present
+}
+
+/// Whether every live head has swept the hole, as far as the target matters.
+fn is_passed(case: &Case<'_>) -> bool {
+    let radius_m = case.hole.diameter_m.min(case.target_m) / 2.0;
+    let [from_m, to_m] = [case.hole.x_m - radius_m, case.hole.x_m + radius_m];
+    case.swept_by_all.is_some_and(|swept| from_m >= swept.from_m && to_m <= swept.to_m)
 }
 
 /// Heads in sectors were silent: where they would have pinged isn't known.
@@ -202,6 +206,11 @@ impl Trial<'_> {
     fn smallest(&mut self, present: Causes) -> Causes {
         if present.is_empty() || !self.passes_without(present, AT_MOST) {
             return Causes::of(Cause::Unknown);
+        }
+        // Nothing else is known of wall that wasn't passed.
+        let not_passed = Causes::of(Cause::NotPassed);
+        if not_passed.is_within(present) && self.passes_without(not_passed, ROUGHLY[1]) {
+            return not_passed;
         }
         for size in 1..=present.len().min(MOST_NAMED) {
             for roughly in ROUGHLY {
@@ -246,7 +255,12 @@ impl Trial<'_> {
     fn otherwise(&self, removed: Causes) -> Otherwise {
         let all = Some(Reach { from_m: f64::NEG_INFINITY, to_m: f64::INFINITY });
         let swept = self.case.swept_by_all;
-        let mut covered = [None; 3];
+        let mut covered = [None; 4];
+        // Beyond the end of what was passed, the wall isn't as it is before.
+        let to_come = self.case.to_come.filter(|_| is_passed(self.case));
+        if to_come.is_none() {
+            covered[3] = self.case.to_come;
+        }
         if removed.has(Cause::NotPassed) {
             let before = swept.map_or(f64::INFINITY, |swept| swept.from_m);
             let beyond = swept.map_or(f64::NEG_INFINITY, |swept| swept.to_m);
@@ -269,7 +283,7 @@ impl Trial<'_> {
             ),
             around: ratio(then.t_y_m, self.drive.t_y_m) * finer,
             covered,
-            to_come: self.case.to_come,
+            to_come,
         }
     }
 }

@@ -142,7 +142,7 @@ fn of_two_that_are_needed_both_are_named_and_of_two_that_suffice_the_one_the_pil
     let why = Causes::of(Cause::MissingReturns);
     assert_eq!(named(&Wall { bare: wide, why, ..fast }), [Cause::TooFast, Cause::MissingReturns]);
     // What was lost here and there has only made it worse.
-    let here = Some([[9.7, 10.0], [3.0, 3.3]]);
+    let here = Some([[10.4, 10.5], [3.0, 3.1]]);
     let fast = Wall { along_m: 0.7, drive: Drive { speed_mps: 0.35, ..sound() }, ..Wall::default() };
     assert_eq!(named(&Wall { bare: here, why, ..fast }), [Cause::TooFast]);
     // What lacks for two reasons lacks for both.

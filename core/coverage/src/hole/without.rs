@@ -16,14 +16,14 @@ pub struct Otherwise {
     /// The same around the perimeter.
     pub around: f64,
     /// Stretches whose wall would have been covered.
-    pub covered: [Option<Reach>; 3],
+    pub covered: [Option<Reach>; 4],
     /// Where samples may still land: the wall there is taken to become as it is on this side.
     pub to_come: Option<Reach>,
 }
 
 impl Otherwise {
     /// Nothing.
-    pub const NOTHING: Self = Self { along: 1.0, around: 1.0, covered: [None; 3], to_come: None };
+    pub const NOTHING: Self = Self { along: 1.0, around: 1.0, covered: [None; 4], to_come: None };
 
     /// How far a chainage would be from a stretch that would have been covered, m.
     fn clear_m(&self, x_m: f64) -> f64 {
@@ -154,6 +154,11 @@ mod tests {
         let behind = |i: u32, _| i <= 9;
         assert!(has(behind, 0.4, &Otherwise::NOTHING, &[]));
         let ahead = Some(Reach { from_m: 4.7, to_m: f64::INFINITY });
-        assert!(!has(behind, 0.4, &Otherwise { covered: [None, ahead, None], ..Otherwise::NOTHING }, &[]));
+        assert!(!has(
+            behind,
+            0.4,
+            &Otherwise { covered: [None, ahead, None, None], ..Otherwise::NOTHING },
+            &[]
+        ));
     }
 }
