@@ -4,7 +4,6 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a bench stops at what it can't do")]
 
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use headrace_tests::interventions::{Matrix, intervene, kinds, remedies};
@@ -16,23 +15,21 @@ fn main() {
     let wrong = arguments.iter().any(|word| word == "wrong");
     let remedy = arguments.iter().any(|word| word == "remedies");
     let sections = arguments.iter().any(|word| word == "sections");
-    let (next, dives) = (AtomicU64::new(from), Mutex::new(Vec::new()));
-    std::thread::scope(|scope| {
-        for _ in 0..2 {
-            scope.spawn(|| {
-                loop {
-                    let seed = next.fetch_add(1, Ordering::SeqCst);
-                    if seed >= to {
-                        return;
-                    }
-                    let dive = intervene(seed, &kinds(seed));
-                    let done = if remedy { remedies(&dive) } else { Vec::new() };
-                    dives.lock().unwrap().push((seed, dive, done));
-                }
-            });
-        }
+    let next = AtomicU64::new(from);
+    let work = || {
+        let numbers =
+            std::iter::repeat_with(|| next.fetch_add(1, Ordering::SeqCst)).take_while(|seed| *seed < to);
+        let dive = |seed: u64| {
+            let dive = intervene(seed, &kinds(seed));
+            let done = if remedy { remedies(&dive) } else { Vec::new() };
+            (seed, dive, done)
+        };
+        numbers.map(dive).collect::<Vec<_>>()
+    };
+    let mut dives: Vec<_> = std::thread::scope(|scope| {
+        let threads = [scope.spawn(work), scope.spawn(work)];
+        threads.into_iter().flat_map(|thread| thread.join().unwrap()).collect()
     });
-    let mut dives = dives.into_inner().unwrap();
     dives.sort_by_key(|(seed, ..)| *seed);
     let mut matrix = Matrix::default();
     let (mut runs, mut clear) = (0, 0);
