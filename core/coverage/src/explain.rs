@@ -214,25 +214,39 @@ impl Trial<'_> {
         if not_passed.is_within(present) && self.passes_without(not_passed, ROUGHLY[1]) {
             return not_passed;
         }
+        let mut needed = Causes::default();
         for size in 1..=present.len().min(MOST_NAMED) {
-            for roughly in ROUGHLY {
-                for beside in self.case.beside {
-                    if beside.len() == size
-                        && beside.is_within(present)
-                        && self.passes_without(beside, roughly)
-                    {
-                        return beside;
-                    }
+            if size == 2 {
+                needed = self.needed(present);
+            }
+            let sets = (1..=present.bits())
+                .filter(|bits| bits & !present.bits() == 0 && bits.count_ones() == size)
+                .map(Causes::from_bits);
+            let mut roughly = None;
+            let fit = |set: &Causes| set.len() == size && set.is_within(present) && needed.is_within(*set);
+            for set in self.case.beside.into_iter().chain(sets).filter(fit) {
+                if !self.passes_without(set, ROUGHLY[1]) {
+                    continue;
                 }
-                for bits in 1..=present.bits() {
-                    let set = Causes::from_bits(bits & present.bits());
-                    if set.bits() == bits && set.len() == size && self.passes_without(set, roughly) {
-                        return set;
-                    }
+                if self.passes_without(set, ROUGHLY[0]) {
+                    return set;
                 }
+                roughly = roughly.or(Some(set));
+            }
+            if let Some(set) = roughly {
+                return set;
             }
         }
         present
+    }
+
+    /// The factors without which no set will do: all the others together don't.
+    fn needed(&mut self, present: Causes) -> Causes {
+        let mut is_needed = |cause: &Cause| {
+            let others = Causes::from_bits(present.bits() & !Causes::of(*cause).bits());
+            !self.passes_without(others, ROUGHLY[1])
+        };
+        present.iter().filter(|cause| is_needed(cause)).collect()
     }
 
     /// Whether the section would have met so many times the target without some factors.
