@@ -31,6 +31,8 @@ pub struct Case<'a> {
     pub to_come: Option<Reach>,
     /// No head was alive then.
     pub none_alive: bool,
+    /// No head pinged in it, and some went through it silent.
+    pub is_dark: bool,
     /// Nothing sure relates its samples to each other.
     pub is_torn: bool,
     /// Target T, m.
@@ -168,7 +170,7 @@ fn present(case: &Case<'_>, seen: &Seen, perimeter_m: f64) -> Causes {
     };
     add(!is_passed && !case.none_alive || !hole.bounded && seen.silent.is_empty(), Cause::NotPassed);
     add(case.is_torn || seen.unseen, Cause::PositionLost);
-    add(is_dark(seen), Cause::HeadSilent);
+    add(is_dark(case, seen), Cause::HeadSilent);
     let coarse = drive.middle_t_y_m > 0.9 * target_m;
     add(drive.middle_t_y_m > COARSE * target_m, Cause::AngularStep);
     let as_planned = spacing::t_max_m(drive.planned_along_m(), drive.advance_m(), drive.middle_t_y_m);
@@ -188,9 +190,14 @@ fn is_passed(case: &Case<'_>) -> bool {
     case.swept_by_all.is_some_and(|swept| from_m >= swept.from_m && to_m <= swept.to_m)
 }
 
-/// Heads in sectors were silent: where they would have pinged isn't known.
-fn is_dark(seen: &Seen) -> bool {
-    seen.worst.is_in_sectors && !seen.silent.is_empty()
+/// Silent heads would have pinged nobody knows where: in sectors, never heard, or all of them silent.
+fn is_dark(case: &Case<'_>, seen: &Seen) -> bool {
+    !seen.silent.is_empty() && seen.worst.is_in_sectors || is_unheard(case, seen)
+}
+
+/// Silent heads were never heard, or none was.
+fn is_unheard(case: &Case<'_>, seen: &Seen) -> bool {
+    !seen.silent.is_empty() && seen.worst.is_unheard || case.is_dark
 }
 
 /// Tries what a hole would have been without some of the factors.
@@ -213,6 +220,11 @@ impl Trial<'_> {
         let not_passed = Causes::of(Cause::NotPassed);
         if not_passed.is_within(present) && self.passes_without(not_passed, ROUGHLY[1]) {
             return not_passed;
+        }
+        // Nor of heads that were never there.
+        let silent = Causes::of(Cause::HeadSilent);
+        if is_unheard(self.case, self.seen) && self.passes_without(silent, ROUGHLY[1]) {
+            return silent;
         }
         let mut needed = Causes::default();
         for size in 1..=present.len().min(MOST_NAMED) {
@@ -284,7 +296,7 @@ impl Trial<'_> {
             covered[1] = Some(Reach { from_m: beyond, to_m: f64::INFINITY });
         }
         if removed.has(Cause::PositionLost) && (self.case.is_torn || self.seen.unseen)
-            || removed.has(Cause::HeadSilent) && is_dark(self.seen)
+            || removed.has(Cause::HeadSilent) && is_dark(self.case, self.seen)
         {
             covered[2] = all;
         }

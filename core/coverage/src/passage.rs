@@ -65,6 +65,8 @@ pub struct Drive {
     pub fits_mps: f64,
     /// Heads go back and forth in sectors.
     pub is_in_sectors: bool,
+    /// A head hasn't been heard since the dive began.
+    pub is_unheard: bool,
 }
 
 impl Drive {

@@ -446,7 +446,8 @@ impl Sections {
             let section = self.get(index).filter(|section| section.is_flagged());
             section.and_then(|section| section.evidence).map_or(Causes::default(), |evidence| evidence.causes)
         };
-        let visits = self.get(request.section).map(|section| section.visits).unwrap_or_default();
+        let here = self.get(request.section).copied().unwrap_or_default();
+        let (visits, passage) = (here.visits, here.passage);
         let case = Case {
             hole,
             bounds_m,
@@ -454,6 +455,7 @@ impl Sections {
             swept_by_all: request.swept_by_all,
             to_come: request.to_come,
             none_alive: request.none_alive,
+            is_dark: passage.pings == 0 && !passage.silent.is_empty(),
             is_torn: visits.are_unrelated(),
             target_m: self.target_m,
             beside: [beside(request.section - 1), beside(request.section + 1)],

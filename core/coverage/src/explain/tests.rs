@@ -85,6 +85,7 @@ fn named(wall: &Wall) -> Vec<Cause> {
         swept_by_all: Some(Reach { from_m: 6.0, to_m: wall.end_m }),
         to_come: None,
         none_alive: false,
+        is_dark: false,
         is_torn: wall.is_torn,
         target_m: TARGET_M,
         beside: wall.beside,

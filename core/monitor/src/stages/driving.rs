@@ -163,6 +163,7 @@ impl Driving {
             planned_gap_s,
             all_gap_s: all.even_gap_s(),
             ping_period_s: periods.fold(0.0, f64::max),
+            is_unheard: healthy.heads.iter().flatten().count() < situation.configured,
             is_in_sectors: situation.layout == HeadLayout::SectorOffset,
             ..self.now
         };
