@@ -3,7 +3,7 @@
 use headrace_coverage::{Cause, Unsure};
 use headrace_monitor::live_state::LiveMetres;
 use headrace_monitor::live_text::{helps_text, metres_text, unsure_text};
-use headrace_monitor::pilot_text::{action_text, cause_text, station};
+use headrace_monitor::pilot_text::{actions_text, cause_text, station};
 use headrace_monitor::report::{ChangeReport, JudgedReport, SmoothingReport};
 use headrace_monitor::report::{NotInspectedReport, Report, RunReport};
 use headrace_monitor::telling::UnsureStretch;
@@ -123,7 +123,8 @@ fn missed(run: &RunReport, report: &Report) -> String {
         append(&mut cause, format_args!(" ({})", run.silent_sources.join(", ")));
     }
     let back = report.way_home.iter().find(|back| back.run == run.id);
-    let action = back.map(|back| format!("  -> {}", action_text(back.action, run.start_m, back.at_most_mps)));
+    let action =
+        back.map(|back| format!("  -> {}", actions_text(&back.actions, run.start_m, back.at_most_mps)));
     format!(
         "  {} to {}  MISSED: {cause}, holes up to {:.2} m{}",
         station(run.start_m),

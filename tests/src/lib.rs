@@ -13,6 +13,7 @@ mod folder;
 #[cfg(unix)]
 pub mod garbling;
 pub mod instrumented;
+pub mod interventions;
 pub mod json_schema;
 mod log_files;
 pub mod outline;

@@ -3,6 +3,7 @@
 use serde::{Serialize, Serializer};
 
 use super::cause::Cause;
+use super::causes::Causes;
 
 /// Change to make when a failed stretch is passed again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -13,7 +14,7 @@ pub enum Action {
     FinerMode,
     /// A longer range setting.
     LongerRange,
-    /// Opposite heading or rolled, so that the vehicle occludes another part of the wall.
+    /// Rolled, so that the vehicle occludes another part of the wall: turned round it hides the same.
     OtherSide,
     /// Centred in the tunnel and steady.
     Middle,
@@ -44,6 +45,18 @@ impl Action {
         Self::Again,
     ];
 
+    /// The actions against several causes, that against the main one first.
+    pub fn against(causes: Causes) -> Vec<Self> {
+        let mut actions: Vec<Self> = Vec::new();
+        for cause in causes.iter() {
+            let action = Self::of(cause);
+            if !actions.contains(&action) {
+                actions.push(action);
+            }
+        }
+        actions
+    }
+
     /// The action against a cause.
     pub fn of(cause: Cause) -> Self {
         match cause {
@@ -56,7 +69,7 @@ impl Action {
             Cause::HeadStalled => Self::Head,
             Cause::HeadSilent => Self::HeadBack,
             Cause::PositionLost => Self::Position,
-            Cause::MissingReturns | Cause::NotPassed => Self::Again,
+            Cause::MissingReturns | Cause::NotPassed | Cause::Unknown => Self::Again,
         }
     }
 

@@ -18,6 +18,9 @@ use headrace_snapshot::stateful;
 mod certain;
 mod division;
 mod window;
+mod without;
+
+pub use without::Otherwise;
 
 /// Maximum search radius, m: wall farther than this from any sample counts as not passed.
 pub const FARTHEST_M: f64 = 12.0;

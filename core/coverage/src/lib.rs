@@ -1,7 +1,7 @@
 //! Coverage: samples on the unrolled wall, the holes between them, and the verdict on each section.
 //!
 //! [`SampleStore`] keeps samples, [`HoleFinder`] finds the largest empty circle of a section, [`Sections`] turns holes
-//! into verdicts and flags, [`cause`] names why a section failed, [`Runs`] joins flagged sections.
+//! into verdicts and flags, [`explain`] finds why a section failed, [`Runs`] joins flagged sections.
 //!
 //! ```
 //! use headrace_coverage::{HoleFinder, SampleStore, StoreLayout, WallSample};
@@ -24,9 +24,13 @@
 
 pub mod action;
 pub mod cause;
+pub mod causes;
 pub mod deviation;
+pub mod evidence;
+pub mod explain;
 pub mod frontier;
 pub mod hole;
+pub mod lacks;
 pub mod metres;
 pub mod openings;
 pub mod passage;
@@ -44,11 +48,14 @@ pub mod wall_limits;
 pub mod what_if;
 
 pub use action::Action;
-pub use cause::{Cause, Evidence};
+pub use cause::Cause;
+pub use causes::Causes;
+pub use evidence::Evidence;
 pub use frontier::{Frontier, HeadReach, Outlook, Reach};
 pub use hole::{Hole, HoleFinder};
+pub use lacks::{Lack, Lacks};
 pub use metres::Metres;
-pub use passage::{Loss, PassError, Passage};
+pub use passage::{Drive, Loss, PassError, Passage};
 pub use relief::Relief;
 pub use runs::{Run, RunChange, RunId, Runs};
 pub use section::{Judgement, Section, Spread, Verdict};

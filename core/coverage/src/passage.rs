@@ -2,11 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::hole::Hole;
 use headrace_fusion::Fix;
 use headrace_fusion::relative::Relative;
 use headrace_geometry::frames::Vec3;
-use headrace_geometry::math;
 use headrace_geometry::tunnel::Profile;
 use headrace_sampling::head::HeadSet;
 
@@ -27,30 +25,71 @@ pub struct Passage {
     pub unplaced: u32,
     /// Pings of a stalled head.
     pub standing: u32,
-    /// A head went through during a navigation outage.
-    pub unseen: bool,
     /// Heads that went through without a ping.
     pub silent: HeadSet,
-    /// Where on this section's wall lost pings were aimed, whichever section they were made in.
-    pub lost: Lost,
-    /// Sum of the speeds at the pings, m/s.
-    pub speed_sum_mps: f64,
-    /// Sum of the times between passes, seconds.
-    pub pass_gap_sum_s: f64,
-    /// The same with the passes evenly spread, seconds.
-    pub even_gap_sum_s: f64,
-    /// The same if all heads had been turning, seconds.
-    pub all_gap_sum_s: f64,
-    /// Sum of how far the beams swung along the tunnel between two passes, m.
-    pub swing_sum_m: f64,
-    /// Sum of the times between pings, seconds.
-    pub ping_period_sum_s: f64,
-    /// Largest step along the perimeter between neighbouring samples of a sweep, m.
-    pub t_y_m: f64,
-    /// The same predicted for a level vehicle in the middle of the tunnel, m.
-    pub middle_t_y_m: f64,
+    /// Driving at the moment of the largest T.
+    pub drive: Drive,
+    /// More pings went by without a fix than are remembered.
+    pub unseen: bool,
     /// Relative error between passes, of the newest visit with a ping here.
     pub pass_error: PassError,
+}
+
+/// How vehicle and heads moved at a moment.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Drive {
+    /// Speed along the tunnel, m/s, without its sign.
+    pub speed_mps: f64,
+    /// Speed for which the heads are put in phase, m/s; zero if none is planned.
+    pub planned_mps: f64,
+    /// The longest time between two passes of the heads that turned, seconds.
+    pub gap_s: f64,
+    /// The same with these heads evenly spread.
+    pub even_gap_s: f64,
+    /// The same with all heads turning as if none had been silent or stood still.
+    pub healthy_gap_s: f64,
+    /// The same with all heads' angles as scheduled, at this speed.
+    pub planned_gap_s: f64,
+    /// The same with all heads evenly spread.
+    pub all_gap_s: f64,
+    /// Time between two pings, seconds.
+    pub ping_period_s: f64,
+    /// How far the beams have swung along the tunnel since the neighbouring passes, where they reach farthest, m.
+    pub swing_m: f64,
+    /// Largest step along the perimeter between two pings where the vehicle was, by its geometry, m.
+    pub t_y_m: f64,
+    /// The same from the middle of the tunnel.
+    pub middle_t_y_m: f64,
+    /// Largest speed that meets the target from the middle, all heads turning as scheduled; the planned one where that does;
+    /// zero where none does, m/s.
+    pub fits_mps: f64,
+    /// Heads go back and forth in sectors.
+    pub is_in_sectors: bool,
+    /// A head hasn't been heard since the dive began.
+    pub is_unheard: bool,
+}
+
+impl Drive {
+    /// The distance between passes with the swing added, had no head been silent or stood still, m.
+    pub fn along_m(&self) -> f64 {
+        self.speed_mps * self.healthy_gap_s + self.swing_m + self.advance_m()
+    }
+
+    /// The distance between passes with all heads turning as scheduled, m.
+    pub fn planned_along_m(&self) -> f64 {
+        self.speed_mps * self.planned_gap_s
+    }
+
+    /// The distance travelled between two pings, m.
+    pub fn advance_m(&self) -> f64 {
+        self.speed_mps * self.ping_period_s
+    }
+
+    /// The one with the larger distance between passes.
+    #[must_use]
+    pub fn or_worse(self, other: Self) -> Self {
+        if other.along_m() > self.along_m() { other } else { self }
+    }
 }
 
 /// Reason a ping gave no sample.
@@ -67,58 +106,6 @@ pub enum Loss {
 impl Loss {
     /// All of them.
     pub const ALL: [Self; 3] = [Self::Missing, Self::OutOfRange, Self::Occluded];
-}
-
-/// Bins around the perimeter.
-const PARTS: f64 = 64.0;
-
-/// Lost pings around a section's wall: one bit for each of 64 bins of the perimeter, by reason.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub struct Lost([u64; Loss::ALL.len()]);
-
-impl Lost {
-    /// Records a ping lost at `arc_m`, in [0, perimeter).
-    pub fn note(&mut self, loss: Loss, arc_m: f64, perimeter_m: f64) {
-        if let Some(bits) = self.0.get_mut(loss as usize) {
-            *bits |= 1 << part(arc_m, perimeter_m);
-        }
-    }
-
-    /// Number of bins within `within_m` of an arc length that have lost pings, by reason.
-    pub fn near(&self, arc_m: f64, within_m: f64, perimeter_m: f64) -> [u32; Loss::ALL.len()] {
-        let near = (0..64_u32).fold(0_u64, |near, k| {
-            let middle_m = (f64::from(k) + 0.5) * perimeter_m / PARTS;
-            let off_m = math::wrap_signed(middle_m - arc_m, perimeter_m).abs();
-            // A bin counts if its nearer edge is within range.
-            near | (u64::from(off_m - perimeter_m / (2.0 * PARTS) < within_m) << k)
-        });
-        self.0.map(|bits| (bits & near).count_ones())
-    }
-}
-
-fn part(arc_m: f64, perimeter_m: f64) -> u32 {
-    u32::try_from(math::floor_to_i64(arc_m / perimeter_m * PARTS).clamp(0, 63)).unwrap_or(0)
-}
-
-/// Number of bins with lost pings within an empty circle, by reason, over the sections that it touches, each with its
-/// start and end chainage.
-pub fn lost_within<'a>(
-    hole: &Hole,
-    radius_m: f64,
-    perimeter_m: f64,
-    sections: impl Iterator<Item = ((f64, f64), &'a Passage)>,
-) -> [u32; Loss::ALL.len()] {
-    let mut sum = [0; Loss::ALL.len()];
-    for ((from_m, to_m), passage) in sections {
-        let off_m = (from_m - hole.x_m).max(hole.x_m - to_m).max(0.0);
-        if off_m >= radius_m {
-            continue;
-        }
-        let within_m = math::sqrt((radius_m - off_m) * (radius_m + off_m));
-        let near = passage.lost.near(hole.arc_m, within_m, perimeter_m);
-        sum = core::array::from_fn(|k| sum.get(k).copied().unwrap_or(0) + near.get(k).copied().unwrap_or(0));
-    }
-    sum
 }
 
 /// Ratio of the error of a section's largest hole to that of the distance between two passes at one point: the maximum
@@ -158,31 +145,5 @@ impl PassError {
     pub fn sd_m(&self, wall_m: [f64; 2]) -> f64 {
         LARGEST_OF_MANY
             * self.relative.sd_m(Vec3::new(0.0, wall_m[0] - self.from_m[0], wall_m[1] - self.from_m[1]))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn lost_pings_are_found_where_they_were_lost_and_across_the_seam() {
-        let mut lost = Lost::default();
-        lost.note(Loss::Missing, 0.05, 6.4);
-        lost.note(Loss::Occluded, 6.35, 6.4);
-        lost.note(Loss::Occluded, 3.2, 6.4);
-        assert_eq!(lost.near(6.39, 0.15, 6.4), [1, 0, 1]);
-        assert_eq!(lost.near(1.0, 0.5, 6.4), [0; 3]);
-        assert_eq!(lost.near(1.0, 3.3, 6.4), [1, 0, 2]);
-    }
-
-    #[test]
-    fn a_circle_is_narrower_towards_its_ends() {
-        let mut passage = Passage::default();
-        passage.lost.note(Loss::OutOfRange, 1.75, 6.4);
-        let hole = Hole { diameter_m: 2.0, least_m: 2.0, most_m: 2.0, x_m: 5.0, arc_m: 1.0, bounded: true };
-        let within =
-            |from_m: f64| lost_within(&hole, 1.0, 6.4, core::iter::once(((from_m, from_m + 0.25), &passage)));
-        assert_eq!((within(5.0), within(5.75), within(6.0)), ([0, 1, 0], [0; 3], [0; 3]));
     }
 }

@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::cause::Evidence;
 use super::deviation::Deviation;
+use super::evidence::Evidence;
 use super::hole::Hole;
 use super::passage::{PassError, Passage};
 use super::unsure::Unsure;

@@ -2,9 +2,12 @@
 
 use core::ops::Range;
 
-use super::cause::{Case, Evidence, explain};
+use super::causes::Causes;
+use super::evidence::Evidence;
+use super::explain::{Case, explain};
 use super::frontier::{Moved, Outlook, Reach, clear_of};
 use super::hole::{FARTHEST_M, Hole, HoleFinder};
+use super::lacks::Lacks;
 use super::metres::Metres;
 use super::openings::Opening;
 use super::passage::PassError;
@@ -84,6 +87,8 @@ struct Measured {
 pub struct Judging<'a> {
     /// The samples.
     pub store: &'a SampleStore,
+    /// The latest samples that are lacking, for the causes of fails.
+    pub lacks: &'a Lacks,
     /// Hole search with its working memory.
     pub finder: &'a mut HoleFinder,
     /// The design profile.
@@ -313,6 +318,7 @@ impl Sections {
         let section = self.get_mut(request.section)?;
         let before = Self::counted(section);
         let (error_m, had_a_flag) = (confidence_sd * sd_m, section.is_flagged());
+        let is_same = section.hole == Some(hole) && section.evidence.is_some();
         section.hole = Some(hole);
         section.hole_sd_m = sd_m;
         section.verdict = match verdict(&hole, error_m, target_m, clear_m.min(passed_m)) {
@@ -341,8 +347,9 @@ impl Sections {
         // Nothing will come any more.
         section.not_inspected |=
             section.verdict == Verdict::Open && request.ended.is_some_and(|ended| ended.is_beyond(&hole));
-        if section.verdict == Verdict::Fail {
-            let evidence = self.explain(&hole, request, judging.profile.perimeter_m());
+        // What is lacking in a hole that hasn't changed may have been forgotten since.
+        if section.verdict == Verdict::Fail && !is_same {
+            let evidence = self.explain(&hole, request, judging);
             self.get_mut(request.section)?.evidence = Some(evidence);
         }
         let section = self.get_mut(request.section)?;
@@ -431,14 +438,31 @@ impl Sections {
         runs.set(request.section, cause, &mut Telling { at: request.at, hole: &hole, tell: judging.tell });
     }
 
-    /// The cause of a hole, from the passages of the sections that it touches.
-    fn explain(&self, hole: &Hole, request: &Request, perimeter_m: f64) -> Evidence {
-        let radius_m = hole.diameter_m / 2.0;
-        let touched = self.index_of(hole.x_m - radius_m)..self.index_of(hole.x_m + radius_m) + 1;
-        let passages = touched.filter_map(|index| Some((self.bounds_m(index), &self.get(index)?.passage)));
-        let Request { swept_by_all, none_alive, .. } = *request;
-        let Self { target_m, confidence_sd, .. } = *self;
-        explain(&Case { hole, swept_by_all, none_alive, target_m, confidence_sd, perimeter_m }, &passages)
+    /// The causes of a hole, from the passages of the sections within T.
+    fn explain(&self, hole: &Hole, request: &Request, judging: &mut Judging<'_>) -> Evidence {
+        let bounds_m = self.bounds_m(request.section);
+        let near = self.index_of(bounds_m.0 - self.target_m)..=self.index_of(bounds_m.1 + self.target_m);
+        let beside = |index: i64| {
+            let section = self.get(index).filter(|section| section.is_flagged());
+            section.and_then(|section| section.evidence).map_or(Causes::default(), |evidence| evidence.causes)
+        };
+        let here = self.get(request.section).copied().unwrap_or_default();
+        let (visits, passage) = (here.visits, here.passage);
+        let case = Case {
+            hole,
+            bounds_m,
+            first_visit: visits.first(),
+            swept_by_all: request.swept_by_all,
+            to_come: request.to_come,
+            none_alive: request.none_alive,
+            is_dark: passage.pings == 0 && !passage.silent.is_empty(),
+            is_torn: visits.are_unrelated(),
+            target_m: self.target_m,
+            beside: [beside(request.section - 1), beside(request.section + 1)],
+            lacks: judging.lacks,
+        };
+        let passages = near.filter_map(|index| Some(&self.get(index)?.passage));
+        explain(&case, passages, judging.store, judging.finder)
     }
 
     /// Calls `ask` for every section of the way that isn't settled, at the end of a dive.

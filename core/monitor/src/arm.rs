@@ -18,7 +18,8 @@ use super::resources::{Coverage, Digests, Finder, Tally, Target, TickTime, Tunne
 use super::run::Loop;
 use super::stages::{Advisor, Driving, SoundSpeed};
 use headrace_coverage::{
-    Frontier, GridLayout, HoleFinder, Relief, SampleStore, Sections, Soundings, StoreLayout, WallLimits,
+    Frontier, GridLayout, HoleFinder, Lacks, Relief, SampleStore, Sections, Soundings, StoreLayout,
+    WallLimits,
 };
 use headrace_fusion::Navigation;
 use headrace_sampling::advice::{self, Task};
@@ -119,7 +120,11 @@ impl App {
         let sources = u16::try_from(sources.len()).unwrap_or(0);
         let confidence_sd = mission.coverage.confidence_sd;
         world.insert_resource(LiveState::new(mission.target_m, confidence_sd, heads, sources));
-        world.insert_resource(Target { target_m: mission.target_m, layout: mission.layout });
+        world.insert_resource(Target {
+            target_m: mission.target_m,
+            layout: mission.layout,
+            planned_speed_mps: mission.planned_speed_mps,
+        });
         Ok(())
     }
 
@@ -193,12 +198,6 @@ fn coverage(mission: &Mission) -> Result<Coverage, PluginError> {
         to_m: mission.length_m,
         node_m: mission.coverage.node_m,
     });
-    Ok(Coverage {
-        store,
-        sections,
-        frontier: Frontier::default(),
-        soundings,
-        relief: Relief::default(),
-        unsure: None,
-    })
+    let (frontier, relief, lacks) = (Frontier::default(), Relief::default(), Lacks::default());
+    Ok(Coverage { store, sections, frontier, soundings, relief, unsure: None, lacks })
 }

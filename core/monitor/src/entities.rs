@@ -152,8 +152,6 @@ impl HiddenAngles {
 pub struct HeadSweep {
     /// The last valid sample in the present sweep.
     pub(super) last: Option<LastSample>,
-    /// The head pinged during a navigation outage, and not since the fix returned.
-    pub(super) unseen: bool,
     /// What its returns are taken for.
     pub(super) wall: HeadWall,
     /// Its last return, while its next one is to say what it is, and what has come since.

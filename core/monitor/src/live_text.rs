@@ -1,7 +1,7 @@
 //! Words for what is told live: the place first, then what, then what to do. Terminals break them to their width.
 
 use super::live_state::{Condition, Lamp, LiveMetres, LiveState, PositionDoubt};
-use super::pilot_text::{AdviceFigures, action_text, advice_text, cause_text, station};
+use super::pilot_text::{AdviceFigures, actions_text, advice_text, cause_text, station};
 use super::telling::{Told, UnsureStretch};
 use headrace_coverage::{Action, Unsure};
 use headrace_fusion::NoFix;
@@ -198,7 +198,7 @@ pub fn told_line(told: &Told, profile: &Profile) -> PilotLine {
     let to = |from_m: f64, to_m: f64| format!("{} to {}", station(from_m), station(to_m));
     match told {
         Told::Flag { from_m, missed, .. } => {
-            let action = action_text(Action::of(missed.figures.cause), *from_m, missed.v_max_mps);
+            let action = actions_text(&Action::against(missed.figures.causes), *from_m, missed.v_max_mps);
             let clock = profile.clock(missed.hole_arc_m);
             let what = format!(
                 "MISSED: {}, holes over {} m at {clock}",

@@ -90,6 +90,17 @@ pub enum Outcome {
     Unplaced(NoFix),
 }
 
+/// Whether the vehicle is in a beam's way, by its geometry.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Hidden {
+    /// It isn't.
+    No,
+    /// Nearly: it may be heard all the same.
+    Beside,
+    /// It is.
+    Yes,
+}
+
 /// Point at which a beam meets the design profile.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Aim {
@@ -120,6 +131,12 @@ pub struct PlacedPing {
     pub standing: bool,
     /// Outcome.
     pub outcome: Outcome,
+    /// Angle of the head, in the sensor frame, radians.
+    pub angle_rad: f64,
+    /// Whether the vehicle is in the way at this angle.
+    pub hidden: Hidden,
+    /// Longest range at the head's setting, m.
+    pub longest_m: f64,
     /// Source of the packet.
     pub source: SourceId,
     /// Where the head was; `None` without a fix.

@@ -3,7 +3,7 @@
 
 use super::advice_log::AdviceEntry;
 use super::alerts::AlertKind;
-use headrace_coverage::{Action, Cause, Evidence};
+use headrace_coverage::{Action, Cause, Causes, Evidence};
 use headrace_fusion::filter::suspicion::{Setting, SettingDoubt};
 use headrace_geometry::tunnel::Profile;
 use headrace_sampling::advice::{Advice, Reason, Remedy};
@@ -21,8 +21,8 @@ pub fn station(chainage_m: f64) -> String {
 /// Figures of a cause's evidence used in its text.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CauseFigures {
-    /// The cause.
-    pub cause: Cause,
+    /// The causes, which only together explain the fail.
+    pub causes: Causes,
     /// Speed along the tunnel, m/s.
     pub speed_mps: f64,
     /// Largest step along the perimeter between neighbouring samples of one turn, m.
@@ -39,15 +39,31 @@ pub struct CauseFigures {
 
 impl From<&Evidence> for CauseFigures {
     fn from(evidence: &Evidence) -> Self {
-        let Evidence { cause, speed_mps, t_y_m, middle_t_y_m, missing_share, swing_m, silent_heads, .. } =
+        let Evidence { causes, speed_mps, t_y_m, middle_t_y_m, missing_share, swing_m, silent_heads, .. } =
             *evidence;
-        Self { cause, speed_mps, t_y_m, middle_t_y_m, missing_share, swing_m, silent_heads }
+        Self { causes, speed_mps, t_y_m, middle_t_y_m, missing_share, swing_m, silent_heads }
     }
 }
 
-/// Text of a cause, with its figures.
+impl CauseFigures {
+    /// The main cause.
+    pub fn cause(&self) -> Cause {
+        self.causes.iter().next().unwrap_or(Cause::Unknown)
+    }
+}
+
+/// Most causes that a text names.
+const NAMED: usize = 2;
+
+/// Text of a fail's causes, with their figures; of several, the first two.
 pub fn cause_text(figures: &CauseFigures) -> String {
-    match figures.cause {
+    let texts: Vec<String> =
+        figures.causes.iter().take(NAMED).map(|cause| one_cause_text(cause, figures)).collect();
+    if texts.is_empty() { one_cause_text(Cause::Unknown, figures) } else { texts.join(" and ") }
+}
+
+fn one_cause_text(cause: Cause, figures: &CauseFigures) -> String {
+    match cause {
         Cause::TooFast => format!("too fast ({:.2} m/s)", figures.speed_mps),
         Cause::AngularStep => format!("steps of {:.2} m along the wall", figures.t_y_m),
         Cause::MissingReturns => format!("{:.0} % of returns missing", figures.missing_share * 100.0),
@@ -62,6 +78,7 @@ pub fn cause_text(figures: &CauseFigures) -> String {
         Cause::Phase => format!("heads out of phase ({:.2} m/s)", figures.speed_mps),
         Cause::PositionLost => "position lost".to_owned(),
         Cause::NotPassed => "not passed on both sides".to_owned(),
+        Cause::Unknown => "cause unknown".to_owned(),
     }
 }
 
@@ -75,6 +92,29 @@ fn silent_text(heads: HeadSet) -> String {
     }
 }
 
+/// Text of the actions for a missed stretch, as of [`action_text`]; of several, the first two.
+pub fn actions_text(actions: &[Action], start_m: f64, at_most_mps: f64) -> String {
+    let Some((first, others)) = actions.split_first() else { return String::new() };
+    let text = action_text(*first, start_m, at_most_mps);
+    others.first().map_or(text.clone(), |second| format!("{text}; and {}", short_text(*second)))
+}
+
+/// Text of an action beside another one.
+fn short_text(action: Action) -> &'static str {
+    match action {
+        Action::Slower => "slower",
+        Action::FinerMode => "in a finer mode",
+        Action::LongerRange => "with a longer range",
+        Action::OtherSide => "rolled to either side",
+        Action::Middle => "in the middle and steady",
+        Action::InPhase => "with the heads in phase",
+        Action::Head => "with that head repaired",
+        Action::HeadBack => "with what is silent back",
+        Action::Position => "once the position is back",
+        Action::Again => "from end to end",
+    }
+}
+
 /// Text of the action for a missed stretch that begins at `start_m`, m, with the maximum speed, m/s; zero if no speed is
 /// known to meet the target.
 pub fn action_text(action: Action, start_m: f64, at_most_mps: f64) -> String {
@@ -85,7 +125,7 @@ pub fn action_text(action: Action, start_m: f64, at_most_mps: f64) -> String {
         Action::LongerRange => return "set a longer range".to_owned(),
         Action::Slower if at_most_mps > 0.0 => format!("go back to {start}, then"),
         Action::Slower => format!("go back to {start}"),
-        Action::OtherSide => format!("pass {start} again turned or rolled,"),
+        Action::OtherSide => format!("pass {start} again rolled to either side,"),
         Action::Middle => format!("go back to {start}, then in the middle and steady,"),
         Action::InPhase => format!("go back to {start}, then with the heads in phase,"),
         Action::Head => format!("go back to {start}, then with that head repaired or without it,"),
@@ -133,7 +173,7 @@ pub fn flag_text(missed: &Missed, profile: &Profile) -> String {
         station(*start_m),
         cause_text(figures),
         profile.clock(*hole_arc_m),
-        action_text(Action::of(figures.cause), *start_m, *v_max_mps),
+        actions_text(&Action::against(figures.causes), *start_m, *v_max_mps),
     )
 }
 
@@ -302,5 +342,9 @@ mod tests {
             "go back to 1+240.50, then in the middle and steady, at most 0.25 m/s"
         );
         assert_eq!(at(Action::Again, 0.0), "pass it again from end to end");
+        assert_eq!(
+            actions_text(&[Action::Slower, Action::OtherSide, Action::Again], 1240.5, 0.25),
+            "go back to 1+240.50, then at most 0.25 m/s; and rolled to either side"
+        );
     }
 }

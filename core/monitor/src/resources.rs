@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::result_stream::ResultStream;
 use headrace_coverage::{
-    Frontier, HoleFinder, Relief, SampleStore, Sections, Soundings, Stretch, WallLimits,
+    Frontier, HoleFinder, Lacks, Relief, SampleStore, Sections, Soundings, Stretch, WallLimits,
 };
 use headrace_fusion::NoFix;
 use headrace_geometry::site::Site;
@@ -38,6 +38,8 @@ pub struct Target {
     pub target_m: f64,
     /// Arrangement of the heads: phase shift or sector offset.
     pub layout: HeadLayout,
+    /// Speed for which the heads are put in phase, m/s; zero if none is planned.
+    pub planned_speed_mps: f64,
 }
 
 /// The vehicle's entity, that of each sensor by source, and that of each head by number.
@@ -80,9 +82,11 @@ pub struct Coverage {
     pub relief: Relief,
     /// The unsure stretch that was judged last.
     pub unsure: Option<Stretch>,
+    /// The latest samples that are lacking.
+    pub lacks: Lacks,
 }
 
-stateful!(Coverage { state: store, sections, frontier, soundings, relief, unsure; });
+stateful!(Coverage { state: store, sections, frontier, soundings, relief, unsure, lacks; });
 
 /// The search for holes with its working memory.
 #[derive(Debug, Default, Resource)]

@@ -101,6 +101,23 @@ impl Phasing {
         (ahead_m().fold(f64::MIN, f64::max) - ahead_m().fold(f64::MAX, f64::min)).max(0.0)
     }
 
+    /// The same heads with the phases of a schedule of `scheduled` heads for `planned_mps`; zero for a schedule that
+    /// ignores where they sit along the hull. Heads in sectors, or out of step, stay as they are.
+    /// Source: Jorge et al. 2021, Eq. 20.
+    #[must_use]
+    pub fn as_scheduled(&self, scheduled: usize, planned_mps: f64) -> Self {
+        let mut then = *self;
+        let Pattern::Turning(phases) = &mut then.pattern else { return then };
+        for (head, ((phase, ahead_m), turn_s)) in
+            phases.iter_mut().zip(self.ahead_m).zip(self.turns_s).enumerate()
+        {
+            let apart = planned_mps > AT_REST_MPS && turn_s > 0.0;
+            let ahead = if apart { ahead_m / planned_mps / turn_s } else { 0.0 };
+            *phase = scheduled_phase(head, scheduled) - ahead;
+        }
+        then
+    }
+
     /// The passes at a speed of `speed_mps`.
     ///
     /// Continuous rotation: head k passes the vertical at the times t_k + i T; as it sits x_k ahead of the vehicle's

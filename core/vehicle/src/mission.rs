@@ -25,6 +25,8 @@ pub struct Mission {
     pub length_m: f64,
     /// Arrangement of the heads: phase shift or sector offset.
     pub layout: HeadLayout,
+    /// Speed for which the heads are put in phase, m/s; zero if none is planned.
+    pub planned_speed_mps: f64,
     /// Parts of the vehicle that may occlude a head, other than the other heads.
     pub hull: Vec<Obstacle>,
     /// Judging parameters and openings of the wall.
@@ -45,6 +47,7 @@ impl Mission {
             section_m: 0.25,
             length_m: 100.0,
             layout: HeadLayout::PhaseShift,
+            planned_speed_mps: 0.0,
             hull: Vec::new(),
             coverage: CoverageConfig { contradiction_m, ..CoverageConfig::default() },
             dive_time: None,

@@ -168,6 +168,7 @@ impl VehicleConfig {
             section_m: self.section_m,
             length_m: self.tunnel.length_m,
             layout: self.layout,
+            planned_speed_mps: self.planned_speed_mps,
             hull: self.hull.clone(),
             coverage: self.coverage.clone(),
             dive_time: self.dive_time,

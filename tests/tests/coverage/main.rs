@@ -10,6 +10,7 @@ mod dives;
 mod faults;
 mod field;
 mod flags;
+mod interventions;
 mod memory;
 mod metamorphic;
 mod oracle;

@@ -80,31 +80,38 @@ impl Window {
         (from_m, to_m): (f64, f64),
         cell_m: f64,
     ) {
-        self.lay_out(store.perimeter_m(), origin_m, (from_m, to_m), cell_m);
-        self.unsorted.clear();
-        self.overfull = false;
-        let (rows, columns) = (self.rows as f64, self.columns - 1);
-        let [_, per_row, per_column] = self.per_m;
+        self.begin(store.perimeter_m(), origin_m, (from_m, to_m), cell_m);
         store.each_between(origin_m + from_m, origin_m + to_m, |x_m, arc_m, visit| {
-            if visit < first_visit {
-                return;
+            if visit >= first_visit {
+                self.push(x_m - origin_m, arc_m);
             }
-            let spot = Spot { x_m: x_m - origin_m, arc_m };
-            let row = (spot.x_m - self.from_m) * per_row;
-            if !(0.0..rows).contains(&row) {
-                return;
-            }
-            if self.unsorted.len() == ROOM {
-                self.overfull = true;
-                return;
-            }
-            let cell = whole(row) * self.columns + whole(arc_m * per_column).min(columns);
-            if let Some(count) = self.begins.get_mut(cell + 2) {
-                *count += 1;
-            }
-            self.unsorted.push((u32::try_from(cell).unwrap_or(u32::MAX), spot));
         });
         self.sort();
+    }
+
+    /// Begins a window between two chainages relative to `origin_m`; samples are pushed, then sorted.
+    pub(super) fn begin(&mut self, perimeter_m: f64, origin_m: f64, between_m: (f64, f64), cell_m: f64) {
+        self.lay_out(perimeter_m, origin_m, between_m, cell_m);
+        self.unsorted.clear();
+        self.overfull = false;
+    }
+
+    /// Adds a sample, unless it lies outside; its chainage is from the window's origin.
+    pub(super) fn push(&mut self, x_m: f64, arc_m: f64) {
+        let [_, per_row, per_column] = self.per_m;
+        let row = (x_m - self.from_m) * per_row;
+        if !(0.0..self.rows as f64).contains(&row) {
+            return;
+        }
+        if self.unsorted.len() == ROOM {
+            self.overfull = true;
+            return;
+        }
+        let cell = whole(row) * self.columns + whole(arc_m * per_column).min(self.columns - 1);
+        if let Some(count) = self.begins.get_mut(cell + 2) {
+            *count += 1;
+        }
+        self.unsorted.push((u32::try_from(cell).unwrap_or(u32::MAX), Spot { x_m, arc_m }));
     }
 
     fn lay_out(&mut self, perimeter_m: f64, origin_m: f64, (from_m, to_m): (f64, f64), cell_m: f64) {
@@ -122,7 +129,7 @@ impl Window {
 
     /// Counting sort by cell. Counts are stored at cell + 2; their running sum at cell + 1 is the start of the cell, and
     /// advances to the start of the next as its samples are placed.
-    fn sort(&mut self) {
+    pub(super) fn sort(&mut self) {
         let mut sum = 0;
         for begin in &mut self.begins {
             sum += *begin;

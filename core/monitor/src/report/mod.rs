@@ -34,7 +34,7 @@ pub use survey::{HolidayReport, NodeRowReport, SurveyReport};
 pub use unsure::UnsureReport;
 
 /// Version of the report schema.
-pub const REPORT_VERSION: u32 = 4;
+pub const REPORT_VERSION: u32 = 5;
 
 /// A whole report. Field names are the contract.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -263,7 +263,7 @@ impl Report {
                 .collect(),
             runs: runs::run_reports(dive),
             unsure: unsure::unsure_reports(coverage),
-            way_home: runs::way_home(sections, log),
+            way_home: runs::way_home(sections),
             survey: survey::survey(coverage, &dive.mission().profile),
             what_if: Vec::new(),
             openings: dive.mission().coverage.openings.iter().map(opening_report).collect(),

@@ -2,11 +2,10 @@
 
 use serde::Serialize;
 
-use crate::advice_log::{AdviceEntry, AdviceLog};
 use crate::app::SourceInfo;
 use crate::pilot_text::CauseFigures;
 use crate::run::Loop;
-use headrace_coverage::{Action, Cause, Run, RunId, Runs, Sections};
+use headrace_coverage::{Action, Cause, Causes, Evidence, Run, RunId, Runs, Sections};
 use headrace_geometry::time::MonoNs;
 use headrace_sensor::device::{SensorInfo, SensorKind};
 
@@ -15,8 +14,10 @@ use headrace_sensor::device::{SensorInfo, SensorKind};
 pub struct RunReport {
     /// Its stable number.
     pub id: u32,
-    /// Its cause.
+    /// Its main cause.
     pub cause: Cause,
+    /// All causes named of its sections, the main one first.
+    pub causes: Causes,
     /// The cause's figures, for its text; those of the section with the largest hole.
     #[serde(skip)]
     pub figures: Option<CauseFigures>,
@@ -51,9 +52,11 @@ pub struct ReturnReport {
     pub from_m: f64,
     /// Chainage of its near end, m.
     pub to_m: f64,
-    /// Change to make.
+    /// Change to make against the main cause.
     pub action: Action,
-    /// Maximum speed, m/s; zero if no speed meets the target with the heads as they were.
+    /// Changes to make, all of them, one for each cause; that against the main cause first.
+    pub actions: Vec<Action>,
+    /// Maximum speed then, m/s: the planned one where that meets the target; zero if none does in this mode.
     pub at_most_mps: f64,
     /// Seconds at that speed.
     pub takes_s: Option<f64>,
@@ -72,6 +75,7 @@ pub(super) fn run_reports(dive: &Loop) -> Vec<RunReport> {
             RunReport {
                 id,
                 cause: run.cause,
+                causes: causes(sections, run),
                 figures,
                 silent_sources: silent.filter_map(|head| heads.get(head).cloned()).collect(),
                 start_m,
@@ -101,29 +105,32 @@ fn figures(sections: &Sections, run: &Run) -> Option<CauseFigures> {
     Some((&evidence).into())
 }
 
-/// Distance from a run within which advice applies to it, m.
-const NEAR_M: f64 = 1.0;
-
 /// Open runs, from the far end to the portal.
-pub(super) fn way_home(sections: &Sections, log: &AdviceLog) -> Vec<ReturnReport> {
+pub(super) fn way_home(sections: &Sections) -> Vec<ReturnReport> {
     let runs: &Runs = sections.runs();
     let open = (0..).map(RunId).zip(runs.all()).filter(|(_, run)| run.is_open());
-    let mut stops: Vec<ReturnReport> = open.map(|(id, run)| stop(sections, log, id, run)).collect();
+    let mut stops: Vec<ReturnReport> = open.map(|(id, run)| stop(sections, id, run)).collect();
     stops.sort_by(|a, b| b.from_m.total_cmp(&a.from_m));
     stops
 }
 
-fn stop(sections: &Sections, log: &AdviceLog, id: RunId, run: &Run) -> ReturnReport {
+fn stop(sections: &Sections, id: RunId, run: &Run) -> ReturnReport {
     let (to_m, from_m) = (sections.bounds_m(run.from).0, sections.bounds_m(run.to - 1).1);
-    let near = |entry: &&AdviceEntry| {
-        entry.chainage_m.is_some_and(|x_m| (to_m - NEAR_M..from_m + NEAR_M).contains(&x_m))
-    };
-    let advised = log.entries.iter().filter(near).map(|entry| entry.advice.v_max_mps);
-    // Without advice: the maximum speed with the turning heads evenly spread.
-    let evidence = |index: i64| sections.get(index).filter(|section| section.is_flagged())?.evidence;
-    let evenly = (run.from..run.to).filter_map(evidence).map(|evidence| evidence.even_v_max_mps);
-    let at_most_mps = advised.filter(|mps| *mps > 0.0).reduce(f64::min).or_else(|| evenly.reduce(f64::min));
-    let at_most_mps = at_most_mps.unwrap_or(0.0);
+    let fits = flagged(sections, run).map(|evidence| evidence.fits_mps).filter(|mps| *mps > 0.0);
+    let at_most_mps = fits.reduce(f64::min).unwrap_or(0.0);
     let takes_s = (at_most_mps > 0.0).then(|| (from_m - to_m) / at_most_mps);
-    ReturnReport { run: id.0, from_m, to_m, action: Action::of(run.cause), at_most_mps, takes_s }
+    let actions = Action::against(causes(sections, run));
+    ReturnReport { run: id.0, from_m, to_m, action: Action::of(run.cause), actions, at_most_mps, takes_s }
+}
+
+/// What the flagged sections of a run were put down to.
+fn flagged<'a>(sections: &'a Sections, run: &Run) -> impl Iterator<Item = Evidence> + use<'a> {
+    let evidence = |index: i64| sections.get(index).filter(|section| section.is_flagged())?.evidence;
+    let cause = run.cause;
+    (run.from..run.to).filter_map(evidence).filter(move |evidence| evidence.cause == cause)
+}
+
+/// All causes named of a run's sections.
+fn causes(sections: &Sections, run: &Run) -> Causes {
+    flagged(sections, run).fold(Causes::of(run.cause), |all, evidence| all.union(evidence.causes))
 }

@@ -4,18 +4,18 @@
 
 use bevy_ecs::prelude::{Res, ResMut, Single};
 
-use super::advise::Advisor;
 use super::doubt;
-use super::driving::{Driven, Driving};
+use super::driving::{Driving, Plan};
 use super::judge::{Results, judge_one};
+use super::lacking;
 use super::live::standing;
 use super::walls::{self, Sorting};
 use super::way::{Heads, note_beat};
 use crate::alerts::Alerts;
-use crate::entities::{HeadFrontier, HeadSweep};
+use crate::entities::HeadFrontier;
 use crate::messages::{Notices, Outcome, Placed, PlacedList, PlacedPing, Requests, Standings};
-use crate::resources::{Coverage, Digests, Finder, Tally, TunnelDesign, VehicleEntities};
-use headrace_coverage::{HeadReach, Loss, Outlook, Visit};
+use crate::resources::{Coverage, Digests, Finder, Tally, Target, TunnelDesign, VehicleEntities};
+use headrace_coverage::{Drive, HeadReach, Loss, Outlook, Visit};
 use headrace_geometry::frames::Vec3;
 use headrace_geometry::time::DurNs;
 use headrace_geometry::tunnel::Profile;
@@ -31,7 +31,7 @@ pub(super) fn cover(
     mut heads: Heads<'_, '_>,
     mut driving: Single<'_, '_, &mut Driving>,
     mut coverage: ResMut<'_, Coverage>,
-    advisor: Res<'_, Advisor>,
+    target: Res<'_, Target>,
     mut requests: ResMut<'_, Requests>,
     mut tally: ResMut<'_, Tally>,
     mut finder: ResMut<'_, Finder>,
@@ -46,7 +46,22 @@ pub(super) fn cover(
         match item {
             Placed::Situation(at, situation, doubts) => {
                 doubt::note(*at, situation, doubts, (&mut alerts, &mut notices, &mut digests));
-                driving.note(*at, situation, &tunnel.profile, &advisor.advisor);
+                let driving = &mut **driving;
+                let healthy = driving.lacking.healthy(*at, situation, &heads);
+                let plan = Plan {
+                    planned_mps: target.planned_speed_mps,
+                    target_m: target.target_m,
+                    confidence_sd: coverage.sections.confidence_sd(),
+                };
+                driving.note(*at, [situation, &healthy], &tunnel.profile, &plan);
+                lacking::note_beat(
+                    &mut driving.lacking,
+                    driving.now,
+                    &heads,
+                    (*at, situation),
+                    &tunnel.profile,
+                    &mut coverage,
+                );
                 note_beat(&mut coverage, &mut heads, &tunnel, (*at, situation), &mut requests);
                 if at.0 % LOOK_AROUND.0.unsigned_abs() == 0 {
                     let reaches = heads.iter().filter_map(|(.., frontier)| frontier.0);
@@ -57,10 +72,23 @@ pub(super) fn cover(
             Placed::Ping(ping) => {
                 count(&mut tally, ping);
                 coverage.frontier.hear(ping.received);
+                if let Some(fix) = &ping.fix {
+                    let now = (ping.valid_at, fix.pose);
+                    let driving = &mut **driving;
+                    lacking::note_away(
+                        &mut driving.lacking,
+                        driving.now,
+                        &heads,
+                        now,
+                        &tunnel.profile,
+                        &mut coverage,
+                    );
+                }
                 let head = entities.of_head(ping.head).and_then(|entity| heads.get_mut(entity).ok());
-                let Some((_, _, mut sweep, mut frontier)) = head else { continue };
-                let ping_there = (ping, &tunnel.profile);
-                note_passage(&mut coverage, &mut sweep, &frontier, &driving.now, ping_there);
+                let Some((.., mut sweep, mut frontier)) = head else { continue };
+                let driving = &mut **driving;
+                lacking::note_ping(&mut driving.lacking, ping, &mut coverage.lacks);
+                note_passage(&mut coverage, &frontier, &driving.now, (ping, &tunnel.profile));
                 let mut sorting = Sorting {
                     coverage: &mut coverage,
                     tunnel: &tunnel,
@@ -90,7 +118,7 @@ pub(super) fn cover(
             judge_one(&request, &tunnel.profile, &mut coverage, &mut results);
         }
         if let Placed::Situation(at, _, doubts) = item {
-            let sweeps = heads.iter().map(|(_, mounted, sweep, _)| (mounted.source, sweep));
+            let sweeps = heads.iter().map(|(_, mounted, _, sweep, _)| (mounted.source, sweep));
             standings.0.push(standing(*at, &coverage, &alerts, doubts, sweeps));
         }
     }
@@ -113,22 +141,13 @@ fn count(tally: &mut Tally, ping: &PlacedPing) {
     }
 }
 
-/// Adds a ping to the passage of the section that its head is in, and a lost ping to that of the section it was aimed at.
+/// Adds a ping to the passage of the section that its head is in.
 fn note_passage(
     coverage: &mut Coverage,
-    sweep: &mut HeadSweep,
     frontier: &HeadFrontier,
-    driven: &Driven,
+    drive: &Drive,
     (ping, profile): (&PlacedPing, &Profile),
 ) {
-    note_unseen(coverage, sweep, frontier, ping);
-    let perimeter_m = coverage.store.perimeter_m();
-    if let Outcome::Lost(loss, Some(aim)) = ping.outcome {
-        let index = coverage.sections.index_of(aim.x_m);
-        if let Some(section) = coverage.sections.get_mut(index) {
-            section.passage.lost.note(loss, aim.arc_m, perimeter_m);
-        }
-    }
     // Without a fix, a ping counts where its head was last known to be.
     let Some(reach) = ping.reach.or_else(|| Some(frontier.0?.latest())) else { return };
     let index = coverage.sections.index_of(reach.middle_m());
@@ -146,33 +165,8 @@ fn note_passage(
     }
     let Some(fix) = ping.fix else { return };
     passage.placed += 1;
-    passage.speed_sum_mps += fix.speed_mps.abs();
-    passage.pass_gap_sum_s += driven.gap_s;
-    passage.even_gap_sum_s += driven.even_gap_s;
-    passage.all_gap_sum_s += driven.all_gap_s;
-    passage.ping_period_sum_s += driven.ping_period_s;
-    passage.swing_sum_m += driven.swing_m;
-    passage.middle_t_y_m = passage.middle_t_y_m.max(driven.middle_t_y_m);
+    passage.drive = passage.drive.or_worse(Drive { speed_mps: fix.speed_mps.abs(), ..*drive });
     section.note_pass(&Visit::of(&fix, ping.valid_at, turns), profile);
-}
-
-/// Marks the sections that a head went through during a navigation outage.
-fn note_unseen(coverage: &mut Coverage, sweep: &mut HeadSweep, frontier: &HeadFrontier, ping: &PlacedPing) {
-    let Some(reach) = ping.reach else {
-        sweep.unseen = true;
-        return;
-    };
-    if !core::mem::take(&mut sweep.unseen) {
-        return;
-    }
-    let Some(before) = frontier.0.map(|reach| reach.latest()) else { return };
-    let (from_m, to_m) = (before.middle_m().min(reach.middle_m()), before.middle_m().max(reach.middle_m()));
-    let passed = coverage.sections.index_of(from_m)..=coverage.sections.index_of(to_m);
-    for index in passed {
-        if let Some(section) = coverage.sections.get_mut(index) {
-            section.passage.unseen = true;
-        }
-    }
 }
 
 /// Requests judging of sections of a still zone that certainly fail, or are flagged and have new samples.

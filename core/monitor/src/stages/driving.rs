@@ -1,100 +1,187 @@
 //! Motion statistics of the vehicle and its heads per beat, stored with each section's passage.
 
 use bevy_ecs::prelude::Component;
-use serde::{Deserialize, Serialize};
 
+use super::lacking::Lacking;
+use headrace_coverage::Drive;
 use headrace_geometry::frames::Vec3;
+use headrace_geometry::math;
 use headrace_geometry::time::{DurNs, MonoNs};
-use headrace_geometry::tunnel::Profile;
-use headrace_sampling::advice::Advisor;
-use headrace_sampling::head::HeadMotion;
-use headrace_sampling::passes::{Phasing, Situation};
+use headrace_geometry::tunnel::{Profile, Yz};
+use headrace_sampling::head::{HeadMotion, HeadSet};
+use headrace_sampling::layout::HeadLayout;
+use headrace_sampling::margin::position_margin_m;
+use headrace_sampling::passes::{Passes, Phasing, Situation};
 use headrace_sampling::swing::Looks;
 use headrace_snapshot::stateful;
 
 /// Maximum look-back over the time between neighbouring passes, seconds.
 const LONGEST_S: f64 = 50.0;
+/// Relative change of passes from which the speed that fits is found anew.
+const SAME_PASSES: f64 = 0.01;
+/// Speeds that are tried for it, each this share of the one before.
+const SLOWER: u32 = 80;
+const SLOWER_BY: f64 = 0.97;
+/// Beams round a place for which steps along the wall are found.
+const RAYS: u32 = 72;
+/// Steps along the wall are found anew after such a way across the tunnel, m.
+const MOVED_M: f64 = 0.05;
+/// Time between passes over the scheduled one up to which heads are in step.
+const IN_STEP: f64 = 1.05;
 /// Speed below which the vehicle counts as stationary, m/s.
 const SLOW_MPS: f64 = 0.01;
 
-/// Motion statistics at the last beat.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-pub(super) struct Driven {
-    /// The longest time between two passes, seconds.
-    pub(super) gap_s: f64,
-    /// The same with the heads evenly spread, seconds.
-    pub(super) even_gap_s: f64,
-    /// The same with all configured heads turning and evenly spread, seconds.
-    pub(super) all_gap_s: f64,
-    /// Time between two pings, seconds.
-    pub(super) ping_period_s: f64,
-    /// How far the beams have swung along the tunnel since the neighbouring passes, where they reach farthest, m.
-    pub(super) swing_m: f64,
-    /// Largest step along the wall predicted from the middle of the tunnel, m.
-    pub(super) middle_t_y_m: f64,
+/// What a dive is to meet.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Plan {
+    /// Speed for which heads are in phase, m/s; zero if none is planned.
+    pub(super) planned_mps: f64,
+    /// Target T, m.
+    pub(super) target_m: f64,
+    /// Standard deviations of a hole that a verdict of pass keeps below it.
+    pub(super) confidence_sd: f64,
 }
 
-/// Motion statistics of the last beat, and the forward axis at earlier ones.
+/// How vehicle and heads moved at the last beat, and what that needs of earlier ones.
 #[derive(Debug, Clone, Default, Component)]
 pub(crate) struct Driving {
-    pub(super) now: Driven,
-    /// The step for which `middle_t_y_m` was looked up, in soundings of a ring.
-    stride: usize,
-    /// The last beat at which a head turned.
-    turned: Option<MonoNs>,
+    pub(super) now: Drive,
+    /// The step of the heads, radians, and the place for which steps along the wall were last found, m.
+    step_rad: f64,
+    place_m: [f64; 2],
+    /// The time between passes, seconds, the steps along the wall and the target less its margin, m, for which the speed
+    /// that fits was last found.
+    fitted: [f64; 3],
     looks: Looks,
+    pub(super) lacking: Lacking,
 }
 
-stateful!(Driving { state: now, stride, turned, looks; });
+stateful!(Driving { state: now, step_rad, place_m, fitted, looks, lacking; });
 
 impl Driving {
-    /// Updates the statistics for a beat.
+    /// Updates the statistics for a beat, from the situation as it is and as it would be had no head been silent or stood
+    /// still.
     ///
     /// Allocates: never.
-    pub(super) fn note(&mut self, at: MonoNs, situation: &Situation, profile: &Profile, advisor: &Advisor) {
-        self.note_gaps(at, situation);
-        let step_rad = situation.heads.iter().flatten().map(|motion| motion.step_rad).fold(0.0, f64::max);
-        let stride = Advisor::stride(step_rad);
-        if step_rad > 0.0 && stride != self.stride {
-            self.stride = stride;
-            self.now.middle_t_y_m = advisor.middle_step_m(step_rad);
-        }
+    pub(super) fn note(
+        &mut self,
+        at: MonoNs,
+        [situation, healthy]: [&Situation; 2],
+        profile: &Profile,
+        plan: &Plan,
+    ) {
         let Some(pose) = situation.pose else {
             self.now.swing_m = 0.0;
             return;
         };
+        self.note_gaps(at, [situation, healthy], plan.planned_mps);
+        self.note_fit(healthy, plan);
+        let place_m = [pose.position.y(), pose.position.z()];
+        self.note_steps(situation, place_m, profile);
         let look = pose.attitude * Vec3::new(1.0, 0.0, 0.0);
         // Neighbouring passes may be those of heads apart along the hull.
         let apart_s = apart_m(situation) / situation.speed_mps.abs().max(SLOW_MPS);
-        let since = at - DurNs::from_secs_f64((self.now.gap_s + apart_s).min(LONGEST_S));
+        let since = at - DurNs::from_secs_f64((self.now.healthy_gap_s + apart_s).min(LONGEST_S));
         let turned_rad = self.looks.turned_since(look, since);
-        self.now.swing_m = turned_rad * profile.farthest_m([pose.position.y(), pose.position.z()]);
+        self.now.swing_m = turned_rad * profile.farthest_m(place_m);
         self.looks.keep(at, look);
     }
 
-    fn note_gaps(&mut self, at: MonoNs, situation: &Situation) {
-        let turning = situation.heads.iter().flatten().count();
-        if turning == 0 {
-            // Until a head turns again the time between two passes grows.
-            if let Some(turned) = self.turned.replace(at) {
-                self.now.gap_s += at.since(turned).as_secs_f64().max(0.0);
-                self.now.even_gap_s = self.now.gap_s;
-            }
+    /// Updates the speed that fits once the heads' passes have changed.
+    fn note_fit(&mut self, healthy: &Situation, plan: &Plan) {
+        let now = &mut self.now;
+        let Plan { target_m, confidence_sd, .. } = *plan;
+        let sure_m =
+            target_m - position_margin_m(target_m, confidence_sd, healthy.pass_error_m, now.middle_t_y_m);
+        let passes = [now.all_gap_s, now.middle_t_y_m, sure_m];
+        if passes.iter().zip(self.fitted).all(|(now, then)| (now - then).abs() <= SAME_PASSES * now.abs()) {
             return;
         }
-        self.turned = Some(at);
-        let passes = Phasing::of(situation).at(situation.speed_mps);
-        let even_gap_s = passes.even_gap_s();
-        let share = turning as f64 / situation.configured.max(1) as f64;
-        let periods = situation.heads.iter().flatten().map(HeadMotion::ping_period_s);
-        self.now = Driven {
-            gap_s: passes.gap_s(passes.heads()).unwrap_or(0.0),
-            even_gap_s,
-            all_gap_s: even_gap_s * share,
+        self.fitted = passes;
+        let squared = (sure_m - now.middle_t_y_m) * (sure_m + now.middle_t_y_m);
+        let along_m = math::sqrt(squared.max(0.0));
+        let scheduled = Phasing::of(healthy).as_scheduled(healthy.configured, now.planned_mps);
+        let fits = |mps: f64| {
+            let passes = scheduled.at(mps);
+            let gap_s = passes.gap_s(passes.heads()).unwrap_or(f64::INFINITY);
+            mps * (gap_s + now.ping_period_s) <= along_m
+        };
+        let most_mps = along_m / (now.all_gap_s + now.ping_period_s).max(1e-9);
+        let mut slower = (0..SLOWER).scan(most_mps, |mps, _| {
+            *mps *= SLOWER_BY;
+            Some(*mps)
+        });
+        now.fits_mps = if now.planned_mps > 0.0 && fits(now.planned_mps) {
+            now.planned_mps
+        } else {
+            slower.find(|mps| fits(*mps)).unwrap_or(0.0)
+        };
+    }
+
+    /// Updates the largest steps along the wall once the vehicle or its heads' steps have changed enough.
+    fn note_steps(&mut self, situation: &Situation, place_m: Yz, profile: &Profile) {
+        let step_rad = situation.heads.iter().flatten().map(|motion| motion.step_rad).fold(0.0, f64::max);
+        if step_rad <= 0.0 {
+            return;
+        }
+        let anew = (step_rad - self.step_rad).abs() > 1e-9;
+        if anew {
+            self.now.middle_t_y_m = largest_step_m(profile, profile.reference(), step_rad);
+        }
+        let off_m = math::hypot(place_m[0] - self.place_m[0], place_m[1] - self.place_m[1]);
+        if anew || off_m > MOVED_M {
+            self.now.t_y_m = largest_step_m(profile, place_m, step_rad).max(self.now.middle_t_y_m);
+            self.place_m = place_m;
+        }
+        self.step_rad = step_rad;
+    }
+
+    fn note_gaps(&mut self, at: MonoNs, [situation, healthy]: [&Situation; 2], planned_mps: f64) {
+        if healthy.heads.iter().flatten().count() == 0 {
+            return;
+        }
+        let speed_mps = situation.speed_mps;
+        let gap_s = |passes: &Passes| passes.gap_s(passes.heads()).unwrap_or(0.0);
+        let passes = Phasing::of(situation).at(speed_mps);
+        let turning = passes.heads().len();
+        let phasing = Phasing::of(healthy);
+        let all = phasing.at(speed_mps);
+        let healthy_gap_s = gap_s(&all);
+        let planned = phasing.as_scheduled(situation.configured, planned_mps).at(speed_mps);
+        let planned_gap_s = gap_s(&planned).min(healthy_gap_s);
+        let all_turn = turning == situation.configured && self.lacking.all_turn(at);
+        if all_turn && gap_s(&passes) <= IN_STEP * planned_gap_s {
+            self.lacking.stalled = HeadSet::default();
+        }
+        let periods = healthy.heads.iter().flatten().map(HeadMotion::ping_period_s);
+        self.now = Drive {
+            speed_mps: speed_mps.abs(),
+            planned_mps,
+            gap_s: if turning > 0 { gap_s(&passes) } else { self.now.gap_s },
+            even_gap_s: if turning > 0 { passes.even_gap_s() } else { self.now.even_gap_s },
+            healthy_gap_s,
+            planned_gap_s,
+            all_gap_s: all.even_gap_s(),
             ping_period_s: periods.fold(0.0, f64::max),
+            is_unheard: healthy.heads.iter().flatten().count() < situation.configured,
+            is_in_sectors: situation.layout == HeadLayout::SectorOffset,
             ..self.now
         };
     }
+}
+
+/// Largest distance along the perimeter between the places that two beams meet, a step apart, seen from a place, m.
+fn largest_step_m(profile: &Profile, place_m: Yz, step_rad: f64) -> f64 {
+    let arc_m = |angle_rad: f64| {
+        let wall = profile.cast(place_m, [math::sin(angle_rad), -math::cos(angle_rad)]);
+        wall.map(|wall| wall.arc_m)
+    };
+    let step_m = |k: u32| {
+        let angle_rad = math::TAU * f64::from(k) / f64::from(RAYS);
+        let (from_m, to_m) = (arc_m(angle_rad)?, arc_m(angle_rad + step_rad)?);
+        Some(math::wrap_signed(to_m - from_m, profile.perimeter_m()).abs())
+    };
+    (0..RAYS).filter_map(step_m).fold(0.0, f64::max)
 }
 
 /// How far apart along the hull the heads that turn are, m.

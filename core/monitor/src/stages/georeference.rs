@@ -3,7 +3,9 @@
 use bevy_ecs::prelude::{Query, Res, ResMut};
 
 use crate::entities::{Head, HiddenAngles, MeasuredMotion, Mounted};
-use crate::messages::{Aim, Events, Outcome, Placed, PlacedList, PlacedPing, Positioned, PositionedList};
+use crate::messages::{
+    Aim, Events, Hidden, Outcome, Placed, PlacedList, PlacedPing, Positioned, PositionedList,
+};
 use crate::resources::{Target, TunnelDesign, VehicleEntities};
 use headrace_coverage::{Loss, PassError, Reach};
 use headrace_fusion::{Fix, NoFix};
@@ -41,6 +43,8 @@ pub(super) fn georeference(
                 let Some((head, mounted, mut motion, hidden)) = head else { continue };
                 let turned = motion.ping(event.valid_at, sonar.angle_rad);
                 let mount = &mounted.info.mount;
+                let hides = hidden.hides(sonar.angle_rad);
+                let beside = [-BESIDE_RAD, BESIDE_RAD].iter().any(|by| hidden.hides(sonar.angle_rad + by));
                 let ping = PlacedPing {
                     head: head.0,
                     received: event.received,
@@ -50,7 +54,16 @@ pub(super) fn georeference(
                     single_step: turned.single_step,
                     new_sweep: turned.new_sweep,
                     standing: turned.standing,
-                    outcome: outcome(&sonar, fix, mount, hidden.hides(sonar.angle_rad), &tunnel),
+                    outcome: outcome(&sonar, fix, mount, hides, &tunnel),
+                    angle_rad: sonar.angle_rad,
+                    hidden: if hides {
+                        Hidden::Yes
+                    } else if beside {
+                        Hidden::Beside
+                    } else {
+                        Hidden::No
+                    },
+                    longest_m: longest_m(&sonar, &tunnel),
                     source: event.source,
                     origin: fix.ok().map(|fix| fix.pose.place(mount.position)),
                 };
@@ -60,6 +73,8 @@ pub(super) fn georeference(
     }
 }
 
+/// Angle beside occluded ones at which the vehicle may be heard, too, radians.
+const BESIDE_RAD: f64 = 0.09;
 /// At occluded angles, returns from nearer than this share of the range to the wall are from the vehicle.
 const VEHICLE_SHARE: f64 = 0.5;
 
@@ -92,13 +107,17 @@ fn outcome(
     {
         return sample(range_m);
     }
-    let longest_m = tunnel.site.rescaled_range_m(sonar.max_range_m, sonar.sound_speed_mps);
     let loss = match wall_m {
         _ if hidden => Loss::Occluded,
-        Some(wall_m) if wall_m <= longest_m => Loss::Missing,
+        Some(wall_m) if wall_m <= longest_m(sonar, tunnel) => Loss::Missing,
         _ => Loss::OutOfRange,
     };
     Outcome::Lost(loss, aim)
+}
+
+/// Longest range at the head's setting in this water, m.
+fn longest_m(sonar: &SonarReturn, tunnel: &TunnelDesign) -> f64 {
+    tunnel.site.rescaled_range_m(sonar.max_range_m, sonar.sound_speed_mps)
 }
 
 /// Reach of a head: its samples lie in the plane across its axis; when tilted, that plane spans some chainage.

@@ -24,13 +24,13 @@ pub(crate) fn judge_one(
     coverage: &mut Coverage,
     results: &mut Results<'_>,
 ) {
-    let Coverage { store, sections, unsure, .. } = coverage;
+    let Coverage { store, sections, unsure, lacks, .. } = coverage;
     let Results { finder, notices, digests, alerts } = results;
     let mut tell = |id: RunId, change: RunChange| {
         notices.0.push(Notice::Run { id, at: request.at, change });
         digests.judgements.record(RecordKind::Run).integer(u64::from(id.0)).integer(change as u64);
     };
-    let mut judging = Judging { store, finder: &mut finder.0, profile, tell: &mut tell };
+    let mut judging = Judging { store, lacks, finder: &mut finder.0, profile, tell: &mut tell };
     let Some(change) = sections.judge(request, &mut judging) else { return };
     notices.0.push(Notice::Section { section: request.section, at: request.at, change });
     if let Some(here) = sections.unsure(request.section)
@@ -59,7 +59,8 @@ pub(crate) fn judge_one(
             .number(evidence.middle_t_y_m)
             .number(evidence.missing_share)
             .number(evidence.swing_m)
-            .integer(u64::from(evidence.silent_heads.bits()));
+            .integer(u64::from(evidence.silent_heads.bits()))
+            .integer(u64::from(evidence.causes.bits()));
     }
     if section.contradicts() {
         let off_m = section.deviation.mean_m().unwrap_or(0.0);

@@ -9,6 +9,7 @@ mod doubt;
 mod driving;
 mod georeference;
 mod judge;
+mod lacking;
 mod live;
 mod navigate;
 mod samples;

@@ -64,8 +64,5 @@ pub(super) fn note_sample(
             section.t_m.add(spacing::t_max_m(t_x_m, advance_m, t_y_m));
         }
     }
-    if let Some([_, around_m]) = step_m {
-        section.passage.t_y_m = section.passage.t_y_m.max(around_m.abs());
-    }
     Ok(())
 }

@@ -8,11 +8,11 @@ use super::judge::digest_alert;
 use super::samples::note_sample;
 use crate::alerts::{AlertKind, Alerts};
 use crate::entities::{HeadSweep, Waiting};
-use crate::messages::{Aim, Notice, Notices, Outcome, PlacedPing, Requests};
+use crate::messages::{Aim, Hidden, Notice, Notices, Outcome, PlacedPing, Requests};
 use crate::resources::{Coverage, Digests, Tally, TunnelDesign, VehicleEntities};
 use crate::result_stream::RecordKind;
 use headrace_coverage::deviation::off_m;
-use headrace_coverage::{Beam, Loss, Outlook, PlacedReturn, Request, StoreError, Taken};
+use headrace_coverage::{Beam, Cause, Causes, Lack, Loss, Outlook, PlacedReturn, Request, StoreError, Taken};
 use headrace_geometry::frames::{Point3, Tunnel};
 use headrace_geometry::math;
 
@@ -175,16 +175,18 @@ fn doubtful(sorting: &mut Sorting<'_>, sweep: &mut HeadSweep, ping: &PlacedPing)
     let aim = ping.origin.and_then(|origin| aim(sorting.tunnel, &origin, &point));
     let lost = PlacedPing { outcome: Outcome::Lost(Loss::Missing, aim), ..*ping };
     store(sorting, sweep, &lost);
-    let Coverage { store, sections, .. } = &mut *sorting.coverage;
+    let Coverage { lacks, sections, .. } = &mut *sorting.coverage;
     if let Some(reach) = ping.reach
         && let Some(section) = sections.get_mut(sections.index_of(reach.middle_m()))
     {
         section.passage.missing += 1;
     }
-    let Some(aim) = aim else { return };
-    if let Some(section) = sections.get_mut(sections.index_of(aim.x_m)) {
+    let Some(Aim { x_m, arc_m }) = aim else { return };
+    // What is heard beside the vehicle's outline, and isn't the wall, is the vehicle.
+    let cause = if ping.hidden == Hidden::No { Cause::MissingReturns } else { Cause::Occluded };
+    lacks.add(Lack { x_m, arc_m, why: Causes::of(cause) });
+    if let Some(section) = sections.get_mut(sections.index_of(x_m)) {
         section.doubtful += 1;
-        section.passage.lost.note(Loss::Missing, aim.arc_m, store.perimeter_m());
     }
 }
 

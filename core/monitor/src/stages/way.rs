@@ -3,16 +3,22 @@
 use bevy_ecs::prelude::Query;
 
 use super::georeference::reach;
-use crate::entities::{Head, HeadFrontier, HeadSweep, Mounted};
+use crate::entities::{Head, HeadFrontier, HeadSweep, HiddenAngles, Mounted};
 use crate::messages::Requests;
 use crate::resources::{Coverage, TunnelDesign};
 use headrace_coverage::{HeadReach, Reach};
 use headrace_geometry::time::MonoNs;
 use headrace_sampling::passes::Situation;
 
-/// A head: number, mount, sweep and reach.
-pub(super) type Heads<'w, 's> =
-    Query<'w, 's, (&'static Head, &'static Mounted, &'static mut HeadSweep, &'static mut HeadFrontier)>;
+/// A head: number, mount, hidden angles, sweep and reach.
+pub(super) type Heads<'w, 's> = Query<'w, 's, HeadParts>;
+type HeadParts = (
+    &'static Head,
+    &'static Mounted,
+    &'static HiddenAngles,
+    &'static mut HeadSweep,
+    &'static mut HeadFrontier,
+);
 
 /// Updates the way for a beat with a fix; where no head is alive, requests judging of the sections that are left.
 pub(super) fn note_beat(
@@ -25,7 +31,7 @@ pub(super) fn note_beat(
     let Some(pose) = situation.pose.filter(|_| !heads.is_empty()) else { return };
     let mut all: Option<Reach> = None;
     let mut span = Reach { from_m: pose.position.x(), to_m: pose.position.x() };
-    for (head, mounted, _, mut frontier) in heads.iter_mut() {
+    for (head, mounted, .., mut frontier) in heads.iter_mut() {
         let here = reach(&pose, &mounted.info.mount, tunnel);
         all = Some(all.map_or(here, |all| all.with(here)));
         span = span.with(Reach { from_m: here.middle_m(), to_m: here.middle_m() });

@@ -56,7 +56,7 @@ impl Sections {
             _ => self.flagged.contains_key(&index),
         };
         let before = self.flagged.get(&index).copied();
-        let now = judged.cause.filter(|_| flagged).map(|figures| (figures.cause, judged.hole_m));
+        let now = judged.cause.filter(|_| flagged).map(|figures| (figures.cause(), judged.hole_m));
         match now {
             Some(now) => self.flagged.insert(index, now),
             None => self.flagged.remove(&index),
@@ -150,7 +150,7 @@ fn shown(judged: &Judged, flagged: bool, site: &Site) -> Section {
         hole_clock: site.profile.clock(judged.hole_arc_m),
         target_m: site.target_m,
         flagged,
-        cause: cause.map_or("", |figures| figures.cause.as_str()),
+        cause: cause.map_or("", |figures| figures.cause().as_str()),
         words: cause.as_ref().map(cause_text).unwrap_or_default(),
     }
 }

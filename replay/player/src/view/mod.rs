@@ -28,7 +28,7 @@ mod wall;
 #[cfg(test)]
 mod tests;
 
-use headrace_coverage::{Cause, Verdict};
+use headrace_coverage::{Cause, Causes, Verdict};
 use headrace_fusion::NoFix;
 use headrace_geometry::frames::{Body, Rot, Tunnel};
 use headrace_geometry::time::{DurNs, MonoNs};
@@ -206,9 +206,11 @@ impl View {
         let [hole_x_m, hole_arc_m] = words.numbers()?;
         let figures = words.numbers().zip(cause);
         let silent = words.integer().and_then(|bits| u8::try_from(bits).ok()).map(HeadSet::from_bits);
+        let causes = words.integer().and_then(|bits| u16::try_from(bits).ok()).map(Causes::from_bits);
         let cause = figures.map(|([speed_mps, t_y_m, middle_t_y_m, missing_share, swing_m], cause)| {
             let silent_heads = silent.unwrap_or_default();
-            CauseFigures { cause, speed_mps, t_y_m, middle_t_y_m, missing_share, swing_m, silent_heads }
+            let causes = causes.unwrap_or(Causes::of(cause));
+            CauseFigures { causes, speed_mps, t_y_m, middle_t_y_m, missing_share, swing_m, silent_heads }
         });
         let judged = Judged { at, section, change, verdict, hole_m, hole_sd_m, hole_x_m, hole_arc_m, cause };
         self.wall.judge(section, verdict);

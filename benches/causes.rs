@@ -1,0 +1,84 @@
+//! Causes told against true ones, over random dives with one or two injected causes: `cargo bench -p headrace_benches
+//! --bench causes [-- FROM TO [wrong]]`, by numbers of dives, 0 to 500 unless given; `wrong` lists the stretches told
+//! wrongly, `sections` all sections; `remedies` does what was told about each run, too.
+
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a bench stops at what it can't do")]
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use headrace_tests::interventions::{Matrix, intervene, kinds, remedies};
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().skip(1).filter(|word| word != "--bench").collect();
+    let number = |k: usize| arguments.get(k).and_then(|word| word.parse::<u64>().ok());
+    let (from, to) = (number(0).unwrap_or(0), number(1).unwrap_or(500));
+    let wrong = arguments.iter().any(|word| word == "wrong");
+    let remedy = arguments.iter().any(|word| word == "remedies");
+    let sections = arguments.iter().any(|word| word == "sections");
+    let next = AtomicU64::new(from);
+    let work = || {
+        let numbers =
+            std::iter::repeat_with(|| next.fetch_add(1, Ordering::SeqCst)).take_while(|seed| *seed < to);
+        let dive = |seed: u64| {
+            let dive = intervene(seed, &kinds(seed));
+            let done = if remedy { remedies(&dive) } else { Vec::new() };
+            (seed, dive, done)
+        };
+        numbers.map(dive).collect::<Vec<_>>()
+    };
+    let mut dives: Vec<_> = std::thread::scope(|scope| {
+        let threads = [scope.spawn(work), scope.spawn(work)];
+        threads.into_iter().flat_map(|thread| thread.join().unwrap()).collect()
+    });
+    dives.sort_by_key(|(seed, ..)| *seed);
+    let mut matrix = Matrix::default();
+    let (mut runs, mut clear) = (0, 0);
+    for (seed, dive, done) in &dives {
+        for remedied in done {
+            (runs, clear) = (runs + 1, clear + u32::from(remedied.clears));
+            if wrong && !remedied.clears {
+                println!("dive {seed}: not cleared: {:?}; {:?}", remedied.told, dive.drawn.injected);
+            }
+        }
+        matrix.add(dive);
+        for section in dive.sections.iter().filter(|_| sections) {
+            let e = &section.evidence;
+            println!(
+                "{seed} {:.2} D {:.3} {:?} told {:?} run {:?}: v {:.3} gaps {:.2} {:.2} {:.2} steps {:.3} {:.3} swing {:.3} lost {}",
+                section.ends_m[0],
+                section.hole_m,
+                section.right,
+                section.told,
+                section.run,
+                e.speed_mps,
+                e.pass_gap_s,
+                e.even_pass_gap_s,
+                e.all_pass_gap_s,
+                e.t_y_m,
+                e.middle_t_y_m,
+                e.swing_m,
+                e.lost_in_hole,
+            );
+        }
+        for stretch in dive.stretches() {
+            let is_right = stretch.right.iter().any(|set| set == stretch.told());
+            if wrong && (!is_right || stretch.runs() > 1) {
+                let [first, last] = [stretch.sections.first().unwrap(), stretch.sections.last().unwrap()];
+                println!(
+                    "dive {seed}: {:.2} to {:.2}, T {:.3}, right {:?}, told {:?}, {} runs; {:?}",
+                    first.ends_m[0],
+                    last.ends_m[1],
+                    dive.drawn.target_m,
+                    stretch.right,
+                    stretch.told(),
+                    stretch.runs(),
+                    dive.drawn.injected
+                );
+            }
+        }
+    }
+    print!("{}", matrix.text());
+    if remedy {
+        println!("runs cleared by what was told to do: {clear} of {runs}");
+    }
+}

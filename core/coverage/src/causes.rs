@@ -1,0 +1,103 @@
+//! Sets of causes.
+
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+use super::cause::Cause;
+
+/// A set of causes. Its order is that of [`Cause::ALL`]: what the pilot can change comes first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Causes(u16);
+
+impl Causes {
+    /// The set of one cause.
+    pub fn of(cause: Cause) -> Self {
+        Self(1 << cause as u16)
+    }
+
+    /// This set plus a cause.
+    #[must_use]
+    pub fn with(self, cause: Cause) -> Self {
+        self.union(Self::of(cause))
+    }
+
+    /// The causes of either set.
+    #[must_use]
+    pub fn union(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+
+    /// Whether the set contains a cause.
+    pub fn has(self, cause: Cause) -> bool {
+        Self::of(cause).is_within(self)
+    }
+
+    /// Whether all of it is in another set.
+    pub fn is_within(self, other: Self) -> bool {
+        self.0 & !other.0 == 0
+    }
+
+    /// Number of causes.
+    pub fn len(self) -> u32 {
+        self.0.count_ones()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+
+    /// The causes, the main one first.
+    pub fn iter(self) -> impl Iterator<Item = Cause> {
+        Cause::ALL.into_iter().filter(move |cause| self.has(*cause))
+    }
+
+    /// The set as a number: bit k for the cause numbered k.
+    pub fn bits(self) -> u16 {
+        self.0
+    }
+
+    /// The set of these bits; bits of no cause are ignored.
+    pub fn from_bits(bits: u16) -> Self {
+        Cause::ALL.into_iter().filter(|cause| bits & (1 << *cause as u16) != 0).collect()
+    }
+}
+
+impl FromIterator<Cause> for Causes {
+    fn from_iter<I: IntoIterator<Item = Cause>>(causes: I) -> Self {
+        causes.into_iter().fold(Self::default(), Self::with)
+    }
+}
+
+/// A list of words in text formats such as JSON, the bits in snapshots.
+impl Serialize for Causes {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        if serializer.is_human_readable() {
+            serializer.collect_seq(self.iter())
+        } else {
+            self.0.serialize(serializer)
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for Causes {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        if deserializer.is_human_readable() {
+            Ok(Vec::<Cause>::deserialize(deserializer)?.into_iter().collect())
+        } else {
+            Ok(Self::from_bits(u16::deserialize(deserializer)?))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_set_is_a_list_of_words_the_main_one_first() {
+        let set = Causes::of(Cause::Occluded).with(Cause::TooFast);
+        assert_eq!(serde_json::to_value(set).unwrap(), serde_json::json!(["too_fast", "occluded"]));
+        assert_eq!((set.len(), Causes::from_bits(set.bits())), (2, set));
+        assert!(Causes::of(Cause::TooFast).is_within(set) && !set.is_within(Causes::of(Cause::TooFast)));
+    }
+}

@@ -1,0 +1,176 @@
+use super::*;
+use crate::store::{StoreLayout, WallSample};
+
+const PERIMETER_M: f64 = 18.0;
+const TARGET_M: f64 = 0.5;
+const BOUNDS_M: (f64, f64) = (10.0, 10.25);
+
+/// Four heads at FAST, 8 s per turn, at 0.19 m/s for a target of 0.5 m.
+fn sound() -> Drive {
+    Drive {
+        speed_mps: 0.19,
+        planned_mps: 0.19,
+        gap_s: 2.0,
+        even_gap_s: 2.0,
+        healthy_gap_s: 2.0,
+        planned_gap_s: 2.0,
+        all_gap_s: 2.0,
+        ping_period_s: 0.02,
+        t_y_m: 0.19,
+        middle_t_y_m: 0.19,
+        ..Drive::default()
+    }
+}
+
+/// A wall with a lattice of samples but for some places, and what is known of it.
+struct Wall {
+    along_m: f64,
+    around_m: f64,
+    drive: Drive,
+    /// A place without samples: its ends along and around, m.
+    bare: Option<[[f64; 2]; 2]>,
+    /// Why they are lacking; empty: nobody knows.
+    why: Causes,
+    end_m: f64,
+    beside: [Causes; 2],
+    is_torn: bool,
+}
+
+impl Default for Wall {
+    fn default() -> Self {
+        Self {
+            along_m: 0.38,
+            around_m: 0.18,
+            drive: sound(),
+            bare: None,
+            why: Causes::default(),
+            end_m: 14.0,
+            beside: [Causes::default(); 2],
+            is_torn: false,
+        }
+    }
+}
+
+/// A place in the section that a turn of pings has missed.
+const BARE: Option<[[f64; 2]; 2]> = Some([[9.7, 10.5], [3.0, 4.5]]);
+
+fn named(wall: &Wall) -> Vec<Cause> {
+    let layout =
+        StoreLayout { perimeter_m: PERIMETER_M, from_m: 0.0, to_m: 20.0, cell_m: 0.25, capacity: 40_000 };
+    let (mut store, mut lacks) = (SampleStore::new(layout), Lacks::default());
+    let count = |length_m: f64, step_m: f64| math::floor_to_i64(length_m / step_m + 1e-9);
+    // The middle between two passes lies in the middle of the section.
+    let rows = count(4.0, wall.along_m);
+    let x_m = |i: i64| 10.125 + (i as f64 + 0.5) * wall.along_m;
+    for i in (-rows..=rows).filter(|i| x_m(*i) < wall.end_m) {
+        for k in 0..count(PERIMETER_M, wall.around_m) {
+            let (x_m, arc_m) = (x_m(i), k as f64 * wall.around_m);
+            let is_bare = wall.bare.is_some_and(|[along, around]| {
+                (along[0]..along[1]).contains(&x_m) && (around[0]..around[1]).contains(&arc_m)
+            });
+            if !is_bare {
+                store.insert(WallSample { x_m, arc_m, head: 0, step_m: None, visit: 0 }).unwrap();
+            } else if !wall.why.is_empty() {
+                lacks.add(Lack { x_m, arc_m, why: wall.why });
+            }
+        }
+    }
+    let mut finder = HoleFinder::default();
+    let hole = finder.largest(&store, BOUNDS_M.0, BOUNDS_M.1);
+    assert!(hole.diameter_m > TARGET_M, "the section fails: {hole:?}");
+    let case = Case {
+        hole: &hole,
+        bounds_m: BOUNDS_M,
+        first_visit: 0,
+        swept_by_all: Some(Reach { from_m: 6.0, to_m: wall.end_m }),
+        to_come: None,
+        none_alive: false,
+        is_dark: false,
+        is_torn: wall.is_torn,
+        target_m: TARGET_M,
+        beside: wall.beside,
+        lacks: &lacks,
+    };
+    let passage = Passage { pings: 1000, placed: 1000, drive: wall.drive, ..Passage::default() };
+    let evidence = explain(&case, core::iter::once(&passage), &store, &mut finder);
+    assert_eq!(evidence.causes.iter().next(), Some(evidence.cause));
+    evidence.causes.iter().collect()
+}
+
+#[test]
+fn each_cause_alone_is_named() {
+    for (cause, wall) in [
+        (
+            Cause::TooFast,
+            Wall { along_m: 0.7, drive: Drive { speed_mps: 0.35, ..sound() }, ..Wall::default() },
+        ),
+        (
+            Cause::AngularStep,
+            Wall {
+                along_m: 0.1,
+                around_m: 0.6,
+                drive: Drive { speed_mps: 0.05, t_y_m: 0.6, middle_t_y_m: 0.6, ..sound() },
+                ..Wall::default()
+            },
+        ),
+        (Cause::OffAxis, Wall { around_m: 0.6, drive: Drive { t_y_m: 0.6, ..sound() }, ..Wall::default() }),
+        (Cause::OffAxis, Wall { along_m: 0.78, drive: Drive { swing_m: 0.4, ..sound() }, ..Wall::default() }),
+        (
+            Cause::Phase,
+            Wall { along_m: 0.76, drive: Drive { healthy_gap_s: 4.0, ..sound() }, ..Wall::default() },
+        ),
+        (Cause::NotPassed, Wall { end_m: 10.1, ..Wall::default() }),
+        (Cause::PositionLost, Wall { bare: BARE, is_torn: true, ..Wall::default() }),
+        (Cause::Unknown, Wall { bare: BARE, ..Wall::default() }),
+    ] {
+        assert_eq!(named(&wall), [cause], "{:?}", wall.drive);
+    }
+    for cause in [
+        Cause::MissingReturns,
+        Cause::OutOfRange,
+        Cause::Occluded,
+        Cause::HeadSilent,
+        Cause::HeadStalled,
+        Cause::PositionLost,
+    ] {
+        assert_eq!(named(&Wall { bare: BARE, why: Causes::of(cause), ..Wall::default() }), [cause]);
+    }
+}
+
+#[test]
+fn of_two_that_are_needed_both_are_named_and_of_two_that_suffice_the_one_the_pilot_can_change() {
+    let fast = Wall { along_m: 0.7, drive: Drive { speed_mps: 0.35, ..sound() }, ..Wall::default() };
+    let wide = Some([[8.6, 11.7], [3.0, 5.5]]);
+    let why = Causes::of(Cause::MissingReturns);
+    assert_eq!(named(&Wall { bare: wide, why, ..fast }), [Cause::TooFast, Cause::MissingReturns]);
+    // What was lost here and there has only made it worse.
+    let here = Some([[10.4, 10.5], [3.0, 3.1]]);
+    let fast = Wall { along_m: 0.7, drive: Drive { speed_mps: 0.35, ..sound() }, ..Wall::default() };
+    assert_eq!(named(&Wall { bare: here, why, ..fast }), [Cause::TooFast]);
+    // What lacks for two reasons lacks for both.
+    let both = Causes::of(Cause::PositionLost).with(Cause::OutOfRange);
+    assert_eq!(
+        named(&Wall { bare: BARE, why: both, ..Wall::default() }),
+        [Cause::OutOfRange, Cause::PositionLost]
+    );
+}
+
+#[test]
+fn what_is_named_beside_is_preferred_if_it_suffices() {
+    let wall = |beside: Cause| Wall {
+        along_m: 0.7,
+        drive: Drive { speed_mps: 0.26, planned_mps: 0.1, planned_gap_s: 2.6, healthy_gap_s: 2.6, ..sound() },
+        beside: [Causes::default(), Causes::of(beside)],
+        ..Wall::default()
+    };
+    assert_eq!(named(&wall(Cause::TooFast)), [Cause::TooFast]);
+    // It has to be a factor that was present.
+    assert_eq!(named(&wall(Cause::Occluded)), [Cause::TooFast]);
+}
+
+#[test]
+fn a_report_has_the_same_word_for_a_cause_wherever_it_stands() {
+    for cause in Cause::ALL {
+        assert_eq!(serde_json::to_value(cause).unwrap(), cause.as_str());
+    }
+}

@@ -1,0 +1,168 @@
+//! Holes as they would have been: with samples that are lacking put back, the wall drawn together, or stretches covered.
+
+use super::{HoleFinder, Tile, cell_m, first_tiles};
+use crate::frontier::Reach;
+use crate::store::SampleStore;
+use headrace_geometry::math;
+
+/// Search resolution, as a share of the radius: a circle larger by less than this may be missed.
+const FINE: f64 = 0.01;
+
+/// What would have been otherwise.
+#[derive(Debug, Clone, Copy)]
+pub struct Otherwise {
+    /// Factor on distances along the tunnel, above 0, at most 1.
+    pub along: f64,
+    /// The same around the perimeter.
+    pub around: f64,
+    /// Stretches whose wall would have been covered.
+    pub covered: [Option<Reach>; 4],
+    /// Where samples may still land: the wall there is taken to become as it is on this side.
+    pub to_come: Option<Reach>,
+}
+
+impl Otherwise {
+    /// Nothing.
+    pub const NOTHING: Self = Self { along: 1.0, around: 1.0, covered: [None; 4], to_come: None };
+
+    /// How far a chainage would be from a stretch that would have been covered, m.
+    fn clear_m(&self, x_m: f64) -> f64 {
+        let off_m = |reach: &Reach| (reach.from_m - x_m).max(x_m - reach.to_m).max(0.0);
+        let covered_m = self.covered.iter().flatten().map(off_m).fold(f64::INFINITY, f64::min) * self.along;
+        self.to_come.as_ref().map(off_m).map_or(covered_m, |to_come_m| covered_m.min(to_come_m))
+    }
+
+    /// The end of where samples may still land at which the wall is mirrored, m.
+    fn mirror_m(&self) -> Option<f64> {
+        self.to_come.iter().flat_map(|reach| [reach.from_m, reach.to_m]).find(|x_m| x_m.is_finite())
+    }
+}
+
+impl HoleFinder {
+    /// True if a circle of `radius_m` centred between two chainages would hold no sample, had things been `otherwise` and
+    /// had there been the samples `more` (chainage and arc length, m) as well; samples count from `first_visit` on.
+    ///
+    /// Allocates: never, unless a section is over 4,000 cells large.
+    pub fn has_circle_otherwise(
+        &mut self,
+        (store, first_visit): (&SampleStore, u32),
+        (from_m, to_m): (f64, f64),
+        radius_m: f64,
+        otherwise: &Otherwise,
+        more: impl Iterator<Item = [f64; 2]>,
+    ) -> bool {
+        let Self { window, tiles, .. } = self;
+        let Otherwise { along, around, .. } = *otherwise;
+        let length_m = (to_m - from_m) * along;
+        let perimeter_m = store.perimeter_m() * around;
+        let reach_m = radius_m + length_m;
+        window.begin(perimeter_m, from_m, (-reach_m, length_m + reach_m), cell_m(radius_m));
+        let mirror_m = otherwise.mirror_m();
+        let mut take = |x_m: f64, arc_m: f64| {
+            window.push((x_m - from_m) * along, arc_m * around);
+            if let Some(mirror_m) = mirror_m {
+                window.push((2.0 * mirror_m - x_m - from_m) * along, arc_m * around);
+            }
+        };
+        let ends_m = [from_m - reach_m / along, to_m + reach_m / along];
+        let mirrored_m = mirror_m.map_or(ends_m, |mirror_m| ends_m.map(|x_m| 2.0 * mirror_m - x_m));
+        let [least_m, most_m] = [ends_m[0].min(mirrored_m[1]), ends_m[1].max(mirrored_m[0])];
+        store.each_between(least_m, most_m, |x_m, arc_m, visit| {
+            if visit >= first_visit {
+                take(x_m, arc_m);
+            }
+        });
+        for [x_m, arc_m] in more {
+            take(x_m, arc_m);
+        }
+        window.sort();
+        tiles.clear();
+        tiles.extend(first_tiles(perimeter_m, length_m));
+        while let Some(tile) = tiles.pop() {
+            let half_m = tile.half_m();
+            let clear_m = otherwise.clear_m(from_m + tile.x_m / along);
+            let nearest = window.nearest(tile.x_m, tile.arc_m, radius_m + half_m);
+            let nearest_m = nearest.map_or(f64::INFINITY, |found| math::sqrt(found.distance2)).min(clear_m);
+            if nearest_m > radius_m {
+                return true;
+            }
+            if nearest_m + half_m > radius_m && half_m > FINE * radius_m {
+                tiles.extend::<[Tile; 2]>(tile.halves());
+            }
+        }
+        false
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::store::{StoreLayout, WallSample};
+
+    /// Samples every 0.5 m along and around a wall of 10 m perimeter, but for those that `is_in` leaves out.
+    fn has(
+        is_in: impl Fn(u32, u32) -> bool,
+        radius_m: f64,
+        otherwise: &Otherwise,
+        more: &[[f64; 2]],
+    ) -> bool {
+        let layout = StoreLayout { perimeter_m: 10.0, from_m: 0.0, to_m: 10.0, cell_m: 0.25, capacity: 1000 };
+        let mut store = SampleStore::new(layout);
+        for (i, k) in (0..20).flat_map(|i| (0..20).map(move |k| (i, k))).filter(|(i, k)| is_in(*i, *k)) {
+            let (x_m, arc_m) = (0.5 * f64::from(i), 0.5 * f64::from(k));
+            store.insert(WallSample { x_m, arc_m, head: 0, step_m: None, visit: 0 }).unwrap();
+        }
+        let more = more.iter().copied();
+        HoleFinder::default().has_circle_otherwise((&store, 0), (5.0, 5.5), radius_m, otherwise, more)
+    }
+
+    #[test]
+    fn samples_put_back_fill_the_hole() {
+        let gone = |i: u32, k: u32| !(i == 10 && k == 4);
+        let hole_m = 0.5;
+        assert!(has(gone, 0.99 * hole_m, &Otherwise::NOTHING, &[]));
+        assert!(!has(gone, 1.03 * hole_m, &Otherwise::NOTHING, &[]));
+        assert!(!has(gone, 0.99 * hole_m, &Otherwise::NOTHING, &[[5.0, 2.0]]));
+    }
+
+    #[test]
+    fn a_wall_drawn_together_has_smaller_holes() {
+        let all = |_, _| true;
+        // Half the diagonal of a mesh of 0.5 by 0.5 m, and of 0.25 by 0.5 m.
+        for (otherwise, radius_m) in [
+            (Otherwise::NOTHING, 0.3535),
+            (Otherwise { along: 0.5, ..Otherwise::NOTHING }, 0.2795),
+            (Otherwise { around: 0.5, ..Otherwise::NOTHING }, 0.2795),
+        ] {
+            assert!(has(all, 0.98 * radius_m, &otherwise, &[]), "{otherwise:?}");
+            assert!(!has(all, 1.03 * radius_m, &otherwise, &[]), "{otherwise:?}");
+        }
+    }
+
+    #[test]
+    fn where_samples_may_still_land_the_wall_becomes_as_it_is_before() {
+        // Drawn together, a circle at the end reaches ahead, where nothing has landed yet.
+        let ends = |i: u32, _| i <= 10;
+        let otherwise = Otherwise { along: 0.3, ..Otherwise::NOTHING };
+        let to_come = Some(Reach { from_m: 5.25, to_m: f64::INFINITY });
+        assert!(has(ends, 0.275, &otherwise, &[]));
+        assert!(!has(ends, 0.275, &Otherwise { to_come, ..otherwise }, &[]));
+        // A strip that nobody sees stays one.
+        let strip = |i: u32, k: u32| i <= 11 && k != 4;
+        let to_come = Some(Reach { from_m: 6.0, to_m: f64::INFINITY });
+        assert!(has(strip, 0.4, &Otherwise { to_come, ..otherwise }, &[]));
+    }
+
+    #[test]
+    fn a_stretch_that_would_have_been_covered_is_no_hole() {
+        let behind = |i: u32, _| i <= 9;
+        assert!(has(behind, 0.4, &Otherwise::NOTHING, &[]));
+        let ahead = Some(Reach { from_m: 4.7, to_m: f64::INFINITY });
+        assert!(!has(
+            behind,
+            0.4,
+            &Otherwise { covered: [None, ahead, None, None], ..Otherwise::NOTHING },
+            &[]
+        ));
+    }
+}

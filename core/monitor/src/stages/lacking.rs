@@ -1,0 +1,329 @@
+//! Samples that are lacking: pings that were lost, those of silent and stalled heads, and those made without a fix.
+//!
+//! A head that is silent or stands is taken to turn on at its last rate; where its pings would have met the design is
+//! noted at each beat. Pings without a fix are noted once there is one again, along the straight way between the two.
+
+use serde::{Deserialize, Serialize};
+
+use super::way::Heads;
+use crate::messages::{Aim, Hidden, Outcome, PlacedPing};
+use crate::resources::Coverage;
+use headrace_coverage::{Cause, Causes, Drive, Lack, Lacks, Loss};
+use headrace_geometry::frames::{Mount, Pose, Vec3, head_direction};
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_geometry::tunnel::Profile;
+use headrace_sampling::head::{HeadMotion, HeadSet, MAX_HEADS};
+use headrace_sampling::passes::Situation;
+use headrace_snapshot::stateful;
+
+/// Time without a ping at a new angle after which a head is lacking.
+const LACKING_AFTER: DurNs = DurNs(400_000_000);
+/// Pings at hidden angles from which it is told whether they are, and the share of them that gets nothing.
+const HIDDEN_PINGS: u16 = 600;
+const HIDDEN_SHARE: f64 = 0.7;
+/// Pings without a fix that are kept: four heads for over two minutes.
+const ROOM: usize = 1 << 15;
+
+/// A head as it was last seen turning.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+struct Turning {
+    /// Angle, radians, rate, rad/s, and step, radians, at a beat.
+    seen: Option<(MonoNs, f64, f64, f64)>,
+    /// Its last ping, and its last at a new angle.
+    pinged: Option<MonoNs>,
+    moved: Option<MonoNs>,
+    /// Until when its lacks have been noted.
+    noted: Option<MonoNs>,
+    /// Longest range at its setting, m.
+    longest_m: f64,
+    /// Of the latest pings at angles that the vehicle hides: those that got nothing, and all.
+    hidden: [u16; 2],
+}
+
+impl Turning {
+    fn note_hidden(&mut self, is_hidden: bool, is_lost: bool) {
+        if !is_hidden {
+            return;
+        }
+        self.hidden = [self.hidden[0] + u16::from(is_lost), self.hidden[1] + 1];
+        if self.hidden[1] >= HIDDEN_PINGS {
+            self.hidden = self.hidden.map(|count| count / 2);
+        }
+    }
+
+    /// Whether the vehicle does hide what it is taken to hide.
+    fn is_hidden(&self) -> bool {
+        let [lost, all] = self.hidden;
+        HIDDEN_SHARE * f64::from(all) <= f64::from(lost)
+    }
+}
+
+/// A ping that was made, or should have been, without a fix.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+struct Away {
+    at: MonoNs,
+    head: u8,
+    angle_rad: f64,
+    /// Why it is lacking beside the position; a ping without a return is judged by where it was aimed.
+    why: Causes,
+    is_lost: bool,
+}
+
+/// What is needed of earlier beats and pings.
+#[derive(Debug, Clone)]
+pub(crate) struct Lacking {
+    heads: [Turning; MAX_HEADS],
+    /// The last beat with a fix.
+    pose: Option<(MonoNs, Pose)>,
+    away: Vec<Away>,
+    /// There was no room for some.
+    forgot: bool,
+    /// Heads that have stood still, and haven't been in step with the others since.
+    pub(super) stalled: HeadSet,
+}
+
+stateful!(Lacking { state: heads, pose, forgot, stalled; lists: away; });
+
+impl Default for Lacking {
+    /// Allocates: startup only; all that it will ever use.
+    fn default() -> Self {
+        Self {
+            heads: [Turning::default(); MAX_HEADS],
+            pose: None,
+            away: Vec::with_capacity(ROOM),
+            forgot: false,
+            stalled: HeadSet::default(),
+        }
+    }
+}
+
+impl Lacking {
+    /// Whether every head that has pinged does so at new angles.
+    pub(super) fn all_turn(&self, at: MonoNs) -> bool {
+        let turns = |moved: MonoNs| at.since(moved).0 <= LACKING_AFTER.0;
+        self.heads.iter().filter_map(|head| head.moved).all(turns)
+    }
+
+    /// The situation as it would be had no head been silent or stood still: such heads turn on as they last did.
+    pub(super) fn healthy(&mut self, at: MonoNs, situation: &Situation, heads: &Heads<'_, '_>) -> Situation {
+        let stalled = self.stalled;
+        let mut healthy = *situation;
+        for (number, mounted, ..) in heads {
+            let slot = self.heads.get_mut(number.0).zip(healthy.heads.get_mut(number.0));
+            let Some((head, motion)) = slot else { continue };
+            match motion {
+                Some(motion) if !stalled.has(number.0) => {
+                    let turns_on = motion.sector_rad.is_none();
+                    head.seen =
+                        turns_on.then_some((at, motion.angle_rad, motion.rate_radps, motion.step_rad));
+                }
+                _ => {
+                    let Some((seen, angle_rad, rate_radps, step_rad)) = head.seen else { continue };
+                    let angle_rad = angle_rad + rate_radps * at.since(seen).as_secs_f64();
+                    let mount = mounted.info.mount;
+                    *motion = Some(HeadMotion { mount, angle_rad, rate_radps, step_rad, sector_rad: None });
+                }
+            }
+        }
+        healthy
+    }
+}
+
+/// Notes a ping: a lack, if it was aimed at the wall in vain.
+pub(super) fn note_ping(lacking: &mut Lacking, ping: &PlacedPing, lacks: &mut Lacks) {
+    if ping.standing {
+        lacking.stalled = lacking.stalled.with(ping.head);
+    }
+    let Lacking { heads, away, forgot, .. } = lacking;
+    let Some(head) = heads.get_mut(ping.head) else { return };
+    head.pinged = Some(ping.valid_at);
+    head.longest_m = ping.longest_m;
+    if ping.standing {
+        return;
+    }
+    head.moved = Some(ping.valid_at);
+    match ping.outcome {
+        Outcome::Sample { .. } => head.note_hidden(ping.hidden == Hidden::Yes, false),
+        Outcome::Lost(loss, Some(Aim { x_m, arc_m })) => {
+            head.note_hidden(loss == Loss::Occluded, true);
+            // Where the wall is heard at such angles all the same, what isn't is missing.
+            let heard = loss == Loss::Occluded && !head.is_hidden();
+            let cause = if heard { Cause::MissingReturns } else { Cause::of_loss(loss) };
+            lacks.add(Lack { x_m, arc_m, why: Causes::of(cause) });
+        }
+        Outcome::Lost(_, None) | Outcome::Unplaced(_) if ping.fix.is_none() => {
+            let is_lost = !matches!(ping.outcome, Outcome::Unplaced(_));
+            let why = Causes::of(Cause::PositionLost);
+            let number = u8::try_from(ping.head).unwrap_or(u8::MAX);
+            *forgot |= !keep(
+                away,
+                Away { at: ping.valid_at, head: number, angle_rad: ping.angle_rad, why, is_lost },
+            );
+        }
+        Outcome::Lost(_, None) | Outcome::Unplaced(_) => {}
+    }
+}
+
+/// Notes a beat: what silent and stalled heads would have pinged since the last one, and where pings without a fix were.
+///
+/// Allocates: never.
+pub(super) fn note_beat(
+    lacking: &mut Lacking,
+    now: Drive,
+    heads: &Heads<'_, '_>,
+    (at, situation): (MonoNs, &Situation),
+    profile: &Profile,
+    coverage: &mut Coverage,
+) {
+    let stalled = lacking.stalled;
+    if let Some(pose) = situation.pose {
+        note_away(lacking, now, heads, (at, pose), profile, coverage);
+    }
+    let Lacking { heads: turning, pose: before, away, forgot, .. } = lacking;
+    let speed_mps = situation.speed_mps;
+    for (number, mounted, hidden, ..) in heads {
+        let Some(head) = turning.get_mut(number.0) else { continue };
+        // A head that has stood still lacks where it would be otherwise until it is in step again.
+        let out_of_step = stalled.has(number.0);
+        let late = |moved: &MonoNs| out_of_step || at.since(*moved).0 > LACKING_AFTER.0;
+        let Some(moved) = head.moved.filter(late) else { continue };
+        let Some((seen, angle_rad, rate_radps, step_rad)) = head.seen.filter(|seen| seen.2.abs() > 0.0)
+        else {
+            continue;
+        };
+        let from = match head.noted {
+            Some(noted) if out_of_step || noted.0 > moved.0 => noted,
+            _ => moved,
+        };
+        let is_silent = head.pinged.is_none_or(|pinged| at.since(pinged).0 > LACKING_AFTER.0);
+        let is_silent = is_silent && !out_of_step;
+        let cause = if is_silent { Cause::HeadSilent } else { Cause::HeadStalled };
+        let period = DurNs::from_secs_f64(step_rad / rate_radps.abs());
+        let mut when = from + period;
+        while period.0 > 0 && at.since(when).0 >= 0 {
+            let angle_rad = angle_rad + rate_radps * when.since(seen).as_secs_f64();
+            let number = u8::try_from(number.0).unwrap_or(u8::MAX);
+            let ping = Away { at: when, head: number, angle_rad, why: Causes::of(cause), is_lost: true };
+            if let Some(pose) = situation.pose {
+                let back_m = speed_mps * at.since(when).as_secs_f64();
+                let pose = Pose { position: pose.position + Vec3::new(-back_m, 0.0, 0.0), ..pose };
+                let hides = |angle_rad| hidden.hides(angle_rad);
+                let placing = Placing { mount: &mounted.info.mount, turning: head, profile, hidden: &hides };
+                placing.lack(&pose, &ping, now, coverage);
+            } else {
+                *forgot |= !keep(away, Away { why: ping.why.with(Cause::PositionLost), ..ping });
+            }
+            head.noted = Some(when);
+            when = when + period;
+        }
+    }
+    if let Some(pose) = situation.pose {
+        *before = Some((at, pose));
+    }
+}
+
+/// Notes pings without a fix once there is one again.
+///
+/// Allocates: never.
+pub(super) fn note_away(
+    lacking: &mut Lacking,
+    now: Drive,
+    heads: &Heads<'_, '_>,
+    (at, pose): (MonoNs, Pose),
+    profile: &Profile,
+    coverage: &mut Coverage,
+) {
+    let Lacking { heads: turning, pose: before, away, forgot, .. } = lacking;
+    let Some((then, from)) = *before else { return };
+    let way = Way { from: (then, from), to: (at, pose) };
+    let speed_mps = way.speed_mps();
+    if core::mem::take(forgot) {
+        let [from_m, to_m] = [&from, &pose].map(|pose| pose.position.x());
+        let sections = &mut coverage.sections;
+        for index in sections.index_of(from_m.min(to_m))..=sections.index_of(from_m.max(to_m)) {
+            if let Some(section) = sections.get_mut(index) {
+                section.passage.unseen = true;
+            }
+        }
+    }
+    for ping in away.drain(..) {
+        let head = usize::from(ping.head);
+        let mut mounts = heads.iter().filter(|(number, ..)| number.0 == head);
+        let mount = mounts.next().map(|(_, mounted, ..)| mounted.info.mount);
+        let (Some(mount), Some(turning)) = (mount, turning.get(head)) else { continue };
+        let hidden = |angle_rad| hides(heads, head, angle_rad);
+        let placing = Placing { mount: &mount, turning, profile, hidden: &hidden };
+        placing.lack(&way.at(ping.at), &ping, Drive { speed_mps, ..now }, coverage);
+    }
+}
+
+/// Keeps a ping without a fix; false if there is no room.
+fn keep(away: &mut Vec<Away>, ping: Away) -> bool {
+    let has_room = away.len() < away.capacity();
+    if has_room {
+        away.push(ping);
+    }
+    has_room
+}
+
+fn hides(heads: &Heads<'_, '_>, head: usize, angle_rad: f64) -> bool {
+    heads.iter().any(|(number, _, hidden, ..)| number.0 == head && hidden.hides(angle_rad))
+}
+
+/// A straight way between two fixes.
+struct Way {
+    from: (MonoNs, Pose),
+    to: (MonoNs, Pose),
+}
+
+impl Way {
+    fn speed_mps(&self) -> f64 {
+        let seconds = self.to.0.since(self.from.0).as_secs_f64().max(1e-3);
+        (self.to.1.position.x() - self.from.1.position.x()).abs() / seconds
+    }
+
+    /// The pose at a time between them: the attitude is the nearer one's.
+    fn at(&self, at: MonoNs) -> Pose {
+        let whole_s = self.to.0.since(self.from.0).as_secs_f64().max(1e-3);
+        let share = (at.since(self.from.0).as_secs_f64() / whole_s).clamp(0.0, 1.0);
+        let (from, to) = (&self.from.1, &self.to.1);
+        let attitude = if share < 0.5 { from.attitude } else { to.attitude };
+        Pose { position: from.position + (to.position - from.position).scaled(share), attitude }
+    }
+}
+
+/// Places what a head would have pinged.
+struct Placing<'a> {
+    mount: &'a Mount,
+    turning: &'a Turning,
+    profile: &'a Profile,
+    hidden: &'a dyn Fn(f64) -> bool,
+}
+
+impl Placing<'_> {
+    /// Notes a lack where a ping was or would have been aimed, and how the vehicle went by.
+    fn lack(&self, pose: &Pose, ping: &Away, drive: Drive, coverage: &mut Coverage) {
+        let origin = pose.place(self.mount.position);
+        let beam = pose.attitude * (self.mount.rotation * head_direction(ping.angle_rad));
+        let wall = self.profile.cast([origin.y(), origin.z()], [beam.y(), beam.z()]);
+        let Some(wall) = wall else { return };
+        let x_m = origin.x() + wall.range_m * beam.x();
+        let index = coverage.sections.index_of(x_m);
+        if let Some(section) = coverage.sections.get_mut(index) {
+            section.passage.drive = section.passage.drive.or_worse(drive);
+        }
+        let mut why = ping.why;
+        // A ping that was made and got nothing was lost for another reason, too; one that wasn't would have been.
+        let made = why == Causes::of(Cause::PositionLost);
+        if ping.is_lost {
+            if wall.range_m > self.turning.longest_m {
+                why = why.with(Cause::OutOfRange);
+            } else if self.turning.is_hidden() && (self.hidden)(ping.angle_rad) {
+                why = why.with(Cause::Occluded);
+            } else if made {
+                why = why.with(Cause::MissingReturns);
+            }
+        }
+        coverage.lacks.add(Lack { x_m, arc_m: wall.arc_m, why });
+    }
+}

@@ -1,0 +1,116 @@
+//! Confusion matrix: causes told against true ones.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
+use headrace_coverage::Cause;
+
+use super::{Intervened, Right};
+
+/// Counts of answers.
+#[derive(Debug, Default, Clone, Copy)]
+pub struct Count {
+    /// All.
+    pub all: u32,
+    /// Right ones.
+    pub right: u32,
+}
+
+impl Count {
+    fn add(&mut self, right: bool) {
+        self.all += 1;
+        self.right += u32::from(right);
+    }
+
+    /// Share of right ones; 1 of nothing.
+    pub fn share(self) -> f64 {
+        if self.all == 0 { 1.0 } else { f64::from(self.right) / f64::from(self.all) }
+    }
+}
+
+/// Told against true, of dives with one cause and with two, by section and by stretch.
+#[derive(Debug, Default)]
+pub struct Matrix {
+    /// By number of injected causes less one.
+    pub sections: [Count; 2],
+    /// The same of stretches.
+    pub stretches: [Count; 2],
+    /// Stretches of which a set of two is true.
+    pub pairs: Count,
+    /// Stretches told as at most one run.
+    pub one_run: Count,
+    /// Dives of which nothing failed.
+    pub idle: u32,
+    /// By true cause (of dives with one) and told ones: sections and stretches.
+    told: BTreeMap<(String, String), [u32; 2]>,
+    /// The same of dives with two, wrong ones only.
+    wrong: BTreeMap<(String, String), u32>,
+}
+
+fn words(causes: &[Cause]) -> String {
+    causes.iter().map(|cause| cause.as_str()).collect::<Vec<_>>().join("+")
+}
+
+fn any_words(right: &Right) -> String {
+    right.iter().map(|set| words(set)).collect::<Vec<_>>().join(" or ")
+}
+
+impl Matrix {
+    /// Adds a dive.
+    pub fn add(&mut self, dive: &Intervened) {
+        let several = dive.drawn.injected.len() - 1;
+        self.idle += u32::from(dive.sections.is_empty());
+        for section in &dive.sections {
+            self.sections[several].add(section.is_right());
+            self.note(several, &section.right, &section.told, 0);
+        }
+        for stretch in dive.stretches() {
+            let is_right = stretch.right.iter().any(|set| set == stretch.told());
+            self.stretches[several].add(is_right);
+            self.one_run.add(stretch.runs() <= 1);
+            if stretch.right.iter().all(|set| set.len() > 1) {
+                self.pairs.add(is_right);
+            }
+            self.note(several, &stretch.right, stretch.told(), 1);
+        }
+    }
+
+    fn note(&mut self, several: usize, right: &Right, told: &[Cause], which: usize) {
+        let key = (any_words(right), words(told));
+        if several == 0 {
+            self.told.entry(key).or_default()[which] += 1;
+        } else if which == 1 && !right.iter().any(|set| set == told) {
+            *self.wrong.entry(key).or_default() += 1;
+        }
+    }
+
+    /// The matrix as text.
+    pub fn text(&self) -> String {
+        let mut text = String::from("one cause injected: true cause, then told with sections/stretches\n");
+        let mut last = "";
+        for ((right, told), [sections, stretches]) in &self.told {
+            if right != last {
+                write!(text, "{}  {right:<16}", if last.is_empty() { "" } else { "\n" }).unwrap();
+                last = right;
+            }
+            write!(text, " {told} {sections}/{stretches};").unwrap();
+        }
+        text.push_str("\ntwo causes injected, wrong stretches: true, told, how many\n");
+        for ((right, told), stretches) in &self.wrong {
+            writeln!(text, "  {right:<45} {told:<35} {stretches}").unwrap();
+        }
+        for (what, count) in [
+            ("sections, one cause", self.sections[0]),
+            ("stretches, one cause", self.stretches[0]),
+            ("sections, two causes", self.sections[1]),
+            ("stretches, two causes", self.stretches[1]),
+            ("of these stretches whose true set is two", self.pairs),
+            ("stretches of at most one run", self.one_run),
+        ] {
+            writeln!(text, "{what}: {} of {} ({:.1} %)", count.right, count.all, 100.0 * count.share())
+                .unwrap();
+        }
+        writeln!(text, "dives without a failed section: {}", self.idle).unwrap();
+        text
+    }
+}

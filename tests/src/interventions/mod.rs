@@ -1,0 +1,201 @@
+//! Causes by intervention: dives with injected causes, simulated with and without each of them, against what the loop puts
+//! its fails down to.
+//!
+//! The true cause of a failed section is the injected one whose removal brings its hole within the target, and of two that
+//! both must go, the set of both. Where either alone suffices, either is right. Nothing of how the program finds causes is
+//! used here: simulations alone decide.
+
+mod draw;
+mod matrix;
+mod remedy;
+
+use headrace_coverage::{Cause, Evidence};
+use headrace_monitor::report::{Report, SectionReport};
+
+use crate::scenes;
+pub use draw::{Drawn, Injected, KINDS};
+pub use matrix::Matrix;
+pub use remedy::remedies;
+
+/// How far from the ends of the way sections are left out, m: there they fail whatever is injected.
+const END_M: f64 = 2.0;
+/// Failed sections this near to each other are one stretch, m.
+const JOIN_M: f64 = 0.5;
+
+/// Sets of causes, any of which is right; each sorted.
+pub type Right = Vec<Vec<Cause>>;
+
+/// A section that fails, why it does, and what was told.
+#[derive(Debug, Clone)]
+pub struct Judged {
+    /// Chainage at which it begins and ends, m.
+    pub ends_m: [f64; 2],
+    /// The sets of causes that are right.
+    pub right: Right,
+    /// The causes told, sorted.
+    pub told: Vec<Cause>,
+    /// Its run.
+    pub run: Option<u32>,
+    /// Diameter of its hole, m.
+    pub hole_m: f64,
+    /// The figures behind what was told.
+    pub evidence: Evidence,
+}
+
+impl Judged {
+    /// Whether what was told is right.
+    pub fn is_right(&self) -> bool {
+        self.right.contains(&self.told)
+    }
+}
+
+/// A dive with its failed sections.
+pub struct Intervened {
+    /// What was drawn, with the target as it was set.
+    pub drawn: Drawn,
+    /// Report with everything injected.
+    pub report: Report,
+    /// The failed sections whose fail the injected causes explain.
+    pub sections: Vec<Judged>,
+}
+
+/// A stretch: neighbouring failed sections with a common right answer.
+pub struct Stretch<'a> {
+    /// Its sections.
+    pub sections: &'a [Judged],
+    /// The sets that are right for all of it.
+    pub right: Right,
+}
+
+impl Stretch<'_> {
+    /// What was told of most of it.
+    pub fn told(&self) -> &[Cause] {
+        let count = |told: &[Cause]| self.sections.iter().filter(|section| section.told == told).count();
+        self.sections
+            .iter()
+            .map(|section| section.told.as_slice())
+            .max_by_key(|told| count(told))
+            .unwrap_or(&[])
+    }
+
+    /// How many runs it was told as.
+    pub fn runs(&self) -> usize {
+        let mut runs: Vec<u32> = self.sections.iter().filter_map(|section| section.run).collect();
+        runs.sort_unstable();
+        runs.dedup();
+        runs.len()
+    }
+}
+
+/// Report of a dive with what `is_in` of the injected causes.
+pub fn report(drawn: &Drawn, is_in: &dyn Fn(usize) -> bool) -> Report {
+    let vehicle = drawn.vehicle(is_in);
+    let scene = scenes::scene_from(&drawn.scene(is_in), &|_| Ok(vehicle.as_bytes().to_vec()));
+    scenes::report(&scene)
+}
+
+/// Draws a dive and simulates it with and without each of the causes injected.
+pub fn intervene(seed: u64, kinds: &[usize]) -> Intervened {
+    let mut drawn = Drawn::of(seed, kinds);
+    let without_all = report(&drawn, &|_| false);
+    let inner_m = [draw::START_M + END_M, drawn.end_m - 0.25];
+    let is_inner = |section: &&SectionReport| section.start_m >= inner_m[0] && section.end_m <= inner_m[1];
+    let holes_m = without_all.sections.iter().filter(is_inner).filter_map(|section| section.hole_m);
+    drawn.target_m = drawn.margin * holes_m.fold(0.0, f64::max);
+    // Holes don't depend on the target, verdicts do.
+    let all = report(&drawn, &|_| true);
+    let without: Vec<Report> = match kinds {
+        [_, _] => (0..2).map(|k| report(&drawn, &|other| other != k)).collect(),
+        _ => vec![without_all.clone()],
+    };
+    let run_of = |at_m: f64| {
+        let has = |run: &&headrace_monitor::report::RunReport| {
+            run.merged_into.is_none() && run.cleared_s.is_none() && (run.start_m..run.end_m).contains(&at_m)
+        };
+        all.runs.iter().filter(has).map(|run| run.id).collect::<Vec<_>>()
+    };
+    let mut sections = Vec::new();
+    for section in all.sections.iter().filter(is_inner) {
+        let Some(evidence) = section.cause.as_ref().filter(|_| section.verdict == "fail") else { continue };
+        let passes = |report: &Report| {
+            let same = report.sections.iter().find(|other| (other.start_m - section.start_m).abs() < 1e-6);
+            same.and_then(|same| same.hole_m).is_some_and(|hole_m| hole_m <= drawn.target_m)
+        };
+        let Some(right) =
+            right(&drawn, &without.iter().map(passes).collect::<Vec<_>>(), passes(&without_all))
+        else {
+            continue;
+        };
+        let told = told(evidence);
+        let runs = run_of(f64::midpoint(section.start_m, section.end_m));
+        let of_cause = |id: &&u32| all.runs[**id as usize].cause == evidence.cause;
+        let run = runs.iter().find(of_cause).or(runs.first()).copied();
+        sections.push(Judged {
+            ends_m: [section.start_m, section.end_m],
+            right,
+            told,
+            run,
+            hole_m: section.hole_m.unwrap_or(0.0),
+            evidence: *evidence,
+        });
+    }
+    Intervened { drawn, report: all, sections }
+}
+
+/// The causes told of a section, sorted.
+fn told(evidence: &Evidence) -> Vec<Cause> {
+    evidence.causes.iter().collect()
+}
+
+/// Which sets of causes are right; `None` where the section fails without any of them.
+fn right(drawn: &Drawn, alone: &[bool], together: bool) -> Option<Right> {
+    if !together {
+        return None;
+    }
+    let cause = |k: usize| drawn.injected[k].cause();
+    let single: Right =
+        alone.iter().enumerate().filter(|(_, passes)| **passes).map(|(k, _)| vec![cause(k)]).collect();
+    if !single.is_empty() {
+        return Some(single);
+    }
+    let mut both: Vec<Cause> = (0..drawn.injected.len()).map(cause).collect();
+    both.sort_by_key(|cause| *cause as usize);
+    Some(vec![both])
+}
+
+impl Intervened {
+    /// The stretches of the failed sections.
+    pub fn stretches(&self) -> Vec<Stretch<'_>> {
+        let mut stretches: Vec<Stretch<'_>> = Vec::new();
+        let mut from = 0;
+        for k in 0..self.sections.len() {
+            let section = &self.sections[k];
+            let near = k > from && section.ends_m[0] - self.sections[k - 1].ends_m[1] <= JOIN_M + 1e-9;
+            let common: Right = match stretches.last().filter(|_| near) {
+                Some(before) => {
+                    before.right.iter().filter(|set| section.right.contains(set)).cloned().collect()
+                }
+                None => Right::new(),
+            };
+            if let (false, Some(last)) = (common.is_empty(), stretches.last_mut()) {
+                *last = Stretch { sections: &self.sections[from..=k], right: common };
+            } else {
+                from = k;
+                stretches.push(Stretch { sections: &self.sections[k..=k], right: section.right.clone() });
+            }
+        }
+        stretches
+    }
+}
+
+/// The kinds injected into the dive of a number: one into every other dive, two into the others, all in turn.
+pub fn kinds(seed: u64) -> Vec<usize> {
+    let number = usize::try_from(seed).unwrap();
+    if number.is_multiple_of(2) {
+        return vec![number / 2 % KINDS.len()];
+    }
+    // All pairs in turn.
+    let pairs: Vec<[usize; 2]> =
+        (0..KINDS.len()).flat_map(|a| (a + 1..KINDS.len()).map(move |b| [a, b])).collect();
+    pairs[number / 2 * 17 % pairs.len()].to_vec()
+}

@@ -1,0 +1,30 @@
+//! Causes by intervention: a tenth of the bench's dives, and what is told of them.
+
+use headrace_tests::interventions::{Matrix, intervene, kinds};
+
+const DIVES: u64 = 50;
+
+#[test]
+fn what_is_told_of_a_fail_is_what_removed_lets_the_section_pass() {
+    let mut matrix = Matrix::default();
+    let threads = 2;
+    let of_thread = |thread: u64| -> Vec<_> {
+        (0..DIVES)
+            .filter(|seed| seed % threads == thread)
+            .map(|seed| intervene(10 * seed + seed % 2, &kinds(10 * seed + seed % 2)))
+            .collect()
+    };
+    let dives = std::thread::scope(|scope| {
+        let running: Vec<_> = (0..threads).map(|thread| scope.spawn(move || of_thread(thread))).collect();
+        running.into_iter().flat_map(|thread| thread.join().unwrap()).collect::<Vec<_>>()
+    });
+    for dive in &dives {
+        matrix.add(dive);
+    }
+    let text = matrix.text();
+    println!("{text}");
+    assert!(matrix.sections[0].all > 300 && matrix.stretches[1].all > 25, "too few fails\n{text}");
+    assert!(matrix.sections[0].share() >= 0.9, "sections, one cause\n{text}");
+    assert!(matrix.stretches[1].share() >= 0.6, "stretches, two causes\n{text}");
+    assert!(matrix.one_run.share() >= 0.8, "runs\n{text}");
+}
