@@ -46,6 +46,16 @@ pub struct Hole {
     pub bounded: bool,
 }
 
+impl Hole {
+    /// Whether another one is the same but for a centimetre.
+    pub fn is_like(&self, other: &Self) -> bool {
+        const LITTLE_M: f64 = 0.01;
+        let grown_m = (self.diameter_m - other.diameter_m).abs();
+        let moved_m = (self.x_m - other.x_m).abs().max((self.arc_m - other.arc_m).abs());
+        grown_m <= LITTLE_M && moved_m <= LITTLE_M && self.bounded == other.bounded
+    }
+}
+
 #[derive(Debug, Clone, Copy)]
 struct Tile {
     /// Centre, from the start of the section, m.

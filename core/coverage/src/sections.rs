@@ -318,7 +318,7 @@ impl Sections {
         let section = self.get_mut(request.section)?;
         let before = Self::counted(section);
         let (error_m, had_a_flag) = (confidence_sd * sd_m, section.is_flagged());
-        let is_same = section.hole == Some(hole) && section.evidence.is_some();
+        let is_same = section.hole.is_some_and(|before| before.is_like(&hole)) && section.evidence.is_some();
         section.hole = Some(hole);
         section.hole_sd_m = sd_m;
         section.verdict = match verdict(&hole, error_m, target_m, clear_m.min(passed_m)) {
