@@ -217,7 +217,13 @@ fn heads_may_stand_in_any_order_in_the_vehicle_file() {
     folder.write("reordered.toml", reordered(&vehicle, 3));
     let (_, got) = folder.replay("dive.mcap", &["--vehicle", "reordered.toml"]);
     assert_eq!(got["sources"][0]["id"], "sonar_2", "the order is another");
-    // What is said of phases goes by the heads' order.
+    // What is said of phases goes by the heads' order, and so do causes: start angles are given out in that order.
+    let [got, expected] = [got, expected].map(|mut report| {
+        for section in report["sections"].as_array_mut().unwrap() {
+            section.as_object_mut().unwrap().remove("cause");
+        }
+        report
+    });
     let keys = ["dive", "summary", "sections"];
     assert_eq!(answers(&got, &keys), answers(&expected, &keys));
 }
