@@ -114,8 +114,11 @@ pub(crate) fn claim(path: &Path, kind: Kind, overwrite: &Overwrite) -> Result<()
     OpenOptions::new().write(true).open(path).map(|_| ()).map_err(failed)
 }
 
-/// Removes a file that may be overwritten, for what creates new files only.
+/// Removes a file that may be overwritten, for what creates new files only. Terminals, pipes and devices stay.
 pub(crate) fn make_way(path: &Path) -> Result<(), Failure> {
+    if !path.is_file() {
+        return Ok(());
+    }
     match std::fs::remove_file(path) {
         Err(source) if source.kind() != ErrorKind::NotFound => {
             Err(Failure::Unwritable { path: path.to_owned(), source })

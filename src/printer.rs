@@ -1,14 +1,17 @@
 //! Writes a dive's lines to stdout on a thread of its own: a terminal that doesn't read holds up no live dive.
 
 use std::thread::{self, JoinHandle};
+use std::time::Duration;
 
-use crossbeam::channel::{Receiver, Sender, TrySendError, bounded};
+use crossbeam::channel::{Receiver, RecvTimeoutError, Sender, TrySendError, bounded};
 
 use crate::output::{put, say};
 use crate::{terminal, transient};
 
 /// Lines that may wait. A dive has a line a second, and some for each stretch.
 const WAITING: usize = 1 << 10;
+/// How long a live dive waits for its terminal at the end.
+const ENDS_WITHIN: Duration = Duration::from_secs(2);
 
 enum Message {
     Line(String),
@@ -20,6 +23,8 @@ enum Message {
 pub(crate) struct Printer {
     sender: Option<Sender<Message>>,
     thread: Option<JoinHandle<()>>,
+    /// Disconnected once the thread has written all.
+    done: Receiver<()>,
     /// Drops what finds no room, instead of waiting for it.
     lossy: bool,
     dropped: u64,
@@ -30,8 +35,13 @@ impl Printer {
     pub(crate) fn start(lossy: bool) -> Self {
         let (sender, messages) = bounded(WAITING);
         // Without a thread everything is dropped, and said so at the end.
-        let thread = thread::Builder::new().name("terminal".to_owned()).spawn(move || print(&messages)).ok();
-        Self { sender: Some(sender), thread, lossy, dropped: 0 }
+        let (writing, done) = bounded(0);
+        let write = move || {
+            print(&messages);
+            drop::<Sender<()>>(writing);
+        };
+        let thread = thread::Builder::new().name("terminal".to_owned()).spawn(write).ok();
+        Self { sender: Some(sender), thread, done, lossy, dropped: 0 }
     }
 
     /// From now on nothing waits for the terminal.
@@ -59,9 +69,15 @@ impl Printer {
         self.dropped += u64::from(full);
     }
 
-    /// Waits until all has been written.
+    /// Waits until all has been written; a lossy one for [`ENDS_WITHIN`] at most, since a terminal that doesn't read must not keep a
+    /// dive from its log's end.
     pub(crate) fn end(&mut self) {
         drop(self.sender.take());
+        let stuck = self.lossy && self.done.recv_timeout(ENDS_WITHIN) == Err(RecvTimeoutError::Timeout);
+        if stuck {
+            self.thread = None;
+            tracing::warn!("the terminal doesn't read: its last lines aren't shown");
+        }
         if let Some(thread) = self.thread.take()
             && thread.join().is_err()
         {

@@ -193,6 +193,11 @@ impl Simulation {
     /// Simulates a second of the dive and discards the messages, for use of the ground truth alone; false at the end.
     pub fn advance(&mut self) -> bool {
         let more = self.next_slice();
+        if let Some(adviser) = &mut self.adviser {
+            while let Some(message) = self.outbox.next() {
+                adviser.hear(&message);
+            }
+        }
         self.outbox.skip();
         more
     }

@@ -144,3 +144,18 @@ fn outputs_are_tried_before_the_work() {
     }
     assert_eq!(folder.read("vehicle.toml"), VEHICLE.as_bytes());
 }
+
+#[cfg(unix)]
+#[test]
+fn what_is_no_file_is_never_removed_to_make_way() {
+    let folder = Folder::new();
+    std::fs::create_dir(folder.path("out")).unwrap();
+    let link = folder.path("out/dive.mcap");
+    std::os::unix::fs::symlink("/dev/null", &link).unwrap();
+    for force in [&["--force"][..], &[]] {
+        let arguments = [&["demo", "--speed", "max", "--out", "out"], force].concat();
+        let answer = folder.headrace(&arguments);
+        assert_ne!(answer.code, Some(0), "{}", answer.stderr);
+        assert!(link.symlink_metadata().unwrap().is_symlink(), "{force:?}: it is gone");
+    }
+}
