@@ -33,6 +33,8 @@ pub mod spacings;
 pub mod tracking;
 pub mod truth;
 pub mod wall;
+#[cfg(unix)]
+pub mod world;
 
 use std::path::Path;
 

@@ -8,6 +8,7 @@ mod device_end;
 mod diagnosis;
 mod discover;
 mod fix_hint;
+mod host;
 mod line_thread;
 mod lines;
 mod open_error;
@@ -20,7 +21,9 @@ pub use clock::{clock_anchor, now, of_wall};
 pub use device_end::{EmulatedPort, wait_for_any};
 pub use discover::can::is_interface_up;
 pub use discover::{Found, Machine, Presence, Rights, User, discover, presence};
-pub use line_thread::SentSink;
+pub use host::Host;
+pub use line_thread::{Attached, Common, LineService, SentSink};
+pub use lines::{Line, READ_BYTES};
 pub use open_error::{OpenError, OpenErrorKind};
 #[cfg(target_os = "linux")]
 pub use probe::{Answer, probe};

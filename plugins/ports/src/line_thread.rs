@@ -1,4 +1,5 @@
-//! Thread of one line: opens it, serves its drivers and reopens it after a failure, indefinitely.
+//! Service of one line: opens it, serves its drivers and reopens it after a failure, indefinitely, one step at a time. On ports
+//! each runs on a thread of its own.
 
 use std::collections::VecDeque;
 use std::io;
@@ -15,7 +16,8 @@ use headrace_sensor::driver::{DeviceHealth, Driver, Wire};
 
 use crate::clock;
 use crate::diagnosis;
-use crate::lines::{self, Line, READ_BYTES};
+use crate::host::Host;
+use crate::lines::{Line, READ_BYTES};
 use crate::status::{Board, LineHistory, Phase, Status};
 
 /// Reconnect backoff: initial and maximum pause; shorter for local ports, which are cheap to retry.
@@ -35,27 +37,54 @@ const KNOCK_PERIOD: DurNs = DurNs::from_millis(1_000);
 pub type SentSink = Arc<dyn Fn(usize, MonoNs, &[u8]) + Send + Sync>;
 
 /// A sensor on a line.
-pub(crate) struct Attached {
+pub struct Attached {
     /// Sensor index, in the order of the vehicle file.
     pub source: usize,
+    /// Writing end of its ring.
     pub port: Port,
+    /// Host-side driver.
     pub driver: Box<dyn Driver>,
 }
 
-/// State shared by all threads.
+/// State shared by all lines.
 #[derive(Clone)]
-pub(crate) struct Common {
+pub struct Common {
+    /// Clock, and what opens lines.
+    pub host: Arc<dyn Host>,
+    /// Set to end all.
     pub stopping: Arc<AtomicBool>,
+    /// Where changes of status are posted.
     pub board: Board,
+    /// Wakes the loop when packets have come.
     pub waker: Unparker,
+    /// Gets all messages sent to devices.
     pub sent: Option<SentSink>,
 }
 
 /// A line and the devices on it.
-pub(crate) struct LineThread {
+pub struct LineService {
     connect: Result<Connect, ConnectError>,
     devices: Vec<AttachedState>,
     common: Common,
+    state: LineState,
+    /// Pause before the next attempt to open it.
+    pause: DurNs,
+}
+
+enum LineState {
+    /// Not tried before that time.
+    Closed {
+        until: MonoNs,
+    },
+    Open(OpenLine),
+}
+
+struct OpenLine {
+    line: Box<dyn Line>,
+    opened: MonoNs,
+    /// Times of the next look at the devices' health, and of the next keep-alive.
+    look_at: MonoNs,
+    knock_at: MonoNs,
 }
 
 /// A sensor with its connection state.
@@ -70,10 +99,9 @@ struct AttachedState {
     last_frame: MonoNs,
 }
 
-/// Reason for the end of service without a failure.
+/// What becomes of an open line after a step.
 enum Served {
-    /// Stop was requested.
-    ToTheEnd,
+    Open,
     /// All devices exceeded their silence timeout: the line is reopened.
     InSilence,
 }
@@ -108,13 +136,10 @@ impl Wire for Ends<'_> {
     }
 }
 
-impl LineThread {
-    pub(crate) fn new(
-        connect: Result<Connect, ConnectError>,
-        attached: Vec<Attached>,
-        common: Common,
-    ) -> Self {
-        let now = clock::now();
+impl LineService {
+    /// A line that isn't open yet.
+    pub fn new(connect: Result<Connect, ConnectError>, attached: Vec<Attached>, common: Common) -> Self {
+        let now = common.host.now();
         let device = |attached| AttachedState {
             attached,
             history: LineHistory::default(),
@@ -124,7 +149,9 @@ impl LineThread {
             last_bytes: now,
             last_frame: now,
         };
-        Self { connect, devices: attached.into_iter().map(device).collect(), common }
+        let devices = attached.into_iter().map(device).collect();
+        let state = LineState::Closed { until: now };
+        Self { connect, devices, common, state, pause: FIRST_PAUSE }
     }
 
     /// Runs until stopped; returns each sensor's line history.
@@ -132,50 +159,120 @@ impl LineThread {
         let sensors: Vec<usize> = self.devices.iter().map(|device| device.attached.source).collect();
         let address = self.connect.as_ref().map_or_else(|error| error.text.clone(), Connect::to_string);
         let _span = tracing::info_span!("port", address, ?sensors).entered();
-        let mut pause = FIRST_PAUSE;
         while !self.stopping() {
-            match self.connect.clone() {
-                // A `connect` that doesn't parse stays invalid.
-                Err(error) => {
-                    self.say_all(Phase::Closed, &error.to_string());
-                    self.wait(LONGEST_PAUSE);
-                    continue;
-                }
-                Ok(connect) => match lines::open(&connect) {
-                    Err(trouble) => {
-                        tracing::debug!(%trouble, "port not opened");
-                        self.say_all(Phase::Closed, &trouble.to_string());
-                    }
-                    Ok(mut line) => {
-                        tracing::info!("port opened");
-                        let opened = clock::now();
-                        let ended = self.serve(line.as_mut(), opened);
-                        self.closed();
-                        let served = clock::now().since(opened);
-                        if served >= LONG_ENOUGH
-                            && self.devices.iter().any(|device| device.last_frame >= opened)
-                        {
-                            pause = FIRST_PAUSE;
-                        }
-                        match ended {
-                            Ok(Served::ToTheEnd) => (),
-                            // The silent status already shown stays until the device answers.
-                            Ok(Served::InSilence) => {
-                                tracing::info!("no data, reopening the port");
-                                self.count_lost();
-                            }
-                            Err(error) => self.lost(&connect, &error),
-                        }
-                    }
-                },
+            if self.closed_until().is_some_and(|until| self.common.host.now() < until) {
+                thread::sleep(LOOK);
+            } else {
+                self.step();
             }
-            if !self.stopping() {
-                tracing::debug!(backoff_s = pause.as_secs_f64(), "waiting before the next attempt");
+        }
+        self.end()
+    }
+
+    /// Time before which a closed line isn't tried again; `None` if it is open.
+    pub fn closed_until(&self) -> Option<MonoNs> {
+        match self.state {
+            LineState::Closed { until } => Some(until),
+            LineState::Open(_) => None,
+        }
+    }
+
+    /// Time at which an open line is to be stepped, whether bytes have come or not; `None` if it is closed.
+    pub fn due(&self) -> Option<MonoNs> {
+        match &self.state {
+            LineState::Closed { .. } => None,
+            LineState::Open(open) => {
+                let drivers = self.devices.iter().filter_map(|device| device.attached.driver.due()).min();
+                Some(drivers.map_or(open.look_at, |due| due.min(open.look_at)).min(open.knock_at))
             }
-            self.wait(pause);
-            pause = (pause + pause).min(self.longest_pause());
+        }
+    }
+
+    /// Opens a closed line, or waits once for bytes on an open one and serves its drivers.
+    pub fn step(&mut self) {
+        let closed = LineState::Closed { until: self.common.host.now() };
+        self.state = match core::mem::replace(&mut self.state, closed) {
+            LineState::Closed { .. } => self.open(),
+            LineState::Open(mut open) => match self.serve(&mut open) {
+                Ok(Served::Open) => LineState::Open(open),
+                ended => self.ended(open.opened, ended.map(|_| ())),
+            },
+        };
+    }
+
+    /// Delivers what the drivers still hold; returns each sensor's line history.
+    pub fn end(mut self) -> Vec<(usize, LineHistory)> {
+        if matches!(self.state, LineState::Open(_)) {
+            self.closed();
         }
         self.devices.into_iter().map(|device| (device.attached.source, device.history)).collect()
+    }
+
+    fn open(&mut self) -> LineState {
+        let connect = match self.connect.clone() {
+            // A `connect` that doesn't parse stays invalid.
+            Err(error) => {
+                self.say_all(Phase::Closed, &error.to_string());
+                return LineState::Closed { until: self.common.host.now() + LONGEST_PAUSE };
+            }
+            Ok(connect) => connect,
+        };
+        let mut line = match self.common.host.open(&connect) {
+            Ok(line) => line,
+            Err(trouble) => {
+                tracing::debug!(%trouble, "port not opened");
+                self.say_all(Phase::Closed, &trouble.to_string());
+                return self.rest();
+            }
+        };
+        tracing::info!("port opened");
+        let opened = self.common.host.now();
+        match self.greet(line.as_mut(), opened) {
+            Ok(()) => LineState::Open(OpenLine {
+                line,
+                opened,
+                look_at: opened + STANDING_PERIOD,
+                knock_at: opened + KNOCK_PERIOD,
+            }),
+            Err(error) => self.ended(opened, Err(error)),
+        }
+    }
+
+    /// Tells the drivers that their line is open.
+    fn greet(&mut self, line: &mut dyn Line, opened: MonoNs) -> io::Result<()> {
+        for device in &mut self.devices {
+            device.history.opened += 1;
+            device.frames_before = device.attached.driver.health().good_frames;
+            (device.last_bytes, device.last_frame) = (opened, opened);
+        }
+        for number in 0..self.devices.len() {
+            self.drive(line, number, |driver, wire| driver.opened(opened, wire))?;
+        }
+        Ok(())
+    }
+
+    /// Closes a line that was opened at that time, in silence or after an error.
+    fn ended(&mut self, opened: MonoNs, ended: io::Result<()>) -> LineState {
+        self.closed();
+        let served = self.common.host.now().since(opened);
+        if served >= LONG_ENOUGH && self.devices.iter().any(|device| device.last_frame >= opened) {
+            self.pause = FIRST_PAUSE;
+        }
+        self.count_lost();
+        match ended {
+            // The silent status already shown stays until the device answers.
+            Ok(()) => tracing::info!("no data, reopening the port"),
+            Err(error) => self.lost(&error),
+        }
+        self.rest()
+    }
+
+    /// Closed for a while, longer each time.
+    fn rest(&mut self) -> LineState {
+        tracing::debug!(backoff_s = self.pause.as_secs_f64(), "waiting before the next attempt");
+        let until = self.common.host.now() + self.pause;
+        self.pause = (self.pause + self.pause).min(self.longest_pause());
+        LineState::Closed { until }
     }
 
     fn longest_pause(&self) -> DurNs {
@@ -189,17 +286,10 @@ impl LineThread {
         self.common.stopping.load(Ordering::Relaxed)
     }
 
-    fn wait(&self, pause: DurNs) {
-        let until = clock::now() + pause;
-        while !self.stopping() && clock::now() < until {
-            thread::sleep(LOOK);
-        }
-    }
-
-    fn lost(&mut self, connect: &Connect, error: &io::Error) {
-        self.count_lost();
+    fn lost(&mut self, error: &io::Error) {
         let why = diagnosis::losing(error);
         tracing::info!(%error, why, "connection lost");
+        let Ok(connect) = self.connect.clone() else { return };
         self.say_all(Phase::Closed, &format!("lost {connect}: {why}; it is tried again"));
     }
 
@@ -217,41 +307,31 @@ impl LineThread {
         }
     }
 
-    /// Serves an open line until it fails, all devices on it are silent, or stop is requested.
-    fn serve(&mut self, line: &mut dyn Line, opened: MonoNs) -> io::Result<Served> {
-        for device in &mut self.devices {
-            device.history.opened += 1;
-            device.frames_before = device.attached.driver.health().good_frames;
-            (device.last_bytes, device.last_frame) = (opened, opened);
-        }
-        for number in 0..self.devices.len() {
-            self.drive(line, number, |driver, wire| driver.opened(opened, wire))?;
-        }
+    /// Waits once for bytes, and serves the drivers.
+    fn serve(&mut self, open: &mut OpenLine) -> io::Result<Served> {
+        let OpenLine { line, look_at, knock_at, .. } = open;
+        let line = line.as_mut();
         let mut buffer = [0; READ_BYTES];
-        let mut look_at = opened + STANDING_PERIOD;
-        let mut knock_at = opened + KNOCK_PERIOD;
-        while !self.stopping() {
-            let wait = self.wait_for(clock::now());
-            if let Some((received, count)) = line.read(wait, &mut buffer)? {
-                let bytes = buffer.get(..count).unwrap_or_default();
-                self.heard(line, received, bytes)?;
-                knock_at = received + KNOCK_PERIOD;
-            }
-            self.wake(line)?;
-            let now = clock::now();
-            if now >= knock_at {
-                line.knock()?;
-                knock_at = now + KNOCK_PERIOD;
-            }
-            if now >= look_at {
-                look_at = now + STANDING_PERIOD;
-                self.look(line.complaint().as_deref(), now);
-                if self.devices.iter().all(|device| device.is_silent(now)) {
-                    return Ok(Served::InSilence);
-                }
+        let wait = self.wait_for(self.common.host.now());
+        if let Some((received, count)) = line.read(wait, &mut buffer)? {
+            let bytes = buffer.get(..count).unwrap_or_default();
+            self.heard(line, received, bytes)?;
+            *knock_at = received + KNOCK_PERIOD;
+        }
+        self.wake(line)?;
+        let now = self.common.host.now();
+        if now >= *knock_at {
+            line.knock()?;
+            *knock_at = now + KNOCK_PERIOD;
+        }
+        if now >= *look_at {
+            *look_at = now + STANDING_PERIOD;
+            self.look(line.complaint().as_deref(), now);
+            if self.devices.iter().all(|device| device.is_silent(now)) {
+                return Ok(Served::InSilence);
             }
         }
-        Ok(Served::ToTheEnd)
+        Ok(Served::Open)
     }
 
     /// Maximum wait for bytes, bounded by the next driver deadline.
@@ -263,7 +343,7 @@ impl LineThread {
     fn heard(&mut self, line: &mut dyn Line, received: MonoNs, bytes: &[u8]) -> io::Result<()> {
         for number in 0..self.devices.len() {
             if let Some(device) = self.devices.get_mut(number) {
-                device.last_bytes = clock::now();
+                device.last_bytes = self.common.host.now();
             }
             self.drive(line, number, |driver, wire| driver.heard(received, bytes, wire))?;
         }
@@ -275,7 +355,7 @@ impl LineThread {
     /// opening), the first times out first; else each would wait for the others indefinitely.
     fn wake(&mut self, line: &mut dyn Line) -> io::Result<()> {
         for number in 0..self.devices.len() {
-            let now = clock::now();
+            let now = self.common.host.now();
             let awaits = |device: &AttachedState| device.attached.driver.awaits();
             let Some(device) = self.devices.get(number) else { continue };
             let rivals = if awaits(device) { number } else { self.devices.len() };
@@ -309,7 +389,7 @@ impl LineThread {
                 IoRequest::Exchange { write, settle, read_bytes } => {
                     self.common.note_sent(*source, &write);
                     if let Some((received, answer)) = line.exchange(&write, settle, read_bytes)? {
-                        *last_bytes = clock::now();
+                        *last_bytes = self.common.host.now();
                         driver.heard(received, &answer, &mut Ends { port, history, requests: &mut requests });
                     }
                 }
@@ -319,7 +399,7 @@ impl LineThread {
     }
 
     fn say_all(&mut self, phase: Phase, words: &str) {
-        let now = clock::now();
+        let now = self.common.host.now();
         for device in &mut self.devices {
             device.say(&self.common.board, now, phase, words);
         }
@@ -342,7 +422,7 @@ impl LineThread {
 impl Common {
     fn note_sent(&self, source: usize, bytes: &[u8]) {
         if let Some(sent) = &self.sent {
-            sent(source, clock::now(), bytes);
+            sent(source, self.host.now(), bytes);
         }
     }
 }

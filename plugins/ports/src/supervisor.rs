@@ -16,7 +16,8 @@ use headrace_sensor::connect::{Connect, ConnectError};
 use headrace_sensor::driver::Driver;
 
 use crate::clock;
-use crate::line_thread::{Attached, Common, LineThread, SentSink};
+use crate::host::RealHost;
+use crate::line_thread::{Attached, Common, LineService, SentSink};
 use crate::status::{Board, LineHistory, Status};
 
 /// Capacity of the status board.
@@ -57,11 +58,12 @@ impl Supervisor {
         let stopping = Arc::new(AtomicBool::new(false));
         let board = Board::new(BOARD);
         let waker = parker.unparker().clone();
-        let common = Common { stopping: Arc::clone(&stopping), board: board.clone(), waker, sent };
+        let host = Arc::new(RealHost);
+        let common = Common { host, stopping: Arc::clone(&stopping), board: board.clone(), waker, sent };
         let sensors = connections.iter().map(|hand| hand.source + 1).max().unwrap_or(0);
         let mut supervisor = Self { sensors, threads: Vec::new(), stopping, board, parker };
         for (name, connect, attached) in lines(connections) {
-            let service = LineThread::new(connect, attached, common.clone());
+            let service = LineService::new(connect, attached, common.clone());
             let thread = thread::Builder::new().name(name).spawn(move || service.run())?;
             supervisor.threads.push(thread);
         }

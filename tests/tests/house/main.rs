@@ -4,5 +4,6 @@
 
 mod circles;
 mod imports;
+mod supply;
 mod tidy;
 mod workspace;

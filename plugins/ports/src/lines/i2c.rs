@@ -30,7 +30,7 @@ pub(super) fn open(bus: &str, address: u8) -> Result<Box<dyn Line>, OpenError> {
     Ok(Box::new(Bus { bus: opened, address }))
 }
 
-impl<B: I2c> Line for Bus<B> {
+impl<B: I2c + Send> Line for Bus<B> {
     /// A bus carries no unsolicited data.
     fn read(&mut self, wait: Duration, _: &mut [u8; READ_BYTES]) -> io::Result<Option<(MonoNs, usize)>> {
         thread::sleep(wait);

@@ -6,18 +6,24 @@ use std::time::Duration;
 use headrace_geometry::time::{DurNs, MonoNs};
 
 /// Maximum bytes of one read.
-pub(crate) const READ_BYTES: usize = 2048;
+pub const READ_BYTES: usize = 2048;
 
 /// An open line.
-pub(crate) trait Line {
+pub trait Line: Send {
     /// Waits up to `wait` for bytes; returns the first one's receive time and the count. `None` on timeout.
+    ///
+    /// Errors: the connection is lost.
     fn read(&mut self, wait: Duration, into: &mut [u8; READ_BYTES]) -> io::Result<Option<(MonoNs, usize)>>;
 
     /// Sends bytes; on a message carrier they form one message.
+    ///
+    /// Errors: the connection is lost.
     fn write(&mut self, bytes: &[u8]) -> io::Result<()>;
 
     /// On a bus: writes, waits `settle`, reads, and returns the transaction (bytes written, then bytes read) with the time at
     /// which the read began. `None` if the answer comes as a message.
+    ///
+    /// Errors: the connection is lost; the line is no bus.
     fn exchange(
         &mut self,
         write: &[u8],
@@ -34,6 +40,8 @@ pub(crate) trait Line {
     }
 
     /// Keep-alive, called about once a second on an idle line, for carriers that forget silent clients.
+    ///
+    /// Errors: the connection is lost.
     fn knock(&mut self) -> io::Result<()> {
         Ok(())
     }

@@ -14,7 +14,7 @@ mod udp;
 use headrace_sensor::connect::Connect;
 
 use crate::open_error::OpenError;
-pub(crate) use line::{Line, READ_BYTES};
+pub use line::{Line, READ_BYTES};
 
 /// Opens the target of a `connect`.
 ///

@@ -1,0 +1,162 @@
+//! Cables of the simulated machine: what the host's lines read and write, without ports, threads or a clock.
+
+use std::collections::VecDeque;
+use std::io;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::Duration;
+
+use crossbeam::queue::SegQueue;
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_ports::{Host, Line, OpenError, OpenErrorKind, READ_BYTES};
+use headrace_sensor::connect::Connect;
+
+/// How an open line fails.
+pub const FAILURES: [io::ErrorKind; 4] = [
+    io::ErrorKind::BrokenPipe,
+    io::ErrorKind::ConnectionReset,
+    io::ErrorKind::UnexpectedEof,
+    io::ErrorKind::PermissionDenied,
+];
+
+/// The clock of the world, which stands until it is set.
+#[derive(Default)]
+pub struct Clock(AtomicU64);
+
+impl Clock {
+    /// Current time.
+    pub fn now(&self) -> MonoNs {
+        MonoNs(self.0.load(Ordering::SeqCst))
+    }
+
+    /// Sets the time.
+    pub fn set(&self, now: MonoNs) {
+        self.0.store(now.0, Ordering::SeqCst);
+    }
+}
+
+/// A cable between the machine and one device.
+pub struct Cable {
+    /// Address at which the machine opens it.
+    pub connect: Connect,
+    /// What has arrived at the machine and hasn't been read.
+    pub to_host: SegQueue<Vec<u8>>,
+    /// What the machine has sent.
+    pub to_device: SegQueue<Vec<u8>>,
+    /// The device can't be opened.
+    pub refuses: AtomicBool,
+    /// Writing fails.
+    pub deaf: AtomicBool,
+    /// Grows when the connection breaks: lines opened before fail.
+    breaks: AtomicU64,
+    /// How it broke, an index of [`FAILURES`].
+    failure: AtomicU64,
+    /// Lines opened on it so far.
+    opened: AtomicU64,
+}
+
+impl Cable {
+    /// A sound cable.
+    pub fn new(connect: Connect) -> Self {
+        let (to_host, to_device) = (SegQueue::new(), SegQueue::new());
+        let [refuses, deaf] = [AtomicBool::new(false), AtomicBool::new(false)];
+        let [breaks, failure, opened] = [AtomicU64::new(0), AtomicU64::new(0), AtomicU64::new(0)];
+        Self { connect, to_host, to_device, refuses, deaf, breaks, failure, opened }
+    }
+
+    /// Breaks the connection; what hasn't been read is lost.
+    pub fn break_off(&self, failure: usize) {
+        while self.to_host.pop().is_some() {}
+        self.failure.store(failure as u64, Ordering::SeqCst);
+        self.breaks.fetch_add(1, Ordering::SeqCst);
+    }
+
+    /// Whether the machine has it open, and it isn't broken.
+    pub fn is_open(&self) -> bool {
+        self.opened.load(Ordering::SeqCst) > self.breaks.load(Ordering::SeqCst)
+    }
+
+    fn error(&self) -> io::Error {
+        let number = usize::try_from(self.failure.load(Ordering::SeqCst)).unwrap();
+        io::Error::from(FAILURES[number % FAILURES.len()])
+    }
+}
+
+/// The machine's clock and cables.
+pub struct Machine {
+    /// Its clock.
+    pub clock: Arc<Clock>,
+    /// Its cables.
+    pub cables: Vec<Arc<Cable>>,
+}
+
+impl Host for Machine {
+    fn now(&self) -> MonoNs {
+        self.clock.now()
+    }
+
+    fn open(&self, connect: &Connect) -> Result<Box<dyn Line>, OpenError> {
+        let cable = self.cables.iter().find(|cable| cable.connect == *connect).unwrap();
+        if cable.refuses.load(Ordering::SeqCst) {
+            let why = format!("opening {connect}: refused");
+            return Err(OpenError { kind: OpenErrorKind::Absent, why, remedy: None });
+        }
+        let breaks = cable.breaks.load(Ordering::SeqCst);
+        cable.opened.store(breaks + 1, Ordering::SeqCst);
+        let (cable, clock) = (Arc::clone(cable), Arc::clone(&self.clock));
+        Ok(Box::new(OpenCable { cable, clock, breaks, left: VecDeque::new() }))
+    }
+}
+
+/// The machine's end of a cable.
+struct OpenCable {
+    cable: Arc<Cable>,
+    clock: Arc<Clock>,
+    breaks: u64,
+    /// What didn't fit into the last read.
+    left: VecDeque<u8>,
+}
+
+impl OpenCable {
+    fn sound(&self) -> io::Result<()> {
+        let broken = self.cable.breaks.load(Ordering::SeqCst) != self.breaks;
+        if broken { Err(self.cable.error()) } else { Ok(()) }
+    }
+}
+
+impl Line for OpenCable {
+    fn read(&mut self, _: Duration, into: &mut [u8; READ_BYTES]) -> io::Result<Option<(MonoNs, usize)>> {
+        self.sound()?;
+        if self.left.is_empty() {
+            match self.cable.to_host.pop() {
+                None => return Ok(None),
+                Some(bytes) => self.left.extend(bytes),
+            }
+        }
+        let count = self.left.len().min(into.len());
+        for (place, byte) in into.iter_mut().zip(self.left.drain(..count)) {
+            *place = byte;
+        }
+        Ok(Some((self.clock.now(), count)))
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.sound()?;
+        if self.cable.deaf.load(Ordering::SeqCst) {
+            return Err(io::Error::from(io::ErrorKind::WriteZero));
+        }
+        self.cable.to_device.push(bytes.to_vec());
+        Ok(())
+    }
+
+    /// Asks as over UDP: with the length of the answer, which comes as a message.
+    fn exchange(
+        &mut self,
+        write: &[u8],
+        _: DurNs,
+        read_bytes: usize,
+    ) -> io::Result<Option<(MonoNs, Vec<u8>)>> {
+        self.write(&[write, &[u8::try_from(read_bytes).unwrap()]].concat())?;
+        Ok(None)
+    }
+}

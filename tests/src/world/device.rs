@@ -1,0 +1,214 @@
+//! Emulated devices at the far ends of the cables, and what becomes of what they send.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+
+use headrace_geometry::frames::Vec3;
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_sensor::connect::Connect;
+use headrace_sensor::device::{Direction, Emulated, Emulator};
+use headrace_sensor::measurement::Measurement;
+
+use super::cable::{Cable, FAILURES};
+use super::plan::{CableFault, Window};
+use crate::random::Random;
+
+/// Longest delay of a part of a frame.
+const LONGEST_DELAY_NS: usize = 80_000_000;
+
+/// A device at the end of its cable.
+pub struct Device {
+    emulated: Emulated,
+    cable: Arc<Cable>,
+    faults: Vec<Window<CableFault>>,
+    /// What is under way, with the time at which it arrives.
+    under_way: VecDeque<(MonoNs, Vec<u8>)>,
+    random: Random,
+    /// Whether bytes may be cut and joined anywhere, or each message comes whole or not at all.
+    is_stream: bool,
+    was_broken: bool,
+    whole: u64,
+}
+
+impl Device {
+    /// A device that is switched on.
+    pub fn new(
+        emulated: Emulated,
+        cable: Arc<Cable>,
+        faults: Vec<Window<CableFault>>,
+        random: Random,
+    ) -> Self {
+        let is_stream = matches!(cable.connect, Connect::Tcp { .. } | Connect::Serial { .. });
+        let under_way = VecDeque::new();
+        Self { emulated, cable, faults, under_way, random, is_stream, was_broken: false, whole: 0 }
+    }
+
+    /// Its cable.
+    pub fn cable(&self) -> &Cable {
+        &self.cable
+    }
+
+    /// Frames that it has sent whole and in order over an open cable.
+    pub fn whole(&self) -> u64 {
+        self.whole
+    }
+
+    /// Whether its cable has only delayed and cut what it sent.
+    pub fn is_lossless(&self) -> bool {
+        self.faults.iter().all(|fault| matches!(fault.what, CableFault::Cut | CableFault::Held))
+    }
+
+    /// Whether nothing ever happened to it.
+    pub fn is_untouched(&self) -> bool {
+        self.faults.is_empty()
+    }
+
+    /// Whether it has something under way.
+    pub fn has_under_way(&self) -> bool {
+        !self.under_way.is_empty()
+    }
+
+    /// Hears what the machine has sent, measures, sends, and lets arrive what is due. A `quiet` one sends nothing new.
+    pub fn step(&mut self, now: MonoNs, quiet: bool) {
+        self.connection(now);
+        let mut out = Vec::new();
+        while let Some(bytes) = self.cable.to_device.pop() {
+            feel(&mut self.emulated, Some(&bytes), now, &mut out);
+        }
+        feel(&mut self.emulated, None, now, &mut out);
+        if !quiet && self.cable.is_open() {
+            for frame in out {
+                self.send(now, frame);
+            }
+        }
+        while self.under_way.front().is_some_and(|(at, _)| *at <= now) {
+            let (_, bytes) = self.under_way.pop_front().unwrap();
+            if self.cable.is_open() {
+                self.cable.to_host.push(bytes);
+            }
+        }
+    }
+
+    fn has(&self, fault: CableFault, now: MonoNs) -> bool {
+        self.faults.iter().any(|window| window.what == fault && window.holds(now))
+    }
+
+    fn connection(&mut self, now: MonoNs) {
+        let broken = self.has(CableFault::Broken, now);
+        if broken && !self.was_broken {
+            self.cable.break_off(self.random.below(FAILURES.len()));
+            self.under_way.clear();
+        }
+        self.was_broken = broken;
+        self.cable.refuses.store(broken, Ordering::SeqCst);
+        self.cable.deaf.store(self.has(CableFault::Deaf, now), Ordering::SeqCst);
+    }
+
+    fn send(&mut self, now: MonoNs, mut frame: Vec<u8>) {
+        if self.has(CableFault::Silent, now) {
+            return;
+        }
+        if self.has(CableFault::Lost, now) && self.random.one_in(5) {
+            return self.lose_some(now, frame);
+        }
+        if self.has(CableFault::Garbled, now) && self.random.one_in(5) {
+            let at = self.random.below(frame.len());
+            frame[at] ^= 1 << self.random.below(8);
+            return self.put(now, frame);
+        }
+        if self.has(CableFault::Babble, now) && self.random.one_in(3) {
+            let count = 1 + self.random.below(300);
+            let noise = (0..count).map(|_| self.random.byte()).collect();
+            self.put(now, noise);
+        }
+        self.whole += 1;
+        if self.has(CableFault::Doubled, now) && self.random.one_in(5) {
+            self.put(now, frame.clone());
+        }
+        if self.has(CableFault::Disordered, now) && self.random.one_in(4) {
+            // Overtaken by what is sent in the meantime.
+            let late = now + DurNs(self.random.below(LONGEST_DELAY_NS) as i64);
+            let place = self.under_way.partition_point(|(at, _)| *at <= late);
+            return self.under_way.insert(place, (late, frame));
+        }
+        if self.is_stream && self.has(CableFault::Cut, now) {
+            return self.cut(now, &frame);
+        }
+        let held = self.faults.iter().find(|fault| fault.what == CableFault::Held && fault.holds(now));
+        let arrives = held.map_or(now, |held| held.to);
+        self.put(arrives, frame);
+    }
+
+    /// A stream loses some bytes of a frame, a message carrier the frame.
+    fn lose_some(&mut self, now: MonoNs, mut frame: Vec<u8>) {
+        if self.is_stream {
+            let from = self.random.below(frame.len());
+            let count = 1 + self.random.below(frame.len() - from);
+            frame.drain(from..(from + count).min(frame.len()));
+            self.put(now, frame);
+        }
+    }
+
+    /// A frame arrives in parts.
+    fn cut(&mut self, now: MonoNs, frame: &[u8]) {
+        let mut rest = frame;
+        let mut at = now;
+        while !rest.is_empty() {
+            let (part, after) = rest.split_at(1 + self.random.below(rest.len()));
+            if self.random.one_in(2) {
+                at = at + DurNs(self.random.below(LONGEST_DELAY_NS) as i64);
+            }
+            self.put(at, part.to_vec());
+            rest = after;
+        }
+    }
+
+    /// Behind all that is under way: cables keep the order.
+    fn put(&mut self, at: MonoNs, bytes: Vec<u8>) {
+        let at = self.under_way.back().map_or(at, |(last, _)| at.max(*last));
+        self.under_way.push_back((at, bytes));
+    }
+}
+
+/// Lets a device hear and measure, in a vehicle that goes along the middle of a pipe of 3 m radius at 0.2 m/s.
+fn feel(device: &mut Emulated, heard: Option<&[u8]>, now: MonoNs, out: &mut Vec<Vec<u8>>) {
+    match device {
+        Emulated::Head(device) | Emulated::Echosounder(device) => {
+            step(device.as_mut(), heard, now, out, |sounding| sounding.range_m = Some(3.0));
+        }
+        Emulated::Depth(device) => {
+            step(device.as_mut(), heard, now, out, |pressure| pressure.pressure_pa = 150_360.0);
+        }
+        Emulated::Tether(device) => step(device.as_mut(), heard, now, out, |payout| {
+            payout.chainage_m = 5.0 + 0.2 * payout.at.since(MonoNs(0)).as_secs_f64();
+        }),
+        Emulated::Inertial(device) => step(device.as_mut(), heard, now, out, |inertia| {
+            inertia.force_mps2 = Vec3::new(0.0, 0.0, 9.81);
+        }),
+        Emulated::VelocityLog(device) => step(device.as_mut(), heard, now, out, |_| ()),
+    }
+}
+
+fn step<M: Measurement>(
+    device: &mut dyn Emulator<M>,
+    heard: Option<&[u8]>,
+    now: MonoNs,
+    out: &mut Vec<Vec<u8>>,
+    feel: impl Fn(&mut M),
+) {
+    let mut line = |direction, _, bytes: &[u8]| {
+        if direction == Direction::Received {
+            out.push(bytes.to_vec());
+        }
+    };
+    if let Some(bytes) = heard {
+        device.hear(now, bytes, &mut line);
+    }
+    let mut due = Vec::new();
+    device.begin(now + DurNs(1), &mut due);
+    for mut measured in due {
+        feel(&mut measured);
+        device.tell(&measured, &mut line);
+    }
+}

@@ -1,0 +1,123 @@
+//! What dependencies may be: their licences, their sources, and how much of them isn't Rust.
+
+use std::collections::BTreeSet;
+use std::process::Command;
+
+use serde_json::Value;
+
+use super::workspace::root;
+
+/// Crates that link libraries in other languages: by the name of the library.
+const FOREIGN_LIBRARIES: [&str; 3] = ["hidapi", "lz4", "zstd"];
+/// Not built for any system that we run on: only pages in a browser need it.
+const NEVER_BUILT: [&str; 1] = ["wasm_bindgen"];
+
+/// All packages that the lock file names and any feature needs.
+fn packages() -> Vec<Value> {
+    let output = Command::new(env!("CARGO"))
+        .args(["metadata", "--format-version", "1", "--offline", "--locked", "--all-features"])
+        .current_dir(root())
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let metadata: Value = serde_json::from_slice(&output.stdout).unwrap();
+    metadata["packages"].as_array().unwrap().clone()
+}
+
+/// The licences that `deny.toml` allows.
+fn allowed() -> BTreeSet<String> {
+    let text = std::fs::read_to_string(root().join("deny.toml")).unwrap();
+    let list = text.split_once("allow = [").unwrap().1.split_once(']').unwrap().0;
+    list.split(',')
+        .map(|name| name.trim().trim_matches('"').to_owned())
+        .filter(|name| !name.is_empty())
+        .collect()
+}
+
+/// Whether a licence expression (SPDX, or a slash for "or") can be met with these.
+fn is_met(expression: &str, allowed: &BTreeSet<String>) -> bool {
+    let expression = expression.trim();
+    let parts = |separator: &str| split_outside_parentheses(expression, separator);
+    for (separator, all) in [(" OR ", false), ("/", false), (" AND ", true)] {
+        let parts = parts(separator);
+        if parts.len() > 1 {
+            let met = |part: &&str| is_met(part, allowed);
+            return if all { parts.iter().all(met) } else { parts.iter().any(met) };
+        }
+    }
+    match expression.strip_prefix('(').and_then(|inner| inner.strip_suffix(')')) {
+        Some(inner) => is_met(inner, allowed),
+        None => allowed.contains(expression),
+    }
+}
+
+fn split_outside_parentheses<'a>(text: &'a str, separator: &str) -> Vec<&'a str> {
+    let (mut parts, mut from, mut depth) = (Vec::new(), 0, 0_usize);
+    for (at, letter) in text.char_indices() {
+        match letter {
+            '(' => depth += 1,
+            ')' => depth -= 1,
+            _ if depth == 0 && at >= from && text[at..].starts_with(separator) => {
+                parts.push(&text[from..at]);
+                from = at + separator.len();
+            }
+            _ => {}
+        }
+    }
+    parts.push(&text[from..]);
+    parts
+}
+
+#[test]
+fn licences_are_allowed() {
+    let allowed = allowed();
+    assert!(!is_met("GPL-3.0-only", &allowed) && !is_met("(MIT OR Apache-2.0) AND GPL-3.0-only", &allowed));
+    assert!(
+        is_met("MIT OR GPL-3.0-only", &allowed) && is_met("(MIT/GPL-3.0-only) AND Unicode-3.0", &allowed)
+    );
+    for package in packages() {
+        let licence = package["license"].as_str().unwrap_or("none stated");
+        assert!(is_met(licence, &allowed), "{}: {licence}; allowed: {allowed:?}", package["name"]);
+    }
+}
+
+#[test]
+fn crates_come_from_the_registry_or_this_tree() {
+    for package in packages() {
+        let source = package["source"].as_str();
+        let of_the_registry =
+            source.is_none_or(|source| source == "registry+https://github.com/rust-lang/crates.io-index");
+        assert!(of_the_registry, "{}: {source:?}", package["name"]);
+    }
+}
+
+#[test]
+fn libraries_in_other_languages_are_known() {
+    let linked: BTreeSet<String> =
+        packages().iter().filter_map(|package| package["links"].as_str().map(str::to_owned)).collect();
+    let known = FOREIGN_LIBRARIES.iter().chain(&NEVER_BUILT).map(|name| (*name).to_owned());
+    assert_eq!(linked, known.collect());
+}
+
+/// `deploy/sbom` lists what is linked into the program and nothing else, each part with its licence and its checksum.
+#[test]
+fn the_bill_of_materials_lists_what_is_linked() {
+    let Ok(output) = Command::new("python3").arg(root().join("deploy/sbom")).current_dir(root()).output()
+    else {
+        return headrace_tests::skipped("python3 is not there");
+    };
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let bill: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let components = bill["components"].as_array().unwrap();
+    let lists = |name: &str| components.iter().any(|part| part["name"] == name);
+    let is_linked = ["bevy_ecs", "headrace_coverage", "nalgebra", "serialport", "zstd-sys"];
+    let is_not = ["headrace", "headrace_tests", "insta", "proptest", "spade"];
+    assert_eq!(is_linked.map(lists), [true; 5], "{is_linked:?}");
+    assert_eq!(is_not.map(lists), [false; 5], "{is_not:?}");
+    for part in components {
+        let ours = part["name"].as_str().unwrap().starts_with("headrace");
+        let checksum = part["hashes"][0]["content"].as_str().map(str::len);
+        assert!(ours || checksum == Some(64), "{part}");
+        assert!(part["licenses"][0]["expression"].is_string(), "{part}");
+    }
+}
