@@ -10,8 +10,8 @@ use headrace_monitor::run::Loop;
 use headrace_ports::Supervisor;
 use headrace_replay::drive::{Pace, PacketSource, drive};
 use headrace_replay::log::{
-    DerivedChannels, Every, LeftOut, LogHeader, Recorder, RecorderHandle, Rotation, SentPort, SourceInfo,
-    Summary, dive_name, files_digest, files_of,
+    DerivedChannels, Every, LeftOut, LogHeader, Recorder, RecorderHandle, RecordingFault, Rotation, SentPort,
+    SourceInfo, Summary, dive_name, files_digest, files_of,
 };
 use headrace_replay::player::seconds;
 use headrace_replay::record::{QUEUE_BYTES, RecorderOutlet, result_channels};
@@ -107,13 +107,8 @@ pub(crate) fn assemble_with(
             }
             header.metadata.extend(scene.map(|scene| (SIMULATED.to_owned(), scene.to_owned())));
             let view: Option<Box<dyn DerivedChannels>> = Some(Box::new(View::new(view_site(vehicle))));
-            let (port, handle) = match rotate {
-                None => Recorder::create(path, &header, QUEUE_BYTES, view),
-                Some(every) => {
-                    let rotation = Rotation { every, dive: new_dive() };
-                    Recorder::create_in_parts(path, &header, &rotation, QUEUE_BYTES, view)
-                }
-            }?;
+            let rotation = Rotation { every: rotate, dive: new_dive() };
+            let (port, handle) = Recorder::create(path, &header, &rotation, QUEUE_BYTES, view)?;
             app.add_plugin(&RecorderOutlet::new(port))?;
             Some((path.to_owned(), handle))
         }
@@ -344,10 +339,10 @@ impl Dive {
     }
 }
 
-/// Data missing in a recording that ended normally, as text.
+/// Data missing in a recording, and errors while it was made, as text.
 fn unrecorded(written: &Summary) -> Vec<String> {
-    let mut losses: Vec<String> =
-        Some(written.left_out).filter(|left| left.messages > 0).map(left_out).into_iter().collect();
+    let mut losses: Vec<String> = written.faults.iter().map(fault).collect();
+    losses.extend(Some(written.left_out).filter(|left| left.messages > 0).map(left_out));
     let counts = [
         (written.sent_dropped, "messages to devices not recorded: the recorder's queue was full"),
         (written.results_missing, "ticks recorded without all their results: too many"),
@@ -355,6 +350,13 @@ fn unrecorded(written: &Summary) -> Vec<String> {
     losses
         .extend(counts.iter().filter(|(count, _)| *count > 0).map(|(count, what)| format!("{count} {what}")));
     losses
+}
+
+/// An error of the recording, with times.
+fn fault(fault: &RecordingFault) -> String {
+    let from = fault.from.map(|from| format!(", after {}", seconds(from)));
+    let to = fault.to.map(|to| format!(", before {}", seconds(to)));
+    [fault.words(), from.unwrap_or_default(), to.unwrap_or_default()].concat()
 }
 
 /// Data that the recorder dropped, with times.

@@ -15,7 +15,7 @@ use headrace_monitor::report::Report;
 use headrace_monitor::run::Loop;
 use headrace_ports::{Connection, LineHistory, Phase, SentSink, Supervisor};
 use headrace_replay::drive::{Pace, drive};
-use headrace_replay::log::{LogHeader, Recorder, RecorderHandle, SourceInfo};
+use headrace_replay::log::{LogHeader, Recorder, RecorderHandle, Rotation, SourceInfo};
 use headrace_replay::player::Player;
 use headrace_replay::record::{QUEUE_BYTES, RecorderOutlet, result_channels};
 use headrace_sensor::connect::Connect;
@@ -287,7 +287,8 @@ fn assemble(vehicle: &VehicleConfig, text: &str, log: Option<&Path>) -> (Loop, O
             results: result_channels(),
             ..LogHeader::default()
         };
-        let (port, recorder) = Recorder::create(log, &header, QUEUE_BYTES, None).unwrap();
+        let (port, recorder) =
+            Recorder::create(log, &header, &Rotation::default(), QUEUE_BYTES, None).unwrap();
         app.add_plugin(&RecorderOutlet::new(port)).unwrap();
         handle = Some(recorder);
     }

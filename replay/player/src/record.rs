@@ -43,7 +43,7 @@ pub fn result_channels() -> Vec<ResultChannel> {
 /// Records every packet that the loop consumes, in the order of consumption, every tick, and every result.
 ///
 /// When the queue has no room for another largest tick the loop consumes nothing until it has: recorded input is never
-/// dropped. If the recorder's thread has failed the dive goes on unrecorded; its handle returns the error.
+/// dropped. If the recorder's thread has ended the dive goes on unrecorded; its handle returns the error.
 pub struct RecorderOutlet {
     port: Cell<Option<RecorderPort>>,
 }
@@ -89,7 +89,7 @@ fn record(
     mut recording: ResMut<'_, Recording>,
 ) {
     let Recording { port, order, message, records } = &mut *recording;
-    if port.failed() {
+    if port.is_closed() {
         inbox.allowance_bytes = MAX_TICK_BYTES;
         return;
     }

@@ -133,14 +133,6 @@ pub enum LogError {
         /// Cause.
         source: io::Error,
     },
-    /// The recorder stopped writing before the end of the dive; the log up to there is readable.
-    #[error("{source}; {discarded} messages after that were not recorded")]
-    Stopped {
-        /// Messages taken from the queue and discarded.
-        discarded: u64,
-        /// Cause.
-        source: Box<LogError>,
-    },
     /// A bug in the recorder.
     #[error("the recorder's thread panicked")]
     Panicked,

@@ -24,12 +24,14 @@
 
 #![cfg_attr(not(test), warn(clippy::indexing_slicing))]
 
+mod backlog;
 mod channels;
 mod chunk;
 mod derived_channels;
 mod digest;
 mod dive_log;
 mod error;
+mod fault;
 mod fields;
 pub mod format;
 mod framing;
@@ -39,11 +41,13 @@ mod part;
 mod queue;
 mod reader;
 mod recorder;
+mod recording;
 mod recover;
 mod rotate;
 mod scan;
 mod search;
 mod space;
+mod storage;
 mod trim;
 mod worker;
 mod writer;
@@ -52,6 +56,7 @@ pub use derived_channels::{DerivedChannels, Made};
 pub use digest::{file_digest, files_digest};
 pub use dive_log::{DiveLog, DivePlace, PartFile, files_of};
 pub use error::LogError;
+pub use fault::{RecordingEvent, RecordingFault};
 pub use loss::{Loss, LossKind};
 pub use part::{Part, PartEnd, PartHead, Progress, dive_name, part_path};
 pub use reader::{ChannelInfo, LogInfo, LogMessage, LogPlace, LogReader, MessageKind};
@@ -59,7 +64,9 @@ pub use recorder::{Full, Recorder, RecorderHandle, RecorderPort, SentPort};
 pub use recover::{RECOVERED_FROM, Recovered, recover};
 pub use rotate::{Every, Rotation};
 pub use space::LeftOut;
+pub use storage::{Disk, Storage, StoredFile};
 pub use trim::{Change, TRIMMED, Trim, Trimmed, trim};
+pub use worker::RecorderWorker;
 pub use writer::{LogHeader, LogWriter, PartSummary, ResultChannel, SourceInfo, Summary};
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! The queue between the loop and the recorder's thread: its entries, and the state shared by both ends.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use crossbeam::queue::ArrayQueue;
 use headrace_geometry::time::MonoNs;
@@ -9,6 +9,7 @@ use ringbuf::HeapRb;
 use ringbuf::traits::{Consumer as _, Observer as _};
 use ringbuf::wrap::Cons;
 
+use super::fault::RecordingEvent;
 use super::fields::Fields;
 use super::writer::Lane;
 
@@ -18,7 +19,12 @@ pub(super) const ENTRY_HEAD_BYTES: usize = 24;
 /// State shared by the ends of a recorder, apart from the queue.
 pub(super) struct State {
     pub(super) stopping: AtomicBool,
-    pub(super) failed: AtomicBool,
+    /// Whether nothing empties the queue any more.
+    pub(super) closed: AtomicBool,
+    /// Whether nothing is being recorded at present.
+    pub(super) failing: AtomicBool,
+    /// News for those who watch the dive; the oldest are dropped.
+    pub(super) events: ArrayQueue<RecordingEvent>,
     /// Bytes that the port threads sent to the devices, which don't pass through the loop.
     pub(super) sent: ArrayQueue<SentMessage>,
     pub(super) sent_dropped: AtomicU64,
@@ -55,8 +61,16 @@ pub(super) fn entry_head(
 /// The thread's end of the queue.
 pub(super) struct Queue {
     pub(super) ring: Cons<Arc<HeapRb<u8>>>,
+    pub(super) state: Arc<State>,
     /// The message of the entry taken last.
     pub(super) message: Vec<u8>,
+}
+
+/// However the recorder ends, the loop doesn't wait for it.
+impl Drop for Queue {
+    fn drop(&mut self) {
+        self.state.closed.store(true, Ordering::Release);
+    }
 }
 
 /// An entry without its message.

@@ -1,14 +1,14 @@
-//! The recorder: a [`LogWriter`] on its own thread, behind a lock-free queue.
+//! The recorder: a log's writer on its own thread, behind a lock-free queue.
 //!
 //! The loop must neither wait for a disk nor lose a byte. It checks [`RecorderPort::vacant_bytes`] before it consumes
 //! more, and leaves packets in their ports' rings while the queue is full.
 
-use std::fs::{File, OpenOptions};
-use std::io::{BufWriter, ErrorKind, Write};
+use std::io::{ErrorKind, Write};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
 
 use crossbeam::queue::ArrayQueue;
 use headrace_geometry::time::MonoNs;
@@ -18,18 +18,24 @@ use ringbuf::wrap::{Cons, Prod};
 
 use super::LogError;
 use super::derived_channels::DerivedChannels;
+use super::fault::RecordingEvent;
 use super::format::{TICK_HEAD_BYTES, order_bytes, tick_head};
-use super::part::part_path;
 use super::queue::{ENTRY_HEAD_BYTES, Queue, SentMessage, State, entry_head};
-use super::rotate::{Parts, Rotation, in_the_way};
-use super::space::Space;
-use super::worker::{Beside, Echoes, Worker};
-use super::writer::{Lane, LogHeader, LogWriter, Summary};
+use super::recording::Recording;
+use super::rotate::{Rotation, in_the_way};
+use super::storage::{Disk, OneWriter, Storage};
+use super::worker::RecorderWorker;
+use super::writer::{Lane, LogHeader, Summary};
 
+/// Sleep of the thread when the queue is empty. The loop can't wake it: that would be a system call.
+const NAP: Duration = Duration::from_millis(2);
 /// Minimum queue size: fits the longest packet of a port, and a tick with many packets.
 const MIN_QUEUE_BYTES: usize = 64 * 1024;
 /// Capacity for messages to devices: some seconds of eight heads.
 const SENT_MESSAGES: usize = 2048;
+/// Capacity for news of the recording.
+const EVENTS: usize = 64;
+
 /// An entry didn't fit in the queue; nothing of it was written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("the recorder's queue has room for {free} bytes and an entry needs {needed}")]
@@ -54,14 +60,14 @@ pub struct RecorderPort {
 /// Handle to stop the recorder. If dropped without [`RecorderHandle::finish`] it still completes the file, but errors
 /// are discarded.
 pub struct RecorderHandle {
-    thread: Option<JoinHandle<Result<Summary, LogError>>>,
+    thread: Option<JoinHandle<Summary>>,
     state: Arc<State>,
 }
 
 /// Logs bytes sent to devices, from any thread. When the queue is full the oldest message is dropped and counted.
 #[derive(Clone)]
 pub struct SentPort {
-    state: Arc<State>,
+    pub(super) state: Arc<State>,
 }
 
 impl SentPort {
@@ -81,7 +87,8 @@ impl SentPort {
 
 impl Recorder {
     /// Starts a recorder that writes to `writer`, with a queue of `queue_bytes`. The header is written before this
-    /// returns. If flushing `writer` doesn't sync to the medium, a power cut loses more than a second.
+    /// returns. If flushing `writer` doesn't sync to the medium, a power cut loses more than a second. After an error there is
+    /// no other part to go on in.
     ///
     /// Errors: the header could not be written, or the thread not started.
     pub fn start<W: Write + Send + 'static>(
@@ -89,72 +96,19 @@ impl Recorder {
         header: &LogHeader,
         queue_bytes: usize,
     ) -> Result<(RecorderPort, RecorderHandle), LogError> {
-        Self::start_within(Space::endless(), writer, header, queue_bytes, None)
+        let storage = Box::new(OneWriter(Some(writer)));
+        let path = Path::new("the log");
+        let begun = Self::unthreaded(storage, path, header, &Rotation::default(), queue_bytes, None)?;
+        Self::spawn(begun)
     }
 
-    /// The same with limited disk space.
-    pub(super) fn start_within<W: Write + Send + 'static>(
-        space: Space,
-        writer: W,
-        header: &LogHeader,
-        queue_bytes: usize,
-        derived: Option<Box<dyn DerivedChannels>>,
-    ) -> Result<(RecorderPort, RecorderHandle), LogError> {
-        Self::begin(space, (LogWriter::new(writer, header)?, None), header, queue_bytes, derived)
-    }
-
-    /// Starts the thread of a log whose header is written, perhaps in parts.
-    fn begin<W: Write + Send + 'static>(
-        space: Space,
-        (mut log, parts): (LogWriter<W>, Option<Parts<W>>),
-        header: &LogHeader,
-        queue_bytes: usize,
-        derived: Option<Box<dyn DerivedChannels>>,
-    ) -> Result<(RecorderPort, RecorderHandle), LogError> {
-        log.flush()?;
-        let ring = Arc::new(HeapRb::new(queue_bytes.max(MIN_QUEUE_BYTES)));
-        let state = Arc::new(State {
-            stopping: AtomicBool::new(false),
-            failed: AtomicBool::new(false),
-            sent: ArrayQueue::new(SENT_MESSAGES),
-            sent_dropped: AtomicU64::new(0),
-            results_missing: AtomicU64::new(0),
-        });
-        let queue = Queue { ring: Cons::new(Arc::clone(&ring)), message: Vec::new() };
-        let thread_state = Arc::clone(&state);
-        let thread = thread::Builder::new().name("recorder".to_owned());
-        let echoes = Echoes::of(header);
-        let beside = Beside::new(derived);
-        let thread =
-            thread.spawn(move || Worker::new(log, parts, space, echoes, beside, &thread_state).run(queue));
-        let thread = Some(thread.map_err(|source| LogError::Thread { source })?);
-        let port = RecorderPort {
-            ring: Prod::new(ring),
-            state: Arc::clone(&state),
-            result_channels: header.results.len(),
-        };
-        Ok((port, RecorderHandle { thread, state }))
-    }
-
-    /// Starts a recorder that writes to a new file, synced at each flush. It warns when the disk fills, and then drops
-    /// echoes before anything else: [`Summary::left_out`].
+    /// Starts a recorder that writes to new files on the disk, synced each half second. It warns when the disk fills, and then
+    /// drops echoes before anything else: [`Summary::left_out`]. `path` names the recording: its file, or with
+    /// [`Rotation::every`] its parts, see [`super::part_path`]. After an error it goes on in a further part: [`Summary::faults`].
     ///
-    /// Errors: as for [`Recorder::start`]; the file exists (a dive is never overwritten) or can't be created.
+    /// Errors: as for [`Recorder::start`]; a file exists that is this recording or would be taken for a part of it (a dive is
+    /// never overwritten), or can't be created.
     pub fn create(
-        path: &Path,
-        header: &LogHeader,
-        queue_bytes: usize,
-        derived: Option<Box<dyn DerivedChannels>>,
-    ) -> Result<(RecorderPort, RecorderHandle), LogError> {
-        let file = new_file(path)?;
-        let space = file.space();
-        Self::start_within(space, file, header, queue_bytes, derived)
-    }
-
-    /// The same in parts, each a log of its own; `path` names the recording, and [`part_path`] its parts.
-    ///
-    /// Errors: as for [`Recorder::create`]; also if a file exists that would be taken for a part of this recording.
-    pub fn create_in_parts(
         path: &Path,
         header: &LogHeader,
         rotation: &Rotation,
@@ -165,51 +119,70 @@ impl Recorder {
         if let Some(other) = in_the_way(path).map_err(|source| failed(path, source))? {
             return Err(failed(&other, ErrorKind::AlreadyExists.into()));
         }
-        let recording = path.to_owned();
-        let open = Box::new(move |number| {
-            let path = part_path(&recording, number);
-            new_file(&path).map(|file| (path, file))
+        Self::spawn(Self::unthreaded(Box::new(Disk), path, header, rotation, queue_bytes, derived)?)
+    }
+
+    /// A recorder whose steps the caller takes, on any storage. The header is written and synced before this returns.
+    ///
+    /// Errors: the first part can't be created, or its header not be written.
+    pub fn unthreaded(
+        storage: Box<dyn Storage>,
+        path: &Path,
+        header: &LogHeader,
+        rotation: &Rotation,
+        queue_bytes: usize,
+        derived: Option<Box<dyn DerivedChannels>>,
+    ) -> Result<(RecorderPort, RecorderWorker), LogError> {
+        let recording = Recording::begin(storage, path, rotation, header)?;
+        let ring = Arc::new(HeapRb::new(queue_bytes.max(MIN_QUEUE_BYTES)));
+        let state = Arc::new(State {
+            stopping: AtomicBool::new(false),
+            closed: AtomicBool::new(false),
+            failing: AtomicBool::new(false),
+            events: ArrayQueue::new(EVENTS),
+            sent: ArrayQueue::new(SENT_MESSAGES),
+            sent_dropped: AtomicU64::new(0),
+            results_missing: AtomicU64::new(0),
         });
-        let (parts, log) = Parts::begin(rotation, header, open)?;
-        // All parts are on one disk.
-        let first = part_path(path, 1);
-        let space = File::open(&first).map_or_else(|_| Space::endless(), Space::of);
-        Self::begin(space, (log, Some(parts)), header, queue_bytes, derived)
+        let port = RecorderPort {
+            ring: Prod::new(Arc::clone(&ring)),
+            state: Arc::clone(&state),
+            result_channels: header.results.len(),
+        };
+        let queue = Queue { ring: Cons::new(ring), state: Arc::clone(&state), message: Vec::new() };
+        Ok((port, RecorderWorker::new(queue, recording, header, derived, state)))
+    }
+
+    /// Takes a recorder's steps on a thread of its own.
+    ///
+    /// Errors: the thread could not be started.
+    pub(super) fn spawn(
+        (port, worker): (RecorderPort, RecorderWorker),
+    ) -> Result<(RecorderPort, RecorderHandle), LogError> {
+        let state = Arc::clone(&port.state);
+        let thread = thread::Builder::new().name("recorder".to_owned());
+        let thread = thread.spawn(move || run(worker)).map_err(|source| LogError::Thread { source })?;
+        Ok((port, RecorderHandle { thread: Some(thread), state }))
     }
 }
 
-/// Creates a new file for a log.
-fn new_file(path: &Path) -> Result<SyncedFile, LogError> {
-    let failed = |source| LogError::Create { path: path.to_owned(), source };
-    let file = OpenOptions::new().write(true).create_new(true).open(path).map_err(failed)?;
-    sync_folder_of(path).map_err(failed)?;
-    tracing::info!(path = %path.display(), "log created");
-    Ok(SyncedFile(BufWriter::new(file)))
-}
-
-/// Makes a new file's directory entry survive a power cut. Only on Unix: other systems don't open folders.
-fn sync_folder_of(path: &Path) -> std::io::Result<()> {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
-    if cfg!(unix) { File::open(folder.unwrap_or(Path::new(".")))?.sync_all() } else { Ok(()) }
-}
-
-/// A file whose flush syncs to the medium.
-struct SyncedFile(BufWriter<File>);
-
-impl SyncedFile {
-    fn space(&self) -> Space {
-        self.0.get_ref().try_clone().map_or_else(|_| Space::endless(), Space::of)
-    }
-}
-
-impl Write for SyncedFile {
-    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
-        self.0.write(bytes)
-    }
-
-    fn flush(&mut self) -> std::io::Result<()> {
-        self.0.flush()?;
-        self.0.get_ref().sync_data()
+/// The recorder's thread.
+#[expect(
+    clippy::disallowed_methods,
+    reason = "how long a chunk stays open is wall time, and no result depends on it"
+)]
+fn run(mut worker: RecorderWorker) -> Summary {
+    let began = Instant::now();
+    loop {
+        // Read before the queue is checked, so that entries pushed before the flag was set are taken.
+        let stopping = worker.is_stopping();
+        let taken = worker.step(began.elapsed());
+        if !taken && stopping {
+            return worker.finish(began.elapsed());
+        }
+        if !taken {
+            thread::park_timeout(NAP);
+        }
     }
 }
 
@@ -277,9 +250,9 @@ impl RecorderPort {
         Self::entry_bytes(TICK_HEAD_BYTES.saturating_add(packets.saturating_mul(2)))
     }
 
-    /// Whether the recorder has failed. It then discards its input, so that the dive can go on.
-    pub fn failed(&self) -> bool {
-        self.state.failed.load(Ordering::Acquire)
+    /// Whether the recorder has ended and takes nothing more.
+    pub fn is_closed(&self) -> bool {
+        self.state.closed.load(Ordering::Acquire)
     }
 
     fn push(&mut self, lane: Lane, log_time: MonoNs, publish_time: MonoNs, bytes: &[u8]) -> Result<(), Full> {
@@ -299,9 +272,14 @@ impl RecorderPort {
 }
 
 impl RecorderHandle {
-    /// Whether the recorder has failed; [`RecorderHandle::finish`] returns the cause.
-    pub fn failed(&self) -> bool {
-        self.state.failed.load(Ordering::Acquire)
+    /// Whether nothing is being recorded at present, because of an error.
+    pub fn is_failing(&self) -> bool {
+        self.state.failing.load(Ordering::Acquire)
+    }
+
+    /// What has happened to the recording, once each, oldest first.
+    pub fn next_event(&self) -> Option<RecordingEvent> {
+        self.state.events.pop()
     }
 
     /// A port for bytes sent to the devices.
@@ -309,9 +287,9 @@ impl RecorderHandle {
         SentPort { state: Arc::clone(&self.state) }
     }
 
-    /// Writes the rest of the queue and the summary, and ends the thread.
+    /// Writes the rest of the queue and the summary, and ends the thread. Errors of writing are in [`Summary::faults`].
     ///
-    /// Errors: any error on the thread since its start.
+    /// Errors: the thread panicked.
     pub fn finish(mut self) -> Result<Summary, LogError> {
         self.stop().unwrap_or(Err(LogError::Panicked))
     }
@@ -320,7 +298,7 @@ impl RecorderHandle {
         self.state.stopping.store(true, Ordering::Release);
         let thread = self.thread.take()?;
         thread.thread().unpark();
-        Some(thread.join().unwrap_or(Err(LogError::Panicked)))
+        Some(thread.join().map_err(|_| LogError::Panicked))
     }
 }
 

@@ -5,8 +5,7 @@
 //! header lists the sonars, since the recorder doesn't decode devices. Packets of heads that send only ranges are short and
 //! kept: such a dive still replays to its digest.
 
-use std::fs::File;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use headrace_geometry::time::MonoNs;
 
@@ -41,9 +40,9 @@ impl LeftOut {
 }
 
 /// Monitors the free space.
+#[derive(Debug, Default)]
 pub(super) struct Space {
-    ask: Box<dyn FnMut() -> Option<u64> + Send>,
-    asked: Option<Instant>,
+    asked: Option<Duration>,
     warned: bool,
     sparing: bool,
     /// Free bytes at the last query.
@@ -52,32 +51,13 @@ pub(super) struct Space {
 }
 
 impl Space {
-    /// With a query of the free bytes, which returns `None` if unknown.
-    pub(super) fn new(ask: impl FnMut() -> Option<u64> + Send + 'static) -> Self {
-        let ask = Box::new(ask);
-        Self { ask, asked: None, warned: false, sparing: false, free: u64::MAX, left_out: LeftOut::default() }
-    }
-
-    /// Unlimited space.
-    pub(super) fn endless() -> Self {
-        Self::new(|| None)
-    }
-
-    /// Free space of a file's disk, for users other than root.
-    pub(super) fn of(file: File) -> Self {
-        Self::new(move || {
-            let disk = rustix::fs::fstatvfs(&file).ok()?;
-            Some(disk.f_bavail.saturating_mul(disk.f_frsize))
-        })
-    }
-
-    /// Queries the free space when due.
-    pub(super) fn look(&mut self, now: Instant) {
-        if self.asked.is_some_and(|asked| now.duration_since(asked) < ASK_EVERY) {
+    /// Queries the free space when due, at `now` since the recording began.
+    pub(super) fn look(&mut self, now: Duration, ask: impl FnOnce() -> Option<u64>) {
+        if self.asked.is_some_and(|asked| now.saturating_sub(asked) < ASK_EVERY) {
             return;
         }
         let first = self.asked.replace(now).is_none();
-        let Some(free) = (self.ask)() else { return };
+        let Some(free) = ask() else { return };
         if first {
             tracing::debug!(free_bytes = free, "disk of the recording");
         }

@@ -1,63 +1,51 @@
-//! The recorder's thread: takes entries from the queue and writes them.
+//! The recorder's work: takes entries from the queue and writes them.
 
-use std::io::Write;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use super::LogError;
 use super::derived_channels::{DerivedChannels, Made};
+use super::fault::RecordingEvent;
 use super::queue::{Entry, Queue, State};
-use super::rotate::Parts;
+use super::recorder::SentPort;
+use super::recording::Recording;
 use super::space::{LONGEST_KEPT_BYTES, Space};
-use super::writer::{Lane, LogHeader, LogWriter, Summary};
+use super::writer::{Lane, LogHeader, Summary};
 
-/// Sleep of the thread when the queue is empty. The loop can't wake it: that would be a system call.
-const NAP: Duration = Duration::from_millis(2);
 /// Interval at which a chunk is closed and synced. Half of the second that a power cut may cost, since closing
 /// and syncing take time too.
 const FLUSH_PERIOD: Duration = Duration::from_millis(500);
-/// Entries between two clock readings.
+/// Entries between two readings of the clock.
 const BATCH: usize = 256;
 
-/// State of the thread.
-pub(super) struct Worker<'a, W: Write> {
-    /// `None` once it has failed.
-    log: Option<LogWriter<W>>,
-    error: Option<LogError>,
-    discarded: u64,
-    flushed: Instant,
+/// A recorder without its thread: whoever has it takes the steps, and says what time it is.
+pub struct RecorderWorker {
+    queue: Queue,
+    recording: Recording,
+    flushed: Duration,
     /// Whether anything was written since the last flush.
     open: bool,
-    /// Parts, where the recording has several.
-    parts: Option<Parts<W>>,
     space: Space,
     echoes: Echoes,
     beside: Beside,
-    state: &'a State,
+    state: Arc<State>,
 }
 
 /// Derived channels, and a buffer for their messages.
-pub(super) struct Beside {
+struct Beside {
     derived: Option<Box<dyn DerivedChannels>>,
     made: Vec<Made>,
 }
 
-impl Beside {
-    pub(super) fn new(derived: Option<Box<dyn DerivedChannels>>) -> Self {
-        Self { derived, made: Vec::new() }
-    }
-}
-
 /// Messages dropped when the disk fills.
-pub(super) struct Echoes {
+struct Echoes {
     sonars: Vec<u16>,
     /// Which results are one per echo.
     results: Vec<bool>,
 }
 
 impl Echoes {
-    pub(super) fn of(header: &LogHeader) -> Self {
+    fn of(header: &LogHeader) -> Self {
         let results = header.results.iter().map(|result| result.follows_echoes).collect();
         Self { sonars: header.sonars.clone(), results }
     }
@@ -71,56 +59,104 @@ impl Echoes {
     }
 }
 
-#[expect(
-    clippy::disallowed_methods,
-    reason = "how long a chunk stays open is wall time, and no result depends on it"
-)]
-fn wall_clock() -> Instant {
-    Instant::now()
-}
-
-impl<'a, W: Write> Worker<'a, W> {
+impl RecorderWorker {
     pub(super) fn new(
-        log: LogWriter<W>,
-        parts: Option<Parts<W>>,
-        space: Space,
-        echoes: Echoes,
-        beside: Beside,
-        state: &'a State,
+        queue: Queue,
+        recording: Recording,
+        header: &LogHeader,
+        derived: Option<Box<dyn DerivedChannels>>,
+        state: Arc<State>,
     ) -> Self {
-        let (log, flushed) = (Some(log), wall_clock());
-        Self { log, error: None, discarded: 0, flushed, open: false, parts, space, echoes, beside, state }
-    }
-
-    pub(super) fn run(mut self, mut queue: Queue) -> Result<Summary, LogError> {
-        loop {
-            self.space.look(wall_clock());
-            // Read before the queue is checked, so that entries pushed before the flag was set are taken.
-            let stopping = self.state.stopping.load(Ordering::Acquire);
-            let taken =
-                (0..BATCH).map_while(|_| queue.take().map(|entry| self.write_all(&entry, &queue.message)));
-            let taken = taken.count() + self.write_sent();
-            self.flush_in_time();
-            if taken == 0 && stopping {
-                return self.finish();
-            }
-            if taken == 0 {
-                thread::park_timeout(NAP);
-            }
+        Self {
+            queue,
+            recording,
+            flushed: Duration::ZERO,
+            open: false,
+            space: Space::default(),
+            echoes: Echoes::of(header),
+            beside: Beside { derived, made: Vec::new() },
+            state,
         }
     }
 
-    /// Writes an entry and the messages derived from it.
-    fn write_all(&mut self, entry: &Entry, message: &[u8]) {
-        self.write(entry, message);
+    /// A port for bytes sent to the devices.
+    pub fn sent_port(&self) -> SentPort {
+        SentPort { state: Arc::clone(&self.state) }
+    }
+
+    /// What has happened to the recording, once each, oldest first.
+    pub fn next_event(&self) -> Option<RecordingEvent> {
+        self.state.events.pop()
+    }
+
+    /// Whether the recorder has been told to end.
+    pub(super) fn is_stopping(&self) -> bool {
+        self.state.stopping.load(Ordering::Acquire)
+    }
+
+    /// Writes some of what is in the queue, and syncs and tries again what is due, at `now` since the recording began. `now`
+    /// never goes back. Returns whether there was anything in the queue.
+    pub fn step(&mut self, now: Duration) -> bool {
+        let recording = &mut self.recording;
+        self.space.look(now, || recording.free_bytes());
+        recording.look(now);
+        let mut taken = 0;
+        while taken < BATCH
+            && let Some(entry) = self.queue.take()
+        {
+            self.write_all(&entry);
+            taken += 1;
+        }
+        taken += self.write_sent();
+        self.flush_in_time(now);
+        self.tell();
+        taken > 0
+    }
+
+    /// Writes the rest of the queue, and ends the log.
+    pub fn finish(mut self, now: Duration) -> Summary {
+        while self.step(now) {}
+        self.write_made(|derived, made| derived.end(made));
+        let left_out = self.space.left_out();
+        if let Some((from, to)) = left_out.span {
+            self.recording.state(Some(from), Some(to), &left_out.words());
+        }
+        let count = |count: &AtomicU64| count.load(Ordering::Relaxed);
+        let (sent_dropped, results_missing) =
+            (count(&self.state.sent_dropped), count(&self.state.results_missing));
+        let summary = Summary { left_out, sent_dropped, results_missing, ..self.recording.finish() };
+        let Summary { messages, bytes, faults, .. } = &summary;
+        tracing::info!(
+            messages,
+            bytes,
+            faults = faults.len(),
+            left_out = left_out.messages,
+            sent_dropped,
+            results_missing,
+            "recording finished"
+        );
+        summary
+    }
+
+    fn tell(&mut self) {
+        for event in self.recording.take_events() {
+            self.state.events.force_push(event);
+        }
+        self.state.failing.store(self.recording.is_failing(), Ordering::Release);
+    }
+
+    /// Writes the entry taken last and the messages derived from it.
+    fn write_all(&mut self, entry: &Entry) {
+        let message = core::mem::take(&mut self.queue.message);
+        self.write(entry, &message);
         if let Lane::Result(number) = entry.lane {
-            self.write_made(|derived, made| derived.take(number, entry.log_time, message, made));
+            self.write_made(|derived, made| derived.take(number, entry.log_time, &message, made));
         }
+        self.queue.message = message;
     }
 
     fn write_made(&mut self, make: impl FnOnce(&mut dyn DerivedChannels, &mut Vec<Made>)) {
-        // Nothing is derived while a dive is not being recorded.
-        let Some(derived) = self.beside.derived.as_mut().filter(|_| self.log.is_some()) else { return };
+        let Some(derived) = self.beside.derived.as_mut() else { return };
         let mut made = core::mem::take(&mut self.beside.made);
         make(derived.as_mut(), &mut made);
         for Made { channel, at, bytes } in made.drain(..) {
@@ -132,31 +168,20 @@ impl<'a, W: Write> Worker<'a, W> {
     }
 
     fn write(&mut self, entry: &Entry, message: &[u8]) {
-        self.discarded += u64::from(self.log.is_none());
         self.open = true;
-        self.rotate_in_time(entry);
         if self.space.is_scarce() && self.echoes.is_echo(entry.lane, message.len()) {
             if let Some(words) = self.space.leave_out(entry.log_time, message.len()) {
-                self.attempt(|log| log.lost(Some(entry.log_time), None, &words));
+                self.recording.state(Some(entry.log_time), None, &words);
             }
             return;
         }
-        self.attempt(|log| log.message(entry.lane, entry.log_time, entry.publish_time, message));
-    }
-
-    fn rotate_in_time(&mut self, entry: &Entry) {
-        let (Some(mut parts), Some(log)) = (self.parts.take(), self.log.as_ref()) else { return };
-        if parts.is_due(entry.lane, entry.log_time, log) {
-            self.attempt(|log| parts.rotate(entry.log_time, log));
-        }
-        self.parts = Some(parts);
+        self.recording.message(entry.lane, entry.log_time, entry.publish_time, message);
     }
 
     /// Writes the bytes sent to the devices; returns the number of messages.
     fn write_sent(&mut self) -> usize {
-        let state = self.state;
         let mut written = 0;
-        while let Some(message) = state.sent.pop() {
+        while let Some(message) = self.state.sent.pop() {
             let entry =
                 Entry { lane: Lane::Sent(message.source), log_time: message.at, publish_time: message.at };
             self.write(&entry, &message.bytes);
@@ -165,59 +190,12 @@ impl<'a, W: Write> Worker<'a, W> {
         written
     }
 
-    fn flush_in_time(&mut self) {
-        let now = wall_clock();
+    fn flush_in_time(&mut self, now: Duration) {
         if !self.open {
             self.flushed = now;
-        } else if now.duration_since(self.flushed) >= FLUSH_PERIOD {
-            self.attempt(LogWriter::flush);
+        } else if now.saturating_sub(self.flushed) >= FLUSH_PERIOD {
+            self.recording.sync();
             (self.flushed, self.open) = (now, false);
         }
-    }
-
-    fn attempt(&mut self, action: impl FnOnce(&mut LogWriter<W>) -> Result<(), LogError>) {
-        let Some(log) = self.log.as_mut() else { return };
-        if let Err(error) = action(log) {
-            tracing::error!("the dive goes on unrecorded: {error}");
-            self.error = Some(error);
-            self.log = None;
-            self.state.failed.store(true, Ordering::Release);
-        }
-    }
-
-    fn finish(mut self) -> Result<Summary, LogError> {
-        self.write_made(|derived, made| derived.end(made));
-        let left_out = self.space.left_out();
-        if let Some((from, to)) = left_out.span {
-            self.attempt(|log| log.lost(Some(from), Some(to), &left_out.words()));
-        }
-        let finished = match (self.log, self.error) {
-            (Some(log), _) => match self.parts {
-                Some(parts) => parts.finish(log),
-                None => log.finish().map(|(_, summary)| summary),
-            },
-            (None, Some(error)) => {
-                Err(LogError::Stopped { discarded: self.discarded, source: Box::new(error) })
-            }
-            (None, None) => Err(LogError::Panicked),
-        };
-        if finished.is_err() {
-            self.state.failed.store(true, Ordering::Release);
-        }
-        let count = |count: &AtomicU64| count.load(Ordering::Relaxed);
-        let (sent_dropped, results_missing) =
-            (count(&self.state.sent_dropped), count(&self.state.results_missing));
-        let summary =
-            finished.map(|summary| Summary { left_out, sent_dropped, results_missing, ..summary })?;
-        let Summary { messages, bytes, .. } = summary;
-        tracing::info!(
-            messages,
-            bytes,
-            left_out = left_out.messages,
-            sent_dropped,
-            results_missing,
-            "recording finished"
-        );
-        Ok(summary)
     }
 }

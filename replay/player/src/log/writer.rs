@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use headrace_geometry::time::{DurNs, MonoNs};
 use mcap::records::{MessageHeader, Metadata};
@@ -17,7 +17,7 @@ use super::format::{
     VEHICLE_FILE, order_bytes, seal, stated_loss, tick_head,
 };
 use super::part::{PART, PART_END, PartEnd, PartHead, Progress};
-use super::{LeftOut, LogError};
+use super::{LeftOut, LogError, RecordingFault};
 
 /// Bytes above which a chunk is closed, whatever its time span.
 const CHUNK_BYTES: u64 = 1 << 20;
@@ -46,6 +46,17 @@ pub struct LogHeader {
     pub sonars: Vec<u16>,
     /// Part metadata, for one part of several. Its channels continue the numbering.
     pub part: Option<PartHead>,
+}
+
+impl LogHeader {
+    /// Whether a log with this header has a channel for a message.
+    pub(super) fn has(&self, lane: Lane) -> bool {
+        match lane {
+            Lane::Raw(source) | Lane::Sent(source) => usize::from(source) < self.sources.len(),
+            Lane::Tick => self.ticks,
+            Lane::Result(channel) => usize::from(channel) < self.results.len(),
+        }
+    }
 }
 
 /// A source of bytes, as its channels describe it.
@@ -89,13 +100,15 @@ pub struct Summary {
     pub bytes: u64,
     /// Messages from the sources.
     pub raw_messages: u64,
+    /// Errors while it was recorded.
+    pub faults: Vec<RecordingFault>,
     /// Messages dropped because the disk was nearly full.
     pub left_out: LeftOut,
     /// Messages to devices that didn't fit in the recorder's queue.
     pub sent_dropped: u64,
     /// Ticks whose results didn't all fit in the recorder's queue.
     pub results_missing: u64,
-    /// The files of a recording in parts, in order.
+    /// The files of a recording, in order.
     pub parts: Vec<PartSummary>,
 }
 
@@ -109,7 +122,7 @@ pub struct PartSummary {
 }
 
 /// A channel by its content.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Lane {
     Raw(u16),
     Sent(u16),
@@ -124,14 +137,16 @@ struct Channel {
     sequence: u32,
 }
 
-/// Writes a log. The underlying writer is append-only and never sought, so that written bytes stay unchanged.
+/// Writes a log. The underlying writer is append-only and never sought, so that written bytes stay unchanged. A log is ended
+/// by [`LogWriter::finish`] alone: one that is dropped, or had an error, gets neither summary nor footer, so that it is found
+/// to be cut off.
 ///
 /// Chunks are compressed with zstd at its lowest level: nothing waits for the writing of a dive, at some hundred
 /// kB/s, and even a small computer compresses a thousand times faster; so the smaller file wins over lz4's speed.
 pub struct LogWriter<W: Write> {
+    /// Dropped before the writer, which would end the log.
+    medium: Closing,
     writer: mcap::Writer<NoSeek<Counted<W>>>,
-    /// Bytes passed to the medium.
-    bytes: Arc<AtomicU64>,
     raw: Vec<Channel>,
     sent: Vec<Channel>,
     tick: Option<Channel>,
@@ -178,8 +193,9 @@ impl<W: Write> LogWriter<W> {
             .compression_threads(0)
             .chunk_size(Some(CHUNK_BYTES))
             .disable_seeking(true);
-        let bytes = Arc::new(AtomicU64::new(0));
-        let counted = NoSeek::new(Counted { writer, bytes: Arc::clone(&bytes) });
+        let medium = Arc::new(Medium::default());
+        let closing = Closing(Arc::clone(&medium));
+        let counted = NoSeek::new(Counted { writer, medium: Arc::clone(&medium) });
         let mut writer = options.create(counted).map_err(LogError::writing("the first bytes"))?;
         write_metadata(&mut writer, header)?;
         let mut list = BTreeMap::new();
@@ -201,7 +217,7 @@ impl<W: Write> LogWriter<W> {
         let before = header.part.as_ref().map(|part| part.before.clone()).unwrap_or_default();
         let mut log = Self {
             writer,
-            bytes,
+            medium: closing,
             raw,
             sent,
             tick,
@@ -240,18 +256,11 @@ impl<W: Write> LogWriter<W> {
         all
     }
 
-    /// Totals of the recording, including earlier parts. `header` is the one that it was begun with.
-    pub(super) fn progress(&mut self, header: &LogHeader) -> Progress {
-        let sequences = self.channels(header).into_iter().map(|(topic, channel)| (topic, channel.sequence));
-        let sequences = sequences.collect();
-        Progress { messages: self.before.messages + self.messages, tick: self.last_tick, sequences }
-    }
-
     /// Approximate file size if it were ended now, bytes: the last chunk isn't compressed yet.
     pub(super) fn bytes(&self) -> u64 {
         let channels = self.raw.len() + self.sent.len() + self.results.len() + 1;
         let index = CHUNK_INDEX_BYTES + CHUNK_INDEX_CHANNEL_BYTES * channels as u64;
-        self.bytes.load(Ordering::Relaxed) + index * self.chunks
+        self.medium.0.bytes.load(Ordering::Relaxed) + index * self.chunks
     }
 
     /// Writes the totals including this part, and whether another follows. Closes the chunk.
@@ -401,21 +410,51 @@ fn write_metadata<W: Write>(
     Ok(())
 }
 
-/// A writer with a count of its bytes.
+/// Bytes passed to the medium, and whether more may be.
+#[derive(Default)]
+struct Medium {
+    bytes: AtomicU64,
+    /// The `mcap` crate's writer ends a log when it is dropped, also after an error. It mustn't.
+    shut: AtomicBool,
+}
+
+/// Shuts the medium when it is dropped.
+struct Closing(Arc<Medium>);
+
+impl Drop for Closing {
+    fn drop(&mut self) {
+        self.0.shut.store(true, Ordering::Relaxed);
+    }
+}
+
+/// A writer with a count of its bytes, that takes nothing after an error.
 struct Counted<W> {
     writer: W,
-    bytes: Arc<AtomicU64>,
+    medium: Arc<Medium>,
+}
+
+impl<W> Counted<W> {
+    fn attempt<T>(&mut self, action: impl FnOnce(&mut W) -> std::io::Result<T>) -> std::io::Result<T> {
+        if self.medium.shut.load(Ordering::Relaxed) {
+            return Err(std::io::Error::other("the log was given up after an error"));
+        }
+        let done = action(&mut self.writer);
+        if done.as_ref().is_err_and(|error| error.kind() != std::io::ErrorKind::Interrupted) {
+            self.medium.shut.store(true, Ordering::Relaxed);
+        }
+        done
+    }
 }
 
 impl<W: Write> Write for Counted<W> {
     fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
-        let taken = self.writer.write(bytes)?;
-        self.bytes.fetch_add(taken as u64, Ordering::Relaxed);
+        let taken = self.attempt(|writer| writer.write(bytes))?;
+        self.medium.bytes.fetch_add(taken as u64, Ordering::Relaxed);
         Ok(taken)
     }
 
     fn flush(&mut self) -> std::io::Result<()> {
-        self.writer.flush()
+        self.attempt(Write::flush)
     }
 }
 

@@ -37,10 +37,8 @@ impl Drop for Folder {
 const TICKS: u64 = 400;
 
 fn record(path: &Path, rotation: Option<&Rotation>) -> super::super::Summary {
-    let begun = match rotation {
-        None => Recorder::create(path, &header(true), 1 << 22, None),
-        Some(rotation) => Recorder::create_in_parts(path, &header(true), rotation, 1 << 22, None),
-    };
+    let single = Rotation::default();
+    let begun = Recorder::create(path, &header(true), rotation.unwrap_or(&single), 1 << 22, None);
     let (mut port, handle) = begun.unwrap();
     for tick in 0..TICKS {
         let at = MonoNs((tick + 10) * 100_000_000);
@@ -53,7 +51,7 @@ fn record(path: &Path, rotation: Option<&Rotation>) -> super::super::Summary {
 }
 
 fn rotation(every: Every) -> Rotation {
-    Rotation { every, dive: "one".to_owned() }
+    Rotation { every: Some(every), dive: "one".to_owned() }
 }
 
 fn all(log: &mut DiveLog) -> Vec<Seen> {
@@ -162,7 +160,7 @@ fn parts_of_two_recordings_and_one_twice_are_refused() {
     let (one, other) = (Folder::new("one"), Folder::new("other"));
     let every = Every::Span(DurNs::from_millis(10_000));
     record(&one.0.join("dive.mcap"), Some(&rotation(every)));
-    record(&other.0.join("dive.mcap"), Some(&Rotation { every, dive: "two".to_owned() }));
+    record(&other.0.join("dive.mcap"), Some(&Rotation { every: Some(every), dive: "two".to_owned() }));
     let open = |files: &[PathBuf]| DiveLog::open(files).err().unwrap();
     assert!(matches!(open(&[one.part(1), other.part(2)]), LogError::OtherDive { .. }));
     std::fs::copy(one.part(2), one.part(7)).unwrap();
@@ -170,9 +168,12 @@ fn parts_of_two_recordings_and_one_twice_are_refused() {
     std::fs::remove_file(one.part(7)).unwrap();
     let single = other.0.join("single.mcap");
     record(&single, None);
-    assert!(matches!(open(&[one.part(1), single]), LogError::NotAPart { .. }));
+    assert!(matches!(open(&[one.part(1), single]), LogError::OtherDive { .. }));
+    let simulated = other.0.join("simulated.mcap");
+    LogWriter::create(&simulated, &header(false)).unwrap().finish().unwrap();
+    assert!(matches!(open(&[one.part(1), simulated]), LogError::NotAPart { .. }));
     // Nor does a recording overwrite another's parts.
-    let again = Recorder::create_in_parts(&one.0.join("dive.mcap"), &header(true), &rotation(every), 0, None);
+    let again = Recorder::create(&one.0.join("dive.mcap"), &header(true), &rotation(every), 0, None);
     assert!(matches!(again.err().unwrap(), LogError::Create { path, .. } if path == one.part(1)));
 }
 
@@ -203,10 +204,10 @@ fn damaged_parts_cost_what_is_damaged_and_become_one_log_again() {
 }
 
 #[test]
-fn a_part_that_cannot_be_made_costs_the_rotation_alone() {
+fn a_name_that_is_taken_is_passed_over() {
     let folder = Folder::new("refused");
     // A folder, created after the start of the recording, blocks the path of the second part.
-    let (mut port, handle) = Recorder::create_in_parts(
+    let (mut port, handle) = Recorder::create(
         &folder.0.join("dive.mcap"),
         &header(true),
         &rotation(Every::Span(DurNs::from_millis(10_000))),
@@ -221,7 +222,9 @@ fn a_part_that_cannot_be_made_costs_the_rotation_alone() {
         port.tick(tick, at, &[0]).unwrap();
     }
     let summary = handle.finish().unwrap();
-    assert_eq!((summary.raw_messages, summary.parts.len()), (300, 1));
-    let mut log = DiveLog::open(&[folder.part(1)]).unwrap();
+    let paths: Vec<PathBuf> = summary.parts.iter().map(|part| part.path.clone()).collect();
+    assert_eq!((summary.raw_messages, &paths), (300, &[1, 3, 4].map(|number| folder.part(number)).to_vec()));
+    assert_eq!(files_of(&[folder.0.join("dive.mcap")]).unwrap(), paths);
+    let mut log = DiveLog::open(&paths).unwrap();
     assert_eq!((all(&mut log).len(), log.losses()), (600, vec![]));
 }

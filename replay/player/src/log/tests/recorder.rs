@@ -1,12 +1,15 @@
 //! The recorder's thread, its queue, and its handling of errors.
 
 use std::io::Write;
+use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, mpsc};
 use std::time::Duration;
 
-use super::super::space::Space;
-use super::super::{DerivedChannels, LogError, LossKind, Made, Recorder, RecorderPort};
+use super::super::{
+    DerivedChannels, LogError, LossKind, Made, Recorder, RecorderHandle, RecorderPort, Rotation, Storage,
+    StoredFile,
+};
 use super::*;
 
 /// A slow medium that reports when something has been flushed to it.
@@ -79,7 +82,7 @@ fn what_is_older_than_a_second_reads_without_an_end() {
     let kinds: Vec<_> = seen.iter().map(|message| message.0.as_str()).collect();
     assert_eq!(kinds, ["raw 0", "sent 0", "/result/advice"]);
     assert_eq!(losses.len(), 1, "{losses:?}");
-    assert!(!port.failed() && !handle.failed());
+    assert!(!port.is_closed() && !handle.is_failing());
     handle.finish().unwrap();
 }
 
@@ -131,7 +134,7 @@ fn a_full_medium_is_reported_and_does_not_stop_the_loop() {
     let (mut port, handle) = Recorder::start(SmallMedium(Arc::clone(&room)), &header(true), 0).unwrap();
     room.store(0, Ordering::Relaxed);
     let mut rounds = 0;
-    while !port.failed() {
+    while !handle.is_failing() {
         if port.vacant_bytes() > 10_000 {
             port.raw(0, MonoNs(0), MonoNs(0), &[9; 5000]).unwrap();
         }
@@ -143,11 +146,10 @@ fn a_full_medium_is_reported_and_does_not_stop_the_loop() {
             std::thread::yield_now();
         }
     }
-    let error = handle.finish().unwrap_err();
-    let LogError::Stopped { discarded, source } = &error else { panic!("{error}") };
-    assert!(*discarded >= 1000);
-    assert!(matches!(**source, LogError::Write { .. }), "{source}");
-    assert!(error.to_string().contains("no storage space"), "{error}");
+    let summary = handle.finish().unwrap();
+    let [fault] = summary.faults.as_slice() else { panic!("{:?}", summary.faults) };
+    assert!(fault.lost >= 1000 && fault.continued.is_none(), "{fault:?}");
+    assert!(fault.words().contains("no storage space"), "{}", fault.words());
 }
 
 #[test]
@@ -155,21 +157,64 @@ fn an_unknown_source_is_an_error_of_the_thread() {
     let (medium, _flushed) = slow(0);
     let (mut port, handle) = Recorder::start(medium, &header(false), 0).unwrap();
     port.raw(77, MonoNs(0), MonoNs(0), &[]).unwrap();
-    let error = handle.finish().unwrap_err();
-    assert!(error.to_string().contains("Raw(77)"), "{error}");
+    let faults = handle.finish().unwrap().faults;
+    assert!(faults.len() == 1 && faults[0].words().contains("Raw(77)"), "{faults:?}");
 }
 
 #[test]
 fn a_recording_is_never_overwritten() {
     let path = std::env::temp_dir().join(format!("headrace-recorder-{}.mcap", std::process::id()));
     std::fs::remove_file(&path).ok();
-    let (mut port, handle) = Recorder::create(&path, &header(true), 1 << 20, None).unwrap();
+    let (mut port, handle) =
+        Recorder::create(&path, &header(true), &Rotation::default(), 1 << 20, None).unwrap();
     port.raw(0, MonoNs(1), MonoNs(1), b"ping").unwrap();
     let summary = handle.finish().unwrap();
     assert_eq!(std::fs::metadata(&path).unwrap().len(), summary.bytes);
-    assert!(matches!(Recorder::create(&path, &header(true), 0, None), Err(LogError::Create { .. })));
+    assert!(matches!(
+        Recorder::create(&path, &header(true), &Rotation::default(), 0, None),
+        Err(LogError::Create { .. })
+    ));
     assert_eq!(read(&std::fs::read(&path).unwrap()).0.len(), 1);
     std::fs::remove_file(&path).unwrap();
+}
+
+/// A medium with so many bytes free.
+struct Within(Option<u64>, Option<SlowMedium>);
+
+impl Storage for Within {
+    fn create(&mut self, _: &Path) -> std::io::Result<Box<dyn StoredFile>> {
+        Ok(Box::new(self.1.take().unwrap()))
+    }
+
+    fn remove(&mut self, _: &Path) -> std::io::Result<()> {
+        Ok(())
+    }
+
+    fn free_bytes(&mut self, _: &Path) -> Option<u64> {
+        self.0
+    }
+}
+
+impl StoredFile for SlowMedium {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        Write::write(self, bytes)
+    }
+
+    fn sync(&mut self) -> std::io::Result<()> {
+        self.flush()
+    }
+}
+
+fn within(
+    free: Option<u64>,
+    medium: SlowMedium,
+    header: &LogHeader,
+    derived: Option<Box<dyn DerivedChannels>>,
+) -> (RecorderPort, RecorderHandle) {
+    let storage = Box::new(Within(free, Some(medium)));
+    let begun =
+        Recorder::unthreaded(storage, Path::new("dive.mcap"), header, &Rotation::default(), 0, derived);
+    Recorder::spawn(begun.unwrap()).unwrap()
 }
 
 #[test]
@@ -181,10 +226,9 @@ fn a_disk_that_fills_keeps_what_is_small_and_says_what_it_left_out() {
         follows_echoes: true,
         ..ResultChannel::default()
     });
-    let space = Space::new(|| Some(5_000_000));
     // A velocity log's lines are as long as echoes, but aren't echoes.
     header.sonars = vec![0];
-    let (mut port, handle) = Recorder::start_within(space, medium, &header, 0, None).unwrap();
+    let (mut port, handle) = within(Some(5_000_000), medium, &header, None);
     for tick in 1..=100_u64 {
         let at = MonoNs(tick * 1_000_000_000);
         // All of this fits in the queue.
@@ -257,8 +301,7 @@ fn what_a_companion_makes_follows_its_result_and_goes_first_when_the_disk_fills(
         let topic = "/result/view/echo".to_owned();
         header.results.push(ResultChannel { topic, follows_echoes: true, ..ResultChannel::default() });
         let derived = Some(Box::new(Echoing) as Box<dyn DerivedChannels>);
-        let space = Space::new(move || free);
-        let (mut port, handle) = Recorder::start_within(space, medium, &header, 0, derived).unwrap();
+        let (mut port, handle) = within(free, medium, &header, derived);
         port.result(0, MonoNs(1), b"one").unwrap();
         port.tick(0, MonoNs(2), &[]).unwrap();
         port.result(0, MonoNs(3), b"two").unwrap();

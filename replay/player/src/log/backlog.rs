@@ -1,0 +1,116 @@
+//! Messages that aren't certain yet: written since the last sync, or waiting for a medium that can be written to again.
+
+use std::collections::{BTreeMap, VecDeque};
+
+use headrace_geometry::time::MonoNs;
+
+use super::format::{RAW_PREFIX, SENT_PREFIX, TICK_TOPIC, Tick};
+use super::part::Progress;
+use super::writer::{Lane, LogHeader};
+
+/// Most bytes kept: minutes of four heads.
+const MAX_BYTES: usize = 16 << 20;
+
+/// A message without its bytes.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Head {
+    pub(super) lane: Lane,
+    pub(super) log_time: MonoNs,
+    pub(super) publish_time: MonoNs,
+    pub(super) len: usize,
+    /// Index of the tick, of a message that is one.
+    tick: Option<u64>,
+}
+
+/// Messages in their order, up to 16 MiB of them.
+#[derive(Debug, Default)]
+pub(super) struct Backlog {
+    heads: VecDeque<Head>,
+    data: VecDeque<u8>,
+}
+
+impl Backlog {
+    pub(super) fn push(&mut self, lane: Lane, log_time: MonoNs, publish_time: MonoNs, bytes: &[u8]) {
+        let tick = (lane == Lane::Tick).then(|| Tick::decode(bytes).ok().map(|tick| tick.index)).flatten();
+        self.heads.push_back(Head { lane, log_time, publish_time, len: bytes.len(), tick });
+        self.data.extend(bytes);
+    }
+
+    /// The oldest message, if there are more than may be kept.
+    pub(super) fn overflow(&mut self) -> Option<Head> {
+        if self.bytes() > MAX_BYTES { self.pop() } else { None }
+    }
+
+    pub(super) fn pop(&mut self) -> Option<Head> {
+        let head = self.heads.pop_front()?;
+        self.data.drain(..head.len);
+        Some(head)
+    }
+
+    /// Memory that the messages take, bytes.
+    pub(super) fn bytes(&self) -> usize {
+        self.data.len() + self.heads.len() * size_of::<Head>()
+    }
+
+    pub(super) fn len(&self) -> u64 {
+        self.heads.len() as u64
+    }
+
+    /// Log times of the first and last message.
+    pub(super) fn span(&self) -> Option<(MonoNs, MonoNs)> {
+        Some((self.heads.front()?.log_time, self.heads.back()?.log_time))
+    }
+
+    /// Calls `write` with each message, until it fails.
+    ///
+    /// Errors: those of `write`.
+    pub(super) fn try_each<E>(
+        &mut self,
+        mut write: impl FnMut(&Head, &[u8]) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let mut rest: &[u8] = self.data.make_contiguous();
+        for head in &self.heads {
+            let (bytes, after) = rest.split_at_checked(head.len).unwrap_or((rest, &[]));
+            write(head, bytes)?;
+            rest = after;
+        }
+        Ok(())
+    }
+}
+
+/// Totals of a recording's messages, in whatever part they are.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Tally {
+    messages: u64,
+    tick: Option<u64>,
+    next: BTreeMap<Lane, u32>,
+    /// Log time of the last message.
+    pub(super) last: Option<MonoNs>,
+}
+
+impl Tally {
+    pub(super) fn add(&mut self, head: &Head) {
+        self.messages += 1;
+        self.tick = head.tick.or(self.tick);
+        let next = self.next.entry(head.lane).or_default();
+        *next = next.wrapping_add(1);
+        self.last = Some(head.log_time);
+    }
+
+    /// As a part states it.
+    pub(super) fn progress(&self, header: &LogHeader) -> Progress {
+        let source = |prefix: &str, number: u16| {
+            header.sources.get(usize::from(number)).map(|source| format!("{prefix}{}", source.id))
+        };
+        let topic = |lane: Lane| match lane {
+            Lane::Raw(number) => source(RAW_PREFIX, number),
+            Lane::Sent(number) => source(SENT_PREFIX, number),
+            Lane::Tick => Some(TICK_TOPIC.to_owned()),
+            Lane::Result(number) => {
+                header.results.get(usize::from(number)).map(|result| result.topic.clone())
+            }
+        };
+        let sequences = self.next.iter().filter_map(|(lane, next)| Some((topic(*lane)?, *next)));
+        Progress { messages: self.messages, tick: self.tick, sequences: sequences.collect() }
+    }
+}

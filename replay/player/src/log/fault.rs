@@ -1,0 +1,68 @@
+//! What went wrong with a recording while it was made.
+
+use std::path::PathBuf;
+
+use headrace_geometry::time::MonoNs;
+
+/// Most faults that are listed; later ones extend the last.
+const MAX_FAULTS: usize = 100;
+
+/// A part of a recording that couldn't be written on.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RecordingFault {
+    /// The part.
+    pub path: PathBuf,
+    /// What was attempted, and the system's error.
+    pub error: String,
+    /// Messages that are in no part.
+    pub lost: u64,
+    /// Log time of the last message that is certain before it, where there is one.
+    pub from: Option<MonoNs>,
+    /// Log time of the first message after it, where there is one.
+    pub to: Option<MonoNs>,
+    /// The part in which the recording goes on; `None` where it ended there.
+    pub continued: Option<PathBuf>,
+}
+
+impl RecordingFault {
+    /// As text, without the times.
+    pub fn words(&self) -> String {
+        let Self { path, error, lost, continued, .. } = self;
+        let lost = match lost {
+            0 => "no message is missing".to_owned(),
+            1 => "1 message is missing".to_owned(),
+            lost => format!("{lost} messages are missing"),
+        };
+        let path = path.display();
+        match continued {
+            Some(next) => {
+                format!("recording failed in {path}: {error}; {lost}; it goes on in {}", next.display())
+            }
+            None => format!("recording failed in {path}: {error}; {lost}; nothing was recorded after that"),
+        }
+    }
+}
+
+/// News of a recording, for those who watch the dive.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum RecordingEvent {
+    /// A part can't be written on; nothing is recorded until another can be begun, which is tried again and again.
+    Failed {
+        /// The part.
+        path: PathBuf,
+        /// What was attempted, and the system's error.
+        error: String,
+    },
+    /// The recording goes on.
+    Resumed(RecordingFault),
+}
+
+/// Adds a fault to a bounded list.
+pub(super) fn add(faults: &mut Vec<RecordingFault>, fault: RecordingFault) {
+    if faults.len() < MAX_FAULTS {
+        faults.push(fault);
+    } else if let Some(last) = faults.last_mut() {
+        last.lost += fault.lost;
+        (last.to, last.continued) = (fault.to, fault.continued);
+    }
+}

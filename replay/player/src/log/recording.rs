@@ -1,0 +1,427 @@
+//! A recording in its parts. A part that can't be written on is left as it is, never ended; another is begun, and what
+//! wasn't certain to be in the last one is written again.
+//!
+//! After an error nothing that was written since the last sync can be relied on (a file system may forget it and report
+//! success the next time), so messages are kept in memory until they are synced.
+
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use headrace_geometry::time::MonoNs;
+
+use super::LogError;
+use super::backlog::{Backlog, Tally};
+use super::fault::{RecordingEvent, RecordingFault, add};
+use super::part::{PartHead, part_path};
+use super::rotate::{Every, Rotation};
+use super::storage::{Buffered, Storage};
+use super::writer::{Lane, LogHeader, LogWriter, PartSummary, Summary};
+
+/// A sync is due once so much isn't certain, bytes.
+const SYNC_BYTES: usize = 4 << 20;
+/// Wait after the second vain attempt to go on; doubled after each other. The first is made at once.
+const FIRST_WAIT: Duration = Duration::from_millis(250);
+const LONGEST_WAIT: Duration = Duration::from_secs(8);
+/// Attempts at writing the rest when the dive has ended.
+const LAST_ATTEMPTS: u32 = 3;
+/// Most statements kept for a part that can't be begun yet.
+const MAX_STATEMENTS: usize = 100;
+/// Names tried for a part, where files with that name are there already.
+const NAMES: u32 = 1000;
+
+/// The part being written.
+struct OpenPart {
+    path: PathBuf,
+    log: LogWriter<Buffered>,
+    /// Log time of its first message, or of the last failed rotation.
+    began: Option<MonoNs>,
+    /// File size from which it is due to end, bytes.
+    ends_at: u64,
+    /// Whether nothing but its header is certain.
+    fresh: bool,
+    /// Messages from sources that are certain.
+    raw_messages: u64,
+}
+
+/// Time without a part that can be written on.
+struct Outage {
+    fault: RecordingFault,
+    retry_at: Duration,
+    wait: Duration,
+}
+
+/// A statement of a loss: after, before, words.
+type Statement = (Option<MonoNs>, Option<MonoNs>, String);
+
+/// A recording.
+pub(super) struct Recording {
+    storage: Box<dyn Storage>,
+    path: PathBuf,
+    rotation: Rotation,
+    /// Header of every part; `part` is set for each.
+    header: LogHeader,
+    open: Option<OpenPart>,
+    /// Number of the last part that has anything in it.
+    number: u32,
+    /// Number in the name of the last part.
+    named: u32,
+    /// Totals of what is certain or lost: what comes before the backlog.
+    settled: Tally,
+    backlog: Backlog,
+    /// Statements that aren't certain yet.
+    statements: Vec<Statement>,
+    /// Whether packets have been written whose tick hasn't.
+    within_tick: bool,
+    outage: Option<Outage>,
+    /// Messages of channels that the header doesn't have, and the first of these channels.
+    refused: Option<(u64, Lane)>,
+    sum: Summary,
+    events: Vec<RecordingEvent>,
+    now: Duration,
+}
+
+impl Recording {
+    /// Begins the first part.
+    ///
+    /// Errors: it can't be created or written.
+    pub(super) fn begin(
+        storage: Box<dyn Storage>,
+        path: &Path,
+        rotation: &Rotation,
+        header: &LogHeader,
+    ) -> Result<Self, LogError> {
+        let mut recording = Self {
+            storage,
+            path: path.to_owned(),
+            rotation: rotation.clone(),
+            header: header.clone(),
+            open: None,
+            number: 0,
+            named: 0,
+            settled: Tally::default(),
+            backlog: Backlog::default(),
+            statements: Vec::new(),
+            within_tick: false,
+            outage: None,
+            refused: None,
+            sum: Summary::default(),
+            events: Vec::new(),
+            now: Duration::ZERO,
+        };
+        recording.open = Some(recording.begin_part()?);
+        recording.number = 1;
+        Ok(recording)
+    }
+
+    /// Bytes free on its medium, where known.
+    pub(super) fn free_bytes(&mut self) -> Option<u64> {
+        self.storage.free_bytes(&self.path)
+    }
+
+    /// Whether nothing is being recorded at present.
+    pub(super) fn is_failing(&self) -> bool {
+        self.open.is_none()
+    }
+
+    /// News since the last call.
+    pub(super) fn take_events(&mut self) -> Vec<RecordingEvent> {
+        core::mem::take(&mut self.events)
+    }
+
+    /// Tells the time since the recording began, and goes on in another part if that is due.
+    pub(super) fn look(&mut self, now: Duration) {
+        self.now = now;
+        if self.open.is_none() && self.outage.as_ref().is_some_and(|outage| now >= outage.retry_at) {
+            self.resume();
+        }
+    }
+
+    /// Writes a message.
+    pub(super) fn message(&mut self, lane: Lane, log_time: MonoNs, publish_time: MonoNs, bytes: &[u8]) {
+        if !self.header.has(lane) {
+            self.refused = Some(self.refused.map_or((1, lane), |(count, first)| (count + 1, first)));
+            return;
+        }
+        if self.is_due(lane, log_time) {
+            self.rotate(log_time);
+        }
+        self.backlog.push(lane, log_time, publish_time, bytes);
+        if let Some(part) = &mut self.open {
+            if let Err(error) = part.log.message(lane, log_time, publish_time, bytes) {
+                self.fail(&error);
+            } else if self.backlog.bytes() >= SYNC_BYTES {
+                self.sync();
+            }
+        }
+        while let Some(lost) = self.backlog.overflow() {
+            self.settled.add(&lost);
+            if let Some(outage) = &mut self.outage {
+                outage.fault.lost += 1;
+            }
+        }
+    }
+
+    /// States a loss in the log.
+    pub(super) fn state(&mut self, from: Option<MonoNs>, to: Option<MonoNs>, words: &str) {
+        if self.statements.len() < MAX_STATEMENTS {
+            self.statements.push((from, to, words.to_owned()));
+        }
+        let Some(part) = &mut self.open else { return };
+        match part.log.lost(from, to, words) {
+            Ok(()) => self.settle(),
+            Err(error) => self.fail(&error),
+        }
+    }
+
+    /// Makes all that was written certain.
+    pub(super) fn sync(&mut self) {
+        let Some(part) = &mut self.open else { return };
+        match part.log.flush() {
+            Ok(()) => self.settle(),
+            Err(error) => self.fail(&error),
+        }
+    }
+
+    /// What is in the open part is certain.
+    fn settle(&mut self) {
+        let Some(part) = &mut self.open else { return };
+        while let Some(head) = self.backlog.pop() {
+            part.raw_messages += u64::from(matches!(head.lane, Lane::Raw(_)));
+            self.sum.messages += 1;
+            self.sum.message_bytes += head.len as u64;
+            self.settled.add(&head);
+        }
+        self.statements.clear();
+        part.fresh = false;
+    }
+
+    /// Leaves the open part as it is.
+    fn fail(&mut self, error: &LogError) {
+        let Some(part) = self.open.take() else { return };
+        let OpenPart { path, log, fresh, raw_messages, .. } = part;
+        let bytes = log.bytes();
+        drop(log);
+        // A part of which nothing is certain isn't one; but the first has the recording's name.
+        if fresh && self.number > 1 {
+            self.number -= 1;
+            self.discard(&path);
+        } else {
+            self.sum.bytes += bytes;
+            self.sum.raw_messages += raw_messages;
+            self.sum.parts.push(PartSummary { path: path.clone(), raw_messages });
+        }
+        if self.outage.is_some() {
+            self.wait();
+            return;
+        }
+        tracing::error!("nothing is recorded to {}: {error}", path.display());
+        let error = error.to_string();
+        self.events.push(RecordingEvent::Failed { path: path.clone(), error: error.clone() });
+        let fault =
+            RecordingFault { path, error, lost: 0, from: self.settled.last, to: None, continued: None };
+        self.outage = Some(Outage { fault, retry_at: self.now, wait: FIRST_WAIT });
+    }
+
+    fn wait(&mut self) {
+        if let Some(outage) = &mut self.outage {
+            outage.retry_at = self.now.saturating_add(outage.wait);
+            outage.wait = outage.wait.saturating_mul(2).min(LONGEST_WAIT);
+        }
+    }
+
+    /// Begins another part after an error, and writes into it all that isn't certain.
+    fn resume(&mut self) {
+        let part = match self.begin_part() {
+            Ok(part) => part,
+            Err(error) => {
+                tracing::debug!("the recording can't go on yet: {error}");
+                self.wait();
+                return;
+            }
+        };
+        self.number += 1;
+        let path = part.path.clone();
+        self.open = Some(part);
+        if let Err(error) = self.write_again(&path) {
+            self.fail(&error);
+            return;
+        }
+        self.settle();
+        let Some(Outage { mut fault, .. }) = self.outage.take() else { return };
+        fault.continued = Some(path);
+        tracing::warn!("{}", fault.words());
+        self.events.push(RecordingEvent::Resumed(fault.clone()));
+        add(&mut self.sum.faults, fault);
+    }
+
+    /// Writes the statements and the backlog into the part that has just been begun, and syncs it.
+    fn write_again(&mut self, path: &Path) -> Result<(), LogError> {
+        let Some(part) = &mut self.open else { return Ok(()) };
+        if let Some(outage) = &mut self.outage {
+            outage.fault.to = self.backlog.span().map(|span| span.0);
+            let fault = RecordingFault { continued: Some(path.to_owned()), ..outage.fault.clone() };
+            part.log.lost(fault.from, fault.to, &fault.words())?;
+        }
+        for (from, to, words) in &self.statements {
+            part.log.lost(*from, *to, words)?;
+        }
+        let log = &mut part.log;
+        self.backlog
+            .try_each(|head, bytes| log.message(head.lane, head.log_time, head.publish_time, bytes))?;
+        log.flush()
+    }
+
+    /// Whether the part should end before a message.
+    fn is_due(&mut self, lane: Lane, at: MonoNs) -> bool {
+        // Parts end between ticks, so that each contains whole ticks.
+        let between = match lane {
+            Lane::Raw(_) => !core::mem::replace(&mut self.within_tick, true),
+            Lane::Tick => {
+                self.within_tick = false;
+                false
+            }
+            Lane::Sent(_) | Lane::Result(_) => false,
+        };
+        let Some(part) = &mut self.open else { return false };
+        let began = *part.began.get_or_insert(at);
+        between
+            && match self.rotation.every {
+                Some(Every::Bytes(_)) => part.log.bytes() >= part.ends_at,
+                Some(Every::Span(span)) => at.since(began) >= span,
+                None => false,
+            }
+    }
+
+    /// Begins the next part, whose first message has time `at`, and ends the last. If it can't be begun the last goes on.
+    fn rotate(&mut self, at: MonoNs) {
+        self.sync();
+        if self.open.is_none() {
+            return;
+        }
+        let next = self.begin_part();
+        let Some(last) = &mut self.open else { return };
+        last.began = Some(at);
+        match next {
+            Err(error) => {
+                tracing::warn!("the recording goes on in {}: {error}", last.path.display());
+                if let Some(Every::Bytes(bytes)) = self.rotation.every {
+                    last.ends_at = last.log.bytes().saturating_add(bytes);
+                }
+            }
+            Ok(next) => {
+                self.number += 1;
+                tracing::info!(from = %last.path.display(), to = %next.path.display(), "recording goes on in the next part");
+                let next = OpenPart { began: Some(at), ..next };
+                if let Some(last) = self.open.replace(next) {
+                    self.end(last, true);
+                }
+            }
+        }
+    }
+
+    /// Creates the file of the next part, and writes and syncs its header.
+    fn begin_part(&mut self) -> Result<OpenPart, LogError> {
+        let before = self.settled.progress(&self.header);
+        let part = PartHead { dive: self.rotation.dive.clone(), number: self.number + 1, before };
+        let header = LogHeader { part: Some(part), ..self.header.clone() };
+        let (path, file) = self.create()?;
+        let begun =
+            LogWriter::new(Buffered::new(file), &header).and_then(|mut log| log.flush().map(|()| log));
+        match begun {
+            Ok(log) => {
+                let ends_at = match self.rotation.every {
+                    Some(Every::Bytes(bytes)) => bytes,
+                    Some(Every::Span(_)) | None => u64::MAX,
+                };
+                Ok(OpenPart { path, log, began: None, ends_at, fresh: true, raw_messages: 0 })
+            }
+            Err(error) => {
+                // A file without a header is no part.
+                self.discard(&path);
+                Err(error)
+            }
+        }
+    }
+
+    /// Creates the next file. A part other than the first passes over names that are taken.
+    fn create(&mut self) -> Result<(PathBuf, Box<dyn super::storage::StoredFile>), LogError> {
+        let first = self.named + 1;
+        for name in first..first.saturating_add(NAMES) {
+            let alone = name == 1 && self.rotation.every.is_none();
+            let path = if alone { self.path.clone() } else { part_path(&self.path, name) };
+            match self.storage.create(&path) {
+                Ok(file) => {
+                    self.named = name;
+                    return Ok((path, file));
+                }
+                Err(error) if error.kind() == ErrorKind::AlreadyExists && name > 1 => {}
+                Err(source) => return Err(LogError::Create { path, source }),
+            }
+        }
+        let path = part_path(&self.path, first);
+        Err(LogError::Create { path, source: ErrorKind::AlreadyExists.into() })
+    }
+
+    /// Removes the file of the part created last; if that fails, its name is passed over.
+    fn discard(&mut self, path: &Path) {
+        match self.storage.remove(path) {
+            Ok(()) => self.named = self.named.saturating_sub(1),
+            Err(error) => tracing::debug!("could not remove {}: {error}", path.display()),
+        }
+    }
+
+    /// Ends a part whose messages are certain, and adds it to the totals.
+    fn end(&mut self, part: OpenPart, follows: bool) {
+        let OpenPart { path, mut log, raw_messages, .. } = part;
+        let bytes = log.bytes();
+        let ended = log.end_part(follows).and_then(|()| log.finish());
+        let (bytes, chunks) = match &ended {
+            Ok((_, written)) => (written.bytes, written.chunks),
+            Err(_) => (bytes, 0),
+        };
+        if let Err(error) = ended {
+            tracing::error!("{} has no end: {error}", path.display());
+            let fault = RecordingFault {
+                path: path.clone(),
+                error: error.to_string(),
+                lost: 0,
+                from: self.settled.last,
+                to: None,
+                continued: self.open.as_ref().map(|next| next.path.clone()),
+            };
+            add(&mut self.sum.faults, fault);
+        }
+        self.sum.bytes += bytes;
+        self.sum.chunks = self.sum.chunks.saturating_add(chunks);
+        self.sum.raw_messages += raw_messages;
+        self.sum.parts.push(PartSummary { path, raw_messages });
+    }
+
+    /// Ends the recording; returns its totals.
+    pub(super) fn finish(mut self) -> Summary {
+        for _ in 0..LAST_ATTEMPTS {
+            if self.open.is_none() {
+                self.resume();
+            }
+            self.sync();
+            if let Some(part) = self.open.take() {
+                self.end(part, false);
+                break;
+            }
+        }
+        if let Some(Outage { mut fault, .. }) = self.outage.take() {
+            fault.lost += self.backlog.len();
+            add(&mut self.sum.faults, fault);
+        }
+        if let Some((count, lane)) = self.refused {
+            let error = LogError::NoChannel { channel: format!("{lane:?}") }.to_string();
+            let (path, continued) = (self.path.clone(), Some(self.path.clone()));
+            add(
+                &mut self.sum.faults,
+                RecordingFault { path, error, lost: count, from: None, to: None, continued },
+            );
+        }
+        self.sum
+    }
+}
