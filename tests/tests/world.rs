@@ -1,40 +1,77 @@
-//! Dives in the simulated world of faults.
+//! Dives in the simulated world of faults: what must hold does, for every seed.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
 
-use headrace_tests::world::World;
-use headrace_tests::world::plan::Ending;
+use std::collections::BTreeMap;
+
+use headrace_tests::Folder;
+use headrace_tests::world::invariants::broken;
+use headrace_tests::world::plan::Plan;
+use headrace_tests::world::{Sabotage, World};
+
+/// Worlds lived through; more, and others, by the environment: `HEADRACE_WORLD_SEEDS=1000..2000`.
+const SEEDS: std::ops::Range<u64> = 0..300;
+/// Worlds in which sabotage must show.
+const ENOUGH: u64 = 100;
+
+fn seeds() -> std::ops::Range<u64> {
+    let Ok(text) = std::env::var("HEADRACE_WORLD_SEEDS") else { return SEEDS };
+    let (from, to) = text.split_once("..").unwrap();
+    from.parse().unwrap()..to.parse().unwrap()
+}
+
+/// Lives through a world; gives what doesn't hold, and what was planned.
+fn lived(folder: &Folder, seed: u64, sabotage: Option<Sabotage>) -> (Vec<String>, Plan, usize) {
+    let lived = World::sabotaged(seed, sabotage).live();
+    let replayed = lived.replay(folder);
+    (broken(&lived, &replayed), lived.plan.clone(), lived.disk_failures)
+}
+
+fn count(plan: &Plan, faults: &mut BTreeMap<String, usize>) {
+    let cables = plan.cables.iter().flatten().map(|window| format!("cable: {:?}", window.what));
+    let machine = plan.machine.iter().map(|window| format!("machine: {:?}", window.what));
+    let disk = plan.disk.iter().map(|window| format!("disk: {:?}", window.what));
+    for kind in cables.chain(machine).chain(disk).chain([format!("end: {:?}", plan.ending)]) {
+        *faults.entry(kind).or_default() += 1;
+    }
+}
 
 #[test]
-fn probe() {
-    let seeds: u64 = std::env::var("SEEDS").map_or(20, |seeds| seeds.parse().unwrap());
-    let mut bad = 0;
-    for seed in 0..seeds {
-        let lived = World::new(seed).live();
-        let finished = lived.plan.ending == Ending::Finished;
-        let mut told = Vec::new();
-        for (n, line) in lived.lines.iter().enumerate() {
-            let h = &line.history;
-            if line.untouched && (h.opened, h.lost, h.dropped) != (1, 0, 0) {
-                told.push(format!("{n} touched {line:?}"));
-            }
-            if line.lossless && finished && h.dropped == 0 && line.good != line.whole {
-                told.push(format!("{n} lost {line:?}"));
-            }
-            if finished && !h.last.starts_with("running") {
-                told.push(format!("{n} not back {line:?}"));
-            }
-            if h.dropped > 0 {
-                told.push(format!("{n} dropped {line:?}"));
-            }
-        }
-        if !told.is_empty() {
-            bad += 1;
-            println!("seed {seed}\n{:?}", lived.plan);
-            for line in told {
-                println!("   {line}");
-            }
-        }
+fn whatever_goes_wrong_nothing_is_lost_silently() {
+    let folder = Folder::new();
+    let (mut faults, mut failures) = (BTreeMap::new(), 0);
+    for seed in seeds() {
+        let (broken, plan, disk_failures) = lived(&folder, seed, None);
+        assert!(broken.is_empty(), "seed {seed}:\n{plan:?}\n{broken:#?}");
+        count(&plan, &mut faults);
+        failures += disk_failures;
     }
-    println!("{bad} bad");
+    println!("{} worlds, {failures} operations of the disk failed, {faults:#?}", seeds().count());
+    assert_eq!(faults.len(), 10 + 3 + 5 + 3, "kinds of faults: {faults:#?}");
+}
+
+#[test]
+fn a_seed_repeats_its_world() {
+    for seed in 0..5 {
+        let [first, second] = [0, 1].map(|_| World::new(seed).live());
+        assert_eq!((first.digest, &first.consumed), (second.digest, &second.consumed));
+        assert_eq!((first.disk_failures, first.certain), (second.disk_failures, second.certain));
+        let bytes = |lived: &headrace_tests::world::Lived| {
+            lived.left.iter().map(|file| (file.path.clone(), file.bytes.clone())).collect::<Vec<_>>()
+        };
+        assert_eq!(bytes(&first), bytes(&second));
+    }
+}
+
+#[test]
+fn sabotage_is_found() {
+    let folder = Folder::new();
+    for sabotage in Sabotage::ALL {
+        let found = (0..ENOUGH).find_map(|seed| {
+            let (broken, ..) = lived(&folder, seed, Some(sabotage));
+            (!broken.is_empty()).then_some((seed, broken))
+        });
+        let (seed, broken) = found.unwrap_or_else(|| panic!("{sabotage:?} shows in none of {ENOUGH} worlds"));
+        println!("{sabotage:?}: found in world {seed}: {}", broken[0]);
+    }
 }

@@ -28,20 +28,23 @@ pub struct Device {
     /// Whether bytes may be cut and joined anywhere, or each message comes whole or not at all.
     is_stream: bool,
     was_broken: bool,
+    /// Some frames are lost without having been planned.
+    loses: bool,
     whole: u64,
 }
 
 impl Device {
-    /// A device that is switched on.
+    /// A device that is switched on. With `loses` some of its frames are lost, without having been planned.
     pub fn new(
         emulated: Emulated,
         cable: Arc<Cable>,
         faults: Vec<Window<CableFault>>,
+        loses: bool,
         random: Random,
     ) -> Self {
         let is_stream = matches!(cable.connect, Connect::Tcp { .. } | Connect::Serial { .. });
         let under_way = VecDeque::new();
-        Self { emulated, cable, faults, under_way, random, is_stream, was_broken: false, whole: 0 }
+        Self { emulated, cable, faults, under_way, random, is_stream, was_broken: false, loses, whole: 0 }
     }
 
     /// Its cable.
@@ -64,9 +67,9 @@ impl Device {
         self.faults.is_empty()
     }
 
-    /// Whether it has something under way.
-    pub fn has_under_way(&self) -> bool {
-        !self.under_way.is_empty()
+    /// Whether its connection is broken as planned.
+    pub fn is_broken(&self) -> bool {
+        self.was_broken
     }
 
     /// Hears what the machine has sent, measures, sends, and lets arrive what is due. A `quiet` one sends nothing new.
@@ -123,6 +126,9 @@ impl Device {
             self.put(now, noise);
         }
         self.whole += 1;
+        if self.loses && self.whole.is_multiple_of(100) {
+            return;
+        }
         if self.has(CableFault::Doubled, now) && self.random.one_in(5) {
             self.put(now, frame.clone());
         }

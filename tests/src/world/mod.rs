@@ -3,12 +3,16 @@
 
 pub mod cable;
 pub mod device;
-// pub mod disk;
+pub mod disk;
+pub mod invariants;
 pub mod plan;
 
+use std::collections::VecDeque;
 use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+use std::time::Duration;
 
 use headrace::devices::KINDS;
 use headrace_config::Document;
@@ -17,20 +21,30 @@ use headrace_monitor::App;
 use headrace_monitor::merge::Inbox;
 use headrace_monitor::run::Loop;
 use headrace_ports::{Attached, Board, Common, LineHistory, LineService};
+use headrace_replay::drive::{Pace, drive};
+use headrace_replay::log::{
+    LogHeader, Recorder, RecorderWorker, RecordingEvent, Rotation, SourceInfo, Summary,
+};
+use headrace_replay::player::Player;
+use headrace_replay::record::{QUEUE_BYTES, RecorderOutlet, result_channels};
 use headrace_sensor::connect::Connect;
 use headrace_sensor::device::EmulatorSetup;
 use headrace_sensor::driver::DriverSetup;
 use headrace_vehicle::VehicleConfig;
 
+use crate::folder::Folder;
 use crate::random::Random;
 use cable::{Cable, Clock, Machine};
 use device::Device;
+use disk::{LeftFile, SimulatedDisk};
 use plan::{BEGIN, Ending, MachineFault, Plan};
 
 /// Longest step of the world.
 const LONGEST_STEP_NS: usize = 12_000_000;
 /// How long a finished dive waits for what is under way.
 const PATIENCE: DurNs = DurNs::from_millis(4_000);
+/// What the recorder took longer ago is synced: half a second, and a step of the world.
+const SYNC_PERIOD: DurNs = DurNs::from_millis(500 + 13);
 
 const TUNNEL: &str = r#"name = "a world of faults"
 target_m = 1.2
@@ -77,8 +91,27 @@ pub struct Consumed {
     pub bytes: Vec<u8>,
 }
 
+/// What breaks an invariant on purpose, to see that it is found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Sabotage {
+    /// Every hundredth frame of a sound device is lost on its way.
+    CableLoses,
+    /// When one connection breaks another does.
+    NeighbourBreaks,
+    /// Every fortieth write is forgotten, and reported as done.
+    DiskForgets,
+    /// Syncs are reported and not done.
+    SyncLies,
+}
+
+impl Sabotage {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::CableLoses, Self::NeighbourBreaks, Self::DiskForgets, Self::SyncLies];
+}
+
 /// A dive in a world.
 pub struct World {
+    sabotage: Option<Sabotage>,
     random: Random,
     clock: Arc<Clock>,
     plan: Plan,
@@ -87,6 +120,13 @@ pub struct World {
     board: Board,
     dive: Loop,
     consumed: Vec<Consumed>,
+    disk: SimulatedDisk,
+    recorder: RecorderWorker,
+    /// Packets consumed when the recorder had emptied its queue, with the time, since its last trouble.
+    taken: VecDeque<(MonoNs, usize)>,
+    is_failing: bool,
+    /// Packets that must be in the log, whatever the end.
+    certain: usize,
 }
 
 /// What a dive has come to.
@@ -99,6 +139,24 @@ pub struct Lived {
     pub digest: u64,
     /// By device.
     pub lines: Vec<Line>,
+    /// What the recorder says of its recording; `None` where it was killed.
+    pub summary: Option<Summary>,
+    /// Operations of the disk that have failed.
+    pub disk_failures: usize,
+    /// Files of the recording.
+    pub left: Vec<LeftFile>,
+    /// Of the packets consumed, those that must be in the log whatever the end.
+    pub certain: usize,
+}
+
+/// What a replay of the files that are left comes to.
+pub struct Replayed {
+    /// All that the loop took.
+    pub consumed: Vec<Consumed>,
+    /// Digest of the results.
+    pub digest: u64,
+    /// What the player says is missing.
+    pub losses: Vec<String>,
 }
 
 /// What came of a device's line.
@@ -119,10 +177,14 @@ pub struct Line {
 impl World {
     /// The world of a seed, before the dive.
     pub fn new(seed: u64) -> Self {
+        Self::sabotaged(seed, None)
+    }
+
+    /// The same with something that breaks an invariant.
+    pub fn sabotaged(seed: u64, sabotage: Option<Sabotage>) -> Self {
         let mut random = Random(seed);
         let text = vehicle_text();
-        let document = Document::new("vehicle.toml", &text);
-        let vehicle = VehicleConfig::parse(document, &KINDS, &|_| unreachable!("no file is named")).unwrap();
+        let vehicle = vehicle(&text);
         let clock = Arc::new(Clock::default());
         clock.set(BEGIN);
         let connect = |source: usize| Connect::parse(&vehicle.sensor_configs[source].connect).unwrap();
@@ -131,11 +193,8 @@ impl World {
         let streams: Vec<bool> =
             cables.iter().map(|cable| !matches!(cable.connect, Connect::Udp { .. })).collect();
         let plan = Plan::draw(&mut random, &streams);
-        let mut app = App::new(vehicle.mission());
-        for sensor in &vehicle.sensors {
-            app.add_device(sensor.as_ref()).unwrap();
-        }
-        let mut dive = app.arm(vehicle.navigation()).unwrap();
+        let disk = SimulatedDisk::new(Arc::clone(&clock), &plan.disk, sabotage);
+        let (mut dive, recorder) = assemble(&vehicle, &text, &disk);
         let board = Board::new(1 << 16);
         let waker = crossbeam::sync::Parker::new().unparker().clone();
         let common = Common {
@@ -154,9 +213,27 @@ impl World {
             let attached = Attached { source, port: dive.take_port(source).unwrap(), driver };
             services.push(LineService::new(Ok(cable.connect.clone()), vec![attached], common.clone()));
             let faults = plan.cables[source].clone();
-            devices.push(Device::new(sensor.emulator(&setup), cable, faults, Random(random.bits())));
+            let loses = sabotage == Some(Sabotage::CableLoses) && faults.is_empty();
+            devices.push(Device::new(sensor.emulator(&setup), cable, faults, loses, Random(random.bits())));
         }
-        Self { random, clock, plan, devices, services, board, dive, consumed: Vec::new() }
+        let (consumed, taken, certain) = (Vec::new(), VecDeque::new(), 0);
+        let is_failing = false;
+        Self {
+            sabotage,
+            random,
+            clock,
+            plan,
+            devices,
+            services,
+            board,
+            dive,
+            consumed,
+            disk,
+            recorder,
+            taken,
+            is_failing,
+            certain,
+        }
     }
 
     /// Lets the dive happen.
@@ -170,17 +247,25 @@ impl World {
                 self.step(true);
             }
         }
-        let Self { services, mut dive, devices, plan, mut consumed, .. } = self;
+        let certain = self.certain;
+        let since_begin = self.since_begin();
+        let Self { services, mut dive, devices, plan, mut consumed, disk, recorder, mut random, .. } = self;
         let histories: Vec<LineHistory> =
             services.into_iter().flat_map(|service| service.end()).map(|(_, history)| history).collect();
+        let mut recorder = Some(recorder);
+        let mut summary = None;
         if plan.ending == Ending::Finished {
             let now = self.clock.now();
             while dive.has_waiting() {
                 dive.tick(now);
                 note(&dive, &mut consumed);
+                recorder.as_mut().unwrap().step(since_begin);
             }
             dive.finish(&mut |_, _| ());
+            dive.tick(now);
+            summary = recorder.take().map(|recorder| recorder.finish(since_begin));
         }
+        drop(recorder);
         let good: Vec<u64> = dive.decoder_counts().iter().map(|counts| counts.good_frames).collect();
         let lines = devices.iter().zip(good).zip(histories).map(|((device, good), history)| Line {
             untouched: device.is_untouched(),
@@ -189,7 +274,42 @@ impl World {
             good,
             history,
         });
-        Lived { lines: lines.collect(), digest: dive.digest(), plan, consumed }
+        let power_cut = (plan.ending == Ending::PowerCut).then_some(&mut random);
+        Lived {
+            lines: lines.collect(),
+            digest: dive.digest(),
+            summary,
+            disk_failures: disk.failures(),
+            left: disk.left(power_cut),
+            certain,
+            plan,
+            consumed,
+        }
+    }
+
+    fn since_begin(&self) -> Duration {
+        Duration::from_nanos(u64::try_from(self.clock.now().since(BEGIN).0).unwrap())
+    }
+
+    /// Lets the recorder write. What it had taken half a second and a step ago is certain, unless its disk gave it trouble.
+    fn record(&mut self, now: MonoNs) {
+        let since_begin = self.since_begin();
+        let failures = self.disk.failures();
+        while self.recorder.step(since_begin) {}
+        while let Some(event) = self.recorder.next_event() {
+            self.is_failing = matches!(event, RecordingEvent::Failed { .. });
+        }
+        if self.is_failing || self.disk.failures() != failures {
+            self.taken.clear();
+            return;
+        }
+        self.taken.push_back((now, self.consumed.len()));
+        while let Some((at, count)) = self.taken.front().copied()
+            && now.since(at) > SYNC_PERIOD
+        {
+            self.certain = count;
+            self.taken.pop_front();
+        }
     }
 
     fn step(&mut self, quiet: bool) {
@@ -197,6 +317,11 @@ impl World {
         self.clock.set(now);
         for device in &mut self.devices {
             device.step(now, quiet);
+        }
+        if self.sabotage == Some(Sabotage::NeighbourBreaks)
+            && let Some(other) = self.devices.iter().position(|device| device.is_broken())
+        {
+            self.devices[(other + 1) % SENSORS.len()].cable().break_off(0);
         }
         if !self.plan.has(MachineFault::PortsStall, now) {
             for (service, device) in self.services.iter_mut().zip(&self.devices) {
@@ -207,8 +332,77 @@ impl World {
             self.dive.tick(now);
             note(&self.dive, &mut self.consumed);
         }
+        if !self.plan.has(MachineFault::RecorderStalls, now) {
+            self.record(now);
+        }
         while self.board.next().is_some() {}
     }
+}
+
+impl Lived {
+    /// Replays what is left, from files in `folder`; `None` where nothing is.
+    ///
+    /// Errors: the files can't be read as a log, with why.
+    pub fn replay(&self, folder: &Folder) -> Result<Replayed, String> {
+        let name = |path: &Path| folder.path(path.file_name().unwrap().to_str().unwrap());
+        let files: Vec<PathBuf> = self.left.iter().map(|file| name(&file.path)).collect();
+        for (path, file) in files.iter().zip(&self.left) {
+            std::fs::write(path, &file.bytes).unwrap();
+        }
+        let played = replayed(&files);
+        for path in files {
+            std::fs::remove_file(path).unwrap();
+        }
+        played
+    }
+}
+
+fn replayed(files: &[PathBuf]) -> Result<Replayed, String> {
+    let mut player = Player::open(files).map_err(|error| error.to_string())?;
+    let text = vehicle_text();
+    let vehicle = vehicle(&text);
+    let mut dive = app(&vehicle).arm(vehicle.navigation()).unwrap();
+    player.connect(dive.sources());
+    let mut consumed = Vec::new();
+    let driven = drive(&mut dive, &mut player, Pace::default(), &mut |dive| note(dive, &mut consumed));
+    driven.map_err(|error| error.to_string())?;
+    dive.finish(&mut |_, _| ());
+    Ok(Replayed { consumed, digest: dive.digest(), losses: player.losses() })
+}
+
+fn vehicle(text: &str) -> VehicleConfig {
+    let document = Document::new("vehicle.toml", text);
+    VehicleConfig::parse(document, &KINDS, &|_| unreachable!("no file is named")).unwrap()
+}
+
+fn app(vehicle: &VehicleConfig) -> App {
+    let mut app = App::new(vehicle.mission());
+    for sensor in &vehicle.sensors {
+        app.add_device(sensor.as_ref()).unwrap();
+    }
+    app
+}
+
+/// The loop of a recorded dive, and its recorder.
+fn assemble(vehicle: &VehicleConfig, text: &str, disk: &SimulatedDisk) -> (Loop, RecorderWorker) {
+    let sources = vehicle.sensor_configs.iter().map(|sensor| SourceInfo {
+        id: sensor.id.clone(),
+        plugin: sensor.plugin.clone(),
+        connect: sensor.connect.clone(),
+    });
+    let header = LogHeader {
+        vehicle_toml: text.to_owned(),
+        sources: sources.collect(),
+        ticks: true,
+        results: result_channels(),
+        ..LogHeader::default()
+    };
+    let (storage, path) = (Box::new(disk.clone()), Path::new("dive.mcap"));
+    let rotation = Rotation::default();
+    let (port, worker) = Recorder::unthreaded(storage, path, &header, &rotation, QUEUE_BYTES, None).unwrap();
+    let mut app = app(vehicle);
+    app.add_plugin(&RecorderOutlet::new(port)).unwrap();
+    (app.arm(vehicle.navigation()).unwrap(), worker)
 }
 
 /// What a service's thread would do until it waits.

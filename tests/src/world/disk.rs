@@ -1,0 +1,172 @@
+//! A disk in memory that fails as planned, and what is left on it after a kill or a power cut.
+
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use crossbeam::queue::SegQueue;
+use headrace_replay::log::{Storage, StoredFile};
+
+use super::Sabotage;
+use super::cable::Clock;
+use super::plan::{DiskFault, Window};
+use crate::random::Random;
+
+/// Smallest unit that a power cut leaves whole.
+const SECTOR_BYTES: usize = 512;
+/// Linux: input or output error, no space left on device.
+const EIO: i32 = 5;
+const ENOSPC: i32 = 28;
+
+enum Done {
+    Created(PathBuf),
+    Wrote(PathBuf, Vec<u8>),
+    Synced(PathBuf),
+    /// A sync has failed: what wasn't synced reads as zeros.
+    Lost(PathBuf),
+    Removed(PathBuf),
+}
+
+/// The disk. Clones are the same disk.
+#[derive(Clone)]
+pub struct SimulatedDisk {
+    clock: Arc<Clock>,
+    faults: Arc<[Window<DiskFault>]>,
+    done: Arc<SegQueue<Done>>,
+    /// Operations that have failed.
+    failed: Arc<SegQueue<DiskFault>>,
+    sabotage: Option<Sabotage>,
+}
+
+/// A file as left on the disk.
+#[derive(Debug, Clone, Default)]
+pub struct LeftFile {
+    /// Its name.
+    pub path: PathBuf,
+    /// Its content.
+    pub bytes: Vec<u8>,
+    /// Bytes that a power cut can't touch.
+    synced: usize,
+}
+
+impl SimulatedDisk {
+    /// An empty disk.
+    pub fn new(clock: Arc<Clock>, faults: &[Window<DiskFault>], sabotage: Option<Sabotage>) -> Self {
+        let (done, failed) = (Arc::new(SegQueue::new()), Arc::new(SegQueue::new()));
+        Self { clock, faults: faults.into(), done, failed, sabotage }
+    }
+
+    /// Operations that have failed so far.
+    pub fn failures(&self) -> usize {
+        self.failed.len()
+    }
+
+    /// What is on the disk; after a power cut what wasn't synced is cut off or has holes.
+    pub fn left(&self, power_cut: Option<&mut Random>) -> Vec<LeftFile> {
+        let mut files: Vec<LeftFile> = Vec::new();
+        while let Some(done) = self.done.pop() {
+            match done {
+                Done::Created(path) => files.push(LeftFile { path, ..LeftFile::default() }),
+                Done::Removed(path) => files.retain(|file| file.path != path),
+                Done::Wrote(path, bytes) => of(&mut files, &path).bytes.extend(bytes),
+                Done::Synced(path) => {
+                    let file = of(&mut files, &path);
+                    file.synced = file.bytes.len();
+                }
+                Done::Lost(path) => {
+                    let file = of(&mut files, &path);
+                    let from = file.synced;
+                    file.bytes[from..].fill(0);
+                }
+            }
+        }
+        if let Some(random) = power_cut {
+            files.iter_mut().for_each(|file| tear(file, random));
+        }
+        files
+    }
+
+    fn try_to(&self, faults: &[DiskFault]) -> io::Result<()> {
+        let now = self.clock.now();
+        match self.faults.iter().find(|window| faults.contains(&window.what) && window.holds(now)) {
+            None => Ok(()),
+            Some(Window { what, .. }) => {
+                self.failed.push(*what);
+                Err(io::Error::from_raw_os_error(if *what == DiskFault::Full { ENOSPC } else { EIO }))
+            }
+        }
+    }
+}
+
+fn of<'a>(files: &'a mut [LeftFile], path: &Path) -> &'a mut LeftFile {
+    files.iter_mut().find(|file| file.path == path).unwrap()
+}
+
+/// Sectors that weren't synced are there or not, each by itself; the length is anything from what was synced on.
+fn tear(file: &mut LeftFile, random: &mut Random) {
+    let unsynced = file.bytes.len() - file.synced;
+    file.bytes.truncate(file.synced + random.below(unsynced + 1));
+    let first = file.synced.div_ceil(SECTOR_BYTES) * SECTOR_BYTES;
+    for at in (first..file.bytes.len()).step_by(SECTOR_BYTES) {
+        if random.one_in(3) {
+            let to = (at + SECTOR_BYTES).min(file.bytes.len());
+            file.bytes[at..to].fill(0);
+        }
+    }
+}
+
+impl Storage for SimulatedDisk {
+    fn create(&mut self, path: &Path) -> io::Result<Box<dyn StoredFile>> {
+        self.try_to(&[DiskFault::CreateFails, DiskFault::Full])?;
+        self.done.push(Done::Created(path.to_owned()));
+        Ok(Box::new(OpenFile { disk: self.clone(), path: path.to_owned(), turn: 0 }))
+    }
+
+    fn remove(&mut self, path: &Path) -> io::Result<()> {
+        self.done.push(Done::Removed(path.to_owned()));
+        Ok(())
+    }
+
+    fn free_bytes(&mut self, _: &Path) -> Option<u64> {
+        None
+    }
+}
+
+struct OpenFile {
+    disk: SimulatedDisk,
+    path: PathBuf,
+    turn: u64,
+}
+
+impl StoredFile for OpenFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.disk.try_to(&[DiskFault::WriteFails, DiskFault::Full])?;
+        let now = self.disk.clock.now();
+        let in_part =
+            |window: &Window<DiskFault>| window.what == DiskFault::WritesInPart && window.holds(now);
+        self.turn += 1;
+        if self.disk.sabotage == Some(Sabotage::DiskForgets) && self.turn.is_multiple_of(40) {
+            return Ok(bytes.len());
+        }
+        let count = if self.disk.faults.iter().any(in_part) {
+            if self.turn.is_multiple_of(3) {
+                return Err(io::ErrorKind::Interrupted.into());
+            }
+            bytes.len().div_ceil(2)
+        } else {
+            bytes.len()
+        };
+        self.disk.done.push(Done::Wrote(self.path.clone(), bytes[..count].to_vec()));
+        Ok(count)
+    }
+
+    fn sync(&mut self) -> io::Result<()> {
+        if self.disk.sabotage == Some(Sabotage::SyncLies) {
+            return Ok(());
+        }
+        let synced = self.disk.try_to(&[DiskFault::SyncFails]);
+        let path = self.path.clone();
+        self.disk.done.push(if synced.is_ok() { Done::Synced(path) } else { Done::Lost(path) });
+        synced
+    }
+}

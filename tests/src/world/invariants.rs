@@ -1,0 +1,66 @@
+//! What must hold of every dive in a world, whatever went wrong.
+
+use super::plan::{Ending, MachineFault};
+use super::{Line, Lived, Replayed};
+
+/// What doesn't hold, as text.
+pub fn broken(lived: &Lived, replayed: &Result<Replayed, String>) -> Vec<String> {
+    let mut broken: Vec<String> =
+        lived.lines.iter().enumerate().filter_map(|(number, line)| of_line(lived, number, line)).collect();
+    match replayed {
+        Err(error) => broken.push(format!("the log can't be read: {error}")),
+        Ok(replayed) => broken.extend(of_log(lived, replayed)),
+    }
+    broken
+}
+
+/// No fault touches another device; no delay loses a frame; after all faults every device runs again.
+fn of_line(lived: &Lived, number: usize, line: &Line) -> Option<String> {
+    let finished = lived.plan.ending == Ending::Finished;
+    let loop_stalled = lived.plan.machine.iter().any(|window| window.what == MachineFault::LoopStalls);
+    let Line { untouched, lossless, whole, good, history } = line;
+    let what = if *untouched && (history.opened, history.lost) != (1, 0) {
+        "nothing happened to it, and its line was lost"
+    } else if *good > *whole && *lossless {
+        "more frames were found than sent"
+    } else if *lossless && finished && *good < *whole && history.dropped == 0 {
+        "frames are missing, and none was counted"
+    } else if history.dropped > 0 && !loop_stalled {
+        "packets were dropped although the loop ran"
+    } else if finished && !history.last.starts_with("running") {
+        "it doesn't run again"
+    } else {
+        return None;
+    };
+    Some(format!("device {number}: {what}: {line:?}"))
+}
+
+/// A log has what the loop took, in that order; what is missing was told, by the recorder and by the reader; and nothing is said
+/// to be missing that isn't.
+fn of_log(lived: &Lived, replayed: &Replayed) -> Vec<String> {
+    let finished = lived.plan.ending == Ending::Finished;
+    let (ours, theirs) = (&lived.consumed, &replayed.consumed);
+    let mut rest = ours.iter();
+    let invented = theirs.iter().filter(|packet| !rest.any(|other| other == *packet)).count();
+    let missing = ours.len() - theirs.len().min(ours.len());
+    let mut broken = Vec::new();
+    let mut hold = |holds: bool, what: &str| {
+        if !holds {
+            let losses = &replayed.losses;
+            broken.push(format!("{what}: {missing} of {} packets missing, told: {losses:?}", ours.len()));
+        }
+    };
+    hold(invented == 0, "the log has what the loop never took, or in another order");
+    hold(missing == 0 || !replayed.losses.is_empty(), "packets are missing without a word");
+    hold(theirs.len() >= lived.certain, "packets are missing that had been synced");
+    if finished {
+        let summary = lived.summary.as_ref().unwrap();
+        let told = summary.faults.iter().any(|fault| fault.lost > 0);
+        hold(missing == 0 || told, "packets are missing of which the recorder says nothing");
+        hold(missing > 0 || replayed.digest == lived.digest, "the replay's results differ");
+        let untroubled = lived.disk_failures == 0;
+        hold(!untroubled || summary.faults.is_empty(), "the recorder reports a fault that wasn't");
+        hold(!untroubled || replayed.losses.is_empty(), "losses are told, and the disk gave no trouble");
+    }
+    broken
+}
