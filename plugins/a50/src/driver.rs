@@ -8,7 +8,7 @@ use crate::report::{Lines, MAX_LINE_BYTES};
 /// Supported carriers.
 pub const CARRIERS: [Carrier; 2] = [Carrier::Tcp, Carrier::Udp];
 
-/// Maximum gap within a line.
+/// Longest usual gap within a line.
 const SILENCE: DurNs = DurNs::from_millis(200);
 /// Silence timeout: without bottom lock the device still reports several times a second.
 const PATIENCE: DurNs = DurNs::from_millis(5_000);

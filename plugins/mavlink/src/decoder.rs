@@ -16,7 +16,7 @@ use crate::message::{
     to_ours,
 };
 
-/// Maximum gap within a frame: the longest takes 50 ms at 57,600 baud.
+/// Longest usual gap within a frame: the longest takes 50 ms at 57,600 baud.
 const SILENCE: DurNs = DurNs::from_millis(100);
 
 /// Tolerance of angle limits, for rounding.

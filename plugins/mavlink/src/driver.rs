@@ -14,7 +14,7 @@ use crate::frame::{Frames, MAX_FRAME_BYTES, encode};
 /// Supported carriers.
 pub const CARRIERS: [Carrier; 3] = [Carrier::Udp, Carrier::Tcp, Carrier::Serial];
 
-/// Maximum gap within a frame: the longest takes 50 ms at 57,600 baud.
+/// Longest usual gap within a frame: the longest takes 50 ms at 57,600 baud.
 const SILENCE: DurNs = DurNs::from_millis(100);
 /// Routers send only to active systems. Source: MAVLink, heartbeat protocol, once a second.
 const HEARTBEAT_PERIOD: DurNs = DurNs::from_millis(1_000);
@@ -83,7 +83,7 @@ impl Driver for MavlinkDriver {
     }
 
     fn due(&self) -> Option<MonoNs> {
-        Some(self.cutter.gives_up().map_or(self.next_at, |gives_up| self.next_at.min(gives_up)))
+        Some(self.cutter.settles().map_or(self.next_at, |settles| self.next_at.min(settles)))
     }
 
     fn wake(&mut self, now: MonoNs, wire: &mut dyn Wire) {

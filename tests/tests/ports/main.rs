@@ -15,3 +15,4 @@ mod kernel_drivers;
 mod rehearsal;
 #[cfg(target_os = "linux")]
 mod run_ports;
+mod splits;

@@ -29,7 +29,7 @@ impl<F: Framing + Send, const N: usize> Driver for Listener<F, N> {
     }
 
     fn due(&self) -> Option<MonoNs> {
-        self.cutter.gives_up()
+        self.cutter.settles()
     }
 
     fn wake(&mut self, now: MonoNs, wire: &mut dyn Wire) {
