@@ -262,6 +262,12 @@ impl Driver for HeadDriver {
         }
     }
 
+    fn accepts(&self, bytes: &[u8]) -> bool {
+        let own = self.settings.command.head_id;
+        let is_own = |(header, _): (Header, _)| header.head_id == own;
+        self.cutter.accepts(bytes, |frame| Header::decode(frame, Some(Model::Head881)).is_ok_and(is_own))
+    }
+
     fn due(&self) -> Option<MonoNs> {
         let next = self.asked.map_or(self.next_at, |(_, at)| at + self.timeout);
         Some(self.cutter.settles().map_or(next, |settles| next.min(settles)))
@@ -285,7 +291,7 @@ impl Driver for HeadDriver {
         let good_frames = self.cutter.counts().good_frames;
         let id = self.settings.command.head_id;
         let identity = (good_frames > 0).then(|| format!("Imagenex 881 family, head {id:#04x}"));
-        DeviceHealth { good_frames, identity, complaint: self.complaint() }
+        DeviceHealth { good_frames, identity, complaint: self.complaint(), ..DeviceHealth::default() }
     }
 }
 

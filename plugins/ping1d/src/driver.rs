@@ -214,6 +214,10 @@ impl Driver for PingDriver {
         }
     }
 
+    fn accepts(&self, bytes: &[u8]) -> bool {
+        self.cutter.accepts(bytes, |_| true)
+    }
+
     fn due(&self) -> Option<MonoNs> {
         let next = match self.asked {
             Some((asked, at)) => at + self.timeout(asked),
@@ -248,7 +252,7 @@ impl Driver for PingDriver {
             )
         });
         let good_frames = self.cutter.counts().good_frames;
-        DeviceHealth { good_frames, identity, complaint: self.complaint() }
+        DeviceHealth { good_frames, identity, complaint: self.complaint(), ..DeviceHealth::default() }
     }
 }
 

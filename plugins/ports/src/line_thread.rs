@@ -15,7 +15,8 @@ use headrace_sensor::driver::{DeviceHealth, Driver, Wire};
 
 use crate::clock;
 use crate::diagnosis;
-use crate::lines::{self, Line, READ_BYTES};
+use crate::lines::{self, Line, READ_BYTES, Senders};
+use crate::open_error::OpenError;
 use crate::status::{Board, LineHistory, Phase, Status};
 
 /// Reconnect backoff: initial and maximum pause; shorter for local ports, which are cheap to retry.
@@ -54,7 +55,10 @@ pub(crate) struct Common {
 /// A line and the devices on it.
 pub(crate) struct LineThread {
     connect: Result<Connect, ConnectError>,
+    /// Those of the lines before this one, in the order of the vehicle file.
+    before: Vec<Connect>,
     devices: Vec<AttachedState>,
+    senders: Senders,
     common: Common,
 }
 
@@ -111,6 +115,7 @@ impl Wire for Ends<'_> {
 impl LineThread {
     pub(crate) fn new(
         connect: Result<Connect, ConnectError>,
+        before: Vec<Connect>,
         attached: Vec<Attached>,
         common: Common,
     ) -> Self {
@@ -124,7 +129,8 @@ impl LineThread {
             last_bytes: now,
             last_frame: now,
         };
-        Self { connect, devices: attached.into_iter().map(device).collect(), common }
+        let (devices, senders) = (attached.into_iter().map(device).collect(), Senders::default());
+        Self { connect, before, devices, senders, common }
     }
 
     /// Runs until stopped; returns each sensor's line history.
@@ -141,7 +147,7 @@ impl LineThread {
                     self.wait(LONGEST_PAUSE);
                     continue;
                 }
-                Ok(connect) => match lines::open(&connect) {
+                Ok(connect) => match self.open(&connect) {
                     Err(trouble) => {
                         tracing::debug!(%trouble, "port not opened");
                         self.say_all(Phase::Closed, &trouble.to_string());
@@ -175,7 +181,21 @@ impl LineThread {
             self.wait(pause);
             pause = (pause + pause).min(self.longest_pause());
         }
-        self.devices.into_iter().map(|device| (device.attached.source, device.history)).collect()
+        let strangers = self.senders.strangers.messages();
+        let history = |mut device: AttachedState| {
+            let own = device.attached.driver.health().strangers.messages();
+            device.history.strangers = strangers + own;
+            (device.attached.source, device.history)
+        };
+        self.devices.into_iter().map(history).collect()
+    }
+
+    /// Opens the line, unless its device is that of a line before it.
+    fn open(&self, connect: &Connect) -> Result<Box<dyn Line>, OpenError> {
+        match self.before.iter().find(|before| lines::same_device(before, connect)) {
+            Some(other) => Err(OpenError::same_device(connect, other)),
+            None => lines::open(connect),
+        }
     }
 
     fn longest_pause(&self) -> DurNs {
@@ -232,7 +252,11 @@ impl LineThread {
         let mut knock_at = opened + KNOCK_PERIOD;
         while !self.stopping() {
             let wait = self.wait_for(clock::now());
-            if let Some((received, count)) = line.read(wait, &mut buffer)? {
+            let devices = &self.devices;
+            let is_valid = |bytes: &[u8]| devices.iter().any(|device| device.attached.driver.accepts(bytes));
+            if let Some((received, count)) =
+                line.read_device(wait, &mut buffer, &mut self.senders, &is_valid)?
+            {
                 let bytes = buffer.get(..count).unwrap_or_default();
                 self.heard(line, received, bytes)?;
                 knock_at = received + KNOCK_PERIOD;
@@ -328,7 +352,8 @@ impl LineThread {
     /// Updates the devices' statuses; the line's own complaint overrides them.
     fn look(&mut self, complaint: Option<&str>, now: MonoNs) {
         for device in &mut self.devices {
-            let judged = device.judge(now);
+            let (phase, words) = device.judge(now);
+            let judged = (phase, with_senders(words, phase, &self.senders, device.attached.driver.as_ref()));
             if complaint.is_some() {
                 // The fault is the line's: restart the device's silence timeout.
                 (device.last_bytes, device.last_frame) = (now, now);
@@ -337,6 +362,14 @@ impl LineThread {
             device.say(&self.common.board, now, phase, &words);
         }
     }
+}
+
+/// A status with who is heard, where that isn't a matter of course, and who isn't.
+fn with_senders(words: String, phase: Phase, senders: &Senders, driver: &dyn Driver) -> String {
+    let from = senders.believed.filter(|_| phase == Phase::Running).map(|sender| format!("from {sender}"));
+    let parts = [(!words.is_empty()).then_some(words), from, senders.strangers.words()];
+    let parts = parts.into_iter().chain([driver.health().strangers.words()]).flatten();
+    parts.collect::<Vec<_>>().join("; ")
 }
 
 impl Common {
@@ -355,7 +388,7 @@ impl AttachedState {
     /// Health of the device, with the reason.
     fn judge(&mut self, now: MonoNs) -> (Phase, String) {
         let silence_timeout = self.attached.driver.silence_timeout();
-        let DeviceHealth { good_frames, identity, complaint } = self.attached.driver.health();
+        let DeviceHealth { good_frames, identity, complaint, .. } = self.attached.driver.health();
         if good_frames != self.frames {
             self.frames = good_frames;
             // Not `now`: the silence counts from the last bytes.

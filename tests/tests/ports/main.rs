@@ -16,3 +16,5 @@ mod rehearsal;
 #[cfg(target_os = "linux")]
 mod run_ports;
 mod splits;
+#[cfg(unix)]
+mod who_speaks;

@@ -72,6 +72,13 @@ impl<F, const N: usize> Framed<F, N> {
     }
 }
 
+impl<F, const N: usize> Framed<F, N> {
+    /// The format.
+    pub fn framing(&self) -> &F {
+        &self.framing
+    }
+}
+
 /// The incomplete frame and the counters.
 impl<F, const N: usize> Stateful for Framed<F, N> {
     fn save(&self, to: &mut Saver) {

@@ -65,7 +65,8 @@ impl LineClock {
         if let Some(free) = self.parts.get_mut(self.len) {
             *free = part;
             self.len += 1;
-        } else if let [.., before, last] = &mut self.parts {
+        } else {
+            let [.., before, last] = &mut self.parts;
             before.bytes += last.bytes;
             *last = part;
         }

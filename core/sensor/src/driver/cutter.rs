@@ -74,6 +74,14 @@ impl<F: Framing, const N: usize> Cutter<F, N> {
         (!self.settled && !self.pending.is_empty()).then(|| self.last + self.silence + DurNs(1))
     }
 
+    /// Whether these bytes, on their own, hold a frame that is `one_of_its`.
+    pub fn accepts(&self, bytes: &[u8], one_of_its: impl Fn(&[u8]) -> bool) -> bool {
+        let (mut codec, mut found) = (Framed::<F, N>::new(*self.codec.framing()), false);
+        codec.push_frames(bytes, |frame, _| found |= one_of_its(frame));
+        codec.flush_frames(|frame, _| found |= one_of_its(frame));
+        found
+    }
+
     /// Counters so far.
     pub fn counts(&self) -> CodecCounts {
         self.codec.counts()
