@@ -182,6 +182,10 @@ impl Driver for Timed {
         self.with(wire, |driver, wire| driver.heard(received, bytes, wire));
     }
 
+    fn accepts(&self, bytes: &[u8]) -> bool {
+        self.driver.accepts(bytes)
+    }
+
     fn due(&self) -> Option<MonoNs> {
         self.driver.due()
     }

@@ -289,6 +289,7 @@ impl Dive {
                 opened: history.opened,
                 lost: history.lost,
                 dropped_packets: history.dropped,
+                strangers: history.strangers,
                 status: history.last,
             });
         }

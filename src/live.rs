@@ -121,11 +121,21 @@ fn required(args: &Run, vehicle: &VehicleConfig) -> Result<Vec<usize>, Failure> 
 /// A thread per connection, with the drivers of the sensors on it.
 fn supervisor(dive: &mut Dive, vehicle: &VehicleConfig, begun: MonoNs) -> Result<Supervisor, Failure> {
     let mut programs = vehicle.programs().map_err(Failure::Plan)?.into_iter();
+    let excluded = vehicle.excluded_from_lines();
     let mut served = Vec::new();
     for (source, (_, connect)) in connections(vehicle).into_iter().enumerate() {
         let Some(device) = vehicle.sensors.get(source) else { continue };
         let head = device.head().and_then(|_| programs.next());
         let Some(port) = dive.armed.take_port(source) else { continue };
+        let excluded = excluded.iter().find(|(number, _)| *number == source).map(|(_, why)| why.clone());
+        let connect = match (connect, excluded) {
+            (Ok(connect), Some(problem)) => Err(ConnectError {
+                text: connect.to_string(),
+                problem,
+                allowed: "headrace check names all such lines".to_owned(),
+            }),
+            (connect, _) => connect,
+        };
         served.push(Connection {
             source,
             connect,

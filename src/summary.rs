@@ -75,6 +75,15 @@ pub(crate) fn summary(report: &Report, columns: Option<usize>) -> String {
     for (count, what) in lost.iter().filter(|(count, _)| *count > 0) {
         line(format!("  {count} {what}"));
     }
+    for source in &report.sources {
+        let strangers = source.line.as_ref().map_or(0, |line| line.strangers);
+        if strangers > 0 {
+            line(format!(
+                "  {strangers} messages on the line of {} came from others and weren't used",
+                source.id
+            ));
+        }
+    }
     for loss in report.log.iter().flat_map(|log| &log.losses) {
         line(format!("  LOST: {loss}"));
     }

@@ -100,7 +100,7 @@ fn connect(text: &str, number: usize) -> String {
     let connect = match Connect::parse(text) {
         Ok(Connect::Tcp { address }) => Connect::Tcp { address: host(&address) },
         Ok(Connect::Udp { address }) => Connect::Udp { address: host(&address) },
-        Ok(Connect::UdpListen { address }) => Connect::UdpListen { address: host(&address) },
+        Ok(Connect::UdpListen { address, .. }) => Connect::UdpListen { address: host(&address), from: None },
         Ok(Connect::Serial { baud, .. }) => {
             Connect::Serial { port: SerialPort::Path(format!("/dev/ttyUSB{number}")), baud }
         }

@@ -50,10 +50,13 @@ pub enum Connect {
         /// Host name or address, and port.
         address: String,
     },
-    /// `udp-listen:ADDRESS:PORT`: a local port that the device sends to.
+    /// `udp-listen:ADDRESS:PORT[?from=HOST[:PORT]]`: a local port that the device sends to. Only one sender is heard: the one
+    /// of `from`, or the first whose message the device's driver accepts.
     UdpListen {
         /// Local address and port.
         address: String,
+        /// Host of the device, perhaps with its port; of any host if there is none.
+        from: Option<String>,
     },
     /// `can:INTERFACE`.
     Can {
@@ -114,9 +117,12 @@ impl Connect {
             "udp" => host_and_port(rest)
                 .map(|address| Self::Udp { address })
                 .map_err(|problem| refused(&problem, "allowed is udp:192.168.2.2:9090")),
-            "udp-listen" => host_and_port(rest)
-                .map(|address| Self::UdpListen { address })
-                .map_err(|problem| refused(&problem, "allowed is udp-listen:0.0.0.0:14550")),
+            "udp-listen" => udp_listen(rest).map_err(|problem| {
+                refused(
+                    &problem,
+                    "allowed is udp-listen:0.0.0.0:14550 or udp-listen:0.0.0.0:14550?from=192.168.2.2",
+                )
+            }),
             "can" => can_interface(rest)
                 .map(|interface| Self::Can { interface })
                 .map_err(|problem| refused(&problem, "allowed is can:can0")),
@@ -192,7 +198,10 @@ impl fmt::Display for Connect {
             Self::Serial { port: SerialPort::Usb(usb), baud } => write!(f, "serial:usb:{usb}?baud={baud}"),
             Self::Tcp { address } => write!(f, "tcp:{address}"),
             Self::Udp { address } => write!(f, "udp:{address}"),
-            Self::UdpListen { address } => write!(f, "udp-listen:{address}"),
+            Self::UdpListen { address, from } => {
+                write!(f, "udp-listen:{address}")?;
+                from.as_ref().map_or(Ok(()), |from| write!(f, "?from={from}"))
+            }
             Self::Can { interface } => write!(f, "can:{interface}"),
             Self::Hid(usb) => write!(f, "hid:{usb}"),
             Self::I2c { bus, address } => write!(f, "i2c:{bus}:{address:#04x}"),
@@ -237,6 +246,22 @@ fn usb(rest: &str) -> Result<UsbIdentity, String> {
         return Err("the serial number is empty; leave its colon out for any".to_owned());
     }
     Ok(UsbIdentity { vendor, product, serial })
+}
+
+fn udp_listen(rest: &str) -> Result<Connect, String> {
+    let Some((address, option)) = rest.split_once('?') else {
+        return host_and_port(rest).map(|address| Connect::UdpListen { address, from: None });
+    };
+    let from =
+        option.strip_prefix("from=").ok_or_else(|| format!("{option:?} is no option; there is from=HOST"))?;
+    if from.is_empty() {
+        return Err("from= names no host; leave it out for the first valid sender".to_owned());
+    }
+    // A bare IPv6 address has colons, and no port.
+    if from.matches(':').count() == 1 {
+        host_and_port(from).map_err(|problem| format!("from={from:?}: {problem}"))?;
+    }
+    Ok(Connect::UdpListen { address: host_and_port(address)?, from: Some(from.to_owned()) })
 }
 
 fn host_and_port(rest: &str) -> Result<String, String> {
@@ -290,6 +315,9 @@ mod tests {
             "tcp:192.168.0.5:4040",
             "udp:blueos.local:9090",
             "udp-listen:0.0.0.0:14550",
+            "udp-listen:0.0.0.0:14550?from=192.168.2.2",
+            "udp-listen:0.0.0.0:14550?from=192.168.2.2:14551",
+            "udp-listen:[::]:14550?from=fe80::1",
             "can:vcan0",
             "hid:1209:0001",
             "hid:1209:0001:COUNTER-7",
@@ -314,6 +342,10 @@ mod tests {
             ("tcp::80", "no host", "tcp:192.168.0.5:4040"),
             ("udp:host:0", "port \"0\"", "udp:192.168.2.2:9090"),
             ("udp:host:70000", "port \"70000\"", "udp:192.168.2.2:9090"),
+            ("udp-listen:0.0.0.0:14550?to=a", "\"to=a\" is no option", "?from=192.168.2.2"),
+            ("udp-listen:0.0.0.0:14550?from=", "names no host", "?from=192.168.2.2"),
+            ("udp-listen:0.0.0.0:14550?from=a:b", "port \"b\"", "?from=192.168.2.2"),
+            ("udp-listen:0.0.0.0?from=a", "no port", "?from=192.168.2.2"),
             ("can:", "\"\" is no name", "can:can0"),
             ("can:an interface", "is no name", "can:can0"),
             ("hid:1209", "no product id", "hid:1209:0001"),

@@ -5,9 +5,11 @@
 
 mod cutter;
 mod listener;
+mod strangers;
 
 pub use cutter::{Cutter, Piece};
 pub use listener::{Judge, Listener, MessageListener};
+pub use strangers::Strangers;
 
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sampling::head::HeadProgram;
@@ -61,6 +63,8 @@ pub struct DeviceHealth {
     pub identity: Option<String>,
     /// Description of a fault, with its remedy.
     pub complaint: Option<String>,
+    /// Messages on its line by others that pass for it.
+    pub strangers: Strangers,
 }
 
 /// Host side of one device's line.
@@ -74,6 +78,10 @@ pub trait Driver: Send {
 
     /// Received bytes, the first of them at `received`. Bytes that aren't delivered are lost to the loop and to the log.
     fn heard(&mut self, received: MonoNs, bytes: &[u8], wire: &mut dyn Wire);
+
+    /// Whether these bytes, on their own, hold a message that this device could have sent. On a line that anybody may send
+    /// to, the sender of the first such bytes is the device from then on, and others aren't heard.
+    fn accepts(&self, bytes: &[u8]) -> bool;
 
     /// Time of the next [`Driver::wake`], if any.
     fn due(&self) -> Option<MonoNs>;

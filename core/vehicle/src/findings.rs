@@ -58,6 +58,22 @@ impl VehicleConfig {
         found
     }
 
+    /// Sensors that can't have the line of one before them, with the reason.
+    pub fn excluded_from_lines(&self) -> Vec<(usize, String)> {
+        let mut found = Vec::new();
+        let mut before: Vec<(usize, Connect)> = Vec::new();
+        for (number, config) in self.sensor_configs.iter().enumerate() {
+            let Ok(connect) = Connect::parse(&config.connect) else { continue };
+            let mut excluded =
+                before.iter().filter_map(|(other, theirs)| self.exclude(*other, theirs, number, &connect));
+            let error =
+                excluded.find(|(grade, _)| *grade == Grade::Error).map(|(_, problem)| (number, problem));
+            found.extend(error);
+            before.push((number, connect));
+        }
+        found
+    }
+
     /// Each sensor's connection that doesn't parse, or that another one's excludes.
     fn connections(&self) -> Vec<Finding> {
         let mut found = Vec::new();
@@ -213,7 +229,7 @@ fn same_end(a: &Connect, b: &Connect) -> Option<&'static str> {
         }
         (Connect::Tcp { address: a }, Connect::Tcp { address: b }) => (a == b).then_some("TCP address"),
         (Connect::Udp { address: a }, Connect::Udp { address: b })
-        | (Connect::UdpListen { address: a }, Connect::UdpListen { address: b }) => {
+        | (Connect::UdpListen { address: a, .. }, Connect::UdpListen { address: b, .. }) => {
             (a == b).then_some("UDP address")
         }
         (Connect::Can { interface: a }, Connect::Can { interface: b }) => (a == b).then_some("CAN interface"),

@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::report::{Against, LineCodec, Lines, Velocity};
 
-/// Maximum gap within a line: covers a TCP retransmission, whose timer is at least 200 ms.
+/// Longest usual gap within a line: covers a TCP retransmission, whose timer is at least 200 ms.
 const SILENCE: DurNs = DurNs::from_millis(1000);
 
 /// Least number of beams: a velocity has three components.

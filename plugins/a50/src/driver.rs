@@ -1,19 +1,89 @@
 //! Host side of the connection: it only listens.
 
-use headrace_sensor::driver::{Carrier, Listener};
-use headrace_sensor::geometry::time::DurNs;
+use headrace_sensor::codec::Framing as _;
+use headrace_sensor::driver::{Carrier, Cutter, DeviceHealth, Driver, Wire};
+use headrace_sensor::geometry::time::{DurNs, MonoNs};
 
-use crate::report::{Lines, MAX_LINE_BYTES};
+use crate::report::{Lines, MAX_LINE_BYTES, format_of};
 
 /// Supported carriers.
 pub const CARRIERS: [Carrier; 2] = [Carrier::Tcp, Carrier::Udp];
 
-/// Maximum gap within a line.
+/// Longest usual gap within a line.
 const SILENCE: DurNs = DurNs::from_millis(200);
-/// Silence timeout: without bottom lock the device still reports several times a second.
-const PATIENCE: DurNs = DurNs::from_millis(5_000);
+/// Lines in a row without a velocity from which the device is said not to be understood; it reports several times a second.
+const NOT_UNDERSTOOD_FROM: u32 = 20;
 
 /// Driver of an A50.
-pub fn listener() -> Listener<Lines, MAX_LINE_BYTES> {
-    Listener::new(Lines, SILENCE, PATIENCE)
+pub struct A50Driver {
+    cutter: Cutter<Lines, MAX_LINE_BYTES>,
+    velocities: u64,
+    /// Lines since the last velocity, and their format, if they name one.
+    others: u32,
+    format: Option<String>,
+}
+
+impl A50Driver {
+    /// New driver.
+    pub fn new() -> Self {
+        Self { cutter: Cutter::new(Lines, SILENCE), velocities: 0, others: 0, format: None }
+    }
+}
+
+impl Default for A50Driver {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Driver for A50Driver {
+    fn opened(&mut self, _: MonoNs, _: &mut dyn Wire) {
+        (self.others, self.format) = (0, None);
+    }
+
+    fn closed(&mut self, wire: &mut dyn Wire) {
+        self.cutter.flush(&mut |piece| wire.deliver(piece.received, piece.bytes));
+    }
+
+    fn heard(&mut self, received: MonoNs, bytes: &[u8], wire: &mut dyn Wire) {
+        let Self { cutter, velocities, others, format } = self;
+        cutter.push(received, bytes, &mut |piece| {
+            wire.deliver(piece.received, piece.bytes);
+            if piece.is_frame && Lines.read(piece.bytes).is_some() {
+                *velocities += 1;
+                *others = 0;
+            } else if let Some(named) = format_of(piece.bytes) {
+                // A report that lacks a field is no frame; what it calls itself is still to be read.
+                *others = others.saturating_add(1);
+                *format = Some(named);
+            } else if piece.is_frame {
+                *others = others.saturating_add(1);
+            }
+        });
+    }
+
+    fn accepts(&self, bytes: &[u8]) -> bool {
+        self.cutter.accepts(bytes, |_| true)
+    }
+
+    fn due(&self) -> Option<MonoNs> {
+        self.cutter.settles()
+    }
+
+    fn wake(&mut self, now: MonoNs, wire: &mut dyn Wire) {
+        self.heard(now, &[], wire);
+    }
+
+    fn health(&self) -> DeviceHealth {
+        let complaint = (self.others >= NOT_UNDERSTOOD_FROM).then(|| {
+            let what = match &self.format {
+                Some(format) => {
+                    format!("sends lines of format {format} without a velocity that is understood")
+                }
+                None => "sends lines without a velocity, and without their format".to_owned(),
+            };
+            format!("{what}; json_v3 to json_v3.3 are: see the device's firmware")
+        });
+        DeviceHealth { good_frames: self.velocities, complaint, ..DeviceHealth::default() }
+    }
 }

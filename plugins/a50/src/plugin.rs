@@ -67,6 +67,6 @@ impl Device for A50 {
     }
 
     fn driver(&self, _: &DriverSetup) -> Box<dyn Driver> {
-        Box::new(driver::listener())
+        Box::new(driver::A50Driver::new())
     }
 }

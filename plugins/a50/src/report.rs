@@ -233,6 +233,21 @@ fn skip(next: u8, lexer: &mut SliceLexer<'_>, depth: usize) -> Result<(), Error>
     }
 }
 
+/// Longest name of a format that is told.
+const MAX_FORMAT_BYTES: usize = 24;
+
+/// What a line, or a part of one, names as its format, whether it is understood or not. Letters, digits, `_` and `.` only:
+/// it is shown to people.
+pub(crate) fn format_of(bytes: &[u8]) -> Option<String> {
+    const KEY: &[u8] = b"\"format\"";
+    let at = bytes.windows(KEY.len()).position(|window| window == KEY)?;
+    let value = bytes.get(at + KEY.len()..)?.iter().skip_while(|byte| matches!(byte, b' ' | b':'));
+    let name: Vec<u8> =
+        value.skip(1).copied().take_while(|byte| *byte != b'"').take(MAX_FORMAT_BYTES).collect();
+    let is_plain = |byte: &u8| byte.is_ascii_alphanumeric() || matches!(byte, b'_' | b'.');
+    (!name.is_empty() && name.iter().all(is_plain)).then(|| String::from_utf8_lossy(&name).into_owned())
+}
+
 /// Framing of lines in a byte stream. A velocity report that lacks a field is a bad line.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Lines;

@@ -5,6 +5,7 @@ use headrace_sensor::config::Document;
 use headrace_sensor::device::{
     Decoder as _, Device, DeviceKind as _, Direction, Emulated, EmulatorSetup, Sense,
 };
+use headrace_sensor::driver::{Driver as _, Wire};
 use headrace_sensor::geometry::frames::{Mount, Rot, Sensor, Vec3};
 use headrace_sensor::geometry::site::Site;
 use headrace_sensor::geometry::time::{DurNs, MonoNs};
@@ -13,6 +14,7 @@ use headrace_sensor::reading::{Decoded, Packet, Reading};
 
 use crate::A50Kind;
 use crate::decoder::{A50Decoder, Meaning, Withheld};
+use crate::driver::A50Driver;
 use crate::report::tests::EXAMPLE;
 use crate::report::{Against, Velocity};
 
@@ -172,4 +174,46 @@ fn wrong_keys_are_named() {
     assert!(error("max_speed_mps = 20\n").contains("from 0.1 to 10"));
     assert!(error("min_beams = 3\n").contains("is not a key here"));
     assert!(configured("fom_max_mps = 0.05\nmax_speed_mps = 1.5\nrate_hz = 10\n").is_ok());
+}
+
+struct Nowhere;
+
+impl Wire for Nowhere {
+    fn send(&mut self, _: &[u8]) {}
+
+    fn exchange(&mut self, _: &[u8], _: DurNs, _: usize) {}
+
+    fn deliver(&mut self, _: MonoNs, _: &[u8]) {}
+}
+
+#[test]
+fn a_format_that_is_not_understood_is_named_until_a_velocity_comes() {
+    // Reports of older firmware have no type; a later one might call its fields something else.
+    let older = EXAMPLE.replace("json_v3.2", "json_v1").replace("\"type\": \"velocity\", ", "");
+    let renamed = EXAMPLE.replace("json_v3.2", "json_v9").replace("\"vx\"", "\"v_x\"");
+    for (line, format) in [(older, "json_v1"), (renamed, "json_v9")] {
+        assert_ne!(line, EXAMPLE);
+        let mut driver = A50Driver::new();
+        driver.opened(START, &mut Nowhere);
+        for _ in 0..20 {
+            driver.heard(START, line.as_bytes(), &mut Nowhere);
+        }
+        let health = driver.health();
+        let complaint = health.complaint.unwrap();
+        assert!(complaint.contains(&format!("format {format} ")), "{complaint}");
+        assert_eq!(health.good_frames, 0, "it isn't running");
+        driver.heard(START, EXAMPLE.as_bytes(), &mut Nowhere);
+        assert_eq!((driver.health().complaint, driver.health().good_frames), (None, 1));
+    }
+}
+
+#[test]
+fn a_device_that_sends_no_velocity_at_all_is_said_to() {
+    let mut driver = A50Driver::new();
+    driver.heard(START, "{\"a\":1}\n".repeat(20).as_bytes(), &mut Nowhere);
+    assert!(driver.health().complaint.unwrap().contains("without a velocity, and without their format"));
+    let mut driver = A50Driver::new();
+    let with_escapes = "{\"format\":\"\u{1b}[31m\"}\n";
+    driver.heard(START, with_escapes.repeat(20).as_bytes(), &mut Nowhere);
+    assert!(!driver.health().complaint.unwrap_or_default().contains('\u{1b}'));
 }

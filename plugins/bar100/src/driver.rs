@@ -77,6 +77,10 @@ impl Driver for Bar100Driver {
         self.answered(Transaction::decode(bytes), received);
     }
 
+    fn accepts(&self, bytes: &[u8]) -> bool {
+        Transaction::decode(bytes).is_ok()
+    }
+
     fn due(&self) -> Option<MonoNs> {
         Some(self.next_at)
     }
@@ -96,7 +100,7 @@ impl Driver for Bar100Driver {
     fn health(&self) -> DeviceHealth {
         let identity = (self.cell == CALIBRATION_CELLS.len()).then(|| "Keller LD pressure sensor".to_owned());
         let complaint = self.complaint.as_ref().map(TransactionError::to_string);
-        DeviceHealth { good_frames: self.good_frames, identity, complaint }
+        DeviceHealth { good_frames: self.good_frames, identity, complaint, ..DeviceHealth::default() }
     }
 }
 

@@ -18,7 +18,7 @@ use crate::settings::Settings;
 /// Supported carriers: Ethernet for the 881L, RS-485 or RS-232 for the 881A.
 pub const CARRIERS: [Carrier; 3] = [Carrier::Tcp, Carrier::Serial, Carrier::Udp];
 
-/// Maximum gap within a return.
+/// Longest usual gap within a return.
 const SILENCE: DurNs = DurNs::from_millis(100);
 /// Allowance for the head's own processing in the answer timeout.
 const LEISURE: DurNs = DurNs::from_millis(60);
@@ -262,9 +262,15 @@ impl Driver for HeadDriver {
         }
     }
 
+    fn accepts(&self, bytes: &[u8]) -> bool {
+        let own = self.settings.command.head_id;
+        let is_own = |(header, _): (Header, _)| header.head_id == own;
+        self.cutter.accepts(bytes, |frame| Header::decode(frame, Some(Model::Head881)).is_ok_and(is_own))
+    }
+
     fn due(&self) -> Option<MonoNs> {
         let next = self.asked.map_or(self.next_at, |(_, at)| at + self.timeout);
-        Some(self.cutter.gives_up().map_or(next, |gives_up| next.min(gives_up)))
+        Some(self.cutter.settles().map_or(next, |settles| next.min(settles)))
     }
 
     fn wake(&mut self, now: MonoNs, wire: &mut dyn Wire) {
@@ -285,7 +291,7 @@ impl Driver for HeadDriver {
         let good_frames = self.cutter.counts().good_frames;
         let id = self.settings.command.head_id;
         let identity = (good_frames > 0).then(|| format!("Imagenex 881 family, head {id:#04x}"));
-        DeviceHealth { good_frames, identity, complaint: self.complaint() }
+        DeviceHealth { good_frames, identity, complaint: self.complaint(), ..DeviceHealth::default() }
     }
 }
 

@@ -25,7 +25,7 @@ const NAME: &str = "imagenex881";
 /// Room for several seconds of the longest returns.
 const RING_BYTES: usize = 1 << 17;
 
-/// Maximum gap within a return, after which an unfinished one is dropped.
+/// Longest usual gap within a return, after which an unfinished one is dropped.
 const SILENCE: DurNs = DurNs::from_millis(100);
 
 /// The Imagenex 881 device kind.

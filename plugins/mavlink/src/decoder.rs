@@ -10,13 +10,13 @@ use headrace_sensor::stateful;
 use serde::{Deserialize, Serialize};
 
 use crate::dialect::ATTITUDE_DATA;
-use crate::frame::{Frame, Frames, MavlinkCodec};
+use crate::frame::{Frame, Frames, MavlinkCodec, is_autopilots_heartbeat, system_of};
 use crate::message::{
     Distance, HECTOPASCAL, Imu, ImuMessage, MILLI_G_MPS2, MILLIRADPS, Message, Pressure, PressureMessage,
     to_ours,
 };
 
-/// Maximum gap within a frame: the longest takes 50 ms at 57,600 baud.
+/// Longest usual gap within a frame: the longest takes 50 ms at 57,600 baud.
 const SILENCE: DurNs = DurNs::from_millis(100);
 
 /// Tolerance of angle limits, for rounding.
@@ -30,7 +30,7 @@ const QUALITY_INVALID_PERCENT: u8 = 1;
 pub struct Meaning {
     /// Part of the vehicle.
     pub part: Part,
-    /// Accepted system id; `None` for any.
+    /// Accepted system id; `None` for that of the first autopilot heard.
     pub system_id: Option<u8>,
     /// Accepted component id; `None` for any.
     pub component_id: Option<u8>,
@@ -84,11 +84,13 @@ stateful!(MavlinkDecoder { state: codec, clock, state; });
 struct State {
     meaning: Meaning,
     boot: BootClock,
+    /// Accepted system id, once it is known.
+    system_id: Option<u8>,
     passed_over: u64,
     withheld: u64,
 }
 
-stateful!(State { state: boot, passed_over, withheld; fixed: meaning; });
+stateful!(State { state: boot, system_id, passed_over, withheld; fixed: meaning; });
 
 /// The autopilot's 32-bit millisecond clock, unwrapped.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
@@ -111,7 +113,8 @@ impl BootClock {
 impl MavlinkDecoder {
     /// New decoder.
     pub fn new(meaning: Meaning) -> Self {
-        let state = State { meaning, boot: BootClock::default(), passed_over: 0, withheld: 0 };
+        let system_id = meaning.system_id;
+        let state = State { meaning, boot: BootClock::default(), system_id, passed_over: 0, withheld: 0 };
         Self { codec: MavlinkCodec::default(), clock: LineClock::new(SILENCE), state }
     }
 
@@ -140,7 +143,7 @@ impl Decoder for MavlinkDecoder {
         self.codec.counts()
     }
 
-    /// Invalid values: angles beyond their range, non-finite numbers, pressure not above zero, contradictory limits.
+    /// Messages of the part from other systems. Invalid values: angles beyond their range, non-finite numbers, pressure not above zero, contradictory limits.
     fn withheld(&self) -> u64 {
         self.state.withheld
     }
@@ -148,10 +151,32 @@ impl Decoder for MavlinkDecoder {
 
 impl State {
     fn take(&mut self, frame: &Frame, sink: &mut dyn FnMut(Reading)) {
-        let Meaning { part, system_id, component_id, .. } = self.meaning;
-        let is_ours = system_id.is_none_or(|id| u32::from(id) == frame.header.system_id)
-            && component_id.is_none_or(|id| id == frame.header.component_id);
-        match (part, Message::of(frame).filter(|_| is_ours)) {
+        let before = self.passed_over;
+        let is_ours = self.system_id.is_none_or(|id| id == system_of(frame));
+        if is_ours {
+            self.take_own(frame, sink);
+        } else if self.is_of_part(frame) {
+            self.withheld += 1;
+        } else {
+            self.passed_over += 1;
+        }
+        // The driver delivers one system's messages only; in a log of another's the heartbeat may be missing.
+        if is_ours && (is_autopilots_heartbeat(frame) || self.passed_over == before) {
+            self.system_id = Some(system_of(frame));
+        }
+    }
+
+    /// Whether a frame would be this part's, whoever sends it.
+    fn is_of_part(&self, frame: &Frame) -> bool {
+        let mut same = Self { system_id: None, passed_over: 0, ..self.clone() };
+        same.take_own(frame, &mut |_| ());
+        same.passed_over == 0
+    }
+
+    fn take_own(&mut self, frame: &Frame, sink: &mut dyn FnMut(Reading)) {
+        let Meaning { part, component_id, .. } = self.meaning;
+        let is_component = component_id.is_none_or(|id| id == frame.header.component_id);
+        match (part, Message::of(frame).filter(|_| is_component)) {
             (Part::Imu { message }, Some(Message::Attitude(attitude))) => {
                 self.boot.note(attitude.time_boot_ms);
                 self.tell(self::attitude(&attitude), sink);

@@ -1,7 +1,8 @@
 //! Host side of a telemetry link: receives its part's messages and sends heartbeats.
 
+use headrace_sensor::codec::Framing as _;
 use headrace_sensor::device::Decoder as _;
-use headrace_sensor::driver::{Carrier, Cutter, DeviceHealth, Driver, Wire};
+use headrace_sensor::driver::{Carrier, Cutter, DeviceHealth, Driver, Strangers, Wire};
 use headrace_sensor::geometry::time::{DurNs, MonoNs};
 use headrace_sensor::reading::Packet;
 
@@ -9,12 +10,12 @@ use mavlink::{MAVLinkV2MessageRaw, MavHeader};
 
 use crate::decoder::{MavlinkDecoder, Meaning};
 use crate::dialect::{HEARTBEAT_DATA, MavAutopilot, MavComponent, MavModeFlag, MavState, MavType};
-use crate::frame::{Frames, MAX_FRAME_BYTES, encode};
+use crate::frame::{Frames, MAX_FRAME_BYTES, encode, is_autopilots_heartbeat, system_of};
 
 /// Supported carriers.
 pub const CARRIERS: [Carrier; 3] = [Carrier::Udp, Carrier::Tcp, Carrier::Serial];
 
-/// Maximum gap within a frame: the longest takes 50 ms at 57,600 baud.
+/// Longest usual gap within a frame: the longest takes 50 ms at 57,600 baud.
 const SILENCE: DurNs = DurNs::from_millis(100);
 /// Routers send only to active systems. Source: MAVLink, heartbeat protocol, once a second.
 const HEARTBEAT_PERIOD: DurNs = DurNs::from_millis(1_000);
@@ -22,7 +23,8 @@ const HEARTBEAT_PERIOD: DurNs = DurNs::from_millis(1_000);
 const COMPONENT_ID: u8 = MavComponent::MAV_COMP_ID_ONBOARD_COMPUTER as u8;
 const SYSTEM_ID: u8 = 1;
 
-/// Driver of a part. Other parts' messages aren't delivered: on a shared line each message is recorded once.
+/// Driver of a part. Other parts' messages aren't delivered: on a shared line each message is recorded once. Nor are those of
+/// other systems, or any before it is known which system is believed.
 pub struct MavlinkDriver {
     cutter: Cutter<Frames, MAX_FRAME_BYTES>,
     /// Separates the part's messages from others.
@@ -30,7 +32,9 @@ pub struct MavlinkDriver {
     own_frames: u64,
     next_at: MonoNs,
     sequence: u8,
-    system_id: u8,
+    /// The system that is believed: the configured one, or that of the first autopilot's heartbeat.
+    system_id: Option<u8>,
+    strangers: Strangers,
 }
 
 impl MavlinkDriver {
@@ -42,13 +46,14 @@ impl MavlinkDriver {
             own_frames: 0,
             next_at: MonoNs(0),
             sequence: 0,
-            system_id: meaning.system_id.unwrap_or(SYSTEM_ID),
+            system_id: meaning.system_id,
+            strangers: Strangers::default(),
         }
     }
 
     fn heartbeat(&mut self) -> MAVLinkV2MessageRaw {
         self.sequence = self.sequence.wrapping_add(1);
-        let system_id = u32::from(self.system_id);
+        let system_id = u32::from(self.system_id.unwrap_or(SYSTEM_ID));
         let header = MavHeader { system_id, component_id: COMPONENT_ID, sequence: self.sequence };
         let heartbeat = HEARTBEAT_DATA {
             mavtype: MavType::MAV_TYPE_ONBOARD_CONTROLLER,
@@ -71,8 +76,17 @@ impl Driver for MavlinkDriver {
     }
 
     fn heard(&mut self, received: MonoNs, bytes: &[u8], wire: &mut dyn Wire) {
-        let Self { cutter, decoder, own_frames, .. } = self;
+        let Self { cutter, decoder, own_frames, system_id, strangers, .. } = self;
         cutter.push(received, bytes, &mut |piece| {
+            if let Some(frame) = Frames.read(piece.bytes).filter(|_| piece.is_frame) {
+                if is_autopilots_heartbeat(&frame) {
+                    system_id.get_or_insert(system_of(&frame));
+                }
+                if *system_id != Some(system_of(&frame)) {
+                    strangers.note(1, &format!("system {}", system_of(&frame)));
+                    return;
+                }
+            }
             let before = decoder.passed_over();
             decoder.decode(Packet { received: piece.received, bytes: piece.bytes }, &mut |_| ());
             if !piece.is_frame || decoder.passed_over() == before {
@@ -82,8 +96,17 @@ impl Driver for MavlinkDriver {
         });
     }
 
+    fn accepts(&self, bytes: &[u8]) -> bool {
+        self.cutter.accepts(bytes, |frame| {
+            Frames.read(frame).is_some_and(|frame| match self.system_id {
+                Some(id) => id == system_of(&frame),
+                None => is_autopilots_heartbeat(&frame),
+            })
+        })
+    }
+
     fn due(&self) -> Option<MonoNs> {
-        Some(self.cutter.gives_up().map_or(self.next_at, |gives_up| self.next_at.min(gives_up)))
+        Some(self.cutter.settles().map_or(self.next_at, |settles| self.next_at.min(settles)))
     }
 
     fn wake(&mut self, now: MonoNs, wire: &mut dyn Wire) {
@@ -96,9 +119,20 @@ impl Driver for MavlinkDriver {
 
     fn health(&self) -> DeviceHealth {
         let others = self.cutter.counts().good_frames > 50 && self.own_frames == 0;
-        let complaint = others.then(|| {
-            "the autopilot speaks, but not of this part; see message and its stream rates".to_owned()
-        });
-        DeviceHealth { good_frames: self.own_frames, identity: None, complaint }
+        let strangers = self.strangers.clone();
+        let complaint = match self.system_id {
+            _ if !others => None,
+            None => Some(
+                "no autopilot's heartbeat has come; set system_id to whose messages are meant".to_owned(),
+            ),
+            Some(id) if strangers.messages() == self.cutter.counts().good_frames => {
+                Some(format!("nothing comes of system {id}; see system_id"))
+            }
+            Some(_) => Some(
+                "the autopilot speaks, but not of this part; see message and its stream rates".to_owned(),
+            ),
+        };
+        let identity = self.system_id.map(|id| format!("MAVLink system {id}"));
+        DeviceHealth { good_frames: self.own_frames, identity, complaint, strangers }
     }
 }

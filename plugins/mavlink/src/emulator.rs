@@ -5,10 +5,11 @@ use headrace_sensor::geometry::math;
 use headrace_sensor::geometry::time::{DurNs, MonoNs};
 use headrace_sensor::measurement::{Inertia, Measurement, Pressure as Felt, Sounding};
 
-use mavlink::MavHeader;
+use mavlink::{MAVLinkV2MessageRaw, MavHeader};
 
 use crate::decoder::{DistancePart, Meaning, Part};
-use crate::dialect::ATTITUDE_DATA;
+use crate::dialect::{ATTITUDE_DATA, HEARTBEAT_DATA, MavAutopilot, MavModeFlag, MavState, MavType};
+use crate::frame::encode;
 use crate::message::{Distance, HECTOPASCAL, Imu, MILLI_G_MPS2, MILLIRADPS, Message, Pressure, to_ours};
 
 /// Limits of an emulated distance sensor, cm: about those of a Ping1D.
@@ -17,6 +18,8 @@ const MOST_CM: u16 = 5000;
 /// Qualities with and without an echo.
 const QUALITY_HEARD_PERCENT: u8 = 100;
 const QUALITY_INVALID_PERCENT: u8 = 1;
+/// Source: MAVLink, heartbeat protocol, once a second.
+const HEARTBEAT_PERIOD: DurNs = DurNs::from_millis(1_000);
 /// Ten degrees Celsius.
 const TEMPERATURE_CDEGC: i16 = 1000;
 
@@ -30,6 +33,8 @@ pub struct AutopilotEmulator {
     device_per_site: f64,
     begun: u64,
     sequence: u8,
+    /// Time of the next heartbeat; `None` if no host hears them.
+    heartbeat_at: Option<MonoNs>,
 }
 
 impl AutopilotEmulator {
@@ -39,7 +44,9 @@ impl AutopilotEmulator {
             Part::Distance(part) => part.sound_speed_mps / setup.site.sound_speed_mps,
             _ => 1.0,
         };
-        Self { meaning, rate_hz, start: setup.start, device_per_site, begun: 0, sequence: 0 }
+        // A log has none: a part's driver records its own messages.
+        let heartbeat_at = (!setup.polled).then_some(setup.start);
+        Self { meaning, rate_hz, start: setup.start, device_per_site, begun: 0, sequence: 0, heartbeat_at }
     }
 
     fn begin_each<M: Measurement>(&mut self, until: MonoNs, due: &mut Vec<M>, new: impl Fn(MonoNs) -> M) {
@@ -54,13 +61,22 @@ impl AutopilotEmulator {
     }
 
     fn send(&mut self, at: MonoNs, message: &Message, line: LineSink<'_>) {
-        let header = MavHeader {
+        let came = at + self.meaning.latency;
+        if self.heartbeat_at.is_some_and(|due| at >= due) {
+            self.heartbeat_at = Some(at + HEARTBEAT_PERIOD);
+            line(Direction::Received, came, heartbeat(self.next_header()).raw_bytes());
+        }
+        line(Direction::Received, came, message.to_frame(self.next_header()).raw_bytes());
+    }
+
+    fn next_header(&mut self) -> MavHeader {
+        let sequence = self.sequence;
+        self.sequence = sequence.wrapping_add(1);
+        MavHeader {
             system_id: u32::from(self.meaning.system_id.unwrap_or(1)),
             component_id: self.meaning.component_id.unwrap_or(1),
-            sequence: self.sequence,
-        };
-        self.sequence = self.sequence.wrapping_add(1);
-        line(Direction::Received, at + self.meaning.latency, message.to_frame(header).raw_bytes());
+            sequence,
+        }
     }
 
     fn since_boot_us(&self, at: MonoNs) -> u64 {
@@ -144,6 +160,18 @@ impl Emulator<Sounding> for AutopilotEmulator {
         };
         self.send(sounding.at, &Message::Distance(distance), line);
     }
+}
+
+/// The heartbeat of an ArduSub.
+fn heartbeat(header: MavHeader) -> MAVLinkV2MessageRaw {
+    let heartbeat = HEARTBEAT_DATA {
+        mavtype: MavType::MAV_TYPE_SUBMARINE,
+        autopilot: MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA,
+        base_mode: MavModeFlag::empty(),
+        system_status: MavState::MAV_STATE_ACTIVE,
+        ..HEARTBEAT_DATA::DEFAULT
+    };
+    encode(header, &heartbeat)
 }
 
 /// Nearest value in the wire's range.

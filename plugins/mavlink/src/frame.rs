@@ -105,6 +105,24 @@ pub fn encode(header: MavHeader, message: &impl MessageData) -> MAVLinkV2Message
     frame
 }
 
+/// The sender's system id, a byte on the wire.
+pub(crate) fn system_of(frame: &Frame) -> u8 {
+    u8::try_from(frame.header.system_id).unwrap_or(u8::MAX)
+}
+
+/// True for the heartbeat of an autopilot: not of a ground station, a router or another onboard computer.
+/// Source: MAVLink, HEARTBEAT (custom mode of four bytes, then type and autopilot).
+pub(crate) fn is_autopilots_heartbeat(frame: &Frame) -> bool {
+    let [kind, autopilot] = match *frame.payload.as_slice() {
+        [_, _, _, _, kind, autopilot, ..] if frame.message_id == dialect::HEARTBEAT_DATA::ID => {
+            [kind, autopilot]
+        }
+        _ => return false,
+    };
+    kind != dialect::MavType::MAV_TYPE_GCS as u8
+        && autopilot != dialect::MavAutopilot::MAV_AUTOPILOT_INVALID as u8
+}
+
 /// Length of the frame at the front of `front` by its header; `None` if the header is incomplete.
 pub(crate) fn announced_bytes(front: &[u8]) -> Option<usize> {
     Header::of(front).map(|header| header.whole_bytes())

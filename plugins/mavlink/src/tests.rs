@@ -6,6 +6,7 @@ use headrace_sensor::config::Document;
 use headrace_sensor::device::{
     Decoder as _, Device, DeviceKind as _, Direction, Emulated, Emulator, EmulatorSetup, Sense,
 };
+use headrace_sensor::driver::{DriverSetup, Wire};
 use headrace_sensor::geometry::frames::{Mount, Rot, Sensor, Vec3};
 use headrace_sensor::geometry::math;
 use headrace_sensor::geometry::site::Site;
@@ -14,8 +15,8 @@ use headrace_sensor::measurement::{Inertia, Measurement, Pressure, Sounding};
 use headrace_sensor::reading::{Decoded, Level, Packet, Reading};
 
 use crate::decoder::{DistancePart, MavlinkDecoder, Meaning, Part};
-use crate::dialect::ATTITUDE_DATA;
-use crate::frame::without_identity;
+use crate::dialect::{ATTITUDE_DATA, HEARTBEAT_DATA, MavAutopilot, MavType};
+use crate::frame::{encode, without_identity};
 use crate::message::{Distance, ImuMessage, Message, Pressure as Told, PressureMessage};
 use crate::{MavHeader, MavlinkKind};
 
@@ -320,4 +321,93 @@ fn places_and_machine_numbers_go_and_readings_stay() {
     }
     let mut nothing = Vec::new();
     assert_eq!((without_identity(&first, &mut nothing), nothing), (Some(()), Vec::new()));
+}
+
+/// Collects what the driver delivers.
+#[derive(Default)]
+struct Delivered(Vec<u8>);
+
+impl Wire for Delivered {
+    fn send(&mut self, _: &[u8]) {}
+
+    fn exchange(&mut self, _: &[u8], _: DurNs, _: usize) {}
+
+    fn deliver(&mut self, _: MonoNs, bytes: &[u8]) {
+        self.0.extend_from_slice(bytes);
+    }
+}
+
+fn pressure_of(system_id: u32, absolute_hpa: f32) -> Vec<u8> {
+    let message = PressureMessage::Second;
+    let told = Message::Pressure(Told { message, time_boot_ms: 1, absolute_hpa, temperature_cdegc: 0 });
+    told.to_frame(MavHeader { system_id, component_id: 1, sequence: 0 }).raw_bytes().to_vec()
+}
+
+fn heartbeat_of(system_id: u32, mavtype: MavType, autopilot: MavAutopilot) -> Vec<u8> {
+    let heartbeat = HEARTBEAT_DATA { mavtype, autopilot, ..HEARTBEAT_DATA::DEFAULT };
+    encode(MavHeader { system_id, component_id: 1, sequence: 0 }, &heartbeat).raw_bytes().to_vec()
+}
+
+#[test]
+fn the_first_autopilot_heard_is_believed_and_others_are_counted() {
+    let autopilot = heartbeat_of(7, MavType::MAV_TYPE_SUBMARINE, MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA);
+    let station = heartbeat_of(255, MavType::MAV_TYPE_GCS, MavAutopilot::MAV_AUTOPILOT_INVALID);
+    let other = heartbeat_of(3, MavType::MAV_TYPE_SUBMARINE, MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA);
+    for (configured, believed) in [("", 7), ("system_id = 3\n", 3)] {
+        let device = configured_part(configured);
+        let mut driver = device.driver(&DriverSetup { begun: START, head: None });
+        let mut wire = Delivered::default();
+        assert_eq!(driver.accepts(&pressure_of(9, 1000.0)), false, "{configured}");
+        assert_eq!(driver.accepts(&station), false, "{configured}");
+        assert_eq!(driver.accepts(&autopilot), believed == 7);
+        assert_eq!(driver.accepts(&other), true);
+        driver.heard(START, &[station.clone(), pressure_of(9, 900.0)].concat(), &mut wire);
+        assert_eq!(wire.0, [], "nobody is known yet");
+        for _ in 0..100 {
+            let all = [autopilot.clone(), pressure_of(3, 800.0), pressure_of(7, 1100.0), other.clone()];
+            driver.heard(START, &all.concat(), &mut wire);
+        }
+        let own = pressure_of(believed, if believed == 7 { 1100.0 } else { 800.0 });
+        assert_eq!(wire.0, own.repeat(100), "{configured}");
+        let health = driver.health();
+        assert_eq!(health.strangers.messages(), 202, "{configured}");
+        assert_eq!(health.identity.unwrap(), format!("MAVLink system {believed}"));
+        let strangers = if believed == 7 { "255, system 9, system 3" } else { "255, system 9, system 7" };
+        assert_eq!(health.strangers.words().unwrap(), format!("not believed: system {strangers}"));
+    }
+}
+
+#[test]
+fn a_log_of_many_systems_gives_the_readings_of_one() {
+    let autopilot = heartbeat_of(7, MavType::MAV_TYPE_SUBMARINE, MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA);
+    for (first, believed) in [(autopilot, 1100.0), (Vec::new(), 800.0)] {
+        let mut decoder = decoder(PRESSURE);
+        let mut readings = decode(&mut decoder, START, &first);
+        for _ in 0..50 {
+            let line = [pressure_of(3, 800.0), pressure_of(7, 1100.0)].concat();
+            readings.extend(decode(&mut decoder, START, &line));
+        }
+        assert_eq!((readings.len(), decoder.withheld()), (50, 50));
+        for decoded in readings {
+            let Reading::Pressure(water) = decoded.reading else { panic!() };
+            assert!((water.pressure_pa - believed * 100.0).abs() < 1e-6, "{water:?}");
+        }
+    }
+}
+
+#[test]
+fn without_an_autopilots_heartbeat_or_of_another_system_it_is_said_what_is_missing() {
+    for (configured, words) in
+        [("", "no autopilot's heartbeat"), ("system_id = 3\n", "nothing comes of system 3")]
+    {
+        let device = configured_part(configured);
+        let mut driver = device.driver(&DriverSetup { begun: START, head: None });
+        driver.heard(START, &pressure_of(9, 900.0).repeat(60), &mut Delivered::default());
+        assert!(driver.health().complaint.unwrap().contains(words), "{configured}");
+        assert_eq!(driver.health().good_frames, 0);
+    }
+}
+
+fn configured_part(own: &str) -> Box<dyn Device> {
+    configured(&format!("part = \"pressure\"\n{own}")).unwrap()
 }

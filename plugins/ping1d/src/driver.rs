@@ -12,7 +12,7 @@ use crate::settings::{Polling, Settings};
 /// Supported carriers.
 pub const CARRIERS: [Carrier; 3] = [Carrier::Serial, Carrier::Udp, Carrier::Tcp];
 
-/// Maximum gap within a frame.
+/// Longest usual gap within a frame.
 const SILENCE: DurNs = DurNs::from_millis(50);
 /// Timeout of the answer to a setting or request. Source: Ping protocol, 50 ms; a bridge adds to it.
 const ANSWER_TIME: DurNs = DurNs::from_millis(150);
@@ -214,13 +214,17 @@ impl Driver for PingDriver {
         }
     }
 
+    fn accepts(&self, bytes: &[u8]) -> bool {
+        self.cutter.accepts(bytes, |_| true)
+    }
+
     fn due(&self) -> Option<MonoNs> {
         let next = match self.asked {
             Some((asked, at)) => at + self.timeout(asked),
             None if self.settings.polling == Polling::Asked => self.next_at.min(self.look_at),
             None => self.look_at,
         };
-        Some(self.cutter.gives_up().map_or(next, |gives_up| next.min(gives_up)))
+        Some(self.cutter.settles().map_or(next, |settles| next.min(settles)))
     }
 
     fn wake(&mut self, now: MonoNs, wire: &mut dyn Wire) {
@@ -248,7 +252,7 @@ impl Driver for PingDriver {
             )
         });
         let good_frames = self.cutter.counts().good_frames;
-        DeviceHealth { good_frames, identity, complaint: self.complaint() }
+        DeviceHealth { good_frames, identity, complaint: self.complaint(), ..DeviceHealth::default() }
     }
 }
 

@@ -17,7 +17,7 @@ use crate::settings::Settings;
 /// Listening range of an emulated device: up to the practical limit of a `Ping1D`.
 const SCAN: ScanRange = ScanRange { start_mm: 0, length_mm: 30_000 };
 
-/// Maximum gap within a frame.
+/// Longest usual gap within a frame.
 const SILENCE: DurNs = DurNs::from_millis(50);
 
 /// Broadcast device id.

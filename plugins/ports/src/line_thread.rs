@@ -17,7 +17,8 @@ use headrace_sensor::driver::{DeviceHealth, Driver, Wire};
 use crate::clock;
 use crate::diagnosis;
 use crate::host::Host;
-use crate::lines::{Line, READ_BYTES};
+use crate::lines::{self, Line, READ_BYTES, Senders};
+use crate::open_error::OpenError;
 use crate::status::{Board, LineHistory, Phase, Status};
 
 /// Reconnect backoff: initial and maximum pause; shorter for local ports, which are cheap to retry.
@@ -64,7 +65,10 @@ pub struct Common {
 /// A line and the devices on it.
 pub struct LineService {
     connect: Result<Connect, ConnectError>,
+    /// Those of the lines before this one, in the order of the vehicle file.
+    before: Vec<Connect>,
     devices: Vec<AttachedState>,
+    senders: Senders,
     common: Common,
     state: LineState,
     /// Pause before the next attempt to open it.
@@ -137,8 +141,13 @@ impl Wire for Ends<'_> {
 }
 
 impl LineService {
-    /// A line that isn't open yet.
-    pub fn new(connect: Result<Connect, ConnectError>, attached: Vec<Attached>, common: Common) -> Self {
+    /// A line that isn't open yet. `before` are those of the lines before it: of two that lead to one device this one isn't opened.
+    pub fn new(
+        connect: Result<Connect, ConnectError>,
+        before: Vec<Connect>,
+        attached: Vec<Attached>,
+        common: Common,
+    ) -> Self {
         let now = common.host.now();
         let device = |attached| AttachedState {
             attached,
@@ -149,9 +158,9 @@ impl LineService {
             last_bytes: now,
             last_frame: now,
         };
-        let devices = attached.into_iter().map(device).collect();
+        let (devices, senders) = (attached.into_iter().map(device).collect(), Senders::default());
         let state = LineState::Closed { until: now };
-        Self { connect, devices, common, state, pause: FIRST_PAUSE }
+        Self { connect, before, devices, senders, common, state, pause: FIRST_PAUSE }
     }
 
     /// Runs until stopped; returns each sensor's line history.
@@ -205,7 +214,21 @@ impl LineService {
         if matches!(self.state, LineState::Open(_)) {
             self.closed();
         }
-        self.devices.into_iter().map(|device| (device.attached.source, device.history)).collect()
+        let strangers = self.senders.strangers.messages();
+        let history = |mut device: AttachedState| {
+            let own = device.attached.driver.health().strangers.messages();
+            device.history.strangers = strangers + own;
+            (device.attached.source, device.history)
+        };
+        self.devices.into_iter().map(history).collect()
+    }
+
+    /// Opens the line, unless its device is that of a line before it.
+    fn open_line(&self, connect: &Connect) -> Result<Box<dyn Line>, OpenError> {
+        match self.before.iter().find(|before| lines::same_device(before, connect)) {
+            Some(other) => Err(OpenError::same_device(connect, other)),
+            None => self.common.host.open(connect),
+        }
     }
 
     fn open(&mut self) -> LineState {
@@ -217,7 +240,7 @@ impl LineService {
             }
             Ok(connect) => connect,
         };
-        let mut line = match self.common.host.open(&connect) {
+        let mut line = match self.open_line(&connect) {
             Ok(line) => line,
             Err(trouble) => {
                 tracing::debug!(%trouble, "port not opened");
@@ -313,7 +336,9 @@ impl LineService {
         let line = line.as_mut();
         let mut buffer = [0; READ_BYTES];
         let wait = self.wait_for(self.common.host.now());
-        if let Some((received, count)) = line.read(wait, &mut buffer)? {
+        let devices = &self.devices;
+        let is_valid = |bytes: &[u8]| devices.iter().any(|device| device.attached.driver.accepts(bytes));
+        if let Some((received, count)) = line.read_device(wait, &mut buffer, &mut self.senders, &is_valid)? {
             let bytes = buffer.get(..count).unwrap_or_default();
             self.heard(line, received, bytes)?;
             *knock_at = received + KNOCK_PERIOD;
@@ -408,7 +433,8 @@ impl LineService {
     /// Updates the devices' statuses; the line's own complaint overrides them.
     fn look(&mut self, complaint: Option<&str>, now: MonoNs) {
         for device in &mut self.devices {
-            let judged = device.judge(now);
+            let (phase, words) = device.judge(now);
+            let judged = (phase, with_senders(words, phase, &self.senders, device.attached.driver.as_ref()));
             if complaint.is_some() {
                 // The fault is the line's: restart the device's silence timeout.
                 (device.last_bytes, device.last_frame) = (now, now);
@@ -417,6 +443,14 @@ impl LineService {
             device.say(&self.common.board, now, phase, &words);
         }
     }
+}
+
+/// A status with who is heard, where that isn't a matter of course, and who isn't.
+fn with_senders(words: String, phase: Phase, senders: &Senders, driver: &dyn Driver) -> String {
+    let from = senders.believed.filter(|_| phase == Phase::Running).map(|sender| format!("from {sender}"));
+    let parts = [(!words.is_empty()).then_some(words), from, senders.strangers.words()];
+    let parts = parts.into_iter().chain([driver.health().strangers.words()]).flatten();
+    parts.collect::<Vec<_>>().join("; ")
 }
 
 impl Common {
@@ -435,7 +469,7 @@ impl AttachedState {
     /// Health of the device, with the reason.
     fn judge(&mut self, now: MonoNs) -> (Phase, String) {
         let silence_timeout = self.attached.driver.silence_timeout();
-        let DeviceHealth { good_frames, identity, complaint } = self.attached.driver.health();
+        let DeviceHealth { good_frames, identity, complaint, .. } = self.attached.driver.health();
         if good_frames != self.frames {
             self.frames = good_frames;
             // Not `now`: the silence counts from the last bytes.

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use headrace_sensor::connect::ConnectError;
+use headrace_sensor::connect::{Connect, ConnectError};
 
 use crate::fix_hint;
 
@@ -71,6 +71,17 @@ impl OpenError {
     pub fn unusable(error: &ConnectError) -> Self {
         let ConnectError { text, problem, allowed } = error;
         Self::new(OpenErrorKind::Other, format!("connect = {text:?}: {problem}"), Some(allowed))
+    }
+
+    /// A device that another line of the vehicle has.
+    pub(crate) fn same_device(connect: &Connect, other: &Connect) -> Self {
+        let why =
+            format!("opening {connect}: it leads to the same device as {other}, which another sensor has");
+        Self::new(
+            OpenErrorKind::Busy,
+            why,
+            Some("give each its own, or the same connect to those that share a line"),
+        )
     }
 
     pub(crate) fn not_plugged_in(what: &str) -> Self {

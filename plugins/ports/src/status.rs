@@ -64,6 +64,8 @@ pub struct LineHistory {
     pub lost: u64,
     /// Packets for which the loop's ring had no room.
     pub dropped: u64,
+    /// Messages of senders that weren't believed.
+    pub strangers: u64,
     /// Last status, as text.
     pub last: String,
 }

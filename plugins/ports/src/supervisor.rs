@@ -62,8 +62,10 @@ impl Supervisor {
         let common = Common { host, stopping: Arc::clone(&stopping), board: board.clone(), waker, sent };
         let sensors = connections.iter().map(|hand| hand.source + 1).max().unwrap_or(0);
         let mut supervisor = Self { sensors, threads: Vec::new(), stopping, board, parker };
+        let mut before = Vec::new();
         for (name, connect, attached) in lines(connections) {
-            let service = LineService::new(connect, attached, common.clone());
+            let service = LineService::new(connect.clone(), before.clone(), attached, common.clone());
+            before.extend(connect);
             let thread = thread::Builder::new().name(name).spawn(move || service.run())?;
             supervisor.threads.push(thread);
         }

@@ -11,7 +11,7 @@ use crate::line::{LineCodec, Lines};
 use crate::report::{LayoutError, Report, ReportCodec, ReportLayout};
 use crate::tracker::{CountTracker, Counting, TrackerHealth};
 
-/// Maximum gap within a line, after which an unfinished one is dropped.
+/// Longest usual gap within a line, after which an unfinished one is dropped.
 const SILENCE: DurNs = DurNs::from_millis(100);
 
 const MILLISECOND: DurNs = DurNs::from_millis(1);

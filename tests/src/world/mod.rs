@@ -211,7 +211,12 @@ impl World {
             let setup = EmulatorSetup { start: BEGIN, head, site: vehicle.site, polled: false };
             let driver = sensor.driver(&DriverSetup { begun: BEGIN, head });
             let attached = Attached { source, port: dive.take_port(source).unwrap(), driver };
-            services.push(LineService::new(Ok(cable.connect.clone()), vec![attached], common.clone()));
+            services.push(LineService::new(
+                Ok(cable.connect.clone()),
+                Vec::new(),
+                vec![attached],
+                common.clone(),
+            ));
             let faults = plan.cables[source].clone();
             let loses = sabotage == Some(Sabotage::CableLoses) && faults.is_empty();
             devices.push(Device::new(sensor.emulator(&setup), cable, faults, loses, Random(random.bits())));

@@ -200,7 +200,7 @@ fn bursts_of_garbage_cost_no_frame() {
     ended.untroubled(2);
 }
 
-/// Stalls in every third frame: for shorter than frames may pause, or for longer, or for ever.
+/// Stalls in every third frame: for shorter than frames usually pause, or for longer, or for ever.
 fn stalling() -> impl Fault {
     EachFrame(|number, frame: &[u8], line: &mut Wire| {
         let (first, second) = frame.split_at(frame.len() / 2);
@@ -215,6 +215,7 @@ fn stalling() -> impl Fault {
                 line.part(first);
                 Wire::pause(300);
                 line.part(second);
+                line.count(1);
             }
             8 => line.part(first),
             _ => line.whole(frame),
@@ -223,7 +224,7 @@ fn stalling() -> impl Fault {
 }
 
 #[test]
-fn a_device_that_stalls_in_a_frame_costs_that_frame() {
+fn a_device_that_stalls_in_a_frame_costs_it_only_if_the_rest_never_comes() {
     let folder = Folder::new();
     let end = End::serial(&folder.path(""), "usb-ping-port0");
     let sensors = vec![sensor(PING, end, stalling()), sensor(HEAD, End::tcp(), stalling()), healthy()];

@@ -284,6 +284,10 @@ impl Driver for Dawdler {
         self.driver.heard(received, bytes, wire);
     }
 
+    fn accepts(&self, bytes: &[u8]) -> bool {
+        self.driver.accepts(bytes)
+    }
+
     fn due(&self) -> Option<MonoNs> {
         self.driver.due()
     }

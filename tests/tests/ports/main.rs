@@ -15,3 +15,6 @@ mod kernel_drivers;
 mod rehearsal;
 #[cfg(target_os = "linux")]
 mod run_ports;
+mod splits;
+#[cfg(unix)]
+mod who_speaks;

@@ -45,6 +45,8 @@ pub struct LineReport {
     pub lost: u64,
     /// Packets dropped for lack of room.
     pub dropped_packets: u64,
+    /// Messages of senders that aren't the device, which weren't used.
+    pub strangers: u64,
     /// Final status, in plain text.
     pub status: String,
 }

@@ -72,6 +72,13 @@ impl<F, const N: usize> Framed<F, N> {
     }
 }
 
+impl<F, const N: usize> Framed<F, N> {
+    /// The format.
+    pub fn framing(&self) -> &F {
+        &self.framing
+    }
+}
+
 /// The incomplete frame and the counters.
 impl<F, const N: usize> Stateful for Framed<F, N> {
     fn save(&self, to: &mut Saver) {
@@ -102,18 +109,40 @@ impl<F: Framing, const N: usize> Framed<F, N> {
             }
             self.len += now.len();
             bytes = later;
-            self.scan(bytes.len(), false, &mut take);
+            self.scan(bytes.len(), 0, &mut take);
         }
         self.counts.skipped_bytes += bytes.len() as u64;
     }
 
     /// Like [`Codec::flush`], but passes frames to `take` as [`Framed::push_frames`] does.
     pub fn flush_frames(&mut self, mut take: impl FnMut(&[u8], usize)) {
-        self.scan(0, true, &mut take);
+        self.scan(0, usize::MAX, &mut take);
         self.astray = false;
     }
 
-    fn scan(&mut self, later: usize, give_up: bool, take: &mut impl FnMut(&[u8], usize)) {
+    /// After a silence, before `next` is pushed: gives up held bytes only on evidence that they are a false start, which is
+    /// a whole frame inside them or at the front of `next`. Without any they are kept, however long the rest of the frame
+    /// takes: silence alone doesn't tell a false start from a line that delivers late. Passes frames to `take` as
+    /// [`Framed::push_frames`] does. A whole message ends with the silence.
+    pub fn settle_frames(&mut self, next: &[u8], mut take: impl FnMut(&[u8], usize)) {
+        if F::WHOLE_MESSAGES || self.is_whole_frame(next) {
+            return self.flush_frames(take);
+        }
+        let held = self.held.get(..self.len).unwrap_or_default();
+        let inside =
+            (1..held.len()).rev().find(|start| self.is_whole_frame(held.get(*start..).unwrap_or_default()));
+        if let Some(start) = inside {
+            self.scan(0, start, &mut take);
+        }
+    }
+
+    fn is_whole_frame(&self, front: &[u8]) -> bool {
+        !front.is_empty()
+            && matches!(self.framing.judge(front), Verdict::Frame(n) if (1..=front.len().min(N)).contains(&n))
+    }
+
+    /// Takes frames from the held bytes; candidates that begin before `give_up_before` aren't waited for.
+    fn scan(&mut self, later: usize, give_up_before: usize, take: &mut impl FnMut(&[u8], usize)) {
         let mut start = 0;
         while start < self.len {
             let front = self.held.get(start..self.len).unwrap_or_default();
@@ -123,7 +152,7 @@ impl<F: Framing, const N: usize> Framed<F, N> {
                     take(front.get(..n).unwrap_or_default(), front.len() + later);
                     n
                 }
-                Verdict::Need(n) if n <= N && n > front.len() && !give_up => break,
+                Verdict::Need(n) if n <= N && n > front.len() && start >= give_up_before => break,
                 verdict => {
                     self.astray = F::WHOLE_MESSAGES;
                     self.counts.bad_frames += u64::from(self.astray || verdict != Verdict::NotAStart);

@@ -10,10 +10,10 @@ use headrace_snapshot::stateful;
 const MAX_PARTS: usize = 32;
 
 /// Stamps each frame of a byte stream with the receive time of the packet that brought its first byte, even if earlier
-/// bytes are still held, and flushes an incomplete frame after a silence.
+/// bytes are still held, and whenever its last byte comes.
 ///
-/// Beyond `MAX_PARTS` packets the last ones are merged into one: a frame that begins among them, after a false start, is
-/// stamped too early.
+/// Beyond `MAX_PARTS` packets those before the newest are merged into one: a frame that begins among them, after a false
+/// start, is stamped too early.
 /// Allocates: never.
 #[derive(Debug, Clone)]
 pub struct LineClock {
@@ -33,7 +33,8 @@ struct Part {
 stateful!(LineClock { state: last, len; slots: parts; fixed: silence; });
 
 impl LineClock {
-    /// `silence` is the inter-frame timeout: a longer gap between two packets ends the frame in progress.
+    /// `silence` is the longest usual gap within a frame: after a longer one between two packets a false start that holds
+    /// frames back is looked for ([`Framed::settle_frames`]).
     pub fn new(silence: DurNs) -> Self {
         Self { silence, last: MonoNs(0), parts: [Part::default(); MAX_PARTS], len: 0 }
     }
@@ -47,8 +48,8 @@ impl LineClock {
         mut take: impl FnMut(MonoNs, &[u8]),
     ) {
         if received.since(self.last) > self.silence {
-            codec.flush_frames(|frame, behind| take(self.received(behind), frame));
-            self.len = 0;
+            codec.settle_frames(bytes, |frame, behind| take(self.received(behind), frame));
+            self.keep(codec.held_bytes());
         }
         self.last = received;
         self.note(Part { received, bytes: bytes.len() });
@@ -64,8 +65,10 @@ impl LineClock {
         if let Some(free) = self.parts.get_mut(self.len) {
             *free = part;
             self.len += 1;
-        } else if let Some(last) = self.parts.last_mut() {
-            last.bytes += part.bytes;
+        } else {
+            let [.., before, last] = &mut self.parts;
+            before.bytes += last.bytes;
+            *last = part;
         }
     }
 
@@ -146,9 +149,13 @@ mod tests {
         let mut packets: Vec<&[u8]> = vec![&[]; 100];
         packets[0] = &[0xA5, 5];
         packets[99] = &[0xA5, 0, 0x5A, 0, 0, 0];
-        assert_eq!(times(&mut clock, &packets), [32]);
+        assert_eq!(times(&mut clock, &packets), [100]);
         packets[0] = &[0xA5, 3, 1, 2, 3];
-        packets[99] = &[0x5A];
-        assert_eq!(times(&mut self::clock(5), &packets), [1]);
+        packets[99] = &[0x5A, 0xA5, 0, 0x5A];
+        assert_eq!(times(&mut self::clock(5), &packets), [1, 100]);
+        packets[0] = &[0xA5, 5];
+        packets[60] = &[0xA5];
+        packets[99] = &[1, 7, 0x5A, 0, 0, 0];
+        assert_eq!(times(&mut self::clock(5), &packets), [31]);
     }
 }

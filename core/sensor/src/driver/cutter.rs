@@ -7,12 +7,17 @@ use headrace_geometry::time::{DurNs, MonoNs};
 
 /// Cuts a byte stream, received in arbitrary pieces, into frames; bytes between frames are passed on too.
 ///
-/// No byte is dropped or reordered: the pieces concatenate to the input.
+/// No byte is dropped or reordered: the pieces concatenate to the input. However a stream is split and whenever its parts
+/// come, the frames are the same; each has the receive time of the part with its first byte, even if its last one comes much
+/// later, as from a bridge that sends blocks.
 #[derive(Debug, Clone)]
 pub struct Cutter<F, const N: usize> {
     codec: Framed<F, N>,
     silence: DurNs,
+    /// Receive time of the last bytes.
     last: MonoNs,
+    /// Whether the silence since then has been noticed.
+    settled: bool,
     /// Bytes not passed on yet.
     pending: Vec<u8>,
     /// Receive times of the pending bytes and the byte count of each, oldest first.
@@ -31,21 +36,25 @@ pub struct Piece<'a> {
 }
 
 impl<F: Framing, const N: usize> Cutter<F, N> {
-    /// `silence` is the inter-frame timeout: a longer gap ends the frame in progress.
+    /// `silence` is the longest usual gap within a frame: after a longer one a false start that holds frames back is looked
+    /// for ([`Framed::settle_frames`]).
     pub fn new(framing: F, silence: DurNs) -> Self {
         let (pending, parts) = (Vec::with_capacity(2 * N), VecDeque::new());
-        Self { codec: Framed::new(framing), silence, last: MonoNs(0), pending, parts }
+        Self { codec: Framed::new(framing), silence, last: MonoNs(0), settled: true, pending, parts }
     }
 
     /// Takes received bytes; `take` gets the pieces completed by them.
     pub fn push(&mut self, received: MonoNs, bytes: &[u8], take: &mut dyn FnMut(Piece<'_>)) {
-        if received.since(self.last) > self.silence {
-            self.flush(take);
+        if !self.settled && received.since(self.last) > self.silence {
+            self.settled = true;
+            let mut found = Vec::new();
+            self.codec.settle_frames(bytes, |frame, behind| found.push((behind, frame.len())));
+            self.hand_on(&found, take);
         }
-        self.last = received;
         if bytes.is_empty() {
             return;
         }
+        (self.last, self.settled) = (received, false);
         self.pending.extend_from_slice(bytes);
         self.parts.push_back((received, bytes.len()));
         let mut found = Vec::new();
@@ -53,16 +62,24 @@ impl<F: Framing, const N: usize> Cutter<F, N> {
         self.hand_on(&found, take);
     }
 
-    /// Gives up an incomplete frame: the line has been silent, or was closed.
+    /// Gives up an incomplete frame: the line was closed.
     pub fn flush(&mut self, take: &mut dyn FnMut(Piece<'_>)) {
         let mut found = Vec::new();
         self.codec.flush_frames(|frame, behind| found.push((behind, frame.len())));
         self.hand_on(&found, take);
     }
 
-    /// Deadline of the incomplete frame, if there is one.
-    pub fn gives_up(&self) -> Option<MonoNs> {
-        (!self.pending.is_empty()).then(|| self.last + self.silence + DurNs(1))
+    /// Time at which to push no bytes, so that an incomplete frame that holds others back is noticed; `None` if there is none.
+    pub fn settles(&self) -> Option<MonoNs> {
+        (!self.settled && !self.pending.is_empty()).then(|| self.last + self.silence + DurNs(1))
+    }
+
+    /// Whether these bytes, on their own, hold a frame that is `one_of_its`.
+    pub fn accepts(&self, bytes: &[u8], one_of_its: impl Fn(&[u8]) -> bool) -> bool {
+        let (mut codec, mut found) = (Framed::<F, N>::new(*self.codec.framing()), false);
+        codec.push_frames(bytes, |frame, _| found |= one_of_its(frame));
+        codec.flush_frames(|frame, _| found |= one_of_its(frame));
+        found
     }
 
     /// Counters so far.
@@ -171,10 +188,37 @@ mod tests {
     fn silence_hands_on_what_was_begun_and_a_frame_inside_it() {
         let mut cutter = cutter();
         assert!(pushed(&mut cutter, &[(1, &[0xA5, 5, 0xA5, 0, 0x5A])]).is_empty());
-        assert_eq!(cutter.gives_up(), Some(MonoNs(52)));
+        assert_eq!(cutter.settles(), Some(MonoNs(52)));
         let pieces = pushed(&mut cutter, &[(52, &[])]);
         assert_eq!(pieces, [(1, vec![0xA5, 5], false), (1, vec![0xA5, 0, 0x5A], true)]);
-        assert_eq!(cutter.gives_up(), None);
+        assert_eq!(cutter.settles(), None);
+    }
+
+    #[test]
+    fn a_frame_whose_last_byte_comes_with_the_next_one_is_whole_and_has_its_first_bytes_time() {
+        let parts: [(u64, &[u8]); 3] =
+            [(1, &[0xA5, 1, 9]), (1 + 66, &[0x5A, 0xA5, 1, 8]), (1 + 2 * 66, &[0x5A, 0xA5])];
+        let expected: Pieces = vec![(1, vec![0xA5, 1, 9, 0x5A], true), (67, vec![0xA5, 1, 8, 0x5A], true)];
+        let mut cutter = cutter();
+        assert_eq!(pushed(&mut cutter, &parts), expected);
+        // Nobody is woken again and again for the frame that is begun.
+        assert!(pushed(&mut cutter, &[(133 + 52, &[])]).is_empty());
+        assert_eq!(cutter.settles(), None);
+    }
+
+    #[test]
+    fn a_frame_cut_short_is_given_up_for_a_whole_one_after_a_silence() {
+        let parts: [(u64, &[u8]); 2] = [(1, &[0xA5, 5, 1]), (100, &[0xA5, 0, 0x5A])];
+        let expected: Pieces = vec![(1, vec![0xA5, 5, 1], false), (100, vec![0xA5, 0, 0x5A], true)];
+        assert_eq!(pushed(&mut cutter(), &parts), expected);
+    }
+
+    #[test]
+    fn wakes_of_others_dont_put_the_silence_off() {
+        let mut cutter = cutter();
+        let lure: [(u64, &[u8]); 3] = [(1, &[0xA5, 5, 0xA5, 0, 0x5A]), (30, &[]), (51, &[])];
+        assert!(pushed(&mut cutter, &lure).is_empty());
+        assert_eq!(pushed(&mut cutter, &[(52, &[])]).len(), 2);
     }
 
     proptest! {

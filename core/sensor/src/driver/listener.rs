@@ -28,8 +28,12 @@ impl<F: Framing + Send, const N: usize> Driver for Listener<F, N> {
         self.cutter.push(received, bytes, &mut |piece| wire.deliver(piece.received, piece.bytes));
     }
 
+    fn accepts(&self, bytes: &[u8]) -> bool {
+        self.cutter.accepts(bytes, |_| true)
+    }
+
     fn due(&self) -> Option<MonoNs> {
-        self.cutter.gives_up()
+        self.cutter.settles()
     }
 
     fn wake(&mut self, now: MonoNs, wire: &mut dyn Wire) {
@@ -74,6 +78,10 @@ impl Driver for MessageListener {
         self.good_frames += u64::from(self.complaint.is_none());
     }
 
+    fn accepts(&self, bytes: &[u8]) -> bool {
+        (self.judge)(bytes).is_none()
+    }
+
     fn due(&self) -> Option<MonoNs> {
         None
     }
@@ -85,6 +93,10 @@ impl Driver for MessageListener {
     }
 
     fn health(&self) -> DeviceHealth {
-        DeviceHealth { good_frames: self.good_frames, identity: None, complaint: self.complaint.clone() }
+        DeviceHealth {
+            good_frames: self.good_frames,
+            complaint: self.complaint.clone(),
+            ..DeviceHealth::default()
+        }
     }
 }

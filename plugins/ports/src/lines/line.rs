@@ -3,10 +3,25 @@
 use std::io;
 use std::time::Duration;
 
+use std::net::SocketAddr;
+
 use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_sensor::driver::Strangers;
 
 /// Maximum bytes of one read.
 pub const READ_BYTES: usize = 2048;
+
+/// Who is heard on a line that anybody may send to. Outlives the line's being reopened.
+#[derive(Default)]
+pub struct Senders {
+    /// The device.
+    pub believed: Option<SocketAddr>,
+    /// All others.
+    pub strangers: Strangers,
+}
+
+/// Tells whether bytes hold a message of a device on the line.
+pub type IsValid<'a> = &'a dyn Fn(&[u8]) -> bool;
 
 /// An open line.
 pub trait Line: Send {
@@ -14,6 +29,19 @@ pub trait Line: Send {
     ///
     /// Errors: the connection is lost.
     fn read(&mut self, wait: Duration, into: &mut [u8; READ_BYTES]) -> io::Result<Option<(MonoNs, usize)>>;
+
+    /// The same where anybody may send: only the bytes of one sender, the first valid one, are returned.
+    ///
+    /// Errors: the connection is lost.
+    fn read_device(
+        &mut self,
+        wait: Duration,
+        into: &mut [u8; READ_BYTES],
+        _: &mut Senders,
+        _: IsValid<'_>,
+    ) -> io::Result<Option<(MonoNs, usize)>> {
+        self.read(wait, into)
+    }
 
     /// Sends bytes; on a message carrier they form one message.
     ///

@@ -7,14 +7,17 @@ pub(crate) mod hid;
 #[cfg(target_os = "linux")]
 mod i2c;
 mod line;
+mod same_device;
 pub(crate) mod serial;
 mod tcp;
 mod udp;
+mod udp_listen;
 
 use headrace_sensor::connect::Connect;
 
 use crate::open_error::OpenError;
-pub use line::{Line, READ_BYTES};
+pub use line::{IsValid, Line, READ_BYTES, Senders};
+pub(crate) use same_device::same_device;
 
 /// Opens the target of a `connect`.
 ///
@@ -24,7 +27,7 @@ pub(crate) fn open(connect: &Connect) -> Result<Box<dyn Line>, OpenError> {
         Connect::Serial { port, baud } => serial::open(port, *baud),
         Connect::Tcp { address } => tcp::open(address),
         Connect::Udp { address } => udp::open(address),
-        Connect::UdpListen { address } => udp::listen(address),
+        Connect::UdpListen { address, from } => udp_listen::open(address, from.as_deref()),
         #[cfg(target_os = "linux")]
         Connect::Can { interface } => can::open(interface),
         #[cfg(target_os = "linux")]

@@ -5,6 +5,8 @@ use std::time::Duration;
 
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::connect::{SerialPort, UsbIdentity};
+use rustix::fs::{FlockOperation, Mode, OFlags, flock};
+use rustix::io::Errno;
 use serialport::{SerialPort as _, SerialPortType, TTYPort};
 
 use super::line::{Line, READ_BYTES, waited};
@@ -30,14 +32,25 @@ pub(super) fn open(port: &SerialPort, baud: u32) -> Result<Box<dyn Line>, OpenEr
         SerialPort::Usb(identity) => path_of(identity)?,
     };
     let builder = serialport::new(&path, baud).timeout(WRITE_TIME);
-    let port = TTYPort::open(&builder).map_err(|error| diagnosis::opening(&path, &error.into()))?;
+    let port = TTYPort::open(&builder).map_err(|error| diagnosis::opening(&path, &cause(&path, error)))?;
     port.clear(serialport::ClearBuffer::All).map_err(|error| diagnosis::opening(&path, &error.into()))?;
     let byte_time = DurNs(BITS_A_BYTE * 1_000_000_000 / i64::from(baud.max(1)));
     Ok(Box::new(Serial { port, byte_time, emptied: clock::now() }))
 }
 
+/// The crate reports a port that another program has locked as absent.
+fn cause(path: &str, error: serialport::Error) -> io::Error {
+    let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::NONBLOCK | OFlags::CLOEXEC;
+    let opened = rustix::fs::open(path, flags, Mode::empty());
+    let locked = opened.and_then(|file| flock(file, FlockOperation::NonBlockingLockExclusive));
+    match locked {
+        Err(Errno::BUSY | Errno::AGAIN) => io::ErrorKind::ResourceBusy.into(),
+        _ => error.into(),
+    }
+}
+
 /// Current path of a USB adapter's port.
-fn path_of(identity: &UsbIdentity) -> Result<String, OpenError> {
+pub(super) fn path_of(identity: &UsbIdentity) -> Result<String, OpenError> {
     let what = format!("serial:usb:{identity}");
     let ports = serialport::available_ports().map_err(|error| diagnosis::opening(&what, &error.into()))?;
     let is_it = |kind: &SerialPortType| match kind {

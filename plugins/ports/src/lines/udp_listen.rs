@@ -1,0 +1,348 @@
+//! UDP from a device that sends to a local port, to which anybody else may send, too.
+//!
+//! One sender is heard, pinned by address and port: the one of `?from=`, or the first whose message a driver of the line
+//! accepts. Nothing of others reaches a driver, nor is anything sent to them. A device that falls silent may come back from
+//! another port, not from another address.
+
+use std::collections::VecDeque;
+use std::io;
+use std::net::{IpAddr, SocketAddr, ToSocketAddrs as _, UdpSocket};
+use std::time::Duration;
+
+use headrace_geometry::time::{DurNs, MonoNs};
+
+use super::line::{IsValid, Line, READ_BYTES, ReadTimeout, Senders, waited};
+use crate::clock;
+use crate::diagnosis;
+use crate::open_error::OpenError;
+
+/// Senders whose bytes are held until one is valid; of more the one heard first is forgotten.
+const MAX_CANDIDATES: usize = 8;
+
+struct UdpListen {
+    socket: UdpSocket,
+    timeout: ReadTimeout,
+    from: From,
+    /// The sender that is heard, and that commands go to.
+    peer: Option<SocketAddr>,
+    candidates: VecDeque<Candidate>,
+}
+
+/// Configured sender.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum From {
+    Anybody,
+    Host(IpAddr),
+    Port(SocketAddr),
+}
+
+/// A sender that nothing valid has come from yet: perhaps its frames come in parts.
+struct Candidate {
+    from: SocketAddr,
+    first: MonoNs,
+    messages: u64,
+    bytes: Vec<u8>,
+}
+
+pub(super) fn open(address: &str, from: Option<&str>) -> Result<Box<dyn Line>, OpenError> {
+    let from = from.map_or(Ok(From::Anybody), |from| {
+        resolved(from).map_err(|error| diagnosis::opening(&format!("{address}?from={from}"), &error))
+    })?;
+    let socket = UdpSocket::bind(address).map_err(|error| diagnosis::opening(address, &error))?;
+    let peer = if let From::Port(peer) = from { Some(peer) } else { None };
+    let (timeout, candidates) = (ReadTimeout::default(), VecDeque::new());
+    Ok(Box::new(UdpListen { socket, timeout, from, peer, candidates }))
+}
+
+fn resolved(from: &str) -> io::Result<From> {
+    let none = || io::Error::new(io::ErrorKind::NotFound, "the name has no address");
+    if let Ok(host) = from.parse::<IpAddr>() {
+        return Ok(From::Host(host));
+    }
+    if from.contains(':') {
+        return from.to_socket_addrs()?.next().map(From::Port).ok_or_else(none);
+    }
+    (from, 0).to_socket_addrs()?.next().map(|found| From::Host(found.ip())).ok_or_else(none)
+}
+
+impl UdpListen {
+    /// Whether a sender may be the device, valid or not.
+    fn may_be(&self, from: SocketAddr, senders: &Senders) -> bool {
+        match (self.from, senders.believed) {
+            (From::Port(peer), _) => from == peer,
+            (From::Host(host), _) => from.ip() == host,
+            // Before the line was reopened.
+            (From::Anybody, Some(before)) => from.ip() == before.ip(),
+            (From::Anybody, None) => true,
+        }
+    }
+
+    /// Takes a datagram of a sender that may be the device. Once it is valid, alone or after the sender's earlier ones, the
+    /// sender is pinned, and what is valid is in `into`.
+    fn introduce(
+        &mut self,
+        (received, from, count): (MonoNs, SocketAddr, usize),
+        into: &mut [u8; READ_BYTES],
+        senders: &mut Senders,
+        is_valid: IsValid<'_>,
+    ) -> Option<(MonoNs, usize)> {
+        let bytes = into.get(..count).unwrap_or_default();
+        let heard = if is_valid(bytes) {
+            Some((received, count))
+        } else {
+            self.hold(received, from, bytes, is_valid)
+        };
+        let Some((first, count)) = heard else {
+            if self.candidates.len() > MAX_CANDIDATES {
+                self.candidates.pop_front().into_iter().for_each(|other| dismiss(&other, senders));
+            }
+            return None;
+        };
+        let held = self.candidates.iter().position(|held| held.from == from);
+        if let Some(own) =
+            held.and_then(|place| self.candidates.remove(place)).filter(|own| own.bytes.len() == count)
+        {
+            into.iter_mut().zip(&own.bytes).for_each(|(to, byte)| *to = *byte);
+        }
+        self.candidates.drain(..).for_each(|other| dismiss(&other, senders));
+        tracing::info!(%from, "the device is this sender; others aren't heard");
+        (self.peer, senders.believed) = (Some(from), Some(from));
+        Some((first, count))
+    }
+
+    /// Adds to a candidate's bytes; their time and length if they are valid together.
+    fn hold(
+        &mut self,
+        received: MonoNs,
+        from: SocketAddr,
+        bytes: &[u8],
+        is_valid: IsValid<'_>,
+    ) -> Option<(MonoNs, usize)> {
+        let place = self.candidates.iter().position(|held| held.from == from).unwrap_or_else(|| {
+            let (messages, bytes) = (0, Vec::new());
+            self.candidates.push_back(Candidate { from, first: received, messages, bytes });
+            self.candidates.len() - 1
+        });
+        let candidate = self.candidates.get_mut(place)?;
+        if candidate.bytes.len() + bytes.len() > READ_BYTES {
+            candidate.bytes.clear();
+            candidate.first = received;
+        }
+        candidate.messages += 1;
+        candidate.bytes.extend_from_slice(bytes);
+        is_valid(&candidate.bytes).then_some((candidate.first, candidate.bytes.len()))
+    }
+}
+
+fn dismiss(candidate: &Candidate, senders: &mut Senders) {
+    refuse(candidate.from, candidate.messages, senders);
+}
+
+fn refuse(from: SocketAddr, messages: u64, senders: &mut Senders) {
+    if senders.strangers.note(messages, &from.to_string()) {
+        tracing::warn!(%from, "a sender that isn't the device");
+    }
+}
+
+impl Line for UdpListen {
+    /// Of anybody: only for probing.
+    fn read(&mut self, wait: Duration, into: &mut [u8; READ_BYTES]) -> io::Result<Option<(MonoNs, usize)>> {
+        self.read_device(wait, into, &mut Senders::default(), &|_| true)
+    }
+
+    fn read_device(
+        &mut self,
+        wait: Duration,
+        into: &mut [u8; READ_BYTES],
+        senders: &mut Senders,
+        is_valid: IsValid<'_>,
+    ) -> io::Result<Option<(MonoNs, usize)>> {
+        let socket = &self.socket;
+        self.timeout.set(wait, |wait| socket.set_read_timeout(Some(wait)))?;
+        let mut sender = None;
+        let received = self.socket.recv_from(into).map(|(count, from)| {
+            sender = Some(from);
+            count
+        });
+        let Some((count, from)) = waited(received)?.zip(sender) else { return Ok(None) };
+        let now = clock::now();
+        if count == 0 {
+            return Ok(None);
+        }
+        if self.peer == Some(from) {
+            senders.believed = Some(from);
+            return Ok(Some((now, count)));
+        }
+        if self.peer.is_some() || !self.may_be(from, senders) {
+            refuse(from, 1, senders);
+            return Ok(None);
+        }
+        Ok(self.introduce((now, from, count), into, senders, is_valid))
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
+        // Without a device there is no destination.
+        self.peer.map_or(Ok(()), |peer| self.socket.send_to(bytes, peer).map(|_| ()))
+    }
+
+    /// Emulated bus: sends a datagram of the bytes to write and the read length; the answer is the transaction.
+    fn exchange(
+        &mut self,
+        write: &[u8],
+        _: DurNs,
+        read_bytes: usize,
+    ) -> io::Result<Option<(MonoNs, Vec<u8>)>> {
+        let count = u8::try_from(read_bytes).unwrap_or(u8::MAX);
+        self.write(&[write, &[count]].concat())?;
+        Ok(None)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const WAIT: Duration = Duration::from_secs(10);
+    const NONE: Duration = Duration::from_millis(20);
+
+    /// Valid are bytes with an `M`, then some, then a `!`.
+    fn is_valid(bytes: &[u8]) -> bool {
+        bytes.iter().position(|b| *b == b'M').is_some_and(|at| bytes[at..].contains(&b'!'))
+    }
+
+    struct Place {
+        line: Box<dyn Line>,
+        address: String,
+        senders: Senders,
+    }
+
+    impl Place {
+        fn new(option: &str) -> Self {
+            let free = UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap().to_string();
+            let from = (!option.is_empty()).then_some(option);
+            Self { line: open(&free, from).unwrap(), address: free, senders: Senders::default() }
+        }
+
+        fn again(&mut self) {
+            self.line = Box::new(Closed);
+            self.line = open(&self.address, None).unwrap();
+        }
+
+        fn tell(&self, from: &UdpSocket, text: &str) {
+            from.send_to(text.as_bytes(), &self.address).unwrap();
+        }
+
+        /// What is heard of a datagram that surely comes.
+        fn heard(&mut self, wait: Duration) -> Option<String> {
+            let mut into = [0; READ_BYTES];
+            let read = self.line.read_device(wait, &mut into, &mut self.senders, &is_valid).unwrap();
+            read.map(|(_, count)| String::from_utf8_lossy(&into[..count]).into_owned())
+        }
+    }
+
+    struct Closed;
+
+    impl Line for Closed {
+        fn read(&mut self, _: Duration, _: &mut [u8; READ_BYTES]) -> io::Result<Option<(MonoNs, usize)>> {
+            Ok(None)
+        }
+
+        fn write(&mut self, _: &[u8]) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    fn sender() -> UdpSocket {
+        let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+        socket.set_read_timeout(Some(WAIT)).unwrap();
+        socket
+    }
+
+    fn got(socket: &UdpSocket) -> Vec<u8> {
+        let mut buffer = [0; 64];
+        let count = socket.recv(&mut buffer).unwrap();
+        buffer[..count].to_vec()
+    }
+
+    #[test]
+    fn the_first_valid_sender_is_heard_alone_and_commands_go_to_it() {
+        let (mut place, device, stranger) = (Place::new(""), sender(), sender());
+        place.tell(&stranger, "x");
+        assert_eq!(place.heard(WAIT), None);
+        place.line.write(b"nobody").unwrap();
+        place.tell(&device, "M1!");
+        assert_eq!(place.heard(WAIT).unwrap(), "M1!");
+        for text in ["x", "M2!"] {
+            place.tell(&stranger, text);
+            assert_eq!(place.heard(WAIT), None);
+            place.line.write(b"command").unwrap();
+            assert_eq!(got(&device), b"command");
+        }
+        place.tell(&device, "in any way");
+        assert_eq!(place.heard(WAIT).unwrap(), "in any way");
+        let strangers = &place.senders.strangers;
+        let name = stranger.local_addr().unwrap();
+        assert_eq!((strangers.messages(), strangers.words().unwrap()), (3, format!("not believed: {name}")));
+        stranger.set_read_timeout(Some(NONE)).unwrap();
+        assert!(stranger.recv(&mut [0; 64]).is_err(), "something was sent to a stranger");
+    }
+
+    #[test]
+    fn a_device_whose_frames_come_in_parts_is_known_by_them_together_whatever_others_send_between() {
+        let (mut place, device, stranger) = (Place::new(""), sender(), sender());
+        for (from, text) in [(&device, "..M"), (&stranger, "M"), (&device, "1"), (&stranger, "2")] {
+            place.tell(from, text);
+            assert_eq!(place.heard(WAIT), None);
+        }
+        place.tell(&device, "3!");
+        assert_eq!(place.heard(WAIT).unwrap(), "..M13!");
+        assert_eq!(place.senders.strangers.messages(), 2);
+    }
+
+    #[test]
+    fn a_device_may_come_back_from_another_port_of_its_address() {
+        let (mut place, device) = (Place::new(""), sender());
+        place.tell(&device, "M1!");
+        assert!(place.heard(WAIT).is_some());
+        place.again();
+        let restarted = sender();
+        place.tell(&restarted, "M2!");
+        assert_eq!(place.heard(WAIT).unwrap(), "M2!");
+        let elsewhere = UdpSocket::bind("127.0.0.2:0").unwrap();
+        place.again();
+        place.tell(&elsewhere, "M3!");
+        assert_eq!(place.heard(WAIT), None);
+        assert_eq!(place.senders.strangers.messages(), 1);
+    }
+
+    #[test]
+    fn a_configured_sender_is_the_only_one() {
+        let device = sender();
+        let mut place = Place::new(&device.local_addr().unwrap().to_string());
+        let stranger = sender();
+        place.tell(&stranger, "M1!");
+        assert_eq!(place.heard(WAIT), None);
+        place.line.write(b"command").unwrap();
+        assert_eq!(got(&device), b"command");
+        place.tell(&device, "M2!");
+        assert_eq!(place.heard(WAIT).unwrap(), "M2!");
+        let mut place = Place::new("127.0.0.2");
+        place.tell(&stranger, "M1!");
+        assert_eq!(place.heard(WAIT), None);
+        let device = UdpSocket::bind("127.0.0.2:0").unwrap();
+        place.tell(&device, "M2!");
+        assert_eq!(place.heard(WAIT).unwrap(), "M2!");
+    }
+
+    #[test]
+    fn any_number_of_strangers_is_endured() {
+        let (mut place, device) = (Place::new(""), sender());
+        for _ in 0..3 * MAX_CANDIDATES {
+            place.tell(&sender(), "M");
+            assert_eq!(place.heard(WAIT), None);
+        }
+        place.tell(&device, "M!");
+        assert_eq!(place.heard(WAIT).unwrap(), "M!");
+        assert_eq!(place.senders.strangers.messages(), 3 * MAX_CANDIDATES as u64);
+    }
+}

@@ -1,0 +1,171 @@
+//! `headrace run` where others speak than the devices: senders on a port that anybody may send to, systems that aren't the
+//! vehicle's autopilot, two sensors that lead to one device, a log of older firmware's words.
+
+use std::net::UdpSocket;
+use std::os::unix::fs::symlink;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::Duration;
+
+use headrace_mavlink::MavHeader;
+use headrace_mavlink::dialect::{HEARTBEAT_DATA, MavAutopilot, MavType};
+use headrace_mavlink::frame::encode;
+use headrace_mavlink::message::{Message, Pressure, PressureMessage};
+use headrace_sensor::connect::{Connect, SerialPort};
+use headrace_tests::faulty::{End, Faulty, Healthy};
+use headrace_tests::rig::{HEAD, HEADING, emulated};
+use headrace_tests::{Folder, raw_messages};
+use serde_json::Value;
+
+const TRUE_HPA: f32 = 1100.0;
+const FALSE_HPA: f32 = 900.0;
+const EACH: Duration = Duration::from_millis(2);
+
+fn header(system_id: u32) -> MavHeader {
+    MavHeader { system_id, component_id: 1, sequence: 0 }
+}
+
+fn pressure(system_id: u32, absolute_hpa: f32) -> Vec<u8> {
+    let message = PressureMessage::Second;
+    let told = Message::Pressure(Pressure { message, time_boot_ms: 1, absolute_hpa, temperature_cdegc: 0 });
+    told.to_frame(header(system_id)).raw_bytes().to_vec()
+}
+
+fn heartbeat(system_id: u32) -> Vec<u8> {
+    let (mavtype, autopilot) = (MavType::MAV_TYPE_SUBMARINE, MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA);
+    let heartbeat = HEARTBEAT_DATA { mavtype, autopilot, ..HEARTBEAT_DATA::DEFAULT };
+    encode(header(system_id), &heartbeat).raw_bytes().to_vec()
+}
+
+fn report(folder: &Folder) -> Value {
+    serde_json::from_slice(&folder.read("report.json")).unwrap()
+}
+
+/// A dive on a local port to which a device sends, and a stranger: first frames of another system, and from when the host has
+/// spoken to the device, the device's own. Gives the report and the pressures that were recorded.
+fn dive_among_strangers(option: &str, keys: &str) -> (Value, usize, usize) {
+    let folder = Folder::new();
+    let place = UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
+    let [device, stranger] = [(); 2].map(|()| UdpSocket::bind("127.0.0.1:0").unwrap());
+    let option = option.replace("<device>", &device.local_addr().unwrap().to_string());
+    let sensor = format!(
+        "\n[[sensors]]\nid = \"depth\"\nplugin = \"mavlink\"\npart = \"pressure\"\n{keys}connect = \"udp-listen:{place}{option}\"\n"
+    );
+    folder.write("vehicle.toml", format!("{HEADING}{sensor}"));
+    let (ended, known) = (AtomicBool::new(false), AtomicBool::new(false));
+    let until_end = |turn: &dyn Fn()| {
+        while !ended.load(Ordering::Relaxed) {
+            turn();
+            thread::sleep(EACH);
+        }
+    };
+    device.set_nonblocking(true).unwrap();
+    stranger.set_nonblocking(true).unwrap();
+    let answer = thread::scope(|scope| {
+        scope.spawn(|| {
+            until_end(&|| {
+                // Errors are those of a port that nobody has opened yet.
+                device.send_to(&[heartbeat(1), pressure(1, TRUE_HPA)].concat(), place).unwrap_or_default();
+                let heard = device.recv(&mut [0; 300]).is_ok_and(|count| count > 0);
+                known.fetch_or(heard, Ordering::Relaxed);
+            });
+        });
+        scope.spawn(|| {
+            until_end(&|| {
+                let told = if known.load(Ordering::Relaxed) {
+                    [heartbeat(1), pressure(1, FALSE_HPA)].concat()
+                } else {
+                    pressure(9, FALSE_HPA)
+                };
+                stranger.send_to(&told, place).unwrap_or_default();
+                stranger.send_to(b"x", place).unwrap_or_default();
+                assert!(stranger.recv(&mut [0; 300]).is_err(), "the host has spoken to a stranger");
+            });
+        });
+        let arguments =
+            ["run", "vehicle.toml", "--record", "dive.mcap", "--report", "report.json", "--for", "4"];
+        let answer = folder.headrace(&[&arguments[..], &["--require", "all"]].concat());
+        ended.store(true, Ordering::Relaxed);
+        answer
+    });
+    // A depth sensor alone gives no position.
+    assert_eq!(answer.code, Some(1), "{}{}", answer.stdout, answer.stderr);
+    assert!(answer.stdout.contains("on the line of depth came from others"), "{}", answer.stdout);
+    let log = folder.read("dive.mcap");
+    let has = |value: f32| {
+        let wanted = value.to_le_bytes();
+        let holds = |data: &[u8]| data.windows(4).any(|four| four == wanted);
+        raw_messages(&log).iter().filter(|message| holds(&message.data)).count()
+    };
+    (report(&folder), has(TRUE_HPA), has(FALSE_HPA))
+}
+
+#[test]
+fn on_a_port_for_anybody_the_first_autopilot_is_heard_and_nobody_else() {
+    for (option, keys) in [("", ""), ("?from=<device>", ""), ("?from=<device>", "system_id = 1\n")] {
+        let (report, of_device, of_strangers) = dive_among_strangers(option, keys);
+        let source = &report["sources"][0];
+        assert!(of_device > 20, "{option}: {of_device}: {source}");
+        assert_eq!(of_strangers, 0, "{option}: {source}");
+        assert_eq!(source["readings"], of_device, "{option}");
+        assert!(source["line"]["strangers"].as_u64().unwrap() > 20, "{source}");
+        let status = source["line"]["status"].as_str().unwrap();
+        assert!(status.starts_with("running: MAVLink system 1; from 127.0.0.1:"), "{status}");
+        assert!(status.contains("not believed: 127.0.0.1:"), "{status}");
+    }
+}
+
+/// Statuses of two sensors of these `connect`s.
+fn two(folder: &Folder, connects: [&str; 2]) -> Vec<Value> {
+    let sensor = |(id, connect): (&str, &str)| {
+        format!("\n[[sensors]]\nid = \"{id}\"\nconnect = \"{connect}\"\n{HEAD}")
+    };
+    let sensors: String = ["first", "second"].into_iter().zip(connects).map(sensor).collect();
+    folder.write("vehicle.toml", format!("{HEADING}{sensors}"));
+    let run =
+        ["run", "vehicle.toml", "--no-record", "--report", "report.json", "--for", "3", "--require", "first"];
+    let answer = folder.headrace(&run);
+    assert_eq!(answer.code, Some(1), "{}{}", answer.stdout, answer.stderr);
+    report(folder)["sources"].as_array().unwrap().clone()
+}
+
+#[test]
+fn two_sensors_that_lead_to_one_device_arent_both_read() {
+    let folder = Folder::new();
+    let end = End::serial(&folder.path(""), "usb-head-port0");
+    let place = end.connect().to_string();
+    let Connect::Serial { port: SerialPort::Path(path), .. } = end.connect().clone() else {
+        panic!("a serial port")
+    };
+    symlink(&path, folder.path("by-id")).unwrap();
+    let other = format!("serial:{}", folder.path("by-id").display());
+    let device = Faulty::start(vec![emulated(HEAD)], end, Box::new(Healthy));
+    for (connects, why) in [
+        ([place.as_str(), other.as_str()], "leads to the same device as"),
+        ([place.as_str(), place.as_str()], "nothing tells the bytes of two"),
+    ] {
+        let sources = two(&folder, connects);
+        let status = |number: usize| sources[number]["line"]["status"].as_str().unwrap();
+        assert!(sources[0]["readings"].as_u64().unwrap() > 0, "{}", sources[0]);
+        assert_eq!(sources[1]["packets"], 0, "{}", sources[1]);
+        assert!(status(1).starts_with("closed: ") && status(1).contains(why), "{}", status(1));
+    }
+    drop(device);
+}
+
+#[test]
+fn a_serial_port_that_another_program_has_is_not_read() {
+    let folder = Folder::new();
+    let end = End::serial(&folder.path(""), "usb-head-port0");
+    let file = std::fs::File::open(folder.path("usb-head-port0")).unwrap();
+    rustix::fs::flock(&file, rustix::fs::FlockOperation::LockExclusive).unwrap();
+    let sensor = format!("\n[[sensors]]\nid = \"head\"\nconnect = \"{}\"\n{HEAD}", end.connect());
+    folder.write("vehicle.toml", format!("{HEADING}{sensor}"));
+    let device = Faulty::start(vec![emulated(HEAD)], end, Box::new(Healthy));
+    let answer =
+        folder.headrace(&["run", "vehicle.toml", "--no-record", "--report", "report.json", "--for", "1"]);
+    drop(device);
+    assert_eq!(answer.code, Some(1), "{}{}", answer.stdout, answer.stderr);
+    let status = report(&folder)["sources"][0]["line"]["status"].as_str().unwrap().to_owned();
+    assert!(status.starts_with("closed: ") && status.contains("another program has it"), "{status}");
+}
