@@ -12,36 +12,7 @@ use headrace_geometry::time::MonoNs;
 use serde::{Deserialize, Serialize};
 
 use super::part::{Part, Progress, named_part};
-use super::rotate::parts_of;
 use super::{LogError, LogInfo, LogMessage, LogPlace, LogReader, Loss, LossKind, MessageKind, SourceInfo};
-
-/// Files of the paths a user named: a log, a folder of logs, or a recording in parts by the name it was given.
-///
-/// Errors: a folder can't be read or contains no log.
-pub fn files_of(named: &[PathBuf]) -> Result<Vec<PathBuf>, LogError> {
-    let mut files = Vec::new();
-    for path in named {
-        let failed = |source| LogError::Open { path: path.to_owned(), source };
-        if path.is_dir() {
-            let entries = std::fs::read_dir(path).and_then(Iterator::collect::<Result<Vec<_>, _>>);
-            let entries = entries.map_err(failed)?;
-            let mut logs: Vec<_> = entries.into_iter().map(|entry| path.join(entry.file_name())).collect();
-            logs.retain(|log| log.extension().is_some_and(|extension| extension == "mcap"));
-            logs.sort();
-            if logs.is_empty() {
-                return Err(LogError::NoLogs { folder: path.to_owned() });
-            }
-            files.append(&mut logs);
-        } else if path.exists() {
-            files.push(path.clone());
-        } else {
-            // Without parts, opening the log reports that it doesn't exist.
-            let parts = parts_of(path).unwrap_or_default();
-            files.extend(if parts.is_empty() { vec![path.clone()] } else { parts });
-        }
-    }
-    Ok(files)
-}
 
 /// A file of a dive's log.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -67,6 +38,7 @@ pub struct DivePlace {
     messages: Vec<u64>,
     earlier: Vec<Loss>,
     late: u64,
+    delivered: u64,
 }
 
 /// Reads a dive's log.
@@ -87,6 +59,21 @@ pub struct DiveLog<R = File> {
     earlier: Vec<Loss>,
     late: u64,
     times: Option<(MonoNs, MonoNs)>,
+    /// For each file that was cut off, how the next one goes on.
+    resumed: Vec<Option<Resumed>>,
+    /// Messages delivered from the file being read.
+    delivered: u64,
+}
+
+/// How the next part of a recording goes on after one that was cut off.
+#[derive(Debug, Clone)]
+struct Resumed {
+    /// Totals before the next part, which repeats all that comes after them.
+    before: Progress,
+    /// Messages that are in the part cut off and not repeated.
+    messages: u64,
+    /// First log time of the next part.
+    at: Option<MonoNs>,
 }
 
 impl DiveLog<File> {
@@ -127,7 +114,9 @@ impl DiveLog<File> {
         let first = open(0)?;
         let times = glances.iter().filter_map(|glance| glance.times);
         let times = times.reduce(|all, one| (all.0.min(one.0), all.1.max(one.1)));
-        Ok(Self { times, ..Self::start(open, first, files, losses) })
+        let mut log = Self { times, resumed: resumed(&glances), ..Self::start(open, first, files, losses) };
+        log.pass_over();
+        Ok(log)
     }
 }
 
@@ -158,6 +147,8 @@ impl<R: Read + Seek> DiveLog<R> {
             earlier: Vec::new(),
             late: 0,
             times: None,
+            resumed: Vec::new(),
+            delivered: 0,
         };
         log.times = log.reader.times();
         log.number_sources();
@@ -181,7 +172,7 @@ impl<R: Read + Seek> DiveLog<R> {
 
     /// Damage and gaps found so far; complete when [`DiveLog::next`] has returned `None`.
     pub fn losses(&self) -> Vec<Loss> {
-        let present = self.reader.losses().iter().map(|loss| self.in_part(loss));
+        let present = self.reader.losses().iter().filter_map(|loss| self.in_part(loss));
         self.between.iter().chain(&self.earlier).cloned().chain(present).collect()
     }
 
@@ -232,8 +223,9 @@ impl<R: Read + Seek> DiveLog<R> {
         if self.numbers.len() < self.reader.sources().len() {
             self.number_sources();
         }
-        let Self { reader, numbers, files, at, .. } = self;
+        let Self { reader, numbers, files, at, delivered, .. } = self;
         let Some(mut message) = reader.next()? else { return Ok(None) };
+        *delivered += 1;
         match &mut message.kind {
             MessageKind::Raw { source } => {
                 *source = numbers.get(usize::from(*source)).copied().unwrap_or(*source);
@@ -257,6 +249,7 @@ impl<R: Read + Seek> DiveLog<R> {
             messages: self.files.iter().map(|file| file.messages).collect(),
             earlier: self.earlier.clone(),
             late: self.late,
+            delivered: self.delivered,
         }
     }
 
@@ -268,24 +261,34 @@ impl<R: Read + Seek> DiveLog<R> {
             self.reader = (self.open)(place.at)?;
             self.at = place.at;
             self.number_sources();
+            self.pass_over();
         }
         for (file, messages) in self.files.iter_mut().zip(&place.messages) {
             file.messages = *messages;
         }
-        (self.earlier, self.late) = (place.earlier.clone(), place.late);
+        (self.earlier, self.late, self.delivered) = (place.earlier.clone(), place.late, place.delivered);
         self.reader.go_to(&place.place)
     }
 
     /// Moves on to the next file.
     fn go_on(&mut self) -> Result<(), LogError> {
-        let read: Vec<Loss> = self.reader.losses().iter().map(|loss| self.in_part(loss)).collect();
+        let read: Vec<Loss> = self.reader.losses().iter().filter_map(|loss| self.in_part(loss)).collect();
         self.earlier.extend(read);
         (self.topics, self.info.sources) = self.channels_found();
         self.late += self.reader.late();
         self.at += 1;
         self.reader = (self.open)(self.at)?;
+        self.delivered = 0;
         self.number_sources();
+        self.pass_over();
         Ok(())
+    }
+
+    /// Leaves out of the file what the next one repeats.
+    fn pass_over(&mut self) {
+        if let Some(Some(resumed)) = self.resumed.get(self.at) {
+            self.reader.pass_over(&resumed.before);
+        }
     }
 
     /// Maps the file's sources to the dive's by name; new ones are added.
@@ -301,14 +304,21 @@ impl<R: Read + Seek> DiveLog<R> {
         }
     }
 
-    fn in_part(&self, loss: &Loss) -> Loss {
-        let file = self.files.get(self.at).filter(|_| self.files.len() > 1);
-        match file.and_then(|file| file.number) {
-            Some(part) => {
-                Loss { kind: LossKind::InPart { part, kind: Box::new(loss.kind.clone()) }, ..loss.clone() }
+    /// A loss of the file being read as one of the dive's; `None` if the next part has what is lost.
+    fn in_part(&self, loss: &Loss) -> Option<Loss> {
+        let mut loss = loss.clone();
+        if let Some(Some(resumed)) = self.resumed.get(self.at) {
+            // The next part says why this one was cut off.
+            if loss.kind == LossKind::Truncated && self.delivered == resumed.messages {
+                return None;
             }
-            None => loss.clone(),
+            loss.to = loss.to.or(resumed.at);
         }
+        let file = self.files.get(self.at).filter(|_| self.files.len() > 1);
+        if let Some(part) = file.and_then(|file| file.number) {
+            loss.kind = LossKind::InPart { part, kind: Box::new(loss.kind) };
+        }
+        Some(loss)
     }
 }
 
@@ -406,6 +416,18 @@ fn between(parts: &[Glance]) -> Vec<Loss> {
         losses.push(loss(kind, from(last), None));
     }
     losses
+}
+
+/// How each part that was cut off goes on in the next.
+fn resumed(parts: &[Glance]) -> Vec<Option<Resumed>> {
+    let pair = |pair: &[Glance]| {
+        let [one, next] = pair else { return None };
+        let own = before(one).filter(|_| after(one).is_none() && one.number + 1 == next.number)?;
+        let before = before(next)?.clone();
+        let messages = before.messages.saturating_sub(own.messages);
+        Some(Resumed { before, messages, at: next.times.map(|times| times.0) })
+    };
+    parts.windows(2).map(pair).collect()
 }
 
 fn goes_on(glance: &Glance) -> bool {

@@ -9,18 +9,20 @@
 //! | record | content |
 //! |---|---|
 //! | metadata `headrace` | [`format::FORMAT_KEY`] and the caller's entries: version, digest of the configuration, clock anchors |
-//! | metadata `headrace.part` | only where a recording has several parts: identity of this one ([`PartHead`]) |
+//! | metadata `headrace.part` | only of a recording: identity of this part of it ([`PartHead`]) |
 //! | attachments | `vehicle.toml` and the files that it names |
 //! | a chunk | definitions of all channels, nothing else |
 //! | metadata `headrace.channels` | the same definitions again, so that a log survives the loss of that chunk |
 //! | metadata `headrace.losses` | only where something is missing: description and time span ([`format::LOSSES`]) |
 //! | chunks | messages, each chunk at most half a second of a dive |
-//! | metadata `headrace.part.end` | only in a part: whether another follows ([`PartEnd`]) |
+//! | metadata `headrace.part.end` | only of a recording: whether another part follows ([`PartEnd`]) |
 //! | summary | indexes for viewers |
 //!
 //! [`DiveLog`] reads one log, or the parts of a recording as one.
 //!
-//! The file is append-only: written bytes are never modified, so a power cut can't damage them.
+//! The file is append-only: written bytes are never modified, so a power cut can't damage them. After an error of the medium a
+//! file is left as it is, without an end, and the recording goes on in another part, which repeats what wasn't synced: its
+//! [`PartHead`] says from which message of each channel on. Readers leave these out of the part before.
 
 #![cfg_attr(not(test), warn(clippy::indexing_slicing))]
 
@@ -54,7 +56,7 @@ mod writer;
 
 pub use derived_channels::{DerivedChannels, Made};
 pub use digest::{file_digest, files_digest};
-pub use dive_log::{DiveLog, DivePlace, PartFile, files_of};
+pub use dive_log::{DiveLog, DivePlace, PartFile};
 pub use error::LogError;
 pub use fault::{RecordingEvent, RecordingFault};
 pub use loss::{Loss, LossKind};
@@ -62,7 +64,7 @@ pub use part::{Part, PartEnd, PartHead, Progress, dive_name, part_path};
 pub use reader::{ChannelInfo, LogInfo, LogMessage, LogPlace, LogReader, MessageKind};
 pub use recorder::{Full, Recorder, RecorderHandle, RecorderPort, SentPort};
 pub use recover::{RECOVERED_FROM, Recovered, recover};
-pub use rotate::{Every, Rotation};
+pub use rotate::{Every, Rotation, files_of};
 pub use space::LeftOut;
 pub use storage::{Disk, Storage, StoredFile};
 pub use trim::{Change, TRIMMED, Trim, Trimmed, trim};

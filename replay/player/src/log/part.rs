@@ -134,7 +134,7 @@ impl PartHead {
         entries
     }
 
-    fn read(entries: &BTreeMap<String, String>) -> Option<Self> {
+    pub(super) fn read(entries: &BTreeMap<String, String>) -> Option<Self> {
         Some(Self {
             dive: entries.get(DIVE_KEY)?.clone(),
             number: entries.get(NUMBER_KEY)?.parse().ok().filter(|number| *number > 0)?,

@@ -16,7 +16,7 @@ use super::format::VEHICLE_FILE;
 use super::framing::{ChunkPlace, Definition, LogFile};
 use super::loss::Losses;
 use super::merge::{Batch, Merge};
-use super::part::Part;
+use super::part::{Part, Progress};
 use super::scan::{Piece, Span, date_losses, scan};
 use super::{LogError, Loss, LossKind, SourceInfo};
 
@@ -136,6 +136,8 @@ pub struct LogReader<R = File> {
     latest: u64,
     late: u64,
     finished: bool,
+    /// By channel, the message number from which on another log repeats its messages.
+    repeated: BTreeMap<u16, u32>,
 }
 
 impl LogReader<File> {
@@ -186,6 +188,7 @@ impl<R: Read + Seek> LogReader<R> {
             latest: 0,
             late: 0,
             finished: false,
+            repeated: BTreeMap::new(),
         })
     }
 
@@ -207,6 +210,12 @@ impl<R: Read + Seek> LogReader<R> {
             let schema = self.schemas.get(&schema).map(String::as_str);
             ChannelInfo { id: definition.id, topic: &definition.topic, encoding, schema }
         })
+    }
+
+    /// Leaves out what comes after these totals. Before the first message is read.
+    pub(super) fn pass_over(&mut self, after: &Progress) {
+        let number = |topic: &str| after.sequences.get(topic).copied().unwrap_or_default();
+        self.repeated = self.channels.all().map(|channel| (channel.id, number(&channel.topic))).collect();
     }
 
     /// First and last log time, from the chunk headers.
@@ -365,7 +374,7 @@ impl<R: Read + Seek> LogReader<R> {
             // The file has changed since the scan.
             None => found.push(LossKind::Contents),
         }
-        place_entries(&mut batch, &self.channels, &mut found);
+        place_entries(&mut batch, &self.channels, &self.repeated, &mut found);
         for kind in found {
             self.lose(number, kind);
         }
@@ -468,10 +477,20 @@ fn read_run<R: Read + Seek>(file: &mut LogFile<R>, span: &Span, batch: &mut Batc
     Ok(())
 }
 
-/// Sets the ranks of messages, and removes those of unknown channels.
-fn place_entries(batch: &mut Batch, channels: &Channels, found: &mut Vec<LossKind>) {
+/// Sets the ranks of messages, and removes those of unknown channels and those that are repeated elsewhere.
+fn place_entries(
+    batch: &mut Batch,
+    channels: &Channels,
+    repeated: &BTreeMap<u16, u32>,
+    found: &mut Vec<LossKind>,
+) {
     let mut unknown: BTreeMap<u16, u64> = BTreeMap::new();
     batch.entries.retain_mut(|entry| {
+        // Message numbers wrap.
+        let is_from = |number: &u32| entry.head.sequence.wrapping_sub(*number) <= u32::MAX / 2;
+        if repeated.get(&entry.head.channel).is_some_and(is_from) {
+            return false;
+        }
         let channel = channels.get(entry.head.channel);
         if let Some(channel) = channel {
             entry.rank = channel.rank;

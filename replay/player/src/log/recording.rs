@@ -390,6 +390,7 @@ impl Recording {
                 to: None,
                 continued: self.open.as_ref().map(|next| next.path.clone()),
             };
+            self.state(fault.from, fault.to, &fault.words());
             add(&mut self.sum.faults, fault);
         }
         self.sum.bytes += bytes;

@@ -1,10 +1,15 @@
 //! When a recording goes on in another part, and the files that are taken for its parts.
 
+use std::fs::File;
 use std::path::{Path, PathBuf};
 
 use headrace_geometry::time::DurNs;
 
-use super::part::named_part;
+use super::LogError;
+use super::fields::Fields;
+use super::format::unseal;
+use super::framing::{Found, Item, LogFile, look};
+use super::part::{PART, PartHead, named_part};
 use super::storage::folder_of;
 
 /// When a part of a recording ends.
@@ -48,4 +53,70 @@ pub(super) fn parts_of(recording: &Path) -> std::io::Result<Vec<PathBuf>> {
     }
     parts.sort();
     Ok(parts.into_iter().map(|(_, path)| path).collect())
+}
+
+/// Files of the paths a user named: a log, with the parts in which its recording went on after an error; a folder of logs; or a
+/// recording in parts by the name it was given.
+///
+/// Errors: a folder can't be read or contains no log.
+pub fn files_of(named: &[PathBuf]) -> Result<Vec<PathBuf>, LogError> {
+    let mut files = Vec::new();
+    for path in named {
+        let failed = |source| LogError::Open { path: path.to_owned(), source };
+        if path.is_dir() {
+            let entries = std::fs::read_dir(path).and_then(Iterator::collect::<Result<Vec<_>, _>>);
+            let entries = entries.map_err(failed)?;
+            let mut logs: Vec<_> = entries.into_iter().map(|entry| path.join(entry.file_name())).collect();
+            logs.retain(|log| log.extension().is_some_and(|extension| extension == "mcap"));
+            logs.sort();
+            if logs.is_empty() {
+                return Err(LogError::NoLogs { folder: path.to_owned() });
+            }
+            files.append(&mut logs);
+        } else if path.exists() {
+            files.push(path.clone());
+            files.extend(continuations(path));
+        } else {
+            // Without parts, opening the log reports that it doesn't exist.
+            let parts = parts_of(path).unwrap_or_default();
+            files.extend(if parts.is_empty() { vec![path.clone()] } else { parts });
+        }
+    }
+    Ok(files)
+}
+
+/// The further parts of a recording whose first part is at that path.
+fn continuations(path: &Path) -> Vec<PathBuf> {
+    let mut parts = parts_of(path).unwrap_or_default();
+    if parts.is_empty() {
+        return parts;
+    }
+    let Some(first) = part_head(path).filter(|head| head.number == 1) else { return Vec::new() };
+    // One without a head was being made when the power failed.
+    parts.retain(|part| part_head(part).is_none_or(|head| head.dive == first.dive));
+    parts
+}
+
+/// Records at the beginning of a log among which is what part it is.
+const HEAD_RECORDS: usize = 4;
+/// Longest record that is read for it, bytes.
+const MAX_HEAD_BYTES: u64 = 1 << 20;
+
+/// Which part a log says that it is; `None` where it says nothing.
+fn part_head(path: &Path) -> Option<PartHead> {
+    let mut file = LogFile::new(File::open(path).ok()?, path.display().to_string()).ok()?;
+    let mut at = mcap::MAGIC.len() as u64;
+    for _ in 0..HEAD_RECORDS {
+        let Found::Record(frame) = look(&mut file, at).ok()? else { return None };
+        if matches!(frame.item, Item::Metadata) && frame.end - frame.body <= MAX_HEAD_BYTES {
+            let body = file.bytes_at(frame.body, frame.end - frame.body).ok()?;
+            let mut fields = Fields::new(&body);
+            if fields.text()? == PART {
+                let mut entries = fields.map()?;
+                return if unseal(PART, &mut entries) { PartHead::read(&entries) } else { None };
+            }
+        }
+        at = frame.end;
+    }
+    None
 }

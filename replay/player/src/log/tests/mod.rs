@@ -7,6 +7,7 @@ mod places;
 mod recorder;
 mod recover;
 mod round_trip;
+mod storage;
 
 use std::io::Cursor;
 

@@ -8,17 +8,17 @@ use super::super::{DiveLog, Every, LogError, LogWriter, Recorder, Rotation, file
 use super::*;
 
 /// A folder that is removed with the test.
-struct Folder(PathBuf);
+pub(super) struct Folder(pub(super) PathBuf);
 
 impl Folder {
-    fn new(name: &str) -> Self {
+    pub(super) fn new(name: &str) -> Self {
         let path = std::env::temp_dir().join(format!("headrace-parts-{}-{name}", std::process::id()));
         std::fs::remove_dir_all(&path).ok();
         std::fs::create_dir_all(&path).unwrap();
         Self(path)
     }
 
-    fn part(&self, number: u32) -> PathBuf {
+    pub(super) fn part(&self, number: u32) -> PathBuf {
         part_path(&self.0.join("dive.mcap"), number)
     }
 
@@ -54,7 +54,7 @@ fn rotation(every: Every) -> Rotation {
     Rotation { every: Some(every), dive: "one".to_owned() }
 }
 
-fn all(log: &mut DiveLog) -> Vec<Seen> {
+pub(super) fn all(log: &mut DiveLog) -> Vec<Seen> {
     let mut seen = Vec::new();
     while let Some(message) = log.next().unwrap() {
         let kind = format!("{:?}", message.kind);

@@ -1,0 +1,346 @@
+//! Every operation of the storage fails in turn, once or for a while: nothing is lost without a word, nothing twice, and no
+//! log that was cut off looks whole.
+
+#![expect(
+    clippy::disallowed_types,
+    reason = "the recorder's end of a test's storage is asked about once a step"
+)]
+
+use std::collections::BTreeMap;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use headrace_geometry::time::DurNs;
+
+use super::super::{
+    DiveLog, Every, LossKind, Recorder, RecordingEvent, Rotation, Storage, StoredFile, Summary, files_of,
+    recover,
+};
+use super::parts::{Folder, all};
+use super::*;
+
+/// What is done to the storage.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Op {
+    Create,
+    Write,
+    Sync,
+    Remove,
+}
+
+/// Which operations fail, by kind and number.
+type Plan = Box<dyn FnMut(Op, u64) -> Option<io::Error> + Send>;
+
+/// A file, and how much of it is certain to be there after a power cut.
+#[derive(Debug, Clone, Default)]
+struct Content {
+    bytes: Vec<u8>,
+    synced: usize,
+}
+
+struct World {
+    files: BTreeMap<PathBuf, Content>,
+    ops: u64,
+    plan: Plan,
+    /// Whether what a failed sync was to save is gone.
+    forgets: bool,
+}
+
+impl World {
+    fn attempt(&mut self, op: Op) -> io::Result<()> {
+        let number = self.ops;
+        self.ops += 1;
+        (self.plan)(op, number).map_or(Ok(()), Err)
+    }
+}
+
+#[derive(Clone)]
+struct Faulty(Arc<Mutex<World>>);
+
+struct FaultyFile(Faulty, PathBuf);
+
+impl Faulty {
+    fn new(plan: impl FnMut(Op, u64) -> Option<io::Error> + Send + 'static) -> Self {
+        let plan: Plan = Box::new(plan);
+        Self(Arc::new(Mutex::new(World { files: BTreeMap::new(), ops: 0, plan, forgets: false })))
+    }
+
+    fn with<T>(&self, act: impl FnOnce(&mut World) -> T) -> T {
+        act(&mut self.0.lock().unwrap())
+    }
+
+    /// Puts the files into a folder, with what a power cut leaves of them or all.
+    fn store(&self, cut: bool) {
+        self.with(|world| {
+            for (path, content) in &world.files {
+                let len = if cut { content.synced } else { content.bytes.len() };
+                std::fs::write(path, &content.bytes[..len]).unwrap();
+            }
+        });
+    }
+}
+
+impl Storage for Faulty {
+    fn create(&mut self, path: &Path) -> io::Result<Box<dyn StoredFile>> {
+        self.with(|world| {
+            world.attempt(Op::Create)?;
+            if world.files.contains_key(path) {
+                return Err(io::Error::from(io::ErrorKind::AlreadyExists));
+            }
+            world.files.insert(path.to_owned(), Content::default());
+            Ok(())
+        })?;
+        Ok(Box::new(FaultyFile(self.clone(), path.to_owned())))
+    }
+
+    fn remove(&mut self, path: &Path) -> io::Result<()> {
+        self.with(|world| {
+            world.attempt(Op::Remove)?;
+            world.files.remove(path).map(|_| ()).ok_or(io::ErrorKind::NotFound.into())
+        })
+    }
+
+    fn free_bytes(&mut self, _: &Path) -> Option<u64> {
+        None
+    }
+}
+
+impl StoredFile for FaultyFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0.with(|world| {
+            let done = world.attempt(Op::Write);
+            // A write that fails may have done some of its work.
+            let len = if done.is_err() { bytes.len() / 2 } else { bytes.len().min(3000) };
+            world.files.get_mut(&self.1).unwrap().bytes.extend_from_slice(&bytes[..len]);
+            done.map(|()| len)
+        })
+    }
+
+    fn sync(&mut self) -> io::Result<()> {
+        self.0.with(|world| {
+            let done = world.attempt(Op::Sync);
+            let forgets = world.forgets;
+            let content = world.files.get_mut(&self.1).unwrap();
+            match done {
+                Ok(()) => content.synced = content.bytes.len(),
+                Err(_) if forgets => content.bytes[content.synced..].fill(0),
+                Err(_) => {}
+            }
+            done
+        })
+    }
+}
+
+const TICKS: u64 = 60;
+
+fn rotation(every: Option<Every>) -> Rotation {
+    Rotation { every, dive: "one".to_owned() }
+}
+
+/// A dive of six seconds, a step each tenth of one.
+fn dive(folder: &Folder, storage: &Faulty, every: Option<Every>) -> (Summary, Vec<RecordingEvent>) {
+    let path = folder.0.join("dive.mcap");
+    let begun =
+        Recorder::unthreaded(Box::new(storage.clone()), &path, &header(true), &rotation(every), 0, None);
+    let (mut port, mut worker) = begun.unwrap();
+    let mut events = Vec::new();
+    for tick in 0..TICKS {
+        let at = MonoNs((tick + 10) * 100_000_000);
+        port.raw(0, at, at, &noise(tick, 700)).unwrap();
+        port.raw(2, at, MonoNs(at.0 - 7), &noise(tick, 16)).unwrap();
+        port.tick(tick, at, &[0, 2]).unwrap();
+        port.result(0, at, b"{}").unwrap();
+        worker.step(Duration::from_millis(100 * tick));
+        events.extend(std::iter::from_fn(|| worker.next_event()));
+    }
+    (worker.finish(Duration::from_millis(100 * TICKS)), events)
+}
+
+/// Messages and losses of the recording in a folder.
+fn read_back(folder: &Folder) -> (Vec<Seen>, Vec<Loss>) {
+    let mut log = DiveLog::open(&files_of(&[folder.0.join("dive.mcap")]).unwrap()).unwrap();
+    let seen = all(&mut log);
+    (seen, log.losses())
+}
+
+fn eio() -> io::Error {
+    io::Error::from_raw_os_error(5)
+}
+
+/// What a dive without faults gives, and its operations; the first ones make the header.
+fn without_faults(name: &str, every: Option<Every>) -> (Vec<Seen>, u64) {
+    let folder = Folder::new(name);
+    let storage = Faulty::new(|_, _| None);
+    let (summary, events) = dive(&folder, &storage, every);
+    storage.store(false);
+    let (seen, losses) = read_back(&folder);
+    assert_eq!((seen.len() as u64, summary.messages), (4 * TICKS, 4 * TICKS));
+    assert_eq!((losses, summary.faults, events), (vec![], vec![], vec![]));
+    (seen, storage.with(|world| world.ops))
+}
+
+/// Operations before the first message: the first part is created, and its header written and synced.
+fn header_ops() -> u64 {
+    let folder = Folder::new("header");
+    let storage = Faulty::new(|_, _| None);
+    let path = folder.0.join("dive.mcap");
+    drop(Recorder::unthreaded(Box::new(storage.clone()), &path, &header(true), &rotation(None), 0, None));
+    storage.with(|world| world.ops)
+}
+
+#[test]
+fn an_operation_that_fails_once_costs_nothing_and_is_told() {
+    for (name, every) in [("once", None), ("once in parts", Some(Every::Span(DurNs::from_millis(2000))))] {
+        let (expected, ops) = without_faults(name, every);
+        for (at, forgets) in (header_ops()..ops).flat_map(|at| [(at, false), (at, true)]) {
+            let folder = Folder::new(name);
+            let storage = Faulty::new(move |_, number| (number == at).then(eio));
+            storage.with(|world| world.forgets = forgets);
+            let (summary, events) = dive(&folder, &storage, every);
+            storage.store(false);
+            let (seen, losses) = read_back(&folder);
+            let which = format!("{name}, operation {at} of {ops}, {forgets}: {:?}", summary.faults);
+            assert_eq!(seen, expected, "{which}");
+            assert_eq!(summary.messages, 4 * TICKS, "{which}");
+            // Another part that can't be begun costs the rotation alone.
+            let Some(fault) = summary.faults.first() else {
+                assert!(every.is_some() && losses.is_empty(), "{which}: {losses:?}");
+                continue;
+            };
+            assert_eq!((summary.faults.len(), fault.lost), (1, 0), "{which}");
+            assert!(fault.error.contains("Input/output error"), "{which}");
+            // An end that isn't certain is whole if it is there nevertheless: everything before it is certain.
+            if fault.error.contains("the summary") {
+                continue;
+            }
+            assert!(!losses.is_empty(), "{which}");
+            let told: Vec<String> = losses.iter().map(ToString::to_string).collect();
+            let is_told = told.iter().any(|told| told.contains(&fault.words()));
+            assert!(is_told || fault.continued.is_none(), "{which}: {told:?}");
+            // The failed part has no end, whatever else it has.
+            let (_, alone) = read(&std::fs::read(&fault.path).unwrap());
+            let is_cut = |loss: &Loss| matches!(loss.kind, LossKind::Truncated | LossKind::Framing);
+            // One of which nothing was certain was removed, and is there anew.
+            let is_anew = fault.continued.as_ref() == Some(&fault.path);
+            assert!(is_anew || alone.iter().any(is_cut), "{which}: {alone:?}");
+            if let [RecordingEvent::Failed { .. }, RecordingEvent::Resumed(resumed)] = events.as_slice() {
+                assert_eq!(resumed, fault, "{which}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_medium_that_is_gone_for_a_while_costs_nothing_and_for_good_what_comes_after() {
+    let (expected, ops) = without_faults("while", None);
+    for from in header_ops()..ops {
+        for lasts in [2, 5, u64::MAX] {
+            let folder = Folder::new("while");
+            let storage = Faulty::new(move |_, number| (number >= from && number - from < lasts).then(eio));
+            let (summary, events) = dive(&folder, &storage, None);
+            storage.store(false);
+            let (seen, losses) = read_back(&folder);
+            let which = format!("{lasts} from operation {from} on: {:?}", summary.faults);
+            let lost: u64 = summary.faults.iter().map(|fault| fault.lost).sum();
+            assert_eq!(summary.messages + lost, 4 * TICKS, "{which}");
+            // What isn't certain may nevertheless be there.
+            assert!(expected.starts_with(&seen) && seen.len() as u64 >= summary.messages, "{which}");
+            let is_end = summary.faults.iter().all(|fault| fault.error.contains("the summary"));
+            assert!(!summary.faults.is_empty() && (is_end || !losses.is_empty()), "{which}");
+            // The first part stays also where nothing else can be made.
+            assert!(folder.0.join("dive.mcap").exists());
+            if lasts < u64::MAX && from < ops / 2 {
+                assert_eq!((lost, seen.len()), (0, expected.len()), "{which}: {events:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn what_there_is_no_memory_for_is_lost_oldest_first_and_counted() {
+    let folder = Folder::new("long");
+    let path = folder.0.join("dive.mcap");
+    let failing = Arc::new(std::sync::atomic::AtomicBool::new(false));
+    let is_failing = Arc::clone(&failing);
+    let storage = Faulty::new(move |_, _| is_failing.load(std::sync::atomic::Ordering::Relaxed).then(eio));
+    let begun =
+        Recorder::unthreaded(Box::new(storage.clone()), &path, &header(true), &rotation(None), 1 << 20, None);
+    let (mut port, mut worker) = begun.unwrap();
+    for tick in 0..1500_u64 {
+        failing.store((100..1200).contains(&tick), std::sync::atomic::Ordering::Relaxed);
+        let at = MonoNs((tick + 10) * 100_000_000);
+        port.raw(0, at, at, &noise(tick, 20_000)).unwrap();
+        port.tick(tick, at, &[0]).unwrap();
+        while worker.step(Duration::from_millis(100 * tick)) {}
+    }
+    let summary = worker.finish(Duration::from_secs(150));
+    let [fault] = summary.faults.as_slice() else { panic!("{:?}", summary.faults) };
+    assert_eq!(summary.messages + fault.lost, 3000);
+    assert!((400..700).contains(&fault.lost), "16 MiB of 22 are kept: {fault:?}");
+    storage.store(false);
+    let (seen, losses) = read_back(&folder);
+    assert_eq!(seen.len() as u64, summary.messages);
+    // One gap, and the loss is told with its ends.
+    let times: Vec<u64> = seen.iter().map(|message| message.1).collect();
+    let gaps: Vec<_> = times.windows(2).filter(|pair| pair[1] - pair[0] > 100_000_000).collect();
+    let stated = losses.iter().find(
+        |loss| matches!(&loss.kind, LossKind::InPart { kind, .. } if matches!(**kind, LossKind::Stated(_))),
+    );
+    let stated = stated.unwrap();
+    assert_eq!(gaps, [&[stated.from.unwrap().0, stated.to.unwrap().0]]);
+    assert!(stated.to_string().contains(&format!("{} messages are missing", fault.lost)), "{stated}");
+}
+
+#[test]
+fn a_power_cut_leaves_all_that_was_synced_also_after_an_error() {
+    let (expected, ops) = without_faults("cut", None);
+    for at in (header_ops()..ops).step_by(2) {
+        let folder = Folder::new("cut");
+        let storage = Faulty::new(move |_, number| (number == at).then(eio));
+        let path = folder.0.join("dive.mcap");
+        let begun =
+            Recorder::unthreaded(Box::new(storage.clone()), &path, &header(true), &rotation(None), 0, None);
+        let (mut port, mut worker) = begun.unwrap();
+        for tick in 0..TICKS / 2 {
+            let time = MonoNs((tick + 10) * 100_000_000);
+            port.raw(0, time, time, &noise(tick, 700)).unwrap();
+            port.raw(2, time, MonoNs(time.0 - 7), &noise(tick, 16)).unwrap();
+            port.tick(tick, time, &[0, 2]).unwrap();
+            port.result(0, time, b"{}").unwrap();
+            worker.step(Duration::from_millis(100 * tick));
+        }
+        storage.store(true);
+        let (seen, losses) = read_back(&folder);
+        assert!(expected.starts_with(&seen), "operation {at}");
+        // Half a second between syncs, and a step in which it is tried again.
+        assert!(seen.len() as u64 >= 4 * (TICKS / 2 - 7), "operation {at}: {}", seen.len());
+        assert!(!losses.is_empty(), "operation {at}");
+    }
+}
+
+#[test]
+fn a_recording_with_a_fault_is_recovered_as_one_log_that_tells_it() {
+    let folder = Folder::new("recovered");
+    let mut syncs = 0;
+    let storage = Faulty::new(move |op, _| {
+        syncs += u64::from(op == Op::Sync);
+        (op == Op::Sync && syncs == 8).then(eio)
+    });
+    let (summary, _) = dive(&folder, &storage, None);
+    storage.store(false);
+    let files = files_of(&[folder.0.join("dive.mcap")]).unwrap();
+    assert_eq!(files, [folder.0.join("dive.mcap"), folder.part(2)]);
+    let mut output = Vec::new();
+    let done = recover(&mut || DiveLog::open(&files), &mut output, &[], "parts").unwrap();
+    assert_eq!(done.messages, 4 * TICKS);
+    let (recovered, losses) = read(&output);
+    assert_eq!((recovered.len() as u64, losses.len()), (4 * TICKS, 1));
+    let told = losses[0].to_string();
+    assert!(told.contains(&summary.faults[0].words()), "{told}");
+    // Its first part alone lacks the rest, and is no whole dive.
+    let first = recover(&mut || DiveLog::open(&files[..1]), &mut Vec::new(), &[], "first").unwrap();
+    assert!(first.messages < 4 * TICKS);
+    assert!(first.losses.iter().any(|loss| loss.kind == LossKind::Truncated), "{:?}", first.losses);
+}
