@@ -10,7 +10,7 @@ use headrace_tests::world::plan::Plan;
 use headrace_tests::world::{Sabotage, World};
 
 /// Worlds lived through; more, and others, by the environment: `HEADRACE_WORLD_SEEDS=1000..2000`.
-const SEEDS: std::ops::Range<u64> = 0..80;
+const SEEDS: std::ops::Range<u64> = 0..300;
 /// Worlds in which sabotage must show.
 const ENOUGH: u64 = 100;
 
