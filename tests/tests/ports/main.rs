@@ -15,6 +15,8 @@ mod kernel_drivers;
 mod rehearsal;
 #[cfg(target_os = "linux")]
 mod run_ports;
+#[cfg(target_os = "linux")]
+mod soak;
 mod splits;
 #[cfg(unix)]
 mod who_speaks;

@@ -48,7 +48,7 @@ pub(crate) fn headrace() -> Command {
     command
 }
 
-fn interrupt(child: &Child) {
+pub(crate) fn interrupt(child: &Child) {
     let done = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
     assert!(done.success());
 }
@@ -94,7 +94,7 @@ fn live(folder: &Folder, scene: &Path) -> Value {
     report(&folder.path("live.json"))
 }
 
-fn report(path: &Path) -> Value {
+pub(crate) fn report(path: &Path) -> Value {
     serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
 }
 
