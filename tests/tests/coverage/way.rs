@@ -289,3 +289,23 @@ fn a_dive_that_mostly_had_no_position_is_no_inspection() {
     let answer = folder.headrace(&["replay", "dive.mcap"]);
     assert!(answer.stdout.contains("NO INSPECTION: "), "{}", answer.stdout);
 }
+
+/// What is placed while the estimate settles is no measure of what is placed after: a vehicle that waits until it is sure of its
+/// heading has all metres but those its front heads looked at meanwhile.
+#[test]
+fn a_vehicle_that_waits_until_its_heading_is_known_loses_no_metre_to_doubt() {
+    let vehicle = VEHICLE.replace("planned_speed_mps = 0.10", "planned_speed_mps = 0.09");
+    assert_ne!(vehicle, VEHICLE);
+    let scene = format!(
+        "seed = 3\nvehicle = \"vehicle.toml\"\n[trajectory]\nkind = \"waypoints\"\n\
+         [[trajectory.waypoints]]\nchainage_m = {START_M}\nstay_s = 10\n\
+         [[trajectory.waypoints]]\nchainage_m = {}\nspeed_mps = 0.09\n[effects]\nmotion_within_turn = {{}}\n",
+        START_M + 6.0
+    );
+    let report = instrumented::dive(&vehicle, &scene).report;
+    accounted_for("waited", &report);
+    assert!(report.summary.cannot_say_m <= 0.25, "{} m: {:?}", report.summary.cannot_say_m, report.unsure);
+    let inside =
+        |s: &&SectionReport| s.start_m > START_M + HEAD_M + 0.25 && s.end_m < START_M + 6.0 - HEAD_M - 0.5;
+    assert!(report.sections.iter().filter(inside).all(|s| s.verdict == "pass"), "{:?}", report.unsure);
+}

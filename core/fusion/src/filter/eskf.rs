@@ -23,7 +23,7 @@ use super::window::{Waiting, Window};
 use crate::smooth::step::{Move, Step};
 use headrace_geometry::frames::{Body, Point3, Rot, Tunnel, Vec3};
 use headrace_geometry::math;
-use headrace_geometry::time::MonoNs;
+use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_geometry::tunnel::Profile;
 use headrace_sensor::device::SensorKind;
 use headrace_sensor::reading::Reading;
@@ -53,6 +53,8 @@ const TIGHTENS_OVER_S: f64 = 100.0;
 /// Share of a wall's ranges' correction of the attitude, and of what is learnt from it, that is made. What matters to coverage is
 /// the attitude of one pass relative to the next, which the gyros know better than walls, whose shape isn't the design's.
 const WALL_SHARE: f64 = 0.3;
+/// Time within which an estimate settles. Later a stretch that ends costs more metres than it makes surer.
+const SETTLES_WITHIN: DurNs = DurNs(20_000_000_000);
 /// Length of an epoch, s.
 const EPOCH_S: f64 = 0.1;
 
@@ -74,6 +76,8 @@ pub struct Eskf {
     pub way_sought: Option<MonoNs>,
     /// How often what was placed before has lost its relation to what is placed from then on.
     pub ties: u32,
+    /// When the estimate began, and the standard deviation of yaw when its present stretch did, radians.
+    begun: (MonoNs, f64),
     /// The estimates through the last epoch, before its measurements.
     knots: Vec<(MonoNs, State)>,
     agreement: Agreement,
@@ -91,7 +95,7 @@ pub struct Eskf {
     keeps_steps: bool,
 }
 
-stateful!(Eskf { state: at, state, factors, clones, way_sought, ties, agreement, cable, unrest, loose_m, suspicions, doubts; lists: knots; fixed: steps, keeps_steps; });
+stateful!(Eskf { state: at, state, factors, clones, way_sought, ties, begun, agreement, cable, unrest, loose_m, suspicions, doubts; lists: knots; fixed: steps, keeps_steps; });
 
 impl Default for Eskf {
     /// Allocated buffers without an estimate.
@@ -103,6 +107,7 @@ impl Default for Eskf {
             clones: ErrorClones::default(),
             way_sought: None,
             ties: 0,
+            begun: (MonoNs(0), 0.0),
             knots: Vec::with_capacity(KNOTS),
             agreement: Agreement::default(),
             cable: Cable::default(),
@@ -134,6 +139,20 @@ impl Eskf {
         self.doubts = [0.0; ERRORS];
         self.way_sought = None;
         self.ties += 1;
+        self.begun = (at, self.pose_sd().yaw_rad);
+    }
+
+    /// While the estimate settles, samples are placed ever more surely, and those from before are no measure of passes after:
+    /// whenever yaw has become twice as sure, what is placed from then on is a stretch of its own.
+    fn settle(&mut self) {
+        let (begun, yaw_rad) = self.begun;
+        let now_rad = self.pose_sd().yaw_rad;
+        if self.at.since(begun).0 <= SETTLES_WITHIN.0 && now_rad < yaw_rad / 2.0 {
+            self.begun = (begun, now_rad);
+            self.ties += 1;
+            self.clones.clear();
+            self.clones.note(self.at, &self.factors);
+        }
     }
 
     /// Advances to a later time, and fuses the window's readings up to it.
@@ -180,6 +199,7 @@ impl Eskf {
         self.bound_speed();
         self.stay_inside(&context.profile);
         self.clones.note(to, &self.factors);
+        self.settle();
         self.unrest.pass(leg.dt_s(), &context.settings);
         self.note_jolt(window.jolted(to));
         self.agreement.seek(&mut self.doubts);
