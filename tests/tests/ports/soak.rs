@@ -17,7 +17,7 @@ const LOOK: Duration = Duration::from_secs(5);
 const LOOKS_A_FAULT: usize = 7;
 /// How long the devices are frozen.
 const FREEZE: Duration = Duration::from_millis(1_500);
-/// Looks before memory counts: pages are touched for the first time.
+/// Looks before files and threads count.
 const WARM_UP: usize = 12;
 
 /// What a process takes.
@@ -102,6 +102,10 @@ fn a_soak_neither_leaks_nor_drops() {
     let warm = &taken[WARM_UP.min(taken.len() / 2)..];
     let an_hour = 3600.0 / LOOK.as_secs_f64();
     let resident: Vec<f64> = warm.iter().map(|look| look.resident_kib / 1024.0).collect();
+    let tenths: Vec<String> =
+        (0..=10).map(|tenth| format!("{:.1}", resident[tenth * (resident.len() - 1) / 10])).collect();
+    // Rings, lists and sections are allocated when the dive begins, and touched one after the other.
+    let later = &resident[resident.len() / 2..];
     let (first, last) = (warm[0], warm[warm.len() - 1]);
     // Linux: 100 ticks a second.
     let core = (last.cpu_ticks - first.cpu_ticks) / 100.0 / ((warm.len() - 1) as f64 * LOOK.as_secs_f64());
@@ -112,11 +116,10 @@ fn a_soak_neither_leaks_nor_drops() {
         .map(|source| source["line"]["dropped_packets"].as_u64().unwrap())
         .sum();
     println!(
-        "{minutes} min, {freezes} freezes of {FREEZE:?}: exit {status}; {:.1} to {:.1} MiB, {:+.2} MiB an hour; {} to {} files; \
+        "{minutes} min, {freezes} freezes of {FREEZE:?}: exit {status}; MiB {}, in the second half {:+.1} an hour; {} to {} files; \
          {} to {} threads; {:.2} % of a core; {dropped} packets dropped; way {} m; losses {}",
-        resident[0],
-        resident[resident.len() - 1],
-        slope(&resident) * an_hour,
+        tenths.join(" "),
+        slope(later) * an_hour,
         first.files,
         last.files,
         first.threads,
