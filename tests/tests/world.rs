@@ -47,7 +47,7 @@ fn whatever_goes_wrong_nothing_is_lost_silently() {
         failures += disk_failures;
     }
     println!("{} worlds, {failures} operations of the disk failed, {faults:#?}", seeds().count());
-    assert_eq!(faults.len(), 10 + 3 + 5 + 3, "kinds of faults: {faults:#?}");
+    assert_eq!(faults.len(), 10 + 4 + 5 + 3, "kinds of faults: {faults:#?}");
 }
 
 #[test]
@@ -73,5 +73,17 @@ fn sabotage_is_found() {
         });
         let (seed, broken) = found.unwrap_or_else(|| panic!("{sabotage:?} shows in none of {ENOUGH} worlds"));
         println!("{sabotage:?}: found in world {seed}: {}", broken[0]);
+    }
+}
+
+#[test]
+fn a_terminal_that_stands_changes_nothing() {
+    for seed in 0..20 {
+        let [taken, stood] = [false, true].map(|stands| World::new(seed).with_terminal(stands).live());
+        assert_eq!((taken.digest, &taken.consumed), (stood.digest, &stood.consumed), "seed {seed}");
+        let bytes = |lived: &headrace_tests::world::Lived| {
+            lived.left.iter().map(|file| file.bytes.len()).sum::<usize>()
+        };
+        assert_eq!(bytes(&taken), bytes(&stood), "seed {seed}");
     }
 }

@@ -19,6 +19,7 @@ use headrace_config::Document;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::App;
 use headrace_monitor::merge::Inbox;
+use headrace_monitor::outlet::{NoticeOutlet, NoticeReceiver};
 use headrace_monitor::run::Loop;
 use headrace_ports::{Attached, Board, Common, LineHistory, LineService};
 use headrace_replay::drive::{Pace, drive};
@@ -43,6 +44,8 @@ use plan::{BEGIN, Ending, MachineFault, Plan};
 const LONGEST_STEP_NS: usize = 12_000_000;
 /// How long a finished dive waits for what is under way.
 const PATIENCE: DurNs = DurNs::from_millis(4_000);
+/// Capacity of the queue to the terminal, soon full.
+const NOTICES: usize = 4;
 /// What the recorder took longer ago is synced: half a second, and a step of the world.
 const SYNC_PERIOD: DurNs = DurNs::from_millis(500 + 13);
 
@@ -125,6 +128,7 @@ pub struct World {
     /// Packets consumed when the recorder had emptied its queue, with the time, since its last trouble.
     taken: VecDeque<(MonoNs, usize)>,
     is_failing: bool,
+    notices: NoticeReceiver,
     /// Packets that must be in the log, whatever the end.
     certain: usize,
 }
@@ -194,7 +198,7 @@ impl World {
             cables.iter().map(|cable| !matches!(cable.connect, Connect::Udp { .. })).collect();
         let plan = Plan::draw(&mut random, &streams);
         let disk = SimulatedDisk::new(Arc::clone(&clock), &plan.disk, sabotage);
-        let (mut dive, recorder) = assemble(&vehicle, &text, &disk);
+        let (mut dive, recorder, notices) = assemble(&vehicle, &text, &disk);
         let board = Board::new(1 << 16);
         let waker = crossbeam::sync::Parker::new().unparker().clone();
         let common = Common {
@@ -237,8 +241,16 @@ impl World {
             recorder,
             taken,
             is_failing,
+            notices,
             certain,
         }
+    }
+
+    /// The same world with a terminal that takes everything, or nothing.
+    #[must_use]
+    pub fn with_terminal(mut self, stands: bool) -> Self {
+        self.plan = self.plan.with_terminal(stands);
+        self
     }
 
     /// Lets the dive happen.
@@ -340,6 +352,9 @@ impl World {
         if !self.plan.has(MachineFault::RecorderStalls, now) {
             self.record(now);
         }
+        if !self.plan.has(MachineFault::TerminalStands, now) {
+            while self.notices.next().is_some() {}
+        }
         while self.board.next().is_some() {}
     }
 }
@@ -389,7 +404,11 @@ fn app(vehicle: &VehicleConfig) -> App {
 }
 
 /// The loop of a recorded dive, and its recorder.
-fn assemble(vehicle: &VehicleConfig, text: &str, disk: &SimulatedDisk) -> (Loop, RecorderWorker) {
+fn assemble(
+    vehicle: &VehicleConfig,
+    text: &str,
+    disk: &SimulatedDisk,
+) -> (Loop, RecorderWorker, NoticeReceiver) {
     let sources = vehicle.sensor_configs.iter().map(|sensor| SourceInfo {
         id: sensor.id.clone(),
         plugin: sensor.plugin.clone(),
@@ -407,7 +426,9 @@ fn assemble(vehicle: &VehicleConfig, text: &str, disk: &SimulatedDisk) -> (Loop,
     let (port, worker) = Recorder::unthreaded(storage, path, &header, &rotation, QUEUE_BYTES, None).unwrap();
     let mut app = app(vehicle);
     app.add_plugin(&RecorderOutlet::new(port)).unwrap();
-    (app.arm(vehicle.navigation()).unwrap(), worker)
+    let (outlet, notices) = NoticeOutlet::new(NOTICES);
+    app.add_plugin(&outlet).unwrap();
+    (app.arm(vehicle.navigation()).unwrap(), worker, notices)
 }
 
 /// What a service's thread would do until it waits.

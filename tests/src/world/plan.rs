@@ -92,10 +92,16 @@ pub enum MachineFault {
     RecorderStalls,
     /// The threads of the ports don't.
     PortsStall,
+    /// The terminal takes nothing.
+    TerminalStands,
 }
 
-const OF_MACHINES: [MachineFault; 3] =
-    [MachineFault::LoopStalls, MachineFault::RecorderStalls, MachineFault::PortsStall];
+const OF_MACHINES: [MachineFault; 4] = [
+    MachineFault::LoopStalls,
+    MachineFault::RecorderStalls,
+    MachineFault::PortsStall,
+    MachineFault::TerminalStands,
+];
 
 /// Faults of a disk.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -174,6 +180,15 @@ impl Plan {
         let ending = pick(random, &[Ending::Finished, Ending::Finished, Ending::Killed, Ending::PowerCut]);
         let early = if ending == Ending::Finished { 0 } else { random.below(END_WITHIN_NS) };
         Self { cables, machine, disk, ending, end: BEGIN + LENGTH - DurNs(early as i64) }
+    }
+
+    /// The same, the terminal apart: it takes everything, or nothing.
+    #[must_use]
+    pub fn with_terminal(mut self, stands: bool) -> Self {
+        self.machine.retain(|window| window.what != MachineFault::TerminalStands);
+        let always = Window { what: MachineFault::TerminalStands, from: BEGIN, to: MonoNs(u64::MAX) };
+        self.machine.extend(stands.then_some(always));
+        self
     }
 
     /// Whether a fault of the machine holds.
