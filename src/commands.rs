@@ -21,6 +21,7 @@ use crate::feeds::Interruptible;
 use crate::files;
 use crate::interrupt;
 use crate::live;
+use crate::logging;
 use crate::output::{put, say};
 use crate::outputs::{self, Kind};
 use crate::play::{self, Playing};
@@ -41,6 +42,7 @@ pub(crate) fn demo(args: &Demo) -> Result<u8, Failure> {
     outputs::claim(&report_file, Kind::Report, &args.overwrite)?;
     // The recorder writes new logs only.
     outputs::make_way(&log)?;
+    logging::never_wait();
     let interrupted = interrupt::flag()?;
     let recording = Recording::simulated(&log, &scene.name);
     let dive = assemble(&scene.vehicle, &scene.vehicle_text, Some(recording))?;
@@ -63,14 +65,14 @@ pub(crate) fn demo(args: &Demo) -> Result<u8, Failure> {
 pub(crate) fn run(args: &Run) -> Result<u8, Failure> {
     let (text, vehicle) = vehicle_file::read(&args.vehicle)?;
     claim_report(&args.output, args.source.as_slice())?;
+    logging::never_wait();
     let Some(log) = &args.source else { return live::run(args, &text, &vehicle) };
     let mut player = Player::open(&files_of(std::slice::from_ref(log))?)?;
-    if let Some(record) = &args.record {
-        live::make_room(record, args)?;
-    }
+    live::make_room(&args.record, args)?;
     let rotate = args.rotate;
+    let paths = args.record.as_slice();
     let recording =
-        args.record.as_deref().map(|path| Recording { path, clock: Clock::Theirs, rotate, scene: None });
+        (!paths.is_empty()).then_some(Recording { paths, clock: Clock::Theirs, rotate, scene: None });
     if let (None, Some(_)) = (&recording, args.rotate) {
         return Err(Failure::Usage(
             "run: --rotate needs a recording; with --source, add --record".to_owned(),
@@ -82,7 +84,7 @@ pub(crate) fn run(args: &Run) -> Result<u8, Failure> {
     let interrupted = interrupt::flag()?;
     let mut feed = Interruptible { feed: &mut player, interrupted: &interrupted };
     let mut report = dive.run(&mut feed, pace, &mut Watch::new(args.output.show()))?;
-    note_losses(&mut report, log, &player)?;
+    note_losses(&mut report, log, &player);
     finish(&report, &args.output)
 }
 
@@ -116,7 +118,7 @@ pub(crate) fn replay(args: &Replay) -> Result<u8, Failure> {
             dive.run(&mut player, pace, &mut watch)?
         }
     };
-    note_losses(&mut report, log, &player)?;
+    note_losses(&mut report, log, &player);
     let code = finish(&report, &args.output)?;
     match &args.expect {
         Some(golden) if args.bless => expect::bless(&report, golden).map(|()| code),
