@@ -21,7 +21,6 @@ use crate::feeds::Interruptible;
 use crate::files;
 use crate::interrupt;
 use crate::live;
-use crate::logging;
 use crate::output::{put, say};
 use crate::outputs::{self, Kind};
 use crate::play::{self, Playing};
@@ -42,7 +41,6 @@ pub(crate) fn demo(args: &Demo) -> Result<u8, Failure> {
     outputs::claim(&report_file, Kind::Report, &args.overwrite)?;
     // The recorder writes new logs only.
     outputs::make_way(&log)?;
-    logging::never_wait();
     let interrupted = interrupt::flag()?;
     let recording = Recording::simulated(&log, &scene.name);
     let dive = assemble(&scene.vehicle, &scene.vehicle_text, Some(recording))?;
@@ -65,7 +63,6 @@ pub(crate) fn demo(args: &Demo) -> Result<u8, Failure> {
 pub(crate) fn run(args: &Run) -> Result<u8, Failure> {
     let (text, vehicle) = vehicle_file::read(&args.vehicle)?;
     claim_report(&args.output, args.source.as_slice())?;
-    logging::never_wait();
     let Some(log) = &args.source else { return live::run(args, &text, &vehicle) };
     let mut player = Player::open(&files_of(std::slice::from_ref(log))?)?;
     live::make_room(&args.record, args)?;

@@ -126,7 +126,9 @@ fn record(
         ports.push(port);
         recorders.push((path.clone(), handle));
     }
-    app.add_plugin(&RecorderOutlet::new(ports))?;
+    let outlet = RecorderOutlet::new(ports);
+    // What is on ports doesn't wait.
+    app.add_plugin(&if clock == Clock::Ours { outlet.waiting_for_one() } else { outlet })?;
     Ok(recorders)
 }
 

@@ -51,6 +51,9 @@ use cli::{Cli, Command};
 pub fn main() -> ExitCode {
     let cli = parse();
     logging::start(&cli.verbosity);
+    if matches!(cli.command, Command::Run(_) | Command::Demo(_)) {
+        logging::never_wait();
+    }
     terminal::be_quiet(cli.verbosity.is_quiet());
     let result = match cli.command {
         Command::Demo(demo) => commands::demo(&demo),

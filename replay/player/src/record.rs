@@ -43,23 +43,29 @@ pub fn result_channels() -> Vec<ResultChannel> {
 /// Records every packet that the loop consumes, in the order of consumption, every tick, and every result, with one recorder or
 /// several.
 ///
-/// When no recorder's queue has room for another largest tick the loop consumes nothing until one has: recorded input is never
-/// dropped by all of them. One that is behind while another has room skips ticks and states them in its log. If all recorders'
-/// threads have ended the dive goes on unrecorded; their handles return the errors.
+/// When a recorder's queue has no room for another largest tick the loop consumes nothing until it has: recorded input is never
+/// dropped. If the recorders' threads have ended the dive goes on unrecorded; their handles return the errors.
 pub struct RecorderOutlet {
     ports: Cell<Vec<RecorderPort>>,
+    waits_for_one: bool,
 }
 
 impl RecorderOutlet {
     /// With the loop's ends of recorders, whose queues have [`QUEUE_BYTES`]. The outlet can be added to one loop.
     pub fn new(ports: impl IntoIterator<Item = RecorderPort>) -> Self {
-        Self { ports: Cell::new(ports.into_iter().collect()) }
+        Self { ports: Cell::new(ports.into_iter().collect()), waits_for_one: false }
+    }
+
+    /// Waits for no recorder that is behind while another has room: it skips ticks, and states them in its log.
+    pub fn waiting_for_one(self) -> Self {
+        Self { waits_for_one: true, ..self }
     }
 }
 
 #[derive(Resource)]
 struct Recording {
     ports: Vec<RecorderPort>,
+    waits_for_one: bool,
     order: Vec<u16>,
     /// Buffer for a stream's message.
     message: Vec<u8>,
@@ -74,6 +80,7 @@ impl Plugin for RecorderOutlet {
             app.keep_results();
             app.insert_resource(Recording {
                 ports,
+                waits_for_one: self.waits_for_one,
                 order: Vec::with_capacity(MAX_TICK_PACKETS),
                 message: Vec::with_capacity(MAX_RESULT_BYTES),
                 records: [0; STREAMS.len()],
@@ -91,7 +98,7 @@ fn record(
     results: Res<'_, Digests>,
     mut recording: ResMut<'_, Recording>,
 ) {
-    let Recording { ports, order, message, records } = &mut *recording;
+    let Recording { ports, waits_for_one, order, message, records } = &mut *recording;
     let packets = inbox.iter().map(|(_, packet)| RecorderPort::entry_bytes(packet.bytes.len()));
     let (count, bytes) = packets.fold((0, 0), |(count, sum), bytes| (count + 1, sum + bytes));
     let needed = bytes + RecorderPort::tick_entry_bytes(count);
@@ -109,7 +116,8 @@ fn record(
     }
     let has_room = |port: &RecorderPort| port.vacant_bytes() >= LARGEST_TICK_BYTES;
     let mut open = ports.iter().filter(|port| !port.is_closed()).peekable();
-    let goes_on = open.peek().is_none() || open.any(has_room);
+    let goes_on =
+        open.peek().is_none() || if *waits_for_one { open.any(has_room) } else { open.all(has_room) };
     inbox.allowance_bytes = if goes_on { MAX_TICK_BYTES } else { 0 };
 }
 
