@@ -84,9 +84,10 @@ pub(crate) enum Command {
     ///
     /// Missing sensors are retried indefinitely while the dive goes on with the others; --require ends the dive if a sensor
     /// is missing. --source feeds the dive from a log instead of the ports. The exit code is 0 whatever the verdicts: metres that
-    /// are missed, or of which nothing can be said, are in the summary and in the report.
+    /// are missed, or of which nothing can be said, are in the summary and in the report. It is 3 if data was lost or the
+    /// recording failed, even if it went on. SIGINT and SIGTERM end the dive with its report; closing the terminal doesn't.
     #[command(
-        after_help = "Example:\n  headrace run vehicle.toml --record dive.mcap --require imu,sonar_0\n  headrace run vehicle.toml --record dive.mcap --rotate 1GiB\n  headrace run vehicle.toml --source dive.mcap --record again.mcap"
+        after_help = "Example:\n  headrace run vehicle.toml --record dive.mcap --require imu,sonar_0\n  headrace run vehicle.toml --record dive.mcap --record /media/stick/dive.mcap\n  headrace run vehicle.toml --record dive.mcap --rotate 1GiB\n  headrace run vehicle.toml --source dive.mcap --record again.mcap"
     )]
     Run(Run),
     /// Replay a recorded dive through the same processing as a live one.
@@ -193,9 +194,11 @@ pub(crate) struct Run {
     /// Log, or folder of a recording in parts, to use instead of the ports.
     #[arg(long, value_name = "LOG.mcap", conflicts_with_all = ["require", "require_within", "duration", "no_record"])]
     pub(crate) source: Option<PathBuf>,
-    /// Log to write; by default, on ports, dive-SECONDS.mcap in the current folder.
+    /// Log to write; by default, on ports, dive-SECONDS.mcap in the current folder. Given twice, the dive is recorded twice, best
+    /// on two media: an error of one doesn't touch the other. After an error a recording goes on in a further part
+    /// (dive.part002.mcap).
     #[arg(long, value_name = "LOG.mcap")]
-    pub(crate) record: Option<PathBuf>,
+    pub(crate) record: Vec<PathBuf>,
     /// Record in parts (dive.part001.mcap, ... for dive.mcap), each a complete log, of this size (1GiB, 500MB) or duration
     /// (30min, 2h).
     #[arg(long, value_name = "1GiB|30min", value_parser = rotation, conflicts_with = "no_record")]

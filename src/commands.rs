@@ -65,12 +65,11 @@ pub(crate) fn run(args: &Run) -> Result<u8, Failure> {
     claim_report(&args.output, args.source.as_slice())?;
     let Some(log) = &args.source else { return live::run(args, &text, &vehicle) };
     let mut player = Player::open(&files_of(std::slice::from_ref(log))?)?;
-    if let Some(record) = &args.record {
-        live::make_room(record, args)?;
-    }
+    live::make_room(&args.record, args)?;
     let rotate = args.rotate;
+    let paths = args.record.as_slice();
     let recording =
-        args.record.as_deref().map(|path| Recording { path, clock: Clock::Theirs, rotate, scene: None });
+        (!paths.is_empty()).then_some(Recording { paths, clock: Clock::Theirs, rotate, scene: None });
     if let (None, Some(_)) = (&recording, args.rotate) {
         return Err(Failure::Usage(
             "run: --rotate needs a recording; with --source, add --record".to_owned(),
@@ -82,7 +81,7 @@ pub(crate) fn run(args: &Run) -> Result<u8, Failure> {
     let interrupted = interrupt::flag()?;
     let mut feed = Interruptible { feed: &mut player, interrupted: &interrupted };
     let mut report = dive.run(&mut feed, pace, &mut Watch::new(args.output.show()))?;
-    note_losses(&mut report, log, &player)?;
+    note_losses(&mut report, log, &player);
     finish(&report, &args.output)
 }
 
@@ -116,7 +115,7 @@ pub(crate) fn replay(args: &Replay) -> Result<u8, Failure> {
             dive.run(&mut player, pace, &mut watch)?
         }
     };
-    note_losses(&mut report, log, &player)?;
+    note_losses(&mut report, log, &player);
     let code = finish(&report, &args.output)?;
     match &args.expect {
         Some(golden) if args.bless => expect::bless(&report, golden).map(|()| code),

@@ -1,6 +1,6 @@
 //! A dive from the assembled loop to the report: shared by `demo`, `run` and `replay`.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use headrace_fusion::Navigation;
 use headrace_monitor::App;
@@ -11,7 +11,7 @@ use headrace_ports::Supervisor;
 use headrace_replay::drive::{Pace, PacketSource, drive};
 use headrace_replay::log::{
     DerivedChannels, Every, LeftOut, LogHeader, Recorder, RecorderHandle, RecordingFault, Rotation, SentPort,
-    SourceInfo, Summary, dive_name, files_digest, files_of,
+    SourceInfo, Summary, dive_name,
 };
 use headrace_replay::player::seconds;
 use headrace_replay::record::{QUEUE_BYTES, RecorderOutlet, result_channels};
@@ -24,7 +24,7 @@ use crate::feeds;
 use crate::outputs::SIMULATED;
 use crate::phase::Phase;
 use crate::progress::Progress;
-use crate::report_output::parts;
+use crate::report_output::files_report;
 use crate::watch::Watch;
 
 /// Capacity of the queue of notices to the terminal; a tick of 20 ms has a handful. A slot takes some 400 bytes, allocated at
@@ -35,14 +35,15 @@ const NOTICES: usize = 1 << 10;
 pub(crate) struct Dive {
     pub(crate) armed: Loop,
     notices: NoticeReceiver,
-    recorder: Option<(PathBuf, RecorderHandle)>,
+    recorders: Vec<(PathBuf, RecorderHandle)>,
     what_if: WhatIf,
 }
 
 /// A log to write.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Recording<'a> {
-    pub(crate) path: &'a Path,
+    /// Where to; several are recordings of their own.
+    pub(crate) paths: &'a [PathBuf],
     pub(crate) clock: Clock,
     /// Size or duration of its parts; `None` for a single file.
     pub(crate) rotate: Option<Every>,
@@ -52,8 +53,8 @@ pub(crate) struct Recording<'a> {
 
 impl<'a> Recording<'a> {
     /// A simulated dive's log.
-    pub(crate) fn simulated(path: &'a Path, scene: &'a str) -> Self {
-        Self { path, clock: Clock::Theirs, rotate: None, scene: Some(scene) }
+    pub(crate) fn simulated(path: &'a PathBuf, scene: &'a str) -> Self {
+        Self { paths: std::slice::from_ref(path), clock: Clock::Theirs, rotate: None, scene: Some(scene) }
     }
 }
 
@@ -87,7 +88,7 @@ pub(crate) fn assemble_kept(vehicle: &VehicleConfig) -> Result<Dive, Failure> {
     let (mut app, notices) = app(vehicle)?;
     app.keep_results();
     let armed = arm(app, vehicle, vehicle.navigation())?;
-    Ok(Dive { armed, notices, recorder: None, what_if: WhatIf::default() })
+    Ok(Dive { armed, notices, recorders: Vec::new(), what_if: WhatIf::default() })
 }
 
 /// The same with another navigation than the vehicle file's.
@@ -98,22 +99,37 @@ pub(crate) fn assemble_with(
     record_to: Option<Recording<'_>>,
 ) -> Result<Dive, Failure> {
     let (mut app, notices) = app(vehicle)?;
-    let recorder = match record_to {
-        None => None,
-        Some(Recording { path, clock, rotate, scene }) => {
-            let mut header = log_header(vehicle, vehicle_text, true);
-            if clock == Clock::Ours {
-                anchor(&mut header);
-            }
-            header.metadata.extend(scene.map(|scene| (SIMULATED.to_owned(), scene.to_owned())));
-            let view: Option<Box<dyn DerivedChannels>> = Some(Box::new(View::new(view_site(vehicle))));
-            let rotation = Rotation { every: rotate, dive: new_dive() };
-            let (port, handle) = Recorder::create(path, &header, &rotation, QUEUE_BYTES, view)?;
-            app.add_plugin(&RecorderOutlet::new(port))?;
-            Some((path.to_owned(), handle))
-        }
+    let recorders = match record_to {
+        None => Vec::new(),
+        Some(recording) => record(&mut app, vehicle, vehicle_text, recording)?,
     };
-    Ok(Dive { armed: arm(app, vehicle, navigation)?, notices, recorder, what_if: WhatIf::default() })
+    Ok(Dive { armed: arm(app, vehicle, navigation)?, notices, recorders, what_if: WhatIf::default() })
+}
+
+/// Starts the recorders of a dive.
+fn record(
+    app: &mut App,
+    vehicle: &VehicleConfig,
+    vehicle_text: &str,
+    Recording { paths, clock, rotate, scene }: Recording<'_>,
+) -> Result<Vec<(PathBuf, RecorderHandle)>, Failure> {
+    let mut header = log_header(vehicle, vehicle_text, true);
+    if clock == Clock::Ours {
+        anchor(&mut header);
+    }
+    header.metadata.extend(scene.map(|scene| (SIMULATED.to_owned(), scene.to_owned())));
+    let rotation = Rotation { every: rotate, dive: new_dive() };
+    let (mut ports, mut recorders) = (Vec::new(), Vec::new());
+    for path in paths {
+        let view: Option<Box<dyn DerivedChannels>> = Some(Box::new(View::new(view_site(vehicle))));
+        let (port, handle) = Recorder::create(path, &header, &rotation, QUEUE_BYTES, view)?;
+        ports.push(port);
+        recorders.push((path.clone(), handle));
+    }
+    let outlet = RecorderOutlet::new(ports);
+    // What is on ports doesn't wait.
+    app.add_plugin(&if clock == Clock::Ours { outlet.waiting_for_one() } else { outlet })?;
+    Ok(recorders)
 }
 
 /// Arms the loop, which allocates all its memory.
@@ -236,6 +252,7 @@ impl Dive {
             while let Some(notice) = notices.next() {
                 watch.notice(&notice, dive);
             }
+            tell_recordings(&self.recorders, watch, dive);
             watch.tick(dive);
             beside(dive);
         });
@@ -275,6 +292,7 @@ impl Dive {
             while let Some(notice) = notices.next() {
                 watch.notice(&notice, dive);
             }
+            tell_recordings(&self.recorders, watch, dive);
             watch.tick(dive);
             beside(&supervisor, watch);
         });
@@ -296,9 +314,9 @@ impl Dive {
         Ok(report)
     }
 
-    /// The recorder's input for bytes sent to devices.
-    pub(crate) fn sent_port(&self) -> Option<SentPort> {
-        self.recorder.as_ref().map(|(_, handle)| handle.sent_port())
+    /// The recorders' inputs for bytes sent to devices.
+    pub(crate) fn sent_ports(&self) -> Vec<SentPort> {
+        self.recorders.iter().map(|(_, handle)| handle.sent_port()).collect()
     }
 
     /// Ends the dive; returns the report.
@@ -316,28 +334,48 @@ impl Dive {
         self.armed.release_samples();
         let mut report = Report::of(&self.armed);
         report.what_if = what_if;
-        if let Some((path, handle)) = self.recorder.take() {
-            drop(self.armed);
-            let written = handle.finish();
-            let losses = match &written {
-                Err(error) => vec![format!("recording failed: {error}")],
-                Ok(written) => unrecorded(written),
-            };
-            let written = written.unwrap_or_default();
-            let files = files_of(std::slice::from_ref(&path))?;
-            let parts_written: Vec<_> =
-                written.parts.iter().map(|part| (part.path.as_path(), part.raw_messages)).collect();
-            report.log = Some(LogReport {
-                path: path.display().to_string(),
-                sha256: files_digest(&files)?,
-                messages: report.sources.iter().map(|source| source.packets).sum(),
-                losses,
-                notes: Vec::new(),
-                parts: if parts_written.is_empty() { Vec::new() } else { parts(&path, &parts_written)? },
-            });
-        }
+        let recorders = core::mem::take(&mut self.recorders);
+        drop(self.armed);
+        report.log = recorded(recorders, &report);
         Ok(report)
     }
+}
+
+/// Tells what has happened to the recordings.
+fn tell_recordings(recorders: &[(PathBuf, RecorderHandle)], watch: &mut Watch, dive: &Loop) {
+    for (number, (_, handle)) in recorders.iter().enumerate() {
+        while let Some(event) = handle.next_event() {
+            watch.recording(number, &event, dive.now());
+        }
+    }
+}
+
+/// Ends the recordings of a dive. The report has the first one's files and the losses of all; media that are gone keep nobody
+/// from it.
+fn recorded(recorders: Vec<(PathBuf, RecorderHandle)>, report: &Report) -> Option<LogReport> {
+    let (mut log, several): (Option<LogReport>, _) = (None, recorders.len() > 1);
+    for (path, handle) in recorders {
+        let written = handle.finish();
+        let mut losses = match &written {
+            Err(error) => vec![format!("recording failed: {error}")],
+            Ok(written) => unrecorded(written),
+        };
+        if several {
+            losses.iter_mut().for_each(|loss| *loss = format!("{}: {loss}", path.display()));
+        }
+        if let Some(log) = &mut log {
+            log.notes.push(format!("also recorded to {}", path.display()));
+            log.losses.extend(losses);
+            continue;
+        }
+        let parts = written.map(|written| written.parts).unwrap_or_default();
+        let parts: Vec<_> = parts.iter().map(|part| (part.path.as_path(), part.raw_messages)).collect();
+        let mut files = files_report(&path, &parts);
+        files.messages = report.sources.iter().map(|source| source.packets).sum();
+        files.losses.splice(0..0, losses);
+        log = Some(files);
+    }
+    log
 }
 
 /// Data missing in a recording, and errors while it was made, as text.
@@ -346,6 +384,7 @@ fn unrecorded(written: &Summary) -> Vec<String> {
     losses.extend(Some(written.left_out).filter(|left| left.messages > 0).map(left_out));
     let counts = [
         (written.sent_dropped, "messages to devices not recorded: the recorder's queue was full"),
+        (written.skipped, "packets not recorded: the recorder was behind while another went on"),
         (written.results_missing, "ticks recorded without all their results: too many"),
     ];
     losses

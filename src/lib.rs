@@ -51,6 +51,9 @@ use cli::{Cli, Command};
 pub fn main() -> ExitCode {
     let cli = parse();
     logging::start(&cli.verbosity);
+    if matches!(cli.command, Command::Run(_) | Command::Demo(_)) {
+        logging::never_wait();
+    }
     terminal::be_quiet(cli.verbosity.is_quiet());
     let result = match cli.command {
         Command::Demo(demo) => commands::demo(&demo),
@@ -69,15 +72,12 @@ pub fn main() -> ExitCode {
         Command::Completions(args) => manual::completions(&args),
         Command::Man(args) => manual::man(&args),
     };
-    match result {
-        Ok(code) => ExitCode::from(code),
-        Err(failure) => {
-            for line in failure.to_string().lines() {
-                eprintln!("headrace: {line}");
-            }
-            ExitCode::from(failure.exit_code())
-        }
-    }
+    let code = result.unwrap_or_else(|failure| {
+        failure.to_string().lines().for_each(|line| logging::complain(&format!("headrace: {line}")));
+        failure.exit_code()
+    });
+    logging::end();
+    ExitCode::from(code)
 }
 
 /// The command line, or the end of the program with help or an error.

@@ -1,7 +1,7 @@
 //! `headrace run` on real ports: connections, drivers, and the state of each sensor.
 
 use std::cell::RefCell;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
@@ -26,12 +26,12 @@ use crate::watch::{Show, Watch};
 /// Runs a dive on the vehicle's ports.
 pub(crate) fn run(args: &Run, text: &str, vehicle: &VehicleConfig) -> Result<u8, Failure> {
     let required = required(args, vehicle)?;
-    let log = args.record.clone().unwrap_or_else(new_log);
+    let logs = if args.record.is_empty() { vec![new_log()] } else { args.record.clone() };
     if !args.no_record {
-        make_room(&log, args)?;
+        make_room(&logs, args)?;
     }
     let recording = (!args.no_record).then_some(Recording {
-        path: &log,
+        paths: &logs,
         clock: Clock::Ours,
         rotate: args.rotate,
         scene: None,
@@ -39,14 +39,17 @@ pub(crate) fn run(args: &Run, text: &str, vehicle: &VehicleConfig) -> Result<u8,
     let mut dive = assemble(vehicle, text, recording)?;
     let begun = headrace_ports::now();
     let supervisor = supervisor(&mut dive, vehicle, begun)?;
-    let interrupted = interrupt::flag()?;
+    let interrupted = interrupt::flag_of_a_dive()?;
     let until = args.duration.map(|seconds| begun + DurNs::from_secs_f64(seconds));
     let mut watch = Watch::new(args.output.show()).live();
     if args.output.show() == Show::Lines {
+        let first = |log: &PathBuf| if args.rotate.is_some() { part_path(log, 1) } else { log.clone() };
+        let firsts: Vec<String> = logs.iter().map(|log| first(log).display().to_string()).collect();
+        let firsts = firsts.join(" and ");
         let where_to = match (args.no_record, args.rotate) {
             (true, _) => "not recorded".to_owned(),
-            (false, None) => format!("recorded to {}", log.display()),
-            (false, Some(_)) => format!("recorded in parts, starting with {}", part_path(&log, 1).display()),
+            (false, None) => format!("recorded to {firsts}"),
+            (false, Some(_)) => format!("recorded in parts, starting with {firsts}"),
         };
         let begun =
             format!("{}, target {} m: {where_to}; Ctrl-C ends the dive", vehicle.name, vehicle.target_m);
@@ -78,11 +81,20 @@ pub(crate) fn run(args: &Run, text: &str, vehicle: &VehicleConfig) -> Result<u8,
     }
 }
 
-/// Checks that a dive can be recorded to a file; with `--force` removes the one that is there.
-pub(crate) fn make_room(log: &Path, args: &Run) -> Result<(), Failure> {
-    let first = if args.rotate.is_some() { part_path(log, 1) } else { log.to_owned() };
-    outputs::claim(&first, Kind::Dive, &args.output.overwrite)?;
-    outputs::make_way(&first)
+/// Checks that a dive can be recorded to these files; with `--force` removes those that are there.
+pub(crate) fn make_room(logs: &[PathBuf], args: &Run) -> Result<(), Failure> {
+    for (number, log) in logs.iter().enumerate() {
+        if logs.iter().take(number).any(|other| other == log) {
+            return Err(Failure::Usage(format!(
+                "run: --record {} is given twice; name two files",
+                log.display()
+            )));
+        }
+        let first = if args.rotate.is_some() { part_path(log, 1) } else { log.clone() };
+        outputs::claim(&first, Kind::Dive, &args.output.overwrite)?;
+        outputs::make_way(&first)?;
+    }
+    Ok(())
 }
 
 /// Each sensor's id and its connection, or why its `connect` is invalid.
@@ -143,12 +155,13 @@ fn supervisor(dive: &mut Dive, vehicle: &VehicleConfig, begun: MonoNs) -> Result
             driver: device.driver(&DriverSetup { begun, head }),
         });
     }
-    let sent = dive.sent_port().map(|port| {
-        let sink: SentSink = Arc::new(move |source, at, bytes: &[u8]| {
+    let ports = dive.sent_ports();
+    let sink: SentSink = Arc::new(move |source, at, bytes: &[u8]| {
+        for port in &ports {
             port.sent(u16::try_from(source).unwrap_or(u16::MAX), at, bytes);
-        });
-        sink
+        }
     });
+    let sent = (!dive.sent_ports().is_empty()).then_some(sink);
     Supervisor::start(served, sent)
         .map_err(|source| Failure::System { what: "starting the port threads", source })
 }

@@ -1,7 +1,12 @@
 //! Log messages: tracing's events on stderr, filtered by `-v`, `-q` and `RUST_LOG`.
 
 use std::io::{self, Write};
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::thread;
+use std::time::Duration;
 
+use crossbeam::channel::{Sender, bounded};
 use tracing::level_filters::LevelFilter;
 use tracing_subscriber::filter::Targets;
 use tracing_subscriber::fmt;
@@ -52,19 +57,86 @@ fn filter(level: Option<LevelFilter>, variable: Option<&str>) -> (Targets, Optio
     (filter, error)
 }
 
-/// Stderr, which log messages share with self-overwriting lines. Failed writes are dropped: a closed stderr must not end a
-/// dive.
+/// Lines that may wait for a stderr that doesn't read, in a dive.
+const WAITING: usize = 1 << 10;
+/// How long a dive waits for it at the end.
+const ENDS_WITHIN: Duration = Duration::from_secs(2);
+
+/// Stderr on a thread of its own.
+struct Background {
+    lines: Sender<Line>,
+    /// Lines for which there was no room.
+    dropped: AtomicU64,
+}
+
+enum Line {
+    Text(Vec<u8>),
+    /// Disconnected once all before it has been written.
+    Mark(Sender<()>),
+}
+
+static BACKGROUND: OnceLock<Background> = OnceLock::new();
+
+/// From now on nothing waits for stderr: neither a dive nor its recorder stands still because nobody reads it. What finds no
+/// room is dropped and counted.
+pub(crate) fn never_wait() {
+    let (lines, queue) = bounded(WAITING);
+    // Without a thread everything is dropped once the queue is full.
+    let thread = thread::Builder::new().name("stderr".to_owned()).spawn(move || {
+        for line in queue {
+            match line {
+                Line::Text(text) => write_now(&text),
+                Line::Mark(mark) => drop(mark),
+            }
+        }
+    });
+    if thread.is_ok() {
+        BACKGROUND.get_or_init(|| Background { lines, dropped: AtomicU64::new(0) });
+    }
+}
+
+/// Writes a line to stderr after those that wait.
+pub(crate) fn complain(text: &str) {
+    pass(format!("{text}\n").as_bytes());
+}
+
+/// Waits for what is to be written to stderr, in a dive for 2 s at most.
+pub(crate) fn end() {
+    let Some(background) = BACKGROUND.get() else { return };
+    let dropped = background.dropped.swap(0, Ordering::Relaxed);
+    if dropped > 0 {
+        complain(&format!("headrace: {dropped} lines not shown here: nobody read them"));
+    }
+    let (mark, written) = bounded::<()>(0);
+    if background.lines.send_timeout(Line::Mark(mark), ENDS_WITHIN).is_ok() {
+        written.recv_timeout(ENDS_WITHIN).ok();
+    }
+}
+
+fn pass(bytes: &[u8]) {
+    let Some(background) = BACKGROUND.get() else { return write_now(bytes) };
+    if background.lines.try_send(Line::Text(bytes.to_vec())).is_err() {
+        background.dropped.fetch_add(1, Ordering::Relaxed);
+    }
+}
+
+/// Stderr is shared with self-overwriting lines. Failed writes are dropped: a closed stderr must not end a dive.
+fn write_now(bytes: &[u8]) {
+    let mut stderr = io::stderr().lock();
+    let cleared = if terminal::of(&stderr).overwrites && transient::take() {
+        stderr.write_all(terminal::CLEAR.as_bytes())
+    } else {
+        Ok(())
+    };
+    cleared.and_then(|()| stderr.write_all(bytes)).ok();
+}
+
+/// Stderr, for log messages.
 struct Stderr;
 
 impl Write for Stderr {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        let mut stderr = io::stderr().lock();
-        let cleared = if terminal::of(&stderr).overwrites && transient::take() {
-            stderr.write_all(terminal::CLEAR.as_bytes())
-        } else {
-            Ok(())
-        };
-        cleared.and_then(|()| stderr.write_all(bytes)).ok();
+        pass(bytes);
         Ok(bytes.len())
     }
 

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use headrace_monitor::report::{LogReport, PartReport, Report};
-use headrace_replay::log::{file_digest, files_digest};
+use headrace_replay::log::{LogError, file_digest, files_digest};
 use headrace_replay::player::Player;
 use serde_json::json;
 
@@ -15,39 +15,48 @@ use crate::screen::Screen;
 use crate::summary::summary;
 
 /// Adds the replayed log and its losses to the report.
-pub(crate) fn note_losses(report: &mut Report, path: &Path, player: &Player) -> Result<(), Failure> {
+pub(crate) fn note_losses(report: &mut Report, path: &Path, player: &Player) {
     let recorded = report.log.take();
-    let mut losses = player.losses();
-    losses.extend(recorded.into_iter().flat_map(|log| log.losses));
     let files: Vec<_> = player.files().iter().map(|file| (file.path.as_path(), file.messages)).collect();
-    let paths: Vec<&Path> = files.iter().map(|(path, _)| *path).collect();
-    report.log = Some(LogReport {
-        path: path.display().to_string(),
-        sha256: files_digest(&paths)?,
-        messages: player.played(),
-        losses,
-        notes: player.notes(),
-        parts: parts(path, &files)?,
-    });
-    Ok(())
+    let mut log = files_report(path, &files);
+    log.messages = player.played();
+    log.losses.splice(0..0, player.losses());
+    log.losses.extend(recorded.into_iter().flat_map(|log| log.losses));
+    log.notes = player.notes();
+    report.log = Some(log);
 }
 
-/// The files of a log; empty where it is only the file named.
-pub(crate) fn parts(named: &Path, files: &[(&Path, u64)]) -> Result<Vec<PartReport>, Failure> {
-    if matches!(files, [(only, _)] if *only == named) {
-        return Ok(Vec::new());
-    }
-    let part = |&(path, messages): &(&Path, u64)| {
-        let sha256 = file_digest(path)?;
-        Ok(PartReport { path: path.display().to_string(), sha256, messages })
+/// A log's files as the report has them. What can't be read back, as where the medium is gone, is a loss, and costs its
+/// digest alone.
+pub(crate) fn files_report(named: &Path, files: &[(&Path, u64)]) -> LogReport {
+    let paths: Vec<&Path> =
+        if files.is_empty() { vec![named] } else { files.iter().map(|(path, _)| *path).collect() };
+    let mut losses = Vec::new();
+    let mut digest = |of: Result<String, LogError>| {
+        of.unwrap_or_else(|error| {
+            losses.push(format!("the log can't be read back: {error}"));
+            String::new()
+        })
     };
-    files.iter().map(part).collect()
+    let sha256 = digest(files_digest(&paths));
+    // Empty where it is only the file named.
+    let named_alone = matches!(files, [(only, _)] if *only == named);
+    let parts = files.iter().filter(|_| !named_alone).map(|(path, messages)| PartReport {
+        path: path.display().to_string(),
+        sha256: if sha256.is_empty() {
+            file_digest(path).unwrap_or_default()
+        } else {
+            digest(file_digest(path))
+        },
+        messages: *messages,
+    });
+    let parts = parts.collect();
+    LogReport { path: named.display().to_string(), sha256, messages: 0, losses, notes: Vec::new(), parts }
 }
 
 pub(crate) fn finish(report: &Report, output: &Output) -> Result<u8, Failure> {
-    if let Some(path) = &output.report {
-        files::write_json(path, report)?;
-    }
+    // A report that can't be written keeps nobody from the summary.
+    let written = output.report.as_ref().map_or(Ok(()), |path| files::write_json(path, report));
     if output.json_lines {
         let end = json!({"type": "end", "digest": report.digest, "way": report.way, "summary": report.summary,
             "not_inspected": report.not_inspected, "exit_code": exit_code(report)});
@@ -57,7 +66,7 @@ pub(crate) fn finish(report: &Report, output: &Output) -> Result<u8, Failure> {
     } else {
         put(&summary(report, Screen::columns()));
     }
-    Ok(exit_code(report))
+    written.map(|()| exit_code(report))
 }
 
 /// Exit code of a finished dive.

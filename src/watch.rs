@@ -1,5 +1,7 @@
 //! Output during a dive: the state, and each missed, unsure or cleared stretch once; as lines for people, or as JSON.
 
+use std::collections::BTreeMap;
+
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::live_state::{Condition, Lamp, LiveState};
 use headrace_monitor::live_text::{PilotLine, status_line, told_line};
@@ -7,6 +9,7 @@ use headrace_monitor::messages::Notice;
 use headrace_monitor::run::Loop;
 use headrace_monitor::telling::{Teller, Told};
 use headrace_ports::{Phase, Status};
+use headrace_replay::log::RecordingEvent;
 use serde_json::{Value, json};
 
 use crate::printer::Printer;
@@ -39,6 +42,8 @@ pub(crate) struct Watch {
     teller: Teller,
     /// When the state was shown last, and what it was.
     shown: Option<(MonoNs, Condition)>,
+    /// Recordings that have failed, by number: whether they still do. It stays in the state for the rest of the dive.
+    failed: BTreeMap<usize, bool>,
 }
 
 impl Watch {
@@ -51,6 +56,7 @@ impl Watch {
             printer: (show != Show::Nothing).then(|| Printer::start(false)),
             teller: Teller::default(),
             shown: None,
+            failed: BTreeMap::new(),
         }
     }
 
@@ -120,6 +126,39 @@ impl Watch {
         }
     }
 
+    /// Shows what has happened to a recording.
+    pub(crate) fn recording(&mut self, number: usize, event: &RecordingEvent, at: MonoNs) {
+        let fails = matches!(event, RecordingEvent::Failed { .. });
+        self.failed.insert(number, fails);
+        let words = match event {
+            RecordingEvent::Failed { path, error } => {
+                format!("NOT RECORDED to {}: {error}; tried again in another part", path.display())
+            }
+            RecordingEvent::Resumed(fault) => fault.words(),
+        };
+        match self.show {
+            Show::Nothing => {}
+            Show::JsonLines => self.json(at, json!({"type": "recording", "fails": fails, "text": words})),
+            Show::Lines => {
+                let lamp = Some(if fails { Lamp::Red } else { Lamp::Amber });
+                self.line(&PilotLine {
+                    place: "RECORDING".to_owned(),
+                    what: vec![words],
+                    lamp,
+                    ..PilotLine::default()
+                });
+            }
+        }
+        self.shown = None;
+    }
+
+    /// Words of the state for recordings that have failed, and whether one still does.
+    fn recordings(&self) -> Option<(&'static str, bool)> {
+        let fails = self.failed.values().any(|fails| *fails);
+        let words = if fails { "NOT RECORDED" } else { "recording had failed" };
+        (!self.failed.is_empty()).then_some((words, fails))
+    }
+
     /// Shows that a replay has paused, jumped or ended at `time` after its beginning.
     pub(crate) fn stopped(&mut self, dive: &Loop, time: DurNs, ended: bool) {
         self.shown = None;
@@ -171,7 +210,11 @@ impl Watch {
     fn status(&mut self, state: &LiveState, dive: &Loop) {
         let name =
             |source: usize| dive.sources().get(source).map_or_else(String::new, |info| info.id.clone());
-        let line = status_line(state, &dive.mission().profile, &name);
+        let mut line = status_line(state, &dive.mission().profile, &name);
+        if let Some((words, fails)) = self.recordings() {
+            line.what.insert(line.what.len().min(1), words.to_owned());
+            line.lamp = if fails { Some(Lamp::Red) } else { line.lamp };
+        }
         if self.show == Show::JsonLines {
             let section_m = dive.coverage().sections.section_m();
             let mut value = match serde_json::to_value(state.json(dive.sources(), section_m)) {
@@ -181,6 +224,8 @@ impl Watch {
             if let Some(object) = value.as_object_mut() {
                 object.insert("type".to_owned(), "state".into());
                 object.insert("text".to_owned(), line.text().into());
+                object
+                    .extend(self.recordings().map(|(_, fails)| ("recording_fails".to_owned(), fails.into())));
             }
             self.json(state.now, value);
         } else if self.screen.overwrites {

@@ -289,7 +289,7 @@ fn assemble(vehicle: &VehicleConfig, text: &str, log: Option<&Path>) -> (Loop, O
         };
         let (port, recorder) =
             Recorder::create(log, &header, &Rotation::default(), QUEUE_BYTES, None).unwrap();
-        app.add_plugin(&RecorderOutlet::new(port)).unwrap();
+        app.add_plugin(&RecorderOutlet::new([port])).unwrap();
         handle = Some(recorder);
     }
     (app.arm(vehicle.navigation()).unwrap(), handle)

@@ -107,7 +107,7 @@ fn a_million_packets_without_one_allocation() {
         ..LogHeader::default()
     };
     let (port, recorder) = Recorder::start(std::io::sink(), &header, QUEUE_BYTES).unwrap();
-    app.add_plugin(&RecorderOutlet::new(port)).unwrap();
+    app.add_plugin(&RecorderOutlet::new([port])).unwrap();
     // Nor does anybody empty the journal of the filter's steps.
     let (journal, steps) = Journal::new(1000);
     let NavigationConfig::Filter(settings) = vehicle.navigation else { panic!("no filter") };

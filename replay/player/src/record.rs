@@ -40,24 +40,32 @@ pub fn result_channels() -> Vec<ResultChannel> {
     STREAMS.iter().map(channel).chain(view::channels()).collect()
 }
 
-/// Records every packet that the loop consumes, in the order of consumption, every tick, and every result.
+/// Records every packet that the loop consumes, in the order of consumption, every tick, and every result, with one recorder or
+/// several.
 ///
-/// When the queue has no room for another largest tick the loop consumes nothing until it has: recorded input is never
-/// dropped. If the recorder's thread has ended the dive goes on unrecorded; its handle returns the error.
+/// When a recorder's queue has no room for another largest tick the loop consumes nothing until it has: recorded input is never
+/// dropped. If the recorders' threads have ended the dive goes on unrecorded; their handles return the errors.
 pub struct RecorderOutlet {
-    port: Cell<Option<RecorderPort>>,
+    ports: Cell<Vec<RecorderPort>>,
+    waits_for_one: bool,
 }
 
 impl RecorderOutlet {
-    /// With the loop's end of a recorder, whose queue has [`QUEUE_BYTES`]. The outlet can be added to one loop.
-    pub fn new(port: RecorderPort) -> Self {
-        Self { port: Cell::new(Some(port)) }
+    /// With the loop's ends of recorders, whose queues have [`QUEUE_BYTES`]. The outlet can be added to one loop.
+    pub fn new(ports: impl IntoIterator<Item = RecorderPort>) -> Self {
+        Self { ports: Cell::new(ports.into_iter().collect()), waits_for_one: false }
+    }
+
+    /// Waits for no recorder that is behind while another has room: it skips ticks, and states them in its log.
+    pub fn waiting_for_one(self) -> Self {
+        Self { waits_for_one: true, ..self }
     }
 }
 
 #[derive(Resource)]
 struct Recording {
-    port: RecorderPort,
+    ports: Vec<RecorderPort>,
+    waits_for_one: bool,
     order: Vec<u16>,
     /// Buffer for a stream's message.
     message: Vec<u8>,
@@ -67,10 +75,12 @@ struct Recording {
 
 impl Plugin for RecorderOutlet {
     fn build(&self, app: &mut App) -> Result<(), PluginError> {
-        if let Some(port) = self.port.take() {
+        let ports = self.ports.take();
+        if !ports.is_empty() {
             app.keep_results();
             app.insert_resource(Recording {
-                port,
+                ports,
+                waits_for_one: self.waits_for_one,
                 order: Vec::with_capacity(MAX_TICK_PACKETS),
                 message: Vec::with_capacity(MAX_RESULT_BYTES),
                 records: [0; STREAMS.len()],
@@ -88,14 +98,34 @@ fn record(
     results: Res<'_, Digests>,
     mut recording: ResMut<'_, Recording>,
 ) {
-    let Recording { port, order, message, records } = &mut *recording;
-    if port.is_closed() {
-        inbox.allowance_bytes = MAX_TICK_BYTES;
-        return;
+    let Recording { ports, waits_for_one, order, message, records } = &mut *recording;
+    let packets = inbox.iter().map(|(_, packet)| RecorderPort::entry_bytes(packet.bytes.len()));
+    let (count, bytes) = packets.fold((0, 0), |(count, sum), bytes| (count + 1, sum + bytes));
+    let needed = bytes + RecorderPort::tick_entry_bytes(count);
+    for port in ports.iter_mut().filter(|port| !port.is_closed()) {
+        if count > 0 && port.vacant_bytes() < needed {
+            // Only where another recorder had room: the allowance has reserved it.
+            port.skip(time.now, count as u64);
+            continue;
+        }
+        record_tick(port, &inbox, &time, order);
+        record_results(port, &results, &time, message, records);
     }
+    for ((_, trail), before) in results.streams().into_iter().zip(records) {
+        *before = trail.records();
+    }
+    let has_room = |port: &RecorderPort| port.vacant_bytes() >= LARGEST_TICK_BYTES;
+    let mut open = ports.iter().filter(|port| !port.is_closed()).peekable();
+    let goes_on =
+        open.peek().is_none() || if *waits_for_one { open.any(has_room) } else { open.all(has_room) };
+    inbox.allowance_bytes = if goes_on { MAX_TICK_BYTES } else { 0 };
+}
+
+/// Records a tick's packets, in the order of consumption.
+fn record_tick(port: &mut RecorderPort, inbox: &Inbox, time: &TickTime, order: &mut Vec<u16>) {
     order.clear();
     for (source, packet) in inbox.iter() {
-        // The allowance has reserved room for all of this.
+        // There is room for all of this.
         if port.raw(source.0, packet.received, packet.received, packet.bytes).is_ok() {
             order.push(source.0);
         }
@@ -103,18 +133,25 @@ fn record(
     if !order.is_empty() && port.tick(time.index, time.now, order).is_err() {
         order.clear();
     }
+}
+
+/// Records a tick's results. Those that don't fit are omitted, which their record numbers show; the input has priority.
+fn record_results(
+    port: &mut RecorderPort,
+    results: &Digests,
+    time: &TickTime,
+    message: &mut Vec<u8>,
+    records: &[u64; STREAMS.len()],
+) {
     let streams = results.streams().into_iter().zip(records).take(port.result_channels());
     for (channel, ((_, trail), before)) in (0..).zip(streams) {
         if !trail.words().is_empty() {
             let whole = fill(message, time.index, *before, trail.words());
-            // Results that don't fit are omitted, which their record numbers show; the input has priority.
             if port.result(channel, time.now, message).is_err() || !whole {
                 port.miss_results();
             }
         }
-        *before = trail.records();
     }
-    inbox.allowance_bytes = if port.vacant_bytes() >= LARGEST_TICK_BYTES { MAX_TICK_BYTES } else { 0 };
 }
 
 /// Writes a stream's words into a message, without allocating; `false` if they don't all fit.

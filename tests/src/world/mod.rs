@@ -425,7 +425,7 @@ fn assemble(
     let rotation = Rotation::default();
     let (port, worker) = Recorder::unthreaded(storage, path, &header, &rotation, QUEUE_BYTES, None).unwrap();
     let mut app = app(vehicle);
-    app.add_plugin(&RecorderOutlet::new(port)).unwrap();
+    app.add_plugin(&RecorderOutlet::new([port])).unwrap();
     let (outlet, notices) = NoticeOutlet::new(NOTICES);
     app.add_plugin(&outlet).unwrap();
     (app.arm(vehicle.navigation()).unwrap(), worker, notices)

@@ -3,6 +3,8 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
 
 mod determinism;
+#[cfg(target_os = "linux")]
+mod faults;
 mod foreign_log;
 mod golden;
 mod odd_logs;

@@ -133,6 +133,14 @@ pub enum LogError {
         /// Cause.
         source: io::Error,
     },
+    /// A medium that neither takes anything nor fails.
+    #[error(
+        "the recording's medium hasn't answered for {waited_s} s; how much of the log is on it isn't known"
+    )]
+    Stuck {
+        /// How long it was waited for, s.
+        waited_s: u64,
+    },
     /// A bug in the recorder.
     #[error("the recorder's thread panicked")]
     Panicked,

@@ -147,6 +147,8 @@ pub(super) enum Item {
     },
     Chunk(ChunkPlace),
     Attachment(AttachmentPlace),
+    /// One whose names are too long to be read.
+    UnreadAttachment,
     Metadata,
     Statistics {
         channels: u32,
@@ -253,6 +255,7 @@ fn unread(opcode: u8) -> Item {
         op::SCHEMA => Item::Schema,
         op::CHANNEL => Item::Channel,
         op::METADATA => Item::Metadata,
+        op::ATTACHMENT => Item::UnreadAttachment,
         _ => Item::Other,
     }
 }
@@ -342,7 +345,8 @@ fn parse(opcode: u8, body: u64, bytes: &[u8]) -> Option<(Item, u64)> {
         }
         op::ATTACHMENT => {
             let place = attachment_place(&mut fields)?;
-            let len = place.head_len.checked_add(place.data_len)?.checked_add(4)?;
+            // Longer than any record where it isn't so.
+            let len = place.head_len.saturating_add(place.data_len).saturating_add(4);
             return Some((Item::Attachment(place), len));
         }
         op::STATISTICS => {

@@ -23,12 +23,25 @@ pub(super) struct State {
     pub(super) closed: AtomicBool,
     /// Whether nothing is being recorded at present.
     pub(super) failing: AtomicBool,
+    /// Ticks that this recorder was too far behind to take.
+    pub(super) gaps: ArrayQueue<Gap>,
+    /// Steps taken, by which a recorder that is stuck is told from one that is slow.
+    pub(super) steps: AtomicU64,
     /// News for those who watch the dive; the oldest are dropped.
     pub(super) events: ArrayQueue<RecordingEvent>,
     /// Bytes that the port threads sent to the devices, which don't pass through the loop.
     pub(super) sent: ArrayQueue<SentMessage>,
     pub(super) sent_dropped: AtomicU64,
     pub(super) results_missing: AtomicU64,
+}
+
+/// Ticks skipped by a recorder.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Gap {
+    /// Times of the first and last of them.
+    pub(super) span: (MonoNs, MonoNs),
+    /// Packets of these ticks.
+    pub(super) packets: u64,
 }
 
 /// Bytes sent to a device.

@@ -20,7 +20,7 @@ use super::LogError;
 use super::derived_channels::DerivedChannels;
 use super::fault::RecordingEvent;
 use super::format::{TICK_HEAD_BYTES, order_bytes, tick_head};
-use super::queue::{ENTRY_HEAD_BYTES, Queue, SentMessage, State, entry_head};
+use super::queue::{ENTRY_HEAD_BYTES, Gap, Queue, SentMessage, State, entry_head};
 use super::recording::Recording;
 use super::rotate::{Rotation, in_the_way};
 use super::storage::{Disk, OneWriter, Storage};
@@ -33,6 +33,8 @@ const NAP: Duration = Duration::from_millis(2);
 const MIN_QUEUE_BYTES: usize = 64 * 1024;
 /// Capacity for messages to devices: some seconds of eight heads.
 const SENT_MESSAGES: usize = 2048;
+/// How long a medium that neither takes anything nor fails is waited for at the end.
+const PATIENCE: Duration = Duration::from_secs(30);
 /// Capacity for news of the recording.
 const EVENTS: usize = 64;
 
@@ -55,6 +57,8 @@ pub struct RecorderPort {
     ring: Prod<Arc<HeapRb<u8>>>,
     state: Arc<State>,
     result_channels: usize,
+    /// Ticks skipped since the last one that was recorded.
+    gap: Option<Gap>,
 }
 
 /// Handle to stop the recorder. If dropped without [`RecorderHandle::finish`] it still completes the file, but errors
@@ -62,6 +66,8 @@ pub struct RecorderPort {
 pub struct RecorderHandle {
     thread: Option<JoinHandle<Summary>>,
     state: Arc<State>,
+    /// How long a medium that neither takes anything nor fails is waited for at the end.
+    pub(super) patience: Duration,
 }
 
 /// Logs bytes sent to devices, from any thread. When the queue is full the oldest message is dropped and counted.
@@ -139,6 +145,8 @@ impl Recorder {
             stopping: AtomicBool::new(false),
             closed: AtomicBool::new(false),
             failing: AtomicBool::new(false),
+            gaps: ArrayQueue::new(EVENTS),
+            steps: AtomicU64::new(0),
             events: ArrayQueue::new(EVENTS),
             sent: ArrayQueue::new(SENT_MESSAGES),
             sent_dropped: AtomicU64::new(0),
@@ -148,6 +156,7 @@ impl Recorder {
             ring: Prod::new(Arc::clone(&ring)),
             state: Arc::clone(&state),
             result_channels: header.results.len(),
+            gap: None,
         };
         let queue = Queue { ring: Cons::new(ring), state: Arc::clone(&state), message: Vec::new() };
         Ok((port, RecorderWorker::new(queue, recording, header, derived, state)))
@@ -162,7 +171,7 @@ impl Recorder {
         let state = Arc::clone(&port.state);
         let thread = thread::Builder::new().name("recorder".to_owned());
         let thread = thread.spawn(move || run(worker)).map_err(|source| LogError::Thread { source })?;
-        Ok((port, RecorderHandle { thread: Some(thread), state }))
+        Ok((port, RecorderHandle { thread: Some(thread), state, patience: PATIENCE }))
     }
 }
 
@@ -225,6 +234,13 @@ impl RecorderPort {
         self.state.results_missing.fetch_add(1, Ordering::Relaxed);
     }
 
+    /// Skips a tick of so many packets, for which there is no room. The log states it.
+    pub fn skip(&mut self, at: MonoNs, packets: u64) {
+        let gap = self.gap.get_or_insert(Gap { span: (at, at), packets: 0 });
+        gap.span.1 = at;
+        gap.packets += packets;
+    }
+
     /// Number of result channels in the log.
     pub fn result_channels(&self) -> usize {
         self.result_channels
@@ -261,13 +277,27 @@ impl RecorderPort {
         Ok(())
     }
 
+    /// Ends a stretch of skipped ticks. If there is no room to say so, it is told with the next.
+    fn end_gap(&mut self) {
+        if let Some(gap) = self.gap.take() {
+            self.gap = self.state.gaps.push(gap).err();
+        }
+    }
+
     /// Reserves room for an entry with a message of `len` bytes, and writes its header. The thread takes an entry only once
     /// it is complete.
     fn begin(&mut self, lane: Lane, log_time: MonoNs, publish_time: MonoNs, len: usize) -> Result<(), Full> {
         let (free, needed) = (self.vacant_bytes(), Self::entry_bytes(len));
         let len = u32::try_from(len).ok().filter(|_| needed <= free).ok_or(Full { free, needed })?;
+        self.end_gap();
         self.ring.push_slice(&entry_head(lane, log_time, publish_time, len));
         Ok(())
+    }
+}
+
+impl Drop for RecorderPort {
+    fn drop(&mut self) {
+        self.end_gap();
     }
 }
 
@@ -289,15 +319,27 @@ impl RecorderHandle {
 
     /// Writes the rest of the queue and the summary, and ends the thread. Errors of writing are in [`Summary::faults`].
     ///
-    /// Errors: the thread panicked.
+    /// Errors: the thread panicked, or its medium neither takes anything nor fails.
     pub fn finish(mut self) -> Result<Summary, LogError> {
         self.stop().unwrap_or(Err(LogError::Panicked))
     }
 
+    #[expect(clippy::disallowed_methods, reason = "how long a medium is waited for is wall time")]
     fn stop(&mut self) -> Option<Result<Summary, LogError>> {
         self.state.stopping.store(true, Ordering::Release);
         let thread = self.thread.take()?;
         thread.thread().unpark();
+        let (mut steps, mut since) = (0, Instant::now());
+        while !thread.is_finished() {
+            let now = self.state.steps.load(Ordering::Relaxed);
+            if now != steps {
+                (steps, since) = (now, Instant::now());
+            } else if since.elapsed() > self.patience {
+                // Nothing ends a thread that waits for its medium; it ends with the program.
+                return Some(Err(LogError::Stuck { waited_s: self.patience.as_secs() }));
+            }
+            thread::sleep(NAP);
+        }
         Some(thread.join().map_err(|_| LogError::Panicked))
     }
 }

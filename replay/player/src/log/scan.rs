@@ -170,6 +170,12 @@ impl Scan {
             }
             Item::Metadata => self.add_metadata(file, frame)?,
             Item::Attachment(place) => self.add_attachment(file, frame, place)?,
+            Item::UnreadAttachment => {
+                self.lose(
+                    LossKind::Attachment("(a name too long to be read)".to_owned()),
+                    frame.at..frame.end,
+                );
+            }
             Item::Statistics { channels } => self.summary_channels = Some(*channels),
             Item::DataEnd => self.data_end = Some(frame.at..frame.end),
             Item::Header { ours } => self.ours = *ours,

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use super::derived_channels::{DerivedChannels, Made};
 use super::fault::RecordingEvent;
-use super::queue::{Entry, Queue, State};
+use super::queue::{Entry, Gap, Queue, State};
 use super::recorder::SentPort;
 use super::recording::Recording;
 use super::space::{LONGEST_KEPT_BYTES, Space};
@@ -28,6 +28,8 @@ pub struct RecorderWorker {
     space: Space,
     echoes: Echoes,
     beside: Beside,
+    /// Packets of skipped ticks.
+    skipped: u64,
     state: Arc<State>,
 }
 
@@ -75,6 +77,7 @@ impl RecorderWorker {
             space: Space::default(),
             echoes: Echoes::of(header),
             beside: Beside { derived, made: Vec::new() },
+            skipped: 0,
             state,
         }
     }
@@ -108,6 +111,7 @@ impl RecorderWorker {
             taken += 1;
         }
         taken += self.write_sent();
+        self.state_gaps();
         self.flush_in_time(now);
         self.tell();
         taken > 0
@@ -124,7 +128,8 @@ impl RecorderWorker {
         let count = |count: &AtomicU64| count.load(Ordering::Relaxed);
         let (sent_dropped, results_missing) =
             (count(&self.state.sent_dropped), count(&self.state.results_missing));
-        let summary = Summary { left_out, sent_dropped, results_missing, ..self.recording.finish() };
+        let skipped = self.skipped;
+        let summary = Summary { left_out, sent_dropped, results_missing, skipped, ..self.recording.finish() };
         let Summary { messages, bytes, faults, .. } = &summary;
         tracing::info!(
             messages,
@@ -138,10 +143,21 @@ impl RecorderWorker {
         summary
     }
 
+    /// States the ticks that were skipped.
+    fn state_gaps(&mut self) {
+        while let Some(Gap { span: (from, to), packets }) = self.state.gaps.pop() {
+            self.skipped += packets;
+            let words =
+                format!("{packets} packets not recorded: the recorder was behind while another went on");
+            self.recording.state(Some(from), Some(to), &words);
+        }
+    }
+
     fn tell(&mut self) {
         for event in self.recording.take_events() {
             self.state.events.force_push(event);
         }
+        self.state.steps.fetch_add(1, Ordering::Relaxed);
         self.state.failing.store(self.recording.is_failing(), Ordering::Release);
     }
 

@@ -106,6 +106,8 @@ pub struct Summary {
     pub left_out: LeftOut,
     /// Messages to devices that didn't fit in the recorder's queue.
     pub sent_dropped: u64,
+    /// Packets of ticks that the recorder was too far behind to take while another one went on.
+    pub skipped: u64,
     /// Ticks whose results didn't all fit in the recorder's queue.
     pub results_missing: u64,
     /// The files of a recording, in order.

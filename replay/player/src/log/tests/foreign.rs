@@ -315,3 +315,38 @@ fn logs_of_the_python_writer_are_read() {
     }
     std::fs::remove_file(&path).unwrap();
 }
+
+/// A log with an attachment of that name; and the position of its record.
+fn with_attachment(name: &str) -> (Vec<u8>, usize) {
+    let mut writer = WriteOptions::new().create(Cursor::new(Vec::new())).unwrap();
+    let channel_id = writer.add_channel(0, "/raw/a", "x", &[].into()).unwrap();
+    let (log_time, publish_time) = (5, 5);
+    writer
+        .write_to_known_channel(&MessageHeader { channel_id, sequence: 0, log_time, publish_time }, b"a")
+        .unwrap();
+    let (name, media_type, data) = (name.to_owned(), "text/plain".to_owned(), vec![7; 3000].into());
+    writer.attach(&mcap::Attachment { log_time: 0, create_time: 0, name, media_type, data }).unwrap();
+    writer.finish().unwrap();
+    let bytes = writer.into_inner().into_inner();
+    let at = places(&bytes, op::ATTACHMENT)[0];
+    (bytes, at)
+}
+
+#[test]
+fn an_attachment_that_cannot_be_read_is_missing_and_said_so() {
+    let (whole, at) = with_attachment("notes.txt");
+    assert_eq!(read(&whole).1, vec![]);
+    // Opcode and length, two times, name and media type with their lengths; then the length of the data.
+    let data_len_at = at + 9 + 16 + 4 + "notes.txt".len() + 4 + "text/plain".len();
+    assert_eq!(whole[data_len_at..data_len_at + 8], 3000_u64.to_le_bytes());
+    for len in [u64::MAX, u64::MAX - 3, u64::MAX - 60, 1 << 63, 3001] {
+        let mut bytes = whole.clone();
+        bytes[data_len_at..data_len_at + 8].copy_from_slice(&len.to_le_bytes());
+        let (seen, losses) = read(&bytes);
+        assert_eq!((seen.len(), losses.is_empty()), (1, false), "{len}");
+    }
+    let (long, _) = with_attachment(&"n".repeat(1100));
+    let (seen, losses) = read(&long);
+    assert_eq!(seen.len(), 1);
+    assert!(matches!(losses.as_slice(), [Loss { kind: LossKind::Attachment(_), .. }]), "{losses:?}");
+}

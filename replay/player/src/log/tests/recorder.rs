@@ -315,3 +315,53 @@ fn what_a_companion_makes_follows_its_result_and_goes_first_when_the_disk_fills(
         assert_eq!(kinds, expected);
     }
 }
+
+#[test]
+fn a_medium_that_does_not_answer_keeps_nobody_from_the_end() {
+    /// Takes the header, and then waits until the test is over.
+    struct Hanging(usize, mpsc::Receiver<()>);
+
+    impl Write for Hanging {
+        fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+            if self.0 == 0 {
+                self.1.recv().ok();
+            }
+            Ok(bytes.len())
+        }
+
+        fn flush(&mut self) -> std::io::Result<()> {
+            self.0 = 0;
+            Ok(())
+        }
+    }
+    let (over, waits) = mpsc::sync_channel(1);
+    let (mut port, mut handle) = Recorder::start(Hanging(1, waits), &header(true), 0).unwrap();
+    handle.patience = Duration::from_millis(50);
+    port.raw(0, MonoNs(0), MonoNs(0), b"ping").unwrap();
+    let error = handle.finish().unwrap_err();
+    assert!(matches!(error, LogError::Stuck { .. }), "{error}");
+    drop(over);
+}
+
+#[test]
+fn ticks_that_were_skipped_are_stated() {
+    let (medium, flushed) = slow(0);
+    let (mut port, handle) = Recorder::start(medium, &header(true), 0).unwrap();
+    let second = |seconds: u64| MonoNs(seconds * 1_000_000_000);
+    port.raw(0, second(1), second(1), b"ping").unwrap();
+    port.skip(second(2), 3);
+    port.skip(second(3), 4);
+    port.raw(0, second(4), second(4), b"ping").unwrap();
+    port.skip(second(5), 1);
+    drop(port);
+    assert_eq!(handle.finish().unwrap().skipped, 8);
+    let (seen, losses) = read(&flushed.iter().last().unwrap());
+    let told: Vec<String> = losses.iter().map(ToString::to_string).collect();
+    assert_eq!((seen.len(), told.len()), (2, 2), "{told:?}");
+    assert!(
+        told[0].starts_with("7 packets not recorded") && told[0].ends_with("(after 2.000 s, before 3.000 s)")
+    );
+    assert!(
+        told[1].starts_with("1 packets not recorded") && told[1].ends_with("(after 5.000 s, before 5.000 s)")
+    );
+}

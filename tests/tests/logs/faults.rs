@@ -1,0 +1,246 @@
+//! Media that fail while a dive is recorded, terminals that are closed, and who is told.
+
+use std::io::{BufRead as _, BufReader, Write as _};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+
+use headrace_tests::{Folder, skipped};
+use serde_json::Value;
+
+const DIVE: [&str; 4] = ["run", "vehicle.toml", "--source", "dive.mcap"];
+
+/// The program below another one, in a folder.
+fn below(folder: &Folder, command: &[&str], arguments: &[&str]) -> Command {
+    let [above, options @ ..] = command else { panic!("no command") };
+    let mut below = Command::new(above);
+    below.args(options).arg(headrace_tests::program().get_program()).args(DIVE).args(arguments);
+    below.current_dir(folder.path(""));
+    below
+}
+
+/// Whether system calls of a process may be made to fail here.
+fn has_strace() -> bool {
+    let can = Command::new("strace").args(["-o", "/dev/null", "true"]).output();
+    let can = can.is_ok_and(|output| output.status.success());
+    if !can {
+        skipped("strace isn't there, or not allowed");
+    }
+    can
+}
+
+/// Dives and records with this fault of the system's; the exit code and the report.
+fn with_fault(folder: &Folder, fault: &[&str], records: &[&str]) -> (Option<i32>, Value) {
+    let strace = [&["strace", "-f", "-qq", "-o", "trace.txt"][..], fault].concat();
+    let records: Vec<&str> = records.iter().flat_map(|record| ["--record", record]).collect();
+    let output =
+        below(folder, &strace, &[&records[..], &["--speed", "max", "--json"]].concat()).output().unwrap();
+    let report = serde_json::from_slice(&output.stdout);
+    (output.status.code(), report.unwrap_or_else(|error| panic!("{error}: {output:?}")))
+}
+
+fn losses(report: &Value) -> String {
+    report["log"]["losses"].to_string()
+}
+
+/// What `replay`, `verify` and `recover` say of a log that isn't whole: each its exit code 3.
+#[track_caller]
+fn all_find_it(folder: &Folder, log: &str, words: &str) {
+    let (code, report) = folder.replay(log, &[]);
+    assert!(code == Some(3) && losses(&report).contains(words), "{code:?}: {}", losses(&report));
+    assert_eq!(folder.headrace(&["verify", log]).code, Some(3));
+    let recovered = folder.headrace(&["recover", log, "-o", "recovered.mcap"]);
+    assert!(recovered.code == Some(3) && recovered.stdout.contains(words), "{}", recovered.stdout);
+    assert!(!recovered.stdout.contains("nothing is missing"), "{}", recovered.stdout);
+}
+
+#[test]
+fn a_sync_that_fails_once_is_told_and_costs_nothing() {
+    let folder = Folder::with_dive();
+    if !has_strace() {
+        return;
+    }
+    let digest = folder.digest("dive.mcap", &[]);
+    let fault = ["-e", "trace=fdatasync", "-e", "inject=fdatasync:error=EIO:when=2"];
+    let (code, report) = with_fault(&folder, &fault, &["log.mcap"]);
+    let told = losses(&report);
+    assert!(code == Some(3) && told.contains("Input/output error") && told.contains("no message"), "{told}");
+    assert!(folder.path("log.part002.mcap").exists());
+    all_find_it(&folder, "log.mcap", "recording failed in log.mcap");
+    // Both parts are played by the recording's name, and are the dive.
+    assert_eq!(folder.replay("log.mcap", &[]).1["digest"], digest.as_str());
+    assert_eq!(folder.replay("recovered.mcap", &[]).1["digest"], digest.as_str());
+}
+
+#[test]
+fn a_medium_that_takes_nothing_more_leaves_a_log_that_is_cut_off() {
+    let folder = Folder::with_dive();
+    if !has_strace() {
+        return;
+    }
+    let fault = ["-e", "trace=fdatasync", "-e", "inject=fdatasync:error=EIO:when=2+"];
+    let (code, report) = with_fault(&folder, &fault, &["log.mcap"]);
+    assert!(code == Some(3) && losses(&report).contains("messages are missing"), "{}", losses(&report));
+    assert!(!folder.path("log.part002.mcap").exists(), "nothing in it is certain");
+    all_find_it(&folder, "log.mcap", "the file ends before its closing records");
+}
+
+#[test]
+fn one_of_two_recordings_that_fails_leaves_the_other_alone() {
+    let folder = Folder::with_dive();
+    if !has_strace() {
+        return;
+    }
+    let digest = folder.digest("dive.mcap", &[]);
+    let stick = folder.path("stick.mcap");
+    let stick = stick.to_str().unwrap();
+    let fault = ["-P", stick, "-e", "trace=fdatasync", "-e", "inject=fdatasync:error=EIO:when=2+"];
+    for (records, other) in [(["log.mcap", stick], "log.mcap"), ([stick, "second.mcap"], "second.mcap")] {
+        let (code, report) = with_fault(&folder, &fault, &records);
+        let told = losses(&report);
+        assert!(code == Some(3) && told.contains("stick.mcap: recording failed"), "{told}");
+        assert_eq!(folder.digest(other, &[]), digest, "nothing is missing there");
+        assert!(!told.contains(&format!("{other}:")), "{told}");
+        for file in ["stick.mcap", "stick.part002.mcap"] {
+            std::fs::remove_file(folder.path(file)).unwrap();
+        }
+    }
+    let twice = folder.headrace(&[&DIVE[..], &["--record", "a.mcap", "--record", "a.mcap"]].concat());
+    assert!(twice.code == Some(2) && twice.stderr.contains("given twice"), "{}", twice.stderr);
+}
+
+/// So large a file may be that a log of the dive has several parts; `None` where that can't be set.
+fn limit(folder: &Folder) -> Option<String> {
+    folder.record("dive.mcap", "whole.mcap", &[]);
+    let bytes = std::fs::metadata(folder.path("whole.mcap")).unwrap().len();
+    let can = Command::new("prlimit").args(["--fsize=1000000", "true"]).output();
+    if !can.is_ok_and(|output| output.status.success()) {
+        skipped("prlimit isn't there, or not allowed");
+        return None;
+    }
+    Some(format!("--fsize={}", bytes * 2 / 3))
+}
+
+#[test]
+fn a_file_that_may_not_grow_is_followed_by_another() {
+    let folder = Folder::with_dive();
+    let Some(limit) = limit(&folder) else { return };
+    let mut dive =
+        below(&folder, &["prlimit", &limit], &["--record", "log.mcap", "--speed", "20x", "--json"]);
+    let output = dive.output().unwrap();
+    assert_eq!(output.status.code(), Some(3), "SIGXFSZ kills nothing: {output:?}");
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert!(losses(&report).contains("File too large"), "{}", losses(&report));
+    all_find_it(&folder, "log.mcap", "File too large");
+    let digest = folder.digest("dive.mcap", &[]);
+    assert_eq!(folder.replay("log.mcap", &[]).1["digest"], digest.as_str());
+}
+
+/// Waits for a process that must end by itself.
+#[track_caller]
+fn ended(mut child: Child) -> Option<i32> {
+    for _ in 0..1200 {
+        if let Some(status) = child.try_wait().unwrap() {
+            return status.code();
+        }
+        std::thread::sleep(Duration::from_millis(100));
+    }
+    child.kill().unwrap();
+    panic!("it doesn't end")
+}
+
+#[test]
+fn a_stderr_that_nobody_reads_holds_up_no_recording_that_fails() {
+    let folder = Folder::with_dive();
+    let Some(limit) = limit(&folder) else { return };
+    let (reader, mut stderr) = std::io::pipe().unwrap();
+    // What a pipe holds.
+    stderr.write_all(&[b'.'; 1 << 16]).unwrap();
+    let arguments = ["-vv", "--record", "log.mcap", "--speed", "max", "--report", "report.json"];
+    let mut dive = below(&folder, &["prlimit", &limit], &arguments);
+    let dive = dive.stdout(Stdio::null()).stderr(stderr).spawn().unwrap();
+    assert_eq!(ended(dive), Some(3));
+    drop(reader);
+    let report: Value = serde_json::from_slice(&folder.read("report.json")).unwrap();
+    assert!(losses(&report).contains("File too large"), "{}", losses(&report));
+}
+
+fn wait_for(path: &Path, dive: &mut Child) {
+    while !path.exists() {
+        assert!(dive.try_wait().unwrap().is_none(), "the dive has ended without {}", path.display());
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
+#[test]
+fn a_medium_that_is_pulled_costs_the_log_and_not_the_report() {
+    let folder = Folder::with_dive();
+    let digest = folder.digest("dive.mcap", &[]);
+    std::fs::create_dir(folder.path("stick")).unwrap();
+    let mut dive = headrace_tests::program();
+    let arguments = ["--record", "stick/log.mcap", "--report", "report.json", "--speed", "10x"];
+    let dive = dive.args(DIVE).args(arguments).current_dir(folder.path(""));
+    let mut dive = dive.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
+    wait_for(&folder.path("stick/log.mcap"), &mut dive);
+    std::fs::remove_dir_all(folder.path("stick")).unwrap();
+    let output = dive.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(3));
+    let summary = String::from_utf8(output.stdout).unwrap();
+    assert!(summary.contains(&digest) && summary.contains("LOST"), "{summary}");
+    let report: Value = serde_json::from_slice(&folder.read("report.json")).unwrap();
+    assert_eq!(report["digest"], digest.as_str());
+    assert!(losses(&report).contains("stick/log.mcap"), "{}", losses(&report));
+}
+
+#[test]
+fn a_report_that_cannot_be_written_leaves_the_summary() {
+    let folder = Folder::with_dive();
+    std::fs::create_dir(folder.path("stick")).unwrap();
+    let mut dive = headrace_tests::program();
+    let arguments = ["--record", "log.mcap", "--report", "stick/report.json", "--speed", "10x"];
+    let dive = dive.args(DIVE).args(arguments).current_dir(folder.path(""));
+    let mut dive = dive.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    wait_for(&folder.path("log.mcap"), &mut dive);
+    std::fs::remove_dir_all(folder.path("stick")).unwrap();
+    let output = dive.wait_with_output().unwrap();
+    let (summary, said) = [output.stdout, output.stderr].map(|text| String::from_utf8(text).unwrap()).into();
+    assert!(output.status.code() == Some(1) && said.contains("stick/report.json"), "{said}");
+    assert!(summary.contains(&folder.digest("log.mcap", &[])), "{summary}");
+}
+
+fn signal(name: &str, dive: &Child) {
+    let done = Command::new("kill").args(["-s", name, &dive.id().to_string()]).status().unwrap();
+    assert!(done.success(), "{name}");
+}
+
+#[test]
+fn a_dive_on_ports_outlives_its_terminal_and_ends_when_told() {
+    let folder = Folder::with_dive();
+    for (end, arguments) in [("TERM", ["--json-lines"]), ("INT", ["--json"])] {
+        let mut dive = headrace_tests::program();
+        let recorded = ["run", "vehicle.toml", "--record", "log.mcap", "--report", "report.json", "--force"];
+        let dive = dive.args(recorded).args(arguments).current_dir(folder.path(""));
+        let mut dive = dive.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
+        let mut lines = BufReader::new(dive.stdout.take().unwrap()).lines();
+        if end == "TERM" {
+            // The signals are taken before the first line is said.
+            lines.next().unwrap().unwrap();
+        } else {
+            // A log has a header before that; a second holds the rest of the start.
+            wait_for(&folder.path("log.mcap"), &mut dive);
+            std::thread::sleep(Duration::from_secs(1));
+        }
+        for name in ["HUP", "USR1", "USR2", "XFSZ", "XCPU", "ALRM", "TSTP"] {
+            signal(name, &dive);
+            assert!(dive.try_wait().unwrap().is_none(), "{name} has ended the dive");
+        }
+        signal(end, &dive);
+        // The way out isn't read any more, as with a terminal that is gone.
+        drop(lines);
+        // Nothing was inspected.
+        assert_eq!(ended(dive), Some(1), "{end}");
+        let report: Value = serde_json::from_slice(&folder.read("report.json")).unwrap();
+        assert_eq!(losses(&report), "[]");
+        std::fs::remove_file(folder.path("log.mcap")).unwrap();
+    }
+}
