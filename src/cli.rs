@@ -472,6 +472,9 @@ pub(crate) struct Plan {
     /// Print the modes as CSV.
     #[arg(long)]
     pub(crate) csv: bool,
+    /// Print the lines of the vehicle file that make the best answer the dive's: layout, planned speed and modes.
+    #[arg(long, conflicts_with_all = ["json", "csv"])]
+    pub(crate) write: bool,
     /// Output folder for SVG charts: perimeter, pattern, speeds and hours (explained in docs/plan).
     #[arg(long, value_name = "DIR")]
     pub(crate) svg: Option<PathBuf>,

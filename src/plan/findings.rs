@@ -1,6 +1,6 @@
 //! Results of a plan, for the table, the JSON and the charts.
 
-use headrace_sampling::plan::{Answer, Briefing, Planner, Question};
+use headrace_sampling::plan::{Answer, Briefing, InLine, Planner, Question};
 
 /// Results of one planning run.
 pub(super) struct Findings {
@@ -17,6 +17,8 @@ pub(super) struct Findings {
     /// The mode of the briefing and the charts, with its speed; `None` if no mode gives one.
     pub(super) shown: Option<(usize, f64)>,
     pub(super) briefing: Briefing,
+    /// What the heads would gain in line, where that is worth a word.
+    pub(super) in_line: Option<InLine>,
 }
 
 /// A speed as printed, m/s: rounded down to 1 mm/s, so that the printed speed meets the target, too.

@@ -3,13 +3,14 @@
 mod case;
 mod csv;
 mod findings;
+mod lines;
 mod pictures;
 mod table;
 
 use std::path::Path;
 
 use headrace_sampling::SamplingError;
-use headrace_sampling::plan::{Answer, Planner};
+use headrace_sampling::plan::{Answer, InLine, Planner, Question};
 use serde_json::json;
 
 use crate::cli::Plan;
@@ -33,7 +34,9 @@ pub(crate) fn plan(args: &Plan) -> Result<u8, Failure> {
     if let Some(folder) = &args.svg {
         draw(&findings, folder)?;
     }
-    if args.json {
+    if args.write {
+        deliver(lines::lines(&findings, args)?.trim_end())?;
+    } else if args.json {
         deliver(&serde_json::to_string_pretty(&json(&findings))?)?;
     } else if args.csv {
         deliver(&csv::csv(&findings.answers))?;
@@ -67,7 +70,27 @@ fn find(case: Case, args: &Plan) -> Result<Findings, Failure> {
     let (mode, speed_mps) = shown.unwrap_or((0, ANY_SPEED_MPS));
     let briefing = planner.briefing(mode, speed_mps)?;
     let footprints_m = planner.footprints_m()?;
-    Ok(Findings { planner, heads, tunnel, range_m, footprints_m, question, answers, shown, briefing })
+    let in_line = in_line(&planner, &question)?;
+    Ok(Findings {
+        planner,
+        heads,
+        tunnel,
+        range_m,
+        footprints_m,
+        question,
+        answers,
+        shown,
+        briefing,
+        in_line,
+    })
+}
+
+/// What the heads would gain in line, if it is worth a word: asked for a speed, and by more than a twentieth.
+fn in_line(planner: &Planner, question: &Question) -> Result<Option<InLine>, SamplingError> {
+    let asks_for_speed = question.speed_mps.is_none() && question.time_s.is_none();
+    let Some(target_m) = question.target_m.filter(|_| asks_for_speed) else { return Ok(None) };
+    let gains = |other: &InLine| other.v_max_mps > 1.05 * other.present_mps.unwrap_or(0.0);
+    Ok(planner.in_line(target_m)?.filter(gains))
 }
 
 /// Whether a mode meets the request.
@@ -125,6 +148,7 @@ fn json(findings: &Findings) -> serde_json::Value {
         "asked_speed_mps": findings.question.speed_mps,
         "asked_time_h": findings.question.time_s.map(|time_s| time_s / 3600.0),
         "modes": findings.answers,
+        "in_line": findings.in_line,
         "briefing": findings.shown.map(|_| &findings.briefing),
     })
 }

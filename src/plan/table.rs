@@ -3,7 +3,7 @@
 use headrace_sampling::head::Basis;
 use headrace_sampling::layout::HeadLayout;
 use headrace_sampling::margin::{Margin, Margins};
-use headrace_sampling::plan::{Answer, Briefing, Heard, Spacing, ThinStrip};
+use headrace_sampling::plan::{Answer, Briefing, Heard, InLine, Spacing, ThinStrip};
 
 use super::findings::{Findings, printed_mps};
 
@@ -146,6 +146,7 @@ fn notes(findings: &Findings) -> Vec<String> {
         notes.push(format!("* {}", best_words(best)));
         notes.extend(best.margins.map(|margins| margin_words(best.mode, &margins)));
     }
+    notes.extend(findings.in_line.as_ref().map(|in_line| in_line_words(findings, in_line)));
     if findings.answers.iter().any(|answer| answer.turn_basis == Basis::Estimated.as_str()) {
         notes.push(
             "~ extrapolated from another range setting; measure the turn period and add it to the vehicle file"
@@ -194,6 +195,19 @@ fn margin_words(mode: &str, margins: &Margins) -> String {
         }
     }
     words.join(", ")
+}
+
+/// What the heads would gain in line.
+fn in_line_words(findings: &Findings, in_line: &InLine) -> String {
+    let InLine { positions_m, mode, v_max_mps, .. } = in_line;
+    let hours = findings.planner.inspection().length_m / v_max_mps / 3600.0;
+    let places: Vec<String> = positions_m.iter().map(|place| format!("{:.2}", place[0])).collect();
+    let [_, y_m, z_m] = positions_m.first().copied().unwrap_or_default();
+    format!(
+        "with the heads in line, x {} m, y {y_m:.2}, z {z_m:.2}: {mode}, at most {:.3} m/s, {hours:.1} h",
+        places.join(", "),
+        printed_mps(*v_max_mps)
+    )
 }
 
 /// Occlusion by the vehicle, and strips of the wall with fewer passes.

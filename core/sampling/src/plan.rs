@@ -2,6 +2,7 @@
 
 mod answer;
 mod briefing;
+mod mounts;
 mod wall;
 
 use super::error::{SamplingError, not_negative, positive};
@@ -19,6 +20,7 @@ use headrace_geometry::tunnel::{Profile, Yz};
 
 pub use answer::{Answer, Question, Spacing};
 pub use briefing::{Briefing, Heard, Hidden, HullAdvice, Start, ThinStrip};
+pub use mounts::InLine;
 pub use wall::{PatternSample, WallPlace};
 
 /// Soundings per ring: 0.1 degrees apart, so that a step is evaluated from many start angles.

@@ -266,3 +266,40 @@ fn the_pages_show_the_pictures_that_are_drawn() {
         );
     }
 }
+
+#[test]
+fn the_lines_that_a_plan_writes_make_its_best_answer_the_vehicle_s() {
+    let folder = Folder::new();
+    let written = plan(&folder, &["--vehicle", VITA_2, "--write"]);
+    assert_eq!((written.code, written.stderr.as_str()), (Some(0), ""));
+    let best = json(&folder, &["--vehicle", VITA_2]);
+    let best = best["modes"].as_array().unwrap().iter().find(|mode| mode["best"] == true).unwrap().clone();
+    let line = |key: &str| {
+        let found = written.stdout.lines().find(|line| line.starts_with(key));
+        found.unwrap_or_else(|| panic!("{key}: {}", written.stdout)).to_owned()
+    };
+    let speed_mps: f64 = line("planned_speed_mps").split_once(" = ").unwrap().1.parse().unwrap();
+    let v_max_mps = best["v_max_mps"].as_f64().unwrap();
+    assert!((0.0..0.001).contains(&(v_max_mps - speed_mps)), "{speed_mps} of {v_max_mps}");
+    assert_eq!(line("mode"), format!("mode = {}", best["mode"]));
+    assert_eq!(written.stdout.matches("[[sensors]]").count(), 4);
+    // Pasted in place of the same keys: a vehicle that passes at its planned speed.
+    let old = std::fs::read_to_string(VITA_2).unwrap();
+    let pasted: Vec<String> = old
+        .lines()
+        .map(|text| match text.split(' ').next().unwrap() {
+            key @ ("planned_speed_mps" | "mode" | "layout") => line(key),
+            _ => text.to_owned(),
+        })
+        .collect();
+    folder.write("pasted.toml", pasted.join("\n"));
+    let checked = folder.headrace(&["check", "pasted.toml"]);
+    assert_eq!(checked.code, Some(0), "{}{}", checked.stdout, checked.stderr);
+    let again = json(&folder, &["--vehicle", "pasted.toml"]);
+    let now =
+        &again["modes"].as_array().unwrap().iter().find(|mode| mode["best"] == true).unwrap()["v_max_mps"];
+    assert!((now.as_f64().unwrap() - v_max_mps).abs() < 0.003, "{now} of {v_max_mps}");
+    let no_vehicle =
+        plan(&folder, &["--tunnel", "circle,radius_m=3", "--length", "10", "--target", "0.5", "--write"]);
+    assert_eq!(no_vehicle.code, Some(2), "{}", no_vehicle.stdout);
+}

@@ -1,6 +1,7 @@
 use super::*;
 use crate::fixtures;
 use crate::head::{Basis, Turn};
+use headrace_geometry::frames::Vec3;
 use headrace_geometry::math;
 use headrace_geometry::tunnel::shapes;
 
@@ -237,4 +238,30 @@ fn the_pattern_is_what_the_heads_lay() {
     let samples = Planner::new(sectors).unwrap().pattern(2, 0.1, 2.0).unwrap();
     // Two turns are four sweeps of half a turn: three turning points within.
     assert_eq!(samples.iter().filter(|sample| sample.new_sweep).count(), 2 * 4);
+}
+
+#[test]
+fn heads_side_by_side_gain_by_standing_in_line_and_those_in_line_nothing() {
+    let planner = Planner::new(vita_2(HeadLayout::PhaseShift)).unwrap();
+    let gain = planner.in_line(0.5).unwrap().unwrap();
+    assert!(gain.v_max_mps > 1.3 * gain.present_mps.unwrap(), "{gain:?}");
+    let [places, sides]: [Vec<f64>; 2] =
+        [0, 1].map(|k| gain.positions_m.iter().map(|place| place[k]).collect());
+    assert_eq!(sides, [0.0; 4]);
+    // As far ahead as astern, and no two within one another.
+    assert!(places.iter().sum::<f64>().abs() < 1e-12, "{places:?}");
+    let mut sorted = places.clone();
+    sorted.sort_by(f64::total_cmp);
+    assert!(sorted.windows(2).all(|pair| pair[1] - pair[0] > 0.05), "{sorted:?}");
+    assert!(places[0] > 0.0 && places[2] < 0.0, "heads in front stay in front: {places:?}");
+    // What is said of the other mount is what a plan of it says.
+    let mut there = vita_2(HeadLayout::PhaseShift);
+    for ((spec, _), place) in there.heads.iter_mut().zip(&gain.positions_m) {
+        spec.mount.position = Vec3::new(place[0], place[1], place[2]);
+    }
+    let there = Planner::new(there).unwrap();
+    let fastest = there.answers(&speed(0.5), None).unwrap().into_iter().filter_map(|answer| answer.v_max_mps);
+    assert_eq!(fastest.fold(0.0, f64::max), gain.v_max_mps);
+    assert_eq!(there.in_line(0.5).unwrap(), None);
+    assert_eq!(Planner::new(ideal(1)).unwrap().in_line(0.5).unwrap(), None);
 }

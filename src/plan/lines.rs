@@ -1,0 +1,42 @@
+//! `headrace plan --write`: what to put into the vehicle file.
+
+use crate::cli::Plan;
+use crate::failure::Failure;
+
+use super::findings::Findings;
+
+/// The keys of a vehicle file that make the plan's best answer the dive's: layout, planned speed and modes. Start angles follow
+/// from them.
+///
+/// Errors: no vehicle file to write lines for; no mode meets the target.
+pub(super) fn lines(findings: &Findings, args: &Plan) -> Result<String, Failure> {
+    let Some(vehicle) = &args.vehicle else {
+        return Err(Failure::Usage("--write: needs --vehicle, whose lines it gives".to_owned()));
+    };
+    let Some((number, speed_mps)) = findings.shown else {
+        return Err(Failure::Usage("--write: no mode meets the target at any speed".to_owned()));
+    };
+    let inspection = findings.planner.inspection();
+    let mode = findings.planner.modes().get(number).map_or("", |planned| planned.mode.name);
+    let mut text = format!("# In place of the same keys of {}", vehicle.display());
+    let met =
+        findings.question.target_m.map(|target_m| format!(": {target_m} m at {speed_mps:.3} m/s in {mode}"));
+    text.push_str(&met.unwrap_or_default());
+    text.push('\n');
+    if let Some(target_m) = args.target {
+        text.push_str(&format!("target_m = {target_m}\n"));
+    }
+    text.push_str(&format!(
+        "\n[heads]\nlayout = {:?}\nplanned_speed_mps = {speed_mps:.3}\n",
+        inspection.layout.as_str()
+    ));
+    let range = args.range.map(|range_m| format!("range_m = {range_m}\n")).unwrap_or_default();
+    for (id, start) in findings.heads.iter().zip(&findings.briefing.starts) {
+        let way = if start.growing { "growing" } else { "falling" };
+        text.push_str(&format!(
+            "\n[[sensors]]    # {id}: begins at {:.1} degrees, {way}\nmode = {mode:?}\n{range}",
+            start.angle_deg
+        ));
+    }
+    Ok(text)
+}
