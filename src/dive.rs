@@ -258,7 +258,7 @@ impl Dive {
         });
         drop(progress);
         drop(phase);
-        let report = self.end(watch, beside)?;
+        let report = self.end(watch, beside);
         driven?;
         Ok(report)
     }
@@ -273,7 +273,7 @@ impl Dive {
         let phase = Phase::start("playback");
         let played = direct(&mut self.armed, &notices, watch);
         drop(phase);
-        let report = self.end(watch, &mut |_| ())?;
+        let report = self.end(watch, &mut |_| ());
         played?;
         Ok(report)
     }
@@ -285,7 +285,7 @@ impl Dive {
         ended: &dyn Fn() -> bool,
         watch: &mut Watch,
         beside: &mut dyn FnMut(&Supervisor, &mut Watch),
-    ) -> Result<Report, Failure> {
+    ) -> Report {
         let notices = self.notices.clone();
         let phase = Phase::start("dive");
         supervisor.run(&mut self.armed, ended, &mut |dive| {
@@ -301,7 +301,7 @@ impl Dive {
         while let Some(notice) = notices.next() {
             watch.notice(&notice, &self.armed);
         }
-        let mut report = self.end(watch, &mut |_| ())?;
+        let mut report = self.end(watch, &mut |_| ());
         for (source, history) in report.sources.iter_mut().zip(histories) {
             source.line = Some(LineReport {
                 opened: history.opened,
@@ -311,7 +311,7 @@ impl Dive {
                 status: history.last,
             });
         }
-        Ok(report)
+        report
     }
 
     /// The recorders' inputs for bytes sent to devices.
@@ -320,7 +320,7 @@ impl Dive {
     }
 
     /// Ends the dive; returns the report.
-    fn end(mut self, watch: &mut Watch, beside: &mut dyn FnMut(&Loop)) -> Result<Report, Failure> {
+    fn end(mut self, watch: &mut Watch, beside: &mut dyn FnMut(&Loop)) -> Report {
         let _phase = Phase::start("report");
         self.armed.finish(&mut |notice, dive| watch.notice(notice, dive));
         // Before the samples are released below.
@@ -337,7 +337,7 @@ impl Dive {
         let recorders = core::mem::take(&mut self.recorders);
         drop(self.armed);
         report.log = recorded(recorders, &report);
-        Ok(report)
+        report
     }
 }
 
@@ -361,7 +361,9 @@ fn recorded(recorders: Vec<(PathBuf, RecorderHandle)>, report: &Report) -> Optio
             Ok(written) => unrecorded(written),
         };
         if several {
-            losses.iter_mut().for_each(|loss| *loss = format!("{}: {loss}", path.display()));
+            for loss in &mut losses {
+                *loss = format!("{}: {loss}", path.display());
+            }
         }
         if let Some(log) = &mut log {
             log.notes.push(format!("also recorded to {}", path.display()));

@@ -73,7 +73,7 @@ pub(crate) fn run(args: &Run, text: &str, vehicle: &VehicleConfig) -> Result<u8,
         while let Some(status) = supervisor.next_status() {
             states.borrow_mut().show(&status, watch);
         }
-    })?;
+    });
     let code = finish(&report, &args.output)?;
     match states.borrow().missing(headrace_ports::now()) {
         Some(why) => Err(Failure::Required(why)),

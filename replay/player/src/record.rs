@@ -57,6 +57,7 @@ impl RecorderOutlet {
     }
 
     /// Waits for no recorder that is behind while another has room: it skips ticks, and states them in its log.
+    #[must_use]
     pub fn waiting_for_one(self) -> Self {
         Self { waits_for_one: true, ..self }
     }

@@ -85,7 +85,7 @@ fn a_recording_logs_its_file_and_a_damaged_log_its_damage() {
     let run =
         ["run", "vehicle.toml", "--source", "dive.mcap", "--speed", "max", "-v", "--record", "again.mcap"];
     let recorded = headrace(&folder, None, &run);
-    let created = recorded.stderr.find("headrace_replay::log::recorder: log created path=again.mcap");
+    let created = recorded.stderr.find("headrace_replay::log::storage: log created path=again.mcap");
     let finished = recorded.stderr.find("headrace_replay::log::worker: recording finished messages=");
     assert!(created.is_some() && created < finished, "{}", recorded.stderr);
     let whole = folder.read("again.mcap");

@@ -155,7 +155,7 @@ fn a_stderr_that_nobody_reads_holds_up_no_recording_that_fails() {
     let Some(limit) = limit(&folder) else { return };
     let (reader, mut stderr) = std::io::pipe().unwrap();
     // What a pipe holds.
-    stderr.write_all(&[b'.'; 1 << 16]).unwrap();
+    stderr.write_all(&vec![b'.'; 1 << 16]).unwrap();
     let arguments = ["-vv", "--record", "log.mcap", "--speed", "max", "--report", "report.json"];
     let mut dive = below(&folder, &["prlimit", &limit], &arguments);
     let dive = dive.stdout(Stdio::null()).stderr(stderr).spawn().unwrap();

@@ -51,6 +51,27 @@ pub(super) struct SentMessage {
     pub(super) bytes: Vec<u8>,
 }
 
+/// Logs bytes sent to devices, from any thread. When the queue is full the oldest message is dropped and counted.
+#[derive(Clone)]
+pub struct SentPort {
+    pub(super) state: Arc<State>,
+}
+
+impl SentPort {
+    /// Logs bytes sent to `source`. Never blocks.
+    pub fn sent(&self, source: u16, at: MonoNs, bytes: &[u8]) {
+        let message = SentMessage { source, at, bytes: bytes.to_vec() };
+        if self.state.sent.force_push(message).is_some() {
+            self.state.sent_dropped.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+
+    /// Number of messages dropped.
+    pub fn dropped(&self) -> u64 {
+        self.state.sent_dropped.load(Ordering::Relaxed)
+    }
+}
+
 /// Header of a message of `len` bytes in the queue.
 pub(super) fn entry_head(
     lane: Lane,

@@ -20,7 +20,7 @@ use super::LogError;
 use super::derived_channels::DerivedChannels;
 use super::fault::RecordingEvent;
 use super::format::{TICK_HEAD_BYTES, order_bytes, tick_head};
-use super::queue::{ENTRY_HEAD_BYTES, Gap, Queue, SentMessage, State, entry_head};
+use super::queue::{ENTRY_HEAD_BYTES, Gap, Queue, SentPort, State, entry_head};
 use super::recording::Recording;
 use super::rotate::{Rotation, in_the_way};
 use super::storage::{Disk, OneWriter, Storage};
@@ -68,27 +68,6 @@ pub struct RecorderHandle {
     state: Arc<State>,
     /// How long a medium that neither takes anything nor fails is waited for at the end.
     pub(super) patience: Duration,
-}
-
-/// Logs bytes sent to devices, from any thread. When the queue is full the oldest message is dropped and counted.
-#[derive(Clone)]
-pub struct SentPort {
-    pub(super) state: Arc<State>,
-}
-
-impl SentPort {
-    /// Logs bytes sent to `source`. Never blocks.
-    pub fn sent(&self, source: u16, at: MonoNs, bytes: &[u8]) {
-        let message = SentMessage { source, at, bytes: bytes.to_vec() };
-        if self.state.sent.force_push(message).is_some() {
-            self.state.sent_dropped.fetch_add(1, Ordering::Relaxed);
-        }
-    }
-
-    /// Number of messages dropped.
-    pub fn dropped(&self) -> u64 {
-        self.state.sent_dropped.load(Ordering::Relaxed)
-    }
 }
 
 impl Recorder {

@@ -6,8 +6,7 @@ use std::time::Duration;
 
 use super::derived_channels::{DerivedChannels, Made};
 use super::fault::RecordingEvent;
-use super::queue::{Entry, Gap, Queue, State};
-use super::recorder::SentPort;
+use super::queue::{Entry, Gap, Queue, SentPort, State};
 use super::recording::Recording;
 use super::space::{LONGEST_KEPT_BYTES, Space};
 use super::writer::{Lane, LogHeader, Summary};
@@ -129,7 +128,7 @@ impl RecorderWorker {
         let (sent_dropped, results_missing) =
             (count(&self.state.sent_dropped), count(&self.state.results_missing));
         let skipped = self.skipped;
-        let summary = Summary { left_out, sent_dropped, results_missing, skipped, ..self.recording.finish() };
+        let summary = Summary { left_out, sent_dropped, skipped, results_missing, ..self.recording.finish() };
         let Summary { messages, bytes, faults, .. } = &summary;
         tracing::info!(
             messages,

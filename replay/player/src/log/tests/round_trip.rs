@@ -3,7 +3,7 @@
 use std::io::Write;
 
 use super::super::format::{Tick, seal};
-use super::super::{LogError, LogReader, LogWriter, file_digest};
+use super::super::{LogError, LogReader, LogWriter, LossKind, file_digest};
 use super::*;
 
 /// Ticks that consume packets out of time order, with results and sent bytes between.
@@ -143,4 +143,17 @@ fn a_later_format_is_refused() {
     let bytes = writer.into_inner().into_inner();
     let error = LogReader::new(Cursor::new(bytes), "new".to_owned()).err().unwrap();
     assert_eq!(error.to_string(), "new is a log of format 2; this program reads formats up to 1");
+}
+
+#[test]
+fn a_writer_that_is_dropped_ends_no_log() {
+    let mut bytes = Vec::new();
+    let mut log = LogWriter::new(&mut bytes, &header(true)).unwrap();
+    log.raw(0, MonoNs(1), MonoNs(1), b"one").unwrap();
+    log.flush().unwrap();
+    log.raw(0, MonoNs(2), MonoNs(2), b"two").unwrap();
+    drop(log);
+    let (seen, losses) = read(&bytes);
+    assert_eq!(seen.len(), 1);
+    assert!(matches!(losses.as_slice(), [Loss { kind: LossKind::Truncated, .. }]), "{losses:?}");
 }
