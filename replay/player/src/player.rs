@@ -160,7 +160,7 @@ impl Player {
             let MessageKind::Raw { source } = message.kind else { continue };
             let index = usize::from(source);
             let Some(id) = self.sources.get(index).copied().flatten() else {
-                let name = self.ids.get(index).cloned().unwrap_or_else(|| source.to_string());
+                let name = self.reader.source_id(source).map_or_else(|| source.to_string(), str::to_owned);
                 *self.unmatched.entry(name).or_default() += 1;
                 continue;
             };
