@@ -18,6 +18,7 @@ mod inventory;
 mod live;
 mod logging;
 mod manual;
+mod memory;
 mod output;
 mod outputs;
 mod phase;
@@ -69,11 +70,12 @@ pub fn main() -> ExitCode {
         Command::Completions(args) => manual::completions(&args),
         Command::Man(args) => manual::man(&args),
     };
+    tracing::info!(most_kib = memory::most_kib(), "memory at the most");
     match result {
         Ok(code) => ExitCode::from(code),
         Err(failure) => {
-            for line in failure.to_string().lines() {
-                eprintln!("headrace: {line}");
+            for line in failure.lines() {
+                output::complain(&format!("headrace: {line}"));
             }
             ExitCode::from(failure.exit_code())
         }

@@ -2,6 +2,7 @@
 
 use std::io::{self, Write};
 
+use headrace_config::plain::one_line;
 use tracing::level_filters::LevelFilter;
 use tracing_subscriber::filter::Targets;
 use tracing_subscriber::fmt;
@@ -52,6 +53,21 @@ fn filter(level: Option<LevelFilter>, variable: Option<&str>) -> (Targets, Optio
     (filter, error)
 }
 
+/// An event as one line, whatever names are in it. The colours are the formatter's, which escapes those of others.
+fn event(bytes: &[u8]) -> String {
+    let text = String::from_utf8_lossy(bytes);
+    let (line, end) = text.strip_suffix('\n').map_or((&*text, ""), |line| (line, "\n"));
+    let mut fit = String::new();
+    let mut parts = line.split('\x1b');
+    fit.push_str(&one_line(parts.next().unwrap_or_default()));
+    for part in parts {
+        let codes = part.trim_start_matches(|c: char| c == '[' || c == ';' || c.is_ascii_digit());
+        fit.push_str(if part.starts_with('[') && codes.starts_with('m') { "\x1b" } else { "\\u001b" });
+        fit.push_str(&one_line(part));
+    }
+    fit + end
+}
+
 /// Stderr, which log messages share with self-overwriting lines. Failed writes are dropped: a closed stderr must not end a
 /// dive.
 struct Stderr;
@@ -64,7 +80,7 @@ impl Write for Stderr {
         } else {
             Ok(())
         };
-        cleared.and_then(|()| stderr.write_all(bytes)).ok();
+        cleared.and_then(|()| stderr.write_all(event(bytes).as_bytes())).ok();
         Ok(bytes.len())
     }
 
@@ -83,6 +99,13 @@ mod tests {
         let (filter, error) = filter(level, variable);
         assert_eq!(error, None);
         move |target, level| filter.would_enable(target, &level)
+    }
+
+    #[test]
+    fn an_event_is_a_line_with_no_codes_but_colours() {
+        let text = "\x1b[33mWARN\x1b[0m opened a\nb\x1b[2J\x1b]0;t\x07\u{202e}\n";
+        let line = "\x1b[33mWARN\x1b[0m opened a\\nb\\u001b[2J\\u001b]0;t\\u0007\\u202e\n";
+        assert_eq!(event(text.as_bytes()), line);
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! Output during a dive: the state, and each missed, unsure or cleared stretch once; as lines for people, or as JSON.
 
+use headrace_config::plain::one_line;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::live_state::{Condition, Lamp, LiveState};
 use headrace_monitor::live_text::{PilotLine, status_line, told_line};
@@ -190,7 +191,7 @@ impl Watch {
                 printer.status(text);
             }
         } else {
-            self.print(line.text());
+            self.print(self.screen.coloured(&line.text(), None));
         }
     }
 
@@ -223,9 +224,10 @@ impl Watch {
         if let Some(object) = value.as_object_mut() {
             object.insert("t_s".to_owned(), at.as_secs_f64().into());
         }
-        self.print(value.to_string());
+        self.print(one_line(&value.to_string()).into_owned());
     }
 
+    /// Writes a line that is fit for it.
     fn print(&mut self, text: String) {
         if let Some(printer) = &mut self.printer {
             printer.line(text);

@@ -240,8 +240,10 @@ impl Verifier {
                 return Ok(false);
             };
             let MessageKind::Result { topic } = message.kind else { continue };
-            let found = stream_of(topic).and_then(|number| self.streams.get_mut(number).zip(STREAMS.get(number)));
-            let (Some((stream, name)), Some((tick, next, words))) = (found, read_results(message.data)) else {
+            let found =
+                stream_of(topic).and_then(|number| self.streams.get_mut(number).zip(STREAMS.get(number)));
+            let (Some((stream, name)), Some((tick, next, words))) = (found, read_results(message.data))
+            else {
                 continue;
             };
             self.has_results = true;
@@ -325,7 +327,8 @@ mod tests {
     #[test]
     fn results_far_ahead_of_the_replay_are_a_difference_and_take_no_more_memory() {
         let mut stream = Stream::default();
-        let batch = |tick| Batch { tick, next: tick, words: vec![RecordKind::Run as u64 | 2047 << 8; 4096], at: 0 };
+        let batch =
+            |tick| Batch { tick, next: tick, words: vec![RecordKind::Run as u64 | 2047 << 8; 4096], at: 0 };
         for tick in 3..1000 {
             stream.wait(batch(tick), "poses");
             assert!(stream.waiting_bytes <= MOST_WAITING);

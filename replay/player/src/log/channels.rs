@@ -2,12 +2,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::limits::{HeaderBudget, MAX_CHANNELS, MAX_SOURCES};
-use super::{Many, SourceInfo};
 use super::format::{
     CONNECT_KEY, PLUGIN_KEY, RAW_PREFIX, RESULT_PREFIX, SENT_PREFIX, SOURCE_KEY, TICK_TOPIC,
 };
 use super::framing::Definition;
+use super::limits::{HeaderBudget, MAX_CHANNELS, MAX_SOURCES};
+use super::{Many, SourceInfo};
 
 /// Rank of the first channel that isn't raw; source numbers are u16.
 const OTHER_RANK: u32 = 1 << 16;
@@ -268,10 +268,7 @@ mod tests {
         let mut channels = channels(&[("/raw/a", None)]);
         let same = channels.get(0).unwrap().definition.clone();
         assert_eq!(channels.admit(same.clone()), Admission::Known);
-        assert_eq!(
-            channels.admit(Definition { topic: "/raw/b".to_owned(), ..same }),
-            Admission::Conflict
-        );
+        assert_eq!(channels.admit(Definition { topic: "/raw/b".to_owned(), ..same }), Admission::Conflict);
     }
 
     #[test]

@@ -166,7 +166,10 @@ impl fmt::Display for LossKind {
                 write!(out, "larger than the {limit} bytes that are read into memory")
             }
             Self::Swells { limit } => {
-                write!(out, "chunks that would unpack to over {limit} times the length of the log: they aren't")
+                write!(
+                    out,
+                    "chunks that would unpack to over {limit} times the length of the log: they aren't"
+                )
             }
             Self::Window { limit } => {
                 write!(out, "a chunk whose unpacking would take more than {limit} bytes")

@@ -68,7 +68,14 @@ pub(super) struct Merge {
 
 impl Merge {
     pub(super) fn new(by_time: bool) -> Self {
-        Self { by_time, heads: BinaryHeap::new(), batches: Vec::new(), spare: Vec::new(), released: Vec::new(), memory: 0 }
+        Self {
+            by_time,
+            heads: BinaryHeap::new(),
+            batches: Vec::new(),
+            spare: Vec::new(),
+            released: Vec::new(),
+            memory: 0,
+        }
     }
 
     /// Memory of the pieces, bytes.

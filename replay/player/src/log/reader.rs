@@ -20,6 +20,7 @@ use super::merge::{Batch, Merge};
 use super::part::Part;
 use super::scan::{FoundDefinitions, Piece, Span, beyond, date_losses, scan};
 use super::{LogError, Loss, LossKind, Many, SourceInfo};
+use crate::regular_file;
 
 /// A log's header.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -143,7 +144,8 @@ impl LogReader<File> {
     ///
     /// Errors: the file can't be read, isn't MCAP, or is of a later format.
     pub fn open(path: &Path) -> Result<Self, LogError> {
-        let file = File::open(path).map_err(|source| LogError::Open { path: path.to_owned(), source })?;
+        let file = regular_file::open(path);
+        let file = file.map_err(|source| LogError::Open { path: path.to_owned(), source })?;
         Self::new(file, path.display().to_string())
     }
 }

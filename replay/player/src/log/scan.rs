@@ -187,7 +187,8 @@ impl Scan {
                 // Its content isn't kept, and may be long.
                 let body = file.bytes_at(frame.body, (frame.end - frame.body).min(MAX_HEADER_BYTES))?;
                 let schema = schema(&mut Fields::new(&body));
-                if let Some((number, name)) = schema.filter(|(number, _)| !self.schemas.contains_key(number)) {
+                if let Some((number, name)) = schema.filter(|(number, _)| !self.schemas.contains_key(number))
+                {
                     self.add_schema(number, name, frame.at..frame.end);
                 }
             }

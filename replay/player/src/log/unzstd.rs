@@ -34,7 +34,9 @@ impl Decompressor for Unzstd {
     fn decompress(&mut self, src: &[u8], dst: &mut [u8]) -> McapResult<DecompressResult> {
         if self.need == 0 {
             // Fewer bytes than that ask for more.
-            let Some(magic) = src.first_chunk() else { return Ok(DecompressResult { consumed: 0, wrote: 0 }) };
+            let Some(magic) = src.first_chunk() else {
+                return Ok(DecompressResult { consumed: 0, wrote: 0 });
+            };
             let magic = u32::from_le_bytes(*magic);
             if magic != FRAME && magic & !0xF != SKIPPABLE {
                 return Err(McapError::DecompressionError("no frame of zstd".into()));
