@@ -15,6 +15,7 @@ pub(crate) struct Bomb {
 
 const MIB: u64 = 1 << 20;
 const TOO_LARGE: &str = "larger than the 33554432 bytes that are read into memory";
+const SWELLS: &str = "chunks that would unpack to over 512 times the length of the log";
 const HEADERS: &str = "more than 8388608 bytes of definitions and metadata";
 const ATTACHMENTS: &str = "more than 16777216 bytes of attachments";
 
@@ -39,10 +40,12 @@ fn chunks() -> Vec<Bomb> {
     let mut head = Vec::new();
     let topic_front = [&[9, 0, 0, 0][..], &u32::try_from(200 * MIB).unwrap().to_le_bytes()].concat();
     let topic = packed_chunk(&filled(&mut head, 4, &topic_front, 200 * MIB + 16), (1, 2));
+    let packets = |mib| {
+        let message = message(1, 5, &vec![7; usize::try_from(mib * MIB).unwrap()]);
+        chunk("", message.len() as u64, &message, (5, 5))
+    };
     let mut head = Vec::new();
-    let long = packed_chunk(&filled(&mut head, 5, &message_head(1, 5), 31 * MIB), (5, 5));
-    let mut head = Vec::new();
-    let half = packed_chunk(&filled(&mut head, 5, &message_head(1, 5), 15 * MIB), (5, 5));
+    let packed = packed_chunk(&filled(&mut head, 5, &message_head(1, 5), 15 * MIB), (5, 5));
     let small: Vec<u8> = (0..MIB).flat_map(|n| message(1, n, b"")).collect();
     let nested = [record_head(6, 40 + 100), vec![0xFF; 140]].concat();
     let nested = packed_chunk(&[Part::Bytes(&nested.repeat(1000))], (1, 2));
@@ -52,20 +55,16 @@ fn chunks() -> Vec<Bomb> {
     vec![
         bomb("a topic of 200 MB in a chunk", &[depth(), topic], TOO_LARGE),
         bomb("8 GiB of zeros in a chunk", &[depth(), zeros(8 << 30)], TOO_LARGE),
-        bomb(
-            "16 GiB of zeros in 500 chunks",
-            &[depth(), zeros(31 * MIB).repeat(500)],
-            "over 1024 times the length of the log",
-        ),
+        bomb("16 GiB of zeros in 500 chunks", &[depth(), zeros(31 * MIB).repeat(500)], SWELLS),
         bomb(
             "100 bytes that are 1 GiB",
             &[depth(), chunk("zstd", 100, &zstd(17, &[Part::Repeated(0, 1 << 30)]), (1, 2))],
-            "doesn't unpack|does not unpack",
+            "does not unpack",
         ),
         bomb(
             "31 MiB that are 100 bytes",
             &[depth(), chunk("zstd", 31 * MIB, &zstd(17, &[Part::Repeated(0, 100)]), (1, 2)).repeat(1000)],
-            "does not unpack|over 1024",
+            "does not unpack|over 512 times",
         ),
         bomb(
             "a window of 128 MiB",
@@ -82,8 +81,17 @@ fn chunks() -> Vec<Bomb> {
             &[depth(), chunk("", small.len() as u64, &small, (0, MIB))],
             TOO_LARGE,
         ),
-        bomb("8 messages of 31 MiB at once", &[depth(), long.repeat(8)], "messages of over 4096 bytes"),
-        bomb("40 overlapping chunks of 15 MiB", &[depth(), half.repeat(40)], "messages of over 4096 bytes"),
+        bomb(
+            "3 messages of 31 MiB at once",
+            &[depth(), packets(31).repeat(3)],
+            "messages of over 4096 bytes",
+        ),
+        bomb(
+            "7 overlapping chunks of 15 MiB",
+            &[depth(), packets(15).repeat(7)],
+            "messages of over 4096 bytes",
+        ),
+        bomb("40 overlapping chunks of 15 MiB, packed", &[depth(), packed.repeat(40)], SWELLS),
         bomb("chunks in chunks", &[depth(), nested], ""),
         bomb(
             "messages of 65,536 channels that there aren't",

@@ -18,6 +18,9 @@ const READING: [&[&str]; 7] = [
     &["recover", "odd.mcap", "-o", "recovered.mcap", "--force"],
 ];
 
+/// A time from number and time.
+type Stamp<'a> = &'a dyn Fn(u64, u64) -> u64;
+
 /// The dive, with times as `stamp` has them from number and time.
 fn odd(folder: &Folder, stamp: impl Fn(u64, u64) -> u64) {
     let dive = folder.read("dive.mcap");
@@ -68,7 +71,7 @@ fn messages_at_the_end_of_time_are_told_and_left_out() {
 fn clocks_that_jump_keep_nobody_waiting() {
     let folder = Folder::with_dive();
     let year = 364 * DAY_NS;
-    let jumps: [(&str, &dyn Fn(u64, u64) -> u64, Option<i32>); 6] = [
+    let jumps: [(&str, Stamp<'_>, Option<i32>); 6] = [
         ("ahead a year", &|number, at| if number > 4000 { at + year } else { at }, Some(0)),
         ("to and fro", &|number, at| at + number / 1000 % 2 * year, Some(0)),
         ("another clock", &|number, at| if number % 3 == 0 { at + 100 * year } else { at }, Some(3)),

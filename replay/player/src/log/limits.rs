@@ -13,9 +13,9 @@ pub(super) const MAX_UNPACKED_BYTES: u64 = 32 << 20;
 pub(super) const RECORD_COST: u64 = 64;
 /// All chunks up to a place in a log may unpack to so many times its distance from the beginning: what is packed best there is
 /// repeats itself every few hundred bytes, and nothing but zeros packs to a thirty-thousandth.
-pub(super) const MAX_UNPACKED_RATIO: u64 = 1024;
+pub(super) const MAX_UNPACKED_RATIO: u64 = 512;
 /// And to these bytes more, so that short logs may say little at length.
-const UNPACKED_ANYWAY: u64 = 256 << 20;
+const UNPACKED_ANYWAY: u64 = 64 << 20;
 /// Largest window of a chunk packed by zstd, as a power of two: 16 MiB, more than levels up to 19 use.
 pub(super) const MAX_WINDOW_LOG: u32 = 24;
 /// Most bytes of overlapping pieces held in memory to merge their messages; one piece more may come in.
