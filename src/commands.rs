@@ -21,7 +21,7 @@ use crate::feeds::Interruptible;
 use crate::files;
 use crate::interrupt;
 use crate::live;
-use crate::output::{put, say};
+use crate::output::{say, show};
 use crate::outputs::{self, Kind};
 use crate::play::{self, Playing};
 use crate::report_output::{exit_code, finish, note_losses};
@@ -54,8 +54,9 @@ pub(crate) fn demo(args: &Demo) -> Result<u8, Failure> {
     let report = dive.run(&mut feed, pace, &mut watch)?;
     files::write_json(&report_file, &report)?;
     let ended = if interrupted.load(Ordering::Relaxed) { "interrupted: the dive so far\n" } else { "" };
-    put(&format!("\n{ended}{}", summary(&report, Screen::columns())));
-    say(&format!("report {}\nlog    {}  (headrace replay)", report_file.display(), log.display()));
+    show(&format!("\n{ended}{}", summary(&report, Screen::columns())));
+    say(&format!("report {}", report_file.display()));
+    say(&format!("log    {}  (headrace replay)", log.display()));
     Ok(exit_code(&report))
 }
 

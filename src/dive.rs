@@ -21,6 +21,7 @@ use headrace_vehicle::VehicleConfig;
 
 use crate::failure::Failure;
 use crate::feeds;
+use crate::memory;
 use crate::outputs::SIMULATED;
 use crate::phase::Phase;
 use crate::progress::Progress;
@@ -137,17 +138,10 @@ fn arm(app: App, vehicle: &VehicleConfig, navigation: Box<dyn Navigation>) -> Re
     let armed = app.arm(navigation)?;
     if tracing::enabled!(tracing::Level::INFO) {
         let ring_bytes: usize = vehicle.sensors.iter().map(|sensor| sensor.specification().ring_bytes).sum();
-        let (sensors, resident_kib) = (vehicle.sensors.len(), resident_kib());
+        let (sensors, resident_kib) = (vehicle.sensors.len(), memory::resident_kib());
         tracing::info!(sensors, ring_bytes, resident_kib, "loop armed");
     }
     Ok(armed)
-}
-
-/// Resident memory of this process, KiB; `None` if the system doesn't provide it.
-fn resident_kib() -> Option<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;
-    line.split_whitespace().next()?.parse().ok()
 }
 
 /// The vehicle's sensors, and the queue of notices to the terminal.

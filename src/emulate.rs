@@ -16,6 +16,7 @@ use crate::devices::KINDS;
 use crate::failure::{self, Failure};
 use crate::files;
 use crate::live::connections;
+use crate::logging::complain;
 use crate::output::say;
 use crate::outputs::{self, Kind, REHEARSAL};
 
@@ -77,7 +78,10 @@ fn stands(scene: &Scene, args: &Emulate) -> Result<Vec<EmulatedPort>, Failure> {
             _ => EmulatedPort::new(carrier, args.listen),
         };
         let stand = stand.or_else(|error| {
-            eprintln!("headrace: {id}: no {} on this machine ({error}); using UDP", carrier.as_str());
+            complain(&format!(
+                "headrace: {id}: no {} on this machine ({error}); using UDP",
+                carrier.as_str()
+            ));
             EmulatedPort::new(Carrier::Udp, args.listen)
         });
         stands.push(stand.map_err(|source| Failure::System { what: "opening a port for a device", source })?);

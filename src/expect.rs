@@ -7,6 +7,7 @@ use serde_json::Value;
 
 use crate::failure::Failure;
 use crate::files;
+use crate::logging::complain;
 
 /// Most differences listed.
 const SHOWN: usize = 20;
@@ -18,7 +19,7 @@ pub(crate) fn differs(report: &Report, golden: &Path) -> Result<bool, Failure> {
         Failure::Usage(format!("reading {}: {why}; expected a report of headrace", golden.display()))
     };
     let mut expected: Value =
-        serde_json::from_str(&files::read(golden)?).map_err(|error| wrong(error.to_string()))?;
+        serde_json::from_str(&files::read_report(golden)?).map_err(|error| wrong(error.to_string()))?;
     let allowed = Allowed::take(&mut expected).map_err(wrong)?;
     drop_log(&mut expected);
     Ok(tell(&expected, &without_log(report)?, &allowed))
@@ -28,7 +29,7 @@ pub(crate) fn differs(report: &Report, golden: &Path) -> Result<bool, Failure> {
 pub(crate) fn bless(report: &Report, golden: &Path) -> Result<(), Failure> {
     let mut got = without_log(report)?;
     let old: Option<Value> =
-        if golden.exists() { serde_json::from_str(&files::read(golden)?).ok() } else { None };
+        if golden.exists() { serde_json::from_str(&files::read_report(golden)?).ok() } else { None };
     match old {
         Some(mut old) => {
             let before = old.clone();
@@ -42,11 +43,11 @@ pub(crate) fn bless(report: &Report, golden: &Path) -> Result<(), Failure> {
             // One that lacks keys, as earlier versions wrote it, is completed.
             let lacks = |key: &String| before.get(key).is_none();
             if !differs && !got.as_object().is_some_and(|got| got.keys().any(lacks)) {
-                eprintln!("{}: unchanged", golden.display());
+                complain(&format!("{}: unchanged", golden.display()));
                 return Ok(());
             }
         }
-        None => eprintln!("{}: new golden report", golden.display()),
+        None => complain(&format!("{}: new golden report", golden.display())),
     }
     let mut text = serde_json::to_string_pretty(&got)?;
     text.push('\n');
@@ -122,10 +123,10 @@ fn tell(expected: &Value, got: &Value, allowed: &Allowed) -> bool {
     compare("", expected, got, allowed, &mut differences);
     differences.sort_by_key(|difference| rank(difference));
     for difference in differences.iter().take(SHOWN) {
-        eprintln!("differs: {difference}");
+        complain(&format!("differs: {difference}"));
     }
     if differences.len() > SHOWN {
-        eprintln!("and {} more", differences.len() - SHOWN);
+        complain(&format!("and {} more", differences.len() - SHOWN));
     }
     !differences.is_empty()
 }

@@ -76,6 +76,17 @@ impl From<ConfigError> for Failure {
 }
 
 impl Failure {
+    /// What it says: all errors of a file, a line each; else one line.
+    pub(crate) fn lines(&self) -> Vec<String> {
+        let words = self.to_string();
+        match self {
+            Self::Config(_) | Self::Scene(_) | Self::Simulation(_) => {
+                words.lines().map(str::to_owned).collect()
+            }
+            _ => vec![words],
+        }
+    }
+
     /// Its exit code.
     pub(crate) fn exit_code(&self) -> u8 {
         match self {

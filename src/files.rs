@@ -5,6 +5,7 @@ use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use headrace_monitor::report::Report;
+use headrace_replay::regular_file;
 
 use crate::failure::Failure;
 
@@ -19,9 +20,28 @@ pub(crate) fn first_named(logs: &[PathBuf]) -> &Path {
     logs.first().map_or(Path::new(""), PathBuf::as_path)
 }
 
-/// Reads a text file.
+/// Longest vehicle file, scene, mapping or file of text that one of these names, bytes.
+const TEXT_BYTES: u64 = 16 << 20;
+/// Longest mesh or trajectory that a scene names, and longest report, bytes.
+const DATA_BYTES: u64 = 256 << 20;
+
+/// Reads a text file that people write.
 pub(crate) fn read(path: &Path) -> Result<String, Failure> {
-    std::fs::read_to_string(path).map_err(|source| Failure::Read { path: path.to_owned(), source })
+    read_up_to(path, TEXT_BYTES)
+}
+
+/// Reads a report.
+pub(crate) fn read_report(path: &Path) -> Result<String, Failure> {
+    read_up_to(path, DATA_BYTES)
+}
+
+fn read_up_to(path: &Path, bytes: u64) -> Result<String, Failure> {
+    regular_file::read_text(path, bytes).map_err(|source| Failure::Read { path: path.to_owned(), source })
+}
+
+/// Opens a file of any length.
+pub(crate) fn open(path: &Path) -> Result<File, Failure> {
+    regular_file::open(path).map_err(|source| Failure::Read { path: path.to_owned(), source })
 }
 
 /// Size of some files together, bytes; what can't be read counts nothing.
@@ -47,7 +67,7 @@ pub(crate) fn beside(file: &Path) -> impl Fn(&str) -> Result<String, String> {
     let folder: PathBuf = file.parent().map(Path::to_owned).unwrap_or_default();
     move |name| {
         let path = folder.join(name);
-        std::fs::read_to_string(&path)
+        regular_file::read_text(&path, TEXT_BYTES)
             .map_err(|error| format!("can't be read at {}: {error}", path.display()))
     }
 }
@@ -57,7 +77,8 @@ pub(crate) fn bytes_beside(file: &Path) -> impl Fn(&str) -> Result<Vec<u8>, Stri
     let folder: PathBuf = file.parent().map(Path::to_owned).unwrap_or_default();
     move |name| {
         let path = folder.join(name);
-        std::fs::read(&path).map_err(|error| format!("can't be read at {}: {error}", path.display()))
+        regular_file::read(&path, DATA_BYTES)
+            .map_err(|error| format!("can't be read at {}: {error}", path.display()))
     }
 }
 

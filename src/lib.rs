@@ -18,6 +18,7 @@ mod inventory;
 mod live;
 mod logging;
 mod manual;
+mod memory;
 mod output;
 mod outputs;
 mod phase;
@@ -72,8 +73,11 @@ pub fn main() -> ExitCode {
         Command::Completions(args) => manual::completions(&args),
         Command::Man(args) => manual::man(&args),
     };
+    tracing::info!(most_kib = memory::most_kib(), "memory at the most");
     let code = result.unwrap_or_else(|failure| {
-        failure.to_string().lines().for_each(|line| logging::complain(&format!("headrace: {line}")));
+        for line in failure.lines() {
+            logging::complain(&format!("headrace: {line}"));
+        }
         failure.exit_code()
     });
     logging::end();

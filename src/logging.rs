@@ -7,6 +7,7 @@ use std::thread;
 use std::time::Duration;
 
 use crossbeam::channel::{Sender, bounded};
+use headrace_config::plain::one_line;
 use tracing::level_filters::LevelFilter;
 use tracing_subscriber::filter::Targets;
 use tracing_subscriber::fmt;
@@ -95,9 +96,9 @@ pub(crate) fn never_wait() {
     }
 }
 
-/// Writes a line to stderr after those that wait.
+/// Writes a line that may hold text from outside to stderr, after those that wait.
 pub(crate) fn complain(text: &str) {
-    pass(format!("{text}\n").as_bytes());
+    pass(format!("{}\n", one_line(text)).as_bytes());
 }
 
 /// Waits for what is to be written to stderr, in a dive for 2 s at most.
@@ -131,12 +132,27 @@ fn write_now(bytes: &[u8]) {
     cleared.and_then(|()| stderr.write_all(bytes)).ok();
 }
 
+/// An event as one line, whatever names are in it. The colours are the formatter's, which escapes those of others.
+fn event(bytes: &[u8]) -> String {
+    let text = String::from_utf8_lossy(bytes);
+    let (line, end) = text.strip_suffix('\n').map_or((&*text, ""), |line| (line, "\n"));
+    let mut fit = String::new();
+    let mut parts = line.split('\x1b');
+    fit.push_str(&one_line(parts.next().unwrap_or_default()));
+    for part in parts {
+        let codes = part.trim_start_matches(|c: char| c == '[' || c == ';' || c.is_ascii_digit());
+        fit.push_str(if part.starts_with('[') && codes.starts_with('m') { "\x1b" } else { "\\u001b" });
+        fit.push_str(&one_line(part));
+    }
+    fit + end
+}
+
 /// Stderr, for log messages.
 struct Stderr;
 
 impl Write for Stderr {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        pass(bytes);
+        pass(event(bytes).as_bytes());
         Ok(bytes.len())
     }
 
@@ -155,6 +171,13 @@ mod tests {
         let (filter, error) = filter(level, variable);
         assert_eq!(error, None);
         move |target, level| filter.would_enable(target, &level)
+    }
+
+    #[test]
+    fn an_event_is_a_line_with_no_codes_but_colours() {
+        let text = "\x1b[33mWARN\x1b[0m opened a\nb\x1b[2J\x1b]0;t\x07\u{202e}\n";
+        let line = "\x1b[33mWARN\x1b[0m opened a\\nb\\u001b[2J\\u001b]0;t\\u0007\\u202e\n";
+        assert_eq!(event(text.as_bytes()), line);
     }
 
     #[test]

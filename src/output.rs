@@ -3,13 +3,15 @@
 use std::fmt::{self, Write as _};
 use std::io::{BufWriter, Write};
 
+use headrace_config::plain::{lines, one_line};
 use headrace_monitor::report::Report;
 
 use crate::failure::Failure;
 use crate::terminal;
 use crate::transient;
 
-/// Writes `text`. Errors are only logged: a closed pipe or a lost session doesn't end a dive.
+/// Writes `text` as it is: lines made fit already, and codes for the terminal. Errors are only logged: a closed pipe or a lost
+/// session doesn't end a dive.
 pub(crate) fn put(text: &str) {
     let mut stdout = std::io::stdout().lock();
     if let Err(error) = stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
@@ -17,15 +19,20 @@ pub(crate) fn put(text: &str) {
     }
 }
 
-/// Writes a line.
+/// Writes lines that may hold text from outside.
+pub(crate) fn show(text: &str) {
+    put(&lines(text));
+}
+
+/// Writes a line that may hold text from outside.
 pub(crate) fn say(text: &str) {
-    put(&format!("{text}\n"));
+    put(&format!("{}\n", one_line(text)));
 }
 
 /// Writes a line in place of a transient one, from any thread.
 pub(crate) fn aside(text: &str) {
     let clear = if transient::take() { terminal::CLEAR } else { "" };
-    put(&format!("{clear}{text}\n"));
+    put(&format!("{clear}{}\n", one_line(text)));
 }
 
 /// Writes output for another program, and a line end.
@@ -34,7 +41,7 @@ pub(crate) fn aside(text: &str) {
 pub(crate) fn deliver(text: &str) -> Result<(), Failure> {
     let mut stdout = std::io::stdout().lock();
     stdout
-        .write_all(text.as_bytes())
+        .write_all(lines(text).as_bytes())
         .and_then(|()| stdout.write_all(b"\n"))
         .and_then(|()| stdout.flush())
         .map_err(|source| Failure::Write { path: "standard output".into(), source })
@@ -56,9 +63,32 @@ pub(crate) fn deliver_bytes(bytes: &[u8]) -> Result<(), Failure> {
 /// Errors: stdout is closed or the write is short.
 pub(crate) fn deliver_json(report: &Report) -> Result<(), Failure> {
     let failed = |source| Failure::Write { path: "standard output".into(), source };
-    let mut stdout = BufWriter::new(std::io::stdout().lock());
+    let mut stdout = BufWriter::new(Plain(std::io::stdout().lock()));
     serde_json::to_writer_pretty(&mut stdout, report).map_err(|error| failed(error.into()))?;
     stdout.write_all(b"\n").and_then(|()| stdout.flush()).map_err(failed)
+}
+
+/// Writes text made fit, whatever pieces it comes in.
+struct Plain<W>(W);
+
+impl<W: Write> Write for Plain<W> {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        // A character that isn't whole yet comes again with the next bytes.
+        let whole = match str::from_utf8(bytes) {
+            Ok(text) => text,
+            Err(error) if error.valid_up_to() > 0 => bytes
+                .get(..error.valid_up_to())
+                .and_then(|text| str::from_utf8(text).ok())
+                .unwrap_or_default(),
+            Err(error) => return Err(std::io::Error::new(std::io::ErrorKind::InvalidData, error)),
+        };
+        self.0.write_all(lines(whole).as_bytes())?;
+        Ok(whole.len())
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        self.0.flush()
+    }
 }
 
 /// Appends formatted text.

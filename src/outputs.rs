@@ -8,6 +8,7 @@ use headrace_replay::log::{DiveLog, RECOVERED_FROM, TRIMMED};
 
 use crate::cli::Overwrite;
 use crate::failure::Failure;
+use crate::files;
 
 /// Key of a log's metadata: the scene of which it is a simulation.
 pub(crate) const SIMULATED: &str = "simulated";
@@ -69,12 +70,12 @@ impl Kind {
             Self::Import => logged(IMPORTED),
             Self::Trimmed => logged(TRIMMED),
             Self::Recovered => logged(RECOVERED_FROM),
-            Self::Report => std::fs::read_to_string(path)
+            Self::Report => files::read_report(path)
                 .is_ok_and(|text| text.trim_start().starts_with('{') && text.contains(REPORT)),
             Self::Truth => begins(path, TRUTH),
             Self::Rehearsal => begins(path, REHEARSAL),
             Self::Manual => begins(path, MANUAL),
-            Self::Picture => std::fs::read_to_string(path).is_ok_and(|text| text.ends_with(PICTURE)),
+            Self::Picture => files::read_report(path).is_ok_and(|text| text.ends_with(PICTURE)),
         }
     }
 }

@@ -19,6 +19,7 @@ use crate::cli::{COMMANDS, speed, time};
 use crate::dive::Dive;
 use crate::failure::Failure;
 use crate::interrupt;
+use crate::logging::complain;
 use crate::output::aside;
 use crate::phase::Phase;
 use crate::watch::Watch;
@@ -121,7 +122,7 @@ fn listen(to: Sender<PlaybackCommand>, begun: MonoNs) {
                         return;
                     }
                 }
-                Err(why) => eprintln!("headrace: {why}"),
+                Err(why) => complain(&format!("headrace: {why}")),
             }
         }
     });

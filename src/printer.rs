@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use crossbeam::channel::{Receiver, RecvTimeoutError, Sender, TrySendError, bounded};
 
-use crate::output::{put, say};
+use crate::output::put;
 use crate::{terminal, transient};
 
 /// Lines that may wait. A dive has a line a second, and some for each stretch.
@@ -49,7 +49,7 @@ impl Printer {
         self.lossy = true;
     }
 
-    /// Writes a line.
+    /// Writes a line, which is fit for it.
     pub(crate) fn line(&mut self, text: String) {
         self.send(Message::Line(text));
     }
@@ -108,7 +108,7 @@ fn print(messages: &Receiver<Message>) {
         match message {
             Message::Line(text) => {
                 close(&mut has_status);
-                say(&text);
+                put(&format!("{text}\n"));
             }
             Message::Status(text) => {
                 put(&format!("{}{text}", terminal::CLEAR));

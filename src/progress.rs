@@ -3,6 +3,8 @@
 use std::io::{self, Write};
 use std::time::{Duration, Instant};
 
+use headrace_config::plain::one_line;
+
 use crate::terminal;
 use crate::transient;
 
@@ -73,6 +75,7 @@ impl Progress {
     }
 
     fn show(&mut self, words: &str) {
+        let words = one_line(words);
         let mut stderr = io::stderr().lock();
         let written = write!(stderr, "{}{words}", terminal::CLEAR);
         if written.and_then(|()| stderr.flush()).is_err() {

@@ -67,10 +67,7 @@ fn tell(args: &Recover, recovered: &Recovered) -> Result<(), Failure> {
     }
     let span = seconds.map(|[from, to]| format!(", {from:.3} s to {to:.3} s")).unwrap_or_default();
     let nothing = if recovered.losses.is_empty() { "; nothing is missing" } else { "" };
-    say(&format!(
-        "kept     {} messages{span}{nothing}\nlog      {}",
-        recovered.messages,
-        args.output.display()
-    ));
+    say(&format!("kept     {} messages{span}{nothing}", recovered.messages));
+    say(&format!("log      {}", args.output.display()));
     Ok(())
 }

@@ -10,7 +10,7 @@ use serde_json::json;
 use crate::cli::Output;
 use crate::failure::{self, Failure};
 use crate::files;
-use crate::output::{deliver, deliver_json, put};
+use crate::output::{deliver, deliver_json, show};
 use crate::screen::Screen;
 use crate::summary::summary;
 
@@ -64,7 +64,7 @@ pub(crate) fn finish(report: &Report, output: &Output) -> Result<u8, Failure> {
     } else if output.json {
         deliver_json(report)?;
     } else {
-        put(&summary(report, Screen::columns()));
+        show(&summary(report, Screen::columns()));
     }
     written.map(|()| exit_code(report))
 }

@@ -2,6 +2,7 @@
 
 use std::io::IsTerminal;
 
+use headrace_config::plain::one_line;
 use headrace_monitor::live_state::Lamp;
 
 use crate::terminal::{self, Terminal};
@@ -37,10 +38,11 @@ impl Screen {
         Some(if columns == 0 { COLUMNS } else { columns.max(LEAST_COLUMNS) } - 1)
     }
 
-    /// A text in the colour of a lamp.
+    /// A line, made fit, in the colour of a lamp.
     pub(crate) fn coloured(self, text: &str, lamp: Option<Lamp>) -> String {
+        let text = one_line(text);
         let code = match lamp.filter(|_| self.colours) {
-            None => return text.to_owned(),
+            None => return text.into_owned(),
             Some(Lamp::Green) => "32",
             Some(Lamp::Amber) => "33",
             Some(Lamp::Red) => "1;31",

@@ -19,7 +19,7 @@ use crate::devices::KINDS;
 use crate::dive::log_header;
 use crate::failure::{self, Failure};
 use crate::files;
-use crate::output::{append, deliver, put, say};
+use crate::output::{append, deliver, say, show};
 use crate::outputs::{self, Kind, SIMULATED, TRUTH};
 use crate::phase::Phase;
 use crate::progress::Progress;
@@ -134,7 +134,7 @@ fn explain(scene: &Scene, as_json: bool) -> Result<u8, Failure> {
     for kind in left_out {
         append(&mut text, format_args!("  {:<22} {}\n", kind.name(), kind.summary()));
     }
-    put(&text);
+    show(&text);
     Ok(failure::OK)
 }
 

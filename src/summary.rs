@@ -1,5 +1,6 @@
 //! Summary of a report as text.
 
+use headrace_config::plain::one_line;
 use headrace_coverage::{Cause, Unsure};
 use headrace_monitor::live_state::LiveMetres;
 use headrace_monitor::live_text::{helps_text, metres_text, unsure_text};
@@ -14,7 +15,7 @@ use crate::output::append;
 pub(crate) fn summary(report: &Report, columns: Option<usize>) -> String {
     let mut text = String::new();
     let mut line = |words: String| {
-        for part in broken(&words, columns) {
+        for part in broken(&one_line(&words), columns) {
             text.push_str(&part);
             text.push('\n');
         }

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use headrace_config::plain::one_line;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::live_state::{Condition, Lamp, LiveState};
 use headrace_monitor::live_text::{PilotLine, status_line, told_line};
@@ -235,7 +236,7 @@ impl Watch {
                 printer.status(text);
             }
         } else {
-            self.print(line.text());
+            self.print(self.screen.coloured(&line.text(), None));
         }
     }
 
@@ -268,9 +269,10 @@ impl Watch {
         if let Some(object) = value.as_object_mut() {
             object.insert("t_s".to_owned(), at.as_secs_f64().into());
         }
-        self.print(value.to_string());
+        self.print(one_line(&value.to_string()).into_owned());
     }
 
+    /// Writes a line that is fit for it.
     fn print(&mut self, text: String) {
         if let Some(printer) = &mut self.printer {
             printer.line(text);

@@ -16,7 +16,7 @@ use crate::cli::Calibrate;
 use crate::dive::assemble;
 use crate::failure::{self, Failure};
 use crate::feeds::{Followed, share};
-use crate::output::{deliver, put};
+use crate::output::{deliver, show};
 use crate::progress::Progress;
 use crate::vehicle_file;
 
@@ -46,7 +46,7 @@ pub(crate) fn calibrate(args: &Calibrate) -> Result<u8, Failure> {
         let shown = words::json(args, &vehicle, &collected, &findings, &table, &losses);
         deliver(&serde_json::to_string_pretty(&shown)?)?;
     } else {
-        put(&words::text(args, &vehicle, &collected, &findings, &table, &losses));
+        show(&words::text(args, &vehicle, &collected, &findings, &table, &losses));
     }
     Ok(if !losses.is_empty() {
         failure::DATA_LOST

@@ -11,7 +11,8 @@ use crate::cli::Check;
 use crate::devices::KINDS;
 use crate::failure::{self, Failure};
 use crate::files;
-use crate::output::{deliver, put};
+use crate::logging::complain;
+use crate::output::{deliver, show};
 use crate::vehicle_file;
 use outlook::Outlook;
 
@@ -48,12 +49,12 @@ pub(crate) fn check(args: &Check) -> Result<u8, Failure> {
     }
     for one in &found {
         let grade = if one.grade == Grade::Warning { "warning: " } else { "" };
-        eprintln!("headrace: {grade}{}:{}: {}: {}", one.file, one.line, one.key, one.problem);
+        complain(&format!("headrace: {grade}{}:{}: {}: {}", one.file, one.line, one.key, one.problem));
     }
     let count = |grade: Grade| found.iter().filter(|one| one.grade == grade).count();
     if let Some(readable) = readable.as_ref().filter(|_| !args.json && count(Grade::Error) == 0) {
-        put(&readable.text());
-        put(&match count(Grade::Warning) {
+        show(&readable.text());
+        show(&match count(Grade::Warning) {
             0 => "no errors\n".to_owned(),
             1 => "no errors, 1 warning\n".to_owned(),
             warnings => format!("no errors, {warnings} warnings\n"),
@@ -113,7 +114,9 @@ fn all(errors: &ConfigErrors) -> Vec<Found> {
 impl Readable {
     /// With the findings of a vehicle whose file has this name and text.
     fn new(vehicle: VehicleConfig, (name, text): (&str, &str), found: &mut Vec<Found>) -> Self {
-        let own = |_: &str| Ok(text.as_bytes().to_vec());
+        // The files that it names have been read with it.
+        let named = |file: &str| vehicle.attachments.iter().find(|(attached, _)| attached == file);
+        let own = |file: &str| Ok(named(file).map_or(text, |(_, text)| text.as_str()).as_bytes().to_vec());
         let errors = calm::expected_errors(&vehicle, "vehicle.toml", &KINDS, &own);
         let outlook = errors.map_err(|why| why.to_string());
         let outlook = outlook.and_then(|errors| Outlook::of(&vehicle, errors).map_err(|why| why.to_string()));

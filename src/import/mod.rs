@@ -23,6 +23,7 @@ use crate::cli;
 use crate::dive::log_header;
 use crate::failure::{self, Failure};
 use crate::files;
+use crate::logging::complain;
 use crate::output::{deliver, say};
 use crate::outputs::{self, IMPORTED, Kind};
 use crate::progress::Progress;
@@ -49,7 +50,7 @@ pub(crate) fn import(args: &cli::Import) -> Result<u8, Failure> {
     outputs::is_no_input(&args.output, std::slice::from_ref(&args.file))?;
     outputs::claim(&args.output, Kind::Import, &args.overwrite)?;
     let name = args.file.display().to_string();
-    let file = File::open(&args.file).map_err(|source| Failure::Read { path: args.file.clone(), source })?;
+    let file = files::open(&args.file)?;
     let read = Rc::new(Cell::new(0));
     let file = Counted { file, read: Rc::clone(&read) };
     let vehicle = vehicle.as_ref().map(|(_, vehicle)| vehicle);
@@ -123,8 +124,7 @@ fn format(
         return Ok(format);
     }
     if kind != FileKind::Csv {
-        let failed = |source| Failure::Read { path: args.file.clone(), source };
-        let file = File::open(&args.file).map_err(failed)?;
+        let file = files::open(&args.file)?;
         let topics = Bag::topics(&args.file.display().to_string(), file)
             .map_err(|error| unusable(&args.file, error))?;
         return Ok(Box::new(Bag::new(ros::feeds(args, vehicle, &topics)?)));
@@ -141,7 +141,7 @@ fn format(
 /// First line of a file, up to 64 KiB.
 fn first_line(path: &Path) -> Result<String, Failure> {
     let failed = |source| Failure::Read { path: path.to_owned(), source };
-    let file = BufReader::new(File::open(path).map_err(failed)?);
+    let file = BufReader::new(files::open(path)?);
     let mut line = Vec::new();
     file.take(1 << 16).read_until(b'\n', &mut line).map_err(failed)?;
     Ok(String::from_utf8_lossy(&line).into_owned())
@@ -176,13 +176,13 @@ fn tell(args: &cli::Import, kind: FileKind, ids: &[String], imported: &Imported)
         }
     }
     for remark in &imported.remarks {
-        eprintln!("headrace: note: {remark}");
+        complain(&format!("headrace: note: {remark}"));
     }
     for loss in &imported.losses {
-        eprintln!("headrace: lost: {loss}");
+        complain(&format!("headrace: lost: {loss}"));
     }
     if heard == 0 {
-        eprintln!("headrace: no sensor of the vehicle file takes anything of this file");
+        complain("headrace: no sensor of the vehicle file takes anything of this file");
         return Ok(failure::FAILED);
     }
     Ok(if imported.losses.is_empty() { failure::OK } else { failure::DATA_LOST })
@@ -215,9 +215,11 @@ fn unusable(path: &Path, error: ImportError) -> Failure {
 /// Error for a file of the wrong kind, with its apparent kind.
 fn named(path: &Path, problem: &str) -> Failure {
     let mut front = Vec::new();
-    let read =
-        File::open(path).and_then(|file| file.take(detect::ENOUGH_BYTES as u64).read_to_end(&mut front));
-    if let Err(source) = read {
+    let file = match files::open(path) {
+        Ok(file) => file,
+        Err(failure) => return failure,
+    };
+    if let Err(source) = file.take(detect::ENOUGH_BYTES as u64).read_to_end(&mut front) {
         return Failure::Read { path: path.to_owned(), source };
     }
     let looks = detect::looks_like(&front).map(|words| format!("; it looks like this: {words}"));

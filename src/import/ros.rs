@@ -7,6 +7,7 @@ use headrace_vehicle::VehicleConfig;
 use crate::cli;
 use crate::failure::Failure;
 use crate::files;
+use crate::logging::complain;
 
 /// Assignment by the mapping file, or without one by unambiguous matches, which are listed on stderr.
 pub(super) fn feeds(
@@ -22,7 +23,7 @@ pub(super) fn feeds(
     let Some(map) = &args.map else {
         let feeds = Feeds::matching(vehicle, topics).map_err(|error| unmatched(args, error))?;
         for matched in feeds.matched() {
-            eprintln!("headrace: {matched}");
+            complain(&format!("headrace: {matched}"));
         }
         return Ok(feeds);
     };

@@ -11,7 +11,7 @@ use headrace_vehicle::VehicleConfig;
 use crate::cli::Devices;
 use crate::failure::Failure;
 use crate::live;
-use crate::output::{deliver, put};
+use crate::output::{deliver, show};
 use crate::vehicle_file;
 use state::{Inventory, Sensor, State};
 
@@ -32,7 +32,7 @@ pub(crate) fn devices(args: &Devices) -> Result<u8, Failure> {
     if args.json {
         deliver(&inventory.json().to_string())?;
     } else {
-        put(&text::text(&inventory));
+        show(&text::text(&inventory));
     }
     Ok(inventory.exit_code())
 }

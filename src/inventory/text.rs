@@ -1,5 +1,6 @@
 //! Text of `headrace devices`: a block for each device, with its errors and what fixes them.
 
+use headrace_config::plain::one_line;
 use headrace_ports::{Answer, Found, OpenError};
 use headrace_sensor::driver::Carrier;
 
@@ -49,9 +50,9 @@ pub(super) fn text(inventory: &Inventory) -> String {
 
 fn device(text: &mut String, found: &Found, probed: Option<&Probed>) {
     let says = found.says.as_ref().map(|says| format!("  {says}")).unwrap_or_default();
-    append(text, format_args!("  {}{says}\n", found.name));
+    append(text, format_args!("  {}\n", one_line(&format!("{}{says}", found.name))));
     if let Some(connect) = &found.connect {
-        append(text, format_args!("    connect = \"{connect}\"\n"));
+        append(text, format_args!("    connect = \"{}\"\n", one_line(connect)));
     }
     for (what, value) in &found.details {
         row(text, what, value);
@@ -69,7 +70,7 @@ fn device(text: &mut String, found: &Found, probed: Option<&Probed>) {
 }
 
 fn row(text: &mut String, what: &str, value: &str) {
-    append(text, format_args!("    {what:<KEY$}  {value}\n"));
+    append(text, format_args!("    {what:<KEY$}  {}\n", one_line(value)));
 }
 
 fn trouble(text: &mut String, trouble: &OpenError) {

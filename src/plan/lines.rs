@@ -1,5 +1,7 @@
 //! `headrace plan --write`: what to put into the vehicle file.
 
+use std::fmt::Write as _;
+
 use crate::cli::Plan;
 use crate::failure::Failure;
 
@@ -18,25 +20,24 @@ pub(super) fn lines(findings: &Findings, args: &Plan) -> Result<String, Failure>
     };
     let inspection = findings.planner.inspection();
     let mode = findings.planner.modes().get(number).map_or("", |planned| planned.mode.name);
-    let mut text = format!("# In place of the same keys of {}", vehicle.display());
     let met =
         findings.question.target_m.map(|target_m| format!(": {target_m} m at {speed_mps:.3} m/s in {mode}"));
-    text.push_str(&met.unwrap_or_default());
-    text.push('\n');
-    if let Some(target_m) = args.target {
-        text.push_str(&format!("target_m = {target_m}\n"));
-    }
-    text.push_str(&format!(
-        "\n[heads]\nlayout = {:?}\nplanned_speed_mps = {speed_mps:.3}\n",
+    let target = args.target.map(|target_m| format!("target_m = {target_m}\n")).unwrap_or_default();
+    let mut text = format!(
+        "# In place of the same keys of {}{}\n{target}\n[heads]\nlayout = {:?}\nplanned_speed_mps = {speed_mps:.3}\n",
+        vehicle.display(),
+        met.unwrap_or_default(),
         inspection.layout.as_str()
-    ));
+    );
     let range = args.range.map(|range_m| format!("range_m = {range_m}\n")).unwrap_or_default();
     for (id, start) in findings.heads.iter().zip(&findings.briefing.starts) {
         let way = if start.growing { "growing" } else { "falling" };
-        text.push_str(&format!(
+        // Writing to a string can't fail.
+        let _ = write!(
+            text,
             "\n[[sensors]]    # {id}: begins at {:.1} degrees, {way}\nmode = {mode:?}\n{range}",
             start.angle_deg
-        ));
+        );
     }
     Ok(text)
 }

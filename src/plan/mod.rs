@@ -16,7 +16,7 @@ use serde_json::json;
 use crate::cli::Plan;
 use crate::failure::{self, Failure};
 use crate::files;
-use crate::output::{deliver, put, say};
+use crate::output::{deliver, say, show};
 use crate::outputs::{self, Kind, PICTURE};
 use case::Case;
 use findings::{Findings, printed_mps};
@@ -41,7 +41,7 @@ pub(crate) fn plan(args: &Plan) -> Result<u8, Failure> {
     } else if args.csv {
         deliver(&csv::csv(&findings.answers))?;
     } else {
-        put(&table::table(&findings));
+        show(&table::table(&findings));
         for picture in args.svg.iter().flat_map(|folder| PICTURES.map(|(name, _)| folder.join(name))) {
             say(&format!("picture {}", picture.display()));
         }

@@ -5,6 +5,9 @@ use toml::de::{DeTable, DeValue};
 
 use super::error::ConfigError;
 
+/// Longest text that is parsed, bytes: some hundred times a long one. Parsed, it takes many times its length.
+const MAX_TEXT_BYTES: usize = 1 << 20;
+
 /// A text and its file name.
 #[derive(Debug, Clone, Copy)]
 pub struct Document<'a> {
@@ -20,7 +23,18 @@ impl<'a> Document<'a> {
 
     /// The root table as parsed.
     pub(super) fn table(self) -> Result<DeTable<'a>, ConfigError> {
+        self.is_short()?;
         DeTable::parse(self.text).map(Spanned::into_inner).map_err(|error| self.broken(&error))
+    }
+
+    /// Refuses a text that is too long to be parsed.
+    pub(super) fn is_short(self) -> Result<(), ConfigError> {
+        if self.text.len() <= MAX_TEXT_BYTES {
+            return Ok(());
+        }
+        let len = self.text.len();
+        Err(self
+            .broken_as(&format!("a text of {len} bytes; the longest that is read has {MAX_TEXT_BYTES}"), 0))
     }
 
     pub(super) fn broken(self, error: &toml::de::Error) -> ConfigError {
@@ -40,6 +54,9 @@ impl<'a> Document<'a> {
     /// Line of a key by its dotted path (`sensors[1].connect`), or of the table that it would be in; the first line if there
     /// is neither.
     pub fn line_of(self, path: &str) -> usize {
+        if self.is_short().is_err() {
+            return 1;
+        }
         let Ok(root) = DeTable::parse(self.text) else { return 1 };
         let (mut table, mut at) = (root.get_ref(), 0);
         for name in path.split('.') {

@@ -4,9 +4,11 @@ use core::cell::RefCell;
 use core::fmt;
 use std::rc::Rc;
 
+use super::plain::one_line;
+
 /// An error in a hand-written file.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{file}:{line}: {key}{}: {problem}", .value.as_ref().map(|v| format!(" = {v}")).unwrap_or_default())]
+#[error("{}", one_line(&self.text()))]
 pub struct ConfigError {
     /// The file, as the caller named it.
     pub file: String,
@@ -18,6 +20,15 @@ pub struct ConfigError {
     pub value: Option<String>,
     /// The problem and the allowed values.
     pub problem: String,
+}
+
+impl ConfigError {
+    /// As the parts have it, whatever they hold.
+    fn text(&self) -> String {
+        let Self { file, line, key, value, problem } = self;
+        let value = value.as_ref().map(|value| format!(" = {value}")).unwrap_or_default();
+        format!("{file}:{line}: {key}{value}: {problem}")
+    }
 }
 
 /// All errors of a file, in the order of its lines; at least one.
@@ -37,6 +48,13 @@ impl ConfigErrors {
             if !each.contains(&error) {
                 each.push(error);
             }
+        }
+        if each.len() > MOST_ERRORS {
+            each.truncate(MOST_ERRORS);
+            let file = each.first()?.file.clone();
+            let problem = format!("has more errors; these are the first {MOST_ERRORS}");
+            let line = each.last()?.line;
+            each.push(ConfigError { file, line, key: "TOML".to_owned(), value: None, problem });
         }
         Some(Self(each))
     }
@@ -73,6 +91,9 @@ impl fmt::Display for ConfigErrors {
 
 impl std::error::Error for ConfigErrors {}
 
+/// Most errors of a file that are told: nobody reads more, and what is no such file may have one in each line.
+pub(super) const MOST_ERRORS: usize = 100;
+
 /// Errors of the tables of one document, if they are collected.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Notes(Option<Rc<RefCell<Vec<ConfigError>>>>);
@@ -89,7 +110,9 @@ impl Notes {
     }
 
     pub(super) fn add(&self, error: &ConfigError) {
-        if let Some(notes) = self.0.as_ref().filter(|notes| !notes.borrow().contains(error)) {
+        let is_new =
+            |notes: &RefCell<Vec<_>>| notes.borrow().len() <= MOST_ERRORS && !notes.borrow().contains(error);
+        if let Some(notes) = self.0.as_ref().filter(|notes| is_new(notes)) {
             notes.borrow_mut().push(error.clone());
         }
     }
@@ -97,6 +120,11 @@ impl Notes {
     /// The first error that is so.
     pub(super) fn find(&self, is_so: impl Fn(&ConfigError) -> bool) -> Option<ConfigError> {
         self.0.as_ref()?.borrow().iter().find(|error| is_so(error)).cloned()
+    }
+
+    /// Whether there are more than are told.
+    pub(super) fn are_enough(&self) -> bool {
+        self.count() > MOST_ERRORS
     }
 
     pub(super) fn count(&self) -> usize {

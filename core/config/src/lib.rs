@@ -21,6 +21,7 @@ mod changes;
 mod document;
 mod error;
 mod nearest;
+pub mod plain;
 mod reader;
 #[cfg(test)]
 mod tests;

@@ -7,11 +7,15 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::document::Document;
-use super::error::{ConfigError, ConfigErrors, Notes};
+use super::error::{ConfigError, ConfigErrors, MOST_ERRORS, Notes};
 use super::nearest::nearest;
+use super::plain::is_plain;
 
 /// Reads a file referenced by another one (a polyline profile, a device's definitions), by the name given there.
 pub type Loader<'a> = &'a dyn Fn(&str) -> Result<String, String>;
+
+/// Most tables of an array of tables; each is compared with the others.
+const MOST_TABLES: usize = 2000;
 
 /// A file referenced by a key.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -63,9 +67,11 @@ impl<'a> Document<'a> {
         self,
         read: impl FnOnce(&Section<'a>) -> Result<T, ConfigError>,
     ) -> Result<T, ConfigErrors> {
+        self.is_short()?;
         let (table, broken) = DeTable::parse_recoverable(self.text);
         // Of a line the first: the others follow from it.
-        let mut broken: Vec<ConfigError> = broken.iter().map(|error| self.broken(error)).collect();
+        let told = broken.iter().take(2 * MOST_ERRORS);
+        let mut broken: Vec<ConfigError> = told.map(|error| self.broken(error)).collect();
         broken.dedup_by_key(|error| error.line);
         if let Some(errors) = ConfigErrors::of(broken) {
             return Err(errors);
@@ -149,7 +155,8 @@ impl<'a> Section<'a> {
     pub fn text(&self, key: &'static str) -> Result<Option<String>, ConfigError> {
         let Some(value) = self.ask(key) else { return Ok(None) };
         match value.get_ref().as_str() {
-            Some(text) => Ok(Some(text.to_owned())),
+            Some(text) if is_plain(text) => Ok(Some(text.to_owned())),
+            Some(_) => self.wrong(key, Some(value), "must be without control characters".to_owned()),
             None => self.wrong(key, Some(value), "must be a text in quotes".to_owned()),
         }
     }
@@ -253,6 +260,11 @@ impl<'a> Section<'a> {
             }
             _ => None,
         };
+        let count = value.get_ref().as_array().map_or(0, |array| array.iter().count());
+        if count > MOST_TABLES {
+            let problem = format!("{count} tables; up to {MOST_TABLES} are read");
+            return Ok(self.wrong(key, Some(value), problem)?.unwrap_or_default());
+        }
         let items = value.get_ref().as_array().map(|array| array.iter().enumerate().map(table));
         if let Some(tables) = items.and_then(Iterator::collect::<Option<Vec<_>>>) {
             return Ok(tables);
@@ -342,6 +354,9 @@ impl<'a> Section<'a> {
             self.table.keys().filter(|key| !asked.contains(&key.get_ref().as_ref())).collect();
         unknown.sort_by_key(|key| key.span().start);
         for key in unknown {
+            if self.notes.are_enough() {
+                break;
+            }
             let name = self.full(key.get_ref());
             // One that was found near a missing key has been told.
             if self.noted(|error| error.key == name).is_none() {

@@ -98,6 +98,9 @@ fn parse(section: &Section<'_>, shape: Shape, load: Loader<'_>) -> Result<Profil
     profile.map_err(|why| section.invalid("profile", &why.to_string()))
 }
 
+/// Most points of a profile: one each centimetre of a wall of 100 m.
+const MOST_POINTS: usize = 10_000;
+
 /// Reads a polyline: one line `y_m,z_m` per vertex; a first line of other text and lines starting with # are skipped.
 fn parse_points(text: &str) -> Result<Vec<Yz>, String> {
     let mut points = Vec::new();
@@ -108,9 +111,15 @@ fn parse_points(text: &str) -> Result<Vec<Yz>, String> {
         }
         let mut fields = line.split(',').map(|field| field.trim().parse::<f64>().ok());
         match (fields.next().flatten(), fields.next().flatten(), fields.next()) {
+            (Some(_), Some(_), None) if points.len() >= MOST_POINTS => {
+                return Err(format!("has more than {MOST_POINTS} points, the most that a profile may have"));
+            }
             (Some(y), Some(z), None) => points.push([y, z]),
             _ if number == 0 => {}
-            _ => return Err(format!("line {} of it is {line:?}; wanted is y_m,z_m", number + 1)),
+            _ => {
+                let start: String = line.chars().take(60).collect();
+                return Err(format!("line {} of it is {start:?}; wanted is y_m,z_m", number + 1));
+            }
         }
     }
     Ok(points)
@@ -123,6 +132,10 @@ mod tests {
     #[test]
     fn a_polyline_file_says_which_line_is_wrong() {
         assert_eq!(parse_points("y_m,z_m\n1, 2\n# floor\n-1,2\n").unwrap(), [[1.0, 2.0], [-1.0, 2.0]]);
+        assert_eq!(parse_points(&"1,2\n".repeat(MOST_POINTS)).unwrap().len(), MOST_POINTS);
+        let words = parse_points(&"1,2\n".repeat(MOST_POINTS + 1)).unwrap_err();
+        assert!(words.starts_with("has more than 10000 points"), "{words}");
+        assert!(parse_points(&format!("1,2\n{}", "3".repeat(1 << 20))).unwrap_err().len() < 200);
         assert_eq!(parse_points("1,2\n3;4\n").unwrap_err(), "line 2 of it is \"3;4\"; wanted is y_m,z_m");
     }
 }

@@ -11,7 +11,7 @@ use crate::log::{DiveLog, LogError, MessageKind};
 
 /// Least offset between two clocks; no dive lasts as long.
 const YEAR_NS: u64 = 365 * 24 * 3600 * 1_000_000_000;
-/// Most clocks that are told apart; messages beyond are counted with the first.
+/// Most clocks that are told apart; messages of others are no clock's.
 const MAX_CLOCKS: usize = 100;
 
 /// A clock, as the range of its timestamps; more than a year from any other clock's range.
@@ -49,25 +49,30 @@ pub(crate) fn of(files: &[PathBuf], times: Option<(MonoNs, MonoNs)>) -> Result<O
     }
     let mut log = DiveLog::open(files)?;
     let mut clocks: Vec<Clock> = Vec::new();
+    let mut others = 0_u64;
     while let Some(message) = log.next()? {
         if matches!(message.kind, MessageKind::Raw { .. }) {
-            count(&mut clocks, message.log_time);
+            others += u64::from(!count(&mut clocks, message.log_time));
         }
     }
-    let several = clocks.len() > 1;
+    let several = clocks.len() > 1 || others > 0;
     // At equal counts the earlier clock: a monotonic clock starts at zero.
     let most = clocks.into_iter().min_by_key(|clock| (core::cmp::Reverse(clock.messages), clock.from));
     Ok(most.filter(|_| several))
 }
 
-fn count(clocks: &mut Vec<Clock>, at: MonoNs) {
-    let full = clocks.len() >= MAX_CLOCKS;
-    if let Some(clock) = clocks.iter_mut().find(|clock| full || clock.is_of(at)) {
+/// Counts a message with its clock; `false` if that is one too many.
+fn count(clocks: &mut Vec<Clock>, at: MonoNs) -> bool {
+    if let Some(clock) = clocks.iter_mut().find(|clock| clock.is_of(at)) {
         (clock.from, clock.to) = (clock.from.min(at), clock.to.max(at));
         clock.messages += 1;
-    } else {
+        return true;
+    }
+    let fits = clocks.len() < MAX_CLOCKS;
+    if fits {
         clocks.push(Clock { from: at, to: at, messages: 1 });
     }
+    fits
 }
 
 #[cfg(test)]
@@ -89,5 +94,8 @@ mod tests {
             count(&mut clocks, MonoNs(at * 3 * YEAR_NS));
         }
         assert_eq!(clocks.len(), MAX_CLOCKS);
+        // One too many doesn't stretch another over all time between them.
+        assert!(!count(&mut clocks, MonoNs(YEAR_NS * 580)) && count(&mut clocks, MonoNs(8)));
+        assert!(clocks.iter().all(|clock| clock.to.0 - clock.from.0 <= YEAR_NS));
     }
 }

@@ -197,7 +197,9 @@ fn send_until(
     until: MonoNs,
     after_tick: &mut dyn FnMut(&Loop),
 ) -> Result<(), DriveError> {
-    while let Some(coming) = feed.coming()?.filter(|coming| coming.at < until) {
+    // Nothing is after the last moment of the clock: what comes at it belongs to the last tick.
+    let is_due = |coming: &Coming| coming.at < until || until == MonoNs(u64::MAX);
+    while let Some(coming) = feed.coming()?.filter(is_due) {
         let Some(port) = ports.get_mut(coming.source.index()) else { continue };
         if !port.has_room(coming.len) {
             // Results don't depend on where ticks end, so a full ring may end one.

@@ -8,6 +8,7 @@ pub mod log;
 pub mod playback;
 pub mod player;
 pub mod record;
+pub mod regular_file;
 mod results;
 mod simulation_feed;
 pub mod smooth;

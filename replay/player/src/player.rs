@@ -30,6 +30,8 @@ pub struct Player {
     clock: Option<Clock>,
     /// Messages stamped by another clock, by the source's name: count and first timestamp.
     astray: BTreeMap<String, (u64, MonoNs)>,
+    /// The farthest place that was left by a jump, in messages, and the losses up to there.
+    farthest: (u64, Vec<String>),
 }
 
 /// A player's position in its log, to resume from.
@@ -63,6 +65,7 @@ impl Player {
             too_long: 0,
             clock: clocks::of(files, reader.times())?,
             astray: BTreeMap::new(),
+            farthest: (0, Vec::new()),
             reader,
         })
     }
@@ -95,10 +98,13 @@ impl Player {
     }
 
     /// Continues from a position of this or another player of the same log and vehicle. Losses are counted as if
-    /// the log had been played straight through.
+    /// the log had been played straight through; those found behind the place stay told until it is passed again.
     ///
     /// Errors: the log can't be read there.
     pub fn go_to(&mut self, place: &PlayerPlace) -> Result<(), LogError> {
+        if self.order > self.farthest.0 {
+            self.farthest = (self.order, self.losses_here());
+        }
         self.reader.go_to(&place.log)?;
         self.next = place.next.as_ref().map(|(at, source, bytes)| {
             self.bytes.clone_from(bytes);
@@ -120,8 +126,14 @@ impl Player {
         self.played
     }
 
-    /// Losses and omissions so far, as text.
+    /// Losses and omissions so far, as text: who goes back to before damage knows of it all the same.
     pub fn losses(&self) -> Vec<String> {
+        let (order, losses) = &self.farthest;
+        if *order > self.order { losses.clone() } else { self.losses_here() }
+    }
+
+    /// Losses and omissions from the beginning to here.
+    fn losses_here(&self) -> Vec<String> {
         let mut all: Vec<String> = self.reader.losses().iter().map(Loss::to_string).collect();
         for (id, count) in &self.unmatched {
             all.push(format!("{count} messages of source {id:?}, which the vehicle file doesn't have"));
@@ -160,7 +172,7 @@ impl Player {
             let MessageKind::Raw { source } = message.kind else { continue };
             let index = usize::from(source);
             let Some(id) = self.sources.get(index).copied().flatten() else {
-                let name = self.ids.get(index).cloned().unwrap_or_else(|| source.to_string());
+                let name = self.reader.source_id(source).map_or_else(|| source.to_string(), str::to_owned);
                 *self.unmatched.entry(name).or_default() += 1;
                 continue;
             };

@@ -9,6 +9,9 @@ use headrace_monitor::run::Loop;
 use crate::log::{DiveLog, LogError, MessageKind};
 use crate::results::{STREAMS, read_results, stream_of};
 
+/// Most memory of a stream's results that wait for the replay, bytes; a true log's are a tick ahead.
+const MOST_WAITING: usize = 16 << 20;
+
 /// The first difference between a replay and the dive.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Difference {
@@ -67,6 +70,8 @@ pub struct Verifier {
 #[derive(Default)]
 struct Stream {
     waiting: VecDeque<Batch>,
+    /// Memory of those.
+    waiting_bytes: usize,
     /// Number of the replay's next record.
     next: u64,
     same: u64,
@@ -88,6 +93,10 @@ struct Batch {
 impl Batch {
     fn rest(&self) -> &[u64] {
         self.words.get(self.at..).unwrap_or_default()
+    }
+
+    fn memory(&self) -> usize {
+        size_of::<Self>() + size_of_val(self.words.as_slice())
     }
 }
 
@@ -112,8 +121,25 @@ impl Stream {
     }
 
     fn drop_empty(&mut self) {
-        while self.waiting.front().is_some_and(|batch| first_record(batch.rest()).is_none()) {
-            self.waiting.pop_front();
+        while let Some(done) = self.waiting.pop_front_if(|batch| first_record(batch.rest()).is_none()) {
+            self.waiting_bytes -= done.memory();
+        }
+    }
+
+    /// Adds a tick's results. When too many wait, the dive published what the replay doesn't have.
+    fn wait(&mut self, batch: Batch, name: &'static str) {
+        // Nothing is compared after a difference.
+        if self.difference.is_some() {
+            return;
+        }
+        self.waiting_bytes += batch.memory();
+        self.waiting.push_back(batch);
+        self.drop_empty();
+        if self.waiting_bytes > MOST_WAITING {
+            let tick = self.waiting.front().map_or(0, |batch| batch.tick);
+            self.part(tick, name, What::Missing);
+            self.waiting.clear();
+            self.waiting_bytes = 0;
         }
     }
 
@@ -214,15 +240,16 @@ impl Verifier {
                 return Ok(false);
             };
             let MessageKind::Result { topic } = message.kind else { continue };
-            let found = stream_of(topic).and_then(|number| self.streams.get_mut(number));
-            let (Some(stream), Some((tick, next, words))) = (found, read_results(message.data)) else {
+            let found =
+                stream_of(topic).and_then(|number| self.streams.get_mut(number).zip(STREAMS.get(number)));
+            let (Some((stream, name)), Some((tick, next, words))) = (found, read_results(message.data))
+            else {
                 continue;
             };
             self.has_results = true;
             stream.has_results = true;
             self.last_tick = tick;
-            stream.waiting.push_back(Batch { tick, next, words, at: 0 });
-            stream.drop_empty();
+            stream.wait(Batch { tick, next, words, at: 0 }, name);
             return Ok(true);
         }
         Ok(false)
@@ -295,5 +322,18 @@ mod tests {
         assert_eq!(stream.front().map(|(tick, record)| (tick, record.words.to_vec())), Some((9, vec![8])));
         stream.step();
         assert!(stream.waiting.is_empty());
+    }
+
+    #[test]
+    fn results_far_ahead_of_the_replay_are_a_difference_and_take_no_more_memory() {
+        let mut stream = Stream::default();
+        let batch =
+            |tick| Batch { tick, next: tick, words: vec![RecordKind::Run as u64 | 2047 << 8; 4096], at: 0 };
+        for tick in 3..1000 {
+            stream.wait(batch(tick), "poses");
+            assert!(stream.waiting_bytes <= MOST_WAITING);
+        }
+        let difference = Difference { tick: 3, stream: "poses", record: 0, what: What::Missing };
+        assert_eq!((stream.difference, stream.waiting.len()), (Some(difference), 0));
     }
 }

@@ -81,7 +81,9 @@ impl SimulatedDisk {
             }
         }
         if let Some(random) = power_cut {
-            files.iter_mut().for_each(|file| tear(file, random));
+            for file in &mut files {
+                tear(file, random);
+            }
         }
         files
     }

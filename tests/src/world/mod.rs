@@ -268,7 +268,7 @@ impl World {
         let since_begin = self.since_begin();
         let Self { services, mut dive, devices, plan, mut consumed, disk, recorder, mut random, .. } = self;
         let histories: Vec<LineHistory> =
-            services.into_iter().flat_map(|service| service.end()).map(|(_, history)| history).collect();
+            services.into_iter().flat_map(LineService::end).map(|(_, history)| history).collect();
         let mut recorder = Some(recorder);
         let mut summary = None;
         if plan.ending == Ending::Finished {

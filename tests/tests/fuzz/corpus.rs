@@ -28,9 +28,11 @@ pub(crate) enum Kind {
     Csv,
     Bag,
     Mcap,
+    Vehicle,
+    Scene,
 }
 
-const KINDS: [(Kind, &str); 8] = [
+const KINDS: [(Kind, &str); 10] = [
     (Kind::Log, "log"),
     (Kind::Tlog, "tlog"),
     (Kind::Candump, "candump"),
@@ -39,6 +41,8 @@ const KINDS: [(Kind, &str); 8] = [
     (Kind::Csv, "csv"),
     (Kind::Bag, "bag"),
     (Kind::Mcap, "mcap"),
+    (Kind::Vehicle, "vehicle"),
+    (Kind::Scene, "scene"),
 ];
 
 impl Kind {
@@ -95,6 +99,11 @@ impl Corpus {
         for name in ["humble.mcap", "jazzy.mcap"] {
             add(Kind::Mcap, fixture(name));
         }
+        add(Kind::Vehicle, headrace_tests::VEHICLE.into());
+        add(Kind::Vehicle, headrace_tests::other_vehicle().into_bytes());
+        let demo = include_str!("../../../deploy/scenes/demo.toml");
+        add(Kind::Scene, demo.replace("../vehicles/vita2-4.toml", "vehicle.toml").into_bytes());
+        add(Kind::Scene, headrace_tests::SCENE.into());
         let said = files
             .iter()
             .filter(|file| file.kind == Kind::Log)

@@ -4,6 +4,7 @@ use std::io::Cursor;
 
 use headrace::devices::KINDS;
 use headrace_config::Document;
+use headrace_config::plain::is_plain;
 use headrace_geometry::time::MonoNs;
 use headrace_import::candump::Candump;
 use headrace_import::csv::Csv;
@@ -17,6 +18,7 @@ use headrace_import::tlog::{self, TlogFormat};
 use headrace_import::{Format, Import, Input, Source, Taker};
 use headrace_replay::log::{LogHeader, LogWriter, SourceInfo};
 use headrace_sensor::driver::DriverSetup;
+use headrace_simulator::Scene;
 use headrace_vehicle::VehicleConfig;
 
 use crate::corpus::{Corpus, Kind};
@@ -125,6 +127,9 @@ pub(crate) fn try_one(
     around: &Surroundings,
 ) -> Result<(), String> {
     looks_like(bytes);
+    if let Kind::Vehicle | Kind::Scene = kind {
+        return written_by_people(kind, bytes).map(drop);
+    }
     if kind != Kind::Log {
         imported(kind, bytes, around);
         return Ok(());
@@ -169,14 +174,43 @@ fn is_vouched_for(log: &[u8]) -> bool {
 pub(crate) fn gives(kind: Kind, bytes: &[u8], around: &Surroundings) -> u64 {
     match kind {
         Kind::Log => said(bytes).unwrap().0.len() as u64,
+        Kind::Vehicle | Kind::Scene => written_by_people(kind, bytes).unwrap(),
         kind => imported(kind, bytes, around),
+    }
+}
+
+/// Most errors that are told of a file, and the line that says that there are more.
+const MOST_ERRORS: usize = 101;
+
+/// Reads a vehicle file or a scene; its sensors. Errors: what is wrong with how its errors are told.
+fn written_by_people(kind: Kind, bytes: &[u8]) -> Result<u64, String> {
+    let Ok(text) = str::from_utf8(bytes) else { return Ok(0) };
+    let document = Document::new("file", text);
+    let vehicle = headrace_tests::VEHICLE;
+    let read = if kind == Kind::Vehicle {
+        VehicleConfig::parse(document, &KINDS, &|name| Err(name.to_owned()))
+            .map(|vehicle| vehicle.sensors.len())
+            .map_err(|errors| errors.to_string())
+    } else {
+        Scene::parse(document, &KINDS, &|_| Ok(vehicle.into()), None)
+            .map(|scene| scene.vehicle.sensors.len())
+            .map_err(|error| error.to_string())
+    };
+    match read {
+        Ok(sensors) => Ok(sensors as u64),
+        Err(words) if words.lines().count() > MOST_ERRORS || words.is_empty() => {
+            Err(format!("{} lines of errors", words.lines().count()))
+        }
+        Err(words) if !is_plain(&words.replace('\n', "")) => Err(format!("codes in errors: {words:?}")),
+        Err(_) => Ok(0),
     }
 }
 
 /// Imports a file into a log, which must be whole.
 fn imported(kind: Kind, bytes: &[u8], around: &Surroundings) -> u64 {
     let format: Box<dyn Format> = match kind {
-        Kind::Log | Kind::Mcap => {
+        // The others aren't imported.
+        Kind::Log | Kind::Mcap | Kind::Vehicle | Kind::Scene => {
             let Ok(recording) = Mcap::open("file", Cursor::new(bytes)) else { return 0 };
             let feeds = around.feeds(&recording.topics());
             return written(kind, recording.feeding(feeds), around);

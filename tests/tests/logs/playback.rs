@@ -225,6 +225,27 @@ fn a_jump_over_damage_and_back_loses_what_a_replay_straight_through_does() {
 }
 
 #[test]
+fn who_ends_before_damage_that_was_seen_is_told_of_it() {
+    let folder = logs();
+    damage(&folder, "ticks.mcap");
+    let losses = |lines: &str| {
+        let answer = interactive(&folder, &["ticks.mcap", "--json"], lines);
+        let report: serde_json::Value = serde_json::from_slice(&answer.stdout).unwrap();
+        (answer.status.code(), report["log"]["losses"].clone())
+    };
+    let all = folder.replay("ticks.mcap", &[]).1["log"]["losses"].clone();
+    assert_eq!(all.as_array().unwrap().len(), 3);
+    for lines in [
+        "pause\nseek 19s\nseek 1s\nend\n",
+        "pause\nseek 19s\nback 18s\nahead 3s\nend\n",
+        "pause\nseek 1h\nback 10s\nback 1h\nend\n",
+        "pause\nseek 19s\nseek 1s\ngo\n",
+    ] {
+        assert_eq!(losses(lines), (Some(3), all.clone()), "{lines}");
+    }
+}
+
+#[test]
 fn a_replay_shown_from_the_middle_gives_the_whole_dive_s_report() {
     let folder = logs();
     let (code, whole) = folder.replay("ticks.mcap", &[]);

@@ -200,6 +200,10 @@ pub(super) fn note_beat(
         let cause = if is_silent { Cause::HeadSilent } else { Cause::HeadStalled };
         let period = DurNs::from_secs_f64(step_rad / rate_radps.abs());
         let mut when = from + period;
+        let owed = owed(when, at, period);
+        if situation.pose.is_some() && owed > ROOM as i64 {
+            (when, *forgot) = (when + DurNs((owed - ROOM as i64).saturating_mul(period.0)), true);
+        }
         while period.0 > 0 && at.since(when).0 >= 0 {
             let angle_rad = angle_rad + rate_radps * when.since(seen).as_secs_f64();
             let number = u8::try_from(number.0).unwrap_or(u8::MAX);
@@ -210,8 +214,10 @@ pub(super) fn note_beat(
                 let hides = |angle_rad| hidden.hides(angle_rad);
                 let placing = Placing { mount: &mounted.info.mount, turning: head, profile, hidden: &hides };
                 placing.lack(&pose, &ping, now, coverage);
-            } else {
-                *forgot |= !keep(away, Away { why: ping.why.with(Cause::PositionLost), ..ping });
+            } else if !keep(away, Away { why: ping.why.with(Cause::PositionLost), ..ping }) {
+                // Nor is there room for those after it.
+                *forgot = true;
+                when = when + DurNs((self::owed(when, at, period) - 1).saturating_mul(period.0));
             }
             head.noted = Some(when);
             when = when + period;
@@ -255,6 +261,13 @@ pub(super) fn note_away(
         let placing = Placing { mount: &mount, turning, profile, hidden: &hidden };
         placing.lack(&way.at(ping.at), &ping, Drive { speed_mps, ..now }, coverage);
     }
+}
+
+/// Pings due from `first` to `at`. The work of a beat must not grow with the time since the last one, which a log may put years
+/// apart.
+fn owed(first: MonoNs, at: MonoNs, period: DurNs) -> i64 {
+    let since = at.since(first).0;
+    if since < 0 { 0 } else { since.checked_div(period.0).map_or(0, |periods| periods.saturating_add(1)) }
 }
 
 /// Keeps a ping without a fix; false if there is no room.

@@ -261,7 +261,7 @@ fn heads_side_by_side_gain_by_standing_in_line_and_those_in_line_nothing() {
     }
     let there = Planner::new(there).unwrap();
     let fastest = there.answers(&speed(0.5), None).unwrap().into_iter().filter_map(|answer| answer.v_max_mps);
-    assert_eq!(fastest.fold(0.0, f64::max), gain.v_max_mps);
+    assert_eq!(fastest.fold(0.0, f64::max).to_bits(), gain.v_max_mps.to_bits());
     assert_eq!(there.in_line(0.5).unwrap(), None);
     assert_eq!(Planner::new(ideal(1)).unwrap().in_line(0.5).unwrap(), None);
 }

@@ -2,11 +2,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::SourceInfo;
 use super::format::{
     CONNECT_KEY, PLUGIN_KEY, RAW_PREFIX, RESULT_PREFIX, SENT_PREFIX, SOURCE_KEY, TICK_TOPIC,
 };
 use super::framing::Definition;
+use super::limits::{HeaderBudget, MAX_CHANNELS, MAX_SOURCES};
+use super::{Many, SourceInfo};
 
 /// Rank of the first channel that isn't raw; source numbers are u16.
 const OTHER_RANK: u32 = 1 << 16;
@@ -30,37 +31,104 @@ pub(super) struct Channel {
     pub(super) rank: u32,
 }
 
+/// What became of a channel's definition.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Admission {
+    /// It is known now.
+    Known,
+    /// It contradicts a known channel.
+    Conflict,
+    /// There are too many of something.
+    Beyond(Many),
+}
+
 /// All known channels.
 #[derive(Debug, Default)]
 pub(super) struct Channels {
     by_id: BTreeMap<u16, Channel>,
     sources: Vec<SourceInfo>,
     others: u32,
+    /// Memory of the definitions.
+    budget: HeaderBudget,
+    /// What of the log's own list, which is known from the start, was too much.
+    refused: Option<Many>,
+    /// Definitions found while messages are read, in that order.
+    later: Vec<Definition>,
 }
 
 impl Channels {
     /// Numbers the sources: by their channels' metadata where it numbers all of them from 0 on, otherwise by name.
-    pub(super) fn new(definitions: BTreeMap<u16, Definition>) -> Self {
+    pub(super) fn new(definitions: BTreeMap<u16, Definition>, budget: HeaderBudget) -> Self {
         let mut definitions: Vec<Definition> = definitions.into_values().collect();
         let numbers: BTreeMap<&str, Option<u16>> =
             definitions.iter().filter_map(|d| source_id(&d.topic).map(|id| (id, stated_number(d)))).collect();
         let distinct: BTreeSet<u16> = numbers.values().filter_map(|number| *number).collect();
         let stated = distinct.iter().copied().map(usize::from).eq(0..numbers.len());
         definitions.sort_by_cached_key(|d| (stated.then(|| stated_number(d)), d.topic.clone(), d.id));
-        let mut channels = Self::default();
+        let mut channels = Self { budget, ..Self::default() };
         // Raw first: sources with only sent bytes come after those that sent something themselves.
         let (raw, others): (Vec<_>, Vec<_>) =
             definitions.into_iter().partition(|d| stated || d.topic.starts_with(RAW_PREFIX));
         for definition in raw.into_iter().chain(others) {
-            channels.admit(definition);
+            if let Admission::Beyond(what) = channels.add(definition) {
+                channels.refused = Some(what);
+            }
         }
         channels
     }
 
-    /// Adds a channel. A new source gets the next number. `false` if it contradicts a known channel.
-    pub(super) fn admit(&mut self, definition: Definition) -> bool {
+    /// What of the definitions that it was made of was too much.
+    pub(super) fn refused(&self) -> Option<Many> {
+        self.refused
+    }
+
+    /// Adds a channel that is defined among the messages. A new source gets the next number.
+    pub(super) fn admit(&mut self, definition: Definition) -> Admission {
         if let Some(known) = self.by_id.get(&definition.id) {
-            return known.definition == definition;
+            return if known.definition == definition { Admission::Known } else { Admission::Conflict };
+        }
+        if !self.budget.take(definition.cost()) {
+            return Admission::Beyond(Many::HeaderBytes);
+        }
+        let admission = self.add(definition.clone());
+        if admission == Admission::Known {
+            self.later.push(definition);
+        }
+        admission
+    }
+
+    /// Definitions found among the messages so far.
+    pub(super) fn later(&self) -> &[Definition] {
+        &self.later
+    }
+
+    /// Goes back, or ahead, to where these have been found among the messages.
+    pub(super) fn go_to(&mut self, later: &[Definition]) {
+        let same = self.later.iter().zip(later).take_while(|(one, other)| one.id == other.id).count();
+        for gone in self.later.drain(same..).rev() {
+            self.budget.give_back(gone.cost());
+            if let Some(Channel { kind, .. }) = self.by_id.remove(&gone.id)
+                && !matches!(kind, ChannelKind::Raw(_))
+            {
+                self.others -= 1;
+            }
+        }
+        let known = self.by_id.values().filter_map(|channel| match channel.kind {
+            ChannelKind::Raw(source) | ChannelKind::Sent(source) => Some(usize::from(source) + 1),
+            _ => None,
+        });
+        self.sources.truncate(known.max().unwrap_or(0));
+        for definition in later.iter().skip(same) {
+            self.admit(definition.clone());
+        }
+    }
+
+    fn add(&mut self, definition: Definition) -> Admission {
+        if self.by_id.len() >= MAX_CHANNELS {
+            return Admission::Beyond(Many::Channels);
+        }
+        if source_id(&definition.topic).is_some_and(|id| !self.has_room_for(id)) {
+            return Admission::Beyond(Many::Sources);
         }
         let kind = match definition.topic.as_str() {
             TICK_TOPIC => ChannelKind::Tick,
@@ -80,7 +148,11 @@ impl Channels {
             OTHER_RANK + self.others
         };
         self.by_id.insert(definition.id, Channel { definition, kind, rank });
-        true
+        Admission::Known
+    }
+
+    fn has_room_for(&self, id: &str) -> bool {
+        self.sources.len() < MAX_SOURCES || self.sources.iter().any(|source| source.id == id)
     }
 
     pub(super) fn get(&self, id: u16) -> Option<&Channel> {
@@ -121,7 +193,7 @@ impl Channels {
             self.sources.push(SourceInfo { id, plugin: text(PLUGIN_KEY), connect: text(CONNECT_KEY) });
             self.sources.len() - 1
         });
-        // A file has at most 65536 channels: their numbers are u16.
+        // At most MAX_SOURCES.
         u16::try_from(number).unwrap_or(u16::MAX)
     }
 }
@@ -165,7 +237,7 @@ mod tests {
                 source.map(|source| (SOURCE_KEY.to_owned(), source.to_owned())).into_iter().collect();
             (id, Definition { id, topic: (*topic).to_owned(), metadata, form: None })
         };
-        Channels::new((0..).zip(topics).map(definition).collect())
+        Channels::new((0..).zip(topics).map(definition).collect(), HeaderBudget::default())
     }
 
     fn ids(channels: &Channels) -> Vec<&str> {
@@ -195,7 +267,37 @@ mod tests {
     fn a_second_definition_must_agree() {
         let mut channels = channels(&[("/raw/a", None)]);
         let same = channels.get(0).unwrap().definition.clone();
-        assert!(channels.admit(same.clone()));
-        assert!(!channels.admit(Definition { topic: "/raw/b".to_owned(), ..same }));
+        assert_eq!(channels.admit(same.clone()), Admission::Known);
+        assert_eq!(channels.admit(Definition { topic: "/raw/b".to_owned(), ..same }), Admission::Conflict);
+    }
+
+    #[test]
+    fn channels_found_later_are_forgotten_on_the_way_back() {
+        let mut channels = channels(&[("/raw/a", None)]);
+        let first = channels.get(0).unwrap().definition.clone();
+        for (id, topic) in [(7, "/raw/b"), (5, "/imu"), (9, "/sent/c")] {
+            let later = Definition { id, topic: topic.to_owned(), ..first.clone() };
+            assert_eq!(channels.admit(later), Admission::Known);
+        }
+        let (all, ranks) = (channels.later().to_vec(), [7, 5, 9].map(|id| channels.get(id).unwrap().rank));
+        channels.go_to(&all[..1]);
+        assert_eq!((ids(&channels), channels.get(5).is_none()), (vec!["a", "b"], true));
+        channels.go_to(&all);
+        assert_eq!(ids(&channels), ["a", "b", "c"]);
+        assert_eq!([7, 5, 9].map(|id| channels.get(id).unwrap().rank), ranks);
+        channels.go_to(&[]);
+        assert_eq!((ids(&channels), channels.later().len()), (vec!["a"], 0));
+    }
+
+    #[test]
+    fn there_is_an_end_of_channels_and_of_sources() {
+        let topics: Vec<String> = (0..MAX_SOURCES + 2).map(|n| format!("/raw/{n}")).collect();
+        let all: Vec<_> = topics.iter().map(|topic| (topic.as_str(), None)).collect();
+        let found = channels(&all);
+        assert_eq!((found.sources().len(), found.refused()), (MAX_SOURCES, Some(Many::Sources)));
+        assert_eq!(channels(&all[2..]).refused(), None);
+        let all: Vec<_> = (0..=MAX_CHANNELS).map(|_| ("/imu", None)).collect();
+        assert_eq!(channels(&all).refused(), Some(Many::Channels));
+        assert_eq!(channels(&all[1..]).refused(), None);
     }
 }

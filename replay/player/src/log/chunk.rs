@@ -6,11 +6,11 @@ use mcap::records::op;
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{McapError, McapResult};
 
-use super::framing::{ChunkPlace, LogFile, MAX_RECORD_BYTES};
+use super::framing::{ChunkPlace, LogFile};
+use super::limits::{MAX_UNPACKED_BYTES, MAX_WINDOW_LOG, RECORD_COST};
+use super::unzstd::{TOO_MUCH_MEMORY, Unzstd};
 use super::{LogError, LossKind};
 
-/// Largest unpacked size of a chunk, bytes.
-pub(super) const MAX_CHUNK_BYTES: u64 = MAX_RECORD_BYTES;
 /// Read size, bytes.
 const READ_BYTES: usize = 1 << 20;
 
@@ -33,15 +33,22 @@ pub(super) fn unpack<R: Read + Seek>(
     place: &ChunkPlace,
     mut sink: impl FnMut(u8, &[u8]),
 ) -> Result<Unpacked, LogError> {
+    if !place.cut && !place.compression.is_empty() && place.unpacked_len > MAX_UNPACKED_BYTES {
+        return Ok(Unpacked::Bad(LossKind::TooLarge { limit: MAX_UNPACKED_BYTES }));
+    }
     let mut reader = reader(|options| options.with_skip_start_magic(true).with_validate_chunk_crcs(true));
+    if let Err(error) = reader.add_decompressor(Unzstd::default()) {
+        // Not reached: it has a name.
+        tracing::error!(%error, "chunks packed by zstd can't be read");
+    }
     // The header is rebuilt: in a chunk cut by the end of the file, its lengths and checksum cover data that isn't there.
     let head = chunk_head(place);
     reader.insert(head.len()).copy_from_slice(&head);
     reader.notify_read(head.len());
-    let (mut total, mut too_large) = (0_u64, false);
+    let (mut memory, mut too_large) = (0_u64, false);
     let mut counted = |opcode, body: &[u8]| {
-        total = total.saturating_add(body.len() as u64);
-        too_large = total > MAX_CHUNK_BYTES;
+        memory = memory.saturating_add(body.len() as u64 + RECORD_COST);
+        too_large = memory > MAX_UNPACKED_BYTES;
         if !too_large {
             sink(opcode, body);
         }
@@ -49,7 +56,13 @@ pub(super) fn unpack<R: Read + Seek>(
     };
     let result = drive(file, place.data..place.data.saturating_add(place.data_len), reader, &mut counted)?;
     Ok(match result {
-        _ if too_large => Unpacked::Bad(LossKind::TooLarge { limit: MAX_CHUNK_BYTES }),
+        _ if too_large => Unpacked::Bad(LossKind::TooLarge { limit: MAX_UNPACKED_BYTES }),
+        Err(McapError::DecompressionError(why)) if why == TOO_MUCH_MEMORY => {
+            Unpacked::Bad(LossKind::Window { limit: 1 << MAX_WINDOW_LOG })
+        }
+        Err(McapError::RecordTooLarge { .. }) if !place.doubtful => {
+            Unpacked::Bad(LossKind::TooLarge { limit: MAX_UNPACKED_BYTES })
+        }
         Err(McapError::UnsupportedCompression(name)) => Unpacked::Bad(LossKind::Compression(name)),
         // No checksum covers the content: a header of zeros makes an empty chunk of any bytes.
         _ if place.doubtful && place.crc == 0 => Unpacked::Bad(LossKind::Contents),
@@ -75,9 +88,9 @@ pub(super) fn summary_holds<R: Read + Seek>(file: &mut LogFile<R>, data_end: u64
     Ok(drive(file, data_end..u64::MAX, reader, &mut |opcode, _| opcode != op::FOOTER)?.is_ok())
 }
 
-/// A reader that allocates no more than the largest record length, whatever lengths a file claims.
+/// A reader that allocates no more than for the longest record, whatever lengths a file claims.
 fn reader(set: impl FnOnce(LinearReaderOptions) -> LinearReaderOptions) -> LinearReader {
-    let limit = usize::try_from(MAX_RECORD_BYTES).unwrap_or(usize::MAX);
+    let limit = usize::try_from(MAX_UNPACKED_BYTES).unwrap_or(usize::MAX);
     let options = LinearReaderOptions::default().with_skip_end_magic(true).with_record_length_limit(limit);
     LinearReader::new_with_options(set(options))
 }

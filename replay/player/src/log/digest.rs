@@ -1,6 +1,5 @@
 //! Digests of log files.
 
-use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
@@ -8,6 +7,7 @@ use sha2::{Digest, Sha256};
 
 use super::LogError;
 use super::format::hex;
+use crate::regular_file;
 
 /// SHA-256 of a file, in hex.
 ///
@@ -25,7 +25,7 @@ pub fn files_digest(paths: &[impl AsRef<Path>]) -> Result<String, LogError> {
     for path in paths {
         let path = path.as_ref();
         let failed = |source| LogError::Open { path: path.to_owned(), source };
-        let mut file = File::open(path).map_err(failed)?;
+        let mut file = regular_file::open(path).map_err(failed)?;
         loop {
             match file.read(&mut block) {
                 Ok(0) => break,

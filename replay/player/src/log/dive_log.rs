@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 use headrace_geometry::time::MonoNs;
 use serde::{Deserialize, Serialize};
 
+use super::limits::MAX_SOURCES;
 use super::part::{Part, Progress, named_part};
 use super::{LogError, LogInfo, LogMessage, LogPlace, LogReader, Loss, LossKind, MessageKind, SourceInfo};
 
@@ -129,8 +130,9 @@ impl<R: Read + Seek> DiveLog<R> {
         Self::start(Box::new(open), reader, vec![file], Vec::new())
     }
 
-    fn start(open: Open<R>, reader: LogReader<R>, files: Vec<PartFile>, between: Vec<Loss>) -> Self {
-        let mut info = reader.header().clone();
+    fn start(open: Open<R>, mut reader: LogReader<R>, files: Vec<PartFile>, between: Vec<Loss>) -> Self {
+        let attachments = reader.take_attachments();
+        let mut info = LogInfo { attachments, ..reader.header().clone() };
         if files.len() > 1 {
             info.part = None;
         }
@@ -206,6 +208,11 @@ impl<R: Read + Seek> DiveLog<R> {
         (topics, all)
     }
 
+    /// Name of a source, by its number in messages; those of the channels read so far are known.
+    pub fn source_id(&self, source: u16) -> Option<&str> {
+        self.info.sources.get(usize::from(source)).map(|source| source.id.as_str())
+    }
+
     /// The next message, or `None` at the end.
     ///
     /// Errors: an I/O error; damage is not an error.
@@ -220,7 +227,7 @@ impl<R: Read + Seek> DiveLog<R> {
             }
             self.go_on()?;
         }
-        if self.numbers.len() < self.reader.sources().len() {
+        if self.numbers.len() != self.reader.sources().len() {
             self.number_sources();
         }
         let Self { reader, numbers, files, at, delivered, .. } = self;
@@ -260,14 +267,16 @@ impl<R: Read + Seek> DiveLog<R> {
         if place.at != self.at {
             self.reader = (self.open)(place.at)?;
             self.at = place.at;
-            self.number_sources();
             self.pass_over();
         }
         for (file, messages) in self.files.iter_mut().zip(&place.messages) {
             file.messages = *messages;
         }
         (self.earlier, self.late, self.delivered) = (place.earlier.clone(), place.late, place.delivered);
-        self.reader.go_to(&place.place)
+        self.reader.go_to(&place.place)?;
+        // Of the channels known there.
+        self.number_sources();
+        Ok(())
     }
 
     /// Moves on to the next file.
@@ -291,16 +300,17 @@ impl<R: Read + Seek> DiveLog<R> {
         }
     }
 
-    /// Maps the file's sources to the dive's by name; new ones are added.
+    /// Maps the file's sources to the dive's by name; new ones are added, as long as there aren't too many in all files
+    /// together.
     fn number_sources(&mut self) {
         self.numbers.clear();
         for source in self.reader.sources() {
             let known = self.info.sources.iter().position(|known| known.id == source.id);
-            let number = known.unwrap_or_else(|| {
-                self.info.sources.push(source.clone());
-                self.info.sources.len() - 1
+            let number = known.or_else(|| {
+                let fits = self.info.sources.len() < MAX_SOURCES;
+                fits.then(|| self.info.sources.push(source.clone())).map(|()| self.info.sources.len() - 1)
             });
-            self.numbers.push(u16::try_from(number).unwrap_or(u16::MAX));
+            self.numbers.push(number.and_then(|number| u16::try_from(number).ok()).unwrap_or(u16::MAX));
         }
     }
 

@@ -5,6 +5,8 @@
 
 use std::collections::BTreeMap;
 
+use super::limits::{MAX_HEADER_BYTES, map_cost};
+
 /// The rest of a record, and the number of bytes taken.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Fields<'a> {
@@ -56,7 +58,11 @@ impl<'a> Fields<'a> {
         str::from_utf8(self.take(len.into())?).ok()
     }
 
+    /// A map; `None` also if it would take more memory than a log's header may.
     pub(super) fn map(&mut self) -> Option<BTreeMap<String, String>> {
+        if self.map_cost()? > MAX_HEADER_BYTES {
+            return None;
+        }
         let len = self.u32()?;
         let mut entries = Fields::new(self.take(len.into())?);
         let mut map = BTreeMap::new();
@@ -64,6 +70,19 @@ impl<'a> Fields<'a> {
             map.insert(entries.text()?.to_owned(), entries.text()?.to_owned());
         }
         Some(map)
+    }
+
+    /// Memory that the map here would take, see [`map_cost`]; it isn't taken.
+    pub(super) fn map_cost(&self) -> Option<u64> {
+        let mut all = *self;
+        let len = all.u32()?;
+        let mut entries = Fields::new(all.take(len.into())?);
+        let mut count = 0;
+        while !entries.rest.is_empty() {
+            let (_key, _value) = (entries.text()?, entries.text()?);
+            count += 1;
+        }
+        Some(map_cost(count, len.into()))
     }
 }
 

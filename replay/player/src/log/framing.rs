@@ -10,13 +10,15 @@ use std::collections::BTreeMap;
 use std::io::{BufReader, Read, Seek};
 
 use mcap::records::op;
+use serde::{Deserialize, Serialize};
 
 use super::LogError;
 use super::fields::{Fields, MessageHead};
 use super::format::LIBRARY;
+use super::limits::map_cost;
 
-/// Longest record read as a whole. A greater length is taken as damage, except for chunks and attachments.
-pub(super) const MAX_RECORD_BYTES: u64 = 256 << 20;
+/// A greater length of a record is taken as damage, except for chunks and attachments.
+const MAX_RECORD_BYTES: u64 = 256 << 20;
 /// Opcode and length.
 const RECORD_HEAD_BYTES: usize = 9;
 /// Bytes of a record that are read to identify it: fields of fixed length, and names.
@@ -79,7 +81,7 @@ impl<R: Read + Seek> LogFile<R> {
 }
 
 /// A channel's definition.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct Definition {
     pub(super) id: u16,
     pub(super) topic: String,
@@ -95,12 +97,22 @@ impl PartialEq for Definition {
     }
 }
 
+impl Eq for Definition {}
+
 impl Definition {
     pub(super) fn read(fields: &mut Fields<'_>) -> Option<Self> {
         let (id, schema) = (fields.u16()?, fields.u16()?);
         let (topic, encoding) = (fields.text()?, fields.text()?);
         let form = Some((schema, encoding.to_owned()));
         Some(Self { id, topic: topic.to_owned(), metadata: fields.map()?, form })
+    }
+
+    /// Memory that it takes, see [`map_cost`].
+    pub(super) fn cost(&self) -> u64 {
+        let form = self.form.as_ref().map_or(0, |(_, encoding)| encoding.len());
+        let texts = self.metadata.iter().map(|(key, value)| key.len() + value.len());
+        let bytes = self.topic.len() + form + texts.sum::<usize>();
+        map_cost(self.metadata.len() as u64 + 1, bytes as u64)
     }
 }
 
@@ -345,7 +357,7 @@ fn parse(opcode: u8, body: u64, bytes: &[u8]) -> Option<(Item, u64)> {
         }
         op::ATTACHMENT => {
             let place = attachment_place(&mut fields)?;
-            // Longer than any record where it isn't so.
+            // One of 2^64 bytes is longer than any record: it is damaged, rather than of another kind.
             let len = place.head_len.saturating_add(place.data_len).saturating_add(4);
             return Some((Item::Attachment(place), len));
         }

@@ -5,6 +5,8 @@ use core::fmt;
 use headrace_geometry::time::MonoNs;
 use serde::{Deserialize, Serialize};
 
+use super::limits::LATEST;
+
 /// Most losses that are listed; later ones extend the last.
 const MAX_LOSSES: usize = 1000;
 
@@ -26,6 +28,30 @@ pub enum LossKind {
     TooLarge {
         /// Limit, bytes.
         limit: u64,
+    },
+    /// Chunks that claim to unpack to many times the length of the log. None of them is delivered.
+    Swells {
+        /// Limit, as a multiple of the log's length up to there.
+        limit: u64,
+    },
+    /// A chunk whose unpacking would take more memory than is given to it.
+    Window {
+        /// Limit, bytes.
+        limit: u64,
+    },
+    /// More of something than is read.
+    Beyond {
+        /// Of what.
+        what: Many,
+        /// Limit.
+        limit: u64,
+    },
+    /// Messages stamped later than any clock can be.
+    Stamped {
+        /// Messages not delivered.
+        messages: u64,
+        /// The first one's timestamp, ns.
+        first: u64,
     },
     /// An attachment that fails its checksum, or that the log lists but doesn't contain.
     Attachment(String),
@@ -86,6 +112,33 @@ pub enum LossKind {
     Stated(String),
 }
 
+/// What a log may have too many of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Many {
+    /// Chunks, and runs of messages outside chunks.
+    Pieces,
+    /// Channels.
+    Channels,
+    /// Sources.
+    Sources,
+    /// Bytes of definitions and metadata.
+    HeaderBytes,
+    /// Bytes of attachments.
+    AttachmentBytes,
+}
+
+impl Many {
+    fn as_str(self) -> &'static str {
+        match self {
+            Self::Pieces => "chunks",
+            Self::Channels => "channels",
+            Self::Sources => "sources",
+            Self::HeaderBytes => "bytes of definitions and metadata",
+            Self::AttachmentBytes => "bytes of attachments",
+        }
+    }
+}
+
 /// One damaged range of a log.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Loss {
@@ -112,6 +165,23 @@ impl fmt::Display for LossKind {
             Self::TooLarge { limit } => {
                 write!(out, "larger than the {limit} bytes that are read into memory")
             }
+            Self::Swells { limit } => {
+                write!(
+                    out,
+                    "chunks that would unpack to over {limit} times the length of the log: they aren't"
+                )
+            }
+            Self::Window { limit } => {
+                write!(out, "a chunk whose unpacking would take more than {limit} bytes")
+            }
+            Self::Beyond { what, limit } => {
+                write!(out, "more than {limit} {}: those beyond aren't read", what.as_str())
+            }
+            Self::Stamped { messages, first } => write!(
+                out,
+                "{messages} messages stamped {first} ns or later: the latest time that is taken is {} ns",
+                LATEST.0
+            ),
             Self::Attachment(name) => write!(out, "attachment {name:?} is damaged"),
             Self::Metadata(name) => write!(out, "metadata {name:?} is damaged"),
             Self::UnknownChannel { channel, messages } => {
@@ -199,9 +269,23 @@ impl Losses {
         &mut self.0
     }
 
+    /// Whether further losses only extend the last.
+    pub(super) fn is_full(&self) -> bool {
+        self.0.len() >= MAX_LOSSES
+    }
+
+    /// Adds a range to the loss of that kind, which is listed once.
+    pub(super) fn extend(&mut self, kind: LossKind, offset: u64, bytes: u64) {
+        if let Some(known) = self.0.iter_mut().rev().find(|loss| loss.kind == kind) {
+            known.bytes = known.bytes.saturating_add(bytes);
+        } else {
+            self.push(Loss { kind, offset, bytes, from: None, to: None });
+        }
+    }
+
     pub(super) fn push(&mut self, loss: Loss) {
         tracing::debug!(%loss, "log is damaged");
-        if self.0.len() < MAX_LOSSES {
+        if !self.is_full() {
             self.0.push(loss);
         } else if let Some(last) = self.0.last_mut() {
             let end = loss.offset.saturating_add(loss.bytes);

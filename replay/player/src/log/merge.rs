@@ -6,6 +6,10 @@ use std::collections::binary_heap::PeekMut;
 
 use super::fields::{Fields, MessageHead};
 
+/// Used-up batches whose memory is kept, and the most of each, bytes: as much as our own chunks take.
+const KEPT: usize = 4;
+const KEPT_BYTES: usize = 3 << 20;
+
 /// A message in a batch.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Entry {
@@ -57,12 +61,21 @@ pub(super) struct Merge {
     batches: Vec<Batch>,
     /// Used-up batches, for reuse.
     spare: Vec<usize>,
+    /// Batches used up since the last piece was read.
+    released: Vec<usize>,
     memory: usize,
 }
 
 impl Merge {
     pub(super) fn new(by_time: bool) -> Self {
-        Self { by_time, heads: BinaryHeap::new(), batches: Vec::new(), spare: Vec::new(), memory: 0 }
+        Self {
+            by_time,
+            heads: BinaryHeap::new(),
+            batches: Vec::new(),
+            spare: Vec::new(),
+            released: Vec::new(),
+            memory: 0,
+        }
     }
 
     /// Memory of the pieces, bytes.
@@ -77,6 +90,15 @@ impl Merge {
 
     /// An empty batch to fill, with the memory of a used-up one.
     pub(super) fn empty_batch(&mut self) -> Batch {
+        // Not before: the bytes of the message taken last may be in one of them.
+        for slot in self.released.drain(..) {
+            if let Some(batch) = self.batches.get_mut(slot)
+                && (batch.memory() > KEPT_BYTES || self.spare.len() >= KEPT)
+            {
+                *batch = Batch::default();
+            }
+            self.spare.push(slot);
+        }
         let spare = self.spare.last().and_then(|slot| self.batches.get_mut(*slot));
         let mut batch = spare.map(core::mem::take).unwrap_or_default();
         batch.clear();
@@ -139,7 +161,7 @@ impl Merge {
 
     fn release(&mut self, slot: usize) {
         self.memory -= self.batches.get(slot).map_or(0, Batch::memory);
-        self.spare.push(slot);
+        self.released.push(slot);
     }
 }
 

@@ -9,19 +9,18 @@ use headrace_geometry::time::MonoNs;
 use mcap::records::op;
 use serde::{Deserialize, Serialize};
 
-use super::channels::{ChannelKind, Channels};
+use super::channels::{Admission, ChannelKind, Channels};
 use super::chunk::{Unpacked, data_section_holds, unpack};
 use super::fields::Fields;
 use super::format::VEHICLE_FILE;
 use super::framing::{ChunkPlace, Definition, LogFile};
+use super::limits::{LATEST, MAX_HELD_BYTES, quoted};
 use super::loss::Losses;
 use super::merge::{Batch, Merge};
 use super::part::{Part, Progress};
-use super::scan::{Piece, Span, date_losses, scan};
-use super::{LogError, Loss, LossKind, SourceInfo};
-
-/// Most bytes of overlapping pieces held in memory to merge their messages.
-const MAX_HELD_BYTES: usize = 256 << 20;
+use super::scan::{FoundDefinitions, Piece, Span, beyond, date_losses, scan};
+use super::{LogError, Loss, LossKind, Many, SourceInfo};
+use crate::regular_file;
 
 /// A log's header.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -92,6 +91,8 @@ pub struct LogPlace {
     latest: u64,
     late: u64,
     losses: Vec<Loss>,
+    /// Channels defined among the messages so far.
+    defined: Vec<Definition>,
 }
 
 /// A channel of a log, from its definition.
@@ -113,7 +114,7 @@ pub struct ChannelInfo<'a> {
 /// summary. A log with a `/loop/tick` channel is then read in file order. Others' logs are brought into the
 /// order of (log time, source, sequence): a piece (a chunk, or about a megabyte of messages outside chunks) is held
 /// from when its earliest message may be next, and overlapping pieces are merged. That is exact as long as
-/// overlapping pieces fit into 256 MiB and chunk headers have correct times; messages out of order are counted in
+/// overlapping pieces fit into 32 MiB and chunk headers have correct times; messages out of order are counted in
 /// [`LogReader::late`].
 ///
 /// Damage is not an error: readable messages are delivered, and [`LogReader::losses`] lists what is missing.
@@ -145,7 +146,8 @@ impl LogReader<File> {
     ///
     /// Errors: the file can't be read, isn't MCAP, or is of a later format.
     pub fn open(path: &Path) -> Result<Self, LogError> {
-        let file = File::open(path).map_err(|source| LogError::Open { path: path.to_owned(), source })?;
+        let file = regular_file::open(path);
+        let file = file.map_err(|source| LogError::Open { path: path.to_owned(), source })?;
         Self::new(file, path.display().to_string())
     }
 }
@@ -195,6 +197,11 @@ impl<R: Read + Seek> LogReader<R> {
     /// The log's header.
     pub fn header(&self) -> &LogInfo {
         &self.info
+    }
+
+    /// Takes the attachments out of the header: they may be long, and are held once.
+    pub(super) fn take_attachments(&mut self) -> Vec<(String, Vec<u8>)> {
+        core::mem::take(&mut self.info.attachments)
     }
 
     /// Whether the log contains the ticks of the loop that wrote it.
@@ -320,6 +327,7 @@ impl<R: Read + Seek> LogReader<R> {
             latest: self.latest,
             late: self.late,
             losses: self.losses.list().to_vec(),
+            defined: self.channels.later().to_vec(),
         }
     }
 
@@ -337,6 +345,8 @@ impl<R: Read + Seek> LogReader<R> {
         for (number, times) in &place.corrected {
             self.correct(*number, *times);
         }
+        // Messages of a channel that is defined only after the position are lost there, as when the log is read straight through.
+        self.channels.go_to(&place.defined);
         for (number, next) in &place.open {
             self.read_span(*number, *next)?;
         }
@@ -388,6 +398,16 @@ impl<R: Read + Seek> LogReader<R> {
 
     fn lose(&mut self, number: usize, kind: LossKind) {
         let Some(span) = self.spans.get(number) else { return };
+        if let LossKind::Beyond { .. } = kind {
+            self.losses.extend(kind, span.at, span.end.saturating_sub(span.at));
+            return;
+        }
+        if self.losses.is_full() {
+            // Only the last one's length grows, and its time is found at the end; each search passes over all that is empty.
+            let (offset, bytes) = (span.at, span.end.saturating_sub(span.at));
+            self.losses.push(Loss { kind, offset, bytes, from: None, to: None });
+            return;
+        }
         let before = self.spans.iter().take(number).rev().find(|span| span.is_dated());
         let after = self.spans.iter().skip(number + 1).find(|span| span.is_dated());
         self.losses.push(Loss {
@@ -439,24 +459,31 @@ fn read_chunk<R: Read + Seek>(
     found: &mut Vec<LossKind>,
 ) -> Result<(), LogError> {
     // Definitions count only once the chunk's checksum has been verified.
-    let (mut definitions, mut sound) = (Vec::new(), true);
+    let (mut definitions, mut sound) = (FoundDefinitions::default(), true);
     let unpacked = unpack(file, place, |opcode, body| match opcode {
         op::MESSAGE => sound &= batch.push(body),
-        op::CHANNEL => definitions.extend(Definition::read(&mut Fields::new(body))),
-        _ => {}
+        opcode => definitions.take(opcode, body),
     })?;
     if let Unpacked::Bad(kind) = unpacked {
         batch.clear();
-        found.push(kind);
+        found.push(match kind {
+            LossKind::Compression(name) => LossKind::Compression(quoted(&name)),
+            kind => kind,
+        });
         return Ok(());
     }
     if !sound {
         found.push(LossKind::Contents);
     }
-    for definition in definitions {
+    if definitions.beyond {
+        found.push(beyond(Many::HeaderBytes));
+    }
+    for definition in definitions.channels {
         let channel = definition.id;
-        if !channels.admit(definition) {
-            found.push(LossKind::Conflict { channel });
+        match channels.admit(definition) {
+            Admission::Known => {}
+            Admission::Conflict => found.push(LossKind::Conflict { channel }),
+            Admission::Beyond(what) => found.push(beyond(what)),
         }
     }
     Ok(())
@@ -477,7 +504,7 @@ fn read_run<R: Read + Seek>(file: &mut LogFile<R>, span: &Span, batch: &mut Batc
     Ok(())
 }
 
-/// Sets the ranks of messages, and removes those of unknown channels and those that are repeated elsewhere.
+/// Sets the ranks of messages, and removes those of unknown channels and times, and those that are repeated elsewhere.
 fn place_entries(
     batch: &mut Batch,
     channels: &Channels,
@@ -485,10 +512,16 @@ fn place_entries(
     found: &mut Vec<LossKind>,
 ) {
     let mut unknown: BTreeMap<u16, u64> = BTreeMap::new();
+    let (mut messages, mut first) = (0, u64::MAX);
     batch.entries.retain_mut(|entry| {
         // Message numbers wrap.
         let is_from = |number: &u32| entry.head.sequence.wrapping_sub(*number) <= u32::MAX / 2;
         if repeated.get(&entry.head.channel).is_some_and(is_from) {
+            return false;
+        }
+        if entry.head.log_time > LATEST.0 {
+            messages += 1;
+            first = first.min(entry.head.log_time);
             return false;
         }
         let channel = channels.get(entry.head.channel);
@@ -499,6 +532,9 @@ fn place_entries(
         }
         channel.is_some()
     });
+    if messages > 0 {
+        found.push(LossKind::Stamped { messages, first });
+    }
     found.extend(
         unknown.into_iter().map(|(channel, messages)| LossKind::UnknownChannel { channel, messages }),
     );

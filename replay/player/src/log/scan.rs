@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use std::io::{Read, Seek};
 
 use headrace_geometry::time::MonoNs;
+use mcap::records::op;
 
 use super::channels::{Channels, listed};
 use super::chunk::{Unpacked, summary_holds, unpack};
@@ -13,16 +14,16 @@ use super::format::{
     ATTACHMENT_PREFIX, CHANNEL_LIST, FORMAT_KEY, FORMAT_VERSION, LOSSES, METADATA, read_loss, unseal,
 };
 use super::framing::{AttachmentPlace, ChunkPlace, Definition, Found, Frame, Item, LogFile, look, schema};
+use super::limits::{
+    HeaderBudget, MAX_ATTACHMENT_BYTES, MAX_CHANNELS, MAX_HEADER_BYTES, MAX_PIECES, MAX_SOURCES,
+    MAX_UNPACKED_BYTES, MAX_UNPACKED_RATIO, map_cost, quoted, unpacked_limit,
+};
 use super::loss::Losses;
 use super::search::find_records;
-use super::{LogError, Loss, LossKind};
+use super::{LogError, Loss, LossKind, Many};
 
 /// Messages outside chunks are read in pieces of about this size, bytes.
 const RUN_BYTES: u64 = 1 << 20;
-/// Definitions and metadata longer than this aren't read, bytes.
-const MAX_WHOLE_BYTES: u64 = 16 << 20;
-/// Limit of all attachments together, bytes.
-const MAX_ATTACHMENT_BYTES: u64 = 64 << 20;
 
 /// A unit of reading.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -70,6 +71,9 @@ pub(super) struct Scan {
     /// Whether the next message may be appended to the last run.
     run_open: bool,
     attachment_bytes: u64,
+    /// Bytes that the chunks unpack to.
+    unpacked: u64,
+    budget: HeaderBudget,
 }
 
 /// Scans a log.
@@ -97,8 +101,23 @@ pub(super) fn scan<R: Read + Seek>(file: &mut LogFile<R>) -> Result<(Scan, Chann
     for loss in core::mem::take(&mut scan.stated) {
         scan.losses.push(loss);
     }
-    let channels = Channels::new(core::mem::take(&mut scan.definitions));
+    let channels = Channels::new(core::mem::take(&mut scan.definitions), scan.budget);
+    if let Some(what) = channels.refused() {
+        scan.losses.extend(beyond(what), 0, 0);
+    }
     Ok((scan, channels))
+}
+
+/// The loss of what is too much.
+pub(super) fn beyond(what: Many) -> LossKind {
+    let limit = match what {
+        Many::Pieces => MAX_PIECES as u64,
+        Many::Channels => MAX_CHANNELS as u64,
+        Many::Sources => MAX_SOURCES as u64,
+        Many::HeaderBytes => MAX_HEADER_BYTES,
+        Many::AttachmentBytes => MAX_ATTACHMENT_BYTES,
+    };
+    LossKind::Beyond { what, limit }
 }
 
 fn not_mcap<R: Read + Seek>(file: &LogFile<R>, first: &[u8]) -> LogError {
@@ -165,8 +184,13 @@ impl Scan {
             Item::Chunk(place) => self.add_chunk(frame.at, frame.end, place),
             Item::Channel => self.add_channel(file, frame)?,
             Item::Schema => {
-                let body = whole_body(file, frame)?;
-                self.schemas.extend(body.and_then(|body| schema(&mut Fields::new(&body))));
+                // Its content isn't kept, and may be long.
+                let body = file.bytes_at(frame.body, (frame.end - frame.body).min(MAX_HEADER_BYTES))?;
+                let schema = schema(&mut Fields::new(&body));
+                if let Some((number, name)) = schema.filter(|(number, _)| !self.schemas.contains_key(number))
+                {
+                    self.add_schema(number, name, frame.at..frame.end);
+                }
             }
             Item::Metadata => self.add_metadata(file, frame)?,
             Item::Attachment(place) => self.add_attachment(file, frame, place)?,
@@ -185,46 +209,96 @@ impl Scan {
         Ok(())
     }
 
+    fn add_schema(&mut self, number: u16, name: String, part: core::ops::Range<u64>) {
+        if self.budget.take(map_cost(1, name.len() as u64)) {
+            self.schemas.insert(number, name);
+        } else {
+            self.lose_beyond(Many::HeaderBytes, part);
+        }
+    }
+
     fn add_message(&mut self, frame: &Frame, log_time: u64) {
-        let last = self.spans.last_mut().filter(|last| self.run_open && last.end - last.at < RUN_BYTES);
+        if frame.end - frame.body > MAX_UNPACKED_BYTES {
+            self.lose(LossKind::TooLarge { limit: MAX_UNPACKED_BYTES }, frame.at..frame.end);
+            return;
+        }
+        // Its length includes what lies between its messages.
+        let within = |last: &&mut Span| self.run_open && frame.end - last.at <= RUN_BYTES;
+        let last = self.spans.last_mut().filter(within);
         if let Some(run) = last {
             (run.end, run.from, run.to) = (frame.end, run.from.min(log_time), run.to.max(log_time));
         } else {
             let (at, end) = (frame.at, frame.end);
-            self.spans.push(Span { at, end, from: log_time, to: log_time, piece: Piece::Run });
-            self.run_open = true;
+            self.run_open = self.add_span(Span { at, end, from: log_time, to: log_time, piece: Piece::Run });
         }
+    }
+
+    /// Adds a piece; `false` if there are too many.
+    fn add_span(&mut self, span: Span) -> bool {
+        let fits = self.spans.len() < MAX_PIECES;
+        if fits {
+            self.spans.push(span);
+        } else {
+            self.lose_beyond(Many::Pieces, span.at..span.end);
+        }
+        fits
     }
 
     fn add_chunk(&mut self, at: u64, end: u64, place: &ChunkPlace) {
         let (from, to) = place.times;
-        self.spans.push(Span { at, end, from, to, piece: Piece::Chunk });
+        // Larger ones aren't unpacked, nor what is cut beyond its records.
+        if !place.compression.is_empty() && !place.cut && place.unpacked_len <= MAX_UNPACKED_BYTES {
+            let unpacked = self.unpacked.saturating_add(place.unpacked_len);
+            if unpacked > unpacked_limit(end) {
+                self.run_open = false;
+                self.losses.extend(LossKind::Swells { limit: MAX_UNPACKED_RATIO }, at, end - at);
+                return;
+            }
+            self.unpacked = unpacked;
+        }
+        self.add_span(Span { at, end, from, to, piece: Piece::Chunk });
         self.run_open = false;
     }
 
     fn add_channel<R: Read + Seek>(&mut self, file: &mut LogFile<R>, frame: &Frame) -> Result<(), LogError> {
-        let body = whole_body(file, frame)?;
-        let Some(definition) = body.and_then(|body| Definition::read(&mut Fields::new(&body))) else {
+        let Some(body) = whole_body(file, frame)? else {
+            self.lose_beyond(Many::HeaderBytes, frame.at..frame.end);
+            return Ok(());
+        };
+        let Some(definition) = Definition::read(&mut Fields::new(&body)) else {
             self.lose(LossKind::Framing, frame.at..frame.end);
             return Ok(());
         };
         let id = definition.id;
         let into = if self.data_end.is_some() { &mut self.summary } else { &mut self.definitions };
-        if *into.entry(id).or_insert_with(|| definition.clone()) != definition {
-            self.lose(LossKind::Conflict { channel: id }, frame.at..frame.end);
+        match into.get(&id) {
+            Some(known) if *known == definition => {}
+            Some(_) => self.lose(LossKind::Conflict { channel: id }, frame.at..frame.end),
+            None if self.budget.take(definition.cost()) => drop(into.insert(id, definition)),
+            None => self.lose_beyond(Many::HeaderBytes, frame.at..frame.end),
         }
         Ok(())
     }
 
     fn add_metadata<R: Read + Seek>(&mut self, file: &mut LogFile<R>, frame: &Frame) -> Result<(), LogError> {
-        let body = whole_body(file, frame)?.unwrap_or_default();
+        let Some(body) = whole_body(file, frame)? else {
+            self.lose_beyond(Many::HeaderBytes, frame.at..frame.end);
+            return Ok(());
+        };
         let mut fields = Fields::new(&body);
-        let (Some(name), Some(mut entries)) = (fields.text(), fields.map()) else {
+        let (Some(name), Some(cost)) = (fields.text(), fields.map_cost()) else {
             self.lose(LossKind::Framing, frame.at..frame.end);
             return Ok(());
         };
+        // Each entry is kept with the name.
+        let names = cost / map_cost(1, 0) * name.len() as u64;
+        if !self.budget.take(cost.saturating_add(names)) {
+            self.lose_beyond(Many::HeaderBytes, frame.at..frame.end);
+            return Ok(());
+        }
+        let mut entries = fields.map().unwrap_or_default();
         if !unseal(name, &mut entries) {
-            self.lose(LossKind::Metadata(name.to_owned()), frame.at..frame.end);
+            self.lose(LossKind::Metadata(quoted(name)), frame.at..frame.end);
         } else if name == CHANNEL_LIST {
             self.has_list = true;
             for definition in listed(&entries) {
@@ -252,19 +326,20 @@ impl Scan {
         place: &AttachmentPlace,
     ) -> Result<(), LogError> {
         self.run_open = false;
-        self.attachment_bytes = self.attachment_bytes.saturating_add(place.data_len);
-        if self.attachment_bytes > MAX_ATTACHMENT_BYTES {
-            self.attachment_bytes -= place.data_len;
-            self.lose(LossKind::TooLarge { limit: MAX_ATTACHMENT_BYTES }, frame.at..frame.end);
+        let cost = map_cost(1, place.data_len.saturating_add(place.head_len));
+        let used = self.attachment_bytes.saturating_add(cost);
+        if used > MAX_ATTACHMENT_BYTES {
+            self.lose_beyond(Many::AttachmentBytes, frame.at..frame.end);
             return Ok(());
         }
+        self.attachment_bytes = used;
         let body = file.bytes_at(frame.body, place.head_len + place.data_len + 4)?;
         // The crate's parser checks the checksum. It requires consistent lengths, which the framing has verified.
-        match mcap::parse_record(mcap::records::op::ATTACHMENT, &body) {
+        match mcap::parse_record(op::ATTACHMENT, &body) {
             Ok(mcap::records::Record::Attachment { data, .. }) => {
                 self.attachments.push((place.name.clone(), data.into_owned()));
             }
-            _ => self.lose(LossKind::Attachment(place.name.clone()), frame.at..frame.end),
+            _ => self.lose(LossKind::Attachment(quoted(&place.name)), frame.at..frame.end),
         }
         Ok(())
     }
@@ -310,26 +385,39 @@ impl Scan {
     /// Reads all chunks for channel definitions, for truncated logs of other writers. Definitions in intact chunks take
     /// precedence over those outside.
     fn look_into_chunks<R: Read + Seek>(&mut self, file: &mut LogFile<R>) -> Result<(), LogError> {
-        for span in &self.spans {
+        for number in 0..self.spans.len() {
+            let Some(span) = self.spans.get(number).copied() else { break };
             let Some(place) = span.chunk(file)? else { continue };
-            let (mut defined, mut schemas) = (Vec::new(), Vec::new());
-            let unpacked = unpack(file, &place, |opcode, body| match opcode {
-                mcap::records::op::CHANNEL => defined.extend(Definition::read(&mut Fields::new(body))),
-                mcap::records::op::SCHEMA => schemas.extend(schema(&mut Fields::new(body))),
-                _ => (),
-            })?;
-            if !matches!(unpacked, Unpacked::Bad(_)) {
-                self.schemas.extend(schemas);
+            let mut found = FoundDefinitions::default();
+            let unpacked = unpack(file, &place, |opcode, body| found.take(opcode, body))?;
+            if matches!(unpacked, Unpacked::Bad(_)) {
+                continue;
             }
-            for definition in defined {
-                match unpacked {
-                    Unpacked::Whole => drop(self.definitions.insert(definition.id, definition)),
-                    Unpacked::Cut => drop(self.definitions.entry(definition.id).or_insert(definition)),
-                    Unpacked::Bad(_) => {}
+            let part = span.at..span.end;
+            for (number, name) in found.schemas {
+                if !self.schemas.contains_key(&number) {
+                    self.add_schema(number, name, part.clone());
                 }
+            }
+            for definition in found.channels {
+                self.add_found(definition, unpacked == Unpacked::Whole, part.clone());
             }
         }
         Ok(())
+    }
+
+    /// Adds a definition found in a chunk; one of a whole chunk replaces what is known.
+    fn add_found(&mut self, definition: Definition, whole: bool, part: core::ops::Range<u64>) {
+        let known = self.definitions.get(&definition.id);
+        if known.is_some_and(|known| !whole || *known == definition) {
+            return;
+        }
+        self.budget.give_back(known.map_or(0, Definition::cost));
+        if self.budget.take(definition.cost()) {
+            self.definitions.insert(definition.id, definition);
+        } else {
+            self.lose_beyond(Many::HeaderBytes, part);
+        }
     }
 
     /// Reports expected records missing from a log of ours, if no other loss has been found.
@@ -349,6 +437,11 @@ impl Scan {
                 self.lose(LossKind::Metadata(name.to_owned()), 0..0);
             }
         }
+    }
+
+    fn lose_beyond(&mut self, what: Many, part: core::ops::Range<u64>) {
+        self.run_open = false;
+        self.losses.extend(beyond(what), part.start, part.end.saturating_sub(part.start));
     }
 
     fn lose(&mut self, kind: LossKind, part: core::ops::Range<u64>) {
@@ -408,8 +501,39 @@ impl Span {
     }
 }
 
+/// Definitions in a chunk, up to the memory that all of a log's may take.
+#[derive(Default)]
+pub(super) struct FoundDefinitions {
+    pub(super) channels: Vec<Definition>,
+    pub(super) schemas: Vec<(u16, String)>,
+    budget: HeaderBudget,
+    /// Whether there was more.
+    pub(super) beyond: bool,
+}
+
+impl FoundDefinitions {
+    /// Takes a record of the chunk, if it is a definition.
+    pub(super) fn take(&mut self, opcode: u8, body: &[u8]) {
+        match opcode {
+            op::CHANNEL => {
+                if let Some(definition) = Definition::read(&mut Fields::new(body)) {
+                    let fits = self.budget.take(definition.cost());
+                    self.beyond |= !fits;
+                    self.channels.extend(Some(definition).filter(|_| fits));
+                }
+            }
+            op::SCHEMA => {
+                let schema = schema(&mut Fields::new(body));
+                let kept = schema.filter(|(_, name)| self.budget.take(map_cost(1, name.len() as u64)));
+                self.schemas.extend(kept);
+            }
+            _ => (),
+        }
+    }
+}
+
 /// A whole record, unless it is too long to be read.
 fn whole_body<R: Read + Seek>(file: &mut LogFile<R>, frame: &Frame) -> Result<Option<Vec<u8>>, LogError> {
     let len = frame.end - frame.body;
-    if len > MAX_WHOLE_BYTES { Ok(None) } else { file.bytes_at(frame.body, len).map(Some) }
+    if len > MAX_HEADER_BYTES { Ok(None) } else { file.bytes_at(frame.body, len).map(Some) }
 }

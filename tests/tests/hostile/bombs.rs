@@ -1,0 +1,88 @@
+//! Bombs: files that claim, or unpack to, far more than they are. Every command that reads one ends, takes less than 200 MiB, and
+//! says what it left out.
+
+use std::io::{Cursor, Read, Result, Seek, SeekFrom};
+
+use headrace_replay::log::{DiveLog, LogReader};
+use headrace_tests::{Folder, VEHICLE};
+
+use crate::bomb_logs::{Bomb, all};
+use crate::run::run;
+
+/// The most that any log may take.
+const MOST_MIB: u64 = 200;
+
+#[test]
+fn bombs_of_logs_take_little_memory_and_are_told() {
+    let folder = Folder::new();
+    folder.write("vehicle.toml", VEHICLE);
+    println!("| bomb | bytes | replay MiB | s | verify MiB | s | recover MiB | s |");
+    let mut wrong = Vec::new();
+    for Bomb { name, bytes, told } in all() {
+        folder.write("bomb.mcap", &bytes);
+        let ran = [
+            &["replay", "bomb.mcap", "--vehicle", "vehicle.toml"][..],
+            &["verify", "bomb.mcap", "--vehicle", "vehicle.toml"],
+            &["recover", "bomb.mcap", "-o", "recovered.mcap", "--force"],
+        ]
+        .map(|arguments| run(&folder, arguments));
+        let cells = ran.each_ref().map(|ran| format!("{} | {:.2}", ran.most_mib, ran.took_s)).join(" | ");
+        println!("| {name} | {} | {cells} |", bytes.len());
+        if ran.iter().any(|ran| ran.most_mib >= MOST_MIB) {
+            wrong.push(format!("{name}: over {MOST_MIB} MiB"));
+        }
+        let [replayed, _, recovered] = ran;
+        if told.is_empty() {
+            continue;
+        }
+        for ran in [replayed, recovered] {
+            let is_told = told.split('|').any(|words| ran.stdout.contains(words));
+            // What is no packet is lost to a dive alone.
+            if (ran.code, is_told) != (Some(3), true) && !(told.contains("over 4096") && ran.code == Some(0))
+            {
+                let start: String = ran.stdout.chars().take(400).collect();
+                wrong.push(format!("{name}: {:?} {start} {}", ran.code, ran.stderr));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// A log in memory that counts what is read of it.
+struct Counted<'a> {
+    log: Cursor<&'a [u8]>,
+    read: u64,
+}
+
+impl Read for Counted<'_> {
+    fn read(&mut self, into: &mut [u8]) -> Result<usize> {
+        let count = self.log.read(into)?;
+        self.read += count as u64;
+        Ok(count)
+    }
+}
+
+impl Seek for Counted<'_> {
+    fn seek(&mut self, to: SeekFrom) -> Result<u64> {
+        self.log.seek(to)
+    }
+}
+
+#[test]
+fn what_is_read_of_a_bomb_is_in_proportion_to_its_length() {
+    for Bomb { name, bytes, .. } in all() {
+        let mut counted = Counted { log: Cursor::new(&bytes), read: 0 };
+        let mut messages = 0_u64;
+        let mut log = DiveLog::of(LogReader::new(&mut counted, name.to_owned()).unwrap());
+        while log.next().unwrap().is_some() {
+            messages += 1;
+        }
+        assert!(log.losses().len() <= 1200, "{name}: {} losses", log.losses().len());
+        drop(log);
+        let len = bytes.len() as u64;
+        println!("{name}: {len} bytes, {} read, {messages} messages", counted.read);
+        // Frames are looked at in steps of a reader's buffer, which is filled anew after each jump.
+        assert!(counted.read <= (1 << 20) + 16 * len, "{name}: {} of {len}", counted.read);
+        assert!(messages <= len / 31 + 100, "{name}: {messages} of {len} bytes");
+    }
+}
