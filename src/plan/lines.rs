@@ -1,7 +1,5 @@
 //! `headrace plan --write`: what to put into the vehicle file.
 
-use std::fmt::Write as _;
-
 use crate::cli::Plan;
 use crate::failure::Failure;
 
@@ -32,12 +30,11 @@ pub(super) fn lines(findings: &Findings, args: &Plan) -> Result<String, Failure>
     let range = args.range.map(|range_m| format!("range_m = {range_m}\n")).unwrap_or_default();
     for (id, start) in findings.heads.iter().zip(&findings.briefing.starts) {
         let way = if start.growing { "growing" } else { "falling" };
-        // Writing to a string can't fail.
-        let _ = write!(
-            text,
+        let sensor = format!(
             "\n[[sensors]]    # {id}: begins at {:.1} degrees, {way}\nmode = {mode:?}\n{range}",
             start.angle_deg
         );
+        text.push_str(&sensor);
     }
     Ok(text)
 }

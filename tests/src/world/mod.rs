@@ -336,7 +336,7 @@ impl World {
             device.step(now, quiet);
         }
         if self.sabotage == Some(Sabotage::NeighbourBreaks)
-            && let Some(other) = self.devices.iter().position(|device| device.is_broken())
+            && let Some(other) = self.devices.iter().position(Device::is_broken)
         {
             self.devices[(other + 1) % SENSORS.len()].cable().break_off(0);
         }
