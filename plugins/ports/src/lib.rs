@@ -15,6 +15,7 @@ mod probe;
 mod status;
 mod supervisor;
 pub mod uhid;
+mod wake;
 
 pub use clock::{clock_anchor, now, of_wall};
 pub use device_end::{EmulatedPort, wait_for_any};

@@ -7,7 +7,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::Duration;
 
-use crossbeam::sync::Unparker;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::ring::{MAX_PACKET_BYTES, Port};
 use headrace_sensor::connect::{Connect, ConnectError};
@@ -18,6 +17,7 @@ use crate::diagnosis;
 use crate::lines::{self, Line, READ_BYTES, Senders};
 use crate::open_error::OpenError;
 use crate::status::{Board, LineHistory, Phase, Status};
+use crate::wake::Waker;
 
 /// Reconnect backoff: initial and maximum pause; shorter for local ports, which are cheap to retry.
 const FIRST_PAUSE: DurNs = DurNs::from_millis(250);
@@ -48,7 +48,7 @@ pub(crate) struct Attached {
 pub(crate) struct Common {
     pub stopping: Arc<AtomicBool>,
     pub board: Board,
-    pub waker: Unparker,
+    pub waker: Waker,
     pub sent: Option<SentSink>,
 }
 
@@ -228,7 +228,7 @@ impl LineThread {
         for AttachedState { attached: Attached { driver, port, .. }, history, .. } in &mut self.devices {
             driver.closed(&mut Ends { port, history, requests: &mut VecDeque::new() });
         }
-        self.common.waker.unpark();
+        self.common.waker.wake();
     }
 
     fn count_lost(&mut self) {
@@ -291,7 +291,7 @@ impl LineThread {
             }
             self.drive(line, number, |driver, wire| driver.heard(received, bytes, wire))?;
         }
-        self.common.waker.unpark();
+        self.common.waker.wake();
         Ok(())
     }
 
@@ -307,7 +307,7 @@ impl LineThread {
             let awaited = others.any(|(other, device)| other != number && awaits(device));
             if device.attached.driver.due().is_some_and(|due| due <= now) && !awaited {
                 self.drive(line, number, |driver, wire| driver.wake(now, wire))?;
-                self.common.waker.unpark();
+                self.common.waker.wake();
             }
         }
         Ok(())

@@ -12,15 +12,16 @@ use std::thread::{self, JoinHandle};
 
 use crossbeam::queue::ArrayQueue;
 use headrace_geometry::time::MonoNs;
+use headrace_monitor::byte_ring::ByteProducer as _;
 use ringbuf::HeapRb;
-use ringbuf::traits::{Observer as _, Producer as _};
+use ringbuf::traits::Observer as _;
 use ringbuf::wrap::{Cons, Prod};
 
 use super::LogError;
 use super::derived_channels::DerivedChannels;
 use super::format::{TICK_HEAD_BYTES, order_bytes, tick_head};
 use super::part::part_path;
-use super::queue::{ENTRY_HEAD_BYTES, Queue, SentMessage, State, entry_head};
+use super::queue::{ENTRY_HEAD_BYTES, Entries, Queue, SentMessage, State};
 use super::rotate::{Parts, Rotation, in_the_way};
 use super::space::Space;
 use super::worker::{Beside, Echoes, Worker};
@@ -46,7 +47,7 @@ pub struct Recorder;
 /// The loop's end. Its methods don't block, allocate or make system calls.
 pub struct RecorderPort {
     /// Without a cached index, so that the port is `Sync` and can be a resource of the loop's world.
-    ring: Prod<Arc<HeapRb<u8>>>,
+    entries: Entries,
     state: Arc<State>,
     result_channels: usize,
 }
@@ -129,7 +130,7 @@ impl Recorder {
             thread.spawn(move || Worker::new(log, parts, space, echoes, beside, &thread_state).run(queue));
         let thread = Some(thread.map_err(|source| LogError::Thread { source })?);
         let port = RecorderPort {
-            ring: Prod::new(ring),
+            entries: Entries { ring: Prod::new(ring) },
             state: Arc::clone(&state),
             result_channels: header.results.len(),
         };
@@ -233,10 +234,10 @@ impl RecorderPort {
     /// Errors: no room; nothing was written.
     pub fn tick(&mut self, index: u64, now: MonoNs, order: &[u16]) -> Result<(), Full> {
         let len = TICK_HEAD_BYTES.saturating_add(order.len().saturating_mul(2));
-        self.begin(Lane::Tick, now, now, len)?;
+        self.entries.begin(Lane::Tick, now, now, len)?;
         // `begin` has reserved room for the whole entry, whose length is a u32, so the count fits as well.
-        self.ring.push_slice(&tick_head(index, now, u32::try_from(order.len()).unwrap_or(u32::MAX)));
-        self.ring.push_iter(order_bytes(order));
+        self.entries.put(&tick_head(index, now, u32::try_from(order.len()).unwrap_or(u32::MAX)));
+        self.entries.ring.push_each(order_bytes(order));
         Ok(())
     }
 
@@ -259,12 +260,12 @@ impl RecorderPort {
 
     /// Free bytes of the queue.
     pub fn vacant_bytes(&self) -> usize {
-        self.ring.vacant_len()
+        self.entries.ring.vacant_len()
     }
 
     /// Capacity of the queue, bytes; a larger entry never fits.
     pub fn capacity_bytes(&self) -> usize {
-        self.ring.capacity().get()
+        self.entries.ring.capacity().get()
     }
 
     /// Bytes in the queue of an entry with a message of `len` bytes.
@@ -283,17 +284,8 @@ impl RecorderPort {
     }
 
     fn push(&mut self, lane: Lane, log_time: MonoNs, publish_time: MonoNs, bytes: &[u8]) -> Result<(), Full> {
-        self.begin(lane, log_time, publish_time, bytes.len())?;
-        self.ring.push_slice(bytes);
-        Ok(())
-    }
-
-    /// Reserves room for an entry with a message of `len` bytes, and writes its header. The thread takes an entry only once
-    /// it is complete.
-    fn begin(&mut self, lane: Lane, log_time: MonoNs, publish_time: MonoNs, len: usize) -> Result<(), Full> {
-        let (free, needed) = (self.vacant_bytes(), Self::entry_bytes(len));
-        let len = u32::try_from(len).ok().filter(|_| needed <= free).ok_or(Full { free, needed })?;
-        self.ring.push_slice(&entry_head(lane, log_time, publish_time, len));
+        self.entries.begin(lane, log_time, publish_time, bytes.len())?;
+        self.entries.put(bytes);
         Ok(())
     }
 }

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use super::LogError;
 use super::derived_channels::{DerivedChannels, Made};
-use super::queue::{Entry, Queue, State};
+use super::queue::{Entry, Queue, State, until_stopped};
 use super::rotate::Parts;
 use super::space::{LONGEST_KEPT_BYTES, Space};
 use super::writer::{Lane, LogHeader, LogWriter, Summary};
@@ -93,21 +93,17 @@ impl<'a, W: Write> Worker<'a, W> {
     }
 
     pub(super) fn run(mut self, mut queue: Queue) -> Result<Summary, LogError> {
-        loop {
+        let state = self.state;
+        let work = || {
             self.space.look(wall_clock());
-            // Read before the queue is checked, so that entries pushed before the flag was set are taken.
-            let stopping = self.state.stopping.load(Ordering::Acquire);
             let taken =
                 (0..BATCH).map_while(|_| queue.take().map(|entry| self.write_all(&entry, &queue.message)));
             let taken = taken.count() + self.write_sent();
             self.flush_in_time();
-            if taken == 0 && stopping {
-                return self.finish();
-            }
-            if taken == 0 {
-                thread::park_timeout(NAP);
-            }
-        }
+            taken
+        };
+        until_stopped(|| state.stopping.load(Ordering::Acquire), work, || thread::park_timeout(NAP));
+        self.finish()
     }
 
     /// Writes an entry and the messages derived from it.
